@@ -1,0 +1,54 @@
+//! The outcome of a solve is data: a status beside the numbers, and the work that was spent on them.
+
+/// What became of a row. The order is the order in summaries.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[repr(u8)]
+pub enum Status {
+    /// Every number is good to the requested tolerance.
+    Ok,
+    /// Computed, but `0 < v < 1` somewhere: outside the range of the friction law.
+    BelowBound,
+    /// No such protocol: `theta <= 0` or `v <= 0` somewhere, or `t_f < t_min`.
+    Infeasible,
+    /// `tau <= max(0, b - a)` somewhere on the optimal path, where the extremal need not be unique.
+    Nonphysical,
+    /// A defect of ours: the solver could not certify its answer.
+    NotConverged,
+}
+
+impl Status {
+    /// All statuses, in their order.
+    pub const ALL: [Status; 5] =
+        [Status::Ok, Status::BelowBound, Status::Infeasible, Status::Nonphysical, Status::NotConverged];
+
+    /// The name that is written into tables.
+    pub fn name(self) -> &'static str {
+        match self {
+            Status::Ok => "ok",
+            Status::BelowBound => "below_bound",
+            Status::Infeasible => "infeasible",
+            Status::Nonphysical => "nonphysical",
+            Status::NotConverged => "not_converged",
+        }
+    }
+}
+
+/// Work spent on a solve; exact and the same on every machine.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Effort {
+    /// Quadratures evaluated.
+    pub quadratures: u32,
+    /// Quadrature nodes evaluated, all quadratures together.
+    pub nodes: u32,
+}
+
+/// A status, the numbers where there are any, and the effort.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Solved<T> {
+    /// What became of it.
+    pub status: Status,
+    /// The numbers; `None` wherever the status is `Infeasible` or `NotConverged`.
+    pub value: Option<T>,
+    /// Work spent.
+    pub effort: Effort,
+}
