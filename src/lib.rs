@@ -1,4 +1,21 @@
 //! Exact parameter sweeps over the control of rate-and-state friction.
+//!
+//! The rooms of the crate, each of which imports only from those before it:
+//!
+//! - [`model`]: the friction law and the change of velocity asked of it;
+//! - [`numerics`]: tools that know no friction;
+//! - [`protocol`]: the optimal protocol, its crossover times, and the cubic shortcuts;
+//! - [`grid`]: quantities, axes and the product of axes;
+//! - [`table`]: what a row means;
+//! - [`dataset`]: tables as Parquet parts on disk, and reading them back;
+//! - [`sweep`]: a spec, checked, planned and run;
+//! - [`cli`]: the commands.
+
+pub mod cli;
+pub mod dataset;
+pub mod grid;
 pub mod model;
 pub mod numerics;
 pub mod protocol;
+pub mod sweep;
+pub mod table;

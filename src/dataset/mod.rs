@@ -1,0 +1,12 @@
+//! Tables on disk: Parquet parts, the manifest beside them, and reading them back.
+
+mod atomic;
+mod folder;
+mod footer;
+mod layout;
+mod part;
+
+pub use folder::{DatasetError, Folder, Identity, Manifest, ManifestTable};
+pub use footer::Footer;
+pub use layout::Layout;
+pub use part::encode;

@@ -1,0 +1,116 @@
+//! An axis: a finite sequence of values of one quantity, told by index and never accumulated.
+
+use super::quantity::{Quantity, Scale};
+
+/// The values of an axis.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Values {
+    /// Given one by one.
+    List(Vec<f64>),
+    /// `first + i (last - first)/(count - 1)`, both ends exact.
+    Linspace {
+        /// Value at index 0.
+        first: f64,
+        /// Value at index `count - 1`.
+        last: f64,
+        /// Number of values, at least 2.
+        count: u64,
+    },
+    /// `first (last/first)^(i/(count - 1))`, both ends exact.
+    Geomspace {
+        /// Value at index 0, not 0.
+        first: f64,
+        /// Value at index `count - 1`, of the same sign.
+        last: f64,
+        /// Number of values, at least 2.
+        count: u64,
+    },
+}
+
+impl Values {
+    /// Number of values.
+    pub fn len(&self) -> u64 {
+        match self {
+            Values::List(values) => values.len() as u64,
+            Values::Linspace { count, .. } | Values::Geomspace { count, .. } => *count,
+        }
+    }
+
+    /// Whether there is no value at all.
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// The value at `index < len()`.
+    pub fn at(&self, index: u64) -> f64 {
+        match *self {
+            Values::List(ref values) => values[index as usize],
+            Values::Linspace { last, count, .. } | Values::Geomspace { last, count, .. } if index + 1 >= count => last,
+            Values::Linspace { first, last, count } => {
+                // Each end is divided on its own, as their difference can overflow.
+                let steps = (count - 1) as f64;
+                first + index as f64 * (last / steps - first / steps)
+            }
+            Values::Geomspace { first, last, count } => {
+                // Base 10 keeps the decades exact, as in 10, 100, 1000.
+                let decades = libm::log10(last / first);
+                first * libm::exp10(decades * (index as f64 / (count - 1) as f64))
+            }
+        }
+    }
+}
+
+/// One quantity and the values it takes.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Axis {
+    /// What varies.
+    pub quantity: Quantity,
+    /// The unit of the values.
+    pub scale: Scale,
+    /// The values.
+    pub values: Values,
+}
+
+#[cfg(test)]
+mod tests {
+    //! Ranges hit both ends exactly and never drift.
+
+    use super::*;
+
+    #[test]
+    fn linspace_is_start_plus_i_steps() {
+        let axis = Values::Linspace { first: -0.5, last: 0.5, count: 401 };
+        assert_eq!(axis.len(), 401);
+        assert_eq!(axis.at(0), -0.5);
+        assert_eq!(axis.at(400), 0.5);
+        assert_eq!(axis.at(200), 0.0);
+        for i in 0..401 {
+            assert!((axis.at(i) - (i as f64 - 200.0) / 400.0).abs() <= 1.2e-16, "{i}");
+        }
+    }
+
+    #[test]
+    fn linspace_spans_the_whole_range_of_doubles() {
+        let axis = Values::Linspace { first: -f64::MAX, last: f64::MAX, count: 3 };
+        assert_eq!([axis.at(0), axis.at(1), axis.at(2)], [-f64::MAX, 0.0, f64::MAX]);
+    }
+
+    #[test]
+    fn geomspace_keeps_decades_and_ends() {
+        let axis = Values::Geomspace { first: 10.0, last: 1000.0, count: 31 };
+        assert_eq!([axis.at(0), axis.at(15), axis.at(30)], [10.0, 100.0, 1000.0]);
+        let odd = Values::Geomspace { first: 3.7, last: 2900.1, count: 7 };
+        assert_eq!([odd.at(0), odd.at(6)], [3.7, 2900.1]);
+        let negative = Values::Geomspace { first: -100.0, last: -1.0, count: 3 };
+        assert_eq!(negative.at(1), -10.0);
+    }
+
+    #[test]
+    fn geomspace_has_equal_ratios() {
+        let axis = Values::Geomspace { first: 1e-3, last: 2.0, count: 1001 };
+        let ratio = axis.at(1) / axis.at(0);
+        for i in 1..1000 {
+            assert!((axis.at(i + 1) / axis.at(i) / ratio - 1.0).abs() <= 4e-15, "{i}");
+        }
+    }
+}

@@ -1,0 +1,183 @@
+//! The quantities a sweep can vary: name, unit, meaning, legal range and default of each.
+
+use std::fmt;
+
+/// A quantity that can be an axis of a sweep.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[repr(u8)]
+pub enum Quantity {
+    /// Duration of the protocol.
+    Time,
+    /// Direct effect.
+    A,
+    /// Effect of the contact lifetime.
+    B,
+    /// Initial velocity.
+    InitialVelocity,
+    /// Final velocity.
+    FinalVelocity,
+    /// Linear coefficient of the cubic shortcut.
+    Alpha2,
+    /// Quadratic coefficient of the cubic shortcut.
+    Alpha3,
+    /// Stiffness of the spring.
+    Stiffness,
+    /// Mass of the block.
+    Mass,
+}
+
+/// The legal range of a number: an interval, with the text that messages show.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Domain {
+    /// The range in words, as in `a > 0, finite`.
+    pub text: &'static str,
+    least: f64,
+    least_excluded: bool,
+    greatest: f64,
+}
+
+impl Domain {
+    /// Whether `value` is in the range; NaN never is.
+    pub fn contains(&self, value: f64) -> bool {
+        let above = if self.least_excluded { value > self.least } else { value >= self.least };
+        above && value <= self.greatest
+    }
+}
+
+impl fmt::Display for Domain {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.text)
+    }
+}
+
+/// Legal range of every `rtol`: below it doubles cannot follow, above it a result means nothing.
+pub const RTOL: Domain = Domain { text: "1e-13 <= rtol <= 1e-2", least: 1e-13, least_excluded: false, greatest: 1e-2 };
+
+/// The unit in which the values of a coefficient axis are given and reported.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Scale {
+    /// The scaled units of the model: the value is the coefficient.
+    Model,
+    /// Relative to the duration: the coefficient of `t^n` is the value over `t_f^n` (`n = 1` for `alpha_2`, 2 for `alpha_3`).
+    Duration,
+}
+
+impl Quantity {
+    /// Every quantity; axis columns come in this order.
+    pub const ALL: [Quantity; 9] = [
+        Quantity::Time,
+        Quantity::A,
+        Quantity::B,
+        Quantity::InitialVelocity,
+        Quantity::FinalVelocity,
+        Quantity::Alpha2,
+        Quantity::Alpha3,
+        Quantity::Stiffness,
+        Quantity::Mass,
+    ];
+
+    /// The quantity of this name.
+    pub fn from_name(name: &str) -> Option<Quantity> {
+        Quantity::ALL.into_iter().find(|quantity| quantity.name() == name)
+    }
+
+    /// The name in specs and tables.
+    pub fn name(self) -> &'static str {
+        match self {
+            Quantity::Time => "t_f",
+            Quantity::A => "a",
+            Quantity::B => "b",
+            Quantity::InitialVelocity => "v_i",
+            Quantity::FinalVelocity => "v_f",
+            Quantity::Alpha2 => "alpha_2",
+            Quantity::Alpha3 => "alpha_3",
+            Quantity::Stiffness => "k",
+            Quantity::Mass => "m",
+        }
+    }
+
+    /// What it means, in one line.
+    pub fn doc(self) -> &'static str {
+        match self {
+            Quantity::Time => "duration of the protocol",
+            Quantity::A => "direct effect of the velocity on friction",
+            Quantity::B => "effect of the contact lifetime on friction",
+            Quantity::InitialVelocity => "velocity of the initial steady state",
+            Quantity::FinalVelocity => "velocity of the final steady state",
+            Quantity::Alpha2 => "coefficient of t in the contact lifetime of the cubic shortcut",
+            Quantity::Alpha3 => "coefficient of t^2 in the contact lifetime of the cubic shortcut",
+            Quantity::Stiffness => "stiffness of the spring",
+            Quantity::Mass => "mass of the block",
+        }
+    }
+
+    /// Its unit, for values given in `scale`.
+    pub fn unit(self, scale: Scale) -> &'static str {
+        match (self, scale) {
+            (Quantity::Time, _) => "l/v_0",
+            (Quantity::A | Quantity::B, _) => "mu_0",
+            (Quantity::InitialVelocity | Quantity::FinalVelocity, _) => "v_0",
+            (Quantity::Alpha2, Scale::Model) => "1",
+            (Quantity::Alpha2, Scale::Duration) => "1/t_f",
+            (Quantity::Alpha3, Scale::Model) => "v_0/l",
+            (Quantity::Alpha3, Scale::Duration) => "1/t_f^2",
+            (Quantity::Stiffness, _) => "mu_0 sigma/l",
+            (Quantity::Mass, _) => "mu_0 sigma l/v_0^2",
+        }
+    }
+
+    /// Whether its values can be given relative to `t_f`.
+    pub fn has_scale(self) -> bool {
+        matches!(self, Quantity::Alpha2 | Quantity::Alpha3)
+    }
+
+    /// Its legal range.
+    pub fn domain(self) -> Domain {
+        let above = |text, least| Domain { text, least, least_excluded: true, greatest: f64::MAX };
+        let from = |text, least| Domain { text, least, least_excluded: false, greatest: f64::MAX };
+        match self {
+            Quantity::Time => above("t_f > 0, finite", 0.0),
+            Quantity::A => above("a > 0, finite", 0.0),
+            Quantity::B => from("b >= 0, finite", 0.0),
+            Quantity::InitialVelocity => above("v_i > 1, finite", 1.0),
+            Quantity::FinalVelocity => above("v_f > 1, finite", 1.0),
+            Quantity::Alpha2 => from("alpha_2 finite", f64::MIN),
+            Quantity::Alpha3 => from("alpha_3 finite", f64::MIN),
+            Quantity::Stiffness => Domain { greatest: f64::INFINITY, ..above("k > 0 (inf: rigid)", 0.0) },
+            Quantity::Mass => from("m >= 0, finite", 0.0),
+        }
+    }
+
+    /// The value it has in a spec that does not name it; `None` where every table that needs it must be told.
+    pub fn default(self) -> Option<f64> {
+        match self {
+            Quantity::Stiffness => Some(f64::INFINITY),
+            Quantity::Mass => Some(0.0),
+            _ => None,
+        }
+    }
+}
+
+/// The values of all quantities at one point of a grid; NaN for those that the grid does not hold.
+#[derive(Debug, Clone, Copy)]
+pub struct Point([f64; Quantity::ALL.len()]);
+
+impl Default for Point {
+    fn default() -> Self {
+        Point([f64::NAN; Quantity::ALL.len()])
+    }
+}
+
+impl std::ops::Index<Quantity> for Point {
+    type Output = f64;
+
+    fn index(&self, quantity: Quantity) -> &f64 {
+        &self.0[quantity as usize]
+    }
+}
+
+impl std::ops::IndexMut<Quantity> for Point {
+    fn index_mut(&mut self, quantity: Quantity) -> &mut f64 {
+        &mut self.0[quantity as usize]
+    }
+}

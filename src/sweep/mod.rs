@@ -1,0 +1,15 @@
+//! A sweep: spec (as written) -> check (against what is legal) -> plan (what there is to do) -> engine (doing it).
+
+mod check;
+mod engine;
+mod error;
+mod place;
+mod plan;
+mod points;
+mod spec;
+
+pub use check::{Request, Sweep};
+pub use engine::{Outcome, RunError, run};
+pub use error::SpecError;
+pub use plan::Plan;
+pub use spec::{AccuracySpec, AxisForm, AxisSpec, ModelSpec, Spec, TableSpec};

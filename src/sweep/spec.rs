@@ -1,0 +1,145 @@
+//! The spec as it is written: its keys and their types, and nothing about what is legal.
+
+use std::fmt;
+use std::path::PathBuf;
+
+use indexmap::IndexMap;
+use serde::de::value::{MapAccessDeserializer, SeqAccessDeserializer};
+use serde::de::{MapAccess, SeqAccess, Visitor};
+use serde::{Deserialize, Deserializer};
+use toml::Value;
+
+/// A sweep spec.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Spec {
+    /// Name of the dataset and of its folder.
+    pub name: String,
+    /// What the sweep is for.
+    #[serde(default)]
+    pub description: String,
+    /// A file of points whose columns are axes that vary together; relative to the spec.
+    pub points: Option<PathBuf>,
+    /// Axes that advance together.
+    pub zip: Option<Value>,
+    /// Condition of the rows to keep.
+    #[serde(rename = "where")]
+    pub condition: Option<Value>,
+    /// Grids to unite.
+    pub block: Option<Value>,
+    /// What is modelled.
+    #[serde(default)]
+    pub model: ModelSpec,
+    /// How accurate the numbers are.
+    #[serde(default)]
+    pub accuracy: AccuracySpec,
+    /// The axes, the last varies fastest.
+    #[serde(default)]
+    pub axes: IndexMap<String, AxisSpec>,
+    /// The tables to write.
+    #[serde(default)]
+    pub tables: IndexMap<String, TableSpec>,
+}
+
+/// `[model]`.
+#[derive(Debug, Clone, PartialEq, Eq, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct ModelSpec {
+    /// Whether optimal protocols obey `v >= 1`.
+    pub velocity_bound: bool,
+    /// Units of the values.
+    pub units: String,
+}
+
+impl Default for ModelSpec {
+    fn default() -> Self {
+        ModelSpec { velocity_bound: true, units: "dimensionless".to_owned() }
+    }
+}
+
+/// `[accuracy]`.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct AccuracySpec {
+    /// Relative accuracy of the numbers.
+    pub rtol: f64,
+}
+
+impl Default for AccuracySpec {
+    fn default() -> Self {
+        AccuracySpec { rtol: 1e-10 }
+    }
+}
+
+/// The value of a key of `[axes]`.
+#[derive(Debug, Clone, PartialEq)]
+pub enum AxisSpec {
+    /// One value.
+    Number(f64),
+    /// Values one by one.
+    List(Vec<f64>),
+    /// A range, or values with a unit.
+    Form(AxisForm),
+}
+
+/// An axis written as a table.
+#[derive(Debug, Clone, PartialEq, Default, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct AxisForm {
+    /// `[first, last, count]`, evenly spaced.
+    pub linspace: Option<Vec<f64>>,
+    /// `[first, last, count]`, evenly spaced in the logarithm.
+    pub geomspace: Option<Vec<f64>>,
+    /// Unit of the values.
+    pub unit: Option<String>,
+    /// An expression of other axes.
+    pub expr: Option<Value>,
+    /// A Sobol sequence.
+    pub sobol: Option<Value>,
+    /// A Latin hypercube.
+    pub lhs: Option<Value>,
+    /// Seed of a sampled axis.
+    pub seed: Option<Value>,
+}
+
+/// The value of a key of `[tables]`.
+#[derive(Debug, Clone, PartialEq, Default, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct TableSpec {
+    /// The columns to compute and write; all by default.
+    pub columns: Option<Vec<String>>,
+    /// Accuracy of this table.
+    pub rtol: Option<f64>,
+}
+
+impl<'de> Deserialize<'de> for AxisSpec {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        deserializer.deserialize_any(AxisVisitor)
+    }
+}
+
+struct AxisVisitor;
+
+impl<'de> Visitor<'de> for AxisVisitor {
+    type Value = AxisSpec;
+
+    fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("a number, a list of numbers or a range such as { linspace = [first, last, count] }")
+    }
+
+    fn visit_f64<E>(self, value: f64) -> Result<AxisSpec, E> {
+        Ok(AxisSpec::Number(value))
+    }
+
+    fn visit_i64<E>(self, value: i64) -> Result<AxisSpec, E> {
+        Ok(AxisSpec::Number(value as f64))
+    }
+
+    fn visit_seq<A: SeqAccess<'de>>(self, values: A) -> Result<AxisSpec, A::Error> {
+        Vec::deserialize(SeqAccessDeserializer::new(values)).map(AxisSpec::List)
+    }
+
+    fn visit_map<A: MapAccess<'de>>(self, form: A) -> Result<AxisSpec, A::Error> {
+        AxisForm::deserialize(MapAccessDeserializer::new(form)).map(AxisSpec::Form)
+    }
+}

@@ -1,0 +1,74 @@
+//! `best`: the cubic shortcut of least work.
+
+use std::ops::Range;
+
+use super::optima::{OPTIMUM_AXES, transition};
+use super::{Column, Job, Kind, Selection, Sheet, Stopped, Table, Work, rows};
+use crate::grid::{Quantity, Scale};
+use crate::protocol::best;
+
+/// One row a transition and time.
+pub struct Best;
+
+const COLUMNS: &[Column] = &[
+    Column {
+        name: "alpha_2",
+        kind: Kind::Quantity(Quantity::Alpha2),
+        doc: "coefficient of t of the best shortcut; in the unit of the spec's alpha_2, 1/t_f if it has none",
+    },
+    Column {
+        name: "alpha_3",
+        kind: Kind::Quantity(Quantity::Alpha3),
+        doc: "coefficient of t^2 of the best shortcut; in the unit of the spec's alpha_3, 1/t_f^2 if it has none",
+    },
+    Column::number("work", "mu_0 sigma l", "work of friction W_s of the best shortcut"),
+    Column::number("work_optimal", "mu_0 sigma l", "least work of friction W* of any protocol"),
+    Column::number("gap", "1", "(W_s - W*)/W*, computed without cancellation"),
+    Column::number("v_min", "v_0", "least velocity of the best shortcut"),
+];
+
+impl Table for Best {
+    fn name(&self) -> &'static str {
+        "best"
+    }
+
+    fn doc(&self) -> &'static str {
+        "the cubic shortcut of least work, over the whole (alpha_2, alpha_3) plane"
+    }
+
+    fn axes(&self) -> &'static [Quantity] {
+        OPTIMUM_AXES
+    }
+
+    fn columns(&self) -> &'static [Column] {
+        COLUMNS
+    }
+
+    fn rows_per_part(&self) -> u64 {
+        1 << 10
+    }
+
+    fn needs_optimum(&self, _selection: &Selection) -> bool {
+        false
+    }
+
+    fn compute(&self, job: &Job<'_>, range: Range<u64>, sheet: &mut Sheet) -> Result<Work, Stopped> {
+        let natural = |quantity| job.grid.scale(quantity) == Some(Scale::Model);
+        let (natural_2, natural_3) = (natural(Quantity::Alpha2), natural(Quantity::Alpha3));
+        rows::each(job, range, (COLUMNS.len(), 1), sheet, |_, point, cells| {
+            let t_f = point[Quantity::Time];
+            let solved = best::solve(&transition(point), t_f, job.bounded, job.rtol);
+            if let Some(best) = solved.value {
+                cells.copy_from_slice(&[
+                    if natural_2 { best.a_2 / t_f } else { best.a_2 },
+                    if natural_3 { best.a_3 / (t_f * t_f) } else { best.a_3 },
+                    best.work,
+                    best.work_optimal,
+                    best.gap,
+                    best.v_min,
+                ]);
+            }
+            (solved.status, Work { best: 1, ..Work::from(solved.effort) })
+        })
+    }
+}

@@ -1,0 +1,47 @@
+//! A column: one definition gives its name, what it holds, its unit and its meaning.
+
+use crate::grid::{Grid, Quantity, Scale};
+
+/// What a column holds.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Kind {
+    /// A number in this unit.
+    Number(&'static str),
+    /// A value of a quantity, in the unit of its axis; relative to `t_f` where the grid has no such axis.
+    Quantity(Quantity),
+    /// One of these words.
+    Label(&'static [&'static str]),
+}
+
+/// One column of a table.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Column {
+    /// Its name.
+    pub name: &'static str,
+    /// What it holds.
+    pub kind: Kind,
+    /// Its meaning in one line.
+    pub doc: &'static str,
+}
+
+impl Column {
+    /// A column of numbers in `unit`.
+    pub const fn number(name: &'static str, unit: &'static str, doc: &'static str) -> Column {
+        Column { name, kind: Kind::Number(unit), doc }
+    }
+
+    /// The unit of its values in a sweep over `grid`; empty for words.
+    pub fn unit(&self, grid: &Grid) -> &'static str {
+        match self.kind {
+            Kind::Number(unit) => unit,
+            Kind::Quantity(quantity) => quantity.unit(grid.scale(quantity).unwrap_or(Scale::Duration)),
+            Kind::Label(_) => "",
+        }
+    }
+}
+
+/// Name of the last column of every table.
+pub const STATUS: &str = "status";
+
+/// Meaning of the last column of every table.
+pub const STATUS_DOC: &str = "what became of the row; numbers are null where there are none";

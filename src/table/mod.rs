@@ -1,0 +1,71 @@
+//! What a row means: the tables, one file each, and what they have in common.
+
+mod best;
+mod column;
+mod crossover;
+mod gap;
+mod optima;
+mod optimal;
+mod rows;
+mod sheet;
+
+use std::ops::Range;
+
+use crate::grid::{Grid, Projection, Quantity, Tuples};
+
+pub use column::{Column, Kind, STATUS, STATUS_DOC};
+pub use optima::{OPTIMUM_AXES, Optima};
+pub use sheet::{Selection, Sheet, Signal, Stopped, Work};
+
+/// A table: what its rows depend on, what they hold and how they are computed.
+pub trait Table: Sync {
+    /// Its name in specs and its folder's name.
+    fn name(&self) -> &'static str;
+
+    /// What a row is, in one line.
+    fn doc(&self) -> &'static str;
+
+    /// The quantities that a row depends on; its first columns, in the order of [`Quantity::ALL`].
+    fn axes(&self) -> &'static [Quantity];
+
+    /// The columns after the axes, without `status`.
+    fn columns(&self) -> &'static [Column];
+
+    /// Rows of a part: fixed, so that the bytes of a part depend on the spec alone.
+    fn rows_per_part(&self) -> u64;
+
+    /// Whether the selected columns need the optimal protocol of every row, shared through [`Optima`].
+    fn needs_optimum(&self, selection: &Selection) -> bool;
+
+    /// Computes `rows` into `sheet`, which has the columns of the selection and is empty.
+    fn compute(&self, job: &Job<'_>, rows: Range<u64>, sheet: &mut Sheet) -> Result<Work, Stopped>;
+}
+
+/// Every table, in the order in which they are listed. A new table is a file and a line here.
+pub const ALL: [&dyn Table; 4] = [&gap::Gap, &best::Best, &optimal::Optimal, &crossover::Crossover];
+
+/// The table of this name.
+pub fn find(name: &str) -> Option<&'static dyn Table> {
+    ALL.into_iter().find(|table| table.name() == name)
+}
+
+/// What a table needs to compute any of its rows.
+#[derive(Debug)]
+pub struct Job<'a> {
+    /// The grid of the sweep.
+    pub grid: &'a Grid,
+    /// The rows of the table.
+    pub rows: Projection<'a>,
+    /// The different optimal problems among its rows.
+    pub tuples: Tuples,
+    /// The columns asked for.
+    pub selection: &'a Selection,
+    /// Whether optimal protocols obey `v >= 1`.
+    pub bounded: bool,
+    /// Relative accuracy of the table.
+    pub rtol: f64,
+    /// The shared optimal protocols.
+    pub optima: &'a Optima,
+    /// How far the run is, and whether to stop.
+    pub signal: &'a Signal,
+}

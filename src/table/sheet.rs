@@ -1,0 +1,128 @@
+//! The cells of a range of rows, column by column, before they are written.
+
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+
+use crate::protocol::Status;
+
+/// The cells that a part consists of, axes apart.
+///
+/// A missing number is NaN in here, and null outside: no solver returns NaN as a result. A label is the index of its word.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Sheet {
+    /// The columns that were asked for, in their order.
+    pub columns: Vec<Vec<f64>>,
+    /// The status of each row.
+    pub status: Vec<Status>,
+}
+
+impl Sheet {
+    /// A sheet of `rows` rows and `columns` columns, every cell missing.
+    pub fn new(rows: usize, columns: usize) -> Sheet {
+        Sheet { columns: vec![vec![f64::NAN; rows]; columns], status: vec![Status::NotConverged; rows] }
+    }
+}
+
+/// Which columns of a table are asked for.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Selection(Vec<usize>);
+
+impl Selection {
+    /// The columns of these indices, in the order of the table.
+    pub fn new(mut indices: Vec<usize>) -> Selection {
+        indices.sort_unstable();
+        indices.dedup();
+        Selection(indices)
+    }
+
+    /// The indices, ascending.
+    pub fn indices(&self) -> &[usize] {
+        &self.0
+    }
+
+    /// Whether the column of this index is asked for.
+    pub fn has(&self, index: usize) -> bool {
+        self.0.binary_search(&index).is_ok()
+    }
+
+    /// Whether any of these is.
+    pub fn has_any(&self, indices: impl IntoIterator<Item = usize>) -> bool {
+        indices.into_iter().any(|index| self.has(index))
+    }
+}
+
+/// Work that was spent, exactly and the same on every machine.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Work {
+    /// Optimal protocols solved for `W*`.
+    pub optima: u64,
+    /// Landscapes prepared.
+    pub landscapes: u64,
+    /// Best shortcuts searched.
+    pub best: u64,
+    /// Transitions whose crossover times were computed.
+    pub crossovers: u64,
+    /// Quadratures, all solves together.
+    pub quadratures: u64,
+    /// Quadrature nodes, all solves together.
+    pub nodes: u64,
+}
+
+impl std::ops::AddAssign for Work {
+    fn add_assign(&mut self, other: Work) {
+        self.optima += other.optima;
+        self.landscapes += other.landscapes;
+        self.best += other.best;
+        self.crossovers += other.crossovers;
+        self.quadratures += other.quadratures;
+        self.nodes += other.nodes;
+    }
+}
+
+impl std::iter::Sum for Work {
+    fn sum<I: Iterator<Item = Work>>(iter: I) -> Work {
+        iter.fold(Work::default(), |mut sum, work| {
+            sum += work;
+            sum
+        })
+    }
+}
+
+impl From<crate::protocol::Effort> for Work {
+    fn from(effort: crate::protocol::Effort) -> Work {
+        Work { quadratures: effort.quadratures.into(), nodes: effort.nodes.into(), ..Work::default() }
+    }
+}
+
+/// The line between a run and whoever watches it: how far it is, and whether it should stop.
+#[derive(Debug, Default)]
+pub struct Signal {
+    stop: AtomicBool,
+    rows: AtomicU64,
+}
+
+impl Signal {
+    /// Asks the run to stop soon.
+    pub fn stop(&self) {
+        self.stop.store(true, Ordering::Relaxed);
+    }
+
+    /// Rows computed so far.
+    pub fn rows(&self) -> u64 {
+        self.rows.load(Ordering::Relaxed)
+    }
+
+    /// Counts `rows` more rows.
+    pub fn advance(&self, rows: u64) {
+        self.rows.fetch_add(rows, Ordering::Relaxed);
+    }
+
+    /// An error once the run should stop.
+    pub fn check(&self) -> Result<(), Stopped> {
+        if self.stop.load(Ordering::Relaxed) { Err(Stopped) } else { Ok(()) }
+    }
+}
+
+/// The run was asked to stop.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[error("stopped")]
+pub struct Stopped;
