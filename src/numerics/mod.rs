@@ -1,1 +1,8 @@
 //! Numerical tools that know no friction.
+
+pub mod dilogarithm;
+pub mod elementary;
+pub mod gauss;
+pub mod lanes;
+pub mod root;
+pub mod turning;

@@ -1,9 +1,17 @@
 //! The optimal protocol: least work of friction from `(v_i, 1/v_i)` to `(v_f, 1/v_f)` in time `t_f`.
+//!
+//! It is a quadrature and one scalar root (docs/theory.md): a regular [`arc`] along which `C` is conserved, under the bound `v >= 1` after a
+//! [`hold`]; the family of such [`extremal`]s has one parameter, in which the time is monotone.
 
+mod arc;
 pub mod crossover;
+mod extremal;
+mod hold;
+mod search;
 
-use super::Solved;
-use crate::model::Transition;
+use super::{Effort, Solved, Status};
+use crate::model::{Law, Transition};
+use extremal::Problem;
 
 /// How the optimal protocol starts.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -51,6 +59,36 @@ pub struct Optimum {
 }
 
 /// Solves one optimal protocol to relative accuracy `rtol`, with `v >= 1` where `bounded`.
-pub fn solve(_transition: &Transition, _t_f: f64, _bounded: bool, _rtol: f64) -> Solved<Optimum> {
-    unimplemented!("in work")
+///
+/// `Infeasible` where no protocol is fast enough under the bound (`t_f < t_min`), or where an argument is outside its domain
+/// (`a > 0`, `b >= 0`, `v_i, v_f > 1`, `t_f > 0`, all finite). Without the bound, `BelowBound` where `v(0+) < 1`.
+pub fn solve(transition: &Transition, t_f: f64, bounded: bool, rtol: f64) -> Solved<Optimum> {
+    let Some(problem) = Problem::of(transition, bounded).filter(|_| t_f > 0.0 && t_f.is_finite()) else {
+        return Solved { status: Status::Infeasible, value: None, effort: Effort::default() };
+    };
+    search::solve(&problem, t_f, rtol, None)
+}
+
+/// The velocity that the optimal protocol has now, at contact lifetime `theta` with `time_left` to reach `theta_f` (optimal feedback).
+///
+/// `None` where no protocol arrives in time, or where the solver could not certify its answer.
+pub fn feedback(law: Law, theta: f64, theta_f: f64, time_left: f64, bounded: bool, rtol: f64) -> Option<f64> {
+    let problem = Problem { law, theta_0: theta, theta_1: theta_f, fall: (theta - theta_f) / theta_f, bounded };
+    search::solve(&problem, time_left, rtol, None).value.map(|optimum| optimum.v_start)
+}
+
+impl Problem {
+    /// The problem of a transition between steady states; `None` outside the domain.
+    fn of(transition: &Transition, bounded: bool) -> Option<Problem> {
+        let &Transition { law, v_i, v_f } = transition;
+        let inside = law.a > 0.0 && law.b >= 0.0 && v_i > 1.0 && v_f > 1.0;
+        let finite = law.a.is_finite() && law.b.is_finite() && v_i.is_finite() && v_f.is_finite();
+        (inside && finite).then(|| Problem {
+            law,
+            theta_0: 1.0 / v_i,
+            theta_1: 1.0 / v_f,
+            fall: (v_f - v_i) / v_i,
+            bounded,
+        })
+    }
 }

@@ -1,0 +1,335 @@
+//! The one-parameter family of extremals between two contact lifetimes, ordered so that the total time is monotone in the parameter.
+//!
+//! The parameter `q` is 0 where the turning point sits at the end of larger theta (docs/theory.md, "One parameter for every case"):
+//!
+//! - falling problems (`theta_0 >= theta_1`): `q > 0` is `ln u(0+)`, theta falls at once; `q < 0` is the scaled start of the turning chart,
+//!   theta rises first; below `q_hold` a hold of `q_hold - q` comes before the arc. Time falls with `q`.
+//! - rising problems (`theta_0 < theta_1`): `q < 0` is `ln u(t_f-)`, theta still rises at the end (with the bound it is stretched so that
+//!   `v(t_f-) = 1` lies at minus infinity); `q > 0` is the scaled end of the turning chart, theta falls at the end; above `q_hold` the hold
+//!   is `q - q_hold` longer than the shortest protocol. Time rises with `q`.
+
+use super::arc::{Arc, Chart, Sums, phi};
+use super::hold;
+use crate::model::Law;
+use crate::numerics::elementary::{exp, exp_m1, ln, ln_1p};
+use crate::numerics::root::Probe;
+use crate::numerics::turning::Turning;
+
+/// What is to be joined: two contact lifetimes, and whether `v >= 1`.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Problem {
+    pub law: Law,
+    /// Contact lifetime at the start, not necessarily steady.
+    pub theta_0: f64,
+    /// Contact lifetime at the end.
+    pub theta_1: f64,
+    /// `theta_0/theta_1 - 1`, from the velocities, free of cancellation.
+    pub fall: f64,
+    pub bounded: bool,
+}
+
+/// Largest `ln u` that is searched: protocols of `1e-300` in units of `l/v_0`.
+const MOST_LN_U: f64 = 690.0;
+
+/// One member of the family.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Extremal {
+    pub hold_time: f64,
+    /// Contact lifetime where the arc starts.
+    pub theta_s: f64,
+    pub arc: Arc,
+    /// `ln u` and slope of the turning function at the start and the end of the arc.
+    pub start: Turning,
+    pub end: Turning,
+    /// How the time follows the parameter.
+    rate: Rate,
+}
+
+/// Derivative of the total time with respect to `q`, up to the interior sum `I` of the quadrature.
+#[derive(Debug, Clone, Copy)]
+enum Rate {
+    /// `gain (I + inner) + outer`, on the part of the family that a hold parametrises.
+    Hold { gain: f64, inner: f64, outer: f64 },
+    /// `gain (I + inner) + outer`.
+    Turning { gain: f64, inner: f64, outer: f64 },
+    /// `gain` times the sensitivity of the direct chart.
+    Direct { gain: f64 },
+}
+
+impl Problem {
+    pub fn rises(&self) -> bool {
+        self.fall < 0.0
+    }
+
+    /// `theta_1/theta_0 - 1`, free of cancellation.
+    fn rise(&self) -> f64 {
+        -self.fall / (1.0 + self.fall)
+    }
+
+    /// The least time of a rising problem (0 for a falling one): `v = 1` or, without the bound, `v = 0` throughout.
+    pub fn t_min(&self) -> f64 {
+        match (self.rises(), self.bounded) {
+            (false, _) => 0.0,
+            (true, true) => hold::time(self.theta_0, -self.fall * self.theta_1),
+            (true, false) => -self.fall * self.theta_1,
+        }
+    }
+
+    /// The end of larger theta, where the parameter is anchored.
+    fn theta_a(&self) -> f64 {
+        if self.rises() { self.theta_1 } else { self.theta_0 }
+    }
+
+    /// Friction at the anchor with `u = 1`.
+    pub fn friction_a(&self) -> f64 {
+        1.0 + (self.law.b - self.law.a) * ln(self.theta_a())
+    }
+
+    /// Scale of the turning layer at the anchor, `w = X/layer`; NaN where `tau <= b - a` there.
+    fn layer(&self) -> f64 {
+        (self.law.a / (2.0 * (self.friction_a() + self.law.a - self.law.b))).sqrt()
+    }
+
+    /// The parameter beyond which a hold parametrises the family (`None`: never).
+    pub fn q_hold(&self) -> Option<f64> {
+        if !self.bounded {
+            return None;
+        }
+        // v = 1 at the anchor.
+        let z = ln(self.theta_a());
+        let c_a = self.law.a * phi(z) - self.friction_a();
+        let xi = turning_distance(&self.law, self.law.a * phi(z), -c_a)?;
+        let q = xi.sqrt() / self.layer();
+        Some(if self.rises() { q } else { -q })
+    }
+
+    /// Bounds of the parameter: a hold cannot last longer than the whole, and `e^q` must stay a number.
+    pub fn bracket(&self, q_hold: Option<f64>, beyond: f64) -> (f64, f64) {
+        match (self.rises(), q_hold) {
+            (false, Some(q_hold)) => (q_hold - beyond, MOST_LN_U),
+            (false, None) => (f64::NEG_INFINITY, MOST_LN_U),
+            (true, Some(q_hold)) => (f64::NEG_INFINITY, q_hold + beyond),
+            (true, None) => (f64::NEG_INFINITY, f64::INFINITY),
+        }
+    }
+
+    /// The member at parameter `q`; `None` where the extremal does not exist.
+    pub fn extremal(&self, q: f64, q_hold: Option<f64>) -> Option<Extremal> {
+        match (self.rises(), q_hold) {
+            (false, Some(q_hold)) if q < q_hold => self.after_hold(q_hold - q, -1.0),
+            (true, Some(q_hold)) if q > q_hold => self.after_hold(self.t_min() + (q - q_hold), 1.0),
+            (false, _) if q > 0.0 => self.falling_at_once(q),
+            (false, _) => self.rising_first(q),
+            (true, _) if q < 0.0 => self.rising_to_the_end(q),
+            (true, _) => self.falling_at_the_end(q),
+        }
+    }
+
+    /// A hold of `time`, then an arc through its turning point down to `theta_1`.
+    fn after_hold(&self, time: f64, direction: f64) -> Option<Extremal> {
+        let law = self.law;
+        let (theta, rest) = hold::age(self.theta_0, time);
+        let z = ln_1p(-rest);
+        let excess = law.a * phi(z);
+        let friction = 1.0 + (law.b - law.a) * z;
+        let xi = turning_distance(&law, excess, friction - excess)?;
+        let theta_h = theta * (1.0 + xi);
+        // theta_c/theta_1 - 1, from theta_0/theta_1 - 1.
+        let fall = self.fall + (theta - self.theta_0) / self.theta_1;
+        let x_squares = (1.0 + xi) * fall;
+        let chart = Chart::Turning { theta_h, x_start: -xi.sqrt(), x_end: (xi + x_squares).sqrt(), x_squares };
+        let (start, end) = Arc { law, chart }.ends()?;
+        let c_h = 1.0 + (law.b - law.a) * ln(theta_h);
+        // d ln theta_h/d ln theta_c from C(theta_h) = C_leaving(theta_c); the hold's own time cancels against the start of the arc.
+        let m = (1.0 + law.a - law.b + law.b * z) / theta * theta_h / (c_h + law.a - law.b);
+        let end_term = self.theta_1 / (exp_m1(end.ln_u));
+        let rate =
+            Rate::Hold { gain: direction * m * rest / theta, inner: end_term, outer: direction * m };
+        Some(Extremal { hold_time: time, theta_s: theta, arc: Arc { law, chart }, start, end, rate })
+    }
+
+    /// Falling problem, `q = ln u(0+) > 0`.
+    fn falling_at_once(&self, z_0: f64) -> Option<Extremal> {
+        let law = self.law;
+        let excess = law.a * phi(z_0);
+        let c_a = excess - self.friction_a();
+        if let Some(xi) = turning_distance(&law, excess, -c_a).filter(|&xi| xi <= 1.0) {
+            let x_squares = (1.0 + xi) * self.fall;
+            let theta_h = self.theta_0 * (1.0 + xi);
+            let chart = Chart::Turning { theta_h, x_start: xi.sqrt(), x_end: (xi + x_squares).sqrt(), x_squares };
+            let arc = Arc { law, chart };
+            let (start, end) = arc.ends()?;
+            let c_h = 1.0 + (law.b - law.a) * ln(theta_h);
+            let swing = law.a * (1.0 + xi) / (c_h + law.a - law.b);
+            let rate = Rate::Turning {
+                gain: swing * exp_m1(z_0),
+                inner: self.theta_1 / exp_m1(end.ln_u),
+                outer: -self.theta_0 * swing,
+            };
+            return Some(Extremal { hold_time: 0.0, theta_s: self.theta_0, arc, start, end, rate });
+        }
+        let chart =
+            Chart::Direct { theta_a: self.theta_0, z_a: z_0, c_a, y_start: 0.0, y_end: -ln_1p(self.fall) };
+        let arc = Arc { law, chart };
+        let (start, end) = arc.ends()?;
+        Some(Extremal { hold_time: 0.0, theta_s: self.theta_0, arc, start, end, rate: Rate::Direct { gain: 1.0 } })
+    }
+
+    /// Falling problem, `q <= 0`: `X = layer q` at the start.
+    fn rising_first(&self, q: f64) -> Option<Extremal> {
+        let law = self.law;
+        let layer = self.layer();
+        let x_start = layer * q;
+        let grow = 1.0 + x_start * x_start;
+        let theta_h = self.theta_0 * grow;
+        let x_squares = grow * self.fall;
+        let chart = Chart::Turning { theta_h, x_start, x_end: (x_start * x_start + x_squares).sqrt(), x_squares };
+        let arc = Arc { law, chart };
+        let (start, end) = arc.ends()?;
+        let rate = Rate::Turning {
+            gain: layer * 2.0 * x_start / grow,
+            inner: if end.ln_u == 0.0 { 0.0 } else { self.theta_1 / exp_m1(end.ln_u) },
+            outer: -layer * edge(&law, theta_h, x_start, &start),
+        };
+        Some(Extremal { hold_time: 0.0, theta_s: self.theta_0, arc, start, end, rate })
+    }
+
+    /// Rising problem, `q < 0`: `ln u(t_f-)`, stretched under the bound.
+    fn rising_to_the_end(&self, q: f64) -> Option<Extremal> {
+        let law = self.law;
+        let reach = -ln(self.theta_1);
+        // ln v(t_f-), and ln u(t_f-).
+        let (eta, z_1, stretch) = if self.bounded {
+            let shrink = exp(q / reach);
+            (reach * shrink, reach * exp_m1(q / reach), shrink)
+        } else {
+            (q + reach, q, 1.0)
+        };
+        let excess = law.a * phi(z_1);
+        let c_a = excess - self.friction_a();
+        let (hold_time, d) = self.leaving(law.a * (self.theta_1 * exp_m1(eta) - eta))?;
+        let theta_s = if hold_time > 0.0 { self.theta_1 * exp(d) } else { self.theta_0 };
+        if let Some(xi) = turning_distance(&law, excess, -c_a).filter(|&xi| xi <= 1.0) {
+            let theta_h = self.theta_1 * (1.0 + xi);
+            let x_squares = -(1.0 + xi) * exp_m1(-d);
+            let chart = Chart::Turning { theta_h, x_start: -(xi - x_squares).sqrt(), x_end: -xi.sqrt(), x_squares };
+            let arc = Arc { law, chart };
+            let (start, end) = arc.ends()?;
+            let c_h = 1.0 + (law.b - law.a) * ln(theta_h);
+            let swing = law.a * (1.0 + xi) / (c_h + law.a - law.b);
+            let rate = Rate::Turning {
+                gain: stretch * swing * exp_m1(z_1),
+                inner: -theta_s / exp_m1(start.ln_u),
+                outer: stretch * self.theta_1 * swing,
+            };
+            return Some(Extremal { hold_time, theta_s, arc, start, end, rate });
+        }
+        let chart = Chart::Direct { theta_a: self.theta_1, z_a: z_1, c_a, y_start: d, y_end: 0.0 };
+        let arc = Arc { law, chart };
+        let (start, end) = arc.ends()?;
+        Some(Extremal { hold_time, theta_s, arc, start, end, rate: Rate::Direct { gain: stretch } })
+    }
+
+    /// Rising problem, `q >= 0`: `X = layer q` at the end.
+    fn falling_at_the_end(&self, q: f64) -> Option<Extremal> {
+        let law = self.law;
+        let layer = self.layer();
+        let x_end = layer * q;
+        let x2 = x_end * x_end;
+        let theta_h = self.theta_1 * (1.0 + x2);
+        let c_h = 1.0 + (law.b - law.a) * ln(theta_h);
+        let excess = (law.a - law.b) * ln_1p(x2) + c_h * x2 / (1.0 + x2);
+        let (hold_time, d) = self.leaving(excess - law.a * phi(ln(self.theta_1)))?;
+        let theta_s = if hold_time > 0.0 { self.theta_1 * exp(d) } else { self.theta_0 };
+        let x_squares = -(1.0 + x2) * exp_m1(-d);
+        let chart = Chart::Turning { theta_h, x_start: -(x2 - x_squares).sqrt(), x_end, x_squares };
+        let arc = Arc { law, chart };
+        let (start, end) = arc.ends()?;
+        let rate = Rate::Turning {
+            gain: layer * 2.0 * x_end / (1.0 + x2),
+            inner: -theta_s / exp_m1(start.ln_u),
+            outer: layer * edge(&law, theta_h, x_end, &end),
+        };
+        Some(Extremal { hold_time, theta_s, arc, start, end, rate })
+    }
+
+    /// For a rising problem: the hold time and `ln(theta_s/theta_1)` where the arc starts, from `kappa = theta_1 (C - C_leaving(theta_1))`.
+    fn leaving(&self, kappa: f64) -> Option<(f64, f64)> {
+        let all = -ln_1p(self.rise());
+        if !self.bounded {
+            return Some((0.0, all));
+        }
+        let d = hold::leave(&self.law, ln(self.theta_1), kappa)?;
+        if d <= all {
+            return Some((0.0, all));
+        }
+        let held = self.theta_1 * exp_m1(d) - self.fall * self.theta_1;
+        Some((hold::time(self.theta_0, held), d))
+    }
+}
+
+impl Extremal {
+    /// The total time beyond the least time `t_min` of the problem.
+    pub fn time_beyond(&self, problem: &Problem, sums: &Sums) -> f64 {
+        if !problem.rises() {
+            return self.hold_time + sums.time;
+        }
+        if problem.bounded {
+            // The arc replaces the last part of the shortest protocol, a hold from theta_s to theta_1.
+            let rest = problem.theta_1 - self.theta_s;
+            if self.hold_time > 0.0 { sums.time - hold::time(self.theta_s, rest) } else { sums.time - problem.t_min() }
+        } else {
+            sums.lag
+        }
+    }
+
+    /// How far the time (beyond the least) is from the one wanted, as a rising function of the parameter: the logarithm of their ratio, or
+    /// their relative difference where a hold makes time linear in the parameter.
+    pub fn probe(&self, problem: &Problem, sums: &Sums, beyond: f64) -> Probe {
+        let time = self.time_beyond(problem, sums);
+        let rate = match self.rate {
+            Rate::Hold { gain, inner, outer } | Rate::Turning { gain, inner, outer } => {
+                gain * (sums.sensitivity + inner) + outer
+            }
+            Rate::Direct { gain } => gain * sums.sensitivity,
+        };
+        let (value, slope) = if let Rate::Hold { .. } = self.rate {
+            (time / beyond - 1.0, rate / beyond)
+        } else if time > 0.0 {
+            (ln(time / beyond), rate / time)
+        } else {
+            (f64::MIN, 0.0)
+        };
+        if problem.rises() { Probe { value, slope } } else { Probe { value: -value, slope: -slope } }
+    }
+}
+
+/// `d time/dX` at an end of the turning chart: `2 theta_h X/((1 + X^2)^2 (u - 1))`, regular at `X = 0`.
+fn edge(law: &Law, theta_h: f64, x: f64, at: &Turning) -> f64 {
+    let grow = 1.0 + x * x;
+    let c_h = 1.0 + (law.b - law.a) * ln(theta_h);
+    2.0 * theta_h / (grow * grow * super::arc::omega(law, c_h, x * x) * at.slope)
+}
+
+/// `xi = theta_h/theta - 1` from `a E = (a - b) ln(1 + xi) - C theta xi` at `theta`; `None` where there is no turning point above.
+///
+/// `excess` is `a E >= 0` and `pull` is `-C theta`. Newton's method from the tangent at 0 converges monotonically on either side of `a = b`.
+fn turning_distance(law: &Law, excess: f64, pull: f64) -> Option<f64> {
+    let bend = law.a - law.b;
+    if pull <= 0.0 || pull + bend <= 0.0 {
+        return None;
+    }
+    let mut xi = excess / (pull + bend);
+    for _ in 0..60 {
+        let slope = bend / (1.0 + xi) + pull;
+        if slope.is_nan() || slope <= 0.0 {
+            return None;
+        }
+        let step = (bend * ln_1p(xi) + pull * xi - excess) / slope;
+        xi -= step;
+        if step.abs() <= 1e-15 * xi.abs() {
+            break;
+        }
+    }
+    (xi.is_finite() && xi >= 0.0).then_some(xi)
+}

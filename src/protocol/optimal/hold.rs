@@ -1,0 +1,78 @@
+//! The hold: the block slides at the bound `v = 1` while the contacts age, `theta = 1 - (1 - theta_0) e^{-t}`.
+
+use crate::model::Law;
+use crate::numerics::dilogarithm::dilogarithm;
+use crate::numerics::elementary::{exp, exp_m1, ln, ln_1p};
+use crate::numerics::gauss::rule;
+
+/// Contact lifetime after a hold of `time` from `theta_0 <= 1`, and its distance from 1, each without cancellation.
+pub(super) fn age(theta_0: f64, time: f64) -> (f64, f64) {
+    (theta_0 - (1.0 - theta_0) * exp_m1(-time), (1.0 - theta_0) * exp(-time))
+}
+
+/// Time to age from `theta_0` to `theta_0 + rise`, below 1.
+pub(super) fn time(theta_0: f64, rise: f64) -> f64 {
+    ln_1p(rise / ((1.0 - theta_0) - rise))
+}
+
+/// Work of a hold of `time` from `theta_0`: `time + b int ln theta dt`.
+pub(super) fn work(law: &Law, theta_0: f64, time: f64) -> f64 {
+    if time <= 0.0 {
+        return 0.0;
+    }
+    // ln theta(t) has its singularity at t = ln(1 - theta_0) < 0: as long as the hold is no longer than that is away, few nodes do.
+    // Beyond, theta has about doubled and a difference of dilogarithms does not cancel.
+    let integral = if time <= -ln_1p(-theta_0) {
+        let rule = rule(16);
+        let sum: f64 = rule.x.iter().zip(&rule.w).map(|(x, w)| w * ln(age(theta_0, 0.5 * time * (1.0 + x)).0)).sum();
+        0.5 * time * sum
+    } else {
+        let (theta, rest) = age(theta_0, time);
+        if theta_0 >= 0.5 {
+            dilogarithm(rest) - dilogarithm(1.0 - theta_0)
+        } else {
+            aged(theta, rest) - aged(theta_0, 1.0 - theta_0)
+        }
+    };
+    time + law.b * integral
+}
+
+/// `int_0^theta ln y/(1 - y) dy = Li_2(1 - theta) - pi^2/6`, to full relative accuracy as `theta -> 0`.
+fn aged(theta: f64, rest: f64) -> f64 {
+    if theta < 0.5 {
+        -(ln_1p(-theta) * ln(theta) + dilogarithm(theta))
+    } else {
+        dilogarithm(rest) - std::f64::consts::PI * std::f64::consts::PI / 6.0
+    }
+}
+
+/// `C` of the arc that leaves the bound at `theta`: `a - (1 + a + b ln theta)/theta`, rising with theta where `tau > b - a`.
+pub(super) fn c_leaving(law: &Law, theta: f64, ln_theta: f64) -> f64 {
+    law.a - (1.0 + law.a + law.b * ln_theta) / theta
+}
+
+/// Where an arc with a given `C` leaves the bound, relative to a reference `theta_r`: `ln(theta_c/theta_r)`.
+///
+/// `kappa` is `theta_r (C - C_leaving(theta_r))`, so that nothing cancels where the arc leaves near the reference. The equation is
+/// `(A - kappa)(e^d - 1) - b d - kappa = 0` with `A = 1 + a + b ln theta_r`, convex and rising at the root sought. `None` if there is no root.
+pub(super) fn leave(law: &Law, ln_theta_r: f64, kappa: f64) -> Option<f64> {
+    let slope = 1.0 + law.a + law.b * ln_theta_r - kappa;
+    if slope <= 0.0 {
+        return None;
+    }
+    let mut d = ln_1p(kappa / slope);
+    for _ in 0..100 {
+        let m = exp_m1(d);
+        let derivative = slope * (1.0 + m) - law.b;
+        if derivative.is_nan() || derivative <= 0.0 {
+            return None;
+        }
+        let step = (slope * m - law.b * d - kappa) / derivative;
+        d -= step;
+        if step.abs() <= 1e-15 * d.abs() {
+            return Some(d);
+        }
+    }
+    // Rounding keeps the last steps at an ulp or two.
+    d.is_finite().then_some(d)
+}

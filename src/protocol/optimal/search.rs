@@ -1,0 +1,155 @@
+//! The search for the extremal that takes a given time, and what is read off it.
+
+use super::arc::{Sums, phi};
+use super::extremal::{Extremal, Problem};
+use super::{Optimum, Strategy, hold};
+use crate::numerics::elementary::{exp, ln, ln_1p};
+use crate::numerics::root::newton;
+use crate::numerics::turning::turning;
+use crate::protocol::{Effort, Solved, Status};
+
+/// A probe this close to the wanted time (relative) is the last: the Newton step from it leaves an error of the order of its square.
+const ENOUGH: f64 = 1e-8;
+
+/// Solves `problem` in time `t_f`, from the parameter `start` if one is known.
+pub(super) fn solve(problem: &Problem, t_f: f64, rtol: f64, start: Option<f64>) -> Solved<Optimum> {
+    let mut effort = Effort::default();
+    let t_min = problem.t_min();
+    let beyond = t_f - t_min;
+    if beyond < 0.0 || beyond.is_nan() || (beyond == 0.0 && !problem.bounded) {
+        return Solved { status: Status::Infeasible, value: None, effort };
+    }
+    if beyond == 0.0 {
+        return shortest(problem, t_min);
+    }
+    let q_hold = problem.q_hold();
+    let start = start.unwrap_or_else(|| guess(problem, q_hold, beyond));
+    let mut last: Option<(Extremal, Sums, f64)> = None;
+    let mut friction_min = f64::INFINITY;
+    // Early probes only need to be as good as the step that they give.
+    let mut tolerance = 1e-3f64;
+    let exact = 0.1 * rtol; // EXP
+    let root = newton(
+        |q| {
+            let extremal = problem.extremal(q, q_hold)?;
+            let mut sums = extremal.arc.sums(tolerance)?;
+            effort.quadratures += 1;
+            effort.nodes += sums.nodes;
+            let mut probe = extremal.probe(problem, &sums, beyond);
+            if probe.value.abs() < ENOUGH && tolerance > exact {
+                sums = extremal.arc.sums(exact)?;
+                effort.quadratures += 1;
+                effort.nodes += sums.nodes;
+                probe = extremal.probe(problem, &sums, beyond);
+            }
+            tolerance = (1e-2 * probe.value * probe.value).clamp(exact, tolerance);
+            friction_min = friction_min.min(sums.friction_min);
+            last = Some((extremal, sums, probe.value));
+            Some(probe)
+        },
+        start,
+        problem.bracket(q_hold, beyond),
+        problem.rises(),
+        ENOUGH,
+    );
+    let law = problem.law;
+    let unique_above = (law.b - law.a).max(0.0);
+    let unsolved = |effort| {
+        let steady = [problem.theta_0, problem.theta_1].map(|theta| 1.0 + (law.b - law.a) * ln(theta));
+        let doubtful = friction_min <= unique_above || steady.iter().any(|&tau| tau <= unique_above);
+        let status = if doubtful { Status::Nonphysical } else { Status::NotConverged };
+        Solved { status, value: None, effort }
+    };
+    let (Some(root), Some((probed, sums, _))) = (root, last) else { return unsolved(effort) };
+    let Some(found) = problem.extremal(root.x, q_hold) else { return unsolved(effort) };
+
+    // W* is stationary in the parameter up to C dt: the trapezium of C over the last step leaves an error of third order.
+    let (c_probed, c) = (probed.arc.c(), found.arc.c());
+    let lag = beyond - probed.time_beyond(problem, &sums);
+    let work = hold::work(&law, problem.theta_0, probed.hold_time) + sums.work - 0.5 * (c_probed + c) * lag;
+    let held = found.hold_time > 0.0;
+    let v_start = if held { 1.0 } else { exp(found.start.ln_u) / problem.theta_0 };
+    let v_end = exp(found.end.ln_u) / problem.theta_1;
+    let tau = |ln_u: f64, theta: f64| 1.0 + law.a * ln_u + (law.b - law.a) * ln(theta);
+    let mut friction = sums.friction_min.min(tau(found.start.ln_u, found.theta_s)).min(tau(found.end.ln_u, problem.theta_1));
+    if held {
+        friction = friction.min(1.0 + law.b * ln(problem.theta_0));
+    }
+    let strategy = if held {
+        Strategy::Hold
+    } else if v_start * problem.theta_0 > 1.0 {
+        Strategy::SpeedUp
+    } else {
+        Strategy::SlowDown
+    };
+    let status = if friction <= unique_above {
+        Status::Nonphysical
+    } else if v_start < 1.0 {
+        Status::BelowBound
+    } else {
+        Status::Ok
+    };
+    let value = Optimum {
+        work,
+        v_start,
+        v_end,
+        hold_time: found.hold_time,
+        hamiltonian: -c,
+        theta_max: found.arc.theta_max(),
+        strategy,
+    };
+    Solved { status, value: Some(value), effort }
+}
+
+/// `t_f = t_min`: the hold alone.
+fn shortest(problem: &Problem, t_min: f64) -> Solved<Optimum> {
+    let law = problem.law;
+    let friction = 1.0 + law.b * ln(problem.theta_0);
+    let status = if friction <= (law.b - law.a).max(0.0) { Status::Nonphysical } else { Status::Ok };
+    let value = Optimum {
+        work: hold::work(&law, problem.theta_0, t_min),
+        v_start: 1.0,
+        v_end: 1.0,
+        hold_time: t_min,
+        hamiltonian: -hold::c_leaving(&law, problem.theta_1, ln(problem.theta_1)),
+        theta_max: problem.theta_1,
+        strategy: Strategy::Hold,
+    };
+    Solved { status, value: Some(value), effort: Effort::default() }
+}
+
+/// A first parameter. For `b = a` time is linear in `ln u` along an arc; that line, `v = const` for very short times, and a hold for long
+/// ones come close.
+fn guess(problem: &Problem, q_hold: Option<f64>, beyond: f64) -> f64 {
+    let law = problem.law;
+    let friction = problem.friction_a();
+    let held = |z_start: f64| {
+        // An arc that leaves the bound at the anchor comes back to it with the same E.
+        let z_end = turning((2.0 * phi(z_start)).sqrt()).ln_u;
+        law.a * (z_end - z_start) / friction
+    };
+    if problem.rises() {
+        let arc = problem.theta_1 * held(ln(problem.theta_1));
+        return match q_hold {
+            Some(q_hold) if beyond > arc => q_hold + (beyond - arc),
+            _ => 0.0,
+        };
+    }
+    let friction_end = 1.0 + (law.b - law.a) * ln(problem.theta_1);
+    let e = ((friction_end - friction / (1.0 + problem.fall)) / law.a).max(0.0);
+    let z_end = turning((2.0 * e).sqrt()).ln_u;
+    let z_start = z_end - beyond * friction / (law.a * problem.theta_0);
+    if z_start > 0.0 {
+        let fast = problem.theta_0 * ln_1p(problem.fall) / beyond;
+        z_start.max(ln(fast) - 1.5)
+    } else {
+        let q = -(2.0 * phi(z_start)).sqrt();
+        match q_hold {
+            Some(q_hold) if q < q_hold => {
+                let arc = problem.theta_0 * law.a * (z_end - ln(problem.theta_0)) / friction;
+                q_hold - (beyond - arc).max(0.0)
+            }
+            _ => q,
+        }
+    }
+}
