@@ -1,6 +1,11 @@
 //! The times at which the optimal strategy changes: closed forms, one quadrature each.
 
-use crate::model::Transition;
+use super::extremal::{Extremal, Problem};
+use super::hold;
+use super::search::quadrature_tolerance;
+use crate::model::{Law, Transition};
+use crate::numerics::elementary::ln;
+use crate::numerics::turning::turning;
 use crate::protocol::{Effort, Status};
 
 /// The special times of one transition, each with the work `W*` there; `None` where the time does not exist.
@@ -49,12 +54,95 @@ pub struct Wanted {
     pub free: bool,
 }
 
-/// All special times of a transition; `bounded` says whether `v >= 1` is imposed (if not, hold and min do not exist).
-pub fn solve(
-    _transition: &Transition,
-    _bounded: bool,
-    _rtol: f64,
-    _wanted: Wanted,
-) -> (Status, CrossoverTimes, Effort) {
-    unimplemented!("in work")
+/// All special times of a transition, to relative accuracy `rtol`; `bounded` says whether `v >= 1` is imposed (`t_min` and the window without
+/// hold do not exist otherwise).
+///
+/// Each is one quadrature, no search over `t_f` (docs/theory.md, "Crossover times"). The status is `Nonphysical` where friction falls to
+/// `max(0, b - a)` on one of the paths, `Infeasible` outside the domain of the law, `NotConverged` where a quadrature failed.
+pub fn solve(transition: &Transition, bounded: bool, rtol: f64, wanted: Wanted) -> (Status, CrossoverTimes, Effort) {
+    let mut times = CrossoverTimes::default();
+    let Some(problem) = Problem::of(transition, bounded) else {
+        return (Status::Infeasible, times, Effort::default());
+    };
+    let mut survey = Survey { problem, rtol, status: Status::Ok, effort: Effort::default() };
+    if transition.v_f > transition.v_i {
+        acceleration(&mut survey, wanted, &mut times);
+    } else {
+        deceleration(&mut survey, wanted, &mut times);
+    }
+    (survey.status, times, survey.effort)
+}
+
+/// The quadratures of one transition, with the worst status met.
+struct Survey {
+    problem: Problem,
+    rtol: f64,
+    status: Status,
+    effort: Effort,
+}
+
+impl Survey {
+    /// Time and work of an extremal that exists.
+    fn measure(&mut self, extremal: Option<Extremal>) -> (Option<f64>, Option<f64>) {
+        let sums = extremal.as_ref().and_then(|e| e.arc.sums(quadrature_tolerance(self.rtol)));
+        let (Some(extremal), Some(sums)) = (extremal, sums) else {
+            self.status = self.status.max(Status::NotConverged);
+            return (None, None);
+        };
+        self.effort.quadratures += 1;
+        self.effort.nodes += sums.nodes;
+        if extremal.friction_min(&self.problem, &sums) <= self.problem.unique_above() {
+            self.status = self.status.max(Status::Nonphysical);
+        }
+        (Some(extremal.time(&sums)), Some(extremal.work(&self.problem, &sums)))
+    }
+}
+
+/// `v_f > v_i`. Each time exists exactly where `E > 0` all along its arc, which the friction at the two ends decides.
+fn acceleration(survey: &mut Survey, wanted: Wanted, times: &mut CrossoverTimes) {
+    let problem = survey.problem;
+    let Law { a, b } = problem.law;
+    let friction_0 = problem.friction_a();
+    let friction_1 = problem.friction_end();
+    let ln_v_i = -ln(problem.theta_0);
+    let ratio = 1.0 + problem.fall;
+    if wanted.cross && friction_0 > b - a && ratio * friction_1 > friction_0 {
+        (times.t_cross, times.work_cross) = survey.measure(problem.extremal(0.0, None));
+    }
+    if wanted.hold && 1.0 - b * ln_v_i > b - a && ratio * friction_1 > 1.0 + a - b * ln_v_i - a * problem.theta_0 {
+        let unheld = Problem { bounded: true, ..problem }.q_hold().and_then(|q| problem.extremal(q, None));
+        (times.t_hold, times.work_hold) = survey.measure(unheld);
+    }
+    if wanted.cheapest && friction_0 > 0.0 && friction_1 > 0.0 {
+        let z_0 = turning((2.0 * friction_0 / a).sqrt()).ln_u;
+        (times.t_cheapest, times.work_cheapest) = survey.measure(problem.extremal(z_0, None));
+    }
+}
+
+/// `v_f <= v_i`.
+fn deceleration(survey: &mut Survey, wanted: Wanted, times: &mut CrossoverTimes) {
+    let problem = survey.problem;
+    let Law { a, b } = problem.law;
+    if wanted.min && problem.bounded {
+        let t_min = problem.t_min();
+        times.t_min = Some(t_min);
+        times.work_min = Some(hold::work(&problem.law, problem.theta_0, t_min));
+        if 1.0 + b * ln(problem.theta_0) <= problem.unique_above() {
+            survey.status = survey.status.max(Status::Nonphysical);
+        }
+    }
+    let turns = problem.friction_end() > b - a;
+    if wanted.turn && turns {
+        (times.t_turn, times.work_turn) = if problem.rises() {
+            survey.measure(problem.extremal(0.0, None))
+        } else {
+            (Some(0.0), Some(0.0))
+        };
+    }
+    if wanted.free && problem.bounded && turns && 1.0 + b * ln(problem.theta_0) > b - a {
+        if let Some([rising, falling]) = problem.free_window() {
+            times.t_free_in = survey.measure(Some(rising)).0;
+            times.t_free_out = survey.measure(Some(falling)).0;
+        }
+    }
 }

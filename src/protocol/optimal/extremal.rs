@@ -75,6 +75,11 @@ impl Problem {
         }
     }
 
+    /// Friction must exceed `max(0, b - a)` all along an extremal for it to be the only one.
+    pub fn unique_above(&self) -> f64 {
+        (self.law.b - self.law.a).max(0.0)
+    }
+
     /// The end of larger theta, where the parameter is anchored.
     fn theta_a(&self) -> f64 {
         if self.rises() { self.theta_1 } else { self.theta_0 }
@@ -83,6 +88,11 @@ impl Problem {
     /// Friction at the anchor with `u = 1`.
     pub fn friction_a(&self) -> f64 {
         1.0 + (self.law.b - self.law.a) * ln(self.theta_a())
+    }
+
+    /// Friction at the end with `u = 1`, `tau_ss(v_f)` where that is steady.
+    pub fn friction_end(&self) -> f64 {
+        1.0 + (self.law.b - self.law.a) * ln(self.theta_1)
     }
 
     /// Scale of the turning layer at the anchor, `w = X/layer`; NaN where `tau <= b - a` there.
@@ -111,6 +121,26 @@ impl Problem {
             (true, Some(q_hold)) => (f64::NEG_INFINITY, q_hold + beyond),
             (true, None) => (f64::NEG_INFINITY, f64::INFINITY),
         }
+    }
+
+    /// Both arcs of a rising problem that start at `v = 1` from `theta_0` without a hold: theta still rising at the end, and falling.
+    /// `None` if they turn below `theta_1`.
+    pub fn free_window(&self) -> Option<[Extremal; 2]> {
+        let law = self.law;
+        let ln_theta = ln(self.theta_0);
+        let excess = law.a * phi(ln_theta);
+        let friction = 1.0 + (law.b - law.a) * ln_theta;
+        let xi = turning_distance(&law, excess, friction - excess)?;
+        let x_squares = (1.0 + xi) * self.fall;
+        let x = (xi + x_squares).sqrt();
+        let one = |x_end: f64| {
+            let theta_h = self.theta_0 * (1.0 + xi);
+            let arc = Arc { law, chart: Chart::Turning { theta_h, x_start: -xi.sqrt(), x_end, x_squares } };
+            let (start, end) = arc.ends()?;
+            let rate = Rate::Turning { gain: 0.0, inner: 0.0, outer: 0.0 };
+            Some(Extremal { hold_time: 0.0, theta_s: self.theta_0, arc, start, end, rate })
+        };
+        if x > 0.0 { Some([one(-x)?, one(x)?]) } else { None }
     }
 
     /// The member at parameter `q`; `None` where the extremal does not exist.
@@ -259,25 +289,50 @@ impl Problem {
         if !self.bounded {
             return Some((0.0, all));
         }
-        let d = hold::leave(&self.law, ln(self.theta_1), kappa)?;
-        if d <= all {
+        // Where no arc leaves the bound (friction at v = 1 too low) only the protocol without a hold is left.
+        let Some(d) = hold::leave(&self.law, ln(self.theta_1), kappa).filter(|&d| d > all) else {
             return Some((0.0, all));
-        }
+        };
         let held = self.theta_1 * exp_m1(d) - self.fall * self.theta_1;
         Some((hold::time(self.theta_0, held), d))
     }
 }
 
 impl Extremal {
+    /// Least friction on the way: at the nodes, at both ends of the arc and at the start of a hold.
+    pub fn friction_min(&self, problem: &Problem, sums: &Sums) -> f64 {
+        let Law { a, b } = problem.law;
+        let friction = |ln_u: f64, theta: f64| 1.0 + a * ln_u + (b - a) * ln(theta);
+        let held = if self.hold_time > 0.0 { 1.0 + b * ln(problem.theta_0) } else { f64::INFINITY };
+        sums.friction_min
+            .min(friction(self.start.ln_u, self.theta_s))
+            .min(friction(self.end.ln_u, problem.theta_1))
+            .min(held)
+    }
+
+    /// Work of the hold and the arc together.
+    pub fn work(&self, problem: &Problem, sums: &Sums) -> f64 {
+        hold::work(&problem.law, problem.theta_0, self.hold_time) + sums.work
+    }
+
+    /// Total time.
+    pub fn time(&self, sums: &Sums) -> f64 {
+        self.hold_time + sums.time
+    }
+
     /// The total time beyond the least time `t_min` of the problem.
     pub fn time_beyond(&self, problem: &Problem, sums: &Sums) -> f64 {
         if !problem.rises() {
             return self.hold_time + sums.time;
         }
         if problem.bounded {
-            // The arc replaces the last part of the shortest protocol, a hold from theta_s to theta_1.
             let rest = problem.theta_1 - self.theta_s;
-            if self.hold_time > 0.0 { sums.time - hold::time(self.theta_s, rest) } else { sums.time - problem.t_min() }
+            if self.hold_time > 0.0 && rest > 0.0 {
+                // The arc replaces the last part of the shortest protocol, a hold from theta_s to theta_1.
+                sums.time - hold::time(self.theta_s, rest)
+            } else {
+                (self.hold_time - problem.t_min()) + sums.time
+            }
         } else {
             sums.lag
         }

@@ -11,6 +11,11 @@ use crate::protocol::{Effort, Solved, Status};
 /// A probe this close to the wanted time (relative) is the last: the Newton step from it leaves an error of the order of its square.
 const ENOUGH: f64 = 1e-8;
 
+/// Tolerance of a quadrature whose result is to be good to `rtol`: what is left over covers rounding and the last Newton step.
+pub(super) fn quadrature_tolerance(rtol: f64) -> f64 {
+    0.1 * rtol
+}
+
 /// Solves `problem` in time `t_f`, from the parameter `start` if one is known.
 pub(super) fn solve(problem: &Problem, t_f: f64, rtol: f64, start: Option<f64>) -> Solved<Optimum> {
     let mut effort = Effort::default();
@@ -24,11 +29,13 @@ pub(super) fn solve(problem: &Problem, t_f: f64, rtol: f64, start: Option<f64>) 
     }
     let q_hold = problem.q_hold();
     let start = start.unwrap_or_else(|| guess(problem, q_hold, beyond));
-    let mut last: Option<(Extremal, Sums, f64)> = None;
+    // The time beyond the least is known no better than t_f itself is.
+    let enough = ENOUGH + 2.0 * f64::EPSILON * t_f / beyond;
+    let mut last: Option<(Extremal, Sums)> = None;
     let mut friction_min = f64::INFINITY;
     // Early probes only need to be as good as the step that they give.
     let mut tolerance = 1e-3f64;
-    let exact = 0.1 * rtol; // EXP
+    let exact = quadrature_tolerance(rtol);
     let root = newton(
         |q| {
             let extremal = problem.extremal(q, q_hold)?;
@@ -36,7 +43,7 @@ pub(super) fn solve(problem: &Problem, t_f: f64, rtol: f64, start: Option<f64>) 
             effort.quadratures += 1;
             effort.nodes += sums.nodes;
             let mut probe = extremal.probe(problem, &sums, beyond);
-            if probe.value.abs() < ENOUGH && tolerance > exact {
+            if probe.value.abs() <= enough && tolerance > exact {
                 sums = extremal.arc.sums(exact)?;
                 effort.quadratures += 1;
                 effort.nodes += sums.nodes;
@@ -44,37 +51,33 @@ pub(super) fn solve(problem: &Problem, t_f: f64, rtol: f64, start: Option<f64>) 
             }
             tolerance = (1e-2 * probe.value * probe.value).clamp(exact, tolerance);
             friction_min = friction_min.min(sums.friction_min);
-            last = Some((extremal, sums, probe.value));
+            last = Some((extremal, sums));
             Some(probe)
         },
         start,
         problem.bracket(q_hold, beyond),
         problem.rises(),
-        ENOUGH,
+        enough,
     );
     let law = problem.law;
-    let unique_above = (law.b - law.a).max(0.0);
+    let unique_above = problem.unique_above();
     let unsolved = |effort| {
         let steady = [problem.theta_0, problem.theta_1].map(|theta| 1.0 + (law.b - law.a) * ln(theta));
         let doubtful = friction_min <= unique_above || steady.iter().any(|&tau| tau <= unique_above);
         let status = if doubtful { Status::Nonphysical } else { Status::NotConverged };
         Solved { status, value: None, effort }
     };
-    let (Some(root), Some((probed, sums, _))) = (root, last) else { return unsolved(effort) };
+    let (Some(root), Some((probed, sums))) = (root, last) else { return unsolved(effort) };
     let Some(found) = problem.extremal(root.x, q_hold) else { return unsolved(effort) };
 
     // W* is stationary in the parameter up to C dt: the trapezium of C over the last step leaves an error of third order.
     let (c_probed, c) = (probed.arc.c(), found.arc.c());
     let lag = beyond - probed.time_beyond(problem, &sums);
-    let work = hold::work(&law, problem.theta_0, probed.hold_time) + sums.work - 0.5 * (c_probed + c) * lag;
+    let work = probed.work(problem, &sums) - 0.5 * (c_probed + c) * lag;
     let held = found.hold_time > 0.0;
     let v_start = if held { 1.0 } else { exp(found.start.ln_u) / problem.theta_0 };
     let v_end = exp(found.end.ln_u) / problem.theta_1;
-    let tau = |ln_u: f64, theta: f64| 1.0 + law.a * ln_u + (law.b - law.a) * ln(theta);
-    let mut friction = sums.friction_min.min(tau(found.start.ln_u, found.theta_s)).min(tau(found.end.ln_u, problem.theta_1));
-    if held {
-        friction = friction.min(1.0 + law.b * ln(problem.theta_0));
-    }
+    let friction = found.friction_min(problem, &sums);
     let strategy = if held {
         Strategy::Hold
     } else if v_start * problem.theta_0 > 1.0 {
@@ -82,9 +85,9 @@ pub(super) fn solve(problem: &Problem, t_f: f64, rtol: f64, start: Option<f64>) 
     } else {
         Strategy::SlowDown
     };
-    let status = if friction <= unique_above {
+    let status = if friction <= unique_above || (problem.bounded && v_start < 1.0 - 1e-9) {
         Status::Nonphysical
-    } else if v_start < 1.0 {
+    } else if v_start < 1.0 && !problem.bounded {
         Status::BelowBound
     } else {
         Status::Ok
@@ -105,7 +108,7 @@ pub(super) fn solve(problem: &Problem, t_f: f64, rtol: f64, start: Option<f64>) 
 fn shortest(problem: &Problem, t_min: f64) -> Solved<Optimum> {
     let law = problem.law;
     let friction = 1.0 + law.b * ln(problem.theta_0);
-    let status = if friction <= (law.b - law.a).max(0.0) { Status::Nonphysical } else { Status::Ok };
+    let status = if friction <= problem.unique_above() { Status::Nonphysical } else { Status::Ok };
     let value = Optimum {
         work: hold::work(&law, problem.theta_0, t_min),
         v_start: 1.0,
@@ -135,8 +138,7 @@ fn guess(problem: &Problem, q_hold: Option<f64>, beyond: f64) -> f64 {
             _ => 0.0,
         };
     }
-    let friction_end = 1.0 + (law.b - law.a) * ln(problem.theta_1);
-    let e = ((friction_end - friction / (1.0 + problem.fall)) / law.a).max(0.0);
+    let e = ((problem.friction_end() - friction / (1.0 + problem.fall)) / law.a).max(0.0);
     let z_end = turning((2.0 * e).sqrt()).ln_u;
     let z_start = z_end - beyond * friction / (law.a * problem.theta_0);
     if z_start > 0.0 {
