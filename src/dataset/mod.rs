@@ -1,7 +1,9 @@
 //! Tables on disk: Parquet parts, the manifest beside them, and reading them back.
 
 mod atomic;
+mod dictionary;
 mod folder;
+mod hybrid;
 mod footer;
 mod layout;
 mod part;
