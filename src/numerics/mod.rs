@@ -1,6 +1,7 @@
 //! Numerical tools that know no friction.
 
 pub mod dilogarithm;
+pub mod double_double;
 pub mod elementary;
 pub mod gauss;
 pub mod lanes;
