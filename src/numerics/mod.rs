@@ -1,5 +1,6 @@
 //! Numerical tools that know no friction.
 
+pub mod cubic;
 pub mod dilogarithm;
 pub mod double_double;
 pub mod elementary;
