@@ -2,52 +2,68 @@
 
 use super::double_double::DoubleDouble;
 
-/// `c[0] + c[1] x + c[2] x^2 + c[3] x^3` with coefficients of about 32 digits.
+/// `c[0] + c[1] x + c[2] x^2 + c[3] x^3`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Cubic {
+    /// Coefficients, lowest power first.
+    pub c: [f64; 4],
+}
+
+/// A cubic whose coefficients are known to about 32 digits.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ExactCubic {
     /// Coefficients, lowest power first.
     pub c: [DoubleDouble; 4],
 }
 
 impl Cubic {
-    /// The value at `x`, from the coefficients rounded to double.
+    /// The value at `x`.
+    #[inline(always)]
     pub fn at(&self, x: f64) -> f64 {
-        let [c0, c1, c2, c3] = self.c;
-        c0.high + x * (c1.high + x * (c2.high + x * c3.high))
-    }
-
-    /// The value at `x` in double-double.
-    pub fn exactly_at(&self, x: f64) -> DoubleDouble {
-        let x = DoubleDouble::new(x);
         let [c0, c1, c2, c3] = self.c;
         c0 + x * (c1 + x * (c2 + x * c3))
     }
 
     /// Whether the cubic is above 0 (`strict`) or at least 0 everywhere on `[0, 1]`.
     ///
-    /// A cubic has its least value at an end or at its one stationary minimum. Where rounding could hide the sign there, double-double decides:
-    /// the place of the minimum enters only by the square of its error.
-    pub fn is_positive(&self, strict: bool) -> bool {
-        let c = self.c.map(|c| c.high);
-        let doubt = 8.0 * f64::EPSILON * (c[0].abs() + c[1].abs() + c[2].abs() + c[3].abs());
-        let decide = |x: f64| {
-            let rough = self.at(x);
-            let value = if rough.abs() > doubt { rough } else { self.exactly_at(x).high };
+    /// A cubic has its least value at an end or at its one stationary minimum. Where rounding could hide the sign there, `exact` decides: the
+    /// same cubic in double-double. The place of the minimum enters only by the square of its error.
+    #[inline(always)]
+    pub fn is_positive(&self, strict: bool, exact: impl Fn() -> ExactCubic) -> bool {
+        let [c0, c1, c2, c3] = self.c;
+        let doubt = 8.0 * f64::EPSILON * (c0.abs() + c1.abs() + c2.abs() + c3.abs());
+        let inside = self.minimum();
+        let least = self.at(0.0).min(self.at(1.0)).min(self.at(inside));
+        if least.abs() > doubt {
+            return least > 0.0;
+        }
+        let exact = exact();
+        [0.0, 1.0, inside].iter().all(|&x| {
+            let value = exact.at(x).high;
             if strict { value > 0.0 } else { value >= 0.0 }
-        };
-        decide(0.0) && decide(1.0) && self.minimum().is_none_or(decide)
+        })
     }
 
-    /// The stationary minimum, if it lies inside `(0, 1)`.
-    pub fn minimum(&self) -> Option<f64> {
-        let [_, c1, c2, c3] = self.c.map(|c| c.high);
+    /// The stationary minimum if it lies inside `(0, 1)`, else 0.
+    #[inline(always)]
+    pub fn minimum(&self) -> f64 {
+        let [_, c1, c2, c3] = self.c;
         // c1 + 2 c2 x + 3 c3 x^2 = 0 with a positive second derivative 2 c2 + 6 c3 x = 2 root.
         let root = (c2 * c2 - 3.0 * c1 * c3).sqrt();
         let x = if c2 > 0.0 { -c1 / (c2 + root) } else { (root - c2) / (3.0 * c3) };
-        (x > 0.0 && x < 1.0).then_some(x)
+        if x > 0.0 && x < 1.0 { x } else { 0.0 }
+    }
+}
+
+impl ExactCubic {
+    /// The value at `x`.
+    pub fn at(&self, x: f64) -> DoubleDouble {
+        let x = DoubleDouble::new(x);
+        let [c0, c1, c2, c3] = self.c;
+        c0 + x * (c1 + x * (c2 + x * c3))
     }
 
-    /// The coefficients in powers of `x - centre`, rounded to double from a double-double shift.
+    /// The coefficients in powers of `x - centre`, rounded to double after the shift.
     pub fn about(&self, centre: f64) -> [f64; 4] {
         let x = DoubleDouble::new(centre);
         let [c0, c1, c2, c3] = self.c;

@@ -14,3 +14,11 @@ pub type Lanes = [f64; LANES];
 pub fn fold(sum: &Lanes) -> f64 {
     ((sum[0] + sum[4]) + (sum[2] + sum[6])) + ((sum[1] + sum[5]) + (sum[3] + sum[7]))
 }
+
+/// The least of all lanes.
+#[inline(always)]
+pub fn least(values: &Lanes) -> f64 {
+    let lower = |x: f64, y: f64| if y < x { y } else { x };
+    let pair = |i: usize| lower(values[i], values[i + 4]);
+    lower(lower(pair(0), pair(2)), lower(pair(1), pair(3)))
+}

@@ -2,7 +2,7 @@
 //!
 //! In `x = t/t_f`: `theta = theta_0 + A_2 x + A_3 x^2 + A_4 x^3` and `n = t_f (1 - theta') = t_f - dtheta/dx`, so `v = n/(t_f theta)`.
 
-use crate::numerics::cubic::Cubic;
+use crate::numerics::cubic::{Cubic, ExactCubic};
 use crate::numerics::double_double::DoubleDouble;
 use crate::protocol::Status;
 
@@ -11,52 +11,104 @@ use crate::protocol::Status;
 pub(super) struct Ends {
     pub theta_0: DoubleDouble,
     pub theta_1: DoubleDouble,
+    /// `theta_1 - theta_0`.
+    pub rise: DoubleDouble,
     pub t_f: f64,
+}
+
+impl Ends {
+    /// Between the steady states at `v_i` and `v_f`.
+    pub fn between(v_i: f64, v_f: f64, t_f: f64) -> Ends {
+        let one = DoubleDouble::new(1.0);
+        let (theta_0, theta_1) = (one / DoubleDouble::new(v_i), one / DoubleDouble::new(v_f));
+        Ends { theta_0, theta_1, rise: theta_1 - theta_0, t_f }
+    }
 }
 
 /// One shortcut.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Path {
-    pub t_f: f64,
-    /// `theta(x)`.
-    pub theta: Cubic,
-    /// `n(x)`, a quadratic.
-    pub n: Cubic,
+pub(super) struct Path<'a> {
+    pub ends: &'a Ends,
+    a_2: f64,
+    a_3: f64,
+    /// `theta` in powers of `x`.
+    theta: Cubic,
+    /// `n` in powers of `x`.
+    n: Cubic,
 }
 
-impl Path {
+impl<'a> Path<'a> {
     /// The shortcut with `alpha_2 t_f = a_2`, `alpha_3 t_f^2 = a_3`.
-    pub fn new(ends: &Ends, a_2: f64, a_3: f64) -> Path {
-        let (a_2, a_3, t_f) = (DoubleDouble::new(a_2), DoubleDouble::new(a_3), DoubleDouble::new(ends.t_f));
-        let a_4 = ends.theta_1 - ends.theta_0 - a_2 - a_3;
-        let (two, three) = (DoubleDouble::new(-2.0), DoubleDouble::new(-3.0));
+    #[inline(always)]
+    pub fn new(ends: &'a Ends, a_2: f64, a_3: f64) -> Path<'a> {
+        let a_4 = ends.rise.high - a_2 - a_3;
         Path {
-            t_f: ends.t_f,
-            theta: Cubic { c: [ends.theta_0, a_2, a_3, a_4] },
-            n: Cubic { c: [t_f - a_2, two * a_3, three * a_4, DoubleDouble::new(0.0)] },
+            ends,
+            a_2,
+            a_3,
+            theta: Cubic { c: [ends.theta_0.high, a_2, a_3, a_4] },
+            n: Cubic { c: [ends.t_f - a_2, -2.0 * a_3, -3.0 * a_4, 0.0] },
         }
     }
 
-    /// `Infeasible` where theta or v falls to 0 or below, `BelowBound` where only `v >= 1` fails, else `Ok`; decided exactly.
-    pub fn status(&self) -> Status {
-        if !(self.n.is_positive(true) && self.theta.is_positive(true)) {
-            return Status::Infeasible;
-        }
-        // v >= 1 where n - t_f theta >= 0.
-        let t_f = DoubleDouble::new(self.t_f);
-        let mut surplus = self.n;
-        for (s, theta) in surplus.c.iter_mut().zip(self.theta.c) {
+    /// `theta(x)` to 32 digits.
+    fn exact_theta(&self) -> ExactCubic {
+        let (a_2, a_3) = (DoubleDouble::new(self.a_2), DoubleDouble::new(self.a_3));
+        ExactCubic { c: [self.ends.theta_0, a_2, a_3, self.ends.rise - a_2 - a_3] }
+    }
+
+    /// `n(x)` to 32 digits.
+    fn exact_n(&self) -> ExactCubic {
+        let [_, a_2, a_3, a_4] = self.exact_theta().c;
+        let (two, three) = (DoubleDouble::new(-2.0), DoubleDouble::new(-3.0));
+        ExactCubic { c: [DoubleDouble::new(self.ends.t_f) - a_2, two * a_3, three * a_4, DoubleDouble::new(0.0)] }
+    }
+
+    /// `n - t_f theta`, at least 0 where `v >= 1`, to 32 digits.
+    fn exact_surplus(&self) -> ExactCubic {
+        let t_f = DoubleDouble::new(self.ends.t_f);
+        let mut surplus = self.exact_n();
+        for (s, theta) in surplus.c.iter_mut().zip(self.exact_theta().c) {
             *s = *s - t_f * theta;
         }
-        if surplus.is_positive(false) { Status::Ok } else { Status::BelowBound }
+        surplus
+    }
+
+    /// `Infeasible` where theta or v falls to 0 or below, `BelowBound` where only `v >= 1` fails, else `Ok`; decided exactly.
+    #[inline(always)]
+    pub fn status(&self) -> Status {
+        if !self.n.is_positive(true, || self.exact_n()) || !self.theta.is_positive(true, || self.exact_theta()) {
+            return Status::Infeasible;
+        }
+        let mut surplus = self.n;
+        for (s, theta) in surplus.c.iter_mut().zip(self.theta.c) {
+            *s -= self.ends.t_f * theta;
+        }
+        if surplus.is_positive(false, || self.exact_surplus()) { Status::Ok } else { Status::BelowBound }
+    }
+
+    /// The coefficients of theta and of n in powers of `x - 1`.
+    #[inline(always)]
+    pub fn about_end(&self) -> ([f64; 4], [f64; 3]) {
+        let (a_2, a_3, rise) = (self.a_2, self.a_3, self.ends.rise.high);
+        let slope = 3.0 * rise - 2.0 * a_2 - a_3;
+        let bend = 3.0 * rise - 3.0 * a_2 - 2.0 * a_3;
+        let a_4 = rise - a_2 - a_3;
+        ([self.ends.theta_1.high, slope, bend, a_4], [self.ends.t_f - slope, -2.0 * bend, -3.0 * a_4])
+    }
+
+    /// The coefficients of theta and of n in powers of `x - centre`, each right to the last bit.
+    pub fn about(&self, centre: f64) -> ([f64; 4], [f64; 3]) {
+        let [n0, n1, n2, _] = self.exact_n().about(centre);
+        (self.exact_theta().about(centre), [n0, n1, n2])
     }
 
     /// Least velocity of a feasible shortcut on `[0, t_f]`.
     ///
     /// `v'` has the sign of the quartic `f = theta_x^2 - t_f theta_x - theta theta_xx`; a minimum inside is a zero where `f` rises.
     pub fn v_min(&self) -> f64 {
-        let [q0, q1, q2, q3] = self.theta.c.map(|c| c.high);
-        let t_f = self.t_f;
+        let [q0, q1, q2, q3] = self.theta.c;
+        let t_f = self.ends.t_f;
         let quartic = [
             q1 * q1 - t_f * q1 - 2.0 * q0 * q2,
             2.0 * (q1 * q2 - t_f * q2 - 3.0 * q0 * q3),
@@ -65,7 +117,8 @@ impl Path {
             3.0 * q3 * q3,
         ];
         let v = |x: f64| self.n.at(x) / (t_f * self.theta.at(x));
-        let at_end = self.n_at_end() / (t_f * self.theta_at_end());
+        let (theta_end, n_end) = self.about_end();
+        let at_end = n_end[0] / (t_f * theta_end[0]);
         let ends = v(0.0).min(at_end);
         let [r0, r1, r2, r3, r4] = quartic;
         // Bernstein coefficients on [0, 1]: where they have one sign, v is monotone.
@@ -84,14 +137,6 @@ impl Path {
             }
         });
         least
-    }
-
-    fn n_at_end(&self) -> f64 {
-        self.n.exactly_at(1.0).high
-    }
-
-    fn theta_at_end(&self) -> f64 {
-        self.theta.exactly_at(1.0).high
     }
 }
 

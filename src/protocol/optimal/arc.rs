@@ -13,7 +13,7 @@ use multiversion::multiversion;
 use crate::model::Law;
 use crate::numerics::elementary::{exp, exp_m1, ln, ln_1p};
 use crate::numerics::gauss::{Rule, rule};
-use crate::numerics::lanes::{LANES, Lanes, fold};
+use crate::numerics::lanes::{LANES, fold, least};
 use crate::numerics::turning::{Turning, turning, turning_lanes};
 
 /// The chart that an arc is drawn in.
@@ -375,9 +375,4 @@ fn direct_kernel(arc: &DirectSlice, middle: f64, half: f64, rule: &Rule) -> Sums
         friction_min: least(&friction_min),
         nodes: rule.x.len() as u32,
     }
-}
-
-#[inline(always)]
-fn least(values: &Lanes) -> f64 {
-    values.iter().fold(f64::INFINITY, |m, &v| if v < m { v } else { m })
 }

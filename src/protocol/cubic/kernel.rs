@@ -1,0 +1,95 @@
+//! The innermost loop of the landscape: `tau v dt` summed over the nodes of one panel, eight at a time.
+
+use multiversion::multiversion;
+
+use super::rules::Map;
+use crate::numerics::elementary::{exp, ln};
+use crate::numerics::gauss::Rule;
+use crate::numerics::lanes::{LANES, fold};
+
+/// Constants of one panel: `tau = constant + a ln n + slope ln theta`, both polynomials in powers of the distance `delta` from the panel's centre.
+pub(super) struct Slice {
+    pub constant: f64,
+    pub a: f64,
+    pub slope: f64,
+    pub theta: [f64; 4],
+    pub n: [f64; 3],
+    /// Middle and half length of the panel in the mapped variable.
+    pub middle: f64,
+    pub half: f64,
+}
+
+impl Slice {
+    /// `int tau v dt` over the panel.
+    pub fn sum(&self, map: Map, rule: &Rule) -> f64 {
+        self.half
+            * match map {
+                Map::Line => line(self, rule),
+                Map::Power { side, gap, squarings: 1 } => square(self, side, gap, rule),
+                Map::Power { side, gap, squarings: 2 } => fourth(self, side, gap, rule),
+                Map::Power { side, gap, .. } => eighth(self, side, gap, rule),
+                Map::Sinh { height } => sinh(self, height, rule),
+            }
+    }
+
+    /// `tau v dt/dx` at one node.
+    #[inline(always)]
+    fn integrand(&self, delta: f64) -> f64 {
+        let [q0, q1, q2, q3] = self.theta;
+        let [n0, n1, n2] = self.n;
+        let theta = q0 + delta * (q1 + delta * (q2 + delta * q3));
+        let n = n0 + delta * (n1 + delta * n2);
+        (self.constant + self.a * ln(n) + self.slope * ln(theta)) * (n / theta)
+    }
+
+    /// The weighted sum over a rule; `map` gives the distance from the centre and the Jacobian.
+    #[inline(always)]
+    fn weigh(&self, rule: &Rule, map: impl Fn(f64) -> (f64, f64)) -> f64 {
+        let mut sum = [0.0; LANES];
+        for (x, w) in rule.x.chunks_exact(LANES).zip(rule.w.chunks_exact(LANES)) {
+            for i in 0..LANES {
+                let (delta, jacobian) = map(self.middle + self.half * x[i]);
+                sum[i] += w[i] * jacobian * self.integrand(delta);
+            }
+        }
+        fold(&sum)
+    }
+}
+
+/// One kernel for each map, compiled for three vector widths and chosen at run time.
+macro_rules! kernels {
+    ($($(#[$doc:meta])* fn $name:ident($slice:ident $(, $argument:ident)*) = $map:expr;)*) => {$(
+        $(#[$doc])*
+        #[multiversion(targets(
+            "x86_64+avx+avx2+bmi1+bmi2+avx512f+avx512bw+avx512cd+avx512dq+avx512vl",
+            "x86_64+avx+avx2+bmi1+bmi2"
+        ))]
+        fn $name($slice: &Slice $(, $argument: f64)*, rule: &Rule) -> f64 {
+            $slice.weigh(rule, $map)
+        }
+    )*};
+}
+
+kernels! {
+    /// `delta = s`.
+    fn line(slice) = |s| (s, 1.0);
+    /// `delta = side (gap - s^2)`.
+    fn square(slice, side, gap) = |s| (side * (gap - s * s), 2.0 * s);
+    /// `delta = side (gap - s^4)`.
+    fn fourth(slice, side, gap) = |s| {
+        let s2 = s * s;
+        (side * (gap - s2 * s2), 4.0 * s * s2)
+    };
+    /// `delta = side (gap - s^8)`.
+    fn eighth(slice, side, gap) = |s| {
+        let s2 = s * s;
+        let s4 = s2 * s2;
+        (side * (gap - s4 * s4), 8.0 * s * s2 * s4)
+    };
+    /// `delta = height sinh s`.
+    fn sinh(slice, height) = |s| {
+        let q = exp(s);
+        let inverse = 1.0 / q;
+        (0.5 * height * (q - inverse), 0.5 * height * (q + inverse))
+    };
+}
