@@ -14,7 +14,7 @@ use crate::numerics::gauss::rule;
 use crate::numerics::lanes::LANES;
 use kernel::Slice;
 use path::{Ends, Path};
-use rules::{Panel, Zeros, choose};
+use rules::{Accuracy, Panel, Zeros, choose};
 
 /// The work landscape of one transition in one time over the plane of `(alpha_2, alpha_3)`.
 #[derive(Debug, Clone)]
@@ -22,7 +22,7 @@ pub struct Landscape {
     law: Law,
     ends: Ends,
     ln_t_f: f64,
-    tolerance: f64,
+    accuracy: Accuracy,
 }
 
 /// Nodes from which the polynomials are expanded in double-double.
@@ -43,7 +43,7 @@ impl Landscape {
     /// Prepares the landscape of `transition` in time `t_f`; every work is good to relative accuracy `rtol`.
     pub fn new(transition: &Transition, t_f: f64, rtol: f64) -> Self {
         let ends = Ends::between(transition.v_i, transition.v_f, t_f);
-        Landscape { law: transition.law, ends, ln_t_f: ln(t_f), tolerance: 0.5 * rtol }
+        Landscape { law: transition.law, ends, ln_t_f: ln(t_f), accuracy: Accuracy::new(0.5 * rtol) }
     }
 
     /// Evaluates the shortcuts `(a_2[i], a_3[i])`, given scaled: `alpha_2 t_f` and `alpha_3 t_f^2`.
@@ -72,11 +72,11 @@ impl Landscape {
     /// `W_s = int tau v dt`.
     fn work(&self, path: &Path, panels: &mut Vec<Panel>, effort: &mut Effort) -> f64 {
         panels.clear();
-        choose(&Zeros::of(path), 0.0, 1.0, self.tolerance, 0, panels);
+        choose(&Zeros::of(path), 0.0, 1.0, &self.accuracy, 0, panels);
         effort.quadratures += 1;
         let mut work = 0.0;
         for panel in panels.iter() {
-            let rule = rule(LANES * (panel.nodes / LANES as f64).ceil().max(1.0) as usize);
+            let rule = rule(LANES * (1 + (panel.nodes / LANES as f64) as usize));
             effort.nodes += rule.x.len() as u32;
             // Where a zero is near, the digits of the small theta there count.
             let (theta, n) =

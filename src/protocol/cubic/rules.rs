@@ -48,6 +48,8 @@ pub(super) struct Panel {
 
 /// Nodes up to which the plain rule is taken without looking for a better one.
 const PLAIN: f64 = 24.0;
+/// Nodes from which the sinh map is tried.
+const POOR: f64 = 40.0;
 /// Nodes beyond which a panel is cut if that helps.
 const LONG: f64 = 80.0;
 /// Most nodes of one panel.
@@ -56,6 +58,27 @@ pub(super) const MOST_NODES: f64 = 256.0;
 const DEEPEST: u32 = 12;
 /// Safety of the estimate: `e^MARGIN` stands for the residues' share in the integral.
 const MARGIN: f64 = 3.0;
+
+/// The accuracy asked for, in the forms that the choice of a rule needs.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Accuracy {
+    /// `-ln tolerance` with the margin.
+    digits: f64,
+    /// Focal sum (see [`focal`]) from which [`PLAIN`] nodes are enough.
+    plain: f64,
+    /// Focal sum below which the sinh map is tried too.
+    poor: f64,
+}
+
+impl Accuracy {
+    /// For a relative accuracy `tolerance`.
+    pub fn new(tolerance: f64) -> Accuracy {
+        let digits = MARGIN - ln(tolerance);
+        // rho + 1/rho with rho^(2 nodes) = e^digits.
+        let focal = |nodes: f64| exp(0.5 * digits / nodes) + exp(-0.5 * digits / nodes);
+        Accuracy { digits, plain: focal(PLAIN), poor: focal(POOR) }
+    }
+}
 
 /// The zeros of one shortcut, filled up to a full set of lanes with places too far away to matter.
 #[derive(Debug, Clone, Copy)]
@@ -84,51 +107,46 @@ impl Zeros {
     }
 }
 
-/// Appends the panels that integrate over `[low, high]` to relative accuracy `tolerance`.
-pub(super) fn choose(zeros: &Zeros, low: f64, high: f64, tolerance: f64, depth: u32, panels: &mut Vec<Panel>) {
-    let mut panel = best_panel(zeros, low, high, MARGIN - ln(tolerance));
+/// Appends the panels that integrate over `[low, high]`.
+pub(super) fn choose(zeros: &Zeros, low: f64, high: f64, accuracy: &Accuracy, depth: u32, panels: &mut Vec<Panel>) {
+    let (mut panel, focal) = best_panel(zeros, low, high, accuracy);
+    let rho = 0.5 * (focal + (focal * focal - 4.0).max(0.0).sqrt());
+    panel.nodes = accuracy.digits / (2.0 * ln(rho.clamp(1.0 + 1e-12, 1e8)));
     if panel.nodes > LONG && depth < DEEPEST {
         let cut = cut_at(zeros, low, high);
-        choose(zeros, low, cut, tolerance, depth + 1, panels);
-        choose(zeros, cut, high, tolerance, depth + 1, panels);
+        choose(zeros, low, cut, accuracy, depth + 1, panels);
+        choose(zeros, cut, high, accuracy, depth + 1, panels);
     } else {
         panel.nodes = panel.nodes.min(MOST_NODES);
         panels.push(panel);
     }
 }
 
-/// The map that needs the fewest nodes for `digits` (a natural logarithm).
+/// The map with the largest Bernstein ellipse, and its focal sum. A costlier map must be clearly better: `focal - 2` goes like the inverse square of the
+/// number of nodes.
 #[multiversion(targets(
     "x86_64+avx+avx2+bmi1+bmi2+avx512f+avx512bw+avx512cd+avx512dq+avx512vl",
     "x86_64+avx+avx2+bmi1+bmi2"
 ))]
-fn best_panel(zeros: &Zeros, low: f64, high: f64, digits: f64) -> Panel {
-    let mut best = line(zeros, low, high, digits);
-    if best.nodes <= PLAIN {
-        return best;
+fn best_panel(zeros: &Zeros, low: f64, high: f64, accuracy: &Accuracy) -> (Panel, f64) {
+    let mut best = Panel { centre: high, map: Map::Line, from: low - high, to: 0.0, nodes: 0.0 };
+    let mut largest = focal(&zeros.re, &zeros.im, low, high);
+    if largest >= accuracy.plain {
+        return (best, largest);
     }
-    for side in [1.0, -1.0] {
-        if let Some(panel) = power(zeros, low, high, side, digits) {
-            if panel.nodes < 0.9 * best.nodes {
-                best = panel;
-            }
+    let gaps = [1.0, -1.0].map(|side| real_gap(zeros, if side > 0.0 { high } else { low }, side));
+    let nearest = if gaps[0] <= gaps[1] { 1.0 } else { -1.0 };
+    for side in [nearest, -nearest] {
+        let gap = if side > 0.0 { gaps[0] } else { gaps[1] };
+        power(zeros, low, high, side, gap, accuracy, &mut best, &mut largest);
+        if largest >= accuracy.plain {
+            return (best, largest);
         }
     }
-    if best.nodes > PLAIN + 16.0 {
-        if let Some(panel) = sinh(zeros, low, high, digits) {
-            if panel.nodes < 0.7 * best.nodes {
-                best = panel;
-            }
-        }
+    if largest < accuracy.poor {
+        sinh(zeros, low, high, &mut best, &mut largest);
     }
-    best
-}
-
-/// Gauss nodes for `digits` on an interval whose nearest singularity has the distances `focal` (see [`focal`]) from its ends.
-#[inline(always)]
-fn nodes(focal: f64, digits: f64) -> f64 {
-    let rho = 0.5 * (focal + (focal * focal - 4.0).max(0.0).sqrt());
-    digits / (2.0 * ln(rho.clamp(1.0 + 1e-12, 1e8)))
+    (best, largest)
 }
 
 /// The least sum of the distances of the places `(re, im)` from both ends of `[from, to]`, in units of half its length: 2 on the interval itself.
@@ -142,25 +160,34 @@ fn focal(re: &Lanes, im: &Lanes, from: f64, to: f64) -> f64 {
     2.0 * least(&sums) / (to - from).abs()
 }
 
+/// Distance of the nearest real zero beyond the end on that side.
 #[inline(always)]
-fn line(zeros: &Zeros, low: f64, high: f64, digits: f64) -> Panel {
-    let focal = focal(&zeros.re, &zeros.im, low, high);
-    Panel { centre: high, map: Map::Line, from: low - high, to: 0.0, nodes: nodes(focal, digits) }
-}
-
-/// The best power map about the nearest real zero beyond the upper (`side = 1`) or the lower end.
-#[inline(always)]
-fn power(zeros: &Zeros, low: f64, high: f64, side: f64, digits: f64) -> Option<Panel> {
-    let end = if side > 0.0 { high } else { low };
+fn real_gap(zeros: &Zeros, end: f64, side: f64) -> f64 {
     let mut gaps = [FAR; LANES];
     for i in 0..LANES {
         let gap = side * (zeros.re[i] - end);
         gaps[i] = if zeros.im[i] == 0.0 && gap > 0.0 { gap } else { FAR };
     }
-    let gap = least(&gaps);
+    least(&gaps)
+}
+
+/// Tries the power maps about the real zero a `gap` beyond the upper (`side = 1`) or the lower end, as long as they gain.
+#[allow(clippy::too_many_arguments)]
+#[inline(always)]
+fn power(
+    zeros: &Zeros,
+    low: f64,
+    high: f64,
+    side: f64,
+    gap: f64,
+    accuracy: &Accuracy,
+    best: &mut Panel,
+    largest: &mut f64,
+) {
+    let end = if side > 0.0 { high } else { low };
     let length = high - low;
     if gap > 0.5 * length {
-        return None;
+        return;
     }
     // Distances from the zero, to be rooted again and again.
     let (mut near, mut far) = (gap, gap + length);
@@ -168,36 +195,41 @@ fn power(zeros: &Zeros, low: f64, high: f64, side: f64, digits: f64) -> Option<P
     for i in 0..LANES {
         re[i] = gap + side * (end - re[i]);
     }
-    let mut best: Option<Panel> = None;
     for squarings in 1..=3 {
         (near, far) = (near.sqrt(), far.sqrt());
         for i in 0..LANES {
             (re[i], im[i]) = complex_sqrt(re[i], im[i]);
         }
         // The zero itself is mapped to 0.
-        let focal = focal(&re, &im, near, far).min(2.0 * (near + far) / (far - near));
-        let count = nodes(focal, digits);
-        if best.is_some_and(|b| count > 0.9 * b.nodes) {
-            break;
+        let image = focal(&re, &im, near, far).min(2.0 * (near + far) / (far - near));
+        if image - 2.0 <= 1.2 * (*largest - 2.0) {
+            return;
         }
-        best = Some(Panel { centre: end, map: Map::Power { side, gap, squarings }, from: near, to: far, nodes: count });
+        *largest = image;
+        *best = Panel { centre: end, map: Map::Power { side, gap, squarings }, from: near, to: far, nodes: 0.0 };
+        if image >= accuracy.plain {
+            return;
+        }
     }
-    best
 }
 
-/// The sinh map over the complex pair that hinders most.
-fn sinh(zeros: &Zeros, low: f64, high: f64, digits: f64) -> Option<Panel> {
+/// Tries the sinh map over the complex pair that hinders most.
+fn sinh(zeros: &Zeros, low: f64, high: f64, best: &mut Panel, largest: &mut f64) {
     let hindrance = hindrance(zeros, low, high);
     let (centre, height) = (zeros.re[hindrance], zeros.im[hindrance]);
     if height == 0.0 {
-        return None;
+        return;
     }
     let (from, to) = (asinh((low - centre) / height), asinh((high - centre) / height));
     let (mut re, mut im) = ([0.0; LANES], [0.0; LANES]);
     for i in 0..LANES {
         (re[i], im[i]) = complex_asinh((zeros.re[i] - centre) / height, zeros.im[i] / height);
     }
-    Some(Panel { centre, map: Map::Sinh { height }, from, to, nodes: nodes(focal(&re, &im, from, to), digits) })
+    let image = focal(&re, &im, from, to);
+    if image - 2.0 > 2.0 * (*largest - 2.0) {
+        *largest = image;
+        *best = Panel { centre, map: Map::Sinh { height }, from, to, nodes: 0.0 };
+    }
 }
 
 /// The zero with the smallest ellipse.
