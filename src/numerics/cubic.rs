@@ -24,24 +24,13 @@ impl Cubic {
         c0 + x * (c1 + x * (c2 + x * c3))
     }
 
-    /// Whether the cubic is above 0 (`strict`) or at least 0 everywhere on `[0, 1]`.
-    ///
-    /// A cubic has its least value at an end or at its one stationary minimum. Where rounding could hide the sign there, `exact` decides: the
-    /// same cubic in double-double. The place of the minimum enters only by the square of its error.
+    /// The least value on `[0, 1]`, at an end or at the one stationary minimum, and a bound on its rounding error.
     #[inline(always)]
-    pub fn is_positive(&self, strict: bool, exact: impl Fn() -> ExactCubic) -> bool {
+    pub fn least(&self) -> (f64, f64) {
         let [c0, c1, c2, c3] = self.c;
         let doubt = 8.0 * f64::EPSILON * (c0.abs() + c1.abs() + c2.abs() + c3.abs());
-        let inside = self.minimum();
-        let least = self.at(0.0).min(self.at(1.0)).min(self.at(inside));
-        if least.abs() > doubt {
-            return least > 0.0;
-        }
-        let exact = exact();
-        [0.0, 1.0, inside].iter().all(|&x| {
-            let value = exact.at(x).high;
-            if strict { value > 0.0 } else { value >= 0.0 }
-        })
+        let lower = |x: f64, y: f64| if y < x { y } else { x };
+        (lower(lower(c0, self.at(1.0)), self.at(self.minimum())), doubt)
     }
 
     /// The stationary minimum if it lies inside `(0, 1)`, else 0.
@@ -61,6 +50,15 @@ impl ExactCubic {
         let x = DoubleDouble::new(x);
         let [c0, c1, c2, c3] = self.c;
         c0 + x * (c1 + x * (c2 + x * c3))
+    }
+
+    /// Whether the cubic is above 0 (`strict`) or at least 0 everywhere on `[0, 1]`. `rounded` is the same in double: the place of its minimum is good
+    /// enough, since the value there depends on the square of its error.
+    pub fn is_positive(&self, rounded: &Cubic, strict: bool) -> bool {
+        [0.0, 1.0, rounded.minimum()].iter().all(|&x| {
+            let value = self.at(x).high;
+            if strict { value > 0.0 } else { value >= 0.0 }
+        })
     }
 
     /// The coefficients in powers of `x - centre`, rounded to double after the shift.

@@ -13,7 +13,7 @@ use crate::numerics::elementary::ln;
 use crate::numerics::gauss::rule;
 use crate::numerics::lanes::LANES;
 use kernel::Slice;
-use path::{Ends, Path};
+use path::{Ends, Path, screen};
 use rules::{Accuracy, Panel, Zeros, choose};
 
 /// The work landscape of one transition in one time over the plane of `(alpha_2, alpha_3)`.
@@ -26,7 +26,7 @@ pub struct Landscape {
 }
 
 /// Nodes from which the polynomials are expanded in double-double.
-const NEAR: f64 = 40.0;
+const NEAR: usize = 40;
 
 /// The results of a run of shortcuts, one element a shortcut, laid out column by column.
 #[derive(Debug)]
@@ -52,18 +52,24 @@ impl Landscape {
     pub fn evaluate(&self, a_2: &[f64], a_3: &[f64], out: Shortcuts<'_>) -> Effort {
         let mut effort = Effort::default();
         let mut panels = Vec::with_capacity(8);
-        let coefficients = a_2.iter().zip(a_3);
-        for (i, ((&a_2, &a_3), status)) in coefficients.zip(out.status.iter_mut()).enumerate() {
-            let path = Path::new(&self.ends, a_2, a_3);
-            *status = path.status();
-            if *status == Status::Infeasible {
-                continue;
-            }
-            if let Some(v_min) = out.v_min.get_mut(i) {
-                *v_min = path.v_min();
-            }
-            if let Some(work) = out.work.get_mut(i) {
-                *work = self.work(&path, &mut panels, &mut effort);
+        let count = a_2.len().min(a_3.len()).min(out.status.len());
+        for first in (0..count).step_by(LANES) {
+            let block = first..(first + LANES).min(count);
+            let (mut a_2_lanes, mut a_3_lanes, mut v_lanes) = ([0.0; LANES], [0.0; LANES], [0.0; LANES]);
+            a_2_lanes[..block.len()].copy_from_slice(&a_2[block.clone()]);
+            a_3_lanes[..block.len()].copy_from_slice(&a_3[block.clone()]);
+            let status = screen(&self.ends, &a_2_lanes, &a_3_lanes, (!out.v_min.is_empty()).then_some(&mut v_lanes));
+            for (lane, i) in block.enumerate() {
+                out.status[i] = status[lane];
+                if status[lane] == Status::Infeasible {
+                    continue;
+                }
+                if let Some(v_min) = out.v_min.get_mut(i) {
+                    *v_min = v_lanes[lane];
+                }
+                if let Some(work) = out.work.get_mut(i) {
+                    *work = self.work(&Path::new(&self.ends, a_2[i], a_3[i]), &mut panels, &mut effort);
+                }
             }
         }
         effort
@@ -76,7 +82,7 @@ impl Landscape {
         effort.quadratures += 1;
         let mut work = 0.0;
         for panel in panels.iter() {
-            let rule = rule(LANES * (1 + (panel.nodes / LANES as f64) as usize));
+            let rule = rule(panel.nodes);
             effort.nodes += rule.x.len() as u32;
             // Where a zero is near, the digits of the small theta there count.
             let (theta, n) =

@@ -2,8 +2,11 @@
 //!
 //! In `x = t/t_f`: `theta = theta_0 + A_2 x + A_3 x^2 + A_4 x^3` and `n = t_f (1 - theta') = t_f - dtheta/dx`, so `v = n/(t_f theta)`.
 
+use multiversion::multiversion;
+
 use crate::numerics::cubic::{Cubic, ExactCubic};
 use crate::numerics::double_double::DoubleDouble;
+use crate::numerics::lanes::{LANES, Lanes};
 use crate::protocol::Status;
 
 /// The ends that all shortcuts of a landscape share.
@@ -74,17 +77,26 @@ impl<'a> Path<'a> {
         surplus
     }
 
-    /// `Infeasible` where theta or v falls to 0 or below, `BelowBound` where only `v >= 1` fails, else `Ok`; decided exactly.
+    /// `n - t_f theta`, at least 0 where `v >= 1`.
     #[inline(always)]
-    pub fn status(&self) -> Status {
-        if !self.n.is_positive(true, || self.exact_n()) || !self.theta.is_positive(true, || self.exact_theta()) {
-            return Status::Infeasible;
-        }
+    fn surplus(&self, scale: f64) -> Cubic {
         let mut surplus = self.n;
         for (s, theta) in surplus.c.iter_mut().zip(self.theta.c) {
-            *s -= self.ends.t_f * theta;
+            *s -= scale * theta;
         }
-        if surplus.is_positive(false, || self.exact_surplus()) { Status::Ok } else { Status::BelowBound }
+        surplus
+    }
+
+    /// `Infeasible` where theta or v falls to 0 or below, `BelowBound` where only `v >= 1` fails, else `Ok`; decided in double-double.
+    fn exact_status(&self) -> Status {
+        let surplus = self.surplus(self.ends.t_f);
+        if !self.exact_n().is_positive(&self.n, true) || !self.exact_theta().is_positive(&self.theta, true) {
+            Status::Infeasible
+        } else if self.exact_surplus().is_positive(&surplus, false) {
+            Status::Ok
+        } else {
+            Status::BelowBound
+        }
     }
 
     /// The coefficients of theta and of n in powers of `x - 1`.
@@ -103,30 +115,94 @@ impl<'a> Path<'a> {
         (self.exact_theta().about(centre), [n0, n1, n2])
     }
 
-    /// Least velocity of a feasible shortcut on `[0, t_f]`.
-    ///
-    /// `v = n/(t_f theta) >= m` where the cubic `n - m t_f theta` is not negative. The minimum of that cubic gives the next, lower `m`: Dinkelbach's
-    /// method (Management Science 13, 492, 1967), which falls to the least ratio and doubles its digits with each step.
+    /// Velocity at both ends, the lesser.
     #[inline(always)]
-    pub fn v_min(&self) -> f64 {
-        let t_f = self.ends.t_f;
+    fn v_ends(&self) -> f64 {
         let (theta_end, n_end) = self.about_end();
-        let mut least = (self.n.c[0] / (t_f * self.theta.c[0])).min(n_end[0] / (t_f * theta_end[0]));
-        for _ in 0..MOST_STEPS {
-            let scale = least * t_f;
-            let mut surplus = self.n;
-            for (s, theta) in surplus.c.iter_mut().zip(self.theta.c) {
-                *s -= scale * theta;
-            }
-            let x = surplus.minimum();
-            let v = self.n.at(x) / (t_f * self.theta.at(x));
-            if x == 0.0 || v.is_nan() || v >= least {
-                break;
-            }
-            least = v;
-        }
-        least
+        let (start, end) = (self.n.c[0] / self.theta.c[0], n_end[0] / theta_end[0]);
+        (if start < end { start } else { end }) / self.ends.t_f
     }
+}
+
+/// Sign of the least value of a polynomial: -1, +1, or 0 where rounding leaves doubt.
+#[inline(always)]
+fn sign(cubic: &Cubic) -> f64 {
+    let (least, doubt) = cubic.least();
+    if least > doubt {
+        1.0
+    } else if least < -doubt {
+        -1.0
+    } else {
+        0.0
+    }
+}
+
+/// Status and, where asked for, least velocity on `[0, t_f]` of eight shortcuts.
+///
+/// Feasibility follows from the stationary minima of theta, of `n` and of `n - t_f theta`; the few that rounding leaves in doubt are decided in
+/// double-double.
+pub(super) fn screen(ends: &Ends, a_2: &Lanes, a_3: &Lanes, v_min: Option<&mut Lanes>) -> [Status; LANES] {
+    let signs = signs(ends, a_2, a_3);
+    let mut status = [Status::Infeasible; LANES];
+    for i in 0..LANES {
+        let [n, theta, surplus] = [signs[0][i], signs[1][i], signs[2][i]];
+        status[i] = if n < 0.0 || theta < 0.0 {
+            Status::Infeasible
+        } else if n * theta * surplus == 0.0 {
+            Path::new(ends, a_2[i], a_3[i]).exact_status()
+        } else if surplus > 0.0 {
+            Status::Ok
+        } else {
+            Status::BelowBound
+        };
+    }
+    if let Some(v_min) = v_min {
+        if status.iter().any(|&s| s != Status::Infeasible) {
+            *v_min = least_velocities(ends, a_2, a_3);
+        }
+    }
+    status
+}
+
+#[multiversion(targets(
+    "x86_64+avx+avx2+bmi1+bmi2+avx512f+avx512bw+avx512cd+avx512dq+avx512vl",
+    "x86_64+avx+avx2+bmi1+bmi2"
+))]
+fn signs(ends: &Ends, a_2: &Lanes, a_3: &Lanes) -> [Lanes; 3] {
+    let mut signs = [[0.0; LANES]; 3];
+    for i in 0..LANES {
+        let path = Path::new(ends, a_2[i], a_3[i]);
+        signs[0][i] = sign(&path.n);
+        signs[1][i] = sign(&path.theta);
+        signs[2][i] = sign(&path.surplus(ends.t_f));
+    }
+    signs
+}
+
+/// `v = n/(t_f theta) >= m` where the cubic `n - m t_f theta` is not negative. The minimum of that cubic gives the next, lower `m`: Dinkelbach's
+/// method (Management Science 13, 492, 1967), which falls to the least ratio and doubles its digits with each step. Infeasible lanes hold no meaning.
+#[multiversion(targets(
+    "x86_64+avx+avx2+bmi1+bmi2+avx512f+avx512bw+avx512cd+avx512dq+avx512vl",
+    "x86_64+avx+avx2+bmi1+bmi2"
+))]
+fn least_velocities(ends: &Ends, a_2: &Lanes, a_3: &Lanes) -> Lanes {
+    let mut v_min = [0.0; LANES];
+    for i in 0..LANES {
+        v_min[i] = Path::new(ends, a_2[i], a_3[i]).v_ends();
+    }
+    for _ in 0..MOST_STEPS {
+        let before = v_min;
+        for i in 0..LANES {
+            let path = Path::new(ends, a_2[i], a_3[i]);
+            let x = path.surplus(v_min[i] * ends.t_f).minimum();
+            let v = path.n.at(x) / (ends.t_f * path.theta.at(x));
+            v_min[i] = if v < v_min[i] && v > 0.0 { v } else { v_min[i] };
+        }
+        if v_min == before {
+            break;
+        }
+    }
+    v_min
 }
 
 /// More steps than the doubling of digits can use.

@@ -43,40 +43,52 @@ pub(super) struct Panel {
     pub from: f64,
     pub to: f64,
     /// Gauss nodes.
-    pub nodes: f64,
+    pub nodes: usize,
 }
 
-/// Nodes up to which the plain rule is taken without looking for a better one.
-const PLAIN: f64 = 24.0;
+/// Nodes that are taken without looking for a better map: the search costs as much as some sixteen nodes.
+const PLAIN: usize = 32;
 /// Nodes from which the sinh map is tried.
-const POOR: f64 = 40.0;
-/// Nodes beyond which a panel is cut if that helps.
-const LONG: f64 = 80.0;
+const POOR: usize = 40;
+/// Nodes beyond which a panel is cut.
+const LONG: usize = 80;
 /// Most nodes of one panel.
-pub(super) const MOST_NODES: f64 = 256.0;
+const MOST_NODES: usize = 256;
 /// Depth of cutting: a panel is never shorter than `2^-12` of its parent's share.
 const DEEPEST: u32 = 12;
 /// Safety of the estimate: `e^MARGIN` stands for the residues' share in the integral.
-const MARGIN: f64 = 3.0;
+const MARGIN: f64 = 2.0;
 
-/// The accuracy asked for, in the forms that the choice of a rule needs.
-#[derive(Debug, Clone, Copy)]
+/// The accuracy asked for, as the focal sums (see [`focal`]) from which a number of nodes is enough.
+#[derive(Debug, Clone)]
 pub(super) struct Accuracy {
-    /// `-ln tolerance` with the margin.
-    digits: f64,
-    /// Focal sum (see [`focal`]) from which [`PLAIN`] nodes are enough.
-    plain: f64,
-    /// Focal sum below which the sinh map is tried too.
-    poor: f64,
+    /// Element `i` is for `(i + 1) LANES` nodes; falling.
+    focal: [f64; MOST_NODES / LANES],
 }
 
 impl Accuracy {
     /// For a relative accuracy `tolerance`.
     pub fn new(tolerance: f64) -> Accuracy {
         let digits = MARGIN - ln(tolerance);
-        // rho + 1/rho with rho^(2 nodes) = e^digits.
-        let focal = |nodes: f64| exp(0.5 * digits / nodes) + exp(-0.5 * digits / nodes);
-        Accuracy { digits, plain: focal(PLAIN), poor: focal(POOR) }
+        let mut focal = [0.0; MOST_NODES / LANES];
+        for (i, focal) in focal.iter_mut().enumerate() {
+            // rho + 1/rho with rho^(2 nodes) = e^digits.
+            let ln_rho = 0.5 * digits / ((i + 1) * LANES) as f64;
+            *focal = exp(ln_rho) + exp(-ln_rho);
+        }
+        Accuracy { focal }
+    }
+
+    /// The focal sum from which `nodes` are enough.
+    #[inline(always)]
+    fn enough(&self, nodes: usize) -> f64 {
+        self.focal[nodes / LANES - 1]
+    }
+
+    /// The nodes that a focal sum asks for; `MOST_NODES` where that is not enough.
+    fn nodes(&self, focal: f64) -> usize {
+        let more = self.focal.iter().position(|&enough| focal >= enough);
+        more.map_or(MOST_NODES, |i| (i + 1) * LANES)
     }
 }
 
@@ -110,14 +122,12 @@ impl Zeros {
 /// Appends the panels that integrate over `[low, high]`.
 pub(super) fn choose(zeros: &Zeros, low: f64, high: f64, accuracy: &Accuracy, depth: u32, panels: &mut Vec<Panel>) {
     let (mut panel, focal) = best_panel(zeros, low, high, accuracy);
-    let rho = 0.5 * (focal + (focal * focal - 4.0).max(0.0).sqrt());
-    panel.nodes = accuracy.digits / (2.0 * ln(rho.clamp(1.0 + 1e-12, 1e8)));
+    panel.nodes = accuracy.nodes(focal);
     if panel.nodes > LONG && depth < DEEPEST {
         let cut = cut_at(zeros, low, high);
         choose(zeros, low, cut, accuracy, depth + 1, panels);
         choose(zeros, cut, high, accuracy, depth + 1, panels);
     } else {
-        panel.nodes = panel.nodes.min(MOST_NODES);
         panels.push(panel);
     }
 }
@@ -129,21 +139,32 @@ pub(super) fn choose(zeros: &Zeros, low: f64, high: f64, accuracy: &Accuracy, de
     "x86_64+avx+avx2+bmi1+bmi2"
 ))]
 fn best_panel(zeros: &Zeros, low: f64, high: f64, accuracy: &Accuracy) -> (Panel, f64) {
-    let mut best = Panel { centre: high, map: Map::Line, from: low - high, to: 0.0, nodes: 0.0 };
-    let mut largest = focal(&zeros.re, &zeros.im, low, high);
-    if largest >= accuracy.plain {
-        return (best, largest);
-    }
-    let gaps = [1.0, -1.0].map(|side| real_gap(zeros, if side > 0.0 { high } else { low }, side));
-    let nearest = if gaps[0] <= gaps[1] { 1.0 } else { -1.0 };
-    for side in [nearest, -nearest] {
-        let gap = if side > 0.0 { gaps[0] } else { gaps[1] };
-        power(zeros, low, high, side, gap, accuracy, &mut best, &mut largest);
-        if largest >= accuracy.plain {
+    let mut best = Panel { centre: high, map: Map::Line, from: low - high, to: 0.0, nodes: 0 };
+    let mut largest = 2.0;
+    let plain = accuracy.enough(PLAIN);
+    let gaps = [real_gap(zeros, high, 1.0), real_gap(zeros, low, -1.0)];
+    let (nearest, gap, other) = if gaps[0] <= gaps[1] { (1.0, gaps[0], gaps[1]) } else { (-1.0, gaps[1], gaps[0]) };
+    // A real zero this near rules the plain rule out before its ellipse is computed.
+    let hopeless = 2.0 + 4.0 * gap / (high - low) < plain;
+    if !hopeless {
+        largest = focal(&zeros.re, &zeros.im, low, high);
+        if largest >= plain {
             return (best, largest);
         }
     }
-    if largest < accuracy.poor {
+    for (side, gap) in [(nearest, gap), (-nearest, other)] {
+        power(zeros, low, high, side, gap, plain, &mut best, &mut largest);
+        if largest >= plain {
+            return (best, largest);
+        }
+    }
+    if hopeless {
+        let straight = focal(&zeros.re, &zeros.im, low, high);
+        if straight > largest {
+            (best, largest) = (Panel { centre: high, map: Map::Line, from: low - high, to: 0.0, nodes: 0 }, straight);
+        }
+    }
+    if largest < accuracy.enough(POOR) {
         sinh(zeros, low, high, &mut best, &mut largest);
     }
     (best, largest)
@@ -180,7 +201,7 @@ fn power(
     high: f64,
     side: f64,
     gap: f64,
-    accuracy: &Accuracy,
+    plain: f64,
     best: &mut Panel,
     largest: &mut f64,
 ) {
@@ -206,8 +227,8 @@ fn power(
             return;
         }
         *largest = image;
-        *best = Panel { centre: end, map: Map::Power { side, gap, squarings }, from: near, to: far, nodes: 0.0 };
-        if image >= accuracy.plain {
+        *best = Panel { centre: end, map: Map::Power { side, gap, squarings }, from: near, to: far, nodes: 0 };
+        if image >= plain {
             return;
         }
     }
@@ -228,7 +249,7 @@ fn sinh(zeros: &Zeros, low: f64, high: f64, best: &mut Panel, largest: &mut f64)
     let image = focal(&re, &im, from, to);
     if image - 2.0 > 2.0 * (*largest - 2.0) {
         *largest = image;
-        *best = Panel { centre, map: Map::Sinh { height }, from, to, nodes: 0.0 };
+        *best = Panel { centre, map: Map::Sinh { height }, from, to, nodes: 0 };
     }
 }
 
