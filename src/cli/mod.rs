@@ -1,20 +1,29 @@
 //! The commands: arguments in, a call of the library, words out.
 
+mod plan;
 mod run;
+mod tables;
+mod watch;
+mod words;
 
-use std::path::PathBuf;
+use std::fmt::Display;
+use std::io::{self, Write};
 use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
 
-/// Exit code of a run whose spec or arguments are wrong.
-const WRONG: u8 = 1;
-/// Exit code of a run that failed.
-const FAILED: u8 = 2;
+use crate::sweep::SpecError;
 
-/// The command line.
+/// The spec or the arguments are wrong.
+const WRONG: u8 = 1;
+/// The run failed.
+const FAILED: u8 = 2;
+/// `--strict`, and some row is `not_converged`.
+const NOT_STRICT: u8 = 3;
+
+/// Exact parameter sweeps over the control of rate-and-state friction.
 #[derive(Debug, Parser)]
-#[command(version, about)]
+#[command(version)]
 struct Arguments {
     #[command(subcommand)]
     command: Command,
@@ -22,8 +31,30 @@ struct Arguments {
 
 #[derive(Debug, Subcommand)]
 enum Command {
-    /// Run a sweep
-    Run(run::RunArguments),
+    /// Compute the tables of a spec; a run that was stopped goes on where it was
+    Run(run::Arguments),
+    /// Say what a spec would compute, and estimate time and size
+    Plan(plan::Arguments),
+    /// List all tables, their columns and units
+    Tables,
+}
+
+/// A command that did not do its work: what to say, and the exit code.
+struct Failure {
+    code: u8,
+    message: String,
+}
+
+impl Failure {
+    fn failed(error: impl Display) -> Failure {
+        Failure { code: FAILED, message: format!("error: {error}") }
+    }
+}
+
+impl From<SpecError> for Failure {
+    fn from(error: SpecError) -> Failure {
+        Failure { code: WRONG, message: format!("error: {error}") }
+    }
 }
 
 /// Reads the arguments of the process and does what they say.
@@ -31,11 +62,31 @@ pub fn main() -> ExitCode {
     let arguments = match Arguments::try_parse() {
         Ok(arguments) => arguments,
         Err(error) => {
+            // Nothing can be done if the terminal is gone.
             let _ = error.print();
             return if error.use_stderr() { WRONG.into() } else { ExitCode::SUCCESS };
         }
     };
-    match arguments.command {
+    let done = match arguments.command {
         Command::Run(arguments) => run::run(&arguments),
+        Command::Plan(arguments) => plan::plan(&arguments),
+        Command::Tables => tables::tables(),
+    };
+    match done {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(failure) => {
+            let _ = writeln!(io::stderr(), "{}", failure.message);
+            failure.code.into()
+        }
+    }
+}
+
+/// Writes `text` to standard output; that a reader has had enough is no failure.
+fn say(text: &str) -> Result<(), Failure> {
+    match io::stdout().write_all(text.as_bytes()) {
+        Err(error) if error.kind() != io::ErrorKind::BrokenPipe => {
+            Err(Failure::failed(format!("cannot write to standard output: {error}")))
+        }
+        _ => Ok(()),
     }
 }

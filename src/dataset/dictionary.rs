@@ -124,12 +124,7 @@ impl Numbers {
     }
 
     /// A chunk of these numbers.
-    pub fn chunk<'a>(
-        &self,
-        codes: &'a [(u32, usize)],
-        present: Option<&'a [(u32, usize)]>,
-        nulls: u64,
-    ) -> Chunk<'a> {
+    pub fn chunk<'a>(&self, codes: &'a [(u32, usize)], present: Option<&'a [(u32, usize)]>, nulls: u64) -> Chunk<'a> {
         let least = self.values.iter().copied().min_by(f64::total_cmp);
         let greatest = self.values.iter().copied().max_by(f64::total_cmp);
         // Readers may compare zeros of either sign as equal: the format asks for the outer one.

@@ -98,6 +98,9 @@ pub enum DatasetError {
         /// Why not.
         source: io::Error,
     },
+    /// A sample of a table could not be encoded.
+    #[error("cannot encode a sample: {0}")]
+    Sample(parquet::errors::ParquetError),
     /// A part could not be encoded.
     #[error("{path}: cannot encode: {source}")]
     Encode {

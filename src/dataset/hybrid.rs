@@ -95,7 +95,12 @@ mod tests {
             } else {
                 let length = (header >> 1) as usize * 8;
                 for i in 0..length {
-                    let bit = |j: usize| u32::from(bytes[at + (i * usize::from(bit_width) + j) / 8] >> ((i * usize::from(bit_width) + j) % 8) & 1);
+                    let bit = |j: usize| {
+                        u32::from(
+                            bytes[at + (i * usize::from(bit_width) + j) / 8] >> ((i * usize::from(bit_width) + j) % 8)
+                                & 1,
+                        )
+                    };
                     values.push((0..usize::from(bit_width)).map(|j| bit(j) << j).sum());
                 }
                 at += length * usize::from(bit_width) / 8;

@@ -2,12 +2,14 @@
 
 mod atomic;
 mod dictionary;
+mod digest;
 mod folder;
-mod hybrid;
 mod footer;
+mod hybrid;
 mod layout;
 mod part;
 
+pub use digest::{Cell, Digest, ReadError, Row};
 pub use folder::{DatasetError, Folder, Identity, Manifest, ManifestTable};
 pub use footer::Footer;
 pub use layout::Layout;

@@ -1,6 +1,5 @@
 //! One part: a range of rows as the bytes of a Parquet file.
 
-
 use std::sync::Arc;
 
 use parquet::arrow::{ArrowSchemaConverter, add_encoded_arrow_schema_to_metadata};

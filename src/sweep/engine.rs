@@ -3,13 +3,12 @@
 //! Encoding and writing a part are tasks of the same threads, so they overlap the computation of the next part. Nothing of what is written
 //! depends on how the work was spread.
 
-use std::ops::Range;
 use std::sync::mpsc::sync_channel;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use super::check::Sweep;
-use super::plan::{Plan, job};
-use crate::dataset::{DatasetError, Folder, Footer, Layout, Manifest, ManifestTable, encode};
+use super::plan::{Plan, footer, job};
+use crate::dataset::{DatasetError, Folder, Layout, encode};
 use crate::table::{Optima, Sheet, Signal, Stopped, Work};
 
 /// What a run did.
@@ -90,7 +89,7 @@ pub fn run(sweep: &Sweep, folder: &Folder, threads: usize, signal: &Signal) -> R
                 // Blocks while too many parts wait; a task that ends makes room. Neither end of the channel is gone before that.
                 let _ = take.send(());
                 let (give_back, layout, job, failure) = (give_back.clone(), &layout, &job, &failure);
-                let footer = footer(sweep, &manifest, table, rows);
+                let footer = footer(&manifest, &table.name, rows);
                 scope.spawn(move |_| {
                     let written = encode(layout, &job.rows, &sheet, &footer)
                         .map_err(|source| DatasetError::encode(folder, &table.name, part, source))
@@ -109,16 +108,6 @@ pub fn run(sweep: &Sweep, folder: &Folder, threads: usize, signal: &Signal) -> R
         outcome.tables.push(done);
     }
     Ok(outcome)
-}
-
-fn footer(sweep: &Sweep, manifest: &Manifest, table: &ManifestTable, rows: Range<u64>) -> Footer {
-    Footer {
-        spec: sweep.text.clone(),
-        spec_hash: manifest.identity.spec_hash.clone(),
-        version: manifest.identity.version.clone(),
-        table: table.name.clone(),
-        rows,
-    }
 }
 
 /// The content of `mutex`, also if a thread died while it held it.

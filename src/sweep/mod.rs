@@ -3,13 +3,15 @@
 mod check;
 mod engine;
 mod error;
+mod estimate;
 mod place;
 mod plan;
 mod points;
 mod spec;
 
 pub use check::{Request, Sweep};
-pub use engine::{Outcome, RunError, run};
+pub use engine::{Outcome, RunError, TableOutcome, run};
 pub use error::SpecError;
+pub use estimate::{Estimate, estimate};
 pub use plan::Plan;
 pub use spec::{AccuracySpec, AxisForm, AxisSpec, ModelSpec, Spec, TableSpec};

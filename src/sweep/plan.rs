@@ -1,7 +1,9 @@
 //! The plan: what there is to do, counted before anything is done.
 
+use std::ops::Range;
+
 use super::check::{Request, Sweep};
-use crate::dataset::{Manifest, ManifestTable};
+use crate::dataset::{Footer, Manifest, ManifestTable};
 use crate::table::{Job, OPTIMUM_AXES, Optima, Signal};
 
 /// What a sweep consists of.
@@ -53,4 +55,15 @@ pub fn job<'a>(sweep: &'a Sweep, request: &'a Request, optima: &'a Optima, signa
         optima,
         signal,
     })
+}
+
+/// What a part says of itself.
+pub fn footer(manifest: &Manifest, table: &str, rows: Range<u64>) -> Footer {
+    Footer {
+        spec: manifest.spec.clone(),
+        spec_hash: manifest.identity.spec_hash.clone(),
+        version: manifest.identity.version.clone(),
+        table: table.to_owned(),
+        rows,
+    }
 }

@@ -1,0 +1,26 @@
+//! `slipsweep tables`: every table and column, from their definitions.
+
+use super::{Failure, say, words};
+use crate::grid::{Grid, Quantity, Scale};
+use crate::table::{self, Kind, STATUS, STATUS_DOC};
+
+/// Prints all tables.
+pub fn tables() -> Result<(), Failure> {
+    let mut text = String::new();
+    let no_axes = Grid { factors: Vec::new() };
+    for table in table::ALL {
+        text.push_str(&format!("{}: {}\n", table.name(), table.doc()));
+        let mut rows: Vec<Vec<String>> = Vec::new();
+        for axis in Quantity::ALL.into_iter().filter(|axis| table.axes().contains(axis)) {
+            rows.push([axis.name(), axis.unit(Scale::Model), axis.doc()].map(str::to_owned).into());
+        }
+        for column in table.columns() {
+            let unit = if let Kind::Label(_) = column.kind { "word" } else { column.unit(&no_axes) };
+            rows.push([column.name, unit, column.doc].map(str::to_owned).into());
+        }
+        rows.push([STATUS, "word", STATUS_DOC].map(str::to_owned).into());
+        text.push_str(&words::aligned(&rows, 2));
+        text.push('\n');
+    }
+    say(text.trim_end_matches('\n')).and_then(|()| say("\n"))
+}

@@ -1,0 +1,107 @@
+//! Watching a run: progress for whoever looks, and the wish to stop.
+
+use std::io::{IsTerminal, Write, stderr};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::time::{Duration, Instant};
+
+use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use signal_hook::consts::{SIGINT, SIGTERM};
+
+use super::words;
+use crate::table::Signal;
+
+/// How often a run is looked at: Ctrl-C and the bar answer within this time.
+const LOOK: Duration = Duration::from_millis(50);
+
+/// How often a line is written where there is no terminal.
+const LINE: Duration = Duration::from_secs(10);
+
+/// Does `work`, and meanwhile shows progress towards `rows` rows unless `quiet`, and passes Ctrl-C and SIGTERM on to `signal`.
+///
+/// Returns what `work` returns, and which signal came, if one did. A second one ends the process at once.
+pub fn watched<T: Send>(signal: &Signal, rows: u64, quiet: bool, work: impl FnOnce() -> T + Send) -> (T, Option<i32>) {
+    let caught = Arc::new(AtomicUsize::new(0));
+    let registered = [SIGINT, SIGTERM].map(|number| listen(number, &caught));
+    let finished = AtomicBool::new(false);
+    let result = std::thread::scope(|scope| {
+        let watcher = scope.spawn(|| {
+            let mut show = Show::new(rows, quiet);
+            while !finished.load(Ordering::Acquire) {
+                if caught.load(Ordering::Relaxed) != 0 {
+                    signal.stop();
+                }
+                show.update(signal.rows());
+                std::thread::park_timeout(LOOK);
+            }
+            show.end();
+        });
+        let result = work();
+        finished.store(true, Ordering::Release);
+        watcher.thread().unpark();
+        result
+    });
+    for id in registered.into_iter().flatten().flatten() {
+        signal_hook::low_level::unregister(id);
+    }
+    let number = caught.load(Ordering::Relaxed);
+    (result, i32::try_from(number).ok().filter(|&number| number != 0))
+}
+
+/// Notes `number` in `caught` when it comes, and ends the process when it comes again. Where that cannot be had the run goes without.
+fn listen(number: i32, caught: &Arc<AtomicUsize>) -> [Option<signal_hook::SigId>; 3] {
+    let again = Arc::new(AtomicBool::new(false));
+    [
+        // Handlers run in the order in which they are registered: the first time `again` is still false here.
+        signal_hook::flag::register_conditional_shutdown(number, 128 + number, again.clone()).ok(),
+        signal_hook::flag::register(number, again).ok(),
+        signal_hook::flag::register_usize(number, caught.clone(), number as usize).ok(),
+    ]
+}
+
+/// The ways to show progress.
+enum Show {
+    Nothing,
+    Bar(ProgressBar),
+    Lines { rows: u64, start: Instant, last: Instant },
+}
+
+impl Show {
+    fn new(rows: u64, quiet: bool) -> Show {
+        if quiet {
+            return Show::Nothing;
+        }
+        if !stderr().is_terminal() {
+            return Show::Lines { rows, start: Instant::now(), last: Instant::now() };
+        }
+        let bar = ProgressBar::with_draw_target(Some(rows), ProgressDrawTarget::stderr_with_hz(10));
+        let template = "{bar:30} {percent}% of {human_len} rows, {per_sec}, {eta} left";
+        if let Ok(style) = ProgressStyle::with_template(template) {
+            bar.set_style(style);
+        }
+        Show::Bar(bar)
+    }
+
+    fn update(&mut self, done: u64) {
+        match self {
+            Show::Nothing => {}
+            Show::Bar(bar) => bar.set_position(done),
+            Show::Lines { rows, start, last } if last.elapsed() >= LINE => {
+                *last = Instant::now();
+                let rate = done as f64 / start.elapsed().as_secs_f64();
+                let left = if done == 0 { "?".to_owned() } else { words::duration((*rows - done) as f64 / rate) };
+                let (done, rows) = (words::count(done), words::count(*rows));
+                // Progress that cannot be told is not worth a failure.
+                let _ =
+                    writeln!(stderr(), "{done} of {rows} rows, {} a second, {left} left", words::count(rate as u64));
+            }
+            Show::Lines { .. } => {}
+        }
+    }
+
+    fn end(self) {
+        if let Show::Bar(bar) = self {
+            bar.finish_and_clear();
+        }
+    }
+}

@@ -1,0 +1,132 @@
+//! Numbers, amounts and tables as words.
+
+/// `value` to nine significant digits.
+pub fn number(value: f64) -> String {
+    if value == 0.0 || !value.is_finite() {
+        return format!("{value}");
+    }
+    let scientific = format!("{value:.8e}");
+    let (digits, exponent) = scientific.split_once('e').unwrap_or((&scientific, "0"));
+    let exponent: i32 = exponent.parse().unwrap_or(0);
+    if (-4..9).contains(&exponent) {
+        let decimals = usize::try_from(8 - exponent).unwrap_or(0);
+        trimmed(&format!("{value:.decimals$}")).to_owned()
+    } else {
+        format!("{}e{exponent}", trimmed(digits))
+    }
+}
+
+/// Without zeros at the end of the decimals.
+fn trimmed(digits: &str) -> &str {
+    if digits.contains('.') { digits.trim_end_matches('0').trim_end_matches('.') } else { digits }
+}
+
+/// `count` with a comma between thousands.
+pub fn count(count: u64) -> String {
+    let digits = count.to_string();
+    let mut text = String::new();
+    for (place, digit) in digits.chars().enumerate() {
+        if place > 0 && (digits.len() - place) % 3 == 0 {
+            text.push(',');
+        }
+        text.push(digit);
+    }
+    text
+}
+
+/// `number` things, in the singular or with an s.
+pub fn things(number: u64, thing: &str) -> String {
+    format!("{} {thing}{}", count(number), if number == 1 { "" } else { "s" })
+}
+
+/// `bytes` in a fitting unit.
+pub fn bytes(bytes: f64) -> String {
+    let mut value = bytes;
+    for unit in ["B", "kB", "MB", "GB"] {
+        if value < 999.5 {
+            return format!("{} {unit}", short(value));
+        }
+        value /= 1000.0;
+    }
+    format!("{} TB", short(value))
+}
+
+/// `seconds` in a fitting unit.
+pub fn duration(seconds: f64) -> String {
+    match seconds {
+        s if s < 0.9995 => format!("{} ms", short(s * 1e3)),
+        s if s < 120.0 => format!("{} s", short(s)),
+        s if s < 7200.0 => format!("{} min", short(s / 60.0)),
+        s if s < 172_800.0 => format!("{} h", short(s / 3600.0)),
+        s => format!("{} d", short(s / 86_400.0)),
+    }
+}
+
+/// Three significant digits of something between 0 and 1000, or all digits before the point.
+fn short(value: f64) -> String {
+    let decimals = if value < 9.995 { 2 } else { usize::from(value < 99.95) };
+    trimmed(&format!("{value:.decimals$}")).to_owned()
+}
+
+/// Lines with aligned columns, two spaces apart, each after `indent` spaces; numbers to the right.
+pub fn aligned(rows: &[Vec<String>], indent: usize) -> String {
+    let columns = rows.iter().map(Vec::len).max().unwrap_or(0);
+    let width = |column: usize| rows.iter().filter_map(|row| row.get(column)).map(|cell| cell.chars().count()).max();
+    let widths: Vec<usize> = (0..columns).map(|column| width(column).unwrap_or(0)).collect();
+    let mut text = String::new();
+    for row in rows {
+        let mut line = " ".repeat(indent);
+        for (cell, width) in row.iter().zip(&widths) {
+            line.push_str(&format!("{cell:<width$}  "));
+        }
+        text.push_str(line.trim_end());
+        text.push('\n');
+    }
+    text
+}
+
+#[cfg(test)]
+mod tests {
+    //! What a reader sees.
+
+    use super::*;
+
+    #[test]
+    fn numbers_have_nine_digits() {
+        let shown =
+            [0.037, 100.0, 6.580308e-7, 3.80811141633, -2.59678653, 3392.17, 1e6, 1.5e12, f64::INFINITY, 1.0 / 3.0];
+        let words = [
+            "0.037",
+            "100",
+            "6.580308e-7",
+            "3.80811142",
+            "-2.59678653",
+            "3392.17",
+            "1000000",
+            "1.5e12",
+            "inf",
+            "0.333333333",
+        ];
+        assert_eq!(shown.map(number), words);
+    }
+
+    #[test]
+    fn amounts_are_readable() {
+        assert_eq!(
+            [0, 999, 1000, 482_403, 1_000_000_000].map(count),
+            ["0", "999", "1,000", "482,403", "1,000,000,000"]
+        );
+        assert_eq!([things(1, "row"), things(1200, "part")], ["1 row", "1,200 parts"]);
+        assert_eq!([0.0, 999.0, 1500.0, 2.5e7, 3e13].map(bytes), ["0 B", "999 B", "1.5 kB", "25 MB", "30 TB"]);
+        assert_eq!(
+            [0.0123, 1.0, 90.0, 600.0, 1e5, 1e6].map(duration),
+            ["12.3 ms", "1 s", "90 s", "10 min", "27.8 h", "11.6 d"]
+        );
+    }
+
+    #[test]
+    fn columns_are_aligned() {
+        let rows = [vec!["t_f".to_owned(), "gap".to_owned()], vec!["0.02".to_owned(), "1e-7".to_owned()]];
+        assert_eq!(aligned(&rows, 2), "  t_f   gap\n  0.02  1e-7\n");
+    }
+}

@@ -1,0 +1,257 @@
+//! A table read back from disk and told in a few numbers: how many rows of which status, ranges, and where a quantity is least.
+//!
+//! Parts are read one at a time, so the memory does not grow with the table.
+
+use std::fs::File;
+use std::path::Path;
+
+use polars::prelude::{DataFrame, ParquetReader, PolarsError, SerReader};
+
+use super::folder::{Folder, ManifestTable};
+use crate::grid::Quantity;
+use crate::protocol::Status;
+use crate::table::{self, Kind, OPTIMUM_AXES, STATUS};
+
+/// Tables of at most this many rows are kept whole, and least values are told apart for at most this many transitions.
+pub const FEW: usize = 12;
+
+/// What a table contains.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Digest {
+    /// Rows by status, in the order of [`Status::ALL`].
+    pub status: [u64; Status::ALL.len()],
+    /// The columns of numbers after the axes.
+    pub ranges: Vec<Range>,
+    /// The columns of words: each word and its rows.
+    pub words: Vec<(String, Vec<(String, u64)>)>,
+    /// All rows, if they are few.
+    pub rows: Option<Vec<Row>>,
+    /// The row of least `gap` with status `ok` of each transition and time, or the least of all if those are many.
+    pub least: Vec<Row>,
+}
+
+/// The values of a column.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Range {
+    /// Its name.
+    pub column: String,
+    /// Rows that have a value.
+    pub count: u64,
+    /// The least.
+    pub least: f64,
+    /// The greatest.
+    pub greatest: f64,
+}
+
+/// One row: the names of its cells and what is in them.
+pub type Row = Vec<(String, Cell)>;
+
+/// A cell.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Cell {
+    /// Null.
+    Missing,
+    /// A number.
+    Number(f64),
+    /// A word.
+    Word(String),
+}
+
+/// Why a table cannot be read back.
+#[derive(Debug, thiserror::Error)]
+#[error(
+    "{path}: cannot read back: {source}\n  help: delete the file and run the sweep again, which makes only what is missing"
+)]
+pub struct ReadError {
+    path: String,
+    source: PolarsError,
+}
+
+impl Digest {
+    /// Reads all parts of `table`.
+    pub fn read(folder: &Folder, table: &ManifestTable) -> Result<Digest, ReadError> {
+        let mut digest = Digest { rows: (table.rows <= FEW as u64).then(Vec::new), ..Digest::default() };
+        let mut least = Least::default();
+        for part in 0..table.parts {
+            let path = folder.part(&table.name, part);
+            load(&path)
+                .and_then(|frame| digest.add(&table.name, &frame, &mut least))
+                .map_err(|source| ReadError { path: path.display().to_string(), source })?;
+        }
+        digest.least = least.rows();
+        Ok(digest)
+    }
+
+    fn add(&mut self, table: &str, frame: &DataFrame, least: &mut Least) -> Result<(), PolarsError> {
+        for (word, rows) in count_words(frame, STATUS)? {
+            if let Some(status) = Status::ALL.iter().position(|status| status.name() == word) {
+                self.status[status] += rows;
+            }
+        }
+        for column in table::find(table).map_or(&[][..], |table| table.columns()) {
+            if frame.column(column.name).is_err() {
+                continue;
+            }
+            match column.kind {
+                Kind::Number(_) | Kind::Quantity(_) => self.add_numbers(frame, column.name)?,
+                Kind::Label(_) => self.add_words(frame, column.name)?,
+            }
+        }
+        if let Some(rows) = &mut self.rows {
+            for index in 0..frame.height() {
+                rows.push(row(frame, index)?);
+            }
+        }
+        if frame.column("gap").is_ok() {
+            least.add(frame)?;
+        }
+        Ok(())
+    }
+
+    fn add_numbers(&mut self, frame: &DataFrame, name: &str) -> Result<(), PolarsError> {
+        let values = frame.column(name)?.f64()?;
+        let mut range = Range { column: name.to_owned(), count: 0, least: f64::INFINITY, greatest: f64::NEG_INFINITY };
+        for value in values.iter().flatten() {
+            range.count += 1;
+            range.least = range.least.min(value);
+            range.greatest = range.greatest.max(value);
+        }
+        match self.ranges.iter_mut().find(|range| range.column == name) {
+            Some(all) => {
+                all.count += range.count;
+                all.least = all.least.min(range.least);
+                all.greatest = all.greatest.max(range.greatest);
+            }
+            None => self.ranges.push(range),
+        }
+        Ok(())
+    }
+
+    fn add_words(&mut self, frame: &DataFrame, name: &str) -> Result<(), PolarsError> {
+        let place = match self.words.iter().position(|(column, _)| column == name) {
+            Some(place) => place,
+            None => {
+                self.words.push((name.to_owned(), Vec::new()));
+                self.words.len() - 1
+            }
+        };
+        let counts = &mut self.words[place].1;
+        for (word, rows) in count_words(frame, name)? {
+            match counts.iter_mut().find(|(known, _)| *known == word) {
+                Some((_, count)) => *count += rows,
+                None => counts.push((word, rows)),
+            }
+        }
+        counts.sort();
+        Ok(())
+    }
+}
+
+fn load(path: &Path) -> Result<DataFrame, PolarsError> {
+    let mut frame = ParquetReader::new(File::open(path)?).finish()?;
+    frame.rechunk_mut();
+    Ok(frame)
+}
+
+/// The words of a column and how many rows have each.
+fn count_words(frame: &DataFrame, name: &str) -> Result<Vec<(String, u64)>, PolarsError> {
+    let words = frame.column(name)?.cat32()?;
+    let mut counts: Vec<(u32, u64)> = Vec::new();
+    let mut last = 0;
+    for code in words.physical().iter().flatten() {
+        if counts.get(last).is_none_or(|(known, _)| *known != code) {
+            last = counts.iter().position(|(known, _)| *known == code).unwrap_or_else(|| {
+                counts.push((code, 0));
+                counts.len() - 1
+            });
+        }
+        counts[last].1 += 1;
+    }
+    let word = |code| words.get_mapping().cat_to_str(code).unwrap_or_default().to_owned();
+    Ok(counts.into_iter().map(|(code, rows)| (word(code), rows)).collect())
+}
+
+fn row(frame: &DataFrame, index: usize) -> Result<Row, PolarsError> {
+    frame
+        .columns()
+        .iter()
+        .map(|column| {
+            let cell = if let Some(numbers) = column.try_f64() {
+                numbers.get(index).map(Cell::Number)
+            } else {
+                let words = column.cat32()?;
+                let word = words.physical().get(index).and_then(|code| words.get_mapping().cat_to_str(code));
+                word.map(|word| Cell::Word(word.to_owned()))
+            };
+            Ok((column.name().to_string(), cell.unwrap_or(Cell::Missing)))
+        })
+        .collect()
+}
+
+/// The least gap of each transition and time so far, while those are few, and of all.
+#[derive(Default)]
+struct Least {
+    each: Vec<(Vec<u64>, f64, Row)>,
+    many: bool,
+    all: Option<(f64, Row)>,
+}
+
+impl Least {
+    fn add(&mut self, frame: &DataFrame) -> Result<(), PolarsError> {
+        let gaps = frame.column("gap")?.f64()?;
+        let status = frame.column(STATUS)?.cat32()?;
+        let codes = status.physical();
+        let ok = |code| status.get_mapping().cat_to_str(code) == Some(Status::Ok.name());
+        let axes = OPTIMUM_AXES
+            .iter()
+            .map(|axis: &Quantity| frame.column(axis.name())?.f64())
+            .collect::<Result<Vec<_>, _>>()?;
+        let axes = axes.iter().map(|axis| axis.cont_slice()).collect::<Result<Vec<_>, _>>()?;
+        // Within a part: the row of the least gap of each tuple, tuples in the order in which they come.
+        let mut found: Vec<(usize, f64)> = Vec::new();
+        let mut current = 0;
+        let same = |a: usize, b: usize| axes.iter().all(|axis| axis[a].to_bits() == axis[b].to_bits());
+        for (index, (gap, code)) in gaps.iter().zip(codes.iter()).enumerate() {
+            let (Some(gap), Some(code)) = (gap, code) else { continue };
+            if !ok(code) {
+                continue;
+            }
+            if found.get(current).is_none_or(|(other, _)| !same(*other, index)) {
+                current = match found.iter().position(|(other, _)| same(*other, index)) {
+                    Some(place) => place,
+                    None if found.len() <= FEW => {
+                        found.push((index, gap));
+                        found.len() - 1
+                    }
+                    // Too many to tell apart: only the least of all counts from here on.
+                    None => FEW,
+                };
+            }
+            if gap < found[current].1 {
+                found[current] = (index, gap);
+            }
+        }
+        self.many |= found.len() > FEW;
+        for (index, gap) in found {
+            let tuple: Vec<u64> = axes.iter().map(|axis| axis[index].to_bits()).collect();
+            if self.all.as_ref().is_none_or(|(least, _)| gap < *least) {
+                self.all = Some((gap, row(frame, index)?));
+            }
+            match self.each.iter().position(|(known, ..)| *known == tuple) {
+                Some(place) if gap < self.each[place].1 => self.each[place] = (tuple, gap, row(frame, index)?),
+                Some(_) => {}
+                None if self.each.len() < FEW => self.each.push((tuple, gap, row(frame, index)?)),
+                None => self.many = true,
+            }
+        }
+        Ok(())
+    }
+
+    fn rows(self) -> Vec<Row> {
+        if self.many {
+            self.all.into_iter().map(|(_, row)| row).collect()
+        } else {
+            self.each.into_iter().map(|(_, _, row)| row).collect()
+        }
+    }
+}
