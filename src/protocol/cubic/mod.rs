@@ -85,8 +85,15 @@ impl Landscape {
             let rule = rule(panel.nodes);
             effort.nodes += rule.x.len() as u32;
             // Where a zero is near, the digits of the small theta there count.
-            let (theta, n) =
-                if panel.centre == 1.0 && panel.nodes < NEAR { path.about_end() } else { path.about(panel.centre) };
+            let (theta, n) = if panel.nodes >= NEAR {
+                path.about(panel.centre)
+            } else if panel.centre == 1.0 {
+                path.about_end()
+            } else if panel.centre == 0.0 {
+                path.about_start()
+            } else {
+                path.about(panel.centre)
+            };
             let slice = Slice {
                 constant: 1.0 - self.law.a * self.ln_t_f,
                 a: self.law.a,

@@ -109,6 +109,13 @@ impl<'a> Path<'a> {
         ([self.ends.theta_1.high, slope, bend, a_4], [self.ends.t_f - slope, -2.0 * bend, -3.0 * a_4])
     }
 
+    /// The coefficients of theta and of n in powers of `x`.
+    #[inline(always)]
+    pub fn about_start(&self) -> ([f64; 4], [f64; 3]) {
+        let [n0, n1, n2, _] = self.n.c;
+        (self.theta.c, [n0, n1, n2])
+    }
+
     /// The coefficients of theta and of n in powers of `x - centre`, each right to the last bit.
     pub fn about(&self, centre: f64) -> ([f64; 4], [f64; 3]) {
         let [n0, n1, n2, _] = self.exact_n().about(centre);

@@ -173,12 +173,18 @@ fn best_panel(zeros: &Zeros, low: f64, high: f64, accuracy: &Accuracy) -> (Panel
 /// The least sum of the distances of the places `(re, im)` from both ends of `[from, to]`, in units of half its length: 2 on the interval itself.
 #[inline(always)]
 fn focal(re: &Lanes, im: &Lanes, from: f64, to: f64) -> f64 {
+    2.0 * least(&distances(re, im, from, to)) / (to - from).abs()
+}
+
+/// The sums of the distances from both ends.
+#[inline(always)]
+fn distances(re: &Lanes, im: &Lanes, from: f64, to: f64) -> Lanes {
     let mut sums = [0.0; LANES];
     for i in 0..LANES {
         let (u, v, y2) = (re[i] - from, re[i] - to, im[i] * im[i]);
         sums[i] = (u * u + y2).sqrt() + (v * v + y2).sqrt();
     }
-    2.0 * least(&sums) / (to - from).abs()
+    sums
 }
 
 /// Distance of the nearest real zero beyond the end on that side.
@@ -235,6 +241,7 @@ fn power(
 }
 
 /// Tries the sinh map over the complex pair that hinders most.
+#[inline(always)]
 fn sinh(zeros: &Zeros, low: f64, high: f64, best: &mut Panel, largest: &mut f64) {
     let hindrance = hindrance(zeros, low, high);
     let (centre, height) = (zeros.re[hindrance], zeros.im[hindrance]);
@@ -254,9 +261,10 @@ fn sinh(zeros: &Zeros, low: f64, high: f64, best: &mut Panel, largest: &mut f64)
 }
 
 /// The zero with the smallest ellipse.
+#[inline(always)]
 fn hindrance(zeros: &Zeros, low: f64, high: f64) -> usize {
-    let size = |i: usize| focal(&[zeros.re[i]; LANES], &[zeros.im[i]; LANES], low, high);
-    (1..LANES).fold(0, |best, i| if size(i) < size(best) { i } else { best })
+    let sums = distances(&zeros.re, &zeros.im, low, high);
+    (1..LANES).fold(0, |best, i| if sums[i] < sums[best] { i } else { best })
 }
 
 /// Where to cut: below the hindrance if that lies inside, else in the middle.
