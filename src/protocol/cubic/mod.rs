@@ -4,6 +4,7 @@
 //! stationary points before any quadrature is spent, and the quadrature follows from their zeros ([`rules`]).
 
 mod kernel;
+mod moments;
 mod path;
 mod rules;
 
@@ -13,7 +14,8 @@ use crate::numerics::elementary::ln;
 use crate::numerics::gauss::rule;
 use crate::numerics::lanes::LANES;
 use kernel::Slice;
-use path::{Ends, Path, screen};
+pub(super) use path::Path;
+use path::{Ends, screen};
 use rules::{Accuracy, Panel, Zeros, choose};
 
 /// The work landscape of one transition in one time over the plane of `(alpha_2, alpha_3)`.
@@ -44,6 +46,16 @@ impl Landscape {
     pub fn new(transition: &Transition, t_f: f64, rtol: f64) -> Self {
         let ends = Ends::between(transition.v_i, transition.v_f, t_f);
         Landscape { law: transition.law, ends, ln_t_f: ln(t_f), accuracy: Accuracy::new(0.5 * rtol) }
+    }
+
+    /// One shortcut, given scaled.
+    pub(super) fn path(&self, a_2: f64, a_3: f64) -> Path<'_> {
+        Path::new(&self.ends, a_2, a_3)
+    }
+
+    /// `theta_0`, `theta_1`, their difference `theta_1 - theta_0`, and `t_f`.
+    pub(super) fn ends(&self) -> [f64; 4] {
+        [self.ends.theta_0.high, self.ends.theta_1.high, self.ends.rise.high, self.ends.t_f]
     }
 
     /// Evaluates the shortcuts `(a_2[i], a_3[i])`, given scaled: `alpha_2 t_f` and `alpha_3 t_f^2`.

@@ -11,7 +11,7 @@ use crate::protocol::Status;
 
 /// The ends that all shortcuts of a landscape share.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Ends {
+pub(in crate::protocol) struct Ends {
     pub theta_0: DoubleDouble,
     pub theta_1: DoubleDouble,
     /// `theta_1 - theta_0`.
@@ -30,7 +30,7 @@ impl Ends {
 
 /// One shortcut.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Path<'a> {
+pub(in crate::protocol) struct Path<'a> {
     pub ends: &'a Ends,
     a_2: f64,
     a_3: f64,
@@ -52,6 +52,11 @@ impl<'a> Path<'a> {
             theta: Cubic { c: [ends.theta_0.high, a_2, a_3, a_4] },
             n: Cubic { c: [ends.t_f - a_2, -2.0 * a_3, -3.0 * a_4, 0.0] },
         }
+    }
+
+    /// `theta` in powers of `x`.
+    pub fn theta(&self) -> &Cubic {
+        &self.theta
     }
 
     /// `theta(x)` to 32 digits.
@@ -77,9 +82,9 @@ impl<'a> Path<'a> {
         surplus
     }
 
-    /// `n - t_f theta`, at least 0 where `v >= 1`.
+    /// `n - scale theta`: at least 0 where `v >= scale/t_f`.
     #[inline(always)]
-    fn surplus(&self, scale: f64) -> Cubic {
+    pub fn surplus(&self, scale: f64) -> Cubic {
         let mut surplus = self.n;
         for (s, theta) in surplus.c.iter_mut().zip(self.theta.c) {
             *s -= scale * theta;
@@ -120,6 +125,11 @@ impl<'a> Path<'a> {
     pub fn about(&self, centre: f64) -> ([f64; 4], [f64; 3]) {
         let [n0, n1, n2, _] = self.exact_n().about(centre);
         (self.exact_theta().about(centre), [n0, n1, n2])
+    }
+
+    /// Status decided in double-double, and least velocity.
+    pub fn judge(&self) -> (Status, f64) {
+        (self.exact_status(), least_velocities(self.ends, &[self.a_2; LANES], &[self.a_3; LANES])[0])
     }
 
     /// Velocity at both ends, the lesser.

@@ -11,6 +11,7 @@ mod search;
 
 use super::{Effort, Solved, Status};
 use crate::model::{Law, Transition};
+use crate::numerics::elementary::ln;
 use extremal::Problem;
 
 /// How the optimal protocol starts.
@@ -69,12 +70,42 @@ pub fn solve(transition: &Transition, t_f: f64, bounded: bool, rtol: f64) -> Sol
     search::solve(&problem, t_f, rtol, None)
 }
 
-/// The velocity that the optimal protocol has now, at contact lifetime `theta` with `time_left` to reach `theta_f` (optimal feedback).
-///
-/// `None` where no protocol arrives in time, or where the solver could not certify its answer.
-pub fn feedback(law: Law, theta: f64, theta_f: f64, time_left: f64, bounded: bool, rtol: f64) -> Option<f64> {
-    let problem = Problem { law, theta_0: theta, theta_1: theta_f, fall: (theta - theta_f) / theta_f, bounded };
-    search::solve(&problem, time_left, rtol, None).value.map(|optimum| optimum.v_start)
+/// What the optimal protocol would do now.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Feedback {
+    /// Its velocity.
+    pub v: f64,
+    /// How hard the bound is pressed: the derivative of the cost rate with respect to `v` there, 0 off the bound.
+    pub pressure: f64,
+}
+
+/// Optimal feedback: what the optimal protocol does now, at contact lifetime `theta` with `time_left` to reach `theta_f`; `fall` is
+/// `theta/theta_f - 1`. `None` where no protocol arrives in time, or where the solver could not certify its answer.
+#[allow(clippy::too_many_arguments)]
+pub(super) fn feedback(
+    law: Law,
+    theta: f64,
+    theta_f: f64,
+    fall: f64,
+    time_left: f64,
+    bounded: bool,
+    rtol: f64,
+    effort: &mut Effort,
+) -> Option<Feedback> {
+    let problem = Problem { law, theta_0: theta, theta_1: theta_f, fall, bounded };
+    let solved = search::solve(&problem, time_left, rtol, None);
+    effort.quadratures += solved.effort.quadratures;
+    effort.nodes += solved.effort.nodes;
+    let optimum = solved.value?;
+    let pressure = if optimum.strategy == Strategy::Hold {
+        // On the bound -C = friction + V_theta (1 - theta) gives V_theta.
+        let friction = 1.0 + law.b * ln(theta);
+        let v_theta = (optimum.hamiltonian - friction) / (1.0 - theta);
+        (friction + law.a - v_theta * theta).max(0.0)
+    } else {
+        0.0
+    };
+    Some(Feedback { v: optimum.v_start, pressure })
 }
 
 impl Problem {
