@@ -1,48 +1,45 @@
-//! Inside the admissible set: a first point, and Newton's method from there.
+//! Inside the admissible set: the ellipsoid method to come close, and Newton's method from there.
 
 use super::Place;
 use crate::protocol::Effort;
 use crate::protocol::cubic::Landscape;
 
-/// Cuts after which an admissible set would be smaller than rounding.
-const MOST_CUTS: u32 = 400;
+/// Cuts of the ellipse, each by about a quarter of its area: from the largest set to rounding.
+const MOST_CUTS: u32 = 500;
+/// The ellipse is small enough where the work can change by no more than this share in it: Newton's method converges from there.
+const CLOSE: f64 = 1e-5;
 /// Newton steps; each is halved as often as needed.
 const MOST_STEPS: u32 = 100;
 
-/// A point well inside the admissible set, by the ellipsoid method; `None` if there is none.
+/// A place close to that of least work, by the ellipsoid method; `None` if nothing is admissible.
 ///
-/// Along with theta > 0 and `theta' <= 1`, theta is at most `M = theta_0 + t_f`, and the coefficients of a cubic between 0 and `M` on `[0, 1]` are bounded
-/// by Chebyshev's: `|a_2| <= 9 M`, `|a_3| <= 24 M`.
-pub(super) fn admissible(landscape: &Landscape, least_velocity: f64) -> Option<Place> {
+/// A cut through the centre of an ellipse that holds the place sought leaves half of it: where the centre is not admissible, the half in which the
+/// violated polynomial rises, else the half in which the work falls. Along with theta > 0 and `theta' <= 1`, theta is at most `M = theta_0 + t_f`, and the
+/// coefficients of a cubic between 0 and `M` on `[0, 1]` are bounded by Chebyshev's: `|a_2| <= 9 M`, `|a_3| <= 24 M`.
+pub(super) fn approach(landscape: &Landscape, least_velocity: f64, effort: &mut Effort) -> Option<Place> {
     let [theta_0, theta_1, _, t_f] = landscape.ends();
     let most = (theta_0 + t_f).max(theta_1);
     let mut centre = [0.0, 0.0];
     // The ellipse (y - centre)^T shape^-1 (y - centre) <= 1.
     let mut shape = [[2.0 * (9.0 * most) * (9.0 * most), 0.0], [0.0, 2.0 * (24.0 * most) * (24.0 * most)]];
-    let mut found: Option<Place> = None;
+    let mut best: Option<(f64, Place)> = None;
     for _ in 0..MOST_CUTS {
-        let (x, theta_side) = match violated(landscape, least_velocity, centre) {
-            Some(violation) => violation,
+        let (keep, work) = match violated(landscape, least_velocity, centre) {
+            Some((x, true)) => (rising(x, None), None),
+            Some((x, false)) => (rising(x, Some(least_velocity * t_f)), None),
             None => {
-                found = Some(Place { a_2: centre[0], a_3: centre[1] });
-                break;
+                let moments = landscape.moments(centre[0], centre[1], effort);
+                if best.is_none_or(|(least, _)| moments.work < least) {
+                    best = Some((moments.work, Place { a_2: centre[0], a_3: centre[1] }));
+                }
+                ([-moments.gradient[0], -moments.gradient[1]], Some(moments.work))
             }
         };
-        // How the violated polynomial changes with the coefficients at x: it must rise.
-        let d_theta = [x * (1.0 - x) * (1.0 + x), x * x * (1.0 - x)];
-        let d_n = [3.0 * x * x - 1.0, x * (3.0 * x - 2.0)];
-        let rise = if theta_side {
-            d_theta
-        } else {
-            [d_n[0] - least_velocity * t_f * d_theta[0], d_n[1] - least_velocity * t_f * d_theta[1]]
-        };
-        let along = [
-            shape[0][0] * rise[0] + shape[0][1] * rise[1],
-            shape[1][0] * rise[0] + shape[1][1] * rise[1],
-        ];
-        let length = (rise[0] * along[0] + rise[1] * along[1]).sqrt();
-        if length.is_nan() || length <= 1e-300 {
-            return None;
+        let along =
+            [shape[0][0] * keep[0] + shape[0][1] * keep[1], shape[1][0] * keep[0] + shape[1][1] * keep[1]];
+        let length = (keep[0] * along[0] + keep[1] * along[1]).sqrt();
+        if length.is_nan() || length <= 1e-300 || work.is_some_and(|work| length < CLOSE * work.abs()) {
+            break;
         }
         let step = [along[0] / length, along[1] / length];
         for i in 0..2 {
@@ -52,7 +49,26 @@ pub(super) fn admissible(landscape: &Landscape, least_velocity: f64) -> Option<P
             }
         }
     }
-    found
+    best.map(|(_, place)| place)
+}
+
+/// The direction in the plane in which theta(x) rises, or `n - scale theta` at `x`.
+fn rising(x: f64, scale: Option<f64>) -> [f64; 2] {
+    let d_theta = [x * (1.0 - x) * (1.0 + x), x * x * (1.0 - x)];
+    let d_n = [3.0 * x * x - 1.0, x * (3.0 * x - 2.0)];
+    match scale {
+        None => d_theta,
+        Some(scale) => [d_n[0] - scale * d_theta[0], d_n[1] - scale * d_theta[1]],
+    }
+}
+
+/// The direction from a place on the border into the admissible set: that in which the velocity rises where it is least.
+pub(super) fn inwards(landscape: &Landscape, least_velocity: f64, place: Place) -> [f64; 2] {
+    let scale = least_velocity * landscape.ends()[3];
+    let surplus = landscape.path(place.a_2, place.a_3).surplus(scale);
+    let places = [0.0, 1.0, surplus.minimum()];
+    let x = places.into_iter().fold(0.0, |least, x| if surplus.at(x) < surplus.at(least) { x } else { least });
+    rising(x, Some(scale))
 }
 
 /// Where an inadmissible shortcut fails worst: the place `x`, and whether it is theta that is not positive. `None` if it is admissible.

@@ -9,7 +9,7 @@ mod excess;
 mod interior;
 
 use super::cubic::Landscape;
-use super::{Solved, Status, optimal};
+use super::{Effort, Solved, Status, optimal};
 use crate::model::Transition;
 
 /// The best cubic shortcut of one transition in one time.
@@ -48,16 +48,12 @@ pub fn solve(transition: &Transition, t_f: f64, bounded: bool, rtol: f64) -> Sol
     };
     let landscape = Landscape::new(transition, t_f, rtol.min(1e-12));
     let least_velocity = if bounded { 1.0 } else { 0.0 };
-    let Some(start) = interior::admissible(&landscape, least_velocity) else {
+    let rough = Landscape::new(transition, t_f, 1e-7);
+    let Some(start) = interior::approach(&rough, least_velocity, &mut effort) else {
         return Solved { status: Status::Infeasible, value: None, effort };
     };
-    let inside = interior::descend(&landscape, least_velocity, start, &mut effort);
-    let (place, touches) = match inside {
-        Some(place) => (place, false),
-        None => match border::least(&landscape, least_velocity, &mut effort) {
-            Some(place) => (place, true),
-            None => return Solved { status: Status::NotConverged, value: None, effort },
-        },
+    let Some((place, touches)) = least(&landscape, least_velocity, start, &mut effort) else {
+        return Solved { status: Status::NotConverged, value: None, effort };
     };
     let work = landscape.moments(place.a_2, place.a_3, &mut effort).work;
     let v_min = if touches { least_velocity } else { landscape.path(place.a_2, place.a_3).judge().1 };
@@ -83,4 +79,16 @@ pub fn solve(transition: &Transition, t_f: f64, bounded: bool, rtol: f64) -> Sol
         v_min,
     };
     Solved { status, value: Some(value), effort }
+}
+
+/// The place of least work, and whether it lies on the border. A place on the border counts only if work rises from there into the admissible set.
+fn least(landscape: &Landscape, least_velocity: f64, start: Place, effort: &mut Effort) -> Option<(Place, bool)> {
+    if let Some(place) = interior::descend(landscape, least_velocity, start, effort) {
+        return Some((place, false));
+    }
+    let place = border::least(landscape, least_velocity, effort)?;
+    let inwards = interior::inwards(landscape, least_velocity, place);
+    let gradient = landscape.moments(place.a_2, place.a_3, effort).gradient;
+    let slope = gradient[0] * inwards[0] + gradient[1] * inwards[1];
+    (slope >= 0.0).then_some((place, true))
 }
