@@ -1,6 +1,7 @@
 //! Cubic polynomials on an interval: their least value, decided without doubt about its sign, and their zeros.
 
 use super::double_double::DoubleDouble;
+use super::elementary::{exp, ln};
 
 /// `c[0] + c[1] x + c[2] x^2 + c[3] x^3`.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -75,50 +76,71 @@ impl ExactCubic {
     }
 }
 
-/// A zero in the closed upper half plane.
+/// The zeros of a polynomial of degree `N` in the closed upper half plane, a conjugate pair given twice.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Zero {
-    /// Real part.
-    pub re: f64,
-    /// Imaginary part, at least 0; a positive one stands for a conjugate pair.
-    pub im: f64,
+pub struct Zeros<const N: usize> {
+    /// Real parts.
+    pub re: [f64; N],
+    /// Imaginary parts, at least 0.
+    pub im: [f64; N],
 }
 
-/// The zeros of `c + b x + a x^2`, without cancellation; those at infinity are left out.
-pub fn quadratic_zeros([c, b, a]: [f64; 3]) -> [Option<Zero>; 2] {
-    let half = -0.5 * b;
-    let discriminant = half * half - a * c;
-    let finite = |re: f64, im: f64| (re.is_finite() && im.is_finite()).then_some(Zero { re, im });
-    if discriminant < 0.0 {
-        return [finite(half / a, (-discriminant).sqrt() / a.abs()), None];
-    }
-    let q = half + discriminant.sqrt().copysign(half);
-    [finite(q / a, 0.0), finite(c / q, 0.0)]
-}
+/// `cos(acos(c)/3)` on `0 <= c <= 1` in powers of `c`: Chebyshev interpolant, good to 5e-6; one Newton step follows.
+const TRISECTION: [f64; 5] =
+    [0.8660304320226909, 0.1664117217875963, -0.04592193313076373, 0.01751218857520906, -0.004035398716654312];
 
-/// The zeros of `d[0] + d[1] s + d[2] s^2 + d[3] s^3` with `d[0] != 0`, to a few digits; those beyond `1e6` are left out.
+/// The zeros of `d[0] + d[1] s + d[2] s^2 + d[3] s^3` with `d[0] > 0`, without branches, to a few digits.
 ///
-/// Found as reciprocals, so that a vanishing leading coefficient only sends a zero to infinity.
-pub fn cubic_zeros(d: [f64; 4]) -> [Option<Zero>; 3] {
-    let (p, q, r) = (d[1] / d[0], d[2] / d[0], d[3] / d[0]);
-    // y^3 + p y^2 + q y + r (Numerical Recipes, 3rd ed., section 5.6).
-    let third = p / 3.0;
+/// Found as reciprocals, so that a vanishing leading coefficient only sends a zero to infinity: it comes out very large or infinite.
+#[inline(always)]
+pub fn cubic_zeros(d: [f64; 4]) -> Zeros<3> {
+    let scale = 1.0 / d[0];
+    let third = d[1] * scale / 3.0;
+    let (q, r) = (d[2] * scale, d[3] * scale);
+    // y = u - third, u^3 - 3 big_q u + 2 big_r = 0.
     let big_q = third * third - q / 3.0;
     let big_r = third * (third * third - 0.5 * q) + 0.5 * r;
-    let cube = big_q * big_q * big_q;
-    let excess = big_r * big_r - cube;
-    let y = if excess < 0.0 {
-        // Three real zeros: the one of largest distance from the mean.
-        let angle = libm::acos((big_r.abs() / cube.sqrt()).min(1.0));
-        -2.0 * (big_q.sqrt() * libm::cos(angle / 3.0)).copysign(big_r) - third
-    } else {
-        let s = -libm::cbrt(big_r.abs() + excess.sqrt()).copysign(big_r);
-        s + if s == 0.0 { 0.0 } else { big_q / s } - third
-    };
-    let rest = quadratic_zeros([q + y * (p + y), p + y, 1.0]);
-    let invert = |zero: Zero| {
-        let square = zero.re * zero.re + zero.im * zero.im;
-        (square > 1e-12).then(|| Zero { re: zero.re / square, im: zero.im / square })
-    };
-    [invert(Zero { re: y, im: 0.0 }), rest[0].and_then(invert), rest[1].and_then(invert)]
+    let size = big_r.abs();
+    let excess = size * size - big_q * big_q * big_q;
+    // One real zero: Cardano, in the form whose terms all have one sign.
+    let cube = size + (if excess > 0.0 { excess } else { 0.0 }).sqrt() + f64::MIN_POSITIVE;
+    let s = exp(ln(cube) / 3.0);
+    let t = big_q / s;
+    let cardano = 2.0 * size / (s * s - big_q + t * t + f64::MIN_POSITIVE);
+    // Three real zeros: Viete, the one of largest distance from the mean.
+    let root = (if big_q > 0.0 { big_q } else { 0.0 }).sqrt() + f64::MIN_POSITIVE;
+    let c = size / (root * root * root + f64::MIN_POSITIVE);
+    let c = if c < 1.0 { c } else { 1.0 };
+    let [g0, g1, g2, g3, g4] = TRISECTION;
+    let g = g0 + c * (g1 + c * (g2 + c * (g3 + c * g4)));
+    let g = g - ((4.0 * g * g - 3.0) * g - c) / (12.0 * g * g - 3.0);
+    let u = if excess > 0.0 { cardano } else { 2.0 * root * g };
+    let u = if big_r > 0.0 { -u } else { u };
+    // The other two from the sum and the product.
+    let mean = -0.5 * u - third;
+    let spread = 3.0 * big_q - 0.75 * u * u;
+    let real = spread >= 0.0;
+    let distance = spread.abs().sqrt();
+    let norm = mean * mean + distance * distance + f64::MIN_POSITIVE;
+    let (plus, minus) = (1.0 / (mean + distance), 1.0 / (mean - distance));
+    let (re, im) = (mean / norm, distance / norm);
+    Zeros {
+        re: [1.0 / (u - third), if real { plus } else { re }, if real { minus } else { re }],
+        im: [0.0, if real { 0.0 } else { im }, if real { 0.0 } else { im }],
+    }
+}
+
+/// The zeros of `c + b x + a x^2`, without branches and without cancellation; those at infinity come out very large, infinite or NaN.
+#[inline(always)]
+pub fn quadratic_zeros([c, b, a]: [f64; 3]) -> Zeros<2> {
+    let half = -0.5 * b;
+    let discriminant = half * half - a * c;
+    let real = discriminant >= 0.0;
+    let root = discriminant.abs().sqrt();
+    let q = if half < 0.0 { half - root } else { half + root };
+    let (re, im) = (half / a, root / a.abs());
+    Zeros {
+        re: [if real { q / a } else { re }, if real { c / q } else { re }],
+        im: [if real { 0.0 } else { im }, if real { 0.0 } else { im }],
+    }
 }

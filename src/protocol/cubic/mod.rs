@@ -6,6 +6,7 @@
 mod kernel;
 mod moments;
 mod path;
+mod plan;
 mod rules;
 
 use super::{Effort, Status};
@@ -16,7 +17,8 @@ use crate::numerics::lanes::LANES;
 use kernel::Slice;
 pub(super) use path::Path;
 use path::{Ends, screen};
-use rules::{Accuracy, Panel, Zeros, choose};
+use plan::plan;
+use rules::{Accuracy, Map, Panel, Zeros, choose};
 
 /// The work landscape of one transition in one time over the plane of `(alpha_2, alpha_3)`.
 #[derive(Debug, Clone)]
@@ -26,6 +28,9 @@ pub struct Landscape {
     ln_t_f: f64,
     accuracy: Accuracy,
 }
+
+/// Most nodes of a panel that is taken without a search for a better one.
+const MOST_PLANNED: usize = 48;
 
 /// Nodes from which the polynomials are expanded in double-double.
 const NEAR: usize = 40;
@@ -65,6 +70,9 @@ impl Landscape {
         let mut effort = Effort::default();
         let mut panels = Vec::with_capacity(8);
         let count = a_2.len().min(a_3.len()).min(out.status.len());
+        // Feasible shortcuts whose work is still due.
+        let mut due = [0; LANES];
+        let mut dues = 0;
         for first in (0..count).step_by(LANES) {
             let block = first..(first + LANES).min(count);
             let (mut a_2_lanes, mut a_3_lanes, mut v_lanes) = ([0.0; LANES], [0.0; LANES], [0.0; LANES]);
@@ -79,12 +87,56 @@ impl Landscape {
                 if let Some(v_min) = out.v_min.get_mut(i) {
                     *v_min = v_lanes[lane];
                 }
-                if let Some(work) = out.work.get_mut(i) {
-                    *work = self.work(&Path::new(&self.ends, a_2[i], a_3[i]), &mut panels, &mut effort);
+                if i < out.work.len() {
+                    due[dues] = i;
+                    dues += 1;
+                    if dues == LANES {
+                        self.works(&due, a_2, a_3, out.work, &mut panels, &mut effort);
+                        dues = 0;
+                    }
                 }
             }
         }
+        self.works(&due[..dues], a_2, a_3, out.work, &mut panels, &mut effort);
         effort
+    }
+
+    /// The works of up to eight feasible shortcuts.
+    fn works(
+        &self,
+        due: &[usize],
+        a_2: &[f64],
+        a_3: &[f64],
+        work: &mut [f64],
+        panels: &mut Vec<Panel>,
+        effort: &mut Effort,
+    ) {
+        let Some(&first) = due.first() else { return };
+        let (mut a_2_lanes, mut a_3_lanes) = ([a_2[first]; LANES], [a_3[first]; LANES]);
+        for (lane, &i) in due.iter().enumerate() {
+            (a_2_lanes[lane], a_3_lanes[lane]) = (a_2[i], a_3[i]);
+        }
+        let plan = plan(&self.ends, &a_2_lanes, &a_3_lanes);
+        for (lane, &i) in due.iter().enumerate() {
+            let path = Path::new(&self.ends, a_2[i], a_3[i]);
+            let nodes = self.accuracy.nodes(plan.focal[lane]);
+            work[i] = if nodes <= MOST_PLANNED {
+                let side = plan.side[lane];
+                let power = plan.squarings[lane] > 0.0;
+                let end = if power { side > 0.0 } else { self.ends.rise.high < 0.0 };
+                let (centre, shift) = if end { (1.0, -1.0) } else { (0.0, 0.0) };
+                effort.quadratures += 1;
+                let panel = if power {
+                    let map = Map::Power { side, gap: plan.gap[lane], squarings: plan.squarings[lane] as u32 };
+                    Panel { centre, map, from: plan.from[lane], to: plan.to[lane], nodes }
+                } else {
+                    Panel { centre, map: Map::Line, from: shift, to: 1.0 + shift, nodes }
+                };
+                self.sum(&path, &panel, effort)
+            } else {
+                self.work(&path, panels, effort)
+            };
+        }
     }
 
     /// `W_s = int tau v dt`.
@@ -92,31 +144,33 @@ impl Landscape {
         panels.clear();
         choose(&Zeros::of(path), 0.0, 1.0, &self.accuracy, 0, panels);
         effort.quadratures += 1;
-        let mut work = 0.0;
-        for panel in panels.iter() {
-            let rule = rule(panel.nodes);
-            effort.nodes += rule.x.len() as u32;
-            // Where a zero is near, the digits of the small theta there count.
-            let (theta, n) = if panel.nodes >= NEAR {
-                path.about(panel.centre)
-            } else if panel.centre == 1.0 {
-                path.about_end()
-            } else if panel.centre == 0.0 {
-                path.about_start()
-            } else {
-                path.about(panel.centre)
-            };
-            let slice = Slice {
-                constant: 1.0 - self.law.a * self.ln_t_f,
-                a: self.law.a,
-                slope: self.law.b - self.law.a,
-                theta,
-                n,
-                middle: 0.5 * (panel.from + panel.to),
-                half: 0.5 * (panel.to - panel.from),
-            };
-            work += slice.sum(panel.map, rule);
-        }
-        work
+        panels.iter().map(|panel| self.sum(path, panel, effort)).sum()
+    }
+
+    /// The part of one panel in the work.
+    #[inline(always)]
+    fn sum(&self, path: &Path, panel: &Panel, effort: &mut Effort) -> f64 {
+        let rule = rule(panel.nodes);
+        effort.nodes += rule.x.len() as u32;
+        // Where a zero is near, the digits of the small theta there count.
+        let (theta, n) = if panel.nodes >= NEAR {
+            path.about(panel.centre)
+        } else if panel.centre == 1.0 {
+            path.about_end()
+        } else if panel.centre == 0.0 {
+            path.about_start()
+        } else {
+            path.about(panel.centre)
+        };
+        let slice = Slice {
+            constant: 1.0 - self.law.a * self.ln_t_f,
+            a: self.law.a,
+            slope: self.law.b - self.law.a,
+            theta,
+            n,
+            middle: 0.5 * (panel.from + panel.to),
+            half: 0.5 * (panel.to - panel.from),
+        };
+        slice.sum(panel.map, rule)
     }
 }

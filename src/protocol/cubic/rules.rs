@@ -8,7 +8,7 @@
 use multiversion::multiversion;
 
 use super::path::Path;
-use crate::numerics::cubic::{cubic_zeros, quadratic_zeros};
+use crate::numerics::cubic::{self, cubic_zeros, quadratic_zeros};
 use crate::numerics::elementary::{exp, ln, ln_1p};
 use crate::numerics::lanes::{LANES, Lanes, least};
 
@@ -86,7 +86,7 @@ impl Accuracy {
     }
 
     /// The nodes that a focal sum asks for; `MOST_NODES` where that is not enough.
-    fn nodes(&self, focal: f64) -> usize {
+    pub fn nodes(&self, focal: f64) -> usize {
         let more = self.focal.iter().position(|&enough| focal >= enough);
         more.map_or(MOST_NODES, |i| (i + 1) * LANES)
     }
@@ -99,22 +99,39 @@ pub(super) struct Zeros {
     im: Lanes,
 }
 
-/// Where the zeros that do not exist are put.
-const FAR: f64 = 1e9;
+/// Zeros of theta and of `1 - theta'`: three and two.
+pub(super) const ZEROS: usize = 5;
+
+/// Zeros are not put farther away than this.
+pub(super) const FAR: f64 = 1e9;
+
+/// Zeros of theta (from its expansion about `x = 1`, where it is smallest in an acceleration) and of `1 - theta'`.
+#[inline(always)]
+pub(super) fn zeros(path: &Path) -> cubic::Zeros<ZEROS> {
+    let (theta, n) = path.about_end();
+    let (q, r) = (cubic_zeros(theta), quadratic_zeros(n));
+    let (mut re, mut im) =
+        ([q.re[0], q.re[1], q.re[2], r.re[0], r.re[1]], [q.im[0], q.im[1], q.im[2], r.im[0], r.im[1]]);
+    for k in 0..ZEROS {
+        (re[k], im[k]) = (1.0 + clamp(re[k]), clamp(im[k]));
+    }
+    cubic::Zeros { re, im }
+}
+
+/// `x` within `[-FAR, FAR]`; what is not a number is far away.
+#[inline(always)]
+fn clamp(x: f64) -> f64 {
+    let x = if x < FAR { x } else { FAR };
+    if x > -FAR { x } else { -FAR }
+}
 
 impl Zeros {
-    /// Zeros of theta (from its expansion about `x = 1`, where it is smallest in an acceleration) and of `1 - theta'`.
-    #[inline(always)]
+    /// The zeros of one shortcut.
     pub fn of(path: &Path) -> Zeros {
-        let (theta, n) = path.about_end();
+        let found = zeros(path);
         let mut zeros = Zeros { re: [FAR; LANES], im: [0.0; LANES] };
-        let [z0, z1, z2] = cubic_zeros(theta);
-        let [z3, z4] = quadratic_zeros(n);
-        for (i, zero) in [z0, z1, z2, z3, z4].into_iter().enumerate() {
-            if let Some(zero) = zero {
-                (zeros.re[i], zeros.im[i]) = (1.0 + zero.re, zero.im.abs());
-            }
-        }
+        zeros.re[..ZEROS].copy_from_slice(&found.re);
+        zeros.im[..ZEROS].copy_from_slice(&found.im);
         zeros
     }
 }
@@ -201,16 +218,7 @@ fn real_gap(zeros: &Zeros, end: f64, side: f64) -> f64 {
 /// Tries the power maps about the real zero a `gap` beyond the upper (`side = 1`) or the lower end, as long as they gain.
 #[allow(clippy::too_many_arguments)]
 #[inline(always)]
-fn power(
-    zeros: &Zeros,
-    low: f64,
-    high: f64,
-    side: f64,
-    gap: f64,
-    plain: f64,
-    best: &mut Panel,
-    largest: &mut f64,
-) {
+fn power(zeros: &Zeros, low: f64, high: f64, side: f64, gap: f64, plain: f64, best: &mut Panel, largest: &mut f64) {
     let end = if side > 0.0 { high } else { low };
     let length = high - low;
     if gap > 0.5 * length {
@@ -276,10 +284,11 @@ fn cut_at(zeros: &Zeros, low: f64, high: f64) -> f64 {
 
 /// The square root in the first quadrant or on its border, for `im >= 0` up to the sign of `im`.
 #[inline(always)]
-fn complex_sqrt(re: f64, im: f64) -> (f64, f64) {
+pub(super) fn complex_sqrt(re: f64, im: f64) -> (f64, f64) {
     let size = (re * re + im * im).sqrt();
     let root = (0.5 * (size + re.abs())).sqrt();
-    let other = if root > 0.0 { 0.5 * im.abs() / root } else { 0.0 };
+    // The smallest normal number keeps 0/0 away.
+    let other = 0.5 * im.abs() / (root + f64::MIN_POSITIVE);
     if re >= 0.0 { (root, other) } else { (other, root) }
 }
 
