@@ -129,15 +129,34 @@ impl<'a> Path<'a> {
 
     /// Status decided in double-double, and least velocity.
     pub fn judge(&self) -> (Status, f64) {
-        (self.exact_status(), least_velocities(self.ends, &[self.a_2; LANES], &[self.a_3; LANES])[0])
+        let (v_min, place) = least_velocities(self.ends, &[self.a_2; LANES], &[self.a_3; LANES]);
+        (self.exact_status(), self.sharpened(v_min[0], place[0]))
     }
 
-    /// Velocity at both ends, the lesser.
+    /// Velocity at both ends: the lesser, and where it is found.
     #[inline(always)]
-    fn v_ends(&self) -> f64 {
+    fn v_ends(&self) -> (f64, f64) {
         let (theta_end, n_end) = self.about_end();
         let (start, end) = (self.n.c[0] / self.theta.c[0], n_end[0] / theta_end[0]);
-        (if start < end { start } else { end }) / self.ends.t_f
+        let first = start < end;
+        ((if first { start } else { end }) / self.ends.t_f, if first { 0.0 } else { 1.0 })
+    }
+
+    /// The least velocity `v_min`, found at `x`: again in double-double where `n` or theta is so small that rounding shows.
+    ///
+    /// Rounding hardly moves the place, and the velocity there depends on the square of that.
+    fn sharpened(&self, v_min: f64, x: f64) -> f64 {
+        let faint = |cubic: &Cubic| {
+            let [c0, c1, c2, c3] = cubic.c;
+            // Written so that not-a-number is faint.
+            !(cubic.at(x) > FAINT * (c0.abs() + c1.abs() + c2.abs() + c3.abs()))
+        };
+        if faint(&self.n) || faint(&self.theta) {
+            let t_f = DoubleDouble::new(self.ends.t_f);
+            (self.exact_n().at(x) / (t_f * self.exact_theta().at(x))).high
+        } else {
+            v_min
+        }
     }
 }
 
@@ -173,9 +192,12 @@ pub(super) fn screen(ends: &Ends, a_2: &Lanes, a_3: &Lanes, v_min: Option<&mut L
             Status::BelowBound
         };
     }
-    if let Some(v_min) = v_min {
-        if status.iter().any(|&s| s != Status::Infeasible) {
-            *v_min = least_velocities(ends, a_2, a_3);
+    if let Some(v_min) = v_min
+        && status.iter().any(|&s| s != Status::Infeasible)
+    {
+        let (rounded, place) = least_velocities(ends, a_2, a_3);
+        for i in (0..LANES).filter(|&i| status[i] != Status::Infeasible) {
+            v_min[i] = Path::new(ends, a_2[i], a_3[i]).sharpened(rounded[i], place[i]);
         }
     }
     status
@@ -197,15 +219,16 @@ fn signs(ends: &Ends, a_2: &Lanes, a_3: &Lanes) -> [Lanes; 3] {
 }
 
 /// `v = n/(t_f theta) >= m` where the cubic `n - m t_f theta` is not negative. The minimum of that cubic gives the next, lower `m`: Dinkelbach's
-/// method (Management Science 13, 492, 1967), which falls to the least ratio and doubles its digits with each step. Infeasible lanes hold no meaning.
+/// method (Management Science 13, 492, 1967), which falls to the least ratio and doubles its digits with each step. Returns the least velocities and
+/// their places; infeasible lanes hold no meaning.
 #[multiversion(targets(
     "x86_64+avx+avx2+bmi1+bmi2+avx512f+avx512bw+avx512cd+avx512dq+avx512vl",
     "x86_64+avx+avx2+bmi1+bmi2"
 ))]
-fn least_velocities(ends: &Ends, a_2: &Lanes, a_3: &Lanes) -> Lanes {
-    let mut v_min = [0.0; LANES];
+fn least_velocities(ends: &Ends, a_2: &Lanes, a_3: &Lanes) -> (Lanes, Lanes) {
+    let (mut v_min, mut place) = ([0.0; LANES], [0.0; LANES]);
     for i in 0..LANES {
-        v_min[i] = Path::new(ends, a_2[i], a_3[i]).v_ends();
+        (v_min[i], place[i]) = Path::new(ends, a_2[i], a_3[i]).v_ends();
     }
     for _ in 0..MOST_STEPS {
         let before = v_min;
@@ -213,14 +236,19 @@ fn least_velocities(ends: &Ends, a_2: &Lanes, a_3: &Lanes) -> Lanes {
             let path = Path::new(ends, a_2[i], a_3[i]);
             let x = path.surplus(v_min[i] * ends.t_f).minimum();
             let v = path.n.at(x) / (ends.t_f * path.theta.at(x));
-            v_min[i] = if v < v_min[i] && v > 0.0 { v } else { v_min[i] };
+            let lower = v < v_min[i] && v > 0.0;
+            v_min[i] = if lower { v } else { v_min[i] };
+            place[i] = if lower { x } else { place[i] };
         }
         if v_min == before {
             break;
         }
     }
-    v_min
+    (v_min, place)
 }
+
+/// Below this share of its coefficients a polynomial loses digits that count.
+const FAINT: f64 = 1e-3;
 
 /// More steps than the doubling of digits can use.
 const MOST_STEPS: u32 = 60;
