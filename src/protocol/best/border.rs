@@ -197,7 +197,7 @@ impl Border<'_> {
         Some(least)
     }
 
-    /// Work and its derivative along a piece; `None` where it is not admissible.
+    /// Work and its derivative along a piece; `None` where it is not admissible, or where friction is not positive.
     fn work(&self, piece: Piece, parameter: f64, effort: &mut Effort) -> Option<(f64, f64)> {
         let (place, direction) = self.place(piece, parameter);
         if !self.admissible(place) {
@@ -205,6 +205,6 @@ impl Border<'_> {
         }
         let moments = self.landscape.moments(place.a_2, place.a_3, effort);
         let slope = moments.gradient[0] * direction[0] + moments.gradient[1] * direction[1];
-        (moments.work.is_finite() && slope.is_finite()).then_some((moments.work, slope))
+        (moments.friction_min > 0.0 && moments.work.is_finite() && slope.is_finite()).then_some((moments.work, slope))
     }
 }

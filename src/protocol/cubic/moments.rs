@@ -8,13 +8,15 @@ use crate::numerics::gauss::rule;
 use crate::protocol::Effort;
 
 /// `W_s` and its derivatives with respect to `a_2 = alpha_2 t_f` and `a_3 = alpha_3 t_f^2`.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub(in crate::protocol) struct Moments {
     pub work: f64,
     /// `dW/da_2`, `dW/da_3`.
     pub gradient: [f64; 2],
     /// `d2W/da_2^2`, `d2W/da_2 da_3`, `d2W/da_3^2`.
     pub hessian: [f64; 3],
+    /// Least friction at a node.
+    pub friction_min: f64,
 }
 
 impl Landscape {
@@ -25,7 +27,8 @@ impl Landscape {
         let path = Path::new(&self.ends, a_2, a_3);
         let (a, slope) = (self.law.a, self.law.b - self.law.a);
         let constant = 1.0 - a * self.ln_t_f;
-        let mut moments = Moments::default();
+        let mut moments =
+            Moments { work: 0.0, gradient: [0.0; 2], hessian: [0.0; 3], friction_min: f64::INFINITY };
         effort.quadratures += 1;
         for panel in self.panels(&path) {
             let ([q0, q1, q2, q3], [n0, n1, n2]) = path.about(panel.centre);
@@ -43,6 +46,7 @@ impl Landscape {
                 let h_nn = a / (n * theta);
                 let h_mixed = (slope - tau - a) / (theta * theta);
                 let h_theta_theta = n * (2.0 * tau - 3.0 * slope) / (theta * theta * theta);
+                moments.friction_min = if tau < moments.friction_min { tau } else { moments.friction_min };
                 moments.work += weight * tau * n / theta;
                 for (sum, (dn, dq)) in moments.gradient.iter_mut().zip(d_n.iter().zip(d_theta)) {
                     *sum += weight * (h_n * dn + h_theta * dq);

@@ -314,7 +314,7 @@ fn turning_kernel(arc: &TurningSlice, middle: f64, half: f64, rule: &Rule) -> Su
             time[i] += dt;
             lag[i] += dt * u;
             work[i] += g * u * friction;
-            sensitivity[i] += dt * (1.0 - u * ratio * ratio * ((b - a) / a) * (x2[i] * shrink));
+            sensitivity[i] += dt * (1.0 - u * ratio * ratio * ((b - a) / a) * shrink);
             friction_min[i] = if friction < friction_min[i] { friction } else { friction_min[i] };
         }
     }

@@ -39,17 +39,19 @@ pub(super) fn solve(problem: &Problem, t_f: f64, rtol: f64, start: Option<f64>) 
     let root = newton(
         |q| {
             let extremal = problem.extremal(q, q_hold)?;
-            let mut sums = extremal.arc.sums(tolerance)?;
-            effort.quadratures += 1;
-            effort.nodes += sums.nodes;
-            let mut probe = extremal.probe(problem, &sums, beyond);
-            if probe.value.abs() <= enough && tolerance > exact {
-                sums = extremal.arc.sums(exact)?;
+            let (sums, probe) = loop {
+                let sums = extremal.arc.sums(tolerance)?;
                 effort.quadratures += 1;
                 effort.nodes += sums.nodes;
-                probe = extremal.probe(problem, &sums, beyond);
-            }
-            tolerance = (1e-2 * probe.value * probe.value).clamp(exact, tolerance);
+                let probe = extremal.probe(problem, &sums, beyond);
+                let next = (1e-3 * probe.value * probe.value).clamp(exact, tolerance);
+                // A value within the error of its quadrature tells nothing, not even its sign.
+                let doubtful = tolerance > exact && probe.value.abs() <= (30.0 * tolerance).max(enough);
+                tolerance = if doubtful { next.min(1e-3 * tolerance).max(exact) } else { next };
+                if !doubtful {
+                    break (sums, probe);
+                }
+            };
             friction_min = friction_min.min(sums.friction_min);
             last = Some((extremal, sums));
             Some(probe)
