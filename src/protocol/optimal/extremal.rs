@@ -388,3 +388,57 @@ fn turning_distance(law: &Law, excess: f64, pull: f64) -> Option<f64> {
     }
     (xi.is_finite() && xi >= 0.0).then_some(xi)
 }
+
+#[cfg(test)]
+mod tests {
+    //! The analytic derivative of the time against differences of it, on every part of the family.
+
+    use super::*;
+
+    #[test]
+    fn slope_is_the_derivative_of_the_time_on_every_part_of_the_family() {
+        let laws = [(0.03, 0.05), (0.03, 0.03), (0.05, 0.01), (0.1, 0.0), (0.002, 0.003)];
+        let transitions = [(3.0, 100.0), (100.0, 3.0), (3.0, 3.2), (3.2, 3.0), (1.01, 40.0), (40.0, 1.01)];
+        for (a, b) in laws {
+            for (v_i, v_f) in transitions {
+                for bounded in [true, false] {
+                    let problem = Problem {
+                        law: Law { a, b },
+                        theta_0: 1.0 / v_i,
+                        theta_1: 1.0 / v_f,
+                        fall: (v_f - v_i) / v_i,
+                        bounded,
+                    };
+                    let q_hold = problem.q_hold();
+                    for i in -24..=24 {
+                        let q = 0.2501 * f64::from(i);
+                        let step = 1e-4;
+                        let time = |q: f64| {
+                            let extremal = problem.extremal(q, q_hold)?;
+                            let sums = extremal.arc.sums(1e-13)?;
+                            Some((extremal.probe(&problem, &sums, 1.0), extremal.time_beyond(&problem, &sums)))
+                        };
+                        let (Some((before, _)), Some((here, beyond)), Some((after, _))) =
+                            (time(q - step), time(q), time(q + step))
+                        else {
+                            continue;
+                        };
+                        // Differences tell nothing across a seam of the family or where the time is all rounding.
+                        let seams = [Some(0.0), q_hold];
+                        let seam = seams.into_iter().flatten().any(|seam| (q - seam).abs() < 2.0 * step);
+                        if seam || beyond < 1e-7 {
+                            continue;
+                        }
+                        let difference = (after.value - before.value) / (2.0 * step);
+                        let error = (difference - here.slope).abs() / here.slope.abs().max(1e-3);
+                        assert!(
+                            error < 1e-5,
+                            "{a} {b} {v_i} -> {v_f} bounded {bounded} q {q}: slope {} difference {difference}",
+                            here.slope
+                        );
+                    }
+                }
+            }
+        }
+    }
+}
