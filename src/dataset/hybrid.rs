@@ -89,7 +89,7 @@ mod tests {
             }
             if header & 1 == 0 {
                 let width = usize::from(bit_width).div_ceil(8);
-                let value = (0..width).map(|i| u32::from(bytes[at + i]) << (8 * i)).sum();
+                let value: u32 = (0..width).map(|i| u32::from(bytes[at + i]) << (8 * i)).sum();
                 values.extend(std::iter::repeat_n(value, (header >> 1) as usize));
                 at += width;
             } else {
@@ -101,7 +101,7 @@ mod tests {
                                 & 1,
                         )
                     };
-                    values.push((0..usize::from(bit_width)).map(|j| bit(j) << j).sum());
+                    values.push((0..usize::from(bit_width)).map(|j| bit(j) << j).sum::<u32>());
                 }
                 at += length * usize::from(bit_width) / 8;
             }

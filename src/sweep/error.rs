@@ -76,7 +76,7 @@ pub fn nearest<'a>(name: &str, known: impl IntoIterator<Item = &'a str>) -> Opti
 pub fn unknown(key: String, what: &str, name: &str, known: &[&str]) -> SpecError {
     let help = match nearest(name, known.iter().copied()) {
         Some(meant) => format!("did you mean `{meant}`?"),
-        None => format!("remove it, or choose {what} from the list"),
+        None => "remove it, or choose one of these".to_owned(),
     };
     SpecError::new(key, format!("unknown {what} `{name}`"), known.join(", "), help)
 }

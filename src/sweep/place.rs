@@ -113,7 +113,7 @@ fn covers(
 
 /// Turns a complaint of the parser, whose wording is serde's, into what was found, expected and to be done.
 fn explain(text: &str, message: &str, span: Option<Range<usize>>) -> SpecError {
-    let key = span.map_or_else(String::new, |span| key_at(text, &span));
+    let key = span.as_ref().map_or_else(String::new, |span| key_at(text, span));
     let quoted = |text: &str| -> Vec<String> { text.split('`').skip(1).step_by(2).map(str::to_owned).collect() };
     if let Some(rest) = message.strip_prefix("unknown field ") {
         let names = quoted(rest);
@@ -124,26 +124,24 @@ fn explain(text: &str, message: &str, span: Option<Range<usize>>) -> SpecError {
     }
     if let Some(rest) = message.strip_prefix("missing field ") {
         let name = quoted(rest).concat();
-        return SpecError::new(
-            key,
-            format!("`{name}` is missing"),
-            format!("a key `{name}`"),
-            format!("add `{name} = ...`"),
-        );
+        let (expected, help) = (format!("a key `{name}`"), format!("add `{name} = ...`"));
+        return SpecError::new("", format!("`{name}` is missing"), expected, help);
     }
-    if let Some((found, expected)) =
-        message.strip_prefix("invalid type: ").and_then(|rest| rest.rsplit_once(", expected "))
-    {
+    let types = message.strip_prefix("invalid type: ").and_then(|rest| rest.rsplit_once(", expected "));
+    if let Some((found, expected)) = types {
         let expected = match expected {
             "f64" => "a number",
             "a sequence" => "a list",
             "a boolean" => "true or false",
+            "a map" => "a table",
             other => other.strip_prefix("struct ").map_or(other, |_| "a table"),
         };
         return SpecError::new(key, format!("found {found}"), expected, "change the value");
     }
     if message.starts_with("duplicate key") {
-        return SpecError::new(key, "the key is there twice", "each key once", "remove one of the two");
+        let name = span.and_then(|span| text.get(span)).unwrap_or_default();
+        let found = format!("the key `{name}` is there twice");
+        return SpecError::new(key, found, "each key once", "remove one of the two");
     }
     SpecError::new(key, format!("not TOML: {message}"), "key = value, [table] or # comment", "correct the line")
 }

@@ -1,0 +1,121 @@
+//! The commands as a user meets them: words, exit codes, interruption.
+
+mod common;
+
+use std::fs;
+use std::path::Path;
+use std::process::{Command, Stdio};
+use std::time::{Duration, Instant};
+
+use common::{LANDSCAPE, files};
+
+fn slipsweep(folder: &Path) -> Command {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_slipsweep"));
+    command.current_dir(folder);
+    command
+}
+
+fn write_spec(folder: &Path, axes: &str, tables: &str) {
+    fs::write(folder.join("spec.toml"), format!("name = \"test\"\n[axes]\n{axes}\n{tables}")).expect("is writable");
+}
+
+#[test]
+fn run_tells_what_a_physicist_asks() {
+    let folder = tempfile::tempdir().expect("is writable");
+    write_spec(folder.path(), LANDSCAPE, "[tables.gap]\n[tables.best]\n[tables.optimal]\n[tables.crossover]\n");
+    let output = slipsweep(folder.path()).args(["run", "spec.toml"]).output().expect("runs");
+    assert_eq!((output.status.code(), String::from_utf8_lossy(&output.stderr).as_ref()), (Some(0), ""));
+    let text = String::from_utf8_lossy(&output.stdout);
+    for line in [
+        "gap: 482,403 rows (",
+        "  least gap among the rows that are ok:\n  at a = 0.03, b = 0.05, v_i = 3, v_f = 100\n",
+        "best: 3 rows (3 ok)",
+        "optimal: 3 rows (3 ok)",
+        "crossover: 1 row (1 ok)",
+        "0.0374184121",
+        "0.0495500046",
+        "work: 3 optimal protocols, 4 landscapes, 3 best shortcuts, 1 transition, ",
+        "written to results/test\n",
+    ] {
+        assert!(text.contains(line), "{line}\n{text}");
+    }
+    let again = slipsweep(folder.path()).args(["run", "spec.toml"]).output().expect("runs");
+    let text = String::from_utf8_lossy(&again.stdout);
+    assert!(text.contains("  2 of 2 parts kept from before\n"), "{text}");
+    assert!(text.contains("nothing to compute: every part was there\n"), "{text}");
+    let quiet = slipsweep(folder.path()).args(["run", "spec.toml", "--quiet", "--strict"]).output().expect("runs");
+    assert_eq!((quiet.status.code(), quiet.stdout.len(), quiet.stderr.len()), (Some(0), 0, 0));
+}
+
+#[test]
+fn plan_counts_without_running() {
+    let folder = tempfile::tempdir().expect("is writable");
+    let axes = LANDSCAPE.replace("401", "1000").replace("[0.02, 0.037, 0.049]", "{ geomspace = [0.001, 2.0, 1000] }");
+    write_spec(folder.path(), &axes, "[tables.gap]\n[tables.optimal]\n");
+    let output = slipsweep(folder.path()).args(["plan", "spec.toml"]).output().expect("runs");
+    let text = String::from_utf8_lossy(&output.stdout);
+    assert_eq!(output.status.code(), Some(0), "{text}");
+    assert!(text.contains("1,000,000,000  3,815"), "{text}");
+    assert!(text.contains("shared: 1,000 optimal protocols solved once each"), "{text}");
+    assert_eq!(files(folder.path()).len(), 1);
+}
+
+#[test]
+fn tables_lists_every_column() {
+    let output = slipsweep(Path::new(".")).arg("tables").output().expect("runs");
+    let text = String::from_utf8_lossy(&output.stdout);
+    for table in slipsweep::table::ALL {
+        assert!(text.contains(&format!("{}: {}\n", table.name(), table.doc())));
+        for column in table.columns() {
+            assert!(text.lines().any(|line| line.trim_start().starts_with(column.name) && line.ends_with(column.doc)));
+        }
+    }
+}
+
+#[test]
+fn a_reader_that_has_had_enough_is_no_failure() {
+    let mut child =
+        slipsweep(Path::new(".")).arg("tables").stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().expect("runs");
+    drop(child.stdout.take());
+    let output = child.wait_with_output().expect("ends");
+    assert_eq!((output.status.code(), output.stderr.len()), (Some(0), 0));
+}
+
+#[cfg(unix)]
+#[test]
+fn an_interrupted_run_leaves_whole_parts_and_goes_on() {
+    let folder = tempfile::tempdir().expect("is writable");
+    let axes = LANDSCAPE.replace("[0.02, 0.037, 0.049]", "{ linspace = [0.02, 0.049, 60] }");
+    write_spec(folder.path(), &axes, "[tables.gap]\ncolumns = [\"gap\"]\nrtol = 1e-6\n");
+    let whole = folder.path().join("whole");
+    let output = slipsweep(folder.path()).args(["run", "spec.toml", "--out", "whole"]).output().expect("runs");
+    assert_eq!(output.status.code(), Some(0));
+
+    for (name, code) in [("INT", 130), ("TERM", 143)] {
+        let broken = folder.path().join(name);
+        let mut child = slipsweep(folder.path())
+            .args(["run", "spec.toml", "--out", name])
+            .stdout(Stdio::piped())
+            .stderr(Stdio::piped())
+            .spawn()
+            .expect("runs");
+        while !broken.join("test/gap/part-000000.parquet").is_file() {
+            assert!(child.try_wait().expect("can be asked").is_none());
+            std::thread::sleep(Duration::from_millis(1));
+        }
+        let sent = Instant::now();
+        let kill = Command::new("kill").args(["-s", name, &child.id().to_string()]).status().expect("runs");
+        assert!(kill.success());
+        let output = child.wait_with_output().expect("ends");
+        assert!(sent.elapsed() < Duration::from_secs(1));
+        assert_eq!(output.status.code(), Some(code));
+        let message = "stopped; finished parts are kept, and the same command goes on from there\n";
+        assert_eq!(String::from_utf8_lossy(&output.stderr), message);
+        let (all, some) = (files(&whole), files(&broken));
+        assert!(some.len() > 1 && some.len() < all.len(), "{} of {}", some.len(), all.len());
+        assert!(some.iter().all(|(path, bytes)| all.get(path) == Some(bytes)));
+        let output = slipsweep(folder.path()).args(["run", "spec.toml", "--out", name]).output().expect("runs");
+        assert_eq!(output.status.code(), Some(0));
+        assert_eq!(files(&broken), all);
+    }
+}
