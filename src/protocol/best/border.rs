@@ -95,12 +95,12 @@ impl Border<'_> {
         }
     }
 
-    /// How far a place is admissible: the least of `g`, and of theta, against rounding.
+    /// Whether a place is admissible: `g` at least 0 within rounding, theta positive, and friction too (else the work falls without limit as theta does).
     fn admissible(&self, place: Place) -> bool {
         let path = self.landscape.path(place.a_2, place.a_3);
         let (g, g_doubt) = path.surplus(self.scale).least();
         let (theta, theta_doubt) = path.theta().least();
-        g >= -4.0 * g_doubt && theta > theta_doubt
+        g >= -4.0 * g_doubt && theta > theta_doubt && self.landscape.pulls(theta)
     }
 
     /// The range of the parameter that is searched; on a segment the admissible part, which begins at the double zero in its end.
@@ -197,7 +197,7 @@ impl Border<'_> {
         Some(least)
     }
 
-    /// Work and its derivative along a piece; `None` where it is not admissible, or where friction is not positive.
+    /// Work and its derivative along a piece; `None` where it is not admissible.
     fn work(&self, piece: Piece, parameter: f64, effort: &mut Effort) -> Option<(f64, f64)> {
         let (place, direction) = self.place(piece, parameter);
         if !self.admissible(place) {
@@ -205,6 +205,6 @@ impl Border<'_> {
         }
         let moments = self.landscape.moments(place.a_2, place.a_3, effort);
         let slope = moments.gradient[0] * direction[0] + moments.gradient[1] * direction[1];
-        (moments.friction_min > 0.0 && moments.work.is_finite() && slope.is_finite()).then_some((moments.work, slope))
+        (moments.work.is_finite() && slope.is_finite()).then_some((moments.work, slope))
     }
 }

@@ -2,7 +2,7 @@
 //!
 //! The admissible shortcuts form a convex set in the plane of `(a_2, a_3)`: `v >= m` means that the cubic `n - m t_f theta`, linear in the
 //! coefficients, is not negative on `[0, 1]`, with `m = 1` under the bound and `m = 0` without. The least work lies inside, where the gradient vanishes
-//! ([`interior`]), or on the border, where some shortcut touches `v = m` ([`border`]). Its gap is a sum of squares of sorts ([`excess`]).
+//! ([`interior`]), or on the border, where some shortcut touches `v = m` ([`border`]). A small gap is an integral of positive terms ([`excess`]).
 
 mod border;
 mod excess;
@@ -29,6 +29,11 @@ pub struct Best {
     pub v_min: f64,
 }
 
+/// Gap from which the difference of two works, each good to 1e-12, is good to 1e-8 of itself.
+const PLAIN_DIFFERENCE: f64 = 1e-4;
+/// Error of that difference, relative to the works.
+const DIFFERENCE_ERROR: f64 = 1e-11;
+
 /// A place in the plane of the coefficients.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Place {
@@ -53,17 +58,20 @@ pub fn solve(transition: &Transition, t_f: f64, bounded: bool, rtol: f64) -> Sol
         return Solved { status: Status::Infeasible, value: None, effort };
     };
     let Some((place, touches)) = least(&landscape, least_velocity, start, &mut effort) else {
-        return Solved { status: Status::NotConverged, value: None, effort };
+        return Solved { status: unsolved(optimum.status), value: None, effort };
     };
     let work = landscape.moments(place.a_2, place.a_3, &mut effort).work;
     let v_min = if touches { least_velocity } else { landscape.path(place.a_2, place.a_3).judge().1 };
     let difference = work - optimum_value.work;
-    let excess = excess::over_optimum(transition, &landscape, place, bounded, &mut effort);
-    // Where the optimal feedback cannot be had everywhere, the difference of two works serves if it is large.
-    let excess = match excess {
-        Some(excess) => excess,
-        None if difference > 1e-4 * optimum_value.work => difference,
-        None => return Solved { status: optimum.status.max(Status::NotConverged), value: None, effort },
+    let excess = if difference > PLAIN_DIFFERENCE * optimum_value.work {
+        difference
+    } else {
+        // Two routes to one number: they must agree as far as the coarser one goes.
+        let excess = excess::over_optimum(transition, &landscape, place, bounded, &mut effort);
+        match excess.filter(|excess| (excess - difference).abs() <= DIFFERENCE_ERROR * work) {
+            Some(excess) => excess,
+            None => return Solved { status: unsolved(optimum.status), value: None, effort },
+        }
     };
     let status = match optimum.status {
         Status::Ok | Status::BelowBound if v_min < 1.0 => Status::BelowBound,
@@ -91,4 +99,9 @@ fn least(landscape: &Landscape, least_velocity: f64, start: Place, effort: &mut 
     let gradient = landscape.moments(place.a_2, place.a_3, effort).gradient;
     let slope = gradient[0] * inwards[0] + gradient[1] * inwards[1];
     (slope >= 0.0).then_some((place, true))
+}
+
+/// The status where no best shortcut was found: where friction is too low there need not be one.
+fn unsolved(optimum: Status) -> Status {
+    if optimum == Status::Nonphysical { Status::Nonphysical } else { Status::NotConverged }
 }

@@ -53,6 +53,11 @@ impl Landscape {
         Landscape { law: transition.law, ends, ln_t_f: ln(t_f), accuracy: Accuracy::new(0.5 * rtol) }
     }
 
+    /// Whether friction at `u = 1`, `1 + (b - a) ln theta`, is positive; for `b > a` it fails at the smallest theta.
+    pub(super) fn pulls(&self, theta: f64) -> bool {
+        1.0 + (self.law.b - self.law.a) * ln(theta) > 0.0
+    }
+
     /// One shortcut, given scaled.
     pub(super) fn path(&self, a_2: f64, a_3: f64) -> Path<'_> {
         Path::new(&self.ends, a_2, a_3)

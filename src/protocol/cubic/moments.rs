@@ -15,8 +15,6 @@ pub(in crate::protocol) struct Moments {
     pub gradient: [f64; 2],
     /// `d2W/da_2^2`, `d2W/da_2 da_3`, `d2W/da_3^2`.
     pub hessian: [f64; 3],
-    /// Least friction at a node.
-    pub friction_min: f64,
 }
 
 impl Landscape {
@@ -27,15 +25,15 @@ impl Landscape {
         let path = Path::new(&self.ends, a_2, a_3);
         let (a, slope) = (self.law.a, self.law.b - self.law.a);
         let constant = 1.0 - a * self.ln_t_f;
-        let mut moments =
-            Moments { work: 0.0, gradient: [0.0; 2], hessian: [0.0; 3], friction_min: f64::INFINITY };
+        let mut moments = Moments { work: 0.0, gradient: [0.0; 2], hessian: [0.0; 3] };
         effort.quadratures += 1;
         for panel in self.panels(&path) {
             let ([q0, q1, q2, q3], [n0, n1, n2]) = path.about(panel.centre);
             effort.nodes += panel.nodes as u32;
             panel.each_node(|delta, weight| {
                 let theta = q0 + delta * (q1 + delta * (q2 + delta * q3));
-                let n = n0 + delta * (n1 + delta * n2);
+                // On the border v = 0 rounding may take n below 0.
+                let n = (n0 + delta * (n1 + delta * n2)).max(f64::MIN_POSITIVE);
                 let tau = constant + a * ln(n) + slope * ln(theta);
                 // theta and n change by these for a change of a_2, a_3 (a_4 gives way).
                 let x = panel.centre + delta;
@@ -46,7 +44,6 @@ impl Landscape {
                 let h_nn = a / (n * theta);
                 let h_mixed = (slope - tau - a) / (theta * theta);
                 let h_theta_theta = n * (2.0 * tau - 3.0 * slope) / (theta * theta * theta);
-                moments.friction_min = if tau < moments.friction_min { tau } else { moments.friction_min };
                 moments.work += weight * tau * n / theta;
                 for (sum, (dn, dq)) in moments.gradient.iter_mut().zip(d_n.iter().zip(d_theta)) {
                     *sum += weight * (h_n * dn + h_theta * dq);
