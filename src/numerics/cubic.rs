@@ -116,16 +116,20 @@ pub fn cubic_zeros(d: [f64; 4]) -> Zeros<3> {
     let g = g - ((4.0 * g * g - 3.0) * g - c) / (12.0 * g * g - 3.0);
     let u = if excess > 0.0 { cardano } else { 2.0 * root * g };
     let u = if big_r > 0.0 { -u } else { u };
-    // The other two from the sum and the product.
-    let mean = -0.5 * u - third;
-    let spread = 3.0 * big_q - 0.75 * u * u;
+    let y = u - third;
+    // The quadratic that is left, y^2 - 2 mean y + product: divided from the low end for a large zero, from the high end for a small one.
+    let large = (y * y * y).abs() > r.abs();
+    let rest = 3.0 * third + y;
+    let product = if large { -r / y } else { q + y * rest };
+    let mean = -0.5 * if large { (product - q) / y } else { rest };
+    let spread = mean * mean - product;
     let real = spread >= 0.0;
     let distance = spread.abs().sqrt();
+    let outer = if mean < 0.0 { mean - distance } else { mean + distance };
     let norm = mean * mean + distance * distance + f64::MIN_POSITIVE;
-    let (plus, minus) = (1.0 / (mean + distance), 1.0 / (mean - distance));
     let (re, im) = (mean / norm, distance / norm);
     Zeros {
-        re: [1.0 / (u - third), if real { plus } else { re }, if real { minus } else { re }],
+        re: [1.0 / y, if real { 1.0 / outer } else { re }, if real { outer / product } else { re }],
         im: [0.0, if real { 0.0 } else { im }, if real { 0.0 } else { im }],
     }
 }

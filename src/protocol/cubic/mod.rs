@@ -27,6 +27,8 @@ pub struct Landscape {
     ends: Ends,
     ln_t_f: f64,
     accuracy: Accuracy,
+    /// Largest share of an error in theta.
+    rounding: f64,
 }
 
 /// Most nodes of a panel that is taken without a search for a better one.
@@ -50,7 +52,13 @@ impl Landscape {
     /// Prepares the landscape of `transition` in time `t_f`; every work is good to relative accuracy `rtol`.
     pub fn new(transition: &Transition, t_f: f64, rtol: f64) -> Self {
         let ends = Ends::between(transition.v_i, transition.v_f, t_f);
-        Landscape { law: transition.law, ends, ln_t_f: ln(t_f), accuracy: Accuracy::new(0.5 * rtol) }
+        Landscape {
+            law: transition.law,
+            ends,
+            ln_t_f: ln(t_f),
+            accuracy: Accuracy::new(0.5 * rtol),
+            rounding: 0.05 * rtol,
+        }
     }
 
     /// Whether friction at `u = 1`, `1 + (b - a) ln theta`, is positive; for `b > a` it fails at the smallest theta.
@@ -125,10 +133,10 @@ impl Landscape {
         for (lane, &i) in due.iter().enumerate() {
             let path = Path::new(&self.ends, a_2[i], a_3[i]);
             let nodes = self.accuracy.nodes(plan.focal[lane]);
-            work[i] = if nodes <= MOST_PLANNED {
-                let side = plan.side[lane];
-                let power = plan.squarings[lane] > 0.0;
-                let end = if power { side > 0.0 } else { self.ends.rise.high < 0.0 };
+            let side = plan.side[lane];
+            let power = plan.squarings[lane] > 0.0;
+            let end = if power { side > 0.0 } else { self.ends.rise.high < 0.0 };
+            work[i] = if nodes <= MOST_PLANNED && !self.is_faint(&path, !end) {
                 let (centre, shift) = if end { (1.0, -1.0) } else { (0.0, 0.0) };
                 effort.quadratures += 1;
                 let panel = if power {
@@ -147,9 +155,25 @@ impl Landscape {
     /// `W_s = int tau v dt`.
     fn work(&self, path: &Path, panels: &mut Vec<Panel>, effort: &mut Effort) -> f64 {
         panels.clear();
-        choose(&Zeros::of(path), 0.0, 1.0, &self.accuracy, 0, panels);
+        let zeros = Zeros::of(path);
+        if self.is_faint(path, false) || self.is_faint(path, true) {
+            // Each half has its own expansions.
+            choose(&zeros, 0.0, 0.5, &self.accuracy, 1, panels);
+            choose(&zeros, 0.5, 1.0, &self.accuracy, 1, panels);
+        } else {
+            choose(&zeros, 0.0, 1.0, &self.accuracy, 0, panels);
+        }
         effort.quadratures += 1;
         panels.iter().map(|panel| self.sum(path, panel, effort)).sum()
+    }
+
+    /// Whether theta at the start or at the end is so small that an expansion about the other end loses its digits.
+    #[inline(always)]
+    fn is_faint(&self, path: &Path, end: bool) -> bool {
+        let [c0, c1, c2, c3] = path.theta().c;
+        let size = c0.abs() + c1.abs() + c2.abs() + c3.abs();
+        let theta = if end { self.ends.theta_1.high } else { self.ends.theta_0.high };
+        size * f64::EPSILON > self.rounding * theta
     }
 
     /// The part of one panel in the work.

@@ -112,11 +112,38 @@ pub(super) fn zeros(path: &Path) -> cubic::Zeros<ZEROS> {
     let (q, r) = (cubic_zeros(theta), quadratic_zeros(n));
     let (mut re, mut im) =
         ([q.re[0], q.re[1], q.re[2], r.re[0], r.re[1]], [q.im[0], q.im[1], q.im[2], r.im[0], r.im[1]]);
+    let start = path.about_start().0;
     for k in 0..ZEROS {
-        (re[k], im[k]) = (1.0 + clamp(re[k]), clamp(im[k]));
+        let (u, y) = (clamp(re[k]), clamp(im[k]));
+        // A zero close to the start, where theta may be as small, lost its digits in the expansion about the end.
+        let x = 1.0 + u;
+        let near = k < 3 && u < -0.5;
+        let (x_start, y_start) = polished(&start, x, y);
+        re[k] = if near { x_start } else { x };
+        im[k] = if near { y_start } else { y };
     }
     cubic::Zeros { re, im }
 }
+
+/// One Newton step towards the zero of a cubic near `x + iy`; a step that is no mere correction is not taken.
+#[inline(always)]
+fn polished(c: &[f64; 4], x: f64, y: f64) -> (f64, f64) {
+    let [c0, c1, c2, c3] = *c;
+    // Value and derivative by Horner's scheme: complex, with imaginary parts factored as i y.
+    let (p, q) = (c2 + c3 * x, c3);
+    let (p, q) = (c1 + p * x - q * y * y, p + q * x);
+    let (value, value_i) = (c0 + p * x - q * y * y, p + q * x);
+    let (slope, slope_i) = (c1 + x * (2.0 * c2 + 3.0 * c3 * x) - 3.0 * c3 * y * y, 2.0 * c2 + 6.0 * c3 * x);
+    let (value_i, slope_i) = (value_i * y, slope_i * y);
+    let norm = slope * slope + slope_i * slope_i + f64::MIN_POSITIVE;
+    let step = (value * slope + value_i * slope_i) / norm;
+    let step_i = (value_i * slope - value * slope_i) / norm;
+    let small = step.abs() + step_i.abs() < LARGEST_CORRECTION;
+    (if small { x - step } else { x }, if small { (y - step_i).abs() } else { y })
+}
+
+/// Zeros are found to a few digits of the farthest; what is left to correct is less than this.
+const LARGEST_CORRECTION: f64 = 1e-3;
 
 /// `x` within `[-FAR, FAR]`; what is not a number is far away.
 #[inline(always)]
@@ -156,7 +183,7 @@ pub(super) fn choose(zeros: &Zeros, low: f64, high: f64, accuracy: &Accuracy, de
     "x86_64+avx+avx2+bmi1+bmi2"
 ))]
 fn best_panel(zeros: &Zeros, low: f64, high: f64, accuracy: &Accuracy) -> (Panel, f64) {
-    let mut best = Panel { centre: high, map: Map::Line, from: low - high, to: 0.0, nodes: 0 };
+    let mut best = line(zeros, low, high);
     let mut largest = 2.0;
     let plain = accuracy.enough(PLAIN);
     let gaps = [real_gap(zeros, high, 1.0), real_gap(zeros, low, -1.0)];
@@ -178,13 +205,20 @@ fn best_panel(zeros: &Zeros, low: f64, high: f64, accuracy: &Accuracy) -> (Panel
     if hopeless {
         let straight = focal(&zeros.re, &zeros.im, low, high);
         if straight > largest {
-            (best, largest) = (Panel { centre: high, map: Map::Line, from: low - high, to: 0.0, nodes: 0 }, straight);
+            (best, largest) = (line(zeros, low, high), straight);
         }
     }
     if largest < accuracy.enough(POOR) {
         sinh(zeros, low, high, &mut best, &mut largest);
     }
     (best, largest)
+}
+
+/// The straight rule, expanded about the end that is nearer to the most hindering zero: the polynomials are small there.
+#[inline(always)]
+fn line(zeros: &Zeros, low: f64, high: f64) -> Panel {
+    let centre = if 2.0 * zeros.re[hindrance(zeros, low, high)] > low + high { high } else { low };
+    Panel { centre, map: Map::Line, from: low - centre, to: high - centre, nodes: 0 }
 }
 
 /// The least sum of the distances of the places `(re, im)` from both ends of `[from, to]`, in units of half its length: 2 on the interval itself.
