@@ -7,7 +7,7 @@ use super::quantity::{Quantity, Scale};
 pub enum Values {
     /// Given one by one.
     List(Vec<f64>),
-    /// `first + i (last - first)/(count - 1)`, both ends exact.
+    /// `first + i step` with `step = (last - first)/(count - 1)`, both ends exact: the doubles of `numpy.linspace`.
     Linspace {
         /// Value at index 0.
         first: f64,
@@ -47,9 +47,10 @@ impl Values {
             Values::List(ref values) => values[index as usize],
             Values::Linspace { last, count, .. } | Values::Geomspace { last, count, .. } if index + 1 >= count => last,
             Values::Linspace { first, last, count } => {
-                // Each end is divided on its own, as their difference can overflow.
                 let steps = (count - 1) as f64;
-                first + index as f64 * (last / steps - first / steps)
+                let step =
+                    if (last - first).is_finite() { (last - first) / steps } else { last / steps - first / steps };
+                first + index as f64 * step
             }
             Values::Geomspace { first, last, count } => {
                 // Base 10 keeps the decades exact, as in 10, 100, 1000.
