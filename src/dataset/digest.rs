@@ -10,10 +10,13 @@ use polars::prelude::{DataFrame, ParquetReader, PolarsError, SerReader};
 use super::folder::{Folder, ManifestTable};
 use crate::grid::Quantity;
 use crate::protocol::Status;
-use crate::table::{self, Kind, OPTIMUM_AXES, STATUS};
+use crate::table::{self, Column, Kind, OPTIMUM_AXES, STATUS};
 
 /// Tables of at most this many rows are kept whole, and least values are told apart for at most this many transitions.
 pub const FEW: usize = 12;
+
+/// The column whose least values are looked for.
+const GAP: &str = "gap";
 
 /// What a table contains.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -74,24 +77,31 @@ impl Digest {
         let mut least = Least::default();
         for part in 0..table.parts {
             let path = folder.part(&table.name, part);
-            load(&path)
-                .and_then(|frame| digest.add(&table.name, &frame, &mut least))
+            digest
+                .add(&table.name, &path, &mut least)
                 .map_err(|source| ReadError { path: path.display().to_string(), source })?;
         }
         digest.least = least.rows();
         Ok(digest)
     }
 
-    fn add(&mut self, table: &str, frame: &DataFrame, least: &mut Least) -> Result<(), PolarsError> {
+    fn add(&mut self, table: &str, path: &Path, least: &mut Least) -> Result<(), PolarsError> {
+        let columns = table::find(table).map_or(&[][..], |table| table.columns());
+        let mut reader = ParquetReader::new(File::open(path)?);
+        let written = reader.schema()?;
+        let columns: Vec<&Column> = columns.iter().filter(|column| written.contains(column.name)).collect();
+        let with_gap = columns.iter().any(|column| column.name == GAP);
+        // The axes are only needed to tell transitions apart: reading them all would take as long as reading the results.
+        let axes = OPTIMUM_AXES.iter().filter(|_| with_gap).map(|axis| axis.name());
+        let names = axes.chain(columns.iter().map(|column| column.name)).chain([STATUS]).map(str::to_owned);
+        let frame = &mut reader.with_columns(Some(names.collect())).finish()?;
+        frame.rechunk_mut();
         for (word, rows) in count_words(frame, STATUS)? {
             if let Some(status) = Status::ALL.iter().position(|status| status.name() == word) {
                 self.status[status] += rows;
             }
         }
-        for column in table::find(table).map_or(&[][..], |table| table.columns()) {
-            if frame.column(column.name).is_err() {
-                continue;
-            }
+        for column in columns {
             match column.kind {
                 Kind::Number(_) | Kind::Quantity(_) => self.add_numbers(frame, column.name)?,
                 Kind::Label(_) => self.add_words(frame, column.name)?,
@@ -99,11 +109,11 @@ impl Digest {
         }
         if let Some(rows) = &mut self.rows {
             for index in 0..frame.height() {
-                rows.push(row(frame, index)?);
+                rows.push(row(path, index)?);
             }
         }
-        if frame.column("gap").is_ok() {
-            least.add(frame)?;
+        if with_gap {
+            least.add(frame, path)?;
         }
         Ok(())
     }
@@ -147,12 +157,6 @@ impl Digest {
     }
 }
 
-fn load(path: &Path) -> Result<DataFrame, PolarsError> {
-    let mut frame = ParquetReader::new(File::open(path)?).finish()?;
-    frame.rechunk_mut();
-    Ok(frame)
-}
-
 /// The words of a column and how many rows have each.
 fn count_words(frame: &DataFrame, name: &str) -> Result<Vec<(String, u64)>, PolarsError> {
     let words = frame.column(name)?.cat32()?;
@@ -171,16 +175,18 @@ fn count_words(frame: &DataFrame, name: &str) -> Result<Vec<(String, u64)>, Pola
     Ok(counts.into_iter().map(|(code, rows)| (word(code), rows)).collect())
 }
 
-fn row(frame: &DataFrame, index: usize) -> Result<Row, PolarsError> {
+/// One row of a part, with all its columns.
+fn row(path: &Path, index: usize) -> Result<Row, PolarsError> {
+    let frame = ParquetReader::new(File::open(path)?).with_slice(Some((index, 1))).finish()?;
     frame
         .columns()
         .iter()
         .map(|column| {
             let cell = if let Some(numbers) = column.try_f64() {
-                numbers.get(index).map(Cell::Number)
+                numbers.get(0).map(Cell::Number)
             } else {
                 let words = column.cat32()?;
-                let word = words.physical().get(index).and_then(|code| words.get_mapping().cat_to_str(code));
+                let word = words.physical().get(0).and_then(|code| words.get_mapping().cat_to_str(code));
                 word.map(|word| Cell::Word(word.to_owned()))
             };
             Ok((column.name().to_string(), cell.unwrap_or(Cell::Missing)))
@@ -197,8 +203,8 @@ struct Least {
 }
 
 impl Least {
-    fn add(&mut self, frame: &DataFrame) -> Result<(), PolarsError> {
-        let gaps = frame.column("gap")?.f64()?;
+    fn add(&mut self, frame: &DataFrame, path: &Path) -> Result<(), PolarsError> {
+        let gaps = frame.column(GAP)?.f64()?;
         let status = frame.column(STATUS)?.cat32()?;
         let codes = status.physical();
         let ok = |code| status.get_mapping().cat_to_str(code) == Some(Status::Ok.name());
@@ -235,12 +241,12 @@ impl Least {
         for (index, gap) in found {
             let tuple: Vec<u64> = axes.iter().map(|axis| axis[index].to_bits()).collect();
             if self.all.as_ref().is_none_or(|(least, _)| gap < *least) {
-                self.all = Some((gap, row(frame, index)?));
+                self.all = Some((gap, row(path, index)?));
             }
             match self.each.iter().position(|(known, ..)| *known == tuple) {
-                Some(place) if gap < self.each[place].1 => self.each[place] = (tuple, gap, row(frame, index)?),
+                Some(place) if gap < self.each[place].1 => self.each[place] = (tuple, gap, row(path, index)?),
                 Some(_) => {}
-                None if self.each.len() < FEW => self.each.push((tuple, gap, row(frame, index)?)),
+                None if self.each.len() < FEW => self.each.push((tuple, gap, row(path, index)?)),
                 None => self.many = true,
             }
         }
