@@ -32,10 +32,10 @@ pub struct Landscape {
 }
 
 /// Most nodes of a panel that is taken without a search for a better one.
-const MOST_PLANNED: usize = 48;
+const MOST_PLANNED: usize = 64;
 
 /// Nodes from which the polynomials are expanded in double-double.
-const NEAR: usize = 40;
+const NEAR: usize = 72;
 
 /// The results of a run of shortcuts, one element a shortcut, laid out column by column.
 #[derive(Debug)]
