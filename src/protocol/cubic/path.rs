@@ -182,7 +182,8 @@ pub(super) fn screen(ends: &Ends, a_2: &Lanes, a_3: &Lanes, v_min: Option<&mut L
     let mut status = [Status::Infeasible; LANES];
     for i in 0..LANES {
         let [n, theta, surplus] = [signs[0][i], signs[1][i], signs[2][i]];
-        status[i] = if n < 0.0 || theta < 0.0 {
+        let tame = a_2[i].abs() + a_3[i].abs() < WILD;
+        status[i] = if n < 0.0 || theta < 0.0 || !tame {
             Status::Infeasible
         } else if n * theta * surplus == 0.0 {
             Path::new(ends, a_2[i], a_3[i]).exact_status()
@@ -246,6 +247,10 @@ fn least_velocities(ends: &Ends, a_2: &Lanes, a_3: &Lanes) -> (Lanes, Lanes) {
     }
     (v_min, place)
 }
+
+/// Coordinates of this size are not feasible for any time that is meant: the quadratic `n >= 0` has the mean `t_f - rise`, so its ends are at most nine
+/// times that. Their squares do not overflow below it.
+const WILD: f64 = 1e100;
 
 /// Below this share of its coefficients a polynomial loses digits that count.
 const FAINT: f64 = 1e-3;

@@ -1,0 +1,375 @@
+//! The landscape of cubic shortcuts against quadrature by repeated halving, which knows nothing of zeros or maps.
+
+use slipsweep::model::{Law, Transition};
+use slipsweep::numerics::gauss::rule;
+use slipsweep::protocol::cubic::{Landscape, Shortcuts};
+use slipsweep::protocol::{Effort, Status};
+
+const PAPER: Transition = Transition { law: Law { a: 0.03, b: 0.05 }, v_i: 3.0, v_f: 100.0 };
+const PAPER_TIMES: [f64; 3] = [0.02, 0.037, 0.049];
+const ACCURACIES: [f64; 5] = [1e-6, 1e-8, 1e-10, 1e-12, 1e-13];
+
+/// One shortcut, evaluated point by point.
+#[derive(Debug, Clone, Copy)]
+struct Plain {
+    transition: Transition,
+    t_f: f64,
+    a_2: f64,
+    a_3: f64,
+}
+
+/// What the landscape says of it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Found {
+    work: f64,
+    v_min: f64,
+    status: Status,
+    effort: Effort,
+}
+
+impl Plain {
+    /// `theta` and `t_f (1 - theta')` at `x = u` for `u >= 0`, at `x = 1 + u` for `u < 0`: from the nearer end, so that a small theta keeps its digits.
+    fn at(&self, u: f64) -> (f64, f64) {
+        let Transition { v_i, v_f, .. } = self.transition;
+        let (theta_0, theta_1, rise) = (1.0 / v_i, 1.0 / v_f, (v_i - v_f) / (v_i * v_f));
+        let a_4 = rise - self.a_2 - self.a_3;
+        let x = if u < 0.0 { 1.0 + u } else { u };
+        let theta = if u < 0.0 {
+            theta_1 - u * (x * ((self.a_2 - rise) - x * a_4) - rise)
+        } else {
+            theta_0 + x * (self.a_2 + x * (self.a_3 + x * a_4))
+        };
+        (theta, self.t_f - (self.a_2 + x * (2.0 * self.a_3 + 3.0 * a_4 * x)))
+    }
+
+    /// `tau v dt/dx` and its absolute value.
+    fn integrand(&self, u: f64) -> [f64; 2] {
+        let Law { a, b } = self.transition.law;
+        let (theta, n) = self.at(u);
+        let power = (1.0 + a * libm::log(n / (self.t_f * theta)) + b * libm::log(theta)) * n / theta;
+        [power, power.abs()]
+    }
+
+    fn panel(&self, low: f64, high: f64) -> [f64; 2] {
+        let rule = rule(20);
+        let (middle, half) = (0.5 * (low + high), 0.5 * (high - low));
+        let mut sums = [0.0; 2];
+        for (x, w) in rule.x.iter().zip(&rule.w) {
+            let [power, size] = self.integrand(middle + half * x);
+            sums = [sums[0] + half * w * power, sums[1] + half * w * size];
+        }
+        sums
+    }
+
+    fn halve(&self, low: f64, high: f64, whole: [f64; 2], enough: f64, depth: u32) -> [f64; 2] {
+        let middle = 0.5 * (low + high);
+        let (left, right) = (self.panel(low, middle), self.panel(middle, high));
+        let sums = [left[0] + right[0], left[1] + right[1]];
+        if (sums[0] - whole[0]).abs() <= enough || depth == 0 {
+            return sums;
+        }
+        let (left, right) =
+            (self.halve(low, middle, left, enough, depth - 1), self.halve(middle, high, right, enough, depth - 1));
+        [left[0] + right[0], left[1] + right[1]]
+    }
+
+    /// `int tau v dt` and `int |tau| v dt`.
+    fn work(&self) -> [f64; 2] {
+        let (late, early) = (self.panel(-0.5, 0.0), self.panel(0.0, 0.5));
+        let enough = 3e-15 * (late[1] + early[1]);
+        let (late, early) = (self.halve(-0.5, 0.0, late, enough, 50), self.halve(0.0, 0.5, early, enough, 50));
+        [late[0] + early[0], late[1] + early[1]]
+    }
+
+    /// Least theta and `n` on a grid of `2 count` steps, and the least velocity, refined by a golden section.
+    fn least(&self, count: usize) -> [f64; 3] {
+        let v = |u: f64| {
+            let (theta, n) = self.at(u);
+            n / (self.t_f * theta)
+        };
+        let step = 0.5 / count as f64;
+        let mut least = [f64::INFINITY; 3];
+        let mut place = 0.0;
+        for i in 0..=count {
+            for u in [-(step * i as f64), step * i as f64] {
+                // u = 0 is the start; the end is just below it.
+                let u = if i == 0 && u.is_sign_negative() { -f64::MIN_POSITIVE } else { u };
+                let (theta, n) = self.at(u);
+                least = [least[0].min(theta), least[1].min(n), least[2].min(v(u))];
+                place = if v(u) <= least[2] { u } else { place };
+            }
+        }
+        let (mut low, mut high) = if place < 0.0 {
+            ((place - step).max(-0.5), (place + step).min(-f64::MIN_POSITIVE))
+        } else {
+            ((place - step).max(0.0), (place + step).min(0.5))
+        };
+        let golden = 0.381_966_011_250_105_1;
+        for _ in 0..60 {
+            let (left, right) = (low + golden * (high - low), high - golden * (high - low));
+            if v(left) < v(right) { high = right } else { low = left }
+        }
+        least[2] = least[2].min(v(0.5 * (low + high)));
+        least
+    }
+
+    fn found(&self, landscape: &Landscape) -> Found {
+        let (mut work, mut v_min, mut status) = ([f64::NAN], [f64::NAN], [Status::NotConverged]);
+        let out = Shortcuts { work: &mut work, v_min: &mut v_min, status: &mut status };
+        let effort = landscape.evaluate(&[self.a_2], &[self.a_3], out);
+        Found { work: work[0], v_min: v_min[0], status: status[0], effort }
+    }
+}
+
+/// `count` values from -0.5 to 0.5.
+fn axis(count: usize) -> Vec<f64> {
+    (0..count).map(|i| -0.5 + i as f64 / (count - 1) as f64).collect()
+}
+
+/// One line of the landscape: all `a_3` at one `a_2`.
+fn line(landscape: &Landscape, a_2: f64, a_3: &[f64]) -> (Vec<f64>, Vec<f64>, Vec<Status>, Effort) {
+    let count = a_3.len();
+    let (mut work, mut v_min, mut status) = (vec![0.0; count], vec![0.0; count], vec![Status::NotConverged; count]);
+    let out = Shortcuts { work: &mut work, v_min: &mut v_min, status: &mut status };
+    let effort = landscape.evaluate(&vec![a_2; count], a_3, out);
+    (work, v_min, status, effort)
+}
+
+/// Numbers between 0 and 1, the same everywhere (xorshift64).
+struct Random(u64);
+
+impl Random {
+    fn unit(&mut self) -> f64 {
+        self.0 ^= self.0 << 13;
+        self.0 ^= self.0 >> 7;
+        self.0 ^= self.0 << 17;
+        (self.0 >> 11) as f64 / (1u64 << 53) as f64
+    }
+
+    fn between(&mut self, low: f64, high: f64) -> f64 {
+        low + (high - low) * self.unit()
+    }
+
+    fn power(&mut self, low: f64, high: f64) -> f64 {
+        libm::pow(10.0, self.between(low, high))
+    }
+}
+
+#[test]
+fn paper_landscape_keeps_every_accuracy_at_every_feasible_point() {
+    let a_3 = axis(401);
+    for t_f in PAPER_TIMES {
+        let landscapes = ACCURACIES.map(|rtol| Landscape::new(&PAPER, t_f, rtol));
+        for a_2 in axis(401) {
+            let lines = landscapes.each_ref().map(|landscape| line(landscape, a_2, &a_3));
+            for (i, &a_3) in a_3.iter().enumerate() {
+                if lines[0].2[i] == Status::Infeasible {
+                    continue;
+                }
+                let [reference, _] = Plain { transition: PAPER, t_f, a_2, a_3 }.work();
+                for (rtol, (work, ..)) in ACCURACIES.into_iter().zip(&lines) {
+                    let error = (work[i] / reference - 1.0).abs();
+                    assert!(error <= rtol, "t_f {t_f}, a_2 {a_2}, a_3 {a_3}: {error:e} at rtol {rtol:e}");
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn paper_landscape_has_exact_status_and_least_velocity() {
+    let a_3 = axis(201);
+    for t_f in PAPER_TIMES {
+        let landscape = Landscape::new(&PAPER, t_f, 1e-10);
+        for a_2 in axis(201) {
+            let (_, v_min, status, _) = line(&landscape, a_2, &a_3);
+            for (i, &a_3) in a_3.iter().enumerate() {
+                let [theta, n, v] = Plain { transition: PAPER, t_f, a_2, a_3 }.least(100);
+                // On the border itself rounding of the plain evaluation decides nothing; regress_* tests do.
+                if theta.abs() < 1e-15 || n.abs() < 1e-15 {
+                    continue;
+                }
+                let place = format!("t_f {t_f}, a_2 {a_2}, a_3 {a_3}");
+                if status[i] == Status::Infeasible {
+                    // A grid may miss a sign that changes between its points, by the square of its step.
+                    assert!(theta.min(n) < 2e-4, "{place}: infeasible, but least theta {theta}, n {n}");
+                    continue;
+                }
+                assert!(theta > 0.0 && n > 0.0, "{place}: feasible, but least theta {theta}, n {n}");
+                // Of the plain evaluation: that of n over the least t_f theta.
+                let rounding = 1e-12 + 1e-12 / v;
+                assert!((v_min[i] / v - 1.0).abs() < rounding, "{place}: v_min {} against {v}", v_min[i]);
+                assert_eq!(status[i] == Status::Ok, v_min[i] >= 1.0, "{place}");
+            }
+        }
+    }
+}
+
+#[test]
+fn many_materials_keep_their_accuracy_up_to_the_border() {
+    let mut random = Random(88172645463325252);
+    let mut checked = 0;
+    while checked < 2000 {
+        let a = random.power(-4.0, -0.52);
+        let law = Law { a, b: a * random.between(0.0, 10.0) };
+        let transition = Transition { law, v_i: 1.0 + random.power(-3.0, 6.0), v_f: 1.0 + random.power(-3.0, 6.0) };
+        let t_f = random.power(-9.0, 3.0);
+        // n is a positive quadratic of known mean, so its ends are at most 9 times that.
+        let rise = (transition.v_i - transition.v_f) / (transition.v_i * transition.v_f);
+        let mean = t_f - rise;
+        let mut place = |most: f64| {
+            let (start, end) = (most * random.unit() * random.unit(), most * random.unit() * random.unit());
+            let a_2 = t_f - mean * start;
+            (a_2, mean * end - t_f - 2.0 * a_2 + 3.0 * rise)
+        };
+        let (inner, outer) = (place(9.0), place(27.0));
+        let landscapes = ACCURACIES.map(|rtol| Landscape::new(&transition, t_f, rtol));
+        let between = |s: f64| Plain {
+            transition,
+            t_f,
+            a_2: inner.0 + s * (outer.0 - inner.0),
+            a_3: inner.1 + s * (outer.1 - inner.1),
+        };
+        let feasible = |s: f64| between(s).found(&landscapes[0]).status != Status::Infeasible;
+        if mean <= 0.0 || !feasible(0.0) || feasible(1.0) {
+            continue;
+        }
+        let (mut low, mut high) = (0.0, 1.0);
+        for _ in 0..60 {
+            let middle = 0.5 * (low + high);
+            if feasible(middle) { low = middle } else { high = middle }
+        }
+        let shortcut = between(low * (1.0 - random.power(-5.0, 0.0)));
+        let [reference, size] = shortcut.work();
+        for (rtol, landscape) in ACCURACIES.into_iter().zip(&landscapes) {
+            let error = (shortcut.found(landscape).work - reference).abs() / size;
+            // The plain evaluation itself loses digits where theta or n is nearly 0 inside: it can judge no better than 1e-10 there.
+            let [theta, n, _] = shortcut.least(500);
+            let faint = (theta * transition.v_i.min(transition.v_f)).min(n / mean) < 0.03;
+            let judge = if faint { 1e-10 } else { 2e-13 };
+            assert!(error <= rtol.max(judge), "{shortcut:?}: {error:e} at rtol {rtol:e}");
+        }
+        checked += 1;
+    }
+}
+
+/// `t_f (1 - theta')` at the end vanishes on `2 a_2 + a_3 = -0.99`, a line of the grid: only the rounding of the coordinates decides.
+/// Velocities from exact rational arithmetic.
+#[test]
+fn regress_points_on_the_border_are_decided_exactly() {
+    let landscape = Landscape::new(&PAPER, 0.02, 1e-10);
+    for (a_2, a_3, v_min) in
+        [(-0.5, 0.010000000000000009, 4.649058915617843e-14), (-0.4975, 0.0050000000000000044, 4.649058915617843e-14)]
+    {
+        let found = Plain { transition: PAPER, t_f: 0.02, a_2, a_3 }.found(&landscape);
+        assert_eq!(found.status, Status::BelowBound);
+        assert!((found.v_min / v_min - 1.0).abs() < 1e-14, "{}", found.v_min);
+    }
+    // theta'(0) = 1 and just above it.
+    for a_2 in [0.02, 0.020000000000000018] {
+        let found = Plain { transition: PAPER, t_f: 0.02, a_2, a_3: -0.3 }.found(&landscape);
+        assert_eq!(found.status, Status::Infeasible, "{a_2}");
+    }
+}
+
+/// Reference: 50-digit quadrature. Close pairs of zeros near the start, next to zeros just beyond the end.
+#[test]
+fn regress_zeros_close_to_both_ends() {
+    let cases = [
+        ([0.05611217460538437, 0.4113088214653343, 640625.1500541139, 1.002546539359029], 919.6267614047433).with(
+            -0.10815782460764245,
+            1874.818635372492,
+            -12122966.634583167,
+        ),
+        ([0.02189376355512217, 0.010826024949659696, 44.27401137397675, 4423.767896572818], 0.07781433039565566).with(
+            -0.20823441154529795,
+            0.567052377021662,
+            6499.15194608382964,
+        ),
+        ([0.030411301866694624, 0.21487814166166327, 18546.78301107986, 214764.481466066], 0.00029933356463209297)
+            .with(-0.000269850913366327, 0.00042757638988498767, -47466.799259016424),
+        ([0.00014409375260631408, 0.0007340859266480505, 1.0579413655202259, 1.0615278167947968], 58.81757388060599)
+            .with(-11.909775721579019, 42.56556422933596, 23514.8650448008486),
+    ];
+    for (shortcut, reference) in cases {
+        let landscape = Landscape::new(&shortcut.transition, shortcut.t_f, 1e-13);
+        let error = (shortcut.found(&landscape).work / reference - 1.0).abs();
+        assert!(error <= 1e-13, "{shortcut:?}: {error:e}");
+    }
+}
+
+/// A material and a time, to be completed with a shortcut and its work.
+trait With {
+    fn with(self, a_2: f64, a_3: f64, work: f64) -> (Plain, f64);
+}
+
+impl With for ([f64; 4], f64) {
+    fn with(self, a_2: f64, a_3: f64, work: f64) -> (Plain, f64) {
+        let ([a, b, v_i, v_f], t_f) = self;
+        (Plain { transition: Transition { law: Law { a, b }, v_i, v_f }, t_f, a_2, a_3 }, work)
+    }
+}
+
+#[test]
+fn a_result_does_not_depend_on_its_neighbours() {
+    let landscape = Landscape::new(&PAPER, 0.037, 1e-10);
+    let a_3 = axis(101);
+    for a_2 in [-0.31, -0.05364, 0.0171] {
+        let (work, v_min, status, effort) = line(&landscape, a_2, &a_3);
+        let mut total = Effort::default();
+        for (i, &a_3) in a_3.iter().enumerate() {
+            let alone = Plain { transition: PAPER, t_f: 0.037, a_2, a_3 }.found(&landscape);
+            assert_eq!(alone.status, status[i]);
+            if status[i] != Status::Infeasible {
+                assert_eq!((alone.work.to_bits(), alone.v_min.to_bits()), (work[i].to_bits(), v_min[i].to_bits()));
+            }
+            total.quadratures += alone.effort.quadratures;
+            total.nodes += alone.effort.nodes;
+        }
+        assert_eq!(total, effort);
+    }
+}
+
+#[test]
+fn effort_is_spent_on_feasible_points_alone() {
+    let landscape = Landscape::new(&PAPER, 0.02, 1e-10);
+    let a_3 = axis(401);
+    let (mut feasible, mut total) = (0, Effort::default());
+    for a_2 in axis(401) {
+        let (.., status, effort) = line(&landscape, a_2, &a_3);
+        feasible += status.iter().filter(|&&s| s != Status::Infeasible).count() as u32;
+        total.quadratures += effort.quadratures;
+        total.nodes += effort.nodes;
+    }
+    assert_eq!(total.quadratures, feasible);
+    assert_eq!(feasible, 69446);
+    assert_eq!(total.nodes, 1_910_088);
+}
+
+#[test]
+fn what_is_not_asked_for_is_not_computed() {
+    let landscape = Landscape::new(&PAPER, 0.02, 1e-10);
+    let (a_2, a_3) = ([-0.12, 0.4], [-0.07, 0.4]);
+    let mut status = [Status::NotConverged; 2];
+    let effort = landscape.evaluate(&a_2, &a_3, Shortcuts { work: &mut [], v_min: &mut [], status: &mut status });
+    assert_eq!(status, [Status::Ok, Status::Infeasible]);
+    assert_eq!(effort, Effort::default());
+    let (mut work, mut v_min) = ([7.0; 2], [7.0; 2]);
+    landscape.evaluate(&a_2, &a_3, Shortcuts { work: &mut work, v_min: &mut v_min, status: &mut status });
+    assert!(work[0] != 7.0 && v_min[0] != 7.0);
+    assert_eq!((work[1], v_min[1]), (7.0, 7.0));
+}
+
+#[test]
+fn no_coordinate_panics() {
+    let landscape = Landscape::new(&PAPER, 0.02, 1e-10);
+    let odd = [f64::NAN, f64::INFINITY, f64::NEG_INFINITY, 1e300, -1e300, 1e160, 5e-324];
+    for a_2 in odd {
+        let (work, v_min, status, _) = line(&landscape, a_2, &odd);
+        for (i, a_3) in odd.into_iter().enumerate() {
+            let sane = a_2 == 5e-324 && a_3 == 5e-324;
+            assert_eq!(status[i] != Status::Infeasible, sane, "{a_2}, {a_3}: {:?}", status[i]);
+            assert!(!sane || (work[i] > 0.0 && v_min[i] > 0.0));
+        }
+    }
+}
