@@ -10,7 +10,7 @@ use super::elementary::{exp, ln};
 use super::lanes::{LANES, Lanes};
 
 /// `ln U / w` on `|w| <= 1`: Chebyshev interpolant of degree 18 (truncation 1e-17), in powers of `w`.
-/// Made by `tests/reference/turning_coefficients.py`.
+/// Made by `tests/reference/coefficients.py`.
 const LN_U_OVER_W: [f64; 19] = [
     1.0,
     -0.16666666666666669,
@@ -34,7 +34,7 @@ const LN_U_OVER_W: [f64; 19] = [
 ];
 
 /// `U / x` for `w <= -1`, with `x = exp(-1 - w^2/2)`, in powers of `s = 1 - sqrt(1 - e x)`: the square root moves the branch point at
-/// `w = 0` out of the way, so degree 14 leaves 1e-17. Made by `tests/reference/turning_coefficients.py`.
+/// `w = 0` out of the way, so degree 14 leaves 1e-17. Made by `tests/reference/coefficients.py`.
 const U_OVER_X: [f64; 15] = [
     1.0,
     0.7357588823428842,

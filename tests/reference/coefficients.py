@@ -1,0 +1,64 @@
+#!/usr/bin/env python3
+"""Coefficients of the approximations in src/numerics, by Chebyshev interpolation at 60 digits.
+
+    venv/bin/python coefficients.py        (needs mpmath)
+
+Prints each array, rounded to double, with the last Chebyshev coefficient: about the truncation error.
+"""
+from mpmath import atanh, binomial, cos, exp, expm1, fsum, lambertw, log, mp, mpf, nstr, pi, sqrt
+
+mp.dps = 60
+
+
+def interpolant(f, low, high, degree):
+    """The interpolant in powers of x, and its last Chebyshev coefficient."""
+    n = degree + 1
+    angle = lambda j: pi * (2 * j + 1) / (2 * n)
+    middle, half = (low + high) / 2, (high - low) / 2
+    values = [f(middle + half * cos(angle(j))) for j in range(n)]
+    c = [2 * fsum(values[j] * cos(m * angle(j)) for j in range(n)) / n for m in range(n)]
+    c[0] /= 2
+    powers = [[mpf(1)], [mpf(0), mpf(1)]]
+    for m in range(2, n):
+        p = [mpf(0)] + [2 * v for v in powers[m - 1]]
+        for i, v in enumerate(powers[m - 2]):
+            p[i] -= v
+        powers.append(p)
+    in_t = [fsum(c[m] * powers[m][i] for m in range(n) if i < len(powers[m])) for i in range(n)]
+    in_x = [fsum(in_t[i] * binomial(i, j) * (-middle) ** (i - j) / half**i for i in range(j, n)) for j in range(n)]
+    return in_x, c[-1]
+
+
+def ln_u_over_w(w):
+    if abs(w) < mpf(10) ** -25:
+        return mpf(1)
+    u = -lambertw(-exp(-1 - w * w / 2), 0 if w < 0 else -1).real
+    return log(u) / w
+
+
+def u_over_x(s):
+    x = exp(-1) * s * (2 - s)
+    return -lambertw(-x, 0).real / x if x > mpf(10) ** -40 else mpf(1)
+
+
+def atanh_tail(z):
+    s = sqrt(z)
+    return (2 * atanh(s) - 2 * s) / s**3 if z > mpf(10) ** -30 else mpf(2) / 3
+
+
+def exp_tail(r):
+    return (expm1(r) - r) / r**2 if abs(r) > mpf(10) ** -20 else mpf(1) / 2
+
+
+ARRAYS = [
+    ("LN_U_OVER_W", ln_u_over_w, mpf(-1), mpf(1), 18),
+    ("U_OVER_X", u_over_x, mpf(0), 1 - sqrt(-expm1(-mpf(1) / 2)), 14),
+    ("ATANH", atanh_tail, mpf(0), ((sqrt(mpf(2)) - 1) / (sqrt(mpf(2)) + 1)) ** 2, 6),
+    ("EXP", exp_tail, -log(mpf(2)) / 2, log(mpf(2)) / 2, 10),
+]
+
+for name, f, low, high, degree in ARRAYS:
+    coefficients, last = interpolant(f, low, high, degree)
+    print(name, "truncation", nstr(last, 2))
+    for c in coefficients:
+        print("   ", repr(float(c)))
