@@ -1,0 +1,324 @@
+//! The optimal protocol and its special times against 40-digit tables, the paper's figures, the paper's own equations, and invariants.
+
+mod reference;
+
+use ode_solvers::{Dop853, SVector, System};
+use slipsweep::model::{Law, Transition};
+use slipsweep::protocol::Status;
+use slipsweep::protocol::optimal::crossover::{self, CrossoverTimes, Wanted};
+use slipsweep::protocol::optimal::{Optimum, Strategy, solve};
+
+const PAPER: Transition = Transition { law: Law { a: 0.03, b: 0.05 }, v_i: 3.0, v_f: 100.0 };
+const EVERY_TIME: Wanted = Wanted { cross: true, hold: true, cheapest: true, min: true, turn: true, free: true };
+
+fn optimum(transition: &Transition, t_f: f64, bounded: bool) -> Optimum {
+    let solved = solve(transition, t_f, bounded, 1e-12);
+    assert!(matches!(solved.status, Status::Ok | Status::BelowBound), "{transition:?} {t_f} {:?}", solved.status);
+    solved.value.expect("a solved row has values")
+}
+
+fn times(transition: &Transition) -> CrossoverTimes {
+    let (status, times, _) = crossover::solve(transition, true, 1e-12, EVERY_TIME);
+    assert_eq!(status, Status::Ok, "{transition:?}");
+    times
+}
+
+fn relative(found: f64, expected: f64) -> f64 {
+    if found == expected { 0.0 } else { ((found - expected) / expected).abs() }
+}
+
+fn transition(row: &reference::Row) -> Transition {
+    Transition {
+        law: Law { a: row.number("a"), b: row.number("b") },
+        v_i: row.number("v_i"),
+        v_f: row.number("v_f"),
+    }
+}
+
+#[test]
+fn reference_optimal_protocols_are_good_to_the_last_digits_that_t_f_allows() {
+    let rows = reference::table("optimal");
+    assert!(rows.len() >= 200, "{} rows", rows.len());
+    for rtol in [1e-6, 1e-10, 1e-13] {
+        for row in &rows {
+            let transition = transition(row);
+            let (t_f, bounded) = (row.number("t_f"), row.text("bounded") == "1");
+            let solved = solve(&transition, t_f, bounded, rtol);
+            let value = solved.value.unwrap_or_else(|| panic!("{row:?}: {:?}", solved.status));
+            let below = !bounded && row.number("v_start") < 1.0;
+            assert_eq!(solved.status, if below { Status::BelowBound } else { Status::Ok }, "{row:?}");
+            assert_eq!(value.strategy.name(), row.text("strategy"), "{row:?}");
+            // t_f is a double: beyond the least time it is known to eps t_f, and so are v and C that depend on what is beyond.
+            let least = if transition.v_f < transition.v_i {
+                if bounded { t_f - beyond_least(&transition, t_f) } else { 1.0 / transition.v_f - 1.0 / transition.v_i }
+            } else {
+                0.0
+            };
+            let doubt = f64::EPSILON * t_f / (t_f - least);
+            // ln v(0+) is of the order of -1/a without the bound.
+            let steep = 4.0 * f64::EPSILON * row.number("v_start").ln().abs();
+            let budget = |condition: f64| 2.0 * rtol + 8.0 * f64::EPSILON + 4.0 * condition;
+            let columns = [
+                ("work", value.work, budget(doubt)),
+                ("v_start", value.v_start, budget(doubt / transition.law.a + steep / transition.law.a)),
+                ("v_end", value.v_end, budget(doubt / transition.law.a)),
+                ("hamiltonian", value.hamiltonian, budget(doubt + f64::EPSILON / row.number("hamiltonian").abs())),
+                ("theta_max", value.theta_max, budget(doubt)),
+            ];
+            for (name, found, budget) in columns {
+                let error = relative(found, row.number(name));
+                assert!(error <= budget, "{name} at rtol {rtol}: {found} off by {error:.1e} > {budget:.1e} in {row:?}");
+            }
+            let hold = (value.hold_time - row.number("hold_time")).abs();
+            assert!(hold <= budget(doubt.sqrt() * 1e-3) * t_f, "hold_time {} off by {hold:.1e} in {row:?}", value.hold_time);
+        }
+    }
+}
+
+/// `t_f - t_min` under the bound.
+fn beyond_least(transition: &Transition, t_f: f64) -> f64 {
+    let Transition { v_i, v_f, .. } = *transition;
+    t_f - ((v_i - v_f) / (v_i * (v_f - 1.0))).ln_1p()
+}
+
+#[test]
+fn reference_crossover_times_and_their_work() {
+    let rows = reference::table("crossover");
+    assert!(rows.len() >= 100, "{} rows", rows.len());
+    for row in &rows {
+        let found = times(&transition(row));
+        let columns = [
+            ("t_cross", found.t_cross),
+            ("t_hold", found.t_hold),
+            ("t_cheapest", found.t_cheapest),
+            ("t_min", found.t_min),
+            ("t_turn", found.t_turn),
+            ("t_free_in", found.t_free_in),
+            ("t_free_out", found.t_free_out),
+            ("work_cross", found.work_cross),
+            ("work_hold", found.work_hold),
+            ("work_cheapest", found.work_cheapest),
+            ("work_min", found.work_min),
+            ("work_turn", found.work_turn),
+        ];
+        for (name, found) in columns {
+            match (found, row.optional(name)) {
+                (Some(found), Some(expected)) => {
+                    let error = relative(found, expected);
+                    assert!(error < 1e-12, "{name}: {found} off by {error:.1e} in {row:?}");
+                }
+                (None, None) => {}
+                (found, expected) => panic!("{name}: {found:?} where {expected:?} in {row:?}"),
+            }
+        }
+    }
+}
+
+#[test]
+fn paper_crossover_is_at_0_037_and_the_start_near_the_bound_at_0_049() {
+    let found = times(&PAPER);
+    assert!(relative(found.t_cross.expect("exists"), 0.0374184120524) < 1e-12);
+    assert!(relative(found.t_hold.expect("exists"), 0.0495500046379) < 1e-12);
+    assert!(found.t_cheapest < found.t_cross);
+    assert_eq!(optimum(&PAPER, 0.037, true).strategy, Strategy::SpeedUp);
+    let late = optimum(&PAPER, 0.049, true);
+    assert_eq!(late.strategy, Strategy::SlowDown);
+    assert!(late.v_start > 1.0 && late.v_start < 1.1, "{}", late.v_start);
+}
+
+#[test]
+fn paper_velocities_scale_with_the_inverse_of_small_times() {
+    // v ~ g(t/t_f)/t_f: constant in the limit, ln(v_f/v_i)/t_f; the work grows by a ln 10 a decade for each part of the way.
+    let way = (PAPER.v_f / PAPER.v_i).ln();
+    let [slow, fast] = [1e-7, 1e-8].map(|t_f| optimum(&PAPER, t_f, true));
+    for (t_f, found) in [(1e-7, slow), (1e-8, fast)] {
+        assert!(relative(found.v_start * t_f, way) < 1e-4 && relative(found.v_end * t_f, way) < 1e-4);
+    }
+    assert!(relative(fast.work - slow.work, way * PAPER.law.a * 10f64.ln()) < 1e-4);
+}
+
+#[test]
+fn for_b_equal_a_the_crossover_is_elementary() {
+    for (a, v_i, v_f) in [(0.03, 3.0, 100.0), (0.2, 1.5, 2.0), (1e-3, 10.0, 1e5)] {
+        // a (e^z - 1 - z) = 1 - v_i/v_f, t_cross = a z/v_i, by bisection.
+        let (mut low, mut high) = (0.0, 50.0);
+        while (high - low) > 1e-15 * high {
+            let z: f64 = 0.5 * (low + high);
+            if a * (z.exp_m1() - z) > 1.0 - v_i / v_f { high = z } else { low = z }
+            if 0.5 * (low + high) == low || 0.5 * (low + high) == high {
+                break;
+            }
+        }
+        let found = times(&Transition { law: Law { a, b: a }, v_i, v_f }).t_cross.expect("exists");
+        assert!(relative(found, a * low / v_i) < 1e-13, "{a} {v_i} {v_f}");
+    }
+}
+
+/// The paper's equations with their costate, and the work: `theta' = 1 - theta v`, `beta' = v (b/theta + beta)`, `W' = tau v`, with v from stationarity.
+struct Paper(Law);
+
+impl System<f64, SVector<f64, 3>> for Paper {
+    fn system(&self, _: f64, y: &SVector<f64, 3>, dy: &mut SVector<f64, 3>) {
+        let Law { a, b } = self.0;
+        let (theta, beta) = (y[0], y[1]);
+        let v = (-(1.0 + a + b * theta.ln() + beta * theta) / a).exp();
+        dy[0] = 1.0 - theta * v;
+        dy[1] = v * (b / theta + beta);
+        dy[2] = (1.0 + a * v.ln() + b * theta.ln()) * v;
+    }
+}
+
+#[test]
+fn paper_equations_integrated_from_our_start_arrive_with_our_work() {
+    let cases = [
+        (PAPER, 0.02),
+        (PAPER, 0.037),
+        (PAPER, 0.049),
+        (PAPER, 0.5),
+        (Transition { law: Law { a: 0.05, b: 0.0 }, ..PAPER }, 0.03),
+        (Transition { law: Law { a: 0.03, b: 0.03 }, ..PAPER }, 0.03),
+        (Transition { v_i: 100.0, v_f: 3.0, ..PAPER }, 0.397),
+        (Transition { v_i: 100.0, v_f: 3.0, ..PAPER }, 0.41),
+        (Transition { v_f: 2.99, ..PAPER }, 0.01),
+    ];
+    for (transition, t_f) in cases {
+        let Transition { law, v_i, v_f } = transition;
+        let found = optimum(&transition, t_f, true);
+        // The hold in closed form for theta, by quadrature in steps of the integrator for its work.
+        let theta_c = 1.0 - (1.0 - 1.0 / v_i) * (-found.hold_time).exp();
+        let tau = |v: f64, theta: f64| 1.0 + law.a * v.ln() + law.b * theta.ln();
+        let steps = 20_000;
+        let h = found.hold_time / f64::from(steps);
+        let held: f64 = (0..steps)
+            .map(|i| tau(1.0, 1.0 - (1.0 - 1.0 / v_i) * (-(f64::from(i) + 0.5) * h).exp()) * h)
+            .sum();
+        let beta = -(law.a + tau(found.v_start, theta_c)) / theta_c;
+        let start = SVector::<f64, 3>::new(theta_c, beta, 0.0);
+        let rest = t_f - found.hold_time;
+        let mut integrator = Dop853::new(Paper(law), 0.0, rest, rest / 100.0, start, 1e-13, 1e-15);
+        integrator.integrate().expect("the arc is smooth");
+        let end = integrator.y_out().last().expect("has an end");
+        assert!(relative(end[0], 1.0 / v_f) < 1e-7, "{transition:?} {t_f}: theta ends at {}", end[0]);
+        let work = held + end[2];
+        assert!(relative(work, found.work) < 1e-8, "{transition:?} {t_f}: {work} against {}", found.work);
+    }
+}
+
+#[test]
+fn the_hamiltonian_is_the_derivative_of_the_work() {
+    for (transition, t_f) in [
+        (PAPER, 0.005),
+        (PAPER, 0.03),
+        (PAPER, 0.0374184120524),
+        (PAPER, 0.045),
+        (PAPER, 0.3),
+        (Transition { v_i: 100.0, v_f: 3.0, ..PAPER }, 0.398),
+        (Transition { v_i: 100.0, v_f: 3.0, ..PAPER }, 0.6),
+    ] {
+        let h = 1e-4 * t_f;
+        let work = |t: f64| optimum(&transition, t, true).work;
+        // Fourth-order difference.
+        let difference = (work(t_f - 2.0 * h) - 8.0 * work(t_f - h) + 8.0 * work(t_f + h) - work(t_f + 2.0 * h)) / (12.0 * h);
+        let hamiltonian = optimum(&transition, t_f, true).hamiltonian;
+        assert!(relative(difference, hamiltonian) < 1e-8, "{transition:?} {t_f}: {difference} against {hamiltonian}");
+    }
+}
+
+#[test]
+fn the_work_has_its_inflection_at_the_crossover_and_at_the_turn() {
+    let deceleration = Transition { v_i: 100.0, v_f: 3.0, ..PAPER };
+    for (transition, t) in [(PAPER, times(&PAPER).t_cross), (deceleration, times(&deceleration).t_turn)] {
+        let t = t.expect("exists");
+        let curvature = |t: f64, h: f64| {
+            optimum(&transition, t + h, true).hamiltonian - optimum(&transition, t - h, true).hamiltonian
+        };
+        let h = 1e-4 * t;
+        assert!(curvature(t - 20.0 * h, h) > 0.0 && curvature(t + 20.0 * h, h) < 0.0, "{transition:?}");
+    }
+}
+
+#[test]
+fn protocols_that_cannot_be_fast_enough_are_infeasible() {
+    let deceleration = Transition { v_i: 100.0, v_f: 3.0, ..PAPER };
+    let t_min = times(&deceleration).t_min.expect("exists");
+    assert_eq!(solve(&deceleration, t_min * (1.0 - 1e-15), true, 1e-10).status, Status::Infeasible);
+    let shortest = optimum(&deceleration, t_min, true);
+    assert_eq!((shortest.v_start, shortest.v_end, shortest.hold_time), (1.0, 1.0, t_min));
+    let next = optimum(&deceleration, t_min * (1.0 + 1e-12), true);
+    assert!(relative(next.work, shortest.work) < 1e-11 && next.v_end > 1.0);
+    assert_eq!(solve(&deceleration, 1.0 / 3.0 - 0.01, false, 1e-10).status, Status::Infeasible);
+    for nonsense in [0.0, -1.0, f64::NAN, f64::INFINITY] {
+        assert_eq!(solve(&PAPER, nonsense, true, 1e-10).status, Status::Infeasible);
+    }
+}
+
+#[test]
+fn the_usual_effort_is_five_quadratures_and_rises_with_the_accuracy_only() {
+    let effort = |rtol| solve(&PAPER, 0.02, true, rtol).effort;
+    assert_eq!((effort(1e-6).quadratures, effort(1e-6).nodes), (EFFORT_6.0, EFFORT_6.1));
+    assert_eq!((effort(1e-12).quadratures, effort(1e-12).nodes), (EFFORT_12.0, EFFORT_12.1));
+    let (_, _, crossover) = crossover::solve(&PAPER, true, 1e-12, EVERY_TIME);
+    assert_eq!(crossover.quadratures, 3);
+}
+
+/// Quadratures and nodes of the paper's case at 0.02 for rtol 1e-6 and 1e-12.
+const EFFORT_6: (u32, u32) = (5, 64);
+const EFFORT_12: (u32, u32) = (5, 88);
+
+/// Deterministic numbers in [0, 1).
+struct Numbers(u64);
+
+impl Numbers {
+    fn next(&mut self) -> f64 {
+        self.0 ^= self.0 << 13;
+        self.0 ^= self.0 >> 7;
+        self.0 ^= self.0 << 17;
+        (self.0 >> 11) as f64 / (1u64 << 53) as f64
+    }
+
+    fn log_uniform(&mut self, low: f64, high: f64) -> f64 {
+        low * (high / low).powf(self.next())
+    }
+}
+
+#[test]
+fn every_random_case_has_an_answer_that_two_accuracies_share() {
+    let mut numbers = Numbers(88172645463325252);
+    let mut counts = [0; 5];
+    for _ in 0..20_000 {
+        let a = numbers.log_uniform(1e-4, 0.3);
+        let b = match (numbers.next() * 4.0) as u32 {
+            0 => 0.0,
+            1 => a,
+            2 => a * numbers.next(),
+            _ => (a * numbers.log_uniform(1.0, 10.0)).min(0.5),
+        };
+        let v = if numbers.next() < 0.5 { 1.0 + numbers.log_uniform(1e-3, 1.0) } else { numbers.log_uniform(2.0, 1e4) };
+        let ratio = if numbers.next() < 0.3 {
+            1.0 + numbers.log_uniform(1e-6, 1.0)
+        } else {
+            numbers.log_uniform(1.1, 1e6)
+        };
+        let (v_i, v_f) = if numbers.next() < 0.5 { (v, v * ratio) } else { (v * ratio, v) };
+        let transition = Transition { law: Law { a, b }, v_i, v_f };
+        let bounded = numbers.next() < 0.7;
+        let least = match (v_f < v_i, bounded) {
+            (false, _) => 0.0,
+            (true, true) => ((v_i - v_f) / (v_i * (v_f - 1.0))).ln_1p(),
+            (true, false) => 1.0 / v_f - 1.0 / v_i,
+        };
+        let t_f = least + if numbers.next() < 0.5 { numbers.log_uniform(1e-9, 1e3) } else { numbers.log_uniform(1e-4, 10.0) * a / v_i };
+        let rough = solve(&transition, t_f, bounded, 1e-9);
+        counts[rough.status as usize] += 1;
+        assert_ne!(rough.status, Status::NotConverged, "{transition:?} {t_f:e} {bounded}");
+        let fine = solve(&transition, t_f, bounded, 1e-13);
+        if let (Some(rough), Some(fine), Status::Ok) = (rough.value, fine.value, fine.status) {
+            let doubt = 1e-15 * t_f / (t_f - least);
+            let error = relative(rough.work, fine.work);
+            assert!(error < 2e-9 + doubt, "{transition:?} {t_f:e} {bounded}: work off by {error:e}");
+            let error = relative(rough.hamiltonian, fine.hamiltonian);
+            assert!(error < 2e-9 + 10.0 * doubt, "{transition:?} {t_f:e} {bounded}: Hamiltonian off by {error:e}");
+        }
+    }
+    assert!(counts[Status::Ok as usize] > 14_000, "{counts:?}");
+}
