@@ -31,6 +31,9 @@ pub struct Landscape {
     rounding: f64,
 }
 
+/// Nodes that no better map can save much of.
+const CHEAP: usize = 16;
+
 /// Most nodes of a panel that is taken without a search for a better one.
 const MOST_PLANNED: usize = 64;
 
@@ -129,7 +132,7 @@ impl Landscape {
         for (lane, &i) in due.iter().enumerate() {
             (a_2_lanes[lane], a_3_lanes[lane]) = (a_2[i], a_3[i]);
         }
-        let plan = plan(&self.ends, &a_2_lanes, &a_3_lanes);
+        let plan = plan(&self.ends, &a_2_lanes, &a_3_lanes, self.accuracy.enough(CHEAP));
         for (lane, &i) in due.iter().enumerate() {
             let path = Path::new(&self.ends, a_2[i], a_3[i]);
             let nodes = self.accuracy.nodes(plan.focal[lane]);

@@ -28,12 +28,12 @@ pub(super) struct Plan {
 /// Largest map tried.
 const MOST_SQUARINGS: u32 = 3;
 
-/// Chooses the panels of the shortcuts `(a_2[i], a_3[i])`, all feasible.
+/// Chooses the panels of the shortcuts `(a_2[i], a_3[i])`, all feasible. No better map is sought from the focal sum `plain` on.
 #[multiversion(targets(
     "x86_64+avx+avx2+bmi1+bmi2+avx512f+avx512bw+avx512cd+avx512dq+avx512vl",
     "x86_64+avx+avx2+bmi1+bmi2"
 ))]
-pub(super) fn plan(ends: &Ends, a_2: &Lanes, a_3: &Lanes) -> Plan {
+pub(super) fn plan(ends: &Ends, a_2: &Lanes, a_3: &Lanes, plain: f64) -> Plan {
     let (mut re, mut im) = ([[0.0; LANES]; ZEROS], [[0.0; LANES]; ZEROS]);
     for i in 0..LANES {
         let zeros = zeros(&Path::new(ends, a_2[i], a_3[i]));
@@ -51,16 +51,18 @@ pub(super) fn plan(ends: &Ends, a_2: &Lanes, a_3: &Lanes) -> Plan {
     };
     // The most hindering zero names the end and the centre.
     let mut shadow = [0.0; LANES];
+    let mut least = [FAR * FAR; LANES];
     for k in 0..ZEROS {
         for i in 0..LANES {
-            let focal = 2.0 * ellipse(re[k][i], im[k][i], 0.0, 1.0);
-            let nearer = focal < plan.focal[i];
-            plan.focal[i] = if nearer { focal } else { plan.focal[i] };
+            let square = ellipse(re[k][i], im[k][i], 0.0, 1.0);
+            let nearer = square < least[i];
+            least[i] = if nearer { square } else { least[i] };
             shadow[i] = if nearer { re[k][i] } else { shadow[i] };
         }
     }
     let (mut near, mut far) = ([0.0; LANES], [0.0; LANES]);
     for i in 0..LANES {
+        plan.focal[i] = 2.0 * least[i].sqrt();
         let upper = shadow[i] > 0.5;
         let beyond = if upper { shadow[i] - 1.0 } else { -shadow[i] };
         plan.side[i] = if upper { 1.0 } else { -1.0 };
@@ -75,7 +77,12 @@ pub(super) fn plan(ends: &Ends, a_2: &Lanes, a_3: &Lanes) -> Plan {
         }
     }
     for squarings in 1..=MOST_SQUARINGS {
-        let mut least = [FAR; LANES];
+        // A lane goes on only for its own sake, so that it does not depend on its neighbours.
+        let going: Lanes = plan.focal.map(|focal| if focal < plain { 1.0 } else { 0.0 });
+        if going == [0.0; LANES] {
+            break;
+        }
+        let mut least = [FAR * FAR; LANES];
         for i in 0..LANES {
             near[i] = near[i].sqrt();
             far[i] = far[i].sqrt();
@@ -84,13 +91,13 @@ pub(super) fn plan(ends: &Ends, a_2: &Lanes, a_3: &Lanes) -> Plan {
             for i in 0..LANES {
                 let (x, y) = complex_sqrt(re[k][i], im[k][i]);
                 (re[k][i], im[k][i]) = (x, y);
-                let sum = ellipse(x, y, near[i], far[i]);
-                least[i] = if sum < least[i] { sum } else { least[i] };
+                let square = ellipse(x, y, near[i], far[i]);
+                least[i] = if square < least[i] { square } else { least[i] };
             }
         }
         for i in 0..LANES {
-            let focal = 2.0 * least[i] / (far[i] - near[i]);
-            let better = focal > plan.focal[i];
+            let focal = 2.0 * least[i].sqrt() / (far[i] - near[i]);
+            let better = going[i] * focal > plan.focal[i];
             plan.focal[i] = if better { focal } else { plan.focal[i] };
             plan.squarings[i] = if better { f64::from(squarings) } else { plan.squarings[i] };
             plan.from[i] = if better { near[i] } else { plan.from[i] };
@@ -100,9 +107,10 @@ pub(super) fn plan(ends: &Ends, a_2: &Lanes, a_3: &Lanes) -> Plan {
     plan
 }
 
-/// Sum of the distances of `x + iy` from both ends of `[from, to]`.
+/// Square of the sum of the distances of `x + iy` from both ends of `[from, to]`.
 #[inline(always)]
 fn ellipse(x: f64, y: f64, from: f64, to: f64) -> f64 {
     let (u, v, y2) = (x - from, x - to, y * y);
-    (u * u + y2).sqrt() + (v * v + y2).sqrt()
+    let (u2, v2) = (u * u + y2, v * v + y2);
+    u2 + v2 + 2.0 * (u2 * v2).sqrt()
 }

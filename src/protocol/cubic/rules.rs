@@ -81,7 +81,7 @@ impl Accuracy {
 
     /// The focal sum from which `nodes` are enough.
     #[inline(always)]
-    fn enough(&self, nodes: usize) -> f64 {
+    pub fn enough(&self, nodes: usize) -> f64 {
         self.focal[nodes / LANES - 1]
     }
 

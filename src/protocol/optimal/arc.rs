@@ -63,6 +63,8 @@ pub(super) struct Sums {
     pub work: f64,
     /// Turning chart: the interior part of `d time/d ln theta_h`. Direct chart: `d time/d z_a`.
     pub sensitivity: f64,
+    /// `int u theta/(1 - u)^2 dt`, from which `d time/d ln u(end)` follows without cancellation where theta rises all the way.
+    pub swing: f64,
     /// Least friction met at a node.
     pub friction_min: f64,
     /// Nodes spent.
@@ -216,13 +218,14 @@ fn panels(
     };
     let rule = rule(LANES * (nodes / LANES as f64).ceil().max(1.0) as usize);
     let half = 0.5 * length / f64::from(count);
-    let mut total = Sums { time: 0.0, lag: 0.0, work: 0.0, sensitivity: 0.0, friction_min: f64::INFINITY, nodes: 0 };
+    let mut total = Sums { time: 0.0, lag: 0.0, work: 0.0, sensitivity: 0.0, swing: 0.0, friction_min: f64::INFINITY, nodes: 0 };
     for panel in 0..count {
         let sums = kernel(start + half * f64::from(2 * panel + 1), half, rule);
         total.time += sums.time;
         total.lag += sums.lag;
         total.work += sums.work;
         total.sensitivity += sums.sensitivity;
+        total.swing += sums.swing;
         total.friction_min = total.friction_min.min(sums.friction_min);
         total.nodes += sums.nodes;
     }
@@ -287,7 +290,7 @@ struct TurningSlice {
 fn turning_kernel(arc: &TurningSlice, middle: f64, half: f64, rule: &Rule) -> Sums {
     let Law { a, b } = arc.law;
     let (mut time, mut lag, mut work, mut sensitivity) = ([0.0; LANES], [0.0; LANES], [0.0; LANES], [0.0; LANES]);
-    let mut friction_min = [f64::INFINITY; LANES];
+    let (mut swing, mut friction_min) = ([0.0; LANES], [f64::INFINITY; LANES]);
     for (x, weight) in rule.x.chunks_exact(LANES).zip(rule.w.chunks_exact(LANES)) {
         let (mut w, mut om, mut x2, mut cosh, mut ln_theta) =
             ([0.0; LANES], [0.0; LANES], [0.0; LANES], [0.0; LANES], [0.0; LANES]);
@@ -308,13 +311,15 @@ fn turning_kernel(arc: &TurningSlice, middle: f64, half: f64, rule: &Rule) -> Su
             let ratio = 1.0 / (om[i] * slope[i]);
             let shrink = 1.0 / (1.0 + x2[i]);
             let g = weight[i] * cosh[i] * ratio * shrink;
-            let u = 1.0 + w[i] * slope[i];
+            let d = w[i] * slope[i];
+            let u = 1.0 + d;
             let friction = 1.0 + a * z[i] + (b - a) * ln_theta[i];
             let dt = g * shrink;
             time[i] += dt;
             lag[i] += dt * u;
             work[i] += g * u * friction;
             sensitivity[i] += dt * (1.0 - u * ratio * ratio * ((b - a) / a) * shrink);
+            swing[i] += dt * shrink * u / (d * d);
             friction_min[i] = if friction < friction_min[i] { friction } else { friction_min[i] };
         }
     }
@@ -324,6 +329,7 @@ fn turning_kernel(arc: &TurningSlice, middle: f64, half: f64, rule: &Rule) -> Su
         lag: scale * arc.theta_h * fold(&lag),
         work: scale * fold(&work),
         sensitivity: scale * arc.theta_h * fold(&sensitivity),
+        swing: scale * arc.theta_h * arc.theta_h * fold(&swing),
         friction_min: least(&friction_min),
         nodes: rule.x.len() as u32,
     }
@@ -372,6 +378,7 @@ fn direct_kernel(arc: &DirectSlice, middle: f64, half: f64, rule: &Rule) -> Sums
         lag: half * arc.theta_a * fold(&lag),
         work: half * fold(&work),
         sensitivity: half * arc.theta_a * arc.slope_a * fold(&sensitivity),
+        swing: -half * arc.theta_a * arc.theta_a * fold(&sensitivity),
         friction_min: least(&friction_min),
         nodes: rule.x.len() as u32,
     }

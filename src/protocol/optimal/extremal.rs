@@ -54,6 +54,8 @@ enum Rate {
     Turning { gain: f64, inner: f64, outer: f64 },
     /// `gain` times the sensitivity of the direct chart.
     Direct { gain: f64 },
+    /// `gain` times the swing, for arcs on which theta rises all the way.
+    Rising { gain: f64 },
 }
 
 impl Problem {
@@ -239,6 +241,7 @@ impl Problem {
         let c_a = excess - self.friction_a();
         let (hold_time, d) = self.leaving(law.a * (self.theta_1 * exp_m1(eta) - eta))?;
         let theta_s = if hold_time > 0.0 { self.theta_1 * exp(d) } else { self.theta_0 };
+        let rising = Rate::Rising { gain: -stretch * exp_m1(z_1) / self.theta_1 };
         if let Some(xi) = turning_distance(&law, excess, -c_a).filter(|&xi| xi <= 1.0) {
             let theta_h = self.theta_1 * (1.0 + xi);
             let x_squares = -(1.0 + xi) * exp_m1(-d);
@@ -247,17 +250,21 @@ impl Problem {
             let (start, end) = arc.ends()?;
             let c_h = 1.0 + (law.b - law.a) * ln(theta_h);
             let swing = law.a * (1.0 + xi) / (c_h + law.a - law.b);
-            let rate = Rate::Turning {
-                gain: stretch * swing * exp_m1(z_1),
-                inner: -theta_s / exp_m1(start.ln_u),
-                outer: stretch * self.theta_1 * swing,
+            let rate = if z_1 < -1.0 {
+                rising
+            } else {
+                Rate::Turning {
+                    gain: stretch * swing * exp_m1(z_1),
+                    inner: -theta_s / exp_m1(start.ln_u),
+                    outer: stretch * self.theta_1 * swing,
+                }
             };
             return Some(Extremal { hold_time, theta_s, arc, start, end, rate });
         }
         let chart = Chart::Direct { theta_a: self.theta_1, z_a: z_1, c_a, y_start: d, y_end: 0.0 };
         let arc = Arc { law, chart };
         let (start, end) = arc.ends()?;
-        Some(Extremal { hold_time, theta_s, arc, start, end, rate: Rate::Direct { gain: stretch } })
+        Some(Extremal { hold_time, theta_s, arc, start, end, rate: rising })
     }
 
     /// Rising problem, `q >= 0`: `X = layer q` at the end.
@@ -347,6 +354,7 @@ impl Extremal {
                 gain * (sums.sensitivity + inner) + outer
             }
             Rate::Direct { gain } => gain * sums.sensitivity,
+            Rate::Rising { gain } => gain * sums.swing,
         };
         let (value, slope) = if let Rate::Hold { .. } = self.rate {
             (time / beyond - 1.0, rate / beyond)
