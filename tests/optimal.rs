@@ -282,7 +282,7 @@ fn the_usual_effort_is_five_quadratures_and_rises_with_the_accuracy_only() {
 
 /// Quadratures and nodes of the paper's case at 0.02 for rtol 1e-6 and 1e-12.
 const EFFORT_6: (u32, u32) = (4, 48);
-const EFFORT_12: (u32, u32) = (5, 88);
+const EFFORT_12: (u32, u32) = (5, 80);
 
 /// Deterministic numbers in [0, 1).
 struct Numbers(u64);
