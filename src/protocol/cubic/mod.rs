@@ -17,7 +17,7 @@ use crate::numerics::lanes::LANES;
 use kernel::Slice;
 pub(super) use path::Path;
 use path::{Ends, screen};
-use plan::plan;
+use plan::{BLOCK, plan};
 use rules::{Accuracy, Map, Panel, Zeros, choose};
 
 /// The work landscape of one transition in one time over the plane of `(alpha_2, alpha_3)`.
@@ -54,7 +54,7 @@ pub struct Shortcuts<'a> {
 impl Landscape {
     /// Prepares the landscape of `transition` in time `t_f`; every work is good to relative accuracy `rtol`.
     pub fn new(transition: &Transition, t_f: f64, rtol: f64) -> Self {
-        let ends = Ends::between(transition.v_i, transition.v_f, t_f);
+        let ends = Ends::between(transition.v_i, transition.v_f, t_f, 0.5 * rtol);
         Landscape {
             law: transition.law,
             ends,
@@ -87,7 +87,7 @@ impl Landscape {
         let mut panels = Vec::with_capacity(8);
         let count = a_2.len().min(a_3.len()).min(out.status.len());
         // Feasible shortcuts whose work is still due.
-        let mut due = [0; LANES];
+        let mut due = [0; BLOCK];
         let mut dues = 0;
         for first in (0..count).step_by(LANES) {
             let block = first..(first + LANES).min(count);
@@ -106,7 +106,7 @@ impl Landscape {
                 if i < out.work.len() {
                     due[dues] = i;
                     dues += 1;
-                    if dues == LANES {
+                    if dues == BLOCK {
                         self.works(&due, a_2, a_3, out.work, &mut panels, &mut effort);
                         dues = 0;
                     }
@@ -128,7 +128,7 @@ impl Landscape {
         effort: &mut Effort,
     ) {
         let Some(&first) = due.first() else { return };
-        let (mut a_2_lanes, mut a_3_lanes) = ([a_2[first]; LANES], [a_3[first]; LANES]);
+        let (mut a_2_lanes, mut a_3_lanes) = ([a_2[first]; BLOCK], [a_3[first]; BLOCK]);
         for (lane, &i) in due.iter().enumerate() {
             (a_2_lanes[lane], a_3_lanes[lane]) = (a_2[i], a_3[i]);
         }

@@ -17,14 +17,16 @@ pub(in crate::protocol) struct Ends {
     /// `theta_1 - theta_0`.
     pub rise: DoubleDouble,
     pub t_f: f64,
+    /// Largest share of a velocity that rounding may cost.
+    v_loss: f64,
 }
 
 impl Ends {
-    /// Between the steady states at `v_i` and `v_f`.
-    pub fn between(v_i: f64, v_f: f64, t_f: f64) -> Ends {
+    /// Between the steady states at `v_i` and `v_f`; velocities are to be good to `v_loss` (relative).
+    pub fn between(v_i: f64, v_f: f64, t_f: f64, v_loss: f64) -> Ends {
         let one = DoubleDouble::new(1.0);
         let (theta_0, theta_1) = (one / DoubleDouble::new(v_i), one / DoubleDouble::new(v_f));
-        Ends { theta_0, theta_1, rise: theta_1 - theta_0, t_f }
+        Ends { theta_0, theta_1, rise: theta_1 - theta_0, t_f, v_loss }
     }
 }
 
@@ -129,8 +131,8 @@ impl<'a> Path<'a> {
 
     /// Status decided in double-double, and least velocity.
     pub fn judge(&self) -> (Status, f64) {
-        let (v_min, place) = least_velocities(self.ends, &[self.a_2; LANES], &[self.a_3; LANES]);
-        (self.exact_status(), self.sharpened(v_min[0], place[0]))
+        let (_, place, _) = least_velocities(self.ends, &[self.a_2; LANES], &[self.a_3; LANES]);
+        (self.exact_status(), self.exact_velocity(place[0]))
     }
 
     /// Velocity at both ends: the lesser, and where it is found.
@@ -142,22 +144,20 @@ impl<'a> Path<'a> {
         ((if first { start } else { end }) / self.ends.t_f, if first { 0.0 } else { 1.0 })
     }
 
-    /// The least velocity `v_min`, found at `x`: again in double-double where `n` or theta is so small that rounding shows.
+    /// Velocity at `x` from 32 digits, for where `n` or theta is so small that rounding shows.
     ///
-    /// Rounding hardly moves the place, and the velocity there depends on the square of that.
-    fn sharpened(&self, v_min: f64, x: f64) -> f64 {
-        let faint = |cubic: &Cubic| {
-            let [c0, c1, c2, c3] = cubic.c;
-            // Written so that not-a-number is faint.
-            !(cubic.at(x) > FAINT * (c0.abs() + c1.abs() + c2.abs() + c3.abs()))
-        };
-        if faint(&self.n) || faint(&self.theta) {
-            let t_f = DoubleDouble::new(self.ends.t_f);
-            (self.exact_n().at(x) / (t_f * self.exact_theta().at(x))).high
-        } else {
-            v_min
-        }
+    /// Rounding hardly moves the place of the least velocity, and the velocity there depends on the square of that.
+    fn exact_velocity(&self, x: f64) -> f64 {
+        let t_f = DoubleDouble::new(self.ends.t_f);
+        (self.exact_n().at(x) / (t_f * self.exact_theta().at(x))).high
     }
+}
+
+/// Whether rounding may cost the value of a cubic at `x` a share `loss` of it (or it is not a number).
+#[inline(always)]
+fn is_faint(cubic: &Cubic, x: f64, loss: f64) -> bool {
+    let [c0, c1, c2, c3] = cubic.c;
+    !(loss * cubic.at(x) > 4.0 * f64::EPSILON * (c0.abs() + c1.abs() + c2.abs() + c3.abs()))
 }
 
 /// Sign of the least value of a polynomial: -1, +1, or 0 where rounding leaves doubt.
@@ -196,9 +196,10 @@ pub(super) fn screen(ends: &Ends, a_2: &Lanes, a_3: &Lanes, v_min: Option<&mut L
     if let Some(v_min) = v_min
         && status.iter().any(|&s| s != Status::Infeasible)
     {
-        let (rounded, place) = least_velocities(ends, a_2, a_3);
-        for i in (0..LANES).filter(|&i| status[i] != Status::Infeasible) {
-            v_min[i] = Path::new(ends, a_2[i], a_3[i]).sharpened(rounded[i], place[i]);
+        let (rounded, place, faint) = least_velocities(ends, a_2, a_3);
+        *v_min = rounded;
+        for i in (0..LANES).filter(|&i| faint[i] > 0.0 && status[i] != Status::Infeasible) {
+            v_min[i] = Path::new(ends, a_2[i], a_3[i]).exact_velocity(place[i]);
         }
     }
     status
@@ -220,13 +221,13 @@ fn signs(ends: &Ends, a_2: &Lanes, a_3: &Lanes) -> [Lanes; 3] {
 }
 
 /// `v = n/(t_f theta) >= m` where the cubic `n - m t_f theta` is not negative. The minimum of that cubic gives the next, lower `m`: Dinkelbach's
-/// method (Management Science 13, 492, 1967), which falls to the least ratio and doubles its digits with each step. Returns the least velocities and
-/// their places; infeasible lanes hold no meaning.
+/// method (Management Science 13, 492, 1967), which falls to the least ratio and doubles its digits with each step. Returns the least velocities,
+/// their places, and 1 where rounding shows; infeasible lanes hold no meaning.
 #[multiversion(targets(
     "x86_64+avx+avx2+bmi1+bmi2+avx512f+avx512bw+avx512cd+avx512dq+avx512vl",
     "x86_64+avx+avx2+bmi1+bmi2"
 ))]
-fn least_velocities(ends: &Ends, a_2: &Lanes, a_3: &Lanes) -> (Lanes, Lanes) {
+fn least_velocities(ends: &Ends, a_2: &Lanes, a_3: &Lanes) -> (Lanes, Lanes, Lanes) {
     let (mut v_min, mut place) = ([0.0; LANES], [0.0; LANES]);
     for i in 0..LANES {
         (v_min[i], place[i]) = Path::new(ends, a_2[i], a_3[i]).v_ends();
@@ -245,15 +246,18 @@ fn least_velocities(ends: &Ends, a_2: &Lanes, a_3: &Lanes) -> (Lanes, Lanes) {
             break;
         }
     }
-    (v_min, place)
+    let mut faint = [0.0; LANES];
+    for i in 0..LANES {
+        let path = Path::new(ends, a_2[i], a_3[i]);
+        let lost = is_faint(&path.n, place[i], ends.v_loss) | is_faint(&path.theta, place[i], ends.v_loss);
+        faint[i] = if lost { 1.0 } else { 0.0 };
+    }
+    (v_min, place, faint)
 }
 
 /// Coordinates of this size are not feasible for any time that is meant: the quadratic `n >= 0` has the mean `t_f - rise`, so its ends are at most nine
 /// times that. Their squares do not overflow below it.
 const WILD: f64 = 1e100;
-
-/// Below this share of its coefficients a polynomial loses digits that count.
-const FAINT: f64 = 1e-3;
 
 /// More steps than the doubling of digits can use.
 const MOST_STEPS: u32 = 60;
