@@ -1,6 +1,7 @@
 //! One landscape point over the paper's landscape, in units of one scalar `f64::ln` measured in the same run.
 //!
-//! `cargo bench --bench landscape`. Medians of several passes on one core; feasibility and `v_min` of all points, feasible or not, are in the time.
+//! `cargo bench --bench landscape`. Medians of several passes on one core; feasibility and `v_min` of all points,
+//! feasible or not, are in the time.
 
 use std::hint::black_box;
 use std::time::Instant;

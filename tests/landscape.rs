@@ -28,7 +28,8 @@ struct Found {
 }
 
 impl Plain {
-    /// `theta` and `t_f (1 - theta')` at `x = u` for `u >= 0`, at `x = 1 + u` for `u < 0`: from the nearer end, so that a small theta keeps its digits.
+    /// `theta` and `t_f (1 - theta')` at `x = u` for `u >= 0`, at `x = 1 + u` for `u < 0`: from the nearer end, so that
+    /// a small theta keeps its digits.
     fn at(&self, u: f64) -> (f64, f64) {
         let Transition { v_i, v_f, .. } = self.transition;
         let (theta_0, theta_1, rise) = (1.0 / v_i, 1.0 / v_f, (v_i - v_f) / (v_i * v_f));
@@ -243,7 +244,8 @@ fn many_materials_keep_their_accuracy_up_to_the_border() {
         let [reference, size] = shortcut.work();
         for (rtol, landscape) in ACCURACIES.into_iter().zip(&landscapes) {
             let error = (shortcut.found(landscape).work - reference).abs() / size;
-            // The plain evaluation itself loses digits where theta or n is nearly 0 inside: it can judge no better than 1e-10 there.
+            // The plain evaluation itself loses digits where theta or n is nearly 0 inside: it can judge no better than
+            // 1e-10 there.
             let [theta, n, _] = shortcut.least(500);
             let faint = (theta * transition.v_i.min(transition.v_f)).min(n / mean) < 0.03;
             let judge = if faint { 1e-10 } else { 2e-13 };
@@ -253,8 +255,8 @@ fn many_materials_keep_their_accuracy_up_to_the_border() {
     }
 }
 
-/// `t_f (1 - theta')` at the end vanishes on `2 a_2 + a_3 = -0.99`, a line of the grid: only the rounding of the coordinates decides.
-/// Velocities from exact rational arithmetic.
+/// `t_f (1 - theta')` at the end vanishes on `2 a_2 + a_3 = -0.99`, a line of the grid: only the rounding of the
+/// coordinates decides. Velocities from exact rational arithmetic.
 #[test]
 fn regress_points_on_the_border_are_decided_exactly() {
     let landscape = Landscape::new(&PAPER, 0.02, 1e-10);

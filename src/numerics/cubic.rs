@@ -53,8 +53,8 @@ impl ExactCubic {
         c0 + x * (c1 + x * (c2 + x * c3))
     }
 
-    /// Whether the cubic is above 0 (`strict`) or at least 0 everywhere on `[0, 1]`. `rounded` is the same in double: the place of its minimum is good
-    /// enough, since the value there depends on the square of its error.
+    /// Whether the cubic is above 0 (`strict`) or at least 0 everywhere on `[0, 1]`. `rounded` is the same in double:
+    /// the place of its minimum is good enough, since the value there depends on the square of its error.
     pub fn is_positive(&self, rounded: &Cubic, strict: bool) -> bool {
         [0.0, 1.0, rounded.minimum()].iter().all(|&x| {
             let value = self.at(x).high;
@@ -91,7 +91,8 @@ const TRISECTION: [f64; 5] =
 
 /// The zeros of `d[0] + d[1] s + d[2] s^2 + d[3] s^3` with `d[0] > 0`, without branches, to a few digits.
 ///
-/// Found as reciprocals, so that a vanishing leading coefficient only sends a zero to infinity: it comes out very large or infinite.
+/// Found as reciprocals, so that a vanishing leading coefficient only sends a zero to infinity: it comes out very large
+/// or infinite.
 #[inline(always)]
 pub fn cubic_zeros(d: [f64; 4]) -> Zeros<3> {
     let scale = 1.0 / d[0];
@@ -117,7 +118,8 @@ pub fn cubic_zeros(d: [f64; 4]) -> Zeros<3> {
     let u = if excess > 0.0 { cardano } else { 2.0 * root * g };
     let u = if big_r > 0.0 { -u } else { u };
     let y = u - third;
-    // The quadratic that is left, y^2 - 2 mean y + product: divided from the low end for a large zero, from the high end for a small one.
+    // The quadratic that is left, y^2 - 2 mean y + product: divided from the low end for a large zero, from the high
+    // end for a small one.
     let large = (y * y * y).abs() > r.abs();
     let rest = 3.0 * third + y;
     let product = if large { -r / y } else { q + y * rest };
@@ -134,7 +136,8 @@ pub fn cubic_zeros(d: [f64; 4]) -> Zeros<3> {
     }
 }
 
-/// The zeros of `c + b x + a x^2`, without branches and without cancellation; those at infinity come out very large, infinite or NaN.
+/// The zeros of `c + b x + a x^2`, without branches and without cancellation; those at infinity come out very large,
+/// infinite or NaN.
 #[inline(always)]
 pub fn quadratic_zeros([c, b, a]: [f64; 3]) -> Zeros<2> {
     let half = -0.5 * b;

@@ -7,7 +7,8 @@ use crate::numerics::elementary::{exp, ln};
 use crate::numerics::gauss::Rule;
 use crate::numerics::lanes::{LANES, fold};
 
-/// Constants of one panel: `tau = constant + a ln n + slope ln theta`, both polynomials in powers of the distance `delta` from the panel's centre.
+/// Constants of one panel: `tau = constant + a ln n + slope ln theta`, both polynomials in powers of the distance
+/// `delta` from the panel's centre.
 pub(super) struct Slice {
     pub constant: f64,
     pub a: f64,

@@ -1,6 +1,7 @@
 //! One cubic shortcut: its two polynomials, whether it is feasible, and its least velocity.
 //!
-//! In `x = t/t_f`: `theta = theta_0 + A_2 x + A_3 x^2 + A_4 x^3` and `n = t_f (1 - theta') = t_f - dtheta/dx`, so `v = n/(t_f theta)`.
+//! In `x = t/t_f`: `theta = theta_0 + A_2 x + A_3 x^2 + A_4 x^3` and `n = t_f (1 - theta') = t_f - dtheta/dx`, so `v =
+//! n/(t_f theta)`.
 
 use multiversion::multiversion;
 
@@ -94,7 +95,8 @@ impl<'a> Path<'a> {
         surplus
     }
 
-    /// `Infeasible` where theta or v falls to 0 or below, `BelowBound` where only `v >= 1` fails, else `Ok`; decided in double-double.
+    /// `Infeasible` where theta or v falls to 0 or below, `BelowBound` where only `v >= 1` fails, else `Ok`; decided in
+    /// double-double.
     fn exact_status(&self) -> Status {
         let surplus = self.surplus(self.ends.t_f);
         if !self.exact_n().is_positive(&self.n, true) || !self.exact_theta().is_positive(&self.theta, true) {
@@ -157,7 +159,8 @@ impl<'a> Path<'a> {
 #[inline(always)]
 fn is_faint(cubic: &Cubic, x: f64, loss: f64) -> bool {
     let [c0, c1, c2, c3] = cubic.c;
-    !(loss * cubic.at(x) > 4.0 * f64::EPSILON * (c0.abs() + c1.abs() + c2.abs() + c3.abs()))
+    let sound = loss * cubic.at(x) > 4.0 * f64::EPSILON * (c0.abs() + c1.abs() + c2.abs() + c3.abs());
+    !sound
 }
 
 /// Sign of the least value of a polynomial: -1, +1, or 0 where rounding leaves doubt.
@@ -175,8 +178,8 @@ fn sign(cubic: &Cubic) -> f64 {
 
 /// Status and, where asked for, least velocity on `[0, t_f]` of eight shortcuts.
 ///
-/// Feasibility follows from the stationary minima of theta, of `n` and of `n - t_f theta`; the few that rounding leaves in doubt are decided in
-/// double-double.
+/// Feasibility follows from the stationary minima of theta, of `n` and of `n - t_f theta`; the few that rounding leaves
+/// in doubt are decided in double-double.
 pub(super) fn screen(ends: &Ends, a_2: &Lanes, a_3: &Lanes, v_min: Option<&mut Lanes>) -> [Status; LANES] {
     let signs = signs(ends, a_2, a_3);
     let mut status = [Status::Infeasible; LANES];
@@ -220,9 +223,10 @@ fn signs(ends: &Ends, a_2: &Lanes, a_3: &Lanes) -> [Lanes; 3] {
     signs
 }
 
-/// `v = n/(t_f theta) >= m` where the cubic `n - m t_f theta` is not negative. The minimum of that cubic gives the next, lower `m`: Dinkelbach's
-/// method (Management Science 13, 492, 1967), which falls to the least ratio and doubles its digits with each step. Returns the least velocities,
-/// their places, and 1 where rounding shows; infeasible lanes hold no meaning.
+/// `v = n/(t_f theta) >= m` where the cubic `n - m t_f theta` is not negative. The minimum of that cubic gives the
+/// next, lower `m`: Dinkelbach's method (Management Science 13, 492, 1967), which falls to the least ratio and doubles
+/// its digits with each step. Returns the least velocities, their places, and 1 where rounding shows; infeasible lanes
+/// hold no meaning.
 #[multiversion(targets(
     "x86_64+avx+avx2+bmi1+bmi2+avx512f+avx512bw+avx512cd+avx512dq+avx512vl",
     "x86_64+avx+avx2+bmi1+bmi2"
@@ -255,8 +259,8 @@ fn least_velocities(ends: &Ends, a_2: &Lanes, a_3: &Lanes) -> (Lanes, Lanes, Lan
     (v_min, place, faint)
 }
 
-/// Coordinates of this size are not feasible for any time that is meant: the quadratic `n >= 0` has the mean `t_f - rise`, so its ends are at most nine
-/// times that. Their squares do not overflow below it.
+/// Coordinates of this size are not feasible for any time that is meant: the quadratic `n >= 0` has the mean `t_f -
+/// rise`, so its ends are at most nine times that. Their squares do not overflow below it.
 const WILD: f64 = 1e100;
 
 /// More steps than the doubling of digits can use.

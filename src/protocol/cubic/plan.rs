@@ -1,7 +1,9 @@
-//! One panel for each of eight shortcuts at a time: the zeros and the power map that suits most of a landscape, without a branch.
+//! One panel for each of eight shortcuts at a time: the zeros and the power map that suits most of a landscape, without
+//! a branch.
 //!
-//! The same estimate as in [`rules`](super::rules), restricted to what is cheap: the straight rule, and the maps `x = r ± s^2`, `s^4`, `s^8` about the
-//! shadow of the most hindering zero on the real axis beyond the nearer end. Where that asks for many nodes, `rules` looks further.
+//! The same estimate as in [`rules`](super::rules), restricted to what is cheap: the straight rule, and the maps `x = r
+//! ± s^2`, `s^4`, `s^8` about the shadow of the most hindering zero on the real axis beyond the nearer end. Where that
+//! asks for many nodes, `rules` looks further.
 
 use multiversion::multiversion;
 
@@ -33,7 +35,8 @@ pub(super) type Block = [f64; BLOCK];
 /// Largest map tried.
 const MOST_SQUARINGS: u32 = 3;
 
-/// Chooses the panels of the shortcuts `(a_2[i], a_3[i])`, all feasible. No better map is sought from the focal sum `plain` on.
+/// Chooses the panels of the shortcuts `(a_2[i], a_3[i])`, all feasible. No better map is sought from the focal sum
+/// `plain` on.
 #[multiversion(targets(
     "x86_64+avx+avx2+bmi1+bmi2+avx512f+avx512bw+avx512cd+avx512dq+avx512vl",
     "x86_64+avx+avx2+bmi1+bmi2"
@@ -68,10 +71,10 @@ pub(super) fn plan(ends: &Ends, a_2: &Block, a_3: &Block, plain: f64) -> Plan {
         near[i] = gap[i];
         far[i] = gap[i] + 1.0;
     }
-    for k in 0..ZEROS {
+    for re in &mut re {
         for i in 0..BLOCK {
-            let end = if side[i] > 0.0 { 1.0 - re[k][i] } else { re[k][i] };
-            re[k][i] = gap[i] + end;
+            let end = if side[i] > 0.0 { 1.0 - re[i] } else { re[i] };
+            re[i] = gap[i] + end;
         }
     }
     let (mut squarings, mut from, mut to) = ([0.0; BLOCK], [0.0; BLOCK], [0.0; BLOCK]);

@@ -1,9 +1,11 @@
-//! Which quadrature a shortcut needs: chosen from the zeros of theta and of `1 - theta'` before the first node is spent.
+//! Which quadrature a shortcut needs: chosen from the zeros of theta and of `1 - theta'` before the first node is
+//! spent.
 //!
-//! The integrand of the work has poles where `theta = 0` and logarithms where `theta = 0` or `theta' = 1`. On an interval, Gauss-Legendre
-//! converges like `rho^(-2n)`, `rho` the Bernstein ellipse through the nearest singularity. Where that is slow, a change of variable moves the
-//! singularities away: `x = r ± s^p` about a real zero `r` beyond an end (roots only, no transcendental function), or `x = c + h sinh y` over a
-//! complex pair `c ± i h`. Where neither does, the interval is cut.
+//! The integrand of the work has poles where `theta = 0` and logarithms where `theta = 0` or `theta' = 1`. On an
+//! interval, Gauss-Legendre converges like `rho^(-2n)`, `rho` the Bernstein ellipse through the nearest singularity.
+//! Where that is slow, a change of variable moves the singularities away: `x = r ± s^p` about a real zero `r` beyond an
+//! end (roots only, no transcendental function), or `x = c + h sinh y` over a complex pair `c ± i h`. Where neither
+//! does, the interval is cut.
 
 use multiversion::multiversion;
 
@@ -17,7 +19,8 @@ use crate::numerics::lanes::{LANES, Lanes, least};
 pub(super) enum Map {
     /// `delta = s`.
     Line,
-    /// `delta = side (gap - s^(2^squarings))`: about a zero at `centre + side gap` beyond the end `centre`, `side = ±1`.
+    /// `delta = side (gap - s^(2^squarings))`: about a zero at `centre + side gap` beyond the end `centre`, `side =
+    /// ±1`.
     Power {
         /// Which end: +1 the upper, -1 the lower.
         side: f64,
@@ -92,7 +95,8 @@ impl Accuracy {
     }
 }
 
-/// The zeros of theta and of `1 - theta'` of one shortcut, filled up to a full set of lanes with places too far away to matter.
+/// The zeros of theta and of `1 - theta'` of one shortcut, filled up to a full set of lanes with places too far away to
+/// matter.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Zeros {
     re: Lanes,
@@ -105,7 +109,8 @@ pub(super) const ZEROS: usize = 5;
 /// Zeros are not put farther away than this.
 pub(super) const FAR: f64 = 1e9;
 
-/// Zeros of theta and of `1 - theta'` for several shortcuts side by side: cheaper than [`Zeros::of`], and not as good for a close pair at the start.
+/// Zeros of theta and of `1 - theta'` for several shortcuts side by side: cheaper than [`Zeros::of`], and not as good
+/// for a close pair at the start.
 #[inline(always)]
 pub(super) fn zeros(path: &Path) -> cubic::Zeros<ZEROS> {
     let (theta, n) = path.about_end();
@@ -153,7 +158,8 @@ fn clamp(x: f64) -> f64 {
 }
 
 impl Zeros {
-    /// The zeros of one shortcut: those of theta from its expansions about the start and about the end, each good on its own side.
+    /// The zeros of one shortcut: those of theta from its expansions about the start and about the end, each good on
+    /// its own side.
     pub fn of(path: &Path) -> Zeros {
         let (theta, n) = path.about_end();
         let (start, end, turns) = (cubic_zeros(path.about_start().0), cubic_zeros(theta), quadratic_zeros(n));
@@ -187,8 +193,8 @@ pub(super) fn choose(zeros: &Zeros, low: f64, high: f64, accuracy: &Accuracy, de
     }
 }
 
-/// The map with the largest Bernstein ellipse, and its focal sum. A costlier map must be clearly better: `focal - 2` goes like the inverse square of the
-/// number of nodes.
+/// The map with the largest Bernstein ellipse, and its focal sum. A costlier map must be clearly better: `focal - 2`
+/// goes like the inverse square of the number of nodes.
 #[multiversion(targets(
     "x86_64+avx+avx2+bmi1+bmi2+avx512f+avx512bw+avx512cd+avx512dq+avx512vl",
     "x86_64+avx+avx2+bmi1+bmi2"
@@ -225,14 +231,16 @@ fn best_panel(zeros: &Zeros, low: f64, high: f64, accuracy: &Accuracy) -> (Panel
     (best, largest)
 }
 
-/// The straight rule, expanded about the end that is nearer to the most hindering zero: the polynomials are small there.
+/// The straight rule, expanded about the end that is nearer to the most hindering zero: the polynomials are small
+/// there.
 #[inline(always)]
 fn line(zeros: &Zeros, low: f64, high: f64) -> Panel {
     let centre = if 2.0 * zeros.re[hindrance(zeros, low, high)] > low + high { high } else { low };
     Panel { centre, map: Map::Line, from: low - centre, to: high - centre, nodes: 0 }
 }
 
-/// The least sum of the distances of the places `(re, im)` from both ends of `[from, to]`, in units of half its length: 2 on the interval itself.
+/// The least sum of the distances of the places `(re, im)` from both ends of `[from, to]`, in units of half its length:
+/// 2 on the interval itself.
 #[inline(always)]
 fn focal(re: &Lanes, im: &Lanes, from: f64, to: f64) -> f64 {
     2.0 * least(&distances(re, im, from, to)) / (to - from).abs()
@@ -252,15 +260,15 @@ fn distances(re: &Lanes, im: &Lanes, from: f64, to: f64) -> Lanes {
 /// Distance of the nearest real zero beyond the end on that side.
 #[inline(always)]
 fn real_gap(zeros: &Zeros, end: f64, side: f64) -> f64 {
-    let mut gaps = [FAR; LANES];
-    for i in 0..LANES {
-        let gap = side * (zeros.re[i] - end);
-        gaps[i] = if zeros.im[i] == 0.0 && gap > 0.0 { gap } else { FAR };
+    let mut gaps = zeros.re.map(|re| side * (re - end));
+    for (gap, im) in gaps.iter_mut().zip(zeros.im) {
+        *gap = if im == 0.0 && *gap > 0.0 { *gap } else { FAR };
     }
     least(&gaps)
 }
 
-/// Tries the power maps about the real zero a `gap` beyond the upper (`side = 1`) or the lower end, as long as they gain.
+/// Tries the power maps about the real zero a `gap` beyond the upper (`side = 1`) or the lower end, as long as they
+/// gain.
 #[allow(clippy::too_many_arguments)]
 #[inline(always)]
 fn power(zeros: &Zeros, low: f64, high: f64, side: f64, gap: f64, plain: f64, best: &mut Panel, largest: &mut f64) {
@@ -271,10 +279,7 @@ fn power(zeros: &Zeros, low: f64, high: f64, side: f64, gap: f64, plain: f64, be
     }
     // Distances from the zero, to be rooted again and again.
     let (mut near, mut far) = (gap, gap + length);
-    let (mut re, mut im) = (zeros.re, zeros.im);
-    for i in 0..LANES {
-        re[i] = gap + side * (end - re[i]);
-    }
+    let (mut re, mut im) = (zeros.re.map(|re| gap + side * (end - re)), zeros.im);
     for squarings in 1..=3 {
         (near, far) = (near.sqrt(), far.sqrt());
         for i in 0..LANES {
