@@ -7,7 +7,7 @@ use std::sync::mpsc::sync_channel;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use super::check::Sweep;
-use super::plan::{Plan, footer, job};
+use super::plan::{Plan, footer};
 use crate::dataset::{DatasetError, Folder, Layout, encode};
 use crate::table::{Optima, Sheet, Signal, Stopped, Work};
 
@@ -62,7 +62,7 @@ pub fn run(sweep: &Sweep, folder: &Folder, threads: usize, signal: &Signal) -> R
     let optima = Optima::new(plan.optima, sweep.bounded, sweep.optimum_rtol());
     let mut outcome = Outcome { tables: Vec::new(), work: Work::default() };
     for (request, table) in sweep.requests.iter().zip(&plan.tables) {
-        let Some(job) = job(sweep, request, &optima, signal) else { continue };
+        let Some(job) = sweep.job(request, &optima, signal) else { continue };
         let layout = Layout::new(request.table, &request.selection, &sweep.grid);
         let mut done = TableOutcome::default();
         let failure = Mutex::new(None);

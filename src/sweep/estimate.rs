@@ -5,7 +5,7 @@ use std::time::{Duration, Instant};
 
 use super::check::{Request, Sweep};
 use super::engine::RunError;
-use super::plan::{Plan, footer, job};
+use super::plan::{Plan, footer};
 use crate::dataset::{DatasetError, Layout, encode};
 use crate::table::{OPTIMUM_AXES, Optima, Sheet, Signal};
 
@@ -49,7 +49,7 @@ fn samples(rows: u64, length: u64) -> impl Iterator<Item = Range<u64>> {
 
 fn table(sweep: &Sweep, request: &Request, plan: &Plan, optima: &Optima) -> Result<Estimate, RunError> {
     let signal = Signal::default();
-    let Some(job) = job(sweep, request, optima, &signal) else { return Ok(Estimate { seconds: 0.0, bytes: 0.0 }) };
+    let Some(job) = sweep.job(request, optima, &signal) else { return Ok(Estimate { seconds: 0.0, bytes: 0.0 }) };
     let layout = Layout::new(request.table, &request.selection, &sweep.grid);
     let manifest = plan.manifest(sweep);
     let measure = |rows: Range<u64>| -> Result<usize, RunError> {

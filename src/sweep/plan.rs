@@ -41,20 +41,22 @@ impl Plan {
     }
 }
 
-/// The job of one table of a sweep; `None` if its rows cannot be counted, which a checked sweep excludes.
-pub fn job<'a>(sweep: &'a Sweep, request: &'a Request, optima: &'a Optima, signal: &'a Signal) -> Option<Job<'a>> {
-    let rows = sweep.grid.project(request.table.axes())?;
-    let tuples = rows.tuples(OPTIMUM_AXES);
-    Some(Job {
-        grid: &sweep.grid,
-        rows,
-        tuples,
-        selection: &request.selection,
-        bounded: sweep.bounded,
-        rtol: request.rtol,
-        optima,
-        signal,
-    })
+impl Sweep {
+    /// The job of one of its tables; `None` if the rows cannot be counted, which a checked sweep excludes.
+    pub fn job<'a>(&'a self, request: &'a Request, optima: &'a Optima, signal: &'a Signal) -> Option<Job<'a>> {
+        let rows = self.grid.project(request.table.axes())?;
+        let tuples = rows.tuples(OPTIMUM_AXES);
+        Some(Job {
+            grid: &self.grid,
+            rows,
+            tuples,
+            selection: &request.selection,
+            bounded: self.bounded,
+            rtol: request.rtol,
+            optima,
+            signal,
+        })
+    }
 }
 
 /// What a part says of itself.
