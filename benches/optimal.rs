@@ -3,9 +3,9 @@
 //! `cargo bench --bench optimal`. The cases: 2,000 random accelerations (a, b in 0.005 … 0.1, v_i in 2 … 50, v_f/v_i in 2 … 100, t_f in 0.1 … 1.2
 //! t_cross), and all rows of `tests/reference/optimal.csv`, which hold the hard corners.
 
-mod support;
 #[path = "../tests/reference/mod.rs"]
 mod reference;
+mod support;
 
 use std::hint::black_box;
 
@@ -15,8 +15,7 @@ use slipsweep::protocol::optimal::solve;
 use support::{median, one_ln};
 
 const RUNS: usize = 15;
-const ONLY_CROSS: Wanted =
-    Wanted { cross: true, hold: false, cheapest: false, min: false, turn: false, free: false };
+const ONLY_CROSS: Wanted = Wanted { cross: true, hold: false, cheapest: false, min: false, turn: false, free: false };
 
 /// One problem: the transition, its time, and whether `v >= 1`.
 type Case = (Transition, f64, bool);

@@ -101,7 +101,11 @@ fn no_shortcut_on_a_fine_grid_costs_less() {
         let size = found.a_2.abs().max(found.a_3.abs());
         for reach in [1e-4, 1e-2, 0.3, 3.0] {
             let least = scan(&transition, t_f, bounded, (found.a_2, found.a_3), reach * size, 81);
-            assert!(least >= found.work * (1.0 - 2e-12), "{transition:?} {t_f} {bounded}: {least} below {}", found.work);
+            assert!(
+                least >= found.work * (1.0 - 2e-12),
+                "{transition:?} {t_f} {bounded}: {least} below {}",
+                found.work
+            );
         }
         assert!(found.gap > 0.0, "{found:?}");
     }

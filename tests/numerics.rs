@@ -26,12 +26,9 @@ fn reference_elementary_functions() {
         worst(rows.iter().filter_map(|row| Some(ulps(f(row.number("x")), row.optional(column)?))))
     };
     assert!(rows.len() > 250);
-    for (column, f, budget) in [
-        ("ln", ln as fn(f64) -> f64, 1.0),
-        ("ln_1p", ln_1p, 1.0),
-        ("exp", exp, 1.0),
-        ("exp_m1", exp_m1, 2.0),
-    ] {
+    for (column, f, budget) in
+        [("ln", ln as fn(f64) -> f64, 1.0), ("ln_1p", ln_1p, 1.0), ("exp", exp, 1.0), ("exp_m1", exp_m1, 2.0)]
+    {
         let error = error(column, f);
         assert!(error <= budget, "{column}: {error} ulp");
     }
@@ -42,7 +39,10 @@ fn elementary_functions_stay_within_an_ulp_of_the_libm_crate() {
     let mut x = 1e-3f64;
     while x < 700.0 {
         assert!(ulps(ln(x), libm::log(x)) <= 1.0, "ln {x}");
-        assert!(ulps(ln_1p(x), libm::log1p(x)) <= 1.0 && ulps(ln_1p(-x / 701.0), libm::log1p(-x / 701.0)) <= 1.0, "ln_1p {x}");
+        assert!(
+            ulps(ln_1p(x), libm::log1p(x)) <= 1.0 && ulps(ln_1p(-x / 701.0), libm::log1p(-x / 701.0)) <= 1.0,
+            "ln_1p {x}"
+        );
         assert!(ulps(exp(x), libm::exp(x)) <= 1.0 && ulps(exp(-x), libm::exp(-x)) <= 1.0, "exp {x}");
         assert!(ulps(exp_m1(x), libm::expm1(x)) <= 2.0 && ulps(exp_m1(-x), libm::expm1(-x)) <= 2.0, "exp_m1 {x}");
         x *= 1.000_71;
@@ -60,12 +60,20 @@ fn reference_turning_function_is_good_to_a_few_ulp_over_the_whole_line() {
         let found = turning(w);
         assert!(ulps(found.ln_u, expected) <= 4.0, "ln U({w}) = {} against {expected}", found.ln_u);
         // (U - 1)/w = (z + w^2/2)/w, by an expression without cancellation where that one cancels.
-        let slope = if w.abs() > 1e-3 { expected.exp_m1() / w } else { 1.0 + w / 3.0 + w * w / 36.0 - w * w * w / 270.0 };
-        assert!((found.slope - slope).abs() <= 8.0 * f64::EPSILON * slope, "slope at {w}: {} against {slope}", found.slope);
+        let slope =
+            if w.abs() > 1e-3 { expected.exp_m1() / w } else { 1.0 + w / 3.0 + w * w / 36.0 - w * w * w / 270.0 };
+        assert!(
+            (found.slope - slope).abs() <= 8.0 * f64::EPSILON * slope,
+            "slope at {w}: {} against {slope}",
+            found.slope
+        );
         // Eight at once have the bits of one by one, whatever their neighbours are.
         lanes[i % LANES] = w;
         let (ln_u, slopes) = turning_lanes(&lanes);
-        assert_eq!((ln_u[i % LANES].to_bits(), slopes[i % LANES].to_bits()), (found.ln_u.to_bits(), found.slope.to_bits()));
+        assert_eq!(
+            (ln_u[i % LANES].to_bits(), slopes[i % LANES].to_bits()),
+            (found.ln_u.to_bits(), found.slope.to_bits())
+        );
     }
 }
 

@@ -29,11 +29,7 @@ fn relative(found: f64, expected: f64) -> f64 {
 }
 
 fn transition(row: &reference::Row) -> Transition {
-    Transition {
-        law: Law { a: row.number("a"), b: row.number("b") },
-        v_i: row.number("v_i"),
-        v_f: row.number("v_f"),
-    }
+    Transition { law: Law { a: row.number("a"), b: row.number("b") }, v_i: row.number("v_i"), v_f: row.number("v_f") }
 }
 
 #[test]
@@ -71,7 +67,11 @@ fn reference_optimal_protocols_are_good_to_the_last_digits_that_t_f_allows() {
                 assert!(error <= budget, "{name} at rtol {rtol}: {found} off by {error:.1e} > {budget:.1e} in {row:?}");
             }
             let hold = (value.hold_time - row.number("hold_time")).abs();
-            assert!(hold <= budget(doubt.sqrt() * 1e-3) * t_f, "hold_time {} off by {hold:.1e} in {row:?}", value.hold_time);
+            assert!(
+                hold <= budget(doubt.sqrt() * 1e-3) * t_f,
+                "hold_time {} off by {hold:.1e} in {row:?}",
+                value.hold_time
+            );
         }
     }
 }
@@ -145,7 +145,11 @@ fn for_b_equal_a_the_crossover_is_elementary() {
         let (mut low, mut high) = (0.0, 50.0);
         while (high - low) > 1e-15 * high {
             let z: f64 = 0.5 * (low + high);
-            if a * (z.exp_m1() - z) > 1.0 - v_i / v_f { high = z } else { low = z }
+            if a * (z.exp_m1() - z) > 1.0 - v_i / v_f {
+                high = z
+            } else {
+                low = z
+            }
             if 0.5 * (low + high) == low || 0.5 * (low + high) == high {
                 break;
             }
@@ -190,9 +194,8 @@ fn paper_equations_integrated_from_our_start_arrive_with_our_work() {
         let tau = |v: f64, theta: f64| 1.0 + law.a * v.ln() + law.b * theta.ln();
         let steps = 20_000;
         let h = found.hold_time / f64::from(steps);
-        let held: f64 = (0..steps)
-            .map(|i| tau(1.0, 1.0 - (1.0 - 1.0 / v_i) * (-(f64::from(i) + 0.5) * h).exp()) * h)
-            .sum();
+        let held: f64 =
+            (0..steps).map(|i| tau(1.0, 1.0 - (1.0 - 1.0 / v_i) * (-(f64::from(i) + 0.5) * h).exp()) * h).sum();
         let beta = -(law.a + tau(found.v_start, theta_c)) / theta_c;
         let start = SVector::<f64, 3>::new(theta_c, beta, 0.0);
         let rest = t_f - found.hold_time;
@@ -237,7 +240,8 @@ fn the_hamiltonian_is_the_derivative_of_the_work() {
         let h = 1e-4 * t_f;
         let work = |t: f64| optimum(&transition, t, true).work;
         // Fourth-order difference.
-        let difference = (work(t_f - 2.0 * h) - 8.0 * work(t_f - h) + 8.0 * work(t_f + h) - work(t_f + 2.0 * h)) / (12.0 * h);
+        let difference =
+            (work(t_f - 2.0 * h) - 8.0 * work(t_f - h) + 8.0 * work(t_f + h) - work(t_f + 2.0 * h)) / (12.0 * h);
         let hamiltonian = optimum(&transition, t_f, true).hamiltonian;
         assert!(relative(difference, hamiltonian) < 1e-8, "{transition:?} {t_f}: {difference} against {hamiltonian}");
     }
@@ -313,11 +317,8 @@ fn every_random_case_has_an_answer_that_two_accuracies_share() {
             _ => (a * numbers.log_uniform(1.0, 10.0)).min(0.5),
         };
         let v = if numbers.next() < 0.5 { 1.0 + numbers.log_uniform(1e-3, 1.0) } else { numbers.log_uniform(2.0, 1e4) };
-        let ratio = if numbers.next() < 0.3 {
-            1.0 + numbers.log_uniform(1e-6, 1.0)
-        } else {
-            numbers.log_uniform(1.1, 1e6)
-        };
+        let ratio =
+            if numbers.next() < 0.3 { 1.0 + numbers.log_uniform(1e-6, 1.0) } else { numbers.log_uniform(1.1, 1e6) };
         let (v_i, v_f) = if numbers.next() < 0.5 { (v, v * ratio) } else { (v * ratio, v) };
         let transition = Transition { law: Law { a, b }, v_i, v_f };
         let bounded = numbers.next() < 0.7;
@@ -326,7 +327,12 @@ fn every_random_case_has_an_answer_that_two_accuracies_share() {
             (true, true) => ((v_i - v_f) / (v_i * (v_f - 1.0))).ln_1p(),
             (true, false) => 1.0 / v_f - 1.0 / v_i,
         };
-        let t_f = least + if numbers.next() < 0.5 { numbers.log_uniform(1e-9, 1e3) } else { numbers.log_uniform(1e-4, 10.0) * a / v_i };
+        let t_f = least
+            + if numbers.next() < 0.5 {
+                numbers.log_uniform(1e-9, 1e3)
+            } else {
+                numbers.log_uniform(1e-4, 10.0) * a / v_i
+            };
         let rough = solve(&transition, t_f, bounded, 1e-9);
         counts[rough.status as usize] += 1;
         assert_ne!(rough.status, Status::NotConverged, "{transition:?} {t_f:e} {bounded}");

@@ -35,8 +35,7 @@ pub(super) fn approach(landscape: &Landscape, least_velocity: f64, effort: &mut 
                 ([-moments.gradient[0], -moments.gradient[1]], Some(moments.work))
             }
         };
-        let along =
-            [shape[0][0] * keep[0] + shape[0][1] * keep[1], shape[1][0] * keep[0] + shape[1][1] * keep[1]];
+        let along = [shape[0][0] * keep[0] + shape[0][1] * keep[1], shape[1][0] * keep[0] + shape[1][1] * keep[1]];
         let length = (keep[0] * along[0] + keep[1] * along[1]).sqrt();
         if length.is_nan() || length <= 1e-300 || work.is_some_and(|work| length < CLOSE * work.abs()) {
             break;
@@ -87,12 +86,7 @@ fn violated(landscape: &Landscape, least_velocity: f64, [a_2, a_3]: [f64; 2]) ->
 }
 
 /// Newton's method with halved steps. `None` where the descent runs into the border of the admissible set.
-pub(super) fn descend(
-    landscape: &Landscape,
-    least_velocity: f64,
-    start: Place,
-    effort: &mut Effort,
-) -> Option<Place> {
+pub(super) fn descend(landscape: &Landscape, least_velocity: f64, start: Place, effort: &mut Effort) -> Option<Place> {
     let mut place = start;
     let mut here = landscape.moments(place.a_2, place.a_3, effort);
     for _ in 0..MOST_STEPS {

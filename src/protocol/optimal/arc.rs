@@ -36,8 +36,8 @@ pub(super) enum Chart {
         theta_a: f64,
         /// `ln u` at the anchor.
         z_a: f64,
-        /// `C theta_a`.
-        c_a: f64,
+        /// Friction at the anchor with `u = 1`, `1 + (b - a) ln theta_a`.
+        friction_a: f64,
         /// Coordinate of the start, at most 0.
         y_start: f64,
         /// Coordinate of the end, at most 0.
@@ -97,7 +97,7 @@ impl Arc {
     pub fn c(&self) -> f64 {
         match self.chart {
             Chart::Turning { theta_h, .. } => -self.friction_at_turn(theta_h) / theta_h,
-            Chart::Direct { theta_a, c_a, .. } => c_a / theta_a,
+            Chart::Direct { theta_a, z_a, friction_a, .. } => (self.law.a * phi(z_a) - friction_a) / theta_a,
         }
     }
 
@@ -123,10 +123,10 @@ impl Arc {
                 };
                 Some((at(x_start)?, at(x_end)?))
             }
-            Chart::Direct { z_a, c_a, y_start, y_end, .. } => {
+            Chart::Direct { z_a, friction_a, y_start, y_end, .. } => {
                 let phi_a = phi(z_a);
                 let at = |y: f64| {
-                    let e = phi_a + ((self.law.b - self.law.a) * y + c_a * exp_m1(y)) / self.law.a;
+                    let e = direct_e(&self.law, phi_a, friction_a, y, exp(y));
                     (e >= 0.0).then(|| turning((2.0 * e).sqrt().copysign(z_a)))
                 };
                 Some((at(y_start)?, at(y_end)?))
@@ -140,8 +140,8 @@ impl Arc {
             Chart::Turning { theta_h, x_start, x_end, x_squares } => {
                 self.turning_sums(theta_h, x_start, x_end, x_squares, tolerance)
             }
-            Chart::Direct { theta_a, z_a, c_a, y_start, y_end } => {
-                self.direct_sums(theta_a, z_a, c_a, y_start, y_end, tolerance)
+            Chart::Direct { theta_a, z_a, friction_a, y_start, y_end } => {
+                self.direct_sums(theta_a, z_a, friction_a, y_start, y_end, tolerance)
             }
         };
         (sums.time.is_finite() && sums.work.is_finite()).then_some(sums)
@@ -169,7 +169,7 @@ impl Arc {
         panels(p_start, length, &singular, tolerance, |middle, half, rule| turning_kernel(&slice, middle, half, rule))
     }
 
-    fn direct_sums(&self, theta_a: f64, z_a: f64, c_a: f64, y_start: f64, y_end: f64, tolerance: f64) -> Sums {
+    fn direct_sums(&self, theta_a: f64, z_a: f64, friction_a: f64, y_start: f64, y_end: f64, tolerance: f64) -> Sums {
         // The turning point lies at least ln 2 above the anchor; other zeros of E are complex.
         let singular = [(std::f64::consts::LN_2, 0.0), (y_end.min(y_start), std::f64::consts::FRAC_PI_2)];
         let slice = DirectSlice {
@@ -178,7 +178,7 @@ impl Arc {
             ln_theta_a: ln(theta_a),
             phi_a: phi(z_a),
             slope_a: exp_m1(z_a),
-            c_a,
+            friction_a,
             sign: 1f64.copysign(z_a),
         };
         panels(y_start, y_end - y_start, &singular, tolerance, |middle, half, rule| {
@@ -218,7 +218,8 @@ fn panels(
     };
     let rule = rule(LANES * (nodes / LANES as f64).ceil().max(1.0) as usize);
     let half = 0.5 * length / f64::from(count);
-    let mut total = Sums { time: 0.0, lag: 0.0, work: 0.0, sensitivity: 0.0, swing: 0.0, friction_min: f64::INFINITY, nodes: 0 };
+    let mut total =
+        Sums { time: 0.0, lag: 0.0, work: 0.0, sensitivity: 0.0, swing: 0.0, friction_min: f64::INFINITY, nodes: 0 };
     for panel in 0..count {
         let sums = kernel(start + half * f64::from(2 * panel + 1), half, rule);
         total.time += sums.time;
@@ -277,6 +278,12 @@ pub(super) fn omega(law: &Law, c_h: f64, x2: f64) -> f64 {
     (2.0 / law.a * (c_h / (1.0 + x2) + (law.a - law.b) * (ln_1p(x2) / x2))).sqrt()
 }
 
+/// `E` in the direct chart, `C theta_a = a phi_a - friction_a` put in so that a large `C` cancels nothing; `grow` is `e^y`.
+#[inline(always)]
+fn direct_e(law: &Law, phi_a: f64, friction_a: f64, y: f64, grow: f64) -> f64 {
+    phi_a * grow + ((law.b - law.a) * y - friction_a * exp_m1(y)) / law.a
+}
+
 /// Constants of the kernel of the turning chart.
 struct TurningSlice {
     law: Law,
@@ -286,7 +293,10 @@ struct TurningSlice {
     sigma: f64,
 }
 
-#[multiversion(targets("x86_64+avx+avx2+bmi1+bmi2+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx+avx2+bmi1+bmi2"))]
+#[multiversion(targets(
+    "x86_64+avx+avx2+bmi1+bmi2+avx512f+avx512bw+avx512cd+avx512dq+avx512vl",
+    "x86_64+avx+avx2+bmi1+bmi2"
+))]
 fn turning_kernel(arc: &TurningSlice, middle: f64, half: f64, rule: &Rule) -> Sums {
     let Law { a, b } = arc.law;
     let (mut time, mut lag, mut work, mut sensitivity) = ([0.0; LANES], [0.0; LANES], [0.0; LANES], [0.0; LANES]);
@@ -342,11 +352,14 @@ struct DirectSlice {
     ln_theta_a: f64,
     phi_a: f64,
     slope_a: f64,
-    c_a: f64,
+    friction_a: f64,
     sign: f64,
 }
 
-#[multiversion(targets("x86_64+avx+avx2+bmi1+bmi2+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx+avx2+bmi1+bmi2"))]
+#[multiversion(targets(
+    "x86_64+avx+avx2+bmi1+bmi2+avx512f+avx512bw+avx512cd+avx512dq+avx512vl",
+    "x86_64+avx+avx2+bmi1+bmi2"
+))]
 fn direct_kernel(arc: &DirectSlice, middle: f64, half: f64, rule: &Rule) -> Sums {
     let Law { a, b } = arc.law;
     let (mut time, mut lag, mut work, mut sensitivity) = ([0.0; LANES], [0.0; LANES], [0.0; LANES], [0.0; LANES]);
@@ -355,10 +368,9 @@ fn direct_kernel(arc: &DirectSlice, middle: f64, half: f64, rule: &Rule) -> Sums
         let (mut w, mut grow, mut ln_theta) = ([0.0; LANES], [0.0; LANES], [0.0; LANES]);
         for i in 0..LANES {
             let y = middle + half * x[i];
-            let m = exp_m1(y);
-            grow[i] = 1.0 + m;
+            grow[i] = exp(y);
             ln_theta[i] = arc.ln_theta_a + y;
-            w[i] = arc.sign * (2.0 * (arc.phi_a + ((b - a) * y + arc.c_a * m) / a)).sqrt();
+            w[i] = arc.sign * (2.0 * direct_e(&arc.law, arc.phi_a, arc.friction_a, y, grow[i])).sqrt();
         }
         let (z, slope) = turning_lanes(&w);
         for i in 0..LANES {

@@ -133,11 +133,8 @@ fn deceleration(survey: &mut Survey, wanted: Wanted, times: &mut CrossoverTimes)
     }
     let turns = problem.friction_end() > b - a;
     if wanted.turn && turns {
-        (times.t_turn, times.work_turn) = if problem.rises() {
-            survey.measure(problem.extremal(0.0, None))
-        } else {
-            (Some(0.0), Some(0.0))
-        };
+        (times.t_turn, times.work_turn) =
+            if problem.rises() { survey.measure(problem.extremal(0.0, None)) } else { (Some(0.0), Some(0.0)) };
     }
     if wanted.free && problem.bounded && turns && 1.0 + b * ln(problem.theta_0) > b - a {
         if let Some([rising, falling]) = problem.free_window() {

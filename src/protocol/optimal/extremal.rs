@@ -175,8 +175,7 @@ impl Problem {
         // d ln theta_h/d ln theta_c from C(theta_h) = C_leaving(theta_c); the hold's own time cancels against the start of the arc.
         let m = (1.0 + law.a - law.b + law.b * z) / theta * theta_h / (c_h + law.a - law.b);
         let end_term = self.theta_1 / (exp_m1(end.ln_u));
-        let rate =
-            Rate::Hold { gain: direction * m * rest / theta, inner: end_term, outer: direction * m };
+        let rate = Rate::Hold { gain: direction * m * rest / theta, inner: end_term, outer: direction * m };
         Some(Extremal { hold_time: time, theta_s: theta, arc: Arc { law, chart }, start, end, rate })
     }
 
@@ -200,8 +199,13 @@ impl Problem {
             };
             return Some(Extremal { hold_time: 0.0, theta_s: self.theta_0, arc, start, end, rate });
         }
-        let chart =
-            Chart::Direct { theta_a: self.theta_0, z_a: z_0, c_a, y_start: 0.0, y_end: -ln_1p(self.fall) };
+        let chart = Chart::Direct {
+            theta_a: self.theta_0,
+            z_a: z_0,
+            friction_a: self.friction_a(),
+            y_start: 0.0,
+            y_end: -ln_1p(self.fall),
+        };
         let arc = Arc { law, chart };
         let (start, end) = arc.ends()?;
         Some(Extremal { hold_time: 0.0, theta_s: self.theta_0, arc, start, end, rate: Rate::Direct { gain: 1.0 } })
@@ -261,7 +265,8 @@ impl Problem {
             };
             return Some(Extremal { hold_time, theta_s, arc, start, end, rate });
         }
-        let chart = Chart::Direct { theta_a: self.theta_1, z_a: z_1, c_a, y_start: d, y_end: 0.0 };
+        let chart =
+            Chart::Direct { theta_a: self.theta_1, z_a: z_1, friction_a: self.friction_a(), y_start: d, y_end: 0.0 };
         let arc = Arc { law, chart };
         let (start, end) = arc.ends()?;
         Some(Extremal { hold_time, theta_s, arc, start, end, rate: rising })
