@@ -44,10 +44,11 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let outcome = done.map_err(|error| explain(error, caught, arguments))?;
     let seconds = start.elapsed().as_secs_f64();
 
-    let mut digests = Vec::new();
-    for table in &plan.tables {
-        digests.push(Digest::read(&folder, table).map_err(Failure::failed)?);
+    if arguments.quiet && !arguments.strict {
+        return Ok(());
     }
+    let read = plan.tables.iter().map(|table| Digest::read(&folder, table));
+    let digests: Vec<Digest> = read.collect::<Result<_, _>>().map_err(Failure::failed)?;
     if !arguments.quiet {
         let mut text = String::new();
         for ((table, digest), done) in plan.tables.iter().zip(&digests).zip(&outcome.tables) {
