@@ -146,12 +146,22 @@ impl<'a> Path<'a> {
         ((if first { start } else { end }) / self.ends.t_f, if first { 0.0 } else { 1.0 })
     }
 
-    /// Velocity at `x` from 32 digits, for where `n` or theta is so small that rounding shows.
+    /// The least velocity, found near `x`, from 32 digits: for where `n` or theta is so small that rounding shows.
     ///
-    /// Rounding hardly moves the place of the least velocity, and the velocity there depends on the square of that.
+    /// In double the velocity is flat within rounding, so the place is known to half the digits only. Dinkelbach's
+    /// step takes it from the stationary point of a cubic instead, which is good to all of them.
     fn exact_velocity(&self, x: f64) -> f64 {
         let t_f = DoubleDouble::new(self.ends.t_f);
-        (self.exact_n().at(x) / (t_f * self.exact_theta().at(x))).high
+        let at = |x: f64| (self.exact_n().at(x) / (t_f * self.exact_theta().at(x))).high;
+        let mut v = at(x);
+        for _ in 0..MOST_STEPS {
+            let lower = at(self.surplus(v * self.ends.t_f).minimum());
+            if lower.is_nan() || lower >= v {
+                break;
+            }
+            v = lower;
+        }
+        v
     }
 }
 
@@ -202,7 +212,7 @@ pub(super) fn screen(ends: &Ends, a_2: &Lanes, a_3: &Lanes, v_min: Option<&mut L
         let (rounded, place, faint) = least_velocities(ends, a_2, a_3);
         *v_min = rounded;
         for i in (0..LANES).filter(|&i| faint[i] > 0.0 && status[i] != Status::Infeasible) {
-            v_min[i] = Path::new(ends, a_2[i], a_3[i]).exact_velocity(place[i]);
+            v_min[i] = Path::new(ends, a_2[i], a_3[i]).exact_least_velocity(place[i]);
         }
     }
     status
