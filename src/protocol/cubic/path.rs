@@ -212,7 +212,7 @@ pub(super) fn screen(ends: &Ends, a_2: &Lanes, a_3: &Lanes, v_min: Option<&mut L
         let (rounded, place, faint) = least_velocities(ends, a_2, a_3);
         *v_min = rounded;
         for i in (0..LANES).filter(|&i| faint[i] > 0.0 && status[i] != Status::Infeasible) {
-            v_min[i] = Path::new(ends, a_2[i], a_3[i]).exact_least_velocity(place[i]);
+            v_min[i] = Path::new(ends, a_2[i], a_3[i]).exact_velocity(place[i]);
         }
     }
     status
