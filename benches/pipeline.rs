@@ -48,7 +48,8 @@ fn measure(folder: &Path) -> Outcome<()> {
     let rows = Plan::new(&sweep).tables[0].rows as f64;
     let mut least = [f64::INFINITY; 4];
     for _ in 0..ROUNDS {
-        let seconds = [compute(&sweep, 1)?, compute(&sweep, 2)?, pipeline(&sweep, folder, 1)?, pipeline(&sweep, folder, 2)?];
+        let seconds =
+            [compute(&sweep, 1)?, compute(&sweep, 2)?, pipeline(&sweep, folder, 1)?, pipeline(&sweep, folder, 2)?];
         for (least, seconds) in least.iter_mut().zip(seconds) {
             *least = least.min(seconds);
         }

@@ -136,7 +136,7 @@ fn listing(rows: &[Row]) -> String {
         let missing = rows.iter().all(|row| row[place].1 == Cell::Missing);
         if !results_begin && !varies && Quantity::from_name(name).is_some_and(|axis| !axis.has_scale()) {
             common.push(format!("{name} = {}", cell_text(cell)));
-        } else if !missing && !(name == STATUS && !varies) {
+        } else if !missing && (name != STATUS || varies) {
             shown.push(place);
         }
     }

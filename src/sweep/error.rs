@@ -11,22 +11,22 @@ pub struct SpecError {
     /// The line in the file, from 1.
     pub line: Option<usize>,
     /// The key, as in `axes.v_i[2]`; empty if it concerns the whole file.
-    pub key: String,
+    pub key: Box<str>,
     /// What was found.
-    pub found: String,
+    pub found: Box<str>,
     /// What would be right.
-    pub expected: String,
+    pub expected: Box<str>,
     /// What to do.
-    pub help: String,
+    pub help: Box<str>,
 }
 
 impl SpecError {
     /// A fault at `key`, whose place is not known yet.
     pub fn new(
-        key: impl Into<String>,
-        found: impl Into<String>,
-        expected: impl Into<String>,
-        help: impl Into<String>,
+        key: impl Into<Box<str>>,
+        found: impl Into<Box<str>>,
+        expected: impl Into<Box<str>>,
+        help: impl Into<Box<str>>,
     ) -> SpecError {
         SpecError {
             file: None,

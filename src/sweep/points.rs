@@ -43,7 +43,7 @@ pub fn read(path: &Path) -> Result<Factor, SpecError> {
     Ok(Factor { axes: axes.into_iter().map(axis).collect() })
 }
 
-fn fault(found: impl Into<String>, expected: &str, help: &str) -> SpecError {
+fn fault(found: impl Into<Box<str>>, expected: &str, help: &str) -> SpecError {
     SpecError::new("points", found, expected, help)
 }
 
@@ -54,7 +54,7 @@ fn header(place: &impl Display, line: &str) -> Result<Vec<(Quantity, Vec<f64>)>,
         let name = cell.trim().trim_matches('"');
         let Some(quantity) = Quantity::from_name(name) else {
             let error = unknown("points".to_owned(), "axis", name, &Quantity::ALL.map(Quantity::name));
-            return Err(SpecError { found: format!("{place}: {}", error.found), ..error });
+            return Err(SpecError { found: format!("{place}: {}", error.found).into(), ..error });
         };
         if axes.iter().any(|(other, _)| *other == quantity) {
             let found = format!("{place}: column `{name}` is there twice");

@@ -5,9 +5,8 @@ use std::path::PathBuf;
 
 use indexmap::IndexMap;
 use serde::de::value::{MapAccessDeserializer, SeqAccessDeserializer};
-use serde::de::{MapAccess, SeqAccess, Visitor};
+use serde::de::{IgnoredAny, MapAccess, SeqAccess, Visitor};
 use serde::{Deserialize, Deserializer};
-use toml::Value;
 
 /// A sweep spec.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
@@ -21,12 +20,12 @@ pub struct Spec {
     /// A file of points whose columns are axes that vary together; relative to the spec.
     pub points: Option<PathBuf>,
     /// Axes that advance together.
-    pub zip: Option<Value>,
+    pub zip: Option<IgnoredAny>,
     /// Condition of the rows to keep.
     #[serde(rename = "where")]
-    pub condition: Option<Value>,
+    pub condition: Option<IgnoredAny>,
     /// Grids to unite.
-    pub block: Option<Value>,
+    pub block: Option<IgnoredAny>,
     /// What is modelled.
     #[serde(default)]
     pub model: ModelSpec,
@@ -93,13 +92,13 @@ pub struct AxisForm {
     /// Unit of the values.
     pub unit: Option<String>,
     /// An expression of other axes.
-    pub expr: Option<Value>,
+    pub expr: Option<IgnoredAny>,
     /// A Sobol sequence.
-    pub sobol: Option<Value>,
+    pub sobol: Option<IgnoredAny>,
     /// A Latin hypercube.
-    pub lhs: Option<Value>,
+    pub lhs: Option<IgnoredAny>,
     /// Seed of a sampled axis.
-    pub seed: Option<Value>,
+    pub seed: Option<IgnoredAny>,
 }
 
 /// The value of a key of `[tables]`.
