@@ -166,6 +166,13 @@ fn points_vary_together_and_slowest() {
     let work = column("work");
     assert_eq!(work[..2], work[4..]);
     assert_ne!(work[..2], work[2..4]);
+
+    // The same points from Parquet, whole numbers as such, are the same grid.
+    let mut cases = polars::df!("v_f" => [50_i64, 100, 50], "b" => [0.04, 0.05, 0.04]).expect("is a table");
+    let file = fs::File::create(folder.path().join("cases.parquet")).expect("is writable");
+    polars::prelude::ParquetWriter::new(file).finish(&mut cases).expect("is written");
+    fs::write(&path, text.replace("cases.csv", "cases.parquet")).expect("is writable");
+    assert_eq!(Sweep::load(&path).expect("is legal").grid, sweep.grid);
 }
 
 #[test]

@@ -89,7 +89,8 @@ impl Show {
             Show::Lines { rows, start, last } if last.elapsed() >= LINE => {
                 *last = Instant::now();
                 let rate = done as f64 / start.elapsed().as_secs_f64();
-                let left = if done == 0 { "?".to_owned() } else { words::duration((*rows - done) as f64 / rate) };
+                let left =
+                    if done == 0 { "?".to_owned() } else { words::duration(rows.saturating_sub(done) as f64 / rate) };
                 let (done, rows) = (words::count(done), words::count(*rows));
                 // Progress that cannot be told is not worth a failure.
                 let _ =

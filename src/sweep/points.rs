@@ -4,54 +4,96 @@ use std::fmt::Display;
 use std::fs;
 use std::path::Path;
 
+use polars::prelude::{DataType, ParquetReader, SerReader};
+
 use super::error::{SpecError, unknown};
 use crate::grid::{Axis, Factor, Quantity, Scale, Values};
 
-/// Reads the points of a CSV file: a header of axis names, then a point a line. Empty lines and lines that begin with # are passed over.
-///
-/// Values of coefficients are in the units of the model.
+/// Reads the points of a CSV or Parquet file; values of coefficients are in the units of the model.
 pub fn read(path: &Path) -> Result<Factor, SpecError> {
-    let name = path.display();
-    if path.extension().is_none_or(|extension| !extension.eq_ignore_ascii_case("csv")) {
-        let (expected, help) = ("a file whose name ends in .csv", "write the points as CSV");
-        return Err(fault(format!("{name}: not a CSV file"), expected, help));
+    let extension = path.extension().map(|extension| extension.to_ascii_lowercase());
+    let axes = match extension.as_ref().and_then(|extension| extension.to_str()) {
+        Some("csv") => csv(path)?,
+        Some("parquet") => parquet(path)?,
+        _ => {
+            let (expected, help) = ("a file whose name ends in .csv or .parquet", "write the points as CSV");
+            return Err(fault(format!("{}: neither CSV nor Parquet", path.display()), expected, help));
+        }
+    };
+    if axes.iter().all(|axis| axis.1.is_empty()) {
+        let (expected, help) = ("axis names and at least one point", "add points, or remove `points`");
+        return Err(fault(format!("{}: no points", path.display()), expected, help));
     }
-    let text = fs::read_to_string(path).map_err(|error| {
-        fault(
-            format!("cannot read {name}: {error}"),
-            "a readable text file",
-            "check the path; it is relative to the spec",
-        )
-    })?;
+    let axis = |(quantity, values)| Axis { quantity, scale: Scale::Model, values: Values::List(values) };
+    Ok(Factor { axes: axes.into_iter().map(axis).collect() })
+}
+
+/// Columns of a file of points.
+type Columns = Vec<(Quantity, Vec<f64>)>;
+
+/// CSV: a header of axis names, then a point a line. Empty lines and lines that begin with # are passed over.
+fn csv(path: &Path) -> Result<Columns, SpecError> {
+    let name = path.display();
+    let text = fs::read_to_string(path).map_err(|error| unreadable(path, &error))?;
     let mut lines = text
         .lines()
         .enumerate()
         .map(|(index, line)| (format!("{name}:{}", index + 1), line.trim()))
         .filter(|(_, line)| !line.is_empty() && !line.starts_with('#'));
     let mut axes = match lines.next() {
-        Some((place, line)) => header(&place, line)?,
+        // Some programs quote the names of columns.
+        Some((place, line)) => header(&place, line.split(',').map(|cell| cell.trim().trim_matches('"')))?,
         None => Vec::new(),
     };
     for (place, line) in lines {
         point(&place, line, &mut axes)?;
     }
-    if axes.iter().all(|axis| axis.1.is_empty()) {
-        let (expected, help) = ("a header and at least one line of values", "add points, or remove `points`");
-        return Err(fault(format!("{name}: no points"), expected, help));
+    Ok(axes)
+}
+
+/// Parquet: columns of numbers whose names are axes.
+fn parquet(path: &Path) -> Result<Columns, SpecError> {
+    let name = path.display();
+    let file = fs::File::open(path).map_err(|error| unreadable(path, &error))?;
+    let frame = ParquetReader::new(file).finish().map_err(|error| unreadable(path, &error))?;
+    let mut axes = header(&name, frame.columns().iter().map(|column| column.name().as_str()))?;
+    for ((quantity, values), column) in axes.iter_mut().zip(frame.columns()) {
+        let numbers = column.dtype().is_primitive_numeric().then(|| column.cast(&DataType::Float64));
+        let Some(Ok(numbers)) = numbers else {
+            let found = format!("{name}: column `{}` holds {}", quantity.name(), column.dtype());
+            return Err(fault(found, "numbers", "write the column as numbers"));
+        };
+        let numbers = numbers.f64().map_err(|error| unreadable(path, &error))?;
+        for (row, value) in numbers.iter().enumerate() {
+            let place = format!("{name}: row {row} of column `{}`", quantity.name());
+            let Some(value) = value else {
+                return Err(fault(format!("{place}: no value"), "a number", "fill in the value"));
+            };
+            values.push(legal(&place, *quantity, value)?);
+        }
     }
-    let axis = |(quantity, values)| Axis { quantity, scale: Scale::Model, values: Values::List(values) };
-    Ok(Factor { axes: axes.into_iter().map(axis).collect() })
+    Ok(axes)
+}
+
+fn unreadable(path: &Path, error: &dyn Display) -> SpecError {
+    let found = format!("cannot read {}: {error}", path.display());
+    fault(found, "a readable file", "check the path; it is relative to the spec")
+}
+
+fn legal(place: &dyn Display, quantity: Quantity, value: f64) -> Result<f64, SpecError> {
+    if quantity.domain().contains(value) {
+        return Ok(value);
+    }
+    Err(fault(format!("{place}: {value:?} is out of range"), quantity.domain().text, "correct the value"))
 }
 
 fn fault(found: impl Into<Box<str>>, expected: &str, help: &str) -> SpecError {
     SpecError::new("points", found, expected, help)
 }
 
-fn header(place: &impl Display, line: &str) -> Result<Vec<(Quantity, Vec<f64>)>, SpecError> {
-    let mut axes: Vec<(Quantity, Vec<f64>)> = Vec::new();
-    for cell in line.split(',') {
-        // Some programs quote the names of columns.
-        let name = cell.trim().trim_matches('"');
+fn header<'a>(place: &impl Display, names: impl Iterator<Item = &'a str>) -> Result<Columns, SpecError> {
+    let mut axes: Columns = Vec::new();
+    for name in names {
         let Some(quantity) = Quantity::from_name(name) else {
             let error = unknown("points".to_owned(), "axis", name, &Quantity::ALL.map(Quantity::name));
             return Err(SpecError { found: format!("{place}: {}", error.found).into(), ..error });
@@ -75,13 +117,9 @@ fn point(place: &impl Display, line: &str, axes: &mut [(Quantity, Vec<f64>)]) ->
         let place = format!("{place}: column `{}`", quantity.name());
         let Ok(value) = cell.parse::<f64>() else {
             let found = format!("{place}: `{cell}` is not a number");
-            return Err(fault(found, "a number such as 0.03 or 1e-3", "correct the cell"));
+            return Err(fault(found, "a number such as 0.03 or 1e-3", "correct the value"));
         };
-        if !quantity.domain().contains(value) {
-            let found = format!("{place}: {value:?} is out of range");
-            return Err(fault(found, quantity.domain().text, "correct the cell"));
-        }
-        values.push(value);
+        values.push(legal(&place, *quantity, value)?);
     }
     Ok(())
 }
