@@ -1,6 +1,7 @@
 //! The logarithm of the kernels against the alternatives: nanoseconds a value over an array.
 //!
-//! `cargo bench --bench elementary`. `own` chooses its vector width at run time; `wide` when it is compiled (`RUSTFLAGS=-Ctarget-cpu=native` shows it at its best).
+//! `cargo bench --bench elementary`. `own` chooses its vector width at run time; `wide` when it is compiled
+//! (`RUSTFLAGS=-Ctarget-cpu=native` shows it at its best).
 
 mod support;
 

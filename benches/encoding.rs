@@ -1,6 +1,7 @@
 //! Encodings and compressions of the columns of a landscape: nanoseconds and bytes a row, one column alone.
 //!
-//! `cargo bench --bench encoding`. The column is the paper's landscape at t_f = 0.02, 0.037 and 0.049; the least time of five.
+//! `cargo bench --bench encoding`. The column is the paper's landscape at t_f = 0.02, 0.037 and 0.049; the least time
+//! of five.
 
 use std::sync::Arc;
 use std::time::Instant;

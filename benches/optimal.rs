@@ -1,7 +1,7 @@
 //! One optimal solve and one crossover, in units of one scalar `f64::ln` measured in the same run, on one core.
 //!
-//! `cargo bench --bench optimal`. The cases: 2,000 random accelerations (a, b in 0.005 … 0.1, v_i in 2 … 50, v_f/v_i in 2 … 100, t_f in 0.1 … 1.2
-//! t_cross), and all rows of `tests/reference/optimal.csv`, which hold the hard corners.
+//! `cargo bench --bench optimal`. The cases: 2,000 random accelerations (a, b in 0.005 … 0.1, v_i in 2 … 50, v_f/v_i in
+//! 2 … 100, t_f in 0.1 … 1.2 t_cross), and all rows of `tests/reference/optimal.csv`, which hold the hard corners.
 
 #[path = "../tests/reference/mod.rs"]
 mod reference;

@@ -19,7 +19,8 @@ fn relative(found: f64, expected: f64) -> f64 {
     ((found - expected) / expected).abs()
 }
 
-/// Least work over a grid of `n x n` places around `(a_2, a_3)`, at a distance of up to `reach`, among those with `v >= 1` or `v > 0`.
+/// Least work over a grid of `n x n` places around `(a_2, a_3)`, at a distance of up to `reach`, among those with `v >=
+/// 1` or `v > 0`.
 fn scan(transition: &Transition, t_f: f64, bounded: bool, centre: (f64, f64), reach: f64, n: usize) -> f64 {
     let landscape = Landscape::new(transition, t_f, 1e-12);
     let at = |middle: f64, i: usize| middle + reach * (2.0 * i as f64 / (n - 1) as f64 - 1.0);
@@ -125,8 +126,8 @@ fn both_routes_to_the_gap_agree() {
 
 #[test]
 fn the_gap_keeps_its_digits_where_the_difference_has_none() {
-    // Gaps of 1e-13, of which a difference of works has no digit: as v_f approaches v_i they run into their limit along a straight line, so that the
-    // slopes, which rest on the fifth digit of the gap, agree.
+    // Gaps of 1e-13, of which a difference of works has no digit: as v_f approaches v_i they run into their limit along
+    // a straight line, so that the slopes, which rest on the fifth digit of the gap, agree.
     let gap = |change: f64| best(&Transition { v_f: 3.0 * (1.0 + change), ..PAPER }, 1e-3, true).gap;
     let [far, middle, near] = [3e-5, 1e-5, 3e-6].map(gap);
     assert!(relative(near, 1.1741e-13) < 1e-4, "{near:e}");

@@ -25,7 +25,11 @@ fn reference_landscape_points_are_good_to_rtol_up_to_the_border_of_feasibility()
                 let error = ((work[0] - expected_work) / expected_work).abs();
                 assert!(error <= rtol + 4.0 * f64::EPSILON, "work {} off by {error:.1e} at {rtol} in {row:?}", work[0]);
                 let error = ((v_min[0] - expected_v_min) / expected_v_min).abs();
-                assert!(error <= rtol + 4.0 * f64::EPSILON, "v_min {} off by {error:.1e} at {rtol} in {row:?}", v_min[0]);
+                assert!(
+                    error <= rtol + 4.0 * f64::EPSILON,
+                    "v_min {} off by {error:.1e} at {rtol} in {row:?}",
+                    v_min[0]
+                );
             }
         }
     }

@@ -103,7 +103,8 @@ fn dilogarithm_obeys_its_identities() {
     assert!(ulps(dilogarithm(0.5), half) <= 4.0);
     for i in 1..1000 {
         let x = f64::from(i) / 1000.0;
-        // The series, where it converges fast; Landen's form of the square relation elsewhere would need negative arguments.
+        // The series, where it converges fast; Landen's form of the square relation elsewhere would need negative
+        // arguments.
         let series: f64 = (1..4000).rev().map(|k| x.powi(k) / (f64::from(k) * f64::from(k))).sum();
         if x < 0.98 {
             assert!((dilogarithm(x) - series).abs() < 1e-14 * series, "{x}");

@@ -1,4 +1,5 @@
-//! The optimal protocol and its special times against 40-digit tables, the paper's figures, the paper's own equations, and invariants.
+//! The optimal protocol and its special times against 40-digit tables, the paper's figures, the paper's own equations,
+//! and invariants.
 
 mod reference;
 
@@ -45,7 +46,8 @@ fn reference_optimal_protocols_are_good_to_the_last_digits_that_t_f_allows() {
             let below = !bounded && row.number("v_start") < 1.0;
             assert_eq!(solved.status, if below { Status::BelowBound } else { Status::Ok }, "{row:?}");
             assert_eq!(value.strategy.name(), row.text("strategy"), "{row:?}");
-            // t_f is a double: beyond the least time it is known to eps t_f, and so are v and C that depend on what is beyond.
+            // t_f is a double: beyond the least time it is known to eps t_f, and so are v and C that depend on what is
+            // beyond.
             let least = if transition.v_f < transition.v_i {
                 if bounded { t_f - beyond_least(&transition, t_f) } else { 1.0 / transition.v_f - 1.0 / transition.v_i }
             } else {
@@ -129,7 +131,8 @@ fn paper_crossover_is_at_0_037_and_the_start_near_the_bound_at_0_049() {
 
 #[test]
 fn paper_velocities_scale_with_the_inverse_of_small_times() {
-    // v ~ g(t/t_f)/t_f: constant in the limit, ln(v_f/v_i)/t_f; the work grows by a ln 10 a decade for each part of the way.
+    // v ~ g(t/t_f)/t_f: constant in the limit, ln(v_f/v_i)/t_f; the work grows by a ln 10 a decade for each part of the
+    // way.
     let way = (PAPER.v_f / PAPER.v_i).ln();
     let [slow, fast] = [1e-7, 1e-8].map(|t_f| optimum(&PAPER, t_f, true));
     for (t_f, found) in [(1e-7, slow), (1e-8, fast)] {
@@ -159,7 +162,8 @@ fn for_b_equal_a_the_crossover_is_elementary() {
     }
 }
 
-/// The paper's equations with their costate, and the work: `theta' = 1 - theta v`, `beta' = v (b/theta + beta)`, `W' = tau v`, with v from stationarity.
+/// The paper's equations with their costate, and the work: `theta' = 1 - theta v`, `beta' = v (b/theta + beta)`, `W' =
+/// tau v`, with v from stationarity.
 struct Paper(Law);
 
 impl System<f64, SVector<f64, 3>> for Paper {

@@ -17,7 +17,8 @@ const BERNOULLI: [f64; 9] = [
 
 /// `Li_2(x) = -int_0^x ln(1 - y)/y dy` for `0 <= x <= 1`, to a few units in the last place.
 ///
-/// Below one half a series in `-ln(1 - x)`, above it Euler's reflection `Li_2(x) + Li_2(1 - x) = pi^2/6 - ln x ln(1 - x)`.
+/// Below one half a series in `-ln(1 - x)`, above it Euler's reflection `Li_2(x) + Li_2(1 - x) = pi^2/6 - ln x ln(1 -
+/// x)`.
 pub fn dilogarithm(x: f64) -> f64 {
     if x <= 0.5 {
         let l = -ln_1p(-x);

@@ -1,6 +1,8 @@
-//! Double-double arithmetic: an unevaluated sum of two doubles, about 32 digits, for the few places that need the last bit.
+//! Double-double arithmetic: an unevaluated sum of two doubles, about 32 digits, for the few places that need the last
+//! bit.
 //!
-//! Error-free transformations after Dekker (Numer. Math. 18, 224, 1971) and Knuth (TAOCP 2, 4.2.2), without fused multiply-add.
+//! Error-free transformations after Dekker (Numer. Math. 18, 224, 1971) and Knuth (TAOCP 2, 4.2.2), without fused
+//! multiply-add.
 
 use std::ops::{Add, Div, Mul, Neg, Sub};
 

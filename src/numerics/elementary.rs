@@ -1,8 +1,9 @@
 //! `ln`, `ln_1p`, `exp` and `exp_m1` without branches, for loops that the compiler turns into vector instructions.
 //!
-//! Plain IEEE arithmetic and integer operations on bits: no fused multiply-add, no call into the system's library. So a result has the same bits on
-//! every machine and at every vector width, which the functions of the standard library do not promise. Errors stay below one unit in the last
-//! place for `ln`, `ln_1p` and `exp`, below two for `exp_m1` (asserted in `tests/numerics.rs`).
+//! Plain IEEE arithmetic and integer operations on bits: no fused multiply-add, no call into the system's library. So a
+//! result has the same bits on every machine and at every vector width, which the functions of the standard library do
+//! not promise. Errors stay below one unit in the last place for `ln`, `ln_1p` and `exp`, below two for `exp_m1`
+//! (asserted in `tests/numerics.rs`).
 
 /// Leading 41 bits of ln 2: its product with an exponent is exact.
 const LN_2_HIGH: f64 = f64::from_bits(0x3FE6_2E42_FEFA_3800);
@@ -12,8 +13,8 @@ const LN_2_LOW: f64 = 5.497923018708371e-14;
 /// `1.5 * 2^52`: added to a small number it leaves the nearest integer in the low bits.
 const ROUND: f64 = 6755399441055744.0;
 
-/// `(2 atanh s - 2 s)/s^3` in powers of `s^2`, Chebyshev interpolant on `|s| <= (sqrt 2 - 1)/(sqrt 2 + 1)`, truncation 5e-18.
-/// Made by `tests/reference/coefficients.py`.
+/// `(2 atanh s - 2 s)/s^3` in powers of `s^2`, Chebyshev interpolant on `|s| <= (sqrt 2 - 1)/(sqrt 2 + 1)`, truncation
+/// 5e-18. Made by `tests/reference/coefficients.py`.
 const ATANH: [f64; 7] = [
     0.666666666666667,
     0.39999999999899505,

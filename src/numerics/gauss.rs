@@ -23,7 +23,8 @@ pub fn rule(n: usize) -> &'static Rule {
     RULES[n - 1].get_or_init(|| make(n))
 }
 
-/// Newton's method from Tricomi's estimate, the last step in double-double, so that rounding it gives the nearest doubles.
+/// Newton's method from Tricomi's estimate, the last step in double-double, so that rounding it gives the nearest
+/// doubles.
 fn make(n: usize) -> Rule {
     let (mut x, mut w) = (vec![0.0; n], vec![0.0; n]);
     for i in 0..n.div_ceil(2) {
@@ -59,8 +60,8 @@ fn legendre(n: usize, x: DoubleDouble) -> (DoubleDouble, DoubleDouble) {
     let (mut before, mut p) = (DoubleDouble::new(1.0), x);
     for k in 2..=n {
         let k = k as f64;
-        let next = (DoubleDouble::new(2.0 * k - 1.0) * x * p - DoubleDouble::new(k - 1.0) * before)
-            / DoubleDouble::new(k);
+        let next =
+            (DoubleDouble::new(2.0 * k - 1.0) * x * p - DoubleDouble::new(k - 1.0) * before) / DoubleDouble::new(k);
         (before, p) = (p, next);
     }
     let derivative = DoubleDouble::new(n as f64) * (before - x * p) / (DoubleDouble::new(1.0) - x * x);

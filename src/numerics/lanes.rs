@@ -1,7 +1,7 @@
 //! Eight numbers side by side: the unit in which kernels work, whatever the width of the machine's vectors.
 //!
-//! Loops over [`LANES`] are unrolled into vector instructions by the compiler. Sums run lane by lane and are folded in one fixed order, so
-//! a result has the same bits at every vector width.
+//! Loops over [`LANES`] are unrolled into vector instructions by the compiler. Sums run lane by lane and are folded in
+//! one fixed order, so a result has the same bits at every vector width.
 
 /// Lanes of a kernel.
 pub const LANES: usize = 8;

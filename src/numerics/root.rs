@@ -20,15 +20,17 @@ pub struct Root {
     pub probe: Probe,
 }
 
-/// Most probes of one search. Newton's method takes four to eight; a bisection of any bracket of doubles takes fewer than this.
+/// Most probes of one search. Newton's method takes four to eight; a bisection of any bracket of doubles takes fewer
+/// than this.
 const MOST_PROBES: u32 = 200;
 
 /// Finds the root of a rising function inside `(low, high)`, either of which may be infinite, from `start`.
 ///
-/// `probe(x)` returns `None` where the function is not defined; such points count as lying beyond the root on the side named by
-/// `undefined_above`. The search ends with the first probe whose absolute value is at most `enough`: the Newton step from there, whose error
-/// is of the order of `enough^2`, is taken unprobed. It also ends where the bracket has closed to neighbouring doubles with a change of sign
-/// between them: rounding of the function allows no better. It returns `None` if the bracket closes on a place without a change of sign.
+/// `probe(x)` returns `None` where the function is not defined; such points count as lying beyond the root on the side
+/// named by `undefined_above`. The search ends with the first probe whose absolute value is at most `enough`: the
+/// Newton step from there, whose error is of the order of `enough^2`, is taken unprobed. It also ends where the bracket
+/// has closed to neighbouring doubles with a change of sign between them: rounding of the function allows no better. It
+/// returns `None` if the bracket closes on a place without a change of sign.
 pub fn newton(
     mut probe: impl FnMut(f64) -> Option<Probe>,
     start: f64,

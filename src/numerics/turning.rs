@@ -1,10 +1,12 @@
-//! The turning function `U(w)`: the real-analytic solution of `U - 1 - ln U = w^2/2` with the sign of `U - 1` equal to the sign of `w`.
+//! The turning function `U(w)`: the real-analytic solution of `U - 1 - ln U = w^2/2` with the sign of `U - 1` equal to
+//! the sign of `w`.
 //!
-//! `U` joins both real branches of the Lambert function at their branch point: `U = -W_k(-exp(-1 - w^2/2))` with `k = 0` for
-//! `w <= 0` and `k = -1` for `w >= 0`. It is the velocity of a particle that falls back from a turning point, hence the name.
-//! Its nearest singularities are at `|w| = 2 sqrt(pi)`, on the four diagonals of the complex plane.
+//! `U` joins both real branches of the Lambert function at their branch point: `U = -W_k(-exp(-1 - w^2/2))` with `k =
+//! 0` for `w <= 0` and `k = -1` for `w >= 0`. It is the velocity of a particle that falls back from a turning point,
+//! hence the name. Its nearest singularities are at `|w| = 2 sqrt(pi)`, on the four diagonals of the complex plane.
 //!
-//! Three formulas cover the line. Each lane of a vector takes the one of its own argument, so a result never depends on its neighbours.
+//! Three formulas cover the line. Each lane of a vector takes the one of its own argument, so a result never depends on
+//! its neighbours.
 
 use super::elementary::{exp, ln};
 use super::lanes::{LANES, Lanes};
@@ -33,8 +35,8 @@ const LN_U_OVER_W: [f64; 19] = [
     1.2288955865958112e-12,
 ];
 
-/// `U / x` for `w <= -1`, with `x = exp(-1 - w^2/2)`, in powers of `s = 1 - sqrt(1 - e x)`: the square root moves the branch point at
-/// `w = 0` out of the way, so degree 14 leaves 1e-17. Made by `tests/reference/coefficients.py`.
+/// `U / x` for `w <= -1`, with `x = exp(-1 - w^2/2)`, in powers of `s = 1 - sqrt(1 - e x)`: the square root moves the
+/// branch point at `w = 0` out of the way, so degree 14 leaves 1e-17. Made by `tests/reference/coefficients.py`.
 const U_OVER_X: [f64; 15] = [
     1.0,
     0.7357588823428842,
@@ -135,8 +137,8 @@ fn rising(w: f64) -> (f64, f64) {
     (u - (1.0 + e), (u - 1.0) / w)
 }
 
-/// `w >= 1`, theta falls: two Halley steps on `U - 1 - e - ln U` from a rational guess that is within 0.6 % everywhere. The second step is
-/// so short that its logarithm serves for the result too.
+/// `w >= 1`, theta falls: two Halley steps on `U - 1 - e - ln U` from a rational guess that is within 0.6 % everywhere.
+/// The second step is so short that its logarithm serves for the result too.
 #[inline(always)]
 fn falling(w: f64) -> (f64, f64) {
     let e = 0.5 * w * w;

@@ -1,7 +1,8 @@
 //! The border of the admissible set: shortcuts whose velocity touches its least value `m`.
 //!
-//! The border consists of a curve, on which `g = n - m t_f theta` has a double zero at some `x_c` in `[0, 1]` (two linear equations for the two
-//! coefficients), and of two segments, on which `v = m` at an end. Along each piece the work is a function of one number.
+//! The border consists of a curve, on which `g = n - m t_f theta` has a double zero at some `x_c` in `[0, 1]` (two
+//! linear equations for the two coefficients), and of two segments, on which `v = m` at an end. Along each piece the
+//! work is a function of one number.
 
 use super::Place;
 use crate::protocol::Effort;
@@ -38,12 +39,11 @@ pub(super) fn least(landscape: &Landscape, least_velocity: f64, effort: &mut Eff
     let border = Border { landscape, scale: least_velocity * ends[3], ends };
     let mut best: Option<(f64, Place)> = None;
     for piece in [Piece::Touch, Piece::Start, Piece::End] {
-        if let Some((low, high)) = border.range(piece) {
-            if let Some((work, place)) = border.least_on(piece, low, high, effort) {
-                if best.is_none_or(|(least, _)| work < least) {
-                    best = Some((work, place));
-                }
-            }
+        if let Some((low, high)) = border.range(piece)
+            && let Some((work, place)) = border.least_on(piece, low, high, effort)
+            && best.is_none_or(|(least, _)| work < least)
+        {
+            best = Some((work, place));
         }
     }
     best.map(|(_, place)| place)
@@ -95,7 +95,8 @@ impl Border<'_> {
         }
     }
 
-    /// Whether a place is admissible: `g` at least 0 within rounding, theta positive, and friction too (else the work falls without limit as theta does).
+    /// Whether a place is admissible: `g` at least 0 within rounding, theta positive, and friction too (else the work
+    /// falls without limit as theta does).
     fn admissible(&self, place: Place) -> bool {
         let path = self.landscape.path(place.a_2, place.a_3);
         let (g, g_doubt) = path.surplus(self.scale).least();
@@ -103,7 +104,8 @@ impl Border<'_> {
         g >= -4.0 * g_doubt && theta > theta_doubt && self.landscape.pulls(theta)
     }
 
-    /// The range of the parameter that is searched; on a segment the admissible part, which begins at the double zero in its end.
+    /// The range of the parameter that is searched; on a segment the admissible part, which begins at the double zero
+    /// in its end.
     fn range(&self, piece: Piece) -> Option<(f64, f64)> {
         let [_, _, rise, t_f] = self.ends;
         let (corner, inwards) = match piece {
@@ -147,10 +149,10 @@ impl Border<'_> {
         let at = |i: u32| low + (high - low) * f64::from(i) / f64::from(SAMPLES);
         let mut best: Option<(f64, u32)> = None;
         for i in 0..=SAMPLES {
-            if let Some((work, _)) = self.work(piece, at(i), effort) {
-                if best.is_none_or(|(least, _)| work < least) {
-                    best = Some((work, i));
-                }
+            if let Some((work, _)) = self.work(piece, at(i), effort)
+                && best.is_none_or(|(least, _)| work < least)
+            {
+                best = Some((work, i));
             }
         }
         let (work, i) = best?;

@@ -1,7 +1,8 @@
 //! The work of a shortcut above the optimum, without subtracting two works.
 //!
-//! With the value function `V(theta, t)` of the optimal control problem, `W_s - W*` is the integral along the shortcut of what its velocity costs more than
-//! the optimal feedback `v~` would there (docs/theory.md, "The gap without cancellation"):
+//! With the value function `V(theta, t)` of the optimal control problem, `W_s - W*` is the integral along the shortcut
+//! of what its velocity costs more than the optimal feedback `v~` would there (docs/theory.md, "The gap without
+//! cancellation"):
 //!
 //! ```text
 //! W_s - W* = int a [v ln(v/v~) - v + v~] + lambda (v - v~) dt,    lambda >= 0, and 0 unless v~ = 1 is held by the bound.

@@ -6,16 +6,18 @@ use crate::protocol::cubic::Landscape;
 
 /// Cuts of the ellipse, each by about a quarter of its area: from the largest set to rounding.
 const MOST_CUTS: u32 = 500;
-/// The ellipse is small enough where the work can change by no more than this share in it: Newton's method converges from there.
+/// The ellipse is small enough where the work can change by no more than this share in it: Newton's method converges
+/// from there.
 const CLOSE: f64 = 1e-5;
 /// Newton steps; each is halved as often as needed.
 const MOST_STEPS: u32 = 100;
 
 /// A place close to that of least work, by the ellipsoid method; `None` if nothing is admissible.
 ///
-/// A cut through the centre of an ellipse that holds the place sought leaves half of it: where the centre is not admissible, the half in which the
-/// violated polynomial rises, else the half in which the work falls. Along with theta > 0 and `theta' <= 1`, theta is at most `M = theta_0 + t_f`, and the
-/// coefficients of a cubic between 0 and `M` on `[0, 1]` are bounded by Chebyshev's: `|a_2| <= 9 M`, `|a_3| <= 24 M`.
+/// A cut through the centre of an ellipse that holds the place sought leaves half of it: where the centre is not
+/// admissible, the half in which the violated polynomial rises, else the half in which the work falls. Along with theta
+/// > 0 and `theta' <= 1`, theta is at most `M = theta_0 + t_f`, and the coefficients of a cubic between 0 and `M` on
+/// `[0, 1]` are bounded by Chebyshev's: `|a_2| <= 9 M`, `|a_3| <= 24 M`.
 pub(super) fn approach(landscape: &Landscape, least_velocity: f64, effort: &mut Effort) -> Option<Place> {
     let [theta_0, theta_1, _, t_f] = landscape.ends();
     let most = (theta_0 + t_f).max(theta_1);
@@ -61,7 +63,8 @@ fn rising(x: f64, scale: Option<f64>) -> [f64; 2] {
     }
 }
 
-/// The direction from a place on the border into the admissible set: that in which the velocity rises where it is least.
+/// The direction from a place on the border into the admissible set: that in which the velocity rises where it is
+/// least.
 pub(super) fn inwards(landscape: &Landscape, least_velocity: f64, place: Place) -> [f64; 2] {
     let scale = least_velocity * landscape.ends()[3];
     let surplus = landscape.path(place.a_2, place.a_3).surplus(scale);
@@ -70,7 +73,8 @@ pub(super) fn inwards(landscape: &Landscape, least_velocity: f64, place: Place) 
     rising(x, Some(scale))
 }
 
-/// Where an inadmissible shortcut fails worst: the place `x`, and whether it is theta that is not positive. `None` if it is admissible.
+/// Where an inadmissible shortcut fails worst: the place `x`, and whether it is theta that is not positive. `None` if
+/// it is admissible.
 fn violated(landscape: &Landscape, least_velocity: f64, [a_2, a_3]: [f64; 2]) -> Option<(f64, bool)> {
     let t_f = landscape.ends()[3];
     let path = landscape.path(a_2, a_3);

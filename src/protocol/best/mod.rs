@@ -1,8 +1,9 @@
 //! The least-work cubic shortcut, and its gap to the optimum without cancellation.
 //!
-//! The admissible shortcuts form a convex set in the plane of `(a_2, a_3)`: `v >= m` means that the cubic `n - m t_f theta`, linear in the
-//! coefficients, is not negative on `[0, 1]`, with `m = 1` under the bound and `m = 0` without. The least work lies inside, where the gradient vanishes
-//! ([`interior`]), or on the border, where some shortcut touches `v = m` ([`border`]). A small gap is an integral of positive terms ([`excess`]).
+//! The admissible shortcuts form a convex set in the plane of `(a_2, a_3)`: `v >= m` means that the cubic `n - m t_f
+//! theta`, linear in the coefficients, is not negative on `[0, 1]`, with `m = 1` under the bound and `m = 0` without.
+//! The least work lies inside, where the gradient vanishes (`interior`), or on the border, where some shortcut touches
+//! `v = m` (`border`). A small gap is an integral of positive terms (`excess`).
 
 mod border;
 mod excess;
@@ -43,8 +44,9 @@ struct Place {
 
 /// The shortcut of least work over the whole plane where `v >= 1` (`bounded`) or `v > 0`.
 ///
-/// `Infeasible` where no cubic shortcut is admissible. Without the bound `BelowBound` where `v < 1` somewhere; a `v_min` of 0 then means that the
-/// least work is only approached, at the border `v = 0`. `Nonphysical` as for the optimum.
+/// `Infeasible` where no cubic shortcut is admissible. Without the bound `BelowBound` where `v < 1` somewhere; a
+/// `v_min` of 0 then means that the least work is only approached, at the border `v = 0`. `Nonphysical` as for the
+/// optimum.
 pub fn solve(transition: &Transition, t_f: f64, bounded: bool, rtol: f64) -> Solved<Best> {
     let optimum = optimal::solve(transition, t_f, bounded, rtol.min(1e-12));
     let mut effort = optimum.effort;
@@ -89,7 +91,8 @@ pub fn solve(transition: &Transition, t_f: f64, bounded: bool, rtol: f64) -> Sol
     Solved { status, value: Some(value), effort }
 }
 
-/// The place of least work, and whether it lies on the border. A place on the border counts only if work rises from there into the admissible set.
+/// The place of least work, and whether it lies on the border. A place on the border counts only if work rises from
+/// there into the admissible set.
 fn least(landscape: &Landscape, least_velocity: f64, start: Place, effort: &mut Effort) -> Option<(Place, bool)> {
     if let Some(place) = interior::descend(landscape, least_velocity, start, effort) {
         return Some((place, false));

@@ -1,8 +1,8 @@
 //! The cubic shortcuts: `theta = 1/v_i + alpha_2 t + alpha_3 t^2 + alpha_4 t^3`, `v` free to jump at both ends.
 //!
-//! `alpha_4` follows from `theta(t_f) = 1/v_f`. A shortcut is a [`path`] of two polynomials; whether it is feasible is
+//! `alpha_4` follows from `theta(t_f) = 1/v_f`. A shortcut is a `path` of two polynomials; whether it is feasible is
 //! decided from their stationary points before any quadrature is spent, and the quadrature follows from their zeros
-//! ([`rules`]).
+//! (`rules`).
 
 mod kernel;
 mod moments;

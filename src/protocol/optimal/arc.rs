@@ -1,12 +1,14 @@
 //! A regular arc of an extremal, and its quadrature: time, work and the derivative of time.
 //!
-//! Along an arc `C = a v + beta` is constant and `u = theta v` obeys `u - 1 - ln u = E(theta)` with
-//! `E = [1 + (b - a) ln theta + C theta]/a`, so `theta' = 1 - U(w)`, `w^2 = 2 E` (docs/theory.md, "The optimum is a quadrature"). Two charts
-//! cover every arc without cancellation; both refer `E` to a point where it is known:
+//! Along an arc `C = a v + beta` is constant and `u = theta v` obeys `u - 1 - ln u = E(theta)` with `E = [1 + (b - a)
+//! ln theta + C theta]/a`, so `theta' = 1 - U(w)`, `w^2 = 2 E` (docs/theory.md, "The optimum is a quadrature"). Two
+//! charts cover every arc without cancellation; both refer `E` to a point where it is known:
 //!
-//! - the **turning chart** `theta = theta_h/(1 + X^2)`, `X < 0` while theta rises and `X > 0` while it falls, is analytic across the turning
-//!   point and becomes `ln theta` far from it. `X = sigma sinh p` resolves the layer of width `sqrt a` around the turning point;
-//! - the **direct chart** `y = ln(theta/theta_a)` is for arcs that stay a factor of two below their turning point, or have none.
+//! - the **turning chart** `theta = theta_h/(1 + X^2)`, `X < 0` while theta rises and `X > 0` while it falls, is
+//!   analytic across the turning point and becomes `ln theta` far from it. `X = sigma sinh p` resolves the layer of
+//!   width `sqrt a` around the turning point;
+//! - the **direct chart** `y = ln(theta/theta_a)` is for arcs that stay a factor of two below their turning point, or
+//!   have none.
 
 use multiversion::multiversion;
 
@@ -63,7 +65,8 @@ pub(super) struct Sums {
     pub work: f64,
     /// Turning chart: the interior part of `d time/d ln theta_h`. Direct chart: `d time/d z_a`.
     pub sensitivity: f64,
-    /// `int u theta/(1 - u)^2 dt`, from which `d time/d ln u(end)` follows without cancellation where theta rises all the way.
+    /// `int u theta/(1 - u)^2 dt`, from which `d time/d ln u(end)` follows without cancellation where theta rises all
+    /// the way.
     pub swing: f64,
     /// Least friction met at a node.
     pub friction_min: f64,
@@ -134,7 +137,8 @@ impl Arc {
         }
     }
 
-    /// Time, work and sensitivity to relative accuracy `tolerance`; `None` where the arc does not exist (`E < 0` on the way).
+    /// Time, work and sensitivity to relative accuracy `tolerance`; `None` where the arc does not exist (`E < 0` on the
+    /// way).
     pub fn sums(&self, tolerance: f64) -> Option<Sums> {
         let sums = match self.chart {
             Chart::Turning { theta_h, x_start, x_end, x_squares } => {
@@ -256,7 +260,8 @@ fn asinh(x: f64) -> f64 {
 
 /// `asinh(m e^{i pi/4})` as `(real, imaginary)`.
 fn asinh_diagonal(m: f64) -> (f64, f64) {
-    // sinh(x + iy) = sinh x cos y + i cosh x sin y with equal parts q = m/sqrt 2: sinh^2 x solves s^2 + s (1 - 2 q^2) - q^2 = 0.
+    // sinh(x + iy) = sinh x cos y + i cosh x sin y with equal parts q = m/sqrt 2: sinh^2 x solves s^2 + s (1 - 2 q^2) -
+    // q^2 = 0.
     let q2 = 0.5 * m * m;
     let h = 0.5 - q2;
     let root = (h * h + q2).sqrt();
@@ -278,7 +283,8 @@ pub(super) fn omega(law: &Law, c_h: f64, x2: f64) -> f64 {
     (2.0 / law.a * (c_h / (1.0 + x2) + (law.a - law.b) * (ln_1p(x2) / x2))).sqrt()
 }
 
-/// `E` in the direct chart, `C theta_a = a phi_a - friction_a` put in so that a large `C` cancels nothing; `grow` is `e^y`.
+/// `E` in the direct chart, `C theta_a = a phi_a - friction_a` put in so that a large `C` cancels nothing; `grow` is
+/// `e^y`.
 #[inline(always)]
 fn direct_e(law: &Law, phi_a: f64, friction_a: f64, y: f64, grow: f64) -> f64 {
     phi_a * grow + ((law.b - law.a) * y - friction_a * exp_m1(y)) / law.a

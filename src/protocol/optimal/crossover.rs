@@ -54,11 +54,12 @@ pub struct Wanted {
     pub free: bool,
 }
 
-/// All special times of a transition, to relative accuracy `rtol`; `bounded` says whether `v >= 1` is imposed (`t_min` and the window without
-/// hold do not exist otherwise).
+/// All special times of a transition, to relative accuracy `rtol`; `bounded` says whether `v >= 1` is imposed (`t_min`
+/// and the window without hold do not exist otherwise).
 ///
-/// Each is one quadrature, no search over `t_f` (docs/theory.md, "Crossover times"). The status is `Nonphysical` where friction falls to
-/// `max(0, b - a)` on one of the paths, `Infeasible` outside the domain of the law, `NotConverged` where a quadrature failed.
+/// Each is one quadrature, no search over `t_f` (docs/theory.md, "Crossover times"). The status is `Nonphysical` where
+/// friction falls to `max(0, b - a)` on one of the paths, `Infeasible` outside the domain of the law, `NotConverged`
+/// where a quadrature failed.
 pub fn solve(transition: &Transition, bounded: bool, rtol: f64, wanted: Wanted) -> (Status, CrossoverTimes, Effort) {
     let mut times = CrossoverTimes::default();
     let Some(problem) = Problem::of(transition, bounded) else {
@@ -136,10 +137,13 @@ fn deceleration(survey: &mut Survey, wanted: Wanted, times: &mut CrossoverTimes)
         (times.t_turn, times.work_turn) =
             if problem.rises() { survey.measure(problem.extremal(0.0, None)) } else { (Some(0.0), Some(0.0)) };
     }
-    if wanted.free && problem.bounded && turns && 1.0 + b * ln(problem.theta_0) > b - a {
-        if let Some([rising, falling]) = problem.free_window() {
-            times.t_free_in = survey.measure(Some(rising)).0;
-            times.t_free_out = survey.measure(Some(falling)).0;
-        }
+    if wanted.free
+        && problem.bounded
+        && turns
+        && 1.0 + b * ln(problem.theta_0) > b - a
+        && let Some([rising, falling]) = problem.free_window()
+    {
+        times.t_free_in = survey.measure(Some(rising)).0;
+        times.t_free_out = survey.measure(Some(falling)).0;
     }
 }

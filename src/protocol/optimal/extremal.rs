@@ -1,12 +1,15 @@
-//! The one-parameter family of extremals between two contact lifetimes, ordered so that the total time is monotone in the parameter.
+//! The one-parameter family of extremals between two contact lifetimes, ordered so that the total time is monotone in
+//! the parameter.
 //!
-//! The parameter `q` is 0 where the turning point sits at the end of larger theta (docs/theory.md, "One parameter for every case"):
+//! The parameter `q` is 0 where the turning point sits at the end of larger theta (docs/theory.md, "One parameter for
+//! every case"):
 //!
-//! - falling problems (`theta_0 >= theta_1`): `q > 0` is `ln u(0+)`, theta falls at once; `q < 0` is the scaled start of the turning chart,
-//!   theta rises first; below `q_hold` a hold of `q_hold - q` comes before the arc. Time falls with `q`.
-//! - rising problems (`theta_0 < theta_1`): `q < 0` is `ln u(t_f-)`, theta still rises at the end (with the bound it is stretched so that
-//!   `v(t_f-) = 1` lies at minus infinity); `q > 0` is the scaled end of the turning chart, theta falls at the end; above `q_hold` the hold
-//!   is `q - q_hold` longer than the shortest protocol. Time rises with `q`.
+//! - falling problems (`theta_0 >= theta_1`): `q > 0` is `ln u(0+)`, theta falls at once; `q < 0` is the scaled start
+//!   of the turning chart, theta rises first; below `q_hold` a hold of `q_hold - q` comes before the arc. Time falls
+//!   with `q`.
+//! - rising problems (`theta_0 < theta_1`): `q < 0` is `ln u(t_f-)`, theta still rises at the end (with the bound it is
+//!   stretched so that `v(t_f-) = 1` lies at minus infinity); `q > 0` is the scaled end of the turning chart, theta
+//!   falls at the end; above `q_hold` the hold is `q - q_hold` longer than the shortest protocol. Time rises with `q`.
 
 use super::arc::{Arc, Chart, Sums, phi};
 use super::hold;
@@ -125,8 +128,8 @@ impl Problem {
         }
     }
 
-    /// Both arcs of a rising problem that start at `v = 1` from `theta_0` without a hold: theta still rising at the end, and falling.
-    /// `None` if they turn below `theta_1`.
+    /// Both arcs of a rising problem that start at `v = 1` from `theta_0` without a hold: theta still rising at the
+    /// end, and falling. `None` if they turn below `theta_1`.
     pub fn free_window(&self) -> Option<[Extremal; 2]> {
         let law = self.law;
         let ln_theta = ln(self.theta_0);
@@ -172,7 +175,8 @@ impl Problem {
         let chart = Chart::Turning { theta_h, x_start: -xi.sqrt(), x_end: (xi + x_squares).sqrt(), x_squares };
         let (start, end) = Arc { law, chart }.ends()?;
         let c_h = 1.0 + (law.b - law.a) * ln(theta_h);
-        // d ln theta_h/d ln theta_c from C(theta_h) = C_leaving(theta_c); the hold's own time cancels against the start of the arc.
+        // d ln theta_h/d ln theta_c from C(theta_h) = C_leaving(theta_c); the hold's own time cancels against the start
+        // of the arc.
         let m = (1.0 + law.a - law.b + law.b * z) / theta * theta_h / (c_h + law.a - law.b);
         let end_term = self.theta_1 / (exp_m1(end.ln_u));
         let rate = Rate::Hold { gain: direction * m * rest / theta, inner: end_term, outer: direction * m };
@@ -295,7 +299,8 @@ impl Problem {
         Some(Extremal { hold_time, theta_s, arc, start, end, rate })
     }
 
-    /// For a rising problem: the hold time and `ln(theta_s/theta_1)` where the arc starts, from `kappa = theta_1 (C - C_leaving(theta_1))`.
+    /// For a rising problem: the hold time and `ln(theta_s/theta_1)` where the arc starts, from `kappa = theta_1 (C -
+    /// C_leaving(theta_1))`.
     fn leaving(&self, kappa: f64) -> Option<(f64, f64)> {
         let all = -ln_1p(self.rise());
         if !self.bounded {
@@ -350,8 +355,8 @@ impl Extremal {
         }
     }
 
-    /// How far the time (beyond the least) is from the one wanted, as a rising function of the parameter: the logarithm of their ratio, or
-    /// their relative difference where a hold makes time linear in the parameter.
+    /// How far the time (beyond the least) is from the one wanted, as a rising function of the parameter: the logarithm
+    /// of their ratio, or their relative difference where a hold makes time linear in the parameter.
     pub fn probe(&self, problem: &Problem, sums: &Sums, beyond: f64) -> Probe {
         let time = self.time_beyond(problem, sums);
         let rate = match self.rate {
@@ -379,9 +384,11 @@ fn edge(law: &Law, theta_h: f64, x: f64, at: &Turning) -> f64 {
     2.0 * theta_h / (grow * grow * super::arc::omega(law, c_h, x * x) * at.slope)
 }
 
-/// `xi = theta_h/theta - 1` from `a E = (a - b) ln(1 + xi) - C theta xi` at `theta`; `None` where there is no turning point above.
+/// `xi = theta_h/theta - 1` from `a E = (a - b) ln(1 + xi) - C theta xi` at `theta`; `None` where there is no turning
+/// point above.
 ///
-/// `excess` is `a E >= 0` and `pull` is `-C theta`. Newton's method from the tangent at 0 converges monotonically on either side of `a = b`.
+/// `excess` is `a E >= 0` and `pull` is `-C theta`. Newton's method from the tangent at 0 converges monotonically on
+/// either side of `a = b`.
 fn turning_distance(law: &Law, excess: f64, pull: f64) -> Option<f64> {
     let bend = law.a - law.b;
     if pull <= 0.0 || pull + bend <= 0.0 {

@@ -20,8 +20,8 @@ pub(super) fn work(law: &Law, theta_0: f64, time: f64) -> f64 {
     if time <= 0.0 {
         return 0.0;
     }
-    // ln theta(t) has its singularity at t = ln(1 - theta_0) < 0: as long as the hold is no longer than that is away, few nodes do.
-    // Beyond, theta has about doubled and a difference of dilogarithms does not cancel.
+    // ln theta(t) has its singularity at t = ln(1 - theta_0) < 0: as long as the hold is no longer than that is away,
+    // few nodes do. Beyond, theta has about doubled and a difference of dilogarithms does not cancel.
     let integral = if time <= -ln_1p(-theta_0) {
         let rule = rule(16);
         let sum: f64 = rule.x.iter().zip(&rule.w).map(|(x, w)| w * ln(age(theta_0, 0.5 * time * (1.0 + x)).0)).sum();
@@ -46,15 +46,17 @@ fn aged(theta: f64, rest: f64) -> f64 {
     }
 }
 
-/// `C` of the arc that leaves the bound at `theta`: `a - (1 + a + b ln theta)/theta`, rising with theta where `tau > b - a`.
+/// `C` of the arc that leaves the bound at `theta`: `a - (1 + a + b ln theta)/theta`, rising with theta where `tau > b
+/// - a`.
 pub(super) fn c_leaving(law: &Law, theta: f64, ln_theta: f64) -> f64 {
     law.a - (1.0 + law.a + law.b * ln_theta) / theta
 }
 
 /// Where an arc with a given `C` leaves the bound, relative to a reference `theta_r`: `ln(theta_c/theta_r)`.
 ///
-/// `kappa` is `theta_r (C - C_leaving(theta_r))`, so that nothing cancels where the arc leaves near the reference. The equation is
-/// `(A - kappa)(e^d - 1) - b d - kappa = 0` with `A = 1 + a + b ln theta_r`, convex and rising at the root sought. `None` if there is no root.
+/// `kappa` is `theta_r (C - C_leaving(theta_r))`, so that nothing cancels where the arc leaves near the reference. The
+/// equation is `(A - kappa)(e^d - 1) - b d - kappa = 0` with `A = 1 + a + b ln theta_r`, convex and rising at the root
+/// sought. `None` if there is no root.
 pub(super) fn leave(law: &Law, ln_theta_r: f64, kappa: f64) -> Option<f64> {
     let slope = 1.0 + law.a + law.b * ln_theta_r - kappa;
     if slope <= 0.0 {

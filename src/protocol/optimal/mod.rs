@@ -1,7 +1,7 @@
 //! The optimal protocol: least work of friction from `(v_i, 1/v_i)` to `(v_f, 1/v_f)` in time `t_f`.
 //!
-//! It is a quadrature and one scalar root (docs/theory.md): a regular [`arc`] along which `C` is conserved, under the bound `v >= 1` after a
-//! [`hold`]; the family of such [`extremal`]s has one parameter, in which the time is monotone.
+//! It is a quadrature and one scalar root (docs/theory.md): a regular `arc` along which `C` is conserved, under the
+//! bound `v >= 1` after a `hold`; the family of such `extremal`s has one parameter, in which the time is monotone.
 
 mod arc;
 pub mod crossover;
@@ -61,8 +61,9 @@ pub struct Optimum {
 
 /// Solves one optimal protocol to relative accuracy `rtol`, with `v >= 1` where `bounded`.
 ///
-/// `Infeasible` where no protocol is fast enough under the bound (`t_f < t_min`), or where an argument is outside its domain
-/// (`a > 0`, `b >= 0`, `v_i, v_f > 1`, `t_f > 0`, all finite). Without the bound, `BelowBound` where `v(0+) < 1`.
+/// `Infeasible` where no protocol is fast enough under the bound (`t_f < t_min`), or where an argument is outside its
+/// domain (`a > 0`, `b >= 0`, `v_i, v_f > 1`, `t_f > 0`, all finite). Without the bound, `BelowBound` where `v(0+) <
+/// 1`.
 pub fn solve(transition: &Transition, t_f: f64, bounded: bool, rtol: f64) -> Solved<Optimum> {
     let Some(problem) = Problem::of(transition, bounded).filter(|_| t_f > 0.0 && t_f.is_finite()) else {
         return Solved { status: Status::Infeasible, value: None, effort: Effort::default() };
@@ -79,8 +80,9 @@ pub(super) struct Feedback {
     pub pressure: f64,
 }
 
-/// Optimal feedback: what the optimal protocol does now, at contact lifetime `theta` with `time_left` to reach `theta_f`; `fall` is
-/// `theta/theta_f - 1`. `None` where no protocol arrives in time, or where the solver could not certify its answer.
+/// Optimal feedback: what the optimal protocol does now, at contact lifetime `theta` with `time_left` to reach
+/// `theta_f`; `fall` is `theta/theta_f - 1`. `None` where no protocol arrives in time, or where the solver could not
+/// certify its answer.
 #[allow(clippy::too_many_arguments)]
 pub(super) fn feedback(
     law: Law,

@@ -8,10 +8,12 @@ use crate::numerics::root::newton;
 use crate::numerics::turning::turning;
 use crate::protocol::{Effort, Solved, Status};
 
-/// A probe this close to the wanted time (relative) is the last: the Newton step from it leaves an error of the order of its square.
+/// A probe this close to the wanted time (relative) is the last: the Newton step from it leaves an error of the order
+/// of its square.
 const ENOUGH: f64 = 1e-8;
 
-/// Tolerance of a quadrature whose result is to be good to `rtol`: what is left over covers rounding and the last Newton step.
+/// Tolerance of a quadrature whose result is to be good to `rtol`: what is left over covers rounding and the last
+/// Newton step.
 pub(super) fn quadrature_tolerance(rtol: f64) -> f64 {
     0.1 * rtol
 }
@@ -72,7 +74,8 @@ pub(super) fn solve(problem: &Problem, t_f: f64, rtol: f64, start: Option<f64>) 
     let (Some(root), Some((probed, sums))) = (root, last) else { return unsolved(effort) };
     let Some(found) = problem.extremal(root.x, q_hold) else { return unsolved(effort) };
 
-    // W* is stationary in the parameter up to C dt: the trapezium of C over the last step leaves an error of third order.
+    // W* is stationary in the parameter up to C dt: the trapezium of C over the last step leaves an error of third
+    // order.
     let (c_probed, c) = (probed.arc.c(), found.arc.c());
     let lag = beyond - probed.time_beyond(problem, &sums);
     let work = probed.work(problem, &sums) - 0.5 * (c_probed + c) * lag;
@@ -123,8 +126,8 @@ fn shortest(problem: &Problem, t_min: f64) -> Solved<Optimum> {
     Solved { status, value: Some(value), effort: Effort::default() }
 }
 
-/// A first parameter. For `b = a` time is linear in `ln u` along an arc; that line, `v = const` for very short times, and a hold for long
-/// ones come close.
+/// A first parameter. For `b = a` time is linear in `ln u` along an arc; that line, `v = const` for very short times,
+/// and a hold for long ones come close.
 fn guess(problem: &Problem, q_hold: Option<f64>, beyond: f64) -> f64 {
     let law = problem.law;
     let friction = problem.friction_a();
