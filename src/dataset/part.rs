@@ -20,6 +20,9 @@ use crate::table::{Kind, Sheet};
 /// Rows of a row group: what a reader skips by the statistics of a column.
 const ROWS_PER_GROUP: usize = 1 << 16;
 
+/// What a row of a landscape takes about, so that the buffer of a part seldom grows.
+const BYTES_PER_ROW: usize = 9;
+
 /// Strength of compression; see docs/performance.md.
 pub const ZSTD_LEVEL: i32 = 1;
 
@@ -37,7 +40,11 @@ pub fn encode(layout: &Layout, grid: &Projection<'_>, sheet: &Sheet, footer: &Fo
         .set_data_page_row_count_limit(ROWS_PER_GROUP)
         .build();
     add_encoded_arrow_schema_to_metadata(&layout.schema, &mut properties);
-    let mut file = SerializedFileWriter::new(Vec::new(), schema.root_schema_ptr(), Arc::new(properties))?;
+    let mut file = SerializedFileWriter::new(
+        Vec::with_capacity(sheet.status.len() * BYTES_PER_ROW),
+        schema.root_schema_ptr(),
+        Arc::new(properties),
+    )?;
     let rows = sheet.status.len();
     for start in (0..rows).step_by(ROWS_PER_GROUP) {
         let range = start..rows.min(start + ROWS_PER_GROUP);
@@ -131,23 +138,20 @@ type CodedRuns = (Numbers, Vec<(u32, usize)>, Vec<(u32, usize)>);
 /// the runs of presence; `None` for a column that is better written number by number.
 fn as_runs(cells: &[f64]) -> Option<CodedRuns> {
     let changes_allowed = cells.len().div_ceil(16);
-    let mut numbers = Numbers::default();
-    let mut codes: Vec<(u32, usize)> = Vec::new();
-    let mut last = None;
-    for &cell in cells.iter().filter(|cell| !cell.is_nan()) {
-        if last != Some(cell.to_bits()) {
-            if codes.len() == changes_allowed {
-                return None;
-            }
-            codes.push((numbers.code(cell), 0));
-            last = Some(cell.to_bits());
+    let mut runs: Vec<(u64, usize)> = Vec::new();
+    for bits in cells.iter().filter(|cell| !cell.is_nan()).map(|cell| cell.to_bits()) {
+        match runs.last_mut() {
+            Some((last, length)) if *last == bits => *length += 1,
+            _ => runs.push((bits, 1)),
         }
-        if let Some((_, length)) = codes.last_mut() {
-            *length += 1;
+        if runs.len() > changes_allowed {
+            return None;
         }
     }
-    if codes.is_empty() {
+    if runs.is_empty() {
         return None;
     }
+    let mut numbers = Numbers::default();
+    let codes = runs.into_iter().map(|(bits, length)| (numbers.code(f64::from_bits(bits)), length)).collect();
     Some((numbers, codes, merge(cells.iter().map(|cell| u32::from(!cell.is_nan())))))
 }
