@@ -1,7 +1,8 @@
 //! The pipeline against its own computation: how much encoding and writing add, and what a second thread brings.
 //!
-//! `cargo bench --bench pipeline` computes the landscape of sixty durations (9.6 million rows) into memory on one and on two threads, then
-//! runs it with Parquet on disk, each several times in turn, and prints the least time of each and their ratios.
+//! `cargo bench --bench pipeline` computes the landscape of sixty durations (9.6 million rows) into memory on one and
+//! on two threads, then runs it with Parquet on disk, each several times in turn, and prints the least time of each and
+//! their ratios.
 
 use std::path::Path;
 use std::time::Instant;

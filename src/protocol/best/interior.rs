@@ -15,8 +15,8 @@ const MOST_STEPS: u32 = 100;
 /// A place close to that of least work, by the ellipsoid method; `None` if nothing is admissible.
 ///
 /// A cut through the centre of an ellipse that holds the place sought leaves half of it: where the centre is not
-/// admissible, the half in which the violated polynomial rises, else the half in which the work falls. Along with theta
-/// > 0 and `theta' <= 1`, theta is at most `M = theta_0 + t_f`, and the coefficients of a cubic between 0 and `M` on
+/// admissible, the half in which the violated polynomial rises, else the half in which the work falls. With
+/// `theta > 0` and `theta' <= 1`, theta is at most `M = theta_0 + t_f`, and the coefficients of a cubic between 0 and `M` on
 /// `[0, 1]` are bounded by Chebyshev's: `|a_2| <= 9 M`, `|a_3| <= 24 M`.
 pub(super) fn approach(landscape: &Landscape, least_velocity: f64, effort: &mut Effort) -> Option<Place> {
     let [theta_0, theta_1, _, t_f] = landscape.ends();

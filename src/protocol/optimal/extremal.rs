@@ -40,6 +40,8 @@ pub(super) struct Extremal {
     pub hold_time: f64,
     /// Contact lifetime where the arc starts.
     pub theta_s: f64,
+    /// `theta_1 - theta_s`, free of cancellation.
+    rest: f64,
     pub arc: Arc,
     /// `ln u` and slope of the turning function at the start and the end of the arc.
     pub start: Turning,
@@ -143,7 +145,15 @@ impl Problem {
             let arc = Arc { law, chart: Chart::Turning { theta_h, x_start: -xi.sqrt(), x_end, x_squares } };
             let (start, end) = arc.ends()?;
             let rate = Rate::Turning { gain: 0.0, inner: 0.0, outer: 0.0 };
-            Some(Extremal { hold_time: 0.0, theta_s: self.theta_0, arc, start, end, rate })
+            Some(Extremal {
+                hold_time: 0.0,
+                theta_s: self.theta_0,
+                rest: -self.fall * self.theta_1,
+                arc,
+                start,
+                end,
+                rate,
+            })
         };
         if x > 0.0 { Some([one(-x)?, one(x)?]) } else { None }
     }
@@ -180,7 +190,15 @@ impl Problem {
         let m = (1.0 + law.a - law.b + law.b * z) / theta * theta_h / (c_h + law.a - law.b);
         let end_term = self.theta_1 / (exp_m1(end.ln_u));
         let rate = Rate::Hold { gain: direction * m * rest / theta, inner: end_term, outer: direction * m };
-        Some(Extremal { hold_time: time, theta_s: theta, arc: Arc { law, chart }, start, end, rate })
+        Some(Extremal {
+            hold_time: time,
+            theta_s: theta,
+            rest: -fall * self.theta_1,
+            arc: Arc { law, chart },
+            start,
+            end,
+            rate,
+        })
     }
 
     /// Falling problem, `q = ln u(0+) > 0`.
@@ -201,7 +219,15 @@ impl Problem {
                 inner: self.theta_1 / exp_m1(end.ln_u),
                 outer: -self.theta_0 * swing,
             };
-            return Some(Extremal { hold_time: 0.0, theta_s: self.theta_0, arc, start, end, rate });
+            return Some(Extremal {
+                hold_time: 0.0,
+                theta_s: self.theta_0,
+                rest: -self.fall * self.theta_1,
+                arc,
+                start,
+                end,
+                rate,
+            });
         }
         let chart = Chart::Direct {
             theta_a: self.theta_0,
@@ -212,7 +238,15 @@ impl Problem {
         };
         let arc = Arc { law, chart };
         let (start, end) = arc.ends()?;
-        Some(Extremal { hold_time: 0.0, theta_s: self.theta_0, arc, start, end, rate: Rate::Direct { gain: 1.0 } })
+        Some(Extremal {
+            hold_time: 0.0,
+            theta_s: self.theta_0,
+            rest: -self.fall * self.theta_1,
+            arc,
+            start,
+            end,
+            rate: Rate::Direct { gain: 1.0 },
+        })
     }
 
     /// Falling problem, `q <= 0`: `X = layer q` at the start.
@@ -231,7 +265,7 @@ impl Problem {
             inner: if end.ln_u == 0.0 { 0.0 } else { self.theta_1 / exp_m1(end.ln_u) },
             outer: -layer * edge(&law, theta_h, x_start, &start),
         };
-        Some(Extremal { hold_time: 0.0, theta_s: self.theta_0, arc, start, end, rate })
+        Some(Extremal { hold_time: 0.0, theta_s: self.theta_0, rest: -self.fall * self.theta_1, arc, start, end, rate })
     }
 
     /// Rising problem, `q < 0`: `ln u(t_f-)`, stretched under the bound.
@@ -267,13 +301,13 @@ impl Problem {
                     outer: stretch * self.theta_1 * swing,
                 }
             };
-            return Some(Extremal { hold_time, theta_s, arc, start, end, rate });
+            return Some(Extremal { hold_time, theta_s, rest: -self.theta_1 * exp_m1(d), arc, start, end, rate });
         }
         let chart =
             Chart::Direct { theta_a: self.theta_1, z_a: z_1, friction_a: self.friction_a(), y_start: d, y_end: 0.0 };
         let arc = Arc { law, chart };
         let (start, end) = arc.ends()?;
-        Some(Extremal { hold_time, theta_s, arc, start, end, rate: rising })
+        Some(Extremal { hold_time, theta_s, rest: -self.theta_1 * exp_m1(d), arc, start, end, rate: rising })
     }
 
     /// Rising problem, `q >= 0`: `X = layer q` at the end.
@@ -296,7 +330,7 @@ impl Problem {
             inner: -theta_s / exp_m1(start.ln_u),
             outer: layer * edge(&law, theta_h, x_end, &end),
         };
-        Some(Extremal { hold_time, theta_s, arc, start, end, rate })
+        Some(Extremal { hold_time, theta_s, rest: -self.theta_1 * exp_m1(d), arc, start, end, rate })
     }
 
     /// For a rising problem: the hold time and `ln(theta_s/theta_1)` where the arc starts, from `kappa = theta_1 (C -
@@ -343,10 +377,9 @@ impl Extremal {
             return self.hold_time + sums.time;
         }
         if problem.bounded {
-            let rest = problem.theta_1 - self.theta_s;
-            if self.hold_time > 0.0 && rest > 0.0 {
+            if self.hold_time > 0.0 && self.rest > 0.0 {
                 // The arc replaces the last part of the shortest protocol, a hold from theta_s to theta_1.
-                sums.time - hold::time(self.theta_s, rest)
+                sums.time - hold::time(self.theta_s, self.rest)
             } else {
                 (self.hold_time - problem.t_min()) + sums.time
             }

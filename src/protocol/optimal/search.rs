@@ -12,11 +12,14 @@ use crate::protocol::{Effort, Solved, Status};
 /// of its square.
 const ENOUGH: f64 = 1e-8;
 
-/// Tolerance of a quadrature whose result is to be good to `rtol`: what is left over covers rounding and the last
-/// Newton step.
+/// Tolerance of a quadrature whose results are to be good to `rtol`. Velocities at the ends change by up to some twenty
+/// times the relative change of the time, since the time goes like the way in `ln u`.
 pub(super) fn quadrature_tolerance(rtol: f64) -> f64 {
-    0.1 * rtol
+    0.02 * rtol
 }
+
+/// No quadrature is asked for more than this.
+const FINEST: f64 = 1e-18;
 
 /// Solves `problem` in time `t_f`, from the parameter `start` if one is known.
 pub(super) fn solve(problem: &Problem, t_f: f64, rtol: f64, start: Option<f64>) -> Solved<Optimum> {
@@ -38,11 +41,13 @@ pub(super) fn solve(problem: &Problem, t_f: f64, rtol: f64, start: Option<f64>) 
     // Early probes only need to be as good as the step that they give.
     let mut tolerance = 1e-3f64;
     let exact = quadrature_tolerance(rtol);
+    // What counts is the time beyond the least, which may be a small share of the whole.
+    let share = beyond / t_f;
     let root = newton(
         |q| {
             let extremal = problem.extremal(q, q_hold)?;
             let (sums, probe) = loop {
-                let sums = extremal.arc.sums(tolerance)?;
+                let sums = extremal.arc.sums((tolerance * share).max(FINEST))?;
                 effort.quadratures += 1;
                 effort.nodes += sums.nodes;
                 let probe = extremal.probe(problem, &sums, beyond);
