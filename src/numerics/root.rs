@@ -30,7 +30,7 @@ const MOST_PROBES: u32 = 200;
 /// named by `undefined_above`. The search ends with the first probe whose absolute value is at most `enough`: the
 /// Newton step from there, whose error is of the order of `enough^2`, is taken unprobed. It also ends where the bracket
 /// has closed to neighbouring doubles with a change of sign between them: rounding of the function allows no better. It
-/// returns `None` if the bracket closes on a place without a change of sign.
+/// returns `None` if the bracket is empty or closes on a place without a change of sign.
 pub fn newton(
     mut probe: impl FnMut(f64) -> Option<Probe>,
     start: f64,
@@ -38,7 +38,10 @@ pub fn newton(
     undefined_above: bool,
     enough: f64,
 ) -> Option<Root> {
-    let mut x = start.clamp(low, high);
+    if low.is_nan() || high.is_nan() || low >= high {
+        return None;
+    }
+    let mut x = if start.is_nan() { middle(low, high) } else { start.clamp(low, high) };
     let mut last_step = f64::INFINITY;
     let mut below = false;
     let mut above = false;

@@ -68,7 +68,7 @@ pub fn solve(transition: &Transition, t_f: f64, bounded: bool, rtol: f64) -> Sol
     let Some(problem) = Problem::of(transition, bounded).filter(|_| t_f > 0.0 && t_f.is_finite()) else {
         return Solved { status: Status::Infeasible, value: None, effort: Effort::default() };
     };
-    search::solve(&problem, t_f, rtol, None)
+    search::solve(&problem, t_f, rtol)
 }
 
 /// What the optimal protocol would do now.
@@ -95,7 +95,7 @@ pub(super) fn feedback(
     effort: &mut Effort,
 ) -> Option<Feedback> {
     let problem = Problem { law, theta_0: theta, theta_1: theta_f, fall, bounded };
-    let solved = search::solve(&problem, time_left, rtol, None);
+    let solved = search::solve(&problem, time_left, rtol);
     effort.quadratures += solved.effort.quadratures;
     effort.nodes += solved.effort.nodes;
     let optimum = solved.value?;

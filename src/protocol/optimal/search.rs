@@ -18,11 +18,14 @@ pub(super) fn quadrature_tolerance(rtol: f64) -> f64 {
     0.02 * rtol
 }
 
+/// How far rounding may take a velocity off the bound.
+const ROUNDING: f64 = 1e-9;
+
 /// No quadrature is asked for more than this.
 const FINEST: f64 = 1e-18;
 
-/// Solves `problem` in time `t_f`, from the parameter `start` if one is known.
-pub(super) fn solve(problem: &Problem, t_f: f64, rtol: f64, start: Option<f64>) -> Solved<Optimum> {
+/// Solves `problem` in time `t_f` to relative accuracy `rtol`.
+pub(super) fn solve(problem: &Problem, t_f: f64, rtol: f64) -> Solved<Optimum> {
     let mut effort = Effort::default();
     let t_min = problem.t_min();
     let beyond = t_f - t_min;
@@ -33,7 +36,6 @@ pub(super) fn solve(problem: &Problem, t_f: f64, rtol: f64, start: Option<f64>) 
         return shortest(problem, t_min);
     }
     let q_hold = problem.q_hold();
-    let start = start.unwrap_or_else(|| guess(problem, q_hold, beyond));
     // The time beyond the least is known no better than t_f itself is.
     let enough = ENOUGH + 2.0 * f64::EPSILON * t_f / beyond;
     let mut last: Option<(Extremal, Sums)> = None;
@@ -63,7 +65,7 @@ pub(super) fn solve(problem: &Problem, t_f: f64, rtol: f64, start: Option<f64>) 
             last = Some((extremal, sums));
             Some(probe)
         },
-        start,
+        guess(problem, q_hold, beyond),
         problem.bracket(q_hold, beyond),
         problem.rises(),
         enough,
@@ -86,6 +88,9 @@ pub(super) fn solve(problem: &Problem, t_f: f64, rtol: f64, start: Option<f64>) 
     let work = probed.work(problem, &sums) - 0.5 * (c_probed + c) * lag;
     let held = found.hold_time > 0.0;
     let v_start = if held { 1.0 } else { exp(found.start.ln_u) / problem.theta_0 };
+    // Just off the bound, rounding may take v(0+) below it; further below there is no protocol on the bound at all.
+    let below = v_start < 1.0 - ROUNDING;
+    let v_start = if problem.bounded && !below { v_start.max(1.0) } else { v_start };
     let v_end = exp(found.end.ln_u) / problem.theta_1;
     let friction = found.friction_min(problem, &sums);
     let strategy = if held {
@@ -95,7 +100,7 @@ pub(super) fn solve(problem: &Problem, t_f: f64, rtol: f64, start: Option<f64>) 
     } else {
         Strategy::SlowDown
     };
-    let status = if friction <= unique_above || (problem.bounded && v_start < 1.0 - 1e-9) {
+    let status = if friction <= unique_above || (problem.bounded && below) {
         Status::Nonphysical
     } else if v_start < 1.0 && !problem.bounded {
         Status::BelowBound
