@@ -18,6 +18,9 @@ pub(super) fn quadrature_tolerance(rtol: f64) -> f64 {
     0.02 * rtol
 }
 
+/// Steps across the seam of the family before it counts as met.
+const MOST_CROSSINGS: u32 = 4;
+
 /// How far rounding may take a velocity off the bound.
 const ROUNDING: f64 = 1e-9;
 
@@ -45,31 +48,36 @@ pub(super) fn solve(problem: &Problem, t_f: f64, rtol: f64) -> Solved<Optimum> {
     let exact = quadrature_tolerance(rtol);
     // What counts is the time beyond the least, which may be a small share of the whole.
     let share = beyond / t_f;
-    let root = newton(
-        |q| {
-            let extremal = problem.extremal(q, q_hold)?;
-            let (sums, probe) = loop {
-                let sums = extremal.arc.sums((tolerance * share).max(FINEST))?;
-                effort.quadratures += 1;
-                effort.nodes += sums.nodes;
-                let probe = extremal.probe(problem, &sums, beyond);
-                let next = (1e-3 * probe.value * probe.value).clamp(exact, tolerance);
-                // A value within the error of its quadrature tells nothing, not even its sign.
-                let doubtful = tolerance > exact && probe.value.abs() <= (30.0 * tolerance).max(enough);
-                tolerance = if doubtful { next.min(1e-3 * tolerance).max(exact) } else { next };
-                if !doubtful {
-                    break (sums, probe);
-                }
-            };
-            friction_min = friction_min.min(sums.friction_min);
-            last = Some((extremal, sums));
-            Some(probe)
-        },
-        guess(problem, q_hold, beyond),
-        problem.bracket(q_hold, beyond),
-        problem.rises(),
-        enough,
-    );
+    let mut probe = |q| {
+        let extremal = problem.extremal(q, q_hold)?;
+        let (sums, probe) = loop {
+            let sums = extremal.arc.sums((tolerance * share).max(FINEST))?;
+            effort.quadratures += 1;
+            effort.nodes += sums.nodes;
+            let probe = extremal.probe(problem, &sums, beyond);
+            let next = (1e-3 * probe.value * probe.value).clamp(exact, tolerance);
+            // A value within the error of its quadrature tells nothing, not even its sign.
+            let doubtful = tolerance > exact && probe.value.abs() <= (30.0 * tolerance).max(enough);
+            tolerance = if doubtful { next.min(1e-3 * tolerance).max(exact) } else { next };
+            if !doubtful {
+                break (sums, probe);
+            }
+        };
+        friction_min = friction_min.min(sums.friction_min);
+        last = Some((extremal, sums));
+        Some(probe)
+    };
+    let bracket = problem.bracket(q_hold, beyond);
+    let mut start = guess(problem, q_hold, beyond);
+    let mut root = None;
+    for _ in 0..MOST_CROSSINGS {
+        root = newton(&mut probe, start, bracket, problem.rises(), enough);
+        // The slope jumps where the hold begins: a last step across that seam is taken again from the other side.
+        match (&root, q_hold) {
+            (Some(root), Some(seam)) if (root.probed < seam) != (root.x < seam) => start = root.x,
+            _ => break,
+        }
+    }
     let law = problem.law;
     let unique_above = problem.unique_above();
     let unsolved = |effort| {
