@@ -5,11 +5,12 @@
 //! every case"):
 //!
 //! - falling problems (`theta_0 >= theta_1`): `q > 0` is `ln u(0+)`, theta falls at once; `q < 0` is the scaled start
-//!   of the turning chart, theta rises first; below `q_hold` a hold of `q_hold - q` comes before the arc. Time falls
-//!   with `q`.
+//!   of the turning chart, theta rises first; below `q_hold` a hold of `q_hold - q`, in units of theta at the
+//!   anchor, comes before the arc. Time falls with `q`.
 //! - rising problems (`theta_0 < theta_1`): `q < 0` is `ln u(t_f-)`, theta still rises at the end (with the bound it is
 //!   stretched so that `v(t_f-) = 1` lies at minus infinity); `q > 0` is the scaled end of the turning chart, theta
-//!   falls at the end; above `q_hold` the hold is `q - q_hold` longer than the shortest protocol. Time rises with `q`.
+//!   falls at the end; above `q_hold` the hold is `q - q_hold` of those units longer than the shortest protocol. Time
+//!   rises with `q`.
 
 use super::arc::{Arc, Chart, Sums, phi};
 use super::hold;
@@ -87,8 +88,9 @@ impl Problem {
         (self.law.b - self.law.a).max(0.0)
     }
 
-    /// The end of larger theta, where the parameter is anchored.
-    fn theta_a(&self) -> f64 {
+    /// The end of larger theta, where the parameter is anchored. It is also the unit of time of the holds that the
+    /// parameter counts, so that short holds keep their digits.
+    pub fn theta_a(&self) -> f64 {
         if self.rises() { self.theta_1 } else { self.theta_0 }
     }
 
@@ -123,9 +125,9 @@ impl Problem {
     /// Bounds of the parameter: a hold cannot last longer than the whole, and `e^q` must stay a number.
     pub fn bracket(&self, q_hold: Option<f64>, beyond: f64) -> (f64, f64) {
         match (self.rises(), q_hold) {
-            (false, Some(q_hold)) => (q_hold - beyond, MOST_LN_U),
+            (false, Some(q_hold)) => (q_hold - beyond / self.theta_a(), MOST_LN_U),
             (false, None) => (f64::NEG_INFINITY, MOST_LN_U),
-            (true, Some(q_hold)) => (f64::NEG_INFINITY, q_hold + beyond),
+            (true, Some(q_hold)) => (f64::NEG_INFINITY, q_hold + beyond / self.theta_a()),
             (true, None) => (f64::NEG_INFINITY, f64::INFINITY),
         }
     }
@@ -161,8 +163,10 @@ impl Problem {
     /// The member at parameter `q`; `None` where the extremal does not exist.
     pub fn extremal(&self, q: f64, q_hold: Option<f64>) -> Option<Extremal> {
         match (self.rises(), q_hold) {
-            (false, Some(q_hold)) if q < q_hold => self.after_hold(q_hold - q, -1.0),
-            (true, Some(q_hold)) if q > q_hold => self.after_hold(self.t_min() + (q - q_hold), 1.0),
+            (false, Some(q_hold)) if q < q_hold => self.after_hold((q_hold - q) * self.theta_a(), -self.theta_a()),
+            (true, Some(q_hold)) if q > q_hold => {
+                self.after_hold(self.t_min() + (q - q_hold) * self.theta_a(), self.theta_a())
+            }
             (false, _) if q > 0.0 => self.falling_at_once(q),
             (false, _) => self.rising_first(q),
             (true, _) if q < 0.0 => self.rising_to_the_end(q),
@@ -171,10 +175,11 @@ impl Problem {
     }
 
     /// A hold of `time`, then an arc through its turning point down to `theta_1`.
-    fn after_hold(&self, time: f64, direction: f64) -> Option<Extremal> {
+    fn after_hold(&self, time: f64, unit: f64) -> Option<Extremal> {
         let law = self.law;
         let (theta, rest) = hold::age(self.theta_0, time);
-        let z = ln_1p(-rest);
+        // From whichever of theta and 1 - theta is small.
+        let z = if theta < 0.5 { ln(theta) } else { ln_1p(-rest) };
         let excess = law.a * phi(z);
         let friction = 1.0 + (law.b - law.a) * z;
         let xi = turning_distance(&law, excess, friction - excess)?;
@@ -189,7 +194,7 @@ impl Problem {
         // of the arc.
         let m = (1.0 + law.a - law.b + law.b * z) / theta * theta_h / (c_h + law.a - law.b);
         let end_term = self.theta_1 / (exp_m1(end.ln_u));
-        let rate = Rate::Hold { gain: direction * m * rest / theta, inner: end_term, outer: direction * m };
+        let rate = Rate::Hold { gain: unit * m * rest / theta, inner: end_term, outer: unit * m };
         Some(Extremal {
             hold_time: time,
             theta_s: theta,

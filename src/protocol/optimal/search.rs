@@ -157,7 +157,7 @@ fn guess(problem: &Problem, q_hold: Option<f64>, beyond: f64) -> f64 {
     if problem.rises() {
         let arc = problem.theta_1 * held(ln(problem.theta_1));
         return match q_hold {
-            Some(q_hold) if beyond > arc => q_hold + (beyond - arc),
+            Some(q_hold) if beyond > arc => q_hold + (beyond - arc) / problem.theta_a(),
             _ => 0.0,
         };
     }
@@ -172,7 +172,7 @@ fn guess(problem: &Problem, q_hold: Option<f64>, beyond: f64) -> f64 {
         match q_hold {
             Some(q_hold) if q < q_hold => {
                 let arc = problem.theta_0 * law.a * (z_end - ln(problem.theta_0)) / friction;
-                q_hold - (beyond - arc).max(0.0)
+                q_hold - (beyond - arc).max(0.0) / problem.theta_a()
             }
             _ => q,
         }
