@@ -80,6 +80,28 @@ fn reference_optimal_protocols_are_good_to_the_last_digits_that_t_f_allows() {
     }
 }
 
+/// Reference: 66-digit quadrature. The last step crossed the start of the hold; the parameter of a short hold lost its
+/// digits beside that of the start.
+#[test]
+fn regress_short_holds_keep_their_digits() {
+    let just_after = Transition {
+        law: Law { a: 0.0036659811808204576, b: 0.0036659811808204576 },
+        v_i: 15.228600355249457,
+        v_f: 115.43349782125296,
+    };
+    let found = solve(&just_after, 0.001991472244285123, true, 1e-10).value.expect("exists");
+    assert!((found.hold_time - 6.635369540271888e-13).abs() < 1e-15, "{found:?}");
+    assert!(relative(found.hamiltonian, 15.128733354966668) < 1e-10, "{found:?}");
+    let steady = Transition {
+        law: Law { a: 0.00045527722097057617, b: 0.0003101560687335413 },
+        v_i: 24927.88156175424,
+        v_f: 24927.88156175424,
+    };
+    let found = solve(&steady, 5.065918085582399e-05, true, 1e-13).value.expect("exists");
+    assert!(relative(found.hold_time, 4.998365298933152e-05) < 1e-13, "{found:?}");
+    assert!(relative(found.hamiltonian, 11072.243988836135) < 2e-13, "{found:?}");
+}
+
 /// `t_f - t_min` under the bound.
 fn beyond_least(transition: &Transition, t_f: f64) -> f64 {
     let Transition { v_i, v_f, .. } = *transition;
