@@ -2,7 +2,10 @@
 
 pub mod best;
 pub mod cubic;
+mod motion;
 pub mod optimal;
 mod outcome;
+pub mod swift;
 
+pub use motion::{Moment, Motion};
 pub use outcome::{Effort, Solved, Status};

@@ -1,0 +1,32 @@
+//! A protocol over time: what a trace shows and a check integrates again.
+
+/// A moment of a protocol, in scaled units.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Moment {
+    /// Time since the start, `0 <= t <= t_f`.
+    pub t: f64,
+    /// Velocity.
+    pub v: f64,
+    /// Contact lifetime.
+    pub theta: f64,
+    /// Friction `tau = 1 + a ln v + b ln theta`.
+    pub friction: f64,
+    /// Costate of the contact lifetime, where the protocol is an extremal.
+    pub beta: Option<f64>,
+}
+
+/// A protocol that can be asked where it is: a curve over a parameter `s` from 0 to 1, along which time never falls.
+///
+/// The parameter stretches layers that are thin in time. `at(0.0)` is just after the jump at the start, `at(1.0)` just
+/// before the jump at the end.
+pub trait Motion: Sync {
+    /// Duration `t_f`.
+    fn duration(&self) -> f64;
+
+    /// Values of `s`, ascending from 0 to 1, between which the curve is smooth and shows no detail much narrower than
+    /// the piece.
+    fn landmarks(&self) -> Vec<f64>;
+
+    /// The moment at `s`, clamped to `[0, 1]`.
+    fn at(&self, s: f64) -> Moment;
+}
