@@ -9,7 +9,7 @@ use std::time::Instant;
 
 use slipsweep::dataset::Folder;
 use slipsweep::sweep::{self, Plan, Sweep};
-use slipsweep::table::{Optima, Sheet, Signal};
+use slipsweep::table::{Optima, Signal};
 
 /// As in the program.
 #[global_allocator]
@@ -67,18 +67,14 @@ fn measure(folder: &Path) -> Outcome<()> {
 
 /// Seconds to compute every part and throw it away.
 fn compute(sweep: &Sweep, threads: usize) -> Outcome<f64> {
-    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build()?;
+    let pool = sweep::pool(threads)?;
     let plan = Plan::new(sweep);
     let optima = Optima::new(plan.optima, sweep.bounded, sweep.optimum_rtol());
     let signal = Signal::default();
     let request = &sweep.requests[0];
     let job = sweep.job(request, &optima, &signal).ok_or("too many rows")?;
     let start = Instant::now();
-    for part in 0..plan.tables[0].parts {
-        let rows = plan.tables[0].rows_of(part);
-        let mut sheet = Sheet::new((rows.end - rows.start) as usize, request.selection.indices().len());
-        pool.install(|| request.table.compute(&job, rows, &mut sheet))?;
-    }
+    sweep::compute(&pool, request.table, &job, &plan.tables[0], 0..plan.tables[0].parts, |_, _| {})?;
     Ok(start.elapsed().as_secs_f64())
 }
 

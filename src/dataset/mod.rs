@@ -1,12 +1,14 @@
 //! Tables on disk: Parquet parts, the manifest beside them, and reading them back.
 
 mod atomic;
+mod chunk;
 mod dictionary;
 mod digest;
 mod folder;
 mod footer;
 mod hybrid;
 mod layout;
+mod numbers;
 mod part;
 
 pub use digest::{Cell, Digest, ReadError, Row};

@@ -1,15 +1,18 @@
-//! The engine: computes the parts that are missing, one after another and each on all threads, and writes them meanwhile.
+//! The engine: computes the parts that are missing, encodes and writes them.
 //!
-//! Encoding and writing a part are tasks of the same threads, so they overlap the computation of the next part. Nothing of what is written
-//! depends on how the work was spread.
+//! A part is computed by all threads that have nothing else to do, encoded by one of them, and written by a thread of its own while the
+//! next parts are computed. Nothing of what is written depends on how the work was spread.
 
-use std::sync::mpsc::sync_channel;
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::mpsc::{channel, sync_channel};
+use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::thread;
+
+use rayon::{ThreadPool, ThreadPoolBuilder};
 
 use super::check::Sweep;
 use super::plan::{Plan, footer};
-use crate::dataset::{DatasetError, Folder, Layout, encode};
-use crate::table::{Optima, Sheet, Signal, Stopped, Work};
+use crate::dataset::{DatasetError, Folder, Layout, ManifestTable, encode};
+use crate::table::{Job, Optima, Sheet, Signal, Stopped, Table, Work};
 
 /// What a run did.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -55,59 +58,121 @@ pub fn run(sweep: &Sweep, folder: &Folder, threads: usize, signal: &Signal) -> R
     let plan = Plan::new(sweep);
     let manifest = plan.manifest(sweep);
     folder.open(&manifest)?;
-    let pool = rayon::ThreadPoolBuilder::new()
-        .num_threads(threads)
-        .build()
-        .map_err(|source| RunError::Threads { threads, source })?;
+    let pool = pool(threads)?;
     let optima = Optima::new(plan.optima, sweep.bounded, sweep.optimum_rtol());
     let mut outcome = Outcome { tables: Vec::new(), work: Work::default() };
-    for (request, table) in sweep.requests.iter().zip(&plan.tables) {
-        let Some(job) = sweep.job(request, &optima, signal) else { continue };
-        let layout = Layout::new(request.table, &request.selection, &sweep.grid);
-        let mut done = TableOutcome::default();
-        let failure = Mutex::new(None);
-        pool.in_place_scope(|scope| {
-            // At most as many parts as threads wait to be written: that bounds the memory, and no thread waits for the disk alone.
-            let (take, give_back) = sync_channel(pool.current_num_threads());
-            let give_back = Arc::new(Mutex::new(give_back));
-            for part in 0..table.parts {
-                if folder.has_part(&table.name, part) {
-                    done.kept += 1;
-                    signal.advance(table.rows_of(part).end - table.rows_of(part).start);
-                    continue;
-                }
-                signal.check()?;
-                if locked(&failure).is_some() {
-                    break;
-                }
-                let rows = table.rows_of(part);
+    let failure = Failure::default();
+    thread::scope(|scope| {
+        // The disk has a thread of its own, so that no thread that computes waits for it.
+        let (to_disk, parts) = sync_channel::<Part<'_>>(1);
+        scope.spawn(|| {
+            for part in parts {
+                failure.keep(folder.write_part(part.table, part.number, &part.bytes));
+            }
+        });
+        for (request, table) in sweep.requests.iter().zip(&plan.tables) {
+            let Some(job) = sweep.job(request, &optima, signal) else { continue };
+            let layout = Layout::new(request.table, &request.selection, &sweep.grid);
+            let mut done = TableOutcome::default();
+            let missing = (0..table.parts).filter(|&number| {
+                let rows = table.rows_of(number);
                 let count = rows.end - rows.start;
-                let mut sheet = Sheet::new(count as usize, request.selection.indices().len());
-                outcome.work += pool.install(|| request.table.compute(&job, rows.clone(), &mut sheet))?;
+                if folder.has_part(&table.name, number) {
+                    done.kept += 1;
+                    signal.advance(count);
+                    return false;
+                }
                 done.made += 1;
                 done.rows += count;
-                // Blocks while too many parts wait; a task that ends makes room. Neither end of the channel is gone before that.
-                let _ = take.send(());
-                let (give_back, layout, job, failure) = (give_back.clone(), &layout, &job, &failure);
-                let footer = footer(&manifest, &table.name, rows);
-                scope.spawn(move |_| {
-                    let written = encode(layout, &job.rows, &sheet, &footer)
-                        .map_err(|source| DatasetError::encode(folder, &table.name, part, source))
-                        .and_then(|bytes| folder.write_part(&table.name, part, &bytes));
-                    if let Err(error) = written {
-                        locked(failure).get_or_insert(error);
-                    }
-                    let _ = locked(&give_back).recv();
-                });
-            }
-            Ok::<(), Stopped>(())
-        })?;
-        if let Some(error) = failure.into_inner().unwrap_or_else(PoisonError::into_inner) {
-            return Err(error.into());
+                true
+            });
+            let wanted = missing.take_while(|_| !failure.is_there());
+            outcome.work += compute(&pool, request.table, &job, table, wanted, |number, sheet| {
+                let footer = footer(&manifest, &table.name, table.rows_of(number));
+                match encode(&layout, &job.rows, sheet, &footer) {
+                    // The other end is there until every sender is gone.
+                    Ok(bytes) => drop(to_disk.send(Part { table: &table.name, number, bytes })),
+                    Err(source) => failure.keep(Err(DatasetError::encode(folder, &table.name, number, source))),
+                }
+            })?;
+            outcome.tables.push(done);
         }
-        outcome.tables.push(done);
-    }
+        Ok::<(), Stopped>(())
+    })?;
+    failure.into_result()?;
     Ok(outcome)
+}
+
+/// The threads of a run.
+pub fn pool(threads: usize) -> Result<ThreadPool, RunError> {
+    ThreadPoolBuilder::new().num_threads(threads).build().map_err(|source| RunError::Threads { threads, source })
+}
+
+/// Computes the parts `numbers` of a table and hands the number and the sheet of each to `take`, in no particular order.
+///
+/// One part more than there are threads is under way at a time, so that no thread waits for the end of a part.
+pub fn compute(
+    pool: &ThreadPool,
+    table: &dyn Table,
+    job: &Job<'_>,
+    parts: &ManifestTable,
+    numbers: impl Iterator<Item = u64>,
+    take: impl Fn(u64, &Sheet) + Sync,
+) -> Result<Work, Stopped> {
+    let (give_back, free) = channel();
+    for _ in 0..=pool.current_num_threads() {
+        let _ = give_back.send(Sheet::new(job.selection.indices().len()));
+    }
+    let result = Mutex::new(Ok(Work::default()));
+    pool.in_place_scope(|scope| {
+        for number in numbers {
+            // Never fails: every task gives its sheet back.
+            let Ok(mut sheet) = free.recv() else { break };
+            if locked(&result).is_err() {
+                break;
+            }
+            let (give_back, result, take) = (give_back.clone(), &result, &take);
+            scope.spawn(move |_| {
+                let rows = parts.rows_of(number);
+                sheet.resize((rows.end - rows.start) as usize);
+                let computed = table.compute(job, rows, &mut sheet);
+                if computed.is_ok() {
+                    take(number, &sheet);
+                }
+                let mut result = locked(result);
+                *result = result.and_then(|work| computed.map(|more| [work, more].into_iter().sum()));
+                let _ = give_back.send(sheet);
+            });
+        }
+    });
+    result.into_inner().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// A part on its way to the disk.
+struct Part<'a> {
+    table: &'a str,
+    number: u64,
+    bytes: Vec<u8>,
+}
+
+/// The first failure of any thread.
+#[derive(Default)]
+struct Failure(Mutex<Option<DatasetError>>);
+
+impl Failure {
+    fn keep(&self, result: Result<(), DatasetError>) {
+        if let Err(error) = result {
+            locked(&self.0).get_or_insert(error);
+        }
+    }
+
+    fn is_there(&self) -> bool {
+        locked(&self.0).is_some()
+    }
+
+    fn into_result(self) -> Result<(), DatasetError> {
+        self.0.into_inner().unwrap_or_else(PoisonError::into_inner).map_or(Ok(()), Err)
+    }
 }
 
 /// The content of `mutex`, also if a thread died while it held it.

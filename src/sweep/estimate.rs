@@ -53,7 +53,8 @@ fn table(sweep: &Sweep, request: &Request, plan: &Plan, optima: &Optima) -> Resu
     let layout = Layout::new(request.table, &request.selection, &sweep.grid);
     let manifest = plan.manifest(sweep);
     let measure = |rows: Range<u64>| -> Result<usize, RunError> {
-        let mut sheet = Sheet::new((rows.end - rows.start) as usize, request.selection.indices().len());
+        let mut sheet = Sheet::new(request.selection.indices().len());
+        sheet.resize((rows.end - rows.start) as usize);
         request.table.compute(&job, rows.clone(), &mut sheet)?;
         let footer = footer(&manifest, request.table.name(), rows);
         let bytes = encode(&layout, &job.rows, &sheet, &footer).map_err(DatasetError::Sample)?;

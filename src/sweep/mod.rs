@@ -10,7 +10,7 @@ mod points;
 mod spec;
 
 pub use check::{Request, Sweep};
-pub use engine::{Outcome, RunError, TableOutcome, run};
+pub use engine::{Outcome, RunError, TableOutcome, compute, pool, run};
 pub use error::SpecError;
 pub use estimate::{Estimate, estimate};
 pub use plan::Plan;

@@ -28,7 +28,7 @@ const COLUMNS: &[Column] = &[
 ];
 
 /// Rows that a thread takes at a time: short enough to stop within a fraction of a second at any accuracy.
-const CHUNK: usize = 1 << 12;
+const CHUNK: usize = 1 << 11;
 
 impl Table for Gap {
     fn name(&self) -> &'static str {
@@ -68,6 +68,8 @@ impl Table for Gap {
         let coefficients = Coefficients::new(job, &rows, order.as_deref());
         let works = chunks(&groups, sheet, job.selection)
             .into_par_iter()
+            // Chunks cost very different times: no thread may keep several to itself while another one is idle.
+            .with_max_len(1)
             .map(|chunk| {
                 job.signal.check()?;
                 let length = chunk.cells.status.len() as u64;
@@ -234,6 +236,7 @@ fn chunks<'a>(groups: &[Group], sheet: &'a mut Sheet, selection: &Selection) -> 
 /// Computes a chunk, group by group.
 fn evaluate(job: &Job<'_>, groups: &[Group], coefficients: &Coefficients<'_>, chunk: Chunk<'_>) -> Work {
     let Chunk { first_group, mut place, mut cells } = chunk;
+    cells.columns.iter_mut().for_each(|column| column.fill(f64::NAN));
     let (mut a_2, mut a_3) = (Vec::with_capacity(CHUNK), Vec::with_capacity(CHUNK));
     let (mut work_buffer, mut v_min_buffer) = (Vec::new(), Vec::new());
     let mut work = Work::default();

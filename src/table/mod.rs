@@ -37,7 +37,7 @@ pub trait Table: Sync {
     /// Whether the selected columns need the optimal protocol of every row, shared through [`Optima`].
     fn needs_optimum(&self, selection: &Selection) -> bool;
 
-    /// Computes `rows` into `sheet`, which has the columns of the selection and is empty.
+    /// Computes `rows` into `sheet`, which has the columns of the selection and as many rows: every cell is written.
     fn compute(&self, job: &Job<'_>, rows: Range<u64>, sheet: &mut Sheet) -> Result<Work, Stopped>;
 }
 

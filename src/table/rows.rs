@@ -21,6 +21,7 @@ pub fn each(
     let starts: Vec<u64> = rows.clone().step_by(chunk).collect();
     let chunks: Vec<Chunk> = starts
         .into_par_iter()
+        .with_max_len(1)
         .map(|start| {
             job.signal.check()?;
             let end = rows.end.min(start + chunk as u64);

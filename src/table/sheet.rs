@@ -16,9 +16,15 @@ pub struct Sheet {
 }
 
 impl Sheet {
-    /// A sheet of `rows` rows and `columns` columns, every cell missing.
-    pub fn new(rows: usize, columns: usize) -> Sheet {
-        Sheet { columns: vec![vec![f64::NAN; rows]; columns], status: vec![Status::NotConverged; rows] }
+    /// A sheet of `columns` columns and no row.
+    pub fn new(columns: usize) -> Sheet {
+        Sheet { columns: vec![Vec::new(); columns], status: Vec::new() }
+    }
+
+    /// Makes it `rows` rows long, for another part; what the cells hold then means nothing.
+    pub fn resize(&mut self, rows: usize) {
+        self.columns.iter_mut().for_each(|column| column.resize(rows, f64::NAN));
+        self.status.resize(rows, Status::NotConverged);
     }
 }
 

@@ -1,0 +1,184 @@
+//! Column chunks of numbers, most of which differ: byte stream split, the first bytes of all numbers, then the second ones, …
+//!
+//! Format: <https://parquet.apache.org/docs/file-format/data-pages/encodings/#BYTESTREAMSPLIT>. Of a smooth column the
+//! last two streams, sign, exponent and the head of the mantissa, compress well.
+
+use multiversion::multiversion;
+use parquet::basic::Encoding;
+use parquet::file::statistics::Statistics;
+
+use super::chunk::{Chunk, Runs, page};
+use super::dictionary;
+
+/// Numbers that are split at a time: they stay in the first cache while all eight streams are written.
+const BLOCK: usize = 512;
+
+/// Rows that have a number (1) and rows that have none (0), as runs.
+pub fn presence(cells: &[f64]) -> Runs {
+    let mut runs: Runs = Vec::new();
+    let mut push = |code: u32, length: usize| match runs.last_mut() {
+        Some((last, total)) if *last == code => *total += length,
+        _ => runs.push((code, length)),
+    };
+    for block in cells.chunks(64) {
+        let mut mask = present_mask(block);
+        let mut left = block.len() as u32;
+        while left > 0 {
+            let code = mask & 1;
+            let length = (if code == 1 { mask.trailing_ones() } else { mask.trailing_zeros() }).min(left);
+            push(code as u32, length as usize);
+            mask = mask.checked_shr(length).unwrap_or(0);
+            left -= length;
+        }
+    }
+    runs
+}
+
+/// A bit a cell: 1 where there is a number.
+fn present_mask(block: &[f64]) -> u64 {
+    block.iter().enumerate().fold(0, |mask, (i, cell)| mask | u64::from(!cell.is_nan()) << i)
+}
+
+/// The chunk of `cells`, of which `present` are numbers.
+pub fn chunk(cells: &[f64], present: &Runs) -> Chunk {
+    let count = present.iter().filter(|run| run.0 == 1).map(|run| run.1).sum();
+    let mut values = Vec::with_capacity(count);
+    let mut row = 0;
+    for &(code, length) in present {
+        if code == 1 {
+            values.extend_from_slice(&cells[row..row + length]);
+        }
+        row += length;
+    }
+    if let Some((distinct, runs)) = repeating(&values) {
+        return dictionary::numbers(&distinct, runs.into_iter(), Some(present));
+    }
+    let mut data = page(Some(present), 8 * values.len());
+    let start = data.len();
+    data.resize(start + 8 * values.len(), 0);
+    let range = split(&values, &mut data[start..]);
+    Chunk {
+        rows: cells.len(),
+        dictionary: None,
+        data,
+        encoding: Encoding::BYTE_STREAM_SPLIT,
+        statistics: double_statistics(range, (cells.len() - values.len()) as u64),
+    }
+}
+
+/// Numbers that repeat for long, such as the optimal work along a landscape: each of them, and the runs of their
+/// places; `None` for a column that is better written number by number.
+fn repeating(values: &[f64]) -> Option<(Vec<f64>, Vec<(usize, usize)>)> {
+    let changes_allowed = values.len().div_ceil(16);
+    let mut distinct = vec![*values.first()?];
+    let mut runs = Vec::new();
+    let mut start = 0;
+    for (place, pair) in values.windows(2).enumerate() {
+        if pair[0].to_bits() != pair[1].to_bits() {
+            if runs.len() + 1 >= changes_allowed {
+                return None;
+            }
+            runs.push((distinct.len() - 1, place + 1 - start));
+            distinct.push(pair[1]);
+            start = place + 1;
+        }
+    }
+    runs.push((distinct.len() - 1, values.len() - start));
+    Some((distinct, runs))
+}
+
+/// Splits `values` into eight streams of bytes, one after another in `streams`; returns the least and the greatest value.
+#[multiversion(targets(
+    "x86_64+avx+avx2+bmi1+bmi2+avx512f+avx512bw+avx512cd+avx512dq+avx512vl",
+    "x86_64+avx+avx2+bmi1+bmi2"
+))]
+fn split(values: &[f64], streams: &mut [u8]) -> Option<(f64, f64)> {
+    let (mut least, mut greatest) = ([f64::INFINITY; 8], [f64::NEG_INFINITY; 8]);
+    let mut streams: Vec<&mut [u8]> = streams.chunks_mut(values.len().max(1)).collect();
+    for (number, block) in values.chunks(BLOCK).enumerate() {
+        for (byte, stream) in streams.iter_mut().enumerate() {
+            let places = number * BLOCK..number * BLOCK + block.len();
+            for (out, value) in stream[places].iter_mut().zip(block) {
+                *out = (value.to_bits() >> (8 * byte)) as u8;
+            }
+        }
+        for eight in block.chunks(8) {
+            for ((value, least), greatest) in eight.iter().zip(&mut least).zip(&mut greatest) {
+                *least = if *value < *least { *value } else { *least };
+                *greatest = if *value > *greatest { *value } else { *greatest };
+            }
+        }
+    }
+    let least = least.into_iter().fold(f64::INFINITY, f64::min);
+    let greatest = greatest.into_iter().fold(f64::NEG_INFINITY, f64::max);
+    (!values.is_empty()).then_some((least, greatest))
+}
+
+/// Statistics of a column of doubles: `range` is its least and greatest value.
+pub fn double_statistics(range: Option<(f64, f64)>, nulls: u64) -> Statistics {
+    // Readers may compare zeros of either sign as equal: the format asks for the outer one.
+    let least = range.map(|(least, _)| if least == 0.0 { -0.0 } else { least });
+    let greatest = range.map(|(_, greatest)| if greatest == 0.0 { 0.0 } else { greatest });
+    Statistics::double(least, greatest, None, Some(nulls), false)
+}
+
+#[cfg(test)]
+mod tests {
+    //! Runs, streams and ranges against the plainest code that could be right.
+
+    use super::*;
+
+    fn cells(count: usize) -> Vec<f64> {
+        let mut state = 1_u64;
+        let mut next = || {
+            state = state.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
+            state >> 33
+        };
+        let mut cells = Vec::new();
+        while cells.len() < count {
+            let (length, missing) = (next() % 200, next() % 3 == 0);
+            for _ in 0..length {
+                cells.push(if missing { f64::NAN } else { next() as f64 - 1e9 });
+            }
+        }
+        cells.truncate(count);
+        cells
+    }
+
+    #[test]
+    fn presence_is_told_cell_by_cell() {
+        for count in [0, 1, 63, 64, 65, 1000, 4096] {
+            let cells = cells(count);
+            let told: Vec<bool> =
+                presence(&cells).into_iter().flat_map(|(code, length)| vec![code == 1; length]).collect();
+            assert_eq!(told, cells.iter().map(|cell| !cell.is_nan()).collect::<Vec<_>>());
+            assert!(presence(&cells).windows(2).all(|pair| pair[0].0 != pair[1].0));
+        }
+    }
+
+    #[test]
+    fn streams_are_bytes_of_equal_place() {
+        for count in [0, 1, 7, 8, 511, 512, 513, 3000] {
+            let values: Vec<f64> = cells(2 * count).into_iter().filter(|cell| !cell.is_nan()).take(count).collect();
+            let mut streams = vec![0; 8 * values.len()];
+            let range = split(&values, &mut streams);
+            for (i, value) in values.iter().enumerate() {
+                let bytes: Vec<u8> = (0..8).map(|byte| streams[byte * values.len() + i]).collect();
+                assert_eq!(bytes, value.to_le_bytes());
+            }
+            let least = values.iter().copied().reduce(f64::min);
+            assert_eq!(range, least.zip(values.iter().copied().reduce(f64::max)));
+        }
+    }
+
+    #[test]
+    fn repetition_is_found_where_it_pays() {
+        assert_eq!(repeating(&[]), None);
+        assert_eq!(repeating(&[2.0; 40]), Some((vec![2.0], vec![(0, 40)])));
+        let two: Vec<f64> = [vec![1.0; 20], vec![3.0; 21]].concat();
+        assert_eq!(repeating(&two), Some((vec![1.0, 3.0], vec![(0, 20), (1, 21)])));
+        assert_eq!(repeating(&(0..40).map(f64::from).collect::<Vec<_>>()), None);
+        // Zeros of either sign are different numbers.
+        assert_eq!(repeating(&[[0.0; 20], [-0.0; 20]].concat()).map(|(distinct, _)| distinct.len()), Some(2));
+    }
+}
