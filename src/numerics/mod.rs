@@ -6,5 +6,6 @@ pub mod double_double;
 pub mod elementary;
 pub mod gauss;
 pub mod lanes;
+pub mod radau;
 pub mod root;
 pub mod turning;

@@ -1,0 +1,133 @@
+//! The Radau rule on `[0, 1]` with a node at 1: quadrature, indefinite integrals and interpolation on the same nodes.
+//!
+//! The nodes are those of Radau IIA collocation (Hairer and Wanner, Solving Ordinary Differential Equations II, section
+//! IV.5), which damps what is stiff. The integrals from 0 to every node follow from one product with a matrix.
+
+use std::sync::OnceLock;
+
+use super::double_double::DoubleDouble;
+
+/// Nodes: two vectors of eight.
+pub const NODES: usize = 16;
+
+/// One value a node.
+pub type Nodes = [f64; NODES];
+
+/// Nodes, weights and the matrix of integration.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Radau {
+    /// Nodes `u`, rising, the last one 1.
+    pub u: Nodes,
+    /// `1 - u`, each to the last bit, the last one 0.
+    pub rest: Nodes,
+    /// Weights: `int_0^1 f du = sum w f(u)`, exact for polynomials of degree `2 NODES - 2`.
+    pub w: Nodes,
+    /// `columns[k][j] = int_0^u[j]` of the polynomial of degree `NODES - 1` that is 1 at `u[k]` and 0 at the others.
+    pub columns: [Nodes; NODES],
+    /// Barycentric weights of the nodes and, last, of the added place 0.
+    barycentric: [f64; NODES + 1],
+}
+
+impl Radau {
+    /// `int_0^u[j] f du` for every node, from the values of `f` at the nodes.
+    #[inline(always)]
+    pub fn integrals(&self, f: &Nodes) -> Nodes {
+        let mut sum = [0.0; NODES];
+        for (column, &value) in self.columns.iter().zip(f) {
+            for j in 0..NODES {
+                sum[j] += column[j] * value;
+            }
+        }
+        sum
+    }
+
+    /// The polynomial through `start` at 0 and `f` at the nodes, at `u` (barycentric formula).
+    pub fn interpolate(&self, start: f64, f: &Nodes, u: f64) -> f64 {
+        if u == 0.0 {
+            return start;
+        }
+        let (mut above, mut below) = (0.0, 0.0);
+        for j in 0..NODES {
+            let distance = u - self.u[j];
+            if distance == 0.0 {
+                return f[j];
+            }
+            let share = self.barycentric[j] / distance;
+            above += share * f[j];
+            below += share;
+        }
+        let share = self.barycentric[NODES] / u;
+        (above + share * start) / (below + share)
+    }
+}
+
+/// The rule, made at its first use.
+pub fn radau() -> &'static Radau {
+    static RADAU: OnceLock<Radau> = OnceLock::new();
+    RADAU.get_or_init(make)
+}
+
+/// Newton's method on `P_n - P_(n-1)`, the last step in double-double.
+fn make() -> Radau {
+    let one = DoubleDouble::new(1.0);
+    let half = DoubleDouble::new(0.5);
+    let n = NODES as f64;
+    let mut nodes = [one; NODES];
+    for (i, node) in nodes.iter_mut().enumerate().take(NODES - 1) {
+        let turn = 2.0 * std::f64::consts::PI * (NODES - 1 - i) as f64 / (2.0 * n - 1.0);
+        let mut x = DoubleDouble::new(libm::cos(turn));
+        for _ in 0..8 {
+            // (1 - x^2) (P_n - P_(n-1))' from DLMF 18.9.17.
+            let p = legendre(x);
+            let (p0, p1, p2) = (p[NODES - 2], p[NODES - 1], p[NODES]);
+            let count = DoubleDouble::new(n);
+            let slope = count * (p1 - x * p2) - (count - one) * (p0 - x * p1);
+            x = x - (p2 - p1) * (one - x * x) / slope;
+        }
+        *node = x;
+    }
+    let polynomials = nodes.map(legendre);
+    let count = DoubleDouble::new(n * n);
+    let mut rule = Radau {
+        u: [0.0; NODES],
+        rest: [0.0; NODES],
+        w: [0.0; NODES],
+        columns: [[0.0; NODES]; NODES],
+        barycentric: [1.0; NODES + 1],
+    };
+    for k in 0..NODES {
+        let last = polynomials[k][NODES - 1];
+        let weight = half * (one + nodes[k]) / (count * last * last);
+        rule.u[k] = (half * (one + nodes[k])).high;
+        rule.rest[k] = (half * (one - nodes[k])).high;
+        rule.w[k] = weight.high;
+        for j in 0..NODES {
+            // int_-1^x P_m = (P_(m+1) - P_(m-1))/(2m + 1); the rule keeps the P_m orthogonal up to m = n - 1.
+            let mut sum = one + nodes[j];
+            for m in 1..NODES {
+                sum = sum + polynomials[k][m] * (polynomials[j][m + 1] - polynomials[j][m - 1]);
+            }
+            rule.columns[k][j] = (weight * half * sum).high;
+        }
+    }
+    let places: [f64; NODES + 1] = std::array::from_fn(|k| if k < NODES { rule.u[k] } else { 0.0 });
+    for k in 0..=NODES {
+        for j in (0..=NODES).filter(|&j| j != k) {
+            // The factor keeps the products near 1; it cancels in the formula.
+            rule.barycentric[k] /= 4.0 * (places[k] - places[j]);
+        }
+    }
+    rule
+}
+
+/// `P_0 … P_n` by the three-term recurrence (DLMF 18.9.1).
+fn legendre(x: DoubleDouble) -> [DoubleDouble; NODES + 1] {
+    let mut p = [DoubleDouble::new(1.0); NODES + 1];
+    p[1] = x;
+    for m in 2..=NODES {
+        let k = m as f64;
+        p[m] = (DoubleDouble::new(2.0 * k - 1.0) * x * p[m - 1] - DoubleDouble::new(k - 1.0) * p[m - 2])
+            / DoubleDouble::new(k);
+    }
+    p
+}

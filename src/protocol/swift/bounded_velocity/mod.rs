@@ -1,0 +1,103 @@
+//! `bounded_velocity`: `v > 1` by construction.
+//!
+//! `v = 1 + (v_i - 1) exp[L t/t_f - alpha_3 (t_f - t) t]` with `L = ln((v_f - 1)/(v_i - 1))`; `alpha_3` brings theta to
+//! `1/v_f` at `t_f`. Since theta(t_f) rises strictly with `alpha_3`, there is one member if `t_f > t_min = ln(v_f/v_i) +
+//! ln((v_i - 1)/(v_f - 1))`, the time that `v = 1` takes, and none otherwise. The unknown is `c = alpha_3 t_f^2`.
+//!
+//! `alpha_3` changes by `d ln alpha_3 = -d ln(t_f - t_min)` near `t_min`: there it is as good as `t_f - t_min` is known
+//! from `t_f`, `v_i` and `v_f`.
+
+mod arrival;
+mod curve;
+mod motion;
+mod passage;
+
+use super::{Case, Family, Obstacle, Swift};
+use crate::numerics::elementary::{exp, ln, ln_1p};
+use crate::numerics::radau::NODES;
+use crate::protocol::{Effort, Motion};
+use arrival::Problem;
+use curve::{Curve, Side};
+use motion::Resolution;
+use passage::{Passage, pass};
+
+/// The family.
+pub struct BoundedVelocity;
+
+impl Family for BoundedVelocity {
+    fn name(&self) -> &'static str {
+        "bounded_velocity"
+    }
+
+    fn doc(&self) -> &'static str {
+        "v > 1 by construction, v continuous at both ends"
+    }
+
+    fn alpha(&self) -> Option<&'static str> {
+        Some("alpha_3 in v = 1 + (v_i - 1) exp[ln((v_f - 1)/(v_i - 1)) t/t_f - alpha_3 (t_f - t) t]")
+    }
+
+    fn solve(&self, case: &Case, rtol: f64, effort: &mut Effort) -> Result<Swift, Obstacle> {
+        let curve = member(case, rtol, effort)?;
+        let (law, v_i, v_f) = (case.transition.law, case.transition.v_i, case.transition.v_f);
+        let mut passage = Passage { work: 0.0, friction_max: f64::NEG_INFINITY };
+        let theta = pass(&curve, v_i, rtol, reach(rtol), effort, |panel| panel.gather(&law, &curve, rtol, &mut passage));
+        let arrived = (theta * v_f - 1.0).abs() <= 10.0 * rtol + ROUNDING;
+        if !arrived || !passage.work.is_finite() {
+            return Err(Obstacle::NotConverged);
+        }
+        let vertex = curve.vertex().map_or(v_i, |x| 1.0 + curve.surplus(Side::Start, x));
+        Ok(Swift {
+            alpha: Some(curve.c / case.t_f / case.t_f),
+            work: passage.work,
+            v_min: v_i.min(v_f).min(vertex),
+            v_max: v_i.max(v_f).max(vertex),
+            friction_max: passage.friction_max,
+            miss: 0.0,
+        })
+    }
+
+    fn motion(&self, case: &Case, rtol: f64) -> Result<Box<dyn Motion>, Obstacle> {
+        let mut effort = Effort::default();
+        let curve = member(case, rtol, &mut effort)?;
+        let mut panels = Vec::new();
+        pass(&curve, case.transition.v_i, rtol, reach(rtol), &mut effort, |panel| panels.push(*panel));
+        Ok(Box::new(Resolution { law: case.transition.law, curve, panels }))
+    }
+}
+
+/// What rounding may cost of theta at the end.
+const ROUNDING: f64 = 1e-12;
+
+/// The velocity of the member that solves the case.
+fn member(case: &Case, rtol: f64, effort: &mut Effort) -> Result<Curve, Obstacle> {
+    let (law, v_i, v_f, t_f) = (case.transition.law, case.transition.v_i, case.transition.v_f, case.t_f);
+    let sound = law.a > 0.0 && law.b >= 0.0 && t_f > 0.0 && v_i >= 1.0 && v_f >= 1.0;
+    if !sound || ![law.a, law.b, t_f, v_i, v_f].iter().all(|x| x.is_finite()) {
+        return Err(Obstacle::Domain);
+    }
+    if v_i == 1.0 || v_f == 1.0 {
+        return Err(Obstacle::End);
+    }
+    let t_min = ln_1p((v_i - v_f) / (v_i * (v_f - 1.0)));
+    if t_f <= t_min {
+        return Err(Obstacle::Time { t_min });
+    }
+    let (w_i, w_f) = (v_i - 1.0, v_f - 1.0);
+    let ratio = (v_f - v_i) / w_i;
+    let l = if ratio > -0.5 { ln_1p(ratio) } else { ln(w_f / w_i) };
+    let curve = Curve::new(w_i, w_f, l, t_f);
+    if v_i == v_f {
+        return Ok(curve);
+    }
+    let problem = Problem { v_i, v_f, curve, spare: t_f - t_min, tight: t_f < 2.0 * t_min };
+    let c = problem.solve(rtol, reach(rtol), effort).ok_or(Obstacle::NotConverged)?;
+    Ok(curve.with(c))
+}
+
+/// Variation of an exponent over a panel whose interpolation at the nodes is good to `rtol`: an exponential of total
+/// variation `r` is interpolated to `2 (r/4)^n/n!`.
+fn reach(rtol: f64) -> f64 {
+    let factorial: f64 = (1..=NODES).map(|k| k as f64).product();
+    (4.0 * exp(ln(0.05 * rtol * factorial) / NODES as f64)).clamp(2.0, 8.0)
+}

@@ -1,0 +1,36 @@
+//! A member over time.
+
+use super::curve::Curve;
+use super::passage::{Resolved, friction_at};
+use crate::model::Law;
+use crate::protocol::{Moment, Motion};
+
+/// Panels of equal length in the parameter `s`, each with theta at its nodes.
+pub(super) struct Resolution {
+    pub law: Law,
+    pub curve: Curve,
+    pub panels: Vec<Resolved>,
+}
+
+impl Motion for Resolution {
+    fn duration(&self) -> f64 {
+        self.curve.t_f
+    }
+
+    fn landmarks(&self) -> Vec<f64> {
+        let count = self.panels.len();
+        (0..=count).map(|k| k as f64 / count as f64).collect()
+    }
+
+    fn at(&self, s: f64) -> Moment {
+        let count = self.panels.len();
+        let along = s.clamp(0.0, 1.0) * count as f64;
+        let k = (along as usize).min(count - 1);
+        let panel = &self.panels[k];
+        let u = along - k as f64;
+        let (x, z) = panel.place(u);
+        let theta = panel.theta(u);
+        let v = 1.0 + self.curve.w_f * crate::numerics::elementary::exp(self.curve.exponent(x, z));
+        Moment { t: self.curve.t_f * x, v, theta, friction: friction_at(&self.law, v, theta), beta: None }
+    }
+}

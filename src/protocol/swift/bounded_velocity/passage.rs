@@ -1,0 +1,258 @@
+//! Theta along a member, panel by panel in the order of time, with work and the greatest friction.
+//!
+//! `theta' = 1 - theta v` contracts forwards. Where the slip of a panel is small, theta follows from the solution in
+//! closed form, of which all terms are positive. Where it is large theta has forgotten its start and follows `1/v`: Radau
+//! collocation gives `theta'` at the nodes.
+
+use multiversion::multiversion;
+
+use super::arrival::total;
+use super::curve::{Curve, Panel};
+use crate::model::Law;
+use crate::numerics::elementary::{exp, ln};
+use crate::numerics::radau::{NODES, Nodes, Radau, radau};
+use crate::protocol::Effort;
+
+/// One panel with theta at its start and at its nodes.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Resolved {
+    pub panel: Panel,
+    theta_start: f64,
+    theta: Nodes,
+    /// `theta'` at the start and at the nodes, accurate where it is small beside 1.
+    rate_start: f64,
+    rate: Nodes,
+    v: Nodes,
+}
+
+/// What is gathered along the way.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Passage {
+    pub work: f64,
+    pub friction_max: f64,
+}
+
+/// Passes along the curve from `theta = 1/v_i`; every panel goes to `visit`.
+pub(super) fn pass(
+    curve: &Curve,
+    v_i: f64,
+    rtol: f64,
+    reach: f64,
+    effort: &mut Effort,
+    mut visit: impl FnMut(&Resolved),
+) -> f64 {
+    let rule = radau();
+    let (mut theta, mut rate, mut slip) = (1.0 / v_i, 0.0, 0.0);
+    // The distance from the slow solution at the start, relative, has to fall below rtol before it may be ignored.
+    let off = curve.slope(0.0, 1.0).abs() * curve.w_i / (v_i * v_i * curve.t_f);
+    let forgotten = ln(off.clamp(rtol, 1.0) / rtol) + 3.0;
+    effort.quadratures += 1;
+    for stretch in curve.stretches().forward() {
+        let mut d = stretch.from;
+        while d != stretch.to {
+            let mut panel = curve.panel(&stretch, d, reach);
+            let stiff = slip >= forgotten && curve.stiffness(&panel) > reach;
+            panel = if stiff { curve.panel(&stretch, d, STIFF * reach) } else { curve.cut(panel, reach) };
+            if panel.to == d {
+                return f64::NAN;
+            }
+            effort.nodes += NODES as u32;
+            let (resolved, slipped) = resolve(curve, panel, theta, rate, stiff, rule);
+            visit(&resolved);
+            theta = resolved.theta[NODES - 1];
+            rate = resolved.rate[NODES - 1];
+            slip += slipped;
+            d = panel.to;
+        }
+    }
+    theta
+}
+
+/// How much less the exponent may vary over a panel on which theta is not given in closed form.
+const STIFF: f64 = 0.5;
+
+#[multiversion(targets(
+    "x86_64+avx+avx2+bmi1+bmi2+avx512f+avx512bw+avx512cd+avx512dq+avx512vl",
+    "x86_64+avx+avx2+bmi1+bmi2"
+))]
+fn resolve(curve: &Curve, panel: Panel, theta_start: f64, rate_start: f64, stiff: bool, rule: &Radau) -> (Resolved, f64) {
+    let (x, z) = Curve::places(&panel, rule);
+    let (w, _) = curve.surpluses(&x, &z);
+    let h = curve.t_f * (panel.to - panel.from).abs();
+    let v = w.map(|w| 1.0 + w);
+    let slip = rule.integrals(&v).map(|slip| h * slip);
+    let (mut theta, mut rate) = ([0.0; NODES], [0.0; NODES]);
+    if stiff {
+        rate = collocate(rule, h, &v, theta_start);
+        for j in 0..NODES {
+            theta[j] = (1.0 - rate[j]) / v[j];
+        }
+    } else {
+        let mut growth = [0.0; NODES];
+        for j in 0..NODES {
+            growth[j] = exp(slip[j]);
+        }
+        let gained = rule.integrals(&growth);
+        for j in 0..NODES {
+            theta[j] = (theta_start + h * gained[j]) / growth[j];
+            rate[j] = 1.0 - theta[j] * v[j];
+        }
+    }
+    (Resolved { panel, theta_start, theta, rate_start, rate, v }, slip[NODES - 1])
+}
+
+/// `theta'` at the nodes of a panel of length `h`, from `rate/v + h A rate = 1/v - theta_start` divided by `h`.
+#[inline(always)]
+fn collocate(rule: &Radau, h: f64, v: &Nodes, theta_start: f64) -> Nodes {
+    let (mut rows, mut right) = ([[0.0; NODES]; NODES], [0.0; NODES]);
+    for j in 0..NODES {
+        for k in 0..NODES {
+            rows[j][k] = rule.columns[k][j];
+        }
+        rows[j][j] += 1.0 / (h * v[j]);
+        right[j] = (1.0 / v[j] - theta_start) / h;
+    }
+    for k in 0..NODES {
+        let mut best = k;
+        for j in k + 1..NODES {
+            if rows[j][k].abs() > rows[best][k].abs() {
+                best = j;
+            }
+        }
+        rows.swap(k, best);
+        right.swap(k, best);
+        let pivot = rows[k];
+        let inverse = 1.0 / pivot[k];
+        for j in k + 1..NODES {
+            let share = rows[j][k] * inverse;
+            for i in 0..NODES {
+                rows[j][i] -= share * pivot[i];
+            }
+            right[j] -= share * right[k];
+        }
+    }
+    for k in (0..NODES).rev() {
+        right[k] /= rows[k][k];
+        for j in 0..k {
+            right[j] -= rows[j][k] * right[k];
+        }
+    }
+    right
+}
+
+impl Resolved {
+    /// Duration of the panel.
+    fn duration(&self, curve: &Curve) -> f64 {
+        curve.t_f * (self.panel.to - self.panel.from).abs()
+    }
+
+    /// `x` and `z` at a share `u` of the panel.
+    pub fn place(&self, u: f64) -> (f64, f64) {
+        Curve::place(self.panel.side, self.panel.from * (1.0 - u) + self.panel.to * u)
+    }
+
+    /// Theta at a share `u` of the panel.
+    pub fn theta(&self, u: f64) -> f64 {
+        radau().interpolate(self.theta_start, &self.theta, u)
+    }
+
+    /// Adds the work of the panel, and raises the greatest friction to what is found on it, good to `rtol`.
+    pub fn gather(&self, law: &Law, curve: &Curve, rtol: f64, passage: &mut Passage) {
+        let rule = radau();
+        let (friction, power) = frictions(law, &self.v, &self.theta, rule);
+        passage.work += self.duration(curve) * power;
+        let mut before = Sample {
+            u: 0.0,
+            friction: friction_at(law, 1.0 + curve.surplus(self.panel.side, self.panel.from), self.theta_start),
+            rise: self.rise(law, curve, 0.0, self.theta_start, self.rate_start),
+        };
+        passage.friction_max = passage.friction_max.max(before.friction);
+        for j in 0..NODES {
+            let rise = self.rise(law, curve, rule.u[j], self.theta[j], self.rate[j]);
+            let after = Sample { u: rule.u[j], friction: friction[j], rise };
+            passage.friction_max = passage.friction_max.max(after.friction);
+            // The tangent bounds a maximum in between.
+            if before.rise > 0.0
+                && after.rise < 0.0
+                && before.friction + before.rise * (after.u - before.u) > passage.friction_max
+            {
+                let greatest = self.summit(law, curve, rtol, before, after);
+                passage.friction_max = passage.friction_max.max(greatest);
+            }
+            before = after;
+        }
+    }
+
+    /// `dtau/du = a v'/v + b theta'/theta`.
+    fn rise(&self, law: &Law, curve: &Curve, u: f64, theta: f64, rate: f64) -> f64 {
+        let (x, z) = self.place(u);
+        let w = curve.w_f * exp(curve.exponent(x, z));
+        let length = (self.panel.to - self.panel.from).abs();
+        length * (law.a * curve.slope(x, z) * (w / (1.0 + w)) + law.b * curve.t_f * rate / theta)
+    }
+
+    /// The greatest friction between two samples where it first rises and then falls: the root of `tau'` by the
+    /// Illinois method.
+    fn summit(&self, law: &Law, curve: &Curve, rtol: f64, mut low: Sample, mut high: Sample) -> f64 {
+        let rule = radau();
+        let mut greatest = low.friction.max(high.friction);
+        let (mut rise_low, mut rise_high) = (low.rise, high.rise);
+        let mut last = 0.0;
+        for _ in 0..MOST_STEPS {
+            let u = low.u + (high.u - low.u) * (rise_low / (rise_low - rise_high));
+            let theta = self.theta(u);
+            let rate = rule.interpolate(self.rate_start, &self.rate, u);
+            let (x, z) = self.place(u);
+            let v = 1.0 + curve.w_f * exp(curve.exponent(x, z));
+            let rise = self.rise(law, curve, u, theta, rate);
+            let friction = friction_at(law, v, theta);
+            greatest = greatest.max(friction);
+            // What is left to gain is less than the rise over the bracket.
+            if rise.abs() * (high.u - low.u) <= 0.1 * rtol * friction.abs() {
+                break;
+            }
+            let sample = Sample { u, friction, rise };
+            if rise > 0.0 {
+                (low, rise_low) = (sample, rise);
+                rise_high *= if last > 0.0 { 0.5 } else { 1.0 };
+                last = 1.0;
+            } else {
+                (high, rise_high) = (sample, rise);
+                rise_low *= if last < 0.0 { 0.5 } else { 1.0 };
+                last = -1.0;
+            }
+        }
+        greatest
+    }
+}
+
+/// Friction at a place and its slope there.
+#[derive(Debug, Clone, Copy)]
+struct Sample {
+    u: f64,
+    friction: f64,
+    /// `dtau/du`.
+    rise: f64,
+}
+
+/// More steps than a bracket between two nodes takes.
+const MOST_STEPS: u32 = 60;
+
+/// `tau = 1 + a ln v + b ln theta`.
+pub(super) fn friction_at(law: &Law, v: f64, theta: f64) -> f64 {
+    1.0 + law.a * ln(v) + law.b * ln(theta)
+}
+
+/// Friction at the nodes, and `int tau v du`.
+#[multiversion(targets(
+    "x86_64+avx+avx2+bmi1+bmi2+avx512f+avx512bw+avx512cd+avx512dq+avx512vl",
+    "x86_64+avx+avx2+bmi1+bmi2"
+))]
+fn frictions(law: &Law, v: &Nodes, theta: &Nodes, rule: &Radau) -> (Nodes, f64) {
+    let (mut tau, mut power) = ([0.0; NODES], [0.0; NODES]);
+    for j in 0..NODES {
+        tau[j] = friction_at(law, v[j], theta[j]);
+        power[j] = rule.w[j] * tau[j] * v[j];
+    }
+    (tau, total(&power))
+}
