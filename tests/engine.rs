@@ -178,8 +178,8 @@ fn points_vary_together_and_slowest() {
 #[test]
 fn columns_are_those_of_the_contract() {
     let folder = tempfile::tempdir().expect("is writable");
-    let axes = format!("t_f = 0.02\n{MATERIAL}alpha_2 = 0.0\nalpha_3 = 0.0\nk = inf\nm = 0.0\n");
-    run(&sweep(folder.path(), &axes, ALL_TABLES), folder.path(), 1);
+    let axes = format!("t_f = 0.02\n{MATERIAL}alpha_2 = 0.0\nalpha_3 = 0.0\nk = inf\nm = 0.0\ntau_max = 2.0\n");
+    run(&sweep(folder.path(), &axes, &format!("{ALL_TABLES}[tables.swift]\n")), folder.path(), 1);
     let names = |table| {
         let frame = read(folder.path(), table);
         frame.get_column_names().into_iter().map(|name| name.as_str()).collect::<Vec<_>>().join(" ")
@@ -187,6 +187,10 @@ fn columns_are_those_of_the_contract() {
     assert_eq!(names("gap"), "t_f a b v_i v_f alpha_2 alpha_3 work work_optimal gap v_min status");
     assert_eq!(names("best"), "t_f a b v_i v_f alpha_2 alpha_3 work work_optimal gap v_min status");
     assert_eq!(names("optimal"), "t_f a b v_i v_f work v_start v_end hold_time hamiltonian theta_max strategy status");
+    assert_eq!(
+        names("swift"),
+        "t_f a b v_i v_f family tau_max alpha work work_optimal gap v_min v_max friction_max status"
+    );
     assert_eq!(
         names("crossover"),
         "a b v_i v_f t_cross t_hold t_cheapest t_min t_turn t_free_in t_free_out work_cross work_hold work_cheapest work_min \
@@ -221,7 +225,6 @@ fn numbers_are_null_where_there_are_none() {
         (false, "below_bound".to_owned(), [true, true, true, true]),
         (false, "infeasible".to_owned(), [false, false, false, false]),
         (true, "infeasible".to_owned(), [false, false, false, false]),
-        (true, "infeasible".to_owned(), [true, true, false, false]),
     ];
     assert_eq!(kinds.into_iter().collect::<Vec<_>>(), expected);
 }
@@ -367,4 +370,30 @@ fn paper_landscape_read_back() {
     assert!(
         gaps.iter().zip(&status).filter(|(_, status)| *status == "ok").all(|(gap, _)| gap.is_some_and(|gap| gap > 0.0))
     );
+}
+
+#[test]
+fn families_are_words_and_say_which_bound_stops_them() {
+    let folder = tempfile::tempdir().expect("is writable");
+    let axes = "t_f = [0.35, 0.41]\na = 0.03\nb = 0.05\nv_i = 100.0\nv_f = 3.0\n\
+                family = [\"bounded_friction\", \"step\"]\ntau_max = [0.5, 1.5]\n";
+    let tables = "[tables.swift]\ncolumns = [\"work\", \"end_error\", \"bound\"]\n";
+    run(&sweep(folder.path(), axes, tables), folder.path(), 1);
+    let swift = read(folder.path(), "swift");
+    let names = swift.get_column_names().into_iter().map(|name| name.as_str()).collect::<Vec<_>>().join(" ");
+    assert_eq!(names, "t_f a b v_i v_f family tau_max work end_error bound status");
+    let families: Vec<String> = words(&swift, "family");
+    let of_one_time = ["bounded_friction", "bounded_friction", "step", "step"];
+    assert_eq!(families, [of_one_time, of_one_time].concat());
+    // t_min is 0.395, and friction at the ends is 0.91 and 0.98.
+    assert_eq!(words(&swift, "bound")[..5], ["time", "time", "time", "time", "friction"]);
+    assert_eq!(words(&swift, "status")[..5], ["infeasible"; 5]);
+    let (work, end_error) = (numbers(&swift, "work"), numbers(&swift, "end_error"));
+    assert_eq!(work[..5], [None; 5]);
+    for row in [6, 7] {
+        // theta(t_f) v_f - 1 of a step in closed form.
+        let expected = (3.0 / 100.0 - 1.0) * (-3.0 * 0.41_f64).exp();
+        assert!(end_error[row].is_some_and(|error| (error / expected - 1.0).abs() < 1e-12));
+        assert_eq!((words(&swift, "status")[row].as_str(), work[row].is_some()), ("ok", true));
+    }
 }

@@ -164,7 +164,7 @@ fn account(outcome: &Outcome, seconds: f64) -> String {
     if rows == 0 {
         return "nothing to compute: every part was there\n".to_owned();
     }
-    let Work { optima, landscapes, best, crossovers, quadratures, nodes } = outcome.work;
+    let Work { optima, landscapes, best, swifts, crossovers, quadratures, nodes } = outcome.work;
     let mut text = format!(
         "{} in {}: {} rows a second, Parquet on disk included\n",
         words::things(rows, "row"),
@@ -175,6 +175,7 @@ fn account(outcome: &Outcome, seconds: f64) -> String {
         (optima, "optimal protocol"),
         (landscapes, "landscape"),
         (best, "best shortcut"),
+        (swifts, "family shortcut"),
         (crossovers, "transition"),
         (quadratures, "quadrature"),
         (nodes, "node"),

@@ -12,11 +12,13 @@ pub fn tables() -> Result<(), Failure> {
         text.push_str(&format!("{}: {}\n", table.name(), table.doc()));
         let mut rows: Vec<Vec<String>> = Vec::new();
         for axis in Quantity::ALL.into_iter().filter(|axis| table.axes().contains(axis)) {
-            rows.push([axis.name(), axis.unit(Scale::Model), axis.doc()].map(str::to_owned).into());
+            let unit = if axis.words().is_empty() { axis.unit(Scale::Model) } else { "word" };
+            rows.push([axis.name(), unit, axis.doc()].map(str::to_owned).into());
         }
         for column in table.columns() {
             let unit = if let Kind::Label(_) = column.kind { "word" } else { column.unit(&no_axes) };
-            rows.push([column.name, unit, column.doc].map(str::to_owned).into());
+            let note = if column.optional { " (only if a spec names it)" } else { "" };
+            rows.push(vec![column.name.to_owned(), unit.to_owned(), format!("{}{note}", column.doc)]);
         }
         rows.push([STATUS, "word", STATUS_DOC].map(str::to_owned).into());
         text.push_str(&words::aligned(&rows, 2));

@@ -5,7 +5,7 @@
 use std::fs::File;
 use std::path::Path;
 
-use polars::prelude::{DataFrame, ParquetReader, PolarsError, SerReader};
+use polars::prelude::{DataFrame, Float64Chunked, NewChunkedArray, ParquetReader, PolarsError, SerReader};
 
 use super::folder::{Folder, ManifestTable};
 use crate::grid::Quantity;
@@ -92,7 +92,8 @@ impl Digest {
         let columns: Vec<&Column> = columns.iter().filter(|column| written.contains(column.name)).collect();
         let with_gap = columns.iter().any(|column| column.name == GAP);
         // The axes are only needed to tell transitions apart: reading them all would take as long as reading the results.
-        let axes = OPTIMUM_AXES.iter().filter(|_| with_gap).map(|axis| axis.name());
+        let keys = keys(table);
+        let axes = keys.iter().filter(|_| with_gap).map(|axis| axis.name());
         let names = axes.chain(columns.iter().map(|column| column.name)).chain([STATUS]).map(str::to_owned);
         let frame = &mut reader.with_columns(Some(names.collect())).finish()?;
         frame.rechunk_mut();
@@ -113,7 +114,7 @@ impl Digest {
             }
         }
         if with_gap {
-            least.add(frame, path)?;
+            least.add(frame, path, &keys)?;
         }
         Ok(())
     }
@@ -194,6 +195,27 @@ fn row(path: &Path, index: usize) -> Result<Row, PolarsError> {
         .collect()
 }
 
+/// What tells rows apart for which a least gap each is of interest: the optimal problem, or the transition and the family.
+fn keys(table: &str) -> Vec<Quantity> {
+    let has_family = table::find(table).is_some_and(|table| table.axes().contains(&Quantity::Family));
+    let (added, dropped) = (has_family.then_some(Quantity::Family), has_family.then_some(Quantity::Time));
+    OPTIMUM_AXES.iter().copied().filter(|axis| Some(*axis) != dropped).chain(added).collect()
+}
+
+/// The column of an axis as numbers; of words, their places.
+fn numbers(frame: &DataFrame, axis: Quantity) -> Result<Float64Chunked, PolarsError> {
+    let column = frame.column(axis.name())?;
+    let words = axis.words();
+    if words.is_empty() {
+        return Ok(column.f64()?.clone());
+    }
+    let column = column.cat32()?;
+    let place =
+        |code| column.get_mapping().cat_to_str(code).and_then(|word| words.iter().position(|known| *known == word));
+    let places = column.physical().iter().map(|code| code.and_then(place).map(|place| place as f64));
+    Ok(Float64Chunked::from_iter_options(axis.name().into(), places))
+}
+
 /// The least gap of each transition and time so far, while those are few, and of all.
 #[derive(Default)]
 struct Least {
@@ -203,15 +225,12 @@ struct Least {
 }
 
 impl Least {
-    fn add(&mut self, frame: &DataFrame, path: &Path) -> Result<(), PolarsError> {
+    fn add(&mut self, frame: &DataFrame, path: &Path, keys: &[Quantity]) -> Result<(), PolarsError> {
         let gaps = frame.column(GAP)?.f64()?;
         let status = frame.column(STATUS)?.cat32()?;
         let codes = status.physical();
         let ok = |code| status.get_mapping().cat_to_str(code) == Some(Status::Ok.name());
-        let axes = OPTIMUM_AXES
-            .iter()
-            .map(|axis: &Quantity| frame.column(axis.name())?.f64())
-            .collect::<Result<Vec<_>, _>>()?;
+        let axes = keys.iter().map(|axis| numbers(frame, *axis)).collect::<Result<Vec<_>, _>>()?;
         let axes = axes.iter().map(|axis| axis.cont_slice()).collect::<Result<Vec<_>, _>>()?;
         // Within a part: the row of the least gap of each tuple, tuples in the order in which they come.
         let mut found: Vec<(usize, f64)> = Vec::new();

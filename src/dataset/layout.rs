@@ -27,7 +27,8 @@ impl Layout {
         let mut fields = Vec::new();
         for axis in &axes {
             let unit = axis.unit(grid.scale(*axis).unwrap_or(Scale::Model));
-            fields.push(field(axis.name(), DataType::Float64, false, unit, axis.doc()));
+            let kind = if axis.words().is_empty() { DataType::Float64 } else { label() };
+            fields.push(field(axis.name(), kind, false, unit, axis.doc()));
         }
         for column in &columns {
             let kind = match column.kind {

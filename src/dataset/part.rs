@@ -49,7 +49,14 @@ pub fn encode(layout: &Layout, grid: &Projection<'_>, sheet: &Sheet, footer: &Fo
         let global = footer.rows.start + range.start as u64..footer.rows.start + range.end as u64;
         for axis in &layout.axes {
             if let Some(runs) = grid.runs(*axis, global.clone()) {
-                group.splice(dictionary::numbers(&runs.values(), runs.over(global.clone()), None))?;
+                let (values, words) = (runs.values(), axis.words());
+                let chunk = if words.is_empty() {
+                    dictionary::numbers(&values, runs.over(global.clone()), None)
+                } else {
+                    let codes = runs.over(global.clone()).map(|(step, length)| (values[step] as u32, length));
+                    dictionary::words(&words, &codes.collect(), None)
+                };
+                group.splice(chunk)?;
             }
         }
         for (column, cells) in layout.columns.iter().zip(&sheet.columns) {

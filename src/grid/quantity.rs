@@ -2,6 +2,8 @@
 
 use std::fmt;
 
+use crate::protocol::swift::FAMILIES;
+
 /// A quantity that can be an axis of a sweep.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 #[repr(u8)]
@@ -16,6 +18,10 @@ pub enum Quantity {
     InitialVelocity,
     /// Final velocity.
     FinalVelocity,
+    /// Family of shortcuts.
+    Family,
+    /// Bound on friction.
+    FrictionBound,
     /// Linear coefficient of the cubic shortcut.
     Alpha2,
     /// Quadratic coefficient of the cubic shortcut.
@@ -64,12 +70,14 @@ pub enum Scale {
 
 impl Quantity {
     /// Every quantity; axis columns come in this order.
-    pub const ALL: [Quantity; 9] = [
+    pub const ALL: [Quantity; 11] = [
         Quantity::Time,
         Quantity::A,
         Quantity::B,
         Quantity::InitialVelocity,
         Quantity::FinalVelocity,
+        Quantity::Family,
+        Quantity::FrictionBound,
         Quantity::Alpha2,
         Quantity::Alpha3,
         Quantity::Stiffness,
@@ -89,6 +97,8 @@ impl Quantity {
             Quantity::B => "b",
             Quantity::InitialVelocity => "v_i",
             Quantity::FinalVelocity => "v_f",
+            Quantity::Family => "family",
+            Quantity::FrictionBound => "tau_max",
             Quantity::Alpha2 => "alpha_2",
             Quantity::Alpha3 => "alpha_3",
             Quantity::Stiffness => "k",
@@ -104,6 +114,8 @@ impl Quantity {
             Quantity::B => "effect of the contact lifetime on friction",
             Quantity::InitialVelocity => "velocity of the initial steady state",
             Quantity::FinalVelocity => "velocity of the final steady state",
+            Quantity::Family => "family of shortcuts",
+            Quantity::FrictionBound => "bound on friction, which bounded_friction heeds",
             Quantity::Alpha2 => "coefficient of t in the contact lifetime of the cubic shortcut",
             Quantity::Alpha3 => "coefficient of t^2 in the contact lifetime of the cubic shortcut",
             Quantity::Stiffness => "stiffness of the spring",
@@ -117,6 +129,8 @@ impl Quantity {
             (Quantity::Time, _) => "l/v_0",
             (Quantity::A | Quantity::B, _) => "mu_0",
             (Quantity::InitialVelocity | Quantity::FinalVelocity, _) => "v_0",
+            (Quantity::Family, _) => "",
+            (Quantity::FrictionBound, _) => "mu_0 sigma",
             (Quantity::Alpha2, Scale::Model) => "1",
             (Quantity::Alpha2, Scale::Duration) => "1/t_f",
             (Quantity::Alpha3, Scale::Model) => "v_0/l",
@@ -131,6 +145,14 @@ impl Quantity {
         matches!(self, Quantity::Alpha2 | Quantity::Alpha3)
     }
 
+    /// The words it takes instead of numbers, each of which stands for its place; none for a number.
+    pub fn words(self) -> Vec<&'static str> {
+        match self {
+            Quantity::Family => FAMILIES.iter().map(|family| family.name()).collect(),
+            _ => Vec::new(),
+        }
+    }
+
     /// Its legal range.
     pub fn domain(self) -> Domain {
         let above = |text, least| Domain { text, least, least_excluded: true, greatest: f64::MAX };
@@ -141,6 +163,8 @@ impl Quantity {
             Quantity::B => from("b >= 0, finite", 0.0),
             Quantity::InitialVelocity => above("v_i > 1, finite", 1.0),
             Quantity::FinalVelocity => above("v_f > 1, finite", 1.0),
+            Quantity::Family => Domain { greatest: (FAMILIES.len() - 1) as f64, ..from("a family", 0.0) },
+            Quantity::FrictionBound => Domain { greatest: f64::INFINITY, ..above("tau_max > 0 (inf: no bound)", 0.0) },
             Quantity::Alpha2 => from("alpha_2 finite", f64::MIN),
             Quantity::Alpha3 => from("alpha_3 finite", f64::MIN),
             Quantity::Stiffness => Domain { greatest: f64::INFINITY, ..above("k > 0 (inf: rigid)", 0.0) },
@@ -148,12 +172,13 @@ impl Quantity {
         }
     }
 
-    /// The value it has in a spec that does not name it; `None` where every table that needs it must be told.
-    pub fn default(self) -> Option<f64> {
+    /// The values it has in a spec that does not name it; none where every table that needs it must be told.
+    pub fn default(self) -> Vec<f64> {
         match self {
-            Quantity::Stiffness => Some(f64::INFINITY),
-            Quantity::Mass => Some(0.0),
-            _ => None,
+            Quantity::Family => (0..FAMILIES.len()).map(|place| place as f64).collect(),
+            Quantity::Stiffness | Quantity::FrictionBound => vec![f64::INFINITY],
+            Quantity::Mass => vec![0.0],
+            _ => Vec::new(),
         }
     }
 }

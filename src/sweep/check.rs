@@ -6,10 +6,11 @@ use std::path::Path;
 use sha2::{Digest, Sha256};
 
 use super::error::{SpecError, unknown};
-use super::spec::{AxisForm, AxisSpec, Spec, TableSpec};
+use super::spec::{AxisForm, AxisSpec, AxisValue, Spec, TableSpec};
 use super::{place, points};
 use crate::dataset::Identity;
 use crate::grid::{Axis, Factor, Grid, Quantity, RTOL, Scale, Values};
+use crate::protocol::swift::FAMILIES;
 use crate::table::{self, OPTIMUM_AXES, STATUS, Selection, Table};
 
 /// A sweep that is known to be legal.
@@ -211,9 +212,9 @@ fn grid(spec: &Spec, folder: &Path) -> Result<Grid, SpecError> {
     }
     for quantity in Quantity::ALL {
         let held = factors.iter().flat_map(|factor| &factor.axes).any(|axis| axis.quantity == quantity);
-        if let (false, Some(value)) = (held, quantity.default()) {
-            factors
-                .push(Factor { axes: vec![Axis { quantity, scale: Scale::Model, values: Values::List(vec![value]) }] });
+        let values = quantity.default();
+        if !held && !values.is_empty() {
+            factors.push(Factor { axes: vec![Axis { quantity, scale: Scale::Model, values: Values::List(values) }] });
         }
     }
     Ok(Grid { factors })
@@ -221,22 +222,12 @@ fn grid(spec: &Spec, folder: &Path) -> Result<Grid, SpecError> {
 
 fn axis(quantity: Quantity, spec: &AxisSpec) -> Result<Axis, SpecError> {
     let key = format!("axes.{}", quantity.name());
-    let check = |key: &str, value: f64| {
-        if quantity.domain().contains(value) {
-            return Ok(());
-        }
-        Err(SpecError::new(
-            key,
-            format!("{value:?} is out of range"),
-            quantity.domain().text,
-            "choose values in the range",
-        ))
-    };
+    let words = quantity.words();
     let (scale, values) = match spec {
-        AxisSpec::Number(value) => {
-            check(&key, *value)?;
-            (Scale::Model, Values::List(vec![*value]))
+        AxisSpec::One(AxisValue::Word(word)) if words.is_empty() => {
+            return Err(SpecError::new(key, format!("found string {word:?}"), AXIS, "change the value"));
         }
+        AxisSpec::One(one) => (Scale::Model, Values::List(vec![value(quantity, &words, &key, one)?])),
         AxisSpec::List(values) => {
             if values.is_empty() {
                 return Err(SpecError::new(
@@ -246,14 +237,50 @@ fn axis(quantity: Quantity, spec: &AxisSpec) -> Result<Axis, SpecError> {
                     "add values, or remove the axis",
                 ));
             }
-            for (index, value) in values.iter().enumerate() {
-                check(&format!("{key}[{index}]"), *value)?;
-            }
-            (Scale::Model, Values::List(values.clone()))
+            let values = values.iter().enumerate();
+            let values = values.map(|(index, one)| value(quantity, &words, &format!("{key}[{index}]"), one));
+            (Scale::Model, Values::List(values.collect::<Result<_, _>>()?))
+        }
+        AxisSpec::Form(_) if !words.is_empty() => {
+            let expected = format!("one or a list of {}", quoted(&words));
+            return Err(SpecError::new(key, "a range", expected, "write the words as a list"));
         }
         AxisSpec::Form(form) => (scale(quantity, &key, form)?, range(quantity, &key, form)?),
     };
     Ok(Axis { quantity, scale, values })
+}
+
+/// What an axis of numbers may be.
+const AXIS: &str = "a number, a list of numbers or a range such as { linspace = [first, last, count] }";
+
+fn quoted(words: &[&str]) -> String {
+    words.iter().map(|word| format!("\"{word}\"")).collect::<Vec<_>>().join(", ")
+}
+
+/// One value: a number in its range, or the place of a word among `words`.
+fn value(quantity: Quantity, words: &[&str], key: &str, value: &AxisValue) -> Result<f64, SpecError> {
+    match value {
+        AxisValue::Word(word) if !words.is_empty() => match words.iter().position(|known| known == word) {
+            Some(place) => Ok(place as f64),
+            None => Err(unknown(key.to_owned(), quantity.name(), word, words)),
+        },
+        AxisValue::Word(word) => {
+            Err(SpecError::new(key, format!("found string {word:?}"), "a number", "change the value"))
+        }
+        AxisValue::Number(number) if !words.is_empty() => Err(SpecError::new(
+            key,
+            format!("found {number:?}"),
+            format!("one of {}", quoted(words)),
+            "write the word in quotes",
+        )),
+        AxisValue::Number(number) if quantity.domain().contains(*number) => Ok(*number),
+        AxisValue::Number(number) => Err(SpecError::new(
+            key,
+            format!("{number:?} is out of range"),
+            quantity.domain().text,
+            "choose values in the range",
+        )),
+    }
 }
 
 fn scale(quantity: Quantity, key: &str, form: &AxisForm) -> Result<Scale, SpecError> {
@@ -351,6 +378,7 @@ fn request(name: &str, spec: &TableSpec, rtol: f64, grid: &Grid) -> Result<Reque
             format!("add `{} = ...` to [axes], or remove the table", missing.name()),
         ));
     }
+    check_friction_bound(table, &key, grid)?;
     let rtol = spec.rtol.unwrap_or(rtol);
     check_rtol(&format!("{key}.rtol"), rtol)?;
     let selection = selection(table, &key, spec.columns.as_deref())?;
@@ -365,9 +393,29 @@ fn request(name: &str, spec: &TableSpec, rtol: f64, grid: &Grid) -> Result<Reque
     Ok(Request { table, selection, rtol, rows })
 }
 
+/// A family that heeds the bound on friction must be told one.
+fn check_friction_bound(table: &dyn Table, key: &str, grid: &Grid) -> Result<(), SpecError> {
+    let told = |quantity| match grid.axis(quantity).map(|axis| &axis.values) {
+        Some(Values::List(values)) if table.axes().contains(&quantity) => values.as_slice(),
+        _ => &[],
+    };
+    let family = told(Quantity::Family).iter().filter_map(|&place| FAMILIES.get(place as usize));
+    match family.copied().find(|family| family.heeds_tau_max()) {
+        Some(family) if told(Quantity::FrictionBound) == [f64::INFINITY] => Err(SpecError::new(
+            key,
+            format!("the family {} needs the axis `tau_max`, which the spec does not have", family.name()),
+            "tau_max above the friction of both steady states",
+            "add `tau_max = ...` to [axes], or name other families there, as in family = [\"cubic\"]",
+        )),
+        _ => Ok(()),
+    }
+}
+
 fn selection(table: &dyn Table, key: &str, names: Option<&[String]>) -> Result<Selection, SpecError> {
     let known: Vec<&str> = table.columns().iter().map(|column| column.name).collect();
-    let Some(names) = names else { return Ok(Selection::new((0..known.len()).collect())) };
+    let Some(names) = names else {
+        return Ok(Selection::new((0..known.len()).filter(|&column| !table.columns()[column].optional).collect()));
+    };
     let mut indices = Vec::new();
     for (place, name) in names.iter().enumerate() {
         let key = format!("{key}.columns[{place}]");

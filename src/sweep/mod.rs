@@ -14,4 +14,4 @@ pub use engine::{Outcome, RunError, TableOutcome, compute, pool, run};
 pub use error::SpecError;
 pub use estimate::{Estimate, estimate};
 pub use plan::Plan;
-pub use spec::{AccuracySpec, AxisForm, AxisSpec, ModelSpec, Spec, TableSpec};
+pub use spec::{AccuracySpec, AxisForm, AxisSpec, AxisValue, ModelSpec, Spec, TableSpec};

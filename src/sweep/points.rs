@@ -58,6 +58,18 @@ fn parquet(path: &Path) -> Result<Columns, SpecError> {
     let frame = ParquetReader::new(file).finish().map_err(|error| unreadable(path, &error))?;
     let mut axes = header(&name, frame.columns().iter().map(|column| column.name().as_str()))?;
     for ((quantity, values), column) in axes.iter_mut().zip(frame.columns()) {
+        let words = quantity.words();
+        if !words.is_empty() {
+            let found = || format!("{name}: column `{}` holds {}", quantity.name(), column.dtype());
+            let text =
+                column.cast(&DataType::String).map_err(|_| fault(found(), "words", "write the column as text"))?;
+            let text = text.str().map_err(|error| unreadable(path, &error))?;
+            for (row, cell) in text.iter().enumerate() {
+                let place = format!("{name}: row {row} of column `{}`", quantity.name());
+                values.push(word(&place, &words, cell.unwrap_or_default())?);
+            }
+            continue;
+        }
         let numbers = column.dtype().is_primitive_numeric().then(|| column.cast(&DataType::Float64));
         let Some(Ok(numbers)) = numbers else {
             let found = format!("{name}: column `{}` holds {}", quantity.name(), column.dtype());
@@ -85,6 +97,14 @@ fn legal(place: &dyn Display, quantity: Quantity, value: f64) -> Result<f64, Spe
         return Ok(value);
     }
     Err(fault(format!("{place}: {value:?} is out of range"), quantity.domain().text, "correct the value"))
+}
+
+/// The place of `cell` among `words`.
+fn word(place: &dyn Display, words: &[&str], cell: &str) -> Result<f64, SpecError> {
+    match words.iter().position(|word| *word == cell) {
+        Some(number) => Ok(number as f64),
+        None => Err(fault(format!("{place}: unknown word `{cell}`"), &words.join(", "), "correct the word")),
+    }
 }
 
 fn fault(found: impl Into<Box<str>>, expected: &str, help: &str) -> SpecError {
@@ -115,6 +135,11 @@ fn point(place: &impl Display, line: &str, axes: &mut [(Quantity, Vec<f64>)]) ->
     }
     for ((quantity, values), cell) in axes.iter_mut().zip(cells) {
         let place = format!("{place}: column `{}`", quantity.name());
+        let words = quantity.words();
+        if !words.is_empty() {
+            values.push(word(&place, &words, cell.trim_matches('"'))?);
+            continue;
+        }
         let Ok(value) = cell.parse::<f64>() else {
             let found = format!("{place}: `{cell}` is not a number");
             return Err(fault(found, "a number such as 0.03 or 1e-3", "correct the value"));

@@ -74,11 +74,20 @@ impl Default for AccuracySpec {
 #[derive(Debug, Clone, PartialEq)]
 pub enum AxisSpec {
     /// One value.
-    Number(f64),
+    One(AxisValue),
     /// Values one by one.
-    List(Vec<f64>),
+    List(Vec<AxisValue>),
     /// A range, or values with a unit.
     Form(AxisForm),
+}
+
+/// A value of an axis.
+#[derive(Debug, Clone, PartialEq)]
+pub enum AxisValue {
+    /// A number.
+    Number(f64),
+    /// A word.
+    Word(String),
 }
 
 /// An axis written as a table.
@@ -127,11 +136,15 @@ impl<'de> Visitor<'de> for AxisVisitor {
     }
 
     fn visit_f64<E>(self, value: f64) -> Result<AxisSpec, E> {
-        Ok(AxisSpec::Number(value))
+        Ok(AxisSpec::One(AxisValue::Number(value)))
     }
 
     fn visit_i64<E>(self, value: i64) -> Result<AxisSpec, E> {
-        Ok(AxisSpec::Number(value as f64))
+        Ok(AxisSpec::One(AxisValue::Number(value as f64)))
+    }
+
+    fn visit_str<E>(self, word: &str) -> Result<AxisSpec, E> {
+        Ok(AxisSpec::One(AxisValue::Word(word.to_owned())))
     }
 
     fn visit_seq<A: SeqAccess<'de>>(self, values: A) -> Result<AxisSpec, A::Error> {
@@ -140,5 +153,33 @@ impl<'de> Visitor<'de> for AxisVisitor {
 
     fn visit_map<A: MapAccess<'de>>(self, form: A) -> Result<AxisSpec, A::Error> {
         AxisForm::deserialize(MapAccessDeserializer::new(form)).map(AxisSpec::Form)
+    }
+}
+
+impl<'de> Deserialize<'de> for AxisValue {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        deserializer.deserialize_any(ValueVisitor)
+    }
+}
+
+struct ValueVisitor;
+
+impl Visitor<'_> for ValueVisitor {
+    type Value = AxisValue;
+
+    fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("a number")
+    }
+
+    fn visit_f64<E>(self, value: f64) -> Result<AxisValue, E> {
+        Ok(AxisValue::Number(value))
+    }
+
+    fn visit_i64<E>(self, value: i64) -> Result<AxisValue, E> {
+        Ok(AxisValue::Number(value as f64))
+    }
+
+    fn visit_str<E>(self, word: &str) -> Result<AxisValue, E> {
+        Ok(AxisValue::Word(word.to_owned()))
     }
 }

@@ -11,16 +11,16 @@ use crate::protocol::best;
 pub struct Best;
 
 const COLUMNS: &[Column] = &[
-    Column {
-        name: "alpha_2",
-        kind: Kind::Quantity(Quantity::Alpha2),
-        doc: "coefficient of t of the best shortcut; in the unit of the spec's alpha_2, 1/t_f if it has none",
-    },
-    Column {
-        name: "alpha_3",
-        kind: Kind::Quantity(Quantity::Alpha3),
-        doc: "coefficient of t^2 of the best shortcut; in the unit of the spec's alpha_3, 1/t_f^2 if it has none",
-    },
+    Column::new(
+        "alpha_2",
+        Kind::Quantity(Quantity::Alpha2),
+        "coefficient of t of the best shortcut; in the unit of the spec's alpha_2, 1/t_f if it has none",
+    ),
+    Column::new(
+        "alpha_3",
+        Kind::Quantity(Quantity::Alpha3),
+        "coefficient of t^2 of the best shortcut; in the unit of the spec's alpha_3, 1/t_f^2 if it has none",
+    ),
     Column::number("work", "mu_0 sigma l", "work of friction W_s of the best shortcut"),
     Column::number("work_optimal", "mu_0 sigma l", "least work of friction W* of any protocol"),
     Column::number("gap", "1", "(W_s - W*)/W*, computed without cancellation"),

@@ -22,12 +22,24 @@ pub struct Column {
     pub kind: Kind,
     /// Its meaning in one line.
     pub doc: &'static str,
+    /// Whether it is written only if a spec names it.
+    pub optional: bool,
 }
 
 impl Column {
     /// A column of numbers in `unit`.
     pub const fn number(name: &'static str, unit: &'static str, doc: &'static str) -> Column {
-        Column { name, kind: Kind::Number(unit), doc }
+        Column::new(name, Kind::Number(unit), doc)
+    }
+
+    /// A column of this kind.
+    pub const fn new(name: &'static str, kind: Kind, doc: &'static str) -> Column {
+        Column { name, kind, doc, optional: false }
+    }
+
+    /// The same, written only if a spec names it.
+    pub const fn optional(self) -> Column {
+        Column { optional: true, ..self }
     }
 
     /// The unit of its values in a sweep over `grid`; empty for words.

@@ -96,7 +96,8 @@ struct Group {
 }
 
 struct Prepared {
-    landscape: Landscape,
+    /// `None` where no protocol with `v >= 1` is fast enough, so that every row is infeasible.
+    landscape: Option<Landscape>,
     /// Status and `W*` of the optimal protocol, where it is asked for.
     optimum: Option<(Status, Option<f64>)>,
 }
@@ -252,12 +253,17 @@ fn evaluate(job: &Job<'_>, groups: &[Group], coefficients: &Coefficients<'_>, ch
         coefficients.fill(place..place + length, point[Quantity::Time], [&mut a_2, &mut a_3]);
         place += length;
 
+        let Some(landscape) = &prepared.landscape else {
+            now.status.fill(Status::Infeasible);
+            continue;
+        };
+
         let [work_s, work_optimal, gap, v_min] = now.columns;
         let with_gap = !gap.is_empty();
         let works = if work_s.is_empty() && with_gap { buffer(&mut work_buffer, length) } else { work_s };
         let v_min = if v_min.is_empty() { buffer(&mut v_min_buffer, length) } else { v_min };
         let out = Shortcuts { work: &mut *works, v_min: &mut *v_min, status: &mut *now.status };
-        work += Work::from(prepared.landscape.evaluate(&a_2, &a_3, out));
+        work += Work::from(landscape.evaluate(&a_2, &a_3, out));
 
         for (i, status) in now.status.iter().enumerate() {
             if *status == Status::NotConverged {
@@ -293,14 +299,17 @@ fn buffer(buffer: &mut Vec<f64>, length: usize) -> &mut [f64] {
 }
 
 fn prepare(job: &Job<'_>, group: &Group, point: &Point, work: &mut Work) -> Prepared {
-    let transition = transition(point);
+    let (transition, t_f) = (transition(point), point[Quantity::Time]);
+    if job.bounded && t_f < transition.least_time() {
+        return Prepared { landscape: None, optimum: None };
+    }
     work.landscapes += 1;
     let optimum = Gap.needs_optimum(job.selection).then(|| {
         let (solved, spent) = job.optima.get(group.tuple, point);
         *work += spent;
         (solved.status, solved.value.map(|optimum| optimum.work))
     });
-    Prepared { landscape: Landscape::new(&transition, point[Quantity::Time], job.rtol), optimum }
+    Prepared { landscape: Some(Landscape::new(&transition, t_f, job.rtol)), optimum }
 }
 
 /// Brings a sheet from the order of computation into the order of rows.

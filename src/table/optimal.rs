@@ -19,11 +19,11 @@ const COLUMNS: &[Column] = &[
     Column::number("hold_time", "l/v_0", "time spent on the bound v = 1"),
     Column::number("hamiltonian", "mu_0 sigma v_0", "dW*/dt_f"),
     Column::number("theta_max", "l/v_0", "largest contact lifetime on the way"),
-    Column {
-        name: "strategy",
-        kind: Kind::Label(STRATEGIES),
-        doc: "how it starts: speed_up v(0+) > v_i, slow_down 1 < v(0+) <= v_i, hold on the bound v = 1",
-    },
+    Column::new(
+        "strategy",
+        Kind::Label(STRATEGIES),
+        "how it starts: speed_up v(0+) > v_i, slow_down 1 < v(0+) <= v_i, hold on the bound v = 1",
+    ),
 ];
 
 impl Table for Optimal {

@@ -65,6 +65,8 @@ pub struct Work {
     pub landscapes: u64,
     /// Best shortcuts searched.
     pub best: u64,
+    /// Shortcuts of a family solved.
+    pub swifts: u64,
     /// Transitions whose crossover times were computed.
     pub crossovers: u64,
     /// Quadratures, all solves together.
@@ -78,6 +80,7 @@ impl std::ops::AddAssign for Work {
         self.optima += other.optima;
         self.landscapes += other.landscapes;
         self.best += other.best;
+        self.swifts += other.swifts;
         self.crossovers += other.crossovers;
         self.quadratures += other.quadratures;
         self.nodes += other.nodes;

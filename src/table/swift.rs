@@ -1,0 +1,113 @@
+//! `swift`: the members of the shortcut families that solve a transition.
+
+use std::ops::Range;
+
+use super::optima::transition;
+use super::{Column, Job, Kind, Selection, Sheet, Stopped, Table, Work, rows};
+use crate::grid::Quantity;
+use crate::protocol::swift::{Case, FAMILIES, Obstacle};
+use crate::protocol::{Effort, Status};
+
+/// One row a transition, time, family and bound on friction.
+pub struct Swift;
+
+const WORK_OPTIMAL: usize = 2;
+const GAP: usize = 3;
+
+const COLUMNS: &[Column] = &[
+    Column::number(
+        "alpha",
+        "1; (v_0/l)^2 for bounded_velocity",
+        "parameter of the family, alpha_3 of the paper; null for step and cubic, which have none",
+    ),
+    Column::number("work", "mu_0 sigma l", "work of friction W_s"),
+    Column::number("work_optimal", "mu_0 sigma l", "least work of friction W* of any protocol"),
+    Column::number("gap", "1", "(W_s - W*)/W*, good to rtol of 1; below 0 for a step that has not arrived"),
+    Column::number("v_min", "v_0", "least velocity between the ends"),
+    Column::number("v_max", "v_0", "greatest velocity between the ends"),
+    Column::number("friction_max", "mu_0 sigma", "greatest friction between the ends"),
+    Column::number("end_error", "1", "theta(t_f) v_f - 1: how far from its target a step is; 0 for the other families")
+        .optional(),
+    Column::new("bound", Kind::Label(&Obstacle::NAMES), "which bound makes the row infeasible").optional(),
+];
+
+impl Table for Swift {
+    fn name(&self) -> &'static str {
+        "swift"
+    }
+
+    fn doc(&self) -> &'static str {
+        "the shortcut of a family"
+    }
+
+    fn axes(&self) -> &'static [Quantity] {
+        &[
+            Quantity::Time,
+            Quantity::A,
+            Quantity::B,
+            Quantity::InitialVelocity,
+            Quantity::FinalVelocity,
+            Quantity::Family,
+            Quantity::FrictionBound,
+        ]
+    }
+
+    fn columns(&self) -> &'static [Column] {
+        COLUMNS
+    }
+
+    fn rows_per_part(&self) -> u64 {
+        1 << 14
+    }
+
+    fn needs_optimum(&self, selection: &Selection) -> bool {
+        selection.has_any([WORK_OPTIMAL, GAP])
+    }
+
+    fn compute(&self, job: &Job<'_>, range: Range<u64>, sheet: &mut Sheet) -> Result<Work, Stopped> {
+        rows::each(job, range, (COLUMNS.len(), 16), sheet, |row, point, cells| {
+            let case = Case {
+                transition: transition(point),
+                t_f: point[Quantity::Time],
+                tau_max: point[Quantity::FrictionBound],
+            };
+            let mut effort = Effort::default();
+            let least = case.transition.least_time();
+            let solved = match FAMILIES.get(point[Quantity::Family] as usize) {
+                _ if job.bounded && case.t_f < least => Err(Obstacle::Time { t_min: least }),
+                Some(family) => family.solve(&case, job.rtol, &mut effort),
+                None => Err(Obstacle::Domain),
+            };
+            let mut work = Work { swifts: 1, ..Work::from(effort) };
+            let swift = match solved {
+                Ok(swift) => swift,
+                Err(obstacle) => {
+                    cells[COLUMNS.len() - 1] = obstacle.code() as f64;
+                    return (obstacle.status(), work);
+                }
+            };
+            let mut status = swift.status();
+            let mut work_optimal = f64::NAN;
+            if self.needs_optimum(job.selection) {
+                let (optimum, spent) = job.optima.get(job.tuples.of(row), point);
+                work += spent;
+                work_optimal = optimum.value.map_or(f64::NAN, |optimum| optimum.work);
+                if matches!(optimum.status, Status::Nonphysical | Status::NotConverged) {
+                    status = optimum.status;
+                }
+            }
+            cells.copy_from_slice(&[
+                swift.alpha.unwrap_or(f64::NAN),
+                swift.work,
+                work_optimal,
+                (swift.work - work_optimal) / work_optimal,
+                swift.v_min,
+                swift.v_max,
+                swift.friction_max,
+                swift.miss,
+                f64::NAN,
+            ]);
+            (status, work)
+        })
+    }
+}
