@@ -66,9 +66,12 @@ pub fn chunk(cells: &[f64], present: &Runs) -> Chunk {
     }
 }
 
-/// Numbers that repeat for long, such as the optimal work along a landscape: each of them, and the runs of their
-/// places; `None` for a column that is better written number by number.
-fn repeating(values: &[f64]) -> Option<(Vec<f64>, Vec<(usize, usize)>)> {
+/// Numbers as they follow each other, and the runs of their places.
+type Repeated = (Vec<f64>, Vec<(usize, usize)>);
+
+/// Numbers that repeat for long, such as the optimal work along a landscape; `None` for a column that is better written
+/// number by number.
+fn repeating(values: &[f64]) -> Option<Repeated> {
     let changes_allowed = values.len().div_ceil(16);
     let mut distinct = vec![*values.first()?];
     let mut runs = Vec::new();
