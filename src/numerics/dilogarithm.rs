@@ -1,4 +1,4 @@
-//! The real dilogarithm on the unit interval.
+//! The real dilogarithm.
 
 use super::elementary::{ln, ln_1p};
 
@@ -15,12 +15,15 @@ const BERNOULLI: [f64; 9] = [
     43867.0 / 97072790126247936000.0,
 ];
 
-/// `Li_2(x) = -int_0^x ln(1 - y)/y dy` for `0 <= x <= 1`, to a few units in the last place.
+/// `Li_2(x) = -int_0^x ln(1 - y)/y dy` for `x <= 1`, to a few units in the last place.
 ///
-/// Below one half a series in `-ln(1 - x)`, above it Euler's reflection `Li_2(x) + Li_2(1 - x) = pi^2/6 - ln x ln(1 -
-/// x)`.
+/// From -1 to one half a series in `-ln(1 - x)`, above it Euler's reflection `Li_2(x) + Li_2(1 - x) = pi^2/6 - ln x ln(1
+/// - x)`, below -1 the inversion `Li_2(x) + Li_2(1/x) = -pi^2/6 - ln(-x)^2/2` (DLMF 25.12.4 and 25.12.6).
 pub fn dilogarithm(x: f64) -> f64 {
-    if x <= 0.5 {
+    if x < -1.0 {
+        let l = ln(-x);
+        -(std::f64::consts::PI * std::f64::consts::PI / 6.0 + 0.5 * l * l) - dilogarithm(1.0 / x)
+    } else if x <= 0.5 {
         let l = -ln_1p(-x);
         let l2 = l * l;
         let tail = BERNOULLI.iter().rev().fold(0.0, |sum, &c| sum * l2 + c);

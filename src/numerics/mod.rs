@@ -6,6 +6,7 @@ pub mod double_double;
 pub mod elementary;
 pub mod gauss;
 pub mod lanes;
+pub mod polynomial;
 pub mod radau;
 pub mod root;
 pub mod turning;

@@ -212,6 +212,12 @@ impl Panel {
         Panel { side: self.side, from: self.to, to: self.from }
     }
 
+    /// The panel, no longer than `most`.
+    pub fn shortened(&self, most: f64) -> Panel {
+        let length = (self.to - self.from).abs();
+        if length <= most { *self } else { Panel { to: self.from + most * (self.to - self.from) / length, ..*self } }
+    }
+
     pub fn is_empty(&self) -> bool {
         self.from == self.to
     }

@@ -40,8 +40,13 @@ impl Family for BoundedVelocity {
     fn solve(&self, case: &Case, rtol: f64, effort: &mut Effort) -> Result<Swift, Obstacle> {
         let curve = member(case, rtol, effort)?;
         let (law, v_i, v_f) = (case.transition.law, case.transition.v_i, case.transition.v_f);
+        if v_i == v_f {
+            let friction_max = 1.0 + (law.a - law.b) * ln(v_i);
+            let work = friction_max * v_i * case.t_f;
+            return Ok(Swift { alpha: Some(0.0), work, v_min: v_i, v_max: v_i, friction_max, miss: 0.0 });
+        }
         let mut passage = Passage { work: 0.0, friction_max: f64::NEG_INFINITY };
-        let theta = pass(&curve, v_i, rtol, reach(rtol), effort, |panel| panel.gather(&law, &curve, rtol, &mut passage));
+        let theta = pass(&curve, v_i, rtol, 0.75 * reach(rtol), effort, |panel| panel.gather(&law, &curve, rtol, &mut passage));
         let arrived = (theta * v_f - 1.0).abs() <= 10.0 * rtol + ROUNDING;
         if !arrived || !passage.work.is_finite() {
             return Err(Obstacle::NotConverged);
@@ -99,5 +104,5 @@ fn member(case: &Case, rtol: f64, effort: &mut Effort) -> Result<Curve, Obstacle
 /// variation `r` is interpolated to `2 (r/4)^n/n!`.
 fn reach(rtol: f64) -> f64 {
     let factorial: f64 = (1..=NODES).map(|k| k as f64).product();
-    (4.0 * exp(ln(0.05 * rtol * factorial) / NODES as f64)).clamp(2.0, 8.0)
+    (4.0 * exp(ln(0.01 * rtol * factorial) / NODES as f64)).clamp(2.0, 6.0)
 }

@@ -7,7 +7,7 @@
 use multiversion::multiversion;
 
 use super::arrival::total;
-use super::curve::{Curve, Panel};
+use super::curve::{Curve, Panel, Side};
 use crate::model::Law;
 use crate::numerics::elementary::{exp, ln};
 use crate::numerics::radau::{NODES, Nodes, Radau, radau};
@@ -42,17 +42,25 @@ pub(super) fn pass(
     mut visit: impl FnMut(&Resolved),
 ) -> f64 {
     let rule = radau();
-    let (mut theta, mut rate, mut slip) = (1.0 / v_i, 0.0, 0.0);
-    // The distance from the slow solution at the start, relative, has to fall below rtol before it may be ignored.
-    let off = curve.slope(0.0, 1.0).abs() * curve.w_i / (v_i * v_i * curve.t_f);
-    let forgotten = ln(off.clamp(rtol, 1.0) / rtol) + 3.0;
+    let (mut theta, mut rate) = (1.0 / v_i, 0.0);
+    // Slip since theta last left the slow solution, and by which share: at the start, or where v changes too fast.
+    let (mut slip, mut off) = (0.0, lag(curve, Side::Start, 0.0));
     effort.quadratures += 1;
     for stretch in curve.stretches().forward() {
         let mut d = stretch.from;
         while d != stretch.to {
             let mut panel = curve.panel(&stretch, d, reach);
-            let stiff = slip >= forgotten && curve.stiffness(&panel) > reach;
-            panel = if stiff { curve.panel(&stretch, d, STIFF * reach) } else { curve.cut(panel, reach) };
+            if lag(curve, stretch.side, d) > SLOW {
+                (slip, off) = (0.0, 1.0);
+            }
+            let forgotten = slip >= ln(off.clamp(rtol, 1.0) / rtol) + 3.0;
+            let stiff = forgotten && curve.stiffness(&panel) > reach;
+            panel = if stiff {
+                curve.panel(&stretch, d, STIFF * reach)
+            } else {
+                // Since theta' <= 1, theta has no zero nearer behind than its own size: ln theta is smooth on that scale.
+                curve.cut(panel, reach).shortened(reach * theta / curve.t_f)
+            };
             if panel.to == d {
                 return f64::NAN;
             }
@@ -68,8 +76,19 @@ pub(super) fn pass(
     theta
 }
 
+/// The relative change of v in the time in which theta follows: how far theta is from `1/v`, relative, where it follows.
+fn lag(curve: &Curve, side: Side, d: f64) -> f64 {
+    let (x, z) = Curve::place(side, d);
+    let w = curve.surplus(side, d);
+    curve.slope(x, z).abs() * w / ((1.0 + w) * (1.0 + w) * curve.t_f)
+}
+
+/// Greatest lag at which theta follows v without leaving the slow solution: what it leaves it by is exponentially small in
+/// the inverse of the lag.
+const SLOW: f64 = 0.02;
+
 /// How much less the exponent may vary over a panel on which theta is not given in closed form.
-const STIFF: f64 = 0.5;
+const STIFF: f64 = 0.6;
 
 #[multiversion(targets(
     "x86_64+avx+avx2+bmi1+bmi2+avx512f+avx512bw+avx512cd+avx512dq+avx512vl",
@@ -147,6 +166,7 @@ impl Resolved {
     }
 
     /// `x` and `z` at a share `u` of the panel.
+    #[inline(always)]
     pub fn place(&self, u: f64) -> (f64, f64) {
         Curve::place(self.panel.side, self.panel.from * (1.0 - u) + self.panel.to * u)
     }
@@ -159,17 +179,17 @@ impl Resolved {
     /// Adds the work of the panel, and raises the greatest friction to what is found on it, good to `rtol`.
     pub fn gather(&self, law: &Law, curve: &Curve, rtol: f64, passage: &mut Passage) {
         let rule = radau();
-        let (friction, power) = frictions(law, &self.v, &self.theta, rule);
+        let (friction, rise, power) = frictions(law, curve, self, rule);
         passage.work += self.duration(curve) * power;
+        let v = 1.0 + curve.surplus(self.panel.side, self.panel.from);
         let mut before = Sample {
             u: 0.0,
-            friction: friction_at(law, 1.0 + curve.surplus(self.panel.side, self.panel.from), self.theta_start),
-            rise: self.rise(law, curve, 0.0, self.theta_start, self.rate_start),
+            friction: friction_at(law, v, self.theta_start),
+            rise: self.rise(law, curve, 0.0, v, self.theta_start, self.rate_start),
         };
         passage.friction_max = passage.friction_max.max(before.friction);
         for j in 0..NODES {
-            let rise = self.rise(law, curve, rule.u[j], self.theta[j], self.rate[j]);
-            let after = Sample { u: rule.u[j], friction: friction[j], rise };
+            let after = Sample { u: rule.u[j], friction: friction[j], rise: rise[j] };
             passage.friction_max = passage.friction_max.max(after.friction);
             // The tangent bounds a maximum in between.
             if before.rise > 0.0
@@ -184,11 +204,11 @@ impl Resolved {
     }
 
     /// `dtau/du = a v'/v + b theta'/theta`.
-    fn rise(&self, law: &Law, curve: &Curve, u: f64, theta: f64, rate: f64) -> f64 {
+    #[inline(always)]
+    fn rise(&self, law: &Law, curve: &Curve, u: f64, v: f64, theta: f64, rate: f64) -> f64 {
         let (x, z) = self.place(u);
-        let w = curve.w_f * exp(curve.exponent(x, z));
         let length = (self.panel.to - self.panel.from).abs();
-        length * (law.a * curve.slope(x, z) * (w / (1.0 + w)) + law.b * curve.t_f * rate / theta)
+        length * (law.a * curve.slope(x, z) * (1.0 - 1.0 / v) + law.b * curve.t_f * rate / theta)
     }
 
     /// The greatest friction between two samples where it first rises and then falls: the root of `tau'` by the
@@ -204,7 +224,7 @@ impl Resolved {
             let rate = rule.interpolate(self.rate_start, &self.rate, u);
             let (x, z) = self.place(u);
             let v = 1.0 + curve.w_f * exp(curve.exponent(x, z));
-            let rise = self.rise(law, curve, u, theta, rate);
+            let rise = self.rise(law, curve, u, v, theta, rate);
             let friction = friction_at(law, v, theta);
             greatest = greatest.max(friction);
             // What is left to gain is less than the rise over the bracket.
@@ -239,20 +259,25 @@ struct Sample {
 const MOST_STEPS: u32 = 60;
 
 /// `tau = 1 + a ln v + b ln theta`.
+#[inline(always)]
 pub(super) fn friction_at(law: &Law, v: f64, theta: f64) -> f64 {
     1.0 + law.a * ln(v) + law.b * ln(theta)
 }
 
-/// Friction at the nodes, and `int tau v du`.
+/// Friction and its slope at the nodes, and `int tau v du`.
 #[multiversion(targets(
     "x86_64+avx+avx2+bmi1+bmi2+avx512f+avx512bw+avx512cd+avx512dq+avx512vl",
     "x86_64+avx+avx2+bmi1+bmi2"
 ))]
-fn frictions(law: &Law, v: &Nodes, theta: &Nodes, rule: &Radau) -> (Nodes, f64) {
-    let (mut tau, mut power) = ([0.0; NODES], [0.0; NODES]);
+fn frictions(law: &Law, curve: &Curve, resolved: &Resolved, rule: &Radau) -> (Nodes, Nodes, f64) {
+    let Resolved { v, theta, rate, .. } = resolved;
+    let (mut tau, mut rise, mut power) = ([0.0; NODES], [0.0; NODES], [0.0; NODES]);
     for j in 0..NODES {
         tau[j] = friction_at(law, v[j], theta[j]);
         power[j] = rule.w[j] * tau[j] * v[j];
     }
-    (tau, total(&power))
+    for j in 0..NODES {
+        rise[j] = resolved.rise(law, curve, rule.u[j], v[j], theta[j], rate[j]);
+    }
+    (tau, rise, total(&power))
 }

@@ -1,0 +1,45 @@
+//! The real roots of a polynomial on an interval, all of them: bracketed between the roots of its derivative.
+
+/// `c[0] + c[1] x + c[2] x^2 + …` at `x`, and its slope there.
+pub fn value_and_slope(c: &[f64], x: f64) -> (f64, f64) {
+    c.iter().rev().fold((0.0, 0.0), |(value, slope), &c| (value * x + c, slope * x + value))
+}
+
+/// The places in `(low, high)` where the polynomial changes sign, rising, each to the last digits that its value allows.
+pub fn roots_between(c: &[f64], low: f64, high: f64) -> Vec<f64> {
+    if c.len() < 2 {
+        return Vec::new();
+    }
+    let derivative: Vec<f64> = c.iter().enumerate().skip(1).map(|(k, &c)| k as f64 * c).collect();
+    let mut ends = roots_between(&derivative, low, high);
+    ends.insert(0, low);
+    ends.push(high);
+    ends.windows(2).filter_map(|piece| root_of_monotone(c, piece[0], piece[1])).collect()
+}
+
+/// Newton's method inside a bracket, which a step that leaves it halves.
+fn root_of_monotone(c: &[f64], mut low: f64, mut high: f64) -> Option<f64> {
+    let (first, last) = (value_and_slope(c, low).0, value_and_slope(c, high).0);
+    if !((first < 0.0 && last > 0.0) || (first > 0.0 && last < 0.0)) {
+        return None;
+    }
+    let mut x = 0.5 * (low + high);
+    for _ in 0..MOST_STEPS {
+        let (value, slope) = value_and_slope(c, x);
+        if (value < 0.0) == (first < 0.0) {
+            low = x;
+        } else {
+            high = x;
+        }
+        let newton = x - value / slope;
+        let next = if newton > low && newton < high { newton } else { 0.5 * (low + high) };
+        if (next - x).abs() <= f64::EPSILON * x.abs() {
+            return Some(next);
+        }
+        x = next;
+    }
+    Some(x)
+}
+
+/// More steps than halving from 1 down to 1e-16 and a few of Newton's take.
+const MOST_STEPS: u32 = 100;
