@@ -47,13 +47,13 @@ impl Radau {
             return start;
         }
         let (mut above, mut below) = (0.0, 0.0);
-        for j in 0..NODES {
-            let distance = u - self.u[j];
+        for ((&node, &value), &weight) in self.u.iter().zip(f).zip(&self.barycentric) {
+            let distance = u - node;
             if distance == 0.0 {
-                return f[j];
+                return value;
             }
-            let share = self.barycentric[j] / distance;
-            above += share * f[j];
+            let share = weight / distance;
+            above += share * value;
             below += share;
         }
         let share = self.barycentric[NODES] / u;

@@ -3,8 +3,8 @@
 
     venv/bin/python generate_swift_velocity.py
 
-Arithmetic: 40 digits and more where differences cancel; work and friction of bounded_velocity are good to 16. The slip of bounded_velocity is in closed form (error functions), theta a tanh-sinh
-quadrature of the solution of theta' = 1 - theta v, its parameter a bracketed root. Work is a quadrature over quadratures of 48 nodes, cut where the
+Arithmetic: 40 digits and more where differences cancel; work and friction of bounded_velocity are good to 16. The slip of bounded_velocity is in closed form (error functions), theta a Gauss
+quadrature of 96 nodes a cut of the solution of theta' = 1 - theta v, its parameter a bracketed root. Work is a quadrature over quadratures of 48 nodes, cut where the
 velocity or theta changes, and checked against 24 nodes. Extrema: the greatest of a grid, then a root of the derivative. No collocation, no dilogarithm.
 Inputs are doubles, written by repr and used exactly. A row whose time is close to t_min has its t_f as a double, and t_min in full.
 """
@@ -134,7 +134,7 @@ class Bounded:
 
         with mp.workdps(coarse or digits):
             places = sorted(x - c for c in set(cuts))
-            value = self.t_f * (gauss(share, places) if coarse else quad(share, places))
+            value = self.t_f * gauss(share, places, 5 if coarse else 6)
         return value + (exp(-whole) * before if least == first else 0)
 
     def layers(self):
@@ -241,8 +241,8 @@ def bounded_velocity(a, b, v_i, v_f, t_f):
         return a * (l - c + 2 * c * x) * w / (1 + w) / t_f + b * (1 / theta - 1 - w)
 
     cuts = {mpf(0), mpf(1), *curve.layers()}
-    # The relaxation of theta at the start.
-    for slip in (mpf("0.3"), 3, 12, 30):
+    # The relaxation of theta at the start; at v = 1 theta grows from 1/v_i by itself, and ln theta like a logarithm.
+    for slip in [mpf("0.3"), 3, 12, 30] + [4**k for k in range(3, 20) if spare < t_f / 2]:
         x = slip / (v_i * t_f)
         if x < mpf("0.1"):
             cuts.add(x)

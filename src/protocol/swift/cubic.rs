@@ -39,7 +39,14 @@ impl Family for Cubic {
         }
         let extrema = curve.extrema(case.transition.law.a, case.transition.law.b - case.transition.law.a);
         let frictions = extrema.into_iter().map(|(side, d)| curve.friction(side, d));
-        Ok(Swift { alpha: None, work, v_min, v_max, friction_max: frictions.fold(f64::NEG_INFINITY, f64::max), miss: 0.0 })
+        Ok(Swift {
+            alpha: None,
+            work,
+            v_min,
+            v_max,
+            friction_max: frictions.fold(f64::NEG_INFINITY, f64::max),
+            miss: 0.0,
+        })
     }
 
     fn motion(&self, case: &Case, _rtol: f64) -> Result<Box<dyn Motion>, Obstacle> {
@@ -110,7 +117,7 @@ impl Curve {
     }
 
     fn velocity(&self, side: Side, d: f64) -> f64 {
-        if d == 0.0 {
+        if d == 0.0 || self.rise == 0.0 {
             return if side == Side::Start { self.v_i } else { self.v_f };
         }
         let n = if self.rise > 0.0 {

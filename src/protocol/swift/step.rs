@@ -103,7 +103,8 @@ impl Motion for Relaxation {
 
     fn at(&self, s: f64) -> Moment {
         let s = s.clamp(0.0, 1.0);
-        let (p, t) = if s < 1.0 { (self.stretched(s), self.stretched(s) / self.v_f) } else { (self.v_f * self.t_f, self.t_f) };
+        let (p, t) =
+            if s < 1.0 { (self.stretched(s), self.stretched(s) / self.v_f) } else { (self.v_f * self.t_f, self.t_f) };
         let ln_ratio = self.decay.ln_at(p);
         Moment {
             t: t.min(self.t_f),

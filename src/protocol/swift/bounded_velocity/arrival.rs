@@ -38,6 +38,8 @@ pub(super) struct Problem {
 /// Integrals behind a place, in the direction from `t_f` to 0.
 #[derive(Debug, Clone, Copy)]
 struct Behind {
+    /// `v` at the place.
+    v: f64,
     /// Slip `int v dt` and its derivative `int x (1 - x)(v - 1) dt` with respect to `-c`.
     slip: f64,
     turn: f64,
@@ -95,7 +97,7 @@ impl Problem {
     /// The integrals over the whole protocol; `None` where the velocity is so large that theta ends at 0.
     fn behind(&self, curve: &Curve, rtol: f64, reach: f64, effort: &mut Effort) -> Option<Behind> {
         let rule = radau();
-        let mut behind = Behind { slip: 0.0, turn: 0.0, sum: 0.0, slope: 0.0 };
+        let mut behind = Behind { v: self.v_f, slip: 0.0, turn: 0.0, sum: 0.0, slope: 0.0 };
         effort.quadratures += 1;
         // Bounds on the integrals without e^-R.
         let most = 1.0 + self.v_f * curve.t_f + self.v_f / self.v_i;
@@ -103,7 +105,8 @@ impl Problem {
         for stretch in curve.stretches().backward() {
             let mut d = stretch.from;
             while d != stretch.to {
-                let panel = curve.cut(curve.panel(&stretch, d, reach), reach);
+                let panel = curve.panel(&stretch, d, reach);
+                let panel = curve.cut(panel, behind.v, curve.last(&panel), reach);
                 if panel.to == d || behind.slip.is_nan() || behind.slip > MOST_SLIP {
                     return None;
                 }
@@ -156,6 +159,7 @@ impl Problem {
                 slope[j] = weight * (xzw[j] - q * excess[j]);
             }
         }
+        behind.v = 1.0 + w[NODES - 1];
         behind.slip += slip[NODES - 1];
         behind.turn += h * turn[NODES - 1];
         behind.sum += total(&sum);

@@ -134,7 +134,8 @@ impl Curve {
             let d = 2.0 * fall / (-slope + (slope * slope - 4.0 * self.c * fall).max(0.0).sqrt());
             if fall > 0.0 && d < rise { d } else { 0.0 }
         };
-        let whole = |side, meeting| [Panel { side, from: 0.0, to: meeting }, Panel { side, from: meeting, to: meeting }];
+        let whole =
+            |side, meeting| [Panel { side, from: 0.0, to: meeting }, Panel { side, from: meeting, to: meeting }];
         let parts = |side, meeting: f64, slope: f64, end: f64| {
             if !quiet {
                 return whole(side, meeting);
@@ -184,18 +185,23 @@ impl Curve {
         self.level(x, z)
     }
 
-    /// Duration of a panel times the greatest velocity at its ends: at least its slip where v is monotone.
-    #[inline(always)]
-    pub fn stiffness(&self, panel: &Panel) -> f64 {
-        let greater = self.surplus(panel.side, panel.from).max(self.surplus(panel.side, panel.to));
-        self.t_f * (panel.to - panel.from).abs() * (1.0 + greater)
+    /// `v` at the end of a panel.
+    pub fn last(&self, panel: &Panel) -> f64 {
+        1.0 + self.surplus(panel.side, panel.to)
     }
 
-    /// The panel, cut so that its stiffness is about `reach` at most.
-    pub fn cut(&self, panel: Panel, reach: f64) -> Panel {
-        let Panel { side, from, to } = panel;
-        let (first, last) = (1.0 + self.surplus(side, from), 1.0 + self.surplus(side, to));
-        let length = (to - from).abs();
+    /// Duration of a panel times the greater velocity of its ends, `first` and `last`: at least its slip where v is
+    /// monotone.
+    pub fn stiffness(&self, panel: &Panel, first: f64, last: f64) -> f64 {
+        self.t_f * (panel.to - panel.from).abs() * first.max(last)
+    }
+
+    /// The panel, cut so that its stiffness is about `reach` at most; `first` and `last` are the velocities at its ends.
+    pub fn cut(&self, panel: Panel, first: f64, last: f64, reach: f64) -> Panel {
+        if self.stiffness(&panel, first, last) <= reach {
+            return panel;
+        }
+        let length = (panel.to - panel.from).abs();
         let mut h = reach / (self.t_f * first);
         if last > first {
             // h v(h) = h_0 v(0) with v exponential: the slip as a start, then Newton's step, which ends below.
@@ -203,7 +209,7 @@ impl Curve {
             let slip = ln_1p(rate * h) / rate;
             h = slip * (1.0 - (ln(slip / h) + rate * slip) / (1.0 + rate * slip));
         }
-        Panel { side, from, to: if h >= length { to } else { from + h * (to - from) / length } }
+        panel.shortened(h)
     }
 }
 

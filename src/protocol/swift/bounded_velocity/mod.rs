@@ -46,7 +46,8 @@ impl Family for BoundedVelocity {
             return Ok(Swift { alpha: Some(0.0), work, v_min: v_i, v_max: v_i, friction_max, miss: 0.0 });
         }
         let mut passage = Passage { work: 0.0, friction_max: f64::NEG_INFINITY };
-        let theta = pass(&curve, v_i, rtol, 0.75 * reach(rtol), effort, |panel| panel.gather(&law, &curve, rtol, &mut passage));
+        let theta =
+            pass(&curve, v_i, rtol, 0.75 * reach(rtol), effort, |panel| panel.gather(&law, &curve, rtol, &mut passage));
         let arrived = (theta * v_f - 1.0).abs() <= 10.0 * rtol + ROUNDING;
         if !arrived || !passage.work.is_finite() {
             return Err(Obstacle::NotConverged);

@@ -13,10 +13,11 @@ use crate::numerics::elementary::{exp, ln};
 use crate::numerics::radau::{NODES, Nodes, Radau, radau};
 use crate::protocol::Effort;
 
-/// One panel with theta at its start and at its nodes.
+/// One panel with v and theta at its start and at its nodes.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Resolved {
     pub panel: Panel,
+    v_start: f64,
     theta_start: f64,
     theta: Nodes,
     /// `theta'` at the start and at the nodes, accurate where it is small beside 1.
@@ -42,31 +43,33 @@ pub(super) fn pass(
     mut visit: impl FnMut(&Resolved),
 ) -> f64 {
     let rule = radau();
-    let (mut theta, mut rate) = (1.0 / v_i, 0.0);
+    let (mut v, mut theta, mut rate) = (v_i, 1.0 / v_i, 0.0);
     // Slip since theta last left the slow solution, and by which share: at the start, or where v changes too fast.
-    let (mut slip, mut off) = (0.0, lag(curve, Side::Start, 0.0));
+    let (mut slip, mut off) = (0.0, lag(curve, Side::Start, 0.0, v_i));
     effort.quadratures += 1;
     for stretch in curve.stretches().forward() {
         let mut d = stretch.from;
         while d != stretch.to {
             let mut panel = curve.panel(&stretch, d, reach);
-            if lag(curve, stretch.side, d) > SLOW {
+            if lag(curve, stretch.side, d, v) > SLOW {
                 (slip, off) = (0.0, 1.0);
             }
             let forgotten = slip >= ln(off.clamp(rtol, 1.0) / rtol) + 3.0;
-            let stiff = forgotten && curve.stiffness(&panel) > reach;
+            let last = curve.last(&panel);
+            let stiff = forgotten && curve.stiffness(&panel, v, last) > reach;
             panel = if stiff {
                 curve.panel(&stretch, d, STIFF * reach)
             } else {
                 // Since theta' <= 1, theta has no zero nearer behind than its own size: ln theta is smooth on that scale.
-                curve.cut(panel, reach).shortened(reach * theta / curve.t_f)
+                curve.cut(panel, v, last, reach).shortened(reach * theta / curve.t_f)
             };
             if panel.to == d {
                 return f64::NAN;
             }
             effort.nodes += NODES as u32;
-            let (resolved, slipped) = resolve(curve, panel, theta, rate, stiff, rule);
+            let (resolved, slipped) = resolve(curve, panel, [v, theta, rate], stiff, rule);
             visit(&resolved);
+            v = resolved.v[NODES - 1];
             theta = resolved.theta[NODES - 1];
             rate = resolved.rate[NODES - 1];
             slip += slipped;
@@ -77,10 +80,9 @@ pub(super) fn pass(
 }
 
 /// The relative change of v in the time in which theta follows: how far theta is from `1/v`, relative, where it follows.
-fn lag(curve: &Curve, side: Side, d: f64) -> f64 {
+fn lag(curve: &Curve, side: Side, d: f64, v: f64) -> f64 {
     let (x, z) = Curve::place(side, d);
-    let w = curve.surplus(side, d);
-    curve.slope(x, z).abs() * w / ((1.0 + w) * (1.0 + w) * curve.t_f)
+    curve.slope(x, z).abs() * (v - 1.0) / (v * v * curve.t_f)
 }
 
 /// Greatest lag at which theta follows v without leaving the slow solution: what it leaves it by is exponentially small in
@@ -94,7 +96,8 @@ const STIFF: f64 = 0.6;
     "x86_64+avx+avx2+bmi1+bmi2+avx512f+avx512bw+avx512cd+avx512dq+avx512vl",
     "x86_64+avx+avx2+bmi1+bmi2"
 ))]
-fn resolve(curve: &Curve, panel: Panel, theta_start: f64, rate_start: f64, stiff: bool, rule: &Radau) -> (Resolved, f64) {
+fn resolve(curve: &Curve, panel: Panel, start: [f64; 3], stiff: bool, rule: &Radau) -> (Resolved, f64) {
+    let [v_start, theta_start, rate_start] = start;
     let (x, z) = Curve::places(&panel, rule);
     let (w, _) = curve.surpluses(&x, &z);
     let h = curve.t_f * (panel.to - panel.from).abs();
@@ -117,18 +120,18 @@ fn resolve(curve: &Curve, panel: Panel, theta_start: f64, rate_start: f64, stiff
             rate[j] = 1.0 - theta[j] * v[j];
         }
     }
-    (Resolved { panel, theta_start, theta, rate_start, rate, v }, slip[NODES - 1])
+    (Resolved { panel, v_start, theta_start, theta, rate_start, rate, v }, slip[NODES - 1])
 }
 
 /// `theta'` at the nodes of a panel of length `h`, from `rate/v + h A rate = 1/v - theta_start` divided by `h`.
 #[inline(always)]
 fn collocate(rule: &Radau, h: f64, v: &Nodes, theta_start: f64) -> Nodes {
     let (mut rows, mut right) = ([[0.0; NODES]; NODES], [0.0; NODES]);
-    for j in 0..NODES {
-        for k in 0..NODES {
-            rows[j][k] = rule.columns[k][j];
+    for (j, row) in rows.iter_mut().enumerate() {
+        for (entry, column) in row.iter_mut().zip(&rule.columns) {
+            *entry = column[j];
         }
-        rows[j][j] += 1.0 / (h * v[j]);
+        row[j] += 1.0 / (h * v[j]);
         right[j] = (1.0 / v[j] - theta_start) / h;
     }
     for k in 0..NODES {
@@ -181,11 +184,10 @@ impl Resolved {
         let rule = radau();
         let (friction, rise, power) = frictions(law, curve, self, rule);
         passage.work += self.duration(curve) * power;
-        let v = 1.0 + curve.surplus(self.panel.side, self.panel.from);
         let mut before = Sample {
             u: 0.0,
-            friction: friction_at(law, v, self.theta_start),
-            rise: self.rise(law, curve, 0.0, v, self.theta_start, self.rate_start),
+            friction: friction_at(law, self.v_start, self.theta_start),
+            rise: self.rise(law, curve, 0.0, self.v_start, self.theta_start, self.rate_start),
         };
         passage.friction_max = passage.friction_max.max(before.friction);
         for j in 0..NODES {
