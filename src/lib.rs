@@ -8,6 +8,7 @@
 //! - [`grid`]: quantities, axes and the product of axes;
 //! - [`table`]: what a row means;
 //! - [`dataset`]: tables as Parquet parts on disk, and reading them back;
+//! - [`trace`]: one protocol over time;
 //! - [`sweep`]: a spec, checked, planned and run;
 //! - [`cli`]: the commands.
 
@@ -19,3 +20,4 @@ pub mod numerics;
 pub mod protocol;
 pub mod sweep;
 pub mod table;
+pub mod trace;

@@ -3,6 +3,7 @@
 mod plan;
 mod run;
 mod tables;
+mod trace;
 mod watch;
 mod words;
 
@@ -35,6 +36,8 @@ enum Command {
     Run(run::Arguments),
     /// Say what a spec would compute, and estimate time and size
     Plan(plan::Arguments),
+    /// Show one protocol over time: v, theta, friction
+    Trace(trace::Arguments),
     /// List all tables, their columns and units
     Tables,
 }
@@ -70,6 +73,7 @@ pub fn main() -> ExitCode {
     let done = match arguments.command {
         Command::Run(arguments) => run::run(&arguments),
         Command::Plan(arguments) => plan::plan(&arguments),
+        Command::Trace(arguments) => trace::trace(&arguments),
         Command::Tables => tables::tables(),
     };
     match done {
@@ -83,7 +87,13 @@ pub fn main() -> ExitCode {
 
 /// Writes `text` to standard output; that a reader has had enough is no failure.
 fn say(text: &str) -> Result<(), Failure> {
-    match io::stdout().write_all(text.as_bytes()) {
+    put(text.as_bytes())
+}
+
+/// The same for bytes.
+fn put(bytes: &[u8]) -> Result<(), Failure> {
+    let mut stdout = io::stdout();
+    match stdout.write_all(bytes).and_then(|()| stdout.flush()) {
         Err(error) if error.kind() != io::ErrorKind::BrokenPipe => {
             Err(Failure::failed(format!("cannot write to standard output: {error}")))
         }

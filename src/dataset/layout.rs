@@ -46,7 +46,8 @@ fn label() -> DataType {
     DataType::Dictionary(Box::new(DataType::Int32), Box::new(DataType::Utf8))
 }
 
-fn field(name: &str, kind: DataType, nullable: bool, unit: &str, doc: &str) -> Field {
+/// A field with its unit and meaning as metadata.
+pub fn field(name: &str, kind: DataType, nullable: bool, unit: &str, doc: &str) -> Field {
     let entries = [("unit", unit), ("description", doc)].map(|(key, value)| (key.to_owned(), value.to_owned()));
     Field::new(name, kind, nullable).with_metadata(HashMap::from(entries))
 }

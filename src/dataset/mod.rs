@@ -1,6 +1,6 @@
 //! Tables on disk: Parquet parts, the manifest beside them, and reading them back.
 
-mod atomic;
+pub(crate) mod atomic;
 mod chunk;
 mod dictionary;
 mod digest;
@@ -15,4 +15,5 @@ pub use digest::{Cell, Digest, ReadError, Row};
 pub use folder::{DatasetError, Folder, Identity, Manifest, ManifestTable};
 pub use footer::Footer;
 pub use layout::Layout;
+pub(crate) use layout::field;
 pub use part::encode;

@@ -6,11 +6,12 @@
 
 mod kernel;
 mod moments;
+mod motion;
 mod path;
 mod plan;
 mod rules;
 
-use super::{Effort, Status};
+use super::{Effort, Motion, Status};
 use crate::model::{Law, Transition};
 use crate::numerics::elementary::ln;
 use crate::numerics::gauss::rule;
@@ -78,6 +79,14 @@ impl Landscape {
     /// `theta_0`, `theta_1`, their difference `theta_1 - theta_0`, and `t_f`.
     pub(super) fn ends(&self) -> [f64; 4] {
         [self.ends.theta_0.high, self.ends.theta_1.high, self.ends.rise.high, self.ends.t_f]
+    }
+
+    /// The motion of one shortcut, given scaled; `None` where it is infeasible.
+    pub fn motion(&self, a_2: f64, a_3: f64) -> Option<Box<dyn Motion>> {
+        let mut status = [Status::Infeasible];
+        self.evaluate(&[a_2], &[a_3], Shortcuts { work: &mut [], v_min: &mut [], status: &mut status });
+        let motion = motion::FreeCubic::new(self.law, self.ends, a_2, a_3);
+        (status != [Status::Infeasible]).then(|| Box::new(motion) as Box<dyn Motion>)
     }
 
     /// Evaluates the shortcuts `(a_2[i], a_3[i])`, given scaled: `alpha_2 t_f` and `alpha_3 t_f^2`.

@@ -131,6 +131,11 @@ impl<'a> Path<'a> {
         (self.exact_theta().about(centre), [n0, n1, n2])
     }
 
+    /// `theta` and `n` at `x`, each right to the last bit.
+    pub fn at(&self, x: f64) -> (f64, f64) {
+        (self.exact_theta().at(x).high, self.exact_n().at(x).high)
+    }
+
     /// Status decided in double-double, and least velocity.
     pub fn judge(&self) -> (Status, f64) {
         let (_, place, _) = least_velocities(self.ends, &[self.a_2; LANES], &[self.a_3; LANES]);

@@ -152,28 +152,40 @@ impl Arc {
     }
 
     fn turning_sums(&self, theta_h: f64, x_start: f64, x_end: f64, x_squares: f64, tolerance: f64) -> Sums {
+        let (line, slice) = self.turning_line(theta_h, x_start, x_end, x_squares);
+        panels(&line, tolerance, |middle, half, rule| turning_kernel(&slice, middle, half, rule))
+    }
+
+    /// The turning chart as a line in `p`.
+    fn turning_line(&self, theta_h: f64, x_start: f64, x_end: f64, x_squares: f64) -> (Line<4>, TurningSlice) {
         let Law { a, b } = self.law;
         let c_h = self.friction_at_turn(theta_h);
         // Scale of the layer: w = X/layer near the turning point.
         let layer = (a / (2.0 * (c_h + a - b))).sqrt();
         let sigma = if LAYERS * layer < 1.0 { LAYERS * layer } else { 1.0 };
         let (s_start, s_end) = (x_start / sigma, x_end / sigma);
-        let p_start = asinh(s_start);
+        let start = asinh(s_start);
         let length = if x_start * x_end > 0.0 {
             let (r_start, r_end) = ((1.0 + s_start * s_start).sqrt(), (1.0 + s_end * s_end).sqrt());
             asinh(x_squares / (sigma * sigma) / (s_end * r_start + s_start * r_end))
         } else {
-            asinh(s_end) - p_start
+            asinh(s_end) - start
         };
         let branch = 2.0 * std::f64::consts::PI.sqrt() * layer / sigma;
         let (re, im) = asinh_diagonal(branch);
         let (far_re, far_im) = (acosh_inverse(sigma), std::f64::consts::FRAC_PI_2);
         let singular = [(re, im), (-re, im), (far_re, far_im), (-far_re, far_im)];
         let slice = TurningSlice { law: self.law, theta_h, ln_theta_h: ln(theta_h), c_h, sigma };
-        panels(p_start, length, &singular, tolerance, |middle, half, rule| turning_kernel(&slice, middle, half, rule))
+        (Line { start, length, singular }, slice)
     }
 
     fn direct_sums(&self, theta_a: f64, z_a: f64, friction_a: f64, y_start: f64, y_end: f64, tolerance: f64) -> Sums {
+        let (line, slice) = self.direct_line(theta_a, z_a, friction_a, y_start, y_end);
+        panels(&line, tolerance, |middle, half, rule| direct_kernel(&slice, middle, half, rule))
+    }
+
+    /// The direct chart as a line in `y`.
+    fn direct_line(&self, theta_a: f64, z_a: f64, friction_a: f64, y_start: f64, y_end: f64) -> (Line<2>, DirectSlice) {
         // The turning point lies at least ln 2 above the anchor; other zeros of E are complex.
         let singular = [(std::f64::consts::LN_2, 0.0), (y_end.min(y_start), std::f64::consts::FRAC_PI_2)];
         let slice = DirectSlice {
@@ -185,9 +197,124 @@ impl Arc {
             friction_a,
             sign: 1f64.copysign(z_a),
         };
-        panels(y_start, y_end - y_start, &singular, tolerance, |middle, half, rule| {
-            direct_kernel(&slice, middle, half, rule)
-        })
+        (Line { start: y_start, length: y_end - y_start, singular }, slice)
+    }
+
+    /// The arc cut into equal pieces, in each of which few nodes yield the time from its ends to any place in it.
+    pub fn pieces(&self) -> Pieces {
+        let cut = |start, length, count, slice| Pieces { start, length, count, slice };
+        match self.chart {
+            Chart::Turning { theta_h, x_start, x_end, x_squares } => {
+                let (line, slice) = self.turning_line(theta_h, x_start, x_end, x_squares);
+                cut(
+                    line.start,
+                    line.length,
+                    line.cut(PIECE_NODES as f64, MOST_PIECES, PIECE_TOLERANCE).0,
+                    Slice::Turning(slice),
+                )
+            }
+            Chart::Direct { theta_a, z_a, friction_a, y_start, y_end } => {
+                let (line, slice) = self.direct_line(theta_a, z_a, friction_a, y_start, y_end);
+                cut(
+                    line.start,
+                    line.length,
+                    line.cut(PIECE_NODES as f64, MOST_PIECES, PIECE_TOLERANCE).0,
+                    Slice::Direct(slice),
+                )
+            }
+        }
+    }
+}
+
+/// An arc along the coordinate of its chart, `[start, start + length]`.
+struct Line<const N: usize> {
+    start: f64,
+    length: f64,
+    /// Singularities as `(real, imaginary)` places in the upper half plane.
+    singular: [(f64, f64); N],
+}
+
+impl<const N: usize> Line<N> {
+    /// Into how many equal panels, up to `most_panels`, to cut so that none needs more than `most` nodes, and how many
+    /// nodes they need.
+    #[inline(always)]
+    fn cut(&self, most: f64, most_panels: u32, tolerance: f64) -> (u32, f64) {
+        let mut count = 1u32;
+        loop {
+            let half = 0.5 * self.length.abs() / f64::from(count);
+            let mut needed = 0.0f64;
+            for panel in 0..count {
+                let middle = self.start + self.length * (f64::from(panel) + 0.5) / f64::from(count);
+                needed = needed.max(nodes_needed(middle, half, &self.singular, tolerance));
+            }
+            if needed <= most || count >= most_panels {
+                return (count, needed.min(most));
+            }
+            count *= 2;
+        }
+    }
+}
+
+/// An arc in equal pieces of its chart's coordinate.
+pub(super) struct Pieces {
+    start: f64,
+    /// From the start to the end, signed.
+    pub length: f64,
+    /// How many.
+    pub count: u32,
+    slice: Slice,
+}
+
+enum Slice {
+    Turning(TurningSlice),
+    Direct(DirectSlice),
+}
+
+/// A place on an arc.
+pub(super) struct Place {
+    pub theta: f64,
+    pub ln_theta: f64,
+    pub ln_u: f64,
+}
+
+/// Nodes of a piece: a multiple of the lanes.
+const PIECE_NODES: usize = 2 * LANES;
+
+/// Most pieces of an arc.
+const MOST_PIECES: u32 = 1024;
+
+/// Relative accuracy of the time within a piece.
+const PIECE_TOLERANCE: f64 = 1e-15;
+
+impl Pieces {
+    /// Time from one place to another of the same piece; places run from 0 at the start of the arc to 1 at its end.
+    pub fn time(&self, from: f64, to: f64) -> f64 {
+        let (middle, half) = (self.start + 0.5 * (from + to) * self.length, 0.5 * (to - from) * self.length);
+        let rule = rule(PIECE_NODES);
+        match &self.slice {
+            Slice::Turning(slice) => turning_kernel(slice, middle, half, rule).time,
+            Slice::Direct(slice) => direct_kernel(slice, middle, half, rule).time,
+        }
+    }
+
+    /// What is where, `place` as in [`Pieces::time`].
+    pub fn at(&self, place: f64) -> Place {
+        let along = self.start + place * self.length;
+        match &self.slice {
+            Slice::Turning(slice) => {
+                let q = exp(along);
+                let x = 0.5 * slice.sigma * (q - 1.0 / q);
+                let x2 = x * x;
+                let w = x * omega(&slice.law, slice.c_h, x2);
+                let (theta, ln_theta) = (slice.theta_h / (1.0 + x2), slice.ln_theta_h - ln_1p(x2));
+                Place { theta, ln_theta, ln_u: turning(w).ln_u }
+            }
+            Slice::Direct(slice) => {
+                let grow = exp(along);
+                let w = slice.sign * (2.0 * direct_e(&slice.law, slice.phi_a, slice.friction_a, along, grow)).sqrt();
+                Place { theta: slice.theta_a * grow, ln_theta: slice.ln_theta_a + along, ln_u: turning(w).ln_u }
+            }
+        }
     }
 }
 
@@ -197,29 +324,13 @@ const LAYERS: f64 = 1.5;
 /// Nodes beyond which a panel is cut in two.
 const MOST_NODES: f64 = 64.0;
 
-/// Sums over equal panels of `[start, start + length]`, with as many Gauss nodes as the nearest singularity asks for.
-///
-/// `singular` holds the singularities as `(real, imaginary)` places in the upper half plane.
-fn panels(
-    start: f64,
-    length: f64,
-    singular: &[(f64, f64)],
-    tolerance: f64,
-    kernel: impl Fn(f64, f64, &Rule) -> Sums,
-) -> Sums {
-    let mut count = 1u32;
-    let (count, nodes) = loop {
-        let half = 0.5 * length.abs() / f64::from(count);
-        let mut most = 0.0f64;
-        for panel in 0..count {
-            let middle = start + length * (f64::from(panel) + 0.5) / f64::from(count);
-            most = most.max(nodes_needed(middle, half, singular, tolerance));
-        }
-        if most <= MOST_NODES || count >= 64 {
-            break (count, most.min(MOST_NODES));
-        }
-        count *= 2;
-    };
+/// Most panels of an arc.
+const MOST_PANELS: u32 = 64;
+
+/// Sums over equal panels of a line, with as many Gauss nodes as the nearest singularity asks for.
+fn panels<const N: usize>(line: &Line<N>, tolerance: f64, kernel: impl Fn(f64, f64, &Rule) -> Sums) -> Sums {
+    let &Line { start, length, .. } = line;
+    let (count, nodes) = line.cut(MOST_NODES, MOST_PANELS, tolerance);
     let rule = rule(LANES * (nodes / LANES as f64).ceil().max(1.0) as usize);
     let half = 0.5 * length / f64::from(count);
     let mut total =

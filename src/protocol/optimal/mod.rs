@@ -7,9 +7,10 @@ mod arc;
 pub mod crossover;
 mod extremal;
 mod hold;
+mod motion;
 mod search;
 
-use super::{Effort, Solved, Status};
+use super::{Effort, Motion, Solved, Status};
 use crate::model::{Law, Transition};
 use crate::numerics::elementary::ln;
 use extremal::Problem;
@@ -69,6 +70,35 @@ pub fn solve(transition: &Transition, t_f: f64, bounded: bool, rtol: f64) -> Sol
         return Solved { status: Status::Infeasible, value: None, effort: Effort::default() };
     };
     search::solve(&problem, t_f, rtol)
+}
+
+/// The same protocol, and its motion wherever it has numbers.
+///
+/// Time is good to `rtol`, or 1e-12 if that is less, of `t_f`; on the arc also of what is left of it. `v`, `theta` and
+/// `friction` belong to the extremal to a few units in the last place. The costate `beta` is the one of the Hamiltonian
+/// `H = tau v - beta theta' = -C`, so `beta = -dV/dtheta` with `V(theta, time left)` the least work: `1 + a + a ln v +
+/// b ln theta + beta theta = 0` on the arc, and `beta = (C + tau)/(1 - theta)` on the bound `v = 1`, continuous where
+/// the arc begins.
+pub fn motion(
+    transition: &Transition,
+    t_f: f64,
+    bounded: bool,
+    rtol: f64,
+) -> (Solved<Optimum>, Option<Box<dyn Motion>>) {
+    let Some(problem) = Problem::of(transition, bounded).filter(|_| t_f > 0.0 && t_f.is_finite()) else {
+        return (Solved { status: Status::Infeasible, value: None, effort: Effort::default() }, None);
+    };
+    let (solved, extremal) = search::find(&problem, t_f, rtol.min(MOTION_RTOL));
+    let motion = solved.value.map(|_| Box::new(motion::Optimal::new(&problem, t_f, extremal)) as Box<dyn Motion>);
+    (solved, motion)
+}
+
+/// Accuracy of every motion: the time on the arc is what is left of `t_f` after the hold.
+const MOTION_RTOL: f64 = 1e-12;
+
+/// The least time in which there is a protocol with `v >= 1`, or `v > 0` without the bound; 0 for an acceleration.
+pub fn shortest_time(transition: &Transition, bounded: bool) -> Option<f64> {
+    Some(Problem::of(transition, bounded)?.t_min())
 }
 
 /// What the optimal protocol would do now.

@@ -29,14 +29,19 @@ const FINEST: f64 = 1e-18;
 
 /// Solves `problem` in time `t_f` to relative accuracy `rtol`.
 pub(super) fn solve(problem: &Problem, t_f: f64, rtol: f64) -> Solved<Optimum> {
+    find(problem, t_f, rtol).0
+}
+
+/// The same, with the extremal; `None` where there is no solution, or no arc beside the hold.
+pub(super) fn find(problem: &Problem, t_f: f64, rtol: f64) -> (Solved<Optimum>, Option<Extremal>) {
     let mut effort = Effort::default();
     let t_min = problem.t_min();
     let beyond = t_f - t_min;
     if beyond < 0.0 || beyond.is_nan() || (beyond == 0.0 && !problem.bounded) {
-        return Solved { status: Status::Infeasible, value: None, effort };
+        return (Solved { status: Status::Infeasible, value: None, effort }, None);
     }
     if beyond == 0.0 {
-        return shortest(problem, t_min);
+        return (shortest(problem, t_min), None);
     }
     let q_hold = problem.q_hold();
     // The time beyond the least is known no better than t_f itself is.
@@ -84,7 +89,7 @@ pub(super) fn solve(problem: &Problem, t_f: f64, rtol: f64) -> Solved<Optimum> {
         let steady = [problem.theta_0, problem.theta_1].map(|theta| 1.0 + (law.b - law.a) * ln(theta));
         let doubtful = friction_min <= unique_above || steady.iter().any(|&tau| tau <= unique_above);
         let status = if doubtful { Status::Nonphysical } else { Status::NotConverged };
-        Solved { status, value: None, effort }
+        (Solved { status, value: None, effort }, None)
     };
     let (Some(root), Some((probed, sums))) = (root, last) else { return unsolved(effort) };
     let Some(found) = problem.extremal(root.x, q_hold) else { return unsolved(effort) };
@@ -124,7 +129,7 @@ pub(super) fn solve(problem: &Problem, t_f: f64, rtol: f64) -> Solved<Optimum> {
         theta_max: found.arc.theta_max(),
         strategy,
     };
-    Solved { status, value: Some(value), effort }
+    (Solved { status, value: Some(value), effort }, Some(found))
 }
 
 /// `t_f = t_min`: the hold alone.

@@ -1,0 +1,286 @@
+//! `slipsweep trace PROTOCOL`: one protocol over time, as a table, CSV or Parquet.
+
+use std::fs::{self, OpenOptions};
+use std::io::{self, IsTerminal, Write};
+use std::path::{Path, PathBuf};
+
+use clap::ValueEnum;
+use clap::builder::{PossibleValue, PossibleValuesParser};
+
+use super::{FAILED, Failure, WRONG, put, say, words};
+use crate::dataset::atomic;
+use crate::grid::{Domain, Quantity, RTOL};
+use crate::model::{Law, Transition};
+use crate::protocol::Status;
+use crate::protocol::swift::{self, Case};
+use crate::trace::{self, Absence, Course, GOOD, Protocol, Times, Trace};
+
+/// Arguments of `trace`.
+#[derive(Debug, clap::Args)]
+#[command(allow_negative_numbers = true)]
+pub struct Arguments {
+    /// The protocol
+    #[arg(value_parser = protocols())]
+    protocol: String,
+    /// Duration, in l/v_0
+    #[arg(long, value_name = "T", value_parser = |text: &str| legal(text, Quantity::Time.domain()))]
+    t_f: f64,
+    /// Direct effect of the velocity on friction, in mu_0
+    #[arg(long, value_name = "A", value_parser = |text: &str| legal(text, Quantity::A.domain()))]
+    a: f64,
+    /// Effect of the contact lifetime on friction, in mu_0
+    #[arg(long, value_name = "B", value_parser = |text: &str| legal(text, Quantity::B.domain()))]
+    b: f64,
+    /// Velocity before the protocol, in v_0
+    #[arg(long, value_name = "V", value_parser = |text: &str| legal(text, Quantity::InitialVelocity.domain()))]
+    v_i: f64,
+    /// Velocity after the protocol, in v_0
+    #[arg(long, value_name = "V", value_parser = |text: &str| legal(text, Quantity::FinalVelocity.domain()))]
+    v_f: f64,
+    /// Bound on friction, in mu_0 sigma (bounded_friction)
+    #[arg(long, value_name = "M", value_parser = |text: &str| legal(text, Quantity::FrictionBound.domain()))]
+    tau_max: Option<f64>,
+    /// Coefficient of t in theta, in units of 1/t_f as in the table `best` (free_cubic)
+    #[arg(long, value_name = "X", value_parser = |text: &str| legal(text, Quantity::Alpha2.domain()))]
+    alpha_2: Option<f64>,
+    /// Coefficient of t^2 in theta, in units of 1/t_f^2 (free_cubic)
+    #[arg(long, value_name = "Y", value_parser = |text: &str| legal(text, Quantity::Alpha3.domain()))]
+    alpha_3: Option<f64>,
+    /// Without the bound v >= 1 (optimal, best)
+    #[arg(long)]
+    unbounded: bool,
+    /// Relative accuracy of the solution
+    #[arg(long, value_name = "R", default_value = "1e-10", value_parser = |text: &str| legal(text, RTOL))]
+    rtol: f64,
+    /// So many equally spaced times instead of the fewest that show every detail
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(2..=10_000_000))]
+    points: Option<u32>,
+    /// How to write it; by default what the name of the file ends in, or a table
+    #[arg(long)]
+    format: Option<Format>,
+    /// Where to write it; - is standard output
+    #[arg(long, value_name = "FILE", default_value = "-", hide_default_value = true)]
+    out: PathBuf,
+}
+
+/// How a trace is written.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum Format {
+    /// Aligned columns of nine digits under a few words (.txt)
+    Table,
+    /// All digits (.csv)
+    Csv,
+    /// With units and meanings (.parquet)
+    Parquet,
+}
+
+/// The names of the protocols, with their meanings.
+fn protocols() -> PossibleValuesParser {
+    trace::names().map(|(name, doc)| PossibleValue::new(name).help(doc)).collect::<Vec<_>>().into()
+}
+
+/// The number that `text` stands for, if it is in `domain`.
+fn legal(text: &str, domain: Domain) -> Result<f64, String> {
+    match text.parse() {
+        Ok(value) if domain.contains(value) => Ok(value),
+        Ok(_) => Err(format!("expected {domain}")),
+        Err(_) => Err(format!("not a number; expected {domain}")),
+    }
+}
+
+/// Traces a protocol.
+pub fn trace(arguments: &Arguments) -> Result<(), Failure> {
+    let format = arguments.format()?;
+    let protocol = arguments.protocol()?;
+    let case = arguments.case();
+    let course = protocol.course(&case, arguments.rtol).map_err(|absence| absent(&arguments.protocol, absence))?;
+    let times = arguments.points.map_or(Times::Fewest, |count| Times::Spaced(count as usize));
+    let Some(trace) = Trace::of(&*course.motion, &case.transition, times) else {
+        return Err(Failure::failed("the protocol shows more detail than can be resolved"));
+    };
+    let header = header(arguments, &course, &trace);
+    let bytes = match format {
+        Format::Table => format!("{header}\n{}", table(&trace)).into_bytes(),
+        Format::Csv => trace::csv(&trace).into_bytes(),
+        Format::Parquet => trace::parquet(&trace, &facts(arguments, &course, &trace), env!("CARGO_PKG_VERSION"))
+            .map_err(Failure::failed)?,
+    };
+    if arguments.is_stdout() {
+        return put(&bytes);
+    }
+    write(&arguments.out, &bytes)
+        .map_err(|error| Failure::failed(format!("cannot write {}: {error}", arguments.out.display())))?;
+    say(&format!("{header}written to {}\n", arguments.out.display()))
+}
+
+fn wrong(message: impl std::fmt::Display) -> Failure {
+    Failure { code: WRONG, message: format!("error: {message}") }
+}
+
+fn absent(protocol: &str, absence: Absence) -> Failure {
+    let code = if absence.is_defect() { FAILED } else { WRONG };
+    Failure { code, message: format!("error: no `{protocol}` protocol: {absence}") }
+}
+
+impl Arguments {
+    fn is_stdout(&self) -> bool {
+        self.out.as_os_str() == "-"
+    }
+
+    fn format(&self) -> Result<Format, Failure> {
+        let ending = self.out.extension().and_then(|ending| ending.to_str());
+        let format = match (self.format, ending) {
+            (Some(format), _) => format,
+            (None, Some("csv")) => Format::Csv,
+            (None, Some("parquet")) => Format::Parquet,
+            (None, Some("txt")) => Format::Table,
+            (None, _) if self.is_stdout() => Format::Table,
+            (None, _) => {
+                let name = self.out.display();
+                return Err(wrong(format!("{name} ends in none of .csv, .parquet, .txt: add --format")));
+            }
+        };
+        if format == Format::Parquet && self.is_stdout() && io::stdout().is_terminal() {
+            return Err(wrong("Parquet is not for a terminal: name a file with --out, or pipe it on"));
+        }
+        Ok(format)
+    }
+
+    /// The protocol, once the arguments that it needs are there and no others.
+    fn protocol(&self) -> Result<Protocol, Failure> {
+        let name = self.protocol.as_str();
+        let family = swift::find(name);
+        let given = [
+            ("--tau-max", self.tau_max.is_some(), family.is_some_and(|family| family.heeds_tau_max()), true),
+            ("--alpha-2", self.alpha_2.is_some(), name == "free_cubic", true),
+            ("--alpha-3", self.alpha_3.is_some(), name == "free_cubic", true),
+            ("--unbounded", self.unbounded, matches!(name, "optimal" | "best"), false),
+        ];
+        for (flag, is_given, is_heeded, is_needed) in given {
+            if is_given && !is_heeded {
+                return Err(wrong(format!("`{name}` takes no {flag}")));
+            }
+            if !is_given && is_heeded && is_needed {
+                return Err(wrong(format!("`{name}` needs {flag}")));
+            }
+        }
+        let bounded = !self.unbounded;
+        Ok(match (name, self.alpha_2, self.alpha_3, family) {
+            ("optimal", ..) => Protocol::Optimal { bounded },
+            ("best", ..) => Protocol::Best { bounded },
+            (_, Some(a_2), Some(a_3), _) => Protocol::FreeCubic { a_2, a_3 },
+            (.., Some(family)) => Protocol::Family(family),
+            _ => return Err(wrong(format!("no protocol is named `{name}`"))),
+        })
+    }
+
+    fn case(&self) -> Case {
+        Case {
+            transition: Transition { law: Law { a: self.a, b: self.b }, v_i: self.v_i, v_f: self.v_f },
+            t_f: self.t_f,
+            tau_max: self.tau_max.unwrap_or(f64::INFINITY),
+        }
+    }
+
+    /// What was asked for, number by number.
+    fn numbers(&self) -> Vec<(&'static str, f64)> {
+        let mut numbers = vec![("t_f", self.t_f), ("a", self.a), ("b", self.b), ("v_i", self.v_i), ("v_f", self.v_f)];
+        numbers.extend(self.tau_max.map(|tau_max| ("tau_max", tau_max)));
+        numbers
+    }
+}
+
+/// What the protocol is, in a few lines.
+fn header(arguments: &Arguments, course: &Course, trace: &Trace) -> String {
+    let doc = trace::names().find(|(name, _)| *name == arguments.protocol).map_or("", |(_, doc)| doc);
+    let listed = |numbers: &[(&'static str, f64)]| {
+        let cells: Vec<String> =
+            numbers.iter().map(|(name, value)| format!("{name} = {}", words::number(*value))).collect();
+        cells.join(", ")
+    };
+    let mut text = format!("{}: {doc}\n  at {}", arguments.protocol, listed(&arguments.numbers()));
+    if arguments.unbounded {
+        text.push_str(", without the bound v >= 1");
+    }
+    text.push('\n');
+    for (name, value, meaning) in &course.parameters {
+        text.push_str(&format!("  {name} = {}: {meaning}\n", words::number(*value)));
+    }
+    let results = [("work", course.work), ("v_min", trace.v_min), ("v_max", trace.v_max)];
+    text.push_str(&format!("  {}\n  status {}\n", listed(&results), status(course.status)));
+    let rows = words::things(trace.moments.len() as u64, "row");
+    match arguments.points {
+        Some(_) => {
+            text.push_str(&format!("  {rows}: equally spaced times, and the states on the other side of a jump\n"))
+        }
+        None => text.push_str(&format!(
+            "  {rows}; straight lines between them are good to {} of the range of a column\n",
+            words::number(GOOD)
+        )),
+    }
+    text
+}
+
+fn status(status: Status) -> String {
+    let meaning = match status {
+        Status::BelowBound => ": v < 1 somewhere, outside the range of the friction law",
+        Status::Nonphysical => ": friction is so low that the extremal need not be the only one",
+        _ => "",
+    };
+    format!("{}{meaning}", status.name())
+}
+
+/// The columns, aligned. Times that nine digits do not tell apart are shown with all of theirs.
+fn table(trace: &Trace) -> String {
+    let nine: Vec<String> = trace.moments.iter().map(|moment| words::number(moment.t)).collect();
+    let pairs = trace.moments.windows(2).zip(nine.windows(2));
+    let alike = |(moments, shown): (&[_], &[String])| {
+        let moments: &[crate::protocol::Moment] = moments;
+        shown[0] == shown[1] && moments[0].t < moments[1].t
+    };
+    let all_digits = pairs.into_iter().any(alike);
+    let mut lines = vec![trace.columns().iter().map(|column| column.name.to_owned()).collect::<Vec<_>>()];
+    for moment in &trace.moments {
+        let cell = |column: usize| match Trace::value(moment, column) {
+            Some(t) if column == 0 && all_digits => format!("{t:?}"),
+            Some(value) => words::number(value),
+            None => "-".to_owned(),
+        };
+        lines.push((0..trace.columns().len()).map(cell).collect());
+    }
+    words::aligned(&lines, 2)
+}
+
+/// What a file says of itself.
+fn facts(arguments: &Arguments, course: &Course, trace: &Trace) -> Vec<(String, String)> {
+    let mut facts = vec![("protocol".to_owned(), arguments.protocol.clone())];
+    let mut number = |name: &str, value: f64| facts.push((name.to_owned(), format!("{value:?}")));
+    for (name, value) in arguments.numbers() {
+        number(name, value);
+    }
+    number("rtol", arguments.rtol);
+    for &(name, value, _) in &course.parameters {
+        number(name, value);
+    }
+    for (name, value) in [("work", course.work), ("v_min", trace.v_min), ("v_max", trace.v_max)] {
+        number(name, value);
+    }
+    if matches!(arguments.protocol.as_str(), "optimal" | "best") {
+        facts.push(("velocity_bound".to_owned(), (!arguments.unbounded).to_string()));
+    }
+    if let Some(points) = arguments.points {
+        facts.push(("points".to_owned(), points.to_string()));
+    }
+    facts.push(("status".to_owned(), course.status.name().to_owned()));
+    facts
+}
+
+/// Writes a file, whole or not at all; what is no plain file (a device, a named pipe) is written to as it is.
+fn write(path: &Path, bytes: &[u8]) -> io::Result<()> {
+    match fs::canonicalize(path) {
+        Ok(real) if fs::metadata(&real)?.is_file() => atomic::write(&real, bytes),
+        Ok(real) => OpenOptions::new().write(true).open(real)?.write_all(bytes),
+        // The folder of a bare name is the one we are in.
+        Err(_) => atomic::write(&Path::new(".").join(path), bytes),
+    }
+}

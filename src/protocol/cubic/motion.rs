@@ -1,0 +1,64 @@
+//! A cubic shortcut over time.
+
+use super::path::{Ends, Path};
+use super::rules::zeros;
+use crate::model::Law;
+use crate::numerics::elementary::ln;
+use crate::protocol::{Moment, Motion};
+
+/// The motion of one shortcut; its parameter is `x = t/t_f`.
+pub(super) struct FreeCubic {
+    law: Law,
+    ends: Ends,
+    a_2: f64,
+    a_3: f64,
+}
+
+impl FreeCubic {
+    /// The shortcut with `alpha_2 t_f = a_2`, `alpha_3 t_f^2 = a_3`, which is feasible.
+    pub fn new(law: Law, ends: Ends, a_2: f64, a_3: f64) -> FreeCubic {
+        FreeCubic { law, ends, a_2, a_3 }
+    }
+
+    fn path(&self) -> Path<'_> {
+        Path::new(&self.ends, self.a_2, self.a_3)
+    }
+}
+
+impl Motion for FreeCubic {
+    fn duration(&self) -> f64 {
+        self.ends.t_f
+    }
+
+    /// About each zero of `theta` and of `n = t_f (1 - theta')`, near which `v = n/(t_f theta)` changes over its
+    /// distance from the real interval.
+    fn landmarks(&self) -> Vec<f64> {
+        let zeros = zeros(&self.path());
+        let mut landmarks = vec![0.0, 1.0];
+        for (&re, &im) in zeros.re.iter().zip(&zeros.im) {
+            let centre = re.clamp(0.0, 1.0);
+            let near = ((re - centre) * (re - centre) + im * im).sqrt();
+            let mut reach = near.max(f64::EPSILON);
+            landmarks.push(centre);
+            while reach < 1.0 {
+                landmarks.extend([centre - reach, centre + reach]);
+                reach *= STRETCH;
+            }
+        }
+        landmarks.retain(|x| (0.0..=1.0).contains(x));
+        landmarks.sort_by(f64::total_cmp);
+        landmarks.dedup();
+        landmarks
+    }
+
+    fn at(&self, s: f64) -> Moment {
+        let x = s.clamp(0.0, 1.0);
+        let (theta, n) = self.path().at(x);
+        let v = n / (self.ends.t_f * theta);
+        let friction = 1.0 + self.law.a * ln(v) + self.law.b * ln(theta);
+        Moment { t: x * self.ends.t_f, v, theta, friction, beta: None }
+    }
+}
+
+/// Ratio of the distances of neighbouring landmarks from a zero.
+const STRETCH: f64 = 8.0;

@@ -1,0 +1,200 @@
+//! The optimal protocol over time: the hold, then the arc along the coordinate of its chart.
+
+use super::arc::Pieces;
+use super::extremal::{Extremal, Problem};
+use super::hold;
+use crate::model::Law;
+use crate::numerics::elementary::{exp, exp_m1, ln, ln_1p};
+use crate::protocol::{Moment, Motion};
+
+/// The motion of one extremal. Its parameter `s` runs along the hold up to `share`, then along the arc.
+pub(super) struct Optimal {
+    law: Law,
+    t_f: f64,
+    bounded: bool,
+    hold: Hold,
+    /// The part of `s` that the hold takes.
+    share: f64,
+    arc: Option<Timed>,
+}
+
+/// How far rounding may take a velocity off the bound.
+const ROUNDING: f64 = 1e-9;
+
+impl Optimal {
+    /// The motion of `extremal`, or of the hold alone, in time `t_f`.
+    pub fn new(problem: &Problem, t_f: f64, extremal: Option<Extremal>) -> Optimal {
+        let (theta_s, hold_time) = extremal.map_or((problem.theta_1, t_f), |found| (found.theta_s, found.hold_time));
+        let arc = extremal.map(|found| Timed::new(found.arc.pieces(), hold_time, t_f));
+        let hold = Hold {
+            law: problem.law,
+            theta_0: problem.theta_0,
+            theta_s,
+            time: arc.as_ref().map_or(t_f, |arc| arc.start),
+            beta_s: -(1.0 + problem.law.a + problem.law.b * ln(theta_s)) / theta_s,
+        };
+        let (held, moving) = (hold.length(), arc.as_ref().map_or(0.0, |arc| arc.pieces.length.abs()));
+        let share = if arc.is_none() { 1.0 } else { held / (held + moving) };
+        Optimal { law: problem.law, t_f, bounded: problem.bounded, hold, share, arc }
+    }
+}
+
+impl Motion for Optimal {
+    fn duration(&self) -> f64 {
+        self.t_f
+    }
+
+    fn landmarks(&self) -> Vec<f64> {
+        let mut landmarks = vec![0.0];
+        if self.share > 0.0 {
+            let (first, length) = (self.hold.first(), self.hold.length());
+            for (from, to) in [(0.0, first), (first, length)] {
+                let pieces = (to - from).ceil().max(1.0);
+                let place = |i: u32| (from + (to - from) * f64::from(i) / pieces) / length;
+                landmarks.extend((1..=pieces as u32).map(|i| self.share * place(i)));
+            }
+        }
+        if let Some(arc) = &self.arc {
+            let count = arc.pieces.count;
+            landmarks.extend((1..=count).map(|i| self.share + (1.0 - self.share) * f64::from(i) / f64::from(count)));
+        }
+        if let Some(last) = landmarks.last_mut() {
+            *last = 1.0;
+        }
+        landmarks
+    }
+
+    fn at(&self, s: f64) -> Moment {
+        let s = s.clamp(0.0, 1.0);
+        let arc = match &self.arc {
+            Some(arc) if s >= self.share => arc,
+            _ => return self.hold.at(s / self.share),
+        };
+        let Law { a, b } = self.law;
+        let place = if s == 1.0 { 1.0 } else { ((s - self.share) / (1.0 - self.share)).min(1.0) };
+        let here = arc.pieces.at(place);
+        let v = exp(here.ln_u - here.ln_theta);
+        let on_bound = self.bounded && v < 1.0 && v > 1.0 - ROUNDING;
+        let friction = 1.0 + a * here.ln_u + (b - a) * here.ln_theta;
+        Moment {
+            t: arc.time(place),
+            v: if on_bound { 1.0 } else { v },
+            theta: here.theta,
+            friction,
+            // C - a v, which cancels where v is large.
+            beta: Some(-(friction + a) / here.theta),
+        }
+    }
+}
+
+/// The hold: `v = 1` from `theta_0` to `theta_s`.
+struct Hold {
+    law: Law,
+    theta_0: f64,
+    theta_s: f64,
+    time: f64,
+    /// Costate where the arc begins, `C - a`.
+    beta_s: f64,
+}
+
+impl Hold {
+    /// Length of its coordinate. `ln theta` changes over `theta_0` at the start, and theta and the costate over 1 at
+    /// both ends: the logarithm of the time from either end, in these units, opens them.
+    fn length(&self) -> f64 {
+        self.first() + ln_1p(0.5 * self.time)
+    }
+
+    /// Its coordinate in the middle of the hold.
+    fn first(&self) -> f64 {
+        ln_1p(0.5 * self.time / self.theta_0)
+    }
+
+    /// The moment at `place`, from 0 at the start to 1 at the end.
+    fn at(&self, place: f64) -> Moment {
+        let along = self.length() * place;
+        // The time gone and the time left.
+        let (gone, left) = if along < self.first() {
+            let gone = (self.theta_0 * exp_m1(along)).min(0.5 * self.time);
+            (gone, self.time - gone)
+        } else {
+            let left = exp_m1(self.length() - along).clamp(0.0, 0.5 * self.time);
+            (self.time - left, left)
+        };
+        let (theta, rest) = hold::age(self.theta_0, gone);
+        let ln_theta = if theta < 0.5 { ln(theta) } else { ln_1p(-rest) };
+        Moment {
+            t: gone,
+            v: 1.0,
+            theta,
+            friction: 1.0 + self.law.b * ln_theta,
+            beta: Some(self.costate(ln_theta, rest, left)),
+        }
+    }
+
+    /// `beta = (C + tau)/(1 - theta)` with `C + tau = beta_s (1 - theta_s) + b ln(theta/theta_s)`, in terms that do not
+    /// cancel; `rest` is `1 - theta`.
+    fn costate(&self, ln_theta: f64, rest: f64, left: f64) -> f64 {
+        // 1 - theta_s = rest e^(-left), and theta_s - theta = rest gain.
+        let gain = -exp_m1(-left);
+        let way = rest * gain / self.theta_s;
+        let ratio = if way == 0.0 {
+            1.0
+        } else if way < 0.5 {
+            -ln_1p(-way) / way
+        } else {
+            (ln(self.theta_s) - ln_theta) / way
+        };
+        self.beta_s * exp(-left) - self.law.b * gain / self.theta_s * ratio
+    }
+}
+
+/// The arc with its time.
+struct Timed {
+    pieces: Pieces,
+    /// When it begins.
+    start: f64,
+    t_f: f64,
+    /// Time from the start of the arc to the start of each piece, and to the end.
+    gone: Vec<f64>,
+    /// Time from the start of each piece to the end of the arc, and 0.
+    left: Vec<f64>,
+    /// What the times of the pieces are to be multiplied with so that they add up.
+    scale: f64,
+}
+
+impl Timed {
+    fn new(pieces: Pieces, hold_time: f64, t_f: f64) -> Timed {
+        let edge = |piece: usize| piece as f64 / f64::from(pieces.count);
+        let times: Vec<f64> = (0..pieces.count as usize).map(|i| pieces.time(edge(i), edge(i + 1))).collect();
+        let sums = |times: &mut dyn Iterator<Item = &f64>| {
+            let mut sum = 0.0;
+            let mut sums = vec![0.0];
+            for time in times {
+                sum += time;
+                sums.push(sum);
+            }
+            sums
+        };
+        let gone = sums(&mut times.iter());
+        let mut left = sums(&mut times.iter().rev());
+        left.reverse();
+        let total = left[0];
+        // Rounding of the search goes to the hold, if there is one.
+        let (start, scale) = if hold_time > 0.0 { ((t_f - total).max(0.0), 1.0) } else { (0.0, t_f / total) };
+        Timed { pieces, start, t_f, gone, left, scale }
+    }
+
+    /// Time since the start of the protocol: from the nearer end of the arc, so that the layers at both ends keep their
+    /// digits.
+    fn time(&self, place: f64) -> f64 {
+        let count = f64::from(self.pieces.count);
+        let piece = ((place * count) as usize).min(self.pieces.count as usize - 1);
+        let (from, to) = (piece as f64 / count, (piece + 1) as f64 / count);
+        let t = if self.gone[piece + 1] <= self.left[piece] {
+            self.start + self.scale * (self.gone[piece] + self.pieces.time(from, place))
+        } else {
+            self.t_f - self.scale * (self.left[piece + 1] + self.pieces.time(place, to))
+        };
+        t.clamp(0.0, self.t_f)
+    }
+}

@@ -1,0 +1,98 @@
+//! A protocol over time: which one, its moments, and how they are written.
+
+mod protocol;
+mod sample;
+mod write;
+
+use crate::model::{Law, Transition};
+use crate::numerics::elementary::ln;
+use crate::protocol::{Moment, Motion};
+use crate::table::Column;
+
+pub use protocol::{Absence, Course, Protocol, names};
+pub use sample::GOOD;
+pub use write::{csv, parquet};
+
+/// The columns of a trace; `beta` only where the protocol is an extremal.
+pub const COLUMNS: [Column; 5] = [
+    Column::number("t", "l/v_0", "time since the start; the same twice where the velocity jumps"),
+    Column::number("v", "v_0", "velocity"),
+    Column::number("theta", "l/v_0", "contact lifetime"),
+    Column::number("tau", "mu_0 sigma", "friction 1 + a ln v + b ln theta"),
+    Column::number(
+        "beta",
+        "mu_0 sigma v_0",
+        "costate of theta: 1 + a + a ln v + b ln theta + beta theta = 0 off the bound; null before and after",
+    ),
+];
+
+/// Velocities closer than this (relative) are no jump.
+const JUMP: f64 = 1e-9;
+
+/// Which times are shown.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Times {
+    /// The fewest between which straight lines are good to [`GOOD`] of the range of every column.
+    Fewest,
+    /// So many, at least 2, equally spaced from 0 to `t_f`.
+    Spaced(usize),
+}
+
+/// The moments of a protocol, with the steady states that it leads from and to.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Trace {
+    /// In the order of time, from 0 to `t_f`; two at the same time where the velocity jumps.
+    pub moments: Vec<Moment>,
+    /// Least velocity on the open interval `(0, t_f)`.
+    pub v_min: f64,
+    /// Greatest velocity there.
+    pub v_max: f64,
+}
+
+impl Trace {
+    /// Traces `motion`, which leads through `transition`; `None` if it has a moment that is no number, or shows more
+    /// detail than can be resolved.
+    pub fn of(motion: &dyn Motion, transition: &Transition, times: Times) -> Option<Trace> {
+        let [before, after] = around(motion, transition);
+        let samples = sample::Samples::of(motion, &[before, after])?;
+        let (v_min, v_max) = samples.velocities(motion);
+        let mut moments = match times {
+            Times::Fewest => samples.fewest(),
+            Times::Spaced(count) => sample::spaced(motion, count)?,
+        };
+        let jumps = |here: &Moment, steady: &Moment| (here.v - steady.v).abs() > JUMP * steady.v;
+        if moments.first().is_some_and(|first| jumps(first, &before)) {
+            moments.insert(0, before);
+        }
+        if moments.last().is_some_and(|last| jumps(last, &after)) {
+            moments.push(after);
+        }
+        Some(Trace { moments, v_min, v_max })
+    }
+
+    /// The columns that the trace has.
+    pub fn columns(&self) -> &'static [Column] {
+        let extremal = self.moments.iter().any(|moment| moment.beta.is_some());
+        if extremal { &COLUMNS } else { &COLUMNS[..COLUMNS.len() - 1] }
+    }
+
+    /// The value of a column at a moment, by its place in [`COLUMNS`]; `None` where there is none.
+    pub fn value(moment: &Moment, column: usize) -> Option<f64> {
+        match column {
+            0 => Some(moment.t),
+            1 => Some(moment.v),
+            2 => Some(moment.theta),
+            3 => Some(moment.friction),
+            _ => moment.beta,
+        }
+    }
+}
+
+/// What is before the start and after the end: the contact lifetime does not jump, the velocity may.
+fn around(motion: &dyn Motion, transition: &Transition) -> [Moment; 2] {
+    let (first, last) = (motion.at(0.0), motion.at(1.0));
+    let Law { a, b } = transition.law;
+    let steady =
+        |t: f64, v: f64, theta: f64| Moment { t, v, theta, friction: 1.0 + a * ln(v) + b * ln(theta), beta: None };
+    [steady(0.0, transition.v_i, first.theta), steady(motion.duration(), transition.v_f, last.theta)]
+}

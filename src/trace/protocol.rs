@@ -1,0 +1,193 @@
+//! The protocols that can be traced, by name, and what is said of one beside its moments.
+
+use std::fmt;
+
+use crate::protocol::cubic::{Landscape, Shortcuts};
+use crate::protocol::swift::{Case, FAMILIES, Family, Obstacle};
+use crate::protocol::{Effort, Motion, Status, best, optimal};
+
+/// A protocol of the rigid limit.
+#[derive(Clone, Copy)]
+pub enum Protocol {
+    /// The protocol of least work, with `v >= 1` where `bounded`.
+    Optimal {
+        /// Whether `v >= 1`.
+        bounded: bool,
+    },
+    /// The cubic shortcut of least work, with `v >= 1` where `bounded`.
+    Best {
+        /// Whether `v >= 1`.
+        bounded: bool,
+    },
+    /// A point of the landscape, scaled: `alpha_2 t_f` and `alpha_3 t_f^2`.
+    FreeCubic {
+        /// `alpha_2 t_f`.
+        a_2: f64,
+        /// `alpha_3 t_f^2`.
+        a_3: f64,
+    },
+    /// The member of a family.
+    Family(&'static dyn Family),
+}
+
+/// Names and meanings of all protocols: first those that are no family, then [`FAMILIES`].
+pub fn names() -> impl Iterator<Item = (&'static str, &'static str)> {
+    let others = [
+        ("optimal", "least work of friction of all protocols; v may jump at both ends"),
+        ("best", "least work of all free cubics"),
+        ("free_cubic", "theta a cubic in time with alpha_2 and alpha_3 given; v may jump at both ends"),
+    ];
+    others.into_iter().chain(FAMILIES.into_iter().map(|family| (family.name(), family.doc())))
+}
+
+/// A protocol that exists: how it moves, and its numbers.
+pub struct Course {
+    /// How it moves.
+    pub motion: Box<dyn Motion>,
+    /// `Ok`, `BelowBound` or `Nonphysical`.
+    pub status: Status,
+    /// Work of friction, `int tau v dt`.
+    pub work: f64,
+    /// Its parameters: name, value and meaning.
+    pub parameters: Vec<(&'static str, f64, &'static str)>,
+}
+
+/// Why there is no protocol.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Absence {
+    /// The family's reason.
+    Obstacle(Obstacle),
+    /// No protocol is that fast.
+    Time {
+        /// The time asked for.
+        t_f: f64,
+        /// The least time.
+        t_min: f64,
+        /// Whether `v >= 1`, else `v > 0`.
+        bounded: bool,
+    },
+    /// No cubic shortcut keeps `v >= 1` (`bounded`) or `v > 0` in this time.
+    Cubic {
+        /// Whether `v >= 1`, else `v > 0`.
+        bounded: bool,
+    },
+    /// The least work of all cubic shortcuts is approached at the border `v = 0`, not attained.
+    Border,
+    /// Friction is so low somewhere that the extremal need not be unique, and none was found.
+    Nonphysical,
+}
+
+impl Absence {
+    /// Whether it is a defect of ours.
+    pub fn is_defect(self) -> bool {
+        self == Absence::Obstacle(Obstacle::NotConverged)
+    }
+}
+
+impl fmt::Display for Absence {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let least = |bounded| if bounded { "v >= 1" } else { "v > 0" };
+        match *self {
+            Absence::Obstacle(obstacle) => obstacle.fmt(f),
+            Absence::Time { t_f, t_min, bounded } => {
+                write!(f, "t_f = {t_f} is too short for {}: the least is t_min = {t_min}", least(bounded))
+            }
+            Absence::Cubic { bounded } => write!(f, "no cubic shortcut keeps {} in this time", least(bounded)),
+            Absence::Border => f.write_str(
+                "the least work is only approached, as v falls to 0 somewhere; with the bound v >= 1 it is attained",
+            ),
+            Absence::Nonphysical => f.write_str(
+                "friction is too low: where tau <= max(0, b - a) there need not be an optimum, and none was found",
+            ),
+        }
+    }
+}
+
+impl From<Obstacle> for Absence {
+    fn from(obstacle: Obstacle) -> Absence {
+        Absence::Obstacle(obstacle)
+    }
+}
+
+impl Protocol {
+    /// The protocol that solves `case`, its numbers good to `rtol`.
+    pub fn course(&self, case: &Case, rtol: f64) -> Result<Course, Absence> {
+        match *self {
+            Protocol::Optimal { bounded } => optimum(case, bounded, rtol),
+            Protocol::Best { bounded } => least_cubic(case, bounded, rtol),
+            Protocol::FreeCubic { a_2, a_3 } => free_cubic(case, a_2, a_3, rtol),
+            Protocol::Family(family) => member(family, case, rtol),
+        }
+    }
+}
+
+fn optimum(case: &Case, bounded: bool, rtol: f64) -> Result<Course, Absence> {
+    let (solved, motion) = optimal::motion(&case.transition, case.t_f, bounded, rtol);
+    let (Some(value), Some(motion)) = (solved.value, motion) else {
+        return Err(without_optimum(case, bounded, solved.status));
+    };
+    let parameters = vec![
+        ("hamiltonian", value.hamiltonian, "dW*/dt_f"),
+        ("hold_time", value.hold_time, "time spent on the bound v = 1"),
+    ];
+    Ok(Course { motion, status: solved.status, work: value.work, parameters })
+}
+
+fn without_optimum(case: &Case, bounded: bool, status: Status) -> Absence {
+    match (status, optimal::shortest_time(&case.transition, bounded)) {
+        (Status::Nonphysical, _) => Absence::Nonphysical,
+        (Status::Infeasible, Some(t_min)) if case.t_f <= t_min => Absence::Time { t_f: case.t_f, t_min, bounded },
+        (Status::Infeasible, _) => Obstacle::Domain.into(),
+        _ => Obstacle::NotConverged.into(),
+    }
+}
+
+fn least_cubic(case: &Case, bounded: bool, rtol: f64) -> Result<Course, Absence> {
+    let solved = best::solve(&case.transition, case.t_f, bounded, rtol);
+    let Some(value) = solved.value else {
+        // Where there is no optimum there is no shortcut either.
+        let optimum = optimal::solve(&case.transition, case.t_f, bounded, rtol);
+        return Err(match (optimum.value, solved.status) {
+            (None, _) => without_optimum(case, bounded, optimum.status),
+            (_, Status::Infeasible) => Absence::Cubic { bounded },
+            (_, Status::Nonphysical) => Absence::Nonphysical,
+            _ => Obstacle::NotConverged.into(),
+        });
+    };
+    if value.v_min == 0.0 {
+        return Err(Absence::Border);
+    }
+    let landscape = Landscape::new(&case.transition, case.t_f, rtol);
+    let Some(motion) = landscape.motion(value.a_2, value.a_3) else {
+        return Err(Absence::Border);
+    };
+    let mut parameters = scaled(value.a_2, value.a_3);
+    parameters.push(("gap", value.gap, "(W_s - W*)/W*"));
+    Ok(Course { motion, status: solved.status, work: value.work, parameters })
+}
+
+fn free_cubic(case: &Case, a_2: f64, a_3: f64, rtol: f64) -> Result<Course, Absence> {
+    let landscape = Landscape::new(&case.transition, case.t_f, rtol);
+    let (mut work, mut status) = ([0.0], [Status::Infeasible]);
+    landscape.evaluate(&[a_2], &[a_3], Shortcuts { work: &mut work, v_min: &mut [], status: &mut status });
+    let motion = landscape.motion(a_2, a_3).ok_or(Obstacle::Velocity)?;
+    Ok(Course { motion, status: status[0], work: work[0], parameters: scaled(a_2, a_3) })
+}
+
+fn scaled(a_2: f64, a_3: f64) -> Vec<(&'static str, f64, &'static str)> {
+    vec![
+        ("alpha_2", a_2, "coefficient of t in theta, in 1/t_f"),
+        ("alpha_3", a_3, "coefficient of t^2 in theta, in 1/t_f^2"),
+    ]
+}
+
+fn member(family: &dyn Family, case: &Case, rtol: f64) -> Result<Course, Absence> {
+    let swift = family.solve(case, rtol, &mut Effort::default())?;
+    let motion = family.motion(case, rtol)?;
+    let mut parameters: Vec<_> =
+        swift.alpha.into_iter().zip(family.alpha()).map(|(alpha, meaning)| ("alpha", alpha, meaning)).collect();
+    if swift.miss != 0.0 {
+        parameters.push(("miss", swift.miss, "distance from the target, theta(t_f) v_f - 1"));
+    }
+    Ok(Course { motion, status: swift.status(), work: swift.work, parameters })
+}

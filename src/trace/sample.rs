@@ -1,0 +1,244 @@
+//! Where to look at a motion: the fewest moments between which straight lines are good, or moments equally spaced.
+
+use crate::protocol::{Moment, Motion};
+
+/// How far a straight line between neighbouring moments may be from the motion, relative to the range of the column.
+pub const GOOD: f64 = 1e-4;
+
+/// What is asked of the samples; between them is left what is missing to [`GOOD`].
+const AIM: f64 = 0.98 * GOOD;
+
+/// Changes below this share of the greatest value of a column are rounding.
+const NOISE: f64 = 1e-12;
+
+/// Times closer than this, relative to the later one, are not told apart.
+const CLOSE: f64 = 8.0 * f64::EPSILON;
+
+/// Steps of a piece of the motion that is looked at: a chord is compared with the motion at all places between them.
+const STEPS: usize = 8;
+
+/// More moments than any motion that can be resolved asks for.
+const MOST_MOMENTS: usize = 1 << 21;
+
+/// A moment and its place on the curve.
+#[derive(Debug, Clone, Copy)]
+struct Sample {
+    s: f64,
+    moment: Moment,
+}
+
+/// The samples of a motion, more than are shown.
+#[derive(Debug)]
+pub struct Samples {
+    samples: Vec<Sample>,
+    tolerance: [f64; COLUMNS],
+}
+
+/// Columns that are interpolated.
+const COLUMNS: usize = 4;
+
+fn columns(moment: &Moment) -> [f64; COLUMNS] {
+    [moment.v, moment.theta, moment.friction, moment.beta.unwrap_or(0.0)]
+}
+
+impl Samples {
+    /// Halves the pieces between the landmarks of `motion` until straight lines are good. `steady` are the states
+    /// before and after: they count in the range of a column. `None` if the motion has a moment that is no number, or
+    /// cannot be resolved.
+    pub fn of(motion: &dyn Motion, steady: &[Moment]) -> Option<Samples> {
+        let landmarks = motion.landmarks();
+        let mut pieces = Vec::with_capacity(landmarks.len());
+        for pair in landmarks.windows(2) {
+            let mut piece = Vec::with_capacity(STEPS + 1);
+            for step in 0..=STEPS {
+                piece.push(look(motion, pair[0] + (pair[1] - pair[0]) * step as f64 / STEPS as f64)?);
+            }
+            pieces.push(piece);
+        }
+        let tolerance = tolerance(pieces.iter().flatten().map(|sample| &sample.moment).chain(steady));
+        let mut samples: Vec<Sample> = vec![*pieces.first()?.first()?];
+        // The next piece is the last of the list.
+        pieces.reverse();
+        while let Some(piece) = pieces.pop() {
+            let (first, last) = (piece[0], piece[STEPS]);
+            if is_even(&piece) && is_straight(&first, &last, &piece[1..STEPS], &tolerance) {
+                samples.extend(&piece[1..]);
+                if samples.len() > MOST_MOMENTS {
+                    return None;
+                }
+                continue;
+            }
+            let halve = |half: &[Sample]| {
+                let mut finer = vec![half[0]];
+                for pair in half.windows(2) {
+                    finer.push(look(motion, 0.5 * (pair[0].s + pair[1].s))?);
+                    finer.push(pair[1]);
+                }
+                Some(finer)
+            };
+            let halves = (halve(&piece[..=STEPS / 2])?, halve(&piece[STEPS / 2..])?);
+            pieces.extend([halves.1, halves.0]);
+        }
+        // Rounding may take a time back by some units in the last place.
+        let mut latest = 0.0_f64;
+        for sample in &mut samples {
+            latest = latest.max(sample.moment.t).min(motion.duration());
+            sample.moment.t = latest;
+        }
+        samples.first_mut()?.moment.t = 0.0;
+        samples.last_mut()?.moment.t = motion.duration();
+        Some(Samples { samples, tolerance })
+    }
+
+    /// As few of the moments as straight lines between them allow.
+    pub fn fewest(&self) -> Vec<Moment> {
+        let samples = &self.samples;
+        let mut rows = vec![samples[0].moment];
+        let mut here = 0;
+        while here + 1 < samples.len() {
+            let mut next = here + 1;
+            while next + 1 < samples.len()
+                && is_straight(&samples[here], &samples[next + 1], &samples[here + 1..=next], &self.tolerance)
+            {
+                next += 1;
+            }
+            let moment = samples[next].moment;
+            // Of moments that time does not tell apart the last one stands, which leads on.
+            if rows.len() > 1 && rows[rows.len() - 1].t == moment.t {
+                rows.pop();
+            }
+            rows.push(moment);
+            here = next;
+        }
+        rows
+    }
+
+    /// Least and greatest velocity of the motion.
+    pub fn velocities(&self, motion: &dyn Motion) -> (f64, f64) {
+        (-self.greatest(|s| -motion.at(s).v, |moment| -moment.v), self.greatest(|s| motion.at(s).v, |moment| moment.v))
+    }
+
+    /// The greatest value: golden section between the neighbours of the greatest sample.
+    fn greatest(&self, value: impl Fn(f64) -> f64, of: impl Fn(&Moment) -> f64) -> f64 {
+        let order = |i: &usize, j: &usize| of(&self.samples[*i].moment).total_cmp(&of(&self.samples[*j].moment));
+        let top = (0..self.samples.len()).max_by(order).unwrap_or(0);
+        let mut best = of(&self.samples[top].moment);
+        let (mut low, mut high) =
+            (self.samples[top.saturating_sub(1)].s, self.samples[(top + 1).min(self.samples.len() - 1)].s);
+        let (mut left, mut right) = (high - GOLDEN * (high - low), low + GOLDEN * (high - low));
+        let (mut at_left, mut at_right) = (value(left), value(right));
+        for _ in 0..SECTIONS {
+            best = best.max(at_left).max(at_right);
+            if at_left > at_right {
+                (high, right, at_right) = (right, left, at_left);
+                left = high - GOLDEN * (high - low);
+                at_left = value(left);
+            } else {
+                (low, left, at_left) = (left, right, at_right);
+                right = low + GOLDEN * (high - low);
+                at_right = value(right);
+            }
+        }
+        best
+    }
+}
+
+/// `(sqrt 5 - 1)/2`.
+const GOLDEN: f64 = 0.618_033_988_749_894_9;
+
+/// Sections after which a smooth maximum is flat within rounding: the interval has shrunk by `1e-8`.
+const SECTIONS: u32 = 40;
+
+/// The moments at `count >= 2` equally spaced times from 0 to `t_f`. `None` as for [`Samples::of`].
+pub fn spaced(motion: &dyn Motion, count: usize) -> Option<Vec<Moment>> {
+    let t_f = motion.duration();
+    let marks: Vec<Sample> = motion.landmarks().into_iter().map(|s| look(motion, s)).collect::<Option<_>>()?;
+    let (first, last) = (marks.first()?, marks.last()?);
+    let mut rows = Vec::with_capacity(count);
+    rows.push(Moment { t: 0.0, ..first.moment });
+    for i in 1..count.saturating_sub(1) {
+        let t = t_f * (i as f64 / (count - 1) as f64);
+        let after = marks.partition_point(|mark| mark.moment.t <= t).clamp(1, marks.len() - 1);
+        let found = meet(motion, t, &marks[after - 1], &marks[after])?;
+        rows.push(Moment { t, ..found });
+    }
+    rows.push(Moment { t: t_f, ..last.moment });
+    Some(rows)
+}
+
+/// The moment at time `t` between two samples: regula falsi, where one end that stays for long counts half (the
+/// Illinois method: Dowell and Jarratt, BIT 11, 168, 1971), and bisection where that is slow.
+fn meet(motion: &dyn Motion, t: f64, low: &Sample, high: &Sample) -> Option<Moment> {
+    let (mut low, mut high) = (*low, *high);
+    let (mut below, mut above) = (low.moment.t - t, high.moment.t - t);
+    let mut nearest = if -below < above { low } else { high };
+    let mut was_below = None;
+    for step in 0..MOST_LOOKS {
+        let secant = low.s - below * (high.s - low.s) / (above - below);
+        let inside = secant > low.s && secant < high.s && step % 4 < 3;
+        let s = if inside { secant } else { 0.5 * (low.s + high.s) };
+        if !(s > low.s && s < high.s) {
+            break;
+        }
+        let sample = look(motion, s)?;
+        let distance = sample.moment.t - t;
+        if distance.abs() < (nearest.moment.t - t).abs() {
+            nearest = sample;
+        }
+        if distance.abs() <= f64::EPSILON * t {
+            break;
+        }
+        let is_below = distance < 0.0;
+        let again = was_below == Some(is_below);
+        if is_below {
+            (low, below, above) = (sample, distance, if again { 0.5 * above } else { above });
+        } else {
+            (high, above, below) = (sample, distance, if again { 0.5 * below } else { below });
+        }
+        was_below = Some(is_below);
+    }
+    Some(nearest.moment)
+}
+
+/// Looks for one time: a bisection alone takes fewer.
+const MOST_LOOKS: u32 = 120;
+
+fn look(motion: &dyn Motion, s: f64) -> Option<Sample> {
+    let moment = motion.at(s);
+    let is_number = moment.t.is_finite() && columns(&moment).iter().all(|value| value.is_finite());
+    is_number.then_some(Sample { s, moment })
+}
+
+fn tolerance<'a>(moments: impl Iterator<Item = &'a Moment>) -> [f64; COLUMNS] {
+    let mut ranges = [(f64::INFINITY, f64::NEG_INFINITY); COLUMNS];
+    for moment in moments {
+        let beta_counts = moment.beta.is_some();
+        for (column, (value, (least, greatest))) in columns(moment).into_iter().zip(&mut ranges).enumerate() {
+            if column + 1 < COLUMNS || beta_counts {
+                (*least, *greatest) = (least.min(value), greatest.max(value));
+            }
+        }
+    }
+    ranges.map(|(least, greatest)| (AIM * (greatest - least)).max(NOISE * least.abs().max(greatest.abs())))
+}
+
+/// Whether no step of a piece takes most of its time, so that there are places to look at between its ends.
+fn is_even(piece: &[Sample]) -> bool {
+    let time = |from: &Sample, to: &Sample| to.moment.t - from.moment.t;
+    let whole = time(&piece[0], &piece[STEPS]);
+    whole <= CLOSE * piece[STEPS].moment.t || piece.windows(2).all(|pair| time(&pair[0], &pair[1]) <= 0.5 * whole)
+}
+
+/// Whether the straight line in time from `from` to `to` is within `tolerance` of the motion at all places `between`.
+fn is_straight(from: &Sample, to: &Sample, between: &[Sample], tolerance: &[f64; COLUMNS]) -> bool {
+    let time = to.moment.t - from.moment.t;
+    if time <= CLOSE * to.moment.t {
+        return true;
+    }
+    let (start, end) = (columns(&from.moment), columns(&to.moment));
+    between.iter().all(|sample| {
+        let share = (sample.moment.t - from.moment.t) / time;
+        let here = columns(&sample.moment);
+        (0..COLUMNS).all(|i| (start[i] + share * (end[i] - start[i]) - here[i]).abs() <= tolerance[i])
+    })
+}

@@ -1,0 +1,73 @@
+//! A trace as CSV and as Parquet.
+
+use std::sync::Arc;
+
+use arrow_schema::{DataType, Schema};
+use parquet::arrow::{ArrowSchemaConverter, add_encoded_arrow_schema_to_metadata};
+use parquet::basic::{Compression, ZstdLevel};
+use parquet::data_type::DoubleType;
+use parquet::errors::Result;
+use parquet::file::metadata::KeyValue;
+use parquet::file::properties::WriterProperties;
+use parquet::file::writer::SerializedFileWriter;
+
+use super::Trace;
+use crate::dataset::field;
+use crate::table::Kind;
+
+/// A line with the names of the columns, then one a moment; every number in the fewest digits that read back the same,
+/// and nothing where there is none.
+pub fn csv(trace: &Trace) -> String {
+    let names: Vec<&str> = trace.columns().iter().map(|column| column.name).collect();
+    let mut text = names.join(",");
+    text.push('\n');
+    for moment in &trace.moments {
+        let cells: Vec<String> = (0..names.len())
+            .map(|column| Trace::value(moment, column).map_or(String::new(), |value| format!("{value:?}")))
+            .collect();
+        text.push_str(&cells.join(","));
+        text.push('\n');
+    }
+    text
+}
+
+/// A Parquet file: units and meanings in the metadata of the fields, `facts` and the version in that of the file. The
+/// same bytes on every machine.
+pub fn parquet(trace: &Trace, facts: &[(String, String)], version: &str) -> Result<Vec<u8>> {
+    let columns = trace.columns();
+    let fields = columns.iter().enumerate().map(|(place, column)| {
+        let unit = if let Kind::Number(unit) = column.kind { unit } else { "" };
+        field(column.name, DataType::Float64, is_partial(place), unit, column.doc)
+    });
+    let layout = Arc::new(Schema::new(fields.collect::<Vec<_>>()));
+    let schema = ArrowSchemaConverter::new().convert(&layout)?;
+    let entry = |key: &str, value: &str| KeyValue::new(format!("slipsweep.{key}"), value.to_owned());
+    let mut entries = vec![entry("version", version)];
+    entries.extend(facts.iter().map(|(key, value)| entry(key, value)));
+    let mut properties = WriterProperties::builder()
+        .set_created_by(format!("slipsweep version {version}"))
+        .set_key_value_metadata(Some(entries))
+        .set_compression(Compression::ZSTD(ZstdLevel::default()))
+        .set_dictionary_enabled(false)
+        .build();
+    add_encoded_arrow_schema_to_metadata(&layout, &mut properties);
+    let mut file = SerializedFileWriter::new(Vec::new(), schema.root_schema_ptr(), Arc::new(properties))?;
+    let mut group = file.next_row_group()?;
+    for column in 0..columns.len() {
+        let cells: Vec<Option<f64>> = trace.moments.iter().map(|moment| Trace::value(moment, column)).collect();
+        let values: Vec<f64> = cells.iter().copied().flatten().collect();
+        let levels: Vec<i16> = cells.iter().map(|cell| i16::from(cell.is_some())).collect();
+        if let Some(mut writer) = group.next_column()? {
+            let levels = is_partial(column).then_some(levels.as_slice());
+            writer.typed::<DoubleType>().write_batch(&values, levels, None)?;
+            writer.close()?;
+        }
+    }
+    group.close()?;
+    file.into_inner()
+}
+
+/// Whether a column, by its place, may have no value: the costate before and after the protocol.
+fn is_partial(column: usize) -> bool {
+    column + 1 == super::COLUMNS.len()
+}
