@@ -1,0 +1,39 @@
+//! A member over time.
+
+use super::course::{Course, Panel};
+use crate::numerics::elementary::exp;
+use crate::protocol::{Moment, Motion};
+
+/// Panels in the order of time, of equal length in the parameter `s`.
+pub(super) struct Resolution {
+    pub course: Course,
+    pub panels: Vec<Panel>,
+}
+
+impl Motion for Resolution {
+    fn duration(&self) -> f64 {
+        self.course.t_f
+    }
+
+    fn landmarks(&self) -> Vec<f64> {
+        let count = self.panels.len();
+        (0..=count).map(|k| k as f64 / count as f64).collect()
+    }
+
+    fn at(&self, s: f64) -> Moment {
+        let count = self.panels.len();
+        let along = s.clamp(0.0, 1.0) * count as f64;
+        let k = (along as usize).min(count - 1);
+        let (panel, share) = (&self.panels[k], along - k as f64);
+        let share = if self.course.forward { share } else { 1.0 - share };
+        let (d, u) = (panel.place(share), panel.level(share));
+        let x = if self.course.forward { d } else { 1.0 - d };
+        Moment {
+            t: self.course.t_f * x,
+            v: self.course.velocity(d, u),
+            theta: exp(u),
+            friction: self.course.friction(d),
+            beta: None,
+        }
+    }
+}
