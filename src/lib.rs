@@ -5,6 +5,7 @@
 //! - [`model`]: the friction law and the change of velocity asked of it;
 //! - [`numerics`]: tools that know no friction;
 //! - [`protocol`]: the optimal protocol, its crossover times, and the cubic shortcuts;
+//! - [`stability`]: steady sliding of a block on a spring;
 //! - [`grid`]: quantities, axes and the product of axes;
 //! - [`table`]: what a row means;
 //! - [`dataset`]: tables as Parquet parts on disk, and reading them back;
@@ -18,6 +19,7 @@ pub mod grid;
 pub mod model;
 pub mod numerics;
 pub mod protocol;
+pub mod stability;
 pub mod sweep;
 pub mod table;
 pub mod trace;

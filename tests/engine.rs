@@ -179,7 +179,7 @@ fn points_vary_together_and_slowest() {
 fn columns_are_those_of_the_contract() {
     let folder = tempfile::tempdir().expect("is writable");
     let axes = format!("t_f = 0.02\n{MATERIAL}alpha_2 = 0.0\nalpha_3 = 0.0\nk = inf\nm = 0.0\ntau_max = 2.0\n");
-    run(&sweep(folder.path(), &axes, &format!("{ALL_TABLES}[tables.swift]\n")), folder.path(), 1);
+    run(&sweep(folder.path(), &axes, &format!("{ALL_TABLES}[tables.swift]\n[tables.stability]\n")), folder.path(), 1);
     let names = |table| {
         let frame = read(folder.path(), table);
         frame.get_column_names().into_iter().map(|name| name.as_str()).collect::<Vec<_>>().join(" ")
@@ -190,6 +190,10 @@ fn columns_are_those_of_the_contract() {
     assert_eq!(
         names("swift"),
         "t_f a b v_i v_f family tau_max alpha work work_optimal gap v_min v_max friction_max status"
+    );
+    assert_eq!(
+        names("stability"),
+        "a b v_i v_f k m k_qs k_c_i k_c_f stable_i stable_f v_crit growth_rate frequency decay_rate status"
     );
     assert_eq!(
         names("crossover"),
@@ -396,4 +400,22 @@ fn families_are_words_and_say_which_bound_stops_them() {
         assert!(end_error[row].is_some_and(|error| (error / expected - 1.0).abs() < 1e-12));
         assert_eq!((words(&swift, "status")[row].as_str(), work[row].is_some()), ("ok", true));
     }
+}
+
+#[test]
+fn stability_is_flagged() {
+    let folder = tempfile::tempdir().expect("is writable");
+    let axes = "a = 0.005\nb = 0.01\nv_i = 1e5\nv_f = 3.2e6\nk = [7.5e-3, 0.00757, inf]\nm = [0.0, 2.5e-16]\n";
+    run(&sweep(folder.path(), axes, "[tables.stability]\n"), folder.path(), 2);
+    let frame = read(folder.path(), "stability");
+    let flags = |name: &str| -> Vec<Option<bool>> {
+        frame.column(name).expect("is there").bool().expect("holds flags").iter().collect()
+    };
+    assert_eq!(flags("stable_i"), [Some(true); 6]);
+    assert_eq!(flags("stable_f"), [true, false, true, true, true, true].map(Some));
+    let given = |name: &str| numbers(&frame, name).into_iter().map(|cell| cell.is_some()).collect::<Vec<_>>();
+    // No third eigenvalue without mass, none at all of a rigid spring, no critical velocity where all are stable.
+    assert_eq!(given("decay_rate"), [false, true, false, true, false, false]);
+    assert_eq!(given("growth_rate"), [true, true, true, true, false, false]);
+    assert_eq!(given("v_crit"), [false, true, false, true, false, false]);
 }

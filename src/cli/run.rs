@@ -184,6 +184,8 @@ fn account(outcome: &Outcome, seconds: f64) -> String {
     .filter(|(number, _)| *number > 0)
     .map(|(number, thing)| words::things(number, thing))
     .collect();
-    text.push_str(&format!("work: {}\n", spent.join(", ")));
+    if !spent.is_empty() {
+        text.push_str(&format!("work: {}\n", spent.join(", ")));
+    }
     text
 }

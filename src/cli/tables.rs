@@ -16,7 +16,11 @@ pub fn tables() -> Result<(), Failure> {
             rows.push([axis.name(), unit, axis.doc()].map(str::to_owned).into());
         }
         for column in table.columns() {
-            let unit = if let Kind::Label(_) = column.kind { "word" } else { column.unit(&no_axes) };
+            let unit = match column.kind {
+                Kind::Label(_) => "word",
+                Kind::Flag => "true or false",
+                _ => column.unit(&no_axes),
+            };
             let note = if column.optional { " (only if a spec names it)" } else { "" };
             rows.push(vec![column.name.to_owned(), unit.to_owned(), format!("{}{note}", column.doc)]);
         }

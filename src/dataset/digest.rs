@@ -105,7 +105,16 @@ impl Digest {
         for column in columns {
             match column.kind {
                 Kind::Number(_) | Kind::Quantity(_) => self.add_numbers(frame, column.name)?,
-                Kind::Label(_) => self.add_words(frame, column.name)?,
+                Kind::Label(_) => {
+                    let counts = count_words(frame, column.name)?;
+                    self.add_words(column.name, counts);
+                }
+                Kind::Flag => {
+                    let flags = frame.column(column.name)?.bool()?;
+                    let count = |flag| flags.iter().flatten().filter(|&found| found == flag).count() as u64;
+                    let counts = [(true, "yes"), (false, "no")].map(|(flag, word)| (word.to_owned(), count(flag)));
+                    self.add_words(column.name, counts.into_iter().filter(|(_, rows)| *rows > 0).collect());
+                }
             }
         }
         if let Some(rows) = &mut self.rows {
@@ -138,7 +147,7 @@ impl Digest {
         Ok(())
     }
 
-    fn add_words(&mut self, frame: &DataFrame, name: &str) -> Result<(), PolarsError> {
+    fn add_words(&mut self, name: &str, found: Vec<(String, u64)>) {
         let place = match self.words.iter().position(|(column, _)| column == name) {
             Some(place) => place,
             None => {
@@ -147,14 +156,13 @@ impl Digest {
             }
         };
         let counts = &mut self.words[place].1;
-        for (word, rows) in count_words(frame, name)? {
+        for (word, rows) in found {
             match counts.iter_mut().find(|(known, _)| *known == word) {
                 Some((_, count)) => *count += rows,
                 None => counts.push((word, rows)),
             }
         }
         counts.sort();
-        Ok(())
     }
 }
 
@@ -185,6 +193,8 @@ fn row(path: &Path, index: usize) -> Result<Row, PolarsError> {
         .map(|column| {
             let cell = if let Some(numbers) = column.try_f64() {
                 numbers.get(0).map(Cell::Number)
+            } else if let Some(flags) = column.try_bool() {
+                flags.get(0).map(|flag| Cell::Word(if flag { "yes" } else { "no" }.to_owned()))
             } else {
                 let words = column.cat32()?;
                 let word = words.physical().get(0).and_then(|code| words.get_mapping().cat_to_str(code));

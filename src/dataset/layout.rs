@@ -34,6 +34,7 @@ impl Layout {
             let kind = match column.kind {
                 Kind::Number(_) | Kind::Quantity(_) => DataType::Float64,
                 Kind::Label(_) => label(),
+                Kind::Flag => DataType::Boolean,
             };
             fields.push(field(column.name, kind, true, column.unit(grid), column.doc));
         }

@@ -4,6 +4,7 @@ pub(crate) mod atomic;
 mod chunk;
 mod dictionary;
 mod digest;
+mod flags;
 mod folder;
 mod footer;
 mod hybrid;

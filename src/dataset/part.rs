@@ -12,7 +12,7 @@ use zstd::bulk::Compressor;
 use super::chunk::{Chunk, Runs};
 use super::footer::Footer;
 use super::layout::Layout;
-use super::{dictionary, numbers};
+use super::{dictionary, flags, numbers};
 use crate::grid::Projection;
 use crate::protocol::Status;
 use crate::table::{Kind, Sheet};
@@ -64,6 +64,7 @@ pub fn encode(layout: &Layout, grid: &Projection<'_>, sheet: &Sheet, footer: &Fo
             match column.kind {
                 Kind::Number(_) | Kind::Quantity(_) => group.numbers(cells)?,
                 Kind::Label(words) => group.labels(words, cells)?,
+                Kind::Flag => group.splice(flags::chunk(cells))?,
             }
         }
         group.status(&sheet.status[range])?;

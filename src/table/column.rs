@@ -11,6 +11,8 @@ pub enum Kind {
     Quantity(Quantity),
     /// One of these words.
     Label(&'static [&'static str]),
+    /// Whether something is so: 1 or 0 in a sheet.
+    Flag,
 }
 
 /// One column of a table.
@@ -47,7 +49,7 @@ impl Column {
         match self.kind {
             Kind::Number(unit) => unit,
             Kind::Quantity(quantity) => quantity.unit(grid.scale(quantity).unwrap_or(Scale::Duration)),
-            Kind::Label(_) => "",
+            Kind::Label(_) | Kind::Flag => "",
         }
     }
 }

@@ -8,6 +8,7 @@ mod optima;
 mod optimal;
 mod rows;
 mod sheet;
+mod stability;
 mod swift;
 
 use std::ops::Range;
@@ -43,7 +44,8 @@ pub trait Table: Sync {
 }
 
 /// Every table, in the order in which they are listed. A new table is a file and a line here.
-pub const ALL: [&dyn Table; 5] = [&gap::Gap, &best::Best, &optimal::Optimal, &crossover::Crossover, &swift::Swift];
+pub const ALL: [&dyn Table; 6] =
+    [&gap::Gap, &best::Best, &optimal::Optimal, &crossover::Crossover, &swift::Swift, &stability::Stability];
 
 /// The table of this name.
 pub fn find(name: &str) -> Option<&'static dyn Table> {

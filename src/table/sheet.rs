@@ -6,7 +6,7 @@ use crate::protocol::Status;
 
 /// The cells that a part consists of, axes apart.
 ///
-/// A missing number is NaN in here, and null outside: no solver returns NaN as a result. A label is the index of its word.
+/// A missing number is NaN in here, and null outside: no solver returns NaN as a result. A label is the index of its word, a flag 1 or 0.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Sheet {
     /// The columns that were asked for, in their order.
