@@ -17,7 +17,7 @@
 
 use multiversion::multiversion;
 
-use super::curve::{Curve, Panel};
+use super::curve::{Curve, MOST_PANELS, Panel};
 use crate::numerics::elementary::{exp, exp_m1, ln, ln_1p};
 use crate::numerics::radau::{NODES, Nodes, Radau, radau};
 use crate::numerics::root::{Probe, newton};
@@ -94,10 +94,12 @@ impl Problem {
         if y > l.abs() { -y } else { -l }
     }
 
-    /// The integrals over the whole protocol; `None` where the velocity is so large that theta ends at 0.
+    /// The integrals over the whole protocol; `None` where the velocity is so large that theta ends at 0,
+    /// or numbers leave the range of a double.
     fn behind(&self, curve: &Curve, rtol: f64, reach: f64, effort: &mut Effort) -> Option<Behind> {
         let rule = radau();
         let mut behind = Behind { v: self.v_f, slip: 0.0, turn: 0.0, sum: 0.0, slope: 0.0 };
+        let mut count = 0;
         effort.quadratures += 1;
         // Bounds on the integrals without e^-R.
         let most = 1.0 + self.v_f * curve.t_f + self.v_f / self.v_i;
@@ -107,9 +109,11 @@ impl Problem {
             while d != stretch.to {
                 let panel = curve.panel(&stretch, d, reach);
                 let panel = curve.cut(panel, behind.v, curve.last(&panel), reach);
-                if panel.to == d || behind.slip.is_nan() || behind.slip > MOST_SLIP {
+                let sound = panel.to != d && !panel.to.is_nan() && behind.slip <= MOST_SLIP;
+                if !sound || count == MOST_PANELS {
                     return None;
                 }
+                count += 1;
                 effort.nodes += NODES as u32;
                 let (left, counts) = if self.tight {
                     tight(self, curve, &panel, rule, &mut behind);

@@ -41,6 +41,9 @@ pub(super) struct Panel {
 /// Below `e^-QUIET` of the larger end (or of 1) the velocity is 1 in double precision, and so is what follows from it.
 const QUIET: f64 = 45.0;
 
+/// More panels than any case within the range of a double takes that is meant; the hardest take some hundreds.
+pub(super) const MOST_PANELS: u32 = 10_000;
+
 impl Curve {
     pub fn new(w_i: f64, w_f: f64, l: f64, t_f: f64) -> Curve {
         Curve { w_i, w_f, l, c: 0.0, t_f, ln_w_f: ln(w_f) }

@@ -4,8 +4,11 @@
 //! `1/v_f` at `t_f`. Since theta(t_f) rises strictly with `alpha_3`, there is one member if `t_f > t_min = ln(v_f/v_i) +
 //! ln((v_i - 1)/(v_f - 1))`, the time that `v = 1` takes, and none otherwise. The unknown is `c = alpha_3 t_f^2`.
 //!
-//! `alpha_3` changes by `d ln alpha_3 = -d ln(t_f - t_min)` near `t_min`: there it is as good as `t_f - t_min` is known
-//! from `t_f`, `v_i` and `v_f`.
+//! Conditioning. With the slip `R(t) = int_t^t_f v dt` that is left, `dc/d ln t_f = -int e^-R theta' dt / int e^-R theta (v -
+//! 1) x (1 - x) dt`. Near `t_min` the first integral tends to `t_min (1 - 1/v_f)` and `c` goes like `1/(t_f - t_min)`:
+//! relative errors of `t_f`, `v_i` and `v_f` come out `t_f/(t_f - t_min)` times as large in `alpha_3`, and so does the
+//! rounding of `t_min`. For short times, `c` goes like `4 ln t_f`; for long ones it tends to `-L`. It never passes 0: since
+//! `int e^-R v'/v^2 dt = 0`, `v'` changes its sign, so the vertex of the exponent lies inside and `|c| > |L|`.
 
 mod arrival;
 mod curve;
@@ -13,13 +16,14 @@ mod motion;
 mod passage;
 
 use super::{Case, Family, Obstacle, Swift};
+use crate::model::Transition;
 use crate::numerics::elementary::{exp, ln, ln_1p};
 use crate::numerics::radau::NODES;
 use crate::protocol::{Effort, Motion};
 use arrival::Problem;
 use curve::{Curve, Side};
 use motion::Resolution;
-use passage::{Passage, pass};
+use passage::{Passage, Resolved, pass};
 
 /// The family.
 pub struct BoundedVelocity;
@@ -46,10 +50,8 @@ impl Family for BoundedVelocity {
             return Ok(Swift { alpha: Some(0.0), work, v_min: v_i, v_max: v_i, friction_max, miss: 0.0 });
         }
         let mut passage = Passage { work: 0.0, friction_max: f64::NEG_INFINITY };
-        let theta =
-            pass(&curve, v_i, rtol, 0.75 * reach(rtol), effort, |panel| panel.gather(&law, &curve, rtol, &mut passage));
-        let arrived = (theta * v_f - 1.0).abs() <= 10.0 * rtol + ROUNDING;
-        if !arrived || !passage.work.is_finite() {
+        follow(&curve, case, rtol, effort, |panel| panel.gather(&law, &curve, rtol, &mut passage))?;
+        if !passage.work.is_finite() {
             return Err(Obstacle::NotConverged);
         }
         let vertex = curve.vertex().map_or(v_i, |x| 1.0 + curve.surplus(Side::Start, x));
@@ -67,9 +69,24 @@ impl Family for BoundedVelocity {
         let mut effort = Effort::default();
         let curve = member(case, rtol, &mut effort)?;
         let mut panels = Vec::new();
-        pass(&curve, case.transition.v_i, rtol, reach(rtol), &mut effort, |panel| panels.push(*panel));
+        follow(&curve, case, rtol, &mut effort, |panel| panels.push(*panel))?;
         Ok(Box::new(Resolution { law: case.transition.law, curve, panels }))
     }
+}
+
+/// Passes along the member, and sees whether theta arrives: that the root is one is shown by another route than found it.
+fn follow(
+    curve: &Curve,
+    case: &Case,
+    rtol: f64,
+    effort: &mut Effort,
+    visit: impl FnMut(&Resolved),
+) -> Result<(), Obstacle> {
+    let Transition { v_i, v_f, .. } = case.transition;
+    // Theta is interpolated, which takes more nodes than a quadrature.
+    let theta = pass(curve, v_i, rtol, 0.75 * reach(rtol), effort, visit).ok_or(Obstacle::NotConverged)?;
+    let arrives = (theta * v_f - 1.0).abs() <= 10.0 * rtol + ROUNDING;
+    if arrives { Ok(()) } else { Err(Obstacle::NotConverged) }
 }
 
 /// What rounding may cost of theta at the end.

@@ -3,6 +3,7 @@
 use super::curve::Curve;
 use super::passage::{Resolved, friction_at};
 use crate::model::Law;
+use crate::numerics::elementary::exp;
 use crate::protocol::{Moment, Motion};
 
 /// Panels of equal length in the parameter `s`, each with theta at its nodes.
@@ -30,7 +31,7 @@ impl Motion for Resolution {
         let u = along - k as f64;
         let (x, z) = panel.place(u);
         let theta = panel.theta(u);
-        let v = 1.0 + self.curve.w_f * crate::numerics::elementary::exp(self.curve.exponent(x, z));
+        let v = 1.0 + self.curve.w_f * exp(self.curve.exponent(x, z));
         Moment { t: self.curve.t_f * x, v, theta, friction: friction_at(&self.law, v, theta), beta: None }
     }
 }

@@ -7,7 +7,7 @@
 use multiversion::multiversion;
 
 use super::arrival::total;
-use super::curve::{Curve, Panel, Side};
+use super::curve::{Curve, MOST_PANELS, Panel, Side};
 use crate::model::Law;
 use crate::numerics::elementary::{exp, ln};
 use crate::numerics::radau::{NODES, Nodes, Radau, radau};
@@ -33,7 +33,8 @@ pub(super) struct Passage {
     pub friction_max: f64,
 }
 
-/// Passes along the curve from `theta = 1/v_i`; every panel goes to `visit`.
+/// Passes along the curve from `theta = 1/v_i`; every panel goes to `visit`. Returns theta at the end, `None` where
+/// numbers leave the range of a double.
 pub(super) fn pass(
     curve: &Curve,
     v_i: f64,
@@ -41,11 +42,12 @@ pub(super) fn pass(
     reach: f64,
     effort: &mut Effort,
     mut visit: impl FnMut(&Resolved),
-) -> f64 {
+) -> Option<f64> {
     let rule = radau();
     let (mut v, mut theta, mut rate) = (v_i, 1.0 / v_i, 0.0);
     // Slip since theta last left the slow solution, and by which share: at the start, or where v changes too fast.
     let (mut slip, mut off) = (0.0, lag(curve, Side::Start, 0.0, v_i));
+    let mut count = 0;
     effort.quadratures += 1;
     for stretch in curve.stretches().forward() {
         let mut d = stretch.from;
@@ -63,9 +65,10 @@ pub(super) fn pass(
                 // Since theta' <= 1, theta has no zero nearer behind than its own size: ln theta is smooth on that scale.
                 curve.cut(panel, v, last, reach).shortened(reach * theta / curve.t_f)
             };
-            if panel.to == d {
-                return f64::NAN;
+            if panel.to == d || panel.to.is_nan() || count == MOST_PANELS {
+                return None;
             }
+            count += 1;
             effort.nodes += NODES as u32;
             let (resolved, slipped) = resolve(curve, panel, [v, theta, rate], stiff, rule);
             visit(&resolved);
@@ -76,7 +79,7 @@ pub(super) fn pass(
             d = panel.to;
         }
     }
-    theta
+    Some(theta)
 }
 
 /// The relative change of v in the time in which theta follows: how far theta is from `1/v`, relative, where it follows.
