@@ -1,11 +1,13 @@
 //! `swift`: the members of the shortcut families that solve a transition.
 
+use std::collections::HashMap;
 use std::ops::Range;
+use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
 use super::optima::transition;
 use super::{Column, Job, Kind, Selection, Sheet, Stopped, Table, Work, rows};
-use crate::grid::Quantity;
-use crate::protocol::swift::{Case, FAMILIES, Obstacle};
+use crate::grid::{Point, Quantity};
+use crate::protocol::swift::{Case, FAMILIES, Family, Obstacle, Swift as Member};
 use crate::protocol::{Effort, Status};
 
 /// One row a transition, time, family and bound on friction.
@@ -13,6 +15,7 @@ pub struct Swift;
 
 const WORK_OPTIMAL: usize = 2;
 const GAP: usize = 3;
+const BOUND: usize = 8;
 
 const COLUMNS: &[Column] = &[
     Column::number(
@@ -65,38 +68,28 @@ impl Table for Swift {
     }
 
     fn compute(&self, job: &Job<'_>, range: Range<u64>, sheet: &mut Sheet) -> Result<Work, Stopped> {
+        let members = Members::default();
         rows::each(job, range, (COLUMNS.len(), 16), sheet, |row, point, cells| {
-            let case = Case {
-                transition: transition(point),
-                t_f: point[Quantity::Time],
-                tau_max: point[Quantity::FrictionBound],
-            };
-            let mut effort = Effort::default();
-            let least = case.transition.least_time();
-            let solved = match FAMILIES.get(point[Quantity::Family] as usize) {
-                _ if job.bounded && case.t_f < least => Err(Obstacle::Time { t_min: least }),
-                Some(family) => family.solve(&case, job.rtol, &mut effort),
-                None => Err(Obstacle::Domain),
-            };
-            let mut work = Work { swifts: 1, ..Work::from(effort) };
-            let swift = match solved {
+            let mut work = Work::default();
+            let tuple = job.tuples.of(row);
+            let swift = match members.get(job, tuple, point, &mut work) {
                 Ok(swift) => swift,
                 Err(obstacle) => {
-                    cells[COLUMNS.len() - 1] = obstacle.code() as f64;
+                    cells[BOUND] = obstacle.code() as f64;
                     return (obstacle.status(), work);
                 }
             };
             let mut status = swift.status();
             let mut work_optimal = f64::NAN;
             if self.needs_optimum(job.selection) {
-                let (optimum, spent) = job.optima.get(job.tuples.of(row), point);
+                let (optimum, spent) = job.optima.get(tuple, point);
                 work += spent;
                 work_optimal = optimum.value.map_or(f64::NAN, |optimum| optimum.work);
                 if matches!(optimum.status, Status::Nonphysical | Status::NotConverged) {
                     status = optimum.status;
                 }
             }
-            cells.copy_from_slice(&[
+            cells[..BOUND].copy_from_slice(&[
                 swift.alpha.unwrap_or(f64::NAN),
                 swift.work,
                 work_optimal,
@@ -105,9 +98,42 @@ impl Table for Swift {
                 swift.v_max,
                 swift.friction_max,
                 swift.miss,
-                f64::NAN,
             ]);
             (status, work)
         })
     }
+}
+
+type Solution = Result<Member, Obstacle>;
+
+/// The members of families that do not heed the bound on friction, solved once each whatever its values.
+#[derive(Default)]
+struct Members(Mutex<HashMap<(u64, usize), Arc<OnceLock<Solution>>>>);
+
+impl Members {
+    /// The member for `point`, which belongs to tuple number `tuple`; adds what is spent by this call alone.
+    fn get(&self, job: &Job<'_>, tuple: u64, point: &Point, work: &mut Work) -> Solution {
+        let number = point[Quantity::Family] as usize;
+        let Some(&family) = FAMILIES.get(number) else { return Err(Obstacle::Domain) };
+        if family.heeds_tau_max() {
+            return solve(job, family, point, work);
+        }
+        let mut members = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        let member = members.entry((tuple, number)).or_default().clone();
+        drop(members);
+        *member.get_or_init(|| solve(job, family, point, work))
+    }
+}
+
+fn solve(job: &Job<'_>, family: &dyn Family, point: &Point, work: &mut Work) -> Solution {
+    let case =
+        Case { transition: transition(point), t_f: point[Quantity::Time], tau_max: point[Quantity::FrictionBound] };
+    let t_min = case.transition.least_time();
+    if job.bounded && case.t_f < t_min {
+        return Err(Obstacle::Time { t_min });
+    }
+    let mut effort = Effort::default();
+    let solved = family.solve(&case, job.rtol, &mut effort);
+    *work += Work { swifts: 1, ..Work::from(effort) };
+    solved
 }
