@@ -1,9 +1,9 @@
 //! One solve of the families `step`, `cubic` and `bounded_velocity`, beside bounded_velocity solved the paper's way:
 //! shooting with a library's ODE integrator, at the same error. One core.
 //!
-//! `cargo bench --bench swift_velocity`. The cases: 1,000 random ones (a, b in 0.005 … 0.1, v_i in 2 … 50, v_f/v_i or its
-//! inverse in 2 … 100, t_f in 1e-3 … 10 l/v_f beyond the least time), 1,000 over the whole range (v up to 1e8, t_f in 1e-6 …
-//! 1e3 l/v_f), and the rows of `tests/reference/swift_velocity.csv`, which hold the hard corners.
+//! `cargo bench --bench swift_velocity`. The cases: 1,000 random ones (a, b in 0.005 … 0.1, v_i in 2 … 50, v_f/v_i or
+//! its inverse in 2 … 100, t_f in 1e-3 … 10 l/v_f beyond the least time), 1,000 over the whole range (v up to 1e8, t_f
+//! in 1e-6 … 1e3 l/v_f), and the rows of `tests/reference/swift_velocity.csv`, which hold the hard corners.
 
 #[path = "../tests/reference/mod.rs"]
 mod reference;
@@ -106,8 +106,8 @@ fn shooting(cases: &[Case], tolerance: f64, ln: f64) {
     );
 }
 
-/// Theta, work and `x = t/t_f` along the formula with `alpha_3 t_f^2 = c`. `x` is a variable, since the library's steps shrink
-/// to nothing where a system depends on its argument.
+/// Theta, work and `x = t/t_f` along the formula with `alpha_3 t_f^2 = c`. `x` is a variable, since the library's steps
+/// shrink to nothing where a system depends on its argument.
 struct Sliding {
     case: Case,
     l: f64,

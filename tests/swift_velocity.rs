@@ -85,8 +85,8 @@ fn reference_every_number_is_good_to_rtol() {
     }
 }
 
-/// `theta' = 1 - theta v` and `W' = tau v` for a velocity that is given over `x = t/t_f`, with `ln theta` as variable. `x` is a
-/// variable too: the library's steps shrink to nothing where a system depends on its argument.
+/// `theta' = 1 - theta v` and `W' = tau v` for a velocity that is given over `x = t/t_f`, with `ln theta` as variable.
+/// `x` is a variable too: the library's steps shrink to nothing where a system depends on its argument.
 struct Sliding<F> {
     law: Law,
     velocity: F,

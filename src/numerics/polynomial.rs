@@ -5,7 +5,8 @@ pub fn value_and_slope(c: &[f64], x: f64) -> (f64, f64) {
     c.iter().rev().fold((0.0, 0.0), |(value, slope), &c| (value * x + c, slope * x + value))
 }
 
-/// The places in `(low, high)` where the polynomial changes sign, rising, each to the last digits that its value allows.
+/// The places in `(low, high)` where the polynomial changes sign, rising, each to the last digits that its value
+/// allows.
 pub fn roots_between(c: &[f64], low: f64, high: f64) -> Vec<f64> {
     if c.len() < 2 {
         return Vec::new();

@@ -1,9 +1,9 @@
 //! `cubic`: theta is the cubic in time along which v is continuous at both ends.
 //!
-//! With `x = t/t_f`, `z = 1 - x` and `rise = 1/v_f - 1/v_i`: `theta = 1/v_i + rise (3 x^2 - 2 x^3)` and `n = t_f (1 - theta') =
-//! t_f - 6 rise x z`, so `v = n/(t_f theta)`. It is the shortcut `alpha_2 = 0`, `alpha_3 t_f^2 = 3 rise` of the landscape,
-//! which gives its work. The extrema of `p ln n + q ln theta` are roots of a polynomial of degree four; both halves have
-//! their own, in the distance from their end.
+//! With `x = t/t_f`, `z = 1 - x` and `rise = 1/v_f - 1/v_i`: `theta = 1/v_i + rise (3 x^2 - 2 x^3)` and `n = t_f (1 -
+//! theta') = t_f - 6 rise x z`, so `v = n/(t_f theta)`. It is the shortcut `alpha_2 = 0`, `alpha_3 t_f^2 = 3 rise` of
+//! the landscape, which gives its work. The extrema of `p ln n + q ln theta` are roots of a polynomial of degree four;
+//! both halves have their own, in the distance from their end.
 
 use super::{Case, Family, Obstacle, Swift};
 use crate::model::Law;
@@ -133,8 +133,8 @@ impl Curve {
         1.0 + self.law.a * ln(self.velocity(side, d)) + self.law.b * ln(self.theta(side, d))
     }
 
-    /// The ends and the places between them where `p ln n + q ln theta` is stationary: where `-p (1 - 2 x) theta + q x z n
-    /// = 0`.
+    /// The ends and the places between them where `p ln n + q ln theta` is stationary: where `-p (1 - 2 x) theta + q x
+    /// z n = 0`.
     fn extrema(&self, p: f64, q: f64) -> Vec<(Side, f64)> {
         let Curve { t_f, rise, .. } = *self;
         let mut places = Vec::with_capacity(8);

@@ -1,7 +1,7 @@
 //! `step`: the velocity jumps to `v_f` and stays there.
 //!
-//! With `p = v_f t` and `k = v_f/v_i - 1` the contact lifetime is `theta = (1 + k e^-p)/v_f`, so all numbers are in closed
-//! form; the work holds `int ln(1 + k e^-p) dp`, a difference of two dilogarithms.
+//! With `p = v_f t` and `k = v_f/v_i - 1` the contact lifetime is `theta = (1 + k e^-p)/v_f`, so all numbers are in
+//! closed form; the work holds `int ln(1 + k e^-p) dp`, a difference of two dilogarithms.
 
 use super::{Case, Family, Obstacle, Swift};
 use crate::model::Law;

@@ -1,7 +1,7 @@
 //! The velocity over the protocol, and the panels in which it is resolved.
 //!
-//! With `x = t/t_f`, `z = 1 - x`, `L = ln((v_f - 1)/(v_i - 1))` and `c = alpha_3 t_f^2` the velocity is `v = 1 + (v_f - 1)
-//! exp(-z (L + c x))`: the exponent is a parabola, known before anything is computed. Places are distances from the
+//! With `x = t/t_f`, `z = 1 - x`, `L = ln((v_f - 1)/(v_i - 1))` and `c = alpha_3 t_f^2` the velocity is `v = 1 + (v_f -
+//! 1) exp(-z (L + c x))`: the exponent is a parabola, known before anything is computed. Places are distances from the
 //! nearer end, so that layers much thinner than the rounding of `x` are seen.
 
 use crate::numerics::elementary::{exp, exp_m1, ln, ln_1p};
@@ -199,7 +199,8 @@ impl Curve {
         self.t_f * (panel.to - panel.from).abs() * first.max(last)
     }
 
-    /// The panel, cut so that its stiffness is about `reach` at most; `first` and `last` are the velocities at its ends.
+    /// The panel, cut so that its stiffness is about `reach` at most; `first` and `last` are the velocities at its
+    /// ends.
     pub fn cut(&self, panel: Panel, first: f64, last: f64, reach: f64) -> Panel {
         if self.stiffness(&panel, first, last) <= reach {
             return panel;

@@ -1,14 +1,15 @@
 //! `bounded_velocity`: `v > 1` by construction.
 //!
 //! `v = 1 + (v_i - 1) exp[L t/t_f - alpha_3 (t_f - t) t]` with `L = ln((v_f - 1)/(v_i - 1))`; `alpha_3` brings theta to
-//! `1/v_f` at `t_f`. Since theta(t_f) rises strictly with `alpha_3`, there is one member if `t_f > t_min = ln(v_f/v_i) +
-//! ln((v_i - 1)/(v_f - 1))`, the time that `v = 1` takes, and none otherwise. The unknown is `c = alpha_3 t_f^2`.
+//! `1/v_f` at `t_f`. Since theta(t_f) rises strictly with `alpha_3`, there is one member if `t_f` is above `t_min =
+//! ln(v_f/v_i) + ln((v_i - 1)/(v_f - 1))`, the time that `v = 1` takes, and none otherwise. The unknown is `c = alpha_3
+//! t_f^2`.
 //!
-//! Conditioning. With the slip `R(t) = int_t^t_f v dt` that is left, `dc/d ln t_f = -int e^-R theta' dt / int e^-R theta (v -
-//! 1) x (1 - x) dt`. Near `t_min` the first integral tends to `t_min (1 - 1/v_f)` and `c` goes like `1/(t_f - t_min)`:
-//! relative errors of `t_f`, `v_i` and `v_f` come out `t_f/(t_f - t_min)` times as large in `alpha_3`, and so does the
-//! rounding of `t_min`. For short times, `c` goes like `4 ln t_f`; for long ones it tends to `-L`. It never passes 0: since
-//! `int e^-R v'/v^2 dt = 0`, `v'` changes its sign, so the vertex of the exponent lies inside and `|c| > |L|`.
+//! Conditioning. With the slip `R(t) = int_t^t_f v dt` that is left, `dc/d ln t_f = -N/M`, where `N = int e^-R theta'
+//! dt` and `M = int e^-R theta (v - 1) x (1 - x) dt`. Near `t_min`, `N` tends to `t_min (1 - 1/v_f)` and `c` goes like
+//! `1/(t_f - t_min)`: a relative error of `t_f`, and the rounding of `t_min`, come out `t_f/(t_f - t_min)` times as
+//! large in `alpha_3`. For short times `c` goes like `4 ln t_f`, for long ones it tends to `-L`. It never passes 0:
+//! since `int e^-R v'/v^2 dt = 0`, `v'` changes its sign, so the vertex of the exponent lies inside and `|c| > |L|`.
 
 mod arrival;
 mod curve;
@@ -74,7 +75,8 @@ impl Family for BoundedVelocity {
     }
 }
 
-/// Passes along the member, and sees whether theta arrives: that the root is one is shown by another route than found it.
+/// Passes along the member, and sees whether theta arrives: that the root is one is shown by another route than found
+/// it.
 fn follow(
     curve: &Curve,
     case: &Case,

@@ -1,8 +1,8 @@
 //! Theta along a member, panel by panel in the order of time, with work and the greatest friction.
 //!
 //! `theta' = 1 - theta v` contracts forwards. Where the slip of a panel is small, theta follows from the solution in
-//! closed form, of which all terms are positive. Where it is large theta has forgotten its start and follows `1/v`: Radau
-//! collocation gives `theta'` at the nodes.
+//! closed form, of which all terms are positive. Where it is large theta has forgotten its start and follows `1/v`:
+//! Radau collocation gives `theta'` at the nodes.
 
 use multiversion::multiversion;
 
@@ -62,7 +62,8 @@ pub(super) fn pass(
             panel = if stiff {
                 curve.panel(&stretch, d, STIFF * reach)
             } else {
-                // Since theta' <= 1, theta has no zero nearer behind than its own size: ln theta is smooth on that scale.
+                // Since theta' <= 1, theta has no zero nearer behind than its own size: ln theta is smooth on that
+                // scale.
                 curve.cut(panel, v, last, reach).shortened(reach * theta / curve.t_f)
             };
             if panel.to == d || panel.to.is_nan() || count == MOST_PANELS {
@@ -82,14 +83,15 @@ pub(super) fn pass(
     Some(theta)
 }
 
-/// The relative change of v in the time in which theta follows: how far theta is from `1/v`, relative, where it follows.
+/// The relative change of v in the time in which theta follows: how far theta is from `1/v`, relative, where it
+/// follows.
 fn lag(curve: &Curve, side: Side, d: f64, v: f64) -> f64 {
     let (x, z) = Curve::place(side, d);
     curve.slope(x, z).abs() * (v - 1.0) / (v * v * curve.t_f)
 }
 
-/// Greatest lag at which theta follows v without leaving the slow solution: what it leaves it by is exponentially small in
-/// the inverse of the lag.
+/// Greatest lag at which theta follows v without leaving the slow solution: what it leaves it by is exponentially small
+/// in the inverse of the lag.
 const SLOW: f64 = 0.02;
 
 /// How much less the exponent may vary over a panel on which theta is not given in closed form.
