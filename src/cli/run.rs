@@ -1,6 +1,5 @@
 //! `slipsweep run SPEC`: computes what is missing of a dataset, then reads it back and says what is in it.
 
-use std::num::NonZeroUsize;
 use std::path::PathBuf;
 use std::time::Instant;
 
@@ -20,9 +19,9 @@ pub struct Arguments {
     /// Folder in which the dataset's folder is made
     #[arg(long, value_name = "DIR", default_value = "results")]
     out: PathBuf,
-    /// Threads to use; one a processor by default
-    #[arg(long, value_name = "N")]
-    threads: Option<NonZeroUsize>,
+    /// Threads to use, at most 1024; one a processor by default
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
+    threads: Option<u16>,
     /// Say nothing but errors
     #[arg(long)]
     quiet: bool,
@@ -39,7 +38,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let rows = plan.tables.iter().fold(0_u64, |sum, table| sum.saturating_add(table.rows));
     let signal = Signal::default();
     let start = Instant::now();
-    let threads = arguments.threads.map_or(0, NonZeroUsize::get);
+    let threads = arguments.threads.map_or(0, usize::from);
     let (done, caught) = watched(&signal, rows, arguments.quiet, || sweep::run(&sweep, &folder, threads, &signal));
     let outcome = done.map_err(|error| explain(error, caught, arguments))?;
     let seconds = start.elapsed().as_secs_f64();
