@@ -62,7 +62,19 @@ impl Course {
         let pick = |i: f64, f: f64| if forward { (i, f) } else { (f, i) };
         let ((start, target), (gap, gap_last)) = (pick(first, last), pick(gap_i, gap_f));
         let l = if forward { ln_r } else { -ln_r };
-        Course { alpha: 0.0, forward, t_f: case.t_f, start, target, a: law.a, b: law.b, tau_max: case.tau_max, gap, gap_last, l }
+        Course {
+            alpha: 0.0,
+            forward,
+            t_f: case.t_f,
+            start,
+            target,
+            a: law.a,
+            b: law.b,
+            tau_max: case.tau_max,
+            gap,
+            gap_last,
+            l,
+        }
     }
 
     /// The course with another `alpha_3`.
@@ -180,22 +192,15 @@ impl Course {
             }
             let sums = rule.integrals(&rate);
             let forced = rule.integrals(&push);
-            let mut right = [[0.0; 2]; NODES];
-            for j in 0..NODES {
-                right[j] = [start + sums[j] - u[j], turn + forced[j]];
-            }
-            let mut matrix = [[0.0; NODES]; NODES];
-            for j in 0..NODES {
-                for k in 0..NODES {
-                    matrix[j][k] = -rule.columns[k][j] * slope[k];
-                }
-                matrix[j][j] += 1.0;
-            }
+            let mut right: [[f64; 2]; NODES] = std::array::from_fn(|j| [start + sums[j] - u[j], turn + forced[j]]);
+            let mut matrix: [Nodes; NODES] = std::array::from_fn(|j| {
+                std::array::from_fn(|k| f64::from(u8::from(j == k)) - rule.columns[k][j] * slope[k])
+            });
             solve(&mut matrix, &mut right);
             let mut change = 0.0f64;
-            for j in 0..NODES {
-                u[j] += right[j][0];
-                change = if right[j][0].abs() <= change { change } else { right[j][0].abs() };
+            for (u, [step, _]) in u.iter_mut().zip(&right) {
+                *u += step;
+                change = if step.abs() <= change { change } else { step.abs() };
             }
             if change.is_nan() || change > 50.0 {
                 return None;
@@ -215,8 +220,8 @@ impl Course {
         let weights = WEIGHTS.get_or_init(|| {
             let rule = radau();
             let mut weights = [[0.0; NODES]; 2];
-            for j in 0..NODES {
-                let x = 2.0 * rule.u[j] - 1.0;
+            for (j, &u) in rule.u.iter().enumerate() {
+                let x = 2.0 * u - 1.0;
                 let (mut before, mut p) = (1.0, x);
                 for m in 1..NODES {
                     if m + 2 >= NODES {
