@@ -5,6 +5,8 @@
 
 use std::sync::OnceLock;
 
+use multiversion::multiversion;
+
 use crate::numerics::elementary::{exp, exp_m1, ln};
 use crate::numerics::radau::{NODES, Nodes, Radau, radau};
 use crate::protocol::Effort;
@@ -36,6 +38,15 @@ pub(super) struct End {
     pub turn: f64,
 }
 
+/// Why a pass did not reach the end.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Stop {
+    /// Theta fell to nothing.
+    Lost,
+    /// A defect of ours.
+    GaveUp,
+}
+
 /// A panel with `ln theta` at its start and nodes.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Panel {
@@ -45,8 +56,8 @@ pub(super) struct Panel {
     pub u: Nodes,
 }
 
-/// Below this exponent theta counts as lost.
-const LOST: f64 = -600.0;
+/// Where `ln theta` has fallen this far below both ends, theta counts as lost.
+const LOST: f64 = 25.0;
 
 /// Most panels of one pass: far more than a course takes that is not lost.
 const MOST_PANELS: usize = 4000;
@@ -77,6 +88,11 @@ impl Course {
         }
     }
 
+    /// A change of `alpha_3` that counts: about a quarter of it is the change of `ln v`.
+    pub fn unit(&self) -> f64 {
+        self.a / self.gap.max(self.gap_last)
+    }
+
     /// The course with another `alpha_3`.
     pub fn with(self, alpha: f64) -> Course {
         Course { alpha, ..self }
@@ -90,7 +106,7 @@ impl Course {
     /// `ln[(tau_M - tau)/gap]`.
     #[inline(always)]
     fn exponent(&self, d: f64) -> f64 {
-        if self.alpha == f64::NEG_INFINITY { -1e3 } else { d * (self.l + self.alpha * (1.0 - d)) }
+        d * (self.l + self.alpha * (1.0 - d))
     }
 
     /// `(tau - 1)/a`; exact where the integration starts.
@@ -130,88 +146,50 @@ impl Course {
         -self.gap / self.a * slope * exp(e) - self.b / self.a * rate
     }
 
-    /// Passes along the course; every panel goes to `visit`. `None` where theta is lost.
-    pub fn pass(&self, tolerance: f64, effort: &mut Effort, mut visit: impl FnMut(&Panel)) -> Option<End> {
+    /// Passes along the course; every panel goes to `visit`.
+    pub fn pass(&self, tolerance: f64, effort: &mut Effort, mut visit: impl FnMut(&Panel)) -> Result<End, Stop> {
         let rule = radau();
         let (mut d, mut u, mut turn) = (0.0, self.start, 0.0);
         let mut h = self.first();
+        let floor = self.start.min(self.target) - LOST;
         effort.quadratures += 1;
         for _ in 0..MOST_PANELS {
             let to = if d + 1.0001 * h >= 1.0 { 1.0 } else { d + h };
             effort.nodes += NODES as u32;
-            match self.step(d, to, [u, turn], rule) {
-                Some((panel, last, error)) if error <= tolerance => {
-                    visit(&panel);
-                    let grown = (0.5 * tolerance / error.max(1e-30)).powi_root();
-                    (u, turn) = (panel.u[NODES - 1], last);
-                    if u < LOST {
-                        return None;
-                    }
-                    if to == 1.0 {
-                        return Some(End { level: u, turn });
-                    }
-                    h = (to - d) * grown.clamp(0.3, 4.0);
-                    d = to;
+            let Some((panel, last, error)) = step(self, d, to, [u, turn], rule) else {
+                h = 0.25 * (to - d);
+                if d + h == d {
+                    return Err(Stop::GaveUp);
                 }
-                Some((_, _, error)) => h = (to - d) * (0.3 * tolerance / error).powi_root().clamp(0.1, 0.8),
-                None => h = 0.25 * (to - d),
+                continue;
+            };
+            // What the end lacks is of the order of the square of what the nodes lack.
+            let change = (tolerance / (error * error.sqrt()).max(1e-30)).powf_tenth();
+            if error * error.sqrt() <= tolerance {
+                visit(&panel);
+                (u, turn) = (panel.u[NODES - 1], last);
+                if u < floor {
+                    return Err(Stop::Lost);
+                }
+                if to == 1.0 {
+                    return Ok(End { level: u, turn });
+                }
+                h = (to - d) * (0.8 * change).clamp(0.5, 5.0);
+                d = to;
+            } else {
+                h = (to - d) * (0.8 * change).clamp(0.2, 0.8);
             }
             if d + h == d {
-                return None;
+                return Err(Stop::GaveUp);
             }
         }
-        None
+        Err(Stop::GaveUp)
     }
 
     /// A first panel: what the exponent and the rate of theta allow.
     fn first(&self) -> f64 {
-        let alpha = if self.alpha.is_finite() { self.alpha.abs() } else { 0.0 };
-        let layer = (self.l.abs() + alpha) * (1.0 + self.gap / self.a);
+        let layer = (self.l.abs() + self.alpha.abs()) * (1.0 + self.gap / self.a);
         (2.0 / (layer + self.t_f * exp(-self.start) + 1.0)).min(1.0)
-    }
-
-    /// One panel: `ln theta`, the derivative by `alpha_3` at its end, and an estimate of the error.
-    fn step(&self, from: f64, to: f64, [start, turn]: [f64; 2], rule: &Radau) -> Option<(Panel, f64, f64)> {
-        let h = to - from;
-        let scale = h * self.pace();
-        let ratio = self.b / self.a;
-        let (mut drive, mut lean) = ([0.0; NODES], [0.0; NODES]);
-        for j in 0..NODES {
-            let d = from * rule.rest[j] + to * rule.u[j];
-            drive[j] = self.drive(d);
-            lean[j] = -self.gap / self.a * d * (1.0 - d) * exp(self.exponent(d));
-        }
-        let mut u = [start; NODES];
-        for _ in 0..MOST_STEPS {
-            let (mut rate, mut slope, mut push) = ([0.0; NODES], [0.0; NODES], [0.0; NODES]);
-            for j in 0..NODES {
-                let (inverse, v) = (exp(-u[j]), exp(drive[j] - ratio * u[j]));
-                rate[j] = scale * (inverse - v);
-                slope[j] = scale * (ratio * v - inverse);
-                push[j] = -scale * v * lean[j];
-            }
-            let sums = rule.integrals(&rate);
-            let forced = rule.integrals(&push);
-            let mut right: [[f64; 2]; NODES] = std::array::from_fn(|j| [start + sums[j] - u[j], turn + forced[j]]);
-            let mut matrix: [Nodes; NODES] = std::array::from_fn(|j| {
-                std::array::from_fn(|k| f64::from(u8::from(j == k)) - rule.columns[k][j] * slope[k])
-            });
-            solve(&mut matrix, &mut right);
-            let mut change = 0.0f64;
-            for (u, [step, _]) in u.iter_mut().zip(&right) {
-                *u += step;
-                change = if step.abs() <= change { change } else { step.abs() };
-            }
-            if change.is_nan() || change > 50.0 {
-                return None;
-            }
-            // Newton's method squares the change.
-            if change <= 1e-8 {
-                let top = self.top(&rate);
-                return Some((Panel { from, to, start, u }, right[NODES - 1][1], top));
-            }
-        }
-        None
     }
 
     /// The highest coefficients of the rate in Legendre polynomials: what the panel does not resolve.
@@ -238,14 +216,94 @@ impl Course {
     }
 }
 
-/// The root by which a step follows from an error of the order of the nodes.
+/// One panel: `ln theta`, the derivative by `alpha_3` at its end, and an estimate of the error at its nodes; `None`
+/// where Newton's method does not settle.
+///
+/// A step of Newton's method solves `delta = R + int slope delta dd`. Where the slope integrates to little, its solution
+/// `R + int e^(S(d) - S(c)) slope R dc` needs no elimination; quadrature only makes the steps a little inexact.
+#[multiversion(targets(
+    "x86_64+avx+avx2+bmi1+bmi2+avx512f+avx512bw+avx512cd+avx512dq+avx512vl",
+    "x86_64+avx+avx2+bmi1+bmi2"
+))]
+fn step(course: &Course, from: f64, to: f64, [start, turn]: [f64; 2], rule: &Radau) -> Option<(Panel, f64, f64)> {
+    let h = to - from;
+    let scale = h * course.pace();
+    let ratio = course.b / course.a;
+    let (mut drive, mut lean) = ([0.0; NODES], [0.0; NODES]);
+    for j in 0..NODES {
+        let d = from * rule.rest[j] + to * rule.u[j];
+        drive[j] = course.drive(d);
+        lean[j] = -course.gap / course.a * d * (1.0 - d) * exp(course.exponent(d));
+    }
+    let mut u = [start; NODES];
+    for _ in 0..MOST_STEPS {
+        let (mut rate, mut slope, mut push) = ([0.0; NODES], [0.0; NODES], [0.0; NODES]);
+        for j in 0..NODES {
+            let (inverse, v) = (exp(-u[j]), exp(drive[j] - ratio * u[j]));
+            rate[j] = scale * (inverse - v);
+            slope[j] = scale * (ratio * v - inverse);
+            push[j] = -scale * v * lean[j];
+        }
+        let sums = rule.integrals(&rate);
+        let mut rest = [0.0; NODES];
+        for j in 0..NODES {
+            rest[j] = start + sums[j] - u[j];
+        }
+        let decay = rule.integrals(&slope);
+        let mild = decay.iter().all(|s| s.abs() <= MILD);
+        let (steps, last) = if mild {
+            let (mut grow, mut weighted, mut pushed) = ([0.0; NODES], [0.0; NODES], [0.0; NODES]);
+            for j in 0..NODES {
+                grow[j] = exp(decay[j]);
+                weighted[j] = slope[j] * rest[j] / grow[j];
+                pushed[j] = push[j] / grow[j];
+            }
+            let sums = rule.integrals(&weighted);
+            let mut steps = [0.0; NODES];
+            for j in 0..NODES {
+                steps[j] = rest[j] + grow[j] * sums[j];
+            }
+            (steps, grow[NODES - 1] * (turn + rule.integrals(&pushed)[NODES - 1]))
+        } else {
+            let forced = rule.integrals(&push);
+            let mut right: [[f64; 2]; NODES] = std::array::from_fn(|j| [rest[j], turn + forced[j]]);
+            let mut matrix: [Nodes; NODES] = std::array::from_fn(|j| {
+                std::array::from_fn(|k| f64::from(u8::from(j == k)) - rule.columns[k][j] * slope[k])
+            });
+            solve(&mut matrix, &mut right);
+            (right.map(|pair| pair[0]), right[NODES - 1][1])
+        };
+        let mut change = 0.0f64;
+        for j in 0..NODES {
+            u[j] += steps[j];
+            // A NaN stays.
+            change = if steps[j].abs() <= change { change } else { steps[j].abs() };
+        }
+        if change.is_nan() || change > 50.0 {
+            return None;
+        }
+        // Newton's method squares the change; without elimination it loses four digits a step at the least.
+        if change <= if mild { 1e-11 } else { 1e-8 } {
+            let top = course.top(&rate);
+            return Some((Panel { from, to, start, u }, last, top));
+        }
+    }
+    None
+}
+
+/// Exponents of a panel that quadrature at its nodes resolves.
+const MILD: f64 = 6.0;
+
+/// The root by which a step follows from an error.
 trait StepRoot {
-    fn powi_root(self) -> f64;
+    fn powf_tenth(self) -> f64;
 }
 
 impl StepRoot for f64 {
-    fn powi_root(self) -> f64 {
-        self.sqrt().sqrt().sqrt().sqrt()
+    /// Near enough to the root of the order: the sixteenth, with half of it once more.
+    fn powf_tenth(self) -> f64 {
+        let sixteenth = self.sqrt().sqrt().sqrt().sqrt();
+        sixteenth * sixteenth.sqrt()
     }
 }
 
@@ -294,6 +352,12 @@ impl Extent {
     pub fn new(course: &Course) -> Extent {
         let (first, last) = (exp(-course.start), exp(-course.target));
         Extent { work: 0.0, v_min: first.min(last), v_max: first.max(last) }
+    }
+
+    /// Of steady sliding.
+    pub fn steady(course: &Course) -> Extent {
+        let v = exp(-course.start);
+        Extent { work: course.friction(0.0) * v * course.t_f, v_min: v, v_max: v }
     }
 
     /// Adds one panel.

@@ -13,10 +13,12 @@ mod course;
 mod motion;
 
 use super::{Case, Family, Obstacle, Swift};
-use crate::numerics::elementary::{ln, ln_1p};
+use crate::model::Law;
+use crate::numerics::elementary::{exp, exp_m1, ln, ln_1p};
+use crate::numerics::gauss::rule;
 use crate::numerics::root::{Probe, newton};
 use crate::protocol::{Effort, Motion};
-use course::{Course, Extent};
+use course::{Course, Extent, Panel, Stop};
 use motion::Resolution;
 
 /// The family.
@@ -40,11 +42,13 @@ impl Family for BoundedFriction {
     }
 
     fn solve(&self, case: &Case, rtol: f64, effort: &mut Effort) -> Result<Swift, Obstacle> {
-        let course = member(case, rtol, effort)?;
-        let mut extent = Extent::new(&course);
-        let end = course.pass(0.1 * rtol, effort, |panel| extent.add(&course, panel)).ok_or(Obstacle::NotConverged)?;
-        let reached = (end.level - course.target).abs() <= 10.0 * rtol + ROUNDING * (1.0 + course.target.abs());
-        if !reached || !extent.work.is_finite() {
+        let mut extent = None;
+        let course = member(case, rtol, effort, |course, panel| match panel {
+            Some(panel) => extent.get_or_insert_with(|| Extent::new(course)).add(course, panel),
+            None => extent = None,
+        })?;
+        let extent = extent.unwrap_or_else(|| Extent::steady(&course));
+        if !extent.work.is_finite() {
             return Err(Obstacle::NotConverged);
         }
         Ok(Swift {
@@ -58,10 +62,17 @@ impl Family for BoundedFriction {
     }
 
     fn motion(&self, case: &Case, rtol: f64) -> Result<Box<dyn Motion>, Obstacle> {
-        let mut effort = Effort::default();
-        let course = member(case, rtol, &mut effort)?;
         let mut panels = Vec::new();
-        course.pass(0.1 * rtol, &mut effort, |panel| panels.push(*panel)).ok_or(Obstacle::NotConverged)?;
+        let mut course = member(case, rtol, &mut Effort::default(), |_, panel| match panel {
+            Some(panel) => panels.push(*panel),
+            None => panels.clear(),
+        })?;
+        if panels.is_empty() {
+            // Steady sliding: one panel tells it all.
+            let again = course.pass(0.1 * rtol, &mut Effort::default(), |panel| panels.push(*panel));
+            again.map_err(|_| Obstacle::NotConverged)?;
+            course.alpha = 0.0;
+        }
         if !course.forward {
             panels.reverse();
         }
@@ -69,14 +80,23 @@ impl Family for BoundedFriction {
     }
 }
 
-/// What rounding may cost of `ln theta` at the end.
-const ROUNDING: f64 = 1e-12;
-
-/// Tolerance of the first search, and of the first look at `tau = tau_M`.
+/// Tolerance of the first search.
 const COARSE: f64 = 1e-4;
 
-/// The course of the member that solves the case.
-fn member(case: &Case, rtol: f64, effort: &mut Effort) -> Result<Course, Obstacle> {
+/// Most passes after the first search: Newton's method needs two or three.
+const MOST_PASSES: u32 = 12;
+
+/// What rounding of `ln theta` may leave of the target.
+const ROUNDING: f64 = 4.0 * f64::EPSILON;
+
+/// The course of the member that solves the case; the panels of its last pass go to `visit`, `None` when a pass begins.
+/// No panel is visited where the protocol is steady sliding.
+fn member(
+    case: &Case,
+    rtol: f64,
+    effort: &mut Effort,
+    mut visit: impl FnMut(&Course, Option<&Panel>),
+) -> Result<Course, Obstacle> {
     let (law, v_i, v_f, t_f) = (case.transition.law, case.transition.v_i, case.transition.v_f, case.t_f);
     let sound = law.a > 0.0 && law.b >= 0.0 && t_f > 0.0 && v_i >= 1.0 && v_f >= 1.0;
     if !sound || ![law.a, law.b, t_f, v_i, v_f, case.tau_max].iter().all(|x| x.is_finite()) {
@@ -99,42 +119,90 @@ fn member(case: &Case, rtol: f64, effort: &mut Effort) -> Result<Course, Obstacl
     if t_f <= (v_i - v_f) / v_f / v_i {
         return Err(Obstacle::Velocity);
     }
-    if !reaches(&course, rtol, effort)? {
+    if v_f > v_i && t_f <= fastest(law, (v_i, v_f), (gap_i, gap_f), effort) {
         return Err(Obstacle::Friction);
     }
-    let first = search(&course, COARSE, effort).ok_or(Obstacle::NotConverged)?;
-    search(&course.with(first), 0.1 * rtol, effort).map(|alpha| course.with(alpha)).ok_or(Obstacle::NotConverged)
-}
-
-/// Whether `tau = tau_M` throughout is more than fast enough.
-fn reaches(course: &Course, rtol: f64, effort: &mut Effort) -> Result<bool, Obstacle> {
-    let limit = course.with(f64::NEG_INFINITY);
-    for tolerance in [COARSE, 0.01 * rtol] {
-        let Some(end) = limit.pass(tolerance, effort, |_| ()) else { return Ok(true) };
-        let excess = limit.excess(&end);
-        if excess.abs() > 100.0 * tolerance {
-            return Ok(excess < 0.0);
+    let mut course = course.with(search(&course, effort).ok_or(Obstacle::NotConverged)?);
+    let mut last_pass = false;
+    for _ in 0..MOST_PASSES {
+        let pass = |panel: &Panel| {
+            if last_pass {
+                visit(&course, Some(panel));
+            }
+        };
+        let end = course.pass(0.1 * rtol, effort, pass).map_err(|_| Obstacle::NotConverged)?;
+        let slope = if course.forward { end.turn } else { -end.turn };
+        let step = -course.excess(&end) / slope;
+        // Rounding of ln theta allows no better, whatever alpha then is worth.
+        let rounding = ROUNDING * (1.0 + course.target.abs()) / slope;
+        let within = |share: f64| step.abs() <= (share * course.alpha.abs()).max(rounding);
+        if last_pass && within(0.5 * rtol) {
+            return Ok(course);
         }
-        if tolerance < COARSE {
-            return Ok(excess < 0.0);
+        // Newton's method doubles the digits.
+        let next = within(rtol.sqrt());
+        if !(slope > 0.0 && step.is_finite()) {
+            return Err(Obstacle::NotConverged);
         }
+        course = course.with(course.alpha + step);
+        last_pass = next;
+        visit(&course, None);
     }
     Err(Obstacle::NotConverged)
 }
 
-/// `alpha_3` from the one of the course on.
-fn search(course: &Course, tolerance: f64, effort: &mut Effort) -> Option<f64> {
-    let probe = |alpha: f64| {
-        let course = course.with(alpha);
-        // Theta too small: too little of alpha forwards, too much of it backwards.
-        let lost = if course.forward { -f64::MAX } else { f64::MAX };
-        let Some(end) = course.pass(tolerance, effort, |_| ()) else { return Some(Probe { value: lost, slope: 0.0 }) };
-        let slope = if course.forward { end.turn } else { -end.turn };
-        let scale = 1.0 + alpha.abs();
+/// The time in which an acceleration arrives with `tau = tau_M` throughout, `int e^y/(e^z - 1) dy` over `y = ln theta`.
+///
+/// `z = ln(theta v)` is linear in `y` there, from `gap_i/a` to `gap_f/a`; panels double with `z`, so that the pole at
+/// `z = 0` stays away.
+fn fastest(law: Law, (v_i, v_f): (f64, f64), (gap_i, gap_f): (f64, f64), effort: &mut Effort) -> f64 {
+    let rule = rule(24);
+    let (z_i, z_f) = (gap_i / law.a, gap_f / law.a);
+    let span = ln(v_f / v_i);
+    let growth = (z_f / z_i).abs().max(z_i / z_f);
+    let panels = (1.5 * ln(growth) + span).ceil().clamp(1.0, 400.0);
+    effort.quadratures += 1;
+    let mut time = 0.0;
+    for panel in 0..panels as u32 {
+        let place = |s: f64| {
+            // Geometric in z, or even in y where z hardly changes.
+            let share = (f64::from(panel) + s) / panels;
+            if growth > 2.0 { z_i * (exp_m1(share * ln(z_f / z_i)) / (z_f - z_i)) } else { share }
+        };
+        let (low, high) = (place(0.0), place(1.0));
+        effort.nodes += rule.x.len() as u32;
+        for (x, w) in rule.x.iter().zip(&rule.w) {
+            let share = low + 0.5 * (high - low) * (1.0 + x);
+            let z = z_i + share * (z_f - z_i);
+            time += 0.5 * (high - low) * w * span * exp(-share * span) / v_i / exp_m1(z);
+        }
+    }
+    time
+}
+
+/// `alpha_3` to [`COARSE`].
+fn search(course: &Course, effort: &mut Effort) -> Option<f64> {
+    let unit = course.unit();
+    let mut gave_up = false;
+    let probe = |x: f64| {
+        let end = match course.with(unit * x).pass(COARSE, effort, |_| ()) {
+            Ok(end) => end,
+            // Theta too small: too little of alpha.
+            Err(Stop::Lost) => return Some(Probe { value: -f64::MAX, slope: 0.0 }),
+            Err(Stop::GaveUp) => {
+                gave_up = true;
+                return Some(Probe { value: 0.0, slope: 0.0 });
+            }
+        };
+        let slope = unit * if course.forward { end.turn } else { -end.turn };
         // In units of the change that alpha bears.
-        let step = course.excess(&end) / slope;
+        let scale = 1.0 + x.abs();
+        let (step, excess) = (course.excess(&end) / slope, course.excess(&end));
+        if !(slope > 0.0 && step.is_finite()) {
+            return Some(Probe { value: if excess > 0.0 { f64::MAX } else { -f64::MAX }, slope: 0.0 });
+        }
         Some(Probe { value: step / scale, slope: 1.0 / scale })
     };
-    newton(probe, course.alpha, (f64::NEG_INFINITY, f64::INFINITY), false, (10.0 * tolerance).sqrt().min(1e-2))
-        .map(|root| root.x)
+    let root = newton(probe, 0.0, (f64::NEG_INFINITY, f64::INFINITY), false, 1e-2);
+    root.filter(|_| !gave_up).map(|root| unit * root.x)
 }
