@@ -98,9 +98,14 @@ impl Course {
         Course { alpha, ..self }
     }
 
-    /// How far the end lies beyond its target; rises with `alpha_3`.
-    pub fn excess(&self, end: &End) -> f64 {
-        if self.forward { end.level - self.target } else { self.target - end.level }
+    /// How far the end lies beyond its target, in a form that rises with `alpha_3`, and the step of Newton's method from
+    /// here.
+    ///
+    /// It is `theta` that bends least: where it is about to be lost it falls to 0 on a line.
+    pub fn miss(&self, end: &End) -> (f64, f64) {
+        let miss = end.level - self.target;
+        let bent = -exp_m1(-miss.max(-3.0));
+        (if self.forward { bent } else { -bent }, -bent / end.turn)
     }
 
     /// `ln[(tau_M - tau)/gap]`.
@@ -159,7 +164,7 @@ impl Course {
             let Some((panel, last, error)) = step(self, d, to, [u, turn], rule) else {
                 h = 0.25 * (to - d);
                 if d + h == d {
-                    return Err(Stop::GaveUp);
+                    break;
                 }
                 continue;
             };
@@ -180,10 +185,10 @@ impl Course {
                 h = (to - d) * (0.8 * change).clamp(0.2, 0.8);
             }
             if d + h == d {
-                return Err(Stop::GaveUp);
+                break;
             }
         }
-        Err(Stop::GaveUp)
+        Err(if u < floor + 0.75 * LOST { Stop::Lost } else { Stop::GaveUp })
     }
 
     /// A first panel: what the exponent and the rate of theta allow.

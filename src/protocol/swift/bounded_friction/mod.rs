@@ -131,17 +131,16 @@ fn member(
             }
         };
         let end = course.pass(0.1 * rtol, effort, pass).map_err(|_| Obstacle::NotConverged)?;
-        let slope = if course.forward { end.turn } else { -end.turn };
-        let step = -course.excess(&end) / slope;
+        let (_, step) = course.miss(&end);
         // Rounding of ln theta allows no better, whatever alpha then is worth.
-        let rounding = ROUNDING * (1.0 + course.target.abs()) / slope;
+        let rounding = ROUNDING * (1.0 + course.target.abs()) / end.turn.abs();
         let within = |share: f64| step.abs() <= (share * course.alpha.abs()).max(rounding);
         if last_pass && within(0.5 * rtol) {
             return Ok(course);
         }
         // Newton's method doubles the digits.
         let next = within(rtol.sqrt());
-        if !(slope > 0.0 && step.is_finite()) {
+        if !step.is_finite() {
             return Err(Obstacle::NotConverged);
         }
         course = course.with(course.alpha + step);
@@ -185,24 +184,29 @@ fn search(course: &Course, effort: &mut Effort) -> Option<f64> {
     let unit = course.unit();
     let mut gave_up = false;
     let probe = |x: f64| {
-        let end = match course.with(unit * x).pass(COARSE, effort, |_| ()) {
+        let course = course.with(unit * x);
+        let end = match course.pass(COARSE, effort, |_| ()) {
             Ok(end) => end,
-            // Theta too small: too little of alpha.
-            Err(Stop::Lost) => return Some(Probe { value: -f64::MAX, slope: 0.0 }),
+            // Theta too small: too little of alpha forwards, too much of it backwards.
+            Err(Stop::Lost) => {
+                return Some(Probe { value: if course.forward { -f64::MAX } else { f64::MAX }, slope: 0.0 });
+            }
             Err(Stop::GaveUp) => {
                 gave_up = true;
                 return Some(Probe { value: 0.0, slope: 0.0 });
             }
         };
-        let slope = unit * if course.forward { end.turn } else { -end.turn };
-        // In units of the change that alpha bears.
+        let (miss, step) = course.miss(&end);
+        // In units of the change that alpha bears; a step that doubles alpha is far enough.
         let scale = 1.0 + x.abs();
-        let (step, excess) = (course.excess(&end) / slope, course.excess(&end));
-        if !(slope > 0.0 && step.is_finite()) {
-            return Some(Probe { value: if excess > 0.0 { f64::MAX } else { -f64::MAX }, slope: 0.0 });
-        }
-        Some(Probe { value: step / scale, slope: 1.0 / scale })
+        let bounded = (step / unit).clamp(-FARTHEST * scale, FARTHEST * scale);
+        let wrong = bounded.is_nan() || (bounded < 0.0) != (miss > 0.0);
+        let value = if wrong { miss } else { -bounded / scale };
+        Some(Probe { value, slope: if wrong { 0.0 } else { 1.0 / scale } })
     };
-    let root = newton(probe, 0.0, (f64::NEG_INFINITY, f64::INFINITY), false, 1e-2);
+    let root = newton(probe, 0.0, (f64::NEG_INFINITY, f64::INFINITY), false, 1e-3);
     root.filter(|_| !gave_up).map(|root| unit * root.x)
 }
+
+/// Longest step of the search, in units of what alpha bears.
+const FARTHEST: f64 = 4.0;
