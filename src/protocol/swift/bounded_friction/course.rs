@@ -159,6 +159,11 @@ impl Course {
         let floor = self.start.min(self.target) - LOST;
         effort.quadratures += 1;
         for _ in 0..MOST_PANELS {
+            // Several panels without elimination cost less than one with it.
+            let mild = 0.9 * MILD / (self.t_f * (self.b / self.a * self.velocity(d, u) - exp(-u)).abs());
+            if h.min(1.0 - d) < WORTH * mild {
+                h = h.min(mild);
+            }
             let to = if d + 1.0001 * h >= 1.0 { 1.0 } else { d + h };
             effort.nodes += NODES as u32;
             let Some((panel, last, error)) = step(self, d, to, [u, turn], rule) else {
@@ -298,6 +303,9 @@ fn step(course: &Course, from: f64, to: f64, [start, turn]: [f64; 2], rule: &Rad
 
 /// Exponents of a panel that quadrature at its nodes resolves.
 const MILD: f64 = 6.0;
+
+/// How many times as dear a panel with elimination is.
+const WORTH: f64 = 4.0;
 
 /// The root by which a step follows from an error.
 trait StepRoot {
