@@ -11,6 +11,7 @@
 //! - [`dataset`]: tables as Parquet parts on disk, and reading them back;
 //! - [`trace`]: one protocol over time;
 //! - [`sweep`]: a spec, checked, planned and run;
+//! - [`verify`]: a sample of a dataset, solved again by an independent method;
 //! - [`cli`]: the commands.
 
 pub mod cli;
@@ -23,3 +24,4 @@ pub mod stability;
 pub mod sweep;
 pub mod table;
 pub mod trace;
+pub mod verify;

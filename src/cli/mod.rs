@@ -4,6 +4,7 @@ mod plan;
 mod run;
 mod tables;
 mod trace;
+mod verify;
 mod watch;
 mod words;
 
@@ -38,6 +39,8 @@ enum Command {
     Plan(plan::Arguments),
     /// Show one protocol over time: v, theta, friction
     Trace(trace::Arguments),
+    /// Solve a sample of the rows of a dataset again by an independent method, and compare
+    Verify(verify::Arguments),
     /// List all tables, their columns and units
     Tables,
 }
@@ -74,6 +77,7 @@ pub fn main() -> ExitCode {
         Command::Run(arguments) => run::run(&arguments),
         Command::Plan(arguments) => plan::plan(&arguments),
         Command::Trace(arguments) => trace::trace(&arguments),
+        Command::Verify(arguments) => verify::verify(&arguments),
         Command::Tables => tables::tables(),
     };
     match done {

@@ -7,6 +7,7 @@ use std::sync::OnceLock;
 
 use multiversion::multiversion;
 
+use crate::model::Transition;
 use crate::numerics::elementary::{exp, exp_m1, ln};
 use crate::numerics::radau::{NODES, Nodes, Radau, radau};
 use crate::protocol::Effort;
@@ -362,14 +363,13 @@ pub(super) struct Extent {
 }
 
 impl Extent {
-    pub fn new(course: &Course) -> Extent {
-        let (first, last) = (exp(-course.start), exp(-course.target));
-        Extent { work: 0.0, v_min: first.min(last), v_max: first.max(last) }
+    pub fn new(transition: &Transition) -> Extent {
+        let Transition { v_i, v_f, .. } = *transition;
+        Extent { work: 0.0, v_min: v_i.min(v_f), v_max: v_i.max(v_f) }
     }
 
     /// Of steady sliding.
-    pub fn steady(course: &Course) -> Extent {
-        let v = exp(-course.start);
+    pub fn steady(course: &Course, v: f64) -> Extent {
         Extent { work: course.friction(0.0) * v * course.t_f, v_min: v, v_max: v }
     }
 

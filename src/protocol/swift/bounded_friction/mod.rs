@@ -44,10 +44,10 @@ impl Family for BoundedFriction {
     fn solve(&self, case: &Case, rtol: f64, effort: &mut Effort) -> Result<Swift, Obstacle> {
         let mut extent = None;
         let course = member(case, rtol, effort, |course, panel| match panel {
-            Some(panel) => extent.get_or_insert_with(|| Extent::new(course)).add(course, panel),
+            Some(panel) => extent.get_or_insert_with(|| Extent::new(&case.transition)).add(course, panel),
             None => extent = None,
         })?;
-        let extent = extent.unwrap_or_else(|| Extent::steady(&course));
+        let extent = extent.unwrap_or_else(|| Extent::steady(&course, case.transition.v_i));
         if !extent.work.is_finite() {
             return Err(Obstacle::NotConverged);
         }
@@ -85,6 +85,9 @@ const COARSE: f64 = 1e-4;
 
 /// Most passes after the first search: Newton's method needs two or three.
 const MOST_PASSES: u32 = 12;
+
+/// Tolerance of the last pass, in units of rtol.
+const LAST: f64 = 1e-3;
 
 /// What rounding of `ln theta` may leave of the target.
 const ROUNDING: f64 = 4.0 * f64::EPSILON;
@@ -130,7 +133,9 @@ fn member(
                 visit(&course, Some(panel));
             }
         };
-        let end = course.pass(0.1 * rtol, effort, pass).map_err(|_| Obstacle::NotConverged)?;
+        // The last pass tells the extremes too, which lie between the nodes.
+        let tolerance = if last_pass { LAST } else { 0.1 } * rtol;
+        let end = course.pass(tolerance, effort, pass).map_err(|_| Obstacle::NotConverged)?;
         let (_, step) = course.miss(&end);
         // Rounding of ln theta allows no better, whatever alpha then is worth.
         let rounding = ROUNDING * (1.0 + course.target.abs()) / end.turn.abs();

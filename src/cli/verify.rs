@@ -1,0 +1,72 @@
+//! `slipsweep verify DATASET`: a sample of rows solved again by an independent method.
+
+use std::path::PathBuf;
+
+use super::{Failure, NOT_STRICT, WRONG, say, words};
+use crate::dataset::{Cell, Folder};
+use crate::verify::{Audit, LIMIT, verify as audit};
+
+/// Arguments of `verify`.
+#[derive(Debug, clap::Args)]
+pub struct Arguments {
+    /// Folder of the dataset, such as results/NAME
+    dataset: PathBuf,
+    /// Rows to check of each table
+    #[arg(long, value_name = "N", default_value_t = 100, value_parser = clap::value_parser!(u64).range(1..))]
+    sample: u64,
+    /// Seed of the sample
+    #[arg(long, value_name = "S", default_value_t = 0)]
+    seed: u64,
+}
+
+/// Audits a dataset.
+pub fn verify(arguments: &Arguments) -> Result<(), Failure> {
+    let path = &arguments.dataset;
+    let manifest = Folder::at(path).manifest().map_err(Failure::failed)?.ok_or_else(|| Failure {
+        code: WRONG,
+        message: format!(
+            "error: {}: not a dataset\n  expected: a folder with a manifest.json\n  help: name a folder that `slipsweep run` wrote",
+            path.display()
+        ),
+    })?;
+    let audits = audit(path, &manifest, arguments.sample, arguments.seed).map_err(Failure::failed)?;
+    let text: Vec<String> = audits.iter().map(summary).collect();
+    say(&text.join("\n"))?;
+    let errors: usize = audits.iter().map(Audit::errors).sum();
+    if errors > 0 {
+        let message = format!("error: {} beyond {LIMIT} rtol", words::things(errors as u64, "number"));
+        return Err(Failure { code: NOT_STRICT, message });
+    }
+    Ok(())
+}
+
+fn summary(audit: &Audit) -> String {
+    let mut text =
+        format!("{}: {} sampled, rtol {:e}\n", audit.table, words::things(audit.rows as u64, "row"), audit.rtol);
+    let mut lines = Vec::new();
+    for (column, all) in &audit.columns {
+        let at = |share: f64| all.get(((all.len() - 1) as f64 * share).ceil() as usize).copied().unwrap_or(f64::NAN);
+        let cells = [at(0.5), at(0.99), at(1.0)].map(|value| format!("{value:.3}"));
+        lines.push([(*column).to_owned(), words::count(all.len() as u64)].into_iter().chain(cells).collect());
+    }
+    if !lines.is_empty() {
+        lines.insert(0, ["difference/rtol", "rows", "median", "99 %", "greatest"].map(str::to_owned).to_vec());
+        text.push_str(&words::aligned(&lines, 2));
+        text.push_str("  worst rows:\n");
+    }
+    for (number, difference, column, row) in &audit.worst {
+        let cells: Vec<String> = row
+            .iter()
+            .map(|(name, cell)| match cell {
+                Cell::Number(value) => format!("{name} = {value}"),
+                Cell::Word(word) => format!("{name} = {word}"),
+                Cell::Missing => format!("{name} = -"),
+            })
+            .collect();
+        text.push_str(&format!("    row {number}: {column} {difference:.3}; {}\n", cells.join(", ")));
+    }
+    for (reason, rows) in &audit.unchecked {
+        text.push_str(&format!("  not checked in {}: {reason}\n", words::things(*rows, "row")));
+    }
+    text
+}

@@ -1,0 +1,61 @@
+//! `crossover`: the extremals of the defining initial or final conditions, integrated until theta arrives.
+
+use super::extremal::{Extremal, branch, from_end, from_start, hold, least_time};
+use super::{Context, Verdict, number, transition, word};
+use crate::dataset::Row;
+use crate::table::STATUS;
+
+pub fn check(row: &Row, context: &Context) -> Verdict {
+    let Some(problem) = transition(row) else { return Verdict::unchecked("an axis is missing") };
+    if word(row, STATUS) != Some("ok") {
+        return Verdict::unchecked("status is not ok");
+    }
+    let mut verdict = Verdict::default();
+    let (a, b) = (problem.law.a, problem.law.b);
+    let (ln_i, ln_f) = (problem.v_i.ln(), problem.v_f.ln());
+    let (tau_i, tau_f) = (1.0 + (a - b) * ln_i, 1.0 + (a - b) * ln_f);
+    let accelerates = problem.v_f > problem.v_i;
+    let mut pair = |columns: [&'static str; 2], exists: bool, extremal: Option<Extremal>| {
+        if exists && extremal.is_none() {
+            verdict.unchecked = Some("the integrator did not get there");
+            return;
+        }
+        let extremal = extremal.filter(|_| exists);
+        verdict.compare(row, columns[0], extremal.map(|e| e.time), None);
+        verdict.compare(row, columns[1], extremal.map(|e| e.work), None);
+    };
+    let cross = accelerates && tau_i > b - a && problem.v_f * tau_f > problem.v_i * tau_i;
+    pair(["t_cross", "work_cross"], cross, from_start(&problem, 0.0, false, None));
+    let start = 1.0 + a - b * ln_i;
+    let hold_exists = accelerates && start - a > b - a && problem.v_f * tau_f > problem.v_i * start - a;
+    pair(["t_hold", "work_hold"], hold_exists, from_start(&problem, -ln_i, false, None));
+    // C = 0: a (e^z - 1 - z) = tau_ss(v_i).
+    let cheapest = accelerates && tau_i > 0.0 && tau_f > 0.0;
+    let fastest = branch(tau_i / a, true).and_then(|z| from_start(&problem, z, false, None));
+    pair(["t_cheapest", "work_cheapest"], cheapest, fastest);
+    if !accelerates {
+        let turn = tau_f > b - a;
+        if problem.v_f < problem.v_i {
+            // At the very turn rounding decides whether there is an end at all: the mean of two neighbours is off by z^2.
+            let near = [-1e-6, 1e-6].map(|z| from_end(&problem, z, context.bounded, None));
+            let mean = match near {
+                [Some(before), Some(after)] => Some(Extremal {
+                    time: 0.5 * (before.time + after.time),
+                    work: 0.5 * (before.work + after.work),
+                    ..before
+                }),
+                _ => None,
+            };
+            pair(["t_turn", "work_turn"], turn, mean);
+        }
+        let t_min = least_time(&problem);
+        let bounded = context.bounded;
+        verdict.compare(row, "t_min", bounded.then_some(t_min), (t_min == 0.0).then_some(1.0));
+        let work = bounded.then(|| hold(problem.law, 1.0 / problem.v_i, t_min)).flatten();
+        verdict.compare(row, "work_min", work, (t_min == 0.0).then_some(1.0));
+    }
+    if number(row, "t_free_in").is_some() {
+        verdict.unchecked = Some("t_free_in and t_free_out have no independent route");
+    }
+    verdict
+}

@@ -1,0 +1,43 @@
+//! `optimal`: the extremal of the row's duration, found again with the integrator.
+
+use super::extremal::{least_time, solve_with};
+use super::{Context, Verdict, number, transition, word};
+use crate::dataset::Row;
+use crate::table::STATUS;
+
+/// Relative sizes of the variations that try to beat the optimum.
+const SIZES: [f64; 4] = [-1e-2, 1e-2, -1e-4, 1e-4];
+
+pub fn check(row: &Row, context: &Context) -> Verdict {
+    let (Some(problem), Some(t_f)) = (transition(row), number(row, "t_f")) else {
+        return Verdict::unchecked("an axis is missing");
+    };
+    let mut verdict = Verdict::default();
+    let infeasible = context.bounded && t_f < least_time(&problem);
+    verdict.status(row, infeasible);
+    if infeasible || word(row, STATUS) == Some("infeasible") {
+        return verdict;
+    }
+    let Some((extremal, varied)) = solve_with(&problem, t_f, context.bounded, &SIZES) else {
+        verdict.unchecked = Some("the integrator did not get there");
+        return verdict;
+    };
+    let size = extremal.work.abs();
+    verdict.compare(row, "work", Some(extremal.work), Some(size));
+    verdict.compare(row, "v_start", Some(extremal.v_start), None);
+    verdict.compare(row, "v_end", Some(extremal.v_end), None);
+    verdict.compare(row, "hold_time", Some(extremal.hold_time), (extremal.hold_time == 0.0).then_some(t_f));
+    verdict.compare(row, "hamiltonian", Some(-extremal.c), None);
+    verdict.compare(row, "theta_max", Some(extremal.theta_max), None);
+    let strategy = match extremal.v_start {
+        _ if extremal.hold_time > 0.0 => "hold",
+        v if v > problem.v_i => "speed_up",
+        _ => "slow_down",
+    };
+    verdict.compare_word(row, "strategy", strategy);
+    // No admissible variation may cost less.
+    if let (Some(work), Some(least)) = (number(row, "work"), varied.into_iter().reduce(f64::min)) {
+        verdict.differences.push(("beaten", ((work - least) / size).max(0.0)));
+    }
+    verdict
+}

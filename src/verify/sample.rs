@@ -1,0 +1,81 @@
+//! A reproducible sample of the rows of a table.
+
+use std::collections::BTreeSet;
+use std::fs::File;
+use std::path::Path;
+
+use polars::prelude::{ParquetReader, PolarsError, SerReader};
+
+use crate::dataset::{Cell, Folder, ManifestTable, Row};
+
+/// Steele, Lea and Flood's SplitMix64 (OOPSLA 2014): a counter, scrambled.
+fn next(state: &mut u64) -> u64 {
+    *state = state.wrapping_add(0x9e37_79b9_7f4a_7c15);
+    let z = (*state ^ (*state >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+    let z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+    z ^ (z >> 31)
+}
+
+/// `count` different row numbers below `rows`, ascending (Floyd's sampling); all if there are no more.
+fn choose(rows: u64, count: u64, seed: u64) -> BTreeSet<u64> {
+    if count >= rows {
+        return (0..rows).collect();
+    }
+    let mut state = seed;
+    let mut chosen = BTreeSet::new();
+    for last in rows - count..rows {
+        let row = next(&mut state) % (last + 1);
+        chosen.insert(if chosen.contains(&row) { last } else { row });
+    }
+    chosen
+}
+
+/// The rows of the sample with their global numbers.
+pub fn rows(folder: &Folder, table: &ManifestTable, count: u64, seed: u64) -> Result<Vec<(u64, Row)>, String> {
+    let chosen = choose(table.rows, count, seed);
+    let mut found = Vec::new();
+    for part in 0..table.parts {
+        let range = table.rows_of(part);
+        let inside: Vec<u64> = chosen.range(range.clone()).map(|row| row - range.start).collect();
+        let path = folder.part(&table.name, part);
+        if !path.is_file() {
+            return Err(format!(
+                "{}: part is missing\n  help: run the sweep again, which makes only what is missing",
+                path.display()
+            ));
+        }
+        if inside.is_empty() {
+            continue;
+        }
+        let cells = read(&path, &inside, range.end - range.start)
+            .map_err(|error| format!("{}: cannot read: {error}", path.display()))?;
+        found.extend(inside.iter().map(|row| row + range.start).zip(cells));
+    }
+    Ok(found)
+}
+
+fn read(path: &Path, rows: &[u64], expected: u64) -> Result<Vec<Row>, PolarsError> {
+    let mut frame = ParquetReader::new(File::open(path)?).finish()?;
+    frame.rechunk_mut();
+    if frame.height() as u64 != expected {
+        let text = format!("{} rows, the manifest says {expected}", frame.height());
+        return Err(PolarsError::ShapeMismatch(text.into()));
+    }
+    let mut found: Vec<Row> = vec![Vec::new(); rows.len()];
+    for column in frame.columns() {
+        for (cells, &row) in found.iter_mut().zip(rows) {
+            let row = row as usize;
+            let cell = if let Some(numbers) = column.try_f64() {
+                numbers.get(row).map(Cell::Number)
+            } else if let Some(flags) = column.try_bool() {
+                flags.get(row).map(|flag| Cell::Word(if flag { "yes" } else { "no" }.to_owned()))
+            } else {
+                let words = column.cat32()?;
+                let word = words.physical().get(row).and_then(|code| words.get_mapping().cat_to_str(code));
+                word.map(|word| Cell::Word(word.to_owned()))
+            };
+            cells.push((column.name().to_string(), cell.unwrap_or(Cell::Missing)));
+        }
+    }
+    Ok(found)
+}

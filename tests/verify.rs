@@ -1,0 +1,104 @@
+//! `slipsweep verify`: a sound dataset passes, a planted error is found and named, and what cannot be audited says so.
+
+mod common;
+
+use std::fs::{self, File};
+use std::path::Path;
+use std::process::{Command, Output};
+
+use common::{run, sweep};
+use polars::prelude::{Column, Float64Chunked, NewChunkedArray, ParquetReader, ParquetWriter, SerReader};
+use slipsweep::dataset::Folder;
+
+const AXES: &str = "t_f = [0.02, 0.3, 0.41]\na = 0.03\nb = [0.01, 0.03, 0.05]\nv_i = 3.0\nv_f = [100.0, 2.0]\n\
+                    alpha_2 = { linspace = [-0.2, 0.2, 3], unit = \"1/t_f\" }\nalpha_3 = 0.0\ntau_max = 1.6\n";
+
+const TABLES: &str = "[tables.gap]\n[tables.best]\n[tables.optimal]\n[tables.crossover]\n[tables.swift]\n";
+
+fn verify(folder: &Path, arguments: &[&str]) -> Output {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_slipsweep"));
+    command.arg("verify").arg("test").args(arguments).current_dir(folder).output().expect("runs")
+}
+
+fn text(output: &Output) -> String {
+    String::from_utf8_lossy(&output.stdout).into_owned()
+}
+
+#[test]
+fn a_sound_dataset_passes() {
+    let folder = tempfile::tempdir().expect("is writable");
+    run(&sweep(folder.path(), AXES, TABLES), folder.path(), 2);
+    let output = verify(folder.path(), &["--sample", "1000"]);
+    assert_eq!(output.status.code(), Some(0), "{}{}", text(&output), String::from_utf8_lossy(&output.stderr));
+    for table in ["gap: 54 rows", "best: 18 rows", "optimal: 18 rows", "crossover: 6 rows", "swift: 72 rows"] {
+        assert!(text(&output).contains(table), "{}", text(&output));
+    }
+    // The same seed draws the same rows, another seed others.
+    let sample = |seed| text(&verify(folder.path(), &["--sample", "5", "--seed", seed]));
+    assert_eq!(sample("1"), sample("1"));
+    assert_ne!(sample("1"), sample("2"));
+}
+
+/// Changes one value of a column by 1e-7 of itself, in the first row that has one, and returns the row.
+fn corrupt(folder: &Path, table: &str, column: &str) -> usize {
+    let path = Folder::new(folder, "test").part(table, 0);
+    let mut frame = ParquetReader::new(File::open(&path).expect("is there")).finish().expect("is readable");
+    // `best` has result columns of the same names as axes: none of those is used here.
+    let mut values: Vec<Option<f64>> =
+        frame.column(column).expect("is there").f64().expect("holds numbers").iter().collect();
+    let row = values.iter().position(Option::is_some).expect("has a value");
+    values[row] = values[row].map(|value| value * (1.0 + 1e-7));
+    let changed = Float64Chunked::from_iter_options(column.into(), values.into_iter());
+    frame.replace(column, Column::from(polars::prelude::IntoSeries::into_series(changed))).expect("has the column");
+    ParquetWriter::new(File::create(&path).expect("is writable")).finish(&mut frame).expect("is writable");
+    row
+}
+
+#[test]
+fn a_planted_error_is_found_and_named() {
+    let folder = tempfile::tempdir().expect("is writable");
+    let sweep = sweep(folder.path(), AXES, TABLES);
+    for (table, column) in [
+        ("gap", "work"),
+        ("gap", "v_min"),
+        ("gap", "work_optimal"),
+        ("best", "work"),
+        ("optimal", "work"),
+        ("optimal", "v_start"),
+        ("optimal", "v_end"),
+        ("optimal", "hamiltonian"),
+        ("optimal", "theta_max"),
+        ("crossover", "t_cross"),
+        ("crossover", "work_cheapest"),
+        ("crossover", "t_min"),
+        ("swift", "alpha"),
+        ("swift", "work"),
+        ("swift", "v_max"),
+        ("swift", "friction_max"),
+    ] {
+        run(&sweep, folder.path(), 2);
+        let row = corrupt(folder.path(), table, column);
+        let output = verify(folder.path(), &["--sample", "1000"]);
+        assert_eq!(output.status.code(), Some(3), "{table}.{column}: {}", text(&output));
+        let text = text(&output);
+        let section = text.split("\n\n").find(|section| section.starts_with(table)).expect("has a section");
+        assert!(section.contains(&format!("    row {row}: ")), "{table}.{column}: {section}");
+        let line = section.lines().map(|line| line.split_whitespace().collect::<Vec<_>>());
+        let line = line.into_iter().find(|cells| cells.first() == Some(&column)).expect("has the column");
+        assert!(line[4].parse::<f64>().is_ok_and(|greatest| greatest > 10.0), "{table}.{column}: {section}");
+        fs::remove_file(Folder::new(folder.path(), "test").part(table, 0)).expect("is there");
+    }
+}
+
+#[test]
+fn what_is_no_dataset_is_told() {
+    let folder = tempfile::tempdir().expect("is writable");
+    assert_eq!(verify(folder.path(), &[]).status.code(), Some(1));
+    run(&sweep(folder.path(), AXES, "[tables.optimal]\n"), folder.path(), 1);
+    assert_eq!(verify(folder.path(), &["--sample", "0"]).status.code(), Some(1));
+    fs::remove_file(Folder::new(folder.path(), "test").part("optimal", 0)).expect("is there");
+    let output = verify(folder.path(), &[]);
+    let message = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert_eq!(output.status.code(), Some(2), "{message}");
+    assert!(message.contains("part is missing") && message.contains("run the sweep again"), "{message}");
+}
