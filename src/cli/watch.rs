@@ -1,11 +1,12 @@
 //! Watching a run: progress for whoever looks, and the wish to stop.
 
+use std::fmt;
 use std::io::{IsTerminal, Write, stderr};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::time::{Duration, Instant};
 
-use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use indicatif::{ProgressBar, ProgressDrawTarget, ProgressState, ProgressStyle};
 use signal_hook::consts::{SIGINT, SIGTERM};
 
 use super::words;
@@ -75,9 +76,17 @@ impl Show {
             return Show::Lines { rows, start: Instant::now(), last: Instant::now() };
         }
         let bar = ProgressBar::with_draw_target(Some(rows), ProgressDrawTarget::stderr_with_hz(10));
-        let template = "{bar:30} {percent}% of {human_len} rows, {per_sec}, {eta} left";
+        let template = "{bar:20} {percent}% of {human_len} rows, {rate} a second, {left} left";
         if let Ok(style) = ProgressStyle::with_template(template) {
-            bar.set_style(style);
+            let rate = |state: &ProgressState, out: &mut dyn fmt::Write| {
+                let _ = out.write_str(&words::count(state.per_sec() as u64));
+            };
+            let left = |state: &ProgressState, out: &mut dyn fmt::Write| {
+                let known = state.pos() > 0;
+                let left = if known { words::duration(state.eta().as_secs_f64()) } else { "?".to_owned() };
+                let _ = out.write_str(&left);
+            };
+            bar.set_style(style.with_key("rate", rate).with_key("left", left));
         }
         Show::Bar(bar)
     }

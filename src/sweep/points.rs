@@ -35,7 +35,9 @@ type Columns = Vec<(Quantity, Vec<f64>)>;
 fn csv(path: &Path) -> Result<Columns, SpecError> {
     let name = path.display();
     let text = fs::read_to_string(path).map_err(|error| unreadable(path, &error))?;
+    // Spreadsheets put a byte order mark in front, and quotes around cells.
     let mut lines = text
+        .trim_start_matches('\u{feff}')
         .lines()
         .enumerate()
         .map(|(index, line)| (format!("{name}:{}", index + 1), line.trim()))
@@ -140,7 +142,7 @@ fn point(place: &impl Display, line: &str, axes: &mut [(Quantity, Vec<f64>)]) ->
             values.push(word(&place, &words, cell.trim_matches('"'))?);
             continue;
         }
-        let Ok(value) = cell.parse::<f64>() else {
+        let Ok(value) = cell.trim_matches('"').parse::<f64>() else {
             let found = format!("{place}: `{cell}` is not a number");
             return Err(fault(found, "a number such as 0.03 or 1e-3", "correct the value"));
         };

@@ -106,9 +106,12 @@ impl Table for Swift {
 
 type Solution = Result<Member, Obstacle>;
 
+/// The members solved so far, by tuple and family.
+type Solved = HashMap<(u64, usize), Arc<OnceLock<Solution>>>;
+
 /// The members of families that do not heed the bound on friction, solved once each whatever its values.
 #[derive(Default)]
-struct Members(Mutex<HashMap<(u64, usize), Arc<OnceLock<Solution>>>>);
+struct Members(Mutex<Solved>);
 
 impl Members {
     /// The member for `point`, which belongs to tuple number `tuple`; adds what is spent by this call alone.
