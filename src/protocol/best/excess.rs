@@ -19,6 +19,8 @@ use crate::protocol::{Effort, optimal};
 
 /// Relative accuracy of the integral.
 const ACCURACY: f64 = 1e-9;
+/// Error that counts for nothing, relative to the work: below it the rounding of `v - v~` shows.
+const NOTHING: f64 = 1e-20;
 /// Relative accuracy of the feedback; an error in it counts quadratically until it comes near `v - v~` itself.
 const FEEDBACK: f64 = 1e-12;
 /// Nodes of a panel.
@@ -28,11 +30,12 @@ const DEEPEST: u32 = 30;
 /// Most panels; smooth cases take two to eight, a kink some thirty.
 const MOST_PANELS: u32 = 300;
 
-/// `W_s - W*` of a shortcut; `None` where the optimal feedback is not to be had on the way.
+/// `W_s - W*` of a shortcut that costs `work`; `None` where the optimal feedback is not to be had on the way.
 pub(super) fn over_optimum(
     transition: &Transition,
     landscape: &Landscape,
     place: Place,
+    work: f64,
     bounded: bool,
     effort: &mut Effort,
 ) -> Option<f64> {
@@ -49,7 +52,7 @@ pub(super) fn over_optimum(
     };
     let whole = panel(&mut density, -1.0, 0.0)?;
     let mut left = MOST_PANELS;
-    let sum = refine(&mut density, -1.0, 0.0, whole, ACCURACY * whole.abs(), 0, &mut left)?;
+    let sum = refine(&mut density, -1.0, 0.0, whole, ACCURACY * whole.abs() + NOTHING * work / t_f, 0, &mut left)?;
     Some(t_f * sum)
 }
 

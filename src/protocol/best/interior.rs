@@ -15,15 +15,15 @@ const MOST_STEPS: u32 = 100;
 /// A place close to that of least work, by the ellipsoid method; `None` if nothing is admissible.
 ///
 /// A cut through the centre of an ellipse that holds the place sought leaves half of it: where the centre is not
-/// admissible, the half in which the violated polynomial rises, else the half in which the work falls. With
-/// `theta > 0` and `theta' <= 1`, theta is at most `M = theta_0 + t_f`, and the coefficients of a cubic between 0 and `M` on
-/// `[0, 1]` are bounded by Chebyshev's: `|a_2| <= 9 M`, `|a_3| <= 24 M`.
+/// admissible, the half in which the violated polynomial rises, else the half in which the work falls. Since `theta' <=
+/// 1`, theta differs from the straight line between its ends by at most `D = t_f - (theta_1 - theta_0)`, and the
+/// coefficients of a cubic between `-D` and `D` on `[0, 1]` are bounded by Chebyshev's: 18 and 48 times `D`.
 pub(super) fn approach(landscape: &Landscape, least_velocity: f64, effort: &mut Effort) -> Option<Place> {
-    let [theta_0, theta_1, _, t_f] = landscape.ends();
-    let most = (theta_0 + t_f).max(theta_1);
-    let mut centre = [0.0, 0.0];
+    let [_, _, rise, t_f] = landscape.ends();
+    let most = t_f - rise;
+    let mut centre = [rise, 0.0];
     // The ellipse (y - centre)^T shape^-1 (y - centre) <= 1.
-    let mut shape = [[2.0 * (9.0 * most) * (9.0 * most), 0.0], [0.0, 2.0 * (24.0 * most) * (24.0 * most)]];
+    let mut shape = [[2.0 * (18.0 * most) * (18.0 * most), 0.0], [0.0, 2.0 * (48.0 * most) * (48.0 * most)]];
     let mut best: Option<(f64, Place)> = None;
     for _ in 0..MOST_CUTS {
         let (keep, work) = match violated(landscape, least_velocity, centre) {

@@ -24,7 +24,7 @@ pub struct Best {
     pub work: f64,
     /// The optimal work `W*`.
     pub work_optimal: f64,
-    /// `(W_s - W*)/W*`, to 1e-7 of itself or better.
+    /// `(W_s - W*)/W*`, to 1e-7 of itself or 1e-20, whichever is more.
     pub gap: f64,
     /// Its least velocity; 1 where it touches the bound.
     pub v_min: f64,
@@ -69,7 +69,7 @@ pub fn solve(transition: &Transition, t_f: f64, bounded: bool, rtol: f64) -> Sol
         difference
     } else {
         // Two routes to one number: they must agree as far as the coarser one goes.
-        let excess = excess::over_optimum(transition, &landscape, place, bounded, &mut effort);
+        let excess = excess::over_optimum(transition, &landscape, place, work, bounded, &mut effort);
         match excess.filter(|excess| (excess - difference).abs() <= DIFFERENCE_ERROR * work) {
             Some(excess) => excess,
             None => return Solved { status: unsolved(optimum.status), value: None, effort },
