@@ -143,3 +143,30 @@ fn nothing_admissible_is_infeasible() {
     let solved = solve(&deceleration, 0.3954147722547, true, 1e-10);
     assert_eq!((solved.status, solved.value), (Status::Infeasible, None));
 }
+
+#[test]
+fn regress_ends_that_are_almost_the_same() {
+    // A linear theta is admissible wherever t_f > 1/v_f - 1/v_i without the bound, and somewhat later with it.
+    for r in [1e-8, 1e-6, 1e-5, 1e-4, 1e-3] {
+        for factor in [2.0, 3.0, 10.0] {
+            for (v_i, v_f) in [(3.0 * (1.0 + r), 3.0), (3.0, 3.0 * (1.0 + r))] {
+                let transition = Transition { law: Law { a: 0.03, b: 0.05 }, v_i, v_f };
+                let t_f = factor * (1.0 / v_f - 1.0 / v_i).abs();
+                let best = solve(&transition, t_f, true, 1e-10);
+                assert_eq!(best.status, Status::Ok, "{transition:?} {t_f}");
+                assert!(best.value.is_some_and(|best| best.gap >= 0.0 && best.gap < 1e-6), "{transition:?} {t_f}");
+            }
+        }
+    }
+}
+
+#[test]
+fn regress_the_optimum_that_is_a_cubic() {
+    // For b = a and C = 0 the optimal theta is a straight line: the gap is 0, of which nothing is 1e-7.
+    let transition = Transition { law: Law { a: 0.03, b: 0.03 }, v_i: 3.0, v_f: 100.0 };
+    for share in [0.0, 1e-6, 1e-5, 1e-4, 1e-3, 1e-2] {
+        let best = solve(&transition, 0.008745798437999044 * (1.0 + share), true, 1e-10);
+        assert_eq!(best.status, Status::Ok, "{share}");
+        assert!(best.value.is_some_and(|best| best.gap.abs() < 1e-17), "{share}");
+    }
+}
