@@ -170,3 +170,15 @@ fn regress_the_optimum_that_is_a_cubic() {
         assert!(best.value.is_some_and(|best| best.gap.abs() < 1e-17), "{share}");
     }
 }
+
+#[test]
+fn regress_holds_shorter_than_a_panel_sees() {
+    // Just past t_free_out the optimum starts with a hold of 3e-5 that no quadrature node meets.
+    let decelerate = |t_f| (Transition { law: Law { a: 0.03, b: 0.05 }, v_i: 3.03, v_f: 3.0 }, t_f);
+    let accelerate = (Transition { law: Law { a: 0.03, b: 0.1 }, v_i: 3.0, v_f: 3.03 }, 0.025046181509522085);
+    for (transition, t_f) in [decelerate(0.0165), decelerate(0.0165016501650165), accelerate] {
+        let best = best(&transition, t_f, true);
+        let difference = best.work - best.work_optimal;
+        assert!((best.gap * best.work_optimal - difference).abs() < 2e-13 * best.work, "{transition:?} {t_f} {best:?}");
+    }
+}

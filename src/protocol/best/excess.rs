@@ -42,18 +42,43 @@ pub(super) fn over_optimum(
     let [_, theta_1, _, t_f] = landscape.ends();
     let (theta, n) = landscape.path(place.a_2, place.a_3).about_end();
     let law = transition.law;
-    let mut density = |delta: f64| {
+    // The density at `delta`, the time before the end in units of `-t_f`, and whether the optimum would hold there.
+    let mut judge = |delta: f64| {
         let drop = delta * (theta[1] + delta * (theta[2] + delta * theta[3]));
         let here = theta[0] + drop;
         let v = (n[0] + delta * (n[1] + delta * n[2])).max(0.0) / (t_f * here);
         let best = optimal::feedback(law, here, theta_1, drop / theta_1, -delta * t_f, bounded, FEEDBACK, effort)?;
         let r = (v - best.v) / best.v;
-        Some(law.a * best.v * entropy(r) + best.pressure * (v - best.v))
+        Some((law.a * best.v * entropy(r) + best.pressure * (v - best.v), best.pressure > 0.0))
     };
-    let whole = panel(&mut density, -1.0, 0.0)?;
+    // A hold at the start may be shorter than the distance of the first node from it.
+    let mut places = vec![-1.0, 0.0];
+    if judge(-1.0)?.1 {
+        places.insert(1, kink(&mut |delta| judge(delta).map(|(_, held)| held))?);
+    }
+    let mut density = |delta: f64| judge(delta).map(|(density, _)| density);
+    let wholes = places.windows(2).map(|ends| panel(&mut density, ends[0], ends[1])).collect::<Option<Vec<f64>>>()?;
+    let tolerance = ACCURACY * wholes.iter().sum::<f64>().abs() + NOTHING * work / t_f;
     let mut left = MOST_PANELS;
-    let sum = refine(&mut density, -1.0, 0.0, whole, ACCURACY * whole.abs() + NOTHING * work / t_f, 0, &mut left)?;
+    let mut sum = 0.0;
+    for (ends, whole) in places.windows(2).zip(wholes) {
+        sum += refine(&mut density, ends[0], ends[1], whole, tolerance, 0, &mut left)?;
+    }
     Some(t_f * sum)
+}
+
+/// Where the optimum that holds at the start leaves the bound, by bisection.
+fn kink(held: &mut impl FnMut(f64) -> Option<bool>) -> Option<f64> {
+    let (mut low, mut high) = (-1.0, 0.0);
+    for _ in 0..DEEPEST {
+        let middle = 0.5 * (low + high);
+        if held(middle)? {
+            low = middle;
+        } else {
+            high = middle;
+        }
+    }
+    Some(high)
 }
 
 /// `(1 + r) ln(1 + r) - r`, without cancellation near 0.
