@@ -30,7 +30,7 @@ alpha_3 = { linspace = [-0.5, 0.5, 401], unit = "1/t_f^2" }
 [tables.gap]
 "#;
 
-const ROUNDS: usize = 5;
+const ROUNDS: usize = 15;
 
 type Outcome<T> = Result<T, Box<dyn std::error::Error>>;
 
