@@ -375,3 +375,14 @@ fn every_random_case_has_an_answer_that_two_accuracies_share() {
     }
     assert!(counts[Status::Ok as usize] > 14_000, "{counts:?}");
 }
+
+#[test]
+fn reference_collocation_with_an_optimiser_finds_the_same_minimum() {
+    let rows = reference::table("collocation");
+    assert!(rows.len() >= 9 && rows.iter().any(|row| row.number("v_f") < row.number("v_i")));
+    for row in rows {
+        let work = solve(&transition(&row), row.number("t_f"), true, 1e-12).value.expect("exists").work;
+        // The optimiser's own error, from other numbers of intervals.
+        assert!((work - row.number("work")).abs() <= 2.0 * row.number("error"), "{row:?} {work}");
+    }
+}
