@@ -20,11 +20,15 @@ const LINE: Duration = Duration::from_secs(10);
 
 /// Does `work`, and meanwhile shows progress towards `rows` rows unless `quiet`, and passes Ctrl-C and SIGTERM on to `signal`.
 ///
-/// Returns what `work` returns, and which signal came, if one did. A second one ends the process at once.
+/// Returns what `work` returns, and which signal came, if one did. A second one ends the process at once, and so does one that
+/// comes when `work` is done.
 pub fn watched<T: Send>(signal: &Signal, rows: u64, quiet: bool, work: impl FnOnce() -> T + Send) -> (T, Option<i32>) {
     let caught = Arc::new(AtomicUsize::new(0));
-    let registered = [SIGINT, SIGTERM].map(|number| listen(number, &caught));
-    let finished = AtomicBool::new(false);
+    let finished = Arc::new(AtomicBool::new(false));
+    for number in [SIGINT, SIGTERM] {
+        // Where a signal cannot be listened to, it keeps its usual effect.
+        let _ = listen(number, &caught, &finished);
+    }
     let result = std::thread::scope(|scope| {
         let watcher = scope.spawn(|| {
             let mut show = Show::new(rows, quiet);
@@ -42,22 +46,19 @@ pub fn watched<T: Send>(signal: &Signal, rows: u64, quiet: bool, work: impl FnOn
         watcher.thread().unpark();
         result
     });
-    for id in registered.into_iter().flatten().flatten() {
-        signal_hook::low_level::unregister(id);
-    }
     let number = caught.load(Ordering::Relaxed);
     (result, i32::try_from(number).ok().filter(|&number| number != 0))
 }
 
-/// Notes `number` in `caught` when it comes, and ends the process when it comes again. Where that cannot be had the run goes without.
-fn listen(number: i32, caught: &Arc<AtomicUsize>) -> [Option<signal_hook::SigId>; 3] {
+/// Notes `number` in `caught` when it comes, and ends the process when it comes again or once all is `finished`.
+fn listen(number: i32, caught: &Arc<AtomicUsize>, finished: &Arc<AtomicBool>) -> std::io::Result<()> {
     let again = Arc::new(AtomicBool::new(false));
-    [
-        // Handlers run in the order in which they are registered: the first time `again` is still false here.
-        signal_hook::flag::register_conditional_shutdown(number, 128 + number, again.clone()).ok(),
-        signal_hook::flag::register(number, again).ok(),
-        signal_hook::flag::register_usize(number, caught.clone(), number as usize).ok(),
-    ]
+    // Handlers run in the order in which they are registered: the first time `again` is still false.
+    signal_hook::flag::register_conditional_shutdown(number, 128 + number, again.clone())?;
+    signal_hook::flag::register_conditional_shutdown(number, 128 + number, finished.clone())?;
+    signal_hook::flag::register(number, again)?;
+    signal_hook::flag::register_usize(number, caught.clone(), number as usize)?;
+    Ok(())
 }
 
 /// The ways to show progress.

@@ -67,7 +67,11 @@ pub fn run(sweep: &Sweep, folder: &Folder, threads: usize, signal: &Signal) -> R
         let (to_disk, parts) = sync_channel::<Part<'_>>(1);
         scope.spawn(|| {
             for part in parts {
-                failure.keep(folder.write_part(part.table, part.number, &part.bytes));
+                // Who asks to stop does not want to wait for the parts that are queued here.
+                failure.keep(match signal.check() {
+                    Ok(()) => folder.write_part(part.table, part.number, &part.bytes).map_err(RunError::from),
+                    Err(stopped) => Err(stopped.into()),
+                });
             }
         });
         for (request, table) in sweep.requests.iter().zip(&plan.tables) {
@@ -92,7 +96,7 @@ pub fn run(sweep: &Sweep, folder: &Folder, threads: usize, signal: &Signal) -> R
                 match encode(&layout, &job.rows, sheet, &footer) {
                     // The other end is there until every sender is gone.
                     Ok(bytes) => drop(to_disk.send(Part { table: &table.name, number, bytes })),
-                    Err(source) => failure.keep(Err(DatasetError::encode(folder, &table.name, number, source))),
+                    Err(source) => failure.keep(Err(DatasetError::encode(folder, &table.name, number, source).into())),
                 }
             })?;
             outcome.tables.push(done);
@@ -135,7 +139,7 @@ pub fn compute(
             scope.spawn(move |_| {
                 let rows = parts.rows_of(number);
                 sheet.resize((rows.end - rows.start) as usize);
-                let computed = table.compute(job, rows, &mut sheet);
+                let computed = table.compute(job, rows, &mut sheet).and_then(|work| job.signal.check().map(|()| work));
                 if computed.is_ok() {
                     take(number, &sheet);
                 }
@@ -157,10 +161,10 @@ struct Part<'a> {
 
 /// The first failure of any thread.
 #[derive(Default)]
-struct Failure(Mutex<Option<DatasetError>>);
+struct Failure(Mutex<Option<RunError>>);
 
 impl Failure {
-    fn keep(&self, result: Result<(), DatasetError>) {
+    fn keep(&self, result: Result<(), RunError>) {
         if let Err(error) = result {
             locked(&self.0).get_or_insert(error);
         }
@@ -170,7 +174,7 @@ impl Failure {
         locked(&self.0).is_some()
     }
 
-    fn into_result(self) -> Result<(), DatasetError> {
+    fn into_result(self) -> Result<(), RunError> {
         self.0.into_inner().unwrap_or_else(PoisonError::into_inner).map_or(Ok(()), Err)
     }
 }
