@@ -20,7 +20,7 @@ fn optimum(transition: &Transition, t_f: f64, bounded: bool) -> Optimum {
 }
 
 fn times(transition: &Transition) -> CrossoverTimes {
-    let (status, times, _) = crossover::solve(transition, true, 1e-12, EVERY_TIME);
+    let (status, times, _) = crossover::solve(transition, true, 1e-13, EVERY_TIME);
     assert_eq!(status, Status::Ok, "{transition:?}");
     times
 }
@@ -71,11 +71,14 @@ fn reference_optimal_protocols_are_good_to_the_last_digits_that_t_f_allows() {
                 assert!(error <= budget, "{name} at rtol {rtol}: {found} off by {error:.1e} > {budget:.1e} in {row:?}");
             }
             let hold = (value.hold_time - row.number("hold_time")).abs();
-            assert!(
-                hold <= budget(doubt.sqrt() * 1e-3) * t_f,
-                "hold_time {} off by {hold:.1e} in {row:?}",
-                value.hold_time
-            );
+            let short = row.text("regime") == "short_hold";
+            // A short hold is what is left of t_f: rounding of t_f, and of as long a time before it.
+            let hold_budget = if short {
+                2.0 * rtol * row.number("hold_time") + 16.0 * f64::EPSILON * t_f
+            } else {
+                budget(doubt.sqrt() * 1e-3) * t_f
+            };
+            assert!(hold <= hold_budget, "hold_time {} off by {hold:.1e} in {row:?}", value.hold_time);
         }
     }
 }
@@ -100,6 +103,29 @@ fn regress_short_holds_keep_their_digits() {
     let found = solve(&steady, 5.065918085582399e-05, true, 1e-13).value.expect("exists");
     assert!(relative(found.hold_time, 4.998365298933152e-05) < 1e-13, "{found:?}");
     assert!(relative(found.hamiltonian, 11072.243988836135) < 2e-13, "{found:?}");
+}
+
+/// No extremal exists at some of these times because friction is negative; it had been called a defect of the solver.
+#[test]
+fn regress_special_times_where_friction_is_negative_are_nonphysical() {
+    for (a, b, v_i, v_f) in [
+        (0.04889316364714283, 0.1819872397332725, 20022.81969885003, 1.001),
+        (0.08690174766765593, 0.33360220509231936, 749.0827455585322, 3.0),
+    ] {
+        let transition = Transition { law: Law { a, b }, v_i, v_f };
+        let (status, ..) = crossover::solve(&transition, false, 1e-10, EVERY_TIME);
+        assert_eq!(status, Status::Nonphysical, "{transition:?}");
+    }
+}
+
+/// The least time, formed from `1/v`, lost digits near `v = 1`.
+#[test]
+fn regress_the_least_time_keeps_its_digits_near_the_bound() {
+    for (v_i, v_f) in [(1.0011, 1.001), (1.5, 1.001), (1e6, 1.001), (1.001 + 1e-9, 1.001)] {
+        let transition = Transition { law: Law { a: 0.03, b: 0.05 }, v_i, v_f };
+        let t_min = times(&transition).t_min.expect("exists");
+        assert!(relative(t_min, transition.least_time()) < 1e-15, "{t_min} for {transition:?}");
+    }
 }
 
 /// `t_f - t_min` under the bound.
@@ -132,7 +158,7 @@ fn reference_crossover_times_and_their_work() {
             match (found, row.optional(name)) {
                 (Some(found), Some(expected)) => {
                     let error = relative(found, expected);
-                    assert!(error < 1e-12, "{name}: {found} off by {error:.1e} in {row:?}");
+                    assert!(error < 2e-13, "{name}: {found} off by {error:.1e} in {row:?}");
                 }
                 (None, None) => {}
                 (found, expected) => panic!("{name}: {found:?} where {expected:?} in {row:?}"),

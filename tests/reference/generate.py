@@ -375,6 +375,24 @@ def crossover_rows():
             pass
 
 
+def short_hold_cases():
+    """Accelerations just after t_hold, where the hold is a small share of t_f."""
+    precision(DIGITS)
+    cases = []
+    for a, b, v_i, v_f in (
+        (0.03, 0.05, 3.0, 100.0),
+        (0.010435427807552387, 0.010435427807552387, 1.001, 1.001001001),
+        (0.0001, 0.0003630315811683068, 3.0, 3.190125206417716),
+        (0.02, 0.01, 1.05, 40.0),
+        (0.1, 0.15, 1.001, 1e6),
+        (0.001, 0.0, 50.0, 50.00005),
+    ):
+        t_hold = Problem(a, b, v_i, v_f, True).by_start(-log(mpf(v_i)))[2].time
+        for excess in (1e-4, 1e-7, 1e-10):
+            cases.append(("short_hold", a, b, v_i, v_f, float(t_hold * (1 + mpf(excess))), 1))
+    return cases
+
+
 def optimal_rows():
     rng = random.Random(1)
     cases = []
@@ -408,6 +426,7 @@ def optimal_rows():
         if t_f > 1e3:
             continue
         cases.append((kind, a, b, v_i, v_f, t_f, bounded))
+    cases += short_hold_cases()
     for kind, *case in cases:
         try:
             row = optimal_row(*case[:5], bool(case[5]))

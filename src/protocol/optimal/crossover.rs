@@ -4,7 +4,6 @@ use super::extremal::{Extremal, Problem};
 use super::hold;
 use super::search::quadrature_tolerance;
 use crate::model::{Law, Transition};
-use crate::numerics::elementary::ln;
 use crate::numerics::turning::turning;
 use crate::protocol::{Effort, Status};
 
@@ -87,7 +86,9 @@ impl Survey {
     fn measure(&mut self, extremal: Option<Extremal>) -> (Option<f64>, Option<f64>) {
         let sums = extremal.as_ref().and_then(|e| e.arc.sums(quadrature_tolerance(self.rtol)));
         let (Some(extremal), Some(sums)) = (extremal, sums) else {
-            self.status = self.status.max(Status::NotConverged);
+            // Where friction fails already in a steady state, no arc need exist.
+            let failed = if self.problem.is_doubtful() { Status::Nonphysical } else { Status::NotConverged };
+            self.status = self.status.max(failed);
             return (None, None);
         };
         self.effort.quadratures += 1;
@@ -105,12 +106,12 @@ fn acceleration(survey: &mut Survey, wanted: Wanted, times: &mut CrossoverTimes)
     let Law { a, b } = problem.law;
     let friction_0 = problem.friction_a();
     let friction_1 = problem.friction_end();
-    let ln_v_i = -ln(problem.theta_0);
+    let ln_v_i = -problem.from.ln();
     let ratio = 1.0 + problem.fall;
     if wanted.cross && friction_0 > b - a && ratio * friction_1 > friction_0 {
         (times.t_cross, times.work_cross) = survey.measure(problem.extremal(0.0, None));
     }
-    if wanted.hold && 1.0 - b * ln_v_i > b - a && ratio * friction_1 > 1.0 + a - b * ln_v_i - a * problem.theta_0 {
+    if wanted.hold && 1.0 - b * ln_v_i > b - a && ratio * friction_1 > 1.0 + a - b * ln_v_i - a * problem.from.theta {
         let unheld = Problem { bounded: true, ..problem }.q_hold().and_then(|q| problem.extremal(q, None));
         (times.t_hold, times.work_hold) = survey.measure(unheld);
     }
@@ -127,8 +128,8 @@ fn deceleration(survey: &mut Survey, wanted: Wanted, times: &mut CrossoverTimes)
     if wanted.min && problem.bounded {
         let t_min = problem.t_min();
         times.t_min = Some(t_min);
-        times.work_min = Some(hold::work(&problem.law, problem.theta_0, t_min));
-        if 1.0 + b * ln(problem.theta_0) <= problem.unique_above() {
+        times.work_min = Some(hold::work(&problem.law, problem.from, t_min));
+        if 1.0 + b * problem.from.ln() <= problem.unique_above() {
             survey.status = survey.status.max(Status::Nonphysical);
         }
     }
@@ -140,7 +141,7 @@ fn deceleration(survey: &mut Survey, wanted: Wanted, times: &mut CrossoverTimes)
     if wanted.free
         && problem.bounded
         && turns
-        && 1.0 + b * ln(problem.theta_0) > b - a
+        && 1.0 + b * problem.from.ln() > b - a
         && let Some([rising, falling]) = problem.free_window()
     {
         times.t_free_in = survey.measure(Some(rising)).0;

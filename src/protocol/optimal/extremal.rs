@@ -11,9 +11,12 @@
 //!   stretched so that `v(t_f-) = 1` lies at minus infinity); `q > 0` is the scaled end of the turning chart, theta
 //!   falls at the end; above `q_hold` the hold is `q - q_hold` of those units longer than the shortest protocol. Time
 //!   rises with `q`.
+//!
+//! A search counts `q` from `q_hold` where that exists, so that short holds keep their digits.
 
 use super::arc::{Arc, Chart, Sums, phi};
 use super::hold;
+use super::lifetime::Lifetime;
 use crate::model::Law;
 use crate::numerics::elementary::{exp, exp_m1, ln, ln_1p};
 use crate::numerics::root::Probe;
@@ -24,10 +27,10 @@ use crate::numerics::turning::Turning;
 pub(super) struct Problem {
     pub law: Law,
     /// Contact lifetime at the start, not necessarily steady.
-    pub theta_0: f64,
+    pub from: Lifetime,
     /// Contact lifetime at the end.
-    pub theta_1: f64,
-    /// `theta_0/theta_1 - 1`, from the velocities, free of cancellation.
+    pub to: Lifetime,
+    /// `theta_0/theta_1 - 1`, of these two, from the velocities, free of cancellation.
     pub fall: f64,
     pub bounded: bool,
 }
@@ -78,8 +81,8 @@ impl Problem {
     pub fn t_min(&self) -> f64 {
         match (self.rises(), self.bounded) {
             (false, _) => 0.0,
-            (true, true) => hold::time(self.theta_0, -self.fall * self.theta_1),
-            (true, false) => -self.fall * self.theta_1,
+            (true, true) => hold::time(-self.fall * self.to.theta, self.to.rest),
+            (true, false) => -self.fall * self.to.theta,
         }
     }
 
@@ -88,20 +91,34 @@ impl Problem {
         (self.law.b - self.law.a).max(0.0)
     }
 
-    /// The end of larger theta, where the parameter is anchored. It is also the unit of time of the holds that the
-    /// parameter counts, so that short holds keep their digits.
+    /// Whether a steady state at either end is already outside of where extremals are unique.
+    pub fn is_doubtful(&self) -> bool {
+        [self.friction_start(), self.friction_end()].iter().any(|&tau| tau <= self.unique_above())
+    }
+
+    /// The end of larger theta, where the parameter is anchored.
+    pub fn anchor(&self) -> Lifetime {
+        if self.rises() { self.to } else { self.from }
+    }
+
+    /// Theta at the anchor, also the unit of time of the holds that the parameter counts.
     pub fn theta_a(&self) -> f64 {
-        if self.rises() { self.theta_1 } else { self.theta_0 }
+        self.anchor().theta
     }
 
     /// Friction at the anchor with `u = 1`.
     pub fn friction_a(&self) -> f64 {
-        1.0 + (self.law.b - self.law.a) * ln(self.theta_a())
+        1.0 + (self.law.b - self.law.a) * self.anchor().ln()
+    }
+
+    /// Friction at the start with `u = 1`, `tau_ss(v_i)` where that is steady.
+    fn friction_start(&self) -> f64 {
+        1.0 + (self.law.b - self.law.a) * self.from.ln()
     }
 
     /// Friction at the end with `u = 1`, `tau_ss(v_f)` where that is steady.
     pub fn friction_end(&self) -> f64 {
-        1.0 + (self.law.b - self.law.a) * ln(self.theta_1)
+        1.0 + (self.law.b - self.law.a) * self.to.ln()
     }
 
     /// Scale of the turning layer at the anchor, `w = X/layer`; NaN where `tau <= b - a` there.
@@ -115,19 +132,20 @@ impl Problem {
             return None;
         }
         // v = 1 at the anchor.
-        let z = ln(self.theta_a());
+        let z = self.anchor().ln();
         let c_a = self.law.a * phi(z) - self.friction_a();
         let xi = turning_distance(&self.law, self.law.a * phi(z), -c_a)?;
         let q = xi.sqrt() / self.layer();
         Some(if self.rises() { q } else { -q })
     }
 
-    /// Bounds of the parameter: a hold cannot last longer than the whole, and `e^q` must stay a number.
+    /// Bounds of the parameter, counted from `q_hold`: a hold cannot last longer than the whole, and `e^q` must stay a
+    /// number.
     pub fn bracket(&self, q_hold: Option<f64>, beyond: f64) -> (f64, f64) {
         match (self.rises(), q_hold) {
-            (false, Some(q_hold)) => (q_hold - beyond / self.theta_a(), MOST_LN_U),
+            (false, Some(q_hold)) => (-beyond / self.theta_a(), MOST_LN_U - q_hold),
             (false, None) => (f64::NEG_INFINITY, MOST_LN_U),
-            (true, Some(q_hold)) => (f64::NEG_INFINITY, q_hold + beyond / self.theta_a()),
+            (true, Some(_)) => (f64::NEG_INFINITY, beyond / self.theta_a()),
             (true, None) => (f64::NEG_INFINITY, f64::INFINITY),
         }
     }
@@ -136,21 +154,21 @@ impl Problem {
     /// end, and falling. `None` if they turn below `theta_1`.
     pub fn free_window(&self) -> Option<[Extremal; 2]> {
         let law = self.law;
-        let ln_theta = ln(self.theta_0);
+        let ln_theta = self.from.ln();
         let excess = law.a * phi(ln_theta);
         let friction = 1.0 + (law.b - law.a) * ln_theta;
         let xi = turning_distance(&law, excess, friction - excess)?;
         let x_squares = (1.0 + xi) * self.fall;
         let x = (xi + x_squares).sqrt();
         let one = |x_end: f64| {
-            let theta_h = self.theta_0 * (1.0 + xi);
+            let theta_h = self.from.theta * (1.0 + xi);
             let arc = Arc { law, chart: Chart::Turning { theta_h, x_start: -xi.sqrt(), x_end, x_squares } };
             let (start, end) = arc.ends()?;
             let rate = Rate::Turning { gain: 0.0, inner: 0.0, outer: 0.0 };
             Some(Extremal {
                 hold_time: 0.0,
-                theta_s: self.theta_0,
-                rest: -self.fall * self.theta_1,
+                theta_s: self.from.theta,
+                rest: -self.fall * self.to.theta,
                 arc,
                 start,
                 end,
@@ -160,13 +178,14 @@ impl Problem {
         if x > 0.0 { Some([one(-x)?, one(x)?]) } else { None }
     }
 
-    /// The member at parameter `q`; `None` where the extremal does not exist.
-    pub fn extremal(&self, q: f64, q_hold: Option<f64>) -> Option<Extremal> {
+    /// The member at parameter `p`, which is `q - q_hold`, or `q` where there is no `q_hold`; `None` where the extremal
+    /// does not exist.
+    pub fn extremal(&self, p: f64, q_hold: Option<f64>) -> Option<Extremal> {
+        let unit = self.theta_a();
+        let q = p + q_hold.unwrap_or(0.0);
         match (self.rises(), q_hold) {
-            (false, Some(q_hold)) if q < q_hold => self.after_hold((q_hold - q) * self.theta_a(), -self.theta_a()),
-            (true, Some(q_hold)) if q > q_hold => {
-                self.after_hold(self.t_min() + (q - q_hold) * self.theta_a(), self.theta_a())
-            }
+            (false, Some(_)) if p < 0.0 => self.after_hold(-p * unit, -unit),
+            (true, Some(_)) if p > 0.0 => self.after_hold(self.t_min() + p * unit, unit),
             (false, _) if q > 0.0 => self.falling_at_once(q),
             (false, _) => self.rising_first(q),
             (true, _) if q < 0.0 => self.rising_to_the_end(q),
@@ -177,15 +196,15 @@ impl Problem {
     /// A hold of `time`, then an arc through its turning point down to `theta_1`.
     fn after_hold(&self, time: f64, unit: f64) -> Option<Extremal> {
         let law = self.law;
-        let (theta, rest) = hold::age(self.theta_0, time);
-        // From whichever of theta and 1 - theta is small.
-        let z = if theta < 0.5 { ln(theta) } else { ln_1p(-rest) };
+        let released = self.from.aged(time);
+        let Lifetime { theta, rest } = released;
+        let z = released.ln();
         let excess = law.a * phi(z);
         let friction = 1.0 + (law.b - law.a) * z;
         let xi = turning_distance(&law, excess, friction - excess)?;
         let theta_h = theta * (1.0 + xi);
         // theta_c/theta_1 - 1, from theta_0/theta_1 - 1.
-        let fall = self.fall + (theta - self.theta_0) / self.theta_1;
+        let fall = self.fall + self.from.growth(time) / self.to.theta;
         let x_squares = (1.0 + xi) * fall;
         let chart = Chart::Turning { theta_h, x_start: -xi.sqrt(), x_end: (xi + x_squares).sqrt(), x_squares };
         let (start, end) = Arc { law, chart }.ends()?;
@@ -193,12 +212,12 @@ impl Problem {
         // d ln theta_h/d ln theta_c from C(theta_h) = C_leaving(theta_c); the hold's own time cancels against the start
         // of the arc.
         let m = (1.0 + law.a - law.b + law.b * z) / theta * theta_h / (c_h + law.a - law.b);
-        let end_term = self.theta_1 / (exp_m1(end.ln_u));
+        let end_term = self.to.theta / (exp_m1(end.ln_u));
         let rate = Rate::Hold { gain: unit * m * rest / theta, inner: end_term, outer: unit * m };
         Some(Extremal {
             hold_time: time,
             theta_s: theta,
-            rest: -fall * self.theta_1,
+            rest: -fall * self.to.theta,
             arc: Arc { law, chart },
             start,
             end,
@@ -213,7 +232,7 @@ impl Problem {
         let c_a = excess - self.friction_a();
         if let Some(xi) = turning_distance(&law, excess, -c_a).filter(|&xi| xi <= 1.0) {
             let x_squares = (1.0 + xi) * self.fall;
-            let theta_h = self.theta_0 * (1.0 + xi);
+            let theta_h = self.from.theta * (1.0 + xi);
             let chart = Chart::Turning { theta_h, x_start: xi.sqrt(), x_end: (xi + x_squares).sqrt(), x_squares };
             let arc = Arc { law, chart };
             let (start, end) = arc.ends()?;
@@ -221,13 +240,13 @@ impl Problem {
             let swing = law.a * (1.0 + xi) / (c_h + law.a - law.b);
             let rate = Rate::Turning {
                 gain: swing * exp_m1(z_0),
-                inner: self.theta_1 / exp_m1(end.ln_u),
-                outer: -self.theta_0 * swing,
+                inner: self.to.theta / exp_m1(end.ln_u),
+                outer: -self.from.theta * swing,
             };
             return Some(Extremal {
                 hold_time: 0.0,
-                theta_s: self.theta_0,
-                rest: -self.fall * self.theta_1,
+                theta_s: self.from.theta,
+                rest: -self.fall * self.to.theta,
                 arc,
                 start,
                 end,
@@ -235,7 +254,7 @@ impl Problem {
             });
         }
         let chart = Chart::Direct {
-            theta_a: self.theta_0,
+            theta_a: self.from.theta,
             z_a: z_0,
             friction_a: self.friction_a(),
             y_start: 0.0,
@@ -245,8 +264,8 @@ impl Problem {
         let (start, end) = arc.ends()?;
         Some(Extremal {
             hold_time: 0.0,
-            theta_s: self.theta_0,
-            rest: -self.fall * self.theta_1,
+            theta_s: self.from.theta,
+            rest: -self.fall * self.to.theta,
             arc,
             start,
             end,
@@ -260,23 +279,31 @@ impl Problem {
         let layer = self.layer();
         let x_start = layer * q;
         let grow = 1.0 + x_start * x_start;
-        let theta_h = self.theta_0 * grow;
+        let theta_h = self.from.theta * grow;
         let x_squares = grow * self.fall;
         let chart = Chart::Turning { theta_h, x_start, x_end: (x_start * x_start + x_squares).sqrt(), x_squares };
         let arc = Arc { law, chart };
         let (start, end) = arc.ends()?;
         let rate = Rate::Turning {
             gain: layer * 2.0 * x_start / grow,
-            inner: if end.ln_u == 0.0 { 0.0 } else { self.theta_1 / exp_m1(end.ln_u) },
+            inner: if end.ln_u == 0.0 { 0.0 } else { self.to.theta / exp_m1(end.ln_u) },
             outer: -layer * edge(&law, theta_h, x_start, &start),
         };
-        Some(Extremal { hold_time: 0.0, theta_s: self.theta_0, rest: -self.fall * self.theta_1, arc, start, end, rate })
+        Some(Extremal {
+            hold_time: 0.0,
+            theta_s: self.from.theta,
+            rest: -self.fall * self.to.theta,
+            arc,
+            start,
+            end,
+            rate,
+        })
     }
 
     /// Rising problem, `q < 0`: `ln u(t_f-)`, stretched under the bound.
     fn rising_to_the_end(&self, q: f64) -> Option<Extremal> {
         let law = self.law;
-        let reach = -ln(self.theta_1);
+        let reach = -self.to.ln();
         // ln v(t_f-), and ln u(t_f-).
         let (eta, z_1, stretch) = if self.bounded {
             let shrink = exp(q / reach);
@@ -286,11 +313,11 @@ impl Problem {
         };
         let excess = law.a * phi(z_1);
         let c_a = excess - self.friction_a();
-        let (hold_time, d) = self.leaving(law.a * (self.theta_1 * exp_m1(eta) - eta))?;
-        let theta_s = if hold_time > 0.0 { self.theta_1 * exp(d) } else { self.theta_0 };
-        let rising = Rate::Rising { gain: -stretch * exp_m1(z_1) / self.theta_1 };
+        let (hold_time, d) = self.leaving(law.a * (self.to.theta * exp_m1(eta) - eta))?;
+        let theta_s = if hold_time > 0.0 { self.to.theta * exp(d) } else { self.from.theta };
+        let rising = Rate::Rising { gain: -stretch * exp_m1(z_1) / self.to.theta };
         if let Some(xi) = turning_distance(&law, excess, -c_a).filter(|&xi| xi <= 1.0) {
-            let theta_h = self.theta_1 * (1.0 + xi);
+            let theta_h = self.to.theta * (1.0 + xi);
             let x_squares = -(1.0 + xi) * exp_m1(-d);
             let chart = Chart::Turning { theta_h, x_start: -(xi - x_squares).sqrt(), x_end: -xi.sqrt(), x_squares };
             let arc = Arc { law, chart };
@@ -303,16 +330,16 @@ impl Problem {
                 Rate::Turning {
                     gain: stretch * swing * exp_m1(z_1),
                     inner: -theta_s / exp_m1(start.ln_u),
-                    outer: stretch * self.theta_1 * swing,
+                    outer: stretch * self.to.theta * swing,
                 }
             };
-            return Some(Extremal { hold_time, theta_s, rest: -self.theta_1 * exp_m1(d), arc, start, end, rate });
+            return Some(Extremal { hold_time, theta_s, rest: -self.to.theta * exp_m1(d), arc, start, end, rate });
         }
         let chart =
-            Chart::Direct { theta_a: self.theta_1, z_a: z_1, friction_a: self.friction_a(), y_start: d, y_end: 0.0 };
+            Chart::Direct { theta_a: self.to.theta, z_a: z_1, friction_a: self.friction_a(), y_start: d, y_end: 0.0 };
         let arc = Arc { law, chart };
         let (start, end) = arc.ends()?;
-        Some(Extremal { hold_time, theta_s, rest: -self.theta_1 * exp_m1(d), arc, start, end, rate: rising })
+        Some(Extremal { hold_time, theta_s, rest: -self.to.theta * exp_m1(d), arc, start, end, rate: rising })
     }
 
     /// Rising problem, `q >= 0`: `X = layer q` at the end.
@@ -321,11 +348,11 @@ impl Problem {
         let layer = self.layer();
         let x_end = layer * q;
         let x2 = x_end * x_end;
-        let theta_h = self.theta_1 * (1.0 + x2);
+        let theta_h = self.to.theta * (1.0 + x2);
         let c_h = 1.0 + (law.b - law.a) * ln(theta_h);
         let excess = (law.a - law.b) * ln_1p(x2) + c_h * x2 / (1.0 + x2);
-        let (hold_time, d) = self.leaving(excess - law.a * phi(ln(self.theta_1)))?;
-        let theta_s = if hold_time > 0.0 { self.theta_1 * exp(d) } else { self.theta_0 };
+        let (hold_time, d) = self.leaving(excess - law.a * phi(self.to.ln()))?;
+        let theta_s = if hold_time > 0.0 { self.to.theta * exp(d) } else { self.from.theta };
         let x_squares = -(1.0 + x2) * exp_m1(-d);
         let chart = Chart::Turning { theta_h, x_start: -(x2 - x_squares).sqrt(), x_end, x_squares };
         let arc = Arc { law, chart };
@@ -335,7 +362,7 @@ impl Problem {
             inner: -theta_s / exp_m1(start.ln_u),
             outer: layer * edge(&law, theta_h, x_end, &end),
         };
-        Some(Extremal { hold_time, theta_s, rest: -self.theta_1 * exp_m1(d), arc, start, end, rate })
+        Some(Extremal { hold_time, theta_s, rest: -self.to.theta * exp_m1(d), arc, start, end, rate })
     }
 
     /// For a rising problem: the hold time and `ln(theta_s/theta_1)` where the arc starts, from `kappa = theta_1 (C -
@@ -346,11 +373,11 @@ impl Problem {
             return Some((0.0, all));
         }
         // Where no arc leaves the bound (friction at v = 1 too low) only the protocol without a hold is left.
-        let Some(d) = hold::leave(&self.law, ln(self.theta_1), kappa).filter(|&d| d > all) else {
+        let Some(d) = hold::leave(&self.law, self.to.ln(), kappa).filter(|&d| d > all) else {
             return Some((0.0, all));
         };
-        let held = self.theta_1 * exp_m1(d) - self.fall * self.theta_1;
-        Some((hold::time(self.theta_0, held), d))
+        let held = self.to.theta * exp_m1(d) - self.fall * self.to.theta;
+        Some((hold::time(held, self.from.rest - held), d))
     }
 }
 
@@ -359,16 +386,16 @@ impl Extremal {
     pub fn friction_min(&self, problem: &Problem, sums: &Sums) -> f64 {
         let Law { a, b } = problem.law;
         let friction = |ln_u: f64, theta: f64| 1.0 + a * ln_u + (b - a) * ln(theta);
-        let held = if self.hold_time > 0.0 { 1.0 + b * ln(problem.theta_0) } else { f64::INFINITY };
+        let held = if self.hold_time > 0.0 { 1.0 + b * problem.from.ln() } else { f64::INFINITY };
         sums.friction_min
             .min(friction(self.start.ln_u, self.theta_s))
-            .min(friction(self.end.ln_u, problem.theta_1))
+            .min(friction(self.end.ln_u, problem.to.theta))
             .min(held)
     }
 
     /// Work of the hold and the arc together.
     pub fn work(&self, problem: &Problem, sums: &Sums) -> f64 {
-        hold::work(&problem.law, problem.theta_0, self.hold_time) + sums.work
+        hold::work(&problem.law, problem.from, self.hold_time) + sums.work
     }
 
     /// Total time.
@@ -384,7 +411,7 @@ impl Extremal {
         if problem.bounded {
             if self.hold_time > 0.0 && self.rest > 0.0 {
                 // The arc replaces the last part of the shortest protocol, a hold from theta_s to theta_1.
-                sums.time - hold::time(self.theta_s, self.rest)
+                sums.time - hold::time(self.rest, problem.to.rest)
             } else {
                 (self.hold_time - problem.t_min()) + sums.time
             }
@@ -462,8 +489,8 @@ mod tests {
                 for bounded in [true, false] {
                     let problem = Problem {
                         law: Law { a, b },
-                        theta_0: 1.0 / v_i,
-                        theta_1: 1.0 / v_f,
+                        from: Lifetime::steady(v_i),
+                        to: Lifetime::steady(v_f),
                         fall: (v_f - v_i) / v_i,
                         bounded,
                     };
@@ -482,8 +509,8 @@ mod tests {
                             continue;
                         };
                         // Differences tell nothing across a seam of the family or where the time is all rounding.
-                        let seams = [Some(0.0), q_hold];
-                        let seam = seams.into_iter().flatten().any(|seam| (q - seam).abs() < 2.0 * step);
+                        let seams = [0.0, -q_hold.unwrap_or(0.0)];
+                        let seam = seams.into_iter().any(|seam| (q - seam).abs() < 2.0 * step);
                         if seam || beyond < 1e-7 {
                             continue;
                         }

@@ -1,44 +1,36 @@
 //! The hold: the block slides at the bound `v = 1` while the contacts age, `theta = 1 - (1 - theta_0) e^{-t}`.
 
+use super::lifetime::Lifetime;
 use crate::model::Law;
 use crate::numerics::dilogarithm::dilogarithm;
-use crate::numerics::elementary::{exp, exp_m1, ln, ln_1p};
+use crate::numerics::elementary::{exp_m1, ln, ln_1p};
 use crate::numerics::gauss::rule;
 
-/// Contact lifetime after a hold of `time` from `theta_0 <= 1`, and its distance from 1, each without cancellation.
-pub(super) fn age(theta_0: f64, time: f64) -> (f64, f64) {
-    (theta_0 - (1.0 - theta_0) * exp_m1(-time), (1.0 - theta_0) * exp(-time))
+/// Time to age by `growth`, until `rest` is left to 1.
+pub(super) fn time(growth: f64, rest: f64) -> f64 {
+    ln_1p(growth / rest)
 }
 
-/// Time to age from `theta_0` to `theta_0 + rise`, below 1.
-pub(super) fn time(theta_0: f64, rise: f64) -> f64 {
-    ln_1p(rise / ((1.0 - theta_0) - rise))
-}
-
-/// Work of a hold of `time` from `theta_0`: `time + b int ln theta dt`.
-pub(super) fn work(law: &Law, theta_0: f64, time: f64) -> f64 {
+/// Work of a hold of `time` that starts from the lifetime `from`: `time + b int ln theta dt`.
+pub(super) fn work(law: &Law, from: Lifetime, time: f64) -> f64 {
     if time <= 0.0 {
         return 0.0;
     }
     // ln theta(t) has its singularity at t = ln(1 - theta_0) < 0: as long as the hold is no longer than that is away,
     // few nodes do. Beyond, theta has about doubled and a difference of dilogarithms does not cancel.
-    let integral = if time <= -ln_1p(-theta_0) {
+    let integral = if time <= -ln_1p(-from.theta) {
         let rule = rule(16);
-        let sum: f64 = rule.x.iter().zip(&rule.w).map(|(x, w)| w * ln(age(theta_0, 0.5 * time * (1.0 + x)).0)).sum();
+        let sum: f64 = rule.x.iter().zip(&rule.w).map(|(x, w)| w * from.aged(0.5 * time * (1.0 + x)).ln()).sum();
         0.5 * time * sum
     } else {
-        let (theta, rest) = age(theta_0, time);
-        if theta_0 >= 0.5 {
-            dilogarithm(rest) - dilogarithm(1.0 - theta_0)
-        } else {
-            aged(theta, rest) - aged(theta_0, 1.0 - theta_0)
-        }
+        let to = from.aged(time);
+        if from.theta >= 0.5 { dilogarithm(to.rest) - dilogarithm(from.rest) } else { aged(to) - aged(from) }
     };
     time + law.b * integral
 }
 
 /// `int_0^theta ln y/(1 - y) dy = Li_2(1 - theta) - pi^2/6`, to full relative accuracy as `theta -> 0`.
-fn aged(theta: f64, rest: f64) -> f64 {
+fn aged(Lifetime { theta, rest }: Lifetime) -> f64 {
     if theta < 0.5 {
         -(ln_1p(-theta) * ln(theta) + dilogarithm(theta))
     } else {

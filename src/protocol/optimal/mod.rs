@@ -7,6 +7,7 @@ mod arc;
 pub mod crossover;
 mod extremal;
 mod hold;
+mod lifetime;
 mod motion;
 mod search;
 
@@ -14,6 +15,7 @@ use super::{Effort, Motion, Solved, Status};
 use crate::model::{Law, Transition};
 use crate::numerics::elementary::ln;
 use extremal::Problem;
+use lifetime::Lifetime;
 
 /// How the optimal protocol starts.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -124,7 +126,7 @@ pub(super) fn feedback(
     rtol: f64,
     effort: &mut Effort,
 ) -> Option<Feedback> {
-    let problem = Problem { law, theta_0: theta, theta_1: theta_f, fall, bounded };
+    let problem = Problem { law, from: Lifetime::new(theta), to: Lifetime::new(theta_f), fall, bounded };
     let solved = search::solve(&problem, time_left, rtol);
     effort.quadratures += solved.effort.quadratures;
     effort.nodes += solved.effort.nodes;
@@ -148,8 +150,8 @@ impl Problem {
         let finite = law.a.is_finite() && law.b.is_finite() && v_i.is_finite() && v_f.is_finite();
         (inside && finite).then(|| Problem {
             law,
-            theta_0: 1.0 / v_i,
-            theta_1: 1.0 / v_f,
+            from: Lifetime::steady(v_i),
+            to: Lifetime::steady(v_f),
             fall: (v_f - v_i) / v_i,
             bounded,
         })

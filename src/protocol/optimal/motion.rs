@@ -2,7 +2,7 @@
 
 use super::arc::Pieces;
 use super::extremal::{Extremal, Problem};
-use super::hold;
+use super::lifetime::Lifetime;
 use crate::model::Law;
 use crate::numerics::elementary::{exp, exp_m1, ln, ln_1p};
 use crate::protocol::{Moment, Motion};
@@ -24,11 +24,11 @@ const ROUNDING: f64 = 1e-9;
 impl Optimal {
     /// The motion of `extremal`, or of the hold alone, in time `t_f`.
     pub fn new(problem: &Problem, t_f: f64, extremal: Option<Extremal>) -> Optimal {
-        let (theta_s, hold_time) = extremal.map_or((problem.theta_1, t_f), |found| (found.theta_s, found.hold_time));
+        let (theta_s, hold_time) = extremal.map_or((problem.to.theta, t_f), |found| (found.theta_s, found.hold_time));
         let arc = extremal.map(|found| Timed::new(found.arc.pieces(), hold_time, t_f));
         let hold = Hold {
             law: problem.law,
-            theta_0: problem.theta_0,
+            from: problem.from,
             theta_s,
             time: arc.as_ref().map_or(t_f, |arc| arc.start),
             beta_s: -(1.0 + problem.law.a + problem.law.b * ln(theta_s)) / theta_s,
@@ -87,10 +87,10 @@ impl Motion for Optimal {
     }
 }
 
-/// The hold: `v = 1` from `theta_0` to `theta_s`.
+/// The hold: `v = 1` until the contact lifetime is `theta_s`.
 struct Hold {
     law: Law,
-    theta_0: f64,
+    from: Lifetime,
     theta_s: f64,
     time: f64,
     /// Costate where the arc begins, `C - a`.
@@ -98,7 +98,7 @@ struct Hold {
 }
 
 impl Hold {
-    /// Length of its coordinate. `ln theta` changes over `theta_0` at the start, and theta and the costate over 1 at
+    /// Length of its coordinate. `ln theta` changes over its first value at the start, and theta and the costate over 1 at
     /// both ends: the logarithm of the time from either end, in these units, opens them.
     fn length(&self) -> f64 {
         self.first() + ln_1p(0.5 * self.time)
@@ -106,7 +106,7 @@ impl Hold {
 
     /// Its coordinate in the middle of the hold.
     fn first(&self) -> f64 {
-        ln_1p(0.5 * self.time / self.theta_0)
+        ln_1p(0.5 * self.time / self.from.theta)
     }
 
     /// The moment at `place`, from 0 at the start to 1 at the end.
@@ -114,20 +114,19 @@ impl Hold {
         let along = self.length() * place;
         // The time gone and the time left.
         let (gone, left) = if along < self.first() {
-            let gone = (self.theta_0 * exp_m1(along)).min(0.5 * self.time);
+            let gone = (self.from.theta * exp_m1(along)).min(0.5 * self.time);
             (gone, self.time - gone)
         } else {
             let left = exp_m1(self.length() - along).clamp(0.0, 0.5 * self.time);
             (self.time - left, left)
         };
-        let (theta, rest) = hold::age(self.theta_0, gone);
-        let ln_theta = if theta < 0.5 { ln(theta) } else { ln_1p(-rest) };
+        let now = self.from.aged(gone);
         Moment {
             t: gone,
             v: 1.0,
-            theta,
-            friction: 1.0 + self.law.b * ln_theta,
-            beta: Some(self.costate(ln_theta, rest, left)),
+            theta: now.theta,
+            friction: 1.0 + self.law.b * now.ln(),
+            beta: Some(self.costate(now.ln(), now.rest, left)),
         }
     }
 
