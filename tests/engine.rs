@@ -300,11 +300,9 @@ fn another_spec_in_the_same_place_is_refused() {
         panic!("{refused:?}");
     };
     let message = format!(
-        "{}: holds a dataset of another spec\n  expected: {}\n  found: {}\n  help: delete the folder, or write elsewhere with --out \
-         DIR",
+        "{}: holds a dataset of another spec\n  expected: `t_f = 0.03` (line 3)\n  found: `t_f = 0.02` (line 3)\n  help: delete \
+         the folder, or write elsewhere with --out DIR",
         place.path().display(),
-        second.identity().spec_hash,
-        first.identity().spec_hash
     );
     assert_eq!(error.to_string(), message);
     assert_eq!(files(&folder.path().join("test")), before);

@@ -160,7 +160,7 @@ impl Folder {
     /// Makes the folder ready for the parts of `manifest`, or refuses if it belongs to something else.
     pub fn open(&self, manifest: &Manifest) -> Result<(), DatasetError> {
         match self.manifest()? {
-            Some(found) => self.compare(&manifest.identity, &found.identity)?,
+            Some(found) => self.compare(manifest, &found)?,
             None => {
                 let occupied = fs::read_dir(&self.path).is_ok_and(|entries| {
                     entries.flatten().any(|entry| !entry.file_name().to_string_lossy().starts_with('.'))
@@ -183,18 +183,23 @@ impl Folder {
         Ok(())
     }
 
-    fn compare(&self, expected: &Identity, found: &Identity) -> Result<(), DatasetError> {
+    fn compare(&self, expected: &Manifest, found: &Manifest) -> Result<(), DatasetError> {
         let foreign = |what, expected: &str, found: &str| DatasetError::Foreign {
             folder: self.path.display().to_string(),
             what,
             expected: expected.to_owned(),
             found: found.to_owned(),
         };
-        if expected.version != found.version {
-            return Err(foreign("version", &expected.version, &found.version));
+        let (here, there) = (&expected.identity, &found.identity);
+        if here.version != there.version {
+            return Err(foreign("version", &here.version, &there.version));
         }
-        if expected.spec_hash != found.spec_hash {
-            return Err(foreign("spec", &expected.spec_hash, &found.spec_hash));
+        if here.spec_hash != there.spec_hash {
+            return Err(match first_difference(&expected.spec, &found.spec) {
+                Some([here, there]) => foreign("spec", &here, &there),
+                // What a spec refers to differs.
+                None => foreign("spec", &here.spec_hash, &there.spec_hash),
+            });
         }
         Ok(())
     }
@@ -208,6 +213,28 @@ impl Folder {
     pub fn write_part(&self, table: &str, part: u64, bytes: &[u8]) -> Result<(), DatasetError> {
         let path = self.part(table, part);
         atomic::write(&path, bytes).map_err(|error| failed(&path, "write", error))
+    }
+}
+
+/// The first lines in which two specs differ, blank lines and comments aside, each with its number.
+fn first_difference(here: &str, there: &str) -> Option<[String; 2]> {
+    fn lines(text: &str) -> impl Iterator<Item = (usize, &str)> {
+        let bare = text.lines().map(|line| line.split(" #").next().unwrap_or(line).trim());
+        (1..).zip(bare).filter(|(_, line)| !line.is_empty() && !line.starts_with('#'))
+    }
+    let show = |line: Option<(usize, &str)>| match line {
+        Some((number, line)) => format!("`{line}` (line {number})"),
+        None => "nothing more".to_owned(),
+    };
+    let (mut here, mut there) = (lines(here), lines(there));
+    loop {
+        let pair = [here.next(), there.next()];
+        if pair.iter().all(Option::is_none) {
+            return None;
+        }
+        if pair[0].map(|(_, line)| line) != pair[1].map(|(_, line)| line) {
+            return Some(pair.map(show));
+        }
     }
 }
 

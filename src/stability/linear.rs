@@ -172,7 +172,11 @@ impl SteadySliding {
             let slope = sum * sum + c * inertia;
             for _ in 0..3 {
                 let rest = ((inertia * p - 2.0 * sum) * inertia * p + slope) * p - hurwitz;
-                p -= rest / ((3.0 * inertia * p - 4.0 * sum) * inertia * p + slope);
+                let step = rest / ((3.0 * inertia * p - 4.0 * sum) * inertia * p + slope);
+                p -= step;
+                if step.abs() <= 1e-9 * p.abs() {
+                    break;
+                }
             }
         }
         let half = 0.5 * p;

@@ -62,11 +62,11 @@ impl fmt::Display for SpecError {
 
 impl std::error::Error for SpecError {}
 
-/// The name among `known` that `name` was most likely meant to be.
+/// The name among `known`, all in lower case, that `name` was most likely meant to be.
 pub fn nearest<'a>(name: &str, known: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
     known
         .into_iter()
-        .map(|candidate| (strsim::damerau_levenshtein(name, candidate), candidate))
+        .map(|candidate| (strsim::damerau_levenshtein(&name.to_lowercase(), candidate), candidate))
         .filter(|(distance, candidate)| *distance <= candidate.len().max(name.len()).div_ceil(3))
         .min_by_key(|(distance, _)| *distance)
         .map(|(_, candidate)| candidate)
@@ -93,6 +93,7 @@ mod tests {
         assert_eq!(nearest("lnspace", known), Some("linspace"));
         assert_eq!(nearest("geospace", known), Some("geomspace"));
         assert_eq!(nearest("unti", known), Some("unit"));
+        assert_eq!(nearest("UNIT", known), Some("unit"));
         assert_eq!(nearest("temperature", known), None);
         assert_eq!(nearest("", known), None);
     }

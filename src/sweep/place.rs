@@ -111,12 +111,19 @@ fn covers(
         || matches!(value.get_ref(), DeValue::Table(table) if table.iter().any(|(key, value)| covers(key, value, inside)))
 }
 
+/// The field that the parser makes of a date.
+const DATE: &str = "$__toml_private_datetime";
+
 /// Turns a complaint of the parser, whose wording is serde's, into what was found, expected and to be done.
 fn explain(text: &str, message: &str, span: Option<Range<usize>>) -> SpecError {
     let key = span.as_ref().map_or_else(String::new, |span| key_at(text, span));
     let quoted = |text: &str| -> Vec<String> { text.split('`').skip(1).step_by(2).map(str::to_owned).collect() };
     if let Some(rest) = message.strip_prefix("unknown field ") {
         let names = quoted(rest);
+        if names.first().is_some_and(|name| name == DATE) {
+            let found = "found a date".to_owned();
+            return SpecError::new(key, found, "a number, a word, a list or a table", "change the value");
+        }
         if let Some((name, known)) = names.split_first() {
             let known: Vec<&str> = known.iter().map(String::as_str).collect();
             return unknown(key, "key", name, &known);
