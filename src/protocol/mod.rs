@@ -1,11 +1,15 @@
 //! Protocols that bring a block from one steady velocity to another: the optimal one and its shortcuts.
 
 pub mod best;
+pub mod compliant;
+mod control;
 pub mod cubic;
 mod motion;
 pub mod optimal;
 mod outcome;
+mod profile;
 pub mod swift;
 
+pub use control::{Jet, Slider};
 pub use motion::{Moment, Motion};
 pub use outcome::{Effort, Solved, Status};

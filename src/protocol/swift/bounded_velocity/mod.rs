@@ -11,20 +11,17 @@
 //! large in `alpha_3`. For short times `c` goes like `4 ln t_f`, for long ones it tends to `-L`. It never passes 0:
 //! since `int e^-R v'/v^2 dt = 0`, `v'` changes its sign, so the vertex of the exponent lies inside and `|c| > |L|`.
 
-mod arrival;
-mod curve;
-mod motion;
-mod passage;
+mod parabola;
 
 use super::{Case, Family, Obstacle, Swift};
 use crate::model::Transition;
-use crate::numerics::elementary::{exp, ln, ln_1p};
-use crate::numerics::radau::NODES;
+use crate::numerics::elementary::{ln, ln_1p};
+use crate::protocol::profile::{self, Passage, Problem, Resolution, Resolved, Side, Start, pass, reach};
 use crate::protocol::{Effort, Motion};
-use arrival::Problem;
-use curve::{Curve, Side};
-use motion::Resolution;
-use passage::{Passage, Resolved, pass};
+use parabola::Parabola;
+
+/// The velocity of a member.
+type Curve = profile::Curve<Parabola>;
 
 /// The family.
 pub struct BoundedVelocity;
@@ -55,9 +52,9 @@ impl Family for BoundedVelocity {
         if !passage.work.is_finite() {
             return Err(Obstacle::NotConverged);
         }
-        let vertex = curve.vertex().map_or(v_i, |x| 1.0 + curve.surplus(Side::Start, x));
+        let vertex = curve.exponent.vertex().map_or(v_i, |x| 1.0 + curve.surplus(Side::Start, x));
         Ok(Swift {
-            alpha: Some(curve.c / case.t_f / case.t_f),
+            alpha: Some(curve.exponent.c / case.t_f / case.t_f),
             work: passage.work,
             v_min: v_i.min(v_f).min(vertex),
             v_max: v_i.max(v_f).max(vertex),
@@ -86,7 +83,8 @@ fn follow(
 ) -> Result<(), Obstacle> {
     let Transition { v_i, v_f, .. } = case.transition;
     // Theta is interpolated, which takes more nodes than a quadrature.
-    let theta = pass(curve, v_i, rtol, 0.75 * reach(rtol), effort, visit).ok_or(Obstacle::NotConverged)?;
+    let theta =
+        pass(curve, Start::steady(v_i), rtol, 0.75 * reach(rtol), effort, visit).ok_or(Obstacle::NotConverged)?;
     let arrives = (theta * v_f - 1.0).abs() <= 10.0 * rtol + ROUNDING;
     if arrives { Ok(()) } else { Err(Obstacle::NotConverged) }
 }
@@ -111,18 +109,23 @@ fn member(case: &Case, rtol: f64, effort: &mut Effort) -> Result<Curve, Obstacle
     let (w_i, w_f) = (v_i - 1.0, v_f - 1.0);
     let ratio = (v_f - v_i) / w_i;
     let l = if ratio > -0.5 { ln_1p(ratio) } else { ln(w_f / w_i) };
-    let curve = Curve::new(w_i, w_f, l, t_f);
+    let curve = Curve::new(1.0, w_f, t_f, Parabola { l, c: 0.0 });
     if v_i == v_f {
         return Ok(curve);
     }
-    let problem = Problem { v_i, v_f, curve, spare: t_f - t_min, tight: t_f < 2.0 * t_min };
-    let c = problem.solve(rtol, reach(rtol), effort).ok_or(Obstacle::NotConverged)?;
+    let (spare, tight) = (t_f - t_min, t_f < 2.0 * t_min);
+    let problem = Problem::steady(v_i, v_f, curve, spare, tight);
+    let start = if tight { 2.0 * t_f / spare } else { guess(w_i, w_f, l, t_f, problem.required) };
+    let c = problem.solve(start, rtol, reach(rtol), effort).ok_or(Obstacle::NotConverged)?;
     Ok(curve.with(c))
 }
 
-/// Variation of an exponent over a panel whose interpolation at the nodes is good to `rtol`: an exponential of total
-/// variation `r` is interpolated to `2 (r/4)^n/n!`.
-fn reach(rtol: f64) -> f64 {
-    let factorial: f64 = (1..=NODES).map(|k| k as f64).product();
-    (4.0 * exp(ln(0.01 * rtol * factorial) / NODES as f64)).clamp(2.0, 6.0)
+/// A start for the search: a bump of area `required`, by Laplace's method; the steady case has its vertex at the end.
+fn guess(w_i: f64, w_f: f64, l: f64, t_f: f64, required: f64) -> f64 {
+    let excess = ln(required / (t_f * (w_i * w_f * std::f64::consts::PI).sqrt()));
+    let mut y = (4.0 * excess).max(1.0);
+    for _ in 0..3 {
+        y = (4.0 * excess + 2.0 * ln(y) - l * l / y).max(1.0);
+    }
+    if y > l.abs() { -y } else { -l }
 }

@@ -1,5 +1,6 @@
 //! A member over time.
 
+use super::Exponent;
 use super::curve::Curve;
 use super::passage::{Resolved, friction_at};
 use crate::model::Law;
@@ -7,13 +8,13 @@ use crate::numerics::elementary::exp;
 use crate::protocol::{Moment, Motion};
 
 /// Panels of equal length in the parameter `s`, each with theta at its nodes.
-pub(super) struct Resolution {
+pub struct Resolution<E> {
     pub law: Law,
-    pub curve: Curve,
+    pub curve: Curve<E>,
     pub panels: Vec<Resolved>,
 }
 
-impl Motion for Resolution {
+impl<E: Exponent> Motion for Resolution<E> {
     fn duration(&self) -> f64 {
         self.curve.t_f
     }
@@ -31,7 +32,7 @@ impl Motion for Resolution {
         let u = along - k as f64;
         let (x, z) = panel.place(u);
         let theta = panel.theta(u);
-        let v = 1.0 + self.curve.w_f * exp(self.curve.exponent(x, z));
+        let v = self.curve.floor + self.curve.w_f * exp(self.curve.exponent.value(x, z));
         Moment { t: self.curve.t_f * x, v, theta, friction: friction_at(&self.law, v, theta), beta: None }
     }
 }

@@ -6,8 +6,9 @@
 
 use multiversion::multiversion;
 
+use super::Exponent;
 use super::arrival::total;
-use super::curve::{Curve, MOST_PANELS, Panel, Side};
+use super::curve::{Curve, MOST_PANELS, Panel, Side, place, places};
 use crate::model::Law;
 use crate::numerics::elementary::{exp, ln};
 use crate::numerics::radau::{NODES, Nodes, Radau, radau};
@@ -15,7 +16,7 @@ use crate::protocol::Effort;
 
 /// One panel with v and theta at its start and at its nodes.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Resolved {
+pub struct Resolved {
     pub panel: Panel,
     v_start: f64,
     theta_start: f64,
@@ -28,25 +29,43 @@ pub(super) struct Resolved {
 
 /// What is gathered along the way.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Passage {
+pub struct Passage {
     pub work: f64,
     pub friction_max: f64,
 }
 
-/// Passes along the curve from `theta = 1/v_i`; every panel goes to `visit`. Returns theta at the end, `None` where
-/// numbers leave the range of a double.
-pub(super) fn pass(
-    curve: &Curve,
-    v_i: f64,
+/// Where a passage starts.
+#[derive(Debug, Clone, Copy)]
+pub struct Start {
+    /// Velocity.
+    pub v: f64,
+    /// Contact lifetime.
+    pub theta: f64,
+    /// `theta'`, accurate where it is small beside 1.
+    pub rate: f64,
+}
+
+impl Start {
+    /// Steady sliding at `v`.
+    pub fn steady(v: f64) -> Start {
+        Start { v, theta: 1.0 / v, rate: 0.0 }
+    }
+}
+
+/// Passes along the curve; every panel goes to `visit`. Returns theta at the end, `None` where numbers leave the range
+/// of a double.
+pub fn pass<E: Exponent>(
+    curve: &Curve<E>,
+    start: Start,
     rtol: f64,
     reach: f64,
     effort: &mut Effort,
     mut visit: impl FnMut(&Resolved),
 ) -> Option<f64> {
     let rule = radau();
-    let (mut v, mut theta, mut rate) = (v_i, 1.0 / v_i, 0.0);
+    let Start { mut v, mut theta, mut rate } = start;
     // Slip since theta last left the slow solution, and by which share: at the start, or where v changes too fast.
-    let (mut slip, mut off) = (0.0, lag(curve, Side::Start, 0.0, v_i));
+    let (mut slip, mut off) = (0.0, if rate == 0.0 { lag(curve, Side::Start, 0.0, v) } else { 1.0 });
     let mut count = 0;
     effort.quadratures += 1;
     for stretch in curve.stretches().forward() {
@@ -85,9 +104,9 @@ pub(super) fn pass(
 
 /// The relative change of v in the time in which theta follows: how far theta is from `1/v`, relative, where it
 /// follows.
-fn lag(curve: &Curve, side: Side, d: f64, v: f64) -> f64 {
-    let (x, z) = Curve::place(side, d);
-    curve.slope(x, z).abs() * (v - 1.0) / (v * v * curve.t_f)
+fn lag<E: Exponent>(curve: &Curve<E>, side: Side, d: f64, v: f64) -> f64 {
+    let (x, z) = place(side, d);
+    curve.exponent.slope(x, z).abs() * (v - curve.floor) / (v * v * curve.t_f)
 }
 
 /// Greatest lag at which theta follows v without leaving the slow solution: what it leaves it by is exponentially small
@@ -101,12 +120,12 @@ const STIFF: f64 = 0.6;
     "x86_64+avx+avx2+bmi1+bmi2+avx512f+avx512bw+avx512cd+avx512dq+avx512vl",
     "x86_64+avx+avx2+bmi1+bmi2"
 ))]
-fn resolve(curve: &Curve, panel: Panel, start: [f64; 3], stiff: bool, rule: &Radau) -> (Resolved, f64) {
+fn resolve<E: Exponent>(curve: &Curve<E>, panel: Panel, start: [f64; 3], stiff: bool, rule: &Radau) -> (Resolved, f64) {
     let [v_start, theta_start, rate_start] = start;
-    let (x, z) = Curve::places(&panel, rule);
+    let (x, z) = places(&panel, rule);
     let (w, _) = curve.surpluses(&x, &z);
     let h = curve.t_f * (panel.to - panel.from).abs();
-    let v = w.map(|w| 1.0 + w);
+    let v = w.map(|w| curve.floor + w);
     let slip = rule.integrals(&v).map(|slip| h * slip);
     let (mut theta, mut rate) = ([0.0; NODES], [0.0; NODES]);
     if stiff {
@@ -169,14 +188,14 @@ fn collocate(rule: &Radau, h: f64, v: &Nodes, theta_start: f64) -> Nodes {
 
 impl Resolved {
     /// Duration of the panel.
-    fn duration(&self, curve: &Curve) -> f64 {
+    pub fn duration<E: Exponent>(&self, curve: &Curve<E>) -> f64 {
         curve.t_f * (self.panel.to - self.panel.from).abs()
     }
 
     /// `x` and `z` at a share `u` of the panel.
     #[inline(always)]
     pub fn place(&self, u: f64) -> (f64, f64) {
-        Curve::place(self.panel.side, self.panel.from * (1.0 - u) + self.panel.to * u)
+        place(self.panel.side, self.panel.from * (1.0 - u) + self.panel.to * u)
     }
 
     /// Theta at a share `u` of the panel.
@@ -184,8 +203,27 @@ impl Resolved {
         radau().interpolate(self.theta_start, &self.theta, u)
     }
 
+    /// `theta'` at a share `u` of the panel.
+    pub fn rate(&self, u: f64) -> f64 {
+        radau().interpolate(self.rate_start, &self.rate, u)
+    }
+
+    /// The nodes, as shares of the panel, with theta and `theta'`.
+    pub fn nodes(&self) -> impl Iterator<Item = (f64, f64, f64)> {
+        radau().u.into_iter().zip(self.theta).zip(self.rate).map(|((u, theta), rate)| (u, theta, rate))
+    }
+
+    /// Work of friction on the panel.
+    pub fn work<E: Exponent>(&self, law: &Law, curve: &Curve<E>) -> f64 {
+        let mut power = radau().w;
+        for ((power, &v), &theta) in power.iter_mut().zip(&self.v).zip(&self.theta) {
+            *power *= friction_at(law, v, theta) * v;
+        }
+        self.duration(curve) * total(&power)
+    }
+
     /// Adds the work of the panel, and raises the greatest friction to what is found on it, good to `rtol`.
-    pub fn gather(&self, law: &Law, curve: &Curve, rtol: f64, passage: &mut Passage) {
+    pub fn gather<E: Exponent>(&self, law: &Law, curve: &Curve<E>, rtol: f64, passage: &mut Passage) {
         let rule = radau();
         let (friction, rise, power) = frictions(law, curve, self, rule);
         passage.work += self.duration(curve) * power;
@@ -212,25 +250,24 @@ impl Resolved {
 
     /// `dtau/du = a v'/v + b theta'/theta`.
     #[inline(always)]
-    fn rise(&self, law: &Law, curve: &Curve, u: f64, v: f64, theta: f64, rate: f64) -> f64 {
+    fn rise<E: Exponent>(&self, law: &Law, curve: &Curve<E>, u: f64, v: f64, theta: f64, rate: f64) -> f64 {
         let (x, z) = self.place(u);
         let length = (self.panel.to - self.panel.from).abs();
-        length * (law.a * curve.slope(x, z) * (1.0 - 1.0 / v) + law.b * curve.t_f * rate / theta)
+        length * (law.a * curve.exponent.slope(x, z) * (1.0 - curve.floor / v) + law.b * curve.t_f * rate / theta)
     }
 
     /// The greatest friction between two samples where it first rises and then falls: the root of `tau'` by the
     /// Illinois method.
-    fn summit(&self, law: &Law, curve: &Curve, rtol: f64, mut low: Sample, mut high: Sample) -> f64 {
-        let rule = radau();
+    fn summit<E: Exponent>(&self, law: &Law, curve: &Curve<E>, rtol: f64, mut low: Sample, mut high: Sample) -> f64 {
         let mut greatest = low.friction.max(high.friction);
         let (mut rise_low, mut rise_high) = (low.rise, high.rise);
         let mut last = 0.0;
         for _ in 0..MOST_STEPS {
             let u = low.u + (high.u - low.u) * (rise_low / (rise_low - rise_high));
             let theta = self.theta(u);
-            let rate = rule.interpolate(self.rate_start, &self.rate, u);
+            let rate = self.rate(u);
             let (x, z) = self.place(u);
-            let v = 1.0 + curve.w_f * exp(curve.exponent(x, z));
+            let v = curve.floor + curve.w_f * exp(curve.exponent.value(x, z));
             let rise = self.rise(law, curve, u, v, theta, rate);
             let friction = friction_at(law, v, theta);
             greatest = greatest.max(friction);
@@ -267,7 +304,7 @@ const MOST_STEPS: u32 = 60;
 
 /// `tau = 1 + a ln v + b ln theta`.
 #[inline(always)]
-pub(super) fn friction_at(law: &Law, v: f64, theta: f64) -> f64 {
+pub fn friction_at(law: &Law, v: f64, theta: f64) -> f64 {
     1.0 + law.a * ln(v) + law.b * ln(theta)
 }
 
@@ -276,7 +313,7 @@ pub(super) fn friction_at(law: &Law, v: f64, theta: f64) -> f64 {
     "x86_64+avx+avx2+bmi1+bmi2+avx512f+avx512bw+avx512cd+avx512dq+avx512vl",
     "x86_64+avx+avx2+bmi1+bmi2"
 ))]
-fn frictions(law: &Law, curve: &Curve, resolved: &Resolved, rule: &Radau) -> (Nodes, Nodes, f64) {
+fn frictions<E: Exponent>(law: &Law, curve: &Curve<E>, resolved: &Resolved, rule: &Radau) -> (Nodes, Nodes, f64) {
     let Resolved { v, theta, rate, .. } = resolved;
     let (mut tau, mut rise, mut power) = ([0.0; NODES], [0.0; NODES], [0.0; NODES]);
     for j in 0..NODES {

@@ -1,0 +1,116 @@
+//! The control velocity under which a block on a spring follows a protocol, `v_c = v + (tau' + m v'')/k`.
+//!
+//! The spring pulls with `k s = tau + m v'` and grows by `s' = v_c - v` (docs/theory.md, "Finite stiffness"). Every
+//! derivative is analytic.
+
+use crate::model::Law;
+use crate::numerics::elementary::ln;
+
+/// A block on a spring under friction.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Slider {
+    /// The friction law.
+    pub law: Law,
+    /// Stiffness of the spring, `k > 0`; infinite for a rigid one.
+    pub k: f64,
+    /// Mass of the block, `m >= 0`.
+    pub m: f64,
+}
+
+/// A moment of a smooth protocol, with its derivatives in time.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Jet {
+    /// `v`, `v'`, `v''`, `v'''`.
+    pub v: [f64; 4],
+    /// Contact lifetime.
+    pub theta: f64,
+    /// `theta' = 1 - theta v`, accurate where it is small beside 1.
+    pub rate: f64,
+}
+
+impl Slider {
+    /// Friction.
+    pub fn friction(&self, jet: &Jet) -> f64 {
+        1.0 + self.law.a * ln(jet.v[0]) + self.law.b * ln(jet.theta)
+    }
+
+    /// What the spring pulls with, `k s = tau + m v'`.
+    pub fn pull(&self, jet: &Jet) -> f64 {
+        self.friction(jet) + self.m * jet.v[1]
+    }
+
+    /// `v_c` and `v_c'`.
+    pub fn control(&self, jet: &Jet) -> [f64; 2] {
+        let [v, v1, v2, v3] = jet.v;
+        if self.k == f64::INFINITY {
+            return [v, v1];
+        }
+        // Derivatives of ln v and ln theta.
+        let (q1, y1) = (v1 / v, jet.rate / jet.theta);
+        let (q2, y2) = (v2 / v - q1 * q1, -(y1 / jet.theta + v1));
+        let Law { a, b } = self.law;
+        [v + (a * q1 + b * y1 + self.m * v2) / self.k, v1 + (a * q2 + b * y2 + self.m * v3) / self.k]
+    }
+}
+
+/// The range of something along a protocol, its turns found from its slope.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Extent {
+    /// Least value so far.
+    pub low: f64,
+    /// Greatest value so far.
+    pub high: f64,
+}
+
+/// More steps than a bracket between two nodes takes.
+const MOST_STEPS: u32 = 60;
+
+impl Extent {
+    /// Of nothing.
+    pub const NONE: Extent = Extent { low: f64::INFINITY, high: f64::NEG_INFINITY };
+
+    /// Takes in a value.
+    pub fn add(&mut self, value: f64) {
+        self.low = self.low.min(value);
+        self.high = self.high.max(value);
+    }
+
+    /// Takes in the turn between two places `(u, [value, slope])` whose slopes differ in sign, good to `rtol` of the
+    /// range; `at(u)` tells the value and the slope. Illinois method on the slope.
+    pub fn turn(
+        &mut self,
+        (mut u_0, [value_0, mut slope_0]): (f64, [f64; 2]),
+        (mut u_1, [value_1, mut slope_1]): (f64, [f64; 2]),
+        rtol: f64,
+        at: impl Fn(f64) -> [f64; 2],
+    ) {
+        self.add(value_0);
+        self.add(value_1);
+        // The tangents bound the turn.
+        let width = u_1 - u_0;
+        let (ahead, behind) = (value_0 + slope_0 * width, value_1 - slope_1 * width);
+        let inside = |value: f64| value >= self.low && value <= self.high;
+        if slope_0 * slope_1 >= 0.0 || (inside(ahead) && inside(behind)) {
+            return;
+        }
+        let mut last = 0.0;
+        for _ in 0..MOST_STEPS {
+            let u = u_0 + (u_1 - u_0) * (slope_0 / (slope_0 - slope_1));
+            let [value, slope] = at(u);
+            self.add(value);
+            // What is left to gain is less than the slope over the bracket.
+            if slope.abs() * (u_1 - u_0) <= 0.1 * rtol * self.high.abs().max(self.low.abs()) {
+                break;
+            }
+            if (slope > 0.0) == (slope_0 > 0.0) {
+                (u_0, slope_0) = (u, slope);
+                slope_1 *= if last > 0.0 { 0.5 } else { 1.0 };
+                last = 1.0;
+            } else {
+                (u_1, slope_1) = (u, slope);
+                slope_0 *= if last < 0.0 { 0.5 } else { 1.0 };
+                last = -1.0;
+            }
+        }
+    }
+}
