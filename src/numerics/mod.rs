@@ -9,4 +9,5 @@ pub mod lanes;
 pub mod polynomial;
 pub mod radau;
 pub mod root;
+pub mod stiff;
 pub mod turning;

@@ -67,25 +67,35 @@ pub fn radau() -> &'static Radau {
     RADAU.get_or_init(make)
 }
 
-/// Newton's method on `P_n - P_(n-1)`, the last step in double-double.
+/// The nodes of the method with `S` stages on `[0, 1]`, rising: Newton's method on `P_S - P_(S-1)` in double-double.
+pub(super) fn nodes<const S: usize>() -> [DoubleDouble; S] {
+    let (one, half) = (DoubleDouble::new(1.0), DoubleDouble::new(0.5));
+    let count = DoubleDouble::new(S as f64);
+    std::array::from_fn(|i| {
+        if i == S - 1 {
+            return one;
+        }
+        let turn = 2.0 * std::f64::consts::PI * (S - 1 - i) as f64 / (2.0 * S as f64 - 1.0);
+        let mut x = DoubleDouble::new(libm::cos(turn));
+        for _ in 0..8 {
+            let mut p = [DoubleDouble::new(0.0), one, x];
+            for m in 2..=S {
+                p = [p[1], p[2], next(m, x, p[2], p[1])];
+            }
+            // (1 - x^2) (P_n - P_(n-1))' from DLMF 18.9.17.
+            let slope = count * (p[1] - x * p[2]) - (count - one) * (p[0] - x * p[1]);
+            x = x - (p[2] - p[1]) * (one - x * x) / slope;
+        }
+        half * (one + x)
+    })
+}
+
 fn make() -> Radau {
     let one = DoubleDouble::new(1.0);
     let half = DoubleDouble::new(0.5);
     let n = NODES as f64;
-    let mut nodes = [one; NODES];
-    for (i, node) in nodes.iter_mut().enumerate().take(NODES - 1) {
-        let turn = 2.0 * std::f64::consts::PI * (NODES - 1 - i) as f64 / (2.0 * n - 1.0);
-        let mut x = DoubleDouble::new(libm::cos(turn));
-        for _ in 0..8 {
-            // (1 - x^2) (P_n - P_(n-1))' from DLMF 18.9.17.
-            let p = legendre(x);
-            let (p0, p1, p2) = (p[NODES - 2], p[NODES - 1], p[NODES]);
-            let count = DoubleDouble::new(n);
-            let slope = count * (p1 - x * p2) - (count - one) * (p0 - x * p1);
-            x = x - (p2 - p1) * (one - x * x) / slope;
-        }
-        *node = x;
-    }
+    let u = nodes::<NODES>();
+    let nodes = u.map(|u| u + u - one);
     let polynomials = nodes.map(legendre);
     let count = DoubleDouble::new(n * n);
     let mut rule = Radau {
@@ -98,8 +108,8 @@ fn make() -> Radau {
     for k in 0..NODES {
         let last = polynomials[k][NODES - 1];
         let weight = half * (one + nodes[k]) / (count * last * last);
-        rule.u[k] = (half * (one + nodes[k])).high;
-        rule.rest[k] = (half * (one - nodes[k])).high;
+        rule.u[k] = u[k].high;
+        rule.rest[k] = (one - u[k]).high;
         rule.w[k] = weight.high;
         for j in 0..NODES {
             // int_-1^x P_m = (P_(m+1) - P_(m-1))/(2m + 1); the rule keeps the P_m orthogonal up to m = n - 1.
@@ -120,14 +130,18 @@ fn make() -> Radau {
     rule
 }
 
-/// `P_0 … P_n` by the three-term recurrence (DLMF 18.9.1).
+/// `P_0 … P_n`.
 fn legendre(x: DoubleDouble) -> [DoubleDouble; NODES + 1] {
     let mut p = [DoubleDouble::new(1.0); NODES + 1];
     p[1] = x;
     for m in 2..=NODES {
-        let k = m as f64;
-        p[m] = (DoubleDouble::new(2.0 * k - 1.0) * x * p[m - 1] - DoubleDouble::new(k - 1.0) * p[m - 2])
-            / DoubleDouble::new(k);
+        p[m] = next(m, x, p[m - 1], p[m - 2]);
     }
     p
+}
+
+/// `P_m` from the two before it (DLMF 18.9.1).
+fn next(m: usize, x: DoubleDouble, last: DoubleDouble, before: DoubleDouble) -> DoubleDouble {
+    let k = m as f64;
+    (DoubleDouble::new(2.0 * k - 1.0) * x * last - DoubleDouble::new(k - 1.0) * before) / DoubleDouble::new(k)
 }

@@ -1,0 +1,444 @@
+//! Steps, their error, and how long the next one may be.
+
+#![expect(clippy::needless_range_loop, reason = "matrices are written with the indices of their formulas")]
+
+use super::blocks::{Factors, Square, inverse};
+use super::collocation::Collocation;
+use super::piece::Piece;
+use super::{Points, System};
+use crate::numerics::double_double::DoubleDouble;
+use crate::numerics::elementary::{exp, ln};
+
+/// How exact an integration is to be.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Accuracy<const N: usize> {
+    /// Error that a step may add, in units of `scale`: `1e-13` to `1e-2`.
+    pub tolerance: f64,
+    /// What counts as an error of size 1 in each variable; positive.
+    pub scale: [f64; N],
+}
+
+/// What an integration has cost; exact and the same on every machine.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Cost {
+    /// Steps taken.
+    pub steps: u32,
+    /// Steps given up, for their error or for Newton's method.
+    pub rejected: u32,
+    /// Evaluations of the equations: at all stages at once, or at the start for the error.
+    pub evaluations: u32,
+    /// Factorisations.
+    pub factorisations: u32,
+}
+
+/// Why an integration cannot go on.
+#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+pub enum Failure {
+    /// No step is short enough: the solution ends here, most often because it becomes infinite.
+    #[error("the solution ends at t = {t}: no step is short enough")]
+    Ends {
+        /// Where.
+        t: f64,
+    },
+}
+
+/// An integration under way: Radau IIA with `S` stages, order `2 S - 1`, over `N` variables.
+#[derive(Debug, Clone)]
+pub struct Integrator<'a, Y, const N: usize, const S: usize> {
+    system: &'a Y,
+    rule: &'static Collocation<S>,
+    accuracy: Accuracy<N>,
+    /// Greatest error estimate of a step, in units of `scale`.
+    allowed: f64,
+    /// With 32 digits, so that short steps add up after a long rest.
+    t: DoubleDouble,
+    y: [f64; N],
+    /// Length proposed for the next step.
+    h: f64,
+    last: Option<Last<N, S>>,
+    cost: Cost,
+}
+
+/// The last step, with its error estimate relative to what was allowed.
+#[derive(Debug, Clone, Copy)]
+struct Last<const N: usize, const S: usize> {
+    piece: Piece<N, S>,
+    error: f64,
+}
+
+/// Newton iterations before a step is given up.
+const MOST_ITERATIONS: u32 = 12;
+
+/// Share of the tolerance that is left to Newton's method.
+const NEWTON_SHARE: f64 = 0.01;
+
+/// The matrix is made anew where an iteration leaves more than this share of the error.
+const SLOW: f64 = 0.1;
+
+impl<'a, Y: System<N>, const N: usize, const S: usize> Integrator<'a, Y, N, S> {
+    /// Starts at `y(t)`, which meets the constraints, with a first step of about `h > 0`.
+    pub fn new(
+        system: &'a Y,
+        rule: &'static Collocation<S>,
+        accuracy: Accuracy<N>,
+        t: f64,
+        y: [f64; N],
+        h: f64,
+    ) -> Self {
+        // The estimate is of order S, the error of order 2 S - 1.
+        let share = (S + 1) as f64 / (2 * S) as f64;
+        let allowed = exp(share * ln(accuracy.tolerance));
+        let (t, cost) = (DoubleDouble::new(t), Cost::default());
+        Integrator { system, rule, accuracy, allowed, t, y, h, last: None, cost }
+    }
+
+    /// Time reached.
+    pub fn t(&self) -> f64 {
+        self.t.high
+    }
+
+    /// Variables there.
+    pub fn y(&self) -> &[f64; N] {
+        &self.y
+    }
+
+    /// Length proposed for the next step: a first step for an integration that takes over from here.
+    pub fn proposal(&self) -> f64 {
+        self.h
+    }
+
+    /// What it has cost so far.
+    pub fn cost(&self) -> Cost {
+        self.cost
+    }
+
+    /// One step, which ends at `limit` at the latest (and then exactly there).
+    #[inline(always)]
+    pub fn step(&mut self, limit: f64) -> Result<Piece<N, S>, Failure> {
+        loop {
+            let left = (DoubleDouble::new(limit) - self.t).high;
+            let cut = self.h >= left;
+            let h = if cut { left } else { self.h };
+            let t_end = if cut { DoubleDouble::new(limit) } else { self.t + DoubleDouble::new(h) };
+            let advances = h > 0.0 && t_end != self.t;
+            if !advances {
+                return Err(Failure::Ends { t: self.t.high });
+            }
+            let guess = self.guess(h);
+            let start = self.y;
+            let solved = self.stages(self.t.high, &start, h, guess);
+            let tried = solved.and_then(|solved| Some((solved, self.error(h, &solved.change)? / self.allowed)));
+            let Some((Solved { change, iterations }, error)) = tried else {
+                self.cost.rejected += 1;
+                self.h = 0.3 * h;
+                continue;
+            };
+            let factor = self.factor(h, error, iterations);
+            if error > 1.0 {
+                self.cost.rejected += 1;
+                self.h = h * if self.last.is_none() { 0.1 } else { factor.clamp(0.1, 0.8) };
+                continue;
+            }
+            let next = h * factor.clamp(0.2, 8.0);
+            self.h = if cut { next.max(self.h) } else { next };
+            let piece = Piece::new(self.rule, self.t.high, h, self.y, &change);
+            (self.t, self.y) = (t_end, piece.end);
+            self.last = Some(Last { piece, error });
+            self.cost.steps += 1;
+            return Ok(piece);
+        }
+    }
+
+    /// The first part of a step that was taken, up to the share `u` of it: a step of its own, so its end has the order
+    /// of the method. `None` if Newton's method fails.
+    #[inline(always)]
+    pub fn part(&mut self, piece: &Piece<N, S>, u: f64) -> Option<Piece<N, S>> {
+        let h = u * piece.h;
+        let guess = std::array::from_fn(|r| std::array::from_fn(|i| piece.change(r, u * self.rule.nodes[i])));
+        let solved = self.stages(piece.t, &piece.start, h, guess)?;
+        Some(Piece::new(self.rule, piece.t, h, piece.start, &solved.change))
+    }
+
+    /// How much longer the next step may be: the predictive controller (Gustafsson, ACM TOMS 20, 496, 1994).
+    #[inline(always)]
+    fn factor(&self, h: f64, error: f64, iterations: u32) -> f64 {
+        let order = (S + 1) as f64;
+        let safety = 0.9 * f64::from(2 * MOST_ITERATIONS + 1) / f64::from(2 * MOST_ITERATIONS + iterations);
+        let level = ln(error.max(1e-10));
+        let factor = safety * exp(-level / order);
+        match &self.last {
+            Some(last) if error <= 1.0 => {
+                let before = ln(last.error.max(1e-2));
+                factor.min(safety * (h / last.piece.h) * exp((before - 2.0 * level) / order))
+            }
+            _ => factor,
+        }
+    }
+
+    /// Changes at the nodes as the last step's polynomial foresees them.
+    #[inline(always)]
+    fn guess(&self, h: f64) -> [[f64; S]; N] {
+        let Some(Last { piece, .. }) = &self.last else { return [[0.0; S]; N] };
+        let share = h / piece.h;
+        std::array::from_fn(|r| {
+            let end = piece.end[r] - piece.start[r];
+            std::array::from_fn(|i| piece.change(r, 1.0 + share * self.rule.nodes[i]) - end)
+        })
+    }
+
+    /// Newton's method for the changes at the nodes; `None` if it fails.
+    #[inline(always)]
+    fn stages(&mut self, t: f64, y: &[f64; N], h: f64, mut change: [[f64; S]; N]) -> Option<Solved<N, S>> {
+        let scale = self.accuracy.scale;
+        let enough = NEWTON_SHARE * self.accuracy.tolerance;
+        // Changes of the last bits of the variables cannot be iterated away.
+        let rounding = (0..N).fold(0.0_f64, |most, r| most.max(16.0 * f64::EPSILON * y[r].abs() / scale[r]));
+        let mut factors: Option<Factors<N, S>> = None;
+        let mut before = f64::NAN;
+        for iterations in 1..=MOST_ITERATIONS {
+            let at = self.system.linearise(&self.points(t, y, h, &change));
+            self.cost.evaluations += 1;
+            let matrix = match factors {
+                Some(factors) => factors,
+                None => {
+                    self.cost.factorisations += 1;
+                    Factors::new(self.rule, h, &at)?
+                }
+            };
+            let mut delta = at.residual;
+            matrix.solve(&mut delta);
+            let mut size = 0.0_f64;
+            for r in 0..N {
+                for i in 0..S {
+                    change[r][i] += delta[r][i];
+                    let part = (delta[r][i] / scale[r]).abs();
+                    // Keeps NaN.
+                    size = if part <= size { size } else { part };
+                }
+            }
+            if !size.is_finite() {
+                return None;
+            }
+            // NaN at first.
+            let rate = size / before;
+            let converged = rate < 1.0 && size * rate / (1.0 - rate) <= enough;
+            let rounded = rate >= 0.5 && size <= rounding.max(enough);
+            if converged || rounded || size <= 0.01 * enough {
+                return Some(Solved { change, iterations });
+            }
+            if rate >= 2.0 {
+                return None;
+            }
+            // An equation changes with its variables at a rate of order 1 in their scales, or it will show.
+            let foreseen = if iterations == 1 { size } else { rate };
+            factors = (foreseen <= SLOW).then_some(matrix);
+            before = size;
+        }
+        None
+    }
+
+    /// The stages at `change` from `y`.
+    #[inline(always)]
+    fn points(&self, t: f64, y: &[f64; N], h: f64, change: &[[f64; S]; N]) -> Points<N, S> {
+        let mut points = Points { t: [0.0; S], y: [[0.0; S]; N], slope: [[0.0; S]; N] };
+        for i in 0..S {
+            points.t[i] = t + h * self.rule.nodes[i];
+        }
+        for r in 0..N {
+            for i in 0..S {
+                points.y[r][i] = y[r] + change[r][i];
+                let mut sum = 0.0;
+                for j in 0..S {
+                    sum += self.rule.differentiation[i][j] * change[r][j];
+                }
+                points.slope[r][i] = sum / h;
+            }
+        }
+        points
+    }
+
+    /// Error estimate of a step: the polynomial meets the equations at the nodes, but not at the start. Its defect there
+    /// goes through `(mass/(gamma h) - J)^-1`, which damps what is stiff (Hairer and Wanner, section IV.8).
+    #[inline(always)]
+    fn error(&mut self, h: f64, change: &[[f64; S]; N]) -> Option<f64> {
+        // About the inverse of the real eigenvalue of the method's inverse matrix.
+        let gamma = 1.0 / (S + 1) as f64;
+        let mut points = Points { t: [self.t.high], y: [[0.0]; N], slope: [[0.0]; N] };
+        for r in 0..N {
+            let mut sum = 0.0;
+            for j in 0..S {
+                sum += self.rule.start_slope[j] * change[r][j];
+            }
+            points.y[r][0] = self.y[r];
+            points.slope[r][0] = sum / h;
+        }
+        let at = self.system.linearise(&points);
+        self.cost.evaluations += 1;
+        let matrix: Square<N> = std::array::from_fn(|r| {
+            std::array::from_fn(|c| {
+                let inertia = if r == c { at.mass[r][0] / (gamma * h) } else { 0.0 };
+                inertia - at.jacobian[r][c][0]
+            })
+        });
+        let inverse = inverse(matrix)?;
+        let mut size = 0.0_f64;
+        for r in 0..N {
+            let mut sum = 0.0;
+            for c in 0..N {
+                sum += inverse[r][c] * at.residual[c][0];
+            }
+            let part = (sum / self.accuracy.scale[r]).abs();
+            size = if part <= size { size } else { part };
+        }
+        size.is_finite().then_some(size)
+    }
+}
+
+/// Changes at the nodes, and the iterations that they took.
+#[derive(Debug, Clone, Copy)]
+struct Solved<const N: usize, const S: usize> {
+    change: [[f64; S]; N],
+    iterations: u32,
+}
+
+#[cfg(test)]
+mod tests {
+    //! Order, stiffness, constraints, the error got for the error asked, and the work, exactly.
+
+    use super::*;
+    use crate::numerics::stiff::{Linearised, radau_iia_5, radau_iia_9, radau_iia_13};
+
+    /// `e^(w/4) c' = -e^(w/4) s`, `s' = c` and the constraint `w = c s`: a rotation.
+    struct Rotation;
+
+    impl System<3> for Rotation {
+        fn linearise<const L: usize>(&self, points: &Points<3, L>) -> Linearised<3, L> {
+            let mut at = Linearised { residual: [[0.0; L]; 3], mass: [[0.0; L]; 3], jacobian: [[[0.0; L]; 3]; 3] };
+            for i in 0..L {
+                let [c, s, w] = [0, 1, 2].map(|r: usize| points.y[r][i]);
+                let mass = exp(0.25 * w);
+                (at.mass[0][i], at.mass[1][i]) = (mass, 1.0);
+                at.residual[0][i] = mass * (-s - points.slope[0][i]);
+                at.residual[1][i] = c - points.slope[1][i];
+                at.residual[2][i] = w - c * s;
+                (at.jacobian[0][1][i], at.jacobian[0][2][i]) = (-mass, 0.25 * at.residual[0][i]);
+                at.jacobian[1][0][i] = 1.0;
+                (at.jacobian[2][0][i], at.jacobian[2][1][i], at.jacobian[2][2][i]) = (-s, -c, 1.0);
+            }
+            at
+        }
+    }
+
+    /// Greatest error at time `end` after steps of equal length.
+    fn error_of_equal_steps<const S: usize>(rule: &'static Collocation<S>, end: f64, steps: u32) -> f64 {
+        let accuracy = Accuracy { tolerance: 1e-13, scale: [1.0; 3] };
+        let mut integrator = Integrator::new(&Rotation, rule, accuracy, 0.0, [1.0, 0.0, 0.0], 1.0);
+        let h = end / f64::from(steps);
+        for _ in 0..steps {
+            let y = integrator.y;
+            let solved = integrator.stages(0.0, &y, h, [[0.0; S]; 3]).expect("converges");
+            integrator.y = Piece::new(rule, 0.0, h, y, &solved.change).end;
+        }
+        let (sin, cos) = libm::sincos(end);
+        let exact = [cos, sin, sin * cos];
+        (0..3).map(|r| (integrator.y[r] - exact[r]).abs()).fold(0.0, f64::max)
+    }
+
+    fn assert_order<const S: usize>(rule: &'static Collocation<S>, h: f64) {
+        let (coarse, fine) = (error_of_equal_steps(rule, 12.0 * h, 12), error_of_equal_steps(rule, 12.0 * h, 24));
+        let order = libm::log2(coarse / fine);
+        let expected = (2 * S - 1) as f64;
+        assert!((order - expected).abs() < 0.11, "{S} stages: order {order}, errors {coarse:.1e} {fine:.1e}");
+    }
+
+    #[test]
+    fn order_is_that_of_the_method() {
+        assert_order(radau_iia_5(), 0.5);
+        assert_order(radau_iia_9(), 0.5);
+        assert_order(radau_iia_13(), 1.5);
+    }
+
+    /// `y' = -1e9 (y - cos t)`, and `x' = -y`: `x = -sin t - 1e-9 (2 - cos t)` after the layer.
+    struct Follower;
+
+    impl System<2> for Follower {
+        fn linearise<const L: usize>(&self, points: &Points<2, L>) -> Linearised<2, L> {
+            let rate = 1e9;
+            let mut at = Linearised { residual: [[0.0; L]; 2], mass: [[1.0; L]; 2], jacobian: [[[0.0; L]; 2]; 2] };
+            for i in 0..L {
+                at.residual[0][i] = -points.y[1][i] - points.slope[0][i];
+                at.residual[1][i] = -rate * (points.y[1][i] - libm::cos(points.t[i])) - points.slope[1][i];
+                (at.jacobian[0][1][i], at.jacobian[1][1][i]) = (-1.0, -rate);
+            }
+            at
+        }
+    }
+
+    fn follow(tolerance: f64) -> (f64, Cost) {
+        let accuracy = Accuracy { tolerance, scale: [1.0; 2] };
+        let mut integrator = Integrator::new(&Follower, radau_iia_9(), accuracy, 0.0, [0.0, 2.0], 1e-3);
+        while integrator.t() < 10.0 {
+            integrator.step(10.0).expect("goes on");
+        }
+        assert_eq!(integrator.t(), 10.0);
+        ((integrator.y()[0] + libm::sin(10.0) + 1e-9 * (2.0 - libm::cos(10.0))).abs(), integrator.cost())
+    }
+
+    #[test]
+    fn error_got_is_the_error_asked_through_a_layer_of_1e_9() {
+        for digits in 3..=11 {
+            let tolerance = libm::pow(10.0, -f64::from(digits));
+            let (error, _) = follow(tolerance);
+            assert!(error <= tolerance, "{error:.1e} at {tolerance:.0e}");
+        }
+    }
+
+    #[test]
+    fn work_is_known_exactly() {
+        let (_, cost) = follow(1e-8);
+        assert_eq!(cost, Cost { steps: 28, rejected: 7, evaluations: 105, factorisations: 42 });
+    }
+
+    /// `y' = e^y`, which is infinite at `t = e^-y(0)`.
+    struct Burst;
+
+    impl System<1> for Burst {
+        fn linearise<const L: usize>(&self, points: &Points<1, L>) -> Linearised<1, L> {
+            let rate = points.y[0].map(exp);
+            let mut at = Linearised { residual: [rate], mass: [[1.0; L]], jacobian: [[rate]] };
+            for i in 0..L {
+                at.residual[0][i] -= points.slope[0][i];
+            }
+            at
+        }
+    }
+
+    #[test]
+    fn solution_that_ends_is_told_where() {
+        let accuracy = Accuracy { tolerance: 1e-10, scale: [1.0] };
+        let mut integrator = Integrator::new(&Burst, radau_iia_9(), accuracy, 0.0, [0.0], 0.1);
+        let failure = loop {
+            if let Err(failure) = integrator.step(2.0) {
+                break failure;
+            }
+        };
+        let Failure::Ends { t } = failure;
+        assert!((t - 1.0).abs() < 1e-10, "{failure}");
+        assert_eq!(integrator.cost().steps, 280);
+    }
+
+    #[test]
+    fn part_of_a_step_has_the_order_of_the_method() {
+        let accuracy = Accuracy { tolerance: 1e-6, scale: [1.0; 3] };
+        let mut integrator = Integrator::new(&Rotation, radau_iia_9(), accuracy, 0.0, [1.0, 0.0, 0.0], 0.1);
+        let (mut dense, mut exact) = (0.0_f64, 0.0_f64);
+        while integrator.t() < 6.0 {
+            let piece = integrator.step(6.0).expect("goes on");
+            let part = integrator.part(&piece, 0.4).expect("converges");
+            let cos = libm::cos(piece.t + 0.4 * piece.h);
+            dense = dense.max((piece.value(0, 0.4) - cos).abs());
+            exact = exact.max((part.end[0] - cos).abs());
+        }
+        assert!(exact < 1e-6 && exact < 0.1 * dense, "{dense:.1e} {exact:.1e}");
+    }
+}

@@ -1,0 +1,55 @@
+//! Stiff initial value problems of a few variables: Radau IIA collocation of order 5, 9 or 13, on the stack.
+//!
+//! A [`System`] is a set of equations `mass y' = f(t, y)`, masses of 0 allowed (constraints of index 1), that gives its
+//! residual and its Jacobian at several points at once. An [`Integrator`] takes steps along a solution; each is a
+//! [`Piece`], the collocation polynomial.
+//!
+//! ```
+//! use slipsweep::numerics::elementary::exp;
+//! use slipsweep::numerics::stiff::{Accuracy, Integrator, Linearised, Points, System, radau_iia_9};
+//!
+//! /// `y' = -1000 (y - e^-t)`.
+//! struct Follower;
+//!
+//! impl System<1> for Follower {
+//!     fn linearise<const L: usize>(&self, points: &Points<1, L>) -> Linearised<1, L> {
+//!         let mut at = Linearised { residual: [[0.0; L]], mass: [[1.0; L]], jacobian: [[[-1000.0; L]]] };
+//!         for i in 0..L {
+//!             at.residual[0][i] = -1000.0 * (points.y[0][i] - exp(-points.t[i])) - points.slope[0][i];
+//!         }
+//!         at
+//!     }
+//! }
+//!
+//! let accuracy = Accuracy { tolerance: 1e-8, scale: [1.0] };
+//! let mut integrator = Integrator::new(&Follower, radau_iia_9(), accuracy, 0.0, [0.0], 1e-3);
+//! while integrator.t() < 1.0 {
+//!     let piece = integrator.step(1.0)?;
+//!     // Dense output: variable 0 half way along the step.
+//!     let _half_way = piece.value(0, 0.5);
+//! }
+//! assert!((integrator.y()[0] - exp(-1.0) * 1000.0 / 999.0).abs() < 1e-8);
+//! # Ok::<(), slipsweep::numerics::stiff::Failure>(())
+//! ```
+//!
+//! Where the equations jump (a control that is sampled and held), end a step there, and go on with a new integrator
+//! whose first step is the old one's [`Integrator::proposal`]. Where a number is needed inside a step to the order of the
+//! method, as for an event, [`Integrator::part`] integrates again up to there.
+//!
+//! # Method
+//!
+//! The stages are solved by Newton's method with the Jacobian of every stage at its own place, so long steps through
+//! strong nonlinearities converge; the matrix is eliminated variable by variable ([`System`] says in which order), which
+//! costs about as much as one iteration of the usual frozen and diagonalised form. The last step's polynomial,
+//! continued, is the first guess.
+
+mod blocks;
+mod collocation;
+mod integrator;
+mod piece;
+mod system;
+
+pub use collocation::{Collocation, radau_iia_5, radau_iia_9, radau_iia_13};
+pub use integrator::{Accuracy, Cost, Failure, Integrator};
+pub use piece::Piece;
+pub use system::{Linearised, Points, System};

@@ -1,0 +1,65 @@
+//! Dense output: the collocation polynomial of one step.
+
+use super::collocation::Collocation;
+
+/// The solution over one step, a polynomial of degree `S`: it meets the equations at the `S` nodes.
+///
+/// At the end it is good to the order of the method, `2 S - 1`; between, to order `S`.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Piece<const N: usize, const S: usize> {
+    /// Time at its start.
+    pub t: f64,
+    /// Duration.
+    pub h: f64,
+    /// Variables at its start.
+    pub start: [f64; N],
+    /// Variables at its end.
+    pub end: [f64; N],
+    /// Coefficients of `u … u^S`, `u` from 0 to 1 along the step.
+    powers: [[f64; S]; N],
+}
+
+impl<const N: usize, const S: usize> Piece<N, S> {
+    /// The polynomial through `start` and through `start + change` at the nodes.
+    #[inline(always)]
+    pub(super) fn new(rule: &Collocation<S>, t: f64, h: f64, start: [f64; N], change: &[[f64; S]; N]) -> Self {
+        let mut powers = [[0.0; S]; N];
+        let mut end = start;
+        for r in 0..N {
+            powers[r] = rule.powers.map(|row| row.iter().zip(&change[r]).map(|(p, c)| p * c).sum());
+            end[r] += change[r][S - 1];
+        }
+        Piece { t, h, start, end, powers }
+    }
+
+    /// Time at its end.
+    pub fn t_end(&self) -> f64 {
+        self.t + self.h
+    }
+
+    /// Change of variable `r` since the start at `u`, the share of the step (beyond 1: extrapolated).
+    #[inline(always)]
+    pub fn change(&self, r: usize, u: f64) -> f64 {
+        let mut sum = 0.0;
+        for k in (0..S).rev() {
+            sum = sum * u + self.powers[r][k];
+        }
+        sum * u
+    }
+
+    /// Variable `r` at `u`.
+    #[inline(always)]
+    pub fn value(&self, r: usize, u: f64) -> f64 {
+        self.start[r] + self.change(r, u)
+    }
+
+    /// Time derivative of variable `r` at `u`.
+    #[inline(always)]
+    pub fn slope(&self, r: usize, u: f64) -> f64 {
+        let mut sum = 0.0;
+        for k in (0..S).rev() {
+            sum = sum * u + (k + 1) as f64 * self.powers[r][k];
+        }
+        sum / self.h
+    }
+}
