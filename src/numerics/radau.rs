@@ -26,6 +26,8 @@ pub struct Radau {
     pub columns: [Nodes; NODES],
     /// Barycentric weights of the nodes and, last, of the added place 0.
     barycentric: [f64; NODES + 1],
+    /// Weights of the two highest Legendre coefficients that the nodes tell.
+    highest: [Nodes; 2],
 }
 
 impl Radau {
@@ -39,6 +41,13 @@ impl Radau {
             }
         }
         sum
+    }
+
+    /// What the nodes do not resolve of the integral of `f`: the size of its two highest coefficients in Legendre
+    /// polynomials, integrated.
+    pub fn unresolved(&self, f: &Nodes) -> f64 {
+        let coefficient = |weights: &Nodes| weights.iter().zip(f).map(|(w, f)| w * f).sum::<f64>().abs();
+        (coefficient(&self.highest[0]) + coefficient(&self.highest[1])) / (4 * NODES) as f64
     }
 
     /// The polynomial through `start` at 0 and `f` at the nodes, at `u` (barycentric formula).
@@ -104,6 +113,7 @@ fn make() -> Radau {
         w: [0.0; NODES],
         columns: [[0.0; NODES]; NODES],
         barycentric: [1.0; NODES + 1],
+        highest: [[0.0; NODES]; 2],
     };
     for k in 0..NODES {
         let last = polynomials[k][NODES - 1];
@@ -118,6 +128,10 @@ fn make() -> Radau {
                 sum = sum + polynomials[k][m] * (polynomials[j][m + 1] - polynomials[j][m - 1]);
             }
             rule.columns[k][j] = (weight * half * sum).high;
+        }
+        for (i, highest) in rule.highest.iter_mut().enumerate() {
+            let m = NODES - 2 + i;
+            highest[k] = (weight * polynomials[k][m]).high * (2 * m + 1) as f64;
         }
     }
     let places: [f64; NODES + 1] = std::array::from_fn(|k| if k < NODES { rule.u[k] } else { 0.0 });

@@ -75,8 +75,8 @@ impl Extent {
         self.high = self.high.max(value);
     }
 
-    /// Takes in the turn between two places `(u, [value, slope])` whose slopes differ in sign, good to `rtol` of the
-    /// range; `at(u)` tells the value and the slope. Illinois method on the slope.
+    /// Takes in what lies between two places `(u, [value, slope])`: a turn if the slopes differ in sign, good to `rtol` of
+    /// the range. `at(u)` tells the value and the slope; Illinois method on the slope.
     pub fn turn(
         &mut self,
         (mut u_0, [value_0, mut slope_0]): (f64, [f64; 2]),
@@ -86,11 +86,7 @@ impl Extent {
     ) {
         self.add(value_0);
         self.add(value_1);
-        // The tangents bound the turn.
-        let width = u_1 - u_0;
-        let (ahead, behind) = (value_0 + slope_0 * width, value_1 - slope_1 * width);
-        let inside = |value: f64| value >= self.low && value <= self.high;
-        if slope_0 * slope_1 >= 0.0 || (inside(ahead) && inside(behind)) {
+        if (slope_0 > 0.0) == (slope_1 > 0.0) {
             return;
         }
         let mut last = 0.0;

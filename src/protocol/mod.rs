@@ -8,6 +8,7 @@ mod motion;
 pub mod optimal;
 mod outcome;
 mod profile;
+pub mod regularised;
 pub mod swift;
 
 pub use control::{Jet, Slider};

@@ -289,11 +289,16 @@ const PIECE_TOLERANCE: f64 = 1e-15;
 impl Pieces {
     /// Time from one place to another of the same piece; places run from 0 at the start of the arc to 1 at its end.
     pub fn time(&self, from: f64, to: f64) -> f64 {
+        self.sums(from, to).time
+    }
+
+    /// The sums of the arc from one place to another of the same piece.
+    pub fn sums(&self, from: f64, to: f64) -> Sums {
         let (middle, half) = (self.start + 0.5 * (from + to) * self.length, 0.5 * (to - from) * self.length);
         let rule = rule(PIECE_NODES);
         match &self.slice {
-            Slice::Turning(slice) => turning_kernel(slice, middle, half, rule).time,
-            Slice::Direct(slice) => direct_kernel(slice, middle, half, rule).time,
+            Slice::Turning(slice) => turning_kernel(slice, middle, half, rule),
+            Slice::Direct(slice) => direct_kernel(slice, middle, half, rule),
         }
     }
 

@@ -9,6 +9,7 @@ mod extremal;
 mod hold;
 mod lifetime;
 mod motion;
+mod route;
 mod search;
 
 use super::{Effort, Motion, Solved, Status};
@@ -16,6 +17,9 @@ use crate::model::{Law, Transition};
 use crate::numerics::elementary::ln;
 use extremal::Problem;
 use lifetime::Lifetime;
+
+pub(super) use motion::Optimal as Route;
+pub(super) use route::{Site, Span};
 
 /// How the optimal protocol starts.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -87,12 +91,18 @@ pub fn motion(
     bounded: bool,
     rtol: f64,
 ) -> (Solved<Optimum>, Option<Box<dyn Motion>>) {
+    let (solved, route) = route(transition, t_f, bounded, rtol);
+    (solved, route.map(|route| Box::new(route) as Box<dyn Motion>))
+}
+
+/// The same protocol, and the route that it takes.
+pub(super) fn route(transition: &Transition, t_f: f64, bounded: bool, rtol: f64) -> (Solved<Optimum>, Option<Route>) {
     let Some(problem) = Problem::of(transition, bounded).filter(|_| t_f > 0.0 && t_f.is_finite()) else {
         return (Solved { status: Status::Infeasible, value: None, effort: Effort::default() }, None);
     };
     let (solved, extremal) = search::find(&problem, t_f, rtol.min(MOTION_RTOL));
-    let motion = solved.value.map(|_| Box::new(motion::Optimal::new(&problem, t_f, extremal)) as Box<dyn Motion>);
-    (solved, motion)
+    let route = solved.value.map(|_| Route::new(&problem, t_f, extremal));
+    (solved, route)
 }
 
 /// Accuracy of every motion: the time on the arc is what is left of `t_f` after the hold.

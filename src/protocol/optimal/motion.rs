@@ -8,14 +8,14 @@ use crate::numerics::elementary::{exp, exp_m1, ln, ln_1p};
 use crate::protocol::{Moment, Motion};
 
 /// The motion of one extremal. Its parameter `s` runs along the hold up to `share`, then along the arc.
-pub(super) struct Optimal {
-    law: Law,
-    t_f: f64,
+pub struct Optimal {
+    pub(super) law: Law,
+    pub(super) t_f: f64,
     bounded: bool,
-    hold: Hold,
+    pub(super) hold: Hold,
     /// The part of `s` that the hold takes.
     share: f64,
-    arc: Option<Timed>,
+    pub(super) arc: Option<Timed>,
 }
 
 /// How far rounding may take a velocity off the bound.
@@ -23,7 +23,7 @@ const ROUNDING: f64 = 1e-9;
 
 impl Optimal {
     /// The motion of `extremal`, or of the hold alone, in time `t_f`.
-    pub fn new(problem: &Problem, t_f: f64, extremal: Option<Extremal>) -> Optimal {
+    pub(super) fn new(problem: &Problem, t_f: f64, extremal: Option<Extremal>) -> Optimal {
         let (theta_s, hold_time) = extremal.map_or((problem.to.theta, t_f), |found| (found.theta_s, found.hold_time));
         let arc = extremal.map(|found| Timed::new(found.arc.pieces(), hold_time, t_f));
         let hold = Hold {
@@ -88,11 +88,11 @@ impl Motion for Optimal {
 }
 
 /// The hold: `v = 1` until the contact lifetime is `theta_s`.
-struct Hold {
-    law: Law,
-    from: Lifetime,
+pub(super) struct Hold {
+    pub law: Law,
+    pub from: Lifetime,
     theta_s: f64,
-    time: f64,
+    pub time: f64,
     /// Costate where the arc begins, `C - a`.
     beta_s: f64,
 }
@@ -148,15 +148,15 @@ impl Hold {
 }
 
 /// The arc with its time.
-struct Timed {
-    pieces: Pieces,
+pub(super) struct Timed {
+    pub pieces: Pieces,
     /// When it begins.
-    start: f64,
+    pub start: f64,
     t_f: f64,
     /// Time from the start of the arc to the start of each piece, and to the end.
-    gone: Vec<f64>,
+    pub gone: Vec<f64>,
     /// Time from the start of each piece to the end of the arc, and 0.
-    left: Vec<f64>,
+    pub left: Vec<f64>,
     /// What the times of the pieces are to be multiplied with so that they add up.
     scale: f64,
 }

@@ -75,6 +75,14 @@ impl<E: Exponent> Problem<E> {
         }
     }
 
+    /// From any theta to any other: `fall = theta_0/theta_1 - 1`, `pull = 1/theta_1 - v_1`, and `room =
+    /// ln(theta_b/theta_1)` with `theta_b` the contact lifetime at the end for `v = floor` throughout.
+    pub fn between(theta_1: f64, fall: f64, pull: f64, room: f64, curve: Curve<E>) -> Problem<E> {
+        let v_1 = curve.floor + curve.w_f;
+        let most = 1.0 + (1.0 + v_1 * theta_1) * curve.t_f / theta_1 + (1.0 + fall);
+        Problem { curve, v_1, fall, pull, required: room, most, tight: false, v_i: v_1, free: 1.0 }
+    }
+
     /// `c` of the member that arrives, good to `rtol`; the search begins at `start`.
     pub fn solve(&self, start: f64, rtol: f64, reach: f64, effort: &mut Effort) -> Option<f64> {
         let required = self.required;

@@ -4,6 +4,7 @@
 
 use super::Exponent;
 use super::curve::{Panel, Side, Stretches};
+use crate::numerics::polynomial::roots_between;
 
 /// The exponent; derivatives are those in `x`.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -62,6 +63,13 @@ impl Hermite {
         let (t, side) = self.about(x, z);
         let sign = if side == Side::Start { 1.0 } else { -1.0 };
         [sign * t[0], 2.0 * t[1], sign * 6.0 * t[2]]
+    }
+
+    /// Every turn inside.
+    pub fn turns(&self) -> Vec<f64> {
+        let powers = self.powers(Side::Start);
+        let slope: [f64; 6] = std::array::from_fn(|k| (k + 1) as f64 * powers[k]);
+        roots_between(&slope, 0.0, 1.0)
     }
 
     /// `x` of the only turn inside, where slopes and curvatures at the ends are 0.

@@ -1,0 +1,199 @@
+//! The optimal protocol asked at a given time: derivatives, what happens between two places, and the control it takes.
+
+use super::hold;
+use super::motion::{Optimal, Timed};
+use crate::model::Law;
+use crate::numerics::elementary::{exp, exp_m1, ln};
+use crate::numerics::radau::radau;
+use crate::protocol::control::{Extent, Jet, Slider};
+
+/// A place on the protocol.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Site {
+    /// On the hold, after this time.
+    Held(f64),
+    /// On the arc, from 0 at its start to 1 at its end.
+    Moving(f64),
+}
+
+/// What happens between two places.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Span {
+    /// Duration.
+    pub time: f64,
+    /// `int theta v dt`, the time less the growth of theta.
+    pub lag: f64,
+    /// Work of friction.
+    pub work: f64,
+}
+
+impl Optimal {
+    /// When the hold ends and the arc begins; `None` if there is only one of them.
+    pub fn corner(&self) -> Option<f64> {
+        self.arc.as_ref().map(|arc| arc.start).filter(|&start| start > 0.0)
+    }
+
+    /// The place just after the start.
+    pub fn first(&self) -> Site {
+        if self.arc.is_some() && self.hold.time == 0.0 { Site::Moving(0.0) } else { Site::Held(0.0) }
+    }
+
+    /// The place just before the end.
+    pub fn last(&self) -> Site {
+        if self.arc.is_some() { Site::Moving(1.0) } else { Site::Held(self.t_f) }
+    }
+
+    /// The place at a time after the start.
+    pub fn after(&self, time: f64) -> Site {
+        match &self.arc {
+            Some(arc) if time >= arc.start => Site::Moving(arc.place_after(time - arc.start)),
+            _ => Site::Held(time),
+        }
+    }
+
+    /// The place at a time before the end.
+    pub fn before(&self, time: f64) -> Site {
+        match &self.arc {
+            Some(arc) if time <= arc.left[0] => Site::Moving(arc.place_before(time)),
+            _ => Site::Held(self.t_f - time),
+        }
+    }
+
+    /// Velocity with its derivatives, and theta.
+    pub fn jet(&self, site: Site) -> Jet {
+        let (arc, place) = match (site, &self.arc) {
+            (Site::Moving(place), Some(arc)) => (arc, place),
+            (Site::Moving(_), None) => return self.held(self.t_f),
+            (Site::Held(time), _) => return self.held(time),
+        };
+        let Law { a, b } = self.law;
+        let here = arc.pieces.at(place);
+        let theta = here.theta;
+        let v = exp(here.ln_u - here.ln_theta);
+        let rate = -exp_m1(here.ln_u);
+        // Derivatives of ln v = q, ln theta = y and friction, from q' = (tau + a - b)/(a theta) and theta' = 1 - theta v.
+        let friction = 1.0 + a * here.ln_u + (b - a) * here.ln_theta;
+        let y1 = rate / theta;
+        let q1 = (friction + a - b) / (a * theta);
+        let y2 = -(y1 / theta + v * q1);
+        let friction1 = a * q1 + b * y1;
+        let q2 = friction1 / (a * theta) - q1 * y1;
+        let friction2 = a * q2 + b * y2;
+        let q3 = (friction2 - friction1 * y1) / (a * theta) - q2 * y1 - q1 * y2;
+        Jet { v: [v, v * q1, v * (q2 + q1 * q1), v * (q3 + 3.0 * q1 * q2 + q1 * q1 * q1)], theta, rate }
+    }
+
+    fn held(&self, time: f64) -> Jet {
+        let now = self.hold.from.aged(time);
+        Jet { v: [1.0, 0.0, 0.0, 0.0], theta: now.theta, rate: now.rest }
+    }
+
+    /// What happens from one place to a later one.
+    pub fn span(&self, from: Site, to: Site) -> Span {
+        let mut span = Span { time: 0.0, lag: 0.0, work: 0.0 };
+        if let Site::Held(start) = from {
+            let end = if let Site::Held(end) = to { end } else { self.hold.time };
+            let (now, time) = (self.hold.from.aged(start), end - start);
+            span.time += time;
+            span.lag += time + now.rest * exp_m1(-time);
+            span.work += hold::work(&self.law, now, time);
+        }
+        if let (Site::Moving(end), Some(arc)) = (to, &self.arc) {
+            let start = if let Site::Moving(start) = from { start } else { 0.0 };
+            for (from, to) in arc.parts(start, end) {
+                let sums = arc.pieces.sums(from, to);
+                span.time += sums.time;
+                span.lag += sums.lag;
+                span.work += sums.work;
+            }
+        }
+        span
+    }
+
+    /// Takes the range of `v_c` between two places into `extent`, turns good to `rtol`.
+    pub fn control(&self, slider: &Slider, from: Site, to: Site, rtol: f64, extent: &mut Extent) {
+        if let Site::Held(start) = from {
+            // v_c = 1 + (b/k) theta'/theta falls all the way.
+            let end = if let Site::Held(end) = to { end } else { self.hold.time };
+            extent.add(slider.control(&self.held(start))[0]);
+            extent.add(slider.control(&self.held(end))[0]);
+        }
+        let (Site::Moving(end), Some(arc)) = (to, &self.arc) else { return };
+        let start = if let Site::Moving(start) = from { start } else { 0.0 };
+        let told = |place| slider.control(&self.jet(Site::Moving(place)));
+        for (from, to) in arc.parts(start, end) {
+            let mut before = (from, told(from));
+            extent.add(before.1[0]);
+            for u in radau().u {
+                let place = from * (1.0 - u) + to * u;
+                let after = (place, told(place));
+                extent.add(after.1[0]);
+                if (before.1[1] > 0.0) != (after.1[1] > 0.0) {
+                    let pace = arc.pieces.time(before.0, after.0) / (after.0 - before.0);
+                    let along = |place, [value, slope]: [f64; 2]| (place, [value, pace * slope]);
+                    let (first, last) = (along(before.0, before.1), along(after.0, after.1));
+                    extent.turn(first, last, rtol, |place| along(place, told(place)).1);
+                }
+                before = after;
+            }
+        }
+    }
+}
+
+impl Timed {
+    /// The parts of `[from, to]` that lie in one piece each.
+    fn parts(&self, from: f64, to: f64) -> impl Iterator<Item = (f64, f64)> + use<'_> {
+        let count = f64::from(self.pieces.count);
+        let edge = move |piece: u32| f64::from(piece) / count;
+        (0..self.pieces.count)
+            .map(move |piece| (edge(piece).max(from), edge(piece + 1).min(to)))
+            .filter(|(from, to)| from < to)
+    }
+
+    /// The place at a time after the start of the arc.
+    fn place_after(&self, time: f64) -> f64 {
+        let piece = self.gone.partition_point(|&gone| gone <= time).clamp(1, self.gone.len() - 1) - 1;
+        let count = f64::from(self.pieces.count);
+        let (from, to) = (piece as f64 / count, (piece + 1) as f64 / count);
+        from + inverse(time - self.gone[piece], to - from, |d| self.pieces.time(from, from + d))
+    }
+
+    /// The place at a time before the end of the arc.
+    fn place_before(&self, time: f64) -> f64 {
+        let piece = self.left.partition_point(|&left| left > time).clamp(1, self.left.len() - 1) - 1;
+        let count = f64::from(self.pieces.count);
+        let (from, to) = (piece as f64 / count, (piece + 1) as f64 / count);
+        to - inverse(time - self.left[piece + 1], to - from, |d| self.pieces.time(to - d, to))
+    }
+}
+
+/// Where in `[0, most]` a rising function that is 0 at 0 takes a value, by secants of its logarithm inside a bracket.
+fn inverse(value: f64, most: f64, f: impl Fn(f64) -> f64) -> f64 {
+    let (mut low, mut high) = (0.0, most);
+    let mut d = most * (value / f(most)).clamp(0.0, 1.0);
+    let mut last = (most, f(most));
+    for _ in 0..MOST_STEPS {
+        if d <= low || d >= high {
+            d = 0.5 * (low + high);
+        }
+        let found = f(d);
+        if (found / value - 1.0).abs() <= ENOUGH || d == low || d == high {
+            break;
+        }
+        if found < value {
+            low = d;
+        } else {
+            high = d;
+        }
+        let order = ln(last.1 / found) / ln(last.0 / d);
+        last = (d, found);
+        d *= exp(ln(value / found) / order);
+    }
+    d.clamp(0.0, most)
+}
+
+/// A relative difference that rounding leaves.
+const ENOUGH: f64 = 1e-14;
+
+/// More steps than the secants take.
+const MOST_STEPS: u32 = 60;

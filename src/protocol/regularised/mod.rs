@@ -1,0 +1,141 @@
+//! The optimal protocol with its jumps replaced by smooth pieces, so that a spring of finite stiffness can drive it.
+//!
+//! The optimum jumps at both ends, and after a hold it leaves the bound with a corner. Each of these would take an
+//! infinite control velocity. In pieces of length `delta_t` at both ends, and in one about the end of a hold, the
+//! velocity is replaced by one that meets value, slope and curvature of the optimum (0 at the ends of the protocol) and
+//! brings theta to where the optimum has it. So the optimum between the pieces is untouched (docs/theory.md,
+//! "Smooth pieces").
+
+mod piece;
+
+use super::control::Extent;
+use super::optimal::{Route, Site, route};
+use super::{Effort, Jet, Slider, Solved, Status};
+use crate::model::Transition;
+use piece::{End, Piece};
+
+/// The regularised optimum, every number to the requested relative accuracy; those of `v_c` to that of the greater of
+/// the two.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Regularised {
+    /// Work of friction, `int tau v dt`.
+    pub work: f64,
+    /// Least work of the optimum itself, `W*`.
+    pub work_optimal: f64,
+    /// `(work - W*)/W*`, from the pieces alone: it keeps its digits where they are short.
+    pub gap: f64,
+    /// Least velocity.
+    pub v_min: f64,
+    /// Greatest velocity.
+    pub v_max: f64,
+    /// Least control velocity.
+    pub control_min: f64,
+    /// Greatest control velocity.
+    pub control_max: f64,
+}
+
+/// Regularises the optimum of a transition from `v_i` to `v_f` under `slider.law` within `t_f`, with `v >= 1` where
+/// `bounded`, by pieces of length `delta_t`.
+///
+/// `Infeasible` where there is no optimum, where the pieces overlap (`2 delta_t > t_f`), or where an argument is outside
+/// its domain (`delta_t > 0`, `k > 0`, `m >= 0`). `BelowBound` where a piece dips below `v = 1`: next to a hold each
+/// must, since theta there is as large as `v >= 1` allows.
+pub fn solve(
+    slider: &Slider,
+    (v_i, v_f): (f64, f64),
+    t_f: f64,
+    delta_t: f64,
+    bounded: bool,
+    rtol: f64,
+) -> Solved<Regularised> {
+    let none = |status, effort| Solved { status, value: None, effort };
+    let sound = delta_t > 0.0 && 2.0 * delta_t <= t_f && slider.k > 0.0 && slider.m >= 0.0 && slider.m.is_finite();
+    if !sound {
+        return none(Status::Infeasible, Effort::default());
+    }
+    let (solved, route) = route(&Transition { law: slider.law, v_i, v_f }, t_f, bounded, rtol);
+    let mut effort = solved.effort;
+    let (Some(optimum), Some(route)) = (solved.value, route) else { return none(solved.status, effort) };
+    let mut sum = Sum { slider: *slider, rtol, excess: 0.0, v: Extent::NONE, control: Extent::NONE };
+    if sum.gather(&route, (v_i, v_f), (delta_t, t_f), &mut effort).is_none() {
+        return none(Status::NotConverged, effort);
+    }
+    let value = Regularised {
+        work: optimum.work + sum.excess,
+        work_optimal: optimum.work,
+        gap: sum.excess / optimum.work,
+        v_min: sum.v.low,
+        v_max: sum.v.high,
+        control_min: sum.control.low,
+        control_max: sum.control.high,
+    };
+    let numbers = [value.work, value.v_max, value.control_min, value.control_max];
+    if !numbers.iter().all(|number| number.is_finite()) {
+        return none(Status::NotConverged, effort);
+    }
+    let status = match solved.status {
+        Status::Ok | Status::BelowBound if value.v_min < 1.0 => Status::BelowBound,
+        Status::BelowBound => Status::Ok,
+        status => status,
+    };
+    Solved { status, value: Some(value), effort }
+}
+
+/// What is gathered along the way.
+struct Sum {
+    slider: Slider,
+    rtol: f64,
+    /// Work beyond that of the optimum.
+    excess: f64,
+    v: Extent,
+    control: Extent,
+}
+
+impl Sum {
+    /// The pieces and what lies between them, in the order of time; `None` where a piece could not be certified.
+    fn gather(
+        &mut self,
+        route: &Route,
+        (v_i, v_f): (f64, f64),
+        (delta_t, t_f): (f64, f64),
+        effort: &mut Effort,
+    ) -> Option<()> {
+        let (leaving, arriving) = (route.after(delta_t), route.before(delta_t));
+        let steady = |v: f64| End::of(&Jet { v: [v, 0.0, 0.0, 0.0], theta: 1.0 / v, rate: 0.0 });
+        let at = |site| End::of(&route.jet(site));
+        self.replace(route, (route.first(), steady(v_i)), (leaving, at(leaving)), effort)?;
+        let mut from = leaving;
+        if let Some(corner) = route.corner().filter(|&corner| corner > delta_t && corner < t_f - delta_t) {
+            let start = Site::Held((corner - 0.5 * delta_t).max(delta_t));
+            let end =
+                if corner + 0.5 * delta_t < t_f - delta_t { route.after(corner + 0.5 * delta_t) } else { arriving };
+            self.keep(route, from, start);
+            self.replace(route, (start, at(start)), (end, at(end)), effort)?;
+            from = end;
+        }
+        self.keep(route, from, arriving);
+        self.replace(route, (arriving, at(arriving)), (route.last(), steady(v_f)), effort)
+    }
+
+    /// Leaves the optimum as it is between two places.
+    fn keep(&mut self, route: &Route, from: Site, to: Site) {
+        route.control(&self.slider, from, to, self.rtol, &mut self.control);
+    }
+
+    /// Replaces the optimum between two places by a smooth piece.
+    fn replace(
+        &mut self,
+        route: &Route,
+        (from, start): (Site, End),
+        (to, end): (Site, End),
+        effort: &mut Effort,
+    ) -> Option<()> {
+        let span = route.span(from, to);
+        let piece = Piece::new(&start, &end, &span, self.rtol, effort)?;
+        let work = piece.pass(&self.slider, self.rtol, &mut self.control, effort)?;
+        self.excess += work - span.work;
+        self.v.add(piece.v.low);
+        self.v.add(piece.v.high);
+        Some(())
+    }
+}
