@@ -30,6 +30,10 @@ pub enum Quantity {
     Stiffness,
     /// Mass of the block.
     Mass,
+    /// Time between samples of the control velocity.
+    Sampling,
+    /// Length of the smooth pieces.
+    Smoothing,
 }
 
 /// The legal range of a number: an interval, with the text that messages show.
@@ -64,13 +68,14 @@ pub const RTOL: Domain = Domain { text: "1e-13 <= rtol <= 1e-2", least: 1e-13, l
 pub enum Scale {
     /// The scaled units of the model: the value is the coefficient.
     Model,
-    /// Relative to the duration: the coefficient of `t^n` is the value over `t_f^n` (`n = 1` for `alpha_2`, 2 for `alpha_3`).
+    /// Relative to the duration: the coefficient of `t^n` is the value over `t_f^n` (`n = 1` for `alpha_2`, 2 for
+    /// `alpha_3`).
     Duration,
 }
 
 impl Quantity {
     /// Every quantity; axis columns come in this order.
-    pub const ALL: [Quantity; 11] = [
+    pub const ALL: [Quantity; 13] = [
         Quantity::Time,
         Quantity::A,
         Quantity::B,
@@ -82,6 +87,8 @@ impl Quantity {
         Quantity::Alpha3,
         Quantity::Stiffness,
         Quantity::Mass,
+        Quantity::Sampling,
+        Quantity::Smoothing,
     ];
 
     /// The quantity of this name.
@@ -103,6 +110,8 @@ impl Quantity {
             Quantity::Alpha3 => "alpha_3",
             Quantity::Stiffness => "k",
             Quantity::Mass => "m",
+            Quantity::Sampling => "dt",
+            Quantity::Smoothing => "delta_t",
         }
     }
 
@@ -120,13 +129,17 @@ impl Quantity {
             Quantity::Alpha3 => "coefficient of t^2 in the contact lifetime of the cubic shortcut",
             Quantity::Stiffness => "stiffness of the spring",
             Quantity::Mass => "mass of the block",
+            Quantity::Sampling => {
+                "time between samples of the control velocity, each held until the next; 0: not sampled"
+            }
+            Quantity::Smoothing => "length of the smooth pieces that replace the jumps of the optimum",
         }
     }
 
     /// Its unit, for values given in `scale`.
     pub fn unit(self, scale: Scale) -> &'static str {
         match (self, scale) {
-            (Quantity::Time, _) => "l/v_0",
+            (Quantity::Time | Quantity::Sampling | Quantity::Smoothing, _) => "l/v_0",
             (Quantity::A | Quantity::B, _) => "mu_0",
             (Quantity::InitialVelocity | Quantity::FinalVelocity, _) => "v_0",
             (Quantity::Family, _) => "",
@@ -169,6 +182,8 @@ impl Quantity {
             Quantity::Alpha3 => from("alpha_3 finite", f64::MIN),
             Quantity::Stiffness => Domain { greatest: f64::INFINITY, ..above("k > 0 (inf: rigid)", 0.0) },
             Quantity::Mass => from("m >= 0, finite", 0.0),
+            Quantity::Sampling => from("dt >= 0, finite (0: not sampled)", 0.0),
+            Quantity::Smoothing => above("delta_t > 0, finite", 0.0),
         }
     }
 
@@ -177,7 +192,7 @@ impl Quantity {
         match self {
             Quantity::Family => (0..FAMILIES.len()).map(|place| place as f64).collect(),
             Quantity::Stiffness | Quantity::FrictionBound => vec![f64::INFINITY],
-            Quantity::Mass => vec![0.0],
+            Quantity::Mass | Quantity::Sampling => vec![0.0],
             _ => Vec::new(),
         }
     }

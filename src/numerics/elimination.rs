@@ -1,7 +1,7 @@
 //! Linear equations by Gaussian elimination with row pivots.
 
-/// Solves `matrix x = right` for several right-hand sides: `matrix` is square, row by row, and `right` has as many rows,
-/// which become those of the solution. `None` where the matrix is singular.
+/// Solves `matrix x = right` for several right-hand sides: `matrix` is square, row by row, and `right` has as many
+/// rows, which become those of the solution. `None` where the matrix is singular.
 pub fn eliminate(matrix: &mut [f64], right: &mut [f64], rows: usize) -> Option<()> {
     let width = right.len() / rows;
     for k in 0..rows {

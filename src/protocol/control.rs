@@ -75,8 +75,8 @@ impl Extent {
         self.high = self.high.max(value);
     }
 
-    /// Takes in what lies between two places `(u, [value, slope])`: a turn if the slopes differ in sign, good to `rtol` of
-    /// the range. `at(u)` tells the value and the slope; Illinois method on the slope.
+    /// Takes in what lies between two places `(u, [value, slope])`: a turn if the slopes differ in sign, good to `rtol`
+    /// of the range. `at(u)` tells the value and the slope; Illinois method on the slope.
     pub fn turn(
         &mut self,
         (mut u_0, [value_0, mut slope_0]): (f64, [f64; 2]),

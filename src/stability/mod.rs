@@ -1,7 +1,9 @@
 //! Finite stiffness: whether steady sliding of a block on a spring is stable.
 
+mod driven;
 mod linear;
 mod sensitivity;
 
+pub use driven::{held_error, loop_error};
 pub use linear::{Eigenvalues, SteadySliding, critical_velocity};
 pub use sensitivity::amplification;

@@ -1,16 +1,16 @@
 //! How much a small error grows over a shortcut that runs open loop: the fundamental matrix of the linearised flow.
 //!
-//! A shortcut is told to the spring as `v_c(t)`, so an error of the state obeys the equations of motion linearised about
-//! the protocol. In the scaled variables `q = ln v`, `y = ln theta` and `p = k s/a`, in each of which 1 is a change of
-//! the velocity by a factor of e,
+//! A shortcut is told to the spring as `v_c(t)`, so an error of the state obeys the equations of motion linearised
+//! about the protocol. In the scaled variables `q = ln v`, `y = ln theta` and `p = k s/a`, in each of which 1 is a
+//! change of the velocity by a factor of e,
 //!
 //! ```text
 //! dq' = kappa (dp - dq - (b/a) dy) - (v'/v) dq,    dy' = -dy/theta - v dq,    dp' = -(k/a) v dq,    kappa = a/(m v).
 //! ```
 //!
-//! Without mass `dq = dp - (b/a) dy` follows the other two. With a rigid spring `dq = 0` and `dp = (b/a) dy`, which leaves
-//! `dy' = -dy/theta`. The decay rate `kappa` spans many decades: collocation at the Radau nodes damps what is fast and
-//! follows what is slow.
+//! Without mass `dq = dp - (b/a) dy` follows the other two. With a rigid spring `dq = 0` and `dp = (b/a) dy`, which
+//! leaves `dy' = -dy/theta`. The decay rate `kappa` spans many decades: collocation at the Radau nodes damps what is
+//! fast and follows what is slow.
 
 use crate::numerics::elementary::exp;
 use crate::numerics::elimination::eliminate;
@@ -22,9 +22,9 @@ use crate::protocol::{Jet, Slider};
 type Matrix = [[f64; 3]; 3];
 
 /// Largest factor by which a small error of the state at the start has grown at the end, both measured by the Euclidean
-/// norm of `(ln v, ln theta, k s/a)`, good to `rtol`: the largest singular value of the fundamental matrix. Where some of
-/// the three follow the others, the error at the start is one of those others alone, so that the limits `m -> 0` and `k ->
-/// inf` are reached.
+/// norm of `(ln v, ln theta, k s/a)`, good to `rtol`: the largest singular value of the fundamental matrix. Where some
+/// of the three follow the others, the error at the start is one of those others alone, so that the limits `m -> 0` and
+/// `k -> inf` are reached.
 ///
 /// `None` where the flow swings too often for its steps to be counted in [`MOST_STEPS`].
 pub fn amplification(path: &Path, rtol: f64) -> Option<f64> {
@@ -170,7 +170,8 @@ fn dot(x: &[f64; 3], y: &[f64; 3]) -> f64 {
     x[0] * y[0] + x[1] * y[1] + x[2] * y[2]
 }
 
-/// The largest singular value of the first `n` columns, by rotations that make the columns orthogonal (one-sided Jacobi method).
+/// The largest singular value of the first `n` columns, by rotations that make the columns orthogonal (one-sided Jacobi
+/// method).
 fn norm(mut flow: Matrix, n: usize) -> f64 {
     for _ in 0..MOST_SWEEPS {
         for (p, q) in [(0, 1), (0, 2), (1, 2)].into_iter().filter(|&(_, q)| q < n) {

@@ -2,10 +2,12 @@
 
 mod best;
 mod column;
+mod compliant;
 mod crossover;
 mod gap;
 mod optima;
 mod optimal;
+mod regularised;
 mod rows;
 mod sheet;
 mod stability;
@@ -44,8 +46,16 @@ pub trait Table: Sync {
 }
 
 /// Every table, in the order in which they are listed. A new table is a file and a line here.
-pub const ALL: [&dyn Table; 6] =
-    [&gap::Gap, &best::Best, &optimal::Optimal, &crossover::Crossover, &swift::Swift, &stability::Stability];
+pub const ALL: [&dyn Table; 8] = [
+    &gap::Gap,
+    &best::Best,
+    &optimal::Optimal,
+    &crossover::Crossover,
+    &swift::Swift,
+    &stability::Stability,
+    &compliant::Compliant,
+    &regularised::Regularised,
+];
 
 /// The table of this name.
 pub fn find(name: &str) -> Option<&'static dyn Table> {

@@ -7,8 +7,8 @@
 //! ```
 //!
 //! `v' = v'' = 0` at both ends. Theta at the end falls strictly with `alpha`, from its value for `v = 1`: there is one
-//! member if `t_f` is above `t_min`, and none otherwise. Neither `alpha` nor the work depends on the spring; the control
-//! `v_c = v + (tau' + m v'')/k` does.
+//! member if `t_f` is above `t_min`, and none otherwise. Neither `alpha` nor the work depends on the spring; the
+//! control `v_c = v + (tau' + m v'')/k` does.
 //!
 //! Conditioning. Near `t_min` the layers at both ends have the width `(-alpha)^(-1/3)`: a relative error of `t_f` comes
 //! out `3 t_f/(t_f - t_min)` times as large in `alpha`. For long times `alpha` tends to `10 L`, for which `v''' = 0` at
@@ -143,8 +143,8 @@ fn member(
     c.map(|c| curve.with(c)).ok_or(Status::NotConverged)
 }
 
-/// A start for the search: a bump of area `required`, by Laplace's method, about the middle, where `x^3 (1 - x)^3` is 1/64
-/// with the curvature -3/8 and the quintic has the slope `15/8 L`; a long protocol takes `-10 L`.
+/// A start for the search: a bump of area `required`, by Laplace's method, about the middle, where `x^3 (1 - x)^3` is
+/// 1/64 with the curvature -3/8 and the quintic has the slope `15/8 L`; a long protocol takes `-10 L`.
 fn guess(w_i: f64, w_f: f64, rise: f64, t_f: f64, required: f64) -> f64 {
     let excess = ln(required / (t_f * (w_i * w_f).sqrt()));
     let height = |y: f64| (excess + 0.5 * ln(12.0 * y / std::f64::consts::PI) - 0.0732 * rise * rise / y).max(0.5);

@@ -71,7 +71,8 @@ impl Optimal {
         let theta = here.theta;
         let v = exp(here.ln_u - here.ln_theta);
         let rate = -exp_m1(here.ln_u);
-        // Derivatives of ln v = q, ln theta = y and friction, from q' = (tau + a - b)/(a theta) and theta' = 1 - theta v.
+        // Derivatives of ln v = q, ln theta = y and friction, from q' = (tau + a - b)/(a theta) and theta' = 1 - theta
+        // v.
         let friction = 1.0 + a * here.ln_u + (b - a) * here.ln_theta;
         let y1 = rate / theta;
         let q1 = (friction + a - b) / (a * theta);

@@ -85,7 +85,8 @@ impl<E: Exponent> Curve<E> {
         (w, excess)
     }
 
-    /// The stretches of the protocol in the order of time: first those measured from the start, then those from the end.
+    /// The stretches of the protocol in the order of time: first those measured from the start, then those from the
+    /// end.
     pub fn stretches(&self) -> Stretches {
         self.exponent.stretches(self.ln_w_f, self.roof() - QUIET)
     }
@@ -100,8 +101,8 @@ impl<E: Exponent> Curve<E> {
         self.ln_w_f.max(self.level(0.0, 1.0)).min(self.cap)
     }
 
-    /// The next panel of a stretch, from `d` on, over which the exponent varies by `reach`: by more where `v - floor` is so
-    /// small that its relative error does not count.
+    /// The next panel of a stretch, from `d` on, over which the exponent varies by `reach`: by more where `v - floor`
+    /// is so small that its relative error does not count.
     pub fn panel(&self, stretch: &Panel, d: f64, reach: f64) -> Panel {
         let Panel { side, to, .. } = *stretch;
         let (x, z) = place(side, d);

@@ -1,4 +1,5 @@
-//! Velocities in closed form, `v = floor + (v_1 - floor) e^f` with a known exponent `f`, and what contacts make of them.
+//! Velocities in closed form, `v = floor + (v_1 - floor) e^f` with a known exponent `f`, and what contacts make of
+//! them.
 //!
 //! The exponent has one free parameter, in which theta at the end is monotone. Since the exponent is known before
 //! anything is computed, so are the panels that resolve it: a `curve` is laid out in them, the parameter that
@@ -44,8 +45,8 @@ pub(super) trait Exponent: Copy + Sync {
     /// A change of the parameter that counts.
     fn unit(&self) -> f64;
 
-    /// The relative step of Newton's method for a large `c` at which something that goes like the width of the layers at
-    /// both ends is to become `ratio` times as large, times minus its logarithmic slope.
+    /// The relative step of Newton's method for a large `c` at which something that goes like the width of the layers
+    /// at both ends is to become `ratio` times as large, times minus its logarithmic slope.
     fn settle(ratio: f64) -> f64;
 
     /// Whether it falls first and then rises, with nothing in between that counts where both sides are low.

@@ -37,9 +37,9 @@ pub struct Regularised {
 /// Regularises the optimum of a transition from `v_i` to `v_f` under `slider.law` within `t_f`, with `v >= 1` where
 /// `bounded`, by pieces of length `delta_t`.
 ///
-/// `Infeasible` where there is no optimum, where the pieces overlap (`2 delta_t > t_f`), or where an argument is outside
-/// its domain (`delta_t > 0`, `k > 0`, `m >= 0`). `BelowBound` where a piece dips below `v = 1`: next to a hold each
-/// must, since theta there is as large as `v >= 1` allows.
+/// `Infeasible` where there is no optimum, where the pieces overlap (`2 delta_t > t_f`), or where an argument is
+/// outside its domain (`delta_t > 0`, `k > 0`, `m >= 0`). `BelowBound` where a piece dips below `v = 1`: next to a hold
+/// each must, since theta there is as large as `v >= 1` allows.
 pub fn solve(
     slider: &Slider,
     (v_i, v_f): (f64, f64),

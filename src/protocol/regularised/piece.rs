@@ -1,9 +1,9 @@
 //! A smooth piece between two moments, with theta brought from the one to the other.
 //!
-//! `v = floor + exp g(x)`, `x` the share of the time gone: `g` is the quintic that meets value, slope and curvature at both
-//! ends, less `c x^3 (1 - x)^3`. Theta at the end rises strictly with `c`, from 0 to its value for `v = floor`, so there is
-//! one member wherever the optimum itself stays above the floor. The floor is 0; where that piece dips below `v = 1`
-//! without need it is 1.
+//! `v = floor + exp g(x)`, `x` the share of the time gone: `g` is the quintic that meets value, slope and curvature at
+//! both ends, less `c x^3 (1 - x)^3`. Theta at the end rises strictly with `c`, from 0 to its value for `v = floor`, so
+//! there is one member wherever the optimum itself stays above the floor. The floor is 0; where that piece dips below
+//! `v = 1` without need it is 1.
 
 use crate::numerics::elementary::{exp_m1, ln, ln_1p};
 use crate::protocol::control::Extent;

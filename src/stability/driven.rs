@@ -1,0 +1,160 @@
+//! The loop closed: the block simulated under the control of a shortcut, told continuously or sampled and held.
+//!
+//! With time in units of `t_f`, `x = ln(v/v_f)`, `y = ln(theta v_f)` and `z = k s - tau_ss(v_f)` the equations of
+//! motion are
+//!
+//! ```text
+//! z' = t_f k (v_c - v),    y' = t_f (1/theta - v),    (m v/t_f) x' = z - a x - b y,
+//! ```
+//!
+//! and the target is 0. Without mass the last one is a constraint. A rigid spring hands `v_c` to the block.
+
+use crate::model::Law;
+use crate::numerics::elementary::{exp, exp_m1, ln};
+use crate::numerics::stiff::{Accuracy, Failure, Integrator, Linearised, Points, System, radau_iia_9};
+use crate::protocol::compliant::Path;
+use crate::protocol::{Motion, Slider};
+
+/// Most samples of one simulation.
+pub const MOST_SAMPLES: f64 = 1e5;
+
+/// Distance from the target at `t_f`, the Euclidean norm in `(ln v, ln theta, k s/a)`, if `v_c` is told continuously:
+/// what `rtol` and the rounding of the protocol leave, amplified. `None` where the simulation does not get there.
+pub fn loop_error(path: &Path, rtol: f64) -> Option<f64> {
+    let v_f = path.jet(path.pieces() - 1, 1.0).v[0];
+    if path.slider.k == f64::INFINITY {
+        let theta = path.jet(path.pieces() - 1, 1.0).theta;
+        return Some(distance(&path.slider.law, [0.0, ln(theta * v_f)]));
+    }
+    let driven = Driven::new(path, Control::Continuous(path));
+    let state = driven.follow(driven.start(path), (0.0, 1.0), FIRST, rtol).ok()?.0;
+    Some(driven.distance(&state))
+}
+
+/// Distance from the target at `t_f`, as in [`loop_error`], if `v_c` is sampled at `0`, `dt`, `2 dt`, … and each sample
+/// is held until the next. `None` where that takes more than [`MOST_SAMPLES`] or the simulation does not get there,
+/// most often because a held `v_c` stops the block or lets it run away.
+pub fn held_error(path: &Path, dt: f64, rtol: f64) -> Option<f64> {
+    let t_f = path.duration();
+    let samples = (t_f / dt).ceil().max(1.0);
+    if samples.is_nan() || samples > MOST_SAMPLES {
+        return None;
+    }
+    let (slider, count) = (&path.slider, samples as u32);
+    let sample = |i: u32| slider.control(&path.at_time(f64::from(i) * dt))[0];
+    // In units of t_f.
+    let time = |i: u32| if i == count { 1.0 } else { f64::from(i) * (dt / t_f) };
+    if slider.k == f64::INFINITY {
+        let v_f = path.jet(path.pieces() - 1, 1.0).v[0];
+        let (mut theta, mut v) = (path.jet(0, 0.0).theta, v_f);
+        for i in 0..count {
+            v = sample(i);
+            let aged = -exp_m1(-t_f * (time(i + 1) - time(i)) * v);
+            theta += (1.0 / v - theta) * aged;
+        }
+        return Some(distance(&slider.law, [ln(v / v_f), ln(theta * v_f)]));
+    }
+    let mut driven = Driven::new(path, Control::Held(0.0));
+    let (mut state, mut h) = (driven.start(path), FIRST);
+    for i in 0..count {
+        driven.control = Control::Held(sample(i));
+        (state, h) = driven.follow(state, (time(i), time(i + 1)), h, rtol).ok()?;
+    }
+    Some(driven.distance(&state))
+}
+
+/// First step, in units of `t_f`; it is shortened as needed.
+const FIRST: f64 = 1e-3;
+
+/// More steps than a protocol takes between two samples.
+const MOST_STEPS: u32 = 100_000;
+
+/// Places of the variables, in the order in which they are eliminated.
+const Z: usize = 0;
+const Y: usize = 1;
+const X: usize = 2;
+
+/// What the end of the spring is told.
+enum Control<'a> {
+    Continuous(&'a Path),
+    Held(f64),
+}
+
+/// The equations of motion.
+struct Driven<'a> {
+    slider: Slider,
+    t_f: f64,
+    v_f: f64,
+    control: Control<'a>,
+}
+
+impl<'a> Driven<'a> {
+    fn new(path: &Path, control: Control<'a>) -> Driven<'a> {
+        let v_f = path.jet(path.pieces() - 1, 1.0).v[0];
+        Driven { slider: path.slider, t_f: path.duration(), v_f, control }
+    }
+
+    /// Steady sliding at the initial velocity.
+    fn start(&self, path: &Path) -> [f64; 3] {
+        let Law { a, b } = self.slider.law;
+        let x = ln(path.jet(0, 0.0).v[0] / self.v_f);
+        [(a - b) * x, -x, x]
+    }
+
+    /// The state at the end of a time, and the step that was foreseen for what follows.
+    fn follow(&self, state: [f64; 3], (from, to): (f64, f64), h: f64, rtol: f64) -> Result<([f64; 3], f64), Failure> {
+        let accuracy = Accuracy { tolerance: (SHARE * rtol).max(1e-13), scale: [self.slider.law.a, 1.0, 1.0] };
+        let mut run = Integrator::new(self, radau_iia_9(), accuracy, from, state, h);
+        for _ in 0..MOST_STEPS {
+            if run.t() >= to {
+                return Ok((*run.y(), run.proposal()));
+            }
+            run.step(to)?;
+        }
+        Err(Failure::Ends { t: run.t() })
+    }
+
+    fn distance(&self, state: &[f64; 3]) -> f64 {
+        let force = state[Z] / self.slider.law.a;
+        (state[X] * state[X] + state[Y] * state[Y] + force * force).sqrt()
+    }
+}
+
+/// The share of the accuracy that a step may take.
+const SHARE: f64 = 0.01;
+
+/// Distance where the spring is rigid and pulls with the friction alone.
+fn distance(law: &Law, [x, y]: [f64; 2]) -> f64 {
+    let force = x + law.b / law.a * y;
+    (x * x + y * y + force * force).sqrt()
+}
+
+impl System<3> for Driven<'_> {
+    fn linearise<const L: usize>(&self, points: &Points<3, L>) -> Linearised<3, L> {
+        let mut at = Linearised { residual: [[0.0; L]; 3], mass: [[1.0; L]; 3], jacobian: [[[0.0; L]; 3]; 3] };
+        let Slider { law: Law { a, b }, k, m } = self.slider;
+        let [z, y, x] = &points.y;
+        let [z_slope, y_slope, x_slope] = &points.slope;
+        // Velocities times t_f.
+        let unit = self.t_f * self.v_f;
+        for i in 0..L {
+            let (v, ageing) = (unit * exp(x[i]), unit * exp(-y[i]));
+            let told = match self.control {
+                Control::Continuous(path) => self.slider.control(&path.at_time(self.t_f * points.t[i]))[0],
+                Control::Held(told) => told,
+            };
+            let mass = m * v / (self.t_f * self.t_f);
+            at.mass[X][i] = mass;
+            at.residual[Z][i] = k * (self.t_f * told - v) - z_slope[i];
+            at.residual[Y][i] = (ageing - v) - y_slope[i];
+            at.residual[X][i] = (z[i] - a * x[i] - b * y[i]) - mass * x_slope[i];
+            at.jacobian[Z][X][i] = -k * v;
+            at.jacobian[Y][Y][i] = -ageing;
+            at.jacobian[Y][X][i] = -v;
+            at.jacobian[X][Z][i] = 1.0;
+            at.jacobian[X][Y][i] = -b;
+            at.jacobian[X][X][i] = -a - mass * x_slope[i];
+        }
+        at
+    }
+}
