@@ -56,11 +56,15 @@ pub fn solve(slider: &Slider, (v_i, v_f): (f64, f64), t_f: f64, rtol: f64) -> So
         Err(status) => return Solved { status, value: None, effort },
     };
     let turn = curve.exponent.turn().map_or(v_i, |x| 1.0 + curve.surplus(Side::Start, x));
+    let (v_min, v_max) = (v_i.min(v_f).min(turn), v_i.max(v_f).max(turn));
+    if slider.k == f64::INFINITY {
+        range.control = Extent { low: v_min, high: v_max };
+    }
     let value = Compliant {
         alpha: -curve.exponent.c,
         work: range.work,
-        v_min: v_i.min(v_f).min(turn),
-        v_max: v_i.max(v_f).max(turn),
+        v_min,
+        v_max,
         control_min: range.control.low,
         control_max: range.control.high,
     };

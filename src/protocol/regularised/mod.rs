@@ -60,6 +60,9 @@ pub fn solve(
     if sum.gather(&route, (v_i, v_f), (delta_t, t_f), &mut effort).is_none() {
         return none(Status::NotConverged, effort);
     }
+    if slider.k == f64::INFINITY {
+        sum.control = sum.v;
+    }
     let value = Regularised {
         work: optimum.work + sum.excess,
         work_optimal: optimum.work,
