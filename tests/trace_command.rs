@@ -73,12 +73,18 @@ fn times_that_nine_digits_do_not_tell_apart_are_shown_in_full() {
 #[test]
 fn csv_reads_back_the_same_numbers_and_parquet_too() {
     let folder = tempfile::tempdir().expect("is writable");
-    for name in ["optimal", "best", "bounded_velocity"] {
+    for name in ["optimal", "best", "bounded_velocity", "compliant"] {
         let csv = shown(&[&[name], UP, &["--format", "csv", "--out", "-"]]);
         let output = trace(folder.path(), &[&[name], UP, &["--out", "trace.parquet"]]);
         assert_eq!(output.status.code(), Some(0));
         assert!(String::from_utf8_lossy(&output.stdout).ends_with("\nwritten to trace.parquet\n"));
-        let columns = if name == "optimal" { &COLUMNS[..] } else { &COLUMNS[..4] };
+        let extra = match name {
+            "optimal" => "beta",
+            "compliant" => "v_c",
+            _ => "",
+        };
+        let columns: Vec<_> =
+            COLUMNS.iter().filter(|column| column.name == extra || !["v_c", "beta"].contains(&column.name)).collect();
         let mut lines = csv.lines();
         let names: Vec<&str> = columns.iter().map(|column| column.name).collect();
         assert_eq!(lines.next(), Some(names.join(",").as_str()));
@@ -133,7 +139,7 @@ fn coefficients_are_scaled_with_the_duration() {
 #[test]
 fn what_does_not_exist_says_which_bound() {
     let t_min = "0.3954147722546";
-    for name in ["optimal", "best", "bounded_velocity"] {
+    for name in ["optimal", "best", "bounded_velocity", "compliant"] {
         let (code, text) = complaint(&[&[name], DOWN]);
         assert!(code == Some(1) && text.starts_with(&format!("error: no `{name}` protocol: ")), "{text}");
         assert!(text.contains(&format!("the least is t_min = {t_min}")), "{text}");
@@ -232,4 +238,28 @@ fn a_file_is_replaced_whole_or_left_as_it_was() {
     let nowhere = complaint(&[&["optimal"], UP, &["--out", "no/such/folder/trace.csv"]]);
     let expected = "error: cannot write no/such/folder/trace.csv: No such file or directory (os error 2)";
     assert_eq!(nowhere, (Some(2), expected.to_owned()));
+}
+
+/// A table of the paper's shortcut on a spring: v within [1e5, 4.31e6], the control negative in between.
+#[test]
+fn paper_control_of_the_smooth_shortcut_turns_negative() {
+    let spring = ["compliant", "--t-f", "3.1e-6", "--a", "0.005", "--b", "0.01", "--v-i", "1e5", "--v-f", "3.2e6"];
+    let csv = shown(&[&spring, &["--k", "7.5e-3", "--m", "2.5e-16", "--format", "csv"]]);
+    let column = |place: usize| -> Vec<f64> {
+        csv.lines()
+            .skip(1)
+            .map(|line| line.split(',').nth(place).and_then(|cell| cell.parse().ok()).expect("is a number"))
+            .collect()
+    };
+    let range =
+        |values: Vec<f64>| values.into_iter().fold((f64::MAX, f64::MIN), |(low, high), v| (low.min(v), high.max(v)));
+    let ((v_min, v_max), (control_min, _)) = (range(column(1)), range(column(4)));
+    assert_eq!(v_min, 1e5);
+    assert!((v_max / 4.31e6 - 1.0).abs() < 1e-3 && control_min < -5e5, "{v_max} {control_min}");
+    // A rigid spring follows its far end.
+    let csv = shown(&[&spring, &["--format", "csv"]]);
+    for line in csv.lines().skip(1) {
+        let cells: Vec<&str> = line.split(',').collect();
+        assert_eq!(cells[1], cells[4], "{line}");
+    }
 }

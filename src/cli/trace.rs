@@ -13,7 +13,7 @@ use crate::grid::{Domain, Quantity, RTOL};
 use crate::model::{Law, Transition};
 use crate::protocol::Status;
 use crate::protocol::swift::{self, Case};
-use crate::trace::{self, Absence, Course, GOOD, Protocol, Times, Trace};
+use crate::trace::{self, Absence, COLUMNS, Course, GOOD, Protocol, Times, Trace};
 
 /// Arguments of `trace`.
 #[derive(Debug, clap::Args)]
@@ -46,6 +46,12 @@ pub struct Arguments {
     /// Coefficient of t^2 in theta, in units of 1/t_f^2 (free_cubic)
     #[arg(long, value_name = "Y", value_parser = |text: &str| legal(text, Quantity::Alpha3.domain()))]
     alpha_3: Option<f64>,
+    /// Stiffness of the spring, in mu_0 sigma/l; rigid by default (compliant)
+    #[arg(long, value_name = "K", value_parser = |text: &str| legal(text, Quantity::Stiffness.domain()))]
+    k: Option<f64>,
+    /// Mass of the block, in mu_0 sigma l/v_0^2; 0 by default (compliant)
+    #[arg(long, value_name = "M", value_parser = |text: &str| legal(text, Quantity::Mass.domain()))]
+    m: Option<f64>,
     /// Without the bound v >= 1 (optimal, best)
     #[arg(long)]
     unbounded: bool,
@@ -154,6 +160,8 @@ impl Arguments {
             ("--tau-max", self.tau_max.is_some(), family.is_some_and(|family| family.heeds_tau_max()), true),
             ("--alpha-2", self.alpha_2.is_some(), name == "free_cubic", true),
             ("--alpha-3", self.alpha_3.is_some(), name == "free_cubic", true),
+            ("--k", self.k.is_some(), name == "compliant", false),
+            ("--m", self.m.is_some(), name == "compliant", false),
             ("--unbounded", self.unbounded, matches!(name, "optimal" | "best"), false),
         ];
         for (flag, is_given, is_heeded, is_needed) in given {
@@ -168,6 +176,7 @@ impl Arguments {
         Ok(match (name, self.alpha_2, self.alpha_3, family) {
             ("optimal", ..) => Protocol::Optimal { bounded },
             ("best", ..) => Protocol::Best { bounded },
+            ("compliant", ..) => Protocol::Compliant { k: self.k.unwrap_or(f64::INFINITY), m: self.m.unwrap_or(0.0) },
             (_, Some(a_2), Some(a_3), _) => Protocol::FreeCubic { a_2, a_3 },
             (.., Some(family)) => Protocol::Family(family),
             _ => return Err(wrong(format!("no protocol is named `{name}`"))),
@@ -185,7 +194,9 @@ impl Arguments {
     /// What was asked for, number by number.
     fn numbers(&self) -> Vec<(&'static str, f64)> {
         let mut numbers = vec![("t_f", self.t_f), ("a", self.a), ("b", self.b), ("v_i", self.v_i), ("v_f", self.v_f)];
-        numbers.extend(self.tau_max.map(|tau_max| ("tau_max", tau_max)));
+        for (name, given) in [("tau_max", self.tau_max), ("k", self.k), ("m", self.m)] {
+            numbers.extend(given.map(|value| (name, value)));
+        }
         numbers
     }
 }
@@ -239,14 +250,15 @@ fn table(trace: &Trace) -> String {
         shown[0] == shown[1] && moments[0].t < moments[1].t
     };
     let all_digits = pairs.into_iter().any(alike);
-    let mut lines = vec![trace.columns().iter().map(|column| column.name.to_owned()).collect::<Vec<_>>()];
+    let columns = trace.columns();
+    let mut lines = vec![columns.iter().map(|&column| COLUMNS[column].name.to_owned()).collect::<Vec<_>>()];
     for moment in &trace.moments {
         let cell = |column: usize| match Trace::value(moment, column) {
             Some(t) if column == 0 && all_digits => format!("{t:?}"),
             Some(value) => words::number(value),
             None => "-".to_owned(),
         };
-        lines.push((0..trace.columns().len()).map(cell).collect());
+        lines.push(columns.iter().map(|&column| cell(column)).collect());
     }
     words::aligned(&lines, 2)
 }

@@ -11,6 +11,8 @@ pub struct Moment {
     pub theta: f64,
     /// Friction `tau = 1 + a ln v + b ln theta`.
     pub friction: f64,
+    /// Control velocity, where the spring is elastic.
+    pub v_c: Option<f64>,
     /// Costate of the contact lifetime, where the protocol is an extremal.
     pub beta: Option<f64>,
 }

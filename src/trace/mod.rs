@@ -13,12 +13,13 @@ pub use protocol::{Absence, Course, Protocol, names};
 pub use sample::GOOD;
 pub use write::{csv, parquet};
 
-/// The columns of a trace; `beta` only where the protocol is an extremal.
-pub const COLUMNS: [Column; 5] = [
+/// The columns of a trace; `v_c` only where the spring is elastic, `beta` only where the protocol is an extremal.
+pub const COLUMNS: [Column; 6] = [
     Column::number("t", "l/v_0", "time since the start; the same twice where the velocity jumps"),
     Column::number("v", "v_0", "velocity"),
     Column::number("theta", "l/v_0", "contact lifetime"),
     Column::number("tau", "mu_0 sigma", "friction 1 + a ln v + b ln theta"),
+    Column::number("v_c", "v_0", "control velocity, with which the far end of the spring moves"),
     Column::number(
         "beta",
         "mu_0 sigma v_0",
@@ -60,7 +61,10 @@ impl Trace {
             Times::Fewest => samples.fewest(),
             Times::Spaced(count) => sample::spaced(motion, count)?,
         };
-        let jumps = |here: &Moment, steady: &Moment| (here.v - steady.v).abs() > JUMP * steady.v;
+        let apart = |here: f64, steady: f64| (here - steady).abs() > JUMP * steady;
+        let jumps = |here: &Moment, steady: &Moment| {
+            apart(here.v, steady.v) || here.v_c.is_some_and(|v_c| apart(v_c, steady.v))
+        };
         if moments.first().is_some_and(|first| jumps(first, &before)) {
             moments.insert(0, before);
         }
@@ -70,10 +74,10 @@ impl Trace {
         Some(Trace { moments, v_min, v_max })
     }
 
-    /// The columns that the trace has.
-    pub fn columns(&self) -> &'static [Column] {
-        let extremal = self.moments.iter().any(|moment| moment.beta.is_some());
-        if extremal { &COLUMNS } else { &COLUMNS[..COLUMNS.len() - 1] }
+    /// The columns that the trace has, by their places in [`COLUMNS`].
+    pub fn columns(&self) -> Vec<usize> {
+        let is_there = |&column: &usize| self.moments.iter().any(|moment| Trace::value(moment, column).is_some());
+        (0..COLUMNS.len()).filter(is_there).collect()
     }
 
     /// The value of a column at a moment, by its place in [`COLUMNS`]; `None` where there is none.
@@ -83,6 +87,7 @@ impl Trace {
             1 => Some(moment.v),
             2 => Some(moment.theta),
             3 => Some(moment.friction),
+            4 => moment.v_c,
             _ => moment.beta,
         }
     }
@@ -92,7 +97,13 @@ impl Trace {
 fn around(motion: &dyn Motion, transition: &Transition) -> [Moment; 2] {
     let (first, last) = (motion.at(0.0), motion.at(1.0));
     let Law { a, b } = transition.law;
-    let steady =
-        |t: f64, v: f64, theta: f64| Moment { t, v, theta, friction: 1.0 + a * ln(v) + b * ln(theta), beta: None };
+    let steady = |t: f64, v: f64, theta: f64| Moment {
+        t,
+        v,
+        theta,
+        friction: 1.0 + a * ln(v) + b * ln(theta),
+        v_c: first.v_c.map(|_| v),
+        beta: None,
+    };
     [steady(0.0, transition.v_i, first.theta), steady(motion.duration(), transition.v_f, last.theta)]
 }

@@ -2,11 +2,12 @@
 
 use std::fmt;
 
+use crate::model::Transition;
 use crate::protocol::cubic::{Landscape, Shortcuts};
 use crate::protocol::swift::{Case, FAMILIES, Family, Obstacle};
-use crate::protocol::{Effort, Motion, Status, best, optimal};
+use crate::protocol::{Effort, Motion, Slider, Status, best, compliant, optimal};
 
-/// A protocol of the rigid limit.
+/// A protocol, and the spring that drives it where that is elastic.
 #[derive(Clone, Copy)]
 pub enum Protocol {
     /// The protocol of least work, with `v >= 1` where `bounded`.
@@ -28,16 +29,24 @@ pub enum Protocol {
     },
     /// The member of a family.
     Family(&'static dyn Family),
+    /// The smooth shortcut on a spring.
+    Compliant {
+        /// Stiffness of the spring.
+        k: f64,
+        /// Mass of the block.
+        m: f64,
+    },
 }
 
-/// Names and meanings of all protocols: first those that are no family, then [`FAMILIES`].
+/// Names and meanings of all protocols: first those that are no family, then [`FAMILIES`], then those on a spring.
 pub fn names() -> impl Iterator<Item = (&'static str, &'static str)> {
     let others = [
         ("optimal", "least work of friction of all protocols; v may jump at both ends"),
         ("best", "least work of all free cubics"),
         ("free_cubic", "theta a cubic in time with alpha_2 and alpha_3 given; v may jump at both ends"),
     ];
-    others.into_iter().chain(FAMILIES.into_iter().map(|family| (family.name(), family.doc())))
+    let elastic = [("compliant", "v, v' and v'' continuous, so that an elastic spring can drive it; with its v_c")];
+    others.into_iter().chain(FAMILIES.into_iter().map(|family| (family.name(), family.doc()))).chain(elastic)
 }
 
 /// A protocol that exists: how it moves, and its numbers.
@@ -117,6 +126,7 @@ impl Protocol {
             Protocol::Best { bounded } => least_cubic(case, bounded, rtol),
             Protocol::FreeCubic { a_2, a_3 } => free_cubic(case, a_2, a_3, rtol),
             Protocol::Family(family) => member(family, case, rtol),
+            Protocol::Compliant { k, m } => smooth(case, k, m, rtol),
         }
     }
 }
@@ -179,6 +189,26 @@ fn scaled(a_2: f64, a_3: f64) -> Vec<(&'static str, f64, &'static str)> {
         ("alpha_2", a_2, "coefficient of t in theta, in 1/t_f"),
         ("alpha_3", a_3, "coefficient of t^2 in theta, in 1/t_f^2"),
     ]
+}
+
+fn smooth(case: &Case, k: f64, m: f64, rtol: f64) -> Result<Course, Absence> {
+    let Case { transition: Transition { law, v_i, v_f }, t_f, .. } = *case;
+    let slider = Slider { law, k, m };
+    let solved = compliant::solve(&slider, (v_i, v_f), t_f, rtol);
+    let t_min = case.transition.least_time();
+    let (Some(value), Ok(path)) = (solved.value, compliant::path(&slider, (v_i, v_f), t_f, rtol)) else {
+        return Err(match solved.status {
+            Status::Infeasible if t_f <= t_min => Absence::Time { t_f, t_min, bounded: true },
+            Status::Infeasible => Obstacle::Domain.into(),
+            _ => Obstacle::NotConverged.into(),
+        });
+    };
+    let parameters = vec![
+        ("alpha", value.alpha, "coefficient of x^3 (1 - x)^3 in ln(v - 1), x = t/t_f"),
+        ("v_c_min", value.control_min, "least control velocity"),
+        ("v_c_max", value.control_max, "greatest control velocity"),
+    ];
+    Ok(Course { motion: Box::new(path), status: solved.status, work: value.work, parameters })
 }
 
 fn member(family: &dyn Family, case: &Case, rtol: f64) -> Result<Course, Absence> {

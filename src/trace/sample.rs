@@ -35,10 +35,10 @@ pub struct Samples {
 }
 
 /// Columns that are interpolated.
-const COLUMNS: usize = 4;
+const COLUMNS: usize = 5;
 
-fn columns(moment: &Moment) -> [f64; COLUMNS] {
-    [moment.v, moment.theta, moment.friction, moment.beta.unwrap_or(0.0)]
+fn columns(moment: &Moment) -> [Option<f64>; COLUMNS] {
+    [Some(moment.v), Some(moment.theta), Some(moment.friction), moment.v_c, moment.beta]
 }
 
 impl Samples {
@@ -205,16 +205,15 @@ const MOST_LOOKS: u32 = 120;
 
 fn look(motion: &dyn Motion, s: f64) -> Option<Sample> {
     let moment = motion.at(s);
-    let is_number = moment.t.is_finite() && columns(&moment).iter().all(|value| value.is_finite());
+    let is_number = moment.t.is_finite() && columns(&moment).iter().flatten().all(|value| value.is_finite());
     is_number.then_some(Sample { s, moment })
 }
 
 fn tolerance<'a>(moments: impl Iterator<Item = &'a Moment>) -> [f64; COLUMNS] {
     let mut ranges = [(f64::INFINITY, f64::NEG_INFINITY); COLUMNS];
     for moment in moments {
-        let beta_counts = moment.beta.is_some();
-        for (column, (value, (least, greatest))) in columns(moment).into_iter().zip(&mut ranges).enumerate() {
-            if column + 1 < COLUMNS || beta_counts {
+        for (value, (least, greatest)) in columns(moment).into_iter().zip(&mut ranges) {
+            if let Some(value) = value {
                 (*least, *greatest) = (least.min(value), greatest.max(value));
             }
         }
@@ -235,10 +234,11 @@ fn is_straight(from: &Sample, to: &Sample, between: &[Sample], tolerance: &[f64;
     if time <= CLOSE * to.moment.t {
         return true;
     }
-    let (start, end) = (columns(&from.moment), columns(&to.moment));
+    let values = |sample: &Sample| columns(&sample.moment).map(|value| value.unwrap_or(0.0));
+    let (start, end) = (values(from), values(to));
     between.iter().all(|sample| {
         let share = (sample.moment.t - from.moment.t) / time;
-        let here = columns(&sample.moment);
+        let here = values(sample);
         (0..COLUMNS).all(|i| (start[i] + share * (end[i] - start[i]) - here[i]).abs() <= tolerance[i])
     })
 }

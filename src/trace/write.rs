@@ -11,19 +11,21 @@ use parquet::file::metadata::KeyValue;
 use parquet::file::properties::WriterProperties;
 use parquet::file::writer::SerializedFileWriter;
 
-use super::Trace;
+use super::{COLUMNS, Trace};
 use crate::dataset::field;
 use crate::table::Kind;
 
 /// A line with the names of the columns, then one a moment; every number in the fewest digits that read back the same,
 /// and nothing where there is none.
 pub fn csv(trace: &Trace) -> String {
-    let names: Vec<&str> = trace.columns().iter().map(|column| column.name).collect();
+    let columns = trace.columns();
+    let names: Vec<&str> = columns.iter().map(|&column| COLUMNS[column].name).collect();
     let mut text = names.join(",");
     text.push('\n');
     for moment in &trace.moments {
-        let cells: Vec<String> = (0..names.len())
-            .map(|column| Trace::value(moment, column).map_or(String::new(), |value| format!("{value:?}")))
+        let cells: Vec<String> = columns
+            .iter()
+            .map(|&column| Trace::value(moment, column).map_or(String::new(), |value| format!("{value:?}")))
             .collect();
         text.push_str(&cells.join(","));
         text.push('\n');
@@ -35,7 +37,8 @@ pub fn csv(trace: &Trace) -> String {
 /// same bytes on every machine.
 pub fn parquet(trace: &Trace, facts: &[(String, String)], version: &str) -> Result<Vec<u8>> {
     let columns = trace.columns();
-    let fields = columns.iter().enumerate().map(|(place, column)| {
+    let fields = columns.iter().map(|&place| {
+        let column = &COLUMNS[place];
         let unit = if let Kind::Number(unit) = column.kind { unit } else { "" };
         field(column.name, DataType::Float64, is_partial(place), unit, column.doc)
     });
@@ -53,7 +56,7 @@ pub fn parquet(trace: &Trace, facts: &[(String, String)], version: &str) -> Resu
     add_encoded_arrow_schema_to_metadata(&layout, &mut properties);
     let mut file = SerializedFileWriter::new(Vec::new(), schema.root_schema_ptr(), Arc::new(properties))?;
     let mut group = file.next_row_group()?;
-    for column in 0..columns.len() {
+    for column in columns {
         let cells: Vec<Option<f64>> = trace.moments.iter().map(|moment| Trace::value(moment, column)).collect();
         let values: Vec<f64> = cells.iter().copied().flatten().collect();
         let levels: Vec<i16> = cells.iter().map(|cell| i16::from(cell.is_some())).collect();
@@ -69,5 +72,5 @@ pub fn parquet(trace: &Trace, facts: &[(String, String)], version: &str) -> Resu
 
 /// Whether a column, by its place, may have no value: the costate before and after the protocol.
 fn is_partial(column: usize) -> bool {
-    column + 1 == super::COLUMNS.len()
+    column + 1 == COLUMNS.len()
 }

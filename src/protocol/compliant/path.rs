@@ -52,6 +52,9 @@ impl Motion for Path {
     }
 
     fn at(&self, s: f64) -> Moment {
-        self.resolution.at(s)
+        let along = s.clamp(0.0, 1.0) * self.pieces() as f64;
+        let piece = (along as usize).min(self.pieces() - 1);
+        let v_c = self.slider.control(&self.jet(piece, along - piece as f64))[0];
+        Moment { v_c: Some(v_c), ..self.resolution.at(s) }
     }
 }

@@ -56,7 +56,7 @@ impl Motion for FreeCubic {
         let (theta, n) = self.path().at(x);
         let v = n / (self.ends.t_f * theta);
         let friction = 1.0 + self.law.a * ln(v) + self.law.b * ln(theta);
-        Moment { t: x * self.ends.t_f, v, theta, friction, beta: None }
+        Moment { t: x * self.ends.t_f, v, theta, friction, v_c: None, beta: None }
     }
 }
 

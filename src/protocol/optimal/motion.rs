@@ -81,6 +81,7 @@ impl Motion for Optimal {
             v: if on_bound { 1.0 } else { v },
             theta: here.theta,
             friction,
+            v_c: None,
             // C - a v, which cancels where v is large.
             beta: Some(-(friction + a) / here.theta),
         }
@@ -126,6 +127,7 @@ impl Hold {
             v: 1.0,
             theta: now.theta,
             friction: 1.0 + self.law.b * now.ln(),
+            v_c: None,
             beta: Some(self.costate(now.ln(), now.rest, left)),
         }
     }

@@ -33,6 +33,6 @@ impl<E: Exponent> Motion for Resolution<E> {
         let (x, z) = panel.place(u);
         let theta = panel.theta(u);
         let v = self.curve.floor + self.curve.w_f * exp(self.curve.exponent.value(x, z));
-        Moment { t: self.curve.t_f * x, v, theta, friction: friction_at(&self.law, v, theta), beta: None }
+        Moment { t: self.curve.t_f * x, v, theta, friction: friction_at(&self.law, v, theta), v_c: None, beta: None }
     }
 }

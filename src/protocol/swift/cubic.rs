@@ -201,6 +201,7 @@ impl Motion for Trace {
             v: self.curve.velocity(side, d),
             theta: self.curve.theta(side, d),
             friction: self.curve.friction(side, d),
+            v_c: None,
             beta: None,
         }
     }

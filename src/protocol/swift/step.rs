@@ -111,6 +111,7 @@ impl Motion for Relaxation {
             v: self.v_f,
             theta: self.decay.at(p) / self.v_f,
             friction: 1.0 + (self.law.a - self.law.b) * ln(self.v_f) + self.law.b * ln_ratio,
+            v_c: None,
             beta: None,
         }
     }

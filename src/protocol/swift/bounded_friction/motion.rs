@@ -33,6 +33,7 @@ impl Motion for Resolution {
             v: self.course.velocity(d, u),
             theta: exp(u),
             friction: self.course.friction(d),
+            v_c: None,
             beta: None,
         }
     }
