@@ -11,9 +11,10 @@ use polars::prelude::{Column, Float64Chunked, NewChunkedArray, ParquetReader, Pa
 use slipsweep::dataset::Folder;
 
 const AXES: &str = "t_f = [0.02, 0.3, 0.41]\na = 0.03\nb = [0.01, 0.03, 0.05]\nv_i = 3.0\nv_f = [100.0, 2.0]\n\
-                    alpha_2 = { linspace = [-0.2, 0.2, 3], unit = \"1/t_f\" }\nalpha_3 = 0.0\ntau_max = 1.6\n";
+                    alpha_2 = { linspace = [-0.2, 0.2, 3], unit = \"1/t_f\" }\nalpha_3 = 0.0\ntau_max = 1.6\nk = [0.01, 0.03]\nm = 1e-5\n";
 
-const TABLES: &str = "[tables.gap]\n[tables.best]\n[tables.optimal]\n[tables.crossover]\n[tables.swift]\n";
+const TABLES: &str =
+    "[tables.gap]\n[tables.best]\n[tables.optimal]\n[tables.crossover]\n[tables.swift]\n[tables.stability]\n";
 
 fn verify(folder: &Path, arguments: &[&str]) -> Output {
     let mut command = Command::new(env!("CARGO_BIN_EXE_slipsweep"));
@@ -30,7 +31,14 @@ fn a_sound_dataset_passes() {
     run(&sweep(folder.path(), AXES, TABLES), folder.path(), 2);
     let output = verify(folder.path(), &["--sample", "1000"]);
     assert_eq!(output.status.code(), Some(0), "{}{}", text(&output), String::from_utf8_lossy(&output.stderr));
-    for table in ["gap: 54 rows", "best: 18 rows", "optimal: 18 rows", "crossover: 6 rows", "swift: 72 rows"] {
+    for table in [
+        "gap: 54 rows",
+        "best: 18 rows",
+        "optimal: 18 rows",
+        "crossover: 6 rows",
+        "swift: 72 rows",
+        "stability: 12 rows",
+    ] {
         assert!(text(&output).contains(table), "{}", text(&output));
     }
     // The same seed draws the same rows, another seed others.
@@ -75,6 +83,9 @@ fn a_planted_error_is_found_and_named() {
         ("swift", "work"),
         ("swift", "v_max"),
         ("swift", "friction_max"),
+        ("stability", "k_c_f"),
+        ("stability", "growth_rate"),
+        ("stability", "frequency"),
     ] {
         run(&sweep, folder.path(), 2);
         let row = corrupt(folder.path(), table, column);

@@ -17,6 +17,7 @@ use crate::numerics::double_double::DoubleDouble;
 pub struct SteadySliding {
     law: Law,
     k: f64,
+    m: f64,
     v: f64,
     /// `m v^2`.
     inertia: f64,
@@ -40,6 +41,9 @@ pub struct Eigenvalues {
     pub decay_rate: Option<f64>,
 }
 
+/// Two eigenvalues whose squared half distance is below this share of their product are close.
+const CLOSE: f64 = 1e-3;
+
 /// A difference below this share of its terms is formed in double-double.
 const CANCELS: f64 = 0.125;
 
@@ -50,7 +54,7 @@ impl SteadySliding {
         let inertia = m * v * v;
         let sum = inertia + law.a;
         let (pull, push) = (law.a * k, weakening * sum);
-        let mut sliding = SteadySliding { law, k, v, inertia, sum, c: k - weakening, hurwitz: pull - push };
+        let mut sliding = SteadySliding { law, k, m, v, inertia, sum, c: k - weakening, hurwitz: pull - push };
         if k.is_finite() && sliding.hurwitz.abs() < CANCELS * pull {
             let inertia = DoubleDouble::product(v, v) * DoubleDouble::new(m);
             let weakening = DoubleDouble::sum(law.b, -law.a);
@@ -160,6 +164,18 @@ impl SteadySliding {
         (-slope + (slope * slope - 4.0 * square * hurwitz).sqrt()) / (2.0 * square)
     }
 
+    /// `P^2/4 - Q` with 32 digits: next to a double root it is a small difference.
+    fn discriminant(&self, r: f64) -> f64 {
+        let double = DoubleDouble::new;
+        let (k, inertia) = (double(self.k), DoubleDouble::product(self.v, self.v) * double(self.m));
+        let (sum, c) = (inertia + double(self.law.a), k - DoubleDouble::sum(self.law.b, -self.law.a));
+        let x = double(r);
+        let rest = (((x - sum) * x + c * inertia) * x - k * inertia * inertia).high;
+        let x = x - double(rest / ((3.0 * r - 2.0 * self.sum) * r + self.c * self.inertia));
+        let half = (c - inertia * k / x) / x * double(0.5);
+        (half * half - k / x).high
+    }
+
     /// The two eigenvalues beside the real one: roots of `x^2 + P x + Q`.
     fn pair(&self, r: f64) -> Pair {
         let SteadySliding { k, inertia, sum, c, hurwitz, .. } = *self;
@@ -180,9 +196,13 @@ impl SteadySliding {
             }
         }
         let half = 0.5 * p;
-        let squares = (half - q.sqrt()) * (half + q.sqrt());
+        let mut squares = (half - q.sqrt()) * (half + q.sqrt());
+        if squares.abs() < CLOSE * q {
+            squares = self.discriminant(r);
+        }
         if squares < 0.0 {
-            return Pair::Complex { growth: -half, frequency: (-squares).sqrt() };
+            // 0 without a sign at the critical stiffness.
+            return Pair::Complex { growth: 0.0 - half, frequency: (-squares).sqrt() };
         }
         // The product tells the smaller one.
         let larger = -(half + squares.sqrt().copysign(half));

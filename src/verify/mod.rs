@@ -7,6 +7,7 @@ mod gap;
 mod optimal;
 mod route;
 mod sample;
+mod stability;
 mod swift;
 
 use std::path::Path;
@@ -128,6 +129,7 @@ pub fn verify(path: &Path, manifest: &Manifest, sample: u64, seed: u64) -> Resul
                 "crossover" => crossover::check(&row, &context),
                 "best" => best::check(&row, &context, rtol),
                 "swift" => swift::check(&row, &context),
+                "stability" => stability::check(&row, &context),
                 _ => Verdict::unchecked("there is no independent route for this table"),
             };
             audit.add(number, row, verdict);

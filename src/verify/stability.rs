@@ -1,0 +1,116 @@
+//! `stability`: all roots of the characteristic polynomial at once, by simultaneous iteration with 32 digits.
+
+use super::{Context, Verdict, number, transition};
+use crate::dataset::Row;
+use crate::numerics::double_double::DoubleDouble;
+
+type Complex = [DoubleDouble; 2];
+
+const ZERO: DoubleDouble = DoubleDouble::new(0.0);
+const ONE: Complex = [DoubleDouble::new(1.0), ZERO];
+
+fn difference(x: Complex, y: Complex) -> Complex {
+    [x[0] - y[0], x[1] - y[1]]
+}
+
+fn product(x: Complex, y: Complex) -> Complex {
+    [x[0] * y[0] - x[1] * y[1], x[0] * y[1] + x[1] * y[0]]
+}
+
+fn quotient(x: Complex, y: Complex) -> Complex {
+    let square = y[0] * y[0] + y[1] * y[1];
+    let [re, im] = product(x, [y[0], -y[1]]);
+    [re / square, im / square]
+}
+
+fn size(x: Complex) -> f64 {
+    x[0].high.hypot(x[1].high)
+}
+
+/// Most rounds of the iteration: roots that differ by many decades are told apart by a factor a round.
+const ROUNDS: u32 = 2000;
+
+/// The roots of `x^n + c[n - 1] x^(n - 1) + … + c[0]` (Weierstrass, Durand, Kerner); `None` if they do not come to rest.
+fn roots<const N: usize>(c: [DoubleDouble; N]) -> Option<[Complex; N]> {
+    let value = |x: Complex| {
+        c.iter().rev().fold(ONE, |sum, &c| {
+            let [re, im] = product(sum, x);
+            [re + c, im]
+        })
+    };
+    // On a circle that holds them all, none of them real, no two conjugate.
+    let bound = (0..N).map(|n| (2.0 * c[n].high.abs()).powf(1.0 / (N - n) as f64)).fold(0.0, f64::max);
+    let mut found = std::array::from_fn(|n| {
+        let angle = 0.4 + 2.0 * std::f64::consts::PI * n as f64 / N as f64;
+        [bound * angle.cos(), bound * angle.sin()].map(DoubleDouble::new)
+    });
+    for _ in 0..ROUNDS {
+        let mut rests = true;
+        for n in 0..N {
+            let x = found[n];
+            let others = (0..N).filter(|&m| m != n).fold(ONE, |all, m| product(all, difference(x, found[m])));
+            let step = quotient(value(x), others);
+            found[n] = difference(x, step);
+            rests &= size(step) <= 1e-24 * size(x);
+        }
+        if rests {
+            return Some(found);
+        }
+    }
+    None
+}
+
+/// Growth rate, frequency and decay rate over `v` from all eigenvalues.
+fn modes(mut roots: Vec<Complex>) -> [f64; 3] {
+    let is_real = |root: &Complex| root[1].high.abs() <= 1e-20 * size(*root);
+    // The pair first, then by descending real part.
+    roots.sort_by(|x, y| is_real(x).cmp(&is_real(y)).then(y[0].high.total_cmp(&x[0].high)));
+    let frequency = if is_real(&roots[0]) { 0.0 } else { roots[0][1].high.abs() };
+    [roots[0][0].high, frequency, roots.last().map_or(f64::NAN, |root| root[0].high)]
+}
+
+pub fn check(row: &Row, _: &Context) -> Verdict {
+    let (Some(problem), Some(k), Some(m)) = (transition(row), number(row, "k"), number(row, "m")) else {
+        return Verdict::unchecked("an axis is missing");
+    };
+    let double = DoubleDouble::new;
+    let (a, b) = (double(problem.law.a), double(problem.law.b));
+    let weakening = b - a;
+    let critical = |v: f64| weakening * (double(1.0) + double(m) * double(v) * double(v) / a);
+    let mut verdict = Verdict::default();
+    verdict.compare(row, "k_qs", Some(weakening.high), None);
+    for (k_c, stable, v) in [("k_c_i", "stable_i", problem.v_i), ("k_c_f", "stable_f", problem.v_f)] {
+        let critical = critical(v);
+        verdict.compare(row, k_c, Some(critical.high), None);
+        let is_stable = !k.is_finite() || (double(k) - critical).high > 0.0;
+        verdict.compare_word(row, stable, if is_stable { "yes" } else { "no" });
+    }
+    let square = (a * (double(k) / weakening - double(1.0)) / double(m)).high;
+    let exists = weakening.high > 0.0 && square > 0.0 && square.is_finite();
+    verdict.compare(row, "v_crit", exists.then(|| square.sqrt()), None);
+    if !k.is_finite() {
+        for column in ["growth_rate", "frequency", "decay_rate"] {
+            verdict.compare(row, column, None, None);
+        }
+        return verdict;
+    }
+    let v = problem.v_f;
+    let inertia = double(m) * double(v) * double(v);
+    let (sum, c) = (inertia + a, double(k) - weakening);
+    let all = if m > 0.0 {
+        roots([double(k) / inertia, c / inertia, sum / inertia]).map(Vec::from)
+    } else {
+        roots([double(k) / a, c / a]).map(Vec::from)
+    };
+    let Some([growth, frequency, decay]) = all.map(modes) else {
+        verdict.unchecked = Some("two eigenvalues are too close to be told apart");
+        return verdict;
+    };
+    // At the critical stiffness it is 0, which has no relative error.
+    let modulus = growth.hypot(frequency);
+    verdict.compare(row, "growth_rate", Some(v * growth), Some(v * growth.abs().max(1e-20 * modulus)));
+    // Next to a double root the frequency is the root of a small difference.
+    verdict.compare(row, "frequency", Some(v * frequency), Some(v * modulus));
+    verdict.compare(row, "decay_rate", (m > 0.0).then_some(v * decay), None);
+    verdict
+}
