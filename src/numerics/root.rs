@@ -91,3 +91,31 @@ fn middle(low: f64, high: f64) -> f64 {
         (false, false) => 0.0,
     }
 }
+
+/// A zero of a continuous function between two places where its values differ in sign, to `resolution`: the Illinois
+/// method (Dowell and Jarratt, BIT 11, 168, 1971).
+pub fn crossing(
+    mut f: impl FnMut(f64) -> f64,
+    [mut x0, mut x1]: [f64; 2],
+    [mut f0, mut f1]: [f64; 2],
+    resolution: f64,
+) -> f64 {
+    for _ in 0..MOST_PROBES {
+        if f1 == 0.0 || (x1 - x0).abs() <= resolution {
+            return x1;
+        }
+        let x = x1 - f1 * (x1 - x0) / (f1 - f0);
+        let value = f(x);
+        if (value > 0.0) == (f1 > 0.0) {
+            f0 *= 0.5;
+        } else {
+            (x0, f0) = (x1, f1);
+        }
+        let step = (x - x1).abs();
+        (x1, f1) = (x, value);
+        if step <= resolution {
+            return x1;
+        }
+    }
+    x1
+}

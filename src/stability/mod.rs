@@ -2,6 +2,7 @@
 
 mod driven;
 mod linear;
+pub mod response;
 mod sensitivity;
 
 pub use driven::{held_error, loop_error};

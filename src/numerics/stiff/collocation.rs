@@ -76,7 +76,8 @@ fn make<const S: usize>() -> Collocation<S> {
             weight(i) / (weight(j) * (place(i) - place(j)))
         }
     };
-    // int_0^c_i of the polynomial of degree S - 1 in its powers; its coefficients are those of u^1 … u^S times c_j, less one power.
+    // int_0^c_i of the polynomial of degree S - 1 in its powers; its coefficients are those of u^1 … u^S times c_j,
+    // less one power.
     let integral = |i: usize, j: usize| {
         let mut sum = zero;
         let mut power = one;

@@ -115,6 +115,11 @@ impl<'a, Y: System<N>, const N: usize, const S: usize> Integrator<'a, Y, N, S> {
         self.cost
     }
 
+    /// Goes on from other variables, which meet the constraints, at the same time; with a first step of about `h > 0`.
+    pub fn jump(&mut self, y: [f64; N], h: f64) {
+        (self.y, self.h, self.last) = (y, h, None);
+    }
+
     /// One step, which ends at `limit` at the latest (and then exactly there).
     #[inline(always)]
     pub fn step(&mut self, limit: f64) -> Result<Piece<N, S>, Failure> {
@@ -159,8 +164,8 @@ impl<'a, Y: System<N>, const N: usize, const S: usize> Integrator<'a, Y, N, S> {
         self.leg(piece, (piece.t, piece.start), 0.0, u)
     }
 
-    /// A middle part of a step that was taken, between the shares `from` and `to`, as a step of its own: shorter, so its
-    /// polynomial is closer to the solution. `None` if Newton's method fails.
+    /// A middle part of a step that was taken, between the shares `from` and `to`, as a step of its own: shorter, so
+    /// its polynomial is closer to the solution. `None` if Newton's method fails.
     #[inline(always)]
     pub fn between(&mut self, piece: &Piece<N, S>, from: f64, to: f64) -> Option<Piece<N, S>> {
         let start = if from > 0.0 { self.part(piece, from)?.end } else { piece.start };
@@ -282,8 +287,8 @@ impl<'a, Y: System<N>, const N: usize, const S: usize> Integrator<'a, Y, N, S> {
         points
     }
 
-    /// Error estimate of a step: the polynomial meets the equations at the nodes, but not at the start. Its defect there
-    /// goes through `(mass/(gamma h) - J)^-1`, which damps what is stiff (Hairer and Wanner, section IV.8).
+    /// Error estimate of a step: the polynomial meets the equations at the nodes, but not at the start. Its defect
+    /// there goes through `(mass/(gamma h) - J)^-1`, which damps what is stiff (Hairer and Wanner, section IV.8).
     #[inline(always)]
     fn error(&mut self, h: f64, change: &[[f64; S]; N]) -> Option<f64> {
         // About the inverse of the real eigenvalue of the method's inverse matrix.

@@ -33,14 +33,14 @@
 //! ```
 //!
 //! Where the equations jump (a control that is sampled and held), end a step there, and go on with a new integrator
-//! whose first step is the old one's [`Integrator::proposal`]. Where a number is needed inside a step to the order of the
-//! method, as for an event, [`Integrator::part`] integrates again up to there.
+//! whose first step is the old one's [`Integrator::proposal`]. Where a number is needed inside a step to the order of
+//! the method, as for an event, [`Integrator::part`] integrates again up to there.
 //!
 //! # Method
 //!
 //! The stages are solved by Newton's method with the Jacobian of every stage at its own place, so long steps through
-//! strong nonlinearities converge; the matrix is eliminated variable by variable ([`System`] says in which order), which
-//! costs about as much as one iteration of the usual frozen and diagonalised form. The last step's polynomial,
+//! strong nonlinearities converge; the matrix is eliminated variable by variable ([`System`] says in which order),
+//! which costs about as much as one iteration of the usual frozen and diagonalised form. The last step's polynomial,
 //! continued, is the first guess.
 
 mod blocks;

@@ -1,7 +1,7 @@
 //! The equations that are integrated: implicit, with one equation a variable.
 
-/// Equations `mass(t, y) y' = f(t, y)` with one mass a variable: the residual `r(t, y, y') = f - mass y'` vanishes along
-/// a solution. A mass may be 0, which makes its equation a constraint (index 1: solvable for its variable).
+/// Equations `mass(t, y) y' = f(t, y)` with one mass a variable: the residual `r(t, y, y') = f - mass y'` vanishes
+/// along a solution. A mass may be 0, which makes its equation a constraint (index 1: solvable for its variable).
 ///
 /// Variables should be chosen so that one absolute tolerance each makes sense: logarithms of what spans decades. They
 /// are eliminated in their order: first those whose equation does not contain them, then those that are damped, last

@@ -1,0 +1,473 @@
+//! What becomes of a response in the end: rest, a limit cycle, or nothing that could be decided.
+//!
+//! A cycle maps the section `v = v_f` onto itself. On it the energy is `E = z^2/(2 k)`, so what friction takes over a
+//! cycle is the change of `ln z` without a difference of nearly equal numbers, however slow it is. While cycles
+//! change fast they are followed one by one. Where they change slowly, and slower than the contact lifetime relaxes,
+//! the map is one of `ln z` alone: its fixed points, and the number of cycles between two values of `z`, follow from
+//! samples of it.
+
+use super::orbit::{BAND, Cycle, Extremum, Orbit, Stop};
+use super::slider::{Slider, State, Y, Z};
+use crate::numerics::elementary::{exp, ln, ln_1p};
+use crate::numerics::gauss;
+
+/// The end of a response.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Fate {
+    /// Steady sliding.
+    Settled {
+        /// Time after which the velocity stays within [`SETTLED`](super::SETTLED), in `l/v_f`.
+        time: f64,
+    },
+    /// A limit cycle.
+    Cycle {
+        /// Its duration, in `l/v_f`.
+        period: f64,
+        /// `ln(v/v_f)` at its fastest.
+        high: f64,
+        /// `ln(v/v_f)` at its slowest.
+        low: f64,
+    },
+    /// None that could be decided with the work allowed.
+    Undecided,
+    /// The velocity becomes infinite in finite time, which takes a mass of 0.
+    Ends,
+}
+
+/// A response that was followed to its end.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Course {
+    /// Its end.
+    pub fate: Fate,
+    /// Its fastest moment since `v = v_f` was first met, if there was one.
+    pub high: Option<Extremum>,
+    /// Its slowest.
+    pub low: Option<Extremum>,
+    /// Time up to which it was followed, in `l/v_f`.
+    pub t: f64,
+    /// Steps taken.
+    pub steps: u32,
+}
+
+/// Small motions about steady sliding.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Linear {
+    /// Whether they die out.
+    pub stable: bool,
+    /// Change of `ln z` over a cycle, if they oscillate.
+    pub growth: Option<f64>,
+    /// Rate at which they come to oscillate alone, in `v_f/l`: minus the third eigenvalue, or infinite.
+    pub relaxation: f64,
+}
+
+/// Steps of one response.
+const MOST_STEPS: u32 = 100_000;
+
+/// Cycles over which `ln z` changes by less than this are sampled.
+const SLOW: f64 = 0.1;
+
+/// The contact lifetime must relax this many times faster than `z` changes.
+const ADIABATIC: f64 = 10.0;
+
+/// Cycles of one sample.
+const MOST_RELAXATIONS: u32 = 60;
+
+/// Nodes of a panel of the integral over `ln z` for the number of cycles, and the greatest length of a panel.
+const NODES: usize = 5;
+const PANEL: f64 = 1.2;
+
+/// Relative error that a sample's rate may have.
+const RATE_ERROR: f64 = 1e-3;
+
+/// Follows the response that starts from steady sliding at `e^x v_f`, `x` not 0.
+pub fn follow(slider: &Slider, linear: Linear, x: f64, rtol: f64) -> Course {
+    let tolerance = 0.03 * rtol;
+    let mut follower = Follower { slider, linear, rtol, tolerance, budget: MOST_STEPS, high: None, low: None, t: 0.0 };
+    let fate = follower.run(slider.steady(x)).unwrap_or_else(|stop| match stop {
+        Stop::Ends if slider.inertia == 0.0 => Fate::Ends,
+        Stop::Ends | Stop::Quiet | Stop::Unrelaxed | Stop::Budget => Fate::Undecided,
+    });
+    let Follower { high, low, t, budget, .. } = follower;
+    Course { fate, high, low, t, steps: MOST_STEPS - budget }
+}
+
+struct Follower<'a> {
+    slider: &'a Slider,
+    linear: Linear,
+    rtol: f64,
+    tolerance: f64,
+    budget: u32,
+    high: Option<Extremum>,
+    low: Option<Extremum>,
+    t: f64,
+}
+
+/// A place on the section.
+#[derive(Debug, Clone, Copy)]
+struct Place {
+    z: f64,
+    y: f64,
+}
+
+/// A cycle that starts on the slow manifold.
+#[derive(Debug, Clone, Copy)]
+struct Sample {
+    place: Place,
+    /// Change of `y` with `ln z` along the slow manifold, relative to `y`.
+    slope: f64,
+    /// How much further in `ln z` it is than was asked for.
+    drift: f64,
+    /// Change of `ln z`.
+    rate: f64,
+    /// Share of its distance from the slow manifold by which the contact lifetime relaxes.
+    relaxation: f64,
+    period: f64,
+    high: f64,
+    low: f64,
+    /// Error of a step that the rate asks for.
+    tolerance: f64,
+}
+
+impl Sample {
+    /// The place on the slow manifold `way` further in `ln z`, if `y` goes on as a power of `z`.
+    fn moved(&self, way: f64) -> Place {
+        Place { z: self.place.z * exp(way), y: self.place.y * exp(self.slope * way) }
+    }
+}
+
+/// How sampling ended.
+enum Slide {
+    Decided(Fate),
+    /// Cycles change fast again from here, `time` later.
+    Fast {
+        place: Place,
+        time: f64,
+    },
+    /// Contact lifetime and `z` change together.
+    Coupled,
+}
+
+impl Follower<'_> {
+    fn run(&mut self, start: State) -> Result<Fate, Stop> {
+        let slider = self.slider;
+        let mut orbit = Orbit::new(slider, start, self.tolerance);
+        // Time before this orbit began.
+        let mut offset = 0.0;
+        let mut before: Option<Place> = None;
+        let (mut last_rate, mut last_change) = (f64::NAN, f64::NAN);
+        let mut contraction = Contraction::NONE;
+        // Cycles so far, and after how many sampling may be tried again.
+        let (mut count, mut again) = (0, 0);
+        loop {
+            let cycle = orbit.cycle(self.linear.stable, &mut self.budget);
+            self.t = offset + orbit.t();
+            let cycle = match cycle {
+                Ok(cycle) => cycle,
+                Err(stop) => {
+                    let extrema = orbit.extrema();
+                    self.note(offset, extrema);
+                    return match (stop, orbit.settled_at()) {
+                        (Stop::Quiet, Some(time)) => Ok(Fate::Settled { time: offset + time }),
+                        _ => Err(stop),
+                    };
+                }
+            };
+            self.note(offset, [cycle.low, cycle.high]);
+            let place = Place { z: cycle.end[Z], y: cycle.end[Y] };
+            let Some(last) = before.replace(place) else { continue };
+            let rate = self.rate(&cycle, last.z);
+            let [low, high] = cycle.range();
+            if self.dies_out(rate, low, high)
+                && place.y.abs() < 0.1
+                && let Some(time) = orbit.settled_at()
+            {
+                return Ok(Fate::Settled { time: offset + time });
+            }
+            let smooth = (rate - last_rate).abs() < 0.5 * rate.abs().max(last_rate.abs());
+            count += 1;
+            if rate.abs() < SLOW && smooth && place.z > 0.0 && count >= again {
+                match self.slide(place, (rate - last_rate) / last_rate) {
+                    Ok(Slide::Decided(Fate::Settled { time })) => {
+                        return Ok(Fate::Settled { time: offset + cycle.t + time });
+                    }
+                    Ok(Slide::Decided(fate)) => return Ok(fate),
+                    Ok(Slide::Fast { place, time }) => {
+                        offset += cycle.t + time;
+                        orbit = Orbit::new(slider, [place.z, place.y, 0.0], self.tolerance);
+                        before = Some(place);
+                        (last_rate, last_change, contraction) = (f64::NAN, f64::NAN, Contraction::NONE);
+                        continue;
+                    }
+                    Ok(Slide::Coupled) | Err(Stop::Unrelaxed) => again = 2 * count,
+                    Err(stop) => return Err(stop),
+                }
+            }
+            // Both coordinates of the section, in units of what moves ln v by 1.
+            let change = ((place.z - last.z) / slider.force()).abs().max((place.y - last.y).abs());
+            // Down to where rounding and the errors of steps stop it.
+            let left = contraction.left;
+            contraction.take(change, change / last_change);
+            if contraction.left < 0.03 * self.rtol || (left < self.rtol && contraction.row == 0) {
+                return Ok(Fate::Cycle { period: cycle.period, high, low });
+            }
+            (last_rate, last_change) = (rate, change);
+        }
+    }
+
+    /// Change of `ln z` over a cycle that began at `z`.
+    fn rate(&self, cycle: &Cycle, z: f64) -> f64 {
+        let energy = 0.5 * z * z / self.slider.k;
+        0.5 * ln_1p((-cycle.loss[0] / energy).max(-1.0 + 1e-12))
+    }
+
+    /// Whether cycles of these extrema stay in the band of settled velocities, and shrink from here down to rest.
+    ///
+    /// For small cycles the rate is `growth + c z^2`, up to a share of the second term of about the square of the
+    /// extrema.
+    fn dies_out(&self, rate: f64, low: f64, high: f64) -> bool {
+        // Without small oscillations, cycles cannot die out slowly.
+        let growth = self.linear.growth.unwrap_or(-1.0);
+        let rest = 10.0 * high.max(-low) * high.max(-low) * (rate - growth).abs();
+        self.linear.stable && excess(low, high) < 0.0 && rate < -2.0 * rest && growth < -2.0 * rest
+    }
+
+    fn note(&mut self, offset: f64, [low, high]: [Option<Extremum>; 2]) {
+        let later = |e: Extremum| Extremum { t: offset + e.t, ..e };
+        if let Some(high) = high.map(later) {
+            self.high = Some(self.high.filter(|old| old.x >= high.x).unwrap_or(high));
+        }
+        if let Some(low) = low.map(later) {
+            self.low = Some(self.low.filter(|old| old.x <= low.x).unwrap_or(low));
+        }
+    }
+
+    /// The first cycle from near a place that starts on the slow manifold. Its `z` has changed by the cycles before it.
+    ///
+    /// Where the contact lifetime relaxes slowly, jumps shorten the way, with the slope of the manifold as it is given.
+    fn sample(&mut self, place: Place, slope: f64, tolerance: f64) -> Result<Sample, Stop> {
+        let asked = place.z;
+        let mut place = place;
+        // How far off the slow manifold the place is.
+        let mut off = f64::INFINITY;
+        for _ in 0..MOST_RELAXATIONS {
+            let mut orbit = Orbit::new(self.slider, [place.z, place.y, 0.0], tolerance);
+            let cycle = orbit.cycle(false, &mut self.budget)?;
+            let rate = self.rate(&cycle, place.z);
+            let relaxation = 1.0 - exp(-self.linear.relaxation * cycle.period);
+            let [low, high] = cycle.range();
+            let size = (high - low).min(1.0);
+            if off <= (RATE_ERROR * rate.abs() * size).max(3.0 * tolerance) {
+                // Errors of a step are absolute in x, so their share is greater in small cycles.
+                let gross = cycle.loss[1] * self.slider.k / (place.z * place.z);
+                let tolerance = (RATE_ERROR * rate.abs() * size / gross).clamp(1e-13, self.tolerance);
+                // Far from the slow manifold a cycle may lead anywhere.
+                let drift = Some(ln(place.z / asked)).filter(|drift| drift.abs() <= SLOW).unwrap_or(0.0);
+                return Ok(Sample {
+                    place,
+                    slope,
+                    drift,
+                    rate,
+                    relaxation,
+                    period: cycle.period,
+                    high,
+                    low,
+                    tolerance,
+                });
+            }
+            let coupled = relaxation < ADIABATIC * rate.abs() && off < f64::INFINITY;
+            let near = ln(cycle.end[Z] / asked).abs() < 1.0;
+            if coupled || !near {
+                break;
+            }
+            let left = (cycle.end[Y] - place.y - rate * slope * place.y) / relaxation;
+            if relaxation > 0.5 {
+                off = off.min(left.abs()) * (1.0 - relaxation);
+                place = Place { z: cycle.end[Z], y: cycle.end[Y] };
+            } else if left.abs() < 1.0 {
+                off = 0.1 * left.abs();
+                place.y += left;
+            } else {
+                break;
+            }
+        }
+        Err(Stop::Unrelaxed)
+    }
+
+    /// Goes on by samples from a place where cycles change slowly, the change itself changing by the share `bend` a
+    /// cycle.
+    fn slide(&mut self, place: Place, bend: f64) -> Result<Slide, Stop> {
+        let start = self.refined(place, 1.0, self.tolerance)?;
+        if start.relaxation < ADIABATIC * start.rate.abs() {
+            return Ok(Slide::Coupled);
+        }
+        let direction = start.rate;
+        // To where the rate would vanish if it went on like this, and beyond.
+        let mut stride = if bend < 0.0 { 1.5 * (direction / bend).abs() } else { 0.5 };
+        let mut here = start;
+        loop {
+            stride = stride.clamp(1e-6, 0.7);
+            let mut next = self.refined(here.moved(stride.copysign(direction)), here.slope, here.tolerance)?;
+            let slope = ln(next.place.y / here.place.y) / ln(next.place.z / here.place.z);
+            next.slope = if (0.0..=2.0).contains(&slope) { slope } else { 1.0 };
+            if next.rate * direction <= 0.0 {
+                return Ok(Slide::Decided(self.cycle_between(&here, &next)?));
+            }
+            if next.relaxation < ADIABATIC * next.rate.abs() {
+                return Ok(Slide::Coupled);
+            }
+            if self.dies_out(next.rate, next.low, next.high) {
+                return Ok(Slide::Decided(Fate::Settled { time: self.settling(place.z, &start, &next)? }));
+            }
+            if next.rate.abs() > 2.0 * SLOW {
+                let (cycles, time) = self.passage(place.z, &start, &next)?;
+                // As many whole cycles as fit.
+                let spare = cycles - cycles.floor();
+                let place = next.moved(-spare * next.rate);
+                return Ok(Slide::Fast { place, time: time - spare * next.period });
+            }
+            here = next;
+            stride *= 2.0;
+        }
+    }
+
+    /// A sample as exact as its rate asks for.
+    fn refined(&mut self, place: Place, slope: f64, tolerance: f64) -> Result<Sample, Stop> {
+        let sample = self.sample(place, slope, tolerance)?;
+        if sample.tolerance >= 0.5 * tolerance {
+            return Ok(sample);
+        }
+        self.sample(sample.place, slope, sample.tolerance)
+    }
+
+    /// The limit cycle between two samples whose rates differ in sign.
+    fn cycle_between(&mut self, from: &Sample, to: &Sample) -> Result<Fate, Stop> {
+        let length = ln(to.place.z / from.place.z);
+        let slope = ((to.rate - from.rate) / length).abs();
+        let gross = RATE_ERROR * from.rate.abs().min(to.rate.abs()) / from.tolerance.min(to.tolerance);
+        let tolerance = (0.1 * self.rtol * slope / gross.max(1e-3)).clamp(1e-13, self.tolerance);
+        let sample = self.find([*from, *to], tolerance, |sample| sample.rate)?;
+        Ok(Fate::Cycle { period: sample.period, high: sample.high, low: sample.low })
+    }
+
+    /// The sample between two others at which `f` vanishes, which differs in sign at them: the Illinois method, with
+    /// the places where samples turn out to be.
+    fn find(
+        &mut self,
+        [mut far, mut near]: [Sample; 2],
+        tolerance: f64,
+        f: impl Fn(&Sample) -> f64,
+    ) -> Result<Sample, Stop> {
+        let resolution = 0.03 * self.rtol;
+        let [mut f_far, mut f_near] = [f(&far), f(&near)];
+        for _ in 0..MOST_RELAXATIONS {
+            let way = ln(near.place.z / far.place.z);
+            let step = -way * f_near / (f_near - f_far);
+            if step.abs() <= resolution || !step.is_finite() {
+                break;
+            }
+            let next = self.sample(near.moved(step - near.drift), near.slope, tolerance)?;
+            let f_next = f(&next);
+            if (f_next > 0.0) == (f_near > 0.0) {
+                f_far *= 0.5;
+            } else {
+                (far, f_far) = (near, f_near);
+            }
+            (near, f_near) = (next, f_next);
+        }
+        Ok(near)
+    }
+
+    /// Time from `z` on until the velocity stays in the band of settled velocities, as it does in the cycle `inside`;
+    /// `start` is a sample near `z`.
+    fn settling(&mut self, z: f64, start: &Sample, inside: &Sample) -> Result<f64, Stop> {
+        let beyond = |sample: &Sample| excess(sample.low, sample.high);
+        let first = beyond(start);
+        if first <= 0.0 {
+            return Ok(0.0);
+        }
+        let touching = self.find([*start, *inside], inside.tolerance, beyond)?;
+        let (cycles, time) = self.passage(z, start, &touching)?;
+        // The last cycle that leaves the band begins a part of a cycle before the one that would touch it.
+        let spare = cycles - cycles.floor();
+        let Place { z, y } = touching.moved(-spare * touching.rate);
+        let mut orbit = Orbit::new(self.slider, [z, y, 0.0], touching.tolerance);
+        orbit.cycle(false, &mut self.budget)?;
+        Ok(time - spare * touching.period + orbit.settled_at().unwrap_or(touching.period))
+    }
+
+    /// Cycles and time from `z`, near one sample, to another: a sum over cycles as an integral over `ln z`.
+    fn passage(&mut self, z: f64, near: &Sample, to: &Sample) -> Result<(f64, f64), Stop> {
+        let length = ln(to.place.z / z);
+        let panels = (length.abs() / PANEL).ceil();
+        let half = 0.5 * length / panels;
+        let rule = gauss::rule(NODES);
+        let (mut cycles, mut time) = (0.0, 0.0);
+        let mut samples = [*near; NODES];
+        let mut last = *near;
+        for panel in 0..panels as u32 {
+            let middle = (2.0 * f64::from(panel) + 1.0) * half;
+            for (sample, x) in samples.iter_mut().zip(&rule.x) {
+                // So that the node is in the middle of the way of the cycle.
+                let way = ln(z / last.place.z) + middle + half * x - last.drift - 0.5 * last.rate;
+                last = self.sample(last.moved(way), last.slope, last.tolerance)?;
+                *sample = last;
+            }
+            // A cycle stands for the middle of the way that it goes.
+            let places = samples.map(|sample| (ln(sample.place.z / z) + 0.5 * sample.rate - middle) / half);
+            for (&x, w) in rule.x.iter().zip(&rule.w) {
+                for (i, sample) in samples.iter().enumerate() {
+                    let share = half * w * lagrange(&places, i, x) / sample.rate;
+                    cycles += share;
+                    time += share * sample.period;
+                }
+            }
+        }
+        Ok((cycles, time))
+    }
+}
+
+/// The polynomial that is 1 at node `i` and 0 at the others, at `x`.
+fn lagrange(nodes: &[f64; NODES], i: usize, x: f64) -> f64 {
+    (0..NODES).filter(|&j| j != i).map(|j| (x - nodes[j]) / (nodes[i] - nodes[j])).product()
+}
+
+/// How cycles come closer to each other.
+#[derive(Debug, Clone, Copy)]
+struct Contraction {
+    /// Changes in a row that were smaller than the one before.
+    row: u32,
+    /// The greatest share that was left of a change among them.
+    share: f64,
+    /// Estimate of all changes to come.
+    left: f64,
+}
+
+impl Contraction {
+    const NONE: Contraction = Contraction { row: 0, share: 0.0, left: f64::INFINITY };
+
+    /// Takes in the next change and its share of the one before.
+    fn take(&mut self, change: f64, share: f64) {
+        let contracts = share < 0.999;
+        if !contracts {
+            *self = Contraction::NONE;
+            return;
+        }
+        (self.row, self.share) = (self.row + 1, self.share.max(share));
+        let enough = if self.share < 0.5 { 2 } else { 8 };
+        if self.row >= enough {
+            self.left = self.left.min(change * share / (1.0 - share));
+        }
+    }
+}
+
+impl Cycle {
+    /// `ln(v/v_f)` at its slowest and fastest.
+    fn range(&self) -> [f64; 2] {
+        [self.low, self.high].map(|extremum| extremum.map_or(0.0, |extremum| extremum.x))
+    }
+}
+
+/// How far a cycle goes beyond the band of settled velocities, relative to it; negative within.
+fn excess(low: f64, high: f64) -> f64 {
+    (high / BAND[1]).max(low / BAND[0]) - 1.0
+}

@@ -1,0 +1,266 @@
+//! Following a response cycle by cycle: extrema, the section `v = v_f` crossed upwards, and the energy that is lost.
+
+use super::slider::{Leg, Run, STAGES, Slider, State, X, Y, Z, between, step};
+use crate::numerics::root::crossing;
+use crate::numerics::stiff::radau_iia_9;
+
+/// A velocity and when it was.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Extremum {
+    /// `ln(v/v_f)`.
+    pub x: f64,
+    /// Time since the start of the orbit, in `l/v_f`.
+    pub t: f64,
+}
+
+/// What happened between two upward crossings of `v = v_f`; the first cycle begins where `v = v_f` is first met.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Cycle {
+    /// State at its end, on the section: `x = 0`.
+    pub end: State,
+    /// Time at its end, since the start of the orbit.
+    pub t: f64,
+    /// Duration.
+    pub period: f64,
+    /// Energy that friction took, and the sum of its sizes over the steps.
+    pub loss: [f64; 2],
+    /// Fastest moment; `None` if the first cycle has none.
+    pub high: Option<Extremum>,
+    /// Slowest moment; `None` if the first cycle has none.
+    pub low: Option<Extremum>,
+}
+
+/// Why an orbit is followed no further.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Stop {
+    /// The state is within [`QUIET`] of steady sliding.
+    Quiet,
+    /// The velocity becomes infinite in finite time.
+    Ends,
+    /// The work allowed is used up.
+    Budget,
+    /// The contact lifetime has not come to rest.
+    Unrelaxed,
+}
+
+/// A state this close to steady sliding is in its linear neighbourhood.
+const QUIET: f64 = 1e-5;
+
+/// Settled means `|v/v_f - 1|` below this, for good.
+pub const SETTLED: f64 = 0.01;
+
+/// `ln(1 - SETTLED)` and `ln(1 + SETTLED)`.
+pub const BAND: [f64; 2] = [-0.01005033585350144, 0.009950330853168083];
+
+/// Share of a step within which an extremum is looked for again.
+const NEAR: f64 = 0.125;
+
+/// A response under way.
+#[derive(Debug)]
+pub struct Orbit<'a> {
+    slider: &'a Slider,
+    run: Run<'a>,
+    /// Energy lost from the last section to the start of the last step, and the sum of its sizes.
+    lost: [f64; 2],
+    /// Time of the last section.
+    section: f64,
+    /// Whether `v = v_f` has been met.
+    met: bool,
+    high: Option<Seen>,
+    low: Option<Seen>,
+    /// The last entry into the band of settled velocities; `None` outside.
+    entry: Option<Entry>,
+}
+
+/// An extremum as it was seen.
+#[derive(Debug, Clone, Copy)]
+struct Seen {
+    rough: Extremum,
+    /// The step and the share of it; `None` at an arrest.
+    place: Option<(Leg, f64)>,
+}
+
+#[derive(Debug, Clone, Copy)]
+struct Entry {
+    edge: f64,
+    place: Option<(Leg, f64)>,
+}
+
+impl<'a> Orbit<'a> {
+    /// Starts at `state`.
+    pub fn new(slider: &'a Slider, state: State, tolerance: f64) -> Orbit<'a> {
+        Orbit {
+            slider,
+            run: slider.run(state, slider.first_step(&state), tolerance),
+            lost: [0.0; 2],
+            section: 0.0,
+            met: state[X] == 0.0,
+            high: None,
+            low: None,
+            entry: is_inside(state[X]).then_some(Entry { edge: state[X], place: None }),
+        }
+    }
+
+    /// Time reached.
+    pub fn t(&self) -> f64 {
+        self.run.t()
+    }
+
+    /// Follows up to the next section. An orbit that `may_rest` ends where it is quiet. Steps come off the `budget`.
+    pub fn cycle(&mut self, may_rest: bool, budget: &mut u32) -> Result<Cycle, Stop> {
+        loop {
+            if *budget == 0 {
+                return Err(Stop::Budget);
+            }
+            *budget -= 1;
+            if may_rest && self.is_quiet() {
+                return Err(Stop::Quiet);
+            }
+            if let Some(arrested) = self.slider.arrest(self.run.y()) {
+                self.run.jump(arrested, self.slider.first_step(&arrested));
+                let rough = Extremum { x: arrested[X], t: self.run.t() };
+                keep(&mut self.low, Seen { rough, place: None }, |new, old| new < old);
+            }
+            let leg = step(&mut self.run).map_err(|_| Stop::Ends)?;
+            let cycle = self.look(&leg);
+            let loss = self.loss(&leg);
+            self.lost = [0, 1].map(|i| self.lost[i] + loss[i]);
+            if let Some(cycle) = cycle {
+                return Ok(cycle);
+            }
+        }
+    }
+
+    fn is_quiet(&self) -> bool {
+        let [z, y, x] = *self.run.y();
+        x.abs() < QUIET && y.abs() < QUIET && z.abs() < QUIET * self.slider.a
+    }
+
+    /// Looks through a step, from node to node, for what happens in it.
+    fn look(&mut self, leg: &Leg) -> Option<Cycle> {
+        let mut cycle = None;
+        let mut u0 = 0.0;
+        let (mut x0, mut slope0) = (leg.start[X], leg.slope(X, 0.0));
+        for u1 in radau_iia_9().nodes {
+            let (x1, slope1) = (leg.value(X, u1), leg.slope(X, u1));
+            if slope0 * slope1 < 0.0 {
+                let turn = crossing(|u| leg.slope(X, u), [u0, u1], [slope0, slope1], 1e-6 * (u1 - u0));
+                let x = leg.value(X, turn);
+                cycle = self.pass(leg, [u0, turn], [x0, x]).or(cycle);
+                let seen = Seen { rough: Extremum { x, t: leg.t + turn * leg.h }, place: Some((*leg, turn)) };
+                if slope0 > 0.0 {
+                    keep(&mut self.high, seen, |new, old| new > old);
+                } else {
+                    keep(&mut self.low, seen, |new, old| new < old);
+                }
+                cycle = self.pass(leg, [turn, u1], [x, x1]).or(cycle);
+            } else {
+                cycle = self.pass(leg, [u0, u1], [x0, x1]).or(cycle);
+            }
+            (u0, x0, slope0) = (u1, x1, slope1);
+        }
+        cycle
+    }
+
+    /// Looks through a piece in which the velocity only rises or only falls.
+    fn pass(&mut self, leg: &Leg, u: [f64; 2], x: [f64; 2]) -> Option<Cycle> {
+        let at = |level: f64| crossing(|u| leg.value(X, u) - level, u, [x[0] - level, x[1] - level], 1e-9);
+        let mut cycle = None;
+        let (rises, falls) = (x[0] < 0.0 && x[1] >= 0.0, x[0] > 0.0 && x[1] <= 0.0);
+        if rises {
+            cycle = Some(self.close(leg, at(0.0)));
+        }
+        if rises || (falls && !self.met) {
+            (self.high, self.low) = (None, None);
+        }
+        self.met |= rises || falls;
+        if !is_inside(x[1]) {
+            self.entry = None;
+        } else if self.entry.is_none() {
+            let edge = if x[0] > 0.0 { BAND[1] } else { BAND[0] };
+            self.entry = Some(Entry { edge, place: Some((*leg, at(edge))) });
+        }
+        cycle
+    }
+
+    /// The cycle that ends at the section, at about the share `u` of a step.
+    fn close(&mut self, leg: &Leg, u: f64) -> Cycle {
+        let (end, t, part) = self.exactly(leg, u, 0.0);
+        let loss = part.map_or([0.0; 2], |part| self.loss(&part));
+        let [low, high] = self.extrema();
+        let cycle = Cycle {
+            end: [end[Z], end[Y], 0.0],
+            t,
+            period: t - self.section,
+            loss: [0, 1].map(|i| self.lost[i] + loss[i]),
+            high,
+            low,
+        };
+        // The whole step will be added.
+        (self.section, self.lost) = (t, loss.map(|loss| -loss));
+        cycle
+    }
+
+    /// State and time where `x` is `level`, near the share `u` of a step, to the order of the method.
+    fn exactly(&mut self, leg: &Leg, u: f64, level: f64) -> (State, f64, Option<Leg>) {
+        let mut u = u;
+        let mut best = (std::array::from_fn(|r| leg.value(r, u)), leg.t + u * leg.h, None);
+        for _ in 0..2 {
+            let Some(part) = between(&mut self.run, leg, 0.0, u) else { break };
+            best = (part.end, part.t_end(), Some(part));
+            let change = (level - part.end[X]) / part.slope(X, 1.0);
+            u += change / leg.h;
+            if change.abs() <= 1e-12 * leg.h || !(u > 0.0 && u < 1.5) {
+                break;
+            }
+        }
+        best
+    }
+
+    /// An extremum, integrated again about where it was seen.
+    fn polished(&mut self, Seen { rough, place }: Seen) -> Extremum {
+        let Some((leg, u)) = place else { return rough };
+        let Some(near) = between(&mut self.run, &leg, (u - NEAR).max(0.0), u + NEAR) else { return rough };
+        let slopes = [near.slope(X, 0.0), near.slope(X, 1.0)];
+        if slopes[0] * slopes[1] >= 0.0 {
+            return rough;
+        }
+        let turn = crossing(|u| near.slope(X, u), [0.0, 1.0], slopes, 1e-9);
+        let Some(part) = between(&mut self.run, &near, 0.0, turn) else { return rough };
+        Extremum { x: part.end[X], t: part.t_end() }
+    }
+
+    /// The slowest and the fastest moment since the last section, if there was one.
+    pub fn extrema(&mut self) -> [Option<Extremum>; 2] {
+        [self.low, self.high].map(|seen| seen.map(|seen| self.polished(seen)))
+    }
+
+    /// When the velocity last came into the band of settled velocities; `None` if it is outside.
+    pub fn settled_at(&mut self) -> Option<f64> {
+        let Entry { edge, place } = self.entry?;
+        Some(place.map_or(0.0, |(leg, u)| self.exactly(&leg, u, edge).1))
+    }
+
+    /// Energy that friction takes over a step, and the sum of its sizes: the method's own quadrature.
+    fn loss(&self, leg: &Leg) -> [f64; 2] {
+        let rule = radau_iia_9();
+        let mut loss = [0.0; 2];
+        for (u, weight) in rule.nodes.into_iter().zip(rule.integration[STAGES - 1]) {
+            let rate = self.slider.loss(leg.value(Y, u), leg.value(X, u));
+            loss[0] += leg.h * weight * rate;
+            loss[1] += leg.h * weight * rate.abs();
+        }
+        loss
+    }
+}
+
+/// Keeps the one of two that is further out.
+fn keep(kept: &mut Option<Seen>, seen: Seen, beyond: impl Fn(f64, f64) -> bool) {
+    if kept.is_none_or(|kept| beyond(seen.rough.x, kept.rough.x)) {
+        *kept = Some(seen);
+    }
+}
+
+fn is_inside(x: f64) -> bool {
+    x > BAND[0] && x < BAND[1]
+}

@@ -1,0 +1,131 @@
+//! The block on its spring, in the scaled variables of one final velocity.
+//!
+//! Lengths in `l`, times in `l/v_f`. With `x = ln(v/v_f)`, `y = ln(theta v_f/l)`, `z = k s - tau_ss(v_f)` and `M = m
+//! v_f^2`, the equations under `v_c = v_f` are
+//!
+//! ```text
+//! z' = k (1 - e^x),    y' = e^-y - e^x,    M e^x x' = z - a x - b y,
+//! ```
+//!
+//! with steady sliding at 0. They stay regular for `M = 0`, where the last one is a constraint, and no velocity is too
+//! low for them.
+
+use multiversion::multiversion;
+
+use crate::numerics::elementary::exp;
+use crate::numerics::stiff::{Accuracy, Failure, Integrator, Linearised, Piece, Points, System, radau_iia_9};
+
+/// Place of the scaled force in a [`State`].
+pub const Z: usize = 0;
+/// Place of the logarithm of the contact lifetime.
+pub const Y: usize = 1;
+/// Place of the logarithm of the velocity.
+pub const X: usize = 2;
+
+/// `[z, y, x]`, in the order in which they are eliminated.
+pub type State = [f64; 3];
+
+/// Stages: order 9.
+pub const STAGES: usize = 5;
+
+/// Dense output of one step.
+pub type Leg = Piece<3, STAGES>;
+
+/// An integration along a response.
+pub type Run<'a> = Integrator<'a, Slider, 3, STAGES>;
+
+/// Below every tolerance.
+const UNFELT: f64 = 1e-14;
+
+/// The four numbers that the response to a step depends on, beside where it starts.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Slider {
+    /// Direct effect `a > 0`.
+    pub a: f64,
+    /// Effect of the contact lifetime `b >= 0`.
+    pub b: f64,
+    /// Scaled mass `M = m v_f^2 >= 0`.
+    pub inertia: f64,
+    /// Stiffness `k > 0`, finite.
+    pub k: f64,
+}
+
+impl Slider {
+    /// Steady sliding at `e^x v_f`, held there until now by the spring.
+    pub fn steady(&self, x: f64) -> State {
+        [(self.a - self.b) * x, -x, x]
+    }
+
+    /// Rate at which friction beyond its steady value at `v_f` takes energy from the motion about steady sliding,
+    /// `E = M (e^x - 1)^2/2 + z^2/(2 k)`: `-E' = (e^x - 1)(a x + b y)`.
+    pub fn loss(&self, y: f64, x: f64) -> f64 {
+        (exp(x) - 1.0) * (self.a * x + self.b * y)
+    }
+
+    /// The state after an arrest that takes no time, if one is under way.
+    ///
+    /// Where the spring holds the block back, the velocity falls faster than exponentially to where friction carries
+    /// the spring's force, `a x = z - b y`, which may be thousands of decades below. It gets there within `M e^x/(a x
+    /// + b y - z)`; once nothing else changes by more than `UNFELT` in this time, the rest of the way is left out.
+    pub fn arrest(&self, &[z, y, x]: &State) -> Option<State> {
+        let resting = (z - self.b * y) / self.a;
+        let pull = self.a * (x - resting);
+        let time = self.inertia * exp(x) / pull;
+        let rate = self.k / self.force() + exp(-y) + exp(x);
+        (x > resting + 1.0 && time * rate < UNFELT).then_some([z, y, resting])
+    }
+
+    /// A step so short that little changes in it.
+    pub fn first_step(&self, &[_, y, x]: &State) -> f64 {
+        let v = exp(x);
+        1e-3 / (self.k * (1.0 - v).abs() / self.a + v + exp(-y))
+    }
+
+    /// Size of the force that counts: what moves `ln v` by 1 at rest, more where inertia rules.
+    pub fn force(&self) -> f64 {
+        (self.a * self.a.max((self.k * self.inertia).sqrt())).sqrt()
+    }
+
+    /// An integration from `state`, with errors of a step below `tolerance` in `x`, `y` and `z/force`.
+    pub fn run(&self, state: State, h: f64, tolerance: f64) -> Run<'_> {
+        Integrator::new(self, radau_iia_9(), Accuracy { tolerance, scale: [self.force(), 1.0, 1.0] }, 0.0, state, h)
+    }
+}
+
+/// One step.
+#[multiversion(targets(
+    "x86_64+avx+avx2+bmi1+bmi2+avx512f+avx512bw+avx512cd+avx512dq+avx512vl",
+    "x86_64+avx+avx2+bmi1+bmi2"
+))]
+pub fn step(run: &mut Run<'_>) -> Result<Leg, Failure> {
+    run.step(f64::MAX)
+}
+
+/// The part of a step between two shares of it, integrated again.
+pub fn between(run: &mut Run<'_>, leg: &Leg, from: f64, to: f64) -> Option<Leg> {
+    run.between(leg, from, to)
+}
+
+impl System<3> for Slider {
+    #[inline(always)]
+    fn linearise<const L: usize>(&self, points: &Points<3, L>) -> Linearised<3, L> {
+        let mut at = Linearised { residual: [[0.0; L]; 3], mass: [[1.0; L]; 3], jacobian: [[[0.0; L]; 3]; 3] };
+        let [z, y, x] = &points.y;
+        let [z_slope, y_slope, x_slope] = &points.slope;
+        for i in 0..L {
+            let (v, ageing) = (exp(x[i]), exp(-y[i]));
+            let mass = self.inertia * v;
+            at.mass[X][i] = mass;
+            at.residual[Z][i] = self.k * (1.0 - v) - z_slope[i];
+            at.residual[Y][i] = (ageing - v) - y_slope[i];
+            at.residual[X][i] = (z[i] - self.a * x[i] - self.b * y[i]) - mass * x_slope[i];
+            at.jacobian[Z][X][i] = -self.k * v;
+            at.jacobian[Y][Y][i] = -ageing;
+            at.jacobian[Y][X][i] = -v;
+            at.jacobian[X][Z][i] = 1.0;
+            at.jacobian[X][Y][i] = -self.b;
+            at.jacobian[X][X][i] = -self.a - mass * x_slope[i];
+        }
+        at
+    }
+}
