@@ -8,7 +8,7 @@ use ode_solvers::dop_shared::OutputType;
 use ode_solvers::{Dop853, SVector, System};
 use slipsweep::model::Law;
 use slipsweep::protocol::compliant::{self, Compliant, Path};
-use slipsweep::protocol::{Motion, Slider, Status};
+use slipsweep::protocol::{Slider, Status};
 use slipsweep::stability::{amplification, held_error, loop_error};
 
 /// The paper's block and spring, and what is asked of it: `(v_i, v_f)` and `t_f`.

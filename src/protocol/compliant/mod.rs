@@ -49,7 +49,7 @@ pub fn solve(slider: &Slider, (v_i, v_f): (f64, f64), t_f: f64, rtol: f64) -> So
     let mut range = Range { work: 0.0, control: Extent::NONE };
     let followed = follow(slider, (v_i, v_f), t_f, rtol, &mut effort, |curve, panel| {
         range.work += panel.work(&slider.law, curve);
-        panel.control(slider, curve, rtol, &mut range.control);
+        panel.range(curve, rtol, &mut range.control, |jet| slider.control(jet));
     });
     let curve = match followed {
         Ok(curve) => curve,
@@ -134,7 +134,7 @@ fn member(
     let (w_i, w_f) = (v_i - 1.0, v_f - 1.0);
     let ratio = (v_f - v_i) / w_i;
     let rise = if ratio > -0.5 { ln_1p(ratio) } else { ln(w_f / w_i) };
-    let curve = Curve::new(1.0, w_f, t_f, Hermite { rise, start: [0.0; 2], end: [0.0; 2], c: 0.0 });
+    let curve = Curve::new(1.0, w_f, t_f, Hermite::flat(rise));
     if v_i == v_f {
         return Ok(curve);
     }

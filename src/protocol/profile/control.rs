@@ -1,11 +1,11 @@
-//! What a spring has to be told along a resolved panel: derivatives of the velocity, and the range of the control.
+//! What a spring has to be told along a resolved panel: derivatives of the velocity, and the range of what follows.
 
 use super::Exponent;
 use super::curve::Curve;
 use super::hermite::Hermite;
 use super::passage::Resolved;
 use crate::numerics::elementary::exp;
-use crate::protocol::control::{Extent, Jet, Slider};
+use crate::protocol::control::{Extent, Jet};
 
 impl Curve<Hermite> {
     /// `v`, `v'`, `v''` and `v'''` in time.
@@ -24,18 +24,19 @@ impl Resolved {
         Jet { v: curve.derivatives(x, z), theta: self.theta(u), rate: self.rate(u) }
     }
 
-    /// Takes the range of `v_c` on the panel into `extent`, turns good to `rtol`.
-    pub fn control(&self, slider: &Slider, curve: &Curve<Hermite>, rtol: f64, extent: &mut Extent) {
+    /// Takes the range of something on the panel into `extent`, turns good to `rtol`; `told` gives its value and its slope
+    /// in time.
+    pub fn range(&self, curve: &Curve<Hermite>, rtol: f64, extent: &mut Extent, told: impl Fn(&Jet) -> [f64; 2]) {
         let duration = self.duration(curve);
-        let told = |jet: &Jet| {
-            let [value, slope] = slider.control(jet);
-            [value, duration * slope]
+        let along = |u: f64, jet: &Jet| {
+            let [value, slope] = told(jet);
+            (u, [value, duration * slope])
         };
-        let mut before = (0.0, told(&self.jet(curve, 0.0)));
+        let mut before = along(0.0, &self.jet(curve, 0.0));
         for (u, theta, rate) in self.nodes() {
             let (x, z) = self.place(u);
-            let after = (u, told(&Jet { v: curve.derivatives(x, z), theta, rate }));
-            extent.turn(before, after, rtol, |u| told(&self.jet(curve, u)));
+            let after = along(u, &Jet { v: curve.derivatives(x, z), theta, rate });
+            extent.turn(before, after, rtol, |u| along(u, &self.jet(curve, u)).1);
             before = after;
         }
     }

@@ -1,82 +1,119 @@
-//! The polynomial that meets value, slope and curvature at both ends, with one term more that meets nothing.
+//! The exponent that meets value, slope and curvature at both ends, with one term more that meets nothing.
 //!
-//! `f = H(x) - c x^3 (1 - x)^3`, where `H` is the quintic Hermite interpolant.
+//! `f = Q(x) + rise S(xi) - c x^3 (1 - x)^3`: the quintic `Q` has the slopes and curvatures and no rise, `S = 10 xi^3 -
+//! 15 xi^4 + 6 xi^5` the rise alone. It runs over the stretched place `xi = (1 + p) x/(1 + p x + q z)`, `z = 1 - x`:
+//! with `p > 0` the start is opened, with `q > 0` the end.
 
 use super::Exponent;
 use super::curve::{Panel, Side, Stretches};
-use crate::numerics::polynomial::roots_between;
 
-/// The exponent; derivatives are those in `x`.
+/// The exponent.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Hermite {
     /// `f(1) - f(0)`.
     pub rise: f64,
-    /// `f'` and `f''` at the start.
+    /// First and second derivative at the start.
     pub start: [f64; 2],
-    /// `f'` and `f''` at the end.
+    /// First and second derivative at the end.
     pub end: [f64; 2],
+    /// `p` and `q`.
+    pub stretch: [f64; 2],
     /// Coefficient of `-x^3 (1 - x)^3`.
     pub c: f64,
 }
 
-/// `x^3 (1 - x)^3` in powers of `x`, from the third on.
-const BUMP: [f64; 4] = [1.0, -3.0, 3.0, -1.0];
+/// `x^3 (1 - x)^3` in powers of `x`, or of `1 - x`, from the first on.
+const BUMP: [f64; 6] = [0.0, 0.0, 1.0, -3.0, 3.0, -1.0];
+
+/// `S` in powers of `xi`, from the first on; that of `1 - xi` is 1 less it.
+const STEP: [f64; 6] = [0.0, 0.0, 10.0, -15.0, 6.0, 0.0];
 
 /// Steps after which Newton's method, which runs down a convex polynomial of degree six, is close enough.
 const MOST_STEPS: u32 = 100;
 
+/// The stretched place and its derivatives in `x`.
+struct Stretched {
+    xi: f64,
+    /// `1 - xi`.
+    zeta: f64,
+    d1: f64,
+    d2: f64,
+    d3: f64,
+}
+
 impl Hermite {
-    /// Coefficients of the distance from an end, from the first power on.
-    fn powers(&self, side: Side) -> [f64; 6] {
-        let (r, [p, q], [s, t]) = match side {
-            Side::Start => (self.rise, self.start, self.end),
-            Side::End => (-self.rise, [-self.end[0], self.end[1]], [-self.start[0], self.start[1]]),
+    /// Between ends of no slope and no curvature, nothing stretched.
+    pub fn flat(rise: f64) -> Hermite {
+        Hermite { rise, start: [0.0; 2], end: [0.0; 2], stretch: [0.0; 2], c: 0.0 }
+    }
+
+    #[inline(always)]
+    fn stretched(&self, x: f64, z: f64) -> Stretched {
+        let [p, q] = self.stretch;
+        let share = 1.0 / (1.0 + p * x + q * z);
+        let d1 = (1.0 + p) * (1.0 + q) * share * share;
+        let bend = (p - q) * share;
+        Stretched {
+            xi: (1.0 + p) * x * share,
+            zeta: (1.0 + q) * z * share,
+            d1,
+            d2: -2.0 * d1 * bend,
+            d3: 6.0 * d1 * bend * bend,
+        }
+    }
+
+    /// Coefficients about a place, from the first power of the distance on, measured away from the nearer end: of what
+    /// is not stretched, and of what is; and the signs of the two directions.
+    fn about(&self, x: f64, z: f64, at: &Stretched) -> ([f64; 6], [f64; 6], [f64; 2]) {
+        let ([p, q], [s, t]) = if x <= z {
+            (self.start, self.end)
+        } else {
+            ([-self.end[0], self.end[1]], [-self.start[0], self.start[1]])
         };
-        [
+        let mut plain = [
             p,
             0.5 * q,
-            10.0 * r - 6.0 * p - 4.0 * s - 1.5 * q + 0.5 * t - self.c * BUMP[0],
-            -15.0 * r + 8.0 * p + 7.0 * s + 1.5 * q - t - self.c * BUMP[1],
-            6.0 * r - 3.0 * p - 3.0 * s - 0.5 * q + 0.5 * t - self.c * BUMP[2],
-            -self.c * BUMP[3],
+            -6.0 * p - 4.0 * s - 1.5 * q + 0.5 * t,
+            8.0 * p + 7.0 * s + 1.5 * q - t,
+            -3.0 * p - 3.0 * s - 0.5 * q + 0.5 * t,
+            0.0,
+        ];
+        plain.iter_mut().zip(BUMP).for_each(|(plain, bump)| *plain -= self.c * bump);
+        let sign = |forwards: bool| if forwards { 1.0 } else { -1.0 };
+        let signs = [sign(x <= z), sign(at.xi <= at.zeta)];
+        let step = STEP.map(|step| signs[1] * self.rise * step);
+        (shifted(&plain, x.min(z)), shifted(&step, at.xi.min(at.zeta)), signs)
+    }
+
+    /// The first three derivatives.
+    pub fn derivatives(&self, x: f64, z: f64) -> [f64; 3] {
+        let at = self.stretched(x, z);
+        let (plain, step, signs) = self.about(x, z, &at);
+        let [f1, f2, f3] = [signs[0] * plain[0], 2.0 * plain[1], signs[0] * 6.0 * plain[2]];
+        let [h1, h2, h3] = [signs[1] * step[0], 2.0 * step[1], signs[1] * 6.0 * step[2]];
+        [
+            f1 + h1 * at.d1,
+            f2 + h2 * at.d1 * at.d1 + h1 * at.d2,
+            f3 + h3 * at.d1 * at.d1 * at.d1 + 3.0 * h2 * at.d1 * at.d2 + h1 * at.d3,
         ]
     }
 
-    /// The coefficients about a place, from the first power of the distance on, measured away from the nearer end, and
-    /// that end.
-    fn about(&self, x: f64, z: f64) -> ([f64; 6], Side) {
-        let (d, side) = if x <= z { (x, Side::Start) } else { (z, Side::End) };
-        let mut t = self.powers(side);
-        // Taylor's shift by Horner's scheme.
-        let mut shifted = [0.0, t[0], t[1], t[2], t[3], t[4], t[5]];
-        for k in 0..6 {
-            for j in (k..6).rev() {
-                shifted[j] += d * shifted[j + 1];
-            }
-        }
-        t.copy_from_slice(&shifted[1..]);
-        (t, side)
-    }
-
-    /// `f'`, `f''` and `f'''`.
-    pub fn derivatives(&self, x: f64, z: f64) -> [f64; 3] {
-        let (t, side) = self.about(x, z);
-        let sign = if side == Side::Start { 1.0 } else { -1.0 };
-        [sign * t[0], 2.0 * t[1], sign * 6.0 * t[2]]
-    }
-
-    /// Every turn inside.
-    pub fn turns(&self) -> Vec<f64> {
-        let powers = self.powers(Side::Start);
-        let slope: [f64; 6] = std::array::from_fn(|k| (k + 1) as f64 * powers[k]);
-        roots_between(&slope, 0.0, 1.0)
-    }
-
-    /// `x` of the only turn inside, where slopes and curvatures at the ends are 0.
+    /// `x` of the only turn inside, for [`Hermite::flat`] ends.
     pub fn turn(&self) -> Option<f64> {
         let x = 0.5 - 5.0 * self.rise / self.c;
         (x > 0.0 && x < 1.0).then_some(x)
     }
+}
+
+/// A polynomial about another place, without its constant term (Taylor's shift by Horner's scheme).
+fn shifted(powers: &[f64; 6], d: f64) -> [f64; 6] {
+    let mut t = [0.0, powers[0], powers[1], powers[2], powers[3], powers[4], powers[5]];
+    for k in 0..6 {
+        for j in (k..6).rev() {
+            t[j] += d * t[j + 1];
+        }
+    }
+    [t[1], t[2], t[3], t[4], t[5], t[6]]
 }
 
 impl Exponent for Hermite {
@@ -86,20 +123,22 @@ impl Exponent for Hermite {
 
     #[inline(always)]
     fn value(&self, x: f64, z: f64) -> f64 {
+        let Stretched { zeta, .. } = self.stretched(x, z);
         let (x2, z2, xz) = (x * x, z * z, x * z);
         let (x3, z3) = (x2 * x, z2 * z);
         let ends = self.start[0] * x * z3 * (1.0 + 3.0 * x) - self.end[0] * z * x3 * (1.0 + 3.0 * z)
             + 0.5 * (self.start[1] * x2 * z3 + self.end[1] * z2 * x3);
-        ends - z3 * self.rise * (10.0 - 15.0 * z + 6.0 * z2) - self.c * (xz * xz * xz)
+        ends - zeta * zeta * zeta * self.rise * (10.0 - 15.0 * zeta + 6.0 * zeta * zeta) - self.c * (xz * xz * xz)
     }
 
     #[inline(always)]
     fn slope(&self, x: f64, z: f64) -> f64 {
-        let (x2, z2) = (x * x, z * z);
+        let Stretched { xi, zeta, d1, .. } = self.stretched(x, z);
+        let (x2, z2, xz, stretched) = (x * x, z * z, x * z, xi * zeta);
         let ends = self.start[0] * z2 * (1.0 + 2.0 * x - 15.0 * x2)
             + self.end[0] * x2 * (1.0 + 2.0 * z - 15.0 * z2)
             + 0.5 * (self.start[1] * x * z2 * (2.0 - 5.0 * x) - self.end[1] * z * x2 * (2.0 - 5.0 * z));
-        ends + x2 * z2 * (30.0 * self.rise - 3.0 * self.c * (z - x))
+        ends + 30.0 * self.rise * d1 * stretched * stretched - 3.0 * self.c * xz * xz * (z - x)
     }
 
     #[inline(always)]
@@ -109,13 +148,25 @@ impl Exponent for Hermite {
     }
 
     fn stride(&self, x: f64, z: f64, variation: f64) -> f64 {
-        let t = self.about(x, z).0.map(f64::abs);
+        let at = self.stretched(x, z);
+        let (mut t, step, _) = self.about(x, z, &at);
+        // Along a distance up to this one xi changes by no more than twice its slope times the distance.
+        let bend = (at.d2 / at.d1).abs();
         let mut h = 1.0;
+        if bend > 0.0 {
+            h = (1.0 / bend).min(1.0);
+            let mut scale = 1.0;
+            for (t, step) in t.iter_mut().zip(&step) {
+                scale *= 2.0 * at.d1;
+                *t = t.abs() + scale * step.abs();
+            }
+        } else {
+            t.iter_mut().zip(&step).for_each(|(t, step)| *t = (*t + step).abs());
+        }
         for _ in 0..MOST_STEPS {
-            let (value, slope) = t.iter().rev().fold((0.0, 0.0), |(value, slope), t| {
-                // The polynomial without its constant term: value = h (…), slope by the product rule.
-                (t + h * value, value + h * slope)
-            });
+            let (value, slope) =
+                t.iter().rev().fold((0.0, 0.0), |(value, slope), t| (t + h * value, value + h * slope));
+            // Without its constant term the polynomial is h times that.
             let (value, slope) = (h * value, value + h * slope);
             if value <= 1.01 * variation {
                 break;

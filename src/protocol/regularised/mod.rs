@@ -10,7 +10,7 @@ mod piece;
 
 use super::control::Extent;
 use super::optimal::{Route, Site, route};
-use super::{Effort, Jet, Slider, Solved, Status};
+use super::{Effort, Slider, Solved, Status};
 use crate::model::Transition;
 use piece::{End, Piece};
 
@@ -57,8 +57,8 @@ pub fn solve(
     let mut effort = solved.effort;
     let (Some(optimum), Some(route)) = (solved.value, route) else { return none(solved.status, effort) };
     let mut sum = Sum { slider: *slider, rtol, excess: 0.0, v: Extent::NONE, control: Extent::NONE };
-    if sum.gather(&route, (v_i, v_f), (delta_t, t_f), &mut effort).is_none() {
-        return none(Status::NotConverged, effort);
+    if let Err(status) = sum.gather(&route, (v_i, v_f), (delta_t, t_f), &mut effort) {
+        return none(status, effort);
     }
     if slider.k == f64::INFINITY {
         sum.control = sum.v;
@@ -95,18 +95,18 @@ struct Sum {
 }
 
 impl Sum {
-    /// The pieces and what lies between them, in the order of time; `None` where a piece could not be certified.
+    /// The pieces and what lies between them, in the order of time; `Err` with the status where a piece has no
+    /// numbers.
     fn gather(
         &mut self,
         route: &Route,
         (v_i, v_f): (f64, f64),
         (delta_t, t_f): (f64, f64),
         effort: &mut Effort,
-    ) -> Option<()> {
+    ) -> Result<(), Status> {
         let (leaving, arriving) = (route.after(delta_t), route.before(delta_t));
-        let steady = |v: f64| End::of(&Jet { v: [v, 0.0, 0.0, 0.0], theta: 1.0 / v, rate: 0.0 });
-        let at = |site| End::of(&route.jet(site));
-        self.replace(route, (route.first(), steady(v_i)), (leaving, at(leaving)), effort)?;
+        let at = |site| End::inner(&route.jet(site));
+        self.replace(route, (route.first(), End::outer(v_i)), (leaving, at(leaving)), effort)?;
         let mut from = leaving;
         if let Some(corner) = route.corner().filter(|&corner| corner > delta_t && corner < t_f - delta_t) {
             let start = Site::Held((corner - 0.5 * delta_t).max(delta_t));
@@ -117,7 +117,7 @@ impl Sum {
             from = end;
         }
         self.keep(route, from, arriving);
-        self.replace(route, (arriving, at(arriving)), (route.last(), steady(v_f)), effort)
+        self.replace(route, (arriving, at(arriving)), (route.last(), End::outer(v_f)), effort)
     }
 
     /// Leaves the optimum as it is between two places.
@@ -132,13 +132,17 @@ impl Sum {
         (from, start): (Site, End),
         (to, end): (Site, End),
         effort: &mut Effort,
-    ) -> Option<()> {
+    ) -> Result<(), Status> {
         let span = route.span(from, to);
-        let piece = Piece::new(&start, &end, &span, self.rtol, effort)?;
-        let work = piece.pass(&self.slider, self.rtol, &mut self.control, effort)?;
-        self.excess += work - span.work;
+        let piece = Piece::new(&self.slider, (&start, &end), &span, self.rtol, effort).ok_or(Status::NotConverged)?;
+        if piece.v.low < f64::MIN_POSITIVE {
+            return Err(Status::Infeasible);
+        }
+        self.excess += piece.work - span.work;
         self.v.add(piece.v.low);
         self.v.add(piece.v.high);
-        Some(())
+        self.control.add(piece.control.low);
+        self.control.add(piece.control.high);
+        Ok(())
     }
 }

@@ -1,14 +1,19 @@
 //! A smooth piece between two moments, with theta brought from the one to the other.
 //!
-//! `v = floor + exp g(x)`, `x` the share of the time gone: `g` is the quintic that meets value, slope and curvature at
-//! both ends, less `c x^3 (1 - x)^3`. Theta at the end rises strictly with `c`, from 0 to its value for `v = floor`, so
-//! there is one member wherever the optimum itself stays above the floor. The floor is 0; where that piece dips below
-//! `v = 1` without need it is 1.
+//! `v = floor + exp g(x)`, `x` the share of the time gone: `g` meets value, slope and curvature at both ends, and has a
+//! term `-c x^3 (1 - x)^3`. Theta at the end rises strictly with `c`, from 0 to its value for `v = floor`, so there is
+//! one member wherever the optimum itself stays above the floor. The floor is 0; where that piece dips below `v = 1`
+//! without need it is 1.
+//!
+//! Where an end of the protocol lies `rho > 1` times as far above the floor as the mean that brings theta on, `int
+//! theta v dt/(t sqrt(theta_0 theta_1))` over a piece of length `t`, the way down has to be short: there the rise of
+//! `g` runs over a stretched place, `xi = (1 + p) x/(1 + p x)` from that end, with `p = 4 (rho (1 + 10 ln rho)^(-1/3) -
+//! 1)` if that is positive. About a quarter of the mean is then left to the way down, whatever `rho`.
 
 use crate::numerics::elementary::{exp_m1, ln, ln_1p};
 use crate::protocol::control::Extent;
 use crate::protocol::optimal::Span;
-use crate::protocol::profile::{Curve, Hermite, Problem, Side, Start, pass, reach};
+use crate::protocol::profile::{Curve, Hermite, Problem, Start, pass, reach};
 use crate::protocol::{Effort, Jet, Slider};
 
 /// An end of a piece.
@@ -18,16 +23,19 @@ pub(super) struct End {
     v: [f64; 3],
     theta: f64,
     rate: f64,
+    /// Whether it is an end of the protocol, where the optimum jumps.
+    outer: bool,
 }
 
-/// A piece.
+/// What a piece amounts to.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Piece {
-    curve: Curve<Hermite>,
-    start: Start,
-    theta_end: f64,
+    /// Work of friction.
+    pub work: f64,
     /// Range of the velocity.
     pub v: Extent,
+    /// Range of the control velocity.
+    pub control: Extent,
 }
 
 /// Theta and its rate are interpolated, which takes more nodes than a quadrature.
@@ -37,9 +45,14 @@ const INTERPOLATION: f64 = 0.5;
 const ROUNDING: f64 = 1e-12;
 
 impl End {
-    /// That of a protocol which is there.
-    pub fn of(jet: &Jet) -> End {
-        End { v: [jet.v[0], jet.v[1], jet.v[2]], theta: jet.theta, rate: jet.rate }
+    /// A moment of the optimum.
+    pub fn inner(jet: &Jet) -> End {
+        End { v: [jet.v[0], jet.v[1], jet.v[2]], theta: jet.theta, rate: jet.rate, outer: false }
+    }
+
+    /// Steady sliding at an end of the protocol.
+    pub fn outer(v: f64) -> End {
+        End { v: [v, 0.0, 0.0], theta: 1.0 / v, rate: 0.0, outer: true }
     }
 
     /// The first two derivatives of `ln(v - floor)`, in a time `t`.
@@ -51,11 +64,17 @@ impl End {
 }
 
 impl Piece {
-    /// The piece from `start` to `end` in place of a part of the optimum.
-    pub fn new(start: &End, end: &End, optimum: &Span, rtol: f64, effort: &mut Effort) -> Option<Piece> {
-        let piece = Piece::above(0.0, start, end, optimum, rtol, effort)?;
+    /// The piece from `start` to `end` in place of a part of the optimum; `None` where it could not be certified.
+    pub fn new(
+        slider: &Slider,
+        (start, end): (&End, &End),
+        optimum: &Span,
+        rtol: f64,
+        effort: &mut Effort,
+    ) -> Option<Piece> {
+        let piece = Piece::above(0.0, slider, (start, end), optimum, rtol, effort)?;
         if piece.v.low < 1.0 && start.v[0] > 1.0 && end.v[0] > 1.0 {
-            let inside = Piece::above(1.0, start, end, optimum, rtol, effort);
+            let inside = Piece::above(1.0, slider, (start, end), optimum, rtol, effort);
             return Some(inside.unwrap_or(piece));
         }
         Some(piece)
@@ -64,20 +83,20 @@ impl Piece {
     /// The piece that stays above `floor`.
     fn above(
         floor: f64,
-        start: &End,
-        end: &End,
+        slider: &Slider,
+        (start, end): (&End, &End),
         &Span { time, lag, .. }: &Span,
         rtol: f64,
         effort: &mut Effort,
     ) -> Option<Piece> {
         let (w_0, w_1) = (start.v[0] - floor, end.v[0] - floor);
         let ratio = (w_1 - w_0) / w_0;
-        let exponent = Hermite {
-            rise: if ratio > -0.5 { ln_1p(ratio) } else { ln(w_1 / w_0) },
-            start: start.slopes(floor, time),
-            end: end.slopes(floor, time),
-            c: 0.0,
-        };
+        let rise = if ratio > -0.5 { ln_1p(ratio) } else { ln(w_1 / w_0) };
+        // About the mean that brings theta there.
+        let mean = lag / (time * (start.theta * end.theta).sqrt()) - floor;
+        let stretch = [start, end].map(|at| if at.outer { stretch(at.v[0] - floor, mean) } else { 0.0 });
+        let (at_start, at_end) = (start.slopes(floor, time), end.slopes(floor, time));
+        let exponent = Hermite { rise, start: at_start, end: at_end, stretch, c: 0.0 };
         let curve = Curve::new(floor, w_1, time, exponent);
         let growth = time - lag;
         // How much larger theta is for v = floor.
@@ -88,25 +107,23 @@ impl Piece {
         let room = ln_1p(spare / end.theta);
         let problem = Problem::between(end.theta, -growth / end.theta, end.rate / end.theta, room, curve);
         let curve = curve.with(problem.solve(0.0, rtol, reach(rtol), effort)?);
-        let mut v = Extent::NONE;
-        v.add(start.v[0]);
-        v.add(end.v[0]);
-        for x in curve.exponent.turns() {
-            let (side, d) = if x < 0.5 { (Side::Start, x) } else { (Side::End, 1.0 - x) };
-            v.add(floor + curve.surplus(side, d));
-        }
-        let start = Start { v: start.v[0], theta: start.theta, rate: start.rate };
-        Some(Piece { curve, start, theta_end: end.theta, v })
-    }
-
-    /// Passes along the piece: its work, and the range of `v_c` into `control`. `None` where theta does not arrive.
-    pub fn pass(&self, slider: &Slider, rtol: f64, control: &mut Extent, effort: &mut Effort) -> Option<f64> {
-        let mut work = 0.0;
-        let reach = INTERPOLATION * reach(rtol);
-        let theta = pass(&self.curve, self.start, rtol, reach, effort, |panel| {
-            work += panel.work(&slider.law, &self.curve);
-            panel.control(slider, &self.curve, rtol, control);
+        let mut piece = Piece { work: 0.0, v: Extent::NONE, control: Extent::NONE };
+        let from = Start { v: start.v[0], theta: start.theta, rate: start.rate };
+        let theta = pass(&curve, from, rtol, INTERPOLATION * reach(rtol), effort, |panel| {
+            piece.work += panel.work(&slider.law, &curve);
+            panel.range(&curve, rtol, &mut piece.v, |jet| [jet.v[0], jet.v[1]]);
+            panel.range(&curve, rtol, &mut piece.control, |jet| slider.control(jet));
         })?;
-        ((theta / self.theta_end - 1.0).abs() <= 10.0 * rtol + ROUNDING).then_some(work)
+        let arrives = (theta / end.theta - 1.0).abs() <= 10.0 * rtol + ROUNDING;
+        arrives.then_some(piece)
     }
 }
+
+/// How much an end of the protocol is stretched, by its height and the mean.
+fn stretch(end: f64, mean: f64) -> f64 {
+    let rho = (end / mean).clamp(1.0, MOST_RHO);
+    (4.0 * (rho / libm::cbrt(1.0 + 10.0 * ln(rho)) - 1.0)).max(0.0)
+}
+
+/// The end that is highest above the mean for which the way down is shortened.
+const MOST_RHO: f64 = 1e6;
