@@ -69,6 +69,9 @@ const SLOW: f64 = 0.1;
 /// The contact lifetime must relax this many times faster than `z` changes.
 const ADIABATIC: f64 = 10.0;
 
+/// Cycles that are followed after sampling has led to another place.
+const PATIENCE: u32 = 10;
+
 /// Cycles of one sample.
 const MOST_RELAXATIONS: u32 = 60;
 
@@ -138,10 +141,11 @@ impl Sample {
 /// How sampling ended.
 enum Slide {
     Decided(Fate),
-    /// Cycles change fast again from here, `time` later.
-    Fast {
+    /// Cycles are to be followed again from here, `time` later; the one before changed `ln z` by `change`.
+    Follow {
         place: Place,
         time: f64,
+        change: f64,
     },
     /// Contact lifetime and `z` change together.
     Coupled,
@@ -191,22 +195,23 @@ impl Follower<'_> {
                         return Ok(Fate::Settled { time: offset + cycle.t + time });
                     }
                     Ok(Slide::Decided(fate)) => return Ok(fate),
-                    Ok(Slide::Fast { place, time }) => {
+                    Ok(Slide::Follow { place, time, change }) => {
                         offset += cycle.t + time;
                         orbit = Orbit::new(slider, [place.z, place.y, 0.0], self.tolerance);
                         before = Some(place);
-                        (last_rate, last_change, contraction) = (f64::NAN, f64::NAN, Contraction::NONE);
+                        (last_rate, last_change, contraction) = (f64::NAN, change, Contraction::NONE);
+                        again = count + PATIENCE;
                         continue;
                     }
                     Ok(Slide::Coupled) | Err(Stop::Unrelaxed) => again = 2 * count,
                     Err(stop) => return Err(stop),
                 }
             }
-            // Both coordinates of the section, in units of what moves ln v by 1.
-            let change = ((place.z - last.z) / slider.force()).abs().max((place.y - last.y).abs());
+            // Both coordinates of the section: relative to its size, or to what moves ln v by 1.
+            let change = ((place.z - last.z) / place.z.max(slider.force())).abs().max((place.y - last.y).abs());
             // Down to where rounding and the errors of steps stop it.
             let left = contraction.left;
-            contraction.take(change, change / last_change);
+            contraction.take(change, last_change, self.tolerance);
             if contraction.left < 0.03 * self.rtol || (left < self.rtol && contraction.row == 0) {
                 return Ok(Fate::Cycle { period: cycle.period, high, low });
             }
@@ -260,8 +265,7 @@ impl Follower<'_> {
                 // Errors of a step are absolute in x, so their share is greater in small cycles.
                 let gross = cycle.loss[1] * self.slider.k / (place.z * place.z);
                 let tolerance = (RATE_ERROR * rate.abs() * size / gross).clamp(1e-13, self.tolerance);
-                // Far from the slow manifold a cycle may lead anywhere.
-                let drift = Some(ln(place.z / asked)).filter(|drift| drift.abs() <= SLOW).unwrap_or(0.0);
+                let drift = ln(place.z / asked);
                 return Ok(Sample {
                     place,
                     slope,
@@ -309,6 +313,11 @@ impl Follower<'_> {
             let mut next = self.refined(here.moved(stride.copysign(direction)), here.slope, here.tolerance)?;
             let slope = ln(next.place.y / here.place.y) / ln(next.place.z / here.place.z);
             next.slope = if (0.0..=2.0).contains(&slope) { slope } else { 1.0 };
+            if next.drift.abs() > 20.0 * next.rate.abs() + self.rtol {
+                // One cycle led here from far away: there is a limit cycle near, and cycles come to it by themselves.
+                let (place, change) = (next.place, next.drift.abs());
+                return Ok(Slide::Follow { place, time: 0.0, change });
+            }
             if next.rate * direction <= 0.0 {
                 return Ok(Slide::Decided(self.cycle_between(&here, &next)?));
             }
@@ -323,7 +332,7 @@ impl Follower<'_> {
                 // As many whole cycles as fit.
                 let spare = cycles - cycles.floor();
                 let place = next.moved(-spare * next.rate);
-                return Ok(Slide::Fast { place, time: time - spare * next.period });
+                return Ok(Slide::Follow { place, time: time - spare * next.period, change: f64::NAN });
             }
             here = next;
             stride *= 2.0;
@@ -445,15 +454,21 @@ struct Contraction {
 impl Contraction {
     const NONE: Contraction = Contraction { row: 0, share: 0.0, left: f64::INFINITY };
 
-    /// Takes in the next change and its share of the one before.
-    fn take(&mut self, change: f64, share: f64) {
+    /// Takes in the next change, after the last one.
+    fn take(&mut self, change: f64, last: f64, tolerance: f64) {
+        let share = change / last;
         let contracts = share < 0.999;
         if !contracts {
             *self = Contraction::NONE;
             return;
         }
         (self.row, self.share) = (self.row + 1, self.share.max(share));
-        let enough = if self.share < 0.5 { 2 } else { 8 };
+        // The slower, the longer it must go on to be told from chance.
+        let enough = match self.share {
+            share if share < 0.01 && last > 1e3 * tolerance => 1,
+            share if share < 0.5 => 2,
+            _ => 8,
+        };
         if self.row >= enough {
             self.left = self.left.min(change * share / (1.0 - share));
         }
