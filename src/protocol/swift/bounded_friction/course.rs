@@ -1,17 +1,57 @@
-//! Theta along a member by collocation at the Radau nodes, in the direction in which it contracts.
+//! A member of the family for one `alpha_3`, and the pass along it in the direction in which theta contracts.
 //!
-//! The variable is `u = ln theta`: `u' = e^-u - v` with `ln v = (tau - 1)/a - (b/a) u`. Places are distances `d` from the
-//! end where the integration starts, in units of `t_f`.
+//! The variable is `w = ln(theta/theta_0)` with `theta_0 = 1/v_0` at the nearer end:
+//!
+//! ```text
+//! w' = v_0 (e^-w - v/v_0),    ln(v/v_0) = f - (b/a) w,    f = (tau - tau_0)/a.
+//! ```
+//!
+//! Places are distances from the nearer end too, in units of `t_f`: so layers much thinner than the rounding of `x` are
+//! seen, and small changes keep their digits.
 
-use std::sync::OnceLock;
-
-use multiversion::multiversion;
-
+use super::panel::{Panel, collocate};
 use crate::model::Transition;
-use crate::numerics::elementary::{exp, exp_m1, ln};
-use crate::numerics::radau::{NODES, Nodes, Radau, radau};
+use crate::numerics::elementary::{exp, exp_m1, ln, ln_1p};
+use crate::numerics::radau::{NODES, Radau, radau};
 use crate::protocol::Effort;
 use crate::protocol::swift::Case;
+
+/// The end from which a place is measured, in the direction of integration.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Side {
+    Start,
+    End,
+}
+
+/// What is known at an end.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Anchor {
+    /// Velocity `v_0`, which is `1/theta_0`.
+    pub v: f64,
+    /// Friction.
+    friction: f64,
+    /// `tau_M - tau`.
+    pub gap: f64,
+    /// Slope of `ln R^x` from here inwards.
+    l: f64,
+    /// `w` where theta is that of the other end.
+    other: f64,
+    /// From here on the exponent leaves a velocity that moves nothing.
+    quiet: f64,
+    /// From here on it leaves a velocity that is 0 in double precision.
+    cap: f64,
+}
+
+/// What tells how far a course is from arriving.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) enum Measure {
+    /// `ln theta` at the end.
+    Level,
+    /// Just beyond the time of `v = 0`: the slip in contact lifetimes, `int theta v dt`, against the time to spare.
+    Slip { spare: f64 },
+    /// Just beyond the time of `tau = tau_M`: the time lost to lower friction against the time to spare.
+    Lag { spare: f64 },
+}
 
 /// A member of the family for one `alpha_3`.
 #[derive(Debug, Clone, Copy)]
@@ -19,24 +59,27 @@ pub(super) struct Course {
     pub alpha: f64,
     pub forward: bool,
     pub t_f: f64,
-    /// `ln theta` at the start of the integration, and where it is to end.
-    pub start: f64,
-    pub target: f64,
-    a: f64,
-    b: f64,
-    tau_max: f64,
-    /// `tau_M - tau` at the start of the integration and at its end.
-    gap: f64,
-    gap_last: f64,
-    /// Slope of `ln R^x` along the integration.
-    l: f64,
+    pub a: f64,
+    /// `b/a`.
+    pub ratio: f64,
+    pub measure: Measure,
+    /// The ends in the direction of integration.
+    anchors: [Anchor; 2],
 }
 
-/// Where a pass ended: `ln theta` and its derivative by `alpha_3`.
+/// Where a pass ended.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct End {
-    pub level: f64,
+    /// `w`: 0 if it arrives.
+    pub w: f64,
+    /// Its derivative by `alpha_3`.
     pub turn: f64,
+    /// The greatest size of that on the way.
+    sway: f64,
+    /// What rounding on the way may have made of it, in units of the last place of 1.
+    noise: f64,
+    /// The integral of [`Measure::Slip`] or [`Measure::Lag`].
+    sum: f64,
 }
 
 /// Why a pass did not reach the end.
@@ -48,50 +91,55 @@ pub(super) enum Stop {
     GaveUp,
 }
 
-/// A panel with `ln theta` at its start and nodes.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Panel {
-    pub from: f64,
-    pub to: f64,
-    pub start: f64,
-    pub u: Nodes,
-}
-
-/// Where `ln theta` has fallen this far below both ends, theta counts as lost.
+/// Where `w` has fallen this far below both ends, theta counts as lost.
 const LOST: f64 = 25.0;
+
+/// A velocity below `e^-QUIET` moves nothing within any time.
+pub(super) const QUIET: f64 = 100.0;
+
+/// A velocity below `e^-NOTHING` is 0 in double precision.
+const NOTHING: f64 = 800.0;
+
+/// Where `ln[(tau_M - tau)/gap]` is below this, friction is `tau_M` to the last bit.
+const SATURATED: f64 = -45.0;
+
+/// Keeps `tau_M - tau` within the range of a double.
+pub(super) const MOST_EXPONENT: f64 = 400.0;
 
 /// Most panels of one pass: far more than a course takes that is not lost.
 const MOST_PANELS: usize = 4000;
 
-/// Most steps of Newton's method on a panel.
-const MOST_STEPS: usize = 10;
-
 impl Course {
-    pub fn new(case: &Case, (gap_i, gap_f): (f64, f64), ln_r: f64) -> Course {
-        let law = case.transition.law;
-        let (first, last) = (-ln(case.transition.v_i), -ln(case.transition.v_f));
+    pub fn new(case: &Case, gaps: (f64, f64), ln_r: f64, log_ratio: f64, measure: Measure) -> Course {
+        let Transition { law, v_i, v_f } = case.transition;
+        let ratio = law.b / law.a;
+        let anchor = |v: f64, gap: f64, l: f64, other: f64| {
+            // The exponent that leaves a velocity below this power of e.
+            let depth = |power: f64| ln_1p((power + ln(v) + ratio * (LOST + log_ratio.abs())) * law.a / gap);
+            let friction = 1.0 + (law.a - law.b) * ln(v);
+            Anchor { v, friction, gap, l, other, quiet: depth(QUIET), cap: depth(NOTHING) }
+        };
         let forward = law.b <= law.a;
-        let pick = |i: f64, f: f64| if forward { (i, f) } else { (f, i) };
-        let ((start, target), (gap, gap_last)) = (pick(first, last), pick(gap_i, gap_f));
-        let l = if forward { ln_r } else { -ln_r };
-        Course {
-            alpha: 0.0,
-            forward,
-            t_f: case.t_f,
-            start,
-            target,
-            a: law.a,
-            b: law.b,
-            tau_max: case.tau_max,
-            gap,
-            gap_last,
-            l,
-        }
+        let ends = [anchor(v_i, gaps.0, ln_r, log_ratio), anchor(v_f, gaps.1, -ln_r, -log_ratio)];
+        let anchors = if forward { ends } else { [ends[1], ends[0]] };
+        Course { alpha: 0.0, forward, t_f: case.t_f, a: law.a, ratio, measure, anchors }
     }
 
     /// A change of `alpha_3` that counts: about a quarter of it is the change of `ln v`.
     pub fn unit(&self) -> f64 {
-        self.a / self.gap.max(self.gap_last)
+        self.a / self.anchors[0].gap.max(self.anchors[1].gap)
+    }
+
+    /// The change of `alpha_3` that changes some velocity by as much as itself, or `alpha_3` if that is less.
+    pub fn scale(&self, end: &End) -> f64 {
+        let mut greatest = self.ratio * end.sway + 1.0 / self.alpha.abs();
+        for k in 1..8 {
+            let x = 0.125 * f64::from(k);
+            let lean = self.distance(Side::Start, x) / self.a * x * (1.0 - x);
+            // Beyond that the velocity is 0 whatever alpha is.
+            greatest = if lean < NOTHING { greatest.max(lean) } else { greatest };
+        }
+        1.0 / greatest
     }
 
     /// The course with another `alpha_3`.
@@ -99,325 +147,315 @@ impl Course {
         Course { alpha, ..self }
     }
 
-    /// How far the end lies beyond its target, in a form that rises with `alpha_3`, and the step of Newton's method from
-    /// here.
-    ///
-    /// It is `theta` that bends least: where it is about to be lost it falls to 0 on a line.
+    /// The course measured by where it ends.
+    pub fn by_level(self) -> Course {
+        Course { measure: Measure::Level, ..self }
+    }
+
+    /// What is known at an end.
+    #[inline(always)]
+    pub fn anchor(&self, side: Side) -> &Anchor {
+        &self.anchors[side as usize]
+    }
+
+    /// How far the end lies beyond its target, in a form that rises with `alpha_3`, and the step of Newton's method
+    /// from here.
     pub fn miss(&self, end: &End) -> (f64, f64) {
-        let miss = end.level - self.target;
-        let bent = -exp_m1(-miss.max(-3.0));
-        (if self.forward { bent } else { -bent }, -bent / end.turn)
+        let rise = if self.forward { 1.0 } else { -1.0 };
+        match self.measure {
+            // It is `theta` that bends least: where it is about to be lost it falls to 0 on a line.
+            Measure::Level => {
+                let bent = -exp_m1(-end.w.max(-3.0));
+                (rise * bent, -bent / end.turn)
+            }
+            Measure::Slip { spare } => {
+                let excess = ln(end.sum / spare);
+                (-excess, excess * end.sum / (rise * self.worth(end.w) * end.turn))
+            }
+            Measure::Lag { spare } => {
+                let excess = ln(end.sum / spare);
+                (excess, -excess * end.sum / (rise * self.worth(end.w) * end.turn))
+            }
+        }
     }
 
-    /// `ln[(tau_M - tau)/gap]`.
+    /// What a change of `w` at the end is worth in time, where it is `w`.
+    pub fn worth(&self, w: f64) -> f64 {
+        let theta = exp(w) / self.anchors[1].v;
+        match self.measure {
+            Measure::Lag { .. } => theta / exp_m1(self.surplus(Side::End, w)),
+            Measure::Level | Measure::Slip { .. } => theta,
+        }
+    }
+
+    /// What an error of 1 in each panel may be worth of `alpha_3`, inverse.
+    pub fn precision(&self, end: &End) -> f64 {
+        end.turn.abs() / end.noise
+    }
+
+    /// The change of `alpha_3` that rounding at the end stands for.
+    pub fn rounding(&self, end: &End) -> f64 {
+        match self.measure {
+            Measure::Level => end.noise / end.turn.abs(),
+            Measure::Slip { .. } | Measure::Lag { .. } => {
+                // One unit of the measure, and what rounding of t_f is of the time to spare.
+                let (miss, step) = self.miss(&End { sum: std::f64::consts::E * end.sum, ..*end });
+                (step / (std::f64::consts::E * miss)).abs() * (1.0 + self.t_f / end.sum)
+            }
+        }
+    }
+
+    /// `ln[(tau_M - tau)/gap]` with the gap of this side.
     #[inline(always)]
-    fn exponent(&self, d: f64) -> f64 {
-        d * (self.l + self.alpha * (1.0 - d))
+    pub fn exponent(&self, anchor: &Anchor, near: f64, far: f64) -> f64 {
+        near * (anchor.l + self.alpha * far)
     }
 
-    /// `(tau - 1)/a`; exact where the integration starts.
+    /// `f = (tau - tau_0)/a`.
     #[inline(always)]
-    fn drive(&self, d: f64) -> f64 {
-        (self.b / self.a - 1.0) * self.start - self.gap / self.a * exp_m1(self.exponent(d))
+    pub fn drive(&self, anchor: &Anchor, exponent: f64) -> f64 {
+        let e = if exponent > anchor.cap { anchor.cap } else { exponent };
+        -anchor.gap / self.a * exp_m1(e)
     }
 
-    /// Friction at a place.
-    pub fn friction(&self, d: f64) -> f64 {
-        self.tau_max - self.gap * exp(self.exponent(d))
-    }
-
-    /// Velocity at a place with this `ln theta`.
+    /// `tau_M - tau`, within the range of a double.
     #[inline(always)]
-    pub fn velocity(&self, d: f64, u: f64) -> f64 {
-        exp(self.drive(d) - self.b / self.a * u)
+    fn distance(&self, side: Side, near: f64) -> f64 {
+        let anchor = self.anchor(side);
+        anchor.gap * exp(self.exponent(anchor, near, 1.0 - near).min(MOST_EXPONENT))
+    }
+
+    /// Friction at a place, within the range of a double.
+    #[inline(always)]
+    pub fn friction(&self, side: Side, near: f64) -> f64 {
+        let anchor = self.anchor(side);
+        anchor.friction - anchor.gap * exp_m1(self.exponent(anchor, near, 1.0 - near).min(MOST_EXPONENT))
+    }
+
+    /// `ln(v/v_0)` at a place with this `w`.
+    #[inline(always)]
+    fn speed(&self, side: Side, near: f64, w: f64) -> f64 {
+        let anchor = self.anchor(side);
+        self.drive(anchor, self.exponent(anchor, near, 1.0 - near)) - self.ratio * w
+    }
+
+    /// Velocity at a place with this `w`.
+    #[inline(always)]
+    pub fn velocity(&self, side: Side, near: f64, w: f64) -> f64 {
+        self.anchor(side).v * exp(self.speed(side, near, w))
+    }
+
+    /// `ln(theta v)` that friction `tau_M` would give.
+    #[inline(always)]
+    fn surplus(&self, side: Side, w: f64) -> f64 {
+        self.anchor(side).gap / self.a + (1.0 - self.ratio) * w
     }
 
     /// Greatest friction: at an end, or at the vertex of the parabola.
     pub fn friction_max(&self) -> f64 {
-        let ends = self.tau_max - self.gap.min(self.gap_last);
-        let vertex = 0.5 + 0.5 * self.l / self.alpha;
-        if self.alpha < 0.0 && vertex > 0.0 && vertex < 1.0 { self.friction(vertex).max(ends) } else { ends }
+        let [first, last] = &self.anchors;
+        let ends = first.friction.max(last.friction);
+        let vertex = 0.5 + 0.5 * first.l / self.alpha;
+        if self.alpha < 0.0 && vertex > 0.0 && vertex < 1.0 {
+            self.friction(Side::Start, vertex).max(ends)
+        } else {
+            ends
+        }
     }
 
-    /// The sign of `d` against time, times `t_f`.
-    fn pace(&self) -> f64 {
-        if self.forward { self.t_f } else { -self.t_f }
+    /// The rate of theta in units of `theta_0`, `v_0 t_f`, with the sign of the integration against time.
+    #[inline(always)]
+    pub fn pace(&self, anchor: &Anchor) -> f64 {
+        if self.forward { self.t_f * anchor.v } else { -self.t_f * anchor.v }
     }
 
     /// Slope of `ln v` along the integration.
-    fn bend(&self, d: f64, u: f64) -> f64 {
-        let e = self.exponent(d);
-        let slope = self.l + self.alpha * (1.0 - 2.0 * d);
-        let rate = self.pace() * (exp(-u) - self.velocity(d, u));
-        -self.gap / self.a * slope * exp(e) - self.b / self.a * rate
+    pub fn bend(&self, side: Side, near: f64, w: f64) -> f64 {
+        let anchor = self.anchor(side);
+        let slope = anchor.l + self.alpha * (1.0 - 2.0 * near);
+        let along = if side == Side::Start { slope } else { -slope };
+        let rate = self.pace(anchor) * (exp_m1(-w) - exp_m1(self.speed(side, near, w)));
+        -self.distance(side, near) / self.a * along - self.ratio * rate
     }
 
-    /// Passes along the course; every panel goes to `visit`.
-    pub fn pass(&self, tolerance: f64, effort: &mut Effort, mut visit: impl FnMut(&Panel)) -> Result<End, Stop> {
+    /// Passes along the course; every panel goes to `visit`. If the pass is to tell the work as well, to an accuracy,
+    /// the velocity has to be resolved.
+    pub fn pass(
+        &self,
+        tolerance: f64,
+        work: Option<f64>,
+        effort: &mut Effort,
+        mut visit: impl FnMut(&Panel),
+    ) -> Result<End, Stop> {
         let rule = radau();
-        let (mut d, mut u, mut turn) = (0.0, self.start, 0.0);
-        let mut h = self.first();
-        let floor = self.start.min(self.target) - LOST;
+        let mut end = End { w: 0.0, turn: 0.0, sway: 0.0, noise: 0.0, sum: 0.0 };
+        let mut h = self.thin(Side::Start);
+        let (mut panels, mut slid) = (0, f64::MIN_POSITIVE);
+        let mut before = Side::Start;
+        let enough = (0.1 * tolerance).max(f64::EPSILON);
         effort.quadratures += 1;
-        for _ in 0..MOST_PANELS {
-            // Several panels without elimination cost less than one with it.
-            let mild = 0.9 * MILD / (self.t_f * (self.b / self.a * self.velocity(d, u) - exp(-u)).abs());
-            if h.min(1.0 - d) < WORTH * mild {
-                h = h.min(mild);
+        for (side, from, to) in self.stretches() {
+            let anchor = self.anchor(side);
+            if side != before {
+                end.w += anchor.other;
+                before = side;
             }
-            let to = if d + 1.0001 * h >= 1.0 { 1.0 } else { d + h };
-            effort.nodes += NODES as u32;
-            let Some((panel, last, error)) = step(self, d, to, [u, turn], rule) else {
-                h = 0.25 * (to - d);
-                if d + h == d {
-                    break;
-                }
+            let floor = anchor.other.min(0.0) - LOST;
+            if self.is_quiet(side, from, to) {
+                end = self.leap(side, (from, to), end, rule, work.is_some(), &mut visit)?;
                 continue;
-            };
-            // What the end lacks is of the order of the square of what the nodes lack.
-            let change = (tolerance / (error * error.sqrt()).max(1e-30)).powf_tenth();
-            if error * error.sqrt() <= tolerance {
-                visit(&panel);
-                (u, turn) = (panel.u[NODES - 1], last);
-                if u < floor {
+            }
+            let along = if side == Side::Start { 1.0 } else { -1.0 };
+            let mut near = from;
+            while near != to {
+                let left = (to - near).abs();
+                // Several panels without elimination cost less than one with it.
+                let slope = self.ratio * exp(self.speed(side, near, end.w)) - exp(-end.w);
+                let mild = 0.9 * MILD / (self.pace(anchor) * slope).abs();
+                let taken = if h.min(left) < WORTH * mild { h.min(mild) } else { h };
+                let next = if 1.0001 * taken >= left { to } else { near + along * taken };
+                let length = (next - near).abs();
+                if next == near || panels == MOST_PANELS {
+                    return Err(if end.w < floor + 0.75 * LOST { Stop::Lost } else { Stop::GaveUp });
+                }
+                panels += 1;
+                effort.nodes += NODES as u32;
+                let Some(found) = collocate(self, side, (near, next), [end.w, end.turn], enough, rule) else {
+                    h = 0.25 * length;
+                    continue;
+                };
+                let (part, lack) = self.part(&found.panel, rule);
+                // What the end lacks is of the order of the square of what the nodes lack.
+                let end_lacks = |nodes: f64| nodes * nodes.sqrt();
+                let mut excess = end_lacks(found.error.max(lack)) / tolerance;
+                if let Some(accuracy) = work {
+                    excess = excess.max(end_lacks(found.lack / (slid + found.slid) / accuracy));
+                }
+                let change = root_of_order(1.0 / excess.max(1e-20));
+                if excess > 1.0 {
+                    h = length * (0.8 * change).clamp(0.2, 0.8);
+                    continue;
+                }
+                visit(&found.panel);
+                slid += found.slid;
+                end = End {
+                    w: found.panel.w[NODES - 1],
+                    turn: found.turn,
+                    sway: end.sway.max(found.turn.abs()),
+                    noise: found.noise + end.noise * found.growth,
+                    sum: end.sum + part,
+                };
+                if end.w < floor {
                     return Err(Stop::Lost);
                 }
-                if to == 1.0 {
-                    return Ok(End { level: u, turn });
-                }
-                h = (to - d) * (0.8 * change).clamp(0.5, 5.0);
-                d = to;
-            } else {
-                h = (to - d) * (0.8 * change).clamp(0.2, 0.8);
-            }
-            if d + h == d {
-                break;
+                h = length.max(h.min(left)) * (0.8 * change).clamp(0.5, 5.0);
+                near = next;
             }
         }
-        Err(if u < floor + 0.75 * LOST { Stop::Lost } else { Stop::GaveUp })
+        Ok(end)
     }
 
-    /// A first panel: what the exponent and the rate of theta allow.
-    fn first(&self) -> f64 {
-        let layer = (self.l.abs() + self.alpha.abs()) * (1.0 + self.gap / self.a);
-        (2.0 / (layer + self.t_f * exp(-self.start) + 1.0)).min(1.0)
+    /// Whether nothing moves in a stretch, which is one of [`Course::stretches`].
+    fn is_quiet(&self, side: Side, from: f64, to: f64) -> bool {
+        let anchor = self.anchor(side);
+        let middle = 0.5 * (from + to);
+        self.alpha > 0.0 && self.exponent(anchor, middle, 1.0 - middle) > anchor.quiet
     }
 
-    /// The highest coefficients of the rate in Legendre polynomials: what the panel does not resolve.
-    fn top(&self, rate: &Nodes) -> f64 {
-        static WEIGHTS: OnceLock<[Nodes; 2]> = OnceLock::new();
-        let weights = WEIGHTS.get_or_init(|| {
-            let rule = radau();
-            let mut weights = [[0.0; NODES]; 2];
-            for (j, &u) in rule.u.iter().enumerate() {
-                let x = 2.0 * u - 1.0;
-                let (mut before, mut p) = (1.0, x);
-                for m in 1..NODES {
-                    if m + 2 >= NODES {
-                        weights[m + 2 - NODES][j] = (2 * m + 1) as f64 * rule.w[j] * p;
-                    }
-                    let k = m as f64;
-                    (before, p) = (p, ((2.0 * k + 1.0) * x * p - k * before) / (k + 1.0));
-                }
-            }
-            weights
-        });
-        let coefficient = |w: &Nodes| w.iter().zip(rate).map(|(w, f)| w * f).sum::<f64>().abs();
-        (coefficient(&weights[0]) + coefficient(&weights[1])) / (4 * NODES) as f64
-    }
-}
-
-/// One panel: `ln theta`, the derivative by `alpha_3` at its end, and an estimate of the error at its nodes; `None`
-/// where Newton's method does not settle.
-///
-/// A step of Newton's method solves `delta = R + int slope delta dd`. Where the slope integrates to little, its solution
-/// `R + int e^(S(d) - S(c)) slope R dc` needs no elimination; quadrature only makes the steps a little inexact.
-#[multiversion(targets(
-    "x86_64+avx+avx2+bmi1+bmi2+avx512f+avx512bw+avx512cd+avx512dq+avx512vl",
-    "x86_64+avx+avx2+bmi1+bmi2"
-))]
-fn step(course: &Course, from: f64, to: f64, [start, turn]: [f64; 2], rule: &Radau) -> Option<(Panel, f64, f64)> {
-    let h = to - from;
-    let scale = h * course.pace();
-    let ratio = course.b / course.a;
-    let (mut drive, mut lean) = ([0.0; NODES], [0.0; NODES]);
-    for j in 0..NODES {
-        let d = from * rule.rest[j] + to * rule.u[j];
-        drive[j] = course.drive(d);
-        lean[j] = -course.gap / course.a * d * (1.0 - d) * exp(course.exponent(d));
-    }
-    let mut u = [start; NODES];
-    for _ in 0..MOST_STEPS {
-        let (mut rate, mut slope, mut push) = ([0.0; NODES], [0.0; NODES], [0.0; NODES]);
-        for j in 0..NODES {
-            let (inverse, v) = (exp(-u[j]), exp(drive[j] - ratio * u[j]));
-            rate[j] = scale * (inverse - v);
-            slope[j] = scale * (ratio * v - inverse);
-            push[j] = -scale * v * lean[j];
+    /// Passes a stretch in which nothing moves, so that theta changes by the time alone.
+    fn leap(
+        &self,
+        side: Side,
+        (from, to): (f64, f64),
+        start: End,
+        rule: &Radau,
+        shown: bool,
+        visit: &mut impl FnMut(&Panel),
+    ) -> Result<End, Stop> {
+        let pace = self.pace(self.anchor(side)) * exp(-start.w);
+        let change = |near: f64| pace * (near - from).abs();
+        let last = 1.0 + change(to);
+        if last <= 0.0 {
+            return Err(Stop::Lost);
         }
-        let sums = rule.integrals(&rate);
-        let mut rest = [0.0; NODES];
-        for j in 0..NODES {
-            rest[j] = start + sums[j] - u[j];
+        let level = |near: f64| start.w + ln_1p(change(near));
+        let mut near = from;
+        while shown && near != to {
+            // Theta changes by a factor of three at most, and the last share of it in one piece.
+            let theta = 1.0 + change(near);
+            let step = theta * if self.forward { 2.0 } else { 2.0 / 3.0 } / pace.abs();
+            let next = if 1.5 * step >= (to - near).abs() { to } else { near + step * (to - from).signum() };
+            let place = |s: f64| near * (1.0 - s) + next * s;
+            visit(&Panel { side, from: near, to: next, start: level(near), w: rule.u.map(|s| level(place(s))) });
+            near = next;
         }
-        let decay = rule.integrals(&slope);
-        let mild = decay.iter().all(|s| s.abs() <= MILD);
-        let (steps, last) = if mild {
-            let (mut grow, mut weighted, mut pushed) = ([0.0; NODES], [0.0; NODES], [0.0; NODES]);
-            for j in 0..NODES {
-                grow[j] = exp(decay[j]);
-                weighted[j] = slope[j] * rest[j] / grow[j];
-                pushed[j] = push[j] / grow[j];
-            }
-            let sums = rule.integrals(&weighted);
-            let mut steps = [0.0; NODES];
-            for j in 0..NODES {
-                steps[j] = rest[j] + grow[j] * sums[j];
-            }
-            (steps, grow[NODES - 1] * (turn + rule.integrals(&pushed)[NODES - 1]))
-        } else {
-            let forced = rule.integrals(&push);
-            let mut right: [[f64; 2]; NODES] = std::array::from_fn(|j| [rest[j], turn + forced[j]]);
-            let mut matrix: [Nodes; NODES] = std::array::from_fn(|j| {
-                std::array::from_fn(|k| f64::from(u8::from(j == k)) - rule.columns[k][j] * slope[k])
-            });
-            solve(&mut matrix, &mut right);
-            (right.map(|pair| pair[0]), right[NODES - 1][1])
+        let noise = (start.noise + 2.0) / last + 1.0;
+        let turn = start.turn / last;
+        Ok(End { w: level(to), turn, sway: start.sway.max(turn.abs()), noise, sum: start.sum })
+    }
+
+    /// The part of a panel in the integral of the measure, and what its nodes lack of it.
+    fn part(&self, panel: &Panel, rule: &Radau) -> (f64, f64) {
+        let spare = match self.measure {
+            Measure::Level => return (0.0, 0.0),
+            Measure::Slip { spare } | Measure::Lag { spare } => spare,
         };
-        let mut change = 0.0f64;
-        for j in 0..NODES {
-            u[j] += steps[j];
-            // A NaN stays.
-            change = if steps[j].abs() <= change { change } else { steps[j].abs() };
+        let scale = self.t_f * (panel.to - panel.from).abs();
+        let mut values = [0.0; NODES];
+        for ((value, &node), &w) in values.iter_mut().zip(&rule.u).zip(&panel.w) {
+            let near = panel.place(node);
+            *value = scale
+                * if matches!(self.measure, Measure::Slip { .. }) {
+                    exp(self.speed(panel.side, near, w) + w)
+                } else {
+                    exp_m1(-self.distance(panel.side, near) / self.a) / exp_m1(-self.surplus(panel.side, w))
+                };
         }
-        if change.is_nan() || change > 50.0 {
-            return None;
-        }
-        // Newton's method squares the change; without elimination it loses four digits a step at the least.
-        if change <= if mild { 1e-11 } else { 1e-8 } {
-            let top = course.top(&rate);
-            return Some((Panel { from, to, start, u }, last, top));
-        }
+        let part = values.iter().zip(&rule.w).map(|(value, w)| value * w).sum();
+        (part, rule.unresolved(&values) / spare)
     }
-    None
+
+    /// Stretches in the direction of integration: from the start to the middle and from there to the end, each cut
+    /// where the velocity vanishes or friction saturates.
+    fn stretches(&self) -> impl Iterator<Item = (Side, f64, f64)> {
+        let middle = 0.5;
+        let cut = |side: Side| {
+            let anchor = self.anchor(side);
+            let level = if self.alpha > 0.0 { anchor.quiet } else { SATURATED };
+            // The nearer root of near (l + alpha (1 - near)) = level, written without cancellation.
+            let slope = anchor.l + self.alpha;
+            let square = slope * slope - 4.0 * self.alpha * level;
+            let near = 2.0 * level / (slope + slope.signum() * square.max(0.0).sqrt());
+            let beyond = self.exponent(anchor, middle, middle) / level > 1.0;
+            if beyond && near > 0.0 && near < middle { near } else { middle }
+        };
+        let (first, last) = (cut(Side::Start), cut(Side::End));
+        let all = [
+            (Side::Start, 0.0, first),
+            (Side::Start, first, middle),
+            (Side::End, middle, last),
+            (Side::End, last, 0.0),
+        ];
+        all.into_iter().filter(|(_, from, to)| from != to)
+    }
+
+    /// A panel at an end: what the exponent and the rate of theta allow.
+    fn thin(&self, side: Side) -> f64 {
+        let anchor = self.anchor(side);
+        let layer = (anchor.l.abs() + self.alpha.abs()) * (1.0 + anchor.gap / self.a);
+        (2.0 / (layer + self.t_f * anchor.v + 1.0)).min(1.0)
+    }
 }
 
 /// Exponents of a panel that quadrature at its nodes resolves.
-const MILD: f64 = 6.0;
+pub(super) const MILD: f64 = 6.0;
 
 /// How many times as dear a panel with elimination is.
 const WORTH: f64 = 4.0;
 
-/// The root by which a step follows from an error.
-trait StepRoot {
-    fn powf_tenth(self) -> f64;
-}
-
-impl StepRoot for f64 {
-    /// Near enough to the root of the order: the sixteenth, with half of it once more.
-    fn powf_tenth(self) -> f64 {
-        let sixteenth = self.sqrt().sqrt().sqrt().sqrt();
-        sixteenth * sixteenth.sqrt()
-    }
-}
-
-/// Gaussian elimination with row pivots, two right-hand sides.
-fn solve(matrix: &mut [Nodes; NODES], right: &mut [[f64; 2]; NODES]) {
-    for k in 0..NODES {
-        let mut pivot = k;
-        for j in k + 1..NODES {
-            if matrix[j][k].abs() > matrix[pivot][k].abs() {
-                pivot = j;
-            }
-        }
-        matrix.swap(k, pivot);
-        right.swap(k, pivot);
-        let (row, values) = (matrix[k], right[k]);
-        let inverse = 1.0 / row[k];
-        for j in k + 1..NODES {
-            let factor = matrix[j][k] * inverse;
-            for m in k..NODES {
-                matrix[j][m] -= factor * row[m];
-            }
-            right[j][0] -= factor * values[0];
-            right[j][1] -= factor * values[1];
-        }
-    }
-    for k in (0..NODES).rev() {
-        let inverse = 1.0 / matrix[k][k];
-        let found = [right[k][0] * inverse, right[k][1] * inverse];
-        right[k] = found;
-        for j in 0..k {
-            right[j][0] -= matrix[j][k] * found[0];
-            right[j][1] -= matrix[j][k] * found[1];
-        }
-    }
-}
-
-/// Work and the extremes of velocity, gathered along a pass.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Extent {
-    pub work: f64,
-    pub v_min: f64,
-    pub v_max: f64,
-}
-
-impl Extent {
-    pub fn new(transition: &Transition) -> Extent {
-        let Transition { v_i, v_f, .. } = *transition;
-        Extent { work: 0.0, v_min: v_i.min(v_f), v_max: v_i.max(v_f) }
-    }
-
-    /// Of steady sliding.
-    pub fn steady(course: &Course, v: f64) -> Extent {
-        Extent { work: course.friction(0.0) * v * course.t_f, v_min: v, v_max: v }
-    }
-
-    /// Adds one panel.
-    pub fn add(&mut self, course: &Course, panel: &Panel) {
-        let rule = radau();
-        let h = panel.to - panel.from;
-        let (mut before, mut sum) = (0.0, 0.0);
-        let mut bend_before = course.bend(panel.from, panel.start);
-        for j in 0..NODES {
-            let d = panel.place(rule.u[j]);
-            sum += rule.w[j] * course.friction(d) * course.velocity(d, panel.u[j]);
-            let bend = course.bend(d, panel.u[j]);
-            if (bend > 0.0) != (bend_before > 0.0) {
-                self.turn(course, panel, (before, rule.u[j]), bend_before > 0.0);
-            }
-            (before, bend_before) = (rule.u[j], bend);
-        }
-        self.work += course.t_f * h * sum;
-    }
-
-    /// The extremum between two places of a panel, by bisection.
-    fn turn(&mut self, course: &Course, panel: &Panel, (mut low, mut high): (f64, f64), rising: bool) {
-        for _ in 0..MOST_HALVINGS {
-            let middle = 0.5 * (low + high);
-            if (course.bend(panel.place(middle), panel.level(middle)) > 0.0) == rising {
-                low = middle;
-            } else {
-                high = middle;
-            }
-        }
-        let v = course.velocity(panel.place(low), panel.level(low));
-        self.v_min = self.v_min.min(v);
-        self.v_max = self.v_max.max(v);
-    }
-}
-
-/// The value at an extremum is off by the square of what is left of the bracket.
-const MOST_HALVINGS: u32 = 28;
-
-impl Panel {
-    /// The place at a share `s` of the panel.
-    pub fn place(&self, s: f64) -> f64 {
-        self.from * (1.0 - s) + self.to * s
-    }
-
-    /// `ln theta` there.
-    pub fn level(&self, s: f64) -> f64 {
-        radau().interpolate(self.start, &self.u, s)
-    }
+/// By how much a panel may grow for its error to grow as much: near enough to the root of the order, the sixteenth with
+/// half of it once more.
+fn root_of_order(x: f64) -> f64 {
+    let sixteenth = x.sqrt().sqrt().sqrt().sqrt();
+    sixteenth * sixteenth.sqrt()
 }

@@ -2,15 +2,29 @@
 //!
 //! `tau = tau_M - (tau_M - tau_i) R^x e^(alpha_3 x (1 - x))` with `x = t/t_f` and `R = (tau_M - tau_f)/(tau_M - tau_i)`
 //! falls strictly with `alpha_3` at every inner `x`. By comparison `theta' = 1 - theta^(1 - b/a) e^((tau - 1)/a)` makes
-//! `theta(t_f)` from `theta(0) = 1/v_i` rise strictly with `alpha_3`. Its limits are that of `tau = tau_M` throughout and
-//! that of `v = 0`, which is `1/v_i + t_f`. So there is one member if `1/v_f` lies strictly between them, none otherwise.
-//! Read backwards from `t_f`, `theta(0)` falls with `alpha_3`, and the conditions are the same.
+//! `theta(t_f)` from `theta(0) = 1/v_i` rise strictly with `alpha_3`. Its limits are that of `tau = tau_M` throughout
+//! and that of `v = 0`, which is `1/v_i + t_f`. So there is one member if `1/v_f` lies strictly between them, none
+//! otherwise. Read backwards from `t_f`, `theta(0)` falls with `alpha_3`, and the conditions are the same.
+//!
+//! As `tau_M` grows, `alpha_3` tends to 0 and friction to a parabola in time, `tau_i + (tau_f - tau_i) x + A x (1 -
+//! x)`, which is the member for an infinite `tau_M`: there is no bound.
 //!
 //! `d(theta')/d(theta) = (b/a - 1) v`: theta is integrated forwards for `b <= a` and backwards for `b > a`, as both
-//! contract.
+//! contract. Where the time is just long enough, theta arrives whatever `alpha_3` is, but for little. Then the time to
+//! spare is compared with what takes it: the slip `int theta v dt` beyond the time of `v = 0`, and beyond that of
+//! `tau = tau_M`, with `z_M = ln(theta v)` for friction `tau_M`,
+//!
+//! ```text
+//! int [1 - e^(-(tau_M - tau)/a)]/[1 - e^(-z_M)] dt.
+//! ```
+//!
+//! Both are sums of positive terms and fall like `1/|alpha_3|`.
 
 mod course;
+mod extent;
+mod gap;
 mod motion;
+mod panel;
 
 use super::{Case, Family, Obstacle, Swift};
 use crate::model::Law;
@@ -18,8 +32,11 @@ use crate::numerics::elementary::{exp, exp_m1, ln, ln_1p};
 use crate::numerics::gauss::rule;
 use crate::numerics::root::{Probe, newton};
 use crate::protocol::{Effort, Motion};
-use course::{Course, Extent, Panel, Stop};
+use course::{Course, Measure, Stop};
+use extent::Extent;
+use gap::gap;
 use motion::Resolution;
+use panel::Panel;
 
 /// The family.
 pub struct BoundedFriction;
@@ -52,7 +69,7 @@ impl Family for BoundedFriction {
             return Err(Obstacle::NotConverged);
         }
         Ok(Swift {
-            alpha: Some(course.alpha),
+            alpha: Some(if case.tau_max == f64::INFINITY { 0.0 } else { course.alpha }),
             work: extent.work,
             v_min: extent.v_min,
             v_max: extent.v_max,
@@ -69,7 +86,7 @@ impl Family for BoundedFriction {
         })?;
         if panels.is_empty() {
             // Steady sliding: one panel tells it all.
-            let again = course.pass(0.1 * rtol, &mut Effort::default(), |panel| panels.push(*panel));
+            let again = course.pass(0.1 * rtol, Some(rtol), &mut Effort::default(), |panel| panels.push(*panel));
             again.map_err(|_| Obstacle::NotConverged)?;
             course.alpha = 0.0;
         }
@@ -80,17 +97,27 @@ impl Family for BoundedFriction {
     }
 }
 
+/// Stands for an infinite distance from the bound.
+const FAR: f64 = 1e100;
+
+/// Below this share of [`Course::worth`] the time to spare is what a course is measured by.
+const CLOSE: f64 = 0.1;
+
 /// Tolerance of the first search.
 const COARSE: f64 = 1e-4;
 
-/// Most passes after the first search: Newton's method needs two or three.
-const MOST_PASSES: u32 = 12;
+/// Most passes after the first search: Newton's method needs two or three, and a dozen more where theta has all but
+/// relaxed at the end.
+const MOST_PASSES: u32 = 40;
 
-/// Tolerance of the last pass, in units of rtol.
-const LAST: f64 = 1e-3;
+/// Tolerance of the nodes of the last pass, in units of rtol.
+const LAST: f64 = 0.1;
 
-/// What rounding of `ln theta` may leave of the target.
-const ROUNDING: f64 = 4.0 * f64::EPSILON;
+/// Least tolerance of nodes: rounding allows no less.
+const FINEST: f64 = 1e-13;
+
+/// What rounding of `w` may leave of the target.
+const ROUNDING: f64 = 8.0 * f64::EPSILON;
 
 /// The course of the member that solves the case; the panels of its last pass go to `visit`, `None` when a pass begins.
 /// No panel is visited where the protocol is steady sliding.
@@ -102,12 +129,12 @@ fn member(
 ) -> Result<Course, Obstacle> {
     let (law, v_i, v_f, t_f) = (case.transition.law, case.transition.v_i, case.transition.v_f, case.t_f);
     let sound = law.a > 0.0 && law.b >= 0.0 && t_f > 0.0 && v_i >= 1.0 && v_f >= 1.0;
-    if !sound || ![law.a, law.b, t_f, v_i, v_f, case.tau_max].iter().all(|x| x.is_finite()) {
+    if !sound || ![law.a, law.b, t_f, v_i, v_f].iter().all(|x| x.is_finite()) || case.tau_max.is_nan() {
         return Err(Obstacle::Domain);
     }
-    // Distances to the bound; their difference is known better than either.
-    let room = case.tau_max - 1.0;
-    let (gap_i, gap_f) = (room - (law.a - law.b) * ln(v_i), room - (law.a - law.b) * ln(v_f));
+    let unbounded = case.tau_max == f64::INFINITY;
+    let distance = |v: f64| if unbounded { FAR } else { gap(law, case.tau_max, v) };
+    let (gap_i, gap_f) = (distance(v_i), distance(v_f));
     if gap_i <= 0.0 || gap_f <= 0.0 {
         return Err(Obstacle::FrictionAtEnds { friction: case.tau_max - gap_i.min(gap_f) });
     }
@@ -115,41 +142,55 @@ fn member(
     let log_ratio = if change.abs() < 0.5 { ln_1p(change) } else { ln(v_i / v_f) };
     let share = (law.a - law.b) * log_ratio / gap_i;
     let ln_r = if share.abs() < 0.5 { ln_1p(share) } else { ln(gap_f / gap_i) };
-    let course = Course::new(case, (gap_i, gap_f), ln_r);
     if v_i == v_f {
-        return Ok(course);
+        return Ok(Course::new(case, (gap_i, gap_f), ln_r, log_ratio, Measure::Level));
     }
-    if t_f <= (v_i - v_f) / v_f / v_i {
-        return Err(Obstacle::Velocity);
+    // Time beyond that of v = 0 or that of tau = tau_M.
+    let accelerates = v_f > v_i;
+    let spare =
+        t_f - if accelerates { fastest(law, (v_i, v_f), (gap_i, gap_f), effort) } else { (v_i - v_f) / v_f / v_i };
+    if spare <= 0.0 {
+        return Err(if accelerates { Obstacle::Friction } else { Obstacle::Velocity });
     }
-    if v_f > v_i && t_f <= fastest(law, (v_i, v_f), (gap_i, gap_f), effort) {
-        return Err(Obstacle::Friction);
-    }
-    let mut course = course.with(search(&course, effort).ok_or(Obstacle::NotConverged)?);
-    let mut last_pass = false;
+    let measure = if accelerates { Measure::Lag { spare } } else { Measure::Slip { spare } };
+    let course = Course::new(case, (gap_i, gap_f), ln_r, log_ratio, measure);
+    let course = if spare < CLOSE * course.worth(0.0) { course } else { course.by_level() };
+    let alpha = match course.measure {
+        Measure::Level => search(&course, effort),
+        Measure::Slip { .. } => close(&course, 2.0 * t_f / spare, effort),
+        Measure::Lag { .. } => close(&course, -2.0 * t_f / spare, effort),
+    };
+    let mut course = course.with(alpha.ok_or(Obstacle::NotConverged)?);
+    let (mut last_pass, mut before, mut tolerance) = (false, f64::INFINITY, 0.1 * rtol);
     for _ in 0..MOST_PASSES {
         let pass = |panel: &Panel| {
             if last_pass {
                 visit(&course, Some(panel));
             }
         };
-        // The last pass tells the extremes too, which lie between the nodes.
-        let tolerance = if last_pass { LAST } else { 0.1 } * rtol;
-        let end = course.pass(tolerance, effort, pass).map_err(|_| Obstacle::NotConverged)?;
+        // The last pass tells the work and the extremes too, which lie between the nodes.
+        let nodes = (LAST * rtol).max(FINEST);
+        let (within_pass, work) =
+            if last_pass { (tolerance.min(nodes * nodes.sqrt()), Some(nodes)) } else { (tolerance, None) };
+        let end = course.pass(within_pass, work, effort, pass).map_err(|_| Obstacle::NotConverged)?;
         let (_, step) = course.miss(&end);
-        // Rounding of ln theta allows no better, whatever alpha then is worth.
-        let rounding = ROUNDING * (1.0 + course.target.abs()) / end.turn.abs();
-        let within = |share: f64| step.abs() <= (share * course.alpha.abs()).max(rounding);
-        if last_pass && within(0.5 * rtol) {
+        let scale = course.scale(&end);
+        let within = |share: f64| step.abs() <= share * scale;
+        // Rounding allows no better, once Newton's method no longer gains.
+        let spent = step.abs() <= ROUNDING * course.rounding(&end) && step.abs() >= 0.5 * before;
+        if last_pass && (within(0.5 * rtol) || spent) {
             return Ok(course);
         }
-        // Newton's method doubles the digits.
-        let next = within(rtol.sqrt());
         if !step.is_finite() {
             return Err(Obstacle::NotConverged);
         }
+        // What a panel may lack for the end to be as good as the step that is to come.
+        let share = 5.0 * rtol * scale * course.precision(&end);
+        tolerance = share.clamp(FINEST * FINEST.sqrt(), 0.1 * rtol);
+        // Newton's method doubles the digits.
+        last_pass = within(rtol.sqrt()) || spent;
+        before = step.abs();
         course = course.with(course.alpha + step);
-        last_pass = next;
         visit(&course, None);
     }
     Err(Obstacle::NotConverged)
@@ -190,7 +231,7 @@ fn search(course: &Course, effort: &mut Effort) -> Option<f64> {
     let mut gave_up = false;
     let probe = |x: f64| {
         let course = course.with(unit * x);
-        let end = match course.pass(COARSE, effort, |_| ()) {
+        let end = match course.pass(COARSE, None, effort, |_| ()) {
             Ok(end) => end,
             // Theta too small: too little of alpha forwards, too much of it backwards.
             Err(Stop::Lost) => {
@@ -215,3 +256,32 @@ fn search(course: &Course, effort: &mut Effort) -> Option<f64> {
 
 /// Longest step of the search, in units of what alpha bears.
 const FARTHEST: f64 = 4.0;
+
+/// `alpha_3` to [`COARSE`] where the time is just long enough: far out, where the layers at the ends shrink like
+/// `1/alpha_3`, from a start in units of [`Course::unit`].
+fn close(course: &Course, start: f64, effort: &mut Effort) -> Option<f64> {
+    let unit = course.unit();
+    let mut gave_up = false;
+    let place = |q: f64| 0.5 * unit * (exp_m1(q) - exp_m1(-q));
+    let probe = |q: f64| {
+        let course = course.with(place(q));
+        match course.pass(COARSE, None, effort, |_| ()) {
+            Ok(end) => {
+                let (value, step) = course.miss(&end);
+                let stretch = 0.5 * unit * (exp(q) + exp(-q));
+                Some(Probe { value, slope: (-value / step * stretch).max(0.0) })
+            }
+            Err(Stop::Lost) => Some(Probe { value: if course.forward { -f64::MAX } else { f64::MAX }, slope: 0.0 }),
+            Err(Stop::GaveUp) => {
+                gave_up = true;
+                Some(Probe { value: 0.0, slope: 0.0 })
+            }
+        }
+    };
+    let start = start.signum() * ln_1p(2.0 * start.abs());
+    let root = newton(probe, start, (-FARTHEST_OUT, FARTHEST_OUT), false, 1e-3);
+    root.filter(|_| !gave_up).map(|root| place(root.x))
+}
+
+/// Logarithm of the greatest `alpha_3` in units of [`Course::unit`].
+const FARTHEST_OUT: f64 = 100.0;

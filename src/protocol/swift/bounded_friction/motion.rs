@@ -1,6 +1,7 @@
 //! A member over time.
 
-use super::course::{Course, Panel};
+use super::course::{Course, Side};
+use super::panel::Panel;
 use crate::numerics::elementary::exp;
 use crate::protocol::{Moment, Motion};
 
@@ -26,14 +27,13 @@ impl Motion for Resolution {
         let k = (along as usize).min(count - 1);
         let (panel, share) = (&self.panels[k], along - k as f64);
         let share = if self.course.forward { share } else { 1.0 - share };
-        let (d, u) = (panel.place(share), panel.level(share));
-        let x = if self.course.forward { d } else { 1.0 - d };
+        let (side, near, w) = (panel.side, panel.place(share), panel.level(share));
+        let x = if self.course.forward == (side == Side::Start) { near } else { 1.0 - near };
         Moment {
             t: self.course.t_f * x,
-            v: self.course.velocity(d, u),
-            theta: exp(u),
-            friction: self.course.friction(d),
-            v_c: None,
+            v: self.course.velocity(side, near, w),
+            theta: exp(w) / self.course.anchor(side).v,
+            friction: self.course.friction(side, near),
             beta: None,
         }
     }

@@ -1,0 +1,61 @@
+//! Work and the extremes of velocity, gathered along a pass.
+
+use super::course::{Course, Side};
+use super::panel::Panel;
+use crate::model::Transition;
+use crate::numerics::radau::{NODES, radau};
+
+/// What a pass gathers.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Extent {
+    pub work: f64,
+    pub v_min: f64,
+    pub v_max: f64,
+}
+
+impl Extent {
+    pub fn new(transition: &Transition) -> Extent {
+        let Transition { v_i, v_f, .. } = *transition;
+        Extent { work: 0.0, v_min: v_i.min(v_f), v_max: v_i.max(v_f) }
+    }
+
+    /// Of steady sliding.
+    pub fn steady(course: &Course, v: f64) -> Extent {
+        Extent { work: course.friction(Side::Start, 0.0) * v * course.t_f, v_min: v, v_max: v }
+    }
+
+    /// Adds one panel.
+    pub fn add(&mut self, course: &Course, panel: &Panel) {
+        let rule = radau();
+        let (mut before, mut sum) = (0.0, 0.0);
+        let mut bend_before = course.bend(panel.side, panel.from, panel.start);
+        for j in 0..NODES {
+            let near = panel.place(rule.u[j]);
+            sum += rule.w[j] * course.friction(panel.side, near) * course.velocity(panel.side, near, panel.w[j]);
+            let bend = course.bend(panel.side, near, panel.w[j]);
+            if (bend > 0.0) != (bend_before > 0.0) {
+                self.turn(course, panel, (before, rule.u[j]), bend_before > 0.0);
+            }
+            (before, bend_before) = (rule.u[j], bend);
+        }
+        self.work += course.t_f * (panel.to - panel.from).abs() * sum;
+    }
+
+    /// The extremum between two places of a panel, by bisection.
+    fn turn(&mut self, course: &Course, panel: &Panel, (mut low, mut high): (f64, f64), rising: bool) {
+        for _ in 0..MOST_HALVINGS {
+            let middle = 0.5 * (low + high);
+            if (course.bend(panel.side, panel.place(middle), panel.level(middle)) > 0.0) == rising {
+                low = middle;
+            } else {
+                high = middle;
+            }
+        }
+        let v = course.velocity(panel.side, panel.place(low), panel.level(low));
+        self.v_min = self.v_min.min(v);
+        self.v_max = self.v_max.max(v);
+    }
+}
+
+/// The value at an extremum is off by the square of what is left of the bracket.
+const MOST_HALVINGS: u32 = 28;
