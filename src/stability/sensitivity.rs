@@ -69,7 +69,7 @@ pub fn amplification(path: &Path, rtol: f64) -> Option<f64> {
 }
 
 /// More steps than any flow takes that swings less than some thousand times.
-pub const MOST_STEPS: u32 = 10_000;
+pub const MOST_STEPS: u32 = 3_000;
 
 /// `exp(-int dt/theta)`, by which an error of `ln theta` decays under a given velocity.
 fn decay(path: &Path, rule: &Radau) -> f64 {

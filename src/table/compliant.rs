@@ -34,7 +34,7 @@ const COLUMNS: &[Column] = &[
         "amplification",
         "1",
         "greatest factor by which a small error grows from start to end, in the norm of (ln v, ln theta, k s/a); null \
-         beyond 10000 steps",
+         beyond 3000 steps of its integration",
     ),
     Column::number(
         "end_error",

@@ -171,30 +171,31 @@ impl Timed {
 /// Where in `[0, most]` a rising function that is 0 at 0 takes a value, by secants of its logarithm inside a bracket.
 fn inverse(value: f64, most: f64, f: impl Fn(f64) -> f64) -> f64 {
     let (mut low, mut high) = (0.0, most);
-    let mut d = most * (value / f(most)).clamp(0.0, 1.0);
     let mut last = (most, f(most));
+    let mut d = most * (value / last.1).clamp(0.0, 1.0);
     for _ in 0..MOST_STEPS {
         if d <= low || d >= high {
             d = 0.5 * (low + high);
         }
         let found = f(d);
-        if (found / value - 1.0).abs() <= ENOUGH || d == low || d == high {
-            break;
-        }
+        let order = ln(last.1 / found) / ln(last.0 / d);
+        last = (d, found);
         if found < value {
             low = d;
         } else {
             high = d;
         }
-        let order = ln(last.1 / found) / ln(last.0 / d);
-        last = (d, found);
         d *= exp(ln(value / found) / order);
+        // The last step leaves less than the square of what it started from; the rounding of places leaves more.
+        if (found / value - 1.0).abs() <= ENOUGH {
+            break;
+        }
     }
     d.clamp(0.0, most)
 }
 
-/// A relative difference that rounding leaves.
-const ENOUGH: f64 = 1e-14;
+/// A relative difference that one more step makes up for.
+const ENOUGH: f64 = 1e-8;
 
 /// More steps than the secants take.
 const MOST_STEPS: u32 = 60;

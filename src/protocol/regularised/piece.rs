@@ -126,4 +126,4 @@ fn stretch(end: f64, mean: f64) -> f64 {
 }
 
 /// The end that is highest above the mean for which the way down is shortened.
-const MOST_RHO: f64 = 1e6;
+const MOST_RHO: f64 = 1e12;
