@@ -6,7 +6,7 @@
 //! the map is one of `ln z` alone: its fixed points, and the number of cycles between two values of `z`, follow from
 //! samples of it.
 
-use super::orbit::{BAND, Cycle, Extremum, Orbit, Stop};
+use super::orbit::{BAND, Cycle, Extremum, Orbit, Seen, Stop};
 use super::slider::{Slider, State, Y, Z};
 use crate::numerics::elementary::{exp, ln, ln_1p};
 use crate::numerics::gauss;
@@ -69,8 +69,14 @@ const SLOW: f64 = 0.1;
 /// The contact lifetime must relax this many times faster than `z` changes.
 const ADIABATIC: f64 = 10.0;
 
+/// On a limit cycle friction gives and takes the same, up to this share of it.
+const BALANCED: f64 = 0.01;
+
 /// Cycles that are followed after sampling has led to another place.
 const PATIENCE: u32 = 10;
+
+/// Error of an extremum in the dense output.
+const ROUGH: f64 = 1e-2;
 
 /// Cycles of one sample.
 const MOST_RELAXATIONS: u32 = 60;
@@ -141,10 +147,14 @@ impl Sample {
 /// How sampling ended.
 enum Slide {
     Decided(Fate),
-    /// Cycles are to be followed again from here, `time` later; the one before changed `ln z` by `change`.
-    Follow {
+    /// Cycles change fast again: the response is here, `time` later.
+    Fast {
         place: Place,
         time: f64,
+    },
+    /// Cycles come to a limit cycle near here by themselves; the last one changed `ln z` by `change`.
+    Near {
+        place: Place,
         change: f64,
     },
     /// Contact lifetime and `z` change together.
@@ -158,10 +168,12 @@ impl Follower<'_> {
         // Time before this orbit began.
         let mut offset = 0.0;
         let mut before: Option<Place> = None;
-        let (mut last_rate, mut last_change) = (f64::NAN, f64::NAN);
-        let mut contraction = Contraction::NONE;
+        let mut last_rate = f64::NAN;
+        let mut contraction = Contraction::after(f64::NAN);
         // Cycles so far, and after how many sampling may be tried again.
         let (mut count, mut again) = (0, 0);
+        // Whether this is the response itself, not another way to the same end.
+        let mut real = true;
         loop {
             let cycle = orbit.cycle(self.linear.stable, &mut self.budget);
             self.t = offset + orbit.t();
@@ -169,14 +181,18 @@ impl Follower<'_> {
                 Ok(cycle) => cycle,
                 Err(stop) => {
                     let extrema = orbit.extrema();
-                    self.note(offset, extrema);
+                    if real {
+                        self.note(offset, &mut orbit, extrema);
+                    }
                     return match (stop, orbit.settled_at()) {
                         (Stop::Quiet, Some(time)) => Ok(Fate::Settled { time: offset + time }),
                         _ => Err(stop),
                     };
                 }
             };
-            self.note(offset, [cycle.low, cycle.high]);
+            if real {
+                self.note(offset, &mut orbit, cycle.extrema);
+            }
             let place = Place { z: cycle.end[Z], y: cycle.end[Y] };
             let Some(last) = before.replace(place) else { continue };
             let rate = self.rate(&cycle, last.z);
@@ -187,19 +203,35 @@ impl Follower<'_> {
             {
                 return Ok(Fate::Settled { time: offset + time });
             }
-            let smooth = (rate - last_rate).abs() < 0.5 * rate.abs().max(last_rate.abs());
             count += 1;
-            if rate.abs() < SLOW && smooth && place.z > 0.0 && count >= again {
+            // Both coordinates of the section: relative to its size, or to what moves ln v by 1.
+            let change = ((place.z - last.z) / place.z.max(slider.force())).abs().max((place.y - last.y).abs());
+            // Down to where rounding and the errors of steps stop it.
+            let left = contraction.left;
+            contraction.take(change, self.tolerance);
+            let near = contraction.left < 0.03 * self.rtol || (left < self.rtol && contraction.row == 0);
+            if near && rate.abs() < BALANCED * gross(&cycle, last.z, slider) {
+                let [low, high] = cycle.exact_range(&mut orbit);
+                return Ok(Fate::Cycle { period: cycle.period, high, low });
+            }
+            if rate.abs() < SLOW && contraction.is_slow() && place.z > 0.0 && count >= again {
                 match self.slide(place, (rate - last_rate) / last_rate) {
                     Ok(Slide::Decided(Fate::Settled { time })) => {
                         return Ok(Fate::Settled { time: offset + cycle.t + time });
                     }
                     Ok(Slide::Decided(fate)) => return Ok(fate),
-                    Ok(Slide::Follow { place, time, change }) => {
+                    Ok(Slide::Fast { place, time }) => {
                         offset += cycle.t + time;
                         orbit = Orbit::new(slider, [place.z, place.y, 0.0], self.tolerance);
                         before = Some(place);
-                        (last_rate, last_change, contraction) = (f64::NAN, change, Contraction::NONE);
+                        (last_rate, contraction) = (f64::NAN, Contraction::after(f64::NAN));
+                        continue;
+                    }
+                    Ok(Slide::Near { place, change }) => {
+                        real = false;
+                        orbit = Orbit::new(slider, [place.z, place.y, 0.0], self.tolerance);
+                        before = Some(place);
+                        (last_rate, contraction) = (f64::NAN, Contraction::after(change));
                         again = count + PATIENCE;
                         continue;
                     }
@@ -207,15 +239,7 @@ impl Follower<'_> {
                     Err(stop) => return Err(stop),
                 }
             }
-            // Both coordinates of the section: relative to its size, or to what moves ln v by 1.
-            let change = ((place.z - last.z) / place.z.max(slider.force())).abs().max((place.y - last.y).abs());
-            // Down to where rounding and the errors of steps stop it.
-            let left = contraction.left;
-            contraction.take(change, last_change, self.tolerance);
-            if contraction.left < 0.03 * self.rtol || (left < self.rtol && contraction.row == 0) {
-                return Ok(Fate::Cycle { period: cycle.period, high, low });
-            }
-            (last_rate, last_change) = (rate, change);
+            last_rate = rate;
         }
     }
 
@@ -236,13 +260,17 @@ impl Follower<'_> {
         self.linear.stable && excess(low, high) < 0.0 && rate < -2.0 * rest && growth < -2.0 * rest
     }
 
-    fn note(&mut self, offset: f64, [low, high]: [Option<Extremum>; 2]) {
-        let later = |e: Extremum| Extremum { t: offset + e.t, ..e };
-        if let Some(high) = high.map(later) {
-            self.high = Some(self.high.filter(|old| old.x >= high.x).unwrap_or(high));
-        }
-        if let Some(low) = low.map(later) {
-            self.low = Some(self.low.filter(|old| old.x <= low.x).unwrap_or(low));
+    /// Keeps the extrema of a cycle if they are further out than those before.
+    fn note(&mut self, offset: f64, orbit: &mut Orbit<'_>, extrema: [Option<Seen>; 2]) {
+        let kept = [&mut self.low, &mut self.high];
+        for ((seen, kept), sign) in extrema.into_iter().zip(kept).zip([-1.0, 1.0]) {
+            let Some(seen) = seen else { continue };
+            if kept.is_none_or(|kept| sign * seen.rough.x > sign * kept.x - ROUGH) {
+                let extremum = orbit.polished(seen);
+                if kept.is_none_or(|kept| sign * extremum.x > sign * kept.x) {
+                    *kept = Some(Extremum { t: offset + extremum.t, ..extremum });
+                }
+            }
         }
     }
 
@@ -263,9 +291,10 @@ impl Follower<'_> {
             let size = (high - low).min(1.0);
             if off <= (RATE_ERROR * rate.abs() * size).max(3.0 * tolerance) {
                 // Errors of a step are absolute in x, so their share is greater in small cycles.
-                let gross = cycle.loss[1] * self.slider.k / (place.z * place.z);
+                let gross = gross(&cycle, place.z, self.slider);
                 let tolerance = (RATE_ERROR * rate.abs() * size / gross).clamp(1e-13, self.tolerance);
                 let drift = ln(place.z / asked);
+                let [low, high] = cycle.exact_range(&mut orbit);
                 return Ok(Sample {
                     place,
                     slope,
@@ -316,7 +345,7 @@ impl Follower<'_> {
             if next.drift.abs() > 20.0 * next.rate.abs() + self.rtol {
                 // One cycle led here from far away: there is a limit cycle near, and cycles come to it by themselves.
                 let (place, change) = (next.place, next.drift.abs());
-                return Ok(Slide::Follow { place, time: 0.0, change });
+                return Ok(Slide::Near { place, change });
             }
             if next.rate * direction <= 0.0 {
                 return Ok(Slide::Decided(self.cycle_between(&here, &next)?));
@@ -332,7 +361,7 @@ impl Follower<'_> {
                 // As many whole cycles as fit.
                 let spare = cycles - cycles.floor();
                 let place = next.moved(-spare * next.rate);
-                return Ok(Slide::Follow { place, time: time - spare * next.period, change: f64::NAN });
+                return Ok(Slide::Fast { place, time: time - spare * next.period });
             }
             here = next;
             stride *= 2.0;
@@ -443,43 +472,65 @@ fn lagrange(nodes: &[f64; NODES], i: usize, x: f64) -> f64 {
 /// How cycles come closer to each other.
 #[derive(Debug, Clone, Copy)]
 struct Contraction {
+    /// The last change of the section.
+    change: f64,
+    /// What was left of a change by the next one, the last two times.
+    shares: [f64; 2],
     /// Changes in a row that were smaller than the one before.
     row: u32,
-    /// The greatest share that was left of a change among them.
-    share: f64,
     /// Estimate of all changes to come.
     left: f64,
 }
 
 impl Contraction {
-    const NONE: Contraction = Contraction { row: 0, share: 0.0, left: f64::INFINITY };
+    /// After a change, or NaN.
+    fn after(change: f64) -> Contraction {
+        Contraction { change, shares: [f64::NAN; 2], row: 0, left: f64::INFINITY }
+    }
 
-    /// Takes in the next change, after the last one.
-    fn take(&mut self, change: f64, last: f64, tolerance: f64) {
-        let share = change / last;
+    /// Takes in the next change, with the error of a step.
+    fn take(&mut self, change: f64, tolerance: f64) {
+        let share = change / self.change;
         let contracts = share < 0.999;
         if !contracts {
-            *self = Contraction::NONE;
+            *self = Contraction { shares: [share, self.shares[0]], ..Contraction::after(change) };
             return;
         }
-        (self.row, self.share) = (self.row + 1, self.share.max(share));
+        let largest = share.max(self.shares[0]);
         // The slower, the longer it must go on to be told from chance.
-        let enough = match self.share {
-            share if share < 0.01 && last > 1e3 * tolerance => 1,
-            share if share < 0.5 => 2,
+        let enough = match largest {
+            _ if share < 0.01 && change < 100.0 * tolerance && self.change > 1e3 * tolerance => 1,
+            largest if largest < 0.5 => 2,
             _ => 8,
         };
+        self.row += 1;
         if self.row >= enough {
-            self.left = self.left.min(change * share / (1.0 - share));
+            self.left = self.left.min(change * largest / (1.0 - largest));
         }
+        (self.change, self.shares) = (change, [share, self.shares[0]]);
+    }
+
+    /// Whether changes stay about the same.
+    fn is_slow(&self) -> bool {
+        self.shares.iter().all(|share| (0.5..2.0).contains(share))
     }
 }
 
 impl Cycle {
-    /// `ln(v/v_f)` at its slowest and fastest.
+    /// `ln(v/v_f)` at its slowest and fastest, as they were seen.
     fn range(&self) -> [f64; 2] {
-        [self.low, self.high].map(|extremum| extremum.map_or(0.0, |extremum| extremum.x))
+        self.extrema.map(|extremum| extremum.map_or(0.0, |seen| seen.rough.x))
     }
+
+    /// The same to the order of the method.
+    fn exact_range(&self, orbit: &mut Orbit<'_>) -> [f64; 2] {
+        self.extrema.map(|extremum| extremum.map_or(0.0, |seen| orbit.polished(seen).x))
+    }
+}
+
+/// What friction gives and takes over a cycle that began at `z`, added up, as a change of `ln z`.
+fn gross(cycle: &Cycle, z: f64, slider: &Slider) -> f64 {
+    cycle.loss[1] * slider.k / (z * z)
 }
 
 /// How far a cycle goes beyond the band of settled velocities, relative to it; negative within.

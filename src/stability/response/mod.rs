@@ -14,7 +14,7 @@ use crate::protocol::Status;
 use crate::stability::SteadySliding;
 
 pub use fate::{Course, Fate, Linear, follow};
-pub use orbit::{Cycle, Extremum, Orbit, SETTLED, Stop};
+pub use orbit::{Cycle, Extremum, Orbit, SETTLED, Seen, Stop};
 pub use slider::{Slider, State};
 
 /// A step of the control velocity.

@@ -24,10 +24,8 @@ pub struct Cycle {
     pub period: f64,
     /// Energy that friction took, and the sum of its sizes over the steps.
     pub loss: [f64; 2],
-    /// Fastest moment; `None` if the first cycle has none.
-    pub high: Option<Extremum>,
-    /// Slowest moment; `None` if the first cycle has none.
-    pub low: Option<Extremum>,
+    /// Slowest and fastest moment; `None` if the first cycle has none.
+    pub extrema: [Option<Seen>; 2],
 }
 
 /// Why an orbit is followed no further.
@@ -52,8 +50,8 @@ pub const SETTLED: f64 = 0.01;
 /// `ln(1 - SETTLED)` and `ln(1 + SETTLED)`.
 pub const BAND: [f64; 2] = [-0.01005033585350144, 0.009950330853168083];
 
-/// Share of a step within which an extremum is looked for again.
-const NEAR: f64 = 0.125;
+/// Shares of a step, and of the step that this leads to, within which an extremum is looked for again.
+const NEAR: [f64; 2] = [0.125, 0.125];
 
 /// A response under way.
 #[derive(Debug)]
@@ -66,16 +64,19 @@ pub struct Orbit<'a> {
     section: f64,
     /// Whether `v = v_f` has been met.
     met: bool,
+    /// Slope of `x` at the end of the last step.
+    slope: f64,
     high: Option<Seen>,
     low: Option<Seen>,
     /// The last entry into the band of settled velocities; `None` outside.
     entry: Option<Entry>,
 }
 
-/// An extremum as it was seen.
-#[derive(Debug, Clone, Copy)]
-struct Seen {
-    rough: Extremum,
+/// An extremum as it was seen, good to the order of the dense output.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Seen {
+    /// Where and when, about.
+    pub rough: Extremum,
     /// The step and the share of it; `None` at an arrest.
     place: Option<(Leg, f64)>,
 }
@@ -95,6 +96,7 @@ impl<'a> Orbit<'a> {
             lost: [0.0; 2],
             section: 0.0,
             met: state[X] == 0.0,
+            slope: 0.0,
             high: None,
             low: None,
             entry: is_inside(state[X]).then_some(Entry { edge: state[X], place: None }),
@@ -118,8 +120,8 @@ impl<'a> Orbit<'a> {
             }
             if let Some(arrested) = self.slider.arrest(self.run.y()) {
                 self.run.jump(arrested, self.slider.first_step(&arrested));
-                let rough = Extremum { x: arrested[X], t: self.run.t() };
-                keep(&mut self.low, Seen { rough, place: None }, |new, old| new < old);
+                self.turn(-1.0, Seen { rough: Extremum { x: arrested[X], t: self.run.t() }, place: None });
+                self.slope = 0.0;
             }
             let leg = step(&mut self.run).map_err(|_| Stop::Ends)?;
             let cycle = self.look(&leg);
@@ -141,25 +143,34 @@ impl<'a> Orbit<'a> {
         let mut cycle = None;
         let mut u0 = 0.0;
         let (mut x0, mut slope0) = (leg.start[X], leg.slope(X, 0.0));
+        if self.slope * slope0 < 0.0 {
+            // Between two steps: the slope of their polynomials jumps a little.
+            self.turn(self.slope, Seen { rough: Extremum { x: x0, t: leg.t }, place: None });
+        }
         for u1 in radau_iia_9().nodes {
             let (x1, slope1) = (leg.value(X, u1), leg.slope(X, u1));
             if slope0 * slope1 < 0.0 {
                 let turn = crossing(|u| leg.slope(X, u), [u0, u1], [slope0, slope1], 1e-6 * (u1 - u0));
                 let x = leg.value(X, turn);
                 cycle = self.pass(leg, [u0, turn], [x0, x]).or(cycle);
-                let seen = Seen { rough: Extremum { x, t: leg.t + turn * leg.h }, place: Some((*leg, turn)) };
-                if slope0 > 0.0 {
-                    keep(&mut self.high, seen, |new, old| new > old);
-                } else {
-                    keep(&mut self.low, seen, |new, old| new < old);
-                }
+                let rough = Extremum { x, t: leg.t + turn * leg.h };
+                self.turn(slope0, Seen { rough, place: Some((*leg, turn)) });
                 cycle = self.pass(leg, [turn, u1], [x, x1]).or(cycle);
             } else {
                 cycle = self.pass(leg, [u0, u1], [x0, x1]).or(cycle);
             }
             (u0, x0, slope0) = (u1, x1, slope1);
         }
+        self.slope = slope0;
         cycle
+    }
+
+    /// Notes an extremum after a rise or a fall, if it is further out than the one before.
+    fn turn(&mut self, slope: f64, seen: Seen) {
+        let (kept, sign) = if slope > 0.0 { (&mut self.high, 1.0) } else { (&mut self.low, -1.0) };
+        if kept.is_none_or(|kept| sign * seen.rough.x > sign * kept.rough.x) {
+            *kept = Some(seen);
+        }
     }
 
     /// Looks through a piece in which the velocity only rises or only falls.
@@ -187,14 +198,12 @@ impl<'a> Orbit<'a> {
     fn close(&mut self, leg: &Leg, u: f64) -> Cycle {
         let (end, t, part) = self.exactly(leg, u, 0.0);
         let loss = part.map_or([0.0; 2], |part| self.loss(&part));
-        let [low, high] = self.extrema();
         let cycle = Cycle {
             end: [end[Z], end[Y], 0.0],
             t,
             period: t - self.section,
             loss: [0, 1].map(|i| self.lost[i] + loss[i]),
-            high,
-            low,
+            extrema: [self.low, self.high],
         };
         // The whole step will be added.
         (self.section, self.lost) = (t, loss.map(|loss| -loss));
@@ -217,22 +226,23 @@ impl<'a> Orbit<'a> {
         best
     }
 
-    /// An extremum, integrated again about where it was seen.
-    fn polished(&mut self, Seen { rough, place }: Seen) -> Extremum {
-        let Some((leg, u)) = place else { return rough };
-        let Some(near) = between(&mut self.run, &leg, (u - NEAR).max(0.0), u + NEAR) else { return rough };
-        let slopes = [near.slope(X, 0.0), near.slope(X, 1.0)];
-        if slopes[0] * slopes[1] >= 0.0 {
-            return rough;
+    /// An extremum, integrated again about where it was seen, on ever shorter steps.
+    pub fn polished(&mut self, Seen { rough, place }: Seen) -> Extremum {
+        let Some((mut leg, mut u)) = place else { return rough };
+        for near in NEAR {
+            let Some(part) = between(&mut self.run, &leg, (u - near).max(0.0), u + near) else { return rough };
+            let slopes = [part.slope(X, 0.0), part.slope(X, 1.0)];
+            if slopes[0] * slopes[1] >= 0.0 {
+                break;
+            }
+            (leg, u) = (part, crossing(|u| part.slope(X, u), [0.0, 1.0], slopes, 1e-9));
         }
-        let turn = crossing(|u| near.slope(X, u), [0.0, 1.0], slopes, 1e-9);
-        let Some(part) = between(&mut self.run, &near, 0.0, turn) else { return rough };
-        Extremum { x: part.end[X], t: part.t_end() }
+        between(&mut self.run, &leg, 0.0, u).map_or(rough, |part| Extremum { x: part.end[X], t: part.t_end() })
     }
 
     /// The slowest and the fastest moment since the last section, if there was one.
-    pub fn extrema(&mut self) -> [Option<Extremum>; 2] {
-        [self.low, self.high].map(|seen| seen.map(|seen| self.polished(seen)))
+    pub fn extrema(&self) -> [Option<Seen>; 2] {
+        [self.low, self.high]
     }
 
     /// When the velocity last came into the band of settled velocities; `None` if it is outside.
@@ -251,13 +261,6 @@ impl<'a> Orbit<'a> {
             loss[1] += leg.h * weight * rate.abs();
         }
         loss
-    }
-}
-
-/// Keeps the one of two that is further out.
-fn keep(kept: &mut Option<Seen>, seen: Seen, beyond: impl Fn(f64, f64) -> bool) {
-    if kept.is_none_or(|kept| beyond(seen.rough.x, kept.rough.x)) {
-        *kept = Some(seen);
     }
 }
 
