@@ -274,7 +274,7 @@ impl Course {
         let anchor = self.anchor(side);
         let slope = anchor.l + self.alpha * (1.0 - 2.0 * near);
         let along = if side == Side::Start { slope } else { -slope };
-        let rate = self.pace(anchor) * (exp_m1(-w) - exp_m1(self.speed(side, near, w)));
+        let rate = -self.pace(anchor) * exp(-w) * exp_m1(self.speed(side, near, w) + w);
         -self.distance(side, near) / self.a * along - self.ratio * rate
     }
 

@@ -247,12 +247,19 @@ fn search(course: &Course, effort: &mut Effort) -> Option<f64> {
         let scale = 1.0 + x.abs();
         let bounded = (step / unit).clamp(-FARTHEST * scale, FARTHEST * scale);
         let wrong = bounded.is_nan() || (bounded < 0.0) != (miss > 0.0);
-        let value = if wrong { miss } else { -bounded / scale };
-        Some(Probe { value, slope: if wrong { 0.0 } else { 1.0 / scale } })
+        if wrong {
+            return Some(Probe { value: miss, slope: 0.0 });
+        }
+        // A step that is small beside alpha may still lead beyond a theta that is about to be lost.
+        let weight = (1.0 / scale).max(FAR_OFF * miss.abs() / bounded.abs());
+        Some(Probe { value: -bounded * weight, slope: weight })
     };
     let root = newton(probe, 0.0, (f64::NEG_INFINITY, f64::INFINITY), false, 1e-3);
     root.filter(|_| !gave_up).map(|root| unit * root.x)
 }
+
+/// What a theta at the end that is off by itself counts, beside the relative change of `alpha_3` that ends the search.
+const FAR_OFF: f64 = 2e-3;
 
 /// Longest step of the search, in units of what alpha bears.
 const FARTHEST: f64 = 4.0;

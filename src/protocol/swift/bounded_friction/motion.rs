@@ -34,7 +34,6 @@ impl Motion for Resolution {
             v: self.course.velocity(side, near, w),
             theta: exp(w) / self.course.anchor(side).v,
             friction: self.course.friction(side, near),
-            v_c: None,
             beta: None,
         }
     }

@@ -49,6 +49,9 @@ impl Panel {
 /// Most steps of Newton's method on a panel.
 const MOST_STEPS: usize = 10;
 
+/// A change that shrinks no more below this, relative to `w`, is rounding.
+const STALLED: f64 = 1e-12;
+
 /// Greatest change of `w` that the guess for a panel may have.
 const FARTHEST: f64 = 20.0;
 
@@ -87,11 +90,13 @@ pub(super) fn collocate(
     for _ in 0..MOST_STEPS {
         let (mut rate, mut speed, mut slope, mut push) = ([0.0; NODES], [0.0; NODES], [0.0; NODES], [0.0; NODES]);
         for j in 0..NODES {
-            let (inverse, v) = (exp_m1(-w[j]), exp_m1(drive[j] - ratio * w[j]));
-            rate[j] = scale * (inverse - v);
-            speed[j] = scale.abs() * (1.0 + v);
-            slope[j] = scale * (ratio * (1.0 + v) - (1.0 + inverse));
-            push[j] = -scale * (1.0 + v) * lean[j];
+            // theta v = e^z: the rate is a small difference wherever theta follows the velocity.
+            let (inverse, excess) = (exp(-w[j]), exp_m1(drive[j] + (1.0 - ratio) * w[j]));
+            let v = inverse * (1.0 + excess);
+            rate[j] = -scale * inverse * excess;
+            speed[j] = scale.abs() * v;
+            slope[j] = scale * (ratio * v - inverse);
+            push[j] = -scale * v * lean[j];
         }
         let sums = rule.integrals(&rate);
         let mut rest = [0.0; NODES];
@@ -133,8 +138,9 @@ pub(super) fn collocate(
         }
         // The next change, if it shrinks as this one did.
         let left = change * (change / before).min(1.0);
+        let stalled = change <= STALLED * (1.0 + start.abs()) && change >= 0.25 * before;
         before = change;
-        if left <= enough {
+        if left <= enough || stalled {
             let panel = Panel { side, from, to, start, w };
             let growth = exp(decay[NODES - 1]);
             let slid: f64 = speed.iter().zip(&rule.w).map(|(v, w)| v * w).sum();
