@@ -35,6 +35,7 @@ impl Motion for Resolution {
             theta: exp(w) / self.course.anchor(side).v,
             friction: self.course.friction(side, near),
             beta: None,
+            v_c: None,
         }
     }
 }
