@@ -11,6 +11,7 @@ mod regularised;
 mod rows;
 mod sheet;
 mod stability;
+mod step;
 mod swift;
 
 use std::ops::Range;
@@ -46,13 +47,14 @@ pub trait Table: Sync {
 }
 
 /// Every table, in the order in which they are listed. A new table is a file and a line here.
-pub const ALL: [&dyn Table; 8] = [
+pub const ALL: [&dyn Table; 9] = [
     &gap::Gap,
     &best::Best,
     &optimal::Optimal,
     &crossover::Crossover,
     &swift::Swift,
     &stability::Stability,
+    &step::Step,
     &compliant::Compliant,
     &regularised::Regularised,
 ];

@@ -63,6 +63,9 @@ pub struct Linear {
 /// Steps of one response.
 const MOST_STEPS: u32 = 100_000;
 
+/// Least error of a step that is asked for.
+const FINEST: f64 = 1e-13;
+
 /// Cycles over which `ln z` changes by less than this are sampled.
 const SLOW: f64 = 0.1;
 
@@ -90,7 +93,7 @@ const RATE_ERROR: f64 = 1e-3;
 
 /// Follows the response that starts from steady sliding at `e^x v_f`, `x` not 0.
 pub fn follow(slider: &Slider, linear: Linear, x: f64, rtol: f64) -> Course {
-    let tolerance = 0.03 * rtol;
+    let tolerance = (0.03 * rtol).max(FINEST);
     let mut follower = Follower { slider, linear, rtol, tolerance, budget: MOST_STEPS, high: None, low: None, t: 0.0 };
     let fate = follower.run(slider.steady(x)).unwrap_or_else(|stop| match stop {
         Stop::Ends if slider.inertia == 0.0 => Fate::Ends,
@@ -292,7 +295,7 @@ impl Follower<'_> {
             if off <= (RATE_ERROR * rate.abs() * size).max(3.0 * tolerance) {
                 // Errors of a step are absolute in x, so their share is greater in small cycles.
                 let gross = gross(&cycle, place.z, self.slider);
-                let tolerance = (RATE_ERROR * rate.abs() * size / gross).clamp(1e-13, self.tolerance);
+                let tolerance = self.finer(RATE_ERROR * rate.abs() * size / gross);
                 let drift = ln(place.z / asked);
                 let [low, high] = cycle.exact_range(&mut orbit);
                 return Ok(Sample {
@@ -368,6 +371,11 @@ impl Follower<'_> {
         }
     }
 
+    /// A tolerance that is no coarser than that of the response.
+    fn finer(&self, tolerance: f64) -> f64 {
+        tolerance.min(self.tolerance).max(FINEST)
+    }
+
     /// A sample as exact as its rate asks for.
     fn refined(&mut self, place: Place, slope: f64, tolerance: f64) -> Result<Sample, Stop> {
         let sample = self.sample(place, slope, tolerance)?;
@@ -382,7 +390,7 @@ impl Follower<'_> {
         let length = ln(to.place.z / from.place.z);
         let slope = ((to.rate - from.rate) / length).abs();
         let gross = RATE_ERROR * from.rate.abs().min(to.rate.abs()) / from.tolerance.min(to.tolerance);
-        let tolerance = (0.1 * self.rtol * slope / gross.max(1e-3)).clamp(1e-13, self.tolerance);
+        let tolerance = self.finer(0.1 * self.rtol * slope / gross.max(1e-3));
         let sample = self.find([*from, *to], tolerance, |sample| sample.rate)?;
         Ok(Fate::Cycle { period: sample.period, high: sample.high, low: sample.low })
     }

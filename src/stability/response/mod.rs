@@ -8,7 +8,7 @@ mod fate;
 mod orbit;
 mod slider;
 
-use crate::model::Transition;
+use crate::model::{Law, Transition};
 use crate::numerics::elementary::{exp, ln};
 use crate::protocol::Status;
 use crate::stability::SteadySliding;
@@ -77,34 +77,74 @@ pub struct Sustained {
 }
 
 impl Step {
-    /// The response, with numbers good to `rtol`; `BelowBound` where the velocity falls below 1, `Infeasible` where it
-    /// becomes infinite in finite time, as it does without mass below the critical stiffness.
-    pub fn respond(&self, rtol: f64) -> (Status, Option<Response>) {
+    /// What the response depends on; `None` where it takes no time: for a rigid spring, and from `v_f` to `v_f`.
+    pub fn scaled(&self) -> Option<Scaled> {
         let Transition { law, v_i, v_f } = self.transition;
-        let x = ln(v_i / v_f);
-        if !self.k.is_finite() || x == 0.0 {
-            let response = Response {
-                outcome: Outcome::Settled,
-                v_peak: v_f,
-                v_trough: v_f,
-                t_peak: None,
-                settling_time: Some(0.0),
-                cycle: None,
-                t_end: 0.0,
-                steps: 0,
-            };
-            return (Status::Ok, Some(response));
-        }
         let slider = Slider { a: law.a, b: law.b, inertia: self.m * v_f * v_f, k: self.k };
-        let linear = Linear::of(&SteadySliding::new(law, self.k, self.m, v_f), v_f);
-        let course = follow(&slider, linear, x, rtol);
-        let Some(response) = Response::new(&course, v_f, rtol) else { return (Status::Infeasible, None) };
-        let least = response.v_trough.min(v_i);
-        (if least < 1.0 { Status::BelowBound } else { Status::Ok }, Some(response))
+        (self.k.is_finite() && v_i != v_f).then_some(Scaled { slider, ratio: v_i / v_f })
+    }
+
+    /// The response, with numbers good to `rtol`.
+    pub fn respond(&self, rtol: f64) -> (Status, Option<Response>) {
+        let course = self.scaled().map(|scaled| scaled.follow(rtol));
+        self.from_course(course.as_ref(), rtol)
+    }
+
+    /// The same from the course of [`Step::scaled`], which other steps may share: `BelowBound` where the velocity falls
+    /// below 1, `Infeasible` where it becomes infinite in finite time, as it does without mass below the critical
+    /// stiffness.
+    pub fn from_course(&self, course: Option<&Course>, rtol: f64) -> (Status, Option<Response>) {
+        let Transition { v_i, v_f, .. } = self.transition;
+        let response = match course {
+            Some(course) => Response::new(course, v_f, rtol),
+            None => Some(Response::at_once(v_f)),
+        };
+        let status = match response {
+            None => Status::Infeasible,
+            Some(response) if response.v_trough.min(v_i) < 1.0 => Status::BelowBound,
+            Some(_) => Status::Ok,
+        };
+        (status, response)
+    }
+}
+
+/// The numbers that the response to a step depends on in scaled variables: steps that share them share its course.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Scaled {
+    /// The block on its spring.
+    pub slider: Slider,
+    /// `v_i/v_f`.
+    pub ratio: f64,
+}
+
+impl Scaled {
+    /// The response, followed to its end.
+    pub fn follow(&self, rtol: f64) -> Course {
+        follow(&self.slider, Linear::of(&self.slider), ln(self.ratio), rtol)
+    }
+
+    /// The same numbers as bits, to tell equal ones by.
+    pub fn key(&self) -> [u64; 5] {
+        let Slider { a, b, inertia, k } = self.slider;
+        [a, b, inertia, k, self.ratio].map(f64::to_bits)
     }
 }
 
 impl Response {
+    /// The velocity is `v_f` from the start.
+    fn at_once(v_f: f64) -> Response {
+        Response {
+            outcome: Outcome::Settled,
+            v_peak: v_f,
+            v_trough: v_f,
+            t_peak: None,
+            settling_time: Some(0.0),
+            cycle: None,
+            t_end: 0.0,
+            steps: 0,
+        }
+    }
+
     /// In the units of the model; `None` for one that ends.
     fn new(course: &Course, v_f: f64, rtol: f64) -> Option<Response> {
         let velocity = |x: f64| v_f * exp(x);
@@ -138,11 +178,13 @@ impl Response {
 
 impl Linear {
     /// Of steady sliding at `v_f`.
-    fn of(sliding: &SteadySliding, v_f: f64) -> Linear {
+    fn of(slider: &Slider) -> Linear {
+        let law = Law { a: slider.a, b: slider.b };
+        let sliding = SteadySliding::new(law, slider.k, slider.inertia, 1.0);
         let mut linear = Linear { stable: sliding.is_stable(), growth: None, relaxation: f64::INFINITY };
         if let Some(eigenvalues) = sliding.eigenvalues().filter(|eigenvalues| eigenvalues.frequency > 0.0) {
             linear.growth = Some(2.0 * std::f64::consts::PI * eigenvalues.growth_rate / eigenvalues.frequency);
-            linear.relaxation = eigenvalues.decay_rate.map_or(f64::INFINITY, |decay| -decay / v_f);
+            linear.relaxation = eigenvalues.decay_rate.map_or(f64::INFINITY, |decay| -decay);
         }
         linear
     }
