@@ -16,7 +16,7 @@ use crate::protocol::compliant::Path;
 use crate::protocol::{Motion, Slider};
 
 /// Most samples of one simulation.
-pub const MOST_SAMPLES: f64 = 1e5;
+const MOST_SAMPLES: f64 = 1e5;
 
 /// Distance from the target at `t_f`, the Euclidean norm in `(ln v, ln theta, k s/a)`, if `v_c` is told continuously:
 /// what `rtol` and the rounding of the protocol leave, amplified. `None` where the simulation does not get there.
@@ -32,7 +32,7 @@ pub fn loop_error(path: &Path, rtol: f64) -> Option<f64> {
 }
 
 /// Distance from the target at `t_f`, as in [`loop_error`], if `v_c` is sampled at `0`, `dt`, `2 dt`, … and each sample
-/// is held until the next. `None` where that takes more than [`MOST_SAMPLES`] or the simulation does not get there,
+/// is held until the next. `None` where that takes more than 100,000 or the simulation does not get there,
 /// most often because a held `v_c` stops the block or lets it run away.
 pub fn held_error(path: &Path, dt: f64, rtol: f64) -> Option<f64> {
     let t_f = path.duration();
@@ -101,8 +101,8 @@ impl<'a> Driven<'a> {
         [(a - b) * x, -x, x]
     }
 
-    /// The state at the end of a time, and the step that was foreseen for what follows; `None` where the simulation ends
-    /// before, or the budget of steps.
+    /// The state at the end of a time, and the step that was foreseen for what follows; `None` where the simulation
+    /// ends before, or the budget of steps.
     fn follow(
         &self,
         state: [f64; 3],

@@ -26,7 +26,7 @@ type Matrix = [[f64; 3]; 3];
 /// of the three follow the others, the error at the start is one of those others alone, so that the limits `m -> 0` and
 /// `k -> inf` are reached.
 ///
-/// `None` where the flow swings too often for its steps to be counted in [`MOST_STEPS`].
+/// `None` where that takes more than 3,000 steps: the flow swings too often.
 pub fn amplification(path: &Path, rtol: f64) -> Option<f64> {
     let rule = radau();
     let slider = &path.slider;
@@ -69,7 +69,7 @@ pub fn amplification(path: &Path, rtol: f64) -> Option<f64> {
 }
 
 /// More steps than any flow takes that swings less than some thousand times.
-pub const MOST_STEPS: u32 = 3_000;
+const MOST_STEPS: u32 = 3_000;
 
 /// `exp(-int dt/theta)`, by which an error of `ln theta` decays under a given velocity.
 fn decay(path: &Path, rule: &Radau) -> f64 {
