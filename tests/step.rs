@@ -1,0 +1,262 @@
+//! The step response: the paper's case, Taylor series at 30 digits as judge, every fate decided, and the error asked for.
+
+mod reference;
+
+use slipsweep::model::{Law, Transition};
+use slipsweep::protocol::Status;
+use slipsweep::stability::SteadySliding;
+use slipsweep::stability::response::{Orbit, Outcome, Response, Step};
+
+const PAPER: Law = Law { a: 0.005, b: 0.01 };
+const V_F: f64 = 3.2e6;
+const MASS: f64 = 2.5e-16;
+
+fn paper(k: f64) -> Step {
+    Step { transition: Transition { law: PAPER, v_i: 1e5, v_f: V_F }, k, m: MASS }
+}
+
+/// Critical stiffness at the paper's final velocity.
+fn critical() -> f64 {
+    SteadySliding::new(PAPER, 1.0, MASS, V_F).critical_stiffness()
+}
+
+fn respond(step: &Step, rtol: f64) -> Response {
+    let (status, response) = step.respond(rtol);
+    response.unwrap_or_else(|| panic!("{step:?}: {status:?}"))
+}
+
+fn relative(found: f64, expected: f64) -> f64 {
+    (found / expected - 1.0).abs()
+}
+
+#[test]
+fn paper_step_overshoots_and_ends_on_a_small_limit_cycle() {
+    let (status, response) = paper(7.5e-3).respond(1e-8);
+    let response = response.expect("goes on");
+    assert_eq!((status, response.outcome), (Status::Ok, Outcome::LimitCycle));
+    // "A factor 6": 6.5585 v_f.
+    assert!(relative(response.v_peak / V_F, 6.5585200) < 2e-8, "{}", response.v_peak / V_F);
+    let cycle = response.cycle.expect("is a limit cycle");
+    assert!((cycle.v_peak / V_F - 1.264680).abs() < 2e-6, "{}", cycle.v_peak / V_F);
+    assert!((cycle.v_trough / V_F - 0.758454).abs() < 2e-6, "{}", cycle.v_trough / V_F);
+    assert!(relative(cycle.period, 1.983573e-6) < 5e-7, "{}", cycle.period);
+    assert!(relative(critical(), 0.00756) < 1e-15);
+}
+
+/// The row of `tests/reference/step.csv` as a step from `v_i` to 1, and its scaled numbers.
+fn row_step(row: &reference::Row) -> Step {
+    let law = Law { a: row.number("a"), b: row.number("b") };
+    Step {
+        transition: Transition { law, v_i: row.number("ratio"), v_f: 1.0 },
+        k: row.number("k"),
+        m: row.number("inertia"),
+    }
+}
+
+#[test]
+fn reference_first_peaks() {
+    for row in reference::table("step") {
+        let step = row_step(&row);
+        for rtol in [1e-6, 1e-9, 1e-12] {
+            let slider = step.scaled().expect("takes time").slider;
+            let mut orbit = Orbit::new(&slider, slider.steady(step.transition.v_i.ln()), 0.03 * rtol);
+            let mut budget = 100_000;
+            let peak = loop {
+                let cycle = orbit.cycle(false, &mut budget).expect("goes on");
+                if let [_, Some(high)] = cycle.extrema {
+                    break orbit.polished(high);
+                }
+            };
+            let (x, t) = (row.number("v_peak").ln(), row.number("t_peak"));
+            assert!((peak.x - x).abs() <= rtol, "{rtol}: {peak:?} {row:?}");
+            assert!(relative(peak.t, t) <= rtol, "{rtol}: {peak:?} {row:?}");
+        }
+    }
+}
+
+#[test]
+fn reference_sections() {
+    for row in reference::table("step") {
+        let slider = row_step(&row).scaled().expect("takes time").slider;
+        for tolerance in [1e-6, 1e-9, 1e-12] {
+            let mut orbit = Orbit::new(&slider, slider.steady(row.number("ratio").ln()), tolerance);
+            let mut budget = 100_000;
+            for i in 1..=3 {
+                let cycle = orbit.cycle(false, &mut budget).expect("goes on");
+                let number = |name: &str| row.number(&format!("{name}_{i}"));
+                let [z, y, x] = cycle.end;
+                let errors = [
+                    relative(cycle.t, number("t")),
+                    (z - slider.k * number("s")).abs() / slider.a,
+                    y - number("theta").ln(),
+                ];
+                assert_eq!(x, 0.0);
+                assert!(errors.iter().all(|error| error.abs() <= 20.0 * tolerance), "{tolerance}: {errors:?} {row:?}");
+            }
+        }
+    }
+}
+
+/// Stiffness and initial velocity over the final one, the paper's material otherwise.
+const CASES: [(f64, f64); 4] = [(7.5e-3, 1e5 / V_F), (0.5 * 0.00756, 1e5 / V_F), (0.02, 1e5 / V_F), (7.5e-3, 20.0)];
+
+#[test]
+fn error_got_is_the_error_asked() {
+    for (k, ratio) in CASES {
+        let step = Step { transition: Transition { law: PAPER, v_i: ratio * V_F, v_f: V_F }, k, m: MASS };
+        let exact = respond(&step, 1e-12);
+        for digits in 3..=10 {
+            let rtol = 10_f64.powi(-digits);
+            let response = respond(&step, rtol);
+            assert_eq!(response.outcome, exact.outcome, "{k} {ratio} at {rtol}");
+            // The trough is as sensitive as the friction law is flat: its logarithm is what is good to rtol.
+            let mut errors = vec![
+                ("v_peak", relative(response.v_peak, exact.v_peak)),
+                ("v_trough", 0.1 * relative(response.v_trough, exact.v_trough)),
+            ];
+            if let (Some(found), Some(expected)) = (response.cycle, exact.cycle) {
+                errors.push(("period", relative(found.period, expected.period)));
+                errors.push(("cycle peak", relative(found.v_peak, expected.v_peak)));
+            }
+            if let (Some(found), Some(expected)) = (response.settling_time, exact.settling_time) {
+                errors.push(("settling_time", relative(found, expected)));
+            }
+            for (name, error) in errors {
+                assert!(error <= rtol, "{name} of {k} {ratio} at {rtol}: {error:.1e}");
+            }
+        }
+    }
+}
+
+#[test]
+fn settling_after_many_cycles_is_when_every_cycle_is_followed() {
+    for (excess, cycles) in [(5e-3, 400), (1e-3, 1300)] {
+        let step = paper((1.0 + excess) * critical());
+        let response = respond(&step, 1e-8);
+        assert_eq!(response.outcome, Outcome::Settled);
+        let scaled = step.scaled().expect("takes time");
+        let mut orbit = Orbit::new(&scaled.slider, scaled.slider.steady(scaled.ratio.ln()), 1e-11);
+        let mut budget = 1_000_000;
+        for _ in 0..cycles {
+            orbit.cycle(false, &mut budget).expect("goes on");
+        }
+        let expected = orbit.settled_at().expect("has settled") / V_F;
+        let found = response.settling_time.expect("settles");
+        assert!(relative(found, expected) < 1e-6, "{excess}: {found} {expected}");
+        assert!(response.steps < 3000, "{}", response.steps);
+    }
+}
+
+#[test]
+fn next_to_the_critical_stiffness_the_linear_verdict_is_met() {
+    let mut last: Option<f64> = None;
+    for distance in [1e-3, 1e-4, 1e-5, 1e-6] {
+        let above = respond(&paper((1.0 + distance) * critical()), 1e-6);
+        assert_eq!(above.outcome, Outcome::Settled, "{distance}");
+        let below = respond(&paper((1.0 - distance) * critical()), 1e-6);
+        assert_eq!(below.outcome, Outcome::LimitCycle, "{distance}");
+        // The Hopf point is supercritical: amplitudes grow as the square root of the distance.
+        let cycle = below.cycle.expect("is a limit cycle");
+        let amplitude = (cycle.v_peak / cycle.v_trough).ln();
+        if let Some(last) = last {
+            let ratio: f64 = last / amplitude;
+            assert!((ratio / 10_f64.sqrt() - 1.0).abs() < 300.0 * distance, "{distance}: {ratio}");
+        }
+        last = Some(amplitude);
+    }
+}
+
+#[test]
+fn equal_scaled_numbers_give_the_same_response() {
+    // Powers of two scale without rounding.
+    let step = paper(7.5e-3);
+    let other =
+        Step { transition: Transition { law: PAPER, v_i: 1e5 / 16.0, v_f: V_F / 16.0 }, m: 256.0 * MASS, ..step };
+    assert_eq!(step.scaled().map(|scaled| scaled.key()), other.scaled().map(|scaled| scaled.key()));
+    let (first, second) = (respond(&step, 1e-6), respond(&other, 1e-6));
+    assert_eq!(second.v_peak, first.v_peak / 16.0);
+    assert_eq!(second.t_peak, first.t_peak.map(|t| 16.0 * t));
+    assert_eq!(second.cycle.map(|cycle| cycle.period), first.cycle.map(|cycle| 16.0 * cycle.period));
+}
+
+#[test]
+fn what_takes_no_time_is_settled_at_once() {
+    for step in [
+        Step { k: f64::INFINITY, ..paper(1.0) },
+        Step { transition: Transition { v_i: V_F, ..paper(1.0).transition }, ..paper(1e-4) },
+    ] {
+        let response = respond(&step, 1e-6);
+        assert_eq!((response.outcome, response.settling_time), (Outcome::Settled, Some(0.0)));
+        assert_eq!((response.v_peak, response.v_trough, response.t_peak), (V_F, V_F, None));
+    }
+}
+
+#[test]
+fn without_mass_it_settles_or_becomes_infinite() {
+    let law = Law { a: 0.01, b: 0.015 };
+    let transition = Transition { law, v_i: 10.0, v_f: 100.0 };
+    let massless = respond(&Step { transition, k: 0.02, m: 0.0 }, 1e-9);
+    assert_eq!(massless.outcome, Outcome::Settled);
+    // A mass of M leaves a trace of the order of M.
+    for m in [1e-12, 1e-10] {
+        let light = respond(&Step { transition, k: 0.02, m }, 1e-9);
+        let difference = relative(light.v_peak, massless.v_peak);
+        assert!(difference < 1e6 * m, "{m}: {difference}");
+    }
+    // Below k = b - a nothing holds the velocity back.
+    let (status, response) = Step { transition, k: 0.004, m: 0.0 }.respond(1e-6);
+    assert_eq!((status, response), (Status::Infeasible, None));
+    let (status, response) = Step { transition, k: 0.004, m: 1e-18 }.respond(1e-6);
+    assert_eq!(status, Status::BelowBound);
+    let response = response.expect("is held back by its mass");
+    assert!(response.outcome == Outcome::LimitCycle && response.v_peak > 1e6 * transition.v_f);
+}
+
+#[test]
+fn work_is_known_exactly() {
+    let found = [7.5e-3, 0.5 * 0.00756, 0.02].map(|k| respond(&paper(k), 1e-6).steps);
+    assert_eq!(found, [559, 615, 32]);
+}
+
+/// Numbers between 0 and 1 from a fixed linear congruence.
+fn uniform(state: &mut u64) -> f64 {
+    *state = state.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
+    (*state >> 11) as f64 / (1_u64 << 53) as f64
+}
+
+#[test]
+fn every_fate_of_a_random_sample_is_decided() {
+    const SAMPLE: usize = 2000;
+    let mut state = 7;
+    let mut random = |least: f64, greatest: f64| least * (greatest / least).powf(uniform(&mut state));
+    let mut undecided = 0;
+    for _ in 0..SAMPLE {
+        let (a, share) = (random(1e-4, 0.3), random(1.0, 11.0) - 1.0);
+        let m = random(1e-22, 1e-3);
+        let m = if m < 1e-20 { 0.0 } else { m };
+        let transition = Transition { law: Law { a, b: share * a }, v_i: random(1.001, 1e9), v_f: random(1.001, 1e9) };
+        let step = Step { transition, k: random(1e-6, 1e3), m };
+        let (status, response) = step.respond(1e-6);
+        let Some(response) = response else {
+            assert_eq!((status, m), (Status::Infeasible, 0.0), "{step:?}");
+            assert!(step.k < transition.law.b - a, "{step:?}");
+            continue;
+        };
+        assert!(matches!(status, Status::Ok | Status::BelowBound), "{step:?}");
+        assert!(response.v_peak >= transition.v_f && response.v_peak.is_finite(), "{step:?} {response:?}");
+        assert!(response.v_trough <= transition.v_f && response.v_trough >= 0.0, "{step:?} {response:?}");
+        assert!(response.t_peak.is_none_or(|t| t.is_finite() && t > 0.0), "{step:?} {response:?}");
+        match response.outcome {
+            Outcome::Settled => {
+                assert!(response.settling_time.is_some_and(|t| t.is_finite() && t >= 0.0), "{step:?} {response:?}");
+            }
+            Outcome::LimitCycle => {
+                let cycle = response.cycle.expect("is a limit cycle");
+                assert!(cycle.period > 0.0 && cycle.period.is_finite(), "{step:?} {response:?}");
+                assert!(cycle.v_trough < transition.v_f && transition.v_f < cycle.v_peak, "{step:?} {response:?}");
+            }
+            Outcome::Undecided => undecided += 1,
+        }
+    }
+    assert!(undecided * 100 < SAMPLE, "{undecided} undecided");
+}
