@@ -154,11 +154,10 @@ fn what_does_not_exist_says_which_bound() {
 
 #[test]
 fn wrong_arguments_get_one_clear_message() {
-    let cases: [(&[&[&str]], &str); 10] = [
+    let cases: [(&[&[&str]], &str); 9] = [
         (&[&["optimal", "--tau-max", "2"], UP], "error: `optimal` takes no --tau-max"),
         (&[&["cubic", "--unbounded"], UP], "error: `cubic` takes no --unbounded"),
         (&[&["free_cubic", "--alpha-2", "0"], UP], "error: `free_cubic` needs --alpha-3"),
-        (&[&["bounded_friction"], UP], "error: `bounded_friction` needs --tau-max"),
         (
             &[&["optimal", "--t-f", "-1"], &UP[2..]],
             "error: invalid value '-1' for '--t-f <T>': expected t_f > 0, finite",

@@ -49,13 +49,18 @@ fn a_sound_dataset_passes() {
 
 /// Changes one value of a column by 1e-7 of itself, in the first row that has one, and returns the row.
 fn corrupt(folder: &Path, table: &str, column: &str) -> usize {
+    change(folder, table, column, 1.0 + 1e-7)
+}
+
+/// Multiplies one value of a column, in the first row that has one, and returns the row.
+fn change(folder: &Path, table: &str, column: &str, factor: f64) -> usize {
     let path = Folder::new(folder, "test").part(table, 0);
     let mut frame = ParquetReader::new(File::open(&path).expect("is there")).finish().expect("is readable");
     // `best` has result columns of the same names as axes: none of those is used here.
     let mut values: Vec<Option<f64>> =
         frame.column(column).expect("is there").f64().expect("holds numbers").iter().collect();
     let row = values.iter().position(Option::is_some).expect("has a value");
-    values[row] = values[row].map(|value| value * (1.0 + 1e-7));
+    values[row] = values[row].map(|value| value * factor);
     let changed = Float64Chunked::from_iter_options(column.into(), values.into_iter());
     frame.replace(column, Column::from(polars::prelude::IntoSeries::into_series(changed))).expect("has the column");
     ParquetWriter::new(File::create(&path).expect("is writable")).finish(&mut frame).expect("is writable");
@@ -98,6 +103,40 @@ fn a_planted_error_is_found_and_named() {
         let line = line.into_iter().find(|cells| cells.first() == Some(&column)).expect("has the column");
         assert!(line[4].parse::<f64>().is_ok_and(|greatest| greatest > 10.0), "{table}.{column}: {section}");
         fs::remove_file(Folder::new(folder.path(), "test").part(table, 0)).expect("is there");
+    }
+}
+
+/// Decelerations with a window without hold, and members that do not exist for each of their reasons.
+const EDGES: &str = "t_f = [1e-4, 1e-3, 0.02, 0.3]\na = 0.03\nb = [0.01, 0.03, 0.05]\nv_i = 3.0\n\
+                     v_f = [2.98, 3.0, 30.0]\ntau_max = [0.9, 1.2, 3.0, inf]\n";
+
+#[test]
+fn windows_and_missing_members_are_decided_again() {
+    let folder = tempfile::tempdir().expect("is writable");
+    let sweep =
+        sweep(folder.path(), EDGES, "[tables.crossover]\n[tables.swift]\ncolumns = [\"alpha\", \"work\", \"bound\"]\n");
+    run(&sweep, folder.path(), 2);
+    let output = verify(folder.path(), &["--sample", "10000"]);
+    assert_eq!(output.status.code(), Some(0), "{}{}", text(&output), String::from_utf8_lossy(&output.stderr));
+    let text_of = |table: &str, output: &Output| {
+        let text = text(output);
+        text.split("\n\n").find(|section| section.starts_with(table)).expect("has a section").to_owned()
+    };
+    assert!(text_of("crossover", &output).contains("t_free_out"), "{}", text(&output));
+    assert!(text_of("swift", &output).contains("status"), "{}", text(&output));
+    for (table, column, factor, blamed) in
+        [("crossover", "t_free_in", 1.0 + 1e-7, "t_free_in"), ("swift", "t_f", 1e3, "status")]
+    {
+        let part = Folder::new(folder.path(), "test").part(table, 0);
+        let sound = fs::read(&part).expect("is there");
+        change(folder.path(), table, column, factor);
+        let output = verify(folder.path(), &["--sample", "10000"]);
+        assert_eq!(output.status.code(), Some(3), "{table}.{column}: {}", text(&output));
+        let section = text_of(table, &output);
+        let line = section.lines().map(|line| line.split_whitespace().collect::<Vec<_>>());
+        let line = line.into_iter().find(|cells| cells.first() == Some(&blamed)).expect("has the column");
+        assert!(line[4].parse::<f64>().is_ok_and(|greatest| greatest > 10.0), "{table}.{column}: {section}");
+        fs::write(&part, sound).expect("is writable");
     }
 }
 

@@ -157,7 +157,7 @@ impl Arguments {
         let name = self.protocol.as_str();
         let family = swift::find(name);
         let given = [
-            ("--tau-max", self.tau_max.is_some(), family.is_some_and(|family| family.heeds_tau_max()), true),
+            ("--tau-max", self.tau_max.is_some(), family.is_some_and(|family| family.heeds_tau_max()), false),
             ("--alpha-2", self.alpha_2.is_some(), name == "free_cubic", true),
             ("--alpha-3", self.alpha_3.is_some(), name == "free_cubic", true),
             ("--k", self.k.is_some(), name == "compliant", false),

@@ -10,7 +10,6 @@ use super::spec::{AxisForm, AxisSpec, AxisValue, Spec, TableSpec};
 use super::{place, points};
 use crate::dataset::Identity;
 use crate::grid::{Axis, Factor, Grid, Quantity, RTOL, Scale, Values};
-use crate::protocol::swift::FAMILIES;
 use crate::table::{self, OPTIMUM_AXES, STATUS, Selection, Table};
 
 /// A sweep that is known to be legal.
@@ -378,7 +377,6 @@ fn request(name: &str, spec: &TableSpec, rtol: f64, grid: &Grid) -> Result<Reque
             format!("add `{} = ...` to [axes], or remove the table", missing.name()),
         ));
     }
-    check_friction_bound(table, &key, grid)?;
     let rtol = spec.rtol.unwrap_or(rtol);
     check_rtol(&format!("{key}.rtol"), rtol)?;
     let selection = selection(table, &key, spec.columns.as_deref())?;
@@ -391,24 +389,6 @@ fn request(name: &str, spec: &TableSpec, rtol: f64, grid: &Grid) -> Result<Reque
         ));
     };
     Ok(Request { table, selection, rtol, rows })
-}
-
-/// A family that heeds the bound on friction must be told one.
-fn check_friction_bound(table: &dyn Table, key: &str, grid: &Grid) -> Result<(), SpecError> {
-    let told = |quantity| match grid.axis(quantity).map(|axis| &axis.values) {
-        Some(Values::List(values)) if table.axes().contains(&quantity) => values.as_slice(),
-        _ => &[],
-    };
-    let family = told(Quantity::Family).iter().filter_map(|&place| FAMILIES.get(place as usize));
-    match family.copied().find(|family| family.heeds_tau_max()) {
-        Some(family) if told(Quantity::FrictionBound) == [f64::INFINITY] => Err(SpecError::new(
-            key,
-            format!("the family {} needs the axis `tau_max`, which the spec does not have", family.name()),
-            "tau_max above the friction of both steady states",
-            "add `tau_max = ...` to [axes], or name other families there, as in family = [\"cubic\"]",
-        )),
-        _ => Ok(()),
-    }
 }
 
 fn selection(table: &dyn Table, key: &str, names: Option<&[String]>) -> Result<Selection, SpecError> {

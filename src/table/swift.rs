@@ -21,7 +21,7 @@ const COLUMNS: &[Column] = &[
     Column::number(
         "alpha",
         "1; (v_0/l)^2 for bounded_velocity",
-        "parameter of the family, alpha_3 of the paper; null for step and cubic, which have none",
+        "the family's parameter alpha_3 of the paper; null for step and cubic, which have none, 0 where tau_max = inf",
     ),
     Column::number("work", "mu_0 sigma l", "work of friction W_s"),
     Column::number("work_optimal", "mu_0 sigma l", "least work of friction W* of any protocol"),

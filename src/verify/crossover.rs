@@ -1,8 +1,9 @@
 //! `crossover`: the extremals of the defining initial or final conditions, integrated until theta arrives.
 
 use super::extremal::{Extremal, branch, from_end, from_start, hold, least_time};
-use super::{Context, Verdict, number, transition, word};
+use super::{Context, Verdict, transition, word};
 use crate::dataset::Row;
+use crate::model::Transition;
 use crate::table::STATUS;
 
 pub fn check(row: &Row, context: &Context) -> Verdict {
@@ -54,8 +55,33 @@ pub fn check(row: &Row, context: &Context) -> Verdict {
         let work = bounded.then(|| hold(problem.law, 1.0 / problem.v_i, t_min)).flatten();
         verdict.compare(row, "work_min", work, (t_min == 0.0).then_some(1.0));
     }
-    if number(row, "t_free_in").is_some() {
-        verdict.unchecked = Some("t_free_in and t_free_out have no independent route");
+    let window = if accelerates || !context.bounded { None } else { window(&problem) };
+    match window {
+        Some([Some(rising), Some(falling)]) => {
+            // Without a change of velocity the window starts at once.
+            let starts_at_once = problem.v_i == problem.v_f;
+            let rising = if starts_at_once { 0.0 } else { rising.time };
+            verdict.compare(row, "t_free_in", Some(rising), starts_at_once.then_some(1.0));
+            verdict.compare(row, "t_free_out", Some(falling.time), None);
+        }
+        Some(_) => verdict.unchecked = Some("the integrator did not get there"),
+        None => {
+            verdict.compare(row, "t_free_in", None, None);
+            verdict.compare(row, "t_free_out", None, None);
+        }
     }
     verdict
+}
+
+/// The decelerations that start at `v = 1` without a hold, theta rising or falling at the end; `None` if there are none.
+///
+/// `v(0+) = 1` fixes `C = a - v_i (1 + a - b ln v_i)`, and `C` the energy `e^z - 1 - z` that is left at the target. Each
+/// of the two `z` belongs to one of them, if there is any energy left.
+fn window(problem: &Transition) -> Option<[Option<Extremal>; 2]> {
+    let (a, b) = (problem.law.a, problem.law.b);
+    let (ln_i, ln_f) = (problem.v_i.ln(), problem.v_f.ln());
+    let c = a - problem.v_i * (1.0 + a - b * ln_i);
+    let left = (1.0 - (b - a) * ln_f + c / problem.v_f) / a;
+    let regular = 1.0 + (a - b) * ln_f > b - a && 1.0 - b * ln_i > b - a;
+    (regular && left > 0.0).then(|| [false, true].map(|falling| from_end(problem, branch(left, falling)?, false, None)))
 }

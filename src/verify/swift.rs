@@ -83,17 +83,38 @@ pub fn check(row: &Row, context: &Context) -> Verdict {
     let (Some(problem), Some(t_f), Some(family)) = (transition(row), number(row, "t_f"), word(row, "family")) else {
         return Verdict::unchecked("an axis is missing");
     };
-    if !matches!(word(row, STATUS), Some("ok" | "below_bound")) {
-        return Verdict::unchecked("whether a family has a member is not decided again");
+    let tau_max = number(row, "tau_max").unwrap_or(f64::INFINITY);
+    match word(row, STATUS) {
+        Some("ok" | "below_bound" | "infeasible") => {}
+        _ => return Verdict::unchecked("status is neither ok, below_bound nor infeasible"),
+    }
+    let Some(bound) = obstacle(&problem, t_f, family, tau_max, context.bounded) else {
+        return Verdict::unchecked("too close to the border to tell whether the family has a member");
+    };
+    let mut verdict = Verdict::default();
+    verdict.status(row, bound.is_some());
+    if let Some(bound) = bound {
+        verdict.compare_word(row, "bound", bound);
+        return verdict;
+    }
+    if word(row, STATUS) == Some("infeasible") {
+        return verdict;
+    }
+    if tau_max == f64::INFINITY && family == "bounded_friction" {
+        verdict.unchecked = Some("without a bound on friction alpha is 0, which tells nothing");
+        return verdict;
     }
     let alpha = number(row, "alpha");
     if alpha.is_none() && family.starts_with("bounded") {
-        return Verdict::unchecked("alpha was not written");
+        verdict.unchecked = Some("alpha was not written");
+        return verdict;
     }
-    let course = |alpha: f64| course(problem, t_f, family, alpha, number(row, "tau_max").unwrap_or(f64::INFINITY));
+    let course = |alpha: f64| course(problem, t_f, family, alpha, tau_max);
     let course_here = course(alpha.unwrap_or(0.0));
-    let Some(states) = course_here.states() else { return Verdict::unchecked("the integrator did not get there") };
-    let mut verdict = Verdict::default();
+    let Some(states) = course_here.states() else {
+        verdict.unchecked = Some("the integrator did not get there");
+        return verdict;
+    };
     let end = states[PIECES];
     let target = -(if course_here.backward { problem.v_i } else { problem.v_f }).ln();
     match alpha {
@@ -122,6 +143,54 @@ pub fn check(row: &Row, context: &Context) -> Verdict {
         None => verdict.unchecked = Some("the integrator did not get there"),
     }
     verdict
+}
+
+/// How close to 0, relative to what it is made of, a number leaves open on which side of 0 it is.
+const UNSURE: f64 = 1e-11;
+
+/// Which bound leaves the family without a member, from the extreme protocols of the family integrated: `None` where
+/// that is too close to call.
+fn obstacle(problem: &Transition, t_f: f64, family: &str, tau_max: f64, bounded: bool) -> Option<Option<&'static str>> {
+    let Transition { law, v_i, v_f } = *problem;
+    let settle = |bound: &'static str, room: f64, size: f64| match room / size {
+        room if room > UNSURE => Some(None),
+        room if room < -UNSURE => Some(Some(bound)),
+        _ => None,
+    };
+    // Along v = 1 theta ages most; it ends beyond its target if there is time to spare.
+    let aged = integrate(|y: &[f64; 1]| [1.0 - y[0]], [1.0 / v_i], (0.0, t_f))?[0];
+    let spare = settle("time", aged * v_f - 1.0, 1.0);
+    if bounded && v_f < v_i && spare != Some(None) {
+        return spare;
+    }
+    match family {
+        "cubic" => {
+            let slack = Cubic::new(problem, t_f, 0.0, -3.0 * (v_f - v_i) / (v_i * v_f)).slack();
+            settle("velocity", slack, 1.0)
+        }
+        "bounded_velocity" if v_i == 1.0 || v_f == 1.0 => Some(Some("velocity")),
+        "bounded_velocity" if v_f < v_i => spare,
+        "bounded_friction" => {
+            let steady = |v: f64| 1.0 + (law.a - law.b) * v.ln();
+            let highest = steady(v_i).max(steady(v_f));
+            match settle("friction", tau_max - highest, highest.abs() + 1.0) {
+                Some(None) if v_f > v_i && tau_max.is_finite() => {
+                    // With tau = tau_max throughout, the time in which theta falls to its target, over ln theta.
+                    let time = |y: &[f64; 2]| {
+                        let surplus = (tau_max - 1.0) / law.a + (1.0 - law.b / law.a) * y[0];
+                        [-1.0, y[0].exp() / surplus.exp_m1()]
+                    };
+                    let fall = (v_f / v_i).ln();
+                    let least = integrate(time, [-v_i.ln(), 0.0], (0.0, fall))?[1];
+                    settle("friction", t_f - least, t_f)
+                }
+                // With v = 0 throughout, theta ages by the time.
+                Some(None) if v_f < v_i => settle("velocity", t_f - (1.0 / v_f - 1.0 / v_i), t_f),
+                decided => decided,
+            }
+        }
+        _ => Some(None),
+    }
 }
 
 fn course(problem: Transition, t_f: f64, family: &str, alpha: f64, tau_max: f64) -> Course {
