@@ -5,7 +5,7 @@ mod reference;
 use slipsweep::model::{Law, Transition};
 use slipsweep::protocol::Status;
 use slipsweep::stability::SteadySliding;
-use slipsweep::stability::response::{Orbit, Outcome, Response, Step};
+use slipsweep::stability::response::{Orbit, Outcome, Response, Step, lyapunov_coefficient};
 
 const PAPER: Law = Law { a: 0.005, b: 0.01 };
 const V_F: f64 = 3.2e6;
@@ -164,6 +164,19 @@ fn next_to_the_critical_stiffness_the_linear_verdict_is_met() {
         }
         last = Some(amplitude);
     }
+}
+
+#[test]
+fn around_a_subcritical_point_the_size_of_the_step_decides() {
+    let step = Step { transition: Transition { law: PAPER, v_i: 1e5, v_f: 7e5 }, k: 0.0, m: MASS };
+    assert!(lyapunov_coefficient(PAPER, step.inertia()).is_some_and(|coefficient| coefficient > 0.0));
+    let critical = SteadySliding::new(PAPER, 1.0, MASS, 7e5).critical_stiffness();
+    let large = Step { k: 1.002 * critical, ..step };
+    let small = Step { transition: Transition { v_i: 6.99e5, ..step.transition }, ..large };
+    assert_eq!(respond(&large, 1e-6).outcome, Outcome::LimitCycle);
+    assert_eq!(respond(&small, 1e-6).outcome, Outcome::Settled);
+    // Well above it only rest is left.
+    assert_eq!(respond(&Step { k: 1.1 * critical, ..step }, 1e-6).outcome, Outcome::Settled);
 }
 
 #[test]

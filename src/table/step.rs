@@ -7,10 +7,12 @@ use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 use super::optima::transition;
 use super::{Column, Job, Kind, Selection, Sheet, Stopped, Table, Work, rows};
 use crate::grid::Quantity;
-use crate::stability::response::{self, Course, Outcome, Scaled};
+use crate::stability::response::{self, Course, Outcome, Scaled, lyapunov_coefficient};
 
 /// One row a transition, stiffness and mass.
 pub struct Step;
+
+const LYAPUNOV: usize = 10;
 
 const COLUMNS: &[Column] = &[
     Column::number("v_peak", "v_0", "greatest velocity from when v = v_f is first met on, at least v_f"),
@@ -31,6 +33,13 @@ const COLUMNS: &[Column] = &[
     Column::number("cycle_peak", "v_0", "greatest velocity on the limit cycle; null without one").optional(),
     Column::number("cycle_trough", "v_0", "least velocity on the limit cycle; null without one").optional(),
     Column::number("t_end", "l/v_0", "time up to which the response was integrated").optional(),
+    Column::number(
+        "lyapunov",
+        "1",
+        "first Lyapunov coefficient at the critical stiffness for this mass and v_f: negative if the Hopf point is \
+         supercritical, positive if a limit cycle may be met above it; null for b <= a",
+    )
+    .optional(),
 ];
 
 impl Table for Step {
@@ -75,9 +84,11 @@ impl Table for Step {
             };
             let course = step.scaled().map(|scaled| courses.get(&scaled, job.rtol));
             let (status, response) = step.from_course(course.as_ref(), job.rtol);
+            let law = step.transition.law;
+            cells[LYAPUNOV] = lyapunov_coefficient(law, step.inertia()).unwrap_or(f64::NAN);
             if let Some(response) = response {
                 let cycle = response.cycle;
-                cells.copy_from_slice(&[
+                cells[..LYAPUNOV].copy_from_slice(&[
                     response.v_peak,
                     response.v_trough,
                     response.t_peak.unwrap_or(f64::NAN),

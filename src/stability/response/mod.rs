@@ -5,6 +5,7 @@
 //! integrated until its end is decided ([`fate`]).
 
 mod fate;
+mod hopf;
 mod orbit;
 mod slider;
 
@@ -14,6 +15,7 @@ use crate::protocol::Status;
 use crate::stability::SteadySliding;
 
 pub use fate::{Course, Fate, Linear, follow};
+pub use hopf::lyapunov_coefficient;
 pub use orbit::{Cycle, Extremum, Orbit, SETTLED, Seen, Stop};
 pub use slider::{Slider, State};
 
@@ -77,10 +79,15 @@ pub struct Sustained {
 }
 
 impl Step {
+    /// Scaled mass `m v_f^2`.
+    pub fn inertia(&self) -> f64 {
+        self.m * self.transition.v_f * self.transition.v_f
+    }
+
     /// What the response depends on; `None` where it takes no time: for a rigid spring, and from `v_f` to `v_f`.
     pub fn scaled(&self) -> Option<Scaled> {
         let Transition { law, v_i, v_f } = self.transition;
-        let slider = Slider { a: law.a, b: law.b, inertia: self.m * v_f * v_f, k: self.k };
+        let slider = Slider { a: law.a, b: law.b, inertia: self.inertia(), k: self.k };
         (self.k.is_finite() && v_i != v_f).then_some(Scaled { slider, ratio: v_i / v_f })
     }
 
