@@ -22,9 +22,9 @@ use crate::protocol::{Jet, Slider};
 type Matrix = [[f64; 3]; 3];
 
 /// Largest factor by which a small error of the state at the start has grown at the end, both measured by the Euclidean
-/// norm of `(ln v, ln theta, k s/a)`, good to `rtol`: the largest singular value of the fundamental matrix. Where some
-/// of the three follow the others, the error at the start is one of those others alone, so that the limits `m -> 0` and
-/// `k -> inf` are reached.
+/// norm of `(ln v, ln theta, k s/a)`, good to `rtol`, or fewer digits where it is far below 1: the largest singular
+/// value of the fundamental matrix. Where some of the three follow the others, the error at the start is one of those
+/// others alone, so that the limits `m -> 0` and `k -> inf` are reached.
 ///
 /// `None` where that takes more than 3,000 steps: the flow swings too often.
 pub fn amplification(path: &Path, rtol: f64) -> Option<f64> {
@@ -38,6 +38,7 @@ pub fn amplification(path: &Path, rtol: f64) -> Option<f64> {
     let mut flow: Matrix = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
     let mut workspace = Workspace::new(states);
     let mut h = first(slider, &path.jet(0, 0.0));
+    let tolerance = (1e-3 * rtol).max(1e-15);
     let mut steps = 0;
     for piece in 0..path.pieces() {
         let span = path.span(piece);
@@ -51,8 +52,8 @@ pub fn amplification(path: &Path, rtol: f64) -> Option<f64> {
             let (next, error) = workspace.step(path, piece, (from, to), &flow, rule)?;
             // What the end lacks is of a higher order than what the nodes lack.
             let error = error * error.sqrt();
-            let change = 0.8 * sixteenth((0.1 * rtol / error.max(1e-30)).min(1e16));
-            if error > 0.1 * rtol {
+            let change = 0.8 * sixteenth((tolerance / error.max(1e-30)).min(1e16));
+            if error > tolerance {
                 h = (to - from) * span * change.clamp(0.2, 0.8);
             } else {
                 flow = next;

@@ -14,7 +14,7 @@ const COLUMNS: &[Column] = &[
     Column::number("work", "mu_0 sigma l", "work of friction"),
     Column::number("work_optimal", "mu_0 sigma l", "least work of friction W* of any protocol"),
     Column::number("gap", "1", "(work - W*)/W*, good to rtol of itself"),
-    Column::number("v_min", "v_0", "least velocity of the block"),
+    Column::number("v_min", "v_0", "least velocity of the block; fewer digits where it dips far below 1"),
     Column::number("v_max", "v_0", "greatest velocity of the block"),
     Column::number("v_c_min", "v_0", "least control velocity; both good to rtol of the greater of the two"),
     Column::number("v_c_max", "v_0", "greatest control velocity"),

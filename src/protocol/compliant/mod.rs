@@ -101,14 +101,15 @@ fn follow(
     mut visit: impl FnMut(&Curve<Hermite>, &Resolved),
 ) -> Result<Curve<Hermite>, Status> {
     let curve = member(slider, (v_i, v_f), t_f, rtol, effort)?;
-    let theta =
-        pass(&curve, Start::steady(v_i), rtol, INTERPOLATION * reach(rtol), effort, |panel| visit(&curve, panel));
+    let theta = pass(&curve, Start::steady(v_i, false), rtol, INTERPOLATION * reach(rtol), effort, |panel| {
+        visit(&curve, panel)
+    });
     let arrives = theta.is_some_and(|theta| (theta * v_f - 1.0).abs() <= 10.0 * rtol + ROUNDING);
     if arrives { Ok(curve) } else { Err(Status::NotConverged) }
 }
 
 /// Theta and its rate are interpolated, which takes more nodes than a quadrature.
-const INTERPOLATION: f64 = 0.5;
+const INTERPOLATION: f64 = 0.45;
 
 /// What rounding may cost of theta at the end.
 const ROUNDING: f64 = 1e-12;

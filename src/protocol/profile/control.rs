@@ -24,8 +24,8 @@ impl Resolved {
         Jet { v: curve.derivatives(x, z), theta: self.theta(u), rate: self.rate(u) }
     }
 
-    /// Takes the range of something on the panel into `extent`, turns good to `rtol`; `told` gives its value and its slope
-    /// in time.
+    /// Takes the range of something on the panel into `extent`, turns good to `rtol`; `told` gives its value and its
+    /// slope in time.
     pub fn range(&self, curve: &Curve<Hermite>, rtol: f64, extent: &mut Extent, told: impl Fn(&Jet) -> [f64; 2]) {
         let duration = self.duration(curve);
         let along = |u: f64, jet: &Jet| {

@@ -43,12 +43,14 @@ pub struct Start {
     pub theta: f64,
     /// `theta'`, accurate where it is small beside 1.
     pub rate: f64,
+    /// Whether theta is off the slow solution by no more than the first derivative of the velocity there tells.
+    pub slow: bool,
 }
 
 impl Start {
     /// Steady sliding at `v`.
-    pub fn steady(v: f64) -> Start {
-        Start { v, theta: 1.0 / v, rate: 0.0 }
+    pub fn steady(v: f64, slow: bool) -> Start {
+        Start { v, theta: 1.0 / v, rate: 0.0, slow }
     }
 }
 
@@ -63,9 +65,9 @@ pub fn pass<E: Exponent>(
     mut visit: impl FnMut(&Resolved),
 ) -> Option<f64> {
     let rule = radau();
-    let Start { mut v, mut theta, mut rate } = start;
+    let Start { mut v, mut theta, mut rate, slow } = start;
     // Slip since theta last left the slow solution, and by which share: at the start, or where v changes too fast.
-    let (mut slip, mut off) = (0.0, if rate == 0.0 { lag(curve, Side::Start, 0.0, v) } else { 1.0 });
+    let (mut slip, mut off) = (0.0, if slow { lag(curve, Side::Start, 0.0, v) } else { 1.0 });
     let mut count = 0;
     effort.quadratures += 1;
     for stretch in curve.stretches().forward() {

@@ -84,6 +84,9 @@ pub fn solve(
     Solved { status, value: Some(value), effort }
 }
 
+/// Velocities below this one count as none.
+const STANDSTILL: f64 = 1e-100;
+
 /// What is gathered along the way.
 struct Sum {
     slider: Slider,
@@ -134,8 +137,8 @@ impl Sum {
         effort: &mut Effort,
     ) -> Result<(), Status> {
         let span = route.span(from, to);
-        let piece = Piece::new(&self.slider, (&start, &end), &span, self.rtol, effort).ok_or(Status::NotConverged)?;
-        if piece.v.low < f64::MIN_POSITIVE {
+        let piece = Piece::new(&self.slider, (&start, &end), &span, self.rtol, effort)?;
+        if piece.v.low < STANDSTILL {
             return Err(Status::Infeasible);
         }
         self.excess += piece.work - span.work;

@@ -14,7 +14,7 @@ use crate::numerics::elementary::{exp_m1, ln, ln_1p};
 use crate::protocol::control::Extent;
 use crate::protocol::optimal::Span;
 use crate::protocol::profile::{Curve, Hermite, Problem, Start, pass, reach};
-use crate::protocol::{Effort, Jet, Slider};
+use crate::protocol::{Effort, Jet, Slider, Status};
 
 /// An end of a piece.
 #[derive(Debug, Clone, Copy)]
@@ -39,7 +39,7 @@ pub(super) struct Piece {
 }
 
 /// Theta and its rate are interpolated, which takes more nodes than a quadrature.
-const INTERPOLATION: f64 = 0.5;
+const INTERPOLATION: f64 = 0.45;
 
 /// What rounding may cost of theta at the end.
 const ROUNDING: f64 = 1e-12;
@@ -64,20 +64,20 @@ impl End {
 }
 
 impl Piece {
-    /// The piece from `start` to `end` in place of a part of the optimum; `None` where it could not be certified.
+    /// The piece from `start` to `end` in place of a part of the optimum; `Err` with the status where there is none.
     pub fn new(
         slider: &Slider,
         (start, end): (&End, &End),
         optimum: &Span,
         rtol: f64,
         effort: &mut Effort,
-    ) -> Option<Piece> {
+    ) -> Result<Piece, Status> {
         let piece = Piece::above(0.0, slider, (start, end), optimum, rtol, effort)?;
         if piece.v.low < 1.0 && start.v[0] > 1.0 && end.v[0] > 1.0 {
             let inside = Piece::above(1.0, slider, (start, end), optimum, rtol, effort);
-            return Some(inside.unwrap_or(piece));
+            return Ok(inside.unwrap_or(piece));
         }
-        Some(piece)
+        Ok(piece)
     }
 
     /// The piece that stays above `floor`.
@@ -88,13 +88,17 @@ impl Piece {
         &Span { time, lag, .. }: &Span,
         rtol: f64,
         effort: &mut Effort,
-    ) -> Option<Piece> {
+    ) -> Result<Piece, Status> {
         let (w_0, w_1) = (start.v[0] - floor, end.v[0] - floor);
         let ratio = (w_1 - w_0) / w_0;
         let rise = if ratio > -0.5 { ln_1p(ratio) } else { ln(w_1 / w_0) };
         // About the mean that brings theta there.
         let mean = lag / (time * (start.theta * end.theta).sqrt()) - floor;
-        let stretch = [start, end].map(|at| if at.outer { stretch(at.v[0] - floor, mean) } else { 0.0 });
+        let rho = [start, end].map(|at| if at.outer { (at.v[0] - floor) / mean } else { 1.0 });
+        if rho.iter().any(|&rho| rho > MOST_RHO) {
+            return Err(Status::Infeasible);
+        }
+        let stretch = rho.map(stretch);
         let (at_start, at_end) = (start.slopes(floor, time), end.slopes(floor, time));
         let exponent = Hermite { rise, start: at_start, end: at_end, stretch, c: 0.0 };
         let curve = Curve::new(floor, w_1, time, exponent);
@@ -102,28 +106,28 @@ impl Piece {
         // How much larger theta is for v = floor.
         let spare = if floor > 0.0 { -(1.0 - start.theta) * exp_m1(-time) - growth } else { lag };
         if spare.is_nan() || spare <= 0.0 {
-            return None;
+            return Err(Status::NotConverged);
         }
         let room = ln_1p(spare / end.theta);
         let problem = Problem::between(end.theta, -growth / end.theta, end.rate / end.theta, room, curve);
-        let curve = curve.with(problem.solve(0.0, rtol, reach(rtol), effort)?);
+        let curve = curve.with(problem.solve(0.0, rtol, reach(rtol), effort).ok_or(Status::NotConverged)?);
         let mut piece = Piece { work: 0.0, v: Extent::NONE, control: Extent::NONE };
-        let from = Start { v: start.v[0], theta: start.theta, rate: start.rate };
+        let from = Start { v: start.v[0], theta: start.theta, rate: start.rate, slow: false };
         let theta = pass(&curve, from, rtol, INTERPOLATION * reach(rtol), effort, |panel| {
             piece.work += panel.work(&slider.law, &curve);
             panel.range(&curve, rtol, &mut piece.v, |jet| [jet.v[0], jet.v[1]]);
             panel.range(&curve, rtol, &mut piece.control, |jet| slider.control(jet));
-        })?;
-        let arrives = (theta / end.theta - 1.0).abs() <= 10.0 * rtol + ROUNDING;
-        arrives.then_some(piece)
+        });
+        let arrives = theta.is_some_and(|theta| (theta / end.theta - 1.0).abs() <= 10.0 * rtol + ROUNDING);
+        if arrives { Ok(piece) } else { Err(Status::NotConverged) }
     }
 }
 
-/// How much an end of the protocol is stretched, by its height and the mean.
-fn stretch(end: f64, mean: f64) -> f64 {
-    let rho = (end / mean).clamp(1.0, MOST_RHO);
+/// How much an end is stretched that lies `rho` times as high as the mean.
+fn stretch(rho: f64) -> f64 {
+    let rho = rho.max(1.0);
     (4.0 * (rho / libm::cbrt(1.0 + 10.0 * ln(rho)) - 1.0)).max(0.0)
 }
 
-/// The end that is highest above the mean for which the way down is shortened.
+/// An end that lies higher above the mean would need a way down too short for doubles.
 const MOST_RHO: f64 = 1e12;

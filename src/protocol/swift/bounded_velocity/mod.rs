@@ -84,7 +84,7 @@ fn follow(
     let Transition { v_i, v_f, .. } = case.transition;
     // Theta is interpolated, which takes more nodes than a quadrature.
     let theta =
-        pass(curve, Start::steady(v_i), rtol, 0.75 * reach(rtol), effort, visit).ok_or(Obstacle::NotConverged)?;
+        pass(curve, Start::steady(v_i, true), rtol, 0.75 * reach(rtol), effort, visit).ok_or(Obstacle::NotConverged)?;
     let arrives = (theta * v_f - 1.0).abs() <= 10.0 * rtol + ROUNDING;
     if arrives { Ok(()) } else { Err(Obstacle::NotConverged) }
 }
