@@ -4,7 +4,7 @@
     venv/bin/pip install mpmath gmpy2 python-flint && venv/bin/python generate_swift_velocity.py          # or name the families
 
 step and cubic are tanh-sinh quadratures of their formulas with mpmath at 40 digits; extrema the greatest of a grid, then golden sections. Theta of
-bounded_velocity is a Taylor series of 90 terms on every step, with Arb at 60 digits; where theta follows the velocity it is the sum
+bounded_velocity is a Taylor series of 90 terms on every step, with Arb at 66 digits; where theta follows the velocity it is the sum
 1/v - (1/v)(1/v)'/t_f + ... instead. Its parameter is bracketed at few digits and finished by Newton's method; it is run again with other steps,
 terms and digits, and written where 25 digits agree. No collocation, no dilogarithm. Inputs are doubles, written by repr and used exactly; a time
 near t_min counts as the double that it is.
