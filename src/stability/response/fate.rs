@@ -70,7 +70,7 @@ const FINEST: f64 = 1e-13;
 const SLOW: f64 = 0.1;
 
 /// The contact lifetime must relax this many times faster than `z` changes.
-const ADIABATIC: f64 = 10.0;
+const ADIABATIC: f64 = 30.0;
 
 /// On a limit cycle friction gives and takes the same, up to this share of it.
 const BALANCED: f64 = 0.01;
@@ -88,8 +88,8 @@ const MOST_RELAXATIONS: u32 = 60;
 const NODES: usize = 5;
 const PANEL: f64 = 1.2;
 
-/// Relative error that a sample's rate may have.
-const RATE_ERROR: f64 = 1e-3;
+/// Relative error that a sample's rate may have, in units of `rtol`: the rest is lost where gain and loss cancel.
+const RATE_ERROR: f64 = 10.0;
 
 /// Follows the response that starts from steady sliding at `e^x v_f`, `x` not 0.
 pub fn follow(slider: &Slider, linear: Linear, x: f64, rtol: f64) -> Course {
@@ -292,10 +292,10 @@ impl Follower<'_> {
             let relaxation = 1.0 - exp(-self.linear.relaxation * cycle.period);
             let [low, high] = cycle.range();
             let size = (high - low).min(1.0);
-            if off <= (RATE_ERROR * rate.abs() * size).max(3.0 * tolerance) {
+            if off <= (self.rate_error() * rate.abs() * size).max(3.0 * tolerance) {
                 // Errors of a step are absolute in x, so their share is greater in small cycles.
                 let gross = gross(&cycle, place.z, self.slider);
-                let tolerance = self.finer(RATE_ERROR * rate.abs() * size / gross);
+                let tolerance = self.finer(self.rate_error() * rate.abs() * size / gross);
                 let drift = ln(place.z / asked);
                 let [low, high] = cycle.exact_range(&mut orbit);
                 return Ok(Sample {
@@ -345,7 +345,8 @@ impl Follower<'_> {
             let mut next = self.refined(here.moved(stride.copysign(direction)), here.slope, here.tolerance)?;
             let slope = ln(next.place.y / here.place.y) / ln(next.place.z / here.place.z);
             next.slope = if (0.0..=2.0).contains(&slope) { slope } else { 1.0 };
-            if next.drift.abs() > 20.0 * next.rate.abs() + self.rtol {
+            let gone = ln(next.place.z / here.place.z) / direction.signum();
+            if gone < 0.5 * stride && next.drift.abs() > 20.0 * next.rate.abs() {
                 // One cycle led here from far away: there is a limit cycle near, and cycles come to it by themselves.
                 let (place, change) = (next.place, next.drift.abs());
                 return Ok(Slide::Near { place, change });
@@ -371,6 +372,11 @@ impl Follower<'_> {
         }
     }
 
+    /// Relative error that a sample's rate may have.
+    fn rate_error(&self) -> f64 {
+        (RATE_ERROR * self.rtol).min(1e-3)
+    }
+
     /// A tolerance that is no coarser than that of the response.
     fn finer(&self, tolerance: f64) -> f64 {
         tolerance.min(self.tolerance).max(FINEST)
@@ -389,7 +395,7 @@ impl Follower<'_> {
     fn cycle_between(&mut self, from: &Sample, to: &Sample) -> Result<Fate, Stop> {
         let length = ln(to.place.z / from.place.z);
         let slope = ((to.rate - from.rate) / length).abs();
-        let gross = RATE_ERROR * from.rate.abs().min(to.rate.abs()) / from.tolerance.min(to.tolerance);
+        let gross = self.rate_error() * from.rate.abs().min(to.rate.abs()) / from.tolerance.min(to.tolerance);
         let tolerance = self.finer(0.1 * self.rtol * slope / gross.max(1e-3));
         let sample = self.find([*from, *to], tolerance, |sample| sample.rate)?;
         Ok(Fate::Cycle { period: sample.period, high: sample.high, low: sample.low })
