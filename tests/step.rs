@@ -1,4 +1,5 @@
-//! The step response: the paper's case, Taylor series at 30 digits as judge, every fate decided, and the error asked for.
+//! The step response: the paper's case, Taylor series at 30 digits as judge, every fate decided, and the error asked
+//! for.
 
 mod reference;
 
@@ -163,6 +164,42 @@ fn next_to_the_critical_stiffness_the_linear_verdict_is_met() {
             assert!((ratio / 10_f64.sqrt() - 1.0).abs() < 300.0 * distance, "{distance}: {ratio}");
         }
         last = Some(amplitude);
+    }
+}
+
+/// A heavy block swings like a pendulum, `v/v_f = 1 - A cos(omega t)`, `omega = sqrt(k/M)`, so slowly that theta
+/// keeps up. Friction takes `(a - b) <A cos ln(1 + A cos)> = (a - b) (1 - sqrt(1 - A^2))` from `M A^2/2`: with `s =
+/// sqrt(1 - A^2)` the time is `M/(a - b)` times the growth of `-s - ln(1 - s)`.
+#[test]
+fn reference_heavy_block_settles_as_averaging_tells() {
+    let (law, k) = (Law { a: 0.01, b: 0.005 }, 1.0);
+    let mut last = f64::INFINITY;
+    for inertia in [1e4, 1e6, 1e8] {
+        let step = Step { transition: Transition { law, v_i: 5e4, v_f: 1e5 }, k, m: inertia * 1e-10 };
+        let response = respond(&step, 1e-8);
+        assert_eq!(response.outcome, Outcome::Settled);
+        let lasts = |s: f64| -s - (1.0 - s).ln();
+        let expected = inertia / (law.a - law.b) * (lasts((1.0 - 1e-4_f64).sqrt()) - lasts(0.75_f64.sqrt()));
+        let found = response.settling_time.expect("settles") * 1e5;
+        let error = relative(found, expected);
+        assert!(error < 0.1 * last, "{inertia}: {found} {expected}");
+        last = error;
+        assert!(response.steps < 5000, "{inertia}: {}", response.steps);
+    }
+}
+
+/// With `b > a` it is driven until it stands still for a moment, and swings between rest and `2 v_f`.
+#[test]
+fn heavy_block_swings_between_rest_and_twice_the_velocity() {
+    let law = Law { a: 0.005, b: 0.01 };
+    for v_i in [10.0, 9e4, 3e6] {
+        let step = Step { transition: Transition { law, v_i, v_f: 1e5 }, k: 10.0, m: 1e5 * 1e-10 };
+        let (status, response) = step.respond(1e-6);
+        let cycle = response.and_then(|response| response.cycle).expect("is a limit cycle");
+        let period = 2.0 * std::f64::consts::PI * 1e2;
+        assert!(relative(cycle.period * 1e5, period) < 1e-4, "{v_i}: {}", cycle.period * 1e5);
+        assert!(relative(cycle.v_peak, 2e5) < 1e-3, "{v_i}: {}", cycle.v_peak);
+        assert_eq!(status, Status::BelowBound);
     }
 }
 
