@@ -1,7 +1,7 @@
 //! The Hopf point at the critical stiffness: whether the oscillation that starts there is small and stable, or not.
 //!
 //! The first Lyapunov coefficient by projection onto the critical eigenvectors (Kuznetsov, Elements of Applied Bifurcation
-//! Theory, equation 5.62), in the scaled variables of [`slider`](super::slider), where the frequency at the Hopf point is
+//! Theory, equation 5.62), in the scaled variables of `slider.rs`, where the frequency at the Hopf point is
 //! `sqrt((b - a)/a)` whatever the mass. The equation of motion enters times `M`, so that `M = 0` is a case like any other.
 
 use std::ops::{Add, Mul, Sub};

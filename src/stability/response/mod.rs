@@ -1,8 +1,8 @@
 //! The response of a block on a spring to a step of the control velocity: `v_c` jumps from `v_i` to `v_f` and stays
 //! there.
 //!
-//! In the scaled variables of [`slider`] only `a`, `b`, `k`, `m v_f^2` and `v_i/v_f` enter. The response is
-//! integrated until its end is decided ([`fate`]).
+//! In the scaled variables of `slider.rs` only `a`, `b`, `k`, `m v_f^2` and `v_i/v_f` enter. The response is
+//! integrated until its end is decided (`fate.rs`).
 
 mod fate;
 mod hopf;

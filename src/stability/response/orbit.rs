@@ -31,7 +31,7 @@ pub struct Cycle {
 /// Why an orbit is followed no further.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Stop {
-    /// The state is within [`QUIET`] of steady sliding.
+    /// The state is close enough to steady sliding to be linear.
     Quiet,
     /// The velocity becomes infinite in finite time.
     Ends,
