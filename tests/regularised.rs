@@ -468,3 +468,44 @@ fn regress_work_counts() {
     let solved = solve(&FAST, 0.1 * FAST.t_f, 1e-10);
     assert_eq!((solved.effort.quadratures, solved.effort.nodes), (17, 848));
 }
+
+#[test]
+fn the_motion_carries_the_numbers() {
+    for (case, share) in [(FAST, 0.1), (FAST, 0.5), (SLOWING, 0.01), (HOLDING, 0.02), (case((100.0, 3.0), 0.5), 0.05)] {
+        let delta_t = share * case.t_f;
+        let (solved, motion) =
+            regularised::motion(&case.slider, case.velocities, case.t_f, delta_t, case.bounded, 1e-10);
+        assert_eq!(solved, solve(&case, delta_t, 1e-10));
+        let (value, motion) = (solved.value.expect("exists"), motion.expect("exists"));
+        let marks = motion.landmarks();
+        let mut before = motion.at(0.0);
+        assert_eq!((before.t, before.theta), (0.0, 1.0 / case.velocities.0));
+        let (mut work, mut range) = (0.0, [[f64::INFINITY, f64::NEG_INFINITY]; 2]);
+        for pair in marks.windows(2) {
+            let steps = 400;
+            for i in 1..=steps {
+                // Next to a mark, so that a place just before and one just after are compared.
+                let s = pair[0] + (pair[1] - pair[0]) * (f64::from(i) / f64::from(steps)).min(1.0 - 1e-12);
+                let now = motion.at(s);
+                let h = now.t - before.t;
+                assert!(h >= 0.0, "{case:?} at {s}: {before:?} {now:?}");
+                work += 0.5 * h * (before.friction * before.v + now.friction * now.v);
+                let grown = h * (1.0 - 0.5 * (before.theta * before.v + now.theta * now.v));
+                let change = now.theta - before.theta;
+                assert!((change - grown).abs() <= 1e-4 * (h + change.abs()) + 1e-13, "{case:?} at {s}: {now:?}");
+                for (range, x) in range.iter_mut().zip([now.v, now.v_c.expect("is told")]) {
+                    *range = [range[0].min(x), range[1].max(x)];
+                }
+                before = now;
+            }
+        }
+        let end = motion.at(1.0);
+        assert!(relative(end.t, case.t_f) < 1e-11 && relative(end.v, case.velocities.1) < 1e-9, "{end:?}");
+        assert!(relative(end.theta * case.velocities.1, 1.0) < 1e-9, "{end:?}");
+        assert!(relative(work, value.work) < 1e-4, "{work} {value:?}");
+        let size = value.control_max.max(-value.control_min);
+        assert!((range[1][0] - value.control_min).abs() < 1e-3 * size, "{range:?} {value:?}");
+        assert!((range[1][1] - value.control_max).abs() < 1e-3 * size, "{range:?} {value:?}");
+        assert!(relative(range[0][0], value.v_min) < 1e-3 && relative(range[0][1], value.v_max) < 1e-3);
+    }
+}

@@ -187,7 +187,7 @@ impl Timed {
 
     /// Time since the start of the protocol: from the nearer end of the arc, so that the layers at both ends keep their
     /// digits.
-    fn time(&self, place: f64) -> f64 {
+    pub fn time(&self, place: f64) -> f64 {
         let count = f64::from(self.pieces.count);
         let piece = ((place * count) as usize).min(self.pieces.count as usize - 1);
         let (from, to) = (piece as f64 / count, (piece + 1) as f64 / count);

@@ -89,6 +89,37 @@ impl Optimal {
         Jet { v: [1.0, 0.0, 0.0, 0.0], theta: now.theta, rate: now.rest }
     }
 
+    /// When a place is reached.
+    pub fn time(&self, site: Site) -> f64 {
+        match (site, &self.arc) {
+            (Site::Moving(place), Some(arc)) => arc.time(place),
+            (Site::Moving(_), None) => self.t_f,
+            (Site::Held(time), _) => time,
+        }
+    }
+
+    /// Places between two, with them, between which the protocol is smooth and shows no detail much narrower.
+    pub fn landmarks(&self, from: Site, to: Site) -> Vec<Site> {
+        let mut sites = vec![from];
+        if let Site::Held(start) = from {
+            let end = if let Site::Held(end) = to { end } else { self.hold.time };
+            // Theta changes over its first value, and then over 1.
+            let mut time = start;
+            while time < end && sites.len() < MOST_MARKS {
+                time = (time + 0.5 * self.hold.from.aged(time).theta).min(end);
+                sites.push(Site::Held(time));
+            }
+        }
+        if let (Site::Moving(end), Some(arc)) = (to, &self.arc) {
+            let start = if let Site::Moving(start) = from { start } else { 0.0 };
+            if let Site::Held(_) = from {
+                sites.push(Site::Moving(0.0));
+            }
+            sites.extend(arc.parts(start, end).map(|(_, to)| Site::Moving(to)));
+        }
+        sites
+    }
+
     /// What happens from one place to a later one.
     pub fn span(&self, from: Site, to: Site) -> Span {
         let mut span = Span { time: 0.0, lag: 0.0, work: 0.0 };
@@ -167,6 +198,9 @@ impl Timed {
         to - inverse(time - self.left[piece + 1], to - from, |d| self.pieces.time(to - d, to))
     }
 }
+
+/// Most landmarks of a hold: beyond, nothing changes any more.
+const MOST_MARKS: usize = 100;
 
 /// Where in `[0, most]` a rising function that is 0 at 0 takes a value, by secants of its logarithm inside a bracket.
 fn inverse(value: f64, most: f64, f: impl Fn(f64) -> f64) -> f64 {

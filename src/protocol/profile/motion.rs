@@ -14,6 +14,16 @@ pub struct Resolution<E> {
     pub panels: Vec<Resolved>,
 }
 
+impl<E> Resolution<E> {
+    /// The panel at `s`, and the share of it.
+    pub fn place(&self, s: f64) -> (&Resolved, f64) {
+        let count = self.panels.len();
+        let along = s.clamp(0.0, 1.0) * count as f64;
+        let k = (along as usize).min(count - 1);
+        (&self.panels[k], along - k as f64)
+    }
+}
+
 impl<E: Exponent> Motion for Resolution<E> {
     fn duration(&self) -> f64 {
         self.curve.t_f
@@ -25,11 +35,7 @@ impl<E: Exponent> Motion for Resolution<E> {
     }
 
     fn at(&self, s: f64) -> Moment {
-        let count = self.panels.len();
-        let along = s.clamp(0.0, 1.0) * count as f64;
-        let k = (along as usize).min(count - 1);
-        let panel = &self.panels[k];
-        let u = along - k as f64;
+        let (panel, u) = self.place(s);
         let (x, z) = panel.place(u);
         let theta = panel.theta(u);
         let v = self.curve.floor + self.curve.w_f * exp(self.curve.exponent.value(x, z));

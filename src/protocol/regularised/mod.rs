@@ -6,12 +6,14 @@
 //! brings theta to where the optimum has it. So the optimum between the pieces is untouched (docs/theory.md,
 //! "Smooth pieces").
 
+mod motion;
 mod piece;
 
 use super::control::Extent;
 use super::optimal::{Route, Site, route};
-use super::{Effort, Slider, Solved, Status};
+use super::{Effort, Motion, Slider, Solved, Status};
 use crate::model::Transition;
+use motion::Smooth;
 use piece::{End, Piece};
 
 /// The regularised optimum, every number to the requested relative accuracy; those of `v_c` to that of the greater of
@@ -48,7 +50,43 @@ pub fn solve(
     bounded: bool,
     rtol: f64,
 ) -> Solved<Regularised> {
-    let none = |status, effort| Solved { status, value: None, effort };
+    assemble(slider, (v_i, v_f), t_f, delta_t, bounded, rtol, |_| ()).0
+}
+
+/// The same, and its motion wherever it has numbers.
+pub fn motion(
+    slider: &Slider,
+    (v_i, v_f): (f64, f64),
+    t_f: f64,
+    delta_t: f64,
+    bounded: bool,
+    rtol: f64,
+) -> (Solved<Regularised>, Option<Box<dyn Motion>>) {
+    let mut parts = Vec::new();
+    let (solved, route) = assemble(slider, (v_i, v_f), t_f, delta_t, bounded, rtol, |part| parts.push(part));
+    let smooth = route.filter(|_| solved.value.is_some()).and_then(|route| Smooth::new(*slider, route, parts, rtol));
+    (solved, smooth.map(|smooth| Box::new(smooth) as Box<dyn Motion>))
+}
+
+/// A part of the regularised optimum.
+enum Part {
+    /// The optimum between two places.
+    Kept(Site, Site),
+    /// A smooth piece.
+    Replaced(Piece),
+}
+
+/// Solves, and hands over the parts in the order of time.
+fn assemble(
+    slider: &Slider,
+    (v_i, v_f): (f64, f64),
+    t_f: f64,
+    delta_t: f64,
+    bounded: bool,
+    rtol: f64,
+    visit: impl FnMut(Part),
+) -> (Solved<Regularised>, Option<Route>) {
+    let none = |status, effort| (Solved { status, value: None, effort }, None);
     let sound = delta_t > 0.0 && 2.0 * delta_t <= t_f && slider.k > 0.0 && slider.m >= 0.0 && slider.m.is_finite();
     if !sound {
         return none(Status::Infeasible, Effort::default());
@@ -56,7 +94,7 @@ pub fn solve(
     let (solved, route) = route(&Transition { law: slider.law, v_i, v_f }, t_f, bounded, rtol);
     let mut effort = solved.effort;
     let (Some(optimum), Some(route)) = (solved.value, route) else { return none(solved.status, effort) };
-    let mut sum = Sum { slider: *slider, rtol, excess: 0.0, v: Extent::NONE, control: Extent::NONE };
+    let mut sum = Sum { slider: *slider, rtol, visit, excess: 0.0, v: Extent::NONE, control: Extent::NONE };
     if let Err(status) = sum.gather(&route, (v_i, v_f), (delta_t, t_f), &mut effort) {
         return none(status, effort);
     }
@@ -81,23 +119,25 @@ pub fn solve(
         Status::BelowBound => Status::Ok,
         status => status,
     };
-    Solved { status, value: Some(value), effort }
+    (Solved { status, value: Some(value), effort }, Some(route))
 }
 
 /// Velocities below this one count as none.
 const STANDSTILL: f64 = 1e-100;
 
 /// What is gathered along the way.
-struct Sum {
+struct Sum<F> {
     slider: Slider,
     rtol: f64,
+    /// Takes the parts.
+    visit: F,
     /// Work beyond that of the optimum.
     excess: f64,
     v: Extent,
     control: Extent,
 }
 
-impl Sum {
+impl<F: FnMut(Part)> Sum<F> {
     /// The pieces and what lies between them, in the order of time; `Err` with the status where a piece has no
     /// numbers.
     fn gather(
@@ -126,6 +166,7 @@ impl Sum {
     /// Leaves the optimum as it is between two places.
     fn keep(&mut self, route: &Route, from: Site, to: Site) {
         route.control(&self.slider, from, to, self.rtol, &mut self.control);
+        (self.visit)(Part::Kept(from, to));
     }
 
     /// Replaces the optimum between two places by a smooth piece.
@@ -146,6 +187,7 @@ impl Sum {
         self.v.add(piece.v.high);
         self.control.add(piece.control.low);
         self.control.add(piece.control.high);
+        (self.visit)(Part::Replaced(piece));
         Ok(())
     }
 }

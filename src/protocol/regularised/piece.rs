@@ -10,10 +10,11 @@
 //! `g` runs over a stretched place, `xi = (1 + p) x/(1 + p x)` from that end, with `p = 4 (rho (1 + 10 ln rho)^(-1/3) -
 //! 1)` if that is positive. About a quarter of the mean is then left to the way down, whatever `rho`.
 
+use crate::model::Law;
 use crate::numerics::elementary::{exp_m1, ln, ln_1p};
 use crate::protocol::control::Extent;
 use crate::protocol::optimal::Span;
-use crate::protocol::profile::{Curve, Hermite, Problem, Start, pass, reach};
+use crate::protocol::profile::{Curve, Hermite, Problem, Resolution, Start, pass, reach};
 use crate::protocol::{Effort, Jet, Slider, Status};
 
 /// An end of a piece.
@@ -36,6 +37,8 @@ pub(super) struct Piece {
     pub v: Extent,
     /// Range of the control velocity.
     pub control: Extent,
+    curve: Curve<Hermite>,
+    from: Start,
 }
 
 /// Theta and its rate are interpolated, which takes more nodes than a quadrature.
@@ -111,8 +114,8 @@ impl Piece {
         let room = ln_1p(spare / end.theta);
         let problem = Problem::between(end.theta, -growth / end.theta, end.rate / end.theta, room, curve);
         let curve = curve.with(problem.solve(0.0, rtol, reach(rtol), effort).ok_or(Status::NotConverged)?);
-        let mut piece = Piece { work: 0.0, v: Extent::NONE, control: Extent::NONE };
         let from = Start { v: start.v[0], theta: start.theta, rate: start.rate, slow: false };
+        let mut piece = Piece { work: 0.0, v: Extent::NONE, control: Extent::NONE, curve, from };
         let theta = pass(&curve, from, rtol, INTERPOLATION * reach(rtol), effort, |panel| {
             piece.work += panel.work(&slider.law, &curve);
             panel.range(&curve, rtol, &mut piece.v, |jet| [jet.v[0], jet.v[1]]);
@@ -120,6 +123,14 @@ impl Piece {
         });
         let arrives = theta.is_some_and(|theta| (theta / end.theta - 1.0).abs() <= 10.0 * rtol + ROUNDING);
         if arrives { Ok(piece) } else { Err(Status::NotConverged) }
+    }
+
+    /// The piece over time; `None` where numbers leave the range of a double.
+    pub fn resolve(&self, law: Law, rtol: f64) -> Option<Resolution<Hermite>> {
+        let mut panels = Vec::new();
+        let reach = INTERPOLATION * reach(rtol);
+        pass(&self.curve, self.from, rtol, reach, &mut Effort::default(), |panel| panels.push(*panel))?;
+        Some(Resolution { law, curve: self.curve, panels })
     }
 }
 
