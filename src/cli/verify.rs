@@ -58,7 +58,7 @@ fn summary(audit: &Audit) -> String {
         let cells: Vec<String> = row
             .iter()
             .map(|(name, cell)| match cell {
-                Cell::Number(value) => format!("{name} = {value}"),
+                Cell::Number(value) => format!("{name} = {value:?}"),
                 Cell::Word(word) => format!("{name} = {word}"),
                 Cell::Missing => format!("{name} = -"),
             })
