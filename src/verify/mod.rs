@@ -1,6 +1,8 @@
 //! A dataset audited: a sample of its rows solved again by a route that shares nothing with the solvers that made it.
 
 mod best;
+mod compliant;
+mod course;
 mod crossover;
 mod extremal;
 mod gap;
@@ -48,10 +50,11 @@ impl Verdict {
         let Some((_, cell)) = row.iter().rev().find(|(name, _)| name == column) else { return };
         let difference = match (cell, expected) {
             (Cell::Missing, None) => 0.0,
+            // Also where both are infinite.
+            (Cell::Number(found), Some(expected)) if *found == expected => 0.0,
             (Cell::Number(found), Some(expected)) => {
                 let size = scale.unwrap_or(expected.abs());
-                let difference = (found - expected).abs();
-                if difference == 0.0 { 0.0 } else { difference / size }
+                (found - expected).abs() / size
             }
             _ => f64::INFINITY,
         };
@@ -129,6 +132,8 @@ pub fn verify(path: &Path, manifest: &Manifest, sample: u64, seed: u64) -> Resul
                 "crossover" => crossover::check(&row, &context),
                 "best" => best::check(&row, &context, rtol),
                 "swift" => swift::check(&row, &context),
+                "compliant" => compliant::check(&row, &context),
+                "regularised" => compliant::check_regularised(&row, &context),
                 "stability" => stability::check(&row, &context),
                 _ => Verdict::unchecked("there is no independent route for this table"),
             };
