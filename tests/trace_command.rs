@@ -262,3 +262,28 @@ fn paper_control_of_the_smooth_shortcut_turns_negative() {
         assert!((cells[1] / cells[4] - 1.0).abs() < 1e-14, "{line}");
     }
 }
+
+/// The response to a step: overshoot to 6.5585 `v_f`, and no jump of the velocity at either end.
+#[test]
+fn paper_step_on_a_spring_overshoots() {
+    let spring = ["step", "--t-f", "1e-5", "--a", "0.005", "--b", "0.01", "--v-i", "1e5", "--v-f", "3.2e6"];
+    let text = shown(&[&spring, &["--k", "7.5e-3", "--m", "2.5e-16"]]);
+    assert!(
+        text.starts_with(
+            "step: the control velocity jumps to v_f and stays there; the block on its spring up to t_f\n"
+        )
+    );
+    let csv = shown(&[&spring, &["--k", "7.5e-3", "--m", "2.5e-16", "--format", "csv"]]);
+    let rows: Vec<Vec<f64>> = csv
+        .lines()
+        .skip(1)
+        .map(|line| line.split(',').map(|cell| cell.parse().expect("is a number")).collect())
+        .collect();
+    let peak = rows.iter().map(|row| row[1]).fold(0.0, f64::max);
+    assert!((peak / 3.2e6 - 6.5585).abs() < 1e-3, "{peak}");
+    // Before and after the jump of the control velocity the block is the same.
+    assert!(rows[0].iter().zip(&rows[1]).take(4).all(|(before, after)| (before - after).abs() <= 1e-15 * before));
+    assert_eq!((rows[0][4], rows[1][4]), (1e5, 3.2e6));
+    let last = rows.last().expect("has rows");
+    assert!(last[0] == 1e-5 && (last[1] / 3.2e6 - 1.0).abs() > 0.01, "{last:?}");
+}

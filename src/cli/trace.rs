@@ -46,10 +46,10 @@ pub struct Arguments {
     /// Coefficient of t^2 in theta, in units of 1/t_f^2 (free_cubic)
     #[arg(long, value_name = "Y", value_parser = |text: &str| legal(text, Quantity::Alpha3.domain()))]
     alpha_3: Option<f64>,
-    /// Stiffness of the spring, in mu_0 sigma/l; rigid by default (compliant)
+    /// Stiffness of the spring, in mu_0 sigma/l; rigid by default (compliant; step, which then is the response to a jump of v_c)
     #[arg(long, value_name = "K", value_parser = |text: &str| legal(text, Quantity::Stiffness.domain()))]
     k: Option<f64>,
-    /// Mass of the block, in mu_0 sigma l/v_0^2; 0 by default (compliant)
+    /// Mass of the block, in mu_0 sigma l/v_0^2; 0 by default (step, compliant)
     #[arg(long, value_name = "M", value_parser = |text: &str| legal(text, Quantity::Mass.domain()))]
     m: Option<f64>,
     /// Without the bound v >= 1 (optimal, best)
@@ -104,7 +104,7 @@ pub fn trace(arguments: &Arguments) -> Result<(), Failure> {
     let Some(trace) = Trace::of(&*course.motion, &case.transition, times) else {
         return Err(Failure::failed("the protocol shows more detail than can be resolved"));
     };
-    let header = header(arguments, &course, &trace);
+    let header = header(arguments, &protocol, &course, &trace);
     let bytes = match format {
         Format::Table => format!("{header}\n{}", table(&trace)).into_bytes(),
         Format::Csv => trace::csv(&trace).into_bytes(),
@@ -160,8 +160,8 @@ impl Arguments {
             ("--tau-max", self.tau_max.is_some(), family.is_some_and(|family| family.heeds_tau_max()), false),
             ("--alpha-2", self.alpha_2.is_some(), name == "free_cubic", true),
             ("--alpha-3", self.alpha_3.is_some(), name == "free_cubic", true),
-            ("--k", self.k.is_some(), name == "compliant", false),
-            ("--m", self.m.is_some(), name == "compliant", false),
+            ("--k", self.k.is_some(), matches!(name, "step" | "compliant"), false),
+            ("--m", self.m.is_some(), matches!(name, "step" | "compliant"), false),
             ("--unbounded", self.unbounded, matches!(name, "optimal" | "best"), false),
         ];
         for (flag, is_given, is_heeded, is_needed) in given {
@@ -173,10 +173,12 @@ impl Arguments {
             }
         }
         let bounded = !self.unbounded;
+        let (k, m) = (self.k.unwrap_or(f64::INFINITY), self.m.unwrap_or(0.0));
         Ok(match (name, self.alpha_2, self.alpha_3, family) {
             ("optimal", ..) => Protocol::Optimal { bounded },
             ("best", ..) => Protocol::Best { bounded },
-            ("compliant", ..) => Protocol::Compliant { k: self.k.unwrap_or(f64::INFINITY), m: self.m.unwrap_or(0.0) },
+            ("compliant", ..) => Protocol::Compliant { k, m },
+            ("step", ..) if k.is_finite() && self.v_i != self.v_f => Protocol::Response { k, m },
             (_, Some(a_2), Some(a_3), _) => Protocol::FreeCubic { a_2, a_3 },
             (.., Some(family)) => Protocol::Family(family),
             _ => return Err(wrong(format!("no protocol is named `{name}`"))),
@@ -202,8 +204,8 @@ impl Arguments {
 }
 
 /// What the protocol is, in a few lines.
-fn header(arguments: &Arguments, course: &Course, trace: &Trace) -> String {
-    let doc = trace::names().find(|(name, _)| *name == arguments.protocol).map_or("", |(_, doc)| doc);
+fn header(arguments: &Arguments, protocol: &Protocol, course: &Course, trace: &Trace) -> String {
+    let doc = protocol.doc(&arguments.protocol);
     let listed = |numbers: &[(&'static str, f64)]| {
         let cells: Vec<String> =
             numbers.iter().map(|(name, value)| format!("{name} = {}", words::number(*value))).collect();

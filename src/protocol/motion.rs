@@ -31,4 +31,9 @@ pub trait Motion: Sync {
 
     /// The moment at `s`, clamped to `[0, 1]`.
     fn at(&self, s: f64) -> Moment;
+
+    /// Whether steady sliding at the final velocity follows; not where a motion is looked at up to some time only.
+    fn arrives(&self) -> bool {
+        true
+    }
 }

@@ -68,7 +68,7 @@ impl Trace {
         if moments.first().is_some_and(|first| jumps(first, &before)) {
             moments.insert(0, before);
         }
-        if moments.last().is_some_and(|last| jumps(last, &after)) {
+        if motion.arrives() && moments.last().is_some_and(|last| jumps(last, &after)) {
             moments.push(after);
         }
         Some(Trace { moments, v_min, v_max })

@@ -6,6 +6,7 @@ use crate::model::Transition;
 use crate::protocol::cubic::{Landscape, Shortcuts};
 use crate::protocol::swift::{Case, FAMILIES, Family, Obstacle};
 use crate::protocol::{Effort, Motion, Slider, Status, best, compliant, optimal};
+use crate::stability::response::Step;
 
 /// A protocol, and the spring that drives it where that is elastic.
 #[derive(Clone, Copy)]
@@ -29,6 +30,13 @@ pub enum Protocol {
     },
     /// The member of a family.
     Family(&'static dyn Family),
+    /// The response of a block on a spring to a step of the control velocity.
+    Response {
+        /// Stiffness of the spring.
+        k: f64,
+        /// Mass of the block.
+        m: f64,
+    },
     /// The smooth shortcut on a spring.
     Compliant {
         /// Stiffness of the spring.
@@ -82,6 +90,8 @@ pub enum Absence {
     },
     /// The least work of all cubic shortcuts is approached at the border `v = 0`, not attained.
     Border,
+    /// The velocity becomes infinite, or oscillates too often to be shown.
+    Response,
     /// Friction is so low somewhere that the extremal need not be unique, and none was found.
     Nonphysical,
 }
@@ -105,6 +115,9 @@ impl fmt::Display for Absence {
             Absence::Border => f.write_str(
                 "the least work is only approached, as v falls to 0 somewhere; with the bound v >= 1 it is attained",
             ),
+            Absence::Response => f.write_str(
+                "before t_f the velocity becomes infinite, or there are more oscillations than can be shown",
+            ),
             Absence::Nonphysical => f.write_str(
                 "friction is too low: where tau <= max(0, b - a) there need not be an optimum, and none was found",
             ),
@@ -119,6 +132,16 @@ impl From<Obstacle> for Absence {
 }
 
 impl Protocol {
+    /// What it is, in one line.
+    pub fn doc(&self, name: &str) -> &'static str {
+        match self {
+            Protocol::Response { .. } => {
+                "the control velocity jumps to v_f and stays there; the block on its spring up to t_f"
+            }
+            _ => names().find(|(known, _)| *known == name).map_or("", |(_, doc)| doc),
+        }
+    }
+
     /// The protocol that solves `case`, its numbers good to `rtol`.
     pub fn course(&self, case: &Case, rtol: f64) -> Result<Course, Absence> {
         match *self {
@@ -126,6 +149,7 @@ impl Protocol {
             Protocol::Best { bounded } => least_cubic(case, bounded, rtol),
             Protocol::FreeCubic { a_2, a_3 } => free_cubic(case, a_2, a_3, rtol),
             Protocol::Family(family) => member(family, case, rtol),
+            Protocol::Response { k, m } => response(case, k, m, rtol),
             Protocol::Compliant { k, m } => smooth(case, k, m, rtol),
         }
     }
@@ -189,6 +213,12 @@ fn scaled(a_2: f64, a_3: f64) -> Vec<(&'static str, f64, &'static str)> {
         ("alpha_2", a_2, "coefficient of t in theta, in 1/t_f"),
         ("alpha_3", a_3, "coefficient of t^2 in theta, in 1/t_f^2"),
     ]
+}
+
+fn response(case: &Case, k: f64, m: f64, rtol: f64) -> Result<Course, Absence> {
+    let swing = Step { transition: case.transition, k, m }.motion(case.t_f, rtol).ok_or(Absence::Response)?;
+    let status = if swing.least_velocity() < 1.0 { Status::BelowBound } else { Status::Ok };
+    Ok(Course { work: swing.work(), motion: Box::new(swing), status, parameters: Vec::new() })
 }
 
 fn smooth(case: &Case, k: f64, m: f64, rtol: f64) -> Result<Course, Absence> {

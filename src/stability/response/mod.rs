@@ -6,6 +6,7 @@
 
 mod fate;
 mod hopf;
+mod motion;
 mod orbit;
 mod slider;
 
@@ -16,6 +17,7 @@ use crate::stability::SteadySliding;
 
 pub use fate::{Course, Fate, Linear, follow};
 pub use hopf::lyapunov_coefficient;
+pub use motion::Swing;
 pub use orbit::{Cycle, Extremum, Orbit, SETTLED, Seen, Stop};
 pub use slider::{Slider, State};
 
