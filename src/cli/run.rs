@@ -9,7 +9,7 @@ use crate::dataset::{Cell, DatasetError, Digest, Folder, Row};
 use crate::grid::Quantity;
 use crate::protocol::Status;
 use crate::sweep::{self, Outcome, Plan, RunError, Sweep};
-use crate::table::{STATUS, Signal, Work};
+use crate::table::{self, STATUS, Signal, Work};
 
 /// Arguments of `run`.
 #[derive(Debug, clap::Args)]
@@ -116,6 +116,21 @@ fn summary(name: &str, rows: u64, digest: &Digest) -> String {
                     counts.iter().map(|(word, rows)| format!("{} {word}", words::count(*rows))).collect();
                 text.push_str(&format!("  {column}: {}\n", counts.join(", ")));
             }
+        }
+    }
+    if let Some(prediction) = table::find(name).and_then(|table| table.prediction())
+        && !digest.predicted.is_empty()
+    {
+        text.push_str(&format!("  {} as {} predicts it, and as found:\n", prediction.column, prediction.theory));
+        let mut lines = vec![["predicted", "found", "rows"].map(str::to_owned).to_vec()];
+        for (predicted, found, rows) in &digest.predicted {
+            lines.push(vec![(*predicted).to_owned(), found.clone(), words::count(*rows)]);
+        }
+        text.push_str(&words::aligned(&lines, 4));
+        let differ: u64 =
+            digest.predicted.iter().filter(|(predicted, found, _)| predicted != found).map(|(.., rows)| rows).sum();
+        if differ > 0 {
+            text.push_str(&format!("    {} differ: {}\n", words::things(differ, "row"), prediction.why));
         }
     }
     text

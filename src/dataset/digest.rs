@@ -8,9 +8,9 @@ use std::path::Path;
 use polars::prelude::{DataFrame, Float64Chunked, NewChunkedArray, ParquetReader, PolarsError, SerReader};
 
 use super::folder::{Folder, ManifestTable};
-use crate::grid::Quantity;
+use crate::grid::{Point, Quantity};
 use crate::protocol::Status;
-use crate::table::{self, Column, Kind, OPTIMUM_AXES, STATUS};
+use crate::table::{self, Column, Kind, OPTIMUM_AXES, Prediction, STATUS};
 
 /// Tables of at most this many rows are kept whole, and least values are told apart for at most this many transitions.
 pub const FEW: usize = 12;
@@ -27,6 +27,8 @@ pub struct Digest {
     pub ranges: Vec<Range>,
     /// The columns of words: each word and its rows.
     pub words: Vec<(String, Vec<(String, u64)>)>,
+    /// Where a simpler theory predicts a column of words: what it predicts, what was found, and in how many rows.
+    pub predicted: Vec<(&'static str, String, u64)>,
     /// All rows, if they are few.
     pub rows: Option<Vec<Row>>,
     /// The row of least `gap` with status `ok` of each transition and time, or the least of all if those are many.
@@ -86,6 +88,7 @@ impl Digest {
     }
 
     fn add(&mut self, table: &str, path: &Path, least: &mut Least) -> Result<(), PolarsError> {
+        let prediction = table::find(table).and_then(|table| table.prediction());
         let columns = table::find(table).map_or(&[][..], |table| table.columns());
         let mut reader = ParquetReader::new(File::open(path)?);
         let written = reader.schema()?;
@@ -93,7 +96,9 @@ impl Digest {
         let with_gap = columns.iter().any(|column| column.name == GAP);
         // The axes are only needed to tell transitions apart: reading them all would take as long as reading the results.
         let keys = keys(table);
-        let axes = keys.iter().filter(|_| with_gap).map(|axis| axis.name());
+        let prediction = prediction.filter(|prediction| written.contains(prediction.column));
+        let axes = keys.iter().filter(|_| with_gap).chain(prediction.map_or(&[][..], |prediction| prediction.axes));
+        let axes = axes.map(|axis| axis.name());
         let names = axes.chain(columns.iter().map(|column| column.name)).chain([STATUS]).map(str::to_owned);
         let frame = &mut reader.with_columns(Some(names.collect())).finish()?;
         frame.rechunk_mut();
@@ -116,6 +121,9 @@ impl Digest {
                     self.add_words(column.name, counts.into_iter().filter(|(_, rows)| *rows > 0).collect());
                 }
             }
+        }
+        if let Some(prediction) = prediction {
+            self.add_predictions(frame, &prediction)?;
         }
         if let Some(rows) = &mut self.rows {
             for index in 0..frame.height() {
@@ -144,6 +152,25 @@ impl Digest {
             }
             None => self.ranges.push(range),
         }
+        Ok(())
+    }
+
+    fn add_predictions(&mut self, frame: &DataFrame, prediction: &Prediction) -> Result<(), PolarsError> {
+        let axes = prediction.axes.iter().map(|axis| numbers(frame, *axis)).collect::<Result<Vec<_>, _>>()?;
+        let found = frame.column(prediction.column)?.cat32()?;
+        let mut point = Point::default();
+        for (row, code) in found.physical().iter().enumerate() {
+            let Some(word) = code.and_then(|code| found.get_mapping().cat_to_str(code)) else { continue };
+            for (quantity, values) in prediction.axes.iter().zip(&axes) {
+                point[*quantity] = values.get(row).unwrap_or(f64::NAN);
+            }
+            let predicted = (prediction.word)(&point);
+            match self.predicted.iter_mut().find(|(p, f, _)| (*p, f.as_str()) == (predicted, word)) {
+                Some((.., rows)) => *rows += 1,
+                None => self.predicted.push((predicted, word.to_owned(), 1)),
+            }
+        }
+        self.predicted.sort();
         Ok(())
     }
 

@@ -16,7 +16,7 @@ mod swift;
 
 use std::ops::Range;
 
-use crate::grid::{Grid, Projection, Quantity, Tuples};
+use crate::grid::{Grid, Point, Projection, Quantity, Tuples};
 
 pub use column::{Column, Kind, STATUS, STATUS_DOC};
 pub use optima::{OPTIMUM_AXES, Optima};
@@ -42,8 +42,28 @@ pub trait Table: Sync {
     /// Whether the selected columns need the optimal protocol of every row, shared through [`Optima`].
     fn needs_optimum(&self, selection: &Selection) -> bool;
 
+    /// What a simpler theory says of one of its columns, if it does.
+    fn prediction(&self) -> Option<Prediction> {
+        None
+    }
+
     /// Computes `rows` into `sheet`, which has the columns of the selection and as many rows: every cell is written.
     fn compute(&self, job: &Job<'_>, rows: Range<u64>, sheet: &mut Sheet) -> Result<Work, Stopped>;
+}
+
+/// What a simpler theory says of a column of words: a summary counts it against what was found.
+#[derive(Debug, Clone, Copy)]
+pub struct Prediction {
+    /// The column.
+    pub column: &'static str,
+    /// The theory, in a few words.
+    pub theory: &'static str,
+    /// Why they may differ.
+    pub why: &'static str,
+    /// The axes that it depends on.
+    pub axes: &'static [Quantity],
+    /// The word that it predicts at a point.
+    pub word: fn(&Point) -> &'static str,
 }
 
 /// Every table, in the order in which they are listed. A new table is a file and a line here.
