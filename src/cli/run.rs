@@ -178,7 +178,7 @@ fn account(outcome: &Outcome, seconds: f64) -> String {
     if rows == 0 {
         return "nothing to compute: every part was there\n".to_owned();
     }
-    let Work { optima, landscapes, best, swifts, crossovers, quadratures, nodes } = outcome.work;
+    let Work { optima, landscapes, best, swifts, crossovers, simulations, steps, quadratures, nodes } = outcome.work;
     let mut text = format!(
         "{} in {}: {} rows a second, Parquet on disk included\n",
         words::things(rows, "row"),
@@ -191,6 +191,8 @@ fn account(outcome: &Outcome, seconds: f64) -> String {
         (best, "best shortcut"),
         (swifts, "family shortcut"),
         (crossovers, "transition"),
+        (simulations, "simulation"),
+        (steps, "step"),
         (quadratures, "quadrature"),
         (nodes, "node"),
     ]

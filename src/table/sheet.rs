@@ -69,6 +69,10 @@ pub struct Work {
     pub swifts: u64,
     /// Transitions whose crossover times were computed.
     pub crossovers: u64,
+    /// Simulations of a block on a spring.
+    pub simulations: u64,
+    /// Steps of all simulations.
+    pub steps: u64,
     /// Quadratures, all solves together.
     pub quadratures: u64,
     /// Quadrature nodes, all solves together.
@@ -82,6 +86,8 @@ impl std::ops::AddAssign for Work {
         self.best += other.best;
         self.swifts += other.swifts;
         self.crossovers += other.crossovers;
+        self.simulations += other.simulations;
+        self.steps += other.steps;
         self.quadratures += other.quadratures;
         self.nodes += other.nodes;
     }
