@@ -377,7 +377,7 @@ fn request(name: &str, spec: &TableSpec, rtol: f64, grid: &Grid) -> Result<Reque
             format!("add `{} = ...` to [axes], or remove the table", missing.name()),
         ));
     }
-    let rtol = spec.rtol.unwrap_or(rtol);
+    let rtol = spec.rtol.or(table.default_rtol()).unwrap_or(rtol);
     check_rtol(&format!("{key}.rtol"), rtol)?;
     let selection = selection(table, &key, spec.columns.as_deref())?;
     let Some(rows) = grid.project(table.axes()).map(|projection| projection.rows()) else {

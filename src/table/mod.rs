@@ -42,6 +42,11 @@ pub trait Table: Sync {
     /// Whether the selected columns need the optimal protocol of every row, shared through [`Optima`].
     fn needs_optimum(&self, selection: &Selection) -> bool;
 
+    /// Relative accuracy where the spec gives the table none of its own; that of the whole sweep if `None`.
+    fn default_rtol(&self) -> Option<f64> {
+        None
+    }
+
     /// What a simpler theory says of one of its columns, if it does.
     fn prediction(&self) -> Option<Prediction> {
         None

@@ -5,8 +5,10 @@ use std::ops::Range;
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
 use super::optima::transition;
-use super::{Column, Job, Kind, Selection, Sheet, Stopped, Table, Work, rows};
+use super::{Column, Job, Kind, Prediction, Selection, Sheet, Stopped, Table, Work, rows};
 use crate::grid::Quantity;
+use crate::model::Law;
+use crate::stability::SteadySliding;
 use crate::stability::response::{self, Course, Outcome, Scaled, lyapunov_coefficient};
 
 /// One row a transition, stiffness and mass.
@@ -74,6 +76,30 @@ impl Table for Step {
         false
     }
 
+    /// Simulated: each digit more costs time.
+    fn default_rtol(&self) -> Option<f64> {
+        Some(1e-6)
+    }
+
+    fn prediction(&self) -> Option<Prediction> {
+        Some(Prediction {
+            column: "outcome",
+            theory: "linear stability at v_f (settled above k_c)",
+            why: "stable against small disturbances, but the step leads onto a cycle that surrounds steady sliding",
+            axes: &[Quantity::A, Quantity::B, Quantity::FinalVelocity, Quantity::Stiffness, Quantity::Mass],
+            word: |point| {
+                let law = Law { a: point[Quantity::A], b: point[Quantity::B] };
+                let (k, m) = (point[Quantity::Stiffness], point[Quantity::Mass]);
+                let outcome = if SteadySliding::new(law, k, m, point[Quantity::FinalVelocity]).is_stable() {
+                    Outcome::Settled
+                } else {
+                    Outcome::LimitCycle
+                };
+                Outcome::NAMES[outcome as usize]
+            },
+        })
+    }
+
     fn compute(&self, job: &Job<'_>, range: Range<u64>, sheet: &mut Sheet) -> Result<Work, Stopped> {
         let courses = Courses::default();
         rows::each(job, range, (COLUMNS.len(), 4), sheet, |_, point, cells| {
@@ -82,7 +108,8 @@ impl Table for Step {
                 k: point[Quantity::Stiffness],
                 m: point[Quantity::Mass],
             };
-            let course = step.scaled().map(|scaled| courses.get(&scaled, job.rtol));
+            let mut work = Work::default();
+            let course = step.scaled().map(|scaled| courses.get(&scaled, job.rtol, &mut work));
             let (status, response) = step.from_course(course.as_ref(), job.rtol);
             let law = step.transition.law;
             cells[LYAPUNOV] = lyapunov_coefficient(law, step.inertia()).unwrap_or(f64::NAN);
@@ -105,7 +132,7 @@ impl Table for Step {
                     response.t_end,
                 ]);
             }
-            (status, Work::default())
+            (status, work)
         })
     }
 }
@@ -115,10 +142,15 @@ impl Table for Step {
 struct Courses(Mutex<HashMap<[u64; 5], Arc<OnceLock<Course>>>>);
 
 impl Courses {
-    fn get(&self, scaled: &Scaled, rtol: f64) -> Course {
+    /// The course; adds what is spent by this call alone.
+    fn get(&self, scaled: &Scaled, rtol: f64, work: &mut Work) -> Course {
         let mut courses = self.0.lock().unwrap_or_else(PoisonError::into_inner);
         let course = courses.entry(scaled.key()).or_default().clone();
         drop(courses);
-        *course.get_or_init(|| scaled.follow(rtol))
+        *course.get_or_init(|| {
+            let course = scaled.follow(rtol);
+            *work += Work { simulations: 1, steps: course.steps.into(), ..Work::default() };
+            course
+        })
     }
 }

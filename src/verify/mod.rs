@@ -18,7 +18,7 @@ use crate::dataset::{Cell, Folder, Manifest, Row};
 use crate::grid::Quantity;
 use crate::model::{Law, Transition};
 use crate::sweep::{AxisSpec, Spec};
-use crate::table::STATUS;
+use crate::table::{self, STATUS};
 
 /// Differences above this many rtol are errors.
 pub const LIMIT: f64 = 10.0;
@@ -115,7 +115,9 @@ pub fn verify(path: &Path, manifest: &Manifest, sample: u64, seed: u64) -> Resul
     let folder = Folder::at(path);
     let mut audits = Vec::new();
     for table in &manifest.tables {
-        let rtol = spec.tables.get(&table.name).and_then(|table| table.rtol).unwrap_or(spec.accuracy.rtol);
+        let own = spec.tables.get(&table.name).and_then(|table| table.rtol);
+        let rtol = own.or(table::find(&table.name).and_then(|table| table.default_rtol()));
+        let rtol = rtol.unwrap_or(spec.accuracy.rtol);
         let rows = sample::rows(&folder, table, sample, seed).map_err(VerifyError)?;
         let mut audit = Audit {
             table: table.name.clone(),
