@@ -1,10 +1,12 @@
 //! Finite stiffness: whether steady sliding of a block on a spring is stable.
 
 mod driven;
+mod hopf;
 mod linear;
 pub mod response;
 mod sensitivity;
 
 pub use driven::{held_error, loop_error};
+pub use hopf::{Hopf, lyapunov_coefficient};
 pub use linear::{Eigenvalues, SteadySliding, critical_velocity};
 pub use sensitivity::amplification;

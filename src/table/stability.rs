@@ -7,7 +7,7 @@ use super::{Column, Job, Kind, Selection, Sheet, Stopped, Table, Work, rows};
 use crate::grid::Quantity;
 use crate::model::Transition;
 use crate::protocol::Status;
-use crate::stability::{SteadySliding, critical_velocity};
+use crate::stability::{Hopf, SteadySliding, critical_velocity};
 
 /// One row a transition, stiffness and mass.
 pub struct Stability;
@@ -30,10 +30,17 @@ const COLUMNS: &[Column] = &[
     ),
     Column::number("frequency", "v_0/l", "imaginary part of that pair (angular frequency), 0 if all three are real"),
     Column::number("decay_rate", "v_0/l", "the third eigenvalue at v_f, real; null for m = 0, which has two"),
+    Column::new(
+        "hopf",
+        Kind::Label(&Hopf::NAMES),
+        "side of k_c_f on which small limit cycles at v_f live: supercritical below it, subcritical above; null for m = 0, b <= a",
+    )
+    .optional(),
 ];
 
-/// The first of the columns of eigenvalues.
+/// The first of the columns of eigenvalues, and the one after them.
 const GROWTH: usize = 6;
+const HOPF: usize = 9;
 
 impl Table for Stability {
     fn name(&self) -> &'static str {
@@ -68,7 +75,7 @@ impl Table for Stability {
     }
 
     fn compute(&self, job: &Job<'_>, range: Range<u64>, sheet: &mut Sheet) -> Result<Work, Stopped> {
-        let with_eigenvalues = job.selection.has_any(GROWTH..COLUMNS.len());
+        let with_eigenvalues = job.selection.has_any(GROWTH..HOPF);
         rows::each(job, range, (COLUMNS.len(), 1024), sheet, |_, point, cells| {
             let Transition { law, v_i, v_f } = transition(point);
             let (k, m) = (point[Quantity::Stiffness], point[Quantity::Mass]);
@@ -83,12 +90,13 @@ impl Table for Stability {
                 critical_velocity(law, k, m).unwrap_or(f64::NAN),
             ]);
             if let Some(eigenvalues) = with_eigenvalues.then(|| at_end.eigenvalues()).flatten() {
-                cells[GROWTH..].copy_from_slice(&[
+                cells[GROWTH..HOPF].copy_from_slice(&[
                     eigenvalues.growth_rate,
                     eigenvalues.frequency,
                     eigenvalues.decay_rate.unwrap_or(f64::NAN),
                 ]);
             }
+            cells[HOPF] = Hopf::of(law, m, v_f).map_or(f64::NAN, |kind| f64::from(kind as u8));
             (Status::Ok, Work::default())
         })
     }

@@ -1,0 +1,144 @@
+//! The Hopf point at the critical stiffness: whether small limit cycles live on its unstable side or on its stable one.
+//!
+//! The first Lyapunov coefficient of the slider at `k = k_c` is elementary (docs/theory.md, "The Hopf point"). With `mu =
+//! m v^2/a` and `omega^2 = (b - a)/a`, in units of `l/v` for time and of `ln v` for the amplitude,
+//!
+//! ```text
+//! l_1 = -mu omega [(7 + 4 omega^2) mu^2 + 6 mu - 1]
+//!       / {2 [(1 + mu)^2 + omega^2 mu^2] [(1 + mu)^2 + 4 omega^2 mu^2]}.
+//! ```
+
+use crate::model::Law;
+
+/// On which side of the critical stiffness small limit cycles live.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Hopf {
+    /// Below it, and attracting: beyond the point the block oscillates little at first.
+    Supercritical,
+    /// Above it, and repelling: they bound the disturbances that die out, and larger ones end in stick-slip.
+    Subcritical,
+}
+
+impl Hopf {
+    /// The words that are written into tables, in the order of the kinds.
+    pub const NAMES: [&'static str; 2] = ["supercritical", "subcritical"];
+
+    /// The kind of the Hopf point of steady sliding at `v > 0` of a mass `m >= 0`. `None` where there is none (`b <= a`), or
+    /// where it is degenerate: without mass.
+    pub fn of(law: Law, m: f64, v: f64) -> Option<Hopf> {
+        let coefficient = lyapunov_coefficient(law, m, v)?;
+        Some(if coefficient < 0.0 { Hopf::Supercritical } else { Hopf::Subcritical })
+    }
+}
+
+/// The first Lyapunov coefficient `l_1` at the critical stiffness; `None` as in [`Hopf::of`].
+///
+/// Next to the point small oscillations of `ln v` have the amplitude `2 sqrt(-sigma/(omega l_1))`, `sigma` the growth rate.
+pub fn lyapunov_coefficient(law: Law, m: f64, v: f64) -> Option<f64> {
+    let mu = m * v * v / law.a;
+    let square = (law.b - law.a) / law.a;
+    if !(square > 0.0 && mu > 0.0 && mu.is_finite()) {
+        return None;
+    }
+    // Both numerator and denominator over mu^4, so that no large mu overflows.
+    let (inverse, sum) = (1.0 / mu, 1.0 + 1.0 / mu);
+    let sign = 7.0 + 4.0 * square + (6.0 - inverse) * inverse;
+    Some(-0.5 * square.sqrt() * inverse * sign / ((sum * sum + square) * (sum * sum + 4.0 * square)))
+}
+
+#[cfg(test)]
+mod tests {
+    //! The coefficient against Kuznetsov's formula, and the amplitude of limit cycles that it predicts against simulations.
+
+    use nalgebra::{Complex, Matrix3, Vector3};
+
+    use super::*;
+    use crate::model::Transition;
+    use crate::stability::SteadySliding;
+    use crate::stability::response::{Outcome, Step};
+
+    type C = Complex<f64>;
+
+    /// Kuznetsov, Elements of Applied Bifurcation Theory, (5.39), for `(z, y, x)` in the scaled variables of the response.
+    fn by_multilinear_forms(law: Law, mass: f64) -> f64 {
+        let Law { a, b } = law;
+        let k = (b - a) * (1.0 + mass / a);
+        let omega = ((k + a - b) / mass).sqrt();
+        let (one, i) = (C::new(1.0, 0.0), C::new(0.0, 1.0));
+        let jacobian = Matrix3::new(0.0, 0.0, -k, 0.0, -1.0, -1.0, 1.0 / mass, -b / mass, -a / mass).map(|x| one * x);
+        let pull = |u: &Vector3<C>| (u[0] - u[1] * b - u[2] * a) / mass;
+        let second = |u: &Vector3<C>, v: &Vector3<C>| {
+            Vector3::new(-u[2] * v[2] * k, u[1] * v[1] - u[2] * v[2], -(u[2] * pull(v) + v[2] * pull(u)))
+        };
+        let third = |u: &Vector3<C>, v: &Vector3<C>, w: &Vector3<C>| {
+            let x = u[2] * v[2] * pull(w) + u[2] * w[2] * pull(v) + v[2] * w[2] * pull(u);
+            Vector3::new(-u[2] * v[2] * w[2] * k, -u[1] * v[1] * w[1] - u[2] * v[2] * w[2], x)
+        };
+        let q = Vector3::new(i * (k / omega), -one / (one + i * omega), one);
+        let p = Vector3::new(i / (omega * mass), one * (b / mass) / (i * omega - one), one);
+        assert!((jacobian * q - q * (i * omega)).norm() < 1e-9 * q.norm() * jacobian.norm());
+        assert!((jacobian.transpose() * p + p * (i * omega)).norm() < 1e-9 * p.norm() * jacobian.norm());
+        let mirrored = q.map(|x| x.conj());
+        let solve = |matrix: Matrix3<C>, v: Vector3<C>| matrix.lu().solve(&v).expect("is regular");
+        let still = solve(jacobian, second(&q, &mirrored));
+        let double = solve(Matrix3::from_diagonal_element(i * (2.0 * omega)) - jacobian, second(&q, &q));
+        let sum = third(&q, &q, &mirrored) - second(&q, &still) * (one * 2.0) + second(&mirrored, &double);
+        (p.dotc(&sum) / p.dotc(&q)).re / (2.0 * omega)
+    }
+
+    #[test]
+    fn coefficient_is_that_of_the_multilinear_forms() {
+        for a in [0.005, 0.05] {
+            for ratio in [1.001, 1.5, 2.0, 10.0] {
+                let law = Law { a, b: ratio * a };
+                for mu in [1e-3, 0.05, 0.13, 0.14, 1.0, 30.0] {
+                    let found = lyapunov_coefficient(law, mu * a / 9.0, 3.0).expect("has a Hopf point");
+                    let expected = by_multilinear_forms(law, mu * a);
+                    assert!(
+                        (found - expected).abs() < 1e-7 * expected.abs().max(1e-3),
+                        "{law:?} {mu} {found} {expected}"
+                    );
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn kind_changes_at_its_mass() {
+        for square in [1e-6, 0.5, 1.0, 30.0_f64] {
+            let law = Law { a: 0.01, b: 0.01 * (1.0 + square) };
+            let mu = 1.0 / (3.0 + 2.0 * (4.0 + (law.b - law.a) / law.a).sqrt());
+            for (share, kind) in [(1.0 - 1e-9, Hopf::Subcritical), (1.0 + 1e-9, Hopf::Supercritical)] {
+                assert_eq!(Hopf::of(law, share * mu * law.a / 4.0, 2.0), Some(kind), "{square}");
+            }
+        }
+        assert_eq!(Hopf::of(Law { a: 0.01, b: 0.01 }, 1.0, 1.0), None);
+        assert_eq!(Hopf::of(Law { a: 0.01, b: 0.02 }, 0.0, 1.0), None);
+        assert_eq!(Hopf::of(Law { a: 0.01, b: 0.02 }, 1e300, 1e10), None);
+    }
+
+    #[test]
+    fn simulated_limit_cycles_have_the_amplitude_that_it_predicts() {
+        let law = Law { a: 0.005, b: 0.01 };
+        for v_f in [2.5e6, 3.2e6, 1e7] {
+            let m = 2.5e-16;
+            let at = |share: f64| {
+                let critical = SteadySliding::new(law, 1.0, m, v_f).critical_stiffness();
+                let k = critical * (1.0 - share);
+                let growth = SteadySliding::new(law, k, m, v_f).eigenvalues().expect("is elastic").growth_rate / v_f;
+                let omega = ((law.b - law.a) / law.a).sqrt();
+                let coefficient = lyapunov_coefficient(law, m, v_f).expect("has a Hopf point");
+                let predicted = 2.0 * (-growth / (omega * coefficient)).sqrt();
+                let transition = Transition { law, v_i: 0.99 * v_f, v_f };
+                let (_, response) = Step { transition, k, m }.respond(1e-8);
+                let response = response.expect("is followed");
+                assert_eq!(response.outcome, Outcome::LimitCycle);
+                let cycle = response.cycle.expect("is a cycle");
+                0.5 * (cycle.v_peak / cycle.v_trough).ln() / predicted - 1.0
+            };
+            // The next order of the amplitude is linear in the distance from the critical stiffness.
+            let (far, near) = (at(4e-4), at(1e-4));
+            assert!(near.abs() < 0.01 && (far / near / 4.0 - 1.0).abs() < 0.1, "{v_f} {far} {near}");
+        }
+    }
+}
