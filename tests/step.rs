@@ -6,7 +6,8 @@ mod reference;
 use slipsweep::model::{Law, Transition};
 use slipsweep::protocol::Status;
 use slipsweep::stability::SteadySliding;
-use slipsweep::stability::response::{Orbit, Outcome, Response, Step, lyapunov_coefficient};
+use slipsweep::stability::lyapunov_coefficient;
+use slipsweep::stability::response::{Orbit, Outcome, Response, Step};
 
 const PAPER: Law = Law { a: 0.005, b: 0.01 };
 const V_F: f64 = 3.2e6;

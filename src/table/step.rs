@@ -8,8 +8,8 @@ use super::optima::transition;
 use super::{Column, Job, Kind, Prediction, Selection, Sheet, Stopped, Table, Work, rows};
 use crate::grid::Quantity;
 use crate::model::Law;
-use crate::stability::SteadySliding;
-use crate::stability::response::{self, Course, Outcome, Scaled, lyapunov_coefficient};
+use crate::stability::response::{self, Course, Outcome, Scaled};
+use crate::stability::{SteadySliding, lyapunov_coefficient};
 
 /// One row a transition, stiffness and mass.
 pub struct Step;
@@ -39,7 +39,7 @@ const COLUMNS: &[Column] = &[
         "lyapunov",
         "1",
         "first Lyapunov coefficient at the critical stiffness for this mass and v_f: negative if the Hopf point is \
-         supercritical, positive if a limit cycle may be met above it; null for b <= a",
+         supercritical, positive if a limit cycle may be met above it; null for b <= a and for m = 0",
     )
     .optional(),
 ];

@@ -5,7 +5,6 @@
 //! integrated until its end is decided (`fate.rs`).
 
 mod fate;
-mod hopf;
 mod motion;
 mod orbit;
 mod slider;
@@ -16,10 +15,9 @@ use crate::protocol::Status;
 use crate::stability::SteadySliding;
 
 pub use fate::{Course, Fate, Linear, follow};
-pub use hopf::lyapunov_coefficient;
 pub use motion::Swing;
 pub use orbit::{Cycle, Extremum, Orbit, SETTLED, Seen, Stop};
-pub use slider::{Slider, State};
+pub use slider::{Slider, State, Z};
 
 /// A step of the control velocity.
 #[derive(Debug, Clone, Copy, PartialEq)]
