@@ -1,83 +1,13 @@
 //! `swift`: the family's formula with the row's `alpha`, integrated over time in the direction in which it contracts.
 
+use super::course::{Course, Formula, arriving};
 use super::extremal::solve;
-use super::gap::{Cubic, golden};
+use super::gap::Cubic;
 use super::route::integrate;
 use super::{Context, Verdict, number, transition, word};
 use crate::dataset::Row;
 use crate::model::Transition;
 use crate::table::STATUS;
-
-/// Pieces in which a protocol is integrated, and between which its extremes are looked for.
-const PIECES: usize = 256;
-
-/// What the formula of a family gives.
-enum Formula {
-    /// The velocity at a place `x = t/t_f`.
-    Velocity(Box<dyn Fn(f64) -> f64>),
-    /// The friction.
-    Friction(Box<dyn Fn(f64) -> f64>),
-}
-
-/// A protocol on its way: `ln theta`, work, place.
-type State = [f64; 3];
-
-struct Course {
-    problem: Transition,
-    t_f: f64,
-    formula: Formula,
-    backward: bool,
-}
-
-impl Course {
-    fn velocity(&self, y: &State) -> f64 {
-        let law = self.problem.law;
-        match &self.formula {
-            Formula::Velocity(velocity) => velocity(y[2]),
-            Formula::Friction(friction) => ((friction(y[2]) - 1.0 - law.b * y[0]) / law.a).exp(),
-        }
-    }
-
-    fn friction(&self, y: &State) -> f64 {
-        let law = self.problem.law;
-        match &self.formula {
-            Formula::Velocity(velocity) => 1.0 + law.a * velocity(y[2]).ln() + law.b * y[0],
-            Formula::Friction(friction) => friction(y[2]),
-        }
-    }
-
-    fn advance(&self, y: State, length: f64) -> Option<State> {
-        let sign = if self.backward { -1.0 } else { 1.0 };
-        let slope = |y: &State| {
-            let v = self.velocity(y);
-            [sign * self.t_f * ((-y[0]).exp() - v), self.t_f * self.friction(y) * v, sign]
-        };
-        integrate(slope, y, (0.0, length))
-    }
-
-    /// The states between the pieces, in the direction of integration.
-    fn states(&self) -> Option<Vec<State>> {
-        let (v, x) = if self.backward { (self.problem.v_f, 1.0) } else { (self.problem.v_i, 0.0) };
-        let mut states = vec![[-v.ln(), 0.0, x]];
-        for _ in 0..PIECES {
-            states.push(self.advance(*states.last()?, 1.0 / PIECES as f64)?);
-        }
-        Some(states)
-    }
-
-    /// The least value of `f` along the way.
-    fn least(&self, states: &[State], f: impl Fn(&State) -> f64) -> f64 {
-        let values = states.iter().enumerate().map(|(i, y)| (i, f(y)));
-        let (place, least) = values.min_by(|a, b| a.1.total_cmp(&b.1)).unwrap_or((0, f64::NAN));
-        let at = |s: f64| {
-            let piece = (s as usize).min(PIECES - 1);
-            let state = self.advance(states[piece], (s - piece as f64) / PIECES as f64);
-            state.map_or(f64::INFINITY, |y| f(&y))
-        };
-        let (low, high) = (place.saturating_sub(1), (place + 1).min(PIECES));
-        golden(&at, low as f64, high as f64).min(least)
-    }
-}
 
 pub fn check(row: &Row, context: &Context) -> Verdict {
     let (Some(problem), Some(t_f), Some(family)) = (transition(row), number(row, "t_f"), word(row, "family")) else {
@@ -115,14 +45,11 @@ pub fn check(row: &Row, context: &Context) -> Verdict {
         verdict.unchecked = Some("the integrator did not get there");
         return verdict;
     };
-    let end = states[PIECES];
-    let target = -(if course_here.backward { problem.v_i } else { problem.v_f }).ln();
+    let Some(end) = states.last() else { return verdict };
+    let target = course_here.target();
     match alpha {
         Some(alpha) if alpha != 0.0 => {
-            // How far alpha would have to be moved for theta to arrive.
-            let moved = course(alpha * (1.0 + 1e-6)).states().map(|states| states[PIECES][0] - end[0]);
-            let share = moved.map_or(f64::INFINITY, |moved| 1e-6 * (end[0] - target) / moved);
-            verdict.compare(row, "alpha", Some(alpha * (1.0 - share)), None);
+            verdict.compare(row, "alpha", Some(arriving(alpha, end[0], target, course)), None);
         }
         Some(_) => verdict.compare(row, "alpha", Some(0.0), None),
         None if family == "cubic" => verdict.differences.push(("arrival", (end[0] - target).abs())),
