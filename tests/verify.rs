@@ -98,7 +98,7 @@ fn a_planted_error_is_found_and_named() {
         assert_eq!(output.status.code(), Some(3), "{table}.{column}: {}", text(&output));
         let text = text(&output);
         let section = text.split("\n\n").find(|section| section.starts_with(table)).expect("has a section");
-        assert!(section.contains(&format!("    row {row}: ")), "{table}.{column}: {section}");
+        assert!(section.contains(&format!("row {row}: ")), "{table}.{column}: {section}");
         let line = section.lines().map(|line| line.split_whitespace().collect::<Vec<_>>());
         let line = line.into_iter().find(|cells| cells.first() == Some(&column)).expect("has the column");
         assert!(line[4].parse::<f64>().is_ok_and(|greatest| greatest > 10.0), "{table}.{column}: {section}");

@@ -34,10 +34,22 @@ pub fn verify(arguments: &Arguments) -> Result<(), Failure> {
     say(&text.join("\n"))?;
     let errors: usize = audits.iter().map(Audit::errors).sum();
     if errors > 0 {
-        let message = format!("error: {} beyond {LIMIT} rtol", words::things(errors as u64, "number"));
+        let message = format!(
+            "error: {} beyond {LIMIT} rtol\n  help: the rows are listed above; a part that was changed is made again if its file is \
+             deleted and the sweep run",
+            words::things(errors as u64, "number")
+        );
         return Err(Failure { code: NOT_STRICT, message });
     }
     Ok(())
+}
+
+/// Columns whose worst row is shown where none fails.
+const FEWEST: usize = 2;
+
+/// A difference in units of rtol.
+fn units(value: f64) -> String {
+    if value < 1e5 { format!("{value:.3}") } else { format!("{value:.1e}") }
 }
 
 fn summary(audit: &Audit) -> String {
@@ -46,16 +58,18 @@ fn summary(audit: &Audit) -> String {
     let mut lines = Vec::new();
     for (column, all) in &audit.columns {
         let at = |share: f64| all.get(((all.len() - 1) as f64 * share).ceil() as usize).copied().unwrap_or(f64::NAN);
-        let cells = [at(0.5), at(0.99), at(1.0)].map(|value| format!("{value:.3}"));
+        let cells = [at(0.5), at(0.99), at(1.0)].map(units);
         lines.push([(*column).to_owned(), words::count(all.len() as u64)].into_iter().chain(cells).collect());
     }
     if !lines.is_empty() {
         lines.insert(0, ["difference/rtol", "rows", "median", "99 %", "greatest"].map(str::to_owned).to_vec());
         text.push_str(&words::aligned(&lines, 2));
-        text.push_str("  worst rows:\n");
     }
-    for (number, difference, column, row) in &audit.worst {
-        let cells: Vec<String> = row
+    // Every column that fails, or else the ones that come closest to it.
+    let failing = audit.worst.iter().filter(|worst| worst.difference > LIMIT).count();
+    for worst in audit.worst.iter().take(failing.max(FEWEST)) {
+        let cells: Vec<String> = worst
+            .row
             .iter()
             .map(|(name, cell)| match cell {
                 Cell::Number(value) => format!("{name} = {value:?}"),
@@ -63,7 +77,12 @@ fn summary(audit: &Audit) -> String {
                 Cell::Missing => format!("{name} = -"),
             })
             .collect();
-        text.push_str(&format!("    row {number}: {column} {difference:.3}; {}\n", cells.join(", ")));
+        let (column, difference, expected) = (worst.column, units(worst.difference), &worst.expected);
+        text.push_str(&format!(
+            "  row {}: {column} differs by {difference} rtol, the check has {expected}\n    {}\n",
+            worst.number,
+            cells.join(", ")
+        ));
     }
     for (reason, rows) in &audit.unchecked {
         text.push_str(&format!("  not checked in {}: {reason}\n", words::things(*rows, "row")));

@@ -182,9 +182,9 @@ const ENDLESS: f64 = 1e3;
 
 /// The optimum of this duration, and the works of admissible variations of it.
 pub fn solve_with(problem: &Transition, t_f: f64, bounded: bool, sizes: &[f64]) -> Option<(Extremal, Vec<f64>)> {
-    let (extremal, p) = find(problem, t_f, bounded)?;
+    let (extremal, member) = find(problem, t_f, bounded)?;
     let works = sizes.iter().flat_map(|&size| [1.0, 2.0, 3.0].map(|k| Variation { size, k, t_f, bounded }));
-    let works = works.filter_map(|variation| at(problem, p, bounded, Some(&variation))?.varied).collect();
+    let works = works.filter_map(|variation| at(problem, member, bounded, Some(&variation))?.varied).collect();
     Some((extremal, works))
 }
 
@@ -193,20 +193,54 @@ pub fn solve(problem: &Transition, t_f: f64, bounded: bool) -> Option<Extremal> 
     find(problem, t_f, bounded).map(|(extremal, _)| extremal)
 }
 
-/// A member of the family of extremals; time rises with the parameter, which is `-z` at the start of an acceleration and
-/// `z` at the end of a deceleration.
-fn at(problem: &Transition, p: f64, bounded: bool, variation: Option<&Variation>) -> Option<Extremal> {
-    if problem.v_f > problem.v_i {
-        from_start(problem, -p, bounded, variation)
-    } else {
-        from_end(problem, p, bounded, variation)
+/// A member of the family of extremals, by the parameter with which time rises.
+#[derive(Debug, Clone, Copy)]
+enum Member {
+    /// `-z` at the start of an acceleration.
+    Start(f64),
+    /// `z` at the end of a deceleration.
+    End(f64),
+    /// How long it holds before theta falls.
+    Held(f64),
+}
+
+fn at(problem: &Transition, member: Member, bounded: bool, variation: Option<&Variation>) -> Option<Extremal> {
+    match member {
+        Member::Start(p) => from_start(problem, -p, bounded, variation),
+        Member::End(p) => from_end(problem, p, bounded, variation),
+        Member::Held(time) => {
+            let theta = held(problem.v_i, time);
+            arc(problem, time, theta, theta.ln(), true, variation)
+        }
     }
 }
 
-/// The optimum of this duration and its parameter.
-fn find(problem: &Transition, t_f: f64, bounded: bool) -> Option<(Extremal, f64)> {
+/// A hold that takes this long brings theta so close to 1 that the end does not tell it any more.
+const LONG: f64 = 12.0;
+
+/// The optimum of a long duration: what comes after the hold hardly depends on it.
+fn find_held(problem: &Transition, t_f: f64) -> Option<(Extremal, Member)> {
+    let mut hold = t_f;
+    for _ in 0..50 {
+        let member = Member::Held(hold);
+        let extremal = at(problem, member, true, None)?;
+        let next = t_f - (extremal.time - hold);
+        if (next - hold).abs() <= 4.0 * f64::EPSILON * t_f {
+            return Some((extremal, member));
+        }
+        hold = next;
+    }
+    None
+}
+
+/// The optimum of this duration, and which member it is.
+fn find(problem: &Transition, t_f: f64, bounded: bool) -> Option<(Extremal, Member)> {
     let accelerates = problem.v_f > problem.v_i;
-    let at = |p: f64| at(problem, p, bounded, None);
+    if bounded && t_f > LONG + least_time(problem) {
+        return find_held(problem, t_f);
+    }
+    let member = |p: f64| if accelerates { Member::Start(p) } else { Member::End(p) };
+    let at = |p: f64| at(problem, member(p), bounded, None);
     // Towards long times a deceleration has a last parameter, at which the hold never ends.
     let excess = |p: f64| match at(p) {
         Some(extremal) => Some((extremal.time / t_f).ln()),
@@ -241,8 +275,12 @@ fn find(problem: &Transition, t_f: f64, bounded: bool) -> Option<(Extremal, f64)
             continue;
         };
         let f = (extremal.time / t_f).ln();
-        if f.abs() <= 1e-12 || high - low <= 1e-15 * (1.0 + p.abs()) {
-            return Some((extremal, p));
+        if f.abs() <= 1e-12 {
+            return Some((extremal, member(p)));
+        }
+        if high - low <= 1e-15 * (1.0 + p.abs()) {
+            // As close as the parameter goes, if that is close.
+            return (f.abs() <= 1e-9).then_some((extremal, member(p)));
         }
         if f > 0.0 {
             (high, f_high) = (p, f);

@@ -34,13 +34,27 @@ struct Context {
 /// What a check found in one row.
 #[derive(Debug, Default)]
 struct Verdict {
-    /// Column and relative difference of each number compared; infinite where only one route has a number.
-    differences: Vec<(&'static str, f64)>,
+    differences: Vec<Difference>,
     /// What could not be checked, and why.
     unchecked: Option<&'static str>,
 }
 
+/// One comparison.
+#[derive(Debug)]
+struct Difference {
+    column: &'static str,
+    /// Relative difference; infinite where only one route has a number.
+    size: f64,
+    /// What the independent route has, in words.
+    expected: String,
+}
+
 impl Verdict {
+    /// Notes a relative difference that has no counterpart in the row.
+    fn push(&mut self, column: &'static str, size: f64) {
+        self.differences.push(Difference { column, size, expected: "0".to_owned() });
+    }
+
     fn unchecked(reason: &'static str) -> Verdict {
         Verdict { unchecked: Some(reason), ..Verdict::default() }
     }
@@ -59,18 +73,23 @@ impl Verdict {
             _ => f64::INFINITY,
         };
         // A number that cannot be compared is an error, not an agreement.
-        self.differences.push((column, if difference.is_nan() { f64::INFINITY } else { difference }));
+        let size = if difference.is_nan() { f64::INFINITY } else { difference };
+        let expected = expected.map_or_else(|| "nothing".to_owned(), |expected| format!("{expected:?}"));
+        self.differences.push(Difference { column, size, expected });
     }
 
     fn compare_word(&mut self, row: &Row, column: &'static str, expected: &str) {
         let Some((_, cell)) = row.iter().find(|(name, _)| name == column) else { return };
         let wrong = !matches!(cell, Cell::Word(found) if found == expected);
-        self.differences.push((column, if wrong { f64::INFINITY } else { 0.0 }));
+        let size = if wrong { f64::INFINITY } else { 0.0 };
+        self.differences.push(Difference { column, size, expected: expected.to_owned() });
     }
 
     fn status(&mut self, row: &Row, expected: bool) {
         let wrong = word(row, STATUS).is_none_or(|status| (status == "infeasible") != expected);
-        self.differences.push((STATUS, if wrong { f64::INFINITY } else { 0.0 }));
+        let size = if wrong { f64::INFINITY } else { 0.0 };
+        let expected = if expected { "infeasible" } else { "not infeasible" }.to_owned();
+        self.differences.push(Difference { column: STATUS, size, expected });
     }
 }
 
@@ -85,19 +104,31 @@ pub struct Audit {
     pub rows: usize,
     /// Differences of each column in units of rtol, ascending.
     pub columns: Vec<(&'static str, Vec<f64>)>,
-    /// The rows with the greatest differences, worst first: number, difference, column, cells.
-    pub worst: Vec<(u64, f64, &'static str, Row)>,
+    /// For each column the row with the greatest difference, worst first.
+    pub worst: Vec<Worst>,
     /// Rows that were not checked, by reason.
     pub unchecked: Vec<(&'static str, u64)>,
+}
+
+/// The greatest difference in a column.
+#[derive(Debug)]
+pub struct Worst {
+    /// The column.
+    pub column: &'static str,
+    /// In units of rtol.
+    pub difference: f64,
+    /// What the independent route has.
+    pub expected: String,
+    /// Number of the row.
+    pub number: u64,
+    /// Its cells.
+    pub row: Row,
 }
 
 /// Why a dataset cannot be audited.
 #[derive(Debug, thiserror::Error)]
 #[error("{0}")]
 pub struct VerifyError(String);
-
-/// Most rows named a table.
-const WORST: usize = 5;
 
 /// Audits `sample` rows of every table of the dataset in `path`.
 pub fn verify(path: &Path, manifest: &Manifest, sample: u64, seed: u64) -> Result<Vec<Audit>, VerifyError> {
@@ -142,8 +173,7 @@ pub fn verify(path: &Path, manifest: &Manifest, sample: u64, seed: u64) -> Resul
             audit.add(number, row, verdict);
         }
         audit.columns.iter_mut().for_each(|(_, differences)| differences.sort_by(f64::total_cmp));
-        audit.worst.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));
-        audit.worst.truncate(WORST);
+        audit.worst.sort_by(|a, b| b.difference.total_cmp(&a.difference).then(a.number.cmp(&b.number)));
         audits.push(audit);
     }
     Ok(audits)
@@ -157,19 +187,18 @@ impl Audit {
                 None => self.unchecked.push((reason, 1)),
             }
         }
-        let mut worst: Option<(f64, &'static str)> = None;
-        for (column, difference) in verdict.differences {
-            let difference = difference / self.rtol;
+        for Difference { column, size, expected } in verdict.differences {
+            let difference = size / self.rtol;
             match self.columns.iter_mut().find(|(known, _)| *known == column) {
                 Some((_, all)) => all.push(difference),
                 None => self.columns.push((column, vec![difference])),
             }
-            if worst.is_none_or(|(greatest, _)| difference > greatest) {
-                worst = Some((difference, column));
+            let worst = Worst { column, difference, expected, number, row: row.clone() };
+            match self.worst.iter_mut().find(|known| known.column == column) {
+                Some(known) if difference > known.difference => *known = worst,
+                Some(_) => {}
+                None => self.worst.push(worst),
             }
-        }
-        if let Some((difference, column)) = worst {
-            self.worst.push((number, difference, column, row));
         }
     }
 

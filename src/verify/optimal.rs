@@ -37,7 +37,7 @@ pub fn check(row: &Row, context: &Context) -> Verdict {
     verdict.compare_word(row, "strategy", strategy);
     // No admissible variation may cost less.
     if let (Some(work), Some(least)) = (number(row, "work"), varied.into_iter().reduce(f64::min)) {
-        verdict.differences.push(("beaten", ((work - least) / size).max(0.0)));
+        verdict.push("beaten", ((work - least) / size).max(0.0));
     }
     verdict
 }

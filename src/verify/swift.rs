@@ -52,7 +52,7 @@ pub fn check(row: &Row, context: &Context) -> Verdict {
             verdict.compare(row, "alpha", Some(arriving(alpha, end[0], target, course)), None);
         }
         Some(_) => verdict.compare(row, "alpha", Some(0.0), None),
-        None if family == "cubic" => verdict.differences.push(("arrival", (end[0] - target).abs())),
+        None if family == "cubic" => verdict.push("arrival", (end[0] - target).abs()),
         None => {}
     }
     verdict.compare(row, "end_error", Some((end[0] - target).exp_m1()), Some(1.0));
