@@ -140,6 +140,19 @@ fn windows_and_missing_members_are_decided_again() {
     }
 }
 
+/// What a run has finished before it was stopped can be audited.
+#[test]
+fn the_parts_that_are_there_are_audited() {
+    let folder = tempfile::tempdir().expect("is writable");
+    let axes = "t_f = [0.02, 0.03, 0.037]\na = 0.03\nb = 0.05\nv_i = 3.0\nv_f = 100.0\n\
+                alpha_2 = { linspace = [-0.2, 0.2, 500], unit = \"1/t_f\" }\nalpha_3 = { linspace = [0.0, 0.1, 500] }\n";
+    run(&sweep(folder.path(), axes, "[tables.gap]\n"), folder.path(), 2);
+    fs::remove_file(Folder::new(folder.path(), "test").part("gap", 1)).expect("is there");
+    let output = verify(folder.path(), &["--sample", "30"]);
+    assert_eq!(output.status.code(), Some(0), "{}", text(&output));
+    assert!(text(&output).contains("their part is missing"), "{}", text(&output));
+}
+
 #[test]
 fn what_is_no_dataset_is_told() {
     let folder = tempfile::tempdir().expect("is writable");

@@ -40,7 +40,12 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let start = Instant::now();
     let threads = arguments.threads.map_or(0, usize::from);
     let (done, caught) = watched(&signal, rows, arguments.quiet, || sweep::run(&sweep, &folder, threads, &signal));
-    let outcome = done.map_err(|error| explain(error, caught, arguments))?;
+    let outcome = done.map_err(|error| {
+        let parts =
+            plan.tables.iter().flat_map(|table| (0..table.parts).map(|part| folder.has_part(&table.name, part)));
+        let (there, all) = parts.fold((0, 0), |(there, all), is| (there + u64::from(is), all + 1));
+        explain(error, caught, arguments, (there, all))
+    })?;
     let seconds = start.elapsed().as_secs_f64();
 
     if arguments.quiet && !arguments.strict {
@@ -73,11 +78,15 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     Ok(())
 }
 
-fn explain(error: RunError, caught: Option<i32>, arguments: &Arguments) -> Failure {
+fn explain(error: RunError, caught: Option<i32>, arguments: &Arguments, (there, all): (u64, u64)) -> Failure {
     match error {
         RunError::Stopped(_) => Failure {
             code: caught.and_then(|number| u8::try_from(128 + number).ok()).unwrap_or(FAILED),
-            message: "stopped; finished parts are kept, and the same command goes on from there".to_owned(),
+            message: format!(
+                "stopped; {} of {} finished: the same command goes on from there",
+                words::count(there),
+                words::things(all, "part")
+            ),
         },
         RunError::Dataset(DatasetError::Foreign { .. } | DatasetError::Occupied { .. }) => {
             Failure { code: WRONG, message: format!("error: {error}") }
@@ -99,7 +108,9 @@ fn summary(name: &str, rows: u64, digest: &Digest) -> String {
         .collect();
     let mut text = format!("{name}: {} ({})\n", words::things(rows, "row"), counts.join(", "));
     if !digest.least.is_empty() && digest.rows.is_none() {
-        text.push_str("  least gap among the rows that are ok:\n");
+        // A family may hold protocols that miss the final state, with any work.
+        let arriving = if name == "swift" { " and arrive" } else { "" };
+        text.push_str(&format!("  least gap among the rows that are ok{arriving}:\n"));
         text.push_str(&listing(&digest.least));
     }
     match &digest.rows {

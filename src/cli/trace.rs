@@ -46,13 +46,16 @@ pub struct Arguments {
     /// Coefficient of t^2 in theta, in units of 1/t_f^2 (free_cubic)
     #[arg(long, value_name = "Y", value_parser = |text: &str| legal(text, Quantity::Alpha3.domain()))]
     alpha_3: Option<f64>,
-    /// Stiffness of the spring, in mu_0 sigma/l; rigid by default (compliant; step, which then is the response to a jump of v_c)
+    /// Stiffness of the spring, in mu_0 sigma/l; rigid by default (compliant, regularised; step, which then is the response to a jump of v_c)
     #[arg(long, value_name = "K", value_parser = |text: &str| legal(text, Quantity::Stiffness.domain()))]
     k: Option<f64>,
-    /// Mass of the block, in mu_0 sigma l/v_0^2; 0 by default (step, compliant)
+    /// Mass of the block, in mu_0 sigma l/v_0^2; 0 by default (step, compliant, regularised)
     #[arg(long, value_name = "M", value_parser = |text: &str| legal(text, Quantity::Mass.domain()))]
     m: Option<f64>,
-    /// Without the bound v >= 1 (optimal, best)
+    /// Length of the smooth pieces, in l/v_0 (regularised)
+    #[arg(long, value_name = "D", value_parser = |text: &str| legal(text, Quantity::Smoothing.domain()))]
+    delta_t: Option<f64>,
+    /// Without the bound v >= 1 (optimal, best, regularised)
     #[arg(long)]
     unbounded: bool,
     /// Relative accuracy of the solution
@@ -65,7 +68,7 @@ pub struct Arguments {
     #[arg(long)]
     format: Option<Format>,
     /// Where to write it; - is standard output
-    #[arg(long, value_name = "FILE", default_value = "-", hide_default_value = true)]
+    #[arg(short, long, value_name = "FILE", default_value = "-", hide_default_value = true)]
     out: PathBuf,
 }
 
@@ -134,8 +137,8 @@ impl Arguments {
     }
 
     fn format(&self) -> Result<Format, Failure> {
-        let ending = self.out.extension().and_then(|ending| ending.to_str());
-        let format = match (self.format, ending) {
+        let ending = self.out.extension().map(|ending| ending.to_string_lossy().to_lowercase());
+        let format = match (self.format, ending.as_deref()) {
             (Some(format), _) => format,
             (None, Some("csv")) => Format::Csv,
             (None, Some("parquet")) => Format::Parquet,
@@ -160,9 +163,10 @@ impl Arguments {
             ("--tau-max", self.tau_max.is_some(), family.is_some_and(|family| family.heeds_tau_max()), false),
             ("--alpha-2", self.alpha_2.is_some(), name == "free_cubic", true),
             ("--alpha-3", self.alpha_3.is_some(), name == "free_cubic", true),
-            ("--k", self.k.is_some(), matches!(name, "step" | "compliant"), false),
-            ("--m", self.m.is_some(), matches!(name, "step" | "compliant"), false),
-            ("--unbounded", self.unbounded, matches!(name, "optimal" | "best"), false),
+            ("--k", self.k.is_some(), matches!(name, "step" | "compliant" | "regularised"), false),
+            ("--m", self.m.is_some(), matches!(name, "step" | "compliant" | "regularised"), false),
+            ("--delta-t", self.delta_t.is_some(), name == "regularised", true),
+            ("--unbounded", self.unbounded, matches!(name, "optimal" | "best" | "regularised"), false),
         ];
         for (flag, is_given, is_heeded, is_needed) in given {
             if is_given && !is_heeded {
@@ -178,6 +182,7 @@ impl Arguments {
             ("optimal", ..) => Protocol::Optimal { bounded },
             ("best", ..) => Protocol::Best { bounded },
             ("compliant", ..) => Protocol::Compliant { k, m },
+            ("regularised", ..) => Protocol::Regularised { k, m, delta_t: self.delta_t.unwrap_or(f64::NAN), bounded },
             ("step", ..) if k.is_finite() && self.v_i != self.v_f => Protocol::Response { k, m },
             (_, Some(a_2), Some(a_3), _) => Protocol::FreeCubic { a_2, a_3 },
             (.., Some(family)) => Protocol::Family(family),
@@ -196,7 +201,7 @@ impl Arguments {
     /// What was asked for, number by number.
     fn numbers(&self) -> Vec<(&'static str, f64)> {
         let mut numbers = vec![("t_f", self.t_f), ("a", self.a), ("b", self.b), ("v_i", self.v_i), ("v_f", self.v_f)];
-        for (name, given) in [("tau_max", self.tau_max), ("k", self.k), ("m", self.m)] {
+        for (name, given) in [("tau_max", self.tau_max), ("k", self.k), ("m", self.m), ("delta_t", self.delta_t)] {
             numbers.extend(given.map(|value| (name, value)));
         }
         numbers
@@ -237,6 +242,7 @@ fn header(arguments: &Arguments, protocol: &Protocol, course: &Course, trace: &T
 fn status(status: Status) -> String {
     let meaning = match status {
         Status::BelowBound => ": v < 1 somewhere, outside the range of the friction law",
+        Status::Infeasible => ": no protocol with v >= 1 arrives in this time",
         Status::Nonphysical => ": friction is so low that the extremal need not be the only one",
         _ => "",
     };
@@ -279,7 +285,7 @@ fn facts(arguments: &Arguments, course: &Course, trace: &Trace) -> Vec<(String, 
     for (name, value) in [("work", course.work), ("v_min", trace.v_min), ("v_max", trace.v_max)] {
         number(name, value);
     }
-    if matches!(arguments.protocol.as_str(), "optimal" | "best") {
+    if matches!(arguments.protocol.as_str(), "optimal" | "best" | "regularised") {
         facts.push(("velocity_bound".to_owned(), (!arguments.unbounded).to_string()));
     }
     if let Some(points) = arguments.points {

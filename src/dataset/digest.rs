@@ -10,6 +10,7 @@ use polars::prelude::{DataFrame, Float64Chunked, NewChunkedArray, ParquetReader,
 use super::folder::{Folder, ManifestTable};
 use crate::grid::{Point, Quantity};
 use crate::protocol::Status;
+use crate::protocol::swift::FAMILIES;
 use crate::table::{self, Column, Kind, OPTIMUM_AXES, Prediction, STATUS};
 
 /// Tables of at most this many rows are kept whole, and least values are told apart for at most this many transitions.
@@ -31,7 +32,7 @@ pub struct Digest {
     pub predicted: Vec<(&'static str, String, u64)>,
     /// All rows, if they are few.
     pub rows: Option<Vec<Row>>,
-    /// The row of least `gap` with status `ok` of each transition and time, or the least of all if those are many.
+    /// The row of least `gap` with status `ok`, of a protocol that arrives, of each transition and time, or the least of all if those are many.
     pub least: Vec<Row>,
 }
 
@@ -269,13 +270,17 @@ impl Least {
         let ok = |code| status.get_mapping().cat_to_str(code) == Some(Status::Ok.name());
         let axes = keys.iter().map(|axis| numbers(frame, *axis)).collect::<Result<Vec<_>, _>>()?;
         let axes = axes.iter().map(|axis| axis.cont_slice()).collect::<Result<Vec<_>, _>>()?;
+        let family = keys.iter().position(|key| *key == Quantity::Family);
+        let arrives = |index: usize| {
+            family.is_none_or(|key| FAMILIES.get(axes[key][index] as usize).is_none_or(|family| family.arrives()))
+        };
         // Within a part: the row of the least gap of each tuple, tuples in the order in which they come.
         let mut found: Vec<(usize, f64)> = Vec::new();
         let mut current = 0;
         let same = |a: usize, b: usize| axes.iter().all(|axis| axis[a].to_bits() == axis[b].to_bits());
         for (index, (gap, code)) in gaps.iter().zip(codes.iter()).enumerate() {
             let (Some(gap), Some(code)) = (gap, code) else { continue };
-            if !ok(code) {
+            if !ok(code) || !arrives(index) {
                 continue;
             }
             if found.get(current).is_none_or(|(other, _)| !same(*other, index)) {

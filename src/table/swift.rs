@@ -26,7 +26,7 @@ const COLUMNS: &[Column] = &[
     Column::number("work", "mu_0 sigma l", "work of friction W_s"),
     Column::number("work_optimal", "mu_0 sigma l", "least work of friction W* of any protocol"),
     Column::number("gap", "1", "(W_s - W*)/W*, good to rtol of 1; below 0 for a step that has not arrived"),
-    Column::number("v_min", "v_0", "least velocity between the ends"),
+    Column::number("v_min", "v_0", "least velocity between the ends; 0 below the range of doubles"),
     Column::number("v_max", "v_0", "greatest velocity between the ends"),
     Column::number("friction_max", "mu_0 sigma", "greatest friction between the ends"),
     Column::number("end_error", "1", "theta(t_f) v_f - 1: how far from its target a step is; 0 for the other families")

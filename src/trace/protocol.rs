@@ -5,7 +5,7 @@ use std::fmt;
 use crate::model::Transition;
 use crate::protocol::cubic::{Landscape, Shortcuts};
 use crate::protocol::swift::{Case, FAMILIES, Family, Obstacle};
-use crate::protocol::{Effort, Motion, Slider, Status, best, compliant, optimal};
+use crate::protocol::{Effort, Motion, Slider, Status, best, compliant, optimal, regularised};
 use crate::stability::response::Step;
 
 /// A protocol, and the spring that drives it where that is elastic.
@@ -44,6 +44,17 @@ pub enum Protocol {
         /// Mass of the block.
         m: f64,
     },
+    /// The optimal protocol with its jumps made smooth, on a spring.
+    Regularised {
+        /// Stiffness of the spring.
+        k: f64,
+        /// Mass of the block.
+        m: f64,
+        /// Length of the smooth pieces.
+        delta_t: f64,
+        /// Whether the optimum keeps `v >= 1`.
+        bounded: bool,
+    },
 }
 
 /// Names and meanings of all protocols: first those that are no family, then [`FAMILIES`], then those on a spring.
@@ -53,7 +64,10 @@ pub fn names() -> impl Iterator<Item = (&'static str, &'static str)> {
         ("best", "least work of all free cubics"),
         ("free_cubic", "theta a cubic in time with alpha_2 and alpha_3 given; v may jump at both ends"),
     ];
-    let elastic = [("compliant", "v, v' and v'' continuous, so that an elastic spring can drive it; with its v_c")];
+    let elastic = [
+        ("compliant", "v, v' and v'' continuous, so that an elastic spring can drive it; with its v_c"),
+        ("regularised", "the optimal protocol, its jumps made smooth in pieces of length delta_t; with its v_c"),
+    ];
     others.into_iter().chain(FAMILIES.into_iter().map(|family| (family.name(), family.doc()))).chain(elastic)
 }
 
@@ -90,6 +104,8 @@ pub enum Absence {
     },
     /// The least work of all cubic shortcuts is approached at the border `v = 0`, not attained.
     Border,
+    /// The smooth pieces do not fit.
+    Pieces,
     /// The velocity becomes infinite, or oscillates too often to be shown.
     Response,
     /// Friction is so low somewhere that the extremal need not be unique, and none was found.
@@ -115,6 +131,9 @@ impl fmt::Display for Absence {
             Absence::Border => f.write_str(
                 "the least work is only approached, as v falls to 0 somewhere; with the bound v >= 1 it is attained",
             ),
+            Absence::Pieces => {
+                f.write_str("two pieces of length delta_t must fit into t_f, and v stay well above 0 in them")
+            }
             Absence::Response => f.write_str(
                 "before t_f the velocity becomes infinite, or there are more oscillations than can be shown",
             ),
@@ -151,6 +170,7 @@ impl Protocol {
             Protocol::Family(family) => member(family, case, rtol),
             Protocol::Response { k, m } => response(case, k, m, rtol),
             Protocol::Compliant { k, m } => smooth(case, k, m, rtol),
+            Protocol::Regularised { k, m, delta_t, bounded } => pieced(case, (k, m), delta_t, bounded, rtol),
         }
     }
 }
@@ -241,13 +261,35 @@ fn smooth(case: &Case, k: f64, m: f64, rtol: f64) -> Result<Course, Absence> {
     Ok(Course { motion: Box::new(path), status: solved.status, work: value.work, parameters })
 }
 
+fn pieced(case: &Case, (k, m): (f64, f64), delta_t: f64, bounded: bool, rtol: f64) -> Result<Course, Absence> {
+    let Case { transition: Transition { law, v_i, v_f }, t_f, .. } = *case;
+    let (solved, motion) = regularised::motion(&Slider { law, k, m }, (v_i, v_f), t_f, delta_t, bounded, rtol);
+    let (Some(value), Some(motion)) = (solved.value, motion) else {
+        let optimum = optimal::solve(&case.transition, t_f, bounded, rtol);
+        return Err(match solved.status {
+            _ if optimum.value.is_none() => without_optimum(case, bounded, optimum.status),
+            Status::Infeasible => Absence::Pieces,
+            _ => Obstacle::NotConverged.into(),
+        });
+    };
+    let parameters = vec![
+        ("gap", value.gap, "(work - W*)/W*"),
+        ("v_c_min", value.control_min, "least control velocity"),
+        ("v_c_max", value.control_max, "greatest control velocity"),
+    ];
+    Ok(Course { motion, status: solved.status, work: value.work, parameters })
+}
+
 fn member(family: &dyn Family, case: &Case, rtol: f64) -> Result<Course, Absence> {
     let swift = family.solve(case, rtol, &mut Effort::default())?;
     let motion = family.motion(case, rtol)?;
+    // A step takes any time, but where no protocol arrives it is not counted either.
+    let late = case.t_f < case.transition.least_time();
+    let status = if late { Status::Infeasible } else { swift.status() };
     let mut parameters: Vec<_> =
         swift.alpha.into_iter().zip(family.alpha()).map(|(alpha, meaning)| ("alpha", alpha, meaning)).collect();
     if swift.miss != 0.0 {
         parameters.push(("miss", swift.miss, "distance from the target, theta(t_f) v_f - 1"));
     }
-    Ok(Course { motion, status: swift.status(), work: swift.work, parameters })
+    Ok(Course { motion, status, work: swift.work, parameters })
 }

@@ -149,7 +149,7 @@ pub fn verify(path: &Path, manifest: &Manifest, sample: u64, seed: u64) -> Resul
         let own = spec.tables.get(&table.name).and_then(|table| table.rtol);
         let rtol = own.or(table::find(&table.name).and_then(|table| table.default_rtol()));
         let rtol = rtol.unwrap_or(spec.accuracy.rtol);
-        let rows = sample::rows(&folder, table, sample, seed).map_err(VerifyError)?;
+        let (rows, missing) = sample::rows(&folder, table, sample, seed).map_err(VerifyError)?;
         let mut audit = Audit {
             table: table.name.clone(),
             rtol,
@@ -171,6 +171,11 @@ pub fn verify(path: &Path, manifest: &Manifest, sample: u64, seed: u64) -> Resul
                 _ => Verdict::unchecked("there is no independent route for this table"),
             };
             audit.add(number, row, verdict);
+        }
+        if missing > 0 {
+            audit
+                .unchecked
+                .push(("their part is missing; running the sweep again makes only what is missing", missing));
         }
         audit.columns.iter_mut().for_each(|(_, differences)| differences.sort_by(f64::total_cmp));
         audit.worst.sort_by(|a, b| b.difference.total_cmp(&a.difference).then(a.number.cmp(&b.number)));

@@ -30,28 +30,33 @@ fn choose(rows: u64, count: u64, seed: u64) -> BTreeSet<u64> {
     chosen
 }
 
-/// The rows of the sample with their global numbers.
-pub fn rows(folder: &Folder, table: &ManifestTable, count: u64, seed: u64) -> Result<Vec<(u64, Row)>, String> {
+/// The rows of the sample that are there, with their global numbers, and how many belong to parts that are missing.
+pub fn rows(folder: &Folder, table: &ManifestTable, count: u64, seed: u64) -> Result<(Vec<(u64, Row)>, u64), String> {
     let chosen = choose(table.rows, count, seed);
-    let mut found = Vec::new();
+    let (mut found, mut missing, mut first_missing) = (Vec::new(), 0, None);
     for part in 0..table.parts {
         let range = table.rows_of(part);
         let inside: Vec<u64> = chosen.range(range.clone()).map(|row| row - range.start).collect();
         let path = folder.part(&table.name, part);
-        if !path.is_file() {
-            return Err(format!(
-                "{}: part is missing\n  help: run the sweep again, which makes only what is missing",
-                path.display()
-            ));
-        }
         if inside.is_empty() {
+            continue;
+        }
+        if !path.is_file() {
+            missing += inside.len() as u64;
+            first_missing.get_or_insert(path);
             continue;
         }
         let cells = read(&path, &inside, range.end - range.start)
             .map_err(|error| format!("{}: cannot read: {error}", path.display()))?;
         found.extend(inside.iter().map(|row| row + range.start).zip(cells));
     }
-    Ok(found)
+    match first_missing {
+        Some(path) if found.is_empty() => Err(format!(
+            "{}: part is missing\n  help: run the sweep again, which makes only what is missing",
+            path.display()
+        )),
+        _ => Ok((found, missing)),
+    }
 }
 
 fn read(path: &Path, rows: &[u64], expected: u64) -> Result<Vec<Row>, PolarsError> {

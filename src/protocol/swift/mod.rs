@@ -129,6 +129,11 @@ pub trait Family: Sync {
         false
     }
 
+    /// Whether its members arrive at the final state.
+    fn arrives(&self) -> bool {
+        true
+    }
+
     /// The member that solves `case`, every number good to `rtol`; adds to `effort`.
     fn solve(&self, case: &Case, rtol: f64, effort: &mut Effort) -> Result<Swift, Obstacle>;
 

@@ -26,6 +26,10 @@ impl Family for Step {
         None
     }
 
+    fn arrives(&self) -> bool {
+        false
+    }
+
     fn solve(&self, case: &Case, _rtol: f64, effort: &mut Effort) -> Result<Swift, Obstacle> {
         let Relaxation { law, v_f, t_f, decay } = Relaxation::new(case)?;
         effort.quadratures += 1;
