@@ -218,6 +218,21 @@ fn regress_small_cycles_are_the_same_at_every_tolerance() {
 }
 
 #[test]
+fn regress_unstable_sliding_is_left_however_small_the_step() {
+    let expected = respond(&paper(7.5e-3), 1e-6).cycle.expect("is a limit cycle");
+    for share in [1e-3, 1e-6, 1e-9, 1e-13, -1e-3, -1e-6, -1e-9, -1e-13] {
+        let transition = Transition { v_i: (1.0 + share) * V_F, ..paper(7.5e-3).transition };
+        let response = respond(&Step { transition, ..paper(7.5e-3) }, 1e-6);
+        let cycle = response.cycle.unwrap_or_else(|| panic!("{share}: {response:?}"));
+        assert!(relative(cycle.v_peak, expected.v_peak) < 1e-6, "{share}: {cycle:?}");
+        // It is approached from below.
+        assert_eq!((response.v_peak, response.t_peak), (cycle.v_peak, None));
+        let stable = respond(&Step { transition, ..paper(8e-3) }, 1e-6);
+        assert_eq!((stable.outcome, stable.settling_time), (Outcome::Settled, Some(0.0)), "{share}");
+    }
+}
+
+#[test]
 fn around_a_subcritical_point_the_size_of_the_step_decides() {
     let step = Step { transition: Transition { law: PAPER, v_i: 1e5, v_f: 7e5 }, k: 0.0, m: MASS };
     assert!(lyapunov_coefficient(PAPER, step.inertia()).is_some_and(|coefficient| coefficient > 0.0));

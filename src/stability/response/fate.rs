@@ -63,6 +63,9 @@ pub struct Linear {
 /// Steps of one response.
 const MOST_STEPS: u32 = 100_000;
 
+/// A motion this small is still told from the rounding of its steps, but not whether it is a limit cycle.
+const FAINT: f64 = 1e-6;
+
 /// Least error of a step that is asked for.
 const FINEST: f64 = 1e-13;
 
@@ -92,14 +95,22 @@ const PANEL: f64 = 1.2;
 const RATE_ERROR: f64 = 10.0;
 
 /// Follows the response that starts from steady sliding at `e^x v_f`, `x` not 0.
+///
+/// A start closer than 1e-6 to sliding that is unstable is moved out to there: what grows from it has the same shape,
+/// but comes later, so that the times of its extrema are NaN.
 pub fn follow(slider: &Slider, linear: Linear, x: f64, rtol: f64) -> Course {
-    let tolerance = (0.03 * rtol).max(FINEST);
+    let faint = !linear.stable && x.abs() < FAINT;
+    let start = if faint { FAINT.copysign(x) } else { x };
+    // A small motion is to be told from the errors of its steps.
+    let tolerance = (0.03 * rtol).min(if linear.stable { 1.0 } else { 1e-4 * start.abs() }).max(FINEST);
     let mut follower = Follower { slider, linear, rtol, tolerance, budget: MOST_STEPS, high: None, low: None, t: 0.0 };
-    let fate = follower.run(slider.steady(x)).unwrap_or_else(|stop| match stop {
+    let fate = follower.run(slider.steady(start)).unwrap_or_else(|stop| match stop {
         Stop::Ends if slider.inertia == 0.0 => Fate::Ends,
         Stop::Ends | Stop::Quiet | Stop::Unrelaxed | Stop::Budget => Fate::Undecided,
     });
     let Follower { high, low, t, budget, .. } = follower;
+    let [low, high] =
+        [low, high].map(|seen| seen.map(|seen: Extremum| if faint { Extremum { t: f64::NAN, ..seen } } else { seen }));
     Course { fate, high, low, t, steps: MOST_STEPS - budget }
 }
 
@@ -213,7 +224,8 @@ impl Follower<'_> {
             let left = contraction.left;
             contraction.take(change, self.tolerance);
             let near = contraction.left < 0.03 * self.rtol || (left < self.rtol && contraction.row == 0);
-            if near && rate.abs() < BALANCED * gross(&cycle, last.z, slider) {
+            let swings = high - low > 10.0 * FAINT;
+            if near && swings && rate.abs() < BALANCED * gross(&cycle, last.z, slider) {
                 let [low, high] = cycle.exact_range(&mut orbit);
                 return Ok(Fate::Cycle { period: cycle.period, high, low });
             }

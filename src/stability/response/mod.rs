@@ -170,7 +170,7 @@ impl Response {
             outcome,
             v_peak: velocity(peak.max(last_high)),
             v_trough: velocity(trough.min(last_low)),
-            t_peak: attained.map(|high| high.t / v_f),
+            t_peak: attained.map(|high| high.t / v_f).filter(|t| !t.is_nan()),
             settling_time,
             cycle: cycle.map(|(period, high, low)| Sustained {
                 period: period / v_f,
