@@ -1,0 +1,65 @@
+//! The integrator of this crate, driven as the table `step` drives it.
+
+use multiversion::multiversion;
+
+use crate::case::{Case, Method};
+use crate::numerics::stiff::{
+    Accuracy, Collocation, Failure, Integrator, Piece, radau_iia_5, radau_iia_9, radau_iia_13,
+};
+use crate::peaks::Peaks;
+use crate::slider::{Slider, State, X};
+
+/// Radau IIA with `S` stages.
+pub struct Ours<const S: usize>;
+
+macro_rules! method {
+    ($stages:literal, $rule:ident, $step:ident) => {
+        #[multiversion(targets(
+            "x86_64+avx+avx2+bmi1+bmi2+avx512f+avx512bw+avx512cd+avx512dq+avx512vl",
+            "x86_64+avx+avx2+bmi1+bmi2"
+        ))]
+        fn $step(run: &mut Integrator<'_, Slider, 3, $stages>, t_end: f64) -> Result<Piece<3, $stages>, Failure> {
+            run.step(t_end)
+        }
+
+        impl Method for Ours<$stages> {
+            fn name(&self) -> String {
+                format!("ours, order {}", 2 * $stages - 1)
+            }
+
+            fn integrate(&self, case: &Case, tolerance: f64, peaks: Option<&mut Peaks>) -> Option<State> {
+                integrate(case, tolerance, peaks, $rule(), $step)
+            }
+        }
+    };
+}
+
+method!(3, radau_iia_5, step_5);
+method!(5, radau_iia_9, step_9);
+method!(7, radau_iia_13, step_13);
+
+fn integrate<const S: usize>(
+    case: &Case,
+    tolerance: f64,
+    mut peaks: Option<&mut Peaks>,
+    rule: &'static Collocation<S>,
+    step: fn(&mut Integrator<'_, Slider, 3, S>, f64) -> Result<Piece<3, S>, Failure>,
+) -> Option<State> {
+    let (slider, start) = (&case.slider, case.start());
+    let accuracy = Accuracy { tolerance, scale: case.absolute(1.0) };
+    let mut run = Integrator::new(slider, rule, accuracy, 0.0, start, slider.first_step(&start));
+    while run.t() < case.t_end {
+        if let Some(arrested) = slider.arrest(run.y()) {
+            run.jump(arrested, slider.first_step(&arrested));
+        }
+        let piece = step(&mut run, case.t_end).ok()?;
+        if let Some(peaks) = &mut peaks {
+            // To the order of the method, as the table polishes its extrema.
+            peaks.look(|u| match run.part(&piece, u) {
+                Some(part) if u > 0.0 => part.end[X],
+                _ => piece.value(X, u),
+            });
+        }
+    }
+    Some(*run.y())
+}
