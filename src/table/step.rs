@@ -23,7 +23,11 @@ const COLUMNS: &[Column] = &[
         "v_0",
         "least velocity from when v = v_f is first met on, at most v_f; 0 below the range of doubles",
     ),
-    Column::number("t_peak", "l/v_0", "time of v_peak; null where it is only approached"),
+    Column::number(
+        "t_peak",
+        "l/v_0",
+        "time of v_peak, good to rtol of itself over the overshoot v_peak/v_f - 1; null where the peak is only approached",
+    ),
     Column::new("outcome", Kind::Label(&Outcome::NAMES), "what becomes of the response in the end"),
     Column::new("stick_slip", Kind::Flag, "whether the oscillation is sustained; null if undecided"),
     Column::number(

@@ -10,6 +10,7 @@ mod optimal;
 mod route;
 mod sample;
 mod stability;
+mod step;
 mod swift;
 
 use std::path::Path;
@@ -167,6 +168,7 @@ pub fn verify(path: &Path, manifest: &Manifest, sample: u64, seed: u64) -> Resul
                 "swift" => swift::check(&row, &context),
                 "compliant" => compliant::check(&row, &context),
                 "regularised" => compliant::check_regularised(&row, &context),
+                "step" => step::check(&row, &context),
                 "stability" => stability::check(&row, &context),
                 _ => Verdict::unchecked("there is no independent route for this table"),
             };
