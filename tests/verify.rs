@@ -13,7 +13,7 @@ use slipsweep::dataset::Folder;
 const AXES: &str = "t_f = [0.02, 0.3, 0.41]\na = 0.03\nb = [0.01, 0.03, 0.05]\nv_i = 3.0\nv_f = [100.0, 2.0]\n\
                     alpha_2 = { linspace = [-0.2, 0.2, 3], unit = \"1/t_f\" }\nalpha_3 = 0.0\ntau_max = 1.6\nk = [0.01, 0.03]\nm = 1e-5\n";
 
-const TABLES: &str = "[tables.gap]\n[tables.best]\n[tables.optimal]\n[tables.crossover]\n[tables.swift]\n[tables.stability]\n[tables.step]\n";
+const TABLES: &str = "[tables.gap]\n[tables.best]\n[tables.optimal]\n[tables.crossover]\n[tables.swift]\n[tables.stability]\n[tables.step]\nrtol = 1e-9\n";
 
 fn verify(folder: &Path, arguments: &[&str]) -> Output {
     let mut command = Command::new(env!("CARGO_BIN_EXE_slipsweep"));
