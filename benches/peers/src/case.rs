@@ -1,5 +1,7 @@
 //! The two responses to a step of the control velocity that are integrated, and what is known of them.
 
+#![expect(clippy::excessive_precision, reason = "reference values as they were printed")]
+
 use std::time::Instant;
 
 use crate::peaks::Peaks;
