@@ -1,7 +1,7 @@
 /* Reference values of `src/case.rs`, independent of the crate: collocation with 8 stages in quadruple precision, once
  * Gauss (order 16) and once Radau IIA (order 15), each at two step sizes.
  *
- *     cc -O2 -ffp-contract=off benches/peers/reference.c -lquadmath -lm -o /tmp/reference && /tmp/reference
+ *     cc -O2 -ffp-contract=off benches/peers/reference.c -lquadmath -lm -o reference && ./reference
  *
  * Prints the state at the end and the first peak, with the size of the change since the line before. */
 #include <math.h>
