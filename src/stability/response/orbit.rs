@@ -165,8 +165,11 @@ impl<'a> Orbit<'a> {
         cycle
     }
 
-    /// Notes an extremum after a rise or a fall, if it is further out than the one before.
+    /// Notes an extremum after a rise or a fall, if `v = v_f` has been met and it is further out than the one before.
     fn turn(&mut self, slope: f64, seen: Seen) {
+        if !self.met {
+            return;
+        }
         let (kept, sign) = if slope > 0.0 { (&mut self.high, 1.0) } else { (&mut self.low, -1.0) };
         if kept.is_none_or(|kept| sign * seen.rough.x > sign * kept.rough.x) {
             *kept = Some(seen);
@@ -181,7 +184,7 @@ impl<'a> Orbit<'a> {
         if rises {
             cycle = Some(self.close(leg, at(0.0)));
         }
-        if rises || (falls && !self.met) {
+        if rises {
             (self.high, self.low) = (None, None);
         }
         self.met |= rises || falls;
