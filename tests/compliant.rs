@@ -355,3 +355,18 @@ fn regress_work_counts() {
     let solved = compliant::solve(&PAPER.0, PAPER.1, PAPER.2, 1e-10);
     assert_eq!((solved.effort.quadratures, solved.effort.nodes), (7, 480));
 }
+
+/// Squares of a large flow overflowed, and the amplification came out as 0. The logarithms are from an integration of the
+/// logarithm of the flow.
+#[test]
+fn regress_amplifications_beyond_the_square_root_of_the_largest_double() {
+    let at = |t_f| {
+        let slider = Slider { law: Law { a: 0.01, b: 0.05 }, k: 0.001, m: 0.0 };
+        amplification(&path((slider, (100.0, 1000.0), t_f)), 1e-10)
+    };
+    for (t_f, expected) in [(0.2, 176.42), (0.3, 263.3)] {
+        let found = at(t_f).expect("is a double").log10();
+        assert!((found - expected).abs() < 0.05, "{t_f} {found}");
+    }
+    assert_eq!(at(0.5), None);
+}

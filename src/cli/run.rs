@@ -138,10 +138,18 @@ fn summary(name: &str, rows: u64, digest: &Digest) -> String {
             lines.push(vec![(*predicted).to_owned(), found.clone(), words::count(*rows)]);
         }
         text.push_str(&words::aligned(&lines, 4));
-        let differ: u64 =
-            digest.predicted.iter().filter(|(predicted, found, _)| predicted != found).map(|(.., rows)| rows).sum();
+        let surprises = digest
+            .predicted
+            .iter()
+            .filter(|(predicted, found, _)| found.as_str() == prediction.surprise && *predicted != prediction.surprise);
+        let differ: u64 = surprises.map(|(.., rows)| rows).sum();
         if differ > 0 {
-            text.push_str(&format!("    {} differ: {}\n", words::things(differ, "row"), prediction.why));
+            text.push_str(&format!(
+                "    {} of {}: {}\n",
+                words::things(differ, "row"),
+                prediction.surprise,
+                prediction.why
+            ));
         }
     }
     text

@@ -26,7 +26,7 @@ type Matrix = [[f64; 3]; 3];
 /// value of the fundamental matrix. Where some of the three follow the others, the error at the start is one of those
 /// others alone, so that the limits `m -> 0` and `k -> inf` are reached.
 ///
-/// `None` where that takes more than 3,000 steps: the flow swings too often.
+/// `None` where that takes more than 3,000 steps, the flow swinging too often, and beyond the range of doubles.
 pub fn amplification(path: &Path, rtol: f64) -> Option<f64> {
     let rule = radau();
     let slider = &path.slider;
@@ -66,7 +66,7 @@ pub fn amplification(path: &Path, rtol: f64) -> Option<f64> {
         // ln v follows.
         flow.iter_mut().for_each(|column| column[2] = column[1] - ratio * column[0]);
     }
-    Some(norm(flow, states))
+    Some(norm(flow, states)).filter(|growth| growth.is_finite())
 }
 
 /// More steps than any flow takes that swings less than some thousand times.
@@ -163,8 +163,14 @@ fn rates(slider: &Slider, jet: &Jet) -> Matrix {
     }
 }
 
+/// Without squares of what is large.
 fn length(column: &[f64; 3]) -> f64 {
-    dot(column, column).sqrt()
+    let size = column.iter().fold(0.0, |size: f64, x| size.max(x.abs()));
+    if size == 0.0 || !size.is_finite() {
+        return size;
+    }
+    let scaled = column.map(|x| x / size);
+    size * dot(&scaled, &scaled).sqrt()
 }
 
 fn dot(x: &[f64; 3], y: &[f64; 3]) -> f64 {
@@ -174,6 +180,11 @@ fn dot(x: &[f64; 3], y: &[f64; 3]) -> f64 {
 /// The largest singular value of the first `n` columns, by rotations that make the columns orthogonal (one-sided Jacobi
 /// method).
 fn norm(mut flow: Matrix, n: usize) -> f64 {
+    let size = flow.iter().take(n).flatten().fold(0.0, |size: f64, x| size.max(x.abs()));
+    if size == 0.0 {
+        return 0.0;
+    }
+    flow.iter_mut().flatten().for_each(|x| *x /= size);
     for _ in 0..MOST_SWEEPS {
         for (p, q) in [(0, 1), (0, 2), (1, 2)].into_iter().filter(|&(_, q)| q < n) {
             let dot = dot(&flow[p], &flow[q]);
@@ -190,7 +201,7 @@ fn norm(mut flow: Matrix, n: usize) -> f64 {
             }
         }
     }
-    flow.iter().take(n).map(length).fold(0.0, f64::max)
+    size * flow.iter().take(n).map(length).fold(0.0, f64::max)
 }
 
 /// Sweeps after which three columns are orthogonal to the last digits.

@@ -34,7 +34,7 @@ const COLUMNS: &[Column] = &[
         "amplification",
         "1",
         "greatest factor by which a small error grows from start to end, in the norm of (ln v, ln theta, k s/a); null \
-         beyond 3000 steps of its integration",
+         beyond 3000 steps of its integration and beyond the range of doubles",
     ),
     Column::number(
         "end_error",

@@ -63,7 +63,9 @@ pub struct Prediction {
     pub column: &'static str,
     /// The theory, in a few words.
     pub theory: &'static str,
-    /// Why they may differ.
+    /// A word that may be found where it is not predicted.
+    pub surprise: &'static str,
+    /// Why that may be.
     pub why: &'static str,
     /// The axes that it depends on.
     pub axes: &'static [Quantity],

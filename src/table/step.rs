@@ -89,6 +89,7 @@ impl Table for Step {
         Some(Prediction {
             column: "outcome",
             theory: "linear stability at v_f (settled above k_c)",
+            surprise: Outcome::NAMES[Outcome::LimitCycle as usize],
             why: "stable against small disturbances, but the step leads onto a cycle that surrounds steady sliding",
             axes: &[Quantity::A, Quantity::B, Quantity::FinalVelocity, Quantity::Stiffness, Quantity::Mass],
             word: |point| {

@@ -39,7 +39,11 @@ pub fn check(row: &Row, context: &Context) -> Verdict {
     if infeasible || word(row, STATUS) == Some("infeasible") {
         return verdict;
     }
-    let Some(alpha) = number(row, "alpha") else { return Verdict::unchecked("alpha was not written") };
+    verdict.demand(row, "alpha");
+    let Some(alpha) = number(row, "alpha") else {
+        verdict.unchecked = Some("alpha was not written");
+        return verdict;
+    };
     let course = |alpha: f64| {
         let exponent = Exponent::new(&problem, alpha);
         let formula = Formula::Velocity(Box::new(move |x| exponent.velocity(x)));
@@ -82,6 +86,7 @@ pub fn check_regularised(row: &Row, context: &Context) -> Verdict {
     let mut verdict = Verdict::default();
     if word(row, STATUS) != Some("infeasible") {
         compare_optimum(&mut verdict, row, &problem, t_f, context);
+        ["work", "gap", "v_min", "v_max", "v_c_min", "v_c_max"].iter().for_each(|column| verdict.demand(row, column));
     }
     verdict.unchecked = verdict.unchecked.or(Some("the smooth pieces have no independent route"));
     verdict

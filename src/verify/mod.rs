@@ -86,6 +86,13 @@ impl Verdict {
         self.differences.push(Difference { column, size, expected: expected.to_owned() });
     }
 
+    /// Notes an error where a column that must have a number was written without.
+    fn demand(&mut self, row: &Row, column: &'static str) {
+        if row.iter().any(|(name, cell)| name == column && *cell == Cell::Missing) {
+            self.differences.push(Difference { column, size: f64::INFINITY, expected: "a number".to_owned() });
+        }
+    }
+
     fn status(&mut self, row: &Row, expected: bool) {
         let wrong = word(row, STATUS).is_none_or(|status| (status == "infeasible") != expected);
         let size = if wrong { f64::INFINITY } else { 0.0 };
