@@ -316,6 +316,24 @@ fn regress_trough_comes_after_the_final_velocity_is_met() {
     }
 }
 
+/// Close to rest a step may be long enough to cross `v = v_f` twice.
+#[test]
+fn regress_every_section_crossed_in_one_step_ends_a_cycle() {
+    let v_f = 2838523.6683949446;
+    let transition = Transition { law: PAPER, v_i: 1e5, v_f };
+    let response = respond(&Step { transition, k: 0.04880251583654431, m: MASS }, 1e-6);
+    assert!(relative(response.t_peak.expect("has a peak"), 3.75188e-7) < 2e-6, "{response:?}");
+    let mut last: Option<f64> = None;
+    for i in 0..=200 {
+        let response = respond(&Step { transition, k: 0.0483 + 5e-6 * f64::from(i), m: MASS }, 1e-6);
+        let peak = response.v_peak / v_f;
+        assert!((peak - 1.61).abs() < 0.01, "{i}: {peak}");
+        // It changes smoothly with k.
+        assert!(last.is_none_or(|last| (peak - last).abs() < 1e-4), "{i}: {peak} {last:?}");
+        last = Some(peak);
+    }
+}
+
 /// Numbers between 0 and 1 from a fixed linear congruence.
 fn uniform(state: &mut u64) -> f64 {
     *state = state.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);

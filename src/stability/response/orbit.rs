@@ -1,5 +1,7 @@
 //! Following a response cycle by cycle: extrema, the section `v = v_f` crossed upwards, and the energy that is lost.
 
+use std::collections::VecDeque;
+
 use super::slider::{Leg, Run, STAGES, Slider, State, X, Y, Z, between, step};
 use crate::numerics::root::crossing;
 use crate::numerics::stiff::radau_iia_9;
@@ -64,6 +66,8 @@ pub struct Orbit<'a> {
     section: f64,
     /// Whether `v = v_f` has been met.
     met: bool,
+    /// Cycles that ended in the last step and were not given out yet: one step can cross the section several times.
+    closed: VecDeque<Cycle>,
     /// Slope of `x` at the end of the last step.
     slope: f64,
     high: Option<Seen>,
@@ -96,6 +100,7 @@ impl<'a> Orbit<'a> {
             lost: [0.0; 2],
             section: 0.0,
             met: state[X] == 0.0,
+            closed: VecDeque::new(),
             slope: 0.0,
             high: None,
             low: None,
@@ -111,6 +116,9 @@ impl<'a> Orbit<'a> {
     /// Follows up to the next section. An orbit that `may_rest` ends where it is quiet. Steps come off the `budget`.
     pub fn cycle(&mut self, may_rest: bool, budget: &mut u32) -> Result<Cycle, Stop> {
         loop {
+            if let Some(cycle) = self.closed.pop_front() {
+                return Ok(cycle);
+            }
             if *budget == 0 {
                 return Err(Stop::Budget);
             }
@@ -124,12 +132,9 @@ impl<'a> Orbit<'a> {
                 self.slope = 0.0;
             }
             let leg = step(&mut self.run).map_err(|_| Stop::Ends)?;
-            let cycle = self.look(&leg);
+            self.look(&leg);
             let loss = self.loss(&leg);
             self.lost = [0, 1].map(|i| self.lost[i] + loss[i]);
-            if let Some(cycle) = cycle {
-                return Ok(cycle);
-            }
         }
     }
 
@@ -139,8 +144,7 @@ impl<'a> Orbit<'a> {
     }
 
     /// Looks through a step, from node to node, for what happens in it.
-    fn look(&mut self, leg: &Leg) -> Option<Cycle> {
-        let mut cycle = None;
+    fn look(&mut self, leg: &Leg) {
         let mut u0 = 0.0;
         let (mut x0, mut slope0) = (leg.start[X], leg.slope(X, 0.0));
         if self.slope * slope0 < 0.0 {
@@ -152,17 +156,16 @@ impl<'a> Orbit<'a> {
             if slope0 * slope1 < 0.0 {
                 let turn = crossing(|u| leg.slope(X, u), [u0, u1], [slope0, slope1], 1e-6 * (u1 - u0));
                 let x = leg.value(X, turn);
-                cycle = self.pass(leg, [u0, turn], [x0, x]).or(cycle);
+                self.pass(leg, [u0, turn], [x0, x]);
                 let rough = Extremum { x, t: leg.t + turn * leg.h };
                 self.turn(slope0, Seen { rough, place: Some((*leg, turn)) });
-                cycle = self.pass(leg, [turn, u1], [x, x1]).or(cycle);
+                self.pass(leg, [turn, u1], [x, x1]);
             } else {
-                cycle = self.pass(leg, [u0, u1], [x0, x1]).or(cycle);
+                self.pass(leg, [u0, u1], [x0, x1]);
             }
             (u0, x0, slope0) = (u1, x1, slope1);
         }
         self.slope = slope0;
-        cycle
     }
 
     /// Notes an extremum after a rise or a fall, if `v = v_f` has been met and it is further out than the one before.
@@ -177,14 +180,12 @@ impl<'a> Orbit<'a> {
     }
 
     /// Looks through a piece in which the velocity only rises or only falls.
-    fn pass(&mut self, leg: &Leg, u: [f64; 2], x: [f64; 2]) -> Option<Cycle> {
+    fn pass(&mut self, leg: &Leg, u: [f64; 2], x: [f64; 2]) {
         let at = |level: f64| crossing(|u| leg.value(X, u) - level, u, [x[0] - level, x[1] - level], 1e-9);
-        let mut cycle = None;
         let (rises, falls) = (x[0] < 0.0 && x[1] >= 0.0, x[0] > 0.0 && x[1] <= 0.0);
         if rises {
-            cycle = Some(self.close(leg, at(0.0)));
-        }
-        if rises {
+            let cycle = self.close(leg, at(0.0));
+            self.closed.push_back(cycle);
             (self.high, self.low) = (None, None);
         }
         self.met |= rises || falls;
@@ -194,7 +195,6 @@ impl<'a> Orbit<'a> {
             let edge = if x[0] > 0.0 { BAND[1] } else { BAND[0] };
             self.entry = Some(Entry { edge, place: Some((*leg, at(edge))) });
         }
-        cycle
     }
 
     /// The cycle that ends at the section, at about the share `u` of a step.
