@@ -56,6 +56,8 @@ pub struct Linear {
     pub stable: bool,
     /// Change of `ln z` over a cycle, if they oscillate.
     pub growth: Option<f64>,
+    /// Their period in `l/v_f`, if they oscillate.
+    pub period: Option<f64>,
     /// Rate at which they come to oscillate alone, in `v_f/l`: minus the third eigenvalue, or infinite.
     pub relaxation: f64,
 }
@@ -63,11 +65,22 @@ pub struct Linear {
 /// Steps of one response.
 const MOST_STEPS: u32 = 100_000;
 
-/// A motion this small is still told from the rounding of its steps, but not whether it is a limit cycle.
-const FAINT: f64 = 1e-6;
+/// A motion this small is still told from the errors of its steps, but not whether it is a limit cycle.
+const FAINT: f64 = 1e-4;
+
+/// Share of a motion about unstable sliding that the error estimate of a step may be: an estimate as large as the
+/// motion would let steps grow until they damp what grows.
+const FELT: f64 = 1e-3;
+
+/// A cycle of less than `SMALL` in `ln v` takes the period of small motions, up to a factor of `ALIKE`.
+const SMALL: f64 = 0.1;
+const ALIKE: f64 = 3.0;
 
 /// Least error of a step that is asked for.
 const FINEST: f64 = 1e-13;
+
+/// Error that the finest steps may make in the extrema of a limit cycle, in `ln v`, whatever is asked for.
+const RESOLVED: f64 = 2e-7;
 
 /// Cycles over which `ln z` changes by less than this are sampled.
 const SLOW: f64 = 0.1;
@@ -96,22 +109,46 @@ const RATE_ERROR: f64 = 10.0;
 
 /// Follows the response that starts from steady sliding at `e^x v_f`, `x` not 0.
 ///
-/// A start closer than 1e-6 to sliding that is unstable is moved out to there: what grows from it has the same shape,
+/// A start closer than 1e-4 to sliding that is unstable is moved out to there: what grows from it has the same shape,
 /// but comes later, so that the times of its extrema are NaN.
 pub fn follow(slider: &Slider, linear: Linear, x: f64, rtol: f64) -> Course {
     let faint = !linear.stable && x.abs() < FAINT;
-    let start = if faint { FAINT.copysign(x) } else { x };
-    // A small motion is to be told from the errors of its steps.
-    let tolerance = (0.03 * rtol).min(if linear.stable { 1.0 } else { 1e-4 * start.abs() }).max(FINEST);
+    let start = if faint { linear.moved_out(x) } else { x };
+    let tolerance = (0.03 * rtol).max(FINEST);
+    let tolerance = if linear.stable { tolerance } else { tolerance.min(telling(start.abs())) };
     let mut follower = Follower { slider, linear, rtol, tolerance, budget: MOST_STEPS, high: None, low: None, t: 0.0 };
-    let fate = follower.run(slider.steady(start)).unwrap_or_else(|stop| match stop {
-        Stop::Ends if slider.inertia == 0.0 => Fate::Ends,
-        Stop::Ends | Stop::Quiet | Stop::Unrelaxed | Stop::Budget => Fate::Undecided,
-    });
+    let fate = match follower.run(slider.steady(start)) {
+        Ok(fate) if linear.allows(&fate, if faint { start.abs() } else { 0.0 }) => fate,
+        Err(Stop::Ends) if slider.inertia == 0.0 => Fate::Ends,
+        Ok(_) | Err(_) => Fate::Undecided,
+    };
     let Follower { high, low, t, budget, .. } = follower;
     let [low, high] =
         [low, high].map(|seen| seen.map(|seen: Extremum| if faint { Extremum { t: f64::NAN, ..seen } } else { seen }));
     Course { fate, high, low, t, steps: MOST_STEPS - budget }
+}
+
+/// Error of a step that tells a motion of this size about unstable sliding: its estimate is allowed to be the power
+/// 6/10 of it.
+fn telling(size: f64) -> f64 {
+    exp(ln(FELT * size) / 0.6).max(FINEST)
+}
+
+impl Linear {
+    /// A start closer than `FAINT`, moved out to where it grows, by whole cycles if they are short enough.
+    fn moved_out(&self, x: f64) -> f64 {
+        let whole = self.growth.map(|growth| growth * (ln(FAINT / x.abs()) / growth).ceil());
+        let size = whole.map(|whole| x.abs() * exp(whole)).filter(|size| (FAINT..10.0 * FAINT).contains(size));
+        size.unwrap_or(FAINT).copysign(x)
+    }
+
+    /// Whether an end that was found is no artefact: a limit cycle is larger than the errors of its steps, encloses a
+    /// start that was moved out to the distance `moved`, and if it is small has the period of small motions.
+    fn allows(&self, fate: &Fate, moved: f64) -> bool {
+        let &Fate::Cycle { period, high, low } = fate else { return true };
+        let alike = self.period.is_none_or(|linear| period > linear / ALIKE && period < linear * ALIKE);
+        period > 0.0 && high - low > FAINT.max(4.0 * moved) && (alike || high - low > SMALL)
+    }
 }
 
 struct Follower<'a> {
@@ -147,6 +184,8 @@ struct Sample {
     period: f64,
     high: f64,
     low: f64,
+    /// Error of the rate that an error of a step makes.
+    noise: f64,
     /// Error of a step that the rate asks for.
     tolerance: f64,
 }
@@ -181,6 +220,8 @@ impl Follower<'_> {
         let mut orbit = Orbit::new(slider, start, self.tolerance);
         // Time before this orbit began.
         let mut offset = 0.0;
+        // Since when this orbit has been settled, if it began so.
+        let mut since = 0.0;
         let mut before: Option<Place> = None;
         let mut last_rate = f64::NAN;
         let mut contraction = Contraction::after(f64::NAN);
@@ -199,7 +240,7 @@ impl Follower<'_> {
                         self.note(offset, &mut orbit, extrema);
                     }
                     return match (stop, orbit.settled_at()) {
-                        (Stop::Quiet, Some(time)) => Ok(Fate::Settled { time: offset + time }),
+                        (Stop::Quiet, Some(time)) => Ok(Fate::Settled { time: latest(since, offset, time) }),
                         _ => Err(stop),
                     };
                 }
@@ -215,7 +256,7 @@ impl Follower<'_> {
                 && place.y.abs() < 0.1
                 && let Some(time) = orbit.settled_at()
             {
-                return Ok(Fate::Settled { time: offset + time });
+                return Ok(Fate::Settled { time: latest(since, offset, time) });
             }
             count += 1;
             // Both coordinates of the section: relative to its size, or to what moves ln v by 1.
@@ -223,19 +264,33 @@ impl Follower<'_> {
             // Down to where rounding and the errors of steps stop it.
             let left = contraction.left;
             contraction.take(change, self.tolerance);
+            // A motion that has become smaller is to be told from the errors of its steps as well.
+            let enough = telling(high - low);
+            if !self.linear.stable && enough < 0.3 * self.tolerance {
+                self.tolerance = (0.1 * enough).max(FINEST);
+                offset += cycle.t;
+                orbit = Orbit::new(slider, [place.z, place.y, 0.0], self.tolerance);
+                (last_rate, contraction) = (f64::NAN, Contraction::after(f64::NAN));
+                continue;
+            }
             let near = contraction.left < 0.03 * self.rtol || (left < self.rtol && contraction.row == 0);
-            let swings = high - low > 10.0 * FAINT;
-            if near && swings && rate.abs() < BALANCED * gross(&cycle, last.z, slider) {
+            // Small cycles may only have stopped to change fast.
+            if near && high - low > SMALL && rate.abs() < BALANCED * gross(&cycle, last.z, slider) {
                 let [low, high] = cycle.exact_range(&mut orbit);
                 return Ok(Fate::Cycle { period: cycle.period, high, low });
             }
             if rate.abs() < SLOW && contraction.is_slow() && place.z > 0.0 && count >= again {
                 match self.slide(place, (rate - last_rate) / last_rate) {
                     Ok(Slide::Decided(Fate::Settled { time })) => {
-                        return Ok(Fate::Settled { time: offset + cycle.t + time });
+                        let inside = orbit.settled_at().filter(|_| time == 0.0);
+                        let time = inside.map_or(offset + cycle.t + time, |time| latest(since, offset, time));
+                        return Ok(Fate::Settled { time });
                     }
                     Ok(Slide::Decided(fate)) => return Ok(fate),
                     Ok(Slide::Fast { place, time }) => {
+                        let stays = excess(low, high) < 0.0 && rate < 0.0;
+                        let inside = orbit.settled_at().filter(|_| stays);
+                        since = inside.map_or(offset + cycle.t + time, |time| latest(since, offset, time));
                         offset += cycle.t + time;
                         orbit = Orbit::new(slider, [place.z, place.y, 0.0], self.tolerance);
                         before = Some(place);
@@ -306,8 +361,8 @@ impl Follower<'_> {
             let size = (high - low).min(1.0);
             if off <= (self.rate_error() * rate.abs() * size).max(3.0 * tolerance) {
                 // Errors of a step are absolute in x, so their share is greater in small cycles.
-                let gross = gross(&cycle, place.z, self.slider);
-                let tolerance = self.finer(self.rate_error() * rate.abs() * size / gross);
+                let noise = gross(&cycle, place.z, self.slider) / size;
+                let tolerance = self.finer(self.rate_error() * rate.abs() / noise);
                 let drift = ln(place.z / asked);
                 let [low, high] = cycle.exact_range(&mut orbit);
                 return Ok(Sample {
@@ -319,6 +374,7 @@ impl Follower<'_> {
                     period: cycle.period,
                     high,
                     low,
+                    noise,
                     tolerance,
                 });
             }
@@ -366,6 +422,9 @@ impl Follower<'_> {
             if next.rate * direction <= 0.0 {
                 return Ok(Slide::Decided(self.cycle_between(&here, &next)?));
             }
+            if !self.linear.stable && next.high - next.low < FAINT {
+                return Err(Stop::Faint);
+            }
             if next.relaxation < ADIABATIC * next.rate.abs() {
                 return Ok(Slide::Coupled);
             }
@@ -407,9 +466,13 @@ impl Follower<'_> {
     fn cycle_between(&mut self, from: &Sample, to: &Sample) -> Result<Fate, Stop> {
         let length = ln(to.place.z / from.place.z);
         let slope = ((to.rate - from.rate) / length).abs();
-        let gross = self.rate_error() * from.rate.abs().min(to.rate.abs()) / from.tolerance.min(to.tolerance);
-        let tolerance = self.finer(0.1 * self.rtol * slope / gross.max(1e-3));
+        let noise = from.noise.max(to.noise);
+        let tolerance = self.finer(0.1 * self.rtol * slope / noise);
         let sample = self.find([*from, *to], tolerance, |sample| sample.rate)?;
+        let uncertain = noise * FINEST / slope * (sample.high - sample.low);
+        if uncertain > RESOLVED.max(0.2 * self.rtol) {
+            return Err(Stop::Faint);
+        }
         Ok(Fate::Cycle { period: sample.period, high: sample.high, low: sample.low })
     }
 
@@ -552,6 +615,11 @@ impl Cycle {
     fn exact_range(&self, orbit: &mut Orbit<'_>) -> [f64; 2] {
         self.extrema.map(|extremum| extremum.map_or(0.0, |seen| orbit.polished(seen).x))
     }
+}
+
+/// When a response settled: at `time` of an orbit that began at `offset`, or at `since` if that is at its start.
+fn latest(since: f64, offset: f64, time: f64) -> f64 {
+    if time == 0.0 { since } else { offset + time }
 }
 
 /// What friction gives and takes over a cycle that began at `z`, added up, as a change of `ln z`.

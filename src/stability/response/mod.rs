@@ -188,9 +188,10 @@ impl Linear {
     fn of(slider: &Slider) -> Linear {
         let law = Law { a: slider.a, b: slider.b };
         let sliding = SteadySliding::new(law, slider.k, slider.inertia, 1.0);
-        let mut linear = Linear { stable: sliding.is_stable(), growth: None, relaxation: f64::INFINITY };
+        let mut linear = Linear { stable: sliding.is_stable(), growth: None, period: None, relaxation: f64::INFINITY };
         if let Some(eigenvalues) = sliding.eigenvalues().filter(|eigenvalues| eigenvalues.frequency > 0.0) {
-            linear.growth = Some(2.0 * std::f64::consts::PI * eigenvalues.growth_rate / eigenvalues.frequency);
+            let period = 2.0 * std::f64::consts::PI / eigenvalues.frequency;
+            (linear.growth, linear.period) = (Some(eigenvalues.growth_rate * period), Some(period));
             linear.relaxation = eigenvalues.decay_rate.map_or(f64::INFINITY, |decay| -decay);
         }
         linear

@@ -41,6 +41,8 @@ pub enum Stop {
     Budget,
     /// The contact lifetime has not come to rest.
     Unrelaxed,
+    /// The motion is too small to be told from the errors of its steps.
+    Faint,
 }
 
 /// A state this close to steady sliding is in its linear neighbourhood.
