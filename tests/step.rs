@@ -400,6 +400,17 @@ fn regress_what_never_leaves_the_band_is_settled_from_the_start() {
     }
 }
 
+/// Just above `k = b - a` the velocity rises over a hundred decades before it comes back.
+#[test]
+fn regress_without_mass_only_a_soft_spring_is_infeasible() {
+    let law = Law { a: 0.0048752, b: 0.0048765 };
+    let transition = Transition { law, v_i: 1.0029, v_f: 1.025e6 };
+    let (_, response) = Step { transition, k: 2e-4, m: 0.0 }.respond(1e-6);
+    assert_eq!(response.map(|response| response.outcome), Some(Outcome::Undecided));
+    let (status, response) = Step { transition, k: 1e-6, m: 0.0 }.respond(1e-6);
+    assert_eq!((status, response), (Status::Infeasible, None));
+}
+
 /// Numbers between 0 and 1 from a fixed linear congruence.
 fn uniform(state: &mut u64) -> f64 {
     *state = state.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);

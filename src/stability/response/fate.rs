@@ -30,7 +30,7 @@ pub enum Fate {
     },
     /// None that could be decided with the work allowed.
     Undecided,
-    /// The velocity becomes infinite in finite time, which takes a mass of 0.
+    /// The velocity becomes infinite in finite time, which takes a mass of 0 and `k <= b - a`.
     Ends,
 }
 
@@ -119,7 +119,7 @@ pub fn follow(slider: &Slider, linear: Linear, x: f64, rtol: f64) -> Course {
     let mut follower = Follower { slider, linear, rtol, tolerance, budget: MOST_STEPS, high: None, low: None, t: 0.0 };
     let fate = match follower.run(slider.steady(start)) {
         Ok(fate) if linear.allows(&fate, if faint { start.abs() } else { 0.0 }) => fate,
-        Err(Stop::Ends) if slider.inertia == 0.0 => Fate::Ends,
+        Err(Stop::Ends) if slider.inertia == 0.0 && slider.k <= slider.b - slider.a => Fate::Ends,
         Ok(_) | Err(_) => Fate::Undecided,
     };
     let Follower { high, low, t, budget, .. } = follower;
