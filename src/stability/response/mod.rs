@@ -51,11 +51,12 @@ impl Outcome {
 pub struct Response {
     /// Its end.
     pub outcome: Outcome,
-    /// Greatest velocity from when `v = v_f` is first met on, at least `v_f`, in `v_0`.
+    /// Greatest velocity from when `v = v_f` is first met on, at least `v_f`, in `v_0`; NaN if undecided.
     pub v_peak: f64,
-    /// Least velocity from when `v = v_f` is first met on, at most `v_f`, in `v_0`; 0 below the range of doubles.
+    /// Least velocity from when `v = v_f` is first met on, at most `v_f`, in `v_0`; 0 below the range of doubles, NaN if
+    /// undecided.
     pub v_trough: f64,
-    /// Time of the greatest velocity, in `l/v_0`; `None` if it is only approached.
+    /// Time of the greatest velocity, in `l/v_0`; `None` if it is only approached or undecided.
     pub t_peak: Option<f64>,
     /// Time after which `|v/v_f - 1|` stays below [`SETTLED`], in `l/v_0`.
     pub settling_time: Option<f64>,
@@ -102,13 +103,14 @@ impl Step {
     /// stiffness.
     pub fn from_course(&self, course: Option<&Course>, rtol: f64) -> (Status, Option<Response>) {
         let Transition { v_i, v_f, .. } = self.transition;
+        let lowest = course.and_then(|course| course.low).map_or(v_f, |low| v_f * exp(low.x)).min(v_i);
         let response = match course {
             Some(course) => Response::new(course, v_f, rtol),
             None => Some(Response::at_once(v_f)),
         };
         let status = match response {
             None => Status::Infeasible,
-            Some(response) if response.v_trough.min(v_i) < 1.0 => Status::BelowBound,
+            Some(response) if response.v_trough.min(lowest) < 1.0 => Status::BelowBound,
             Some(_) => Status::Ok,
         };
         (status, response)
@@ -164,12 +166,14 @@ impl Response {
         let (peak, trough) =
             (course.high.map_or(0.0, |high| high.x.max(0.0)), course.low.map_or(0.0, |low| low.x.min(0.0)));
         let (last_high, last_low) = cycle.map_or((0.0, 0.0), |(_, high, low)| (high, low));
+        // What comes after the last step may go further.
+        let known = if outcome == Outcome::Undecided { f64::NAN } else { 1.0 };
         // Approached from below, the greatest velocity is that of the limit cycle.
-        let attained = course.high.filter(|high| high.x > last_high + rtol);
+        let attained = course.high.filter(|high| outcome != Outcome::Undecided && high.x > last_high + rtol);
         Some(Response {
             outcome,
-            v_peak: velocity(peak.max(last_high)),
-            v_trough: velocity(trough.min(last_low)),
+            v_peak: known * velocity(peak.max(last_high)),
+            v_trough: known * velocity(trough.min(last_low)),
             t_peak: attained.map(|high| high.t / v_f).filter(|t| !t.is_nan()),
             settling_time,
             cycle: cycle.map(|(period, high, low)| Sustained {
