@@ -109,8 +109,8 @@ const RATE_ERROR: f64 = 10.0;
 
 /// Follows the response that starts from steady sliding at `e^x v_f`, `x` not 0.
 ///
-/// A start closer than 1e-4 to sliding that is unstable is moved out to there: what grows from it has the same shape,
-/// but comes later, so that the times of its extrema are NaN.
+/// A start closer than 1e-4 to sliding that is unstable is moved out to there or, by whole cycles, to below 1e-3: what
+/// grows from it has the same shape, but comes later, so that the times of its extrema are NaN.
 pub fn follow(slider: &Slider, linear: Linear, x: f64, rtol: f64) -> Course {
     let faint = !linear.stable && x.abs() < FAINT;
     let start = if faint { linear.moved_out(x) } else { x };

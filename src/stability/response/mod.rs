@@ -53,8 +53,8 @@ pub struct Response {
     pub outcome: Outcome,
     /// Greatest velocity from when `v = v_f` is first met on, at least `v_f`, in `v_0`; NaN if undecided.
     pub v_peak: f64,
-    /// Least velocity from when `v = v_f` is first met on, at most `v_f`, in `v_0`; 0 below the range of doubles, NaN if
-    /// undecided.
+    /// Least velocity from when `v = v_f` is first met on, at most `v_f`, in `v_0`; 0 below the range of doubles, NaN
+    /// if undecided.
     pub v_trough: f64,
     /// Time of the greatest velocity, in `l/v_0`; `None` if it is only approached or undecided.
     pub t_peak: Option<f64>,
