@@ -17,16 +17,20 @@ pub struct Step;
 const LYAPUNOV: usize = 10;
 
 const COLUMNS: &[Column] = &[
-    Column::number("v_peak", "v_0", "greatest velocity from when v = v_f is first met on, at least v_f"),
+    Column::number(
+        "v_peak",
+        "v_0",
+        "greatest velocity from when v = v_f is first met on, at least v_f; null if undecided",
+    ),
     Column::number(
         "v_trough",
         "v_0",
-        "least velocity from when v = v_f is first met on, at most v_f; 0 below the range of doubles",
+        "least velocity from when v = v_f is first met on, at most v_f; 0 below the range of doubles, null if undecided",
     ),
     Column::number(
         "t_peak",
         "l/v_0",
-        "time of v_peak, good to rtol of itself over the overshoot v_peak/v_f - 1; null where the peak is only approached",
+        "time of v_peak, good to rtol of itself over the overshoot v_peak/v_f - 1; null where the peak is only approached, and if undecided",
     ),
     Column::new("outcome", Kind::Label(&Outcome::NAMES), "what becomes of the response in the end"),
     Column::new("stick_slip", Kind::Flag, "whether the oscillation is sustained; null if undecided"),

@@ -42,8 +42,8 @@ impl Stretch {
 }
 
 impl Step {
-    /// The response up to time `t_f`, in `l/v_0`, with errors of a step below `0.03 rtol`. `None` for a rigid spring,
-    /// for `v_i = v_f`, where the velocity becomes infinite before, and where the response swings too often to be shown.
+    /// The response up to time `t_f`, in `l/v_0`, with errors of a step below `0.03 rtol`. `None` for a rigid spring, for
+    /// `v_i = v_f`, where the velocity becomes infinite before, and where the response swings too often to be shown.
     pub fn motion(&self, t_f: f64, rtol: f64) -> Option<Swing> {
         let Transition { law, v_i, v_f } = self.transition;
         let x = ln(v_i / v_f);
