@@ -7,9 +7,7 @@ mod support;
 
 use std::hint::black_box;
 
-use multiversion::multiversion;
-use slipsweep::numerics::elementary::ln;
-use support::median;
+use support::{median, vector_ln};
 use wide::f64x8;
 
 const COUNT: usize = 4096;
@@ -27,7 +25,7 @@ fn main() {
         });
         println!("{name:<8} {:.2} ns", 1e9 * time / (COUNT * PASSES) as f64);
     };
-    measure("own", &own);
+    measure("own", &vector_ln);
     measure("wide", &|x, y| {
         for (x, y) in x.chunks_exact(8).zip(y.chunks_exact_mut(8)) {
             let lanes: [f64; 8] = std::array::from_fn(|i| x[i]);
@@ -39,14 +37,4 @@ fn main() {
             *y = x.ln();
         }
     });
-}
-
-#[multiversion(targets(
-    "x86_64+avx+avx2+bmi1+bmi2+avx512f+avx512bw+avx512cd+avx512dq+avx512vl",
-    "x86_64+avx+avx2+bmi1+bmi2"
-))]
-fn own(x: &[f64], y: &mut [f64]) {
-    for (x, y) in x.iter().zip(y) {
-        *y = ln(*x);
-    }
 }

@@ -1,7 +1,20 @@
 //! The commands: arguments in, a call of the library, words out.
 
+mod completions;
+mod head;
+mod init;
+mod man;
+mod next;
+mod output;
 mod plan;
+mod plot;
+mod query;
+mod report;
 mod run;
+mod schema;
+mod shards;
+mod status;
+mod summary;
 mod tables;
 mod trace;
 mod verify;
@@ -9,11 +22,17 @@ mod watch;
 mod words;
 
 use std::fmt::Display;
+use std::fs::{self, OpenOptions};
 use std::io::{self, Write};
+use std::panic;
+use std::path::Path;
 use std::process::ExitCode;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 use clap::{Parser, Subcommand};
 
+use crate::dataset::{Folder, Manifest, atomic};
+use crate::query::QueryError;
 use crate::sweep::SpecError;
 
 /// The spec or the arguments are wrong.
@@ -22,10 +41,21 @@ const WRONG: u8 = 1;
 const FAILED: u8 = 2;
 /// `--strict`, and some row is `not_converged`.
 const NOT_STRICT: u8 = 3;
+/// `--requeue`, and another try may mend what failed (EX_TEMPFAIL of sysexits.h).
+const AGAIN: u8 = 75;
 
 /// Exact parameter sweeps over the control of rate-and-state friction.
 #[derive(Debug, Parser)]
-#[command(version)]
+#[command(
+    version,
+    after_help = "Example:
+  slipsweep init granite
+  slipsweep run granite.toml
+  slipsweep plot results/granite
+  slipsweep query results/granite \"SELECT t_f, gap FROM best\"
+
+`slipsweep COMMAND --help` shows an example of each command."
+)]
 struct Arguments {
     #[command(subcommand)]
     command: Command,
@@ -33,16 +63,44 @@ struct Arguments {
 
 #[derive(Debug, Subcommand)]
 enum Command {
+    /// Write a commented spec to start from
+    Init(init::Arguments),
     /// Compute the tables of a spec; a run that was stopped goes on where it was
     Run(run::Arguments),
     /// Say what a spec would compute, and estimate time and size
     Plan(plan::Arguments),
     /// Show one protocol over time: v, theta, friction
     Trace(trace::Arguments),
+    /// Say what is in a dataset: rows by status, ranges of the columns, least gaps
+    Summary(summary::Arguments),
+    /// Show the first rows of a table
+    Head(head::Arguments),
+    /// Ask a dataset a question in SQL
+    Query(query::Arguments),
+    /// Say what is there of a dataset, what is missing, and what would finish it
+    Status(status::Arguments),
+    /// Write the job script of a sweep in shares, for a scheduler, and say what to submit
+    Shards(shards::Arguments),
+    /// Draw a picture as SVG, PNG or PDF
+    Plot(plot::Arguments),
+    /// Write a page of HTML with the pictures and the summary of a dataset
+    Report(report::Arguments),
     /// Solve a sample of the rows of a dataset again by an independent method, and compare
     Verify(verify::Arguments),
     /// List all tables, their columns and units
+    #[command(after_help = "Example:\n  slipsweep tables | less")]
     Tables,
+    /// Print the JSON Schema of a spec, with which editors complete and check specs
+    #[command(after_help = "Example:
+  slipsweep schema > slipsweep.schema.json
+
+With `#:schema ./slipsweep.schema.json` as its first line, a spec beside that file is completed and checked by editors that
+use taplo, such as VS Code with Even Better TOML. `slipsweep init` writes both.")]
+    Schema,
+    /// Print what makes a shell complete commands and flags
+    Completions(completions::Arguments),
+    /// Print the manual page of the program or of a command
+    Man(man::Arguments),
 }
 
 /// A command that did not do its work: what to say, and the exit code.
@@ -63,8 +121,15 @@ impl From<SpecError> for Failure {
     }
 }
 
+impl From<QueryError> for Failure {
+    fn from(error: QueryError) -> Failure {
+        Failure { code: if error.is_wrong() { WRONG } else { FAILED }, message: format!("error: {error}") }
+    }
+}
+
 /// Reads the arguments of the process and does what they say.
 pub fn main() -> ExitCode {
+    tell_first_panic();
     let arguments = match Arguments::try_parse() {
         Ok(arguments) => arguments,
         Err(error) => {
@@ -74,11 +139,22 @@ pub fn main() -> ExitCode {
         }
     };
     let done = match arguments.command {
+        Command::Init(arguments) => init::init(&arguments),
         Command::Run(arguments) => run::run(&arguments),
         Command::Plan(arguments) => plan::plan(&arguments),
         Command::Trace(arguments) => trace::trace(&arguments),
+        Command::Summary(arguments) => summary::summary(&arguments),
+        Command::Head(arguments) => head::head(&arguments),
+        Command::Query(arguments) => query::query(&arguments),
+        Command::Status(arguments) => status::status(&arguments),
+        Command::Shards(arguments) => shards::shards(&arguments),
+        Command::Plot(arguments) => plot::plot(&arguments),
+        Command::Report(arguments) => report::report(&arguments),
         Command::Verify(arguments) => verify::verify(&arguments),
         Command::Tables => tables::tables(),
+        Command::Schema => schema::print(),
+        Command::Completions(arguments) => completions::completions(&arguments),
+        Command::Man(arguments) => man::man(&arguments),
     };
     match done {
         Ok(()) => ExitCode::SUCCESS,
@@ -87,6 +163,34 @@ pub fn main() -> ExitCode {
             failure.code.into()
         }
     }
+}
+
+/// The failure of somebody who asked for something wrong.
+fn wrong(message: impl Display) -> Failure {
+    Failure { code: WRONG, message: format!("error: {message}") }
+}
+
+/// The dataset in `path`, which must be one.
+fn dataset(path: &Path) -> Result<(Folder, Manifest), Failure> {
+    let folder = Folder::at(path);
+    match folder.manifest().map_err(Failure::failed)? {
+        Some(manifest) => Ok((folder, manifest)),
+        None => Err(wrong(format!(
+            "{}: not a dataset\n  expected: a folder with a manifest.json\n  help: name a folder that `slipsweep run` wrote",
+            path.display()
+        ))),
+    }
+}
+
+/// Lets the process tell of its first panic alone: the engine provokes others when it looks for the row that is to blame. Those of a reader
+/// of damaged files are told as what they are, faults of the file.
+fn tell_first_panic() {
+    let (usual, told) = (panic::take_hook(), AtomicBool::new(false));
+    panic::set_hook(Box::new(move |panic| {
+        if !crate::dataset::is_guarded() && !told.swap(true, Ordering::Relaxed) {
+            usual(panic);
+        }
+    }));
 }
 
 /// Writes `text` to standard output; that a reader has had enough is no failure.
@@ -102,5 +206,15 @@ fn put(bytes: &[u8]) -> Result<(), Failure> {
             Err(Failure::failed(format!("cannot write to standard output: {error}")))
         }
         _ => Ok(()),
+    }
+}
+
+/// Fills a file, whole or not at all; what is no plain file (a device, a named pipe) is written to as it is.
+fn to_file<E: From<io::Error>>(path: &Path, fill: impl FnOnce(&mut dyn Write) -> Result<(), E>) -> Result<(), E> {
+    match fs::canonicalize(path) {
+        Ok(real) if fs::metadata(&real)?.is_file() => atomic::write_with(&real, |file| fill(file)),
+        Ok(real) => fill(&mut OpenOptions::new().write(true).open(real)?),
+        // The folder of a bare name is the one we are in.
+        Err(_) => atomic::write_with(&Path::new(".").join(path), |file| fill(file)),
     }
 }

@@ -1,27 +1,36 @@
-//! `slipsweep run SPEC`: computes what is missing of a dataset, then reads it back and says what is in it.
+//! `slipsweep run SPEC`: computes what is missing of a dataset, or of a share of it, then reads it back and says what is in it.
 
-use std::path::PathBuf;
+use std::io;
+use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use super::watch::watched;
-use super::{FAILED, Failure, NOT_STRICT, WRONG, say, words};
-use crate::dataset::{Cell, DatasetError, Digest, Folder, Row};
-use crate::grid::Quantity;
+use super::{AGAIN, FAILED, Failure, NOT_STRICT, WRONG, next, say, summary, words, wrong};
+use crate::dataset::{DatasetError, Digest, Folder};
 use crate::protocol::Status;
-use crate::sweep::{self, Outcome, Plan, RunError, Sweep};
-use crate::table::{self, STATUS, Signal, Work};
+use crate::sweep::{self, Outcome, Plan, RunError, Shard, Sweep};
+use crate::table::{Signal, Work};
 
 /// Arguments of `run`.
 #[derive(Debug, clap::Args)]
+#[command(after_help = "Examples:
+  slipsweep run granite.toml
+  slipsweep run granite.toml --out /scratch/results --threads 8 --quiet")]
 pub struct Arguments {
-    /// The sweep spec, a TOML file
+    /// The sweep spec, a TOML file; or the folder of a dataset that is to be finished
     spec: PathBuf,
-    /// Folder in which the dataset's folder is made
-    #[arg(long, value_name = "DIR", default_value = "results")]
-    out: PathBuf,
+    /// Folder in which the dataset's folder is made [default: results, or where the dataset is]
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
     /// Threads to use, at most 1024; one a processor by default
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
     threads: Option<u16>,
+    /// Make only share I, from 0, of N: every part is in one of them, and they may run side by side
+    #[arg(long, value_name = "I/N")]
+    shard: Option<Shard>,
+    /// Exit with code 75, not 2, after a failure that another try may mend: schedulers then put the job back into the queue
+    #[arg(long)]
+    requeue: bool,
     /// Say nothing but errors
     #[arg(long)]
     quiet: bool,
@@ -32,18 +41,25 @@ pub struct Arguments {
 
 /// Runs a spec.
 pub fn run(arguments: &Arguments) -> Result<(), Failure> {
-    let sweep = Sweep::load(&arguments.spec)?;
-    let folder = Folder::new(&arguments.out, &sweep.name);
+    let (sweep, folder) = subject(arguments)?;
     let plan = Plan::new(&sweep);
-    let rows = plan.tables.iter().fold(0_u64, |sum, table| sum.saturating_add(table.rows));
+    let shard = arguments.shard.unwrap_or(Shard::WHOLE);
+    let parts = shard.parts(&sweep, &plan).map_err(wrong)?;
+    let rows = plan.tables.iter().zip(&parts).flat_map(|(table, parts)| {
+        parts
+            .iter()
+            .filter(|range| !range.is_empty())
+            .map(|range| table.rows_of(range.end - 1).end - table.rows_of(range.start).start)
+    });
+    let rows = rows.fold(0_u64, u64::saturating_add);
     let signal = Signal::default();
     let start = Instant::now();
     let threads = arguments.threads.map_or(0, usize::from);
-    let (done, caught) = watched(&signal, rows, arguments.quiet, || sweep::run(&sweep, &folder, threads, &signal));
+    let (done, caught) =
+        watched(&signal, rows, arguments.quiet, || sweep::run_shard(&sweep, &folder, shard, threads, &signal));
     let outcome = done.map_err(|error| {
-        let parts =
-            plan.tables.iter().flat_map(|table| (0..table.parts).map(|part| folder.has_part(&table.name, part)));
-        let (there, all) = parts.fold((0, 0), |(there, all), is| (there + u64::from(is), all + 1));
+        let there = plan.tables.iter().map(|table| folder.parts_there(table).len() as u64).sum();
+        let all = plan.tables.iter().map(|table| table.parts).sum();
         explain(error, caught, arguments, (there, all))
     })?;
     let seconds = start.elapsed().as_secs_f64();
@@ -51,23 +67,46 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     if arguments.quiet && !arguments.strict {
         return Ok(());
     }
-    let read = plan.tables.iter().map(|table| Digest::read(&folder, table));
+    let read = plan.tables.iter().zip(parts).map(|(table, parts)| {
+        // Only a complete table is worth a summary; of a share, the outcome of its rows may be asked for.
+        let parts = if arguments.strict || arguments.shard.is_none() { parts } else { Vec::new() };
+        Digest::read_parts(&folder, table, &sweep.grid.units, parts.into_iter().flatten())
+    });
     let digests: Vec<Digest> = read.collect::<Result<_, _>>().map_err(Failure::failed)?;
     if !arguments.quiet {
         let mut text = String::new();
         for ((table, digest), done) in plan.tables.iter().zip(&digests).zip(&outcome.tables) {
-            text.push_str(&summary(&table.name, table.rows, digest));
+            let all = done.kept + done.made;
+            match arguments.shard {
+                None => text.push_str(&summary::digest(&table.name, table.rows, digest)),
+                Some(shard) => text.push_str(&format!(
+                    "{}: {} of {} in share {} of {}\n",
+                    table.name,
+                    words::count(all),
+                    words::things(table.parts, "part"),
+                    shard.index(),
+                    shard.count()
+                )),
+            }
             if done.kept > 0 {
                 text.push_str(&format!(
                     "  {} of {} kept from before\n",
                     words::count(done.kept),
-                    words::things(table.parts, "part")
+                    words::things(all, "part")
                 ));
             }
-            text.push('\n');
+            if done.damaged > 0 {
+                text.push_str(&format!("  {} made again\n", words::things(done.damaged, "damaged part")));
+            }
+            if arguments.shard.is_none() {
+                text.push('\n');
+            }
         }
         text.push_str(&account(&outcome, seconds));
         text.push_str(&format!("written to {}\n", folder.path().display()));
+        if arguments.shard.is_none() {
+            text.push_str(&next::commands(&sweep, folder.path()));
+        }
         say(&text)?;
     }
     let defects: u64 = digests.iter().map(|digest| digest.status[Status::NotConverged as usize]).sum();
@@ -76,6 +115,28 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
         return Err(Failure { code: NOT_STRICT, message });
     }
     Ok(())
+}
+
+/// The sweep and where it goes: from a spec, or from a dataset, which holds the text of its own.
+fn subject(arguments: &Arguments) -> Result<(Sweep, Folder), Failure> {
+    let path = &arguments.spec;
+    if !path.is_dir() {
+        let sweep = Sweep::load(path)?;
+        let folder = Folder::new(arguments.out.as_deref().unwrap_or(Path::new("results")), &sweep.name);
+        return Ok((sweep, folder));
+    }
+    let folder = Folder::at(path);
+    let found = folder.manifest().map_err(Failure::failed)?.or_else(|| folder.manifest_of_parts());
+    let Some(manifest) = found else {
+        let message = format!(
+            "error: {}: neither a spec nor a dataset\n  expected: a TOML file, or a folder that `slipsweep run` wrote\n  help: check the path",
+            path.display()
+        );
+        return Err(Failure { code: WRONG, message });
+    };
+    let sweep = Sweep::parse_at(&manifest.spec, &path.join("manifest.json"))?;
+    let folder = arguments.out.as_deref().map_or(folder, |out| Folder::new(out, &sweep.name));
+    Ok((sweep, folder))
 }
 
 fn explain(error: RunError, caught: Option<i32>, arguments: &Arguments, (there, all): (u64, u64)) -> Failure {
@@ -88,107 +149,40 @@ fn explain(error: RunError, caught: Option<i32>, arguments: &Arguments, (there, 
                 words::things(all, "part")
             ),
         },
-        RunError::Dataset(DatasetError::Foreign { .. } | DatasetError::Occupied { .. }) => {
-            Failure { code: WRONG, message: format!("error: {error}") }
-        }
+        RunError::Dataset(
+            DatasetError::Foreign { .. } | DatasetError::ForeignPart { .. } | DatasetError::Occupied { .. },
+        ) => Failure { code: WRONG, message: format!("error: {error}") },
         RunError::Threads { .. } if arguments.threads.is_some() => {
             Failure { code: WRONG, message: format!("error: {error}") }
+        }
+        RunError::Dataset(DatasetError::Io { ref source, .. }) if arguments.requeue && is_passing(source) => {
+            Failure { code: AGAIN, message: format!("error: {error}") }
         }
         _ => Failure::failed(error),
     }
 }
 
-/// One table in a few lines.
-fn summary(name: &str, rows: u64, digest: &Digest) -> String {
-    let counts: Vec<String> = Status::ALL
-        .iter()
-        .zip(digest.status)
-        .filter(|(_, rows)| *rows > 0)
-        .map(|(status, rows)| format!("{} {}", words::count(rows), status.name()))
-        .collect();
-    let mut text = format!("{name}: {} ({})\n", words::things(rows, "row"), counts.join(", "));
-    if !digest.least.is_empty() && digest.rows.is_none() {
-        // A family may hold protocols that miss the final state, with any work.
-        let arriving = if name == "swift" { " and arrive" } else { "" };
-        text.push_str(&format!("  least gap among the rows that are ok{arriving}:\n"));
-        text.push_str(&listing(&digest.least));
-    }
-    match &digest.rows {
-        Some(rows) => text.push_str(&listing(rows)),
-        None => {
-            let mut lines = vec![["column", "rows", "least", "greatest"].map(str::to_owned).to_vec()];
-            for range in digest.ranges.iter().filter(|range| range.count > 0) {
-                let ends = [range.least, range.greatest].map(words::number);
-                lines.push([range.column.clone(), words::count(range.count)].into_iter().chain(ends).collect());
-            }
-            text.push_str(&words::aligned(&lines, 2));
-            for (column, counts) in &digest.words {
-                let counts: Vec<String> =
-                    counts.iter().map(|(word, rows)| format!("{} {word}", words::count(*rows))).collect();
-                text.push_str(&format!("  {column}: {}\n", counts.join(", ")));
-            }
-        }
-    }
-    if let Some(prediction) = table::find(name).and_then(|table| table.prediction())
-        && !digest.predicted.is_empty()
-    {
-        text.push_str(&format!("  {} as {} predicts it, and as found:\n", prediction.column, prediction.theory));
-        let mut lines = vec![["predicted", "found", "rows"].map(str::to_owned).to_vec()];
-        for (predicted, found, rows) in &digest.predicted {
-            lines.push(vec![(*predicted).to_owned(), found.clone(), words::count(*rows)]);
-        }
-        text.push_str(&words::aligned(&lines, 4));
-        let surprises = digest
-            .predicted
-            .iter()
-            .filter(|(predicted, found, _)| found.as_str() == prediction.surprise && *predicted != prediction.surprise);
-        let differ: u64 = surprises.map(|(.., rows)| rows).sum();
-        if differ > 0 {
-            text.push_str(&format!(
-                "    {} of {}: {}\n",
-                words::things(differ, "row"),
-                prediction.surprise,
-                prediction.why
-            ));
-        }
-    }
-    text
-}
-
-/// Rows with a header; axes that do not vary stand above, columns without any value are left out.
-fn listing(rows: &[Row]) -> String {
-    let Some(first) = rows.first() else { return String::new() };
-    let is_axis = |name: &str| Quantity::from_name(name).is_some();
-    let mut common = Vec::new();
-    let mut shown = Vec::new();
-    let mut results_begin = false;
-    for (place, (name, cell)) in first.iter().enumerate() {
-        // `best` has result columns of the same names as axes: axes end where they stop coming in the order of quantities.
-        results_begin |= !is_axis(name);
-        let varies = rows.iter().any(|row| row[place].1 != *cell);
-        let missing = rows.iter().all(|row| row[place].1 == Cell::Missing);
-        if !results_begin && !varies && Quantity::from_name(name).is_some_and(|axis| !axis.has_scale()) {
-            common.push(format!("{name} = {}", cell_text(cell)));
-        } else if !missing && (name != STATUS || varies) {
-            shown.push(place);
-        }
-    }
-    let mut lines = vec![shown.iter().map(|&place| first[place].0.clone()).collect::<Vec<_>>()];
-    lines.extend(rows.iter().map(|row| shown.iter().map(|&place| cell_text(&row[place].1)).collect()));
-    let mut text = String::new();
-    if !common.is_empty() {
-        text.push_str(&format!("  at {}\n", common.join(", ")));
-    }
-    text.push_str(&words::aligned(&lines, 4));
-    text
-}
-
-fn cell_text(cell: &Cell) -> String {
-    match cell {
-        Cell::Missing => "-".to_owned(),
-        Cell::Number(value) => words::number(*value),
-        Cell::Word(word) => word.clone(),
-    }
+/// Whether a failure may pass by itself: of a disk, a network or a server, not of room or rights.
+fn is_passing(error: &io::Error) -> bool {
+    /// "Input/output error", which has no kind of its own.
+    const EIO: i32 = 5;
+    use io::ErrorKind as Kind;
+    error.raw_os_error() == Some(EIO)
+        || matches!(
+            error.kind(),
+            Kind::Interrupted
+                | Kind::TimedOut
+                | Kind::WouldBlock
+                | Kind::StaleNetworkFileHandle
+                | Kind::HostUnreachable
+                | Kind::NetworkUnreachable
+                | Kind::NetworkDown
+                | Kind::ConnectionReset
+                | Kind::ConnectionAborted
+                | Kind::ConnectionRefused
+                | Kind::NotConnected
+                | Kind::ResourceBusy
+        )
 }
 
 /// What the run spent.

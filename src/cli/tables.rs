@@ -7,8 +7,8 @@ use crate::table::{self, Kind, STATUS, STATUS_DOC};
 /// Prints all tables.
 pub fn tables() -> Result<(), Failure> {
     let mut text = String::new();
-    let no_axes = Grid { factors: Vec::new() };
-    for table in table::ALL {
+    let no_axes = Grid::default();
+    for table in table::ALL.into_iter().chain(table::REDUCED.map(|(_, table)| table)) {
         text.push_str(&format!("{}: {}\n", table.name(), table.doc()));
         let mut rows: Vec<Vec<String>> = Vec::new();
         for axis in Quantity::ALL.into_iter().filter(|axis| table.axes().contains(axis)) {

@@ -1,23 +1,24 @@
 //! `slipsweep trace PROTOCOL`: one protocol over time, as a table, CSV or Parquet.
 
-use std::fs::{self, OpenOptions};
-use std::io::{self, IsTerminal, Write};
-use std::path::{Path, PathBuf};
-
 use clap::ValueEnum;
 use clap::builder::{PossibleValue, PossibleValuesParser};
 
-use super::{FAILED, Failure, WRONG, put, say, words};
-use crate::dataset::atomic;
+use super::output::{self, Output};
+use super::{FAILED, Failure, WRONG, put, say, to_file, words, wrong};
 use crate::grid::{Domain, Quantity, RTOL};
 use crate::model::{Law, Transition};
 use crate::protocol::Status;
 use crate::protocol::swift::{self, Case};
-use crate::trace::{self, Absence, COLUMNS, Course, GOOD, Protocol, Times, Trace};
+use crate::trace::{self, Absence, CLOSE_UP, COLUMNS, Course, GOOD, Protocol, Times, Trace};
 
 /// Arguments of `trace`.
 #[derive(Debug, clap::Args)]
-#[command(allow_negative_numbers = true)]
+#[command(
+    allow_negative_numbers = true,
+    after_help = "Examples:
+  slipsweep trace optimal --t-f 0.02 --a 0.03 --b 0.05 --v-i 3 --v-f 100
+  slipsweep trace free_cubic --alpha-2 -0.12 --alpha-3 -0.066 --t-f 0.02 --a 0.03 --b 0.05 --v-i 3 --v-f 100 --out cubic.csv"
+)]
 pub struct Arguments {
     /// The protocol
     #[arg(value_parser = protocols())]
@@ -64,12 +65,8 @@ pub struct Arguments {
     /// So many equally spaced times instead of the fewest that show every detail
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(2..=10_000_000))]
     points: Option<u32>,
-    /// How to write it; by default what the name of the file ends in, or a table
-    #[arg(long)]
-    format: Option<Format>,
-    /// Where to write it; - is standard output
-    #[arg(short, long, value_name = "FILE", default_value = "-", hide_default_value = true)]
-    out: PathBuf,
+    #[command(flatten)]
+    output: Output<Format>,
 }
 
 /// How a trace is written.
@@ -81,6 +78,13 @@ enum Format {
     Csv,
     /// With units and meanings (.parquet)
     Parquet,
+}
+
+impl output::Format for Format {
+    const ENDINGS: &'static [(&'static str, Format)] =
+        &[("csv", Format::Csv), ("parquet", Format::Parquet), ("txt", Format::Table)];
+    const TABLE: Format = Format::Table;
+    const PARQUET: Format = Format::Parquet;
 }
 
 /// The names of the protocols, with their meanings.
@@ -99,7 +103,7 @@ fn legal(text: &str, domain: Domain) -> Result<f64, String> {
 
 /// Traces a protocol.
 pub fn trace(arguments: &Arguments) -> Result<(), Failure> {
-    let format = arguments.format()?;
+    let (format, output) = (arguments.output.format()?, &arguments.output);
     let protocol = arguments.protocol()?;
     let case = arguments.case();
     let course = protocol.course(&case, arguments.rtol).map_err(|absence| absent(&arguments.protocol, absence))?;
@@ -114,16 +118,12 @@ pub fn trace(arguments: &Arguments) -> Result<(), Failure> {
         Format::Parquet => trace::parquet(&trace, &facts(arguments, &course, &trace), env!("CARGO_PKG_VERSION"))
             .map_err(Failure::failed)?,
     };
-    if arguments.is_stdout() {
+    if output.is_stdout() {
         return put(&bytes);
     }
-    write(&arguments.out, &bytes)
-        .map_err(|error| Failure::failed(format!("cannot write {}: {error}", arguments.out.display())))?;
-    say(&format!("{header}written to {}\n", arguments.out.display()))
-}
-
-fn wrong(message: impl std::fmt::Display) -> Failure {
-    Failure { code: WRONG, message: format!("error: {message}") }
+    to_file(&output.out, |file| file.write_all(&bytes))
+        .map_err(|error| Failure::failed(format!("cannot write {}: {error}", output.out.display())))?;
+    say(&format!("{header}written to {}\n", output.out.display()))
 }
 
 fn absent(protocol: &str, absence: Absence) -> Failure {
@@ -132,29 +132,6 @@ fn absent(protocol: &str, absence: Absence) -> Failure {
 }
 
 impl Arguments {
-    fn is_stdout(&self) -> bool {
-        self.out.as_os_str() == "-"
-    }
-
-    fn format(&self) -> Result<Format, Failure> {
-        let ending = self.out.extension().map(|ending| ending.to_string_lossy().to_lowercase());
-        let format = match (self.format, ending.as_deref()) {
-            (Some(format), _) => format,
-            (None, Some("csv")) => Format::Csv,
-            (None, Some("parquet")) => Format::Parquet,
-            (None, Some("txt")) => Format::Table,
-            (None, _) if self.is_stdout() => Format::Table,
-            (None, _) => {
-                let name = self.out.display();
-                return Err(wrong(format!("{name} ends in none of .csv, .parquet, .txt: add --format")));
-            }
-        };
-        if format == Format::Parquet && self.is_stdout() && io::stdout().is_terminal() {
-            return Err(wrong("Parquet is not for a terminal: name a file with --out, or pipe it on"));
-        }
-        Ok(format)
-    }
-
     /// The protocol, once the arguments that it needs are there and no others.
     fn protocol(&self) -> Result<Protocol, Failure> {
         let name = self.protocol.as_str();
@@ -232,8 +209,9 @@ fn header(arguments: &Arguments, protocol: &Protocol, course: &Course, trace: &T
             text.push_str(&format!("  {rows}: equally spaced times, and the states on the other side of a jump\n"))
         }
         None => text.push_str(&format!(
-            "  {rows}; straight lines between them are good to {} of the range of a column\n",
-            words::number(GOOD)
+            "  {rows}; straight lines between them are good to {} of the range of a column, and to {} of v and theta\n",
+            words::number(GOOD),
+            words::number(CLOSE_UP)
         )),
     }
     text
@@ -293,14 +271,4 @@ fn facts(arguments: &Arguments, course: &Course, trace: &Trace) -> Vec<(String, 
     }
     facts.push(("status".to_owned(), course.status.name().to_owned()));
     facts
-}
-
-/// Writes a file, whole or not at all; what is no plain file (a device, a named pipe) is written to as it is.
-fn write(path: &Path, bytes: &[u8]) -> io::Result<()> {
-    match fs::canonicalize(path) {
-        Ok(real) if fs::metadata(&real)?.is_file() => atomic::write(&real, bytes),
-        Ok(real) => OpenOptions::new().write(true).open(real)?.write_all(bytes),
-        // The folder of a bare name is the one we are in.
-        Err(_) => atomic::write(&Path::new(".").join(path), bytes),
-    }
 }

@@ -2,12 +2,14 @@
 
 use std::path::PathBuf;
 
-use super::{Failure, NOT_STRICT, WRONG, say, words};
-use crate::dataset::{Cell, Folder};
+use super::{Failure, NOT_STRICT, dataset, say, words};
+use crate::dataset::Cell;
 use crate::verify::{Audit, LIMIT, verify as audit};
 
 /// Arguments of `verify`.
 #[derive(Debug, clap::Args)]
+#[command(after_help = "Example:
+  slipsweep verify results/granite --sample 1000")]
 pub struct Arguments {
     /// Folder of the dataset, such as results/NAME
     dataset: PathBuf,
@@ -22,13 +24,7 @@ pub struct Arguments {
 /// Audits a dataset.
 pub fn verify(arguments: &Arguments) -> Result<(), Failure> {
     let path = &arguments.dataset;
-    let manifest = Folder::at(path).manifest().map_err(Failure::failed)?.ok_or_else(|| Failure {
-        code: WRONG,
-        message: format!(
-            "error: {}: not a dataset\n  expected: a folder with a manifest.json\n  help: name a folder that `slipsweep run` wrote",
-            path.display()
-        ),
-    })?;
+    let (_, manifest) = dataset(path)?;
     let audits = audit(path, &manifest, arguments.sample, arguments.seed).map_err(Failure::failed)?;
     let text: Vec<String> = audits.iter().map(summary).collect();
     say(&text.join("\n"))?;

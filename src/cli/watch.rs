@@ -4,9 +4,12 @@ use std::fmt;
 use std::io::{IsTerminal, Write, stderr};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::thread::Thread;
 use std::time::{Duration, Instant};
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressState, ProgressStyle};
+#[cfg(unix)]
+use signal_hook::consts::SIGXFSZ;
 use signal_hook::consts::{SIGINT, SIGTERM};
 
 use super::words;
@@ -29,8 +32,11 @@ pub fn watched<T: Send>(signal: &Signal, rows: u64, quiet: bool, work: impl FnOn
         // Where a signal cannot be listened to, it keeps its usual effect.
         let _ = listen(number, &caught, &finished);
     }
+    // A file that grows beyond the limit of its user is then a write that fails, not the end of the process.
+    #[cfg(unix)]
+    let _ = signal_hook::flag::register(SIGXFSZ, Arc::new(AtomicBool::new(false)));
     let result = std::thread::scope(|scope| {
-        let watcher = scope.spawn(|| {
+        let watch = || {
             let mut show = Show::new(rows, quiet);
             while !finished.load(Ordering::Acquire) {
                 if caught.load(Ordering::Relaxed) != 0 {
@@ -40,14 +46,28 @@ pub fn watched<T: Send>(signal: &Signal, rows: u64, quiet: bool, work: impl FnOn
                 std::thread::park_timeout(LOOK);
             }
             show.end();
-        });
-        let result = work();
-        finished.store(true, Ordering::Release);
-        watcher.thread().unpark();
-        result
+        };
+        // Where no thread can be had, nobody watches.
+        let watcher = std::thread::Builder::new().spawn_scoped(scope, watch).ok();
+        // Also if the work panics: the scope waits for the watcher.
+        let _end = End { finished: &finished, watcher: watcher.as_ref().map(|watcher| watcher.thread()) };
+        work()
     });
     let number = caught.load(Ordering::Relaxed);
     (result, i32::try_from(number).ok().filter(|&number| number != 0))
+}
+
+/// Tells the watcher, when it goes, that there is nothing to watch any more.
+struct End<'a> {
+    finished: &'a AtomicBool,
+    watcher: Option<&'a Thread>,
+}
+
+impl Drop for End<'_> {
+    fn drop(&mut self) {
+        self.finished.store(true, Ordering::Release);
+        self.watcher.inspect(|watcher| watcher.unpark());
+    }
 }
 
 /// Notes `number` in `caught` when it comes, and ends the process when it comes again or once all is `finished`.

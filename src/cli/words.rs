@@ -42,13 +42,13 @@ pub fn things(number: u64, thing: &str) -> String {
 /// `bytes` in a fitting unit.
 pub fn bytes(bytes: f64) -> String {
     let mut value = bytes;
-    for unit in ["B", "kB", "MB", "GB"] {
+    for unit in ["B", "kB", "MB", "GB", "TB", "PB"] {
         if value < 999.5 {
             return format!("{} {unit}", short(value));
         }
         value /= 1000.0;
     }
-    format!("{} TB", short(value))
+    format!("{} EB", short(value))
 }
 
 /// `seconds` in a fitting unit.
@@ -58,7 +58,8 @@ pub fn duration(seconds: f64) -> String {
         s if s < 120.0 => format!("{} s", short(s)),
         s if s < 7200.0 => format!("{} min", short(s / 60.0)),
         s if s < 172_800.0 => format!("{} h", short(s / 3600.0)),
-        s => format!("{} d", short(s / 86_400.0)),
+        s if s < 1e8 => format!("{} d", short(s / 86_400.0)),
+        s => format!("{} years", short(s / 31_557_600.0)),
     }
 }
 
@@ -68,21 +69,54 @@ fn short(value: f64) -> String {
     trimmed(&format!("{value:.decimals$}")).to_owned()
 }
 
-/// Lines with aligned columns, two spaces apart, each after `indent` spaces; numbers to the right.
-pub fn aligned(rows: &[Vec<String>], indent: usize) -> String {
-    let columns = rows.iter().map(Vec::len).max().unwrap_or(0);
-    let width = |column: usize| rows.iter().filter_map(|row| row.get(column)).map(|cell| cell.chars().count()).max();
-    let widths: Vec<usize> = (0..columns).map(|column| width(column).unwrap_or(0)).collect();
-    let mut text = String::new();
-    for row in rows {
-        let mut line = " ".repeat(indent);
-        for (cell, width) in row.iter().zip(&widths) {
-            line.push_str(&format!("{cell:<width$}  "));
+/// Ascending numbers, consecutive ones as first-last.
+pub fn ranges(numbers: impl IntoIterator<Item = u64>) -> String {
+    let mut ranges: Vec<[u64; 2]> = Vec::new();
+    for number in numbers {
+        match ranges.last_mut() {
+            Some([_, last]) if *last + 1 == number => *last = number,
+            _ => ranges.push([number, number]),
         }
-        text.push_str(line.trim_end());
-        text.push('\n');
     }
-    text
+    ranges.into_iter().map(|[first, last]| range(first, last)).collect::<Vec<_>>().join(",")
+}
+
+/// The numbers from `first` to `last`.
+pub fn range(first: u64, last: u64) -> String {
+    if first == last { first.to_string() } else { format!("{first}-{last}") }
+}
+
+/// Lines with aligned columns, two spaces apart, each after `indent` spaces.
+pub fn aligned(rows: &[Vec<String>], indent: usize) -> String {
+    Columns::default().lines(rows, indent)
+}
+
+/// Columns that stay aligned while lines come block by block: a later block makes them wider at most.
+#[derive(Debug, Default)]
+pub struct Columns {
+    widths: Vec<usize>,
+}
+
+impl Columns {
+    /// The next lines, each after `indent` spaces.
+    pub fn lines(&mut self, rows: &[Vec<String>], indent: usize) -> String {
+        for row in rows {
+            self.widths.resize(self.widths.len().max(row.len()), 0);
+            for (cell, width) in row.iter().zip(&mut self.widths) {
+                *width = cell.chars().count().max(*width);
+            }
+        }
+        let mut text = String::new();
+        for row in rows {
+            let mut line = " ".repeat(indent);
+            for (cell, width) in row.iter().zip(&self.widths) {
+                line.push_str(&format!("{cell:<width$}  "));
+            }
+            text.push_str(line.trim_end());
+            text.push('\n');
+        }
+        text
+    }
 }
 
 #[cfg(test)]
@@ -117,11 +151,20 @@ mod tests {
             ["0", "999", "1,000", "482,403", "1,000,000,000"]
         );
         assert_eq!([things(1, "row"), things(1200, "part")], ["1 row", "1,200 parts"]);
-        assert_eq!([0.0, 999.0, 1500.0, 2.5e7, 3e13].map(bytes), ["0 B", "999 B", "1.5 kB", "25 MB", "30 TB"]);
         assert_eq!(
-            [0.0123, 1.0, 90.0, 600.0, 1e5, 1e6].map(duration),
-            ["12.3 ms", "1 s", "90 s", "10 min", "27.8 h", "11.6 d"]
+            [0.0, 999.0, 1500.0, 2.5e7, 3e13, 2e20].map(bytes),
+            ["0 B", "999 B", "1.5 kB", "25 MB", "30 TB", "200 EB"]
         );
+        assert_eq!(
+            [0.0123, 1.0, 90.0, 600.0, 1e5, 1e6, 1e9].map(duration),
+            ["12.3 ms", "1 s", "90 s", "10 min", "27.8 h", "11.6 d", "31.7 years"]
+        );
+    }
+
+    #[test]
+    fn consecutive_numbers_are_ranges() {
+        assert_eq!(ranges([0, 1, 2, 5, 7, 8]), "0-2,5,7-8");
+        assert_eq!(ranges([]), "");
     }
 
     #[test]

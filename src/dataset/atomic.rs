@@ -1,26 +1,151 @@
 //! Files that are there whole or not at all.
+//!
+//! The bytes go to a name of their own, are synced, and the name is changed; then the folder is synced. A process that dies in between
+//! leaves a temporary file behind, which [`sweep`] removes.
 
-use std::fs::{self, File};
+use std::fs::{self, File, TryLockError};
 use std::io::{self, Write};
-use std::path::Path;
+use std::path::{Path, PathBuf};
+use std::time::{Duration, SystemTime};
+
+/// Age from which a temporary file of another machine is taken for abandoned, by the clock of the file system. Writing one takes seconds.
+const ABANDONED: Duration = Duration::from_secs(24 * 60 * 60);
+
+/// Times that a file is written if its temporary file vanishes, which happens where a machine takes a living process for dead.
+const ATTEMPTS: u32 = 3;
+
+/// A step that failed, and why.
+#[derive(Debug)]
+pub struct Unwritten {
+    /// What was tried.
+    pub action: &'static str,
+    /// Why not.
+    pub source: io::Error,
+}
 
 /// Writes `bytes` to `path` so that at no time, not even after a power cut, an incomplete file bears the name.
-///
-/// The bytes go to a name with a leading dot that no other process uses, are synced, and the name is changed; then the folder is synced.
-pub fn write(path: &Path, bytes: &[u8]) -> io::Result<()> {
+pub fn write(path: &Path, bytes: &[u8]) -> Result<(), Unwritten> {
+    let failed = |action, source| Unwritten { action, source };
+    let fill = |file: &mut File| file.write_all(bytes).map_err(|source| failed("write", source));
+    let mut attempt = 1;
+    loop {
+        match publish(path, fill, failed) {
+            Err(Unwritten { action: RENAME, source })
+                if source.kind() == io::ErrorKind::NotFound && attempt < ATTEMPTS =>
+            {
+                attempt += 1;
+            }
+            done => return done,
+        }
+    }
+}
+
+/// The same with whatever `fill` writes.
+#[cfg(feature = "cli")]
+pub fn write_with<E: From<io::Error>>(path: &Path, fill: impl FnOnce(&mut File) -> Result<(), E>) -> Result<(), E> {
+    publish(path, fill, |_, source| source.into())
+}
+
+const RENAME: &str = "rename the temporary file";
+
+fn publish<E>(
+    path: &Path,
+    fill: impl FnOnce(&mut File) -> Result<(), E>,
+    failed: impl Fn(&'static str, io::Error) -> E,
+) -> Result<(), E> {
     let (Some(folder), Some(name)) = (path.parent(), path.file_name()) else {
-        return Err(io::Error::new(io::ErrorKind::InvalidInput, "not the path of a file"));
+        return Err(failed("write", io::Error::new(io::ErrorKind::InvalidInput, "not the path of a file")));
     };
-    let temporary = folder.join(format!(".{}.{}", name.to_string_lossy(), std::process::id()));
-    let written = File::create(&temporary)
-        .and_then(|mut file| file.write_all(bytes).and_then(|()| file.sync_all()))
-        .and_then(|()| fs::rename(&temporary, path))
-        .and_then(|()| sync_folder(folder));
+    let (temporary, mut file) = create(folder, &name.to_string_lossy()).map_err(|error| failed("create", error))?;
+    // Tells processes of this machine that the file has an owner. Where files cannot be locked, its age tells.
+    let _ = file.try_lock();
+    let written = fill(&mut file)
+        .and_then(|()| file.sync_all().map_err(|error| failed("sync", error)))
+        .and_then(|()| fs::rename(&temporary, path).map_err(|error| failed(RENAME, error)))
+        .and_then(|()| sync_folder(folder).map_err(|error| failed("sync the folder", error)));
     if written.is_err() {
         // The first error is the one to report; a leftover bears a dot and does no harm.
         let _ = fs::remove_file(&temporary);
     }
     written
+}
+
+/// Creates a temporary file for `name` that no other process has: its name tells machine and process, and a number if that is taken.
+fn create(folder: &Path, name: &str) -> io::Result<(PathBuf, File)> {
+    let (machine, process) = (machine(), std::process::id());
+    let mut number = 0_u32;
+    loop {
+        let temporary = folder.join(format!(".{name}.{process}-{number}@{machine}{SUFFIX}"));
+        match File::create_new(&temporary) {
+            Err(error) if error.kind() == io::ErrorKind::AlreadyExists && number < u32::MAX => number += 1,
+            created => return created.map(|file| (temporary, file)),
+        }
+    }
+}
+
+/// How the name of a temporary file ends.
+const SUFFIX: &str = ".tmp";
+
+/// The name of this machine, as far as it may be part of a file's name.
+fn machine() -> String {
+    let name = fs::read_to_string("/proc/sys/kernel/hostname").unwrap_or_default();
+    let name: String =
+        name.trim().chars().map(|c| if c.is_ascii_alphanumeric() || c == '-' { c } else { '_' }).collect();
+    if name.is_empty() { "localhost".to_owned() } else { name }
+}
+
+/// Whether a file of this name is a temporary one of ours.
+pub fn is_temporary(name: &str) -> bool {
+    name.starts_with('.') && name.ends_with(SUFFIX) && name.contains('@')
+}
+
+/// Removes the temporary files in `folder` whose processes are gone. `now` is the time by the clock of the file system.
+///
+/// A process holds a lock on its temporary file as long as it lives. Locks may not reach other machines, so a file of another machine
+/// counts as abandoned only when it is old. That something cannot be removed is no failure: such files do no harm.
+pub fn sweep(folder: &Path, now: SystemTime) {
+    let ours = format!("@{}{SUFFIX}", machine());
+    for entry in fs::read_dir(folder).into_iter().flatten().flatten() {
+        let name = entry.file_name();
+        let name = name.to_string_lossy();
+        // Opening a named pipe would wait for somebody who writes.
+        if !is_temporary(&name) || !entry.file_type().is_ok_and(|kind| kind.is_file()) {
+            continue;
+        }
+        let abandoned = if name.ends_with(&ours) {
+            match File::open(entry.path()).map(|file| file.try_lock()) {
+                Ok(Ok(())) => true,
+                Ok(Err(TryLockError::WouldBlock)) => false,
+                _ => is_old(&entry, now),
+            }
+        } else {
+            is_old(&entry, now)
+        };
+        if abandoned {
+            let _ = fs::remove_file(entry.path());
+        }
+    }
+}
+
+fn is_old(entry: &fs::DirEntry, now: SystemTime) -> bool {
+    let written = entry.metadata().and_then(|metadata| metadata.modified());
+    written.is_ok_and(|written| now.duration_since(written).is_ok_and(|age| age > ABANDONED))
+}
+
+/// Creates `folder` and those above it that are missing, each durably.
+pub fn create_folder(folder: &Path) -> io::Result<()> {
+    if folder.is_dir() {
+        return Ok(());
+    }
+    let above = folder.parent().filter(|above| !above.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    if above != Path::new(".") {
+        create_folder(above)?;
+    }
+    match fs::create_dir(folder) {
+        // Another process was faster.
+        Err(error) if error.kind() == io::ErrorKind::AlreadyExists && folder.is_dir() => Ok(()),
+        created => created.and_then(|()| sync_folder(above)),
+    }
 }
 
 #[cfg(unix)]
@@ -32,4 +157,50 @@ fn sync_folder(folder: &Path) -> io::Result<()> {
 #[cfg(not(unix))]
 fn sync_folder(_folder: &Path) -> io::Result<()> {
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    //! Which temporary files are swept away, and what happens to a process whose file was.
+
+    use super::*;
+
+    fn names(folder: &Path) -> Vec<String> {
+        let entries = fs::read_dir(folder).expect("is readable");
+        let mut names: Vec<_> =
+            entries.map(|entry| entry.expect("is readable").file_name().to_string_lossy().into_owned()).collect();
+        names.sort();
+        names
+    }
+
+    #[test]
+    fn files_of_the_dead_are_swept_and_those_of_the_living_stay() {
+        let folder = tempfile::tempdir().expect("is writable");
+        let now = SystemTime::now();
+        let (dead, _) = create(folder.path(), "dead").expect("is writable");
+        let (living, file) = create(folder.path(), "living").expect("is writable");
+        file.lock().expect("can be locked");
+        let foreign = folder.path().join(".part-000000.parquet.1-0@elsewhere.tmp");
+        fs::write(&foreign, "").expect("is writable");
+        fs::write(folder.path().join(".mine.tmp"), "").expect("is writable");
+        let shown = |path: &Path| path.file_name().expect("has a name").to_string_lossy().into_owned();
+        sweep(folder.path(), now);
+        assert!(!dead.exists());
+        assert_eq!(names(folder.path()), [shown(&living), ".mine.tmp".to_owned(), shown(&foreign)]);
+        sweep(folder.path(), now + ABANDONED + Duration::from_secs(60));
+        assert_eq!(names(folder.path()), [shown(&living), ".mine.tmp".to_owned()]);
+        drop(file);
+        sweep(folder.path(), now);
+        assert_eq!(names(folder.path()), [".mine.tmp"]);
+    }
+
+    #[test]
+    fn names_that_are_taken_are_left_alone() {
+        let folder = tempfile::tempdir().expect("is writable");
+        let (first, mut file) = create(folder.path(), "x").expect("is writable");
+        file.write_all(b"first").expect("is writable");
+        write(&folder.path().join("x"), b"second").expect("is writable");
+        assert_eq!(fs::read(first).expect("is readable"), b"first");
+        assert_eq!(fs::read(folder.path().join("x")).expect("is readable"), b"second");
+    }
 }

@@ -2,13 +2,13 @@
 //!
 //! Parts are read one at a time, so the memory does not grow with the table.
 
-use std::fs::File;
+use std::borrow::Cow;
 use std::path::Path;
 
-use polars::prelude::{DataFrame, Float64Chunked, NewChunkedArray, ParquetReader, PolarsError, SerReader};
-
 use super::folder::{Folder, ManifestTable};
-use crate::grid::{Point, Quantity};
+use super::frame::{self, Cells, Frame, FrameError, Row};
+use crate::grid::{Point, Quantity, Scale};
+use crate::model::Units;
 use crate::protocol::Status;
 use crate::protocol::swift::FAMILIES;
 use crate::table::{self, Column, Kind, OPTIMUM_AXES, Prediction, STATUS};
@@ -22,6 +22,8 @@ const GAP: &str = "gap";
 /// What a table contains.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Digest {
+    /// Parts that are not there.
+    pub missing: u64,
     /// Rows by status, in the order of [`Status::ALL`].
     pub status: [u64; Status::ALL.len()],
     /// The columns of numbers after the axes.
@@ -49,87 +51,73 @@ pub struct Range {
     pub greatest: f64,
 }
 
-/// One row: the names of its cells and what is in them.
-pub type Row = Vec<(String, Cell)>;
-
-/// A cell.
-#[derive(Debug, Clone, PartialEq)]
-pub enum Cell {
-    /// Null.
-    Missing,
-    /// A number.
-    Number(f64),
-    /// A word.
-    Word(String),
-}
-
 /// Why a table cannot be read back.
 #[derive(Debug, thiserror::Error)]
-#[error(
-    "{path}: cannot read back: {source}\n  help: delete the file and run the sweep again, which makes only what is missing"
-)]
-pub struct ReadError {
-    path: String,
-    source: PolarsError,
-}
+#[error("{0}\n  help: delete the file and run the sweep again, which makes only what is missing")]
+pub struct ReadError(#[from] FrameError);
 
 impl Digest {
-    /// Reads all parts of `table`.
-    pub fn read(folder: &Folder, table: &ManifestTable) -> Result<Digest, ReadError> {
+    /// Reads the parts of `table` that are there; its values are in `units`.
+    pub fn read(folder: &Folder, table: &ManifestTable, units: &Units) -> Result<Digest, ReadError> {
+        let there = folder.parts_there(table);
+        let missing = table.parts - there.len() as u64;
+        let mut digest = Digest::read_parts(folder, table, units, there)?;
+        digest.missing += missing;
+        Ok(digest)
+    }
+
+    /// Reads some parts of `table`.
+    pub fn read_parts(
+        folder: &Folder,
+        table: &ManifestTable,
+        units: &Units,
+        parts: impl IntoIterator<Item = u64>,
+    ) -> Result<Digest, ReadError> {
         let mut digest = Digest { rows: (table.rows <= FEW as u64).then(Vec::new), ..Digest::default() };
         let mut least = Least::default();
-        for part in 0..table.parts {
+        for part in parts {
             let path = folder.part(&table.name, part);
-            digest
-                .add(&table.name, &path, &mut least)
-                .map_err(|source| ReadError { path: path.display().to_string(), source })?;
+            if !folder.has_part(&table.name, part) {
+                digest.missing += 1;
+                continue;
+            }
+            digest.add(&table.name, &path, units, &mut least)?;
         }
         digest.least = least.rows();
         Ok(digest)
     }
 
-    fn add(&mut self, table: &str, path: &Path, least: &mut Least) -> Result<(), PolarsError> {
+    fn add(&mut self, table: &str, path: &Path, units: &Units, least: &mut Least) -> Result<(), FrameError> {
         let prediction = table::find(table).and_then(|table| table.prediction());
         let columns = table::find(table).map_or(&[][..], |table| table.columns());
-        let mut reader = ParquetReader::new(File::open(path)?);
-        let written = reader.schema()?;
-        let columns: Vec<&Column> = columns.iter().filter(|column| written.contains(column.name)).collect();
+        let (headings, _) = frame::headings(path)?;
+        let written = |name: &str| headings.iter().any(|heading| heading.name == name);
+        let columns: Vec<&Column> = columns.iter().filter(|column| written(column.name)).collect();
         let with_gap = columns.iter().any(|column| column.name == GAP);
         // The axes are only needed to tell transitions apart: reading them all would take as long as reading the results.
         let keys = keys(table);
-        let prediction = prediction.filter(|prediction| written.contains(prediction.column));
+        let prediction = prediction.filter(|prediction| written(prediction.column));
         let axes = keys.iter().filter(|_| with_gap).chain(prediction.map_or(&[][..], |prediction| prediction.axes));
         let axes = axes.map(|axis| axis.name());
-        let names = axes.chain(columns.iter().map(|column| column.name)).chain([STATUS]).map(str::to_owned);
-        let frame = &mut reader.with_columns(Some(names.collect())).finish()?;
-        frame.rechunk_mut();
-        for (word, rows) in count_words(frame, STATUS)? {
+        let names: Vec<&str> = axes.chain(columns.iter().map(|column| column.name)).chain([STATUS]).collect();
+        let frame = &frame::read(path, &names)?;
+        for (word, rows) in count_words(frame, STATUS) {
             if let Some(status) = Status::ALL.iter().position(|status| status.name() == word) {
                 self.status[status] += rows;
             }
         }
         for column in columns {
             match column.kind {
-                Kind::Number(_) | Kind::Quantity(_) => self.add_numbers(frame, column.name)?,
-                Kind::Label(_) => {
-                    let counts = count_words(frame, column.name)?;
-                    self.add_words(column.name, counts);
-                }
-                Kind::Flag => {
-                    let flags = frame.column(column.name)?.bool()?;
-                    let count = |flag| flags.iter().flatten().filter(|&found| found == flag).count() as u64;
-                    let counts = [(true, "yes"), (false, "no")].map(|(flag, word)| (word.to_owned(), count(flag)));
-                    self.add_words(column.name, counts.into_iter().filter(|(_, rows)| *rows > 0).collect());
-                }
+                Kind::Number(_) | Kind::Quantity(_) => self.add_numbers(frame, column.name),
+                Kind::Label(_) | Kind::Flag => self.add_words(column.name, count_words(frame, column.name)),
             }
         }
         if let Some(prediction) = prediction {
-            self.add_predictions(frame, &prediction)?;
+            self.add_predictions(frame, &prediction, units);
         }
         if let Some(rows) = &mut self.rows {
-            for index in 0..frame.height() {
-                rows.push(row(path, index)?);
-            }
+            let whole = frame::read_all(path)?;
+            rows.extend((0..whole.height).map(|row| whole.row(row)));
         }
         if with_gap {
             least.add(frame, path, &keys)?;
@@ -137,10 +125,10 @@ impl Digest {
         Ok(())
     }
 
-    fn add_numbers(&mut self, frame: &DataFrame, name: &str) -> Result<(), PolarsError> {
-        let values = frame.column(name)?.f64()?;
+    fn add_numbers(&mut self, frame: &Frame, name: &str) {
+        let Some(Cells::Numbers(values)) = frame.column(name) else { return };
         let mut range = Range { column: name.to_owned(), count: 0, least: f64::INFINITY, greatest: f64::NEG_INFINITY };
-        for value in values.iter().flatten() {
+        for &value in values.iter().filter(|value| !value.is_nan()) {
             range.count += 1;
             range.least = range.least.min(value);
             range.greatest = range.greatest.max(value);
@@ -153,26 +141,25 @@ impl Digest {
             }
             None => self.ranges.push(range),
         }
-        Ok(())
     }
 
-    fn add_predictions(&mut self, frame: &DataFrame, prediction: &Prediction) -> Result<(), PolarsError> {
-        let axes = prediction.axes.iter().map(|axis| numbers(frame, *axis)).collect::<Result<Vec<_>, _>>()?;
-        let found = frame.column(prediction.column)?.cat32()?;
+    fn add_predictions(&mut self, frame: &Frame, prediction: &Prediction, units: &Units) {
+        let axes: Vec<Cow<'_, [f64]>> = prediction.axes.iter().map(|axis| numbers(frame, *axis)).collect();
+        let Some(Cells::Words(found, words)) = frame.column(prediction.column) else { return };
         let mut point = Point::default();
-        for (row, code) in found.physical().iter().enumerate() {
-            let Some(word) = code.and_then(|code| found.get_mapping().cat_to_str(code)) else { continue };
+        for (row, place) in found.iter().enumerate() {
+            let Some(word) = place.and_then(|place| words.get(place as usize)) else { continue };
             for (quantity, values) in prediction.axes.iter().zip(&axes) {
-                point[*quantity] = values.get(row).unwrap_or(f64::NAN);
+                let value = values.get(row).copied().unwrap_or(f64::NAN);
+                point[*quantity] = units.scaled(quantity.unit(Scale::Model), value);
             }
             let predicted = (prediction.word)(&point);
-            match self.predicted.iter_mut().find(|(p, f, _)| (*p, f.as_str()) == (predicted, word)) {
+            match self.predicted.iter_mut().find(|(p, f, _)| (*p, f) == (predicted, word)) {
                 Some((.., rows)) => *rows += 1,
-                None => self.predicted.push((predicted, word.to_owned(), 1)),
+                None => self.predicted.push((predicted, word.clone(), 1)),
             }
         }
         self.predicted.sort();
-        Ok(())
     }
 
     fn add_words(&mut self, name: &str, found: Vec<(String, u64)>) {
@@ -194,43 +181,16 @@ impl Digest {
     }
 }
 
-/// The words of a column and how many rows have each.
-fn count_words(frame: &DataFrame, name: &str) -> Result<Vec<(String, u64)>, PolarsError> {
-    let words = frame.column(name)?.cat32()?;
-    let mut counts: Vec<(u32, u64)> = Vec::new();
-    let mut last = 0;
-    for code in words.physical().iter().flatten() {
-        if counts.get(last).is_none_or(|(known, _)| *known != code) {
-            last = counts.iter().position(|(known, _)| *known == code).unwrap_or_else(|| {
-                counts.push((code, 0));
-                counts.len() - 1
-            });
+/// The words of a column that occur, and how many rows have each.
+fn count_words(frame: &Frame, name: &str) -> Vec<(String, u64)> {
+    let Some(Cells::Words(places, words)) = frame.column(name) else { return Vec::new() };
+    let mut counts = vec![0_u64; words.len()];
+    for place in places.iter().flatten() {
+        if let Some(count) = counts.get_mut(*place as usize) {
+            *count += 1;
         }
-        counts[last].1 += 1;
     }
-    let word = |code| words.get_mapping().cat_to_str(code).unwrap_or_default().to_owned();
-    Ok(counts.into_iter().map(|(code, rows)| (word(code), rows)).collect())
-}
-
-/// One row of a part, with all its columns.
-fn row(path: &Path, index: usize) -> Result<Row, PolarsError> {
-    let frame = ParquetReader::new(File::open(path)?).with_slice(Some((index, 1))).finish()?;
-    frame
-        .columns()
-        .iter()
-        .map(|column| {
-            let cell = if let Some(numbers) = column.try_f64() {
-                numbers.get(0).map(Cell::Number)
-            } else if let Some(flags) = column.try_bool() {
-                flags.get(0).map(|flag| Cell::Word(if flag { "yes" } else { "no" }.to_owned()))
-            } else {
-                let words = column.cat32()?;
-                let word = words.physical().get(0).and_then(|code| words.get_mapping().cat_to_str(code));
-                word.map(|word| Cell::Word(word.to_owned()))
-            };
-            Ok((column.name().to_string(), cell.unwrap_or(Cell::Missing)))
-        })
-        .collect()
+    words.iter().cloned().zip(counts).filter(|(_, count)| *count > 0).collect()
 }
 
 /// What tells rows apart for which a least gap each is of interest: the optimal problem, or the transition and the family.
@@ -241,17 +201,17 @@ fn keys(table: &str) -> Vec<Quantity> {
 }
 
 /// The column of an axis as numbers; of words, their places.
-fn numbers(frame: &DataFrame, axis: Quantity) -> Result<Float64Chunked, PolarsError> {
-    let column = frame.column(axis.name())?;
-    let words = axis.words();
-    if words.is_empty() {
-        return Ok(column.f64()?.clone());
+fn numbers(frame: &Frame, axis: Quantity) -> Cow<'_, [f64]> {
+    match frame.column(axis.name()) {
+        Some(Cells::Numbers(numbers)) => numbers.into(),
+        Some(Cells::Words(places, words)) => {
+            let known = |word: &String| axis.words().iter().position(|known| known == word);
+            let codes: Vec<f64> = words.iter().map(|word| known(word).map_or(f64::NAN, |place| place as f64)).collect();
+            let code = |place: &Option<u32>| place.and_then(|place| codes.get(place as usize).copied());
+            places.iter().map(|place| code(place).unwrap_or(f64::NAN)).collect()
+        }
+        None => vec![f64::NAN; frame.height].into(),
     }
-    let column = column.cat32()?;
-    let place =
-        |code| column.get_mapping().cat_to_str(code).and_then(|word| words.iter().position(|known| *known == word));
-    let places = column.physical().iter().map(|code| code.and_then(place).map(|place| place as f64));
-    Ok(Float64Chunked::from_iter_options(axis.name().into(), places))
 }
 
 /// The least gap of each transition and time so far, while those are few, and of all.
@@ -263,13 +223,13 @@ struct Least {
 }
 
 impl Least {
-    fn add(&mut self, frame: &DataFrame, path: &Path, keys: &[Quantity]) -> Result<(), PolarsError> {
-        let gaps = frame.column(GAP)?.f64()?;
-        let status = frame.column(STATUS)?.cat32()?;
-        let codes = status.physical();
-        let ok = |code| status.get_mapping().cat_to_str(code) == Some(Status::Ok.name());
-        let axes = keys.iter().map(|axis| numbers(frame, *axis)).collect::<Result<Vec<_>, _>>()?;
-        let axes = axes.iter().map(|axis| axis.cont_slice()).collect::<Result<Vec<_>, _>>()?;
+    fn add(&mut self, frame: &Frame, path: &Path, keys: &[Quantity]) -> Result<(), FrameError> {
+        let (Some(Cells::Numbers(gaps)), Some(Cells::Words(status, words))) = (frame.column(GAP), frame.column(STATUS))
+        else {
+            return Ok(());
+        };
+        let ok = words.iter().position(|word| word == Status::Ok.name()).map(|place| place as u32);
+        let axes: Vec<Cow<'_, [f64]>> = keys.iter().map(|axis| numbers(frame, *axis)).collect();
         let family = keys.iter().position(|key| *key == Quantity::Family);
         let arrives = |index: usize| {
             family.is_none_or(|key| FAMILIES.get(axes[key][index] as usize).is_none_or(|family| family.arrives()))
@@ -278,9 +238,8 @@ impl Least {
         let mut found: Vec<(usize, f64)> = Vec::new();
         let mut current = 0;
         let same = |a: usize, b: usize| axes.iter().all(|axis| axis[a].to_bits() == axis[b].to_bits());
-        for (index, (gap, code)) in gaps.iter().zip(codes.iter()).enumerate() {
-            let (Some(gap), Some(code)) = (gap, code) else { continue };
-            if !ok(code) || !arrives(index) {
+        for (index, (&gap, &status)) in gaps.iter().zip(status).enumerate() {
+            if gap.is_nan() || ok.is_none() || status != ok || !arrives(index) {
                 continue;
             }
             if found.get(current).is_none_or(|(other, _)| !same(*other, index)) {
@@ -302,12 +261,12 @@ impl Least {
         for (index, gap) in found {
             let tuple: Vec<u64> = axes.iter().map(|axis| axis[index].to_bits()).collect();
             if self.all.as_ref().is_none_or(|(least, _)| gap < *least) {
-                self.all = Some((gap, row(path, index)?));
+                self.all = Some((gap, frame::row(path, index)?));
             }
             match self.each.iter().position(|(known, ..)| *known == tuple) {
-                Some(place) if gap < self.each[place].1 => self.each[place] = (tuple, gap, row(path, index)?),
+                Some(place) if gap < self.each[place].1 => self.each[place] = (tuple, gap, frame::row(path, index)?),
                 Some(_) => {}
-                None if self.each.len() < FEW => self.each.push((tuple, gap, row(path, index)?)),
+                None if self.each.len() < FEW => self.each.push((tuple, gap, frame::row(path, index)?)),
                 None => self.many = true,
             }
         }

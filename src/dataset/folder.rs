@@ -4,10 +4,13 @@ use std::fs;
 use std::io;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
+use std::time::SystemTime;
 
 use serde::{Deserialize, Serialize};
 
-use super::atomic;
+use super::atomic::{self, Unwritten};
+use super::footer::Footer;
+use super::state::{self, Look, State};
 
 /// What a dataset was made from: parts of different identity never share a folder.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
@@ -32,14 +35,15 @@ pub struct ManifestTable {
 }
 
 impl ManifestTable {
-    /// The rows of part number `part`.
+    /// The rows of part number `part`; none if there is no such part, whatever a manifest claims.
     pub fn rows_of(&self, part: u64) -> Range<u64> {
-        let start = part * self.rows_per_part;
-        start..(start + self.rows_per_part).min(self.rows)
+        let start = part.saturating_mul(self.rows_per_part).min(self.rows);
+        start..start.saturating_add(self.rows_per_part).min(self.rows)
     }
 }
 
-/// `manifest.json`: what the finished dataset consists of. It is there before the first part.
+/// `manifest.json`: what the finished dataset consists of. It is there before the first part, and follows from the spec as well as from any
+/// part, so that nobody has to guard it.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Manifest {
     /// The name of the dataset.
@@ -80,8 +84,23 @@ pub enum DatasetError {
         /// The folder.
         folder: String,
     },
+    /// A file in the place of a part was not made by this sweep.
+    #[error(
+        "{path}: belongs to another {what}\n  expected: {expected}\n  found: {found}\n  help: move the file away, or delete it; the same \
+         command then makes the part and keeps all others"
+    )]
+    ForeignPart {
+        /// The file.
+        path: String,
+        /// In what it differs.
+        what: &'static str,
+        /// What the part has.
+        expected: String,
+        /// What the file has.
+        found: String,
+    },
     /// The manifest cannot be understood.
-    #[error("{path}: not a manifest: {source}\n  help: delete the folder, or write elsewhere with --out DIR")]
+    #[error("{path}: not a manifest: {source}\n  help: delete the file; the next run makes it again")]
     Manifest {
         /// The file.
         path: String,
@@ -89,7 +108,10 @@ pub enum DatasetError {
         source: serde_json::Error,
     },
     /// The system refused.
-    #[error("{path}: cannot {action}: {source}\n  help: write elsewhere with --out DIR")]
+    #[error(
+        "{path}: cannot {action}: {source}\n  help: mend that, then run the same command again, which keeps what is finished; or write \
+         elsewhere with --out DIR"
+    )]
     Io {
         /// The file or folder.
         path: String,
@@ -148,7 +170,11 @@ impl Folder {
     /// The manifest, if there is one.
     pub fn manifest(&self) -> Result<Option<Manifest>, DatasetError> {
         let path = self.path.join("manifest.json");
-        match fs::read(&path) {
+        let read = fs::metadata(&path).and_then(|metadata| {
+            // Reading a named pipe would wait for somebody who writes, and a device might never end.
+            if metadata.is_file() { fs::read(&path) } else { Err(io::Error::other("it is not a file")) }
+        });
+        match read {
             Ok(bytes) => serde_json::from_slice(&bytes)
                 .map(Some)
                 .map_err(|source| DatasetError::Manifest { path: path.display().to_string(), source }),
@@ -157,28 +183,52 @@ impl Folder {
         }
     }
 
+    /// The manifest as the parts tell it, if there is a part that can be read.
+    pub fn manifest_of_parts(&self) -> Option<Manifest> {
+        let is_part = |path: &Path| {
+            let name = path.file_name().unwrap_or_default().to_string_lossy();
+            name.starts_with("part-") && name.ends_with(".parquet")
+        };
+        let parts = sorted(&self.path, Path::is_dir).into_iter().flat_map(|table| sorted(&table, is_part));
+        let mut footers = parts.filter_map(|part| Footer::from_entries(&state::footer_of(&part).ok()??));
+        footers.next().map(Footer::manifest)
+    }
+
     /// Makes the folder ready for the parts of `manifest`, or refuses if it belongs to something else.
     pub fn open(&self, manifest: &Manifest) -> Result<(), DatasetError> {
-        match self.manifest()? {
-            Some(found) => self.compare(manifest, &found)?,
-            None => {
-                let occupied = fs::read_dir(&self.path).is_ok_and(|entries| {
-                    entries.flatten().any(|entry| !entry.file_name().to_string_lossy().starts_with('.'))
-                });
-                if occupied {
-                    return Err(DatasetError::Occupied { folder: self.path.display().to_string() });
-                }
-            }
+        let mut found = self.manifest()?;
+        let occupied = found.is_none()
+            && fs::read_dir(&self.path).is_ok_and(|entries| {
+                entries.flatten().any(|entry| !entry.file_name().to_string_lossy().starts_with('.'))
+            });
+        if occupied {
+            // Another run may have published its manifest, the first file with a name, a moment ago.
+            found = self.manifest()?;
         }
-        fs::create_dir_all(&self.path).map_err(|error| failed(&self.path, "create the folder", error))?;
-        let path = self.path.join("manifest.json");
-        let mut text = serde_json::to_vec_pretty(manifest)
-            .map_err(|source| DatasetError::Manifest { path: path.display().to_string(), source })?;
-        text.push(b'\n');
-        atomic::write(&path, &text).map_err(|error| failed(&path, "write", error))?;
+        match found.clone().or_else(|| self.manifest_of_parts()) {
+            Some(found) => self.compare(manifest, &found)?,
+            None if occupied => {
+                return Err(DatasetError::Occupied { folder: self.path.display().to_string() });
+            }
+            None => {}
+        }
+        let create =
+            |folder: &Path| atomic::create_folder(folder).map_err(|error| failed(folder, "create the folder", error));
+        create(&self.path)?;
+        // Thousands of shards find it as it should be: none of them needs to write it again.
+        if found.as_ref() != Some(manifest) {
+            let path = self.path.join("manifest.json");
+            let mut text = serde_json::to_vec_pretty(manifest)
+                .map_err(|source| DatasetError::Manifest { path: path.display().to_string(), source })?;
+            text.push(b'\n');
+            atomic::write(&path, &text).map_err(|error| unwritten(&path, error))?;
+        }
+        let now = SystemTime::now();
+        atomic::sweep(&self.path, now);
         for table in &manifest.tables {
             let folder = self.path.join(&table.name);
-            fs::create_dir_all(&folder).map_err(|error| failed(&folder, "create the folder", error))?;
+            create(&folder)?;
+            atomic::sweep(&folder, now);
         }
         Ok(())
     }
@@ -204,16 +254,62 @@ impl Folder {
         Ok(())
     }
 
-    /// Whether a part is finished. A part has its name only once it is whole.
+    /// The numbers of the parts of `table` in whose place there is something, ascending. One look at the folder tells, so that parts
+    /// that are missing cost nothing, however many.
+    pub fn parts_there(&self, table: &ManifestTable) -> Vec<u64> {
+        let entries = fs::read_dir(self.path.join(&table.name)).into_iter().flatten().flatten();
+        let mut parts: Vec<u64> = entries.filter_map(|entry| self.part_at(table, &entry.path())).collect();
+        parts.sort_unstable();
+        parts
+    }
+
+    /// Whether there is a file in the place of a part; [`Folder::state`] tells what it is.
     pub fn has_part(&self, table: &str, part: u64) -> bool {
         self.part(table, part).is_file()
+    }
+
+    /// What is in the place of a part of the dataset of `manifest`.
+    pub fn state(&self, manifest: &Manifest, table: &str, part: u64, look: Look) -> State {
+        state::state(&self.part(table, part), manifest, table, part, look)
     }
 
     /// Writes a part, whole or not at all.
     pub fn write_part(&self, table: &str, part: u64, bytes: &[u8]) -> Result<(), DatasetError> {
         let path = self.part(table, part);
-        atomic::write(&path, bytes).map_err(|error| failed(&path, "write", error))
+        atomic::write(&path, bytes).map_err(|error| unwritten(&path, error))
     }
+
+    /// Files below the folder that are no part of the dataset of `manifest`, and whether they are temporary files of a run.
+    pub fn strays(&self, manifest: &Manifest) -> Vec<(PathBuf, bool)> {
+        let mut strays = Vec::new();
+        for path in sorted(&self.path, |_| true) {
+            let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+            match manifest.tables.iter().find(|table| table.name == name) {
+                Some(table) if path.is_dir() => {
+                    strays.extend(sorted(&path, |path| self.part_at(table, path).is_none()));
+                }
+                _ if name == "manifest.json" => {}
+                _ => strays.push(path),
+            }
+        }
+        let is_temporary = |path: &Path| atomic::is_temporary(&path.file_name().unwrap_or_default().to_string_lossy());
+        strays.into_iter().map(|path| (is_temporary(&path), path)).map(|(temporary, path)| (path, temporary)).collect()
+    }
+
+    /// The number of the part of `table` whose place `path` is.
+    fn part_at(&self, table: &ManifestTable, path: &Path) -> Option<u64> {
+        let name = path.file_name()?.to_string_lossy();
+        let part = name.strip_prefix("part-")?.strip_suffix(".parquet")?.parse().ok()?;
+        (part < table.parts && self.part(&table.name, part) == path).then_some(part)
+    }
+}
+
+/// What is `wanted` of what is in a folder, in the order of names; nothing if it cannot be read.
+fn sorted(folder: &Path, wanted: impl Fn(&Path) -> bool) -> Vec<PathBuf> {
+    let entries = fs::read_dir(folder).into_iter().flatten().flatten();
+    let mut paths: Vec<PathBuf> = entries.map(|entry| entry.path()).filter(|path| wanted(path)).collect();
+    paths.sort();
+    paths
 }
 
 /// The first lines in which two specs differ, blank lines and comments aside, each with its number.
@@ -236,6 +332,10 @@ fn first_difference(here: &str, there: &str) -> Option<[String; 2]> {
             return Some(pair.map(show));
         }
     }
+}
+
+fn unwritten(path: &Path, Unwritten { action, source }: Unwritten) -> DatasetError {
+    failed(path, action, source)
 }
 
 fn failed(path: &Path, action: &'static str, source: io::Error) -> DatasetError {

@@ -26,7 +26,7 @@ impl Layout {
         let columns: Vec<Column> = selection.indices().iter().map(|&index| table.columns()[index]).collect();
         let mut fields = Vec::new();
         for axis in &axes {
-            let unit = axis.unit(grid.scale(*axis).unwrap_or(Scale::Model));
+            let unit = grid.units.name(axis.unit(grid.scale(*axis).unwrap_or(Scale::Model)));
             let kind = if axis.words().is_empty() { DataType::Float64 } else { label() };
             fields.push(field(axis.name(), kind, false, unit, axis.doc()));
         }
@@ -43,7 +43,8 @@ impl Layout {
     }
 }
 
-fn label() -> DataType {
+/// The type of words: places in a dictionary.
+pub fn label() -> DataType {
     DataType::Dictionary(Box::new(DataType::Int32), Box::new(DataType::Utf8))
 }
 

@@ -12,7 +12,7 @@ use zstd::bulk::Compressor;
 use super::chunk::{Chunk, Runs};
 use super::footer::Footer;
 use super::layout::Layout;
-use super::{dictionary, flags, numbers};
+use super::{dictionary, flags, numbers, seal};
 use crate::grid::Projection;
 use crate::protocol::Status;
 use crate::table::{Kind, Sheet};
@@ -26,12 +26,12 @@ const BYTES_PER_ROW: usize = 9;
 /// Strength of compression; see docs/performance.md.
 pub const ZSTD_LEVEL: i32 = 1;
 
-/// The bytes of a part, the same on every machine.
-pub fn encode(layout: &Layout, grid: &Projection<'_>, sheet: &Sheet, footer: &Footer) -> Result<Vec<u8>> {
+/// The bytes of a part, the same on every machine, with their checksum.
+pub fn encode(layout: &Layout, projection: &Projection, sheet: &Sheet, footer: &Footer) -> Result<Vec<u8>> {
     let schema = ArrowSchemaConverter::new().convert(&layout.schema)?;
     let mut properties = WriterProperties::builder()
         .set_created_by(format!("slipsweep version {}", footer.version))
-        .set_key_value_metadata(Some(footer.entries()))
+        .set_key_value_metadata(Some(footer.entries(&sheet.status)))
         .set_offset_index_disabled(true)
         .build();
     add_encoded_arrow_schema_to_metadata(&layout.schema, &mut properties);
@@ -42,16 +42,17 @@ pub fn encode(layout: &Layout, grid: &Projection<'_>, sheet: &Sheet, footer: &Fo
     )?;
     let mut zstd = Compressor::new(ZSTD_LEVEL)?;
     let rows = sheet.status.len();
+    let view = projection.view(footer.rows.clone());
     for start in (0..rows).step_by(ROWS_PER_GROUP) {
         let range = start..rows.min(start + ROWS_PER_GROUP);
         let mut columns = schema.columns().iter().cloned();
         let mut group = Group { writer: file.next_row_group()?, next: || columns.next(), zstd: &mut zstd };
         let global = footer.rows.start + range.start as u64..footer.rows.start + range.end as u64;
         for axis in &layout.axes {
-            if let Some(runs) = grid.runs(*axis, global.clone()) {
+            if let Some(runs) = view.runs(*axis, global.clone()) {
                 let (values, words) = (runs.values(), axis.words());
                 let chunk = if words.is_empty() {
-                    dictionary::numbers(&values, runs.over(global.clone()), None)
+                    dictionary::numbers(values, runs.over(global.clone()), None)
                 } else {
                     let codes = runs.over(global.clone()).map(|(step, length)| (values[step] as u32, length));
                     dictionary::words(&words, &codes.collect(), None)
@@ -70,7 +71,10 @@ pub fn encode(layout: &Layout, grid: &Projection<'_>, sheet: &Sheet, footer: &Fo
         group.status(&sheet.status[range])?;
         group.writer.close()?;
     }
-    file.into_inner()
+    let mut bytes = file.into_inner()?;
+    // The footer has the place for it.
+    seal::seal(&mut bytes);
+    Ok(bytes)
 }
 
 /// A row group in the making, and the columns that it still lacks.

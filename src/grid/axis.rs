@@ -54,8 +54,16 @@ impl Values {
             }
             Values::Geomspace { first, last, count } => {
                 // Base 10 keeps the decades exact, as in 10, 100, 1000.
-                let decades = libm::log10(last / first);
-                first * libm::exp10(decades * (index as f64 / (count - 1) as f64))
+                let (ratio, share) = (last / first, index as f64 / (count - 1) as f64);
+                let value = if ratio.is_normal() {
+                    first * libm::exp10(libm::log10(ratio) * share)
+                } else {
+                    // Neither the ratio nor a power of it is a double.
+                    let half = libm::exp10(0.5 * (libm::log10(last.abs()) - libm::log10(first.abs())) * share);
+                    first * half * half
+                };
+                // Rounding must not leave the range.
+                value.clamp(first.min(last), first.max(last))
             }
         }
     }
@@ -104,6 +112,30 @@ mod tests {
         assert_eq!([odd.at(0), odd.at(6)], [3.7, 2900.1]);
         let negative = Values::Geomspace { first: -100.0, last: -1.0, count: 3 };
         assert_eq!(negative.at(1), -10.0);
+    }
+
+    #[test]
+    fn regress_geomspace_spans_the_whole_range_of_doubles() {
+        // Without their absolute values the ends have no logarithm, and the ratio of these is no double.
+        for (first, last) in [(1e-200, 1e200), (1e200, 1e-200), (-1e200, -1e-200)] {
+            let axis = Values::Geomspace { first, last, count: 5 };
+            for (index, exponent) in (0..5).zip([-200, -100, 0, 100, 200]) {
+                let value = axis.at(if first.abs() < 1.0 { index } else { 4 - index });
+                let expected = first.signum() * 10_f64.powi(exponent);
+                assert!((value / expected - 1.0).abs() < 1e-12, "{first} {last} {index} {value}");
+            }
+        }
+    }
+
+    #[test]
+    fn regress_geomspace_stays_between_its_ends() {
+        let next = |x: f64| f64::from_bits(x.to_bits() + 1);
+        for (first, last) in [(1.0, next(1.0)), (next(1.0), 1.0), (3.7, next(next(3.7)))] {
+            let axis = Values::Geomspace { first, last, count: 7 };
+            for index in 0..7 {
+                assert!((first.min(last)..=first.max(last)).contains(&axis.at(index)), "{first} {last} {index}");
+            }
+        }
     }
 
     #[test]

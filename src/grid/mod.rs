@@ -1,9 +1,22 @@
-//! What a sweep varies: quantities, the axes they run over, and the product of axes whose rows a number decodes.
+//! What a sweep varies: quantities, the axes they run over, and the grid, whose rows a number decodes.
 
 mod axis;
-mod product;
+mod block;
+mod design;
+mod digits;
+mod expression;
+mod projection;
 mod quantity;
+mod sampler;
+mod sieve;
+mod view;
 
 pub use axis::{Axis, Values};
-pub use product::{Factor, Grid, Projection, Runs, Tuples};
+pub use block::{Block, Derived, Factor};
+pub use design::Design;
+pub use digits::{Digit, Digits};
+pub use expression::{Expression, Fault};
+pub use projection::{Grid, Projection, Stretch, TooMany, Tuples};
 pub use quantity::{Domain, Point, Quantity, RTOL, Scale};
+pub use sieve::first_wrong;
+pub use view::{Runs, Segment, View};

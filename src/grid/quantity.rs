@@ -36,21 +36,42 @@ pub enum Quantity {
     Smoothing,
 }
 
-/// The legal range of a number: an interval, with the text that messages show.
+/// The legal range of a number: an interval, perhaps with one value apart from it, and the text that messages show.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Domain {
-    /// The range in words, as in `a > 0, finite`.
+    /// The range in words, as in `1 < v_i <= 1e12`.
     pub text: &'static str,
     least: f64,
     least_excluded: bool,
     greatest: f64,
+    apart: Option<f64>,
 }
 
 impl Domain {
+    /// The numbers from `least` to `greatest`.
+    const fn new(text: &'static str, least: f64, greatest: f64) -> Domain {
+        Domain { text, least, least_excluded: false, greatest, apart: None }
+    }
+
+    /// The lower end of its interval, and whether that is excluded.
+    pub fn least(&self) -> (f64, bool) {
+        (self.least, self.least_excluded)
+    }
+
+    /// The upper end of its interval, which belongs to it.
+    pub fn greatest(&self) -> f64 {
+        self.greatest
+    }
+
+    /// The one legal value outside of its interval, 0 or infinity, if there is one.
+    pub fn apart(&self) -> Option<f64> {
+        self.apart
+    }
+
     /// Whether `value` is in the range; NaN never is.
     pub fn contains(&self, value: f64) -> bool {
         let above = if self.least_excluded { value > self.least } else { value >= self.least };
-        above && value <= self.greatest
+        (above && value <= self.greatest) || self.apart == Some(value)
     }
 }
 
@@ -61,7 +82,7 @@ impl fmt::Display for Domain {
 }
 
 /// Legal range of every `rtol`: below it doubles cannot follow, above it a result means nothing.
-pub const RTOL: Domain = Domain { text: "1e-13 <= rtol <= 1e-2", least: 1e-13, least_excluded: false, greatest: 1e-2 };
+pub const RTOL: Domain = Domain::new("1e-13 <= rtol <= 1e-2", 1e-13, 1e-2);
 
 /// The unit in which the values of a coefficient axis are given and reported.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -166,24 +187,31 @@ impl Quantity {
         }
     }
 
-    /// Its legal range.
+    /// Its legal range: far beyond what a material or a machine can have, and no further, since from some size on no product
+    /// of quantities is a double any more.
     pub fn domain(self) -> Domain {
-        let above = |text, least| Domain { text, least, least_excluded: true, greatest: f64::MAX };
-        let from = |text, least| Domain { text, least, least_excluded: false, greatest: f64::MAX };
+        let velocity = |text| Domain { least_excluded: true, ..Domain::new(text, 1.0, 1e12) };
         match self {
-            Quantity::Time => above("t_f > 0, finite", 0.0),
-            Quantity::A => above("a > 0, finite", 0.0),
-            Quantity::B => from("b >= 0, finite", 0.0),
-            Quantity::InitialVelocity => above("v_i > 1, finite", 1.0),
-            Quantity::FinalVelocity => above("v_f > 1, finite", 1.0),
-            Quantity::Family => Domain { greatest: (FAMILIES.len() - 1) as f64, ..from("a family", 0.0) },
-            Quantity::FrictionBound => Domain { greatest: f64::INFINITY, ..above("tau_max > 0 (inf: no bound)", 0.0) },
-            Quantity::Alpha2 => from("alpha_2 finite", f64::MIN),
-            Quantity::Alpha3 => from("alpha_3 finite", f64::MIN),
-            Quantity::Stiffness => Domain { greatest: f64::INFINITY, ..above("k > 0 (inf: rigid)", 0.0) },
-            Quantity::Mass => from("m >= 0, finite", 0.0),
-            Quantity::Sampling => from("dt >= 0, finite (0: not sampled)", 0.0),
-            Quantity::Smoothing => above("delta_t > 0, finite", 0.0),
+            Quantity::Time => Domain::new("1e-20 <= t_f <= 1e20", 1e-20, 1e20),
+            Quantity::A => Domain::new("1e-6 <= a <= 10", 1e-6, 10.0),
+            Quantity::B => Domain::new("0 <= b <= 10", 0.0, 10.0),
+            Quantity::InitialVelocity => velocity("1 < v_i <= 1e12"),
+            Quantity::FinalVelocity => velocity("1 < v_f <= 1e12"),
+            Quantity::Family => Domain::new("a family", 0.0, (FAMILIES.len() - 1) as f64),
+            Quantity::FrictionBound => Domain {
+                apart: Some(f64::INFINITY),
+                ..Domain::new("1e-20 <= tau_max <= 1e20, or inf: no bound", 1e-20, 1e20)
+            },
+            Quantity::Alpha2 => Domain::new("-1e100 <= alpha_2 <= 1e100", -1e100, 1e100),
+            Quantity::Alpha3 => Domain::new("-1e100 <= alpha_3 <= 1e100", -1e100, 1e100),
+            Quantity::Stiffness => {
+                Domain { apart: Some(f64::INFINITY), ..Domain::new("1e-40 <= k <= 1e40, or inf: rigid", 1e-40, 1e40) }
+            }
+            Quantity::Mass => Domain { apart: Some(0.0), ..Domain::new("1e-40 <= m <= 1e40, or 0", 1e-40, 1e40) },
+            Quantity::Sampling => {
+                Domain { apart: Some(0.0), ..Domain::new("1e-20 <= dt <= 1e20, or 0: not sampled", 1e-20, 1e20) }
+            }
+            Quantity::Smoothing => Domain::new("1e-20 <= delta_t <= 1e20", 1e-20, 1e20),
         }
     }
 
@@ -219,5 +247,37 @@ impl std::ops::Index<Quantity> for Point {
 impl std::ops::IndexMut<Quantity> for Point {
     fn index_mut(&mut self, quantity: Quantity) -> &mut f64 {
         &mut self.0[quantity as usize]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    //! Ranges are what their texts say, and what the book says.
+
+    use super::*;
+
+    #[test]
+    fn texts_of_ranges_name_their_ends() {
+        let book = include_str!("../../docs/specs.md");
+        for quantity in Quantity::ALL.into_iter().filter(|quantity| quantity.words().is_empty()) {
+            let domain = quantity.domain();
+            let (least, is_excluded) = domain.least();
+            let below = if is_excluded { "<" } else { "<=" };
+            let short = |number: f64| {
+                if number.abs() <= 10.0 && number.fract() == 0.0 { format!("{number}") } else { format!("{number:e}") }
+            };
+            let interval = format!("{} {below} {} <= {}", short(least), quantity.name(), short(domain.greatest()));
+            let rest = domain.text.strip_prefix(&interval).unwrap_or_else(|| panic!("{interval}: {domain}"));
+            let apart = domain.apart().map_or(String::new(), |apart| format!(", or {apart}"));
+            assert!(rest.starts_with(&apart) && rest.is_empty() == apart.is_empty(), "{domain}");
+            assert!(book.contains(&format!("| `{}` | {domain} |", quantity.name())), "{domain}");
+            for edge in [least, domain.greatest()] {
+                assert_eq!(domain.contains(edge), edge != least || !is_excluded, "{domain}");
+            }
+            for beyond in [least.next_down(), domain.greatest().next_up(), f64::NAN] {
+                assert!(!domain.contains(beyond), "{domain}");
+            }
+        }
+        assert!(book.contains(RTOL.text));
     }
 }

@@ -28,6 +28,18 @@ impl Transition {
     /// Least duration of any protocol with `v >= 1`, `t_min`: 0 unless it slows down, then the time in which contacts
     /// age from `1/v_i` to `1/v_f` at `v = 1`.
     pub fn least_time(&self) -> f64 {
-        ln_1p((self.v_i - self.v_f).max(0.0) / (self.v_i * (self.v_f - 1.0)))
+        self.ageing_time().max(0.0)
+    }
+
+    /// The time in which contacts age from `1/v_i` to `1/v_f` at `v = 1`; negative for an acceleration.
+    pub fn ageing_time(&self) -> f64 {
+        let &Transition { v_i, v_f, .. } = self;
+        if v_i < v_f {
+            // The shares of both, of which the first may be as small as rounding.
+            return -ln_1p((v_f - v_i) / v_f / (v_i - 1.0));
+        }
+        // In the steps in which the optimum's hold takes it, so that both are the same double.
+        let (fall, rest) = ((v_i - v_f) / v_i, (v_f - 1.0) / v_f);
+        ln_1p(fall * (1.0 / v_f) / rest)
     }
 }

@@ -1,7 +1,7 @@
 //! Cubic polynomials on an interval: their least value, decided without doubt about its sign, and their zeros.
 
 use super::double_double::DoubleDouble;
-use super::elementary::{exp, ln};
+use super::real::Real;
 
 /// `c[0] + c[1] x + c[2] x^2 + c[3] x^3`.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -25,13 +25,43 @@ impl Cubic {
         c0 + x * (c1 + x * (c2 + x * c3))
     }
 
-    /// The least value on `[0, 1]`, at an end or at the one stationary minimum, and a bound on its rounding error.
+    /// The least value on `[0, 1]`, at an end or at the one stationary minimum.
     #[inline(always)]
-    pub fn least(&self) -> (f64, f64) {
-        let [c0, c1, c2, c3] = self.c;
-        let doubt = 8.0 * f64::EPSILON * (c0.abs() + c1.abs() + c2.abs() + c3.abs());
+    pub fn least(&self) -> f64 {
         let lower = |x: f64, y: f64| if y < x { y } else { x };
-        (lower(lower(c0, self.at(1.0)), self.at(self.minimum())), doubt)
+        lower(lower(self.c[0], self.at(1.0)), self.at(self.minimum()))
+    }
+
+    /// Where on `[0, 1]` the least value is, and that value.
+    #[inline(always)]
+    pub fn lowest(&self) -> (f64, f64) {
+        let inside = self.minimum();
+        let lower = |a: (f64, f64), b: (f64, f64)| if b.1 < a.1 { b } else { a };
+        lower(lower((0.0, self.c[0]), (1.0, self.at(1.0))), (inside, self.at(inside)))
+    }
+
+    /// A bound on the rounding error of a value on `[0, 1]` and of the coefficients in Bernstein's form.
+    #[inline(always)]
+    pub fn doubt(&self) -> f64 {
+        let [c0, c1, c2, c3] = self.c;
+        8.0 * f64::EPSILON * (c0.abs() + c1.abs() + c2.abs() + c3.abs())
+    }
+
+    /// A lower and an upper bound of the least value on `[0, 1]`: the least coefficient in Bernstein's form, and the
+    /// lesser end.
+    #[inline(always)]
+    pub fn bounds(&self) -> (f64, f64) {
+        let lower = |x: f64, y: f64| if y < x { y } else { x };
+        let [first, second] = self.inner();
+        let end = lower(self.c[0], self.at(1.0));
+        (lower(end, lower(first, second)), end)
+    }
+
+    /// The two inner coefficients in Bernstein's form on `[0, 1]`.
+    #[inline(always)]
+    pub fn inner(&self) -> [f64; 2] {
+        let [c0, c1, c2, _] = self.c;
+        [c0 + c1 * THIRD, c0 + (2.0 * c1 + c2) * THIRD]
     }
 
     /// The stationary minimum if it lies inside `(0, 1)`, else 0.
@@ -40,7 +70,8 @@ impl Cubic {
         let [_, c1, c2, c3] = self.c;
         // c1 + 2 c2 x + 3 c3 x^2 = 0 with a positive second derivative 2 c2 + 6 c3 x = 2 root.
         let root = (c2 * c2 - 3.0 * c1 * c3).sqrt();
-        let x = if c2 > 0.0 { -c1 / (c2 + root) } else { (root - c2) / (3.0 * c3) };
+        let rises = c2 > 0.0;
+        let x = if rises { -c1 } else { root - c2 } / if rises { c2 + root } else { 3.0 * c3 };
         if x > 0.0 && x < 1.0 { x } else { 0.0 }
     }
 }
@@ -53,13 +84,45 @@ impl ExactCubic {
         c0 + x * (c1 + x * (c2 + x * c3))
     }
 
-    /// Whether the cubic is above 0 (`strict`) or at least 0 everywhere on `[0, 1]`. `rounded` is the same in double:
-    /// the place of its minimum is good enough, since the value there depends on the square of its error.
-    pub fn is_positive(&self, rounded: &Cubic, strict: bool) -> bool {
-        [0.0, 1.0, rounded.minimum()].iter().all(|&x| {
+    /// The stationary minimum if it lies inside `(0, 1)`, else 0; from coefficients right to the last bit of a double.
+    pub fn minimum(&self) -> f64 {
+        Cubic { c: self.c.map(|c| c.high) }.minimum()
+    }
+
+    /// Whether the cubic is above 0 (`strict`) or at least 0 everywhere on `[0, 1]`. The place of its minimum in double
+    /// is good enough, since the value there depends on the square of its error.
+    pub fn is_positive(&self, strict: bool) -> bool {
+        [0.0, 1.0, self.minimum()].iter().all(|&x| {
             let value = self.at(x).high;
             if strict { value > 0.0 } else { value >= 0.0 }
         })
+    }
+
+    /// The zeros, one of a conjugate pair and its mate alike: real parts with digits enough for distances from anywhere, and
+    /// the distances from the real axis, at least 0. Those that are infinite come out as no numbers or very large.
+    pub fn zeros(&self) -> [(DoubleDouble, f64); 3] {
+        let rough = cubic_zeros(self.c.map(|c| c.high));
+        // The real one farthest from the others, in proportion, is a simple one; what is left is a quadratic.
+        let apart = |k: usize| {
+            let distance = |j: usize| (rough.re[j] - rough.re[k]).hypot(rough.im[j]) / rough.re[k].abs();
+            let others = (0..3).filter(|&j| j != k).map(distance).fold(f64::INFINITY, f64::min);
+            if rough.im[k] == 0.0 && rough.re[k].is_finite() { others } else { -1.0 }
+        };
+        let lone = (1..3).fold(0, |best, k| if apart(k) > apart(best) { k } else { best });
+        let [c0, c1, c2, c3] = self.c;
+        if rough.re[lone].abs() <= 1.0 {
+            let x = refined(self.c, rough.re[lone]);
+            let upper = c2 + x * c3;
+            let [first, second] = exact_quadratic_zeros([c1 + x * upper, upper, c3]);
+            [(x, 0.0), first, second]
+        } else {
+            // In y = 1/x, which is 0 for a zero at infinity.
+            let y = if rough.re[lone].is_finite() { 1.0 / rough.re[lone] } else { 0.0 };
+            let y = refined([c3, c2, c1, c0], y);
+            let upper = c1 + y * c0;
+            let [first, second] = exact_quadratic_zeros([c0, upper, c2 + y * upper]);
+            [(DoubleDouble::new(1.0) / y, 0.0), first, second]
+        }
     }
 
     /// The coefficients in powers of `x - centre`, rounded to double after the shift.
@@ -76,13 +139,49 @@ impl ExactCubic {
     }
 }
 
+/// A simple real zero next to `x`, by Newton's method.
+fn refined([c0, c1, c2, c3]: [DoubleDouble; 4], x: f64) -> DoubleDouble {
+    let mut x = DoubleDouble::new(x);
+    let mut last = f64::INFINITY;
+    for _ in 0..MOST_STEPS {
+        let value = c0 + x * (c1 + x * (c2 + x * c3));
+        let slope = c1.high + x.high * (2.0 * c2.high + 3.0 * x.high * c3.high);
+        let step = value.high / slope;
+        // Steps shrink until they are rounding.
+        if step.is_nan() || step.abs() >= last {
+            break;
+        }
+        x = x - DoubleDouble::new(step);
+        last = 0.5 * step.abs();
+    }
+    x
+}
+
+/// More steps than halving the error each time would take.
+const MOST_STEPS: u32 = 120;
+
+/// As [`ExactCubic::zeros`], of `c + b x + a x^2`.
+pub fn exact_quadratic_zeros([c, b, a]: [DoubleDouble; 3]) -> [(DoubleDouble, f64); 2] {
+    let half = DoubleDouble::new(-0.5) * b;
+    let discriminant = half * half - a * c;
+    if discriminant.high < 0.0 {
+        let (re, im) = (half / a, ((-discriminant).sqrt() / a).high.abs());
+        return [(re, im); 2];
+    }
+    let root = discriminant.sqrt();
+    let q = if half.high < 0.0 { half - root } else { half + root };
+    [(q / a, 0.0), (c / q, 0.0)]
+}
+
+const THIRD: f64 = 1.0 / 3.0;
+
 /// The zeros of a polynomial of degree `N` in the closed upper half plane, a conjugate pair given twice.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Zeros<const N: usize> {
+pub struct Zeros<const N: usize, T = f64> {
     /// Real parts.
-    pub re: [f64; N],
+    pub re: [T; N],
     /// Imaginary parts, at least 0.
-    pub im: [f64; N],
+    pub im: [T; N],
 }
 
 /// `cos(acos(c)/3)` on `0 <= c <= 1` in powers of `c`: Chebyshev interpolant, good to 5e-6; one Newton step follows.
@@ -94,60 +193,66 @@ const TRISECTION: [f64; 5] =
 /// Found as reciprocals, so that a vanishing leading coefficient only sends a zero to infinity: it comes out very large
 /// or infinite.
 #[inline(always)]
-pub fn cubic_zeros(d: [f64; 4]) -> Zeros<3> {
-    let scale = 1.0 / d[0];
-    let third = d[1] * scale / 3.0;
+pub fn cubic_zeros<T: Real>(d: [T; 4]) -> Zeros<3, T> {
+    let [zero, half, one, two, three, four, twelve, a_third] = [0.0, 0.5, 1.0, 2.0, 3.0, 4.0, 12.0, THIRD].map(T::of);
+    let scale = one / d[0];
+    let third = d[1] * scale * a_third;
     let (q, r) = (d[2] * scale, d[3] * scale);
     // y = u - third, u^3 - 3 big_q u + 2 big_r = 0.
-    let big_q = third * third - q / 3.0;
-    let big_r = third * (third * third - 0.5 * q) + 0.5 * r;
+    let big_q = third * third - q * a_third;
+    let big_r = third * (third * third - half * q) + half * r;
     let size = big_r.abs();
     let excess = size * size - big_q * big_q * big_q;
-    // One real zero: Cardano, in the form whose terms all have one sign.
-    let cube = size + (if excess > 0.0 { excess } else { 0.0 }).sqrt() + f64::MIN_POSITIVE;
-    let s = exp(ln(cube) / 3.0);
-    let t = big_q / s;
-    let cardano = 2.0 * size / (s * s - big_q + t * t + f64::MIN_POSITIVE);
-    // Three real zeros: Viete, the one of largest distance from the mean.
-    let root = (if big_q > 0.0 { big_q } else { 0.0 }).sqrt() + f64::MIN_POSITIVE;
-    let c = size / (root * root * root + f64::MIN_POSITIVE);
-    let c = if c < 1.0 { c } else { 1.0 };
-    let [g0, g1, g2, g3, g4] = TRISECTION;
+    let single = excess > zero;
+    // One real zero: Cardano, in the form whose terms all have one sign. Three: Viete, the one of largest distance from
+    // the mean. Both are fractions of fractions, so that one lane divides for the one it needs.
+    let cube = size + (if single { excess } else { zero }).sqrt() + T::TINY;
+    let s = cube.cube_root();
+    let root = (if big_q > zero { big_q } else { zero }).sqrt() + T::TINY;
+    let inner = if single { big_q } else { size } / if single { s } else { root * root * root + T::TINY };
+    let c = if inner < one { inner } else { one };
+    let [g0, g1, g2, g3, g4] = TRISECTION.map(T::of);
     let g = g0 + c * (g1 + c * (g2 + c * (g3 + c * g4)));
-    let g = g - ((4.0 * g * g - 3.0) * g - c) / (12.0 * g * g - 3.0);
-    let u = if excess > 0.0 { cardano } else { 2.0 * root * g };
-    let u = if big_r > 0.0 { -u } else { u };
+    let above = if single { two * size } else { (four * g * g - three) * g - c };
+    let below = if single { s * s - big_q + inner * inner + T::TINY } else { twelve * g * g - three };
+    let outer = above / below;
+    let u = if single { outer } else { two * root * (g - outer) };
+    let u = if big_r > zero { -u } else { u };
     let y = u - third;
+    let inverse = one / y;
     // The quadratic that is left, y^2 - 2 mean y + product: divided from the low end for a large zero, from the high
     // end for a small one.
     let large = (y * y * y).abs() > r.abs();
-    let rest = 3.0 * third + y;
-    let product = if large { -r / y } else { q + y * rest };
-    let mean = -0.5 * if large { (product - q) / y } else { rest };
+    let rest = three * third + y;
+    let product = if large { -r * inverse } else { q + y * rest };
+    let mean = -half * if large { (product - q) * inverse } else { rest };
     let spread = mean * mean - product;
-    let real = spread >= 0.0;
+    let real = spread >= zero;
     let distance = spread.abs().sqrt();
-    let outer = if mean < 0.0 { mean - distance } else { mean + distance };
-    let norm = mean * mean + distance * distance + f64::MIN_POSITIVE;
-    let (re, im) = (mean / norm, distance / norm);
+    let farther = if mean < zero { mean - distance } else { mean + distance };
+    let norm = mean * mean + distance * distance + T::TINY;
+    let scale = one / if real { farther } else { norm };
+    let (re, im) = (mean * scale, distance * scale);
     Zeros {
-        re: [1.0 / y, if real { 1.0 / outer } else { re }, if real { outer / product } else { re }],
-        im: [0.0, if real { 0.0 } else { im }, if real { 0.0 } else { im }],
+        re: [inverse, if real { scale } else { re }, if real { farther / product } else { re }],
+        im: [zero, if real { zero } else { im }, if real { zero } else { im }],
     }
 }
 
 /// The zeros of `c + b x + a x^2`, without branches and without cancellation; those at infinity come out very large,
 /// infinite or NaN.
 #[inline(always)]
-pub fn quadratic_zeros([c, b, a]: [f64; 3]) -> Zeros<2> {
-    let half = -0.5 * b;
+pub fn quadratic_zeros<T: Real>([c, b, a]: [T; 3]) -> Zeros<2, T> {
+    let zero = T::of(0.0);
+    let half = T::of(-0.5) * b;
     let discriminant = half * half - a * c;
-    let real = discriminant >= 0.0;
+    let real = discriminant >= zero;
     let root = discriminant.abs().sqrt();
-    let q = if half < 0.0 { half - root } else { half + root };
-    let (re, im) = (half / a, root / a.abs());
+    let q = if half < zero { half - root } else { half + root };
+    let scale = T::of(1.0) / a;
+    let (re, im) = (half * scale, root * scale.abs());
     Zeros {
-        re: [if real { q / a } else { re }, if real { c / q } else { re }],
-        im: [if real { 0.0 } else { im }, if real { 0.0 } else { im }],
+        re: [if real { q * scale } else { re }, if real { c / q } else { re }],
+        im: [if real { zero } else { im }, if real { zero } else { im }],
     }
 }

@@ -36,6 +36,12 @@ impl DoubleDouble {
         DoubleDouble { high, low: ((x1 * y1 - high) + x1 * y2 + x2 * y1) + x2 * y2 }
     }
 
+    /// The square root of what is not negative.
+    pub fn sqrt(self) -> Self {
+        let root = Self::new(self.high.sqrt());
+        if self.high > 0.0 { root + (self - root * root) / (root + root) } else { Self::new(0.0) }
+    }
+
     /// `high + low` where `|high| >= |low|`.
     fn normalised(high: f64, low: f64) -> Self {
         let sum = high + low;

@@ -67,3 +67,59 @@ fn legendre(n: usize, x: DoubleDouble) -> (DoubleDouble, DoubleDouble) {
     let derivative = DoubleDouble::new(n as f64) * (before - x * p) / (DoubleDouble::new(1.0) - x * x);
     (p, derivative)
 }
+
+/// A Gauss rule of an even number of nodes with what it takes to integrate a product of a function and a primitive of
+/// another one.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Primitive {
+    /// Positive nodes, rising.
+    pub x: Vec<f64>,
+    /// Their weights.
+    pub w: Vec<f64>,
+    /// The matrix of the form, row by row, filled up with zeros to a multiple of [`ROWS`].
+    pub matrix: Vec<f64>,
+}
+
+/// Rows of the matrix that are taken together.
+pub const ROWS: usize = 4;
+
+/// The rule with `2 half` nodes, made at its first use.
+pub fn primitive(half: usize) -> &'static Primitive {
+    static RULES: [OnceLock<Primitive>; MOST_HALF] = [const { OnceLock::new() }; MOST_HALF];
+    let half = half.clamp(1, MOST_HALF);
+    RULES[half - 1].get_or_init(|| make_primitive(half))
+}
+
+/// Largest half of a rule with a primitive.
+pub const MOST_HALF: usize = 40;
+
+fn make_primitive(half: usize) -> Primitive {
+    let n = 2 * half;
+    let rule = rule(n);
+    let (x, w) = (rule.x[half..].to_vec(), rule.w[half..].to_vec());
+    // P_0 to P_n at the nodes.
+    let p: Vec<Vec<f64>> = x
+        .iter()
+        .map(|&x| {
+            let mut p = vec![1.0, x];
+            for k in 2..=n {
+                let f = k as f64;
+                p.push(((2.0 * f - 1.0) * x * p[k - 1] - (f - 1.0) * p[k - 2]) / f);
+            }
+            p[n] = 0.0;
+            p
+        })
+        .collect();
+    let entry = |i: usize, j: usize| {
+        let mut sum = x[i];
+        for k in (2..n).step_by(2) {
+            sum += p[j][k] * (p[i][k + 1] - p[i][k - 1]);
+        }
+        0.5 * w[i] * w[j] * sum
+    };
+    let mut matrix = vec![0.0; half * half.next_multiple_of(ROWS)];
+    for (place, cell) in matrix[..half * half].iter_mut().enumerate() {
+        *cell = entry(place / half, place % half);
+    }
+    Primitive { x, w, matrix }
+}

@@ -22,3 +22,57 @@ pub fn least(values: &Lanes) -> f64 {
     let pair = |i: usize| lower(values[i], values[i + 4]);
     lower(lower(pair(0), pair(2)), lower(pair(1), pair(3)))
 }
+
+/// [`Lanes`] with arithmetic, lane by lane.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[repr(align(64))]
+pub struct Vector(pub Lanes);
+
+impl Vector {
+    /// The same in every lane.
+    #[inline(always)]
+    pub const fn splat(value: f64) -> Vector {
+        Vector([value; LANES])
+    }
+
+    /// A function of every lane.
+    #[inline(always)]
+    pub fn map(self, f: impl Fn(f64) -> f64) -> Vector {
+        let mut out = [0.0; LANES];
+        for (out, x) in out.iter_mut().zip(self.0) {
+            *out = f(x);
+        }
+        Vector(out)
+    }
+
+    /// A function of every pair of lanes.
+    #[inline(always)]
+    pub fn zip(self, other: Vector, f: impl Fn(f64, f64) -> f64) -> Vector {
+        let mut out = [0.0; LANES];
+        for ((out, x), y) in out.iter_mut().zip(self.0).zip(other.0) {
+            *out = f(x, y);
+        }
+        Vector(out)
+    }
+}
+
+macro_rules! lanewise {
+    ($($trait:ident $method:ident $operator:tt;)*) => {$(
+        impl std::ops::$trait for Vector {
+            type Output = Vector;
+            #[inline(always)]
+            fn $method(self, other: Vector) -> Vector {
+                self.zip(other, |x, y| x $operator y)
+            }
+        }
+        impl std::ops::$trait<Vector> for f64 {
+            type Output = Vector;
+            #[inline(always)]
+            fn $method(self, other: Vector) -> Vector {
+                other.map(|y| self $operator y)
+            }
+        }
+    )*};
+}
+
+lanewise! { Add add +; Sub sub -; Mul mul *; Div div /; }

@@ -9,6 +9,7 @@ pub mod gauss;
 pub mod lanes;
 pub mod polynomial;
 pub mod radau;
+pub mod real;
 pub mod root;
 pub mod stiff;
 pub mod turning;

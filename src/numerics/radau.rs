@@ -26,6 +26,9 @@ pub struct Radau {
     pub columns: [Nodes; NODES],
     /// Barycentric weights of the nodes and, last, of the added place 0.
     barycentric: [f64; NODES + 1],
+    /// `slopes[k][j]`: the slope at node `j` of the polynomial of degree `NODES` that is 1 at `u[k]` and 0 at the others
+    /// and at 0.
+    slopes: [Nodes; NODES],
     /// Weights of the two highest Legendre coefficients that the nodes tell.
     highest: [Nodes; 2],
 }
@@ -34,13 +37,13 @@ impl Radau {
     /// `int_0^u[j] f du` for every node, from the values of `f` at the nodes.
     #[inline(always)]
     pub fn integrals(&self, f: &Nodes) -> Nodes {
-        let mut sum = [0.0; NODES];
-        for (column, &value) in self.columns.iter().zip(f) {
-            for j in 0..NODES {
-                sum[j] += column[j] * value;
-            }
-        }
-        sum
+        combined(&self.columns, f)
+    }
+
+    /// The slopes at the nodes of the polynomial through 0 at 0 and `f` at the nodes.
+    #[inline(always)]
+    pub fn slopes(&self, f: &Nodes) -> Nodes {
+        combined(&self.slopes, f)
     }
 
     /// What the nodes do not resolve of the integral of `f`: the size of its two highest coefficients in Legendre
@@ -68,6 +71,34 @@ impl Radau {
         let share = self.barycentric[NODES] / u;
         (above + share * start) / (below + share)
     }
+
+    /// The polynomial through `f` at the nodes alone, at `u`.
+    pub fn follow(&self, f: &Nodes, u: f64) -> f64 {
+        let (mut above, mut below) = (0.0, 0.0);
+        for ((&node, &value), &weight) in self.u.iter().zip(f).zip(&self.barycentric) {
+            let distance = u - node;
+            if distance == 0.0 {
+                return value;
+            }
+            // The weights are those of the nodes and 0.
+            let share = weight * node / distance;
+            above += share * value;
+            below += share;
+        }
+        above / below
+    }
+}
+
+/// The columns of a matrix, each times the value of its node.
+#[inline(always)]
+fn combined(columns: &[Nodes; NODES], f: &Nodes) -> Nodes {
+    let mut sum = [0.0; NODES];
+    for (column, &value) in columns.iter().zip(f) {
+        for j in 0..NODES {
+            sum[j] += column[j] * value;
+        }
+    }
+    sum
 }
 
 /// The rule, made at its first use.
@@ -113,6 +144,7 @@ fn make() -> Radau {
         w: [0.0; NODES],
         columns: [[0.0; NODES]; NODES],
         barycentric: [1.0; NODES + 1],
+        slopes: [[0.0; NODES]; NODES],
         highest: [[0.0; NODES]; 2],
     };
     for k in 0..NODES {
@@ -139,6 +171,14 @@ fn make() -> Radau {
         for j in (0..=NODES).filter(|&j| j != k) {
             // The factor keeps the products near 1; it cancels in the formula.
             rule.barycentric[k] /= 4.0 * (places[k] - places[j]);
+        }
+    }
+    for j in 0..NODES {
+        // The slope of a constant is 0: that tells the diagonal, with the place 0 in the sum.
+        let entry = |k: usize| rule.barycentric[k] / rule.barycentric[j] / (places[j] - places[k]);
+        let others: Vec<f64> = (0..=NODES).map(|k| if k == j { 0.0 } else { entry(k) }).collect();
+        for k in 0..NODES {
+            rule.slopes[k][j] = if k == j { -others.iter().sum::<f64>() } else { others[k] };
         }
     }
     rule

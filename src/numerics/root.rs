@@ -34,31 +34,58 @@ const MOST_PROBES: u32 = 200;
 pub fn newton(
     mut probe: impl FnMut(f64) -> Option<Probe>,
     start: f64,
-    (mut low, mut high): (f64, f64),
+    bracket: (f64, f64),
     undefined_above: bool,
     enough: f64,
 ) -> Option<Root> {
+    // No two probes share a piece.
+    let mut count = 0u32;
+    let probe = |x| {
+        count += 1;
+        Some((probe(x)?, count))
+    };
+    newton_in_pieces(probe, start, bracket, undefined_above, enough, 0.0).map(|(root, _)| root)
+}
+
+/// [`newton`] for a function that is smooth in pieces: `probe` also names the piece, and so does the result for the
+/// last probe.
+///
+/// Where the last two probes lie in one piece, the change of the slope between them corrects the step, which leaves an
+/// error of third order: the search also ends where that is at most `least`.
+pub fn newton_in_pieces<Piece: Copy + PartialEq>(
+    mut probe: impl FnMut(f64) -> Option<(Probe, Piece)>,
+    start: f64,
+    (mut low, mut high): (f64, f64),
+    undefined_above: bool,
+    enough: f64,
+    least: f64,
+) -> Option<(Root, Piece)> {
     if low.is_nan() || high.is_nan() || low >= high {
         return None;
     }
     let mut x = if start.is_nan() { middle(low, high) } else { start.clamp(low, high) };
-    let mut last_step = f64::INFINITY;
+    let mut last_steps = [f64::INFINITY; 2];
+    let mut last: Option<(Probe, Piece)> = None;
     let mut below = false;
     let mut above = false;
     for _ in 0..MOST_PROBES {
-        let p = probe(x).filter(|p| !p.value.is_nan());
+        let p = probe(x).filter(|(p, _)| !p.value.is_nan());
         let step = match p {
-            Some(p) => {
-                let step = if p.slope > 0.0 { -p.value / p.slope } else { f64::NAN };
-                if p.value.abs() <= enough {
+            Some((p, piece)) => {
+                let before = last.filter(|&(_, before)| before == piece).map(|(before, _)| before);
+                let corrected = before.and_then(|before| corrected(&p, &before));
+                let newton = if p.slope > 0.0 { -p.value / p.slope } else { f64::NAN };
+                let step = corrected.map_or(newton, |(step, _)| step);
+                if p.value.abs() <= enough || corrected.is_some_and(|(_, left)| left <= least) {
                     let x_next = if step.is_finite() { (x + step).clamp(low, high) } else { x };
-                    return Some(Root { x: x_next, probed: x, probe: p });
+                    return Some((Root { x: x_next, probed: x, probe: p }, piece));
                 }
                 if p.value > 0.0 {
                     (high, above) = (x, true);
                 } else {
                     (low, below) = (x, true);
                 }
+                last = Some((p, piece));
                 step
             }
             None if undefined_above => {
@@ -70,16 +97,32 @@ pub fn newton(
                 f64::NAN
             }
         };
-        let newton = x + step;
-        // A step that leaves the bracket, or that does not shrink, gives way to a bisection.
-        let next = if newton > low && newton < high && step.abs() < last_step { newton } else { middle(low, high) };
+        let next = x + step;
+        // A step that leaves the bracket, or that does not shrink, gives way to a bisection; from side to side of the root, by
+        // a quarter in two steps.
+        let [last_step, step_before] = last_steps;
+        let shrinks = step.abs() < last_step && !(below && above && step.abs() > 0.75 * step_before);
+        let next = if next > low && next < high && shrinks { next } else { middle(low, high) };
         if next == x || !(next > low && next < high) {
-            return p.filter(|_| below && above).map(|probe| Root { x, probed: x, probe });
+            return p.filter(|_| below && above).map(|(probe, piece)| (Root { x, probed: x, probe }, piece));
         }
-        last_step = (next - x).abs();
+        last_steps = [(next - x).abs(), last_step];
         x = next;
     }
     None
+}
+
+/// The step to the root of the inverse function with the slope at the last probe, and its change since the one before;
+/// and the order of what it leaves, in units of the value.
+fn corrected(last: &Probe, before: &Probe) -> Option<(f64, f64)> {
+    let (pace, pace_before) = (1.0 / last.slope, 1.0 / before.slope);
+    let bend = (pace - pace_before) / (last.value - before.value);
+    let correction = 0.5 * bend * last.value / pace;
+    // No more than a correction: far from the root the slope need not change evenly.
+    let sound = pace > 0.0 && pace_before > 0.0 && correction.abs() <= 0.3;
+    let values = last.value.abs() + before.value.abs();
+    let left = last.value.abs() * last.value.abs().max(correction.abs()) * values.min(1.0);
+    sound.then(|| (-last.value * pace * (1.0 - correction), left))
 }
 
 /// A point well inside `(low, high)`: the middle, or a step outwards that doubles where one side is infinite.

@@ -3,13 +3,12 @@
 //!
 //! `U` joins both real branches of the Lambert function at their branch point: `U = -W_k(-exp(-1 - w^2/2))` with `k =
 //! 0` for `w <= 0` and `k = -1` for `w >= 0`. It is the velocity of a particle that falls back from a turning point,
-//! hence the name. Its nearest singularities are at `|w| = 2 sqrt(pi)`, on the four diagonals of the complex plane.
+//! hence the name. Its nearest singularities are at `w = 2 sqrt(pi) e^(±3 pi i/4)`.
 //!
 //! Three formulas cover the line. Each lane of a vector takes the one of its own argument, so a result never depends on
 //! its neighbours.
 
-use super::elementary::{exp, ln};
-use super::lanes::{LANES, Lanes};
+use super::elementary::{exp, ln, polynomial};
 
 /// `ln U / w` on `|w| <= 1`: Chebyshev interpolant of degree 18 (truncation 1e-17), in powers of `w`.
 /// Made by `tests/reference/coefficients.py`.
@@ -55,114 +54,183 @@ const U_OVER_X: [f64; 15] = [
     0.0008663289439595966,
 ];
 
+/// `ln U` for `w >= 1` in powers of `w/(w + 11)`: interpolated where that is at most 0.4; beyond, the error falls
+/// behind `U` itself. Made by `tests/reference/coefficients.py`.
+const LN_U_FAR: [f64; 4] = [0.005525334715095086, 10.884780968207572, -8.4436137582789, 6.8186052209486885];
+
 /// The turning function at one argument.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Turning {
     /// `ln U`, in `(-inf, inf)`.
     pub ln_u: f64,
+    /// `U - 1`.
+    pub excess: f64,
     /// `(U - 1)/w`, positive; 1 at `w = 0`. Its reciprocal is `d(ln U)/dw`.
     pub slope: f64,
 }
 
-/// `ln U` and `(U - 1)/w` at `w`, each to a few units in the last place, for `|w| < 1e150`.
+/// `ln U`, `U - 1` and `(U - 1)/w` at `w`, each to a few units in the last place, for `|w| < 1e150`.
 ///
 /// The derivative of `ln U` is `1/slope`, since `(1 - 1/U) dU = w dw`.
 pub fn turning(w: f64) -> Turning {
-    let (ln_u, slope) = if w <= -1.0 {
+    let place = if w <= -1.0 {
         rising(w)
     } else if w < 1.0 {
         near(w)
     } else {
         falling(w)
     };
-    Turning { ln_u, slope }
+    Turning { ln_u: place.ln_u, excess: place.excess, slope: place.over / place.under }
 }
 
-/// [`turning`] of eight arguments at once: `(ln U, (U - 1)/w)`, with the same bits as one by one.
+/// The turning function at several arguments side by side.
+#[derive(Debug, Clone, Copy)]
+pub struct Turnings<const N: usize> {
+    /// `ln U`.
+    pub ln_u: [f64; N],
+    /// `U`, with all its digits where it is small.
+    pub u: [f64; N],
+    /// `U - 1`.
+    pub excess: [f64; N],
+    /// `(U - 1)/w` as a fraction `over/under`, so that whoever divides by it divides only once.
+    pub over: [f64; N],
+    /// See `over`.
+    pub under: [f64; N],
+}
+
+/// [`turning`] of several arguments at once, with the same bits as one by one.
 #[inline(always)]
-pub fn turning_lanes(w: &Lanes) -> (Lanes, Lanes) {
-    let (mut least, mut greatest) = (w[0], w[0]);
+pub fn turning_lanes<const N: usize>(w: &[f64; N]) -> Turnings<N> {
+    let (mut rises, mut falls, mut turns) = (false, false, false);
     for &w in w {
-        least = if w < least { w } else { least };
-        greatest = if w > greatest { w } else { greatest };
+        rises |= w <= -1.0;
+        falls |= w >= 1.0;
+        turns |= (w > -1.0) & (w < 1.0);
     }
-    let mut ln_u = [0.0; LANES];
-    let mut slope = [0.0; LANES];
-    if least > -1.0 && greatest < 1.0 {
-        for i in 0..LANES {
-            (ln_u[i], slope[i]) = near(w[i]);
+    let mut found = Turnings { ln_u: [0.0; N], u: [0.0; N], excess: [0.0; N], over: [0.0; N], under: [0.0; N] };
+    match (rises, turns, falls) {
+        (false, _, false) => {
+            for (i, &w) in w.iter().enumerate() {
+                found.set(i, near(w));
+            }
         }
-    } else if least >= 1.0 {
-        for i in 0..LANES {
-            (ln_u[i], slope[i]) = falling(w[i]);
+        (false, false, true) => {
+            for (i, &w) in w.iter().enumerate() {
+                found.set(i, falling(w));
+            }
         }
-    } else if greatest <= -1.0 {
-        for i in 0..LANES {
-            (ln_u[i], slope[i]) = rising(w[i]);
+        (false, true, true) => {
+            for (i, &w) in w.iter().enumerate() {
+                found.set(i, near_or_falling(w));
+            }
         }
-    } else {
-        mixed(w, &mut ln_u, &mut slope);
+        (true, false, false) => {
+            for (i, &w) in w.iter().enumerate() {
+                found.set(i, rising(w));
+            }
+        }
+        (true, ..) => {
+            for (i, &w) in w.iter().enumerate() {
+                found.set(i, any(w));
+            }
+        }
     }
-    (ln_u, slope)
+    found
 }
 
-/// Lanes on both sides of a seam: all three formulas, each on arguments clamped into its range, then a choice per lane.
+/// On both sides of the seam at 1: both formulas, each on an argument in its range, then a choice.
 #[inline(always)]
-fn mixed(w: &Lanes, ln_u: &mut Lanes, slope: &mut Lanes) {
-    for i in 0..LANES {
-        let (z_near, h_near) = near(if w[i].abs() < 1.0 { w[i] } else { 0.5 });
-        let (z_falling, h_falling) = falling(if w[i] >= 1.0 { w[i] } else { 1.0 });
-        let (z_rising, h_rising) = rising(if w[i] <= -1.0 { w[i] } else { -1.0 });
-        let (z_far, h_far) = if w[i] >= 1.0 { (z_falling, h_falling) } else { (z_rising, h_rising) };
-        let inside = w[i].abs() < 1.0;
-        ln_u[i] = if inside { z_near } else { z_far };
-        slope[i] = if inside { h_near } else { h_far };
+fn near_or_falling(w: f64) -> Place {
+    choose(w < 1.0, near(if w < 1.0 { w } else { 0.5 }), falling(if w < 1.0 { 1.0 } else { w }))
+}
+
+/// All three formulas, then a choice.
+#[inline(always)]
+fn any(w: f64) -> Place {
+    let rises = w <= -1.0;
+    choose(rises, rising(if rises { w } else { -1.0 }), near_or_falling(if rises { 0.5 } else { w }))
+}
+
+impl<const N: usize> Turnings<N> {
+    #[inline(always)]
+    fn set(&mut self, i: usize, place: Place) {
+        (self.ln_u[i], self.u[i], self.excess[i]) = (place.ln_u, place.u, place.excess);
+        (self.over[i], self.under[i]) = (place.over, place.under);
+    }
+}
+
+/// One element of [`Turnings`].
+struct Place {
+    ln_u: f64,
+    u: f64,
+    excess: f64,
+    over: f64,
+    under: f64,
+}
+
+/// The one or the other, without a branch.
+#[inline(always)]
+fn choose(first: bool, one: Place, other: Place) -> Place {
+    Place {
+        ln_u: if first { one.ln_u } else { other.ln_u },
+        u: if first { one.u } else { other.u },
+        excess: if first { one.excess } else { other.excess },
+        over: if first { one.over } else { other.over },
+        under: if first { one.under } else { other.under },
     }
 }
 
 /// `|w| < 1`: a polynomial for `ln U / w`; then `(U - 1)/w = ln U / w + w/2` needs no exponential.
 #[inline(always)]
-fn near(w: f64) -> (f64, f64) {
-    let q = horner(&LN_U_OVER_W, w);
-    (w * q, q + 0.5 * w)
+fn near(w: f64) -> Place {
+    let q = polynomial(&LN_U_OVER_W, w);
+    let slope = q + 0.5 * w;
+    let excess = w * slope;
+    Place { ln_u: w * q, u: 1.0 + excess, excess, over: slope, under: 1.0 }
 }
 
 /// `w <= -1`, theta rises: `U = x (1 + ...)` is small, and `ln U = -1 - w^2/2 + U`.
 #[inline(always)]
-fn rising(w: f64) -> (f64, f64) {
+fn rising(w: f64) -> Place {
     let e = 0.5 * w * w;
     let g = exp(-e);
     let s = g / (1.0 + (1.0 - g).sqrt());
-    let u = g * std::f64::consts::E.recip() * horner(&U_OVER_X, s);
-    (u - (1.0 + e), (u - 1.0) / w)
+    let u = g * std::f64::consts::E.recip() * polynomial(&U_OVER_X, s);
+    Place { ln_u: u - (1.0 + e), u, excess: u - 1.0, over: u - 1.0, under: w }
 }
 
-/// `w >= 1`, theta falls: two Halley steps on `U - 1 - e - ln U` from a rational guess that is within 0.6 % everywhere.
-/// The second step is so short that its logarithm serves for the result too.
+/// `w >= 1`, theta falls. A guess that is within 1.3e-4 everywhere, and what it lacks by the reversed series of
+/// `U - 1 - ln U` about it: one logarithm in all.
 #[inline(always)]
-fn falling(w: f64) -> (f64, f64) {
+fn falling(w: f64) -> Place {
     let e = 0.5 * w * w;
-    let guess = 1.0 + e + 6.0 * w / (6.0 + w);
-    let u = guess - halley(guess, ln(guess), e);
-    let ln_u = ln(u);
-    let step = halley(u, ln_u, e);
-    let q = step / u;
-    (ln_u - q * (1.0 + 0.5 * q), (u - step - 1.0) / w)
+    let guess = 1.0 + far_excess(w, e);
+    let d = guess - 1.0;
+    let inverse = 1.0 / d;
+    let ln_guess = ln(guess);
+    // U = guess (1 + x): d x + x^2/2 - x^3/3 + x^4/4 = d y.
+    let y = (e - d + ln_guess) * inverse;
+    let second = -0.5 * inverse;
+    let third = inverse * (1.0 / 3.0 + 0.5 * inverse);
+    let fourth = -inverse * (0.25 + inverse * (5.0 / 6.0 + 0.625 * inverse));
+    let x = y * (1.0 + y * (second + y * (third + y * fourth)));
+    let excess = d + guess * x;
+    let ln_u = ln_guess + x * (1.0 - x * (0.5 - x * (1.0 / 3.0)));
+    Place { ln_u, u: 1.0 + excess, excess, over: excess, under: w }
 }
 
-/// What Halley's method (order three) subtracts from `u` to solve `U - 1 - ln U = e`.
+/// `U - 1` for `w >= 1` and `e = w^2/2`, within 1.3e-4 of `U`.
 #[inline(always)]
-fn halley(u: f64, ln_u: f64, e: f64) -> f64 {
-    let d = u - 1.0;
-    let r = d - e - ln_u;
-    r * u * d / (d * d - 0.5 * r)
+fn far_excess(w: f64, e: f64) -> f64 {
+    let far = w / (w + 11.0);
+    let [c0, c1, c2, c3] = LN_U_FAR;
+    e + (c0 + far * (c1 + far * (c2 + far * c3)))
 }
 
+/// `U - 1` for `w >= 0` and `e = w^2/2`, within 1e-3 of `U` and without a logarithm.
 #[inline(always)]
-fn horner<const N: usize>(coefficients: &[f64; N], x: f64) -> f64 {
-    let mut sum = coefficients[N - 1];
-    for i in (0..N - 1).rev() {
-        sum = sum * x + coefficients[i];
-    }
-    sum
+pub fn rough_excess(w: f64, e: f64) -> f64 {
+    let near = w * (1.0 + w * (1.0 / 3.0 + w * (1.0 / 36.0 - w * (1.0 / 270.0))));
+    let far = far_excess(w, e);
+    if w < 1.0 { near } else { far }
 }

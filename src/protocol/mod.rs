@@ -4,6 +4,7 @@ pub mod best;
 pub mod compliant;
 mod control;
 pub mod cubic;
+pub mod error;
 mod motion;
 pub mod optimal;
 mod outcome;

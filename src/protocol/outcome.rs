@@ -42,6 +42,13 @@ pub struct Effort {
     pub nodes: u32,
 }
 
+impl std::ops::AddAssign for Effort {
+    fn add_assign(&mut self, other: Effort) {
+        self.quadratures = self.quadratures.saturating_add(other.quadratures);
+        self.nodes = self.nodes.saturating_add(other.nodes);
+    }
+}
+
 /// A status, the numbers where there are any, and the effort.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Solved<T> {

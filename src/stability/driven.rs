@@ -14,31 +14,34 @@ use crate::numerics::elementary::{exp, exp_m1, ln};
 use crate::numerics::stiff::{Accuracy, Integrator, Linearised, Points, System, radau_iia_9};
 use crate::protocol::compliant::Path;
 use crate::protocol::{Motion, Slider};
+use crate::stability::Followed;
 
 /// Most samples of one simulation.
 const MOST_SAMPLES: f64 = 1e5;
 
 /// Distance from the target at `t_f`, the Euclidean norm in `(ln v, ln theta, k s/a)`, if `v_c` is told continuously:
-/// what `rtol` and the rounding of the protocol leave, amplified. `None` where the simulation does not get there.
-pub fn loop_error(path: &Path, rtol: f64) -> Option<f64> {
+/// what `rtol` and the rounding of the protocol leave, amplified from wherever they arise. None where the simulation does
+/// not get there.
+pub fn loop_error(path: &Path, rtol: f64) -> Followed {
     let v_f = path.jet(path.pieces() - 1, 1.0).v[0];
     if path.slider.k == f64::INFINITY {
         let theta = path.jet(path.pieces() - 1, 1.0).theta;
-        return Some(distance(&path.slider.law, [0.0, ln(theta * v_f)]));
+        return Followed { number: Some(distance(&path.slider.law, [0.0, ln(theta * v_f)])), steps: 0 };
     }
     let driven = Driven::new(path, Control::Continuous(path));
-    let state = driven.follow(driven.start(path), (0.0, 1.0), FIRST, rtol, &mut { MOST_STEPS })?.0;
-    Some(driven.distance(&state))
+    let mut budget = MOST_STEPS;
+    let end = driven.follow(driven.start(path), (0.0, 1.0), FIRST, rtol, &mut budget);
+    Followed { number: end.map(|(state, _)| driven.distance(&state)), steps: MOST_STEPS - budget }
 }
 
 /// Distance from the target at `t_f`, as in [`loop_error`], if `v_c` is sampled at `0`, `dt`, `2 dt`, … and each sample
-/// is held until the next. `None` where that takes more than 100,000 or the simulation does not get there,
+/// is held until the next. None where that takes more than 100,000 or the simulation does not get there,
 /// most often because a held `v_c` stops the block or lets it run away.
-pub fn held_error(path: &Path, dt: f64, rtol: f64) -> Option<f64> {
+pub fn held_error(path: &Path, dt: f64, rtol: f64) -> Followed {
     let t_f = path.duration();
     let samples = (t_f / dt).ceil().max(1.0);
     if samples.is_nan() || samples > MOST_SAMPLES {
-        return None;
+        return Followed { number: None, steps: 0 };
     }
     let (slider, count) = (&path.slider, samples as u32);
     let sample = |i: u32| slider.control(&path.at_time(f64::from(i) * dt))[0];
@@ -52,15 +55,17 @@ pub fn held_error(path: &Path, dt: f64, rtol: f64) -> Option<f64> {
             let aged = -exp_m1(-t_f * (time(i + 1) - time(i)) * v);
             theta += (1.0 / v - theta) * aged;
         }
-        return Some(distance(&slider.law, [ln(v / v_f), ln(theta * v_f)]));
+        return Followed { number: Some(distance(&slider.law, [ln(v / v_f), ln(theta * v_f)])), steps: 0 };
     }
     let mut driven = Driven::new(path, Control::Held(0.0));
-    let (mut state, mut h, mut budget) = (driven.start(path), FIRST, MOST_STEPS);
+    let mut budget = MOST_STEPS;
+    let mut here = Some((driven.start(path), FIRST));
     for i in 0..count {
+        let Some((state, h)) = here else { break };
         driven.control = Control::Held(sample(i));
-        (state, h) = driven.follow(state, (time(i), time(i + 1)), h, rtol, &mut budget)?;
+        here = driven.follow(state, (time(i), time(i + 1)), h, rtol, &mut budget);
     }
-    Some(driven.distance(&state))
+    Followed { number: here.map(|(state, _)| driven.distance(&state)), steps: MOST_STEPS - budget }
 }
 
 /// First step, in units of `t_f`; it is shortened as needed.

@@ -51,6 +51,8 @@ impl SteadySliding {
     /// Steady sliding at velocity `v > 0`, on a spring of stiffness `k > 0` (infinite: rigid), of a mass `m >= 0`.
     pub fn new(law: Law, k: f64, m: f64, v: f64) -> SteadySliding {
         let weakening = law.b - law.a;
+        // Of a mass -0 the decay would have the wrong sign.
+        let m = m + 0.0;
         let inertia = m * v * v;
         let sum = inertia + law.a;
         let (pull, push) = (law.a * k, weakening * sum);
@@ -164,15 +166,17 @@ impl SteadySliding {
         (-slope + (slope * slope - 4.0 * square * hurwitz).sqrt()) / (2.0 * square)
     }
 
-    /// `P^2/4 - Q` with 32 digits: next to a double root it is a small difference.
-    fn discriminant(&self, r: f64) -> f64 {
+    /// `P^2/4 - Q` with 32 digits: next to a double root it is a small difference. `P` follows from the sum of the
+    /// eigenvalues, or else from their products in pairs.
+    fn discriminant(&self, r: f64, by_sum: bool) -> f64 {
         let double = DoubleDouble::new;
         let (k, inertia) = (double(self.k), DoubleDouble::product(self.v, self.v) * double(self.m));
         let (sum, c) = (inertia + double(self.law.a), k - DoubleDouble::sum(self.law.b, -self.law.a));
         let x = double(r);
         let rest = (((x - sum) * x + c * inertia) * x - k * inertia * inertia).high;
         let x = x - double(rest / ((3.0 * r - 2.0 * self.sum) * r + self.c * self.inertia));
-        let half = (c - inertia * k / x) / x * double(0.5);
+        let p = if by_sum { (sum - x) / inertia } else { (c - inertia * k / x) / x };
+        let half = p * double(0.5);
         (half * half - k / x).high
     }
 
@@ -182,7 +186,8 @@ impl SteadySliding {
         let q = k / r;
         // Two ways to the same P: the one whose terms are smaller loses fewer digits.
         let (first, second) = (sum / inertia, c.abs().max(inertia * q) / r);
-        let mut p = if first < second { (sum - r) / inertia } else { (c - inertia * q) / r };
+        let by_sum = first < second;
+        let mut p = if by_sum { (sum - r) / inertia } else { (c - inertia * q) / r };
         if p.abs() * inertia < 0.125 * sum {
             // Near the Hopf point P is small: M^2 P^3 - 2 M (M + a) P^2 + ((M + a)^2 + c M) P = H gives all its digits.
             let slope = sum * sum + c * inertia;
@@ -198,7 +203,7 @@ impl SteadySliding {
         let half = 0.5 * p;
         let mut squares = (half - q.sqrt()) * (half + q.sqrt());
         if squares.abs() < CLOSE * q {
-            squares = self.discriminant(r);
+            squares = self.discriminant(r, by_sum);
         }
         if squares < 0.0 {
             // 0 without a sign at the critical stiffness.
@@ -262,6 +267,32 @@ mod tests {
             }
             assert!(eigenvalues.decay_rate.is_some_and(|decay| decay < 0.0));
             assert_eq!(eigenvalues.growth_rate < 0.0, sliding.is_stable(), "{law:?} {k} {m} {v}");
+        }
+    }
+
+    #[test]
+    fn regress_two_equal_roots_far_from_the_third() {
+        let cases = [
+            (
+                Law { a: 0.19086204474307833, b: 2.2434371767818206e-5 },
+                1.1408613468454599e-36,
+                0.19506509378437617,
+                1.0000000013126165,
+            ),
+            (
+                Law { a: 0.029836586823087336, b: 0.011314424028958483 },
+                2.864919705106888e21,
+                7.77143814637104e-26,
+                1.0000000000024418,
+            ),
+            (Law { a: 9.573661630788803e-6, b: 0.0 }, 2.5530113256544154e-38, 9.286204574305586e-6, 1.0000000000000049),
+        ];
+        for (law, k, m, v) in cases {
+            let eigenvalues = SteadySliding::new(law, k, m, v).eigenvalues().expect("is elastic");
+            for root in scaled(&eigenvalues, v) {
+                let residual = residual(law, k, m, v, root);
+                assert!(residual <= 4e-15, "{law:?} {k} {m} {v} {eigenvalues:?} {residual}");
+            }
         }
     }
 

@@ -10,3 +10,12 @@ pub use driven::{held_error, loop_error};
 pub use hopf::{Hopf, lyapunov_coefficient};
 pub use linear::{Eigenvalues, SteadySliding, critical_velocity};
 pub use sensitivity::amplification;
+
+/// What following a protocol open loop yields.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Followed {
+    /// The number asked for; `None` where there is none.
+    pub number: Option<f64>,
+    /// Steps of the integration.
+    pub steps: u32,
+}

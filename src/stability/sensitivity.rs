@@ -17,6 +17,7 @@ use crate::numerics::elimination::eliminate;
 use crate::numerics::radau::{NODES, Radau, radau};
 use crate::protocol::compliant::Path;
 use crate::protocol::{Jet, Slider};
+use crate::stability::Followed;
 
 /// The fundamental matrix, by columns; only as many rows and columns as there are states count.
 type Matrix = [[f64; 3]; 3];
@@ -26,8 +27,14 @@ type Matrix = [[f64; 3]; 3];
 /// value of the fundamental matrix. Where some of the three follow the others, the error at the start is one of those
 /// others alone, so that the limits `m -> 0` and `k -> inf` are reached.
 ///
-/// `None` where that takes more than 3,000 steps, the flow swinging too often, and beyond the range of doubles.
-pub fn amplification(path: &Path, rtol: f64) -> Option<f64> {
+/// None where that takes more than 3,000 steps, the flow swinging too often, and beyond the range of doubles.
+pub fn amplification(path: &Path, rtol: f64) -> Followed {
+    let mut steps = 0;
+    let number = growth(path, rtol, &mut steps).filter(|growth| growth.is_finite());
+    Followed { number, steps }
+}
+
+fn growth(path: &Path, rtol: f64, steps: &mut u32) -> Option<f64> {
     let rule = radau();
     let slider = &path.slider;
     let ratio = slider.law.b / slider.law.a;
@@ -39,15 +46,14 @@ pub fn amplification(path: &Path, rtol: f64) -> Option<f64> {
     let mut workspace = Workspace::new(states);
     let mut h = first(slider, &path.jet(0, 0.0));
     let tolerance = (1e-3 * rtol).max(1e-15);
-    let mut steps = 0;
     for piece in 0..path.pieces() {
         let span = path.span(piece);
         let mut from = 0.0;
         while from < 1.0 {
-            if steps == MOST_STEPS {
+            if *steps == MOST_STEPS {
                 return None;
             }
-            steps += 1;
+            *steps += 1;
             let to = if from + 1.0001 * h / span >= 1.0 { 1.0 } else { from + h / span };
             let (next, error) = workspace.step(path, piece, (from, to), &flow, rule)?;
             // What the end lacks is of a higher order than what the nodes lack.
@@ -66,7 +72,7 @@ pub fn amplification(path: &Path, rtol: f64) -> Option<f64> {
         // ln v follows.
         flow.iter_mut().for_each(|column| column[2] = column[1] - ratio * column[0]);
     }
-    Some(norm(flow, states)).filter(|growth| growth.is_finite())
+    Some(norm(flow, states))
 }
 
 /// More steps than any flow takes that swings less than some thousand times.

@@ -1,18 +1,25 @@
-//! The engine: computes the parts that are missing, encodes and writes them.
+//! The engine: computes the parts that are missing or damaged, encodes and writes them.
 //!
-//! A part is computed by all threads that have nothing else to do, encoded by one of them, and written by a thread of its own while the
-//! next parts are computed. Nothing of what is written depends on how the work was spread.
+//! A part is computed by all threads that have nothing else to do, and written by a thread of its own while the next parts are computed. That
+//! thread also encodes a part if it has not enough to do; else one of those that compute does. Nothing of what is written depends on how the
+//! work was spread.
 
-use std::sync::mpsc::{channel, sync_channel};
+use std::fmt;
+use std::ops::{Deref, Range};
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::mpsc::{Sender, channel, sync_channel};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::thread;
 
 use rayon::{ThreadPool, ThreadPoolBuilder};
 
 use super::check::Sweep;
-use super::plan::{Plan, footer};
-use crate::dataset::{DatasetError, Folder, Layout, ManifestTable, encode};
-use crate::table::{Job, Optima, Sheet, Signal, Stopped, Table, Work};
+use super::plan::Plan;
+use super::shard::{Shard, TooManyParts};
+use crate::dataset::{DatasetError, Folder, Footer, Layout, Look, Manifest, ManifestTable, State, encode};
+use crate::grid::Quantity;
+use crate::table::{Job, Sheet, Signal, Stopped, Table, Work};
 
 /// What a run did.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -30,6 +37,8 @@ pub struct TableOutcome {
     pub kept: u64,
     /// Parts that were made.
     pub made: u64,
+    /// Those of them that were there, but damaged.
+    pub damaged: u64,
     /// Rows that were computed.
     pub rows: u64,
 }
@@ -48,115 +57,317 @@ pub enum RunError {
         /// Why not.
         source: rayon::ThreadPoolBuildError,
     },
+    /// The thread that writes cannot be started.
+    #[error("cannot start the thread that writes: {0}\n  help: allow the process more memory or more threads")]
+    Writer(std::io::Error),
+    /// It cannot be shared out.
+    #[error(transparent)]
+    Parts(#[from] TooManyParts),
+    /// A row made the program panic; all other parts are finished.
+    #[error("{defect}\n  help: this is a defect of slipsweep, please report it; {}", rest(*others))]
+    Defect {
+        /// The first of them.
+        defect: Defect,
+        /// How many parts more have such a row.
+        others: usize,
+    },
     /// It was asked to stop.
     #[error(transparent)]
     Stopped(#[from] Stopped),
 }
 
+fn rest(others: usize) -> String {
+    match others {
+        0 => "all other parts are finished".to_owned(),
+        _ => format!("{others} more parts have such a row, all others are finished"),
+    }
+}
+
+/// A row that made the program panic, which no row should.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Defect {
+    /// The table.
+    pub table: String,
+    /// The row, by global number; several if no single one panics when it is computed on its own.
+    pub rows: Range<u64>,
+    /// The axes of the table at the first of them.
+    pub axes: Vec<(&'static str, f64)>,
+    /// What the program said.
+    pub message: String,
+}
+
+impl fmt::Display for Defect {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Defect { table, rows, axes, message } = self;
+        match rows.end - rows.start {
+            1 => write!(f, "{table}: row {} panicked: {message}\n  at ", rows.start)?,
+            _ => write!(f, "{table}: rows {} to {} panicked: {message}\n  beginning at ", rows.start, rows.end)?,
+        }
+        let axes: Vec<String> = axes.iter().map(|(name, value)| format!("{name} = {value:?}")).collect();
+        f.write_str(&axes.join(", "))
+    }
+}
+
 /// Runs `sweep` on `threads` threads (0: one a processor) into `folder`; parts that are there already are kept.
 pub fn run(sweep: &Sweep, folder: &Folder, threads: usize, signal: &Signal) -> Result<Outcome, RunError> {
+    run_shard(sweep, folder, Shard::WHOLE, threads, signal)
+}
+
+/// The same for the parts of one shard alone. Any number of processes may do that at the same time, with the same shard too.
+///
+/// Every bit of a part that is there is checked: one that is damaged is made again, one of another sweep is left alone and ends the run.
+pub fn run_shard(
+    sweep: &Sweep,
+    folder: &Folder,
+    shard: Shard,
+    threads: usize,
+    signal: &Signal,
+) -> Result<Outcome, RunError> {
     let plan = Plan::new(sweep);
     let manifest = plan.manifest(sweep);
+    let shares = shard.parts(sweep, &plan)?;
     folder.open(&manifest)?;
     let pool = pool(threads)?;
-    let optima = Optima::new(plan.optima, sweep.bounded, sweep.optimum_rtol());
+    let optima = sweep.optima();
     let mut outcome = Outcome { tables: Vec::new(), work: Work::default() };
     let failure = Failure::default();
+    let defects = Mutex::new(Vec::new());
+    let stages: Vec<Stage<'_>> = (sweep.requests.iter().zip(&plan.tables))
+        .map(|(request, table)| Stage {
+            manifest: &manifest,
+            table,
+            job: sweep.job(request, &optima, signal),
+            layout: Layout::new(request.table, &request.selection, &sweep.grid),
+        })
+        .collect();
+    // Parts that the disk has not finished.
+    let queued = AtomicUsize::new(0);
     thread::scope(|scope| {
         // The disk has a thread of its own, so that no thread that computes waits for it.
         let (to_disk, parts) = sync_channel::<Part<'_>>(1);
-        scope.spawn(|| {
-            for part in parts {
+        let (queued, failure) = (&queued, &failure);
+        let write = move || {
+            for Part { stage, number, content } in parts {
                 // Who asks to stop does not want to wait for the parts that are queued here.
-                failure.keep(match signal.check() {
-                    Ok(()) => folder.write_part(part.table, part.number, &part.bytes).map_err(RunError::from),
-                    Err(stopped) => Err(stopped.into()),
-                });
+                failure.keep(signal.check().map_err(RunError::from).and_then(|()| {
+                    let bytes = match content {
+                        Content::Bytes(bytes) => bytes,
+                        Content::Sheet(sheet) => stage.encode(folder, number, &sheet)?,
+                    };
+                    folder.write_part(&stage.table.name, number, &bytes).map_err(RunError::from)
+                }));
+                queued.fetch_sub(1, Ordering::Relaxed);
             }
-        });
-        for (request, table) in sweep.requests.iter().zip(&plan.tables) {
-            let Some(job) = sweep.job(request, &optima, signal) else { continue };
-            let layout = Layout::new(request.table, &request.selection, &sweep.grid);
+        };
+        thread::Builder::new().spawn_scoped(scope, write).map_err(RunError::Writer)?;
+        for ((request, stage), share) in sweep.requests.iter().zip(&stages).zip(shares) {
+            let table = stage.table;
             let mut done = TableOutcome::default();
-            let missing = (0..table.parts).filter(|&number| {
+            let missing = share.into_iter().flatten().filter(|&number| {
                 let rows = table.rows_of(number);
                 let count = rows.end - rows.start;
-                if folder.has_part(&table.name, number) {
-                    done.kept += 1;
-                    signal.advance(count);
-                    return false;
+                match folder.state(&manifest, &table.name, number, Look::Whole) {
+                    State::There { .. } => {
+                        done.kept += 1;
+                        signal.advance(count);
+                        return false;
+                    }
+                    State::Foreign { what, expected, found } => {
+                        let path = folder.part(&table.name, number).display().to_string();
+                        failure.keep(Err(DatasetError::ForeignPart { path, what, expected, found }.into()));
+                        return false;
+                    }
+                    State::Damaged { .. } => done.damaged += 1,
+                    State::Missing => {}
                 }
                 done.made += 1;
                 done.rows += count;
                 true
             });
-            let wanted = missing.take_while(|_| !failure.is_there());
-            outcome.work += compute(&pool, request.table, &job, table, wanted, |number, sheet| {
-                let footer = footer(&manifest, &table.name, table.rows_of(number));
-                match encode(&layout, &job.rows, sheet, &footer) {
-                    // The other end is there until every sender is gone.
-                    Ok(bytes) => drop(to_disk.send(Part { table: &table.name, number, bytes })),
-                    Err(source) => failure.keep(Err(DatasetError::encode(folder, &table.name, number, source).into())),
-                }
+            let wanted = missing.take_while(|_| !failure.is_there() && signal.check().is_ok());
+            outcome.work += compute(&pool, request.table, &stage.job, table, wanted, |number, sheet| {
+                let sheet = match sheet {
+                    Ok(sheet) => sheet,
+                    Err(defect) => return locked(&defects).push(defect),
+                };
+                let take = |parts: usize| (parts < AHEAD).then_some(parts + 1);
+                let is_free = queued.fetch_update(Ordering::Relaxed, Ordering::Relaxed, take).is_ok();
+                let content = if is_free {
+                    Content::Sheet(sheet)
+                } else {
+                    match stage.encode(folder, number, &sheet) {
+                        Ok(bytes) => {
+                            queued.fetch_add(1, Ordering::Relaxed);
+                            Content::Bytes(bytes)
+                        }
+                        Err(error) => return failure.keep(Err(error)),
+                    }
+                };
+                // The other end is there until every sender is gone.
+                let _ = to_disk.send(Part { stage, number, content });
             })?;
+            signal.check()?;
             outcome.tables.push(done);
         }
-        Ok::<(), Stopped>(())
+        Ok::<(), RunError>(())
     })?;
     failure.into_result()?;
-    Ok(outcome)
+    let mut defects = defects.into_inner().unwrap_or_else(PoisonError::into_inner);
+    // Threads find them in no particular order.
+    defects.sort_by_key(|defect| (plan.tables.iter().position(|table| table.name == defect.table), defect.rows.start));
+    let others = defects.len().saturating_sub(1);
+    match defects.into_iter().next() {
+        Some(defect) => Err(RunError::Defect { defect, others }),
+        None => Ok(outcome),
+    }
 }
 
 /// The threads of a run.
 pub fn pool(threads: usize) -> Result<ThreadPool, RunError> {
-    ThreadPoolBuilder::new().num_threads(threads).build().map_err(|source| RunError::Threads { threads, source })
+    ThreadPoolBuilder::new().num_threads(threads).build().map_err(|source| {
+        let each_processor = || thread::available_parallelism().map_or(1, |threads| threads.get());
+        RunError::Threads { threads: if threads == 0 { each_processor() } else { threads }, source }
+    })
 }
 
-/// Computes the parts `numbers` of a table and hands the number and the sheet of each to `take`, in no particular order.
+/// Most bytes of the sheets that are being filled at a time, unless there are fewer than two.
+const SHEETS: u64 = 1 << 27;
+
+/// Parts that the writing thread may have before it, the one that it is at included: with fewer than two it would wait for the next.
+const AHEAD: usize = 2;
+
+/// Computes the parts `numbers` of a table and hands the number and the sheet of each to `take`, in no particular order; of a part with a
+/// row that panics, the row.
 ///
-/// One part more than there are threads is under way at a time, so that no thread waits for the end of a part.
+/// One part more than there are threads is under way at a time, so that no thread waits for the end of a part, and two may be kept by
+/// whoever takes them; fewer where parts are large and threads many, since the threads share the rows of a part.
 pub fn compute(
     pool: &ThreadPool,
     table: &dyn Table,
     job: &Job<'_>,
     parts: &ManifestTable,
     numbers: impl Iterator<Item = u64>,
-    take: impl Fn(u64, &Sheet) + Sync,
+    take: impl Fn(u64, Result<Filled, Defect>) + Sync,
 ) -> Result<Work, Stopped> {
     let (give_back, free) = channel();
-    for _ in 0..=pool.current_num_threads() {
-        let _ = give_back.send(Sheet::new(job.selection.indices().len()));
+    let columns = job.selection.indices().len();
+    let size = parts.rows_per_part.min(parts.rows).saturating_mul(8 * columns as u64 + 1);
+    let sheets = (pool.current_num_threads() as u64 + 1 + AHEAD as u64).min((SHEETS / size.max(1)).max(2));
+    for _ in 0..sheets {
+        let _ = give_back.send(Sheet::new(columns));
     }
     let result = Mutex::new(Ok(Work::default()));
     pool.in_place_scope(|scope| {
         for number in numbers {
-            // Never fails: every task gives its sheet back.
-            let Ok(mut sheet) = free.recv() else { break };
+            // Never fails: every sheet is given back.
+            let Ok(sheet) = free.recv() else { break };
             if locked(&result).is_err() {
                 break;
             }
-            let (give_back, result, take) = (give_back.clone(), &result, &take);
+            let (mut filled, result, take) = (Filled { sheet, give_back: give_back.clone() }, &result, &take);
             scope.spawn(move |_| {
                 let rows = parts.rows_of(number);
-                sheet.resize((rows.end - rows.start) as usize);
-                let computed = table.compute(job, rows, &mut sheet).and_then(|work| job.signal.check().map(|()| work));
-                if computed.is_ok() {
-                    take(number, &sheet);
-                }
+                let computed = match attempt(table, job, rows.clone(), &mut filled.sheet) {
+                    Ok(computed) => computed.and_then(|work| job.signal.check().map(|()| work)).inspect(|_| {
+                        take(number, Ok(filled));
+                    }),
+                    Err(message) => {
+                        take(number, Err(culprit(table, job, rows, message)));
+                        Ok(Work::default())
+                    }
+                };
                 let mut result = locked(result);
                 *result = result.and_then(|work| computed.map(|more| [work, more].into_iter().sum()));
-                let _ = give_back.send(sheet);
             });
         }
     });
     result.into_inner().unwrap_or_else(PoisonError::into_inner)
 }
 
+/// Computes `rows` into `sheet`; the message if that panics.
+fn attempt(
+    table: &dyn Table,
+    job: &Job<'_>,
+    rows: Range<u64>,
+    sheet: &mut Sheet,
+) -> Result<Result<Work, Stopped>, String> {
+    sheet.resize((rows.end - rows.start) as usize);
+    // What a panic leaves half done is the sheet, which is filled anew, and solves that were not stored.
+    catch_unwind(AssertUnwindSafe(|| table.compute(job, rows, sheet))).map_err(|payload| {
+        let text = payload.downcast_ref::<&str>().map(|text| (*text).to_owned());
+        text.or_else(|| payload.downcast_ref::<String>().cloned()).unwrap_or_else(|| "no message".to_owned())
+    })
+}
+
+/// The row among `rows`, which panicked with `message`, that is to blame: found by halves, since any rows can be computed on their own.
+fn culprit(table: &dyn Table, job: &Job<'_>, mut rows: Range<u64>, mut message: String) -> Defect {
+    let mut sheet = Sheet::new(job.selection.indices().len());
+    while rows.end - rows.start > 1 {
+        let middle = rows.start + (rows.end - rows.start) / 2;
+        let halves = [rows.start..middle, middle..rows.end];
+        let panics = halves.into_iter().find_map(|half| {
+            let said = attempt(table, job, half.clone(), &mut sheet).err()?;
+            Some((half, said))
+        });
+        let Some((half, said)) = panics else { break };
+        (rows, message) = (half, said);
+    }
+    let point = job.rows.point(rows.start);
+    let axes = Quantity::ALL.into_iter().filter(|axis| table.axes().contains(axis));
+    let axes = axes.map(|axis| (axis.name(), point[axis])).collect();
+    Defect { table: table.name().to_owned(), rows, axes, message }
+}
+
+/// One table of a run.
+struct Stage<'a> {
+    manifest: &'a Manifest,
+    table: &'a ManifestTable,
+    job: Job<'a>,
+    layout: Layout,
+}
+
+impl Stage<'_> {
+    /// The bytes of a part.
+    fn encode(&self, folder: &Folder, number: u64, sheet: &Sheet) -> Result<Vec<u8>, RunError> {
+        let name = &self.table.name;
+        let footer = Footer::new(self.manifest, name, self.table.rows_of(number));
+        encode(&self.layout, self.job.rows, sheet, &footer)
+            .map_err(|source| DatasetError::encode(folder, name, number, source).into())
+    }
+}
+
 /// A part on its way to the disk.
 struct Part<'a> {
-    table: &'a str,
+    stage: &'a Stage<'a>,
     number: u64,
-    bytes: Vec<u8>,
+    content: Content,
+}
+
+/// What is there of a part.
+enum Content {
+    Sheet(Filled),
+    Bytes(Vec<u8>),
+}
+
+/// The cells of a part. They go back to where the next part is computed once they are dropped.
+pub struct Filled {
+    sheet: Sheet,
+    give_back: Sender<Sheet>,
+}
+
+impl Deref for Filled {
+    type Target = Sheet;
+
+    fn deref(&self) -> &Sheet {
+        &self.sheet
+    }
+}
+
+impl Drop for Filled {
+    fn drop(&mut self) {
+        // Nobody waits for it once all parts are computed.
+        let _ = self.give_back.send(std::mem::replace(&mut self.sheet, Sheet::new(0)));
+    }
 }
 
 /// The first failure of any thread.

@@ -3,12 +3,14 @@
 use std::fmt;
 use std::path::{Path, PathBuf};
 
+use crate::names::{nearest, shown};
+
 /// A fault in a spec.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct SpecError {
     /// The file, if there is one.
     pub file: Option<PathBuf>,
-    /// The line in the file, from 1.
+    /// The line, from 1.
     pub line: Option<usize>,
     /// The key, as in `axes.v_i[2]`; empty if it concerns the whole file.
     pub key: Box<str>,
@@ -19,6 +21,15 @@ pub struct SpecError {
     /// What to do.
     pub help: Box<str>,
 }
+
+/// Characters of a key that a message shows.
+const MOST_OF_KEY: usize = 200;
+
+/// Characters of a name, or of a cell of a file, that a message shows.
+pub const MOST_OF_NAME: usize = 100;
+
+/// Characters of what was found that a message shows: more than twice those of the longest expression.
+const MOST_OF_FOUND: usize = 2500;
 
 impl SpecError {
     /// A fault at `key`, whose place is not known yet.
@@ -46,31 +57,20 @@ impl SpecError {
 
 impl fmt::Display for SpecError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        if let Some(file) = &self.file {
-            write!(f, "{}:", file.display())?;
-            match self.line {
-                Some(line) => write!(f, "{line}: ")?,
-                None => f.write_str(" ")?,
-            }
+        match (&self.file, self.line) {
+            (Some(file), Some(line)) => write!(f, "{}:{line}: ", file.display())?,
+            (Some(file), None) => write!(f, "{}: ", file.display())?,
+            (None, Some(line)) => write!(f, "line {line}: ")?,
+            (None, None) => {}
         }
         if !self.key.is_empty() {
-            write!(f, "{}: ", self.key)?;
+            write!(f, "{}: ", shown(&self.key, MOST_OF_KEY))?;
         }
-        write!(f, "{}\n  expected: {}\n  help: {}", self.found, self.expected, self.help)
+        write!(f, "{}\n  expected: {}\n  help: {}", shown(&self.found, MOST_OF_FOUND), self.expected, self.help)
     }
 }
 
 impl std::error::Error for SpecError {}
-
-/// The name among `known`, all in lower case, that `name` was most likely meant to be.
-pub fn nearest<'a>(name: &str, known: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
-    known
-        .into_iter()
-        .map(|candidate| (strsim::damerau_levenshtein(&name.to_lowercase(), candidate), candidate))
-        .filter(|(distance, candidate)| *distance <= candidate.len().max(name.len()).div_ceil(3))
-        .min_by_key(|(distance, _)| *distance)
-        .map(|(_, candidate)| candidate)
-}
 
 /// A fault of a name that is none of `known`, with the nearest of them.
 pub fn unknown(key: String, what: &str, name: &str, known: &[&str]) -> SpecError {
@@ -78,23 +78,5 @@ pub fn unknown(key: String, what: &str, name: &str, known: &[&str]) -> SpecError
         Some(meant) => format!("did you mean `{meant}`?"),
         None => "remove it, or choose one of these".to_owned(),
     };
-    SpecError::new(key, format!("unknown {what} `{name}`"), known.join(", "), help)
-}
-
-#[cfg(test)]
-mod tests {
-    //! Suggestions are near or not made.
-
-    use super::nearest;
-
-    #[test]
-    fn nearest_name_or_none() {
-        let known = ["linspace", "geomspace", "unit", "expr"];
-        assert_eq!(nearest("lnspace", known), Some("linspace"));
-        assert_eq!(nearest("geospace", known), Some("geomspace"));
-        assert_eq!(nearest("unti", known), Some("unit"));
-        assert_eq!(nearest("UNIT", known), Some("unit"));
-        assert_eq!(nearest("temperature", known), None);
-        assert_eq!(nearest("", known), None);
-    }
+    SpecError::new(key, format!("unknown {what} `{}`", shown(name, MOST_OF_NAME)), known.join(", "), help)
 }

@@ -5,9 +5,9 @@ use std::time::{Duration, Instant};
 
 use super::check::{Request, Sweep};
 use super::engine::RunError;
-use super::plan::{Plan, footer};
-use crate::dataset::{DatasetError, Layout, encode};
-use crate::table::{OPTIMUM_AXES, Optima, Sheet, Signal};
+use super::plan::Plan;
+use crate::dataset::{DatasetError, Footer, Layout, encode};
+use crate::table::{Optima, Sheet, Signal};
 
 /// Places of a table at which samples are taken.
 const PLACES: u64 = 8;
@@ -32,7 +32,7 @@ pub fn estimate(sweep: &Sweep) -> Result<(Vec<Estimate>, f64), RunError> {
         .build()
         .map_err(|source| RunError::Threads { threads: 1, source })?;
     pool.install(|| {
-        let optima = Optima::new(plan.optima, sweep.bounded, sweep.optimum_rtol());
+        let optima = sweep.optima();
         let tables = sweep.requests.iter().map(|request| table(sweep, request, &plan, &optima));
         Ok((tables.collect::<Result<_, RunError>>()?, shared(sweep, &plan)))
     })
@@ -49,15 +49,15 @@ fn samples(rows: u64, length: u64) -> impl Iterator<Item = Range<u64>> {
 
 fn table(sweep: &Sweep, request: &Request, plan: &Plan, optima: &Optima) -> Result<Estimate, RunError> {
     let signal = Signal::default();
-    let Some(job) = sweep.job(request, optima, &signal) else { return Ok(Estimate { seconds: 0.0, bytes: 0.0 }) };
+    let job = sweep.job(request, optima, &signal);
     let layout = Layout::new(request.table, &request.selection, &sweep.grid);
     let manifest = plan.manifest(sweep);
     let measure = |rows: Range<u64>| -> Result<usize, RunError> {
         let mut sheet = Sheet::new(request.selection.indices().len());
         sheet.resize((rows.end - rows.start) as usize);
         request.table.compute(&job, rows.clone(), &mut sheet)?;
-        let footer = footer(&manifest, request.table.name(), rows);
-        let bytes = encode(&layout, &job.rows, &sheet, &footer).map_err(DatasetError::Sample)?;
+        let footer = Footer::new(&manifest, request.table.name(), rows);
+        let bytes = encode(&layout, job.rows, &sheet, &footer).map_err(DatasetError::Sample)?;
         Ok(bytes.len())
     };
     // The first round solves the shared protocols of its places, which are counted on their own, and tells what an empty part weighs.
@@ -88,14 +88,14 @@ fn table(sweep: &Sweep, request: &Request, plan: &Plan, optima: &Optima) -> Resu
 
 /// Seconds of one processor for all shared optimal protocols.
 fn shared(sweep: &Sweep, plan: &Plan) -> f64 {
-    let Some(projection) = sweep.grid.project(OPTIMUM_AXES).filter(|_| plan.optima > 0) else { return 0.0 };
+    let Some(projection) = sweep.optimum_rows.as_ref() else { return 0.0 };
     // A store without room: every protocol is solved anew.
     let optima = Optima::new(u64::MAX, sweep.bounded, sweep.optimum_rtol());
     let mut solved = 0;
     let start = Instant::now();
     while start.elapsed() < ENOUGH / 4 {
         for range in samples(projection.rows(), 1) {
-            optima.get(range.start, &projection.point(range.start));
+            optima.get(range.start, &sweep.grid.scaled(&projection.point(range.start)));
             solved += 1;
         }
     }

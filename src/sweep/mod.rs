@@ -1,5 +1,8 @@
-//! A sweep: spec (as written) -> check (against what is legal) -> plan (what there is to do) -> engine (doing it).
+//! A sweep: spec (as written) -> check (against what is legal; block and axis make the grid) -> plan (what there is to do) -> engine (doing it).
 
+mod axis;
+mod batches;
+mod block;
 mod check;
 mod engine;
 mod error;
@@ -7,11 +10,18 @@ mod estimate;
 mod place;
 mod plan;
 mod points;
+mod schema;
+mod shard;
 mod spec;
+mod units;
 
+pub use batches::Batches;
 pub use check::{Request, Sweep};
-pub use engine::{Outcome, RunError, TableOutcome, compute, pool, run};
+pub use engine::{Defect, Outcome, RunError, TableOutcome, compute, pool, run, run_shard};
 pub use error::SpecError;
 pub use estimate::{Estimate, estimate};
 pub use plan::Plan;
-pub use spec::{AccuracySpec, AxisForm, AxisSpec, AxisValue, ModelSpec, Spec, TableSpec};
+pub use schema::schema;
+pub use shard::{Shard, TooManyParts, check_parts, shares_with};
+pub use spec::{AccuracySpec, AxisForm, AxisSpec, AxisValue, BlockSpec, ModelSpec, Spec, TableSpec};
+pub use units::{units, units_of};

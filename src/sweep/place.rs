@@ -84,7 +84,7 @@ fn key_at(text: &str, span: &Range<usize>) -> String {
                 value
             }),
             Here::Value(DeValue::Array(items)) => {
-                items.iter().enumerate().find(|(_, value)| inside(value.span())).map(|(index, value)| {
+                items.iter().enumerate().find(|(_, value)| holds(value, &inside)).map(|(index, value)| {
                     path.push_str(&format!("[{index}]"));
                     value
                 })
@@ -106,9 +106,17 @@ fn covers(
     value: &Spanned<DeValue<'_>>,
     inside: &impl Fn(Range<usize>) -> bool,
 ) -> bool {
-    inside(key.span())
-        || inside(value.span())
-        || matches!(value.get_ref(), DeValue::Table(table) if table.iter().any(|(key, value)| covers(key, value, inside)))
+    inside(key.span()) || holds(value, inside)
+}
+
+/// The same for a value.
+fn holds(value: &Spanned<DeValue<'_>>, inside: &impl Fn(Range<usize>) -> bool) -> bool {
+    inside(value.span())
+        || match value.get_ref() {
+            DeValue::Table(table) => table.iter().any(|(key, value)| covers(key, value, inside)),
+            DeValue::Array(items) => items.iter().any(|item| holds(item, inside)),
+            _ => false,
+        }
 }
 
 /// The field that the parser makes of a date.
@@ -136,6 +144,9 @@ fn explain(text: &str, message: &str, span: Option<Range<usize>>) -> SpecError {
     }
     let types = message.strip_prefix("invalid type: ").and_then(|rest| rest.rsplit_once(", expected "));
     if let Some((found, expected)) = types {
+        if key == "block" && expected == "a sequence" {
+            return SpecError::new(key, "one [block]", "[[block]], as often as there are blocks", "write two brackets");
+        }
         let expected = match expected {
             "f64" => "a number",
             "a sequence" => "a list",

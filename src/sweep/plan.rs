@@ -1,16 +1,16 @@
 //! The plan: what there is to do, counted before anything is done.
 
-use std::ops::Range;
-
 use super::check::{Request, Sweep};
-use crate::dataset::{Footer, Manifest, ManifestTable};
-use crate::table::{Job, OPTIMUM_AXES, Optima, Signal};
+use crate::dataset::{Manifest, ManifestTable};
+use crate::table::{Job, OPTIMUM_AXES, Optima, Repeats, Signal};
 
 /// What a sweep consists of.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Plan {
     /// The tables.
     pub tables: Vec<ManifestTable>,
+    /// Rows of each table that `where` leaves out.
+    pub dropped: Vec<u64>,
     /// Different optimal protocols that the tables share.
     pub optima: u64,
 }
@@ -27,7 +27,8 @@ impl Plan {
                 rows_per_part,
             }
         });
-        Plan { tables: tables.collect(), optima: sweep.optimum_tuples() }
+        let dropped = sweep.requests.iter().map(|request| request.projection.dropped()).collect();
+        Plan { tables: tables.collect(), dropped, optima: sweep.optimum_tuples() }
     }
 
     /// The manifest of the dataset.
@@ -42,30 +43,20 @@ impl Plan {
 }
 
 impl Sweep {
-    /// The job of one of its tables; `None` if the rows cannot be counted, which a checked sweep excludes.
-    pub fn job<'a>(&'a self, request: &'a Request, optima: &'a Optima, signal: &'a Signal) -> Option<Job<'a>> {
-        let rows = self.grid.project(request.table.axes())?;
-        let tuples = rows.tuples(OPTIMUM_AXES);
-        Some(Job {
+    /// The job of one of its tables.
+    pub fn job<'a>(&'a self, request: &'a Request, optima: &'a Optima, signal: &'a Signal) -> Job<'a> {
+        Job {
             grid: &self.grid,
-            rows,
-            tuples,
+            rows: &request.projection,
+            tuples: request.projection.tuples(OPTIMUM_AXES),
+            repeats: Repeats::among(&request.projection, request.table.axes()),
+            members: request.members.as_ref(),
             selection: &request.selection,
+            sizes: &request.sizes,
             bounded: self.bounded,
             rtol: request.rtol,
             optima,
             signal,
-        })
-    }
-}
-
-/// What a part says of itself.
-pub fn footer(manifest: &Manifest, table: &str, rows: Range<u64>) -> Footer {
-    Footer {
-        spec: manifest.spec.clone(),
-        spec_hash: manifest.identity.spec_hash.clone(),
-        version: manifest.identity.version.clone(),
-        table: table.to_owned(),
-        rows,
+        }
     }
 }

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 
 use indexmap::IndexMap;
 use serde::de::value::{MapAccessDeserializer, SeqAccessDeserializer};
-use serde::de::{IgnoredAny, MapAccess, SeqAccess, Visitor};
+use serde::de::{MapAccess, SeqAccess, Visitor};
 use serde::{Deserialize, Deserializer};
 
 /// A sweep spec.
@@ -20,12 +20,14 @@ pub struct Spec {
     /// A file of points whose columns are axes that vary together; relative to the spec.
     pub points: Option<PathBuf>,
     /// Axes that advance together.
-    pub zip: Option<IgnoredAny>,
-    /// Condition of the rows to keep.
+    #[serde(default)]
+    pub zip: Vec<Vec<String>>,
+    /// Condition of the points to keep.
     #[serde(rename = "where")]
-    pub condition: Option<IgnoredAny>,
-    /// Grids to unite.
-    pub block: Option<IgnoredAny>,
+    pub condition: Option<String>,
+    /// Grids to unite, each with axes of its own.
+    #[serde(default)]
+    pub block: Vec<BlockSpec>,
     /// What is modelled.
     #[serde(default)]
     pub model: ModelSpec,
@@ -40,19 +42,66 @@ pub struct Spec {
     pub tables: IndexMap<String, TableSpec>,
 }
 
+/// A key of `[[block]]`, or of the top level of a spec without blocks.
+#[derive(Debug, Clone, PartialEq, Default, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct BlockSpec {
+    /// A file of points whose columns are axes that vary together; relative to the spec.
+    pub points: Option<PathBuf>,
+    /// Axes that advance together.
+    pub zip: Vec<Vec<String>>,
+    /// Condition of the points to keep.
+    #[serde(rename = "where")]
+    pub condition: Option<String>,
+    /// The axes, the last varies fastest.
+    pub axes: IndexMap<String, AxisSpec>,
+}
+
+impl Spec {
+    /// The top level as a block.
+    pub fn top(&self) -> BlockSpec {
+        BlockSpec {
+            points: self.points.clone(),
+            zip: self.zip.clone(),
+            condition: self.condition.clone(),
+            axes: self.axes.clone(),
+        }
+    }
+
+    /// An axis as it is written where it is met first.
+    pub fn axis(&self, name: &str) -> Option<&AxisSpec> {
+        self.axes.get(name).or_else(|| self.block.iter().find_map(|block| block.axes.get(name)))
+    }
+}
+
 /// `[model]`.
-#[derive(Debug, Clone, PartialEq, Eq, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct ModelSpec {
     /// Whether optimal protocols obey `v >= 1`.
     pub velocity_bound: bool,
     /// Units of the values.
     pub units: String,
+    /// Friction coefficient, for SI units.
+    pub mu_0: Option<f64>,
+    /// Length in m, for SI units.
+    pub l: Option<f64>,
+    /// Velocity in m/s, for SI units.
+    pub v_0: Option<f64>,
+    /// Normal load in Pa, for SI units.
+    pub normal_load: Option<f64>,
 }
 
 impl Default for ModelSpec {
     fn default() -> Self {
-        ModelSpec { velocity_bound: true, units: "dimensionless".to_owned() }
+        ModelSpec {
+            velocity_bound: true,
+            units: "dimensionless".to_owned(),
+            mu_0: None,
+            l: None,
+            v_0: None,
+            normal_load: None,
+        }
     }
 }
 
@@ -101,13 +150,13 @@ pub struct AxisForm {
     /// Unit of the values.
     pub unit: Option<String>,
     /// An expression of other axes.
-    pub expr: Option<IgnoredAny>,
-    /// A Sobol sequence.
-    pub sobol: Option<IgnoredAny>,
-    /// A Latin hypercube.
-    pub lhs: Option<IgnoredAny>,
+    pub expr: Option<String>,
+    /// `[least, greatest, count]`, from a Sobol sequence.
+    pub sobol: Option<Vec<f64>>,
+    /// `[least, greatest, count]`, from a Latin hypercube.
+    pub lhs: Option<Vec<f64>>,
     /// Seed of a sampled axis.
-    pub seed: Option<IgnoredAny>,
+    pub seed: Option<i64>,
 }
 
 /// The value of a key of `[tables]`.
@@ -118,6 +167,8 @@ pub struct TableSpec {
     pub columns: Option<Vec<String>>,
     /// Accuracy of this table.
     pub rtol: Option<f64>,
+    /// What to write of each landscape instead of its rows; of `gap` alone.
+    pub reduce: Option<String>,
 }
 
 impl<'de> Deserialize<'de> for AxisSpec {

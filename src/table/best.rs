@@ -5,7 +5,7 @@ use std::ops::Range;
 use super::optima::{OPTIMUM_AXES, transition};
 use super::{Column, Job, Kind, Selection, Sheet, Stopped, Table, Work, rows};
 use crate::grid::{Quantity, Scale};
-use crate::protocol::best;
+use crate::protocol::{best, error};
 
 /// One row a transition and time.
 pub struct Best;
@@ -25,7 +25,10 @@ const COLUMNS: &[Column] = &[
     Column::number("work_optimal", "mu_0 sigma l", "least work of friction W* of any protocol"),
     Column::number("gap", "1", "(W_s - W*)/W*, without cancellation: good to 1e-7 of itself or 1e-20"),
     Column::number("v_min", "v_0", "least velocity of the best shortcut"),
+    Column::number("work_error", "mu_0 sigma l", "bound of the error of work, by a second search").optional(),
 ];
+
+const WORK_ERROR: usize = 6;
 
 impl Table for Best {
     fn name(&self) -> &'static str {
@@ -48,6 +51,10 @@ impl Table for Best {
         1 << 10
     }
 
+    fn cost(&self) -> u64 {
+        1_500_000
+    }
+
     fn needs_optimum(&self, _selection: &Selection) -> bool {
         false
     }
@@ -57,9 +64,18 @@ impl Table for Best {
         let (natural_2, natural_3) = (natural(Quantity::Alpha2), natural(Quantity::Alpha3));
         rows::each(job, range, (COLUMNS.len(), 1), sheet, |_, point, cells| {
             let t_f = point[Quantity::Time];
-            let solved = best::solve(&transition(point), t_f, job.bounded, job.rtol);
+            let solve = |rtol| best::solve(&transition(point), t_f, job.bounded, rtol);
+            let solved = solve(job.rtol);
+            let mut effort = solved.effort;
             if let Some(best) = solved.value {
-                cells.copy_from_slice(&[
+                if job.selection.has(WORK_ERROR) {
+                    let finest = solve(error::FINEST);
+                    effort += finest.effort;
+                    if let Some(finest) = finest.value {
+                        cells[WORK_ERROR] = error::bound(best.work, finest.work, best.work);
+                    }
+                }
+                cells[..WORK_ERROR].copy_from_slice(&[
                     if natural_2 { best.a_2 / t_f } else { best.a_2 },
                     if natural_3 { best.a_3 / (t_f * t_f) } else { best.a_3 },
                     best.work,
@@ -68,7 +84,7 @@ impl Table for Best {
                     best.v_min,
                 ]);
             }
-            (solved.status, Work { best: 1, ..Work::from(solved.effort) })
+            (solved.status, Work { best: 1, ..Work::from(effort) })
         })
     }
 }

@@ -46,11 +46,21 @@ impl Column {
 
     /// The unit of its values in a sweep over `grid`; empty for words.
     pub fn unit(&self, grid: &Grid) -> &'static str {
+        grid.units.name(self.model_unit(grid))
+    }
+
+    /// The same unit as the model has it.
+    fn model_unit(&self, grid: &Grid) -> &'static str {
         match self.kind {
             Kind::Number(unit) => unit,
             Kind::Quantity(quantity) => quantity.unit(grid.scale(quantity).unwrap_or(Scale::Duration)),
             Kind::Label(_) | Kind::Flag => "",
         }
+    }
+
+    /// What a value in the units of the model is multiplied by to be one in those of `grid`.
+    pub fn size(&self, grid: &Grid) -> f64 {
+        grid.units.size(self.model_unit(grid))
     }
 }
 

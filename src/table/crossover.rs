@@ -49,6 +49,10 @@ impl Table for Crossover {
         1 << 16
     }
 
+    fn cost(&self) -> u64 {
+        1_800
+    }
+
     fn needs_optimum(&self, _selection: &Selection) -> bool {
         false
     }

@@ -8,27 +8,35 @@ use std::sync::OnceLock;
 
 use rayon::prelude::*;
 
-use super::optima::transition;
+use super::fault;
+use super::optima::{transition, work_error};
 use super::{Column, Job, Selection, Sheet, Stopped, Table, Work};
-use crate::grid::{Point, Quantity, Scale};
-use crate::protocol::Status;
+use crate::grid::{Point, Quantity, Runs, Scale, View};
+use crate::model::Transition;
 use crate::protocol::cubic::{Landscape, Shortcuts};
+use crate::protocol::{Status, error};
 
 /// One row a shortcut.
 pub struct Gap;
 
 const WORK_OPTIMAL: usize = 1;
-const GAP: usize = 2;
+/// The place of `gap` among its columns.
+pub const GAP: usize = 2;
+const WORK_ERROR: usize = 4;
+const GAP_ERROR: usize = 5;
 
 const COLUMNS: &[Column] = &[
     Column::number("work", "mu_0 sigma l", "work of friction W_s of the shortcut"),
     Column::number("work_optimal", "mu_0 sigma l", "least work of friction W* of any protocol"),
-    Column::number("gap", "1", "(W_s - W*)/W*, good to rtol of 1, not of itself"),
+    Column::number("gap", "1", "(W_s - W*)/W*, good to rtol of 1 + gap, not of itself"),
     Column::number("v_min", "v_0", "least velocity of the shortcut"),
+    Column::number("work_error", "mu_0 sigma l", "bound of the error of work, by a second quadrature").optional(),
+    Column::number("gap_error", "1", "bound of the error of gap, by a second quadrature and a second optimum")
+        .optional(),
 ];
 
 /// Rows that a thread takes at a time: short enough to stop within a fraction of a second at any accuracy.
-const CHUNK: usize = 1 << 11;
+const CHUNK: usize = 1 << 13;
 
 impl Table for Gap {
     fn name(&self) -> &'static str {
@@ -59,13 +67,18 @@ impl Table for Gap {
         1 << 18
     }
 
+    fn cost(&self) -> u64 {
+        100
+    }
+
     fn needs_optimum(&self, selection: &Selection) -> bool {
-        selection.has(WORK_OPTIMAL) || selection.has(GAP)
+        selection.has_any([WORK_OPTIMAL, GAP, GAP_ERROR])
     }
 
     fn compute(&self, job: &Job<'_>, rows: Range<u64>, sheet: &mut Sheet) -> Result<Work, Stopped> {
-        let (groups, order) = groups(job, &rows);
-        let coefficients = Coefficients::new(job, &rows, order.as_deref());
+        let view = job.rows.view(rows.clone());
+        let (groups, order) = groups(&view, job, &rows);
+        let coefficients = Coefficients::new(job, view, &rows, order.as_deref());
         let works = chunks(&groups, sheet, job.selection)
             .into_par_iter()
             // Chunks cost very different times: no thread may keep several to itself while another one is idle.
@@ -80,6 +93,9 @@ impl Table for Gap {
             .collect::<Result<Vec<Work>, Stopped>>()?;
         if let Some(order) = order {
             scatter(sheet, &order);
+        }
+        for (column, size) in sheet.columns.iter_mut().zip(job.sizes).filter(|(_, size)| **size != 1.0) {
+            column.iter_mut().for_each(|cell| *cell *= size);
         }
         Ok(works.into_iter().sum())
     }
@@ -98,23 +114,17 @@ struct Group {
 struct Prepared {
     /// `None` where no protocol with `v >= 1` is fast enough, so that every row is infeasible.
     landscape: Option<Landscape>,
+    /// The same as fine as there is, its transition and its time, where errors are asked for.
+    finest: Option<(Landscape, Transition, f64)>,
     /// Status and `W*` of the optimal protocol, where it is asked for.
     optimum: Option<(Status, Option<f64>)>,
+    /// Bound of the error of `W*`, where it is asked for.
+    error_optimal: f64,
 }
 
 /// The groups of a part, and for each place in the order of computation its row, if that is not the order of rows.
-fn groups(job: &Job<'_>, rows: &Range<u64>) -> (Vec<Group>, Option<Vec<u32>>) {
-    let mut runs: Vec<(u64, Range<u64>)> = Vec::new();
-    let mut row = rows.start;
-    while row < rows.end {
-        let end = ((row / job.tuples.run() + 1).saturating_mul(job.tuples.run())).min(rows.end);
-        let tuple = job.tuples.of(row);
-        match runs.last_mut() {
-            Some((last, run)) if *last == tuple => run.end = end,
-            _ => runs.push((tuple, row..end)),
-        }
-        row = end;
-    }
+fn groups(view: &View<'_>, job: &Job<'_>, rows: &Range<u64>) -> (Vec<Group>, Option<Vec<u32>>) {
+    let mut runs = view.tuples(&job.tuples, rows.clone());
     let in_order = |runs: &[(u64, Range<u64>)]| {
         let mut tuples: Vec<u64> = runs.iter().map(|(tuple, _)| *tuple).collect();
         tuples.sort_unstable();
@@ -139,45 +149,50 @@ fn groups(job: &Job<'_>, rows: &Range<u64>) -> (Vec<Group>, Option<Vec<u32>>) {
     (groups, order)
 }
 
-/// The coefficients of every place of a part.
+/// The rows of a part, and the coefficients of every place.
 struct Coefficients<'a> {
-    job: &'a Job<'a>,
-    rows: Range<u64>,
+    view: View<'a>,
+    first: u64,
     order: Option<&'a [u32]>,
-    values: [Vec<f64>; 2],
+    runs: [Option<Runs>; 2],
     natural: [bool; 2],
+    sizes: [f64; 2],
 }
 
 const ALPHAS: [Quantity; 2] = [Quantity::Alpha2, Quantity::Alpha3];
 
 impl<'a> Coefficients<'a> {
-    fn new(job: &'a Job<'a>, rows: &Range<u64>, order: Option<&'a [u32]>) -> Self {
-        let values = ALPHAS.map(|alpha| job.rows.runs(alpha, rows.clone()).map_or_else(Vec::new, |runs| runs.values()));
+    fn new(job: &Job<'a>, view: View<'a>, rows: &Range<u64>, order: Option<&'a [u32]>) -> Self {
+        let runs = ALPHAS.map(|alpha| view.runs(alpha, rows.clone()));
         let natural = ALPHAS.map(|alpha| job.grid.scale(alpha) == Some(Scale::Model));
-        Coefficients { job, rows: rows.clone(), order, values, natural }
+        let sizes = ALPHAS.map(|alpha| job.grid.units.size(alpha.unit(Scale::Model)));
+        Coefficients { view, first: rows.start, order, runs, natural, sizes }
+    }
+
+    /// The row at a place in the order of computation.
+    fn row(&self, place: usize) -> u64 {
+        self.first + self.order.map_or(place as u64, |order| order[place].into())
     }
 
     /// `alpha_2 t_f` and `alpha_3 t_f^2` at `places`, all of one duration.
     fn fill(&self, places: Range<usize>, t_f: f64, out: [&mut Vec<f64>; 2]) {
         for (i, out) in out.into_iter().enumerate() {
             out.clear();
-            let Some(runs) = self.job.rows.runs(ALPHAS[i], self.rows.clone()) else { continue };
-            let values = &self.values[i];
+            let Some(runs) = &self.runs[i] else { continue };
+            let values = runs.values();
             match self.order {
                 None => {
-                    let rows = self.rows.start + places.start as u64..self.rows.start + places.end as u64;
+                    let rows = self.first + places.start as u64..self.first + places.end as u64;
                     for (value, length) in runs.over(rows) {
                         out.resize(out.len() + length, values[value]);
                     }
                 }
                 Some(order) => out.extend(
-                    order[places.clone()]
-                        .iter()
-                        .map(|&offset| values[runs.step_of(self.rows.start + u64::from(offset))]),
+                    order[places.clone()].iter().map(|&offset| values[runs.step_of(self.first + u64::from(offset))]),
                 ),
             }
             if self.natural[i] {
-                let unit = if i == 0 { t_f } else { t_f * t_f };
+                let unit = if i == 0 { t_f } else { t_f * t_f } / self.sizes[i];
                 out.iter_mut().for_each(|value| *value *= unit);
             }
         }
@@ -239,16 +254,17 @@ fn evaluate(job: &Job<'_>, groups: &[Group], coefficients: &Coefficients<'_>, ch
     let Chunk { first_group, mut place, mut cells } = chunk;
     cells.columns.iter_mut().for_each(|column| column.fill(f64::NAN));
     let (mut a_2, mut a_3) = (Vec::with_capacity(CHUNK), Vec::with_capacity(CHUNK));
-    let (mut work_buffer, mut v_min_buffer) = (Vec::new(), Vec::new());
+    let (mut work_buffer, mut v_min_buffer, mut error_buffer) = (Vec::new(), Vec::new(), Vec::new());
     let mut work = Work::default();
     for group in &groups[first_group..] {
         if cells.status.is_empty() {
             break;
         }
         let length = (group.places.end - place).min(cells.status.len());
+        fault::strike((place..place + length).map(|place| coefficients.row(place)));
         let (now, later) = cells.split(length);
         cells = later;
-        let point = job.rows.point(group.row);
+        let point = job.grid.scaled(&coefficients.view.point(group.row));
         let prepared = group.prepared.get_or_init(|| prepare(job, group, &point, &mut work));
         coefficients.fill(place..place + length, point[Quantity::Time], [&mut a_2, &mut a_3]);
         place += length;
@@ -258,12 +274,26 @@ fn evaluate(job: &Job<'_>, groups: &[Group], coefficients: &Coefficients<'_>, ch
             continue;
         };
 
-        let [work_s, work_optimal, gap, v_min] = now.columns;
+        let [work_s, work_optimal, gap, v_min, work_error, gap_error] = now.columns;
         let with_gap = !gap.is_empty();
-        let works = if work_s.is_empty() && with_gap { buffer(&mut work_buffer, length) } else { work_s };
+        let with_work = with_gap || prepared.finest.is_some();
+        let works = if work_s.is_empty() && with_work { buffer(&mut work_buffer, length) } else { work_s };
         let v_min = if v_min.is_empty() { buffer(&mut v_min_buffer, length) } else { v_min };
         let out = Shortcuts { work: &mut *works, v_min: &mut *v_min, status: &mut *now.status };
         work += Work::from(landscape.evaluate(&a_2, &a_3, out));
+        let errors = if work_error.is_empty() && prepared.finest.is_some() {
+            buffer(&mut error_buffer, length)
+        } else {
+            work_error
+        };
+        if let Some((finest, transition, t_f)) = &prepared.finest {
+            let mut again = now.status.to_vec();
+            let out = Shortcuts { work: &mut *errors, v_min: &mut [], status: &mut again };
+            work += Work::from(finest.evaluate(&a_2, &a_3, out));
+            for ((error, &work_s), &v_min) in errors.iter_mut().zip(&*works).zip(&*v_min) {
+                *error = error::of_shortcut(transition, *t_f, v_min, work_s, *error);
+            }
+        }
 
         for (i, status) in now.status.iter().enumerate() {
             if *status == Status::NotConverged {
@@ -281,6 +311,9 @@ fn evaluate(job: &Job<'_>, groups: &[Group], coefficients: &Coefficients<'_>, ch
                     }
                     if with_gap {
                         gap[i] = (works[i] - value) / value;
+                    }
+                    if let Some(cell) = gap_error.get_mut(i) {
+                        *cell = error::of_gap((works[i], errors[i]), (value, prepared.error_optimal));
                     }
                 }
                 if matches!(optimum, Status::Infeasible | Status::Nonphysical | Status::NotConverged) {
@@ -301,15 +334,21 @@ fn buffer(buffer: &mut Vec<f64>, length: usize) -> &mut [f64] {
 fn prepare(job: &Job<'_>, group: &Group, point: &Point, work: &mut Work) -> Prepared {
     let (transition, t_f) = (transition(point), point[Quantity::Time]);
     if job.bounded && t_f < transition.least_time() {
-        return Prepared { landscape: None, optimum: None };
+        return Prepared { landscape: None, finest: None, optimum: None, error_optimal: f64::NAN };
     }
     work.landscapes += 1;
+    let mut error_optimal = f64::NAN;
     let optimum = Gap.needs_optimum(job.selection).then(|| {
         let (solved, spent) = job.optima.get(group.tuple, point);
         *work += spent;
+        if let Some(optimum) = solved.value.filter(|_| job.selection.has(GAP_ERROR)) {
+            error_optimal = work_error(job, point, &optimum, work);
+        }
         (solved.status, solved.value.map(|optimum| optimum.work))
     });
-    Prepared { landscape: Some(Landscape::new(&transition, t_f, job.rtol)), optimum }
+    let landscape = |rtol| Landscape::new(&transition, t_f, rtol);
+    let finest = job.selection.has_any([WORK_ERROR, GAP_ERROR]).then(|| (landscape(error::FINEST), transition, t_f));
+    Prepared { landscape: Some(landscape(job.rtol)), finest, optimum, error_optimal }
 }
 
 /// Brings a sheet from the order of computation into the order of rows.

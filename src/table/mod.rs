@@ -4,10 +4,13 @@ mod best;
 mod column;
 mod compliant;
 mod crossover;
+mod fault;
 mod gap;
 mod optima;
 mod optimal;
+mod reduced;
 mod regularised;
+mod repeats;
 mod rows;
 mod sheet;
 mod stability;
@@ -20,6 +23,8 @@ use crate::grid::{Grid, Point, Projection, Quantity, Tuples};
 
 pub use column::{Column, Kind, STATUS, STATUS_DOC};
 pub use optima::{OPTIMUM_AXES, Optima};
+pub use reduced::MOST_SORTED;
+pub use repeats::Repeats;
 pub use sheet::{Selection, Sheet, Signal, Stopped, Work};
 
 /// A table: what its rows depend on, what they hold and how they are computed.
@@ -38,6 +43,10 @@ pub trait Table: Sync {
 
     /// Rows of a part: fixed, so that the bytes of a part depend on the spec alone.
     fn rows_per_part(&self) -> u64;
+
+    /// What a row costs on average, in nanoseconds of one processor: fixed, for it decides which shard has which part. Only how tables
+    /// compare matters.
+    fn cost(&self) -> u64;
 
     /// Whether the selected columns need the optimal protocol of every row, shared through [`Optima`].
     fn needs_optimum(&self, selection: &Selection) -> bool;
@@ -86,9 +95,13 @@ pub const ALL: [&dyn Table; 9] = [
     &regularised::Regularised,
 ];
 
-/// The table of this name.
+/// Ways to reduce the landscapes of `gap`, by the word that a spec has for each, and the tables that hold what comes of them.
+pub const REDUCED: [(&str, &dyn Table); 3] =
+    [("min", &reduced::MINIMUM), ("quantiles", &reduced::QUANTILES), ("histogram", &reduced::HISTOGRAM)];
+
+/// The table of this name, also one of [`REDUCED`].
 pub fn find(name: &str) -> Option<&'static dyn Table> {
-    ALL.into_iter().find(|table| table.name() == name)
+    ALL.into_iter().chain(REDUCED.map(|(_, table)| table)).find(|table| table.name() == name)
 }
 
 /// What a table needs to compute any of its rows.
@@ -97,11 +110,17 @@ pub struct Job<'a> {
     /// The grid of the sweep.
     pub grid: &'a Grid,
     /// The rows of the table.
-    pub rows: Projection<'a>,
+    pub rows: &'a Projection,
     /// The different optimal problems among its rows.
     pub tuples: Tuples,
+    /// Its rows that are there more than once, if any are.
+    pub repeats: Option<Repeats>,
+    /// Of a table that reduces landscapes: their rows, those of one of its rows side by side, in the order of its rows.
+    pub members: Option<&'a Projection>,
     /// The columns asked for.
     pub selection: &'a Selection,
+    /// What the values of each of them are multiplied by to be in the units of the grid.
+    pub sizes: &'a [f64],
     /// Whether optimal protocols obey `v >= 1`.
     pub bounded: bool,
     /// Relative accuracy of the table.

@@ -1,12 +1,13 @@
 //! Optimal protocols shared by every table and part of a run: each transition and time is solved once.
 
-use std::sync::OnceLock;
+use std::collections::HashMap;
+use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
-use super::sheet::Work;
+use super::{Job, Work};
 use crate::grid::{Point, Quantity};
 use crate::model::{Law, Transition};
-use crate::protocol::Solved;
 use crate::protocol::optimal::{self, Optimum};
+use crate::protocol::{Solved, Status, error};
 
 /// What the optimal protocol depends on.
 pub const OPTIMUM_AXES: &[Quantity] =
@@ -21,12 +22,69 @@ pub fn transition(point: &Point) -> Transition {
     }
 }
 
+/// Bound of the error of the work of an optimal protocol that was found for `point`, by a second solve; NaN where that
+/// has none. The work is added.
+pub fn work_error(job: &Job<'_>, point: &Point, optimum: &Optimum, work: &mut Work) -> f64 {
+    let (bound, effort) = error::of_optimum(&transition(point), point[Quantity::Time], job.bounded, optimum);
+    *work += Work { optima: 1, ..Work::from(effort) };
+    bound.unwrap_or(f64::NAN)
+}
+
+/// The least work of any protocol, and how far above it one is.
+pub struct Comparison {
+    /// The least work; NaN where it is not known.
+    pub work: f64,
+    /// What the protocol takes beyond it, as a share of it.
+    pub gap: f64,
+    /// Bound of the error of the gap; NaN where it is not asked for.
+    pub gap_error: f64,
+    /// What keeps the least work from being known, where that is neither a bound nor a matter of time.
+    pub defect: Option<Status>,
+}
+
+impl Comparison {
+    /// Nothing is known.
+    pub const NONE: Comparison = Comparison { work: f64::NAN, gap: f64::NAN, gap_error: f64::NAN, defect: None };
+}
+
+/// Compares a work, and the bound of its error, with the least one of the tuple that `point` belongs to; with the bound
+/// of the error of the gap where it is `bounded`. What is solved for it is added to `work`.
+pub fn compare(
+    job: &Job<'_>,
+    (tuple, point): (u64, &Point),
+    (work_s, error): (f64, f64),
+    bounded: bool,
+    work: &mut Work,
+) -> Comparison {
+    let (optimum, spent) = job.optima.get(tuple, point);
+    *work += spent;
+    let defect = Some(optimum.status).filter(|status| matches!(status, Status::Nonphysical | Status::NotConverged));
+    let Some(least) = optimum.value else { return Comparison { defect, ..Comparison::NONE } };
+    let gap_error = if bounded {
+        error::of_gap((work_s, error), (least.work, work_error(job, point, &least, work)))
+    } else {
+        f64::NAN
+    };
+    Comparison { work: least.work, gap: (work_s - least.work) / least.work, gap_error, defect }
+}
+
+/// An optimal protocol once it is solved.
+type Slot = OnceLock<Solved<Optimum>>;
+
 /// The store of optimal protocols, by tuple number.
 #[derive(Debug)]
 pub struct Optima {
-    slots: Vec<OnceLock<Solved<Optimum>>>,
+    slots: Slots,
     bounded: bool,
     rtol: f64,
+}
+
+#[derive(Debug)]
+enum Slots {
+    /// One for each number.
+    Dense(Vec<Slot>),
+    /// Only for the numbers that occur.
+    Sparse(Mutex<HashMap<u64, Arc<Slot>>>),
 }
 
 impl Optima {
@@ -35,8 +93,18 @@ impl Optima {
 
     /// A store for `tuples` different transitions and times, each solved to `rtol`, with `v >= 1` where `bounded`.
     pub fn new(tuples: u64, bounded: bool, rtol: f64) -> Optima {
-        let kept = if tuples <= Self::MOST_KEPT { tuples as usize } else { 0 };
-        Optima { slots: std::iter::repeat_with(OnceLock::new).take(kept).collect(), bounded, rtol }
+        Optima::among(tuples, tuples, bounded, rtol)
+    }
+
+    /// The same where their numbers lie below `span`, most of which may not occur.
+    pub fn among(tuples: u64, span: u64, bounded: bool, rtol: f64) -> Optima {
+        let slots = if span > Self::MOST_KEPT && tuples <= Self::MOST_KEPT {
+            Slots::Sparse(Mutex::default())
+        } else {
+            let kept = if span <= Self::MOST_KEPT { span as usize } else { 0 };
+            Slots::Dense(std::iter::repeat_with(OnceLock::new).take(kept).collect())
+        };
+        Optima { slots, bounded, rtol }
     }
 
     /// The optimal protocol of tuple number `tuple`, which `point` belongs to; the work is that of this call alone.
@@ -47,9 +115,17 @@ impl Optima {
             work = Work { optima: 1, ..Work::from(solved.effort) };
             solved
         };
-        let solved = match usize::try_from(tuple).ok().and_then(|tuple| self.slots.get(tuple)) {
-            Some(slot) => *slot.get_or_init(solve),
-            None => solve(),
+        let solved = match &self.slots {
+            Slots::Dense(slots) => match usize::try_from(tuple).ok().and_then(|tuple| slots.get(tuple)) {
+                Some(slot) => *slot.get_or_init(solve),
+                None => solve(),
+            },
+            Slots::Sparse(slots) => {
+                let mut slots = slots.lock().unwrap_or_else(PoisonError::into_inner);
+                let slot = slots.entry(tuple).or_default().clone();
+                drop(slots);
+                *slot.get_or_init(solve)
+            }
         };
         (solved, work)
     }

@@ -2,12 +2,14 @@
 
 use std::ops::Range;
 
-use super::optima::OPTIMUM_AXES;
+use super::optima::{OPTIMUM_AXES, work_error};
 use super::{Column, Job, Kind, Selection, Sheet, Stopped, Table, Work, rows};
 use crate::grid::Quantity;
 
 /// One row a transition and time.
 pub struct Optimal;
+
+const WORK_ERROR: usize = 7;
 
 /// The words of `strategy`, in the order of [`Strategy::ALL`](crate::protocol::optimal::Strategy::ALL).
 const STRATEGIES: &[&str] = &["speed_up", "slow_down", "hold"];
@@ -24,6 +26,7 @@ const COLUMNS: &[Column] = &[
         Kind::Label(STRATEGIES),
         "how it starts: speed_up v(0+) > v_i, slow_down 1 < v(0+) <= v_i, hold on the bound v = 1",
     ),
+    Column::number("work_error", "mu_0 sigma l", "bound of the error of work, by a second solve").optional(),
 ];
 
 impl Table for Optimal {
@@ -47,15 +50,22 @@ impl Table for Optimal {
         1 << 16
     }
 
+    fn cost(&self) -> u64 {
+        2_500
+    }
+
     fn needs_optimum(&self, _selection: &Selection) -> bool {
         true
     }
 
     fn compute(&self, job: &Job<'_>, range: Range<u64>, sheet: &mut Sheet) -> Result<Work, Stopped> {
-        rows::each(job, range, (COLUMNS.len(), 64), sheet, |row, point, cells| {
-            let (solved, work) = job.optima.get(job.tuples.of(row), point);
+        rows::each(job, range, (COLUMNS.len(), 64), sheet, |tuple, point, cells| {
+            let (solved, mut work) = job.optima.get(tuple, point);
             if let Some(optimum) = solved.value {
-                cells.copy_from_slice(&[
+                if job.selection.has(WORK_ERROR) {
+                    cells[WORK_ERROR] = work_error(job, point, &optimum, &mut work);
+                }
+                cells[..WORK_ERROR].copy_from_slice(&[
                     optimum.work,
                     optimum.v_start,
                     optimum.v_end,

@@ -5,7 +5,7 @@ use std::ops::Range;
 use super::compliant::{slider, velocities};
 use super::{Column, Job, Selection, Sheet, Stopped, Table, Work, rows};
 use crate::grid::Quantity;
-use crate::protocol::regularised;
+use crate::protocol::{error, regularised};
 
 /// One row a transition, time, stiffness, mass and length of the pieces.
 pub struct Regularised;
@@ -18,7 +18,12 @@ const COLUMNS: &[Column] = &[
     Column::number("v_max", "v_0", "greatest velocity of the block"),
     Column::number("v_c_min", "v_0", "least control velocity; both good to rtol of the greater of the two"),
     Column::number("v_c_max", "v_0", "greatest control velocity"),
+    Column::number("work_error", "mu_0 sigma l", "bound of the error of work, by a second solve").optional(),
+    Column::number("gap_error", "1", "bound of the error of gap, by a second solve").optional(),
 ];
+
+const WORK_ERROR: usize = 7;
+const GAP_ERROR: usize = 8;
 
 impl Table for Regularised {
     fn name(&self) -> &'static str {
@@ -50,6 +55,10 @@ impl Table for Regularised {
         1 << 14
     }
 
+    fn cost(&self) -> u64 {
+        50_000
+    }
+
     fn needs_optimum(&self, _selection: &Selection) -> bool {
         false
     }
@@ -57,9 +66,19 @@ impl Table for Regularised {
     fn compute(&self, job: &Job<'_>, range: Range<u64>, sheet: &mut Sheet) -> Result<Work, Stopped> {
         rows::each(job, range, (COLUMNS.len(), 16), sheet, |_, point, cells| {
             let (t_f, delta_t) = (point[Quantity::Time], point[Quantity::Smoothing]);
-            let solved = regularised::solve(&slider(point), velocities(point), t_f, delta_t, job.bounded, job.rtol);
+            let solve = |rtol| regularised::solve(&slider(point), velocities(point), t_f, delta_t, job.bounded, rtol);
+            let solved = solve(job.rtol);
+            let mut effort = solved.effort;
             if let Some(found) = solved.value {
-                cells.copy_from_slice(&[
+                if job.selection.has_any([WORK_ERROR, GAP_ERROR]) {
+                    let finest = solve(error::FINEST);
+                    effort += finest.effort;
+                    if let Some(finest) = finest.value {
+                        cells[WORK_ERROR] = error::bound(found.work, finest.work, found.work);
+                        cells[GAP_ERROR] = error::of_excess(found.gap, finest.gap, found.replaced / found.work_optimal);
+                    }
+                }
+                cells[..WORK_ERROR].copy_from_slice(&[
                     found.work,
                     found.work_optimal,
                     found.gap,
@@ -69,7 +88,7 @@ impl Table for Regularised {
                     found.control_max,
                 ]);
             }
-            (solved.status, Work { optima: 1, ..Work::from(solved.effort) })
+            (solved.status, Work { optima: 1, ..Work::from(effort) })
         })
     }
 }

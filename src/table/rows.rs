@@ -4,11 +4,13 @@ use std::ops::Range;
 
 use rayon::prelude::*;
 
-use super::{Job, Sheet, Stopped, Work};
+use super::fault;
+use super::{Job, Repeats, Sheet, Stopped, Work};
 use crate::grid::{Point, Quantity, Runs};
 use crate::protocol::Status;
 
-/// Computes `rows` with `row`, which fills the cells of all `width` columns of the table (given as missing) and returns the status.
+/// Computes `rows` with `row`, which is given the number of the optimal problem and fills the cells of all `width` columns of the table
+/// (given as missing), and returns the status.
 ///
 /// Rows are spread over the threads in chunks of `chunk` rows.
 pub fn each(
@@ -18,12 +20,16 @@ pub fn each(
     sheet: &mut Sheet,
     row: impl Fn(u64, &Point, &mut [f64]) -> (Status, Work) + Sync,
 ) -> Result<Work, Stopped> {
+    let view = job.rows.view(rows.clone());
+    let tuples = view.tuples(&job.tuples, rows.clone());
+    let repeats = job.repeats.as_ref().map(|repeats| (repeats, view.tuples(&repeats.tuples, rows.clone())));
     // Values are taken from the axes once a step, not once a row.
-    let axes: Vec<Steps<'_>> = Quantity::ALL
+    let axes: Vec<Steps> = Quantity::ALL
         .into_iter()
         .filter_map(|quantity| {
-            let runs = job.rows.runs(quantity, rows.clone())?;
-            Some(Steps { quantity, values: runs.values(), runs })
+            let runs = view.runs(quantity, rows.clone())?;
+            let values = runs.values().iter().map(|value| job.grid.scaled_value(quantity, *value)).collect();
+            Some(Steps { quantity, runs, values })
         })
         .collect();
     let starts = rows.clone().step_by(chunk);
@@ -39,19 +45,23 @@ pub fn each(
     let works = chunks.into_par_iter().with_max_len(1).map(|chunk| {
         job.signal.check()?;
         let count = chunk.status.len() as u64;
-        let work = chunk.compute(job, &axes, width, &row);
+        let known = repeats.as_ref().map(|(repeats, tuples)| (*repeats, tuples.as_slice()));
+        let work = chunk.compute(job, &axes, &tuples, known, width, &row);
         job.signal.advance(count);
         Ok(work)
     });
     Ok(works.collect::<Result<Vec<Work>, Stopped>>()?.into_iter().sum())
 }
 
-/// An axis over the rows of a part.
-struct Steps<'a> {
+/// An axis over the rows of a part, its values in the units of the model.
+struct Steps {
     quantity: Quantity,
+    runs: Runs,
     values: Vec<f64>,
-    runs: Runs<'a>,
 }
+
+/// The number of a tuple, and rows in a row that have it.
+type Numbered = (u64, Range<u64>);
 
 /// The cells of consecutive rows.
 struct Chunk<'a> {
@@ -65,7 +75,9 @@ impl Chunk<'_> {
     fn compute(
         mut self,
         job: &Job<'_>,
-        axes: &[Steps<'_>],
+        axes: &[Steps],
+        tuples: &[Numbered],
+        repeats: Option<(&Repeats, &[Numbered])>,
         width: usize,
         row: &impl Fn(u64, &Point, &mut [f64]) -> (Status, Work),
     ) -> Work {
@@ -82,15 +94,28 @@ impl Chunk<'_> {
             .collect();
         let (mut point, mut cells) = (Point::default(), vec![f64::NAN; width]);
         let mut work = Work::default();
+        let mut tuple = tuples.partition_point(|(_, rows)| rows.end <= self.start);
         for place in 0..count {
+            let at = self.start + place as u64;
+            while tuples[tuple].1.end <= at {
+                tuple += 1;
+            }
             for (quantity, values) in &values {
                 point[*quantity] = values[place];
             }
             cells.fill(f64::NAN);
-            let (status, spent) = row(self.start + place as u64, &point, &mut cells);
+            fault::strike(std::iter::once(at));
+            let compute = |cells: &mut [f64]| row(tuples[tuple].0, &point, cells);
+            let (status, spent) = match repeats {
+                None => compute(&mut cells),
+                Some((repeats, numbers)) => {
+                    let number = numbers[numbers.partition_point(|(_, rows)| rows.end <= at)].0;
+                    repeats.get(number, &mut cells, compute)
+                }
+            };
             self.status[place] = status;
-            for (column, &index) in self.columns.iter_mut().zip(job.selection.indices()) {
-                column[place] = cells[index];
+            for ((column, &index), size) in self.columns.iter_mut().zip(job.selection.indices()).zip(job.sizes) {
+                column[place] = cells[index] * size;
             }
             work += spent;
         }

@@ -2,6 +2,7 @@
 
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 
+use super::Column;
 use crate::protocol::Status;
 
 /// The cells that a part consists of, axes apart.
@@ -38,6 +39,11 @@ impl Selection {
         indices.sort_unstable();
         indices.dedup();
         Selection(indices)
+    }
+
+    /// Those of `columns` that are written where a spec names none.
+    pub fn usual(columns: &[Column]) -> Selection {
+        Selection((0..columns.len()).filter(|&index| !columns[index].optional).collect())
     }
 
     /// The indices, ascending.

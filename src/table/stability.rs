@@ -70,6 +70,10 @@ impl Table for Stability {
         1 << 17
     }
 
+    fn cost(&self) -> u64 {
+        150
+    }
+
     fn needs_optimum(&self, _selection: &Selection) -> bool {
         false
     }

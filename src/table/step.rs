@@ -25,23 +25,30 @@ const COLUMNS: &[Column] = &[
     Column::number(
         "v_trough",
         "v_0",
-        "least velocity from when v = v_f is first met on, at most v_f; 0 below the range of doubles, null if undecided",
+        "least velocity from when v = v_f is first met on, at most v_f; 0 below the range of doubles, null if undecided or \
+         not known to rtol",
     ),
     Column::number(
         "t_peak",
         "l/v_0",
-        "time of v_peak, good to rtol of itself over the overshoot v_peak/v_f - 1; null where the peak is only approached, and if undecided",
+        "time of v_peak, good to rtol of itself over the overshoot v_peak/v_f - 1; null where the peak is only approached, \
+         if undecided and if not known to that",
     ),
     Column::new("outcome", Kind::Label(&Outcome::NAMES), "what becomes of the response in the end"),
     Column::new("stick_slip", Kind::Flag, "whether the oscillation is sustained; null if undecided"),
     Column::number(
         "settling_time",
         "l/v_0",
-        "time after which v stays within 1 % of v_f; null unless the outcome is settled",
+        "time after which v stays within 1 % of v_f; null unless the outcome is settled, and if not known to rtol",
     ),
     Column::number("period", "l/v_0", "duration of the limit cycle; null without one"),
     Column::number("cycle_peak", "v_0", "greatest velocity on the limit cycle; null without one").optional(),
-    Column::number("cycle_trough", "v_0", "least velocity on the limit cycle; null without one").optional(),
+    Column::number(
+        "cycle_trough",
+        "v_0",
+        "least velocity on the limit cycle; null without one, and if not known to rtol",
+    )
+    .optional(),
     Column::number("t_end", "l/v_0", "time up to which the response was integrated").optional(),
     Column::number(
         "lyapunov",
@@ -78,6 +85,10 @@ impl Table for Step {
 
     fn rows_per_part(&self) -> u64 {
         1 << 12
+    }
+
+    fn cost(&self) -> u64 {
+        350_000
     }
 
     fn needs_optimum(&self, _selection: &Selection) -> bool {

@@ -10,7 +10,7 @@ use crate::protocol::{Moment, Motion};
 use crate::table::Column;
 
 pub use protocol::{Absence, Course, Protocol, names};
-pub use sample::GOOD;
+pub use sample::{CLOSE_UP, GOOD};
 pub use write::{csv, parquet};
 
 /// The columns of a trace; `v_c` only where the spring is elastic, `beta` only where the protocol is an extremal.
@@ -33,7 +33,8 @@ const JUMP: f64 = 1e-9;
 /// Which times are shown.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Times {
-    /// The fewest between which straight lines are good to [`GOOD`] of the range of every column.
+    /// The fewest between which straight lines are good to [`GOOD`] of the range of every column, and to [`CLOSE_UP`] of velocities and
+    /// contact lifetimes themselves (those below `1e-12` of the greatest aside).
     Fewest,
     /// So many, at least 2, equally spaced from 0 to `t_f`.
     Spaced(usize),

@@ -5,8 +5,14 @@ use crate::protocol::{Moment, Motion};
 /// How far a straight line between neighbouring moments may be from the motion, relative to the range of the column.
 pub const GOOD: f64 = 1e-4;
 
-/// What is asked of the samples; between them is left what is missing to [`GOOD`].
-const AIM: f64 = 0.98 * GOOD;
+/// How far it may be relative to a velocity or a contact lifetime, which logarithmic axes show over decades.
+pub const CLOSE_UP: f64 = 0.01;
+
+/// Columns for which that holds: the velocity and the contact lifetime.
+const POSITIVE: usize = 2;
+
+/// What is asked of the samples, as a share of both; between them is left what is missing.
+const AIM: f64 = 0.98;
 
 /// Changes below this share of the greatest value of a column are rounding.
 const NOISE: f64 = 1e-12;
@@ -31,7 +37,26 @@ struct Sample {
 #[derive(Debug)]
 pub struct Samples {
     samples: Vec<Sample>,
-    tolerance: [f64; COLUMNS],
+    tolerance: Tolerance,
+}
+
+/// How far straight lines may be from a motion.
+#[derive(Debug, Clone, Copy)]
+struct Tolerance {
+    /// By the range of each column.
+    range: [f64; COLUMNS],
+    /// Below this a change is rounding, in each column.
+    noise: [f64; COLUMNS],
+}
+
+impl Tolerance {
+    /// What is allowed in a column where its value is `value`.
+    fn at(&self, column: usize, value: f64) -> f64 {
+        if column >= POSITIVE {
+            return self.range[column];
+        }
+        self.range[column].min((AIM * CLOSE_UP * value.abs()).max(self.noise[column]))
+    }
 }
 
 /// Columns that are interpolated.
@@ -209,7 +234,7 @@ fn look(motion: &dyn Motion, s: f64) -> Option<Sample> {
     is_number.then_some(Sample { s, moment })
 }
 
-fn tolerance<'a>(moments: impl Iterator<Item = &'a Moment>) -> [f64; COLUMNS] {
+fn tolerance<'a>(moments: impl Iterator<Item = &'a Moment>) -> Tolerance {
     let mut ranges = [(f64::INFINITY, f64::NEG_INFINITY); COLUMNS];
     for moment in moments {
         for (value, (least, greatest)) in columns(moment).into_iter().zip(&mut ranges) {
@@ -218,7 +243,9 @@ fn tolerance<'a>(moments: impl Iterator<Item = &'a Moment>) -> [f64; COLUMNS] {
             }
         }
     }
-    ranges.map(|(least, greatest)| (AIM * (greatest - least)).max(NOISE * least.abs().max(greatest.abs())))
+    let noise = ranges.map(|(least, greatest)| NOISE * least.abs().max(greatest.abs()));
+    let range = std::array::from_fn(|i| (AIM * GOOD * (ranges[i].1 - ranges[i].0)).max(noise[i]));
+    Tolerance { range, noise }
 }
 
 /// Whether no step of a piece takes most of its time, so that there are places to look at between its ends.
@@ -229,7 +256,7 @@ fn is_even(piece: &[Sample]) -> bool {
 }
 
 /// Whether the straight line in time from `from` to `to` is within `tolerance` of the motion at all places `between`.
-fn is_straight(from: &Sample, to: &Sample, between: &[Sample], tolerance: &[f64; COLUMNS]) -> bool {
+fn is_straight(from: &Sample, to: &Sample, between: &[Sample], tolerance: &Tolerance) -> bool {
     let time = to.moment.t - from.moment.t;
     if time <= CLOSE * to.moment.t {
         return true;
@@ -239,6 +266,6 @@ fn is_straight(from: &Sample, to: &Sample, between: &[Sample], tolerance: &[f64;
     between.iter().all(|sample| {
         let share = (sample.moment.t - from.moment.t) / time;
         let here = values(sample);
-        (0..COLUMNS).all(|i| (start[i] + share * (end[i] - start[i]) - here[i]).abs() <= tolerance[i])
+        (0..COLUMNS).all(|i| (start[i] + share * (end[i] - start[i]) - here[i]).abs() <= tolerance.at(i, here[i]))
     })
 }

@@ -1,10 +1,12 @@
-//! `compliant` and `regularised`: the smooth shortcut integrated over time, its control velocity looked at on the way.
+//! `compliant`: the smooth shortcut integrated over time, its control velocity looked at on the way.
 
 use super::course::{Course, Formula, State, arriving};
 use super::extremal::{least_time, solve};
-use super::{Context, Verdict, number, transition, word};
-use crate::dataset::Row;
+use super::open_loop::{Told, growth, is_stiff};
+use super::verdict::{Context, Verdict, number, transition, word};
+use crate::dataset::{Cell, Row};
 use crate::model::Transition;
+use crate::protocol::Slider;
 use crate::table::STATUS;
 
 /// `ln(v - 1)` over `x = t/t_f`, as the sum of the powers from 0 to 6.
@@ -26,9 +28,16 @@ impl Exponent {
     fn velocity(&self, x: f64) -> f64 {
         1.0 + self.at(x)[0].exp()
     }
+
+    /// Velocity and its first two derivatives in time.
+    fn moment(&self, x: f64, t_f: f64) -> [f64; 3] {
+        let [f, g, h] = self.at(x);
+        let w = f.exp();
+        [1.0 + w, w * g / t_f, w * (h + g * g) / (t_f * t_f)]
+    }
 }
 
-pub fn check(row: &Row, context: &Context) -> Verdict {
+pub fn check(row: &Row, context: &Context, rtol: f64) -> Verdict {
     let numbers = ["t_f", "k", "m"].map(|name| number(row, name));
     let (Some(problem), [Some(t_f), Some(k), Some(m)]) = (transition(row), numbers) else {
         return Verdict::unchecked("an axis is missing");
@@ -40,14 +49,14 @@ pub fn check(row: &Row, context: &Context) -> Verdict {
         return verdict;
     }
     verdict.demand(row, "alpha");
-    let Some(alpha) = number(row, "alpha") else {
-        verdict.unchecked = Some("alpha was not written");
-        return verdict;
-    };
     let course = |alpha: f64| {
         let exponent = Exponent::new(&problem, alpha);
         let formula = Formula::Velocity(Box::new(move |x| exponent.velocity(x)));
         Course { problem, t_f, formula, backward: false }
+    };
+    let Some(alpha) = number(row, "alpha").or_else(|| member(&problem, course)) else {
+        verdict.miss("alpha was not written, and theta at the end does not tell it");
+        return verdict;
     };
     let here = course(alpha);
     let Some(states) = here.states() else { return Verdict::unchecked("the integrator did not get there") };
@@ -57,44 +66,126 @@ pub fn check(row: &Row, context: &Context) -> Verdict {
     verdict.compare(row, "work", Some(work), None);
     verdict.compare(row, "v_min", Some(here.least(&states, |y| here.velocity(y))), None);
     verdict.compare(row, "v_max", Some(-here.least(&states, |y| -here.velocity(y))), None);
+    let slider = Slider { law: problem.law, k, m };
     let exponent = Exponent::new(&problem, alpha);
-    let control = |y: &State| {
-        let [f, g, h] = exponent.at(y[2]);
-        let w = f.exp();
-        let (v, v1, v2) = (1.0 + w, w * g / t_f, w * (h + g * g) / (t_f * t_f));
-        let rate = (-y[0]).exp() - v;
-        v + (problem.law.a * v1 / v + problem.law.b * rate + m * v2) / k
+    let control = |x: f64, ln_theta: f64| {
+        let [v, v1, v2] = exponent.moment(x, t_f);
+        v + (problem.law.a * v1 / v + problem.law.b * ((-ln_theta).exp() - v) + m * v2) / k
     };
-    let (low, high) = (here.least(&states, control), -here.least(&states, |y| -control(y)));
+    let low = here.least(&states, |y| control(y[2], y[0]));
+    let high = -here.least(&states, |y| -control(y[2], y[0]));
     let size = Some(low.abs().max(high.abs()));
     verdict.compare(row, "v_c_min", Some(low), size);
     verdict.compare(row, "v_c_max", Some(high), size);
-    verdict.compare(row, "rigid", Some(k * t_f * t_f / m), None);
+    verdict.compare(row, "rigid", Some(if m > 0.0 { k * t_f * t_f / m } else { f64::INFINITY }), None);
+    let told = Told { slider, v_i: problem.v_i, v_f: problem.v_f, t_f, velocity: |x| exponent.velocity(x), control };
+    let least = states.iter().map(|y| here.velocity(y)).fold(f64::INFINITY, f64::min);
+    // What the spring pulls with, in units of a, and what it would under the greatest control alone: rounding of the one, and
+    // an error of the other, are felt in proportion.
+    let pull = |y: &State| (here.friction(y) + m * exponent.moment(y[2], t_f)[1]).abs() / problem.law.a;
+    let pull = states.iter().map(pull).fold(0.0, f64::max);
+    let reach = if k.is_finite() { k / problem.law.a * t_f * low.abs().max(high.abs()) } else { 0.0 };
+    open_loop(&mut verdict, row, &told, &Along { course: &here, states: &states, least, pull, reach }, rtol);
     compare_optimum(&mut verdict, row, &problem, t_f, context);
-    let simulated = ["amplification", "end_error", "loop_error"];
-    if simulated.iter().any(|column| number(row, column).is_some()) {
-        verdict.unchecked = Some("simulated columns have no independent route");
-    }
     verdict
 }
 
-/// `regularised`: its optimum, and that the gap belongs to the works.
-pub fn check_regularised(row: &Row, context: &Context) -> Verdict {
-    let (Some(problem), Some(t_f)) = (transition(row), number(row, "t_f")) else {
-        return Verdict::unchecked("an axis is missing");
-    };
-    let mut verdict = Verdict::default();
-    if word(row, STATUS) != Some("infeasible") {
-        compare_optimum(&mut verdict, row, &problem, t_f, context);
-        ["work", "gap", "v_min", "v_max", "v_c_min", "v_c_max"].iter().for_each(|column| verdict.demand(row, column));
+/// A protocol on its way.
+struct Along<'a> {
+    course: &'a Course,
+    states: &'a [State],
+    /// Least velocity.
+    least: f64,
+    /// Greatest pull of the spring, in units of `a`.
+    pull: f64,
+    /// What the greatest control would stretch the spring by, in the same units.
+    reach: f64,
+}
+
+/// More samples than a check follows.
+const MOST_SAMPLES: f64 = 3000.0;
+
+/// Amplifications below this have fewer digits.
+const FORGOTTEN: f64 = 1e-2;
+
+/// The columns that tell what becomes of the protocol open loop.
+fn open_loop<V, C>(verdict: &mut Verdict, row: &Row, told: &Told<V, C>, along: &Along<'_>, rtol: f64)
+where
+    V: Fn(f64) -> f64,
+    C: Fn(f64, f64) -> f64,
+{
+    let dt = number(row, "dt").unwrap_or(0.0);
+    if dt == 0.0 {
+        verdict.compare(row, "end_error", None, None);
     }
-    verdict.unchecked = verdict.unchecked.or(Some("the smooth pieces have no independent route"));
-    verdict
+    let columns = ["amplification", "end_error", "loop_error"];
+    let [grown, held, closed] = columns.map(|column| number(row, column));
+    if row.iter().any(|(name, cell)| {
+        *cell == Cell::Missing && (name != "end_error" || dt > 0.0) && columns.contains(&name.as_str())
+    }) {
+        verdict.miss("numbers of a motion that was given up");
+    }
+    if grown.or(held).or(closed).is_none() {
+        return;
+    }
+    if is_stiff(&told.slider, along.least, told.t_f) {
+        verdict.miss("motions too stiff for an explicit integrator");
+        return;
+    }
+    let Some(growth) = growth(&told.slider, along.course, along.states, &told.velocity) else {
+        verdict.miss("motions too stiff for an explicit integrator");
+        return;
+    };
+    let noise = 1e-11 * growth.most / rtol;
+    verdict.compare_number(row, "amplification", growth.whole, growth.whole.max(FORGOTTEN).max(noise));
+    // An error of the control, good to rtol, has grown at the end from anywhere on the way.
+    let felt = (1.0 + along.reach + 1e-14 / rtol * along.pull) * (1.0 + growth.most);
+    let mut compare = |column: &'static str, dt: Option<f64>, scale: f64| match told.miss(dt) {
+        Some(expected) => verdict.compare_number(row, column, expected, scale.max(expected)),
+        None => verdict.miss("motions too stiff for an explicit integrator"),
+    };
+    if closed.is_some() {
+        compare("loop_error", None, felt);
+    }
+    if held.is_some() && told.t_f / dt <= MOST_SAMPLES {
+        compare("end_error", Some(dt), felt);
+    } else if held.is_some() {
+        verdict.miss("controls sampled more than 3000 times");
+    }
+}
+
+/// The parameter for which theta arrives; `None` where that does not tell it.
+fn member(problem: &Transition, course: impl Fn(f64) -> Course) -> Option<f64> {
+    const CLOSE: f64 = 1e-10;
+    let miss = |alpha: f64| {
+        let course = course(alpha);
+        Some(course.states()?.last()?[0] - course.target())
+    };
+    // Theta at the end falls as alpha rises.
+    let rise = ((problem.v_f - 1.0) / (problem.v_i - 1.0)).ln().abs().max(1.0);
+    let (mut low, mut high) = (-rise, rise);
+    while miss(low)? < CLOSE {
+        low *= 2.0;
+        if low < -1e9 {
+            return None;
+        }
+    }
+    while miss(high)? > -CLOSE {
+        high *= 2.0;
+        if high > 1e9 {
+            return None;
+        }
+    }
+    for _ in 0..70 {
+        let middle = 0.5 * (low + high);
+        if miss(middle)? > 0.0 { low = middle } else { high = middle }
+    }
+    Some(0.5 * (low + high))
 }
 
 fn compare_optimum(verdict: &mut Verdict, row: &Row, problem: &Transition, t_f: f64, context: &Context) {
     let Some(optimum) = solve(problem, t_f, context.bounded) else {
-        verdict.unchecked = Some("the integrator did not get there");
+        verdict.miss("the integrator did not get there");
         return;
     };
     verdict.compare(row, "work_optimal", Some(optimum.work), None);

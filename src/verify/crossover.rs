@@ -18,7 +18,7 @@ pub fn check(row: &Row, context: &Context) -> Verdict {
     let accelerates = problem.v_f > problem.v_i;
     let mut pair = |columns: [&'static str; 2], exists: bool, extremal: Option<Extremal>| {
         if exists && extremal.is_none() {
-            verdict.unchecked = Some("the integrator did not get there");
+            verdict.miss("the integrator did not get there");
             return;
         }
         let extremal = extremal.filter(|_| exists);
@@ -64,7 +64,7 @@ pub fn check(row: &Row, context: &Context) -> Verdict {
             verdict.compare(row, "t_free_in", Some(rising), starts_at_once.then_some(1.0));
             verdict.compare(row, "t_free_out", Some(falling.time), None);
         }
-        Some(_) => verdict.unchecked = Some("the integrator did not get there"),
+        Some(_) => verdict.miss("the integrator did not get there"),
         None => {
             verdict.compare(row, "t_free_in", None, None);
             verdict.compare(row, "t_free_out", None, None);

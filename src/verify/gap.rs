@@ -32,7 +32,7 @@ pub fn check(row: &Row, context: &Context) -> Verdict {
     verdict.compare(row, "v_min", Some(cubic.v_min()), None);
     match work {
         Some(work) => verdict.compare(row, "work", Some(work), None),
-        None => verdict.unchecked = Some("the integrator did not get there"),
+        None => verdict.miss("the integrator did not get there"),
     }
     match solve(&problem, t_f, context.bounded) {
         Some(optimum) => {
@@ -42,7 +42,7 @@ pub fn check(row: &Row, context: &Context) -> Verdict {
                 verdict.compare(row, "gap", Some((work - optimum.work) / optimum.work), Some(1.0));
             }
         }
-        None => verdict.unchecked = Some("the integrator did not get there"),
+        None => verdict.miss("the integrator did not get there"),
     }
     verdict
 }

@@ -5,101 +5,32 @@ mod compliant;
 mod course;
 mod crossover;
 mod extremal;
+mod fate;
 mod gap;
+mod hopf;
+mod open_loop;
 mod optimal;
+mod pieces;
+mod reduced;
 mod route;
 mod sample;
 mod stability;
 mod step;
 mod swift;
+mod swing;
+mod units;
+mod verdict;
 
 use std::path::Path;
 
-use crate::dataset::{Cell, Folder, Manifest, Row};
-use crate::grid::Quantity;
-use crate::model::{Law, Transition};
-use crate::sweep::{AxisSpec, Spec};
-use crate::table::{self, STATUS};
+use crate::dataset::{Folder, Manifest, ManifestTable, Row, frame};
+use crate::grid::{Quantity, Scale};
+use crate::sweep::{self, AxisSpec, Spec};
+use crate::table;
+use verdict::{Context, Difference, Verdict, number, transition, word};
 
 /// Differences above this many rtol are errors.
 pub const LIMIT: f64 = 10.0;
-
-/// What a check needs to know of the sweep.
-#[derive(Debug, Clone, Copy)]
-struct Context {
-    bounded: bool,
-    /// Whether `alpha_2`, `alpha_3` are given relative to `t_f`.
-    relative: [bool; 2],
-}
-
-/// What a check found in one row.
-#[derive(Debug, Default)]
-struct Verdict {
-    differences: Vec<Difference>,
-    /// What could not be checked, and why.
-    unchecked: Option<&'static str>,
-}
-
-/// One comparison.
-#[derive(Debug)]
-struct Difference {
-    column: &'static str,
-    /// Relative difference; infinite where only one route has a number.
-    size: f64,
-    /// What the independent route has, in words.
-    expected: String,
-}
-
-impl Verdict {
-    /// Notes a relative difference that has no counterpart in the row.
-    fn push(&mut self, column: &'static str, size: f64) {
-        self.differences.push(Difference { column, size, expected: "0".to_owned() });
-    }
-
-    fn unchecked(reason: &'static str) -> Verdict {
-        Verdict { unchecked: Some(reason), ..Verdict::default() }
-    }
-
-    /// Compares `found`, if the column was written, in units of `scale`.
-    fn compare(&mut self, row: &Row, column: &'static str, expected: Option<f64>, scale: Option<f64>) {
-        let Some((_, cell)) = row.iter().rev().find(|(name, _)| name == column) else { return };
-        let difference = match (cell, expected) {
-            (Cell::Missing, None) => 0.0,
-            // Also where both are infinite.
-            (Cell::Number(found), Some(expected)) if *found == expected => 0.0,
-            (Cell::Number(found), Some(expected)) => {
-                let size = scale.unwrap_or(expected.abs());
-                (found - expected).abs() / size
-            }
-            _ => f64::INFINITY,
-        };
-        // A number that cannot be compared is an error, not an agreement.
-        let size = if difference.is_nan() { f64::INFINITY } else { difference };
-        let expected = expected.map_or_else(|| "nothing".to_owned(), |expected| format!("{expected:?}"));
-        self.differences.push(Difference { column, size, expected });
-    }
-
-    fn compare_word(&mut self, row: &Row, column: &'static str, expected: &str) {
-        let Some((_, cell)) = row.iter().find(|(name, _)| name == column) else { return };
-        let wrong = !matches!(cell, Cell::Word(found) if found == expected);
-        let size = if wrong { f64::INFINITY } else { 0.0 };
-        self.differences.push(Difference { column, size, expected: expected.to_owned() });
-    }
-
-    /// Notes an error where a column that must have a number was written without.
-    fn demand(&mut self, row: &Row, column: &'static str) {
-        if row.iter().any(|(name, cell)| name == column && *cell == Cell::Missing) {
-            self.differences.push(Difference { column, size: f64::INFINITY, expected: "a number".to_owned() });
-        }
-    }
-
-    fn status(&mut self, row: &Row, expected: bool) {
-        let wrong = word(row, STATUS).is_none_or(|status| (status == "infeasible") != expected);
-        let size = if wrong { f64::INFINITY } else { 0.0 };
-        let expected = if expected { "infeasible" } else { "not infeasible" }.to_owned();
-        self.differences.push(Difference { column: STATUS, size, expected });
-    }
-}
 
 /// The audit of one table.
 #[derive(Debug)]
@@ -142,22 +73,22 @@ pub struct VerifyError(String);
 pub fn verify(path: &Path, manifest: &Manifest, sample: u64, seed: u64) -> Result<Vec<Audit>, VerifyError> {
     let spec: Spec = toml::from_str(&manifest.spec)
         .map_err(|error| VerifyError(format!("the spec in the manifest cannot be read: {error}")))?;
-    let relative = |quantity: Quantity| match spec.axes.get(quantity.name()) {
-        Some(AxisSpec::Form(form)) => form.unit.as_deref().is_some_and(|unit| unit.starts_with("1/t_f")),
-        Some(_) => false,
-        None => true,
-    };
-    let context = Context {
-        bounded: spec.model.velocity_bound,
-        relative: [relative(Quantity::Alpha2), relative(Quantity::Alpha3)],
-    };
+    let units = sweep::units(&spec.model).map_err(|error| VerifyError(error.to_string()))?;
     let folder = Folder::at(path);
     let mut audits = Vec::new();
     for table in &manifest.tables {
-        let own = spec.tables.get(&table.name).and_then(|table| table.rtol);
+        let is_reduced = reduced::is_reduced(&table.name);
+        let key = if is_reduced { "gap" } else { &table.name };
+        let own = spec.tables.get(key).and_then(|table| table.rtol);
         let rtol = own.or(table::find(&table.name).and_then(|table| table.default_rtol()));
         let rtol = rtol.unwrap_or(spec.accuracy.rtol);
-        let (rows, missing) = sample::rows(&folder, table, sample, seed).map_err(VerifyError)?;
+        let (mut rows, missing) = sample::rows(&folder, table, sample, seed).map_err(VerifyError)?;
+        let relative = relative(&spec, &folder, table)?;
+        let context = Context { bounded: spec.model.velocity_bound, relative };
+        // What a landscape is told in is compared as it was written.
+        if let Some(table) = table::find(&table.name).filter(|_| !is_reduced) {
+            units::scale(&mut rows, table, &units, relative);
+        }
         let mut audit = Audit {
             table: table.name.clone(),
             rtol,
@@ -173,10 +104,11 @@ pub fn verify(path: &Path, manifest: &Manifest, sample: u64, seed: u64) -> Resul
                 "crossover" => crossover::check(&row, &context),
                 "best" => best::check(&row, &context, rtol),
                 "swift" => swift::check(&row, &context),
-                "compliant" => compliant::check(&row, &context),
-                "regularised" => compliant::check_regularised(&row, &context),
-                "step" => step::check(&row, &context),
+                "compliant" => compliant::check(&row, &context, rtol),
+                "regularised" => pieces::check(&row, &context, rtol),
+                "step" => step::check(&row, &context, rtol),
                 "stability" => stability::check(&row, &context),
+                _ if is_reduced => reduced::check(&row, &units, &spec, &context),
                 _ => Verdict::unchecked("there is no independent route for this table"),
             };
             audit.add(number, row, verdict);
@@ -193,9 +125,28 @@ pub fn verify(path: &Path, manifest: &Manifest, sample: u64, seed: u64) -> Resul
     Ok(audits)
 }
 
+/// Whether `alpha_2`, `alpha_3` of `table` are given relative to the duration.
+fn relative(spec: &Spec, folder: &Folder, table: &ManifestTable) -> Result<[bool; 2], VerifyError> {
+    let has_points = spec.points.is_some() || spec.block.iter().any(|block| block.points.is_some());
+    // What a file of points holds is told by the parts alone.
+    let headings = match frame::parts(folder, table).0.first() {
+        Some(part) if has_points => frame::headings(part).map_err(|error| VerifyError(error.to_string()))?.0,
+        _ => Vec::new(),
+    };
+    Ok([Quantity::Alpha2, Quantity::Alpha3].map(|coefficient| {
+        let (name, unit) = (coefficient.name(), coefficient.unit(Scale::Duration));
+        match spec.axis(name) {
+            Some(AxisSpec::Form(form)) => form.unit.as_deref() == Some(unit),
+            Some(_) => false,
+            None if has_points => headings.iter().any(|heading| heading.name == name && heading.unit == unit),
+            None => true,
+        }
+    }))
+}
+
 impl Audit {
     fn add(&mut self, number: u64, row: Row, verdict: Verdict) {
-        if let Some(reason) = verdict.unchecked {
+        for reason in verdict.unchecked {
             match self.unchecked.iter_mut().find(|(known, _)| *known == reason) {
                 Some((_, rows)) => *rows += 1,
                 None => self.unchecked.push((reason, 1)),
@@ -220,23 +171,4 @@ impl Audit {
     pub fn errors(&self) -> usize {
         self.columns.iter().flat_map(|(_, all)| all).filter(|difference| **difference > LIMIT).count()
     }
-}
-
-fn number(row: &Row, column: &str) -> Option<f64> {
-    match row.iter().find(|(name, _)| name == column)?.1 {
-        Cell::Number(value) => Some(value),
-        _ => None,
-    }
-}
-
-fn word<'a>(row: &'a Row, column: &str) -> Option<&'a str> {
-    match &row.iter().find(|(name, _)| name == column)?.1 {
-        Cell::Word(word) => Some(word),
-        _ => None,
-    }
-}
-
-fn transition(row: &Row) -> Option<Transition> {
-    let law = Law { a: number(row, "a")?, b: number(row, "b")? };
-    Some(Transition { law, v_i: number(row, "v_i")?, v_f: number(row, "v_f")? })
 }

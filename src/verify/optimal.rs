@@ -19,7 +19,7 @@ pub fn check(row: &Row, context: &Context) -> Verdict {
         return verdict;
     }
     let Some((extremal, varied)) = solve_with(&problem, t_f, context.bounded, &SIZES) else {
-        verdict.unchecked = Some("the integrator did not get there");
+        verdict.miss("the integrator did not get there");
         return verdict;
     };
     let size = extremal.work.abs();

@@ -1,12 +1,9 @@
 //! A reproducible sample of the rows of a table.
 
 use std::collections::BTreeSet;
-use std::fs::File;
 use std::path::Path;
 
-use polars::prelude::{ParquetReader, PolarsError, SerReader};
-
-use crate::dataset::{Cell, Folder, ManifestTable, Row};
+use crate::dataset::{Folder, ManifestTable, Row, frame};
 
 /// Steele, Lea and Flood's SplitMix64 (OOPSLA 2014): a counter, scrambled.
 fn next(state: &mut u64) -> u64 {
@@ -34,20 +31,17 @@ fn choose(rows: u64, count: u64, seed: u64) -> BTreeSet<u64> {
 pub fn rows(folder: &Folder, table: &ManifestTable, count: u64, seed: u64) -> Result<(Vec<(u64, Row)>, u64), String> {
     let chosen = choose(table.rows, count, seed);
     let (mut found, mut missing, mut first_missing) = (Vec::new(), 0, None);
-    for part in 0..table.parts {
+    let numbers: BTreeSet<u64> = chosen.iter().map(|row| row / table.rows_per_part.max(1)).collect();
+    for part in numbers {
         let range = table.rows_of(part);
         let inside: Vec<u64> = chosen.range(range.clone()).map(|row| row - range.start).collect();
         let path = folder.part(&table.name, part);
-        if inside.is_empty() {
-            continue;
-        }
         if !path.is_file() {
             missing += inside.len() as u64;
             first_missing.get_or_insert(path);
             continue;
         }
-        let cells = read(&path, &inside, range.end - range.start)
-            .map_err(|error| format!("{}: cannot read: {error}", path.display()))?;
+        let cells = read(&path, &inside, range.end - range.start)?;
         found.extend(inside.iter().map(|row| row + range.start).zip(cells));
     }
     match first_missing {
@@ -59,28 +53,10 @@ pub fn rows(folder: &Folder, table: &ManifestTable, count: u64, seed: u64) -> Re
     }
 }
 
-fn read(path: &Path, rows: &[u64], expected: u64) -> Result<Vec<Row>, PolarsError> {
-    let mut frame = ParquetReader::new(File::open(path)?).finish()?;
-    frame.rechunk_mut();
-    if frame.height() as u64 != expected {
-        let text = format!("{} rows, the manifest says {expected}", frame.height());
-        return Err(PolarsError::ShapeMismatch(text.into()));
+fn read(path: &Path, rows: &[u64], expected: u64) -> Result<Vec<Row>, String> {
+    let frame = frame::read_all(path).map_err(|error| error.to_string())?;
+    if frame.height as u64 != expected {
+        return Err(format!("{}: {} rows, the manifest says {expected}", path.display(), frame.height));
     }
-    let mut found: Vec<Row> = vec![Vec::new(); rows.len()];
-    for column in frame.columns() {
-        for (cells, &row) in found.iter_mut().zip(rows) {
-            let row = row as usize;
-            let cell = if let Some(numbers) = column.try_f64() {
-                numbers.get(row).map(Cell::Number)
-            } else if let Some(flags) = column.try_bool() {
-                flags.get(row).map(|flag| Cell::Word(if flag { "yes" } else { "no" }.to_owned()))
-            } else {
-                let words = column.cat32()?;
-                let word = words.physical().get(row).and_then(|code| words.get_mapping().cat_to_str(code));
-                word.map(|word| Cell::Word(word.to_owned()))
-            };
-            cells.push((column.name().to_string(), cell.unwrap_or(Cell::Missing)));
-        }
-    }
-    Ok(found)
+    Ok(rows.iter().map(|&row| frame.row(row as usize)).collect())
 }

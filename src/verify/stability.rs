@@ -1,6 +1,7 @@
 //! `stability`: all roots of the characteristic polynomial at once, by simultaneous iteration with 32 digits.
 
-use super::{Context, Verdict, number, transition};
+use super::hopf;
+use super::verdict::{Context, Verdict, number, transition};
 use crate::dataset::Row;
 use crate::numerics::double_double::DoubleDouble;
 
@@ -88,6 +89,7 @@ pub fn check(row: &Row, _: &Context) -> Verdict {
     let square = (a * (double(k) / weakening - double(1.0)) / double(m)).high;
     let exists = weakening.high > 0.0 && square > 0.0 && square.is_finite();
     verdict.compare(row, "v_crit", exists.then(|| square.sqrt()), None);
+    hopf::compare_kind(&mut verdict, row, problem.law, m * problem.v_f * problem.v_f);
     if !k.is_finite() {
         for column in ["growth_rate", "frequency", "decay_rate"] {
             verdict.compare(row, column, None, None);
@@ -103,7 +105,7 @@ pub fn check(row: &Row, _: &Context) -> Verdict {
         roots([double(k) / a, c / a]).map(Vec::from)
     };
     let Some([growth, frequency, decay]) = all.map(modes) else {
-        verdict.unchecked = Some("two eigenvalues are too close to be told apart");
+        verdict.miss("two eigenvalues are too close to be told apart");
         return verdict;
     };
     // At the critical stiffness it is 0, which has no relative error.

@@ -40,18 +40,18 @@ pub fn check(row: &Row, context: &Context) -> Verdict {
         return verdict;
     }
     if tau_max == f64::INFINITY && family == "bounded_friction" {
-        verdict.unchecked = Some("without a bound on friction alpha is 0, which tells nothing");
+        verdict.miss("without a bound on friction alpha is 0, which tells nothing");
         return verdict;
     }
     let alpha = number(row, "alpha");
     if alpha.is_none() && family.starts_with("bounded") {
-        verdict.unchecked = Some("alpha was not written");
+        verdict.miss("alpha was not written");
         return verdict;
     }
     let course = |alpha: f64| course(problem, t_f, family, alpha, tau_max);
     let course_here = course(alpha.unwrap_or(0.0));
     let Some(states) = course_here.states() else {
-        verdict.unchecked = Some("the integrator did not get there");
+        verdict.miss("the integrator did not get there");
         return verdict;
     };
     let Some(end) = states.last() else { return verdict };
@@ -63,13 +63,13 @@ pub fn check(row: &Row, context: &Context) -> Verdict {
             let tells = arriving.is_finite() && (arriving - alpha).abs() > MOVED * alpha.abs();
             if doubtful && !tells {
                 // A change of its last digits moves the end: as a double alpha does not tell the protocol.
-                verdict.unchecked = Some("alpha has too few digits to follow the protocol again");
+                verdict.miss("alpha has too few digits to follow the protocol again");
                 return verdict;
             }
             verdict.compare(row, "alpha", Some(arriving), None);
         }
         _ if (problem.v_f / problem.v_i).ln().abs() > FAR => {
-            verdict.unchecked = Some("velocities too far apart for the formula in doubles");
+            verdict.miss("velocities too far apart for the formula in doubles");
             return verdict;
         }
         Some(_) => verdict.compare(row, "alpha", Some(0.0), None),
@@ -88,7 +88,7 @@ pub fn check(row: &Row, context: &Context) -> Verdict {
             let gap = (end[1] - optimum.work) / optimum.work;
             verdict.compare(row, "gap", Some(gap), Some(gap.abs().max(1.0)));
         }
-        None => verdict.unchecked = Some("the integrator did not get there"),
+        None => verdict.miss("the integrator did not get there"),
     }
     verdict
 }

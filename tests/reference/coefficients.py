@@ -41,6 +41,11 @@ def u_over_x(s):
     return -lambertw(-x, 0).real / x if x > mpf(10) ** -40 else mpf(1)
 
 
+def ln_u_far(v):
+    w = 11 * v / (1 - v)
+    return log(-lambertw(-exp(-1 - w * w / 2), -1).real)
+
+
 def atanh_tail(z):
     s = sqrt(z)
     return (2 * atanh(s) - 2 * s) / s**3 if z > mpf(10) ** -30 else mpf(2) / 3
@@ -53,6 +58,7 @@ def exp_tail(r):
 ARRAYS = [
     ("LN_U_OVER_W", ln_u_over_w, mpf(-1), mpf(1), 18),
     ("U_OVER_X", u_over_x, mpf(0), 1 - sqrt(-expm1(-mpf(1) / 2)), 14),
+    ("LN_U_FAR", ln_u_far, mpf(1) / 12, mpf(2) / 5, 3),
     ("ATANH", atanh_tail, mpf(0), ((sqrt(mpf(2)) - 1) / (sqrt(mpf(2)) + 1)) ** 2, 6),
     ("EXP", exp_tail, -log(mpf(2)) / 2, log(mpf(2)) / 2, 10),
 ]

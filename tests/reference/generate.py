@@ -393,6 +393,18 @@ def short_hold_cases():
     return cases
 
 
+def solved(cases):
+    """The rows of optimal problems, each with a word on its kind first; those without a physical answer are skipped."""
+    for kind, *case in cases:
+        try:
+            row = optimal_row(*case[:5], bool(case[5]))
+        except (Unphysical, AssertionError, ZeroDivisionError, ValueError) as error:
+            print("skipped", kind, case, repr(error)[:80], file=sys.stderr)
+            mp.dps = DIGITS
+            continue
+        yield [kind] + [repr(x) for x in case] + [show(x) for x in row]
+
+
 def optimal_rows():
     rng = random.Random(1)
     cases = []
@@ -427,14 +439,7 @@ def optimal_rows():
             continue
         cases.append((kind, a, b, v_i, v_f, t_f, bounded))
     cases += short_hold_cases()
-    for kind, *case in cases:
-        try:
-            row = optimal_row(*case[:5], bool(case[5]))
-        except (Unphysical, AssertionError, ZeroDivisionError, ValueError) as error:
-            print("skipped", kind, case, repr(error)[:80], file=sys.stderr)
-            mp.dps = DIGITS
-            continue
-        yield [kind] + [repr(x) for x in case] + [show(x) for x in row]
+    yield from solved(cases)
 
 
 def turning_rows():
@@ -642,6 +647,151 @@ def best_rows():
             print("skipped", case, repr(error)[:80], file=sys.stderr)
 
 
+def touching_rows():
+    """Best shortcuts that touch v = 1 inside: v = 1 and v' = 0 at a place x, and the gradient of the work is along that of v there. Newton's method with
+    differences at 30 digits, each case from the one before; the first from the paper's picture."""
+    a, b, v_i, v_f = mpf(0.03), mpf(0.05), mpf(3), mpf(100)
+    q0, rise, s = 1 / v_i, 1 / v_f - 1 / v_i, b - a
+    near = mp.matrix([-0.07618, 0.49105, 0.45])
+    for t_f in (0.049, 0.05, 0.052, 0.055, 0.06, 0.065):
+        time = mpf(t_f)
+
+        def place(x, a_2, a_3):
+            a_4 = rise - a_2 - a_3
+            return q0 + x * (a_2 + x * (a_3 + x * a_4)), time - a_2 - x * (2 * a_3 + x * 3 * a_4)
+
+        def conditions(a_2, a_3, x):
+            a_4 = rise - a_2 - a_3
+            q, m = place(x, a_2, a_3)
+            slope = (-2 * a_3 - 6 * x * a_4) * q - m * (time - m)
+            # Change of q and n with a_2 and a_3.
+            change = [((lambda y: y - y**3), (lambda y: 3 * y * y - 1)), ((lambda y: y**2 - y**3), (lambda y: 3 * y * y - 2 * y))]
+            of_v = [(dn(x) * q - m * dq(x)) for dq, dn in change]
+
+            def along(y, dq, dn):
+                theta, n = place(y, a_2, a_3)
+                tau = 1 + a * log(n / time) + s * log(theta)
+                return (tau + a) / theta * dn(y) + (s - tau) * n / theta**2 * dq(y)
+
+            of_w = [quad(lambda y: along(y, *pair), [0, 0.25, 0.5, 0.8, 0.95, 1]) for pair in change]
+            return [m / (time * q) - 1, slope, of_w[0] * of_v[1] - of_w[1] * of_v[0]]
+
+        if t_f == 0.049:
+            velocity = lambda x: place(x, near[0], near[1])[1] / place(x, near[0], near[1])[0]
+            near[2] = min((mpf(i) / 200 for i in range(201)), key=velocity)
+        mp.dps = 30
+        near = mp.findroot(lambda *z: conditions(*z), tuple(near), tol=mpf(10) ** -50, maxsteps=30)
+        mp.dps = DIGITS
+        a_2, a_3 = near[0], near[1]
+        work, v_min, status = landscape_point(a, b, v_i, v_f, time, a_2, a_3)
+        assert abs(v_min - 1) < mpf(10) ** -22, v_min
+        optimum = optimal_row(0.03, 0.05, 3.0, 100.0, t_f, True)[0]
+        case = (0.03, 0.05, 3.0, 100.0, t_f, 1)
+        yield [repr(x) for x in case] + [show(x) for x in (a_2, a_3, work, optimum, (work - optimum) / optimum)]
+
+
+def edge_rows():
+    """Optima next to where one regime passes into another, and next to v = 1."""
+    materials = [(0.03, 0.05, 3.0, 100.0), (0.03, 0.05, 100.0, 3.0), (0.1, 0.02, 3.0, 2.9)]
+    cases = []
+    for small in (1e-3, 1e-6, 1e-9, 1e-12):
+        cases.append(("v_near_1", 0.03, 0.05, 1 + small, 40.0, 0.3, 1))
+        least = Problem(0.03, 0.05, 40.0, 1 + small, True).least_time()
+        cases.append(("v_near_1", 0.03, 0.05, 40.0, 1 + small, float(least + 1), 1))
+    for a, b, v_i, v_f in materials:
+        precision(DIGITS)
+        times = crossover_row(a, b, v_i, v_f)
+        for name, t in zip(("t_cross", "t_hold", "t_cheapest", None, "t_turn", "t_free", "t_free"), times):
+            if name is None or t is None:
+                continue
+            for share in (1e-7, 1e-13):
+                cases.append(("next_to_" + name, a, b, v_i, v_f, float(t * (1 + mpf(share))), 1))
+    yield from solved(cases)
+
+
+def stability_row(a, b, k, m, v):
+    """Eigenvalues of steady sliding, times v: the roots of the characteristic polynomial, to many more digits than are shown."""
+    law_a, law_b, stiffness, inertia = mpf(a), mpf(b), mpf(k), mpf(m) * mpf(v) ** 2
+    # Of what cancels next to the critical stiffness, of roots decades apart, and of close roots.
+    mp.dps = 120
+    roots = mp.polyroots([inertia, inertia + law_a, stiffness + law_a - law_b, stiffness], maxsteps=2000, extraprec=2000)
+    mp.dps = DIGITS
+    pair = [r for r in roots if abs(r.imag) > abs(r) * mpf(10) ** -50]
+    if pair:
+        growth, frequency = pair[0].real, abs(pair[0].imag)
+        decay = next(r.real for r in roots if all(r is not p for p in pair))
+    else:
+        decay, _, growth = sorted(r.real for r in roots)
+        frequency = mpf(0)
+    return [repr(x) for x in (a, b, k, m, v)] + [show(x * mpf(v)) for x in (growth, frequency, decay)]
+
+
+def stability_rows():
+    rng = random.Random(6)
+    cases = [(0.005, 0.01, k, 2.5e-16, v) for k in (1e-3, 7.5e-3, 0.1) for v in (1e5, 3.2e6)]
+    while len(cases) < 200:
+        a = log_uniform(rng, 1e-4, 0.3)
+        b = rng.choice([0.0, a * log_uniform(rng, 0.1, 1), a * log_uniform(rng, 1, 10)])
+        v = log_uniform(rng, 1, 1e8)
+        cases.append((a, b, log_uniform(rng, 1e-5, 1e2), a * log_uniform(rng, 1e-8, 1e6) / v**2, v))
+    while len(cases) < 300:
+        # Next to the critical stiffness.
+        a = log_uniform(rng, 1e-4, 0.3)
+        b = a * log_uniform(rng, 1.01, 10)
+        v = log_uniform(rng, 1, 1e8)
+        m = a * log_uniform(rng, 1e-4, 1e4) / v**2
+        share = rng.choice([1, -1]) * log_uniform(rng, 1e-13, 1e-2)
+        critical = (mpf(b) - mpf(a)) * (1 + mpf(m) * mpf(v) ** 2 / mpf(a))
+        cases.append((a, b, float(critical * (1 + mpf(share))), m, v))
+    for case in cases:
+        yield stability_row(*case)
+
+
+def hopf_coefficient(a, b, inertia):
+    """The first Lyapunov coefficient by Kuznetsov's multilinear forms, in units of l/v for time and ln v for the amplitude, for (z, y, x) of
+    z' = k (1 - e^x), y' = e^-y - e^x, M e^x x' = z - a x - b y at the critical stiffness; linear systems by elimination."""
+    a, b, mass = mpf(a), mpf(b), mpf(inertia)
+    k = (b - a) * (1 + mass / a)
+    omega = sqrt((k + a - b) / mass)
+    i = mp.mpc(0, 1)
+    jacobian = mp.matrix([[0, 0, -k], [0, -1, -1], [1 / mass, -b / mass, -a / mass]])
+    q = mp.matrix([i * k / omega, -1 / (1 + i * omega), 1])
+    p = mp.matrix([i / (omega * mass), (b / mass) / (i * omega - 1), 1])
+    assert mp.norm(jacobian * q - i * omega * q) < mpf(10) ** -30 * mp.norm(q) * mp.mnorm(jacobian)
+    assert mp.norm(jacobian.T * p + i * omega * p) < mpf(10) ** -30 * mp.norm(p) * mp.mnorm(jacobian)
+    pull = lambda u: (u[0] - b * u[1] - a * u[2]) / mass
+    second = lambda u, v: mp.matrix([-k * u[2] * v[2], u[1] * v[1] - u[2] * v[2], -(u[2] * pull(v) + v[2] * pull(u))])
+
+    def third(u, v, w):
+        x = u[2] * v[2] * pull(w) + u[2] * w[2] * pull(v) + v[2] * w[2] * pull(u)
+        return mp.matrix([-k * u[2] * v[2] * w[2], -u[1] * v[1] * w[1] - u[2] * v[2] * w[2], x])
+
+    mirrored = q.apply(mp.conj)
+    still = mp.lu_solve(jacobian, second(q, mirrored))
+    double = mp.lu_solve(2 * i * omega * mp.eye(3) - jacobian, second(q, q))
+    total = third(q, q, mirrored) - 2 * second(q, still) + second(mirrored, double)
+    dot = lambda u, v: sum(mp.conj(u[n]) * v[n] for n in range(3))
+    return (dot(p, total) / dot(p, q)).real / (2 * omega)
+
+
+def hopf_rows():
+    rng = random.Random(7)
+    cases = [(0.005, 0.01, 1e5, 3.2e6, 7.5e-3, 2.5e-16), (0.005, 0.01, 1e5, 7e5, 7.5e-3, 2.5e-16)]
+    while len(cases) < 60:
+        a = log_uniform(rng, 1e-4, 0.3)
+        b = a * (1 + log_uniform(rng, 1e-3, 10))
+        v = log_uniform(rng, 1.5, 1e8)
+        cases.append((a, b, 0.5 * v + 0.6, v, a, a * log_uniform(rng, 1e-6, 1e4) / v**2))
+    # Next to where the kind changes: where a mu = 1/(3 + 2 sqrt(3 + b/a)).
+    for share in (1e-2, -1e-2, 1e-6, -1e-6, 1e-12, -1e-12):
+        mu = (1 + mpf(share)) / (3 + 2 * sqrt(3 + mpf(0.01) / mpf(0.005)))
+        cases.append((0.005, 0.01, 1e3, 1024.0, 7.5e-3, float(mpf(0.005) * mu / 2**20)))
+    cases += [(0.005, 0.01, 10.0, 100.0, 0.1, 0.0), (0.01, 0.01, 10.0, 100.0, 0.1, 1e-6), (0.02, 0.01, 10.0, 100.0, 0.1, 1e-6)]
+    for a, b, v_i, v_f, k, m in cases:
+        coefficient = hopf_coefficient(a, b, mpf(m) * mpf(v_f) ** 2) if b > a and m > 0 else None
+        yield [repr(x) for x in (a, b, v_i, v_f, k, m)] + [show(coefficient)]
+
+
 TABLES = {
     "gauss": (["n", "i", "x", "weight"], gauss_rows),
     "elementary": (["x", "ln", "ln_1p", "exp", "exp_m1"], elementary_rows),
@@ -650,6 +800,10 @@ TABLES = {
                    "work_cross", "work_hold", "work_cheapest", "work_min", "work_turn"], crossover_rows),
     "optimal": (["regime", "a", "b", "v_i", "v_f", "t_f", "bounded", "work", "v_start", "v_end", "hold_time", "hamiltonian", "theta_max", "strategy"], optimal_rows),
     "landscape": (["a", "b", "v_i", "v_f", "t_f", "a_2", "a_3", "work", "v_min", "status"], landscape_rows),
+    "stability": (["a", "b", "k", "m", "v", "growth_rate", "frequency", "decay_rate"], stability_rows),
+    "optimal_edges": (["regime", "a", "b", "v_i", "v_f", "t_f", "bounded", "work", "v_start", "v_end", "hold_time", "hamiltonian", "theta_max", "strategy"], edge_rows),
+    "best_touching": (["a", "b", "v_i", "v_f", "t_f", "bounded", "a_2", "a_3", "work", "work_optimal", "gap"], touching_rows),
+    "hopf": (["a", "b", "v_i", "v_f", "k", "m", "lyapunov"], hopf_rows),
     "best": (["a", "b", "v_i", "v_f", "t_f", "bounded", "a_2", "a_3", "work", "work_optimal", "gap", "v_min"], best_rows),
 }
 

@@ -12,6 +12,11 @@ mod numerics;
 mod ours;
 mod peaks;
 #[allow(dead_code, reason = "the crate's own source, for what is used here")]
+#[path = "../../../src/stability/response/run.rs"]
+mod run;
+#[path = "../../../src/stability/response/series.rs"]
+mod series;
+#[allow(dead_code, reason = "the crate's own source, for what is used here")]
 #[path = "../../../src/stability/response/slider.rs"]
 mod slider;
 mod summary;
@@ -20,20 +25,23 @@ mod with_diffsol;
 
 use case::{Case, Method, PAPER, STICK_SLIP};
 use cvode::Cvode;
-use ours::Ours;
+use ours::{Ours, Switching};
 use summary::Point;
-use with_differential_equations::Radau5;
+use with_differential_equations::{Dop853, Radau5};
 use with_diffsol::{Bdf, Esdirk34};
 
 fn main() {
-    let ours: Vec<Box<dyn Method>> = vec![Box::new(Ours::<3>), Box::new(Ours::<5>), Box::new(Ours::<7>)];
+    let ours: Vec<Box<dyn Method>> =
+        vec![Box::new(Switching), Box::new(Ours::<3>), Box::new(Ours::<5>), Box::new(Ours::<7>)];
     let mut libraries: Vec<Box<dyn Method>> = vec![
         Box::new(Bdf),
         Box::new(Esdirk34),
         Box::new(Radau5 { newton_tol: 0.01 }),
         Box::new(Radau5 { newton_tol: 0.0 }),
+        Box::new(Dop853),
     ];
     libraries.extend(std::env::args_os().nth(1).map(|driver| Box::new(Cvode { driver }) as Box<dyn Method>));
+    println!("### all runs\n");
     println!("| case | method | tolerance | ms | error of end | error of first peak | peaks |");
     println!("| --- | --- | --- | --- | --- | --- | --- |");
     let cases = [PAPER, STICK_SLIP];

@@ -1,4 +1,4 @@
-//! The integrator of this crate, driven as the table `step` drives it.
+//! The integrators of this crate: the one of the table `step`, and Radau IIA alone.
 
 use multiversion::multiversion;
 
@@ -7,7 +7,36 @@ use crate::numerics::stiff::{
     Accuracy, Collocation, Failure, Integrator, Piece, radau_iia_5, radau_iia_9, radau_iia_13,
 };
 use crate::peaks::Peaks;
+use crate::run::{between, step_to};
 use crate::slider::{Slider, State, X};
+
+/// Series where nothing is stiff, Radau IIA of order 9 elsewhere: what the table `step` uses.
+pub struct Switching;
+
+impl Method for Switching {
+    fn name(&self) -> String {
+        "ours".into()
+    }
+
+    fn integrate(&self, case: &Case, tolerance: f64, mut peaks: Option<&mut Peaks>) -> Option<State> {
+        let (slider, start) = (&case.slider, case.start());
+        let mut run = slider.run(start, slider.first_step(&start), tolerance);
+        while run.t() < case.t_end {
+            if let Some(arrested) = slider.arrest(run.y()) {
+                run.jump(arrested, slider.first_step(&arrested));
+            }
+            let leg = step_to(&mut run, case.t_end).ok()?;
+            if let Some(peaks) = &mut peaks {
+                // To the order of the method, as the table polishes its extrema.
+                peaks.look(|u| match between(&mut run, &leg, 0.0, u) {
+                    Some(part) if u > 0.0 => part.end()[X],
+                    _ => leg.value(X, u),
+                });
+            }
+        }
+        Some(*run.y())
+    }
+}
 
 /// Radau IIA with `S` stages.
 pub struct Ours<const S: usize>;
@@ -24,7 +53,7 @@ macro_rules! method {
 
         impl Method for Ours<$stages> {
             fn name(&self) -> String {
-                format!("ours, order {}", 2 * $stages - 1)
+                format!("ours, Radau IIA of order {}", 2 * $stages - 1)
             }
 
             fn integrate(&self, case: &Case, tolerance: f64, peaks: Option<&mut Peaks>) -> Option<State> {

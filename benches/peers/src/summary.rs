@@ -56,9 +56,9 @@ fn smallest(points: &[Point]) -> f64 {
 }
 
 pub fn print(case: &Case, ours: &[Vec<Point>], libraries: &[Vec<Point>]) {
-    println!("\n{}, ms to an error of the end:\n", case.name);
-    println!("| error | ours, order 5 | 9 | 13 | best library | | order 9 is faster by |");
-    println!("| --- | --- | --- | --- | --- | --- | --- |");
+    println!("\n### {}\n\nms to an error of the end:\n", case.name);
+    println!("| error | ours | Radau IIA 5 | 9 | 13 | best library | | ours is faster by |");
+    println!("| --- | --- | --- | --- | --- | --- | --- | --- |");
     let reached = libraries.iter().map(|points| smallest(points)).fold(f64::INFINITY, f64::min);
     let round = (2..=12).map(|digits| 10f64.powi(-digits));
     let mut errors: Vec<f64> = round.chain([reached]).collect();
@@ -68,7 +68,7 @@ pub fn print(case: &Case, ours: &[Vec<Point>], libraries: &[Vec<Point>]) {
         let own: Vec<Option<f64>> = ours.iter().map(|points| time_to(points, error)).collect();
         let best = fastest(libraries, error);
         let name = best.map_or("none gets there", |(_, name)| name);
-        let ratio = own[1].zip(best).map_or("-".into(), |(own, (time, _))| format!("{:.1}", time / own));
+        let ratio = own[0].zip(best).map_or("-".into(), |(own, (time, _))| format!("{:.1}", time / own));
         let own: Vec<String> = own.into_iter().map(ms).collect();
         println!("| {error:.1e} | {} | {} | {name} | {ratio} |", own.join(" | "), ms(best.map(|(time, _)| time)));
     }

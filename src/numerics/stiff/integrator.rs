@@ -52,6 +52,10 @@ pub struct Integrator<'a, Y, const N: usize, const S: usize> {
     allowed: f64,
     /// With 32 digits, so that short steps add up after a long rest.
     t: DoubleDouble,
+    /// Time beyond it that its digits do not show.
+    rest: f64,
+    /// Share of the time before it that a step is at least.
+    shortest: f64,
     y: [f64; N],
     /// Length proposed for the next step.
     h: f64,
@@ -68,6 +72,9 @@ struct Last<const N: usize, const S: usize> {
 
 /// Error that a tolerance cannot ask for less of, relative to the variables: 32 units in the last place.
 const ROUNDING: f64 = 32.0 * f64::EPSILON;
+
+/// Share of the time before it that a step is at least, unless it [may be shorter](Integrator::may_step): 32 digits.
+const SHORTEST: f64 = 6e-33;
 
 /// Newton iterations before a step is given up.
 const MOST_ITERATIONS: u32 = 12;
@@ -92,7 +99,13 @@ impl<'a, Y: System<N>, const N: usize, const S: usize> Integrator<'a, Y, N, S> {
         let share = (S + 1) as f64 / (2 * S) as f64;
         let allowed = exp(share * ln(accuracy.tolerance));
         let (t, cost) = (DoubleDouble::new(t), Cost::default());
-        Integrator { system, rule, accuracy, allowed, t, y, h, last: None, cost }
+        Integrator { system, rule, accuracy, allowed, t, rest: 0.0, shortest: SHORTEST, y, h, last: None, cost }
+    }
+
+    /// Lets a step be as short as this share of the time before it: where variables become infinite after all, it takes so
+    /// much longer to see.
+    pub fn may_step(&mut self, share: f64) {
+        self.shortest = share;
     }
 
     /// Time reached.
@@ -120,15 +133,38 @@ impl<'a, Y: System<N>, const N: usize, const S: usize> Integrator<'a, Y, N, S> {
         (self.y, self.h, self.last) = (y, h, None);
     }
 
+    /// Time left until `limit`.
+    pub fn left(&self, limit: f64) -> f64 {
+        (DoubleDouble::new(limit) - self.t).high
+    }
+
+    /// Goes on from the variables `y`, to which something else has led in the time `h`; with a first step of about
+    /// `next > 0`. Whether `h` is long enough for that.
+    pub fn leap(&mut self, h: f64, y: [f64; N], next: f64) -> bool {
+        let advances = h > self.shortest * self.t.high;
+        if advances {
+            self.pass(h);
+            (self.y, self.h, self.last) = (y, next, None);
+        }
+        advances
+    }
+
+    /// Time goes on.
+    #[inline(always)]
+    fn pass(&mut self, h: f64) {
+        let t = self.t + DoubleDouble::new(self.rest + h);
+        self.rest = if t == self.t { self.rest + h } else { 0.0 };
+        self.t = t;
+    }
+
     /// One step, which ends at `limit` at the latest (and then exactly there).
     #[inline(always)]
     pub fn step(&mut self, limit: f64) -> Result<Piece<N, S>, Failure> {
         loop {
-            let left = (DoubleDouble::new(limit) - self.t).high;
+            let left = self.left(limit);
             let cut = self.h >= left;
             let h = if cut { left } else { self.h };
-            let t_end = if cut { DoubleDouble::new(limit) } else { self.t + DoubleDouble::new(h) };
-            let advances = h > 0.0 && t_end != self.t;
+            let advances = h > self.shortest * self.t.high;
             if !advances {
                 return Err(Failure::Ends { t: self.t.high });
             }
@@ -150,7 +186,12 @@ impl<'a, Y: System<N>, const N: usize, const S: usize> Integrator<'a, Y, N, S> {
             let next = h * factor.clamp(0.2, 8.0);
             self.h = if cut { next.max(self.h) } else { next };
             let piece = Piece::new(self.rule, self.t.high, h, self.y, &change);
-            (self.t, self.y) = (t_end, piece.end);
+            if cut {
+                (self.t, self.rest) = (DoubleDouble::new(limit), 0.0);
+            } else {
+                self.pass(h);
+            }
+            self.y = piece.end;
             self.last = Some(Last { piece, error });
             self.cost.steps += 1;
             return Ok(piece);
@@ -455,7 +496,7 @@ mod tests {
         };
         let Failure::Ends { t } = failure;
         assert!((t - 1.0).abs() < 1e-10, "{failure}");
-        assert_eq!(integrator.cost().steps, 279);
+        assert_eq!(integrator.cost().steps, 280);
     }
 
     #[test]

@@ -32,6 +32,36 @@ impl<const N: usize, const S: usize> Piece<N, S> {
         Piece { t, h, start, end, powers }
     }
 
+    /// The polynomial with the coefficients `powers` of `u … u^S`.
+    #[inline(always)]
+    pub fn from_powers(t: f64, h: f64, start: [f64; N], powers: [[f64; S]; N]) -> Self {
+        let mut piece = Piece { t, h, start, end: start, powers };
+        for r in 0..N {
+            piece.end[r] = piece.value(r, 1.0);
+        }
+        piece
+    }
+
+    /// The same polynomial between two shares of the step.
+    pub fn between(&self, from: f64, to: f64) -> Self {
+        let mut powers = self.powers;
+        for row in &mut powers {
+            // Horner's scheme, again and again, gives the powers of `u - from`; the one of degree 0 is not kept.
+            for pass in 0..S {
+                for k in (pass.saturating_sub(1)..S - 1).rev() {
+                    row[k] += from * row[k + 1];
+                }
+            }
+            let mut scale = 1.0;
+            for power in row {
+                scale *= to - from;
+                *power *= scale;
+            }
+        }
+        let start = std::array::from_fn(|r| self.value(r, from));
+        Piece::from_powers(self.t + from * self.h, (to - from) * self.h, start, powers)
+    }
+
     /// Time at its end.
     pub fn t_end(&self) -> f64 {
         self.t + self.h

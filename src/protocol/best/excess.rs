@@ -10,15 +10,16 @@
 //!
 //! Both terms are at least 0, so the sum is good to full relative precision however small it is.
 
-use super::Place;
 use crate::model::Transition;
-use crate::numerics::elementary::ln_1p;
+use crate::numerics::cubic::ExactCubic;
+use crate::numerics::double_double::DoubleDouble;
+use crate::numerics::elementary::{ln, ln_1p};
 use crate::numerics::gauss::rule;
-use crate::protocol::cubic::Landscape;
+use crate::protocol::cubic::Path;
 use crate::protocol::{Effort, optimal};
 
 /// Relative accuracy of the integral.
-const ACCURACY: f64 = 1e-9;
+const ACCURACY: f64 = 1e-10;
 /// Error that counts for nothing, relative to the work: below it the rounding of `v - v~` shows.
 const NOTHING: f64 = 1e-20;
 /// Relative accuracy of the feedback; an error in it counts quadratically until it comes near `v - v~` itself.
@@ -28,57 +29,158 @@ const NODES: usize = 12;
 /// Most halvings of a panel: kinks where the feedback leaves the bound are caught this closely.
 const DEEPEST: u32 = 30;
 /// Most panels; smooth cases take two to eight, a kink some thirty.
-const MOST_PANELS: u32 = 300;
+const MOST_PANELS: u32 = 1000;
+/// Share of the shortcut's velocity below which that of the optimum may be too small for a number.
+const FAINT: f64 = 1e-3;
+/// Panels towards an end are this much shorter, one after the other.
+const SHORTER: f64 = 0.2;
+
+/// A path seen from one of its ends: polynomials in the distance from there, `x` or `1 - x`, so that nothing is lost where
+/// it is short.
+struct Side {
+    /// From the end, else from the start.
+    from_end: bool,
+    theta: [f64; 4],
+    /// `1 - theta`.
+    rest: [f64; 4],
+    /// `theta - theta_1`.
+    drop: [f64; 4],
+    n: [f64; 4],
+    /// `t_f theta (v - 1)`, whose digits count where the bound presses.
+    surplus: [f64; 4],
+    /// That of [`optimal::Position`].
+    margin: [f64; 4],
+}
+
+impl Side {
+    fn of(path: &Path, bounded: bool, from_end: bool) -> Side {
+        let theta = path.exact_theta();
+        let (one, zero) = (DoubleDouble::new(1.0), DoubleDouble::new(0.0));
+        let theta_1 = path.ends.theta_1;
+        let rest = ExactCubic { c: [one - theta.c[0], -theta.c[1], -theta.c[2], -theta.c[3]] };
+        let drop = ExactCubic { c: [theta.c[0] - theta_1, theta.c[1], theta.c[2], theta.c[3]] };
+        // (1 - x) t_f, times 1 - theta_1 under the bound, and the drop.
+        let time = DoubleDouble::new(path.ends.t_f) * if bounded { one - theta_1 } else { one };
+        let margin = ExactCubic { c: [drop.c[0] + time, drop.c[1] - time, drop.c[2], drop.c[3]] };
+        let about = |cubic: &ExactCubic| {
+            let [c0, c1, c2, c3] = cubic.about(if from_end { 1.0 } else { 0.0 });
+            if from_end { [c0, -c1, c2, -c3] } else { [c0, c1, c2, c3] }
+        };
+        let mut side = Side {
+            from_end,
+            theta: about(&theta),
+            rest: about(&rest),
+            drop: about(&drop),
+            n: about(&path.exact_n()),
+            surplus: about(&path.exact_surplus(1.0)),
+            margin: about(&margin),
+        };
+        if from_end {
+            (side.drop[0], side.margin[0]) = (zero.high, zero.high);
+        }
+        side
+    }
+}
+
+/// The excess of a shortcut, as a density.
+struct Excess<'a> {
+    transition: &'a Transition,
+    t_f: f64,
+    bounded: bool,
+    effort: &'a mut Effort,
+}
+
+impl Excess<'_> {
+    /// The density at a distance from one side, and whether the optimum would hold there.
+    fn judge(&mut self, side: &Side, distance: f64) -> Option<(f64, bool)> {
+        let at = |[c0, c1, c2, c3]: [f64; 4]| c0 + distance * (c1 + distance * (c2 + distance * c3));
+        let time_left = self.t_f * if side.from_end { distance } else { 1.0 - distance };
+        let (theta, rest, drop, margin) = (at(side.theta), at(side.rest), at(side.drop), at(side.margin));
+        let v = at(side.n).max(0.0) / (self.t_f * theta);
+        let position = optimal::Position { theta, rest, drop, time_left, margin };
+        let Transition { law, v_f, .. } = *self.transition;
+        let best = optimal::feedback(law, v_f, position, self.bounded, FEEDBACK, self.effort)?;
+        let dearer = if best.v > FAINT * v {
+            best.v * entropy((v - best.v) / best.v)
+        } else {
+            v * (ln(v) - best.ln_v - 1.0) + best.v
+        };
+        let pressed = best.pressure * at(side.surplus).max(0.0) / (self.t_f * theta);
+        Some((law.a * dearer + pressed, best.pressure > 0.0))
+    }
+
+    /// Where the optimum that holds at the start leaves the bound, by bisection; `None` if it does so in the second half.
+    fn kink(&mut self, side: &Side) -> Option<Option<f64>> {
+        let (mut low, mut high) = (0.0, HALF);
+        if self.judge(side, high)?.1 {
+            return Some(None);
+        }
+        for _ in 0..DEEPEST {
+            let middle = 0.5 * (low + high);
+            if self.judge(side, middle)?.1 {
+                low = middle;
+            } else {
+                high = middle;
+            }
+        }
+        Some(Some(high))
+    }
+}
+
+/// Where both sides meet.
+const HALF: f64 = 0.5;
 
 /// `W_s - W*` of a shortcut that costs `work`; `None` where the optimal feedback is not to be had on the way.
 pub(super) fn over_optimum(
     transition: &Transition,
-    landscape: &Landscape,
-    place: Place,
+    path: &Path,
     work: f64,
     bounded: bool,
     effort: &mut Effort,
 ) -> Option<f64> {
-    let [_, theta_1, _, t_f] = landscape.ends();
-    let (theta, n) = landscape.path(place.a_2, place.a_3).about_end();
-    let law = transition.law;
-    // The density at `delta`, the time before the end in units of `-t_f`, and whether the optimum would hold there.
-    let mut judge = |delta: f64| {
-        let drop = delta * (theta[1] + delta * (theta[2] + delta * theta[3]));
-        let here = theta[0] + drop;
-        let v = (n[0] + delta * (n[1] + delta * n[2])).max(0.0) / (t_f * here);
-        let best = optimal::feedback(law, here, theta_1, drop / theta_1, -delta * t_f, bounded, FEEDBACK, effort)?;
-        let r = (v - best.v) / best.v;
-        Some((law.a * best.v * entropy(r) + best.pressure * (v - best.v), best.pressure > 0.0))
-    };
-    // A hold at the start may be shorter than the distance of the first node from it.
-    let mut places = vec![-1.0, 0.0];
-    if judge(-1.0)?.1 {
-        places.insert(1, kink(&mut |delta| judge(delta).map(|(_, held)| held))?);
+    let t_f = path.ends.t_f;
+    let mut excess = Excess { transition, t_f, bounded, effort };
+    let mut panels = Vec::new();
+    let sides = [false, true].map(|from_end| Side::of(path, bounded, from_end));
+    for side in &sides {
+        let mut places = layers(side, t_f);
+        // A hold at the start may be shorter than the distance of the first node from it.
+        if !side.from_end
+            && excess.judge(side, 0.0)?.1
+            && let Some(kink) = excess.kink(side)?
+        {
+            places.push(kink);
+            places.sort_by(f64::total_cmp);
+            places.dedup();
+        }
+        for ends in places.windows(2) {
+            let whole = panel(&mut |distance| Some(excess.judge(side, distance)?.0), ends[0], ends[1])?;
+            panels.push((side, ends[0], ends[1], whole));
+        }
     }
-    let mut density = |delta: f64| judge(delta).map(|(density, _)| density);
-    let wholes = places.windows(2).map(|ends| panel(&mut density, ends[0], ends[1])).collect::<Option<Vec<f64>>>()?;
-    let tolerance = ACCURACY * wholes.iter().sum::<f64>().abs() + NOTHING * work / t_f;
+    let tolerance = ACCURACY * panels.iter().map(|panel| panel.3).sum::<f64>().abs() + NOTHING * work / t_f;
     let mut left = MOST_PANELS;
     let mut sum = 0.0;
-    for (ends, whole) in places.windows(2).zip(wholes) {
-        sum += refine(&mut density, ends[0], ends[1], whole, tolerance, 0, &mut left)?;
+    for (side, from, to, whole) in panels {
+        let mut density = |distance| Some(excess.judge(side, distance)?.0);
+        sum += refine(&mut density, from, to, whole, tolerance, 0, &mut left)?;
     }
     Some(t_f * sum)
 }
 
-/// Where the optimum that holds at the start leaves the bound, by bisection.
-fn kink(held: &mut impl FnMut(f64) -> Option<bool>) -> Option<f64> {
-    let (mut low, mut high) = (-1.0, 0.0);
-    for _ in 0..DEEPEST {
-        let middle = 0.5 * (low + high);
-        if held(middle)? {
-            low = middle;
-        } else {
-            high = middle;
-        }
+/// Ends of panels that get shorter towards the end of a side as far as theta or the velocity may change there: by the slope
+/// of theta, and in the time in which contacts are renewed.
+fn layers(side: &Side, t_f: f64) -> Vec<f64> {
+    let [theta, slopes @ ..] = side.theta;
+    let thin = theta / (theta + t_f + slopes.iter().map(|slope| slope.abs()).sum::<f64>());
+    let mut places = vec![0.0, HALF];
+    let mut width = HALF * SHORTER;
+    while width > thin {
+        places.push(width);
+        width *= SHORTER;
     }
-    Some(high)
+    places.sort_by(f64::total_cmp);
+    places
 }
 
 /// `(1 + r) ln(1 + r) - r`, without cancellation near 0.

@@ -1,17 +1,22 @@
 //! The least-work cubic shortcut, and its gap to the optimum without cancellation.
 //!
-//! The admissible shortcuts form a convex set in the plane of `(a_2, a_3)`: `v >= m` means that the cubic `n - m t_f
-//! theta`, linear in the coefficients, is not negative on `[0, 1]`, with `m = 1` under the bound and `m = 0` without.
-//! The least work lies inside, where the gradient vanishes (`interior`), or on the border, where some shortcut touches
-//! `v = m` (`border`). A small gap is an integral of positive terms (`excess`).
+//! The admissible shortcuts form a convex set in the plane of two coefficients (`plane`): `v >= m` means that the cubic
+//! `n - m t_f theta`, linear in the coefficients, is not negative on `[0, 1]`, with `m = 1` under the bound and `m = 0`
+//! without. The ellipsoid method (`ellipse`) comes close to the least work. If that lies inside, Newton's method ends
+//! there (`newton`); on the border, where some shortcut touches `v = m`, the ellipsoid method goes on to the end. A small
+//! gap is an integral of positive terms (`excess`).
 
-mod border;
+mod ellipse;
 mod excess;
-mod interior;
+mod newton;
+mod plane;
 
 use super::cubic::Landscape;
 use super::{Effort, Solved, Status, optimal};
 use crate::model::Transition;
+use crate::numerics::elementary::ln;
+use ellipse::{Ellipse, Outcome, Until};
+use plane::{Bound, Place, Plane};
 
 /// The best cubic shortcut of one transition in one time.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -35,12 +40,12 @@ const PLAIN_DIFFERENCE: f64 = 1e-4;
 /// Error of that difference, relative to the works.
 const DIFFERENCE_ERROR: f64 = 1e-11;
 
-/// A place in the plane of the coefficients.
-#[derive(Debug, Clone, Copy, PartialEq)]
-struct Place {
-    a_2: f64,
-    a_3: f64,
-}
+/// Roundings of the time beyond the least one.
+const ROUNDINGS: f64 = 8.0;
+
+/// The ellipse is small enough where the work can change by no more than this share in it, times `a` where that is
+/// small: all shortcuts cost the same but for their velocities, which count by `a`. Newton's method converges from there.
+const CLOSE: f64 = 1e-5;
 
 /// The shortcut of least work over the whole plane where `v >= 1` (`bounded`) or `v > 0`.
 ///
@@ -53,26 +58,37 @@ pub fn solve(transition: &Transition, t_f: f64, bounded: bool, rtol: f64) -> Sol
     let Some(optimum_value) = optimum.value else {
         return Solved { status: optimum.status, value: None, effort };
     };
+    let law = transition.law;
     let landscape = Landscape::new(transition, t_f, rtol.min(1e-12));
+    let rough = Landscape::new(transition, t_f, (1e-7 * law.a).clamp(1e-12, 1e-7));
     let least_velocity = if bounded { 1.0 } else { 0.0 };
-    let rough = Landscape::new(transition, t_f, 1e-7);
-    let Some(start) = interior::approach(&rough, least_velocity, &mut effort) else {
-        return Solved { status: Status::Infeasible, value: None, effort };
+    let [rough, plane] = [&rough, &landscape].map(|landscape| Plane::new(landscape, law, least_velocity));
+    // Where friction is as low as that there may be no shortcut of least work, or one that costs less than the extremal.
+    let steady = |v: f64| 1.0 + (law.a - law.b) * ln(v);
+    let lowest = steady(transition.v_i).min(steady(transition.v_f));
+    let doubtful = optimum.status == Status::Nonphysical || lowest <= (law.b - law.a).max(0.0);
+    let unsolved = |status, effort| {
+        let status = if doubtful && status == Status::NotConverged { Status::Nonphysical } else { status };
+        Solved { status, value: None, effort }
     };
-    let Some((place, touches)) = least(&landscape, least_velocity, start, &mut effort) else {
-        return Solved { status: unsolved(optimum.status), value: None, effort };
+    let least = match least(&rough, &plane, law.a, &mut effort) {
+        Ok(least) => least,
+        Err(status) => return unsolved(status, effort),
     };
-    let work = landscape.moments(place.a_2, place.a_3, &mut effort).work;
-    let v_min = if touches { least_velocity } else { landscape.path(place.a_2, place.a_3).judge().1 };
+    let path = plane.path(least.place);
+    let work = plane.moments(least.place, &mut effort).work;
+    let v_min = if least.touches { least_velocity } else { path.least_velocity() };
     let difference = work - optimum_value.work;
     let excess = if difference > PLAIN_DIFFERENCE * optimum_value.work {
         difference
     } else {
-        // Two routes to one number: they must agree as far as the coarser one goes.
-        let excess = excess::over_optimum(transition, &landscape, place, work, bounded, &mut effort);
-        match excess.filter(|excess| (excess - difference).abs() <= DIFFERENCE_ERROR * work) {
+        // Two routes to one number: they must agree as far as the coarser one goes, and as far as a rounding of t_f
+        // leaves W* alone.
+        let coarse = DIFFERENCE_ERROR * work + ROUNDINGS * f64::EPSILON * t_f * optimum_value.hamiltonian.abs();
+        let excess = excess::over_optimum(transition, &path, work, bounded, &mut effort);
+        match excess.filter(|excess| (excess - difference).abs() <= coarse) {
             Some(excess) => excess,
-            None => return Solved { status: unsolved(optimum.status), value: None, effort },
+            None => return unsolved(Status::NotConverged, effort),
         }
     };
     let status = match optimum.status {
@@ -80,31 +96,44 @@ pub fn solve(transition: &Transition, t_f: f64, bounded: bool, rtol: f64) -> Sol
         Status::BelowBound => Status::Ok,
         status => status,
     };
-    let value = Best {
-        a_2: place.a_2,
-        a_3: place.a_3,
-        work,
-        work_optimal: optimum_value.work,
-        gap: excess / optimum_value.work,
-        v_min,
-    };
+    let [a_2, a_3] = plane.coefficients(least.place).map(|a| a.high);
+    let gap = excess / optimum_value.work;
+    let value = Best { a_2, a_3, work, work_optimal: optimum_value.work, gap, v_min };
     Solved { status, value: Some(value), effort }
 }
 
-/// The place of least work, and whether it lies on the border. A place on the border counts only if work rises from
-/// there into the admissible set.
-fn least(landscape: &Landscape, least_velocity: f64, start: Place, effort: &mut Effort) -> Option<(Place, bool)> {
-    if let Some(place) = interior::descend(landscape, least_velocity, start, effort) {
-        return Some((place, false));
-    }
-    let place = border::least(landscape, least_velocity, effort)?;
-    let inwards = interior::inwards(landscape, least_velocity, place);
-    let gradient = landscape.moments(place.a_2, place.a_3, effort).gradient;
-    let slope = gradient[0] * inwards[0] + gradient[1] * inwards[1];
-    (slope >= 0.0).then_some((place, true))
+/// The place of least work, and whether the velocity touches its least value there.
+struct Least {
+    place: Place,
+    touches: bool,
 }
 
-/// The status where no best shortcut was found: where friction is too low there need not be one.
-fn unsolved(optimum: Status) -> Status {
-    if optimum == Status::Nonphysical { Status::Nonphysical } else { Status::NotConverged }
+/// Close in on the place of least work, coarsely and then, if it is not inside the set, to the end.
+fn least(rough: &Plane, plane: &Plane, a: f64, effort: &mut Effort) -> Result<Least, Status> {
+    let mut ellipse = Ellipse::around(rough).ok_or(Status::Infeasible)?;
+    let start = match ellipse.close_in(rough, Until::Work(CLOSE * a.min(1.0)), effort) {
+        Outcome::Empty => return Err(Status::Infeasible),
+        Outcome::Close(place) => place,
+        Outcome::Exhausted => return Err(Status::NotConverged),
+    };
+    if let Some(place) = newton::descend(plane, a, start, effort) {
+        return Ok(Least { place, touches: false });
+    }
+    let Outcome::Close(place) = ellipse.close_in(plane, Until::Rounding, effort) else {
+        return Err(Status::NotConverged);
+    };
+    let mut least = Least { place, touches: false };
+    for condition in plane.conditions(place) {
+        if condition.value <= NEAR * ellipse.span(condition.along).0 {
+            match condition.of {
+                // Cheaper and cheaper towards friction that no optimum has.
+                Bound::Lifetime => return Err(Status::Nonphysical),
+                Bound::Velocity => least.touches = true,
+            }
+        }
+    }
+    Ok(least)
 }
+
+/// Sizes of the ellipse within which a condition counts as touched.
+const NEAR: f64 = 16.0;

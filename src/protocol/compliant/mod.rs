@@ -19,6 +19,7 @@ mod path;
 use super::control::Extent;
 use super::profile::{Curve, Hermite, Problem, Resolved, Side, Start, pass, reach};
 use super::{Effort, Slider, Solved, Status};
+use crate::model::Transition;
 use crate::numerics::elementary::{ln, ln_1p};
 
 pub use path::Path;
@@ -61,7 +62,8 @@ pub fn solve(slider: &Slider, (v_i, v_f): (f64, f64), t_f: f64, rtol: f64) -> So
         range.control = Extent { low: v_min, high: v_max };
     }
     let value = Compliant {
-        alpha: -curve.exponent.c,
+        // 0 without a sign.
+        alpha: 0.0 - curve.exponent.c,
         work: range.work,
         v_min,
         v_max,
@@ -128,7 +130,7 @@ fn member(
         return Err(Status::Infeasible);
     }
     // Negative for an acceleration.
-    let t_min = ln_1p((v_i - v_f) / (v_i * (v_f - 1.0)));
+    let t_min = Transition { law, v_i, v_f }.ageing_time();
     if t_f <= t_min {
         return Err(Status::Infeasible);
     }

@@ -1,4 +1,5 @@
-//! The innermost loop of the landscape: `tau v dt` summed over the nodes of one panel, eight at a time.
+//! `tau v dt` summed over the nodes of one panel, eight at a time, with logarithms: for the few shortcuts that
+//! [`works`](super::works) cannot sum without.
 
 use multiversion::multiversion;
 

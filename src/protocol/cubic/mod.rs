@@ -4,43 +4,49 @@
 //! decided from their stationary points before any quadrature is spent, and the quadrature follows from their zeros
 //! (`rules`).
 
+mod bins;
+mod bundle;
+mod cells;
 mod kernel;
 mod moments;
 mod motion;
 mod path;
 mod plan;
+mod queue;
 mod rules;
+mod screen;
+mod works;
 
 use super::{Effort, Motion, Status};
 use crate::model::{Law, Transition};
+use crate::numerics::double_double::DoubleDouble;
 use crate::numerics::elementary::ln;
 use crate::numerics::gauss::rule;
 use crate::numerics::lanes::LANES;
+use bins::Bins;
+use bundle::Friction;
+use cells::Frame;
 use kernel::Slice;
-pub(super) use path::Path;
-use path::{Ends, screen};
-use plan::{BLOCK, plan};
-use rules::{Accuracy, Map, Panel, Zeros, choose};
+pub(super) use moments::{Basis, Moments};
+pub(super) use path::{Ends, Path, rise};
+use queue::Queue;
+use rules::{Accuracy, Panel, Zeros, choose};
+use screen::{
+    Ending, SEARCH, SPAN, SPANS, end_velocities, end_velocities_of_span, inner_velocities, on_side, screen, settle,
+};
+use works::Works;
 
 /// The work landscape of one transition in one time over the plane of `(alpha_2, alpha_3)`.
 #[derive(Debug, Clone)]
 pub struct Landscape {
     law: Law,
+    friction: Friction,
     ends: Ends,
     ln_t_f: f64,
+    frame: Frame,
     accuracy: Accuracy,
-    /// Largest share of an error in theta.
-    rounding: f64,
+    accuracy_of_parts: Accuracy,
 }
-
-/// Nodes that no better map can save much of.
-const CHEAP: usize = 16;
-
-/// Most nodes of a panel that is taken without a search for a better one.
-const MOST_PLANNED: usize = 64;
-
-/// Nodes from which the polynomials are expanded in double-double.
-const NEAR: usize = 72;
 
 /// The results of a run of shortcuts, one element a shortcut, laid out column by column.
 #[derive(Debug)]
@@ -56,29 +62,28 @@ pub struct Shortcuts<'a> {
 impl Landscape {
     /// Prepares the landscape of `transition` in time `t_f`; every work is good to relative accuracy `rtol`.
     pub fn new(transition: &Transition, t_f: f64, rtol: f64) -> Self {
-        let ends = Ends::between(transition.v_i, transition.v_f, t_f, 0.5 * rtol);
+        let tolerance = 0.5 * rtol;
+        let ends = Ends::between(transition.v_i, transition.v_f, t_f, tolerance);
+        let accuracy = Accuracy::new(tolerance, transition.law, t_f * transition.v_i.max(transition.v_f));
         Landscape {
             law: transition.law,
+            friction: Friction::new(transition.law, &ends),
             ends,
             ln_t_f: ln(t_f),
-            accuracy: Accuracy::new(0.5 * rtol),
-            rounding: 0.05 * rtol,
+            frame: Frame::new(&ends, &accuracy),
+            accuracy_of_parts: accuracy.of_parts(tolerance),
+            accuracy,
         }
     }
 
-    /// Whether friction at `u = 1`, `1 + (b - a) ln theta`, is positive; for `b > a` it fails at the smallest theta.
-    pub(super) fn pulls(&self, theta: f64) -> bool {
-        1.0 + (self.law.b - self.law.a) * ln(theta) > 0.0
+    /// One shortcut, given scaled, to 32 digits.
+    pub(super) fn path(&self, a_2: DoubleDouble, a_3: DoubleDouble) -> Path<'_> {
+        Path::exact(&self.ends, a_2, a_3)
     }
 
-    /// One shortcut, given scaled.
-    pub(super) fn path(&self, a_2: f64, a_3: f64) -> Path<'_> {
-        Path::new(&self.ends, a_2, a_3)
-    }
-
-    /// `theta_0`, `theta_1`, their difference `theta_1 - theta_0`, and `t_f`.
-    pub(super) fn ends(&self) -> [f64; 4] {
-        [self.ends.theta_0.high, self.ends.theta_1.high, self.ends.rise.high, self.ends.t_f]
+    /// What all shortcuts share.
+    pub(super) fn ends(&self) -> &Ends {
+        &self.ends
     }
 
     /// The motion of one shortcut, given scaled; `None` where it is infeasible.
@@ -93,100 +98,108 @@ impl Landscape {
     ///
     /// As many as the shortest of `a_2`, `a_3` and `out.status` holds.
     pub fn evaluate(&self, a_2: &[f64], a_3: &[f64], out: Shortcuts<'_>) -> Effort {
-        let mut effort = Effort::default();
-        let mut panels = Vec::with_capacity(8);
-        let count = a_2.len().min(a_3.len()).min(out.status.len());
-        // Feasible shortcuts whose work is still due.
-        let mut due = [0; BLOCK];
-        let mut dues = 0;
-        for first in (0..count).step_by(LANES) {
-            let block = first..(first + LANES).min(count);
-            let (mut a_2_lanes, mut a_3_lanes, mut v_lanes) = ([0.0; LANES], [0.0; LANES], [0.0; LANES]);
-            a_2_lanes[..block.len()].copy_from_slice(&a_2[block.clone()]);
-            a_3_lanes[..block.len()].copy_from_slice(&a_3[block.clone()]);
-            let status = screen(&self.ends, &a_2_lanes, &a_3_lanes, (!out.v_min.is_empty()).then_some(&mut v_lanes));
-            for (lane, i) in block.enumerate() {
-                out.status[i] = status[lane];
-                if status[lane] == Status::Infeasible {
+        let Shortcuts { work, v_min, status } = out;
+        let count = a_2.len().min(a_3.len()).min(status.len());
+        let (velocities, count_of_works) = (count.min(v_min.len()), count.min(work.len()));
+        let (mut open, mut bins) = (Queue::<SEARCH>::EMPTY, Bins::take());
+        bins.cells.begin(&self.frame);
+        let mut works = Works::new(self, &mut work[..count_of_works], &mut bins);
+        for start in (0..count).step_by(SPAN * SPANS) {
+            let stretch = start..(start + SPAN * SPANS).min(count);
+            let settled = match (a_2[stretch.clone()].try_into(), a_3[stretch.clone()].try_into()) {
+                (Ok(a_2), Ok(a_3)) => settle(&self.ends, a_2, a_3),
+                _ => [None; SPANS],
+            };
+            for (first, common) in stretch.clone().step_by(SPAN).zip(settled) {
+                let span = first..(first + SPAN).min(stretch.end);
+                if let (Some(common), Ok(a_2), Ok(a_3)) =
+                    (common, a_2[span.clone()].try_into(), a_3[span.clone()].try_into())
+                {
+                    status[span].fill(common);
+                    if common != Status::Infeasible {
+                        if first < velocities {
+                            let ending = end_velocities_of_span(&self.ends, a_2, a_3, common);
+                            self.end_velocities(first, ending, [a_2, a_3], &mut open, status, &mut v_min[..velocities]);
+                        }
+                        works.push_span(first, a_2, a_3);
+                    }
                     continue;
                 }
-                if let Some(v_min) = out.v_min.get_mut(i) {
-                    *v_min = v_lanes[lane];
-                }
-                if i < out.work.len() {
-                    due[dues] = i;
-                    dues += 1;
-                    if dues == BLOCK {
-                        self.works(&due, a_2, a_3, out.work, &mut panels, &mut effort);
-                        dues = 0;
+                for first in span.clone().step_by(LANES) {
+                    let block = first..(first + LANES).min(span.end);
+                    let (mut a_2_lanes, mut a_3_lanes) = ([0.0; LANES], [0.0; LANES]);
+                    a_2_lanes[..block.len()].copy_from_slice(&a_2[block.clone()]);
+                    a_3_lanes[..block.len()].copy_from_slice(&a_3[block.clone()]);
+                    let found = screen(&self.ends, &a_2_lanes, &a_3_lanes);
+                    status[block.clone()].copy_from_slice(&found[..block.len()]);
+                    if found.iter().all(|&found| found == Status::Infeasible) {
+                        continue;
+                    }
+                    if first < velocities {
+                        let ending = end_velocities(&self.ends, &a_2_lanes, &a_3_lanes, &found);
+                        let places = [&a_2_lanes, &a_3_lanes];
+                        self.end_velocities(first, ending, places, &mut open, status, &mut v_min[..velocities]);
+                    }
+                    for i in block {
+                        if status[i] != Status::Infeasible {
+                            works.push(i, a_2[i], a_3[i]);
+                        }
                     }
                 }
             }
         }
-        self.works(&due[..dues], a_2, a_3, out.work, &mut panels, &mut effort);
+        self.inner_velocities(&mut open, status, &mut v_min[..velocities]);
+        let effort = works.finish();
+        bins.keep();
         effort
     }
 
-    /// The works of up to eight feasible shortcuts.
-    fn works(
+    /// Writes the least velocities of the feasible shortcuts from `first` on where an end has them.
+    #[inline(always)]
+    fn end_velocities<const N: usize>(
         &self,
-        due: &[usize],
-        a_2: &[f64],
-        a_3: &[f64],
-        work: &mut [f64],
-        panels: &mut Vec<Panel>,
-        effort: &mut Effort,
+        first: usize,
+        (found, mut left): Ending<N>,
+        [a_2, a_3]: [&[f64; N]; 2],
+        open: &mut Queue<SEARCH>,
+        status: &[Status],
+        v_min: &mut [f64],
     ) {
-        let Some(&first) = due.first() else { return };
-        let (mut a_2_lanes, mut a_3_lanes) = ([a_2[first]; BLOCK], [a_3[first]; BLOCK]);
-        for (lane, &i) in due.iter().enumerate() {
-            (a_2_lanes[lane], a_3_lanes[lane]) = (a_2[i], a_3[i]);
+        for ((v_min, found), &status) in v_min[first..].iter_mut().zip(found).zip(&status[first..]) {
+            *v_min = if status == Status::Infeasible { *v_min } else { found };
         }
-        let plan = plan(&self.ends, &a_2_lanes, &a_3_lanes, self.accuracy.enough(CHEAP));
-        for (lane, &i) in due.iter().enumerate() {
-            let path = Path::new(&self.ends, a_2[i], a_3[i]);
-            let nodes = self.accuracy.nodes(plan.focal[lane]);
-            let side = plan.side[lane];
-            let power = plan.squarings[lane] > 0.0;
-            let end = if power { side > 0.0 } else { self.ends.rise.high < 0.0 };
-            work[i] = if nodes <= MOST_PLANNED && !self.is_faint(&path, !end) {
-                let (centre, shift) = if end { (1.0, -1.0) } else { (0.0, 0.0) };
-                effort.quadratures += 1;
-                let panel = if power {
-                    let map = Map::Power { side, gap: plan.gap[lane], squarings: plan.squarings[lane] as u32 };
-                    Panel { centre, map, from: plan.from[lane], to: plan.to[lane], nodes }
-                } else {
-                    Panel { centre, map: Map::Line, from: shift, to: 1.0 + shift, nodes }
-                };
-                self.sum(&path, &panel, effort)
-            } else {
-                self.work(&path, panels, effort)
-            };
+        while left != 0 {
+            let lane = left.trailing_zeros() as usize;
+            left &= left - 1;
+            let i = first + lane;
+            let wanted = i < v_min.len() && status[i] != Status::Infeasible;
+            if wanted && open.push(i, a_2[lane], a_3[lane]) {
+                self.inner_velocities(open, status, v_min);
+            }
+        }
+    }
+
+    /// The least velocities of feasible shortcuts, wherever they are.
+    fn inner_velocities(&self, queue: &mut Queue<SEARCH>, status: &[Status], v_min: &mut [f64]) {
+        if let Some((indices, [a_2, a_3])) = queue.take() {
+            for (&i, found) in indices.iter().zip(inner_velocities(&self.ends, a_2, a_3)) {
+                v_min[i] = on_side(found, status[i]);
+            }
         }
     }
 
     /// `W_s = int tau v dt`.
-    fn work(&self, path: &Path, panels: &mut Vec<Panel>, effort: &mut Effort) -> f64 {
-        panels.clear();
+    fn work(&self, path: &Path, effort: &mut Effort) -> f64 {
+        let mut panels = Vec::with_capacity(8);
         let zeros = Zeros::of(path);
-        if self.is_faint(path, false) || self.is_faint(path, true) {
+        if [false, true].iter().any(|&end| path.is_faint(end, self.accuracy.rounding)) {
             // Each half has its own expansions.
-            choose(&zeros, 0.0, 0.5, &self.accuracy, 1, panels);
-            choose(&zeros, 0.5, 1.0, &self.accuracy, 1, panels);
+            choose(&zeros, 0.0, 0.5, &self.accuracy, 1, &mut panels);
+            choose(&zeros, 0.5, 1.0, &self.accuracy, 1, &mut panels);
         } else {
-            choose(&zeros, 0.0, 1.0, &self.accuracy, 0, panels);
+            choose(&zeros, 0.0, 1.0, &self.accuracy, 0, &mut panels);
         }
-        effort.quadratures += 1;
         panels.iter().map(|panel| self.sum(path, panel, effort)).sum()
-    }
-
-    /// Whether theta at the start or at the end is so small that an expansion about the other end loses its digits.
-    #[inline(always)]
-    fn is_faint(&self, path: &Path, end: bool) -> bool {
-        let [c0, c1, c2, c3] = path.theta().c;
-        let size = c0.abs() + c1.abs() + c2.abs() + c3.abs();
-        let theta = if end { self.ends.theta_1.high } else { self.ends.theta_0.high };
-        size * f64::EPSILON > self.rounding * theta
     }
 
     /// The part of one panel in the work.
@@ -195,15 +208,7 @@ impl Landscape {
         let rule = rule(panel.nodes);
         effort.nodes += rule.x.len() as u32;
         // Where a zero is near, the digits of the small theta there count.
-        let (theta, n) = if panel.nodes >= NEAR {
-            path.about(panel.centre)
-        } else if panel.centre == 1.0 {
-            path.about_end()
-        } else if panel.centre == 0.0 {
-            path.about_start()
-        } else {
-            path.about(panel.centre)
-        };
+        let (theta, n) = path.about(panel.centre);
         let slice = Slice {
             constant: 1.0 - self.law.a * self.ln_t_f,
             a: self.law.a,

@@ -1,52 +1,94 @@
-//! Work of one shortcut with its gradient and Hessian in `(a_2, a_3)`, all from the same nodes.
+//! Work of one shortcut with its gradient and Hessian, all from the same nodes.
+//!
+//! With `H(n, theta) = tau n/theta` the work is `int H dx`; theta and `n` are linear in the coefficients. A change
+//! `dtheta` that vanishes at both ends changes `n` by `-d(dtheta)/dx`, so that for a constant `K`
+//!
+//! ```text
+//! int K (dn/theta - n dtheta/theta^2) dx = -K t_f int dtheta/theta^2 dx.
+//! ```
+//!
+//! With `K = tau_r + a`, the friction of steady sliding at `v_i` and `a`, the gradient is therefore
+//!
+//! ```text
+//! int L dn/theta + [(b - L) n - K t_f] dtheta/theta^2 dx,    L = a ln(v/v_i) + b ln(v_i theta):
+//! ```
+//!
+//! nothing is lost where the velocity hardly changes. The Hessian follows from this form.
 
 use super::Landscape;
 use super::path::Path;
 use super::rules::{Map, Panel, Zeros, choose};
-use crate::numerics::elementary::{exp, ln};
+use crate::numerics::elementary::{exp, ln, ln_1p};
 use crate::numerics::gauss::rule;
 use crate::protocol::Effort;
 
-/// `W_s` and its derivatives with respect to `a_2 = alpha_2 t_f` and `a_3 = alpha_3 t_f^2`.
+/// Work and its derivatives with respect to the two coefficients of a basis.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(in crate::protocol) struct Moments {
     pub work: f64,
-    /// `dW/da_2`, `dW/da_3`.
     pub gradient: [f64; 2],
-    /// `d2W/da_2^2`, `d2W/da_2 da_3`, `d2W/da_3^2`.
+    /// `d2W/dy_1^2`, `d2W/dy_1 dy_2`, `d2W/dy_2^2`.
     pub hessian: [f64; 3],
+}
+
+/// Two coefficients that tell a cubic theta between its ends.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(in crate::protocol) enum Basis {
+    /// Those of `x` and `x^2`.
+    Start,
+    /// Those of `1 - x` and `(1 - x)^2`: where theta falls to far less, it has all but a triple zero at the end, and the
+    /// coefficients in `x` are large numbers whose difference counts.
+    End,
+}
+
+impl Basis {
+    /// How theta and `n` change with the two, at `x` and at a distance of `rest` from 1.
+    pub fn changes(self, x: f64, rest: f64) -> ([f64; 2], [f64; 2]) {
+        match self {
+            Basis::Start => ([x * rest * (1.0 + x), x * x * rest], [3.0 * x * x - 1.0, x * (3.0 * x - 2.0)]),
+            Basis::End => {
+                ([rest * x * (1.0 + rest), rest * rest * x], [1.0 - 3.0 * rest * rest, rest * (2.0 - 3.0 * rest)])
+            }
+        }
+    }
 }
 
 impl Landscape {
     /// Work, gradient and Hessian of a feasible shortcut.
-    ///
-    /// With `H(n, theta) = tau n/theta` the work is `int H dx`; theta and `n` are linear in the coefficients.
-    pub(in crate::protocol) fn moments(&self, a_2: f64, a_3: f64, effort: &mut Effort) -> Moments {
-        let path = Path::new(&self.ends, a_2, a_3);
-        let (a, slope) = (self.law.a, self.law.b - self.law.a);
+    pub(in crate::protocol) fn moments(&self, path: &Path, basis: Basis, effort: &mut Effort) -> Moments {
+        let (a, b) = (self.law.a, self.law.b);
+        let slope = b - a;
         let constant = 1.0 - a * self.ln_t_f;
+        let (theta_i, t_f) = (self.ends.theta_0.high, self.ends.t_f);
+        let pull = (1.0 + slope * ln(theta_i) + a) * t_f;
         let mut moments = Moments { work: 0.0, gradient: [0.0; 2], hessian: [0.0; 3] };
         effort.quadratures += 1;
-        for panel in self.panels(&path) {
-            let ([q0, q1, q2, q3], [n0, n1, n2]) = path.about(panel.centre);
+        let mut panels = Vec::with_capacity(4);
+        choose(&Zeros::of(path), 0.0, 1.0, &self.accuracy, 0, &mut panels);
+        for panel in panels {
+            let (q, [n0, n1, n2]) = path.about(panel.centre);
+            // theta - theta_0 and, in units of v_i/t_f, n - v_i t_f theta.
+            let aged = path.change_about(panel.centre);
+            let above = path.above_start_about(panel.centre);
             effort.nodes += panel.nodes as u32;
             panel.each_node(|delta, weight| {
-                let theta = q0 + delta * (q1 + delta * (q2 + delta * q3));
+                let theta = at(&q, delta);
                 // On the border v = 0 rounding may take n below 0.
                 let n = (n0 + delta * (n1 + delta * n2)).max(f64::MIN_POSITIVE);
                 let tau = constant + a * ln(n) + slope * ln(theta);
-                // theta and n change by these for a change of a_2, a_3 (a_4 gives way).
-                let x = panel.centre + delta;
-                let d_theta = [x * (1.0 - x) * (1.0 + x), x * x * (1.0 - x)];
-                let d_n = [3.0 * x * x - 1.0, x * (3.0 * x - 2.0)];
-                let h_n = (tau + a) / theta;
-                let h_theta = (slope - tau) * n / (theta * theta);
-                let h_nn = a / (n * theta);
-                let h_mixed = (slope - tau - a) / (theta * theta);
-                let h_theta_theta = n * (2.0 * tau - 3.0 * slope) / (theta * theta * theta);
-                moments.work += weight * tau * n / theta;
+                let speed = ln_of(at(&above, delta) / (t_f * theta), n / (t_f * theta) * theta_i);
+                let age = ln_of(at(&aged, delta) / theta_i, theta / theta_i);
+                let l = a * speed + b * age;
+                let (x, rest) = (panel.centre + delta, (1.0 - panel.centre) - delta);
+                let (d_theta, d_n) = basis.changes(x, rest);
+                let inverse = 1.0 / theta;
+                let by_theta = ((b - l) * n - pull) * inverse * inverse;
+                let h_nn = a * inverse / n;
+                let h_mixed = (slope - l) * inverse * inverse;
+                let h_theta_theta = -(slope * n * inverse * inverse + 2.0 * by_theta) * inverse;
+                moments.work += weight * tau * n * inverse;
                 for (sum, (dn, dq)) in moments.gradient.iter_mut().zip(d_n.iter().zip(d_theta)) {
-                    *sum += weight * (h_n * dn + h_theta * dq);
+                    *sum += weight * (l * inverse * dn + by_theta * dq);
                 }
                 for (sum, (i, j)) in moments.hessian.iter_mut().zip([(0, 0), (0, 1), (1, 1)]) {
                     *sum += weight
@@ -58,14 +100,17 @@ impl Landscape {
         }
         moments
     }
-
-    fn panels(&self, path: &Path) -> Vec<Panel> {
-        let mut panels = Vec::with_capacity(4);
-        choose(&Zeros::of(path), 0.0, 1.0, &self.accuracy, 0, &mut panels);
-        panels
-    }
 }
 
+/// A cubic at a distance from where it is expanded.
+fn at([c0, c1, c2, c3]: &[f64; 4], delta: f64) -> f64 {
+    c0 + delta * (c1 + delta * (c2 + delta * c3))
+}
+
+/// `ln(1 + change)`, where `1 + change` is `ratio`.
+fn ln_of(change: f64, ratio: f64) -> f64 {
+    if change.abs() < 0.5 { ln_1p(change) } else { ln(ratio) }
+}
 impl Panel {
     /// Visits the distance from the centre and the weight of every node.
     fn each_node(&self, mut visit: impl FnMut(f64, f64)) {

@@ -3,15 +3,13 @@
 //! In `x = t/t_f`: `theta = theta_0 + A_2 x + A_3 x^2 + A_4 x^3` and `n = t_f (1 - theta') = t_f - dtheta/dx`, so `v =
 //! n/(t_f theta)`.
 
-use multiversion::multiversion;
-
-use crate::numerics::cubic::{Cubic, ExactCubic};
+use super::rules::{APART, Accuracy};
+use crate::numerics::cubic::{Cubic, ExactCubic, exact_quadratic_zeros};
 use crate::numerics::double_double::DoubleDouble;
-use crate::numerics::lanes::{LANES, Lanes};
 use crate::protocol::Status;
 
 /// The ends that all shortcuts of a landscape share.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub(in crate::protocol) struct Ends {
     pub theta_0: DoubleDouble,
     pub theta_1: DoubleDouble,
@@ -19,7 +17,7 @@ pub(in crate::protocol) struct Ends {
     pub rise: DoubleDouble,
     pub t_f: f64,
     /// Largest share of a velocity that rounding may cost.
-    v_loss: f64,
+    pub v_loss: f64,
 }
 
 impl Ends {
@@ -27,8 +25,13 @@ impl Ends {
     pub fn between(v_i: f64, v_f: f64, t_f: f64, v_loss: f64) -> Ends {
         let one = DoubleDouble::new(1.0);
         let (theta_0, theta_1) = (one / DoubleDouble::new(v_i), one / DoubleDouble::new(v_f));
-        Ends { theta_0, theta_1, rise: theta_1 - theta_0, t_f, v_loss }
+        Ends { theta_0, theta_1, rise: rise(v_i, v_f), t_f, v_loss }
     }
+}
+
+/// `1/v_f - 1/v_i`: of two that are almost the same the difference of the inverses would have few digits left.
+pub(in crate::protocol) fn rise(v_i: f64, v_f: f64) -> DoubleDouble {
+    DoubleDouble::sum(v_i, -v_f) / DoubleDouble::product(v_i, v_f)
 }
 
 /// One shortcut.
@@ -37,6 +40,8 @@ pub(in crate::protocol) struct Path<'a> {
     pub ends: &'a Ends,
     a_2: f64,
     a_3: f64,
+    /// What the coefficients are beyond their doubles.
+    low: [f64; 2],
     /// `theta` in powers of `x`.
     theta: Cubic,
     /// `n` in powers of `x`.
@@ -52,9 +57,28 @@ impl<'a> Path<'a> {
             ends,
             a_2,
             a_3,
+            low: [0.0; 2],
             theta: Cubic { c: [ends.theta_0.high, a_2, a_3, a_4] },
             n: Cubic { c: [ends.t_f - a_2, -2.0 * a_3, -3.0 * a_4, 0.0] },
         }
+    }
+
+    /// The shortcut with coefficients of 32 digits, which its expansions `about` a place and what is called exact know.
+    pub fn exact(ends: &'a Ends, a_2: DoubleDouble, a_3: DoubleDouble) -> Path<'a> {
+        let mut path = Path { low: [a_2.low, a_3.low], ..Path::new(ends, a_2.high, a_3.high) };
+        (path.theta.c, path.n.c) = (path.exact_theta().c.map(|c| c.high), path.exact_n().c.map(|c| c.high));
+        path
+    }
+
+    /// What rounding may cost `A_4`, a small difference where `A_2 + A_3` is close to the rise.
+    #[inline(always)]
+    pub fn slack(&self) -> f64 {
+        f64::EPSILON * (self.ends.rise.high.abs() + self.a_2.abs() + self.a_3.abs())
+    }
+
+    /// `n` in powers of `x`.
+    pub fn n(&self) -> &Cubic {
+        &self.n
     }
 
     /// `theta` in powers of `x`.
@@ -63,24 +87,30 @@ impl<'a> Path<'a> {
     }
 
     /// `theta(x)` to 32 digits.
-    fn exact_theta(&self) -> ExactCubic {
-        let (a_2, a_3) = (DoubleDouble::new(self.a_2), DoubleDouble::new(self.a_3));
+    pub fn exact_theta(&self) -> ExactCubic {
+        let (a_2, a_3) = (DoubleDouble::sum(self.a_2, self.low[0]), DoubleDouble::sum(self.a_3, self.low[1]));
         ExactCubic { c: [self.ends.theta_0, a_2, a_3, self.ends.rise - a_2 - a_3] }
     }
 
     /// `n(x)` to 32 digits.
-    fn exact_n(&self) -> ExactCubic {
+    pub fn exact_n(&self) -> ExactCubic {
         let [_, a_2, a_3, a_4] = self.exact_theta().c;
         let (two, three) = (DoubleDouble::new(-2.0), DoubleDouble::new(-3.0));
         ExactCubic { c: [DoubleDouble::new(self.ends.t_f) - a_2, two * a_3, three * a_4, DoubleDouble::new(0.0)] }
     }
 
-    /// `n - t_f theta`, at least 0 where `v >= 1`, to 32 digits.
-    fn exact_surplus(&self) -> ExactCubic {
-        let t_f = DoubleDouble::new(self.ends.t_f);
+    /// The zeros of `n`, as [`ExactCubic::zeros`].
+    pub(super) fn zeros_of_n(&self) -> [(DoubleDouble, f64); 2] {
+        let [n0, n1, n2, _] = self.exact_n().c;
+        exact_quadratic_zeros([n0, n1, n2])
+    }
+
+    /// `n - v t_f theta`, at least 0 where the velocity is at least `v`, to 32 digits.
+    pub fn exact_surplus(&self, v: f64) -> ExactCubic {
+        let scale = DoubleDouble::product(v, self.ends.t_f);
         let mut surplus = self.exact_n();
         for (s, theta) in surplus.c.iter_mut().zip(self.exact_theta().c) {
-            *s = *s - t_f * theta;
+            *s = *s - scale * theta;
         }
         surplus
     }
@@ -97,15 +127,29 @@ impl<'a> Path<'a> {
 
     /// `Infeasible` where theta or v falls to 0 or below, `BelowBound` where only `v >= 1` fails, else `Ok`; decided in
     /// double-double.
-    fn exact_status(&self) -> Status {
-        let surplus = self.surplus(self.ends.t_f);
-        if !self.exact_n().is_positive(&self.n, true) || !self.exact_theta().is_positive(&self.theta, true) {
+    pub fn exact_status(&self) -> Status {
+        if !self.exact_n().is_positive(true) || !self.exact_theta().is_positive(true) {
             Status::Infeasible
-        } else if self.exact_surplus().is_positive(&surplus, false) {
+        } else if self.exact_surplus(1.0).is_positive(false) {
             Status::Ok
         } else {
             Status::BelowBound
         }
+    }
+
+    /// The complex pair of zeros of theta next to its least value, where that is so small that the closed form of the
+    /// zeros has no digit of their distance from the real axis: its place, its height, and how far from there the closed
+    /// form may put the two, but not the third one.
+    pub fn close_pair(&self) -> Option<(f64, f64, f64)> {
+        let [c0, c1, c2, c3] = self.theta.c;
+        let x = self.theta.minimum();
+        let half_bend = c2 + 3.0 * c3 * x;
+        let third = -c2 / c3 - 2.0 * x;
+        let alone = (third - x).abs() > APART || third.is_nan();
+        let reach = APART.min(0.5 * (third - x).abs());
+        let least = self.exact_theta().at(x).high;
+        let close = least < 1e-6 * (c0.abs() + c1.abs() + c2.abs() + c3.abs());
+        (x > 0.0 && alone && close && half_bend > 0.0 && least > 0.0).then(|| (x, (least / half_bend).sqrt(), reach))
     }
 
     /// The coefficients of theta and of n in powers of `x - 1`.
@@ -125,10 +169,63 @@ impl<'a> Path<'a> {
         (self.theta.c, [n0, n1, n2])
     }
 
+    /// Whether theta at the start or at the end is so small that an expansion about the other end costs it more than the
+    /// share `loss` of its digits.
+    #[inline(always)]
+    pub fn is_faint(&self, end: bool, loss: f64) -> bool {
+        let [c0, c1, c2, c3] = self.theta.c;
+        let size = c0.abs() + c1.abs() + c2.abs() + c3.abs();
+        let theta = if end { self.ends.theta_1.high } else { self.ends.theta_0.high };
+        size * f64::EPSILON > loss * theta
+    }
+
+    /// Whether the expansion about the end or the start keeps enough digits of theta and of n at both ends of a panel,
+    /// `near` and `far` from its centre.
+    #[inline(always)]
+    pub(super) fn is_sound(&self, about_end: bool, near: f64, far: f64, accuracy: &Accuracy) -> bool {
+        let (start, end) = (self.about_start(), self.about_end());
+        let mut sound = accuracy.slight > 0.0;
+        let [q0, q1, q2, q3]: [f64; 4] = std::array::from_fn(|i| if about_end { end.0[i] } else { start.0[i] });
+        let [n0, n1, n2]: [f64; 3] = std::array::from_fn(|i| if about_end { end.1[i] } else { start.1[i] });
+        let theta_size = f64::EPSILON * (q0.abs() + q1.abs() + q2.abs() + q3.abs());
+        let size = n0.abs() + n1.abs() + n2.abs();
+        let n_size = f64::EPSILON * size + 3.0 * self.slack();
+        sound &= accuracy.rounding * size >= 3.0 * self.slack();
+        for x in [near, far] {
+            let theta = q0 + x * (q1 + x * (q2 + x * q3));
+            let n = n0 + x * (n1 + x * n2);
+            // The centre itself is exact.
+            let fine = (accuracy.rounding * theta >= theta_size) & (accuracy.slight * n >= n_size);
+            // The logarithm of n at an end counts over the whole panel, and the sums multiply theta and n of two nodes.
+            let size = theta * n;
+            sound &= n >= STEEPEST * (n0.abs() + n1.abs() + n2.abs());
+            sound &= (fine | (x == 0.0)) & (size > 1e-120) & (size < 1e120);
+        }
+        sound
+    }
+
     /// The coefficients of theta and of n in powers of `x - centre`, each right to the last bit.
     pub fn about(&self, centre: f64) -> ([f64; 4], [f64; 3]) {
         let [n0, n1, n2, _] = self.exact_n().about(centre);
         (self.exact_theta().about(centre), [n0, n1, n2])
+    }
+
+    /// The coefficients of `theta - theta_0` in powers of `x - centre`, each right to the last bit.
+    pub fn change_about(&self, centre: f64) -> [f64; 4] {
+        let mut change = self.exact_theta();
+        change.c[0] = DoubleDouble::new(0.0);
+        change.about(centre)
+    }
+
+    /// The coefficients of `n theta_0 - t_f theta` in powers of `x - centre`, each right to the last bit: `t_f theta (v/v_i
+    /// - 1)`.
+    pub fn above_start_about(&self, centre: f64) -> [f64; 4] {
+        let (mut above, theta) = (self.exact_n(), self.exact_theta());
+        let t_f = DoubleDouble::new(self.ends.t_f);
+        for (c, theta) in above.c.iter_mut().zip(theta.c) {
+            *c = *c * self.ends.theta_0 - t_f * theta;
+        }
+        above.about(centre)
     }
 
     /// `theta` and `n` at `x`, each right to the last bit.
@@ -136,32 +233,47 @@ impl<'a> Path<'a> {
         (self.exact_theta().at(x).high, self.exact_n().at(x).high)
     }
 
-    /// Status decided in double-double, and least velocity.
-    pub fn judge(&self) -> (Status, f64) {
-        let (_, place, _) = least_velocities(self.ends, &[self.a_2; LANES], &[self.a_3; LANES]);
-        (self.exact_status(), self.exact_velocity(place[0]))
+    /// Whether `n <= most theta` at `x`; decided in double-double where rounding leaves doubt.
+    pub fn is_within(&self, x: f64, most: f64) -> bool {
+        let rest = self.surplus(most);
+        let (value, doubt) = (rest.at(x), rest.doubt() + (3.0 + most) * self.slack());
+        if value.abs() > doubt {
+            return value < 0.0;
+        }
+        let (theta, n) = self.at(x);
+        n <= most * theta
+    }
+
+    /// The least velocity of coefficients of 32 digits.
+    pub fn least_velocity(&self) -> f64 {
+        let t_f = DoubleDouble::new(self.ends.t_f);
+        let at = |x: f64| (self.exact_n().at(x) / (t_f * self.exact_theta().at(x))).high;
+        let place = if at(1.0) < at(0.0) { 1.0 } else { 0.0 };
+        self.exact_velocity(place)
     }
 
     /// Velocity at both ends: the lesser, and where it is found.
     #[inline(always)]
-    fn v_ends(&self) -> (f64, f64) {
+    pub fn v_ends(&self) -> (f64, f64) {
         let (theta_end, n_end) = self.about_end();
-        let (start, end) = (self.n.c[0] / self.theta.c[0], n_end[0] / theta_end[0]);
-        let first = start < end;
-        ((if first { start } else { end }) / self.ends.t_f, if first { 0.0 } else { 1.0 })
+        let (n_start, theta_start) = (self.n.c[0], self.theta.c[0]);
+        // Ratios are compared without a division.
+        let first = n_start * theta_end[0] < n_end[0] * theta_start;
+        let (n, theta) = if first { (n_start, theta_start) } else { (n_end[0], theta_end[0]) };
+        (n / (self.ends.t_f * theta), if first { 0.0 } else { 1.0 })
     }
 
     /// The least velocity, found near `x`, from 32 digits: for where `n` or theta is so small that rounding shows.
     ///
     /// In double the velocity is flat within rounding, so the place is known to half the digits only. Dinkelbach's
     /// step takes it from the stationary point of a cubic instead, which is good to all of them.
-    fn exact_velocity(&self, x: f64) -> f64 {
+    pub fn exact_velocity(&self, x: f64) -> f64 {
         let t_f = DoubleDouble::new(self.ends.t_f);
         let at = |x: f64| (self.exact_n().at(x) / (t_f * self.exact_theta().at(x))).high;
         let mut v = at(x);
         for _ in 0..MOST_STEPS {
-            let lower = at(self.surplus(v * self.ends.t_f).minimum());
-            if lower.is_nan() || lower >= v {
+            let lower = at(self.exact_surplus(v).minimum());
+            if lower.is_nan() || lower >= v || lower <= 0.0 {
                 break;
             }
             v = lower;
@@ -170,113 +282,9 @@ impl<'a> Path<'a> {
     }
 }
 
-/// Whether rounding may cost the value of a cubic at `x` a share `loss` of it (or it is not a number).
-#[inline(always)]
-fn is_faint(cubic: &Cubic, x: f64, loss: f64) -> bool {
-    let [c0, c1, c2, c3] = cubic.c;
-    let sound = loss * cubic.at(x) > 4.0 * f64::EPSILON * (c0.abs() + c1.abs() + c2.abs() + c3.abs());
-    !sound
-}
-
-/// Sign of the least value of a polynomial: -1, +1, or 0 where rounding leaves doubt.
-#[inline(always)]
-fn sign(cubic: &Cubic) -> f64 {
-    let (least, doubt) = cubic.least();
-    if least > doubt {
-        1.0
-    } else if least < -doubt {
-        -1.0
-    } else {
-        0.0
-    }
-}
-
-/// Status and, where asked for, least velocity on `[0, t_f]` of eight shortcuts.
-///
-/// Feasibility follows from the stationary minima of theta, of `n` and of `n - t_f theta`; the few that rounding leaves
-/// in doubt are decided in double-double.
-pub(super) fn screen(ends: &Ends, a_2: &Lanes, a_3: &Lanes, v_min: Option<&mut Lanes>) -> [Status; LANES] {
-    let signs = signs(ends, a_2, a_3);
-    let mut status = [Status::Infeasible; LANES];
-    for i in 0..LANES {
-        let [n, theta, surplus] = [signs[0][i], signs[1][i], signs[2][i]];
-        let tame = a_2[i].abs() + a_3[i].abs() < WILD;
-        status[i] = if n < 0.0 || theta < 0.0 || !tame {
-            Status::Infeasible
-        } else if n * theta * surplus == 0.0 {
-            Path::new(ends, a_2[i], a_3[i]).exact_status()
-        } else if surplus > 0.0 {
-            Status::Ok
-        } else {
-            Status::BelowBound
-        };
-    }
-    if let Some(v_min) = v_min
-        && status.iter().any(|&s| s != Status::Infeasible)
-    {
-        let (rounded, place, faint) = least_velocities(ends, a_2, a_3);
-        *v_min = rounded;
-        for i in (0..LANES).filter(|&i| faint[i] > 0.0 && status[i] != Status::Infeasible) {
-            v_min[i] = Path::new(ends, a_2[i], a_3[i]).exact_velocity(place[i]);
-        }
-    }
-    status
-}
-
-#[multiversion(targets(
-    "x86_64+avx+avx2+bmi1+bmi2+avx512f+avx512bw+avx512cd+avx512dq+avx512vl",
-    "x86_64+avx+avx2+bmi1+bmi2"
-))]
-fn signs(ends: &Ends, a_2: &Lanes, a_3: &Lanes) -> [Lanes; 3] {
-    let mut signs = [[0.0; LANES]; 3];
-    for i in 0..LANES {
-        let path = Path::new(ends, a_2[i], a_3[i]);
-        signs[0][i] = sign(&path.n);
-        signs[1][i] = sign(&path.theta);
-        signs[2][i] = sign(&path.surplus(ends.t_f));
-    }
-    signs
-}
-
-/// `v = n/(t_f theta) >= m` where the cubic `n - m t_f theta` is not negative. The minimum of that cubic gives the
-/// next, lower `m`: Dinkelbach's method (Management Science 13, 492, 1967), which falls to the least ratio and doubles
-/// its digits with each step. Returns the least velocities, their places, and 1 where rounding shows; infeasible lanes
-/// hold no meaning.
-#[multiversion(targets(
-    "x86_64+avx+avx2+bmi1+bmi2+avx512f+avx512bw+avx512cd+avx512dq+avx512vl",
-    "x86_64+avx+avx2+bmi1+bmi2"
-))]
-fn least_velocities(ends: &Ends, a_2: &Lanes, a_3: &Lanes) -> (Lanes, Lanes, Lanes) {
-    let (mut v_min, mut place) = ([0.0; LANES], [0.0; LANES]);
-    for i in 0..LANES {
-        (v_min[i], place[i]) = Path::new(ends, a_2[i], a_3[i]).v_ends();
-    }
-    for _ in 0..MOST_STEPS {
-        let before = v_min;
-        for i in 0..LANES {
-            let path = Path::new(ends, a_2[i], a_3[i]);
-            let x = path.surplus(v_min[i] * ends.t_f).minimum();
-            let v = path.n.at(x) / (ends.t_f * path.theta.at(x));
-            let lower = v < v_min[i] && v > 0.0;
-            v_min[i] = if lower { v } else { v_min[i] };
-            place[i] = if lower { x } else { place[i] };
-        }
-        if v_min == before {
-            break;
-        }
-    }
-    let mut faint = [0.0; LANES];
-    for i in 0..LANES {
-        let path = Path::new(ends, a_2[i], a_3[i]);
-        let lost = is_faint(&path.n, place[i], ends.v_loss) | is_faint(&path.theta, place[i], ends.v_loss);
-        faint[i] = if lost { 1.0 } else { 0.0 };
-    }
-    (v_min, place, faint)
-}
-
-/// Coordinates of this size are not feasible for any time that is meant: the quadratic `n >= 0` has the mean `t_f -
-/// rise`, so its ends are at most nine times that. Their squares do not overflow below it.
-const WILD: f64 = 1e100;
+/// Least share of n in its coefficients at an end of a panel that is summed without logarithms: below it `n'/n` is so
+/// steep there that its rounding shows.
+const STEEPEST: f64 = 1e-4;
 
 /// More steps than the doubling of digits can use.
-const MOST_STEPS: u32 = 60;
+pub(super) const MOST_STEPS: u32 = 60;

@@ -1,120 +1,367 @@
-//! One panel for each of eight shortcuts at a time: the zeros and the power map that suits most of a landscape, without
-//! a branch.
+//! One panel for each of many shortcuts at a time: the zeros and the power map that suits most of a landscape, without a
+//! branch that a lane takes for another one.
 //!
 //! The same estimate as in [`rules`](super::rules), restricted to what is cheap: the straight rule, and the maps `x = r
 //! ± s^2`, `s^4`, `s^8` about the shadow of the most hindering zero on the real axis beyond the nearer end. Where that
-//! asks for many nodes, `rules` looks further.
+//! asks for many nodes, the interval is cut in two, and where that does not help either, `rules` looks further.
 
 use multiversion::multiversion;
 
+use super::bins::BINS;
 use super::path::{Ends, Path};
-use super::rules::{FAR, ZEROS, complex_sqrt, zeros};
+use super::rules::{APART, Accuracy, FAR, THETA_ZEROS, ZEROS, is_near_start, polished, rough_zeros};
+use crate::numerics::real::Real;
 
-/// The panels over `[0, 1]` of eight shortcuts.
+/// One panel for each shortcut.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Plan {
-    /// Focal sum that the map reaches.
-    pub focal: Block,
-    /// log2 of the power, 0 for the straight rule.
+    /// The bin of the number of nodes that the map asks for; none from [`BINS`] on.
+    pub bin: [u32; BLOCK],
+    /// log2 of the power.
     pub squarings: Block,
-    /// Which end the power map grows from: +1 the upper, -1 the lower.
+    /// Which end of the panel the map grows from: +1 the upper, -1 the lower.
     pub side: Block,
-    /// Distance of the centre of the map from that end.
+    /// Distance of the centre of the map beyond that end.
     pub gap: Block,
-    /// Bounds of the mapped variable; without meaning for the straight rule.
-    pub from: Block,
-    pub to: Block,
+    /// 1 where a larger power might save nodes.
+    pub deeper: Block,
+    /// Where a panel that asks for too many nodes is best cut.
+    pub cut: Block,
+}
+
+impl Plan {
+    /// Not yet made.
+    pub const EMPTY: Plan = {
+        let none = [0.0; BLOCK];
+        Plan { bin: [0; BLOCK], squarings: none, side: none, gap: none, deeper: none, cut: none }
+    };
 }
 
 /// Shortcuts that are planned together: enough to hide the latency of square roots, few enough to be filled.
 pub(super) const BLOCK: usize = 32;
 
+/// Single precision numbers of the widest vectors.
+const WIDTH: usize = 16;
+
 /// One value a shortcut.
 pub(super) type Block = [f64; BLOCK];
 
-/// Largest map tried.
-const MOST_SQUARINGS: u32 = 3;
+/// log2 of the largest power tried.
+pub(super) const MOST_SQUARINGS: u32 = 3;
 
-/// Chooses the panels of the shortcuts `(a_2[i], a_3[i])`, all feasible. No better map is sought from the focal sum
-/// `plain` on.
+/// Nodes that a larger power cannot save much of.
+pub(super) const CHEAP: usize = 32;
+
+/// Half the distance of a pair of zeros of n from each other that is known to some digits.
+const CLOSEST: f64 = 1e-6;
+
+/// A distance of a real zero from the end that has lost digits which the map needs.
+pub(super) const BLURRED: f64 = 1e-10;
+
+/// Zeros that may be complex, each followed by its conjugate or by another real one; all others are real.
+pub(super) const PAIRS: [usize; 2] = [1, 3];
+
+/// What a doubtful zero of n counts, more than all of theta.
+const OF_N: f32 = 8.0;
+
+/// Whether zeros are computed to few digits; what these do not tell is left to the next plan.
+const fn is_coarse<T: Real>() -> bool {
+    size_of::<T>() < size_of::<f64>()
+}
+
+/// In single precision: sizes of the coefficients of theta, relative to theta at the end, and of n, whose powers stay in
+/// range and keep some digits of all zeros.
+const TAME_THETA: (f64, f64) = (1e-4, 3e3);
+const TAME_N: (f64, f64) = (1e-10, 1e10);
+
+/// The square of the distance of two zeros of theta, relative to their distance from the end, at which single precision
+/// has lost half of its digits of it.
+const APART_SQUARE: f64 = 1e-3;
+
+/// What errors of the zeros in single precision cost the focal sum beyond 2.
+pub(super) const COARSE: f64 = 0.03;
+
+/// Chooses the panels over `[0, 1]` of the shortcuts `(a_2[i], a_3[i])`, all feasible, without powers beyond the square
+/// and in single precision: `deeper` where that is not enough.
 #[multiversion(targets(
     "x86_64+avx+avx2+bmi1+bmi2+avx512f+avx512bw+avx512cd+avx512dq+avx512vl",
     "x86_64+avx+avx2+bmi1+bmi2"
 ))]
-pub(super) fn plan(ends: &Ends, a_2: &Block, a_3: &Block, plain: f64) -> Plan {
-    let (mut re, mut im) = ([[0.0; BLOCK]; ZEROS], [[0.0; BLOCK]; ZEROS]);
+pub(super) fn plan(ends: &Ends, a_2: &Block, a_3: &Block, accuracy: &Accuracy, plan: &mut Plan) {
+    panels::<f32, 1>(ends, a_2, a_3, &[0.0; BLOCK], &[1.0; BLOCK], accuracy, plan);
+}
+
+/// Chooses the panels over `[0, 1]` with all powers.
+#[multiversion(targets(
+    "x86_64+avx+avx2+bmi1+bmi2+avx512f+avx512bw+avx512cd+avx512dq+avx512vl",
+    "x86_64+avx+avx2+bmi1+bmi2"
+))]
+pub(super) fn plan_deeper(ends: &Ends, a_2: &Block, a_3: &Block, accuracy: &Accuracy, plan: &mut Plan) {
+    panels::<f64, MOST_SQUARINGS>(ends, a_2, a_3, &[0.0; BLOCK], &[1.0; BLOCK], accuracy, plan);
+}
+
+/// Chooses panels over `[low[i], high[i]]`, of which one is an end of `[0, 1]`.
+#[multiversion(targets(
+    "x86_64+avx+avx2+bmi1+bmi2+avx512f+avx512bw+avx512cd+avx512dq+avx512vl",
+    "x86_64+avx+avx2+bmi1+bmi2"
+))]
+pub(super) fn plan_parts(ends: &Ends, [a_2, a_3, low, high]: [&Block; 4], accuracy: &Accuracy, plan: &mut Plan) {
+    panels::<f64, MOST_SQUARINGS>(ends, a_2, a_3, low, high, accuracy, plan);
+}
+
+/// The zeros of theta and of n of each shortcut, in the closed upper half plane, a pair once.
+pub(super) struct Places<T> {
+    pub re: [[T; BLOCK]; ZEROS],
+    pub im: [[T; BLOCK]; ZEROS],
+    /// Above 0 where the zeros are not known well enough for a plan.
+    pub doubt: [f32; BLOCK],
+}
+
+/// The zeros of the shortcuts `(a_2[i], a_3[i])`.
+#[inline(always)]
+pub(super) fn places<T: Real>(ends: &Ends, a_2: &Block, a_3: &Block) -> Places<T> {
+    let zero = T::of(0.0);
+    let [mut q0, mut q1, mut q2, mut q3, mut n0, mut n1, mut n2] = [[zero; BLOCK]; 7];
     for i in 0..BLOCK {
-        let zeros = zeros(&Path::new(ends, a_2[i], a_3[i]));
+        let (theta, n) = Path::new(ends, a_2[i], a_3[i]).about_end();
+        (q0[i], q1[i], q2[i], q3[i]) = (T::of(theta[0]), T::of(theta[1]), T::of(theta[2]), T::of(theta[3]));
+        (n0[i], n1[i], n2[i]) = (T::of(n[0]), T::of(n[1]), T::of(n[2]));
+    }
+    let (mut re, mut im) = ([[zero; BLOCK]; ZEROS], [[zero; BLOCK]; ZEROS]);
+    let mut doubt = [0.0f32; BLOCK];
+    for i in 0..BLOCK {
+        let theta = [q0[i], q1[i], q2[i], q3[i]];
+        let n = [n0[i], n1[i], n2[i]];
+        let zeros = rough_zeros(theta, n);
         for k in 0..ZEROS {
             (re[k][i], im[k][i]) = (zeros.re[k], zeros.im[k]);
         }
+        if is_coarse::<T>() {
+            let (between, from_end) = (zeros.re[1] - zeros.re[2], zeros.re[1] - T::of(1.0));
+            let square = between * between + T::of(4.0) * zeros.im[1] * zeros.im[1];
+            let size = from_end * from_end + zeros.im[1] * zeros.im[1];
+            let apart = square >= T::of(APART_SQUARE) * size;
+            doubt[i] = if is_tame(theta, n) & apart { 0.0 } else { 1.0 };
+        }
     }
-    // The most hindering zero names the end and the centre.
-    let mut shadow = [0.0; BLOCK];
-    let mut least = [FAR * FAR; BLOCK];
+    let mut close = [0.0f32; BLOCK];
     for k in 0..ZEROS {
         for i in 0..BLOCK {
-            let square = ellipse(re[k][i], im[k][i], 0.0, 1.0);
+            close[i] += if is_near_start(re[k][i], im[k][i]) { 1.0 } else { 0.0 };
+        }
+    }
+    for i in (0..BLOCK).filter(|&i| close[i] > 0.0) {
+        for k in 0..ZEROS {
+            if is_near_start(re[k][i], im[k][i]) {
+                let (theta, [n0, n1, n2]) = Path::new(ends, a_2[i], a_3[i]).about_start();
+                let c = if k < THETA_ZEROS { theta } else { [n0, n1, n2, 0.0] };
+                match polished(&c.map(T::of), re[k][i], im[k][i]) {
+                    Some(zero) => (re[k][i], im[k][i]) = zero,
+                    None => doubt[i] += if is_coarse::<T>() { 1.0 } else { 0.0 },
+                }
+            }
+        }
+    }
+    // The closed forms do not tell how far a pair this close to the real axis is from it. That of theta is looked at again.
+    for k in 0..ZEROS {
+        let least = T::of(if k < THETA_ZEROS || is_coarse::<T>() { APART } else { CLOSEST });
+        let weight = if k < THETA_ZEROS { 1.0 } else { OF_N };
+        for i in 0..BLOCK {
+            let close = (re[k][i] > zero) & (re[k][i] < T::of(1.0)) & (im[k][i] < least);
+            doubt[i] += if close { weight } else { 0.0 };
+        }
+    }
+    for i in 0..BLOCK {
+        let of_theta = !is_coarse::<T>() && doubt[i] > 0.0 && doubt[i] < OF_N;
+        let pair = of_theta.then(|| Path::new(ends, a_2[i], a_3[i]).close_pair()).flatten();
+        if let Some((x, height, reach)) = pair {
+            for k in 0..THETA_ZEROS {
+                if (re[k][i].wide() - x).abs() < reach && im[k][i].wide() < reach {
+                    (re[k][i], im[k][i]) = (T::of(x), T::of(height));
+                }
+            }
+            doubt[i] = 0.0;
+        }
+    }
+    // A pair is counted once.
+    for k in PAIRS {
+        for i in 0..BLOCK {
+            let (place, height) = (re[k + 1][i], im[k + 1][i]);
+            (re[k + 1][i], im[k + 1][i]) = (if height > zero { T::of(FAR) } else { place }, zero);
+        }
+    }
+    Places { re, im, doubt }
+}
+
+/// Of the zeros of each shortcut the one that hinders a straight rule over `[low[i], high[i]]` most: the square of the
+/// sum of its distances from both ends, and its shadow on the real axis.
+#[inline(always)]
+pub(super) fn nearest<T: Real>(
+    re: &[[T; BLOCK]; ZEROS],
+    im: &[[T; BLOCK]; ZEROS],
+    low: &Block,
+    high: &Block,
+) -> ([f32; BLOCK], [T; BLOCK]) {
+    // The most hindering zero names the end and the centre. Single precision does for what is only compared: places of
+    // zeros keep all their digits.
+    let mut shadow = [T::of(0.0); BLOCK];
+    let mut least = [f32::MAX; BLOCK];
+    for k in 0..ZEROS {
+        for i in 0..BLOCK {
+            let (u, v) = ((re[k][i] - T::of(low[i])).narrow(), (re[k][i] - T::of(high[i])).narrow());
+            let y = im[k][i].narrow();
+            let (u_square, v_square) = (u * u + y * y, v * v + y * y);
+            // A real zero needs no root.
+            let product = if PAIRS.contains(&k) { (u_square * v_square).sqrt() } else { (u * v).abs() };
+            let square = u_square + v_square + 2.0 * product;
             let nearer = square < least[i];
             least[i] = if nearer { square } else { least[i] };
             shadow[i] = if nearer { re[k][i] } else { shadow[i] };
         }
     }
-    let (mut focal, mut side, mut gap) = ([0.0; BLOCK], [0.0; BLOCK], [0.0; BLOCK]);
-    let (mut near, mut far) = ([0.0; BLOCK], [0.0; BLOCK]);
+    (least, shadow)
+}
+
+/// The root of a place given by its size and its real part, `x + iy` with positive `x`: `x`, and the square of the sum
+/// of its distances from `a` and `b`.
+#[inline(always)]
+pub(super) fn rooted(size: f32, real: f32, a: f32, b: f32) -> (f32, f32) {
+    // |sqrt z|^2 = |z| and Re sqrt z = sqrt((|z| + Re z)/2).
+    let x = (0.5 * (size + real)).sqrt();
+    let u = size + a * (a - 2.0 * x);
+    let v = size + b * (b - 2.0 * x);
+    // Rounding may take the square of a distance below 0.
+    let product = u * v;
+    (x, u + v + 2.0 * (if product > 0.0 { product } else { 0.0 }).sqrt())
+}
+
+#[inline(always)]
+#[allow(clippy::too_many_arguments)]
+fn panels<T: Real, const SQUARINGS: u32>(
+    ends: &Ends,
+    a_2: &Block,
+    a_3: &Block,
+    low: &Block,
+    high: &Block,
+    accuracy: &Accuracy,
+    plan: &mut Plan,
+) {
+    let zero = T::of(0.0);
+    // A focal sum that is not safe from the errors of the zeros does not count in full.
+    let enough = |focal: f64| (if is_coarse::<T>() { focal + COARSE * (focal - 2.0) } else { focal }) as f32;
+    let cheap = enough(accuracy.enough(CHEAP));
+    let Places { re, im, mut doubt } = places::<T>(ends, a_2, a_3);
+    let (least, shadow) = nearest(&re, &im, low, high);
+    let mut focal = [0.0f32; BLOCK];
+    let (mut side, mut gap) = ([zero; BLOCK], [zero; BLOCK]);
+    let (mut near, mut far) = ([zero; BLOCK], [zero; BLOCK]);
+    let (mut real, mut size) = ([[0.0f32; BLOCK]; ZEROS], [[0.0f32; BLOCK]; ZEROS]);
     for i in 0..BLOCK {
-        focal[i] = 2.0 * least[i].sqrt();
-        let upper = shadow[i] > 0.5;
-        let beyond = if upper { shadow[i] - 1.0 } else { -shadow[i] };
-        side[i] = if upper { 1.0 } else { -1.0 };
-        gap[i] = if beyond > 0.0 { beyond } else { 0.0 };
+        let (low, high) = (T::of(low[i]), T::of(high[i]));
+        let length = high - low;
+        focal[i] = 2.0 * least[i].sqrt() / length.narrow();
+        let upper = shadow[i] + shadow[i] > low + high;
+        let beyond = if upper { shadow[i] - high } else { low - shadow[i] };
+        side[i] = T::of(if upper { 1.0 } else { -1.0 });
+        gap[i] = if beyond > zero { beyond } else { zero };
         near[i] = gap[i];
-        far[i] = gap[i] + 1.0;
+        far[i] = gap[i] + length;
     }
-    for re in &mut re {
+    // A place is its real part and its size, which is all that the distances from real ends ask for.
+    for k in 0..ZEROS {
         for i in 0..BLOCK {
-            let end = if side[i] > 0.0 { 1.0 - re[i] } else { re[i] };
-            re[i] = gap[i] + end;
+            let end = if side[i] > zero { T::of(high[i]) - re[k][i] } else { re[k][i] - T::of(low[i]) };
+            let (x, y) = ((gap[i] + end).narrow(), im[k][i].narrow());
+            real[k][i] = x;
+            size[k][i] = if PAIRS.contains(&k) { (x * x + y * y).sqrt() } else { x.abs() };
         }
     }
-    let (mut squarings, mut from, mut to) = ([0.0; BLOCK], [0.0; BLOCK], [0.0; BLOCK]);
-    for level in 1..=MOST_SQUARINGS {
-        // A lane goes on only for its own sake, so that it does not depend on its neighbours.
-        if focal.iter().all(|&focal| focal >= plain) {
-            break;
-        }
-        let mut least = [FAR * FAR; BLOCK];
+    // A zero beyond the end is known from 1, not from there.
+    for i in 0..BLOCK {
+        let blurred = (side[i] > zero) & (high[i] == 1.0) & (gap[i] > zero) & (gap[i] < T::of(BLURRED));
+        doubt[i] += if blurred { OF_N } else { 0.0 };
+    }
+    let mut squarings = [0.0f32; BLOCK];
+    // The focal sum that the centre of the map itself allows, mapped to 0.
+    let mut ceiling = [2.0f32; BLOCK];
+    for level in 1..=SQUARINGS {
+        let (mut a, mut b) = ([0.0f32; BLOCK], [0.0f32; BLOCK]);
         for i in 0..BLOCK {
             near[i] = near[i].sqrt();
             far[i] = far[i].sqrt();
+            (a[i], b[i]) = (near[i].narrow(), far[i].narrow());
         }
+        let mut least = [f32::MAX; BLOCK];
         for k in 0..ZEROS {
             for i in 0..BLOCK {
-                let (x, y) = complex_sqrt(re[k][i], im[k][i]);
-                (re[k][i], im[k][i]) = (x, y);
-                let square = ellipse(x, y, near[i], far[i]);
-                least[i] = if square < least[i] { square } else { least[i] };
+                let square = size[k][i];
+                let (x, sum) = rooted(square, real[k][i], a[i], b[i]);
+                (real[k][i], size[k][i]) = (x, square.sqrt());
+                least[i] = if sum < least[i] { sum } else { least[i] };
             }
         }
-        let mut reached = [0.0; BLOCK];
         for i in 0..BLOCK {
-            reached[i] = 2.0 * least[i].sqrt() / (far[i] - near[i]);
-        }
-        for i in 0..BLOCK {
-            let better = (focal[i] < plain) & (reached[i] > focal[i]);
-            focal[i] = if better { reached[i] } else { focal[i] };
-            squarings[i] = if better { f64::from(level) } else { squarings[i] };
-            from[i] = if better { near[i] } else { from[i] };
-            to[i] = if better { far[i] } else { to[i] };
+            let reached = 2.0 * least[i].sqrt() / (b[i] - a[i]);
+            // The sum takes a square as it takes a straight rule, but differences from a centre far away lose digits.
+            let open = if level == 1 { gap[i].narrow() <= (high[i] - low[i]) as f32 } else { focal[i] < cheap };
+            let better = open & (reached > focal[i]);
+            focal[i] = if better { reached } else { focal[i] };
+            squarings[i] = if better { level as f32 } else { squarings[i] };
+            ceiling[i] = 2.0 * (a[i] + b[i]) / (b[i] - a[i]);
         }
     }
-    Plan { focal, squarings, side, gap, from, to }
+    let mut deeper = [0.0f32; BLOCK];
+    for i in 0..BLOCK {
+        // A larger power moves the interval away from the centre, but hardly from other zeros.
+        let near = focal[i] - 2.0 > 0.5 * (ceiling[i] - 2.0);
+        let short = (focal[i] < cheap) & (squarings[i] == SQUARINGS as f32) & near;
+        let unsure = is_coarse::<T>() & (doubt[i] > 0.0);
+        deeper[i] = if short | unsure { 1.0 } else { 0.0 };
+    }
+    let mut limits = [0.0f32; BINS];
+    for (limit, &focal) in limits.iter_mut().zip(accuracy.in_steps()) {
+        *limit = enough(focal);
+    }
+    let mut bin = [0.0f32; BLOCK];
+    for (bins, focals) in bin.chunks_exact_mut(WIDTH).zip(focal.chunks_exact(WIDTH)) {
+        let mut counts = [0.0f32; WIDTH];
+        for limit in limits {
+            for i in 0..WIDTH {
+                counts[i] += if focals[i] >= limit { 0.0 } else { 1.0 };
+            }
+        }
+        bins.copy_from_slice(&counts);
+    }
+    for i in 0..BLOCK {
+        let (low, high) = (low[i], high[i]);
+        let (length, shadow) = (high - low, shadow[i].wide());
+        let inside = (shadow > low + 0.05 * length) & (shadow < high - 0.05 * length);
+        plan.cut[i] = if inside { shadow } else { 0.5 * (low + high) };
+        let straight = squarings[i] == 0.0;
+        // Over all of [0, 1] a straight rule grows from the end where theta is less.
+        let steady = if ends.rise.high < 0.0 { 1.0 } else { -1.0 };
+        let whole = (low == 0.0) & (high == 1.0);
+        let side = if straight & whole { steady } else { side[i].wide() };
+        let other = if low == 0.0 { -1.0 } else { 1.0 };
+        let centre = if whole { side } else { other };
+        let end = if side > 0.0 { high } else { low };
+        let near = end - if centre > 0.0 { 1.0 } else { 0.0 };
+        let far = near - side * length;
+        let gap = if straight { 0.0 } else { gap[i].wide() };
+        (plan.squarings[i], plan.side[i], plan.gap[i]) = (f64::from(squarings[i]), side, gap);
+        plan.deeper[i] = f64::from(deeper[i]);
+        let path = Path::new(ends, a_2[i], a_3[i]);
+        let sound = path.is_sound(centre > 0.0, near, far, accuracy);
+        plan.bin[i] = if sound & (doubt[i] == 0.0) { bin[i] as u32 } else { BINS as u32 };
+    }
 }
 
-/// Square of the sum of the distances of `x + iy` from both ends of `[from, to]`.
+/// Whether single precision is enough for estimates of the zeros of theta and n, given about the end.
 #[inline(always)]
-fn ellipse(x: f64, y: f64, from: f64, to: f64) -> f64 {
-    let (u, v, y2) = (x - from, x - to, y * y);
-    let (u2, v2) = (u * u + y2, v * v + y2);
-    u2 + v2 + 2.0 * (u2 * v2).sqrt()
+fn is_tame<T: Real>([q0, q1, q2, q3]: [T; 4], [n0, n1, n2]: [T; 3]) -> bool {
+    let (theta, n) = (q1.abs() + q2.abs() + q3.abs(), n0.abs() + n1.abs() + n2.abs());
+    (theta > T::of(TAME_THETA.0) * q0)
+        & (theta < T::of(TAME_THETA.1) * q0)
+        & (n > T::of(TAME_N.0))
+        & (n < T::of(TAME_N.1))
 }

@@ -10,9 +10,12 @@
 use multiversion::multiversion;
 
 use super::path::Path;
+use crate::model::Law;
 use crate::numerics::cubic::{self, cubic_zeros, quadratic_zeros};
+use crate::numerics::double_double::DoubleDouble;
 use crate::numerics::elementary::{exp, ln, ln_1p};
 use crate::numerics::lanes::{LANES, Lanes, least};
+use crate::numerics::real::Real;
 
 /// A change of variable on a panel, relative to a `centre`: `delta = x - centre`.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -57,41 +60,84 @@ const POOR: usize = 40;
 const LONG: usize = 80;
 /// Most nodes of one panel.
 const MOST_NODES: usize = 256;
+/// Numbers of nodes differ by this.
+pub(super) const STEP: usize = 4;
 /// Depth of cutting: a panel is never shorter than `2^-12` of its parent's share.
 const DEEPEST: u32 = 12;
 /// Safety of the estimate: `e^MARGIN` stands for the residues' share in the integral.
 const MARGIN: f64 = 3.5;
 
 /// The accuracy asked for, as the focal sums (see [`focal`]) from which a number of nodes is enough.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, PartialEq)]
 pub(super) struct Accuracy {
-    /// Element `i` is for `(i + 1) LANES` nodes; falling.
-    focal: [f64; MOST_NODES / LANES],
+    /// Element `i` is for `(i + 1) STEP` nodes; falling.
+    focal: [f64; MOST_NODES / STEP],
+    /// ln rho from which [`STEP`] nodes are enough.
+    pub pace: f64,
+    /// Largest share of an error in theta.
+    pub rounding: f64,
+    /// Largest share of an error in n, whose logarithm counts; 0 where sums without logarithms lose too many digits.
+    pub slight: f64,
+    /// Largest distance, under constant velocity, over which sums without logarithms keep enough digits.
+    pub longest: f64,
+}
+
+/// Accuracy below which parts of a cut panel are not planned.
+const FEWEST_DIGITS: f64 = 1e-5;
+
+/// The focal sums from which [`STEP`] nodes are enough for `tolerance`, twice as many, and so on.
+fn focal_sums(tolerance: f64) -> [f64; MOST_NODES / STEP] {
+    let mut focal = [0.0; MOST_NODES / STEP];
+    for (i, focal) in focal.iter_mut().enumerate() {
+        // rho + 1/rho.
+        let ln_rho = pace(tolerance) / (i + 1) as f64;
+        *focal = exp(ln_rho) + exp(-ln_rho);
+    }
+    focal
+}
+
+/// ln rho from which [`STEP`] nodes are enough for `tolerance`: `rho^(2 nodes) = e^digits`.
+fn pace(tolerance: f64) -> f64 {
+    0.5 * (MARGIN - ln(tolerance)) / STEP as f64
 }
 
 impl Accuracy {
-    /// For a relative accuracy `tolerance`.
-    pub fn new(tolerance: f64) -> Accuracy {
-        let digits = MARGIN - ln(tolerance);
-        let mut focal = [0.0; MOST_NODES / LANES];
-        for (i, focal) in focal.iter_mut().enumerate() {
-            // rho + 1/rho with rho^(2 nodes) = e^digits.
-            let ln_rho = 0.5 * digits / ((i + 1) * LANES) as f64;
-            *focal = exp(ln_rho) + exp(-ln_rho);
-        }
-        Accuracy { focal }
+    /// For a relative accuracy `tolerance` of the work, under friction and a distance that is no more than `most`.
+    pub fn new(tolerance: f64, law: Law, most: f64) -> Accuracy {
+        let rounding = 0.1 * tolerance;
+        // Without logarithms `tau` is as good as a difference of terms that grow like the distance.
+        let longest = rounding / ((law.b - law.a).abs() * f64::EPSILON);
+        // A pair of zeros between the ends that no cut is made for is as far from the real axis as the height of the smallest
+        // ellipse in units of half the panel, and theta there as small as its square.
+        let height = 0.5 * (MARGIN - ln(tolerance)) / LONG as f64;
+        let slight = if most <= longest * (0.25 * height * height) { rounding / law.a } else { 0.0 };
+        Accuracy { focal: focal_sums(tolerance), pace: pace(tolerance), rounding, slight, longest }
+    }
+
+    /// For parts of a panel that is cut at a close pair of zeros, which fills what is left: at low accuracies its share is
+    /// larger than the margin.
+    pub fn of_parts(&self, tolerance: f64) -> Accuracy {
+        let tolerance = tolerance.min(FEWEST_DIGITS);
+        Accuracy { focal: focal_sums(tolerance), pace: pace(tolerance), ..*self }
     }
 
     /// The focal sum from which `nodes` are enough.
     #[inline(always)]
     pub fn enough(&self, nodes: usize) -> f64 {
-        self.focal[nodes / LANES - 1]
+        self.focal[nodes / STEP - 1]
     }
 
-    /// The nodes that a focal sum asks for; `MOST_NODES` where that is not enough.
+    /// The focal sums from which [`STEP`] nodes are enough, twice as many, and so on.
+    #[inline(always)]
+    pub fn in_steps(&self) -> &[f64] {
+        &self.focal
+    }
+
+    /// The nodes that a focal sum asks for, of a rule for [`LANES`] nodes at a time; `MOST_NODES` where that is not
+    /// enough.
     pub fn nodes(&self, focal: f64) -> usize {
         let more = self.focal.iter().position(|&enough| focal >= enough);
-        more.map_or(MOST_NODES, |i| (i + 1) * LANES)
+        more.map_or(MOST_NODES, |i| ((i + 1) * STEP).next_multiple_of(LANES))
     }
 }
 
@@ -101,50 +147,66 @@ impl Accuracy {
 pub(super) struct Zeros {
     re: Lanes,
     im: Lanes,
+    /// Real parts less 1, with all digits of a zero next to the end.
+    from_end: Lanes,
 }
 
 /// Zeros of theta and of `1 - theta'`: three and two.
 pub(super) const ZEROS: usize = 5;
 
+/// Those of theta, which come first.
+pub(super) const THETA_ZEROS: usize = 3;
+
 /// Zeros are not put farther away than this.
 pub(super) const FAR: f64 = 1e9;
 
-/// Zeros of theta and of `1 - theta'` for several shortcuts side by side: cheaper than [`Zeros::of`], and not as good
-/// for a close pair at the start.
-#[inline(always)]
+/// Zeros of theta and of `1 - theta'`: cheaper than [`Zeros::of`], and not as good for a close pair at the start.
 pub(super) fn zeros(path: &Path) -> cubic::Zeros<ZEROS> {
     let (theta, n) = path.about_end();
+    let mut zeros = rough_zeros(theta, n);
+    for (re, im) in zeros.re.iter_mut().zip(&mut zeros.im).take(THETA_ZEROS) {
+        if is_near_start(*re, *im) {
+            (*re, *im) = polished(&path.about_start().0, *re, *im).unwrap_or((*re, *im));
+        }
+    }
+    zeros
+}
+
+/// The same for several shortcuts side by side, given about the end; those near the start are not yet [`polished`].
+#[inline(always)]
+pub(super) fn rough_zeros<T: Real>(theta: [T; 4], n: [T; 3]) -> cubic::Zeros<ZEROS, T> {
     let (q, r) = (cubic_zeros(theta), quadratic_zeros(n));
     let (mut re, mut im) =
         ([q.re[0], q.re[1], q.re[2], r.re[0], r.re[1]], [q.im[0], q.im[1], q.im[2], r.im[0], r.im[1]]);
-    let start = path.about_start().0;
     for k in 0..ZEROS {
-        let (u, y) = (clamp(re[k]), clamp(im[k]));
-        // A zero close to the start, where theta may be as small, lost its digits in the expansion about the end.
-        let x = 1.0 + u;
-        let near = k < 3 && u < -0.5;
-        let (x_start, y_start) = polished(&start, x, y);
-        re[k] = if near { x_start } else { x };
-        im[k] = if near { y_start } else { y };
+        (re[k], im[k]) = (T::of(1.0) + clamp(re[k]), clamp(im[k]));
     }
     cubic::Zeros { re, im }
 }
 
-/// One Newton step towards the zero of a cubic near `x + iy`; a step that is no mere correction is not taken.
+/// Whether a zero is so close to the start that the expansion about the end cost it digits that matter.
 #[inline(always)]
-fn polished(c: &[f64; 4], x: f64, y: f64) -> (f64, f64) {
+pub(super) fn is_near_start<T: Real>(x: T, y: T) -> bool {
+    (x.abs() < T::of(0.1)) & (y < T::of(0.1))
+}
+
+/// One Newton step towards the zero of a cubic near `x + iy`; `None` where the step is no mere correction.
+#[inline(always)]
+pub(super) fn polished<T: Real>(c: &[T; 4], x: T, y: T) -> Option<(T, T)> {
     let [c0, c1, c2, c3] = *c;
+    let [two, three, six] = [2.0, 3.0, 6.0].map(T::of);
     // Value and derivative by Horner's scheme: complex, with imaginary parts factored as i y.
     let (p, q) = (c2 + c3 * x, c3);
     let (p, q) = (c1 + p * x - q * y * y, p + q * x);
     let (value, value_i) = (c0 + p * x - q * y * y, p + q * x);
-    let (slope, slope_i) = (c1 + x * (2.0 * c2 + 3.0 * c3 * x) - 3.0 * c3 * y * y, 2.0 * c2 + 6.0 * c3 * x);
+    let (slope, slope_i) = (c1 + x * (two * c2 + three * c3 * x) - three * c3 * y * y, two * c2 + six * c3 * x);
     let (value_i, slope_i) = (value_i * y, slope_i * y);
-    let norm = slope * slope + slope_i * slope_i + f64::MIN_POSITIVE;
-    let step = (value * slope + value_i * slope_i) / norm;
-    let step_i = (value_i * slope - value * slope_i) / norm;
-    let small = step.abs() + step_i.abs() < LARGEST_CORRECTION;
-    (if small { x - step } else { x }, if small { (y - step_i).abs() } else { y })
+    let norm = slope * slope + slope_i * slope_i + T::TINY;
+    let scale = T::of(1.0) / norm;
+    let step = (value * slope + value_i * slope_i) * scale;
+    let step_i = (value_i * slope - value * slope_i) * scale;
+    let small = step.abs() + step_i.abs() < T::of(LARGEST_CORRECTION);
+    small.then(|| (x - step, (y - step_i).abs()))
 }
 
 /// Zeros are found to a few digits of the farthest; what is left to correct is less than this.
@@ -152,33 +214,33 @@ const LARGEST_CORRECTION: f64 = 1e-3;
 
 /// `x` within `[-FAR, FAR]`; what is not a number is far away.
 #[inline(always)]
-fn clamp(x: f64) -> f64 {
-    let x = if x < FAR { x } else { FAR };
-    if x > -FAR { x } else { -FAR }
+fn clamp<T: Real>(x: T) -> T {
+    let far = T::of(FAR);
+    let x = if x < far { x } else { far };
+    if x > -far { x } else { -far }
 }
 
 impl Zeros {
-    /// The zeros of one shortcut: those of theta from its expansions about the start and about the end, each good on
-    /// its own side.
+    /// The zeros of one shortcut.
     pub fn of(path: &Path) -> Zeros {
-        let (theta, n) = path.about_end();
-        let (start, end, turns) = (cubic_zeros(path.about_start().0), cubic_zeros(theta), quadratic_zeros(n));
-        let mut zeros = Zeros { re: [FAR; LANES], im: [0.0; LANES] };
-        for k in 0..3 {
-            // The sides overlap, so that none is lost between them.
-            if start.re[k] < 0.6 {
-                (zeros.re[k], zeros.im[k]) = (clamp(start.re[k]), clamp(start.im[k]));
-            }
-            if end.re[k] > -0.6 {
-                (zeros.re[3 + k], zeros.im[3 + k]) = (1.0 + clamp(end.re[k]), clamp(end.im[k]));
-            }
-        }
-        for k in 0..2 {
-            (zeros.re[6 + k], zeros.im[6 + k]) = (1.0 + clamp(turns.re[k]), clamp(turns.im[k]));
+        let mut zeros = Zeros { re: [FAR; LANES], im: [0.0; LANES], from_end: [FAR; LANES] };
+        let [first, second, third] = path.exact_theta().zeros();
+        let [fourth, fifth] = path.zeros_of_n();
+        for (k, (re, im)) in [first, second, third, fourth, fifth].into_iter().enumerate() {
+            (zeros.re[k], zeros.im[k]) = (clamp(re.high), clamp(im));
+            zeros.from_end[k] = clamp((re - DoubleDouble::new(1.0)).high);
         }
         zeros
     }
+
+    /// Real parts less `place`.
+    fn from(&self, place: f64) -> Lanes {
+        if place == 1.0 { self.from_end } else { self.re.map(|re| re - place) }
+    }
 }
+
+/// How far from a close pair of zeros the third one is at least; their closed form is better than half of this.
+pub(super) const APART: f64 = 0.03;
 
 /// Appends the panels that integrate over `[low, high]`.
 pub(super) fn choose(zeros: &Zeros, low: f64, high: f64, accuracy: &Accuracy, depth: u32, panels: &mut Vec<Panel>) {
@@ -260,7 +322,7 @@ fn distances(re: &Lanes, im: &Lanes, from: f64, to: f64) -> Lanes {
 /// Distance of the nearest real zero beyond the end on that side.
 #[inline(always)]
 fn real_gap(zeros: &Zeros, end: f64, side: f64) -> f64 {
-    let mut gaps = zeros.re.map(|re| side * (re - end));
+    let mut gaps = zeros.from(end).map(|distance| side * distance);
     for (gap, im) in gaps.iter_mut().zip(zeros.im) {
         *gap = if im == 0.0 && *gap > 0.0 { *gap } else { FAR };
     }
@@ -279,7 +341,7 @@ fn power(zeros: &Zeros, low: f64, high: f64, side: f64, gap: f64, plain: f64, be
     }
     // Distances from the zero, to be rooted again and again.
     let (mut near, mut far) = (gap, gap + length);
-    let (mut re, mut im) = (zeros.re.map(|re| gap + side * (end - re)), zeros.im);
+    let (mut re, mut im) = (zeros.from(end).map(|distance| gap - side * distance), zeros.im);
     for squarings in 1..=3 {
         (near, far) = (near.sqrt(), far.sqrt());
         for i in 0..LANES {
@@ -334,7 +396,7 @@ fn cut_at(zeros: &Zeros, low: f64, high: f64) -> f64 {
 
 /// The square root in the first quadrant or on its border, for `im >= 0` up to the sign of `im`.
 #[inline(always)]
-pub(super) fn complex_sqrt(re: f64, im: f64) -> (f64, f64) {
+fn complex_sqrt(re: f64, im: f64) -> (f64, f64) {
     let size = (re * re + im * im).sqrt();
     let root = (0.5 * (size + re.abs())).sqrt();
     // The smallest normal number keeps 0/0 away.

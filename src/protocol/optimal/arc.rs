@@ -13,9 +13,9 @@
 use multiversion::multiversion;
 
 use crate::model::Law;
-use crate::numerics::elementary::{exp, exp_m1, ln, ln_1p};
+use crate::numerics::elementary::{exp, exp_m1, ln, ln_1p, ln_grown, polynomial, rough_ln};
 use crate::numerics::gauss::{Rule, rule};
-use crate::numerics::lanes::{LANES, fold, least};
+use crate::numerics::lanes::{LANES, Lanes, fold, least};
 use crate::numerics::turning::{Turning, turning, turning_lanes};
 
 /// The chart that an arc is drawn in.
@@ -25,6 +25,8 @@ pub(super) enum Chart {
     Turning {
         /// Contact lifetime at the turning point.
         theta_h: f64,
+        /// Its logarithm.
+        ln_theta_h: f64,
         /// Signed coordinate of the start, negative where theta rises.
         x_start: f64,
         /// Signed coordinate of the end.
@@ -65,8 +67,8 @@ pub(super) struct Sums {
     pub work: f64,
     /// Turning chart: the interior part of `d time/d ln theta_h`. Direct chart: `d time/d z_a`.
     pub sensitivity: f64,
-    /// `int u theta/(1 - u)^2 dt`, from which `d time/d ln u(end)` follows without cancellation where theta rises all
-    /// the way.
+    /// `int u theta/(1 - u)^2 dt`, from which `d time/d ln u(end)` follows without cancellation where theta goes one
+    /// way.
     pub swing: f64,
     /// Least friction met at a node.
     pub friction_min: f64,
@@ -76,30 +78,37 @@ pub(super) struct Sums {
 
 /// `phi(z) = e^z - 1 - z`, the left side of the turning equation, without cancellation near 0.
 pub(super) fn phi(z: f64) -> f64 {
-    if z.abs() < 0.25 {
-        // 1/2 + z/6 + z^2/24 + …: thirteen terms leave 1e-17 of the first at |z| = 1/4.
-        let mut term = 1.0;
-        let mut sum = 1.0;
-        for n in 3..15 {
-            term *= z / f64::from(n);
-            sum += term;
-        }
-        0.5 * z * z * sum
-    } else {
-        exp_m1(z) - z
-    }
+    phi_and_slope(z).0
 }
+
+/// `phi(z)` and its derivative `e^z - 1`.
+pub(super) fn phi_and_slope(z: f64) -> (f64, f64) {
+    let slope = exp_m1(z);
+    let phi = if z.abs() < 0.25 { 0.5 * z * z * polynomial(&PHI_OVER_HALF_SQUARE, z) } else { slope - z };
+    (phi, slope)
+}
+
+/// `2/(n + 2)!`: twelve terms of `phi(z)/(z^2/2)` leave 2e-18 at `|z| = 1/4`.
+const PHI_OVER_HALF_SQUARE: [f64; 12] = {
+    let mut terms = [1.0; 12];
+    let mut n = 1;
+    while n < terms.len() {
+        terms[n] = terms[n - 1] / (n + 2) as f64;
+        n += 1;
+    }
+    terms
+};
 
 impl Arc {
     /// `c_h = -C theta_h = 1 + (b - a) ln theta_h`, the friction at the turning point (there `u = 1`).
-    fn friction_at_turn(&self, theta_h: f64) -> f64 {
-        1.0 + (self.law.b - self.law.a) * ln(theta_h)
+    fn friction_at_turn(&self, ln_theta_h: f64) -> f64 {
+        1.0 + (self.law.b - self.law.a) * ln_theta_h
     }
 
     /// The conserved `C`.
     pub fn c(&self) -> f64 {
         match self.chart {
-            Chart::Turning { theta_h, .. } => -self.friction_at_turn(theta_h) / theta_h,
+            Chart::Turning { theta_h, ln_theta_h, .. } => -self.friction_at_turn(ln_theta_h) / theta_h,
             Chart::Direct { theta_a, z_a, friction_a, .. } => (self.law.a * phi(z_a) - friction_a) / theta_a,
         }
     }
@@ -115,85 +124,127 @@ impl Arc {
         }
     }
 
-    /// `ln u` and `(u - 1)/w` at the start and the end; `None` where `E < 0` (no such extremal).
-    pub fn ends(&self) -> Option<(Turning, Turning)> {
+    /// The start of the arc; `None` where `E < 0` (no such extremal).
+    pub fn start(&self) -> Option<Turning> {
         match self.chart {
-            Chart::Turning { theta_h, x_start, x_end, .. } => {
-                let c_h = self.friction_at_turn(theta_h);
-                let at = |x: f64| {
-                    let w = x * omega(&self.law, c_h, x * x);
-                    w.is_finite().then(|| turning(w))
-                };
-                Some((at(x_start)?, at(x_end)?))
-            }
-            Chart::Direct { z_a, friction_a, y_start, y_end, .. } => {
-                let phi_a = phi(z_a);
-                let at = |y: f64| {
-                    let e = direct_e(&self.law, phi_a, friction_a, y, exp(y));
-                    (e >= 0.0).then(|| turning((2.0 * e).sqrt().copysign(z_a)))
-                };
-                Some((at(y_start)?, at(y_end)?))
-            }
+            Chart::Turning { x_start, .. } => self.edge(x_start),
+            Chart::Direct { y_start, .. } => self.edge(y_start),
         }
+    }
+
+    /// The end of the arc; `None` where `E < 0`.
+    pub fn end(&self) -> Option<Turning> {
+        match self.chart {
+            Chart::Turning { x_end, .. } => self.edge(x_end),
+            Chart::Direct { y_end, .. } => self.edge(y_end),
+        }
+    }
+
+    /// What is at a coordinate of the chart.
+    fn edge(&self, at: f64) -> Option<Turning> {
+        let w = match self.chart {
+            Chart::Turning { ln_theta_h, .. } => at * omega(&self.law, self.friction_at_turn(ln_theta_h), at * at),
+            Chart::Direct { z_a, friction_a, .. } => {
+                (2.0 * direct_e(&self.law, phi(z_a), friction_a, at, exp(at))).sqrt().copysign(z_a)
+            }
+        };
+        w.is_finite().then(|| turning(w))
     }
 
     /// Time, work and sensitivity to relative accuracy `tolerance`; `None` where the arc does not exist (`E < 0` on the
     /// way).
     pub fn sums(&self, tolerance: f64) -> Option<Sums> {
+        let mut sums = self.sums_once(tolerance)?;
+        // Where friction falls below b - a, E has a minimum on the way: zeros next to it ask for more nodes than foreseen.
+        let mut asked = tolerance;
+        while sums.friction_min <= self.law.b - self.law.a && asked > LEAST_TOLERANCE {
+            asked *= asked.min(1e-3);
+            let finer = self.sums_once(asked)?;
+            let change = (finer.time - sums.time).abs();
+            sums = Sums {
+                nodes: sums.nodes + finer.nodes,
+                friction_min: sums.friction_min.min(finer.friction_min),
+                ..finer
+            };
+            if change <= tolerance * finer.time {
+                break;
+            }
+        }
+        Some(sums)
+    }
+
+    fn sums_once(&self, tolerance: f64) -> Option<Sums> {
         let sums = match self.chart {
-            Chart::Turning { theta_h, x_start, x_end, x_squares } => {
-                self.turning_sums(theta_h, x_start, x_end, x_squares, tolerance)
+            Chart::Turning { theta_h, ln_theta_h, x_start, x_end, x_squares } => {
+                let (line, slice) = self.turning_line(theta_h, ln_theta_h, x_start, x_end, x_squares);
+                panels(&line, tolerance, |middle, half, rule| turning_kernel(&slice, middle, half, rule))
             }
             Chart::Direct { theta_a, z_a, friction_a, y_start, y_end } => {
-                self.direct_sums(theta_a, z_a, friction_a, y_start, y_end, tolerance)
+                let (line, slice) = self.direct_line(theta_a, z_a, friction_a, y_start, y_end);
+                panels(&line, tolerance, |middle, half, rule| direct_kernel(&slice, middle, half, rule))
             }
         };
         (sums.time.is_finite() && sums.work.is_finite()).then_some(sums)
     }
 
-    fn turning_sums(&self, theta_h: f64, x_start: f64, x_end: f64, x_squares: f64, tolerance: f64) -> Sums {
-        let (line, slice) = self.turning_line(theta_h, x_start, x_end, x_squares);
-        panels(&line, tolerance, |middle, half, rule| turning_kernel(&slice, middle, half, rule))
-    }
-
     /// The turning chart as a line in `p`.
-    fn turning_line(&self, theta_h: f64, x_start: f64, x_end: f64, x_squares: f64) -> (Line<4>, TurningSlice) {
+    fn turning_line(
+        &self,
+        theta_h: f64,
+        ln_theta_h: f64,
+        x_start: f64,
+        x_end: f64,
+        x_squares: f64,
+    ) -> (Line<4>, TurningSlice) {
         let Law { a, b } = self.law;
-        let c_h = self.friction_at_turn(theta_h);
+        let c_h = self.friction_at_turn(ln_theta_h);
         // Scale of the layer: w = X/layer near the turning point.
         let layer = (a / (2.0 * (c_h + a - b))).sqrt();
         let sigma = if LAYERS * layer < 1.0 { LAYERS * layer } else { 1.0 };
         let (s_start, s_end) = (x_start / sigma, x_end / sigma);
-        let start = asinh(s_start);
+        let (r_start, r_end) = ((1.0 + s_start * s_start).sqrt(), (1.0 + s_end * s_end).sqrt());
+        let start = asinh(s_start, r_start);
         let length = if x_start * x_end > 0.0 {
-            let (r_start, r_end) = ((1.0 + s_start * s_start).sqrt(), (1.0 + s_end * s_end).sqrt());
-            asinh(x_squares / (sigma * sigma) / (s_end * r_start + s_start * r_end))
+            let s = x_squares / (sigma * sigma * (s_end * r_start + s_start * r_end));
+            asinh(s, (1.0 + s * s).sqrt())
         } else {
-            asinh(s_end) - start
+            asinh(s_end, r_end) - start
         };
-        let branch = 2.0 * std::f64::consts::PI.sqrt() * layer / sigma;
-        let (re, im) = asinh_diagonal(branch);
-        let (far_re, far_im) = (acosh_inverse(sigma), std::f64::consts::FRAC_PI_2);
-        let singular = [(re, im), (-re, im), (far_re, far_im), (-far_re, far_im)];
-        let slice = TurningSlice { law: self.law, theta_h, ln_theta_h: ln(theta_h), c_h, sigma };
+        // Where theta rises, the branch points of U; where it falls, U has none.
+        let (re, im) = if sigma < 1.0 { BRANCH } else { asinh_diagonal(2.0 * std::f64::consts::PI.sqrt() * layer) };
+        // Where theta is infinite, X = i; for C > 0 E has another zero above theta_h, at |X| > sqrt(1 - kappa).
+        let kappa = if c_h < 0.0 && a > b { -c_h / (a - b) } else { 0.0 };
+        let nearest = (1.0 - kappa).max(0.0).sqrt();
+        let (far_re, far_im) = if nearest < sigma {
+            (0.0, nearest / sigma)
+        } else {
+            (acosh_inverse(sigma / nearest), std::f64::consts::FRAC_PI_2)
+        };
+        let low = if x_start + x_end > 0.0 { x_end } else { x_start };
+        let below = last_zero(b - a, c_h, 1.0 + low * low)
+            .map_or(f64::INFINITY, |x| asinh(x / sigma, (1.0 + x * x / (sigma * sigma)).sqrt()));
+        let singular = [(-re, im), (far_re, far_im), (-far_re, far_im), (below.min(FAR).copysign(low), 0.0)];
+        let slice = TurningSlice { law: self.law, theta_h, ln_theta_h, c_h, sigma };
         (Line { start, length, singular }, slice)
     }
 
-    fn direct_sums(&self, theta_a: f64, z_a: f64, friction_a: f64, y_start: f64, y_end: f64, tolerance: f64) -> Sums {
-        let (line, slice) = self.direct_line(theta_a, z_a, friction_a, y_start, y_end);
-        panels(&line, tolerance, |middle, half, rule| direct_kernel(&slice, middle, half, rule))
-    }
-
     /// The direct chart as a line in `y`.
-    fn direct_line(&self, theta_a: f64, z_a: f64, friction_a: f64, y_start: f64, y_end: f64) -> (Line<2>, DirectSlice) {
-        // The turning point lies at least ln 2 above the anchor; other zeros of E are complex.
-        let singular = [(std::f64::consts::LN_2, 0.0), (y_end.min(y_start), std::f64::consts::FRAC_PI_2)];
+    fn direct_line(&self, theta_a: f64, z_a: f64, friction_a: f64, y_start: f64, y_end: f64) -> (Line<4>, DirectSlice) {
+        let Law { a, b } = self.law;
+        let (phi_a, slope_a) = phi_and_slope(z_a);
+        let (low, c) = (y_start.min(y_end), a * phi_a - friction_a);
+        // For C > 0 a pair of zeros of E lies above the arc; where theta rises, a branch point of U as well.
+        let pair = zero_above(&self.law, friction_a, c, 0.0);
+        let branch = if z_a < 0.0 { zero_above(&self.law, friction_a, c, std::f64::consts::TAU * a) } else { pair };
+        let below = zero_below(b - a, friction_a, c, low);
+        // The turning point lies at least ln 2 above the anchor.
+        let singular = [(std::f64::consts::LN_2, 0.0), (below, 0.0), pair, branch];
         let slice = DirectSlice {
             law: self.law,
             theta_a,
             ln_theta_a: ln(theta_a),
-            phi_a: phi(z_a),
-            slope_a: exp_m1(z_a),
+            phi_a,
+            slope_a,
             friction_a,
             sign: 1f64.copysign(z_a),
         };
@@ -202,27 +253,29 @@ impl Arc {
 
     /// The arc cut into equal pieces, in each of which few nodes yield the time from its ends to any place in it.
     pub fn pieces(&self) -> Pieces {
-        let cut = |start, length, count, slice| Pieces { start, length, count, slice };
-        match self.chart {
-            Chart::Turning { theta_h, x_start, x_end, x_squares } => {
-                let (line, slice) = self.turning_line(theta_h, x_start, x_end, x_squares);
-                cut(
-                    line.start,
-                    line.length,
-                    line.cut(PIECE_NODES as f64, MOST_PIECES, PIECE_TOLERANCE).0,
-                    Slice::Turning(slice),
-                )
+        let (start, length, count, slice) = match self.chart {
+            Chart::Turning { theta_h, ln_theta_h, x_start, x_end, x_squares } => {
+                let (line, slice) = self.turning_line(theta_h, ln_theta_h, x_start, x_end, x_squares);
+                (line.start, line.length, line.pieces(), Slice::Turning(slice))
             }
             Chart::Direct { theta_a, z_a, friction_a, y_start, y_end } => {
                 let (line, slice) = self.direct_line(theta_a, z_a, friction_a, y_start, y_end);
-                cut(
-                    line.start,
-                    line.length,
-                    line.cut(PIECE_NODES as f64, MOST_PIECES, PIECE_TOLERANCE).0,
-                    Slice::Direct(slice),
-                )
+                (line.start, line.length, line.pieces(), Slice::Direct(slice))
+            }
+        };
+        let mut pieces = Pieces { start, length, count, slice };
+        // As in `sums`, more of them where friction falls below b - a.
+        let (mut time, friction_min) = pieces.whole();
+        while friction_min <= self.law.b - self.law.a && pieces.count < MOST_PIECES {
+            pieces.count *= 2;
+            let (finer, _) = pieces.whole();
+            let change = (finer - time).abs();
+            time = finer;
+            if change <= 10.0 * PIECE_TOLERANCE * time {
+                break;
             }
         }
+        pieces
     }
 }
 
@@ -235,17 +288,28 @@ struct Line<const N: usize> {
 }
 
 impl<const N: usize> Line<N> {
+    /// How many pieces of few nodes.
+    fn pieces(&self) -> u32 {
+        self.cut(PIECE_NODES as f64, MOST_PIECES, PIECE_TOLERANCE).0
+    }
+
     /// Into how many equal panels, up to `most_panels`, to cut so that none needs more than `most` nodes, and how many
     /// nodes they need.
     #[inline(always)]
     fn cut(&self, most: f64, most_panels: u32, tolerance: f64) -> (u32, f64) {
-        let mut count = 1u32;
+        let digits = -rough_ln(tolerance);
+        let half = 0.5 * self.length.abs();
+        let needed = nodes_needed(self.start + 0.5 * self.length, half, &self.singular, digits);
+        if needed <= most || most_panels == 1 {
+            return (1, needed.min(most));
+        }
+        let mut count = 2u32;
         loop {
             let half = 0.5 * self.length.abs() / f64::from(count);
             let mut needed = 0.0f64;
             for panel in 0..count {
                 let middle = self.start + self.length * (f64::from(panel) + 0.5) / f64::from(count);
-                needed = needed.max(nodes_needed(middle, half, &self.singular, tolerance));
+                needed = needed.max(nodes_needed(middle, half, &self.singular, digits));
             }
             if needed <= most || count >= most_panels {
                 return (count, needed.min(most));
@@ -292,6 +356,13 @@ impl Pieces {
         self.sums(from, to).time
     }
 
+    /// Time of all pieces, and the least friction met.
+    fn whole(&self) -> (f64, f64) {
+        let edge = |piece: u32| f64::from(piece) / f64::from(self.count);
+        let all = (0..self.count).map(|piece| self.sums(edge(piece), edge(piece + 1)));
+        all.fold((0.0, f64::INFINITY), |(time, least), sums| (time + sums.time, least.min(sums.friction_min)))
+    }
+
     /// The sums of the arc from one place to another of the same piece.
     pub fn sums(&self, from: f64, to: f64) -> Sums {
         let (middle, half) = (self.start + 0.5 * (from + to) * self.length, 0.5 * (to - from) * self.length);
@@ -326,17 +397,23 @@ impl Pieces {
 /// Layers of the turning point to one unit of `sinh p`: balances the two kinds of singularity in the `p` plane.
 const LAYERS: f64 = 1.5;
 
+/// The branch points of `U` in the `p` plane, `asinh(2 sqrt(pi)/LAYERS e^(i pi/4))`.
+const BRANCH: (f64, f64) = (1.556165173207204, 0.7409303559311022);
+
 /// Nodes beyond which a panel is cut in two.
 const MOST_NODES: f64 = 64.0;
 
 /// Most panels of an arc.
 const MOST_PANELS: u32 = 64;
 
+/// A quadrature that is asked for this much uses all panels and nodes that there are.
+const LEAST_TOLERANCE: f64 = 1e-200;
+
 /// Sums over equal panels of a line, with as many Gauss nodes as the nearest singularity asks for.
 fn panels<const N: usize>(line: &Line<N>, tolerance: f64, kernel: impl Fn(f64, f64, &Rule) -> Sums) -> Sums {
     let &Line { start, length, .. } = line;
     let (count, nodes) = line.cut(MOST_NODES, MOST_PANELS, tolerance);
-    let rule = rule(LANES * (nodes / LANES as f64).ceil().max(1.0) as usize);
+    let rule = rule(LANES * (nodes as usize / LANES + 1));
     let half = 0.5 * length / f64::from(count);
     let mut total =
         Sums { time: 0.0, lag: 0.0, work: 0.0, sensitivity: 0.0, swing: 0.0, friction_min: f64::INFINITY, nodes: 0 };
@@ -353,25 +430,105 @@ fn panels<const N: usize>(line: &Line<N>, tolerance: f64, kernel: impl Fn(f64, f
     total
 }
 
-/// Gauss nodes for relative accuracy `tolerance` on a panel: the Bernstein ellipse through the nearest singularity.
-fn nodes_needed(middle: f64, half: f64, singular: &[(f64, f64)], tolerance: f64) -> f64 {
+/// Gauss nodes for relative accuracy `e^-digits` on a panel: the Bernstein ellipse through the nearest singularity.
+#[inline(always)]
+fn nodes_needed(middle: f64, half: f64, singular: &[(f64, f64)], digits: f64) -> f64 {
+    let scale = 1.0 / half;
+    // Squares of the sums of the distances from both ends.
     let mut least = f64::INFINITY;
     for &(re, im) in singular {
-        let (x, y) = ((re - middle) / half, im / half);
-        let foci = ((x - 1.0) * (x - 1.0) + y * y).sqrt() + ((x + 1.0) * (x + 1.0) + y * y).sqrt();
-        least = least.min(foci);
+        let (x, y) = ((re - middle) * scale, im * scale);
+        let (near, far) = ((x - 1.0) * (x - 1.0) + y * y, (x + 1.0) * (x + 1.0) + y * y);
+        let square = near + far + 2.0 * (near * far).sqrt();
+        least = if square < least { square } else { least };
     }
-    let rho = 0.5 * (least + (least * least - 4.0).max(0.0).sqrt());
-    (-ln(tolerance) + MARGIN) / (2.0 * ln(rho.min(1e6)))
+    let rho = 0.5 * (least.sqrt() + (least - 4.0).max(0.0).sqrt());
+    (digits + MARGIN) / (2.0 * rough_ln(rho.min(1e6)))
 }
+
+/// Stands for a singularity that is nowhere near.
+const FAR: f64 = 1e3;
+
+/// The pair of zeros of `a E = friction_a + (b - a) y + c e^y` beside the real axis, or of `a E - i shift`: a place of the
+/// upper half plane, to some tenths, and not above it. For `c <= 0` there is none next to an arc.
+///
+/// With `y = r + i s` it is where `c e^r cos s = -F` and `c e^r sin s = G`, of `F = friction_a + (b - a) r` and `G = shift +
+/// (a - b) s`, so that `s = pi/2 + atan(F/G)`; each round shrinks the error of `r` to a third or less, mostly far less.
+fn zero_above(law: &Law, friction_a: f64, c: f64, shift: f64) -> (f64, f64) {
+    use std::f64::consts::{FRAC_PI_2, PI};
+    let bend = law.a - law.b;
+    // Friction is no less on the arc for b <= a, which leaves the pair beyond the anchor.
+    if c <= 0.0 || (bend >= 0.0 && 2.0 * c <= friction_a) {
+        return (FAR, FRAC_PI_2);
+    }
+    let inverse = 1.0 / c;
+    let (mut r, mut s) = (0.0, PI);
+    for _ in 0..ROUNDS {
+        let (force, side) = ((friction_a - bend * r).max(0.0), shift + bend * s);
+        let size = (force * force + side * side).sqrt();
+        r = rough_ln((inverse * size).clamp(LEAST, MOST));
+        // Shafer's bound of the arcus tangens from below.
+        s = if side > 0.0 { FRAC_PI_2 + 3.0 * force / (side + 2.0 * size) } else { PI };
+    }
+    (r, s)
+}
+
+/// Rounds of [`zero_above`] and [`last_zero`].
+const ROUNDS: u32 = 2;
+
+/// Range of what a logarithm is taken of.
+const LEAST: f64 = 1e-100;
+const MOST: f64 = 1e100;
+
+/// A bound from above of the zero of `a E` below the arc in the direct chart, which reaches down to `low`; `slope` is `b
+/// - a`.
+fn zero_below(slope: f64, friction_a: f64, c: f64, low: f64) -> f64 {
+    if slope <= 0.0 {
+        return -FAR;
+    }
+    let friction = friction_a + slope * low;
+    if friction > HIGH * slope {
+        return low - NEAREST_HIGH;
+    }
+    // Below the arc a E is no steeper than there for C > 0, and than b - a for C < 0.
+    let pull = c * exp(low);
+    let steepest = (friction + pull) / (slope + pull.max(0.0));
+    let distance = if c > 0.0 { steepest.max(friction / slope) } else { steepest };
+    low - distance.max(CLOSEST)
+}
+
+/// The same in the turning chart, as `X`, whose greatest square on the arc is `grow - 1`; `None` where it is far.
+///
+/// With `x = ln(theta_h/theta)` it is where `x = k (1 - e^-x)`, `k = c_h/slope`.
+fn last_zero(slope: f64, c_h: f64, grow: f64) -> Option<f64> {
+    let k = c_h / slope;
+    if slope <= 0.0 || k > HIGH + rough_ln(grow) {
+        return None;
+    }
+    // Newton's method comes down to it from the right: x < k, and x < 2 (k - 1) since x/(1 - e^-x) > 1 + x/2.
+    let mut x = k.min(2.0 * (k - 1.0)).max(CLOSEST);
+    for _ in 0..ROUNDS {
+        let rest = exp(-x);
+        x -= (x - k * (1.0 - rest)) / (1.0 - k * rest);
+    }
+    Some(exp_m1(x.max(rough_ln(grow) + CLOSEST)).sqrt())
+}
+
+/// Friction in units of `b - a` above which the zero of `E` below an arc is far from it, and how far at least.
+const HIGH: f64 = 4.0;
+const NEAREST_HIGH: f64 = 1.6;
+
+/// Zeros closer than this come with friction below `b - a`, where quadratures are refined until two agree.
+const CLOSEST: f64 = 0.01;
 
 /// Safety of the node estimate: `e^MARGIN` is the ratio of the error constant to the integral.
 const MARGIN: f64 = 2.0;
 
-/// `asinh x` without cancellation.
-fn asinh(x: f64) -> f64 {
+/// `asinh x` without cancellation; `root` is `sqrt(1 + x^2)`.
+fn asinh(x: f64, root: f64) -> f64 {
     let t = x.abs();
-    ln_1p(t + t * t / (1.0 + (1.0 + t * t).sqrt())).copysign(x)
+    // e^asinh t = t + root is the reciprocal of root - t.
+    ln_grown(t + t * t / (1.0 + root), root - t).copysign(x)
 }
 
 /// `asinh(m e^{i pi/4})` as `(real, imaginary)`.
@@ -383,12 +540,12 @@ fn asinh_diagonal(m: f64) -> (f64, f64) {
     let root = (h * h + q2).sqrt();
     let s = if h > 0.0 { q2 / (root + h) } else { root - h };
     let sin_y = (q2 / (1.0 + s)).sqrt().min(1.0);
-    (asinh(s.sqrt()), libm::asin(sin_y))
+    (asinh(s.sqrt(), (1.0 + s).sqrt()), libm::asin(sin_y))
 }
 
-/// `acosh(1/sigma)` for `0 < sigma <= 1`.
+/// `acosh(1/sigma)` for `0 < sigma <= 1`, to the digits of [`rough_ln`].
 fn acosh_inverse(sigma: f64) -> f64 {
-    asinh(((1.0 - sigma) * (1.0 + sigma)).sqrt() / sigma)
+    rough_ln((1.0 + ((1.0 - sigma) * (1.0 + sigma)).sqrt()) / sigma)
 }
 
 /// `w/X = sqrt(2 E)/X` as a function of `X^2`: `a E = (a - b) ln(1 + X^2) + c_h X^2/(1 + X^2)`. NaN where `E < 0`.
@@ -415,55 +572,131 @@ struct TurningSlice {
     sigma: f64,
 }
 
+/// Nodes that a kernel takes at once where there are as many: the operations of one half hide the latency of the other.
+const WIDE: usize = 2 * LANES;
+
+/// The sums of a kernel lane by lane.
+struct Tally {
+    time: Lanes,
+    lag: Lanes,
+    work: Lanes,
+    sensitivity: Lanes,
+    swing: Lanes,
+    friction_min: Lanes,
+}
+
+/// What `N` nodes, a multiple of the lanes, add to a [`Tally`].
+struct Terms<const N: usize> {
+    time: [f64; N],
+    lag: [f64; N],
+    work: [f64; N],
+    sensitivity: [f64; N],
+    swing: [f64; N],
+    friction: [f64; N],
+}
+
+impl Tally {
+    #[inline(always)]
+    fn new() -> Tally {
+        let zero = [0.0; LANES];
+        Tally {
+            time: zero,
+            lag: zero,
+            work: zero,
+            sensitivity: zero,
+            swing: zero,
+            friction_min: [f64::INFINITY; LANES],
+        }
+    }
+
+    #[inline(always)]
+    fn add<const N: usize>(&mut self, terms: &Terms<N>) {
+        for first in (0..N).step_by(LANES) {
+            for i in 0..LANES {
+                self.time[i] += terms.time[first + i];
+                self.lag[i] += terms.lag[first + i];
+                self.work[i] += terms.work[first + i];
+                self.sensitivity[i] += terms.sensitivity[first + i];
+                self.swing[i] += terms.swing[first + i];
+                let (friction, least) = (terms.friction[first + i], self.friction_min[i]);
+                self.friction_min[i] = if friction < least { friction } else { least };
+            }
+        }
+    }
+}
+
+impl<const N: usize> Terms<N> {
+    #[inline(always)]
+    fn new() -> Terms<N> {
+        let zero = [0.0; N];
+        Terms { time: zero, lag: zero, work: zero, sensitivity: zero, swing: zero, friction: zero }
+    }
+}
+
 #[multiversion(targets(
     "x86_64+avx+avx2+bmi1+bmi2+avx512f+avx512bw+avx512cd+avx512dq+avx512vl",
     "x86_64+avx+avx2+bmi1+bmi2"
 ))]
 fn turning_kernel(arc: &TurningSlice, middle: f64, half: f64, rule: &Rule) -> Sums {
-    let Law { a, b } = arc.law;
-    let (mut time, mut lag, mut work, mut sensitivity) = ([0.0; LANES], [0.0; LANES], [0.0; LANES], [0.0; LANES]);
-    let (mut swing, mut friction_min) = ([0.0; LANES], [f64::INFINITY; LANES]);
-    for (x, weight) in rule.x.chunks_exact(LANES).zip(rule.w.chunks_exact(LANES)) {
-        let (mut w, mut om, mut x2, mut cosh, mut ln_theta) =
-            ([0.0; LANES], [0.0; LANES], [0.0; LANES], [0.0; LANES], [0.0; LANES]);
-        for i in 0..LANES {
-            let q = exp(middle + half * x[i]);
-            let inverse = 1.0 / q;
-            let big_x = 0.5 * arc.sigma * (q - inverse);
-            cosh[i] = 0.5 * (q + inverse);
-            x2[i] = big_x * big_x + 1e-280;
-            let l = ln_1p(x2[i]);
-            ln_theta[i] = arc.ln_theta_h - l;
-            om[i] = (2.0 / a * (arc.c_h / (1.0 + x2[i]) + (a - b) * (l / x2[i]))).sqrt();
-            w[i] = big_x * om[i];
-        }
-        let (z, slope) = turning_lanes(&w);
-        for i in 0..LANES {
-            // X/(u - 1), regular at the turning point.
-            let ratio = 1.0 / (om[i] * slope[i]);
-            let shrink = 1.0 / (1.0 + x2[i]);
-            let g = weight[i] * cosh[i] * ratio * shrink;
-            let d = w[i] * slope[i];
-            let u = 1.0 + d;
-            let friction = 1.0 + a * z[i] + (b - a) * ln_theta[i];
-            let dt = g * shrink;
-            time[i] += dt;
-            lag[i] += dt * u;
-            work[i] += g * u * friction;
-            sensitivity[i] += dt * (1.0 - u * ratio * ratio * ((b - a) / a) * shrink);
-            swing[i] += dt * shrink * u / (d * d);
-            friction_min[i] = if friction < friction_min[i] { friction } else { friction_min[i] };
-        }
+    let mut tally = Tally::new();
+    let (x, x_last) = rule.x.as_chunks::<WIDE>();
+    let (weight, weight_last) = rule.w.as_chunks::<WIDE>();
+    for (x, weight) in x.iter().zip(weight) {
+        arc.add(middle, half, x, weight, &mut tally);
+    }
+    for (x, weight) in x_last.as_chunks::<LANES>().0.iter().zip(weight_last.as_chunks::<LANES>().0) {
+        arc.add(middle, half, x, weight, &mut tally);
     }
     let scale = 2.0 * arc.sigma * half;
     Sums {
-        time: scale * arc.theta_h * fold(&time),
-        lag: scale * arc.theta_h * fold(&lag),
-        work: scale * fold(&work),
-        sensitivity: scale * arc.theta_h * fold(&sensitivity),
-        swing: scale * arc.theta_h * arc.theta_h * fold(&swing),
-        friction_min: least(&friction_min),
+        time: scale * arc.theta_h * fold(&tally.time),
+        lag: scale * arc.theta_h * fold(&tally.lag),
+        work: scale * fold(&tally.work),
+        sensitivity: scale * arc.theta_h * fold(&tally.sensitivity),
+        swing: scale * arc.theta_h * arc.theta_h * fold(&tally.swing),
+        friction_min: least(&tally.friction_min),
         nodes: rule.x.len() as u32,
+    }
+}
+
+impl TurningSlice {
+    /// Adds the terms of `N` nodes, a multiple of the lanes.
+    #[inline(always)]
+    fn add<const N: usize>(&self, middle: f64, half: f64, x: &[f64; N], weight: &[f64; N], tally: &mut Tally) {
+        let Law { a, b } = self.law;
+        let (double, bend, slope) = (2.0 / a, (a - b) * (2.0 / a), (b - a) / a);
+        let (mut w, mut om, mut inverse_x2) = ([0.0; N], [0.0; N], [0.0; N]);
+        let (mut cosh, mut shrink, mut ln_theta) = ([0.0; N], [0.0; N], [0.0; N]);
+        for i in 0..N {
+            let q = exp(middle + half * x[i]);
+            let inverse = 1.0 / q;
+            let big_x = 0.5 * self.sigma * (q - inverse);
+            cosh[i] = 0.5 * (q + inverse);
+            // The tiny offset turns the removable 0/0 at X = 0 into 1.
+            let x2 = big_x * big_x + 1e-280;
+            shrink[i] = 1.0 / (1.0 + x2);
+            inverse_x2[i] = 1.0 / x2;
+            let l = ln_grown(x2, shrink[i]);
+            ln_theta[i] = self.ln_theta_h - l;
+            om[i] = (double * self.c_h * shrink[i] + bend * (l * inverse_x2[i])).sqrt();
+            w[i] = big_x * om[i];
+        }
+        let found = turning_lanes(&w);
+        let mut terms = Terms::<N>::new();
+        for i in 0..N {
+            // X/(u - 1), regular at the turning point.
+            let ratio = found.under[i] / (om[i] * found.over[i]);
+            let g = weight[i] * cosh[i] * ratio * shrink[i];
+            let u = found.u[i];
+            let bent = u * ratio * ratio * shrink[i];
+            terms.friction[i] = 1.0 + a * found.ln_u[i] + (b - a) * ln_theta[i];
+            terms.time[i] = g * shrink[i];
+            terms.lag[i] = terms.time[i] * u;
+            terms.work[i] = g * u * terms.friction[i];
+            terms.sensitivity[i] = terms.time[i] * (1.0 - bent * slope);
+            terms.swing[i] = terms.time[i] * bent * inverse_x2[i];
+        }
+        tally.add(&terms);
     }
 }
 
@@ -483,37 +716,50 @@ struct DirectSlice {
     "x86_64+avx+avx2+bmi1+bmi2"
 ))]
 fn direct_kernel(arc: &DirectSlice, middle: f64, half: f64, rule: &Rule) -> Sums {
-    let Law { a, b } = arc.law;
-    let (mut time, mut lag, mut work, mut sensitivity) = ([0.0; LANES], [0.0; LANES], [0.0; LANES], [0.0; LANES]);
-    let mut friction_min = [f64::INFINITY; LANES];
-    for (x, weight) in rule.x.chunks_exact(LANES).zip(rule.w.chunks_exact(LANES)) {
-        let (mut w, mut grow, mut ln_theta) = ([0.0; LANES], [0.0; LANES], [0.0; LANES]);
-        for i in 0..LANES {
+    let mut tally = Tally::new();
+    let (x, x_last) = rule.x.as_chunks::<WIDE>();
+    let (weight, weight_last) = rule.w.as_chunks::<WIDE>();
+    for (x, weight) in x.iter().zip(weight) {
+        arc.add(middle, half, x, weight, &mut tally);
+    }
+    for (x, weight) in x_last.as_chunks::<LANES>().0.iter().zip(weight_last.as_chunks::<LANES>().0) {
+        arc.add(middle, half, x, weight, &mut tally);
+    }
+    let sensitivity = fold(&tally.sensitivity);
+    Sums {
+        time: half * arc.theta_a * fold(&tally.time),
+        lag: half * arc.theta_a * fold(&tally.lag),
+        work: half * fold(&tally.work),
+        sensitivity: half * arc.theta_a * arc.slope_a * sensitivity,
+        swing: -half * arc.theta_a * arc.theta_a * sensitivity,
+        friction_min: least(&tally.friction_min),
+        nodes: rule.x.len() as u32,
+    }
+}
+
+impl DirectSlice {
+    /// Adds the terms of `N` nodes, a multiple of the lanes.
+    #[inline(always)]
+    fn add<const N: usize>(&self, middle: f64, half: f64, x: &[f64; N], weight: &[f64; N], tally: &mut Tally) {
+        let Law { a, b } = self.law;
+        let (mut w, mut grow, mut ln_theta) = ([0.0; N], [0.0; N], [0.0; N]);
+        for i in 0..N {
             let y = middle + half * x[i];
             grow[i] = exp(y);
-            ln_theta[i] = arc.ln_theta_a + y;
-            w[i] = arc.sign * (2.0 * direct_e(&arc.law, arc.phi_a, arc.friction_a, y, grow[i])).sqrt();
+            ln_theta[i] = self.ln_theta_a + y;
+            w[i] = self.sign * (2.0 * direct_e(&self.law, self.phi_a, self.friction_a, y, grow[i])).sqrt();
         }
-        let (z, slope) = turning_lanes(&w);
-        for i in 0..LANES {
-            let d = w[i] * slope[i];
-            let u = 1.0 + d;
-            let dt = -weight[i] * grow[i] / d;
-            let friction = 1.0 + a * z[i] + (b - a) * ln_theta[i];
-            time[i] += dt;
-            lag[i] += dt * u;
-            work[i] -= weight[i] / d * u * friction;
-            sensitivity[i] -= dt * grow[i] * u / (d * d);
-            friction_min[i] = if friction < friction_min[i] { friction } else { friction_min[i] };
+        let found = turning_lanes(&w);
+        let mut terms = Terms::<N>::new();
+        for i in 0..N {
+            let inverse = 1.0 / found.excess[i];
+            let u = found.u[i];
+            terms.friction[i] = 1.0 + a * found.ln_u[i] + (b - a) * ln_theta[i];
+            terms.time[i] = -weight[i] * grow[i] * inverse;
+            terms.lag[i] = terms.time[i] * u;
+            terms.work[i] = -weight[i] * inverse * u * terms.friction[i];
+            terms.sensitivity[i] = -terms.time[i] * grow[i] * u * inverse * inverse;
         }
-    }
-    Sums {
-        time: half * arc.theta_a * fold(&time),
-        lag: half * arc.theta_a * fold(&lag),
-        work: half * fold(&work),
-        sensitivity: half * arc.theta_a * arc.slope_a * fold(&sensitivity),
-        swing: -half * arc.theta_a * arc.theta_a * fold(&sensitivity),
-        friction_min: least(&friction_min),
-        nodes: rule.x.len() as u32,
+        tally.add(&terms);
     }
 }

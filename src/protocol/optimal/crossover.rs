@@ -106,7 +106,7 @@ fn acceleration(survey: &mut Survey, wanted: Wanted, times: &mut CrossoverTimes)
     let Law { a, b } = problem.law;
     let friction_0 = problem.friction_a();
     let friction_1 = problem.friction_end();
-    let ln_v_i = -problem.from.ln();
+    let ln_v_i = -problem.from.ln;
     let ratio = 1.0 + problem.fall;
     if wanted.cross && friction_0 > b - a && ratio * friction_1 > friction_0 {
         (times.t_cross, times.work_cross) = survey.measure(problem.extremal(0.0, None));
@@ -129,7 +129,7 @@ fn deceleration(survey: &mut Survey, wanted: Wanted, times: &mut CrossoverTimes)
         let t_min = problem.t_min();
         times.t_min = Some(t_min);
         times.work_min = Some(hold::work(&problem.law, problem.from, t_min));
-        if 1.0 + b * problem.from.ln() <= problem.unique_above() {
+        if 1.0 + b * problem.from.ln <= problem.unique_above() {
             survey.status = survey.status.max(Status::Nonphysical);
         }
     }
@@ -141,7 +141,7 @@ fn deceleration(survey: &mut Survey, wanted: Wanted, times: &mut CrossoverTimes)
     if wanted.free
         && problem.bounded
         && turns
-        && 1.0 + b * problem.from.ln() > b - a
+        && 1.0 + b * problem.from.ln > b - a
         && let Some([rising, falling]) = problem.free_window()
     {
         times.t_free_in = survey.measure(Some(rising)).0;

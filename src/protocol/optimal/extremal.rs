@@ -14,7 +14,7 @@
 //!
 //! A search counts `q` from `q_hold` where that exists, so that short holds keep their digits.
 
-use super::arc::{Arc, Chart, Sums, phi};
+use super::arc::{Arc, Chart, Sums, phi, phi_and_slope};
 use super::hold;
 use super::lifetime::Lifetime;
 use crate::model::Law;
@@ -44,12 +44,15 @@ pub(super) struct Extremal {
     pub hold_time: f64,
     /// Contact lifetime where the arc starts.
     pub theta_s: f64,
-    /// `theta_1 - theta_s`, free of cancellation.
-    rest: f64,
+    /// By how much later than `t_min` the arc starts (negative: sooner), free of cancellation; for arcs of rising problems
+    /// that are parametrised by their end, what is to be added to their lag instead of their time.
+    late: f64,
+    /// Whether it is.
+    lags: bool,
     pub arc: Arc,
-    /// `ln u` and slope of the turning function at the start and the end of the arc.
-    pub start: Turning,
-    pub end: Turning,
+    /// `ln u` at the start and at the end of the arc.
+    pub start: f64,
+    pub end: f64,
     /// How the time follows the parameter.
     rate: Rate,
 }
@@ -63,8 +66,17 @@ enum Rate {
     Turning { gain: f64, inner: f64, outer: f64 },
     /// `gain` times the sensitivity of the direct chart.
     Direct { gain: f64 },
-    /// `gain` times the swing, for arcs on which theta rises all the way.
-    Rising { gain: f64 },
+    /// `gain` times the swing, for arcs on which theta goes one way.
+    OneWay { gain: f64 },
+}
+
+/// How an arc of a rising problem starts.
+struct Leaving {
+    hold_time: f64,
+    /// What is to be added to the arc's lag.
+    late: f64,
+    /// `ln(theta_s/theta_1)`.
+    d: f64,
 }
 
 impl Problem {
@@ -84,6 +96,20 @@ impl Problem {
             (true, true) => hold::time(-self.fall * self.to.theta, self.to.rest),
             (true, false) => -self.fall * self.to.theta,
         }
+    }
+
+    /// What the growth of theta at rest takes beyond `t_min`, free of cancellation; at most 0.
+    pub fn rest_beyond(&self) -> f64 {
+        if !(self.rises() && self.bounded) {
+            return 0.0;
+        }
+        self.growth_beyond(-self.fall * self.to.theta)
+    }
+
+    /// `growth - ln(1 + growth/rest)`: what a growth of theta up to its end takes at rest, less what it takes at `v = 1`.
+    fn growth_beyond(&self, growth: f64) -> f64 {
+        let time = hold::time(growth, self.to.rest);
+        if time > 1.0 { growth - time } else { phi(time) - growth * self.to.theta / self.to.rest }
     }
 
     /// Friction must exceed `max(0, b - a)` all along an extremal for it to be the only one.
@@ -108,17 +134,17 @@ impl Problem {
 
     /// Friction at the anchor with `u = 1`.
     pub fn friction_a(&self) -> f64 {
-        1.0 + (self.law.b - self.law.a) * self.anchor().ln()
+        1.0 + (self.law.b - self.law.a) * self.anchor().ln
     }
 
     /// Friction at the start with `u = 1`, `tau_ss(v_i)` where that is steady.
     fn friction_start(&self) -> f64 {
-        1.0 + (self.law.b - self.law.a) * self.from.ln()
+        1.0 + (self.law.b - self.law.a) * self.from.ln
     }
 
     /// Friction at the end with `u = 1`, `tau_ss(v_f)` where that is steady.
     pub fn friction_end(&self) -> f64 {
-        1.0 + (self.law.b - self.law.a) * self.to.ln()
+        1.0 + (self.law.b - self.law.a) * self.to.ln
     }
 
     /// Scale of the turning layer at the anchor, `w = X/layer`; NaN where `tau <= b - a` there.
@@ -132,11 +158,16 @@ impl Problem {
             return None;
         }
         // v = 1 at the anchor.
-        let z = self.anchor().ln();
+        let z = self.anchor().ln;
         let c_a = self.law.a * phi(z) - self.friction_a();
         let xi = turning_distance(&self.law, self.law.a * phi(z), -c_a)?;
         let q = xi.sqrt() / self.layer();
         Some(if self.rises() { q } else { -q })
+    }
+
+    /// About how far from 0 the parameter is of a protocol that takes `beyond` more than the least time.
+    pub fn reach(&self, beyond: f64) -> f64 {
+        beyond * self.friction_a().abs() / (self.law.a * self.theta_a()) + ln_1p(self.fall).abs()
     }
 
     /// Bounds of the parameter, counted from `q_hold`: a hold cannot last longer than the whole, and `e^q` must stay a
@@ -154,26 +185,17 @@ impl Problem {
     /// end, and falling. `None` if they turn below `theta_1`.
     pub fn free_window(&self) -> Option<[Extremal; 2]> {
         let law = self.law;
-        let ln_theta = self.from.ln();
+        let ln_theta = self.from.ln;
         let excess = law.a * phi(ln_theta);
         let friction = 1.0 + (law.b - law.a) * ln_theta;
         let xi = turning_distance(&law, excess, friction - excess)?;
         let x_squares = (1.0 + xi) * self.fall;
         let x = (xi + x_squares).sqrt();
         let one = |x_end: f64| {
-            let theta_h = self.from.theta * (1.0 + xi);
-            let arc = Arc { law, chart: Chart::Turning { theta_h, x_start: -xi.sqrt(), x_end, x_squares } };
-            let (start, end) = arc.ends()?;
+            let (theta_h, ln_theta_h) = (self.from.theta * (1.0 + xi), ln_theta + ln_1p(xi));
+            let arc = Arc { law, chart: Chart::Turning { theta_h, ln_theta_h, x_start: -xi.sqrt(), x_end, x_squares } };
             let rate = Rate::Turning { gain: 0.0, inner: 0.0, outer: 0.0 };
-            Some(Extremal {
-                hold_time: 0.0,
-                theta_s: self.from.theta,
-                rest: -self.fall * self.to.theta,
-                arc,
-                start,
-                end,
-                rate,
-            })
+            self.without_hold(arc, ln_theta, arc.end()?.ln_u, rate)
         };
         if x > 0.0 { Some([one(-x)?, one(x)?]) } else { None }
     }
@@ -184,8 +206,8 @@ impl Problem {
         let unit = self.theta_a();
         let q = p + q_hold.unwrap_or(0.0);
         match (self.rises(), q_hold) {
-            (false, Some(_)) if p < 0.0 => self.after_hold(-p * unit, -unit),
-            (true, Some(_)) if p > 0.0 => self.after_hold(self.t_min() + p * unit, unit),
+            (false, Some(_)) if p < 0.0 => self.after_hold(self.from, self.fall, -p * unit, -unit),
+            (true, Some(_)) if p > 0.0 => self.after_hold(self.to, 0.0, p * unit, unit),
             (false, _) if q > 0.0 => self.falling_at_once(q),
             (false, _) => self.rising_first(q),
             (true, _) if q < 0.0 => self.rising_to_the_end(q),
@@ -193,84 +215,78 @@ impl Problem {
         }
     }
 
-    /// A hold of `time`, then an arc through its turning point down to `theta_1`.
-    fn after_hold(&self, time: f64, unit: f64) -> Option<Extremal> {
+    /// A hold that ends `time` after the lifetime `since`, which is `fall` above `theta_1`, then an arc through its
+    /// turning point down to `theta_1`.
+    fn after_hold(&self, since: Lifetime, fall: f64, time: f64, unit: f64) -> Option<Extremal> {
         let law = self.law;
-        let released = self.from.aged(time);
-        let Lifetime { theta, rest } = released;
-        let z = released.ln();
+        let released = since.aged(time);
+        let Lifetime { theta, rest, ln: z } = released;
         let excess = law.a * phi(z);
         let friction = 1.0 + (law.b - law.a) * z;
         let xi = turning_distance(&law, excess, friction - excess)?;
-        let theta_h = theta * (1.0 + xi);
-        // theta_c/theta_1 - 1, from theta_0/theta_1 - 1.
-        let fall = self.fall + self.from.growth(time) / self.to.theta;
+        let (theta_h, ln_theta_h) = (theta * (1.0 + xi), z + ln_1p(xi));
+        // theta_c/theta_1 - 1.
+        let fall = fall + since.growth(time) / self.to.theta;
         let x_squares = (1.0 + xi) * fall;
-        let chart = Chart::Turning { theta_h, x_start: -xi.sqrt(), x_end: (xi + x_squares).sqrt(), x_squares };
-        let (start, end) = Arc { law, chart }.ends()?;
-        let c_h = 1.0 + (law.b - law.a) * ln(theta_h);
+        let (x_start, x_end) = (-xi.sqrt(), (xi + x_squares).sqrt());
+        let arc = Arc { law, chart: Chart::Turning { theta_h, ln_theta_h, x_start, x_end, x_squares } };
+        let end = arc.end()?;
+        let c_h = 1.0 + (law.b - law.a) * ln_theta_h;
         // d ln theta_h/d ln theta_c from C(theta_h) = C_leaving(theta_c); the hold's own time cancels against the start
         // of the arc.
         let m = (1.0 + law.a - law.b + law.b * z) / theta * theta_h / (c_h + law.a - law.b);
-        let end_term = self.to.theta / (exp_m1(end.ln_u));
-        let rate = Rate::Hold { gain: unit * m * rest / theta, inner: end_term, outer: unit * m };
+        let rate = Rate::Hold { gain: unit * m * rest / theta, inner: self.to.theta / end.excess, outer: unit * m };
         Some(Extremal {
-            hold_time: time,
+            hold_time: self.t_min() + time,
             theta_s: theta,
-            rest: -fall * self.to.theta,
-            arc: Arc { law, chart },
-            start,
-            end,
+            late: time,
+            lags: false,
+            arc,
+            start: z,
+            end: end.ln_u,
             rate,
         })
+    }
+
+    /// An arc from theta at the start to theta at the end.
+    fn without_hold(&self, arc: Arc, start: f64, end: f64, rate: Rate) -> Option<Extremal> {
+        let (late, lags) = (self.rest_beyond(), self.rises());
+        Some(Extremal { hold_time: 0.0, theta_s: self.from.theta, late, lags, arc, start, end, rate })
     }
 
     /// Falling problem, `q = ln u(0+) > 0`.
     fn falling_at_once(&self, z_0: f64) -> Option<Extremal> {
         let law = self.law;
-        let excess = law.a * phi(z_0);
-        let c_a = excess - self.friction_a();
-        if let Some(xi) = turning_distance(&law, excess, -c_a).filter(|&xi| xi <= 1.0) {
+        let (phi_0, excess_0) = phi_and_slope(z_0);
+        let excess = law.a * phi_0;
+        let friction_a = self.friction_a();
+        let pull = friction_a - excess;
+        if may_turn(&law, excess, pull)
+            && let Some(xi) = turning_distance(&law, excess, pull).filter(|&xi| xi <= 1.0)
+        {
             let x_squares = (1.0 + xi) * self.fall;
-            let theta_h = self.from.theta * (1.0 + xi);
-            let chart = Chart::Turning { theta_h, x_start: xi.sqrt(), x_end: (xi + x_squares).sqrt(), x_squares };
-            let arc = Arc { law, chart };
-            let (start, end) = arc.ends()?;
-            let c_h = 1.0 + (law.b - law.a) * ln(theta_h);
+            let (theta_h, ln_theta_h) = (self.from.theta * (1.0 + xi), self.from.ln + ln_1p(xi));
+            let (x_start, x_end) = (xi.sqrt(), (xi + x_squares).sqrt());
+            let arc = Arc { law, chart: Chart::Turning { theta_h, ln_theta_h, x_start, x_end, x_squares } };
+            let end = arc.end()?;
+            let c_h = 1.0 + (law.b - law.a) * ln_theta_h;
             let swing = law.a * (1.0 + xi) / (c_h + law.a - law.b);
-            let rate = Rate::Turning {
-                gain: swing * exp_m1(z_0),
-                inner: self.to.theta / exp_m1(end.ln_u),
-                outer: -self.from.theta * swing,
+            let rate = if x_squares < xi {
+                // A short arc: both ends would cancel.
+                Rate::OneWay { gain: -excess_0 / self.from.theta }
+            } else {
+                Rate::Turning {
+                    gain: swing * excess_0,
+                    inner: self.to.theta / end.excess,
+                    outer: -self.from.theta * swing,
+                }
             };
-            return Some(Extremal {
-                hold_time: 0.0,
-                theta_s: self.from.theta,
-                rest: -self.fall * self.to.theta,
-                arc,
-                start,
-                end,
-                rate,
-            });
+            return self.without_hold(arc, z_0, end.ln_u, rate);
         }
-        let chart = Chart::Direct {
-            theta_a: self.from.theta,
-            z_a: z_0,
-            friction_a: self.friction_a(),
-            y_start: 0.0,
-            y_end: -ln_1p(self.fall),
-        };
+        let y_end = -ln_1p(self.fall);
+        let chart = Chart::Direct { theta_a: self.from.theta, z_a: z_0, friction_a, y_start: 0.0, y_end };
         let arc = Arc { law, chart };
-        let (start, end) = arc.ends()?;
-        Some(Extremal {
-            hold_time: 0.0,
-            theta_s: self.from.theta,
-            rest: -self.fall * self.to.theta,
-            arc,
-            start,
-            end,
-            rate: Rate::Direct { gain: 1.0 },
-        })
+        self.without_hold(arc, z_0, arc.end()?.ln_u, Rate::Direct { gain: 1.0 })
     }
 
     /// Falling problem, `q <= 0`: `X = layer q` at the start.
@@ -278,32 +294,25 @@ impl Problem {
         let law = self.law;
         let layer = self.layer();
         let x_start = layer * q;
-        let grow = 1.0 + x_start * x_start;
-        let theta_h = self.from.theta * grow;
+        let x2 = x_start * x_start;
+        let grow = 1.0 + x2;
+        let (theta_h, ln_theta_h) = (self.from.theta * grow, self.from.ln + ln_1p(x2));
         let x_squares = grow * self.fall;
-        let chart = Chart::Turning { theta_h, x_start, x_end: (x_start * x_start + x_squares).sqrt(), x_squares };
-        let arc = Arc { law, chart };
-        let (start, end) = arc.ends()?;
+        let x_end = (x2 + x_squares).sqrt();
+        let arc = Arc { law, chart: Chart::Turning { theta_h, ln_theta_h, x_start, x_end, x_squares } };
+        let (start, end) = (arc.start()?, arc.end()?);
         let rate = Rate::Turning {
             gain: layer * 2.0 * x_start / grow,
-            inner: if end.ln_u == 0.0 { 0.0 } else { self.to.theta / exp_m1(end.ln_u) },
-            outer: -layer * edge(&law, theta_h, x_start, &start),
+            inner: if end.excess == 0.0 { 0.0 } else { self.to.theta / end.excess },
+            outer: -layer * edge(&law, theta_h, ln_theta_h, x_start, &start),
         };
-        Some(Extremal {
-            hold_time: 0.0,
-            theta_s: self.from.theta,
-            rest: -self.fall * self.to.theta,
-            arc,
-            start,
-            end,
-            rate,
-        })
+        self.without_hold(arc, start.ln_u, end.ln_u, rate)
     }
 
     /// Rising problem, `q < 0`: `ln u(t_f-)`, stretched under the bound.
     fn rising_to_the_end(&self, q: f64) -> Option<Extremal> {
         let law = self.law;
-        let reach = -self.to.ln();
+        let reach = -self.to.ln;
         // ln v(t_f-), and ln u(t_f-).
         let (eta, z_1, stretch) = if self.bounded {
             let shrink = exp(q / reach);
@@ -311,35 +320,37 @@ impl Problem {
         } else {
             (q + reach, q, 1.0)
         };
-        let excess = law.a * phi(z_1);
-        let c_a = excess - self.friction_a();
-        let (hold_time, d) = self.leaving(law.a * (self.to.theta * exp_m1(eta) - eta))?;
+        let (phi_1, excess_1) = phi_and_slope(z_1);
+        let excess = law.a * phi_1;
+        let friction_a = self.friction_a();
+        let pull = friction_a - excess;
+        let Leaving { hold_time, late, d } = self.leaving(law.a * (self.to.theta * exp_m1(eta) - eta));
         let theta_s = if hold_time > 0.0 { self.to.theta * exp(d) } else { self.from.theta };
-        let rising = Rate::Rising { gain: -stretch * exp_m1(z_1) / self.to.theta };
-        if let Some(xi) = turning_distance(&law, excess, -c_a).filter(|&xi| xi <= 1.0) {
-            let theta_h = self.to.theta * (1.0 + xi);
+        let rising = Rate::OneWay { gain: -stretch * excess_1 / self.to.theta };
+        if may_turn(&law, excess, pull)
+            && let Some(xi) = turning_distance(&law, excess, pull).filter(|&xi| xi <= 1.0)
+        {
+            let (theta_h, ln_theta_h) = (self.to.theta * (1.0 + xi), self.to.ln + ln_1p(xi));
             let x_squares = -(1.0 + xi) * exp_m1(-d);
-            let chart = Chart::Turning { theta_h, x_start: -(xi - x_squares).sqrt(), x_end: -xi.sqrt(), x_squares };
-            let arc = Arc { law, chart };
-            let (start, end) = arc.ends()?;
-            let c_h = 1.0 + (law.b - law.a) * ln(theta_h);
+            let (x_start, x_end) = (-(xi - x_squares).sqrt(), -xi.sqrt());
+            let arc = Arc { law, chart: Chart::Turning { theta_h, ln_theta_h, x_start, x_end, x_squares } };
+            let start = arc.start()?;
+            let c_h = 1.0 + (law.b - law.a) * ln_theta_h;
             let swing = law.a * (1.0 + xi) / (c_h + law.a - law.b);
-            let rate = if z_1 < -1.0 {
+            let rate = if z_1 < -1.0 || -x_squares < xi {
                 rising
             } else {
                 Rate::Turning {
-                    gain: stretch * swing * exp_m1(z_1),
-                    inner: -theta_s / exp_m1(start.ln_u),
+                    gain: stretch * swing * excess_1,
+                    inner: -theta_s / start.excess,
                     outer: stretch * self.to.theta * swing,
                 }
             };
-            return Some(Extremal { hold_time, theta_s, rest: -self.to.theta * exp_m1(d), arc, start, end, rate });
+            return Some(Extremal { hold_time, theta_s, late, lags: true, arc, start: start.ln_u, end: z_1, rate });
         }
-        let chart =
-            Chart::Direct { theta_a: self.to.theta, z_a: z_1, friction_a: self.friction_a(), y_start: d, y_end: 0.0 };
+        let chart = Chart::Direct { theta_a: self.to.theta, z_a: z_1, friction_a, y_start: d, y_end: 0.0 };
         let arc = Arc { law, chart };
-        let (start, end) = arc.ends()?;
-        Some(Extremal { hold_time, theta_s, rest: -self.to.theta * exp_m1(d), arc, start, end, rate: rising })
+        Some(Extremal { hold_time, theta_s, late, lags: true, arc, start: arc.start()?.ln_u, end: z_1, rate: rising })
     }
 
     /// Rising problem, `q >= 0`: `X = layer q` at the end.
@@ -348,36 +359,43 @@ impl Problem {
         let layer = self.layer();
         let x_end = layer * q;
         let x2 = x_end * x_end;
-        let theta_h = self.to.theta * (1.0 + x2);
-        let c_h = 1.0 + (law.b - law.a) * ln(theta_h);
-        let excess = (law.a - law.b) * ln_1p(x2) + c_h * x2 / (1.0 + x2);
-        let (hold_time, d) = self.leaving(excess - law.a * phi(self.to.ln()))?;
+        let grown = ln_1p(x2);
+        let (theta_h, ln_theta_h) = (self.to.theta * (1.0 + x2), self.to.ln + grown);
+        let c_h = 1.0 + (law.b - law.a) * ln_theta_h;
+        let excess = (law.a - law.b) * grown + c_h * x2 / (1.0 + x2);
+        let Leaving { hold_time, late, d } = self.leaving(excess - law.a * phi(self.to.ln));
         let theta_s = if hold_time > 0.0 { self.to.theta * exp(d) } else { self.from.theta };
         let x_squares = -(1.0 + x2) * exp_m1(-d);
-        let chart = Chart::Turning { theta_h, x_start: -(x2 - x_squares).sqrt(), x_end, x_squares };
-        let arc = Arc { law, chart };
-        let (start, end) = arc.ends()?;
+        let x_start = -(x2 - x_squares).sqrt();
+        let arc = Arc { law, chart: Chart::Turning { theta_h, ln_theta_h, x_start, x_end, x_squares } };
+        let (start, end) = (arc.start()?, arc.end()?);
         let rate = Rate::Turning {
             gain: layer * 2.0 * x_end / (1.0 + x2),
-            inner: -theta_s / exp_m1(start.ln_u),
-            outer: layer * edge(&law, theta_h, x_end, &end),
+            inner: -theta_s / start.excess,
+            outer: layer * edge(&law, theta_h, ln_theta_h, x_end, &end),
         };
-        Some(Extremal { hold_time, theta_s, rest: -self.to.theta * exp_m1(d), arc, start, end, rate })
+        Some(Extremal { hold_time, theta_s, late, lags: true, arc, start: start.ln_u, end: end.ln_u, rate })
     }
 
-    /// For a rising problem: the hold time and `ln(theta_s/theta_1)` where the arc starts, from `kappa = theta_1 (C -
-    /// C_leaving(theta_1))`.
-    fn leaving(&self, kappa: f64) -> Option<(f64, f64)> {
-        let all = -ln_1p(self.rise());
+    /// For a rising problem: where the arc starts, from `kappa = theta_1 (C - C_leaving(theta_1))`.
+    fn leaving(&self, kappa: f64) -> Leaving {
+        // ln(theta_0/theta_1), from what has its digits.
+        let all = if self.fall < -0.5 { self.from.ln - self.to.ln } else { -ln_1p(self.rise()) };
+        let at_once = Leaving { hold_time: 0.0, late: self.rest_beyond(), d: all };
         if !self.bounded {
-            return Some((0.0, all));
+            return at_once;
         }
         // Where no arc leaves the bound (friction at v = 1 too low) only the protocol without a hold is left.
-        let Some(d) = hold::leave(&self.law, self.to.ln(), kappa).filter(|&d| d > all) else {
-            return Some((0.0, all));
+        let Some(d) = hold::leave(&self.law, self.to.ln, kappa).filter(|&d| d > all) else {
+            return at_once;
         };
         let held = self.to.theta * exp_m1(d) - self.fall * self.to.theta;
-        Some((hold::time(held, self.from.rest - held), d))
+        if held <= 0.0 {
+            return at_once;
+        }
+        // 1 - theta_s comes from theta_1: it is a small difference where v_f is next to 1.
+        let left = -self.to.theta * exp_m1(d);
+        Leaving { hold_time: hold::time(held, self.to.rest + left), late: self.growth_beyond(left), d }
     }
 }
 
@@ -386,11 +404,8 @@ impl Extremal {
     pub fn friction_min(&self, problem: &Problem, sums: &Sums) -> f64 {
         let Law { a, b } = problem.law;
         let friction = |ln_u: f64, theta: f64| 1.0 + a * ln_u + (b - a) * ln(theta);
-        let held = if self.hold_time > 0.0 { 1.0 + b * problem.from.ln() } else { f64::INFINITY };
-        sums.friction_min
-            .min(friction(self.start.ln_u, self.theta_s))
-            .min(friction(self.end.ln_u, problem.to.theta))
-            .min(held)
+        let held = if self.hold_time > 0.0 { 1.0 + b * problem.from.ln } else { f64::INFINITY };
+        sums.friction_min.min(friction(self.start, self.theta_s)).min(friction(self.end, problem.to.theta)).min(held)
     }
 
     /// Work of the hold and the arc together.
@@ -404,32 +419,20 @@ impl Extremal {
     }
 
     /// The total time beyond the least time `t_min` of the problem.
-    pub fn time_beyond(&self, problem: &Problem, sums: &Sums) -> f64 {
-        if !problem.rises() {
-            return self.hold_time + sums.time;
-        }
-        if problem.bounded {
-            if self.hold_time > 0.0 && self.rest > 0.0 {
-                // The arc replaces the last part of the shortest protocol, a hold from theta_s to theta_1.
-                sums.time - hold::time(self.rest, problem.to.rest)
-            } else {
-                (self.hold_time - problem.t_min()) + sums.time
-            }
-        } else {
-            sums.lag
-        }
+    pub fn time_beyond(&self, sums: &Sums) -> f64 {
+        self.late + if self.lags { sums.lag } else { sums.time }
     }
 
     /// How far the time (beyond the least) is from the one wanted, as a rising function of the parameter: the logarithm
     /// of their ratio, or their relative difference where a hold makes time linear in the parameter.
     pub fn probe(&self, problem: &Problem, sums: &Sums, beyond: f64) -> Probe {
-        let time = self.time_beyond(problem, sums);
+        let time = self.time_beyond(sums);
         let rate = match self.rate {
             Rate::Hold { gain, inner, outer } | Rate::Turning { gain, inner, outer } => {
                 gain * (sums.sensitivity + inner) + outer
             }
             Rate::Direct { gain } => gain * sums.sensitivity,
-            Rate::Rising { gain } => gain * sums.swing,
+            Rate::OneWay { gain } => gain * sums.swing,
         };
         let (value, slope) = if let Rate::Hold { .. } = self.rate {
             (time / beyond - 1.0, rate / beyond)
@@ -443,31 +446,50 @@ impl Extremal {
 }
 
 /// `d time/dX` at an end of the turning chart: `2 theta_h X/((1 + X^2)^2 (u - 1))`, regular at `X = 0`.
-fn edge(law: &Law, theta_h: f64, x: f64, at: &Turning) -> f64 {
+fn edge(law: &Law, theta_h: f64, ln_theta_h: f64, x: f64, at: &Turning) -> f64 {
     let grow = 1.0 + x * x;
-    let c_h = 1.0 + (law.b - law.a) * ln(theta_h);
+    let c_h = 1.0 + (law.b - law.a) * ln_theta_h;
     2.0 * theta_h / (grow * grow * super::arc::omega(law, c_h, x * x) * at.slope)
+}
+
+/// Whether the turning point can be within a factor of two: a bound that costs no logarithm.
+///
+/// `(a - b) ln(1 + xi) + pull xi` at `xi = 1`, below which `excess` must lie.
+fn may_turn(law: &Law, excess: f64, pull: f64) -> bool {
+    excess <= (law.a - law.b) * std::f64::consts::LN_2 + pull
 }
 
 /// `xi = theta_h/theta - 1` from `a E = (a - b) ln(1 + xi) - C theta xi` at `theta`; `None` where there is no turning
 /// point above.
 ///
-/// `excess` is `a E >= 0` and `pull` is `-C theta`. Newton's method from the tangent at 0 converges monotonically on
-/// either side of `a = b`.
+/// `excess` is `a E >= 0` and `pull` is `-C theta`, below 0 where `C > 0`: for `a > b` friction then still turns theta if
+/// it is near. Newton's method from the tangent at 0 converges monotonically on either side of `a = b`; Halley's, whose
+/// steps it corrects, gets there in fewer.
 fn turning_distance(law: &Law, excess: f64, pull: f64) -> Option<f64> {
     let bend = law.a - law.b;
-    if pull <= 0.0 || pull + bend <= 0.0 {
+    if pull + bend <= 0.0 {
         return None;
     }
-    let mut xi = excess / (pull + bend);
+    // From ln(1 + xi) = xi (6 + xi)/(6 + 4 xi), which is good to 1 % up to xi = 1; else from the tangent.
+    let tangent = excess / (pull + bend);
+    let (square, linear) = (bend + 4.0 * pull, 3.0 * (bend + pull) - 2.0 * excess);
+    let near = 6.0 * excess / (linear + (linear * linear + 6.0 * square * excess).sqrt());
+    let mut xi = if near > 0.0 && near < 2.0 { near } else { tangent };
     for _ in 0..60 {
-        let slope = bend / (1.0 + xi) + pull;
+        let inverse = 1.0 / (1.0 + xi);
+        let slope = bend * inverse + pull;
         if slope.is_nan() || slope <= 0.0 {
             return None;
         }
-        let step = (bend * ln_1p(xi) + pull * xi - excess) / slope;
+        let newton = (bend * ln_1p(xi) + pull * xi - excess) / slope;
+        // Half of the second derivative over the first: what Newton's step lacks.
+        let curvature = -0.5 * bend * inverse * inverse / slope;
+        let correction = curvature * newton;
+        let step = if correction.abs() < 0.3 { newton / (1.0 - correction) } else { newton };
         xi -= step;
-        if step.abs() <= 1e-15 * xi.abs() {
+        // The error left is of third order: by the second derivative squared and by the third.
+        let left = (correction * correction + (correction * inverse * newton).abs()) * step;
+        if step.abs() <= 1e-15 * xi.abs() || (correction.abs() < 0.3 && left.abs() <= 1e-17 * xi.abs()) {
             break;
         }
     }
@@ -501,7 +523,7 @@ mod tests {
                         let time = |q: f64| {
                             let extremal = problem.extremal(q, q_hold)?;
                             let sums = extremal.arc.sums(1e-13)?;
-                            Some((extremal.probe(&problem, &sums, 1.0), extremal.time_beyond(&problem, &sums)))
+                            Some((extremal.probe(&problem, &sums, 1.0), extremal.time_beyond(&sums)))
                         };
                         let (Some((before, _)), Some((here, beyond)), Some((after, _))) =
                             (time(q - step), time(q), time(q + step))

@@ -3,7 +3,7 @@
 use super::lifetime::Lifetime;
 use crate::model::Law;
 use crate::numerics::dilogarithm::dilogarithm;
-use crate::numerics::elementary::{exp_m1, ln, ln_1p};
+use crate::numerics::elementary::{exp_m1, ln_1p};
 use crate::numerics::gauss::rule;
 
 /// Time to age by `growth`, until `rest` is left to 1.
@@ -20,7 +20,7 @@ pub(super) fn work(law: &Law, from: Lifetime, time: f64) -> f64 {
     // few nodes do. Beyond, theta has about doubled and a difference of dilogarithms does not cancel.
     let integral = if time <= -ln_1p(-from.theta) {
         let rule = rule(16);
-        let sum: f64 = rule.x.iter().zip(&rule.w).map(|(x, w)| w * from.aged(0.5 * time * (1.0 + x)).ln()).sum();
+        let sum: f64 = rule.x.iter().zip(&rule.w).map(|(x, w)| w * from.aged(0.5 * time * (1.0 + x)).ln).sum();
         0.5 * time * sum
     } else {
         let to = from.aged(time);
@@ -30,9 +30,9 @@ pub(super) fn work(law: &Law, from: Lifetime, time: f64) -> f64 {
 }
 
 /// `int_0^theta ln y/(1 - y) dy = Li_2(1 - theta) - pi^2/6`, to full relative accuracy as `theta -> 0`.
-fn aged(Lifetime { theta, rest }: Lifetime) -> f64 {
+fn aged(Lifetime { theta, rest, ln }: Lifetime) -> f64 {
     if theta < 0.5 {
-        -(ln_1p(-theta) * ln(theta) + dilogarithm(theta))
+        -(ln_1p(-theta) * ln + dilogarithm(theta))
     } else {
         dilogarithm(rest) - std::f64::consts::PI * std::f64::consts::PI / 6.0
     }

@@ -9,22 +9,20 @@ pub(super) struct Lifetime {
     pub theta: f64,
     /// `1 - theta`.
     pub rest: f64,
+    /// `ln theta`.
+    pub ln: f64,
 }
 
 impl Lifetime {
-    /// That of a `theta` as it is.
-    pub fn new(theta: f64) -> Lifetime {
-        Lifetime { theta, rest: 1.0 - theta }
-    }
-
     /// That of steady sliding at `v`, `1/v`.
     pub fn steady(v: f64) -> Lifetime {
-        Lifetime { theta: 1.0 / v, rest: (v - 1.0) / v }
+        Lifetime::with(1.0 / v, (v - 1.0) / v)
     }
 
-    /// `ln theta`, from whichever of `theta` and `1 - theta` is small.
-    pub fn ln(&self) -> f64 {
-        if self.theta < 0.5 { ln(self.theta) } else { ln_1p(-self.rest) }
+    /// From `theta` and `1 - theta`; `ln theta` comes from whichever of `theta` and `1 - theta` is small.
+    pub fn with(theta: f64, rest: f64) -> Lifetime {
+        let ln = if theta < 0.5 { ln(theta) } else { ln_1p(-rest) };
+        Lifetime { theta, rest, ln }
     }
 
     /// By how much it grows in `time` at `v = 1`.
@@ -34,6 +32,6 @@ impl Lifetime {
 
     /// What it has become after `time` at `v = 1`.
     pub fn aged(&self, time: f64) -> Lifetime {
-        Lifetime { theta: self.theta + self.growth(time), rest: self.rest * exp(-time) }
+        Lifetime::with(self.theta + self.growth(time), self.rest * exp(-time))
     }
 }

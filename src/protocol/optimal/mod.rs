@@ -6,6 +6,7 @@
 mod arc;
 pub mod crossover;
 mod extremal;
+mod guess;
 mod hold;
 mod lifetime;
 mod motion;
@@ -14,7 +15,7 @@ mod search;
 
 use super::{Effort, Motion, Solved, Status};
 use crate::model::{Law, Transition};
-use crate::numerics::elementary::ln;
+use crate::numerics::elementary::{exp, ln_1p};
 use extremal::Problem;
 use lifetime::Lifetime;
 
@@ -116,40 +117,97 @@ pub fn shortest_time(transition: &Transition, bounded: bool) -> Option<f64> {
 /// What the optimal protocol would do now.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Feedback {
-    /// Its velocity.
+    /// Its velocity, which may be too small for a number.
     pub v: f64,
+    /// Its logarithm.
+    pub ln_v: f64,
     /// How hard the bound is pressed: the derivative of the cost rate with respect to `v` there, 0 off the bound.
     pub pressure: f64,
 }
 
-/// Optimal feedback: what the optimal protocol does now, at contact lifetime `theta` with `time_left` to reach
-/// `theta_f`; `fall` is `theta/theta_f - 1`. `None` where no protocol arrives in time, or where the solver could not
-/// certify its answer.
-#[allow(clippy::too_many_arguments)]
+/// Where an optimal protocol may start: on the way to steady sliding.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Position {
+    /// The contact lifetime.
+    pub theta: f64,
+    /// 1 less that.
+    pub rest: f64,
+    /// By how much the contact lifetime is above that of steady sliding at the end.
+    pub drop: f64,
+    pub time_left: f64,
+    /// `drop`, and the time that is left by how much contacts age at first: times `1 - theta_1` under the bound. For a
+    /// rise it is a small difference of the two.
+    pub margin: f64,
+}
+
+/// Optimal feedback: what the optimal protocol does now, on the way to steady sliding at `v_f`. `None` where no protocol
+/// arrives in time, or where the solver could not certify its answer.
 pub(super) fn feedback(
     law: Law,
-    theta: f64,
-    theta_f: f64,
-    fall: f64,
-    time_left: f64,
+    v_f: f64,
+    position: Position,
     bounded: bool,
     rtol: f64,
     effort: &mut Effort,
 ) -> Option<Feedback> {
-    let problem = Problem { law, from: Lifetime::new(theta), to: Lifetime::new(theta_f), fall, bounded };
-    let solved = search::solve(&problem, time_left, rtol);
-    effort.quadratures += solved.effort.quadratures;
-    effort.nodes += solved.effort.nodes;
+    let to = Lifetime::steady(v_f);
+    let Position { theta, rest, drop, time_left, margin } = position;
+    // A change that no velocity shows, and none of theta.
+    let unseen = drop.abs() <= f64::EPSILON * time_left.min(theta).min(rest);
+    let drop = if unseen { 0.0 } else { drop };
+    let from = Lifetime::with(theta, rest);
+    let problem = Problem { law, from, to, fall: drop / to.theta, bounded };
+    // The least time of a rise is -drop, or, under the bound, ln(1 - drop/(1 - theta_1)).
+    let aged = -drop / to.rest;
+    let (beyond, size) = if drop >= 0.0 {
+        (time_left, time_left)
+    } else if !bounded {
+        (margin, margin)
+    } else if aged < 0.5 {
+        let parts = [margin / to.rest, above_ln_1p(aged)];
+        (parts[0] + parts[1], parts[0].abs() + parts[1] - problem.rest_beyond())
+    } else {
+        (time_left - problem.t_min(), time_left)
+    };
+    let rounding = ROUNDINGS * f64::EPSILON * size;
+    let beyond = if bounded && beyond <= rounding { 0.0 } else { beyond };
+    let time = search::Time { whole: time_left, beyond, doubt: rounding / beyond };
+    let (solved, extremal) = search::find_beyond(&problem, time, rtol);
+    *effort += solved.effort;
     let optimum = solved.value?;
     let pressure = if optimum.strategy == Strategy::Hold {
-        // On the bound -C = friction + V_theta (1 - theta) gives V_theta.
-        let friction = 1.0 + law.b * ln(theta);
-        let v_theta = (optimum.hamiltonian - friction) / (1.0 - theta);
-        (friction + law.a - v_theta * theta).max(0.0)
+        // On the bound -C = friction + V_theta (1 - theta), with the C of the arc that leaves it at theta_c, where 1 -
+        // theta_c = (1 - theta) e^-t: nothing cancels next to theta = 1.
+        let held = optimum.hold_time;
+        let released = from.aged(held);
+        let grown = ln_1p(from.growth(held) / from.theta);
+        let leaving = (1.0 + law.a + law.b * released.ln) * exp(-held) / released.theta;
+        let friction = 1.0 + law.b * from.ln;
+        let v_theta = leaving + law.b * grown / from.rest;
+        (friction + law.a - v_theta * from.theta).max(0.0)
     } else {
         0.0
     };
-    Some(Feedback { v: optimum.v_start, pressure })
+    let ln_v = match extremal {
+        Some(extremal) if optimum.strategy != Strategy::Hold => extremal.start - from.ln,
+        _ => 0.0,
+    };
+    Some(Feedback { v: optimum.v_start, ln_v, pressure })
+}
+
+/// Roundings of what the time beyond the least one is a difference of.
+const ROUNDINGS: f64 = 64.0;
+
+/// `x - ln(1 + x)` for `0 <= x < 0.5`, without cancellation.
+fn above_ln_1p(x: f64) -> f64 {
+    // ln(1 + x) = 2 artanh s with s = x/(2 + x), and x - 2 s = s x.
+    let s = x / (2.0 + x);
+    let (square, mut power, mut sum) = (s * s, s, 0.0);
+    for k in 1..16 {
+        power *= square;
+        sum += power / f64::from(2 * k + 1);
+    }
+    s * x - 2.0 * sum
 }
 
 impl Problem {

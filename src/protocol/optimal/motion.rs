@@ -126,9 +126,9 @@ impl Hold {
             t: gone,
             v: 1.0,
             theta: now.theta,
-            friction: 1.0 + self.law.b * now.ln(),
+            friction: 1.0 + self.law.b * now.ln,
             v_c: None,
-            beta: Some(self.costate(now.ln(), now.rest, left)),
+            beta: Some(self.costate(now.ln, now.rest, left)),
         }
     }
 
@@ -161,6 +161,8 @@ pub(super) struct Timed {
     pub left: Vec<f64>,
     /// What the times of the pieces are to be multiplied with so that they add up.
     scale: f64,
+    /// When the pieces begin whose times count from the end.
+    middle: f64,
 }
 
 impl Timed {
@@ -182,7 +184,8 @@ impl Timed {
         let total = left[0];
         // Rounding of the search goes to the hold, if there is one.
         let (start, scale) = if hold_time > 0.0 { ((t_f - total).max(0.0), 1.0) } else { (0.0, t_f / total) };
-        Timed { pieces, start, t_f, gone, left, scale }
+        let middle = gone.iter().skip(1).zip(&left).find(|(gone, left)| gone > left).map_or(0.0, |(_, &left)| left);
+        Timed { pieces, start, t_f, gone, left, scale, middle: t_f - scale * middle }
     }
 
     /// Time since the start of the protocol: from the nearer end of the arc, so that the layers at both ends keep their
@@ -191,11 +194,13 @@ impl Timed {
         let count = f64::from(self.pieces.count);
         let piece = ((place * count) as usize).min(self.pieces.count as usize - 1);
         let (from, to) = (piece as f64 / count, (piece + 1) as f64 / count);
-        let t = if self.gone[piece + 1] <= self.left[piece] {
-            self.start + self.scale * (self.gone[piece] + self.pieces.time(from, place))
+        // Rounding must not let the time run backwards where one piece or one way of counting gives way to the next.
+        if self.gone[piece + 1] <= self.left[piece] {
+            let gone = (self.gone[piece] + self.pieces.time(from, place)).min(self.gone[piece + 1]);
+            (self.start + self.scale * gone).min(self.middle).max(0.0)
         } else {
-            self.t_f - self.scale * (self.left[piece + 1] + self.pieces.time(place, to))
-        };
-        t.clamp(0.0, self.t_f)
+            let left = (self.left[piece + 1] + self.pieces.time(place, to)).min(self.left[piece]);
+            (self.t_f - self.scale * left).max(self.middle).min(self.t_f)
+        }
     }
 }

@@ -1,16 +1,12 @@
 //! The search for the extremal that takes a given time, and what is read off it.
 
-use super::arc::{Sums, phi};
+use super::arc::Sums;
 use super::extremal::{Extremal, Problem};
+use super::guess::{Guess, guess};
 use super::{Optimum, Strategy, hold};
-use crate::numerics::elementary::{exp, ln, ln_1p};
-use crate::numerics::root::{Root, newton};
-use crate::numerics::turning::turning;
+use crate::numerics::elementary::exp;
+use crate::numerics::root::newton_in_pieces;
 use crate::protocol::{Effort, Solved, Status};
-
-/// A probe this close to the wanted time (relative) is the last: the Newton step from it leaves an error of the order
-/// of its square.
-const ENOUGH: f64 = 1e-8;
 
 /// Tolerance of a quadrature whose results are to be good to `rtol`. Velocities at the ends change by up to some twenty
 /// times the relative change of the time, since the time goes like the way in `ln u`.
@@ -21,8 +17,27 @@ pub(super) fn quadrature_tolerance(rtol: f64) -> f64 {
 /// Steps across the seam of the family before it counts as met.
 const MOST_CROSSINGS: u32 = 4;
 
+/// Most steps that make a short hold more exact.
+const MOST_REFINEMENTS: u32 = 10;
+
+/// A relative change of a short hold after which the next one is rounding.
+const SETTLED: f64 = 1e-7;
+
+/// A relative difference of times that is rounding.
+const SPENT: f64 = 4.0 * f64::EPSILON;
+
+/// A bracket that closes on a larger change of the time holds no member of this time, but a gap of the family; unless
+/// a search may end there, with a corrected step that leaves an error of third order.
+const JUMP: f64 = 1e-2;
+
 /// Share of the whole time below which a hold is short.
 const SHORT: f64 = 0.01;
+
+/// Share of `q_hold` below which parameters are counted from 0: counted from `q_hold`, a search could not tell them apart.
+const NEAR: f64 = 1e-5;
+
+/// How far from the seam, in the scaled start of the arc or in `ln v(0+)`, a protocol without a hold is next to it.
+const SEAM: f64 = 1e-3;
 
 /// How far rounding may take a velocity off the bound.
 const ROUNDING: f64 = 1e-9;
@@ -37,85 +52,121 @@ pub(super) fn solve(problem: &Problem, t_f: f64, rtol: f64) -> Solved<Optimum> {
 
 /// The same, with the extremal; `None` where there is no solution, or no arc beside the hold.
 pub(super) fn find(problem: &Problem, t_f: f64, rtol: f64) -> (Solved<Optimum>, Option<Extremal>) {
+    let beyond = t_f - problem.t_min();
+    find_beyond(problem, Time { whole: t_f, beyond, doubt: 2.0 * f64::EPSILON * t_f / beyond }, rtol)
+}
+
+/// A time, and what of it is beyond the least one.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Time {
+    pub whole: f64,
+    pub beyond: f64,
+    /// What rounding leaves open of `beyond`, relative.
+    pub doubt: f64,
+}
+
+/// The same, where the time beyond the least may be known better than as a difference.
+pub(super) fn find_beyond(problem: &Problem, time: Time, rtol: f64) -> (Solved<Optimum>, Option<Extremal>) {
+    let Time { whole: t_f, beyond, doubt } = time;
     let mut effort = Effort::default();
-    let t_min = problem.t_min();
-    let beyond = t_f - t_min;
     if beyond < 0.0 || beyond.is_nan() || (beyond == 0.0 && !problem.bounded) {
         return (Solved { status: Status::Infeasible, value: None, effort }, None);
     }
     if beyond == 0.0 {
-        return (shortest(problem, t_min), None);
+        return (shortest(problem, problem.t_min()), None);
     }
-    let q_hold = problem.q_hold();
-    // The time beyond the least is known no better than t_f itself is.
-    let enough = ENOUGH + 2.0 * f64::EPSILON * t_f / beyond;
-    let mut last: Option<(Extremal, Sums)> = None;
+    let family = Family { q_hold: problem.q_hold().filter(|&q_hold| problem.reach(beyond) >= NEAR * q_hold.abs()) };
+    let accuracy = Accuracy::new(rtol, doubt, problem.law.a);
+    let Guess { p: mut start, error } = guess(problem, family.q_hold, beyond);
+    let mut tolerance = (1e-3 * error).max(accuracy.exact);
+    let mut last: Option<Probed> = None;
     let mut friction_min = f64::INFINITY;
-    // Early probes only need to be as good as the step that they give.
-    let mut tolerance = 1e-3f64;
-    let exact = quadrature_tolerance(rtol);
-    // What counts is the time beyond the least, which may be a small share of the whole.
-    let share = beyond / t_f;
-    let mut probe = |q, share: f64| {
-        let extremal = problem.extremal(q, q_hold)?;
+    let mut probe = |p, share: f64| {
+        let extremal = problem.extremal(p, family.q_hold)?;
+        let piece = family.piece(p, extremal.hold_time);
+        let before = last.as_ref().filter(|last| last.piece == piece).map(|last| last.value);
         let (sums, probe) = loop {
             let sums = extremal.arc.sums((tolerance * share).max(FINEST))?;
             effort.quadratures += 1;
             effort.nodes += sums.nodes;
             let probe = extremal.probe(problem, &sums, beyond);
-            let next = (1e-3 * probe.value * probe.value).clamp(exact, tolerance);
             // A value within the error of its quadrature tells nothing, not even its sign.
-            let doubtful = tolerance > exact && probe.value.abs() <= (30.0 * tolerance).max(enough);
-            tolerance = if doubtful { next.min(1e-3 * tolerance).max(exact) } else { next };
+            let doubtful = tolerance > accuracy.exact
+                && (probe.value.abs() <= 30.0 * tolerance || accuracy.may_end(probe.value, before));
+            let next = accuracy.next(probe.value, before);
+            tolerance = if doubtful { next.min(1e-3 * tolerance).max(accuracy.exact) } else { next };
             if !doubtful {
                 break (sums, probe);
             }
         };
         friction_min = friction_min.min(sums.friction_min);
-        last = Some((extremal, sums));
-        Some(probe)
+        last = Some(Probed { extremal, sums, piece, value: probe.value });
+        Some((probe, piece))
     };
-    let bracket = problem.bracket(q_hold, beyond);
-    let mut start = guess(problem, q_hold, beyond);
-    let mut root = None;
+    // What counts is the time beyond the least, which may be a small share of the whole.
+    let share = beyond / t_f;
+    let bracket = problem.bracket(family.q_hold, beyond);
+    let mut outcome = None;
     for _ in 0..MOST_CROSSINGS {
-        root = newton(|q| probe(q, share), start, bracket, problem.rises(), enough);
-        // The slope jumps where the hold begins: a last step across that seam is taken again from the other side.
-        match (&root, q_hold) {
-            (Some(root), Some(_)) if (root.probed < 0.0) != (root.x < 0.0) => start = root.x,
+        let root =
+            newton_in_pieces(|p| probe(p, share), start, bracket, problem.rises(), accuracy.enough, accuracy.least);
+        let found = root.and_then(|(root, piece)| Some((root.x, problem.extremal(root.x, family.q_hold)?, piece)));
+        outcome = found.map(|(x, found, _)| (x, found));
+        // The slope jumps where a hold begins: a last step across such a seam is taken again from the other side.
+        match found {
+            Some((x, found, piece)) if family.piece(x, found.hold_time) != piece => start = x,
             _ => break,
         }
     }
-    if let Some(root) = &mut root
-        && let Some(held) = problem.extremal(root.x, q_hold).map(|found| found.hold_time)
-        && held > 0.0
-        && held < SHORT * t_f
-        && let Some(last) = probe(root.x, held / t_f)
-        && last.slope > 0.0
-    {
-        // A short hold is a small difference of two times: one more step, as fine as the hold asks.
-        *root = Root { x: root.x - last.value / last.slope, probed: root.x, probe: last };
+    // A short hold is a small difference of two times: more steps, as fine as the hold asks. Next to the seam a protocol
+    // without a hold may be one with a hold of less than the error.
+    for _ in 0..MOST_REFINEMENTS {
+        let Some((x, found)) = &mut outcome else { break };
+        let held = found.hold_time > 0.0;
+        let beside = if problem.rises() { found.start - problem.from.ln } else { *x };
+        let seam = family.q_hold.filter(|_| !held && beside < SEAM);
+        let share = match seam {
+            Some(_) => 0.0,
+            None if held && found.hold_time < SHORT * t_f => found.hold_time / t_f,
+            None => break,
+        };
+        let Some((last, _)) = probe(*x, share).filter(|(last, _)| last.slope > 0.0) else { break };
+        let finer = *x - last.value / last.slope;
+        // The slope may be 1e5 times as large on the other side of the start of a hold: a step ends there, and goes on
+        // with that side's own.
+        let crosses = family.q_hold.is_some() && finer * x.signum() < 0.0;
+        let finer = if crosses { f64::MIN_POSITIVE.copysign(finer) } else { finer };
+        let Some(extremal) = problem.extremal(finer, family.q_hold) else { break };
+        let before = found.hold_time;
+        (*x, *found) = (finer, extremal);
+        // A hold that such a step changes is not yet known to the square of that change.
+        let settled = (found.hold_time - before).abs() <= SETTLED * before || last.value.abs() <= SPENT;
+        if held == (found.hold_time > 0.0) && last.value.abs() <= accuracy.enough && settled && !crosses {
+            break;
+        }
     }
     let unique_above = problem.unique_above();
-    let unsolved = |effort| {
+    let close = JUMP.max(10.0 * accuracy.enough).max(libm::cbrt(accuracy.least));
+    let (Some((_, found)), Some(Probed { extremal: probed, sums, .. })) =
+        (outcome, last.filter(|last| last.value.abs() <= close))
+    else {
         let doubtful = friction_min <= unique_above || problem.is_doubtful();
         let status = if doubtful { Status::Nonphysical } else { Status::NotConverged };
-        (Solved { status, value: None, effort }, None)
+        return (Solved { status, value: None, effort }, None);
     };
-    let (Some(root), Some((probed, sums))) = (root, last) else { return unsolved(effort) };
-    let Some(found) = problem.extremal(root.x, q_hold) else { return unsolved(effort) };
 
     // W* is stationary in the parameter up to C dt: the trapezium of C over the last step leaves an error of third
     // order.
     let (c_probed, c) = (probed.arc.c(), found.arc.c());
-    let lag = beyond - probed.time_beyond(problem, &sums);
+    let lag = beyond - probed.time_beyond(&sums);
     let work = probed.work(problem, &sums) - 0.5 * (c_probed + c) * lag;
     let held = found.hold_time > 0.0;
-    let v_start = if held { 1.0 } else { exp(found.start.ln_u) / problem.from.theta };
+    let v_start = if held { 1.0 } else { exp(found.start) / problem.from.theta };
     // Just off the bound, rounding may take v(0+) below it; further below there is no protocol on the bound at all.
     let below = v_start < 1.0 - ROUNDING;
     let v_start = if problem.bounded && !below { v_start.max(1.0) } else { v_start };
-    let v_end = exp(found.end.ln_u) / problem.to.theta;
+    let v_end = exp(found.end) / problem.to.theta;
+    let v_end = if problem.bounded && v_end > 1.0 - ROUNDING { v_end.max(1.0) } else { v_end };
     let friction = found.friction_min(problem, &sums);
     let strategy = if held {
         Strategy::Hold
@@ -143,55 +194,90 @@ pub(super) fn find(problem: &Problem, t_f: f64, rtol: f64) -> (Solved<Optimum>, 
     (Solved { status, value: Some(value), effort }, Some(found))
 }
 
+/// The last probe of a search.
+struct Probed {
+    extremal: Extremal,
+    sums: Sums,
+    piece: Piece,
+    value: f64,
+}
+
+/// The family in its parameter `p`, which counts from `q_hold`.
+struct Family {
+    q_hold: Option<f64>,
+}
+
+/// Where the time depends smoothly on the parameter.
+#[derive(Clone, Copy, PartialEq)]
+struct Piece {
+    /// Beyond `q_hold`.
+    beyond: bool,
+    /// Beyond `q = 0`.
+    turned: bool,
+    held: bool,
+}
+
+impl Family {
+    fn piece(&self, p: f64, hold_time: f64) -> Piece {
+        let q_hold = self.q_hold.unwrap_or(0.0);
+        Piece { beyond: p > 0.0, turned: p + q_hold > 0.0, held: hold_time > 0.0 }
+    }
+}
+
+/// How good probes have to be.
+struct Accuracy {
+    /// A value this small (relative) needs no further probe: the Newton step from there leaves an error of the order of
+    /// its square.
+    enough: f64,
+    /// An error (relative) that a corrected step may leave.
+    least: f64,
+    /// Tolerance of the quadrature of the last probe.
+    exact: f64,
+}
+
+impl Accuracy {
+    fn new(rtol: f64, doubt: f64, a: f64) -> Accuracy {
+        let enough = 1e-8 + doubt;
+        // C = a v + beta goes like a times the velocities.
+        Accuracy { enough, least: (0.005 * rtol).max(1e-16), exact: quadrature_tolerance(rtol) / (1.0 + a) }
+    }
+
+    /// What the step after a probe of this value, and one of the value `before` in the same piece, is expected to leave.
+    fn left(value: f64, before: Option<f64>) -> f64 {
+        0.5 * value * value * before.map_or(1.0, |before| (value.abs() + before.abs()).min(1.0))
+    }
+
+    /// Whether a probe of this value may be the last.
+    fn may_end(&self, value: f64, before: Option<f64>) -> bool {
+        value.abs() <= self.enough || (before.is_some() && Accuracy::left(value, before) <= self.least)
+    }
+
+    /// Tolerance of the probe after one of this value: as good as the step that it gives.
+    fn next(&self, value: f64, before: Option<f64>) -> f64 {
+        let next = Accuracy::left(value, before);
+        if self.may_end(next, Some(value)) {
+            return self.exact;
+        }
+        (0.06 * Accuracy::left(next, Some(value))).min(COARSEST).max(self.exact)
+    }
+}
+
+/// Largest tolerance of a probe.
+const COARSEST: f64 = 1e-4;
+
 /// `t_f = t_min`: the hold alone.
 fn shortest(problem: &Problem, t_min: f64) -> Solved<Optimum> {
     let law = problem.law;
-    let friction = 1.0 + law.b * problem.from.ln();
+    let friction = 1.0 + law.b * problem.from.ln;
     let status = if friction <= problem.unique_above() { Status::Nonphysical } else { Status::Ok };
     let value = Optimum {
         work: hold::work(&law, problem.from, t_min),
         v_start: 1.0,
         v_end: 1.0,
         hold_time: t_min,
-        hamiltonian: -hold::c_leaving(&law, problem.to.theta, problem.to.ln()),
+        hamiltonian: -hold::c_leaving(&law, problem.to.theta, problem.to.ln),
         theta_max: problem.to.theta,
         strategy: Strategy::Hold,
     };
     Solved { status, value: Some(value), effort: Effort::default() }
-}
-
-/// A first parameter, counted from `q_hold`. For `b = a` time is linear in `ln u` along an arc; that line, `v = const` for very short times,
-/// and a hold for long ones come close.
-fn guess(problem: &Problem, q_hold: Option<f64>, beyond: f64) -> f64 {
-    let law = problem.law;
-    let friction = problem.friction_a();
-    let origin = q_hold.unwrap_or(0.0);
-    let held = |z_start: f64| {
-        // An arc that leaves the bound at the anchor comes back to it with the same E.
-        let z_end = turning((2.0 * phi(z_start)).sqrt()).ln_u;
-        law.a * (z_end - z_start) / friction
-    };
-    if problem.rises() {
-        let arc = problem.to.theta * held(problem.to.ln());
-        return match q_hold {
-            Some(_) if beyond > arc => (beyond - arc) / problem.theta_a(),
-            _ => -origin,
-        };
-    }
-    let e = ((problem.friction_end() - friction / (1.0 + problem.fall)) / law.a).max(0.0);
-    let z_end = turning((2.0 * e).sqrt()).ln_u;
-    let z_start = z_end - beyond * friction / (law.a * problem.from.theta);
-    if z_start > 0.0 {
-        let fast = problem.from.theta * ln_1p(problem.fall) / beyond;
-        z_start.max(ln(fast) - 1.5) - origin
-    } else {
-        let q = -(2.0 * phi(z_start)).sqrt();
-        match q_hold {
-            Some(q_hold) if q < q_hold => {
-                let arc = problem.from.theta * law.a * (z_end - problem.from.ln()) / friction;
-                -(beyond - arc).max(0.0) / problem.theta_a()
-            }
-            _ => q - origin,
-        }
-    }
 }

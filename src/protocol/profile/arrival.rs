@@ -91,6 +91,10 @@ impl<E: Exponent> Problem<E> {
         let probe = |c: f64| {
             let curve = self.curve.with(c);
             let behind = self.behind(&curve, rtol, reach, effort)?;
+            // So fast that the rest of theta is a rounding error of the sum.
+            if !self.tight && 1.0 + behind.sum < LOST {
+                return None;
+            }
             let steep = c > 0.0;
             let step = if self.tight {
                 let lost = -ln_1p(-behind.sum / self.free);
@@ -184,6 +188,9 @@ impl<E: Exponent> Problem<E> {
         behind.slope += total(&slope);
     }
 }
+
+/// `theta(t_f)/theta_1` below which its digits are lost.
+const LOST: f64 = 1e-6;
 
 /// What is left behind a slip that ends the integration, in units of the accuracy.
 const NOTHING: f64 = 1e-3;

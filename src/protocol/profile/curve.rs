@@ -52,6 +52,11 @@ impl<E: Exponent> Curve<E> {
         Curve { floor, w_f, t_f, exponent, ln_w_f: ln(w_f), cap }
     }
 
+    /// The curve resolved down to where `v - floor` is small beside a value.
+    pub fn resolved_to(self, value: f64) -> Curve<E> {
+        Curve { cap: self.cap.min(ln(value)), ..self }
+    }
+
     /// The curve with another parameter.
     pub fn with(self, c: f64) -> Curve<E> {
         Curve { exponent: self.exponent.with(c), ..self }

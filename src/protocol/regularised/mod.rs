@@ -26,6 +26,8 @@ pub struct Regularised {
     pub work_optimal: f64,
     /// `(work - W*)/W*`, from the pieces alone: it keeps its digits where they are short.
     pub gap: f64,
+    /// Work of friction over the pieces alone: the gap is what it differs by from the optimum's over the same time.
+    pub replaced: f64,
     /// Least velocity.
     pub v_min: f64,
     /// Greatest velocity.
@@ -40,7 +42,9 @@ pub struct Regularised {
 /// `bounded`, by pieces of length `delta_t`.
 ///
 /// `Infeasible` where there is no optimum, where the pieces overlap (`2 delta_t > t_f`), or where an argument is
-/// outside its domain (`delta_t > 0`, `k > 0`, `m >= 0`). `BelowBound` where a piece dips below `v = 1`: next to a hold
+/// outside its domain (`delta_t > 0`, `k > 0`, `m >= 0`), or where the protocol all but stands still: without the bound
+/// a deceleration jumps down by about `e^(1/a)`; pieces are drawn down to 1e-12 of the velocity at the end, and down to
+/// 1e-100. `BelowBound` where a piece dips below `v = 1`: next to a hold
 /// each must, since theta there is as large as `v >= 1` allows.
 pub fn solve(
     slider: &Slider,
@@ -94,9 +98,12 @@ fn assemble(
     let (solved, route) = route(&Transition { law: slider.law, v_i, v_f }, t_f, bounded, rtol);
     let mut effort = solved.effort;
     let (Some(optimum), Some(route)) = (solved.value, route) else { return none(solved.status, effort) };
-    let mut sum = Sum { slider: *slider, rtol, visit, excess: 0.0, v: Extent::NONE, control: Extent::NONE };
+    let mut sum =
+        Sum { slider: *slider, rtol, visit, excess: 0.0, replaced: 0.0, v: Extent::NONE, control: Extent::NONE };
     if let Err(status) = sum.gather(&route, (v_i, v_f), (delta_t, t_f), &mut effort) {
-        return none(status, effort);
+        // Where the optimum need not be unique, it need not be exact enough for pieces either.
+        let doubtful = solved.status == Status::Nonphysical && status == Status::NotConverged;
+        return none(if doubtful { solved.status } else { status }, effort);
     }
     if slider.k == f64::INFINITY {
         sum.control = sum.v;
@@ -105,6 +112,7 @@ fn assemble(
         work: optimum.work + sum.excess,
         work_optimal: optimum.work,
         gap: sum.excess / optimum.work,
+        replaced: sum.replaced,
         v_min: sum.v.low,
         v_max: sum.v.high,
         control_min: sum.control.low,
@@ -112,7 +120,8 @@ fn assemble(
     };
     let numbers = [value.work, value.v_max, value.control_min, value.control_max];
     if !numbers.iter().all(|number| number.is_finite()) {
-        return none(Status::NotConverged, effort);
+        let doubtful = solved.status == Status::Nonphysical;
+        return none(if doubtful { solved.status } else { Status::NotConverged }, effort);
     }
     let status = match solved.status {
         Status::Ok | Status::BelowBound if value.v_min < 1.0 => Status::BelowBound,
@@ -133,6 +142,8 @@ struct Sum<F> {
     visit: F,
     /// Work beyond that of the optimum.
     excess: f64,
+    /// Work of the pieces.
+    replaced: f64,
     v: Extent,
     control: Extent,
 }
@@ -165,6 +176,10 @@ impl<F: FnMut(Part)> Sum<F> {
 
     /// Leaves the optimum as it is between two places.
     fn keep(&mut self, route: &Route, from: Site, to: Site) {
+        // Where two pieces meet, rounding alone may lie between them.
+        if route.time(to) - route.time(from) <= 4.0 * f64::EPSILON * route.duration() {
+            return;
+        }
         route.control(&self.slider, from, to, self.rtol, &mut self.control);
         (self.visit)(Part::Kept(from, to));
     }
@@ -183,6 +198,7 @@ impl<F: FnMut(Part)> Sum<F> {
             return Err(Status::Infeasible);
         }
         self.excess += piece.work - span.work;
+        self.replaced += piece.work;
         self.v.add(piece.v.low);
         self.v.add(piece.v.high);
         self.control.add(piece.control.low);

@@ -8,7 +8,8 @@
 //! Where an end of the protocol lies `rho > 1` times as far above the floor as the mean that brings theta on, `int
 //! theta v dt/(t sqrt(theta_0 theta_1))` over a piece of length `t`, the way down has to be short: there the rise of
 //! `g` runs over a stretched place, `xi = (1 + p) x/(1 + p x)` from that end, with `p = 4 (rho (1 + 10 ln rho)^(-1/3) -
-//! 1)` if that is positive. About a quarter of the mean is then left to the way down, whatever `rho`.
+//! 1)` if that is positive. About a quarter of the mean is then left to the way down, whatever `rho`. An end of the
+//! protocol where theta has the time to follow `1/v` asks for none of this.
 
 use crate::model::Law;
 use crate::numerics::elementary::{exp_m1, ln, ln_1p};
@@ -16,6 +17,8 @@ use crate::protocol::control::Extent;
 use crate::protocol::optimal::Span;
 use crate::protocol::profile::{Curve, Hermite, Problem, Resolution, Start, pass, reach};
 use crate::protocol::{Effort, Jet, Slider, Status};
+
+use super::STANDSTILL;
 
 /// An end of a piece.
 #[derive(Debug, Clone, Copy)]
@@ -92,6 +95,9 @@ impl Piece {
         rtol: f64,
         effort: &mut Effort,
     ) -> Result<Piece, Status> {
+        if start.v[0].min(end.v[0]) < STANDSTILL {
+            return Err(Status::Infeasible);
+        }
         let (w_0, w_1) = (start.v[0] - floor, end.v[0] - floor);
         let ratio = (w_1 - w_0) / w_0;
         let rise = if ratio > -0.5 { ln_1p(ratio) } else { ln(w_1 / w_0) };
@@ -101,7 +107,10 @@ impl Piece {
         if rho.iter().any(|&rho| rho > MOST_RHO) {
             return Err(Status::Infeasible);
         }
-        let stretch = rho.map(stretch);
+        let mut stretch = rho.map(stretch);
+        if end.v[0] * time > FOLLOWING * (1.0 + stretch[1]) {
+            stretch[1] = 0.0;
+        }
         let (at_start, at_end) = (start.slopes(floor, time), end.slopes(floor, time));
         let exponent = Hermite { rise, start: at_start, end: at_end, stretch, c: 0.0 };
         let curve = Curve::new(floor, w_1, time, exponent);
@@ -139,6 +148,9 @@ fn stretch(rho: f64) -> f64 {
     let rho = rho.max(1.0);
     (4.0 * (rho / libm::cbrt(1.0 + 10.0 * ln(rho)) - 1.0)).max(0.0)
 }
+
+/// Slip on the way to the end of the protocol after which theta follows `1/v`, and arrives whatever was before.
+const FOLLOWING: f64 = 5.0;
 
 /// An end that lies higher above the mean would need a way down too short for doubles.
 const MOST_RHO: f64 = 1e12;

@@ -10,7 +10,7 @@ use crate::model::Law;
 use crate::numerics::double_double::DoubleDouble;
 use crate::numerics::elementary::ln;
 use crate::numerics::polynomial::roots_between;
-use crate::protocol::cubic::{Landscape, Shortcuts};
+use crate::protocol::cubic::{Landscape, Shortcuts, rise};
 use crate::protocol::{Effort, Moment, Motion, Status};
 
 /// The family.
@@ -84,8 +84,7 @@ impl Curve {
         if !sound || ![law.a, law.b, t_f, v_i, v_f].iter().all(|x| x.is_finite()) {
             return Err(Obstacle::Domain);
         }
-        let one = DoubleDouble::new(1.0);
-        let rise = one / DoubleDouble::new(v_f) - one / DoubleDouble::new(v_i);
+        let rise = rise(v_i, v_f);
         let waist = (DoubleDouble::new(t_f) - DoubleDouble::new(1.5) * rise).high;
         if waist <= 0.0 {
             return Err(Obstacle::Velocity);

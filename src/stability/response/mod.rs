@@ -2,11 +2,17 @@
 //! there.
 //!
 //! In the scaled variables of `slider.rs` only `a`, `b`, `k`, `m v_f^2` and `v_i/v_f` enter. The response is
-//! integrated until its end is decided (`fate.rs`).
+//! integrated until its end is decided (`fate.rs`), and its numbers are known (`course.rs`), unless theory tells them
+//! (`averaging.rs`).
 
+mod averaging;
+mod course;
 mod fate;
 mod motion;
 mod orbit;
+mod run;
+mod series;
+mod slide;
 mod slider;
 
 use crate::model::{Law, Transition};
@@ -14,9 +20,11 @@ use crate::numerics::elementary::{exp, ln};
 use crate::protocol::Status;
 use crate::stability::SteadySliding;
 
-pub use fate::{Course, Fate, Linear, follow};
+pub use course::{Course, Doubts, Fate, follow};
+pub use fate::Linear;
 pub use motion::Swing;
 pub use orbit::{Cycle, Extremum, Orbit, SETTLED, Seen, Stop};
+pub use run::{Leg, Run, step_to};
 pub use slider::{Slider, State, Z};
 
 /// A step of the control velocity.
@@ -54,11 +62,11 @@ pub struct Response {
     /// Greatest velocity from when `v = v_f` is first met on, at least `v_f`, in `v_0`; NaN if undecided.
     pub v_peak: f64,
     /// Least velocity from when `v = v_f` is first met on, at most `v_f`, in `v_0`; 0 below the range of doubles, NaN
-    /// if undecided.
+    /// if undecided or in doubt.
     pub v_trough: f64,
-    /// Time of the greatest velocity, in `l/v_0`; `None` if it is only approached or undecided.
+    /// Time of the greatest velocity, in `l/v_0`; `None` if it is only approached, undecided or in doubt.
     pub t_peak: Option<f64>,
-    /// Time after which `|v/v_f - 1|` stays below [`SETTLED`], in `l/v_0`.
+    /// Time after which `|v/v_f - 1|` stays below [`SETTLED`], in `l/v_0`; `None` also if in doubt.
     pub settling_time: Option<f64>,
     /// The limit cycle.
     pub cycle: Option<Sustained>,
@@ -75,7 +83,7 @@ pub struct Sustained {
     pub period: f64,
     /// Its greatest velocity, in `v_0`.
     pub v_peak: f64,
-    /// Its least velocity, in `v_0`.
+    /// Its least velocity, in `v_0`; NaN if in doubt.
     pub v_trough: f64,
 }
 
@@ -158,28 +166,29 @@ impl Response {
     fn new(course: &Course, v_f: f64, rtol: f64) -> Option<Response> {
         let velocity = |x: f64| v_f * exp(x);
         let (outcome, settling_time, cycle) = match course.fate {
-            Fate::Settled { time } => (Outcome::Settled, Some(time / v_f), None),
+            Fate::Settled { time } => {
+                (Outcome::Settled, Some(time / v_f).filter(|_| !course.doubts.settling_time), None)
+            }
             Fate::Cycle { period, high, low } => (Outcome::LimitCycle, None, Some((period, high, low))),
             Fate::Undecided => (Outcome::Undecided, None, None),
             Fate::Ends => return None,
         };
-        let (peak, trough) =
-            (course.high.map_or(0.0, |high| high.x.max(0.0)), course.low.map_or(0.0, |low| low.x.min(0.0)));
-        let (last_high, last_low) = cycle.map_or((0.0, 0.0), |(_, high, low)| (high, low));
+        let [low, high] = course.range();
         // What comes after the last step may go further.
-        let known = if outcome == Outcome::Undecided { f64::NAN } else { 1.0 };
-        // Approached from below, the greatest velocity is that of the limit cycle.
-        let attained = course.high.filter(|high| outcome != Outcome::Undecided && high.x > last_high + rtol);
+        let decided = outcome != Outcome::Undecided;
+        let known = |velocity: f64, known: bool| if known { velocity } else { f64::NAN };
+        let doubts = course.doubts;
+        let peak = course.peak(rtol).filter(|peak| decided && !doubts.t_peak && !peak.t.is_nan());
         Some(Response {
             outcome,
-            v_peak: known * velocity(peak.max(last_high)),
-            v_trough: known * velocity(trough.min(last_low)),
-            t_peak: attained.map(|high| high.t / v_f).filter(|t| !t.is_nan()),
+            v_peak: known(velocity(high), decided),
+            v_trough: known(velocity(low), decided && !doubts.trough),
+            t_peak: peak.map(|peak| peak.t / v_f),
             settling_time,
             cycle: cycle.map(|(period, high, low)| Sustained {
                 period: period / v_f,
                 v_peak: velocity(high),
-                v_trough: velocity(low),
+                v_trough: known(velocity(low), !doubts.cycle_trough),
             }),
             t_end: course.t / v_f,
             steps: course.steps,

@@ -1,7 +1,8 @@
 //! A response over time.
 
 use super::Step;
-use super::slider::{Leg, Slider, State, X, Y};
+use super::run::{Leg, step_to};
+use super::slider::{Slider, State, X, Y};
 use crate::model::{Law, Transition};
 use crate::numerics::elementary::{exp, ln};
 use crate::numerics::gauss;
@@ -24,6 +25,7 @@ pub struct Swing {
 
 /// A stretch of a response.
 #[derive(Debug, Clone, Copy)]
+#[expect(clippy::large_enum_variant, reason = "arrests are few")]
 enum Stretch {
     /// A step of the integrator.
     Leg(Leg),
@@ -35,7 +37,7 @@ impl Stretch {
     /// Time, in `l/v_f`, and state at a share of it.
     fn at(&self, u: f64) -> (f64, State) {
         match self {
-            Stretch::Leg(leg) => (leg.t + u * leg.h, std::array::from_fn(|r| leg.value(r, u))),
+            Stretch::Leg(leg) => (leg.time(u), std::array::from_fn(|r| leg.value(r, u))),
             Stretch::Arrest { t, from, to } => (*t, std::array::from_fn(|r| from[r] + u * (to[r] - from[r]))),
         }
     }
@@ -60,7 +62,7 @@ impl Step {
                 stretches.push(Stretch::Arrest { t: run.t(), from: *run.y(), to: arrested });
                 run.jump(arrested, slider.first_step(&arrested));
             }
-            stretches.push(Stretch::Leg(run.step(end).ok()?));
+            stretches.push(Stretch::Leg(step_to(&mut run, end).ok()?));
             if stretches.len() > MOST_STRETCHES {
                 return None;
             }
@@ -76,7 +78,7 @@ impl Swing {
         let leg_work = |leg: &Leg| {
             let at = |x: f64| self.moment(Stretch::Leg(*leg).at(0.5 * (1.0 + x)));
             let power: f64 = rule.x.iter().zip(&rule.w).map(|(&x, w)| w * at(x).friction * at(x).v).sum();
-            0.5 * leg.h / self.v_f * power
+            0.5 * leg.h() / self.v_f * power
         };
         let legs = self.stretches.iter().filter_map(|stretch| match stretch {
             Stretch::Leg(leg) => Some(leg_work(leg)),

@@ -2,7 +2,9 @@
 
 use std::collections::VecDeque;
 
-use super::slider::{Leg, Run, STAGES, Slider, State, X, Y, Z, between, step};
+use super::run::{Leg, Run, STAGES, between, step_to};
+use super::slider::{Slider, State, X, Y, Z};
+use crate::numerics::gauss;
 use crate::numerics::root::crossing;
 use crate::numerics::stiff::radau_iia_9;
 
@@ -46,7 +48,7 @@ pub enum Stop {
 }
 
 /// A state this close to steady sliding is in its linear neighbourhood.
-const QUIET: f64 = 1e-5;
+pub(super) const QUIET: f64 = 1e-5;
 
 /// Settled means `|v/v_f - 1|` below this, for good.
 pub const SETTLED: f64 = 0.01;
@@ -56,6 +58,9 @@ pub const BAND: [f64; 2] = [-0.01005033585350144, 0.009950330853168083];
 
 /// Shares of a step, and of the step that this leads to, within which an extremum is looked for again.
 const NEAR: [f64; 2] = [0.125, 0.125];
+
+/// Nodes of the energy lost over a series.
+const NODES: usize = 8;
 
 /// A response under way.
 #[derive(Debug)]
@@ -133,7 +138,7 @@ impl<'a> Orbit<'a> {
                 self.turn(-1.0, Seen { rough: Extremum { x: arrested[X], t: self.run.t() }, place: None });
                 self.slope = 0.0;
             }
-            let leg = step(&mut self.run).map_err(|_| Stop::Ends)?;
+            let leg = step_to(&mut self.run, f64::MAX).map_err(|_| Stop::Ends)?;
             self.look(&leg);
             let loss = self.loss(&leg);
             self.lost = [0, 1].map(|i| self.lost[i] + loss[i]);
@@ -148,10 +153,10 @@ impl<'a> Orbit<'a> {
     /// Looks through a step, from node to node, for what happens in it.
     fn look(&mut self, leg: &Leg) {
         let mut u0 = 0.0;
-        let (mut x0, mut slope0) = (leg.start[X], leg.slope(X, 0.0));
+        let (mut x0, mut slope0) = (leg.start()[X], leg.slope(X, 0.0));
         if self.slope * slope0 < 0.0 {
             // Between two steps: the slope of their polynomials jumps a little.
-            self.turn(self.slope, Seen { rough: Extremum { x: x0, t: leg.t }, place: None });
+            self.turn(self.slope, Seen { rough: Extremum { x: x0, t: leg.t() }, place: None });
         }
         for u1 in radau_iia_9().nodes {
             let (x1, slope1) = (leg.value(X, u1), leg.slope(X, u1));
@@ -159,7 +164,7 @@ impl<'a> Orbit<'a> {
                 let turn = crossing(|u| leg.slope(X, u), [u0, u1], [slope0, slope1], 1e-6 * (u1 - u0));
                 let x = leg.value(X, turn);
                 self.pass(leg, [u0, turn], [x0, x]);
-                let rough = Extremum { x, t: leg.t + turn * leg.h };
+                let rough = Extremum { x, t: leg.time(turn) };
                 self.turn(slope0, Seen { rough, place: Some((*leg, turn)) });
                 self.pass(leg, [turn, u1], [x, x1]);
             } else {
@@ -218,13 +223,13 @@ impl<'a> Orbit<'a> {
     /// State and time where `x` is `level`, near the share `u` of a step, to the order of the method.
     fn exactly(&mut self, leg: &Leg, u: f64, level: f64) -> (State, f64, Option<Leg>) {
         let mut u = u;
-        let mut best = (std::array::from_fn(|r| leg.value(r, u)), leg.t + u * leg.h, None);
+        let mut best = (std::array::from_fn(|r| leg.value(r, u)), leg.time(u), None);
         for _ in 0..2 {
             let Some(part) = between(&mut self.run, leg, 0.0, u) else { break };
-            best = (part.end, part.t_end(), Some(part));
-            let change = (level - part.end[X]) / part.slope(X, 1.0);
-            u += change / leg.h;
-            if change.abs() <= 1e-12 * leg.h || !(u > 0.0 && u < 1.5) {
+            best = (*part.end(), part.time(1.0), Some(part));
+            let change = (level - part.end()[X]) / part.slope(X, 1.0);
+            u += change / leg.h();
+            if change.abs() <= 1e-12 * leg.h() || !(u > 0.0 && u < 1.5) {
                 break;
             }
         }
@@ -242,7 +247,7 @@ impl<'a> Orbit<'a> {
             }
             (leg, u) = (part, crossing(|u| part.slope(X, u), [0.0, 1.0], slopes, 1e-9));
         }
-        between(&mut self.run, &leg, 0.0, u).map_or(rough, |part| Extremum { x: part.end[X], t: part.t_end() })
+        between(&mut self.run, &leg, 0.0, u).map_or(rough, |part| Extremum { x: part.end()[X], t: part.time(1.0) })
     }
 
     /// The slowest and the fastest moment since the last section, if there was one.
@@ -256,14 +261,22 @@ impl<'a> Orbit<'a> {
         Some(place.map_or(0.0, |(leg, u)| self.exactly(&leg, u, edge).1))
     }
 
-    /// Energy that friction takes over a step, and the sum of its sizes: the method's own quadrature.
+    /// Energy that friction takes over a step, and the sum of its sizes: for an implicit one by its own quadrature.
     fn loss(&self, leg: &Leg) -> [f64; 2] {
-        let rule = radau_iia_9();
         let mut loss = [0.0; 2];
-        for (u, weight) in rule.nodes.into_iter().zip(rule.integration[STAGES - 1]) {
-            let rate = self.slider.loss(leg.value(Y, u), leg.value(X, u));
-            loss[0] += leg.h * weight * rate;
-            loss[1] += leg.h * weight * rate.abs();
+        let mut add = |u: f64, weight: f64| {
+            let rate = leg.h() * weight * self.slider.loss(leg.value(Y, u), leg.value(X, u));
+            loss = [loss[0] + rate, loss[1] + rate.abs()];
+        };
+        match leg {
+            Leg::Stiff(_) => {
+                let rule = radau_iia_9();
+                rule.nodes.into_iter().zip(rule.integration[STAGES - 1]).for_each(|(u, weight)| add(u, weight));
+            }
+            Leg::Mild(_) => {
+                let rule = gauss::rule(NODES);
+                rule.x.iter().zip(&rule.w).for_each(|(x, weight)| add(0.5 * (1.0 + x), 0.5 * weight));
+            }
         }
         loss
     }

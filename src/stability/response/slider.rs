@@ -10,10 +10,8 @@
 //! with steady sliding at 0. They stay regular for `M = 0`, where the last one is a constraint, and no velocity is too
 //! low for them.
 
-use multiversion::multiversion;
-
-use crate::numerics::elementary::exp;
-use crate::numerics::stiff::{Accuracy, Failure, Integrator, Linearised, Piece, Points, System, radau_iia_9};
+use crate::numerics::elementary::{exp, exp_and_m1, exp_m1};
+use crate::numerics::stiff::{Linearised, Points, System};
 
 /// Place of the scaled force in a [`State`].
 pub const Z: usize = 0;
@@ -24,15 +22,6 @@ pub const X: usize = 2;
 
 /// `[z, y, x]`, in the order in which they are eliminated.
 pub type State = [f64; 3];
-
-/// Stages: order 9.
-pub const STAGES: usize = 5;
-
-/// Dense output of one step.
-pub type Leg = Piece<3, STAGES>;
-
-/// An integration along a response.
-pub type Run<'a> = Integrator<'a, Slider, 3, STAGES>;
 
 /// Below every tolerance.
 const UNFELT: f64 = 1e-14;
@@ -59,7 +48,7 @@ impl Slider {
     /// Rate at which friction beyond its steady value at `v_f` takes energy from the motion about steady sliding,
     /// `E = M (e^x - 1)^2/2 + z^2/(2 k)`: `-E' = (e^x - 1)(a x + b y)`.
     pub fn loss(&self, y: f64, x: f64) -> f64 {
-        (exp(x) - 1.0) * (self.a * x + self.b * y)
+        exp_m1(x) * (self.a * x + self.b * y)
     }
 
     /// The state after an arrest that takes no time, if one is under way.
@@ -86,24 +75,36 @@ impl Slider {
         (self.a * self.a.max((self.k * self.inertia).sqrt())).sqrt()
     }
 
-    /// An integration from `state`, with errors of a step below `tolerance` in `x`, `y` and `z/force`.
-    pub fn run(&self, state: State, h: f64, tolerance: f64) -> Run<'_> {
-        Integrator::new(self, radau_iia_9(), Accuracy { tolerance, scale: [self.force(), 1.0, 1.0] }, 0.0, state, h)
+    /// Rate of the fastest motion that there may be at `v` and `ageing = e^-y`: damping by friction, swinging on the
+    /// spring, or ageing.
+    pub fn fast(&self, v: f64, ageing: f64) -> f64 {
+        let (damping, swinging) = (self.a / (self.inertia * v), (self.k / self.inertia).sqrt());
+        damping.max(swinging) + ageing
     }
 }
 
-/// One step.
-#[multiversion(targets(
-    "x86_64+avx+avx2+bmi1+bmi2+avx512f+avx512bw+avx512cd+avx512dq+avx512vl",
-    "x86_64+avx+avx2+bmi1+bmi2"
-))]
-pub fn step(run: &mut Run<'_>) -> Result<Leg, Failure> {
-    run.step(f64::MAX)
+/// What the equations are made of, at a state: relative to their size also near steady sliding, where they vanish.
+#[derive(Debug, Clone, Copy)]
+pub struct Rates {
+    /// `v = e^x`.
+    pub v: f64,
+    /// `v - 1`.
+    pub excess: f64,
+    /// `e^-y`.
+    pub ageing: f64,
+    /// `y' = e^-y - v`.
+    pub growth: f64,
 }
 
-/// The part of a step between two shares of it, integrated again.
-pub fn between(run: &mut Run<'_>, leg: &Leg, from: f64, to: f64) -> Option<Leg> {
-    run.between(leg, from, to)
+impl Rates {
+    /// At `y` and `x`.
+    #[inline(always)]
+    pub fn of(y: f64, x: f64) -> Rates {
+        let ((v, excess), (ageing, surplus)) = (exp_and_m1(x), exp_and_m1(-y));
+        // Far from 1 the difference with 1 would lose digits.
+        let near = excess.abs() < 0.5 && surplus.abs() < 0.5;
+        Rates { v, excess, ageing, growth: if near { surplus - excess } else { ageing - v } }
+    }
 }
 
 impl System<3> for Slider {
@@ -113,11 +114,11 @@ impl System<3> for Slider {
         let [z, y, x] = &points.y;
         let [z_slope, y_slope, x_slope] = &points.slope;
         for i in 0..L {
-            let (v, ageing) = (exp(x[i]), exp(-y[i]));
+            let Rates { v, excess, ageing, growth } = Rates::of(y[i], x[i]);
             let mass = self.inertia * v;
             at.mass[X][i] = mass;
-            at.residual[Z][i] = self.k * (1.0 - v) - z_slope[i];
-            at.residual[Y][i] = (ageing - v) - y_slope[i];
+            at.residual[Z][i] = -self.k * excess - z_slope[i];
+            at.residual[Y][i] = growth - y_slope[i];
             at.residual[X][i] = (z[i] - self.a * x[i] - self.b * y[i]) - mass * x_slope[i];
             at.jacobian[Z][X][i] = -self.k * v;
             at.jacobian[Y][Y][i] = -ageing;

@@ -28,11 +28,12 @@ impl Extent {
     pub fn add(&mut self, course: &Course, panel: &Panel) {
         let rule = radau();
         let (mut before, mut sum) = (0.0, 0.0);
-        let mut bend_before = course.bend(panel.side, panel.from, panel.start);
+        let (_, z) = panel.state(course, 0.0);
+        let mut bend_before = course.bend(panel.side, panel.from, panel.start, z);
         for j in 0..NODES {
-            let near = panel.place(rule.u[j]);
-            sum += rule.w[j] * course.friction(panel.side, near) * course.velocity(panel.side, near, panel.w[j]);
-            let bend = course.bend(panel.side, near, panel.w[j]);
+            let (near, w, z) = (panel.place(rule.u[j]), panel.w[j], panel.z[j]);
+            sum += rule.w[j] * course.friction(panel.side, near) * course.velocity(panel.side, w, z);
+            let bend = course.bend(panel.side, near, w, z);
             if (bend > 0.0) != (bend_before > 0.0) {
                 self.turn(course, panel, (before, rule.u[j]), bend_before > 0.0);
             }
@@ -45,13 +46,15 @@ impl Extent {
     fn turn(&mut self, course: &Course, panel: &Panel, (mut low, mut high): (f64, f64), rising: bool) {
         for _ in 0..MOST_HALVINGS {
             let middle = 0.5 * (low + high);
-            if (course.bend(panel.side, panel.place(middle), panel.level(middle)) > 0.0) == rising {
+            let (w, z) = panel.state(course, middle);
+            if (course.bend(panel.side, panel.place(middle), w, z) > 0.0) == rising {
                 low = middle;
             } else {
                 high = middle;
             }
         }
-        let v = course.velocity(panel.side, panel.place(low), panel.level(low));
+        let (w, z) = panel.state(course, low);
+        let v = course.velocity(panel.side, w, z);
         self.v_min = self.v_min.min(v);
         self.v_max = self.v_max.max(v);
     }

@@ -19,6 +19,9 @@
 //! ```
 //!
 //! Both are sums of positive terms and fall like `1/|alpha_3|`.
+//!
+//! Where the block stands still in between, either pass would lose in the standstill what tells its start from its end:
+//! there both ends are followed to a place in it, and the slip on both ways is compared with the time to spare.
 
 mod course;
 mod extent;
@@ -27,12 +30,11 @@ mod motion;
 mod panel;
 
 use super::{Case, Family, Obstacle, Swift};
-use crate::model::Law;
 use crate::numerics::elementary::{exp, exp_m1, ln, ln_1p};
 use crate::numerics::gauss::rule;
 use crate::numerics::root::{Probe, newton};
 use crate::protocol::{Effort, Motion};
-use course::{Course, Measure, Stop};
+use course::{Course, Measure, Stop, Work};
 use extent::Extent;
 use gap::gap;
 use motion::Resolution;
@@ -73,7 +75,7 @@ impl Family for BoundedFriction {
             work: extent.work,
             v_min: extent.v_min,
             v_max: extent.v_max,
-            friction_max: course.friction_max(),
+            friction_max: course.friction_max().min(case.tau_max),
             miss: 0.0,
         })
     }
@@ -86,13 +88,15 @@ impl Family for BoundedFriction {
         })?;
         if panels.is_empty() {
             // Steady sliding: one panel tells it all.
-            let again = course.pass(0.1 * rtol, Some(rtol), &mut Effort::default(), |panel| panels.push(*panel));
+            let tolerances = (0.1 * rtol, 0.1 * rtol);
+            let work = Work { accuracy: rtol, expected: 0.0 };
+            let again = course.pass(tolerances, Some(work), &mut Effort::default(), |_, panel| panels.push(*panel));
             again.map_err(|_| Obstacle::NotConverged)?;
             course.alpha = 0.0;
         }
-        if !course.forward {
-            panels.reverse();
-        }
+        // What was integrated backwards lies behind what was integrated forwards.
+        let (mut panels, backward): (Vec<Panel>, Vec<Panel>) = panels.into_iter().partition(|panel| panel.forward);
+        panels.extend(backward.into_iter().rev());
         Ok(Box::new(Resolution { course, panels }))
     }
 }
@@ -103,8 +107,24 @@ const FAR: f64 = 1e100;
 /// Below this share of [`Course::worth`] the time to spare is what a course is measured by.
 const CLOSE: f64 = 0.1;
 
+/// Share of the time that a standstill takes beyond which the ways to it are compared with the time to spare.
+const STANDSTILL: f64 = 0.1;
+
 /// Tolerance of the first search.
 const COARSE: f64 = 1e-4;
+
+/// Logarithm of the ratio of the velocities beyond which they count as far apart, and `b/a` times it.
+const FAR_APART: f64 = 7.0;
+const FAR_APART_FOR_THETA: f64 = 1e3;
+
+/// What ends it.
+const ENOUGH: f64 = 1e-3;
+
+/// Growth of errors beyond which the other direction is tried.
+const MOST_ERRORS: f64 = 1e3;
+
+/// Rounding of theta beyond which a pass counts as lost, where less is not asked for.
+const MOST_NOISE: f64 = 1e-9;
 
 /// Most passes after the first search: Newton's method needs two or three, and a dozen more where theta has all but
 /// relaxed at the end.
@@ -147,101 +167,169 @@ fn member(
     }
     // Time beyond that of v = 0 or that of tau = tau_M.
     let accelerates = v_f > v_i;
-    let spare =
-        t_f - if accelerates { fastest(law, (v_i, v_f), (gap_i, gap_f), effort) } else { (v_i - v_f) / v_f / v_i };
+    let spare = t_f
+        - if accelerates {
+            fastest(law.a, v_i, -log_ratio, (gap_i, gap_f), effort)
+        } else {
+            (v_i - v_f) / v_i * (1.0 / v_f)
+        };
     if spare <= 0.0 {
         return Err(if accelerates { Obstacle::Friction } else { Obstacle::Velocity });
     }
     let measure = if accelerates { Measure::Lag { spare } } else { Measure::Slip { spare } };
     let course = Course::new(case, (gap_i, gap_f), ln_r, log_ratio, measure);
-    let course = if spare < CLOSE * course.worth(0.0) { course } else { course.by_level() };
-    let alpha = match course.measure {
-        Measure::Level => search(&course, effort),
-        Measure::Slip { .. } => close(&course, 2.0 * t_f / spare, effort),
-        Measure::Lag { .. } => close(&course, -2.0 * t_f / spare, effort),
+    let close = spare < CLOSE * course.worth(0.0).min(t_f);
+    // From a standstill theta grows, and forgets forwards what it was.
+    let measured = if accelerates { course } else { course.towards(true) };
+    let level = course.measured_by(Measure::Level);
+    let meeting = course.towards(true).measured_by(Measure::Meeting { spare });
+    let all = [measured, measured.reversed(), level, level.reversed(), meeting];
+    // What a pass through a standstill loses grows like the ratio of the velocities, and where theta runs away, b/a
+    // times.
+    let far = log_ratio > FAR_APART || log_ratio * law.b > FAR_APART_FOR_THETA * law.a;
+    let standstill = !accelerates && far && t_f - spare > STANDSTILL * t_f;
+    let order: &[usize] = match (standstill, close) {
+        (true, true) => &[4, 0, 1, 2, 3],
+        (true, false) => &[4, 2, 3, 0, 1],
+        (false, true) => &[0, 1, 2, 3, 4],
+        (false, false) => &[2, 3, 4, 0, 1],
     };
-    let mut course = course.with(alpha.ok_or(Obstacle::NotConverged)?);
-    let (mut last_pass, mut before, mut tolerance) = (false, f64::INFINITY, 0.1 * rtol);
+    let order = order.iter().filter(|&&place| !(accelerates && place == 4));
+    let mut start = None;
+    for strict in [true, false] {
+        for course in order.clone().map(|&place| all[place]) {
+            let Some((alpha, errors)) = rough(&course, start, strict, effort) else { continue };
+            start = start.or((course.measure == Measure::Level || errors < MOST_ERRORS).then_some(alpha));
+            if strict && errors > MOST_ERRORS {
+                continue;
+            }
+            if let Some(found) = refined(course.with(alpha), rtol, strict, effort, &mut visit) {
+                return Ok(found);
+            }
+        }
+    }
+    Err(Obstacle::NotConverged)
+}
+
+/// `alpha_3` to [`COARSE`], and by how much errors on the way would grow.
+fn rough(course: &Course, start: Option<f64>, strict: bool, effort: &mut Effort) -> Option<(f64, f64)> {
+    match course.measure {
+        Measure::Level => search(course, start.unwrap_or(0.0), strict, effort),
+        Measure::Slip { spare } | Measure::Meeting { spare } => close(course, 2.0 * course.t_f / spare, effort),
+        Measure::Lag { spare } => close(course, -2.0 * course.t_f / spare, effort),
+    }
+}
+
+/// The course from a rough `alpha_3` on to the one that arrives; `None` where it does not come so far.
+fn refined(
+    mut course: Course,
+    rtol: f64,
+    strict: bool,
+    effort: &mut Effort,
+    visit: &mut impl FnMut(&Course, Option<&Panel>),
+) -> Option<Course> {
+    visit(&course, None);
+    let (mut last_pass, mut before, mut tolerance, mut expected) = (false, f64::INFINITY, 0.1 * rtol, 0.0);
     for _ in 0..MOST_PASSES {
-        let pass = |panel: &Panel| {
+        let pass = |course: &Course, panel: &Panel| {
             if last_pass {
-                visit(&course, Some(panel));
+                visit(course, Some(panel));
             }
         };
         // The last pass tells the work and the extremes too, which lie between the nodes.
         let nodes = (LAST * rtol).max(FINEST);
-        let (within_pass, work) =
-            if last_pass { (tolerance.min(nodes * nodes.sqrt()), Some(nodes)) } else { (tolerance, None) };
-        let end = course.pass(within_pass, work, effort, pass).map_err(|_| Obstacle::NotConverged)?;
+        let fine = nodes * nodes.sqrt();
+        let (within_pass, work) = if last_pass {
+            ((tolerance.min(fine), fine), Some(Work { accuracy: nodes, expected: 0.5 * expected }))
+        } else {
+            ((tolerance, 0.1 * rtol), None)
+        };
+        let end = course.pass(within_pass, work, effort, pass).ok()?;
+        expected = end.work;
         let (_, step) = course.miss(&end);
         let scale = course.scale(&end);
         let within = |share: f64| step.abs() <= share * scale;
-        // Rounding allows no better, once Newton's method no longer gains.
-        let spent = step.abs() <= ROUNDING * course.rounding(&end) && step.abs() >= 0.5 * before;
-        if last_pass && (within(0.5 * rtol) || spent) {
-            return Ok(course);
+        // Rounding allows no better, once Newton's method no longer gains; that of the bound, and of alpha itself, only
+        // where no other way tells more.
+        let neighbours = step.abs() <= f64::EPSILON * course.alpha.abs();
+        let rounding = course.rounding(&end).max(if strict { 0.0 } else { course.blur });
+        let spent = step.abs() <= ROUNDING * rounding && step.abs() >= 0.5 * before
+            || course.alpha + step == course.alpha
+            || neighbours && !strict;
+        // Rounding of the time, spent at the greater velocity, allows no better.
+        let blur = 100.0 * f64::EPSILON * course.t_f * course.fastest_end();
+        if end.noise * f64::EPSILON > MOST_NOISE.max(rtol).max(blur) {
+            return None;
         }
-        if !step.is_finite() {
-            return Err(Obstacle::NotConverged);
+        if last_pass && (within(0.5 * rtol) || spent) {
+            return Some(course);
+        }
+        // From side to side of the next double: another way to the end may tell more.
+        if !step.is_finite() || last_pass && neighbours {
+            return None;
         }
         // What a panel may lack for the end to be as good as the step that is to come.
-        let share = 5.0 * rtol * scale * course.precision(&end);
-        tolerance = share.clamp(FINEST * FINEST.sqrt(), 0.1 * rtol);
+        let share = 5.0 * rtol * scale * course.precision(&end) / course.size;
+        let wanted =
+            if course.measure == Measure::Level { share } else { 0.1 * rtol * (scale / course.alpha.abs()).min(1.0) };
+        tolerance = wanted.clamp(f64::MIN_POSITIVE, 0.1 * rtol);
         // Newton's method doubles the digits.
         last_pass = within(rtol.sqrt()) || spent;
         before = step.abs();
         course = course.with(course.alpha + step);
         visit(&course, None);
     }
-    Err(Obstacle::NotConverged)
+    None
 }
 
 /// The time in which an acceleration arrives with `tau = tau_M` throughout, `int e^y/(e^z - 1) dy` over `y = ln theta`.
 ///
 /// `z = ln(theta v)` is linear in `y` there, from `gap_i/a` to `gap_f/a`; panels double with `z`, so that the pole at
 /// `z = 0` stays away.
-fn fastest(law: Law, (v_i, v_f): (f64, f64), (gap_i, gap_f): (f64, f64), effort: &mut Effort) -> f64 {
+fn fastest(a: f64, v_i: f64, span: f64, (gap_i, gap_f): (f64, f64), effort: &mut Effort) -> f64 {
     let rule = rule(24);
-    let (z_i, z_f) = (gap_i / law.a, gap_f / law.a);
-    let span = ln(v_f / v_i);
+    let (z_i, z_f) = (gap_i / a, gap_f / a);
     let growth = (z_f / z_i).abs().max(z_i / z_f);
     let panels = (1.5 * ln(growth) + span).ceil().clamp(1.0, 400.0);
     effort.quadratures += 1;
     let mut time = 0.0;
     for panel in 0..panels as u32 {
+        // The share of the way and z: geometric in z, or even in y where z hardly changes.
         let place = |s: f64| {
-            // Geometric in z, or even in y where z hardly changes.
-            let share = (f64::from(panel) + s) / panels;
-            if growth > 2.0 { z_i * (exp_m1(share * ln(z_f / z_i)) / (z_f - z_i)) } else { share }
+            if growth > 2.0 {
+                let power = s * ln(z_f / z_i);
+                (z_i * (exp_m1(power) / (z_f - z_i)), z_i * exp(power))
+            } else {
+                (s, z_i + s * (z_f - z_i))
+            }
         };
-        let (low, high) = (place(0.0), place(1.0));
+        let (low, high) = (place(f64::from(panel) / panels), place(f64::from(panel + 1) / panels));
         effort.nodes += rule.x.len() as u32;
         for (x, w) in rule.x.iter().zip(&rule.w) {
-            let share = low + 0.5 * (high - low) * (1.0 + x);
-            let z = z_i + share * (z_f - z_i);
-            time += 0.5 * (high - low) * w * span * exp(-share * span) / v_i / exp_m1(z);
+            let between = |low: f64, high: f64| low + 0.5 * (high - low) * (1.0 + x);
+            let (share, z) = (between(low.0, high.0), between(low.1, high.1));
+            time += 0.5 * (high.0 - low.0) * w * span * exp(-share * span) / v_i / exp_m1(z);
         }
     }
     time
 }
 
-/// `alpha_3` to [`COARSE`].
-fn search(course: &Course, effort: &mut Effort) -> Option<f64> {
+/// `alpha_3` to [`COARSE`], from a start, and the growth of errors.
+fn search(course: &Course, start: f64, strict: bool, effort: &mut Effort) -> Option<(f64, f64)> {
     let unit = course.unit();
-    let mut gave_up = false;
+    let (mut gave_up, mut errors) = (false, f64::INFINITY);
     let probe = |x: f64| {
         let course = course.with(unit * x);
-        let end = match course.pass(COARSE, None, effort, |_| ()) {
+        let end = match course.pass((COARSE, COARSE), None, effort, |_, _| ()) {
             Ok(end) => end,
-            // Theta too small: too little of alpha forwards, too much of it backwards.
-            Err(Stop::Lost) => {
-                return Some(Probe { value: if course.forward { -f64::MAX } else { f64::MAX }, slope: 0.0 });
-            }
+            Err(Stop::Little) => return Some(Probe { value: -f64::MAX, slope: 0.0 }),
+            Err(Stop::Much) => return Some(Probe { value: f64::MAX, slope: 0.0 }),
             Err(Stop::GaveUp) => {
                 gave_up = true;
                 return Some(Probe { value: 0.0, slope: 0.0 });
             }
         };
+        errors = end.errors;
         let (miss, step) = course.miss(&end);
         // In units of the change that alpha bears; a step that doubles alpha is far enough.
         let scale = 1.0 + x.abs();
@@ -251,34 +339,38 @@ fn search(course: &Course, effort: &mut Effort) -> Option<f64> {
             return Some(Probe { value: miss, slope: 0.0 });
         }
         // A step that is small beside alpha may still lead beyond a theta that is about to be lost.
-        let weight = (1.0 / scale).max(FAR_OFF * miss.abs() / bounded.abs());
+        let weight = (1.0 / scale).max(FAR_OFF * miss.abs() / course.size / bounded.abs());
+        // Theta may be about to arrive whatever alpha is: what grows there vanishes beyond.
+        let weight = if strict && errors > MOST_ERRORS { weight.max(2.0 * ENOUGH / bounded.abs()) } else { weight };
         Some(Probe { value: -bounded * weight, slope: weight })
     };
-    let root = newton(probe, 0.0, (f64::NEG_INFINITY, f64::INFINITY), false, 1e-3);
-    root.filter(|_| !gave_up).map(|root| unit * root.x)
+    let root = newton(probe, start / unit, (f64::NEG_INFINITY, f64::INFINITY), false, ENOUGH);
+    root.filter(|_| !gave_up).map(|root| (unit * root.x, errors))
 }
 
 /// What a theta at the end that is off by itself counts, beside the relative change of `alpha_3` that ends the search.
-const FAR_OFF: f64 = 2e-3;
+const FAR_OFF: f64 = 0.1;
 
 /// Longest step of the search, in units of what alpha bears.
 const FARTHEST: f64 = 4.0;
 
 /// `alpha_3` to [`COARSE`] where the time is just long enough: far out, where the layers at the ends shrink like
 /// `1/alpha_3`, from a start in units of [`Course::unit`].
-fn close(course: &Course, start: f64, effort: &mut Effort) -> Option<f64> {
+fn close(course: &Course, start: f64, effort: &mut Effort) -> Option<(f64, f64)> {
     let unit = course.unit();
-    let mut gave_up = false;
+    let (mut gave_up, mut errors) = (false, f64::INFINITY);
     let place = |q: f64| 0.5 * unit * (exp_m1(q) - exp_m1(-q));
     let probe = |q: f64| {
         let course = course.with(place(q));
-        match course.pass(COARSE, None, effort, |_| ()) {
+        match course.pass((COARSE, COARSE), None, effort, |_, _| ()) {
             Ok(end) => {
+                errors = end.errors;
                 let (value, step) = course.miss(&end);
                 let stretch = 0.5 * unit * (exp(q) + exp(-q));
                 Some(Probe { value, slope: (-value / step * stretch).max(0.0) })
             }
-            Err(Stop::Lost) => Some(Probe { value: if course.forward { -f64::MAX } else { f64::MAX }, slope: 0.0 }),
+            Err(Stop::Little) => Some(Probe { value: -f64::MAX, slope: 0.0 }),
+            Err(Stop::Much) => Some(Probe { value: f64::MAX, slope: 0.0 }),
             Err(Stop::GaveUp) => {
                 gave_up = true;
                 Some(Probe { value: 0.0, slope: 0.0 })
@@ -286,8 +378,8 @@ fn close(course: &Course, start: f64, effort: &mut Effort) -> Option<f64> {
         }
     };
     let start = start.signum() * ln_1p(2.0 * start.abs());
-    let root = newton(probe, start, (-FARTHEST_OUT, FARTHEST_OUT), false, 1e-3);
-    root.filter(|_| !gave_up).map(|root| place(root.x))
+    let root = newton(probe, start, (-FARTHEST_OUT, FARTHEST_OUT), false, ENOUGH);
+    root.filter(|_| !gave_up).map(|root| (place(root.x), errors))
 }
 
 /// Logarithm of the greatest `alpha_3` in units of [`Course::unit`].

@@ -26,14 +26,15 @@ impl Motion for Resolution {
         let along = s.clamp(0.0, 1.0) * count as f64;
         let k = (along as usize).min(count - 1);
         let (panel, share) = (&self.panels[k], along - k as f64);
-        let share = if self.course.forward { share } else { 1.0 - share };
-        let (side, near, w) = (panel.side, panel.place(share), panel.level(share));
-        let x = if self.course.forward == (side == Side::Start) { near } else { 1.0 - near };
+        let course = self.course.towards(panel.forward);
+        let share = if panel.forward { share } else { 1.0 - share };
+        let (side, near, (w, z)) = (panel.side, panel.place(share), panel.state(&course, share));
+        let x = if panel.forward == (side == Side::Start) { near } else { 1.0 - near };
         Moment {
             t: self.course.t_f * x,
-            v: self.course.velocity(side, near, w),
-            theta: exp(w) / self.course.anchor(side).v,
-            friction: self.course.friction(side, near),
+            v: course.velocity(side, w, z),
+            theta: exp(w) / course.anchor(side).v,
+            friction: course.friction(side, near),
             beta: None,
             v_c: None,
         }

@@ -2,19 +2,25 @@
 
 use multiversion::multiversion;
 
-use super::course::{Course, MILD, MOST_EXPONENT, QUIET, Side};
-use crate::numerics::elementary::{exp, exp_m1};
+use super::course::{Course, MILD, MOST_EXPONENT, Side};
+use crate::numerics::elementary::{exp, exp_m1, ln_1p};
 use crate::numerics::radau::{NODES, Nodes, Radau, radau};
 
 /// A panel with `w` at its start and nodes.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Panel {
+    /// Whether it was integrated forwards in time.
+    pub forward: bool,
     pub side: Side,
     /// Distances from that end.
     pub from: f64,
     pub to: f64,
     pub start: f64,
     pub w: Nodes,
+    /// `z = ln(theta v)` at the nodes, from the slope of `w` wherever that tells it better than friction does.
+    pub z: Nodes,
+    /// Whether it does at all nodes.
+    pub follows: bool,
 }
 
 /// A panel solved.
@@ -26,7 +32,7 @@ pub(super) struct Found {
     /// Slip along it over the slip of steady sliding, `int v/v_0 dd`, and what the nodes lack of that.
     pub slid: f64,
     pub lack: f64,
-    /// Rounding of `w` in units of the last place of 1: its own, and that of `f` as far as the slip passes it on.
+    /// Rounding of `w` in units of the last place of 1: its own, and that of `z` as far as the slip passes it on.
     pub noise: f64,
     /// What a change of `w` at its start becomes at its end.
     pub growth: f64,
@@ -44,13 +50,23 @@ impl Panel {
     pub fn level(&self, s: f64) -> f64 {
         radau().interpolate(self.start, &self.w, s)
     }
+
+    /// `w` and `z` there.
+    pub fn state(&self, course: &Course, s: f64) -> (f64, f64) {
+        let w = self.level(s);
+        let z = if self.follows { radau().follow(&self.z, s) } else { course.excess(self.side, self.place(s), w) };
+        (w, z)
+    }
 }
 
 /// Most steps of Newton's method on a panel.
 const MOST_STEPS: usize = 10;
 
-/// A change that shrinks no more below this, relative to `w`, is rounding.
-const STALLED: f64 = 1e-12;
+/// Share of the first change that quadrature may leave.
+const INEXACT: f64 = 1e-3;
+
+/// A change that shrinks no more below this, relative to what rounding makes of `w`, is rounding.
+const STALLED: f64 = 100.0;
 
 /// Greatest change of `w` that the guess for a panel may have.
 const FARTHEST: f64 = 20.0;
@@ -75,7 +91,7 @@ pub(super) fn collocate(
 ) -> Option<Found> {
     let anchor = course.anchor(side);
     let scale = (to - from).abs() * course.pace(anchor);
-    let ratio = course.ratio;
+    let kappa = course.kappa;
     let (mut drive, mut lean) = ([0.0; NODES], [0.0; NODES]);
     for j in 0..NODES {
         let near = from * rule.rest[j] + to * rule.u[j];
@@ -84,19 +100,21 @@ pub(super) fn collocate(
         drive[j] = course.drive(anchor, e);
         lean[j] = -anchor.gap / course.a * near * far * exp(if e < MOST_EXPONENT { e } else { MOST_EXPONENT });
     }
-    let mut w = guess(course, side, from, start, scale, &drive);
-    // A first step from a guess is taken to gain a digit.
-    let mut before = 1.0;
+    let mut w = guess(course, side, from, start, scale, &drive, rule);
+    let mut before = f64::INFINITY;
     for _ in 0..MOST_STEPS {
         let (mut rate, mut speed, mut slope, mut push) = ([0.0; NODES], [0.0; NODES], [0.0; NODES], [0.0; NODES]);
+        let mut blur = [0.0; NODES];
         for j in 0..NODES {
             // theta v = e^z: the rate is a small difference wherever theta follows the velocity.
-            let (inverse, excess) = (exp(-w[j]), exp_m1(drive[j] + (1.0 - ratio) * w[j]));
+            let (inverse, excess) = (exp(-w[j]), exp_m1(drive[j] + kappa * w[j]));
             let v = inverse * (1.0 + excess);
             rate[j] = -scale * inverse * excess;
             speed[j] = scale.abs() * v;
-            slope[j] = scale * (ratio * v - inverse);
+            slope[j] = scale * inverse * (excess - kappa * (1.0 + excess));
             push[j] = -scale * v * lean[j];
+            // Where theta relaxes, it forgets all but the last of what rounding makes of the drive.
+            blur[j] = speed[j] * (drive[j].abs() + (kappa * w[j]).abs()) / (1.0 + slope[j].abs());
         }
         let sums = rule.integrals(&rate);
         let mut rest = [0.0; NODES];
@@ -137,39 +155,83 @@ pub(super) fn collocate(
             return None;
         }
         // The next change, if it shrinks as this one did.
-        let left = change * (change / before).min(1.0);
-        let stalled = change <= STALLED * (1.0 + start.abs()) && change >= 0.25 * before;
+        let gain = if before.is_finite() { change / before } else { (1.0 + kappa.abs()) * change + INEXACT };
+        let left = change * gain.min(1.0);
+        let farthest = w.iter().fold(start.abs(), |most, w| most.max(w.abs()));
+        let blurred: f64 = blur.iter().zip(&rule.w).map(|(blur, w)| blur * w).sum();
+        let noise = farthest + blurred;
+        let stalled = change <= STALLED * f64::EPSILON * noise && change >= 0.25 * before;
         before = change;
-        if left <= enough || stalled {
-            let panel = Panel { side, from, to, start, w };
+        if left <= enough || left <= f64::EPSILON * noise || stalled {
             let growth = exp(decay[NODES - 1]);
             let slid: f64 = speed.iter().zip(&rule.w).map(|(v, w)| v * w).sum();
             // What is left of them by rounding does not count.
-            let farthest = w.iter().fold(0.0f64, |most, w| most.max(w.abs()));
-            let rounding = (4 * NODES) as f64 * f64::EPSILON * (1.0 + farthest);
-            let error = ((4 * NODES) as f64 * rule.unresolved(&w) - rounding).max(0.0);
-            let deepest = drive.iter().fold(0.0f64, |most, f| most.max(f.abs())).min(QUIET);
-            let lack = (rule.unresolved(&speed) - rounding * (1.0 + ratio + deepest) * slid).max(0.0);
-            let passed = drive.iter().zip(&speed).fold(0.0f64, |most, (f, v)| most.max(4.0 * f.abs() * v.min(1.0)));
-            let noise = rounding / f64::EPSILON + passed;
-            return Some(Found { panel, turn: last, slid, lack, noise, growth, error });
+            let count = (4 * NODES) as f64;
+            let error = (count * rule.unresolved(&w) - count * f64::EPSILON * noise).max(0.0);
+            let (z, follows, rounding) = excesses(&w, start, scale, kappa, &drive, rule);
+            let mut uncertain = 0.0;
+            for j in 0..NODES {
+                speed[j] = scale.abs() * exp(z[j] - w[j]);
+                uncertain += rule.w[j] * speed[j] * (1.0 + w[j].abs() + rounding[j]);
+            }
+            let lack = (rule.unresolved(&speed) - count * f64::EPSILON * uncertain).max(0.0);
+            let panel = Panel { forward: course.forward, side, from, to, start, w, z, follows };
+            return Some(Found { panel, turn: last, slid, lack, noise: 8.0 * noise, growth, error });
         }
     }
     None
 }
 
-/// Where theta relaxes fast it follows the drive, as `ln(theta v)` hardly changes; else it hardly changes itself.
+/// `z` at the nodes, whether it is the slope of `w` that tells all of them, and their rounding.
+///
+/// `z = f + kappa w` is a small difference where theta follows the velocity; there `1 - e^z = theta'` is small, and the
+/// slope of `w` tells it.
 #[inline(always)]
-fn guess(course: &Course, side: Side, from: f64, start: f64, scale: f64, drive: &Nodes) -> Nodes {
+fn excesses(w: &Nodes, start: f64, scale: f64, kappa: f64, drive: &Nodes, rule: &Radau) -> (Nodes, bool, Nodes) {
+    let slopes = rule.slopes(&w.map(|w| w - start));
+    let swing = w.iter().fold(0.0f64, |most, w| most.max((w - start).abs()));
+    let (mut z, mut follows, mut rounding) = ([0.0; NODES], true, [0.0; NODES]);
+    for j in 0..NODES {
+        let gain = exp(w[j]) / scale;
+        let told = slopes[j] * gain;
+        let (by_friction, by_slope) = (drive[j].abs() + (kappa * w[j]).abs(), SLOPE_NOISE * swing * gain.abs());
+        if by_slope < by_friction && told.abs() < 0.5 {
+            (z[j], rounding[j]) = (ln_1p(-told), by_slope);
+        } else {
+            (z[j], rounding[j]) = (drive[j] + kappa * w[j], by_friction);
+            follows = false;
+        }
+    }
+    (z, follows, rounding)
+}
+
+/// Rounding of the slope of a polynomial through the nodes, in units of that of its values.
+const SLOPE_NOISE: f64 = 300.0;
+
+/// Where theta relaxes it comes to follow the drive, as `ln(theta v)` hardly changes; else it hardly changes itself.
+#[inline(always)]
+fn guess(course: &Course, side: Side, from: f64, start: f64, scale: f64, drive: &Nodes, rule: &Radau) -> Nodes {
     let anchor = course.anchor(side);
     let before = course.drive(anchor, course.exponent(anchor, from, 1.0 - from));
-    let stiff = (scale * (course.ratio * exp(before - course.ratio * start) - exp(-start))).abs();
-    if stiff <= MILD {
+    let excess = exp_m1(before + course.kappa * start);
+    let decay = -scale * exp(-start) * (excess - course.kappa * (1.0 + excess));
+    if decay <= STILL {
         return [start; NODES];
     }
-    let share = 1.0 / (course.ratio - 1.0);
-    drive.map(|drive| start + ((drive - before) * share).clamp(-FARTHEST, FARTHEST))
+    // The slope relaxes from what it is to that of a drive that goes on evenly.
+    let slope = -scale * exp(-start) * excess;
+    let farthest = FARTHEST * course.kappa.abs();
+    let mut w = [0.0; NODES];
+    for j in 0..NODES {
+        let followed = -(drive[j] - before).clamp(-farthest, farthest) / course.kappa;
+        let passed = decay * rule.u[j];
+        w[j] = start + followed - (slope * rule.u[j] - followed) * exp_m1(-passed) / passed;
+    }
+    w
 }
+
+/// Below this theta does not relax within a panel.
+const STILL: f64 = 0.1;
 
 /// Gaussian elimination with row pivots, two right-hand sides.
 fn solve(matrix: &mut [Nodes; NODES], right: &mut [[f64; 2]; NODES]) {

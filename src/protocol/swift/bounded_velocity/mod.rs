@@ -102,14 +102,16 @@ fn member(case: &Case, rtol: f64, effort: &mut Effort) -> Result<Curve, Obstacle
     if v_i == 1.0 || v_f == 1.0 {
         return Err(Obstacle::End);
     }
-    let t_min = ln_1p((v_i - v_f) / (v_i * (v_f - 1.0)));
+    // Negative for an acceleration.
+    let t_min = case.transition.ageing_time();
     if t_f <= t_min {
         return Err(Obstacle::Time { t_min });
     }
     let (w_i, w_f) = (v_i - 1.0, v_f - 1.0);
     let ratio = (v_f - v_i) / w_i;
     let l = if ratio > -0.5 { ln_1p(ratio) } else { ln(w_f / w_i) };
-    let curve = Curve::new(1.0, w_f, t_f, Parabola { l, c: 0.0 });
+    // Next to v = 1 it is excesses of the size of that at the end that theta hangs on.
+    let curve = Curve::new(1.0, w_f, t_f, Parabola { l, c: 0.0 }).resolved_to(w_f);
     if v_i == v_f {
         return Ok(curve);
     }

@@ -1,0 +1,73 @@
+//! `slipsweep head DATASET [TABLE]`: the first rows of a table, with units.
+
+use std::path::PathBuf;
+
+use super::query::unreadable;
+use super::{Failure, say, summary, words, wrong};
+use crate::names::nearest;
+use crate::query::{Source, Tables};
+use crate::table;
+
+/// Arguments of `head`.
+#[derive(Debug, clap::Args)]
+#[command(after_help = "Examples:
+  slipsweep head results/granite
+  slipsweep head results/granite gap -n 20")]
+pub struct Arguments {
+    /// Folder of the dataset, such as results/NAME; or a Parquet or CSV file
+    dataset: PathBuf,
+    /// The table; all by default
+    table: Option<String>,
+    /// Rows to show
+    #[arg(short = 'n', long, value_name = "N", default_value_t = 10)]
+    rows: u32,
+}
+
+/// Shows the first rows of one table or of all.
+pub fn head(arguments: &Arguments) -> Result<(), Failure> {
+    let tables = Tables::open(&arguments.dataset)?;
+    let chosen: Vec<&Source> = match &arguments.table {
+        None => tables.sources.iter().collect(),
+        Some(name) => vec![tables.find(name).ok_or_else(|| unknown(arguments, name, &tables))?],
+    };
+    let texts: Vec<String> = chosen.into_iter().map(|source| first(source, arguments)).collect::<Result<_, _>>()?;
+    say(&texts.join("\n"))
+}
+
+fn unknown(arguments: &Arguments, name: &str, tables: &Tables) -> Failure {
+    let names: Vec<&str> = tables.sources.iter().map(|source| source.name.as_str()).collect();
+    let path = arguments.dataset.display();
+    let help = match nearest(name, names.iter().copied()) {
+        Some(meant) => format!("did you mean `{meant}`?"),
+        None => "choose one of these".to_owned(),
+    };
+    wrong(format!("{path}: no table `{name}`\n  expected: {}\n  help: {help}", names.join(", ")))
+}
+
+/// A line on the table, then names, units and rows.
+fn first(source: &Source, arguments: &Arguments) -> Result<String, Failure> {
+    let mut lines = vec![source.columns.clone()];
+    if source.units.iter().any(|unit| !unit.is_empty()) {
+        lines.push(source.units.clone());
+    }
+    source
+        .first(arguments.rows)?
+        .rows(|piece| {
+            lines.extend(piece.iter().map(|row| row.iter().map(summary::shown).collect()));
+            Ok(())
+        })
+        .map_err(|error| unreadable(&arguments.dataset, &error))?;
+    let mut text = source.name.clone();
+    if let Some(rows) = source.rows {
+        text.push_str(&format!(": {}", words::things(rows, "row")));
+        if let Some(table) = table::find(&source.name) {
+            text.push_str(&format!(", each {}", table.doc()));
+        }
+        if source.missing > 0 {
+            text.push_str(&format!("; {} missing", words::things(source.missing, "part")));
+        }
+    }
+    text.push('\n');
+    text.push_str(&words::aligned(&lines, 2));
+    Ok(text)
+}

@@ -1,0 +1,43 @@
+//! `slipsweep man [COMMAND]`: the manual page of the program, or of one command.
+
+use clap::CommandFactory;
+use clap_mangen::Man;
+
+use super::{Failure, put, wrong};
+use crate::names::nearest;
+
+/// Arguments of `man`.
+#[derive(Debug, clap::Args)]
+#[command(after_help = "Examples:
+  slipsweep man | man -l -
+  slipsweep man run > ~/.local/share/man/man1/slipsweep-run.1")]
+pub struct Arguments {
+    /// The command; the program itself by default
+    command: Option<String>,
+}
+
+/// Prints a manual page.
+pub fn man(arguments: &Arguments) -> Result<(), Failure> {
+    let mut program = super::Arguments::command();
+    program.build();
+    let command = match &arguments.command {
+        None => program,
+        Some(name) => match program.find_subcommand(name) {
+            Some(command) => command.clone(),
+            None => return Err(unknown(name, &program)),
+        },
+    };
+    let mut page = Vec::new();
+    Man::new(command).render(&mut page).map_err(Failure::failed)?;
+    // What stands after the options of a command are its examples.
+    put(String::from_utf8_lossy(&page).replace(".SH EXTRA", ".SH EXAMPLES").as_bytes())
+}
+
+fn unknown(name: &str, program: &clap::Command) -> Failure {
+    let names: Vec<&str> = program.get_subcommands().map(clap::Command::get_name).collect();
+    let help = match nearest(name, names.iter().copied()) {
+        Some(meant) => format!("did you mean `{meant}`?"),
+        None => "choose one of these".to_owned(),
+    };
+    wrong(format!("no command `{name}`\n  expected: {}\n  help: {help}", names.join(", ")))
+}

@@ -1,0 +1,59 @@
+//! Where an answer goes, standard output or a file, and in which format: the one asked for, or what the name of the file ends in.
+
+use std::io::{self, IsTerminal};
+use std::path::PathBuf;
+
+use clap::ValueEnum;
+
+use super::{Failure, wrong};
+
+/// A way to write an answer.
+pub trait Format: ValueEnum + Copy + PartialEq + Send + Sync + 'static {
+    /// The formats by the endings of files; of two for one format, the first is the usual one.
+    const ENDINGS: &'static [(&'static str, Self)];
+    /// Words for a terminal.
+    const TABLE: Self;
+    /// Bytes that are not for a terminal.
+    const PARQUET: Self;
+}
+
+/// The arguments that say where and how.
+#[derive(Debug, clap::Args)]
+pub struct Output<F: Format> {
+    /// How to write it; by default what the name of the file ends in, or a table
+    #[arg(long)]
+    format: Option<F>,
+    /// Where to write it; - is standard output
+    #[arg(short, long, value_name = "FILE", default_value = "-", hide_default_value = true)]
+    pub out: PathBuf,
+}
+
+impl<F: Format> Output<F> {
+    /// Whether it goes to standard output.
+    pub fn is_stdout(&self) -> bool {
+        self.out.as_os_str() == "-"
+    }
+
+    /// The format that the arguments come to.
+    pub fn format(&self) -> Result<F, Failure> {
+        let ending = self.out.extension().map(|ending| ending.to_string_lossy().to_lowercase());
+        let told = ending.and_then(|ending| F::ENDINGS.iter().find(|(known, _)| *known == ending));
+        let format = match (self.format, told) {
+            (Some(format), _) | (None, Some(&(_, format))) => format,
+            (None, None) if self.is_stdout() => F::TABLE,
+            (None, None) => {
+                let name = self.out.display();
+                let usual = F::ENDINGS
+                    .iter()
+                    .enumerate()
+                    .filter(|(place, (_, format))| F::ENDINGS[..*place].iter().all(|(_, other)| other != format));
+                let usual: Vec<String> = usual.map(|(_, (ending, _))| format!(".{ending}")).collect();
+                return Err(wrong(format!("{name} ends in none of {}: add --format", usual.join(", "))));
+            }
+        };
+        if format == F::PARQUET && self.is_stdout() && io::stdout().is_terminal() {
+            return Err(wrong("Parquet is not for a terminal: name a file with --out, or pipe it on"));
+        }
+        Ok(format)
+    }
+}

@@ -1,0 +1,180 @@
+//! `slipsweep plot DATASET|TRACE…`: pictures as SVG, PNG or PDF.
+
+use std::io;
+use std::path::{Path, PathBuf};
+
+use super::{FAILED, Failure, WRONG, dataset, say, to_file, wrong};
+use crate::plot::table::{Condition, Request, Source};
+use crate::plot::{self, COLUMN, Figure, Format, PAGE, PlotError};
+use crate::sweep::units_of;
+
+/// Arguments of `plot`.
+#[derive(Debug, clap::Args)]
+#[command(after_help = "Examples:
+  slipsweep plot results/landscape                       every table, a picture each
+  slipsweep plot results/landscape --table gap --where t_f=0.02 --out gap.pdf
+  slipsweep plot results/crossover --table crossover --x v_f --y b --color t_hold --where v_i=1.1
+  slipsweep plot optimal.csv best.csv --out protocols.png")]
+pub struct Arguments {
+    /// Folder of a dataset, such as results/NAME, or traces that `slipsweep trace` wrote (.csv, .parquet)
+    #[arg(required = true, value_name = "DATASET|TRACE")]
+    sources: Vec<PathBuf>,
+    /// The table; by default each of the dataset has its picture
+    #[arg(long, value_name = "NAME")]
+    table: Option<String>,
+    /// Rows to show, such as "a=0.03, v_f>=10"
+    #[arg(long = "where", value_name = "CONDITION")]
+    conditions: Vec<String>,
+    /// Horizontal axis
+    #[arg(long, value_name = "AXIS")]
+    x: Option<String>,
+    /// Vertical axis of a map, or the column that lines show
+    #[arg(long, value_name = "AXIS|COLUMN")]
+    y: Option<String>,
+    /// Column of a map's colours, or the axis that tells lines apart
+    #[arg(long, visible_alias = "colour", value_name = "COLUMN|AXIS")]
+    color: Option<String>,
+    /// Where to write it; the ending tells how: .svg, .png or .pdf [default: the name of the dataset and the table, .svg]
+    #[arg(short, long, value_name = "FILE")]
+    out: Option<PathBuf>,
+    /// Width in millimetres: 89 for one column of a journal, 183 for two [default: what the panels need]
+    #[arg(long, value_name = "MM", value_parser = width)]
+    width: Option<f64>,
+    /// Pixels to the inch of a .png
+    #[arg(long, value_name = "N", default_value = "300", value_parser = dpi)]
+    dpi: f64,
+}
+
+fn width(text: &str) -> Result<f64, String> {
+    in_range(text, 50.0, 1000.0)
+}
+
+fn dpi(text: &str) -> Result<f64, String> {
+    in_range(text, 20.0, 2400.0)
+}
+
+fn in_range(text: &str, least: f64, most: f64) -> Result<f64, String> {
+    let range = format!("expected a number from {least} to {most}");
+    match text.parse() {
+        Ok(value) if (least..=most).contains(&value) => Ok(value),
+        _ => Err(range),
+    }
+}
+
+impl From<PlotError> for Failure {
+    fn from(error: PlotError) -> Failure {
+        // A damaged file is no fault of who asks for its picture.
+        let code = if matches!(error, PlotError::Part(_) | PlotError::Trace(_)) { FAILED } else { WRONG };
+        Failure { code, message: format!("error: {error}") }
+    }
+}
+
+/// Draws what the arguments ask for.
+pub fn plot(arguments: &Arguments) -> Result<(), Failure> {
+    arguments.format()?;
+    match arguments.sources.as_slice() {
+        [one] if one.is_dir() => arguments.dataset(one),
+        sources => match sources.iter().find(|source| source.is_dir()) {
+            Some(folder) => Err(wrong(format!(
+                "{}: a folder beside other arguments\n  expected: one dataset, or traces\n  help: draw them one after the other",
+                folder.display()
+            ))),
+            None => arguments.traces(sources),
+        },
+    }
+}
+
+impl Arguments {
+    fn traces(&self, sources: &[PathBuf]) -> Result<(), Failure> {
+        let of_tables = [
+            ("--table", self.table.is_some()),
+            ("--where", !self.conditions.is_empty()),
+            ("--x", self.x.is_some()),
+            ("--y", self.y.is_some()),
+            ("--color", self.color.is_some()),
+        ];
+        let courses = sources.iter().map(|path| plot::trace::read(path)).collect::<Result<Vec<_>, _>>()?;
+        if let Some((flag, _)) = of_tables.iter().find(|(_, is_given)| *is_given) {
+            return Err(wrong(format!(
+                "{flag}: traces have no tables\n  expected: the folder of a dataset, such as results/NAME"
+            )));
+        }
+        let stem = match sources {
+            [one] => one.file_stem().map_or("trace".into(), |stem| stem.to_string_lossy().into_owned()),
+            _ => "traces".to_owned(),
+        };
+        let path = self.write(&plot::trace::figure(&courses)?, &stem)?;
+        say(&format!("written to {}\n", path.display()))
+    }
+
+    fn dataset(&self, path: &Path) -> Result<(), Failure> {
+        let (folder, manifest) = dataset(path)?;
+        let units = units_of(&manifest.spec)?;
+        let source = Source::new(folder, manifest, units);
+        let request = self.request()?;
+        let tables = match &self.table {
+            Some(table) => vec![table.clone()],
+            None => source.tables(),
+        };
+        if tables.len() > 1 {
+            let several = [
+                ("--out", self.out.is_some()),
+                ("--where", !self.conditions.is_empty()),
+                ("--x", self.x.is_some()),
+                ("--y", self.y.is_some()),
+                ("--color", self.color.is_some()),
+            ];
+            if let Some((flag, _)) = several.iter().find(|(_, is_given)| *is_given) {
+                let tables = tables.join(", ");
+                return Err(wrong(format!(
+                    "{flag} is for one table\n  found: {tables}\n  help: name one of them with --table"
+                )));
+            }
+        }
+        let mut damage = None;
+        for table in &tables {
+            let drawn = source.figure(table, &request).map_err(Failure::from);
+            let figure = match drawn {
+                // One table that makes no picture does not keep the others from theirs.
+                Err(failure) if tables.len() > 1 && failure.code == FAILED => {
+                    damage = damage.or(Some(failure));
+                    continue;
+                }
+                Err(failure) if tables.len() > 1 => {
+                    say(&format!("{table}: no picture: {}\n", failure.message.trim_start_matches("error: ")))?;
+                    continue;
+                }
+                drawn => drawn?,
+            };
+            let path = self.write(&figure, &format!("{}-{table}", source.manifest.name))?;
+            say(&format!("{table}: written to {}\n", path.display()))?;
+        }
+        damage.map_or(Ok(()), Err)
+    }
+
+    fn request(&self) -> Result<Request, Failure> {
+        let mut conditions = Vec::new();
+        for text in &self.conditions {
+            conditions.extend(Condition::all(text)?);
+        }
+        Ok(Request { conditions, x: self.x.clone(), y: self.y.clone(), colour: self.color.clone() })
+    }
+
+    /// How it is to be written.
+    fn format(&self) -> Result<Format, Failure> {
+        let Some(path) = &self.out else { return Ok(Format::Svg) };
+        Format::of(path)
+            .ok_or_else(|| wrong(format!("--out {}: the name ends in none of .svg, .png, .pdf", path.display())))
+    }
+
+    /// Writes a figure where it is to go, which it says.
+    fn write(&self, figure: &Figure, stem: &str) -> Result<PathBuf, Failure> {
+        let path = self.out.clone().unwrap_or_else(|| PathBuf::from(format!("{stem}.svg")));
+        let width = self.width.unwrap_or(if figure.columns > 1 { PAGE } else { COLUMN });
+        let drawn = figure.draw(width);
+        let bytes = self.format()?.encode(&drawn.svg, self.dpi).map_err(PlotError::from)?;
+        to_file(&path, |file| file.write_all(&bytes))
+            .map_err(|error: io::Error| Failure::failed(format!("cannot write {}: {error}", path.display())))?;
+        Ok(path)
+    }
+}

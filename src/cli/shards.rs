@@ -1,0 +1,263 @@
+//! `slipsweep shards SPEC`: a sweep in shares, as an array job of a scheduler.
+
+use std::fmt::Write as _;
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+use super::{Failure, WRONG, say, words, wrong};
+use crate::dataset::Folder;
+use crate::sweep::{Plan, Shard, Sweep, check_parts, estimate};
+
+/// Arguments of `shards`.
+#[derive(Debug, clap::Args)]
+#[command(after_help = "Example:
+  slipsweep shards granite.toml --engine slurm --shards 100 --out /shared/results")]
+pub struct Arguments {
+    /// The sweep spec, a TOML file
+    spec: PathBuf,
+    /// The scheduler
+    #[arg(long, value_enum)]
+    engine: Engine,
+    /// Shares to make at most; fewer if a task would have too little to do
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=Shard::MOST))]
+    shards: u64,
+    /// Folder in which the dataset's folder is made, on a file system that all machines share
+    #[arg(long, value_name = "DIR", default_value = "results")]
+    out: PathBuf,
+    /// Processors of a task
+    #[arg(long, value_name = "K", default_value_t = 1, value_parser = clap::value_parser!(u64).range(1..=1024))]
+    cpus: u64,
+    /// Least minutes of work of a task, as predicted
+    #[arg(long, value_name = "M", default_value_t = 5.0, value_parser = minutes)]
+    minutes: f64,
+}
+
+fn minutes(text: &str) -> Result<f64, String> {
+    let minutes = text.parse::<f64>().ok().filter(|minutes| minutes.is_finite() && *minutes >= 0.0);
+    minutes.ok_or_else(|| format!("expected a number of minutes, 0 or more, found `{text}`"))
+}
+
+/// A scheduler with array jobs.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+pub enum Engine {
+    /// Slurm: `sbatch`
+    Slurm,
+    /// HyperQueue: `hq submit`
+    Hyperqueue,
+}
+
+/// What precedes the number of shares in a job script.
+const SHARES: &str = "# shares: ";
+
+impl Engine {
+    const ALL: [Engine; 2] = [Engine::Slurm, Engine::Hyperqueue];
+
+    fn name(self) -> &'static str {
+        match self {
+            Engine::Slurm => "slurm",
+            Engine::Hyperqueue => "hyperqueue",
+        }
+    }
+
+    /// The job script of a dataset: beside its folder.
+    fn script(self, dataset: &Path) -> PathBuf {
+        let mut name = dataset.file_name().unwrap_or_default().to_owned();
+        name.push(format!(".{}.sh", self.name()));
+        dataset.with_file_name(name)
+    }
+
+    /// The command that submits `script`, or only some shares of it.
+    fn submit(self, script: &Path, shares: Option<&[u64]>) -> String {
+        let script = quoted(script);
+        let array = shares.map(|shares| words::ranges(shares.iter().copied()));
+        match (self, array) {
+            (Engine::Slurm, None) => format!("sbatch {script}"),
+            (Engine::Slurm, Some(array)) => format!("sbatch --array={array} {script}"),
+            (Engine::Hyperqueue, None) => format!("hq submit {script}"),
+            (Engine::Hyperqueue, Some(array)) => format!("hq submit --array={array} {script}"),
+        }
+    }
+
+    /// Most tasks of an array. Slurm bounds the number of a task, by default to 1000.
+    fn most_tasks(self) -> u64 {
+        match self {
+            Engine::Slurm => slurm_config("MaxArraySize").and_then(|size| size.parse().ok()).unwrap_or(1001).max(1),
+            Engine::Hyperqueue => Shard::MOST,
+        }
+    }
+}
+
+/// The scripts beside `dataset`: how many shares each has, and how to submit some of them.
+pub fn scripts(dataset: &Path) -> Vec<(u64, impl Fn(&[u64]) -> String)> {
+    let scripts = Engine::ALL.into_iter().filter_map(|engine| {
+        let path = engine.script(dataset);
+        let text = fs::read_to_string(&path).ok()?;
+        let count: u64 = text.lines().find_map(|line| line.strip_prefix(SHARES))?.parse().ok()?;
+        let known = (1..=Shard::MOST).contains(&count);
+        known.then_some((count, move |shares: &[u64]| engine.submit(&path, Some(shares))))
+    });
+    scripts.collect()
+}
+
+/// Writes the job script and says what to submit.
+pub fn shards(arguments: &Arguments) -> Result<(), Failure> {
+    let sweep = Sweep::load(&arguments.spec)?;
+    let plan = Plan::new(&sweep);
+    check_parts(&plan).map_err(wrong)?;
+    let (estimates, shared) = estimate(&sweep).map_err(Failure::failed)?;
+    let seconds = shared + estimates.iter().map(|estimate| estimate.seconds).sum::<f64>();
+    let parts: u64 = plan.tables.iter().map(|table| table.parts).sum();
+    let rows = plan.tables.iter().fold(0_u64, |sum, table| sum.saturating_add(table.rows));
+
+    let engine = arguments.engine;
+    let worth = match arguments.minutes {
+        0.0 => Shard::MOST,
+        minutes => (seconds / (60.0 * minutes * arguments.cpus as f64)) as u64,
+    };
+    let bounds = [
+        (parts, "there are no more parts".to_owned()),
+        (engine.most_tasks(), "MaxArraySize of Slurm allows no more tasks in an array".to_owned()),
+        (worth.max(1), format!("more of them would have less than {} minutes of work each", arguments.minutes)),
+    ];
+    let shares = bounds.iter().map(|(most, _)| *most).fold(arguments.shards, u64::min);
+    let each = seconds / (shares * arguments.cpus) as f64;
+
+    fs::create_dir_all(&arguments.out).map_err(|error| refused(&arguments.out, "create the folder", &error))?;
+    let out = absolute(&arguments.out)?;
+    let folder = Folder::new(&out, &sweep.name);
+    let script = engine.script(folder.path());
+    let program =
+        std::env::current_exe().map_err(|error| Failure::failed(format!("where is this program? {error}")))?;
+    let job = Job {
+        name: &sweep.name,
+        program: quoted(&program),
+        spec: quoted(&absolute(&arguments.spec)?),
+        out: quoted(&out),
+        dataset: quoted(folder.path()),
+        log: script.with_extension(""),
+        shares,
+        cpus: arguments.cpus,
+        each,
+    };
+    let text = match engine {
+        Engine::Slurm => job.slurm(),
+        Engine::Hyperqueue => job.hyperqueue(),
+    };
+    fs::write(&script, text).map_err(|error| refused(&script, "write", &error))?;
+
+    let mut said = format!(
+        "{}: {} in {}, about {} of one processor\n{} of about {} on {} each\n",
+        sweep.name,
+        words::things(rows, "row"),
+        words::things(parts, "part"),
+        words::duration(seconds),
+        words::things(shares, "task"),
+        words::duration(each),
+        words::things(arguments.cpus, "processor"),
+    );
+    if let Some((_, reason)) = bounds.iter().find(|(most, _)| *most == shares && shares < arguments.shards) {
+        let _ = writeln!(said, "fewer than the {} asked for: {reason}", words::count(arguments.shards));
+    }
+    if engine == Engine::Slurm
+        && slurm_config("RequeueExit").is_some_and(|codes| !codes.split(',').any(|code| code == "75"))
+    {
+        said.push_str("RequeueExit of this Slurm does not have 75: a task that meets a passing failure is to be submitted again\n");
+    }
+    let _ = writeln!(said, "written: {}\nsubmit it with\n  {}", script.display(), engine.submit(&script, None));
+    let _ = writeln!(said, "what is missing then:\n  slipsweep status {}", quoted(folder.path()));
+    say(&said)
+}
+
+fn refused(path: &Path, action: &str, error: &std::io::Error) -> Failure {
+    Failure::failed(format!("{}: cannot {action}: {error}\n  help: write elsewhere with --out DIR", path.display()))
+}
+
+/// The path as it is from anywhere. One that is not Unicode cannot stand in a script.
+fn absolute(path: &Path) -> Result<PathBuf, Failure> {
+    let wrong = |why: String| Failure { code: WRONG, message: format!("error: {}: {why}", path.display()) };
+    let absolute = std::path::absolute(path).map_err(|error| wrong(error.to_string()))?;
+    match absolute.to_str() {
+        Some(text) if !text.chars().any(char::is_control) => Ok(absolute),
+        _ => Err(wrong("not a path that can stand in a script\n  help: use letters that UTF-8 can write".to_owned())),
+    }
+}
+
+/// A path as a word of the shell.
+pub fn quoted(path: &Path) -> String {
+    let text = path.display().to_string();
+    let plain = |c: char| c.is_ascii_alphanumeric() || "/._-+=@%,:".contains(c);
+    if !text.is_empty() && text.chars().all(plain) { text } else { format!("'{}'", text.replace('\'', "'\\''")) }
+}
+
+/// An entry of the configuration of the Slurm that this machine belongs to, if it does.
+fn slurm_config(key: &str) -> Option<String> {
+    let output =
+        Command::new("scontrol").args(["show", "config"]).output().ok().filter(|output| output.status.success())?;
+    let text = String::from_utf8_lossy(&output.stdout).into_owned();
+    text.lines().find_map(|line| {
+        let (found, value) = line.split_once('=')?;
+        (found.trim() == key).then(|| value.trim().to_owned())
+    })
+}
+
+/// What goes into a job script; paths as words of the shell.
+struct Job<'a> {
+    name: &'a str,
+    program: String,
+    spec: String,
+    out: String,
+    dataset: String,
+    log: PathBuf,
+    shares: u64,
+    cpus: u64,
+    /// Seconds of a task, as predicted.
+    each: f64,
+}
+
+impl Job<'_> {
+    fn slurm(&self) -> String {
+        let Job { name, program, spec, out, shares, cpus, .. } = self;
+        // Predictions are from a small sample, and not all machines are as fast.
+        let minutes = (10.0 + 3.0 * self.each / 60.0).ceil();
+        // Slurm takes % for a pattern.
+        let log = self.log.display().to_string().replace('%', "%%").replace('"', "\\\"");
+        format!(
+            "#!/bin/bash\n\
+             #SBATCH --job-name={name}\n\
+             #SBATCH --array=0-{last}\n\
+             #SBATCH --cpus-per-task={cpus}\n\
+             #SBATCH --time={minutes}\n\
+             #SBATCH --requeue\n\
+             #SBATCH --open-mode=append\n\
+             #SBATCH --output=\"{log}-%a.log\"\n\
+             {SHARES}{shares}\n\
+             # A task is about {about} of work. It may be killed, repeated or run twice at a time at no harm.\n\
+             # Exit code 75 asks for another try, five times at most, where RequeueExit of Slurm has it.\n\
+             again=--requeue\n\
+             [ \"${{SLURM_RESTART_COUNT:-0}}\" -lt 5 ] || again=\n\
+             exec {program} run {spec} --out {out} --shard \"$SLURM_ARRAY_TASK_ID/{shares}\" --threads {cpus} $again\n\
+             # What is missing: {program} status {dataset}\n",
+            last = shares - 1,
+            about = words::duration(self.each),
+            dataset = self.dataset,
+        )
+    }
+
+    fn hyperqueue(&self) -> String {
+        let Job { name, program, spec, out, shares, cpus, .. } = self;
+        format!(
+            "#!/bin/bash\n\
+             #HQ --name={name}\n\
+             #HQ --array=0-{last}\n\
+             #HQ --cpus={cpus}\n\
+             {SHARES}{shares}\n\
+             # A task is about {about} of work. It may be killed, repeated or run twice at a time at no harm.\n\
+             exec {program} run {spec} --out {out} --shard \"$HQ_TASK_ID/{shares}\" --threads {cpus}\n\
+             # What is missing: {program} status {dataset}\n",
+            last = shares - 1,
+            about = words::duration(self.each),
+            dataset = self.dataset,
+        )
+    }
+}

@@ -1,0 +1,154 @@
+//! `slipsweep status DATASET`: what is there of a dataset, what is not, and what would finish it.
+
+use std::fmt::Write as _;
+use std::path::{Path, PathBuf};
+
+use super::shards::{quoted, scripts};
+use super::{FAILED, Failure, WRONG, say, words};
+use crate::dataset::{Folder, Look, Manifest, Survey};
+use crate::protocol::Status;
+use crate::sweep::{Plan, Sweep, shares_with};
+
+/// Arguments of `status`.
+#[derive(Debug, clap::Args)]
+#[command(after_help = "Examples:
+  slipsweep status results/granite
+  slipsweep status results/granite --check")]
+pub struct Arguments {
+    /// Folder of the dataset, such as results/NAME
+    dataset: PathBuf,
+    /// Check every bit of every part, not its footer alone
+    #[arg(long)]
+    check: bool,
+}
+
+/// Parts and files that are listed one by one of each kind.
+const LISTED: usize = 10;
+
+/// Says what there is of a dataset.
+pub fn status(arguments: &Arguments) -> Result<(), Failure> {
+    let path = &arguments.dataset;
+    let folder = Folder::at(path);
+    let written = folder.manifest().map_err(Failure::failed)?;
+    let without = written.is_none();
+    let Some(manifest) = written.or_else(|| folder.manifest_of_parts()) else {
+        let message = format!(
+            "error: {}: not a dataset\n  expected: a folder with a manifest.json or at least one part\n  help: name a folder that \
+             `slipsweep run` wrote",
+            path.display()
+        );
+        return Err(Failure { code: WRONG, message });
+    };
+    let survey = Survey::new(&folder, &manifest, if arguments.check { Look::Whole } else { Look::Footer });
+    let mut text = format!("{}: {}, made by slipsweep {}\n", path.display(), manifest.name, manifest.identity.version);
+    if without {
+        text.push_str("manifest.json is missing; the parts tell what it would say, and a run makes it again\n");
+    }
+    text.push_str(&counts(&survey));
+    text.push_str(&faults(&folder, &survey));
+    if survey.is_complete() {
+        text.push_str(if arguments.check { "complete, every bit as written\n" } else { "complete\n" });
+        return say(&text);
+    }
+    text.push_str(&remedy(path, &manifest, &survey));
+    say(&text)?;
+    let (all, there) =
+        survey.tables.iter().fold((0, 0), |(all, there), table| (all + table.parts, there + table.there));
+    let message = format!("incomplete: {} of {} there", words::count(there), words::things(all, "part"));
+    Err(Failure { code: FAILED, message })
+}
+
+/// Parts and rows, table by table.
+fn counts(survey: &Survey) -> String {
+    let mut lines =
+        vec![["table", "parts", "there", "missing", "damaged", "foreign", "rows there"].map(str::to_owned).to_vec()];
+    for table in &survey.tables {
+        let missing = table.missing.iter().map(|range| range.end - range.start).sum();
+        let (damaged, foreign) = (table.damaged.len() as u64, table.foreign.len() as u64);
+        let by_status = Status::ALL.iter().zip(table.status).filter(|(_, rows)| *rows > 0);
+        let by_status: Vec<String> =
+            by_status.map(|(status, rows)| format!("{} {}", words::count(rows), status.name())).collect();
+        let rows = format!("{} of {}", words::count(table.status.iter().sum()), words::count(table.rows));
+        let rows = if by_status.is_empty() { rows } else { format!("{rows}: {}", by_status.join(", ")) };
+        let numbers = [table.parts, table.there, missing, damaged, foreign].map(words::count);
+        lines.push([table.name.clone()].into_iter().chain(numbers).chain([rows]).collect());
+    }
+    words::aligned(&lines, 2)
+}
+
+/// What is wrong, one by one.
+fn faults(folder: &Folder, survey: &Survey) -> String {
+    let mut text = String::new();
+    let mut list = |title: &str, lines: Vec<String>| {
+        if lines.is_empty() {
+            return;
+        }
+        let _ = writeln!(text, "{title}");
+        for line in lines.iter().take(LISTED) {
+            let _ = writeln!(text, "  {line}");
+        }
+        if lines.len() > LISTED {
+            let _ = writeln!(text, "  and {} more", words::count((lines.len() - LISTED) as u64));
+        }
+    };
+    let missing = survey.tables.iter().filter(|table| !table.missing.is_empty());
+    let missing = missing.map(|table| {
+        let first = table.missing.iter().take(LISTED).map(|parts| words::range(parts.start, parts.end - 1));
+        let more = if table.missing.len() > LISTED { ", …" } else { "" };
+        format!("{}: {}{more}", table.name, first.collect::<Vec<_>>().join(","))
+    });
+    list("missing parts:", missing.collect());
+    let tables = || survey.tables.iter();
+    let damaged =
+        tables().flat_map(|table| table.damaged.iter().map(|(part, why)| (folder.part(&table.name, *part), why)));
+    list(
+        "damaged; the next run makes them again:",
+        damaged.map(|(path, why)| format!("{}: {why}", path.display())).collect(),
+    );
+    let foreign =
+        tables().flat_map(|table| table.foreign.iter().map(|(part, is)| (folder.part(&table.name, *part), is)));
+    let foreign = foreign.map(|(path, [what, expected, found])| {
+        format!("{}: belongs to another {what}\n    expected: {expected}\n    found: {found}", path.display())
+    });
+    list("foreign; a run leaves them alone and fails:", foreign.collect());
+    let shown = |paths: &[PathBuf]| paths.iter().map(|path| path.display().to_string()).collect();
+    list(
+        "temporary files of runs that are under way or were killed; a run removes those of the dead:",
+        shown(&survey.temporary),
+    );
+    list("other files, which nobody minds:", shown(&survey.others));
+    text
+}
+
+/// The commands that would finish the dataset.
+fn remedy(path: &Path, manifest: &Manifest, survey: &Survey) -> String {
+    let mut text = "to finish it:\n".to_owned();
+    for table in &survey.tables {
+        for (part, _) in &table.foreign {
+            let place = Folder::at(path).part(&table.name, *part);
+            let _ = writeln!(text, "  rm {}{}", if place.is_dir() { "-r " } else { "" }, quoted(&place));
+        }
+    }
+    if manifest.identity.version != env!("CARGO_PKG_VERSION") {
+        let (theirs, ours) = (&manifest.identity.version, env!("CARGO_PKG_VERSION"));
+        let _ = writeln!(text, "  run its spec with slipsweep {theirs}; this is {ours}, whose parts would differ");
+        return text;
+    }
+    let sweep = Sweep::parse_at(&manifest.spec, &path.join("manifest.json")).ok();
+    let Some(sweep) = sweep.filter(|sweep| sweep.identity() == manifest.identity) else {
+        let out = quoted(path.parent().filter(|out| !out.as_os_str().is_empty()).unwrap_or(Path::new(".")));
+        let _ = writeln!(text, "  slipsweep run SPEC --out {out}");
+        text.push_str(
+            "where SPEC is the file that it was made from: it refers to other files, so its text alone does not do\n",
+        );
+        return text;
+    };
+    let _ = writeln!(text, "  slipsweep run {}", quoted(path));
+    let plan = Plan::new(&sweep);
+    for (count, submit) in scripts(path) {
+        let wanted = |table: usize, part| survey.tables.get(table).is_some_and(|table| !table.has(part));
+        let Ok(shares) = shares_with(&sweep, &plan, count, wanted) else { continue };
+        let _ = writeln!(text, "or as tasks, {} of {count}:\n  {}", shares.len(), submit(&shares));
+    }
+    text
+}

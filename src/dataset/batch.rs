@@ -1,0 +1,63 @@
+//! A range of rows as an Arrow record batch, for whoever keeps tables in memory.
+
+use std::ops::Range;
+use std::sync::Arc;
+
+use arrow_array::types::Int32Type;
+use arrow_array::{ArrayRef, BooleanArray, DictionaryArray, Float64Array, Int32Array, RecordBatch, StringArray};
+use arrow_schema::ArrowError;
+
+use super::layout::Layout;
+use crate::grid::Projection;
+use crate::protocol::Status;
+use crate::table::{Kind, Sheet};
+
+/// The cells of `sheet`, which are the rows `rows` of a table, with the columns and types that a part on disk has.
+///
+/// # Errors
+///
+/// A column that does not fit the layout.
+pub fn batch(
+    layout: &Layout,
+    projection: &Projection,
+    rows: Range<u64>,
+    sheet: &Sheet,
+) -> Result<RecordBatch, ArrowError> {
+    let view = projection.view(rows.clone());
+    let mut columns: Vec<ArrayRef> = Vec::with_capacity(layout.schema.fields().len());
+    for axis in &layout.axes {
+        let mut cells = Vec::with_capacity(sheet.status.len());
+        if let Some(runs) = view.runs(*axis, rows.clone()) {
+            let values = runs.values();
+            for (step, length) in runs.over(rows.clone()) {
+                cells.resize(cells.len() + length, values[step]);
+            }
+        }
+        let words = axis.words();
+        columns.push(if words.is_empty() { Arc::new(Float64Array::from(cells)) } else { labels(&words, &cells)? });
+    }
+    for (column, cells) in layout.columns.iter().zip(&sheet.columns) {
+        columns.push(match column.kind {
+            Kind::Number(_) | Kind::Quantity(_) => {
+                Arc::new(cells.iter().map(|&cell| some(cell)).collect::<Float64Array>())
+            }
+            Kind::Label(words) => labels(words, cells)?,
+            Kind::Flag => Arc::new(cells.iter().map(|&cell| Some(some(cell)? != 0.0)).collect::<BooleanArray>()),
+        });
+    }
+    let status: Vec<f64> = sheet.status.iter().map(|&status| f64::from(status as u8)).collect();
+    columns.push(labels(&Status::ALL.map(Status::name), &status)?);
+    RecordBatch::try_new(layout.schema.clone(), columns)
+}
+
+/// Words by their places.
+fn labels(words: &[&str], places: &[f64]) -> Result<ArrayRef, ArrowError> {
+    let keys: Int32Array = places.iter().map(|&place| Some(some(place)? as i32)).collect();
+    let words = Arc::new(StringArray::from(words.to_vec()));
+    Ok(Arc::new(DictionaryArray::<Int32Type>::try_new(keys, words)?))
+}
+
+/// What a cell holds: NaN is nothing.
+fn some(cell: f64) -> Option<f64> {
+    (!cell.is_nan()).then_some(cell)
+}

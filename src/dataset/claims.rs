@@ -1,0 +1,257 @@
+//! What a Parquet file says that it holds, checked before its reader takes memory for it: a few bytes can claim gigabytes.
+//!
+//! Footers and page headers are structs of Thrift's compact protocol. They are walked without knowing all of their fields:
+//! no list may be longer than the bytes that are left, and of the numbers only those count that memory is taken by.
+
+use parquet::errors::ParquetError;
+use parquet::file::metadata::ParquetMetaData;
+use parquet::file::reader::ChunkReader;
+
+/// Most bytes of a footer.
+const MOST_OF_FOOTER: usize = 1 << 24;
+/// Most bytes of a page header.
+const MOST_OF_HEADER: usize = 1 << 16;
+/// Most bytes of a page, decompressed: four million doubles and more.
+const MOST_OF_PAGE: i64 = 40 << 20;
+/// Most values of a page or of a dictionary.
+const MOST_VALUES: i64 = 1 << 22;
+/// Most groups of rows, since their number has 16 bits.
+const MOST_GROUPS: i64 = i16::MAX as i64;
+
+/// Whether the lists of the footer, if there is one, are as long as they say.
+pub fn check_footer(file: &impl ChunkReader) -> Result<(), ParquetError> {
+    const TRAILER: u64 = 8;
+    let Some(before) = file.len().checked_sub(TRAILER) else { return Ok(()) };
+    let trailer = file.get_bytes(before, TRAILER as usize)?;
+    let [a, b, c, d, b'P', b'A', b'R', b'1'] = trailer[..] else { return Ok(()) };
+    let length = u32::from_le_bytes([a, b, c, d]) as usize;
+    let Some(start) = before.checked_sub(length as u64) else { return Ok(()) };
+    if length > MOST_OF_FOOTER {
+        return Err(excess("a footer", length as i64, MOST_OF_FOOTER as i64, "bytes"));
+    }
+    let footer = file.get_bytes(start, length)?;
+    let (mut elements, mut claims) = (0, Ok(()));
+    let end = walk(&footer, &mut |path, value| match path {
+        [2] => elements = value,
+        [2, 5] if !(0..=elements).contains(&value) => claims = Err(excess("a node", value, elements, "children")),
+        [4] if value > MOST_GROUPS => claims = Err(excess("a file", value, MOST_GROUPS, "groups of rows")),
+        _ => {}
+    });
+    end.ok_or_else(|| damaged("footer")).and(claims)
+}
+
+/// Whether no page takes more than memory has, and none is encoded so that its length is known only when it is decoded.
+pub fn check_pages(file: &impl ChunkReader, metadata: &ParquetMetaData) -> Result<(), ParquetError> {
+    for chunk in metadata.row_groups().iter().flat_map(|group| group.columns()) {
+        let start = chunk.dictionary_page_offset().unwrap_or(chunk.data_page_offset());
+        let (Ok(mut at), Ok(length)) = (u64::try_from(start), u64::try_from(chunk.compressed_size())) else {
+            return Err(damaged("list of columns"));
+        };
+        let end = at.checked_add(length).filter(|&end| end <= file.len()).ok_or_else(|| damaged("list of columns"))?;
+        while at < end {
+            let left = usize::try_from(end - at).unwrap_or(usize::MAX).min(MOST_OF_HEADER);
+            // Headers are short, but for those with long words as least and greatest values.
+            let short = check_page(&file.get_bytes(at, left.min(256))?)?;
+            let page = match short {
+                None => check_page(&file.get_bytes(at, left)?)?,
+                page => page,
+            };
+            at += page.ok_or_else(|| damaged("page header"))?;
+        }
+    }
+    Ok(())
+}
+
+/// The bytes from the start of a header to the end of its page; `None` if the header goes on beyond `bytes`.
+fn check_page(bytes: &[u8]) -> Result<Option<u64>, ParquetError> {
+    let (mut compressed, mut claims) = (None, Ok(()));
+    let header = walk(bytes, &mut |path, value| match path {
+        [2] if value > MOST_OF_PAGE => claims = Err(excess("a page", value, MOST_OF_PAGE, "bytes")),
+        [3] => compressed = u64::try_from(value).ok(),
+        [5 | 7 | 8, 1] if value > MOST_VALUES => claims = Err(excess("a page", value, MOST_VALUES, "values")),
+        [5 | 7, 2] | [8, 4] if matches!(value, 6 | 7) => {
+            claims = Err(ParquetError::General("words are encoded as differences".to_owned()));
+        }
+        _ => {}
+    });
+    let Some(header) = header else { return Ok(None) };
+    let compressed = compressed.ok_or_else(|| damaged("page header"))?;
+    claims.map(|()| (header as u64).checked_add(compressed))
+}
+
+fn excess(what: &str, found: i64, most: i64, unit: &str) -> ParquetError {
+    ParquetError::General(format!("{what} of {found} {unit}, where {most} are possible"))
+}
+
+fn damaged(what: &str) -> ParquetError {
+    ParquetError::General(format!("its {what} is damaged"))
+}
+
+/// Walks the struct that `bytes` begin with and tells `visit` of every whole number in it and of the length of every
+/// list, each with the numbers of the fields that lead there. Returns the length of the struct; `None` if it is damaged
+/// or goes on beyond `bytes`.
+fn walk(bytes: &[u8], visit: &mut dyn FnMut(&[i16], i64)) -> Option<usize> {
+    let mut walker = Walker { bytes, at: 0, path: Vec::new(), visit };
+    walker.fields()?;
+    Some(walker.at)
+}
+
+/// Most structs in one another; Parquet has six.
+const DEEPEST: usize = 16;
+
+struct Walker<'a> {
+    bytes: &'a [u8],
+    at: usize,
+    path: Vec<i16>,
+    visit: &'a mut dyn FnMut(&[i16], i64),
+}
+
+impl Walker<'_> {
+    fn byte(&mut self) -> Option<u8> {
+        let byte = self.bytes.get(self.at).copied()?;
+        self.at += 1;
+        Some(byte)
+    }
+
+    fn skip(&mut self, length: u64) -> Option<()> {
+        let at = self.at.checked_add(usize::try_from(length).ok()?)?;
+        self.at = at;
+        (at <= self.bytes.len()).then_some(())
+    }
+
+    /// Seven bits a byte, the lowest first.
+    fn varint(&mut self) -> Option<u64> {
+        let mut value = 0;
+        for shift in (0..64).step_by(7) {
+            let byte = self.byte()?;
+            value |= u64::from(byte & 0x7f) << shift;
+            if byte < 0x80 {
+                return Some(value);
+            }
+        }
+        None
+    }
+
+    /// Signs are in the lowest bit.
+    fn whole(&mut self) -> Option<i64> {
+        let value = self.varint()?;
+        Some((value >> 1) as i64 ^ -((value & 1) as i64))
+    }
+
+    fn fields(&mut self) -> Option<()> {
+        if self.path.len() >= DEEPEST {
+            return None;
+        }
+        let mut field = 0_i16;
+        loop {
+            let head = self.byte()?;
+            if head == 0 {
+                return Some(());
+            }
+            field = match head >> 4 {
+                0 => i16::try_from(self.whole()?).ok()?,
+                step => field.checked_add(step.into())?,
+            };
+            self.path.push(field);
+            // The type of a field is its value where that is true or false.
+            if !matches!(head & 0xf, 1 | 2) {
+                self.value(head & 0xf)?;
+            }
+            self.path.pop();
+        }
+    }
+
+    fn value(&mut self, kind: u8) -> Option<()> {
+        match kind {
+            1..=3 => self.skip(1),
+            4..=6 => {
+                let value = self.whole()?;
+                (self.visit)(&self.path, value);
+                Some(())
+            }
+            7 => self.skip(8),
+            8 => {
+                let length = self.varint()?;
+                self.skip(length)
+            }
+            9 | 10 => {
+                let head = self.byte()?;
+                let count = match head >> 4 {
+                    15 => self.varint()?,
+                    count => count.into(),
+                };
+                // An element has a byte or more.
+                let left = (self.bytes.len() - self.at) as u64;
+                let count = (count <= left).then_some(count)?;
+                (self.visit)(&self.path, count as i64);
+                // Parquet has no lists of lists, and no maps.
+                let kind = Some(head & 0xf).filter(|kind| !matches!(kind, 9 | 10))?;
+                (0..count).try_for_each(|_| self.value(kind))
+            }
+            12 => self.fields(),
+            _ => None,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    //! What no writer writes, byte by byte; files as they are written stand in `tests/bad_specs` and `fuzz/corpus`.
+
+    use super::*;
+    use bytes::Bytes;
+    use parquet::file::metadata::ParquetMetaDataReader;
+
+    fn told(result: Result<(), ParquetError>) -> String {
+        result.err().map_or_else(String::new, |error| error.to_string())
+    }
+
+    /// What is told of a file that is nothing but this footer.
+    fn footer(bytes: &[u8]) -> String {
+        let length = u32::try_from(bytes.len()).expect("is short").to_le_bytes();
+        told(check_footer(&Bytes::from([bytes, &length, b"PAR1"].concat())))
+    }
+
+    #[test]
+    fn a_footer_claims_no_more_than_there_can_be() {
+        // Field 4, a list of 40,000 structs without fields.
+        let groups = [&[0x49, 0xfc, 0xc0, 0xb8, 0x02][..], &[0; 40_000], &[0]].concat();
+        assert!(footer(&groups).ends_with("a file of 40000 groups of rows, where 32767 are possible"));
+        // Field 2, a list of one struct whose field 5 is 1000.
+        assert!(
+            footer(&[0x29, 0x1c, 0x55, 0xd0, 0x0f, 0, 0]).ends_with("a node of 1000 children, where 1 are possible")
+        );
+        // A list of lists; structs in structs; a list and a text longer than what is left; no end.
+        let deep = [0x1c; 20];
+        for damaged in [&[0x19, 0x19, 0x05, 0, 0][..], &deep, &[0x19, 0xf5, 0x7f, 0], &[0x18, 0x7f, 0], &[0x15]] {
+            assert!(footer(damaged).ends_with("its footer is damaged"), "{damaged:x?}");
+        }
+        assert_eq!(footer(&[0x15, 0x02, 0]), "");
+    }
+
+    #[test]
+    fn a_page_claims_no_more_than_there_can_be() {
+        // Type, both sizes, and a struct of a number of values and an encoding.
+        let header = |size: u8, values: u8, encoding: u8| {
+            [0x15, 0, 0x15, size, 0x15, 20, 0x2c, 0x15, values, 0x15, encoding, 0, 0]
+        };
+        assert_eq!(check_page(&header(20, 2, 0)).expect("claims little"), Some(13 + 10));
+        for encoding in [6, 7] {
+            let error = check_page(&header(20, 2, 2 * encoding)).expect_err("is refused");
+            assert!(error.to_string().ends_with("words are encoded as differences"));
+        }
+        // A text of 300 bytes goes on beyond the first 256.
+        let long = [&header(20, 2, 0)[..12], &[0x18, 0xac, 0x02], &[b'v'; 300], &[0]].concat();
+        assert_eq!(check_page(&long[..256]).expect("claims little"), None);
+        assert_eq!(check_page(&long).expect("claims little"), Some(316 + 10));
+    }
+
+    #[test]
+    fn columns_lie_within_their_file() {
+        let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("fuzz/corpus/points/bare.parquet");
+        let whole = std::fs::File::open(&path).expect("is there");
+        let metadata = ParquetMetaDataReader::new().parse_and_finish(&whole).expect("is sound");
+        assert_eq!(told(check_pages(&whole, &metadata)), "");
+        assert!(told(check_pages(&Bytes::from("PAR1"), &metadata)).ends_with("its list of columns is damaged"));
+    }
+}

@@ -1,0 +1,257 @@
+//! Columns of a table, read part by part: the memory does not grow with the table.
+
+use std::fs::File;
+use std::path::Path;
+use std::sync::Arc;
+
+use arrow_array::cast::AsArray;
+use arrow_array::types::{Float64Type, Int32Type};
+use arrow_array::{Array, RecordBatchReader};
+use arrow_schema::{DataType, FieldRef, Fields, Schema};
+use parquet::arrow::arrow_reader::{ArrowReaderMetadata, ArrowReaderOptions, ParquetRecordBatchReaderBuilder};
+use parquet::arrow::{ProjectionMask, parquet_to_arrow_schema};
+use parquet::errors::ParquetError;
+use parquet::file::metadata::ParquetMetaDataReader;
+
+use super::claims::{check_footer, check_pages};
+use super::folder::{Folder, ManifestTable};
+use super::guard::guarded;
+use super::layout::label;
+
+/// Rows that are decoded together.
+const ROWS_AT_ONCE: usize = 1 << 14;
+
+/// Name, unit and meaning of a column of a file.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Heading {
+    /// Its name.
+    pub name: String,
+    /// Its unit; empty for words and flags.
+    pub unit: String,
+    /// What it means.
+    pub doc: String,
+    /// Whether it holds numbers; else words, or flags as `yes` and `no`.
+    pub is_number: bool,
+}
+
+/// The cells of a column.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Cells {
+    /// Numbers, NaN where there is none.
+    Numbers(Vec<f64>),
+    /// Places in a list of words; `None` where there is none.
+    Words(Vec<Option<u32>>, Vec<String>),
+}
+
+/// Some columns of some rows.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Frame {
+    /// Rows.
+    pub height: usize,
+    /// The columns asked for, in that order, each with its name.
+    pub columns: Vec<(String, Cells)>,
+}
+
+/// A cell.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Cell {
+    /// Null.
+    Missing,
+    /// A number.
+    Number(f64),
+    /// A word.
+    Word(String),
+}
+
+/// One row: the names of its cells and what is in them.
+pub type Row = Vec<(String, Cell)>;
+
+impl Cells {
+    /// No cells of a column of this type; `None` of one that no table has.
+    fn none(kind: &DataType) -> Option<Cells> {
+        match kind {
+            DataType::Float64 => Some(Cells::Numbers(Vec::new())),
+            DataType::Boolean => Some(Cells::Words(Vec::new(), ["no", "yes"].map(str::to_owned).into())),
+            kind if *kind == label() => Some(Cells::Words(Vec::new(), Vec::new())),
+            _ => None,
+        }
+    }
+
+    /// Adds those of an array of the same type.
+    fn extend(&mut self, array: &dyn Array) {
+        match self {
+            Cells::Numbers(numbers) => {
+                let Some(array) = array.as_primitive_opt::<Float64Type>() else { return };
+                match array.null_count() {
+                    0 => numbers.extend_from_slice(array.values()),
+                    _ => numbers.extend(array.iter().map(|cell| cell.unwrap_or(f64::NAN))),
+                }
+            }
+            Cells::Words(places, words) => {
+                if let Some(flags) = array.as_boolean_opt() {
+                    places.extend(flags.iter().map(|flag| flag.map(u32::from)));
+                } else if let Some(array) = array.as_dictionary_opt::<Int32Type>()
+                    && let Some(values) = array.values().as_string_opt::<i32>()
+                {
+                    // The places of its words among those of the column.
+                    let here: Vec<u32> = values.iter().map(|word| place(words, word.unwrap_or_default())).collect();
+                    let cell = |key: i32| here.get(usize::try_from(key).ok()?).copied();
+                    places.extend(array.keys().iter().map(|key| cell(key?)));
+                }
+            }
+        }
+    }
+
+    fn cell(&self, row: usize) -> Cell {
+        match self {
+            Cells::Numbers(numbers) => {
+                numbers.get(row).filter(|number| !number.is_nan()).map_or(Cell::Missing, |number| Cell::Number(*number))
+            }
+            Cells::Words(places, words) => {
+                let word = places.get(row).copied().flatten().and_then(|place| words.get(place as usize));
+                word.map_or(Cell::Missing, |word| Cell::Word(word.clone()))
+            }
+        }
+    }
+}
+
+/// The place of a word, which is added if it is new.
+fn place(words: &mut Vec<String>, word: &str) -> u32 {
+    let found = words.iter().position(|known| known == word);
+    found.unwrap_or_else(|| {
+        words.push(word.to_owned());
+        words.len() - 1
+    }) as u32
+}
+
+impl Frame {
+    /// The cells of a column; `None` if it was not asked for.
+    pub fn column(&self, name: &str) -> Option<&Cells> {
+        self.columns.iter().find(|(known, _)| known == name).map(|(_, cells)| cells)
+    }
+
+    /// A row.
+    pub fn row(&self, row: usize) -> Row {
+        self.columns.iter().map(|(name, cells)| (name.clone(), cells.cell(row))).collect()
+    }
+}
+
+/// Why columns cannot be read.
+#[derive(Debug, thiserror::Error)]
+pub enum FrameError {
+    /// A file is damaged or is no Parquet.
+    #[error("{path}: cannot be read as Parquet: {reason}")]
+    File {
+        /// The file.
+        path: String,
+        /// Why not.
+        reason: String,
+    },
+}
+
+fn wrong(path: &Path, reason: impl std::fmt::Display) -> FrameError {
+    FrameError::File { path: path.display().to_string(), reason: reason.to_string() }
+}
+
+/// The entries of a footer: keys and values.
+pub type Facts = Vec<(String, String)>;
+
+/// The columns of a Parquet file, and the entries of its footer.
+pub fn headings(path: &Path) -> Result<(Vec<Heading>, Facts), FrameError> {
+    let file = File::open(path).map_err(|error| wrong(path, error))?;
+    let metadata = check_footer(&file).and_then(|()| ParquetMetaDataReader::new().parse_and_finish(&file));
+    let metadata = metadata.map_err(|error| wrong(path, error))?;
+    let footer = metadata.file_metadata();
+    let schema = parquet_to_arrow_schema(footer.schema_descr(), footer.key_value_metadata())
+        .map_err(|error| wrong(path, error))?;
+    let heading = |field: &arrow_schema::FieldRef| {
+        let entry = |key: &str| field.metadata().get(key).cloned().unwrap_or_default();
+        let is_number = field.data_type().is_numeric();
+        Heading { name: field.name().clone(), unit: entry("unit"), doc: entry("description"), is_number }
+    };
+    let entries = footer.key_value_metadata().into_iter().flatten();
+    let entries = entries.filter_map(|entry| Some((entry.key.clone(), entry.value.clone()?))).collect();
+    Ok((schema.fields().iter().map(heading).collect(), entries))
+}
+
+/// The columns `names` of a Parquet file.
+pub fn read(path: &Path, names: &[&str]) -> Result<Frame, FrameError> {
+    open(path, Some(names), None)
+}
+
+/// All columns of a Parquet file.
+pub fn read_all(path: &Path) -> Result<Frame, FrameError> {
+    open(path, None, None)
+}
+
+/// One row of a Parquet file, with all its columns.
+pub fn row(path: &Path, row: usize) -> Result<Row, FrameError> {
+    let frame = open(path, None, Some(row))?;
+    if frame.height == 1 { Ok(frame.row(0)) } else { Err(wrong(path, format!("it has no row {row}"))) }
+}
+
+/// Some columns, or all, of one row or all.
+fn open(path: &Path, names: Option<&[&str]>, row: Option<usize>) -> Result<Frame, FrameError> {
+    let read = || -> Result<Frame, ParquetError> {
+        let file = File::open(path)?;
+        let plain = ArrowReaderOptions::new().with_skip_arrow_metadata(true);
+        check_footer(&file)?;
+        let plain = ArrowReaderMetadata::load(&file, plain)?;
+        check_pages(&file, plain.metadata())?;
+        // Words as codes, whoever wrote them.
+        let coded = |field: &FieldRef| match field.data_type() {
+            DataType::Utf8 => Arc::new(field.as_ref().clone().with_data_type(label())),
+            _ => field.clone(),
+        };
+        let schema: Fields = plain.schema().fields().iter().map(coded).collect();
+        let options = ArrowReaderOptions::new().with_schema(Arc::new(Schema::new(schema)));
+        let metadata = ArrowReaderMetadata::try_new(plain.metadata().clone(), options)?;
+        let mut builder =
+            ParquetRecordBatchReaderBuilder::new_with_metadata(file, metadata).with_batch_size(ROWS_AT_ONCE);
+        if let Some(names) = names {
+            let mask = ProjectionMask::columns(builder.parquet_schema(), names.iter().copied());
+            builder = builder.with_projection(mask);
+        }
+        if let Some(row) = row {
+            builder = builder.with_offset(row).with_limit(1);
+        }
+        let reader = builder.build()?;
+        let fields = reader.schema();
+        let names: Vec<&str> = match names {
+            Some(names) => names.to_vec(),
+            None => fields.fields().iter().map(|field| field.name().as_str()).collect(),
+        };
+        let mut places = Vec::new();
+        let mut columns = Vec::new();
+        for name in names {
+            let (place, field) = fields
+                .column_with_name(name)
+                .ok_or_else(|| ParquetError::General(format!("it has no column `{name}`")))?;
+            let cells = Cells::none(field.data_type()).ok_or_else(|| {
+                ParquetError::General(format!("column `{name}` is {}, which no table has", field.data_type()))
+            })?;
+            places.push(place);
+            columns.push((name.to_owned(), cells));
+        }
+        let mut height = 0;
+        for batch in reader {
+            let batch = batch?;
+            height += batch.num_rows();
+            for ((_, cells), &place) in columns.iter_mut().zip(&places) {
+                cells.extend(batch.column(place));
+            }
+        }
+        Ok(Frame { height, columns })
+    };
+    guarded(read)
+        .unwrap_or_else(|| Err(ParquetError::General("it is damaged".to_owned())))
+        .map_err(|error| wrong(path, error))
+}
+
+/// The parts of `table` that are there, in order, and how many are missing.
+pub fn parts(folder: &Folder, table: &ManifestTable) -> (Vec<std::path::PathBuf>, u64) {
+    let there = folder.parts_there(table).into_iter().map(|part| folder.part(&table.name, part));
+    let there: Vec<_> = there.filter(|path| path.is_file()).collect();
+    let missing = table.parts - there.len() as u64;
+    (there, missing)
+}

@@ -1,0 +1,107 @@
+//! A survey of a dataset: which parts are there, and what is in the place of the others.
+
+use std::ops::Range;
+use std::path::PathBuf;
+
+use super::folder::{Folder, Manifest};
+use super::footer::StatusCounts;
+use super::state::{Look, State};
+
+/// What was found in the folder of a dataset.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Survey {
+    /// Its tables, in the order of the manifest.
+    pub tables: Vec<TableSurvey>,
+    /// Temporary files of runs that were killed or are under way.
+    pub temporary: Vec<PathBuf>,
+    /// Files that are no part of the dataset.
+    pub others: Vec<PathBuf>,
+}
+
+/// What was found of a table.
+#[derive(Debug, Clone, PartialEq)]
+pub struct TableSurvey {
+    /// Its name.
+    pub name: String,
+    /// Its rows.
+    pub rows: u64,
+    /// Its parts.
+    pub parts: u64,
+    /// Parts that are there.
+    pub there: u64,
+    /// Parts that are not, as ranges of their numbers.
+    pub missing: Vec<Range<u64>>,
+    /// Parts that are damaged, and in what way.
+    pub damaged: Vec<(u64, String)>,
+    /// Parts whose place is taken by something else: in what it differs, what was expected and what was found.
+    pub foreign: Vec<(u64, [String; 3])>,
+    /// Rows by status of the parts that are there, in the order of [`Status::ALL`](crate::protocol::Status::ALL).
+    pub status: StatusCounts,
+}
+
+impl TableSurvey {
+    /// Whether part number `part` is there.
+    pub fn has(&self, part: u64) -> bool {
+        // All three are in the order of parts.
+        let after = self.missing.partition_point(|range| range.end <= part);
+        !self.missing.get(after).is_some_and(|range| range.contains(&part))
+            && self.damaged.binary_search_by_key(&part, |(damaged, _)| *damaged).is_err()
+            && self.foreign.binary_search_by_key(&part, |(foreign, _)| *foreign).is_err()
+    }
+
+    /// Notes parts that are missing, beyond all that were.
+    fn miss(&mut self, parts: Range<u64>) {
+        match self.missing.last_mut() {
+            _ if parts.is_empty() => {}
+            Some(range) if range.end == parts.start => range.end = parts.end,
+            _ => self.missing.push(parts),
+        }
+    }
+}
+
+impl Survey {
+    /// Surveys the dataset of `manifest` in `folder`, with a look of this kind at every part.
+    pub fn new(folder: &Folder, manifest: &Manifest, look: Look) -> Survey {
+        let tables = manifest.tables.iter().map(|table| {
+            let mut survey = TableSurvey {
+                name: table.name.clone(),
+                rows: table.rows,
+                parts: table.parts,
+                there: 0,
+                missing: Vec::new(),
+                damaged: Vec::new(),
+                foreign: Vec::new(),
+                status: Default::default(),
+            };
+            let mut next = 0;
+            for part in folder.parts_there(table) {
+                survey.miss(next..part);
+                next = part + 1;
+                match folder.state(manifest, &table.name, part, look) {
+                    State::There { status } => {
+                        survey.there += 1;
+                        survey.status.iter_mut().zip(status).for_each(|(sum, count)| *sum += count);
+                    }
+                    // It went away a moment ago.
+                    State::Missing => survey.miss(part..part + 1),
+                    State::Damaged { why } => survey.damaged.push((part, why)),
+                    State::Foreign { what, expected, found } => {
+                        survey.foreign.push((part, [what.to_owned(), expected, found]));
+                    }
+                }
+            }
+            survey.miss(next..table.parts);
+            survey
+        });
+        let tables = tables.collect();
+        let (temporary, others) =
+            folder.strays(manifest).into_iter().partition::<Vec<_>, _>(|(_, temporary)| *temporary);
+        let paths = |strays: Vec<(PathBuf, bool)>| strays.into_iter().map(|(path, _)| path).collect();
+        Survey { tables, temporary: paths(temporary), others: paths(others) }
+    }
+
+    /// Whether every part is there.
+    pub fn is_complete(&self) -> bool {
+        self.tables.iter().all(|table| table.there == table.parts)
+    }
+}

@@ -1,0 +1,103 @@
+//! A block: independent factors, axes computed from other axes, and a condition on the points to keep.
+
+use std::collections::HashMap;
+
+use super::axis::{Axis, Values};
+use super::expression::Expression;
+use super::quantity::{Quantity, Scale};
+
+/// Axes that advance together.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Factor {
+    /// The axes, all of the same length, at least one.
+    pub axes: Vec<Axis>,
+}
+
+impl Factor {
+    /// Number of steps.
+    pub fn len(&self) -> u64 {
+        self.axes.first().map_or(0, |axis| axis.values.len())
+    }
+
+    /// Whether the factor has no step at all.
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// Whether it holds one of `quantities`.
+    pub fn holds_any(&self, quantities: &[Quantity]) -> bool {
+        self.axes.iter().any(|axis| quantities.contains(&axis.quantity))
+    }
+
+    /// How many different tuples of `quantities` the factor takes, and which one each step has, if not one a step.
+    ///
+    /// Ranges are distinct by construction, so only what is stored value by value is compared.
+    pub fn classes(&self, quantities: &[Quantity]) -> (u64, Option<Vec<u32>>) {
+        let used: Vec<&Axis> = self.axes.iter().filter(|axis| quantities.contains(&axis.quantity)).collect();
+        if used.is_empty() || !used.iter().all(|axis| matches!(axis.values, Values::List(_))) {
+            return (self.len(), None);
+        }
+        let mut seen: HashMap<Vec<u64>, u32> = HashMap::new();
+        let mut class_of = Vec::with_capacity(self.len() as usize);
+        for step in 0..self.len() {
+            // -0 is another way to write 0.
+            let tuple: Vec<u64> = used.iter().map(|axis| (axis.values.at(step) + 0.0).to_bits()).collect();
+            let next = seen.len() as u32;
+            class_of.push(*seen.entry(tuple).or_insert(next));
+        }
+        let distinct = seen.len() as u64;
+        if distinct == self.len() { (distinct, None) } else { (distinct, Some(class_of)) }
+    }
+}
+
+/// An axis whose value at a point is computed from other axes of its block.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Derived {
+    /// What is computed.
+    pub quantity: Quantity,
+    /// The unit of the values.
+    pub scale: Scale,
+    /// How.
+    pub expression: Expression,
+}
+
+/// One product of factors, with what is computed from it and which of its points are kept.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Block {
+    /// The factors, slowest first.
+    pub factors: Vec<Factor>,
+    /// Computed axes, each after those that it is made of.
+    pub derived: Vec<Derived>,
+    /// The points to keep are those where it is true; all without one.
+    pub condition: Option<Expression>,
+}
+
+impl Block {
+    /// The axis of `quantity`, if a factor holds it.
+    pub fn axis(&self, quantity: Quantity) -> Option<&Axis> {
+        self.factors.iter().flat_map(|factor| &factor.axes).find(|axis| axis.quantity == quantity)
+    }
+
+    /// The unit in which the block gives `quantity`; `None` if it has no such axis.
+    pub fn scale(&self, quantity: Quantity) -> Option<Scale> {
+        let derived = self.derived.iter().find(|derived| derived.quantity == quantity).map(|derived| derived.scale);
+        derived.or_else(|| self.axis(quantity).map(|axis| axis.scale))
+    }
+
+    /// The axes of the factors that `quantities` are, or are made of.
+    pub fn roots(&self, quantities: &[Quantity]) -> Vec<Quantity> {
+        let mut roots = quantities.to_vec();
+        for derived in self.derived.iter().rev() {
+            if roots.contains(&derived.quantity) {
+                roots.extend(derived.expression.reads());
+            }
+        }
+        roots.retain(|quantity| self.axis(*quantity).is_some());
+        roots
+    }
+
+    /// The numbers of the factors that hold one of `roots`, slowest first.
+    pub fn factors_of(&self, roots: &[Quantity]) -> Vec<usize> {
+        (0..self.factors.len()).filter(|&factor| self.factors[factor].holds_any(roots)).collect()
+    }
+}

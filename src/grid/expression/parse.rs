@@ -1,0 +1,401 @@
+//! From text to a checked expression: the grammar is that of an SQL condition, of which only arithmetic and comparisons are let in.
+
+use sqlparser::ast::{
+    BinaryOperator, CeilFloorKind, DateTimeField, Expr, FunctionArg, FunctionArgExpr, FunctionArguments, Spanned,
+    UnaryOperator, Value,
+};
+use sqlparser::dialect::PostgreSqlDialect;
+use sqlparser::parser::{Parser, ParserError};
+use sqlparser::tokenizer::Token;
+
+use super::super::quantity::Quantity;
+use super::program::{Binary, Expression, Op, Unary};
+
+/// The longest expression, in bytes: it bounds memory and depth.
+const LONGEST: usize = 1000;
+
+/// What is wrong with an expression.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Fault {
+    /// Where, in characters from 1; `None` if it concerns the whole.
+    pub position: Option<u64>,
+    /// What was found.
+    pub found: String,
+    /// What would be right.
+    pub expected: String,
+    /// What to do.
+    pub help: String,
+    /// A name that is not known, and those that are.
+    pub unknown: Option<Box<(String, Vec<&'static str>)>>,
+}
+
+impl Fault {
+    fn new(
+        position: Option<u64>,
+        found: impl Into<String>,
+        expected: impl Into<String>,
+        help: impl Into<String>,
+    ) -> Fault {
+        Fault { position, found: found.into(), expected: expected.into(), help: help.into(), unknown: None }
+    }
+}
+
+/// The functions of one number.
+const UNARY: [(&str, Unary); 7] = [
+    ("abs", Unary::Abs),
+    ("sqrt", Unary::Sqrt),
+    ("exp", Unary::Exp),
+    ("ln", Unary::Ln),
+    ("log10", Unary::Log10),
+    ("floor", Unary::Floor),
+    ("ceil", Unary::Ceil),
+];
+
+/// The functions of two numbers; `min` and `max` take more.
+const BINARY: [(&str, Binary); 3] = [("min", Binary::Min), ("max", Binary::Max), ("pow", Binary::Power)];
+
+/// What is let in, in words.
+const GRAMMAR: &str = "axes, numbers, + - * / ^, comparisons, and, or, not, in (...), between, abs, sqrt, exp, ln, log10, floor, \
+                       ceil, min, max, pow";
+
+impl Expression {
+    /// Reads a number computed from `axes`.
+    pub fn number(text: &str, axes: &[Quantity]) -> Result<Expression, Fault> {
+        let (expression, kind) = read(text, axes)?;
+        if kind == Kind::Number {
+            return Ok(expression);
+        }
+        Err(Fault::new(
+            None,
+            format!("`{text}` is true or false"),
+            "a number",
+            "use it in `where`, or compute a number",
+        ))
+    }
+
+    /// Reads a condition on `axes`.
+    pub fn condition(text: &str, axes: &[Quantity]) -> Result<Expression, Fault> {
+        let (expression, kind) = read(text, axes)?;
+        if kind == Kind::Truth {
+            return Ok(expression);
+        }
+        Err(Fault::new(None, format!("`{text}` is a number"), "true or false", "compare it, as in `v_f > v_i`"))
+    }
+}
+
+/// What an expression gives.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Kind {
+    Number,
+    Truth,
+}
+
+fn read(text: &str, axes: &[Quantity]) -> Result<(Expression, Kind), Fault> {
+    if text.len() > LONGEST {
+        let found = format!("{} characters", text.chars().count());
+        return Err(Fault::new(None, found, format!("at most {LONGEST}"), "shorten the expression"));
+    }
+    // To SQL these begin comments: what follows them would be passed over.
+    for comment in ["--", "/*"] {
+        if let Some(place) = text.find(comment) {
+            let position = text[..place].chars().count() as u64 + 1;
+            let help = if comment == "--" { "put a space or parentheses between" } else { "remove it" };
+            return Err(Fault::new(Some(position), format!("`{comment}`"), GRAMMAR, help));
+        }
+    }
+    // One line, so that a column is a position.
+    let line: String = text.chars().map(|c| if c.is_whitespace() { ' ' } else { c }).collect();
+    let parsed = Parser::new(&PostgreSqlDialect {}).try_with_sql(&line).and_then(|mut parser| {
+        let expression = parser.parse_expr()?;
+        Ok((expression, parser.next_token()))
+    });
+    let (expression, rest) = parsed.map_err(|error| syntax(&line, error))?;
+    if rest.token != Token::EOF {
+        let found = format!("`{}` after the end of `{expression}`", rest.token);
+        let help = match rest.token {
+            Token::Assignment | Token::SemiColon => "remove it",
+            _ => "put an operator between, or remove it",
+        };
+        return Err(Fault::new(Some(rest.span.start.column), found, "nothing more", help));
+    }
+    let mut compiler = Compiler { axes, program: Vec::new() };
+    let kind = compiler.compile(&expression)?;
+    Ok((Expression { program: compiler.program }, kind))
+}
+
+/// What the parser says, without its habits.
+fn syntax(line: &str, error: ParserError) -> Fault {
+    let message = match error {
+        ParserError::RecursionLimitExceeded => {
+            return Fault::new(
+                None,
+                "parentheses too deep inside each other",
+                "a flatter expression",
+                "take parentheses away",
+            );
+        }
+        ParserError::TokenizerError(message) | ParserError::ParserError(message) => message,
+    };
+    let (said, column) = message.split_once(" at Line: 1, Column: ").unwrap_or((&message, ""));
+    let position = column.trim().parse().ok();
+    let said = said.replace("Expected: ", "expected ").replace("found: ", "found ");
+    let (found, position) = if said.ends_with("EOF") {
+        let end = line.chars().count() as u64 + 1;
+        (if line.trim().is_empty() { "nothing at all" } else { "it ends too early" }.to_owned(), Some(end))
+    } else {
+        (said, position)
+    };
+    Fault::new(position, found, GRAMMAR, "correct the expression")
+}
+
+struct Compiler<'a> {
+    axes: &'a [Quantity],
+    program: Vec<Op>,
+}
+
+impl Compiler<'_> {
+    fn compile(&mut self, expression: &Expr) -> Result<Kind, Fault> {
+        match expression {
+            Expr::Nested(inner) => self.compile(inner),
+            // Infinity is no axis, but stands where a number may.
+            Expr::Identifier(name) if name.value == "inf" => {
+                self.program.push(Op::Number(f64::INFINITY));
+                Ok(Kind::Number)
+            }
+            Expr::Identifier(name) if name.quote_style.is_none() => {
+                let quantity = self.axis(&name.value, expression)?;
+                if !quantity.words().is_empty() {
+                    let found = format!("`{quantity}` stands for words", quantity = quantity.name());
+                    let help = format!("write `{} = '{}'`", quantity.name(), quantity.words()[0]);
+                    return Err(Fault::new(position(expression), found, "a comparison with a word", help));
+                }
+                self.program.push(Op::Axis(quantity));
+                Ok(Kind::Number)
+            }
+            Expr::Value(value) => match &value.value {
+                Value::Number(digits, false) => {
+                    let number: f64 = digits.parse().unwrap_or(f64::INFINITY);
+                    if number.is_infinite() {
+                        let found = format!("`{digits}` is beyond the range of numbers");
+                        return Err(Fault::new(position(expression), found, "a number", "write `inf` for infinity"));
+                    }
+                    self.program.push(Op::Number(number));
+                    Ok(Kind::Number)
+                }
+                Value::Boolean(is) => {
+                    self.program.push(Op::Number(f64::from(u8::from(*is))));
+                    Ok(Kind::Truth)
+                }
+                _ => Err(foreign(expression)),
+            },
+            Expr::UnaryOp { op, expr } => {
+                let (function, kind) = match op {
+                    UnaryOperator::Minus => (Some(Unary::Negate), Kind::Number),
+                    UnaryOperator::Plus => (None, Kind::Number),
+                    UnaryOperator::Not => (Some(Unary::Not), Kind::Truth),
+                    _ => return Err(foreign(expression)),
+                };
+                self.operand(expr, kind)?;
+                self.program.extend(function.map(Op::Unary));
+                Ok(kind)
+            }
+            Expr::BinaryOp { left, op, right } => self.binary(expression, left, op, right),
+            Expr::Between { expr, negated, low, high } => {
+                for (bound, comparison) in [(low, Binary::GreaterEqual), (high, Binary::LessEqual)] {
+                    self.operand(expr, Kind::Number)?;
+                    self.operand(bound, Kind::Number)?;
+                    self.program.push(Op::Binary(comparison));
+                }
+                self.program.push(Op::Binary(Binary::And));
+                self.program.extend(negated.then_some(Op::Unary(Unary::Not)));
+                Ok(Kind::Truth)
+            }
+            Expr::InList { expr, list, negated } if !list.is_empty() => {
+                for (place, value) in list.iter().enumerate() {
+                    self.equal(expr, value)?;
+                    self.program.extend((place > 0).then_some(Op::Binary(Binary::Or)));
+                }
+                self.program.extend(negated.then_some(Op::Unary(Unary::Not)));
+                Ok(Kind::Truth)
+            }
+            Expr::Function(call) => {
+                let plain = call.filter.is_none() && call.over.is_none() && call.within_group.is_empty();
+                let (Some(name), FunctionArguments::List(list), true) =
+                    (call.name.0.first().and_then(|part| part.as_ident()), &call.args, plain)
+                else {
+                    return Err(foreign(expression));
+                };
+                let arguments: Option<Vec<&Expr>> = list
+                    .args
+                    .iter()
+                    .map(|argument| match argument {
+                        FunctionArg::Unnamed(FunctionArgExpr::Expr(expression)) => Some(expression),
+                        _ => None,
+                    })
+                    .collect();
+                let arguments = arguments.ok_or_else(|| foreign(expression))?;
+                self.call(&name.value, &arguments, expression)
+            }
+            // The grammar has these two apart from other functions.
+            Expr::Floor { expr, field: CeilFloorKind::DateTimeField(DateTimeField::NoDateTime) } => {
+                self.call("floor", &[expr], expression)
+            }
+            Expr::Ceil { expr, field: CeilFloorKind::DateTimeField(DateTimeField::NoDateTime) } => {
+                self.call("ceil", &[expr], expression)
+            }
+            _ => Err(foreign(expression)),
+        }
+    }
+
+    fn axis(&self, name: &str, expression: &Expr) -> Result<Quantity, Fault> {
+        let known = self.axes.iter().copied().find(|quantity| quantity.name() == name);
+        known.ok_or_else(|| {
+            let known = self.axes.iter().map(|quantity| quantity.name()).collect();
+            Fault {
+                unknown: Some(Box::new((name.to_owned(), known))),
+                ..Fault::new(position(expression), format!("unknown axis `{name}`"), "", "")
+            }
+        })
+    }
+
+    fn operand(&mut self, expression: &Expr, wanted: Kind) -> Result<(), Fault> {
+        let found = self.compile(expression)?;
+        if found == wanted {
+            return Ok(());
+        }
+        let position = position(expression);
+        Err(match found {
+            Kind::Truth => Fault::new(
+                position,
+                format!("`{expression}` is true or false"),
+                "a number",
+                "write each comparison on its own, as in `1 < v_i and v_i < 3`",
+            ),
+            Kind::Number => Fault::new(
+                position,
+                format!("`{expression}` is a number"),
+                "true or false",
+                "compare it, as in `v_f > 3`",
+            ),
+        })
+    }
+
+    /// Whether two sides are the same: numbers, or an axis of words and a word.
+    fn equal(&mut self, left: &Expr, right: &Expr) -> Result<(), Fault> {
+        let (axis, word) = match (word(left), word(right)) {
+            (None, Some(word)) => (left, (word, right)),
+            (Some(word), None) => (right, (word, left)),
+            _ => {
+                self.operand(left, Kind::Number)?;
+                self.operand(right, Kind::Number)?;
+                self.program.push(Op::Binary(Binary::Equal));
+                return Ok(());
+            }
+        };
+        let (word, place) = word;
+        let Expr::Identifier(name) = axis else { return Err(foreign(place)) };
+        let quantity = self.axis(&name.value, axis)?;
+        let words = quantity.words();
+        let Some(number) = words.iter().position(|known| *known == word) else {
+            if words.is_empty() {
+                let found = format!("'{word}' is a word, `{}` a number", quantity.name());
+                return Err(Fault::new(position(place), found, "a number", "remove the quotes"));
+            }
+            return Err(Fault {
+                unknown: Some(Box::new((word.to_owned(), words))),
+                ..Fault::new(position(place), format!("unknown {} `{word}`", quantity.name()), "", "")
+            });
+        };
+        self.program.extend([Op::Axis(quantity), Op::Number(number as f64), Op::Binary(Binary::Equal)]);
+        Ok(())
+    }
+
+    fn binary(&mut self, whole: &Expr, left: &Expr, op: &BinaryOperator, right: &Expr) -> Result<Kind, Fault> {
+        let (function, operands, kind) = match op {
+            BinaryOperator::Plus => (Binary::Add, Kind::Number, Kind::Number),
+            BinaryOperator::Minus => (Binary::Subtract, Kind::Number, Kind::Number),
+            BinaryOperator::Multiply => (Binary::Multiply, Kind::Number, Kind::Number),
+            BinaryOperator::Divide => (Binary::Divide, Kind::Number, Kind::Number),
+            BinaryOperator::PGExp => {
+                if matches!(left, Expr::BinaryOp { op: BinaryOperator::PGExp, .. }) {
+                    let found = format!("`{whole}` can be read in two ways");
+                    return Err(Fault::new(position(whole), found, "one power", "add parentheses, as in `(2^3)^2`"));
+                }
+                (Binary::Power, Kind::Number, Kind::Number)
+            }
+            BinaryOperator::Lt => (Binary::Less, Kind::Number, Kind::Truth),
+            BinaryOperator::LtEq => (Binary::LessEqual, Kind::Number, Kind::Truth),
+            BinaryOperator::Gt => (Binary::Greater, Kind::Number, Kind::Truth),
+            BinaryOperator::GtEq => (Binary::GreaterEqual, Kind::Number, Kind::Truth),
+            BinaryOperator::Eq | BinaryOperator::NotEq => {
+                self.equal(left, right)?;
+                self.program.extend((*op == BinaryOperator::NotEq).then_some(Op::Unary(Unary::Not)));
+                return Ok(Kind::Truth);
+            }
+            BinaryOperator::And => (Binary::And, Kind::Truth, Kind::Truth),
+            BinaryOperator::Or => (Binary::Or, Kind::Truth, Kind::Truth),
+            BinaryOperator::PGOverlap | BinaryOperator::StringConcat => {
+                let (found, help) =
+                    if *op == BinaryOperator::PGOverlap { ("`&&`", "write `and`") } else { ("`||`", "write `or`") };
+                return Err(Fault::new(position(right), format!("{found} before this"), GRAMMAR, help));
+            }
+            _ => return Err(foreign(whole)),
+        };
+        self.operand(left, operands)?;
+        self.operand(right, operands)?;
+        self.program.push(Op::Binary(function));
+        Ok(kind)
+    }
+
+    fn call(&mut self, name: &str, arguments: &[&Expr], whole: &Expr) -> Result<Kind, Fault> {
+        let wrong = |count: &str| {
+            let found = format!("`{name}` of {} numbers", arguments.len());
+            Fault::new(position(whole), found, format!("`{name}` of {count}"), "correct the numbers in parentheses")
+        };
+        if let Some((_, function)) = UNARY.iter().find(|(known, _)| *known == name) {
+            let [argument] = arguments else { return Err(wrong("one number")) };
+            self.operand(argument, Kind::Number)?;
+            self.program.push(Op::Unary(*function));
+        } else if let Some((_, function)) = BINARY.iter().find(|(known, _)| *known == name) {
+            if arguments.len() < 2 || (*function == Binary::Power && arguments.len() > 2) {
+                return Err(wrong(if *function == Binary::Power { "two numbers" } else { "two numbers or more" }));
+            }
+            for (place, argument) in arguments.iter().enumerate() {
+                self.operand(argument, Kind::Number)?;
+                self.program.extend((place > 0).then_some(Op::Binary(*function)));
+            }
+        } else {
+            let known = UNARY.iter().map(|(name, _)| *name).chain(BINARY.iter().map(|(name, _)| *name)).collect();
+            return Err(Fault {
+                unknown: Some(Box::new((name.to_owned(), known))),
+                ..Fault::new(position(whole), format!("unknown function `{name}`"), "", "")
+            });
+        }
+        Ok(Kind::Number)
+    }
+}
+
+fn word(expression: &Expr) -> Option<&str> {
+    match expression {
+        Expr::Value(value) => match &value.value {
+            Value::SingleQuotedString(word) => Some(word),
+            _ => None,
+        },
+        Expr::Nested(inner) => word(inner),
+        _ => None,
+    }
+}
+
+fn position(expression: &Expr) -> Option<u64> {
+    let column = expression.span().start.column;
+    (column > 0).then_some(column)
+}
+
+/// A fault of what SQL allows and this language does not.
+fn foreign(expression: &Expr) -> Fault {
+    let help = match word(expression) {
+        Some(_) => "compare an axis of words with it, as in `family = 'step'`",
+        None => "remove it, or write it with what is listed",
+    };
+    Fault::new(position(expression), format!("`{expression}`"), GRAMMAR, help)
+}

@@ -1,0 +1,243 @@
+//! A grid, and the rows of a table over it.
+//!
+//! A table depends on some axes. Its rows over a block are the combinations of the steps of those factors that hold one of these axes, or
+//! an axis from which one is computed, in the order of the product, the last factor fastest. A combination is kept if the condition of
+//! the block holds at any point of the block that has it. Blocks follow one another. Nothing here grows with the number of rows.
+
+use std::collections::HashSet;
+use std::ops::Range;
+use std::sync::Arc;
+
+use super::axis::Axis;
+use super::block::Block;
+use super::digits::{Digit, Digits};
+use super::quantity::{Point, Quantity, Scale};
+use super::sieve::Sieve;
+use super::view::{Segment, View};
+use crate::model::Units;
+
+/// A grid of points: blocks, one after another.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Grid {
+    /// The blocks.
+    pub blocks: Vec<Arc<Block>>,
+    /// The units of all values.
+    pub units: Units,
+}
+
+/// Why the rows of a table cannot be enumerated.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum TooMany {
+    /// 64 bits cannot count them.
+    Rows,
+    /// The condition of this block reads axes with too many combinations.
+    Combinations(usize),
+}
+
+impl Grid {
+    /// The unit in which the grid gives `quantity`; `None` if no block has it.
+    pub fn scale(&self, quantity: Quantity) -> Option<Scale> {
+        self.blocks.iter().find_map(|block| block.scale(quantity))
+    }
+
+    /// `value` of `quantity`, given in the units of the grid, in those of the model. Coefficients relative to the duration stay so; -0 is 0.
+    pub fn scaled_value(&self, quantity: Quantity, value: f64) -> f64 {
+        self.units.scaled(quantity.unit(self.scale(quantity).unwrap_or(Scale::Model)), value) + 0.0
+    }
+
+    /// A point in the units of the model.
+    pub fn scaled(&self, point: &Point) -> Point {
+        let mut scaled = *point;
+        for quantity in Quantity::ALL {
+            scaled[quantity] = self.scaled_value(quantity, point[quantity]);
+        }
+        scaled
+    }
+
+    /// The rows of a table that depends on `quantities`.
+    pub fn project(&self, quantities: &[Quantity]) -> Result<Projection, TooMany> {
+        let mut stretches = Vec::new();
+        let (mut rows, mut raw): (u64, u64) = (0, 0);
+        for (number, block) in self.blocks.iter().enumerate() {
+            let factors = block.factors_of(&block.roots(quantities));
+            let digits = Digits::new(block, &factors).ok_or(TooMany::Rows)?;
+            raw = raw.checked_add(digits.rows).ok_or(TooMany::Rows)?;
+            let sieve = match &block.condition {
+                Some(condition) => Some(Sieve::new(block, &digits, condition).ok_or(TooMany::Combinations(number))?),
+                None => None,
+            };
+            let sieve = sieve.filter(|sieve| !sieve.keeps_all()).map(Arc::new);
+            let kept = sieve.as_ref().map_or(digits.rows, |sieve| sieve.rows());
+            stretches.push(Stretch { block: block.clone(), digits, sieve, first: rows, rows: kept });
+            rows += kept;
+        }
+        Ok(Projection { stretches, rows, dropped: raw - rows })
+    }
+}
+
+/// The rows of a table.
+#[derive(Debug, Clone)]
+pub struct Projection {
+    stretches: Vec<Stretch>,
+    rows: u64,
+    dropped: u64,
+}
+
+/// The rows of one block.
+#[derive(Debug, Clone)]
+pub struct Stretch {
+    /// The block.
+    pub block: Arc<Block>,
+    /// The digits of its rows, kept or not.
+    pub digits: Digits,
+    sieve: Option<Arc<Sieve>>,
+    first: u64,
+    rows: u64,
+}
+
+impl Stretch {
+    /// Number of rows that are kept.
+    pub fn rows(&self) -> u64 {
+        self.rows
+    }
+
+    /// The digit and axis that hold `quantity`, if a factor does.
+    pub fn axis(&self, quantity: Quantity) -> Option<(Digit, &Axis)> {
+        self.digits.digits.iter().find_map(|digit| {
+            let axes = &self.block.factors[digit.factor].axes;
+            Some((*digit, axes.iter().find(|axis| axis.quantity == quantity)?))
+        })
+    }
+}
+
+impl Projection {
+    /// Number of rows.
+    pub fn rows(&self) -> u64 {
+        self.rows
+    }
+
+    /// Rows that conditions leave out.
+    pub fn dropped(&self) -> u64 {
+        self.dropped
+    }
+
+    /// The rows of each block.
+    pub fn stretches(&self) -> &[Stretch] {
+        &self.stretches
+    }
+
+    /// The values at `row`.
+    pub fn point(&self, row: u64) -> Point {
+        self.view(row..row + 1).point(row)
+    }
+
+    /// Some consecutive rows.
+    pub fn view(&self, rows: Range<u64>) -> View<'_> {
+        let mut segments = Vec::new();
+        for (number, stretch) in self.stretches.iter().enumerate() {
+            let start = rows.start.clamp(stretch.first, stretch.first + stretch.rows) - stretch.first;
+            let end = rows.end.clamp(stretch.first, stretch.first + stretch.rows) - stretch.first;
+            if start >= end {
+                continue;
+            }
+            let ranges = match &stretch.sieve {
+                Some(sieve) => sieve.ranges(start..end),
+                None => std::iter::once(start..end).collect(),
+            };
+            let mut first = stretch.first + start;
+            for raw in ranges {
+                let length = raw.end - raw.start;
+                segments.push(Segment { stretch: number, first, raw });
+                first += length;
+            }
+        }
+        View::new(self, segments)
+    }
+
+    /// Numbers the different tuples of `quantities` among the rows.
+    pub fn tuples(&self, quantities: &[Quantity]) -> Tuples {
+        let (mut parts, mut span) = (Vec::new(), 0);
+        for stretch in &self.stretches {
+            let roots = stretch.block.roots(quantities);
+            let (mut digits, mut count) = (Vec::new(), 1);
+            for digit in stretch.digits.digits.iter().rev() {
+                let factor = &stretch.block.factors[digit.factor];
+                if factor.holds_any(&roots) {
+                    let (distinct, class_of) = factor.classes(&roots);
+                    digits.push(TupleDigit { digit: *digit, class_of, weight: count });
+                    // Never more than the rows, which fit.
+                    count *= distinct;
+                }
+            }
+            let run = digits.first().map_or(stretch.digits.rows, |fastest| fastest.digit.stride);
+            parts.push(TupleStretch { digits, first: span, run });
+            span += count;
+        }
+        Tuples { parts, span }
+    }
+
+    /// How many different tuples of `quantities` the rows have, where no row differs from another in anything else.
+    ///
+    /// Values that blocks share, and those that expressions map together, count each time; so do values that a list repeats if a
+    /// condition leaves more than `most` rows.
+    pub fn distinct(&self, quantities: &[Quantity], most: u64) -> u64 {
+        let tuples = self.tuples(quantities);
+        let repeats = tuples.repeat();
+        if self.stretches.iter().all(|stretch| stretch.sieve.is_none()) {
+            tuples.span
+        } else if repeats && self.rows <= most {
+            let seen: HashSet<u64> =
+                self.view(0..self.rows).tuples(&tuples, 0..self.rows).into_iter().map(|(tuple, _)| tuple).collect();
+            seen.len() as u64
+        } else {
+            self.rows
+        }
+    }
+}
+
+#[derive(Debug, Clone)]
+struct TupleDigit {
+    digit: Digit,
+    class_of: Option<Vec<u32>>,
+    weight: u64,
+}
+
+/// The tuples of one block.
+#[derive(Debug, Clone)]
+struct TupleStretch {
+    digits: Vec<TupleDigit>,
+    /// Tuples of the blocks before.
+    first: u64,
+    /// For how many rows of the product a tuple lasts, counted from a multiple of this number.
+    run: u64,
+}
+
+/// A numbering of the different tuples of some quantities among the rows of a projection. The same tuple of a block has the same number in
+/// every projection of the same grid that holds all the quantities.
+#[derive(Debug, Clone)]
+pub struct Tuples {
+    parts: Vec<TupleStretch>,
+    span: u64,
+}
+
+impl Tuples {
+    /// One more than the greatest number.
+    pub fn span(&self) -> u64 {
+        self.span
+    }
+
+    /// Whether rows that differ in nothing else can share a tuple, since a list names a value twice.
+    pub fn repeat(&self) -> bool {
+        self.parts.iter().any(|part| part.digits.iter().any(|digit| digit.class_of.is_some()))
+    }
+
+    /// The tuple of row `raw` of the product of block number `stretch`, and the first row after it that may have another one.
+    pub(super) fn of(&self, stretch: usize, raw: u64) -> (u64, u64) {
+        let part = &self.parts[stretch];
+        let number = part.digits.iter().map(|TupleDigit { digit, class_of, weight }| {
+            let step = digit.step(raw);
+            weight * class_of.as_ref().map_or(step, |class_of| u64::from(class_of[step as usize]))
+        });
+        (part.first + number.sum::<u64>(), (raw / part.run + 1).saturating_mul(part.run))
+    }
+}

@@ -1,0 +1,119 @@
+//! Values of axes and expressions over many rows at a time.
+
+use std::ops::Range;
+
+use super::axis::{Axis, Values};
+use super::block::{Block, Derived};
+use super::digits::{Digit, Digits};
+use super::expression::{Columns, Expression, Stack};
+use super::quantity::Quantity;
+
+/// Ranges of at most this many values are computed once and looked up.
+const TABULATED: u64 = 1 << 10;
+
+/// What some quantities of a block are over the rows of a product.
+pub struct Sampler<'a> {
+    sources: Vec<Source<'a>>,
+    derived: Vec<&'a Derived>,
+}
+
+struct Source<'a> {
+    digit: Digit,
+    axis: &'a Axis,
+    table: Option<Vec<f64>>,
+}
+
+impl Source<'_> {
+    fn at(&self, step: u64) -> f64 {
+        self.table.as_ref().map_or_else(|| self.axis.values.at(step), |table| table[step as usize])
+    }
+}
+
+/// The memory of one thread.
+#[derive(Default)]
+pub struct Scratch {
+    columns: Columns,
+    stack: Stack,
+    length: usize,
+}
+
+impl<'a> Sampler<'a> {
+    /// Of `quantities`, axes or computed, and all that they are made of; rows are told by `digits`.
+    pub fn new(block: &'a Block, digits: &Digits, quantities: &[Quantity]) -> Sampler<'a> {
+        let roots = block.roots(quantities);
+        let mut sources = Vec::new();
+        for digit in &digits.digits {
+            for axis in block.factors[digit.factor].axes.iter().filter(|axis| roots.contains(&axis.quantity)) {
+                let is_range = !matches!(axis.values, Values::List(_));
+                let table = (is_range && digit.len <= TABULATED)
+                    .then(|| (0..digit.len).map(|step| axis.values.at(step)).collect());
+                sources.push(Source { digit: *digit, axis, table });
+            }
+        }
+        let mut wanted = quantities.to_vec();
+        let mut derived: Vec<&Derived> = Vec::new();
+        for one in block.derived.iter().rev() {
+            if wanted.contains(&one.quantity) {
+                wanted.extend(one.expression.reads());
+                derived.push(one);
+            }
+        }
+        derived.reverse();
+        Sampler { sources, derived }
+    }
+
+    /// For how many rows all the quantities stay the same at least, counted from a multiple of this number; `None` if they never change.
+    pub fn run(&self) -> Option<u64> {
+        self.sources.iter().map(|source| source.digit.stride).min()
+    }
+
+    /// Takes the values at consecutive rows.
+    pub fn load(&self, rows: Range<u64>, scratch: &mut Scratch) {
+        scratch.length = (rows.end - rows.start) as usize;
+        for source in &self.sources {
+            let column = scratch.columns.get_mut(source.axis.quantity);
+            column.clear();
+            let Digit { len, stride, .. } = source.digit;
+            let (mut row, mut step) = (rows.start, source.digit.step(rows.start));
+            let mut end = (row / stride + 1).saturating_mul(stride);
+            while row < rows.end {
+                let until = end.min(rows.end);
+                column.resize(column.len() + (until - row) as usize, source.at(step));
+                row = until;
+                end = end.saturating_add(stride);
+                step = if step + 1 == len { 0 } else { step + 1 };
+            }
+        }
+        self.derive(scratch);
+    }
+
+    /// Takes the values at any rows.
+    pub fn pick(&self, rows: &[u64], scratch: &mut Scratch) {
+        scratch.length = rows.len();
+        for source in &self.sources {
+            let column = scratch.columns.get_mut(source.axis.quantity);
+            column.clear();
+            column.extend(rows.iter().map(|&row| source.at(source.digit.step(row))));
+        }
+        self.derive(scratch);
+    }
+
+    fn derive(&self, scratch: &mut Scratch) {
+        for one in &self.derived {
+            let values = scratch.evaluate(&one.expression).to_vec();
+            *scratch.columns.get_mut(one.quantity) = values;
+        }
+    }
+}
+
+impl Scratch {
+    /// The values of a quantity at the rows that were taken last.
+    pub fn column(&self, quantity: Quantity) -> &[f64] {
+        self.columns.get(quantity)
+    }
+
+    /// The values of an expression there.
+    pub fn evaluate(&mut self, expression: &Expression) -> &[f64] {
+        expression.evaluate(&self.columns, self.length, &mut self.stack)
+    }
+}

@@ -1,0 +1,287 @@
+//! Consecutive rows of a table: their values as runs of equal ones.
+
+use std::collections::HashMap;
+use std::ops::Range;
+
+use super::axis::Axis;
+use super::digits::Digit;
+use super::projection::{Projection, Tuples};
+use super::quantity::{Point, Quantity};
+use super::sampler::{Sampler, Scratch};
+
+/// Points at which an expression is evaluated at a time.
+const BATCH: usize = 1 << 10;
+
+/// Axes of at most this many steps have a code for each in a table.
+const TABULATED: u64 = 1 << 16;
+
+/// Rows of a table that are neighbours in the product of a block.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Segment {
+    /// The number of the block.
+    pub stretch: usize,
+    /// The number of its first row in the table.
+    pub first: u64,
+    /// The rows of the product.
+    pub raw: Range<u64>,
+}
+
+impl Segment {
+    fn end(&self) -> u64 {
+        self.first + (self.raw.end - self.raw.start)
+    }
+
+    /// The part that lies in `rows` of the table.
+    fn cut(&self, rows: &Range<u64>) -> Segment {
+        let (start, end) = (rows.start.max(self.first), rows.end.min(self.end()));
+        let raw = self.raw.start + (start - self.first)..self.raw.start + (end - self.first);
+        Segment { stretch: self.stretch, first: start, raw }
+    }
+}
+
+/// Consecutive rows of a table.
+#[derive(Debug, Clone)]
+pub struct View<'a> {
+    projection: &'a Projection,
+    segments: Vec<Segment>,
+}
+
+impl<'a> View<'a> {
+    pub(super) fn new(projection: &'a Projection, segments: Vec<Segment>) -> View<'a> {
+        View { projection, segments }
+    }
+
+    fn segments(&self, rows: Range<u64>) -> impl Iterator<Item = Segment> + '_ {
+        let first = self.segments.partition_point(|segment| segment.end() <= rows.start);
+        let inside = self.segments[first..].iter().take_while({
+            let end = rows.end;
+            move |segment| segment.first < end
+        });
+        inside.map(move |segment| segment.cut(&rows)).filter(|segment| !segment.raw.is_empty())
+    }
+
+    /// The values at `row`, one of the rows.
+    pub fn point(&self, row: u64) -> Point {
+        let mut point = Point::default();
+        if let Some(segment) = self.segments(row..row + 1).next() {
+            let stretch = &self.projection.stretches()[segment.stretch];
+            let block = &stretch.block;
+            for digit in &stretch.digits.digits {
+                for axis in &block.factors[digit.factor].axes {
+                    point[axis.quantity] = axis.values.at(digit.step(segment.raw.start));
+                }
+            }
+            if block.derived.is_empty() {
+                return point;
+            }
+            let made = block.derived.iter().map(|derived| derived.quantity).filter(|quantity| {
+                // All that it is made of is there.
+                block.roots(&[*quantity]).iter().all(|root| stretch.axis(*root).is_some())
+            });
+            let made: Vec<Quantity> = made.collect();
+            let mut scratch = Scratch::default();
+            Sampler::new(block, &stretch.digits, &made).pick(&[segment.raw.start], &mut scratch);
+            for quantity in made {
+                point[quantity] = scratch.column(quantity)[0];
+            }
+        }
+        point
+    }
+
+    /// The values of `quantity` over `rows`, some of the rows, as runs of equal values; `None` if the table has no such axis.
+    pub fn runs(&self, quantity: Quantity, rows: Range<u64>) -> Option<Runs> {
+        let stretches = self.projection.stretches();
+        let is_known = |stretch: &super::projection::Stretch| {
+            let block = &stretch.block;
+            block.scale(quantity).is_some() && block.roots(&[quantity]).iter().all(|root| stretch.axis(*root).is_some())
+        };
+        if !stretches.iter().all(is_known) {
+            return None;
+        }
+        let segments: Vec<Segment> = self.segments(rows.clone()).collect();
+        if let [segment] = segments.as_slice()
+            && let Some((digit, axis)) = stretches[segment.stretch].axis(quantity)
+        {
+            let first = segment.raw.start / digit.stride;
+            let steps = ((segment.raw.end - 1) / digit.stride - first + 1).min(digit.len);
+            let values = (first..first + steps).map(|turn| axis.values.at(turn % digit.len)).collect();
+            return Some(Runs { values, order: Order::Cyclic { digit, segment: segment.clone() } });
+        }
+        let mut runs = Listed::default();
+        let (mut scratch, mut starts) = (Scratch::default(), Vec::new());
+        for group in segments.chunk_by(|one, next| one.stretch == next.stretch) {
+            let stretch = &stretches[group[0].stretch];
+            if let Some((digit, axis)) = stretch.axis(quantity) {
+                runs.take_steps(digit, axis, group);
+                continue;
+            }
+            let sampler = Sampler::new(&stretch.block, &stretch.digits, &[quantity]);
+            for segment in group {
+                let stride = sampler.run().unwrap_or(u64::MAX);
+                let mut raw = segment.raw.start;
+                while raw < segment.raw.end {
+                    starts.push((segment.first + (raw - segment.raw.start), raw));
+                    raw = (raw / stride + 1).saturating_mul(stride);
+                }
+                if starts.len() >= BATCH {
+                    runs.take_values(&sampler, quantity, &mut starts, &mut scratch);
+                }
+            }
+            runs.take_values(&sampler, quantity, &mut starts, &mut scratch);
+        }
+        Some(Runs { values: runs.values, order: Order::Listed { starts: runs.starts, codes: runs.codes } })
+    }
+
+    /// The tuples of `rows`, some of the rows, each with the rows in a row that have it.
+    pub fn tuples(&self, tuples: &Tuples, rows: Range<u64>) -> Vec<(u64, Range<u64>)> {
+        let mut runs: Vec<(u64, Range<u64>)> = Vec::new();
+        for segment in self.segments(rows) {
+            let mut raw = segment.raw.start;
+            while raw < segment.raw.end {
+                let (tuple, next) = tuples.of(segment.stretch, raw);
+                let next = next.min(segment.raw.end);
+                let end = segment.first + (next - segment.raw.start);
+                match runs.last_mut() {
+                    Some((last, run)) if *last == tuple => run.end = end,
+                    _ => runs.push((tuple, segment.first + (raw - segment.raw.start)..end)),
+                }
+                raw = next;
+            }
+        }
+        runs
+    }
+}
+
+/// Runs one by one: the first row of each, and the place of its value among those that occur.
+#[derive(Default)]
+struct Listed {
+    starts: Vec<u64>,
+    codes: Vec<u32>,
+    values: Vec<f64>,
+}
+
+impl Listed {
+    fn push(&mut self, row: u64, code: u32) {
+        if self.codes.last() != Some(&code) {
+            self.starts.push(row);
+            self.codes.push(code);
+        }
+    }
+
+    /// Adds the steps of an axis of a factor over `segments`, each value once.
+    fn take_steps(&mut self, digit: Digit, axis: &Axis, segments: &[Segment]) {
+        // What each step is coded as: a table where it is small, since there may be as many runs as rows.
+        let mut table = vec![None; if digit.len <= TABULATED { digit.len as usize } else { 0 }];
+        let mut map = HashMap::new();
+        for segment in segments {
+            let mut raw = segment.raw.start;
+            let mut step = digit.step(raw);
+            let mut next = (raw / digit.stride + 1).saturating_mul(digit.stride);
+            while raw < segment.raw.end {
+                let slot = match table.get_mut(step as usize) {
+                    Some(slot) => slot,
+                    None => map.entry(step).or_insert(None),
+                };
+                let code = *slot.get_or_insert_with(|| {
+                    self.values.push(axis.values.at(step));
+                    self.values.len() as u32 - 1
+                });
+                self.push(segment.first + (raw - segment.raw.start), code);
+                raw = next;
+                next = next.saturating_add(digit.stride);
+                step = if step + 1 == digit.len { 0 } else { step + 1 };
+            }
+        }
+    }
+
+    /// Adds the values of a computed axis at `starts`, rows of the table with their rows of the product.
+    fn take_values(
+        &mut self,
+        sampler: &Sampler<'_>,
+        quantity: Quantity,
+        starts: &mut Vec<(u64, u64)>,
+        scratch: &mut Scratch,
+    ) {
+        let raw: Vec<u64> = starts.iter().map(|(_, raw)| *raw).collect();
+        sampler.pick(&raw, scratch);
+        for ((row, _), &value) in starts.drain(..).zip(scratch.column(quantity)) {
+            if self.values.last().is_none_or(|last| last.to_bits() != value.to_bits()) {
+                self.values.push(value);
+            }
+            self.push(row, self.values.len() as u32 - 1);
+        }
+    }
+}
+
+/// The values of one quantity over a range of rows.
+#[derive(Debug, Clone)]
+pub struct Runs {
+    values: Vec<f64>,
+    order: Order,
+}
+
+#[derive(Debug, Clone)]
+enum Order {
+    /// The steps of an axis of a product, over and over again.
+    Cyclic { digit: Digit, segment: Segment },
+    /// The first row of each run, and the index of its value.
+    Listed { starts: Vec<u64>, codes: Vec<u32> },
+}
+
+impl Runs {
+    /// The values that occur, one a step, in the order of their first row.
+    pub fn values(&self) -> &[f64] {
+        &self.values
+    }
+
+    /// The index into [`Runs::values`] of one row.
+    pub fn step_of(&self, row: u64) -> usize {
+        match &self.order {
+            Order::Cyclic { digit, segment } => {
+                let raw = segment.raw.start + (row - segment.first);
+                ((raw / digit.stride - segment.raw.start / digit.stride) % digit.len) as usize
+            }
+            Order::Listed { starts, codes } => codes[Runs::run_at(starts, row)] as usize,
+        }
+    }
+
+    fn run_at(starts: &[u64], row: u64) -> usize {
+        starts.partition_point(|start| *start <= row).saturating_sub(1)
+    }
+
+    /// The runs of equal values over `rows`, part of the rows of `self`: an index into [`Runs::values`], and for how many rows.
+    pub fn over(&self, rows: Range<u64>) -> impl Iterator<Item = (usize, usize)> + '_ {
+        let mut row = rows.start;
+        // The step of the axis of a product and the first row of the next one, or the run at hand.
+        let (mut place, mut next) = match &self.order {
+            _ if rows.is_empty() => (0, 0),
+            Order::Cyclic { digit, segment } => {
+                let raw = segment.raw.start + (row - segment.first);
+                let turn = (raw / digit.stride + 1).saturating_mul(digit.stride);
+                (self.step_of(row), row.saturating_add(turn - raw))
+            }
+            Order::Listed { starts, .. } => (Runs::run_at(starts, row), 0),
+        };
+        std::iter::from_fn(move || {
+            if row >= rows.end {
+                return None;
+            }
+            let (step, end) = match &self.order {
+                Order::Cyclic { digit, .. } => {
+                    let run = (place, next);
+                    next = next.saturating_add(digit.stride);
+                    place = if place as u64 + 1 == digit.len { 0 } else { place + 1 };
+                    run
+                }
+                Order::Listed { starts, codes } => {
+                    place += 1;
+                    (codes[place - 1] as usize, starts.get(place).copied().unwrap_or(u64::MAX))
+                }
+            };
+            let end = end.min(rows.end);
+            let length = (end - row) as usize;
+            row = end;
+            Some((step, length))
+        })
+    }
+}

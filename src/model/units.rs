@@ -1,0 +1,78 @@
+//! The scales of the model, and what its units are in SI.
+
+/// The four scales that make the model dimensionless.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Scales {
+    /// Friction coefficient at the velocity `v_0`, `mu_0 > 0`.
+    pub mu_0: f64,
+    /// Length over which contacts are renewed, in m.
+    pub l: f64,
+    /// Velocity from which on the friction law holds, in m/s.
+    pub v_0: f64,
+    /// Normal load `sigma` on the interface, in Pa.
+    pub normal_load: f64,
+}
+
+/// In which units values are given and reported.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub enum Units {
+    /// Those of the model: velocities in `v_0`, lengths in `l`, stresses in `mu_0 sigma`.
+    #[default]
+    Scaled,
+    /// SI, for these scales. Masses, stiffnesses and work are per area of the interface.
+    Si(Scales),
+}
+
+/// How large a unit of the model is.
+type Size = fn(&Scales) -> f64;
+
+/// Every unit of the model that a column may have, and the same in SI.
+const UNITS: [(&str, &str, Size); 13] = [
+    ("1", "1", |_| 1.0),
+    ("mu_0", "1", |s| s.mu_0),
+    ("l/v_0", "s", |s| s.l / s.v_0),
+    ("v_0/l", "1/s", |s| s.v_0 / s.l),
+    ("v_0", "m/s", |s| s.v_0),
+    ("mu_0 sigma", "Pa", |s| s.mu_0 * s.normal_load),
+    ("mu_0 sigma/l", "Pa/m", |s| s.mu_0 * s.normal_load / s.l),
+    ("mu_0 sigma l", "J/m^2", |s| s.mu_0 * s.normal_load * s.l),
+    ("mu_0 sigma v_0", "W/m^2", |s| s.mu_0 * s.normal_load * s.v_0),
+    ("mu_0 sigma l/v_0^2", "kg/m^2", |s| s.mu_0 * s.normal_load * s.l / (s.v_0 * s.v_0)),
+    // A coefficient that is told relative to the duration stays so, contact lifetimes in units of l/v_0.
+    ("1/t_f", "1/t_f", |_| 1.0),
+    ("1/t_f^2", "1/t_f^2", |_| 1.0),
+    // Which of the two it is differs from row to row: the table converts it.
+    ("1; (v_0/l)^2 for bounded_velocity", "1; 1/s^2 for bounded_velocity", |_| 1.0),
+];
+
+impl Units {
+    /// The value in these units of what is 1 in `unit`, a unit of the model.
+    pub fn size(&self, unit: &str) -> f64 {
+        match self {
+            Units::Scaled => 1.0,
+            Units::Si(scales) => known(unit).map_or(1.0, |(_, _, size)| size(scales)),
+        }
+    }
+
+    /// What these units call `unit`, a unit of the model.
+    pub fn name(&self, unit: &'static str) -> &'static str {
+        match self {
+            Units::Scaled => unit,
+            Units::Si(_) => known(unit).map_or(unit, |(_, name, _)| name),
+        }
+    }
+
+    /// `value`, given in these units, in `unit`.
+    pub fn scaled(&self, unit: &str, value: f64) -> f64 {
+        value / self.size(unit)
+    }
+}
+
+fn known(unit: &str) -> Option<&'static (&'static str, &'static str, Size)> {
+    UNITS.iter().find(|(name, ..)| *name == unit)
+}
+
+/// Whether `unit` can be told in SI; words have none.
+pub fn is_known(unit: &str) -> bool {
+    unit.is_empty() || known(unit).is_some()
+}

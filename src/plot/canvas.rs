@@ -1,0 +1,256 @@
+//! A sheet of SVG: shapes and text, in points from its upper left corner.
+
+use std::fmt::Write;
+
+use super::label::{self, DROP, FAMILIES, RISE, SMALL};
+
+/// Points of a millimetre.
+pub const MILLIMETRE: f64 = 72.0 / 25.4;
+
+/// How a line is drawn.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Stroke {
+    /// Colour.
+    pub colour: String,
+    /// Width, in points.
+    pub width: f64,
+    /// Lengths of dashes and spaces, in points; empty for a solid line.
+    pub dashes: &'static [f64],
+}
+
+impl Stroke {
+    /// A solid line.
+    pub fn solid(colour: &str, width: f64) -> Stroke {
+        Stroke { colour: colour.to_owned(), width, dashes: &[] }
+    }
+}
+
+/// Where a text is relative to its place.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Anchor {
+    /// It starts there.
+    Start,
+    /// Its middle is there.
+    Middle,
+    /// It ends there.
+    End,
+}
+
+/// A rectangle: left, top, width, height.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Area {
+    /// Left edge.
+    pub x: f64,
+    /// Upper edge.
+    pub y: f64,
+    /// Width.
+    pub width: f64,
+    /// Height.
+    pub height: f64,
+}
+
+/// The sheet.
+#[derive(Debug, Default)]
+pub struct Canvas {
+    body: String,
+    clips: usize,
+}
+
+/// A coordinate, to a hundredth of a point.
+fn at(value: f64) -> String {
+    let text = format!("{:.2}", if value.is_finite() { value.clamp(-1e5, 1e5) } else { 0.0 });
+    let text = text.trim_end_matches('0').trim_end_matches('.');
+    if text == "-0" { "0".to_owned() } else { text.to_owned() }
+}
+
+/// Text that is safe inside XML.
+pub fn escaped(text: &str) -> String {
+    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
+}
+
+impl Canvas {
+    fn push(&mut self, arguments: std::fmt::Arguments<'_>) {
+        // Writing to a string cannot fail.
+        let _ = self.body.write_fmt(arguments);
+        self.body.push('\n');
+    }
+
+    fn stroke(stroke: &Stroke) -> String {
+        let mut text = format!("fill=\"none\" stroke=\"{}\" stroke-width=\"{}\"", stroke.colour, at(stroke.width));
+        if !stroke.dashes.is_empty() {
+            let dashes: Vec<String> = stroke.dashes.iter().map(|&dash| at(dash)).collect();
+            text.push_str(&format!(" stroke-dasharray=\"{}\"", dashes.join(" ")));
+        }
+        text
+    }
+
+    /// A straight line.
+    pub fn line(&mut self, from: (f64, f64), to: (f64, f64), stroke: &Stroke) {
+        let style = Self::stroke(stroke);
+        self.push(format_args!("<path d=\"M{} {}L{} {}\" {style}/>", at(from.0), at(from.1), at(to.0), at(to.1)));
+    }
+
+    /// Lines through points, each list its own line.
+    pub fn lines(&mut self, lines: &[Vec<(f64, f64)>], stroke: &Stroke) {
+        let mut path = String::new();
+        for line in lines.iter().filter(|line| line.len() > 1) {
+            for (place, &(x, y)) in line.iter().enumerate() {
+                path.push_str(&format!("{}{} {}", if place == 0 { 'M' } else { 'L' }, at(x), at(y)));
+            }
+        }
+        if !path.is_empty() {
+            let style = Self::stroke(stroke);
+            self.push(format_args!("<path d=\"{path}\" stroke-linejoin=\"round\" {style}/>"));
+        }
+    }
+
+    /// A closed shape.
+    pub fn shape(&mut self, points: &[(f64, f64)], fill: &str, stroke: Option<&Stroke>) {
+        let mut path = String::new();
+        for (place, &(x, y)) in points.iter().enumerate() {
+            path.push_str(&format!("{}{} {}", if place == 0 { 'M' } else { 'L' }, at(x), at(y)));
+        }
+        let line = stroke.map_or_else(String::new, |stroke| {
+            format!(" stroke=\"{}\" stroke-width=\"{}\" stroke-linejoin=\"round\"", stroke.colour, at(stroke.width))
+        });
+        self.push(format_args!("<path d=\"{path}Z\" fill=\"{fill}\"{line}/>"));
+    }
+
+    /// A circle.
+    pub fn circle(&mut self, centre: (f64, f64), radius: f64, fill: &str, stroke: &Stroke) {
+        let style = format!("fill=\"{fill}\" stroke=\"{}\" stroke-width=\"{}\"", stroke.colour, at(stroke.width));
+        self.push(format_args!(
+            "<circle cx=\"{}\" cy=\"{}\" r=\"{}\" {style}/>",
+            at(centre.0),
+            at(centre.1),
+            at(radius)
+        ));
+    }
+
+    /// A filled rectangle.
+    pub fn fill(&mut self, area: Area, colour: &str) {
+        let Area { x, y, width, height } = area;
+        let style = format!("width=\"{}\" height=\"{}\" fill=\"{colour}\"", at(width), at(height));
+        self.push(format_args!("<rect x=\"{}\" y=\"{}\" {style}/>", at(x), at(y)));
+    }
+
+    /// The frame of a rectangle.
+    pub fn frame(&mut self, area: Area, stroke: &Stroke) {
+        let Area { x, y, width, height } = area;
+        let style = Self::stroke(stroke);
+        let size = format!("width=\"{}\" height=\"{}\"", at(width), at(height));
+        self.push(format_args!("<rect x=\"{}\" y=\"{}\" {size} {style}/>", at(x), at(y)));
+    }
+
+    /// A rectangle of grey diagonal lines: no data.
+    pub fn hatch(&mut self, area: Area) {
+        self.fill(area, "#efefef");
+        self.clipped(area, |canvas| {
+            let step = 3.2;
+            let mut lines = Vec::new();
+            let mut start = -area.height;
+            while start < area.width {
+                lines.push(vec![(area.x + start, area.y + area.height), (area.x + start + area.height, area.y)]);
+                start += step;
+            }
+            canvas.lines(&lines, &Stroke::solid("#a8a8a8", 0.4));
+        });
+    }
+
+    /// An image, given as a PNG; its pixels stay sharp.
+    pub fn image(&mut self, area: Area, png: &[u8]) {
+        use base64::Engine;
+        let data = base64::engine::general_purpose::STANDARD.encode(png);
+        let Area { x, y, width, height } = area;
+        let place = format!("x=\"{}\" y=\"{}\" width=\"{}\" height=\"{}\"", at(x), at(y), at(width), at(height));
+        self.push(format_args!(
+            "<image {place} preserveAspectRatio=\"none\" style=\"image-rendering:pixelated\" \
+             xlink:href=\"data:image/png;base64,{data}\"/>"
+        ));
+    }
+
+    /// What `draw` draws, as far as it is inside `area`.
+    pub fn clipped(&mut self, area: Area, draw: impl FnOnce(&mut Canvas)) {
+        let Area { x, y, width, height } = area;
+        self.clips += 1;
+        let id = self.clips;
+        let rect = format!("x=\"{}\" y=\"{}\" width=\"{}\" height=\"{}\"", at(x), at(y), at(width), at(height));
+        self.push(format_args!("<clipPath id=\"clip{id}\"><rect {rect}/></clipPath><g clip-path=\"url(#clip{id})\">"));
+        draw(self);
+        self.push(format_args!("</g>"));
+    }
+
+    /// A text in markup on the line through `place`, turned by a quarter to the left if `upwards`.
+    pub fn text(&mut self, place: (f64, f64), markup: &str, size: f64, anchor: Anchor, upwards: bool) {
+        self.coloured(place, markup, size, anchor, upwards, "#000");
+    }
+
+    /// The same in a colour.
+    pub fn coloured(
+        &mut self,
+        place: (f64, f64),
+        markup: &str,
+        size: f64,
+        anchor: Anchor,
+        upwards: bool,
+        colour: &str,
+    ) {
+        // Anchors are computed from the metrics of the font: a viewer need not agree on how spans of several styles are anchored.
+        let width = size * label::width(markup);
+        let shift = match anchor {
+            Anchor::Start => 0.0,
+            Anchor::Middle => -0.5 * width,
+            Anchor::End => -width,
+        };
+        let mut spans = String::new();
+        let mut level = 0;
+        for span in label::spans(markup) {
+            let height = |level: i8| match level {
+                1 => -RISE * size,
+                -1 => DROP * size,
+                _ => 0.0,
+            };
+            let mut style = String::new();
+            if span.level != level {
+                style.push_str(&format!(" dy=\"{}\"", at(height(span.level) - height(level))));
+                level = span.level;
+            }
+            if span.level != 0 {
+                style.push_str(&format!(" font-size=\"{}\"", at(SMALL * size)));
+            }
+            if span.italic {
+                style.push_str(" font-style=\"italic\"");
+            }
+            let text = escaped(&span.text);
+            if style.is_empty() {
+                spans.push_str(&text)
+            } else {
+                spans.push_str(&format!("<tspan{style}>{text}</tspan>"))
+            }
+        }
+        let position = if upwards {
+            format!("transform=\"translate({} {}) rotate(-90)\" x=\"{}\" y=\"0\"", at(place.0), at(place.1), at(shift))
+        } else {
+            format!("x=\"{}\" y=\"{}\"", at(place.0 + shift), at(place.1))
+        };
+        self.push(format_args!(
+            "<text {position} font-size=\"{}\" fill=\"{colour}\" xml:space=\"preserve\">{spans}</text>",
+            at(size)
+        ));
+    }
+
+    /// The whole picture, of a size in points.
+    pub fn svg(&self, width: f64, height: f64, title: &str) -> String {
+        format!(
+            "<svg xmlns=\"http://www.w3.org/2000/svg\" xmlns:xlink=\"http://www.w3.org/1999/xlink\" width=\"{}mm\" height=\"{}mm\" \
+             viewBox=\"0 0 {} {}\" font-family=\"{FAMILIES}\">\n<title>{}</title>\n<rect width=\"100%\" height=\"100%\" \
+             fill=\"#fff\"/>\n{}</svg>\n",
+            at(width / MILLIMETRE),
+            at(height / MILLIMETRE),
+            at(width),
+            at(height),
+            escaped(title),
+            self.body
+        )
+    }
+}

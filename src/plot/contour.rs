@@ -1,0 +1,117 @@
+//! Lines along which a field over a grid has a given value (marching squares).
+
+use std::collections::BTreeMap;
+
+/// A field over a grid of `columns` by `rows`, row after row; NaN where there is none.
+#[derive(Debug, Clone, Copy)]
+pub struct Field<'a> {
+    /// Values of a row.
+    pub columns: usize,
+    /// Rows.
+    pub rows: usize,
+    /// The values.
+    pub values: &'a [f64],
+}
+
+/// An edge of the grid: its first corner, and whether it leads to the next row.
+type Edge = (usize, bool);
+
+/// The lines `field = level`, in units of columns and rows. Cells with a corner without value have none.
+pub fn contour(field: Field<'_>, level: f64) -> Vec<Vec<(f64, f64)>> {
+    let Field { columns, rows, values } = field;
+    if columns < 2 || rows < 2 || values.len() < columns * rows {
+        return Vec::new();
+    }
+    let mut next: BTreeMap<Edge, Vec<Edge>> = BTreeMap::new();
+    for row in 0..rows - 1 {
+        for column in 0..columns - 1 {
+            let corner = row * columns + column;
+            let corners = [corner, corner + 1, corner + columns + 1, corner + columns];
+            let heights = corners.map(|corner| values[corner] - level);
+            if heights.iter().any(|height| height.is_nan()) {
+                continue;
+            }
+            let above = heights.map(|height| height >= 0.0);
+            // Edges of the cell, in the order of its corners.
+            let edges: [Edge; 4] = [(corner, false), (corner + 1, true), (corner + columns, false), (corner, true)];
+            let crossed: Vec<Edge> =
+                (0..4).filter(|&side| above[side] != above[(side + 1) % 4]).map(|side| edges[side]).collect();
+            let pairs = match crossed.len() {
+                2 => vec![(crossed[0], crossed[1])],
+                // A saddle: the mean tells which corners belong together.
+                4 if (heights.iter().sum::<f64>() >= 0.0) == above[0] => {
+                    vec![(crossed[0], crossed[1]), (crossed[2], crossed[3])]
+                }
+                4 => vec![(crossed[3], crossed[0]), (crossed[1], crossed[2])],
+                _ => continue,
+            };
+            for (from, to) in pairs {
+                next.entry(from).or_default().push(to);
+                next.entry(to).or_default().push(from);
+            }
+        }
+    }
+    let place = |(corner, upwards): Edge| {
+        let other = if upwards { corner + columns } else { corner + 1 };
+        let (from, to) = (values[corner] - level, values[other] - level);
+        let share = from / (from - to);
+        let (x, y) = ((corner % columns) as f64, (corner / columns) as f64);
+        if upwards { (x, y + share) } else { (x + share, y) }
+    };
+    let mut lines = Vec::new();
+    // Open lines start where only one piece does; what is left are rings.
+    let starts: Vec<Edge> = next.iter().filter(|(_, to)| to.len() == 1).map(|(edge, _)| *edge).collect();
+    let all: Vec<Edge> = next.keys().copied().collect();
+    for start in starts.into_iter().chain(all) {
+        let mut line = vec![place(start)];
+        let mut here = start;
+        while let Some(to) = next.get_mut(&here).and_then(Vec::pop) {
+            if let Some(back) = next.get_mut(&to)
+                && let Some(entry) = back.iter().position(|edge| *edge == here)
+            {
+                back.swap_remove(entry);
+            }
+            line.push(place(to));
+            here = to;
+        }
+        if line.len() > 1 {
+            lines.push(line);
+        }
+    }
+    lines
+}
+
+#[cfg(test)]
+mod tests {
+    //! Contours of known shape.
+
+    use super::*;
+
+    fn field(size: usize, value: impl Fn(f64, f64) -> f64) -> Vec<f64> {
+        (0..size * size).map(|i| value((i % size) as f64, (i / size) as f64)).collect()
+    }
+
+    #[test]
+    fn a_plane_has_one_straight_contour() {
+        let values = field(11, |x, y| x + y);
+        let lines = contour(Field { columns: 11, rows: 11, values: &values }, 7.5);
+        assert_eq!(lines.len(), 1);
+        assert!(lines[0].iter().all(|(x, y)| (x + y - 7.5).abs() < 1e-12));
+    }
+
+    #[test]
+    fn a_hill_has_a_ring() {
+        let values = field(21, |x, y| (x - 10.0).powi(2) + (y - 10.0).powi(2));
+        let lines = contour(Field { columns: 21, rows: 21, values: &values }, 30.0);
+        assert_eq!(lines.len(), 1);
+        assert_eq!(lines[0].first(), lines[0].last());
+        assert!(lines[0].iter().all(|(x, y)| ((x - 10.0).hypot(y - 10.0) - 30f64.sqrt()).abs() < 0.05));
+    }
+
+    #[test]
+    fn a_gap_in_the_data_cuts_the_line() {
+        let values = field(11, |x, y| if x == 5.0 { f64::NAN } else { y });
+        let lines = contour(Field { columns: 11, rows: 11, values: &values }, 4.5);
+        assert_eq!(lines.len(), 2);
+    }
+}

@@ -1,0 +1,131 @@
+//! Why a picture cannot be drawn.
+
+use super::export::ExportError;
+use crate::dataset::ReadError;
+use crate::dataset::frame::FrameError;
+
+/// Why a picture cannot be drawn.
+#[derive(Debug, thiserror::Error)]
+pub enum PlotError {
+    /// A file cannot be opened.
+    #[error("{path}: cannot be read: {reason}")]
+    Read {
+        /// The file.
+        path: String,
+        /// What the system says.
+        reason: String,
+    },
+    /// A cell of a CSV file.
+    #[error(
+        "{path}, line {line}: found {found}\n  expected: {expected}\n  help: a trace is what `slipsweep trace … --out FILE.csv` writes"
+    )]
+    Cell {
+        /// The file.
+        path: String,
+        /// The line, from 1.
+        line: usize,
+        /// What is there.
+        found: String,
+        /// What should be.
+        expected: String,
+    },
+    /// A file is no trace.
+    #[error(
+        "{path}: not a trace: it has no column `{missing}`\n  found: {}\n  help: a trace is what `slipsweep trace … --out FILE` writes; \
+         of a dataset, name the folder",
+        .found.join(", ")
+    )]
+    NoTrace {
+        /// The file.
+        path: String,
+        /// The column.
+        missing: &'static str,
+        /// The columns that it has.
+        found: Vec<String>,
+    },
+    /// More traces than can be told apart.
+    #[error("{found} traces are too many for one picture\n  expected: at most {most}")]
+    TooManyTraces {
+        /// So many were given.
+        found: usize,
+        /// So many fit.
+        most: usize,
+    },
+    /// There is nothing to draw.
+    #[error("nothing to draw: no number in what was asked for")]
+    Nothing,
+    /// No table of that name.
+    #[error("the dataset has no table `{name}`\n  found: {}\n  help: name one of them with --table", .found.join(", "))]
+    NoTable {
+        /// The name.
+        name: String,
+        /// The tables that there are.
+        found: Vec<String>,
+    },
+    /// No column of that name.
+    #[error("{argument}: the table `{table}` has no {what} `{name}`\n  found: {}", .found.join(", "))]
+    NoColumn {
+        /// The argument that names it.
+        argument: String,
+        /// The table.
+        table: String,
+        /// `axis` or `column`.
+        what: &'static str,
+        /// The name.
+        name: String,
+        /// What there is.
+        found: Vec<String>,
+    },
+    /// A condition that cannot be read.
+    #[error(
+        "--where {text}: not a condition\n  expected: COLUMN=VALUE, or <, >, <=, >= or != between them\n  help: such as --where \"a=0.03\""
+    )]
+    Condition {
+        /// The condition.
+        text: String,
+    },
+    /// No row fulfils the conditions.
+    #[error("--where {text}: no row of the table `{table}` is left\n  found: {found}")]
+    NoRows {
+        /// The table.
+        table: String,
+        /// The conditions.
+        text: String,
+        /// The values that there are.
+        found: String,
+    },
+    /// All rows are missing.
+    #[error(
+        "the table `{table}` has no rows yet: none of its parts is there\n  help: `slipsweep run` of its spec makes them"
+    )]
+    Empty {
+        /// The table.
+        table: String,
+    },
+    /// Every axis has one value only.
+    #[error("the table `{table}` has a single row left, which makes no picture\n  help: `slipsweep head` shows rows")]
+    OneRow {
+        /// The table.
+        table: String,
+    },
+    /// A map needs two axes.
+    #[error(
+        "--color {column}: a map needs two axes of several values, which the table `{table}` does not have\n  help: \
+             --y {column} draws lines"
+    )]
+    NoMap {
+        /// The table.
+        table: String,
+        /// The column.
+        column: String,
+    },
+    /// A trace in Parquet.
+    #[error("{0}\n  help: delete the file and trace it again")]
+    Trace(FrameError),
+    /// A part of a table.
+    #[error(transparent)]
+    Part(#[from] ReadError),
+    /// The picture.
+    #[error(transparent)]
+    Export(#[from] ExportError),
+}

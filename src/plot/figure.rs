@@ -1,0 +1,689 @@
+//! A figure: panels with axes and layers, a legend, a colour bar and a few words, set out on a sheet of given width.
+
+use super::canvas::{Anchor, Area, Canvas, MILLIMETRE, Stroke};
+use super::colour::{hex, viridis};
+use super::label;
+use super::scale::{Scale, Tick, Ticks};
+
+/// Size of the words of a figure, in points: legible when it is printed as wide as it is.
+const SIZE: f64 = 7.5;
+const TICK_SIZE: f64 = 7.0;
+const NOTE_SIZE: f64 = 6.2;
+const TICK: f64 = 2.6;
+const MARGIN: f64 = 5.0;
+const FRAME: f64 = 0.6;
+/// Length of what leads from a vertical line to its words, and the space between words.
+const LEADER: f64 = 5.0;
+const MARK_SPACE: f64 = 5.0;
+/// Height of both.
+const WORDS_ABOVE: f64 = LEADER + 2.5 + NOTE_SIZE;
+
+/// A figure.
+#[derive(Debug, Clone, Default)]
+pub struct Figure {
+    /// What it shows, in markup.
+    pub title: String,
+    /// What is the same all over it, in markup.
+    pub subtitle: String,
+    /// The panels, row after row.
+    pub panels: Vec<Panel>,
+    /// Panels side by side.
+    pub columns: usize,
+    /// Height of a panel relative to its width.
+    pub aspect: f64,
+    /// Whether all panels have the same axes, so that only the outer ones are labelled.
+    pub shared: bool,
+    /// What is explained.
+    pub legend: Vec<Entry>,
+    /// The colours of maps.
+    pub colours: Option<Colours>,
+    /// Remarks below, in markup.
+    pub notes: Vec<String>,
+}
+
+/// Colours for numbers.
+#[derive(Debug, Clone)]
+pub struct Colours {
+    /// What the numbers are, in markup.
+    pub label: String,
+    /// Their range; the darkest colour is at its start.
+    pub scale: Scale,
+}
+
+/// A pair of axes and what is between them.
+#[derive(Debug, Clone)]
+pub struct Panel {
+    /// What tells it from the others, in markup.
+    pub title: String,
+    /// The horizontal axis.
+    pub x: Axis,
+    /// The vertical axis.
+    pub y: Axis,
+    /// From back to front.
+    pub layers: Vec<Layer>,
+}
+
+/// An axis.
+#[derive(Debug, Clone)]
+pub struct Axis {
+    /// Name of its column.
+    pub column: String,
+    /// Unit of its column.
+    pub unit: String,
+    /// What it spans.
+    pub scale: Scale,
+}
+
+/// What is drawn between axes; places are values of the axes unless they are said to be shares.
+#[derive(Debug, Clone)]
+pub enum Layer {
+    /// The background where a map has no data: hatched.
+    Hatch,
+    /// Colours that fill the panel.
+    Map(Map),
+    /// Lines through points.
+    Lines(Vec<Vec<(f64, f64)>>, Stroke),
+    /// A line that is seen on any colour: dark, with a light rim.
+    Contour(Vec<Vec<(f64, f64)>>, Stroke),
+    /// Small marks, by series.
+    Points(Vec<(f64, f64)>, Marker),
+    /// Small coloured discs; without a colour, hollow.
+    Dots(Vec<(f64, f64, Option<[u8; 3]>)>),
+    /// Stars.
+    Stars(Vec<(f64, f64)>),
+    /// A vertical line with words above its upper end, in markup.
+    Mark(f64, String, Stroke),
+    /// A horizontal line.
+    Level(f64, Stroke),
+}
+
+/// An image over the panel, with what its pixels stand for.
+#[derive(Debug, Clone)]
+pub struct Map {
+    /// As PNG, its first row at the top; it fills the panel.
+    pub png: Vec<u8>,
+    /// What is shown where the pointer is, if the picture is in a page.
+    pub hover: Option<Hover>,
+}
+
+/// The values of a map.
+#[derive(Debug, Clone)]
+pub struct Hover {
+    /// Values of the horizontal axis.
+    pub x: Vec<f64>,
+    /// Values of the vertical axis.
+    pub y: Vec<f64>,
+    /// The value of each cell, row after row from the least `y`; NaN where there is none.
+    pub values: Vec<f64>,
+    /// Words for some cells.
+    pub words: Vec<String>,
+    /// The word of each cell, if there is one.
+    pub word: Vec<u8>,
+    /// Name of the column.
+    pub column: String,
+}
+
+impl Hover {
+    /// Every `step`-th column and row.
+    pub fn every(&self, step: usize) -> Hover {
+        let thinned = |values: &[f64]| values.iter().copied().step_by(step).collect();
+        let columns = self.x.len();
+        let places: Vec<usize> = (0..self.y.len())
+            .step_by(step)
+            .flat_map(|row| (0..columns).step_by(step).map(move |column| row * columns + column))
+            .collect();
+        Hover {
+            x: thinned(&self.x),
+            y: thinned(&self.y),
+            values: places.iter().map(|&place| self.values[place]).collect(),
+            word: places.iter().map(|&place| self.word[place]).collect(),
+            words: self.words.clone(),
+            column: self.column.clone(),
+        }
+    }
+}
+
+/// A mark at a point.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Marker {
+    /// Which shape and colour.
+    pub series: usize,
+}
+
+/// An entry of a legend.
+#[derive(Debug, Clone)]
+pub struct Entry {
+    /// What is drawn beside the words.
+    pub key: Key,
+    /// The words, in markup.
+    pub text: String,
+}
+
+/// What a legend explains.
+#[derive(Debug, Clone)]
+pub enum Key {
+    /// A line.
+    Line(Stroke),
+    /// A line with a light rim.
+    Contour(Stroke),
+    /// A mark.
+    Point(Marker),
+    /// A line with marks.
+    Marked(Stroke, Marker),
+    /// A star.
+    Star,
+    /// The hatched background.
+    Hatch,
+    /// A hollow dot.
+    Hollow,
+    /// A colour.
+    Fill([u8; 3]),
+    /// Only words.
+    None,
+}
+
+/// A figure as SVG, and where its maps are.
+#[derive(Debug, Clone)]
+pub struct Drawn {
+    /// The picture.
+    pub svg: String,
+    /// Width and height in points.
+    pub size: (f64, f64),
+    /// Maps with values, and where they are in the picture.
+    pub hovers: Vec<(Area, Axis, Axis, Hover)>,
+}
+
+/// Room around a panel for its labels.
+#[derive(Debug, Clone, Copy)]
+struct Room {
+    left: f64,
+    right: f64,
+    below: f64,
+}
+
+impl Figure {
+    /// Draws the figure, `width` millimetres wide.
+    pub fn draw(&self, width: f64) -> Drawn {
+        let width = width * MILLIMETRE;
+        let mut canvas = Canvas::default();
+        let mut y = MARGIN;
+        let inner = width - 2.0 * MARGIN;
+        for line in wrapped(&self.title, SIZE + 0.5, inner) {
+            y += SIZE + 1.5;
+            canvas.text((MARGIN, y), &line, SIZE + 0.5, Anchor::Start, false);
+        }
+        for line in wrapped(&self.subtitle, NOTE_SIZE, inner) {
+            y += NOTE_SIZE + 2.2;
+            canvas.coloured((MARGIN, y), &line, NOTE_SIZE, Anchor::Start, false, "#444");
+        }
+        y += 4.0;
+        if !self.legend.is_empty() {
+            y = self.legend(&mut canvas, y, inner);
+        }
+        let bar = self.colours.as_ref().map_or(0.0, |colours| colours.width());
+        let (bottom, hovers) = self.panels(&mut canvas, y, inner - bar);
+        let mut foot = bottom;
+        for note in &self.notes {
+            for line in wrapped(note, NOTE_SIZE, inner) {
+                foot += NOTE_SIZE + 2.0;
+                canvas.coloured((MARGIN, foot), &line, NOTE_SIZE, Anchor::Start, false, "#444");
+            }
+        }
+        let height = foot + MARGIN;
+        Drawn { svg: canvas.svg(width, height, &label::plain(&self.title)), size: (width, height), hovers }
+    }
+
+    fn legend(&self, canvas: &mut Canvas, top: f64, inner: f64) -> f64 {
+        let (mut x, mut y) = (MARGIN, top + SIZE);
+        for entry in &self.legend {
+            let key = if matches!(entry.key, Key::None) { 0.0 } else { 20.0 };
+            let wide = key + SIZE * label::width(&entry.text) + 10.0;
+            if x > MARGIN && x + wide - 8.0 > MARGIN + inner {
+                x = MARGIN;
+                y += SIZE + 3.0;
+            }
+            let middle = y - 0.35 * SIZE;
+            let area = Area { x, y: middle - 3.5, width: 16.0, height: 7.0 };
+            match &entry.key {
+                Key::Line(stroke) => canvas.line((x, middle), (x + 16.0, middle), stroke),
+                Key::Contour(stroke) => contour_line(canvas, &[vec![(x, middle), (x + 16.0, middle)]], stroke),
+                Key::Point(marker) => marker.draw(canvas, (x + 8.0, middle)),
+                Key::Marked(stroke, marker) => {
+                    canvas.line((x, middle), (x + 16.0, middle), stroke);
+                    marker.draw(canvas, (x + 8.0, middle));
+                }
+                Key::Star => star(canvas, (x + 8.0, middle)),
+                Key::Hatch => {
+                    canvas.hatch(area);
+                    canvas.frame(area, &Stroke::solid("#777", 0.4));
+                }
+                Key::Hollow => dot(canvas, (x + 8.0, middle), None),
+                Key::Fill(colour) => {
+                    canvas.fill(area, &hex(*colour));
+                    canvas.frame(area, &Stroke::solid("#777", 0.4));
+                }
+                Key::None => {}
+            }
+            canvas.text((x + key, y), &entry.text, SIZE, Anchor::Start, false);
+            x += wide;
+        }
+        y + 4.0
+    }
+
+    fn panels(&self, canvas: &mut Canvas, top: f64, inner: f64) -> (f64, Vec<(Area, Axis, Axis, Hover)>) {
+        let columns = self.columns.clamp(1, self.panels.len().max(1));
+        let rows = self.panels.len().div_ceil(columns);
+        let count = self.panels.len();
+        // A first guess of a panel's width decides how many ticks it has, and so how much room their labels take.
+        let guess = inner / columns as f64 - 40.0;
+        let aspect = self.aspect;
+        let plans: Vec<(Ticks, Ticks)> = self
+            .panels
+            .iter()
+            .map(|panel| {
+                let x_count = panel.x.fitting(guess, false);
+                (panel.x.scale.ticks(x_count), panel.y.scale.ticks(panel.y.fitting(guess * aspect, true)))
+            })
+            .collect();
+        let has_title = self.panels.iter().any(|panel| !panel.title.is_empty());
+        let labelled = |place: usize| {
+            let same_below = self.panels.get(place + columns).is_some_and(|below| below.x.same(&self.panels[place].x));
+            let is_first = place.is_multiple_of(columns);
+            (!(self.shared && same_below && place + columns < count), !self.shared || is_first)
+        };
+        let mut lefts = vec![0.0_f64; columns];
+        let mut rights = vec![0.0_f64; columns];
+        let mut belows = vec![0.0_f64; rows];
+        for (place, (panel, (x, y))) in self.panels.iter().zip(&plans).enumerate() {
+            let room = panel.room(x, y, labelled(place), guess);
+            let (row, column) = (place / columns, place % columns);
+            lefts[column] = lefts[column].max(room.left);
+            rights[column] = rights[column].max(room.right);
+            belows[row] = belows[row].max(room.below);
+        }
+        let above = if has_title { SIZE + 5.0 } else { 4.0 };
+        let has_words = |row: usize| self.panels.iter().skip(row * columns).take(columns).any(Panel::has_words_above);
+        let above: Vec<f64> = (0..rows).map(|row| above + if has_words(row) { WORDS_ABOVE } else { 0.0 }).collect();
+        let room: f64 = lefts.iter().sum::<f64>() + rights.iter().sum::<f64>();
+        let panel_width = ((inner - room) / columns as f64).max(20.0);
+        let panel_height = (panel_width * aspect).max(20.0);
+        let mut y = top;
+        let mut hovers = Vec::new();
+        for (row, (above, below)) in above.iter().zip(&belows).enumerate() {
+            y += above;
+            let mut x = MARGIN;
+            for column in 0..columns {
+                x += lefts[column];
+                let place = row * columns + column;
+                if let Some(panel) = self.panels.get(place) {
+                    let area = Area { x, y, width: panel_width, height: panel_height };
+                    panel.draw(canvas, area, &plans[place], labelled(place), lefts[column]);
+                    for layer in &panel.layers {
+                        if let Layer::Map(Map { hover: Some(hover), .. }) = layer {
+                            hovers.push((area, panel.x.clone(), panel.y.clone(), hover.clone()));
+                        }
+                    }
+                }
+                x += panel_width + rights[column];
+            }
+            y += panel_height + below;
+        }
+        if let Some(colours) = &self.colours {
+            let first = top + above.first().copied().unwrap_or(0.0);
+            let tall = (y - belows.last().copied().unwrap_or(0.0) - first).min(220.0);
+            let area = Area { x: MARGIN + inner + 6.0, y: first, width: 8.0, height: tall };
+            colours.draw(canvas, area);
+        }
+        (y, hovers)
+    }
+}
+
+fn wrapped(markup: &str, size: f64, width: f64) -> Vec<String> {
+    if markup.is_empty() { Vec::new() } else { label::wrapped(markup, width / size) }
+}
+
+impl Axis {
+    /// About how many labels fit on `length` points.
+    fn fitting(&self, length: f64, is_vertical: bool) -> usize {
+        let each = if is_vertical {
+            17.0
+        } else if self.scale.log {
+            27.0
+        } else {
+            30.0
+        };
+        ((length / each) as usize).clamp(2, 9)
+    }
+
+    fn same(&self, other: &Axis) -> bool {
+        self.column == other.column && self.scale == other.scale
+    }
+
+    fn label(&self, power: i32) -> String {
+        label::axis(&self.column, &self.unit, power)
+    }
+}
+
+fn widest(ticks: &Ticks) -> f64 {
+    let widths = ticks.ticks.iter().filter_map(|tick| tick.label.as_deref()).map(label::width);
+    TICK_SIZE * widths.fold(0.0, f64::max)
+}
+
+impl Panel {
+    /// Room for the labels around a panel about `length` wide.
+    fn room(&self, x: &Ticks, y: &Ticks, (x_label, y_label): (bool, bool), length: f64) -> Room {
+        // The first and the last label of the horizontal axis may hang over.
+        let over = |tick: &Tick, share: f64| {
+            0.5 * TICK_SIZE * tick.label.as_deref().map_or(0.0, label::width) - share.max(0.0) * length
+        };
+        let before = x.ticks.iter().map(|tick| over(tick, self.x.scale.share(tick.value))).fold(0.0, f64::max);
+        let after = x.ticks.iter().map(|tick| over(tick, 1.0 - self.x.scale.share(tick.value))).fold(0.0, f64::max);
+        let labels = if y_label { TICK + 2.0 + widest(y) + 3.0 + SIZE + 3.0 } else { 5.0 };
+        let below = if x_label { TICK + TICK_SIZE + 4.0 + SIZE + 6.0 } else { 2.0 };
+        Room { left: labels.max(before + 3.0), right: after + 2.0, below }
+    }
+
+    fn draw(&self, canvas: &mut Canvas, area: Area, plan: &(Ticks, Ticks), labelled: (bool, bool), left: f64) {
+        let place = |(x, y): (f64, f64)| {
+            (area.x + area.width * self.x.scale.share(x), area.y + area.height * (1.0 - self.y.scale.share(y)))
+        };
+        let all = |lines: &[Vec<(f64, f64)>]| -> Vec<Vec<(f64, f64)>> {
+            lines.iter().flat_map(|line| pieces(line.iter().map(|point| place(*point)))).collect()
+        };
+        canvas.clipped(area, |canvas| {
+            for layer in &self.layers {
+                match layer {
+                    Layer::Hatch => canvas.hatch(area),
+                    Layer::Map(map) => canvas.image(area, &map.png),
+                    Layer::Lines(lines, stroke) => canvas.lines(&all(lines), stroke),
+                    Layer::Contour(lines, stroke) => contour_line(canvas, &all(lines), stroke),
+                    Layer::Mark(x, _, stroke) => {
+                        let (x, _) = place((*x, self.y.scale.low));
+                        canvas.line((x, area.y), (x, area.y + area.height), stroke);
+                    }
+                    Layer::Level(y, stroke) => {
+                        let (_, y) = place((self.x.scale.low, *y));
+                        canvas.line((area.x, y), (area.x + area.width, y), stroke);
+                    }
+                    Layer::Points(..) | Layer::Dots(_) | Layer::Stars(_) => {}
+                }
+            }
+        });
+        // Marks on the frame are not to be cut.
+        let inside = |&(x, y): &(f64, f64)| {
+            let (x, y) = (self.x.scale.share(x), self.y.scale.share(y));
+            (-1e-9..=1.0 + 1e-9).contains(&x) && (-1e-9..=1.0 + 1e-9).contains(&y)
+        };
+        canvas.frame(area, &Stroke::solid("#000", FRAME));
+        for layer in &self.layers {
+            match layer {
+                Layer::Points(points, marker) => {
+                    points.iter().filter(|point| inside(point)).for_each(|point| marker.draw(canvas, place(*point)));
+                }
+                Layer::Dots(dots) => {
+                    dots.iter()
+                        .filter(|(x, y, _)| inside(&(*x, *y)))
+                        .for_each(|&(x, y, fill)| dot(canvas, place((x, y)), fill));
+                }
+                Layer::Stars(points) => {
+                    points.iter().filter(|point| inside(point)).for_each(|point| star(canvas, place(*point)));
+                }
+                _ => {}
+            }
+        }
+        self.marks(canvas, area);
+        self.ticks(canvas, area, plan, labelled, left);
+        if !self.title.is_empty() {
+            let above = if self.has_words_above() { WORDS_ABOVE } else { 0.0 };
+            canvas.text((area.x, area.y - 3.5 - above), &self.title, SIZE, Anchor::Start, false);
+        }
+    }
+
+    /// Whether vertical lines have words, which stand above the panel.
+    fn has_words_above(&self) -> bool {
+        let visible = |x: f64| (0.0..=1.0).contains(&self.x.scale.share(x));
+        self.layers.iter().any(|layer| matches!(layer, Layer::Mark(x, words, _) if !words.is_empty() && visible(*x)))
+    }
+
+    /// The words at vertical lines: above the panel, as near to their lines as they do not run over each other.
+    fn marks(&self, canvas: &mut Canvas, area: Area) {
+        let mut marks: Vec<(f64, &str, &Stroke)> = Vec::new();
+        for layer in &self.layers {
+            let Layer::Mark(x, words, stroke) = layer else { continue };
+            let share = self.x.scale.share(*x);
+            if !words.is_empty() && (0.0..=1.0).contains(&share) {
+                marks.push((area.x + area.width * share, words, stroke));
+            }
+        }
+        marks.sort_by(|left, right| left.0.total_cmp(&right.0));
+        let wishes: Vec<(f64, f64)> =
+            marks.iter().map(|(line, words, _)| (*line, NOTE_SIZE * label::width(words) + MARK_SPACE)).collect();
+        for ((line, words, stroke), place) in marks.iter().zip(apart(&wishes, area.x, area.x + area.width)) {
+            let leader = Stroke::solid(&stroke.colour, stroke.width);
+            canvas.line((*line, area.y), (place, area.y - LEADER), &leader);
+            let foot = area.y - LEADER - 2.5;
+            canvas.coloured((place, foot), words, NOTE_SIZE, Anchor::Middle, false, &stroke.colour);
+        }
+    }
+
+    /// Ticks and labels; the label of the vertical axis is at the outer edge of the room to the left, `left` wide.
+    fn ticks(
+        &self,
+        canvas: &mut Canvas,
+        area: Area,
+        (x, y): &(Ticks, Ticks),
+        (x_label, y_label): (bool, bool),
+        left: f64,
+    ) {
+        let thin = Stroke::solid("#000", FRAME);
+        let (bottom, right) = (area.y + area.height, area.x + area.width);
+        let mut edge = f64::NEG_INFINITY;
+        for tick in &x.ticks {
+            let place = area.x + area.width * self.x.scale.share(tick.value);
+            if place < area.x - 0.1 || place > right + 0.1 {
+                continue;
+            }
+            let length = if tick.label.is_some() { TICK } else { 0.6 * TICK };
+            canvas.line((place, bottom), (place, bottom + length), &thin);
+            if let (true, Some(words)) = (x_label, &tick.label) {
+                let half = 0.5 * TICK_SIZE * label::width(words);
+                if place - half > edge + 2.0 {
+                    canvas.text((place, bottom + TICK + 1.0 + TICK_SIZE), words, TICK_SIZE, Anchor::Middle, false);
+                    edge = place + half;
+                }
+            }
+        }
+        let mut edge = f64::INFINITY;
+        for tick in &y.ticks {
+            let place = area.y + area.height * (1.0 - self.y.scale.share(tick.value));
+            if place < area.y - 0.1 || place > bottom + 0.1 {
+                continue;
+            }
+            let length = if tick.label.is_some() { TICK } else { 0.6 * TICK };
+            canvas.line((area.x - length, place), (area.x, place), &thin);
+            if let (true, Some(words)) = (y_label, &tick.label)
+                && edge - place > TICK_SIZE + 0.5
+            {
+                let right = area.x - TICK - 2.0;
+                canvas.text((right, place + 0.35 * TICK_SIZE), words, TICK_SIZE, Anchor::End, false);
+                edge = place;
+            }
+        }
+        if x_label {
+            let words = self.x.label(x.power);
+            let place = (area.x + 0.5 * area.width, bottom + TICK + TICK_SIZE + 4.0 + SIZE);
+            canvas.text(place, &words, SIZE, Anchor::Middle, false);
+        }
+        if y_label {
+            let words = self.y.label(y.power);
+            canvas.text((area.x - left + SIZE + 1.0, area.y + 0.5 * area.height), &words, SIZE, Anchor::Middle, true);
+        }
+    }
+}
+
+/// Places for words of which each has a wish and a width, in the order of their wishes: such that they do not overlap, stay between
+/// `low` and `high` if there is room, and are as near to their wishes as that allows.
+fn apart(wishes: &[(f64, f64)], low: f64, high: f64) -> Vec<f64> {
+    // Words that touch move as one block, whose place is the mean of what its words wish.
+    struct Block {
+        wish: f64,
+        width: f64,
+        words: usize,
+    }
+    let mut blocks: Vec<Block> = Vec::new();
+    let centre = |block: &Block| {
+        let half = 0.5 * block.width;
+        (block.wish / block.words as f64).min(high - half).max(low + half)
+    };
+    for &(wish, width) in wishes {
+        let mut last = Block { wish, width, words: 1 };
+        while let Some(before) = blocks.pop() {
+            if centre(&before) + 0.5 * before.width <= centre(&last) - 0.5 * last.width {
+                blocks.push(before);
+                break;
+            }
+            // The middle of a block that grows at its end is where its words wish it, shifted by what they are beside it.
+            let shift = |block: &Block, by: f64| block.wish + by * block.words as f64;
+            let wish = shift(&before, 0.5 * last.width) + shift(&last, -0.5 * before.width);
+            last = Block { wish, width: before.width + last.width, words: before.words + last.words };
+        }
+        blocks.push(last);
+    }
+    let mut places = Vec::with_capacity(wishes.len());
+    for block in &blocks {
+        let mut edge = centre(block) - 0.5 * block.width;
+        for _ in 0..block.words {
+            let (_, width) = wishes[places.len()];
+            places.push(edge + 0.5 * width);
+            edge += width;
+        }
+    }
+    places
+}
+
+/// A line in pieces, where points without a place cut it.
+fn pieces(points: impl Iterator<Item = (f64, f64)>) -> Vec<Vec<(f64, f64)>> {
+    let mut pieces = vec![Vec::new()];
+    for point in points {
+        if point.0.is_nan() || point.1.is_nan() {
+            pieces.push(Vec::new());
+        } else if let Some(last) = pieces.last_mut() {
+            last.push(point);
+        }
+    }
+    pieces
+}
+
+fn contour_line(canvas: &mut Canvas, lines: &[Vec<(f64, f64)>], stroke: &Stroke) {
+    canvas.lines(lines, &Stroke::solid("#fff", stroke.width + 1.2));
+    canvas.lines(lines, stroke);
+}
+
+fn dot(canvas: &mut Canvas, centre: (f64, f64), fill: Option<[u8; 3]>) {
+    match fill {
+        Some(fill) => canvas.circle(centre, 1.7, &hex(fill), &Stroke::solid("#444", 0.2)),
+        None => canvas.circle(centre, 1.2, "none", &Stroke::solid("#888", 0.4)),
+    }
+}
+
+/// A star with five points.
+fn star(canvas: &mut Canvas, (x, y): (f64, f64)) {
+    let corner = |i: usize| {
+        let angle = std::f64::consts::PI * (i as f64 / 5.0 - 0.5);
+        let radius = if i.is_multiple_of(2) { 4.6 } else { 1.9 };
+        (x + radius * angle.cos(), y + radius * angle.sin())
+    };
+    let corners: Vec<(f64, f64)> = (0..10).map(corner).collect();
+    canvas.shape(&corners, "#fff", Some(&Stroke::solid("#000", 0.8)));
+}
+
+impl Marker {
+    fn draw(&self, canvas: &mut Canvas, (x, y): (f64, f64)) {
+        let colour = super::colour::series(self.series).colour;
+        let stroke = Stroke::solid(&colour, 0.8);
+        let r = 2.0;
+        match self.series % 4 {
+            0 => canvas.circle((x, y), r, "#fff", &stroke),
+            1 => canvas.shape(&[(x - r, y - r), (x + r, y - r), (x + r, y + r), (x - r, y + r)], "#fff", Some(&stroke)),
+            2 => canvas.shape(&[(x, y - r - 0.5), (x + r + 0.3, y + r), (x - r - 0.3, y + r)], "#fff", Some(&stroke)),
+            _ => {
+                let points = [(x, y - r - 0.8), (x + r + 0.8, y), (x, y + r + 0.8), (x - r - 0.8, y)];
+                canvas.shape(&points, "#fff", Some(&stroke));
+            }
+        }
+    }
+}
+
+impl Colours {
+    fn ticks(&self) -> Ticks {
+        self.scale.ticks(6)
+    }
+
+    fn width(&self) -> f64 {
+        6.0 + 8.0 + TICK + 2.0 + widest(&self.ticks()) + 4.0 + SIZE + 1.0
+    }
+
+    fn draw(&self, canvas: &mut Canvas, area: Area) {
+        let steps = 128;
+        let pixels: Vec<Option<[u8; 3]>> =
+            (0..steps).map(|i| Some(viridis(1.0 - (i as f64 + 0.5) / steps as f64))).collect();
+        if let Some(png) = super::export::image(1, &pixels) {
+            canvas.image(area, &png);
+        }
+        canvas.frame(area, &Stroke::solid("#000", FRAME));
+        let ticks = self.ticks();
+        let right = area.x + area.width;
+        let mut edge = f64::INFINITY;
+        for tick in &ticks.ticks {
+            let share = self.scale.share(tick.value);
+            if !(-1e-9..=1.0 + 1e-9).contains(&share) {
+                continue;
+            }
+            let y = area.y + area.height * (1.0 - share);
+            let length = if tick.label.is_some() { TICK } else { 0.6 * TICK };
+            canvas.line((right, y), (right + length, y), &Stroke::solid("#000", FRAME));
+            if let Some(words) = &tick.label
+                && edge - y > TICK_SIZE + 0.5
+            {
+                canvas.text((right + TICK + 2.0, y + 0.35 * TICK_SIZE), words, TICK_SIZE, Anchor::Start, false);
+                edge = y;
+            }
+        }
+        let mut words = self.label.clone();
+        if ticks.power != 0 {
+            words.push_str(&format!(" (10^{{{}}})", label::signed(ticks.power)));
+        }
+        let x = right + TICK + 2.0 + widest(&ticks) + 4.0 + SIZE - 1.0;
+        canvas.text((x, area.y + 0.5 * area.height), &words, SIZE, Anchor::Middle, true);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    //! Words beside each other; maps of fewer values.
+
+    use super::{Hover, apart};
+
+    #[test]
+    fn words_do_not_overlap_and_stay_near_their_wishes() {
+        assert_eq!(apart(&[(10.0, 4.0), (50.0, 4.0)], 0.0, 100.0), [10.0, 50.0]);
+        assert_eq!(apart(&[(10.0, 4.0), (10.0, 4.0)], 0.0, 100.0), [8.0, 12.0]);
+        assert_eq!(apart(&[(0.0, 4.0), (99.0, 4.0)], 0.0, 100.0), [2.0, 98.0]);
+        // Three at the left edge push each other to the right; the widths differ.
+        assert_eq!(apart(&[(1.0, 4.0), (1.0, 6.0), (2.0, 4.0)], 0.0, 100.0), [2.0, 7.0, 12.0]);
+        // The mean displacement of a block is zero.
+        let places = apart(&[(20.0, 10.0), (24.0, 6.0), (30.0, 10.0)], 0.0, 100.0);
+        assert!((places.iter().sum::<f64>() - 74.0).abs() < 1e-12, "{places:?}");
+    }
+
+    #[test]
+    fn a_coarser_map_has_the_values_of_its_cells() {
+        let (x, y) = (vec![1.0, 2.0, 3.0, 4.0, 5.0], vec![10.0, 20.0, 30.0]);
+        let values: Vec<f64> = y.iter().flat_map(|y| x.iter().map(move |x| x + y)).collect();
+        let hover = Hover { x, y, word: vec![1; values.len()], values, words: Vec::new(), column: "gap".to_owned() };
+        let coarser = hover.every(2);
+        assert_eq!((coarser.x.as_slice(), coarser.y.as_slice()), (&[1.0, 3.0, 5.0][..], &[10.0, 30.0][..]));
+        assert_eq!(coarser.values, [11.0, 13.0, 15.0, 31.0, 33.0, 35.0]);
+        assert_eq!(coarser.word.len(), 6);
+    }
+}

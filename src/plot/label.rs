@@ -1,0 +1,303 @@
+//! Words in pictures: a small markup for symbols, the symbols of columns and units, and how wide a text is.
+//!
+//! `*…*` is italic, `_{…}` below and `^{…}` above the line, as in `*t*_{f} (*l*/*v*_{0})`; `∗` is an asterisk, and all else stands for
+//! itself.
+
+use std::sync::OnceLock;
+
+use ttf_parser::Face;
+
+/// The fonts of every picture, upright and italic: Arimo, as wide as Arial, Helvetica and Liberation Sans, one of which a viewer of an
+/// SVG has. Their licence is beside them.
+pub const FONTS: [&[u8]; 2] = [include_bytes!("fonts/arimo-Regular.ttf"), include_bytes!("fonts/arimo-Italic.ttf")];
+
+/// The families of a text, in the order of preference.
+pub const FAMILIES: &str = "Arimo, Arial, 'Liberation Sans', Helvetica, sans-serif";
+
+/// Size of what is above or below the line, relative to the line.
+pub const SMALL: f64 = 0.72;
+
+/// How far it is from the line, in units of the size of the font.
+pub const RISE: f64 = 0.38;
+
+/// How far it is below the line.
+pub const DROP: f64 = 0.2;
+
+/// Some letters in one style.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Span {
+    /// The letters.
+    pub text: String,
+    /// Whether they are italic.
+    pub italic: bool,
+    /// On the line (0), above it (1) or below it (-1).
+    pub level: i8,
+}
+
+/// The spans of a text in markup.
+pub fn spans(markup: &str) -> Vec<Span> {
+    let mut spans: Vec<Span> = Vec::new();
+    let (mut italic, mut level) = (false, 0);
+    let mut letters = markup.chars().peekable();
+    while let Some(letter) = letters.next() {
+        let shown = if letter == '∗' { '*' } else { letter };
+        match letter {
+            '*' => italic = !italic,
+            '_' | '^' if letters.peek() == Some(&'{') => {
+                letters.next();
+                level = if letter == '^' { 1 } else { -1 };
+            }
+            '}' if level != 0 => level = 0,
+            _ => match spans.last_mut() {
+                Some(span) if span.italic == italic && span.level == level => span.text.push(shown),
+                _ => spans.push(Span { text: shown.to_string(), italic, level }),
+            },
+        }
+    }
+    spans
+}
+
+/// The width of a text in markup, at a font size of 1.
+pub fn width(markup: &str) -> f64 {
+    spans(markup).iter().map(span_width).sum()
+}
+
+fn span_width(span: &Span) -> f64 {
+    static FACES: OnceLock<[Option<Face<'static>>; 2]> = OnceLock::new();
+    let faces = FACES.get_or_init(|| FONTS.map(|font| Face::parse(font, 0).ok()));
+    let size = if span.level == 0 { 1.0 } else { SMALL };
+    let Some(face) = &faces[usize::from(span.italic)] else { return 0.6 * size * span.text.len() as f64 };
+    let advance = |letter: char| face.glyph_index(letter).and_then(|glyph| face.glyph_hor_advance(glyph));
+    let units: u32 =
+        span.text.chars().map(|letter| u32::from(advance(letter).unwrap_or(face.units_per_em() / 2))).sum();
+    size * f64::from(units) / f64::from(face.units_per_em())
+}
+
+/// The text without its markup.
+pub fn plain(markup: &str) -> String {
+    spans(markup).into_iter().map(|span| span.text).collect()
+}
+
+/// The symbol of a quantity, a column or a unit, in markup.
+fn symbol(name: &str) -> Option<&'static str> {
+    Some(match name {
+        "t_f" => "*t*_{f}",
+        "t" => "*t*",
+        "a" => "*a*",
+        "b" => "*b*",
+        "k" => "*k*",
+        "m" => "*m*",
+        "l" => "*l*",
+        "dt" => "d*t*",
+        "delta_t" => "*δt*",
+        "v_i" => "*v*_{i}",
+        "v_f" => "*v*_{f}",
+        "v_0" => "*v*_{0}",
+        "v" => "*v*",
+        "v_c" => "*v*_{c}",
+        "theta" => "*θ*",
+        "tau" => "*τ*",
+        "beta" => "*β*",
+        "tau_max" => "*τ*_{max}",
+        "alpha" => "*α*",
+        "alpha_2" => "*α*_{2}",
+        "alpha_3" => "*α*_{3}",
+        "mu_0" => "*μ*_{0}",
+        "sigma" => "*σ*",
+        "work" => "*W*",
+        "work_optimal" => "*W*∗",
+        "v_start" => "*v*(0+)",
+        "v_end" => "*v*(*t*_{f}−)",
+        "v_min" => "*v*_{min}",
+        "v_max" => "*v*_{max}",
+        "v_c_min" => "*v*_{c,min}",
+        "v_c_max" => "*v*_{c,max}",
+        "v_peak" => "*v*_{peak}",
+        "v_trough" => "*v*_{trough}",
+        "v_crit" => "*v*_{crit}",
+        "t_peak" => "*t*_{peak}",
+        "t_end" => "*t*_{end}",
+        "theta_max" => "*θ*_{max}",
+        "friction_max" => "*τ*_{max}",
+        "hamiltonian" => "d*W*∗/d*t*_{f}",
+        "t_cross" => "*t*_{cross}",
+        "t_hold" => "*t*_{hold}",
+        "t_cheapest" => "*t*_{cheapest}",
+        "t_min" => "*t*_{min}",
+        "t_turn" => "*t*_{turn}",
+        "t_free_in" => "*t*_{free in}",
+        "t_free_out" => "*t*_{free out}",
+        "work_cross" => "*W*∗(*t*_{cross})",
+        "work_hold" => "*W*∗(*t*_{hold})",
+        "work_cheapest" => "*W*∗(*t*_{cheapest})",
+        "work_min" => "*W*∗(*t*_{min})",
+        "work_turn" => "*W*∗(*t*_{turn})",
+        "k_qs" => "*k*_{qs}",
+        "k_c_i" => "*k*_{c}(*v*_{i})",
+        "k_c_f" => "*k*_{c}(*v*_{f})",
+        "rigid" => "*k t*_{f}^{2}/*m*",
+        _ => return None,
+    })
+}
+
+/// The name of a column in markup: its symbol, or its name in words.
+pub fn name(column: &str) -> String {
+    symbol(column).map_or_else(|| column.replace('_', " "), str::to_owned)
+}
+
+/// The symbols that units of the model are made of. In SI, letters are upright and `m` is a metre.
+const SCALES: [&str; 5] = ["mu_0", "sigma", "l", "v_0", "t_f"];
+
+fn scale(word: &str) -> Option<&'static str> {
+    SCALES.contains(&word).then(|| symbol(word)).flatten()
+}
+
+/// A value of a column, in markup, with its unit if that is one of SI: values in scales of the model are pure numbers.
+pub fn equation(column: &str, value: &str, of: &str) -> String {
+    let is_si = !of.split([' ', '/', '(', ')', '^']).any(|word| SCALES.contains(&word));
+    let unit = if is_si && value != "∞" { unit(of) } else { String::new() };
+    format!("{} = {value} {unit}", name(column)).trim_end().to_owned()
+}
+
+/// A unit in markup; nothing for a pure number.
+pub fn unit(unit: &str) -> String {
+    // Units of columns may go on after a semicolon for special cases.
+    let unit = unit.split(';').next().unwrap_or("").trim();
+    if unit == "1" {
+        return String::new();
+    }
+    let mut markup = String::new();
+    let mut word = String::new();
+    let flush = |word: &mut String, markup: &mut String| {
+        if let Some((base, power)) = word.split_once('^') {
+            markup.push_str(&format!("{}^{{{power}}}", scale(base).unwrap_or(base)));
+        } else {
+            markup.push_str(scale(word).unwrap_or(word));
+        }
+        word.clear();
+    };
+    for letter in unit.chars() {
+        if matches!(letter, ' ' | '/' | '(' | ')') {
+            flush(&mut word, &mut markup);
+            markup.push(letter);
+        } else {
+            word.push(letter);
+        }
+    }
+    flush(&mut word, &mut markup);
+    markup
+}
+
+/// The label of an axis: name and unit, and the power of ten that its numbers leave out.
+pub fn axis(column: &str, of: &str, power: i32) -> String {
+    let scale = if power == 0 { String::new() } else { format!("10^{{{}}}", signed(power)) };
+    let inside = match (scale.is_empty(), unit(of)) {
+        (true, unit) => unit,
+        (false, unit) if unit.is_empty() => scale,
+        (false, unit) => format!("{scale} {unit}"),
+    };
+    let name = match (column, of) {
+        ("alpha_2", "1/t_f") => return "*α*_{2} *t*_{f}".to_owned(),
+        ("alpha_3", "1/t_f^2") => return "*α*_{3} *t*_{f}^{2}".to_owned(),
+        ("gap", _) => "gap (*W* − *W*∗)/*W*∗".to_owned(),
+        _ => name(column),
+    };
+    if inside.is_empty() { name } else { format!("{name} ({inside})") }
+}
+
+/// An integer with a true minus sign.
+pub fn signed(value: i32) -> String {
+    if value < 0 { format!("−{}", value.unsigned_abs()) } else { value.to_string() }
+}
+
+/// A number to six digits, in markup.
+pub fn number(value: f64) -> String {
+    if value == 0.0 {
+        return "0".to_owned();
+    }
+    if !value.is_finite() {
+        return if value.is_nan() {
+            "–"
+        } else if value > 0.0 {
+            "∞"
+        } else {
+            "−∞"
+        }
+        .to_owned();
+    }
+    let scientific = format!("{:.5e}", value.abs());
+    let (digits, exponent) = scientific.split_once('e').unwrap_or((&scientific, "0"));
+    let exponent: i32 = exponent.parse().unwrap_or(0);
+    let minus = if value < 0.0 { "−" } else { "" };
+    if (-3..6).contains(&exponent) {
+        let decimals = usize::try_from(5 - exponent).unwrap_or(0);
+        return format!("{minus}{}", trimmed(&format!("{:.decimals$}", value.abs())));
+    }
+    match trimmed(digits) {
+        "1" => format!("{minus}10^{{{}}}", signed(exponent)),
+        digits => format!("{minus}{digits}×10^{{{}}}", signed(exponent)),
+    }
+}
+
+/// Without zeros at the end of the decimals.
+fn trimmed(digits: &str) -> &str {
+    if digits.contains('.') { digits.trim_end_matches('0').trim_end_matches('.') } else { digits }
+}
+
+/// Cuts a text in markup into lines of at most `most` (in units of the font size), between words.
+pub fn wrapped(markup: &str, most: f64) -> Vec<String> {
+    let mut lines: Vec<String> = Vec::new();
+    for word in markup.split(' ') {
+        match lines.last_mut() {
+            Some(line) if width(&format!("{line} {word}")) <= most => {
+                line.push(' ');
+                line.push_str(word);
+            }
+            _ => lines.push(word.to_owned()),
+        }
+    }
+    lines
+}
+
+#[cfg(test)]
+mod tests {
+    //! What a reader sees.
+
+    use super::*;
+
+    #[test]
+    fn symbols_and_units_are_typeset() {
+        assert_eq!(axis("t_f", "l/v_0", 0), "*t*_{f} (*l*/*v*_{0})");
+        assert_eq!(axis("t_f", "l/v_0", -6), "*t*_{f} (10^{−6} *l*/*v*_{0})");
+        assert_eq!(axis("m", "mu_0 sigma l/v_0^2", 0), "*m* (*μ*_{0} *σ* *l*/*v*_{0}^{2})");
+        assert_eq!(axis("alpha_2", "1/t_f", 0), "*α*_{2} *t*_{f}");
+        assert_eq!(axis("end_error", "1", 0), "end error");
+        assert_eq!(axis("k", "Pa/m", 3), "*k* (10^{3} Pa/m)");
+        assert_eq!(axis("m", "kg/m^2", 0), "*m* (kg/m^{2})");
+        assert_eq!(equation("v_i", "3×10^{−9}", "m/s"), "*v*_{i} = 3×10^{−9} m/s");
+        assert_eq!(equation("v_i", "3", "v_0"), "*v*_{i} = 3");
+        assert_eq!(equation("k", "∞", "Pa/m"), "*k* = ∞");
+    }
+
+    #[test]
+    fn markup_is_cut_into_spans() {
+        let styles: Vec<(String, bool, i8)> =
+            spans("*t*_{f} 2").into_iter().map(|span| (span.text, span.italic, span.level)).collect();
+        assert_eq!(styles, [("t".to_owned(), true, 0), ("f".to_owned(), false, -1), (" 2".to_owned(), false, 0)]);
+        assert_eq!(plain("*W*∗(*t*_{f})"), "W*(tf)");
+    }
+
+    #[test]
+    fn numbers_are_short() {
+        let shown = [0.03, 3.2e6, 1e5, 2.5e-16, -0.12, 100.0, f64::INFINITY].map(number);
+        assert_eq!(shown, ["0.03", "3.2×10^{6}", "100000", "2.5×10^{−16}", "−0.12", "100", "∞"]);
+    }
+
+    #[test]
+    fn every_symbol_has_its_glyphs() {
+        let face = Face::parse(FONTS[0], 0).expect("the font can be read");
+        for letter in "θτβαμσδΔ*−×·≤≥≈∞…–→′".chars() {
+            assert!(face.glyph_index(letter).is_some(), "{letter} is not in the font");
+        }
+    }
+}

@@ -1,0 +1,225 @@
+//! Scales of axes and colours: linear or logarithmic, their ticks, and when a logarithm shows more.
+
+use super::label;
+
+/// Ratio of the greatest to the least value from which on a logarithm is used.
+const LOGARITHMIC: f64 = 30.0;
+
+/// A range of values, and whether it is shown logarithmically.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Scale {
+    /// The value at the start.
+    pub low: f64,
+    /// The value at the end.
+    pub high: f64,
+    /// Whether equal ratios are equally far apart.
+    pub log: bool,
+}
+
+/// A mark of a scale.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Tick {
+    /// Where it is.
+    pub value: f64,
+    /// Its text in markup; none for a small mark.
+    pub label: Option<String>,
+}
+
+/// The ticks of a scale.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Ticks {
+    /// In ascending order.
+    pub ticks: Vec<Tick>,
+    /// The power of ten by which the labels are to be multiplied.
+    pub power: i32,
+}
+
+impl Scale {
+    /// The scale of `values`, logarithmic where all are positive and span a large ratio or are evenly spaced in ratio; `None` without any.
+    pub fn of(values: impl IntoIterator<Item = f64>) -> Option<Scale> {
+        let finite = values.into_iter().filter(|value| value.is_finite());
+        let (low, high) =
+            finite.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| (low.min(value), high.max(value)));
+        (low <= high).then(|| Scale { low, high, log: low > 0.0 && high / low >= LOGARITHMIC })
+    }
+
+    /// With a little room at both ends; a single value gets some around it.
+    pub fn with_room(self, share: f64) -> Scale {
+        if self.log {
+            let room = (self.high / self.low).ln().max(1e-3) * share;
+            return Scale { low: self.low * (-room).exp(), high: self.high * room.exp(), log: true };
+        }
+        let span = self.high - self.low;
+        // Below this the range is rounding.
+        let least = 1e-9 * self.low.abs().max(self.high.abs());
+        let room = if span > least {
+            span * share
+        } else if least > 0.0 {
+            0.05 * self.high.abs().max(self.low.abs())
+        } else {
+            1.0
+        };
+        Scale { low: self.low - room, high: self.high + room, log: false }
+    }
+
+    /// Grown so that it holds `other`.
+    pub fn and(self, other: Scale) -> Scale {
+        let (low, high) = (self.low.min(other.low), self.high.max(other.high));
+        Scale { low, high, log: low > 0.0 && (self.log || other.log || high / low >= LOGARITHMIC) }
+    }
+
+    /// Where `value` is, 0 at the start and 1 at the end; NaN where the scale does not reach.
+    pub fn share(&self, value: f64) -> f64 {
+        if self.log {
+            if value > 0.0 { (value / self.low).ln() / (self.high / self.low).ln() } else { f64::NAN }
+        } else {
+            (value - self.low) / (self.high - self.low)
+        }
+    }
+
+    /// The value at a share.
+    pub fn value(&self, share: f64) -> f64 {
+        if self.log {
+            self.low * ((self.high / self.low).ln() * share).exp()
+        } else {
+            self.low + (self.high - self.low) * share
+        }
+    }
+
+    /// About `count` labelled ticks.
+    pub fn ticks(&self, count: usize) -> Ticks {
+        if self.log { self.powers(count) } else { self.steps(count) }
+    }
+
+    fn steps(&self, count: usize) -> Ticks {
+        let span = self.high - self.low;
+        if !(span > 0.0 && span.is_finite()) {
+            return Ticks { ticks: Vec::new(), power: 0 };
+        }
+        let rough = span / count.max(1) as f64;
+        let magnitude = 10f64.powi(rough.log10().floor() as i32);
+        let step =
+            [1.0, 2.0, 5.0, 10.0].into_iter().find(|step| step * magnitude >= 0.8 * rough).unwrap_or(10.0) * magnitude;
+        let greatest = self.low.abs().max(self.high.abs());
+        let size = greatest.log10().floor() as i32;
+        let power = if (-3..5).contains(&size) { 0 } else { size };
+        let unit = 10f64.powi(power);
+        let decimals = usize::try_from(-((step / unit * 1.000_001).log10().floor() as i32)).unwrap_or(0);
+        let (first, last) = ((self.low / step - 1e-6).ceil() as i64, (self.high / step + 1e-6).floor() as i64);
+        let ticks = (first..=last.min(first + 100)).map(|place| {
+            let value = place as f64 * step;
+            let text = format!("{:.decimals$}", (value / unit).abs());
+            let minus = if place < 0 { "−" } else { "" };
+            Tick { value, label: Some(format!("{minus}{text}")) }
+        });
+        Ticks { ticks: ticks.collect(), power }
+    }
+
+    fn powers(&self, count: usize) -> Ticks {
+        let (first, last) = (self.low.log10() - 1e-6, self.high.log10() + 1e-6);
+        let (lowest, highest) = (first.floor() as i32, last.ceil() as i32);
+        let decades = (first.ceil() as i32..=last.floor() as i32).count();
+        // With few powers of ten inside, other digits get labels too.
+        let digits: &[u32] = match decades {
+            0 | 1 if last - first < 0.55 => &[1, 2, 3, 4, 5, 6, 7, 8, 9],
+            0 | 1 => &[1, 2, 3, 5],
+            2 if count > 3 => &[1, 3],
+            _ => &[1],
+        };
+        let every = decades.div_ceil(count.max(1)).max(1) as i32;
+        let plain = (-3..=4).contains(&lowest) && highest <= 4 && lowest >= -3;
+        let mut ticks = Vec::new();
+        for power in lowest..=highest {
+            for digit in 1..=9_u32 {
+                let value = f64::from(digit) * 10f64.powi(power);
+                let place = value.log10();
+                if place < first || place > last {
+                    continue;
+                }
+                let is_labelled = digits.contains(&digit) && power.rem_euclid(every) == 0;
+                if !is_labelled && (decades > 12 || (digit > 1 && every > 1)) {
+                    continue;
+                }
+                let text = || {
+                    if plain && (digits.len() > 1 || (-2..=3).contains(&power)) {
+                        label::number(value)
+                    } else if digit == 1 {
+                        format!("10^{{{}}}", label::signed(power))
+                    } else {
+                        format!("{digit}×10^{{{}}}", label::signed(power))
+                    }
+                };
+                ticks.push(Tick { value, label: is_labelled.then(text) });
+            }
+        }
+        Ticks { ticks, power: 0 }
+    }
+}
+
+/// Whether values in ascending order are better shown by their logarithms: equal ratios, or a large one.
+pub fn is_logarithmic(values: &[f64]) -> bool {
+    let (Some(&low), Some(&high)) = (values.first(), values.last()) else { return false };
+    if low <= 0.0 || values.len() < 2 {
+        return false;
+    }
+    if values.len() >= 4 {
+        let uneven = |steps: &[f64]| {
+            let mean = steps.iter().sum::<f64>() / steps.len() as f64;
+            steps.iter().fold(0.0_f64, |worst, step| worst.max((step / mean - 1.0).abs()))
+        };
+        let ratios: Vec<f64> = values.windows(2).map(|pair| (pair[1] / pair[0]).ln()).collect();
+        let steps: Vec<f64> = values.windows(2).map(|pair| pair[1] - pair[0]).collect();
+        if uneven(&steps) < 1e-3 {
+            return false;
+        }
+        if uneven(&ratios) < 1e-3 {
+            return high / low > 3.0;
+        }
+    }
+    // Of uneven values, such as samples, half are to be left of the middle.
+    let scale = |log| Scale { low, high, log };
+    let off = |log: bool| (scale(log).share(values[values.len() / 2]) - 0.5).abs();
+    high / low >= LOGARITHMIC && (values.len() < 4 || off(true) <= off(false))
+}
+
+#[cfg(test)]
+mod tests {
+    //! Ticks as a reader sees them.
+
+    use super::*;
+
+    fn labels(scale: Scale, count: usize) -> Vec<String> {
+        scale.ticks(count).ticks.into_iter().filter_map(|tick| tick.label).collect()
+    }
+
+    #[test]
+    fn linear_ticks_are_round() {
+        let scale = |low, high| Scale { low, high, log: false };
+        assert_eq!(labels(scale(-0.5, 0.5), 5), ["−0.4", "−0.2", "0.0", "0.2", "0.4"]);
+        assert_eq!(labels(scale(0.0, 100.0), 5), ["0", "20", "40", "60", "80", "100"]);
+        let small = scale(0.0, 3.1e-6).ticks(4);
+        assert_eq!(small.power, -6);
+        assert_eq!(
+            small.ticks.iter().filter_map(|tick| tick.label.as_deref()).collect::<Vec<_>>(),
+            ["0", "1", "2", "3"]
+        );
+    }
+
+    #[test]
+    fn logarithmic_ticks_are_powers_of_ten() {
+        let scale = |low, high| Scale { low, high, log: true };
+        assert_eq!(labels(scale(1e-7, 1.0), 4), ["10^{−6}", "10^{−4}", "10^{−2}", "10^{0}"]);
+        assert_eq!(labels(scale(0.01, 10.0), 4), ["0.01", "0.1", "1", "10"]);
+        assert_eq!(labels(scale(3.0, 7.0), 4), ["3", "4", "5", "6", "7"]);
+    }
+
+    #[test]
+    fn geometric_axes_are_logarithmic_and_linear_ones_are_not() {
+        assert!(is_logarithmic(&[1.0, 2.0, 4.0, 8.0]));
+        assert!(!is_logarithmic(&[1.0, 34.0, 67.0, 100.0]));
+        assert!(!is_logarithmic(&[0.0, 1.0, 100.0]));
+        assert!(is_logarithmic(&[1.0, 100.0]));
+        assert!(is_logarithmic(&[1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0]));
+        assert!(!is_logarithmic(&[1.0, 20.0, 38.0, 52.0, 67.0, 83.0, 100.0]));
+    }
+}

@@ -1,0 +1,144 @@
+//! An axis cut into cells: one for each of its values while those are few, else one for several that follow each other.
+
+use super::survey::Values;
+use crate::plot::scale::{Scale, is_logarithmic};
+
+/// The cells of an axis.
+#[derive(Debug, Clone, PartialEq)]
+pub struct AxisCells {
+    /// Their middles, ascending: the values themselves where each has a cell.
+    pub middles: Vec<f64>,
+    /// From the edge of the first to the edge of the last.
+    pub scale: Scale,
+    /// Whether they are equally wide.
+    pub even: bool,
+    /// Whether each value has a cell of its own.
+    pub exact: bool,
+    /// The least value of each cell; empty where all values are too many to be known, and cells are equal stretches.
+    firsts: Vec<f64>,
+}
+
+impl AxisCells {
+    /// At most `most` cells for the values of an axis, which has at least one.
+    pub fn new(axis: &Values, most: usize) -> AxisCells {
+        let values = &axis.values;
+        let (low, high) = (values[0], values[values.len() - 1]);
+        let log = if axis.many { low > 0.0 && high / low > 30.0 } else { is_logarithmic(values) };
+        let span = Scale { low, high, log };
+        if axis.many {
+            let middles = (0..most).map(|cell| span.value((cell as f64 + 0.5) / most as f64)).collect();
+            return AxisCells { middles, scale: span, even: true, exact: false, firsts: Vec::new() };
+        }
+        let last = values.len() - 1;
+        if last == 0 {
+            let scale = span.with_room(0.0);
+            return AxisCells { middles: values.clone(), scale, even: true, exact: true, firsts: values.clone() };
+        }
+        // Cells of equally many values: none is empty, whatever the ratio of values to cells.
+        let together = values.len().div_ceil(most);
+        let firsts: Vec<f64> = values.chunks(together).map(|chunk| chunk[0]).collect();
+        let exact = together == 1;
+        let even = values
+            .iter()
+            .enumerate()
+            .all(|(place, &value)| (span.share(value) * last as f64 - place as f64).abs() < 0.02);
+        // A value or what is between two of them, by its place.
+        let at = |place: f64| span.value(place / last as f64);
+        if even {
+            let middle = |cell: usize| at((cell * together) as f64 + 0.5 * (together - 1) as f64);
+            let middles = if exact { values.clone() } else { (0..firsts.len()).map(middle).collect() };
+            // Half a step beyond the first value and the last cell, which may lack some values.
+            let scale = Scale { low: at(-0.5), high: at((firsts.len() * together) as f64 - 0.5), log };
+            return AxisCells { middles, scale, even, exact, firsts };
+        }
+        let middles: Vec<f64> = values.chunks(together).map(|chunk| chunk[chunk.len() / 2]).collect();
+        let shares: Vec<f64> = middles.iter().map(|&middle| span.share(middle)).collect();
+        // Half a cell beyond the first and the last middle.
+        let beyond = |edge: usize, inner: usize| span.value(1.5 * shares[edge] - 0.5 * shares[inner]);
+        let end = shares.len() - 1;
+        let scale = Scale { low: beyond(0, 1), high: beyond(end, end - 1), log };
+        AxisCells { middles, scale, even, exact, firsts }
+    }
+
+    /// How many there are.
+    pub fn len(&self) -> usize {
+        self.middles.len()
+    }
+
+    /// The cell of a value.
+    pub fn place(&self, value: f64) -> Option<usize> {
+        if !value.is_finite() {
+            return None;
+        }
+        if self.exact {
+            return self.middles.binary_search_by(|middle| middle.total_cmp(&(value + 0.0))).ok();
+        }
+        if !self.firsts.is_empty() {
+            return self.firsts.partition_point(|first| first.total_cmp(&(value + 0.0)).is_le()).checked_sub(1);
+        }
+        let share = self.scale.share(value);
+        let place = (share * self.len() as f64).floor();
+        (-1e-12..=1.0 + 1e-12).contains(&share).then(|| (place.max(0.0) as usize).min(self.len() - 1))
+    }
+
+    /// The cell whose middle is nearest to a share of the scale.
+    pub fn nearest(&self, share: f64) -> usize {
+        let value = self.scale.value(share);
+        let after = self.middles.partition_point(|&middle| middle < value);
+        if after == 0 {
+            return 0;
+        }
+        if after == self.len() {
+            return after - 1;
+        }
+        let (left, right) = (self.scale.share(self.middles[after - 1]), self.scale.share(self.middles[after]));
+        if share - left <= right - share { after - 1 } else { after }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    //! Every value has its cell.
+
+    use super::*;
+
+    fn axis(values: Vec<f64>) -> Values {
+        Values { name: "t_f".to_owned(), unit: String::new(), values, words: Vec::new(), many: false, infinite: false }
+    }
+
+    #[test]
+    fn few_values_have_cells_of_their_own() {
+        let cells = AxisCells::new(&axis(vec![1.0, 10.0, 100.0, 1000.0]), 8);
+        assert!(cells.exact && cells.even && cells.scale.log);
+        assert!((cells.scale.low - 0.1f64.sqrt()).abs() < 1e-12);
+        assert_eq!([1.0, 100.0, 50.0].map(|value| cells.place(value)), [Some(0), Some(2), None]);
+        assert_eq!(cells.nearest(0.99), 3);
+    }
+
+    #[test]
+    fn many_values_share_cells() {
+        let cells = AxisCells::new(&axis((0..1000).map(f64::from).collect()), 10);
+        assert!(!cells.exact && cells.len() == 10);
+        let places: Vec<usize> = (0..1000).filter_map(|value| cells.place(f64::from(value))).collect();
+        assert_eq!(places.len(), 1000);
+        assert_eq!((places[0], places[999]), (0, 9));
+    }
+
+    #[test]
+    fn no_cell_is_empty() {
+        for count in [401, 799, 1000] {
+            for axis in [
+                axis((0..count).map(|i| -0.5 + f64::from(i) * 0.0025).collect()),
+                axis((0..count).map(|i| f64::from(i).powi(2)).collect()),
+            ] {
+                let cells = AxisCells::new(&axis, 400);
+                let mut places: Vec<usize> = axis.values.iter().filter_map(|&value| cells.place(value)).collect();
+                assert_eq!(places.len(), axis.values.len());
+                places.dedup();
+                assert_eq!(places, (0..cells.len()).collect::<Vec<_>>());
+                assert!(cells.middles.windows(2).all(|pair| pair[0] < pair[1]));
+                assert!(cells.scale.low < axis.values[0] && cells.scale.high > axis.values[axis.values.len() - 1]);
+            }
+        }
+    }
+}

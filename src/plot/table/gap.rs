@@ -1,0 +1,119 @@
+//! The landscape of the work gap: where v falls below 1, and the best shortcut.
+
+use super::Scene;
+use super::cells::AxisCells;
+use super::choice::Shape;
+use super::condition::Condition;
+use super::groups::Groups;
+use super::lines;
+use super::map::{self, Mapped};
+use super::survey::Survey;
+use crate::model::Units;
+use crate::numerics::cubic::Cubic;
+use crate::plot::PlotError;
+use crate::plot::canvas::Stroke;
+use crate::plot::contour::{Field, contour};
+use crate::plot::figure::{Entry, Figure, Key, Layer};
+use crate::table::OPTIMUM_AXES;
+
+/// The axes of the landscape.
+const ALPHAS: [&str; 2] = ["alpha_2", "alpha_3"];
+
+/// Steps of the grid on which the line `v = 1` is found, along both axes.
+const STEPS: usize = 300;
+
+pub fn draw(scene: &Scene<'_>, shape: &Shape) -> Result<Figure, PlotError> {
+    let plan = match shape {
+        Shape::Lines(plan) => return Ok(lines::lines(scene.survey, plan, |_, _| {})?.figure),
+        Shape::Map(plan) => plan,
+    };
+    let Mapped { mut figure, groups, least, cells } = map::map(scene.survey, plan)?;
+    if plan.x != ALPHAS[0] || plan.y != ALPHAS[1] {
+        return Ok(figure);
+    }
+    let stroke = Stroke::solid("#000", 0.9);
+    let best = best(scene, &groups)?;
+    let from_table = best.iter().any(Option::is_some);
+    let (mut any_line, mut any_star) = (false, false);
+    for (place, panel) in figure.panels.iter_mut().enumerate() {
+        if let Some(lines) = bound(scene, &groups, place, &cells) {
+            any_line |= !lines.is_empty();
+            panel.layers.push(Layer::Contour(lines, stroke.clone()));
+        }
+        let star = if from_table { best[place] } else { least[place].map(|(x, y, _)| (x, y)) };
+        any_star |= star.is_some();
+        panel.layers.extend(star.map(|star| Layer::Stars(vec![star])));
+    }
+    if any_line {
+        figure.legend.push(Entry { key: Key::Contour(stroke), text: bound_in_words(scene) });
+    }
+    if any_star {
+        let text = if from_table { "best shortcut" } else { "least gap of the grid" };
+        figure.legend.push(Entry { key: Key::Star, text: text.to_owned() });
+    }
+    Ok(figure)
+}
+
+fn bound_in_words(scene: &Scene<'_>) -> String {
+    let bound = if scene.source.units == Units::Scaled { "1" } else { "*v*_{0}" };
+    format!("*v*_{{min}} = {bound}")
+}
+
+/// The line along which the least velocity of a shortcut is 1. Its border with what is infeasible is often nearer than a cell, so it is
+/// found from the cubic itself: where `theta > 0`, `v >= 1` says that `1 - theta' - theta >= 0`.
+fn bound(scene: &Scene<'_>, groups: &Groups, panel: usize, cells: &[AxisCells; 2]) -> Option<Vec<Vec<(f64, f64)>>> {
+    let value = |name| scene.scaled(groups, panel, name);
+    let (t_f, start, end) = (value("t_f")?, 1.0 / value("v_i")?, 1.0 / value("v_f")?);
+    // Coefficients in units of 1/t_f and 1/t_f^2 do not depend on it.
+    let unit = |alpha: &str, power: f64| if scene.survey.unit(alpha).starts_with("1/t_f") { 1.0 } else { power };
+    let rate = scene.source.units.size("v_0/l");
+    let (unit_2, unit_3) = (unit(ALPHAS[0], t_f), unit(ALPHAS[1], t_f * t_f / rate));
+    let at = |cells: &AxisCells, step: usize| cells.scale.value(step as f64 / STEPS as f64);
+    let mut margin = Vec::with_capacity((STEPS + 1) * (STEPS + 1));
+    for row in 0..=STEPS {
+        let a_3 = at(&cells[1], row) * unit_3;
+        for column in 0..=STEPS {
+            let a_2 = at(&cells[0], column) * unit_2;
+            let a_4 = end - start - a_2 - a_3;
+            let theta = Cubic { c: [start, a_2, a_3, a_4] };
+            let slope = [a_2, 2.0 * a_3, 3.0 * a_4, 0.0];
+            let excess =
+                Cubic { c: std::array::from_fn(|i| if i == 0 { t_f } else { 0.0 } - slope[i] - t_f * theta.c[i]) };
+            margin.push(if theta.least() > 0.0 { excess.least() } else { f64::NAN });
+        }
+    }
+    let lines = contour(Field { columns: STEPS + 1, rows: STEPS + 1, values: &margin }, 0.0);
+    let place = |(x, y): (f64, f64)| (cells[0].scale.value(x / STEPS as f64), cells[1].scale.value(y / STEPS as f64));
+    Some(lines.into_iter().map(|line| line.into_iter().map(place).collect()).collect())
+}
+
+/// The best shortcut of each panel, from the table `best`, if the dataset has it.
+fn best(scene: &Scene<'_>, groups: &Groups) -> Result<Vec<Option<(f64, f64)>>, PlotError> {
+    let mut found = vec![None; groups.shown.len()];
+    let source = scene.source;
+    if !source.manifest.tables.iter().any(|table| table.name == "best") {
+        return Ok(found);
+    }
+    let none: [Condition; 0] = [];
+    let survey = match Survey::new(&source.folder, &source.manifest, "best", &none) {
+        // A table that is not there yet has no star.
+        Err(PlotError::Empty { .. }) => return Ok(found),
+        survey => survey?,
+    };
+    if !ALPHAS.iter().all(|alpha| survey.has(alpha)) {
+        return Ok(found);
+    }
+    let axes: Vec<&str> = OPTIMUM_AXES.iter().map(|axis| axis.name()).collect();
+    let values: Vec<Option<Vec<f64>>> =
+        (0..found.len()).map(|group| axes.iter().map(|axis| scene.value(groups, group, axis)).collect()).collect();
+    let columns: Vec<&str> = axes.iter().copied().chain(ALPHAS).collect();
+    survey.each(&columns, |row| {
+        for (values, star) in values.iter().zip(&mut found) {
+            let (place, alphas) = row.split_at(axes.len());
+            if values.as_deref() == Some(place) && alphas.iter().all(|alpha| alpha.is_finite()) {
+                *star = Some((alphas[0], alphas[1]));
+            }
+        }
+    })?;
+    Ok(found)
+}

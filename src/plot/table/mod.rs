@@ -1,0 +1,261 @@
+//! Pictures of tables: which axes and columns a picture of each table shows, and what is marked in it.
+
+mod cells;
+mod choice;
+mod condition;
+mod gap;
+mod groups;
+mod lines;
+mod map;
+mod optimal;
+mod phase;
+mod survey;
+mod swift;
+
+use super::figure::Figure;
+use super::{PlotError, label};
+use crate::dataset::{Folder, Manifest};
+use crate::grid::{Quantity, Scale};
+use crate::model::Units;
+
+use choice::{Defaults, Shape};
+pub use condition::Condition;
+use survey::Survey;
+
+/// What is asked for.
+#[derive(Debug, Clone, Default)]
+pub struct Request {
+    /// Rows that are shown.
+    pub conditions: Vec<Condition>,
+    /// Horizontal axis.
+    pub x: Option<String>,
+    /// Vertical axis, or the column of lines.
+    pub y: Option<String>,
+    /// Column of a map's colours, or the axis that tells lines apart.
+    pub colour: Option<String>,
+}
+
+/// A dataset whose tables can be drawn.
+#[derive(Debug)]
+pub struct Source {
+    /// Its manifest.
+    pub manifest: Manifest,
+    folder: Folder,
+    bounded: bool,
+    units: Units,
+}
+
+/// What a picture of a table is made of.
+struct Kind {
+    table: &'static str,
+    title: &'static str,
+    defaults: Defaults,
+    /// What the picture adds to lines or a map.
+    draw: fn(&Scene<'_>, &Shape) -> Result<Figure, PlotError>,
+}
+
+/// What a picture is drawn from.
+struct Scene<'a> {
+    source: &'a Source,
+    survey: &'a Survey,
+}
+
+/// What pictures of the protocol of least work, or nearly so, have in common.
+const OVER_TIME: Defaults = Defaults {
+    x: &["t_f", "v_f", "v_i", "b", "a"],
+    y: &["v_f", "v_i", "b", "a"],
+    value: &[],
+    lines: &[],
+    series: &[],
+    least_map: 12,
+};
+
+/// What phase diagrams have in common.
+const ON_A_SPRING: Defaults = Defaults {
+    x: &["v_f", "k", "m", "b", "a"],
+    y: &["k", "v_i", "m", "b"],
+    value: &[],
+    lines: &[],
+    series: &["k"],
+    least_map: 5,
+};
+
+/// A picture for each table. A new one is a line here, and a file if it marks something of its own.
+const KINDS: [Kind; 9] = [
+    Kind {
+        table: "gap",
+        title: "Work gap of the cubic shortcuts",
+        defaults: Defaults {
+            x: &["alpha_2", "alpha_3", "t_f"],
+            y: &["alpha_3"],
+            value: &["gap", "work"],
+            lines: &["gap", "v_min"],
+            series: &[],
+            least_map: 2,
+        },
+        draw: gap::draw,
+    },
+    Kind {
+        table: "best",
+        title: "Best cubic shortcut",
+        defaults: Defaults { value: &["gap"], lines: &["gap", "alpha_2", "alpha_3", "v_min"], ..OVER_TIME },
+        draw: plain,
+    },
+    Kind {
+        table: "optimal",
+        title: "Optimal protocol",
+        defaults: Defaults { value: &["work"], lines: &["work", "v_start", "hold_time"], ..OVER_TIME },
+        draw: optimal::draw,
+    },
+    Kind {
+        table: "crossover",
+        title: "Durations at which the optimal strategy changes",
+        defaults: Defaults {
+            x: &["v_f", "v_i", "b", "a"],
+            y: &["v_i", "b", "a"],
+            value: &["t_cross", "t_hold", "t_cheapest", "t_turn", "t_min"],
+            lines: &["t_cheapest", "t_cross", "t_hold", "t_min", "t_turn"],
+            series: &["b", "a"],
+            least_map: 5,
+        },
+        draw: plain,
+    },
+    Kind {
+        table: "swift",
+        title: "Families of shortcuts",
+        defaults: Defaults {
+            x: &["t_f", "v_f", "v_i", "tau_max", "b", "a"],
+            y: &[],
+            value: &["gap", "work"],
+            lines: &["gap", "v_max"],
+            series: &["family"],
+            least_map: usize::MAX,
+        },
+        draw: swift::draw,
+    },
+    Kind {
+        table: "stability",
+        title: "Stability of steady sliding",
+        defaults: Defaults {
+            value: &["stable_f", "growth_rate", "k_c_f"],
+            lines: &["growth_rate", "frequency", "k_c_f"],
+            ..ON_A_SPRING
+        },
+        draw: phase::draw,
+    },
+    Kind {
+        table: "step",
+        title: "What becomes of the response to a step",
+        defaults: Defaults {
+            value: &["outcome", "stick_slip", "v_peak"],
+            lines: &["v_peak", "v_trough", "settling_time", "period"],
+            ..ON_A_SPRING
+        },
+        draw: phase::draw,
+    },
+    Kind {
+        table: "compliant",
+        title: "Smooth shortcut on a spring",
+        defaults: Defaults {
+            x: &["t_f", "k", "dt", "m", "v_f"],
+            y: &["k", "m", "v_f", "v_i"],
+            value: &["end_error", "amplification", "v_c_min"],
+            lines: &["amplification", "end_error", "v_c_min", "v_c_max"],
+            series: &["k", "dt"],
+            least_map: 12,
+        },
+        draw: plain,
+    },
+    Kind {
+        table: "regularised",
+        title: "Optimum with its jumps made smooth",
+        defaults: Defaults {
+            x: &["delta_t", "t_f", "k", "m", "v_f"],
+            y: &["t_f", "k", "v_f"],
+            value: &["gap"],
+            lines: &["gap", "v_c_max", "v_c_min"],
+            series: &["t_f", "k"],
+            least_map: 12,
+        },
+        draw: plain,
+    },
+];
+
+impl Source {
+    /// The dataset in `folder`, whose values are in `units`.
+    pub fn new(folder: Folder, manifest: Manifest, units: Units) -> Source {
+        let spec: Option<toml::Table> = manifest.spec.parse().ok();
+        let model = spec.as_ref().and_then(|spec| spec.get("model"));
+        let bound = model.and_then(|model| model.get("velocity_bound")).and_then(toml::Value::as_bool);
+        Source { manifest, folder, bounded: bound.unwrap_or(true), units }
+    }
+
+    /// Names of the tables of which there are pictures.
+    pub fn tables(&self) -> Vec<String> {
+        let known = |name: &str| KINDS.iter().any(|kind| kind.table == name);
+        self.manifest.tables.iter().map(|table| table.name.clone()).filter(|name| known(name)).collect()
+    }
+
+    /// The picture of a table.
+    pub fn figure(&self, table: &str, request: &Request) -> Result<Figure, PlotError> {
+        let survey = Survey::new(&self.folder, &self.manifest, table, &request.conditions)?;
+        let kind = KINDS
+            .iter()
+            .find(|kind| kind.table == table)
+            .ok_or_else(|| PlotError::NoTable { name: table.to_owned(), found: self.tables() })?;
+        let shape = choice::choose(&survey, &kind.defaults, request)?;
+        let mut figure = (kind.draw)(&Scene { source: self, survey: &survey }, &shape)?;
+        figure.title = kind.title.to_owned();
+        figure.subtitle = fixed(&survey, &shape);
+        if survey.missing > 0 {
+            figure.notes.push(format!("{} parts of the table are missing.", survey.missing));
+        }
+        Ok(figure)
+    }
+}
+
+/// Lines or a map, and nothing else.
+fn plain(scene: &Scene<'_>, shape: &Shape) -> Result<Figure, PlotError> {
+    match shape {
+        Shape::Map(plan) => Ok(map::map(scene.survey, plan)?.figure),
+        Shape::Lines(plan) => Ok(lines::lines(scene.survey, plan, |_, _| {})?.figure),
+    }
+}
+
+/// What is the same in all rows.
+fn fixed(survey: &Survey, shape: &Shape) -> String {
+    let drawn = |name: &str| match shape {
+        Shape::Map(plan) => plan.x == name || plan.y == name,
+        Shape::Lines(plan) => plan.x == name,
+    };
+    let mut words = Vec::new();
+    for axis in survey.axes.iter().filter(|axis| !drawn(&axis.name)) {
+        match axis.values.as_slice() {
+            [one] if !axis.infinite => {
+                words.push(axis.told(*one));
+            }
+            [] if axis.infinite && axis.name != "tau_max" => words.push(format!("{} = ∞", label::name(&axis.name))),
+            _ => {}
+        }
+    }
+    words.join(", ")
+}
+
+impl Scene<'_> {
+    /// The value of a quantity in all rows of a group: that of the group, or the only one there is.
+    fn value(&self, groups: &groups::Groups, group: usize, name: &str) -> Option<f64> {
+        if let Some(place) = groups.axes.iter().position(|axis| axis == name) {
+            return groups.shown.get(group)?.values.get(place).copied();
+        }
+        match self.survey.axis(name)?.values.as_slice() {
+            [one] => Some(*one),
+            _ => None,
+        }
+    }
+
+    /// The same in the scaled units of the model, in which the library computes.
+    fn scaled(&self, groups: &groups::Groups, group: usize, name: &str) -> Option<f64> {
+        let unit = Quantity::from_name(name)?.unit(Scale::Model);
+        Some(self.source.units.scaled(unit, self.value(groups, group, name)?))
+    }
+}

@@ -1,0 +1,80 @@
+//! Newton's method from a place close to that of least work, inside the admissible set.
+
+use super::plane::{Place, Plane, moved};
+use crate::protocol::Effort;
+use crate::protocol::cubic::Moments;
+
+/// Newton steps; each is halved as often as needed.
+const MOST_STEPS: u32 = 60;
+/// A step that gains this share of the work, times `a` where that is small, is the last: it changes velocities by a share
+/// of 1e-11, and what is left by the square of that.
+const LAST: f64 = 1e-22;
+/// A share of the work that rounding of its gradient may seem to gain.
+const NOISE: f64 = 1e-12;
+
+/// A step of Newton's method.
+struct Newton {
+    step: [f64; 2],
+    /// Twice what it gains.
+    decrement: f64,
+    /// Whether the work bends upwards, so that no shift was needed.
+    sure: bool,
+}
+
+impl Newton {
+    fn of(Moments { gradient, hessian: [h_11, h_12, h_22], .. }: &Moments) -> Newton {
+        // In units in which both coordinates bend the work alike.
+        let units = [h_11, h_22].map(|bend| 1.0 / bend.abs().max(f64::MIN_POSITIVE).sqrt());
+        let [g_1, g_2] = [gradient[0] * units[0], gradient[1] * units[1]];
+        let [h_11, h_12, h_22] = [h_11 * units[0] * units[0], h_12 * units[0] * units[1], h_22 * units[1] * units[1]];
+        // The Hessian, shifted until it is positive definite.
+        let trace = h_11 + h_22;
+        let spread = ((h_11 - h_22) * (h_11 - h_22) + 4.0 * h_12 * h_12).sqrt();
+        let (lowest, highest) = (0.5 * (trace - spread), 0.5 * (trace + spread));
+        let shift = if lowest > 1e-9 * highest { 0.0 } else { 1e-3 * highest.abs() - lowest };
+        let (h_11, h_22) = (h_11 + shift, h_22 + shift);
+        let determinant = h_11 * h_22 - h_12 * h_12;
+        let scaled = [-(h_22 * g_1 - h_12 * g_2) / determinant, -(h_11 * g_2 - h_12 * g_1) / determinant];
+        let step = [scaled[0] * units[0], scaled[1] * units[1]];
+        let decrement = -(g_1 * scaled[0] + g_2 * scaled[1]);
+        Newton { step, decrement, sure: shift == 0.0 }
+    }
+}
+
+/// Newton's method with halved steps. `None` where the descent runs into the border of the admissible set.
+pub(super) fn descend(plane: &Plane, a: f64, start: Place, effort: &mut Effort) -> Option<Place> {
+    let mut place = start;
+    let mut here = plane.moments(place, effort);
+    let mut before = f64::INFINITY;
+    for _ in 0..MOST_STEPS {
+        let Newton { step, decrement, sure } = Newton::of(&here);
+        if decrement.is_nan() {
+            return None;
+        }
+        let work = here.work.abs();
+        // Rounding of the gradient, once Newton's method gains no more.
+        if sure && decrement <= NOISE * a.min(1.0) * work && decrement >= 0.25 * before {
+            return Some(place);
+        }
+        before = decrement;
+        let last = sure && decrement <= LAST * a.min(1.0) * work;
+        let mut share = 1.0;
+        (place, here) = loop {
+            let trial = moved(place, step.map(|step| share * step));
+            if plane.admits(trial) {
+                if last {
+                    return Some(trial);
+                }
+                let there = plane.moments(trial, effort);
+                if there.work <= here.work - 1e-4 * share * decrement + 1e-14 * work {
+                    break (trial, there);
+                }
+            }
+            share *= 0.5;
+            if share < 1e-6 {
+                return None;
+            }
+        };
+    }
+    None
+}

@@ -1,0 +1,126 @@
+//! The plane of the coefficients of a cubic, and the convex set of its admissible places.
+
+use crate::model::Law;
+use crate::numerics::double_double::DoubleDouble;
+use crate::numerics::elementary::exp;
+use crate::protocol::Effort;
+use crate::protocol::cubic::{Basis, Landscape, Moments, Path};
+
+/// Two coefficients of theta, those of [`Basis`], to 32 digits: next to the border what is admissible may be thinner than
+/// the rounding of a double.
+pub(super) type Place = [DoubleDouble; 2];
+
+/// Shortcuts of one landscape that are no slower than a velocity, and whose theta stays above a floor.
+pub(super) struct Plane<'a> {
+    landscape: &'a Landscape,
+    pub basis: Basis,
+    least_velocity: f64,
+    floor: f64,
+}
+
+/// A condition `value + along . (y - place) >= 0` on the places `y`.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Condition {
+    pub value: f64,
+    pub along: [f64; 2],
+    pub of: Bound,
+}
+
+/// What a condition keeps.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Bound {
+    /// theta above its floor.
+    Lifetime,
+    /// The velocity at or above its least.
+    Velocity,
+}
+
+impl<'a> Plane<'a> {
+    /// The floor of theta is 0, or, for `b > a`, the place beyond which a smaller theta costs less, `1 + (b - a) ln theta =
+    /// b - a`: beyond it friction is as low as it is nowhere on a path that is an optimum. Where it is so at an end already,
+    /// the floor is half of that end's theta.
+    pub fn new(landscape: &'a Landscape, law: Law, least_velocity: f64) -> Plane<'a> {
+        let ends = landscape.ends();
+        let floor = if law.b > law.a { exp(1.0 - 1.0 / (law.b - law.a)) } else { 0.0 };
+        let lower = ends.theta_0.high.min(ends.theta_1.high);
+        let floor = if floor < lower { floor } else { 0.5 * lower };
+        let basis = if ends.rise.high < 0.0 { Basis::End } else { Basis::Start };
+        Plane { landscape, basis, least_velocity, floor }
+    }
+
+    /// The straight line between the ends.
+    pub fn line(&self) -> Place {
+        let rise = self.landscape.ends().rise;
+        [if self.basis == Basis::End { -rise } else { rise }, DoubleDouble::new(0.0)]
+    }
+
+    /// The farthest that an admissible theta may be from the straight line: `theta' <= 1` bounds it by `t_f - (theta_1 -
+    /// theta_0)`, and where `v >= 1`, `0 < theta < 1` does.
+    pub fn reach(&self) -> f64 {
+        let ends = self.landscape.ends();
+        let reach = (DoubleDouble::new(ends.t_f) - ends.rise).high;
+        if self.least_velocity >= 1.0 { reach.min(1.0) } else { reach }
+    }
+
+    /// `a_2` and `a_3`.
+    pub fn coefficients(&self, [y_1, y_2]: Place) -> Place {
+        match self.basis {
+            Basis::Start => [y_1, y_2],
+            Basis::End => {
+                let rise = self.landscape.ends().rise;
+                let [two, three] = [2.0, 3.0].map(DoubleDouble::new);
+                [three * rise + two * y_1 + y_2, -(three * (rise + y_1) + two * y_2)]
+            }
+        }
+    }
+
+    /// The shortcut at a place.
+    pub fn path(&self, place: Place) -> Path<'a> {
+        let [a_2, a_3] = self.coefficients(place);
+        self.landscape.path(a_2, a_3)
+    }
+
+    /// Work, gradient and Hessian at an admissible place.
+    pub fn moments(&self, place: Place, effort: &mut Effort) -> Moments {
+        self.landscape.moments(&self.path(place), self.basis, effort)
+    }
+
+    /// What must not be negative: theta above its floor and velocity above its least, where each is least, and the
+    /// velocity at both ends.
+    pub fn conditions(&self, place: Place) -> [Condition; 4] {
+        let path = self.path(place);
+        let mut theta = path.exact_theta();
+        theta.c[0] = theta.c[0] - DoubleDouble::new(self.floor);
+        let surplus = path.exact_surplus(self.least_velocity);
+        let scale = self.least_velocity * self.landscape.ends().t_f;
+        let velocity = |x: f64| {
+            let (d_theta, d_n) = self.basis.changes(x, 1.0 - x);
+            let along = [d_n[0] - scale * d_theta[0], d_n[1] - scale * d_theta[1]];
+            Condition { value: surplus.at(x).high, along, of: Bound::Velocity }
+        };
+        let x = theta.minimum();
+        let along = self.basis.changes(x, 1.0 - x).0;
+        let lifetime = Condition { value: theta.at(x).high, along, of: Bound::Lifetime };
+        [lifetime, velocity(surplus.minimum()), velocity(0.0), velocity(1.0)]
+    }
+
+    /// Whether a place is admissible.
+    pub fn admits(&self, place: Place) -> bool {
+        self.conditions(place).iter().all(Condition::holds)
+    }
+}
+
+impl Condition {
+    /// theta is positive; the least velocity may be touched.
+    pub fn holds(&self) -> bool {
+        match self.of {
+            Bound::Lifetime => self.value > 0.0,
+            Bound::Velocity => self.value >= 0.0,
+        }
+    }
+}
+
+/// A place moved by a step.
+pub(super) fn moved(place: Place, step: [f64; 2]) -> Place {
+    [place[0] + DoubleDouble::new(step[0]), place[1] + DoubleDouble::new(step[1])]
+}

@@ -1,0 +1,180 @@
+//! Shortcuts sorted by the number of nodes that they ask for, eight of which are summed together.
+
+use std::cell::Cell;
+
+use multiversion::multiversion;
+
+use super::Landscape;
+use super::bundle::{Bundle, Prepared, Space, prepare};
+use super::cells::Cells;
+use super::plan::{Block, Plan};
+use super::rules::STEP;
+use crate::numerics::gauss::primitive;
+use crate::numerics::lanes::LANES;
+
+/// Numbers of nodes that shortcuts are sorted by.
+pub(super) const BINS: usize = 20;
+
+/// From this one on two parts are cheaper.
+pub(super) const WHOLE: usize = 16;
+
+/// The nodes of a bin.
+#[inline(always)]
+pub(super) fn nodes_of(bin: usize) -> u32 {
+    STEP as u32 * (bin as u32 + 1)
+}
+
+/// Full bundles that are kept until they are summed. All of them are prepared first, so that the processor works on the
+/// logarithms of one while those of another one are on their way.
+const READY: usize = 8;
+
+/// Bundles of all bins, and of those that are ready.
+const ALL: usize = BINS + READY;
+
+/// A bundle, the places of its shortcuts, and the bin that it comes from once it is ready.
+#[derive(Debug, Clone, Copy)]
+struct Load {
+    bundle: Bundle,
+    indices: [usize; LANES],
+    count: usize,
+    bin: usize,
+    /// Whether no panel has another one beside it.
+    whole: bool,
+}
+
+/// All bins.
+#[derive(Debug, Clone)]
+pub(super) struct Bins {
+    loads: [Load; ALL],
+    /// The load that each bin fills, then those that are ready, then empty ones.
+    order: [usize; ALL],
+    /// How many are ready.
+    ready: usize,
+    prepared: [Prepared; READY],
+    space: Space,
+    /// Plans of cells of the last landscape.
+    pub cells: Cells,
+}
+
+thread_local! {
+    /// Memory for the next call: to clear it takes longer than a few sums.
+    static SPARE: Cell<Option<Box<Bins>>> = const { Cell::new(None) };
+}
+
+impl Bins {
+    /// Empty bins, in the memory of the last ones of this thread if there were any.
+    pub fn take() -> Box<Bins> {
+        SPARE.take().unwrap_or_else(|| Box::new(Bins::new()))
+    }
+
+    /// Keeps the memory of empty bins for the next ones.
+    pub fn keep(self: Box<Bins>) {
+        SPARE.set(Some(self));
+    }
+
+    fn new() -> Bins {
+        let load = Load { bundle: Bundle::EMPTY, indices: [0; LANES], count: 0, bin: 0, whole: false };
+        let order = std::array::from_fn(|i| i);
+        Bins {
+            loads: [load; ALL],
+            order,
+            ready: 0,
+            prepared: [Prepared::EMPTY; READY],
+            space: Space::EMPTY,
+            cells: Cells::EMPTY,
+        }
+    }
+
+    /// Puts a panel of the shortcut at `index`, given by its coordinates and bounds, into a bin; a full bin is emptied
+    /// and summed, its sums added to the works.
+    #[inline(always)]
+    #[allow(clippy::too_many_arguments)]
+    pub fn add(&mut self, of: &Landscape, plan: &Plan, lane: usize, panel: [f64; 4], index: usize, work: &mut [f64]) {
+        let bin = plan.bin[lane] as usize;
+        let Load { bundle, indices, count, .. } = &mut self.loads[self.order[bin]];
+        let last = *count % LANES;
+        (bundle.a_2[last], bundle.a_3[last]) = (panel[0], panel[1]);
+        (bundle.low[last], bundle.high[last]) = (panel[2], panel[3]);
+        (bundle.side[last], bundle.gap[last]) = (plan.side[lane], plan.gap[lane]);
+        bundle.squarings[last] = plan.squarings[lane];
+        indices[last] = index;
+        *count = last + 1;
+        if *count == LANES {
+            self.empty(of, bin, work);
+        }
+    }
+
+    /// As [`Bins::add`], for eight shortcuts of one bin from lane `first` on, over all of `[0, 1]`: a bundle
+    /// of their own.
+    #[inline(always)]
+    #[allow(clippy::too_many_arguments)]
+    pub fn add_all(
+        &mut self,
+        of: &Landscape,
+        plan: &Plan,
+        first: usize,
+        [a_2, a_3]: [&Block; 2],
+        indices: &[usize],
+        work: &mut [f64],
+    ) {
+        let load = &mut self.loads[self.order[BINS + self.ready]];
+        fill(&mut load.bundle, plan, first, a_2, a_3);
+        load.indices.copy_from_slice(indices);
+        (load.count, load.bin, load.whole) = (LANES, plan.bin[first] as usize, true);
+        self.ready += 1;
+        if self.ready == READY {
+            self.sum(of, work);
+        }
+    }
+
+    /// Sums what is left.
+    pub fn close(&mut self, of: &Landscape, work: &mut [f64]) {
+        for bin in 0..BINS {
+            self.empty(of, bin, work);
+        }
+        self.sum(of, work);
+    }
+
+    /// Exchanges the load of a bin, if there is something in it, for an empty one.
+    fn empty(&mut self, of: &Landscape, bin: usize, work: &mut [f64]) {
+        let load = &mut self.loads[self.order[bin]];
+        if load.count > 0 {
+            (load.bin, load.whole) = (bin, false);
+            self.order.swap(bin, BINS + self.ready);
+            self.ready += 1;
+            if self.ready == READY {
+                self.sum(of, work);
+            }
+        }
+    }
+
+    /// Sums what is ready.
+    fn sum(&mut self, of: &Landscape, work: &mut [f64]) {
+        let ready = &self.order[BINS..BINS + std::mem::take(&mut self.ready)];
+        for (&load, prepared) in ready.iter().zip(&mut self.prepared) {
+            prepare(&self.loads[load].bundle, &of.ends, &of.friction, prepared);
+        }
+        for (&load, prepared) in ready.iter().zip(&self.prepared) {
+            let Load { indices, count, bin, whole, .. } = &mut self.loads[load];
+            let works = prepared.works(primitive(nodes_of(*bin) as usize / 2), &mut self.space);
+            for (work_of, &i) in works.iter().zip(&indices[..std::mem::take(count)]) {
+                work[i] = if *whole { *work_of } else { work[i] + *work_of };
+            }
+        }
+    }
+}
+
+/// Makes a bundle of eight planned shortcuts, those from lane `first` on, over all of `[0, 1]`.
+#[multiversion(targets(
+    "x86_64+avx+avx2+bmi1+bmi2+avx512f+avx512bw+avx512cd+avx512dq+avx512vl",
+    "x86_64+avx+avx2+bmi1+bmi2"
+))]
+fn fill(bundle: &mut Bundle, plan: &Plan, first: usize, a_2: &Block, a_3: &Block) {
+    let lanes = first..first + LANES;
+    bundle.a_2.copy_from_slice(&a_2[lanes.clone()]);
+    bundle.a_3.copy_from_slice(&a_3[lanes.clone()]);
+    (bundle.low, bundle.high) = ([0.0; LANES], [1.0; LANES]);
+    bundle.side.copy_from_slice(&plan.side[lanes.clone()]);
+    bundle.gap.copy_from_slice(&plan.gap[lanes.clone()]);
+    bundle.squarings.copy_from_slice(&plan.squarings[lanes]);
+}

@@ -1,0 +1,303 @@
+//! The work of eight shortcuts at a time without a logarithm at a node.
+//!
+//! `W = int tau v dt`, and `tau` is known at both ends, its derivative `tau'` rational: `tau = (tau_0 + tau_1)/2 + 1/2
+//! int sign(x - y) tau'(y) dy`. So the work is the mean of `tau_0` and `tau_1` times `int v dt`, plus a bilinear form of
+//! `v` and `tau'`, which the nodes of one Gauss rule give to the order of that rule
+//! ([`Primitive`](crate::numerics::gauss::Primitive)).
+
+use multiversion::multiversion;
+
+use super::path::Ends;
+use super::plan::MOST_SQUARINGS;
+use crate::model::Law;
+use crate::numerics::elementary::ln;
+use crate::numerics::gauss::{MOST_HALF, Primitive, ROWS};
+use crate::numerics::lanes::{LANES, Lanes, Vector, least};
+
+/// Panels of eight shortcuts that share a number of nodes, each with its map `delta = side (gap - s^(2^squarings))` of
+/// the distance from an end of the panel.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Bundle {
+    pub a_2: Lanes,
+    pub a_3: Lanes,
+    /// Bounds of the panel, of which one is an end of `[0, 1]`.
+    pub low: Lanes,
+    pub high: Lanes,
+    /// Which end the map grows from: +1 the upper, -1 the lower.
+    pub side: Lanes,
+    /// Distance of the centre of the map beyond that end.
+    pub gap: Lanes,
+    /// log2 of the power.
+    pub squarings: Lanes,
+}
+
+/// What the shortcuts of a landscape share of friction.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Friction {
+    a: f64,
+    /// `b - a`.
+    slope: f64,
+    /// `tau` for `n = 1` and `theta = 1`.
+    constant: f64,
+    /// Sum of the logarithms of theta at both ends.
+    ln_theta: f64,
+}
+
+impl Friction {
+    pub fn new(law: Law, ends: &Ends) -> Friction {
+        let ln_theta = ln(ends.theta_0.high) + ln(ends.theta_1.high);
+        Friction { a: law.a, slope: law.b - law.a, constant: 1.0 - law.a * ln(ends.t_f), ln_theta }
+    }
+}
+
+/// Room for the values at the nodes: sums and differences of those on both sides of the middle.
+#[derive(Debug, Clone)]
+pub(super) struct Space {
+    v_even: [Vector; MOST_HALF],
+    v_odd: [Vector; MOST_HALF],
+    g_even: [Vector; MOST_HALF],
+    g_odd: [Vector; MOST_HALF],
+}
+
+impl Space {
+    pub const EMPTY: Space = {
+        let none = [Vector::splat(0.0); MOST_HALF];
+        Space { v_even: none, v_odd: none, g_even: none, g_odd: none }
+    };
+}
+
+/// What the nodes of a bundle need: the values that do not change from one to the next. Places are given by `eta = gap -
+/// s^(2^squarings) = side delta`.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Prepared {
+    /// Coefficients of theta and of n in powers of `eta`.
+    theta: [Vector; 4],
+    n: [Vector; 3],
+    /// `a dn/d(delta)` in powers of `eta`, times `side`.
+    slope: [Vector; 2],
+    /// `(b - a) t_f`, times `side`, with the other sign.
+    drive: Vector,
+    /// Mean of tau at both ends.
+    tau: Vector,
+    gap: Vector,
+    squarings: Vector,
+    middle: Vector,
+    half: Vector,
+    /// 1, from memory like the others: the compiler would take lanes apart for a constant.
+    unit: Vector,
+    /// The constant factor of `d(eta)/dx`, `x` the node of the rule.
+    scale: Vector,
+    kernel: Kernel,
+}
+
+/// What sums a bundle: by its least and its largest power.
+#[derive(Debug, Clone, Copy)]
+enum Kernel {
+    Squares,
+    Square,
+    Fourth,
+    Eighth,
+}
+
+impl Prepared {
+    /// Of no bundle.
+    pub const EMPTY: Prepared = {
+        let none = Vector::splat(0.0);
+        Prepared {
+            theta: [none; 4],
+            n: [none; 3],
+            slope: [none; 2],
+            drive: none,
+            tau: none,
+            kernel: Kernel::Eighth,
+            gap: none,
+            squarings: none,
+            middle: none,
+            half: none,
+            unit: none,
+            scale: none,
+        }
+    };
+}
+
+impl Bundle {
+    /// Lanes without a shortcut.
+    pub const EMPTY: Bundle = {
+        let none = [0.0; LANES];
+        Bundle { a_2: none, a_3: none, low: none, high: none, side: none, gap: none, squarings: none }
+    };
+}
+
+impl Prepared {
+    /// The works, of which those of empty lanes have no meaning.
+    #[inline(always)]
+    pub fn works(&self, rule: &Primitive, space: &mut Space) -> Lanes {
+        match self.kernel {
+            Kernel::Squares => squares(self, rule, space),
+            Kernel::Square => square(self, rule, space),
+            Kernel::Fourth => fourth(self, rule, space),
+            Kernel::Eighth => eighth(self, rule, space),
+        }
+    }
+}
+
+/// Prepares the sum of a bundle.
+#[multiversion(targets(
+    "x86_64+avx+avx2+bmi1+bmi2+avx512f+avx512bw+avx512cd+avx512dq+avx512vl",
+    "x86_64+avx+avx2+bmi1+bmi2"
+))]
+pub(super) fn prepare(bundle: &Bundle, ends: &Ends, friction: &Friction, prepared: &mut Prepared) {
+    let [a_2, a_3, low, high] = [bundle.a_2, bundle.a_3, bundle.low, bundle.high].map(Vector);
+    let [side, gap, squarings] = [bundle.side, bundle.gap, bundle.squarings].map(Vector);
+    let (t_f, rise) = (ends.t_f, ends.rise.high);
+    let [none, unit] = [0.0, 1.0].map(Vector::splat);
+    // The polynomials are expanded about the end that the map grows from, of a part about that of `[0, 1]`.
+    let centre = choose(low, unit, choose(unit - high, none - unit, side));
+    let slope = 3.0 * rise - (2.0 * a_2 + a_3);
+    let bend = 3.0 * rise - (3.0 * a_2 + 2.0 * a_3);
+    let a_4 = rise - (a_2 + a_3);
+    let [theta_0, theta_1] = [ends.theta_0.high, ends.theta_1.high].map(Vector::splat);
+    let (q0, q1) = (choose(centre, theta_1, theta_0), choose(centre, slope, a_2));
+    let (q2, q3) = (choose(centre, bend, a_3), a_4);
+    let (n0, n1, n2) = (t_f - q1, -2.0 * q2, -3.0 * q3);
+    // Both ends from there, and tau at them from the polynomials that the nodes see.
+    let length = high - low;
+    let near = choose(side, high, low) - choose(centre, unit, none);
+    let far = near - side * length;
+    let theta_at = |delta: Vector| q0 + delta * (q1 + delta * (q2 + delta * q3));
+    let n_at = |delta: Vector| n0 + delta * (n1 + delta * n2);
+    let part = unit - length;
+    let mut ln_theta = Vector::splat(friction.ln_theta);
+    if part != none {
+        let of_part = (theta_at(near) * theta_at(far)).map(ln);
+        ln_theta = choose(part, of_part, ln_theta);
+    }
+    let ln_n = (n_at(near) * n_at(far)).map(ln);
+    let (mut from, mut to, mut factor) = (gap, gap + length, unit);
+    let (fewest, most) = (least(&squarings.0), -least(&squarings.map(|squarings| -squarings).0));
+    for level in 1..=MOST_SQUARINGS {
+        let more = squarings - Vector::splat(f64::from(level) - 0.5);
+        // Roots take long.
+        if most < f64::from(level) {
+            break;
+        }
+        from = choose(more, from.map(f64::sqrt), from);
+        to = choose(more, to.map(f64::sqrt), to);
+        factor = choose(more, factor + factor, factor);
+    }
+    let half = 0.5 * (to - from);
+    *prepared = Prepared {
+        theta: [q0, side * q1, q2, side * q3],
+        n: [n0, side * n1, n2],
+        slope: [friction.a * (side * n1), (2.0 * friction.a) * n2],
+        drive: friction.slope * t_f * side,
+        tau: friction.constant + 0.5 * (friction.a * ln_n + friction.slope * ln_theta),
+        gap: side * near + gap,
+        squarings,
+        middle: 0.5 * (from + to),
+        half,
+        unit,
+        scale: half * factor,
+        kernel: if fewest == 1.0 && most == 1.0 {
+            Kernel::Squares
+        } else if most <= 1.0 {
+            Kernel::Square
+        } else if most <= 2.0 {
+            Kernel::Fourth
+        } else {
+            Kernel::Eighth
+        },
+    };
+}
+
+/// `yes` in the lanes where `sign` is above 0, `no` in the others.
+#[inline(always)]
+fn choose(sign: Vector, yes: Vector, no: Vector) -> Vector {
+    let mut chosen = no;
+    for i in 0..LANES {
+        chosen.0[i] = if sign.0[i] > 0.0 { yes.0[i] } else { no.0[i] };
+    }
+    chosen
+}
+
+macro_rules! kernels {
+    ($($(#[$doc:meta])* $name:ident = $most:literal, $same:literal;)*) => {$(
+        $(#[$doc])*
+        #[multiversion(targets(
+            "x86_64+avx+avx2+bmi1+bmi2+avx512f+avx512bw+avx512cd+avx512dq+avx512vl",
+            "x86_64+avx+avx2+bmi1+bmi2"
+        ))]
+        fn $name(prepared: &Prepared, rule: &Primitive, space: &mut Space) -> Lanes {
+            sum::<$most, $same>(prepared, rule, space)
+        }
+    )*};
+}
+
+kernels! {
+    /// Where all maps take one root.
+    squares = 1, true;
+    /// Where none takes more than one.
+    square = 1, false;
+    /// Where none takes more than two.
+    fourth = 2, false;
+    /// For all maps.
+    eighth = 3, false;
+}
+
+/// The works where no map squares more than `SQUARINGS` times, and all as often as that if they are the `SAME`.
+#[inline(always)]
+fn sum<const SQUARINGS: u32, const SAME: bool>(prepared: &Prepared, rule: &Primitive, space: &mut Space) -> Lanes {
+    let Space { v_even, v_odd, g_even, g_odd } = space;
+    let Prepared { theta, n, slope, drive, tau, gap, squarings, middle, half, unit, scale, .. } = *prepared;
+    let count = rule.x.len().min(MOST_HALF);
+    let mut mean = Vector::splat(0.0);
+    for j in 0..count {
+        let none = [Vector::splat(0.0); 2];
+        let (mut v, mut g, mut below) = (none, none, none);
+        for (((v, g), below), x) in v.iter_mut().zip(&mut g).zip(&mut below).zip([rule.x[j], -rule.x[j]]) {
+            let s = middle + x * half;
+            let (mut power, mut jacobian) = if SAME { (s * s, s) } else { (s, unit) };
+            for level in 0..if SAME { 0 } else { SQUARINGS } {
+                let more = squarings - Vector::splat(f64::from(level) + 0.5);
+                (power, jacobian) = (choose(more, power * power, power), choose(more, power * jacobian, jacobian));
+            }
+            let eta = gap - power;
+            let theta = theta[0] + eta * (theta[1] + eta * (theta[2] + eta * theta[3]));
+            let n = n[0] + eta * (n[1] + eta * n[2]);
+            let slope = slope[0] + eta * slope[1];
+            // Over theta n, of which there is one division for two nodes.
+            *v = n * n * jacobian;
+            *g = (drive * n + slope * theta) * jacobian;
+            *below = theta * n;
+        }
+        let inverse = 1.0 / (below[0] * below[1]);
+        let inverses = [below[1] * inverse, below[0] * inverse];
+        for ((v, g), inverse) in v.iter_mut().zip(&mut g).zip(inverses) {
+            (*v, *g) = (*v * inverse, *g * inverse);
+        }
+        (v_even[j], v_odd[j]) = (v[0] + v[1], v[0] - v[1]);
+        (g_even[j], g_odd[j]) = (g[0] + g[1], g[0] - g[1]);
+        mean = mean + rule.w[j] * v_even[j];
+    }
+    // The last rows of the matrix are filled up with zeros.
+    let padded = count.next_multiple_of(ROWS);
+    v_odd[count..padded].fill(Vector::splat(0.0));
+    g_odd[count..padded].fill(Vector::splat(0.0));
+    let mut sum = Vector::splat(0.0);
+    let pairs = v_odd.chunks_exact(ROWS).zip(g_odd.chunks_exact(ROWS));
+    for (rows, (v, g)) in rule.matrix.chunks_exact(ROWS * count).zip(pairs) {
+        let (first, second) = rows.split_at(2 * count);
+        let ((one, two), (three, four)) = (first.split_at(count), second.split_at(count));
+        let (mut y, mut z) = ([Vector::splat(0.0); ROWS], [Vector::splat(0.0); ROWS]);
+        for j in 0..count {
+            for (r, row) in [one, two, three, four].into_iter().enumerate() {
+                y[r] = y[r] + row[j] * g_even[j];
+                z[r] = z[r] + row[j] * v_even[j];
+            }
+        }
+        for r in 0..ROWS {
+            sum = sum + (g[r] * z[r] - v[r] * y[r]);
+        }
+    }
+    (scale * (tau * mean + scale * sum)).0
+}

@@ -1,0 +1,429 @@
+//! One map for all shortcuts of a cell of the plane, and how many nodes each of them needs: most plans are made for
+//! hundreds of neighbours at once.
+//!
+//! The cells follow from the landscape alone, and the plan of a cell from the cell: what is found of a shortcut does
+//! not depend on its neighbours. The zeros move smoothly from one shortcut to the next, so that ln rho, which a number of
+//! nodes is in inverse proportion to, is interpolated between the corners; how far it is from that in the middle of the
+//! edges is what it may be off. A shortcut near the border of feasibility, or with many nodes, has a plan of its own.
+
+use multiversion::multiversion;
+
+use super::bins::WHOLE;
+use super::path::{Ends, Path};
+use super::plan::{BLOCK, BLURRED, Block, CHEAP, COARSE, PAIRS, Places, Plan, nearest, places, rooted};
+use super::rules::{Accuracy, STEP, ZEROS};
+use crate::numerics::elementary::rough_ln;
+use crate::numerics::lanes::{LANES, Vector};
+
+/// Plans of the cells of a landscape that were met last.
+#[derive(Debug, Clone)]
+pub(super) struct Cells {
+    frame: Option<Frame>,
+    /// Which frames the cells are of.
+    age: u64,
+    of: [Cell; SLOTS],
+}
+
+/// What cells follow from.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Frame {
+    ends: Ends,
+    accuracy: Accuracy,
+    /// Cells in a unit of either coordinate.
+    scale: f64,
+}
+
+/// The plan of one cell.
+#[derive(Debug, Clone, Copy)]
+struct Cell {
+    place: Place,
+    /// The age of its frame.
+    age: u64,
+    /// ln rho in units of that for which [`STEP`] nodes are enough, in powers of the distances from the middle: 1, `u`,
+    /// `v` and `u v`.
+    pace: [f64; 4],
+    /// Where ln rho is no more than that a shortcut needs a plan of its own; 0 if all of a cell do.
+    least: f64,
+    side: f64,
+    gap: f64,
+    squarings: f64,
+}
+
+/// Which cell: bits of the coordinates of its middle.
+type Place = [u64; 2];
+
+/// Cells that are kept: those of two or three lines of a map.
+const SLOTS: usize = 64;
+
+/// Cells that are planned together, each from as many places.
+const TOGETHER: usize = BLOCK / SAMPLES.len();
+
+/// Corners of a cell, then the middles of the edges between them.
+const SAMPLES: [[f64; 2]; 8] =
+    [[-0.5, -0.5], [-0.5, 0.5], [0.5, -0.5], [0.5, 0.5], [0.0, -0.5], [0.0, 0.5], [-0.5, 0.0], [0.5, 0.0]];
+
+/// The first of them.
+const CORNERS: usize = 4;
+
+/// Cells in the power of 2 below the mean of n, the scale of the whole domain.
+const CELLS: f64 = 8.0;
+
+/// `1.5 * 2^52`, whose last bit is 1: added to a number, it leaves the nearest integer.
+const ONES: f64 = 6755399441055744.0;
+
+/// Cells farther away are not planned.
+const FARTHEST: f64 = 1e9;
+
+/// The share of the distance to the zero beyond the end that the map grows from, so that none comes between.
+const SAFE: f64 = 0.97;
+
+/// Largest share of ln rho that it may be off.
+const ROUGH: f64 = 0.12;
+
+/// The bin of a shortcut that needs a plan of its own.
+pub(super) const OWN: u32 = u32::MAX;
+
+impl Frame {
+    /// Of the landscape between `ends`.
+    pub fn new(ends: &Ends, accuracy: &Accuracy) -> Frame {
+        let mean = ends.t_f - ends.rise.high;
+        // The exponent alone.
+        let power = f64::from_bits(mean.to_bits() & 0x7FF0_0000_0000_0000);
+        let scale = CELLS / power;
+        Frame { ends: *ends, accuracy: accuracy.clone(), scale: if scale.is_normal() { scale } else { 1.0 } }
+    }
+}
+
+impl Cell {
+    const NONE: Cell = Cell { place: [0; 2], age: 0, pace: [0.0; 4], least: 0.0, side: 0.0, gap: 0.0, squarings: 0.0 };
+}
+
+impl Cells {
+    pub const EMPTY: Cells = Cells { frame: None, age: 0, of: [Cell::NONE; SLOTS] };
+
+    /// Forgets the cells of another frame.
+    pub fn begin(&mut self, frame: &Frame) {
+        if self.frame.as_ref() != Some(frame) {
+            self.frame = Some(frame.clone());
+            self.age += 1;
+        }
+    }
+
+    /// Where a cell is kept.
+    #[inline(always)]
+    fn slot([i, j]: Place) -> u32 {
+        i.wrapping_mul(37).wrapping_add(j) as u32 % SLOTS as u32
+    }
+
+    #[inline(always)]
+    fn holds(&self, slot: u32, place: Place) -> bool {
+        let cell = &self.of[slot as usize];
+        cell.place == place && cell.age == self.age
+    }
+
+    /// Plans shortcuts, all feasible, from their cells.
+    pub fn plan(&mut self, frame: &Frame, a_2: &Block, a_3: &Block, plan: &mut Plan) {
+        let located = locate(frame.scale, a_2, a_3);
+        let (mut runs, mut count) = ([Run { from: 0, slot: 0 }; BLOCK], 0);
+        let (mut missing, mut lost) = ([[0; 2]; BLOCK], 0);
+        // The cell before, and the one before the last of those that are missing.
+        let (mut last, mut before) = (located.place(0), located.place(0));
+        let mut starts = located.starts;
+        while starts != 0 {
+            let from = starts.trailing_zeros();
+            starts &= starts - 1;
+            let place = located.place(from as usize);
+            let slot = Cells::slot(place);
+            runs[count] = Run { from, slot };
+            count += 1;
+            if !self.holds(slot, place) {
+                missing[lost] = place;
+                lost += 1;
+                before = last;
+            }
+            last = place;
+        }
+        let (runs, missing) = (&runs[..count], &missing[..lost]);
+        for places in missing.chunks(TOGETHER) {
+            let mut padded = [places[0]; TOGETHER];
+            padded[..places.len()].copy_from_slice(places);
+            // There is room for those that the shortcuts seem to come to next.
+            let last = places[places.len() - 1];
+            let step = [0, 1].map(|axis| last[axis].wrapping_sub(before[axis]));
+            for next in places.len()..TOGETHER {
+                padded[next] = [0, 1].map(|axis| padded[next - 1][axis].wrapping_add(step[axis]));
+            }
+            for cell in chart(frame, &padded) {
+                self.keep(cell);
+            }
+        }
+        assemble(&self.of, runs, &located, plan);
+        if missing.is_empty() {
+            return;
+        }
+        // Of cells that are kept in the same slot there is only the last one.
+        for lane in 0..BLOCK {
+            let place = located.place(lane);
+            let slot = Cells::slot(place);
+            if !self.holds(slot, place) {
+                let [cell, ..] = chart(frame, &[place; TOGETHER]);
+                self.keep(cell);
+            }
+            self.of[slot as usize].write(located.local[0][lane], located.local[1][lane], lane, plan);
+        }
+    }
+
+    fn keep(&mut self, cell: Cell) {
+        self.of[Cells::slot(cell.place) as usize] = Cell { age: self.age, ..cell };
+    }
+}
+
+/// Neighbouring lanes of one cell, up to the next run.
+#[derive(Clone, Copy)]
+struct Run {
+    from: u32,
+    slot: u32,
+}
+
+/// The cells of shortcuts, and the distances from their middles.
+struct Located {
+    places: [[u64; BLOCK]; 2],
+    local: [Block; 2],
+    /// The lanes whose cell is not that of the lane before.
+    starts: u32,
+}
+
+impl Located {
+    #[inline(always)]
+    fn place(&self, lane: usize) -> Place {
+        [self.places[0][lane], self.places[1][lane]]
+    }
+}
+
+#[multiversion(targets(
+    "x86_64+avx+avx2+bmi1+bmi2+avx512f+avx512bw+avx512cd+avx512dq+avx512vl",
+    "x86_64+avx+avx2+bmi1+bmi2"
+))]
+fn locate(scale: f64, a_2: &Block, a_3: &Block) -> Located {
+    let mut located = Located { places: [[0; BLOCK]; 2], local: [[0.0; BLOCK]; 2], starts: 1 };
+    for ((places, local), a) in located.places.iter_mut().zip(&mut located.local).zip([a_2, a_3]) {
+        for i in 0..BLOCK {
+            let x = a[i] * scale;
+            let middle = x + ONES;
+            places[i] = middle.to_bits();
+            local[i] = x - (middle - ONES);
+        }
+    }
+    let [i, j] = &located.places;
+    for lane in 1..BLOCK {
+        let other = (i[lane] != i[lane - 1]) | (j[lane] != j[lane - 1]);
+        located.starts |= u32::from(other) << lane;
+    }
+    located
+}
+
+impl Cell {
+    /// The plan of a shortcut.
+    #[inline(always)]
+    fn write(&self, u: f64, v: f64, lane: usize, plan: &mut Plan) {
+        let [p0, p1, p2, p3] = self.pace;
+        plan.bin[lane] = bin(p0 + u * p1 + v * (p2 + u * p3), self.least);
+        (plan.side[lane], plan.gap[lane], plan.squarings[lane]) = (self.side, self.gap, self.squarings);
+    }
+}
+
+/// The bin of a shortcut of a cell.
+#[inline(always)]
+fn bin(pace: f64, least: f64) -> u32 {
+    // As many steps as that are enough, rounded up; the first bin is one step.
+    let last = (1.0 / pace - 0.5) + ONES;
+    if pace > least { last.to_bits() as u32 } else { OWN }
+}
+
+/// Writes the plans of shortcuts of cells.
+#[multiversion(targets(
+    "x86_64+avx+avx2+bmi1+bmi2+avx512f+avx512bw+avx512cd+avx512dq+avx512vl",
+    "x86_64+avx+avx2+bmi1+bmi2"
+))]
+fn assemble(cells: &[Cell; SLOTS], runs: &[Run], located: &Located, plan: &mut Plan) {
+    let from = |run: usize| runs.get(run).map_or(BLOCK, |run| run.from as usize);
+    let cell = |run: usize| &cells[runs[run].slot as usize % SLOTS];
+    let mut run = 0;
+    for start in (0..BLOCK).step_by(LANES) {
+        let lanes = start..start + LANES;
+        while from(run + 1) <= start {
+            run += 1;
+        }
+        if from(run + 2) < lanes.end {
+            for lane in lanes {
+                while from(run + 1) <= lane {
+                    run += 1;
+                }
+                cell(run).write(located.local[0][lane], located.local[1][lane], lane, plan);
+            }
+            continue;
+        }
+        // At most two cells: from where on it is the other one.
+        let border = from(run + 1).min(lanes.end);
+        let (one, other) = (cell(run), cell(if border < lanes.end { run + 1 } else { run }));
+        let beyond = ORDER - Vector::splat((border - start) as f64);
+        let pick = |one: f64, other: f64| beyond.map(|beyond| if beyond > 0.0 { other } else { one });
+        let mut local = [Vector::splat(0.0); 2];
+        for (local, all) in local.iter_mut().zip(&located.local) {
+            local.0.copy_from_slice(&all[lanes.clone()]);
+        }
+        let [p0, p1, p2, p3]: [Vector; 4] = std::array::from_fn(|k| pick(one.pace[k], other.pace[k]));
+        let [u, v] = local;
+        let pace = p0 + u * p1 + v * (p2 + u * p3);
+        let least = pick(one.least, other.least);
+        for lane in 0..LANES {
+            plan.bin[start + lane] = bin(pace.0[lane], least.0[lane]);
+        }
+        plan.side[lanes.clone()].copy_from_slice(&pick(one.side, other.side).0);
+        plan.gap[lanes.clone()].copy_from_slice(&pick(one.gap, other.gap).0);
+        plan.squarings[lanes].copy_from_slice(&pick(one.squarings, other.squarings).0);
+    }
+}
+
+/// The middles of the lanes of a vector.
+const ORDER: Vector = Vector([0.5, 1.5, 2.5, 3.5, 4.5, 5.5, 6.5, 7.5]);
+
+/// One value a cell, given to all its places.
+#[inline(always)]
+fn spread<T: Copy>(of: [T; TOGETHER]) -> [T; BLOCK] {
+    let mut all = [of[0]; BLOCK];
+    for places in all.chunks_exact_mut(TOGETHER) {
+        places.copy_from_slice(&of);
+    }
+    all
+}
+
+/// The least value of each cell.
+#[inline(always)]
+fn lowest(values: &[f32; BLOCK]) -> [f32; TOGETHER] {
+    let mut lowest = [f32::MAX; TOGETHER];
+    for places in values.chunks_exact(TOGETHER) {
+        for c in 0..TOGETHER {
+            lowest[c] = if places[c] < lowest[c] { places[c] } else { lowest[c] };
+        }
+    }
+    lowest
+}
+
+/// Plans cells.
+#[multiversion(targets(
+    "x86_64+avx+avx2+bmi1+bmi2+avx512f+avx512bw+avx512cd+avx512dq+avx512vl",
+    "x86_64+avx+avx2+bmi1+bmi2"
+))]
+fn chart(frame: &Frame, cells: &[Place; TOGETHER]) -> [Cell; TOGETHER] {
+    let Frame { ends, accuracy, scale } = frame;
+    let middles = [0, 1].map(|k| std::array::from_fn(|c| f64::from_bits(cells[c][k]) - ONES));
+    let (mut a_2, mut a_3) = (spread(middles[0]), spread(middles[1]));
+    let size = 1.0 / scale;
+    for (sample, [u, v]) in SAMPLES.into_iter().enumerate() {
+        for i in sample * TOGETHER..(sample + 1) * TOGETHER {
+            (a_2[i], a_3[i]) = ((a_2[i] + u) * size, (a_3[i] + v) * size);
+        }
+    }
+    let Places { re, im, doubt } = places::<f32>(ends, &a_2, &a_3);
+    let (straight, shadow) = nearest(&re, &im, &[0.0; BLOCK], &[1.0; BLOCK]);
+    // One map for each cell: how far beyond the upper and the lower end it has to be at most.
+    let (mut above, mut below) = ([0.0f32; BLOCK], [0.0f32; BLOCK]);
+    for i in 0..BLOCK {
+        let upper = shadow[i] > 0.5;
+        let beyond = if upper { shadow[i] - 1.0 } else { -shadow[i] };
+        let beyond = if beyond > 0.0 { beyond } else { 0.0 };
+        (above[i], below[i]) = if upper { (beyond, -1.0) } else { (-1.0, beyond) };
+    }
+    let (above, below) = (lowest(&above), lowest(&below));
+    let (mut sides, mut gaps) = ([0.0f32; TOGETHER], [0.0f32; TOGETHER]);
+    for c in 0..TOGETHER {
+        let beyond = if above[c] >= 0.0 { above[c] } else { below[c] };
+        sides[c] = if above[c] >= 0.0 { 1.0 } else { -1.0 };
+        gaps[c] = SAFE as f32 * beyond;
+    }
+    let (side, gap) = (spread(sides), spread(gaps));
+    let (mut near, mut far) = ([0.0f32; BLOCK], [0.0f32; BLOCK]);
+    for i in 0..BLOCK {
+        (near[i], far[i]) = (gap[i].sqrt(), (1.0 + gap[i]).sqrt());
+    }
+    let mut least = [f32::MAX; BLOCK];
+    for k in 0..ZEROS {
+        for i in 0..BLOCK {
+            let end = if side[i] > 0.0 { 1.0 - re[k][i] } else { re[k][i] };
+            let (x, y) = (gap[i] + end, im[k][i]);
+            let size = if PAIRS.contains(&k) { (x * x + y * y).sqrt() } else { x.abs() };
+            let (_, sum) = rooted(size, x, near[i], far[i]);
+            least[i] = if sum < least[i] { sum } else { least[i] };
+        }
+    }
+    let mut focal = [[0.0f32; BLOCK]; 2];
+    for i in 0..BLOCK {
+        focal[0][i] = 2.0 * straight[i].sqrt();
+        focal[1][i] = 2.0 * least[i].sqrt() / (far[i] - near[i]);
+    }
+    // As in the plan of one shortcut, a larger power might help where the centre of the map itself is what hinders.
+    let mut room = [0.0f32; BLOCK];
+    for i in 0..BLOCK {
+        let ceiling = 4.0 * near[i] / (far[i] - near[i]);
+        room[i] = 0.5 * ceiling - (focal[1][i] - 2.0);
+    }
+    let room = lowest(&room);
+    let (straight, squared) = (lowest(&focal[0]), lowest(&focal[1]));
+    let mut gain = [0.0f32; TOGETHER];
+    for c in 0..TOGETHER {
+        gain[c] = squared[c] - straight[c];
+    }
+    let gains = spread(gain);
+    let (mut paces, mut sound, mut unsure) = ([0.0; BLOCK], [0.0; BLOCK], [0.0f32; TOGETHER]);
+    let steady = if ends.rise.high < 0.0 { 1.0 } else { -1.0 };
+    let mean = ends.t_f - ends.rise.high;
+    for i in 0..BLOCK {
+        let focal = if gains[i] > 0.0 { focal[1][i] } else { focal[0][i] };
+        // What errors of the zeros may cost.
+        let excess = (f64::from(focal) - 2.0) * (0.5 / (1.0 + COARSE));
+        let excess = if excess > 0.0 { excess } else { 0.0 };
+        paces[i] = rough_ln(1.0 + excess + (excess * (2.0 + excess)).sqrt()) / accuracy.pace;
+    }
+    for i in 0..CORNERS * TOGETHER {
+        let path = Path::new(ends, a_2[i], a_3[i]);
+        let side = if gains[i] > 0.0 { f64::from(side[i]) } else { steady };
+        // The mean of n is the least sum of its coefficients' sizes.
+        let kept = path.is_sound(side > 0.0, 0.0, -side, accuracy) & (accuracy.rounding * mean >= 3.0 * path.slack());
+        sound[i] = if kept { 1.0 } else { 0.0 };
+    }
+    for doubts in doubt.chunks_exact(TOGETHER) {
+        for c in 0..TOGETHER {
+            unsure[c] += doubts[c];
+        }
+    }
+    let mut found = [Cell::NONE; TOGETHER];
+    for (c, cell) in found.iter_mut().enumerate() {
+        let [mm, mp, pm, pp, m_low, m_high, low_m, high_m] = std::array::from_fn(|sample| paces[sample * TOGETHER + c]);
+        let off = |middle: f64, one: f64, other: f64| (middle - 0.5 * (one + other)).abs();
+        let greater = |a: f64, b: f64| if a > b { a } else { b };
+        let off_u = greater(off(m_low, mm, pm), off(m_high, mp, pp));
+        let off_v = greater(off(low_m, mm, mp), off(high_m, pm, pp));
+        let slack = off_u + off_v;
+        let lowest = -greater(greater(-mm, -mp), greater(-pm, -pp));
+        let squared = gain[c] > 0.0;
+        let (side, gap) = if squared { (f64::from(sides[c]), f64::from(gaps[c])) } else { (steady, 0.0) };
+        let one_map =
+            !squared || ((above[c] >= 0.0) | (below[c] >= 0.0)) & ((gap == 0.0) | (gap >= BLURRED)) & (gap <= 1.0);
+        let corners = (0..CORNERS).all(|corner| sound[corner * TOGETHER + c] > 0.0);
+        let meant = middles[0][c].abs() + middles[1][c].abs() < FARTHEST;
+        *cell = Cell { place: cells[c], ..Cell::NONE };
+        if unsure[c] == 0.0 && one_map && corners && meant && slack <= ROUGH * lowest {
+            cell.pace = [
+                0.25 * ((mm + pp) + (mp + pm)) - slack,
+                0.5 * ((pp - mm) + (pm - mp)),
+                0.5 * ((pp - mm) - (pm - mp)),
+                (pp + mm) - (pm + mp),
+            ];
+            (cell.side, cell.gap, cell.squarings) = (side, gap, if squared { 1.0 } else { 0.0 });
+            let most = if squared && room[c] < 0.0 { CHEAP / STEP } else { WHOLE };
+            cell.least = 1.0 / most as f64;
+        }
+    }
+    found
+}

@@ -1,0 +1,77 @@
+//! Shortcuts that wait until there are enough of them for all lanes.
+
+use super::plan::{BLOCK, Block};
+
+/// Up to `N` shortcuts of a landscape.
+#[derive(Debug, Clone)]
+pub(super) struct Queue<const N: usize> {
+    indices: [usize; N],
+    a_2: [f64; N],
+    a_3: [f64; N],
+    count: usize,
+}
+
+impl<const N: usize> Queue<N> {
+    pub const EMPTY: Queue<N> = Queue { indices: [0; N], a_2: [0.0; N], a_3: [0.0; N], count: 0 };
+
+    /// Adds the shortcut at `index`; true once the queue is full.
+    #[inline(always)]
+    pub fn push(&mut self, index: usize, a_2: f64, a_3: f64) -> bool {
+        let last = self.count % N;
+        (self.indices[last], self.a_2[last], self.a_3[last]) = (index, a_2, a_3);
+        self.count = last + 1;
+        self.count == N
+    }
+
+    /// Takes all out: their indices, and coordinates for all lanes, the last ones given again where there are fewer
+    /// shortcuts; `None` if there are none.
+    pub fn take(&mut self) -> Option<(&[usize], [&[f64; N]; 2])> {
+        let count = std::mem::take(&mut self.count);
+        let last = count.checked_sub(1)?;
+        let (a_2, a_3) = (self.a_2[last], self.a_3[last]);
+        self.a_2[last..].fill(a_2);
+        self.a_3[last..].fill(a_3);
+        Some((&self.indices[..count], [&self.a_2, &self.a_3]))
+    }
+}
+
+/// Shortcuts whose interval is to be cut in two.
+#[derive(Debug, Clone)]
+pub(super) struct Cuts {
+    indices: [usize; BLOCK / 2],
+    a_2: Block,
+    a_3: Block,
+    low: Block,
+    high: Block,
+    count: usize,
+}
+
+impl Cuts {
+    pub const EMPTY: Cuts = Cuts {
+        indices: [0; BLOCK / 2],
+        a_2: [0.0; BLOCK],
+        a_3: [0.0; BLOCK],
+        low: [0.0; BLOCK],
+        high: [1.0; BLOCK],
+        count: 0,
+    };
+
+    /// Adds the shortcut at `index`, cut at `at`; true once there are as many as are planned together.
+    pub fn push(&mut self, index: usize, [a_2, a_3]: [f64; 2], at: f64) -> bool {
+        let last = self.count % (BLOCK / 2);
+        self.indices[last] = index;
+        for lane in [last, last + BLOCK / 2] {
+            (self.a_2[lane], self.a_3[lane]) = (a_2, a_3);
+        }
+        (self.high[last], self.low[last + BLOCK / 2]) = (at, at);
+        self.count = last + 1;
+        self.count == BLOCK / 2
+    }
+
+    /// Takes all out: their indices, and coordinates and bounds, the lower parts in the first half of the lanes; `None`
+    /// if there are none.
+    pub fn take(&mut self) -> Option<(&[usize], [&Block; 4])> {
+        let count = std::mem::take(&mut self.count);
+        (count > 0).then_some((&self.indices[..count], [&self.a_2, &self.a_3, &self.low, &self.high]))
+    }
+}

@@ -1,0 +1,378 @@
+//! Whether shortcuts are feasible, and their least velocities, eight at a time.
+//!
+//! What is cheap to see is seen first. Theta, `n` and `n - t_f theta` are linear in the coordinates at every `x`, so
+//! that most spans of a line follow from their ends; then the ends of a shortcut and the coefficients in Bernstein's
+//! form settle most, and stationary points are computed only where they leave some lane in doubt. What is found of a
+//! shortcut does not depend on its neighbours, only the time does.
+
+use multiversion::multiversion;
+
+use super::path::{Ends, MOST_STEPS, Path};
+use crate::numerics::cubic::Cubic;
+use crate::numerics::lanes::{LANES, Lanes};
+use crate::protocol::Status;
+
+/// Shortcuts of a span, which its ends may settle.
+pub(super) const SPAN: usize = 32;
+
+/// Spans that are looked at together: two ends each.
+pub(super) const SPANS: usize = LANES / 2;
+
+/// The one status of all shortcuts of each of consecutive spans; `None` where they differ or rounding leaves doubt, and
+/// where a span is not part of a line along one of the coordinates, between its first and its last place.
+///
+/// What is positive at both ends of a span is positive on all of it, and so is what is negative at both ends for the
+/// same `x`.
+pub(super) fn settle(ends: &Ends, a_2: &Stretch, a_3: &Stretch) -> [Option<Status>; SPANS] {
+    let (mut first_2, mut first_3) = ([0.0; LANES], [0.0; LANES]);
+    for span in 0..SPANS {
+        for (lane, place) in [(span, span * SPAN), (span + SPANS, (span + 1) * SPAN - 1)] {
+            (first_2[lane], first_3[lane]) = (a_2[place], a_3[place]);
+        }
+    }
+    let mut found = verdicts(ends, &first_2, &first_3);
+    let straight = straight(a_2, a_3);
+    for (verdict, straight) in found.iter_mut().zip(straight) {
+        *verdict = verdict.filter(|_| straight);
+    }
+    found
+}
+
+/// A coordinate of the shortcuts of all spans.
+pub(super) type Stretch = [f64; SPAN * SPANS];
+
+/// Whether a span has one coordinate in common, and of the other none beyond its first and last place.
+#[multiversion(targets(
+    "x86_64+avx+avx2+bmi1+bmi2+avx512f+avx512bw+avx512cd+avx512dq+avx512vl",
+    "x86_64+avx+avx2+bmi1+bmi2"
+))]
+fn straight(a_2: &Stretch, a_3: &Stretch) -> [bool; SPANS] {
+    let mut straight = [false; SPANS];
+    for ((straight, a_2), a_3) in straight.iter_mut().zip(a_2.chunks_exact(SPAN)).zip(a_3.chunks_exact(SPAN)) {
+        *straight = if a_2[0] == a_2[SPAN - 1] { is_along(a_3, a_2) } else { is_along(a_2, a_3) };
+    }
+    straight
+}
+
+/// Whether one coordinate stays between its ends while the other one does not change.
+#[inline(always)]
+fn is_along(moving: &[f64], fixed: &[f64]) -> bool {
+    let (first, last, same) = (moving[0], moving[SPAN - 1], fixed[0]);
+    let (low, high) = if first < last { (first, last) } else { (last, first) };
+    let mut beyond = [0.0; LANES];
+    for (moving, fixed) in moving.chunks_exact(LANES).zip(fixed.chunks_exact(LANES)) {
+        for i in 0..LANES {
+            let between = (moving[i] >= low) & (moving[i] <= high) & (fixed[i] == same);
+            beyond[i] = if between { beyond[i] } else { 1.0 };
+        }
+    }
+    beyond == [0.0; LANES]
+}
+
+/// The status of all that lies between the shortcuts of lanes `i` and `i + SPANS`.
+#[multiversion(targets(
+    "x86_64+avx+avx2+bmi1+bmi2+avx512f+avx512bw+avx512cd+avx512dq+avx512vl",
+    "x86_64+avx+avx2+bmi1+bmi2"
+))]
+fn verdicts(ends: &Ends, a_2: &Lanes, a_3: &Lanes) -> [Option<Status>; SPANS] {
+    // Where each of the three has its least value, and whether that is positive, or negative at the other end too.
+    let (mut places, mut positive, mut negative) = ([[0.0; LANES]; 3], [[false; LANES]; 3], [[false; LANES]; 3]);
+    let (mut others_2, mut others_3) = ([0.0; LANES], [0.0; LANES]);
+    for i in 0..LANES {
+        (others_2[i], others_3[i]) = (a_2[(i + SPANS) % LANES], a_3[(i + SPANS) % LANES]);
+    }
+    for k in 0..3 {
+        for i in 0..LANES {
+            let (cubic, doubt) = polynomial(ends, a_2[i], a_3[i], k);
+            let (place, least) = cubic.lowest();
+            places[k][i] = place;
+            positive[k][i] = least > doubt;
+        }
+        for i in 0..LANES {
+            let (cubic, doubt) = polynomial(ends, a_2[i], a_3[i], k);
+            let (other, other_doubt) = polynomial(ends, others_2[i], others_3[i], k);
+            let x = places[k][i];
+            negative[k][i] = (cubic.at(x) < -doubt) & (other.at(x) < -other_doubt);
+        }
+    }
+    let mut found = [None; SPANS];
+    for (i, found) in found.iter_mut().enumerate() {
+        let j = i + SPANS;
+        let tame = (a_2[i].abs() + a_3[i].abs() < WILD) & (a_2[j].abs() + a_3[j].abs() < WILD);
+        let [n, theta, surplus] = [0, 1, 2].map(|k| positive[k][i] & positive[k][j]);
+        let [no_n, no_theta, no_surplus] = [0, 1, 2].map(|k| negative[k][i] | negative[k][j]);
+        *found = if !tame {
+            None
+        } else if no_n | no_theta {
+            Some(Status::Infeasible)
+        } else if n & theta & surplus {
+            Some(Status::Ok)
+        } else if n & theta & no_surplus {
+            Some(Status::BelowBound)
+        } else {
+            None
+        };
+    }
+    found
+}
+
+/// `n`, theta or `n - t_f theta` of a shortcut, and the rounding of its values.
+#[inline(always)]
+fn polynomial(ends: &Ends, a_2: f64, a_3: f64, which: usize) -> (Cubic, f64) {
+    let path = Path::new(ends, a_2, a_3);
+    let (cubic, slack) = match which {
+        0 => (*path.n(), 3.0 * path.slack()),
+        1 => (*path.theta(), path.slack()),
+        _ => (path.surplus(ends.t_f), (3.0 + ends.t_f) * path.slack()),
+    };
+    (cubic, cubic.doubt() + slack)
+}
+
+/// The status of eight shortcuts.
+///
+/// It follows from the least values of theta, of `n` and of `n - t_f theta`; the few that rounding leaves in doubt are
+/// decided in double-double.
+#[inline(always)]
+pub(super) fn screen(ends: &Ends, a_2: &Lanes, a_3: &Lanes) -> [Status; LANES] {
+    let Some([n, theta, surplus]) = signs(ends, a_2, a_3) else { return [Status::Infeasible; LANES] };
+    std::array::from_fn(|i| {
+        if n[i] < 0.0 || theta[i] < 0.0 {
+            Status::Infeasible
+        } else if n[i] * theta[i] * surplus[i] == 0.0 {
+            Path::new(ends, a_2[i], a_3[i]).exact_status()
+        } else if surplus[i] > 0.0 {
+            Status::Ok
+        } else {
+            Status::BelowBound
+        }
+    })
+}
+
+/// The signs of the least values of `n`, theta and `n - t_f theta`: -1, +1, or 0 where rounding leaves doubt; `None`
+/// where `n` rules all lanes out.
+#[multiversion(targets(
+    "x86_64+avx+avx2+bmi1+bmi2+avx512f+avx512bw+avx512cd+avx512dq+avx512vl",
+    "x86_64+avx+avx2+bmi1+bmi2"
+))]
+fn signs(ends: &Ends, a_2: &Lanes, a_3: &Lanes) -> Option<[Lanes; 3]> {
+    let mut n = [0.0; LANES];
+    for i in 0..LANES {
+        let path = Path::new(ends, a_2[i], a_3[i]);
+        let sign = sign_of_quadratic(path.n(), 3.0 * path.slack());
+        let tame = a_2[i].abs() + a_3[i].abs() < WILD;
+        n[i] = if tame { sign } else { -1.0 };
+    }
+    if n.iter().all(|&n| n < 0.0) {
+        return None;
+    }
+    let theta = sign(&|i| {
+        let path = Path::new(ends, a_2[i], a_3[i]);
+        (*path.theta(), path.slack())
+    });
+    let surplus = sign(&|i| {
+        let path = Path::new(ends, a_2[i], a_3[i]);
+        (path.surplus(ends.t_f), (3.0 + ends.t_f) * path.slack())
+    });
+    Some([n, theta, surplus])
+}
+
+/// Sign of the least value of `c[0] + c[1] x + c[2] x^2`; `slack` is what rounding costs the coefficients beyond their
+/// own last bits.
+#[inline(always)]
+fn sign_of_quadratic(quadratic: &Cubic, slack: f64) -> f64 {
+    let [c0, c1, c2, _] = quadratic.c;
+    let doubt = 8.0 * f64::EPSILON * (c0.abs() + c1.abs() + c2.abs()) + slack;
+    let x = -0.5 * c1 / c2;
+    let inside = c2 > 0.0 && x > 0.0 && x < 1.0;
+    let bottom = if inside { c0 + 0.5 * x * c1 } else { c0 };
+    let lower = |x: f64, y: f64| if y < x { y } else { x };
+    sign_of(lower(lower(c0, c0 + c1 + c2), bottom), doubt)
+}
+
+/// Signs of the least values of eight cubics, each given with its slack.
+#[inline(always)]
+fn sign(cubic: &impl Fn(usize) -> (Cubic, f64)) -> Lanes {
+    let mut signs = [0.0; LANES];
+    for (i, sign) in signs.iter_mut().enumerate() {
+        let (cubic, slack) = cubic(i);
+        let (least, greatest) = cubic.bounds();
+        let doubt = cubic.doubt() + slack;
+        // Above 0 where all coefficients are, below where an end is.
+        *sign = if least > doubt {
+            1.0
+        } else if greatest < -doubt {
+            -1.0
+        } else {
+            0.0
+        };
+    }
+    if signs.iter().all(|&sign| sign != 0.0) {
+        return signs;
+    }
+    for (i, sign) in signs.iter_mut().enumerate() {
+        let (cubic, slack) = cubic(i);
+        *sign = sign_of(cubic.least(), cubic.doubt() + slack);
+    }
+    signs
+}
+
+#[inline(always)]
+fn sign_of(value: f64, doubt: f64) -> f64 {
+    if value > doubt {
+        1.0
+    } else if value < -doubt {
+        -1.0
+    } else {
+        0.0
+    }
+}
+
+/// Least velocities of feasible shortcuts where an end has them, and a bit for each where that is not certain.
+pub(super) type Ending<const N: usize> = ([f64; N], u32);
+
+/// [`Ending`] of eight shortcuts.
+#[multiversion(targets(
+    "x86_64+avx+avx2+bmi1+bmi2+avx512f+avx512bw+avx512cd+avx512dq+avx512vl",
+    "x86_64+avx+avx2+bmi1+bmi2"
+))]
+pub(super) fn end_velocities(ends: &Ends, a_2: &Lanes, a_3: &Lanes, status: &[Status; LANES]) -> Ending<LANES> {
+    ending(ends, a_2, a_3, status)
+}
+
+/// [`Ending`] of a span with one status.
+#[multiversion(targets(
+    "x86_64+avx+avx2+bmi1+bmi2+avx512f+avx512bw+avx512cd+avx512dq+avx512vl",
+    "x86_64+avx+avx2+bmi1+bmi2"
+))]
+pub(super) fn end_velocities_of_span(
+    ends: &Ends,
+    a_2: &[f64; SPAN],
+    a_3: &[f64; SPAN],
+    status: Status,
+) -> Ending<SPAN> {
+    ending(ends, a_2, a_3, &[status; SPAN])
+}
+
+/// An end with `v = m` has the least velocity if the cubic `n - m t_f theta` has no coefficient below 0.
+#[inline(always)]
+fn ending<const N: usize>(ends: &Ends, a_2: &[f64; N], a_3: &[f64; N], status: &[Status; N]) -> Ending<N> {
+    let (mut v_min, mut open) = ([0.0; N], [0; N]);
+    for i in 0..N {
+        let path = Path::new(ends, a_2[i], a_3[i]);
+        let (v, place) = path.v_ends();
+        let surplus = path.surplus(v * ends.t_f);
+        let [first, second] = surplus.inner();
+        let slack = path.slack();
+        let doubt = surplus.doubt() + (3.0 + v * ends.t_f) * slack;
+        let lost =
+            is_faint(path.n(), 3.0 * slack, place, ends.v_loss) | is_faint(path.theta(), slack, place, ends.v_loss);
+        v_min[i] = on_side(v, status[i]);
+        let is_open = lost | !((first > doubt) & (second > doubt));
+        open[i] = if is_open { 1u32 << i } else { 0 };
+    }
+    (v_min, open.iter().fold(0, |all, bit| all | bit))
+}
+
+/// The status is exact, a least velocity is rounded: they agree on which side of the bound it is.
+#[inline(always)]
+pub(super) fn on_side(v_min: f64, status: Status) -> f64 {
+    if status == Status::Ok { v_min.max(1.0) } else { v_min.min(1.0 - 0.5 * f64::EPSILON) }
+}
+
+/// Shortcuts whose least velocities are searched for together: enough to hide the latency of roots and quotients.
+pub(super) const SEARCH: usize = 4 * LANES;
+
+/// One value of each of them.
+type Search = [f64; SEARCH];
+
+/// Least velocities of feasible shortcuts.
+pub(super) fn inner_velocities(ends: &Ends, a_2: &Search, a_3: &Search) -> Search {
+    let [mut v_min, place, faint] = least_velocities(ends, a_2, a_3);
+    for i in (0..SEARCH).filter(|&i| faint[i] > 0.0) {
+        v_min[i] = Path::new(ends, a_2[i], a_3[i]).exact_velocity(place[i]);
+    }
+    v_min
+}
+
+/// [`least`] of many.
+#[multiversion(targets(
+    "x86_64+avx+avx2+bmi1+bmi2+avx512f+avx512bw+avx512cd+avx512dq+avx512vl",
+    "x86_64+avx+avx2+bmi1+bmi2"
+))]
+fn least_velocities(ends: &Ends, a_2: &Search, a_3: &Search) -> [Search; 3] {
+    least(ends, a_2, a_3)
+}
+
+/// `v = n/(t_f theta) >= m` where the cubic `n - m t_f theta` is not negative. The minimum of that cubic gives the
+/// next, lower `m`: Dinkelbach's method (Management Science 13, 492, 1967), which falls to the least ratio and doubles
+/// its digits with each step. Returns the least velocities, their places, and 1 where rounding shows; infeasible lanes
+/// hold no meaning.
+#[inline(always)]
+fn least<const N: usize>(ends: &Ends, a_2: &[f64; N], a_3: &[f64; N]) -> [[f64; N]; 3] {
+    let (mut v_min, mut place) = ([0.0; N], [0.0; N]);
+    let (mut n, mut theta) = ([0.0; N], [0.0; N]);
+    for i in 0..N {
+        let path = Path::new(ends, a_2[i], a_3[i]);
+        let (theta_end, n_end) = path.about_end();
+        let (theta_start, n_start) = (path.theta().c[0], path.n().c[0]);
+        // Ratios are compared without a division.
+        let first = n_start * theta_end[0] < n_end[0] * theta_start;
+        place[i] = if first { 0.0 } else { 1.0 };
+        (n[i], theta[i]) = (if first { n_start } else { n_end[0] }, if first { theta_start } else { theta_end[0] });
+    }
+    // From a place inside there are fewer steps to go.
+    for x in [0.25, 0.5, 0.75] {
+        for i in 0..N {
+            let path = Path::new(ends, a_2[i], a_3[i]);
+            let (n_there, theta_there) = (path.n().at(x), path.theta().at(x));
+            let lower = (n_there * theta[i] < n[i] * theta_there) & (n_there > 0.0);
+            n[i] = if lower { n_there } else { n[i] };
+            theta[i] = if lower { theta_there } else { theta[i] };
+            place[i] = if lower { x } else { place[i] };
+        }
+    }
+    for i in 0..N {
+        v_min[i] = n[i] / (ends.t_f * theta[i]);
+    }
+    let mut due = [1.0; N];
+    for _ in 0..MOST_STEPS {
+        for i in 0..N {
+            let path = Path::new(ends, a_2[i], a_3[i]);
+            let x = path.surplus(v_min[i] * ends.t_f).minimum();
+            let v = path.n().at(x) / (ends.t_f * path.theta().at(x));
+            let lower = (due[i] > 0.0) & (v < v_min[i]) & (v > 0.0);
+            let last = v >= (1.0 - SMALL_STEP) * v_min[i];
+            v_min[i] = if lower { v } else { v_min[i] };
+            // Where the velocity is lost in rounding it is looked at again.
+            place[i] = if lower | (v <= 0.0) { x } else { place[i] };
+            due[i] = if lower & !last { 1.0 } else { 0.0 };
+        }
+        if due == [0.0; N] {
+            break;
+        }
+    }
+    let mut faint = [0.0; N];
+    for i in 0..N {
+        let path = Path::new(ends, a_2[i], a_3[i]);
+        let slack = path.slack();
+        let lost = is_faint(path.n(), 3.0 * slack, place[i], ends.v_loss)
+            | is_faint(path.theta(), slack, place[i], ends.v_loss);
+        faint[i] = if lost { 1.0 } else { 0.0 };
+    }
+    [v_min, place, faint]
+}
+
+/// After a step as small as this, relative, the next one is within rounding.
+const SMALL_STEP: f64 = 1e-9;
+
+/// Whether rounding may cost the value of a cubic at `x` a share `loss` of it (or it is not a number).
+#[inline(always)]
+fn is_faint(cubic: &Cubic, slack: f64, x: f64, loss: f64) -> bool {
+    let [c0, c1, c2, c3] = cubic.c;
+    let sound = loss * cubic.at(x) > 4.0 * f64::EPSILON * (c0.abs() + c1.abs() + c2.abs() + c3.abs()) + slack;
+    !sound
+}
+
+/// Coordinates of this size are not feasible for any time that is meant: the quadratic `n >= 0` has the mean `t_f -
+/// rise`, so its ends are at most nine times that. Their squares do not overflow below it.
+const WILD: f64 = 1e100;

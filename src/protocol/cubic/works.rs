@@ -1,0 +1,177 @@
+//! The works of many shortcuts, each summed beside others that ask for as many nodes.
+
+use super::Landscape;
+use super::bins::{BINS, Bins, WHOLE, nodes_of};
+use super::cells::OWN;
+use super::path::Path;
+use super::plan::{BLOCK, Block, Plan, plan, plan_deeper, plan_parts};
+use super::queue::{Cuts, Queue};
+use crate::numerics::lanes::LANES;
+use crate::protocol::Effort;
+
+/// Works in the making. A shortcut waits for the plan of its cell, perhaps for one of its own, perhaps for one with
+/// larger powers, and then for its sum.
+pub(super) struct Works<'a> {
+    due: Queue<BLOCK>,
+    planned: Planned<'a>,
+}
+
+/// Shortcuts that the plan of their cell is not enough for, and the last plans.
+struct Planned<'a> {
+    alone: Queue<BLOCK>,
+    deep: Queue<BLOCK>,
+    from_cells: Plan,
+    own: Plan,
+    sums: Sums<'a>,
+}
+
+/// Sums in the making: of shortcuts cut in two, which wait for a plan of their parts, and in the bins.
+struct Sums<'a> {
+    of: &'a Landscape,
+    work: &'a mut [f64],
+    cut: Cuts,
+    bins: &'a mut Bins,
+    effort: Effort,
+}
+
+impl<'a> Works<'a> {
+    /// For shortcuts of a landscape, whose works are to be written to `work`.
+    pub fn new(of: &'a Landscape, work: &'a mut [f64], bins: &'a mut Bins) -> Works<'a> {
+        let sums = Sums { of, work, cut: Cuts::EMPTY, bins, effort: Effort::default() };
+        let (from_cells, own) = (Plan::EMPTY, Plan::EMPTY);
+        let planned = Planned { alone: Queue::EMPTY, deep: Queue::EMPTY, from_cells, own, sums };
+        Works { due: Queue::EMPTY, planned }
+    }
+
+    /// Adds the feasible shortcut at `index`, if its work is wanted.
+    #[inline(always)]
+    pub fn push(&mut self, index: usize, a_2: f64, a_3: f64) {
+        if index < self.planned.sums.work.len() && self.due.push(index, a_2, a_3) {
+            self.plan();
+        }
+    }
+
+    /// Adds the feasible shortcuts from `first` on.
+    pub fn push_span(&mut self, first: usize, a_2: &Block, a_3: &Block) {
+        if self.planned.sums.work.len() < first + BLOCK {
+            for lane in 0..BLOCK {
+                self.push(first + lane, a_2[lane], a_3[lane]);
+            }
+            return;
+        }
+        let indices: [usize; BLOCK] = std::array::from_fn(|lane| first + lane);
+        self.planned.plan(&indices, [a_2, a_3]);
+    }
+
+    /// Sums what is left.
+    pub fn finish(&mut self) -> Effort {
+        self.plan();
+        let Planned { alone, deep, own, sums, .. } = &mut self.planned;
+        sums.plan(alone, deep, own);
+        sums.deepen(deep);
+        sums.part();
+        sums.bins.close(sums.of, sums.work);
+        sums.effort
+    }
+
+    fn plan(&mut self) {
+        if let Some((indices, places)) = self.due.take() {
+            self.planned.plan(indices, places);
+        }
+    }
+}
+
+impl Planned<'_> {
+    /// Plans shortcuts from their cells; those for which these are not enough wait for a plan of their own.
+    fn plan(&mut self, indices: &[usize], [a_2, a_3]: [&Block; 2]) {
+        let Planned { alone, deep, from_cells: plan, own, sums } = self;
+        sums.bins.cells.plan(&sums.of.frame, a_2, a_3, plan);
+        for (k, indices) in indices.chunks(LANES).enumerate() {
+            let first = k * LANES;
+            let bin = plan.bin[first];
+            if bin != OWN && indices.len() == LANES && plan.bin[first..first + LANES] == [bin; LANES] {
+                sums.settle_all(plan, first, indices, [a_2, a_3]);
+                continue;
+            }
+            for (lane, &i) in (first..).zip(indices) {
+                if plan.bin[lane] != OWN {
+                    sums.settle(plan, lane, i, [a_2[lane], a_3[lane]]);
+                } else if alone.push(i, a_2[lane], a_3[lane]) {
+                    sums.plan(alone, deep, own);
+                }
+            }
+        }
+    }
+}
+
+impl Sums<'_> {
+    /// Plans shortcuts by themselves.
+    fn plan(&mut self, alone: &mut Queue<BLOCK>, deep: &mut Queue<BLOCK>, made: &mut Plan) {
+        let Some((indices, [a_2, a_3])) = alone.take() else { return };
+        plan(&self.of.ends, a_2, a_3, &self.of.accuracy, made);
+        for (lane, &i) in indices.iter().enumerate() {
+            if made.deeper[lane] == 0.0 {
+                self.settle(made, lane, i, [a_2[lane], a_3[lane]]);
+            } else if deep.push(i, a_2[lane], a_3[lane]) {
+                self.deepen(deep);
+            }
+        }
+    }
+
+    /// Sums eight shortcuts that share a bin, those from lane `first` on, side by side.
+    #[inline(always)]
+    fn settle_all(&mut self, plan: &Plan, first: usize, indices: &[usize], places: [&Block; 2]) {
+        self.effort.quadratures += LANES as u32;
+        self.effort.nodes += LANES as u32 * nodes_of(plan.bin[first] as usize);
+        self.bins.add_all(self.of, plan, first, places, indices, self.work);
+    }
+
+    /// Plans shortcuts with larger powers.
+    fn deepen(&mut self, deep: &mut Queue<BLOCK>) {
+        let Some((indices, [a_2, a_3])) = deep.take() else { return };
+        let mut plan = Plan::EMPTY;
+        plan_deeper(&self.of.ends, a_2, a_3, &self.of.accuracy, &mut plan);
+        for (lane, &i) in indices.iter().enumerate() {
+            self.settle(&plan, lane, i, [a_2[lane], a_3[lane]]);
+        }
+    }
+
+    /// Puts the shortcut at `index` where its plan says.
+    #[inline(always)]
+    fn settle(&mut self, plan: &Plan, lane: usize, index: usize, place: [f64; 2]) {
+        let bin = plan.bin[lane] as usize;
+        if bin < WHOLE {
+            self.work[index] = 0.0;
+            self.effort.quadratures += 1;
+            self.effort.nodes += nodes_of(bin);
+            self.bins.add(self.of, plan, lane, [place[0], place[1], 0.0, 1.0], index, self.work);
+        } else if self.cut.push(index, place, plan.cut[lane]) {
+            self.part();
+        }
+    }
+
+    /// Plans the parts of shortcuts that are cut in two. Those for which that is not enough are summed alone.
+    fn part(&mut self) {
+        let Sums { of, work, cut, bins, effort } = self;
+        let Some((indices, parts)) = cut.take() else { return };
+        let mut plan = Plan::EMPTY;
+        plan_parts(&of.ends, parts, &of.accuracy_of_parts, &mut plan);
+        let [a_2, a_3, low, high] = parts;
+        for (k, &i) in indices.iter().enumerate() {
+            effort.quadratures += 1;
+            let lanes = [k, k + BLOCK / 2];
+            let path = Path::new(&of.ends, a_2[k], a_3[k]);
+            // Where it is cut a shortcut may be at its fastest.
+            let near = path.is_within(if low[k] == 0.0 { high[k] } else { low[k] }, of.accuracy.longest);
+            if near && lanes.iter().all(|&lane| plan.bin[lane] < BINS as u32) {
+                work[i] = 0.0;
+                for lane in lanes {
+                    effort.nodes += nodes_of(plan.bin[lane] as usize);
+                    bins.add(of, &plan, lane, [a_2[lane], a_3[lane], low[lane], high[lane]], i, work);
+                }
+            } else {
+                work[i] = of.work(&path, effort);
+            }
+        }
+    }
+}

@@ -1,0 +1,178 @@
+//! A table on disk that can be asked.
+
+use std::fs::{self, File};
+use std::path::{Path, PathBuf};
+
+use parquet::arrow::parquet_to_arrow_schema;
+use parquet::file::reader::{FileReader, SerializedFileReader};
+use polars::prelude::{
+    LazyCsvReader, LazyFileListReader, LazyFrame, PlRefPath, PolarsError, PolarsResult, ScanArgsParquet,
+};
+
+use super::{Answer, QueryError};
+use crate::dataset::Folder;
+use crate::dataset::frame::parts as parts_of;
+
+/// A table and where it comes from.
+pub struct Source {
+    /// Its name in questions.
+    pub name: String,
+    /// The names of its columns.
+    pub columns: Vec<String>,
+    /// The units of its columns, empty where none is known.
+    pub units: Vec<String>,
+    /// The files that it consists of.
+    pub files: Vec<PathBuf>,
+    /// How many files the dataset lacks.
+    pub missing: u64,
+    /// All rows, as the dataset counts them; unknown of a single file.
+    pub rows: Option<u64>,
+    /// The table, to be read as far as it is asked for.
+    pub(super) frame: LazyFrame,
+}
+
+/// What can be asked.
+const EXPECTED: &str = "the folder of a dataset, such as results/NAME, or a Parquet or CSV file";
+
+/// The tables in `path`.
+pub fn open(path: &Path) -> Result<Vec<Source>, QueryError> {
+    let wrong = |found: &str, help| QueryError::Path {
+        path: path.display().to_string(),
+        found: found.to_owned(),
+        expected: EXPECTED,
+        help,
+    };
+    if path.is_dir() {
+        let folder = Folder::at(path);
+        let manifest = folder.manifest().map_err(|error| wrong(&error.to_string(), "name another folder"))?;
+        let Some(manifest) = manifest else {
+            let files = parts(path);
+            if files.is_empty() {
+                return Err(wrong(
+                    "holds neither a manifest.json nor Parquet files",
+                    "name a folder that `slipsweep run` wrote",
+                ));
+            }
+            return Source::parquet(path, name_of(path), files, 0, None).map(|source| vec![source]);
+        };
+        let mut sources = Vec::new();
+        for table in &manifest.tables {
+            let (files, missing) = parts_of(&folder, table);
+            if !files.is_empty() {
+                sources.push(Source::parquet(path, table.name.clone(), files, missing, Some(table.rows))?);
+            }
+        }
+        if sources.is_empty() {
+            return Err(wrong("no part of any table is there yet", "let `slipsweep run` compute some first"));
+        }
+        return Ok(sources);
+    }
+    if !path.exists() {
+        return Err(wrong("there is no such file or folder", "check the path"));
+    }
+    let ending = path.extension().map(|ending| ending.to_string_lossy().to_lowercase());
+    match ending.as_deref() {
+        Some("parquet") => Source::parquet(path, name_of(path), vec![path.to_owned()], 0, None),
+        Some("csv") => Source::csv(path),
+        _ => return Err(wrong("neither a folder nor a file that ends in .parquet or .csv", "check the path")),
+    }
+    .map(|source| vec![source])
+}
+
+impl Source {
+    /// A table of Parquet files of the same columns; parts of a dataset know its name better than their folder does.
+    fn parquet(
+        path: &Path,
+        name: String,
+        files: Vec<PathBuf>,
+        missing: u64,
+        rows: Option<u64>,
+    ) -> Result<Source, QueryError> {
+        let failed = |path: &Path, source| QueryError::Read { path: path.display().to_string(), source };
+        let header = match files.first() {
+            Some(first) => Header::read(first).map_err(|source| failed(first, source))?,
+            None => Header::default(),
+        };
+        // What a path looks like (`a=1`, `*`) means nothing here.
+        let options = ScanArgsParquet { glob: false, ..ScanArgsParquet::default() };
+        let frame = scan(&files, options).map_err(|source| failed(path, source))?;
+        let Header { table, columns, units } = header;
+        Ok(Source { name: table.unwrap_or(name), columns, units, files, missing, rows, frame })
+    }
+
+    /// The table in a CSV file, numbers where all of a column are numbers.
+    fn csv(path: &Path) -> Result<Source, QueryError> {
+        let failed = |source| QueryError::Read { path: path.display().to_string(), source };
+        let reader = LazyCsvReader::new(plain(path).map_err(failed)?).with_glob(false).with_infer_schema_length(None);
+        let mut frame = reader.finish().map_err(failed)?;
+        let schema = frame.collect_schema().map_err(failed)?;
+        let columns: Vec<String> = schema.iter_names().map(ToString::to_string).collect();
+        let units = vec![String::new(); columns.len()];
+        Ok(Source { name: name_of(path), columns, units, files: vec![path.to_owned()], missing: 0, rows: None, frame })
+    }
+
+    /// The first `count` rows.
+    pub fn first(&self, count: u32) -> Result<Answer, QueryError> {
+        let path = self.files.first().map_or_else(String::new, |file| file.display().to_string());
+        Answer::new(self.frame.clone().limit(count)).map_err(|source| QueryError::Read { path, source })
+    }
+}
+
+fn scan(files: &[PathBuf], options: ScanArgsParquet) -> PolarsResult<LazyFrame> {
+    let paths = files.iter().map(|file| plain(file)).collect::<PolarsResult<_>>()?;
+    LazyFrame::scan_parquet_files(paths, options)
+}
+
+/// A path as polars takes it, which knows no bytes that are not UTF-8.
+fn plain(path: &Path) -> PolarsResult<PlRefPath> {
+    PlRefPath::try_from_path(path)
+}
+
+/// What a Parquet file says of itself.
+#[derive(Default)]
+struct Header {
+    /// The table that it is a part of.
+    table: Option<String>,
+    columns: Vec<String>,
+    units: Vec<String>,
+}
+
+impl Header {
+    fn read(path: &Path) -> PolarsResult<Header> {
+        let foreign = |error: parquet::errors::ParquetError| PolarsError::ComputeError(error.to_string().into());
+        let reader = SerializedFileReader::new(File::open(path)?).map_err(foreign)?;
+        let metadata = reader.metadata().file_metadata();
+        let entries = metadata.key_value_metadata();
+        let schema = parquet_to_arrow_schema(metadata.schema_descr(), entries).map_err(foreign)?;
+        let fields = || schema.fields().iter();
+        Ok(Header {
+            table: entries
+                .into_iter()
+                .flatten()
+                .find(|entry| entry.key == "slipsweep.table")
+                .and_then(|entry| entry.value.clone()),
+            columns: fields().map(|field| field.name().clone()).collect(),
+            units: fields().map(|field| field.metadata().get("unit").cloned().unwrap_or_default()).collect(),
+        })
+    }
+}
+
+/// The Parquet files in a folder, in the order of their names.
+fn parts(folder: &Path) -> Vec<PathBuf> {
+    let entries = fs::read_dir(folder).into_iter().flatten().flatten().map(|entry| entry.path());
+    let is_part = |path: &PathBuf| {
+        let hidden = path.file_name().is_none_or(|name| name.to_string_lossy().starts_with('.'));
+        !hidden && path.is_file() && path.extension().is_some_and(|ending| ending == "parquet")
+    };
+    let mut files: Vec<PathBuf> = entries.filter(is_part).collect();
+    files.sort();
+    files
+}
+
+/// The name of a file or folder as a word that needs no quotes in SQL.
+fn name_of(path: &Path) -> String {
+    let real = fs::canonicalize(path);
+    let stem = real.as_deref().unwrap_or(path).file_stem().unwrap_or_default().to_string_lossy().into_owned();
+    let word: String = stem.chars().map(|c| if c.is_alphanumeric() { c } else { '_' }).collect();
+    if word.starts_with(|c: char| c.is_ascii_digit()) || word.is_empty() { format!("t{word}") } else { word }
+}

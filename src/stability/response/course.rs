@@ -1,0 +1,157 @@
+//! A response followed to its end as finely as its numbers ask for: at finer and finer steps, until none of them moves.
+
+use super::averaging;
+use super::fate::{Linear, MOST_STEPS, follow_once};
+use super::orbit::{Extremum, QUIET};
+use super::slider::Slider;
+
+/// The end of a response.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Fate {
+    /// Steady sliding.
+    Settled {
+        /// Time after which the velocity stays within [`SETTLED`](super::SETTLED), in `l/v_f`.
+        time: f64,
+    },
+    /// A limit cycle.
+    Cycle {
+        /// Its duration, in `l/v_f`.
+        period: f64,
+        /// `ln(v/v_f)` at its fastest.
+        high: f64,
+        /// `ln(v/v_f)` at its slowest.
+        low: f64,
+    },
+    /// None that could be decided with the work allowed.
+    Undecided,
+    /// The velocity becomes infinite in finite time, which takes a mass of 0 and `k <= b - a`.
+    Ends,
+}
+
+/// A response that was followed to its end.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Course {
+    /// Its end.
+    pub fate: Fate,
+    /// Its fastest moment since `v = v_f` was first met, if there was one.
+    pub high: Option<Extremum>,
+    /// Its slowest.
+    pub low: Option<Extremum>,
+    /// Time up to which it was followed, in `l/v_f`.
+    pub t: f64,
+    /// Steps taken.
+    pub steps: u32,
+    /// What of it is not known.
+    pub doubts: Doubts,
+}
+
+/// Numbers of a course that steps cannot be made fine enough for: a velocity that falls over many decades magnifies every
+/// error, and so does the last of thousands of swings that just leaves the band of settled velocities.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Doubts {
+    /// The least velocity.
+    pub trough: bool,
+    /// The least velocity on the limit cycle.
+    pub cycle_trough: bool,
+    /// The time of the greatest velocity.
+    pub t_peak: bool,
+    /// The time after which it is settled.
+    pub settling_time: bool,
+}
+
+/// Accuracy, in units of what is asked for, with which a response is first followed, and share of it that is taken each
+/// time after that: a change by `rtol` from one time to the next then leaves an error of a tenth of that.
+const COARSE: f64 = 3.0;
+const FINER: f64 = 0.1;
+
+/// Times that a response is followed more finely.
+const MOST_TIMES: u32 = 3;
+
+/// Logarithm of a velocity that is 0 in doubles, whatever its unit.
+pub(super) const VANISHING: f64 = -1000.0;
+
+/// Follows the response that starts from steady sliding at `e^x v_f`, `x` not 0, with numbers good to `rtol`: at finer and
+/// finer steps, until nothing changes by more than that from one time to the next. Where that does not happen it is
+/// `Undecided`, or in doubt in what little else hangs on.
+///
+/// A start closer than 1e-4 to sliding that is unstable is moved out to there or, by whole cycles, to below 1e-3: what
+/// grows from it has the same shape, but comes later, so that the times of its extrema are NaN.
+///
+/// A block whose swings friction hardly changes is not simulated.
+pub fn follow(slider: &Slider, linear: Linear, x: f64, rtol: f64) -> Course {
+    let told = averaging::course(slider, linear, x, rtol);
+    if let Some(course) = told.or_else(|| averaging::course_after_first_swings(slider, linear, x, rtol)) {
+        return course;
+    }
+    if linear.is_neutral(slider) && x.abs() > QUIET {
+        let fate = Fate::Undecided;
+        return Course { fate, high: None, low: None, t: 0.0, steps: 0, doubts: Doubts::default() };
+    }
+    let mut course = follow_once(slider, linear, x, COARSE * rtol);
+    // Finer steps would be more.
+    if course.fate == Fate::Undecided && course.steps == MOST_STEPS {
+        return course;
+    }
+    let mut share = COARSE;
+    let mut known = false;
+    for _ in 0..MOST_TIMES {
+        share *= FINER;
+        let finer = follow_once(slider, linear, x, share * rtol);
+        let doubts = course.compared(&finer, rtol);
+        let steps = course.steps + finer.steps;
+        course = Course { steps, doubts: doubts.unwrap_or_default(), ..finer };
+        // What is left in doubt seldom becomes clear.
+        if doubts.is_some_and(|doubts| known || doubts == Doubts::default()) {
+            return course;
+        }
+        known = doubts.is_some();
+    }
+    if known { course } else { Course { fate: Fate::Undecided, ..course } }
+}
+
+impl Course {
+    /// Fastest moment on the way, if it is one: what is only approached is not.
+    pub fn peak(&self, rtol: f64) -> Option<Extremum> {
+        let last = if let Fate::Cycle { high, .. } = self.fate { high } else { 0.0 };
+        self.high.filter(|high| high.x > last + rtol)
+    }
+
+    /// `ln(v/v_f)` at its slowest and fastest, the end included.
+    pub fn range(&self) -> [f64; 2] {
+        let [low, high] = if let Fate::Cycle { high, low, .. } = self.fate { [low, high] } else { [0.0; 2] };
+        let reached = |extremum: Option<Extremum>| extremum.map_or(0.0, |extremum| extremum.x);
+        [low.min(reached(self.low)), high.max(reached(self.high))]
+    }
+
+    /// Which of its numbers differ by more than `rtol` from those of another; `None` if those do that say what becomes of
+    /// it and how high it swings.
+    fn compared(&self, other: &Course, rtol: f64) -> Option<Doubts> {
+        let near = |x: f64, y: f64| (x - y).abs() <= rtol;
+        let alike = |x: f64, y: f64| near(x / y, 1.0) || x == y;
+        let slow = |x: f64, y: f64| near(x, y) || (x < VANISHING && y < VANISHING);
+        let mut doubts = other.doubts;
+        let ends = match (self.fate, other.fate) {
+            (Fate::Settled { time }, Fate::Settled { time: other }) => {
+                doubts.settling_time |= !alike(time, other);
+                true
+            }
+            (Fate::Cycle { period, high, low }, Fate::Cycle { period: other, high: top, low: bottom }) => {
+                doubts.cycle_trough |= !slow(low, bottom);
+                alike(period, other) && near(high, top)
+            }
+            (Fate::Undecided, Fate::Undecided) | (Fate::Ends, Fate::Ends) => return Some(doubts),
+            _ => false,
+        };
+        let ([low, high], [bottom, top]) = (self.range(), other.range());
+        // That of the cycle may be the least of all.
+        doubts.trough = !slow(low, bottom) || (doubts.cycle_trough && bottom > VANISHING);
+        doubts.t_peak = match (self.peak(rtol), other.peak(rtol)) {
+            // On the way to a cycle all but as high moments are many, and none of them is told.
+            (None, None) => false,
+            // The flatter a peak, the less is known of when it was; NaN is told as such.
+            (Some(peak), Some(other)) => doubts.t_peak || (peak.t / other.t - 1.0).abs() > rtol / other.x.min(1.0),
+            _ => true,
+        };
+        (ends && near(high, top)).then_some(doubts)
+    }
+}

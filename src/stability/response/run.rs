@@ -1,0 +1,309 @@
+//! Integration along a response: by Taylor series where nothing is stiff, by Radau IIA where something is.
+//!
+//! A slip is not stiff: its velocity changes at the rate at which friction damps it. A series of order 16 is then about
+//! as long as an implicit step and costs a fifth of it. In the stick phase friction damps `v` thousands of times faster
+//! than anything changes, which only an implicit method steps over.
+
+use multiversion::multiversion;
+
+use super::series::{TERMS, reach};
+use super::slider::{Rates, Slider, State, X, Y};
+use crate::numerics::elementary::{exp, ln};
+use crate::numerics::stiff::{Accuracy, Cost, Failure, Integrator, Piece, radau_iia_9};
+
+/// Stages of an implicit step: order 9.
+pub const STAGES: usize = 5;
+
+/// One step, with dense output.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[expect(clippy::large_enum_variant, reason = "both kinds are as frequent, and live on the stack")]
+pub enum Leg {
+    /// By Radau IIA: good to order 9 at its end, to order 5 between.
+    Stiff(Piece<3, STAGES>),
+    /// By a Taylor series: good everywhere.
+    Mild(Piece<3, TERMS>),
+}
+
+/// An integration along a response.
+#[derive(Debug, Clone)]
+pub struct Run<'a> {
+    slider: &'a Slider,
+    integrator: Integrator<'a, Slider, 3, STAGES>,
+    accuracy: Accuracy<3>,
+    /// Length of a series in units of the fastest motion from which on steps are implicit.
+    stiff: f64,
+    /// Whether steps are series.
+    mild: bool,
+    series: u32,
+}
+
+/// A series longer than this in units of the fastest motion would let errors grow.
+const STABLE: f64 = 5.0;
+
+/// Lengths of steps in that unit from which on they become implicit, and up to which they become series again: steps of
+/// either kind cost as much there.
+const STIFF: f64 = 15.0;
+const MILD: f64 = 10.0;
+
+/// A slip of a light block on a soft spring lasts at least this share of the rest before it.
+const SLIP: f64 = 1e-120;
+
+/// Share of the tolerance for implicit steps: they are where an error of the contact lifetime becomes one of the time of
+/// the next slip, and where accuracy costs least.
+const IMPLICIT: f64 = 0.03;
+
+impl Slider {
+    /// An integration from `state`, with errors of a step below `tolerance` in `x`, `y` and `z/force`.
+    pub fn run(&self, state: State, h: f64, tolerance: f64) -> Run<'_> {
+        let accuracy = Accuracy { tolerance, scale: [self.force(), 1.0, 1.0] };
+        let implicit = Accuracy { tolerance: IMPLICIT * tolerance, ..accuracy };
+        let mut integrator = Integrator::new(self, radau_iia_9(), implicit, 0.0, state, h);
+        if self.inertia > 0.0 || self.k > self.b - self.a {
+            integrator.may_step(SLIP);
+        }
+        // A series stays this short where nothing happens: rounding errors of the force enter its terms over factorials.
+        let order = TERMS as f64;
+        let rounding = exp((ln(tolerance / f64::EPSILON) + libm::lgamma(order + 1.0)) / order);
+        let stiff = STIFF.min(0.7 * rounding);
+        Run { slider: self, integrator, accuracy, stiff, mild: true, series: 0 }
+    }
+}
+
+impl Run<'_> {
+    /// Time reached.
+    pub fn t(&self) -> f64 {
+        self.integrator.t()
+    }
+
+    /// State there.
+    pub fn y(&self) -> &State {
+        self.integrator.y()
+    }
+
+    /// Goes on from another state, with a first step of about `h`.
+    pub fn jump(&mut self, state: State, h: f64) {
+        self.integrator.jump(state, h);
+    }
+
+    /// Series so far, and what implicit steps have cost.
+    pub fn cost(&self) -> (u32, Cost) {
+        (self.series, self.integrator.cost())
+    }
+
+    #[inline(always)]
+    fn step(&mut self, limit: f64) -> Result<Leg, Failure> {
+        match self.expand(limit) {
+            Some(piece) => Ok(Leg::Mild(piece)),
+            None => self.integrator.step(limit).map(Leg::Stiff),
+        }
+    }
+
+    /// A step by a series; `None` where something is stiff.
+    #[inline(always)]
+    fn expand(&mut self, limit: f64) -> Option<Piece<3, TERMS>> {
+        let (slider, state) = (self.slider, *self.integrator.y());
+        let rates = Rates::of(state[Y], state[X]);
+        let fast = slider.fast(rates.v, rates.ageing);
+        // False for numbers out of range.
+        let short = fast * self.integrator.proposal() < MILD;
+        if !self.mild && !short {
+            return None;
+        }
+        let unit = 1.0 / fast;
+        let powers = slider.series(&state, &rates, unit);
+        let reach = reach(&powers, &self.accuracy.scale, self.accuracy.tolerance);
+        self.mild = reach < self.stiff;
+        if !self.mild {
+            return None;
+        }
+        let reach = reach.min(STABLE);
+        let h = reach * unit;
+        let left = self.integrator.left(limit);
+        let whole = h.min(left);
+        let mut scaled = powers;
+        let mut power = 1.0;
+        let [z, y, x] = &mut scaled;
+        for ((z, y), x) in z.iter_mut().zip(y).zip(x) {
+            power *= whole / unit;
+            [z, y, x].into_iter().for_each(|coefficient| *coefficient *= power);
+        }
+        let piece = Piece::from_powers(self.t(), whole, state, scaled);
+        let advances = piece.end.iter().all(|end| end.is_finite()) && self.integrator.leap(whole, piece.end, h);
+        self.mild = advances;
+        self.series += u32::from(advances);
+        advances.then_some(piece)
+    }
+}
+
+/// One step, which ends at `limit` at the latest.
+#[multiversion(targets(
+    "x86_64+avx+avx2+bmi1+bmi2+avx512f+avx512bw+avx512cd+avx512dq+avx512vl",
+    "x86_64+avx+avx2+bmi1+bmi2"
+))]
+pub fn step_to(run: &mut Run<'_>, limit: f64) -> Result<Leg, Failure> {
+    run.step(limit)
+}
+
+/// The part of a step between two shares of it, as good as a step: an implicit one is taken again. `None` if that fails.
+pub fn between(run: &mut Run<'_>, leg: &Leg, from: f64, to: f64) -> Option<Leg> {
+    match leg {
+        Leg::Stiff(piece) => run.integrator.between(piece, from, to).map(Leg::Stiff),
+        Leg::Mild(piece) => Some(Leg::Mild(piece.between(from, to))),
+    }
+}
+
+impl Leg {
+    /// Time at its start.
+    pub fn t(&self) -> f64 {
+        match self {
+            Leg::Stiff(piece) => piece.t,
+            Leg::Mild(piece) => piece.t,
+        }
+    }
+
+    /// Duration.
+    pub fn h(&self) -> f64 {
+        match self {
+            Leg::Stiff(piece) => piece.h,
+            Leg::Mild(piece) => piece.h,
+        }
+    }
+
+    /// Time at the share `u` of it.
+    pub fn time(&self, u: f64) -> f64 {
+        self.t() + u * self.h()
+    }
+
+    /// State at its start.
+    pub fn start(&self) -> &State {
+        match self {
+            Leg::Stiff(piece) => &piece.start,
+            Leg::Mild(piece) => &piece.start,
+        }
+    }
+
+    /// State at its end.
+    pub fn end(&self) -> &State {
+        match self {
+            Leg::Stiff(piece) => &piece.end,
+            Leg::Mild(piece) => &piece.end,
+        }
+    }
+
+    /// Variable `r` at the share `u` of it.
+    pub fn value(&self, r: usize, u: f64) -> f64 {
+        match self {
+            Leg::Stiff(piece) => piece.value(r, u),
+            Leg::Mild(piece) => piece.value(r, u),
+        }
+    }
+
+    /// Time derivative of variable `r` there.
+    pub fn slope(&self, r: usize, u: f64) -> f64 {
+        match self {
+            Leg::Stiff(piece) => piece.slope(r, u),
+            Leg::Mild(piece) => piece.slope(r, u),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    //! Order, the error got for the error asked, and the work, exactly.
+
+    use super::super::slider::Z;
+    use super::*;
+
+    /// The published material at `v_f = 3.2e6`.
+    const SLIDER: Slider = Slider { a: 0.005, b: 0.01, inertia: 2.56e-3, k: 7.5e-3 };
+
+    /// Near steady sliding, where errors are those of a linear problem.
+    const NEAR: State = [2e-5, 2e-3, 3e-3];
+
+    /// In a slip.
+    const SLIP: State = [-7e-3, 0.3, 0.4];
+
+    #[test]
+    fn order_of_a_series_is_its_number_of_terms() {
+        let piece = |state: &State, h: f64| {
+            let powers = SLIDER.series(state, &Rates::of(state[Y], state[X]), h);
+            Piece::from_powers(0.0, h, *state, powers)
+        };
+        let exact = |h: f64| (0..64).fold(NEAR, |state, _| piece(&state, h / 64.0).end);
+        let error = |h: f64| {
+            let (found, expected) = (piece(&NEAR, h).end, exact(h));
+            (0..3).map(|r| (found[r] - expected[r]).abs()).fold(0.0, f64::max)
+        };
+        // What a single step leaves is of one order more.
+        let order = libm::log2(error(0.7) / error(0.35)) - 1.0;
+        assert!((order - TERMS as f64).abs() < 0.3, "{order}");
+        // The first terms are the equations themselves.
+        let [z, y, x] = SLIP;
+        let (v, ageing) = (exp(x), exp(-y));
+        let powers = SLIDER.series(&SLIP, &Rates::of(y, x), 1.0);
+        let slopes = [SLIDER.k * (1.0 - v), ageing - v, (z - SLIDER.a * x - SLIDER.b * y) / (SLIDER.inertia * v)];
+        for r in [Z, Y, X] {
+            assert!((powers[r][0] / slopes[r] - 1.0).abs() < 1e-15, "{r}");
+        }
+    }
+
+    /// The end of a response, how often it has risen through `v_f`, and the work.
+    fn follow(k: f64, t_end: f64, tolerance: f64) -> (State, usize, u32, Cost) {
+        let slider = Slider { k, ..SLIDER };
+        let start = slider.steady(-32.0_f64.ln());
+        let mut run = slider.run(start, slider.first_step(&start), tolerance);
+        let mut rises = 0;
+        while run.t() < t_end {
+            if let Some(arrested) = slider.arrest(run.y()) {
+                run.jump(arrested, slider.first_step(&arrested));
+            }
+            let leg = step_to(&mut run, t_end).expect("goes on");
+            let places: Vec<f64> = (0..=8).map(|i| leg.value(X, f64::from(i) / 8.0)).collect();
+            rises += places.windows(2).filter(|pair| pair[0] < 0.0 && pair[1] >= 0.0).count();
+        }
+        let (series, cost) = run.cost();
+        (*run.y(), rises, series, cost)
+    }
+
+    /// The published response over 50 periods and deep stick-slip over 50 peaks: the cases of `benches/peers`, with the states
+    /// at the end that its `reference.c` prints, and by how much the second lets errors grow.
+    const CASES: [(f64, f64, State, usize, f64); 2] = [
+        (
+            7.5e-3,
+            50.0 * (1.98357e-6 * 3.2e6),
+            [2.150556631719136e-3, 1.67506764044267e-1, -3.35849426803342e-2],
+            48,
+            10.0,
+        ),
+        (3.78e-3, 940.0, [1.148246712724051e-2, 2.3776288157839837, -2.4866011275185427], 50, 250.0),
+    ];
+
+    #[test]
+    fn reference_error_got_is_the_error_asked_times_what_the_motion_makes_of_it() {
+        for (k, t_end, end, expected, growth) in CASES {
+            for digits in 3..=13 {
+                let tolerance = libm::pow(10.0, -f64::from(digits));
+                let (state, rises, ..) = follow(k, t_end, tolerance);
+                let unit = [Slider { k, ..SLIDER }.force(), 1.0, 1.0];
+                let error = (0..3).map(|r| (state[r] - end[r]).abs() / unit[r]).fold(0.0, f64::max);
+                // Below 1e-12 rounding errors grow like those of steps.
+                assert!(error <= growth * tolerance.max(1e-12), "{k} at {tolerance:.0e}: {error:.1e}");
+                assert_eq!(rises, expected, "{k} at {tolerance:.0e}");
+            }
+        }
+    }
+
+    #[test]
+    fn work_is_known_exactly() {
+        let work = CASES.map(|(k, t_end, ..)| follow(k, t_end, 1e-6));
+        let [(.., paper, paper_implicit), (.., deep, deep_implicit)] = work;
+        assert_eq!(
+            (paper, paper_implicit),
+            (373, Cost { steps: 14, rejected: 0, evaluations: 51, factorisations: 15 })
+        );
+        assert_eq!(
+            (deep, deep_implicit),
+            (1211, Cost { steps: 656, rejected: 51, evaluations: 2369, factorisations: 707 })
+        );
+    }
+}

@@ -1,0 +1,62 @@
+//! A table of a sweep as Arrow record batches, in the order of its rows, without a file.
+
+use arrow_array::RecordBatch;
+use arrow_schema::{ArrowError, SchemaRef};
+
+use super::check::{Request, Sweep};
+use super::plan::Plan;
+use crate::dataset::{Layout, ManifestTable, batch};
+use crate::table::{Optima, Sheet, Signal};
+
+/// The batches of a table, each of which is computed, on all threads, when it is asked for.
+pub struct Batches<'a> {
+    sweep: &'a Sweep,
+    request: &'a Request,
+    table: ManifestTable,
+    layout: Layout,
+    optima: Optima,
+    next: u64,
+}
+
+impl Sweep {
+    /// The rows of one of its tables, by name, as Arrow record batches with the columns, types, units and row order of the
+    /// Parquet files that a run would write; `None` if the sweep does not ask for this table.
+    pub fn batches(&self, table: &str) -> Option<Batches<'_>> {
+        let plan = Plan::new(self);
+        let (request, table) = self.requests.iter().zip(plan.tables).find(|(_, planned)| planned.name == table)?;
+        Some(Batches {
+            sweep: self,
+            request,
+            table,
+            layout: Layout::new(request.table, &request.selection, &self.grid),
+            optima: self.optima(),
+            next: 0,
+        })
+    }
+}
+
+impl Batches<'_> {
+    /// The columns of every batch, units and meanings in the metadata of the fields.
+    pub fn schema(&self) -> SchemaRef {
+        self.layout.schema.clone()
+    }
+}
+
+impl Iterator for Batches<'_> {
+    type Item = Result<RecordBatch, ArrowError>;
+
+    fn next(&mut self) -> Option<Self::Item> {
+        if self.next >= self.table.parts {
+            return None;
+        }
+        let rows = self.table.rows_of(self.next);
+        self.next += 1;
+        let signal = Signal::default();
+        let job = self.sweep.job(self.request, &self.optima, &signal);
+        let mut sheet = Sheet::new(self.request.selection.indices().len());
+        sheet.resize((rows.end - rows.start) as usize);
+        // Nobody else has the signal, so that nothing stops the computation.
+        self.request.table.compute(&job, rows.clone(), &mut sheet).ok()?;
+        Some(batch(&self.layout, job.rows, rows, &sheet))
+    }
+}

@@ -1,0 +1,231 @@
+//! Shards: which parts of a sweep fall to whom when many processes share it.
+//!
+//! The answer follows from the spec and the version alone. Every process works it out for itself, so that none has to ask another.
+
+use std::cmp::Reverse;
+use std::collections::BinaryHeap;
+use std::ops::Range;
+use std::str::FromStr;
+
+use super::check::Sweep;
+use super::plan::Plan;
+
+/// A sweep has more parts than can be shared out: every share would count them all, and list a folder with as many files.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[error(
+    "{parts} parts are too many to be shared out\n  expected: at most {}\n  help: write several specs, each with some of the values of an axis",
+    Shard::MOST_PARTS
+)]
+pub struct TooManyParts {
+    /// All parts of the sweep.
+    pub parts: u64,
+}
+
+/// Share number `index` of `count`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Shard {
+    index: u64,
+    count: u64,
+}
+
+impl Shard {
+    /// Most shards of a sweep.
+    pub const MOST: u64 = 1_000_000;
+
+    /// Most parts of a sweep in shares.
+    pub const MOST_PARTS: u64 = 1 << 23;
+
+    /// The whole sweep.
+    pub const WHOLE: Shard = Shard { index: 0, count: 1 };
+
+    /// Share number `index`, from 0, of `count`; `None` if there is no such share, or more than [`Shard::MOST`].
+    pub fn new(index: u64, count: u64) -> Option<Shard> {
+        (index < count && count <= Self::MOST).then_some(Shard { index, count })
+    }
+
+    /// The number of this share, from 0.
+    pub fn index(self) -> u64 {
+        self.index
+    }
+
+    /// How many shares there are.
+    pub fn count(self) -> u64 {
+        self.count
+    }
+
+    /// The parts of this share, table by table in the order of the plan, each ascending.
+    ///
+    /// # Errors
+    ///
+    /// If there are more parts than can be shared out; the whole sweep may have any number.
+    pub fn parts(self, sweep: &Sweep, plan: &Plan) -> Result<Vec<Vec<Range<u64>>>, TooManyParts> {
+        if self.count == 1 {
+            return Ok(plan.tables.iter().map(|table| std::iter::once(0..table.parts).collect()).collect());
+        }
+        check_parts(plan)?;
+        let mut parts = vec![Vec::new(); plan.tables.len()];
+        deal(&piles(sweep, plan), self.count, |table, part, shard| {
+            if shard == self.index {
+                parts[table].push(part..part + 1);
+            }
+        });
+        Ok(parts)
+    }
+}
+
+impl FromStr for Shard {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Shard, String> {
+        let form = || format!("expected I/N, such as 0/16 for the first of 16 shares, found `{text}`");
+        let (index, count) = text.split_once('/').ok_or_else(form)?;
+        let [index, count]: [u64; 2] = match (index.parse(), count.parse()) {
+            (Ok(index), Ok(count)) => [index, count],
+            _ => return Err(form()),
+        };
+        if count == 0 || count > Self::MOST {
+            return Err(format!("{count} shares; a sweep has between 1 and {} of them", Self::MOST));
+        }
+        Shard::new(index, count)
+            .ok_or_else(|| format!("there is no share {index} of {count}: they are numbered from 0 to {}", count - 1))
+    }
+}
+
+/// Whether the parts of `plan` can be shared out.
+pub fn check_parts(plan: &Plan) -> Result<(), TooManyParts> {
+    let parts = plan.tables.iter().fold(0, |parts: u64, table| parts.saturating_add(table.parts));
+    if parts <= Shard::MOST_PARTS { Ok(()) } else { Err(TooManyParts { parts }) }
+}
+
+/// The shares among `count` to which at least one of the parts belongs for which `wanted(table, part)` holds, ascending.
+///
+/// # Errors
+///
+/// If there are more parts than can be shared out.
+pub fn shares_with(
+    sweep: &Sweep,
+    plan: &Plan,
+    count: u64,
+    mut wanted: impl FnMut(usize, u64) -> bool,
+) -> Result<Vec<u64>, TooManyParts> {
+    check_parts(plan)?;
+    let mut shares = Vec::new();
+    deal(&piles(sweep, plan), count, |table, part, shard| {
+        if wanted(table, part) {
+            shares.push(shard);
+        }
+    });
+    shares.sort_unstable();
+    shares.dedup();
+    Ok(shares)
+}
+
+/// Parts of equal predicted cost: consecutive parts of one table.
+#[derive(Debug, Clone, PartialEq, Eq)]
+struct Pile {
+    table: usize,
+    parts: Range<u64>,
+    /// Nanoseconds a part.
+    cost: u64,
+}
+
+/// The parts of a sweep, the most expensive first. All parts of a table but the last have as many rows, and so the same predicted cost.
+fn piles(sweep: &Sweep, plan: &Plan) -> Vec<Pile> {
+    let mut piles = Vec::new();
+    for (index, (request, table)) in sweep.requests.iter().zip(&plan.tables).enumerate() {
+        let full = table.rows / table.rows_per_part;
+        for parts in [0..full, full..table.parts] {
+            if !parts.is_empty() {
+                let rows = table.rows_of(parts.start);
+                let cost = (rows.end - rows.start).saturating_mul(request.table.cost());
+                piles.push(Pile { table: index, parts, cost });
+            }
+        }
+    }
+    piles.sort_by_key(|pile| Reverse(pile.cost));
+    piles
+}
+
+/// Gives each part to the shard that has least so far: no shard then has more than one part above the mean.
+///
+/// Among shards that have the same, the order changes from part to part: costs that repeat along a table would otherwise meet
+/// in the same shard whenever their period divides the number of shards.
+fn deal(piles: &[Pile], count: u64, mut give: impl FnMut(usize, u64, u64)) {
+    let mut shards: BinaryHeap<Reverse<(u64, u64, u64)>> =
+        (0..count).map(|shard| Reverse((0, mix(shard), shard))).collect();
+    for pile in piles {
+        for part in pile.parts.clone() {
+            let Some(Reverse((load, order, shard))) = shards.pop() else { return };
+            give(pile.table, part, shard);
+            shards.push(Reverse((load.saturating_add(pile.cost), mix(order), shard)));
+        }
+    }
+}
+
+/// A number that looks unlike `x` (the finalizer of SplitMix64 after its increment).
+fn mix(x: u64) -> u64 {
+    let x = x.wrapping_add(0x9e37_79b9_7f4a_7c15);
+    let x = (x ^ (x >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+    let x = (x ^ (x >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+    x ^ (x >> 31)
+}
+
+#[cfg(test)]
+mod tests {
+    //! Every part is dealt once, evenly, and without regard to patterns along a table.
+
+    use super::*;
+
+    fn piles() -> Vec<Pile> {
+        [(0, 0..700, 20), (0, 700..701, 7), (1, 0..13, 90), (2, 0..1, 4), (3, 0..60, 1)]
+            .map(|(table, parts, cost)| Pile { table, parts, cost })
+            .into()
+    }
+
+    #[test]
+    fn every_part_is_dealt_once_and_loads_differ_by_one_part() {
+        let mut piles = piles();
+        piles.sort_by_key(|pile| Reverse(pile.cost));
+        let total: u64 = piles.iter().map(|pile| pile.cost * (pile.parts.end - pile.parts.start)).sum();
+        for count in (1..50).chain([64, 100, 699, 700, 775, 776, 1000]) {
+            let mut loads = vec![0; count as usize];
+            let mut dealt = std::collections::BTreeMap::new();
+            deal(&piles, count, |table, part, shard| {
+                let pile = piles.iter().find(|pile| pile.table == table && pile.parts.contains(&part));
+                loads[shard as usize] += pile.expect("is of a pile").cost;
+                assert_eq!(dealt.insert((table, part), shard), None);
+            });
+            assert_eq!(dealt.len(), 701 + 13 + 1 + 60);
+            assert_eq!(loads.iter().sum::<u64>(), total);
+            let greatest = loads.iter().copied().max().unwrap_or(0);
+            assert!(greatest as f64 <= total as f64 / count as f64 + 90.0, "{count}: {greatest}");
+        }
+    }
+
+    #[test]
+    fn costs_that_repeat_along_a_table_do_not_meet() {
+        let piles = [Pile { table: 0, parts: 0..4096, cost: 10 }];
+        for count in [2_u64, 4, 8, 16] {
+            // In truth every `count`-th part costs 100 times as much.
+            let mut loads = vec![0; count as usize];
+            deal(&piles, count, |_, part, shard| loads[shard as usize] += if part % count == 0 { 100 } else { 1 });
+            let mean = loads.iter().sum::<u64>() as f64 / count as f64;
+            // As even as chance makes it; dealt in turn, one shard would have nearly everything.
+            assert!(loads.iter().all(|load| (*load as f64) < 1.6 * mean), "{count}: {loads:?}");
+        }
+    }
+
+    #[test]
+    fn words_for_wrong_shares() {
+        assert_eq!("3/16".parse(), Ok(Shard { index: 3, count: 16 }));
+        for (text, message) in [
+            ("16/16", "there is no share 16 of 16: they are numbered from 0 to 15"),
+            ("0/0", "0 shares; a sweep has between 1 and 1000000 of them"),
+            ("1", "expected I/N, such as 0/16 for the first of 16 shares, found `1`"),
+            ("-1/4", "expected I/N, such as 0/16 for the first of 16 shares, found `-1/4`"),
+            ("0/9999999", "9999999 shares; a sweep has between 1 and 1000000 of them"),
+        ] {
+            assert_eq!(text.parse::<Shard>(), Err(message.to_owned()));
+        }
+    }
+}

@@ -1,0 +1,15 @@
+//! A row that panics on demand, so that tests can see what a run makes of it. Builds without debug assertions do not have it.
+
+use std::sync::OnceLock;
+
+/// Panics if the environment variable `SLIPSWEEP_PANIC` is the number of one of `rows`.
+pub fn strike(mut rows: impl Iterator<Item = u64>) {
+    if !cfg!(debug_assertions) {
+        return;
+    }
+    static ROW: OnceLock<Option<u64>> = OnceLock::new();
+    let wanted = ROW.get_or_init(|| std::env::var("SLIPSWEEP_PANIC").ok()?.parse().ok());
+    if let Some(wanted) = wanted {
+        assert!(!rows.any(|row| row == *wanted), "SLIPSWEEP_PANIC asks for it");
+    }
+}

@@ -1,0 +1,227 @@
+//! `gap_min`, `gap_quantiles`, `gap_histogram`: all shortcuts of a transition and time in one row, for landscapes that nobody wants to store.
+//!
+//! The landscape is computed piece by piece, as `gap` computes it, and forgotten. What is told of it does not depend on the pieces: counts, a
+//! least value whose ties go to the first row, and quantiles that are values of the landscape themselves.
+
+use std::ops::Range;
+
+use super::gap::{GAP, Gap};
+use super::optima::OPTIMUM_AXES;
+use super::{Column, Job, Kind, Selection, Sheet, Signal, Stopped, Table, Work};
+use crate::grid::Quantity;
+use crate::protocol::Status;
+
+/// What is told of a landscape.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Reduction {
+    Minimum,
+    Quantiles,
+    Histogram,
+}
+
+/// One row a transition and time.
+#[derive(Debug)]
+pub struct Reduced(Reduction);
+
+/// The shortcut of least gap.
+pub const MINIMUM: Reduced = Reduced(Reduction::Minimum);
+/// Quantiles of the gap.
+pub const QUANTILES: Reduced = Reduced(Reduction::Quantiles);
+/// Numbers of shortcuts by decades of the gap.
+pub const HISTOGRAM: Reduced = Reduced(Reduction::Histogram);
+
+/// Rows of a landscape that are held at a time.
+const PIECE: usize = 1 << 16;
+
+/// Most shortcuts of a transition and time of which quantiles are told: their gaps are sorted in memory.
+pub const MOST_SORTED: u64 = 1 << 21;
+
+const COUNT: Column = Column::number("shortcuts", "1", "shortcuts with status ok, the only ones that count");
+
+const MINIMUM_COLUMNS: &[Column] = &[
+    COUNT,
+    Column::new("alpha_2", Kind::Quantity(Quantity::Alpha2), "coefficient of t of the shortcut of least gap"),
+    Column::new("alpha_3", Kind::Quantity(Quantity::Alpha3), "coefficient of t^2 of the shortcut of least gap"),
+    Column::number("work", "mu_0 sigma l", "its work of friction W_s"),
+    Column::number("work_optimal", "mu_0 sigma l", "least work of friction W* of any protocol"),
+    Column::number("gap", "1", "its (W_s - W*)/W*; of several with the same, that of the first row of the landscape"),
+    Column::number("v_min", "v_0", "its least velocity"),
+];
+
+/// The quantiles, in hundredths: the least gap that so many hundredths of the shortcuts do not exceed.
+const HUNDREDTHS: [u64; 7] = [0, 5, 25, 50, 75, 95, 100];
+
+const QUANTILE_COLUMNS: &[Column] = &[
+    COUNT,
+    Column::number("gap_min", "1", "least gap"),
+    Column::number("gap_q05", "1", "least gap that at least 5 % of the shortcuts do not exceed"),
+    Column::number("gap_q25", "1", "the same of 25 %"),
+    Column::number("gap_q50", "1", "the same of 50 %"),
+    Column::number("gap_q75", "1", "the same of 75 %"),
+    Column::number("gap_q95", "1", "the same of 95 %"),
+    Column::number("gap_max", "1", "greatest gap"),
+];
+
+/// Where the classes of the histogram begin, but for the first.
+const EDGES: [f64; 10] = [1e-8, 1e-7, 1e-6, 1e-5, 1e-4, 1e-3, 1e-2, 1e-1, 1.0, 10.0];
+
+const HISTOGRAM_COLUMNS: &[Column] = &[
+    COUNT,
+    Column::number("below_1e_8", "1", "shortcuts with a gap below 1e-8"),
+    Column::number("from_1e_8", "1", "shortcuts with a gap from 1e-8 to below 1e-7"),
+    Column::number("from_1e_7", "1", "shortcuts with a gap from 1e-7 to below 1e-6"),
+    Column::number("from_1e_6", "1", "shortcuts with a gap from 1e-6 to below 1e-5"),
+    Column::number("from_1e_5", "1", "shortcuts with a gap from 1e-5 to below 1e-4"),
+    Column::number("from_1e_4", "1", "shortcuts with a gap from 1e-4 to below 1e-3"),
+    Column::number("from_1e_3", "1", "shortcuts with a gap from 1e-3 to below 0.01"),
+    Column::number("from_1e_2", "1", "shortcuts with a gap from 0.01 to below 0.1"),
+    Column::number("from_1e_1", "1", "shortcuts with a gap from 0.1 to below 1"),
+    Column::number("from_1", "1", "shortcuts with a gap from 1 to below 10"),
+    Column::number("from_10", "1", "shortcuts with a gap of 10 or more"),
+];
+
+impl Table for Reduced {
+    fn name(&self) -> &'static str {
+        match self.0 {
+            Reduction::Minimum => "gap_min",
+            Reduction::Quantiles => "gap_quantiles",
+            Reduction::Histogram => "gap_histogram",
+        }
+    }
+
+    fn doc(&self) -> &'static str {
+        match self.0 {
+            Reduction::Minimum => "the shortcut of least gap among those of a spec (reduce = \"min\" of gap)",
+            Reduction::Quantiles => "quantiles of the gap of the shortcuts of a spec (reduce = \"quantiles\" of gap)",
+            Reduction::Histogram => "how many shortcuts of a spec have which gap (reduce = \"histogram\" of gap)",
+        }
+    }
+
+    fn axes(&self) -> &'static [Quantity] {
+        OPTIMUM_AXES
+    }
+
+    fn columns(&self) -> &'static [Column] {
+        match self.0 {
+            Reduction::Minimum => MINIMUM_COLUMNS,
+            Reduction::Quantiles => QUANTILE_COLUMNS,
+            Reduction::Histogram => HISTOGRAM_COLUMNS,
+        }
+    }
+
+    fn rows_per_part(&self) -> u64 {
+        1 << 8
+    }
+
+    fn cost(&self) -> u64 {
+        // A landscape of 400 x 400 shortcuts.
+        16_000_000
+    }
+
+    fn needs_optimum(&self, _selection: &Selection) -> bool {
+        true
+    }
+
+    fn compute(&self, job: &Job<'_>, rows: Range<u64>, sheet: &mut Sheet) -> Result<Work, Stopped> {
+        let Some(members) = job.members else {
+            // A checked sweep has them.
+            sheet.columns.iter_mut().for_each(|column| column.fill(f64::NAN));
+            sheet.status.fill(Status::NotConverged);
+            return Ok(Work::default());
+        };
+        let each = members.rows() / job.rows.rows().max(1);
+        let (selection, signal) = (Selection::usual(Gap.columns()), Signal::default());
+        let tuples = members.tuples(OPTIMUM_AXES);
+        // Progress is counted in rows of this table, so that of the landscape goes nowhere.
+        let sizes: Vec<f64> = Gap.columns().iter().map(|column| column.size(job.grid)).collect();
+        let landscape = Job {
+            rows: members,
+            tuples,
+            selection: &selection,
+            sizes: &sizes,
+            signal: &signal,
+            members: None,
+            repeats: None,
+            ..*job
+        };
+        let mut all = Work::default();
+        // One after another: the threads share each landscape, and no more than one a part is in memory.
+        for (place, row) in rows.enumerate() {
+            let (status, cells, work) = self.tell(job, &landscape, row * each..(row + 1) * each)?;
+            sheet.status[place] = status;
+            for (column, &index) in sheet.columns.iter_mut().zip(job.selection.indices()) {
+                column[place] = cells[index];
+            }
+            all += work;
+            job.signal.advance(1);
+        }
+        Ok(all)
+    }
+}
+
+impl Reduced {
+    /// Status and cells of the row whose shortcuts are `rows` of the landscape.
+    fn tell(&self, job: &Job<'_>, landscape: &Job<'_>, rows: Range<u64>) -> Result<(Status, Vec<f64>, Work), Stopped> {
+        let mut sheet = Sheet::new(landscape.selection.indices().len());
+        let mut statuses = [0_u64; Status::ALL.len()];
+        let mut work = Work::default();
+        let mut least: Option<(u64, [f64; 4])> = None;
+        let mut gaps = Vec::new();
+        let mut classes = [0_u64; EDGES.len() + 1];
+        for start in rows.clone().step_by(PIECE) {
+            job.signal.check()?;
+            let piece = start..rows.end.min(start + PIECE as u64);
+            sheet.resize((piece.end - piece.start) as usize);
+            work += Gap.compute(landscape, piece.clone(), &mut sheet)?;
+            for (place, status) in sheet.status.iter().enumerate() {
+                statuses[*status as usize] += 1;
+                let gap = sheet.columns[GAP][place];
+                if *status != Status::Ok || gap.is_nan() {
+                    continue;
+                }
+                match self.0 {
+                    Reduction::Minimum => {
+                        if least.is_none_or(|(_, least)| gap < least[GAP]) {
+                            let cells = std::array::from_fn(|column| sheet.columns[column][place]);
+                            least = Some((piece.start + place as u64, cells));
+                        }
+                    }
+                    Reduction::Quantiles => gaps.push(gap),
+                    Reduction::Histogram => classes[EDGES.partition_point(|edge| *edge <= gap)] += 1,
+                }
+            }
+        }
+        let count = statuses[Status::Ok as usize];
+        let mut cells = vec![f64::NAN; self.columns().len()];
+        // The worst that concerns the whole landscape; one that has nothing that is ok says why.
+        let status = [Status::NotConverged, Status::Ok, Status::Nonphysical, Status::BelowBound]
+            .into_iter()
+            .find(|status| statuses[*status as usize] > 0)
+            .unwrap_or(Status::Infeasible);
+        if status == Status::NotConverged {
+            return Ok((status, cells, work));
+        }
+        cells[0] = count as f64;
+        match self.0 {
+            Reduction::Minimum => {
+                if let Some((row, [work, work_optimal, gap, v_min])) = least {
+                    let point = landscape.rows.point(row);
+                    let (alpha_2, alpha_3) = (point[Quantity::Alpha2], point[Quantity::Alpha3]);
+                    cells[1..].copy_from_slice(&[alpha_2, alpha_3, work, work_optimal, gap, v_min]);
+                }
+            }
+            Reduction::Quantiles => {
+                gaps.sort_unstable_by(f64::total_cmp);
+                let count = gaps.len() as u64;
+                for (cell, hundredths) in cells[1..].iter_mut().zip(HUNDREDTHS) {
+                    let rank = (hundredths * count).div_ceil(100).max(1);
+                    *cell = gaps.get(rank as usize - 1).copied().unwrap_or(f64::NAN);
+                }
+            }
+            Reduction::Histogram => {
+                cells[1..].iter_mut().zip(classes).for_each(|(cell, count)| *cell = count as f64);
+            }
+        }
+        Ok((status, cells, work))
+    }
+}

@@ -1,0 +1,205 @@
+//! `gap_min`, `gap_quantiles`, `gap_histogram`: the landscape of the row, computed again and told in another way; some of its shortcuts
+//! are solved by the route that checks `gap`.
+
+use std::path::Path;
+
+use indexmap::IndexMap;
+
+use super::{Context, Verdict, gap, number, units};
+use crate::dataset::{Cell, Row};
+use crate::grid::Quantity;
+use crate::model::Units;
+use crate::protocol::Status;
+use crate::sweep::{AxisSpec, AxisValue, BlockSpec, Spec, Sweep, TableSpec};
+use crate::table::{OPTIMUM_AXES, STATUS, Sheet, Signal};
+
+/// Shortcuts of a landscape that are held at a time.
+const PIECE: usize = 1 << 16;
+
+/// Shortcuts of a landscape that are solved by an independent route.
+const SOLVED: u64 = 3;
+
+/// Whether `table` is one of these.
+pub fn is_reduced(table: &str) -> bool {
+    ["gap_min", "gap_quantiles", "gap_histogram"].contains(&table)
+}
+
+/// The columns of quantiles, and how many hundredths of the shortcuts each does not exceed.
+const QUANTILES: [(&str, u64); 7] = [
+    ("gap_min", 0),
+    ("gap_q05", 5),
+    ("gap_q25", 25),
+    ("gap_q50", 50),
+    ("gap_q75", 75),
+    ("gap_q95", 95),
+    ("gap_max", 100),
+];
+
+/// The columns of the histogram, and where each begins.
+const CLASSES: [(&str, f64); 11] = [
+    ("below_1e_8", f64::NEG_INFINITY),
+    ("from_1e_8", 1e-8),
+    ("from_1e_7", 1e-7),
+    ("from_1e_6", 1e-6),
+    ("from_1e_5", 1e-5),
+    ("from_1e_4", 1e-4),
+    ("from_1e_3", 1e-3),
+    ("from_1e_2", 1e-2),
+    ("from_1e_1", 1e-1),
+    ("from_1", 1.0),
+    ("from_10", 10.0),
+];
+
+/// What is known of a landscape once all of it was seen.
+#[derive(Default)]
+struct Told {
+    status: [u64; Status::ALL.len()],
+    /// Number and cells of the first shortcut of least gap.
+    least: Option<(u64, Vec<f64>)>,
+    /// Shortcuts with a gap below the number in each column of quantiles, and with that very gap.
+    quantiles: [[u64; 2]; QUANTILES.len()],
+    classes: [u64; CLASSES.len()],
+}
+
+/// Checks a row as it was `written`, in `units`.
+pub fn check(written: &Row, units: &Units, spec: &Spec, context: &Context) -> Verdict {
+    let Some(sweep) = landscape(written, spec) else {
+        return Verdict::unchecked("what its shortcuts are is told by a file of points");
+    };
+    let Some(request) = sweep.requests.first() else {
+        return Verdict::unchecked("its spec does not ask for it");
+    };
+    let (optima, signal) = (sweep.optima(), Signal::default());
+    let job = sweep.job(request, &optima, &signal);
+    let mut verdict = Verdict::default();
+    let mut sheet = Sheet::new(request.selection.indices().len());
+    let mut told = Told::default();
+    let cells = |sheet: &Sheet, place: usize| sheet.columns.iter().map(|column| column[place]).collect::<Vec<f64>>();
+    let all = request.rows;
+    // From the middle of equal parts of the landscape.
+    let solved = (0..SOLVED).map(|part| ((2 * part + 1) as f64 / (2 * SOLVED) as f64 * all as f64) as u64);
+    let solved: Vec<u64> = solved.collect();
+    for start in (0..all).step_by(PIECE) {
+        let rows = start..all.min(start + PIECE as u64);
+        sheet.resize((rows.end - rows.start) as usize);
+        // Nobody else has the signal, so that nothing stops the computation.
+        if request.table.compute(&job, rows.clone(), &mut sheet).is_err() {
+            break;
+        }
+        for (row, place) in rows.zip(0..) {
+            told.see(written, row, sheet.status[place], || cells(&sheet, place));
+            if solved.contains(&row) {
+                let shortcut = shortcut(&sweep, row, &cells(&sheet, place), sheet.status[place]);
+                let mut shortcut = [(row, shortcut)];
+                units::scale(&mut shortcut, request.table, units, context.relative);
+                let found = gap::check(&shortcut[0].1, context);
+                verdict.differences.extend(found.differences);
+                found.unchecked.into_iter().for_each(|reason| verdict.miss(reason));
+            }
+        }
+    }
+    let status = [Status::NotConverged, Status::Ok, Status::Nonphysical, Status::BelowBound, Status::Infeasible]
+        .into_iter()
+        .find(|status| told.status[*status as usize] > 0);
+    verdict.compare_word(written, STATUS, status.map_or("", Status::name));
+    if status != Some(Status::NotConverged) {
+        told.compare(written, &sweep, &mut verdict);
+    }
+    verdict
+}
+
+/// The landscape of a row alone: its transition and time, and the coefficients of the sweep.
+fn landscape(written: &Row, spec: &Spec) -> Option<Sweep> {
+    let block = match spec.block.as_slice() {
+        [] => spec.top(),
+        [block] => block.clone(),
+        _ => return None,
+    };
+    let mut axes = IndexMap::new();
+    for axis in OPTIMUM_AXES {
+        let value = AxisValue::Number(number(written, axis.name())?);
+        axes.insert(axis.name().to_owned(), AxisSpec::One(value));
+    }
+    let BlockSpec { axes: all, .. } = block;
+    let coefficients = [Quantity::Alpha2, Quantity::Alpha3].map(Quantity::name);
+    axes.extend(all.into_iter().filter(|(name, _)| coefficients.contains(&name.as_str())));
+    let rtol = spec.tables.get("gap").and_then(|table| table.rtol);
+    let gap = TableSpec { rtol, ..TableSpec::default() };
+    let alone = Spec {
+        axes,
+        tables: [("gap".to_owned(), gap)].into_iter().collect(),
+        points: None,
+        zip: Vec::new(),
+        condition: None,
+        block: Vec::new(),
+        ..spec.clone()
+    };
+    Sweep::check(&alone, "", Path::new("")).ok()
+}
+
+/// Row number `row` of the landscape as `gap` would have it.
+fn shortcut(sweep: &Sweep, row: u64, cells: &[f64], status: Status) -> Row {
+    let request = &sweep.requests[0];
+    let point = request.projection.point(row);
+    let axes = request.table.axes().iter().map(|axis| (axis.name().to_owned(), Cell::Number(point[*axis])));
+    let columns = request.selection.indices().iter().zip(cells).map(|(&column, &value)| {
+        let cell = if value.is_nan() { Cell::Missing } else { Cell::Number(value) };
+        (request.table.columns()[column].name.to_owned(), cell)
+    });
+    axes.chain(columns).chain([(STATUS.to_owned(), Cell::Word(status.name().to_owned()))]).collect()
+}
+
+/// Where `gap` stands among the columns of the table `gap`.
+const GAP: usize = 2;
+
+impl Told {
+    fn see(&mut self, written: &Row, row: u64, status: Status, cells: impl FnOnce() -> Vec<f64>) {
+        self.status[status as usize] += 1;
+        if status != Status::Ok {
+            return;
+        }
+        let cells = cells();
+        let gap = cells[GAP];
+        for ((column, _), [below, same]) in QUANTILES.iter().zip(&mut self.quantiles) {
+            if let Some(quantile) = number(written, column) {
+                *below += u64::from(gap < quantile);
+                *same += u64::from(gap == quantile);
+            }
+        }
+        let class = CLASSES.iter().rposition(|(_, from)| gap >= *from).unwrap_or(0);
+        self.classes[class] += 1;
+        if self.least.as_ref().is_none_or(|(_, least)| gap < least[GAP]) {
+            self.least = Some((row, cells));
+        }
+    }
+
+    /// Compares the columns that were written, of whichever reduction.
+    fn compare(&self, written: &Row, sweep: &Sweep, verdict: &mut Verdict) {
+        let ok = self.status[Status::Ok as usize];
+        verdict.compare(written, "shortcuts", Some(ok as f64), Some(1.0));
+        for ((column, hundredths), [below, same]) in QUANTILES.iter().zip(self.quantiles) {
+            if ok == 0 {
+                verdict.demand_nothing(written, column);
+            } else if number(written, column).is_some() {
+                // One of the gaps, which so many shortcuts do not exceed, and no lesser one.
+                let enough = 100 * (below + same) >= hundredths * ok;
+                let least = below == 0 || 100 * below < hundredths * ok;
+                verdict.push(column, if same > 0 && enough && least { 0.0 } else { f64::INFINITY });
+            } else {
+                verdict.demand(written, column);
+            }
+        }
+        for ((column, _), count) in CLASSES.iter().zip(self.classes) {
+            verdict.compare(written, column, Some(count as f64), Some(1.0));
+        }
+        let request = &sweep.requests[0];
+        let point = self.least.as_ref().map(|(row, _)| request.projection.point(*row));
+        for axis in [Quantity::Alpha2, Quantity::Alpha3] {
+            verdict.compare(written, axis.name(), point.as_ref().map(|point| point[axis]), Some(1.0));
+        }
+        for (place, name) in ["work", "work_optimal", "gap", "v_min"].into_iter().enumerate() {
+            let cell = self.least.as_ref().map(|(_, cells)| cells[place]);
+            verdict.compare(written, name, cell, None);
+        }
+    }
+}

@@ -1,0 +1,259 @@
+//! A block on its spring after a step of the control velocity, followed by the library's explicit integrator.
+//!
+//! With `x = ln(v/v_f)`, `y = ln(theta v_f)`, `p = (k s - tau_ss(v_f))/a`, times in `l/v_f` and `mu = m v_f^2/a`
+//!
+//! ```text
+//! p' = (k/a) (1 - e^x),    y' = e^-y - e^x,    mu e^x x' = p - x - (b/a) y.
+//! ```
+//!
+//! The variable of integration is the way that these go, not time, so that equal steps see every phase of a slip. Where
+//! `x` follows the other two much faster than they change, as it does while the block sticks and always without mass, it is
+//! given by them up to the second order in the ratio of the rates.
+
+use std::cell::Cell;
+
+use super::route::integrate;
+
+/// A block on its spring.
+#[derive(Debug, Clone)]
+pub struct Block {
+    /// `k/a`.
+    pub pull: f64,
+    /// `b/a`.
+    pub ratio: f64,
+    /// `m v_f^2/a`.
+    pub mu: f64,
+    /// Ratio of rates below which `x` follows: its third power is an error.
+    pub fast: f64,
+    /// Slopes evaluated so far.
+    pub work: Cell<u64>,
+}
+
+/// A moment.
+#[derive(Debug, Clone, Copy)]
+pub struct Here {
+    pub p: f64,
+    pub y: f64,
+    pub x: f64,
+    pub t: f64,
+    /// Whether `x` follows.
+    slaved: bool,
+}
+
+/// What is seen on the way.
+#[derive(Debug, Clone, Copy)]
+pub enum Event {
+    /// The velocity turns, at a maximum or a minimum.
+    Turn { here: Here, top: bool },
+    /// It passes through a level.
+    Pass { here: Here, level: f64, up: bool },
+}
+
+/// Way of one leg: no variable changes by more.
+const LEG: f64 = 0.5;
+
+/// Slopes evaluated for one block.
+const MOST_WORK: u64 = 10_000_000;
+
+/// Distance from where it would follow to at which `x` may be taken to follow, and ratio of rates at which it gets there
+/// at once.
+const CLOSE: f64 = 1e-10;
+const AT_ONCE: f64 = 1e-13;
+
+impl Block {
+    /// Steady sliding at `e^x v_f`.
+    pub fn steady(&self, x: f64) -> Here {
+        Here { p: (1.0 - self.ratio) * x, y: -x, x, t: 0.0, slaved: self.mu == 0.0 }
+    }
+
+    /// The section `v = v_f`.
+    pub fn section(&self, p: f64, y: f64) -> Here {
+        Here { p, y, ..self.steady(0.0) }
+    }
+
+    fn slopes(&self, p: f64, y: f64, x: f64) -> [f64; 3] {
+        let slow = [-self.pull * x.exp_m1(), (-y).exp() - x.exp()];
+        [slow[0], slow[1], (p - x - self.ratio * y) / (self.mu * x.exp())]
+    }
+
+    /// Where `x` follows to, and how fast that moves.
+    fn followed(&self, p: f64, y: f64) -> (f64, f64) {
+        let rest = p - self.ratio * y;
+        let mut x = rest;
+        let mut speed = 0.0;
+        // Without mass the first is exact; each next one gains an order.
+        for _ in 0..8 {
+            let (v, ageing) = (x.exp(), (-y).exp());
+            let first = -self.pull * x.exp_m1() - self.ratio * (ageing - v);
+            let second = -self.pull * v * first - self.ratio * (-ageing * (ageing - v) - v * first);
+            speed = first - self.mu * v * (first * first + second);
+            let next = rest - self.mu * v * speed;
+            if (next - x).abs() <= 1e-15 * x.abs() {
+                break;
+            }
+            x = next;
+        }
+        (x, speed)
+    }
+
+    /// Rate at which `x` changes.
+    pub fn speed(&self, here: &Here) -> f64 {
+        if !here.slaved {
+            return self.slopes(here.p, here.y, here.x)[2];
+        }
+        let (x, speed) = self.followed(here.p, here.y);
+        if self.mu == 0.0 {
+            return speed;
+        }
+        // As exact as x itself: its derivative along the way of p and y.
+        let way = [-self.pull * x.exp_m1(), (-here.y).exp() - x.exp()];
+        let step = 1e-3 / (way[0].abs() + way[1].abs());
+        let at = |share: f64| self.followed(here.p + share * step * way[0], here.y + share * step * way[1]).0;
+        (8.0 * (at(1.0) - at(-1.0)) - (at(2.0) - at(-2.0))) / (12.0 * step)
+    }
+
+    /// How long a turn is about as fast as an error of the velocity's slope, in units of the slopes that it is made of.
+    pub fn flatness(&self, turn: &Here) -> Option<f64> {
+        let later = self.advance(turn, 0.1 * LEG)?;
+        let bend = (self.speed(&later) - self.speed(turn)) / (later.t - turn.t);
+        let slopes = [self.pull * turn.x.exp_m1(), self.ratio * ((-turn.y).exp() - turn.x.exp())];
+        Some((slopes[0].abs() + slopes[1].abs()) / bend.abs())
+    }
+
+    /// Rates at which the others change over that at which `x` follows.
+    fn ratio_of_rates(&self, here: &Here) -> f64 {
+        let v = here.x.exp();
+        self.mu * v * ((self.pull + self.ratio) * (1.0 + v) + (1.0 + self.ratio) * (-here.y).exp())
+    }
+
+    /// The fastest swing of small motions, which no leg may overlook.
+    fn swing(&self) -> f64 {
+        1.0 + (self.pull / self.mu).sqrt().min(self.pull)
+    }
+
+    /// The moment a way further; `None` if the integrator gives up, or too much work is done.
+    fn advance(&self, here: &Here, way: f64) -> Option<Here> {
+        if self.work.get() > MOST_WORK {
+            return None;
+        }
+        let swing = self.swing();
+        let pace = |slopes: [f64; 3]| 1.0 / slopes.iter().fold(swing, |sum, slope| sum.hypot(*slope));
+        if here.slaved {
+            let slope = |y: &[f64; 3]| {
+                self.work.set(self.work.get() + 1);
+                let (x, speed) = self.followed(y[0], y[1]);
+                let [p, age] = [-self.pull * x.exp_m1(), (-y[1]).exp() - x.exp()];
+                let pace = pace([p, age, speed]);
+                [p * pace, age * pace, pace]
+            };
+            let [p, y, t] = integrate(slope, [here.p, here.y, 0.0], (0.0, way))?;
+            return Some(Here { p, y, x: self.followed(p, y).0, t: here.t + t, slaved: true });
+        }
+        let slope = |y: &[f64; 4]| {
+            self.work.set(self.work.get() + 1);
+            let slopes = self.slopes(y[0], y[1], y[2]);
+            let pace = pace(slopes);
+            [slopes[0] * pace, slopes[1] * pace, slopes[2] * pace, pace]
+        };
+        let [p, y, x, t] = integrate(slope, [here.p, here.y, here.x, 0.0], (0.0, way))?;
+        Some(Here { p, y, x, t: here.t + t, slaved: false })
+    }
+
+    /// Whether `x` follows from here on.
+    fn settle(&self, here: Here) -> Here {
+        if self.mu == 0.0 {
+            return here;
+        }
+        let fast = self.ratio_of_rates(&here);
+        if here.slaved {
+            return Here { slaved: fast < 2.0 * self.fast, ..here };
+        }
+        let x = self.followed(here.p, here.y).0;
+        let follows = fast < AT_ONCE || (fast < self.fast && (here.x - x).abs() < CLOSE);
+        if follows { Here { x, slaved: true, ..here } } else { here }
+    }
+
+    /// Way of the next leg: as long as it takes `x` to come closer to where it will follow, or some time of its relaxation.
+    fn length(&self, here: &Here) -> f64 {
+        let fast = self.ratio_of_rates(here);
+        if here.slaved || fast >= self.fast {
+            return LEG;
+        }
+        (0.7 * (here.x - self.followed(here.p, here.y).0).abs()).max(3.0 * fast).min(LEG)
+    }
+
+    /// A leg further, with what is seen of these levels, in ascending order, on the way.
+    pub fn leg(&self, here: Here, levels: &[f64]) -> Option<(Here, Vec<Event>)> {
+        let before = here;
+        let here = self.settle(here);
+        let rising = self.speed(&here) > 0.0;
+        // An arrest in no time passes levels too.
+        let fallen = levels.iter().rev().filter(|level| **level < before.x && **level >= here.x);
+        let mut events: Vec<Event> =
+            fallen.map(|&level| Event::Pass { here: Here { x: level, ..here }, level, up: false }).collect();
+        let was_rising = self.speed(&before) > 0.0;
+        if was_rising != rising {
+            events.push(Event::Turn { here, top: was_rising });
+        }
+        let length = self.length(&here);
+        let end = self.advance(&here, length)?;
+        let turns = rising != (self.speed(&end) > 0.0);
+        if turns {
+            let (place, turn) = self.place(&here, (0.0, length), |at| self.speed(at))?;
+            self.passes(&here, (0.0, here.x), (place, turn.x), levels, &mut events)?;
+            events.push(Event::Turn { here: turn, top: rising });
+            self.passes(&here, (place, turn.x), (length, end.x), levels, &mut events)?;
+        } else {
+            self.passes(&here, (0.0, here.x), (length, end.x), levels, &mut events)?;
+        }
+        Some((end, events))
+    }
+
+    /// The levels met between two places of a leg between which the velocity only rises or only falls.
+    fn passes(
+        &self,
+        here: &Here,
+        (from, x_from): (f64, f64),
+        (to, x_to): (f64, f64),
+        levels: &[f64],
+        events: &mut Vec<Event>,
+    ) -> Option<()> {
+        let up = x_to > x_from;
+        let mut met: Vec<f64> =
+            levels.iter().copied().filter(|level| (x_from < *level) != (x_to < *level) && x_from != *level).collect();
+        met.sort_by(|a, b| if up { a.total_cmp(b) } else { b.total_cmp(a) });
+        for level in met {
+            let (_, at) = self.place(here, (from, to), |at| at.x - level)?;
+            events.push(Event::Pass { here: Here { x: level, ..at }, level, up });
+        }
+        Some(())
+    }
+
+    /// Where on a leg something vanishes that differs in sign at both places: Illinois method.
+    fn place(&self, here: &Here, (mut low, mut high): (f64, f64), f: impl Fn(&Here) -> f64) -> Option<(f64, Here)> {
+        let at = |way: f64| if way == 0.0 { Some(*here) } else { self.advance(here, way) };
+        let (mut f_low, mut f_high) = (f(&at(low)?), f(&at(high)?));
+        let mut found = (low, at(low)?);
+        let mut side = 0;
+        for _ in 0..60 {
+            let way = if f_high == f_low { 0.5 * (low + high) } else { low - f_low * (high - low) / (f_high - f_low) };
+            let way = way.clamp(low, high);
+            let last = found.0;
+            found = (way, at(way)?);
+            let value = f(&found.1);
+            if value == 0.0 || (way - last).abs() <= 1e-13 {
+                break;
+            }
+            if (value > 0.0) == (f_high > 0.0) {
+                (high, f_high) = (way, value);
+                f_low *= if side == 1 { 0.5 } else { 1.0 };
+                side = 1;
+            } else {
+                (low, f_low) = (way, value);
+                f_high *= if side == -1 { 0.5 } else { 1.0 };
+                side = -1;
+            }
+        }
+        Some(found)
+    }
+}

@@ -1,0 +1,39 @@
+//! Rows of a dataset brought to the units of the model, in which everything is checked.
+
+use crate::dataset::{Cell, Row};
+use crate::grid::{Quantity, Scale};
+use crate::model::Units;
+use crate::table::{Kind, Table};
+
+/// The rows of `table` in the units of the model; `relative` tells which of `alpha_2`, `alpha_3` are given relative to the duration.
+pub fn scale(rows: &mut [(u64, Row)], table: &dyn Table, units: &Units, relative: [bool; 2]) {
+    let unit = |quantity: Quantity| {
+        let is_relative = match quantity {
+            Quantity::Alpha2 => relative[0],
+            Quantity::Alpha3 => relative[1],
+            _ => false,
+        };
+        quantity.unit(if is_relative { Scale::Duration } else { Scale::Model })
+    };
+    let unit_of = |name: &str| {
+        let axis = Quantity::from_name(name).map(unit);
+        axis.or_else(|| match table.columns().iter().find(|column| column.name == name)?.kind {
+            Kind::Number(unit) => Some(unit),
+            _ => None,
+        })
+    };
+    for (_, row) in rows {
+        // One family alone has a parameter with a dimension.
+        let is_rate =
+            row.iter().any(|(name, cell)| name == "family" && *cell == Cell::Word("bounded_velocity".to_owned()));
+        for (name, cell) in row {
+            let Cell::Number(value) = cell else { continue };
+            if let Some(unit) = unit_of(name) {
+                *value = units.scaled(unit, *value);
+            }
+            if is_rate && name == "alpha" {
+                *value /= units.size("v_0/l") * units.size("v_0/l");
+            }
+        }
+    }
+}

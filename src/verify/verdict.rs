@@ -1,0 +1,122 @@
+//! What a check finds in a row: differences, and what it could not check.
+
+use crate::dataset::{Cell, Row};
+use crate::model::{Law, Transition};
+use crate::table::STATUS;
+
+/// What a check needs to know of the sweep.
+#[derive(Debug, Clone, Copy)]
+pub struct Context {
+    pub bounded: bool,
+    /// Whether `alpha_2`, `alpha_3` are given relative to `t_f`.
+    pub relative: [bool; 2],
+}
+
+/// What a check found in one row.
+#[derive(Debug, Default)]
+pub struct Verdict {
+    pub differences: Vec<Difference>,
+    /// Why something could not be checked.
+    pub unchecked: Vec<&'static str>,
+}
+
+/// One comparison.
+#[derive(Debug)]
+pub struct Difference {
+    pub column: &'static str,
+    /// Relative difference; infinite where only one route has a number.
+    pub size: f64,
+    /// What the independent route has, in words.
+    pub expected: String,
+}
+
+impl Verdict {
+    /// Notes a relative difference that has no counterpart in the row.
+    pub fn push(&mut self, column: &'static str, size: f64) {
+        self.differences.push(Difference { column, size, expected: "0".to_owned() });
+    }
+
+    pub fn unchecked(reason: &'static str) -> Verdict {
+        Verdict { unchecked: vec![reason], ..Verdict::default() }
+    }
+
+    /// Notes why something could not be checked.
+    pub fn miss(&mut self, reason: &'static str) {
+        if !self.unchecked.contains(&reason) {
+            self.unchecked.push(reason);
+        }
+    }
+
+    /// Compares `found`, if the column was written, in units of `scale`.
+    pub fn compare(&mut self, row: &Row, column: &'static str, expected: Option<f64>, scale: Option<f64>) {
+        let Some((_, cell)) = row.iter().rev().find(|(name, _)| name == column) else { return };
+        let difference = match (cell, expected) {
+            (Cell::Missing, None) => 0.0,
+            // Also where both are infinite.
+            (Cell::Number(found), Some(expected)) if *found == expected => 0.0,
+            (Cell::Number(found), Some(expected)) => {
+                let size = scale.unwrap_or(expected.abs());
+                (found - expected).abs() / size
+            }
+            _ => f64::INFINITY,
+        };
+        // A number that cannot be compared is an error, not an agreement.
+        let size = if difference.is_nan() { f64::INFINITY } else { difference };
+        let expected = expected.map_or_else(|| "nothing".to_owned(), |expected| format!("{expected:?}"));
+        self.differences.push(Difference { column, size, expected });
+    }
+
+    /// Compares a number, if there is one.
+    pub fn compare_number(&mut self, row: &Row, column: &'static str, expected: f64, scale: f64) {
+        if number(row, column).is_some() {
+            self.compare(row, column, Some(expected), Some(scale));
+        }
+    }
+
+    pub fn compare_word(&mut self, row: &Row, column: &'static str, expected: &str) {
+        let Some((_, cell)) = row.iter().find(|(name, _)| name == column) else { return };
+        let wrong = !matches!(cell, Cell::Word(found) if found == expected);
+        let size = if wrong { f64::INFINITY } else { 0.0 };
+        self.differences.push(Difference { column, size, expected: expected.to_owned() });
+    }
+
+    /// Notes an error where a column that must have a number was written without.
+    pub fn demand(&mut self, row: &Row, column: &'static str) {
+        if row.iter().any(|(name, cell)| name == column && *cell == Cell::Missing) {
+            self.differences.push(Difference { column, size: f64::INFINITY, expected: "a number".to_owned() });
+        }
+    }
+
+    /// Notes an error where a column that must have nothing was written with something.
+    pub fn demand_nothing(&mut self, row: &Row, column: &'static str) {
+        if row.iter().any(|(name, cell)| name == column && *cell != Cell::Missing) {
+            self.differences.push(Difference { column, size: f64::INFINITY, expected: "nothing".to_owned() });
+        }
+    }
+
+    pub fn status(&mut self, row: &Row, expected: bool) {
+        let wrong = word(row, STATUS).is_none_or(|status| (status == "infeasible") != expected);
+        let size = if wrong { f64::INFINITY } else { 0.0 };
+        let expected = if expected { "infeasible" } else { "not infeasible" }.to_owned();
+        self.differences.push(Difference { column: STATUS, size, expected });
+    }
+}
+
+pub fn number(row: &Row, column: &str) -> Option<f64> {
+    match row.iter().find(|(name, _)| name == column)?.1 {
+        Cell::Number(value) => Some(value),
+        _ => None,
+    }
+}
+
+pub fn word<'a>(row: &'a Row, column: &str) -> Option<&'a str> {
+    match &row.iter().find(|(name, _)| name == column)?.1 {
+        Cell::Word(word) => Some(word),
+        _ => None,
+    }
+}
+
+pub fn transition(row: &Row) -> Option<Transition> {
+    let law = Law { a: number(row, "a")?, b: number(row, "b")? };
+    Some(Transition { law, v_i: number(row, "v_i")?, v_f: number(row, "v_f")? })
+}

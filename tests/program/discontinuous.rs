@@ -1,0 +1,235 @@
+//! Inputs that are legal and unlike what a sweep usually has: zeros with a sign, ends of ranges, axes that descend or repeat
+//! values, neighbouring doubles.
+
+use std::fs;
+use std::path::Path;
+use std::process::Command;
+
+use polars::prelude::DataFrame;
+use slipsweep::dataset::frame;
+use slipsweep::sweep::Sweep;
+use slipsweep::table::Work;
+
+use crate::common::{numbers, read, run, sweep, words};
+
+/// Every table with its axes but those of the material.
+const TABLES: [(&str, &str); 9] = [
+    ("gap", "t_f = [0.02, 0.04]\nalpha_2 = [-0.1, 0.1]\nalpha_3 = [-0.1, 0.1]\n"),
+    ("best", "t_f = [0.02]\n"),
+    ("optimal", "t_f = [0.02, 0.04]\n"),
+    ("crossover", ""),
+    ("swift", "t_f = [0.02]\nfamily = [\"step\", \"cubic\"]\ntau_max = [1.5]\n"),
+    ("stability", "k = [7.5e-3, 1.0]\nm = [1e-12, 1e-6]\n"),
+    ("step", "k = [1.0]\nm = [1e-12, 1e-6]\n"),
+    ("compliant", "t_f = [0.02]\nk = [1.0]\nm = [1e-12]\ndt = [0.0]\n"),
+    ("regularised", "t_f = [0.02]\nk = [7.5e-3]\nm = [1e-12, 1e-6]\ndelta_t = [1e-3]\n"),
+];
+
+/// The axes that all tables have.
+const COMMON: &str = "a = [0.03]\nb = [0.04, 0.02]\nv_i = [2.0, 3.0]\nv_f = [50.0, 100.0]\n";
+
+fn table(folder: &Path, axes: &str, name: &str) -> (DataFrame, Work) {
+    let out = folder.join("out");
+    let _ = fs::remove_dir_all(&out);
+    let outcome = run(&sweep(folder, axes, &format!("[tables.{name}]\n")), &out, 2);
+    (read(&out, name), outcome.work)
+}
+
+/// `axes` with the list of each of its axes changed.
+fn changed(axes: &str, change: impl Fn(&[&str]) -> String) -> String {
+    let lines = axes.lines().map(|line| {
+        let (name, list) = line.split_once(" = [").expect("is a list");
+        let values: Vec<&str> = list.trim_end_matches(']').split(", ").collect();
+        format!("{name} = [{}]\n", change(&values))
+    });
+    lines.collect()
+}
+
+#[test]
+fn descending_axes_have_the_rows_of_ascending_ones() {
+    let folder = tempfile::tempdir().expect("is writable");
+    for (name, own) in TABLES {
+        let axes = format!("{own}{COMMON}");
+        let (up, _) = table(folder.path(), &axes, name);
+        let reversed = |values: &[&str]| values.iter().rev().copied().collect::<Vec<_>>().join(", ");
+        let (down, _) = table(folder.path(), &changed(&axes, reversed), name);
+        assert!(up.height() >= 8, "{name}");
+        assert!(up.equals_missing(&down.reverse()), "{name}");
+    }
+}
+
+#[test]
+fn regress_values_that_repeat_are_solved_once_and_written_as_asked() {
+    let folder = tempfile::tempdir().expect("is writable");
+    let material = "a = 0.03\nb = 0.05\n";
+    let (once, twice) =
+        ("v_i = [2.0, 3.0]\nv_f = [50.0, 100.0]\n", "v_i = [2.0, 3.0, 2.0]\nv_f = [50.0, 50.0, 100.0, 50.0]\n");
+    for (name, own) in TABLES {
+        let (once, work) = table(folder.path(), &format!("{own}{material}{once}"), name);
+        let (all, again) = table(folder.path(), &format!("{own}{material}{twice}"), name);
+        // The points of a landscape are no solves; that it is prepared and its optimum are.
+        let solves = |work: Work| if name == "gap" { Work { quadratures: 0, nodes: 0, ..work } } else { work };
+        assert_eq!(solves(work), solves(again), "{name}");
+        assert_eq!(all.height(), 3 * once.height(), "{name}");
+        for row in 0..all.height() {
+            let (rest, v_i, v_f) = (row / 12, row / 4 % 3, row % 4);
+            let same = 4 * rest + 2 * (v_i % 2) + usize::from(v_f == 2);
+            assert!(all.slice(row as i64, 1).equals_missing(&once.slice(same as i64, 1)), "{name} {row}");
+        }
+    }
+}
+
+/// `-0` is 0, and another way to write what is there already.
+#[test]
+fn regress_minus_zero_is_zero() {
+    let folder = tempfile::tempdir().expect("is writable");
+    for (name, own) in TABLES {
+        let zero = |zero: &str| {
+            let own = changed(own, |values| match values[0] {
+                "-0.1" => format!("{zero}, 0.1"),
+                _ => values.join(", "),
+            });
+            let own = own.replace("m = [1e-12", &format!("m = [{zero}")).replace("dt = [0.0", &format!("dt = [{zero}"));
+            table(folder.path(), &format!("{own}a = 0.03\nb = [{zero}, 0.05]\nv_i = 3.0\nv_f = 100.0\n"), name)
+        };
+        let ((plus, work), (minus, again), (both, once)) = (zero("0.0"), zero("-0.0"), zero("0.0, -0.0"));
+        assert!(plus.equals_missing(&minus), "{name}");
+        assert_eq!(work, again, "{name}");
+        assert!(both.height() > plus.height(), "{name}");
+        let solves = |work: Work| if name == "gap" { Work { quadratures: 0, nodes: 0, ..work } } else { work };
+        assert_eq!(solves(work), solves(once), "{name}");
+        // Written as asked.
+        let signs: Vec<bool> =
+            numbers(&minus, "b").into_iter().map(|b| b.expect("is there").is_sign_negative()).collect();
+        assert!(signs.contains(&true) && signs.contains(&false), "{name}");
+    }
+}
+
+/// Both ends of every range and what lies next to them, each alone and all at once: typed, finite, and no defect.
+#[test]
+fn regress_ends_of_ranges_are_solved() {
+    let folder = tempfile::tempdir().expect("is writable");
+    for (name, own) in TABLES {
+        let mut defects = 0;
+        for (axis, values) in [
+            ("t_f", "[1e-20, 1e-10, 1e10, 1e20]"),
+            ("a", "[1e-6, 1.0000000000000002e-6, 10.0]"),
+            ("b", "[5e-324, 1e-300, 0.03, 0.030000000000000002, 10.0]"),
+            ("v_i", "[1.0000000000000002, 1.0000000001, 99.99999999999999, 100.00000000000001, 1e12]"),
+            ("v_f", "[1.0000000000000002, 2.9999999999999996, 3.0000000000000004, 1e12]"),
+            ("k", "[1e-40, 1e40, inf]"),
+            ("m", "[0.0, 1e-40, 1e-20]"),
+            ("tau_max", "[1e-20, 1e20, inf]"),
+        ] {
+            let axes = format!("{own}a = 0.03\nb = 0.05\nv_i = 3.0\nv_f = 100.0\n");
+            let line = |line: &str| line.split(" = ").next() == Some(axis);
+            if !axes.lines().any(line) {
+                continue;
+            }
+            let lines =
+                axes.lines().map(|text| if line(text) { format!("{axis} = {values}\n") } else { format!("{text}\n") });
+            let (rows, _) = table(folder.path(), &lines.collect::<String>(), name);
+            defects += words(&rows, "status").iter().filter(|status| *status == "not_converged").count();
+            for column in rows.columns().iter().filter(|column| column.dtype().is_float()) {
+                let infinite = ["k", "tau_max", "rigid"].contains(&column.name().as_str());
+                for value in numbers(&rows, column.name()).into_iter().flatten() {
+                    assert!(value.is_finite() || infinite, "{name} {axis} {}: {value}", column.name());
+                }
+            }
+        }
+        assert_eq!(defects, 0, "{name}");
+    }
+}
+
+/// What a stranger may send: neither memory nor words without bound.
+#[test]
+fn regress_what_is_too_large_is_refused() {
+    let folder = tempfile::tempdir().expect("is writable");
+    let path = folder.path().join("spec.toml");
+    let fault = |spec: &str, points: &[u8]| {
+        fs::write(&path, spec).expect("is writable");
+        fs::write(folder.path().join("points.csv"), points).expect("is writable");
+        let message = Sweep::load(&path).err().expect("is refused").to_string();
+        assert!(message.len() < 4000, "{message}");
+        message.lines().next().unwrap_or_default().replace(&path.display().to_string(), "spec.toml")
+    };
+    let spec = format!("name = \"test\"\n# {}\n", "-".repeat(1 << 22));
+    assert_eq!(fault(&spec, b""), "spec.toml: too long");
+    let key = "v".repeat(1 << 20);
+    assert_eq!(
+        fault(&format!("name = \"test\"\n[axes]\n{key} = 1\n"), b""),
+        format!("spec.toml:3: axes.{}...: unknown axis `{}...`", &key[..195], &key[..100])
+    );
+    let points = "name = \"test\"\npoints = \"points.csv\"\n[tables.stability]\n";
+    assert!(fault(points, "v".repeat(1 << 24).as_bytes()).contains("points.csv:1: unknown axis `vvvv"));
+    assert!(
+        fault(points, format!("a\n{}", ",".repeat(1 << 24)).as_bytes())
+            .ends_with("16777217 values under 1 column names")
+    );
+    assert!(fault(points, b"a\x1b[2J\n1").contains("unknown axis `a\\u{1b}[2J`"));
+    assert_eq!(fault(&"a.".repeat(1 << 20), b"").get(..14), Some("spec.toml:1: n"));
+    assert_eq!(fault(&format!("name = {}", "[".repeat(1 << 20)), b"").get(..14), Some("spec.toml:1: n"));
+}
+
+/// Files of points cut anywhere or with any byte changed are points or a fault.
+#[test]
+fn regress_damaged_parquet_is_a_fault() {
+    let folder = tempfile::tempdir().expect("is writable");
+    let bad = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/bad_specs/points_parquet_out_of_range.parquet");
+    let whole = fs::read(bad).expect("is there");
+    let text = "name = \"test\"\npoints = \"points.parquet\"\n[tables.stability]\n";
+    let load = |bytes: &[u8]| {
+        fs::write(folder.path().join("points.parquet"), bytes).expect("is writable");
+        Sweep::parse(text, folder.path()).err().map(|error| error.to_string().len())
+    };
+    assert!(load(&whole).is_some());
+    for place in 0..whole.len() {
+        assert!(load(&whole[..place]).is_some_and(|length| length < 4000), "{place}");
+        for mask in [0x01, 0x80, 0xff] {
+            let mut bytes = whole.clone();
+            bytes[place] ^= mask;
+            assert!(load(&bytes).is_none_or(|length| length < 4000), "{place} {mask}");
+        }
+    }
+}
+
+/// A part with any byte changed, or cut anywhere: what was read, or a fault that names it.
+#[test]
+fn regress_damaged_parts_are_read_or_refused() {
+    let folder = tempfile::tempdir().expect("is writable");
+    let axes = "t_f = [0.02, 0.037]\na = 0.03\nb = 0.05\nv_i = 3.0\nv_f = 100.0\n";
+    let spec = format!("name = \"test\"\n[axes]\n{axes}[tables.optimal]\n");
+    fs::write(folder.path().join("spec.toml"), spec).expect("is writable");
+    let run = |arguments: &[&str]| {
+        let mut program = Command::new(env!("CARGO_BIN_EXE_slipsweep"));
+        program.args(arguments).current_dir(folder.path()).output().expect("runs")
+    };
+    assert!(run(&["run", "spec.toml"]).status.success());
+    let part = folder.path().join("results/test/optimal/part-000000.parquet");
+    let whole = fs::read(&part).expect("is there");
+    let damaged = folder.path().join("damaged.parquet");
+    let mut refused = 0;
+    let mut read = |bytes: &[u8]| {
+        fs::write(&damaged, bytes).expect("is writable");
+        if let Err(error) = frame::read_all(&damaged) {
+            let message = error.to_string();
+            assert!(message.contains("damaged.parquet: ") && message.len() < 4000, "{message}");
+            refused += 1;
+        }
+    };
+    for place in 0..whole.len() {
+        read(&whole[..place]);
+        let mut bytes = whole.clone();
+        bytes[place] ^= 0x81;
+        read(&bytes);
+    }
+    assert!(refused > whole.len());
+
+    fs::write(&part, &whole[..whole.len() / 2]).expect("is writable");
+    for command in ["plot", "summary", "verify"] {
+        let output = run(&[command, "results/test"]);
+        let message = String::from_utf8_lossy(&output.stderr);
+        assert_eq!(output.status.code(), Some(2), "{command}: {message}");
+        assert!(message.contains("part-000000.parquet: cannot be read as Parquet"), "{command}: {message}");
+    }
+}

@@ -1,0 +1,22 @@
+//! Sweeps, datasets and the commands as a user meets them.
+
+mod analysis;
+mod bad_specs;
+mod batches;
+mod commands;
+mod common;
+mod discontinuous;
+mod docs;
+mod engine;
+mod faults;
+mod finite_stiffness;
+mod grid;
+mod init;
+mod plot;
+mod properties;
+mod reduced;
+mod report;
+mod schema;
+mod shards;
+mod trace_command;
+mod verify;

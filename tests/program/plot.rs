@@ -1,0 +1,263 @@
+//! `slipsweep plot` as a user meets it: pictures of every table and of traces, words, exit codes.
+
+use std::fs;
+use std::path::Path;
+use std::process::{Command, Output};
+
+/// Every table of a small dataset.
+const SPEC: &str = r#"
+name = "small"
+[axes]
+t_f = [0.02, 0.037]
+a = 0.03
+b = 0.05
+v_i = 3.0
+v_f = { geomspace = [50.0, 200.0, 5] }
+alpha_2 = { linspace = [-0.3, 0.1, 21], unit = "1/t_f" }
+alpha_3 = { linspace = [-0.3, 0.3, 21], unit = "1/t_f^2" }
+tau_max = [1.1, 2.0]
+k = { geomspace = [0.01, 0.1, 5] }
+m = 1e-9
+dt = [0.0, 0.001]
+delta_t = [1e-4, 1e-3]
+[tables.gap]
+[tables.best]
+[tables.optimal]
+[tables.crossover]
+[tables.swift]
+[tables.stability]
+[tables.step]
+[tables.compliant]
+[tables.regularised]
+"#;
+
+fn command(folder: &Path, arguments: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_slipsweep")).current_dir(folder).args(arguments).output().expect("runs")
+}
+
+/// Standard output of a command that succeeds.
+fn shown(folder: &Path, arguments: &[&str]) -> String {
+    let output = command(folder, arguments);
+    assert_eq!(
+        (output.status.code(), String::from_utf8_lossy(&output.stderr).as_ref()),
+        (Some(0), ""),
+        "{arguments:?}"
+    );
+    String::from_utf8(output.stdout).expect("is text")
+}
+
+/// What a command that is refused says.
+fn complaint(folder: &Path, arguments: &[&str]) -> String {
+    let output = command(folder, arguments);
+    assert_eq!(output.status.code(), Some(1), "{arguments:?}");
+    String::from_utf8(output.stderr).expect("is text")
+}
+
+fn read(folder: &Path, name: &str) -> String {
+    fs::read_to_string(folder.join(name)).expect("is readable")
+}
+
+/// The words of a picture, markup aside.
+fn words(svg: &str) -> String {
+    let mut words = String::new();
+    for text in svg.split("<text").skip(1) {
+        let text = text.split("</text>").next().unwrap_or_default();
+        let mut inside = false;
+        for letter in text.chars() {
+            match letter {
+                '<' => inside = false,
+                '>' => inside = true,
+                _ if inside => words.push(letter),
+                _ => {}
+            }
+        }
+        words.push('\n');
+    }
+    words
+}
+
+fn dataset() -> tempfile::TempDir {
+    let folder = tempfile::tempdir().expect("a folder");
+    fs::write(folder.path().join("small.toml"), SPEC).expect("is writable");
+    let run = command(folder.path(), &["run", "small.toml"]);
+    assert_eq!(run.status.code(), Some(0), "{}", String::from_utf8_lossy(&run.stderr));
+    folder
+}
+
+#[test]
+fn every_table_has_its_picture() {
+    let folder = dataset();
+    let folder = folder.path();
+    let said = shown(folder, &["plot", "results/small"]);
+    let tables = ["gap", "best", "optimal", "crossover", "swift", "stability", "step", "compliant", "regularised"];
+    assert_eq!(said, tables.map(|table| format!("{table}: written to small-{table}.svg\n")).concat());
+    let all: Vec<String> = tables.iter().map(|table| read(folder, &format!("small-{table}.svg"))).collect();
+    for (table, svg) in tables.iter().zip(&all) {
+        assert!(svg.starts_with("<svg") && svg.trim_end().ends_with("</svg>"), "{table}");
+    }
+    let words: Vec<String> = all.iter().map(|svg| words(svg)).collect();
+    assert!(words.iter().all(|words| !words.contains("NaN")));
+    for part in
+        ["Work gap of the cubic shortcuts", "infeasible", "vmin = 1", "best shortcut", "α2 tf", "α3 tf2", "tf = 0.02"]
+    {
+        assert!(words[0].contains(part), "{part} in {}", words[0]);
+    }
+    assert!(words[2].contains("W* (μ0 σ l)"), "{}", words[2]);
+    assert!(words[4].contains("bounded friction, tf = 0.02, τmax = 1.1"), "{}", words[4]);
+    assert!(words[5].contains("kc(vf)") && words[5].contains("k (μ0 σ/l)"), "{}", words[5]);
+    // The same again is the same bytes.
+    shown(folder, &["plot", "results/small", "--table", "gap", "--out", "again.svg"]);
+    assert_eq!(read(folder, "again.svg"), all[0]);
+    refusals(folder);
+    formats(folder);
+}
+
+/// PNG and PDF, and the pixels asked for.
+fn formats(folder: &Path) {
+    shown(folder, &["plot", "results/small", "--table", "optimal", "--width", "89", "--dpi", "100", "--out", "o.png"]);
+    let png = fs::read(folder.join("o.png")).expect("is readable");
+    assert_eq!(&png[..8], b"\x89PNG\r\n\x1a\n");
+    let width = u32::from_be_bytes(png[16..20].try_into().expect("four bytes"));
+    assert_eq!(width, (89.0_f64 / 25.4 * 100.0).ceil() as u32);
+    shown(folder, &["plot", "results/small", "--table", "gap", "--where", "t_f=0.02, v_f=100", "--out", "g.pdf"]);
+    let pdf = fs::read(folder.join("g.pdf")).expect("is readable");
+    assert!(pdf.starts_with(b"%PDF-"));
+    // Text stays text: its font is embedded.
+    assert!(pdf.windows(5).any(|bytes| bytes == b"Arimo"));
+}
+
+/// Messages name what there is.
+fn refusals(folder: &Path) {
+    let gap = ["plot", "results/small", "--table", "gap"];
+    let with = |more: &[&str]| complaint(folder, &[&gap, more].concat());
+    assert_eq!(
+        with(&["--where", "t_f=0.03"]),
+        "error: --where t_f = 0.03: no row of the table `gap` is left\n  found: t_f = 0.02, 0.037\n"
+    );
+    assert_eq!(
+        with(&["--where", "tf=0.02"]),
+        "error: --where: the table `gap` has no column `tf`\n  found: t_f, a, b, v_i, v_f, alpha_2, alpha_3, work, work_optimal, \
+         gap, v_min, status\n"
+    );
+    assert_eq!(
+        with(&["--x", "gap"]),
+        "error: --x: the table `gap` has no axis `gap`\n  found: t_f, a, b, v_i, v_f, alpha_2, alpha_3\n"
+    );
+    assert_eq!(with(&["--out", "gap.jpg"]), "error: --out gap.jpg: the name ends in none of .svg, .png, .pdf\n");
+    assert_eq!(
+        complaint(folder, &["plot", "results/small", "--table", "gop"]),
+        "error: the dataset has no table `gop`\n  found: gap, best, optimal, crossover, swift, stability, step, compliant, \
+         regularised\n  help: name one of them with --table\n"
+    );
+    assert_eq!(
+        complaint(folder, &["plot", "results"]),
+        "error: results: not a dataset\n  expected: a folder with a manifest.json\n  help: name a folder that `slipsweep run` \
+         wrote\n"
+    );
+    let many = complaint(folder, &["plot", "results/small", "--x", "t_f"]);
+    assert!(many.starts_with("error: --x is for one table\n"), "{many}");
+}
+
+#[test]
+fn traces_are_drawn_over_each_other() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let folder = folder.path();
+    let case = ["--t-f", "0.02", "--a", "0.03", "--b", "0.05", "--v-i", "3", "--v-f", "100"];
+    shown(folder, &[&["trace", "optimal", "--out", "optimal.parquet"], &case[..]].concat());
+    shown(folder, &[&["trace", "best", "--out", "best.csv"], &case[..]].concat());
+    assert_eq!(shown(folder, &["plot", "optimal.parquet"]), "written to optimal.svg\n");
+    let alone = words(&read(folder, "optimal.svg"));
+    for part in ["Protocol optimal", "tf = 0.02", "v (v0)", "θ (l/v0)", "τ (μ0 σ)", "t (l/v0)"] {
+        assert!(alone.contains(part), "{part} in {alone}");
+    }
+    assert_eq!(shown(folder, &["plot", "optimal.parquet", "best.csv"]), "written to traces.svg\n");
+    let both = words(&read(folder, "traces.svg"));
+    assert!(both.contains("\noptimal\nbest\n"), "{both}");
+    fs::copy(folder.join("best.csv"), folder.join("my_<best>*\u{1}.csv")).expect("is writable");
+    shown(folder, &["plot", "my_<best>*\u{1}.csv", "--out", "odd.png"]);
+    shown(folder, &["plot", "my_<best>*\u{1}.csv", "--out", "odd.svg"]);
+    assert!(words(&read(folder, "odd.svg")).starts_with("Protocol my &lt;best&gt;"));
+    fs::write(folder.join("bad.csv"), "t,v\n0,1\n1,x\n").expect("is writable");
+    assert_eq!(
+        complaint(folder, &["plot", "bad.csv"]),
+        "error: bad.csv, line 3: found `x`\n  expected: a number or nothing\n  help: a trace is what `slipsweep trace … --out \
+         FILE.csv` writes\n"
+    );
+    fs::write(folder.join("other.csv"), "a,b\n0,1\n").expect("is writable");
+    assert!(
+        complaint(folder, &["plot", "other.csv"]).starts_with("error: other.csv: not a trace: it has no column `t`\n")
+    );
+    assert!(complaint(folder, &["plot", "none.csv"]).starts_with("error: none.csv: cannot be read: "));
+    assert!(
+        complaint(folder, &["plot", "best.csv", "--table", "gap"])
+            .starts_with("error: --table: traces have no tables\n")
+    );
+}
+
+#[test]
+fn many_rows_share_cells_and_the_picture_says_so() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let folder = folder.path();
+    let spec = "name = \"many\"\n[axes]\nt_f = { geomspace = [0.001, 2.0, 9000] }\na = 0.03\nb = 0.05\nv_i = 3.0\nv_f = 100.0\n\
+                [tables.optimal]\ncolumns = [\"hold_time\"]\n";
+    fs::write(folder.join("many.toml"), spec).expect("is writable");
+    shown(folder, &["run", "many.toml"]);
+    shown(folder, &["plot", "results/many"]);
+    let words = words(&read(folder, "many-optimal.svg"));
+    assert!(words.contains("Rows share 3000 places of tf: the least and the greatest of each are drawn."), "{words}");
+    for mark in ["tcheapest", "tcross", "thold"] {
+        assert!(words.contains(mark), "{mark} in {words}");
+    }
+}
+
+/// A dataset of its own, and the words of the picture of a table of it.
+fn picture(name: &str, spec: &str, table: &str) -> (String, String) {
+    let folder = tempfile::tempdir().expect("a folder");
+    let folder = folder.path();
+    fs::write(folder.join("spec.toml"), format!("name = \"{name}\"\n{spec}")).expect("is writable");
+    shown(folder, &["run", "spec.toml", "--quiet"]);
+    shown(folder, &["plot", &format!("results/{name}"), "--table", table, "--out", "picture.svg"]);
+    let svg = read(folder, "picture.svg");
+    (words(&svg), svg)
+}
+
+#[test]
+fn pictures_in_si_units_show_the_same() {
+    let spec = "[model]\nunits = \"si\"\nmu_0 = 0.6\nl = 1e-6\nv_0 = 1e-9\nnormal_load = 10.0\n[axes]\nt_f = [20.0, 49.0]\na = 0.018\n\
+                b = 0.03\nv_i = 3e-9\nv_f = 1e-7\nalpha_2 = { linspace = [-0.3, 0.1, 21], unit = \"1/t_f\" }\n\
+                alpha_3 = { linspace = [-0.3, 0.3, 21], unit = \"1/t_f^2\" }\n[tables.gap]\n[tables.optimal]\n";
+    let (gap, _) = picture("si", spec, "gap");
+    for part in ["vmin = v0", "vf = 10−7 m/s", "tf = 20 s", "least gap of the grid"] {
+        assert!(gap.contains(part), "{part} in {gap}");
+    }
+    let (optimal, _) = picture("si", spec, "optimal");
+    for part in ["W* (10−5 J/m2)", "v(0+) (10−8 m/s)", "tcross"] {
+        assert!(optimal.contains(part), "{part} in {optimal}");
+    }
+    let spec = "[model]\nunits = \"si\"\nmu_0 = 0.6\nl = 1e-6\nv_0 = 1e-9\nnormal_load = 10.0\n[axes]\na = 0.003\nb = 0.006\n\
+                v_i = 1e-6\nv_f = { geomspace = [2e-6, 1e-2, 7] }\nk = { geomspace = [1e3, 1e5, 7] }\nm = 1.0\n[tables.stability]\n";
+    let (stability, svg) = picture("spring", spec, "stability");
+    for part in ["kc(vf)", "k (Pa/m)", "vf (m/s)", "m = 1 kg/m2"] {
+        assert!(stability.contains(part), "{part} in {stability}");
+    }
+    // The metre is upright, the mass is not.
+    assert!(svg.contains("(Pa/m)") && svg.contains("<tspan font-style=\"italic\">m</tspan> = 1 kg"), "{svg}");
+}
+
+#[test]
+fn axes_that_change_together_make_lines_and_sampled_ones_dots() {
+    let (along, svg) = picture(
+        "along",
+        "[axes]\na = 0.03\nb = 0.05\nv_i = { geomspace = [2.0, 200.0, 41] }\nv_f = { expr = \"10 * v_i\" }\nt_f = 0.02\n\
+         [tables.optimal]\n",
+        "optimal",
+    );
+    assert!(along.contains("Along with vf, vi changes.") && !svg.contains("<image"), "{along}");
+    let (sampled, svg) = picture(
+        "sampled",
+        "[axes]\na = 0.03\nb = 0.05\nv_i = 3.0\nv_f = { sobol = [10.0, 1000.0, 64], seed = 1 }\n\
+         t_f = { sobol = [0.01, 0.1, 64], seed = 1 }\n[tables.optimal]\n",
+        "optimal",
+    );
+    assert!(svg.matches("<circle").count() == 64 && !sampled.contains("Rows share"), "{sampled}");
+}

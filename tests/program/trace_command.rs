@@ -1,0 +1,314 @@
+//! `slipsweep trace` as a user meets it: words, files, pipes, exit codes.
+
+use std::fs::{self, File};
+use std::path::Path;
+use std::process::{Command, Output, Stdio};
+
+use arrow_array::cast::AsArray;
+use arrow_array::types::Float64Type;
+use parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
+use slipsweep::protocol::swift;
+use slipsweep::trace::COLUMNS;
+
+const UP: &[&str] = &["--t-f", "0.02", "--a", "0.03", "--b", "0.05", "--v-i", "3", "--v-f", "100"];
+const DOWN: &[&str] = &["--t-f", "0.39", "--a", "0.03", "--b", "0.05", "--v-i", "100", "--v-f", "3"];
+
+fn command(folder: &Path, arguments: &[&[&str]]) -> Command {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_slipsweep"));
+    command.current_dir(folder).arg("trace").args(arguments.concat());
+    command
+}
+
+fn trace(folder: &Path, arguments: &[&[&str]]) -> Output {
+    command(folder, arguments).output().expect("runs")
+}
+
+/// Standard output of a trace that succeeds without a word of complaint.
+fn shown(arguments: &[&[&str]]) -> String {
+    let output = trace(Path::new("."), arguments);
+    assert_eq!((output.status.code(), String::from_utf8_lossy(&output.stderr).as_ref()), (Some(0), ""));
+    String::from_utf8(output.stdout).expect("is text")
+}
+
+/// First line of the complaint of a trace that fails, with its exit code.
+fn complaint(arguments: &[&[&str]]) -> (Option<i32>, String) {
+    let output = trace(Path::new("."), arguments);
+    assert!(output.stdout.is_empty());
+    let text = String::from_utf8_lossy(&output.stderr).into_owned();
+    (output.status.code(), text.lines().next().unwrap_or_default().to_owned())
+}
+
+#[test]
+fn a_table_tells_a_physicist_what_he_sees() {
+    let text = shown(&[&["optimal"], UP]);
+    let head = "optimal: least work of friction of all protocols; v may jump at both ends\n  \
+                at t_f = 0.02, a = 0.03, b = 0.05, v_i = 3, v_f = 100\n  \
+                hamiltonian = 2.59678653: dW*/dt_f\n  \
+                hold_time = 0: time spent on the bound v = 1\n  \
+                work = 3.80811142, v_min = 19.9230141, v_max = 3392.16787\n  \
+                status ok\n  \
+                117 rows; straight lines between them are good to 0.0001 of the range of a column, and to 0.01 of v and theta\n\n  \
+                t               v           theta         tau          beta\n  \
+                0               3           0.333333333   0.978027754  -\n  \
+                0               19.9230141  0.333333333   1.03482565   -3.19447696\n";
+    assert!(text.starts_with(head), "{text}");
+    assert!(text.ends_with("\n  0.02            100         0.01          0.907896596  -\n"), "{text}");
+    let below = shown(&[&["cubic"], &["--t-f", "0.5"], &DOWN[2..]]);
+    assert!(
+        below.contains("  status below_bound: v < 1 somewhere, outside the range of the friction law\n"),
+        "{below}"
+    );
+}
+
+#[test]
+fn times_that_nine_digits_do_not_tell_apart_are_shown_in_full() {
+    let late = ["--t-f", "1000", "--a", "1e-3", "--b", "2e-3", "--v-i", "3", "--v-f", "1e6"];
+    let text = shown(&[&["optimal"], &late]);
+    let rows = text.lines().skip_while(|line| !line.starts_with("  t ")).skip(1);
+    let times: Vec<&str> = rows.filter_map(|row| row.split_whitespace().next()).collect();
+    let inside = &times[1..times.len() - 1];
+    assert!(inside.len() > 100 && inside.windows(2).all(|pair| pair[0] != pair[1]), "{text}");
+}
+
+#[test]
+fn csv_reads_back_the_same_numbers_and_parquet_too() {
+    let folder = tempfile::tempdir().expect("is writable");
+    for name in ["optimal", "best", "bounded_velocity", "compliant"] {
+        let csv = shown(&[&[name], UP, &["--format", "csv", "--out", "-"]]);
+        let output = trace(folder.path(), &[&[name], UP, &["--out", "trace.parquet"]]);
+        assert_eq!(output.status.code(), Some(0));
+        assert!(String::from_utf8_lossy(&output.stdout).ends_with("\nwritten to trace.parquet\n"));
+        let extra = match name {
+            "optimal" => "beta",
+            "compliant" => "v_c",
+            _ => "",
+        };
+        let columns: Vec<_> =
+            COLUMNS.iter().filter(|column| column.name == extra || !["v_c", "beta"].contains(&column.name)).collect();
+        let mut lines = csv.lines();
+        let names: Vec<&str> = columns.iter().map(|column| column.name).collect();
+        assert_eq!(lines.next(), Some(names.join(",").as_str()));
+        let rows: Vec<Vec<Option<f64>>> =
+            lines.map(|line| line.split(',').map(|cell| cell.parse().ok()).collect()).collect();
+
+        let file = File::open(folder.path().join("trace.parquet")).expect("is there");
+        let builder = ParquetRecordBatchReaderBuilder::try_new(file).expect("is Parquet");
+        let schema = builder.schema().clone();
+        for (field, column) in schema.fields().iter().zip(columns) {
+            assert_eq!(field.name(), column.name);
+            assert_eq!(field.metadata()["description"], column.doc);
+            assert!(!field.metadata()["unit"].is_empty());
+            assert_eq!(field.is_nullable(), column.name == "beta");
+        }
+        let entries = builder.metadata().file_metadata().key_value_metadata().cloned().unwrap_or_default();
+        let entry = |key: &str| {
+            let found = entries.iter().find(|entry| entry.key == format!("slipsweep.{key}"));
+            found.and_then(|entry| entry.value.clone()).unwrap_or_default()
+        };
+        assert_eq!(["protocol", "t_f", "v_f", "rtol"].map(entry), [name, "0.02", "100.0", "1e-10"]);
+        assert_eq!((entry("version"), entry("status")), (env!("CARGO_PKG_VERSION").to_owned(), "ok".to_owned()));
+        let batches: Vec<_> = builder.build().expect("is readable").collect::<Result<_, _>>().expect("is readable");
+        assert_eq!(batches.len(), 1);
+        for (place, values) in batches[0].columns().iter().enumerate() {
+            let found: Vec<Option<f64>> = values.as_primitive::<Float64Type>().iter().collect();
+            assert_eq!(found, rows.iter().map(|row| row[place]).collect::<Vec<_>>(), "{name} {place}");
+        }
+        // Parquet to a pipe is the same file.
+        let piped = trace(folder.path(), &[&[name], UP, &["--format", "parquet"]]);
+        assert_eq!(piped.stdout, fs::read(folder.path().join("trace.parquet")).expect("is there"));
+    }
+    assert_eq!(fs::read_dir(folder.path()).expect("is readable").count(), 1);
+}
+
+#[test]
+fn points_are_equally_spaced() {
+    let csv = shown(&[&["step"], UP, &["--format", "csv", "--points", "3"]]);
+    let times: Vec<&str> = csv.lines().skip(1).filter_map(|line| line.split(',').next()).collect();
+    assert_eq!(times, ["0.0", "0.0", "0.01", "0.02"]);
+}
+
+#[test]
+fn coefficients_are_scaled_with_the_duration() {
+    let free = shown(&[&["free_cubic"], UP, &["--alpha-2", "-0.12", "--alpha-3", "-0.068", "--format", "csv"]]);
+    let start: Vec<f64> =
+        free.lines().nth(2).expect("has rows").split(',').map(|cell| cell.parse().expect("is a number")).collect();
+    // v = (1 - theta')/theta with theta' = -0.12/t_f.
+    assert!((start[1] - 3.0 * (1.0 + 0.12 / 0.02)).abs() < 1e-12, "{start:?}");
+}
+
+#[test]
+fn what_does_not_exist_says_which_bound() {
+    let t_min = "0.3954147722546";
+    for name in ["optimal", "best", "bounded_velocity", "compliant"] {
+        let (code, text) = complaint(&[&[name], DOWN]);
+        assert!(code == Some(1) && text.starts_with(&format!("error: no `{name}` protocol: ")), "{text}");
+        assert!(text.contains(&format!("the least is t_min = {t_min}")), "{text}");
+    }
+    let low = complaint(&[&["bounded_friction", "--tau-max", "0.9"], UP]);
+    let expected = "error: no `bounded_friction` protocol: tau_max must be above the friction of both ends, 0.978";
+    assert!(low.0 == Some(1) && low.1.starts_with(expected), "{low:?}");
+    let steep = complaint(&[&["free_cubic", "--alpha-2", "3", "--alpha-3", "0"], UP]);
+    let expected = "error: no `free_cubic` protocol: v or theta would not stay positive";
+    assert_eq!(steep, (Some(1), expected.to_owned()));
+}
+
+#[test]
+fn wrong_arguments_get_one_clear_message() {
+    let cases: [(&[&[&str]], &str); 9] = [
+        (&[&["optimal", "--tau-max", "2"], UP], "error: `optimal` takes no --tau-max"),
+        (&[&["cubic", "--unbounded"], UP], "error: `cubic` takes no --unbounded"),
+        (&[&["free_cubic", "--alpha-2", "0"], UP], "error: `free_cubic` needs --alpha-3"),
+        (
+            &[&["optimal", "--t-f", "-1"], &UP[2..]],
+            "error: invalid value '-1' for '--t-f <T>': expected 1e-20 <= t_f <= 1e20",
+        ),
+        (
+            &[&["optimal", "--t-f", "soon"], &UP[2..]],
+            "error: invalid value 'soon' for '--t-f <T>': not a number; expected 1e-20 <= t_f <= 1e20",
+        ),
+        (
+            &[&["optimal", "--rtol", "1"], UP],
+            "error: invalid value '1' for '--rtol <R>': expected 1e-13 <= rtol <= 1e-2",
+        ),
+        (&[&["optimal", "--points", "1"], UP], "error: invalid value '1' for '--points <N>': 1 is not in 2..=10000000"),
+        (&[&["optimum"], UP], "error: invalid value 'optimum' for '<PROTOCOL>'"),
+        (&[&["optimal", "--out", "x.dat"], UP], "error: x.dat ends in none of .csv, .parquet, .txt: add --format"),
+    ];
+    for (arguments, expected) in cases {
+        assert_eq!(complaint(arguments), (Some(1), expected.to_owned()));
+    }
+}
+
+#[test]
+fn help_lists_every_protocol_with_its_meaning() {
+    let text = shown(&[&["--help"]]);
+    for (name, doc) in slipsweep::trace::names() {
+        assert!(text.lines().any(|line| line.contains(&format!("- {name}:")) && line.ends_with(doc)), "{name}\n{text}");
+    }
+    assert!(swift::FAMILIES.iter().all(|family| text.contains(family.name())));
+}
+
+#[test]
+fn a_reader_that_has_had_enough_is_no_failure() {
+    for format in ["table", "csv", "parquet"] {
+        let mut child = command(Path::new("."), &[&["optimal"], UP, &["--points", "100000", "--format", format]])
+            .stdout(Stdio::piped())
+            .stderr(Stdio::piped())
+            .spawn()
+            .expect("runs");
+        drop(child.stdout.take());
+        let output = child.wait_with_output().expect("ends");
+        assert_eq!((output.status.code(), output.stderr.len()), (Some(0), 0), "{format}");
+    }
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn a_full_disk_is_a_failure_and_devices_stay_what_they_are() {
+    use std::os::unix::fs::FileTypeExt;
+
+    let full = "error: cannot write /dev/full: No space left on device (os error 28)";
+    for format in ["table", "csv", "parquet"] {
+        let to_file = complaint(&[&["optimal"], UP, &["--format", format, "--out", "/dev/full"]]);
+        assert_eq!(to_file, (Some(2), full.to_owned()));
+        let device = File::options().write(true).open("/dev/full").expect("is there");
+        let piped = command(Path::new("."), &[&["optimal"], UP, &["--format", format]])
+            .stdout(device)
+            .stderr(Stdio::piped())
+            .output()
+            .expect("runs");
+        let expected = "error: cannot write to standard output: No space left on device (os error 28)\n";
+        assert_eq!((piped.status.code(), String::from_utf8_lossy(&piped.stderr).as_ref()), (Some(2), expected));
+    }
+    assert!(fs::metadata("/dev/full").expect("is there").file_type().is_char_device());
+}
+
+#[test]
+fn a_file_is_replaced_whole_or_left_as_it_was() {
+    let folder = tempfile::tempdir().expect("is writable");
+    let path = folder.path().join("trace.csv");
+    fs::write(&path, "before").expect("is writable");
+    let absent = trace(folder.path(), &[&["optimal"], DOWN, &["--out", "trace.csv"]]);
+    assert_eq!(absent.status.code(), Some(1));
+    assert_eq!(fs::read_to_string(&path).expect("is there"), "before");
+    let done = trace(folder.path(), &[&["optimal"], UP, &["--out", "trace.csv"]]);
+    assert_eq!(done.status.code(), Some(0));
+    assert_eq!(fs::read_to_string(&path).expect("is there"), shown(&[&["optimal"], UP, &["--format", "csv"]]));
+    let nowhere = complaint(&[&["optimal"], UP, &["--out", "no/such/folder/trace.csv"]]);
+    let expected = "error: cannot write no/such/folder/trace.csv: No such file or directory (os error 2)";
+    assert_eq!(nowhere, (Some(2), expected.to_owned()));
+}
+
+/// A table of the paper's shortcut on a spring: v within [1e5, 4.31e6], the control negative in between.
+#[test]
+fn paper_control_of_the_smooth_shortcut_turns_negative() {
+    let spring = ["compliant", "--t-f", "3.1e-6", "--a", "0.005", "--b", "0.01", "--v-i", "1e5", "--v-f", "3.2e6"];
+    let csv = shown(&[&spring, &["--k", "7.5e-3", "--m", "2.5e-16", "--format", "csv"]]);
+    let column = |place: usize| -> Vec<f64> {
+        csv.lines()
+            .skip(1)
+            .map(|line| line.split(',').nth(place).and_then(|cell| cell.parse().ok()).expect("is a number"))
+            .collect()
+    };
+    let range =
+        |values: Vec<f64>| values.into_iter().fold((f64::MAX, f64::MIN), |(low, high), v| (low.min(v), high.max(v)));
+    let ((v_min, v_max), (control_min, _)) = (range(column(1)), range(column(4)));
+    assert!((v_min / 1e5 - 1.0).abs() < 1e-15);
+    assert!((v_max / 4.31e6 - 1.0).abs() < 1e-3 && control_min < -5e5, "{v_max} {control_min}");
+    // A rigid spring follows its far end.
+    let csv = shown(&[&spring, &["--format", "csv"]]);
+    for line in csv.lines().skip(1) {
+        let cells: Vec<f64> = line.split(',').map(|cell| cell.parse().expect("is a number")).collect();
+        assert!((cells[1] / cells[4] - 1.0).abs() < 1e-14, "{line}");
+    }
+}
+
+/// The response to a step: overshoot to 6.5585 `v_f`, and no jump of the velocity at either end.
+#[test]
+fn paper_step_on_a_spring_overshoots() {
+    let spring = ["step", "--t-f", "1e-5", "--a", "0.005", "--b", "0.01", "--v-i", "1e5", "--v-f", "3.2e6"];
+    let text = shown(&[&spring, &["--k", "7.5e-3", "--m", "2.5e-16"]]);
+    assert!(
+        text.starts_with(
+            "step: the control velocity jumps to v_f and stays there; the block on its spring up to t_f\n"
+        )
+    );
+    let csv = shown(&[&spring, &["--k", "7.5e-3", "--m", "2.5e-16", "--format", "csv"]]);
+    let rows: Vec<Vec<f64>> = csv
+        .lines()
+        .skip(1)
+        .map(|line| line.split(',').map(|cell| cell.parse().expect("is a number")).collect())
+        .collect();
+    let peak = rows.iter().map(|row| row[1]).fold(0.0, f64::max);
+    assert!((peak / 3.2e6 - 6.5585).abs() < 1e-3, "{peak}");
+    // Before and after the jump of the control velocity the block is the same.
+    assert!(rows[0].iter().zip(&rows[1]).take(4).all(|(before, after)| (before - after).abs() <= 1e-15 * before));
+    assert_eq!((rows[0][4], rows[1][4]), (1e5, 3.2e6));
+    let last = rows.last().expect("has rows");
+    assert!(last[0] == 1e-5 && (last[1] / 3.2e6 - 1.0).abs() > 0.01, "{last:?}");
+}
+
+/// A step response spans decades: rows that are good to the range of a column alone would make corners on a logarithmic axis.
+#[test]
+fn regress_slow_velocities_are_good_to_a_hundredth_of_themselves() {
+    let case = ["step", "--t-f", "3.1e-6", "--a", "0.005", "--b", "0.01", "--v-i", "1e5", "--v-f", "3.2e6"];
+    let spring = ["--k", "7.5e-3", "--m", "2.5e-16", "--format", "csv"];
+    let rows = |more: &[&str]| -> Vec<Vec<f64>> {
+        let csv = shown(&[&case, &spring, more]);
+        csv.lines().skip(1).map(|line| line.split(',').map(|cell| cell.parse().expect("a number")).collect()).collect()
+    };
+    let (fewest, spaced) = (rows(&[]), rows(&["--points", "2001"]));
+    let mut slowest = f64::INFINITY;
+    for here in &spaced[2..2001] {
+        let next = fewest.partition_point(|row| row[0] < here[0]);
+        let (from, to) = (&fewest[next - 1], &fewest[next]);
+        let share = (here[0] - from[0]) / (to[0] - from[0]);
+        for column in [1, 2] {
+            let line = from[column] + share * (to[column] - from[column]);
+            assert!((line / here[column] - 1.0).abs() <= 0.01, "{here:?} {line}");
+        }
+        slowest = slowest.min(here[1]);
+    }
+    // A ten thousandth of the range is a fifth of it.
+    assert!(slowest < 1e4, "{slowest}");
+}

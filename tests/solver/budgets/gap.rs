@@ -1,0 +1,51 @@
+//! `gap`: works and least velocities by quadrature at 40 digits, least works by the judge.
+
+use super::Known;
+use super::case::{self, Case, Route};
+use super::optimal::{least_time, least_work, transition};
+use super::sweeps::Grid;
+use crate::reference::{self, Row};
+
+pub const KNOWN: Known = Known {
+    table: "gap",
+    grid: Grid::Shortcuts,
+    regimes: &[
+        ("v >= 1", "shortcuts of the paper's landscapes and random ones that stay above v = 1"),
+        ("below v = 1", "the same that fall below v = 1"),
+        ("next to the border", "shortcuts in 1e-3 to 1e-12 of the way to where theta or v is 0"),
+        ("infeasible", "theta or v at or below 0, or less time than t_min"),
+    ],
+    cases,
+};
+
+/// Where the rows next to the border of feasibility begin in the reference table.
+const INSIDE: usize = 330;
+
+fn cases() -> Vec<Case> {
+    let rows = reference::table("landscape");
+    assert_eq!((rows[0].text("t_f"), rows.len()), ("0.02", 406));
+    rows.iter().enumerate().filter_map(|(place, row)| point(row, place >= INSIDE)).collect()
+}
+
+fn point(row: &Row, border: bool) -> Option<Case> {
+    let (transition, t_f) = (transition(row), row.number("t_f"));
+    let case = Case::of(row, &super::optimal::AXES);
+    let axes = [("alpha_2", row.number("a_2")), ("alpha_3", row.number("a_3"))];
+    let case = Case { axes: case.axes.into_iter().chain(Case::at(axes).axes).collect(), ..case };
+    let late = t_f < least_time(transition.v_i, transition.v_f);
+    if late || row.text("status") == "infeasible" {
+        let numbers = ["work", "work_optimal", "gap", "v_min", "work_error", "gap_error"];
+        let case = case.within("infeasible").nulls(&numbers, Route::Reference);
+        return Some(case.word("status", "infeasible", Route::Reference));
+    }
+    // Where the optimum is not certain to be one, the row says no more than that.
+    let work_optimal = least_work(&transition, t_f, true)?;
+    let work = row.number("work");
+    let (status, regime) = match row.text("status") {
+        "ok" => ("ok", "v >= 1"),
+        _ => ("below_bound", "below v = 1"),
+    };
+    let case = case.within(if border { "next to the border" } else { regime });
+    let case = case.reference(row, &["work", "v_min"]).word("status", status, Route::Reference);
+    Some(case::gap(case, work, work_optimal))
+}

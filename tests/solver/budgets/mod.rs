@@ -1,0 +1,138 @@
+//! Error budgets: what every column of every table is good to, regime by regime, as `tests/budgets.csv` states it.
+//!
+//! Each table is computed as a sweep computes it, on fixed points of each regime whose numbers are known by another
+//! route. A budget fails where an error is larger, where ten times less would do, and where a column has none; the
+//! tables of `docs/accuracy.md` are those of the file. `SLIPSWEEP_BUDGETS=write` writes both anew: budgets that hold
+//! and are tight stay as they are, others become about three times what is measured.
+
+mod best;
+mod case;
+mod compliant;
+mod crossover;
+mod gap;
+mod ledger;
+mod measure;
+mod optimal;
+mod page;
+mod reduced;
+mod regularised;
+mod stability;
+mod step;
+mod sweeps;
+mod swift;
+
+use std::collections::BTreeMap;
+
+use slipsweep::grid::Quantity;
+use slipsweep::table;
+
+use case::{Case, Value};
+use ledger::{Budget, Key, Ledger};
+use measure::{Found, measure};
+use sweeps::Grid;
+
+/// What is known of a table by other routes.
+struct Known {
+    table: &'static str,
+    /// How its points are made a sweep.
+    grid: Grid,
+    /// The name of each regime and what its points are.
+    regimes: &'static [(&'static str, &'static str)],
+    cases: fn() -> Vec<Case>,
+}
+
+/// Every table and its reductions, in the order in which they are listed.
+const KNOWN: [Known; 12] = [
+    gap::KNOWN,
+    reduced::MINIMUM,
+    reduced::QUANTILES,
+    reduced::HISTOGRAM,
+    best::KNOWN,
+    optimal::KNOWN,
+    crossover::KNOWN,
+    swift::KNOWN,
+    stability::KNOWN,
+    step::KNOWN,
+    compliant::KNOWN,
+    regularised::KNOWN,
+];
+
+#[test]
+fn every_column_keeps_its_budget_and_needs_it() {
+    let cases: Vec<Vec<Case>> = KNOWN.iter().map(legal_cases).collect();
+    let mut points = BTreeMap::new();
+    for (known, cases) in KNOWN.iter().zip(&cases) {
+        for (regime, _) in known.regimes {
+            let count = cases.iter().filter(|case| case.regime == *regime).count();
+            assert!(count > 0, "{}: no point of `{regime}`", known.table);
+            points.insert((known.table, *regime), count);
+        }
+        let stray = cases.iter().find(|case| known.regimes.iter().all(|(regime, _)| case.regime != *regime));
+        assert!(stray.is_none(), "{}: {stray:?} is of no regime", known.table);
+    }
+    let all = |ledger: &Ledger, propose: bool| -> BTreeMap<Key, Found> {
+        KNOWN.iter().zip(&cases).flat_map(|(known, cases)| measure(known, cases, ledger, propose)).collect()
+    };
+    let mut ledger = Ledger::read();
+    if std::env::var_os("SLIPSWEEP_BUDGETS").is_some_and(|word| word == "write") {
+        ledger = ledger.renewed(&all(&ledger, true));
+        ledger.write();
+        page::write(&ledger, &points);
+    }
+    let measured = all(&ledger, false);
+    let mut faults = Vec::new();
+    for (key, found) in &measured {
+        println!("{key}: {found}");
+        match ledger.0.get(key) {
+            None => faults.push(format!("{key} has no budget: {found}")),
+            Some(budget) => faults.extend(budget.faults(found).into_iter().map(|fault| format!("{key}: {fault}"))),
+        }
+    }
+    let idle = ledger.0.keys().filter(|key| !measured.contains_key(*key));
+    faults.extend(idle.map(|key| format!("{key} has a budget, but nothing is known of it")));
+    let bare = columns().filter(|(table, column)| !ledger.knows(table, column));
+    faults.extend(bare.map(|(table, column)| format!("{table}.{column} has no budget in any regime")));
+    assert!(
+        faults.is_empty(),
+        "{} faults; `SLIPSWEEP_BUDGETS=write cargo test --test solver budgets` states what is measured:\n{}",
+        faults.len(),
+        faults.join("\n")
+    );
+    page::check(&ledger, &points);
+}
+
+/// The points of a table that a spec may ask for: some in the reference tables lie beyond.
+fn legal_cases(known: &Known) -> Vec<Case> {
+    let legal = |&(axis, value): &(&str, Value)| match value {
+        Value::Number(number) => Quantity::from_name(axis).is_some_and(|axis| axis.domain().contains(number)),
+        Value::Word(_) => true,
+    };
+    (known.cases)().into_iter().filter(|case| case.axes.iter().all(legal)).collect()
+}
+
+/// Every column of every table, `status` among them.
+fn columns() -> impl Iterator<Item = (&'static str, &'static str)> {
+    let tables = table::ALL.into_iter().chain(table::REDUCED.map(|(_, table)| table));
+    tables.flat_map(|table| {
+        let columns = table.columns().iter().map(|column| column.name);
+        columns.chain([table::STATUS]).map(move |column| (table.name(), column))
+    })
+}
+
+/// The rules for budgets can fail.
+#[test]
+fn a_budget_that_is_exceeded_or_ten_times_too_large_is_a_fault() {
+    let found = |rtols: f64, ulps: f64| Found { rtols, ulps, ..Found::default() };
+    let budget = |rtols: f64, ulps: f64| Budget { rtols, ulps, ..Budget::default() };
+    let faults = |budget: Budget, rtols: f64, ulps: f64| budget.faults(&found(rtols, ulps)).len();
+    assert_eq!(faults(budget(0.3, 9.0), 0.1, 3.0), 0);
+    assert_eq!(faults(budget(0.3, 9.0), 0.31, 3.0), 1);
+    assert_eq!(faults(budget(0.3, 9.0), 0.1, 10.0), 1);
+    assert_eq!(faults(budget(0.3, 9.0), 0.02, 0.5), 2);
+    // What a number is good to in the last place can be no less than a unit, and no more is asked.
+    assert_eq!(faults(budget(ledger::LEAST_RTOLS, 1.0), 0.0, 0.0), 0);
+    assert_eq!(faults(budget(2.0 * ledger::LEAST_RTOLS, 2.0), 0.0, 0.0), 2);
+    // Words are exact or wrong.
+    assert_eq!(faults(budget(0.0, 0.0), f64::INFINITY, 0.0), 1);
+    assert_eq!(faults(budget(f64::NAN, 1.0), 0.0, 0.0), 1);
+}

@@ -1,0 +1,102 @@
+//! `optimal`: against quadratures at 40 digits.
+
+use slipsweep::model::{Law, Transition};
+use slipsweep::protocol::Status;
+use slipsweep::protocol::optimal;
+
+use super::Known;
+use super::case::{Case, Route, Value};
+use super::sweeps::Grid;
+use crate::judge;
+use crate::reference::{self, Row};
+
+pub const KNOWN: Known = Known {
+    table: "optimal",
+    grid: Grid::Points,
+    regimes: &[
+        ("speeds up", "accelerations that start with v(0+) > v_i"),
+        ("slows down", "accelerations that slow down first, above v = 1"),
+        ("holds", "accelerations that wait at v = 1"),
+        ("short hold", "accelerations in 1e-4 to 1e-10 more than t_hold, relatively"),
+        ("deceleration", "decelerations in more than 1.01 t_min"),
+        ("next to t_min", "decelerations in 1 to 1.01 t_min"),
+        (
+            "special times",
+            "1e-7 and 1e-13, relatively, after t_cross, t_hold, t_cheapest, t_turn, t_free_in and t_free_out",
+        ),
+        ("v near 1", "the lower velocity 1e-3 to 1e-12 above v = 1"),
+        ("no bound", "accelerations that may fall below v = 1"),
+        ("no bound down", "decelerations that may fall below v = 1"),
+        ("infeasible", "decelerations in less than t_min"),
+    ],
+    cases,
+};
+
+/// The axes of an optimal problem.
+pub const AXES: [&str; 5] = ["t_f", "a", "b", "v_i", "v_f"];
+
+/// The transition of a row of a reference table.
+pub fn transition(row: &Row) -> Transition {
+    let law = Law { a: row.number("a"), b: row.number("b") };
+    Transition { law, v_i: row.number("v_i"), v_f: row.number("v_f") }
+}
+
+/// The least time under the bound.
+pub fn least_time(v_i: f64, v_f: f64) -> f64 {
+    ((v_i - v_f) / (v_i * (v_f - 1.0))).ln_1p()
+}
+
+/// `W*` by the judge, where the optimum is the only one and the judge can tell.
+pub fn least_work(transition: &Transition, t_f: f64, bounded: bool) -> Option<f64> {
+    let solved = optimal::solve(transition, t_f, bounded, 1e-13);
+    let optimum = solved.value.filter(|_| matches!(solved.status, Status::Ok | Status::BelowBound))?;
+    let (work, late) = judge::optimal_work(transition, t_f, &optimum)?;
+    // What is left grows with the square.
+    (late < 1e-12).then_some(work)
+}
+
+fn regime(row: &Row) -> &'static str {
+    let Transition { v_i, v_f, .. } = transition(row);
+    let bounded = row.text("bounded") == "1";
+    match row.text("strategy") {
+        _ if row.text("regime") == "short_hold" => "short hold",
+        _ if row.text("regime") == "v_near_1" => "v near 1",
+        _ if row.text("regime").starts_with("next_to_") => "special times",
+        _ if v_f < v_i && !bounded => "no bound down",
+        _ if v_f < v_i && row.number("t_f") < 1.01 * least_time(v_i, v_f) => "next to t_min",
+        _ if v_f < v_i => "deceleration",
+        _ if !bounded => "no bound",
+        "speed_up" => "speeds up",
+        "slow_down" => "slows down",
+        "hold" => "holds",
+        word => panic!("`{word}` is no strategy"),
+    }
+}
+
+fn cases() -> Vec<Case> {
+    let numbers = ["work", "v_start", "v_end", "hold_time", "hamiltonian", "theta_max"];
+    let mut cases: Vec<Case> = Vec::new();
+    for row in reference::table("optimal").into_iter().chain(reference::table("optimal_edges")) {
+        let bounded = row.text("bounded") == "1";
+        let strategy = ["speed_up", "slow_down", "hold"].into_iter().find(|word| *word == row.text("strategy"));
+        let below = !bounded && row.number("v_start") < 1.0;
+        let case = Case { bounded, ..Case::of(&row, &AXES).within(regime(&row)) };
+        let case = case.reference(&row, &numbers);
+        // Whether v(0+) is above v_i is told only where they differ by more than the accuracy.
+        let told = (row.number("v_start") / row.number("v_i") - 1.0).abs() > 1e-6;
+        let case = match told {
+            true => case.word("strategy", strategy.expect("is a strategy"), Route::Reference),
+            false => case,
+        };
+        cases.push(case.word("status", if below { "below_bound" } else { "ok" }, Route::Reference));
+        // In a little less than the least time there is none.
+        if cases.last().is_some_and(|case| case.regime == "next to t_min") {
+            let Transition { v_i, v_f, .. } = transition(&row);
+            let mut case = Case::of(&row, &AXES).within("infeasible");
+            case.axes[0].1 = Value::Number(least_time(v_i, v_f) * (1.0 - 1e-12));
+            let case = case.nulls(&numbers, Route::Formula).nulls(&["strategy"], Route::Formula);
+            cases.push(case.word("status", "infeasible", Route::Formula));
+        }
+    }
+    cases
+}

@@ -1,0 +1,87 @@
+//! `swift`: the families against tables to 25 digits, least works by the judge.
+
+use slipsweep::model::Transition;
+
+use super::Known;
+use super::case::{self, Case, Route, Truth, Value};
+use super::optimal::{AXES, least_time, least_work, transition};
+use super::sweeps::Grid;
+use crate::reference::{self, Row};
+
+pub const KNOWN: Known = Known {
+    table: "swift",
+    grid: Grid::Points,
+    regimes: &[
+        ("step", "family step"),
+        ("cubic", "family cubic"),
+        ("bounded_velocity", "family bounded_velocity, up, or down in more than 1.01 t_min"),
+        ("next to t_min", "family bounded_velocity, down in less than 1.01 t_min"),
+        ("bounded_friction", "family bounded_friction, velocities within a factor 3000"),
+        ("short friction", "the same in less than 1.01 of its least time"),
+        ("far friction", "family bounded_friction, velocities further apart"),
+        ("infeasible", "no member of the family"),
+    ],
+    cases,
+};
+
+const NUMBERS: [&str; 9] =
+    ["alpha", "work", "work_optimal", "gap", "v_min", "v_max", "friction_max", "work_error", "gap_error"];
+
+fn cases() -> Vec<Case> {
+    let velocity = reference::table("swift_velocity");
+    let friction = reference::table("swift_friction");
+    let families = ["step", "cubic", "bounded_velocity"];
+    let velocity = velocity.iter().map(|row| {
+        let family = families.into_iter().find(|family| *family == row.text("family")).expect("is a family");
+        let Transition { v_i, v_f, .. } = transition(row);
+        let near = family == "bounded_velocity" && v_f < v_i && row.number("t_f") < 1.01 * least_time(v_i, v_f);
+        let case = point(row, family, f64::INFINITY, if near { "next to t_min" } else { family });
+        match row.text("status") {
+            "infeasible" => case,
+            _ => case.reference(row, &["alpha"]).number("end_error", row.number("miss"), Route::Reference),
+        }
+    });
+    let friction = friction.iter().map(|row| {
+        let Transition { v_i, v_f, .. } = transition(row);
+        let regime = match row.number("t_f") < 1.01 * row.optional("t_least").unwrap_or(0.0) {
+            _ if (v_f / v_i).ln().abs() > 8.0 => "far friction",
+            true => "short friction",
+            false => "bounded_friction",
+        };
+        let case = point(row, "bounded_friction", row.number("tau_max"), regime);
+        match row.text("status") {
+            "infeasible" => case,
+            _ => case.reference(row, &["alpha"]).knows("end_error", Truth::Exact(0.0), Route::Formula),
+        }
+    });
+    velocity.chain(friction).collect()
+}
+
+fn point(row: &Row, family: &'static str, tau_max: f64, regime: &'static str) -> Case {
+    let (transition, t_f) = (transition(row), row.number("t_f"));
+    let late = t_f < least_time(transition.v_i, transition.v_f);
+    // Without the bound on v the families are what they are also in less than t_min.
+    let mut case = Case { bounded: !late, ..Case::of(row, &AXES) };
+    case.axes.push(("family", Value::Word(family)));
+    case.axes.push(("tau_max", Value::Number(tau_max)));
+    if row.text("status") == "infeasible" {
+        let case = case.within("infeasible").nulls(&NUMBERS, Route::Reference);
+        let bound = match family {
+            "bounded_velocity" => "time",
+            "cubic" => "velocity",
+            _ if transition.v_f < transition.v_i => "velocity",
+            _ => "friction",
+        };
+        return case.word("bound", bound, Route::Formula).word("status", "infeasible", Route::Reference);
+    }
+    let case = case.within(regime).reference(row, &["work", "v_min", "v_max", "friction_max"]);
+    let case = case.nulls(&["bound"], Route::Reference);
+    match least_work(&transition, t_f, !late) {
+        Some(least) => {
+            let status = if row.number("v_min") < 1.0 { "below_bound" } else { "ok" };
+            case::gap(case, row.number("work"), least).word("status", status, Route::Reference)
+        }
+        // Where the optimum is not certain to be one, the status says so, and the rest is still what it is.
+        None => case,
+    }
+}

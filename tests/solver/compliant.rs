@@ -1,0 +1,377 @@
+//! The smooth shortcut at finite stiffness: against a high-precision table, simulations by a library's integrator,
+//! finite perturbations, limits and orders; and the loop closed.
+
+use crate::reference;
+use nalgebra::Matrix3;
+use ode_solvers::dop_shared::OutputType;
+use ode_solvers::{Dop853, SVector, System};
+use slipsweep::model::Law;
+use slipsweep::protocol::compliant::{self, Compliant, Path};
+use slipsweep::protocol::{Slider, Status};
+use slipsweep::stability::{amplification, held_error, loop_error};
+
+/// The paper's block and spring, and what is asked of it: `(v_i, v_f)` and `t_f`.
+const PAPER: (Slider, (f64, f64), f64) =
+    (Slider { law: Law { a: 0.005, b: 0.01 }, k: 7.5e-3, m: 2.5e-16 }, (1e5, 3.2e6), 3.1e-6);
+
+/// A slower one, of the material of the paper's rigid figures.
+const SLOW: (Slider, (f64, f64), f64) =
+    (Slider { law: Law { a: 0.03, b: 0.05 }, k: 0.5, m: 1e-6 }, (3.0, 100.0), 0.037);
+
+fn solve((slider, velocities, t_f): (Slider, (f64, f64), f64), rtol: f64) -> Compliant {
+    let solved = compliant::solve(&slider, velocities, t_f, rtol);
+    assert_eq!(solved.status, Status::Ok, "{slider:?} {velocities:?} {t_f}");
+    solved.value.expect("has a member")
+}
+
+fn path((slider, velocities, t_f): (Slider, (f64, f64), f64)) -> Path {
+    compliant::path(&slider, velocities, t_f, 1e-12).expect("has a member")
+}
+
+fn relative(found: f64, expected: f64) -> f64 {
+    if found == expected { 0.0 } else { ((found - expected) / expected).abs() }
+}
+
+#[test]
+fn reference_every_number_is_good_to_rtol() {
+    let rows = reference::table("compliant");
+    assert!(rows.len() >= 40, "{} rows", rows.len());
+    for rtol in [1e-6, 1e-10, 1e-13] {
+        for row in &rows {
+            let slider =
+                Slider { law: Law { a: row.number("a"), b: row.number("b") }, k: row.number("k"), m: row.number("m") };
+            let (v_i, v_f, t_f) = (row.number("v_i"), row.number("v_f"), row.number("t_f"));
+            let found = solve((slider, (v_i, v_f), t_f), rtol);
+            // t_min is known to a few eps of itself, so alpha near it is known to that share of t_f - t_min.
+            let t_min = ((v_i - v_f) / (v_i * (v_f - 1.0))).ln_1p();
+            let near = 3.0 * f64::EPSILON * t_min.abs() / (t_f - t_min);
+            let allowed = rtol + 8.0 * f64::EPSILON;
+            assert!(relative(found.alpha, row.number("alpha")) <= allowed + 3.0 * near, "{row:?}: {found:?}");
+            assert!(relative(found.work, row.number("work")) <= allowed + near, "{row:?}: {found:?}");
+            assert!(relative(found.v_min, row.number("v_min")) <= allowed + near, "{row:?}: {found:?}");
+            assert!(relative(found.v_max, row.number("v_max")) <= allowed + near, "{row:?}: {found:?}");
+            let (low, high) = (row.number("v_c_min"), row.number("v_c_max"));
+            let size = low.abs().max(high.abs()) * (allowed + 3.0 * near);
+            assert!((found.control_min - low).abs() <= size, "{row:?}: {found:?}");
+            assert!((found.control_max - high).abs() <= size, "{row:?}: {found:?}");
+            let path = compliant::path(&slider, (v_i, v_f), t_f, rtol).expect("has a member");
+            let grown = amplification(&path, rtol).number.expect("is solved");
+            assert!(relative(grown, row.number("amplification")) <= allowed + 1e-12, "{row:?}: {grown}");
+        }
+    }
+}
+
+#[test]
+fn paper_shortcut_stays_below_4_31e6_and_its_control_goes_negative() {
+    let found = solve(PAPER, 1e-10);
+    assert_eq!(found.v_min, 1e5);
+    assert!((found.v_max / 4.31e6 - 1.0).abs() < 1e-3, "{found:?}");
+    assert!(found.control_min < 0.0 && found.control_max < PAPER.1.1 * 1.02, "{found:?}");
+}
+
+#[test]
+fn paper_larger_steps_of_the_control_leave_visible_oscillations() {
+    let path = path(PAPER);
+    let errors =
+        [100.0, 30.0, 10.0, 4.0, 2.0].map(|n| held_error(&path, PAPER.2 / n, 1e-8).number.expect("is simulated"));
+    assert!(errors.windows(2).all(|pair| pair[1] > 4.0 * pair[0]), "{errors:?}");
+    assert!(errors[0] < 2e-3 && errors[2] > 0.1, "{errors:?}");
+}
+
+/// The equations of motion in `(ln v, ln theta, k s - 1)`, `ln theta` of the protocol itself, and
+/// time over `t_f`, which the library does not tell exactly inside its steps.
+#[derive(Clone, Copy)]
+struct Sliding {
+    slider: Slider,
+    velocities: (f64, f64),
+    t_f: f64,
+    alpha: f64,
+    held: Option<f64>,
+}
+
+impl Sliding {
+    fn new((slider, velocities, t_f): (Slider, (f64, f64), f64)) -> Sliding {
+        Sliding { slider, velocities, t_f, alpha: solve((slider, velocities, t_f), 1e-13).alpha, held: None }
+    }
+
+    /// `v_c` from the formula of the shortcut.
+    fn told(&self, x: f64, ln_theta: f64) -> f64 {
+        let (w_i, w_f) = (self.velocities.0 - 1.0, self.velocities.1 - 1.0);
+        let (l, z) = ((w_f / w_i).ln(), 1.0 - x);
+        let y = x * z;
+        let f = w_i.ln() + l * x.powi(3) * (10.0 - 15.0 * x + 6.0 * x * x) + self.alpha * y.powi(3);
+        let f_1 = 30.0 * l * y * y + 3.0 * self.alpha * y * y * (z - x);
+        let f_2 = 60.0 * l * y * (z - x) + self.alpha * (6.0 * y - 30.0 * y * y);
+        let v = 1.0 + f.exp();
+        let v_1 = f.exp() * f_1 / self.t_f;
+        let v_2 = f.exp() * (f_2 + f_1 * f_1) / self.t_f.powi(2);
+        let Law { a, b } = self.slider.law;
+        v + (a * v_1 / v + b * ((-ln_theta).exp() - v) + self.slider.m * v_2) / self.slider.k
+    }
+}
+
+impl System<f64, SVector<f64, 5>> for Sliding {
+    fn system(&self, _: f64, y: &SVector<f64, 5>, dy: &mut SVector<f64, 5>) {
+        let Slider { law, k, m } = self.slider;
+        let x = y[4];
+        let (w_i, w_f, z) = (self.velocities.0 - 1.0, self.velocities.1 - 1.0, 1.0 - x);
+        let v = y[0].exp();
+        let exponent = (w_f / w_i).ln() * x.powi(3) * (10.0 - 15.0 * x + 6.0 * x * x);
+        let protocol = 1.0 + w_i * (exponent + self.alpha * (x * z).powi(3)).exp();
+        dy[0] = self.t_f * (y[2] - law.a * y[0] - law.b * y[1]) / (m * v);
+        dy[1] = self.t_f * ((-y[1]).exp() - v);
+        dy[2] = self.t_f * k * (self.held.unwrap_or_else(|| self.told(x, y[3])) - v);
+        dy[3] = self.t_f * ((-y[3]).exp() - protocol);
+        dy[4] = 1.0;
+    }
+}
+
+/// A library's integration from `t` to `t_end`, in units of `t_f`.
+fn integrate(sliding: Sliding, (t, t_end): (f64, f64), start: SVector<f64, 5>) -> SVector<f64, 5> {
+    let h = t_end - t;
+    // Tolerances, then the library's defaults but for the test for stiffness.
+    let mut stepper = Dop853::from_param(
+        sliding,
+        t,
+        t_end,
+        h,
+        start,
+        1e-13,
+        1e-13,
+        0.9,
+        0.0,
+        0.333,
+        6.0,
+        h,
+        0.0,
+        100_000,
+        u32::MAX,
+        OutputType::Sparse,
+    );
+    stepper.integrate().expect("is integrated");
+    *stepper.y_out().last().expect("has an end")
+}
+
+fn steady(slider: &Slider, v: f64) -> SVector<f64, 5> {
+    SVector::<f64, 5>::new(v.ln(), -v.ln(), (slider.law.a - slider.law.b) * v.ln(), -v.ln(), 0.0)
+}
+
+/// The difference of two states in `(ln v, ln theta, k s/a)`.
+fn scaled(slider: &Slider, difference: SVector<f64, 5>) -> [f64; 3] {
+    [difference[0], difference[1], difference[2] / slider.law.a]
+}
+
+#[test]
+fn reference_the_control_brings_the_block_to_its_target_when_a_library_integrates() {
+    for case in [PAPER, SLOW] {
+        let end = integrate(Sliding::new(case), (0.0, 1.0), steady(&case.0, case.1.0));
+        let missed = scaled(&case.0, end - steady(&case.0, case.1.1));
+        assert!((end[3] + case.1.1.ln()).abs() < 1e-11, "{end}");
+        let grown = amplification(&path(case), 1e-10).number.expect("is solved");
+        assert!(missed.iter().all(|x| x.abs() < 1e-10 * (1.0 + grown)), "{missed:?} {grown}");
+    }
+}
+
+#[test]
+fn reference_amplification_is_that_of_small_perturbations() {
+    for case in [PAPER, SLOW] {
+        let sliding = Sliding::new(case);
+        let start = steady(&case.0, case.1.0);
+        let scale = [1.0, 1.0, case.0.law.a];
+        let columns = std::array::from_fn::<_, 3, _>(|i| {
+            let mut shift = SVector::<f64, 5>::zeros();
+            shift[i] = 1e-4 * scale[i];
+            let [ahead, behind] = [start + shift, start - shift].map(|start| integrate(sliding, (0.0, 1.0), start));
+            scaled(&case.0, (ahead - behind) / 2e-4)
+        });
+        let flow = Matrix3::from_fn(|i, j| columns[j][i]);
+        let grown = amplification(&path(case), 1e-10).number.expect("is solved");
+        let found = flow.singular_values()[0];
+        // The cubic term of the flow, and the integrator's error over the shift.
+        assert!(relative(grown, found) < 1e-5, "{grown} {found}");
+    }
+}
+
+#[test]
+fn reference_a_held_control_misses_by_what_a_library_finds() {
+    for case in [PAPER, SLOW] {
+        let path = path(case);
+        let sliding = Sliding::new(case);
+        let dt = case.2 / 15.5;
+        let mut state = steady(&case.0, case.1.0);
+        for i in 0..16 {
+            let (t, t_end) = (f64::from(i) / 15.5, (f64::from(i + 1) / 15.5).min(1.0));
+            let held = case.0.control(&path.at_time(f64::from(i) * dt))[0];
+            state = integrate(Sliding { held: Some(held), ..sliding }, (t, t_end), state);
+        }
+        let expected = scaled(&case.0, state - steady(&case.0, case.1.1)).iter().map(|x| x * x).sum::<f64>().sqrt();
+        for rtol in [1e-4, 1e-6, 1e-8, 1e-10] {
+            let found = held_error(&path, dt, rtol).number.expect("is simulated");
+            assert!((found - expected).abs() <= rtol, "{found} {expected} at {rtol}");
+        }
+    }
+}
+
+#[test]
+fn the_error_of_a_held_control_is_of_second_order() {
+    let rigid = (Slider { k: f64::INFINITY, ..SLOW.0 }, SLOW.1, SLOW.2);
+    let light = (Slider { m: 0.0, ..SLOW.0 }, SLOW.1, SLOW.2);
+    // A rigid spring forgives the third order later.
+    for (case, n) in [(PAPER, 800.0), (SLOW, 800.0), (light, 800.0), (rigid, 6400.0)] {
+        let path = path(case);
+        let errors = [n, 2.0 * n, 4.0 * n].map(|n| held_error(&path, case.2 / n, 1e-11).number.expect("is simulated"));
+        for pair in errors.windows(2) {
+            let order = (pair[0] / pair[1]).log2();
+            assert!((order - 2.0).abs() < 0.05, "{case:?}: {errors:?}");
+        }
+    }
+}
+
+#[test]
+fn the_loop_closes_to_what_the_amplification_allows() {
+    let light = (Slider { m: 0.0, ..PAPER.0 }, PAPER.1, PAPER.2);
+    let back = (SLOW.0, (100.0, 3.0), 0.5);
+    for case in [PAPER, light, SLOW, back] {
+        let path = path(case);
+        let grown = amplification(&path, 1e-10).number.expect("is solved");
+        for rtol in [1e-4, 1e-6, 1e-8, 1e-10] {
+            let missed = loop_error(&path, rtol).number.expect("is simulated");
+            assert!(missed <= rtol * (1.0 + grown), "{case:?} at {rtol}: {missed}, amplification {grown}");
+        }
+    }
+}
+
+#[test]
+fn derivatives_are_those_of_the_path() {
+    let path = path(PAPER);
+    for i in 1..60 {
+        let (t, h) = (PAPER.2 * f64::from(i) / 60.0, 1e-4 * PAPER.2);
+        let [behind, here, ahead] = [t - h, t, t + h].map(|t| path.at_time(t));
+        for k in 0..3 {
+            let slope = (ahead.v[k] - behind.v[k]) / (2.0 * h);
+            let size = 3.2e6 * (30.0 / PAPER.2).powi(k as i32 + 1);
+            assert!((slope - here.v[k + 1]).abs() < 1e-4 * size, "{i} {k}: {slope} {}", here.v[k + 1]);
+        }
+        let slope = (PAPER.0.control(&ahead)[0] - PAPER.0.control(&behind)[0]) / (2.0 * h);
+        let told = PAPER.0.control(&here);
+        assert!((slope - told[1]).abs() < 1e-4 * 3.2e6 * 30.0 / PAPER.2, "{i}: {slope} {}", told[1]);
+        let rate = (ahead.theta - behind.theta) / (2.0 * h);
+        assert!((rate - here.rate).abs() < 1e-4, "{i}: {rate} {}", here.rate);
+    }
+}
+
+#[test]
+fn stiff_springs_and_light_blocks_tend_to_rigid_ones_and_to_none() {
+    let (slider, velocities, t_f) = SLOW;
+    let rigid = (Slider { k: f64::INFINITY, ..slider }, velocities, t_f);
+    let expected = solve(rigid, 1e-12);
+    assert_eq!([expected.control_min, expected.control_max], [expected.v_min, expected.v_max]);
+    let grown = amplification(&path(rigid), 1e-10).number.expect("is solved");
+    let mut last = f64::INFINITY;
+    for k in [1e3, 1e5, 1e7] {
+        let found = solve((Slider { k, ..slider }, velocities, t_f), 1e-12);
+        assert_eq!([found.alpha, found.work, found.v_max], [expected.alpha, expected.work, expected.v_max]);
+        let lag = relative(found.control_max, expected.control_max);
+        assert!(lag < 0.02 * last && lag < 200.0 / k, "{k}: {lag}");
+        last = lag;
+        let without_mass = path((Slider { k, m: 0.0, ..slider }, velocities, t_f));
+        let found = amplification(&without_mass, 1e-10).number.expect("is solved");
+        assert!(relative(found, grown) < 10.0 / k, "{k}: {found} {grown}");
+    }
+    let without_mass = path((Slider { m: 0.0, ..slider }, velocities, t_f));
+    let expected = amplification(&without_mass, 1e-10).number.expect("is solved");
+    for m in [1e-8, 1e-10, 1e-12] {
+        let found = amplification(&path((Slider { m, ..slider }, velocities, t_f)), 1e-10).number.expect("is solved");
+        assert!(relative(found, expected) < 1e5 * m, "{m}: {found} {expected}");
+    }
+}
+
+#[test]
+fn regress_equal_velocities_are_a_constant_protocol() {
+    let (slider, _, t_f) = SLOW;
+    let found = solve((slider, (7.0, 7.0), t_f), 1e-10);
+    let friction = 1.0 + (slider.law.a - slider.law.b) * 7f64.ln();
+    assert!(found.alpha.to_bits() == 0 && relative(found.work, friction * 7.0 * t_f) < 1e-15, "{found:?}");
+    assert_eq!([found.v_min, found.v_max], [7.0, 7.0]);
+    assert!(relative(found.control_min, 7.0) < 1e-14 && relative(found.control_max, 7.0) < 1e-14, "{found:?}");
+}
+
+#[test]
+fn regress_what_does_not_exist_is_infeasible() {
+    let (slider, velocities, t_f) = SLOW;
+    let t_min = ((100.0f64 - 3.0) / (100.0 * 2.0)).ln_1p();
+    let status = |slider: Slider, velocities, t_f| {
+        let solved = compliant::solve(&slider, velocities, t_f, 1e-10);
+        assert!(solved.value.is_none());
+        solved.status
+    };
+    for (slider, velocities, t_f) in [
+        (slider, (100.0, 3.0), t_min * (1.0 - 1e-12)),
+        (slider, (1.0, 3.0), t_f),
+        (slider, (3.0, 1.0), t_f),
+        (slider, velocities, 0.0),
+        (slider, velocities, f64::INFINITY),
+        (slider, velocities, f64::NAN),
+        (Slider { k: 0.0, ..slider }, velocities, t_f),
+        (Slider { m: -1.0, ..slider }, velocities, t_f),
+        (Slider { m: f64::INFINITY, ..slider }, velocities, t_f),
+        (Slider { law: Law { a: 0.0, b: 0.05 }, ..slider }, velocities, t_f),
+    ] {
+        assert_eq!(status(slider, velocities, t_f), Status::Infeasible, "{slider:?} {velocities:?} {t_f}");
+    }
+    assert_eq!(compliant::path(&slider, velocities, -1.0, 1e-10).err(), Some(Status::Infeasible));
+}
+
+#[test]
+fn regress_every_corner_of_the_range_is_solved() {
+    let velocities: [f64; 6] = [1.0 + 1e-12, 1.001, 1.5, 30.0, 1e4, 1e8];
+    let mut solved = 0;
+    for v_i in velocities {
+        for v_f in velocities {
+            let t_min = ((v_i - v_f) / (v_i * (v_f - 1.0))).ln_1p().max(0.0);
+            for share in [1e-9, 1e-6, 1e-3, 0.1, 1.0, 10.0, 1e3, 1e6] {
+                for (k, m) in [(1e-3, 0.0), (1.0, 1e-6), (f64::INFINITY, 1.0)] {
+                    for t_f in [share / v_f, t_min * (1.0 + share)] {
+                        let slider = Slider { law: Law { a: 1e-3, b: 2e-3 }, k, m };
+                        for rtol in [1e-6, 1e-10, 1e-13] {
+                            let found = compliant::solve(&slider, (v_i, v_f), t_f, rtol);
+                            assert_ne!(found.status, Status::NotConverged, "{slider:?} {v_i} {v_f} {t_f} {rtol}");
+                            if let Some(found) = found.value {
+                                solved += 1;
+                                assert!(found.v_min >= 1.0 && found.v_max >= v_i.max(v_f), "{found:?}");
+                                assert!(found.work.is_finite() && found.control_min <= found.control_max);
+                            }
+                        }
+                    }
+                }
+            }
+        }
+    }
+    assert!(solved > 2900, "{solved}");
+}
+
+#[test]
+fn regress_work_counts() {
+    let solved = compliant::solve(&PAPER.0, PAPER.1, PAPER.2, 1e-10);
+    assert_eq!((solved.effort.quadratures, solved.effort.nodes), (7, 480));
+    let path = path(PAPER);
+    let followed = [amplification(&path, 1e-10), loop_error(&path, 1e-10), held_error(&path, PAPER.2 / 100.0, 1e-10)];
+    let [grown, told, held] = followed.map(|followed| followed.steps);
+    // At least a step a sample.
+    assert!(grown == 16 && told < 100 && (100..400).contains(&held), "{grown} {told} {held}");
+}
+
+/// Squares of a large flow overflowed, and the amplification came out as 0. The logarithms are from an integration of the
+/// logarithm of the flow.
+#[test]
+fn regress_amplifications_beyond_the_square_root_of_the_largest_double() {
+    let at = |t_f| {
+        let slider = Slider { law: Law { a: 0.01, b: 0.05 }, k: 0.001, m: 0.0 };
+        amplification(&path((slider, (100.0, 1000.0), t_f)), 1e-10).number
+    };
+    for (t_f, expected) in [(0.2, 176.42), (0.3, 263.3)] {
+        let found = at(t_f).expect("is a double").log10();
+        assert!((found - expected).abs() < 0.05, "{t_f} {found}");
+    }
+    assert_eq!(at(0.5), None);
+}

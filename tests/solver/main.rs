@@ -1,0 +1,24 @@
+//! The mathematics without tables or files: every solver against references, invariants and limits. One binary of all
+//! tests of a kind, since linking one for each file took most of the time and of the disk.
+
+mod best;
+mod budgets;
+mod compliant;
+mod error;
+mod hopf;
+mod judge;
+mod landscape;
+mod landscape_reference;
+mod numerics;
+mod optimal;
+mod paper;
+mod properties;
+#[path = "../reference/mod.rs"]
+mod reference;
+mod regularised;
+mod step;
+mod stress;
+mod swift_edges;
+mod swift_friction;
+mod swift_velocity;
+mod trace;

@@ -1,0 +1,80 @@
+//! `best`: the least work is below that of its neighbours and not below the optimum.
+
+use slipsweep::model::Transition;
+use slipsweep::numerics::cubic::Cubic;
+use slipsweep::protocol::Status;
+use slipsweep::protocol::best::{Best, solve};
+use slipsweep::protocol::cubic::{Landscape, Shortcuts};
+use slipsweep::protocol::optimal;
+
+use super::random::Random;
+use super::{POINTS, Row, sample};
+
+#[derive(Debug)]
+struct Point {
+    transition: Transition,
+    t_f: f64,
+    bounded: bool,
+    rtol: f64,
+    /// Directions and distances of neighbours, relative.
+    neighbours: [(f64, f64, f64); 6],
+}
+
+fn draw(random: &mut Random) -> Point {
+    let (transition, bounded) = (random.transition(), random.chance(0.7));
+    let t_f = random.duration(&transition, bounded);
+    let neighbours = std::array::from_fn(|_| {
+        let angle = std::f64::consts::TAU * random.uniform();
+        (angle.cos(), angle.sin(), random.between(1e-4, 1.0))
+    });
+    Point { transition, t_f, bounded, rtol: random.rtol(), neighbours }
+}
+
+#[test]
+fn every_best_shortcut_is_the_best_or_says_so() {
+    sample("best", POINTS, draw, |point, row| {
+        let &Point { ref transition, t_f, bounded, rtol, .. } = point;
+        let solved = solve(transition, t_f, bounded, rtol);
+        row.status(solved.status);
+        let Some(best) = solved.value else { return };
+        let Best { a_2, a_3, work, work_optimal, gap, v_min } = best;
+        let numbers = [a_2, a_3, work, work_optimal, gap, v_min];
+        row.fact("finite", numbers.iter().all(|number| number.is_finite()));
+        if solved.status == Status::Nonphysical {
+            return;
+        }
+        row.fact("the bound is kept", v_min >= if bounded { 1.0 } else { 0.0 });
+        row.at_most("gap >= 0", -gap, 1e-20);
+        let Some(optimum) = optimal::solve(transition, t_f, bounded, 1e-12).value else {
+            return row.fact("the optimum exists", false);
+        };
+        let allowed = 2e-11 * work + 16.0 * f64::EPSILON * t_f * optimum.hamiltonian.abs();
+        row.at_most("gap is that of the works", (gap * work_optimal - (work - work_optimal)).abs(), allowed);
+        row.agree("the optimum's work", work_optimal, optimum.work, 4e-12);
+        neighbours(point, &best, row);
+    });
+}
+
+/// No admissible neighbour costs less. For `b > a` the work falls without limit beyond the theta of which `tau = b - a` at
+/// `u = 1`: neighbours that go there are left out.
+fn neighbours(point: &Point, best: &Best, row: &mut Row) {
+    let &Point { ref transition, t_f, bounded, .. } = point;
+    let Transition { law, v_i, v_f } = *transition;
+    let floor = if law.b > law.a { (1.0 - 1.0 / (law.b - law.a)).exp() } else { 0.0 };
+    let landscape = Landscape::new(transition, t_f, 1e-12);
+    let size = best.a_2.abs().max(best.a_3.abs());
+    for &(x, y, distance) in &point.neighbours {
+        let (mut work, mut v_min, mut status) = ([f64::NAN], [f64::NAN], [Status::NotConverged]);
+        let out = Shortcuts { work: &mut work, v_min: &mut v_min, status: &mut status };
+        let reach = distance * size;
+        let (a_2, a_3) = (best.a_2 + reach * x, best.a_3 + reach * y);
+        landscape.evaluate(&[a_2], &[a_3], out);
+        let theta = Cubic { c: [1.0 / v_i, a_2, a_3, 1.0 / v_f - 1.0 / v_i - a_2 - a_3] };
+        if law.b > law.a && theta.least() <= floor {
+            continue;
+        }
+        if status[0] == Status::Ok || (!bounded && status[0] == Status::BelowBound) {
+            row.at_most("least among neighbours", best.work - work[0], 4e-12 * best.work);
+        }
+    }
+}

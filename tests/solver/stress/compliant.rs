@@ -1,0 +1,114 @@
+//! `compliant`: the member exists if there is time for it, costs no less than the optimum, and the control velocity
+//! tends to the block's on a stiff spring.
+
+use slipsweep::model::{Law, Transition};
+use slipsweep::protocol::compliant::{self, Compliant};
+use slipsweep::protocol::{Slider, Status, optimal};
+use slipsweep::stability::{amplification, held_error, loop_error};
+
+use super::random::Random;
+use super::{POINTS, Row, sample};
+
+/// More quadrature nodes than any point takes.
+const MOST_NODES: u32 = 150_000;
+
+/// Steps at which simulations are given up.
+const MOST_STEPS: u32 = 200_000;
+
+/// Open loops are simulated: three times up to a hundred thousand steps.
+const LOOP_POINTS: u64 = 60;
+
+const FINE: f64 = 1e-12;
+
+#[derive(Debug)]
+struct Point {
+    slider: Slider,
+    velocities: (f64, f64),
+    t_f: f64,
+    dt: f64,
+    rtol: f64,
+}
+
+fn draw(random: &mut Random) -> Point {
+    let transition = random.transition();
+    let slider = random.slider(transition.law, transition.v_f);
+    let t_f = random.duration(&transition, true);
+    let Transition { v_i, v_f, .. } = transition;
+    let dt = t_f * random.between(1e-3, 1.0);
+    Point { slider, velocities: (v_i, v_f), t_f, dt, rtol: random.rtol() }
+}
+
+#[test]
+fn every_compliant_is_right_or_says_so() {
+    sample("compliant", POINTS, draw, |point, row| {
+        let &Point { slider, velocities: (v_i, v_f), t_f, rtol, .. } = point;
+        let solved = compliant::solve(&slider, (v_i, v_f), t_f, rtol);
+        row.status(solved.status);
+        let transition = Transition { law: slider.law, v_i, v_f };
+        row.fact("exists if there is time", (solved.status == Status::Ok) == (t_f > transition.least_time()));
+        row.at_most("few nodes", f64::from(solved.effort.nodes), f64::from(MOST_NODES));
+        let Some(rough) = solved.value else { return };
+        let Compliant { alpha, work, v_min, v_max, control_min, control_max } = rough;
+        let numbers = [alpha, work, v_min, v_max, control_min, control_max];
+        row.fact("finite", numbers.iter().all(|number| number.is_finite()));
+        row.fact("in order", 1.0 <= v_min && v_min <= v_max && control_min <= control_max);
+        let optimum = optimal::solve(&transition, t_f, true, FINE);
+        if let (Some(best), Status::Ok) = (optimum.value, optimum.status) {
+            let terms = 1.0 + (slider.law.a + slider.law.b) * (v_max.ln() + v_i.max(v_f).ln());
+            let rounding = 8.0 * f64::EPSILON * t_f * best.hamiltonian.abs();
+            row.at_most("gap >= 0", best.work - work, (rtol + FINE) * terms * best.work + rounding);
+        }
+        forces(point, &rough, row);
+        stiff(point, &rough, row);
+    });
+}
+
+/// Friction, inertia and spring may be weaker by the same factor: nothing but ratios of forces enters.
+fn forces(point: &Point, rough: &Compliant, row: &mut Row) {
+    let &Point { slider: Slider { law: Law { a, b }, k, m }, velocities, t_f, rtol, .. } = point;
+    let weaker = Slider { law: Law { a: 0.25 * a, b: 0.25 * b }, k: 0.25 * k, m: 0.25 * m };
+    let Some(other) = compliant::solve(&weaker, velocities, t_f, rtol).value else {
+        return row.fact("only ratios of forces enter", false);
+    };
+    let of = |found: &Compliant| [found.alpha, found.v_min, found.v_max, found.control_min, found.control_max];
+    row.fact("only ratios of forces enter", of(&other) == of(rough));
+}
+
+/// The block does not know the spring; a rigid one moves with it.
+fn stiff(point: &Point, rough: &Compliant, row: &mut Row) {
+    let &Point { slider, velocities, t_f, rtol, .. } = point;
+    let at = |k: f64| compliant::solve(&Slider { k, ..slider }, velocities, t_f, rtol).value;
+    let Some(rigid) = at(f64::INFINITY) else { return row.fact("exists on a rigid spring", false) };
+    row.fact(
+        "a rigid spring moves with the block",
+        (rigid.control_min, rigid.control_max) == (rigid.v_min, rigid.v_max),
+    );
+    row.fact(
+        "the block does not know the spring",
+        [rigid.alpha, rigid.work, rigid.v_max] == [rough.alpha, rough.work, rough.v_max],
+    );
+    // k (v_c - v) is the same on any spring, so the control velocity is at most this far from the block's.
+    let far = (rough.control_max - rough.v_max).max(rough.v_min - rough.control_min).max(0.0) + rough.v_max;
+    if slider.k.is_finite()
+        && let Some(near) = at(1e9 * slider.k * (far / rough.v_max))
+    {
+        let off = (near.control_max - rigid.v_max).abs().max((near.control_min - rigid.v_min).abs());
+        row.at_most("k -> inf", off, (4e-9 + 4.0 * rtol) * rigid.v_max);
+    }
+}
+
+#[test]
+fn what_becomes_of_a_compliant_open_loop_is_a_number_or_none() {
+    sample("compliant open loop", LOOP_POINTS, draw, |point, row| {
+        let &Point { slider, velocities, t_f, dt, rtol } = point;
+        let path = match compliant::path(&slider, velocities, t_f, rtol) {
+            Ok(path) => path,
+            Err(status) => return row.status(status),
+        };
+        row.status(Status::Ok);
+        for found in [amplification(&path, rtol), loop_error(&path, rtol), held_error(&path, dt, rtol)] {
+            row.fact("few steps", found.steps <= MOST_STEPS);
+            row.fact("a number or none", found.number.is_none_or(|number| number >= 0.0 && number.is_finite()));
+        }
+    });
+}
