@@ -1,7 +1,8 @@
 //! `best`: the least work is below that of its neighbours and not below the optimum.
 
 use slipsweep::model::Transition;
-use slipsweep::numerics::cubic::Cubic;
+use slipsweep::numerics::cubic::{Cubic, ExactCubic};
+use slipsweep::numerics::double_double::DoubleDouble;
 use slipsweep::protocol::Status;
 use slipsweep::protocol::best::{Best, solve};
 use slipsweep::protocol::cubic::{Landscape, Shortcuts};
@@ -55,8 +56,9 @@ fn every_best_shortcut_is_the_best_or_says_so() {
     });
 }
 
-/// No admissible neighbour costs less. For `b > a` the work falls without limit beyond the theta of which `tau = b - a` at
-/// `u = 1`: neighbours that go there are left out.
+/// No admissible neighbour costs less. For `b > a` the work falls without limit beyond the theta of which `tau = b - a`
+/// at `u = 1`: neighbours that go there are left out. So are those below `v = 1` by less than its rounding: over `t_f` of
+/// 1e8 even that saves work.
 fn neighbours(point: &Point, best: &Best, row: &mut Row) {
     let &Point { ref transition, t_f, bounded, .. } = point;
     let Transition { law, v_i, v_f } = *transition;
@@ -73,8 +75,23 @@ fn neighbours(point: &Point, best: &Best, row: &mut Row) {
         if law.b > law.a && theta.least() <= floor {
             continue;
         }
-        if status[0] == Status::Ok || (!bounded && status[0] == Status::BelowBound) {
+        let above = status[0] == Status::Ok && keeps_the_bound(transition, t_f, [a_2, a_3]);
+        if above || (!bounded && matches!(status[0], Status::Ok | Status::BelowBound)) {
             row.at_most("least among neighbours", best.work - work[0], 4e-12 * best.work);
         }
     }
+}
+
+/// Whether `v >= 1` to the last of 32 digits: `t_f - theta' - t_f theta >= 0` over `x = t/t_f`.
+fn keeps_the_bound(transition: &Transition, t_f: f64, [a_2, a_3]: [f64; 2]) -> bool {
+    let number = DoubleDouble::new;
+    let steady = |v: f64| number(1.0) / number(v);
+    let (start, end) = (steady(transition.v_i), steady(transition.v_f));
+    let theta = [start, number(a_2), number(a_3), end - start - number(a_2) - number(a_3)];
+    let mut surplus = theta.map(|c| -number(t_f) * c);
+    surplus[0] = surplus[0] + number(t_f);
+    for power in 1..4 {
+        surplus[power - 1] = surplus[power - 1] - number(power as f64) * theta[power];
+    }
+    ExactCubic { c: surplus }.is_positive(false)
 }
