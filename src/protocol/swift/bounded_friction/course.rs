@@ -163,7 +163,7 @@ impl Course {
         for k in 1..8 {
             let near = 0.125 * f64::from(k);
             let anchor = self.anchor(Side::Start);
-            let exponent = self.exponent(anchor, near, 1.0 - near);
+            let exponent = self.exponent(anchor, near);
             // What stands still does so as long as its velocity is not 0 in double precision.
             if exponent > anchor.quiet && exponent < anchor.cap {
                 greatest = greatest.max(self.lean(anchor, near));
@@ -175,8 +175,7 @@ impl Course {
     /// By how much friction falls with `alpha_3` at a place, in units of `a`.
     #[inline(always)]
     pub fn lean(&self, anchor: &Anchor, near: f64) -> f64 {
-        let far = 1.0 - near;
-        anchor.gap / self.a * near * far * exp(self.exponent(anchor, near, far).min(MOST_EXPONENT))
+        anchor.gap / self.a * near * (1.0 - near) * exp(self.exponent(anchor, near).min(MOST_EXPONENT))
     }
 
     /// The course with another `alpha_3`.
@@ -193,11 +192,6 @@ impl Course {
     /// The same course, integrated forwards or not.
     pub fn towards(self, forward: bool) -> Course {
         if self.forward == forward { self } else { self.reversed() }
-    }
-
-    /// The greater velocity of the ends.
-    pub fn fastest_end(&self) -> f64 {
-        self.anchors[0].v.max(self.anchors[1].v)
     }
 
     /// The course with another measure.
@@ -260,10 +254,16 @@ impl Course {
         }
     }
 
-    /// `ln[(tau_M - tau)/gap]` with the gap of this side.
+    /// `ln[(tau_M - tau)/gap]` with the gap of this side: where `alpha_3` is next to `-ln R`, the sum of both is exact.
     #[inline(always)]
-    pub fn exponent(&self, anchor: &Anchor, near: f64, far: f64) -> f64 {
-        near * (anchor.l + self.alpha * far)
+    pub fn exponent(&self, anchor: &Anchor, near: f64) -> f64 {
+        near * ((anchor.l + self.alpha) - self.alpha * near)
+    }
+
+    /// Rounding of the exponent, in units of the last place of 1.
+    #[inline(always)]
+    pub fn uncertainty(&self, anchor: &Anchor, near: f64) -> f64 {
+        near * ((anchor.l + self.alpha).abs() + self.alpha.abs() * near)
     }
 
     /// `f = (tau - tau_0)/a`.
@@ -277,21 +277,21 @@ impl Course {
     #[inline(always)]
     fn distance(&self, side: Side, near: f64) -> f64 {
         let anchor = self.anchor(side);
-        anchor.gap * exp(self.exponent(anchor, near, 1.0 - near).min(MOST_EXPONENT))
+        anchor.gap * exp(self.exponent(anchor, near).min(MOST_EXPONENT))
     }
 
     /// Friction at a place, within the range of a double.
     #[inline(always)]
     pub fn friction(&self, side: Side, near: f64) -> f64 {
         let anchor = self.anchor(side);
-        anchor.friction - anchor.gap * exp_m1(self.exponent(anchor, near, 1.0 - near).min(MOST_EXPONENT))
+        anchor.friction - anchor.gap * exp_m1(self.exponent(anchor, near).min(MOST_EXPONENT))
     }
 
     /// `z = ln(theta v)` at a place with this `w`.
     #[inline(always)]
     pub fn excess(&self, side: Side, near: f64, w: f64) -> f64 {
         let anchor = self.anchor(side);
-        self.drive(anchor, self.exponent(anchor, near, 1.0 - near)) + self.kappa * w
+        self.drive(anchor, self.exponent(anchor, near)) + self.kappa * w
     }
 
     /// Velocity at a place with this `w` and `z`.
@@ -394,6 +394,7 @@ impl Course {
         let (tolerance, relative) = (self.size * tolerance, tolerance);
         let (damping, layer) = self.damping();
         let last_layer = SEEN * self.thin(Side::End);
+        let settles = work.map_or(0.0, |work| self.settles(work.accuracy));
         let grows = until.is_some() && self.kappa * self.pace(self.anchor(Side::Start)) < 0.0;
         effort.quadratures += 1;
         for (side, from, to, quiet) in self.stretches(until) {
@@ -416,6 +417,8 @@ impl Course {
                 let mild = 0.9 * MILD / stiffness.abs();
                 // What grows has to be followed: collocation would damp it.
                 let taken = if stiffness < 0.0 || h.min(left) < WORTH * mild { h.min(mild) } else { h };
+                // What the velocity does before theta follows it is next to nothing to theta.
+                let taken = if side == Side::Start && near < settles { taken.min(mild) } else { taken };
                 // Towards a layer at the end, or where theta follows the velocity up to there, panels shrink like what is
                 // left.
                 let thin = left > last_layer || (stiffness > 0.0 && left > mild);
@@ -535,6 +538,17 @@ impl Course {
         (0.25 * (self.kappa * self.pace(anchor)).abs(), (1.0 / layer).min(0.25))
     }
 
+    /// How far from its start theta comes to follow the velocity to an accuracy, where the change of velocity in between
+    /// is too small for theta to show it.
+    fn settles(&self, accuracy: f64) -> f64 {
+        let anchor = self.anchor(Side::Start);
+        let rate = self.kappa * self.pace(anchor);
+        let jump = (anchor.gap / self.a * (anchor.l + self.alpha) / rate).abs();
+        // Theta changes by that over kappa.
+        let faint = jump < FAINT * self.kappa.abs().min(1.0);
+        if rate > 0.0 && jump > accuracy && faint { ln(jump / accuracy) / rate } else { 0.0 }
+    }
+
     /// The part of a panel in the integral of the measure, and what its nodes lack of it.
     fn part(&self, panel: &Panel, rule: &Radau) -> (f64, f64) {
         let spare = match self.measure {
@@ -603,6 +617,9 @@ impl Course {
 
 /// The place that is as far from either end.
 const MIDDLE: f64 = 0.5;
+
+/// A relative change of velocity that theta may not show.
+const FAINT: f64 = 0.01;
 
 /// What theta falls on the way before it is lost makes of an error.
 const FALL: f64 = LOST + 30.0;

@@ -11,17 +11,19 @@ pub(super) struct Extent {
     pub work: f64,
     pub v_min: f64,
     pub v_max: f64,
+    /// Whether the velocity rises at the end of the last panel, and what it is there.
+    last: Option<(bool, f64)>,
 }
 
 impl Extent {
     pub fn new(transition: &Transition) -> Extent {
         let Transition { v_i, v_f, .. } = *transition;
-        Extent { work: 0.0, v_min: v_i.min(v_f), v_max: v_i.max(v_f) }
+        Extent { work: 0.0, v_min: v_i.min(v_f), v_max: v_i.max(v_f), last: None }
     }
 
     /// Of steady sliding.
     pub fn steady(course: &Course, v: f64) -> Extent {
-        Extent { work: course.friction(Side::Start, 0.0) * v * course.t_f, v_min: v, v_max: v }
+        Extent { work: course.friction(Side::Start, 0.0) * v * course.t_f, v_min: v, v_max: v, last: None }
     }
 
     /// Adds one panel.
@@ -30,6 +32,13 @@ impl Extent {
         let (mut before, mut sum) = (0.0, 0.0);
         let (_, z) = panel.state(course, 0.0);
         let mut bend_before = course.bend(panel.side, panel.from, panel.start, z);
+        // Where theta comes to follow the velocity from one panel to the next, the extremum lies between them.
+        if panel.side == Side::Start && panel.from == 0.0 {
+            self.last = None;
+        }
+        if let Some((_, v)) = self.last.filter(|&(rises, _)| rises != (bend_before > 0.0)) {
+            self.see(v);
+        }
         for j in 0..NODES {
             let (near, w, z) = (panel.place(rule.u[j]), panel.w[j], panel.z[j]);
             sum += rule.w[j] * course.friction(panel.side, near) * course.velocity(panel.side, w, z);
@@ -39,6 +48,7 @@ impl Extent {
             }
             (before, bend_before) = (rule.u[j], bend);
         }
+        self.last = Some((bend_before > 0.0, course.velocity(panel.side, panel.w[NODES - 1], panel.z[NODES - 1])));
         self.work += course.t_f * (panel.to - panel.from).abs() * sum;
     }
 
@@ -54,7 +64,11 @@ impl Extent {
             }
         }
         let (w, z) = panel.state(course, low);
-        let v = course.velocity(panel.side, w, z);
+        self.see(course.velocity(panel.side, w, z));
+    }
+
+    /// Notes an extremum.
+    fn see(&mut self, v: f64) {
         self.v_min = self.v_min.min(v);
         self.v_max = self.v_max.max(v);
     }

@@ -123,12 +123,18 @@ const ENOUGH: f64 = 1e-3;
 /// Growth of errors beyond which the other direction is tried.
 const MOST_ERRORS: f64 = 1e3;
 
-/// Rounding of theta beyond which a pass counts as lost, where less is not asked for.
+/// Rounding of theta beyond which a pass counts as lost, where less is not asked for: as long as another way may have
+/// less, and then.
+const LITTLE_NOISE: f64 = 1e-11;
 const MOST_NOISE: f64 = 1e-9;
 
 /// Most passes after the first search: Newton's method needs two or three, and a dozen more where theta has all but
 /// relaxed at the end.
 const MOST_PASSES: u32 = 40;
+
+/// Change of some velocity by the last step beyond which rounding has left too little of a way, as long as there may be
+/// another.
+const SURE: f64 = 1e-3;
 
 /// Tolerance of the nodes of the last pass, in units of rtol.
 const LAST: f64 = 0.1;
@@ -196,14 +202,17 @@ fn member(
     };
     let order = order.iter().filter(|&&place| !(accelerates && place == 4));
     let mut start = None;
-    for strict in [true, false] {
+    // Rounding of the time, spent at the greater velocity, allows no better.
+    let blur = 100.0 * f64::EPSILON * t_f * v_i.max(v_f);
+    let (little, most) = (LITTLE_NOISE.max(rtol), MOST_NOISE.max(rtol).max(blur));
+    for (strict, most_noise) in [(true, little), (true, most), (false, most)] {
         for course in order.clone().map(|&place| all[place]) {
             let Some((alpha, errors)) = rough(&course, start, strict, effort) else { continue };
             start = start.or((course.measure == Measure::Level || errors < MOST_ERRORS).then_some(alpha));
             if strict && errors > MOST_ERRORS {
                 continue;
             }
-            if let Some(found) = refined(course.with(alpha), rtol, strict, effort, &mut visit) {
+            if let Some(found) = refined(course.with(alpha), (rtol, most_noise), strict, effort, &mut visit) {
                 return Ok(found);
             }
         }
@@ -223,7 +232,7 @@ fn rough(course: &Course, start: Option<f64>, strict: bool, effort: &mut Effort)
 /// The course from a rough `alpha_3` on to the one that arrives; `None` where it does not come so far.
 fn refined(
     mut course: Course,
-    rtol: f64,
+    (rtol, most_noise): (f64, f64),
     strict: bool,
     effort: &mut Effort,
     visit: &mut impl FnMut(&Course, Option<&Panel>),
@@ -256,13 +265,12 @@ fn refined(
         let spent = step.abs() <= ROUNDING * rounding && step.abs() >= 0.5 * before
             || course.alpha + step == course.alpha
             || neighbours && !strict;
-        // Rounding of the time, spent at the greater velocity, allows no better.
-        let blur = 100.0 * f64::EPSILON * course.t_f * course.fastest_end();
-        if end.noise * f64::EPSILON > MOST_NOISE.max(rtol).max(blur) {
+        if end.noise * f64::EPSILON > most_noise {
             return None;
         }
         if last_pass && (within(0.5 * rtol) || spent) {
-            return Some(course);
+            // Where nothing depends on alpha but by rounding, this way tells nothing.
+            return within(if strict { SURE } else { 1.0 }).then_some(course);
         }
         // From side to side of the next double: another way to the end may tell more.
         if !step.is_finite() || last_pass && neighbours {

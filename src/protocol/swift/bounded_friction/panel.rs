@@ -92,13 +92,15 @@ pub(super) fn collocate(
     let anchor = course.anchor(side);
     let scale = (to - from).abs() * course.pace(anchor);
     let kappa = course.kappa;
-    let (mut drive, mut lean) = ([0.0; NODES], [0.0; NODES]);
+    let (mut drive, mut lean, mut doubt) = ([0.0; NODES], [0.0; NODES], [0.0; NODES]);
     for j in 0..NODES {
         let near = from * rule.rest[j] + to * rule.u[j];
-        let far = 1.0 - near;
-        let e = course.exponent(anchor, near, far);
+        let e = course.exponent(anchor, near);
         drive[j] = course.drive(anchor, e);
-        lean[j] = -anchor.gap / course.a * near * far * exp(if e < MOST_EXPONENT { e } else { MOST_EXPONENT });
+        let distance = anchor.gap / course.a * exp(if e < MOST_EXPONENT { e } else { MOST_EXPONENT });
+        lean[j] = -near * (1.0 - near) * distance;
+        // The drive rounds, and so does its exponent.
+        doubt[j] = drive[j].abs() + course.uncertainty(anchor, near) * distance;
     }
     let mut w = guess(course, side, from, start, scale, &drive, rule);
     let mut before = f64::INFINITY;
@@ -114,7 +116,7 @@ pub(super) fn collocate(
             slope[j] = scale * inverse * (excess - kappa * (1.0 + excess));
             push[j] = -scale * v * lean[j];
             // Where theta relaxes, it forgets all but the last of what rounding makes of the drive.
-            blur[j] = speed[j] * (drive[j].abs() + (kappa * w[j]).abs()) / (1.0 + slope[j].abs());
+            blur[j] = speed[j] * (doubt[j] + (kappa * w[j]).abs()) / (1.0 + slope[j].abs());
         }
         let sums = rule.integrals(&rate);
         let mut rest = [0.0; NODES];
@@ -168,7 +170,7 @@ pub(super) fn collocate(
             // What is left of them by rounding does not count.
             let count = (4 * NODES) as f64;
             let error = (count * rule.unresolved(&w) - count * f64::EPSILON * noise).max(0.0);
-            let (z, follows, rounding) = excesses(&w, start, scale, kappa, &drive, rule);
+            let (z, follows, rounding) = excesses(&w, start, scale, kappa, (&drive, &doubt), rule);
             let mut uncertain = 0.0;
             for j in 0..NODES {
                 speed[j] = scale.abs() * exp(z[j] - w[j]);
@@ -187,14 +189,21 @@ pub(super) fn collocate(
 /// `z = f + kappa w` is a small difference where theta follows the velocity; there `1 - e^z = theta'` is small, and the
 /// slope of `w` tells it.
 #[inline(always)]
-fn excesses(w: &Nodes, start: f64, scale: f64, kappa: f64, drive: &Nodes, rule: &Radau) -> (Nodes, bool, Nodes) {
+fn excesses(
+    w: &Nodes,
+    start: f64,
+    scale: f64,
+    kappa: f64,
+    (drive, doubt): (&Nodes, &Nodes),
+    rule: &Radau,
+) -> (Nodes, bool, Nodes) {
     let slopes = rule.slopes(&w.map(|w| w - start));
     let swing = w.iter().fold(0.0f64, |most, w| most.max((w - start).abs()));
     let (mut z, mut follows, mut rounding) = ([0.0; NODES], true, [0.0; NODES]);
     for j in 0..NODES {
         let gain = exp(w[j]) / scale;
         let told = slopes[j] * gain;
-        let (by_friction, by_slope) = (drive[j].abs() + (kappa * w[j]).abs(), SLOPE_NOISE * swing * gain.abs());
+        let (by_friction, by_slope) = (doubt[j] + (kappa * w[j]).abs(), SLOPE_NOISE * swing * gain.abs());
         if by_slope < by_friction && told.abs() < 0.5 {
             (z[j], rounding[j]) = (ln_1p(-told), by_slope);
         } else {
@@ -212,7 +221,7 @@ const SLOPE_NOISE: f64 = 300.0;
 #[inline(always)]
 fn guess(course: &Course, side: Side, from: f64, start: f64, scale: f64, drive: &Nodes, rule: &Radau) -> Nodes {
     let anchor = course.anchor(side);
-    let before = course.drive(anchor, course.exponent(anchor, from, 1.0 - from));
+    let before = course.drive(anchor, course.exponent(anchor, from));
     let excess = exp_m1(before + course.kappa * start);
     let decay = -scale * exp(-start) * (excess - course.kappa * (1.0 + excess));
     if decay <= STILL {
