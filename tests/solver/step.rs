@@ -654,3 +654,30 @@ fn reference_few_swings_tell_what_many_do() {
     }
     assert!(simulated > 12 && known > 8, "{simulated} {known}");
 }
+
+/// Errors of steps drive cycles off limit cycles on which a heavy block all but rests once in a swing: they have arrived
+/// where nothing but that moves them.
+#[test]
+fn regress_limit_cycles_that_errors_of_steps_drive_off() {
+    for (a, weakening, mass, k, x) in [
+        (6.68e-3, 0.353, 1.08e5, 2.28e3, 0.1452_f64),
+        (6.33e-4, 1.51, 8.9, 7.76, -5.87),
+        (7.83e-4, 8.78, 8.12e4, 4.02e5, -3.504),
+        (3.97e-3, 0.947, 6.47e5, 89.6, 8.083),
+        (4.65e-2, 4.79, 3.03e4, 96.7, -0.4829),
+    ] {
+        let law = Law { a, b: a * (1.0 + weakening) };
+        let step = Step { transition: Transition { law, v_i: x.exp(), v_f: 1.0 }, k: k * a, m: mass * a };
+        let [coarse, fine] = [1e-6, 1e-7].map(|rtol| respond(&step, rtol));
+        assert_eq!([coarse.outcome, fine.outcome], [Outcome::LimitCycle; 2], "{step:?}");
+        let [coarse, fine] = [coarse, fine].map(|response| response.cycle.expect("is a limit cycle"));
+        assert!(relative(coarse.v_peak, fine.v_peak) < 1e-6, "{step:?}: {coarse:?} {fine:?}");
+        assert!(relative(coarse.period, fine.period) < 1e-6, "{step:?}: {coarse:?} {fine:?}");
+        let troughs = [coarse, fine].map(|cycle| cycle.v_trough);
+        let told = troughs.iter().all(|trough| !trough.is_nan());
+        assert!(!told || relative(troughs[0], troughs[1]) < 1e-6, "{step:?}: {coarse:?} {fine:?}");
+        // Friction makes an almost free block swing from rest to 2 v_f.
+        let free = std::f64::consts::TAU * (mass / k).sqrt();
+        assert!((1.8..2.01).contains(&coarse.v_peak) && relative(coarse.period, free) < 0.2, "{step:?}: {coarse:?}");
+    }
+}

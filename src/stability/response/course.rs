@@ -4,6 +4,7 @@ use super::averaging;
 use super::fate::{Linear, MOST_STEPS, follow_once};
 use super::orbit::{Extremum, QUIET};
 use super::slider::Slider;
+use super::strengthening;
 
 /// The end of a response.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -77,8 +78,18 @@ pub(super) const VANISHING: f64 = -1000.0;
 /// A start closer than 1e-4 to sliding that is unstable is moved out to there or, by whole cycles, to below 1e-3: what
 /// grows from it has the same shape, but comes later, so that the times of its extrema are NaN.
 ///
-/// A block whose swings friction hardly changes is not simulated.
+/// A block whose swings friction hardly changes is not simulated. What friction that does not weaken with velocity brings to
+/// rest, but not within the work allowed, is told as far as the first swings do.
 pub fn follow(slider: &Slider, linear: Linear, x: f64, rtol: f64) -> Course {
+    let course = follow_to_the_end(slider, linear, x, rtol);
+    if course.fate != Fate::Undecided {
+        return course;
+    }
+    strengthening::course(slider, x, rtol).map_or(course, |told| Course { steps: course.steps + told.steps, ..told })
+}
+
+/// The same without what the first swings tell.
+fn follow_to_the_end(slider: &Slider, linear: Linear, x: f64, rtol: f64) -> Course {
     let told = averaging::course(slider, linear, x, rtol);
     if let Some(course) = told.or_else(|| averaging::course_after_first_swings(slider, linear, x, rtol)) {
         return course;

@@ -55,6 +55,10 @@ const BALANCED: f64 = 0.01;
 /// Cycles that are followed after sampling has led to another place.
 const PATIENCE: u32 = 10;
 
+/// Cycles next to a limit cycle that samples have found between them have come to it where they move by less than this in
+/// `PATIENCE` of them, in units of `rtol`: what is left are errors of steps, whose shares of each other are chance.
+const STILL: f64 = 0.1;
+
 /// Peaks that differ by less than this, in units of `rtol`, are as high as each other.
 const ALIKE_PEAKS: f64 = 0.3;
 
@@ -167,6 +171,10 @@ impl Follower<'_> {
         // Cycles so far, and after how many sampling may be tried again.
         let (mut count, mut again) = (0, 0);
         let (mut last_low, mut lingers) = (f64::NAN, 0);
+        // Whether cycles have come so near to each other that what is left are errors of steps.
+        let mut arrived = false;
+        // Where samples have found a limit cycle, and at which cycle.
+        let mut found: Option<(Place, u32)> = None;
         // Whether this is the response itself, not another way to the same end.
         let mut real = true;
         loop {
@@ -202,7 +210,9 @@ impl Follower<'_> {
             }
             count += 1;
             // Both coordinates of the section: relative to its size, or to what moves ln v by 1.
-            let change = ((place.z - last.z) / place.z.max(slider.force())).abs().max((place.y - last.y).abs());
+            let distance =
+                |from: Place| ((place.z - from.z) / place.z.max(slider.force())).abs().max((place.y - from.y).abs());
+            let change = distance(last);
             // Down to where rounding and the errors of steps stop it.
             let left = contraction.left;
             contraction.take(change, self.tolerance);
@@ -215,7 +225,12 @@ impl Follower<'_> {
                 (last_rate, contraction) = (f64::NAN, Contraction::after(f64::NAN));
                 continue;
             }
-            let near = contraction.left < 0.03 * self.rtol || (left < self.rtol && contraction.row == 0);
+            let still = found.is_some_and(|(from, since)| {
+                count >= since + PATIENCE && distance(from) < STILL * self.rtol && change < STILL * self.rtol
+            });
+            arrived &= change < self.rtol;
+            let near =
+                contraction.left < 0.03 * self.rtol || (left < self.rtol && contraction.row == 0) || still || arrived;
             let lower = (low - last_low).abs();
             last_low = low;
             // Small cycles may only have stopped to change fast.
@@ -228,6 +243,7 @@ impl Follower<'_> {
                     return Ok(Fate::Cycle { period: cycle.period, high, low });
                 }
                 lingers += 1;
+                arrived = true;
                 last_rate = rate;
                 continue;
             }
@@ -249,8 +265,18 @@ impl Follower<'_> {
                         (last_rate, contraction) = (f64::NAN, Contraction::after(f64::NAN));
                         continue;
                     }
-                    Ok(Slide::Near { place, change }) => {
+                    // Errors of steps drive cycles off again.
+                    Ok(Slide::Near { place, enclosed: true, .. })
+                        if found.is_some_and(|(from, _)| ln(place.z / from.z).abs() < self.rtol)
+                            && change < self.rtol =>
+                    {
+                        let [low, high] = cycle.exact_range(&mut orbit);
+                        self.vague = true;
+                        return Ok(Fate::Cycle { period: cycle.period, high, low });
+                    }
+                    Ok(Slide::Near { place, change, enclosed }) => {
                         real = false;
+                        found = enclosed.then_some((place, count));
                         orbit = Orbit::new(slider, [place.z, place.y, 0.0], self.tolerance);
                         before = Some(place);
                         (last_rate, contraction) = (f64::NAN, Contraction::after(change));

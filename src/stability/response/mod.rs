@@ -3,7 +3,7 @@
 //!
 //! In the scaled variables of `slider.rs` only `a`, `b`, `k`, `m v_f^2` and `v_i/v_f` enter. The response is
 //! integrated until its end is decided (`fate.rs`), and its numbers are known (`course.rs`), unless theory tells them
-//! (`averaging.rs`).
+//! (`averaging.rs`, `strengthening.rs`).
 
 mod averaging;
 mod course;
@@ -14,6 +14,7 @@ mod run;
 mod series;
 mod slide;
 mod slider;
+mod strengthening;
 
 use crate::model::{Law, Transition};
 use crate::numerics::elementary::{exp, ln};
@@ -137,7 +138,12 @@ pub struct Scaled {
 impl Scaled {
     /// The response, followed to its end.
     pub fn follow(&self, rtol: f64) -> Course {
-        follow(&self.slider, Linear::of(&self.slider), ln(self.ratio), rtol)
+        follow(&self.slider, self.linear(), ln(self.ratio), rtol)
+    }
+
+    /// Small motions about steady sliding at the final velocity.
+    fn linear(&self) -> Linear {
+        Linear::of(&self.slider)
     }
 
     /// The same numbers as bits, to tell equal ones by.

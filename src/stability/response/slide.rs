@@ -93,10 +93,12 @@ pub(super) enum Slide {
         place: Place,
         time: f64,
     },
-    /// Cycles come to a limit cycle near here by themselves; the last one changed `ln z` by `change`.
+    /// Cycles come to a limit cycle near here by themselves; the last one changed `ln z` by `change`. It is `enclosed`
+    /// where cycles grow on one side of it and shrink on the other.
     Near {
         place: Place,
         change: f64,
+        enclosed: bool,
     },
     /// Contact lifetime and `z` change together.
     Coupled,
@@ -181,7 +183,7 @@ impl Follower<'_> {
             if gone < 0.5 * stride && next.drift.abs() > 20.0 * next.rate.abs() {
                 // One cycle led here from far away: there is a limit cycle near, and cycles come to it by themselves.
                 let (place, change) = (next.place, next.drift.abs());
-                return Ok(Slide::Near { place, change });
+                return Ok(Slide::Near { place, change, enclosed: false });
             }
             if next.rate * direction <= 0.0 {
                 return self.cycle_between(&here, &next);
@@ -253,7 +255,8 @@ impl Follower<'_> {
         if sample.low < RESTING {
             let beside = self.sample(sample.moved(RESOLUTION * self.rtol), sample.slope, tolerance)?;
             if (beside.low - sample.low).abs() > self.rtol {
-                return Ok(Slide::Near { place: sample.place, change: RESOLUTION * self.rtol });
+                let change = RESOLUTION * self.rtol;
+                return Ok(Slide::Near { place: sample.place, change, enclosed: true });
             }
         }
         Ok(Slide::Decided(Fate::Cycle { period: sample.period, high: sample.high, low: sample.low }))
