@@ -81,7 +81,7 @@ pub struct Primitive {
 }
 
 /// Rows of the matrix that are taken together.
-pub const ROWS: usize = 4;
+pub const ROWS: usize = 2;
 
 /// The rule with `2 half` nodes, made at its first use.
 pub fn primitive(half: usize) -> &'static Primitive {

@@ -97,6 +97,7 @@ impl Bins {
         (bundle.low[last], bundle.high[last]) = (panel[2], panel[3]);
         (bundle.side[last], bundle.gap[last]) = (plan.side[lane], plan.gap[lane]);
         bundle.squarings[last] = plan.squarings[lane];
+        (bundle.from[last], bundle.to[last]) = (plan.from[lane], plan.to[lane]);
         indices[last] = index;
         *count = last + 1;
         if *count == LANES {
@@ -157,7 +158,12 @@ impl Bins {
         for (&load, prepared) in ready.iter().zip(&self.prepared) {
             let Load { indices, count, bin, whole, .. } = &mut self.loads[load];
             let works = prepared.works(primitive(nodes_of(*bin) as usize / 2), &mut self.space);
-            for (work_of, &i) in works.iter().zip(&indices[..std::mem::take(count)]) {
+            let (count, first) = (std::mem::take(count), indices[0]);
+            if *whole && indices.iter().enumerate().all(|(lane, &i)| i == first + lane) {
+                work[first..first + LANES].copy_from_slice(&works);
+                continue;
+            }
+            for (work_of, &i) in works.iter().zip(&indices[..count]) {
                 work[i] = if *whole { *work_of } else { work[i] + *work_of };
             }
         }
@@ -176,5 +182,7 @@ fn fill(bundle: &mut Bundle, plan: &Plan, first: usize, a_2: &Block, a_3: &Block
     (bundle.low, bundle.high) = ([0.0; LANES], [1.0; LANES]);
     bundle.side.copy_from_slice(&plan.side[lanes.clone()]);
     bundle.gap.copy_from_slice(&plan.gap[lanes.clone()]);
-    bundle.squarings.copy_from_slice(&plan.squarings[lanes]);
+    bundle.squarings.copy_from_slice(&plan.squarings[lanes.clone()]);
+    bundle.from.copy_from_slice(&plan.from[lanes.clone()]);
+    bundle.to.copy_from_slice(&plan.to[lanes]);
 }

@@ -29,6 +29,9 @@ pub(super) struct Bundle {
     pub gap: Lanes,
     /// log2 of the power.
     pub squarings: Lanes,
+    /// Bounds of the mapped variable `s`.
+    pub from: Lanes,
+    pub to: Lanes,
 }
 
 /// What the shortcuts of a landscape share of friction.
@@ -37,6 +40,8 @@ pub(super) struct Friction {
     a: f64,
     /// `b - a`.
     slope: f64,
+    /// `(b - a) t_f`, which `tau'` is summed in units of: hardly more than nothing where it is nothing.
+    drive: f64,
     /// `tau` for `n = 1` and `theta = 1`.
     constant: f64,
     /// Sum of the logarithms of theta at both ends.
@@ -46,9 +51,14 @@ pub(super) struct Friction {
 impl Friction {
     pub fn new(law: Law, ends: &Ends) -> Friction {
         let ln_theta = ln(ends.theta_0.high) + ln(ends.theta_1.high);
-        Friction { a: law.a, slope: law.b - law.a, constant: 1.0 - law.a * ln(ends.t_f), ln_theta }
+        let slope = law.b - law.a;
+        let unit = if slope.abs() > FAINT * law.a { slope } else { FAINT * law.a };
+        Friction { a: law.a, slope, drive: unit * ends.t_f, constant: 1.0 - law.a * ln(ends.t_f), ln_theta }
     }
 }
+
+/// `b - a` in units of `a` that stands for less, far below the rounding of `a`.
+const FAINT: f64 = 1e-30;
 
 /// Room for the values at the nodes: sums and differences of those on both sides of the middle.
 #[derive(Debug, Clone)]
@@ -73,9 +83,9 @@ pub(super) struct Prepared {
     /// Coefficients of theta and of n in powers of `eta`.
     theta: [Vector; 4],
     n: [Vector; 3],
-    /// `a dn/d(delta)` in powers of `eta`, times `side`.
+    /// `a dn/d(delta)` in powers of `eta`, in units of `drive side`.
     slope: [Vector; 2],
-    /// `(b - a) t_f`, times `side`, with the other sign.
+    /// `(b - a) t_f`, times `side`.
     drive: Vector,
     /// Mean of tau at both ends.
     tau: Vector,
@@ -124,7 +134,17 @@ impl Bundle {
     /// Lanes without a shortcut.
     pub const EMPTY: Bundle = {
         let none = [0.0; LANES];
-        Bundle { a_2: none, a_3: none, low: none, high: none, side: none, gap: none, squarings: none }
+        Bundle {
+            a_2: none,
+            a_3: none,
+            low: none,
+            high: none,
+            side: none,
+            gap: none,
+            squarings: none,
+            from: none,
+            to: none,
+        }
     };
 }
 
@@ -149,6 +169,7 @@ impl Prepared {
 pub(super) fn prepare(bundle: &Bundle, ends: &Ends, friction: &Friction, prepared: &mut Prepared) {
     let [a_2, a_3, low, high] = [bundle.a_2, bundle.a_3, bundle.low, bundle.high].map(Vector);
     let [side, gap, squarings] = [bundle.side, bundle.gap, bundle.squarings].map(Vector);
+    let [from, to] = [bundle.from, bundle.to].map(Vector);
     let (t_f, rise) = (ends.t_f, ends.rise.high);
     let [none, unit] = [0.0, 1.0].map(Vector::splat);
     // The polynomials are expanded about the end that the map grows from, of a part about that of `[0, 1]`.
@@ -173,24 +194,18 @@ pub(super) fn prepare(bundle: &Bundle, ends: &Ends, friction: &Friction, prepare
         ln_theta = choose(part, of_part, ln_theta);
     }
     let ln_n = (n_at(near) * n_at(far)).map(ln);
-    let (mut from, mut to, mut factor) = (gap, gap + length, unit);
+    let mut factor = unit;
     let (fewest, most) = (least(&squarings.0), -least(&squarings.map(|squarings| -squarings).0));
     for level in 1..=MOST_SQUARINGS {
         let more = squarings - Vector::splat(f64::from(level) - 0.5);
-        // Roots take long.
-        if most < f64::from(level) {
-            break;
-        }
-        from = choose(more, from.map(f64::sqrt), from);
-        to = choose(more, to.map(f64::sqrt), to);
         factor = choose(more, factor + factor, factor);
     }
     let half = 0.5 * (to - from);
     *prepared = Prepared {
         theta: [q0, side * q1, q2, side * q3],
         n: [n0, side * n1, n2],
-        slope: [friction.a * (side * n1), (2.0 * friction.a) * n2],
-        drive: friction.slope * t_f * side,
+        slope: [(friction.a / friction.drive) * n1, (2.0 * friction.a / friction.drive) * (side * n2)],
+        drive: friction.drive * side,
         tau: friction.constant + 0.5 * (friction.a * ln_n + friction.slope * ln_theta),
         gap: side * near + gap,
         squarings,
@@ -253,8 +268,9 @@ fn sum<const SQUARINGS: u32, const SAME: bool>(prepared: &Prepared, rule: &Primi
     let mut mean = Vector::splat(0.0);
     for j in 0..count {
         let none = [Vector::splat(0.0); 2];
-        let (mut v, mut g, mut below) = (none, none, none);
-        for (((v, g), below), x) in v.iter_mut().zip(&mut g).zip(&mut below).zip([rule.x[j], -rule.x[j]]) {
+        let (mut v, mut g, mut below, mut weight) = (none, none, none, none);
+        let places = v.iter_mut().zip(&mut g).zip(&mut below).zip(&mut weight);
+        for ((((v, g), below), weight), x) in places.zip([rule.x[j], -rule.x[j]]) {
             let s = middle + x * half;
             let (mut power, mut jacobian) = if SAME { (s * s, s) } else { (s, unit) };
             for level in 0..if SAME { 0 } else { SQUARINGS } {
@@ -266,14 +282,15 @@ fn sum<const SQUARINGS: u32, const SAME: bool>(prepared: &Prepared, rule: &Primi
             let n = n[0] + eta * (n[1] + eta * n[2]);
             let slope = slope[0] + eta * slope[1];
             // Over theta n, of which there is one division for two nodes.
-            *v = n * n * jacobian;
-            *g = (drive * n + slope * theta) * jacobian;
+            *v = n * n;
+            *g = n + slope * theta;
             *below = theta * n;
+            *weight = jacobian;
         }
         let inverse = 1.0 / (below[0] * below[1]);
-        let inverses = [below[1] * inverse, below[0] * inverse];
-        for ((v, g), inverse) in v.iter_mut().zip(&mut g).zip(inverses) {
-            (*v, *g) = (*v * inverse, *g * inverse);
+        let factors = [weight[0] * (below[1] * inverse), weight[1] * (below[0] * inverse)];
+        for ((v, g), factor) in v.iter_mut().zip(&mut g).zip(factors) {
+            (*v, *g) = (*v * factor, *g * factor);
         }
         (v_even[j], v_odd[j]) = (v[0] + v[1], v[0] - v[1]);
         (g_even[j], g_odd[j]) = (g[0] + g[1], g[0] - g[1]);
@@ -286,11 +303,10 @@ fn sum<const SQUARINGS: u32, const SAME: bool>(prepared: &Prepared, rule: &Primi
     let mut sum = Vector::splat(0.0);
     let pairs = v_odd.chunks_exact(ROWS).zip(g_odd.chunks_exact(ROWS));
     for (rows, (v, g)) in rule.matrix.chunks_exact(ROWS * count).zip(pairs) {
-        let (first, second) = rows.split_at(2 * count);
-        let ((one, two), (three, four)) = (first.split_at(count), second.split_at(count));
+        let (one, two) = rows.split_at(count);
         let (mut y, mut z) = ([Vector::splat(0.0); ROWS], [Vector::splat(0.0); ROWS]);
         for j in 0..count {
-            for (r, row) in [one, two, three, four].into_iter().enumerate() {
+            for (r, row) in [one, two].into_iter().enumerate() {
                 y[r] = y[r] + row[j] * g_even[j];
                 z[r] = z[r] + row[j] * v_even[j];
             }
@@ -299,5 +315,5 @@ fn sum<const SQUARINGS: u32, const SAME: bool>(prepared: &Prepared, rule: &Primi
             sum = sum + (g[r] * z[r] - v[r] * y[r]);
         }
     }
-    (scale * (tau * mean + scale * sum)).0
+    (scale * (tau * mean + scale * (drive * sum))).0
 }

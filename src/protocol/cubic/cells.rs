@@ -47,6 +47,9 @@ struct Cell {
     side: f64,
     gap: f64,
     squarings: f64,
+    /// Bounds of the mapped variable.
+    from: f64,
+    to: f64,
 }
 
 /// Which cell: bits of the coordinates of its middle.
@@ -95,7 +98,17 @@ impl Frame {
 }
 
 impl Cell {
-    const NONE: Cell = Cell { place: [0; 2], age: 0, pace: [0.0; 4], least: 0.0, side: 0.0, gap: 0.0, squarings: 0.0 };
+    const NONE: Cell = Cell {
+        place: [0; 2],
+        age: 0,
+        pace: [0.0; 4],
+        least: 0.0,
+        side: 0.0,
+        gap: 0.0,
+        squarings: 0.0,
+        from: 0.0,
+        to: 0.0,
+    };
 }
 
 impl Cells {
@@ -229,6 +242,7 @@ impl Cell {
         let [p0, p1, p2, p3] = self.pace;
         plan.bin[lane] = bin(p0 + u * p1 + v * (p2 + u * p3), self.least);
         (plan.side[lane], plan.gap[lane], plan.squarings[lane]) = (self.side, self.gap, self.squarings);
+        (plan.from[lane], plan.to[lane]) = (self.from, self.to);
     }
 }
 
@@ -281,7 +295,9 @@ fn assemble(cells: &[Cell; SLOTS], runs: &[Run], located: &Located, plan: &mut P
         }
         plan.side[lanes.clone()].copy_from_slice(&pick(one.side, other.side).0);
         plan.gap[lanes.clone()].copy_from_slice(&pick(one.gap, other.gap).0);
-        plan.squarings[lanes].copy_from_slice(&pick(one.squarings, other.squarings).0);
+        plan.squarings[lanes.clone()].copy_from_slice(&pick(one.squarings, other.squarings).0);
+        plan.from[lanes.clone()].copy_from_slice(&pick(one.from, other.from).0);
+        plan.to[lanes].copy_from_slice(&pick(one.to, other.to).0);
     }
 }
 
@@ -421,6 +437,7 @@ fn chart(frame: &Frame, cells: &[Place; TOGETHER]) -> [Cell; TOGETHER] {
                 (pp + mm) - (pm + mp),
             ];
             (cell.side, cell.gap, cell.squarings) = (side, gap, if squared { 1.0 } else { 0.0 });
+            (cell.from, cell.to) = if squared { (gap.sqrt(), (1.0 + gap).sqrt()) } else { (0.0, 1.0) };
             let most = if squared && room[c] < 0.0 { CHEAP / STEP } else { WHOLE };
             cell.least = 1.0 / most as f64;
         }

@@ -23,6 +23,9 @@ pub(super) struct Plan {
     pub side: Block,
     /// Distance of the centre of the map beyond that end.
     pub gap: Block,
+    /// Bounds of the mapped variable.
+    pub from: Block,
+    pub to: Block,
     /// 1 where a larger power might save nodes.
     pub deeper: Block,
     /// Where a panel that asks for too many nodes is best cut.
@@ -33,7 +36,7 @@ impl Plan {
     /// Not yet made.
     pub const EMPTY: Plan = {
         let none = [0.0; BLOCK];
-        Plan { bin: [0; BLOCK], squarings: none, side: none, gap: none, deeper: none, cut: none }
+        Plan { bin: [0; BLOCK], squarings: none, side: none, gap: none, from: none, to: none, deeper: none, cut: none }
     };
 }
 
@@ -349,10 +352,18 @@ fn panels<T: Real, const SQUARINGS: u32>(
         let far = near - side * length;
         let gap = if straight { 0.0 } else { gap[i].wide() };
         (plan.squarings[i], plan.side[i], plan.gap[i]) = (f64::from(squarings[i]), side, gap);
+        (plan.from[i], plan.to[i]) = (gap, gap + length);
         plan.deeper[i] = f64::from(deeper[i]);
         let path = Path::new(ends, a_2[i], a_3[i]);
         let sound = path.is_sound(centre > 0.0, near, far, accuracy);
         plan.bin[i] = if sound & (doubt[i] == 0.0) { bin[i] as u32 } else { BINS as u32 };
+    }
+    for level in 1..=SQUARINGS {
+        for ((from, to), &squarings) in plan.from.iter_mut().zip(&mut plan.to).zip(&squarings) {
+            let more = squarings >= level as f32;
+            *from = if more { from.sqrt() } else { *from };
+            *to = if more { to.sqrt() } else { *to };
+        }
     }
 }
 
