@@ -24,7 +24,7 @@ const SPELL: usize = 20;
 
 /// Multiplications and additions at one node, without those of the bilinear form (one for each pair of nodes) and
 /// without the division.
-const OF_A_NODE: f64 = 30.0;
+const OF_A_NODE: f64 = 27.0;
 
 fn main() {
     let ln = one_ln();

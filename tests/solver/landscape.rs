@@ -365,6 +365,48 @@ fn no_order_and_no_split_changes_a_bit() {
     }
 }
 
+/// On lines of as many points as are settled together most least velocities are searched for span by span.
+#[test]
+fn spans_of_a_line_are_as_their_shortcuts_alone() {
+    let landscape = Landscape::new(&PAPER, 0.037, 1e-10);
+    let a_3 = axis(401);
+    let mut inside = 0;
+    for a_2 in [-0.4, -0.31, -0.05364, 0.0171] {
+        let (work, v_min, status, _) = line(&landscape, a_2, &a_3);
+        for (i, &a_3) in a_3.iter().enumerate().filter(|&(i, _)| status[i] != Status::Infeasible) {
+            let shortcut = Plain { transition: PAPER, t_f: 0.037, a_2, a_3 };
+            let alone = shortcut.found(&landscape);
+            assert_eq!((alone.work.to_bits(), alone.v_min.to_bits()), (work[i].to_bits(), v_min[i].to_bits()));
+            let [start, end] = [0.0, -f64::MIN_POSITIVE].map(|u| shortcut.at(u)).map(|(theta, n)| n / (0.037 * theta));
+            inside += u32::from(alone.v_min < 0.999 * start.min(end));
+        }
+        // Fewer velocities than shortcuts are wanted, down to none of the last spans.
+        for wanted in (0..a_3.len()).step_by(29) {
+            let (mut some, mut status) = (vec![0.0; wanted], status.clone());
+            let out = Shortcuts { work: &mut [], v_min: &mut some, status: &mut status };
+            landscape.evaluate(&[a_2; 401], &a_3, out);
+            assert_eq!(some[..], v_min[..wanted]);
+        }
+    }
+    assert!(inside > 200, "{inside}");
+}
+
+/// `tau'` is summed in units of `b - a`, which may be nothing.
+#[test]
+fn equal_effects_of_velocity_and_contacts_keep_their_digits() {
+    for b in [0.03, 0.03 * (1.0 + f64::EPSILON), 0.03 * (1.0 - 1e-12), 0.03 + 1e-9] {
+        let transition = Transition { law: Law { a: 0.03, b }, ..PAPER };
+        let landscape = Landscape::new(&transition, 0.037, 1e-12);
+        for (a_2, a_3) in [(-0.12, -0.066), (-0.25, 0.1), (-0.05, -0.3)] {
+            let shortcut = Plain { transition, t_f: 0.037, a_2, a_3 };
+            let found = shortcut.found(&landscape);
+            let [work, size] = shortcut.work();
+            assert_ne!(found.status, Status::Infeasible);
+            assert!((found.work - work).abs() <= 1e-12 * size, "{shortcut:?}: {} and {work}", found.work);
+        }
+    }
+}
+
 #[test]
 fn effort_is_spent_on_feasible_points_alone() {
     let landscape = Landscape::new(&PAPER, 0.02, 1e-10);

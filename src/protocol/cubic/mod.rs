@@ -31,9 +31,7 @@ pub(super) use moments::{Basis, Moments};
 pub(super) use path::{Ends, Path, rise};
 use queue::Queue;
 use rules::{Accuracy, Panel, Zeros, choose};
-use screen::{
-    Ending, SEARCH, SPAN, SPANS, end_velocities, end_velocities_of_span, inner_velocities, on_side, screen, settle,
-};
+use screen::{SEARCH, SPAN, SPANS, end_velocities, end_velocities_of_span, inner_velocities, on_side, screen, settle};
 use works::Works;
 
 /// The work landscape of one transition in one time over the plane of `(alpha_2, alpha_3)`.
@@ -118,8 +116,7 @@ impl Landscape {
                     status[span].fill(common);
                     if common != Status::Infeasible {
                         if first < velocities {
-                            let ending = end_velocities_of_span(&self.ends, a_2, a_3, common);
-                            self.end_velocities(first, ending, [a_2, a_3], &mut open, status, &mut v_min[..velocities]);
+                            self.velocities_of_span(first, [a_2, a_3], &mut open, status, &mut v_min[..velocities]);
                         }
                         works.push_span(first, a_2, a_3);
                     }
@@ -136,9 +133,13 @@ impl Landscape {
                         continue;
                     }
                     if first < velocities {
-                        let ending = end_velocities(&self.ends, &a_2_lanes, &a_3_lanes, &found);
+                        let mut least = [0.0; LANES];
+                        let left = end_velocities(&self.ends, &a_2_lanes, &a_3_lanes, &found, &mut least);
+                        for ((v_min, least), found) in v_min[..velocities][first..].iter_mut().zip(least).zip(found) {
+                            *v_min = if found == Status::Infeasible { *v_min } else { least };
+                        }
                         let places = [&a_2_lanes, &a_3_lanes];
-                        self.end_velocities(first, ending, places, &mut open, status, &mut v_min[..velocities]);
+                        self.search(first, left, places, &mut open, status, &mut v_min[..velocities]);
                     }
                     for i in block {
                         if status[i] != Status::Infeasible {
@@ -154,20 +155,47 @@ impl Landscape {
         effort
     }
 
-    /// Writes the least velocities of the feasible shortcuts from `first` on where an end has them.
+    /// Writes the least velocities of a span of feasible shortcuts with one status; those that no end is sure to have
+    /// are left open.
     #[inline(always)]
-    fn end_velocities<const N: usize>(
+    fn velocities_of_span(
         &self,
         first: usize,
-        (found, mut left): Ending<N>,
+        places: [&[f64; SPAN]; 2],
+        open: &mut Queue<SEARCH>,
+        status: &[Status],
+        v_min: &mut [f64],
+    ) {
+        let [a_2, a_3] = places;
+        let mut least = [0.0; SPAN];
+        let wanted = &mut v_min[first..];
+        let left = match wanted.first_chunk_mut() {
+            Some(wanted) => end_velocities_of_span(&self.ends, a_2, a_3, status[first], wanted),
+            None => {
+                let left = end_velocities_of_span(&self.ends, a_2, a_3, status[first], &mut least);
+                wanted.copy_from_slice(&least[..wanted.len()]);
+                left
+            }
+        };
+        match wanted.first_chunk_mut() {
+            Some(wanted) if left == u32::MAX => {
+                *wanted = inner_velocities(&self.ends, a_2, a_3).map(|found| on_side(found, status[first]));
+            }
+            _ => self.search(first, left, places, open, status, v_min),
+        }
+    }
+
+    /// Leaves the shortcuts from `first` on that have a bit open for a search of their least velocities, if wanted.
+    #[inline(always)]
+    fn search<const N: usize>(
+        &self,
+        first: usize,
+        mut left: u32,
         [a_2, a_3]: [&[f64; N]; 2],
         open: &mut Queue<SEARCH>,
         status: &[Status],
         v_min: &mut [f64],
     ) {
-        for ((v_min, found), &status) in v_min[first..].iter_mut().zip(found).zip(&status[first..]) {
-            *v_min = if status == Status::Infeasible { *v_min } else { found };
-        }
         while left != 0 {
             let lane = left.trailing_zeros() as usize;
             left &= left - 1;

@@ -10,6 +10,7 @@ use multiversion::multiversion;
 use super::path::{Ends, MOST_STEPS, Path};
 use crate::numerics::cubic::Cubic;
 use crate::numerics::lanes::{LANES, Lanes};
+use crate::numerics::real::Real;
 use crate::protocol::Status;
 
 /// Shortcuts of a span, which its ends may settle.
@@ -227,19 +228,23 @@ fn sign_of(value: f64, doubt: f64) -> f64 {
     }
 }
 
-/// Least velocities of feasible shortcuts where an end has them, and a bit for each where that is not certain.
-pub(super) type Ending<const N: usize> = ([f64; N], u32);
-
-/// [`Ending`] of eight shortcuts.
+/// Writes the least velocities of feasible shortcuts as if an end had them, and returns a bit for each where that is
+/// not certain: of eight shortcuts.
 #[multiversion(targets(
     "x86_64+avx+avx2+bmi1+bmi2+avx512f+avx512bw+avx512cd+avx512dq+avx512vl",
     "x86_64+avx+avx2+bmi1+bmi2"
 ))]
-pub(super) fn end_velocities(ends: &Ends, a_2: &Lanes, a_3: &Lanes, status: &[Status; LANES]) -> Ending<LANES> {
-    ending(ends, a_2, a_3, status)
+pub(super) fn end_velocities(
+    ends: &Ends,
+    a_2: &Lanes,
+    a_3: &Lanes,
+    status: &[Status; LANES],
+    v_min: &mut Lanes,
+) -> u32 {
+    ending(ends, a_2, a_3, status, v_min)
 }
 
-/// [`Ending`] of a span with one status.
+/// The same of a span with one status.
 #[multiversion(targets(
     "x86_64+avx+avx2+bmi1+bmi2+avx512f+avx512bw+avx512cd+avx512dq+avx512vl",
     "x86_64+avx+avx2+bmi1+bmi2"
@@ -249,14 +254,21 @@ pub(super) fn end_velocities_of_span(
     a_2: &[f64; SPAN],
     a_3: &[f64; SPAN],
     status: Status,
-) -> Ending<SPAN> {
-    ending(ends, a_2, a_3, &[status; SPAN])
+    v_min: &mut [f64; SPAN],
+) -> u32 {
+    ending(ends, a_2, a_3, &[status; SPAN], v_min)
 }
 
 /// An end with `v = m` has the least velocity if the cubic `n - m t_f theta` has no coefficient below 0.
 #[inline(always)]
-fn ending<const N: usize>(ends: &Ends, a_2: &[f64; N], a_3: &[f64; N], status: &[Status; N]) -> Ending<N> {
-    let (mut v_min, mut open) = ([0.0; N], [0; N]);
+fn ending<const N: usize>(
+    ends: &Ends,
+    a_2: &[f64; N],
+    a_3: &[f64; N],
+    status: &[Status; N],
+    v_min: &mut [f64; N],
+) -> u32 {
+    let mut open = [0; N];
     for i in 0..N {
         let path = Path::new(ends, a_2[i], a_3[i]);
         let (v, place) = path.v_ends();
@@ -270,7 +282,7 @@ fn ending<const N: usize>(ends: &Ends, a_2: &[f64; N], a_3: &[f64; N], status: &
         let is_open = lost | !((first > doubt) & (second > doubt));
         open[i] = if is_open { 1u32 << i } else { 0 };
     }
-    (v_min, open.iter().fold(0, |all, bit| all | bit))
+    open.iter().fold(0, |all, bit| all | bit)
 }
 
 /// The status is exact, a least velocity is rounded: they agree on which side of the bound it is.
@@ -280,7 +292,7 @@ pub(super) fn on_side(v_min: f64, status: Status) -> f64 {
 }
 
 /// Shortcuts whose least velocities are searched for together: enough to hide the latency of roots and quotients.
-pub(super) const SEARCH: usize = 4 * LANES;
+pub(super) const SEARCH: usize = SPAN;
 
 /// One value of each of them.
 type Search = [f64; SEARCH];
@@ -303,38 +315,121 @@ fn least_velocities(ends: &Ends, a_2: &Search, a_3: &Search) -> [Search; 3] {
     least(ends, a_2, a_3)
 }
 
-/// `v = n/(t_f theta) >= m` where the cubic `n - m t_f theta` is not negative. The minimum of that cubic gives the
-/// next, lower `m`: Dinkelbach's method (Management Science 13, 492, 1967), which falls to the least ratio and doubles
-/// its digits with each step. Returns the least velocities, their places, and 1 where rounding shows; infeasible lanes
-/// hold no meaning.
+/// Stationary places of `n/theta` by Newton's method, in single precision but for the last step; where the cubic
+/// `n - v t_f theta` with the velocity `v` there does not show that there is no lower one, [`lower`] goes on. Returns
+/// the least velocities, their places, and 1 where rounding shows; infeasible lanes hold no meaning.
 #[inline(always)]
 fn least<const N: usize>(ends: &Ends, a_2: &[f64; N], a_3: &[f64; N]) -> [[f64; N]; 3] {
-    let (mut v_min, mut place) = ([0.0; N], [0.0; N]);
-    let (mut n, mut theta) = ([0.0; N], [0.0; N]);
+    let (mut v_min, mut place, mut due) = ([0.0; N], [0.0; N], [0.0; N]);
+    let rough = rough_places(ends, a_2, a_3);
     for i in 0..N {
         let path = Path::new(ends, a_2[i], a_3[i]);
         let (theta_end, n_end) = path.about_end();
         let (theta_start, n_start) = (path.theta().c[0], path.n().c[0]);
         // Ratios are compared without a division.
         let first = n_start * theta_end[0] < n_end[0] * theta_start;
-        place[i] = if first { 0.0 } else { 1.0 };
-        (n[i], theta[i]) = (if first { n_start } else { n_end[0] }, if first { theta_start } else { theta_end[0] });
+        let (n, theta) = (if first { n_start } else { n_end[0] }, if first { theta_start } else { theta_end[0] });
+        let x = nearer(path.theta().c, ends.t_f, f64::from(rough[i]));
+        let (n_there, theta_there) = (path.n().at(x), path.theta().at(x));
+        let inside = (x > 0.0) & (x < 1.0) & (n_there * theta < n * theta_there) & (n_there > 0.0);
+        let (n, theta) = (if inside { n_there } else { n }, if inside { theta_there } else { theta });
+        let x = if inside {
+            x
+        } else if first {
+            0.0
+        } else {
+            1.0
+        };
+        let v = n / (ends.t_f * theta);
+        // With its value and slope at x taken off, the cubic is the square of the distance times a linear function.
+        let [_, c1, c2, c3] = path.surplus(v * ends.t_f).c;
+        let slope = c1 + x * (2.0 * c2 + 3.0 * x * c3);
+        let (below, above) = (c2 + 2.0 * x * c3, c2 + c3 + 2.0 * x * c3);
+        let factor = if below < above { below } else { above };
+        let outward = if first { slope >= 0.0 } else { slope <= 0.0 };
+        let settled = (factor > 0.0) & ((slope * slope < LEVEL * n * factor) | (!inside & outward));
+        (v_min[i], place[i]) = (v, x);
+        due[i] = if settled { 0.0 } else { 1.0 };
     }
-    // From a place inside there are fewer steps to go.
-    for x in [0.25, 0.5, 0.75] {
-        for i in 0..N {
-            let path = Path::new(ends, a_2[i], a_3[i]);
-            let (n_there, theta_there) = (path.n().at(x), path.theta().at(x));
-            let lower = (n_there * theta[i] < n[i] * theta_there) & (n_there > 0.0);
-            n[i] = if lower { n_there } else { n[i] };
-            theta[i] = if lower { theta_there } else { theta[i] };
-            place[i] = if lower { x } else { place[i] };
+    if due != [0.0; N] {
+        lower(ends, a_2, a_3, &mut v_min, &mut place, due);
+    }
+    let mut faint = [0.0; N];
+    for i in 0..N {
+        let path = Path::new(ends, a_2[i], a_3[i]);
+        let slack = path.slack();
+        let lost = is_faint(path.n(), 3.0 * slack, place[i], ends.v_loss)
+            | is_faint(path.theta(), slack, place[i], ends.v_loss);
+        faint[i] = if lost { 1.0 } else { 0.0 };
+    }
+    [v_min, place, faint]
+}
+
+/// Where to look for least velocities: from the least of some, a few steps of Newton's method.
+#[inline(always)]
+fn rough_places<const N: usize>(ends: &Ends, a_2: &[f64; N], a_3: &[f64; N]) -> [f32; N] {
+    let t_f = ends.t_f as f32;
+    let mut theta = [[0.0f32; N]; 4];
+    for i in 0..N {
+        let path = Path::new(ends, a_2[i], a_3[i]);
+        for (theta, c) in theta.iter_mut().zip(path.theta().c) {
+            theta[i] = c as f32;
         }
     }
+    let mut place = [0.0f32; N];
     for i in 0..N {
-        v_min[i] = n[i] / (ends.t_f * theta[i]);
+        let [c0, c1, c2, c3] = [theta[0][i], theta[1][i], theta[2][i], theta[3][i]];
+        let (mut least, mut of) = (t_f - c1, c0);
+        for x in [0.25, 0.5, 0.75, 1.0] {
+            let theta = c0 + x * (c1 + x * (c2 + x * c3));
+            let n = t_f - (c1 + x * (2.0 * c2 + 3.0 * x * c3));
+            let less = n * of < least * theta;
+            (least, of) = (if less { n } else { least }, if less { theta } else { of });
+            place[i] = if less { x } else { place[i] };
+        }
     }
-    let mut due = [1.0; N];
+    for _ in 0..STEPS {
+        for i in 0..N {
+            place[i] = nearer([theta[0][i], theta[1][i], theta[2][i], theta[3][i]], t_f, place[i]);
+        }
+    }
+    place
+}
+
+/// A step of Newton's method from `x` to a place within `[0, 1]` where `n/theta` is least.
+#[inline(always)]
+fn nearer<T: Real>([c0, c1, c2, c3]: [T; 4], t_f: T, x: T) -> T {
+    let [zero, one, two, three, six] = [0.0, 1.0, 2.0, 3.0, 6.0].map(T::of);
+    let theta = c0 + x * (c1 + x * (c2 + x * c3));
+    let slope = c1 + x * (two * c2 + three * c3 * x);
+    let bend = two * c2 + six * c3 * x;
+    let n = t_f - slope;
+    // theta^2 d(n/theta)/dx with the other sign, and its derivative.
+    let (fall, change) = (bend * theta + n * slope, six * c3 * theta + n * bend);
+    let next = x - fall / change;
+    let within = if next > zero { next } else { zero };
+    let within = if within < one { within } else { one };
+    if change < zero { within } else { x }
+}
+
+/// Steps in single precision.
+const STEPS: usize = 3;
+
+/// The square of the slope of `n - v t_f theta` that shows in the velocity, relative to `n` and the curvature.
+const LEVEL: f64 = 1e-15;
+
+/// `v = n/(t_f theta) >= m` where the cubic `n - m t_f theta` is not negative. The minimum of that cubic gives the
+/// next, lower `m`: Dinkelbach's method (Management Science 13, 492, 1967), which falls to the least ratio and doubles
+/// its digits with each step.
+#[inline(always)]
+fn lower<const N: usize>(
+    ends: &Ends,
+    a_2: &[f64; N],
+    a_3: &[f64; N],
+    v_min: &mut [f64; N],
+    place: &mut [f64; N],
+    mut due: [f64; N],
+) {
     for _ in 0..MOST_STEPS {
         for i in 0..N {
             let path = Path::new(ends, a_2[i], a_3[i]);
@@ -351,15 +446,6 @@ fn least<const N: usize>(ends: &Ends, a_2: &[f64; N], a_3: &[f64; N]) -> [[f64; 
             break;
         }
     }
-    let mut faint = [0.0; N];
-    for i in 0..N {
-        let path = Path::new(ends, a_2[i], a_3[i]);
-        let slack = path.slack();
-        let lost = is_faint(path.n(), 3.0 * slack, place[i], ends.v_loss)
-            | is_faint(path.theta(), slack, place[i], ends.v_loss);
-        faint[i] = if lost { 1.0 } else { 0.0 };
-    }
-    [v_min, place, faint]
 }
 
 /// After a step as small as this, relative, the next one is within rounding.
