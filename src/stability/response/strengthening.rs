@@ -7,8 +7,8 @@
 //! -V' = (a - b) (v - 1) ln v + b [(u ln u - u + 1)/theta + u - 1 - ln u],
 //! ```
 //!
-//! never rises, and vanishes at steady sliding alone. Where the velocity is extremal, friction carries the spring's force,
-//! `z = a ln v + b ln theta`, so the least `V` that an extremum takes bounds all those to come.
+//! never rises, and vanishes at steady sliding alone. Where the velocity is extremal, friction carries the spring's
+//! force, `z = a ln v + b ln theta`, so the least `V` that an extremum takes bounds all those to come.
 
 use super::course::{Course, Doubts, Fate};
 use super::orbit::{BAND, Extremum, Orbit, Stop};
@@ -44,8 +44,9 @@ pub(super) fn course(slider: &Slider, x: f64, rtol: f64) -> Option<Course> {
 }
 
 impl Slider {
-    /// A spring so soft that contacts follow the velocity, `theta v = 1`, and friction only adds `a/v^2` to the mass. The block
-    /// swings in the potential `U = M (v - 1)^2/2 + a (1/v - 1 + ln v)`, which takes it from its fastest to its slowest moment.
+    /// A spring so soft that contacts follow the velocity, `theta v = 1`, and friction only adds `a/v^2` to the mass. The
+    /// block swings in the potential `U = M (v - 1)^2/2 + a (1/v - 1 + ln v)`, which takes it from its fastest to its
+    /// slowest moment.
     fn adiabatic(&self, x: f64, rtol: f64) -> Option<Course> {
         let &Slider { a, b, inertia: mass, k } = self;
         let potential = |x: f64| 0.5 * mass * exp_m1(x) * exp_m1(x) + a * lag(x);
