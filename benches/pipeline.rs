@@ -129,7 +129,7 @@ fn threads(folder: &Path) -> Outcome<()> {
     Ok(())
 }
 
-/// Rows a second against the accuracy asked for. Writing has a thread of its own, so what it adds is not what it takes.
+/// Rows a second against the accuracy asked for. Writing has threads of its own, so what it adds is not what it takes.
 fn accuracy(folder: &Path) -> Outcome<()> {
     let in_memory = Path::new(IN_MEMORY);
     let in_memory = in_memory.is_dir().then(|| in_memory.join(format!("slipsweep-pipeline-{}", std::process::id())));

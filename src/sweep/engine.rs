@@ -1,15 +1,15 @@
 //! The engine: computes the parts that are missing or damaged, encodes and writes them.
 //!
-//! A part is computed by all threads that have nothing else to do, and written by a thread of its own while the next parts are computed. That
-//! thread also encodes a part if it has not enough to do; else one of those that compute does. Nothing of what is written depends on how the
-//! work was spread.
+//! A part is computed by all threads that have nothing else to do, and written by threads of their own while the next parts are computed. Those
+//! also encode a part if they have not enough to do; else one of those that compute does. Nothing of what is written depends on how the work was
+//! spread.
 
 use std::fmt;
 use std::ops::{Deref, Range};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::mpsc::{Sender, channel, sync_channel};
-use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::thread;
 
 use rayon::{ThreadPool, ThreadPoolBuilder};
@@ -143,11 +143,12 @@ pub fn run_shard(
     // Parts that the disk has not finished.
     let queued = AtomicUsize::new(0);
     thread::scope(|scope| {
-        // The disk has a thread of its own, so that no thread that computes waits for it.
+        // The disk has threads of its own, so that no thread that computes waits for it.
         let (to_disk, parts) = sync_channel::<Part<'_>>(1);
-        let (queued, failure) = (&queued, &failure);
+        let (queued, failure, parts) = (&queued, &failure, Arc::new(Mutex::new(parts)));
+        let next = move || locked(&parts).recv();
         let write = move || {
-            for Part { stage, number, content } in parts {
+            while let Ok(Part { stage, number, content }) = next() {
                 // Who asks to stop does not want to wait for the parts that are queued here.
                 failure.keep(signal.check().map_err(RunError::from).and_then(|()| {
                     let bytes = match content {
@@ -159,7 +160,9 @@ pub fn run_shard(
                 queued.fetch_sub(1, Ordering::Relaxed);
             }
         };
-        thread::Builder::new().spawn_scoped(scope, write).map_err(RunError::Writer)?;
+        for write in std::iter::repeat_n(write, WRITERS) {
+            thread::Builder::new().spawn_scoped(scope, write).map_err(RunError::Writer)?;
+        }
         for ((request, stage), share) in sweep.requests.iter().zip(&stages).zip(shares) {
             let table = stage.table;
             let mut done = TableOutcome::default();
@@ -233,13 +236,16 @@ pub fn pool(threads: usize) -> Result<ThreadPool, RunError> {
 /// Most bytes of the sheets that are being filled at a time, unless there are fewer than two.
 const SHEETS: u64 = 1 << 27;
 
-/// Parts that the writing thread may have before it, the one that it is at included: with fewer than two it would wait for the next.
-const AHEAD: usize = 2;
+/// Threads that encode and write: while one waits for the disk to sync its part, another one has the processor.
+const WRITERS: usize = 2;
+
+/// Parts that those threads may have before them, the ones that they are at included: with fewer they would wait for the next.
+const AHEAD: usize = WRITERS + 1;
 
 /// Computes the parts `numbers` of a table and hands the number and the sheet of each to `take`, in no particular order; of a part with a
 /// row that panics, the row.
 ///
-/// One part more than there are threads is under way at a time, so that no thread waits for the end of a part, and two may be kept by
+/// One part more than there are threads is under way at a time, so that no thread waits for the end of a part, and three may be kept by
 /// whoever takes them; fewer where parts are large and threads many, since the threads share the rows of a part.
 pub fn compute(
     pool: &ThreadPool,
