@@ -120,6 +120,9 @@ const FAR_APART_FOR_THETA: f64 = 1e3;
 /// What ends it.
 const ENOUGH: f64 = 1e-3;
 
+/// Accuracy of what is not to be had at less.
+const FINE: f64 = 1e-8;
+
 /// Growth of errors beyond which the other direction is tried.
 const MOST_ERRORS: f64 = 1e3;
 
@@ -205,7 +208,11 @@ fn member(
     // Rounding of the time, spent at the greater velocity, allows no better.
     let blur = 100.0 * f64::EPSILON * t_f * v_i.max(v_f);
     let (little, most) = (LITTLE_NOISE.max(rtol), MOST_NOISE.max(rtol).max(blur));
-    for (strict, most_noise) in [(true, little), (true, most), (false, most)] {
+    // Where errors grow on every way, a rough pass may be lost and a fine one not.
+    let fine = rtol.min(FINE);
+    for (strict, most_noise, rtol) in
+        [(true, little, rtol), (true, most, rtol), (false, most, rtol), (false, most, fine)]
+    {
         for course in order.clone().map(|&place| all[place]) {
             let Some((alpha, errors)) = rough(&course, start, strict, effort) else { continue };
             start = start.or((course.measure == Measure::Level || errors < MOST_ERRORS).then_some(alpha));
@@ -224,9 +231,21 @@ fn member(
 fn rough(course: &Course, start: Option<f64>, strict: bool, effort: &mut Effort) -> Option<(f64, f64)> {
     match course.measure {
         Measure::Level => search(course, start.unwrap_or(0.0), strict, effort),
-        Measure::Slip { spare } | Measure::Meeting { spare } => close(course, 2.0 * course.t_f / spare, effort),
-        Measure::Lag { spare } => close(course, -2.0 * course.t_f / spare, effort),
+        Measure::Slip { spare } | Measure::Meeting { spare } => {
+            closest(course, 2.0 * course.t_f / spare, strict, effort)
+        }
+        Measure::Lag { spare } => closest(course, -2.0 * course.t_f / spare, strict, effort),
     }
+}
+
+/// [`close`], and once more to as much as the growth of errors asks for where there is no way on which they grow less.
+fn closest(course: &Course, start: f64, strict: bool, effort: &mut Effort) -> Option<(f64, f64)> {
+    let (alpha, errors) = close(course, start, (COARSE, ENOUGH), effort)?;
+    if strict || errors < MOST_ERRORS {
+        return Some((alpha, errors));
+    }
+    let fine = ((COARSE / errors).max(FINEST), ENOUGH * ENOUGH);
+    close(course, alpha / course.unit(), fine, effort).or(Some((alpha, errors)))
 }
 
 /// The course from a rough `alpha_3` on to the one that arrives; `None` where it does not come so far.
@@ -362,15 +381,15 @@ const FAR_OFF: f64 = 0.1;
 /// Longest step of the search, in units of what alpha bears.
 const FARTHEST: f64 = 4.0;
 
-/// `alpha_3` to [`COARSE`] where the time is just long enough: far out, where the layers at the ends shrink like
+/// `alpha_3` to a tolerance where the time is just long enough: far out, where the layers at the ends shrink like
 /// `1/alpha_3`, from a start in units of [`Course::unit`].
-fn close(course: &Course, start: f64, effort: &mut Effort) -> Option<(f64, f64)> {
+fn close(course: &Course, start: f64, (tolerance, enough): (f64, f64), effort: &mut Effort) -> Option<(f64, f64)> {
     let unit = course.unit();
     let (mut gave_up, mut errors) = (false, f64::INFINITY);
     let place = |q: f64| 0.5 * unit * (exp_m1(q) - exp_m1(-q));
     let probe = |q: f64| {
         let course = course.with(place(q));
-        match course.pass((COARSE, COARSE), None, effort, |_, _| ()) {
+        match course.pass((tolerance, tolerance), None, effort, |_, _| ()) {
             Ok(end) => {
                 errors = end.errors;
                 let (value, step) = course.miss(&end);
@@ -386,7 +405,7 @@ fn close(course: &Course, start: f64, effort: &mut Effort) -> Option<(f64, f64)>
         }
     };
     let start = start.signum() * ln_1p(2.0 * start.abs());
-    let root = newton(probe, start, (-FARTHEST_OUT, FARTHEST_OUT), false, ENOUGH);
+    let root = newton(probe, start, (-FARTHEST_OUT, FARTHEST_OUT), false, enough);
     root.filter(|_| !gave_up).map(|root| (place(root.x), errors))
 }
 
