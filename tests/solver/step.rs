@@ -680,3 +680,27 @@ fn regress_limit_cycles_that_errors_of_steps_drive_off() {
         assert!((1.8..2.01).contains(&coarse.v_peak) && relative(coarse.period, free) < 0.2, "{step:?}: {coarse:?}");
     }
 }
+
+/// Swings of heavy blocks die out or end on a small limit cycle, however close to the critical stiffness.
+#[test]
+fn reference_heavy_blocks_next_to_the_critical_stiffness() {
+    let (law, mass, rtol) = (Law { a: 0.01, b: 0.02 }, 1e10, 1e-5);
+    let critical = SteadySliding::new(law, 1.0, mass, 1.0).critical_stiffness();
+    for share in [1e-15, 1e-12, 1e-9] {
+        for x in [-3.0, 0.5, 4.0_f64] {
+            let transition = Transition { law, v_i: x.exp(), v_f: 1.0 };
+            let [above, below] = [1.0, -1.0]
+                .map(|sign| respond(&Step { transition, k: critical * (1.0 + sign * share), m: mass }, rtol));
+            assert_eq!([above.outcome, below.outcome], [Outcome::Settled, Outcome::LimitCycle], "{share:e} {x}");
+            assert!(relative(above.v_peak, below.v_peak) < rtol, "{share:e} {x}: {above:?} {below:?}");
+            // To leading order friction gives b omega^2/(1 + omega^2)^2 (1 - k/k_c), and takes the bend times A^2/2.
+            let cycle = below.cycle.expect("is a limit cycle");
+            let omega_squared = (law.b - law.a) / law.a;
+            let sum = 1.0 + omega_squared;
+            let bend = 0.5 * law.a * omega_squared * (7.0 + 4.0 * omega_squared) / (sum * (1.0 + 4.0 * omega_squared));
+            let driven = law.b * omega_squared * share / (sum * sum);
+            let size = (2.0 * driven / bend).sqrt();
+            assert!((cycle.v_peak - 1.0 - size).abs() < 0.2 * size + rtol * rtol, "{share:e}: {cycle:?} {size}");
+        }
+    }
+}

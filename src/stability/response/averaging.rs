@@ -18,9 +18,11 @@ use super::course::{Course, Doubts, Fate, VANISHING};
 use super::fate::Linear;
 use super::orbit::{Extremum, Orbit, SETTLED};
 use super::slider::Slider;
+use crate::model::Law;
 use crate::numerics::elementary::{exp, exp_m1, ln, ln_1p};
 use crate::numerics::gauss;
 use crate::numerics::root::crossing;
+use crate::stability::lyapunov_coefficient;
 
 /// What friction does within a swing, in units of `(a + b)/S` for every power of e over which `ln v` and `ln theta` run.
 const SIZE: f64 = 3.0;
@@ -39,6 +41,9 @@ const COUPLED: f64 = 30.0;
 const SWINGS: u32 = 3;
 const FINE: f64 = 3e-3;
 const MOST_STEPS: u32 = 10_000;
+
+/// Limit cycles are told by the Hopf point where their amplitude is less.
+const FAINT: f64 = 1e-3;
 
 /// Share of `s` over which the slope of `c` is taken.
 const BESIDE: f64 = 1e-4;
@@ -173,14 +178,18 @@ impl Swinging {
             if excess < 0.0 && ratio < CLEAR * self.share && ages && !follows {
                 return None;
             }
+            let small = crossing.filter(|&s| (1.0 - s) * (1.0 + s) < FAINT * FAINT);
+            // Next to the critical stiffness rounding decides the sign of c in small swings: linear theory and the Hopf
+            // point tell it.
+            let damped = self.bend().is_some_and(|bend| bend < 0.0);
             match crossing {
-                Some(s) => self.cycle(s, rtol, &mut doubts)?,
-                None if linear.stable => {
+                Some(s) if small.is_none() => self.cycle(s, rtol, &mut doubts)?,
+                _ if linear.stable && (small.is_none() || damped) => {
                     let (time, known) = self.settling(amplitude, start, rtol);
                     doubts.settling_time = !known;
                     Fate::Settled { time: if time > 0.0 || arrested { time + delay / self.omega } else { 0.0 } }
                 }
-                None => return None,
+                _ => self.small_cycle(linear, rtol)?,
             }
         } else {
             // What comes later is faster.
@@ -319,6 +328,20 @@ impl Swinging {
         told.then_some(fate)
     }
 
+    /// The first Lyapunov coefficient, if there is a Hopf point.
+    fn bend(&self) -> Option<f64> {
+        lyapunov_coefficient(Law { a: self.a, b: self.b }, self.mass)
+    }
+
+    /// The limit cycle that a supercritical Hopf point leaves just below the critical stiffness, up to the cube of its
+    /// size.
+    fn small_cycle(&self, linear: Linear, rtol: f64) -> Option<Fate> {
+        let growth = linear.growth.filter(|&growth| growth > 0.0)? / (2.0 * PI);
+        let size = 2.0 * (growth / -self.bend().filter(|&bend| bend < 0.0)?).sqrt();
+        let told = size > 0.0 && size < FAINT && size * size < UNFELT * rtol;
+        told.then(|| Fate::Cycle { period: 2.0 * PI / self.omega, high: size, low: -size })
+    }
+
     /// The limit cycle on which friction drives the block until it is arrested: what it gives in a swing is what the
     /// spring's force at rest takes.
     fn driven(&self) -> Option<Fate> {
@@ -351,5 +374,29 @@ impl Swinging {
         }
         error += 2.0 * PI / self.omega + 2.0 * self.mass * self.share / least;
         (time, error < UNFELT * rtol * time)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    //! What friction takes from small swings at the critical stiffness, against the first Lyapunov coefficient.
+
+    use super::*;
+
+    #[test]
+    fn reference_averaging_meets_the_hopf_point() {
+        for (a, omega, mass) in
+            [(0.01, 0.1, 1e6), (0.01, 0.3, 1e8), (0.1, 1.0, 1e9), (0.003, 3.0, 1e7), (0.02, 30.0, 1e12)]
+        {
+            let b = a * (1.0 + omega * omega);
+            // At the critical stiffness, but for a share of a/M.
+            let swinging = Swinging { a, b, mass, impedance: mass * omega, omega, share: 0.0 };
+            let c = |s: f64| swinging.coefficient(s);
+            // c = -M omega l_1 (1 - s) to the next order in 1 - s, which two places tell apart.
+            let slope = |s: f64| (c(s) - a + b / (1.0 + omega * omega)) / (1.0 - s);
+            let found = 2.0 * slope(1.0 - 5e-4) - slope(1.0 - 1e-3);
+            let expected = -mass * omega * swinging.bend().expect("has a Hopf point");
+            assert!((found / expected - 1.0).abs() < 1e-3, "{omega}: {found} {expected}");
+        }
     }
 }
