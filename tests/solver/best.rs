@@ -170,6 +170,15 @@ fn regress_the_optimum_that_is_a_cubic() {
     }
 }
 
+/// The optimum holds for almost half of the time: halves of a panel across the end of the hold agreed by chance.
+#[test]
+fn regress_holds_of_half_the_time() {
+    let law = Law { a: 1.3094022960939522, b: 0.0 };
+    let transition = Transition { law, v_i: 1.0000000000001092, v_f: 1.0017523331852594 };
+    let best = solve(&transition, 0.08514974796105777, true, 1e-10);
+    assert_eq!(best.status, Status::Ok);
+}
+
 #[test]
 fn regress_holds_shorter_than_a_panel_sees() {
     // Just past t_free_out the optimum starts with a hold of 3e-5 that no quadrature node meets.

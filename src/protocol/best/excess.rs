@@ -109,21 +109,22 @@ impl Excess<'_> {
         Some((law.a * dearer + pressed, best.pressure > 0.0))
     }
 
-    /// Where the optimum that holds at the start leaves the bound, by bisection; `None` if it does so in the second half.
+    /// Where in its half of the way an optimum that holds leaves the bound, by bisection; `None` if it does so elsewhere.
     fn kink(&mut self, side: &Side) -> Option<Option<f64>> {
-        let (mut low, mut high) = (0.0, HALF);
-        if self.judge(side, high)?.1 {
+        let (mut held, mut free) = if side.from_end { (HALF, 0.0) } else { (0.0, HALF) };
+        // With no time left nothing holds.
+        if !self.judge(side, held)?.1 || (!side.from_end && self.judge(side, free)?.1) {
             return Some(None);
         }
         for _ in 0..DEEPEST {
-            let middle = 0.5 * (low + high);
+            let middle = 0.5 * (held + free);
             if self.judge(side, middle)?.1 {
-                low = middle;
+                held = middle;
             } else {
-                high = middle;
+                free = middle;
             }
         }
-        Some(Some(high))
+        Some(Some(free))
     }
 }
 
@@ -144,11 +145,9 @@ pub(super) fn over_optimum(
     let sides = [false, true].map(|from_end| Side::of(path, bounded, from_end));
     for side in &sides {
         let mut places = layers(side, t_f);
-        // A hold at the start may be shorter than the distance of the first node from it.
-        if !side.from_end
-            && excess.judge(side, 0.0)?.1
-            && let Some(kink) = excess.kink(side)?
-        {
+        // A hold at the start may be shorter than the distance of the first node from it; later, halves of a panel may agree
+        // by chance.
+        if let Some(kink) = excess.kink(side)? {
             places.push(kink);
             places.sort_by(f64::total_cmp);
             places.dedup();
