@@ -29,6 +29,8 @@ pub struct Radau {
     /// `slopes[k][j]`: the slope at node `j` of the polynomial of degree `NODES` that is 1 at `u[k]` and 0 at the others
     /// and at 0.
     slopes: [Nodes; NODES],
+    /// The slope at 0 of the same polynomials.
+    slopes_at_0: Nodes,
     /// Weights of the two highest Legendre coefficients that the nodes tell.
     highest: [Nodes; 2],
 }
@@ -44,6 +46,11 @@ impl Radau {
     #[inline(always)]
     pub fn slopes(&self, f: &Nodes) -> Nodes {
         combined(&self.slopes, f)
+    }
+
+    /// The slope at 0 of the polynomial through 0 at 0 and `f` at the nodes.
+    pub fn slope_at_0(&self, f: &Nodes) -> f64 {
+        self.slopes_at_0.iter().zip(f).map(|(slope, f)| slope * f).sum()
     }
 
     /// What the nodes do not resolve of the integral of `f`: the size of its two highest coefficients in Legendre
@@ -145,6 +152,7 @@ fn make() -> Radau {
         columns: [[0.0; NODES]; NODES],
         barycentric: [1.0; NODES + 1],
         slopes: [[0.0; NODES]; NODES],
+        slopes_at_0: [0.0; NODES],
         highest: [[0.0; NODES]; 2],
     };
     for k in 0..NODES {
@@ -180,6 +188,9 @@ fn make() -> Radau {
         for k in 0..NODES {
             rule.slopes[k][j] = if k == j { -others.iter().sum::<f64>() } else { others[k] };
         }
+    }
+    for k in 0..NODES {
+        rule.slopes_at_0[k] = -rule.barycentric[k] / rule.barycentric[NODES] / rule.u[k];
     }
     rule
 }

@@ -24,6 +24,9 @@ pub struct Root {
 /// than this.
 const MOST_PROBES: u32 = 200;
 
+/// Most growth of a step to a side that nothing bounds.
+const MOST_GROWTH: f64 = 8.0;
+
 /// Finds the root of a rising function inside `(low, high)`, either of which may be infinite, from `start`.
 ///
 /// `probe(x)` returns `None` where the function is not defined; such points count as lying beyond the root on the side
@@ -97,12 +100,18 @@ pub fn newton_in_pieces<Piece: Copy + PartialEq>(
                 f64::NAN
             }
         };
-        let next = x + step;
         // A step that leaves the bracket, or that does not shrink, gives way to a bisection; from side to side of the root, by
-        // a quarter in two steps.
+        // a quarter in two steps. Where nothing bounds the side that it leads to, it may grow.
         let [last_step, step_before] = last_steps;
+        let open = if step > 0.0 { !above && high.is_infinite() } else { !below && low.is_infinite() };
+        let step = if open && step.abs() >= last_step {
+            step.abs().clamp(2.0 * last_step, MOST_GROWTH * last_step).copysign(step)
+        } else {
+            step
+        };
         let shrinks = step.abs() < last_step && !(below && above && step.abs() > 0.75 * step_before);
-        let next = if next > low && next < high && shrinks { next } else { middle(low, high) };
+        let next = x + step;
+        let next = if next > low && next < high && (shrinks || open) { next } else { middle(low, high) };
         if next == x || !(next > low && next < high) {
             return p.filter(|_| below && above).map(|(probe, piece)| (Root { x, probed: x, probe }, piece));
         }

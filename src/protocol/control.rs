@@ -39,17 +39,28 @@ impl Slider {
         self.friction(jet) + self.m * jet.v[1]
     }
 
-    /// `v_c` and `v_c'`.
-    pub fn control(&self, jet: &Jet) -> [f64; 2] {
-        let [v, v1, v2, v3] = jet.v;
+    /// `v_c`.
+    pub fn control(&self, jet: &Jet) -> f64 {
+        let [v, v1, v2, _] = jet.v;
         if self.k == f64::INFINITY {
-            return [v, v1];
+            return v;
         }
         // Derivatives of ln v and ln theta.
         let (q1, y1) = (v1 / v, jet.rate / jet.theta);
-        let (q2, y2) = (v2 / v - q1 * q1, -(y1 / jet.theta + v1));
         let Law { a, b } = self.law;
-        [v + (a * q1 + b * y1 + self.m * v2) / self.k, v1 + (a * q2 + b * y2 + self.m * v3) / self.k]
+        v + (a * q1 + b * y1 + self.m * v2) / self.k
+    }
+
+    /// `v_c'`, where `theta''` is `bend`.
+    pub fn control_rate(&self, jet: &Jet, bend: f64) -> f64 {
+        let [v, v1, v2, v3] = jet.v;
+        if self.k == f64::INFINITY {
+            return v1;
+        }
+        let (q1, y1) = (v1 / v, jet.rate / jet.theta);
+        let (q2, y2) = (v2 / v - q1 * q1, bend / jet.theta - y1 * y1);
+        let Law { a, b } = self.law;
+        v1 + (a * q2 + b * y2 + self.m * v3) / self.k
     }
 }
 
@@ -60,6 +71,15 @@ pub(super) struct Extent {
     pub low: f64,
     /// Greatest value so far.
     pub high: f64,
+}
+
+/// How good a turn has to be.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) enum Tolerance {
+    /// In units of the value there, of whose logarithm the slopes are.
+    OfValue(f64),
+    /// In units of the greatest size in the range.
+    OfRange(f64),
 }
 
 /// More steps than a bracket between two nodes takes.
@@ -75,13 +95,13 @@ impl Extent {
         self.high = self.high.max(value);
     }
 
-    /// Takes in what lies between two places `(u, [value, slope])`: a turn if the slopes differ in sign, good to `rtol`
-    /// of the range. `at(u)` tells the value and the slope; Illinois method on the slope.
+    /// Takes in what lies between two places `(u, [value, slope])`: a turn if the slopes differ in sign. `at(u)` tells the
+    /// value and the slope; Illinois method on the slope.
     pub fn turn(
         &mut self,
         (mut u_0, [value_0, mut slope_0]): (f64, [f64; 2]),
         (mut u_1, [value_1, mut slope_1]): (f64, [f64; 2]),
-        rtol: f64,
+        tolerance: Tolerance,
         at: impl Fn(f64) -> [f64; 2],
     ) {
         self.add(value_0);
@@ -95,7 +115,11 @@ impl Extent {
             let [value, slope] = at(u);
             self.add(value);
             // What is left to gain is less than the slope over the bracket.
-            if slope.abs() * (u_1 - u_0) <= 0.1 * rtol * self.high.abs().max(self.low.abs()) {
+            let enough = match tolerance {
+                Tolerance::OfValue(rtol) => 0.1 * rtol,
+                Tolerance::OfRange(rtol) => 0.1 * rtol * self.high.abs().max(self.low.abs()),
+            };
+            if slope.abs() * (u_1 - u_0) <= enough {
                 break;
             }
             if (slope > 0.0) == (slope_0 > 0.0) {

@@ -44,7 +44,7 @@ pub fn held_error(path: &Path, dt: f64, rtol: f64) -> Followed {
         return Followed { number: None, steps: 0 };
     }
     let (slider, count) = (&path.slider, samples as u32);
-    let sample = |i: u32| slider.control(&path.at_time(f64::from(i) * dt))[0];
+    let sample = |i: u32| slider.control(&path.at_time(f64::from(i) * dt));
     // In units of t_f.
     let time = |i: u32| if i == count { 1.0 } else { f64::from(i) * (dt / t_f) };
     if slider.k == f64::INFINITY {
@@ -151,7 +151,7 @@ impl System<3> for Driven<'_> {
         for i in 0..L {
             let (v, ageing) = (unit * exp(x[i]), unit * exp(-y[i]));
             let told = match self.control {
-                Control::Continuous(path) => self.slider.control(&path.at_time(self.t_f * points.t[i]))[0],
+                Control::Continuous(path) => self.slider.control(&path.at_time(self.t_f * points.t[i])),
                 Control::Held(told) => told,
             };
             let mass = m * v / (self.t_f * self.t_f);

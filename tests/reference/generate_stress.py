@@ -1,16 +1,18 @@
 #!/usr/bin/env python3
 """Points of the stress sample, which is drawn over the whole legal domain, to 25 digits.
 
-    SLIPSWEEP_STRESS=200 SLIPSWEEP_STRESS_PRINT=1 cargo test --test solver stress:: -- --nocapture --test-threads 1 > points.txt
+    SLIPSWEEP_STRESS=400 SLIPSWEEP_STRESS_PRINT=1 cargo test --test solver stress:: -- --nocapture --test-threads 1 > points.txt
     venv/bin/python generate_stress.py points.txt
 
 The formulas are those of generate.py, at 80 digits: between velocities and times twenty decades apart half of them cancel. A point is left out
 where the optimum is not physical, where there is none, where a hold lasts longer than the digits tell theta from 1, and where the quadrature
-does not reach the digits that its own checks ask for; what is left out is counted.
+does not reach the digits that its own checks ask for, or takes more than a minute; what is left out is counted. Members of bounded_friction are Taylor
+series as in generate_swift_friction.py.
 """
 import csv, functools, multiprocessing, re, signal, sys
 
 import generate
+import generate_swift_friction as friction
 import generate_swift_velocity as swift
 from generate import Problem, Unphysical, crossover_row, landscape_point, landscape_status, optimal_row, show, stability_row
 from mpmath import mp, mpf
@@ -95,9 +97,23 @@ def of_family(family, p):
     return key, row
 
 
+def of_friction(p):
+    key = [p[name] for name in (*LAW, "t_f", "tau_max")]
+    # Without a bound there is no member.
+    if p["tau_max"] == float("inf"):
+        raise Unphysical
+    friction.ctx.prec = friction.FINE[0]
+    exact = tuple(map(friction.arb, key))
+    least = friction.least_time(exact)
+    if not exact[4] > least:
+        raise Unphysical
+    return key, [mpf(x.str(40, radius=False)) for x in friction.Course(exact).member(least.mid())]
+
+
 FAMILY = ["a", "b", "v_i", "v_f", "t_f", *swift.HEADER[6:]]
 TABLES = {
     **{f"swift {family}": (FAMILY, functools.partial(of_family, family), 60) for family in swift.FAMILIES},
+    "swift bounded_friction": (["a", "b", "v_i", "v_f", "t_f", "tau_max", "alpha", "work", "v_min", "v_max", "friction_max"], of_friction, 400),
     "optimal": (["a", "b", "v_i", "v_f", "t_f", "bounded", "work", "v_start", "v_end", "hold_time", "hamiltonian", "theta_max", "strategy"], of_optimal, 160),
     "crossover": (["a", "b", "v_i", "v_f", "t_cross", "t_hold", "t_cheapest", "t_min", "t_turn", "t_free_in", "t_free_out",
                    "work_cross", "work_hold", "work_cheapest", "work_min", "work_turn"], of_crossover, 100),
@@ -131,7 +147,8 @@ def main(path, tables):
         jobs = [(table, index, point) for index, point in points(path, table)][:most]
         left_out = {}
         with multiprocessing.Pool(2) as pool, open(f"stress_{table.removeprefix('swift ')}.csv", "w", newline="") as file:
-            file.write(f"# made by generate_stress.py, mpmath at {DIGITS} digits, of the first {len(jobs)} points\n")
+            digits = "Arb at 84 digits" if table == "swift bounded_friction" else f"mpmath at {DIGITS} digits"
+            file.write(f"# made by generate_stress.py, {digits}, of the first {len(jobs)} points\n")
             out = csv.writer(file, lineterminator="\n")
             out.writerow(["point"] + header)
             for (_, index, _), row in zip(jobs, pool.imap(solved, jobs)):

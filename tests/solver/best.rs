@@ -179,6 +179,25 @@ fn regress_holds_of_half_the_time() {
     assert_eq!(best.status, Status::Ok);
 }
 
+/// The search for the optimum lengthens its steps from 1e-8 on, where a leap to 1 met what cannot be integrated.
+#[test]
+fn regress_optima_between_velocities_a_rounding_apart() {
+    let law = Law { a: 6.621256489523037, b: 5.45716375648159 };
+    let transition = Transition { law, v_i: 1.068944223223348, v_f: 1.0689442232233477 };
+    let solved = solve(&transition, 2.025223566696026e-7, true, 4.547561724399975e-8);
+    assert_eq!(solved.status, Status::Ok);
+}
+
+/// No place of the shortcut is further than a rounding from where no time is left to arrive: there is no feedback to compare with.
+#[test]
+fn regress_best_shortcuts_a_rounding_from_the_least_time() {
+    let law = Law { a: 2.41896179387082, b: 1.0348235315141456e-6 };
+    let transition = Transition { law, v_i: 1.000000000000015, v_f: 1.0000000000000002 };
+    let solved = solve(&transition, 5.9429391678875705, true, 8.6e-4);
+    assert_eq!(solved.status, Status::Ok);
+    assert!(solved.value.is_some_and(|best| (0.0..1e-13).contains(&best.gap)), "{solved:?}");
+}
+
 #[test]
 fn regress_holds_shorter_than_a_panel_sees() {
     // Just past t_free_out the optimum starts with a hold of 3e-5 that no quadrature node meets.

@@ -201,7 +201,7 @@ fn reference_a_held_control_misses_by_what_a_library_finds() {
         let mut state = steady(&case.0, case.1.0);
         for i in 0..16 {
             let (t, t_end) = (f64::from(i) / 15.5, (f64::from(i + 1) / 15.5).min(1.0));
-            let held = case.0.control(&path.at_time(f64::from(i) * dt))[0];
+            let held = case.0.control(&path.at_time(f64::from(i) * dt));
             state = integrate(Sliding { held: Some(held), ..sliding }, (t, t_end), state);
         }
         let expected = scaled(&case.0, state - steady(&case.0, case.1.1)).iter().map(|x| x * x).sum::<f64>().sqrt();
@@ -252,9 +252,9 @@ fn derivatives_are_those_of_the_path() {
             let size = 3.2e6 * (30.0 / PAPER.2).powi(k as i32 + 1);
             assert!((slope - here.v[k + 1]).abs() < 1e-4 * size, "{i} {k}: {slope} {}", here.v[k + 1]);
         }
-        let slope = (PAPER.0.control(&ahead)[0] - PAPER.0.control(&behind)[0]) / (2.0 * h);
-        let told = PAPER.0.control(&here);
-        assert!((slope - told[1]).abs() < 1e-4 * 3.2e6 * 30.0 / PAPER.2, "{i}: {slope} {}", told[1]);
+        let slope = (PAPER.0.control(&ahead) - PAPER.0.control(&behind)) / (2.0 * h);
+        let told = PAPER.0.control_rate(&here, -(here.rate * here.v[0] + here.theta * here.v[1]));
+        assert!((slope - told).abs() < 1e-4 * 3.2e6 * 30.0 / PAPER.2, "{i}: {slope} {told}");
         let rate = (ahead.theta - behind.theta) / (2.0 * h);
         assert!((rate - here.rate).abs() < 1e-4, "{i}: {rate} {}", here.rate);
     }
@@ -374,4 +374,36 @@ fn regress_amplifications_beyond_the_square_root_of_the_largest_double() {
         assert!((found - expected).abs() < 0.05, "{t_f} {found}");
     }
     assert_eq!(at(0.5), None);
+}
+
+/// Where contacts follow, `theta v = 1` and friction is `1 + (a - b) ln v`: a soft spring is driven by its slope, which is lost
+/// in the rounding of `1 - theta v`.
+#[test]
+fn regress_control_velocities_of_slow_protocols_on_soft_springs() {
+    let (law, k, t_f) = (Law { a: 0.03, b: 0.05 }, 1e-16, 1e9);
+    for rtol in [1e-6, 1e-10] {
+        let found = solve((Slider { law, k, m: 1e-9 }, (2.0, 3.0), t_f), rtol);
+        let rise = 2f64.ln();
+        let told = |x: f64| {
+            let (flat, z) = (x * x * (1.0 - x) * (1.0 - x), 1.0 - x);
+            let f = rise * x * x * x * (10.0 - 15.0 * x + 6.0 * x * x) + found.alpha * (x * z).powi(3);
+            let slope = 30.0 * rise * flat + 3.0 * found.alpha * flat * (1.0 - 2.0 * x);
+            let v = 1.0 + f.exp();
+            v + (law.a - law.b) * f.exp() * slope / (v * t_f * k)
+        };
+        let places = (0..=200_000).map(|i| told(f64::from(i) / 200_000.0));
+        let (low, high) = places.fold((f64::MAX, f64::MIN), |(low, high), told| (low.min(told), high.max(told)));
+        let size = low.abs().max(high.abs());
+        assert!(size > 1e5);
+        assert!((found.control_min - low).abs() <= (rtol + 1e-8) * size, "{found:?} {low}");
+        assert!((found.control_max - high).abs() <= (rtol + 1e-8) * size, "{found:?} {high}");
+    }
+}
+
+#[test]
+fn regress_a_soft_spring_that_slides_steadily_is_driven_as_fast() {
+    let law = Law { a: 0.00018869557042703084, b: 0.00018869557042703084 };
+    let v = 1.0000219636724441;
+    let found = solve((Slider { law, k: 5.39280429386416e-32, m: 1e-30 }, (v, v), 3.953104389605138e8), 4e-3);
+    assert_eq!((found.control_min, found.control_max), (v, v));
 }

@@ -140,6 +140,10 @@ fn the_root_finder_always_ends() {
     let cubic = |x: f64| Some(Probe { value: x * x * x - 2.0, slope: 3.0 * x * x });
     let (root, probes) = count(&cubic, 1.0, (f64::NEG_INFINITY, f64::INFINITY));
     assert!(ulps(root.expect("has a root"), 2f64.cbrt()) <= 1.0 && probes <= 7, "{root:?} {probes}");
+    // Far below the root every step is longer than the one before: a leap to 1 would be far beyond it.
+    let logarithm = |x: f64| Some(Probe { value: (x / 1e-6).ln(), slope: 1.0 / x });
+    let (root, probes) = count(&logarithm, 1e-9, (0.0, f64::INFINITY));
+    assert!(ulps(root.expect("has a root"), 1e-6) <= 1.0 && probes <= 10, "{root:?} {probes}");
     // Wrong slopes, a jump through zero, a function without a root, one that is nowhere defined, one that is NaN.
     let wrong = |x: f64| Some(Probe { value: x - 0.3, slope: 1e-9 });
     assert!((count(&wrong, 5.0, (0.0, 10.0)).0.expect("bisects") - 0.3).abs() < 1e-9);

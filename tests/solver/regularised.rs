@@ -580,3 +580,17 @@ fn regress_a_standstill_is_infeasible() {
     };
     assert_eq!([0.05, 0.02].map(at), [(Status::Nonphysical, true), (Status::Infeasible, false)]);
 }
+
+/// A piece that is short beside the lifetime of contacts: theta hardly tells what its velocity is, the slip does.
+#[test]
+fn regress_short_pieces_keep_the_digits_of_v_min() {
+    let law = Law { a: 2.5401475772267644e-6, b: 0.0 };
+    let slider = Slider { law, k: 2.3583748302810077e23, m: 0.0136346039616178 };
+    let case =
+        Case { slider, velocities: (6804880689.211707, 106433661.09597254), t_f: 9.248594399029421e-9, bounded: true };
+    let v_min = |rtol| solve(&case, 1.5791875720478793e-13, rtol).value.expect("has pieces").v_min;
+    let exact = v_min(1e-13);
+    for rtol in [1e-6, 1e-8, 1e-10] {
+        assert!(relative(v_min(rtol), exact) <= rtol + 1e-10, "{rtol}: {} {exact}", v_min(rtol));
+    }
+}

@@ -86,9 +86,12 @@ pub fn solve(transition: &Transition, t_f: f64, bounded: bool, rtol: f64) -> Sol
         // leaves W* alone.
         let coarse = DIFFERENCE_ERROR * work + ROUNDINGS * f64::EPSILON * t_f * optimum_value.hamiltonian.abs();
         let excess = excess::over_optimum(transition, &path, work, bounded, &mut effort);
-        match excess.filter(|excess| (excess - difference).abs() <= coarse) {
-            Some(excess) => excess,
-            None => return unsolved(Status::NotConverged, effort),
+        match excess {
+            Some(excess) if (excess - difference).abs() <= coarse => excess,
+            // A path may be nowhere further than a rounding from the least time: there is no feedback then, and the difference
+            // is as good as both works.
+            None if difference.abs() <= coarse => difference.max(0.0),
+            _ => return unsolved(Status::NotConverged, effort),
         }
     };
     let status = match optimum.status {

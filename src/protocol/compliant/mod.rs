@@ -16,7 +16,7 @@
 
 mod path;
 
-use super::control::Extent;
+use super::control::{Extent, Tolerance};
 use super::profile::{Curve, Hermite, Problem, Resolved, Side, Start, pass, reach};
 use super::{Effort, Slider, Solved, Status};
 use crate::model::Transition;
@@ -50,7 +50,9 @@ pub fn solve(slider: &Slider, (v_i, v_f): (f64, f64), t_f: f64, rtol: f64) -> So
     let mut range = Range { work: 0.0, control: Extent::NONE };
     let followed = follow(slider, (v_i, v_f), t_f, rtol, &mut effort, |curve, panel| {
         range.work += panel.work(&slider.law, curve);
-        panel.range(curve, rtol, &mut range.control, |jet| slider.control(jet));
+        panel.range(curve, Tolerance::OfRange(rtol), &mut range.control, |jet, bend| {
+            [slider.control(jet), slider.control_rate(jet, bend)]
+        });
     });
     let curve = match followed {
         Ok(curve) => curve,

@@ -54,7 +54,7 @@ impl Motion for Path {
     fn at(&self, s: f64) -> Moment {
         let along = s.clamp(0.0, 1.0) * self.pieces() as f64;
         let piece = (along as usize).min(self.pieces() - 1);
-        let v_c = self.slider.control(&self.jet(piece, along - piece as f64))[0];
+        let v_c = self.slider.control(&self.jet(piece, along - piece as f64));
         Moment { v_c: Some(v_c), ..self.resolution.at(s) }
     }
 }

@@ -5,7 +5,7 @@ use super::motion::{Optimal, Timed};
 use crate::model::Law;
 use crate::numerics::elementary::{exp, exp_m1, ln};
 use crate::numerics::radau::radau;
-use crate::protocol::control::{Extent, Jet, Slider};
+use crate::protocol::control::{Extent, Jet, Slider, Tolerance};
 
 /// A place on the protocol.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -127,7 +127,7 @@ impl Optimal {
             let end = if let Site::Held(end) = to { end } else { self.hold.time };
             let (now, time) = (self.hold.from.aged(start), end - start);
             span.time += time;
-            span.lag += time + now.rest * exp_m1(-time);
+            span.lag += lag_at_bound(now.theta, time);
             span.work += hold::work(&self.law, now, time);
         }
         if let (Site::Moving(end), Some(arc)) = (to, &self.arc) {
@@ -147,12 +147,16 @@ impl Optimal {
         if let Site::Held(start) = from {
             // v_c = 1 + (b/k) theta'/theta falls all the way.
             let end = if let Site::Held(end) = to { end } else { self.hold.time };
-            extent.add(slider.control(&self.held(start))[0]);
-            extent.add(slider.control(&self.held(end))[0]);
+            extent.add(slider.control(&self.held(start)));
+            extent.add(slider.control(&self.held(end)));
         }
         let (Site::Moving(end), Some(arc)) = (to, &self.arc) else { return };
         let start = if let Site::Moving(start) = from { start } else { 0.0 };
-        let told = |place| slider.control(&self.jet(Site::Moving(place)));
+        let told = |place| {
+            let jet = self.jet(Site::Moving(place));
+            let bend = -(jet.rate * jet.v[0] + jet.theta * jet.v[1]);
+            [slider.control(&jet), slider.control_rate(&jet, bend)]
+        };
         for (from, to) in arc.parts(start, end) {
             let mut before = (from, told(from));
             extent.add(before.1[0]);
@@ -164,7 +168,7 @@ impl Optimal {
                     let pace = arc.pieces.time(before.0, after.0) / (after.0 - before.0);
                     let along = |place, [value, slope]: [f64; 2]| (place, [value, pace * slope]);
                     let (first, last) = (along(before.0, before.1), along(after.0, after.1));
-                    extent.turn(first, last, rtol, |place| along(place, told(place)).1);
+                    extent.turn(first, last, Tolerance::OfRange(rtol), |place| along(place, told(place)).1);
                 }
                 before = after;
             }
@@ -197,6 +201,18 @@ impl Timed {
         let (from, to) = (piece as f64 / count, (piece + 1) as f64 / count);
         to - inverse(time - self.left[piece + 1], to - from, |d| self.pieces.time(to - d, to))
     }
+}
+
+/// `int theta v dt` over a time on `v = 1`, from theta on: no difference of times, of which it may be a small part.
+pub fn lag_at_bound(theta: f64, time: f64) -> f64 {
+    // t - 1 + e^-t.
+    let idle = if time < 0.1 {
+        // Each term is less than a thirtieth of the one before.
+        (3..14).rev().fold(1.0, |sum, k| 1.0 - time / f64::from(k) * sum) * 0.5 * time * time
+    } else {
+        time + exp_m1(-time)
+    };
+    idle - theta * exp_m1(-time)
 }
 
 /// Most landmarks of a hold: beyond, nothing changes any more.

@@ -7,13 +7,15 @@
 //! ```
 //!
 //! Between steady states its terms are small where the protocol is close to steady sliding at `v_f`, so the root keeps
-//! its digits where theta merely follows `1/v`. Near `t_min` the root hangs on the little that theta loses to `v - 1`,
+//! its digits where theta merely follows `1/v`. Where theta loses little to `v - floor`, next to `t_min` above all, the root
+//! hangs on that little,
 //!
 //! ```text
-//! P = int_0^t_f (v - 1) theta_b e^-R dt = (1 - 1/v_f)(1 - e^-(t_f - t_min)),    theta_b = 1 - (1 - 1/v_i) e^-t,
+//! P = int_0^t_f (v - floor) theta_b e^-R dt = theta_b(t_f) - theta_1,
 //! ```
 //!
-//! whose terms are all positive. Both are integrated backwards from `t_f`, until `e^-R` leaves nothing.
+//! with `theta_b = 1 - (1 - theta_0) e^-t` for `floor = 1` and `theta_0 + t` for 0; all terms are positive. Both are
+//! integrated backwards from `t_f`, until `e^-R` leaves nothing.
 
 use multiversion::multiversion;
 
@@ -38,9 +40,11 @@ pub struct Problem<E> {
     pub required: f64,
     /// A bound on the integral without `e^-R`.
     most: f64,
-    /// Whether `t_f` is so close to `t_min` that the second form is the better one; it needs the next two.
+    /// Whether theta loses so little to `v - floor` that the second form is the better one; it needs the next three.
     tight: bool,
-    v_i: f64,
+    /// Theta at the start, and what it is short of 1.
+    theta_0: f64,
+    rest_0: f64,
     /// `theta_b` at the end.
     free: f64,
 }
@@ -70,17 +74,34 @@ impl<E: Exponent> Problem<E> {
             required: ln_1p(-gain),
             most: 1.0 + v_f * curve.t_f + v_f / v_i,
             tight,
-            v_i,
+            theta_0: 1.0 / v_i,
+            rest_0: (v_i - 1.0) / v_i,
             free: (1.0 - gain) / v_f,
         }
     }
 
-    /// From any theta to any other: `fall = theta_0/theta_1 - 1`, `pull = 1/theta_1 - v_1`, and `room =
-    /// ln(theta_b/theta_1)` with `theta_b` the contact lifetime at the end for `v = floor` throughout.
-    pub fn between(theta_1: f64, fall: f64, pull: f64, room: f64, curve: Curve<E>) -> Problem<E> {
+    /// From any theta to any other: `fall = theta_0/theta_1 - 1`, `pull = 1/theta_1 - v_1`, and `spare = theta_b -
+    /// theta_1` with `theta_b` the contact lifetime at the end for `v = floor` throughout.
+    pub fn between([theta_0, theta_1]: [f64; 2], fall: f64, pull: f64, spare: f64, curve: Curve<E>) -> Problem<E> {
         let v_1 = curve.floor + curve.w_f;
-        let most = 1.0 + (1.0 + v_1 * theta_1) * curve.t_f / theta_1 + (1.0 + fall);
-        Problem { curve, v_1, fall, pull, required: room, most, tight: false, v_i: v_1, free: 1.0 }
+        Problem {
+            curve,
+            v_1,
+            fall,
+            pull,
+            required: ln_1p(spare / theta_1),
+            most: 1.0 + (1.0 + v_1 * theta_1) * curve.t_f / theta_1 + (1.0 + fall),
+            tight: spare < theta_1,
+            theta_0,
+            rest_0: 1.0 - theta_0,
+            free: theta_1 + spare,
+        }
+    }
+
+    /// `theta_b` after a time.
+    #[inline(always)]
+    fn aged(&self, time: f64) -> f64 {
+        self.theta_0 + if self.curve.floor > 0.0 { -self.rest_0 * exp_m1(-time) } else { time }
     }
 
     /// `c` of the member that arrives, good to `rtol`; the search begins at `start`.
@@ -92,7 +113,8 @@ impl<E: Exponent> Problem<E> {
             let curve = self.curve.with(c);
             let behind = self.behind(&curve, rtol, reach, effort)?;
             // So fast that the rest of theta is a rounding error of the sum.
-            if !self.tight && 1.0 + behind.sum < LOST {
+            let left = if self.tight { 1.0 - behind.sum / self.free } else { 1.0 + behind.sum };
+            if left < LOST {
                 return None;
             }
             let steep = c > 0.0;
@@ -134,7 +156,7 @@ impl<E: Exponent> Problem<E> {
                 effort.nodes += NODES as u32;
                 let (left, counts) = if self.tight {
                     tight(self, curve, &panel, rule, &mut behind);
-                    (1.0, behind.sum)
+                    (self.free, behind.sum)
                 } else {
                     loose(self, curve, &panel, rule, &mut behind);
                     (self.most, behind.slope * scale)
@@ -171,8 +193,7 @@ impl<E: Exponent> Problem<E> {
             let weight = h * rule.w[j] * exp(-(behind.slip + slip[j]));
             let q = behind.turn + h * turn[j];
             if TIGHT {
-                let aged = (1.0 - (self.v_i - 1.0) * exp_m1(-curve.t_f * x[j])) / self.v_i;
-                let part = weight * w[j] * aged;
+                let part = weight * w[j] * self.aged(curve.t_f * x[j]);
                 sum[j] = part;
                 slope[j] = part * (q - E::lean(x[j], z[j]));
             } else {
@@ -189,7 +210,7 @@ impl<E: Exponent> Problem<E> {
     }
 }
 
-/// `theta(t_f)/theta_1` below which its digits are lost.
+/// Theta at the end, as a share of `theta_1` or of `theta_b`, below which its digits are lost.
 const LOST: f64 = 1e-6;
 
 /// What is left behind a slip that ends the integration, in units of the accuracy.

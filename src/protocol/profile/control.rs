@@ -5,7 +5,8 @@ use super::curve::Curve;
 use super::hermite::Hermite;
 use super::passage::Resolved;
 use crate::numerics::elementary::exp;
-use crate::protocol::control::{Extent, Jet};
+use crate::numerics::radau::radau;
+use crate::protocol::control::{Extent, Jet, Tolerance};
 
 impl Curve<Hermite> {
     /// `v`, `v'`, `v''` and `v'''` in time.
@@ -24,19 +25,27 @@ impl Resolved {
         Jet { v: curve.derivatives(x, z), theta: self.theta(u), rate: self.rate(u) }
     }
 
-    /// Takes the range of something on the panel into `extent`, turns good to `rtol`; `told` gives its value and its
-    /// slope in time.
-    pub fn range(&self, curve: &Curve<Hermite>, rtol: f64, extent: &mut Extent, told: impl Fn(&Jet) -> [f64; 2]) {
+    /// Takes the range of something on the panel into `extent`, turns as good as `tolerance`; `told` gives its value and its
+    /// slope in time, from the moment and `theta''` there.
+    pub fn range(
+        &self,
+        curve: &Curve<Hermite>,
+        tolerance: Tolerance,
+        extent: &mut Extent,
+        told: impl Fn(&Jet, f64) -> [f64; 2],
+    ) {
         let duration = self.duration(curve);
-        let along = |u: f64, jet: &Jet| {
-            let [value, slope] = told(jet);
+        let (bend_start, bends) = self.bends(duration);
+        let along = |u: f64, jet: &Jet, bend: f64| {
+            let [value, slope] = told(jet, bend);
             (u, [value, duration * slope])
         };
-        let mut before = along(0.0, &self.jet(curve, 0.0));
-        for (u, theta, rate) in self.nodes() {
+        let between = |u: f64| along(u, &self.jet(curve, u), radau().interpolate(bend_start, &bends, u)).1;
+        let mut before = (0.0, between(0.0));
+        for ((u, theta, rate), bend) in self.nodes().zip(bends) {
             let (x, z) = self.place(u);
-            let after = along(u, &Jet { v: curve.derivatives(x, z), theta, rate });
-            extent.turn(before, after, rtol, |u| along(u, &self.jet(curve, u)).1);
+            let after = along(u, &Jet { v: curve.derivatives(x, z), theta, rate }, bend);
+            extent.turn(before, after, tolerance, between);
             before = after;
         }
     }

@@ -10,7 +10,7 @@ use super::Exponent;
 use super::arrival::total;
 use super::curve::{Curve, MOST_PANELS, Panel, Side, place, places};
 use crate::model::Law;
-use crate::numerics::elementary::{exp, ln};
+use crate::numerics::elementary::{exp, exp_m1, ln};
 use crate::numerics::radau::{NODES, Nodes, Radau, radau};
 use crate::protocol::Effort;
 
@@ -118,6 +118,9 @@ const SLOW: f64 = 0.02;
 /// How much less the exponent may vary over a panel on which theta is not given in closed form.
 const STIFF: f64 = 0.6;
 
+/// Below this one `theta'` is so small beside 1 that `1 - theta v` loses a digit or more.
+const STEADY: f64 = 0.1;
+
 #[multiversion(targets(
     "x86_64+avx+avx2+bmi1+bmi2+avx512f+avx512bw+avx512cd+avx512dq+avx512vl",
     "x86_64+avx+avx2+bmi1+bmi2"
@@ -131,7 +134,17 @@ fn resolve<E: Exponent>(curve: &Curve<E>, panel: Panel, start: [f64; 3], stiff: 
     let slip = rule.integrals(&v).map(|slip| h * slip);
     let (mut theta, mut rate) = ([0.0; NODES], [0.0; NODES]);
     if stiff {
-        rate = collocate(rule, h, &v, theta_start);
+        // v - v_start, as good where it is small.
+        let level = |x: f64, z: f64| curve.exponent.value(x, z);
+        let (x_0, z_0) = place(panel.side, panel.from);
+        let before = level(x_0, z_0);
+        let w_start = curve.w_f * exp(before);
+        let mut gained = [0.0; NODES];
+        for j in 0..NODES {
+            let rise = level(x[j], z[j]) - before;
+            gained[j] = if rise.abs() < 1.0 { w_start * exp_m1(rise) } else { w[j] - w_start };
+        }
+        rate = collocate(rule, h, &v, &gained, v_start, rate_start);
         for j in 0..NODES {
             theta[j] = (1.0 - rate[j]) / v[j];
         }
@@ -145,20 +158,33 @@ fn resolve<E: Exponent>(curve: &Curve<E>, panel: Panel, start: [f64; 3], stiff: 
             theta[j] = (theta_start + h * gained[j]) / growth[j];
             rate[j] = 1.0 - theta[j] * v[j];
         }
+        // Next to steady sliding that difference cancels: theta'' = -v theta' - v' theta keeps its digits.
+        if rate.iter().fold(rate_start.abs(), |most, rate| most.max(rate.abs())) < STEADY {
+            let length = (panel.to - panel.from).abs();
+            let mut loss = [0.0; NODES];
+            for j in 0..NODES {
+                loss[j] = growth[j] * theta[j] * w[j] * length * curve.exponent.slope(x[j], z[j]);
+            }
+            let lost = rule.integrals(&loss);
+            for j in 0..NODES {
+                rate[j] = (rate_start - lost[j]) / growth[j];
+            }
+        }
     }
     (Resolved { panel, v_start, theta_start, theta, rate_start, rate, v }, slip[NODES - 1])
 }
 
-/// `theta'` at the nodes of a panel of length `h`, from `rate/v + h A rate = 1/v - theta_start` divided by `h`.
+/// `theta'` at the nodes of a panel of length `h`, from `rate/v + h A rate = 1/v - theta_start` divided by `h`; `gained` is `v
+/// - v_start`, in which the right side keeps its digits however little changes.
 #[inline(always)]
-fn collocate(rule: &Radau, h: f64, v: &Nodes, theta_start: f64) -> Nodes {
+fn collocate(rule: &Radau, h: f64, v: &Nodes, gained: &Nodes, v_start: f64, rate_start: f64) -> Nodes {
     let (mut rows, mut right) = ([[0.0; NODES]; NODES], [0.0; NODES]);
     for (j, row) in rows.iter_mut().enumerate() {
         for (entry, column) in row.iter_mut().zip(&rule.columns) {
             *entry = column[j];
         }
         row[j] += 1.0 / (h * v[j]);
-        right[j] = (1.0 / v[j] - theta_start) / h;
+        right[j] = (rate_start - gained[j] / v[j]) / (h * v_start);
     }
     for k in 0..NODES {
         let mut best = k;
@@ -208,6 +234,14 @@ impl Resolved {
     /// `theta'` at a share `u` of the panel.
     pub fn rate(&self, u: f64) -> f64 {
         radau().interpolate(self.rate_start, &self.rate, u)
+    }
+
+    /// `theta''` at the start and at the nodes of a panel of this duration. Where theta follows `1/v`, the terms of `-theta'
+    /// v - theta v'` cancel: the slope of what is interpolated keeps its digits.
+    pub fn bends(&self, duration: f64) -> (f64, Nodes) {
+        let rule = radau();
+        let gained = self.rate.map(|rate| rate - self.rate_start);
+        (rule.slope_at_0(&gained) / duration, rule.slopes(&gained).map(|slope| slope / duration))
     }
 
     /// The nodes, as shares of the panel, with theta and `theta'`.

@@ -56,7 +56,7 @@ impl Smooth {
             v: jet.v[0],
             theta: jet.theta,
             friction: self.slider.friction(jet),
-            v_c: Some(self.slider.control(jet)[0]),
+            v_c: Some(self.slider.control(jet)),
             beta: None,
         }
     }

@@ -12,9 +12,9 @@
 //! protocol where theta has the time to follow `1/v` asks for none of this.
 
 use crate::model::Law;
-use crate::numerics::elementary::{exp_m1, ln, ln_1p};
-use crate::protocol::control::Extent;
-use crate::protocol::optimal::Span;
+use crate::numerics::elementary::{ln, ln_1p};
+use crate::protocol::control::{Extent, Tolerance};
+use crate::protocol::optimal::{Span, lag_at_bound};
 use crate::protocol::profile::{Curve, Hermite, Problem, Resolution, Start, pass, reach};
 use crate::protocol::{Effort, Jet, Slider, Status};
 
@@ -115,20 +115,22 @@ impl Piece {
         let exponent = Hermite { rise, start: at_start, end: at_end, stretch, c: 0.0 };
         let curve = Curve::new(floor, w_1, time, exponent);
         let growth = time - lag;
-        // How much larger theta is for v = floor.
-        let spare = if floor > 0.0 { -(1.0 - start.theta) * exp_m1(-time) - growth } else { lag };
+        // How much larger theta is for v = floor: what it then loses less.
+        let spare = if floor > 0.0 { lag - lag_at_bound(start.theta, time) } else { lag };
         if spare.is_nan() || spare <= 0.0 {
             return Err(Status::NotConverged);
         }
-        let room = ln_1p(spare / end.theta);
-        let problem = Problem::between(end.theta, -growth / end.theta, end.rate / end.theta, room, curve);
+        let ends = [start.theta, end.theta];
+        let problem = Problem::between(ends, -growth / end.theta, end.rate / end.theta, spare, curve);
         let curve = curve.with(problem.solve(0.0, rtol, reach(rtol), effort).ok_or(Status::NotConverged)?);
         let from = Start { v: start.v[0], theta: start.theta, rate: start.rate, slow: false };
         let mut piece = Piece { work: 0.0, v: Extent::NONE, control: Extent::NONE, curve, from };
         let theta = pass(&curve, from, rtol, INTERPOLATION * reach(rtol), effort, |panel| {
             piece.work += panel.work(&slider.law, &curve);
-            panel.range(&curve, rtol, &mut piece.v, |jet| [jet.v[0], jet.v[1]]);
-            panel.range(&curve, rtol, &mut piece.control, |jet| slider.control(jet));
+            panel.range(&curve, Tolerance::OfValue(rtol), &mut piece.v, |jet, _| [jet.v[0], jet.v[1] / jet.v[0]]);
+            panel.range(&curve, Tolerance::OfRange(rtol), &mut piece.control, |jet, bend| {
+                [slider.control(jet), slider.control_rate(jet, bend)]
+            });
         });
         let arrives = theta.is_some_and(|theta| (theta / end.theta - 1.0).abs() <= 10.0 * rtol + ROUNDING);
         if arrives { Ok(piece) } else { Err(Status::NotConverged) }

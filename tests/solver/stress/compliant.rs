@@ -58,9 +58,37 @@ fn every_compliant_is_right_or_says_so() {
             let rounding = 8.0 * f64::EPSILON * t_f * best.hamiltonian.abs();
             row.at_most("gap >= 0", best.work - work, (rtol + FINE) * terms * best.work + rounding);
         }
+        accurate(point, &rough, row);
         forces(point, &rough, row);
         stiff(point, &rough, row);
     });
+}
+
+/// Every number agrees with that of a finer accuracy.
+fn accurate(point: &Point, rough: &Compliant, row: &mut Row) {
+    let &Point { slider, velocities: (v_i, v_f), t_f, rtol, .. } = point;
+    let Some(fine) = compliant::solve(&slider, (v_i, v_f), t_f, FINE).value else {
+        return row.fact("exists at 1e-12", false);
+    };
+    let noise = 2.0 * (rtol + FINE);
+    let terms = 1.0 + (slider.law.a + slider.law.b) * (fine.v_max.ln() + v_i.max(v_f).ln());
+    row.agree("work to rtol", rough.work, fine.work, noise * terms);
+    row.agree("v_min to rtol", rough.v_min, fine.v_min, noise);
+    row.agree("v_max to rtol", rough.v_max, fine.v_max, noise);
+    let range = fine.control_max.abs().max(fine.control_min.abs());
+    if tells(slider.law, fine.v_max, range) {
+        // Ageing drives the spring at (b/k) (1/theta - v), which may cancel with v. Twice: the velocity itself has an error,
+        // and its exponent, of terms of some hundred, a rounding.
+        let allowed = (2.0 * noise + 128.0 * f64::EPSILON) * (range + slider.law.b / slider.k * fine.v_max);
+        row.at_most("least control velocity to rtol", (rough.control_min - fine.control_min).abs(), allowed);
+        row.at_most("greatest control velocity to rtol", (rough.control_max - fine.control_max).abs(), allowed);
+    }
+}
+
+/// Whether the control velocity is no small remainder of large terms: friction changes by `a v'/v + b theta'/theta`, which
+/// cancel for `b` next to `a` where theta follows `1/v`, and a soft spring makes much of what is left.
+pub fn tells(Law { a, b }: Law, v_max: f64, range: f64) -> bool {
+    (b - a).abs() > 0.1 * a && range < 1e6 * v_max
 }
 
 /// Friction, inertia and spring may be weaker by the same factor: nothing but ratios of forces enters.

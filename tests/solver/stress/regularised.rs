@@ -4,12 +4,18 @@ use slipsweep::model::Transition;
 use slipsweep::protocol::regularised::{self, Regularised};
 use slipsweep::protocol::{Slider, Status, optimal};
 
+use super::compliant::tells;
 use super::random::Random;
 use super::{POINTS, Row, sample};
 
 /// More quadrature nodes than any point takes: some hundredths of a second where velocities fall by ten decades within a
 /// piece.
 const MOST_NODES: u32 = 4_000_000;
+
+const FINE: f64 = 1e-12;
+
+/// What rounding may leave of the velocity where the exponent of a piece is steep.
+const STEEP: f64 = 2e-10;
 
 #[derive(Debug)]
 struct Point {
@@ -61,11 +67,37 @@ fn every_regularised_is_right_or_says_so() {
         if found.status == Status::Ok {
             let &Point { slider, velocities: (v_i, v_f), t_f, bounded, .. } = point;
             let transition = Transition { law: slider.law, v_i, v_f };
-            let optimum = optimal::solve(&transition, t_f, bounded, 1e-12).value.map_or(f64::NAN, |found| found.work);
+            let optimum = optimal::solve(&transition, t_f, bounded, FINE).value.map_or(f64::NAN, |found| found.work);
             row.agree("the optimum's work", work_optimal, optimum, 2.0 * point.rtol + 1e-11);
         }
+        accurate(point, &value, row);
         stiff(point, &value, row);
     });
+}
+
+/// Every number agrees with that of a finer accuracy.
+fn accurate(point: &Point, rough: &Regularised, row: &mut Row) {
+    let &Point { slider, velocities, t_f, delta_t, bounded, rtol } = point;
+    let found = regularised::solve(&slider, velocities, t_f, delta_t, bounded, FINE);
+    // Where the extremal need not be unique, no number is promised.
+    if found.status == Status::Nonphysical {
+        return;
+    }
+    let Some(fine) = found.value else { return row.fact("exists at 1e-12", false) };
+    let noise = 2.0 * (rtol + FINE);
+    row.agree("work to rtol", rough.work, fine.work, noise);
+    row.at_most("gap to rtol", (rough.gap - fine.gap).abs(), noise * (1.0 + fine.gap));
+    // The ends of a piece have slopes of the order of 1/a in time, and curvatures of their square.
+    let slope = delta_t / slider.law.a;
+    let short = velocities.0.min(velocities.1) - 1.0;
+    let steep = noise + STEEP + f64::EPSILON * (16.0 / slider.law.a + slope * slope + 4.0 / short);
+    row.agree("v_min to rtol", rough.v_min, fine.v_min, steep);
+    row.agree("v_max to rtol", rough.v_max, fine.v_max, steep);
+    let range = fine.control_max.abs().max(fine.control_min.abs());
+    if tells(slider.law, fine.v_max, range) {
+        row.at_most("least control velocity to rtol", (rough.control_min - fine.control_min).abs(), steep * range);
+        row.at_most("greatest control velocity to rtol", (rough.control_max - fine.control_max).abs(), steep * range);
+    }
 }
 
 /// The block does not know the spring; a rigid one moves with it.

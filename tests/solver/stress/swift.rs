@@ -7,6 +7,7 @@ use slipsweep::protocol::{Effort, Status, optimal};
 
 use super::random::Random;
 use super::{POINTS, Row, sample};
+use crate::reference::table;
 
 #[derive(Debug)]
 struct Point {
@@ -196,4 +197,38 @@ fn every_bounded_velocity_is_right_or_says_so() {
 #[test]
 fn every_bounded_friction_is_right_or_says_so() {
     examine("bounded_friction", POINTS, draw);
+}
+
+/// The first points of the sample against Taylor series in arithmetic of 84 digits: `tests/reference/generate_stress.py`.
+#[test]
+fn reference_members_of_bounded_friction_of_the_sample() {
+    let family = find("bounded_friction").expect("is a family");
+    let rows = table("stress_bounded_friction");
+    assert!(rows.len() >= 100, "{} rows", rows.len());
+    for row in &rows {
+        let law @ Law { a, b } = Law { a: row.number("a"), b: row.number("b") };
+        let transition = Transition { law, v_i: row.number("v_i"), v_f: row.number("v_f") };
+        let case = Case { transition, t_f: row.number("t_f"), tau_max: row.number("tau_max") };
+        for rtol in [1e-6, 1e-10, 1e-13] {
+            let found = solve(family, &case, rtol).unwrap_or_else(|obstacle| panic!("{obstacle} in {row:?}"));
+            let logarithms = found.v_max.ln() + transition.v_i.max(transition.v_f).ln();
+            let noise = rtol * (1.0 + (a + b) * logarithms) + 8.0 * slip(&case, &found);
+            let carried = 2.0 * f64::EPSILON * (1.0 + b / a) * logarithms;
+            let numbers: [Number; 4] = [
+                ("work", |s| s.work),
+                ("v_min", |s| s.v_min),
+                ("v_max", |s| s.v_max),
+                ("friction_max", |s| s.friction_max),
+            ];
+            for (column, number) in numbers {
+                let exact = row.number(column);
+                if number(&found) == exact {
+                    continue;
+                }
+                let error = number(&found) / exact - 1.0;
+                let allowed = allowed(family, &case, error, noise + carried, |s| number(s) / exact);
+                assert!(error.abs() <= allowed, "{column} at {rtol}: off by {error:.1e} > {allowed:.1e} in {row:?}");
+            }
+        }
+    }
 }
