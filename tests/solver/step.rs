@@ -595,6 +595,18 @@ fn regress_a_heavy_block_that_is_driven_comes_to_rest_in_every_swing() {
 }
 
 /// Rounding errors of the friction, which takes a share of 1e-43 a swing, make no limit cycle.
+/// A block that falls to rest trembles there by the rounding of its `ln v`, which was taken for its first swing.
+#[test]
+fn regress_blocks_that_fall_to_rest_swing_from_there() {
+    let law = Law { a: 0.00016607319830601024, b: 5.401341955090528e-5 };
+    let transition = Transition { law, v_i: 193273.89836014027, v_f: 203.7819410206123 };
+    let step = Step { transition, k: 2.9455383641716224e33, m: 9.494628234570941e-25 };
+    for rtol in [1e-6, 2.3e-8, 1e-10] {
+        let found = respond(&step, rtol);
+        assert!((found.v_peak / transition.v_f - 2.0).abs() <= 2.0 * rtol, "{rtol}: {found:?}");
+    }
+}
+
 #[test]
 fn regress_equal_effects_of_velocity_and_contacts_drive_nothing() {
     let law = Law { a: 1.1021004188962902e-3, b: 1.1021004188962902e-3 };

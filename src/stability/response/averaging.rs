@@ -109,7 +109,8 @@ pub(super) fn course_after_first_swings(slider: &Slider, linear: Linear, x: f64,
     for _ in 0..SWINGS {
         let cycle = orbit.cycle(false, &mut budget).ok()?;
         let [slow, fast] = cycle.extrema.map(|seen| seen.map(|seen| orbit.polished(seen)));
-        (low, high) = (low.or(slow), high.or(fast));
+        // At rest the velocity trembles far below v_f.
+        (low, high) = (low.or(slow.filter(|slow| slow.x < 0.0)), high.or(fast.filter(|fast| fast.x > 0.0)));
     }
     let (low, high) = (low?, high?);
     let excess = exp_m1(x).abs();
