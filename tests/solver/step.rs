@@ -594,7 +594,6 @@ fn regress_a_heavy_block_that_is_driven_comes_to_rest_in_every_swing() {
     }
 }
 
-/// Rounding errors of the friction, which takes a share of 1e-43 a swing, make no limit cycle.
 /// A block that falls to rest trembles there by the rounding of its `ln v`, which was taken for its first swing.
 #[test]
 fn regress_blocks_that_fall_to_rest_swing_from_there() {
@@ -607,6 +606,7 @@ fn regress_blocks_that_fall_to_rest_swing_from_there() {
     }
 }
 
+/// Rounding errors of the friction, which takes a share of 1e-43 a swing, make no limit cycle.
 #[test]
 fn regress_equal_effects_of_velocity_and_contacts_drive_nothing() {
     let law = Law { a: 1.1021004188962902e-3, b: 1.1021004188962902e-3 };
