@@ -249,3 +249,29 @@ const ENOUGH: f64 = 1e-8;
 
 /// More steps than the secants take.
 const MOST_STEPS: u32 = 60;
+
+#[cfg(test)]
+mod tests {
+    use super::lag_at_bound;
+
+    /// `t - 1 + e^-t + theta (1 - e^-t)` by its series in `t`, forty terms, where they do not cancel.
+    fn series(theta: f64, time: f64) -> f64 {
+        let (mut power, mut sum) = (time, theta * time);
+        for k in 2..40 {
+            power *= -time / f64::from(k);
+            sum += (theta - 1.0) * power;
+        }
+        sum
+    }
+
+    #[test]
+    fn reference_the_lag_at_the_bound_is_its_series() {
+        for theta in [1e-12, 1e-3, 0.5, 1.0 - 1e-12] {
+            for time in [1e-300, 1e-13, 1e-6, 1e-3, 0.0999, 0.1, 0.1001, 0.5, 1.0] {
+                let (found, expected) = (lag_at_bound(theta, time), series(theta, time));
+                assert!((found / expected - 1.0).abs() <= 2e-15, "{theta} {time}: {found:e} {expected:e}");
+            }
+        }
+        assert_eq!(lag_at_bound(0.3, 800.0), 799.3);
+    }
+}
