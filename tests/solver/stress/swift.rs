@@ -214,7 +214,8 @@ fn reference_members_of_bounded_friction_of_the_sample() {
             let logarithms = found.v_max.ln() + transition.v_i.max(transition.v_f).ln();
             let noise = rtol * (1.0 + (a + b) * logarithms) + 8.0 * slip(&case, &found);
             let carried = 2.0 * f64::EPSILON * (1.0 + b / a) * logarithms;
-            let numbers: [Number; 4] = [
+            let numbers: [Number; 5] = [
+                ("alpha", |s| s.alpha.unwrap_or(f64::NAN)),
                 ("work", |s| s.work),
                 ("v_min", |s| s.v_min),
                 ("v_max", |s| s.v_max),
