@@ -6,7 +6,7 @@ use slipsweep::model::{Law, Transition};
 use slipsweep::protocol::Status;
 use slipsweep::stability::SteadySliding;
 use slipsweep::stability::lyapunov_coefficient;
-use slipsweep::stability::response::{Orbit, Outcome, Response, Step, Sustained};
+use slipsweep::stability::response::{Orbit, Outcome, Response, Slider, Step, Sustained};
 
 const PAPER: Law = Law { a: 0.005, b: 0.01 };
 const V_F: f64 = 3.2e6;
@@ -184,7 +184,7 @@ fn reference_heavy_block_settles_as_averaging_tells() {
         let error = relative(found, expected);
         assert!(error < 0.1 * last, "{inertia}: {found} {expected}");
         last = error;
-        assert!(response.steps < 12_000, "{inertia}: {}", response.steps);
+        assert!(response.steps < 20_000, "{inertia}: {}", response.steps);
     }
 }
 
@@ -313,7 +313,7 @@ fn without_mass_it_settles_or_becomes_infinite() {
 fn work_is_known_exactly() {
     let found = [7.5e-3, 0.5 * 0.00756, 0.02].map(|k| respond(&paper(k), 1e-6).steps);
     // Each is followed twice.
-    assert_eq!(found, [921, 1577, 65]);
+    assert_eq!(found, [993, 1734, 65]);
 }
 
 /// The slope at the start is a rounding error, of either sign.
@@ -714,5 +714,200 @@ fn reference_heavy_blocks_next_to_the_critical_stiffness() {
             let size = (2.0 * driven / bend).sqrt();
             assert!((cycle.v_peak - 1.0 - size).abs() < 0.2 * size + rtol * rtol, "{share:e}: {cycle:?} {size}");
         }
+    }
+}
+
+/// The peak and the trough of a motion within 1e-5 of `v_f`, which counted as rest.
+#[test]
+fn regress_motions_within_1e_5_of_the_final_velocity_are_told() {
+    let equal = Law { a: 0.3233401024753941, b: 0.32334010247665207 };
+    let cases = [
+        (
+            Law { a: 0.018450554182241147, b: 0.0 },
+            [4247641877.583368, 4247642864.5342784],
+            26543896.623336684,
+            3.3186185634321918e-6,
+        ),
+        (
+            Law { a: 0.01895063231431266, b: 0.1823680557632764 },
+            [1.0000018260121661, 1.000000000000117],
+            0.1634285645073741,
+            2.0014453796760405e-35,
+        ),
+        (equal, [1.0000497665328962, 1.000000004601511], 2.0968487392865115e-10, 1.8844869992301743e-40),
+    ];
+    for (law, [v_i, v_f], k, m) in cases {
+        let step = Step { transition: Transition { law, v_i, v_f }, k, m };
+        let [rough, fine] = [1e-8, 1e-12].map(|rtol| respond(&step, rtol));
+        assert!(rough.v_peak > v_f * (1.0 + 1e-8) || rough.v_trough < v_f * (1.0 - 1e-8), "{rough:?}");
+        for (rough, fine) in [(rough.v_peak, fine.v_peak), (rough.v_trough, fine.v_trough)] {
+            assert!(relative(rough, fine) <= 1e-8, "{rough:?} {fine:?}");
+        }
+    }
+}
+
+/// Troughs far below `v_f` magnify errors of steps a million times.
+#[test]
+fn regress_troughs_of_light_blocks_on_stiff_springs_are_good_to_rtol() {
+    let cases = [
+        (
+            Law { a: 0.060474504981499, b: 0.00032430768565563846 },
+            [1568.6422201864552, 124242480973.50568],
+            23397449113.086067,
+            4.713195165981806e-24,
+        ),
+        (
+            Law { a: 3.18220613797142, b: 0.07891451867664324 },
+            [1.000000016886479, 122109495760.26038],
+            7.39205775074722e25,
+            1.9024087380731431e-31,
+        ),
+    ];
+    for (law, [v_i, v_f], k, m) in cases {
+        let step = Step { transition: Transition { law, v_i, v_f }, k, m };
+        let [rough, fine] = [1e-6, 1e-9].map(|rtol| respond(&step, rtol));
+        assert!(fine.v_trough < 1e-4 * v_f && relative(rough.v_trough, fine.v_trough) <= 1e-6, "{rough:?} {fine:?}");
+    }
+}
+
+/// Rounding makes the velocity of a block that is arrested tremble, and this was taken for its greatest.
+#[test]
+fn regress_peaks_after_an_arrest_are_no_tremble() {
+    let law = Law { a: 0.07866619495006706, b: 0.07866319797385066 };
+    let transition = Transition { law, v_i: 59369.4658510401, v_f: 1.000000000000003 };
+    let step = Step { transition, k: 2377.3711209053295, m: 738353885140.4694 };
+    let found = respond(&step, 1e-10);
+    assert!((found.v_peak - 2.000000003508).abs() < 1e-11, "{found:?}");
+}
+
+/// Swings that friction changes by 1e-7 of themselves, or of which it gives as much as it takes, are no limit cycle.
+#[test]
+fn regress_what_hardly_changes_is_no_limit_cycle() {
+    let below = Law { a: 1.3218331381257936e-6, b: 1.0028531539030115e-5 };
+    let above = Law { a: 0.0018650442311370467, b: 0.006462420414556991 };
+    let cases = [
+        (below, [1.1817928163219251, 1.0951933757494372], 34.774726365844984, 4.401544839861419, 1.2e-5),
+        (above, [1.0000000000007274, 1.118762060696573], 116641.0071753458, 37805.49045120459, 1e-6),
+    ];
+    for (law, [v_i, v_f], k, m, rtol) in cases {
+        let found = respond(&Step { transition: Transition { law, v_i, v_f }, k, m }, rtol);
+        assert!(found.cycle.is_none_or(|cycle| cycle.v_peak < v_f * (1.0 + 1e-3)), "{found:?}");
+    }
+}
+
+/// The rate of cycles is 1e-7 beside the limit cycle, and 1e-2 in a distance.
+#[test]
+fn regress_limit_cycles_where_the_rate_bends_are_found() {
+    let law = Law { a: 0.5401665375930877, b: 1.2379871388134032 };
+    let transition = Transition { law, v_i: 1.0000000000506755, v_f: 1.983476098447413 };
+    let step = Step { transition, k: 0.6978206013086433, m: 1.735729886784671e-11 };
+    for rtol in [1.7e-3, 1.7e-4, 1.7e-5] {
+        let cycle = respond(&step, rtol).cycle.expect("ends on a limit cycle");
+        assert!(relative(cycle.v_peak / transition.v_f, 6348.3526) <= 0.1 * rtol, "{rtol}: {cycle:?}");
+    }
+}
+
+/// Without mass there is no limit cycle: rounding of the spring's force made one.
+#[test]
+fn regress_without_mass_there_is_no_limit_cycle() {
+    let law = Law { a: 2.436194722874896e-6, b: 2.0537999570900105 };
+    let transition = Transition { law, v_i: 1.0000000000012021, v_f: 1.0000000000363836 };
+    let step = Step { transition, k: 2.053783995210945, m: 0.0 };
+    assert_eq!(step.respond(6e-7), (Status::Infeasible, None));
+}
+
+/// Next to the critical stiffness a block without mass comes to rest after more swings than can be followed.
+#[test]
+fn responses_without_mass_next_to_the_critical_stiffness_are_decided() {
+    let law = Law { a: 0.25, b: 0.75 };
+    for v_i in [2.1, 1.9, 200.0, 1.0001] {
+        let transition = Transition { law, v_i, v_f: 2.0 };
+        let step = Step { transition, k: 0.5f64.next_up(), m: 0.0 };
+        let [rough, fine] = [1e-6, 1e-9].map(|rtol| respond(&step, rtol));
+        assert_eq!((rough.outcome, fine.outcome), (Outcome::Settled, Outcome::Settled));
+        assert!(
+            relative(rough.v_peak, fine.v_peak) <= 1e-6 && relative(rough.v_trough, fine.v_trough) <= 1e-6,
+            "{rough:?} {fine:?}"
+        );
+        assert_eq!(Step { k: 0.5f64.next_down(), ..step }.respond(1e-6), (Status::Infeasible, None));
+    }
+}
+
+/// Terms of `1/theta` that were too small to be felt in a series grew over seventy powers of e within one step of a slip, and the next
+/// cycle was off by a thousand times the error of a step.
+#[test]
+fn regress_cycles_of_long_slips_are_alike_at_every_accuracy() {
+    let slider =
+        Slider { a: 1.8342438123566077e-5, b: 9.799475947200603e-5, inertia: 5.635e-30, k: 4.984302511808676e-6 };
+    for tolerance in [5e-4, 1.7e-4, 5e-5, 1.7e-5, 1e-6] {
+        let mut orbit = Orbit::new(&slider, slider.steady(-2.32), tolerance);
+        let mut budget = 10_000;
+        let periods: Vec<f64> = (0..6).map(|_| orbit.cycle(false, &mut budget).expect("goes on").period).collect();
+        assert!(relative(periods[4], periods[5]) < 0.01 * tolerance.max(1e-4), "{tolerance:e}: {periods:?}");
+    }
+}
+
+/// What a soft spring stores at a force of 1e-5 of `a` moves a light block by powers of e.
+#[test]
+fn regress_small_forces_of_soft_springs_are_no_rest() {
+    let law = Law { a: 0.00014663178743581242, b: 0.00014663178696880193 };
+    let transition = Transition { law, v_i: 1.0000314445814567, v_f: 177821.22008867457 };
+    let step = Step { transition, k: 2.4929439620047403e-19, m: 4.105628758746547e-22 };
+    for rtol in [2.6e-4, 1e-6] {
+        let time = respond(&step, rtol).settling_time.expect("settles") * transition.v_f;
+        assert!(relative(time, 2.32256714e12) <= rtol, "{rtol}: {time:e}");
+    }
+}
+
+/// Cycles were counted with rates too coarse for it, up to a place that was not where they come into the band.
+#[test]
+fn regress_cycles_until_it_settles_are_counted() {
+    let light = Law { a: 7.800928358237422e-6, b: 0.024779000929800166 };
+    let heavy = Law { a: 0.1931690592553601, b: 1.4518214224180492 };
+    let cases = [
+        (
+            light,
+            [10310.918710403183, 1.0129941889216252],
+            0.024771240385117264,
+            3.7149710843086593e-16,
+            1.7e-3,
+            4566.62848,
+        ),
+        (heavy, [4.924451308600438, 1.0000000000066644], 2.2020110691423884, 0.14478001957119171, 7.5e-6, 44152.22435),
+    ];
+    for (law, [v_i, v_f], k, m, rtol, expected) in cases {
+        let found = respond(&Step { transition: Transition { law, v_i, v_f }, k, m }, rtol).settling_time;
+        assert!(found.is_none_or(|time| relative(time * v_f, expected) <= rtol), "{found:?}");
+    }
+}
+
+/// After a rest of 1e22 the time has no digits for a period of 1e11.
+#[test]
+fn regress_periods_after_a_long_rest_keep_their_digits() {
+    let law = Law { a: 0.0001962300694679421, b: 0.0004329083474134625 };
+    let transition = Transition { law, v_i: 178568889604.49713, v_f: 1.0577629643308977 };
+    let step = Step { transition, k: 9.951615527837284e-13, m: 2903341234.6479425 };
+    let period = respond(&step, 3e-8).cycle.expect("is a limit cycle").period;
+    assert!(relative(period * transition.v_f, 359239700355.754) <= 3e-8, "{period}");
+}
+
+/// The mean over swings smaller than 1e-3 was taken with the amplitude of one and the energy of another.
+#[test]
+fn regress_small_swings_about_stable_sliding_settle() {
+    let law = Law { a: 0.0016658905273092804, b: 0.0017707917234087503 };
+    let transition = Transition { law, v_i: 1.0002576023010952, v_f: 1.0000000000002036 };
+    let found = respond(&Step { transition, k: 1.3357034496304796e25, m: 2.121172881501665e26 }, 3.7e-6);
+    assert!(found.outcome == Outcome::Settled && relative(found.v_peak, transition.v_i) < 3.7e-6, "{found:?}");
+}
+
+/// An arrest may take the velocity past `v_f` at once.
+#[test]
+fn regress_an_arrest_meets_the_final_velocity() {
+    let law = Law { a: 8.182498673153683e-5, b: 3.36991947389927e-5 };
+    let transition = Transition { law, v_i: 128693332.41120453, v_f: 1.0000000500238169 };
+    let step = Step { transition, k: 6330178.537020585, m: 7.85671589242974e-28 };
+    for rtol in [1e-4, 1e-6] {
+        let trough = respond(&step, rtol).v_trough / transition.v_f;
+        assert!(relative(trough, 6.3801684564e-41) <= rtol, "{rtol}: {trough:e}");
     }
 }

@@ -14,7 +14,7 @@
 
 use std::f64::consts::{LN_2, PI};
 
-use super::course::{Course, Doubts, Fate, VANISHING};
+use super::course::{Course, Doubts, Fate, VANISHING, as_slow};
 use super::fate::Linear;
 use super::orbit::{Extremum, Orbit, SETTLED};
 use super::slider::Slider;
@@ -37,9 +37,13 @@ const COUNTABLE: f64 = 1.5e3;
 /// Contacts age while swings die out where `M/a` is more.
 const COUPLED: f64 = 30.0;
 
-/// Swings that are simulated before, errors of their steps in units of `rtol`, and steps.
+/// Swings that are simulated before, errors of their steps in units of `rtol`, the share of it that is taken each time that
+/// they are simulated more finely, the least of them, how often that is done at most, and steps.
 const SWINGS: u32 = 3;
 const FINE: f64 = 3e-3;
+const FINER: f64 = 0.1;
+const FINEST: f64 = 1e-14;
+const MOST_TIMES: u32 = 5;
 const MOST_STEPS: u32 = 10_000;
 
 /// Limit cycles are told by the Hopf point where their amplitude is less.
@@ -103,25 +107,56 @@ pub(super) fn course_after_first_swings(slider: &Slider, linear: Linear, x: f64,
         return None;
     }
     let swinging = Swinging { a, b, mass, impedance, omega, share };
-    let mut orbit = Orbit::new(slider, slider.steady(x), FINE * rtol);
-    let mut budget = MOST_STEPS;
-    let (mut low, mut high) = (None, None);
-    for _ in 0..SWINGS {
-        let cycle = orbit.cycle(false, &mut budget).ok()?;
-        let [slow, fast] = cycle.extrema.map(|seen| seen.map(|seen| orbit.polished(seen)));
-        // At rest the velocity trembles far below v_f.
-        (low, high) = (low.or(slow.filter(|slow| slow.x < 0.0)), high.or(fast.filter(|fast| fast.x > 0.0)));
+    // The way down to a slow trough magnifies the errors of steps, so it takes finer ones.
+    let mut tolerance = FINE * rtol;
+    let mut first = FirstSwings::of(slider, x, tolerance)?;
+    let mut doubts = Doubts { trough: true, t_peak: true, ..Doubts::default() };
+    for _ in 0..MOST_TIMES {
+        tolerance = (FINER * tolerance).max(FINEST);
+        let finer = FirstSwings::of(slider, x, tolerance)?;
+        if (finer.high.x - first.high.x).abs() > rtol {
+            return None;
+        }
+        doubts.trough = !as_slow(finer.low.x, first.low.x, rtol);
+        doubts.t_peak = (finer.high.t / first.high.t - 1.0).abs() > rtol / finer.high.x.min(1.0);
+        first = FirstSwings { steps: first.steps + finer.steps, ..finer };
+        if !doubts.trough && !doubts.t_peak {
+            break;
+        }
     }
-    let (low, high) = (low?, high?);
+    let FirstSwings { low, high, t, steps } = first;
     let excess = exp_m1(x).abs();
     let amplitude = excess.min(1.0);
     let start = ((1.0 - amplitude) * (1.0 + amplitude)).sqrt();
     // Friction takes from all swings: c is a, but for a share of 1/omega.
     let (time, known) = swinging.settling(amplitude, start, rtol);
-    let doubts = Doubts { settling_time: !known, ..Doubts::default() };
+    doubts.settling_time = !known;
     let time = if time > 0.0 { time + high.t } else { time };
     let fate = Fate::Settled { time };
-    Some(Course { fate, high: Some(high), low: Some(low), t: orbit.t(), steps: MOST_STEPS - budget, doubts })
+    Some(Course { fate, high: Some(high), low: Some(low), t, steps, doubts })
+}
+
+/// Extrema of the first swings.
+struct FirstSwings {
+    low: Extremum,
+    high: Extremum,
+    t: f64,
+    steps: u32,
+}
+
+impl FirstSwings {
+    /// From `e^x v_f`, with steps whose errors are below `tolerance`.
+    fn of(slider: &Slider, x: f64, tolerance: f64) -> Option<FirstSwings> {
+        let mut orbit = Orbit::new(slider, slider.steady(x), tolerance);
+        let mut budget = MOST_STEPS;
+        let (mut low, mut high) = (None, None);
+        for _ in 0..SWINGS {
+            let cycle = orbit.cycle(false, &mut budget).ok()?;
+            let [slow, fast] = cycle.extrema.map(|seen| seen.map(|seen| orbit.polished(seen)));
+            (low, high) = (low.or(slow), high.or(fast));
+        }
+        Some(FirstSwings { low: low?, high: high?, t: orbit.t(), steps: MOST_STEPS - budget })
+    }
 }
 
 /// Over how much `ln v` and `ln theta` may run.
@@ -168,21 +203,24 @@ impl Swinging {
         let ages = self.b * decades(self.omega, x) > self.a * self.omega.max(1.0) / CLEAR;
         doubts.t_peak |= ages && (arrested || !follows);
         let first = [low, high].map(|(x, phase)| Some(Extremum { x, t: phase / self.omega }));
-        let at_start = self.coefficient(start);
-        if !self.is_clear(start) {
+        // Next to the critical stiffness rounding decides the sign of c in small swings: linear theory and the Hopf point tell it.
+        let damped = self.bend().is_some_and(|bend| bend < 0.0);
+        let dies_out = amplitude < FAINT && linear.stable && damped;
+        if !dies_out && !self.is_clear(start) {
             return None;
         }
+        let at_start = self.coefficient(start);
         let mut seen = first;
-        let crossing = self.change_of_sign(start, if at_start > 0.0 { 1.0 } else { 0.0 });
-        let fate = if at_start > 0.0 {
+        let crossing = || self.change_of_sign(start, if at_start > 0.0 { 1.0 } else { 0.0 });
+        let fate = if dies_out {
+            Fate::Settled { time: 0.0 }
+        } else if at_start > 0.0 {
             // That may even arrest a block that is almost at rest.
             if excess < 0.0 && ratio < CLEAR * self.share && ages && !follows {
                 return None;
             }
+            let crossing = crossing();
             let small = crossing.filter(|&s| (1.0 - s) * (1.0 + s) < FAINT * FAINT);
-            // Next to the critical stiffness rounding decides the sign of c in small swings: linear theory and the Hopf
-            // point tell it.
-            let damped = self.bend().is_some_and(|bend| bend < 0.0);
             match crossing {
                 Some(s) if small.is_none() => self.cycle(s, rtol, &mut doubts)?,
                 _ if linear.stable && (small.is_none() || damped) => {
@@ -196,7 +234,7 @@ impl Swinging {
             // What comes later is faster.
             seen = [first[0].filter(|_| arrested), None];
             doubts = Doubts::default();
-            match crossing {
+            match crossing() {
                 Some(s) => self.cycle(s, rtol, &mut doubts)?,
                 None => self.driven()?,
             }
@@ -264,11 +302,20 @@ impl Swinging {
         s.max(0.834 * libm::cbrt(self.omega))
     }
 
-    /// `q` from the contact lifetime that repeats itself, integrated exactly but for `e^D` within short pieces:
-    /// `-(v - 1) ln theta` has the mean of `-(A/omega) sin(phi)/theta`.
+    /// `q` from the contact lifetime that repeats itself; in small swings it is linear in the square of the amplitude.
     fn summed(&self, s: f64) -> f64 {
+        let square = (1.0 - s) * (1.0 + s);
+        if square >= SMALL * SMALL {
+            return self.summed_at(square.sqrt());
+        }
+        let linear = 1.0 / (1.0 + self.omega * self.omega);
+        linear + (self.summed_at(SMALL) - linear) * square / (SMALL * SMALL)
+    }
+
+    /// The sum for one amplitude, integrated exactly but for `e^D` within short pieces: `-(v - 1) ln theta` has the mean of
+    /// `-(A/omega) sin(phi)/theta`.
+    fn summed_at(&self, amplitude: f64) -> f64 {
         let omega = self.omega;
-        let amplitude = ((1.0 - s) * (1.0 + s)).max(SMALL * SMALL).sqrt();
         let pieces = 64 + (8.0 / omega) as usize;
         let width = 2.0 * PI / pieces as f64;
         let rule = gauss::rule(GROWN);
@@ -291,6 +338,7 @@ impl Swinging {
             theta = theta * left + added;
         }
         let in_phase = -amplitude / omega * sum / pieces as f64;
+        let s = ((1.0 - amplitude) * (1.0 + amplitude)).sqrt();
         in_phase * (1.0 + s) / (amplitude * amplitude)
     }
 

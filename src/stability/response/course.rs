@@ -1,10 +1,9 @@
 //! A response followed to its end as finely as its numbers ask for: at finer and finer steps, until none of them moves.
 
-use super::averaging;
-use super::fate::{Linear, MOST_STEPS, follow_once};
-use super::orbit::{Extremum, QUIET};
+use super::fate::{Linear, MOST_STEPS, STEP, follow_once};
+use super::orbit::{Extremum, quiet};
 use super::slider::Slider;
-use super::strengthening;
+use super::{averaging, massless, strengthening};
 
 /// The end of a response.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -78,14 +77,18 @@ pub(super) const VANISHING: f64 = -1000.0;
 /// A start closer than 1e-4 to sliding that is unstable is moved out to there or, by whole cycles, to below 1e-3: what
 /// grows from it has the same shape, but comes later, so that the times of its extrema are NaN.
 ///
-/// A block whose swings friction hardly changes is not simulated. What friction that does not weaken with velocity brings to
-/// rest, but not within the work allowed, is told as far as the first swings do.
+/// A block whose swings friction hardly changes is not simulated, nor is one without mass whose velocity becomes infinite. What
+/// comes to rest without fail, but not within the work allowed, is told as far as the first swings do.
 pub fn follow(slider: &Slider, linear: Linear, x: f64, rtol: f64) -> Course {
+    if let Some(course) = massless::end(slider, linear) {
+        return course;
+    }
     let course = follow_to_the_end(slider, linear, x, rtol);
     if course.fate != Fate::Undecided {
         return course;
     }
-    strengthening::course(slider, x, rtol).map_or(course, |told| Course { steps: course.steps + told.steps, ..told })
+    let told = strengthening::course(slider, x, rtol).or_else(|| massless::course(slider, linear, x, rtol));
+    told.map_or(course, |told| Course { steps: course.steps + told.steps, ..told })
 }
 
 /// The same without what the first swings tell.
@@ -94,11 +97,11 @@ fn follow_to_the_end(slider: &Slider, linear: Linear, x: f64, rtol: f64) -> Cour
     if let Some(course) = told.or_else(|| averaging::course_after_first_swings(slider, linear, x, rtol)) {
         return course;
     }
-    if linear.is_neutral(slider) && x.abs() > QUIET {
+    if linear.is_neutral(slider) && x.abs() > quiet(STEP * COARSE * FINER * rtol) {
         let fate = Fate::Undecided;
         return Course { fate, high: None, low: None, t: 0.0, steps: 0, doubts: Doubts::default() };
     }
-    let mut course = follow_once(slider, linear, x, COARSE * rtol);
+    let mut course = follow_once(slider, linear, x, COARSE * rtol, true);
     // Finer steps would be more.
     if course.fate == Fate::Undecided && course.steps == MOST_STEPS {
         return course;
@@ -107,7 +110,7 @@ fn follow_to_the_end(slider: &Slider, linear: Linear, x: f64, rtol: f64) -> Cour
     let mut known = false;
     for _ in 0..MOST_TIMES {
         share *= FINER;
-        let finer = follow_once(slider, linear, x, share * rtol);
+        let finer = follow_once(slider, linear, x, share * rtol, false);
         let doubts = course.compared(&finer, rtol);
         let steps = course.steps + finer.steps;
         course = Course { steps, doubts: doubts.unwrap_or_default(), ..finer };
@@ -139,7 +142,7 @@ impl Course {
     fn compared(&self, other: &Course, rtol: f64) -> Option<Doubts> {
         let near = |x: f64, y: f64| (x - y).abs() <= rtol;
         let alike = |x: f64, y: f64| near(x / y, 1.0) || x == y;
-        let slow = |x: f64, y: f64| near(x, y) || (x < VANISHING && y < VANISHING);
+        let slow = |x: f64, y: f64| as_slow(x, y, rtol);
         let mut doubts = other.doubts;
         let ends = match (self.fate, other.fate) {
             (Fate::Settled { time }, Fate::Settled { time: other }) => {
@@ -165,4 +168,9 @@ impl Course {
         };
         (ends && near(high, top)).then_some(doubts)
     }
+}
+
+/// Whether two logarithms of a least velocity are the same: to `rtol`, or both of 0 in doubles.
+pub(super) fn as_slow(x: f64, y: f64, rtol: f64) -> bool {
+    (x - y).abs() <= rtol || (x < VANISHING && y < VANISHING)
 }

@@ -59,27 +59,38 @@ const PATIENCE: u32 = 10;
 /// `PATIENCE` of them, in units of `rtol`: what is left are errors of steps, whose shares of each other are chance.
 const STILL: f64 = 0.1;
 
+/// How far from a cycle in `ln z` another begins that shows whether it attracts; it does so at once if one cycle leaves less than
+/// this share of that.
+const BESIDE: f64 = 0.03;
+const AT_ONCE: f64 = 0.1;
+
 /// Peaks that differ by less than this, in units of `rtol`, are as high as each other.
 const ALIKE_PEAKS: f64 = 0.3;
+
+/// Error of a step, in units of the accuracy of the numbers.
+pub(super) const STEP: f64 = 0.03;
 
 /// Error of an extremum in the dense output.
 const ROUGH: f64 = 1e-2;
 
-/// The same with steps whose errors are to leave `rtol` of the numbers.
-pub(super) fn follow_once(slider: &Slider, linear: Linear, x: f64, rtol: f64) -> Course {
+/// The same with steps whose errors are to leave `rtol` of the numbers. What `trusts` takes cycles that hardly change for a limit
+/// cycle, and is to be followed more finely.
+pub(super) fn follow_once(slider: &Slider, linear: Linear, x: f64, rtol: f64, trusts: bool) -> Course {
     let faint = !linear.stable && x.abs() < FAINT;
     let start = if faint { linear.moved_out(x) } else { x };
-    let tolerance = (0.03 * rtol).max(finest(start.abs()));
+    let tolerance = (STEP * rtol).max(finest(start.abs()));
     let tolerance = if linear.stable { tolerance } else { tolerance.min(telling(start.abs())) };
     let mut follower = Follower {
         slider,
         linear,
         rtol,
         tolerance,
+        trusts,
         budget: MOST_STEPS,
         high: None,
         low: None,
         t: 0.0,
+        counting: f64::INFINITY,
         vague: false,
         vague_time: false,
         vague_peak: false,
@@ -87,7 +98,6 @@ pub(super) fn follow_once(slider: &Slider, linear: Linear, x: f64, rtol: f64) ->
     };
     let fate = match follower.run(slider.steady(start)) {
         Ok(fate) if linear.allows(slider, &fate, if faint { start.abs() } else { 0.0 }) => fate,
-        Err(Stop::Ends) if slider.inertia == 0.0 && !linear.stable => Fate::Ends,
         Ok(_) | Err(_) => Fate::Undecided,
     };
     let Follower { high, low, t, budget, vague, vague_time, vague_peak, .. } = follower;
@@ -143,10 +153,13 @@ pub(super) struct Follower<'a> {
     pub(super) linear: Linear,
     pub(super) rtol: f64,
     pub(super) tolerance: f64,
+    trusts: bool,
     pub(super) budget: u32,
     high: Option<Extremum>,
     low: Option<Extremum>,
     t: f64,
+    /// Relative error of rates with which cycles can be counted.
+    pub(super) counting: f64,
     /// Whether the least velocity still changes on the limit cycle.
     vague: bool,
     /// Whether the number of cycles that were passed over is not known.
@@ -170,6 +183,8 @@ impl Follower<'_> {
         let mut contraction = Contraction::after(f64::NAN);
         // Cycles so far, and after how many sampling may be tried again.
         let (mut count, mut again) = (0, 0);
+        // After how many it may be asked again whether they come to a limit cycle.
+        let mut asked = 0;
         let (mut last_low, mut lingers) = (f64::NAN, 0);
         // Whether cycles have come so near to each other that what is left are errors of steps.
         let mut arrived = false;
@@ -234,7 +249,15 @@ impl Follower<'_> {
             let lower = (low - last_low).abs();
             last_low = low;
             // Small cycles may only have stopped to change fast.
-            if near && high - low > SMALL && rate.abs() < BALANCED * gross(&cycle, last.z, slider) {
+            let ends = near && high - low > SMALL && rate.abs() < BALANCED * gross(&cycle, last.z, slider);
+            // Changes that are errors of steps do not show that cycles change slowly.
+            let mut creeps = false;
+            if ends && !arrived && !still && count >= asked {
+                asked = 2 * count;
+                arrived = self.trusts || self.attracts(last, place, change)?;
+                creeps = !arrived;
+            }
+            if ends && (arrived || still) {
                 // Friction may magnify what the section does not show.
                 let [low, high] = cycle.exact_range(&mut orbit);
                 let vague = lower > 0.1 * self.rtol && low > VANISHING;
@@ -243,12 +266,13 @@ impl Follower<'_> {
                     return Ok(Fate::Cycle { period: cycle.period, high, low });
                 }
                 lingers += 1;
-                arrived = true;
                 last_rate = rate;
                 continue;
             }
-            if rate.abs() < SLOW && contraction.is_slow() && place.z > 0.0 && count >= again {
-                match self.slide(place, (rate - last_rate) / last_rate) {
+            let slow = rate.abs() < SLOW && (contraction.is_slow() || creeps);
+            if slow && place.z > 0.0 && count >= again {
+                let bend = if creeps { 0.0 } else { (rate - last_rate) / last_rate };
+                match self.slide(place, bend) {
                     Ok(Slide::Decided(Fate::Settled { time })) => {
                         let inside = orbit.settled_at().filter(|_| time == 0.0);
                         let time = inside.map_or(offset + cycle.t + time, |time| latest(since, offset, time));
@@ -289,6 +313,30 @@ impl Follower<'_> {
             }
             last_rate = rate;
         }
+    }
+
+    /// Whether cycles that begin beside the last one, which went from one place to another, come to it so fast that all its changes to
+    /// come, `change` having been the last, add up to less than `rtol`.
+    ///
+    /// That a cycle changes little does not tell: friction may only give and take almost the same, as it does next to the critical
+    /// stiffness, or be little beside inertia.
+    fn attracts(&mut self, from: Place, to: Place, change: f64) -> Result<bool, Stop> {
+        let mut beside = self.next(Place { z: from.z * exp(BESIDE), ..from })?;
+        let gap = |place: Place, beside: Place| ln(beside.z / place.z).abs().max((beside.y - place.y).abs());
+        let first = gap(to, beside);
+        let mut share = first / BESIDE;
+        if share > AT_ONCE {
+            // The first cycle was for the contact lifetime to follow.
+            beside = self.next(beside)?;
+            share = gap(self.next(to)?, beside) / first;
+        }
+        Ok(1.0 - share > 10.0 * self.tolerance / BESIDE && change * share < self.rtol * (1.0 - share))
+    }
+
+    /// Where the cycle ends that begins at a place.
+    fn next(&mut self, Place { z, y }: Place) -> Result<Place, Stop> {
+        let end = Orbit::new(self.slider, [z, y, 0.0], self.tolerance).cycle(false, &mut self.budget)?.end;
+        Ok(Place { z: end[Z], y: end[Y] })
     }
 
     /// Change of `ln z` over a cycle that began at `z`.

@@ -3,11 +3,12 @@
 //!
 //! In the scaled variables of `slider.rs` only `a`, `b`, `k`, `m v_f^2` and `v_i/v_f` enter. The response is
 //! integrated until its end is decided (`fate.rs`), and its numbers are known (`course.rs`), unless theory tells them
-//! (`averaging.rs`, `strengthening.rs`).
+//! (`averaging.rs`, `strengthening.rs`, `massless.rs`).
 
 mod averaging;
 mod course;
 mod fate;
+mod massless;
 mod motion;
 mod orbit;
 mod run;
@@ -15,6 +16,7 @@ mod series;
 mod slide;
 mod slider;
 mod strengthening;
+mod swings;
 
 use crate::model::{Law, Transition};
 use crate::numerics::elementary::{exp, ln};

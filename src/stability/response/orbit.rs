@@ -48,7 +48,10 @@ pub enum Stop {
 }
 
 /// A state this close to steady sliding is in its linear neighbourhood.
-pub(super) const QUIET: f64 = 1e-5;
+const LINEAR: f64 = 1e-5;
+
+/// Errors of steps that make up a motion which cannot be told from rest.
+const UNTOLD: f64 = 3.0;
 
 /// Settled means `|v/v_f - 1|` below this, for good.
 pub const SETTLED: f64 = 0.01;
@@ -67,10 +70,13 @@ const NODES: usize = 8;
 pub struct Orbit<'a> {
     slider: &'a Slider,
     run: Run<'a>,
+    /// Distance from steady sliding within which it rests.
+    quiet: f64,
     /// Energy lost from the last section to the start of the last step, and the sum of its sizes.
     lost: [f64; 2],
-    /// Time of the last section.
-    section: f64,
+    /// Time from the last section to the start of the last step: the time since the start has too few digits for short cycles
+    /// after a long rest.
+    elapsed: f64,
     /// Whether `v = v_f` has been met.
     met: bool,
     /// Cycles that ended in the last step and were not given out yet: one step can cross the section several times.
@@ -104,8 +110,9 @@ impl<'a> Orbit<'a> {
         Orbit {
             slider,
             run: slider.run(state, slider.first_step(&state), tolerance),
+            quiet: quiet(tolerance),
             lost: [0.0; 2],
-            section: 0.0,
+            elapsed: 0.0,
             met: state[X] == 0.0,
             closed: VecDeque::new(),
             slope: 0.0,
@@ -134,6 +141,9 @@ impl<'a> Orbit<'a> {
                 return Err(Stop::Quiet);
             }
             if let Some(arrested) = self.slider.arrest(self.run.y()) {
+                // It falls past v_f, and out of the band of settled velocities.
+                self.met |= self.run.y()[X] > 0.0 && arrested[X] <= 0.0;
+                self.entry = self.entry.filter(|_| is_inside(arrested[X]));
                 self.run.jump(arrested, self.slider.first_step(&arrested));
                 self.turn(-1.0, Seen { rough: Extremum { x: arrested[X], t: self.run.t() }, place: None });
                 self.slope = 0.0;
@@ -142,12 +152,16 @@ impl<'a> Orbit<'a> {
             self.look(&leg);
             let loss = self.loss(&leg);
             self.lost = [0, 1].map(|i| self.lost[i] + loss[i]);
+            self.elapsed += leg.h();
         }
     }
 
     fn is_quiet(&self) -> bool {
         let [z, y, x] = *self.run.y();
-        x.abs() < QUIET && y.abs() < QUIET && z.abs() < QUIET * self.slider.a
+        let Slider { a, b, inertia, k } = *self.slider;
+        // Friction turns a share b/a of ln theta into ln v, and a soft spring moves masses of M and a by its energy.
+        let force = a.min((k * (inertia + a)).sqrt());
+        x.abs() < self.quiet && y.abs() * a.max(b) < self.quiet * a && z.abs() < self.quiet * force
     }
 
     /// Looks through a step, from node to node, for what happens in it.
@@ -175,13 +189,12 @@ impl<'a> Orbit<'a> {
         self.slope = slope0;
     }
 
-    /// Notes an extremum after a rise or a fall, if `v = v_f` has been met and it is further out than the one before.
+    /// Notes an extremum after a rise or a fall, if `v = v_f` has been met and it is further out than `v_f` and the one
+    /// before: at rest rounding makes extrema as well.
     fn turn(&mut self, slope: f64, seen: Seen) {
-        if !self.met {
-            return;
-        }
         let (kept, sign) = if slope > 0.0 { (&mut self.high, 1.0) } else { (&mut self.low, -1.0) };
-        if kept.is_none_or(|kept| sign * seen.rough.x > sign * kept.rough.x) {
+        let out = sign * seen.rough.x;
+        if self.met && out > 0.0 && kept.is_none_or(|kept| out > sign * kept.rough.x) {
             *kept = Some(seen);
         }
     }
@@ -208,15 +221,16 @@ impl<'a> Orbit<'a> {
     fn close(&mut self, leg: &Leg, u: f64) -> Cycle {
         let (end, t, part) = self.exactly(leg, u, 0.0);
         let loss = part.map_or([0.0; 2], |part| self.loss(&part));
+        let time = part.map_or(u * leg.h(), |part| part.h());
         let cycle = Cycle {
             end: [end[Z], end[Y], 0.0],
             t,
-            period: t - self.section,
+            period: self.elapsed + time,
             loss: [0, 1].map(|i| self.lost[i] + loss[i]),
             extrema: [self.low, self.high],
         };
         // The whole step will be added.
-        (self.section, self.lost) = (t, loss.map(|loss| -loss));
+        (self.elapsed, self.lost) = (-time, loss.map(|loss| -loss));
         cycle
     }
 
@@ -280,6 +294,12 @@ impl<'a> Orbit<'a> {
         }
         loss
     }
+}
+
+/// How close to steady sliding a motion rests whose steps have errors below `tolerance`: what is left of it is linear, and
+/// of the size of these errors.
+pub(super) fn quiet(tolerance: f64) -> f64 {
+    LINEAR.min(UNTOLD * tolerance)
 }
 
 fn is_inside(x: f64) -> bool {

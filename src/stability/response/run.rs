@@ -6,7 +6,7 @@
 
 use multiversion::multiversion;
 
-use super::series::{TERMS, reach};
+use super::series::{Powers, TERMS, reach};
 use super::slider::{Rates, Slider, State, X, Y};
 use crate::numerics::elementary::{exp, ln};
 use crate::numerics::stiff::{Accuracy, Cost, Failure, Integrator, Piece, radau_iia_9};
@@ -39,6 +39,10 @@ pub struct Run<'a> {
 
 /// A series longer than this in units of the fastest motion would let errors grow.
 const STABLE: f64 = 5.0;
+
+/// Greatest change of `ln theta` in a series: beyond it terms of `1/theta` that are too small to be felt would grow before they
+/// vanish.
+const FAR: f64 = 6.0;
 
 /// Lengths of steps in that unit from which on they become implicit, and up to which they become series again: steps of
 /// either kind cost as much there.
@@ -116,23 +120,33 @@ impl Run<'_> {
         if !self.mild {
             return None;
         }
-        let reach = reach.min(STABLE);
-        let h = reach * unit;
-        let left = self.integrator.left(limit);
-        let whole = h.min(left);
-        let mut scaled = powers;
-        let mut power = 1.0;
-        let [z, y, x] = &mut scaled;
-        for ((z, y), x) in z.iter_mut().zip(y).zip(x) {
-            power *= whole / unit;
-            [z, y, x].into_iter().for_each(|coefficient| *coefficient *= power);
+        let h = reach.min(STABLE) * unit;
+        let mut whole = h.min(self.integrator.left(limit));
+        let over = |h: f64| Piece::from_powers(self.t(), h, state, stretched(&powers, h / unit));
+        let mut piece = over(whole);
+        let change = (piece.end[Y] - state[Y]).abs();
+        if change > FAR {
+            whole *= FAR / change;
+            piece = over(whole);
         }
-        let piece = Piece::from_powers(self.t(), whole, state, scaled);
         let advances = piece.end.iter().all(|end| end.is_finite()) && self.integrator.leap(whole, piece.end, h);
         self.mild = advances;
         self.series += u32::from(advances);
         advances.then_some(piece)
     }
+}
+
+/// Coefficients in powers of a time that is `share` times as long.
+#[inline(always)]
+fn stretched(powers: &Powers, share: f64) -> Powers {
+    let mut scaled = *powers;
+    let mut power = 1.0;
+    let [z, y, x] = &mut scaled;
+    for ((z, y), x) in z.iter_mut().zip(y).zip(x) {
+        power *= share;
+        [z, y, x].into_iter().for_each(|coefficient| *coefficient *= power);
+    }
+    scaled
 }
 
 /// One step, which ends at `limit` at the latest.

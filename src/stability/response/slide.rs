@@ -8,8 +8,8 @@ use std::ops::AddAssign;
 use super::course::Fate;
 use super::fate::{FAINT, Follower, LEGIBLE, SLOW, excess, finest, gross};
 use super::orbit::{Orbit, Stop};
-use super::slider::{Y, Z};
-use crate::numerics::elementary::{exp, ln};
+use super::slider::{Slider, Y, Z};
+use crate::numerics::elementary::{exp, ln, ln_1p};
 use crate::numerics::gauss;
 
 /// Error that the finest steps may make in the extrema of a limit cycle, in `ln v`, whatever is asked for.
@@ -35,8 +35,10 @@ const MOST_REFINEMENTS: u32 = 4;
 const NODES: usize = 5;
 const PANEL: f64 = 1.2;
 
-/// Part of a cycle up to which a number of cycles must be known to tell when a response has settled.
+/// Part of a cycle up to which a number of cycles must be known to tell when a response has settled, and what contact lifetimes
+/// off the slow manifold add to the errors of rates, as a factor.
 const COUNTED: f64 = 0.02;
+const CHANCE: f64 = 10.0;
 
 /// Share of what is asked for that a cycle must not be of all cycles, to be counted.
 const UNCOUNTED: f64 = 0.1;
@@ -44,8 +46,18 @@ const UNCOUNTED: f64 = 0.1;
 /// Times that a panel is halved for that.
 const MOST_HALVINGS: u32 = 6;
 
-/// Part of a cycle that a number of cycles may be off by, at least.
+/// Part of a cycle that a number of cycles may be off by, at least, and by which the last entry into the band moves at once where a
+/// cycle just touches it.
 const TIE: f64 = 1e-3;
+const JUMP: f64 = 0.1;
+
+/// How far beside a limit cycle in `ln z` the slope of the rate is taken, and the share of the slope that was expected which it must
+/// not fall below.
+const BESIDE: f64 = 0.01;
+const ALIKE: f64 = 0.1;
+
+/// Rounding of the spring's force in a step.
+const ROUNDING: f64 = 3.0 * f64::EPSILON;
 
 /// Relative error that a sample's rate may have, in units of `rtol`: the rest is lost where gain and loss cancel.
 const RATE_ERROR: f64 = 10.0;
@@ -123,21 +135,13 @@ impl Follower<'_> {
             if off <= (self.rate_error() * rate.abs() * size).max(3.0 * tolerance) {
                 // Errors of a step are absolute in x, so their share is greater in small cycles.
                 let noise = gross(&cycle, place.z, self.slider) / size;
-                let tolerance = self.finer(self.rate_error() * rate.abs() / noise, size);
                 let drift = ln(place.z / asked);
                 let [low, high] = cycle.exact_range(&mut orbit);
-                return Ok(Sample {
-                    place,
-                    slope,
-                    drift,
-                    rate,
-                    relaxation,
-                    period: cycle.period,
-                    high,
-                    low,
-                    noise,
-                    tolerance,
-                });
+                let period = cycle.period;
+                let sample =
+                    Sample { place, slope, drift, rate, relaxation, period, high, low, noise, tolerance: f64::NAN };
+                let tolerance = self.finer(self.rate_error() * rate.abs() / noise, &sample);
+                return Ok(Sample { tolerance, ..sample });
             }
             let coupled = relaxation < ADIABATIC * rate.abs() && off < f64::INFINITY;
             let near = ln(cycle.end[Z] / asked).abs() < 1.0;
@@ -215,12 +219,18 @@ impl Follower<'_> {
 
     /// Relative error that a sample's rate may have.
     fn rate_error(&self) -> f64 {
-        (RATE_ERROR * self.rtol).min(1e-3)
+        (RATE_ERROR * self.rtol).min(1e-3).min(self.counting)
     }
 
     /// A tolerance that is no coarser than that of the response.
-    fn finer(&self, tolerance: f64, size: f64) -> f64 {
-        tolerance.min(self.tolerance).max(finest(size))
+    fn finer(&self, tolerance: f64, sample: &Sample) -> f64 {
+        tolerance.min(self.tolerance).max(self.finest(sample))
+    }
+
+    /// Least error of a step that a cycle is asked for: rounding of the spring's force moves `ln v` of a light block.
+    fn finest(&self, Sample { place, low, high, .. }: &Sample) -> f64 {
+        let Slider { a, inertia, k, .. } = *self.slider;
+        finest(high - low).max(ROUNDING * place.z / a.max((k * inertia).sqrt()))
     }
 
     /// A sample as exact as its rate asks for.
@@ -235,22 +245,13 @@ impl Follower<'_> {
             tolerance = sample.tolerance;
             sample = self.sample(sample.place, slope, tolerance)?;
         }
-        let least = LEGIBLE * sample.noise * finest(sample.high - sample.low);
+        let least = LEGIBLE * sample.noise * self.finest(&sample);
         if sample.rate.abs() < least { Err(Stop::Faint) } else { Ok(sample) }
     }
 
     /// The limit cycle between two samples whose rates differ in sign.
     fn cycle_between(&mut self, from: &Sample, to: &Sample) -> Result<Slide, Stop> {
-        let length = ln(to.place.z / from.place.z);
-        let slope = ((to.rate - from.rate) / length).abs();
-        let noise = from.noise.max(to.noise);
-        let tolerance = self.finer(0.1 * self.rtol * slope / noise, from.high - from.low);
-        let sample = self.find([*from, *to], tolerance, |sample| sample.rate)?;
-        let size = sample.high - sample.low;
-        let uncertain = noise * finest(size) / slope * size;
-        if uncertain > RESOLVED.max(0.2 * self.rtol) {
-            return Err(Stop::Faint);
-        }
+        let (sample, tolerance) = self.crossing([*from, *to])?;
         // A block that is almost at rest once in a swing hardly shows it on the section.
         if sample.low < RESTING {
             let beside = self.sample(sample.moved(RESOLUTION * self.rtol), sample.slope, tolerance)?;
@@ -260,6 +261,38 @@ impl Follower<'_> {
             }
         }
         Ok(Slide::Decided(Fate::Cycle { period: sample.period, high: sample.high, low: sample.low }))
+    }
+
+    /// The sample between two others at which the rate changes its sign, and the error of its steps.
+    ///
+    /// They are as exact as the slope of the rate asks for, which beside a limit cycle may be far less than between two distant
+    /// samples.
+    fn crossing(&mut self, mut bracket: [Sample; 2]) -> Result<(Sample, f64), Stop> {
+        let direction = bracket[0].rate.signum();
+        for _ in 0..MOST_REFINEMENTS {
+            let [from, to] = bracket;
+            let way = ln(to.place.z / from.place.z);
+            let slope = ((to.rate - from.rate) / way).abs();
+            let noise = from.noise.max(to.noise);
+            let tolerance = self.finer(RESOLUTION * self.rtol * slope / noise, &from);
+            let sample = self.find(bracket, tolerance, |sample| sample.rate)?;
+            let step = (0.5 * way.abs()).min(BESIDE).copysign(way);
+            let before = self.sample(sample.moved(-step), sample.slope, tolerance)?;
+            let steepness = before.rate * direction / ln(sample.place.z / before.place.z).abs();
+            if steepness >= ALIKE * slope {
+                let uncertain = noise * self.finest(&sample) / steepness * (sample.high - sample.low);
+                let enough = uncertain <= RESOLVED.max(0.2 * self.rtol);
+                return if enough { Ok((sample, tolerance)) } else { Err(Stop::Faint) };
+            }
+            let before = self.refined(before.place, before.slope, before.tolerance)?;
+            let after = self.refined(sample.moved(step), sample.slope, before.tolerance)?;
+            bracket = match [before.rate * direction > 0.0, after.rate * direction < 0.0] {
+                [true, true] => [before, after],
+                [true, false] => [after, to],
+                [false, _] => [from, before],
+            };
+        }
+        Err(Stop::Faint)
     }
 
     /// The sample between two others at which `f` vanishes, which differs in sign at them: the Illinois method, with
@@ -293,22 +326,43 @@ impl Follower<'_> {
     /// Time from `z` on until the velocity stays in the band of settled velocities, as it does in the cycle `inside`;
     /// `start` is a sample near `z`.
     fn settling(&mut self, z: f64, start: &Sample, inside: &Sample) -> Result<f64, Stop> {
-        let beyond = |sample: &Sample| excess(sample.low, sample.high);
-        let first = beyond(start);
-        if first <= 0.0 {
+        // About linear in ln z.
+        let beyond = |sample: &Sample| ln_1p(excess(sample.low, sample.high));
+        if beyond(start) <= 0.0 {
             return Ok(0.0);
         }
-        let touching = self.find([*start, *inside], inside.tolerance, beyond)?;
-        let Passage { cycles, time } = self.passage(z, start, &touching)?;
+        let mut touching = self.find([*start, *inside], inside.tolerance, beyond)?;
+        let mut passage = self.passage(z, start, &touching)?;
+        // Whether a single cycle is felt, and so whether they have to be counted.
+        let felt = passage.cycles * UNCOUNTED * self.rtol < 1.0;
+        let needed = COUNTED / (CHANCE * passage.cycles);
+        if felt && needed < self.rate_error() {
+            (self.counting, self.miscounted) = (needed, 0.0);
+            let [start, inside] =
+                [start, inside].map(|sample| self.refined(sample.place, sample.slope, sample.tolerance));
+            let (start, inside) = (start?, inside?);
+            touching = self.find([start, inside], inside.tolerance, beyond)?;
+            passage = self.passage(z, &start, &touching)?;
+        }
+        let Passage { cycles, time } = passage;
+        let uncertain = CHANCE * cycles * (touching.noise * touching.tolerance / touching.rate).abs();
         // The last cycle that leaves the band begins a part of a cycle before the one that would touch it.
         let spare = cycles - cycles.floor();
-        // Whether a cycle that just touches the band leaves it may not be known.
-        let felt = cycles * UNCOUNTED * self.rtol < 1.0;
-        self.vague_time |= felt && spare.min(1.0 - spare) < self.miscounted.max(TIE);
-        let Place { z, y } = touching.moved(-spare * touching.rate);
-        let mut orbit = Orbit::new(self.slider, [z, y, 0.0], touching.tolerance);
-        orbit.cycle(false, &mut self.budget)?;
-        Ok(time - spare * touching.period + orbit.settled_at().unwrap_or(touching.period))
+        let mut settled = |way: f64| {
+            let Place { z, y } = touching.moved(-(spare + way) * touching.rate);
+            let mut orbit = Orbit::new(self.slider, [z, y, 0.0], touching.tolerance);
+            orbit.cycle(false, &mut self.budget)?;
+            Ok(time - spare * touching.period + orbit.settled_at().unwrap_or(touching.period))
+        };
+        let found = settled(0.0)?;
+        if felt {
+            // Whether a cycle that just touches the band leaves it, on either side, may not be known.
+            let off = (self.miscounted + uncertain).max(TIE);
+            let [early, late] = [settled(-off)?, settled(off)?];
+            let moved = (early - found).abs().max((late - found).abs());
+            self.vague_time |= spare.min(1.0 - spare) < off || moved > JUMP * touching.period;
+        }
+        Ok(found)
     }
 
     /// Cycles and time from `z`, near one sample, to another: a sum over cycles as an integral over `ln z`.

@@ -11,24 +11,11 @@
 //! force, `z = a ln v + b ln theta`, so the least `V` that an extremum takes bounds all those to come.
 
 use super::course::{Course, Doubts, Fate};
-use super::orbit::{BAND, Extremum, Orbit, Stop};
-use super::slider::{Slider, Y, Z};
+use super::orbit::{BAND, Extremum};
+use super::slider::{Slider, State, Y, Z};
+use super::swings::{self, Descent, UNFELT, stored};
 use crate::numerics::elementary::{exp, exp_m1, ln_1p};
 use crate::numerics::root::{Probe, newton};
-
-/// Share of `rtol` that an extremum may be off by, and by which those to come may go beyond it.
-const UNFELT: f64 = 0.1;
-
-/// A peak is the greatest where those to come are lower by as much, in units of `rtol`.
-const CLEAR: f64 = 0.3;
-
-/// Errors of steps in units of `rtol`, and the share of it by which they are taken once more.
-const FINE: f64 = 0.01;
-const FINER: f64 = 0.1;
-
-/// Swings that are followed until those to come are known to be smaller, and steps.
-const MOST_SWINGS: u32 = 100;
-const MOST_STEPS: u32 = 20_000;
 
 /// Greatest `|ln v|` whose exponential is in the range of doubles with room to spare.
 const WIDEST: f64 = 600.0;
@@ -40,7 +27,7 @@ const ENOUGH: f64 = 1e-12;
 /// peak is not known.
 pub(super) fn course(slider: &Slider, x: f64, rtol: f64) -> Option<Course> {
     let strengthens = slider.b <= slider.a;
-    strengthens.then(|| slider.adiabatic(x, rtol).or_else(|| slider.first_swings(x, rtol)))?
+    strengthens.then(|| slider.adiabatic(x, rtol).or_else(|| swings::first(slider, &Energy(slider), x, rtol)))?
 }
 
 impl Slider {
@@ -86,74 +73,19 @@ impl Slider {
         let (high, low) = (Some(extremum(high)), low.map(extremum));
         Some(Course { fate: Fate::Settled { time: 0.0 }, high, low, t: 0.0, steps: 0, doubts })
     }
+}
 
-    /// The first swings, until those to come are known to be smaller.
-    fn first_swings(&self, x: f64, rtol: f64) -> Option<Course> {
-        let [coarse, fine] = [FINE, FINE * FINER].map(|share| self.swings(x, share * rtol, rtol));
-        let (coarse, fine) = (coarse?, fine?);
-        let ([low, high], [bottom, top]) = (coarse.range(), fine.range());
-        if (high - top).abs() > rtol {
-            return None;
-        }
-        let Doubts { trough, t_peak, settling_time, cycle_trough } = fine.doubts;
-        let alike = |t: f64, other: f64| (t / other - 1.0).abs() <= rtol || t == other;
-        let timed = matches!((coarse.fate, fine.fate), (Fate::Settled { time }, Fate::Settled { time: other })
-            if alike(time, other));
-        let late = match (coarse.peak(rtol), fine.peak(rtol)) {
-            (Some(peak), Some(other)) => (peak.t / other.t - 1.0).abs() > rtol / other.x.min(1.0),
-            (None, None) => false,
-            _ => true,
-        };
-        let doubts = Doubts {
-            trough: trough || coarse.doubts.trough || (low - bottom).abs() > rtol,
-            t_peak: t_peak || coarse.doubts.t_peak || late,
-            settling_time: settling_time || coarse.doubts.settling_time || !timed,
-            cycle_trough,
-        };
-        Some(Course { steps: coarse.steps + fine.steps, doubts, ..fine })
+/// `V`, which falls.
+struct Energy<'a>(&'a Slider);
+
+impl Descent for Energy<'_> {
+    fn on_section(&self, state: &State) -> f64 {
+        0.5 * state[Z] * state[Z] / self.0.k + self.0.b * stored(state[Y])
     }
 
-    /// The same with steps whose errors are below `tolerance`.
-    fn swings(&self, x: f64, tolerance: f64, rtol: f64) -> Option<Course> {
-        let mut orbit = Orbit::new(self, self.steady(x), tolerance);
-        let mut budget = MOST_STEPS;
-        let [mut low, mut high]: [Option<Extremum>; 2] = [None; 2];
-        for _ in 0..MOST_SWINGS {
-            let cycle = orbit.cycle(true, &mut budget);
-            let quiet = cycle == Err(Stop::Quiet);
-            let extrema = match &cycle {
-                Ok(cycle) => cycle.extrema,
-                Err(Stop::Quiet) => orbit.extrema(),
-                Err(_) => return None,
-            };
-            let [slow, fast] = extrema.map(|seen| seen.map(|seen| orbit.polished(seen)));
-            low = [low, slow].into_iter().flatten().min_by(|one, other| one.x.total_cmp(&other.x));
-            high = [high, fast].into_iter().flatten().max_by(|one, other| one.x.total_cmp(&other.x));
-            let [least, greatest] = [low, high].map(|seen| seen.map_or(0.0, |seen| seen.x));
-            let left = match cycle {
-                Ok(cycle) => 0.5 * cycle.end[Z] * cycle.end[Z] / self.k + self.b * stored(cycle.end[Y]),
-                Err(_) => 0.0,
-            };
-            let reaches = |x: f64| self.least_energy(x).is_none_or(|least| least < left);
-            if quiet || !reaches(greatest + UNFELT * rtol) {
-                let time = if quiet { orbit.settled_at() } else { None };
-                let doubts = Doubts {
-                    trough: !quiet && reaches(least - UNFELT * rtol),
-                    t_peak: !quiet && (greatest < CLEAR * rtol || reaches(greatest - CLEAR * rtol)),
-                    settling_time: time.is_none(),
-                    ..Doubts::default()
-                };
-                let fate = Fate::Settled { time: time.unwrap_or(0.0) };
-                return Some(Course { fate, high, low, t: orbit.t(), steps: MOST_STEPS - budget, doubts });
-            }
-        }
-        None
-    }
-
-    /// The least `V` with an extremum at `x`: over all contact lifetimes. It grows with the distance of `x` from 0. `None` out
-    /// of range.
-    fn least_energy(&self, x: f64) -> Option<f64> {
-        let &Slider { a, b, inertia, k } = self;
+    /// Over all contact lifetimes.
+    fn of_extremum(&self, x: f64) -> Option<f64> {
+        let &Slider { a, b, inertia, k } = self.0;
         let kinetic = 0.5 * inertia * exp_m1(x) * exp_m1(x);
         let of = |y: f64| kinetic + 0.5 * (a * x + b * y) * (a * x + b * y) / k + b * stored(y);
         if b == 0.0 || x == 0.0 {
@@ -169,11 +101,6 @@ impl Slider {
         let bracket = if x < 0.0 { (0.0, f64::INFINITY) } else { (f64::NEG_INFINITY, 0.0) };
         newton(probe, end, bracket, true, ENOUGH).map(|root| of(root.x))
     }
-}
-
-/// `theta - 1 - ln theta` of `y = ln theta`.
-fn stored(y: f64) -> f64 {
-    if y.abs() < 1e-4 { y * y * (0.5 + y * (1.0 / 6.0 + y / 24.0)) } else { exp_m1(y) - y }
 }
 
 /// `1/v - 1 + ln v` of `x = ln v`.
@@ -199,7 +126,7 @@ mod tests {
     /// Compares with a response that is followed to its end; what is compared is counted.
     fn compare(slider: &Slider, found: &Course, x: f64, rtol: f64, compared: &mut [usize; 4]) {
         let scaled = Scaled { slider: *slider, ratio: exp(x) };
-        let judge = follow_once(slider, scaled.linear(), x, 0.01 * rtol);
+        let judge = follow_once(slider, scaled.linear(), x, 0.01 * rtol, false);
         let Fate::Settled { time } = judge.fate else { return };
         let ([low, high], [bottom, top]) = (found.range(), judge.range());
         compared[0] += 1;
@@ -233,7 +160,7 @@ mod tests {
             let inertia = if i % 7 == 0 { 0.0 } else { a * random(1e-6, 1e6) };
             let slider = Slider { a, b, inertia, k: a * random(1e-4, 1e4) };
             let x = random(1e-3, 10.0) * if i % 2 == 0 { 1.0 } else { -1.0 };
-            if let Some(found) = slider.first_swings(x, rtol) {
+            if let Some(found) = swings::first(&slider, &Energy(&slider), x, rtol) {
                 compare(&slider, &found, x, rtol, &mut compared);
             }
         }
@@ -278,7 +205,7 @@ mod tests {
             for _ in 0..8 {
                 let Ok(cycle) = orbit.cycle(true, &mut budget) else { break };
                 for seen in cycle.extrema.into_iter().flatten() {
-                    let Some(least) = slider.least_energy(orbit.polished(seen).x) else { continue };
+                    let Some(least) = Energy(&slider).of_extremum(orbit.polished(seen).x) else { continue };
                     bounded += 1;
                     assert!(least < left * (1.0 + 1e-6) + 1e-12 * a, "{slider:?}: {least} {left}");
                 }

@@ -11,22 +11,31 @@ use super::{POINTS, Row, sample};
 /// Velocities below this may have too few bits to scale.
 const TINY: f64 = 1e-300;
 
+/// Share of the points that are held to a finer accuracy.
+const HELD: f64 = 0.05;
+
+/// How much finer the accuracy is to which a response is held.
+const FINER: f64 = 1e-2;
+
 #[derive(Debug)]
 struct Point {
     step: Step,
     rtol: f64,
+    /// Whether it is solved to a finer accuracy as well, which takes longer.
+    held: bool,
 }
 
 fn draw(random: &mut Random) -> Point {
     let transition = random.transition();
     let Slider { k, m, .. } = random.slider(transition.law, transition.v_f);
-    Point { step: Step { transition, k, m }, rtol: random.between(1e-8, 1e-2) }
+    let rtol = random.between(1e-8, 1e-2);
+    Point { step: Step { transition, k, m }, rtol, held: random.chance(HELD) }
 }
 
 #[test]
 fn every_response_is_right_or_undecided() {
     sample("step", POINTS, draw, |point, row| {
-        let &Point { step, rtol } = point;
+        let &Point { step, rtol, held } = point;
         let course = step.scaled().map(|scaled| scaled.follow(rtol));
         let (status, response) = step.from_course(course.as_ref(), rtol);
         row.status(status);
@@ -38,6 +47,9 @@ fn every_response_is_right_or_undecided() {
         // The response knows m v^2 alone, which is rounded.
         let rounded = SteadySliding::new(step.transition.law, step.k, step.inertia(), 1.0);
         sound(&step, &response, sliding.is_stable() || rounded.is_stable(), row);
+        if held {
+            accurate(&step, &response, rtol, row);
+        }
         // Powers of two scale without rounding.
         let Transition { law, v_i, v_f } = step.transition;
         let other =
@@ -57,6 +69,36 @@ fn every_response_is_right_or_undecided() {
                 && times(scaled.settling_time) == response.settling_time,
         );
     });
+}
+
+/// What is told at one accuracy agrees with what is told at a finer one, if that decides at all.
+fn accurate(step: &Step, rough: &Response, rtol: f64, row: &mut Row) {
+    let finer = FINER * rtol;
+    let course = step.scaled().map(|scaled| scaled.follow(finer));
+    let Some(fine) = step.from_course(course.as_ref(), finer).1 else { return };
+    if [rough.outcome, fine.outcome].contains(&Outcome::Undecided) {
+        return;
+    }
+    row.fact("same outcome at a finer accuracy", rough.outcome == fine.outcome);
+    let v_f = step.transition.v_f;
+    let mut agree = |name, rough: f64, fine: f64, flat: f64| {
+        if !rough.is_nan() && !fine.is_nan() {
+            row.agree(name, rough, fine, (2.0 * rtol + 2.0 * finer) / flat);
+        }
+    };
+    agree("v_peak to rtol", rough.v_peak, fine.v_peak, 1.0);
+    agree("v_trough to rtol", rough.v_trough, fine.v_trough, 1.0);
+    if let (Some(rough), Some(fine)) = (rough.cycle, fine.cycle) {
+        agree("period to rtol", rough.period, fine.period, 1.0);
+        agree("cycle_peak to rtol", rough.v_peak, fine.v_peak, 1.0);
+        agree("cycle_trough to rtol", rough.v_trough, fine.v_trough, 1.0);
+    }
+    if let (Some(rough), Some(fine)) = (rough.settling_time, fine.settling_time) {
+        agree("settling_time to rtol", rough, fine, 1.0);
+    }
+    if let (Some(early), Some(late)) = (rough.t_peak, fine.t_peak) {
+        agree("t_peak to rtol", early, late, (fine.v_peak / v_f).ln().min(1.0));
+    }
 }
 
 fn sound(step: &Step, response: &Response, stable: bool, row: &mut Row) {
