@@ -26,8 +26,8 @@ pub struct Cycle {
     pub t: f64,
     /// Duration.
     pub period: f64,
-    /// Energy that friction took, and the sum of its sizes over the steps.
-    pub loss: [f64; 2],
+    /// Energy that friction took, the sum of its sizes over the steps, and that of the sizes of its two terms.
+    pub loss: [f64; 3],
     /// Slowest and fastest moment; `None` if the first cycle has none.
     pub extrema: [Option<Seen>; 2],
 }
@@ -72,8 +72,8 @@ pub struct Orbit<'a> {
     run: Run<'a>,
     /// Distance from steady sliding within which it rests.
     quiet: f64,
-    /// Energy lost from the last section to the start of the last step, and the sum of its sizes.
-    lost: [f64; 2],
+    /// Energy lost from the last section to the start of the last step, and the sums of its sizes.
+    lost: [f64; 3],
     /// Time from the last section to the start of the last step: the time since the start has too few digits for short cycles
     /// after a long rest.
     elapsed: f64,
@@ -111,7 +111,7 @@ impl<'a> Orbit<'a> {
             slider,
             run: slider.run(state, slider.first_step(&state), tolerance),
             quiet: quiet(tolerance),
-            lost: [0.0; 2],
+            lost: [0.0; 3],
             elapsed: 0.0,
             met: state[X] == 0.0,
             closed: VecDeque::new(),
@@ -151,7 +151,7 @@ impl<'a> Orbit<'a> {
             let leg = step_to(&mut self.run, f64::MAX).map_err(|_| Stop::Ends)?;
             self.look(&leg);
             let loss = self.loss(&leg);
-            self.lost = [0, 1].map(|i| self.lost[i] + loss[i]);
+            self.lost = [0, 1, 2].map(|i| self.lost[i] + loss[i]);
             self.elapsed += leg.h();
         }
     }
@@ -220,13 +220,13 @@ impl<'a> Orbit<'a> {
     /// The cycle that ends at the section, at about the share `u` of a step.
     fn close(&mut self, leg: &Leg, u: f64) -> Cycle {
         let (end, t, part) = self.exactly(leg, u, 0.0);
-        let loss = part.map_or([0.0; 2], |part| self.loss(&part));
+        let loss = part.map_or([0.0; 3], |part| self.loss(&part));
         let time = part.map_or(u * leg.h(), |part| part.h());
         let cycle = Cycle {
             end: [end[Z], end[Y], 0.0],
             t,
             period: self.elapsed + time,
-            loss: [0, 1].map(|i| self.lost[i] + loss[i]),
+            loss: [0, 1, 2].map(|i| self.lost[i] + loss[i]),
             extrema: [self.low, self.high],
         };
         // The whole step will be added.
@@ -275,12 +275,14 @@ impl<'a> Orbit<'a> {
         Some(place.map_or(0.0, |(leg, u)| self.exactly(&leg, u, edge).1))
     }
 
-    /// Energy that friction takes over a step, and the sum of its sizes: for an implicit one by its own quadrature.
-    fn loss(&self, leg: &Leg) -> [f64; 2] {
-        let mut loss = [0.0; 2];
+    /// Energy that friction takes over a step, the sum of its sizes, and that of its terms: for an implicit one by its own
+    /// quadrature.
+    fn loss(&self, leg: &Leg) -> [f64; 3] {
+        let mut loss = [0.0; 3];
         let mut add = |u: f64, weight: f64| {
-            let rate = leg.h() * weight * self.slider.loss(leg.value(Y, u), leg.value(X, u));
-            loss = [loss[0] + rate, loss[1] + rate.abs()];
+            let (terms, time) = (self.slider.loss(leg.value(Y, u), leg.value(X, u)), leg.h() * weight);
+            let rate = time * (terms[0] + terms[1]);
+            loss = [loss[0] + rate, loss[1] + rate.abs(), loss[2] + time * (terms[0].abs() + terms[1].abs())];
         };
         match leg {
             Leg::Stiff(_) => {

@@ -84,8 +84,9 @@ struct Sample {
     period: f64,
     high: f64,
     low: f64,
-    /// Error of the rate that an error of a step makes.
+    /// Error of the rate that an error of a step makes, and the one that rounding makes where the terms of friction cancel.
     noise: f64,
+    rounding: f64,
     /// Error of a step that the rate asks for.
     tolerance: f64,
 }
@@ -135,11 +136,23 @@ impl Follower<'_> {
             if off <= (self.rate_error() * rate.abs() * size).max(3.0 * tolerance) {
                 // Errors of a step are absolute in x, so their share is greater in small cycles.
                 let noise = gross(&cycle, place.z, self.slider) / size;
+                let rounding = f64::EPSILON * cycle.loss[2] / cycle.loss[1] * noise * size;
                 let drift = ln(place.z / asked);
                 let [low, high] = cycle.exact_range(&mut orbit);
                 let period = cycle.period;
-                let sample =
-                    Sample { place, slope, drift, rate, relaxation, period, high, low, noise, tolerance: f64::NAN };
+                let sample = Sample {
+                    place,
+                    slope,
+                    drift,
+                    rate,
+                    relaxation,
+                    period,
+                    high,
+                    low,
+                    noise,
+                    rounding,
+                    tolerance: f64::NAN,
+                };
                 let tolerance = self.finer(self.rate_error() * rate.abs() / noise, &sample);
                 return Ok(Sample { tolerance, ..sample });
             }
@@ -245,7 +258,7 @@ impl Follower<'_> {
             tolerance = sample.tolerance;
             sample = self.sample(sample.place, slope, tolerance)?;
         }
-        let least = LEGIBLE * sample.noise * self.finest(&sample);
+        let least = LEGIBLE * (sample.noise * self.finest(&sample)).max(sample.rounding);
         if sample.rate.abs() < least { Err(Stop::Faint) } else { Ok(sample) }
     }
 
@@ -280,7 +293,8 @@ impl Follower<'_> {
             let before = self.sample(sample.moved(-step), sample.slope, tolerance)?;
             let steepness = before.rate * direction / ln(sample.place.z / before.place.z).abs();
             if steepness >= ALIKE * slope {
-                let uncertain = noise * self.finest(&sample) / steepness * (sample.high - sample.low);
+                let error = (noise * self.finest(&sample)).max(sample.rounding);
+                let uncertain = error / steepness * (sample.high - sample.low);
                 let enough = uncertain <= RESOLVED.max(0.2 * self.rtol);
                 return if enough { Ok((sample, tolerance)) } else { Err(Stop::Faint) };
             }

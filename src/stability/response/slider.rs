@@ -46,9 +46,10 @@ impl Slider {
     }
 
     /// Rate at which friction beyond its steady value at `v_f` takes energy from the motion about steady sliding,
-    /// `E = M (e^x - 1)^2/2 + z^2/(2 k)`: `-E' = (e^x - 1)(a x + b y)`.
-    pub fn loss(&self, y: f64, x: f64) -> f64 {
-        exp_m1(x) * (self.a * x + self.b * y)
+    /// `E = M (e^x - 1)^2/2 + z^2/(2 k)`, in two terms: `-E' = (e^x - 1) a x + (e^x - 1) b y`.
+    pub fn loss(&self, y: f64, x: f64) -> [f64; 2] {
+        let excess = exp_m1(x);
+        [excess * (self.a * x), excess * (self.b * y)]
     }
 
     /// The state after an arrest that takes no time, if one is under way.
