@@ -60,8 +60,11 @@ const MOST_LEGS: u32 = 5_000;
 /// Velocities beyond `e^this v_f` without mass count as infinite.
 const ENDLESS: f64 = 60.0;
 
-/// Within this distance from steady sliding that is stable, and from the limit of the band, nothing happens any more.
+/// Within this distance from steady sliding that is stable nothing happens any more, nor within a share of what is to be told.
 const QUIET: f64 = 1e-5;
+const UNTOLD: f64 = 0.1;
+
+/// Swings within this share of the band stay in it.
 const INSIDE: f64 = 0.3;
 
 /// A section this close to that of the limit cycle, in `ln p` and `y`, has come to it; as many cycles may be left, and
@@ -72,8 +75,9 @@ const SLOW: f64 = 0.8;
 
 const TOO_LONG: &str = "responses too long or too stiff for an explicit integrator";
 
-/// Follows the response from `e^x v_f` to its end.
-pub fn follow(block: &Block, stable: bool, x: f64) -> Course {
+/// Follows the response from `e^x v_f` to its end, whose numbers are to be told to `rtol`.
+pub fn follow(block: &Block, stable: bool, x: f64, rtol: f64) -> Course {
+    let quiet = QUIET.min(UNTOLD * rtol);
     let mut watch =
         Watch { course: Course { fate: Err(TOO_LONG), high: None, low: None, t: 0.0 }, since: None, edge: 1.0 };
     let edges = band();
@@ -139,7 +143,7 @@ pub fn follow(block: &Block, stable: bool, x: f64) -> Course {
                 }
             }
         }
-        if stable && [here.x, here.y, here.p].iter().all(|part| part.abs() < QUIET) {
+        if stable && [here.x, here.y, here.p].iter().all(|part| part.abs() < quiet) {
             return watch.settled();
         }
     }

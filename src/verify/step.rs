@@ -60,7 +60,7 @@ pub fn check(row: &Row, _: &Context, rtol: f64) -> Verdict {
         fast: (0.01 * rtol).cbrt(),
         work: Cell::new(0),
     };
-    let course = follow(&block, stable, start);
+    let course = follow(&block, stable, start, rtol);
     let infinite = matches!(course.fate, Ok(Fate::Infinite));
     if infinite || word(row, STATUS) == Some("infeasible") {
         verdict.status(row, infinite);

@@ -14,7 +14,7 @@
 
 use std::f64::consts::{LN_2, PI};
 
-use super::course::{Course, Doubts, Fate, VANISHING, as_slow};
+use super::course::{Course, Doubts, Fate, VANISHING, as_slow, is_later};
 use super::fate::Linear;
 use super::orbit::{Extremum, Orbit, SETTLED};
 use super::slider::Slider;
@@ -37,14 +37,15 @@ const COUNTABLE: f64 = 1.5e3;
 /// Contacts age while swings die out where `M/a` is more.
 const COUPLED: f64 = 30.0;
 
-/// Swings that are simulated before, errors of their steps in units of `rtol`, the share of it that is taken each time that
-/// they are simulated more finely, the least of them, how often that is done at most, and steps.
+/// Swings that are simulated before, and steps.
 const SWINGS: u32 = 3;
+const MOST_STEPS: u32 = 10_000;
+
+/// Errors of these steps in units of `rtol`, the share of them that is taken each time that they are simulated more finely, and
+/// the least of them.
 const FINE: f64 = 3e-3;
 const FINER: f64 = 0.1;
 const FINEST: f64 = 1e-14;
-const MOST_TIMES: u32 = 5;
-const MOST_STEPS: u32 = 10_000;
 
 /// Limit cycles are told by the Hopf point where their amplitude is less.
 const FAINT: f64 = 1e-3;
@@ -108,21 +109,18 @@ pub(super) fn course_after_first_swings(slider: &Slider, linear: Linear, x: f64,
     }
     let swinging = Swinging { a, b, mass, impedance, omega, share };
     // The way down to a slow trough magnifies the errors of steps, so it takes finer ones.
-    let mut tolerance = FINE * rtol;
+    let mut tolerance = (FINE * rtol).max(FINEST / FINER);
     let mut first = FirstSwings::of(slider, x, tolerance)?;
     let mut doubts = Doubts { trough: true, t_peak: true, ..Doubts::default() };
-    for _ in 0..MOST_TIMES {
-        tolerance = (FINER * tolerance).max(FINEST);
+    while (doubts.trough || doubts.t_peak) && FINER * tolerance >= FINEST {
+        tolerance *= FINER;
         let finer = FirstSwings::of(slider, x, tolerance)?;
         if (finer.high.x - first.high.x).abs() > rtol {
             return None;
         }
         doubts.trough = !as_slow(finer.low.x, first.low.x, rtol);
-        doubts.t_peak = (finer.high.t / first.high.t - 1.0).abs() > rtol / finer.high.x.min(1.0);
+        doubts.t_peak = is_later(first.high, finer.high, rtol);
         first = FirstSwings { steps: first.steps + finer.steps, ..finer };
-        if !doubts.trough && !doubts.t_peak {
-            break;
-        }
     }
     let FirstSwings { low, high, t, steps } = first;
     let excess = exp_m1(x).abs();
@@ -203,7 +201,8 @@ impl Swinging {
         let ages = self.b * decades(self.omega, x) > self.a * self.omega.max(1.0) / CLEAR;
         doubts.t_peak |= ages && (arrested || !follows);
         let first = [low, high].map(|(x, phase)| Some(Extremum { x, t: phase / self.omega }));
-        // Next to the critical stiffness rounding decides the sign of c in small swings: linear theory and the Hopf point tell it.
+        // Next to the critical stiffness rounding decides the sign of c in small swings: linear theory and the Hopf point
+        // tell it.
         let damped = self.bend().is_some_and(|bend| bend < 0.0);
         let dies_out = amplitude < FAINT && linear.stable && damped;
         if !dies_out && !self.is_clear(start) {

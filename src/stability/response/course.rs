@@ -1,6 +1,6 @@
 //! A response followed to its end as finely as its numbers ask for: at finer and finer steps, until none of them moves.
 
-use super::fate::{Linear, MOST_STEPS, STEP, follow_once};
+use super::fate::{Linear, MOST_STEPS, follow_once};
 use super::orbit::{Extremum, quiet};
 use super::slider::Slider;
 use super::{averaging, massless, strengthening};
@@ -24,7 +24,7 @@ pub enum Fate {
     },
     /// None that could be decided with the work allowed.
     Undecided,
-    /// The velocity becomes infinite in finite time, which takes a mass of 0 and `k <= b - a`.
+    /// The velocity becomes infinite in finite time, which takes a mass of 0 and `k < b - a`.
     Ends,
 }
 
@@ -61,8 +61,8 @@ pub struct Doubts {
 
 /// Accuracy, in units of what is asked for, with which a response is first followed, and share of it that is taken each
 /// time after that: a change by `rtol` from one time to the next then leaves an error of a tenth of that.
-const COARSE: f64 = 3.0;
-const FINER: f64 = 0.1;
+pub(super) const COARSE: f64 = 3.0;
+pub(super) const FINER: f64 = 0.1;
 
 /// Times that a response is followed more finely.
 const MOST_TIMES: u32 = 3;
@@ -97,11 +97,11 @@ fn follow_to_the_end(slider: &Slider, linear: Linear, x: f64, rtol: f64) -> Cour
     if let Some(course) = told.or_else(|| averaging::course_after_first_swings(slider, linear, x, rtol)) {
         return course;
     }
-    if linear.is_neutral(slider) && x.abs() > quiet(STEP * COARSE * FINER * rtol) {
+    if linear.is_neutral(slider) && x.abs() > quiet(linear.step_error(x, rtol, COARSE * FINER)) {
         let fate = Fate::Undecided;
         return Course { fate, high: None, low: None, t: 0.0, steps: 0, doubts: Doubts::default() };
     }
-    let mut course = follow_once(slider, linear, x, COARSE * rtol, true);
+    let mut course = follow_once(slider, linear, x, rtol, COARSE);
     // Finer steps would be more.
     if course.fate == Fate::Undecided && course.steps == MOST_STEPS {
         return course;
@@ -109,8 +109,13 @@ fn follow_to_the_end(slider: &Slider, linear: Linear, x: f64, rtol: f64) -> Cour
     let mut share = COARSE;
     let mut known = false;
     for _ in 0..MOST_TIMES {
+        let errors = [share, FINER * share].map(|share| linear.step_error(x, rtol, share));
+        // The same steps would tell the same.
+        if errors[1] > 0.5 * errors[0] {
+            break;
+        }
         share *= FINER;
-        let finer = follow_once(slider, linear, x, share * rtol, false);
+        let finer = follow_once(slider, linear, x, rtol, share);
         let doubts = course.compared(&finer, rtol);
         let steps = course.steps + finer.steps;
         course = Course { steps, doubts: doubts.unwrap_or_default(), ..finer };
@@ -153,7 +158,7 @@ impl Course {
                 doubts.cycle_trough |= !slow(low, bottom);
                 alike(period, other) && near(high, top)
             }
-            (Fate::Undecided, Fate::Undecided) | (Fate::Ends, Fate::Ends) => return Some(doubts),
+            (Fate::Undecided, Fate::Undecided) => return Some(doubts),
             _ => false,
         };
         let ([low, high], [bottom, top]) = (self.range(), other.range());
@@ -162,8 +167,8 @@ impl Course {
         doubts.t_peak = match (self.peak(rtol), other.peak(rtol)) {
             // On the way to a cycle all but as high moments are many, and none of them is told.
             (None, None) => false,
-            // The flatter a peak, the less is known of when it was; NaN is told as such.
-            (Some(peak), Some(other)) => doubts.t_peak || (peak.t / other.t - 1.0).abs() > rtol / other.x.min(1.0),
+            // NaN is told as such.
+            (Some(peak), Some(other)) => doubts.t_peak || is_later(peak, other, rtol),
             _ => true,
         };
         (ends && near(high, top)).then_some(doubts)
@@ -173,4 +178,10 @@ impl Course {
 /// Whether two logarithms of a least velocity are the same: to `rtol`, or both of 0 in doubles.
 pub(super) fn as_slow(x: f64, y: f64, rtol: f64) -> bool {
     (x - y).abs() <= rtol || (x < VANISHING && y < VANISHING)
+}
+
+/// Whether two peaks, the second of them the more exact, are not at the same time to `rtol`: the flatter a peak, the less is
+/// known of when it was.
+pub(super) fn is_later(peak: Extremum, exact: Extremum, rtol: f64) -> bool {
+    (peak.t / exact.t - 1.0).abs() > rtol / exact.x.min(1.0)
 }

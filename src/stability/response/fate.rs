@@ -4,7 +4,7 @@
 //! cycle is the change of `ln z` without a difference of nearly equal numbers, however slow it is. While cycles
 //! change fast they are followed one by one; where they change slowly, many are passed over at once (`slide.rs`).
 
-use super::course::{Course, Doubts, Fate, VANISHING};
+use super::course::{COARSE, Course, Doubts, FINER, Fate, VANISHING};
 use super::orbit::{BAND, Cycle, Extremum, Orbit, Seen, Stop};
 use super::slide::{Place, Slide};
 use super::slider::{Slider, State, Y, Z};
@@ -59,9 +59,10 @@ const PATIENCE: u32 = 10;
 /// `PATIENCE` of them, in units of `rtol`: what is left are errors of steps, whose shares of each other are chance.
 const STILL: f64 = 0.1;
 
-/// How far from a cycle in `ln z` another begins that shows whether it attracts; it does so at once if one cycle leaves less than
-/// this share of that.
+/// How far from a cycle in `ln z` another begins that shows whether it attracts.
 const BESIDE: f64 = 0.03;
+
+/// It attracts at once where one cycle leaves less than this share of that.
 const AT_ONCE: f64 = 0.1;
 
 /// Peaks that differ by less than this, in units of `rtol`, are as high as each other.
@@ -73,19 +74,17 @@ pub(super) const STEP: f64 = 0.03;
 /// Error of an extremum in the dense output.
 const ROUGH: f64 = 1e-2;
 
-/// The same with steps whose errors are to leave `rtol` of the numbers. What `trusts` takes cycles that hardly change for a limit
-/// cycle, and is to be followed more finely.
-pub(super) fn follow_once(slider: &Slider, linear: Linear, x: f64, rtol: f64, trusts: bool) -> Course {
-    let faint = !linear.stable && x.abs() < FAINT;
-    let start = if faint { linear.moved_out(x) } else { x };
-    let tolerance = (STEP * rtol).max(finest(start.abs()));
-    let tolerance = if linear.stable { tolerance } else { tolerance.min(telling(start.abs())) };
+/// Follows the response from `e^x v_f` once, with steps whose errors are to leave this `share` of `rtol` of its numbers. The
+/// coarsest run takes cycles that hardly change for a limit cycle, which a finer one has to confirm.
+pub(super) fn follow_once(slider: &Slider, linear: Linear, x: f64, rtol: f64, share: f64) -> Course {
+    let start = linear.start(x);
+    let faint = start != x;
     let mut follower = Follower {
         slider,
         linear,
-        rtol,
-        tolerance,
-        trusts,
+        rtol: share * rtol,
+        tolerance: linear.step_error(x, rtol, share),
+        trusts: share >= COARSE,
         budget: MOST_STEPS,
         high: None,
         low: None,
@@ -94,6 +93,7 @@ pub(super) fn follow_once(slider: &Slider, linear: Linear, x: f64, rtol: f64, tr
         vague: false,
         vague_time: false,
         vague_peak: false,
+        passed: 0.0,
         miscounted: 0.0,
     };
     let fate = match follower.run(slider.steady(start)) {
@@ -130,6 +130,18 @@ impl Linear {
         swing < SOFT * slider.a && growth.abs() * swing < LEGIBLE * FINEST * slider.force()
     }
 
+    /// Where the response from `e^x v_f` is followed from.
+    fn start(&self, x: f64) -> f64 {
+        if !self.stable && x.abs() < FAINT { self.moved_out(x) } else { x }
+    }
+
+    /// Error of a step of the run that is to leave a `share` of `rtol`: of the first two it always differs.
+    pub(super) fn step_error(&self, x: f64, rtol: f64, share: f64) -> f64 {
+        let size = self.start(x).abs();
+        let told = if self.stable { f64::INFINITY } else { telling(size) * share / COARSE };
+        (STEP * share * rtol).min(told).max(finest(size) * (share / (COARSE * FINER)).max(1.0))
+    }
+
     /// A start closer than `FAINT`, moved out to where it grows, by whole cycles if they are short enough.
     fn moved_out(&self, x: f64) -> f64 {
         let whole = self.growth.map(|growth| growth * (ln(FAINT / x.abs()) / growth).ceil());
@@ -143,7 +155,7 @@ impl Linear {
     fn allows(&self, slider: &Slider, fate: &Fate, moved: f64) -> bool {
         let &Fate::Cycle { period, high, low } = fate else { return true };
         let alike = self.period.is_none_or(|linear| period > linear / ALIKE && period < linear * ALIKE);
-        let driven = slider.b > slider.a;
+        let driven = slider.b > slider.a && slider.inertia > 0.0;
         driven && period > 0.0 && high - low > FAINT.max(4.0 * moved) && (alike || high - low > SMALL)
     }
 }
@@ -153,6 +165,7 @@ pub(super) struct Follower<'a> {
     pub(super) linear: Linear,
     pub(super) rtol: f64,
     pub(super) tolerance: f64,
+    /// Whether what hardly changes is a limit cycle without being asked.
     trusts: bool,
     pub(super) budget: u32,
     high: Option<Extremum>,
@@ -166,7 +179,8 @@ pub(super) struct Follower<'a> {
     pub(super) vague_time: bool,
     /// Whether another moment was as fast as the fastest.
     vague_peak: bool,
-    /// What it may be off by.
+    /// Cycles that were passed over, and by how many this number may be off.
+    pub(super) passed: f64,
     pub(super) miscounted: f64,
 }
 
@@ -249,7 +263,8 @@ impl Follower<'_> {
             let lower = (low - last_low).abs();
             last_low = low;
             // Small cycles may only have stopped to change fast.
-            let ends = near && high - low > SMALL && rate.abs() < BALANCED * gross(&cycle, last.z, slider);
+            let ends =
+                near && place.z > 0.0 && high - low > SMALL && rate.abs() < BALANCED * gross(&cycle, last.z, slider);
             // Changes that are errors of steps do not show that cycles change slowly.
             let mut creeps = false;
             if ends && !arrived && !still && count >= asked {
@@ -315,11 +330,11 @@ impl Follower<'_> {
         }
     }
 
-    /// Whether cycles that begin beside the last one, which went from one place to another, come to it so fast that all its changes to
-    /// come, `change` having been the last, add up to less than `rtol`.
+    /// Whether cycles that begin beside the last one, which went from one place to another, come to it so fast that all its
+    /// changes to come, `change` having been the last, add up to less than `rtol`.
     ///
-    /// That a cycle changes little does not tell: friction may only give and take almost the same, as it does next to the critical
-    /// stiffness, or be little beside inertia.
+    /// That a cycle changes little does not tell: friction may only give and take almost the same, as it does next to the
+    /// critical stiffness, or be little beside inertia.
     fn attracts(&mut self, from: Place, to: Place, change: f64) -> Result<bool, Stop> {
         let mut beside = self.next(Place { z: from.z * exp(BESIDE), ..from })?;
         let gap = |place: Place, beside: Place| ln(beside.z / place.z).abs().max((beside.y - place.y).abs());

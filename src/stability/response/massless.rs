@@ -7,8 +7,9 @@
 //! ```
 //!
 //! which vanishes at steady sliding alone, only falls above the critical stiffness, only grows below it, and is kept at it. So
-//! its sign tells the end of every response: steady sliding above; below a velocity that is infinite in finite time, since once
-//! `(k_c - k)(u - 1) > k` nothing stops the growth of `u`; and the same swing for ever where `k` is `k_c` to the last digit.
+//! the sign of `k - k_c` tells the end of every response: steady sliding above; below a velocity that is infinite in
+//! finite time, since once `(k_c - k)(u - 1) > k` nothing stops the growth of `u`; and the same swing for ever where `k` is
+//! `k_c` to the last digit.
 
 use super::course::{Course, Doubts, Fate};
 use super::slider::{Slider, Y};

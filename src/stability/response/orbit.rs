@@ -35,9 +35,9 @@ pub struct Cycle {
 /// Why an orbit is followed no further.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Stop {
-    /// The state is close enough to steady sliding to be linear.
+    /// The state is as close to steady sliding as errors of steps tell.
     Quiet,
-    /// The velocity becomes infinite in finite time.
+    /// No step is short enough.
     Ends,
     /// The work allowed is used up.
     Budget,
@@ -50,7 +50,7 @@ pub enum Stop {
 /// A state this close to steady sliding is in its linear neighbourhood.
 const LINEAR: f64 = 1e-5;
 
-/// Errors of steps that make up a motion which cannot be told from rest.
+/// Distance from rest, in errors of a step, that cannot be told from it.
 const UNTOLD: f64 = 3.0;
 
 /// Settled means `|v/v_f - 1|` below this, for good.

@@ -44,6 +44,9 @@ const STABLE: f64 = 5.0;
 /// vanish.
 const FAR: f64 = 6.0;
 
+/// Times that a series is cut for that: where the velocity falls, the first cut is too little.
+const MOST_CUTS: u32 = 6;
+
 /// Lengths of steps in that unit from which on they become implicit, and up to which they become series again: steps of
 /// either kind cost as much there.
 const STIFF: f64 = 15.0;
@@ -124,9 +127,12 @@ impl Run<'_> {
         let mut whole = h.min(self.integrator.left(limit));
         let over = |h: f64| Piece::from_powers(self.t(), h, state, stretched(&powers, h / unit));
         let mut piece = over(whole);
-        let change = (piece.end[Y] - state[Y]).abs();
-        if change > FAR {
-            whole *= FAR / change;
+        for _ in 0..MOST_CUTS {
+            let change = (piece.end[Y] - state[Y]).abs();
+            if change <= FAR {
+                break;
+            }
+            whole *= 0.9 * FAR / change;
             piece = over(whole);
         }
         let advances = piece.end.iter().all(|end| end.is_finite()) && self.integrator.leap(whole, piece.end, h);

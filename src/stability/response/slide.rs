@@ -35,9 +35,10 @@ const MOST_REFINEMENTS: u32 = 4;
 const NODES: usize = 5;
 const PANEL: f64 = 1.2;
 
-/// Part of a cycle up to which a number of cycles must be known to tell when a response has settled, and what contact lifetimes
-/// off the slow manifold add to the errors of rates, as a factor.
+/// Part of a cycle up to which a number of cycles must be known to tell when a response has settled.
 const COUNTED: f64 = 0.02;
+
+/// Errors of rates, in units of those that errors of steps make: samples are off the slow manifold as well.
 const CHANCE: f64 = 10.0;
 
 /// Share of what is asked for that a cycle must not be of all cycles, to be counted.
@@ -46,14 +47,16 @@ const UNCOUNTED: f64 = 0.1;
 /// Times that a panel is halved for that.
 const MOST_HALVINGS: u32 = 6;
 
-/// Part of a cycle that a number of cycles may be off by, at least, and by which the last entry into the band moves at once where a
-/// cycle just touches it.
+/// Part of a cycle that a number of cycles may be off by, at least.
 const TIE: f64 = 1e-3;
+
+/// An entry into the band that such an error moves by more than this part of a period is not the one where a cycle just touches it.
 const JUMP: f64 = 0.1;
 
-/// How far beside a limit cycle in `ln z` the slope of the rate is taken, and the share of the slope that was expected which it must
-/// not fall below.
+/// How far beside a limit cycle in `ln z` the slope of the rate is taken.
 const BESIDE: f64 = 0.01;
+
+/// Least share of the slope that was expected with which a limit cycle is found.
 const ALIKE: f64 = 0.1;
 
 /// Rounding of the spring's force in a step.
@@ -136,7 +139,7 @@ impl Follower<'_> {
             if off <= (self.rate_error() * rate.abs() * size).max(3.0 * tolerance) {
                 // Errors of a step are absolute in x, so their share is greater in small cycles.
                 let noise = gross(&cycle, place.z, self.slider) / size;
-                let rounding = f64::EPSILON * cycle.loss[2] / cycle.loss[1] * noise * size;
+                let rounding = f64::EPSILON * cycle.loss[2] * self.slider.k / (place.z * place.z);
                 let drift = ln(place.z / asked);
                 let [low, high] = cycle.exact_range(&mut orbit);
                 let period = cycle.period;
@@ -227,6 +230,8 @@ impl Follower<'_> {
     fn whole_cycles(&mut self, z: f64, near: &Sample, to: &Sample) -> Result<Slide, Stop> {
         let Passage { cycles, time } = self.passage(z, near, to)?;
         let spare = cycles - cycles.floor();
+        self.passed += cycles;
+        self.miscounted += CHANCE * cycles * (to.noise * to.tolerance / to.rate).abs();
         Ok(Slide::Fast { place: to.moved(-spare * to.rate), time: time - spare * to.period })
     }
 
@@ -289,10 +294,13 @@ impl Follower<'_> {
             let noise = from.noise.max(to.noise);
             let tolerance = self.finer(RESOLUTION * self.rtol * slope / noise, &from);
             let sample = self.find(bracket, tolerance, |sample| sample.rate)?;
-            let step = (0.5 * way.abs()).min(BESIDE).copysign(way);
+            let room = ln(sample.place.z / from.place.z).abs().min(ln(to.place.z / sample.place.z).abs());
+            let step = (0.5 * room).min(BESIDE).copysign(way);
             let before = self.sample(sample.moved(-step), sample.slope, tolerance)?;
-            let steepness = before.rate * direction / ln(sample.place.z / before.place.z).abs();
-            if steepness >= ALIKE * slope {
+            let distance = ln(sample.place.z / before.place.z).abs();
+            let steepness = (before.rate - sample.rate) * direction / distance;
+            let found = sample.rate.abs() <= self.rtol.max(RESOLVED) * steepness;
+            if found && steepness >= ALIKE * slope {
                 let error = (noise * self.finest(&sample)).max(sample.rounding);
                 let uncertain = error / steepness * (sample.high - sample.low);
                 let enough = uncertain <= RESOLVED.max(0.2 * self.rtol);
@@ -346,12 +354,13 @@ impl Follower<'_> {
             return Ok(0.0);
         }
         let mut touching = self.find([*start, *inside], inside.tolerance, beyond)?;
+        let (miscounted, vague) = (self.miscounted, self.vague_time);
         let mut passage = self.passage(z, start, &touching)?;
         // Whether a single cycle is felt, and so whether they have to be counted.
-        let felt = passage.cycles * UNCOUNTED * self.rtol < 1.0;
+        let felt = (self.passed + passage.cycles) * UNCOUNTED * self.rtol < 1.0;
         let needed = COUNTED / (CHANCE * passage.cycles);
         if felt && needed < self.rate_error() {
-            (self.counting, self.miscounted) = (needed, 0.0);
+            (self.counting, self.miscounted, self.vague_time) = (needed, miscounted, vague);
             let [start, inside] =
                 [start, inside].map(|sample| self.refined(sample.place, sample.slope, sample.tolerance));
             let (start, inside) = (start?, inside?);
@@ -359,6 +368,7 @@ impl Follower<'_> {
             passage = self.passage(z, &start, &touching)?;
         }
         let Passage { cycles, time } = passage;
+        let miscounted = self.miscounted;
         let uncertain = CHANCE * cycles * (touching.noise * touching.tolerance / touching.rate).abs();
         // The last cycle that leaves the band begins a part of a cycle before the one that would touch it.
         let spare = cycles - cycles.floor();
@@ -371,10 +381,12 @@ impl Follower<'_> {
         let found = settled(0.0)?;
         if felt {
             // Whether a cycle that just touches the band leaves it, on either side, may not be known.
-            let off = (self.miscounted + uncertain).max(TIE);
-            let [early, late] = [settled(-off)?, settled(off)?];
-            let moved = (early - found).abs().max((late - found).abs());
-            self.vague_time |= spare.min(1.0 - spare) < off || moved > JUMP * touching.period;
+            let off = (miscounted + uncertain).max(TIE);
+            let mut jumps = spare.min(1.0 - spare) < off;
+            for way in [-off, off] {
+                jumps = jumps || (settled(way)? - found).abs() > JUMP * touching.period;
+            }
+            self.vague_time |= jumps;
         }
         Ok(found)
     }

@@ -127,7 +127,7 @@ mod tests {
     /// Compares with a response that is followed to its end; what is compared is counted.
     fn compare(slider: &Slider, found: &Course, x: f64, rtol: f64, compared: &mut [usize; 4]) {
         let scaled = Scaled { slider: *slider, ratio: exp(x) };
-        let judge = follow_once(slider, scaled.linear(), x, 0.01 * rtol, false);
+        let judge = follow_once(slider, scaled.linear(), x, rtol, 0.01);
         let Fate::Settled { time } = judge.fate else { return };
         let ([low, high], [bottom, top]) = (found.range(), judge.range());
         compared[0] += 1;

@@ -1,6 +1,6 @@
 //! The first swings of a response that is known to settle: a function of the state that never rises bounds all later ones.
 
-use super::course::{Course, Doubts, Fate, as_slow};
+use super::course::{Course, Doubts, Fate, as_slow, is_later};
 use super::orbit::{Extremum, Orbit, Stop};
 use super::slider::{Slider, State};
 use crate::numerics::elementary::exp_m1;
@@ -11,9 +11,10 @@ pub(super) const UNFELT: f64 = 0.1;
 /// A peak is the greatest where those to come are lower by as much, in units of `rtol`.
 const CLEAR: f64 = 0.3;
 
-/// Errors of steps in units of `rtol`, and the share of it by which they are taken once more.
+/// Errors of steps in units of `rtol`, the share of it by which they are taken once more, and the least of them.
 const FINE: f64 = 0.01;
 const FINER: f64 = 0.1;
+const FINEST: f64 = 1e-14;
 
 /// Swings that are followed until those to come are known to be smaller, and steps.
 const MOST_SWINGS: u32 = 100;
@@ -32,7 +33,8 @@ pub(super) trait Descent {
 /// The response from `e^x v_f`, which settles, as far as the first swings tell it until those to come are known to be smaller;
 /// `None` if its peak is not known.
 pub(super) fn first(slider: &Slider, descent: &impl Descent, x: f64, rtol: f64) -> Option<Course> {
-    let [coarse, fine] = [FINE, FINE * FINER].map(|share| follow(slider, descent, x, share * rtol, rtol));
+    let fine = (FINE * FINER * rtol).max(FINEST);
+    let [coarse, fine] = [fine / FINER, fine].map(|tolerance| follow(slider, descent, x, tolerance, rtol));
     let (coarse, fine) = (coarse?, fine?);
     let ([low, high], [bottom, top]) = (coarse.range(), fine.range());
     if (high - top).abs() > rtol {
@@ -43,7 +45,7 @@ pub(super) fn first(slider: &Slider, descent: &impl Descent, x: f64, rtol: f64) 
     let timed = matches!((coarse.fate, fine.fate), (Fate::Settled { time }, Fate::Settled { time: other })
         if alike(time, other));
     let late = match (coarse.peak(rtol), fine.peak(rtol)) {
-        (Some(peak), Some(other)) => (peak.t / other.t - 1.0).abs() > rtol / other.x.min(1.0),
+        (Some(peak), Some(other)) => is_later(peak, other, rtol),
         (None, None) => false,
         _ => true,
     };
