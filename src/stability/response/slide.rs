@@ -38,6 +38,9 @@ const PANEL: f64 = 1.2;
 /// Part of a cycle up to which a number of cycles must be known to tell when a response has settled.
 const COUNTED: f64 = 0.02;
 
+/// Times the work of counting cycles that counting them again more exactly may take.
+const RECOUNT: u32 = 5;
+
 /// Errors of rates, in units of those that errors of steps make: samples are off the slow manifold as well.
 const CHANCE: f64 = 10.0;
 
@@ -55,6 +58,9 @@ const JUMP: f64 = 0.1;
 
 /// How far beside a limit cycle in `ln z` the slope of the rate is taken.
 const BESIDE: f64 = 0.01;
+
+/// Slope of the rate beside a limit cycle with which cycles come to it by themselves.
+const ATTRACTING: f64 = 1e-3;
 
 /// Least share of the slope that was expected with which a limit cycle is found.
 const ALIKE: f64 = 0.1;
@@ -99,6 +105,15 @@ impl Sample {
     fn moved(&self, way: f64) -> Place {
         Place { z: self.place.z * exp(way), y: self.place.y * exp(self.slope * way) }
     }
+}
+
+/// Where the rate changes its sign.
+#[expect(clippy::large_enum_variant, reason = "it is taken apart at once")]
+enum Crossing {
+    /// At this sample, whose steps have this error.
+    Found { sample: Sample, tolerance: f64 },
+    /// About here, up to `change`, but its slope is another one on each side: cycles come to it by themselves.
+    Kink { place: Place, change: f64 },
 }
 
 /// How sampling ended.
@@ -269,7 +284,10 @@ impl Follower<'_> {
 
     /// The limit cycle between two samples whose rates differ in sign.
     fn cycle_between(&mut self, from: &Sample, to: &Sample) -> Result<Slide, Stop> {
-        let (sample, tolerance) = self.crossing([*from, *to])?;
+        let (sample, tolerance) = match self.crossing([*from, *to])? {
+            Crossing::Found { sample, tolerance } => (sample, tolerance),
+            Crossing::Kink { place, change } => return Ok(Slide::Near { place, change, enclosed: false }),
+        };
         // A block that is almost at rest once in a swing hardly shows it on the section.
         if sample.low < RESTING {
             let beside = self.sample(sample.moved(RESOLUTION * self.rtol), sample.slope, tolerance)?;
@@ -281,11 +299,11 @@ impl Follower<'_> {
         Ok(Slide::Decided(Fate::Cycle { period: sample.period, high: sample.high, low: sample.low }))
     }
 
-    /// The sample between two others at which the rate changes its sign, and the error of its steps.
+    /// Where between two samples the rate changes its sign.
     ///
     /// They are as exact as the slope of the rate asks for, which beside a limit cycle may be far less than between two distant
     /// samples.
-    fn crossing(&mut self, mut bracket: [Sample; 2]) -> Result<(Sample, f64), Stop> {
+    fn crossing(&mut self, mut bracket: [Sample; 2]) -> Result<Crossing, Stop> {
         let direction = bracket[0].rate.signum();
         for _ in 0..MOST_REFINEMENTS {
             let [from, to] = bracket;
@@ -304,7 +322,14 @@ impl Follower<'_> {
                 let error = (noise * self.finest(&sample)).max(sample.rounding);
                 let uncertain = error / steepness * (sample.high - sample.low);
                 let enough = uncertain <= RESOLVED.max(0.2 * self.rtol);
-                return if enough { Ok((sample, tolerance)) } else { Err(Stop::Faint) };
+                return if enough { Ok(Crossing::Found { sample, tolerance }) } else { Err(Stop::Faint) };
+            }
+            if sample.low < RESTING {
+                let after = self.sample(sample.moved(step), sample.slope, tolerance)?;
+                let beyond = (sample.rate - after.rate) * direction / ln(after.place.z / sample.place.z).abs();
+                if steepness.max(beyond) > ATTRACTING {
+                    return Ok(Crossing::Kink { place: sample.place, change: step.abs() });
+                }
             }
             let before = self.refined(before.place, before.slope, before.tolerance)?;
             let after = self.refined(sample.moved(step), sample.slope, before.tolerance)?;
@@ -355,11 +380,15 @@ impl Follower<'_> {
         }
         let mut touching = self.find([*start, *inside], inside.tolerance, beyond)?;
         let (miscounted, vague) = (self.miscounted, self.vague_time);
+        let budget = self.budget;
         let mut passage = self.passage(z, start, &touching)?;
         // Whether a single cycle is felt, and so whether they have to be counted.
         let felt = (self.passed + passage.cycles) * UNCOUNTED * self.rtol < 1.0;
         let needed = COUNTED / (CHANCE * passage.cycles);
-        if felt && needed < self.rate_error() {
+        let recounts = felt && needed < self.rate_error();
+        let affordable = self.budget > RECOUNT * (budget - self.budget);
+        self.vague_time |= recounts && !affordable;
+        if recounts && affordable {
             (self.counting, self.miscounted, self.vague_time) = (needed, miscounted, vague);
             let [start, inside] =
                 [start, inside].map(|sample| self.refined(sample.place, sample.slope, sample.tolerance));
