@@ -65,6 +65,9 @@ const BESIDE: f64 = 0.03;
 /// It attracts at once where one cycle leaves less than this share of that.
 const AT_ONCE: f64 = 0.1;
 
+/// What errors of steps may leave on the side from which cycles come slowly, in units of `rtol`.
+const SLOW_SIDE: f64 = 10.0;
+
 /// Peaks that differ by less than this, in units of `rtol`, are as high as each other.
 const ALIKE_PEAKS: f64 = 0.3;
 
@@ -269,7 +272,7 @@ impl Follower<'_> {
             let mut creeps = false;
             if ends && !arrived && !still && count >= asked {
                 asked = 2 * count;
-                arrived = self.trusts || self.attracts(last, place, change)?;
+                arrived = self.trusts || self.attracts(last, place, change, !real)?;
                 creeps = !arrived;
             }
             if ends && (arrived || still) {
@@ -335,17 +338,26 @@ impl Follower<'_> {
     ///
     /// That a cycle changes little does not tell: friction may only give and take almost the same, as it does next to the
     /// critical stiffness, or be little beside inertia.
-    fn attracts(&mut self, from: Place, to: Place, change: f64) -> Result<bool, Stop> {
-        let mut beside = self.next(Place { z: from.z * exp(BESIDE), ..from })?;
+    fn attracts(&mut self, from: Place, to: Place, change: f64, sampled: bool) -> Result<bool, Stop> {
         let gap = |place: Place, beside: Place| ln(beside.z / place.z).abs().max((beside.y - place.y).abs());
-        let first = gap(to, beside);
-        let mut share = first / BESIDE;
-        if share > AT_ONCE {
-            // The first cycle was for the contact lifetime to follow.
-            beside = self.next(beside)?;
-            share = gap(self.next(to)?, beside) / first;
+        // What samples led to may be approached fast from one side and slowly from the other.
+        let sides = if sampled { [BESIDE, -BESIDE].as_slice() } else { &[BESIDE] };
+        for &side in sides {
+            let mut beside = self.next(Place { z: from.z * exp(side), ..from })?;
+            let first = gap(to, beside);
+            let mut share = first / BESIDE;
+            if share > AT_ONCE {
+                // The first cycle was for the contact lifetime to follow.
+                beside = self.next(beside)?;
+                share = gap(self.next(to)?, beside) / first;
+            }
+            let told = 1.0 - share > 10.0 * self.tolerance / BESIDE;
+            let enough = if side > 0.0 { self.rtol } else { SLOW_SIDE * self.rtol };
+            if !(told && change * share < enough * (1.0 - share)) {
+                return Ok(false);
+            }
         }
-        Ok(1.0 - share > 10.0 * self.tolerance / BESIDE && change * share < self.rtol * (1.0 - share))
+        Ok(true)
     }
 
     /// Where the cycle ends that begins at a place.
