@@ -108,7 +108,6 @@ impl Sample {
 }
 
 /// Where the rate changes its sign.
-#[expect(clippy::large_enum_variant, reason = "it is taken apart at once")]
 enum Crossing {
     /// At this sample, whose steps have this error.
     Found { sample: Sample, tolerance: f64 },
