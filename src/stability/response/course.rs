@@ -64,6 +64,9 @@ pub struct Doubts {
 pub(super) const COARSE: f64 = 3.0;
 pub(super) const FINER: f64 = 0.1;
 
+/// What a trough may make of the errors of the finest steps but one: below it nothing would be told.
+const ROUNDED: f64 = 1e-11;
+
 /// Times that a response is followed more finely.
 const MOST_TIMES: u32 = 3;
 
@@ -116,7 +119,7 @@ fn follow_to_the_end(slider: &Slider, linear: Linear, x: f64, rtol: f64) -> Cour
         }
         share *= FINER;
         let finer = follow_once(slider, linear, x, rtol, share);
-        let doubts = course.compared(&finer, rtol);
+        let doubts = course.compared(&finer, rtol.max(ROUNDED));
         let steps = course.steps + finer.steps;
         course = Course { steps, doubts: doubts.unwrap_or_default(), ..finer };
         // What is left in doubt seldom becomes clear.
