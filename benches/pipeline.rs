@@ -219,7 +219,7 @@ fn compute(sweep: &Sweep, threads: usize) -> Outcome<f64> {
     let optima = sweep.optima();
     let signal = Signal::default();
     let request = &sweep.requests[0];
-    let job = sweep.job(request, &optima, &signal);
+    let job = sweep.job(request, &optima[0], &signal);
     let start = Instant::now();
     sweep::compute(&pool, request.table, &job, &plan.tables[0], 0..plan.tables[0].parts, |_, _| {})?;
     Ok(start.elapsed().as_secs_f64())
@@ -233,7 +233,7 @@ fn encode(sweep: &Sweep) -> Outcome<f64> {
     let optima = sweep.optima();
     let signal = Signal::default();
     let (request, table) = (&sweep.requests[0], &plan.tables[0]);
-    let job = sweep.job(request, &optima, &signal);
+    let job = sweep.job(request, &optima[0], &signal);
     let layout = Layout::new(request.table, &request.selection, &sweep.grid);
     let spent = Mutex::new(Duration::ZERO);
     sweep::compute(&pool, request.table, &job, table, 0..table.parts, |number, sheet| {

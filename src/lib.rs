@@ -21,6 +21,7 @@
 #[cfg(feature = "cli")]
 pub mod cli;
 pub mod dataset;
+mod file;
 pub mod grid;
 pub mod model;
 mod names;

@@ -1,12 +1,35 @@
 //! The command line of `slipsweep`; everything it does is in the library.
 
 use std::process::ExitCode;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 /// Parts take and give back some megabytes each. The system's allocator returns them to the kernel every time, which then costs a
 /// fifth of a run in page faults.
 #[global_allocator]
 static ALLOCATOR: mimalloc::MiMalloc = mimalloc::MiMalloc;
 
+/// Whether standard output was closed when the process began. Before `main`, the standard library opens `/dev/null` in its place, where an
+/// answer would be lost without an error; so this is found out before.
+static STDOUT_IS_CLOSED: AtomicBool = AtomicBool::new(false);
+
+#[cfg(any(target_os = "linux", target_os = "macos"))]
+#[allow(unsafe_code)]
+mod early {
+    use super::{Ordering, STDOUT_IS_CLOSED};
+
+    /// Called by the loader, before the standard library has begun.
+    #[used]
+    #[cfg_attr(target_os = "linux", unsafe(link_section = ".init_array"))]
+    #[cfg_attr(target_os = "macos", unsafe(link_section = "__DATA,__mod_init_func"))]
+    static LOOK: extern "C" fn() = look;
+
+    extern "C" fn look() {
+        // Asks for the flags of the descriptor, which changes nothing.
+        let is_closed = unsafe { libc::fcntl(libc::STDOUT_FILENO, libc::F_GETFD) } == -1;
+        STDOUT_IS_CLOSED.store(is_closed, Ordering::Relaxed);
+    }
+}
+
 fn main() -> ExitCode {
-    slipsweep::cli::main()
+    slipsweep::cli::main(STDOUT_IS_CLOSED.load(Ordering::Relaxed))
 }

@@ -20,19 +20,51 @@ pub fn shown(text: &str, most: usize) -> Cow<'_, str> {
     shown.into()
 }
 
-/// The name among `known`, all in lower case, that `name` was most likely meant to be.
+/// What others call some of our names: their words, in lower case, after ours.
+const SYNONYMS: [(&str, &[&str]); 13] = [
+    ("threads", &["jobs", "j", "cores", "workers", "cpus", "processes", "parallel"]),
+    ("out", &["output", "output_dir", "outdir", "dir", "dest", "to"]),
+    ("quiet", &["silent"]),
+    ("rows", &["limit", "lines"]),
+    ("where", &["filter", "condition"]),
+    ("rtol", &["tol", "tolerance", "accuracy", "precision"]),
+    ("l", &["d_c", "dc", "d_rs", "length"]),
+    ("normal_load", &["sigma", "sigma_n", "normal_stress", "pressure"]),
+    ("mu_0", &["f_0", "f0", "mu"]),
+    ("v_0", &["v_ref", "v_star"]),
+    ("t_f", &["t", "time", "duration"]),
+    ("k", &["stiffness"]),
+    ("m", &["mass"]),
+];
+
+/// Longest name of which the first letter has to be right, in characters: one letter away from `sin` are `min` and `bin`.
+const SHORT: usize = 4;
+
+/// The name among `known`, all in lower case, that `name` was most likely meant to be: one that means the same, or a similar one.
 ///
 /// None of a name of more than [`LONGEST`] bytes: comparing two takes memory in proportion to the product of their lengths.
 pub fn nearest<'a>(name: &str, known: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
     if name.len() > LONGEST {
         return None;
     }
-    known
-        .into_iter()
-        .map(|candidate| (strsim::damerau_levenshtein(&name.to_lowercase(), candidate), candidate))
-        .filter(|(distance, candidate)| *distance <= candidate.len().max(name.len()).div_ceil(3))
-        .min_by_key(|(distance, _)| *distance)
-        .map(|(_, candidate)| candidate)
+    let name = name.to_lowercase();
+    let ours = SYNONYMS.iter().find(|(_, theirs)| theirs.contains(&name.as_str())).map(|(ours, _)| *ours);
+    let distance = |candidate: &str| {
+        let (distance, longer) = (strsim::damerau_levenshtein(&name, candidate), candidate.len().max(name.len()));
+        let is_far = longer <= SHORT && name.chars().next() != candidate.chars().next();
+        (ours == Some(candidate)).then_some(0).or((!is_far && distance <= longer.div_ceil(3)).then_some(distance))
+    };
+    let near = known.into_iter().filter_map(|candidate| Some((distance(candidate)?, candidate)));
+    near.min_by_key(|(distance, _)| *distance).map(|(_, candidate)| candidate)
+}
+
+/// What to do about `name`, which is none of `known`.
+#[cfg(feature = "read")]
+pub fn hint<'a>(name: &str, known: impl IntoIterator<Item = &'a str>) -> String {
+    match nearest(name, known) {
+        Some(meant) => format!("did you mean `{meant}`?"),
+        None => "choose one of these".to_owned(),
+    }
 }
 
 #[cfg(test)]
@@ -50,6 +82,17 @@ mod tests {
         assert_eq!(nearest("UNIT", known), Some("unit"));
         assert_eq!(nearest("temperature", known), None);
         assert_eq!(nearest("", known), None);
+        assert_eq!(nearest("mni", ["min", "max"]), Some("min"));
+        assert_eq!(nearest("sin", ["abs", "min"]), None);
+        assert_eq!(nearest("x", ["a", "b", "k"]), None);
+    }
+
+    #[test]
+    fn words_of_others_lead_to_ours() {
+        assert_eq!(nearest("jobs", ["out", "threads", "shard"]), Some("threads"));
+        assert_eq!(nearest("D_c", ["mu_0", "l", "v_0", "normal_load"]), Some("l"));
+        assert_eq!(nearest("sigma", ["mu_0", "l", "v_0", "normal_load"]), Some("normal_load"));
+        assert_eq!(nearest("jobs", ["out"]), None);
     }
 
     #[test]

@@ -9,6 +9,8 @@ samples), there is one dimension, `row`.
 """
 
 import json
+import shutil
+import subprocess
 from pathlib import Path
 
 import numpy as np
@@ -17,6 +19,28 @@ import xarray as xr
 
 # The quantities that can be axes, in the order of their columns.
 AXES = ["t_f", "a", "b", "v_i", "v_f", "family", "tau_max", "alpha_2", "alpha_3", "k", "m", "dt", "delta_t"]
+
+
+# The program that a clone of the repository builds.
+BUILT = Path(__file__).resolve().parents[2] / "target/release/slipsweep"
+
+
+def make(question, folder="results"):
+    """Makes the dataset `QUESTION` in `folder` from the spec of `slipsweep init --question`, as far as it is missing."""
+    folder = Path(folder)
+    program = shutil.which("slipsweep") or shutil.which(BUILT)
+    if program is None:
+        raise FileNotFoundError(f"no program slipsweep on the path, nor {BUILT}: `cargo build --release` in the clone builds it")
+    folder.mkdir(parents=True, exist_ok=True)
+    if not (folder / f"{question}.toml").exists():
+        _run([program, "init", question, "--question", question], folder)
+    _run([program, "run", f"{question}.toml", "--out", ".", "--quiet"], folder)
+
+
+def _run(command, folder):
+    done = subprocess.run(command, cwd=folder, capture_output=True, text=True)
+    if done.returncode != 0:
+        raise RuntimeError(f"{' '.join(command)} ended with exit code {done.returncode}\n{done.stderr}")
 
 
 def open(dataset, table):

@@ -17,14 +17,15 @@ fuzz_target!(|text: &str| {
         Ok(sweep) => {
             let plan = Plan::new(&sweep);
             assert_eq!(plan.tables.len(), sweep.requests.len());
-            sweep.identity();
+            sweep.requests.iter().for_each(|request| drop(sweep.hash(request)));
             for request in &sweep.requests {
                 for row in [0, request.rows / 2, request.rows - 1] {
                     request.projection.point(row);
                 }
             }
         }
-        Err(error) => assert!(error.to_string().len() < 4096),
+        // At most ten faults.
+        Err(error) => assert!(error.to_string().len() < 10 * 4096),
     }
 });
 

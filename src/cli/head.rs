@@ -3,8 +3,8 @@
 use std::path::PathBuf;
 
 use super::query::unreadable;
-use super::{Failure, say, summary, words, wrong};
-use crate::names::nearest;
+use super::{Failure, kind, say, summary, words, wrong};
+use crate::names::hint;
 use crate::query::{Source, Tables};
 use crate::table;
 
@@ -25,6 +25,8 @@ pub struct Arguments {
 
 /// Shows the first rows of one table or of all.
 pub fn head(arguments: &Arguments) -> Result<(), Failure> {
+    kind::expect_rows(&arguments.dataset)?;
+    super::note_at(&arguments.dataset);
     let tables = Tables::open(&arguments.dataset)?;
     let chosen: Vec<&Source> = match &arguments.table {
         None => tables.sources.iter().collect(),
@@ -37,10 +39,7 @@ pub fn head(arguments: &Arguments) -> Result<(), Failure> {
 fn unknown(arguments: &Arguments, name: &str, tables: &Tables) -> Failure {
     let names: Vec<&str> = tables.sources.iter().map(|source| source.name.as_str()).collect();
     let path = arguments.dataset.display();
-    let help = match nearest(name, names.iter().copied()) {
-        Some(meant) => format!("did you mean `{meant}`?"),
-        None => "choose one of these".to_owned(),
-    };
+    let help = hint(name, names.iter().copied());
     wrong(format!("{path}: no table `{name}`\n  expected: {}\n  help: {help}", names.join(", ")))
 }
 

@@ -1,13 +1,13 @@
 //! `slipsweep init NAME`: a commented spec to start from, that runs as it is.
 
-use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
 
 use clap::ValueEnum;
 
 use super::{FAILED, Failure, say, schema, to_file, wrong};
-use crate::sweep::Sweep;
+use crate::file;
+use crate::sweep::check_name;
 
 /// Arguments of `init`.
 #[derive(Debug, clap::Args)]
@@ -54,17 +54,28 @@ const SCHEMA: &str = "slipsweep.schema.json";
 
 /// Writes a spec, and the schema beside it.
 pub fn init(arguments: &Arguments) -> Result<(), Failure> {
+    let given = arguments.name.display();
     let bare = match arguments.name.extension() {
         Some(ending) if ending == "toml" => arguments.name.with_extension(""),
         _ => arguments.name.clone(),
     };
     let name = bare.file_name().unwrap_or_default().to_string_lossy();
     let folder = bare.parent().unwrap_or(Path::new(""));
+    check_name(&name).map_err(|error| {
+        wrong(format!("`{given}`: {}\n  expected: {}\n  help: {}", error.found, error.expected, error.help))
+    })?;
+    if !(folder.as_os_str().is_empty() || folder.is_dir()) {
+        let folder = folder.display();
+        return Err(wrong(format!(
+            "`{given}`: there is no folder `{folder}`\n  expected: a name such as {name}, or one in a folder that is there\n  \
+             help: slipsweep init {name}"
+        )));
+    }
     let text = format!("#:schema ./{SCHEMA}\n{}", arguments.question.spec().replace("NAME", &name));
-    Sweep::parse(&text, folder)
-        .map_err(|error| wrong(format!("{}\n  expected: {}\n  help: {}", error.found, error.expected, error.help)))?;
     let path = folder.join(format!("{name}.toml"));
-    if path.exists() {
+    // The spec as it would be written is no other one.
+    let found = file::open(&path).and_then(io::read_to_string);
+    if path.exists() && !found.is_ok_and(|found| found == text) {
         return Err(wrong(format!(
             "{}: is there already\n  expected: a new name\n  help: choose another name, or remove the file",
             path.display()
@@ -83,7 +94,7 @@ pub fn init(arguments: &Arguments) -> Result<(), Failure> {
     let schema_path = folder.join(SCHEMA);
     let schema = schema::text();
     // One of another version would complain of what this version can do.
-    if !fs::read_to_string(&schema_path).is_ok_and(|found| found == schema) {
+    if !file::open(&schema_path).and_then(io::read_to_string).is_ok_and(|found| found == schema) {
         write(&schema_path, &schema)?;
     }
     write(&path, &text)?;

@@ -4,7 +4,7 @@ use clap::CommandFactory;
 use clap_mangen::Man;
 
 use super::{Failure, put, wrong};
-use crate::names::nearest;
+use crate::names::hint;
 
 /// Arguments of `man`.
 #[derive(Debug, clap::Args)]
@@ -35,9 +35,6 @@ pub fn man(arguments: &Arguments) -> Result<(), Failure> {
 
 fn unknown(name: &str, program: &clap::Command) -> Failure {
     let names: Vec<&str> = program.get_subcommands().map(clap::Command::get_name).collect();
-    let help = match nearest(name, names.iter().copied()) {
-        Some(meant) => format!("did you mean `{meant}`?"),
-        None => "choose one of these".to_owned(),
-    };
+    let help = hint(name, names.iter().copied());
     wrong(format!("no command `{name}`\n  expected: {}\n  help: {help}", names.join(", ")))
 }

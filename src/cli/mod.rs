@@ -3,6 +3,7 @@
 mod completions;
 mod head;
 mod init;
+mod kind;
 mod man;
 mod next;
 mod output;
@@ -21,19 +22,27 @@ mod verify;
 mod watch;
 mod words;
 
+use std::env;
 use std::fmt::Display;
 use std::fs::{self, OpenOptions};
-use std::io::{self, Write};
+use std::io::{self, BufWriter, StdoutLock, Write};
 use std::panic;
 use std::path::Path;
 use std::process::ExitCode;
+#[cfg(unix)]
+use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use clap::{Parser, Subcommand};
+use clap::error::{ContextKind, ContextValue, ErrorKind};
+use clap::{CommandFactory, Parser, Subcommand};
 
+use self::watch::{Wait, waiting};
 use crate::dataset::{Folder, Manifest, atomic};
+use crate::names::nearest;
 use crate::query::QueryError;
-use crate::sweep::SpecError;
+use crate::sweep::{SpecError, Sweep};
+
+use kind::Kind;
 
 /// The spec or the arguments are wrong.
 const WRONG: u8 = 1;
@@ -54,7 +63,16 @@ const AGAIN: u8 = 75;
   slipsweep plot results/granite
   slipsweep query results/granite \"SELECT t_f, gap FROM best\"
 
-`slipsweep COMMAND --help` shows an example of each command."
+`slipsweep COMMAND --help` shows an example of each command.
+
+Exit codes:
+  0    done
+  1    the spec or the arguments are wrong
+  2    the command failed
+  3    `run --strict` met a row that is not_converged, or `verify` an error
+  75   `run --requeue` met a failure that may pass by itself
+  130  stopped by Ctrl-C (SIGINT); what is finished is kept
+  143  stopped by SIGTERM; what is finished is kept"
 )]
 struct Arguments {
     #[command(subcommand)]
@@ -87,9 +105,8 @@ enum Command {
     Report(report::Arguments),
     /// Solve a sample of the rows of a dataset again by an independent method, and compare
     Verify(verify::Arguments),
-    /// List all tables, their columns and units
-    #[command(after_help = "Example:\n  slipsweep tables | less")]
-    Tables,
+    /// List all tables or one, with columns and units
+    Tables(tables::Arguments),
     /// Print the JSON Schema of a spec, with which editors complete and check specs
     #[command(after_help = "Example:
   slipsweep schema > slipsweep.schema.json
@@ -127,18 +144,35 @@ impl From<QueryError> for Failure {
     }
 }
 
-/// Reads the arguments of the process and does what they say.
-pub fn main() -> ExitCode {
+/// Whether standard output was closed when the process began.
+static STDOUT_IS_CLOSED: AtomicBool = AtomicBool::new(false);
+
+/// Reads the arguments of the process and does what they say; an answer that standard output cannot take, closed as it may be from the
+/// start, is a failure.
+pub fn main(stdout_is_closed: bool) -> ExitCode {
+    STDOUT_IS_CLOSED.store(stdout_is_closed, Ordering::Relaxed);
     tell_first_panic();
+    // A file that grows beyond the limit of its user is then a write that fails, not the end of the process.
+    #[cfg(unix)]
+    let _ = signal_hook::flag::register(signal_hook::consts::SIGXFSZ, Arc::new(AtomicBool::new(false)));
     let arguments = match Arguments::try_parse() {
         Ok(arguments) => arguments,
         Err(error) => {
-            // Nothing can be done if the terminal is gone.
-            let _ = error.print();
-            return if error.use_stderr() { WRONG.into() } else { ExitCode::SUCCESS };
+            let error = suggested(error);
+            let printed = error.print();
+            if error.use_stderr() {
+                // Nothing can be done if the terminal is gone.
+                return WRONG.into();
+            }
+            return ended(stdout().and_then(|mut stdout| written(printed.and_then(|()| stdout.flush()))));
         }
     };
-    let done = match arguments.command {
+    ended(perform(arguments))
+}
+
+/// Does what the arguments say.
+fn perform(arguments: Arguments) -> Result<(), Failure> {
+    match arguments.command {
         Command::Init(arguments) => init::init(&arguments),
         Command::Run(arguments) => run::run(&arguments),
         Command::Plan(arguments) => plan::plan(&arguments),
@@ -151,11 +185,15 @@ pub fn main() -> ExitCode {
         Command::Plot(arguments) => plot::plot(&arguments),
         Command::Report(arguments) => report::report(&arguments),
         Command::Verify(arguments) => verify::verify(&arguments),
-        Command::Tables => tables::tables(),
+        Command::Tables(arguments) => tables::tables(&arguments),
         Command::Schema => schema::print(),
         Command::Completions(arguments) => completions::completions(&arguments),
         Command::Man(arguments) => man::man(&arguments),
-    };
+    }
+}
+
+/// The exit code of a command, whose failure is reported.
+fn ended(done: Result<(), Failure>) -> ExitCode {
     match done {
         Ok(()) => ExitCode::SUCCESS,
         Err(failure) => {
@@ -165,6 +203,41 @@ pub fn main() -> ExitCode {
     }
 }
 
+/// `error` with the option or command that was meant, which may have another name than the one given.
+fn suggested(mut error: clap::Error) -> clap::Error {
+    let (invalid, suggestion) = match error.kind() {
+        ErrorKind::UnknownArgument => (ContextKind::InvalidArg, ContextKind::SuggestedArg),
+        ErrorKind::InvalidSubcommand => (ContextKind::InvalidSubcommand, ContextKind::SuggestedSubcommand),
+        _ => return error,
+    };
+    let Some(ContextValue::String(given)) = error.get(invalid) else { return error };
+    // As columns are written.
+    let given = given.trim_start_matches('-').replace('-', "_");
+    let program = Arguments::command();
+    let meant = if invalid == ContextKind::InvalidSubcommand {
+        nearest(&given, program.get_subcommands().map(clap::Command::get_name)).map(str::to_owned)
+    } else {
+        let command = env::args().skip(1).find_map(|word| program.find_subcommand(word)).unwrap_or(&program);
+        let options = command.get_arguments().filter_map(|option| option.get_long());
+        let options: Vec<String> = options.map(|option| option.replace('-', "_")).collect();
+        nearest(&given, options.iter().map(String::as_str)).map(|option| format!("--{}", option.replace('_', "-")))
+    };
+    if let Some(meant) = meant {
+        error.insert(suggestion, ContextValue::String(meant));
+    }
+    error
+}
+
+/// The spec in `path`, checked; what is doubtful about it is said.
+fn load(path: &Path) -> Result<Sweep, Failure> {
+    kind::expect_spec(path)?;
+    let sweep = waiting(&Wait::new("reading the spec"), || Sweep::load(path))?;
+    for warning in &sweep.warnings {
+        let _ = writeln!(io::stderr(), "warning: {warning}");
+    }
+    Ok(sweep)
+}
+
 /// The failure of somebody who asked for something wrong.
 fn wrong(message: impl Display) -> Failure {
     Failure { code: WRONG, message: format!("error: {message}") }
@@ -172,13 +245,31 @@ fn wrong(message: impl Display) -> Failure {
 
 /// The dataset in `path`, which must be one.
 fn dataset(path: &Path) -> Result<(Folder, Manifest), Failure> {
+    kind::expect(path, &[Kind::Dataset])?;
     let folder = Folder::at(path);
     match folder.manifest().map_err(Failure::failed)? {
-        Some(manifest) => Ok((folder, manifest)),
-        None => Err(wrong(format!(
-            "{}: not a dataset\n  expected: a folder with a manifest.json\n  help: name a folder that `slipsweep run` wrote",
-            path.display()
-        ))),
+        Some(manifest) => {
+            note(&folder, &manifest);
+            Ok((folder, manifest))
+        }
+        None => Err(wrong(format!("{}: not a dataset", path.display()))),
+    }
+}
+
+/// Says on standard error that a manifest is not what its file says.
+fn note(folder: &Folder, manifest: &Manifest) {
+    if let Some(why) = &manifest.rebuilt {
+        let path = folder.manifest_path();
+        let text = "the parts give its contents; `slipsweep run` writes it again";
+        let _ = writeln!(io::stderr(), "note: {} is {why}; {text}", path.display());
+    }
+}
+
+/// Says the same of the dataset in `path`, if there is one.
+fn note_at(path: &Path) {
+    let folder = Folder::at(path);
+    if let (true, Ok(Some(manifest))) = (path.is_dir(), folder.manifest()) {
+        note(&folder, &manifest);
     }
 }
 
@@ -193,15 +284,28 @@ fn tell_first_panic() {
     }));
 }
 
-/// Writes `text` to standard output; that a reader has had enough is no failure.
+/// Writes `text` to standard output.
 fn say(text: &str) -> Result<(), Failure> {
     put(text.as_bytes())
 }
 
 /// The same for bytes.
 fn put(bytes: &[u8]) -> Result<(), Failure> {
-    let mut stdout = io::stdout();
-    match stdout.write_all(bytes).and_then(|()| stdout.flush()) {
+    let mut stdout = stdout()?;
+    written(stdout.write_all(bytes).and_then(|()| stdout.flush()))
+}
+
+/// Standard output, which takes every answer. Who writes to it flushes it, and hands the result to [`written`].
+fn stdout() -> Result<BufWriter<StdoutLock<'static>>, Failure> {
+    if STDOUT_IS_CLOSED.load(Ordering::Relaxed) {
+        return Err(Failure::failed("cannot write to standard output: it is closed"));
+    }
+    Ok(BufWriter::new(io::stdout().lock()))
+}
+
+/// Whether standard output took an answer; that a reader has had enough is no failure.
+fn written(result: io::Result<()>) -> Result<(), Failure> {
+    match result {
         Err(error) if error.kind() != io::ErrorKind::BrokenPipe => {
             Err(Failure::failed(format!("cannot write to standard output: {error}")))
         }

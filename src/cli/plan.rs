@@ -1,9 +1,13 @@
 //! `slipsweep plan SPEC`: what there is to do, before anything is done.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
+use std::thread::available_parallelism;
+use std::time::Instant;
 
-use super::{Failure, say, words};
-use crate::sweep::{Plan, Sweep, estimate};
+use super::watch::{Wait, waiting};
+use super::{Failure, load, say, words};
+use crate::dataset::atomic::nearest_folder;
+use crate::sweep::{Estimates, Plan, Sweep, estimate};
 
 /// Arguments of `plan`.
 #[derive(Debug, clap::Args)]
@@ -12,23 +16,51 @@ use crate::sweep::{Plan, Sweep, estimate};
 pub struct Arguments {
     /// The sweep spec, a TOML file
     spec: PathBuf,
+    /// Folder in which the dataset's folder would be made, to compare the size with the room on its disk
+    #[arg(long, value_name = "DIR", default_value = "results")]
+    out: PathBuf,
 }
+
+/// Seconds below which the start of the process and its first pages of memory count as much as the rows: `benches/waiting/run` prints committed
+/// sweeps that take up to 0.07 s more than their rows.
+const SHORT: f64 = 0.2;
 
 /// Prints the plan of a spec.
 pub fn plan(arguments: &Arguments) -> Result<(), Failure> {
-    let sweep = Sweep::load(&arguments.spec)?;
-    say(&format!("{}\n{}", sweep.name, in_words(&sweep)?))
+    let start = Instant::now();
+    let sweep = load(&arguments.spec)?;
+    let reading = start.elapsed().as_secs_f64();
+    let sample = Wait::new("computing a sample");
+    let estimates = waiting(&sample, || estimate(&sweep, &arguments.out)).map_err(Failure::failed)?;
+    let mut text = format!("{}\n{}", sweep.name, in_words(&sweep, &estimates, reading));
+    if let Ok(free) = fs4::available_space(nearest_folder(&arguments.out)) {
+        let (bytes, free) = (estimates.bytes(), free as f64);
+        text.push_str(&match bytes > free {
+            true => format!("does not fit: {}\n", too_large(&arguments.out, bytes, free)),
+            false => format!("{} free on the disk of {}\n", words::bytes(free), arguments.out.display()),
+        });
+    }
+    say(&text)
 }
 
-/// The rows of each table, and what they cost.
-pub fn in_words(sweep: &Sweep) -> Result<String, Failure> {
+/// What to say of a dataset of `bytes` that is to go to `folder`, whose disk has `free` bytes.
+pub fn too_large(folder: &Path, bytes: f64, free: f64) -> String {
+    format!(
+        "{}: about {} to write, but {} free on the disk\n  help: write less, with `reduce` or fewer `columns`, or elsewhere, with --out DIR",
+        folder.display(),
+        words::bytes(bytes),
+        words::bytes(free),
+    )
+}
+
+/// The rows of each table, and what they cost in a run that reads the spec in `reading` seconds.
+pub fn in_words(sweep: &Sweep, estimates: &Estimates, reading: f64) -> String {
     let plan = Plan::new(sweep);
-    let (estimates, shared) = estimate(sweep).map_err(Failure::failed)?;
-    let threads = std::thread::available_parallelism().map_or(1, |threads| threads.get());
+    let threads = available_parallelism().map_or(1, |threads| threads.get());
     let has_condition = sweep.grid.blocks.iter().any(|block| block.condition.is_some());
     let header = ["table", "rows", "left out by where", "parts", "size", "time on one thread"];
     let mut rows = vec![header.map(str::to_owned).to_vec()];
-    for ((table, dropped), estimate) in plan.tables.iter().zip(&plan.dropped).zip(&estimates) {
+    for ((table, dropped), estimate) in plan.tables.iter().zip(&plan.dropped).zip(&estimates.tables) {
         rows.push(vec![
             table.name.clone(),
             words::count(table.rows),
@@ -41,19 +73,18 @@ pub fn in_words(sweep: &Sweep) -> Result<String, Failure> {
     if !has_condition {
         rows.iter_mut().for_each(|row| drop(row.remove(2)));
     }
-    let seconds = shared + estimates.iter().map(|estimate| estimate.seconds).sum::<f64>();
-    let bytes = estimates.iter().map(|estimate| estimate.bytes).sum();
     let mut text = words::aligned(&rows, 2);
     if plan.optima > 0 {
-        let (solves, time) = (words::things(plan.optima, "optimal protocol"), words::duration(shared));
+        let (solves, time) = (words::things(plan.optima, "optimal protocol"), words::duration(estimates.shared));
         text.push_str(&format!("shared: {solves} solved once each, {time} on one thread\n"));
     }
+    let seconds = reading + estimates.elapsed(threads);
     text.push_str(&format!(
-        "in all: about {} on disk, about {} on {}\n",
-        words::bytes(bytes),
-        words::duration(seconds / threads as f64),
+        "in all: about {} on disk, {} on {}\n",
+        words::bytes(estimates.bytes()),
+        if seconds < SHORT { "less than 0.3 s".to_owned() } else { format!("about {}", words::duration(seconds)) },
         words::things(threads as u64, "thread"),
     ));
     text.push_str("(sizes and times from a small sample)\n");
-    Ok(text)
+    text
 }

@@ -1,8 +1,11 @@
 //! `slipsweep plot DATASET|TRACE…`: pictures as SVG, PNG or PDF.
 
+use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
 
+use super::kind::{self, Kind};
+use super::watch::{Wait, waiting};
 use super::{FAILED, Failure, WRONG, dataset, say, to_file, wrong};
 use crate::plot::table::{Condition, Request, Source};
 use crate::plot::{self, COLUMN, Figure, Format, PAGE, PlotError};
@@ -12,6 +15,7 @@ use crate::sweep::units_of;
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:
   slipsweep plot results/landscape                       every table, a picture each
+  slipsweep plot results/landscape --format png --out pictures
   slipsweep plot results/landscape --table gap --where t_f=0.02 --out gap.pdf
   slipsweep plot results/crossover --table crossover --x v_f --y b --color t_hold --where v_i=1.1
   slipsweep plot optimal.csv best.csv --out protocols.png")]
@@ -34,9 +38,12 @@ pub struct Arguments {
     /// Column of a map's colours, or the axis that tells lines apart
     #[arg(long, visible_alias = "colour", value_name = "COLUMN|AXIS")]
     color: Option<String>,
-    /// Where to write it; the ending tells how: .svg, .png or .pdf [default: the name of the dataset and the table, .svg]
-    #[arg(short, long, value_name = "FILE")]
+    /// A file, whose ending determines the format (.svg, .png, .pdf), or a folder [default: here, by the name of the dataset and the table]
+    #[arg(short, long, value_name = "FILE|DIR")]
     out: Option<PathBuf>,
+    /// Format of the pictures in a folder [default: svg]
+    #[arg(long, value_name = "FORMAT", value_enum)]
+    format: Option<Format>,
     /// Width in millimetres: 89 for one column of a journal, 183 for two [default: what the panels need]
     #[arg(long, value_name = "MM", value_parser = width)]
     width: Option<f64>,
@@ -71,21 +78,34 @@ impl From<PlotError> for Failure {
 
 /// Draws what the arguments ask for.
 pub fn plot(arguments: &Arguments) -> Result<(), Failure> {
-    arguments.format()?;
+    let place = arguments.place()?;
     match arguments.sources.as_slice() {
-        [one] if one.is_dir() => arguments.dataset(one),
-        sources => match sources.iter().find(|source| source.is_dir()) {
-            Some(folder) => Err(wrong(format!(
-                "{}: a folder beside other arguments\n  expected: one dataset, or traces\n  help: draw them one after the other",
-                folder.display()
-            ))),
-            None => arguments.traces(sources),
-        },
+        [one] if Kind::of(one) == Kind::Dataset => arguments.dataset(one, &place),
+        sources => {
+            for source in sources {
+                if source.is_dir() && sources.len() > 1 {
+                    return Err(wrong(format!(
+                        "{}: a folder beside other arguments\n  expected: one dataset, or traces\n  help: draw them one after the other",
+                        source.display()
+                    )));
+                }
+                kind::expect(source, &[Kind::Dataset, Kind::Trace])?;
+            }
+            arguments.traces(sources, &place)
+        }
     }
 }
 
+/// Where pictures go.
+struct Place {
+    /// The only file, if that was named.
+    file: Option<PathBuf>,
+    folder: PathBuf,
+    format: Format,
+}
+
 impl Arguments {
-    fn traces(&self, sources: &[PathBuf]) -> Result<(), Failure> {
+    fn traces(&self, sources: &[PathBuf], place: &Place) -> Result<(), Failure> {
         let of_tables = [
             ("--table", self.table.is_some()),
             ("--where", !self.conditions.is_empty()),
@@ -103,11 +123,12 @@ impl Arguments {
             [one] => one.file_stem().map_or("trace".into(), |stem| stem.to_string_lossy().into_owned()),
             _ => "traces".to_owned(),
         };
-        let path = self.write(&plot::trace::figure(&courses)?, &stem)?;
-        say(&format!("written to {}\n", path.display()))
+        let figure = plot::trace::figure(&courses)?;
+        let path = self.write(&figure, &stem, place)?;
+        say(&format!("written to {}\n{}", path.display(), remarks(&figure)))
     }
 
-    fn dataset(&self, path: &Path) -> Result<(), Failure> {
+    fn dataset(&self, path: &Path, place: &Place) -> Result<(), Failure> {
         let (folder, manifest) = dataset(path)?;
         let units = units_of(&manifest.spec)?;
         let source = Source::new(folder, manifest, units);
@@ -118,7 +139,7 @@ impl Arguments {
         };
         if tables.len() > 1 {
             let several = [
-                ("--out", self.out.is_some()),
+                ("--out with the name of a file", place.file.is_some()),
                 ("--where", !self.conditions.is_empty()),
                 ("--x", self.x.is_some()),
                 ("--y", self.y.is_some()),
@@ -133,7 +154,8 @@ impl Arguments {
         }
         let mut damage = None;
         for table in &tables {
-            let drawn = source.figure(table, &request).map_err(Failure::from);
+            let drawing = format!("drawing {table}");
+            let drawn = waiting(&Wait::new(&drawing), || source.figure(table, &request)).map_err(Failure::from);
             let figure = match drawn {
                 // One table that makes no picture does not keep the others from theirs.
                 Err(failure) if tables.len() > 1 && failure.code == FAILED => {
@@ -146,8 +168,8 @@ impl Arguments {
                 }
                 drawn => drawn?,
             };
-            let path = self.write(&figure, &format!("{}-{table}", source.manifest.name))?;
-            say(&format!("{table}: written to {}\n", path.display()))?;
+            let path = self.write(&figure, &format!("{}-{table}", source.manifest.name), place)?;
+            say(&format!("{table}: written to {}\n{}", path.display(), remarks(&figure)))?;
         }
         damage.map_or(Ok(()), Err)
     }
@@ -160,21 +182,46 @@ impl Arguments {
         Ok(Request { conditions, x: self.x.clone(), y: self.y.clone(), colour: self.color.clone() })
     }
 
-    /// How it is to be written.
-    fn format(&self) -> Result<Format, Failure> {
-        let Some(path) = &self.out else { return Ok(Format::Svg) };
-        Format::of(path)
-            .ok_or_else(|| wrong(format!("--out {}: the name ends in none of .svg, .png, .pdf", path.display())))
+    /// Where it is to be written, and how.
+    fn place(&self) -> Result<Place, Failure> {
+        let format = self.format.unwrap_or(Format::Svg);
+        let Some(out) = &self.out else { return Ok(Place { file: None, folder: PathBuf::new(), format }) };
+        let shown = out.display();
+        if out.is_dir() || out.extension().is_none() {
+            return Ok(Place { file: None, folder: out.clone(), format });
+        }
+        match (Format::of(out), self.format) {
+            (None, _) => Err(wrong(format!(
+                "--out {shown}: the name ends in none of .svg, .png, .pdf\n  help: for a folder, make it first or give a name without \
+                 a dot"
+            ))),
+            (Some(named), Some(given)) if named != given => Err(wrong(format!(
+                "--out {shown}: the ending contradicts --format\n  help: leave out --format, or name a folder"
+            ))),
+            (Some(format), _) => Ok(Place { file: Some(out.clone()), folder: PathBuf::new(), format }),
+        }
     }
 
-    /// Writes a figure where it is to go, which it says.
-    fn write(&self, figure: &Figure, stem: &str) -> Result<PathBuf, Failure> {
-        let path = self.out.clone().unwrap_or_else(|| PathBuf::from(format!("{stem}.svg")));
+    /// Writes a figure where it is to go, which it returns.
+    fn write(&self, figure: &Figure, stem: &str, place: &Place) -> Result<PathBuf, Failure> {
+        let path = match &place.file {
+            Some(file) => file.clone(),
+            None => place.folder.join(format!("{stem}.{}", place.format.ending())),
+        };
+        let failed = |error: io::Error| Failure::failed(format!("cannot write {}: {error}", path.display()));
         let width = self.width.unwrap_or(if figure.columns > 1 { PAGE } else { COLUMN });
-        let drawn = figure.draw(width);
-        let bytes = self.format()?.encode(&drawn.svg, self.dpi).map_err(PlotError::from)?;
-        to_file(&path, |file| file.write_all(&bytes))
-            .map_err(|error: io::Error| Failure::failed(format!("cannot write {}: {error}", path.display())))?;
+        let encoded =
+            waiting(&Wait::new("writing the picture"), || place.format.encode(&figure.draw(width).svg, self.dpi));
+        let bytes = encoded.map_err(PlotError::from)?;
+        if !place.folder.as_os_str().is_empty() {
+            fs::create_dir_all(&place.folder).map_err(failed)?;
+        }
+        to_file(&path, |file| file.write_all(&bytes)).map_err(failed)?;
         Ok(path)
     }
+}
+
+/// What is left out of a figure, for who can ask for it.
+fn remarks(figure: &Figure) -> String {
+    figure.remarks.iter().map(|remark| format!("  {remark}\n")).collect()
 }

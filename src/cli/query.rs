@@ -1,18 +1,33 @@
 //! `slipsweep query DATASET "SELECT …"`: a question in SQL, and the answer as a table, CSV, JSON lines or Parquet.
+//!
+//! A process of its own answers each question, so that one that is too large (a product of tables that no memory holds, an expression too deep
+//! for any stack) ends in one message, and leaves no file behind.
 
-use std::io::{self, BufWriter, Write};
+use std::env;
+use std::fs;
+use std::io::{self, BufWriter, IsTerminal, Read, Write};
+use std::panic::{self, AssertUnwindSafe};
 use std::path::{Path, PathBuf};
+use std::process::{Child, ChildStdout, Command, ExitStatus, Stdio};
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::{Arc, Mutex};
+use std::thread;
+use std::time::{Duration, Instant, SystemTime};
 
 use clap::ValueEnum;
+use indicatif::ProgressBar;
+use signal_hook::consts::{SIGINT, SIGTERM};
 
 use super::output::{self, Output};
-use super::{Failure, say, summary, to_file, words};
+use super::watch::{SILENCE, text_line};
+use super::{Failure, kind, say, stdout, summary, to_file, words, written, wrong};
+use crate::dataset::{Folder, atomic};
 use crate::query::{self, Answer, AnswerError, Tables};
 
 /// Arguments of `query`.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:
-  slipsweep query results/granite \"SELECT t_f, min(gap) FROM gap GROUP BY t_f ORDER BY t_f\"
+  slipsweep query results/granite \"SELECT t_f, min(gap), max(gap) FROM gap GROUP BY t_f ORDER BY t_f\"
   slipsweep query results/granite \"SELECT status, count(*) FROM gap GROUP BY status\"
   slipsweep query results/granite \"SELECT * FROM best WHERE status = 'ok'\" --out best.csv")]
 pub struct Arguments {
@@ -49,13 +64,277 @@ impl output::Format for Format {
     const PARQUET: Format = Format::Parquet;
 }
 
+/// The environment variable of the process that answers.
+const INSIDE: &str = "SLIPSWEEP_ANSWERS";
+
+/// Time between two looks at the process that answers. Chosen: a short query does not wait longer than that for its end.
+const LOOK: Duration = Duration::from_millis(5);
+
+/// Bytes of the stack on which a question is read and planned. A term takes some kilobytes of it, and a question has thousands at most.
+const STACK: usize = 256 << 20;
+
 /// Answers a question.
 pub fn query(arguments: &Arguments) -> Result<(), Failure> {
+    if env::var_os(INSIDE).is_some() {
+        return inside(arguments);
+    }
+    arguments.output.format()?;
+    if arguments.output.is_stdout() {
+        // Of a closed one the process that answers would not know.
+        drop(stdout()?);
+    } else {
+        keep_datasets(&arguments.output.out)?;
+        let same = |path: &Path| fs::canonicalize(path).ok();
+        if same(&arguments.dataset).is_some_and(|source| Some(source) == same(&arguments.output.out)) {
+            let path = arguments.output.out.display();
+            return Err(wrong(format!(
+                "{path}: the answer would replace the file that it is read from\n  help: write it elsewhere, such as --out answer.csv"
+            )));
+        }
+    }
+    apart(arguments)
+}
+
+/// Refuses to write where a part or the manifest of a dataset is.
+fn keep_datasets(out: &Path) -> Result<(), Failure> {
+    let real = fs::canonicalize(out).unwrap_or_else(|_| out.to_owned());
+    let folder = match real.parent() {
+        Some(folder) if !folder.as_os_str().is_empty() => folder.to_owned(),
+        _ => PathBuf::from("."),
+    };
+    let folder = fs::canonicalize(&folder).unwrap_or(folder);
+    // A lost manifest does not make its parts anybody's.
+    let is_dataset =
+        |folder: &Path| folder.join("manifest.json").exists() || matches!(Folder::at(folder).manifest(), Ok(Some(_)));
+    let name = real.file_name().unwrap_or_default().to_string_lossy();
+    let is_manifest = name == "manifest.json" && is_dataset(&folder);
+    if is_manifest || folder.parent().is_some_and(is_dataset) {
+        let what = if is_manifest { "the manifest of a dataset" } else { "in a table of a dataset" };
+        return Err(wrong(format!(
+            "{}: this is {what}, which only `slipsweep run` writes\n  help: write the answer elsewhere, such as --out answer.csv",
+            out.display()
+        )));
+    }
+    Ok(())
+}
+
+/// Answers a question in a process of its own.
+fn apart(arguments: &Arguments) -> Result<(), Failure> {
+    let signal = Arc::new(AtomicUsize::new(0));
+    for number in [SIGINT, SIGTERM] {
+        // Where a signal cannot be listened to, it keeps its usual effect.
+        let _ = signal_hook::flag::register_usize(number, signal.clone(), number as usize);
+    }
+    let none = |error: io::Error| {
+        Failure::failed(format!(
+            "cannot start the process that answers: {error}\n  help: raise the number of processes allowed (ulimit -u), or end others"
+        ))
+    };
+    // What goes on is said on a terminal until the answer begins, which a terminal therefore gets through this process.
+    let shown = io::stderr().is_terminal();
+    let is_copied = shown && arguments.output.is_stdout() && io::stdout().is_terminal();
+    let mut child = env::current_exe()
+        .and_then(|program| {
+            let mut command = Command::new(program);
+            command.args(env::args_os().skip(1)).env(INSIDE, "1").stdin(Stdio::piped()).stderr(Stdio::piped());
+            if is_copied {
+                command.stdout(Stdio::piped());
+            }
+            command.spawn()
+        })
+        .map_err(none)?;
+    let mut said = child.stderr.take();
+    let listen = move || {
+        let mut text = String::new();
+        if let Some(said) = &mut said {
+            let _ = said.read_to_string(&mut text);
+        }
+        text
+    };
+    let listener = match thread::Builder::new().spawn(listen) {
+        Ok(listener) => listener,
+        Err(error) => {
+            let _ = child.kill();
+            let _ = child.wait();
+            return Err(none(error));
+        }
+    };
+    let line = Arc::new(Mutex::new(Line { bar: None, is_over: !shown }));
+    let copier = child.stdout.take().and_then(|answer| {
+        let line = line.clone();
+        thread::Builder::new().spawn(move || copy(answer, &line)).ok()
+    });
+    let ended = wait(&mut child, &signal, &line);
+    if let Some(copier) = copier {
+        let _ = copier.join();
+    }
+    let text = listener.join().unwrap_or_default();
+    let number = signal.load(Ordering::Relaxed);
+    if number != 0 {
+        sweep(&arguments.output.out);
+        return Err(Failure { code: u8::try_from(128 + number).unwrap_or(u8::MAX), message: "stopped".to_owned() });
+    }
+    let status = ended.map_err(Failure::failed)?;
+    match status.code() {
+        Some(0) => {
+            let _ = write!(io::stderr(), "{text}");
+            Ok(())
+        }
+        Some(code @ 1..=2) => Err(Failure { code: code as u8, message: text.trim_end().to_owned() }),
+        _ => {
+            sweep(&arguments.output.out);
+            Err(Failure::failed(reason(status, &text)))
+        }
+    }
+}
+
+/// The line that says on a terminal what goes on.
+struct Line {
+    bar: Option<ProgressBar>,
+    /// Whether nothing is to be said any more.
+    is_over: bool,
+}
+
+impl Line {
+    fn end(&mut self) {
+        self.is_over = true;
+        self.bar.take().iter().for_each(ProgressBar::finish_and_clear);
+    }
+}
+
+/// Copies an answer to standard output, from its first byte on in place of the line that says what goes on.
+fn copy(mut answer: ChildStdout, line: &Mutex<Line>) {
+    let mut bytes = vec![0; 1 << 16];
+    while let Ok(count @ 1..) = answer.read(&mut bytes) {
+        if let Ok(mut line) = line.lock() {
+            line.end();
+        }
+        let mut out = io::stdout();
+        if out.write_all(&bytes[..count]).and_then(|()| out.flush()).is_err() {
+            // The process that answers notices.
+            return;
+        }
+    }
+}
+
+/// Waits for the end of a process, or ends it if a signal comes; a terminal says after a second what goes on.
+fn wait(child: &mut Child, signal: &AtomicUsize, line: &Mutex<Line>) -> io::Result<ExitStatus> {
+    let start = Instant::now();
+    let ended = loop {
+        if let Some(status) = child.try_wait()? {
+            break Ok(status);
+        }
+        if signal.load(Ordering::Relaxed) != 0 {
+            child.kill()?;
+            break child.wait();
+        }
+        if start.elapsed() > SILENCE
+            && let Ok(mut line) = line.lock()
+            && !line.is_over
+        {
+            line.bar.get_or_insert_with(|| text_line(0)).set_message("answering; Ctrl-C leaves no file behind");
+        }
+        thread::sleep(LOOK);
+    };
+    if let Ok(mut line) = line.lock() {
+        line.end();
+    }
+    ended
+}
+
+/// Why a process that answered ended before its time.
+fn reason(status: ExitStatus, said: &str) -> String {
+    #[cfg(unix)]
+    let signal = std::os::unix::process::ExitStatusExt::signal(&status);
+    #[cfg(not(unix))]
+    let signal: Option<i32> = None;
+    // SIGKILL is what a machine sends that has no memory left.
+    if said.contains("memory allocation of") || signal == Some(9) {
+        return "the query needs more memory than there is\n  help: ask for less: fewer columns, a WHERE, a LIMIT; or join on a column"
+            .to_owned();
+    }
+    if said.contains("overflowed its stack") {
+        return "the query is too long\n  help: ask in several queries".to_owned();
+    }
+    let said = said.lines().next().unwrap_or_default();
+    format!("the query failed ({status}): {said}\n  help: ask in another way")
+}
+
+/// Removes what a process that was ended left of the file `out`.
+fn sweep(out: &Path) {
+    let real = fs::canonicalize(out).unwrap_or_else(|_| out.to_owned());
+    let folder = real.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    atomic::sweep(folder, SystemTime::now());
+}
+
+/// Answers a question in this process, which ends with its answer, or with the process that started it.
+fn inside(arguments: &Arguments) -> Result<(), Failure> {
+    let no_thread = |error: io::Error| {
+        Failure::failed(format!(
+            "cannot start a thread: {error}\n  help: raise the number of processes allowed (ulimit -u), or end others"
+        ))
+    };
+    limit_memory();
+    // A panic is reported by the message of the query.
+    let panicked: Arc<Mutex<Option<String>>> = Arc::default();
+    let noted = panicked.clone();
+    panic::set_hook(Box::new(move |panic| {
+        if let Ok(mut first) = noted.lock() {
+            first.get_or_insert_with(|| panic.payload_as_str().unwrap_or_default().to_owned());
+        }
+    }));
+    rayon::ThreadPoolBuilder::new().build_global().map_err(|error| no_thread(io::Error::other(error)))?;
+    let watch = || {
+        // Ends when the other process does.
+        let _ = io::stdin().read(&mut [0]);
+        std::process::exit(2);
+    };
+    thread::Builder::new().spawn(watch).map_err(no_thread)?;
+    thread::scope(|scope| {
+        let work = || panic::catch_unwind(AssertUnwindSafe(|| answer(arguments)));
+        let thread = thread::Builder::new().stack_size(STACK).spawn_scoped(scope, work).map_err(no_thread)?;
+        let done = thread.join().and_then(|done| done);
+        let unsupported = |_| Err(Failure::failed("the query failed: it is not supported\n  help: ask in another way"));
+        done.unwrap_or_else(unsupported).map_err(|mut failure| {
+            if let Some(panic) = panicked.lock().ok().and_then(|mut first| first.take()) {
+                let line = panic.lines().next().unwrap_or_default();
+                failure.message.push_str(&format!("\n  note: polars gave up: {line}"));
+            }
+            failure
+        })
+    })
+}
+
+/// Lets this process have the memory that is free, so that too large a question fails instead of slowing the machine down.
+#[cfg(target_os = "linux")]
+fn limit_memory() {
+    use rustix::process::{Resource, Rlimit, getrlimit, setrlimit};
+    let kilobytes = |text: &str, key: &str| -> Option<u64> {
+        let line = text.lines().find(|line| line.starts_with(key))?;
+        line.split_whitespace().nth(1)?.parse().ok()
+    };
+    let free = fs::read_to_string("/proc/meminfo").ok().and_then(|text| kilobytes(&text, "MemAvailable:"));
+    let taken = fs::read_to_string("/proc/self/status").ok().and_then(|text| kilobytes(&text, "VmSize:"));
+    let (Some(free), Some(taken)) = (free, taken) else { return };
+    let most = (free + taken) * 1024;
+    let Rlimit { current, maximum } = getrlimit(Resource::As);
+    let most = current.map_or(most, |current| current.min(most));
+    // A query that has no limit is one that the machine ends if need be.
+    let _ = setrlimit(Resource::As, Rlimit { current: Some(most), maximum });
+}
+
+#[cfg(not(target_os = "linux"))]
+fn limit_memory() {}
+
+/// Answers a question.
+fn answer(arguments: &Arguments) -> Result<(), Failure> {
     let format = arguments.output.format()?;
+    kind::expect_rows(&arguments.dataset)?;
+    super::note_at(&arguments.dataset);
     let tables = Tables::open(&arguments.dataset)?;
     let answer = tables.ask(&arguments.sql)?;
     for source in tables.sources.iter().filter(|source| source.missing > 0) {
-        let (missing, all) = (source.missing, source.missing + source.files.len() as u64);
+        let (missing, all) = (source.missing, source.missing + source.paths.len() as u64);
         // That the answer is incomplete is worth saying, but not worth failing if it cannot be said.
         let _ = writeln!(
             io::stderr(),
@@ -66,10 +345,9 @@ pub fn query(arguments: &Arguments) -> Result<(), Failure> {
         );
     }
     if arguments.output.is_stdout() {
-        return match write(answer, format, &mut BufWriter::new(io::stdout().lock())) {
-            // Who reads has had enough.
-            Err(AnswerError::Write(error)) if error.kind() == io::ErrorKind::BrokenPipe => Ok(()),
-            Err(AnswerError::Write(error)) => Err(Failure::failed(format!("cannot write to standard output: {error}"))),
+        let mut out = stdout()?;
+        return match write(answer, format, &mut out).and_then(|()| Ok(out.flush()?)) {
+            Err(AnswerError::Write(error)) => written(Err(error)),
             done => done.map_err(|error| failure(&tables, arguments, error)),
         };
     }
@@ -84,7 +362,13 @@ pub fn query(arguments: &Arguments) -> Result<(), Failure> {
 
 /// A question that cannot be answered, or files that cannot be read to the end.
 fn failure(tables: &Tables, arguments: &Arguments, error: AnswerError) -> Failure {
-    tables.fault(&arguments.sql).map_or_else(|| unreadable(&arguments.dataset, &error), Failure::from)
+    let other = || match &error {
+        AnswerError::Failed(cause) if !query::is_unreadable(cause) => {
+            Failure::failed(format!("{error}\n  help: ask in another way"))
+        }
+        _ => unreadable(&arguments.dataset, &error),
+    };
+    tables.fault(&arguments.sql).map_or_else(other, Failure::from)
 }
 
 /// Tables that cannot be read to the end, for all that is known by a file that is damaged.
@@ -108,17 +392,19 @@ fn write(answer: Answer, format: Format, out: &mut dyn Write) -> Result<(), Answ
     answer.write(format, out)
 }
 
-/// Aligned columns under their names.
+/// Aligned columns under their names and, where they are known, their units.
 fn table(answer: Answer, out: &mut dyn Write) -> Result<(), AnswerError> {
     let mut columns = words::Columns::default();
     let mut lines = vec![answer.columns()];
+    let units = answer.units();
+    if units.iter().any(|unit| !unit.is_empty()) {
+        lines.push(units);
+    }
     answer.rows(|rows| {
         lines.extend(rows.iter().map(|row| row.iter().map(summary::shown).collect()));
         out.write_all(columns.lines(&lines, 0).as_bytes())?;
         lines.clear();
         Ok(())
     })?;
-    // The names alone, where there was no row.
-    out.write_all(columns.lines(&lines, 0).as_bytes())?;
     Ok(out.flush()?)
 }

@@ -3,12 +3,13 @@
 use std::io;
 use std::path::PathBuf;
 
+use super::summary::Piece;
+use super::watch::{Wait, waiting};
 use super::{Failure, dataset, plan, say, summary, to_file, words};
-use crate::dataset::{Cell, Digest};
 use crate::plot::table::{Request, Source};
-use crate::plot::{COLUMN, PAGE, Page};
+use crate::plot::{COLUMN, PAGE, Page, PlotError};
 use crate::protocol::Status;
-use crate::sweep::{Sweep, units_of};
+use crate::sweep::{Sweep, estimate, units_of};
 
 /// Arguments of `report`.
 #[derive(Debug, clap::Args)]
@@ -27,59 +28,71 @@ pub fn report(arguments: &Arguments) -> Result<(), Failure> {
     let (folder, manifest) = dataset(&arguments.dataset)?;
     let path = arguments.out.clone().unwrap_or_else(|| PathBuf::from(format!("{}-report.html", manifest.name)));
     let mut page = Page::new(&format!("Dataset {}", manifest.name));
-    page.words(&format!("Made by slipsweep {}.", manifest.identity.version));
-    let units = units_of(&manifest.spec)?;
-    let digests = manifest
-        .tables
-        .iter()
-        .map(|table| Digest::read(&folder, table, &units).map_err(Failure::failed))
-        .collect::<Result<Vec<_>, _>>()?;
-
-    page.heading("Plan");
-    match Sweep::parse_at(&manifest.spec, &arguments.dataset.join("manifest.json")) {
-        Ok(sweep) => page.verbatim(&plan::in_words(&sweep)?),
-        // Points are files beside the spec, not in the dataset.
-        Err(error) => page.words(&format!("It cannot be told again from the dataset alone: {}", error.found)),
+    // What the user says of it comes first.
+    let spec: Option<toml::Table> = manifest.spec.parse().ok();
+    if let Some(description) = spec.as_ref().and_then(|spec| spec.get("description")?.as_str()) {
+        page.words(description);
     }
-
-    page.heading("Rows and statuses");
-    let used: Vec<usize> =
-        (0..Status::ALL.len()).filter(|&status| digests.iter().any(|digest| digest.status[status] > 0)).collect();
-    let names: Vec<&str> = ["table", "rows", "parts", "missing parts"]
-        .into_iter()
-        .chain(used.iter().map(|&status| Status::ALL[status].name()))
-        .collect();
-    let rows: Vec<Vec<String>> = manifest
-        .tables
-        .iter()
-        .zip(&digests)
-        .map(|(table, digest)| {
-            let counts = [table.rows, table.parts, digest.missing].map(words::count);
-            let statuses = used.iter().map(|&status| words::count(digest.status[status]));
-            [table.name.clone()].into_iter().chain(counts).chain(statuses).collect()
-        })
-        .collect();
-    page.table(&names, &rows);
+    page.words(&format!("Made by slipsweep {}.", manifest.build.version));
+    let units = units_of(&manifest.spec)?;
+    let tables = summary::contents(&folder, &manifest)?.tables;
 
     page.heading("Pictures");
     let source = Source::new(folder, manifest.clone(), units);
     for table in source.tables() {
-        match source.figure(&table, &Request::default()) {
-            Ok(figure) => page.picture(&figure.draw(if figure.columns > 1 { PAGE } else { COLUMN })),
+        let drawing = format!("drawing {table}");
+        match waiting(&Wait::new(&drawing), || source.figure(&table, &Request::default())) {
+            Ok(figure) => {
+                page.picture(&figure.draw(if figure.columns > 1 { PAGE } else { COLUMN }));
+                figure.remarks.iter().for_each(|remark| page.words(&format!("{table}: {remark} of `slipsweep plot`.")));
+            }
+            Err(error @ PlotError::Part(_)) => return Err(error.into()),
             // Its help is for who draws one picture.
             Err(error) => page.words(error.to_string().lines().next().unwrap_or_default()),
         }
     }
 
+    page.heading("Rows and statuses");
+    let used: Vec<usize> =
+        (0..Status::ALL.len()).filter(|&status| tables.iter().any(|table| table.digest.status[status] > 0)).collect();
+    let names: Vec<&str> = ["table", "rows", "parts", "missing parts"]
+        .into_iter()
+        .chain(used.iter().map(|&status| Status::ALL[status].name()))
+        .collect();
+    let counted = tables.iter().map(|table| {
+        let counts = [table.rows, table.parts, table.parts - table.there].map(words::count);
+        let statuses = used.iter().map(|&status| words::count(table.digest.status[status]));
+        [table.name.clone()].into_iter().chain(counts).chain(statuses).collect()
+    });
+    let rows: Vec<Vec<String>> = counted.collect();
+    page.table(&names, &rows);
+
     page.heading("Summary");
-    for (table, digest) in manifest.tables.iter().zip(&digests) {
-        page.verbatim(&summary::digest(&table.name, table.rows, digest));
-        let rows: &[_] = digest.rows.as_deref().unwrap_or(&digest.least);
-        if let Some(first) = rows.first() {
-            let names: Vec<&str> = first.iter().map(|(name, _)| name.as_str()).collect();
-            let cells = |row: &Vec<(String, Cell)>| row.iter().map(|(_, cell)| summary::shown(cell)).collect();
-            page.table(&names, &rows.iter().map(cells).collect::<Vec<_>>());
+    for table in &tables {
+        for piece in summary::pieces(&table.name, table.rows, &table.digest) {
+            match piece {
+                Piece::Line(_, line) => page.words(&line),
+                Piece::Table(_, names, units, rows) => {
+                    let headed = |(place, name): (usize, &String)| match units.get(place) {
+                        Some(unit) if !unit.is_empty() => format!("{name} [{unit}]"),
+                        _ => name.clone(),
+                    };
+                    let names: Vec<String> = names.iter().enumerate().map(headed).collect();
+                    page.table(&names.iter().map(String::as_str).collect::<Vec<_>>(), &rows);
+                }
+            }
         }
+    }
+
+    page.heading("Plan");
+    match Sweep::parse_at(&manifest.spec, &arguments.dataset.join("manifest.json")) {
+        Ok(sweep) => {
+            let sample = Wait::new("computing a sample");
+            let estimates = waiting(&sample, || estimate(&sweep, &arguments.dataset)).map_err(Failure::failed)?;
+            page.verbatim(&plan::in_words(&sweep, &estimates, 0.0));
+        }
+        // Points are files beside the spec, not in the dataset.
+        Err(error) => page.words(&format!("It cannot be recomputed from the dataset alone: {}", error.found)),
     }
 
     page.heading("Spec");

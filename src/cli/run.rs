@@ -1,12 +1,15 @@
-//! `slipsweep run SPEC`: computes what is missing of a dataset, or of a share of it, then reads it back and says what is in it.
+//! `slipsweep run SPEC`: computes what is missing of a dataset, or of a share of it, and says what is in it.
 
 use std::io;
+use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-use super::watch::watched;
-use super::{AGAIN, FAILED, Failure, NOT_STRICT, WRONG, next, say, summary, words, wrong};
-use crate::dataset::{DatasetError, Digest, Folder};
+use super::plan::too_large;
+use super::watch::{Wait, waiting, watched};
+use super::{AGAIN, FAILED, Failure, NOT_STRICT, WRONG, load, next, say, summary, words, wrong};
+use crate::dataset::atomic::nearest_folder;
+use crate::dataset::{DatasetError, Folder};
 use crate::protocol::Status;
 use crate::sweep::{self, Outcome, Plan, RunError, Shard, Sweep};
 use crate::table::{Signal, Work};
@@ -20,7 +23,7 @@ pub struct Arguments {
     /// The sweep spec, a TOML file; or the folder of a dataset that is to be finished
     spec: PathBuf,
     /// Folder in which the dataset's folder is made [default: results, or where the dataset is]
-    #[arg(long, value_name = "DIR")]
+    #[arg(short, long, value_name = "DIR")]
     out: Option<PathBuf>,
     /// Threads to use, at most 1024; one a processor by default
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
@@ -41,10 +44,16 @@ pub struct Arguments {
 
 /// Runs a spec.
 pub fn run(arguments: &Arguments) -> Result<(), Failure> {
-    let (sweep, folder) = subject(arguments)?;
-    let plan = Plan::new(&sweep);
+    let start = Instant::now();
     let shard = arguments.shard.unwrap_or(Shard::WHOLE);
-    let parts = shard.parts(&sweep, &plan).map_err(wrong)?;
+    let (sweep, folder) = subject(arguments)?;
+    let planning = Wait { quiet: arguments.quiet, ..Wait::new("planning the sweep") };
+    let (plan, parts) = waiting(&planning, || {
+        let plan = Plan::new(&sweep);
+        let parts = shard.parts(&sweep, &plan).map_err(wrong)?;
+        check_room(&sweep, &plan, &parts, &folder)?;
+        Ok::<_, Failure>((plan, parts))
+    })?;
     let rows = plan.tables.iter().zip(&parts).flat_map(|(table, parts)| {
         parts
             .iter()
@@ -53,63 +62,20 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     });
     let rows = rows.fold(0_u64, u64::saturating_add);
     let signal = Signal::default();
-    let start = Instant::now();
     let threads = arguments.threads.map_or(0, usize::from);
-    let (done, caught) =
-        watched(&signal, rows, arguments.quiet, || sweep::run_shard(&sweep, &folder, shard, threads, &signal));
+    let (done, caught) = watched(&signal, rows, arguments.quiet, || match arguments.shard {
+        None => sweep::run(&sweep, &folder, threads, &signal),
+        Some(shard) => sweep::run_shard(&sweep, &folder, shard, threads, &signal),
+    });
     let outcome = done.map_err(|error| {
         let there = plan.tables.iter().map(|table| folder.parts_there(table).len() as u64).sum();
         let all = plan.tables.iter().map(|table| table.parts).sum();
         explain(error, caught, arguments, (there, all))
     })?;
-    let seconds = start.elapsed().as_secs_f64();
-
-    if arguments.quiet && !arguments.strict {
-        return Ok(());
-    }
-    let read = plan.tables.iter().zip(parts).map(|(table, parts)| {
-        // Only a complete table is worth a summary; of a share, the outcome of its rows may be asked for.
-        let parts = if arguments.strict || arguments.shard.is_none() { parts } else { Vec::new() };
-        Digest::read_parts(&folder, table, &sweep.grid.units, parts.into_iter().flatten())
-    });
-    let digests: Vec<Digest> = read.collect::<Result<_, _>>().map_err(Failure::failed)?;
     if !arguments.quiet {
-        let mut text = String::new();
-        for ((table, digest), done) in plan.tables.iter().zip(&digests).zip(&outcome.tables) {
-            let all = done.kept + done.made;
-            match arguments.shard {
-                None => text.push_str(&summary::digest(&table.name, table.rows, digest)),
-                Some(shard) => text.push_str(&format!(
-                    "{}: {} of {} in share {} of {}\n",
-                    table.name,
-                    words::count(all),
-                    words::things(table.parts, "part"),
-                    shard.index(),
-                    shard.count()
-                )),
-            }
-            if done.kept > 0 {
-                text.push_str(&format!(
-                    "  {} of {} kept from before\n",
-                    words::count(done.kept),
-                    words::things(all, "part")
-                ));
-            }
-            if done.damaged > 0 {
-                text.push_str(&format!("  {} made again\n", words::things(done.damaged, "damaged part")));
-            }
-            if arguments.shard.is_none() {
-                text.push('\n');
-            }
-        }
-        text.push_str(&account(&outcome, seconds));
-        text.push_str(&format!("written to {}\n", folder.path().display()));
-        if arguments.shard.is_none() {
-            text.push_str(&next::commands(&sweep, folder.path()));
-        }
-        say(&text)?;
+        say(&report(&sweep, &plan, &folder, &outcome, arguments.shard, start))?;
     }
-    let defects: u64 = digests.iter().map(|digest| digest.status[Status::NotConverged as usize]).sum();
+    let defects: u64 = outcome.digests.iter().map(|digest| digest.status[Status::NotConverged as usize]).sum();
     if arguments.strict && defects > 0 {
         let message = format!("error: {} not_converged", words::things(defects, "row"));
         return Err(Failure { code: NOT_STRICT, message });
@@ -117,16 +83,97 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     Ok(())
 }
 
+/// What the tables contain, what was done since `start`, and what to do next.
+fn report(
+    sweep: &Sweep,
+    plan: &Plan,
+    folder: &Folder,
+    outcome: &Outcome,
+    shard: Option<Shard>,
+    start: Instant,
+) -> String {
+    let mut text = String::new();
+    for ((table, digest), done) in plan.tables.iter().zip(&outcome.digests).zip(&outcome.tables) {
+        let all = done.kept + done.made;
+        match shard {
+            None => text.push_str(&summary::digest(&table.name, table.rows, digest)),
+            Some(shard) => text.push_str(&format!(
+                "{}: {} of {} in share {} of {}\n",
+                table.name,
+                words::count(all),
+                words::things(table.parts, "part"),
+                shard.index(),
+                shard.count()
+            )),
+        }
+        if done.kept > 0 {
+            text.push_str(&format!(
+                "  {} of {} kept from before\n",
+                words::count(done.kept),
+                words::things(all, "part")
+            ));
+        }
+        if done.damaged > 0 {
+            text.push_str(&format!("  {} made again\n", words::things(done.damaged, "damaged part")));
+        }
+        if shard.is_none() {
+            text.push('\n');
+        }
+    }
+    text.push_str(&account(outcome, start.elapsed().as_secs_f64()));
+    text.push_str(&format!("written to {}\n", folder.path().display()));
+    if shard.is_none() {
+        text.push_str(&next::commands(sweep, folder.path()));
+    }
+    text
+}
+
+/// Bytes of a cell on disk: more than any takes, but for long labels.
+const MOST_OF_CELL: f64 = 16.0;
+
+/// Bytes of a part besides its rows and the spec: more than its footer takes.
+const MOST_OF_FOOTER: f64 = 65536.0;
+
+/// Whether the parts among `shares`, those of each table, that are missing have room on the disk.
+fn check_room(sweep: &Sweep, plan: &Plan, shares: &[Vec<Range<u64>>], folder: &Folder) -> Result<(), Failure> {
+    let Ok(free) = fs4::available_space(nearest_folder(folder.path())) else { return Ok(()) };
+    let free = free as f64;
+    let missing: Vec<u64> = (plan.tables.iter().zip(shares))
+        .map(|(table, share)| {
+            // Both are ascending.
+            let is_ours = |part: &u64| {
+                share.get(share.partition_point(|range| range.end <= *part)).is_some_and(|range| range.contains(part))
+            };
+            let there = folder.parts_there(table).iter().filter(|part| is_ours(part)).count() as u64;
+            share.iter().map(|range| range.end - range.start).sum::<u64>() - there
+        })
+        .collect();
+    let most = (sweep.requests.iter().zip(&plan.tables).zip(&missing)).map(|((request, table), &parts)| {
+        let rows = parts as f64 * table.rows_per_part.min(table.rows) as f64;
+        let cells = request.table.axes().len() + request.selection.indices().len() + 1;
+        rows * cells as f64 * MOST_OF_CELL + parts as f64 * (MOST_OF_FOOTER + sweep.text.len() as f64)
+    });
+    if most.sum::<f64>() < free {
+        return Ok(());
+    }
+    // What is far too much, or might be, is worth a sample.
+    let sizes = sweep::sizes(sweep).map_err(Failure::failed)?;
+    let bytes = (sizes.iter().zip(&plan.tables).zip(missing))
+        .map(|((size, table), missing)| size * missing as f64 / table.parts as f64)
+        .sum::<f64>();
+    if bytes < free { Ok(()) } else { Err(wrong(too_large(folder.path(), bytes, free))) }
+}
+
 /// The sweep and where it goes: from a spec, or from a dataset, which holds the text of its own.
 fn subject(arguments: &Arguments) -> Result<(Sweep, Folder), Failure> {
     let path = &arguments.spec;
     if !path.is_dir() {
-        let sweep = Sweep::load(path)?;
+        let sweep = if arguments.quiet { Sweep::load(path)? } else { load(path)? };
         let folder = Folder::new(arguments.out.as_deref().unwrap_or(Path::new("results")), &sweep.name);
         return Ok((sweep, folder));
     }
     let folder = Folder::at(path);
-    let found = folder.manifest().map_err(Failure::failed)?.or_else(|| folder.manifest_of_parts());
+    let found = folder.manifest().map_err(Failure::failed)?;
     let Some(manifest) = found else {
         let message = format!(
             "error: {}: neither a spec nor a dataset\n  expected: a TOML file, or a folder that `slipsweep run` wrote\n  help: check the path",
@@ -134,7 +181,19 @@ fn subject(arguments: &Arguments) -> Result<(Sweep, Folder), Failure> {
         );
         return Err(Failure { code: WRONG, message });
     };
-    let sweep = Sweep::parse_at(&manifest.spec, &path.join("manifest.json"))?;
+    if manifest.spec.is_empty() {
+        let message = "its manifest is lost and its parts do not carry the spec";
+        return Err(wrong(format!("{}: {message}\n  help: run the spec that it was made from", path.display())));
+    }
+    let sweep = Sweep::parse_at(&manifest.spec, &path.join("manifest.json")).map_err(|error| {
+        let out = path.parent().filter(|out| !out.as_os_str().is_empty()).unwrap_or(Path::new("."));
+        wrong(format!(
+            "{}: the spec in it does not do without the files that it names\n  found: {error}\n  help: run the file that it was made from: \
+             slipsweep run SPEC --out {}",
+            path.display(),
+            out.display()
+        ))
+    })?;
     let folder = arguments.out.as_deref().map_or(folder, |out| Folder::new(out, &sweep.name));
     Ok((sweep, folder))
 }
@@ -150,10 +209,17 @@ fn explain(error: RunError, caught: Option<i32>, arguments: &Arguments, (there, 
             ),
         },
         RunError::Dataset(
-            DatasetError::Foreign { .. } | DatasetError::ForeignPart { .. } | DatasetError::Occupied { .. },
+            DatasetError::Foreign { .. }
+            | DatasetError::OtherSpec { .. }
+            | DatasetError::OtherTables { .. }
+            | DatasetError::ForeignPart { .. }
+            | DatasetError::Occupied { .. },
         ) => Failure { code: WRONG, message: format!("error: {error}") },
         RunError::Threads { .. } if arguments.threads.is_some() => {
             Failure { code: WRONG, message: format!("error: {error}") }
+        }
+        RunError::Dataset(DatasetError::Busy { .. } | DatasetError::Taken { .. }) if arguments.requeue => {
+            Failure { code: AGAIN, message: format!("error: {error}") }
         }
         RunError::Dataset(DatasetError::Io { ref source, .. }) if arguments.requeue && is_passing(source) => {
             Failure { code: AGAIN, message: format!("error: {error}") }

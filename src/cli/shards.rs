@@ -5,9 +5,9 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-use super::{Failure, WRONG, say, words, wrong};
+use super::{Failure, WRONG, load, say, to_file, words, wrong};
 use crate::dataset::Folder;
-use crate::sweep::{Plan, Shard, Sweep, check_parts, estimate};
+use crate::sweep::{Plan, Shard, check_parts, estimate};
 
 /// Arguments of `shards`.
 #[derive(Debug, clap::Args)]
@@ -23,7 +23,7 @@ pub struct Arguments {
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=Shard::MOST))]
     shards: u64,
     /// Folder in which the dataset's folder is made, on a file system that all machines share
-    #[arg(long, value_name = "DIR", default_value = "results")]
+    #[arg(short, long, value_name = "DIR", default_value = "results")]
     out: PathBuf,
     /// Processors of a task
     #[arg(long, value_name = "K", default_value_t = 1, value_parser = clap::value_parser!(u64).range(1..=1024))]
@@ -102,11 +102,10 @@ pub fn scripts(dataset: &Path) -> Vec<(u64, impl Fn(&[u64]) -> String)> {
 
 /// Writes the job script and says what to submit.
 pub fn shards(arguments: &Arguments) -> Result<(), Failure> {
-    let sweep = Sweep::load(&arguments.spec)?;
+    let sweep = load(&arguments.spec)?;
     let plan = Plan::new(&sweep);
     check_parts(&plan).map_err(wrong)?;
-    let (estimates, shared) = estimate(&sweep).map_err(Failure::failed)?;
-    let seconds = shared + estimates.iter().map(|estimate| estimate.seconds).sum::<f64>();
+    let seconds = estimate(&sweep, &arguments.out).map_err(Failure::failed)?.seconds();
     let parts: u64 = plan.tables.iter().map(|table| table.parts).sum();
     let rows = plan.tables.iter().fold(0_u64, |sum, table| sum.saturating_add(table.rows));
 
@@ -123,10 +122,21 @@ pub fn shards(arguments: &Arguments) -> Result<(), Failure> {
     let shares = bounds.iter().map(|(most, _)| *most).fold(arguments.shards, u64::min);
     let each = seconds / (shares * arguments.cpus) as f64;
 
-    fs::create_dir_all(&arguments.out).map_err(|error| refused(&arguments.out, "create the folder", &error))?;
     let out = absolute(&arguments.out)?;
     let folder = Folder::new(&out, &sweep.name);
     let script = engine.script(folder.path());
+    if engine == Engine::Slurm && out.to_string_lossy().contains('\\') {
+        // Slurm removes backslashes from the path of a log, and reads two of them as an order to leave its patterns alone.
+        return Err(Failure {
+            code: WRONG,
+            message: format!(
+                "error: {}: Slurm writes no log below a folder whose name has a backslash\n  expected: a path without `\\`\n  help: write \
+                 elsewhere with --out DIR",
+                out.display()
+            ),
+        });
+    }
+    fs::create_dir_all(&arguments.out).map_err(|error| refused(&arguments.out, "create the folder", &error))?;
     let program =
         std::env::current_exe().map_err(|error| Failure::failed(format!("where is this program? {error}")))?;
     let job = Job {
@@ -144,7 +154,7 @@ pub fn shards(arguments: &Arguments) -> Result<(), Failure> {
         Engine::Slurm => job.slurm(),
         Engine::Hyperqueue => job.hyperqueue(),
     };
-    fs::write(&script, text).map_err(|error| refused(&script, "write", &error))?;
+    to_file(&script, |file| file.write_all(text.as_bytes())).map_err(|error| refused(&script, "write", &error))?;
 
     let mut said = format!(
         "{}: {} in {}, about {} of one processor\n{} of about {} on {} each\n",
@@ -157,7 +167,7 @@ pub fn shards(arguments: &Arguments) -> Result<(), Failure> {
         words::things(arguments.cpus, "processor"),
     );
     if let Some((_, reason)) = bounds.iter().find(|(most, _)| *most == shares && shares < arguments.shards) {
-        let _ = writeln!(said, "fewer than the {} asked for: {reason}", words::count(arguments.shards));
+        let _ = writeln!(said, "fewer than the {} requested: {reason}", words::count(arguments.shards));
     }
     if engine == Engine::Slurm
         && slurm_config("RequeueExit").is_some_and(|codes| !codes.split(',').any(|code| code == "75"))

@@ -4,8 +4,8 @@ use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
 use super::shards::{quoted, scripts};
-use super::{FAILED, Failure, WRONG, say, words};
-use crate::dataset::{Folder, Look, Manifest, Survey};
+use super::{FAILED, Failure, WRONG, kind, say, summary, words};
+use crate::dataset::{Build, Folder, Look, Manifest, Survey};
 use crate::protocol::Status;
 use crate::sweep::{Plan, Sweep, shares_with};
 
@@ -28,10 +28,9 @@ const LISTED: usize = 10;
 /// Says what there is of a dataset.
 pub fn status(arguments: &Arguments) -> Result<(), Failure> {
     let path = &arguments.dataset;
+    kind::expect_rows(path)?;
     let folder = Folder::at(path);
-    let written = folder.manifest().map_err(Failure::failed)?;
-    let without = written.is_none();
-    let Some(manifest) = written.or_else(|| folder.manifest_of_parts()) else {
+    let Some(manifest) = folder.manifest().map_err(Failure::failed)? else {
         let message = format!(
             "error: {}: not a dataset\n  expected: a folder with a manifest.json or at least one part\n  help: name a folder that \
              `slipsweep run` wrote",
@@ -39,10 +38,10 @@ pub fn status(arguments: &Arguments) -> Result<(), Failure> {
         );
         return Err(Failure { code: WRONG, message });
     };
-    let survey = Survey::new(&folder, &manifest, if arguments.check { Look::Whole } else { Look::Footer });
-    let mut text = format!("{}: {}, made by slipsweep {}\n", path.display(), manifest.name, manifest.identity.version);
-    if without {
-        text.push_str("manifest.json is missing; the parts tell what it would say, and a run makes it again\n");
+    let survey = summary::survey(&folder, &manifest, if arguments.check { Look::Whole } else { Look::Footer });
+    let mut text = format!("{}: {}, made by slipsweep {}\n", path.display(), manifest.name, manifest.build.version);
+    if let Some(why) = &manifest.rebuilt {
+        let _ = writeln!(text, "manifest.json is {why}; the parts give its contents, and a run writes it again");
     }
     text.push_str(&counts(&survey));
     text.push_str(&faults(&folder, &survey));
@@ -65,10 +64,10 @@ fn counts(survey: &Survey) -> String {
     for table in &survey.tables {
         let missing = table.missing.iter().map(|range| range.end - range.start).sum();
         let (damaged, foreign) = (table.damaged.len() as u64, table.foreign.len() as u64);
-        let by_status = Status::ALL.iter().zip(table.status).filter(|(_, rows)| *rows > 0);
+        let by_status = Status::ALL.iter().zip(table.digest.status).filter(|(_, rows)| *rows > 0);
         let by_status: Vec<String> =
             by_status.map(|(status, rows)| format!("{} {}", words::count(rows), status.name())).collect();
-        let rows = format!("{} of {}", words::count(table.status.iter().sum()), words::count(table.rows));
+        let rows = format!("{} of {}", words::count(table.digest.status.iter().sum()), words::count(table.rows));
         let rows = if by_status.is_empty() { rows } else { format!("{rows}: {}", by_status.join(", ")) };
         let numbers = [table.parts, table.there, missing, damaged, foreign].map(words::count);
         lines.push([table.name.clone()].into_iter().chain(numbers).chain([rows]).collect());
@@ -126,16 +125,21 @@ fn remedy(path: &Path, manifest: &Manifest, survey: &Survey) -> String {
     for table in &survey.tables {
         for (part, _) in &table.foreign {
             let place = Folder::at(path).part(&table.name, *part);
-            let _ = writeln!(text, "  rm {}{}", if place.is_dir() { "-r " } else { "" }, quoted(&place));
+            let away = place.with_extension("parquet.foreign");
+            let _ = writeln!(text, "  mv {} {}", quoted(&place), quoted(&away));
         }
     }
-    if manifest.identity.version != env!("CARGO_PKG_VERSION") {
-        let (theirs, ours) = (&manifest.identity.version, env!("CARGO_PKG_VERSION"));
-        let _ = writeln!(text, "  run its spec with slipsweep {theirs}; this is {ours}, whose parts would differ");
+    let ours = Build::this();
+    if manifest.build != ours {
+        let [theirs, ours] = [&manifest.build, &ours]
+            .map(|build| format!("slipsweep {}, numerics revision {}", build.version, build.revision));
+        let _ = writeln!(text, "  run its spec with {theirs}; this is {ours}, whose parts would differ");
         return text;
     }
     let sweep = Sweep::parse_at(&manifest.spec, &path.join("manifest.json")).ok();
-    let Some(sweep) = sweep.filter(|sweep| sweep.identity() == manifest.identity) else {
+    let plan = sweep.as_ref().map(Plan::new);
+    let is_same = plan.as_ref().is_some_and(|plan| plan.tables == manifest.tables);
+    let (Some(sweep), Some(plan), true) = (sweep, plan, is_same) else {
         let out = quoted(path.parent().filter(|out| !out.as_os_str().is_empty()).unwrap_or(Path::new(".")));
         let _ = writeln!(text, "  slipsweep run SPEC --out {out}");
         text.push_str(
@@ -144,7 +148,6 @@ fn remedy(path: &Path, manifest: &Manifest, survey: &Survey) -> String {
         return text;
     };
     let _ = writeln!(text, "  slipsweep run {}", quoted(path));
-    let plan = Plan::new(&sweep);
     for (count, submit) in scripts(path) {
         let wanted = |table: usize, part| survey.tables.get(table).is_some_and(|table| !table.has(part));
         let Ok(shares) = shares_with(&sweep, &plan, count, wanted) else { continue };

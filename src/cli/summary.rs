@@ -1,12 +1,13 @@
-//! `slipsweep summary DATASET`: what is in a dataset, as `run` tells it at its end.
+//! `slipsweep summary DATASET`: what is in a dataset, as `run` reports it at its end. It stands in the footers of the parts.
 
 use std::path::PathBuf;
+use std::sync::atomic::AtomicU64;
 
+use super::watch::{Wait, waiting};
 use super::{Failure, dataset, say, words};
-use crate::dataset::{Cell, Digest, Row};
+use crate::dataset::{Cell, Counts, Digest, DigestRow, FEW, Folder, Look, Manifest, Survey};
 use crate::grid::Quantity;
 use crate::protocol::Status;
-use crate::sweep::units_of;
 use crate::table::{self, STATUS};
 
 /// Arguments of `summary`.
@@ -21,18 +22,17 @@ pub struct Arguments {
 /// Tells what is in a dataset.
 pub fn summary(arguments: &Arguments) -> Result<(), Failure> {
     let (folder, manifest) = dataset(&arguments.dataset)?;
-    let units = units_of(&manifest.spec)?;
     let mut text = String::new();
-    for table in &manifest.tables {
-        let read = Digest::read(&folder, table, &units).map_err(Failure::failed)?;
+    for table in &contents(&folder, &manifest)?.tables {
         if !text.is_empty() {
             text.push('\n');
         }
-        text.push_str(&digest(&table.name, table.rows, &read));
-        if read.missing > 0 {
+        text.push_str(&digest(&table.name, table.rows, &table.digest));
+        let missing = table.parts - table.there;
+        if missing > 0 {
             text.push_str(&format!(
                 "  {} of {} not there yet: `slipsweep run` makes what is missing\n",
-                words::count(read.missing),
+                words::count(missing),
                 words::things(table.parts, "part")
             ));
         }
@@ -40,89 +40,146 @@ pub fn summary(arguments: &Arguments) -> Result<(), Failure> {
     say(&text)
 }
 
+/// Surveys a dataset, and says so if it takes long.
+pub fn survey(folder: &Folder, manifest: &Manifest, look: Look) -> Survey {
+    let looked = AtomicU64::new(0);
+    let there = manifest.tables.iter().map(|table| folder.parts_there(table).len() as u64).sum();
+    let doing = match look {
+        Look::Footer => "reading the footers",
+        Look::Whole => "checking the parts that are there",
+    };
+    let wait = Wait { done: Some((&looked, there, "part")), ..Wait::new(doing) };
+    waiting(&wait, || Survey::new(folder, manifest, look, &looked))
+}
+
+/// What is in a dataset of which every part that is there is sound.
+pub fn contents(folder: &Folder, manifest: &Manifest) -> Result<Survey, Failure> {
+    let survey = survey(folder, manifest, Look::Footer);
+    for table in &survey.tables {
+        let parts = table.damaged.iter().map(|(part, _)| *part).chain(table.foreign.iter().map(|(part, _)| *part));
+        for part in parts {
+            folder.open_part(manifest, &table.name, part).map_err(Failure::failed)?;
+        }
+    }
+    Ok(survey)
+}
+
+/// A piece of what is said of a table, which stands in a text or on a page.
+pub enum Piece {
+    /// A line, this far indented.
+    Line(usize, String),
+    /// Names, units (empty where there are none) and rows, this far indented.
+    Table(usize, Vec<String>, Vec<String>, Vec<Vec<String>>),
+}
+
 /// One table in a few lines.
 pub fn digest(name: &str, rows: u64, digest: &Digest) -> String {
+    let lines = pieces(name, rows, digest).into_iter().map(|piece| match piece {
+        Piece::Line(indent, line) => format!("{:indent$}{line}\n", ""),
+        Piece::Table(indent, names, units, rows) => {
+            let units = Some(units).filter(|units| units.iter().any(|unit| !unit.is_empty()));
+            let lines: Vec<Vec<String>> = [names].into_iter().chain(units).chain(rows).collect();
+            words::aligned(&lines, indent)
+        }
+    });
+    lines.collect()
+}
+
+/// What is said of a table of `rows` rows.
+pub fn pieces(name: &str, rows: u64, digest: &Digest) -> Vec<Piece> {
     let counts: Vec<String> = Status::ALL
         .iter()
         .zip(digest.status)
         .filter(|(_, rows)| *rows > 0)
         .map(|(status, rows)| format!("{} {}", words::count(rows), status.name()))
         .collect();
-    let mut text = format!("{name}: {} ({})\n", words::things(rows, "row"), counts.join(", "));
-    if !digest.least.is_empty() && digest.rows.is_none() {
-        // A family may hold protocols that miss the final state, with any work.
-        let arriving = if name == "swift" { " and arrive" } else { "" };
-        text.push_str(&format!("  least gap among the rows that are ok{arriving}:\n"));
-        text.push_str(&listing(&digest.least));
-    }
+    let mut pieces = vec![Piece::Line(0, format!("{name}: {} ({})", words::things(rows, "row"), counts.join(", ")))];
     match &digest.rows {
-        Some(rows) => text.push_str(&listing(rows)),
+        Some(rows) => pieces.extend(listing(digest, &rows.iter().collect::<Vec<_>>())),
         None => {
-            let mut lines = vec![["column", "rows", "least", "greatest"].map(str::to_owned).to_vec()];
-            for range in digest.ranges.iter().filter(|range| range.count > 0) {
-                let ends = [range.least, range.greatest].map(words::number);
-                lines.push([range.column.clone(), words::count(range.count)].into_iter().chain(ends).collect());
+            let least: Vec<&DigestRow> = digest.least().collect();
+            if !least.is_empty() {
+                // A family may hold protocols that miss the final state, with any work.
+                let arriving = if name == "swift" { " and arrive" } else { "" };
+                pieces.push(Piece::Line(2, format!("least gap among the rows that are ok{arriving}:")));
+                pieces.extend(listing(digest, &least));
             }
-            text.push_str(&words::aligned(&lines, 2));
-            for (column, counts) in &digest.words {
+            pieces.extend(ranges(digest));
+            let counted = |column: &str, counts: &Counts| {
                 let counts: Vec<String> =
                     counts.iter().map(|(word, rows)| format!("{} {word}", words::count(*rows))).collect();
-                text.push_str(&format!("  {column}: {}\n", counts.join(", ")));
-            }
+                Piece::Line(2, format!("{column}: {}", counts.join(", ")))
+            };
+            pieces.extend(digest.labels.iter().map(|(label, counts)| match counts {
+                Some(counts) => counted(label, counts),
+                None => Piece::Line(2, format!("{label}: more than {FEW} different labels")),
+            }));
+            pieces.extend(digest.words.iter().map(|(column, counts)| counted(column, counts)));
         }
     }
-    if let Some(prediction) = table::find(name).and_then(|table| table.prediction())
-        && !digest.predicted.is_empty()
-    {
-        text.push_str(&format!("  {} as {} predicts it, and as found:\n", prediction.column, prediction.theory));
-        let mut lines = vec![["predicted", "found", "rows"].map(str::to_owned).to_vec()];
-        for (predicted, found, rows) in &digest.predicted {
-            lines.push(vec![(*predicted).to_owned(), found.clone(), words::count(*rows)]);
-        }
-        text.push_str(&words::aligned(&lines, 4));
-        let surprises = digest
-            .predicted
-            .iter()
-            .filter(|(predicted, found, _)| found.as_str() == prediction.surprise && *predicted != prediction.surprise);
-        let differ: u64 = surprises.map(|(.., rows)| rows).sum();
-        if differ > 0 {
-            text.push_str(&format!(
-                "    {} of {}: {}\n",
-                words::things(differ, "row"),
-                prediction.surprise,
-                prediction.why
-            ));
-        }
-    }
-    text
+    pieces.extend(predicted(name, digest));
+    pieces
 }
 
-/// Rows with a header; axes that do not vary stand above, columns without any value are left out.
-fn listing(rows: &[Row]) -> String {
-    let Some(first) = rows.first() else { return String::new() };
+/// The columns of numbers.
+fn ranges(digest: &Digest) -> Option<Piece> {
+    let ranges = digest.ranges.iter().filter(|range| range.count > 0).map(|range| {
+        let ends = [range.least, range.greatest].map(words::number);
+        let of = [range.column.clone(), digest.unit(&range.column).to_owned(), words::count(range.count)];
+        of.into_iter().chain(ends).collect()
+    });
+    let names = ["column", "unit", "rows", "least", "greatest"].map(str::to_owned);
+    let ranges: Vec<Vec<String>> = ranges.collect();
+    (!ranges.is_empty()).then(|| Piece::Table(2, names.to_vec(), Vec::new(), ranges))
+}
+
+/// What a simpler theory predicts of a column, beside what was found.
+fn predicted(name: &str, digest: &Digest) -> Vec<Piece> {
+    let prediction = table::find(name).and_then(|table| table.prediction());
+    let Some(prediction) = prediction.filter(|_| !digest.predicted.is_empty()) else { return Vec::new() };
+    let line =
+        |(predicted, found, rows): &(String, String, u64)| vec![predicted.clone(), found.clone(), words::count(*rows)];
+    let names = ["predicted", "found", "rows"].map(str::to_owned);
+    let mut pieces = vec![
+        Piece::Line(2, format!("{} as {} predicts it, and as found:", prediction.column, prediction.theory)),
+        Piece::Table(4, names.to_vec(), Vec::new(), digest.predicted.iter().map(line).collect()),
+    ];
+    let is_surprise = |(predicted, found, _): &&(String, String, u64)| {
+        found == prediction.surprise && predicted != prediction.surprise
+    };
+    let differ: u64 = digest.predicted.iter().filter(is_surprise).map(|(.., rows)| rows).sum();
+    if differ > 0 {
+        let rows = words::things(differ, "row");
+        pieces.push(Piece::Line(4, format!("{rows} of {}: {}", prediction.surprise, prediction.why)));
+    }
+    pieces
+}
+
+/// Rows under names and units; axes that do not vary stand above, columns without any value are left out.
+fn listing(digest: &Digest, rows: &[&DigestRow]) -> Vec<Piece> {
+    let Some(first) = rows.first() else { return Vec::new() };
     let is_axis = |name: &str| Quantity::from_name(name).is_some();
     let mut common = Vec::new();
     let mut places = Vec::new();
     let mut results_begin = false;
-    for (place, (name, cell)) in first.iter().enumerate() {
+    for (place, (name, unit)) in digest.columns.iter().enumerate() {
+        let cell = first.cell(place);
         // `best` has result columns of the same names as axes: axes end where they stop coming in the order of quantities.
         results_begin |= !is_axis(name);
-        let varies = rows.iter().any(|row| row[place].1 != *cell);
-        let missing = rows.iter().all(|row| row[place].1 == Cell::Missing);
+        let varies = rows.iter().any(|row| row.cell(place) != cell);
+        let missing = rows.iter().all(|row| *row.cell(place) == Cell::Missing);
         if !results_begin && !varies && Quantity::from_name(name).is_some_and(|axis| !axis.has_scale()) {
-            common.push(format!("{name} = {}", shown(cell)));
+            let unit = if unit == "1" { "" } else { unit };
+            common.push(format!("{name} = {} {unit}", shown(cell)).trim_end().to_owned());
         } else if !missing && (name != STATUS || varies) {
             places.push(place);
         }
     }
-    let mut lines = vec![places.iter().map(|&place| first[place].0.clone()).collect::<Vec<_>>()];
-    lines.extend(rows.iter().map(|row| places.iter().map(|&place| shown(&row[place].1)).collect()));
-    let mut text = String::new();
-    if !common.is_empty() {
-        text.push_str(&format!("  at {}\n", common.join(", ")));
-    }
-    text.push_str(&words::aligned(&lines, 4));
-    text
+    let at = (!common.is_empty()).then(|| Piece::Line(2, format!("at {}", common.join(", "))));
+    let names = places.iter().map(|&place| digest.columns[place].0.clone()).collect();
+    let units = places.iter().map(|&place| digest.columns[place].1.clone()).collect();
+    let rows = rows.iter().map(|row| places.iter().map(|&place| shown(row.cell(place))).collect()).collect();
+    at.into_iter().chain([Piece::Table(4, names, units, rows)]).collect()
 }
 
 /// A cell as a reader sees it.

@@ -1,32 +1,57 @@
-//! `slipsweep tables`: every table and column, from their definitions.
+//! `slipsweep tables [TABLE]`: tables and their columns, from their definitions.
 
-use super::{Failure, say, words};
+use super::{Failure, say, words, wrong};
 use crate::grid::{Grid, Quantity, Scale};
-use crate::table::{self, Kind, STATUS, STATUS_DOC};
+use crate::names::hint;
+use crate::table::{self, Kind, STATUS, STATUS_DOC, Table};
 
-/// Prints all tables.
-pub fn tables() -> Result<(), Failure> {
-    let mut text = String::new();
+/// Arguments of `tables`.
+#[derive(Debug, clap::Args)]
+#[command(after_help = "Examples:
+  slipsweep tables | less
+  slipsweep tables gap")]
+pub struct Arguments {
+    /// The table; all by default
+    table: Option<String>,
+}
+
+/// Prints one table or all.
+pub fn tables(arguments: &Arguments) -> Result<(), Failure> {
+    let all: Vec<&dyn Table> = table::ALL.into_iter().chain(table::REDUCED.map(|(_, table)| table)).collect();
+    let chosen = match &arguments.table {
+        None => all,
+        Some(name) => match all.iter().find(|table| table.name() == name) {
+            Some(table) => vec![*table],
+            None => return Err(unknown(name, &all)),
+        },
+    };
+    let texts: Vec<String> = chosen.into_iter().map(text).collect();
+    say(&texts.join("\n"))
+}
+
+fn unknown(name: &str, all: &[&dyn Table]) -> Failure {
+    let names: Vec<&str> = all.iter().map(|table| table.name()).collect();
+    let help = hint(name, names.iter().copied());
+    wrong(format!("no table `{name}`\n  expected: {}\n  help: {help}", names.join(", ")))
+}
+
+/// A line on a table, then its columns with units and meanings.
+fn text(table: &dyn Table) -> String {
     let no_axes = Grid::default();
-    for table in table::ALL.into_iter().chain(table::REDUCED.map(|(_, table)| table)) {
-        text.push_str(&format!("{}: {}\n", table.name(), table.doc()));
-        let mut rows: Vec<Vec<String>> = Vec::new();
-        for axis in Quantity::ALL.into_iter().filter(|axis| table.axes().contains(axis)) {
-            let unit = if axis.words().is_empty() { axis.unit(Scale::Model) } else { "word" };
-            rows.push([axis.name(), unit, axis.doc()].map(str::to_owned).into());
-        }
-        for column in table.columns() {
-            let unit = match column.kind {
-                Kind::Label(_) => "word",
-                Kind::Flag => "true or false",
-                _ => column.unit(&no_axes),
-            };
-            let note = if column.optional { " (only if a spec names it)" } else { "" };
-            rows.push(vec![column.name.to_owned(), unit.to_owned(), format!("{}{note}", column.doc)]);
-        }
-        rows.push([STATUS, "word", STATUS_DOC].map(str::to_owned).into());
-        text.push_str(&words::aligned(&rows, 2));
-        text.push('\n');
+    let mut rows: Vec<Vec<String>> = Vec::new();
+    for axis in Quantity::ALL.into_iter().filter(|axis| table.axes().contains(axis)) {
+        let unit = if axis.words().is_empty() { axis.unit(Scale::Model) } else { "word" };
+        rows.push([axis.name(), unit, axis.doc()].map(str::to_owned).into());
     }
-    say(text.trim_end_matches('\n')).and_then(|()| say("\n"))
+    for column in table.columns() {
+        let unit = match column.kind {
+            Kind::Label(_) => "word",
+            Kind::Flag => "true or false",
+            _ => column.unit(&no_axes),
+        };
+        let note = if column.optional { " (only if a spec names it)" } else { "" };
+        rows.push(vec![column.name.to_owned(), unit.to_owned(), format!("{}{note}", column.doc)]);
+    }
+    rows.push([STATUS, "word", STATUS_DOC].map(str::to_owned).into());
+    format!("{}: {}\n{}", table.name(), table.doc(), words::aligned(&rows, 2))
 }

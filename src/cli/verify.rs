@@ -2,6 +2,7 @@
 
 use std::path::PathBuf;
 
+use super::watch::{Wait, waiting};
 use super::{Failure, NOT_STRICT, dataset, say, words};
 use crate::dataset::Cell;
 use crate::verify::{Audit, LIMIT, verify as audit};
@@ -25,7 +26,9 @@ pub struct Arguments {
 pub fn verify(arguments: &Arguments) -> Result<(), Failure> {
     let path = &arguments.dataset;
     let (_, manifest) = dataset(path)?;
-    let audits = audit(path, &manifest, arguments.sample, arguments.seed).map_err(Failure::failed)?;
+    let again = Wait::new("solving the sample again");
+    let audits =
+        waiting(&again, || audit(path, &manifest, arguments.sample, arguments.seed)).map_err(Failure::failed)?;
     let text: Vec<String> = audits.iter().map(summary).collect();
     say(&text.join("\n"))?;
     let errors: usize = audits.iter().map(Audit::errors).sum();

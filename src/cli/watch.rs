@@ -1,138 +1,269 @@
-//! Watching a run: progress for whoever looks, and the wish to stop.
+//! Watching what takes long: progress for whoever looks, and the wish to stop.
 
-use std::fmt;
 use std::io::{IsTerminal, Write, stderr};
-use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::process;
+use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering};
+use std::sync::{Arc, OnceLock};
 use std::thread::Thread;
 use std::time::{Duration, Instant};
 
-use indicatif::{ProgressBar, ProgressDrawTarget, ProgressState, ProgressStyle};
-#[cfg(unix)]
-use signal_hook::consts::SIGXFSZ;
+use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use signal_hook::consts::{SIGINT, SIGTERM};
 
 use super::words;
-use crate::table::Signal;
+use crate::table::{Phase, Signal};
 
-/// How often a run is looked at: Ctrl-C and the bar answer within this time.
+/// How often work is looked at: Ctrl-C and the progress answer within this time.
 const LOOK: Duration = Duration::from_millis(50);
 
 /// How often a line is written where there is no terminal.
 const LINE: Duration = Duration::from_secs(10);
 
+/// Time after which a terminal says what is going on. Chosen: nobody waits longer than a second without knowing for what.
+pub const SILENCE: Duration = Duration::from_secs(1);
+
 /// Does `work`, and meanwhile shows progress towards `rows` rows unless `quiet`, and passes Ctrl-C and SIGTERM on to `signal`.
 ///
 /// Returns what `work` returns, and which signal came, if one did. A second one ends the process at once, and so does one that
 /// comes when `work` is done.
-pub fn watched<T: Send>(signal: &Signal, rows: u64, quiet: bool, work: impl FnOnce() -> T + Send) -> (T, Option<i32>) {
-    let caught = Arc::new(AtomicUsize::new(0));
-    let finished = Arc::new(AtomicBool::new(false));
-    for number in [SIGINT, SIGTERM] {
-        // Where a signal cannot be listened to, it keeps its usual effect.
-        let _ = listen(number, &caught, &finished);
+pub fn watched<T>(signal: &Signal, rows: u64, quiet: bool, work: impl FnOnce() -> T) -> (T, Option<i32>) {
+    let mut show = Show::new(rows, quiet);
+    let look = |caught: Option<i32>| {
+        if caught.is_some() {
+            signal.stop();
+        }
+        show.update(signal);
+    };
+    let result = while_looking(look, work);
+    show.end();
+    (result, signals().caught())
+}
+
+/// Something that takes its time, and writes nothing.
+pub struct Wait<'a> {
+    /// What goes on, such as "reading the footers of the parts".
+    pub doing: &'a str,
+    /// How far it is: things done, all of them, and what one is.
+    pub done: Option<(&'a AtomicU64, u64, &'a str)>,
+    /// Whether nothing is to be shown.
+    pub quiet: bool,
+}
+
+impl<'a> Wait<'a> {
+    /// The wait for something of which nobody knows how far it is.
+    pub fn new(doing: &'a str) -> Wait<'a> {
+        Wait { doing, done: None, quiet: false }
     }
-    // A file that grows beyond the limit of its user is then a write that fails, not the end of the process.
-    #[cfg(unix)]
-    let _ = signal_hook::flag::register(SIGXFSZ, Arc::new(AtomicBool::new(false)));
-    let result = std::thread::scope(|scope| {
-        let watch = || {
-            let mut show = Show::new(rows, quiet);
-            while !finished.load(Ordering::Acquire) {
-                if caught.load(Ordering::Relaxed) != 0 {
-                    signal.stop();
+}
+
+/// Does `work`, and says on a terminal what goes on if it takes longer than a second. Ctrl-C and SIGTERM end the process, which says what
+/// is safe. One wait never holds another.
+pub fn waiting<T>(wait: &Wait<'_>, work: impl FnOnce() -> T) -> T {
+    let start = Instant::now();
+    let mut line: Option<ProgressBar> = None;
+    let look = |caught: Option<i32>| {
+        if let Some(number) = caught {
+            line.iter().for_each(ProgressBar::finish_and_clear);
+            // Where nobody listens, nothing is lost.
+            let _ = writeln!(stderr(), "stopped while {}; nothing is changed", wait.doing);
+            process::exit(128 + number);
+        }
+        if !wait.quiet && start.elapsed() > SILENCE && stderr().is_terminal() {
+            line.get_or_insert_with(|| text_line(0)).set_message(match wait.done {
+                Some((done, all, thing)) => {
+                    let (done, all) = (words::count(done.load(Ordering::Relaxed)), words::things(all, thing));
+                    format!("{}: {done} of {all}", wait.doing)
                 }
-                show.update(signal.rows());
+                None => format!("{} ({})", wait.doing, words::duration(start.elapsed().as_secs_f64().floor())),
+            });
+        }
+    };
+    let result = while_looking(look, work);
+    line.iter().for_each(ProgressBar::finish_and_clear);
+    result
+}
+
+/// Does `work` while another thread looks at it from time to time, with the signal that came if one did.
+fn while_looking<T>(mut look: impl FnMut(Option<i32>) + Send, work: impl FnOnce() -> T) -> T {
+    let signals = signals();
+    signals.idle.store(false, Ordering::Release);
+    let finished = AtomicBool::new(false);
+    std::thread::scope(|scope| {
+        let watch = || {
+            while !finished.load(Ordering::Acquire) {
+                look(signals.caught());
                 std::thread::park_timeout(LOOK);
             }
-            show.end();
         };
         // Where no thread can be had, nobody watches.
         let watcher = std::thread::Builder::new().spawn_scoped(scope, watch).ok();
         // Also if the work panics: the scope waits for the watcher.
-        let _end = End { finished: &finished, watcher: watcher.as_ref().map(|watcher| watcher.thread()) };
+        let _end = End { finished: &finished, signals, watcher: watcher.as_ref().map(|watcher| watcher.thread()) };
         work()
-    });
-    let number = caught.load(Ordering::Relaxed);
-    (result, i32::try_from(number).ok().filter(|&number| number != 0))
+    })
 }
 
 /// Tells the watcher, when it goes, that there is nothing to watch any more.
 struct End<'a> {
     finished: &'a AtomicBool,
+    signals: &'a Signals,
     watcher: Option<&'a Thread>,
 }
 
 impl Drop for End<'_> {
     fn drop(&mut self) {
+        self.signals.idle.store(true, Ordering::Release);
         self.finished.store(true, Ordering::Release);
         self.watcher.inspect(|watcher| watcher.unpark());
     }
 }
 
-/// Notes `number` in `caught` when it comes, and ends the process when it comes again or once all is `finished`.
-fn listen(number: i32, caught: &Arc<AtomicUsize>, finished: &Arc<AtomicBool>) -> std::io::Result<()> {
+/// The signals that the process listens to, from the first thing on that is watched.
+struct Signals {
+    /// The one that came; 0 if none did.
+    caught: Arc<AtomicUsize>,
+    /// Whether nothing is watched: then a signal ends the process.
+    idle: Arc<AtomicBool>,
+}
+
+impl Signals {
+    fn caught(&self) -> Option<i32> {
+        i32::try_from(self.caught.load(Ordering::Relaxed)).ok().filter(|&number| number != 0)
+    }
+}
+
+fn signals() -> &'static Signals {
+    static SIGNALS: OnceLock<Signals> = OnceLock::new();
+    SIGNALS.get_or_init(|| {
+        let signals = Signals { caught: Arc::default(), idle: Arc::default() };
+        for number in [SIGINT, SIGTERM] {
+            // Where a signal cannot be listened to, it keeps its usual effect.
+            let _ = listen(number, &signals);
+        }
+        signals
+    })
+}
+
+/// Notes `number` when it comes, and ends the process when it comes again or while nothing is watched.
+fn listen(number: i32, signals: &Signals) -> std::io::Result<()> {
     let again = Arc::new(AtomicBool::new(false));
     // Handlers run in the order in which they are registered: the first time `again` is still false.
     signal_hook::flag::register_conditional_shutdown(number, 128 + number, again.clone())?;
-    signal_hook::flag::register_conditional_shutdown(number, 128 + number, finished.clone())?;
+    signal_hook::flag::register_conditional_shutdown(number, 128 + number, signals.idle.clone())?;
     signal_hook::flag::register(number, again)?;
-    signal_hook::flag::register_usize(number, caught.clone(), number as usize)?;
+    signal_hook::flag::register_usize(number, signals.caught.clone(), number as usize)?;
     Ok(())
 }
 
-/// The ways to show progress.
+/// A line on a terminal that shows its message, or with `rows` a bar before it.
+pub fn text_line(rows: u64) -> ProgressBar {
+    let bar = ProgressBar::with_draw_target(Some(rows), ProgressDrawTarget::stderr_with_hz(10));
+    set_style(&bar, rows > 0);
+    bar
+}
+
+fn set_style(bar: &ProgressBar, has_bar: bool) {
+    let template = if has_bar { "{bar:20} {percent}% of {human_len} rows, {msg}" } else { "{msg}" };
+    if let Ok(style) = ProgressStyle::with_template(template) {
+        bar.set_style(style);
+    }
+}
+
+/// The ways to show the progress of a run.
 enum Show {
     Nothing,
-    Bar(ProgressBar),
-    Lines { rows: u64, start: Instant, last: Instant },
+    Bar { bar: ProgressBar, pace: Pace },
+    Lines { last: Instant, pace: Pace },
 }
 
 impl Show {
     fn new(rows: u64, quiet: bool) -> Show {
+        let now = Instant::now();
+        let pace = Pace { rows, phase: Phase::Checking, since: now };
         if quiet {
-            return Show::Nothing;
+            Show::Nothing
+        } else if stderr().is_terminal() {
+            Show::Bar { bar: text_line(0), pace }
+        } else {
+            Show::Lines { last: now, pace }
         }
-        if !stderr().is_terminal() {
-            return Show::Lines { rows, start: Instant::now(), last: Instant::now() };
-        }
-        let bar = ProgressBar::with_draw_target(Some(rows), ProgressDrawTarget::stderr_with_hz(10));
-        let template = "{bar:20} {percent}% of {human_len} rows, {rate} a second, {left} left";
-        if let Ok(style) = ProgressStyle::with_template(template) {
-            let rate = |state: &ProgressState, out: &mut dyn fmt::Write| {
-                let _ = out.write_str(&words::count(state.per_sec() as u64));
-            };
-            let left = |state: &ProgressState, out: &mut dyn fmt::Write| {
-                let known = state.pos() > 0;
-                let left = if known { words::duration(state.eta().as_secs_f64()) } else { "?".to_owned() };
-                let _ = out.write_str(&left);
-            };
-            bar.set_style(style.with_key("rate", rate).with_key("left", left));
-        }
-        Show::Bar(bar)
     }
 
-    fn update(&mut self, done: u64) {
+    fn update(&mut self, signal: &Signal) {
         match self {
             Show::Nothing => {}
-            Show::Bar(bar) => bar.set_position(done),
-            Show::Lines { rows, start, last } if last.elapsed() >= LINE => {
-                *last = Instant::now();
-                let rate = done as f64 / start.elapsed().as_secs_f64();
-                let left =
-                    if done == 0 { "?".to_owned() } else { words::duration(rows.saturating_sub(done) as f64 / rate) };
-                let (done, rows) = (words::count(done), words::count(*rows));
-                // Progress that cannot be told is not worth a failure.
-                let _ =
-                    writeln!(stderr(), "{done} of {rows} rows, {} a second, {left} left", words::count(rate as u64));
+            Show::Bar { bar, pace } => {
+                let is_new = pace.follow(signal);
+                if pace.phase == Phase::Computing {
+                    if is_new {
+                        bar.set_length(pace.rows);
+                        set_style(bar, true);
+                    }
+                    bar.set_position(signal.rows() + signal.kept());
+                    bar.set_message(pace.text(signal));
+                } else if pace.since.elapsed() > SILENCE {
+                    set_style(bar, false);
+                    bar.set_message(pace.text(signal));
+                }
             }
-            Show::Lines { .. } => {}
+            Show::Lines { last, pace } => {
+                pace.follow(signal);
+                if last.elapsed() >= LINE {
+                    *last = Instant::now();
+                    let done = words::count(signal.rows() + signal.kept());
+                    // Progress that cannot be shown is not worth a failure.
+                    let _ = match pace.phase {
+                        Phase::Computing => {
+                            writeln!(stderr(), "{done} of {} rows, {}", words::count(pace.rows), pace.text(signal))
+                        }
+                        _ => writeln!(stderr(), "{}", pace.text(signal)),
+                    };
+                }
+            }
         }
     }
 
     fn end(self) {
-        if let Show::Bar(bar) = self {
+        if let Show::Bar { bar, .. } = self {
             bar.finish_and_clear();
+        }
+    }
+}
+
+/// How fast a run is.
+struct Pace {
+    /// All rows.
+    rows: u64,
+    /// What the run is doing.
+    phase: Phase,
+    /// Since when.
+    since: Instant,
+}
+
+impl Pace {
+    /// Looks at what the run is doing now; whether that is something new.
+    fn follow(&mut self, signal: &Signal) -> bool {
+        let is_new = signal.phase() != self.phase;
+        if is_new {
+            (self.phase, self.since) = (signal.phase(), Instant::now());
+        }
+        is_new
+    }
+
+    fn text(&self, signal: &Signal) -> String {
+        let (done, kept) = (signal.rows(), signal.kept());
+        match self.phase {
+            Phase::Checking => {
+                let (kept, all) = (words::count(kept), words::things(self.rows, "row"));
+                format!("checking the parts that are there: {kept} of {all}")
+            }
+            Phase::Computing => {
+                let rate = done as f64 / self.since.elapsed().as_secs_f64().max(LOOK.as_secs_f64());
+                let to_do = self.rows.saturating_sub(done + kept);
+                let left = if done == 0 { "?".to_owned() } else { words::duration(to_do as f64 / rate) };
+                format!("{} a second, {left} left", words::count(rate as u64))
+            }
+            Phase::Writing => "writing the last parts".to_owned(),
         }
     }
 }

@@ -110,7 +110,9 @@ impl Columns {
         for row in rows {
             let mut line = " ".repeat(indent);
             for (cell, width) in row.iter().zip(&self.widths) {
-                line.push_str(&format!("{cell:<width$}  "));
+                line.push_str(cell);
+                // The widths of formats end at 65,535.
+                line.push_str(&" ".repeat(width - cell.chars().count() + 2));
             }
             text.push_str(line.trim_end());
             text.push('\n');

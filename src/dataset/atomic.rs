@@ -6,7 +6,7 @@
 use std::fs::{self, File, TryLockError};
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
-use std::time::{Duration, SystemTime};
+use std::time::{Duration, Instant, SystemTime};
 
 /// Age from which a temporary file of another machine is taken for abandoned, by the clock of the file system. Writing one takes seconds.
 const ABANDONED: Duration = Duration::from_secs(24 * 60 * 60);
@@ -25,11 +25,29 @@ pub struct Unwritten {
 
 /// Writes `bytes` to `path` so that at no time, not even after a power cut, an incomplete file bears the name.
 pub fn write(path: &Path, bytes: &[u8]) -> Result<(), Unwritten> {
+    write_by(path, bytes, |temporary, path| fs::rename(temporary, path))
+}
+
+/// Writes `bytes` to `path` in the same way, but never over another file: `false` if there is one.
+pub fn write_new(path: &Path, bytes: &[u8]) -> Result<bool, Unwritten> {
+    let link = |temporary: &Path, path: &Path| match fs::hard_link(temporary, path) {
+        Ok(()) => fs::remove_file(temporary),
+        // Some file systems have no links.
+        Err(error) if error.kind() != io::ErrorKind::AlreadyExists && !path.exists() => fs::rename(temporary, path),
+        Err(error) => Err(error),
+    };
+    match write_by(path, bytes, link) {
+        Err(Unwritten { action: RENAME, .. }) if path.exists() => Ok(false),
+        written => written.map(|()| true),
+    }
+}
+
+fn write_by(path: &Path, bytes: &[u8], place: impl Fn(&Path, &Path) -> io::Result<()>) -> Result<(), Unwritten> {
     let failed = |action, source| Unwritten { action, source };
     let fill = |file: &mut File| file.write_all(bytes).map_err(|source| failed("write", source));
     let mut attempt = 1;
     loop {
-        match publish(path, fill, failed) {
+        match publish(path, fill, &place, failed) {
             Err(Unwritten { action: RENAME, source })
                 if source.kind() == io::ErrorKind::NotFound && attempt < ATTEMPTS =>
             {
@@ -43,7 +61,7 @@ pub fn write(path: &Path, bytes: &[u8]) -> Result<(), Unwritten> {
 /// The same with whatever `fill` writes.
 #[cfg(feature = "cli")]
 pub fn write_with<E: From<io::Error>>(path: &Path, fill: impl FnOnce(&mut File) -> Result<(), E>) -> Result<(), E> {
-    publish(path, fill, |_, source| source.into())
+    publish(path, fill, |temporary, path| fs::rename(temporary, path), |_, source| source.into())
 }
 
 const RENAME: &str = "rename the temporary file";
@@ -51,6 +69,7 @@ const RENAME: &str = "rename the temporary file";
 fn publish<E>(
     path: &Path,
     fill: impl FnOnce(&mut File) -> Result<(), E>,
+    place: impl Fn(&Path, &Path) -> io::Result<()>,
     failed: impl Fn(&'static str, io::Error) -> E,
 ) -> Result<(), E> {
     let (Some(folder), Some(name)) = (path.parent(), path.file_name()) else {
@@ -61,7 +80,7 @@ fn publish<E>(
     let _ = file.try_lock();
     let written = fill(&mut file)
         .and_then(|()| file.sync_all().map_err(|error| failed("sync", error)))
-        .and_then(|()| fs::rename(&temporary, path).map_err(|error| failed(RENAME, error)))
+        .and_then(|()| place(&temporary, path).map_err(|error| failed(RENAME, error)))
         .and_then(|()| sync_folder(folder).map_err(|error| failed("sync the folder", error)));
     if written.is_err() {
         // The first error is the one to report; a leftover bears a dot and does no harm.
@@ -130,6 +149,25 @@ pub fn sweep(folder: &Path, now: SystemTime) {
 fn is_old(entry: &fs::DirEntry, now: SystemTime) -> bool {
     let written = entry.metadata().and_then(|metadata| metadata.modified());
     written.is_ok_and(|written| now.duration_since(written).is_ok_and(|age| age > ABANDONED))
+}
+
+/// The folder itself, or the nearest above it that is there: what is written there goes to the same disk.
+pub fn nearest_folder(folder: &Path) -> PathBuf {
+    let absolute = std::path::absolute(folder).unwrap_or_else(|_| folder.to_owned());
+    let there = absolute.ancestors().find(|folder| folder.is_dir());
+    there.unwrap_or(Path::new(".")).to_owned()
+}
+
+/// How long the disk of `folder` takes for a file of so many `bytes`, which is removed again.
+pub fn time(folder: &Path, bytes: usize) -> io::Result<Duration> {
+    let folder = nearest_folder(folder);
+    let content = vec![0; bytes];
+    let start = Instant::now();
+    let (temporary, mut file) = create(&folder, "plan")?;
+    let written = file.write_all(&content).and_then(|()| file.sync_all()).and_then(|()| sync_folder(&folder));
+    let time = start.elapsed();
+    fs::remove_file(&temporary)?;
+    written.map(|()| time)
 }
 
 /// Creates `folder` and those above it that are missing, each durably.

@@ -36,6 +36,11 @@ pub fn batch(
         let words = axis.words();
         columns.push(if words.is_empty() { Arc::new(Float64Array::from(cells)) } else { labels(&words, &cells)? });
     }
+    for name in &layout.labels {
+        let runs = view.label(name, rows.clone());
+        let cells = runs.iter().flat_map(|(word, length)| std::iter::repeat_n(*word, *length));
+        columns.push(Arc::new(cells.collect::<DictionaryArray<Int32Type>>()));
+    }
     for (column, cells) in layout.columns.iter().zip(&sheet.columns) {
         columns.push(match column.kind {
             Kind::Number(_) | Kind::Quantity(_) => {

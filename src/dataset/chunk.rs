@@ -5,12 +5,10 @@
 
 use bytes::Bytes;
 use parquet::basic::{Compression, Encoding, ZstdLevel};
-use parquet::column::page::{CompressedPage, Page, PageWriter};
 use parquet::column::writer::ColumnCloseResult;
 use parquet::errors::{ParquetError, Result};
 use parquet::file::metadata::ColumnChunkMetaData;
 use parquet::file::statistics::Statistics;
-use parquet::file::writer::{SerializedPageWriter, TrackedWrite};
 use parquet::schema::types::ColumnDescPtr;
 use zstd::bulk::Compressor;
 
@@ -61,33 +59,15 @@ impl Chunk {
             _ => zstd.compress(&bytes).map_err(|error| ParquetError::External(Box::new(error))),
         };
 
-        let mut file = TrackedWrite::new(Vec::with_capacity(raw));
-        let mut pages = SerializedPageWriter::new(&mut file);
-        let (mut compressed, mut uncompressed) = (0, 0);
+        let mut file = Vec::with_capacity(raw);
+        let mut uncompressed = 0;
         let mut dictionary_offset = None;
         if let Some((plain, count)) = self.dictionary {
-            let size = plain.len();
-            let page = Page::DictionaryPage {
-                buf: compress(plain)?.into(),
-                num_values: count,
-                encoding: Encoding::PLAIN,
-                is_sorted: false,
-            };
-            let written = pages.write_page(CompressedPage::new(page, size))?;
-            (compressed, uncompressed) = (written.compressed_size, written.uncompressed_size);
-            dictionary_offset = Some(written.offset as i64);
+            dictionary_offset = Some(0);
+            uncompressed += add_page(&mut file, Kind::Dictionary, count, plain, &mut compress)?;
         }
-        let size = self.data.len();
-        let page = Page::DataPage {
-            buf: compress(self.data)?.into(),
-            num_values: self.rows as u32,
-            encoding: self.encoding,
-            def_level_encoding: Encoding::RLE,
-            rep_level_encoding: Encoding::RLE,
-            statistics: None,
-        };
-        let written = pages.write_page(CompressedPage::new(page, size))?;
-        pages.close()?;
+        let offset = file.len();
+        uncompressed += add_page(&mut file, Kind::Data(self.encoding), self.rows as u32, self.data, &mut compress)?;
 
         let mut encodings = vec![Encoding::RLE, self.encoding];
         if dictionary_offset.is_some() {
@@ -97,10 +77,10 @@ impl Chunk {
             .set_compression(compression)
             .set_encodings(encodings)
             .set_num_values(self.rows as i64)
-            .set_total_compressed_size((compressed + written.compressed_size) as i64)
-            .set_total_uncompressed_size((uncompressed + written.uncompressed_size) as i64)
+            .set_total_compressed_size(file.len() as i64)
+            .set_total_uncompressed_size(uncompressed as i64)
             .set_dictionary_page_offset(dictionary_offset)
-            .set_data_page_offset(written.offset as i64)
+            .set_data_page_offset(offset as i64)
             .set_statistics(self.statistics)
             .build()?;
         let close = ColumnCloseResult {
@@ -111,6 +91,67 @@ impl Chunk {
             column_index: None,
             offset_index: None,
         };
-        Ok((file.into_inner()?.into(), close))
+        Ok((file.into(), close))
     }
+}
+
+/// The kind of a page.
+enum Kind {
+    /// Values in plain encoding.
+    Dictionary,
+    /// Levels and encoded values.
+    Data(Encoding),
+}
+
+/// Adds a page with its header, which has the checksum of its bytes; returns its size before compression, header included.
+///
+/// The header is the struct `PageHeader` of <https://github.com/apache/parquet-format/blob/master/src/main/thrift/parquet.thrift> in Thrift's
+/// compact protocol: the `parquet` crate writes none with a checksum.
+fn add_page(
+    file: &mut Vec<u8>,
+    kind: Kind,
+    count: u32,
+    content: Vec<u8>,
+    compress: &mut impl FnMut(Vec<u8>) -> Result<Vec<u8>>,
+) -> Result<usize> {
+    let size = content.len();
+    let content = compress(content)?;
+    let size_as = |size: usize| i32::try_from(size).map_err(|error| ParquetError::External(Box::new(error)));
+    let (tag, code) = match kind {
+        Kind::Dictionary => (2, Encoding::PLAIN as i32),
+        Kind::Data(encoding) => (0, encoding as i32),
+    };
+    let start = file.len();
+    // Type, both sizes, and the checksum, whose bits are those of a signed number.
+    for field in [tag, size_as(size)?, size_as(content.len())?, crc32fast::hash(&content).cast_signed()] {
+        add_field(file, field);
+    }
+    let (field, rest) = match kind {
+        // Field 7, and whether the dictionary is sorted, which is false.
+        Kind::Dictionary => (0x3c, &[][..]),
+        // Field 5, and the encodings of both levels.
+        Kind::Data(_) => (0x1c, &[Encoding::RLE as i32; 2][..]),
+    };
+    file.push(field);
+    for &field in [count.cast_signed(), code].iter().chain(rest) {
+        add_field(file, field);
+    }
+    if let Kind::Dictionary = kind {
+        file.push(0x12);
+    }
+    file.extend([0, 0]);
+    let header = file.len() - start;
+    file.extend(content);
+    Ok(header + size)
+}
+
+/// The next field of a struct: a number of 32 bits, signs in the lowest bit, seven bits a byte, the lowest first.
+fn add_field(file: &mut Vec<u8>, value: i32) {
+    file.push(0x15);
+    let mut left = (value << 1 ^ value >> 31).cast_unsigned();
+    while left >= 0x80 {
+        file.push(left as u8 | 0x80);
+        left >>= 7;
+    }
+    file.push(left as u8);
 }

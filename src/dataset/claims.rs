@@ -42,6 +42,15 @@ pub fn check_footer(file: &impl ChunkReader) -> Result<(), ParquetError> {
 
 /// Whether no page takes more than memory has, and none is encoded so that its length is known only when it is decoded.
 pub fn check_pages(file: &impl ChunkReader, metadata: &ParquetMetaData) -> Result<(), ParquetError> {
+    page_headers(file, metadata, |_| {})
+}
+
+/// The same; gives `visit` the header of each page.
+pub fn page_headers(
+    file: &impl ChunkReader,
+    metadata: &ParquetMetaData,
+    mut visit: impl FnMut(&[u8]),
+) -> Result<(), ParquetError> {
     for chunk in metadata.row_groups().iter().flat_map(|group| group.columns()) {
         let start = chunk.dictionary_page_offset().unwrap_or(chunk.data_page_offset());
         let (Ok(mut at), Ok(length)) = (u64::try_from(start), u64::try_from(chunk.compressed_size())) else {
@@ -51,19 +60,22 @@ pub fn check_pages(file: &impl ChunkReader, metadata: &ParquetMetaData) -> Resul
         while at < end {
             let left = usize::try_from(end - at).unwrap_or(usize::MAX).min(MOST_OF_HEADER);
             // Headers are short, but for those with long words as least and greatest values.
-            let short = check_page(&file.get_bytes(at, left.min(256))?)?;
-            let page = match short {
-                None => check_page(&file.get_bytes(at, left)?)?,
-                page => page,
-            };
-            at += page.ok_or_else(|| damaged("page header"))?;
+            let mut bytes = file.get_bytes(at, left.min(256))?;
+            let mut page = check_page(&bytes)?;
+            if page.is_none() {
+                bytes = file.get_bytes(at, left)?;
+                page = check_page(&bytes)?;
+            }
+            let (header, page) = page.ok_or_else(|| damaged("page header"))?;
+            visit(bytes.get(..header).unwrap_or_default());
+            at += page;
         }
     }
     Ok(())
 }
 
-/// The bytes from the start of a header to the end of its page; `None` if the header goes on beyond `bytes`.
-fn check_page(bytes: &[u8]) -> Result<Option<u64>, ParquetError> {
+/// The bytes of a header, and from its start to the end of its page; `None` if the header goes on beyond `bytes`.
+fn check_page(bytes: &[u8]) -> Result<Option<(usize, u64)>, ParquetError> {
     let (mut compressed, mut claims) = (None, Ok(()));
     let header = walk(bytes, &mut |path, value| match path {
         [2] if value > MOST_OF_PAGE => claims = Err(excess("a page", value, MOST_OF_PAGE, "bytes")),
@@ -76,7 +88,7 @@ fn check_page(bytes: &[u8]) -> Result<Option<u64>, ParquetError> {
     });
     let Some(header) = header else { return Ok(None) };
     let compressed = compressed.ok_or_else(|| damaged("page header"))?;
-    claims.map(|()| (header as u64).checked_add(compressed))
+    claims.map(|()| (header as u64).checked_add(compressed).map(|page| (header, page)))
 }
 
 fn excess(what: &str, found: i64, most: i64, unit: &str) -> ParquetError {
@@ -235,7 +247,7 @@ mod tests {
         let header = |size: u8, values: u8, encoding: u8| {
             [0x15, 0, 0x15, size, 0x15, 20, 0x2c, 0x15, values, 0x15, encoding, 0, 0]
         };
-        assert_eq!(check_page(&header(20, 2, 0)).expect("claims little"), Some(13 + 10));
+        assert_eq!(check_page(&header(20, 2, 0)).expect("claims little"), Some((13, 13 + 10)));
         for encoding in [6, 7] {
             let error = check_page(&header(20, 2, 2 * encoding)).expect_err("is refused");
             assert!(error.to_string().ends_with("words are encoded as differences"));
@@ -243,7 +255,7 @@ mod tests {
         // A text of 300 bytes goes on beyond the first 256.
         let long = [&header(20, 2, 0)[..12], &[0x18, 0xac, 0x02], &[b'v'; 300], &[0]].concat();
         assert_eq!(check_page(&long[..256]).expect("claims little"), None);
-        assert_eq!(check_page(&long).expect("claims little"), Some(316 + 10));
+        assert_eq!(check_page(&long).expect("claims little"), Some((316, 316 + 10)));
     }
 
     #[test]

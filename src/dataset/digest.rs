@@ -1,17 +1,21 @@
-//! A table read back from disk and told in a few numbers: how many rows of which status, ranges, and where a quantity is least.
+//! A table in a few numbers: how many rows of which status, ranges, and where a quantity is least.
 //!
-//! Parts are read one at a time, so the memory does not grow with the table.
+//! The digest of a part is made when it is encoded, and kept in its footer. Digests add up: in any order, those of the parts give that of the
+//! table, so that nobody reads the rows of a table for its summary.
 
-use std::borrow::Cow;
-use std::path::Path;
+use std::ops;
 
-use super::folder::{Folder, ManifestTable};
-use super::frame::{self, Cells, Frame, FrameError, Row};
-use crate::grid::{Point, Quantity, Scale};
-use crate::model::Units;
+use arrow_schema::ArrowError;
+use serde::{Deserialize, Serialize};
+
+use super::batch::batch;
+use super::cell::{Cell, exact, first_row};
+use super::footer::StatusCounts;
+use super::layout::Layout;
+use crate::grid::{Point, Projection, Quantity, Scale, View};
 use crate::protocol::Status;
 use crate::protocol::swift::FAMILIES;
-use crate::table::{self, Column, Kind, OPTIMUM_AXES, Prediction, STATUS};
+use crate::table::{Kind, OPTIMUM_AXES, Sheet};
 
 /// Tables of at most this many rows are kept whole, and least values are told apart for at most this many transitions.
 pub const FEW: usize = 12;
@@ -19,265 +23,369 @@ pub const FEW: usize = 12;
 /// The column whose least values are looked for.
 const GAP: &str = "gap";
 
-/// What a table contains.
-#[derive(Debug, Clone, PartialEq, Default)]
+/// What some rows of a table contain.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct Digest {
-    /// Parts that are not there.
-    pub missing: u64,
-    /// Rows by status, in the order of [`Status::ALL`].
-    pub status: [u64; Status::ALL.len()],
+    /// Rows by status, in the order of [`Status::ALL`]. A footer has an entry of its own for them.
+    #[serde(skip)]
+    pub status: StatusCounts,
+    /// All columns of the table: name and unit, which is empty for words.
+    pub columns: Vec<(String, String)>,
     /// The columns of numbers after the axes.
     pub ranges: Vec<Range>,
-    /// The columns of words: each word and its rows.
-    pub words: Vec<(String, Vec<(String, u64)>)>,
+    /// The columns of words after the axes: each word that occurs, and its rows.
+    pub words: Vec<(String, Counts)>,
+    /// The labels: each word that occurs, and its rows; `None` if there are more than [`FEW`] words.
+    #[serde(default)]
+    pub labels: Vec<(String, Option<Counts>)>,
     /// Where a simpler theory predicts a column of words: what it predicts, what was found, and in how many rows.
-    pub predicted: Vec<(&'static str, String, u64)>,
-    /// All rows, if they are few.
+    pub predicted: Vec<(String, String, u64)>,
+    /// All rows in their order, if the table has few.
     pub rows: Option<Vec<Row>>,
-    /// The row of least `gap` with status `ok`, of a protocol that arrives, of each transition and time, or the least of all if those are many.
-    pub least: Vec<Row>,
+    /// Where the gap is least.
+    least: Least,
 }
 
+/// Words and how many rows have each, in the order of words.
+pub type Counts = Vec<(String, u64)>;
+
 /// The values of a column.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Range {
     /// Its name.
     pub column: String,
     /// Rows that have a value.
     pub count: u64,
     /// The least.
+    #[serde(with = "exact")]
     pub least: f64,
     /// The greatest.
+    #[serde(with = "exact")]
     pub greatest: f64,
 }
 
-/// Why a table cannot be read back.
-#[derive(Debug, thiserror::Error)]
-#[error("{0}\n  help: delete the file and run the sweep again, which makes only what is missing")]
-pub struct ReadError(#[from] FrameError);
+/// A row.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Row {
+    /// Its number in the table.
+    pub number: u64,
+    /// Its cells, one a column.
+    pub cells: Vec<Cell>,
+}
+
+/// The rows of least gap with status `ok`, of protocols that arrive.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+struct Least {
+    /// Whether there are too many transitions to tell them apart: then the least of all is the only one here.
+    many: bool,
+    /// One a transition and time, in the order of their first rows.
+    each: Vec<Candidate>,
+}
+
+/// A row of least gap.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+struct Candidate {
+    /// The first row of its transition and time that has status `ok`.
+    first: u64,
+    row: Row,
+}
 
 impl Digest {
-    /// Reads the parts of `table` that are there; its values are in `units`.
-    pub fn read(folder: &Folder, table: &ManifestTable, units: &Units) -> Result<Digest, ReadError> {
-        let there = folder.parts_there(table);
-        let missing = table.parts - there.len() as u64;
-        let mut digest = Digest::read_parts(folder, table, units, there)?;
-        digest.missing += missing;
-        Ok(digest)
-    }
-
-    /// Reads some parts of `table`.
-    pub fn read_parts(
-        folder: &Folder,
-        table: &ManifestTable,
-        units: &Units,
-        parts: impl IntoIterator<Item = u64>,
-    ) -> Result<Digest, ReadError> {
-        let mut digest = Digest { rows: (table.rows <= FEW as u64).then(Vec::new), ..Digest::default() };
-        let mut least = Least::default();
-        for part in parts {
-            let path = folder.part(&table.name, part);
-            if !folder.has_part(&table.name, part) {
-                digest.missing += 1;
-                continue;
-            }
-            digest.add(&table.name, &path, units, &mut least)?;
-        }
-        digest.least = least.rows();
-        Ok(digest)
-    }
-
-    fn add(&mut self, table: &str, path: &Path, units: &Units, least: &mut Least) -> Result<(), FrameError> {
-        let prediction = table::find(table).and_then(|table| table.prediction());
-        let columns = table::find(table).map_or(&[][..], |table| table.columns());
-        let (headings, _) = frame::headings(path)?;
-        let written = |name: &str| headings.iter().any(|heading| heading.name == name);
-        let columns: Vec<&Column> = columns.iter().filter(|column| written(column.name)).collect();
-        let with_gap = columns.iter().any(|column| column.name == GAP);
-        // The axes are only needed to tell transitions apart: reading them all would take as long as reading the results.
-        let keys = keys(table);
-        let prediction = prediction.filter(|prediction| written(prediction.column));
-        let axes = keys.iter().filter(|_| with_gap).chain(prediction.map_or(&[][..], |prediction| prediction.axes));
-        let axes = axes.map(|axis| axis.name());
-        let names: Vec<&str> = axes.chain(columns.iter().map(|column| column.name)).chain([STATUS]).collect();
-        let frame = &frame::read(path, &names)?;
-        for (word, rows) in count_words(frame, STATUS) {
-            if let Some(status) = Status::ALL.iter().position(|status| status.name() == word) {
-                self.status[status] += rows;
-            }
-        }
-        for column in columns {
+    /// The digest of `rows`, whose cells are in `sheet`.
+    ///
+    /// # Errors
+    ///
+    /// A sheet that does not fit the layout.
+    pub fn of(
+        layout: &Layout,
+        projection: &Projection,
+        rows: ops::Range<u64>,
+        sheet: &Sheet,
+    ) -> Result<Digest, ArrowError> {
+        let unit = |field: &arrow_schema::FieldRef| field.metadata().get("unit").cloned().unwrap_or_default();
+        let fields = layout.schema.fields().iter();
+        let mut digest =
+            Digest { columns: fields.map(|field| (field.name().clone(), unit(field))).collect(), ..Digest::default() };
+        sheet.status.iter().for_each(|status| digest.status[*status as usize] += 1);
+        for (column, cells) in layout.columns.iter().zip(&sheet.columns) {
             match column.kind {
-                Kind::Number(_) | Kind::Quantity(_) => self.add_numbers(frame, column.name),
-                Kind::Label(_) | Kind::Flag => self.add_words(column.name, count_words(frame, column.name)),
+                Kind::Number(_) | Kind::Quantity(_) => digest.ranges.push(Range::of(column.name, cells)),
+                Kind::Label(words) => digest.words.push((column.name.to_owned(), counts(words, cells))),
+                Kind::Flag => digest.words.push((column.name.to_owned(), counts(&["no", "yes"], cells))),
             }
         }
-        if let Some(prediction) = prediction {
-            self.add_predictions(frame, &prediction, units);
-        }
-        if let Some(rows) = &mut self.rows {
-            let whole = frame::read_all(path)?;
-            rows.extend((0..whole.height).map(|row| whole.row(row)));
-        }
-        if with_gap {
-            least.add(frame, path, &keys)?;
-        }
-        Ok(())
-    }
-
-    fn add_numbers(&mut self, frame: &Frame, name: &str) {
-        let Some(Cells::Numbers(values)) = frame.column(name) else { return };
-        let mut range = Range { column: name.to_owned(), count: 0, least: f64::INFINITY, greatest: f64::NEG_INFINITY };
-        for &value in values.iter().filter(|value| !value.is_nan()) {
-            range.count += 1;
-            range.least = range.least.min(value);
-            range.greatest = range.greatest.max(value);
-        }
-        match self.ranges.iter_mut().find(|range| range.column == name) {
-            Some(all) => {
-                all.count += range.count;
-                all.least = all.least.min(range.least);
-                all.greatest = all.greatest.max(range.greatest);
-            }
-            None => self.ranges.push(range),
-        }
-    }
-
-    fn add_predictions(&mut self, frame: &Frame, prediction: &Prediction, units: &Units) {
-        let axes: Vec<Cow<'_, [f64]>> = prediction.axes.iter().map(|axis| numbers(frame, *axis)).collect();
-        let Some(Cells::Words(found, words)) = frame.column(prediction.column) else { return };
-        let mut point = Point::default();
-        for (row, place) in found.iter().enumerate() {
-            let Some(word) = place.and_then(|place| words.get(place as usize)) else { continue };
-            for (quantity, values) in prediction.axes.iter().zip(&axes) {
-                let value = values.get(row).copied().unwrap_or(f64::NAN);
-                point[*quantity] = units.scaled(quantity.unit(Scale::Model), value);
-            }
-            let predicted = (prediction.word)(&point);
-            match self.predicted.iter_mut().find(|(p, f, _)| (*p, f) == (predicted, word)) {
-                Some((.., rows)) => *rows += 1,
-                None => self.predicted.push((predicted, word.clone(), 1)),
-            }
-        }
-        self.predicted.sort();
-    }
-
-    fn add_words(&mut self, name: &str, found: Vec<(String, u64)>) {
-        let place = match self.words.iter().position(|(column, _)| column == name) {
-            Some(place) => place,
-            None => {
-                self.words.push((name.to_owned(), Vec::new()));
-                self.words.len() - 1
-            }
+        let view = projection.view(rows.clone());
+        let labels = layout.labels.iter().map(|name| (name.clone(), labelled(&view.label(name, rows.clone()))));
+        digest.labels = labels.collect();
+        digest.predicted = predicted(layout, &view, &rows, sheet);
+        let whole = |places: &mut dyn Iterator<Item = usize>| -> Result<Vec<Row>, ArrowError> {
+            places.map(|place| row(layout, projection, rows.start + place as u64, sheet, place)).collect()
         };
-        let counts = &mut self.words[place].1;
-        for (word, rows) in found {
-            match counts.iter_mut().find(|(known, _)| *known == word) {
-                Some((_, count)) => *count += rows,
-                None => counts.push((word, rows)),
-            }
+        if projection.rows() <= FEW as u64 {
+            digest.rows = Some(whole(&mut (0..sheet.status.len()))?);
         }
-        counts.sort();
+        let (many, found) = least(layout, &view, &rows, sheet);
+        let least = whole(&mut found.iter().map(|(_, place)| *place))?;
+        let firsts = found.iter().map(|(first, _)| rows.start + *first as u64);
+        digest.least = Least { many, each: firsts.zip(least).map(|(first, row)| Candidate { first, row }).collect() };
+        Ok(digest)
+    }
+
+    /// The digest of the rows of both. The order does not matter, nor how many are merged at a time.
+    pub fn merge(mut self, other: Digest) -> Digest {
+        if self.columns.is_empty() {
+            return other;
+        }
+        if other.columns.is_empty() {
+            return self;
+        }
+        self.status.iter_mut().zip(other.status).for_each(|(sum, count)| *sum += count);
+        for (range, other) in self.ranges.iter_mut().zip(&other.ranges) {
+            range.count += other.count;
+            range.least = range.least.min(other.least);
+            range.greatest = range.greatest.max(other.greatest);
+        }
+        for ((_, counts), (_, others)) in self.words.iter_mut().zip(other.words) {
+            others.into_iter().for_each(|(word, rows)| add(counts, &word, rows));
+        }
+        for ((_, counts), (_, others)) in self.labels.iter_mut().zip(other.labels) {
+            *counts = counts.take().zip(others).and_then(|(mut counts, others)| {
+                others.into_iter().for_each(|(word, rows)| add(&mut counts, &word, rows));
+                (counts.len() <= FEW).then_some(counts)
+            });
+        }
+        for (predicted, found, rows) in other.predicted {
+            count(&mut self.predicted, &predicted, &found, rows);
+        }
+        if let (Some(rows), Some(others)) = (&mut self.rows, other.rows) {
+            rows.extend(others);
+            rows.sort_by_key(|row| row.number);
+        }
+        self.least = self.least.merge(other.least, &self.columns);
+        self
+    }
+
+    /// The row of least gap with status `ok`, of a protocol that arrives, of each transition and time; the least of all if those are many.
+    pub fn least(&self) -> impl Iterator<Item = &Row> {
+        self.least.each.iter().map(|candidate| &candidate.row)
+    }
+
+    /// The unit of a column; empty for words.
+    pub fn unit(&self, column: &str) -> &str {
+        self.columns.iter().find(|(name, _)| name == column).map_or("", |(_, unit)| unit)
     }
 }
 
-/// The words of a column that occur, and how many rows have each.
-fn count_words(frame: &Frame, name: &str) -> Vec<(String, u64)> {
-    let Some(Cells::Words(places, words)) = frame.column(name) else { return Vec::new() };
+impl Row {
+    /// The cell of a column.
+    pub fn cell(&self, place: usize) -> &Cell {
+        self.cells.get(place).unwrap_or(&Cell::Missing)
+    }
+}
+
+impl Range {
+    fn of(column: &str, cells: &[f64]) -> Range {
+        /// Values that are compared side by side, so that the compiler can use vector instructions.
+        const LANES: usize = 8;
+        let (mut count, mut least, mut greatest) = (0, [f64::INFINITY; LANES], [f64::NEG_INFINITY; LANES]);
+        for chunk in cells.chunks(LANES) {
+            for ((&value, least), greatest) in chunk.iter().zip(&mut least).zip(&mut greatest) {
+                count += u64::from(!value.is_nan());
+                *least = if value < *least { value } else { *least };
+                *greatest = if value > *greatest { value } else { *greatest };
+            }
+        }
+        // Of two zeros, the sign would depend on the order.
+        let least = least.into_iter().fold(f64::INFINITY, f64::min) + 0.0;
+        let greatest = greatest.into_iter().fold(f64::NEG_INFINITY, f64::max) + 0.0;
+        Range { column: column.to_owned(), count, least, greatest }
+    }
+}
+
+/// Adds the rows of a word.
+fn add(counts: &mut Counts, word: &str, rows: u64) {
+    match counts.binary_search_by(|(known, _)| known.as_str().cmp(word)) {
+        Ok(place) => counts[place].1 += rows,
+        Err(place) => counts.insert(place, (word.to_owned(), rows)),
+    }
+}
+
+/// The words of a label in these runs, and how many rows have each; `None` if they are not few.
+fn labelled(runs: &[(Option<&str>, usize)]) -> Option<Counts> {
+    let mut counts = Counts::new();
+    for (word, rows) in runs.iter().filter_map(|(word, rows)| Some(((*word)?, *rows))) {
+        add(&mut counts, word, rows as u64);
+        if counts.len() > FEW {
+            return None;
+        }
+    }
+    Some(counts)
+}
+
+/// How many `cells`, places in `words`, hold which word.
+fn counts(words: &[&str], cells: &[f64]) -> Counts {
     let mut counts = vec![0_u64; words.len()];
-    for place in places.iter().flatten() {
-        if let Some(count) = counts.get_mut(*place as usize) {
+    for cell in cells.iter().filter(|cell| !cell.is_nan()) {
+        if let Some(count) = counts.get_mut(*cell as usize) {
             *count += 1;
         }
     }
-    words.iter().cloned().zip(counts).filter(|(_, count)| *count > 0).collect()
+    let words = words.iter().map(|word| (*word).to_owned());
+    let mut counts: Counts = words.zip(counts).filter(|(_, count)| *count > 0).collect();
+    counts.sort();
+    counts
+}
+
+/// Counts `rows` in which `predicted` was predicted and `found` was found.
+fn count(counts: &mut Vec<(String, String, u64)>, predicted: &str, found: &str, rows: u64) {
+    match counts.binary_search_by(|(p, f, _)| (p.as_str(), f.as_str()).cmp(&(predicted, found))) {
+        Ok(place) => counts[place].2 += rows,
+        Err(place) => counts.insert(place, (predicted.to_owned(), found.to_owned(), rows)),
+    }
+}
+
+fn predicted(layout: &Layout, view: &View<'_>, rows: &ops::Range<u64>, sheet: &Sheet) -> Vec<(String, String, u64)> {
+    let mut counted = Vec::new();
+    let Some(prediction) = &layout.prediction else { return counted };
+    let column = layout.columns.iter().zip(&sheet.columns).find(|(column, _)| column.name == prediction.column);
+    let Some((Kind::Label(words), cells)) = column.map(|(column, cells)| (column.kind, cells)) else { return counted };
+    let mut axes: Vec<(Quantity, Vec<f64>)> = Vec::new();
+    for axis in prediction.axes {
+        let Some(runs) = view.runs(*axis, rows.clone()) else { continue };
+        let unit = axis.unit(Scale::Model);
+        let values: Vec<f64> = runs.values().iter().map(|value| layout.units.scaled(unit, *value)).collect();
+        let each = runs.over(rows.clone()).flat_map(|(step, length)| std::iter::repeat_n(values[step], length));
+        axes.push((*axis, each.collect()));
+    }
+    let mut point = Point::default();
+    for (place, cell) in cells.iter().enumerate() {
+        let found = if cell.is_nan() { None } else { words.get(*cell as usize) };
+        let Some(found) = found else { continue };
+        for (axis, values) in &axes {
+            point[*axis] = values.get(place).copied().unwrap_or(f64::NAN);
+        }
+        count(&mut counted, (prediction.word)(&point), found, 1);
+    }
+    counted
 }
 
 /// What tells rows apart for which a least gap each is of interest: the optimal problem, or the transition and the family.
-fn keys(table: &str) -> Vec<Quantity> {
-    let has_family = table::find(table).is_some_and(|table| table.axes().contains(&Quantity::Family));
-    let (added, dropped) = (has_family.then_some(Quantity::Family), has_family.then_some(Quantity::Time));
-    OPTIMUM_AXES.iter().copied().filter(|axis| Some(*axis) != dropped).chain(added).collect()
+fn is_key(name: &str, has_family: bool) -> bool {
+    let axis = if has_family { Quantity::Time } else { Quantity::Family };
+    name != axis.name() && (name == Quantity::Family.name() || OPTIMUM_AXES.iter().any(|axis| axis.name() == name))
 }
 
-/// The column of an axis as numbers; of words, their places.
-fn numbers(frame: &Frame, axis: Quantity) -> Cow<'_, [f64]> {
-    match frame.column(axis.name()) {
-        Some(Cells::Numbers(numbers)) => numbers.into(),
-        Some(Cells::Words(places, words)) => {
-            let known = |word: &String| axis.words().iter().position(|known| known == word);
-            let codes: Vec<f64> = words.iter().map(|word| known(word).map_or(f64::NAN, |place| place as f64)).collect();
-            let code = |place: &Option<u32>| place.and_then(|place| codes.get(place as usize).copied());
-            places.iter().map(|place| code(place).unwrap_or(f64::NAN)).collect()
+/// Whether there are many transitions; and of each, or of all if they are many, the first row with status `ok` and the row of least gap, as
+/// places in `sheet`.
+fn least(layout: &Layout, view: &View<'_>, rows: &ops::Range<u64>, sheet: &Sheet) -> (bool, Vec<(usize, usize)>) {
+    let gaps = layout.columns.iter().zip(&sheet.columns).find(|(column, _)| column.name == GAP);
+    let Some((_, gaps)) = gaps else { return (false, Vec::new()) };
+    let has_family = layout.axes.contains(&Quantity::Family);
+    let keys = layout.axes.iter().filter(|axis| is_key(axis.name(), has_family));
+    let keys: Vec<_> = keys.filter_map(|axis| Some((*axis, view.runs(*axis, rows.clone())?))).collect();
+    // The runs of every key that are not over yet: its value, and the place at which it ends.
+    let mut runs: Vec<_> = keys.iter().map(|(_, runs)| (runs.over(rows.clone()), f64::NAN, 0)).collect();
+    let family = keys.iter().position(|(axis, _)| *axis == Quantity::Family);
+    let (mut many, mut found) = (false, Vec::<(Vec<f64>, usize, usize)>::new());
+    let (mut place, mut current) = (0, 0);
+    while place < sheet.status.len() {
+        let mut end = sheet.status.len();
+        for ((_, values), (run, value, stop)) in keys.iter().zip(&mut runs) {
+            if *stop <= place
+                && let Some((step, length)) = run.next()
+            {
+                (*value, *stop) = (values.values()[step], place + length);
+            }
+            end = end.min((*stop).max(place + 1));
         }
-        None => vec![f64::NAN; frame.height].into(),
+        let stretch = place..end;
+        place = end;
+        let member = family.and_then(|family| FAMILIES.get(runs[family].1 as usize));
+        if member.is_some_and(|member| !member.arrives()) {
+            continue;
+        }
+        let mut best: Option<(usize, usize)> = None;
+        for row in stretch {
+            let gap = gaps[row];
+            if gap.is_nan() || sheet.status[row] != Status::Ok {
+                continue;
+            }
+            match &mut best {
+                Some((_, least)) if gap < gaps[*least] => *least = row,
+                Some(_) => {}
+                None => best = Some((row, row)),
+            }
+        }
+        let Some((first, least)) = best else { continue };
+        let is_same = |(key, ..): &(Vec<f64>, usize, usize)| {
+            many || key.iter().zip(&runs).all(|(key, (_, value, _))| key.to_bits() == value.to_bits())
+        };
+        if !found.get(current).is_some_and(is_same) {
+            current = found.iter().position(is_same).unwrap_or(found.len());
+        }
+        match found.get_mut(current) {
+            Some((.., known)) if gaps[least] < gaps[*known] => *known = least,
+            Some(_) => {}
+            None => found.push((runs.iter().map(|(_, value, _)| *value).collect(), first, least)),
+        }
+        if found.len() > FEW {
+            many = true;
+            let is_less =
+                |one: usize, other: usize| gaps[one] < gaps[other] || (gaps[one] == gaps[other] && one < other);
+            found = found
+                .into_iter()
+                .reduce(|one, other| if is_less(other.2, one.2) { other } else { one })
+                .into_iter()
+                .collect();
+            current = 0;
+        }
     }
+    if many {
+        // Where they are not told apart, the first row is that of the least gap.
+        found.iter_mut().for_each(|(_, first, least)| *first = *least);
+    }
+    (many, found.into_iter().map(|(_, first, least)| (first, least)).collect())
 }
 
-/// The least gap of each transition and time so far, while those are few, and of all.
-#[derive(Default)]
-struct Least {
-    each: Vec<(Vec<u64>, f64, Row)>,
-    many: bool,
-    all: Option<(f64, Row)>,
+/// Row number `number` of the table, the cells of which are at `place` in `sheet`.
+fn row(layout: &Layout, projection: &Projection, number: u64, sheet: &Sheet, place: usize) -> Result<Row, ArrowError> {
+    let columns = sheet.columns.iter().map(|column| vec![column[place]]).collect();
+    let single = Sheet { columns, status: vec![sheet.status[place]] };
+    Ok(Row { number, cells: first_row(&batch(layout, projection, number..number + 1, &single)?) })
 }
 
 impl Least {
-    fn add(&mut self, frame: &Frame, path: &Path, keys: &[Quantity]) -> Result<(), FrameError> {
-        let (Some(Cells::Numbers(gaps)), Some(Cells::Words(status, words))) = (frame.column(GAP), frame.column(STATUS))
-        else {
-            return Ok(());
+    fn merge(mut self, other: Least, columns: &[(String, String)]) -> Least {
+        let place = |name: &str| columns.iter().position(|(column, _)| column == name);
+        let Some(gap) = place(GAP) else { return self };
+        let value = |row: &Row| row.cell(gap).number().unwrap_or(f64::INFINITY);
+        // Of equal gaps, that of the first row.
+        let is_less = |one: &Row, other: &Row| {
+            value(one) < value(other) || (value(one) == value(other) && one.number < other.number)
         };
-        let ok = words.iter().position(|word| word == Status::Ok.name()).map(|place| place as u32);
-        let axes: Vec<Cow<'_, [f64]>> = keys.iter().map(|axis| numbers(frame, *axis)).collect();
-        let family = keys.iter().position(|key| *key == Quantity::Family);
-        let arrives = |index: usize| {
-            family.is_none_or(|key| FAMILIES.get(axes[key][index] as usize).is_none_or(|family| family.arrives()))
-        };
-        // Within a part: the row of the least gap of each tuple, tuples in the order in which they come.
-        let mut found: Vec<(usize, f64)> = Vec::new();
-        let mut current = 0;
-        let same = |a: usize, b: usize| axes.iter().all(|axis| axis[a].to_bits() == axis[b].to_bits());
-        for (index, (&gap, &status)) in gaps.iter().zip(status).enumerate() {
-            if gap.is_nan() || ok.is_none() || status != ok || !arrives(index) {
-                continue;
-            }
-            if found.get(current).is_none_or(|(other, _)| !same(*other, index)) {
-                current = match found.iter().position(|(other, _)| same(*other, index)) {
-                    Some(place) => place,
-                    None if found.len() <= FEW => {
-                        found.push((index, gap));
-                        found.len() - 1
+        let has_family = place(Quantity::Family.name()).is_some();
+        let keys = (0..columns.len()).filter(|&place| is_key(&columns[place].0, has_family));
+        let keys: Vec<usize> = keys.collect();
+        let is_same = |one: &Row, other: &Row| keys.iter().all(|&key| one.cell(key).is_same(other.cell(key)));
+        self.many |= other.many;
+        for candidate in other.each {
+            match self.each.iter_mut().find(|known| self.many || is_same(&known.row, &candidate.row)) {
+                Some(known) => {
+                    known.first = known.first.min(candidate.first);
+                    if is_less(&candidate.row, &known.row) {
+                        known.row = candidate.row;
                     }
-                    // Too many to tell apart: only the least of all counts from here on.
-                    None => FEW,
-                };
-            }
-            if gap < found[current].1 {
-                found[current] = (index, gap);
+                }
+                None => self.each.push(candidate),
             }
         }
-        self.many |= found.len() > FEW;
-        for (index, gap) in found {
-            let tuple: Vec<u64> = axes.iter().map(|axis| axis[index].to_bits()).collect();
-            if self.all.as_ref().is_none_or(|(least, _)| gap < *least) {
-                self.all = Some((gap, frame::row(path, index)?));
-            }
-            match self.each.iter().position(|(known, ..)| *known == tuple) {
-                Some(place) if gap < self.each[place].1 => self.each[place] = (tuple, gap, frame::row(path, index)?),
-                Some(_) => {}
-                None if self.each.len() < FEW => self.each.push((tuple, gap, frame::row(path, index)?)),
-                None => self.many = true,
-            }
-        }
-        Ok(())
-    }
-
-    fn rows(self) -> Vec<Row> {
+        self.many |= self.each.len() > FEW;
         if self.many {
-            self.all.into_iter().map(|(_, row)| row).collect()
-        } else {
-            self.each.into_iter().map(|(_, _, row)| row).collect()
+            let least =
+                self.each.into_iter().reduce(|one, other| if is_less(&other.row, &one.row) { other } else { one });
+            self.each = least.map(|least| Candidate { first: least.row.number, ..least }).into_iter().collect();
         }
+        self.each.sort_by_key(|candidate| candidate.first);
+        self
     }
 }

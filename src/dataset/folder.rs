@@ -2,78 +2,85 @@
 
 use std::fs;
 use std::io;
-use std::ops::Range;
 use std::path::{Path, PathBuf};
-use std::time::SystemTime;
 
-use serde::{Deserialize, Serialize};
+use rayon::prelude::*;
 
 use super::atomic::{self, Unwritten};
 use super::footer::Footer;
-use super::state::{self, Look, State};
+use super::manifest::{Manifest, ManifestTable};
+use super::state::{self, Look, OpenPart, State};
 
-/// What a dataset was made from: parts of different identity never share a folder.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Identity {
-    /// SHA-256 of the checked spec: comments, spacing and description do not enter it.
-    pub spec_hash: String,
-    /// Version of the program.
-    pub version: String,
-}
-
-/// One table of a dataset.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
-pub struct ManifestTable {
-    /// Its name, also of its folder.
-    pub name: String,
-    /// All its rows.
-    pub rows: u64,
-    /// Its parts.
-    pub parts: u64,
-    /// Rows of every part but the last, which may have fewer.
-    pub rows_per_part: u64,
-}
-
-impl ManifestTable {
-    /// The rows of part number `part`; none if there is no such part, whatever a manifest claims.
-    pub fn rows_of(&self, part: u64) -> Range<u64> {
-        let start = part.saturating_mul(self.rows_per_part).min(self.rows);
-        start..start.saturating_add(self.rows_per_part).min(self.rows)
-    }
-}
-
-/// `manifest.json`: what the finished dataset consists of. It is there before the first part, and follows from the spec as well as from any
-/// part, so that nobody has to guard it.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Manifest {
-    /// The name of the dataset.
-    pub name: String,
-    /// What it was made from.
-    #[serde(flatten)]
-    pub identity: Identity,
-    /// The tables, in the order of the spec.
-    pub tables: Vec<ManifestTable>,
-    /// The text of the spec.
-    pub spec: String,
-}
+/// What to do about a dataset in the place of another one.
+const WAYS_OUT: &str = "change `name` in the spec, or write elsewhere with --out DIR, or remove the dataset";
 
 /// What can go wrong with the files of a dataset.
 #[derive(Debug, thiserror::Error)]
 pub enum DatasetError {
-    /// The folder holds a dataset of another spec or version.
+    /// The folder holds a dataset of another spec, or that another program computed.
     #[error(
-        "{folder}: holds a dataset of another {what}\n  expected: {expected}\n  found: {found}\n  help: delete the folder, or write \
-         elsewhere with --out DIR"
+        "{folder}: holds a dataset of another {what}\n  expected: {expected}\n  found: {found}\n  help: {WAYS_OUT}"
     )]
     Foreign {
         /// The folder.
         folder: String,
-        /// `spec` or `version`.
+        /// `version` or `numerics revision`.
         what: &'static str,
         /// What this run has.
         expected: String,
         /// What the folder has.
         found: String,
+    },
+    /// The folder holds a dataset of another spec.
+    #[error("{folder}: holds a dataset of another spec\n  expected: {expected}\n  found: {found}\n  help: {WAYS_OUT}")]
+    OtherSpec {
+        /// The folder.
+        folder: String,
+        /// The table that differs.
+        table: String,
+        /// What this spec has: the hash of the table, or the key that differs.
+        expected: String,
+        /// What the folder has.
+        found: String,
+        /// The text of the spec in the folder.
+        spec: String,
+    },
+    /// The folder holds tables that the spec lacks, and lacks some that the spec has.
+    #[error(
+        "{folder}: the spec and the dataset each have a table that the other lacks\n  expected: {expected}\n  found: {found}\n  help: add \
+         [tables.{}] to the spec, which keeps its rows and computes yours; or {WAYS_OUT}",
+        missing.join("] and [tables.")
+    )]
+    OtherTables {
+        /// The folder.
+        folder: String,
+        /// The tables of the spec.
+        expected: String,
+        /// The tables of the dataset.
+        found: String,
+        /// Those that the spec lacks.
+        missing: Vec<String>,
+    },
+    /// Another run is at work.
+    #[error(
+        "{folder}: another run is at work here{process}\n  help: wait for its end, `slipsweep status {folder}` shows what is finished; only \
+         shards (--shard I/N) run side by side"
+    )]
+    Busy {
+        /// The folder.
+        folder: String,
+        /// The process, in brackets, if it is known.
+        process: String,
+    },
+    /// Somebody changed the dataset while this run was at work.
+    #[error(
+        "{folder}: {what} while this run was at work; it stopped there\n  help: run the same command again, which keeps what is finished"
+    )]
+    Taken {
+        /// The folder.
+        folder: String,
+        /// What happened.
+        what: &'static str,
     },
     /// The folder holds something else.
     #[error(
@@ -86,8 +93,8 @@ pub enum DatasetError {
     },
     /// A file in the place of a part was not made by this sweep.
     #[error(
-        "{path}: belongs to another {what}\n  expected: {expected}\n  found: {found}\n  help: move the file away, or delete it; the same \
-         command then makes the part and keeps all others"
+        "{path}: belongs to another {what}\n  expected: {expected}\n  found: {found}\n  help: move the file away; `slipsweep run` then \
+         computes the part and keeps all others"
     )]
     ForeignPart {
         /// The file.
@@ -99,13 +106,28 @@ pub enum DatasetError {
         /// What the file has.
         found: String,
     },
-    /// The manifest cannot be understood.
-    #[error("{path}: not a manifest: {source}\n  help: delete the file; the next run makes it again")]
+    /// A part is broken.
+    #[error(
+        "{path}: the part is damaged: {why}\n  help: `slipsweep run {dataset}` recomputes it and keeps all sound parts"
+    )]
+    DamagedPart {
+        /// The file.
+        path: String,
+        /// In what way.
+        why: String,
+        /// The folder of the dataset.
+        dataset: String,
+    },
+    /// The manifest is damaged, and no part says what it said.
+    #[error(
+        "{path}: damaged, or not of this version of slipsweep: {why}\n  help: run the spec of the dataset, which writes it again if no part \
+         is there; else {WAYS_OUT}"
+    )]
     Manifest {
         /// The file.
         path: String,
-        /// Why.
-        source: serde_json::Error,
+        /// In what way.
+        why: String,
     },
     /// The system refused.
     #[error(
@@ -167,89 +189,90 @@ impl Folder {
         self.path.join(table).join(format!("part-{part:06}.parquet"))
     }
 
-    /// The manifest, if there is one.
+    /// Where the manifest is or will be.
+    pub fn manifest_path(&self) -> PathBuf {
+        self.path.join("manifest.json")
+    }
+
+    /// The manifest, if there is one; as the parts say it, where its file is missing or damaged.
+    ///
+    /// # Errors
+    ///
+    /// If it cannot be read, or is damaged and no part is there.
     pub fn manifest(&self) -> Result<Option<Manifest>, DatasetError> {
-        let path = self.path.join("manifest.json");
+        let why = match self.read_manifest() {
+            Ok(Some(manifest)) => return Ok(Some(manifest)),
+            Ok(None) => "missing".to_owned(),
+            Err(DatasetError::Manifest { path, why }) => match self.manifest_of_parts() {
+                Some(manifest) => return Ok(Some(Manifest { rebuilt: Some(format!("damaged: {why}")), ..manifest })),
+                None => return Err(DatasetError::Manifest { path, why }),
+            },
+            Err(error) => return Err(error),
+        };
+        Ok(self.manifest_of_parts().map(|manifest| Manifest { rebuilt: Some(why), ..manifest }))
+    }
+
+    /// The manifest as its file says it; `None` if there is no file.
+    pub(super) fn read_manifest(&self) -> Result<Option<Manifest>, DatasetError> {
+        let path = self.manifest_path();
         let read = fs::metadata(&path).and_then(|metadata| {
             // Reading a named pipe would wait for somebody who writes, and a device might never end.
             if metadata.is_file() { fs::read(&path) } else { Err(io::Error::other("it is not a file")) }
         });
         match read {
-            Ok(bytes) => serde_json::from_slice(&bytes)
+            Ok(bytes) => Manifest::from_bytes(&bytes)
                 .map(Some)
-                .map_err(|source| DatasetError::Manifest { path: path.display().to_string(), source }),
+                .map_err(|why| DatasetError::Manifest { path: path.display().to_string(), why }),
             Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(None),
             Err(error) => Err(failed(&path, "read", error)),
         }
     }
 
-    /// The manifest as the parts tell it, if there is a part that can be read.
-    pub fn manifest_of_parts(&self) -> Option<Manifest> {
-        let is_part = |path: &Path| {
-            let name = path.file_name().unwrap_or_default().to_string_lossy();
-            name.starts_with("part-") && name.ends_with(".parquet")
-        };
-        let parts = sorted(&self.path, Path::is_dir).into_iter().flat_map(|table| sorted(&table, is_part));
-        let mut footers = parts.filter_map(|part| Footer::from_entries(&state::footer_of(&part).ok()??));
-        footers.next().map(Footer::manifest)
+    /// The manifest as the parts say it, if there is a part that can be read: of the tables, those that have parts were planned last.
+    pub(super) fn manifest_of_parts(&self) -> Option<Manifest> {
+        let first = |table: PathBuf| sorted(&table, is_part).into_iter().find_map(|part| state::footer_of(&part));
+        let footers = sorted(&self.path, Path::is_dir).into_iter().filter_map(first);
+        // Tables are only ever added.
+        footers.map(Footer::manifest).reduce(|most, next| if next.covers(&most) { next } else { most })
     }
 
-    /// Makes the folder ready for the parts of `manifest`, or refuses if it belongs to something else.
-    pub fn open(&self, manifest: &Manifest) -> Result<(), DatasetError> {
-        let mut found = self.manifest()?;
-        let occupied = found.is_none()
-            && fs::read_dir(&self.path).is_ok_and(|entries| {
-                entries.flatten().any(|entry| !entry.file_name().to_string_lossy().starts_with('.'))
-            });
-        if occupied {
-            // Another run may have published its manifest, the first file with a name, a moment ago.
-            found = self.manifest()?;
-        }
-        match found.clone().or_else(|| self.manifest_of_parts()) {
-            Some(found) => self.compare(manifest, &found)?,
-            None if occupied => {
-                return Err(DatasetError::Occupied { folder: self.path.display().to_string() });
+    /// Whether there is something with the name of a part.
+    pub(super) fn has_parts(&self) -> bool {
+        sorted(&self.path, Path::is_dir).iter().any(|table| !sorted(table, is_part).is_empty())
+    }
+
+    /// Whether a run of `expected` may work on the dataset of `found`.
+    pub(super) fn compare(&self, expected: &Manifest, found: &Manifest) -> Result<(), DatasetError> {
+        let folder = self.path.display().to_string();
+        let (here, there) = (&expected.build, &found.build);
+        for (what, here, there) in
+            [("version", &here.version, &there.version), ("numerics revision", &here.revision, &there.revision)]
+        {
+            if here != there {
+                let expected = format!("{here}, of this program");
+                return Err(DatasetError::Foreign { folder, what, expected, found: there.clone() });
             }
-            None => {}
         }
-        let create =
-            |folder: &Path| atomic::create_folder(folder).map_err(|error| failed(folder, "create the folder", error));
-        create(&self.path)?;
-        // Thousands of shards find it as it should be: none of them needs to write it again.
-        if found.as_ref() != Some(manifest) {
-            let path = self.path.join("manifest.json");
-            let mut text = serde_json::to_vec_pretty(manifest)
-                .map_err(|source| DatasetError::Manifest { path: path.display().to_string(), source })?;
-            text.push(b'\n');
-            atomic::write(&path, &text).map_err(|error| unwritten(&path, error))?;
+        for table in &expected.tables {
+            if let Some(other) = found.table(&table.name)
+                && other.hash != table.hash
+            {
+                let (expected, there) = (table.hash.clone(), other.hash.clone());
+                let (table, spec) = (table.name.clone(), found.spec.clone());
+                return Err(DatasetError::OtherSpec { folder, table, expected, found: there, spec });
+            }
         }
-        let now = SystemTime::now();
-        atomic::sweep(&self.path, now);
-        for table in &manifest.tables {
-            let folder = self.path.join(&table.name);
-            create(&folder)?;
-            atomic::sweep(&folder, now);
-        }
-        Ok(())
-    }
-
-    fn compare(&self, expected: &Manifest, found: &Manifest) -> Result<(), DatasetError> {
-        let foreign = |what, expected: &str, found: &str| DatasetError::Foreign {
-            folder: self.path.display().to_string(),
-            what,
-            expected: expected.to_owned(),
-            found: found.to_owned(),
+        let lacks = |manifest: &Manifest, other: &Manifest| -> Vec<String> {
+            let names = other.tables.iter().map(|table| &table.name);
+            names.filter(|name| manifest.table(name).is_none()).cloned().collect()
         };
-        let (here, there) = (&expected.identity, &found.identity);
-        if here.version != there.version {
-            return Err(foreign("version", &here.version, &there.version));
-        }
-        if here.spec_hash != there.spec_hash {
-            return Err(match first_difference(&expected.spec, &found.spec) {
-                Some([here, there]) => foreign("spec", &here, &there),
-                // What a spec refers to differs.
-                None => foreign("spec", &here.spec_hash, &there.spec_hash),
-            });
+        let missing = lacks(expected, found);
+        if !missing.is_empty() && !lacks(found, expected).is_empty() {
+            let names = |manifest: &Manifest| {
+                manifest.tables.iter().map(|table| table.name.as_str()).collect::<Vec<_>>().join(", ")
+            };
+            let (expected, found) = (names(expected), names(found));
+            return Err(DatasetError::OtherTables { folder, expected, found, missing });
         }
         Ok(())
     }
@@ -263,14 +286,46 @@ impl Folder {
         parts
     }
 
-    /// Whether there is a file in the place of a part; [`Folder::state`] tells what it is.
-    pub fn has_part(&self, table: &str, part: u64) -> bool {
-        self.part(table, part).is_file()
-    }
-
     /// What is in the place of a part of the dataset of `manifest`.
     pub fn state(&self, manifest: &Manifest, table: &str, part: u64, look: Look) -> State {
         state::state(&self.part(table, part), manifest, table, part, look)
+    }
+
+    /// Opens a part of the dataset of `manifest`; `None` if it is not there. What is opened is the part that should be there, and its footer is
+    /// as it was written; its pages have checksums, which are verified when they are read. Every reader of a dataset opens its parts here.
+    ///
+    /// # Errors
+    ///
+    /// If the part is damaged, or does not belong to the dataset.
+    pub fn open_part(&self, manifest: &Manifest, table: &str, part: u64) -> Result<Option<OpenPart>, DatasetError> {
+        let path = self.part(table, part);
+        state::open_part(&path, manifest, table, part).map_err(|state| self.fault(&path, state))
+    }
+
+    /// The paths of the parts of `table` that are there, in order, each of which [`Folder::open_part`] opens; and how many are missing.
+    ///
+    /// # Errors
+    ///
+    /// If a part is damaged, or does not belong to the dataset.
+    pub fn verified(&self, manifest: &Manifest, table: &ManifestTable) -> Result<(Vec<PathBuf>, u64), DatasetError> {
+        let there = self.parts_there(table);
+        let open = |part: u64| Ok(self.open_part(manifest, &table.name, part)?.map(|part| part.path));
+        let opened: Result<Vec<Option<PathBuf>>, DatasetError> = there.into_par_iter().map(open).collect();
+        let paths: Vec<PathBuf> = opened?.into_iter().flatten().collect();
+        let missing = table.parts - paths.len() as u64;
+        Ok((paths, missing))
+    }
+
+    /// What is wrong with the file in the place of a part.
+    pub fn fault(&self, path: &Path, state: State) -> DatasetError {
+        let (path, dataset) = (path.display().to_string(), self.path.display().to_string());
+        match state {
+            State::Foreign { what, expected, found } => DatasetError::ForeignPart { path, what, expected, found },
+            State::Damaged { why } => DatasetError::DamagedPart { path, why, dataset },
+            State::Missing | State::There { .. } => {
+                DatasetError::DamagedPart { path, why: "it changed while it was read".to_owned(), dataset }
+            }
+        }
     }
 
     /// Writes a part, whole or not at all.
@@ -312,32 +367,16 @@ fn sorted(folder: &Path, wanted: impl Fn(&Path) -> bool) -> Vec<PathBuf> {
     paths
 }
 
-/// The first lines in which two specs differ, blank lines and comments aside, each with its number.
-fn first_difference(here: &str, there: &str) -> Option<[String; 2]> {
-    fn lines(text: &str) -> impl Iterator<Item = (usize, &str)> {
-        let bare = text.lines().map(|line| line.split(" #").next().unwrap_or(line).trim());
-        (1..).zip(bare).filter(|(_, line)| !line.is_empty() && !line.starts_with('#'))
-    }
-    let show = |line: Option<(usize, &str)>| match line {
-        Some((number, line)) => format!("`{line}` (line {number})"),
-        None => "nothing more".to_owned(),
-    };
-    let (mut here, mut there) = (lines(here), lines(there));
-    loop {
-        let pair = [here.next(), there.next()];
-        if pair.iter().all(Option::is_none) {
-            return None;
-        }
-        if pair[0].map(|(_, line)| line) != pair[1].map(|(_, line)| line) {
-            return Some(pair.map(show));
-        }
-    }
+/// Whether a file has the name of a part.
+fn is_part(path: &Path) -> bool {
+    let name = path.file_name().unwrap_or_default().to_string_lossy();
+    name.starts_with("part-") && name.ends_with(".parquet")
 }
 
-fn unwritten(path: &Path, Unwritten { action, source }: Unwritten) -> DatasetError {
+pub(super) fn unwritten(path: &Path, Unwritten { action, source }: Unwritten) -> DatasetError {
     failed(path, action, source)
 }
 
-fn failed(path: &Path, action: &'static str, source: io::Error) -> DatasetError {
+pub(super) fn failed(path: &Path, action: &'static str, source: io::Error) -> DatasetError {
     DatasetError::Io { path: path.display().to_string(), action, source }
 }

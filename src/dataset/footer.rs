@@ -5,21 +5,24 @@ use std::ops::Range;
 
 use parquet::file::metadata::KeyValue;
 
-use super::folder::{Identity, Manifest, ManifestTable};
+use super::digest::Digest;
+use super::manifest::{Build, Manifest, ManifestTable};
 use super::seal;
 use crate::protocol::Status;
+
+/// Most bytes of a spec that each part carries: a fortieth of a part of 2^18 rows of a landscape. Of a longer spec the manifest has the one copy,
+/// to which the hash of the table leads.
+const MAX_SPEC_BYTES: usize = 1 << 16;
 
 /// The origin of a part. Any part tells what the whole dataset consists of.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Footer {
     /// The name of the dataset.
     pub name: String,
-    /// The text of the spec.
-    pub spec: String,
-    /// The hash of the spec.
-    pub spec_hash: String,
-    /// The version of the program.
-    pub version: String,
+    /// The text of the spec, if it is short.
+    pub spec: Option<String>,
+    /// The program.
+    pub build: Build,
     /// All tables of the dataset.
     pub tables: Vec<ManifestTable>,
     /// The table.
@@ -33,13 +36,15 @@ pub const PREFIX: &str = "slipsweep.";
 
 const NAME: &str = "slipsweep.name";
 const SPEC: &str = "slipsweep.spec";
-const SPEC_HASH: &str = "slipsweep.spec_hash";
 const VERSION: &str = "slipsweep.version";
+const REVISION: &str = "slipsweep.revision";
 const TABLES: &str = "slipsweep.tables";
 const TABLE: &str = "slipsweep.table";
+const HASH: &str = "slipsweep.hash";
 const ROW_START: &str = "slipsweep.row_start";
 const ROW_END: &str = "slipsweep.row_end";
 const STATUS: &str = "slipsweep.status";
+const DIGEST: &str = "slipsweep.digest";
 
 /// Rows by status, in the order of [`Status::ALL`].
 pub type StatusCounts = [u64; Status::ALL.len()];
@@ -49,35 +54,34 @@ impl Footer {
     pub fn new(manifest: &Manifest, table: &str, rows: Range<u64>) -> Footer {
         Footer {
             name: manifest.name.clone(),
-            spec: manifest.spec.clone(),
-            spec_hash: manifest.identity.spec_hash.clone(),
-            version: manifest.identity.version.clone(),
+            spec: Some(manifest.spec.clone()).filter(|spec| spec.len() <= MAX_SPEC_BYTES),
+            build: manifest.build.clone(),
             tables: manifest.tables.clone(),
             table: table.to_owned(),
             rows,
         }
     }
 
-    /// As Parquet metadata, with how many of the rows, of these `status`, have which, and the place of the checksum last.
-    pub fn entries(&self, status: &[Status]) -> Vec<KeyValue> {
-        let mut counts = StatusCounts::default();
-        status.iter().for_each(|status| counts[*status as usize] += 1);
-        let counts: BTreeMap<&str, u64> = Status::ALL.map(Status::name).into_iter().zip(counts).collect();
+    /// As Parquet metadata, with the digest of the rows, and the places of the checksums last.
+    pub fn entries(&self, digest: &Digest) -> Vec<KeyValue> {
+        let counts: BTreeMap<&str, u64> = Status::ALL.map(Status::name).into_iter().zip(digest.status).collect();
         let counts = serde_json::to_string(&counts).unwrap_or_default();
         let tables = serde_json::to_string(&self.tables).unwrap_or_default();
         let entries = [
             (NAME, self.name.clone()),
-            (SPEC, self.spec.clone()),
-            (SPEC_HASH, self.spec_hash.clone()),
-            (VERSION, self.version.clone()),
+            (VERSION, self.build.version.clone()),
+            (REVISION, self.build.revision.clone()),
             (TABLES, tables),
             (TABLE, self.table.clone()),
+            (HASH, self.planned().map_or_else(String::new, |table| table.hash.clone())),
             (ROW_START, self.rows.start.to_string()),
             (ROW_END, self.rows.end.to_string()),
             (STATUS, counts),
+            (DIGEST, serde_json::to_string(digest).unwrap_or_default()),
         ];
-        let entries = entries.into_iter().map(|(key, value)| KeyValue::new(key.to_owned(), value));
-        entries.chain([seal::entry()]).collect()
+        let spec = self.spec.iter().map(|spec| (SPEC, spec.clone()));
+        let entries = spec.chain(entries).map(|(key, value)| KeyValue::new(key.to_owned(), value));
+        entries.chain(seal::entries()).collect()
     }
 
     /// From Parquet metadata, `None` if anything is missing.
@@ -85,25 +89,32 @@ impl Footer {
         let get = |key: &str| entries.iter().find(|entry| entry.key == key)?.value.clone();
         Some(Footer {
             name: get(NAME)?,
-            spec: get(SPEC)?,
-            spec_hash: get(SPEC_HASH)?,
-            version: get(VERSION)?,
+            spec: get(SPEC),
+            build: Build { version: get(VERSION)?, revision: get(REVISION)? },
             tables: serde_json::from_str(&get(TABLES)?).ok()?,
             table: get(TABLE)?,
             rows: get(ROW_START)?.parse().ok()?..get(ROW_END)?.parse().ok()?,
         })
     }
 
-    /// Rows of the part by status, from its Parquet metadata.
-    pub fn status_counts(entries: &[KeyValue]) -> Option<StatusCounts> {
-        let counts = entries.iter().find(|entry| entry.key == STATUS)?.value.as_ref()?;
-        let counts: BTreeMap<String, u64> = serde_json::from_str(counts).ok()?;
-        Some(Status::ALL.map(|status| counts.get(status.name()).copied().unwrap_or(0)))
+    /// The digest of the rows of the part, from its Parquet metadata.
+    pub fn digest(entries: &[KeyValue]) -> Option<Digest> {
+        let get = |key: &str| entries.iter().find(|entry| entry.key == key)?.value.as_deref();
+        let counts: BTreeMap<String, u64> = serde_json::from_str(get(STATUS)?).ok()?;
+        let status = Status::ALL.map(|status| counts.get(status.name()).copied().unwrap_or(0));
+        let mut digest: Digest = serde_json::from_str(get(DIGEST)?).ok()?;
+        digest.status = status;
+        Some(digest)
+    }
+
+    /// Its table, as the dataset has it.
+    pub fn planned(&self) -> Option<&ManifestTable> {
+        self.tables.iter().find(|table| table.name == self.table)
     }
 
     /// The manifest of the dataset that the part belongs to.
     pub fn manifest(self) -> Manifest {
-        let identity = Identity { spec_hash: self.spec_hash, version: self.version };
-        Manifest { name: self.name, identity, tables: self.tables, spec: self.spec }
+        let spec = self.spec.unwrap_or_default();
+        Manifest { name: self.name, build: self.build, tables: self.tables, spec, rebuilt: None }
     }
 }

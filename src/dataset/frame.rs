@@ -1,6 +1,5 @@
 //! Columns of a table, read part by part: the memory does not grow with the table.
 
-use std::fs::File;
 use std::path::Path;
 use std::sync::Arc;
 
@@ -11,12 +10,15 @@ use arrow_schema::{DataType, FieldRef, Fields, Schema};
 use parquet::arrow::arrow_reader::{ArrowReaderMetadata, ArrowReaderOptions, ParquetRecordBatchReaderBuilder};
 use parquet::arrow::{ProjectionMask, parquet_to_arrow_schema};
 use parquet::errors::ParquetError;
-use parquet::file::metadata::ParquetMetaDataReader;
+use parquet::file::metadata::{ParquetMetaDataReader, RowGroupMetaData};
+use parquet::file::statistics::Statistics;
 
+use super::cell::Cell;
 use super::claims::{check_footer, check_pages};
-use super::folder::{Folder, ManifestTable};
+use super::folder::DatasetError;
 use super::guard::guarded;
 use super::layout::label;
+use crate::file;
 
 /// Rows that are decoded together.
 const ROWS_AT_ONCE: usize = 1 << 14;
@@ -50,17 +52,6 @@ pub struct Frame {
     pub height: usize,
     /// The columns asked for, in that order, each with its name.
     pub columns: Vec<(String, Cells)>,
-}
-
-/// A cell.
-#[derive(Debug, Clone, PartialEq)]
-pub enum Cell {
-    /// Null.
-    Missing,
-    /// A number.
-    Number(f64),
-    /// A word.
-    Word(String),
 }
 
 /// One row: the names of its cells and what is in them.
@@ -149,6 +140,17 @@ pub enum FrameError {
     },
 }
 
+/// Why a part of a table cannot be read.
+#[derive(Debug, thiserror::Error)]
+pub enum ReadError {
+    /// A part is damaged, or belongs to another dataset.
+    #[error(transparent)]
+    Part(#[from] DatasetError),
+    /// A part turns out to be damaged when it is read.
+    #[error("{0}\n  help: run the sweep again, which recomputes damaged parts and keeps all others")]
+    Frame(#[from] FrameError),
+}
+
 fn wrong(path: &Path, reason: impl std::fmt::Display) -> FrameError {
     FrameError::File { path: path.display().to_string(), reason: reason.to_string() }
 }
@@ -158,7 +160,7 @@ pub type Facts = Vec<(String, String)>;
 
 /// The columns of a Parquet file, and the entries of its footer.
 pub fn headings(path: &Path) -> Result<(Vec<Heading>, Facts), FrameError> {
-    let file = File::open(path).map_err(|error| wrong(path, error))?;
+    let file = file::open(path).map_err(|error| wrong(path, error))?;
     let metadata = check_footer(&file).and_then(|()| ParquetMetaDataReader::new().parse_and_finish(&file));
     let metadata = metadata.map_err(|error| wrong(path, error))?;
     let footer = metadata.file_metadata();
@@ -176,24 +178,54 @@ pub fn headings(path: &Path) -> Result<(Vec<Heading>, Facts), FrameError> {
 
 /// The columns `names` of a Parquet file.
 pub fn read(path: &Path, names: &[&str]) -> Result<Frame, FrameError> {
-    open(path, Some(names), None)
+    open(path, Some(names), Rows::All)
+}
+
+/// Whether a row group may hold a row that is wanted, by the least and the greatest number of its columns; a column without numbers has
+/// none.
+pub type Keep<'a> = &'a dyn Fn(&dyn Fn(&str) -> Option<(f64, f64)>) -> bool;
+
+/// The columns `names` of those row groups of a Parquet file that `keep` says may hold a row that is wanted.
+pub fn read_where(path: &Path, names: &[&str], keep: Keep<'_>) -> Result<Frame, FrameError> {
+    open(path, Some(names), Rows::Of(keep))
 }
 
 /// All columns of a Parquet file.
 pub fn read_all(path: &Path) -> Result<Frame, FrameError> {
-    open(path, None, None)
+    open(path, None, Rows::All)
+}
+
+/// The least and the greatest number of a column of a row group.
+fn range(group: &RowGroupMetaData, name: &str) -> Option<(f64, f64)> {
+    let column = group.columns().iter().find(|column| column.column_path().string() == name)?;
+    match column.statistics()? {
+        Statistics::Double(range) => Some((*range.min_opt()?, *range.max_opt()?)),
+        _ => None,
+    }
 }
 
 /// One row of a Parquet file, with all its columns.
+///
+/// # Errors
+/// If the file cannot be read, or has no such row.
 pub fn row(path: &Path, row: usize) -> Result<Row, FrameError> {
-    let frame = open(path, None, Some(row))?;
+    let frame = open(path, None, Rows::One(row))?;
     if frame.height == 1 { Ok(frame.row(0)) } else { Err(wrong(path, format!("it has no row {row}"))) }
 }
 
-/// Some columns, or all, of one row or all.
-fn open(path: &Path, names: Option<&[&str]>, row: Option<usize>) -> Result<Frame, FrameError> {
+/// Which rows of a file are read.
+enum Rows<'a> {
+    All,
+    /// Those of some row groups.
+    Of(Keep<'a>),
+    /// The one with this number.
+    One(usize),
+}
+
+/// Some columns, or all, of some rows.
+fn open(path: &Path, names: Option<&[&str]>, rows: Rows<'_>) -> Result<Frame, FrameError> {
     let read = || -> Result<Frame, ParquetError> {
-        let file = File::open(path)?;
+        let file = file::open(path)?;
         let plain = ArrowReaderOptions::new().with_skip_arrow_metadata(true);
         check_footer(&file)?;
         let plain = ArrowReaderMetadata::load(&file, plain)?;
@@ -212,8 +244,15 @@ fn open(path: &Path, names: Option<&[&str]>, row: Option<usize>) -> Result<Frame
             let mask = ProjectionMask::columns(builder.parquet_schema(), names.iter().copied());
             builder = builder.with_projection(mask);
         }
-        if let Some(row) = row {
-            builder = builder.with_offset(row).with_limit(1);
+        match rows {
+            Rows::All => {}
+            Rows::One(row) => builder = builder.with_offset(row).with_limit(1),
+            Rows::Of(keep) => {
+                let groups = builder.metadata().row_groups().iter().enumerate();
+                let kept =
+                    groups.filter(|(_, group)| keep(&|name| range(group, name))).map(|(place, _)| place).collect();
+                builder = builder.with_row_groups(kept);
+            }
         }
         let reader = builder.build()?;
         let fields = reader.schema();
@@ -246,12 +285,4 @@ fn open(path: &Path, names: Option<&[&str]>, row: Option<usize>) -> Result<Frame
     guarded(read)
         .unwrap_or_else(|| Err(ParquetError::General("it is damaged".to_owned())))
         .map_err(|error| wrong(path, error))
-}
-
-/// The parts of `table` that are there, in order, and how many are missing.
-pub fn parts(folder: &Folder, table: &ManifestTable) -> (Vec<std::path::PathBuf>, u64) {
-    let there = folder.parts_there(table).into_iter().map(|part| folder.part(&table.name, part));
-    let there: Vec<_> = there.filter(|path| path.is_file()).collect();
-    let missing = table.parts - there.len() as u64;
-    (there, missing)
 }

@@ -6,17 +6,27 @@ use std::sync::Arc;
 use arrow_schema::{DataType, Field, Schema, SchemaRef};
 
 use crate::grid::{Grid, Quantity, Scale};
-use crate::table::{Column, Kind, STATUS, STATUS_DOC, Selection, Table};
+use crate::model::Units;
+use crate::table::{Column, Kind, Prediction, STATUS, STATUS_DOC, Selection, Table};
 
-/// The columns of one table of one sweep, in order: axes, the selected columns, `status`.
+/// Meaning of a column of labels.
+const LABEL_DOC: &str = "label of the row's point, from the file of `points`";
+
+/// The columns of one table of one sweep, in order: axes, labels, the selected columns, `status`.
 #[derive(Debug, Clone)]
 pub struct Layout {
     /// The axes.
     pub axes: Vec<Quantity>,
+    /// The names of the labels, in the order in which the grid has them.
+    pub labels: Vec<String>,
     /// The selected columns.
     pub columns: Vec<Column>,
     /// All of them as Arrow fields.
     pub schema: SchemaRef,
+    /// The units of the values.
+    pub units: Units,
+    /// What a simpler theory says of one of the columns.
+    pub prediction: Option<Prediction>,
 }
 
 impl Layout {
@@ -24,12 +34,19 @@ impl Layout {
     pub fn new(table: &dyn Table, selection: &Selection, grid: &Grid) -> Layout {
         let axes: Vec<Quantity> = Quantity::ALL.into_iter().filter(|axis| table.axes().contains(axis)).collect();
         let columns: Vec<Column> = selection.indices().iter().map(|&index| table.columns()[index]).collect();
+        let mut labels: Vec<String> = Vec::new();
+        for name in grid.blocks.iter().flat_map(|block| block.labels(table.axes())) {
+            if !labels.iter().any(|known| known == name) {
+                labels.push(name.to_owned());
+            }
+        }
         let mut fields = Vec::new();
         for axis in &axes {
             let unit = grid.units.name(axis.unit(grid.scale(*axis).unwrap_or(Scale::Model)));
             let kind = if axis.words().is_empty() { DataType::Float64 } else { label() };
             fields.push(field(axis.name(), kind, false, unit, axis.doc()));
         }
+        fields.extend(labels.iter().map(|name| field(name, label(), true, "", LABEL_DOC)));
         for column in &columns {
             let kind = match column.kind {
                 Kind::Number(_) | Kind::Quantity(_) => DataType::Float64,
@@ -39,7 +56,8 @@ impl Layout {
             fields.push(field(column.name, kind, true, column.unit(grid), column.doc));
         }
         fields.push(field(STATUS, label(), false, "", STATUS_DOC));
-        Layout { axes, columns, schema: Arc::new(Schema::new(fields)) }
+        let (units, prediction) = (grid.units, table.prediction());
+        Layout { axes, labels, columns, schema: Arc::new(Schema::new(fields)), units, prediction }
     }
 }
 

@@ -2,10 +2,10 @@
 
 pub(crate) mod atomic;
 mod batch;
+mod cell;
 mod chunk;
 mod claims;
 mod dictionary;
-#[cfg(feature = "read")]
 mod digest;
 mod flags;
 mod folder;
@@ -15,27 +15,31 @@ pub mod frame;
 mod guard;
 mod hybrid;
 mod layout;
+mod manifest;
 mod numbers;
 mod part;
 mod seal;
+mod session;
 mod state;
 #[cfg(feature = "read")]
 mod survey;
 
 pub use batch::batch;
+pub use cell::Cell;
 pub(crate) use claims::{check_footer, check_pages};
-#[cfg(feature = "read")]
-pub use digest::{Digest, ReadError};
-pub use folder::{DatasetError, Folder, Identity, Manifest, ManifestTable};
+pub use digest::{Counts, Digest, FEW, Row as DigestRow};
+pub use folder::{DatasetError, Folder};
 pub use footer::{Footer, StatusCounts};
 #[cfg(feature = "read")]
-pub use frame::{Cell, FrameError, Row};
+pub use frame::{FrameError, ReadError, Row};
 pub(crate) use guard::guarded;
 #[cfg(feature = "cli")]
 pub(crate) use guard::is_guarded;
 pub use layout::Layout;
-pub(crate) use layout::field;
+pub(crate) use layout::{field, label};
+pub use manifest::{Build, Manifest, ManifestTable};
 pub use part::encode;
-pub use state::{Look, State};
+pub use session::{Company, Session};
+pub use state::{Look, OpenPart, State};
 #[cfg(feature = "read")]
 pub use survey::{Survey, TableSurvey};

@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use indexmap::IndexSet;
 use parquet::arrow::{ArrowSchemaConverter, add_encoded_arrow_schema_to_metadata};
 use parquet::errors::Result;
 use parquet::file::properties::WriterProperties;
@@ -10,6 +11,7 @@ use parquet::schema::types::ColumnDescPtr;
 use zstd::bulk::Compressor;
 
 use super::chunk::{Chunk, Runs};
+use super::digest::Digest;
 use super::footer::Footer;
 use super::layout::Layout;
 use super::{dictionary, flags, numbers, seal};
@@ -26,12 +28,13 @@ const BYTES_PER_ROW: usize = 9;
 /// Strength of compression; see docs/performance.md.
 pub const ZSTD_LEVEL: i32 = 1;
 
-/// The bytes of a part, the same on every machine, with their checksum.
-pub fn encode(layout: &Layout, projection: &Projection, sheet: &Sheet, footer: &Footer) -> Result<Vec<u8>> {
+/// The bytes of a part, the same on every machine, with their checksums; and the digest of its rows, which they hold.
+pub fn encode(layout: &Layout, projection: &Projection, sheet: &Sheet, footer: &Footer) -> Result<(Vec<u8>, Digest)> {
+    let digest = Digest::of(layout, projection, footer.rows.clone(), sheet)?;
     let schema = ArrowSchemaConverter::new().convert(&layout.schema)?;
     let mut properties = WriterProperties::builder()
-        .set_created_by(format!("slipsweep version {}", footer.version))
-        .set_key_value_metadata(Some(footer.entries(&sheet.status)))
+        .set_created_by(format!("slipsweep version {}", footer.build.version))
+        .set_key_value_metadata(Some(footer.entries(&digest)))
         .set_offset_index_disabled(true)
         .build();
     add_encoded_arrow_schema_to_metadata(&layout.schema, &mut properties);
@@ -60,6 +63,9 @@ pub fn encode(layout: &Layout, projection: &Projection, sheet: &Sheet, footer: &
                 group.splice(chunk)?;
             }
         }
+        for name in &layout.labels {
+            group.label(&view.label(name, global.clone()))?;
+        }
         for (column, cells) in layout.columns.iter().zip(&sheet.columns) {
             let cells = &cells[range.clone()];
             match column.kind {
@@ -71,10 +77,7 @@ pub fn encode(layout: &Layout, projection: &Projection, sheet: &Sheet, footer: &
         group.status(&sheet.status[range])?;
         group.writer.close()?;
     }
-    let mut bytes = file.into_inner()?;
-    // The footer has the place for it.
-    seal::seal(&mut bytes);
-    Ok(bytes)
+    Ok((seal::sealed(file.into_inner()?)?, digest))
 }
 
 /// A row group in the making, and the columns that it still lacks.
@@ -98,23 +101,33 @@ impl<Next: FnMut() -> Option<ColumnDescPtr>> Group<'_, '_, Next> {
 
     /// Indices of `words`, NaN where there is none.
     fn labels(&mut self, words: &[&str], cells: &[f64]) -> Result<()> {
-        let codes = merge(cells.iter().filter(|cell| !cell.is_nan()).map(|&cell| cell as u32));
+        let codes = merge(cells.iter().filter(|cell| !cell.is_nan()).map(|&cell| (cell as u32, 1)));
         self.splice(dictionary::words(words, &codes, Some(&numbers::presence(cells))))
     }
 
+    /// Runs of words, `None` where rows have none. The dictionary has only the words that occur here: a file of points may have millions.
+    fn label(&mut self, runs: &[(Option<&str>, usize)]) -> Result<()> {
+        let words: IndexSet<&str> = runs.iter().filter_map(|(word, _)| *word).collect();
+        let code = |word: &str| words.get_index_of(word).map(|place| place as u32);
+        let codes = merge(runs.iter().filter_map(|(word, length)| Some((code((*word)?)?, *length))));
+        let presence = merge(runs.iter().map(|(word, length)| (u32::from(word.is_some()), *length)));
+        let words: Vec<&str> = words.iter().copied().collect();
+        self.splice(dictionary::words(&words, &codes, Some(&presence)))
+    }
+
     fn status(&mut self, status: &[Status]) -> Result<()> {
-        let codes = merge(status.iter().map(|&status| status as u32));
+        let codes = merge(status.iter().map(|&status| (status as u32, 1)));
         self.splice(dictionary::words(&Status::ALL.map(Status::name), &codes, None))
     }
 }
 
-/// Runs of equal values.
-fn merge(codes: impl Iterator<Item = u32>) -> Runs {
+/// Runs of equal codes, each as long as it can be.
+fn merge(codes: impl Iterator<Item = (u32, usize)>) -> Runs {
     let mut runs: Runs = Vec::new();
-    for code in codes {
+    for (code, rows) in codes {
         match runs.last_mut() {
-            Some((last, length)) if *last == code => *length += 1,
-            _ => runs.push((code, 1)),
+            Some((last, length)) if *last == code => *length += rows,
+            _ => runs.push((code, rows)),
         }
     }
     runs

@@ -1,52 +1,112 @@
-//! The checksum of a part, kept in its own footer.
+//! The checksums of a part, kept in its own footer.
 //!
-//! It is the SHA-256 of all bytes of the file, those of the checksum itself taken as zeros: whoever has the file can check it, and no bit
-//! of it, not one of the footer either, can change unnoticed.
+//! One is the SHA-256 of all bytes of the file: whoever has the file can check it, and no bit of it, not one of the footer either, can change
+//! unnoticed. The other is that of the footer and of the headers of the pages, which is checked whenever a part is opened. What is in the pages
+//! has checksums of its own (CRC-32), checked whenever a page is read. Checksums count as zeros where they are computed.
 
-use parquet::file::metadata::KeyValue;
+use bytes::Bytes;
+use parquet::errors::{ParquetError, Result};
+use parquet::file::metadata::{KeyValue, ParquetMetaData, ParquetMetaDataReader};
+use parquet::file::reader::ChunkReader;
 use sha2::{Digest, Sha256};
 
-/// The key of the checksum.
-const KEY: &str = "slipsweep.sha256";
+use super::claims::page_headers;
 
-/// What stands in its place while it is computed: as long as the checksum in hexadecimal digits.
+/// The key of the checksum of footer and headers.
+const HEAD: &str = "slipsweep.head_sha256";
+
+/// The key of the checksum of the file.
+const FILE: &str = "slipsweep.sha256";
+
+/// What stands in the place of a checksum while it is computed: as long as one in hexadecimal digits.
 const BLANK: &str = "0000000000000000000000000000000000000000000000000000000000000000";
 
 /// What Thrift's compact protocol writes between key and value: the next field, a string, and its length.
 const BETWEEN: [u8; 2] = [0x18, BLANK.len() as u8];
 
-/// The entry that a footer needs to be sealed; the last of its entries.
-pub fn entry() -> KeyValue {
-    KeyValue::new(KEY.to_owned(), BLANK.to_owned())
+/// Bytes after the footer: its length and `PAR1`.
+const TRAILER: u64 = 8;
+
+/// The entries that a footer needs to be sealed; the last of its entries.
+pub fn entries() -> [KeyValue; 2] {
+    [HEAD, FILE].map(|key| KeyValue::new(key.to_owned(), BLANK.to_owned()))
 }
 
-/// Writes the checksum into a finished file whose footer has the [`entry`]. `false` if it has none.
-pub fn seal(bytes: &mut [u8]) -> bool {
-    let Some(place) = place(bytes) else { return false };
-    let checksum = checksum(bytes, place);
-    bytes[place..place + BLANK.len()].copy_from_slice(checksum.as_bytes());
-    true
+/// A finished file whose footer has the [`entries`], with its checksums.
+pub fn sealed(bytes: Vec<u8>) -> Result<Vec<u8>> {
+    let bytes = Bytes::from(bytes);
+    let metadata = ParquetMetaDataReader::new().parse_and_finish(&bytes)?;
+    let head = head(&bytes, &metadata)?;
+    let mut bytes = Vec::from(bytes);
+    let mut write = |key: &str, checksum: &dyn Fn(&[u8], usize) -> String| {
+        let place = place(&bytes, key).ok_or_else(|| ParquetError::General("no place for a checksum".to_owned()))?;
+        let checksum = checksum(&bytes, place);
+        bytes[place..place + BLANK.len()].copy_from_slice(checksum.as_bytes());
+        Ok::<(), ParquetError>(())
+    };
+    write(HEAD, &|_, _| head.clone())?;
+    write(FILE, &whole)?;
+    Ok(bytes)
 }
 
-/// Whether the bytes are those that were sealed; `None` if they bear no seal.
+/// Whether the bytes of a file are those that were sealed; `None` if they bear no seal.
 pub fn is_intact(bytes: &[u8]) -> Option<bool> {
-    let place = place(bytes)?;
-    Some(bytes[place..place + BLANK.len()] == *checksum(bytes, place).as_bytes())
+    let place = place(bytes, FILE)?;
+    Some(bytes[place..place + BLANK.len()] == *whole(bytes, place).as_bytes())
 }
 
-/// Where the checksum stands: at the last occurrence of its key, since the text of a spec before it may hold anything.
-fn place(bytes: &[u8]) -> Option<usize> {
-    let key = bytes.windows(KEY.len()).rposition(|window| window == KEY.as_bytes())?;
-    let place = key + KEY.len() + BETWEEN.len();
-    let found = bytes.get(key + KEY.len()..place)? == BETWEEN && bytes.len() >= place + BLANK.len();
+/// Whether footer and page headers of a file are those that were sealed; `None` if they bear no seal.
+///
+/// # Errors
+///
+/// If they cannot be read.
+pub fn is_head_intact(file: &impl ChunkReader, metadata: &ParquetMetaData) -> Result<Option<bool>> {
+    let entries = metadata.file_metadata().key_value_metadata().into_iter().flatten();
+    let Some(sealed) = entries.filter(|entry| entry.key == HEAD).find_map(|entry| entry.value.as_ref()) else {
+        // One flipped bit may hide the entries of a footer, whose bytes still have them.
+        let footer = footer(file)?;
+        return Ok([HEAD, FILE].iter().any(|key| place(&footer, key).is_some()).then_some(false));
+    };
+    Ok(Some(*sealed == head(file, metadata)?))
+}
+
+/// The bytes of the footer with its length and `PAR1`.
+fn footer(file: &impl ChunkReader) -> Result<Vec<u8>> {
+    let before = file.len().saturating_sub(TRAILER);
+    let trailer = file.get_bytes(before, TRAILER as usize)?;
+    let length = trailer.iter().take(4).rev().fold(0_u64, |length, &byte| length << 8 | u64::from(byte));
+    let start = before.checked_sub(length).ok_or_else(|| ParquetError::General("its footer is damaged".to_owned()))?;
+    Ok(file.get_bytes(start, (length + TRAILER) as usize)?.to_vec())
+}
+
+/// The checksum of the page headers, in order, and of the footer.
+fn head(file: &impl ChunkReader, metadata: &ParquetMetaData) -> Result<String> {
+    let mut hash = Sha256::new();
+    page_headers(file, metadata, |header| hash.update(header))?;
+    let mut footer = footer(file)?;
+    for key in [HEAD, FILE] {
+        if let Some(place) = place(&footer, key) {
+            footer[place..place + BLANK.len()].copy_from_slice(BLANK.as_bytes());
+        }
+    }
+    hash.update(&footer);
+    Ok(digits(hash))
+}
+
+/// Where the checksum of a key stands: at its last occurrence, since the text of a spec before it may hold anything.
+fn place(bytes: &[u8], key: &str) -> Option<usize> {
+    let key_at = bytes.windows(key.len()).rposition(|window| window == key.as_bytes())?;
+    let place = key_at + key.len() + BETWEEN.len();
+    let found = bytes.get(key_at + key.len()..place)? == BETWEEN && bytes.len() >= place + BLANK.len();
     found.then_some(place)
 }
 
-fn checksum(bytes: &[u8], place: usize) -> String {
-    let digest = Sha256::new()
-        .chain_update(&bytes[..place])
-        .chain_update(BLANK)
-        .chain_update(&bytes[place + BLANK.len()..])
-        .finalize();
-    digest.iter().map(|byte| format!("{byte:02x}")).collect()
+/// The checksum of a file whose checksum stands at `place`.
+fn whole(bytes: &[u8], place: usize) -> String {
+    let hash = Sha256::new().chain_update(&bytes[..place]).chain_update(BLANK);
+    digits(hash.chain_update(&bytes[place + BLANK.len()..]))
+}
+
+fn digits(hash: Sha256) -> String {
+    hash.finalize().iter().map(|byte| format!("{byte:02x}")).collect()
 }

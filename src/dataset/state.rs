@@ -2,13 +2,15 @@
 
 use std::fs::{self, File};
 use std::io::{self, Read};
-use std::path::Path;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
-use parquet::file::metadata::{KeyValue, ParquetMetaDataReader};
+use parquet::file::metadata::{KeyValue, ParquetMetaData, ParquetMetaDataReader};
 
 use super::claims::check_footer;
-use super::folder::Manifest;
-use super::footer::{Footer, PREFIX, StatusCounts};
+use super::digest::Digest;
+use super::footer::{Footer, PREFIX};
+use super::manifest::{Manifest, ManifestTable};
 use super::seal;
 
 /// How closely a part is looked at.
@@ -21,14 +23,14 @@ pub enum Look {
 }
 
 /// What is found in the place of a part.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq)]
 pub enum State {
     /// Nothing.
     Missing,
     /// The part.
     There {
-        /// Its rows by status.
-        status: StatusCounts,
+        /// What its rows contain.
+        digest: Box<Digest>,
     },
     /// Something that was not made from this spec by this version; it may be of use to somebody.
     Foreign {
@@ -46,25 +48,63 @@ pub enum State {
     },
 }
 
+/// A part that was opened, and is the one that should be there.
+#[derive(Debug)]
+pub struct OpenPart {
+    /// Where it is.
+    pub path: PathBuf,
+    /// The file.
+    pub file: File,
+    /// Its Parquet footer.
+    pub metadata: Arc<ParquetMetaData>,
+    /// What it says of itself.
+    pub footer: Footer,
+    /// What its rows contain.
+    pub digest: Digest,
+}
+
 /// Looks at the file in the place of a part, number `part` of `table` in the dataset of `manifest`, which is written in `path`.
 pub fn state(path: &Path, manifest: &Manifest, table: &str, part: u64, look: Look) -> State {
-    let entries = match look {
-        Look::Footer => footer_of(path),
-        Look::Whole => whole(path),
+    let found = match look {
+        Look::Footer => open_part(path, manifest, table, part).map(|part| part.map(|part| part.digest)),
+        Look::Whole => whole(path).and_then(|entries| {
+            entries.map(|entries| belongs(&entries, manifest, table, part).map(|(_, digest)| digest)).transpose()
+        }),
     };
-    match entries {
-        Ok(Some(entries)) => compare(&entries, manifest, table, part),
+    match found {
+        Ok(Some(digest)) => State::There { digest: Box::new(digest) },
         Ok(None) => State::Missing,
         Err(state) => state,
     }
 }
 
-/// The key-value metadata of a file, without a look at the rest of it.
-pub fn footer_of(path: &Path) -> Result<Option<Vec<KeyValue>>, State> {
-    match open(path)? {
-        Some(file) => metadata(&file).map(Some),
-        None => Ok(None),
+/// Opens the file in the place of a part if it is the part that should be there; `None` if there is none.
+///
+/// # Errors
+///
+/// [`State::Foreign`] or [`State::Damaged`].
+pub fn open_part(path: &Path, manifest: &Manifest, table: &str, part: u64) -> Result<Option<OpenPart>, State> {
+    let Some(file) = open(path)? else { return Ok(None) };
+    let metadata = metadata(&file)?;
+    let entries = entries(&metadata);
+    match seal::is_head_intact(&file, &metadata) {
+        Ok(Some(true)) => {}
+        Ok(None) if Footer::from_entries(&entries).is_none() => {
+            return Err(stranger("a Parquet file without its marks"));
+        }
+        Ok(_) => return damaged("the checksum of its footer and page headers does not match"),
+        Err(error) => return damaged(&error.to_string()),
     }
+    let (footer, digest) = belongs(&entries, manifest, table, part)?;
+    Ok(Some(OpenPart { path: path.to_owned(), file, metadata: metadata.into(), footer, digest }))
+}
+
+/// What the footer of a part says, if it is as it was written.
+pub fn footer_of(path: &Path) -> Option<Footer> {
+    let file = open(path).ok()??;
+    let metadata = metadata(&file).ok()?;
+    let sound = seal::is_head_intact(&file, &metadata).ok()??;
+    if sound { Footer::from_entries(&entries(&metadata)) } else { None }
 }
 
 /// The file in `path`. What is no file is not opened: a named pipe would wait for somebody who writes, a device might never end.
@@ -90,10 +130,10 @@ fn whole(path: &Path) -> Result<Option<Vec<KeyValue>>, State> {
     }
     let bytes = bytes::Bytes::from(bytes);
     match seal::is_intact(&bytes) {
-        Some(true) => metadata(&bytes).map(Some),
-        Some(false) => damaged("its checksum does not fit its bytes"),
+        Some(true) => metadata(&bytes).map(|metadata| Some(entries(&metadata))),
+        Some(false) => damaged("its checksum does not match its bytes"),
         // Either the checksum is broken, or the file is somebody else's.
-        None => match metadata(&bytes) {
+        None => match metadata(&bytes).map(|metadata| entries(&metadata)) {
             Ok(entries) if !entries.iter().any(|entry| entry.key.starts_with(PREFIX)) => Ok(Some(entries)),
             Ok(_) => damaged("it has no checksum"),
             Err(state) => Err(state),
@@ -114,35 +154,44 @@ fn damaged<T>(why: &str) -> Result<T, State> {
     Err(State::Damaged { why: why.to_owned() })
 }
 
-fn metadata<R: parquet::file::reader::ChunkReader>(file: &R) -> Result<Vec<KeyValue>, State> {
-    match check_footer(file).and_then(|()| ParquetMetaDataReader::new().parse_and_finish(file)) {
-        Ok(metadata) => Ok(metadata.file_metadata().key_value_metadata().cloned().unwrap_or_default()),
-        Err(error) => damaged(&format!("it is cut short or not Parquet: {error}")),
-    }
+fn metadata<R: parquet::file::reader::ChunkReader>(file: &R) -> Result<ParquetMetaData, State> {
+    check_footer(file)
+        .and_then(|()| ParquetMetaDataReader::new().parse_and_finish(file))
+        .or_else(|error| damaged(&format!("it is cut short or not Parquet: {error}")))
 }
 
-/// Compares what a file says of itself with the part that should be there.
-fn compare(entries: &[KeyValue], manifest: &Manifest, table: &str, part: u64) -> State {
-    let foreign = |what, expected: &str, found: &str| State::Foreign {
-        what,
-        expected: expected.to_owned(),
-        found: found.to_owned(),
+fn entries(metadata: &ParquetMetaData) -> Vec<KeyValue> {
+    metadata.file_metadata().key_value_metadata().cloned().unwrap_or_default()
+}
+
+/// What a file says of itself, if that is what the part that should be there says.
+fn belongs(entries: &[KeyValue], manifest: &Manifest, table: &str, part: u64) -> Result<(Footer, Digest), State> {
+    let foreign = |what, expected: &str, found: &str| {
+        Err(State::Foreign { what, expected: expected.to_owned(), found: found.to_owned() })
     };
-    let (Some(found), Some(status)) = (Footer::from_entries(entries), Footer::status_counts(entries)) else {
-        return stranger("a Parquet file without its marks");
+    let (Some(found), Some(digest)) = (Footer::from_entries(entries), Footer::digest(entries)) else {
+        return Err(stranger("a Parquet file without its marks"));
     };
-    let rows = manifest.tables.iter().find(|known| known.name == table).map(|known| known.rows_of(part));
-    let expected = &manifest.identity;
-    if found.version != expected.version {
-        foreign("version", &expected.version, &found.version)
-    } else if found.spec_hash != expected.spec_hash {
-        foreign("spec", &expected.spec_hash, &found.spec_hash)
+    let planned = manifest.table(table);
+    let rows = planned.map(|planned| planned.rows_of(part));
+    let build = &manifest.build;
+    let hash = |table: Option<&ManifestTable>| table.map_or_else(String::new, |table| table.hash.clone());
+    if found.build.version != build.version {
+        foreign("version", &build.version, &found.build.version)
+    } else if found.build.revision != build.revision {
+        foreign("numerics revision", &build.revision, &found.build.revision)
     } else if found.table != table {
         foreign("table", table, &found.table)
+    } else if hash(found.planned()) != hash(planned) {
+        foreign("spec", &hash(planned), &hash(found.planned()))
+    } else if found.planned() != planned {
+        let show = |table: &ManifestTable| format!("{} rows in {} parts", table.rows, table.parts);
+        let [planned, found] = [planned, found.planned()].map(|table| table.map(show).unwrap_or_default());
+        foreign("plan", &planned, &found)
     } else if Some(&found.rows) != rows.as_ref() {
         let show = |rows: &std::ops::Range<u64>| format!("rows {} to {}", rows.start, rows.end);
         foreign("place in the table", &rows.as_ref().map(show).unwrap_or_default(), &show(&found.rows))
     } else {
-        State::There { status }
+        Ok((found, digest))
     }
 }

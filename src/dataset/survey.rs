@@ -2,9 +2,13 @@
 
 use std::ops::Range;
 use std::path::PathBuf;
+use std::sync::atomic::{AtomicU64, Ordering};
 
-use super::folder::{Folder, Manifest};
-use super::footer::StatusCounts;
+use rayon::prelude::*;
+
+use super::digest::Digest;
+use super::folder::Folder;
+use super::manifest::Manifest;
 use super::state::{Look, State};
 
 /// What was found in the folder of a dataset.
@@ -35,9 +39,12 @@ pub struct TableSurvey {
     pub damaged: Vec<(u64, String)>,
     /// Parts whose place is taken by something else: in what it differs, what was expected and what was found.
     pub foreign: Vec<(u64, [String; 3])>,
-    /// Rows by status of the parts that are there, in the order of [`Status::ALL`](crate::protocol::Status::ALL).
-    pub status: StatusCounts,
+    /// What the parts that are there contain.
+    pub digest: Digest,
 }
+
+/// Parts that are looked at before what they contain is added up, so that the memory does not grow with the dataset.
+const LOOKED_AT_TOGETHER: usize = 1 << 10;
 
 impl TableSurvey {
     /// Whether part number `part` is there.
@@ -60,8 +67,10 @@ impl TableSurvey {
 }
 
 impl Survey {
-    /// Surveys the dataset of `manifest` in `folder`, with a look of this kind at every part.
-    pub fn new(folder: &Folder, manifest: &Manifest, look: Look) -> Survey {
+    /// Surveys the dataset of `manifest` in `folder`, with a look of this kind at every part, once, on all processors; `looked` counts the parts.
+    pub fn new(folder: &Folder, manifest: &Manifest, look: Look, looked: &AtomicU64) -> Survey {
+        // Where no threads can be had, this one looks alone.
+        let pool = rayon::ThreadPoolBuilder::new().build().ok();
         let tables = manifest.tables.iter().map(|table| {
             let mut survey = TableSurvey {
                 name: table.name.clone(),
@@ -71,16 +80,28 @@ impl Survey {
                 missing: Vec::new(),
                 damaged: Vec::new(),
                 foreign: Vec::new(),
-                status: Default::default(),
+                digest: Digest::default(),
             };
             let mut next = 0;
-            for part in folder.parts_there(table) {
+            let there = folder.parts_there(table);
+            let states = there.chunks(LOOKED_AT_TOGETHER).flat_map(|parts| {
+                let look = |part: &u64| {
+                    let state = folder.state(manifest, &table.name, *part, look);
+                    looked.fetch_add(1, Ordering::Relaxed);
+                    (*part, state)
+                };
+                match &pool {
+                    Some(pool) => pool.install(|| parts.par_iter().with_max_len(1).map(look).collect::<Vec<_>>()),
+                    None => parts.iter().map(look).collect(),
+                }
+            });
+            for (part, state) in states {
                 survey.miss(next..part);
                 next = part + 1;
-                match folder.state(manifest, &table.name, part, look) {
-                    State::There { status } => {
+                match state {
+                    State::There { digest } => {
                         survey.there += 1;
-                        survey.status.iter_mut().zip(status).for_each(|(sum, count)| *sum += count);
+                        survey.digest = std::mem::take(&mut survey.digest).merge(*digest);
                     }
                     // It went away a moment ago.
                     State::Missing => survey.miss(part..part + 1),

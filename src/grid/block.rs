@@ -7,10 +7,31 @@ use super::expression::Expression;
 use super::quantity::{Quantity, Scale};
 
 /// Axes that advance together.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Default)]
 pub struct Factor {
     /// The axes, all of the same length, at least one.
     pub axes: Vec<Axis>,
+    /// The labels of its steps, of that length too.
+    pub labels: Vec<Label>,
+}
+
+/// A column of words that names the steps of a factor. No number depends on it.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Label {
+    /// Its name.
+    pub name: String,
+    /// The words that occur, each once, in the order of the first step that has each.
+    pub words: Vec<String>,
+    /// The place in `words` of the word of each step; `None` where a step has none.
+    pub places: Vec<Option<u32>>,
+}
+
+impl Label {
+    /// The word of `step`, if it has one.
+    pub fn word(&self, step: u64) -> Option<&str> {
+        let place = (*self.places.get(step as usize)?)?;
+        self.words.get(place as usize).map(String::as_str)
+    }
 }
 
 impl Factor {
@@ -76,6 +97,12 @@ impl Block {
     /// The axis of `quantity`, if a factor holds it.
     pub fn axis(&self, quantity: Quantity) -> Option<&Axis> {
         self.factors.iter().flat_map(|factor| &factor.axes).find(|axis| axis.quantity == quantity)
+    }
+
+    /// The names of the labels that rows over `quantities` have: those of the factors that such rows tell apart.
+    pub fn labels(&self, quantities: &[Quantity]) -> impl Iterator<Item = &str> {
+        let factors = self.factors_of(&self.roots(quantities)).into_iter();
+        factors.flat_map(|factor| &self.factors[factor].labels).map(|label| label.name.as_str())
     }
 
     /// The unit in which the block gives `quantity`; `None` if it has no such axis.

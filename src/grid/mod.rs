@@ -12,7 +12,7 @@ mod sieve;
 mod view;
 
 pub use axis::{Axis, Values};
-pub use block::{Block, Derived, Factor};
+pub use block::{Block, Derived, Factor, Label};
 pub use design::Design;
 pub use digits::{Digit, Digits};
 pub use expression::{Expression, Fault};

@@ -9,7 +9,7 @@ use std::ops::Range;
 use std::sync::Arc;
 
 use super::axis::Axis;
-use super::block::Block;
+use super::block::{Block, Label};
 use super::digits::{Digit, Digits};
 use super::quantity::{Point, Quantity, Scale};
 use super::sieve::Sieve;
@@ -106,6 +106,14 @@ impl Stretch {
         self.digits.digits.iter().find_map(|digit| {
             let axes = &self.block.factors[digit.factor].axes;
             Some((*digit, axes.iter().find(|axis| axis.quantity == quantity)?))
+        })
+    }
+
+    /// The digit that has the label `name`, and the label, if one has.
+    pub fn label(&self, name: &str) -> Option<(Digit, &Label)> {
+        self.digits.digits.iter().find_map(|digit| {
+            let labels = &self.block.factors[digit.factor].labels;
+            Some((*digit, labels.iter().find(|label| label.name == name)?))
         })
     }
 }

@@ -3,7 +3,7 @@
 use std::ops::Range;
 
 use super::axis::{Axis, Values};
-use super::block::{Block, Derived};
+use super::block::{Block, Derived, Label};
 use super::digits::{Digit, Digits};
 use super::expression::{Columns, Expression, Stack};
 use super::quantity::Quantity;
@@ -19,13 +19,31 @@ pub struct Sampler<'a> {
 
 struct Source<'a> {
     digit: Digit,
-    axis: &'a Axis,
-    table: Option<Vec<f64>>,
+    content: Content<'a>,
+}
+
+enum Content<'a> {
+    /// The values of an axis, which are looked up where they are tabulated.
+    Axis(&'a Axis, Option<Vec<f64>>),
+    /// A label, and its number among those of its factor.
+    Label(usize, &'a Label),
 }
 
 impl Source<'_> {
     fn at(&self, step: u64) -> f64 {
-        self.table.as_ref().map_or_else(|| self.axis.values.at(step), |table| table[step as usize])
+        match &self.content {
+            Content::Axis(_, Some(table)) => table[step as usize],
+            Content::Axis(axis, None) => axis.values.at(step),
+            Content::Label(_, label) => label.places[step as usize].map_or(-1.0, f64::from),
+        }
+    }
+
+    /// The column that it fills.
+    fn column<'s>(&self, scratch: &'s mut Scratch) -> &'s mut Vec<f64> {
+        match &self.content {
+            Content::Axis(axis, _) => scratch.columns.get_mut(axis.quantity),
+            Content::Label(number, _) => scratch.columns.label_mut(*number),
+        }
     }
 }
 
@@ -47,7 +65,7 @@ impl<'a> Sampler<'a> {
                 let is_range = !matches!(axis.values, Values::List(_));
                 let table = (is_range && digit.len <= TABULATED)
                     .then(|| (0..digit.len).map(|step| axis.values.at(step)).collect());
-                sources.push(Source { digit: *digit, axis, table });
+                sources.push(Source { digit: *digit, content: Content::Axis(axis, table) });
             }
         }
         let mut wanted = quantities.to_vec();
@@ -62,6 +80,18 @@ impl<'a> Sampler<'a> {
         Sampler { sources, derived }
     }
 
+    /// Of the labels of `condition`, too, whose axes it has.
+    pub fn with_labels(mut self, block: &'a Block, digits: &Digits, condition: Option<&Expression>) -> Sampler<'a> {
+        for (axis, number) in condition.iter().flat_map(|condition| condition.labels()) {
+            let holds = |digit: &&Digit| block.factors[digit.factor].holds_any(&[axis]);
+            if let Some(digit) = digits.digits.iter().find(holds) {
+                let label = &block.factors[digit.factor].labels[number];
+                self.sources.push(Source { digit: *digit, content: Content::Label(number, label) });
+            }
+        }
+        self
+    }
+
     /// For how many rows all the quantities stay the same at least, counted from a multiple of this number; `None` if they never change.
     pub fn run(&self) -> Option<u64> {
         self.sources.iter().map(|source| source.digit.stride).min()
@@ -71,7 +101,7 @@ impl<'a> Sampler<'a> {
     pub fn load(&self, rows: Range<u64>, scratch: &mut Scratch) {
         scratch.length = (rows.end - rows.start) as usize;
         for source in &self.sources {
-            let column = scratch.columns.get_mut(source.axis.quantity);
+            let column = source.column(scratch);
             column.clear();
             let Digit { len, stride, .. } = source.digit;
             let (mut row, mut step) = (rows.start, source.digit.step(rows.start));
@@ -91,7 +121,7 @@ impl<'a> Sampler<'a> {
     pub fn pick(&self, rows: &[u64], scratch: &mut Scratch) {
         scratch.length = rows.len();
         for source in &self.sources {
-            let column = scratch.columns.get_mut(source.axis.quantity);
+            let column = source.column(scratch);
             column.clear();
             column.extend(rows.iter().map(|&row| source.at(source.digit.step(row))));
         }

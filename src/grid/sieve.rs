@@ -32,8 +32,8 @@ const LIMITS: Limits = Limits { chunk: 1 << 16, chunks: 1 << 22, bits: 1 << 26 }
 /// Points that are evaluated at a time.
 const BATCH: u64 = 1 << 10;
 
-/// Most combinations of the axes that a condition reads, which take minutes to evaluate.
-pub const MOST_COMBINATIONS: u64 = 1 << 36;
+/// Most combinations of the axes that a condition or a computed axis reads: evaluating them takes seconds.
+pub const MOST_COMBINATIONS: u64 = 1 << 30;
 
 /// Combinations from which on evaluation is worth several threads.
 const WORTH_THREADS: u64 = 1 << 18;
@@ -155,8 +155,7 @@ impl Sieve {
             Some(pool) => pool.install(work),
             None => work(),
         };
-        let reads = self.condition.reads();
-        let sampler = Sampler::new(&self.block, &self.combinations, &reads);
+        let sampler = self.sampler();
         let each = |ranges: u64, made: &(dyn Fn(u64, &mut Scratch) -> Vec<u64> + Sync)| {
             in_pool(&|| {
                 if several {
@@ -193,6 +192,12 @@ impl Sieve {
         self.before = before.collect();
         self.bits = bits;
         Some(self)
+    }
+
+    /// What the condition reads.
+    fn sampler(&self) -> Sampler<'_> {
+        let sampler = Sampler::new(&self.block, &self.combinations, &self.condition.reads());
+        sampler.with_labels(&self.block, &self.combinations, Some(&self.condition))
     }
 
     /// A bit for each of `told` combinations, from the first on.
@@ -232,10 +237,7 @@ impl Sieve {
     pub fn ranges(&self, kept: Range<u64>) -> Vec<Range<u64>> {
         let mut ranges: Vec<Range<u64>> = Vec::new();
         let mut chunk = Chunk { number: usize::MAX, words: Vec::new() };
-        let sampler = self.bits.is_none().then(|| {
-            let reads = self.condition.reads();
-            Sampler::new(&self.block, &self.combinations, &reads)
-        });
+        let sampler = self.bits.is_none().then(|| self.sampler());
         let mut scratch = Scratch::default();
         let trail = self.levels.last().map_or(1, |level| level.free);
         let mut row = kept.start;
@@ -370,7 +372,7 @@ pub fn first_wrong(block: &Block, quantity: Quantity, wrong: impl Fn(f64) -> boo
     reads.extend(block.condition.iter().flat_map(Expression::reads));
     let roots = block.roots(&reads);
     let digits = Digits::new(block, &block.factors_of(&roots)).filter(|digits| digits.rows <= MOST_COMBINATIONS)?;
-    let sampler = Sampler::new(block, &digits, &reads);
+    let sampler = Sampler::new(block, &digits, &reads).with_labels(block, &digits, block.condition.as_ref());
     let search = |chunk: u64, scratch: &mut Scratch| -> Option<u64> {
         let end = ((chunk + 1) * LIMITS.chunk).min(digits.rows);
         let mut start = chunk * LIMITS.chunk;
@@ -420,7 +422,7 @@ mod tests {
     fn block(lengths: &[u64]) -> Arc<Block> {
         let factors = lengths.iter().zip(Quantity::ALL).map(|(&length, quantity)| {
             let values = Values::List((1..=length).map(|value| value as f64).collect());
-            Factor { axes: vec![Axis { quantity, scale: Scale::Model, values }] }
+            Factor { axes: vec![Axis { quantity, scale: Scale::Model, values }], labels: Vec::new() }
         });
         Arc::new(Block { factors: factors.collect(), ..Block::default() })
     }
@@ -466,7 +468,7 @@ mod tests {
         for lengths in [[3, 4, 2, 5, 6], [1, 3, 4, 1, 7], [70, 2, 1, 3, 2], [2, 1, 3, 2, 150]] {
             let block = block(&lengths);
             for (text, holds) in conditions {
-                let condition = Expression::condition(text, &Quantity::ALL).expect("is a condition");
+                let condition = Expression::condition(text, &Quantity::ALL, None).expect("is a condition");
                 for factors in [&[0, 1, 2, 3, 4][..], &[0, 2, 4], &[1], &[3, 4], &[]] {
                     let digits = Digits::new(&block, factors).expect("is small");
                     let expected = kept(&lengths, factors, holds);

@@ -132,6 +132,34 @@ impl<'a> View<'a> {
         Some(Runs { values: runs.values, order: Order::Listed { starts: runs.starts, codes: runs.codes } })
     }
 
+    /// The words of the label `name` over `rows`, some of the rows, each with the number of rows in a row that have it; `None` where rows
+    /// have none.
+    pub fn label(&self, name: &str, rows: Range<u64>) -> Vec<(Option<&'a str>, usize)> {
+        let stretches = self.projection.stretches();
+        let mut runs: Vec<(Option<&str>, usize)> = Vec::new();
+        let mut push = |word: Option<&'a str>, length: u64| match runs.last_mut() {
+            Some((last, run)) if *last == word => *run += length as usize,
+            _ => runs.push((word, length as usize)),
+        };
+        let segments: Vec<Segment> = self.segments(rows).collect();
+        for group in segments.chunk_by(|one, next| one.stretch == next.stretch) {
+            let label = stretches[group[0].stretch].label(name);
+            for Segment { raw, .. } in group {
+                let Some((digit, label)) = label else {
+                    push(None, raw.end - raw.start);
+                    continue;
+                };
+                let mut row = raw.start;
+                while row < raw.end {
+                    let next = (row / digit.stride + 1).saturating_mul(digit.stride).min(raw.end);
+                    push(label.word(digit.step(row)), next - row);
+                    row = next;
+                }
+            }
+        }
+        runs
+    }
+
     /// The tuples of `rows`, some of the rows, each with the rows in a row that have it.
     pub fn tuples(&self, tuples: &Tuples, rows: Range<u64>) -> Vec<(u64, Range<u64>)> {
         let mut runs: Vec<(u64, Range<u64>)> = Vec::new();

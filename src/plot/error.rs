@@ -3,6 +3,11 @@
 use super::export::ExportError;
 use crate::dataset::ReadError;
 use crate::dataset::frame::FrameError;
+use crate::names;
+
+fn hint(name: &str, found: &[String]) -> String {
+    names::hint(name, found.iter().map(String::as_str))
+}
 
 /// Why a picture cannot be drawn.
 #[derive(Debug, thiserror::Error)]
@@ -55,7 +60,7 @@ pub enum PlotError {
     #[error("nothing to draw: no number in what was asked for")]
     Nothing,
     /// No table of that name.
-    #[error("the dataset has no table `{name}`\n  found: {}\n  help: name one of them with --table", .found.join(", "))]
+    #[error("the dataset has no table `{name}`\n  found: {}\n  help: {}", .found.join(", "), hint(.name, .found))]
     NoTable {
         /// The name.
         name: String,
@@ -63,7 +68,7 @@ pub enum PlotError {
         found: Vec<String>,
     },
     /// No column of that name.
-    #[error("{argument}: the table `{table}` has no {what} `{name}`\n  found: {}", .found.join(", "))]
+    #[error("{argument}: the table `{table}` has no {what} `{name}`\n  found: {}\n  help: {}", .found.join(", "), hint(.name, .found))]
     NoColumn {
         /// The argument that names it.
         argument: String,
@@ -85,7 +90,7 @@ pub enum PlotError {
         text: String,
     },
     /// No row fulfils the conditions.
-    #[error("--where {text}: no row of the table `{table}` is left\n  found: {found}")]
+    #[error("--where {text}: no row of the table `{table}` is left\n  found: {found}\n  help: {help}")]
     NoRows {
         /// The table.
         table: String,
@@ -93,6 +98,8 @@ pub enum PlotError {
         text: String,
         /// The values that there are.
         found: String,
+        /// The nearest of them.
+        help: String,
     },
     /// All rows are missing.
     #[error(
@@ -118,6 +125,17 @@ pub enum PlotError {
         table: String,
         /// The column.
         column: String,
+    },
+    /// Traces in different units.
+    #[error(
+        "the traces differ in the unit of `{column}`\n  found: {} and {}\n  expected: the same units\n  help: draw them one by one, or \
+         trace both in the same units", .units[0], .units[1]
+    )]
+    Units {
+        /// The column.
+        column: String,
+        /// Two of its units.
+        units: [String; 2],
     },
     /// A trace in Parquet.
     #[error("{0}\n  help: delete the file and trace it again")]

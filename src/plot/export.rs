@@ -11,6 +11,7 @@ use super::label::FONTS;
 
 /// How a picture is written.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
 pub enum Format {
     /// Vectors and text (`.svg`).
     Svg,
@@ -44,6 +45,15 @@ impl Format {
             "png" => Some(Format::Png),
             "pdf" => Some(Format::Pdf),
             _ => None,
+        }
+    }
+
+    /// What names of files of this format end in.
+    pub fn ending(self) -> &'static str {
+        match self {
+            Format::Svg => "svg",
+            Format::Png => "png",
+            Format::Pdf => "pdf",
         }
     }
 

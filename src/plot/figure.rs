@@ -12,6 +12,12 @@ const NOTE_SIZE: f64 = 6.2;
 const TICK: f64 = 2.6;
 const MARGIN: f64 = 5.0;
 const FRAME: f64 = 0.6;
+/// Space between the line of a title and the frame below: letters below the line keep clear of it.
+const TITLE_SPACE: f64 = 5.0;
+/// Room for the titles of rows.
+const ROW_TITLE: f64 = SIZE + 6.0;
+/// Radius of a star.
+const STAR: f64 = 4.6;
 /// Length of what leads from a vertical line to its words, and the space between words.
 const LEADER: f64 = 5.0;
 const MARK_SPACE: f64 = 5.0;
@@ -29,6 +35,8 @@ pub struct Figure {
     pub panels: Vec<Panel>,
     /// Panels side by side.
     pub columns: usize,
+    /// What is the same in each row of panels, in markup, where their titles are those of the columns; empty where panels have their own.
+    pub rows: Vec<String>,
     /// Height of a panel relative to its width.
     pub aspect: f64,
     /// Whether all panels have the same axes, so that only the outer ones are labelled.
@@ -39,6 +47,8 @@ pub struct Figure {
     pub colours: Option<Colours>,
     /// Remarks below, in markup.
     pub notes: Vec<String>,
+    /// What its reader need not know but its maker: which panels are left out.
+    pub remarks: Vec<String>,
 }
 
 /// Colours for numbers.
@@ -85,10 +95,16 @@ pub enum Layer {
     Lines(Vec<Vec<(f64, f64)>>, Stroke),
     /// A line that is seen on any colour: dark, with a light rim.
     Contour(Vec<Vec<(f64, f64)>>, Stroke),
+    /// Between two curves, each point with its least and greatest value: filled.
+    Band(Vec<(f64, f64, f64)>, [u8; 3]),
+    /// Bars from zero: where each begins and ends, and its height.
+    Bars(Vec<(f64, f64, f64)>, [u8; 3]),
     /// Small marks, by series.
     Points(Vec<(f64, f64)>, Marker),
-    /// Small coloured discs; without a colour, hollow.
-    Dots(Vec<(f64, f64, Option<[u8; 3]>)>),
+    /// Small marks of single rows.
+    Dots(Vec<Dot>),
+    /// Names of points, in markup, beside them.
+    Names(Vec<((f64, f64), String)>),
     /// Stars.
     Stars(Vec<(f64, f64)>),
     /// A vertical line with words above its upper end, in markup.
@@ -150,6 +166,17 @@ pub struct Marker {
     pub series: usize,
 }
 
+/// A row as a mark.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Dot {
+    /// Where it is.
+    pub at: (f64, f64),
+    /// Its colour; a row without a value is hollow.
+    pub fill: Option<[u8; 3]>,
+    /// Its shape.
+    pub shape: usize,
+}
+
 /// An entry of a legend.
 #[derive(Debug, Clone)]
 pub struct Entry {
@@ -176,6 +203,8 @@ pub enum Key {
     Hatch,
     /// A hollow dot.
     Hollow,
+    /// A coloured mark of a row.
+    Dot([u8; 3], usize),
     /// A colour.
     Fill([u8; 3]),
     /// Only words.
@@ -220,8 +249,10 @@ impl Figure {
         if !self.legend.is_empty() {
             y = self.legend(&mut canvas, y, inner);
         }
-        let bar = self.colours.as_ref().map_or(0.0, |colours| colours.width());
-        let (bottom, hovers) = self.panels(&mut canvas, y, inner - bar);
+        let as_powers = self.as_powers();
+        let bar = self.colours.as_ref().map_or(0.0, |colours| colours.width(as_powers));
+        let rows = if self.rows.is_empty() { 0.0 } else { ROW_TITLE };
+        let (bottom, hovers) = self.panels(&mut canvas, y, inner - bar - rows, as_powers);
         let mut foot = bottom;
         for note in &self.notes {
             for line in wrapped(note, NOTE_SIZE, inner) {
@@ -257,7 +288,8 @@ impl Figure {
                     canvas.hatch(area);
                     canvas.frame(area, &Stroke::solid("#777", 0.4));
                 }
-                Key::Hollow => dot(canvas, (x + 8.0, middle), None),
+                Key::Hollow => symbol(canvas, (x + 8.0, middle), 0, "none", &Stroke::solid("#888", 0.4)),
+                Key::Dot(colour, shape) => symbol(canvas, (x + 8.0, middle), *shape, &hex(*colour), &dot_rim()),
                 Key::Fill(colour) => {
                     canvas.fill(area, &hex(*colour));
                     canvas.frame(area, &Stroke::solid("#777", 0.4));
@@ -270,7 +302,19 @@ impl Figure {
         y + 4.0
     }
 
-    fn panels(&self, canvas: &mut Canvas, top: f64, inner: f64) -> (f64, Vec<(Area, Axis, Axis, Hover)>) {
+    /// Whether logarithmic ticks are powers of ten: in all panels if in one.
+    fn as_powers(&self) -> bool {
+        let axes = self.panels.iter().flat_map(|panel| [panel.x.scale, panel.y.scale]);
+        axes.chain(self.colours.iter().map(|colours| colours.scale)).any(|scale| scale.needs_powers())
+    }
+
+    fn panels(
+        &self,
+        canvas: &mut Canvas,
+        top: f64,
+        inner: f64,
+        as_powers: bool,
+    ) -> (f64, Vec<(Area, Axis, Axis, Hover)>) {
         let columns = self.columns.clamp(1, self.panels.len().max(1));
         let rows = self.panels.len().div_ceil(columns);
         let count = self.panels.len();
@@ -282,7 +326,8 @@ impl Figure {
             .iter()
             .map(|panel| {
                 let x_count = panel.x.fitting(guess, false);
-                (panel.x.scale.ticks(x_count), panel.y.scale.ticks(panel.y.fitting(guess * aspect, true)))
+                let y_count = panel.y.fitting(guess * aspect, true);
+                (panel.x.scale.ticks(x_count, as_powers), panel.y.scale.ticks(y_count, as_powers))
             })
             .collect();
         let has_title = self.panels.iter().any(|panel| !panel.title.is_empty());
@@ -301,9 +346,12 @@ impl Figure {
             rights[column] = rights[column].max(room.right);
             belows[row] = belows[row].max(room.below);
         }
-        let above = if has_title { SIZE + 5.0 } else { 4.0 };
+        let above = if has_title { SIZE + TITLE_SPACE + 1.5 } else { 4.0 };
+        // Titles of columns stand above the first row.
+        let titled = |row: usize| if row == 0 || self.rows.is_empty() { above } else { 4.0 };
         let has_words = |row: usize| self.panels.iter().skip(row * columns).take(columns).any(Panel::has_words_above);
-        let above: Vec<f64> = (0..rows).map(|row| above + if has_words(row) { WORDS_ABOVE } else { 0.0 }).collect();
+        let above: Vec<f64> =
+            (0..rows).map(|row| titled(row) + if has_words(row) { WORDS_ABOVE } else { 0.0 }).collect();
         let room: f64 = lefts.iter().sum::<f64>() + rights.iter().sum::<f64>();
         let panel_width = ((inner - room) / columns as f64).max(20.0);
         let panel_height = (panel_width * aspect).max(20.0);
@@ -326,13 +374,18 @@ impl Figure {
                 }
                 x += panel_width + rights[column];
             }
+            if let Some(title) = self.rows.get(row) {
+                let place = (MARGIN + inner + SIZE, y + 0.5 * panel_height);
+                canvas.text(place, title, SIZE, Anchor::Middle, true);
+            }
             y += panel_height + below;
         }
         if let Some(colours) = &self.colours {
             let first = top + above.first().copied().unwrap_or(0.0);
             let tall = (y - belows.last().copied().unwrap_or(0.0) - first).min(220.0);
-            let area = Area { x: MARGIN + inner + 6.0, y: first, width: 8.0, height: tall };
-            colours.draw(canvas, area);
+            let beside = if self.rows.is_empty() { 0.0 } else { ROW_TITLE };
+            let area = Area { x: MARGIN + inner + beside + 6.0, y: first, width: 8.0, height: tall };
+            colours.draw(canvas, area, as_powers);
         }
         (y, hovers)
     }
@@ -405,7 +458,22 @@ impl Panel {
                         let (_, y) = place((self.x.scale.low, *y));
                         canvas.line((area.x, y), (area.x + area.width, y), stroke);
                     }
-                    Layer::Points(..) | Layer::Dots(_) | Layer::Stars(_) => {}
+                    Layer::Band(points, colour) => {
+                        for run in points.split(|(_, low, high)| !(low.is_finite() && high.is_finite())) {
+                            let lower = run.iter().map(|&(x, low, _)| place((x, low)));
+                            let upper = run.iter().rev().map(|&(x, _, high)| place((x, high)));
+                            canvas.shape(&lower.chain(upper).collect::<Vec<_>>(), &hex(*colour), None);
+                        }
+                    }
+                    Layer::Bars(bars, colour) => {
+                        for &(from, to, height) in bars.iter().filter(|(.., height)| *height > 0.0) {
+                            let ((left, top), (right, bottom)) = (place((from, height)), place((to, 0.0)));
+                            let bar = Area { x: left, y: top, width: right - left, height: bottom - top };
+                            canvas.fill(bar, &hex(*colour));
+                            canvas.frame(bar, &Stroke::solid("#000", 0.3));
+                        }
+                    }
+                    Layer::Points(..) | Layer::Dots(_) | Layer::Names(_) | Layer::Stars(_) => {}
                 }
             }
         });
@@ -421,12 +489,22 @@ impl Panel {
                     points.iter().filter(|point| inside(point)).for_each(|point| marker.draw(canvas, place(*point)));
                 }
                 Layer::Dots(dots) => {
-                    dots.iter()
-                        .filter(|(x, y, _)| inside(&(*x, *y)))
-                        .for_each(|&(x, y, fill)| dot(canvas, place((x, y)), fill));
+                    for Dot { at, fill, shape } in dots.iter().filter(|dot| inside(&dot.at)) {
+                        let (x, y) = place(*at);
+                        match fill {
+                            Some(fill) => symbol(canvas, (x, y), *shape, &hex(*fill), &dot_rim()),
+                            None => symbol(canvas, (x, y), *shape, "none", &Stroke::solid("#888", 0.4)),
+                        }
+                    }
+                }
+                Layer::Names(names) => {
+                    names
+                        .iter()
+                        .filter(|(at, _)| inside(at))
+                        .for_each(|(at, name)| beside(canvas, area, place(*at), name));
                 }
                 Layer::Stars(points) => {
-                    points.iter().filter(|point| inside(point)).for_each(|point| star(canvas, place(*point)));
+                    points.iter().filter(|point| inside(point)).for_each(|point| clear(canvas, area, place(*point)));
                 }
                 _ => {}
             }
@@ -435,7 +513,7 @@ impl Panel {
         self.ticks(canvas, area, plan, labelled, left);
         if !self.title.is_empty() {
             let above = if self.has_words_above() { WORDS_ABOVE } else { 0.0 };
-            canvas.text((area.x, area.y - 3.5 - above), &self.title, SIZE, Anchor::Start, false);
+            canvas.text((area.x, area.y - TITLE_SPACE - above), &self.title, SIZE, Anchor::Start, false);
         }
     }
 
@@ -579,18 +657,42 @@ fn contour_line(canvas: &mut Canvas, lines: &[Vec<(f64, f64)>], stroke: &Stroke)
     canvas.lines(lines, stroke);
 }
 
-fn dot(canvas: &mut Canvas, centre: (f64, f64), fill: Option<[u8; 3]>) {
-    match fill {
-        Some(fill) => canvas.circle(centre, 1.7, &hex(fill), &Stroke::solid("#444", 0.2)),
-        None => canvas.circle(centre, 1.2, "none", &Stroke::solid("#888", 0.4)),
+/// The rim of a mark of a row.
+fn dot_rim() -> Stroke {
+    Stroke::solid("#222", 0.3)
+}
+
+/// The name of a row beside its mark, on the side where it stays inside.
+fn beside(canvas: &mut Canvas, area: Area, (x, y): (f64, f64), name: &str) {
+    let wide = NOTE_SIZE * label::width(name) + 4.0;
+    let (place, anchor) =
+        if x + wide > area.x + area.width { (x - 3.5, Anchor::End) } else { (x + 3.5, Anchor::Start) };
+    let line = (y + 0.35 * NOTE_SIZE).clamp(area.y + NOTE_SIZE, area.y + area.height - 2.0);
+    canvas.coloured((place, line), name, NOTE_SIZE, anchor, false, "#333");
+}
+
+/// A star that is clear of the frame: near it, the star stands inside and a line leads to its place.
+fn clear(canvas: &mut Canvas, area: Area, (x, y): (f64, f64)) {
+    let room = STAR + 1.4;
+    let inside = |value: f64, start: f64, length: f64| value.min(start + length - room).max(start + room);
+    let place = (inside(x, area.x, area.width), inside(y, area.y, area.height));
+    if place != (x, y) {
+        let away = (place.0 - x).hypot(place.1 - y);
+        // Farther in, so that the line is seen.
+        let place = (place.0 + 1.5 * (place.0 - x) / away * STAR, place.1 + 1.5 * (place.1 - y) / away * STAR);
+        canvas.line((x, y), place, &Stroke::solid("#fff", 1.6));
+        canvas.line((x, y), place, &Stroke::solid("#000", 0.7));
+        canvas.circle((x, y), 1.0, "#000", &Stroke::solid("#fff", 0.4));
+        return star(canvas, place);
     }
+    star(canvas, place);
 }
 
 /// A star with five points.
 fn star(canvas: &mut Canvas, (x, y): (f64, f64)) {
     let corner = |i: usize| {
         let angle = std::f64::consts::PI * (i as f64 / 5.0 - 0.5);
-        let radius = if i.is_multiple_of(2) { 4.6 } else { 1.9 };
+        let radius = if i.is_multiple_of(2) { STAR } else { 1.9 };
         (x + radius * angle.cos(), y + radius * angle.sin())
     };
     let corners: Vec<(f64, f64)> = (0..10).map(corner).collect();
@@ -598,32 +700,31 @@ fn star(canvas: &mut Canvas, (x, y): (f64, f64)) {
 }
 
 impl Marker {
-    fn draw(&self, canvas: &mut Canvas, (x, y): (f64, f64)) {
+    fn draw(&self, canvas: &mut Canvas, place: (f64, f64)) {
         let colour = super::colour::series(self.series).colour;
-        let stroke = Stroke::solid(&colour, 0.8);
-        let r = 2.0;
-        match self.series % 4 {
-            0 => canvas.circle((x, y), r, "#fff", &stroke),
-            1 => canvas.shape(&[(x - r, y - r), (x + r, y - r), (x + r, y + r), (x - r, y + r)], "#fff", Some(&stroke)),
-            2 => canvas.shape(&[(x, y - r - 0.5), (x + r + 0.3, y + r), (x - r - 0.3, y + r)], "#fff", Some(&stroke)),
-            _ => {
-                let points = [(x, y - r - 0.8), (x + r + 0.8, y), (x, y + r + 0.8), (x - r - 0.8, y)];
-                canvas.shape(&points, "#fff", Some(&stroke));
-            }
-        }
+        symbol(canvas, place, self.series, "#fff", &Stroke::solid(&colour, 0.8));
     }
 }
 
+/// A circle, a square, a triangle or a rhombus.
+fn symbol(canvas: &mut Canvas, (x, y): (f64, f64), shape: usize, fill: &str, stroke: &Stroke) {
+    let r = 2.0;
+    let corners: &[(f64, f64)] = match shape % 4 {
+        0 => return canvas.circle((x, y), r, fill, stroke),
+        1 => &[(-r, -r), (r, -r), (r, r), (-r, r)],
+        2 => &[(0.0, -r - 0.5), (r + 0.3, r), (-r - 0.3, r)],
+        _ => &[(0.0, -r - 0.8), (r + 0.8, 0.0), (0.0, r + 0.8), (-r - 0.8, 0.0)],
+    };
+    let corners: Vec<(f64, f64)> = corners.iter().map(|(right, down)| (x + right, y + down)).collect();
+    canvas.shape(&corners, fill, Some(stroke));
+}
+
 impl Colours {
-    fn ticks(&self) -> Ticks {
-        self.scale.ticks(6)
+    fn width(&self, as_powers: bool) -> f64 {
+        6.0 + 8.0 + TICK + 2.0 + widest(&self.scale.ticks(6, as_powers)) + 4.0 + SIZE + 1.0
     }
 
-    fn width(&self) -> f64 {
-        6.0 + 8.0 + TICK + 2.0 + widest(&self.ticks()) + 4.0 + SIZE + 1.0
-    }
-
-    fn draw(&self, canvas: &mut Canvas, area: Area) {
+    fn draw(&self, canvas: &mut Canvas, area: Area, as_powers: bool) {
         let steps = 128;
         let pixels: Vec<Option<[u8; 3]>> =
             (0..steps).map(|i| Some(viridis(1.0 - (i as f64 + 0.5) / steps as f64))).collect();
@@ -631,7 +732,7 @@ impl Colours {
             canvas.image(area, &png);
         }
         canvas.frame(area, &Stroke::solid("#000", FRAME));
-        let ticks = self.ticks();
+        let ticks = self.scale.ticks(6, as_powers);
         let right = area.x + area.width;
         let mut edge = f64::INFINITY;
         for tick in &ticks.ticks {

@@ -57,6 +57,11 @@ pub fn spans(markup: &str) -> Vec<Span> {
     spans
 }
 
+/// A text of the user's, in which signs of markup mean nothing.
+pub fn literal(text: &str) -> String {
+    text.chars().map(|letter| if letter.is_control() || "*_^{}".contains(letter) { ' ' } else { letter }).collect()
+}
+
 /// The width of a text in markup, at a font size of 1.
 pub fn width(markup: &str) -> f64 {
     spans(markup).iter().map(span_width).sum()
@@ -95,6 +100,7 @@ fn symbol(name: &str) -> Option<&'static str> {
         "v_0" => "*v*_{0}",
         "v" => "*v*",
         "v_c" => "*v*_{c}",
+        "v, v_c" => "*v*, *v*_{c}",
         "theta" => "*θ*",
         "tau" => "*τ*",
         "beta" => "*β*",
@@ -152,11 +158,13 @@ fn scale(word: &str) -> Option<&'static str> {
     SCALES.contains(&word).then(|| symbol(word)).flatten()
 }
 
-/// A value of a column, in markup, with its unit if that is one of SI: values in scales of the model are pure numbers.
+/// A value of a column, in markup, with its unit.
 pub fn equation(column: &str, value: &str, of: &str) -> String {
-    let is_si = !of.split([' ', '/', '(', ')', '^']).any(|word| SCALES.contains(&word));
-    let unit = if is_si && value != "∞" { unit(of) } else { String::new() };
-    format!("{} = {value} {unit}", name(column)).trim_end().to_owned()
+    let unit = if value == "∞" { String::new() } else { unit(of) };
+    match unit.strip_prefix("1/") {
+        Some(rest) => format!("{} = {value}/{rest}", name(column)),
+        None => format!("{} = {value} {unit}", name(column)).trim_end().to_owned(),
+    }
 }
 
 /// A unit in markup; nothing for a pure number.
@@ -210,8 +218,15 @@ pub fn signed(value: i32) -> String {
     if value < 0 { format!("−{}", value.unsigned_abs()) } else { value.to_string() }
 }
 
-/// A number to six digits, in markup.
+/// A number to five digits, in markup: as a decimal from 0.001 to 99999, as ticks are.
 pub fn number(value: f64) -> String {
+    number_among(value, &[])
+}
+
+/// A number in the format that all of `others` have: with a power of ten if one of them needs it.
+pub fn number_among(value: f64, others: &[f64]) -> String {
+    let needs_power = |other: &f64| other.is_finite() && *other != 0.0 && !(1e-3..99_999.5).contains(&other.abs());
+    let as_powers = others.iter().any(needs_power);
     if value == 0.0 {
         return "0".to_owned();
     }
@@ -225,12 +240,12 @@ pub fn number(value: f64) -> String {
         }
         .to_owned();
     }
-    let scientific = format!("{:.5e}", value.abs());
+    let scientific = format!("{:.4e}", value.abs());
     let (digits, exponent) = scientific.split_once('e').unwrap_or((&scientific, "0"));
     let exponent: i32 = exponent.parse().unwrap_or(0);
     let minus = if value < 0.0 { "−" } else { "" };
-    if (-3..6).contains(&exponent) {
-        let decimals = usize::try_from(5 - exponent).unwrap_or(0);
+    if exponent == 0 || !as_powers && (-3..5).contains(&exponent) {
+        let decimals = usize::try_from(4 - exponent).unwrap_or(0);
         return format!("{minus}{}", trimmed(&format!("{:.decimals$}", value.abs())));
     }
     match trimmed(digits) {
@@ -244,16 +259,19 @@ fn trimmed(digits: &str) -> &str {
     if digits.contains('.') { digits.trim_end_matches('0').trim_end_matches('.') } else { digits }
 }
 
-/// Cuts a text in markup into lines of at most `most` (in units of the font size), between words.
+/// Cuts a text in markup into lines of at most `most` (in units of the font size), between words, but not beside a sign of equality.
 pub fn wrapped(markup: &str, most: f64) -> Vec<String> {
     let mut lines: Vec<String> = Vec::new();
+    // Spaces within equations, while the text is cut.
+    let markup = markup.replace(" = ", "\u{a0}=\u{a0}");
     for word in markup.split(' ') {
+        let word = &word.replace('\u{a0}', " ");
         match lines.last_mut() {
             Some(line) if width(&format!("{line} {word}")) <= most => {
                 line.push(' ');
                 line.push_str(word);
             }
-            _ => lines.push(word.to_owned()),
+            _ => lines.push(word.clone()),
         }
     }
     lines
@@ -275,7 +293,8 @@ mod tests {
         assert_eq!(axis("k", "Pa/m", 3), "*k* (10^{3} Pa/m)");
         assert_eq!(axis("m", "kg/m^2", 0), "*m* (kg/m^{2})");
         assert_eq!(equation("v_i", "3×10^{−9}", "m/s"), "*v*_{i} = 3×10^{−9} m/s");
-        assert_eq!(equation("v_i", "3", "v_0"), "*v*_{i} = 3");
+        assert_eq!(equation("v_i", "3", "v_0"), "*v*_{i} = 3 *v*_{0}");
+        assert_eq!(equation("alpha_2", "−0.12", "1/t_f"), "*α*_{2} = −0.12/*t*_{f}");
         assert_eq!(equation("k", "∞", "Pa/m"), "*k* = ∞");
     }
 
@@ -290,7 +309,19 @@ mod tests {
     #[test]
     fn numbers_are_short() {
         let shown = [0.03, 3.2e6, 1e5, 2.5e-16, -0.12, 100.0, f64::INFINITY].map(number);
-        assert_eq!(shown, ["0.03", "3.2×10^{6}", "100000", "2.5×10^{−16}", "−0.12", "100", "∞"]);
+        assert_eq!(shown, ["0.03", "3.2×10^{6}", "10^{5}", "2.5×10^{−16}", "−0.12", "100", "∞"]);
+    }
+
+    #[test]
+    fn numbers_of_an_axis_have_one_format() {
+        let values = [1e-4, 1e-3, 0.02, 3.0];
+        assert_eq!(values.map(|value| number_among(value, &values)), ["10^{−4}", "10^{−3}", "2×10^{−2}", "3"]);
+        assert_eq!(values.map(|value| number_among(value, &values[1..])), ["10^{−4}", "0.001", "0.02", "3"]);
+    }
+
+    #[test]
+    fn equations_are_not_cut() {
+        assert_eq!(wrapped("a = 1, b = 2", 3.0), ["a = 1,", "b = 2"]);
     }
 
     #[test]

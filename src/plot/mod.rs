@@ -1,6 +1,7 @@
 //! Pictures of traces and tables: a figure is set out, drawn as SVG, and written as SVG, PNG or PDF.
 
 mod canvas;
+mod coincide;
 mod colour;
 mod contour;
 mod error;
@@ -16,7 +17,7 @@ pub use canvas::Stroke;
 pub use colour::series;
 pub use error::PlotError;
 pub use export::{ExportError, Format};
-pub use figure::{Axis, Drawn, Entry, Figure, Key, Layer, Marker, Panel};
+pub use figure::{Axis, Dot, Drawn, Entry, Figure, Key, Layer, Marker, Panel};
 pub use page::Page;
 pub use scale::Scale;
 

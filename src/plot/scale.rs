@@ -5,6 +5,16 @@ use super::label;
 /// Ratio of the greatest to the least value from which on a logarithm is used.
 const LOGARITHMIC: f64 = 30.0;
 
+/// The same ratio of the values above zero, where others are zero, which a logarithm cannot show: a double's digits show less of them.
+const LOGARITHMIC_BESIDE_ZERO: f64 = 1e9;
+
+/// What is left of numbers of size 1 that cancel, with room for a few hundred roundings of 1.1e-16 each: smaller values, relative to the
+/// greatest, may be zeros.
+const ROUNDING: f64 = 1e-12;
+
+/// Decades without a value that part such zeros from values: neighbouring points of a curve are closer.
+const EMPTY_DECADES: usize = 6;
+
 /// A range of values, and whether it is shown logarithmically.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Scale {
@@ -35,12 +45,25 @@ pub struct Ticks {
 }
 
 impl Scale {
-    /// The scale of `values`, logarithmic where all are positive and span a large ratio or are evenly spaced in ratio; `None` without any.
+    /// The scale of `values`, logarithmic where they are positive and span a large ratio; zeros made of rounding errors do not stretch
+    /// it. `None` without any.
     pub fn of(values: impl IntoIterator<Item = f64>) -> Option<Scale> {
-        let finite = values.into_iter().filter(|value| value.is_finite());
-        let (low, high) =
-            finite.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| (low.min(value), high.max(value)));
-        (low <= high).then(|| Scale { low, high, log: low > 0.0 && high / low >= LOGARITHMIC })
+        let finite: Vec<f64> = values.into_iter().filter(|value| value.is_finite()).collect();
+        let span = |values: &mut dyn Iterator<Item = f64>| {
+            values.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| (low.min(value), high.max(value)))
+        };
+        let (low, high) = span(&mut finite.iter().copied());
+        if low > high {
+            return None;
+        }
+        let linear = Scale { low, high, log: false };
+        if low < 0.0 || high <= 0.0 {
+            return Some(linear);
+        }
+        let zero = rounding(&finite, high);
+        let (least, _) = span(&mut finite.iter().copied().filter(|value| *value > zero));
+        let ratio = if low == 0.0 { LOGARITHMIC_BESIDE_ZERO } else { LOGARITHMIC };
+        Some(if high / least >= ratio { Scale { low: least, high, log: true } } else { linear })
     }
 
     /// With a little room at both ends; a single value gets some around it.
@@ -86,9 +109,14 @@ impl Scale {
         }
     }
 
-    /// About `count` labelled ticks.
-    pub fn ticks(&self, count: usize) -> Ticks {
-        if self.log { self.powers(count) } else { self.steps(count) }
+    /// About `count` labelled ticks; those of a logarithm as powers of ten if `as_powers`, else as decimals.
+    pub fn ticks(&self, count: usize, as_powers: bool) -> Ticks {
+        if self.log { self.powers(count, as_powers) } else { self.steps(count) }
+    }
+
+    /// Whether ticks are too small or too large for decimals.
+    pub fn needs_powers(&self) -> bool {
+        self.log && (self.low < 0.999e-3 || self.high > 1.001e4)
     }
 
     fn steps(&self, count: usize) -> Ticks {
@@ -115,7 +143,7 @@ impl Scale {
         Ticks { ticks: ticks.collect(), power }
     }
 
-    fn powers(&self, count: usize) -> Ticks {
+    fn powers(&self, count: usize, as_powers: bool) -> Ticks {
         let (first, last) = (self.low.log10() - 1e-6, self.high.log10() + 1e-6);
         let (lowest, highest) = (first.floor() as i32, last.ceil() as i32);
         let decades = (first.ceil() as i32..=last.floor() as i32).count();
@@ -127,7 +155,6 @@ impl Scale {
             _ => &[1],
         };
         let every = decades.div_ceil(count.max(1)).max(1) as i32;
-        let plain = (-3..=4).contains(&lowest) && highest <= 4 && lowest >= -3;
         let mut ticks = Vec::new();
         for power in lowest..=highest {
             for digit in 1..=9_u32 {
@@ -141,7 +168,7 @@ impl Scale {
                     continue;
                 }
                 let text = || {
-                    if plain && (digits.len() > 1 || (-2..=3).contains(&power)) {
+                    if !as_powers {
                         label::number(value)
                     } else if digit == 1 {
                         format!("10^{{{}}}", label::signed(power))
@@ -154,6 +181,23 @@ impl Scale {
         }
         Ticks { ticks, power: 0 }
     }
+}
+
+/// The greatest of the values that are zeros made of rounding errors; 0 without any.
+fn rounding(values: &[f64], high: f64) -> f64 {
+    // Decades below the greatest value, of which doubles have fewer than 640.
+    let decade = |value: f64| (high.log10() - value.log10()).floor().clamp(0.0, 639.0) as usize;
+    let mut used = [false; 640];
+    values.iter().filter(|value| **value > 0.0).for_each(|value| used[decade(*value)] = true);
+    let mut empty = 0;
+    for (place, is_used) in used.into_iter().enumerate() {
+        empty = if is_used { 0 } else { empty + 1 };
+        if empty == EMPTY_DECADES {
+            let zeros = values.iter().copied().filter(|value| *value <= ROUNDING * high && decade(*value) > place);
+            return zeros.fold(0.0, f64::max);
+        }
+    }
+    0.0
 }
 
 /// Whether values in ascending order are better shown by their logarithms: equal ratios, or a large one.
@@ -189,7 +233,7 @@ mod tests {
     use super::*;
 
     fn labels(scale: Scale, count: usize) -> Vec<String> {
-        scale.ticks(count).ticks.into_iter().filter_map(|tick| tick.label).collect()
+        scale.ticks(count, scale.needs_powers()).ticks.into_iter().filter_map(|tick| tick.label).collect()
     }
 
     #[test]
@@ -197,7 +241,7 @@ mod tests {
         let scale = |low, high| Scale { low, high, log: false };
         assert_eq!(labels(scale(-0.5, 0.5), 5), ["−0.4", "−0.2", "0.0", "0.2", "0.4"]);
         assert_eq!(labels(scale(0.0, 100.0), 5), ["0", "20", "40", "60", "80", "100"]);
-        let small = scale(0.0, 3.1e-6).ticks(4);
+        let small = scale(0.0, 3.1e-6).ticks(4, false);
         assert_eq!(small.power, -6);
         assert_eq!(
             small.ticks.iter().filter_map(|tick| tick.label.as_deref()).collect::<Vec<_>>(),
@@ -211,6 +255,23 @@ mod tests {
         assert_eq!(labels(scale(1e-7, 1.0), 4), ["10^{−6}", "10^{−4}", "10^{−2}", "10^{0}"]);
         assert_eq!(labels(scale(0.01, 10.0), 4), ["0.01", "0.1", "1", "10"]);
         assert_eq!(labels(scale(3.0, 7.0), 4), ["3", "4", "5", "6", "7"]);
+        // One format a scale: no 0.01 beside a power of ten.
+        assert_eq!(labels(scale(1e-3, 1e3), 7), ["0.001", "0.01", "0.1", "1", "10", "100", "1000"]);
+        assert_eq!(labels(scale(1e-4, 1.0), 5), ["10^{−4}", "10^{−3}", "10^{−2}", "10^{−1}", "10^{0}"]);
+    }
+
+    #[test]
+    fn zeros_made_of_rounding_errors_do_not_stretch_a_logarithm() {
+        let log = |low, high| Some(Scale { low, high, log: true });
+        assert_eq!(Scale::of([1e-14, 3e-16, 0.02, 0.5, 3.0]), log(0.02, 3.0));
+        // Without them there is no need of a logarithm.
+        assert_eq!(Scale::of([1e-14, 1.0, 3.0]), Some(Scale { low: 1e-14, high: 3.0, log: false }));
+        // A curve that comes down step by step is no zero, and neither is a small number beside one that is not much greater.
+        assert_eq!(Scale::of([1.0, 1e-5, 1e-10, 1e-15]), log(1e-15, 1.0));
+        assert_eq!(Scale::of([1.0, 1e-8]), log(1e-8, 1.0));
+        // Zeros beside values of a few decades need none, beside many they do.
+        assert_eq!(Scale::of([0.0, 1e-3, 1.0, 10.0]), Some(Scale { low: 0.0, high: 10.0, log: false }));
+        assert_eq!(Scale::of([0.0, 1e-10, 1e-4, 1.0]), log(1e-10, 1.0));
     }
 
     #[test]

@@ -10,6 +10,8 @@ pub enum Status {
     BelowBound,
     /// No such protocol: `theta <= 0` or `v <= 0` somewhere, or `t_f < t_min`.
     Infeasible,
+    /// Computed, but `tau < 0` somewhere on this path: outside any friction law.
+    NegativeFriction,
     /// `tau <= max(0, b - a)` somewhere on the optimal path, where the extremal need not be unique.
     Nonphysical,
     /// A defect of ours: the solver could not certify its answer.
@@ -18,8 +20,14 @@ pub enum Status {
 
 impl Status {
     /// All statuses, in their order.
-    pub const ALL: [Status; 5] =
-        [Status::Ok, Status::BelowBound, Status::Infeasible, Status::Nonphysical, Status::NotConverged];
+    pub const ALL: [Status; 6] = [
+        Status::Ok,
+        Status::BelowBound,
+        Status::Infeasible,
+        Status::NegativeFriction,
+        Status::Nonphysical,
+        Status::NotConverged,
+    ];
 
     /// The name that is written into tables.
     pub fn name(self) -> &'static str {
@@ -27,8 +35,34 @@ impl Status {
             Status::Ok => "ok",
             Status::BelowBound => "below_bound",
             Status::Infeasible => "infeasible",
+            Status::NegativeFriction => "negative_friction",
             Status::Nonphysical => "nonphysical",
             Status::NotConverged => "not_converged",
+        }
+    }
+
+    /// The status of a path with this least friction, which would have status `self` otherwise.
+    ///
+    /// Negative friction rules out more than a low velocity or an optimum that need not be unique. A path without
+    /// numbers has no friction.
+    pub fn with_friction(self, least: f64) -> Status {
+        match self {
+            Status::Ok | Status::BelowBound | Status::Nonphysical if least < 0.0 => Status::NegativeFriction,
+            status => status,
+        }
+    }
+
+    /// The status of a row that compares a path of status `self` with the optimum of this status.
+    ///
+    /// An optimum that need not be the least leaves the row in doubt, and so does one whose own friction is negative;
+    /// negative friction on the path itself is the stronger statement.
+    pub fn beside(self, optimum: Status) -> Status {
+        match (self, optimum) {
+            (Status::Infeasible | Status::NotConverged, _) => self,
+            (_, Status::Infeasible | Status::NotConverged) => optimum,
+            (Status::NegativeFriction, _) => self,
+            (_, Status::NegativeFriction | Status::Nonphysical) => Status::Nonphysical,
+            _ => self,
         }
     }
 }

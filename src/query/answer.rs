@@ -1,25 +1,43 @@
 //! An answer: its columns, and its rows a piece at a time.
 
 use std::io::{self, Write};
-use std::num::NonZeroUsize;
-use std::sync::Mutex;
-use std::sync::mpsc::sync_channel;
-use std::thread;
+use std::sync::{Arc, Mutex};
 
-use polars::prelude::{
-    AnyValue, Column, CsvWriter, DataFrame, Engine, JsonFormat, JsonWriter, LazyFrame, ParquetWriter, PlanCallback,
-    PolarsError, PolarsResult, SchemaRef, SerWriter,
+use arrow_array::builder::StringDictionaryBuilder;
+use arrow_array::types::Int32Type;
+use arrow_array::{
+    ArrayRef, BooleanArray, Date32Array, Float64Array, Int64Array, RecordBatch, StringArray, TimestampMicrosecondArray,
 };
+use arrow_schema::{DataType as ArrowType, Schema as ArrowSchema, SchemaRef, TimeUnit};
+use parquet::arrow::ArrowWriter;
+use parquet::basic::Compression;
+use parquet::errors::ParquetError;
+use parquet::file::properties::WriterProperties;
+use polars::prelude::{
+    AnyValue, Column, DataFrame, DataType, IntoLazy, LazyFrame, PolarsError, PolarsResult, Series, SortMultipleOptions,
+    TimeUnit as PolarsTimeUnit,
+};
+use polars_io::SerWriter;
+use polars_io::prelude::CsvWriter;
+use rayon::prelude::*;
 
-use crate::dataset::Cell;
+use super::pieces::{Key, PARTS, Pieces};
+use super::plan;
+use super::scan::{Files, append};
+use crate::dataset::{Cell, field, guarded, label};
 
-/// Rows of a piece: enough to keep all threads busy, few enough to hold in memory.
-const PIECE: NonZeroUsize = NonZeroUsize::MIN.saturating_add((1 << 14) - 1);
+/// Rows that are handed over at a time. Chosen: few enough that a reader sees the first ones soon.
+const PIECE: usize = 1 << 14;
+
+/// Rows of partial answers that are merged before more are computed. Chosen: ten columns of 2^22 doubles are 336 MB.
+const MOST_PARTIAL: usize = 1 << 22;
 
 /// An answer that is found while it is read.
 pub struct Answer {
+    columns: Vec<String>,
+    units: Vec<String>,
     frame: LazyFrame,
-    schema: SchemaRef,
+    pieces: Option<(Files, Pieces)>,
 }
 
 /// How an answer is written to a file.
@@ -53,21 +71,42 @@ impl From<PolarsError> for AnswerError {
     }
 }
 
+impl From<ParquetError> for AnswerError {
+    fn from(error: ParquetError) -> AnswerError {
+        AnswerError::Failed(PolarsError::ComputeError(error.to_string().into()))
+    }
+}
+
+type Take<'a> = &'a mut dyn FnMut(&DataFrame) -> Result<(), AnswerError>;
+
 impl Answer {
-    /// The answer that `frame` will give.
-    pub(super) fn new(mut frame: LazyFrame) -> PolarsResult<Answer> {
-        let schema = frame.collect_schema()?;
-        Ok(Answer { frame, schema })
+    /// The answer that `frame` will give, with `columns` in these `units`; or `pieces` of files.
+    pub(super) fn new(
+        frame: LazyFrame,
+        columns: Vec<String>,
+        units: Vec<String>,
+        pieces: Option<(Files, Pieces)>,
+    ) -> Answer {
+        Answer { columns, units, frame, pieces }
     }
 
     /// The names of its columns.
     pub fn columns(&self) -> Vec<String> {
-        self.schema.iter_names().map(ToString::to_string).collect()
+        self.columns.clone()
+    }
+
+    /// The units of its columns, empty where none is known.
+    pub fn units(&self) -> Vec<String> {
+        self.units.clone()
     }
 
     /// Hands its rows to `take`, some thousands at a time.
+    ///
+    /// # Errors
+    ///
+    /// If it cannot be found, or `take` fails.
     pub fn rows(self, mut take: impl FnMut(Vec<Vec<Cell>>) -> io::Result<()>) -> Result<(), AnswerError> {
-        self.pieces(|piece| {
+        self.find(&mut |piece| {
             let columns: Vec<Vec<Cell>> = piece.columns().iter().map(cells).collect();
             let mut columns: Vec<_> = columns.into_iter().map(Vec::into_iter).collect();
             let row = || columns.iter_mut().filter_map(Iterator::next).collect();
@@ -76,92 +115,195 @@ impl Answer {
     }
 
     /// Writes it to `out`.
+    ///
+    /// # Errors
+    ///
+    /// If it cannot be found or written.
     pub fn write(self, format: Format, out: &mut dyn Write) -> Result<(), AnswerError> {
-        let schema = self.schema.clone();
+        let mut first = true;
         match format {
-            Format::Csv => {
+            Format::Csv => self.find(&mut |piece| {
                 let mut bytes = Vec::new();
-                let mut empty = DataFrame::empty_with_schema(&schema);
-                CsvWriter::new(&mut bytes).finish(&mut empty)?;
-                out.write_all(&bytes)?;
-                self.pieces(|piece| {
-                    bytes.clear();
-                    CsvWriter::new(&mut bytes).include_header(false).finish(piece)?;
-                    Ok(out.write_all(&bytes)?)
-                })?;
-            }
-            Format::JsonLines => self.pieces(|piece| {
-                let mut bytes = Vec::new();
-                JsonWriter::new(&mut bytes).with_json_format(JsonFormat::JsonLines).finish(piece)?;
+                let header = std::mem::take(&mut first);
+                without_lists(piece, "CSV")?;
+                CsvWriter::new(&mut bytes).include_header(header).finish(&mut piece.clone())?;
                 Ok(out.write_all(&bytes)?)
             })?,
+            Format::JsonLines => self.find(&mut |piece| Ok(out.write_all(json_lines(piece).as_bytes())?))?,
             Format::Parquet => {
-                let failure = Mutex::new(None);
-                let mut writer = ParquetWriter::new(Noting { out: &mut *out, failure: &failure }).batched(&schema)?;
-                let written = self.pieces(|piece| Ok(writer.write_batch(piece)?));
-                let written = written.and_then(|()| Ok(writer.finish().map(drop)?));
-                let failure = failure.lock().ok().and_then(|mut failure| failure.take());
-                failure.map_or(written, |error| Err(error.into()))?;
+                let units = self.units.clone();
+                let properties = WriterProperties::builder().set_compression(Compression::SNAPPY).build();
+                let written = Bytes::default();
+                let mut writer: Option<(SchemaRef, ArrowWriter<Bytes>)> = None;
+                self.find(&mut |piece| {
+                    if writer.is_none() {
+                        without_lists(piece, "a Parquet answer")?;
+                        let schema = arrow_schema(piece, &units);
+                        let made = ArrowWriter::try_new(written.clone(), schema.clone(), Some(properties.clone()))?;
+                        writer = Some((schema, made));
+                    }
+                    if let Some((schema, writer)) = &mut writer {
+                        writer.write(&batch(piece, schema)?)?;
+                    }
+                    Ok(out.write_all(&written.take())?)
+                })?;
+                if let Some((_, writer)) = writer {
+                    writer.close()?;
+                }
+                out.write_all(&written.take())?;
             }
         }
         Ok(out.flush()?)
     }
 
-    /// Finds the answer on all threads and hands it over piece by piece, as fast as they are taken.
-    fn pieces(self, mut take: impl FnMut(&mut DataFrame) -> Result<(), AnswerError>) -> Result<(), AnswerError> {
-        let (send, pieces) = sync_channel(1);
-        // Whoever does not want any more pieces hangs up, which stops the query.
-        let give = PlanCallback::new(move |piece: DataFrame| Ok(send.send(piece).is_err()));
-        let query = self.frame.sink_batches(give, true, Some(PIECE))?;
-        thread::scope(|scope| {
-            let finding = scope.spawn(move || query.collect_with_engine(Engine::Streaming));
-            let taken = pieces.iter().try_for_each(|mut piece| {
-                piece.rechunk_mut();
-                take(&mut piece)
-            });
-            drop(pieces);
-            let found = finding.join().unwrap_or_else(|_| {
-                Err(PolarsError::ComputeError("it asks for something that is not supported".into()))
-            });
-            taken?;
-            found.map(drop).map_err(AnswerError::from)
-        })
+    /// Finds the answer on all threads and hands it over piece by piece, at least one even if there is no row.
+    fn find(self, take: Take) -> Result<(), AnswerError> {
+        let Answer { frame, pieces, .. } = self;
+        match pieces {
+            Some((files, pieces)) if pieces.merge.is_none() && pieces.keys.is_empty() => stream(&files, &pieces, take),
+            Some((files, pieces)) => match guarded(|| combine(&files, &pieces)) {
+                Some(Ok(found)) => hand(&found, take),
+                // What cannot be merged may be answered in one piece; if not, that error is the one to report.
+                _ => hand(&whole(frame)?, take),
+            },
+            None => hand(&whole(frame)?, take),
+        }
     }
 }
 
-/// Notes how writing failed, which a Parquet writer tells as if the format were at fault.
-struct Noting<'a> {
-    out: &'a mut dyn Write,
-    failure: &'a Mutex<Option<io::Error>>,
+fn whole(frame: LazyFrame) -> PolarsResult<DataFrame> {
+    guarded(|| frame.collect()).unwrap_or_else(|| Err(unsupported()))
 }
 
-impl Noting<'_> {
-    fn note<T>(&self, result: io::Result<T>) -> io::Result<T> {
-        result.map_err(|error| {
-            let kind = error.kind();
-            if let Ok(mut failure) = self.failure.lock() {
-                failure.get_or_insert(error);
+/// What a panic of polars is reported as.
+fn unsupported() -> PolarsError {
+    PolarsError::ComputeError("polars does not support it".into())
+}
+
+/// Hands `found` over, some rows at a time.
+fn hand(found: &DataFrame, take: Take) -> Result<(), AnswerError> {
+    let mut start = 0;
+    loop {
+        take(&found.slice(start as i64, PIECE))?;
+        start += PIECE;
+        if start >= found.height() {
+            return Ok(());
+        }
+    }
+}
+
+/// Pieces that are answered at a time. Chosen: several for each thread, so that none waits long for another.
+fn at_once() -> usize {
+    4 * rayon::current_num_threads()
+}
+
+/// What each of `files` gives, in their order.
+fn ask(files: &[Files], pieces: &Pieces) -> PolarsResult<Vec<DataFrame>> {
+    let answer = |files: &Files| match &pieces.groups {
+        Some(groups) => files.groups(groups),
+        None => {
+            let rows = files.clone().only(pieces.conditions.clone(), pieces.top.clone());
+            guarded(|| plan([(pieces.table.as_str(), rows.frame()?)], &pieces.partial)?.collect())
+                .unwrap_or_else(|| Err(unsupported()))
+        }
+    };
+    files.par_iter().map(answer).collect()
+}
+
+/// Hands rows over as they are read.
+fn stream(files: &Files, pieces: &Pieces, take: Take) -> Result<(), AnswerError> {
+    let mut skip = pieces.offset;
+    let mut left = pieces.limit;
+    let mut first = true;
+    for wave in files.pieces().chunks(at_once()) {
+        for mut found in ask(wave, pieces)? {
+            let skipped = skip.min(found.height());
+            skip -= skipped;
+            found = found.slice(skipped as i64, left.unwrap_or(usize::MAX));
+            left = left.map(|left| left - found.height());
+            if std::mem::take(&mut first) || found.height() > 0 {
+                hand(&found, take)?;
             }
-            kind.into()
-        })
+        }
+        if left == Some(0) {
+            break;
+        }
+    }
+    Ok(())
+}
+
+/// The answer, put together from those of pieces.
+fn combine(files: &Files, pieces: &Pieces) -> PolarsResult<DataFrame> {
+    let most = pieces.limit.map(|limit| limit.saturating_add(pieces.offset));
+    let mut parts = DataFrame::default();
+    for wave in files.pieces().chunks(at_once()) {
+        for part in ask(wave, pieces)? {
+            let part = if pieces.merge.is_some() { part } else { ordered(part, &pieces.keys, 0, most)? };
+            append(&mut parts, part)?;
+        }
+        if parts.height() > MOST_PARTIAL {
+            parts = merged(parts, pieces, most)?;
+        }
+    }
+    parts = merged(parts, pieces, most)?;
+    if let Some(finish) = &pieces.finish {
+        parts = plan([(PARTS, parts.lazy())], finish)?.collect()?;
+    }
+    ordered(parts, &pieces.keys, pieces.offset, pieces.limit)?.select(pieces.names.iter().map(String::as_str))
+}
+
+fn merged(parts: DataFrame, pieces: &Pieces, most: Option<usize>) -> PolarsResult<DataFrame> {
+    match &pieces.merge {
+        Some(merge) => plan([(PARTS, parts.lazy())], merge)?.collect(),
+        None => ordered(parts, &pieces.keys, 0, most),
     }
 }
 
-impl Write for Noting<'_> {
+/// `rows` ordered by their columns `__k0`, ..., at most `limit` of them after the first `offset`.
+fn ordered(rows: DataFrame, keys: &[Key], offset: usize, limit: Option<usize>) -> PolarsResult<DataFrame> {
+    let rows = if keys.is_empty() {
+        rows
+    } else {
+        let names: Vec<String> = (0..keys.len()).map(|place| format!("__k{place}")).collect();
+        let options = SortMultipleOptions::default()
+            .with_order_descending_multi(keys.iter().map(|key| key.descending).collect::<Vec<_>>())
+            .with_nulls_last_multi(keys.iter().map(|key| key.nulls_last).collect::<Vec<_>>())
+            .with_maintain_order(true);
+        let mut frame = rows.lazy().sort(names, options);
+        if let Some(limit) = limit {
+            let most = u32::try_from(limit.saturating_add(offset)).unwrap_or(u32::MAX);
+            frame = frame.limit(most);
+        }
+        frame.collect()?
+    };
+    Ok(rows.slice(i64::try_from(offset).unwrap_or(i64::MAX), limit.unwrap_or(usize::MAX)))
+}
+
+/// Bytes on their way from a writer to where they belong.
+#[derive(Clone, Default)]
+struct Bytes(Arc<Mutex<Vec<u8>>>);
+
+impl Bytes {
+    fn take(&self) -> Vec<u8> {
+        self.0.lock().map(|mut bytes| std::mem::take(&mut *bytes)).unwrap_or_default()
+    }
+}
+
+impl Write for Bytes {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
-        let written = self.out.write(bytes);
-        self.note(written)
+        let mut kept = self.0.lock().map_err(|_| io::ErrorKind::Other)?;
+        kept.extend_from_slice(bytes);
+        Ok(bytes.len())
     }
 
     fn flush(&mut self) -> io::Result<()> {
-        let flushed = self.out.flush();
-        self.note(flushed)
+        Ok(())
     }
 }
 
 /// The cells of a column.
 fn cells(column: &Column) -> Vec<Cell> {
-    let series = column.as_materialized_series();
+    let series = column.as_materialized_series().rechunk();
     series
         .iter()
         .map(|value| match value {
@@ -171,4 +313,106 @@ fn cells(column: &Column) -> Vec<Cell> {
             other => Cell::Word(other.str_value().into_owned()),
         })
         .collect()
+}
+
+/// A JSON object for each row.
+fn json_lines(piece: &DataFrame) -> String {
+    let columns: Vec<(String, Series)> = piece
+        .columns()
+        .iter()
+        .map(|column| {
+            let name = serde_json::Value::String(column.name().to_string()).to_string();
+            (name, column.as_materialized_series().rechunk())
+        })
+        .collect();
+    let mut cells: Vec<_> = columns.iter().map(|(name, series)| (name, series.iter())).collect();
+    let mut text = String::new();
+    for _ in 0..piece.height() {
+        let row: Vec<String> = cells
+            .iter_mut()
+            .map(|(name, cells)| format!("{name}:{}", cells.next().map_or(serde_json::Value::Null, |cell| json(&cell))))
+            .collect();
+        text.push_str(&format!("{{{}}}\n", row.join(",")));
+    }
+    text
+}
+
+fn json(value: &AnyValue) -> serde_json::Value {
+    match value {
+        AnyValue::Null => serde_json::Value::Null,
+        AnyValue::Boolean(flag) => (*flag).into(),
+        AnyValue::Float64(number) => json_number(*number),
+        AnyValue::Float32(number) => json_number(f64::from(*number)),
+        AnyValue::UInt64(number) => (*number).into(),
+        AnyValue::List(cells) => cells.iter().map(|cell| json(&cell)).collect::<Vec<_>>().into(),
+        other => match other.extract::<i64>().filter(|_| other.dtype().is_integer()) {
+            Some(number) => number.into(),
+            None => other.str_value().into_owned().into(),
+        },
+    }
+}
+
+/// A number; JSON has words for the others alone: "inf", "-inf", "NaN".
+fn json_number(number: f64) -> serde_json::Value {
+    if number.is_finite() { number.into() } else { number.to_string().into() }
+}
+
+/// That no column of a piece holds lists, which a format does not.
+fn without_lists(piece: &DataFrame, format: &str) -> PolarsResult<()> {
+    let Some(list) = piece.columns().iter().find(|column| column.dtype().is_nested()) else { return Ok(()) };
+    let (name, format) = (list.name(), format);
+    Err(PolarsError::ComputeError(
+        format!("column `{name}` holds lists, which {format} does not: use --format jsonl").into(),
+    ))
+}
+
+/// The columns of a piece as they are written to Parquet, with their units.
+fn arrow_schema(piece: &DataFrame, units: &[String]) -> SchemaRef {
+    let columns = piece.columns().iter().zip(units.iter().map(String::as_str).chain(std::iter::repeat("")));
+    let fields = columns.map(|(column, unit)| {
+        let kind = match column.dtype() {
+            kind if kind.is_float() => ArrowType::Float64,
+            kind if kind.is_integer() => ArrowType::Int64,
+            DataType::Boolean => ArrowType::Boolean,
+            DataType::Date => ArrowType::Date32,
+            DataType::Datetime(..) => ArrowType::Timestamp(TimeUnit::Microsecond, None),
+            kind if kind.is_categorical() => label(),
+            _ => ArrowType::Utf8,
+        };
+        field(column.name(), kind, true, unit, "")
+    });
+    Arc::new(ArrowSchema::new(fields.collect::<Vec<_>>()))
+}
+
+/// A piece as it is written to Parquet.
+fn batch(piece: &DataFrame, schema: &SchemaRef) -> Result<RecordBatch, AnswerError> {
+    let mut arrays: Vec<ArrayRef> = Vec::new();
+    for (column, field) in piece.columns().iter().zip(schema.fields()) {
+        let series = column.as_materialized_series();
+        arrays.push(match field.data_type() {
+            ArrowType::Float64 => Arc::new(series.cast(&DataType::Float64)?.f64()?.iter().collect::<Float64Array>()),
+            ArrowType::Int64 => Arc::new(series.strict_cast(&DataType::Int64)?.i64()?.iter().collect::<Int64Array>()),
+            ArrowType::Boolean => Arc::new(series.bool()?.iter().collect::<BooleanArray>()),
+            ArrowType::Date32 => Arc::new(series.cast(&DataType::Int32)?.i32()?.iter().collect::<Date32Array>()),
+            ArrowType::Timestamp(..) => {
+                let ticks = series.cast(&DataType::Datetime(PolarsTimeUnit::Microseconds, None))?;
+                let ticks = ticks.cast(&DataType::Int64)?;
+                Arc::new(ticks.i64()?.iter().collect::<TimestampMicrosecondArray>())
+            }
+            ArrowType::Dictionary(..) => {
+                let text = series.cast(&DataType::String)?;
+                let mut words = StringDictionaryBuilder::<Int32Type>::new();
+                text.str()?.iter().for_each(|word| words.append_option(word));
+                Arc::new(words.finish())
+            }
+            _ => {
+                let word = |value: AnyValue| match value {
+                    AnyValue::Null => None,
+                    other => Some(other.str_value().into_owned()),
+                };
+                Arc::new(series.rechunk().iter().map(word).collect::<StringArray>())
+            }
+        });
+    }
+    Ok(RecordBatch::try_new(schema.clone(), arrays).map_err(ParquetError::from)?)
 }

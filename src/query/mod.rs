@@ -1,21 +1,29 @@
 //! Questions to tables on disk, in SQL: the tables of a dataset, or a single file, as they lie in their folder.
 //!
-//! Files are scanned as far as a question needs them, column by column and in pieces, so that memory does not grow with
-//! the tables but with the answer that is kept in memory, if any.
+//! `question` checks a question and spells it as polars reads it; `pieces` splits it, where that can be done, so that memory holds what
+//! is kept and not the table; `scan` reads of the files what is needed, `filter` drops rows and `groups` counts them on the way, and `answer` writes what comes out. Nothing is read but the tables
+//! that were opened.
 
 mod answer;
-mod literal;
+mod filter;
+mod groups;
+mod pieces;
+mod question;
+mod scan;
 mod source;
+mod walk;
 
 use std::path::Path;
-use std::thread;
 
-use polars::prelude::{IntoLazy, LazyFrame, PolarsError};
+use polars::prelude::{IntoLazy, LazyFrame, PolarsError, PolarsResult, Schema};
 use polars::sql::SQLContext;
 
-use crate::names::nearest;
+use crate::dataset::{DatasetError, guarded};
+use crate::names::{hint, nearest};
 
 pub use answer::{Answer, AnswerError, Format};
+use question::{CORRECT, Fault, Question};
+pub use scan::is_unreadable;
 pub use source::Source;
 
 /// Tables that can be asked.
@@ -49,6 +57,9 @@ pub enum QueryError {
         /// What to do.
         help: String,
     },
+    /// A part is damaged, or belongs to another dataset.
+    #[error(transparent)]
+    Part(Box<DatasetError>),
     /// A file cannot be read.
     #[error(
         "{path}: cannot read: {source}\n  help: if a run wrote it, delete it and run the sweep again, which makes only what is missing"
@@ -68,8 +79,21 @@ impl QueryError {
     }
 }
 
+/// The plan of `sql` about `tables`, each with its name.
+fn plan<'a>(tables: impl IntoIterator<Item = (&'a str, LazyFrame)>, sql: &str) -> PolarsResult<LazyFrame> {
+    let mut context = SQLContext::new();
+    for (name, frame) in tables {
+        context.register(name, frame);
+    }
+    context.execute(sql)
+}
+
 impl Tables {
     /// The tables of the dataset in `path`; or of a folder of Parquet files, or a Parquet or CSV file, one table under its name.
+    ///
+    /// # Errors
+    ///
+    /// If there is no table, or a file of it cannot be read.
     pub fn open(path: &Path) -> Result<Tables, QueryError> {
         source::open(path).map(|sources| Tables { sources })
     }
@@ -80,62 +104,65 @@ impl Tables {
     }
 
     /// The answer to a question in SQL, which is found when it is read.
+    ///
+    /// # Errors
+    ///
+    /// If it is not one SELECT from these tables.
     pub fn ask(&self, sql: &str) -> Result<Answer, QueryError> {
-        let mut context = SQLContext::new();
-        for source in &self.sources {
-            context.register(&source.name, source.frame.clone());
-        }
-        match context.execute(&literal::written_out(sql)).and_then(Answer::new) {
-            Ok(answer) if answer.columns().is_empty() => {
-                Err(self.refuse("this asks for nothing".to_owned(), "begin with SELECT"))
-            }
-            Ok(answer) => Ok(answer),
-            Err(error) => Err(self.explain(&error)),
-        }
+        let question = self.parse(sql)?;
+        let planned = || -> PolarsResult<(LazyFrame, std::sync::Arc<Schema>)> {
+            let tables = self.sources.iter().map(|source| (source.name.as_str(), source.frame.clone()));
+            let mut frame = plan(tables, &question.query.to_string())?;
+            let schema = frame.collect_schema()?;
+            Ok((frame, schema))
+        };
+        let (frame, schema) = guarded(planned)
+            .unwrap_or_else(|| Err(PolarsError::ComputeError("the query is not supported".into())))
+            .map_err(|error| self.explain(sql, &error))?;
+        let columns: Vec<String> = schema.iter_names().map(ToString::to_string).collect();
+        let unit = |name: &String| {
+            let known = question.units.iter().find(|(column, _)| column == name);
+            known.map_or_else(String::new, |(_, unit)| unit.clone())
+        };
+        let units = columns.iter().map(unit).collect();
+        let pieces = pieces::pieces(&question.query, &self.sources).filter(|pieces| pieces.names == columns);
+        let pieces = pieces.and_then(|pieces| Some((self.find(&pieces.table)?.files.clone()?, pieces)));
+        Ok(Answer::new(frame, columns, units, pieces))
+    }
+
+    fn parse(&self, sql: &str) -> Result<Question, QueryError> {
+        Question::parse(sql, &self.sources).map_err(|Fault { found, help }| self.refuse(found, &help))
     }
 
     /// What is wrong with a question that failed while it was answered: what fails on the first rows alone too, such as the sum of words,
     /// is no fault of the files. `None` if it is not the question.
     pub fn fault(&self, sql: &str) -> Option<QueryError> {
-        let mut context = SQLContext::new();
+        let question = self.parse(sql).ok()?;
+        let mut first = Vec::new();
         for source in &self.sources {
-            let first = source.frame.clone().limit(1).collect().ok()?;
-            context.register(&source.name, first.lazy());
+            first.push((source.name.as_str(), source.frame.clone().limit(1).collect().ok()?.lazy()));
         }
-        let mut answer = || context.execute(&literal::written_out(sql)).and_then(LazyFrame::collect);
-        // A question that is too much for polars ends its thread.
-        let answered = thread::scope(|scope| scope.spawn(&mut answer).join());
-        Some(self.explain(&answered.ok()?.err()?))
+        let answered = guarded(|| plan(first, &question.query.to_string()).and_then(LazyFrame::collect));
+        Some(self.explain(sql, &answered?.err()?))
     }
 
     /// What is wrong with a question.
-    fn explain(&self, error: &PolarsError) -> QueryError {
+    fn explain(&self, sql: &str, error: &PolarsError) -> QueryError {
         let text = error.to_string();
         // The first line says it, before lists of what there is and plans of queries.
         let line = text.lines().next().unwrap_or_default().trim_end_matches(':');
-        let quoted = |quote: char| line.split(quote).nth(1).unwrap_or_default();
-        let columns = || self.sources.iter().flat_map(|source| &source.columns).map(String::as_str);
-        let tables = || self.sources.iter().map(|source| source.name.as_str());
-        let meant = |near: Option<&str>| match near {
-            Some(name) => format!("did you mean `{name}`?"),
-            None => "choose one of these".to_owned(),
-        };
         if line.contains("unable to find column") {
-            let name = quoted('"');
-            return self.refuse(format!("no column `{name}`"), &meant(nearest(name, columns())));
+            let name = line.split('"').nth(1).unwrap_or_default();
+            let columns = || self.sources.iter().flat_map(|source| &source.columns).map(String::as_str);
+            let help = match nearest(name, columns()) {
+                None if sql.contains(&format!("\"{name}\"")) => {
+                    format!("text goes in single quotes: '{name}'; double quotes are for names of columns")
+                }
+                _ => hint(name, columns()),
+            };
+            return self.refuse(format!("no column `{name}`"), &help);
         }
-        if line.starts_with("relation ") && line.ends_with("was not found") {
-            let name = quoted('\'');
-            return self.refuse(format!("no table `{name}`"), &meant(nearest(name, tables())));
-        }
-        if line.starts_with("one (and only one) statement") {
-            return self.refuse("not one statement".to_owned(), "write one SELECT");
-        }
-        let found = line.strip_prefix("sql parser error: ").map_or(line.to_owned(), |rest| format!("not SQL: {rest}"));
-        self.refuse(
-            found,
-            "correct the query; text goes in 'single quotes', names with odd characters in \"double\" ones",
-        )
+        self.refuse(line.to_owned(), CORRECT)
     }
 
     fn refuse(&self, found: String, help: &str) -> QueryError {

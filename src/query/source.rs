@@ -1,17 +1,18 @@
 //! A table on disk that can be asked.
 
 use std::fs::{self, File};
+use std::io::Cursor;
 use std::path::{Path, PathBuf};
 
 use parquet::arrow::parquet_to_arrow_schema;
 use parquet::file::reader::{FileReader, SerializedFileReader};
-use polars::prelude::{
-    LazyCsvReader, LazyFileListReader, LazyFrame, PlRefPath, PolarsError, PolarsResult, ScanArgsParquet,
-};
+use polars::prelude::{DataFrame, IntoLazy, LazyFrame, PolarsError, PolarsResult};
+use polars_io::SerReader;
+use polars_io::prelude::{CsvParseOptions, CsvReadOptions, CsvReader};
 
+use super::scan::Files;
 use super::{Answer, QueryError};
 use crate::dataset::Folder;
-use crate::dataset::frame::parts as parts_of;
 
 /// A table and where it comes from.
 pub struct Source {
@@ -22,11 +23,15 @@ pub struct Source {
     /// The units of its columns, empty where none is known.
     pub units: Vec<String>,
     /// The files that it consists of.
-    pub files: Vec<PathBuf>,
+    pub paths: Vec<PathBuf>,
     /// How many files the dataset lacks.
     pub missing: u64,
     /// All rows, as the dataset counts them; unknown of a single file.
     pub rows: Option<u64>,
+    /// Its columns of words that repeat.
+    pub(super) words: Vec<String>,
+    /// Its Parquet files.
+    pub(super) files: Option<Files>,
     /// The table, to be read as far as it is asked for.
     pub(super) frame: LazyFrame,
 }
@@ -43,6 +48,16 @@ pub fn open(path: &Path) -> Result<Vec<Source>, QueryError> {
         help,
     };
     if path.is_dir() {
+        // The folder of a table of a dataset is that table, checked as the dataset is.
+        if let (Some(above), Some(name)) = (folder_above(path), path.file_name())
+            && let Ok(Some(_)) = Folder::at(&above).manifest()
+        {
+            let mut sources = open(&above)?;
+            sources.retain(|source| *source.name == *name.to_string_lossy());
+            if !sources.is_empty() {
+                return Ok(sources);
+            }
+        }
         let folder = Folder::at(path);
         let manifest = folder.manifest().map_err(|error| wrong(&error.to_string(), "name another folder"))?;
         let Some(manifest) = manifest else {
@@ -57,7 +72,8 @@ pub fn open(path: &Path) -> Result<Vec<Source>, QueryError> {
         };
         let mut sources = Vec::new();
         for table in &manifest.tables {
-            let (files, missing) = parts_of(&folder, table);
+            let verified = folder.verified(&manifest, table);
+            let (files, missing) = verified.map_err(|fault| QueryError::Part(Box::new(fault)))?;
             if !files.is_empty() {
                 sources.push(Source::parquet(path, table.name.clone(), files, missing, Some(table.rows))?);
             }
@@ -69,6 +85,9 @@ pub fn open(path: &Path) -> Result<Vec<Source>, QueryError> {
     }
     if !path.exists() {
         return Err(wrong("there is no such file or folder", "check the path"));
+    }
+    if !path.is_file() {
+        return Err(wrong("a device or a named pipe, not a file", "write it to a file, and name that file"));
     }
     let ending = path.extension().map(|ending| ending.to_string_lossy().to_lowercase());
     match ending.as_deref() {
@@ -84,48 +103,66 @@ impl Source {
     fn parquet(
         path: &Path,
         name: String,
-        files: Vec<PathBuf>,
+        paths: Vec<PathBuf>,
         missing: u64,
         rows: Option<u64>,
     ) -> Result<Source, QueryError> {
         let failed = |path: &Path, source| QueryError::Read { path: path.display().to_string(), source };
-        let header = match files.first() {
+        let header = match paths.first() {
             Some(first) => Header::read(first).map_err(|source| failed(first, source))?,
             None => Header::default(),
         };
-        // What a path looks like (`a=1`, `*`) means nothing here.
-        let options = ScanArgsParquet { glob: false, ..ScanArgsParquet::default() };
-        let frame = scan(&files, options).map_err(|source| failed(path, source))?;
+        let files = Files::new(paths.clone()).map_err(|source| failed(path, source))?;
+        let frame = files.frame().map_err(|source| failed(path, source))?;
         let Header { table, columns, units } = header;
-        Ok(Source { name: table.unwrap_or(name), columns, units, files, missing, rows, frame })
+        let name = table.unwrap_or(name);
+        Ok(Source { name, columns, units, paths, missing, rows, words: files.words(), files: Some(files), frame })
     }
 
-    /// The table in a CSV file, numbers where all of a column are numbers.
+    /// The table in a CSV file, numbers where all of a column are numbers; lines that begin with # are comments.
     fn csv(path: &Path) -> Result<Source, QueryError> {
         let failed = |source| QueryError::Read { path: path.display().to_string(), source };
-        let reader = LazyCsvReader::new(plain(path).map_err(failed)?).with_glob(false).with_infer_schema_length(None);
-        let mut frame = reader.finish().map_err(failed)?;
-        let schema = frame.collect_schema().map_err(failed)?;
-        let columns: Vec<String> = schema.iter_names().map(ToString::to_string).collect();
-        let units = vec![String::new(); columns.len()];
-        Ok(Source { name: name_of(path), columns, units, files: vec![path.to_owned()], missing: 0, rows: None, frame })
+        let frame = csv(path).map_err(failed)?;
+        let columns: Vec<String> = frame.get_column_names_owned().iter().map(ToString::to_string).collect();
+        Ok(Source {
+            name: name_of(path),
+            units: vec![String::new(); columns.len()],
+            columns,
+            paths: vec![path.to_owned()],
+            missing: 0,
+            rows: None,
+            words: Vec::new(),
+            files: None,
+            frame: frame.lazy(),
+        })
     }
 
     /// The first `count` rows.
+    ///
+    /// # Errors
+    ///
+    /// If the table cannot be read.
     pub fn first(&self, count: u32) -> Result<Answer, QueryError> {
-        let path = self.files.first().map_or_else(String::new, |file| file.display().to_string());
-        Answer::new(self.frame.clone().limit(count)).map_err(|source| QueryError::Read { path, source })
+        let frame = self.frame.clone().limit(count);
+        Ok(Answer::new(frame, self.columns.clone(), self.units.clone(), None))
     }
 }
 
-fn scan(files: &[PathBuf], options: ScanArgsParquet) -> PolarsResult<LazyFrame> {
-    let paths = files.iter().map(|file| plain(file)).collect::<PolarsResult<_>>()?;
-    LazyFrame::scan_parquet_files(paths, options)
-}
-
-/// A path as polars takes it, which knows no bytes that are not UTF-8.
-fn plain(path: &Path) -> PolarsResult<PlRefPath> {
-    PlRefPath::try_from_path(path)
+fn csv(path: &Path) -> PolarsResult<DataFrame> {
+    let bytes = fs::read(path)?;
+    let mut opened = None;
+    for (number, line) in bytes.split(|&byte| byte == b'\n').enumerate() {
+        let is_comment = opened.is_none() && line.starts_with(b"#");
+        if !is_comment && line.iter().filter(|&&byte| byte == b'"').count() % 2 == 1 {
+            opened = if opened.is_none() { Some(number + 1) } else { None };
+        }
+    }
+    if let Some(line) = opened {
+        return Err(PolarsError::ComputeError(format!("line {line}: a quote opens and never closes").into()));
+    }
+    let format = CsvParseOptions::default().with_comment_prefix(Some("#"));
+    let options = CsvReadOptions::default().with_infer_schema_length(None).with_parse_options(format);
+    CsvReader::new(Cursor::new(bytes)).with_options(options).finish()
 }
 
 /// What a Parquet file says of itself.
@@ -155,6 +192,11 @@ impl Header {
             units: fields().map(|field| field.metadata().get("unit").cloned().unwrap_or_default()).collect(),
         })
     }
+}
+
+/// The folder that a folder is in.
+fn folder_above(path: &Path) -> Option<PathBuf> {
+    Some(fs::canonicalize(path).ok()?.parent()?.to_owned())
 }
 
 /// The Parquet files in a folder, in the order of their names.

@@ -27,12 +27,18 @@ type Matrix = [[f64; 3]; 3];
 /// value of the fundamental matrix. Where some of the three follow the others, the error at the start is one of those
 /// others alone, so that the limits `m -> 0` and `k -> inf` are reached.
 ///
-/// None where that takes more than 3,000 steps, the flow swinging too often, and beyond the range of doubles.
+/// 0 below 1e-30. None where that takes more than 3,000 steps, the flow swinging too often, and beyond the range of doubles.
 pub fn amplification(path: &Path, rtol: f64) -> Followed {
     let mut steps = 0;
     let number = growth(path, rtol, &mut steps).filter(|growth| growth.is_finite());
+    let number = number.map(|growth| if growth < FORGOTTEN { 0.0 } else { growth });
     Followed { number, steps }
 }
+
+/// Least amplification that is given, a factor: about the square of the rounding of a double. Every step leaves rounding in
+/// the flow, which decays at the slowest rate from there on, so that of a flow far below nothing else may be left: a
+/// solution in high precision found 47 % of error at 1e-138.
+const FORGOTTEN: f64 = 1e-30;
 
 fn growth(path: &Path, rtol: f64, steps: &mut u32) -> Option<f64> {
     let rule = radau();

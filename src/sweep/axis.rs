@@ -2,7 +2,7 @@
 
 use super::error::{SpecError, unknown};
 use super::spec::{AxisForm, AxisSpec, AxisValue};
-use super::units::legal;
+use super::units::{help, legal};
 use crate::grid::{Axis, Design, Quantity, Scale, Values};
 use crate::model::Units;
 
@@ -97,7 +97,8 @@ fn value(quantity: Quantity, units: &Units, words: &[&str], key: &str, value: &A
         AxisValue::Number(number) => match legal(units, quantity, Scale::Model, *number) {
             Ok(()) => Ok(*number),
             Err(range) => {
-                Err(SpecError::new(key, format!("{number:?} is out of range"), range, "choose values in the range"))
+                let help = help(units, quantity, *number);
+                Err(SpecError::new(key, format!("{number:?} is out of range"), range, help))
             }
         },
     }
@@ -183,7 +184,7 @@ fn ends((quantity, units, scale): What<'_>, key: &str, names: &str, numbers: &[f
                 format!("{key}[{index}]"),
                 format!("{end:?} is out of range"),
                 legal,
-                "choose values in the range",
+                help(units, quantity, end),
             ));
         }
     }
@@ -198,7 +199,11 @@ fn range(what: What<'_>, key: &str, geometric: bool, numbers: &[f64]) -> Result<
             format!("{key}[2]"),
             format!("{count} is not a count of values"),
             "a whole number from 2 to 2^53 - 1",
-            "for one value write the number itself",
+            match count {
+                1.0 => "for one value write the number itself",
+                _ if count.fract() != 0.0 => "the third number is how many values there are, not their distance",
+                _ => "choose a count in the range",
+            },
         ));
     }
     if first == last {

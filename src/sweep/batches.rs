@@ -1,5 +1,7 @@
 //! A table of a sweep as Arrow record batches, in the order of its rows, without a file.
 
+use std::sync::Arc;
+
 use arrow_array::RecordBatch;
 use arrow_schema::{ArrowError, SchemaRef};
 
@@ -14,7 +16,7 @@ pub struct Batches<'a> {
     request: &'a Request,
     table: ManifestTable,
     layout: Layout,
-    optima: Optima,
+    optima: Arc<Optima>,
     next: u64,
 }
 
@@ -23,13 +25,14 @@ impl Sweep {
     /// Parquet files that a run would write; `None` if the sweep does not ask for this table.
     pub fn batches(&self, table: &str) -> Option<Batches<'_>> {
         let plan = Plan::new(self);
-        let (request, table) = self.requests.iter().zip(plan.tables).find(|(_, planned)| planned.name == table)?;
+        let tables = self.requests.iter().zip(plan.tables).zip(self.optima());
+        let ((request, table), optima) = tables.into_iter().find(|((_, planned), _)| planned.name == table)?;
         Some(Batches {
             sweep: self,
             request,
             table,
             layout: Layout::new(request.table, &request.selection, &self.grid),
-            optima: self.optima(),
+            optima,
             next: 0,
         })
     }

@@ -3,81 +3,134 @@
 use std::path::Path;
 
 use super::axis::{Sampled, Written, read};
-use super::error::{SpecError, unknown};
+use super::error::{Faults, SpecError, unknown};
 use super::points;
 use super::spec::BlockSpec;
 use super::units::legal;
 use crate::grid::{Axis, Block, Derived, Design, Expression, Factor, Fault, Quantity, Scale, Values, first_wrong};
 use crate::model::Units;
+use crate::names::nearest;
 
-/// Checks `spec`, whose keys begin with `prefix`; files are relative to `folder`.
-pub fn block(spec: &BlockSpec, prefix: &str, units: &Units, folder: &Path) -> Result<Block, SpecError> {
+/// A block of a spec, as far as it is legal.
+pub struct Checked {
+    /// What its keys begin with.
+    pub prefix: String,
+    /// Every axis that it has, or may have: that of a misspelt name too, and all if a file of points cannot be read.
+    pub held: Vec<Quantity>,
+    /// It as a block of the grid; `None` if anything is wrong with it.
+    pub block: Option<Block>,
+}
+
+/// Checks `spec`, whose keys begin with `prefix`; files are relative to `folder`. Without `units` no value can be judged.
+pub fn check(spec: &BlockSpec, prefix: String, units: Option<&Units>, folder: &Path, faults: &mut Faults) -> Checked {
     let mut factors = Vec::new();
+    let mut are_known = !(faults.concern(&format!("{prefix}points")) || prefix.is_empty() && faults.concern("block"));
     if let Some(path) = &spec.points {
-        let points = points::read(&folder.join(path), units);
-        factors.push(points.map_err(|error| SpecError { key: format!("{prefix}{}", error.key).into(), ..error })?);
+        let points = units.map(|units| points::read(&folder.join(path), units));
+        let points = points
+            .map(|read| read.map_err(|error| SpecError { key: format!("{prefix}{}", error.key).into(), ..error }));
+        match points.and_then(|read| faults.take(read)) {
+            Some(points) => factors.push(points),
+            None => are_known = false,
+        }
     }
-    let mut written = Vec::new();
+    // Axes that are there, with what they say if that is legal.
+    let mut axes: Vec<(Quantity, Option<Written>)> = Vec::new();
     for (name, axis) in &spec.axes {
         let key = format!("{prefix}axes.{name}");
+        let known = Quantity::ALL.map(Quantity::name);
         let Some(quantity) = Quantity::from_name(name) else {
-            return Err(unknown(key, "axis", name, &Quantity::ALL.map(Quantity::name)));
+            axes.extend(nearest(name, known).and_then(Quantity::from_name).map(|meant| (meant, None)));
+            faults.push(unknown(key, "axis", name, &known));
+            continue;
         };
-        let axis = read(quantity, units, &key, axis)?;
+        let is_sound = !faults.concern(&key);
         if factors.iter().any(|factor: &Factor| factor.holds_any(&[quantity])) {
-            return Err(SpecError::new(
-                key,
+            faults.push(SpecError::new(
+                key.as_str(),
                 format!("`{name}` is also a column of `points`"),
                 "each axis once",
                 "remove the axis here or the column there",
             ));
         }
-        written.push((quantity, axis));
+        let written = units.filter(|_| is_sound).and_then(|units| faults.take(read(quantity, units, &key, axis)));
+        axes.push((quantity, written));
     }
-    let zips = zips(spec, prefix, &factors, &written)?;
-    let samples = samples(prefix, units, &written)?;
+    let mut held: Vec<Quantity> = factors.iter().flat_map(|factor| &factor.axes).map(|axis| axis.quantity).collect();
+    held.extend(axes.iter().map(|(quantity, _)| *quantity));
+    for quantity in Quantity::ALL {
+        let is_there = !are_known || faults.concern(&format!("{prefix}axes.{}", quantity.name()));
+        if !held.contains(&quantity) && (is_there || !quantity.default().is_empty()) {
+            held.push(quantity);
+        }
+    }
+    let block = units.and_then(|units| block(spec, &prefix, units, factors, &axes, &held, faults));
+    Checked { prefix, held, block }
+}
+
+/// The block of these points and axes, of which it has all of `held`.
+fn block(
+    spec: &BlockSpec,
+    prefix: &str,
+    units: &Units,
+    mut factors: Vec<Factor>,
+    axes: &[(Quantity, Option<Written>)],
+    held: &[Quantity],
+    faults: &mut Faults,
+) -> Option<Block> {
+    let has_points = !factors.is_empty();
+    let zips = zips(spec, prefix, &factors, axes, held, faults);
+    let samples = faults.take(samples(prefix, units, axes))?;
     let mut computed = Vec::new();
     let mut placed: Vec<Quantity> = Vec::new();
-    for (quantity, axis) in &written {
+    for (quantity, axis) in axes {
         if placed.contains(quantity) {
             continue;
         }
         let factor = match axis {
-            Written::Computed { scale, text } => {
+            None => continue,
+            Some(Written::Computed { scale, text }) => {
                 computed.push((*quantity, *scale, text.as_str()));
                 continue;
             }
-            Written::Values(axis) => match zips.iter().find(|axes| axes[0].quantity == *quantity) {
+            Some(Written::Values(axis)) => match zips.iter().find(|axes| axes[0].quantity == *quantity) {
                 Some(axes) => axes.clone(),
                 None => vec![axis.clone()],
             },
-            Written::Sampled(sampled) => samples
+            Some(Written::Sampled(sampled)) => samples
                 .iter()
                 .find(|(design, _)| *design == sampled.design)
                 .map_or_else(Vec::new, |(_, axes)| axes.clone()),
         };
         placed.extend(factor.iter().map(|axis| axis.quantity));
-        factors.push(Factor { axes: factor });
+        factors.push(Factor { axes: factor, ..Factor::default() });
     }
     for quantity in Quantity::ALL {
         let held = factors.iter().any(|factor| factor.holds_any(&[quantity]))
             || computed.iter().any(|(other, ..)| *other == quantity);
         let values = quantity.default();
         if !held && !values.is_empty() {
-            factors.push(Factor { axes: vec![Axis { quantity, scale: Scale::Model, values: Values::List(values) }] });
+            let axis = Axis { quantity, scale: Scale::Model, values: Values::List(values) };
+            factors.push(Factor { axes: vec![axis], ..Factor::default() });
         }
     }
-    let held = factors.iter().flat_map(|factor| &factor.axes).map(|axis| axis.quantity);
-    let held: Vec<Quantity> = held.chain(computed.iter().map(|(quantity, ..)| *quantity)).collect();
-    let derived = derived(prefix, &computed, &held)?;
-    let condition = spec.condition.as_ref().map(|text| {
-        Expression::condition(text, &held).map_err(|fault| explain(format!("{prefix}where"), "axis", fault))
+    let derived = derived(prefix, &computed, held, faults);
+    let points = factors.first().filter(|_| has_points);
+    // Without the points nobody knows their labels.
+    let are_known = has_points || spec.points.is_none();
+    let condition = spec.condition.as_ref().filter(|_| are_known && !faults.concern(&format!("{prefix}where")));
+    let condition = condition.map(|text| {
+        let condition = Expression::condition(text, held, points);
+        faults.take(condition.map_err(|fault| explain(format!("{prefix}where"), "axis", fault)))
     });
-    let block = Block { factors, derived, condition: condition.transpose()? };
+    let block = Block { factors, derived, condition: condition.flatten() };
+    // Only of what is legal so far, since this takes time.
     for (quantity, _, text) in computed {
-        check_values(&block, prefix, units, quantity, text)?;
+        if faults.are_none() {
+            faults.take(check_values(&block, prefix, units, quantity, text));
+        }
     }
-    Ok(block)
+    Some(block)
 }
 
 /// The axes of each zip, all of equal length, in the order of the axes.
@@ -85,61 +138,79 @@ fn zips(
     spec: &BlockSpec,
     prefix: &str,
     factors: &[Factor],
-    written: &[(Quantity, Written)],
-) -> Result<Vec<Vec<Axis>>, SpecError> {
+    axes: &[(Quantity, Option<Written>)],
+    held: &[Quantity],
+    faults: &mut Faults,
+) -> Vec<Vec<Axis>> {
     let mut zips: Vec<Vec<Axis>> = Vec::new();
     for (number, names) in spec.zip.iter().enumerate() {
         let key = format!("{prefix}zip[{number}]");
         if names.len() < 2 {
             let found = format!("a zip of {}", if names.is_empty() { "no axis" } else { "one axis" });
-            return Err(SpecError::new(key, found, "two axes or more", "add axes, or remove the zip"));
+            faults.push(SpecError::new(key, found, "two axes or more", "add axes, or remove the zip"));
+            continue;
         }
         let mut zip: Vec<Axis> = Vec::new();
         for (place, name) in names.iter().enumerate() {
-            let key = format!("{key}[{place}]");
-            let axis = written.iter().find(|(quantity, _)| quantity.name() == name).map(|(_, axis)| axis);
-            let axis = match axis {
-                Some(Written::Values(axis)) => axis,
-                Some(Written::Computed { .. }) => {
-                    let found = format!("`{name}` is computed from other axes at every point");
-                    return Err(SpecError::new(key, found, "axes with values of their own", "remove it here"));
-                }
-                Some(Written::Sampled(sampled)) => {
-                    let found = format!("`{name}` varies together with all axes of `{}`", sampled.design.name());
-                    return Err(SpecError::new(key, found, "axes with values of their own", "remove it here"));
-                }
-                None if factors.iter().flat_map(|factor| &factor.axes).any(|axis| axis.quantity.name() == name) => {
-                    let found = format!("`{name}` is a column of `points`, which vary together anyway");
-                    return Err(SpecError::new(key, found, "names of [axes]", "remove it here"));
-                }
-                None => {
-                    let known: Vec<&str> = written.iter().map(|(quantity, _)| quantity.name()).collect();
-                    return Err(unknown(key, "axis", name, &known));
-                }
-            };
-            if zips.iter().chain([&zip]).flatten().any(|other| other.quantity == axis.quantity) {
-                let found = format!("`{name}` is there twice");
-                return Err(SpecError::new(key, found, "each axis in one zip", "remove one of the two"));
-            }
-            if let Some(first) = zip.first()
-                && first.values.len() != axis.values.len()
-            {
-                let found = format!(
-                    "`{}` has {}, `{name}` has {}",
-                    first.quantity.name(),
-                    values(first.values.len()),
-                    values(axis.values.len())
-                );
-                let help = "give both the same number; nothing is repeated or left out";
-                return Err(SpecError::new(key, found, "axes of equal length", help));
-            }
-            zip.push(axis.clone());
+            let zipped = zipped(name, format!("{key}[{place}]"), factors, axes, held, (&zips, &zip));
+            zip.extend(faults.take(zipped).flatten());
         }
-        let place = |axis: &Axis| written.iter().position(|(quantity, _)| *quantity == axis.quantity);
-        zip.sort_by_key(place);
-        zips.push(zip);
+        zip.sort_by_key(|axis| axes.iter().position(|(quantity, _)| *quantity == axis.quantity));
+        zips.extend((!zip.is_empty()).then_some(zip));
     }
-    Ok(zips)
+    zips
+}
+
+/// The axis `name` of a zip at `key`, after those of other zips and of its own; `None` if it is not known what that axis says.
+fn zipped(
+    name: &str,
+    key: String,
+    factors: &[Factor],
+    axes: &[(Quantity, Option<Written>)],
+    held: &[Quantity],
+    (zips, zip): (&[Vec<Axis>], &[Axis]),
+) -> Result<Option<Axis>, SpecError> {
+    let axis = match axes.iter().find(|(quantity, _)| quantity.name() == name).map(|(_, axis)| axis.as_ref()) {
+        Some(Some(Written::Values(axis))) => axis,
+        Some(Some(Written::Computed { .. })) => {
+            let found = format!("`{name}` is computed from other axes at every point");
+            return Err(SpecError::new(key, found, "axes with values of their own", "remove it here"));
+        }
+        Some(Some(Written::Sampled(sampled))) => {
+            let found = format!("`{name}` varies together with all axes of `{}`", sampled.design.name());
+            return Err(SpecError::new(key, found, "axes with values of their own", "remove it here"));
+        }
+        Some(None) => return Ok(None),
+        None if factors.iter().flat_map(|factor| &factor.axes).any(|axis| axis.quantity.name() == name) => {
+            let found = format!("`{name}` is a column of `points`, which vary together anyway");
+            return Err(SpecError::new(key, found, "names of [axes]", "remove it here"));
+        }
+        // An axis that is there only by default has one value, or one of each word.
+        None if held.iter().any(|quantity| quantity.name() == name && quantity.default().is_empty()) => {
+            return Ok(None);
+        }
+        None => {
+            let known: Vec<&str> = axes.iter().map(|(quantity, _)| quantity.name()).collect();
+            return Err(unknown(key, "axis", name, &known));
+        }
+    };
+    if zips.iter().flatten().chain(zip).any(|other| other.quantity == axis.quantity) {
+        return Err(SpecError::new(
+            key,
+            format!("`{name}` is there twice"),
+            "each axis in one zip",
+            "remove one of the two",
+        ));
+    }
+    if let Some(first) = zip.first()
+        && first.values.len() != axis.values.len()
+    {
+        let (one, other) = (values(first.values.len()), values(axis.values.len()));
+        let found = format!("`{}` has {one}, `{name}` has {other}", first.quantity.name());
+        let help = "give both the same number; nothing is repeated or left out";
+        return Err(SpecError::new(key, found, "axes of equal length", help));
+    }
+    Ok(Some(axis.clone()))
 }
 
 fn values(count: u64) -> String {
@@ -150,14 +221,14 @@ fn values(count: u64) -> String {
 fn samples(
     prefix: &str,
     units: &Units,
-    written: &[(Quantity, Written)],
+    axes: &[(Quantity, Option<Written>)],
 ) -> Result<Vec<(Design, Vec<Axis>)>, SpecError> {
     let mut samples = Vec::new();
     for design in [Design::Sobol, Design::LatinHypercube] {
-        let axes: Vec<(Quantity, Sampled)> = written
+        let axes: Vec<(Quantity, Sampled)> = axes
             .iter()
             .filter_map(|(quantity, axis)| match axis {
-                Written::Sampled(sampled) if sampled.design == design => Some((*quantity, *sampled)),
+                Some(Written::Sampled(sampled)) if sampled.design == design => Some((*quantity, *sampled)),
                 _ => None,
             })
             .collect();
@@ -203,12 +274,12 @@ fn samples(
 }
 
 /// Computed axes, each after those that it is made of.
-fn derived(prefix: &str, computed: &[(Quantity, Scale, &str)], held: &[Quantity]) -> Result<Vec<Derived>, SpecError> {
+fn derived(prefix: &str, computed: &[(Quantity, Scale, &str)], held: &[Quantity], faults: &mut Faults) -> Vec<Derived> {
     let key = |quantity: Quantity| format!("{prefix}axes.{}.expr", quantity.name());
     let mut waiting = Vec::new();
     for &(quantity, scale, text) in computed {
-        let expression = Expression::number(text, held).map_err(|fault| explain(key(quantity), "axis", fault))?;
-        waiting.push(Derived { quantity, scale, expression });
+        let expression = Expression::number(text, held).map_err(|fault| explain(key(quantity), "axis", fault));
+        waiting.extend(faults.take(expression).map(|expression| Derived { quantity, scale, expression }));
     }
     let mut derived = Vec::new();
     while !waiting.is_empty() {
@@ -229,14 +300,15 @@ fn derived(prefix: &str, computed: &[(Quantity, Scale, &str)], held: &[Quantity]
             path.push(read);
         }
         let names: Vec<String> = path.iter().map(|quantity| format!("`{}`", quantity.name())).collect();
-        return Err(SpecError::new(
+        faults.push(SpecError::new(
             key(path[0]),
             format!("depends on itself: {}", names.join(", which is computed from ").replacen(", which", "", 1)),
             "axes that are computed from others",
             "give one of them values of its own",
         ));
+        break;
     }
-    Ok(derived)
+    derived
 }
 
 /// Every kept value of a computed axis has to be legal.
@@ -263,9 +335,9 @@ fn check_values(block: &Block, prefix: &str, units: &Units, quantity: Quantity, 
 pub fn too_many(key: String) -> SpecError {
     SpecError::new(
         key,
-        "more than 2^36 combinations of the axes that it reads",
-        "at most 2^36, which take minutes",
-        "take fewer values on these axes, or share them out over several [[block]]s",
+        "more than 2^30 combinations of the axes that it reads",
+        "at most 2^30, which take seconds",
+        "take fewer values on these axes, or split them over several [[block]]s or specs",
     )
 }
 

@@ -1,21 +1,19 @@
 //! The checked sweep: from a spec to a grid, tables and columns that are all legal, or a fault that says what is not.
 
-use std::fmt::{self, Write};
 use std::fs;
 use std::io::{self, Read};
-use std::path::Path;
-use std::sync::Arc;
+use std::path::{Path, PathBuf};
+use std::sync::{Arc, OnceLock};
 
-use sha2::{Digest, Sha256};
-
-use super::block::{block, too_many};
-use super::error::{SpecError, unknown};
+use super::block::{self, Checked, too_many};
+use super::error::{Faults, SpecError, unknown};
 use super::place;
 use super::spec::{Spec, TableSpec};
-use super::units::units;
-use crate::dataset::Identity;
+use super::units::{UNIT_KEYS, doubt, units};
+use crate::file;
 use crate::grid::{Block, Factor, Grid, Projection, Quantity, RTOL, TooMany};
 use crate::model::Units;
+use crate::names::nearest;
 use crate::table::{self, OPTIMUM_AXES, Optima, STATUS, Selection, Table};
 
 /// Most bytes of a spec: reading one takes about a hundred times as much memory.
@@ -32,6 +30,8 @@ pub struct Sweep {
     pub description: String,
     /// The text that it was read from.
     pub text: String,
+    /// The folder that the files it names are relative to.
+    pub folder: PathBuf,
     /// All points.
     pub grid: Grid,
     /// Whether optimal protocols obey `v >= 1`.
@@ -40,6 +40,8 @@ pub struct Sweep {
     pub requests: Vec<Request>,
     /// The rows that tell all optimal problems of the tables that need them; `None` if none does.
     pub optimum_rows: Option<Projection>,
+    /// What is legal and yet doubtful.
+    pub warnings: Vec<SpecError>,
 }
 
 /// A table that is asked for.
@@ -56,67 +58,108 @@ pub struct Request {
     pub projection: Projection,
     /// Of a reduced table: the rows of the landscapes, those of one of its rows side by side.
     pub members: Option<Projection>,
+    /// The hash of what its rows follow from, once it is computed.
+    pub(super) hash: OnceLock<String>,
     /// What the values of each column are multiplied by to be in the units of the grid.
     pub sizes: Vec<f64>,
 }
 
+/// What to do about a spec that cannot be read: the TOML file of nearly this name in the same folder, if there is one.
+fn path_hint(path: &Path) -> String {
+    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let entries = fs::read_dir(folder).into_iter().flatten().flatten();
+    let mut names: Vec<String> = entries.filter_map(|entry| entry.file_name().into_string().ok()).collect();
+    names.retain(|name| name.ends_with(".toml"));
+    names.sort();
+    let stem = path.file_stem().unwrap_or_default().to_string_lossy();
+    let meant = nearest(&format!("{stem}.toml"), names.iter().map(String::as_str));
+    match meant {
+        Some(name) => format!("did you mean `{}`?", path.with_file_name(name).display()),
+        None => "check the path".to_owned(),
+    }
+}
+
 impl Sweep {
     /// Reads and checks the spec in `path`.
+    ///
+    /// # Errors
+    ///
+    /// What is wrong with the file or with the spec, and in which lines.
     pub fn load(path: &Path) -> Result<Sweep, SpecError> {
-        let fault = |found: String, expected: &str, help| SpecError::new("", found, expected, help).at(path, None);
-        let unreadable = |error| fault(format!("cannot read: {error}"), "a readable TOML file", "check the path");
+        let fault = |found: String, expected: &str, help: &str| SpecError::new("", found, expected, help).of(path);
         let mut bytes = Vec::new();
-        // A pipe tells no length before it is read.
-        let read = fs::File::open(path).and_then(|file| file.take(MOST_BYTES + 1).read_to_end(&mut bytes));
-        read.map_err(unreadable)?;
+        let read = file::open(path).and_then(|file| file.take(MOST_BYTES + 1).read_to_end(&mut bytes));
+        read.map_err(|error| match error.kind() {
+            io::ErrorKind::InvalidInput => {
+                fault(error.to_string(), "a TOML file", "write the spec to a file, and name that file")
+            }
+            _ => fault(format!("cannot read: {error}"), "a readable TOML file", &path_hint(path)),
+        })?;
         if bytes.len() as u64 > MOST_BYTES {
             let expected = format!("a spec of at most {MOST_BYTES} bytes");
             return Err(fault("too long".to_owned(), &expected, "write lists of values as a file of `points`"));
         }
-        let text = String::from_utf8(bytes).map_err(|error| unreadable(io::Error::other(error)))?;
+        let text = String::from_utf8(bytes).map_err(|error| {
+            let (start, bytes) = (error.utf8_error().valid_up_to(), error.as_bytes());
+            let line = 1 + bytes[..start].iter().filter(|&&byte| byte == b'\n').count();
+            let found = format!("not UTF-8: the byte 0x{:02x}", bytes.get(start).copied().unwrap_or_default());
+            SpecError { line: Some(line), ..fault(found, "a spec in UTF-8", "save as UTF-8 in the editor") }
+        })?;
         Sweep::parse_at(&text, path)
     }
 
     /// Reads and checks the spec in `text`, which stands in `path`.
     pub(crate) fn parse_at(text: &str, path: &Path) -> Result<Sweep, SpecError> {
-        Sweep::parse(text, path.parent().unwrap_or(Path::new(""))).map_err(|error| {
-            let line = error.line;
-            error.at(path, line)
-        })
+        let parsed = Sweep::parse(text, path.parent().unwrap_or(Path::new("")));
+        let mut sweep = parsed.map_err(|error| error.of(path))?;
+        sweep.warnings = sweep.warnings.into_iter().map(|warning| warning.of(path)).collect();
+        Ok(sweep)
     }
 
     /// Reads and checks the spec in `text`; files that it names are relative to `folder`.
     ///
     /// # Errors
     ///
-    /// What is wrong with the spec, and in which line.
+    /// What is wrong with the spec, and in which lines.
     pub fn parse(text: &str, folder: &Path) -> Result<Sweep, SpecError> {
-        let spec = place::parse(text).map_err(|(error, line)| SpecError { line, ..error })?;
-        Sweep::check(&spec, text, folder).map_err(|error| {
-            let line = place::line(text, &error.key);
-            SpecError { line, ..error }
-        })
+        let mut faults = Faults::default();
+        match place::read(text, &mut faults) {
+            Some(spec) => Sweep::checked(&spec, text, folder, faults),
+            None => faults.finish(text).and_then(|()| Sweep::check(&Spec::default(), text, folder)),
+        }
     }
 
     /// Checks `spec`, read from `text`; files that it names are relative to `folder`.
+    ///
+    /// # Errors
+    ///
+    /// What is wrong with the spec, and in which lines.
     pub fn check(spec: &Spec, text: &str, folder: &Path) -> Result<Sweep, SpecError> {
-        check_name(&spec.name)?;
-        let units = units(&spec.model)?;
-        check_rtol("accuracy.rtol", spec.accuracy.rtol)?;
-        let (grid, prefixes) = grid(spec, units, folder)?;
-        let mut requests = Vec::new();
-        for (name, table) in &spec.tables {
-            requests.push(request(name, table, spec.accuracy.rtol, &grid, &prefixes)?);
-        }
-        if requests.is_empty() {
-            let known = table::ALL.map(|table| table.name());
-            return Err(SpecError::new(
-                "tables",
-                "no table is asked for",
-                format!("at least one of {}", known.join(", ")),
-                "add a line such as [tables.optimal]",
-            ));
-        }
+        Sweep::checked(spec, text, folder, Faults::default())
+    }
+
+    /// Checks `spec`, in which `faults` were found when it was read.
+    fn checked(spec: &Spec, text: &str, folder: &Path, mut faults: Faults) -> Result<Sweep, SpecError> {
+        faults.take(check_name(&spec.name));
+        let is_any_wrong = UNIT_KEYS.iter().any(|key| faults.concern(&format!("model.{key}")));
+        let units = if is_any_wrong { None } else { faults.take(units(&spec.model)) };
+        faults.take(check_rtol("accuracy.rtol", spec.accuracy.rtol));
+        let mut blocks = blocks(spec, units.as_ref(), folder, &mut faults);
+        let tables = tables(spec, &mut blocks, &mut faults);
+        faults.finish(text)?;
+
+        // Everything is legal on its own.
+        let prefixes: Vec<String> = blocks.iter().map(|block| block.prefix.clone()).collect();
+        let blocks = blocks.into_iter().filter_map(|block| block.block).map(Arc::new).collect();
+        let grid = Grid { blocks, units: units.unwrap_or_default() };
+        let placed = |fault| {
+            let mut faults = [fault];
+            place::find_lines(text, &mut faults);
+            let [fault] = faults;
+            fault
+        };
+        let requests = tables.into_iter().map(|table| request(table, &grid, &prefixes).map_err(placed));
+        let requests = requests.collect::<Result<Vec<Request>, _>>()?;
         let needed = requests.iter().any(|request| request.table.needs_optimum(&request.selection));
         // A table that depends on nothing else has these very rows.
         let own = requests.iter().find(|request| request.table.axes() == OPTIMUM_AXES);
@@ -125,59 +168,23 @@ impl Sweep {
             Some(request) => Some(request.projection.clone()),
             None => grid.project(OPTIMUM_AXES).ok(),
         };
+        let mut warnings = Vec::new();
+        for (prefix, block) in prefixes.iter().zip(&grid.blocks) {
+            let axes = block.factors.iter().flat_map(|factor| &factor.axes);
+            warnings.extend(axes.filter_map(|axis| doubt(prefix, &grid.units, axis)));
+        }
+        place::find_lines(text, &mut warnings);
         Ok(Sweep {
             name: spec.name.clone(),
             description: spec.description.clone(),
             text: text.to_owned(),
+            folder: folder.to_owned(),
             grid,
             bounded: spec.model.velocity_bound,
             requests,
             optimum_rows,
+            warnings,
         })
-    }
-
-    /// What the dataset is made from.
-    pub fn identity(&self) -> Identity {
-        let mut hashed = Hashed(Sha256::new());
-        // Never fails.
-        let _ = self.canonical(&mut hashed);
-        let spec_hash = hashed.0.finalize().iter().map(|byte| format!("{byte:02x}")).collect();
-        Identity { spec_hash, version: env!("CARGO_PKG_VERSION").to_owned() }
-    }
-
-    /// Everything that the numbers depend on, in one way of writing it.
-    fn canonical(&self, text: &mut impl Write) -> fmt::Result {
-        writeln!(text, "velocity_bound {}", self.bounded)?;
-        if let Units::Si(scales) = &self.grid.units {
-            writeln!(text, "si {scales:?}")?;
-        }
-        for block in &self.grid.blocks {
-            if self.grid.blocks.len() > 1 {
-                writeln!(text, "block")?;
-            }
-            for factor in &block.factors {
-                writeln!(text, "factor")?;
-                for axis in &factor.axes {
-                    let (name, unit) = (axis.quantity.name(), axis.quantity.unit(axis.scale));
-                    writeln!(text, "axis {name} {unit} {:?}", axis.values)?;
-                }
-            }
-            for derived in &block.derived {
-                let (name, unit) = (derived.quantity.name(), derived.quantity.unit(derived.scale));
-                writeln!(text, "computed {name} {unit} {:?}", derived.expression)?;
-            }
-            if let Some(condition) = &block.condition {
-                writeln!(text, "where {condition:?}")?;
-            }
-        }
-        for request in &self.requests {
-            write!(text, "table {} rtol {:?}", request.table.name(), request.rtol)?;
-            for &column in request.selection.indices() {
-                write!(text, " {}", request.table.columns()[column].name)?;
-            }
-            writeln!(text)?;
-        }
-        Ok(())
     }
 
     /// Accuracy of the shared optimal protocols: the strictest of the tables that use them.
@@ -191,24 +198,29 @@ impl Sweep {
         self.optimum_rows.as_ref().map_or(0, |rows| rows.distinct(OPTIMUM_AXES, Optima::MOST_KEPT))
     }
 
-    /// An empty store for them.
-    pub fn optima(&self) -> Optima {
+    /// An empty store of them for each table: one for all tables of the same accuracy, so that no table depends on that of another one.
+    pub fn optima(&self) -> Vec<Arc<Optima>> {
         let span = self.optimum_rows.as_ref().map_or(0, |rows| rows.tuples(OPTIMUM_AXES).span());
-        Optima::among(self.optimum_tuples(), span, self.bounded, self.optimum_rtol())
+        let tuples = self.optimum_tuples();
+        let mut stores: Vec<(u64, Arc<Optima>)> = Vec::new();
+        let store = |request: &Request| {
+            if !request.table.needs_optimum(&request.selection) {
+                return Arc::new(Optima::new(0, self.bounded, request.rtol));
+            }
+            let key = request.rtol.to_bits();
+            if let Some((_, store)) = stores.iter().find(|(known, _)| *known == key) {
+                return store.clone();
+            }
+            let store = Arc::new(Optima::among(tuples, span, self.bounded, request.rtol));
+            stores.push((key, store.clone()));
+            store
+        };
+        self.requests.iter().map(store).collect()
     }
 }
 
-/// The hash of a text that is never held as a whole: written out, the values of large files of points are many times as long.
-struct Hashed(Sha256);
-
-impl Write for Hashed {
-    fn write_str(&mut self, text: &str) -> fmt::Result {
-        self.0.update(text);
-        Ok(())
-    }
-}
-
-fn check_name(name: &str) -> Result<(), SpecError> {
+/// Whether a dataset can have this name.
+pub fn check_name(name: &str) -> Result<(), SpecError> {
     let legal = |c: char| c.is_ascii_alphanumeric() || matches!(c, '-' | '_' | '.');
     if (1..=LONGEST_NAME).contains(&name.len()) && name.chars().all(legal) && !name.starts_with('.') {
         return Ok(());
@@ -221,11 +233,11 @@ fn check_name(name: &str) -> Result<(), SpecError> {
     ))
 }
 
-/// The blocks of `spec`, and what their keys begin with.
-fn grid(spec: &Spec, units: Units, folder: &Path) -> Result<(Grid, Vec<String>), SpecError> {
+/// The blocks of `spec`.
+fn blocks(spec: &Spec, units: Option<&Units>, folder: &Path, faults: &mut Faults) -> Vec<Checked> {
     let top = spec.top();
     if spec.block.is_empty() {
-        return Ok((Grid { blocks: vec![Arc::new(block(&top, "", &units, folder)?)], units }, vec![String::new()]));
+        return vec![block::check(&top, String::new(), units, folder, faults)];
     }
     let outside = [
         ("axes", !top.axes.is_empty()),
@@ -233,25 +245,23 @@ fn grid(spec: &Spec, units: Units, folder: &Path) -> Result<(Grid, Vec<String>),
         ("zip", !top.zip.is_empty()),
         ("where", top.condition.is_some()),
     ];
-    if let Some((key, _)) = outside.into_iter().find(|(_, is_there)| *is_there) {
-        return Err(SpecError::new(
+    for (key, _) in outside.into_iter().filter(|(_, is_there)| *is_there) {
+        faults.push(SpecError::new(
             key,
             format!("`{key}` outside of the blocks"),
             "everything about the grid in [[block]]s, or no block",
             "move it into the blocks that it concerns",
         ));
     }
-    let (mut blocks, mut prefixes) = (Vec::new(), Vec::new());
-    for (number, one) in spec.block.iter().enumerate() {
-        let prefix = format!("block[{number}].");
-        blocks.push(Arc::new(block(one, &prefix, &units, folder)?));
-        prefixes.push(prefix);
-    }
+    let blocks = spec.block.iter().enumerate();
+    let blocks: Vec<Checked> =
+        blocks.map(|(number, one)| block::check(one, format!("block[{number}]."), units, folder, faults)).collect();
     for quantity in Quantity::ALL {
-        let scales = blocks.iter().enumerate().filter_map(|(number, block)| Some((number, block.scale(quantity)?)));
-        let scales: Vec<_> = scales.collect();
+        let scale = |checked: &Checked| checked.block.as_ref()?.scale(quantity);
+        let scales: Vec<_> =
+            blocks.iter().enumerate().filter_map(|(number, block)| Some((number, scale(block)?))).collect();
         if let Some((number, scale)) = scales.iter().find(|(_, scale)| *scale != scales[0].1) {
-            return Err(SpecError::new(
+            faults.push(SpecError::new(
                 format!("block[{number}].axes.{}", quantity.name()),
                 format!(
                     "in units of \"{}\", but \"{}\" in block[{}]",
@@ -264,7 +274,7 @@ fn grid(spec: &Spec, units: Units, folder: &Path) -> Result<(Grid, Vec<String>),
             ));
         }
     }
-    Ok((Grid { blocks, units }, prefixes))
+    blocks
 }
 
 fn check_rtol(key: &str, rtol: f64) -> Result<(), SpecError> {
@@ -274,29 +284,78 @@ fn check_rtol(key: &str, rtol: f64) -> Result<(), SpecError> {
     Err(SpecError::new(key, format!("{rtol:?} is out of range"), RTOL.text, "choose a value in the range"))
 }
 
-fn request(name: &str, spec: &TableSpec, rtol: f64, grid: &Grid, prefixes: &[String]) -> Result<Request, SpecError> {
-    let key = format!("tables.{name}");
-    let Some(written) = table::ALL.into_iter().find(|table| table.name() == name) else {
-        return Err(unknown(key, "table", name, &table::ALL.map(|table| table.name())));
-    };
-    let table = reduced(written, &key, spec.reduce.as_deref())?;
-    for (block, prefix) in grid.blocks.iter().zip(prefixes) {
-        let Some(missing) = written.axes().iter().find(|axis| block.scale(**axis).is_none()) else { continue };
-        let (place, axes) = match prefix.trim_end_matches('.') {
-            "" => ("the spec", "[axes]"),
-            block => (block, "its [block.axes]"),
-        };
-        return Err(SpecError::new(
-            key,
-            format!("needs the axis `{}`, which {place} does not have", missing.name()),
-            format!("axes {}", written.axes().iter().map(|axis| axis.name()).collect::<Vec<_>>().join(", ")),
-            format!("add `{} = ...` to {axes}, or remove the table", missing.name()),
+/// A table of a spec that is legal on its own.
+struct Draft {
+    /// Its name as it is written.
+    name: String,
+    /// The table with the rows.
+    written: &'static dyn Table,
+    /// The table that is written: that one, or what `reduce` makes of it.
+    table: &'static dyn Table,
+    selection: Selection,
+    rtol: f64,
+}
+
+/// The tables of `spec`. An axis that a table lacks counts as held from then on: one fault names it.
+fn tables(spec: &Spec, blocks: &mut [Checked], faults: &mut Faults) -> Vec<Draft> {
+    if spec.tables.is_empty() && !faults.concern("tables") {
+        let known = table::ALL.map(|table| table.name());
+        faults.push(SpecError::new(
+            "tables",
+            "no table is asked for",
+            format!("at least one of {}", known.join(", ")),
+            "add a line such as [tables.optimal]",
         ));
     }
+    spec.tables.iter().filter_map(|(name, table)| draft(name, table, spec.accuracy.rtol, blocks, faults)).collect()
+}
+
+fn draft(name: &str, spec: &TableSpec, rtol: f64, blocks: &mut [Checked], faults: &mut Faults) -> Option<Draft> {
+    let key = format!("tables.{name}");
+    let Some(written) = table::ALL.into_iter().find(|table| table.name() == name) else {
+        faults.push(unknown(key, "table", name, &table::ALL.map(|table| table.name())));
+        return None;
+    };
+    let is_reduction_known = !faults.concern(&format!("{key}.reduce"));
+    for block in blocks {
+        let missing: Vec<Quantity> = written.axes().iter().copied().filter(|axis| !block.held.contains(axis)).collect();
+        if !missing.is_empty() {
+            faults.push(lacks(&key, written, &block.prefix, &missing));
+            block.held.extend(missing);
+        }
+    }
+    let table = faults.take(reduced(written, &key, spec.reduce.as_deref()))?;
     let rtol = spec.rtol.or(table.default_rtol()).unwrap_or(rtol);
-    check_rtol(&format!("{key}.rtol"), rtol)?;
-    let selection = selection(table, &key, spec.columns.as_deref())?;
-    let members = if spec.reduce.is_some() { Some(members(written, table, &key, grid)?) } else { None };
+    if spec.rtol.is_some() {
+        faults.take(check_rtol(&format!("{key}.rtol"), rtol));
+    }
+    // The columns are those of the reduced table.
+    let selection = selection(table, &key, spec.columns.as_deref().filter(|_| is_reduction_known), faults);
+    Some(Draft { name: name.to_owned(), written, table, selection, rtol })
+}
+
+/// A table that needs axes which the block of `prefix` does not have.
+fn lacks(key: &str, table: &dyn Table, prefix: &str, missing: &[Quantity]) -> SpecError {
+    let (place, axes) = match prefix.trim_end_matches('.') {
+        "" => ("the spec", "[axes]"),
+        block => (block, "its [block.axes]"),
+    };
+    let names: Vec<String> = missing.iter().map(|axis| format!("`{}`", axis.name())).collect();
+    let lines: Vec<String> = missing.iter().map(|axis| format!("`{} = ...`", axis.name())).collect();
+    let noun = if missing.len() == 1 { "axis" } else { "axes" };
+    SpecError::new(
+        key,
+        format!("needs the {noun} {}, which {place} does not have", names.join(", ")),
+        format!("axes {}", table.axes().iter().map(|axis| axis.name()).collect::<Vec<_>>().join(", ")),
+        format!("add {} to {axes}, or remove the table", lines.join(", ")),
+    )
+}
+
+/// A table over its rows of `grid`, whose blocks have keys that begin with `prefixes`.
+fn request(draft: Draft, grid: &Grid, prefixes: &[String]) -> Result<Request, SpecError> {
+    let Draft { name, written, table, selection, rtol } = draft;
+    let key = format!("tables.{name}");
+    let members = if written.name() == table.name() { None } else { Some(members(written, table, &key, grid)?) };
     let projection = grid.project(table.axes()).map_err(|error| match error {
         TooMany::Rows => SpecError::new(
             key,
@@ -309,13 +368,13 @@ fn request(name: &str, spec: &TableSpec, rtol: f64, grid: &Grid, prefixes: &[Str
     if let Some(empty) = projection.stretches().iter().position(|stretch| stretch.rows() == 0) {
         return Err(SpecError::new(
             format!("{}where", prefixes[empty]),
-            "keeps no point at all",
+            "matches no points",
             "a condition that some point meets",
             "correct the condition, or the axes that it reads",
         ));
     }
     let sizes = selection.indices().iter().map(|&column| table.columns()[column].size(grid)).collect();
-    Ok(Request { table, selection, rtol, rows: projection.rows(), projection, members, sizes })
+    Ok(Request { table, selection, rtol, rows: projection.rows(), projection, members, hash: OnceLock::new(), sizes })
 }
 
 /// The table that `reduce` makes of `table`, or `table` without it.
@@ -374,37 +433,34 @@ fn members(landscape: &dyn Table, reduced: &dyn Table, key: &str, grid: &Grid) -
     projection.map_err(|_| wrong("more shortcuts than 64 bits can count", "take fewer values on the axes"))
 }
 
-fn selection(table: &dyn Table, key: &str, names: Option<&[String]>) -> Result<Selection, SpecError> {
+/// The columns of these names; the usual ones without any.
+fn selection(table: &dyn Table, key: &str, names: Option<&[String]>, faults: &mut Faults) -> Selection {
     let known: Vec<&str> = table.columns().iter().map(|column| column.name).collect();
     let Some(names) = names else {
-        return Ok(Selection::usual(table.columns()));
+        return Selection::usual(table.columns());
     };
     let mut indices = Vec::new();
     for (place, name) in names.iter().enumerate() {
         let key = format!("{key}.columns[{place}]");
-        if name == STATUS {
-            continue;
-        }
-        let Some(index) = known.iter().position(|column| column == name) else {
-            return Err(unknown(key, "column", name, &known));
-        };
-        if indices.contains(&index) {
-            return Err(SpecError::new(
+        match known.iter().position(|column| column == name) {
+            _ if name == STATUS => {}
+            Some(index) if indices.contains(&index) => faults.push(SpecError::new(
                 key,
                 format!("`{name}` is there twice"),
                 "each column once",
                 "remove one of the two",
-            ));
+            )),
+            Some(index) => indices.push(index),
+            None => faults.push(unknown(key, "column", name, &known)),
         }
-        indices.push(index);
     }
-    if indices.is_empty() {
-        return Err(SpecError::new(
+    if indices.is_empty() && !faults.concern(&format!("{key}.columns")) {
+        faults.push(SpecError::new(
             format!("{key}.columns"),
             "no column is asked for",
             format!("at least one of {}", known.join(", ")),
             "name columns, or remove `columns` to have the usual ones",
         ));
     }
-    Ok(Selection::new(indices))
+    Selection::new(indices)
 }

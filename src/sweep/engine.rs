@@ -12,20 +12,25 @@ use std::sync::mpsc::{Sender, channel, sync_channel};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::thread;
 
+use rayon::prelude::*;
 use rayon::{ThreadPool, ThreadPoolBuilder};
 
 use super::check::Sweep;
 use super::plan::Plan;
 use super::shard::{Shard, TooManyParts};
-use crate::dataset::{DatasetError, Folder, Footer, Layout, Look, Manifest, ManifestTable, State, encode};
+use crate::dataset::{
+    Company, DatasetError, Digest, Folder, Footer, Layout, Look, Manifest, ManifestTable, State, encode,
+};
 use crate::grid::Quantity;
-use crate::table::{Job, Sheet, Signal, Stopped, Table, Work};
+use crate::table::{Job, Phase, Sheet, Signal, Stopped, Table, Work};
 
 /// What a run did.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Outcome {
     /// What it did for each table, in the order of the spec.
     pub tables: Vec<TableOutcome>,
+    /// What the parts of each table contain, those that were kept and those that were made.
+    pub digests: Vec<Digest>,
     /// All work that was spent.
     pub work: Work,
 }
@@ -108,9 +113,10 @@ impl fmt::Display for Defect {
     }
 }
 
-/// Runs `sweep` on `threads` threads (0: one a processor) into `folder`; parts that are there already are kept.
+/// Runs `sweep` on `threads` threads (0: one a processor) into `folder`; parts that are there already are kept. No other run may be at work
+/// there.
 pub fn run(sweep: &Sweep, folder: &Folder, threads: usize, signal: &Signal) -> Result<Outcome, RunError> {
-    run_shard(sweep, folder, Shard::WHOLE, threads, signal)
+    run_in(sweep, folder, (Shard::WHOLE, Company::Alone), threads, signal)
 }
 
 /// The same for the parts of one shard alone. Any number of processes may do that at the same time, with the same shard too.
@@ -123,29 +129,44 @@ pub fn run_shard(
     threads: usize,
     signal: &Signal,
 ) -> Result<Outcome, RunError> {
+    run_in(sweep, folder, (shard, Company::Shards), threads, signal)
+}
+
+fn run_in(
+    sweep: &Sweep,
+    folder: &Folder,
+    (shard, company): (Shard, Company),
+    threads: usize,
+    signal: &Signal,
+) -> Result<Outcome, RunError> {
     let plan = Plan::new(sweep);
-    let manifest = plan.manifest(sweep);
     let shares = shard.parts(sweep, &plan)?;
-    folder.open(&manifest)?;
+    let session = folder.open(&plan.manifest(sweep), company).map_err(|error| sweep.explain(error))?;
     let pool = pool(threads)?;
     let optima = sweep.optima();
-    let mut outcome = Outcome { tables: Vec::new(), work: Work::default() };
+    let mut outcome = Outcome { tables: Vec::new(), digests: Vec::new(), work: Work::default() };
     let failure = Failure::default();
     let defects = Mutex::new(Vec::new());
     let stages: Vec<Stage<'_>> = (sweep.requests.iter().zip(&plan.tables))
-        .map(|(request, table)| Stage {
-            manifest: &manifest,
+        .zip(&optima)
+        .map(|((request, table), optima)| Stage {
+            manifest: &session.manifest,
             table,
-            job: sweep.job(request, &optima, signal),
+            job: sweep.job(request, optima, signal),
             layout: Layout::new(request.table, &request.selection, &sweep.grid),
+            digest: Mutex::default(),
         })
         .collect();
+    signal.enter(Phase::Checking);
+    let checked = stages.iter().zip(&shares).map(|(stage, share)| stage.check(folder, share, &pool, signal));
+    let checked = checked.collect::<Result<Vec<_>, RunError>>()?;
+    signal.enter(Phase::Computing);
     // Parts that the disk has not finished.
     let queued = AtomicUsize::new(0);
     thread::scope(|scope| {
         // The disk has threads of its own, so that no thread that computes waits for it.
         let (to_disk, parts) = sync_channel::<Part<'_>>(1);
-        let (queued, failure, parts) = (&queued, &failure, Arc::new(Mutex::new(parts)));
+        let (queued, session, failure, parts) = (&queued, &session, &failure, Arc::new(Mutex::new(parts)));
         let next = move || locked(&parts).recv();
         let write = move || {
             while let Ok(Part { stage, number, content }) = next() {
@@ -155,7 +176,7 @@ pub fn run_shard(
                         Content::Bytes(bytes) => bytes,
                         Content::Sheet(sheet) => stage.encode(folder, number, &sheet)?,
                     };
-                    folder.write_part(&stage.table.name, number, &bytes).map_err(RunError::from)
+                    session.write_part(&stage.table.name, number, &bytes).map_err(RunError::from)
                 }));
                 queued.fetch_sub(1, Ordering::Relaxed);
             }
@@ -163,28 +184,27 @@ pub fn run_shard(
         for write in std::iter::repeat_n(write, WRITERS) {
             thread::Builder::new().spawn_scoped(scope, write).map_err(RunError::Writer)?;
         }
-        for ((request, stage), share) in sweep.requests.iter().zip(&stages).zip(shares) {
+        for (((request, stage), share), checked) in sweep.requests.iter().zip(&stages).zip(shares).zip(checked) {
             let table = stage.table;
-            let mut done = TableOutcome::default();
-            let missing = share.into_iter().flatten().filter(|&number| {
-                let rows = table.rows_of(number);
-                let count = rows.end - rows.start;
-                match folder.state(&manifest, &table.name, number, Look::Whole) {
-                    State::There { .. } => {
+            let mut done = TableOutcome { kept: checked.len() as u64, ..TableOutcome::default() };
+            let missing = share.into_iter().flatten().filter(|number| checked.binary_search(number).is_err());
+            let missing = missing.filter(|&number| {
+                // Another run may have made it by now.
+                match stage.look(folder, number, signal) {
+                    Ok(true) => {
                         done.kept += 1;
-                        signal.advance(count);
                         return false;
                     }
-                    State::Foreign { what, expected, found } => {
-                        let path = folder.part(&table.name, number).display().to_string();
-                        failure.keep(Err(DatasetError::ForeignPart { path, what, expected, found }.into()));
+                    Ok(false) => {}
+                    Err(State::Damaged { .. }) => done.damaged += 1,
+                    Err(state) => {
+                        failure.keep(stage.refuse(folder, number, state));
                         return false;
                     }
-                    State::Damaged { .. } => done.damaged += 1,
-                    State::Missing => {}
                 }
+                let rows = table.rows_of(number);
                 done.made += 1;
-                done.rows += count;
+                done.rows += rows.end - rows.start;
                 true
             });
             let wanted = missing.take_while(|_| !failure.is_there() && signal.check().is_ok());
@@ -212,9 +232,13 @@ pub fn run_shard(
             signal.check()?;
             outcome.tables.push(done);
         }
+        signal.enter(Phase::Writing);
         Ok::<(), RunError>(())
     })?;
     failure.into_result()?;
+    session.check()?;
+    outcome.digests =
+        stages.into_iter().map(|stage| stage.digest.into_inner().unwrap_or_else(PoisonError::into_inner)).collect();
     let mut defects = defects.into_inner().unwrap_or_else(PoisonError::into_inner);
     // Threads find them in no particular order.
     defects.sort_by_key(|defect| (plan.tables.iter().position(|table| table.name == defect.table), defect.rows.start));
@@ -237,7 +261,7 @@ pub fn pool(threads: usize) -> Result<ThreadPool, RunError> {
 const SHEETS: u64 = 1 << 27;
 
 /// Threads that encode and write: while one waits for the disk to sync its part, another one has the processor.
-const WRITERS: usize = 2;
+pub(super) const WRITERS: usize = 2;
 
 /// Parts that those threads may have before them, the ones that they are at included: with fewer they would wait for the next.
 const AHEAD: usize = WRITERS + 1;
@@ -330,15 +354,79 @@ struct Stage<'a> {
     table: &'a ManifestTable,
     job: Job<'a>,
     layout: Layout,
+    /// What the parts contain that are kept or made by now.
+    digest: Mutex<Digest>,
 }
 
+/// Parts that are checked before what they contain is added up, so that the memory does not grow with the dataset.
+const CHECKED_TOGETHER: usize = 1 << 10;
+
 impl Stage<'_> {
-    /// The bytes of a part.
+    /// The numbers of the sound parts of `share` that are there, ascending; every bit of them is checked, on all threads of `pool`.
+    fn check(
+        &self,
+        folder: &Folder,
+        share: &[Range<u64>],
+        pool: &ThreadPool,
+        signal: &Signal,
+    ) -> Result<Vec<u64>, RunError> {
+        let mut there = folder.parts_there(self.table);
+        // Both are ascending.
+        there.retain(|number| {
+            share.get(share.partition_point(|range| range.end <= *number)).is_some_and(|range| range.contains(number))
+        });
+        let mut sound = Vec::with_capacity(there.len());
+        for numbers in there.chunks(CHECKED_TOGETHER) {
+            let look = |&number: &u64| {
+                signal.check()?;
+                match self.look(folder, number, signal) {
+                    Ok(is_there) => Ok(is_there),
+                    Err(State::Damaged { .. }) => Ok(false),
+                    Err(state) => self.refuse(folder, number, state).map(|()| false),
+                }
+            };
+            let looks =
+                pool.install(|| numbers.par_iter().with_max_len(1).map(look).collect::<Result<Vec<bool>, RunError>>())?;
+            sound.extend(numbers.iter().zip(looks).filter(|(_, is_sound)| *is_sound).map(|(number, _)| *number));
+        }
+        Ok(sound)
+    }
+
+    /// Whether a part is there, every bit of it; then it is counted. What is in its place if that is something else.
+    fn look(&self, folder: &Folder, number: u64, signal: &Signal) -> Result<bool, State> {
+        match folder.state(self.manifest, &self.table.name, number, Look::Whole) {
+            State::There { digest } => {
+                let rows = self.table.rows_of(number);
+                signal.keep(rows.end - rows.start);
+                self.count(*digest);
+                Ok(true)
+            }
+            State::Missing => Ok(false),
+            state => Err(state),
+        }
+    }
+
+    /// A failure because of what is in the place of a part, if it is foreign.
+    fn refuse(&self, folder: &Folder, number: u64, state: State) -> Result<(), RunError> {
+        let State::Foreign { what, expected, found } = state else { return Ok(()) };
+        let path = folder.part(&self.table.name, number).display().to_string();
+        Err(DatasetError::ForeignPart { path, what, expected, found }.into())
+    }
+
+    /// Adds what a part contains.
+    fn count(&self, part: Digest) {
+        let mut digest = locked(&self.digest);
+        *digest = std::mem::take(&mut *digest).merge(part);
+    }
+
+    /// The bytes of a part, which is counted.
     fn encode(&self, folder: &Folder, number: u64, sheet: &Sheet) -> Result<Vec<u8>, RunError> {
         let name = &self.table.name;
         let footer = Footer::new(self.manifest, name, self.table.rows_of(number));
-        encode(&self.layout, self.job.rows, sheet, &footer)
-            .map_err(|source| DatasetError::encode(folder, name, number, source).into())
+        let (bytes, digest) = encode(&self.layout, self.job.rows, sheet, &footer)
+            .map_err(|source| DatasetError::encode(folder, name, number, source))?;
+        self.count(digest);
+        Ok(bytes)
     }
 }
 

@@ -3,9 +3,10 @@
 use std::fmt;
 use std::path::{Path, PathBuf};
 
+use super::place;
 use crate::names::{nearest, shown};
 
-/// A fault in a spec.
+/// What is wrong with a spec: a fault, and those that are independent of it.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct SpecError {
     /// The file, if there is one.
@@ -20,6 +21,8 @@ pub struct SpecError {
     pub expected: Box<str>,
     /// What to do.
     pub help: Box<str>,
+    /// The other faults of the spec, in the order of their lines; of many, the first that were found.
+    pub others: Box<[SpecError]>,
 }
 
 /// Characters of a key that a message shows.
@@ -46,12 +49,83 @@ impl SpecError {
             found: found.into(),
             expected: expected.into(),
             help: help.into(),
+            others: Box::default(),
         }
     }
 
-    /// The same fault with its place.
-    pub fn at(self, file: &Path, line: Option<usize>) -> SpecError {
-        SpecError { file: Some(file.to_owned()), line, ..self }
+    /// The fault and its `others`, as faults of `file`.
+    pub fn of(mut self, file: &Path) -> SpecError {
+        for fault in std::iter::once(&mut self.file).chain(self.others.iter_mut().map(|other| &mut other.file)) {
+            *fault = Some(file.to_owned());
+        }
+        self
+    }
+}
+
+/// Most faults that one message names.
+const MOST_FAULTS: usize = 10;
+
+/// The faults that a check has found so far.
+#[derive(Debug, Default)]
+pub struct Faults {
+    found: Vec<SpecError>,
+    /// Keys that are wrong, or that a misspelt one was meant to be.
+    suspects: Vec<String>,
+}
+
+impl Faults {
+    /// Adds a fault, unless it is known or there are enough.
+    pub fn push(&mut self, fault: SpecError) {
+        self.suspect(fault.key.to_string());
+        if !self.are_enough() && !self.found.contains(&fault) {
+            self.found.push(fault);
+        }
+    }
+
+    /// The value of `result`; its error is added.
+    pub fn take<T>(&mut self, result: Result<T, SpecError>) -> Option<T> {
+        result.map_err(|fault| self.push(fault)).ok()
+    }
+
+    /// Adds a key about which nothing more can be said.
+    pub fn suspect(&mut self, key: String) {
+        if !self.are_enough() {
+            self.suspects.push(key);
+        }
+    }
+
+    /// Whether a fault at `key`, above or below it, or one that was not added, may be the cause of what looks wrong there.
+    pub fn concern(&self, key: &str) -> bool {
+        let is_below = |key: &str, above: &str| {
+            key.strip_prefix(above).is_some_and(|rest| rest.is_empty() || rest.starts_with(['.', '[']))
+        };
+        self.are_enough() || self.suspects.iter().any(|suspect| is_below(suspect, key) || is_below(key, suspect))
+    }
+
+    /// Whether there is no fault so far.
+    pub fn are_none(&self) -> bool {
+        self.found.is_empty()
+    }
+
+    /// Whether no more are added: there are more than are named.
+    pub fn are_enough(&self) -> bool {
+        self.found.len() > MOST_FAULTS
+    }
+
+    /// All faults as one error, in the order of their lines in `text`.
+    ///
+    /// # Errors
+    ///
+    /// If there is any fault.
+    pub fn finish(mut self, text: &str) -> Result<(), SpecError> {
+        place::find_lines(text, &mut self.found);
+        // Faults of the whole spec come last.
+        self.found.sort_by_key(|fault| fault.line.unwrap_or(usize::MAX));
+        let mut found = self.found.into_iter();
+        match found.next() {
+            Some(first) => Err(SpecError { others: found.collect(), ..first }),
+            None => Ok(()),
+        }
     }
 }
 
@@ -66,7 +140,15 @@ impl fmt::Display for SpecError {
         if !self.key.is_empty() {
             write!(f, "{}: ", shown(&self.key, MOST_OF_KEY))?;
         }
-        write!(f, "{}\n  expected: {}\n  help: {}", shown(&self.found, MOST_OF_FOUND), self.expected, self.help)
+        write!(f, "{}\n  expected: {}\n  help: {}", shown(&self.found, MOST_OF_FOUND), self.expected, self.help)?;
+        let (named, rest) = self.others.split_at(self.others.len().min(MOST_FAULTS - 1));
+        for other in named {
+            write!(f, "\nerror: {other}")?;
+        }
+        if !rest.is_empty() {
+            f.write_str("\nerror: there are more; correct these first")?;
+        }
+        Ok(())
     }
 }
 

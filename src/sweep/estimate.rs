@@ -1,103 +1,265 @@
-//! What a sweep will cost, from a small sample that is computed for real.
+//! The cost of a sweep, from samples that are computed, encoded and written as a run does it.
 
+use std::iter::Sum;
 use std::ops::Range;
+use std::path::Path;
 use std::time::{Duration, Instant};
 
+use rayon::ThreadPool;
+use rayon::prelude::*;
+
 use super::check::{Request, Sweep};
-use super::engine::RunError;
+use super::engine::{RunError, WRITERS, pool};
 use super::plan::Plan;
-use crate::dataset::{DatasetError, Footer, Layout, encode};
+use crate::dataset::{DatasetError, Footer, Layout, Manifest, atomic, encode};
+use crate::grid::Point;
 use crate::table::{Optima, Sheet, Signal};
 
-/// Places of a table at which samples are taken.
-const PLACES: u64 = 8;
+/// Time that the samples of a sweep may take together: `plan` is to answer within a second or two.
+const BUDGET: Duration = Duration::from_millis(1500);
 
-/// Time after which the sample of a table is large enough.
-const ENOUGH: Duration = Duration::from_millis(100);
+/// Ranges of rows of a first sample: enough to keep several threads busy.
+const PLACES: u64 = 16;
 
-/// What a table will cost.
+/// Ranges of rows of a sample at most: what is known of each is kept while it is taken.
+const MOST_PLACES: u64 = 1 << 14;
+
+/// Seconds that the sample of a table may take at most, where a range of rows costs much, however few rows it has. Chosen: a person waits that
+/// long for a plan.
+const LONGEST: f64 = 5.0;
+
+/// Greatest cost of a row over the mean cost of its table. Chosen: rows of `step` differ by three orders of magnitude.
+const SPREAD: f64 = 1000.0;
+
+/// What a table costs.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Estimate {
-    /// Seconds of one processor, without the optimal protocols it shares.
+    /// Seconds of one thread, without the optimal protocols that tables share.
     pub seconds: f64,
     /// Bytes on disk.
     pub bytes: f64,
 }
 
-/// Estimates each table of `sweep`, and the seconds of one processor that the shared optimal protocols take.
-pub fn estimate(sweep: &Sweep) -> Result<(Vec<Estimate>, f64), RunError> {
-    let plan = Plan::new(sweep);
-    let pool = rayon::ThreadPoolBuilder::new()
-        .num_threads(1)
-        .build()
-        .map_err(|source| RunError::Threads { threads: 1, source })?;
-    pool.install(|| {
-        let optima = sweep.optima();
-        let tables = sweep.requests.iter().map(|request| table(sweep, request, &plan, &optima));
-        Ok((tables.collect::<Result<_, RunError>>()?, shared(sweep, &plan)))
-    })
+/// What a sweep costs.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Estimates {
+    /// Each of its tables, in the order of the spec.
+    pub tables: Vec<Estimate>,
+    /// Seconds of one thread for the optimal protocols that tables share.
+    pub shared: f64,
+    /// Seconds until the disk has a file of no length and its name.
+    sync: f64,
+    /// The same for a part of the usual length.
+    part: f64,
+    /// All parts.
+    parts: u64,
 }
 
-/// Where samples of `length` rows lie.
-fn samples(rows: u64, length: u64) -> impl Iterator<Item = Range<u64>> {
-    let places = PLACES.min(rows);
-    (0..places).map(move |place| {
-        let start = (u128::from(place) * u128::from(rows) / u128::from(places)) as u64;
-        start..start.saturating_add(length).min(rows)
-    })
-}
-
-fn table(sweep: &Sweep, request: &Request, plan: &Plan, optima: &Optima) -> Result<Estimate, RunError> {
-    let signal = Signal::default();
-    let job = sweep.job(request, optima, &signal);
-    let layout = Layout::new(request.table, &request.selection, &sweep.grid);
-    let manifest = plan.manifest(sweep);
-    let measure = |rows: Range<u64>| -> Result<usize, RunError> {
-        let mut sheet = Sheet::new(request.selection.indices().len());
-        sheet.resize((rows.end - rows.start) as usize);
-        request.table.compute(&job, rows.clone(), &mut sheet)?;
-        let footer = Footer::new(&manifest, request.table.name(), rows);
-        let bytes = encode(&layout, job.rows, &sheet, &footer).map_err(DatasetError::Sample)?;
-        Ok(bytes.len())
-    };
-    // The first round solves the shared protocols of its places, which are counted on their own, and tells what an empty part weighs.
-    let mut overhead = 0;
-    for range in samples(request.rows, 1) {
-        overhead = measure(range)?;
+impl Estimates {
+    /// Seconds of one thread for everything that is computed.
+    pub fn seconds(&self) -> f64 {
+        self.shared + self.tables.iter().map(|table| table.seconds).sum::<f64>()
     }
-    let mut length = 1;
-    loop {
-        let start = Instant::now();
-        let (mut rows, mut bytes) = (0, 0);
-        for range in samples(request.rows, length) {
-            rows += range.end - range.start;
-            bytes += measure(range)?.saturating_sub(overhead);
-        }
-        let elapsed = start.elapsed();
-        if elapsed >= ENOUGH || rows >= request.rows || length >= request.table.rows_per_part() {
-            let parts = request.rows.div_ceil(request.table.rows_per_part());
-            let scale = request.rows as f64 / rows as f64;
-            return Ok(Estimate {
-                seconds: elapsed.as_secs_f64() * scale,
-                bytes: bytes as f64 * scale + overhead as f64 * parts as f64,
+
+    /// Bytes of all tables.
+    pub fn bytes(&self) -> f64 {
+        self.tables.iter().map(|table| table.bytes).sum()
+    }
+
+    /// Seconds on the clock of a run on `threads` threads, once the spec is read.
+    pub fn elapsed(&self, threads: usize) -> f64 {
+        // First come the folder of the dataset, its manifest and the folders of the tables, one after the other.
+        let opening = self.sync * (self.tables.len() + 2) as f64;
+        // Parts are written while others are computed, but for the last one.
+        let writing = self.part * self.parts as f64 / WRITERS as f64;
+        opening + (self.seconds() / threads as f64).max(writing) + self.part
+    }
+}
+
+/// Estimates `sweep` on as many threads as a run takes, for a dataset in `folder`, which need not be there yet.
+///
+/// # Errors
+///
+/// Threads that cannot be started, and cells that cannot be encoded.
+pub fn estimate(sweep: &Sweep, folder: &Path) -> Result<Estimates, RunError> {
+    let (plan, pool) = (Plan::new(sweep), pool(0)?);
+    let sampler = Sampler { sweep, plan: &plan, manifest: plan.manifest(sweep), pool: &pool };
+    let shares = sweep.requests.len() as u32 + u32::from(plan.optima > 0);
+    let budget = BUDGET.as_secs_f64() / f64::from(shares);
+    let optimum = sampler.optimum(budget);
+    let optima = sweep.optima();
+    let tables =
+        sweep.requests.iter().zip(&optima).map(|(request, optima)| sampler.table(request, optima, optimum, budget));
+    let tables: Vec<Estimate> = tables.collect::<Result<_, _>>()?;
+    let parts: u64 = plan.tables.iter().map(|table| table.parts).sum();
+    let bytes = tables.iter().map(|table| table.bytes).sum::<f64>() / parts as f64;
+    // What cannot be written is not for an estimate to complain about.
+    let written = |bytes: f64| atomic::time(folder, bytes as usize).map_or(0.0, |time| time.as_secs_f64());
+    let (sync, part) = (written(0.0), written(bytes));
+    let shared = optimum * plan.optima as f64 * pool.current_num_threads() as f64;
+    Ok(Estimates { tables, shared, sync, part, parts })
+}
+
+/// Bytes of each table of `sweep` on disk, from samples of a fifth of the time.
+///
+/// # Errors
+///
+/// Those of [`estimate`].
+pub fn sizes(sweep: &Sweep) -> Result<Vec<f64>, RunError> {
+    let (plan, pool) = (Plan::new(sweep), pool(0)?);
+    let sampler = Sampler { sweep, plan: &plan, manifest: plan.manifest(sweep), pool: &pool };
+    let budget = 0.2 * BUDGET.as_secs_f64() / sweep.requests.len() as f64;
+    let optima = sweep.optima();
+    let tables =
+        sweep.requests.iter().zip(&optima).map(|(request, optima)| sampler.table(request, optima, 0.0, budget));
+    tables.map(|table| table.map(|table| table.bytes)).collect()
+}
+
+/// What some ranges of rows cost.
+#[derive(Debug, Clone, Copy, Default)]
+struct Sample {
+    rows: u64,
+    /// Optimal protocols that were solved for other tables, too.
+    optima: u64,
+    bytes: u64,
+}
+
+impl Sum for Sample {
+    fn sum<I: Iterator<Item = Sample>>(samples: I) -> Sample {
+        samples.fold(Sample::default(), |sum, one| Sample {
+            rows: sum.rows + one.rows,
+            optima: sum.optima + one.optima,
+            bytes: sum.bytes + one.bytes,
+        })
+    }
+}
+
+/// What a range of rows costs, however many it has, and each of its rows: in seconds of all threads together, or in bytes.
+#[derive(Debug, Clone, Copy)]
+struct Line {
+    range: f64,
+    row: f64,
+}
+
+impl Line {
+    /// The line through ranges of `shorter` and `longer` rows; costs that fall are taken as constant.
+    fn through(shorter: (f64, f64), longer: (f64, f64)) -> Line {
+        let row = ((longer.1 - shorter.1) / (longer.0 - shorter.0)).max(0.0);
+        Line { range: (shorter.1 - row * shorter.0).max(0.0), row }
+    }
+
+    fn of(self, ranges: u64, rows: u64) -> f64 {
+        self.range * ranges as f64 + self.row * rows as f64
+    }
+}
+
+/// Who takes samples.
+struct Sampler<'a> {
+    sweep: &'a Sweep,
+    plan: &'a Plan,
+    manifest: Manifest,
+    pool: &'a ThreadPool,
+}
+
+impl Sampler<'_> {
+    /// What a table costs, if a shared optimal protocol costs `optimum`, from samples that take about `budget`.
+    fn table(&self, request: &Request, optima: &Optima, optimum: f64, budget: f64) -> Result<Estimate, RunError> {
+        let signal = Signal::default();
+        let job = self.sweep.job(request, optima, &signal);
+        let layout = Layout::new(request.table, &request.selection, &self.sweep.grid);
+        let compute = |rows: Range<u64>| -> Result<Sample, RunError> {
+            let mut sheet = Sheet::new(request.selection.indices().len());
+            sheet.resize((rows.end - rows.start) as usize);
+            let work = request.table.compute(&job, rows.clone(), &mut sheet)?;
+            let footer = Footer::new(&self.manifest, request.table.name(), rows.clone());
+            let (bytes, _) = encode(&layout, job.rows, &sheet, &footer).map_err(DatasetError::Sample)?;
+            let optima = if optimum > 0.0 { work.optima } else { 0 };
+            Ok(Sample { rows: rows.end - rows.start, optima, bytes: bytes.len() as u64 })
+        };
+        // Seconds, bytes and rows of a range, on the mean of `places` ranges of `length` rows, or as many as are begun within `limit` seconds.
+        let sample = |length: u64, places: u64, limit: f64| -> Result<[f64; 3], RunError> {
+            let start = Instant::now();
+            let ranges = (0..places as usize).into_par_iter().with_max_len(1).filter_map(|place| {
+                let is_late = start.elapsed().as_secs_f64() > limit && place > 0;
+                (!is_late).then(|| compute(place_of(request.rows, place as u64, length)))
             });
+            let taken = self.pool.install(|| ranges.collect::<Result<Vec<_>, _>>())?;
+            let sum: Sample = taken.iter().copied().sum();
+            let seconds = start.elapsed().as_secs_f64() - sum.optima as f64 * optimum;
+            Ok([seconds.max(0.0), sum.bytes as f64, sum.rows as f64].map(|all| all / taken.len() as f64))
+        };
+        let began = Instant::now();
+        let left = || budget - began.elapsed().as_secs_f64();
+        // Rows that cost much leave time for a few.
+        let mut places = self.pool.current_num_threads() as u64;
+        let mut one = sample(1, places, f64::INFINITY)?;
+        if left() > 0.8 * budget {
+            places = PLACES;
+            one = sample(1, places, f64::INFINITY)?;
         }
-        length *= 4;
+        let longest = request.table.rows_per_part().min(request.rows / places);
+        let (mut seconds, mut bytes) = (Line { range: 0.0, row: one[0] }, Line { range: one[1], row: 0.0 });
+        let (mut length, mut long) = (1, one);
+        // Ranges grow until their rows, and not that there are ranges, take most of the time. As long as they do not, it costs little, and
+        // what is known of one row alone may be thousands of times too much.
+        while length < longest {
+            let is_flat = length == 1 || long[0] < 2.0 * one[0];
+            let row = (SPREAD * 1e-9 * request.table.cost() as f64).min(long[0] / length as f64);
+            let next = (long[0] + 3.0 * length as f64 * row) * places as f64;
+            let is_bearable = began.elapsed().as_secs_f64() + next < LONGEST;
+            if left() < 0.6 * budget && !(is_flat && is_bearable) {
+                break;
+            }
+            length = (4 * length).min(longest);
+            long = sample(length, places, f64::INFINITY)?;
+            seconds = Line::through((one[2], one[0]), (long[2], long[0]));
+            bytes = Line::through((one[2], one[1]), (long[2], long[1]));
+            if seconds.range < 0.1 * long[0] && left() < 0.8 * budget {
+                break;
+            }
+        }
+        // What time is left goes into more of them, since rows differ.
+        if left() > 0.1 * budget {
+            let all = sample(length, MOST_PLACES.min(request.rows / length), left())?;
+            seconds.row = ((all[0] - seconds.range) / all[2]).max(0.0);
+            if length > 1 {
+                bytes.row = ((all[1] - bytes.range) / all[2]).max(0.0);
+            }
+        }
+        let parts = request.rows.div_ceil(request.table.rows_per_part());
+        let threads = self.pool.current_num_threads() as f64;
+        Ok(Estimate { seconds: seconds.of(parts, request.rows) * threads, bytes: bytes.of(parts, request.rows) })
+    }
+
+    /// Seconds of all threads together for an optimal protocol that tables share; 0 if there is none.
+    fn optimum(&self, budget: f64) -> f64 {
+        let Some(rows) = self.sweep.optimum_rows.as_ref().filter(|_| self.plan.optima <= Optima::MOST_KEPT) else {
+            return 0.0;
+        };
+        // A store without room: each is solved however often it was met.
+        let optima = Optima::new(u64::MAX, self.sweep.bounded, self.sweep.optimum_rtol());
+        let (began, mut places) = (Instant::now(), rows.rows().min(PLACES));
+        loop {
+            let starts = (0..places).map(|place| place_of(rows.rows(), place, 1).start);
+            let points: Vec<Point> = starts.map(|row| self.sweep.grid.scaled(&rows.point(row))).collect();
+            let start = Instant::now();
+            self.pool.install(|| points.par_iter().for_each(|point| _ = optima.get(0, point)));
+            let each = start.elapsed().as_secs_f64() / places as f64;
+            let most = rows.rows().min(MOST_PLACES);
+            if places == most || began.elapsed().as_secs_f64() > 0.2 * budget {
+                return each;
+            }
+            places = (8 * places).min(most);
+        }
     }
 }
 
-/// Seconds of one processor for all shared optimal protocols.
-fn shared(sweep: &Sweep, plan: &Plan) -> f64 {
-    let Some(projection) = sweep.optimum_rows.as_ref() else { return 0.0 };
-    // A store without room: every protocol is solved anew.
-    let optima = Optima::new(u64::MAX, sweep.bounded, sweep.optimum_rtol());
-    let mut solved = 0;
-    let start = Instant::now();
-    while start.elapsed() < ENOUGH / 4 {
-        for range in samples(projection.rows(), 1) {
-            optima.get(range.start, &sweep.grid.scaled(&projection.point(range.start)));
-            solved += 1;
-        }
-    }
-    start.elapsed().as_secs_f64() / f64::from(solved) * plan.optima as f64
+/// Range number `place` of a sample, which has `length` of the `rows`: any consecutive ranges lie nearly evenly among them.
+fn place_of(rows: u64, place: u64, length: u64) -> Range<u64> {
+    // Multiples of the golden ratio, modulo 1, are spread most evenly (Knuth, The Art of Computer Programming 3, section 6.4, theorem S).
+    const GOLDEN: u64 = 0x9e37_79b9_7f4a_7c15;
+    let part = (place + 1).wrapping_mul(GOLDEN);
+    let length = length.min(rows);
+    let start = ((u128::from(part) * u128::from(rows - length + 1)) >> 64) as u64;
+    start..start + length
 }

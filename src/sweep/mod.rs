@@ -7,6 +7,7 @@ mod check;
 mod engine;
 mod error;
 mod estimate;
+mod identity;
 mod place;
 mod plan;
 mod points;
@@ -16,10 +17,12 @@ mod spec;
 mod units;
 
 pub use batches::Batches;
+#[cfg(feature = "cli")]
+pub(crate) use check::check_name;
 pub use check::{Request, Sweep};
 pub use engine::{Defect, Outcome, RunError, TableOutcome, compute, pool, run, run_shard};
 pub use error::SpecError;
-pub use estimate::{Estimate, estimate};
+pub use estimate::{Estimate, Estimates, estimate, sizes};
 pub use plan::Plan;
 pub use schema::schema;
 pub use shard::{Shard, TooManyParts, check_parts, shares_with};

@@ -2,41 +2,126 @@
 
 use std::ops::Range;
 
+use serde::Deserialize;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
-use super::error::{SpecError, unknown};
+use super::error::{Faults, SpecError, unknown};
 use super::spec::Spec;
+use crate::names::nearest;
+
+/// Reads a spec from TOML, as far as it can be read.
+///
+/// A key whose value has the wrong type, or that no spec has, is a fault, and left out: what is right is checked all the same.
+pub fn read(text: &str, faults: &mut Faults) -> Option<Spec> {
+    let fault = |error: toml::de::Error| {
+        let line = error.span().map(|span| line_of(text, span.start));
+        SpecError { line, ..explain(text, error.message(), error.span()) }
+    };
+    let mut document = faults.take(DeTable::parse(text).map_err(fault))?;
+    while !faults.are_enough() {
+        let error = match Spec::deserialize(toml::de::Deserializer::from(document.clone())) {
+            Ok(spec) => return Some(spec),
+            Err(error) => error,
+        };
+        let (span, missing) = (error.span(), quoted(error.message(), "missing field ").pop());
+        if let Some((name, known)) = quoted(error.message(), "unknown field ").split_first()
+            && let Some(meant) = nearest(name, known.iter().map(String::as_str))
+        {
+            let key = span.as_ref().map_or_else(String::new, |span| key_at(text, span));
+            faults.suspect(format!("{}{meant}", key.strip_suffix(name.as_str()).unwrap_or_default()));
+        }
+        match missing {
+            Some(name) => {
+                if !faults.concern(&name) {
+                    faults.push(fault(error));
+                }
+                let value = Spanned::new(0..0, DeValue::String("missing".into()));
+                document.get_mut().insert(Spanned::new(0..0, name.into()), value);
+            }
+            None => {
+                faults.push(fault(error));
+                if !span.is_some_and(|span| remove(document.get_mut(), &span)) {
+                    return None;
+                }
+            }
+        }
+    }
+    None
+}
 
 /// Reads a spec from TOML.
-pub fn parse(text: &str) -> Result<Spec, (SpecError, Option<usize>)> {
-    toml::from_str::<Spec>(text).map_err(|error| {
-        let line = error.span().map(|span| line_of(text, span.start));
-        (explain(text, error.message(), error.span()), line)
-    })
+///
+/// # Errors
+///
+/// What keeps it from being read.
+pub fn parse(text: &str) -> Result<Spec, SpecError> {
+    let mut faults = Faults::default();
+    let spec = read(text, &mut faults).unwrap_or_default();
+    faults.finish(text).map(|()| spec)
+}
+
+/// Removes the entry of `table`, or of one below it, that holds `span`; the innermost of them. Whether there was one.
+fn remove(table: &mut DeTable<'_>, span: &Range<usize>) -> bool {
+    let inside = |outer: Range<usize>| outer.start <= span.start && span.end <= outer.end;
+    let Some(name) = table.iter().find(|(key, value)| covers(key, value, &inside)).map(|(key, _)| key.clone()) else {
+        return false;
+    };
+    let below = match table.get_mut(&name).map(Spanned::get_mut) {
+        Some(DeValue::Table(inner)) => remove(inner, span),
+        Some(DeValue::Array(items)) => items.iter_mut().any(|item| match item.get_mut() {
+            DeValue::Table(inner) => remove(inner, span),
+            _ => false,
+        }),
+        _ => false,
+    };
+    below || table.remove(&name).is_some()
+}
+
+/// Gives faults without a line that of their key (as in `axes.v_i[2]`) in `text`, or of the closest part of it that exists.
+pub fn find_lines(text: &str, faults: &mut [SpecError]) {
+    let Ok(document) = DeTable::parse(text) else { return };
+    for fault in faults.iter_mut().filter(|fault| fault.line.is_none()) {
+        fault.line = find(document.get_ref(), &fault.key).map(|(entry, ..)| line_of(text, entry.start));
+    }
 }
 
 /// The line of `key` (as in `axes.v_i[2]`), or of the closest part of it that exists.
 pub fn line(text: &str, key: &str) -> Option<usize> {
     let document = DeTable::parse(text).ok()?;
+    let (entry, ..) = find(document.get_ref(), key)?;
+    Some(line_of(text, entry.start))
+}
+
+/// The value of `key` as it is written; `None` if it is not there, or a table of its own.
+pub fn value(text: &str, key: &str) -> Option<String> {
+    let document = DeTable::parse(text).ok()?;
+    let (_, value, whole) = find(document.get_ref(), key)?;
+    let written = text.get(value.span())?;
+    // The span of a `[table]` is that of its header.
+    let is_value = !matches!(value.get_ref(), DeValue::Table(_)) || written.starts_with('{');
+    (whole && is_value).then(|| written.split_whitespace().collect::<Vec<_>>().join(" "))
+}
+
+/// The place of `key`, or of the closest part of it that exists, its value, and whether it is all of the key.
+fn find<'a, 'i>(document: &'a DeTable<'i>, key: &str) -> Option<(Range<usize>, &'a Spanned<DeValue<'i>>, bool)> {
     let mut found = None;
-    let mut here = Here::Table(document.get_ref());
+    let mut here = Here::Table(document);
     for step in steps(key) {
-        let (span, value) = match (here, step) {
-            (Here::Table(table), Step::Key(name)) => match table.iter().find(|(key, _)| key.get_ref() == name) {
-                Some((key, value)) => (key.span(), value),
-                None => break,
-            },
-            (Here::Value(DeValue::Array(items)), Step::Index(index)) => match items.get(index) {
-                Some(value) => (value.span(), value),
-                None => break,
-            },
-            _ => break,
+        let next = match (here, step) {
+            (Here::Table(table), Step::Key(name)) => {
+                table.iter().find(|(key, _)| key.get_ref() == name).map(|(key, value)| (key.span(), value))
+            }
+            (Here::Value(DeValue::Array(items)), Step::Index(index)) => {
+                items.get(index).map(|value| (value.span(), value))
+            }
+            _ => None,
         };
-        found = Some(span.start);
+        let Some((span, value)) = next else { return found.map(|(span, value)| (span, value, false)) };
+        found = Some((span, value));
         here = below(value);
     }
-    found.map(|offset| line_of(text, offset))
+    found.map(|(span, value)| (span, value, true))
 }
 
 enum Here<'a, 'i> {
@@ -122,12 +207,17 @@ fn holds(value: &Spanned<DeValue<'_>>, inside: &impl Fn(Range<usize>) -> bool) -
 /// The field that the parser makes of a date.
 const DATE: &str = "$__toml_private_datetime";
 
+/// The words in backquotes of a message that begins with `opening`; none of another one.
+fn quoted(message: &str, opening: &str) -> Vec<String> {
+    let rest = message.strip_prefix(opening).unwrap_or_default();
+    rest.split('`').skip(1).step_by(2).map(str::to_owned).collect()
+}
+
 /// Turns a complaint of the parser, whose wording is serde's, into what was found, expected and to be done.
 fn explain(text: &str, message: &str, span: Option<Range<usize>>) -> SpecError {
     let key = span.as_ref().map_or_else(String::new, |span| key_at(text, span));
-    let quoted = |text: &str| -> Vec<String> { text.split('`').skip(1).step_by(2).map(str::to_owned).collect() };
-    if let Some(rest) = message.strip_prefix("unknown field ") {
-        let names = quoted(rest);
+    let names = quoted(message, "unknown field ");
+    if !names.is_empty() {
         if names.first().is_some_and(|name| name == DATE) {
             let found = "found a date".to_owned();
             return SpecError::new(key, found, "a number, a word, a list or a table", "change the value");
@@ -137,8 +227,7 @@ fn explain(text: &str, message: &str, span: Option<Range<usize>>) -> SpecError {
             return unknown(key, "key", name, &known);
         }
     }
-    if let Some(rest) = message.strip_prefix("missing field ") {
-        let name = quoted(rest).concat();
+    if let Some(name) = quoted(message, "missing field ").pop() {
         let (expected, help) = (format!("a key `{name}`"), format!("add `{name} = ...`"));
         return SpecError::new("", format!("`{name}` is missing"), expected, help);
     }

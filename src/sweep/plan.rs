@@ -1,7 +1,7 @@
 //! The plan: what there is to do, counted before anything is done.
 
 use super::check::{Request, Sweep};
-use crate::dataset::{Manifest, ManifestTable};
+use crate::dataset::{Build, Manifest, ManifestTable};
 use crate::table::{Job, OPTIMUM_AXES, Optima, Repeats, Signal};
 
 /// What a sweep consists of.
@@ -22,6 +22,7 @@ impl Plan {
             let rows_per_part = request.table.rows_per_part();
             ManifestTable {
                 name: request.table.name().to_owned(),
+                hash: sweep.hash(request),
                 rows: request.rows,
                 parts: request.rows.div_ceil(rows_per_part),
                 rows_per_part,
@@ -35,9 +36,10 @@ impl Plan {
     pub fn manifest(&self, sweep: &Sweep) -> Manifest {
         Manifest {
             name: sweep.name.clone(),
-            identity: sweep.identity(),
+            build: Build::this(),
             tables: self.tables.clone(),
             spec: sweep.text.clone(),
+            rebuilt: None,
         }
     }
 }

@@ -1,27 +1,33 @@
-//! `points`: a file of points whose columns are axes that vary together.
+//! `points`: a file of points whose columns are axes that vary together, and labels, which name the points.
 
+use std::borrow::Cow;
 use std::fmt::{self, Display, Formatter};
 use std::fs;
 use std::path::Path;
+use std::sync::Arc;
 
 use arrow_array::cast::AsArray;
 use arrow_array::types::{
     Float32Type, Float64Type, Int8Type, Int16Type, Int32Type, Int64Type, UInt8Type, UInt16Type, UInt32Type, UInt64Type,
 };
-use arrow_array::{Array, ArrayRef, ArrowPrimitiveType, PrimitiveArray, StringArray};
-use arrow_schema::DataType;
+use arrow_array::{Array, ArrayRef, ArrowPrimitiveType, PrimitiveArray};
+use arrow_schema::{DataType, Fields, Schema};
+use indexmap::IndexSet;
 use parquet::arrow::arrow_reader::{ArrowReaderMetadata, ArrowReaderOptions, ParquetRecordBatchReaderBuilder};
+use parquet::errors::ParquetError;
 
 use super::error::{MOST_OF_NAME, SpecError, unknown};
 use crate::dataset::{check_footer, check_pages, guarded};
-use crate::grid::{Axis, Factor, Quantity, Scale, Values};
+use crate::grid::{Axis, Factor, Label, Quantity, Scale, Values};
 use crate::model::Units;
 use crate::names::shown;
+use crate::protocol::Status;
+use crate::table::{self, STATUS};
 
 /// Reads the points of a CSV or Parquet file; values are in `units`, those of coefficients not relative to `t_f`.
 pub fn read(path: &Path, units: &Units) -> Result<Factor, SpecError> {
     let extension = path.extension().map(|extension| extension.to_ascii_lowercase());
-    let axes = match extension.as_ref().and_then(|extension| extension.to_str()) {
+    let columns = match extension.as_ref().and_then(|extension| extension.to_str()) {
         Some("csv") => csv(path, units)?,
         Some("parquet") => sound(path, units)?,
         _ => {
@@ -29,12 +35,23 @@ pub fn read(path: &Path, units: &Units) -> Result<Factor, SpecError> {
             return Err(fault(format!("{}: neither CSV nor Parquet", path.display()), expected, help));
         }
     };
-    if axes.iter().all(|axis| axis.1.is_empty()) {
+    let mut factor = Factor::default();
+    for Column { name, cells } in columns {
+        match cells {
+            Cells::Axis(quantity, values) => {
+                factor.axes.push(Axis { quantity, scale: Scale::Model, values: Values::List(values) });
+            }
+            Cells::Label(cells) if cells.has_text => {
+                factor.labels.push(Label { name, words: cells.words.into_iter().collect(), places: cells.places });
+            }
+            Cells::Label(_) => return Err(unknown_column(&path.display(), &name)),
+        }
+    }
+    if factor.is_empty() {
         let (expected, help) = ("axis names and at least one point", "add points, or remove `points`");
         return Err(fault(format!("{}: no points", path.display()), expected, help));
     }
-    let axis = |(quantity, values)| Axis { quantity, scale: Scale::Model, values: Values::List(values) };
-    Ok(Factor { axes: axes.into_iter().map(axis).collect() })
+    Ok(factor)
 }
 
 /// Most points of a file.
@@ -65,37 +82,138 @@ fn check_count(path: &Path, count: usize) -> Result<(), SpecError> {
     Err(fault(found, &format!("at most {MOST_POINTS}"), "take fewer points, or several sweeps"))
 }
 
-/// Columns of a file of points.
-type Columns = Vec<(Quantity, Vec<f64>)>;
+/// A column of a file of points.
+struct Column {
+    name: String,
+    cells: Cells,
+}
 
-/// CSV: a header of axis names, then a point a line. Empty lines and lines that begin with # are passed over.
-fn csv(path: &Path, units: &Units) -> Result<Columns, SpecError> {
+/// The cells of a column.
+enum Cells {
+    /// Values of an axis.
+    Axis(Quantity, Vec<f64>),
+    /// What names the points, if it has text.
+    Label(Texts),
+}
+
+/// Cells of text: each text once, and the place of that of each point; `None` where a point has none.
+#[derive(Default)]
+struct Texts {
+    words: IndexSet<String>,
+    places: Vec<Option<u32>>,
+    /// Whether one of them is no number.
+    has_text: bool,
+}
+
+impl Texts {
+    /// Adds the cell of a point, which has none if it is empty.
+    fn push(&mut self, place: impl Fn() -> String, cell: &str) -> Result<(), SpecError> {
+        if cell.is_empty() {
+            self.places.push(None);
+            return Ok(());
+        }
+        let number = match self.words.get_index_of(cell) {
+            Some(number) => number,
+            None => {
+                let length = cell.chars().count();
+                if length > LONGEST_LABEL {
+                    let (expected, help) = (format!("at most {LONGEST_LABEL}"), "shorten the label");
+                    return Err(fault(format!("{}: a label of {length} characters", place()), &expected, help));
+                }
+                if cell.contains(char::is_control) {
+                    let found = format!("{}: a label with a line break or another control character", place());
+                    return Err(fault(found, "one line of text", "correct the label"));
+                }
+                self.has_text |= cell.parse::<f64>().is_err();
+                self.words.insert_full(cell.to_owned()).0
+            }
+        };
+        self.places.push(Some(number as u32));
+        Ok(())
+    }
+}
+
+/// Longest label, in characters: it names a line of a picture.
+const LONGEST_LABEL: usize = 200;
+
+/// CSV: a header of names, then a point a line. Empty lines and lines that begin with # are passed over.
+fn csv(path: &Path, units: &Units) -> Result<Vec<Column>, SpecError> {
     check_size(path)?;
     let bytes = fs::read(path).map_err(|error| unreadable(path, &error))?;
-    let Ok(text) = String::from_utf8(bytes) else {
-        return Err(fault(format!("{}: not in UTF-8", path.display()), "CSV in UTF-8", "save it as CSV in UTF-8"));
-    };
-    // Spreadsheets put a byte order mark in front, and quotes around cells.
+    let text = String::from_utf8(bytes).map_err(|error| {
+        let before = &error.as_bytes()[..error.utf8_error().valid_up_to()];
+        let place = Line { file: path, number: 1 + before.iter().filter(|&&byte| byte == b'\n').count() };
+        fault(format!("{place}: not in UTF-8"), "CSV in UTF-8", "save it as CSV in UTF-8")
+    })?;
+    // Spreadsheets put a byte order mark in front.
     let mut lines = text
         .trim_start_matches('\u{feff}')
         .lines()
         .enumerate()
         .map(|(index, line)| (Line { file: path, number: index + 1 }, line.trim()))
         .filter(|(_, line)| !line.is_empty() && !line.starts_with('#'));
-    let mut axes = match lines.next() {
-        // Some programs quote the names of columns.
-        Some((place, line)) => header(&place, line.split(',').map(|cell| cell.trim().trim_matches('"')))?,
+    let mut columns = match lines.next() {
+        Some((place, line)) => {
+            let names: Result<Vec<Cow<'_, str>>, SpecError> =
+                cells_of(line).map(|cell| cell.map_err(|cell| unclosed(&place, cell))).collect();
+            header(&place, names?.iter().map(AsRef::as_ref))?
+        }
         None => Vec::new(),
     };
     for (count, (place, line)) in lines.enumerate() {
         check_count(path, count + 1)?;
-        point(&place, line, units, &mut axes)?;
+        point(&place, line, units, &mut columns)?;
     }
-    Ok(axes)
+    Ok(columns)
+}
+
+/// The cells of a line of CSV, which spreadsheets put between quotes where they hold commas or quotes; as it stands, and the last one, if its
+/// quotes do not end where it ends.
+struct Split<'a> {
+    rest: Option<&'a str>,
+}
+
+fn cells_of(line: &str) -> Split<'_> {
+    Split { rest: Some(line) }
+}
+
+impl<'a> Iterator for Split<'a> {
+    type Item = Result<Cow<'a, str>, &'a str>;
+
+    fn next(&mut self) -> Option<Self::Item> {
+        let line = self.rest.take()?.trim_start();
+        let Some(quoted) = line.strip_prefix('"') else {
+            let (cell, rest) = line.split_once(',').map_or((line, None), |(cell, rest)| (cell, Some(rest)));
+            self.rest = rest;
+            return Some(Ok(cell.trim_end().into()));
+        };
+        let unclosed = Some(Err(line.split(',').next().unwrap_or(line).trim_end()));
+        // Two quotes within quotes are one.
+        let mut from = 0;
+        let end = loop {
+            let Some(end) = quoted[from..].find('"').map(|place| from + place) else { return unclosed };
+            if !quoted[end + 1..].starts_with('"') {
+                break end;
+            }
+            from = end + 2;
+        };
+        let after = quoted[end + 1..].trim_start();
+        match after.strip_prefix(',') {
+            None if !after.is_empty() => return unclosed,
+            rest => self.rest = rest,
+        }
+        let cell = &quoted[..end];
+        Some(Ok(if from == 0 { cell.trim().into() } else { cell.replace("\"\"", "\"").trim().to_owned().into() }))
+    }
+}
+
+fn unclosed(place: &Line<'_>, cell: &str) -> SpecError {
+    let found = format!("{place}: `{}`, a quote that is not closed", shown(cell, MOST_OF_NAME));
+    fault(found, "quotes around a whole cell", "close the quote, or remove it")
 }
 
 /// Parquet, where damage that the reader did not think of is a fault like any other.
-fn sound(path: &Path, units: &Units) -> Result<Columns, SpecError> {
+fn sound(path: &Path, units: &Units) -> Result<Vec<Column>, SpecError> {
     guarded(|| parquet(path, units)).unwrap_or_else(|| Err(unsound(path, &"it is damaged")))
 }
 
@@ -104,10 +222,10 @@ fn unsound(path: &Path, error: &dyn Display) -> SpecError {
     fault(found, "a Parquet file, uncompressed or with Snappy or Zstandard", "write it so, or as CSV")
 }
 
-/// Parquet: columns of numbers, or of text for axes of words, whose names are axes.
+/// Parquet: columns of numbers, or of text for axes of words, whose names are axes; other columns of text are labels.
 ///
 /// What Arrow or pandas add to a file about its types is not asked for: a column is what Parquet says that it is.
-fn parquet(path: &Path, units: &Units) -> Result<Columns, SpecError> {
+fn parquet(path: &Path, units: &Units) -> Result<Vec<Column>, SpecError> {
     let name = path.display();
     check_size(path)?;
     let unsound = |error: &dyn Display| unsound(path, error);
@@ -116,22 +234,32 @@ fn parquet(path: &Path, units: &Units) -> Result<Columns, SpecError> {
     // What the file says of itself comes first: a few bytes can stand for any number of rows.
     let metadata = check_footer(&file).and_then(|()| {
         let metadata = ArrowReaderMetadata::load(&file, options)?;
-        check_pages(&file, metadata.metadata()).map(|()| metadata)
+        check_pages(&file, metadata.metadata())?;
+        coded(metadata)
     });
     let metadata = metadata.map_err(|error| unsound(&error))?;
     let reader = ParquetRecordBatchReaderBuilder::new_with_metadata(file, metadata);
     let rows = reader.metadata().file_metadata().num_rows();
     check_count(path, usize::try_from(rows).unwrap_or(0))?;
-    let mut axes = header(&name, reader.schema().fields().iter().map(|field| field.name().as_str()))?;
-    for ((quantity, _), field) in axes.iter().zip(reader.schema().fields()) {
-        let (kind, is_word) = (field.data_type(), !quantity.words().is_empty());
-        if is_word != (*kind == DataType::Utf8) || !(is_word || kind.is_numeric()) {
-            let held = if *kind == DataType::Utf8 { "words".to_owned() } else { kind.to_string() };
-            let found = format!("{name}: column `{}` holds {held}", quantity.name());
-            return Err(match is_word {
-                true => fault(found, "words", "write the column as text"),
-                false => fault(found, "numbers", "write the column as numbers"),
-            });
+    let mut columns = header(&name, reader.schema().fields().iter().map(|field| field.name().as_str()))?;
+    for (column, field) in columns.iter().zip(reader.schema().fields()) {
+        let (kind, is_text) = (field.data_type(), *field.data_type() == text());
+        let held = || {
+            format!(
+                "{name}: column `{}` holds {}",
+                column.name,
+                if is_text { "words".to_owned() } else { kind.to_string() }
+            )
+        };
+        match &column.cells {
+            Cells::Axis(quantity, _) if !quantity.words().is_empty() && !is_text => {
+                return Err(fault(held(), "words", "write the column as text"));
+            }
+            Cells::Axis(..) if !kind.is_numeric() => {
+                return Err(fault(held(), "numbers", "write the column as numbers"));
+            }
+            Cells::Label(_) if !is_text => return Err(unknown_column(&name, &column.name)),
+            _ => {}
         }
     }
     let reader = reader.with_batch_size(BATCH).build().map_err(|error| unsound(&error))?;
@@ -139,30 +267,63 @@ fn parquet(path: &Path, units: &Units) -> Result<Columns, SpecError> {
     for batch in reader {
         let batch = batch.map_err(|error| unsound(&error))?;
         check_count(path, first + batch.num_rows())?;
-        for ((quantity, values), column) in axes.iter_mut().zip(batch.columns()) {
-            let place = |row: usize| format!("{name}: row {} of column `{}`", first + row, quantity.name());
-            if let Some(row) = (0..column.len()).find(|&row| column.is_null(row)) {
-                let expected = if quantity.words().is_empty() { "a number" } else { "a word" };
-                return Err(fault(format!("{}: no value", place(row)), expected, "fill in the value"));
-            }
-            let words = quantity.words();
-            if let Some(text) = column.as_any().downcast_ref::<StringArray>() {
-                for (row, cell) in text.iter().enumerate() {
-                    values.push(word(|| place(row), &words, cell.unwrap_or_default())?);
+        for (Column { name: column, cells }, array) in columns.iter_mut().zip(batch.columns()) {
+            let place = |row: usize| format!("{name}: row {} of column `{column}`", first + row);
+            let null = (0..array.len()).find(|&row| array.is_null(row));
+            match cells {
+                Cells::Label(texts) => {
+                    for (row, cell) in texts_of(array).enumerate() {
+                        texts.push(|| place(row), cell.unwrap_or_default().trim())?;
+                    }
                 }
-                continue;
-            }
-            let Some(numbers) = numbers(column) else {
-                let found = format!("{name}: column `{}` holds {}", quantity.name(), column.data_type());
-                return Err(fault(found, "numbers", "write the column as floating-point numbers"));
-            };
-            for (row, value) in numbers.into_iter().enumerate() {
-                values.push(legal(|| place(row), units, *quantity, value)?);
+                Cells::Axis(quantity, values) => {
+                    let words = quantity.words();
+                    if let Some(row) = null {
+                        let expected = if words.is_empty() { "a number" } else { "a word" };
+                        return Err(fault(format!("{}: no value", place(row)), expected, "fill in the value"));
+                    }
+                    if !words.is_empty() {
+                        for (row, cell) in texts_of(array).enumerate() {
+                            values.push(word(|| place(row), &words, cell.unwrap_or_default())?);
+                        }
+                        continue;
+                    }
+                    let Some(numbers) = numbers(array) else {
+                        let found = format!("{name}: column `{column}` holds {}", array.data_type());
+                        return Err(fault(found, "numbers", "write the column as floating-point numbers"));
+                    };
+                    for (row, value) in numbers.into_iter().enumerate() {
+                        values.push(legal(|| place(row), units, *quantity, value)?);
+                    }
+                }
             }
         }
         first += batch.num_rows();
     }
-    Ok(axes)
+    Ok(columns)
+}
+
+/// The type of text as it is read: codes, so that a word that is there a million times takes memory once.
+fn text() -> DataType {
+    DataType::Dictionary(Box::new(DataType::Int32), Box::new(DataType::Utf8))
+}
+
+/// The file with text as codes.
+fn coded(metadata: ArrowReaderMetadata) -> Result<ArrowReaderMetadata, ParquetError> {
+    let fields = metadata.schema().fields().iter().map(|field| match field.data_type() {
+        DataType::Utf8 => Arc::new(field.as_ref().clone().with_data_type(text())),
+        _ => field.clone(),
+    });
+    let options = ArrowReaderOptions::new().with_schema(Arc::new(Schema::new(fields.collect::<Fields>())));
+    ArrowReaderMetadata::try_new(metadata.metadata().clone(), options)
+}
+
+/// The cells of a column of text.
+fn texts_of(column: &ArrayRef) -> impl Iterator<Item = Option<&str>> {
+    let column = column.as_dictionary_opt::<Int32Type>();
+    let words = column.and_then(|column| column.values().as_string_opt::<i32>());
+    let cell = move |key: Option<i32>| words.zip(key).map(|(words, key)| words.value(key as usize));
+    column.into_iter().flat_map(|column| column.keys()).map(cell)
 }
 
 /// Rows of a Parquet file that are held as it gives them.
@@ -217,28 +378,67 @@ fn fault(found: impl Into<Box<str>>, expected: &str, help: &str) -> SpecError {
     SpecError::new("points", found, expected, help)
 }
 
-fn header<'a>(place: &impl Display, names: impl Iterator<Item = &'a str>) -> Result<Columns, SpecError> {
-    let mut axes: Columns = Vec::new();
+/// A column that is no axis and names no points either.
+fn unknown_column(place: &impl Display, name: &str) -> SpecError {
+    let error = unknown("points".to_owned(), "axis", name, &Quantity::ALL.map(Quantity::name));
+    let expected = format!("{}; or a label, a column of text", error.expected);
+    let help = match error.help.strip_prefix("did you mean") {
+        Some(_) => error.help,
+        None => "remove the column; for a label, write text, such as `s17` for 17".into(),
+    };
+    SpecError { found: format!("{place}: {}", error.found).into(), expected: expected.into(), help, ..error }
+}
+
+/// Whether `name` is so near to that of an axis that it is hardly meant as a label.
+fn is_misspelt(name: &str) -> bool {
+    let plain = |name: &str| name.chars().filter(|c| c.is_alphanumeric()).collect::<String>().to_lowercase();
+    let name = plain(name);
+    Quantity::ALL.iter().map(|axis| plain(axis.name())).any(|axis| strsim::damerau_levenshtein(&axis, &name) <= 1)
+}
+
+/// Whether `name` already means something where a label stands: in a table, or in a question to one.
+fn is_taken(name: &str) -> bool {
+    let tables = table::ALL.into_iter().chain(table::REDUCED.map(|(_, table)| table));
+    let columns = tables.flat_map(|table| table.columns()).map(|column| column.name);
+    let status = Status::ALL.into_iter().map(Status::name);
+    columns.chain(status).chain([STATUS]).any(|taken| taken.eq_ignore_ascii_case(name))
+}
+
+fn header<'a>(place: &impl Display, names: impl Iterator<Item = &'a str>) -> Result<Vec<Column>, SpecError> {
+    let mut columns: Vec<Column> = Vec::new();
     for (number, name) in names.enumerate() {
         if name.is_empty() {
             let found = format!("{place}: column {} has no name", number + 1);
-            return Err(fault(found, "the name of an axis over every column", "name it, or remove the column"));
+            return Err(fault(
+                found,
+                "the name of an axis or label over every column",
+                "name it, or remove the column",
+            ));
         }
-        let Some(quantity) = Quantity::from_name(name) else {
+        let cells = match Quantity::from_name(name) {
+            Some(quantity) => Cells::Axis(quantity, Vec::new()),
+            None => Cells::Label(Texts::default()),
+        };
+        if matches!(cells, Cells::Label(_)) {
             if let Some(separator) = name.chars().find(|c| matches!(c, ';' | '\t' | '\r')) {
                 let found = format!("{place}: columns or lines that end with {separator:?}");
                 return Err(fault(found, "columns that end with commas, lines with newlines", "save it as such CSV"));
             }
-            let error = unknown("points".to_owned(), "axis", name, &Quantity::ALL.map(Quantity::name));
-            return Err(SpecError { found: format!("{place}: {}", error.found).into(), ..error });
-        };
-        if axes.iter().any(|(other, _)| *other == quantity) {
-            let found = format!("{place}: column `{name}` is there twice");
-            return Err(fault(found, "each axis once", "remove one of the two"));
+            if is_taken(name) {
+                let found = format!("{place}: the label `{name}` has the name of a column or status of a table");
+                return Err(fault(found, "a name that no table has", &format!("name it `{name}_label`")));
+            }
+            if name.len() > MOST_OF_NAME || name.contains(char::is_control) || is_misspelt(name) {
+                return Err(unknown_column(place, name));
+            }
         }
-        axes.push((quantity, Vec::new()));
+        if columns.iter().any(|other| other.name == name) {
+            let found = format!("{place}: column `{name}` is there twice");
+            return Err(fault(found, "each column once", "remove one of the two"));
+        }
+        columns.push(Column { name: name.to_owned(), cells });
     }
-    Ok(axes)
+    Ok(columns)
 }
 
 /// A line of a file, which is put into words only for a message: there are many.
@@ -253,24 +453,33 @@ impl Display for Line<'_> {
     }
 }
 
-fn point(place: &Line<'_>, line: &str, units: &Units, axes: &mut [(Quantity, Vec<f64>)]) -> Result<(), SpecError> {
-    let count = line.split(',').count();
-    if count != axes.len() {
-        let found = format!("{place}: {count} values under {} column names", axes.len());
+fn point(place: &Line<'_>, line: &str, units: &Units, columns: &mut [Column]) -> Result<(), SpecError> {
+    let count = cells_of(line).count();
+    if count != columns.len() {
+        if let Some(Err(cell)) = cells_of(line).last() {
+            return Err(unclosed(place, cell));
+        }
+        let found = format!("{place}: {count} values under {} column names", columns.len());
         return Err(fault(found, "a value for each column", "correct the line"));
     }
-    for ((quantity, values), cell) in axes.iter_mut().zip(line.split(',').map(str::trim)) {
-        let place = || format!("{place}: column `{}`", quantity.name());
-        let words = quantity.words();
-        if !words.is_empty() {
-            values.push(word(place, &words, cell.trim_matches('"'))?);
-            continue;
+    for (Column { name, cells }, cell) in columns.iter_mut().zip(cells_of(line)) {
+        let cell = cell.map_err(|cell| unclosed(place, cell))?;
+        let place = || format!("{place}: column `{name}`");
+        match cells {
+            Cells::Label(texts) => texts.push(place, &cell)?,
+            Cells::Axis(quantity, values) => {
+                let words = quantity.words();
+                if !words.is_empty() {
+                    values.push(word(place, &words, &cell)?);
+                    continue;
+                }
+                let Ok(value) = cell.parse::<f64>() else {
+                    let found = format!("{}: `{}` is not a number", place(), shown(&cell, MOST_OF_NAME));
+                    return Err(fault(found, "a number such as 0.03 or 1e-3", "correct the value"));
+                };
+                values.push(legal(place, units, *quantity, value)?);
+            }
         }
-        let Ok(value) = cell.trim_matches('"').parse::<f64>() else {
-            let found = format!("{}: `{}` is not a number", place(), shown(cell, MOST_OF_NAME));
-            return Err(fault(found, "a number such as 0.03 or 1e-3", "correct the value"));
-        };
-        values.push(legal(place, units, *quantity, value)?);
     }
     Ok(())
 }

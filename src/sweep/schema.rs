@@ -34,7 +34,7 @@ pub fn schema() -> Value {
             json!({
                 "type": "string",
                 "pattern": "\\.([cC][sS][vV]|[pP][aA][rR][qQ][uU][eE][tT])$",
-                "description": "A CSV or Parquet file, relative to the spec: one row a point; its columns are axes that vary together",
+                "description": "A CSV or Parquet file, relative to the spec: one row a point; its columns are axes that vary together, and labels of text",
             }),
         ),
         ("axes", json!({ "type": "object", "description": "The axes, the last varies fastest" })),
@@ -69,7 +69,12 @@ pub fn schema() -> Value {
                         "default": true,
                         "description": "Whether optimal protocols obey v >= 1",
                     },
-                    "units": { "enum": ["dimensionless", "si"], "default": "dimensionless", "description": "Units of the values" },
+                    "units": {
+                        "anyOf": [{ "enum": ["dimensionless", "si"] }, { "pattern": any_case("dimensionless") }, { "pattern": any_case("si") }],
+                        "type": "string",
+                        "default": "dimensionless",
+                        "description": "Units of the values",
+                    },
                     "mu_0": scale("Friction coefficient at v_0, for SI units"),
                     "l": scale("Length over which contacts are renewed in m, for SI units"),
                     "v_0": scale("Velocity from which on the friction law holds in m/s, for SI units"),
@@ -133,13 +138,19 @@ fn units() -> Value {
         })
     };
     json!({
-        "if": { "required": ["model"], "properties": { "model": { "required": ["units"], "properties": { "units": { "const": "si" } } } } },
+        "if": { "required": ["model"], "properties": { "model": { "required": ["units"], "properties": { "units": { "type": "string", "pattern": any_case("si") } } } } },
         "then": both(json!({ "$ref": "#/definitions/axes_si" }), json!({ "required": scales })),
         "else": both(
             json!({ "$ref": "#/definitions/axes" }),
             json!({ "not": { "anyOf": scales.map(|scale| json!({ "required": [scale] })) } }),
         ),
     })
+}
+
+/// A pattern of `word` in letters of any case.
+fn any_case(word: &str) -> String {
+    let letters = word.chars().map(|letter| format!("[{letter}{}]", letter.to_ascii_uppercase()));
+    format!("^{}$", letters.collect::<String>())
 }
 
 /// One of the scales of SI units.

@@ -63,12 +63,11 @@ impl Shard {
             return Ok(plan.tables.iter().map(|table| std::iter::once(0..table.parts).collect()).collect());
         }
         check_parts(plan)?;
+        let deal = Deal::new(piles(sweep, plan), self.count);
         let mut parts = vec![Vec::new(); plan.tables.len()];
-        deal(&piles(sweep, plan), self.count, |table, part, shard| {
-            if shard == self.index {
-                parts[table].push(part..part + 1);
-            }
-        });
+        deal.parts_of(self.index, |table, part| parts[table].push(part..part + 1));
+        // The last part of a table is a pile of its own.
+        parts.iter_mut().for_each(|parts| parts.sort_unstable_by_key(|range| range.start));
         Ok(parts)
     }
 }
@@ -109,8 +108,9 @@ pub fn shares_with(
     mut wanted: impl FnMut(usize, u64) -> bool,
 ) -> Result<Vec<u64>, TooManyParts> {
     check_parts(plan)?;
+    let deal = Deal::new(piles(sweep, plan), count);
     let mut shares = Vec::new();
-    deal(&piles(sweep, plan), count, |table, part, shard| {
+    deal.every(|table, part, shard| {
         if wanted(table, part) {
             shares.push(shard);
         }
@@ -146,19 +146,68 @@ fn piles(sweep: &Sweep, plan: &Plan) -> Vec<Pile> {
     piles
 }
 
-/// Gives each part to the shard that has least so far: no shard then has more than one part above the mean.
+/// Which shard has which part. The parts of a pile are dealt in rounds, one part to each shard; what is left of all piles goes, the most expensive
+/// part first, to the shard that has least so far. No shard then has more than one part above the mean.
 ///
-/// Among shards that have the same, the order changes from part to part: costs that repeat along a table would otherwise meet
-/// in the same shard whenever their period divides the number of shards.
-fn deal(piles: &[Pile], count: u64, mut give: impl FnMut(usize, u64, u64)) {
-    let mut shards: BinaryHeap<Reverse<(u64, u64, u64)>> =
-        (0..count).map(|shard| Reverse((0, mix(shard), shard))).collect();
-    for pile in piles {
-        for part in pile.parts.clone() {
-            let Some(Reverse((load, order, shard))) = shards.pop() else { return };
-            give(pile.table, part, shard);
-            shards.push(Reverse((load.saturating_add(pile.cost), mix(order), shard)));
+/// The shard that a round begins with changes from round to round: costs that repeat along a table would otherwise meet in the same shard
+/// whenever their period divides the number of shards.
+struct Deal {
+    piles: Vec<Pile>,
+    count: u64,
+    /// Table, part and shard of what is left after the rounds.
+    rest: Vec<(usize, u64, u64)>,
+}
+
+impl Deal {
+    fn new(piles: Vec<Pile>, count: u64) -> Deal {
+        let mut shards: BinaryHeap<Reverse<(u64, u64, u64)>> =
+            (0..count).map(|shard| Reverse((0, mix(shard), shard))).collect();
+        let mut rest = Vec::new();
+        for pile in &piles {
+            for part in pile.parts.start + pile.rounds(count) * count..pile.parts.end {
+                let Some(Reverse((load, order, shard))) = shards.pop() else { break };
+                rest.push((pile.table, part, shard));
+                shards.push(Reverse((load.saturating_add(pile.cost), mix(order), shard)));
+            }
         }
+        Deal { piles, count, rest }
+    }
+
+    /// Gives `take` each part of a shard, by table and number.
+    fn parts_of(&self, shard: u64, mut take: impl FnMut(usize, u64)) {
+        for pile in &self.piles {
+            for round in 0..pile.rounds(self.count) {
+                let place = (shard + self.count - pile.first(round, self.count)) % self.count;
+                take(pile.table, pile.parts.start + round * self.count + place);
+            }
+        }
+        self.rest.iter().filter(|rest| rest.2 == shard).for_each(|&(table, part, _)| take(table, part));
+    }
+
+    /// Gives `take` every part, by table and number, and its shard.
+    fn every(&self, mut take: impl FnMut(usize, u64, u64)) {
+        for pile in &self.piles {
+            for round in 0..pile.rounds(self.count) {
+                let first = pile.first(round, self.count);
+                for place in 0..self.count {
+                    let part = pile.parts.start + round * self.count + place;
+                    take(pile.table, part, (first + place) % self.count);
+                }
+            }
+        }
+        self.rest.iter().for_each(|&(table, part, shard)| take(table, part, shard));
+    }
+}
+
+impl Pile {
+    /// Rounds in which each of `count` shards gets one of its parts.
+    fn rounds(&self, count: u64) -> u64 {
+        (self.parts.end - self.parts.start) / count
+    }
+
+    /// The shard that a round begins with.
+    fn first(&self, round: u64, count: u64) -> u64 {
+        mix(round ^ mix(self.table as u64)) % count
     }
 }
 
@@ -190,12 +239,17 @@ mod tests {
         for count in (1..50).chain([64, 100, 699, 700, 775, 776, 1000]) {
             let mut loads = vec![0; count as usize];
             let mut dealt = std::collections::BTreeMap::new();
-            deal(&piles, count, |table, part, shard| {
+            let deal = Deal::new(piles.clone(), count);
+            deal.every(|table, part, shard| {
                 let pile = piles.iter().find(|pile| pile.table == table && pile.parts.contains(&part));
                 loads[shard as usize] += pile.expect("is of a pile").cost;
                 assert_eq!(dealt.insert((table, part), shard), None);
             });
             assert_eq!(dealt.len(), 701 + 13 + 1 + 60);
+            for shard in 0..count {
+                deal.parts_of(shard, |table, part| assert_eq!(dealt.remove(&(table, part)), Some(shard)));
+            }
+            assert!(dealt.is_empty());
             assert_eq!(loads.iter().sum::<u64>(), total);
             let greatest = loads.iter().copied().max().unwrap_or(0);
             assert!(greatest as f64 <= total as f64 / count as f64 + 90.0, "{count}: {greatest}");
@@ -208,7 +262,8 @@ mod tests {
         for count in [2_u64, 4, 8, 16] {
             // In truth every `count`-th part costs 100 times as much.
             let mut loads = vec![0; count as usize];
-            deal(&piles, count, |_, part, shard| loads[shard as usize] += if part % count == 0 { 100 } else { 1 });
+            Deal::new(piles.to_vec(), count)
+                .every(|_, part, shard| loads[shard as usize] += if part % count == 0 { 100 } else { 1 });
             let mean = loads.iter().sum::<u64>() as f64 / count as f64;
             // As even as chance makes it; dealt in turn, one shard would have nearly everything.
             assert!(loads.iter().all(|load| (*load as f64) < 1.6 * mean), "{count}: {loads:?}");

@@ -9,7 +9,7 @@ use serde::de::{MapAccess, SeqAccess, Visitor};
 use serde::{Deserialize, Deserializer};
 
 /// A sweep spec.
-#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Default, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Spec {
     /// Name of the dataset and of its folder.
@@ -17,7 +17,7 @@ pub struct Spec {
     /// What the sweep is for.
     #[serde(default)]
     pub description: String,
-    /// A file of points whose columns are axes that vary together; relative to the spec.
+    /// A file of points whose columns are axes that vary together, and labels; relative to the spec.
     pub points: Option<PathBuf>,
     /// Axes that advance together.
     #[serde(default)]
@@ -46,7 +46,7 @@ pub struct Spec {
 #[derive(Debug, Clone, PartialEq, Default, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct BlockSpec {
-    /// A file of points whose columns are axes that vary together; relative to the spec.
+    /// A file of points whose columns are axes that vary together, and labels; relative to the spec.
     pub points: Option<PathBuf>,
     /// Axes that advance together.
     pub zip: Vec<Vec<String>>,

@@ -2,8 +2,11 @@
 
 use super::error::SpecError;
 use super::spec::ModelSpec;
-use crate::grid::{Quantity, Scale};
+use crate::grid::{Axis, Quantity, Scale, Values};
 use crate::model::{Scales, Units};
+
+/// The keys of `[model]` that determine the units.
+pub const UNIT_KEYS: [&str; 5] = ["units", "mu_0", "l", "v_0", "normal_load"];
 
 /// The units that `model` asks for.
 pub fn units(model: &ModelSpec) -> Result<Units, SpecError> {
@@ -13,7 +16,7 @@ pub fn units(model: &ModelSpec) -> Result<Units, SpecError> {
         ("v_0", model.v_0, "m/s"),
         ("normal_load", model.normal_load, "Pa"),
     ];
-    match model.units.as_str() {
+    match model.units.to_ascii_lowercase().as_str() {
         "dimensionless" => match scales.into_iter().find(|(_, value, _)| value.is_some()) {
             None => Ok(Units::Scaled),
             Some((name, ..)) => Err(SpecError::new(
@@ -43,11 +46,11 @@ pub fn units(model: &ModelSpec) -> Result<Units, SpecError> {
             let [mu_0, l, v_0, normal_load] = values;
             Ok(Units::Si(Scales { mu_0, l, v_0, normal_load }))
         }
-        other => Err(SpecError::new(
+        _ => Err(SpecError::new(
             "model.units",
-            format!("unknown unit system {other:?}"),
+            format!("unknown unit system {:?}", model.units),
             "\"dimensionless\" or \"si\"",
-            "correct it",
+            "write units = \"si\" and give SI values, or remove the line",
         )),
     }
 }
@@ -67,8 +70,50 @@ pub fn legal(units: &Units, quantity: Quantity, scale: Scale, value: f64) -> Res
     })
 }
 
+/// What to do about velocities that look scaled in a spec in SI.
+const SCALED_IN_SI: &str =
+    "if these are in units of v_0, multiply them by v_0, or remove `units` and the scales from [model]";
+
+/// What to do about a value that `quantity` cannot have. Velocities out of range are often a matter of units.
+pub fn help(units: &Units, quantity: Quantity, value: f64) -> &'static str {
+    let is_velocity = matches!(quantity, Quantity::InitialVelocity | Quantity::FinalVelocity);
+    let scaled = units.scaled("v_0", value);
+    match units {
+        _ if !is_velocity || value <= 0.0 || !value.is_finite() => "choose values in the range",
+        Units::Scaled if scaled >= 1.0 => "choose values in the range",
+        Units::Si(_) if scaled > 1.0 => SCALED_IN_SI,
+        Units::Scaled => "velocities are in units of v_0; for m/s, add `units = \"si\"` and the scales to [model]",
+        Units::Si(_) => "velocities are in m/s, as `units = \"si\"` says, and above v_0; or lower v_0",
+    }
+}
+
+/// A velocity in m/s above which SI values are likely to be scaled ones: a hundred times that of seismic waves, 1e4 m/s.
+const DOUBTFUL_VELOCITY: f64 = 1e6;
+
+/// The doubt whether `axis`, whose key begins with `prefix`, is in SI units, if there is one.
+pub fn doubt(prefix: &str, units: &Units, axis: &Axis) -> Option<SpecError> {
+    if *units == Units::Scaled || !matches!(axis.quantity, Quantity::InitialVelocity | Quantity::FinalVelocity) {
+        return None;
+    }
+    let values: Box<dyn Iterator<Item = f64>> = match &axis.values {
+        Values::List(values) => Box::new(values.iter().copied()),
+        Values::Linspace { first, last, .. } | Values::Geomspace { first, last, .. } => {
+            Box::new([*first, *last].into_iter())
+        }
+    };
+    let greatest = values.fold(0.0, f64::max);
+    (greatest > DOUBTFUL_VELOCITY).then(|| {
+        SpecError::new(
+            format!("{prefix}axes.{}", axis.quantity.name()),
+            format!("{greatest:?} m/s is faster than anything slides"),
+            "velocities in m/s, as `units = \"si\"` says",
+            SCALED_IN_SI,
+        )
+    })
+}
+
 /// The units of the dataset that was made from the spec `text`.
 pub fn units_of(text: &str) -> Result<Units, SpecError> {
-    let spec = super::place::parse(text).map_err(|(error, _)| error)?;
+    let spec = super::place::parse(text)?;
     units(&spec.model)
 }

@@ -35,8 +35,8 @@ const COLUMNS: &[Column] = &[
     Column::number(
         "amplification",
         "1",
-        "greatest factor by which a small error grows from start to end, in the norm of (ln v, ln theta, k s/a); null \
-         beyond 3000 steps of its integration and beyond the range of doubles",
+        "greatest factor by which a small error grows from start to end, in the norm of (ln v, ln theta, k s/a); 0 \
+         below 1e-30, where only rounding is left of the error; null beyond 3000 steps of its integration and beyond the range of doubles",
     ),
     Column::number(
         "end_error",
@@ -105,7 +105,7 @@ impl Table for Compliant {
             if self.needs_optimum(job.selection) {
                 let bounded = job.selection.has(GAP_ERROR);
                 least = optima::compare(job, (tuple, point), (member.work, work_error), bounded, &mut work);
-                status = least.defect.unwrap_or(status);
+                status = status.beside(least.optimum);
             }
             cells[..AMPLIFICATION].copy_from_slice(&[
                 member.alpha,

@@ -316,9 +316,7 @@ fn evaluate(job: &Job<'_>, groups: &[Group], coefficients: &Coefficients<'_>, ch
                         *cell = error::of_gap((works[i], errors[i]), (value, prepared.error_optimal));
                     }
                 }
-                if matches!(optimum, Status::Infeasible | Status::Nonphysical | Status::NotConverged) {
-                    *status = optimum;
-                }
+                *status = status.beside(optimum);
             }
         }
     }

@@ -23,9 +23,11 @@ use crate::grid::{Grid, Point, Projection, Quantity, Tuples};
 
 pub use column::{Column, Kind, STATUS, STATUS_DOC};
 pub use optima::{OPTIMUM_AXES, Optima};
+#[cfg(feature = "plot")]
+pub(crate) use reduced::EDGES as HISTOGRAM_EDGES;
 pub use reduced::MOST_SORTED;
 pub use repeats::Repeats;
-pub use sheet::{Selection, Sheet, Signal, Stopped, Work};
+pub use sheet::{Phase, Selection, Sheet, Signal, Stopped, Work};
 
 /// A table: what its rows depend on, what they hold and how they are computed.
 pub trait Table: Sync {

@@ -38,13 +38,13 @@ pub struct Comparison {
     pub gap: f64,
     /// Bound of the error of the gap; NaN where it is not asked for.
     pub gap_error: f64,
-    /// What keeps the least work from being known, where that is neither a bound nor a matter of time.
-    pub defect: Option<Status>,
+    /// The status of the optimum; `Ok` where it is not asked for, and where a bound or the time rules it out.
+    pub optimum: Status,
 }
 
 impl Comparison {
     /// Nothing is known.
-    pub const NONE: Comparison = Comparison { work: f64::NAN, gap: f64::NAN, gap_error: f64::NAN, defect: None };
+    pub const NONE: Comparison = Comparison { work: f64::NAN, gap: f64::NAN, gap_error: f64::NAN, optimum: Status::Ok };
 }
 
 /// Compares a work, and the bound of its error, with the least one of the tuple that `point` belongs to; with the bound
@@ -58,14 +58,14 @@ pub fn compare(
 ) -> Comparison {
     let (optimum, spent) = job.optima.get(tuple, point);
     *work += spent;
-    let defect = Some(optimum.status).filter(|status| matches!(status, Status::Nonphysical | Status::NotConverged));
-    let Some(least) = optimum.value else { return Comparison { defect, ..Comparison::NONE } };
+    let status = if optimum.status == Status::Infeasible { Status::Ok } else { optimum.status };
+    let Some(least) = optimum.value else { return Comparison { optimum: status, ..Comparison::NONE } };
     let gap_error = if bounded {
         error::of_gap((work_s, error), (least.work, work_error(job, point, &least, work)))
     } else {
         f64::NAN
     };
-    Comparison { work: least.work, gap: (work_s - least.work) / least.work, gap_error, defect }
+    Comparison { work: least.work, gap: (work_s - least.work) / least.work, gap_error, optimum: status }
 }
 
 /// An optimal protocol once it is solved.

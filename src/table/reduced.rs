@@ -63,7 +63,7 @@ const QUANTILE_COLUMNS: &[Column] = &[
 ];
 
 /// Where the classes of the histogram begin, but for the first.
-const EDGES: [f64; 10] = [1e-8, 1e-7, 1e-6, 1e-5, 1e-4, 1e-3, 1e-2, 1e-1, 1.0, 10.0];
+pub const EDGES: [f64; 10] = [1e-8, 1e-7, 1e-6, 1e-5, 1e-4, 1e-3, 1e-2, 1e-1, 1.0, 10.0];
 
 const HISTOGRAM_COLUMNS: &[Column] = &[
     COUNT,
@@ -194,10 +194,11 @@ impl Reduced {
         let count = statuses[Status::Ok as usize];
         let mut cells = vec![f64::NAN; self.columns().len()];
         // The worst that concerns the whole landscape; one that has nothing that is ok says why.
-        let status = [Status::NotConverged, Status::Ok, Status::Nonphysical, Status::BelowBound]
-            .into_iter()
-            .find(|status| statuses[*status as usize] > 0)
-            .unwrap_or(Status::Infeasible);
+        let status =
+            [Status::NotConverged, Status::Ok, Status::Nonphysical, Status::NegativeFriction, Status::BelowBound]
+                .into_iter()
+                .find(|status| statuses[*status as usize] > 0)
+                .unwrap_or(Status::Infeasible);
         if status == Status::NotConverged {
             return Ok((status, cells, work));
         }

@@ -1,6 +1,6 @@
 //! The cells of a range of rows, column by column, before they are written.
 
-use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU8, AtomicU64, Ordering};
 
 use super::Column;
 use crate::protocol::Status;
@@ -119,6 +119,19 @@ impl From<crate::protocol::Effort> for Work {
 pub struct Signal {
     stop: AtomicBool,
     rows: AtomicU64,
+    kept: AtomicU64,
+    phase: AtomicU8,
+}
+
+/// What a run is doing.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Phase {
+    /// It checks the parts that are there.
+    Checking,
+    /// It computes rows.
+    Computing,
+    /// It writes the last parts.
+    Writing,
 }
 
 impl Signal {
@@ -130,6 +143,30 @@ impl Signal {
     /// Rows computed so far.
     pub fn rows(&self) -> u64 {
         self.rows.load(Ordering::Relaxed)
+    }
+
+    /// Rows of parts that were there already and are sound.
+    pub fn kept(&self) -> u64 {
+        self.kept.load(Ordering::Relaxed)
+    }
+
+    /// Counts `rows` more rows that are kept.
+    pub fn keep(&self, rows: u64) {
+        self.kept.fetch_add(rows, Ordering::Relaxed);
+    }
+
+    /// What the run is doing.
+    pub fn phase(&self) -> Phase {
+        match self.phase.load(Ordering::Relaxed) {
+            phase if phase == Phase::Checking as u8 => Phase::Checking,
+            phase if phase == Phase::Computing as u8 => Phase::Computing,
+            _ => Phase::Writing,
+        }
+    }
+
+    /// Notes what the run is doing.
+    pub fn enter(&self, phase: Phase) {
+        self.phase.store(phase as u8, Ordering::Relaxed);
     }
 
     /// Counts `rows` more rows.

@@ -91,7 +91,7 @@ impl Table for Swift {
             if self.needs_optimum(job.selection) {
                 let bounded = job.selection.has(GAP_ERROR);
                 least = optima::compare(job, (tuple, point), (swift.work, work_error), bounded, &mut work);
-                status = least.defect.unwrap_or(status);
+                status = status.beside(least.optimum);
             }
             let family = FAMILIES.get(point[Quantity::Family] as usize);
             let rate = if family.is_some_and(|family| family.name() == "bounded_velocity") {

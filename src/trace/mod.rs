@@ -1,15 +1,19 @@
 //! A protocol over time: which one, its moments, and how they are written.
 
 mod protocol;
+#[cfg(feature = "read")]
+mod row;
 mod sample;
 mod write;
 
-use crate::model::{Law, Transition};
+use crate::model::{Law, Transition, Units};
 use crate::numerics::elementary::ln;
 use crate::protocol::{Moment, Motion};
-use crate::table::Column;
+use crate::table::{Column, Kind};
 
-pub use protocol::{Absence, Course, Protocol, names};
+pub use protocol::{Absence, Course, Parameter, Protocol, names};
+#[cfg(feature = "read")]
+pub use row::{Pathless, TABLES, protocol_of};
 pub use sample::{CLOSE_UP, GOOD};
 pub use write::{csv, parquet};
 
@@ -75,6 +79,23 @@ impl Trace {
         Some(Trace { moments, v_min, v_max })
     }
 
+    /// The same trace, given in the units of the model, in `units`.
+    pub fn in_units(mut self, units: &Units) -> Trace {
+        let size = |column: usize| units.size(unit(column));
+        for moment in &mut self.moments {
+            *moment = Moment {
+                t: moment.t * size(0),
+                v: moment.v * size(1),
+                theta: moment.theta * size(2),
+                friction: moment.friction * size(3),
+                v_c: moment.v_c.map(|v_c| v_c * size(4)),
+                beta: moment.beta.map(|beta| beta * size(5)),
+            };
+        }
+        (self.v_min, self.v_max) = (self.v_min * size(1), self.v_max * size(1));
+        self
+    }
+
     /// The columns that the trace has, by their places in [`COLUMNS`].
     pub fn columns(&self) -> Vec<usize> {
         let is_there = |&column: &usize| self.moments.iter().any(|moment| Trace::value(moment, column).is_some());
@@ -91,6 +112,14 @@ impl Trace {
             4 => moment.v_c,
             _ => moment.beta,
         }
+    }
+}
+
+/// The unit of a column, by its place in [`COLUMNS`], in the model.
+pub fn unit(column: usize) -> &'static str {
+    match COLUMNS[column].kind {
+        Kind::Number(unit) => unit,
+        _ => "",
     }
 }
 

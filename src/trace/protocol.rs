@@ -79,8 +79,27 @@ pub struct Course {
     pub status: Status,
     /// Work of friction, `int tau v dt`.
     pub work: f64,
-    /// Its parameters: name, value and meaning.
-    pub parameters: Vec<(&'static str, f64, &'static str)>,
+    /// Its parameters.
+    pub parameters: Vec<Parameter>,
+}
+
+/// A number of a protocol.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Parameter {
+    /// Its name.
+    pub name: &'static str,
+    /// Its value, in the unit of the model.
+    pub value: f64,
+    /// That unit.
+    pub unit: &'static str,
+    /// Its meaning in one line.
+    pub doc: &'static str,
+}
+
+impl Parameter {
+    fn new(name: &'static str, value: f64, unit: &'static str, doc: &'static str) -> Parameter {
+        Parameter { name, value, unit, doc }
+    }
 }
 
 /// Why there is no protocol.
@@ -181,8 +200,8 @@ fn optimum(case: &Case, bounded: bool, rtol: f64) -> Result<Course, Absence> {
         return Err(without_optimum(case, bounded, solved.status));
     };
     let parameters = vec![
-        ("hamiltonian", value.hamiltonian, "dW*/dt_f"),
-        ("hold_time", value.hold_time, "time spent on the bound v = 1"),
+        Parameter::new("hamiltonian", value.hamiltonian, "mu_0 sigma v_0", "dW*/dt_f"),
+        Parameter::new("hold_time", value.hold_time, "l/v_0", "time spent on the bound v = 1"),
     ];
     Ok(Course { motion, status: solved.status, work: value.work, parameters })
 }
@@ -216,7 +235,7 @@ fn least_cubic(case: &Case, bounded: bool, rtol: f64) -> Result<Course, Absence>
         return Err(Absence::Border);
     };
     let mut parameters = scaled(value.a_2, value.a_3);
-    parameters.push(("gap", value.gap, "(W_s - W*)/W*"));
+    parameters.push(Parameter::new("gap", value.gap, "1", "(W_s - W*)/W*"));
     Ok(Course { motion, status: solved.status, work: value.work, parameters })
 }
 
@@ -228,10 +247,10 @@ fn free_cubic(case: &Case, a_2: f64, a_3: f64, rtol: f64) -> Result<Course, Abse
     Ok(Course { motion, status: status[0], work: work[0], parameters: scaled(a_2, a_3) })
 }
 
-fn scaled(a_2: f64, a_3: f64) -> Vec<(&'static str, f64, &'static str)> {
+fn scaled(a_2: f64, a_3: f64) -> Vec<Parameter> {
     vec![
-        ("alpha_2", a_2, "coefficient of t in theta, in 1/t_f"),
-        ("alpha_3", a_3, "coefficient of t^2 in theta, in 1/t_f^2"),
+        Parameter::new("alpha_2", a_2, "1/t_f", "coefficient of t in theta, in 1/t_f"),
+        Parameter::new("alpha_3", a_3, "1/t_f^2", "coefficient of t^2 in theta, in 1/t_f^2"),
     ]
 }
 
@@ -254,9 +273,9 @@ fn smooth(case: &Case, k: f64, m: f64, rtol: f64) -> Result<Course, Absence> {
         });
     };
     let parameters = vec![
-        ("alpha", value.alpha, "coefficient of x^3 (1 - x)^3 in ln(v - 1), x = t/t_f"),
-        ("v_c_min", value.control_min, "least control velocity"),
-        ("v_c_max", value.control_max, "greatest control velocity"),
+        Parameter::new("alpha", value.alpha, "1", "coefficient of x^3 (1 - x)^3 in ln(v - 1), x = t/t_f"),
+        Parameter::new("v_c_min", value.control_min, "v_0", "least control velocity"),
+        Parameter::new("v_c_max", value.control_max, "v_0", "greatest control velocity"),
     ];
     Ok(Course { motion: Box::new(path), status: solved.status, work: value.work, parameters })
 }
@@ -273,9 +292,9 @@ fn pieced(case: &Case, (k, m): (f64, f64), delta_t: f64, bounded: bool, rtol: f6
         });
     };
     let parameters = vec![
-        ("gap", value.gap, "(work - W*)/W*"),
-        ("v_c_min", value.control_min, "least control velocity"),
-        ("v_c_max", value.control_max, "greatest control velocity"),
+        Parameter::new("gap", value.gap, "1", "(work - W*)/W*"),
+        Parameter::new("v_c_min", value.control_min, "v_0", "least control velocity"),
+        Parameter::new("v_c_max", value.control_max, "v_0", "greatest control velocity"),
     ];
     Ok(Course { motion, status: solved.status, work: value.work, parameters })
 }
@@ -286,10 +305,14 @@ fn member(family: &dyn Family, case: &Case, rtol: f64) -> Result<Course, Absence
     // A step takes any time, but where no protocol arrives it is not counted either.
     let late = case.t_f < case.transition.least_time();
     let status = if late { Status::Infeasible } else { swift.status() };
-    let mut parameters: Vec<_> =
-        swift.alpha.into_iter().zip(family.alpha()).map(|(alpha, meaning)| ("alpha", alpha, meaning)).collect();
+    let mut parameters: Vec<_> = swift
+        .alpha
+        .into_iter()
+        .zip(family.alpha())
+        .map(|(alpha, meaning)| Parameter::new("alpha", alpha, "1", meaning))
+        .collect();
     if swift.miss != 0.0 {
-        parameters.push(("miss", swift.miss, "distance from the target, theta(t_f) v_f - 1"));
+        parameters.push(Parameter::new("miss", swift.miss, "1", "distance from the target, theta(t_f) v_f - 1"));
     }
     Ok(Course { motion, status, work: swift.work, parameters })
 }

@@ -11,16 +11,23 @@ use parquet::file::metadata::KeyValue;
 use parquet::file::properties::WriterProperties;
 use parquet::file::writer::SerializedFileWriter;
 
-use super::{COLUMNS, Trace};
+use super::{COLUMNS, Trace, unit};
 use crate::dataset::field;
-use crate::table::Kind;
+use crate::model::Units;
 
-/// A line with the names of the columns, then one a moment; every number in the fewest digits that read back the same,
-/// and nothing where there is none.
-pub fn csv(trace: &Trace) -> String {
+/// Comments with the version, `facts` and the units of the columns, a line `# key = value` each; then a line with the
+/// names of the columns, and one a moment: every number in the fewest digits that read back the same, and nothing where
+/// there is none. The trace is in `units`.
+pub fn csv(trace: &Trace, units: &Units, facts: &[(String, String)], version: &str) -> String {
     let columns = trace.columns();
+    let of_columns: Vec<&str> = columns.iter().map(|&column| units.name(unit(column))).collect();
+    let mut text = format!("# slipsweep = {version}\n");
+    for (key, value) in facts {
+        text.push_str(&format!("# {key} = {value}\n"));
+    }
+    text.push_str(&format!("# units = {}\n", of_columns.join(", ")));
     let names: Vec<&str> = columns.iter().map(|&column| COLUMNS[column].name).collect();
-    let mut text = names.join(",");
+    text.push_str(&names.join(","));
     text.push('\n');
     for moment in &trace.moments {
         let cells: Vec<String> = columns
@@ -34,13 +41,15 @@ pub fn csv(trace: &Trace) -> String {
 }
 
 /// A Parquet file: units and meanings in the metadata of the fields, `facts` and the version in that of the file. The
-/// same bytes on every machine.
-pub fn parquet(trace: &Trace, facts: &[(String, String)], version: &str) -> Result<Vec<u8>> {
+/// same bytes on every machine. The trace is in `units`.
+///
+/// # Errors
+/// If the file cannot be encoded.
+pub fn parquet(trace: &Trace, units: &Units, facts: &[(String, String)], version: &str) -> Result<Vec<u8>> {
     let columns = trace.columns();
     let fields = columns.iter().map(|&place| {
         let column = &COLUMNS[place];
-        let unit = if let Kind::Number(unit) = column.kind { unit } else { "" };
-        field(column.name, DataType::Float64, is_partial(place), unit, column.doc)
+        field(column.name, DataType::Float64, is_partial(place), units.name(unit(place)), column.doc)
     });
     let layout = Arc::new(Schema::new(fields.collect::<Vec<_>>()));
     let schema = ArrowSchemaConverter::new().convert(&layout)?;

@@ -2,6 +2,7 @@
 
 use super::extremal::solve;
 use super::gap::Cubic;
+use super::verdict::NEGATIVE;
 use super::{Context, Verdict, number, transition, word};
 use crate::dataset::Row;
 use crate::table::STATUS;
@@ -13,8 +14,8 @@ pub fn check(row: &Row, context: &Context, rtol: f64) -> Verdict {
     let (Some(problem), Some(t_f)) = (transition(row), number(row, "t_f")) else {
         return Verdict::unchecked("an axis is missing");
     };
-    if word(row, STATUS) != Some("ok") {
-        return Verdict::unchecked("status is not ok");
+    if !matches!(word(row, STATUS), Some("ok" | NEGATIVE)) {
+        return Verdict::unchecked("status is neither ok nor negative_friction");
     }
     let (Some(alpha_2), Some(alpha_3)) = (number(row, "alpha_2"), number(row, "alpha_3")) else {
         return Verdict::unchecked("a coefficient was not written");
@@ -27,6 +28,7 @@ pub fn check(row: &Row, context: &Context, rtol: f64) -> Verdict {
     verdict.compare(row, "work", Some(work), None);
     // The coefficients are written to double precision: v_min has to be as close to the bound as they allow.
     verdict.compare(row, "v_min", Some(cubic.v_min()), None);
+    verdict.friction(row, cubic.friction_min());
     if let Some(optimum) = solve(&problem, t_f, context.bounded) {
         verdict.compare(row, "work_optimal", Some(optimum.work), None);
         // Good to 1e-7 of itself, whatever rtol. The difference of two integrations tells it to 1e-12, or to what they

@@ -66,6 +66,7 @@ pub fn check(row: &Row, context: &Context, rtol: f64) -> Verdict {
     verdict.compare(row, "work", Some(work), None);
     verdict.compare(row, "v_min", Some(here.least(&states, |y| here.velocity(y))), None);
     verdict.compare(row, "v_max", Some(-here.least(&states, |y| -here.velocity(y))), None);
+    verdict.friction(row, here.least(&states, |y| here.friction(y)));
     let slider = Slider { law: problem.law, k, m };
     let exponent = Exponent::new(&problem, alpha);
     let control = |x: f64, ln_theta: f64| {

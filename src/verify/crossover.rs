@@ -1,6 +1,7 @@
 //! `crossover`: the extremals of the defining initial or final conditions, integrated until theta arrives.
 
 use super::extremal::{Extremal, branch, from_end, from_start, hold, least_time};
+use super::verdict::NEGATIVE;
 use super::{Context, Verdict, transition, word};
 use crate::dataset::Row;
 use crate::model::Transition;
@@ -8,8 +9,8 @@ use crate::table::STATUS;
 
 pub fn check(row: &Row, context: &Context) -> Verdict {
     let Some(problem) = transition(row) else { return Verdict::unchecked("an axis is missing") };
-    if word(row, STATUS) != Some("ok") {
-        return Verdict::unchecked("status is not ok");
+    if !matches!(word(row, STATUS), Some("ok" | NEGATIVE)) {
+        return Verdict::unchecked("status is neither ok nor negative_friction");
     }
     let mut verdict = Verdict::default();
     let (a, b) = (problem.law.a, problem.law.b);

@@ -52,7 +52,8 @@ pub fn branch(h: f64, above: bool) -> Option<f64> {
     Some(z)
 }
 
-fn energy(law: Law, c: f64, theta: f64) -> f64 {
+/// `e^z - 1 - z` at a theta.
+pub fn energy(law: Law, c: f64, theta: f64) -> f64 {
     (1.0 + (law.b - law.a) * theta.ln() + c * theta) / law.a
 }
 

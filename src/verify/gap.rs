@@ -30,6 +30,7 @@ pub fn check(row: &Row, context: &Context) -> Verdict {
     }
     let work = cubic.work();
     verdict.compare(row, "v_min", Some(cubic.v_min()), None);
+    verdict.friction(row, cubic.friction_min());
     match work {
         Some(work) => verdict.compare(row, "work", Some(work), None),
         None => verdict.miss("the integrator did not get there"),
@@ -80,12 +81,16 @@ impl Cubic {
         lowest(&|x| self.velocity(x))
     }
 
+    fn friction(&self, x: f64) -> f64 {
+        1.0 + self.law.a * self.velocity(x).ln() + self.law.b * self.theta(x).ln()
+    }
+
+    pub fn friction_min(&self) -> f64 {
+        lowest(&|x| self.friction(x))
+    }
+
     pub fn work(&self) -> Option<f64> {
-        let law = self.law;
-        let slope = |y: &[f64; 2]| {
-            let v = self.velocity(y[1]);
-            [self.t_f * v * (1.0 + law.a * v.ln() + law.b * self.theta(y[1]).ln()), 1.0]
-        };
+        let slope = |y: &[f64; 2]| [self.t_f * self.velocity(y[1]) * self.friction(y[1]), 1.0];
         integrate(slope, [0.0, 0.0], (0.0, 1.0)).map(|y| y[0])
     }
 }

@@ -27,6 +27,8 @@ use crate::dataset::{Folder, Manifest, ManifestTable, Row, frame};
 use crate::grid::{Quantity, Scale};
 use crate::sweep::{self, AxisSpec, Spec};
 use crate::table;
+#[cfg(feature = "cli")]
+pub(crate) use units::scale;
 use verdict::{Context, Difference, Verdict, number, transition, word};
 
 /// Differences above this many rtol are errors.
@@ -129,8 +131,10 @@ pub fn verify(path: &Path, manifest: &Manifest, sample: u64, seed: u64) -> Resul
 fn relative(spec: &Spec, folder: &Folder, table: &ManifestTable) -> Result<[bool; 2], VerifyError> {
     let has_points = spec.points.is_some() || spec.block.iter().any(|block| block.points.is_some());
     // What a file of points holds is told by the parts alone.
-    let headings = match frame::parts(folder, table).0.first() {
-        Some(part) if has_points => frame::headings(part).map_err(|error| VerifyError(error.to_string()))?.0,
+    let headings = match folder.parts_there(table).first() {
+        Some(&part) if has_points => {
+            frame::headings(&folder.part(&table.name, part)).map_err(|error| VerifyError(error.to_string()))?.0
+        }
         _ => Vec::new(),
     };
     Ok([Quantity::Alpha2, Quantity::Alpha3].map(|coefficient| {

@@ -1,8 +1,9 @@
 //! `optimal`: the extremal of the row's duration, found again with the integrator.
 
-use super::extremal::{least_time, solve_with};
+use super::extremal::{Extremal, branch, energy, least_time, solve_with};
 use super::{Context, Verdict, number, transition, word};
 use crate::dataset::Row;
+use crate::model::Transition;
 use crate::table::STATUS;
 
 /// Relative sizes of the variations that try to beat the optimum.
@@ -29,6 +30,7 @@ pub fn check(row: &Row, context: &Context) -> Verdict {
     verdict.compare(row, "hold_time", Some(extremal.hold_time), (extremal.hold_time == 0.0).then_some(t_f));
     verdict.compare(row, "hamiltonian", Some(-extremal.c), None);
     verdict.compare(row, "theta_max", Some(extremal.theta_max), None);
+    verdict.friction(row, friction_min(&problem, &extremal));
     let strategy = match extremal.v_start {
         _ if extremal.hold_time > 0.0 => "hold",
         v if v > problem.v_i => "speed_up",
@@ -40,4 +42,29 @@ pub fn check(row: &Row, context: &Context) -> Verdict {
         verdict.push("beaten", ((work - least) / size).max(0.0));
     }
     verdict
+}
+
+/// Places on either leg at which friction is looked at.
+const PLACES: u32 = 4000;
+
+/// Least friction: on the hold it rises; on the arc `u - 1 - ln u` follows from theta, rising and then falling.
+fn friction_min(problem: &Transition, extremal: &Extremal) -> f64 {
+    let Transition { law, v_i, v_f } = *problem;
+    let held = if extremal.hold_time > 0.0 { 1.0 - law.b * v_i.ln() } else { f64::INFINITY };
+    let start =
+        if extremal.hold_time > 0.0 { 1.0 + (1.0 / v_i - 1.0) * (-extremal.hold_time).exp() } else { 1.0 / v_i };
+    let friction = |z: f64, theta: f64| 1.0 + law.a * z + (law.b - law.a) * theta.ln();
+    let mut least = held.min(friction((extremal.v_start * start).ln(), start));
+    least = least.min(friction((extremal.v_end / v_f).ln(), 1.0 / v_f));
+    let legs = [(extremal.v_start * start < 1.0, start, false), (extremal.v_end > v_f, 1.0 / v_f, true)];
+    for (_, theta, falling) in legs.into_iter().filter(|(is_there, ..)| *is_there) {
+        for place in 0..=PLACES {
+            let share = f64::from(place) / f64::from(PLACES);
+            let theta = theta * (extremal.theta_max / theta).powf(share);
+            if let Some(z) = branch(energy(law, extremal.c, theta), falling) {
+                least = least.min(friction(z, theta));
+            }
+        }
+    }
+    least
 }

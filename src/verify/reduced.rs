@@ -66,11 +66,11 @@ pub fn check(written: &Row, units: &Units, spec: &Spec, context: &Context) -> Ve
     let Some(sweep) = landscape(written, spec) else {
         return Verdict::unchecked("what its shortcuts are is told by a file of points");
     };
-    let Some(request) = sweep.requests.first() else {
+    let (stores, signal) = (sweep.optima(), Signal::default());
+    let (Some(request), Some(optima)) = (sweep.requests.first(), stores.first()) else {
         return Verdict::unchecked("its spec does not ask for it");
     };
-    let (optima, signal) = (sweep.optima(), Signal::default());
-    let job = sweep.job(request, &optima, &signal);
+    let job = sweep.job(request, optima, &signal);
     let mut verdict = Verdict::default();
     let mut sheet = Sheet::new(request.selection.indices().len());
     let mut told = Told::default();
@@ -98,9 +98,15 @@ pub fn check(written: &Row, units: &Units, spec: &Spec, context: &Context) -> Ve
             }
         }
     }
-    let status = [Status::NotConverged, Status::Ok, Status::Nonphysical, Status::BelowBound, Status::Infeasible]
-        .into_iter()
-        .find(|status| told.status[*status as usize] > 0);
+    let order = [
+        Status::NotConverged,
+        Status::Ok,
+        Status::Nonphysical,
+        Status::NegativeFriction,
+        Status::BelowBound,
+        Status::Infeasible,
+    ];
+    let status = order.into_iter().find(|status| told.status[*status as usize] > 0);
     verdict.compare_word(written, STATUS, status.map_or("", Status::name));
     if status != Some(Status::NotConverged) {
         told.compare(written, &sweep, &mut verdict);

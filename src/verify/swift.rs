@@ -4,6 +4,7 @@ use super::course::{Course, Formula, arriving};
 use super::extremal::solve;
 use super::gap::Cubic;
 use super::route::integrate;
+use super::verdict::NEGATIVE;
 use super::{Context, Verdict, number, transition, word};
 use crate::dataset::Row;
 use crate::model::Transition;
@@ -24,8 +25,8 @@ pub fn check(row: &Row, context: &Context) -> Verdict {
     };
     let tau_max = number(row, "tau_max").unwrap_or(f64::INFINITY);
     match word(row, STATUS) {
-        Some("ok" | "below_bound" | "infeasible") => {}
-        _ => return Verdict::unchecked("status is neither ok, below_bound nor infeasible"),
+        Some("ok" | "below_bound" | NEGATIVE | "infeasible") => {}
+        _ => return Verdict::unchecked("status is neither ok, below_bound, negative_friction nor infeasible"),
     }
     let Some(bound) = obstacle(&problem, t_f, family, tau_max, context.bounded) else {
         return Verdict::unchecked("too close to the border to tell whether the family has a member");
@@ -82,6 +83,7 @@ pub fn check(row: &Row, context: &Context) -> Verdict {
     verdict.compare(row, "v_max", Some(-course_here.least(&states, |y| -course_here.velocity(y))), None);
     let friction_max = -course_here.least(&states, |y| -course_here.friction(y));
     verdict.compare(row, "friction_max", Some(friction_max), Some(friction_max.abs().max(1.0)));
+    verdict.friction(row, course_here.least(&states, |y| course_here.friction(y)));
     match solve(&problem, t_f, context.bounded) {
         Some(optimum) => {
             verdict.compare(row, "work_optimal", Some(optimum.work), None);

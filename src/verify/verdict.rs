@@ -94,6 +94,20 @@ impl Verdict {
         }
     }
 
+    /// Compares whether the status reports friction below 0 with the least friction along the path.
+    pub fn friction(&mut self, row: &Row, least: f64) {
+        if least.abs() > ZERO {
+            let negative = least < 0.0;
+            let wrong = word(row, STATUS).is_none_or(|status| (status == NEGATIVE) != negative);
+            let expected = if negative { NEGATIVE.to_owned() } else { format!("not {NEGATIVE}") };
+            self.differences.push(Difference {
+                column: STATUS,
+                size: if wrong { f64::INFINITY } else { 0.0 },
+                expected,
+            });
+        }
+    }
+
     pub fn status(&mut self, row: &Row, expected: bool) {
         let wrong = word(row, STATUS).is_none_or(|status| (status == "infeasible") != expected);
         let size = if wrong { f64::INFINITY } else { 0.0 };
@@ -101,6 +115,12 @@ impl Verdict {
         self.differences.push(Difference { column: STATUS, size, expected });
     }
 }
+
+/// The status of a path with friction below 0.
+pub const NEGATIVE: &str = "negative_friction";
+
+/// Least friction, in mu_0 sigma, that an independent route tells from 0: a hundred times the tolerance of its integrator.
+const ZERO: f64 = 1e-9;
 
 pub fn number(row: &Row, column: &str) -> Option<f64> {
     match row.iter().find(|(name, _)| name == column)?.1 {

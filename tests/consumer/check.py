@@ -15,7 +15,7 @@ import polars as pl
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-STATUS = {"ok", "below_bound", "infeasible", "nonphysical", "not_converged"}
+STATUS = {"ok", "below_bound", "infeasible", "negative_friction", "nonphysical", "not_converged"}
 AXES = ["t_f", "a", "b", "v_i", "v_f", "alpha_2", "alpha_3"]
 GAP = AXES + ["work", "work_optimal", "gap", "v_min", "status"]
 
@@ -116,8 +116,9 @@ def check_metadata(dataset, manifest):
             assert bool(field.metadata[b"unit"]) != is_word, field
         footer = {key.decode(): value.decode() for key, value in file.metadata.metadata.items()}
         assert footer["slipsweep.spec"] == manifest["spec"]
-        assert footer["slipsweep.spec_hash"] == manifest["spec_hash"]
+        assert footer["slipsweep.hash"] == table["hash"]
         assert footer["slipsweep.version"] == manifest["version"]
+        assert footer["slipsweep.revision"] == manifest["revision"]
         assert footer["slipsweep.table"] == table["name"]
         assert (footer["slipsweep.row_start"], footer["slipsweep.row_end"]) == ("0", str(table["rows"]))
     schema = pq.read_schema(dataset / "gap" / "part-000000.parquet")

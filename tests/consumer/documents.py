@@ -1,15 +1,19 @@
-"""Runs what README, docs and examples show: their commands and Python, in order, each document in a folder of its own.
+"""Runs what README, docs and examples show: their commands and Python, in order, each document in a folder of its own; the notebook as a
+fresh clone opens it.
 
 Usage: documents.py FOLDER, in which the program `slipsweep` is.
 """
 
-import json
 import os
 import re
+import shutil
 import subprocess
 import sys
 import tempfile
 from pathlib import Path
+
+import nbformat
+from nbclient import NotebookClient
 
 REPOSITORY = Path(__file__).resolve().parents[2]
 PYTHON = REPOSITORY / "examples/python"
@@ -36,6 +40,29 @@ def document(path, folder):
     return len(blocks)
 
 
+def notebook(clone):
+    """Executes the notebook in the files of a clone, with the program in target/release and not on the path; returns how many cells it has."""
+    listed = subprocess.run(
+        ["git", "ls-files", "-z", "--cached", "--others", "--exclude-standard", "examples"],
+        cwd=REPOSITORY, capture_output=True, text=True, check=True,
+    )
+    for name in listed.stdout.split("\0")[:-1]:
+        (clone / name).parent.mkdir(parents=True, exist_ok=True)
+        shutil.copy(REPOSITORY / name, clone / name)
+    (clone / "target/release").mkdir(parents=True)
+    shutil.copy(Path(sys.argv[1]) / "slipsweep", clone / "target/release")
+    place = clone / PYTHON.relative_to(REPOSITORY) / "first_look.ipynb"
+    cells = nbformat.read(place, as_version=4)
+    folders = [folder for folder in os.environ["PATH"].split(os.pathsep) if not (Path(folder) / "slipsweep").exists()]
+    environment = {key: value for key, value in os.environ.items() if key != "PYTHONPATH"}
+    client = NotebookClient(cells, timeout=600, resources={"metadata": {"path": str(place.parent)}})
+    client.execute(env=environment | {"PATH": os.pathsep.join(folders), "PYTHONWARNINGS": "error::DeprecationWarning:__main__"})
+    code = [cell for cell in cells.cells if cell.cell_type == "code"]
+    pictures = [output for cell in code for output in cell.outputs if "image/png" in output.get("data", {})]
+    assert len(pictures) == 3, len(pictures)
+    return len(code)
+
+
 def main():
     blocks = 0
     for path in [REPOSITORY / "README.md", *sorted((REPOSITORY / "docs").glob("*.md"))]:
@@ -49,15 +76,14 @@ def main():
     with tempfile.TemporaryDirectory() as folder:
         document(REPOSITORY / "examples/README.md", folder)
         scripts = sorted(PYTHON.glob("with_*.py"))
-        answers = {script.stem: run([sys.executable, str(script), "results"], folder) for script in scripts}
+        answers = {script.stem: run([sys.executable, str(script), "answers"], folder) for script in scripts}
         assert len(answers) == 4 and len(set(answers.values())) == 1, answers
         answer = next(iter(answers.values()))
         for question in ["landscape", "crossover", "stick-slip"]:
             assert f"{question}: " in answer, answer
-        notebook = json.loads((PYTHON / "first_look.ipynb").read_text())
-        cells = ["".join(cell["source"]) for cell in notebook["cells"] if cell["cell_type"] == "code"]
-        run([sys.executable, "-W", "error::DeprecationWarning:__main__", "-c", "\n".join(cells)], folder)
-    print(f"documents: {blocks} blocks, {len(answers)} examples that agree, a notebook of {len(cells)} cells")
+    with tempfile.TemporaryDirectory() as folder:
+        cells = notebook(Path(folder))
+    print(f"documents: {blocks} blocks, {len(answers)} examples that agree, a notebook of {cells} cells")
 
 
 main()

@@ -56,6 +56,23 @@ fn summary_tells_what_the_run_told() {
 }
 
 #[test]
+fn summaries_state_units() {
+    let expected = "\
+optimal: 3 rows (3 ok)
+  at a = 0.03 mu_0, b = 0.05 mu_0, v_i = 3 v_0, v_f = 100 v_0
+    t_f    work          v_start     v_end       hold_time  hamiltonian     theta_max    strategy
+    l/v_0  mu_0 sigma l  v_0         v_0         l/v_0      mu_0 sigma v_0  l/v_0
+    0.02   3.80811142    19.9230141  3392.16787  0          2.59678653      0.333333333  speed_up
+";
+    let summary = printed(small().path(), &["summary", "results/test"]);
+    assert!(summary.starts_with(expected), "{summary}");
+    let summary = printed(landscape().path(), &["summary", "results/test"]);
+    let units = |line: &&str| ["  gap ", "  v_min "].iter().any(|column| line.starts_with(column));
+    let lines: Vec<Vec<&str>> = summary.lines().filter(units).map(|line| line.split_whitespace().collect()).collect();
+    assert_eq!(lines.iter().map(|line| line[..2].to_vec()).collect::<Vec<_>>(), [["gap", "1"], ["v_min", "v_0"]]);
+}
+
+#[test]
 fn what_is_missing_is_told() {
     let folder = landscape();
     let lost = folder.path().join("results/test/gap/part-000001.parquet");
@@ -102,9 +119,9 @@ optimal: 3 rows, each the protocol of least work
 fn queries_answer_in_every_format() {
     let folder = landscape();
     let least = "SELECT t_f, min(gap) AS gap, count(*) AS n FROM gap WHERE status = 'ok' GROUP BY t_f ORDER BY t_f";
-    let table = "t_f    gap             n\n0.02   6.8168686e-7    68406\n0.037  0.000113236866  70885\n\
-                 0.049  0.00062147271   72871\n";
-    assert_eq!(printed(folder.path(), &["query", "results/test", least]), table);
+    let rows = "0.02   6.8168686e-7    68406\n0.037  0.000113236866  70885\n0.049  0.00062147271   72871\n";
+    let [with_units, without] = ["l/v_0  1\n", ""].map(|units| format!("t_f    gap             n\n{units}{rows}"));
+    assert_eq!(printed(folder.path(), &["query", "results/test", least]), with_units);
     let join = "SELECT o.strategy, max(g.gap) > 0.1 AS large FROM gap g JOIN optimal o ON g.t_f = o.t_f \
                 GROUP BY o.strategy ORDER BY o.strategy";
     let csv = printed(folder.path(), &["query", "results/test", join, "--format", "csv"]);
@@ -113,15 +130,15 @@ fn queries_answer_in_every_format() {
     let json = printed(folder.path(), &["query", "results/test", null, "--format", "jsonl"]);
     assert_eq!(json, "{\"t_f\":0.02,\"gap\":null,\"status\":\"infeasible\"}\n");
     let nothing = printed(folder.path(), &["query", "results/test", "SELECT t_f, gap FROM gap LIMIT 0"]);
-    assert_eq!(nothing, "t_f  gap\n");
+    assert_eq!(nothing, "t_f    gap\nl/v_0  1\n");
     // A file says by its name what it holds, and can be asked again.
-    for file in ["least.parquet", "least.csv"] {
+    for (file, table) in [("least.parquet", &with_units), ("least.csv", &without)] {
         let arguments = ["query", "results/test", least, "--out", file];
         assert_eq!(printed(folder.path(), &arguments), format!("written to {file}\n"));
-        assert_eq!(printed(folder.path(), &["query", file, "SELECT * FROM least"]), table);
+        assert_eq!(printed(folder.path(), &["query", file, "SELECT * FROM least"]), *table);
     }
     printed(folder.path(), &["query", "results/test", least, "--out", "least.txt"]);
-    assert_eq!(fs::read_to_string(folder.path().join("least.txt")).expect("is there"), table);
+    assert_eq!(fs::read_to_string(folder.path().join("least.txt")).expect("is there"), with_units);
     // The parts of one table, and one part, know which table they are of.
     for (path, rows) in [("results/test/gap", 482_403), ("results/test/gap/part-000000.parquet", 262_144)] {
         let count = printed(folder.path(), &["query", path, "SELECT count(*) AS n FROM gap"]);
@@ -161,7 +178,7 @@ fn wrong_questions_are_answered_with_what_there_is() {
         ("SELEC gap FROM best", "not SQL: Expected: an SQL statement, found: SELEC at Line: 1, Column: 1", correct),
         ("SELECT frobnicate(gap) FROM best", "unsupported function 'frobnicate'", correct),
         ("", "not one statement", "write one SELECT"),
-        ("DROP TABLE best", "this asks for nothing", "begin with SELECT"),
+        ("DROP TABLE best", "DROP is not a question: `query` reads and never writes", "write one SELECT"),
     ] {
         let expected = (1, format!("error: {found}\n{tables}  help: {help}\n"));
         assert_eq!(refused(folder.path(), &["query", "results/test", question]), expected, "{question}");
@@ -172,6 +189,7 @@ fn wrong_questions_are_answered_with_what_there_is() {
         ("SELECT sum(status) FROM best", "`sum` operation not supported for dtype `cat`"),
         ("SELECT gap FROM best WHERE status = 1", "cannot compare categorical with i32"),
         ("SELECT sqrt(status) FROM best", "cannot cast categorical types to Float64"),
+        ("SELECT avg(status) FROM best", "`mean` operation not supported for dtype `cat`"),
     ] {
         let expected = (1, format!("error: {found}\n{tables}  help: {correct}\n"));
         assert_eq!(refused(folder.path(), &["query", "results/test", question]), expected, "{question}");
@@ -206,7 +224,290 @@ fn wrong_paths_and_names() {
         refused(folder.path(), &["query", "results/test", "SELECT 1", "--out", "x.pdf"]),
         (1, message.to_owned())
     );
-    let message = "error: empty: not a dataset\n  expected: a folder with a manifest.json\n  \
-                   help: name a folder that `slipsweep run` wrote\n";
+    let message = "error: empty: a folder without a manifest.json, not a dataset\n  expected: the folder of a dataset, such as \
+                   results/NAME\n  help: name a folder that `slipsweep run` wrote\n";
     assert_eq!(refused(folder.path(), &["summary", "empty"]), (1, message.to_owned()));
+}
+
+#[test]
+fn columns_without_a_name_are_named_as_in_duckdb() {
+    let folder = small();
+    for (question, names) in [
+        ("SELECT min(gap), max(gap), count(*) FROM best", "min(gap),max(gap),count"),
+        ("SELECT t_f, min(gap), min(gap) FROM best GROUP BY t_f", "t_f,min(gap),min(gap)_1"),
+        ("SELECT gap * 2, -gap, round(gap, 3), count(DISTINCT t_f) FROM best", ""),
+        ("SELECT count(t_f), b.gap FROM best b GROUP BY b.gap", "count(t_f),gap"),
+        ("SELECT * FROM (SELECT min(gap), max(gap) FROM best) AS both_of", "min(gap),max(gap)"),
+    ] {
+        let csv = printed(folder.path(), &["query", "results/test", question, "--format", "csv"]);
+        let first = csv.lines().next().expect("has names");
+        if names.is_empty() {
+            assert!(first.starts_with("(gap * 2),"), "{first}");
+        } else {
+            assert_eq!(first, names, "{question}");
+        }
+    }
+    // What is ordered by is the column of the answer.
+    let question = "SELECT t_f, max(work) FROM best GROUP BY t_f ORDER BY max(work) DESC";
+    let csv = printed(folder.path(), &["query", "results/test", question, "--format", "csv"]);
+    let work: Vec<f64> = csv.lines().skip(1).filter_map(|line| line.split(',').nth(1)?.parse().ok()).collect();
+    assert!(work.len() == 3 && work.is_sorted_by(|one, next| one >= next), "{csv}");
+}
+
+#[test]
+fn words_and_logarithms_are_as_elsewhere() {
+    let folder = landscape();
+    let ask = |question: &str| printed(folder.path(), &["query", "results/test", question, "--format", "csv"]);
+    let infeasible = ask("SELECT count(*) FROM gap WHERE status = 'infeasible'");
+    assert_eq!(ask("SELECT count(*) FROM gap WHERE status LIKE 'inf%'"), infeasible);
+    assert_eq!(ask("SELECT count(*) FROM gap g WHERE g.status LIKE 'inf%'"), infeasible);
+    assert_eq!(ask("SELECT count(*) FROM gap WHERE upper(status) = 'INFEASIBLE'"), infeasible);
+    assert_eq!(ask("SELECT log(v_f) AS x, log10(v_f) AS y FROM gap LIMIT 1"), "x,y\n2.0,2.0\n");
+    let quoted = "SELECT count(*) FROM gap WHERE status = \"ok\"";
+    let (code, message) = refused(folder.path(), &["query", "results/test", quoted]);
+    let help = "  help: text goes in single quotes: 'ok'; double quotes are for names of columns\n";
+    assert!(code == 1 && message.starts_with("error: no column `ok`\n") && message.ends_with(help), "{message}");
+}
+
+#[test]
+fn an_answer_in_pieces_is_the_answer_at_once() {
+    let folder = landscape();
+    let ask = |question: &str| printed(folder.path(), &["query", "results/test", question, "--format", "csv"]);
+    // Over a subquery a question is answered at once.
+    for question in [
+        "SELECT t_f, min(gap) AS x, max(gap) - min(gap) AS y, count(gap) AS n, count(*) AS m FROM {} WHERE alpha_2 > 0 \
+         GROUP BY t_f HAVING count(*) > 10 ORDER BY t_f DESC",
+        "SELECT status, count(*) AS n FROM {} GROUP BY status ORDER BY n DESC, status",
+        "SELECT round(log10(gap)) AS decade, count(*) AS n FROM {} WHERE gap > 0 GROUP BY decade ORDER BY decade",
+        "SELECT t_f, alpha_2, alpha_3, gap FROM {} WHERE status = 'ok' ORDER BY gap DESC, alpha_2, alpha_3 LIMIT 7 OFFSET 3",
+        "SELECT t_f, gap FROM {} ORDER BY gap NULLS FIRST, t_f LIMIT 3",
+        "SELECT alpha_2, alpha_3 FROM {} WHERE gap < 1e-3 LIMIT 5 OFFSET 20000",
+        "SELECT min(gap) AS x, max(v_min) AS y, count(*) AS n FROM {} WHERE t_f > 0.03",
+        "SELECT count(*) AS n, avg(gap) AS x, min(gap) AS y FROM {} WHERE t_f > 1",
+        "SELECT t_f, status FROM {} GROUP BY t_f, status ORDER BY t_f, status",
+    ] {
+        let pieces = ask(&question.replace("{}", "gap"));
+        assert_eq!(pieces, ask(&question.replace("{}", "(SELECT * FROM gap) AS all_of")), "{question}");
+    }
+    let mean = |table: &str| -> Vec<f64> {
+        let question = format!("SELECT t_f, avg(gap) AS x, sum(work) AS y FROM {table} GROUP BY t_f ORDER BY t_f");
+        ask(&question).split([',', '\n']).skip(3).filter_map(|cell| cell.parse().ok()).collect()
+    };
+    let (pieces, whole) = (mean("gap"), mean("(SELECT * FROM gap) AS all_of"));
+    assert_eq!(pieces.len(), 9);
+    for (piece, whole) in pieces.iter().zip(&whole) {
+        assert!((piece - whole).abs() <= 1e-12 * whole.abs(), "{piece} {whole}");
+    }
+}
+
+/// What polars answers otherwise than SQL has it is refused, or spelt so that both agree.
+#[test]
+fn regress_answers_are_those_of_standard_sql() {
+    let folder = small();
+    let ask = |question: &str| printed(folder.path(), &["query", "results/test", question, "--format", "csv"]);
+    for (question, answer) in [
+        ("SELECT sum(gap) AS x, count(1) AS n FROM best WHERE t_f > 1", "x,n\n,0\n"),
+        ("SELECT t_f, sum(gap) AS x FROM (SELECT * FROM best) AS b WHERE t_f > 1 GROUP BY t_f", "t_f,x\n"),
+        ("SELECT count(1), count(*) FROM best", "count(1),count\n3,3\n"),
+        ("SELECT count(*) FROM best WHERE t_f IN (1, (0.02), -3)", "count\n1\n"),
+        (
+            "SELECT b.t_f, o.strategy FROM best b JOIN optimal o ON b.t_f = o.t_f ORDER BY o.work LIMIT 1",
+            "t_f,strategy\n0.02,speed_up\n",
+        ),
+        (
+            "SELECT t_f, median(work) AS x FROM best WHERE t_f < 0.03 GROUP BY t_f ORDER BY t_f LIMIT 1",
+            "t_f,x\n0.02,3.80811",
+        ),
+        ("WITH x AS (SELECT t_f FROM best) SELECT t_f FROM x ORDER BY t_f DESC LIMIT 1", "t_f\n0.049\n"),
+        ("SELECT count(*) FROM best b LEFT JOIN optimal o ON b.t_f = o.t_f AND b.v_f = o.v_f", "count\n3\n"),
+        ("SELECT count(*) FROM optimal WHERE strategy LIKE '%s%e%_%p%' AND strategy NOT LIKE '%x'", "count\n2\n"),
+    ] {
+        let found = ask(question);
+        assert!(found.starts_with(answer), "{question}: {found}");
+    }
+    for (question, found) in [
+        ("SELECT sum(1) FROM best", "`sum(1)`: no column in it"),
+        ("SELECT avg(2.5) FROM best GROUP BY t_f", "`avg(2.5)`: no column in it"),
+        ("WITH best AS (SELECT t_f FROM optimal) SELECT * FROM best", "WITH best: a table has this name"),
+        (
+            "SELECT count(*) FROM best b LEFT JOIN optimal o ON b.t_f = o.t_f AND o.t_f < 0.03",
+            "ON b.t_f = o.t_f AND o.t_f < 0.03: an outer join compares columns with columns by =",
+        ),
+    ] {
+        let (code, message) = refused(folder.path(), &["query", "results/test", question]);
+        assert!(code == 1 && message.starts_with(&format!("error: {found}\n")), "{question}: {message}");
+    }
+    // Lists go to JSON alone, and numbers that JSON has not are words.
+    let lists = "SELECT v_f, array_agg(t_f) AS all_of FROM best GROUP BY v_f";
+    for file in ["x.parquet", "x.csv"] {
+        let (code, message) = refused(folder.path(), &["query", "results/test", lists, "--out", file]);
+        assert!(
+            code == 2 && message.contains("column `all_of` holds lists") && !message.contains("damaged"),
+            "{message}"
+        );
+    }
+    let json = printed(folder.path(), &["query", "results/test", lists, "--format", "jsonl"]);
+    assert_eq!(json, "{\"v_f\":100.0,\"all_of\":[0.02,0.037,0.049]}\n");
+    let infinite = "SELECT 1.0 / (t_f - t_f) AS x FROM best LIMIT 1";
+    assert_eq!(printed(folder.path(), &["query", "results/test", infinite, "--format", "jsonl"]), "{\"x\":\"inf\"}\n");
+}
+
+#[test]
+fn files_of_different_columns_are_no_table() {
+    let folder = small();
+    fs::create_dir(folder.path().join("mixed")).expect("is writable");
+    for (question, file) in [("SELECT t_f, gap AS x FROM best", "a"), ("SELECT t_f, status AS x FROM best", "b")] {
+        printed(folder.path(), &["query", "results/test", question, "--out", &format!("mixed/{file}.parquet")]);
+    }
+    for question in ["SELECT count(*) FROM mixed WHERE x > 5", "SELECT count(x) FROM mixed", "SELECT x FROM mixed"] {
+        let (code, message) = refused(folder.path(), &["query", "mixed", question]);
+        assert!(code == 2 && message.contains("column `x` has the type cat, unlike in the first file"), "{message}");
+    }
+    assert_eq!(printed(folder.path(), &["query", "mixed", "SELECT count(t_f) FROM mixed"]), "count(t_f)\n6\n");
+}
+
+/// A lost manifest leaves a dataset a dataset.
+#[test]
+fn regress_a_dataset_without_a_manifest_is_read_and_kept() {
+    let folder = small();
+    fs::remove_file(folder.path().join("results/test/manifest.json")).expect("was there");
+    let before = crate::common::files(&folder.path().join("results"));
+    let arguments = ["query", "results/test", "SELECT * FROM best", "--out", "results/test/best/part-000000.parquet"];
+    let (code, message) = refused(folder.path(), &arguments);
+    assert!(code == 1 && message.contains("which only `slipsweep run` writes"), "{message}");
+    for arguments in [vec!["plot", "results/test"], vec!["report", "results/test"], vec!["summary", "results/test"]] {
+        let output = slipsweep(folder.path(), &arguments);
+        let said = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert_eq!(output.status.code(), Some(0), "{said}");
+        assert!(said.contains("manifest.json is missing"), "{arguments:?}: {said}");
+    }
+    assert_eq!(crate::common::files(&folder.path().join("results")), before);
+    // An answer does not replace the file that it is read from either.
+    fs::write(folder.path().join("t.csv"), "t_f\n0.02\n").expect("is writable");
+    let (code, message) = refused(folder.path(), &["query", "t.csv", "SELECT * FROM t", "--out", "./t.csv"]);
+    assert!(code == 1 && message.contains("would replace the file that it is read from"), "{message}");
+}
+
+#[test]
+fn nothing_but_the_dataset_is_read_and_nothing_is_written() {
+    let folder = small();
+    let root = folder.path().display();
+    for question in [
+        format!("SELECT * FROM read_parquet('{root}/results/test/best/part-000000.parquet')"),
+        format!("SELECT * FROM read_csv('{root}/spec.toml')"),
+        "SELECT * FROM read_parquet('http://127.0.0.1:9/x.parquet')".to_owned(),
+        format!("SELECT * FROM '{root}/results/test/best/part-000000.parquet'"),
+        "SELECT * FROM best JOIN read_csv('x.csv') AS x ON best.t_f = x.t_f".to_owned(),
+        "DELETE FROM best".to_owned(),
+        "TRUNCATE TABLE best".to_owned(),
+        "CREATE TABLE copy AS SELECT * FROM best".to_owned(),
+        "INSERT INTO best VALUES (1)".to_owned(),
+        "SELECT * INTO copy FROM best".to_owned(),
+        "EXPLAIN SELECT * FROM best".to_owned(),
+        "SHOW TABLES".to_owned(),
+        "SELECT * FROM best; SELECT * FROM best".to_owned(),
+    ] {
+        let (code, message) = refused(folder.path(), &["query", "results/test", &question]);
+        assert!(code == 1 && message.contains("  expected: a SELECT from these tables:\n"), "{question}: {message}");
+    }
+    // No answer replaces a part or a manifest.
+    let before = crate::common::files(&folder.path().join("results"));
+    for out in
+        ["results/test/best/part-000000.parquet", "results/test/best/other.parquet", "results/test/manifest.json"]
+    {
+        let format = ["--format", "parquet"];
+        let arguments = ["query", "results/test", "SELECT * FROM best", "--out", out];
+        let (code, message) = refused(folder.path(), &[&arguments[..], &format[..]].concat());
+        assert!(code == 1 && message.contains("which only `slipsweep run` writes"), "{message}");
+    }
+    assert_eq!(crate::common::files(&folder.path().join("results")), before);
+}
+
+#[test]
+fn what_is_too_much_is_an_error() {
+    let folder = small();
+    // A cell longer than the widths of formats.
+    let long = "SELECT string_agg(status, ',') AS x FROM best a CROSS JOIN best b CROSS JOIN best c CROSS JOIN best d CROSS JOIN best e \
+                CROSS JOIN best f CROSS JOIN best g CROSS JOIN best h CROSS JOIN best i CROSS JOIN best j";
+    let answered =
+        slipsweep(folder.path(), &["query", "results/test", &long.replace("string_agg(status", "string_agg(a.status")]);
+    let text = String::from_utf8_lossy(&answered.stdout).into_owned();
+    assert!(answered.status.code() == Some(0) && text.len() > 65_535, "{answered:?}");
+    // Thousands of terms are answered, or refused with a message.
+    let terms = format!("SELECT gap + {} AS x FROM best", vec!["1"; 30_000].join(" + "));
+    let output = slipsweep(folder.path(), &["query", "results/test", &terms]);
+    let said = String::from_utf8_lossy(&output.stderr).into_owned();
+    match output.status.code() {
+        Some(0) => assert!(said.is_empty()),
+        Some(2) => assert!(said.starts_with("error: the query ") && said.contains("\n  help: "), "{said}"),
+        other => panic!("{other:?}: {said}"),
+    }
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn memory_that_is_not_there_is_an_error() {
+    let folder = landscape();
+    // 10^11 rows in 4 GB.
+    let command = format!(
+        "ulimit -v 4000000; {} query results/test 'SELECT a.gap, b.gap FROM gap a CROSS JOIN gap b ORDER BY a.gap' --out x.csv",
+        env!("CARGO_BIN_EXE_slipsweep")
+    );
+    let output = Command::new("sh").arg("-c").arg(command).current_dir(folder.path()).output().expect("runs");
+    let said = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert!(output.status.code() == Some(2) && said.starts_with("error: ") && said.contains("\n  help: "), "{said}");
+    let left = fs::read_dir(folder.path()).expect("is readable").map(|entry| entry.expect("is readable").file_name());
+    let left: Vec<_> =
+        left.map(|name| name.to_string_lossy().into_owned()).filter(|name| name.contains("x.csv")).collect();
+    assert!(left.is_empty(), "{left:?}");
+}
+
+#[cfg(unix)]
+#[test]
+fn a_query_that_is_stopped_leaves_no_file() {
+    let folder = landscape();
+    for (signal, code) in [("INT", 130), ("TERM", 143)] {
+        let question = "SELECT a.gap, b.gap AS other FROM gap a JOIN gap b ON a.t_f = b.t_f";
+        let mut child = Command::new(env!("CARGO_BIN_EXE_slipsweep"))
+            .current_dir(folder.path())
+            .args(["query", "results/test", question, "--out", "x.csv"])
+            .stderr(Stdio::piped())
+            .spawn()
+            .expect("runs");
+        let is_ours = |name: &str| name.contains("x.csv");
+        let files = || -> Vec<String> {
+            let entries = fs::read_dir(folder.path()).expect("is readable");
+            let names = entries.map(|entry| entry.expect("is readable").file_name().to_string_lossy().into_owned());
+            names.filter(|name| is_ours(name)).collect()
+        };
+        let start = std::time::Instant::now();
+        while files().is_empty() && start.elapsed().as_secs() < 30 {
+            std::thread::sleep(std::time::Duration::from_millis(10));
+        }
+        assert_eq!(files().len(), 1, "has begun");
+        let sent = Command::new("kill").args([&format!("-{signal}"), &child.id().to_string()]).status().expect("runs");
+        assert!(sent.success());
+        assert_eq!(child.wait().expect("ends").code(), Some(code));
+        assert_eq!(files(), Vec::<String>::new(), "{signal}");
+    }
+}
+
+#[test]
+fn answers_have_units_and_files_that_are_half_are_refused() {
+    let folder = small();
+    let answer = printed(
+        folder.path(),
+        &["query", "results/test", "SELECT t_f, max(work), count(*) FROM optimal GROUP BY t_f ORDER BY t_f"],
+    );
+    let lines: Vec<Vec<&str>> = answer.lines().map(|line| line.split_whitespace().collect()).collect();
+    assert_eq!(lines[0], ["t_f", "max(work)", "count"]);
+    assert_eq!(lines[1], ["l/v_0", "mu_0", "sigma", "l"]);
+    assert_eq!(lines.len(), 5);
+    fs::write(folder.path().join("half.csv"), "# made by hand\nname,x\n\"a,1\nb,2\n").expect("is writable");
+    let (code, message) = refused(folder.path(), &["query", "half.csv", "SELECT * FROM half"]);
+    assert!(code == 2 && message.contains("line 3: a quote opens and never closes"), "{message}");
+    fs::write(folder.path().join("dates.csv"), "# made by hand\nday,x\n2024-02-30,1\n2024-03-01,2\n")
+        .expect("is writable");
+    let answer = printed(folder.path(), &["query", "dates.csv", "SELECT sum(x) AS x FROM dates", "--format", "csv"]);
+    assert_eq!(answer, "x\n3\n");
 }

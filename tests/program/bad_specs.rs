@@ -48,6 +48,59 @@ fn a_spec_that_cannot_be_read() {
                    help: check the path\n";
     assert_eq!(String::from_utf8_lossy(&output.stderr), message);
     assert_eq!(output.status.code(), Some(1));
+    fs::write(folder.path().join("granite.toml"), "").expect("is writable");
+    for name in ["granite", "granit.toml"] {
+        let output = slipsweep(&["run", name], folder.path());
+        let message = format!(
+            "error: {name}: cannot read: No such file or directory (os error 2)\n  expected: a readable TOML file\n  \
+             help: did you mean `granite.toml`?\n"
+        );
+        assert_eq!(String::from_utf8_lossy(&output.stderr), message);
+    }
+}
+
+/// Neither a named pipe nor a device is waited for.
+#[test]
+fn a_spec_that_is_no_file() {
+    let folder = tempfile::tempdir().expect("is writable");
+    let pipe = folder.path().join("pipe.toml");
+    assert!(Command::new("mkfifo").arg(&pipe).status().expect("runs").success());
+    let (expected, help) = ("a TOML file", "write the spec to a file, and name that file");
+    for (spec, found) in
+        [("pipe.toml", "a device or a named pipe"), ("/dev/zero", "a device or a named pipe"), (".", "a folder")]
+    {
+        for command in [&["plan"][..], &["shards", "--engine", "slurm", "--shards", "2"]] {
+            let output = slipsweep(&[command, &[spec]].concat(), folder.path());
+            let message = format!("error: {spec}: {found}, not a file\n  expected: {expected}\n  help: {help}\n");
+            assert_eq!(String::from_utf8_lossy(&output.stderr), message, "{command:?}");
+            assert_eq!(output.status.code(), Some(1), "{command:?}");
+        }
+    }
+    fs::rename(&pipe, folder.path().join("pipe.csv")).expect("is writable");
+    let points = "name = \"x\"\npoints = \"pipe.csv\"\n[tables.stability]\n";
+    fs::write(folder.path().join("points.toml"), points).expect("is writable");
+    for arguments in [&["plan", "points.toml"][..], &["plot", "pipe.csv"], &["head", "pipe.csv"]] {
+        let output = slipsweep(arguments, folder.path());
+        let message = String::from_utf8_lossy(&output.stderr);
+        assert!(output.status.code() == Some(1) && message.contains("not a file"), "{arguments:?}: {message}");
+    }
+}
+
+/// Values that are legal, and yet probably in other units, are computed with a warning.
+#[test]
+fn doubtful_velocities() {
+    let folder = tempfile::tempdir().expect("is writable");
+    let spec = "name = \"fast\"\n[model]\nunits = \"Si\"\nmu_0 = 0.6\nl = 1e-6\nv_0 = 1e-4\nnormal_load = 1e6\n[axes]\na = 0.018\nb = 0.03\n\
+                v_i = 3.0\nv_f = { geomspace = [10.0, 1e7, 3] }\n[tables.crossover]\n";
+    fs::write(folder.path().join("fast.toml"), spec).expect("is writable");
+    let output = slipsweep(&["plan", "fast.toml"], folder.path());
+    let warning = "warning: fast.toml:12: axes.v_f: 10000000.0 m/s is faster than anything slides\n  expected: velocities in m/s, as \
+                   `units = \"si\"` says\n  help: if these are in units of v_0, multiply them by v_0, or remove `units` and the scales \
+                   from [model]\n";
+    assert_eq!(String::from_utf8_lossy(&output.stderr), warning);
+    assert_eq!(output.status.code(), Some(0));
+    fs::write(folder.path().join("fast.toml"), spec.replace("1e7", "1e6")).expect("is writable");
+    assert!(slipsweep(&["plan", "fast.toml"], folder.path()).stderr.is_empty());
 }
 
 const GOOD: &str = "name = \"good\"\n[axes]\na = 0.03\nb = 0.05\nv_i = 3.0\nv_f = [100.0, 200.0]\n[tables.crossover]\n";
@@ -86,5 +139,23 @@ fn wrong_arguments() {
     }
     for arguments in [&["--help"][..], &["--version"], &["run", "--help"]] {
         assert_eq!(slipsweep(arguments, folder.path()).status.code(), Some(0), "{arguments:?}");
+    }
+    for (given, meant) in [
+        (&["run", "x.toml", "--jobs", "2"][..], "'--threads'"),
+        (&["run", "x.toml", "-j2"], "'--threads'"),
+        (&["run", "--cores=2", "x.toml"], "'--threads'"),
+        (&["run", "x.toml", "--thread", "2"], "'--threads'"),
+        (&["run", "x.toml", "--output", "here"], "'--out'"),
+        (&["head", "results/x", "--limit", "2"], "'--rows'"),
+        (&["plot", "results/x", "--filter", "a=1"], "'--where'"),
+        (&["trace", "optimal", "--duration", "1"], "'--t-f'"),
+        (&["rnu", "x.toml"], "'run'"),
+        (&["trace", "optimum"], "'optimal'"),
+        (&["tables", "stabilty"], "`stability`"),
+        (&["man", "sumary"], "`summary`"),
+    ] {
+        let output = slipsweep(given, folder.path());
+        let message = String::from_utf8_lossy(&output.stderr);
+        assert!(output.status.code() == Some(1) && message.contains(meant), "{given:?}: {message}");
     }
 }

@@ -30,7 +30,7 @@ fn run_tells_what_a_physicist_asks() {
     let text = String::from_utf8_lossy(&output.stdout);
     for line in [
         "gap: 482,403 rows (",
-        "  least gap among the rows that are ok:\n  at a = 0.03, b = 0.05, v_i = 3, v_f = 100\n",
+        "  least gap among the rows that are ok:\n  at a = 0.03 mu_0, b = 0.05 mu_0, v_i = 3 v_0, v_f = 100 v_0\n",
         "best: 3 rows (3 ok)",
         "optimal: 3 rows (3 ok)",
         "crossover: 1 row (1 ok)",
@@ -67,7 +67,7 @@ fn strict_fails_where_a_row_is_not_converged() {
     sheet.resize(2);
     sheet.status = vec![Status::Ok, Status::NotConverged];
     let footer = Footer::new(&Plan::new(&sweep).manifest(&sweep), "optimal", 0..2);
-    let bytes = encode(&layout, &request.projection, &sheet, &footer).expect("is encoded");
+    let (bytes, _) = encode(&layout, &request.projection, &sheet, &footer).expect("is encoded");
     Folder::new(&folder.path().join("results"), "test").write_part("optimal", 0, &bytes).expect("is writable");
 
     let message = "error: 1 row not_converged\n".to_owned();
@@ -101,6 +101,11 @@ fn tables_lists_every_column() {
             assert!(text.lines().any(|line| line.trim_start().starts_with(column.name) && line.contains(column.doc)));
         }
     }
+    for table in ["gap", "gap_histogram", "stability"] {
+        let output = slipsweep(Path::new(".")).args(["tables", table]).output().expect("runs");
+        let one = String::from_utf8_lossy(&output.stdout);
+        assert!(one.starts_with(&format!("{table}: ")) && text.contains(&*one) && !one.contains("\n\n"), "{one}");
+    }
 }
 
 #[test]
@@ -116,7 +121,7 @@ fn a_reader_that_has_had_enough_is_no_failure() {
 #[test]
 fn an_interrupted_run_leaves_whole_parts_and_goes_on() {
     let folder = tempfile::tempdir().expect("is writable");
-    let axes = LANDSCAPE.replace("[0.02, 0.037, 0.049]", "{ linspace = [0.02, 0.049, 120] }");
+    let axes = LANDSCAPE.replace("[0.02, 0.037, 0.049]", "{ linspace = [0.02, 0.049, 40] }");
     write_spec(folder.path(), &axes, "[tables.gap]\ncolumns = [\"gap\"]\nrtol = 1e-6\n");
     let whole = folder.path().join("whole");
     let output = slipsweep(folder.path()).args(["run", "spec.toml", "--out", "whole"]).output().expect("runs");
@@ -163,4 +168,127 @@ fn interrupt(folder: &Path, out: &str, signal: &str, code: i32, whole: &Path) ->
     assert_eq!(output.status.code(), Some(0));
     assert_eq!(files(&broken), all);
     elapsed
+}
+
+/// What `output.rs` does not try: an answer that is lost is a failure of every command, and of the help.
+#[cfg(target_os = "linux")]
+#[test]
+fn regress_no_command_loses_its_answer() {
+    let folder = tempfile::tempdir().expect("is writable");
+    write_spec(folder.path(), &format!("t_f = [0.02, 0.03]\n{MATERIAL}"), "[tables.optimal]\n");
+    let sh = |arguments: &[&str], target: &str| {
+        let script = format!("exec \"$0\" \"$@\" {target}");
+        let mut shell = Command::new("sh");
+        shell.args(["-c", &script, env!("CARGO_BIN_EXE_slipsweep")]).args(arguments).current_dir(folder.path());
+        let output = shell.output().expect("runs");
+        (output.status.code(), String::from_utf8_lossy(&output.stderr).into_owned())
+    };
+    // What says nothing loses nothing.
+    assert_eq!(sh(&["run", "spec.toml", "--quiet"], ">&-"), (Some(0), String::new()));
+    let commands: [&[&str]; 7] = [
+        &["verify", "results/test"],
+        &["query", "results/test", "SELECT t_f FROM optimal", "--format", "jsonl"],
+        &["schema"],
+        &["completions", "bash"],
+        &["man"],
+        &["run", "--help"],
+        &["--version"],
+    ];
+    for arguments in commands {
+        let closed = "error: cannot write to standard output: it is closed\n".to_owned();
+        assert_eq!(sh(arguments, ">&-"), (Some(2), closed), "{arguments:?}");
+        let full = "error: cannot write to standard output: No space left on device (os error 28)\n".to_owned();
+        assert_eq!(sh(arguments, "> /dev/full"), (Some(2), full), "{arguments:?}");
+        assert_eq!(sh(arguments, "> /dev/null"), (Some(0), String::new()), "{arguments:?}");
+    }
+}
+
+/// A command that only reads ends at once, and says that nothing is changed.
+#[cfg(unix)]
+#[test]
+fn a_command_that_reads_can_be_stopped() {
+    let folder = tempfile::tempdir().expect("is writable");
+    let axes = format!("{MATERIAL}t_f = {{ linspace = [0.01, 0.1, 1000] }}\n")
+        .replace("v_f = 100.0", "v_f = { linspace = [10.0, 100.0, 1000] }");
+    let axes = axes.replace("v_i = 3.0", "v_i = { linspace = [1.5, 9.0, 1000] }");
+    fs::write(
+        folder.path().join("spec.toml"),
+        format!("name = \"test\"\nwhere = \"t_f * v_f * v_i > 3\"\n[axes]\n{axes}[tables.optimal]\n"),
+    )
+    .expect("is writable");
+    for (signal, code) in [("INT", 130), ("TERM", 143)] {
+        let mut command = slipsweep(folder.path());
+        let child =
+            command.args(["plan", "spec.toml"]).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().expect("runs");
+        // Time to begin; what it has to do takes seconds.
+        std::thread::sleep(Duration::from_millis(500));
+        let kill = Command::new("kill").args(["-s", signal, &child.id().to_string()]).status().expect("runs");
+        assert!(kill.success());
+        let output = child.wait_with_output().expect("ends");
+        let told = String::from_utf8_lossy(&output.stderr);
+        assert_eq!(
+            (output.status.code(), told.as_ref()),
+            (Some(code), "stopped while reading the spec; nothing is changed\n")
+        );
+    }
+}
+
+/// Both exit codes of a run that is stopped stand where a user looks for them.
+#[test]
+fn exit_codes_are_documented() {
+    let folder = tempfile::tempdir().expect("is writable");
+    let help = slipsweep(folder.path()).arg("--help").output().expect("runs").stdout;
+    let help = String::from_utf8_lossy(&help).into_owned();
+    let page = fs::read_to_string(concat!(env!("CARGO_MANIFEST_DIR"), "/docs/commands.md")).expect("is there");
+    for code in [0, 1, 2, 3, 75, 130, 143] {
+        assert!(help.contains(&format!("\n  {code:<5}")), "{code} in {help}");
+        assert!(page.contains(&format!("\n| {code} |")), "{code}");
+    }
+}
+
+/// More than any disk has: refused before anything is written, with both numbers and the way out.
+#[test]
+fn a_dataset_that_cannot_fit_is_refused() {
+    let folder = tempfile::tempdir().expect("is writable");
+    let axes = "t_f = { linspace = [0.01, 1.0, 100000] }\na = 0.03\nb = { linspace = [0.02, 0.05, 100000] }\nv_i = 3.0\n\
+                v_f = { geomspace = [10.0, 1000.0, 100000] }\n";
+    write_spec(folder.path(), axes, "[tables.optimal]\n");
+    let output = slipsweep(folder.path()).args(["run", "spec.toml"]).output().expect("runs");
+    let message = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert_eq!(output.status.code(), Some(1), "{message}");
+    let (found, help) = message.split_once("\n  help: ").expect("has help");
+    assert!(found.starts_with("error: results/test: about ") && found.contains("PB to write, but "), "{message}");
+    assert!(found.ends_with(" free on the disk"), "{message}");
+    assert_eq!(help, "write less, with `reduce` or fewer `columns`, or elsewhere, with --out DIR\n");
+    assert!(!folder.path().join("results").exists());
+    let output = slipsweep(folder.path()).args(["plan", "spec.toml"]).output().expect("runs");
+    let text = String::from_utf8_lossy(&output.stdout);
+    assert!(text.contains("1,000,000,000,000,000") && text.contains("\ndoes not fit: results: about "), "{text}");
+}
+
+/// What a block costs is not what a row costs: 20,000 blocks were said to take minutes.
+#[test]
+fn blocks_are_no_rows_to_a_plan() {
+    let folder = tempfile::tempdir().expect("is writable");
+    let mut spec = "name = \"test\"\n[tables.optimal]\n".to_owned();
+    for block in 0..20_000 {
+        let t_f = 0.02 + 1e-6 * f64::from(block);
+        spec.push_str(&format!("[[block]]\n[block.axes]\nt_f = {t_f:?}\na = 0.03\nb = 0.05\nv_i = 3.0\nv_f = 100.0\n"));
+    }
+    fs::write(folder.path().join("spec.toml"), spec).expect("is writable");
+    let output = slipsweep(folder.path()).args(["plan", "spec.toml"]).output().expect("runs");
+    let text = String::from_utf8_lossy(&output.stdout);
+    let total = text.lines().find_map(|line| line.strip_prefix("in all: ")).expect("says");
+    let time = total.split("on disk, ").nth(1).expect("says");
+    assert!(time.contains(" s on "), "{total}");
+}
+
+/// Of a run that ends at once the start of the process is most: a plan does not name milliseconds.
+#[test]
+fn plans_of_short_runs_are_bounds() {
+    let folder = tempfile::tempdir().expect("is writable");
+    write_spec(folder.path(), "t_f = 0.02\na = 0.03\nb = 0.05\nv_i = 3.0\nv_f = 100.0", "[tables.optimal]\n");
+    let output = slipsweep(folder.path()).args(["plan", "spec.toml"]).output().expect("runs");
+    let text = String::from_utf8_lossy(&output.stdout);
+    assert!(text.contains(" on disk, less than 0.3 s on "), "{text}");
 }

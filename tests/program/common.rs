@@ -4,7 +4,13 @@ use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use polars::prelude::{DataFrame, ParquetReader, SerReader};
+use arrow_array::RecordBatch;
+use arrow_array::cast::AsArray;
+use arrow_array::types::{Float64Type, Int32Type};
+use arrow_schema::DataType;
+use parquet::arrow::ArrowWriter;
+use parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
+use polars::prelude::{BooleanChunked, Column, DataFrame, Float64Chunked, IntoColumn, NewChunkedArray, StringChunked};
 use slipsweep::dataset::Folder;
 use slipsweep::sweep::{self, Outcome, Sweep};
 use slipsweep::table::Signal;
@@ -53,11 +59,50 @@ pub fn read(out: &Path, table: &str) -> DataFrame {
     let mut parts: Vec<PathBuf> =
         fs::read_dir(&folder).expect("is readable").map(|entry| entry.expect("is readable").path()).collect();
     parts.sort();
-    let mut frames = parts
-        .iter()
-        .map(|part| ParquetReader::new(fs::File::open(part).expect("is readable")).finish().expect("is a table"));
+    let mut frames = parts.iter().map(|part| frame(&batch(part)));
     let first = frames.next().expect("has a part");
     frames.fold(first, |all, next| all.vstack(&next).expect("has the same columns"))
+}
+
+/// All rows of a Parquet file.
+pub fn batch(path: &Path) -> RecordBatch {
+    let file = fs::File::open(path).expect("is readable");
+    let builder = ParquetRecordBatchReaderBuilder::try_new(file).expect("is Parquet");
+    let rows = usize::try_from(builder.metadata().file_metadata().num_rows()).expect("is a number");
+    let mut batches = builder.with_batch_size(rows.max(1)).build().expect("is Parquet");
+    let batch = batches.next().expect("has rows").expect("is readable");
+    assert_eq!(batch.num_rows(), rows);
+    batch
+}
+
+/// Writes the rows of a Parquet file.
+pub fn write_batch(path: &Path, batch: &RecordBatch) {
+    let file = fs::File::create(path).expect("is writable");
+    let mut writer = ArrowWriter::try_new(file, batch.schema(), None).expect("is a table");
+    writer.write(batch).expect("is writable");
+    writer.close().expect("is writable");
+}
+
+/// The rows of a batch as polars has them.
+fn frame(batch: &RecordBatch) -> DataFrame {
+    let schema = batch.schema();
+    let column = |(field, array): (&arrow_schema::FieldRef, &arrow_array::ArrayRef)| -> Column {
+        let name = field.name().as_str().into();
+        match field.data_type() {
+            DataType::Float64 => {
+                Float64Chunked::from_iter_options(name, array.as_primitive::<Float64Type>().iter()).into_column()
+            }
+            DataType::Boolean => BooleanChunked::from_iter_options(name, array.as_boolean().iter()).into_column(),
+            _ => {
+                let codes = array.as_dictionary::<Int32Type>();
+                let words = codes.values().as_string::<i32>();
+                let word = |key: Option<i32>| key.map(|key| words.value(usize::try_from(key).expect("is a place")));
+                StringChunked::from_iter_options(name, codes.keys().iter().map(word)).into_column()
+            }
+        }
+    };
+    let columns = schema.fields().iter().zip(batch.columns()).map(column).collect();
+    DataFrame::new(batch.num_rows(), columns).expect("is a table")
 }
 
 /// A column of numbers; `None` where null.
@@ -67,6 +112,6 @@ pub fn numbers(frame: &DataFrame, column: &str) -> Vec<Option<f64>> {
 
 /// A column of words; empty where null.
 pub fn words(frame: &DataFrame, column: &str) -> Vec<String> {
-    let words = frame.column(column).expect("is there").cat32().expect("holds words");
-    words.iter_str().map(|word| word.unwrap_or_default().to_owned()).collect()
+    let words = frame.column(column).expect("is there").str().expect("holds words");
+    words.iter().map(|word| word.unwrap_or_default().to_owned()).collect()
 }

@@ -86,6 +86,42 @@ fn specs_are_legal() {
     assert!(specs >= 2);
 }
 
+/// The specs in a folder and those below it.
+fn specs_in(folder: &Path) -> Vec<PathBuf> {
+    let entries = fs::read_dir(folder).expect("is there").map(|entry| entry.expect("is readable").path());
+    let (folders, files): (Vec<PathBuf>, Vec<PathBuf>) = entries.partition(|path| path.is_dir());
+    let below = folders.iter().flat_map(|folder| specs_in(folder));
+    files.into_iter().filter(|path| path.extension().is_some_and(|ending| ending == "toml")).chain(below).collect()
+}
+
+/// Documents can be followed in one clone, in any order: a dataset of one name comes from one spec.
+#[test]
+fn names_of_datasets_do_not_collide() {
+    let named =
+        |text: &str| text.lines().find_map(|line| Some(line.strip_prefix("name = \"")?.split('"').next()?.to_owned()));
+    let mut datasets: Vec<(String, String)> = Vec::new();
+    for path in specs_in(&repository().join("sweeps")) {
+        let spec = fs::read_to_string(&path).expect("is readable");
+        datasets.push((named(&spec).expect("has a name"), spec));
+    }
+    for document in documents() {
+        let text = text(&document);
+        let begun = |line: &str| Some(line.strip_prefix("slipsweep init ")?.split(' ').next()?.to_owned());
+        // Of the examples, which are followed in their own folder, the datasets go elsewhere.
+        for block in blocks(&text, "sh").iter().filter(|block| !block.contains("--out answers")) {
+            let written = block.split("<<END\n").skip(1).filter_map(|rest| rest.split("\nEND").next());
+            datasets.extend(written.filter_map(|spec| Some((named(spec)?, spec.to_owned()))));
+            datasets.extend(block.lines().filter_map(begun).map(|name| (name, document.display().to_string())));
+        }
+        let specs = blocks(&text, "toml").into_iter().filter(|block| block.starts_with("name = "));
+        datasets.extend(specs.map(|spec| (named(&spec).expect("has a name"), spec)));
+    }
+    assert!(datasets.len() >= 16, "{datasets:?}");
+    for (name, spec) in &datasets {
+        assert!(datasets.iter().all(|(other, same)| other != name || same == spec), "two datasets `{name}`: {spec}");
+    }
+}
+
 #[test]
 fn links_lead_somewhere() {
     for document in documents() {
@@ -113,6 +149,12 @@ fn links_lead_somewhere() {
             }
         }
     }
+}
+
+#[test]
+fn the_least_compiler_is_the_one_of_the_manifest() {
+    let sentence = concat!("With a Rust toolchain (", env!("CARGO_PKG_RUST_VERSION"), " or later)");
+    assert!(text(Path::new("README.md")).contains(sentence), "README.md: expected `{sentence}`");
 }
 
 #[test]

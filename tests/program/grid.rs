@@ -104,7 +104,7 @@ impl Known {
                 // Few values, so that some repeat.
                 values: Values::List((0..length).map(|_| random.below(6) as f64).collect()),
             });
-            factors.push(Factor { axes: axes.collect() });
+            factors.push(Factor { axes: axes.collect(), ..Factor::default() });
         }
         let held: Vec<Quantity> = factors.iter().flat_map(|factor| &factor.axes).map(|axis| axis.quantity).collect();
         let mut known = held.clone();
@@ -117,8 +117,9 @@ impl Known {
             known.push(quantity);
         }
         let condition = (random.below(4) > 0).then(|| condition(random, &known, 2));
-        let expression =
-            condition.as_ref().map(|formula| Expression::condition(&formula.text, &known).expect("is a condition"));
+        let expression = condition
+            .as_ref()
+            .map(|formula| Expression::condition(&formula.text, &known, None).expect("is a condition"));
         Known { block: Block { factors, derived, condition: expression }, derived: formulas, condition }
     }
 
@@ -340,7 +341,7 @@ fn a_grid_written_in_another_way_has_the_same_rows() {
         let sweep = load(folder.path(), text, "[tables.optimal]\n").expect("is legal");
         let out = folder.path().join(name);
         run(&sweep, &out, 1);
-        (read(&out, "optimal"), sweep.identity().spec_hash)
+        (read(&out, "optimal"), sweep.hash(&sweep.requests[0]))
     };
     let (expected, hash) = table("product", &product);
     let (same, same_hash) = table("block", &block);
@@ -397,11 +398,12 @@ fn expressions_mean_what_they_say() {
     let at = |text: &str| -> f64 {
         let axes = [Quantity::InitialVelocity, Quantity::Time];
         let expression = Expression::number(text, &axes).unwrap_or_else(|fault| panic!("{text}: {fault:?}"));
+        let one = |quantity, value| {
+            let axis = Axis { quantity, scale: Scale::Model, values: Values::List(vec![value]) };
+            Factor { axes: vec![axis], ..Factor::default() }
+        };
         let block = Block {
-            factors: vec![
-                Factor { axes: vec![Axis { quantity: axes[0], scale: Scale::Model, values: Values::List(vec![3.0]) }] },
-                Factor { axes: vec![Axis { quantity: axes[1], scale: Scale::Model, values: Values::List(vec![0.5]) }] },
-            ],
+            factors: vec![one(axes[0], 3.0), one(axes[1], 0.5)],
             derived: vec![Derived { quantity: Quantity::FinalVelocity, scale: Scale::Model, expression }],
             condition: None,
         };
@@ -424,6 +426,7 @@ fn expressions_mean_what_they_say() {
         ("exp(0) + ln(1) + log10(1000)", 4.0),
         ("floor(2.5) + ceil(2.5)", 5.0),
         ("pow(v_i, 2)", 9.0),
+        ("log(100) + ceiling(2.5) + power(2, 3) + least(4, v_i) + greatest(0, t_f)", 16.5),
         ("inf", f64::INFINITY),
         ("\n 1\n + 1 ", 2.0),
     ] {
@@ -440,7 +443,7 @@ fn expressions_mean_what_they_say() {
         "family <> 'step'",
         "true",
     ] {
-        assert!(Expression::condition(text, &axes).is_ok(), "{text}");
+        assert!(Expression::condition(text, &axes, None).is_ok(), "{text}");
     }
 }
 
@@ -642,5 +645,5 @@ fn regress_files_of_points_that_are_not_quite_csv() {
     assert_eq!(csv(b"t_f\ta\n1\t2\n"), "cases.csv:1: columns or lines that end with '\\t'");
     assert_eq!(csv(b"t_f,a\r1,2\r"), "cases.csv:1: columns or lines that end with '\\r'");
     assert_eq!(csv(b",t_f,a\n0,1,2\n"), "cases.csv:1: column 1 has no name");
-    assert_eq!(csv(b"\xff\xfet\0_\0f\0"), "cases.csv: not in UTF-8");
+    assert_eq!(csv(b"\xff\xfet\0_\0f\0"), "cases.csv:1: not in UTF-8");
 }

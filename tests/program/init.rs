@@ -69,14 +69,28 @@ fn what_is_there_is_not_overwritten() {
         assert_eq!((output.status.code(), String::from_utf8_lossy(&output.stderr).as_ref()), (Some(1), message));
     }
     assert_eq!(fs::read_to_string(folder.path().join("mine.toml")).expect("is there"), "mine");
-    let output = slipsweep(folder.path(), &["init", "my spec"]);
-    let message = "error: `my spec` cannot name a folder\n  expected: at most 200 letters, digits, '-', '_' and '.', the first not '.'\n  \
-                   help: choose another name\n";
-    assert_eq!((output.status.code(), String::from_utf8_lossy(&output.stderr).as_ref()), (Some(1), message));
-    let output = slipsweep(folder.path(), &["init", "nowhere/mine"]);
-    let message = "error: nowhere/slipsweep.schema.json: cannot write: No such file or directory (os error 2)\n  \
-                   help: choose a folder that is there and can be written to\n";
-    assert_eq!((output.status.code(), String::from_utf8_lossy(&output.stderr).as_ref()), (Some(2), message));
+    let refused = |name: &str| {
+        let output = slipsweep(folder.path(), &["init", name]);
+        assert_eq!(output.status.code(), Some(1), "{name}");
+        String::from_utf8_lossy(&output.stderr).into_owned()
+    };
+    let rule =
+        "  expected: at most 200 letters, digits, '-', '_' and '.', the first not '.'\n  help: choose another name\n";
+    assert_eq!(refused("my spec"), format!("error: `my spec`: `my spec` cannot name a folder\n{rule}"));
+    assert_eq!(refused("a\"b"), format!("error: `a\"b`: `a\"b` cannot name a folder\n{rule}"));
+    assert_eq!(refused(".."), format!("error: `..`: `` cannot name a folder\n{rule}"));
+    let message = "error: `nowhere/mine`: there is no folder `nowhere`\n  expected: a name such as mine, or one in a folder that is \
+                   there\n  help: slipsweep init mine\n";
+    assert_eq!(refused("nowhere/mine"), message);
+    assert_eq!(
+        refused("mine.toml/mine").lines().next(),
+        Some("error: `mine.toml/mine`: there is no folder `mine.toml`")
+    );
+    // In a folder that is there, and a second time, when it is there as it would be written.
+    fs::create_dir(folder.path().join("specs")).expect("is writable");
+    for _ in 0..2 {
+        assert!(printed(folder.path(), &["init", "specs/other"]).contains("slipsweep run specs/other.toml\n"));
+    }
     // The schema is generated: that of another version gives way.
     printed(folder.path(), &["init", "other"]);
     assert!(fs::read_to_string(folder.path().join("slipsweep.schema.json")).expect("is there").starts_with('{'));

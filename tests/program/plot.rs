@@ -89,8 +89,10 @@ fn every_table_has_its_picture() {
     let folder = dataset();
     let folder = folder.path();
     let said = shown(folder, &["plot", "results/small"]);
+    let written: String = said.lines().filter(|line| !line.starts_with("  ")).map(|line| format!("{line}\n")).collect();
     let tables = ["gap", "best", "optimal", "crossover", "swift", "stability", "step", "compliant", "regularised"];
-    assert_eq!(said, tables.map(|table| format!("{table}: written to small-{table}.svg\n")).concat());
+    assert_eq!(written, tables.map(|table| format!("{table}: written to small-{table}.svg\n")).concat());
+    assert!(said.contains("\n  8 of 10 panels (t_f, v_f); choose others with --where\n"), "{said}");
     let all: Vec<String> = tables.iter().map(|table| read(folder, &format!("small-{table}.svg"))).collect();
     for (table, svg) in tables.iter().zip(&all) {
         assert!(svg.starts_with("<svg") && svg.trim_end().ends_with("</svg>"), "{table}");
@@ -103,7 +105,10 @@ fn every_table_has_its_picture() {
         assert!(words[0].contains(part), "{part} in {}", words[0]);
     }
     assert!(words[2].contains("W* (μ0 σ l)"), "{}", words[2]);
-    assert!(words[4].contains("bounded friction, tf = 0.02, τmax = 1.1"), "{}", words[4]);
+    assert!(words[4].contains("bounded friction, tf = 0.02 l/v0, τmax = 1.1 μ0 σ"), "{}", words[4]);
+    // Scaled figures state their units too; nothing in a figure is for the command line.
+    assert!(words[0].contains("a = 0.03 μ0, b = 0.05 μ0, vi = 3 v0"), "{}", words[0]);
+    assert!(words.iter().all(|words| !words.contains("--")));
     assert!(words[5].contains("kc(vf)") && words[5].contains("k (μ0 σ/l)"), "{}", words[5]);
     // The same again is the same bytes.
     shown(folder, &["plot", "results/small", "--table", "gap", "--out", "again.svg"]);
@@ -132,30 +137,87 @@ fn refusals(folder: &Path) {
     let with = |more: &[&str]| complaint(folder, &[&gap, more].concat());
     assert_eq!(
         with(&["--where", "t_f=0.03"]),
-        "error: --where t_f = 0.03: no row of the table `gap` is left\n  found: t_f = 0.02, 0.037\n"
+        "error: --where t_f = 0.03: no row of the table `gap` is left\n  found: t_f = 0.02, 0.037\n  help: the \
+         nearest rows have --where \"t_f=0.037\"\n"
     );
+    let near = with(&["--where", "t_f=0.0200001, b=0.05"]);
+    assert!(near.ends_with("  help: the nearest rows have --where \"t_f=0.02, b=0.05\"\n"), "{near}");
     assert_eq!(
         with(&["--where", "tf=0.02"]),
         "error: --where: the table `gap` has no column `tf`\n  found: t_f, a, b, v_i, v_f, alpha_2, alpha_3, work, work_optimal, \
-         gap, v_min, status\n"
+         gap, v_min, status\n  help: did you mean `t_f`?\n"
     );
     assert_eq!(
         with(&["--x", "gap"]),
-        "error: --x: the table `gap` has no axis `gap`\n  found: t_f, a, b, v_i, v_f, alpha_2, alpha_3\n"
+        "error: --x: the table `gap` has no axis `gap`\n  found: t_f, a, b, v_i, v_f, alpha_2, alpha_3\n  help: choose one of these\n"
     );
-    assert_eq!(with(&["--out", "gap.jpg"]), "error: --out gap.jpg: the name ends in none of .svg, .png, .pdf\n");
+    assert_eq!(
+        with(&["--out", "gap.jpg"]),
+        "error: --out gap.jpg: the name ends in none of .svg, .png, .pdf\n  help: for a folder, make it first or give a name \
+         without a dot\n"
+    );
+    let contradiction = with(&["--out", "gap.pdf", "--format", "png"]);
+    assert!(contradiction.starts_with("error: --out gap.pdf: the ending contradicts --format\n"), "{contradiction}");
     assert_eq!(
         complaint(folder, &["plot", "results/small", "--table", "gop"]),
         "error: the dataset has no table `gop`\n  found: gap, best, optimal, crossover, swift, stability, step, compliant, \
-         regularised\n  help: name one of them with --table\n"
-    );
-    assert_eq!(
-        complaint(folder, &["plot", "results"]),
-        "error: results: not a dataset\n  expected: a folder with a manifest.json\n  help: name a folder that `slipsweep run` \
-         wrote\n"
+         regularised\n  help: did you mean `gap`?\n"
     );
     let many = complaint(folder, &["plot", "results/small", "--x", "t_f"]);
     assert!(many.starts_with("error: --x is for one table\n"), "{many}");
+}
+
+#[test]
+fn the_wrong_kind_of_file_is_named_with_the_command_that_takes_it() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let folder = folder.path();
+    let spec =
+        "name = \"tiny\"\n[axes]\nt_f = [0.02, 0.03]\na = 0.03\nb = 0.05\nv_i = 3.0\nv_f = 100.0\n[tables.optimal]\n";
+    fs::write(folder.join("tiny.toml"), spec).expect("is writable");
+    shown(folder, &["run", "tiny.toml", "--quiet"]);
+    let case = ["--t-f", "0.02", "--a", "0.03", "--b", "0.05", "--v-i", "3", "--v-f", "100"];
+    shown(folder, &[&["trace", "best", "--out", "best.csv"], &case[..]].concat());
+    fs::write(folder.join("other.csv"), "a,b\n0,1\n").expect("is writable");
+    let spec = "a spec, not a dataset";
+    let run = "help: `slipsweep run tiny.toml` computes its dataset, results/tiny: name that\n";
+    for command in ["plot", "report", "summary", "head", "status", "verify"] {
+        let said = complaint(folder, &[command, "tiny.toml"]);
+        assert!(said.contains(spec) && said.ends_with(run), "{command}: {said}");
+        assert!(!said.contains("delete"), "{command}: {said}");
+    }
+    assert_eq!(
+        complaint(folder, &["summary", "best.csv"]),
+        "error: best.csv: a trace, not a dataset\n  expected: the folder of a dataset, such as results/NAME\n  help: `slipsweep \
+         plot best.csv` draws it\n"
+    );
+    for (path, kind, help) in [
+        ("results", "a folder of datasets", "name one of them: results/tiny"),
+        ("results/tiny/optimal", "the folder of a table", "name its dataset, results/tiny"),
+        ("results/tiny/optimal/part-000000.parquet", "a part of a table", "name its dataset, "),
+        ("results/tiny/manifest.json", "the manifest of a dataset", "name its folder, results/tiny"),
+        ("other.csv", "a file of rows", "`slipsweep query other.csv "),
+    ] {
+        let said = complaint(folder, &["plot", path]);
+        assert!(said.starts_with(&format!("error: {path}: {kind}, not a dataset or a trace\n")), "{said}");
+        assert!(said.contains(&format!("\n  help: {help}")), "{said}");
+    }
+    assert!(complaint(folder, &["plot", "none.csv"]).starts_with("error: none.csv: there is no such file or folder\n"));
+}
+
+#[test]
+fn all_tables_go_into_a_folder_in_a_format() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let folder = folder.path();
+    let spec = "name = \"tiny\"\n[axes]\nt_f = [0.02, 0.03, 0.04]\na = 0.03\nb = 0.05\nv_i = 3.0\nv_f = 100.0\n\
+                [tables.optimal]\n[tables.best]\n";
+    fs::write(folder.join("tiny.toml"), spec).expect("is writable");
+    shown(folder, &["run", "tiny.toml", "--quiet"]);
+    let said = shown(folder, &["plot", "results/tiny", "--format", "png", "--out", "new/pictures", "--dpi", "60"]);
+    let path = |table: &str| format!("new/pictures/tiny-{table}.png");
+    assert_eq!(said, ["optimal", "best"].map(|table| format!("{table}: written to {}\n", path(table))).concat());
+    assert!(fs::read(folder.join(path("best"))).expect("is there").starts_with(b"\x89PNG"));
+    shown(folder, &["plot", "results/tiny", "--format", "pdf", "--table", "best"]);
+    assert!(fs::read(folder.join("tiny-best.pdf")).expect("is there").starts_with(b"%PDF-"));
 }
 
 #[test]
@@ -172,22 +234,31 @@ fn traces_are_drawn_over_each_other() {
     }
     assert_eq!(shown(folder, &["plot", "optimal.parquet", "best.csv"]), "written to traces.svg\n");
     let both = words(&read(folder, "traces.svg"));
-    assert!(both.contains("\noptimal\nbest\n"), "{both}");
+    // They lie on each other: one line, one entry of the legend.
+    assert!(both.contains("\noptimal; best, α2 = −0.11983/tf, α3 = −0.066423/tf2\n"), "{both}");
+    shown(folder, &[&["trace", "step", "--out", "step.parquet"], &case[..]].concat());
+    shown(folder, &["plot", "optimal.parquet", "step.parquet"]);
+    let apart = words(&read(folder, "traces.svg"));
+    assert!(apart.contains("\noptimal\nstep\n"), "{apart}");
+    let spring = ["--t-f", "3.1e-6", "--a", "0.005", "--b", "0.01", "--v-i", "1e5", "--v-f", "3.2e6", "--k", "7.5e-3"];
+    shown(folder, &[&["trace", "compliant", "--m", "2.5e-16", "--out", "spring.parquet"], &spring[..]].concat());
+    shown(folder, &["plot", "spring.parquet"]);
+    let spring = words(&read(folder, "spring.svg"));
+    // One panel for both velocities; one format of numbers, with units.
+    for part in ["v, vc (106 v0)", "k = 0.0075 μ0 σ/l", "vi = 105 v0", "vf = 3.2×106 v0", "\nv\nvc\n"] {
+        assert!(spring.contains(part), "{part} in {spring}");
+    }
     fs::copy(folder.join("best.csv"), folder.join("my_<best>*\u{1}.csv")).expect("is writable");
     shown(folder, &["plot", "my_<best>*\u{1}.csv", "--out", "odd.png"]);
     shown(folder, &["plot", "my_<best>*\u{1}.csv", "--out", "odd.svg"]);
-    assert!(words(&read(folder, "odd.svg")).starts_with("Protocol my &lt;best&gt;"));
+    let odd = words(&read(folder, "odd.svg"));
+    assert!(odd.starts_with("Protocol best"), "{odd}");
     fs::write(folder.join("bad.csv"), "t,v\n0,1\n1,x\n").expect("is writable");
     assert_eq!(
         complaint(folder, &["plot", "bad.csv"]),
         "error: bad.csv, line 3: found `x`\n  expected: a number or nothing\n  help: a trace is what `slipsweep trace … --out \
          FILE.csv` writes\n"
     );
-    fs::write(folder.join("other.csv"), "a,b\n0,1\n").expect("is writable");
-    assert!(
-        complaint(folder, &["plot", "other.csv"]).starts_with("error: other.csv: not a trace: it has no column `t`\n")
-    );
-    assert!(complaint(folder, &["plot", "none.csv"]).starts_with("error: none.csv: cannot be read: "));
     assert!(
         complaint(folder, &["plot", "best.csv", "--table", "gap"])
             .starts_with("error: --table: traces have no tables\n")
@@ -259,5 +330,111 @@ fn axes_that_change_together_make_lines_and_sampled_ones_dots() {
          t_f = { sobol = [0.01, 0.1, 64], seed = 1 }\n[tables.optimal]\n",
         "optimal",
     );
-    assert!(svg.matches("<circle").count() == 64 && !sampled.contains("Rows share"), "{sampled}");
+    assert!(
+        !svg.contains("<image") && sampled.contains("\nspeed up\n") && !sampled.contains("Rows share"),
+        "{sampled}"
+    );
+    let dots = svg.matches("stroke=\"#222\" stroke-width=\"0.3\"").count();
+    // A dot a row, and those of the legend.
+    assert_eq!(
+        dots,
+        64 + sampled.matches("speed up").count()
+            + sampled.matches("slow down").count()
+            + sampled.matches("\nhold\n").count()
+    );
+}
+
+/// The paper's transition.
+const MATERIAL: &str = "a = 0.03\nb = 0.05\nv_i = 3.0\n";
+
+#[test]
+fn two_axes_are_crossed_and_what_is_left_out_is_said_on_the_terminal() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let folder = folder.path();
+    let spec = "name = \"crossed\"\n[axes]\nt_f = { geomspace = [0.01, 0.04, 5] }\na = 0.03\nb = [0.04, 0.05]\nv_i = 3.0\nv_f = 100.0\n\
+                alpha_2 = { linspace = [-0.3, 0.1, 11], unit = \"1/t_f\" }\n\
+                alpha_3 = { linspace = [-0.3, 0.3, 11], unit = \"1/t_f^2\" }\n[tables.gap]\n";
+    fs::write(folder.join("spec.toml"), spec).expect("is writable");
+    shown(folder, &["run", "spec.toml", "--quiet"]);
+    let said = shown(folder, &["plot", "results/crossed"]);
+    assert_eq!(said, "gap: written to crossed-gap.svg\n  8 of 10 panels (t_f, b); choose others with --where\n");
+    let words_of = words;
+    let words = words_of(&read(folder, "crossed-gap.svg"));
+    // A title a row and a column.
+    for title in ["\ntf = 0.01 l/v0\n", "\ntf = 0.04 l/v0\n", "\nb = 0.04 μ0\n", "\nb = 0.05 μ0\n"] {
+        assert_eq!(words.matches(title).count(), 1, "{title} in {words}");
+    }
+    assert!(!words.contains("panels"), "{words}");
+    // A condition on a result leaves a row of each kind in different places: the panels stay apart.
+    shown(folder, &["plot", "results/crossed", "--table", "gap", "--where", "gap<1e-4, b=0.05", "--out", "few.svg"]);
+    let few = words_of(&read(folder, "few.svg"));
+    assert!(few.matches("\ntf = ").count() > 1, "{few}");
+}
+
+#[test]
+fn few_points_are_shown_and_what_is_constant_is_said() {
+    let axes = |count: u32| {
+        format!(
+            "[axes]\nt_f = {{ geomspace = [0.3, 1.0, {count}] }}\n{MATERIAL}v_f = [50.0, 100.0]\n[tables.optimal]\n"
+        )
+    };
+    let (few, svg) = picture("few", &axes(20), "optimal");
+    // v(0+) = 1 throughout; 20 points a line, two panels, two entries of the legend with the marks of their lines.
+    assert!(few.contains("v(0+) = 1 v0") && !few.contains("v(0+) (v0)"), "{few}");
+    assert_eq!(svg.matches("<circle").count(), 2 * 20 + 1);
+    let (_, svg) = picture("many", &axes(60), "optimal");
+    assert_eq!(svg.matches("<circle").count(), 0);
+}
+
+#[test]
+fn the_map_of_optima_shows_the_strategy_and_when_it_changes() {
+    let spec = format!(
+        "[axes]\nt_f = {{ geomspace = [0.01, 0.1, 15] }}\n{MATERIAL}v_f = {{ geomspace = [50.0, 200.0, 15] }}\n[tables.optimal]\n"
+    );
+    let (map, _) = picture("strategies", &spec, "optimal");
+    for part in ["speed up", "slow down", "hold", "\ntcross\n", "\nthold\n"] {
+        assert!(map.contains(part), "{part} in {map}");
+    }
+    let (same, _) = picture("same", &spec.replace("0.01, 0.1", "0.001, 0.01"), "optimal");
+    assert!(same.contains("W* (μ0 σ l)") && !same.contains("speed up"), "{same}");
+}
+
+#[test]
+fn reduced_landscapes_have_pictures_of_their_own() {
+    let spec = |reduce: &str| {
+        format!(
+            "[axes]\nt_f = [0.02, 0.03, 0.037]\n{MATERIAL}v_f = 100.0\nalpha_2 = {{ linspace = [-0.3, 0.1, 21], unit = \"1/t_f\" }}\n\
+             alpha_3 = {{ linspace = [-0.3, 0.3, 21], unit = \"1/t_f^2\" }}\n[tables.gap]\nreduce = \"{reduce}\"\n"
+        )
+    };
+    let (bars, svg) = picture("bars", &spec("histogram"), "gap_histogram");
+    assert!(bars.contains("\nshortcuts\n") && bars.matches("\ntf = ").count() == 3, "{bars}");
+    assert!(svg.matches("fill=\"#9ec4e4\"").count() > 6);
+    let (bands, _) = picture("bands", &spec("quantiles"), "gap_quantiles");
+    for part in ["median", "25 % to 75 %", "5 % to 95 %", "tf (l/v0)"] {
+        assert!(bands.contains(part), "{part} in {bands}");
+    }
+    let (least, _) = picture("least", &spec("min"), "gap_min");
+    assert!(least.contains("α2 tf") && least.contains("gap"), "{least}");
+    let (alone, _) = picture("alone", &spec("quantiles").replace("[0.02, 0.03, 0.037]", "0.02"), "gap_quantiles");
+    assert!(alone.contains("shortcuts of at most this gap (%)"), "{alone}");
+}
+
+#[test]
+fn single_materials_are_symbols_of_their_outcome() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let folder = folder.path();
+    let points =
+        "a,b,k,m\n0.01,0.015,0.004,1e-15\n0.005,0.01,0.006,2e-16\n0.012,0.02,0.006,3e-16\n0.008,0.011,0.02,1e-16\n";
+    fs::write(folder.join("points.csv"), points).expect("is writable");
+    let spec = "name = \"materials\"\npoints = \"points.csv\"\n[axes]\nv_i = 1e5\nv_f = 1e6\n[tables.step]\n";
+    fs::write(folder.join("spec.toml"), spec).expect("is writable");
+    shown(folder, &["run", "spec.toml", "--quiet"]);
+    shown(folder, &["plot", "results/materials"]);
+    let svg = read(folder, "materials-step.svg");
+    let words = words(&svg);
+    assert!(words.contains("\nsettled\n") && words.contains("\nlimit cycle\n"), "{words}");
+    // Two settle and two do not; each symbol is in the legend, too. Nothing is hatched or blank.
+    assert_eq!(svg.matches("<circle").count(), 3);
+    assert!(!svg.contains("<image") && !words.contains("no row"), "{words}");
 }

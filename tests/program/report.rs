@@ -49,14 +49,32 @@ fn the_page_holds_everything_and_opens_without_an_error() {
     ] {
         assert!(page.contains(part), "{part}");
     }
+    assert!(page.contains("<th>t_f [l/v_0]</th>") && page.contains("<th>unit</th>"), "units");
+    for table in ["gap: 882 rows", "best: 2 rows", "crossover: 1 row"] {
+        assert_eq!(page.matches(table).count(), 1, "{table}");
+    }
     // Two maps tell their values; nothing is asked of a network.
     assert_eq!(page.matches("\"column\":\"gap\"").count(), 2);
     assert!(!page.contains("src=") && !page.contains("<link") && !page.contains("@import") && !page.contains("fetch("));
     command(folder, &["report", "results/small", "--out", "again.html"]);
     // The plan estimates from a sample that takes its time; the rest is the same again.
     let again = fs::read_to_string(folder.join("again.html")).expect("is readable");
-    let after_plan = |page: &str| page.split_once("Rows and statuses").map(|(_, rest)| rest.to_owned());
-    assert!(after_plan(&page).is_some() && after_plan(&page) == after_plan(&again));
+    let but_the_plan = |page: &str| {
+        let (before, after) = page.split_once("<h2>Plan</h2>").expect("has a plan");
+        (before.to_owned(), after.split_once("<h2>Spec</h2>").expect("has a spec").1.to_owned())
+    };
+    assert_eq!(but_the_plan(&page), but_the_plan(&again));
+    // The description on top, then pictures; each summary once.
+    let order = [
+        "<p>A page &lt;of&gt; its own</p>",
+        "<h2>Pictures</h2>",
+        "<h2>Rows and statuses</h2>",
+        "<h2>Summary</h2>",
+        "<h2>Plan</h2>",
+    ];
+    let places: Vec<Option<usize>> = order.iter().map(|part| page.find(part)).collect();
+    assert!(places.iter().all(Option::is_some) && places.is_sorted(), "{places:?}");
+    assert_eq!(page.matches("best: 2 rows").count(), 1);
     in_a_browser(folder);
 }
 

@@ -5,7 +5,7 @@ use std::path::Path;
 use std::process::{Command, Output};
 
 use crate::common::{files, run, sweep};
-use slipsweep::dataset::Folder;
+use slipsweep::dataset::{Company, Folder};
 use slipsweep::sweep::{self, Plan, Shard, TableOutcome, shares_with};
 use slipsweep::table::Signal;
 
@@ -155,15 +155,16 @@ fn the_manifest_follows_from_any_part() {
     let output = slipsweep(folder.path(), &["status", "test"]);
     assert_eq!(output.status.code(), Some(2));
     let said = text(&output.stdout);
-    assert!(said.contains("manifest.json is missing; the parts tell what it would say"), "{said}");
+    assert!(said.contains("manifest.json is missing; the parts give its contents"), "{said}");
     assert!(said.contains("missing parts:\n  gap: 2\n"), "{said}");
     assert_eq!(slipsweep(folder.path(), &["run", "test", "--quiet"]).status.code(), Some(0));
     assert!(files(&dataset) == whole);
     // Nor can another spec take over a dataset that lost it.
     fs::remove_file(dataset.join("manifest.json")).expect("is there");
-    let other = crate::common::sweep(folder.path(), AXES, "[tables.optimal]\n");
+    let other = crate::common::sweep(folder.path(), &AXES.replace("v_i = 3.0", "v_i = 2.0"), "[tables.optimal]\n");
     let refused = sweep::run(&other, &Folder::new(folder.path(), "test"), 1, &Signal::default());
-    assert!(refused.is_err_and(|error| error.to_string().contains("holds a dataset of another spec")));
+    let refused = refused.expect_err("is refused").to_string();
+    assert!(refused.contains("holds a dataset of another spec"), "{refused}");
 }
 
 #[test]
@@ -199,11 +200,11 @@ fn tasks_that_would_have_too_little_to_do_are_not_made() {
     };
     let (_, said, _) = shards(&["--shards", "100"]);
     assert!(said.contains("\n1 task of about "), "{said}");
-    let reason = "\nfewer than the 100 asked for: more of them would have less than 5 minutes of work each\n";
+    let reason = "\nfewer than the 100 requested: more of them would have less than 5 minutes of work each\n";
     assert!(said.contains(reason), "{said}");
     let (_, said, _) = shards(&["--shards", "100", "--minutes", "0"]);
     assert!(said.contains("\n7 tasks of about "), "{said}");
-    assert!(said.contains("\nfewer than the 100 asked for: there are no more parts\n"), "{said}");
+    assert!(said.contains("\nfewer than the 100 requested: there are no more parts\n"), "{said}");
     let (code, _, error) = shards(&["--shards", "3", "--minutes", "x"]);
     assert_eq!(code, Some(1));
     assert!(error.contains("expected a number of minutes, 0 or more, found `x`"), "{error}");
@@ -211,6 +212,50 @@ fn tasks_that_would_have_too_little_to_do_are_not_made() {
     assert_eq!(output.status.code(), Some(1));
     let message = "there is no share 4 of 4: they are numbered from 0 to 3";
     assert!(text(&output.stderr).contains(message), "{}", text(&output.stderr));
+}
+
+#[test]
+fn a_path_in_which_slurm_would_lose_a_backslash_is_refused() {
+    let folder = tempfile::tempdir().expect("is writable");
+    sweep(folder.path(), AXES, TABLES);
+    let shards = |engine: &str| {
+        let out = ["--engine", engine, "--shards", "3", "--minutes", "0", "--out", "a\\b"];
+        slipsweep(folder.path(), &[&["shards", "spec.toml"], &out[..]].concat())
+    };
+    let output = shards("slurm");
+    assert_eq!(output.status.code(), Some(1));
+    let out = folder.path().canonicalize().expect("is there").join("a\\b");
+    assert_eq!(
+        text(&output.stderr),
+        format!(
+            "error: {}: Slurm writes no log below a folder whose name has a backslash\n  expected: a path without `\\`\n  help: write \
+             elsewhere with --out DIR\n",
+            out.display()
+        )
+    );
+    assert!(!out.exists());
+    assert_eq!(shards("hyperqueue").status.code(), Some(0));
+}
+
+#[test]
+fn a_job_script_is_written_whole_or_not_at_all() {
+    let folder = tempfile::tempdir().expect("is writable");
+    sweep(folder.path(), AXES, TABLES);
+    let shards = |limit: &str| {
+        let line =
+            format!("ulimit -f {limit}; exec \"$0\" shards spec.toml --engine slurm --shards 3 --minutes 0 --out .");
+        let mut bash = Command::new("bash");
+        bash.current_dir(folder.path()).args(["-c", &line, env!("CARGO_BIN_EXE_slipsweep")]).output().expect("runs")
+    };
+    let left = || files(folder.path()).into_keys().collect::<Vec<_>>();
+    let output = shards("0");
+    assert_eq!(output.status.code(), Some(2));
+    assert!(text(&output.stderr).contains("test.slurm.sh: cannot write: File too large"), "{}", text(&output.stderr));
+    assert_eq!(left(), [Path::new("spec.toml")]);
+    assert_eq!(shards("unlimited").status.code(), Some(0));
+    let script = fs::read(folder.path().join("test.slurm.sh")).expect("is there");
+    assert_eq!(shards("0").status.code(), Some(2));
+    assert!(fs::read(folder.path().join("test.slurm.sh")).is_ok_and(|still| still == script));
 }
 
 /// Rows beyond any disk, of which a spec can ask.
@@ -224,7 +269,9 @@ fn regress_parts_that_are_missing_cost_nothing() {
     let plan = Plan::new(&sweep);
     let [table] = plan.tables.as_slice() else { panic!("one table") };
     assert_eq!((table.rows, table.rows_of(table.parts - 1).end), (u64::MAX, u64::MAX));
-    Folder::new(&folder.path().join("results"), "test").open(&plan.manifest(&sweep)).expect("is writable");
+    Folder::new(&folder.path().join("results"), "test")
+        .open(&plan.manifest(&sweep), Company::Alone)
+        .expect("is writable");
     let output = slipsweep(folder.path(), &["status", "results/test"]);
     assert_eq!(output.status.code(), Some(2));
     let last = table.parts - 1;

@@ -30,6 +30,12 @@ fn shown(arguments: &[&[&str]]) -> String {
     String::from_utf8(output.stdout).expect("is text")
 }
 
+/// The rows of a trace as CSV, without the comments above them.
+fn csv(arguments: &[&[&str]]) -> String {
+    let text = shown(&[arguments, &[&["--format", "csv"]]].concat());
+    text.lines().filter(|line| !line.starts_with('#')).fold(String::new(), |text, line| text + line + "\n")
+}
+
 /// First line of the complaint of a trace that fails, with its exit code.
 fn complaint(arguments: &[&[&str]]) -> (Option<i32>, String) {
     let output = trace(Path::new("."), arguments);
@@ -49,6 +55,7 @@ fn a_table_tells_a_physicist_what_he_sees() {
                 status ok\n  \
                 117 rows; straight lines between them are good to 0.0001 of the range of a column, and to 0.01 of v and theta\n\n  \
                 t               v           theta         tau          beta\n  \
+                l/v_0           v_0         l/v_0         mu_0 sigma   mu_0 sigma v_0\n  \
                 0               3           0.333333333   0.978027754  -\n  \
                 0               19.9230141  0.333333333   1.03482565   -3.19447696\n";
     assert!(text.starts_with(head), "{text}");
@@ -64,7 +71,7 @@ fn a_table_tells_a_physicist_what_he_sees() {
 fn times_that_nine_digits_do_not_tell_apart_are_shown_in_full() {
     let late = ["--t-f", "1000", "--a", "1e-3", "--b", "2e-3", "--v-i", "3", "--v-f", "1e6"];
     let text = shown(&[&["optimal"], &late]);
-    let rows = text.lines().skip_while(|line| !line.starts_with("  t ")).skip(1);
+    let rows = text.lines().skip_while(|line| !line.starts_with("  t ")).skip(2);
     let times: Vec<&str> = rows.filter_map(|row| row.split_whitespace().next()).collect();
     let inside = &times[1..times.len() - 1];
     assert!(inside.len() > 100 && inside.windows(2).all(|pair| pair[0] != pair[1]), "{text}");
@@ -74,7 +81,7 @@ fn times_that_nine_digits_do_not_tell_apart_are_shown_in_full() {
 fn csv_reads_back_the_same_numbers_and_parquet_too() {
     let folder = tempfile::tempdir().expect("is writable");
     for name in ["optimal", "best", "bounded_velocity", "compliant"] {
-        let csv = shown(&[&[name], UP, &["--format", "csv", "--out", "-"]]);
+        let csv = csv(&[&[name], UP, &["--out", "-"]]);
         let output = trace(folder.path(), &[&[name], UP, &["--out", "trace.parquet"]]);
         assert_eq!(output.status.code(), Some(0));
         assert!(String::from_utf8_lossy(&output.stdout).ends_with("\nwritten to trace.parquet\n"));
@@ -122,14 +129,14 @@ fn csv_reads_back_the_same_numbers_and_parquet_too() {
 
 #[test]
 fn points_are_equally_spaced() {
-    let csv = shown(&[&["step"], UP, &["--format", "csv", "--points", "3"]]);
+    let csv = csv(&[&["step"], UP, &["--points", "3"]]);
     let times: Vec<&str> = csv.lines().skip(1).filter_map(|line| line.split(',').next()).collect();
     assert_eq!(times, ["0.0", "0.0", "0.01", "0.02"]);
 }
 
 #[test]
 fn coefficients_are_scaled_with_the_duration() {
-    let free = shown(&[&["free_cubic"], UP, &["--alpha-2", "-0.12", "--alpha-3", "-0.068", "--format", "csv"]]);
+    let free = csv(&[&["free_cubic"], UP, &["--alpha-2", "-0.12", "--alpha-3", "-0.068"]]);
     let start: Vec<f64> =
         free.lines().nth(2).expect("has rows").split(',').map(|cell| cell.parse().expect("is a number")).collect();
     // v = (1 - theta')/theta with theta' = -0.12/t_f.
@@ -154,7 +161,8 @@ fn what_does_not_exist_says_which_bound() {
 
 #[test]
 fn wrong_arguments_get_one_clear_message() {
-    let cases: [(&[&[&str]], &str); 9] = [
+    let cases: [(&[&[&str]], &str); 10] = [
+        (&[&["optimal", "--t-f", "1"]], "error: `optimal` needs --a, --b, --v-i, --v-f"),
         (&[&["optimal", "--tau-max", "2"], UP], "error: `optimal` takes no --tau-max"),
         (&[&["cubic", "--unbounded"], UP], "error: `cubic` takes no --unbounded"),
         (&[&["free_cubic", "--alpha-2", "0"], UP], "error: `free_cubic` needs --alpha-3"),
@@ -171,7 +179,7 @@ fn wrong_arguments_get_one_clear_message() {
             "error: invalid value '1' for '--rtol <R>': expected 1e-13 <= rtol <= 1e-2",
         ),
         (&[&["optimal", "--points", "1"], UP], "error: invalid value '1' for '--points <N>': 1 is not in 2..=10000000"),
-        (&[&["optimum"], UP], "error: invalid value 'optimum' for '<PROTOCOL>'"),
+        (&[&["optimum"], UP], "error: invalid value 'optimum' for '<PROTOCOL|DATASET>'"),
         (&[&["optimal", "--out", "x.dat"], UP], "error: x.dat ends in none of .csv, .parquet, .txt: add --format"),
     ];
     for (arguments, expected) in cases {
@@ -243,7 +251,7 @@ fn a_file_is_replaced_whole_or_left_as_it_was() {
 #[test]
 fn paper_control_of_the_smooth_shortcut_turns_negative() {
     let spring = ["compliant", "--t-f", "3.1e-6", "--a", "0.005", "--b", "0.01", "--v-i", "1e5", "--v-f", "3.2e6"];
-    let csv = shown(&[&spring, &["--k", "7.5e-3", "--m", "2.5e-16", "--format", "csv"]]);
+    let csv = csv(&[&spring, &["--k", "7.5e-3", "--m", "2.5e-16"]]);
     let column = |place: usize| -> Vec<f64> {
         csv.lines()
             .skip(1)
@@ -256,8 +264,8 @@ fn paper_control_of_the_smooth_shortcut_turns_negative() {
     assert!((v_min / 1e5 - 1.0).abs() < 1e-15);
     assert!((v_max / 4.31e6 - 1.0).abs() < 1e-3 && control_min < -5e5, "{v_max} {control_min}");
     // A rigid spring follows its far end.
-    let csv = shown(&[&spring, &["--format", "csv"]]);
-    for line in csv.lines().skip(1) {
+    let rigid = self::csv(&[&spring]);
+    for line in rigid.lines().skip(1) {
         let cells: Vec<f64> = line.split(',').map(|cell| cell.parse().expect("is a number")).collect();
         assert!((cells[1] / cells[4] - 1.0).abs() < 1e-14, "{line}");
     }
@@ -273,7 +281,7 @@ fn paper_step_on_a_spring_overshoots() {
             "step: the control velocity jumps to v_f and stays there; the block on its spring up to t_f\n"
         )
     );
-    let csv = shown(&[&spring, &["--k", "7.5e-3", "--m", "2.5e-16", "--format", "csv"]]);
+    let csv = csv(&[&spring, &["--k", "7.5e-3", "--m", "2.5e-16"]]);
     let rows: Vec<Vec<f64>> = csv
         .lines()
         .skip(1)
@@ -292,9 +300,9 @@ fn paper_step_on_a_spring_overshoots() {
 #[test]
 fn regress_slow_velocities_are_good_to_a_hundredth_of_themselves() {
     let case = ["step", "--t-f", "3.1e-6", "--a", "0.005", "--b", "0.01", "--v-i", "1e5", "--v-f", "3.2e6"];
-    let spring = ["--k", "7.5e-3", "--m", "2.5e-16", "--format", "csv"];
+    let spring = ["--k", "7.5e-3", "--m", "2.5e-16"];
     let rows = |more: &[&str]| -> Vec<Vec<f64>> {
-        let csv = shown(&[&case, &spring, more]);
+        let csv = csv(&[&case, &spring, more]);
         csv.lines().skip(1).map(|line| line.split(',').map(|cell| cell.parse().expect("a number")).collect()).collect()
     };
     let (fewest, spaced) = (rows(&[]), rows(&["--points", "2001"]));
@@ -311,4 +319,119 @@ fn regress_slow_velocities_are_good_to_a_hundredth_of_themselves() {
     }
     // A ten thousandth of the range is a fifth of it.
     assert!(slowest < 1e4, "{slowest}");
+}
+
+/// A dataset in SI units with a row of every table that has a path, and one that is infeasible.
+fn dataset(folder: &Path) {
+    let spec = r#"name = "rows"
+[model]
+units = "si"
+mu_0 = 0.6
+l = 1e-6
+v_0 = 1e-9
+normal_load = 1e6
+[axes]
+t_f = [2e1, 3e2]
+a = 0.018
+b = 0.03
+v_i = [3e-9, 1e-7]
+v_f = 5e-9
+alpha_2 = { linspace = [-0.01, 0.01, 3], unit = "1/t_f" }
+alpha_3 = { linspace = [-0.01, 0.01, 3], unit = "1/t_f^2" }
+k = 1e11
+m = 0.0
+delta_t = 1.0
+family = ["step", "bounded_velocity"]
+[tables.gap]
+[tables.optimal]
+[tables.best]
+[tables.swift]
+[tables.compliant]
+[tables.regularised]
+[tables.step]
+[tables.crossover]
+"#;
+    fs::write(folder.join("rows.toml"), spec).expect("is writable");
+    let run = Command::new(env!("CARGO_BIN_EXE_slipsweep"))
+        .current_dir(folder)
+        .args(["run", "rows.toml", "--quiet"])
+        .output();
+    let run = run.expect("runs");
+    assert_eq!(run.status.code(), Some(0), "{}", String::from_utf8_lossy(&run.stderr));
+}
+
+/// A row is traced as the protocol that its numbers name, in the units of its dataset.
+#[test]
+fn a_row_over_time_is_the_protocol_of_its_numbers() {
+    let folder = tempfile::tempdir().expect("is writable");
+    dataset(folder.path());
+    let run = |arguments: &[&str]| trace(folder.path(), &[&["results/rows"], arguments]);
+    let text = |output: Output| String::from_utf8(output.stdout).expect("is text");
+    for table in ["gap", "optimal", "best", "swift", "compliant", "regularised"] {
+        let output = run(&[table, "--row", "0", "--format", "csv"]);
+        assert_eq!(output.status.code(), Some(0), "{table}: {}", String::from_utf8_lossy(&output.stderr));
+        let found = text(output);
+        let fact = |key: &str| {
+            let start = format!("# {key} = ");
+            found.lines().find_map(|line| line.strip_prefix(&start)).map(str::to_owned)
+        };
+        assert_eq!(fact("v_i").as_deref(), Some("3e-9"), "{table}: {found}");
+        assert_eq!((fact("table").as_deref(), fact("row").as_deref()), (Some(table), Some("0")));
+        assert!(fact("units").is_some_and(|units| units.starts_with("s, m/s, s, Pa")), "{found}");
+        // It begins at v_i and its work is that of the row.
+        let first = found.lines().find(|line| line.starts_with("0.0,")).expect("has rows");
+        let v: f64 = first.split(',').nth(1).and_then(|cell| cell.parse().ok()).expect("is a number");
+        assert!((v / 3e-9 - 1.0).abs() < 1e-9, "{table}: {first}");
+        let part = folder.path().join(format!("results/rows/{table}/part-000000.parquet"));
+        let row = slipsweep::dataset::frame::row(&part, 0).expect("is there");
+        let work = row.iter().find(|(name, _)| name == "work").map(|(_, cell)| cell.clone());
+        let slipsweep::dataset::Cell::Number(work) = work.expect("is a column") else { panic!("{table}: no work") };
+        let told: f64 = fact("work").and_then(|work| work.parse().ok()).expect("is a number");
+        assert!((told / work - 1.0).abs() < 1e-9, "{table}: {told} {work}");
+    }
+    let by_words = run(&["optimal", "--where", "t_f=300, v_i=3e-9", "--format", "csv"]);
+    assert_eq!(text(by_words), text(run(&["optimal", "--row", "2", "--format", "csv"])));
+    let step = text(run(&["step", "--row", "0", "--t-f", "100"]));
+    assert!(step.contains("t_f = 100 s") && step.contains("row 0 of table step of rows"), "{step}");
+    // The picture of a CSV names the protocol and its parameters.
+    assert_eq!(run(&["optimal", "--row", "0", "--out", "row.csv"]).status.code(), Some(0));
+    let plot =
+        Command::new(env!("CARGO_BIN_EXE_slipsweep")).current_dir(folder.path()).args(["plot", "row.csv"]).output();
+    assert_eq!(plot.expect("runs").status.code(), Some(0));
+    let picture = fs::read_to_string(folder.path().join("row.svg")).expect("is there");
+    assert!(picture.contains("optimal") && picture.contains("3\u{d7}10") || picture.contains("3e-9"), "no parameters");
+}
+
+#[test]
+fn a_row_without_a_path_says_why() {
+    let folder = tempfile::tempdir().expect("is writable");
+    dataset(folder.path());
+    let complaint = |arguments: &[&str]| {
+        let output = trace(folder.path(), &[&["results/rows"], arguments]);
+        assert_eq!((output.status.code(), output.stdout.len()), (Some(1), 0), "{arguments:?}");
+        String::from_utf8(output.stderr).expect("is text")
+    };
+    let cases: [(&[&str], &str); 10] = [
+        (&[], "error: results/rows: a folder, without a table\n"),
+        (&["optimal"], "error: results/rows: which row of `optimal`?\n  expected: --row N, from 0 to 3, or --where"),
+        (&["optimal", "--row", "4"], "error: results/rows: no row 4 in `optimal`\n  expected: a row from 0 to 3\n"),
+        (
+            &["optimal", "--row", "1"],
+            "error: results/rows: row 1 of `optimal`: its status is infeasible: there is no such protocol\n",
+        ),
+        (
+            &["optimal", "--where", "t_f>0"],
+            "error: results/rows: several rows of `optimal` meet --where \"t_f>0\"\n  found: rows 0, 1, 2, 3\n",
+        ),
+        (&["optimal", "--where", "t_f=7"], "error: results/rows: no row of `optimal` meets --where \"t_f=7\"\n"),
+        (&["optimal", "--where", "t_g=7"], "error: --where: `optimal` has no column `t_g`\n"),
+        (&["optimol", "--row", "1"], "error: results/rows: no table `optimol`\n"),
+        (&["crossover", "--row", "0"], "error: a row of table `crossover` has no path over time\n"),
+        (&["optimal", "--row", "0", "--a", "0.1"], "error: --a: the row of a dataset has its own\n"),
+    ];
+    for (arguments, expected) in cases {
+        let found = complaint(arguments);
+        assert!(found.starts_with(expected), "{arguments:?}: {found}");
+    }
+    assert!(complaint(&["step", "--row", "0"]).contains("has no duration of its own\n  help: add --t-f T"));
 }

@@ -1,11 +1,15 @@
 //! `slipsweep verify`: a sound dataset passes, a planted error is found and named, and what cannot be audited says so.
 
-use std::fs::{self, File};
+use std::fs;
 use std::path::Path;
 use std::process::{Command, Output};
+use std::sync::Arc;
 
-use crate::common::{run, sweep};
-use polars::prelude::{Column, Float64Chunked, NewChunkedArray, ParquetReader, ParquetWriter, SerReader};
+use arrow_array::cast::AsArray;
+use arrow_array::types::Float64Type;
+use arrow_array::{Float64Array, RecordBatch};
+
+use crate::common::{batch, run, sweep, write_batch};
 use slipsweep::dataset::Folder;
 use slipsweep::sweep::Sweep;
 
@@ -54,15 +58,15 @@ fn corrupt(folder: &Path, table: &str, column: &str) -> usize {
 /// Multiplies one value of a column, in the first row that has one, and returns the row.
 fn change(folder: &Path, table: &str, column: &str, factor: f64) -> usize {
     let path = Folder::new(folder, "test").part(table, 0);
-    let mut frame = ParquetReader::new(File::open(&path).expect("is there")).finish().expect("is readable");
+    let rows = batch(&path);
     // `best` has result columns of the same names as axes: none of those is used here.
-    let mut values: Vec<Option<f64>> =
-        frame.column(column).expect("is there").f64().expect("holds numbers").iter().collect();
+    let place = rows.schema().index_of(column).expect("is there");
+    let mut values: Vec<Option<f64>> = rows.column(place).as_primitive::<Float64Type>().iter().collect();
     let row = values.iter().position(Option::is_some).expect("has a value");
     values[row] = values[row].map(|value| value * factor);
-    let changed = Float64Chunked::from_iter_options(column.into(), values.into_iter());
-    frame.replace(column, Column::from(polars::prelude::IntoSeries::into_series(changed))).expect("has the column");
-    ParquetWriter::new(File::create(&path).expect("is writable")).finish(&mut frame).expect("is writable");
+    let mut columns = rows.columns().to_vec();
+    columns[place] = Arc::new(Float64Array::from(values));
+    write_batch(&path, &RecordBatch::try_new(rows.schema(), columns).expect("is a table"));
     row
 }
 

@@ -478,6 +478,27 @@ def elementary_rows():
         yield [repr(x), show(log(y)) if x > 0 else "", show(log1p(y)) if x > -1 else "", show(exp(y)), show(expm1(y))]
 
 
+def friction_min(a, b, t_f, theta):
+    """The least friction of a path along which theta is this cubic of t/t_f, by rising powers: at an end or where its derivative is zero.
+
+    tau = 1 + a ln v + b ln theta with v = n/(t_f theta), n = t_f - theta', so that tau' = 0 where a n' theta + (b - a) theta' n = 0.
+    """
+    times = lambda p, q: [sum((p[i] * q[j - i] for i in range(len(p)) if 0 <= j - i < len(q)), mpf(0)) for j in range(len(p) + len(q) - 1)]
+    derived = lambda p: [i * c for i, c in enumerate(p)][1:]
+    at = lambda p, x: sum(c * x**i for i, c in enumerate(p))
+    rise = derived(theta)
+    n = [t_f - rise[0]] + [-c for c in rise[1:]]
+    first, second = times(derived(n), theta), times(rise, n)
+    sums = [a * (first[i] if i < len(first) else 0) + (b - a) * (second[i] if i < len(second) else 0) for i in range(max(len(first), len(second)))]
+    while sums and sums[-1] == 0:
+        sums.pop()
+    roots = mp.polyroots(sums[::-1], maxsteps=500, extraprec=300) if len(sums) > 1 else []
+    # Where rounding makes two real roots a complex pair, friction is flat, so that their real part will do.
+    places = [mpf(0), mpf(1)] + [r.real for r in roots if abs(r.imag) < mpf(10) ** -10 and 0 < r.real < 1]
+    tau = lambda x: 1 + a * log(at(n, x) / t_f) + (b - a) * log(at(theta, x))
+    return min(tau(x) for x in places)
+
+
 def landscape_point(a, b, v_i, v_f, t_f, a_2, a_3):
     a, b, v_i, v_f, t_f, a_2, a_3 = (mpf(x) for x in (a, b, v_i, v_f, t_f, a_2, a_3))
     q0, q1 = 1 / v_i, 1 / v_f
@@ -511,6 +532,8 @@ def landscape_point(a, b, v_i, v_f, t_f, a_2, a_3):
                 d *= 8
             cuts.add(x)
     work = quad(f, sorted(cuts))
+    if friction_min(a, b, t_f, [q0, a_2, a_3, a_4]) < 0:
+        return work, v_min, "negative_friction"
     return work, v_min, "ok" if v_min >= 1 else "below_bound"
 
 

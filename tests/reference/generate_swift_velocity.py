@@ -11,6 +11,7 @@ near t_min counts as the double that it is.
 """
 import csv, math, random, sys
 from flint import arb, arb_poly, arb_series, ctx
+from generate import friction_min
 from mpmath import exp, log, log1p, mp, mpf, nstr, quad, sqrt
 
 DIGITS = 40
@@ -63,7 +64,9 @@ def step(a, b, v_i, v_f, t_f):
     work = quad(lambda p: tau(p / v_f), [c for c in cuts if c <= 160 or c == end] if end <= 160 else [c for c in cuts if c <= 160])
     if end > 160:
         work += (end - 160) * (1 + (a - b) * log(v_f))
-    return None, work, v_f, v_f, max(tau(mpf(0)), tau(t_f)), (v_f / v_i - 1) * exp(-end), "ok"
+    # At one velocity friction rises or falls with theta, which goes one way.
+    status = "ok" if min(tau(mpf(0)), tau(t_f)) >= 0 else "negative_friction"
+    return None, work, v_f, v_f, max(tau(mpf(0)), tau(t_f)), (v_f / v_i - 1) * exp(-end), status
 
 
 def cubic(a, b, v_i, v_f, t_f):
@@ -78,7 +81,10 @@ def cubic(a, b, v_i, v_f, t_f):
     fine = sorted(set(both_ends(20, 120) + [mpf(i) / 100 for i in range(1, 100)]))
     work = t_f * quad(lambda x: tau(x) * v(x), cuts)
     v_min, v_max = -greatest(lambda x: -v(x), fine), greatest(v, fine)
-    return None, work, v_min, v_max, greatest(tau, fine), mpf(0), "ok" if v_min >= 1 else "below_bound"
+    status = "ok" if v_min >= 1 else "below_bound"
+    if friction_min(a, b, t_f, [1 / v_i, mpf(0), -3 * d / (v_i * v_f), 2 * d / (v_i * v_f)]) < 0:
+        status = "negative_friction"
+    return None, work, v_min, v_max, greatest(tau, fine), mpf(0), status
 
 
 def at(series, h):
@@ -171,7 +177,7 @@ class Bounded:
         raise ArithmeticError("Newton's method does not settle")
 
     def numbers(self, a, b, c, precision):
-        """Work and greatest friction."""
+        """Work, and the greatest and the least friction."""
         work, friction = arb(0), []
 
         def gather(v, theta, h):
@@ -182,15 +188,16 @@ class Bounded:
             friction.extend([tau[0].mid(), at(tau, h)])
             places = [h * i / 16 for i in range(17)]
             for low, high in zip(places, places[1:]):
-                if not (slope(low) > 0 and slope(high) < 0):
+                sign = 1 if slope(low) > 0 else -1
+                if not (sign * slope(low) > 0 and sign * slope(high) < 0):
                     continue
                 for _ in range(120):
                     middle = ((low + high) / 2).mid()
-                    low, high = (middle, high) if slope(middle) > 0 else (low, middle)
+                    low, high = (middle, high) if sign * slope(middle) > 0 else (low, middle)
                 friction.append(at(tau, low))
 
         self.run(c, precision, gather)
-        return work, max(friction, key=float)
+        return work, max(friction, key=float), min(friction, key=float)
 
 
 def bounded_velocity(*case):
@@ -203,14 +210,14 @@ def bounded_velocity(*case):
     c = curve.member()
     found, check = (curve.numbers(a, b, c, precision) for precision in (FINE, OTHER))
     end, turn = curve.run(c, OTHER)
-    off = [abs(end / turn / c)] + [abs((x - y) / y) for x, y in zip(found, check)]
+    off = [abs(end / turn / c)] + [abs((x - y) / y) for x, y in zip(found[:2], check)]
     assert all(difference < 1e-25 for difference in off), [x.str(3) for x in off]
     l = ((v_f - 1) / (v_i - 1)).log()
     top, velocities = (c - l) / (2 * c), [v_i, v_f]
     if top > 0 and top < 1:
         velocities.append(1 + (v_i - 1) * (l * top - c * top * (1 - top)).exp())
     numbers = c / t_f**2, check[0], min(velocities, key=float), max(velocities, key=float), check[1]
-    return *(mpf(x.mid().str(30, radius=False)) for x in numbers), mpf(0), "ok"
+    return *(mpf(x.mid().str(30, radius=False)) for x in numbers), mpf(0), "ok" if check[2] >= 0 else "negative_friction"
 
 
 FAMILIES = {"step": step, "cubic": cubic, "bounded_velocity": bounded_velocity}

@@ -10,8 +10,12 @@ const PAPER: Transition = Transition { law: Law { a: 0.03, b: 0.05 }, v_i: 3.0, 
 
 fn best(transition: &Transition, t_f: f64, bounded: bool) -> Best {
     let solved = solve(transition, t_f, bounded, 1e-10);
-    assert!(matches!(solved.status, Status::Ok | Status::BelowBound), "{transition:?} {t_f} {:?}", solved.status);
-    solved.value.expect("a solved row has values")
+    let found = solved.value.expect("a solved row has values");
+    // At the border v = 0 friction falls without limit.
+    let at_border = found.v_min == 0.0 && solved.status == Status::NegativeFriction;
+    let expected = at_border || matches!(solved.status, Status::Ok | Status::BelowBound);
+    assert!(expected, "{transition:?} {t_f} {:?}", solved.status);
+    found
 }
 
 fn relative(found: f64, expected: f64) -> f64 {
@@ -31,7 +35,12 @@ fn scan(transition: &Transition, t_f: f64, bounded: bool, centre: (f64, f64), re
         let out = Shortcuts { work: &mut work, v_min: &mut v_min, status: &mut status };
         landscape.evaluate(&vec![at(centre.0, i); n], &a_3, out);
         for (work, status) in work.into_iter().zip(status) {
-            if (status == Status::Ok || (!bounded && status == Status::BelowBound)) && work < least {
+            let admissible = match status {
+                Status::Ok => true,
+                Status::BelowBound | Status::NegativeFriction => !bounded,
+                _ => false,
+            };
+            if admissible && work < least {
                 least = work;
             }
         }

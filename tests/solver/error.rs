@@ -7,11 +7,14 @@ use slipsweep::protocol::optimal::{self, Optimum};
 use slipsweep::protocol::swift::{Case, find};
 use slipsweep::protocol::{Effort, Slider, Status, best, compliant, error};
 
+use crate::extent::quick_or_long;
 use crate::stress::random::Random;
 use crate::{judge, reference};
 
 /// Points of the stress sample in a test.
-const POINTS: u64 = 800;
+fn points() -> u64 {
+    quick_or_long(100, 800)
+}
 
 /// Accuracies that are asked for.
 const RTOLS: [f64; 6] = [1e-4, 1e-6, 1e-8, 1e-10, 1e-12, 1e-13];
@@ -62,7 +65,8 @@ fn work(transition: &Transition, t_f: f64, rtol: f64, (a_2, a_3): (f64, f64)) ->
 fn work_errors_of_random_shortcuts_are_bounded_and_within_rtol() {
     let mut claims: [Vec<Claim>; RTOLS.len()] = Default::default();
     let mut unjudged = 0;
-    for index in 0..POINTS {
+    let points = points();
+    for index in 0..points {
         let random = &mut Random::of("work_error of gap", index);
         let transition = random.transition();
         let t_f = random.duration(&transition, true);
@@ -82,7 +86,7 @@ fn work_errors_of_random_shortcuts_are_bounded_and_within_rtol() {
             claims.push(Claim { found, bound: error::of_shortcut(&transition, t_f, v_min, found, finest), truth });
         }
     }
-    assert!(claims[0].len() as u64 > POINTS / 3 && unjudged < POINTS / 8, "{} {unjudged}", claims[0].len());
+    assert!(claims[0].len() as u64 > points / 3 && unjudged < points / 8, "{} {unjudged}", claims[0].len());
     for (rtol, claims) in RTOLS.iter().zip(&claims) {
         assert_honest(&format!("{rtol}"), claims);
     }
@@ -97,7 +101,8 @@ fn least_work(transition: &Transition, t_f: f64, bounded: bool, rtol: f64) -> Op
 fn work_errors_of_random_optima_are_bounded() {
     let mut claims: [Vec<Claim>; RTOLS.len()] = Default::default();
     let mut unjudged = 0;
-    for index in 0..POINTS {
+    let points = points();
+    for index in 0..points {
         let random = &mut Random::of("work_error of optimal", index);
         let (transition, bounded) = (random.transition(), random.chance(0.7));
         let t_f = random.duration(&transition, bounded);
@@ -121,7 +126,7 @@ fn work_errors_of_random_optima_are_bounded() {
             claims.push(claim);
         }
     }
-    assert!(claims[0].len() as u64 > POINTS / 3 && unjudged < POINTS / 8, "{} {unjudged}", claims[0].len());
+    assert!(claims[0].len() as u64 > points / 3 && unjudged < points / 8, "{} {unjudged}", claims[0].len());
     for (rtol, claims) in RTOLS.iter().zip(&claims) {
         assert_honest(&format!("{rtol}"), claims);
     }

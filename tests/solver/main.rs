@@ -5,6 +5,9 @@ mod best;
 mod budgets;
 mod compliant;
 mod error;
+#[path = "../extent/mod.rs"]
+mod extent;
+mod friction;
 mod hopf;
 mod judge;
 mod landscape;

@@ -578,7 +578,7 @@ fn regress_a_standstill_is_infeasible() {
         let found = solve(&case, 1e-3, 1e-10);
         (found.status, found.value.is_some())
     };
-    assert_eq!([0.05, 0.02].map(at), [(Status::Nonphysical, true), (Status::Infeasible, false)]);
+    assert_eq!([0.05, 0.02].map(at), [(Status::NegativeFriction, true), (Status::Infeasible, false)]);
 }
 
 /// A piece that is short beside the lifetime of contacts: theta hardly tells what its velocity is, the slip does.

@@ -8,8 +8,10 @@ use sqlparser::dialect::PostgreSqlDialect;
 use sqlparser::parser::{Parser, ParserError};
 use sqlparser::tokenizer::Token;
 
+use super::super::block::{Factor, Label};
 use super::super::quantity::Quantity;
 use super::program::{Binary, Expression, Op, Unary};
+use crate::names::nearest;
 
 /// The longest expression, in bytes: it bounds memory and depth.
 const LONGEST: usize = 1000;
@@ -40,28 +42,37 @@ impl Fault {
     }
 }
 
-/// The functions of one number.
-const UNARY: [(&str, Unary); 7] = [
+/// The functions of one number. `log` is that of SQL.
+const UNARY: [(&str, Unary); 9] = [
     ("abs", Unary::Abs),
     ("sqrt", Unary::Sqrt),
     ("exp", Unary::Exp),
     ("ln", Unary::Ln),
     ("log10", Unary::Log10),
+    ("log", Unary::Log10),
     ("floor", Unary::Floor),
     ("ceil", Unary::Ceil),
+    ("ceiling", Unary::Ceil),
 ];
 
-/// The functions of two numbers; `min` and `max` take more.
-const BINARY: [(&str, Binary); 3] = [("min", Binary::Min), ("max", Binary::Max), ("pow", Binary::Power)];
+/// The functions of two numbers, in both of SQL's spellings; only powers take no more.
+const BINARY: [(&str, Binary); 6] = [
+    ("min", Binary::Min),
+    ("least", Binary::Min),
+    ("max", Binary::Max),
+    ("greatest", Binary::Max),
+    ("pow", Binary::Power),
+    ("power", Binary::Power),
+];
 
 /// What is let in, in words.
-const GRAMMAR: &str = "axes, numbers, + - * / ^, comparisons, and, or, not, in (...), between, abs, sqrt, exp, ln, log10, floor, \
-                       ceil, min, max, pow";
+const GRAMMAR: &str = "axes, numbers, + - * / ^, comparisons, and, or, not, in (...), between, abs, sqrt, exp, ln (natural logarithm), \
+                       log or log10 (to base 10), floor, ceil, min, max, pow";
 
 impl Expression {
     /// Reads a number computed from `axes`.
     pub fn number(text: &str, axes: &[Quantity]) -> Result<Expression, Fault> {
-        let (expression, kind) = read(text, axes)?;
+        let (expression, kind) = read(text, axes, None)?;
         if kind == Kind::Number {
             return Ok(expression);
         }
@@ -73,9 +84,9 @@ impl Expression {
         ))
     }
 
-    /// Reads a condition on `axes`.
-    pub fn condition(text: &str, axes: &[Quantity]) -> Result<Expression, Fault> {
-        let (expression, kind) = read(text, axes)?;
+    /// Reads a condition on `axes` and on the labels of `points`.
+    pub fn condition(text: &str, axes: &[Quantity], points: Option<&Factor>) -> Result<Expression, Fault> {
+        let (expression, kind) = read(text, axes, points)?;
         if kind == Kind::Truth {
             return Ok(expression);
         }
@@ -90,17 +101,17 @@ enum Kind {
     Truth,
 }
 
-fn read(text: &str, axes: &[Quantity]) -> Result<(Expression, Kind), Fault> {
+fn read(text: &str, axes: &[Quantity], points: Option<&Factor>) -> Result<(Expression, Kind), Fault> {
     if text.len() > LONGEST {
         let found = format!("{} characters", text.chars().count());
         return Err(Fault::new(None, found, format!("at most {LONGEST}"), "shorten the expression"));
     }
-    // To SQL these begin comments: what follows them would be passed over.
-    for comment in ["--", "/*"] {
-        if let Some(place) = text.find(comment) {
+    // To SQL the first two begin comments: what follows them would be passed over.
+    let foreign = [("--", "put a space or parentheses between"), ("/*", "remove it"), ("**", "write `^` for a power")];
+    for (sign, help) in foreign {
+        if let Some(place) = text.find(sign) {
             let position = text[..place].chars().count() as u64 + 1;
-            let help = if comment == "--" { "put a space or parentheses between" } else { "remove it" };
-            return Err(Fault::new(Some(position), format!("`{comment}`"), GRAMMAR, help));
+            return Err(Fault::new(Some(position), format!("`{sign}`"), GRAMMAR, help));
         }
     }
     // One line, so that a column is a position.
@@ -118,7 +129,7 @@ fn read(text: &str, axes: &[Quantity]) -> Result<(Expression, Kind), Fault> {
         };
         return Err(Fault::new(Some(rest.span.start.column), found, "nothing more", help));
     }
-    let mut compiler = Compiler { axes, program: Vec::new() };
+    let mut compiler = Compiler { line: &line, axes, points, program: Vec::new() };
     let kind = compiler.compile(&expression)?;
     Ok((Expression { program: compiler.program }, kind))
 }
@@ -149,7 +160,9 @@ fn syntax(line: &str, error: ParserError) -> Fault {
 }
 
 struct Compiler<'a> {
+    line: &'a str,
     axes: &'a [Quantity],
+    points: Option<&'a Factor>,
     program: Vec<Op>,
 }
 
@@ -161,6 +174,12 @@ impl Compiler<'_> {
             Expr::Identifier(name) if name.value == "inf" => {
                 self.program.push(Op::Number(f64::INFINITY));
                 Ok(Kind::Number)
+            }
+            Expr::Identifier(name) if self.label(&name.value).is_some() => {
+                let word =
+                    self.label(&name.value).and_then(|(_, _, label)| label.words.first()).map_or("", String::as_str);
+                let (found, help) = (format!("`{name}` is a label"), format!("write `{name} = '{word}'`"));
+                Err(Fault::new(position(expression), found, "a comparison with a word", help))
             }
             Expr::Identifier(name) if name.quote_style.is_none() => {
                 let quantity = self.axis(&name.value, expression)?;
@@ -258,6 +277,13 @@ impl Compiler<'_> {
         })
     }
 
+    /// The label of this name: an axis that varies with it, its number among the labels, and itself.
+    fn label(&self, name: &str) -> Option<(Quantity, usize, &Label)> {
+        let points = self.points?;
+        let place = points.labels.iter().position(|label| label.name == name)?;
+        Some((points.axes.first()?.quantity, place, &points.labels[place]))
+    }
+
     fn operand(&mut self, expression: &Expr, wanted: Kind) -> Result<(), Fault> {
         let found = self.compile(expression)?;
         if found == wanted {
@@ -280,8 +306,28 @@ impl Compiler<'_> {
         })
     }
 
-    /// Whether two sides are the same: numbers, or an axis of words and a word.
+    /// The fault of a comparison of `axis` with a word, `other`, that does not stand in single quotes.
+    fn unquoted(&self, axis: &Expr, other: &Expr) -> Option<Fault> {
+        let (Expr::Identifier(axis), Expr::Identifier(word)) = (axis, other) else { return None };
+        let quantity = self.axes.iter().find(|quantity| quantity.name() == axis.value)?;
+        let words = quantity.words();
+        let is_axis = word.quote_style.is_none() && self.axes.iter().any(|quantity| quantity.name() == word.value);
+        if words.is_empty() || is_axis {
+            return None;
+        }
+        let meant = nearest(&word.value, words.iter().copied()).unwrap_or(words[0]);
+        let known: Vec<String> = words.iter().map(|word| format!("'{word}'")).collect();
+        let help = format!("text goes in single quotes: `{} = '{meant}'`", quantity.name());
+        Some(Fault::new(position(other), format!("`{other}` is no word"), known.join(", "), help))
+    }
+
+    /// Whether two sides are the same: numbers, or an axis of words, or a label, and a word.
     fn equal(&mut self, left: &Expr, right: &Expr) -> Result<(), Fault> {
+        for (axis, other) in [(left, right), (right, left)] {
+            if let Some(fault) = self.unquoted(axis, other) {
+                return Err(fault);
+            }
+        }
         let (axis, word) = match (word(left), word(right)) {
             (None, Some(word)) => (left, (word, right)),
             (Some(word), None) => (right, (word, left)),
@@ -294,6 +340,23 @@ impl Compiler<'_> {
         };
         let (word, place) = word;
         let Expr::Identifier(name) = axis else { return Err(foreign(place)) };
+        if let Some((axis, number, label)) = self.label(&name.value) {
+            let Some(code) = label.words.iter().position(|known| known == word) else {
+                let (found, expected) =
+                    (format!("no point has the {name} '{word}'"), format!("a word of the column `{name}`"));
+                let help = match nearest(word, label.words.iter().map(String::as_str)) {
+                    Some(meant) => format!("did you mean `{meant}`?"),
+                    None => "correct the word".to_owned(),
+                };
+                return Err(Fault::new(position(place), found, expected, help));
+            };
+            self.program.extend([
+                Op::Label { label: number, axis },
+                Op::Number(code as f64),
+                Op::Binary(Binary::Equal),
+            ]);
+            return Ok(());
+        }
         let quantity = self.axis(&name.value, axis)?;
         let words = quantity.words();
         let Some(number) = words.iter().position(|known| *known == word) else {
@@ -334,17 +397,28 @@ impl Compiler<'_> {
             }
             BinaryOperator::And => (Binary::And, Kind::Truth, Kind::Truth),
             BinaryOperator::Or => (Binary::Or, Kind::Truth, Kind::Truth),
-            BinaryOperator::PGOverlap | BinaryOperator::StringConcat => {
-                let (found, help) =
-                    if *op == BinaryOperator::PGOverlap { ("`&&`", "write `and`") } else { ("`||`", "write `or`") };
-                return Err(Fault::new(position(right), format!("{found} before this"), GRAMMAR, help));
+            _ => {
+                let help = match op {
+                    BinaryOperator::PGOverlap => "write `and`",
+                    BinaryOperator::StringConcat => "write `or`",
+                    _ => REMOVE,
+                };
+                return Err(Fault::new(self.operator(left, op), format!("`{op}`"), GRAMMAR, help));
             }
-            _ => return Err(foreign(whole)),
         };
         self.operand(left, operands)?;
         self.operand(right, operands)?;
         self.program.push(Op::Binary(function));
         Ok(kind)
+    }
+
+    /// Where the operator after `left` is.
+    fn operator(&self, left: &Expr, op: &BinaryOperator) -> Option<u64> {
+        // Parentheses are no part of a span.
+        let end = left.span().end.column.saturating_sub(1);
+        let rest: String = self.line.chars().skip(end as usize).collect();
+        let place = rest.find(&op.to_string())?;
+        Some(end + rest[..place].chars().count() as u64 + 1)
     }
 
     fn call(&mut self, name: &str, arguments: &[&Expr], whole: &Expr) -> Result<Kind, Fault> {
@@ -391,11 +465,15 @@ fn position(expression: &Expr) -> Option<u64> {
     (column > 0).then_some(column)
 }
 
+/// What to do about something that the language does not have.
+const REMOVE: &str = "remove it, or write it with what is listed";
+
 /// A fault of what SQL allows and this language does not.
 fn foreign(expression: &Expr) -> Fault {
-    let help = match word(expression) {
-        Some(_) => "compare an axis of words with it, as in `family = 'step'`",
-        None => "remove it, or write it with what is listed",
+    let help = match expression {
+        _ if word(expression).is_some() => "compare an axis of words with it, as in `family = 'step'`",
+        Expr::Identifier(_) => "names stand without quotes; text goes in single quotes, as in `family = 'step'`",
+        _ => REMOVE,
     };
     Fault::new(position(expression), format!("`{expression}`"), GRAMMAR, help)
 }

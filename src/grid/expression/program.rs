@@ -7,6 +7,13 @@ use super::super::quantity::Quantity;
 pub(super) enum Op {
     /// Pushes the values of an axis.
     Axis(Quantity),
+    /// Pushes the places of the words of a label, by its number among those of the factor that holds `axis`; -1 where a step has none.
+    Label {
+        /// The number of the label.
+        label: usize,
+        /// An axis of the factor.
+        axis: Quantity,
+    },
     /// Pushes a constant.
     Number(f64),
     /// Replaces the last value.
@@ -54,19 +61,30 @@ pub struct Expression {
     pub(super) program: Vec<Op>,
 }
 
-/// Values of quantities at several points.
+/// Values of quantities, and places of the words of labels, at several points.
 #[derive(Debug, Clone, Default)]
-pub struct Columns([Vec<f64>; Quantity::ALL.len()]);
+pub struct Columns {
+    values: [Vec<f64>; Quantity::ALL.len()],
+    labels: Vec<Vec<f64>>,
+}
 
 impl Columns {
     /// The values of `quantity`.
     pub fn get(&self, quantity: Quantity) -> &[f64] {
-        &self.0[quantity as usize]
+        &self.values[quantity as usize]
     }
 
     /// The values of `quantity`, to be filled.
     pub fn get_mut(&mut self, quantity: Quantity) -> &mut Vec<f64> {
-        &mut self.0[quantity as usize]
+        &mut self.values[quantity as usize]
+    }
+
+    /// The places of a label, to be filled.
+    pub fn label_mut(&mut self, label: usize) -> &mut Vec<f64> {
+        if self.labels.len() <= label {
+            self.labels.resize_with(label + 1, Vec::new);
+        }
+        &mut self.labels[label]
     }
 }
 
@@ -75,11 +93,11 @@ impl Columns {
 pub struct Stack(Vec<Vec<f64>>);
 
 impl Expression {
-    /// The quantities that it names, each once.
+    /// The quantities that it names, or that vary with labels that it names, each once.
     pub fn reads(&self) -> Vec<Quantity> {
         let mut reads = Vec::new();
         for op in &self.program {
-            if let Op::Axis(quantity) = op
+            if let Op::Axis(quantity) | Op::Label { axis: quantity, .. } = op
                 && !reads.contains(quantity)
             {
                 reads.push(*quantity);
@@ -88,12 +106,20 @@ impl Expression {
         reads
     }
 
+    /// The labels that it names: an axis of the factor that has each, and its number there.
+    pub fn labels(&self) -> impl Iterator<Item = (Quantity, usize)> {
+        self.program.iter().filter_map(|op| match op {
+            Op::Label { label, axis } => Some((*axis, *label)),
+            _ => None,
+        })
+    }
+
     /// Its values at the `length` points of `columns`.
     pub fn evaluate<'s>(&self, columns: &Columns, length: usize, stack: &'s mut Stack) -> &'s [f64] {
         let stack = &mut stack.0;
         let mut top = 0;
         for op in &self.program {
-            if matches!(op, Op::Axis(_) | Op::Number(_)) {
+            if matches!(op, Op::Axis(_) | Op::Label { .. } | Op::Number(_)) {
                 if stack.len() == top {
                     stack.push(Vec::new());
                 }
@@ -102,6 +128,10 @@ impl Expression {
             }
             match *op {
                 Op::Axis(quantity) => stack[top - 1].extend_from_slice(columns.get(quantity)),
+                Op::Label { label, .. } => {
+                    let column = columns.labels.get(label).map_or(&[][..], Vec::as_slice);
+                    stack[top - 1].extend_from_slice(column);
+                }
                 Op::Number(number) => stack[top - 1].resize(length, number),
                 Op::Unary(function) => unary(function, &mut stack[top - 1]),
                 Op::Binary(function) => {

@@ -13,7 +13,9 @@ pub struct Defaults {
     pub x: &'static [&'static str],
     /// Vertical axes of a map.
     pub y: &'static [&'static str],
-    /// Columns of the colours of a map: the first that has a value.
+    /// Columns of words that colour a map where they vary.
+    pub classes: &'static [&'static str],
+    /// Columns of the colours of a map otherwise: the first that has a value.
     pub value: &'static [&'static str],
     /// Columns of lines, a panel each.
     pub lines: &'static [&'static str],
@@ -21,6 +23,8 @@ pub struct Defaults {
     pub series: &'static [&'static str],
     /// Values of both axes from which on a map is drawn.
     pub least_map: usize,
+    /// Whether single points of a plane, such as materials, make a map however few they are: lines between them mean nothing.
+    pub scatters: bool,
 }
 
 /// A map or lines.
@@ -55,6 +59,18 @@ pub fn choose(survey: &Survey, defaults: &Defaults, request: &Request) -> Result
         long.max_by_key(|axis| axis.values.len()).map(|axis| axis.name.clone())
     };
     let value = || {
+        for class in defaults.classes.iter().filter(|class| survey.has(class)) {
+            let mut seen = None;
+            let mut varies = false;
+            survey.each_while(&[class], |row| {
+                varies |= row[0].is_finite() && seen.is_some_and(|seen| seen != row[0]);
+                seen = seen.or(Some(row[0]).filter(|place| place.is_finite()));
+                !varies
+            })?;
+            if varies {
+                return Ok((*class).to_owned());
+            }
+        }
         let there = defaults.value.iter().filter(|column| survey.has(column));
         let mut columns: Vec<String> = there.map(|&column| column.to_owned()).collect();
         // The first in which any row has a value.
@@ -82,11 +98,16 @@ pub fn choose(survey: &Survey, defaults: &Defaults, request: &Request) -> Result
     }
     let wants_map = colour.is_some_and(|colour| !is_axis(colour));
     let wants_lines = y.is_some() || colour.is_some_and(is_axis);
-    let least = if wants_map { 2 } else { defaults.least_map };
+    let longest_axis = varying.iter().map(|axis| axis.values.len()).max().unwrap_or(0);
+    let is_scattered = defaults.scatters && varying.len() > 1 && survey.rows <= 2 * longest_axis as u64;
+    let least = if wants_map || is_scattered { 2 } else { defaults.least_map };
     let first = x.map(str::to_owned).or_else(|| find(defaults.x, None, least));
     if let Some(first) = first.filter(|_| !wants_lines && least < usize::MAX) {
         // An axis that only changes along with the first would make a map of a single line.
-        for second in defaults.y.iter().chain(defaults.x) {
+        // One of the grid comes before one that is computed from others.
+        let others = [defaults.y, defaults.x].concat();
+        let (gridded, computed): (Vec<&str>, Vec<&str>) = others.into_iter().partition(|name| survey.gridded.has(name));
+        for second in [gridded, computed].concat() {
             if let Some(second) = find(&[second], Some(&first), least)
                 && !survey.follows(&second, &first)?
             {

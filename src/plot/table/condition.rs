@@ -57,8 +57,7 @@ impl Condition {
 
     /// It as it may be typed.
     pub fn shown(&self) -> String {
-        let sign = SIGNS.iter().rev().find(|(_, relation)| *relation == self.relation).map_or("=", |(sign, _)| sign);
-        format!("{} {sign} {}", self.column, self.value)
+        self.shown_with(&self.value)
     }
 
     /// Whether a number fulfils it; where there is none, it never does.
@@ -73,6 +72,38 @@ impl Condition {
             Relation::Greater => cell > value && !equal,
             Relation::AtLeast => cell > value || equal,
         }
+    }
+
+    /// Whether a number from `low` to `high` may fulfil it.
+    pub fn may_hold(&self, low: f64, high: f64) -> bool {
+        let Ok(value) = self.value.parse::<f64>() else { return false };
+        match self.relation {
+            Relation::Equal => low <= value && value <= high || self.holds(low) || self.holds(high),
+            Relation::Unequal => low != high || self.holds(low),
+            Relation::Less | Relation::AtMost => self.holds(low),
+            Relation::Greater | Relation::AtLeast => self.holds(high),
+        }
+    }
+
+    /// The number that a column is to be equal to.
+    pub fn wanted(&self) -> Option<f64> {
+        (self.relation == Relation::Equal).then(|| self.value.parse().ok()).flatten()
+    }
+
+    /// The word that a column is to be equal to.
+    pub fn word(&self) -> Option<&str> {
+        (self.relation == Relation::Equal).then_some(self.value.as_str())
+    }
+
+    /// The same with another number, as it may be typed on a command line.
+    pub fn typed(&self, value: Option<f64>) -> String {
+        let value = value.map_or_else(|| self.value.clone(), |value| format!("{value:?}"));
+        self.shown_with(value.strip_suffix(".0").unwrap_or(&value)).replace(' ', "")
+    }
+
+    fn shown_with(&self, value: &str) -> String {
+        let sign = SIGNS.iter().rev().find(|(_, relation)| *relation == self.relation).map_or("=", |(sign, _)| sign);
+        format!("{} {sign} {value}", self.column)
     }
 
     /// Whether a word fulfils it.
@@ -98,6 +129,34 @@ mod tests {
         assert!(conditions[0].holds(0.03) && !conditions[0].holds(0.031) && !conditions[0].holds(f64::NAN));
         assert!(conditions[1].holds(10.0) && conditions[1].holds(11.0) && !conditions[1].holds(9.0));
         assert!(conditions[2].holds_word(Some("step")) && !conditions[2].holds_word(Some("cubic")));
+    }
+
+    #[test]
+    fn ranges_that_cannot_hold_are_known() {
+        let may_hold = |text: &str, low, high| {
+            let conditions = Condition::all(text).expect("a condition");
+            conditions[0].may_hold(low, high)
+        };
+        assert!(may_hold("a=0.03", 0.01, 0.05) && may_hold("a=0.03", 0.03 * (1.0 + 1e-12), 0.05));
+        assert!(!may_hold("a=0.03", 0.04, 0.05) && !may_hold("a=word", 0.01, 0.05));
+        assert!(may_hold("a!=0.03", 0.03, 0.04) && !may_hold("a!=0.03", 0.03, 0.03));
+        assert!(may_hold("a<0.03", 0.01, 0.05) && !may_hold("a<0.03", 0.03, 0.05) && may_hold("a<=0.03", 0.03, 0.05));
+        assert!(may_hold("a>0.03", 0.01, 0.05) && !may_hold("a>0.03", 0.01, 0.03) && may_hold("a>=0.03", 0.01, 0.03));
+    }
+
+    #[test]
+    fn conditions_are_typed_as_they_are_read() {
+        let conditions = Condition::all("v_f = 100, a >= 0.03").expect("two conditions");
+        assert_eq!(conditions[0].typed(Some(100.0000001)), "v_f=100.0000001");
+        assert_eq!((conditions[0].typed(Some(50.0)), conditions[1].typed(None)), ("v_f=50".into(), "a>=0.03".into()));
+    }
+
+    #[test]
+    fn words_may_stand_in_quotes_of_any_kind() {
+        for text in ["status=ok", "status = 'ok'", "status = \"ok\"", "status == ok"] {
+            let conditions = Condition::all(text).expect("a condition");
+            assert!(conditions[0].holds_word(Some("ok")) && !conditions[0].holds_word(Some("infeasible")), "{text}");
+        }
     }
 
     #[test]

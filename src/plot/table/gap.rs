@@ -34,10 +34,11 @@ pub fn draw(scene: &Scene<'_>, shape: &Shape) -> Result<Figure, PlotError> {
     let stroke = Stroke::solid("#000", 0.9);
     let best = best(scene, &groups)?;
     let from_table = best.iter().any(Option::is_some);
-    let (mut any_line, mut any_star) = (false, false);
+    let (mut any_line, mut any_zero, mut any_star) = (false, false, false);
     for (place, panel) in figure.panels.iter_mut().enumerate() {
-        if let Some(lines) = bound(scene, &groups, place, &cells) {
+        if let Some(Border { lines, meets_zero }) = bound(scene, &groups, place, &cells) {
             any_line |= !lines.is_empty();
+            any_zero |= meets_zero;
             panel.layers.push(Layer::Contour(lines, stroke.clone()));
         }
         let star = if from_table { best[place] } else { least[place].map(|(x, y, _)| (x, y)) };
@@ -45,7 +46,7 @@ pub fn draw(scene: &Scene<'_>, shape: &Shape) -> Result<Figure, PlotError> {
         panel.layers.extend(star.map(|star| Layer::Stars(vec![star])));
     }
     if any_line {
-        figure.legend.push(Entry { key: Key::Contour(stroke), text: bound_in_words(scene) });
+        figure.legend.push(Entry { key: Key::Contour(stroke), text: bound_in_words(scene, any_zero) });
     }
     if any_star {
         let text = if from_table { "best shortcut" } else { "least gap of the grid" };
@@ -54,14 +55,23 @@ pub fn draw(scene: &Scene<'_>, shape: &Shape) -> Result<Figure, PlotError> {
     Ok(figure)
 }
 
-fn bound_in_words(scene: &Scene<'_>) -> String {
+fn bound_in_words(scene: &Scene<'_>, meets_zero: bool) -> String {
     let bound = if scene.source.units == Units::Scaled { "1" } else { "*v*_{0}" };
-    format!("*v*_{{min}} = {bound}")
+    let zero = if meets_zero { " or *θ* = 0" } else { "" };
+    format!("*v*_{{min}} = {bound}{zero}")
 }
 
-/// The line along which the least velocity of a shortcut is 1. Its border with what is infeasible is often nearer than a cell, so it is
-/// found from the cubic itself: where `theta > 0`, `v >= 1` says that `1 - theta' - theta >= 0`.
-fn bound(scene: &Scene<'_>, groups: &Groups, panel: usize, cells: &[AxisCells; 2]) -> Option<Vec<Vec<(f64, f64)>>> {
+/// A border of shortcuts.
+struct Border {
+    lines: Vec<Vec<(f64, f64)>>,
+    /// Whether a piece of it is where `theta` becomes 0.
+    meets_zero: bool,
+}
+
+/// The border of the shortcuts of which the least velocity is 1 or more, and whether a piece of it is where `theta` becomes 0 instead, as it
+/// does far from the optimum. Its border with what is infeasible is often nearer than a cell, so it is found from the cubic itself: where
+/// `theta > 0`, `v >= 1` says that `1 - theta' - theta >= 0`.
+fn bound(scene: &Scene<'_>, groups: &Groups, panel: usize, cells: &[AxisCells; 2]) -> Option<Border> {
     let value = |name| scene.scaled(groups, panel, name);
     let (t_f, start, end) = (value("t_f")?, 1.0 / value("v_i")?, 1.0 / value("v_f")?);
     // Coefficients in units of 1/t_f and 1/t_f^2 do not depend on it.
@@ -70,6 +80,7 @@ fn bound(scene: &Scene<'_>, groups: &Groups, panel: usize, cells: &[AxisCells; 2
     let (unit_2, unit_3) = (unit(ALPHAS[0], t_f), unit(ALPHAS[1], t_f * t_f / rate));
     let at = |cells: &AxisCells, step: usize| cells.scale.value(step as f64 / STEPS as f64);
     let mut margin = Vec::with_capacity((STEPS + 1) * (STEPS + 1));
+    let mut is_zero = Vec::with_capacity((STEPS + 1) * (STEPS + 1));
     for row in 0..=STEPS {
         let a_3 = at(&cells[1], row) * unit_3;
         for column in 0..=STEPS {
@@ -79,12 +90,19 @@ fn bound(scene: &Scene<'_>, groups: &Groups, panel: usize, cells: &[AxisCells; 2
             let slope = [a_2, 2.0 * a_3, 3.0 * a_4, 0.0];
             let excess =
                 Cubic { c: std::array::from_fn(|i| if i == 0 { t_f } else { 0.0 } - slope[i] - t_f * theta.c[i]) };
-            margin.push(if theta.least() > 0.0 { excess.least() } else { f64::NAN });
+            let (theta, excess) = (theta.least(), excess.least());
+            // In units in which both are of the order of 1.
+            margin.push((excess / t_f).min(theta / start.min(end)));
+            is_zero.push(theta <= 0.0 && excess >= 0.0);
         }
     }
     let lines = contour(Field { columns: STEPS + 1, rows: STEPS + 1, values: &margin }, 0.0);
     let place = |(x, y): (f64, f64)| (cells[0].scale.value(x / STEPS as f64), cells[1].scale.value(y / STEPS as f64));
-    Some(lines.into_iter().map(|line| line.into_iter().map(place).collect()).collect())
+    let is_inside = |node: Option<usize>| node.and_then(|node| margin.get(node)).is_some_and(|margin| *margin > 0.0);
+    let neighbours =
+        |node: usize| [node.checked_sub(1), Some(node + 1), node.checked_sub(STEPS + 1), Some(node + STEPS + 1)];
+    let meets_zero = (0..margin.len()).any(|node| is_zero[node] && neighbours(node).into_iter().any(is_inside));
+    Some(Border { lines: lines.into_iter().map(|line| line.into_iter().map(place).collect()).collect(), meets_zero })
 }
 
 /// The best shortcut of each panel, from the table `best`, if the dataset has it.

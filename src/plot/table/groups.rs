@@ -8,18 +8,88 @@ use crate::plot::{PlotError, label};
 /// Most different groups that are told apart.
 const MOST_GROUPS: usize = 4096;
 
-/// The axes that vary besides those that are drawn and tell rows apart, and a sentence on those that only change along.
+/// Most panels in a row, and in a column, of a figure that crosses two axes.
+const MOST_CROSSED: usize = 4;
+
+/// The axes that vary besides those that are drawn and tell rows apart, and a sentence on those that only change along. An axis of the
+/// grid always tells them apart, whichever rows are left of it.
 pub fn further<'a>(survey: &'a Survey, drawn: &[&str]) -> Result<(Vec<&'a str>, Option<String>), PlotError> {
     let others =
         survey.axes.iter().filter(|axis| (axis.varies() || axis.infinite) && !drawn.contains(&axis.name.as_str()));
     let others: Vec<&str> = others.map(|axis| axis.name.as_str()).collect();
     let mut determined = survey.determined(&others, drawn)?.into_iter();
-    let (along, further): (Vec<&str>, Vec<&str>) = others.into_iter().partition(|_| determined.next().unwrap_or(false));
+    let is_along = |name: &str, is_determined: bool| {
+        let gridded = survey.axis(name).is_some_and(|axis| axis.varies()) && survey.gridded.is_free(name, drawn);
+        is_determined && !gridded
+    };
+    let (along, further): (Vec<&str>, Vec<&str>) =
+        others.into_iter().partition(|name| is_along(name, determined.next().unwrap_or(false)));
     let along: Vec<&str> = along.into_iter().filter(|name| survey.axis(name).is_some_and(Values::varies)).collect();
     let list = |names: &[&str]| names.iter().map(|name| label::name(name)).collect::<Vec<_>>().join(" and ");
     let verb = if along.len() == 1 { "changes" } else { "change" };
     let note = (!along.is_empty()).then(|| format!("Along with {}, {} {verb}.", list(drawn), list(&along)));
     Ok((further, note))
+}
+
+/// Whether the rows are single points over `x`, such as materials of which each has its own values of several axes: an axis that changes
+/// along with `x` neither rises nor falls with it.
+pub fn is_scattered(survey: &Survey, x: &str, further: &[&str]) -> Result<bool, PlotError> {
+    for axis in survey.axes.iter().filter(|axis| axis.varies() && axis.name != x && axis.words.is_empty()) {
+        if !further.contains(&axis.name.as_str()) && !survey.follows(&axis.name, x)? {
+            return Ok(true);
+        }
+    }
+    Ok(false)
+}
+
+/// The axes of a spec that are lists or ranges, which multiply; axes that are zipped, or computed from each other, are one.
+#[derive(Debug, Clone, Default)]
+pub struct Gridded {
+    axes: Vec<String>,
+    /// Axes that change together.
+    tied: Vec<Vec<String>>,
+}
+
+impl Gridded {
+    /// Those of a spec; none of one that is damaged.
+    pub fn of(spec: &str) -> Gridded {
+        let mut gridded = Gridded::default();
+        let Ok(spec) = spec.parse::<toml::Table>() else { return gridded };
+        let blocks = spec.get("block").and_then(toml::Value::as_array).into_iter().flatten();
+        for part in [&spec].into_iter().chain(blocks.filter_map(toml::Value::as_table)) {
+            let is_range = |value: &toml::Value| match value {
+                toml::Value::Array(values) => values.len() > 1,
+                toml::Value::Table(table) => table.contains_key("linspace") || table.contains_key("geomspace"),
+                _ => false,
+            };
+            let axes = || part.get("axes").and_then(toml::Value::as_table).into_iter().flatten();
+            gridded.axes.extend(axes().filter(|(_, value)| is_range(value)).map(|(name, _)| name.clone()));
+            let zipped = part.get("zip").and_then(toml::Value::as_array).into_iter().flatten();
+            let names = |zip: &toml::Value| {
+                zip.as_array().into_iter().flatten().filter_map(|name| Some(name.as_str()?.to_owned())).collect()
+            };
+            gridded.tied.extend(zipped.map(names));
+            gridded.tied.extend(axes().filter_map(|(name, value)| {
+                let expression = value.get("expr")?.as_str()?;
+                let words = expression.split(|c: char| !c.is_alphanumeric() && c != '_').map(str::to_owned);
+                Some(words.chain([name.clone()]).collect())
+            }));
+        }
+        gridded
+    }
+
+    /// Whether an axis is a list or a range.
+    pub fn has(&self, name: &str) -> bool {
+        self.axes.iter().any(|axis| axis == name)
+    }
+
+    /// Whether an axis varies freely of those that are drawn.
+    fn is_free(&self, name: &str, drawn: &[&str]) -> bool {
+        let is_tied = |tied: &Vec<String>| {
+            tied.iter().any(|axis| axis == name) && tied.iter().any(|axis| drawn.contains(&axis.as_str()))
+        };
+        self.has(name) && !self.tied.iter().any(is_tied)
+    }
 }
 
 /// The rows of the same values of some axes.
@@ -40,17 +110,22 @@ pub struct Groups {
     pub shown: Vec<Group>,
     /// How many there are in all.
     pub all: usize,
+    /// How many are not shown.
+    left_out: usize,
+    /// Where two axes are crossed, the titles of the rows and of the columns of panels, in markup: the groups fill the rows.
+    pub crossed: Option<[Vec<String>; 2]>,
     places: BTreeMap<Vec<u64>, usize>,
 }
 
 impl Groups {
     /// The groups of the rows of `survey` over `axes`, at most `most` of them, evenly chosen, those of infinite values included; one
     /// group of all rows if there are too many to choose from. `alike` makes values equal that mean the same; a group that is to be
-    /// kept is shown before others.
+    /// kept is shown before others. Two axes that vary independently are crossed if that is wanted: the first makes rows of panels, the
+    /// second columns, and the groups are those of all pairs of some values of both, also of pairs without rows.
     pub fn new(
         survey: &Survey,
         axes: &[&str],
-        most: usize,
+        (most, is_crossed): (usize, bool),
         alike: impl Fn(&mut [f64]),
         is_kept: impl Fn(&[f64]) -> bool,
     ) -> Result<Groups, PlotError> {
@@ -78,6 +153,8 @@ impl Groups {
                 axes: Vec::new(),
                 shown: vec![whole],
                 all: 1,
+                left_out: 0,
+                crossed: None,
                 places: BTreeMap::from([(Vec::new(), 0)]),
             });
         }
@@ -96,7 +173,13 @@ impl Groups {
         let (kept, others): (Vec<usize>, Vec<usize>) = (0..all).partition(|&place| is_kept(&groups[place]));
         let mut places = kept;
         places.truncate(most);
-        places.extend(chosen(others.len(), most - places.len()).into_iter().map(|place| others[place]));
+        let room = most - places.len();
+        if varies.iter().filter(|varies| **varies).count() > 2 {
+            // Neighbours in the order of the grid differ in one axis, and compare.
+            places.extend(others.into_iter().take(room));
+        } else {
+            places.extend(chosen(others.len(), room).into_iter().map(|place| others[place]));
+        }
         places.sort_unstable();
         let shown: Vec<Group> = places
             .into_iter()
@@ -110,8 +193,84 @@ impl Groups {
                 Group { name: words.collect::<Vec<_>>().join(", "), values }
             })
             .collect();
-        let places = shown.iter().enumerate().map(|(place, group)| (key(&group.values), place)).collect();
-        Ok(Groups { axes, shown, all, places })
+        let (places, left_out) = (places_of(&shown), all - shown.len());
+        let mut found = Groups { axes, shown, all, left_out, crossed: None, places };
+        if is_crossed {
+            found.cross(survey, &groups, most);
+        }
+        if found.crossed.is_none() {
+            found.label(survey, alike)?;
+        }
+        Ok(found)
+    }
+
+    /// Names the groups by their labels, if each has one of its own.
+    fn label(&mut self, survey: &Survey, alike: impl Fn(&mut [f64])) -> Result<(), PlotError> {
+        if survey.labels.is_empty() || self.shown.len() < 2 {
+            return Ok(());
+        }
+        let axes = self.axes.clone();
+        let columns: Vec<&str> = axes.iter().map(String::as_str).chain(survey.label_columns()).collect();
+        let mut labels: Vec<Option<String>> = vec![None; self.shown.len()];
+        let mut is_one = true;
+        survey.each_while(&columns, |row| {
+            let (key, cells) = row.split_at(axes.len());
+            let mut key = key.to_vec();
+            alike(&mut key);
+            if let Some(place) = self.place(&key) {
+                let label = survey.label(cells);
+                is_one = labels[place].get_or_insert_with(|| label.clone()) == &label && !label.is_empty();
+            }
+            is_one
+        })?;
+        let mut different: Vec<&String> = labels.iter().flatten().collect();
+        different.sort_unstable();
+        different.dedup();
+        if is_one && different.len() == self.shown.len() {
+            for (group, label) in self.shown.iter_mut().zip(labels.into_iter().flatten()) {
+                group.name = label;
+            }
+        }
+        Ok(())
+    }
+
+    fn cross(&mut self, survey: &Survey, found: &[Vec<f64>], most: usize) {
+        let [first, second] = self.axes.as_slice() else { return };
+        let (Some(first), Some(second)) = (survey.axis(first), survey.axis(second)) else { return };
+        let values = |axis: usize| {
+            let mut values: Vec<f64> = found.iter().map(|group| group[axis]).collect();
+            values.sort_by(f64::total_cmp);
+            values.dedup();
+            values
+        };
+        let (rows, columns) = (values(0), values(1));
+        // Axes that advance together have fewer pairs than a row and a column of a table take.
+        if rows.len() < 2 || columns.len() < 2 || found.len() < rows.len() + columns.len() {
+            return;
+        }
+        let some = |values: &[f64], most: usize| -> Vec<f64> {
+            chosen(values.len(), most).into_iter().map(|place| values[place]).collect()
+        };
+        // A square of panels, or what the shorter axis leaves to the other.
+        let side = |mine: usize, other: usize| {
+            let square = (most as f64).sqrt() as usize;
+            mine.min(if other < square { (most / other).min(MOST_CROSSED) } else { square })
+        };
+        let (rows, columns) =
+            (some(&rows, side(rows.len(), columns.len())), some(&columns, side(columns.len(), rows.len())));
+        let name = |axis: &Values, value: f64| axis.told(value);
+        self.shown = rows
+            .iter()
+            .flat_map(|&row| columns.iter().map(move |&column| (row, column)))
+            .map(|(row, column)| Group {
+                name: format!("{}, {}", name(first, row), name(second, column)),
+                values: vec![row, column],
+            })
+            .collect();
+        let titles = |axis: &Values, values: &[f64]| values.iter().map(|&value| name(axis, value)).collect();
+        self.crossed = Some([titles(first, &rows), titles(second, &columns)]);
+        self.places = places_of(&self.shown);
+        self.left_out = found.iter().filter(|group| self.place(group).is_none()).count();
     }
 
     /// The group with these values of the axes, if it is shown.
@@ -130,17 +289,21 @@ impl Groups {
             keep
         });
         self.all -= dropped.len();
-        self.places = self.shown.iter().enumerate().map(|(place, group)| (key(&group.values), place)).collect();
+        self.places = places_of(&self.shown);
         dropped
     }
 
-    /// What is left out, in a sentence.
+    /// What is left out, for who can ask for it.
     pub fn note(&self, what: &str) -> Option<String> {
-        let names: Vec<String> = self.axes.iter().map(|axis| label::name(axis)).collect();
-        (self.all > self.shown.len()).then(|| {
-            format!("{} of {} {what} ({}); others with --where.", self.shown.len(), self.all, names.join(", "))
+        (self.left_out > 0).then(|| {
+            let (shown, all) = (self.all - self.left_out, self.all);
+            format!("{shown} of {all} {what} ({}); choose others with --where", self.axes.join(", "))
         })
     }
+}
+
+fn places_of(groups: &[Group]) -> BTreeMap<Vec<u64>, usize> {
+    groups.iter().enumerate().map(|(place, group)| (key(&group.values), place)).collect()
 }
 
 fn key(values: &[f64]) -> Vec<u64> {
@@ -160,6 +323,20 @@ mod tests {
     //! An even choice.
 
     use super::*;
+
+    #[test]
+    fn axes_of_the_grid_are_free_unless_one_they_are_zipped_with_is_drawn() {
+        let gridded = Gridded::of(
+            "zip = [[\"a\", \"b\"]]\n[axes]\na = [0.03, 0.05]\nb = [0.05, 0.03]\nt_f = { geomspace = [0.01, 1.0, 5] }\nv_i = 3.0\n\
+             v_f = { expr = \"10 * v_i\" }\nk = { sobol = [1.0, 2.0, 8], seed = 1 }\n",
+        );
+        let free = |name, drawn: &[&str]| gridded.is_free(name, drawn);
+        assert!(free("t_f", &["v_f"]) && free("a", &["t_f"]) && !free("a", &["b"]));
+        assert!(!free("v_i", &[]) && !free("v_f", &[]) && !free("k", &[]));
+        let blocks =
+            Gridded::of("[[block]]\n[block.axes]\nt_f = [1.0, 2.0]\n[[block]]\n[block.axes]\nb = [1.0, 2.0]\n");
+        assert!(blocks.is_free("t_f", &["b"]) && blocks.is_free("b", &["t_f"]));
+    }
 
     #[test]
     fn the_choice_is_even_and_keeps_the_ends() {

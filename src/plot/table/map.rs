@@ -2,10 +2,10 @@
 
 use super::cells::AxisCells;
 use super::groups::{self, Groups};
-use super::survey::Survey;
+use super::survey::{Survey, Values};
 use crate::plot::colour::{class, viridis};
 use crate::plot::export::image;
-use crate::plot::figure::{Axis, Colours, Entry, Figure, Hover, Key, Layer, Map, Panel};
+use crate::plot::figure::{Axis, Colours, Dot, Entry, Figure, Hover, Key, Layer, Map, Panel};
 use crate::plot::scale::Scale;
 use crate::plot::{PlotError, label};
 use crate::protocol::Status;
@@ -18,11 +18,21 @@ const MOST_PANELS: usize = 9;
 const MOST_CELLS: usize = 720;
 const MOST_CELLS_SHARED: usize = 480;
 
-/// A map of which rows fill a smaller share is sparse.
-const SPARSE: f64 = 0.1;
+/// A map of which rows fill a smaller fraction is sparse: half of what a condition such as `v_f > v_i` leaves of a grid.
+const SPARSE: f64 = 0.25;
+
+/// Rows that are so many times as many as the values of either axis, or fewer, are single points, such as materials of which each has
+/// its own values of both axes: not a grid, and not half of one.
+const SCATTERED: usize = 2;
+
+/// Most rows whose names stand beside their dots.
+const MOST_NAMED: u64 = 60;
 
 /// Most dots of a panel.
 const MOST_DOTS: f64 = 5000.0;
+
+/// Room beyond the first and the last dot, as a fraction of the axis. Chosen by eye: no dot touches the frame in a panel of a third of a page.
+const DOT_ROOM: f64 = 0.04;
 
 /// Pixels of a panel whose cells are not equally wide.
 const PIXELS: usize = 1024;
@@ -56,8 +66,8 @@ struct Sheet {
     value: Vec<f64>,
     /// Place of the status plus one; 0 without a row.
     status: Vec<u8>,
-    /// The places of single rows, where those are drawn instead of cells.
-    dots: Vec<(f64, f64)>,
+    /// The places of single rows, where those are drawn instead of cells, and their names.
+    dots: Vec<((f64, f64), String)>,
     least: Option<(f64, f64, f64)>,
 }
 
@@ -65,7 +75,7 @@ struct Sheet {
 pub fn map(survey: &Survey, plan: &Plan) -> Result<Mapped, PlotError> {
     let Plan { x, y, value } = plan;
     let (further, along) = groups::further(survey, &[x, y])?;
-    let groups = Groups::new(survey, &further, MOST_PANELS, |_| {}, |_| false)?;
+    let groups = Groups::new(survey, &further, (MOST_PANELS, true), |_| {}, |_| false)?;
     let further: Vec<&str> = groups.axes.iter().map(String::as_str).collect();
     let most = if groups.shown.len() > 1 { MOST_CELLS_SHARED } else { MOST_CELLS };
     let (Some(x_axis), Some(y_axis)) = (survey.axis(x), survey.axis(y)) else { return Err(PlotError::Nothing) };
@@ -74,15 +84,26 @@ pub fn map(survey: &Survey, plan: &Plan) -> Result<Mapped, PlotError> {
     }
     // Rows at places of their own, such as those of a sampled design, are dots; of too many, several share a cell.
     let per_panel = survey.rows as f64 / groups.all as f64;
-    let is_sparse = SPARSE * (x_axis.values.len() * y_axis.values.len()) as f64 > per_panel;
+    let is_sparse = SPARSE * (x_axis.values.len() * y_axis.values.len()) as f64 > per_panel
+        || is_scattered(survey.rows / groups.all as u64, [x_axis, y_axis]);
     let are_dots = is_sparse && per_panel <= MOST_DOTS;
     let most = if is_sparse && !are_dots { most.min((0.5 * per_panel.sqrt()) as usize) } else { most };
-    let cells = [x_axis, y_axis].map(|axis| AxisCells::new(axis, most));
+    let mut cells = [x_axis, y_axis].map(|axis| AxisCells::new(axis, most));
+    if are_dots {
+        // Room for the dots at the ends.
+        for (cells, axis) in cells.iter_mut().zip([x_axis, y_axis]) {
+            let (low, high) = (axis.values[0], axis.values[axis.values.len() - 1]);
+            cells.scale = Scale { low, high, log: cells.scale.log }.with_room(DOT_ROOM);
+        }
+    }
     let (columns, rows) = (cells[0].len(), cells[1].len());
     let count = if are_dots { 0 } else { columns * rows };
     let empty = || Sheet { value: vec![f64::NAN; count], status: vec![0; count], dots: Vec::new(), least: None };
     let mut sheets: Vec<Sheet> = groups.shown.iter().map(|_| empty()).collect();
     let mut wanted = vec![x.as_str(), y.as_str(), value.as_str(), STATUS];
+    let is_named = are_dots && survey.rows <= MOST_NAMED;
+    let labels = wanted.len();
+    wanted.extend(survey.label_columns().into_iter().filter(|_| is_named));
     let fixed = wanted.len();
     wanted.extend(&further);
     let ok = Status::ALL.iter().position(|status| *status == Status::Ok).unwrap_or(0) as f64;
@@ -94,7 +115,7 @@ pub fn map(survey: &Survey, plan: &Plan) -> Result<Mapped, PlotError> {
         let found = row[2];
         if are_dots {
             cell = sheet.dots.len();
-            sheet.dots.push((row[0], row[1]));
+            sheet.dots.push(((row[0], row[1]), survey.label(&row[labels..fixed])));
             sheet.value.push(f64::NAN);
             sheet.status.push(0);
         }
@@ -111,7 +132,7 @@ pub fn map(survey: &Survey, plan: &Plan) -> Result<Mapped, PlotError> {
     let is_empty = |sheet: &Sheet| sheet.value.iter().all(|value| value.is_nan());
     let mut groups = groups;
     let mut left_out = Vec::new();
-    if sheets.iter().any(|sheet| !is_empty(sheet)) {
+    if groups.crossed.is_none() && sheets.iter().any(|sheet| !is_empty(sheet)) {
         let mut keep = sheets.iter().map(|sheet| !is_empty(sheet)).collect::<Vec<bool>>().into_iter();
         left_out = groups.retain(|| keep.next().unwrap_or(true));
         sheets.retain(|sheet| !is_empty(sheet));
@@ -120,13 +141,18 @@ pub fn map(survey: &Survey, plan: &Plan) -> Result<Mapped, PlotError> {
     let numbers = || sheets.iter().flat_map(|sheet| sheet.value.iter().copied());
     let colours = if words.is_empty() { colours(survey, value, numbers())? } else { None };
     let mut figure = Figure {
-        columns: columns_of(groups.shown.len()),
+        columns: groups.crossed.as_ref().map_or_else(|| columns_of(groups.shown.len()), |[_, columns]| columns.len()),
+        rows: groups.crossed.clone().map_or_else(Vec::new, |[rows, _]| rows),
         aspect: if groups.shown.len() > 1 { 0.9 } else { 0.8 },
         shared: true,
         ..Figure::default()
     };
     let holes = sheets.iter().any(|sheet| sheet.value.iter().any(|value| value.is_nan()));
-    for (sheet, group) in sheets.iter().zip(&groups.shown) {
+    for (place, (sheet, group)) in sheets.iter().zip(&groups.shown).enumerate() {
+        let title = match &groups.crossed {
+            Some([_, columns]) => columns.get(place).cloned().unwrap_or_default(),
+            None => group.name.clone(),
+        };
         let colour = |cell: usize| -> Option<[u8; 3]> {
             let value = sheet.value[cell];
             match &colours {
@@ -138,15 +164,20 @@ pub fn map(survey: &Survey, plan: &Plan) -> Result<Mapped, PlotError> {
             }
         };
         let layers = if are_dots {
-            let dots = sheet.dots.iter().enumerate().map(|(dot, &(x, y))| (x, y, colour(dot)));
-            vec![Layer::Dots(dots.collect())]
+            let dot = |(dot, (at, _)): (usize, &((f64, f64), String))| {
+                let is_word = !words.is_empty() && !sheet.value[dot].is_nan();
+                let shape = if is_word { shade(plan, sheet.value[dot] as usize) } else { 0 };
+                Dot { at: *at, fill: colour(dot), shape }
+            };
+            let names = sheet.dots.iter().filter(|(_, name)| !name.is_empty()).cloned().collect();
+            vec![Layer::Dots(sheet.dots.iter().enumerate().map(dot).collect()), Layer::Names(names)]
         } else {
             let image = pixels(&cells, colour);
             let filled = image.map(|png| Layer::Map(Map { png, hover: Some(hover(&cells, sheet, &words, value)) }));
             [Layer::Hatch].into_iter().chain(filled).collect()
         };
         figure.panels.push(Panel {
-            title: group.name.clone(),
+            title,
             x: Axis { column: x.clone(), unit: survey.unit(x), scale: cells[0].scale },
             y: Axis { column: y.clone(), unit: survey.unit(y), scale: cells[1].scale },
             layers,
@@ -158,7 +189,9 @@ pub fn map(survey: &Survey, plan: &Plan) -> Result<Mapped, PlotError> {
         for (place, word) in words.iter().enumerate() {
             if numbers().any(|value| value == place as f64) {
                 let text = meaning(plan, word);
-                figure.legend.push(Entry { key: Key::Fill(class(shade(plan, place))), text });
+                let shade = shade(plan, place);
+                let key = if are_dots { Key::Dot(class(shade), shade) } else { Key::Fill(class(shade)) };
+                figure.legend.push(Entry { key, text });
             }
         }
     }
@@ -166,7 +199,7 @@ pub fn map(survey: &Survey, plan: &Plan) -> Result<Mapped, PlotError> {
         let key = if are_dots { Key::Hollow } else { Key::Hatch };
         figure.legend.push(Entry { key, text: nothing(&sheets) });
     }
-    figure.notes.extend(groups.note("panels"));
+    figure.remarks.extend(groups.note("panels"));
     figure.notes.extend(along);
     if !left_out.is_empty() {
         figure.notes.push(format!("No value for {}.", left_out.join("; ")));
@@ -182,6 +215,14 @@ pub fn map(survey: &Survey, plan: &Plan) -> Result<Mapped, PlotError> {
     }
     let least = sheets.iter().map(|sheet| sheet.least).collect();
     Ok(Mapped { figure, groups, least, cells })
+}
+
+/// Whether rows are single points of a plane, of which a map would be mostly blank.
+fn is_scattered(rows: u64, axes: [&Values; 2]) -> bool {
+    let most = axes.map(|axis| axis.values.len()).into_iter().max().unwrap_or(0);
+    let least = axes.map(|axis| axis.values.len()).into_iter().min().unwrap_or(0);
+    // Rows of which each pair of values has one are a grid.
+    rows <= (SCATTERED * most) as u64 && rows < (most * least) as u64
 }
 
 /// Whether the column is a flag of stability: stable is shown as light as what settles, and in words.
@@ -203,7 +244,7 @@ fn meaning(plan: &Plan, word: &str) -> String {
 }
 
 /// Panels side by side.
-fn columns_of(panels: usize) -> usize {
+pub fn columns_of(panels: usize) -> usize {
     match panels {
         0 | 1 => 1,
         2 | 4 => 2,

@@ -9,6 +9,7 @@ mod lines;
 mod map;
 mod optimal;
 mod phase;
+mod reduced;
 mod survey;
 mod swift;
 
@@ -64,24 +65,32 @@ struct Scene<'a> {
 const OVER_TIME: Defaults = Defaults {
     x: &["t_f", "v_f", "v_i", "b", "a"],
     y: &["v_f", "v_i", "b", "a"],
+    classes: &[],
     value: &[],
     lines: &[],
     series: &[],
     least_map: 12,
+    scatters: false,
 };
 
 /// What phase diagrams have in common.
 const ON_A_SPRING: Defaults = Defaults {
     x: &["v_f", "k", "m", "b", "a"],
     y: &["k", "v_i", "m", "b"],
+    classes: &[],
     value: &[],
     lines: &[],
     series: &["k"],
     least_map: 5,
+    scatters: true,
 };
 
+/// A picture that is drawn in a way of its own.
+const ALONE: Defaults =
+    Defaults { x: &["t_f", "v_f", "v_i", "b", "a"], y: &[], least_map: usize::MAX, lines: &["shortcuts"], ..OVER_TIME };
+
 /// A picture for each table. A new one is a line here, and a file if it marks something of its own.
-const KINDS: [Kind; 9] = [
+const KINDS: [Kind; 12] = [
     Kind {
         table: "gap",
         title: "Work gap of the cubic shortcuts",
@@ -90,8 +99,8 @@ const KINDS: [Kind; 9] = [
             y: &["alpha_3"],
             value: &["gap", "work"],
             lines: &["gap", "v_min"],
-            series: &[],
             least_map: 2,
+            ..OVER_TIME
         },
         draw: gap::draw,
     },
@@ -104,7 +113,12 @@ const KINDS: [Kind; 9] = [
     Kind {
         table: "optimal",
         title: "Optimal protocol",
-        defaults: Defaults { value: &["work"], lines: &["work", "v_start", "hold_time"], ..OVER_TIME },
+        defaults: Defaults {
+            classes: &["strategy"],
+            value: &["work"],
+            lines: &["work", "v_start", "hold_time"],
+            ..OVER_TIME
+        },
         draw: optimal::draw,
     },
     Kind {
@@ -117,6 +131,7 @@ const KINDS: [Kind; 9] = [
             lines: &["t_cheapest", "t_cross", "t_hold", "t_min", "t_turn"],
             series: &["b", "a"],
             least_map: 5,
+            ..OVER_TIME
         },
         draw: plain,
     },
@@ -130,6 +145,7 @@ const KINDS: [Kind; 9] = [
             lines: &["gap", "v_max"],
             series: &["family"],
             least_map: usize::MAX,
+            ..OVER_TIME
         },
         draw: swift::draw,
     },
@@ -137,7 +153,8 @@ const KINDS: [Kind; 9] = [
         table: "stability",
         title: "Stability of steady sliding",
         defaults: Defaults {
-            value: &["stable_f", "growth_rate", "k_c_f"],
+            classes: &["stable_f", "hopf"],
+            value: &["growth_rate", "k_c_f", "stable_f"],
             lines: &["growth_rate", "frequency", "k_c_f"],
             ..ON_A_SPRING
         },
@@ -147,7 +164,8 @@ const KINDS: [Kind; 9] = [
         table: "step",
         title: "What becomes of the response to a step",
         defaults: Defaults {
-            value: &["outcome", "stick_slip", "v_peak"],
+            classes: &["outcome", "stick_slip"],
+            value: &["v_peak", "cycle_peak", "outcome"],
             lines: &["v_peak", "v_trough", "settling_time", "period"],
             ..ON_A_SPRING
         },
@@ -163,6 +181,7 @@ const KINDS: [Kind; 9] = [
             lines: &["amplification", "end_error", "v_c_min", "v_c_max"],
             series: &["k", "dt"],
             least_map: 12,
+            ..OVER_TIME
         },
         draw: plain,
     },
@@ -176,9 +195,23 @@ const KINDS: [Kind; 9] = [
             lines: &["gap", "v_c_max", "v_c_min"],
             series: &["t_f", "k"],
             least_map: 12,
+            ..OVER_TIME
         },
         draw: plain,
     },
+    Kind {
+        table: "gap_min",
+        title: "Least work gap of the cubic shortcuts",
+        defaults: Defaults { value: &["gap"], lines: &["gap", "alpha_2", "alpha_3", "v_min"], ..OVER_TIME },
+        draw: plain,
+    },
+    Kind {
+        table: "gap_quantiles",
+        title: "Quantiles of the work gap of the cubic shortcuts",
+        defaults: ALONE,
+        draw: plain,
+    },
+    Kind { table: "gap_histogram", title: "Cubic shortcuts by their work gap", defaults: ALONE, draw: plain },
 ];
 
 impl Source {
@@ -203,10 +236,22 @@ impl Source {
             .iter()
             .find(|kind| kind.table == table)
             .ok_or_else(|| PlotError::NoTable { name: table.to_owned(), found: self.tables() })?;
-        let shape = choice::choose(&survey, &kind.defaults, request)?;
-        let mut figure = (kind.draw)(&Scene { source: self, survey: &survey }, &shape)?;
+        let is_alone = request.x.is_none() && request.y.is_none() && request.colour.is_none();
+        let (mut figure, drawn) = match table {
+            "gap_histogram" if is_alone => reduced::histogram(&survey)?,
+            "gap_quantiles" if is_alone => reduced::quantiles(&survey)?,
+            _ => {
+                let shape = choice::choose(&survey, &kind.defaults, request)?;
+                let drawn = match &shape {
+                    Shape::Map(plan) => vec![plan.x.clone(), plan.y.clone()],
+                    Shape::Lines(plan) => vec![plan.x.clone()],
+                };
+                ((kind.draw)(&Scene { source: self, survey: &survey }, &shape)?, drawn)
+            }
+        };
         figure.title = kind.title.to_owned();
-        figure.subtitle = fixed(&survey, &shape);
+        let same = [fixed(&survey, &drawn), figure.subtitle].into_iter().filter(|words| !words.is_empty());
+        figure.subtitle = same.collect::<Vec<_>>().join(", ");
         if survey.missing > 0 {
             figure.notes.push(format!("{} parts of the table are missing.", survey.missing));
         }
@@ -223,13 +268,9 @@ fn plain(scene: &Scene<'_>, shape: &Shape) -> Result<Figure, PlotError> {
 }
 
 /// What is the same in all rows.
-fn fixed(survey: &Survey, shape: &Shape) -> String {
-    let drawn = |name: &str| match shape {
-        Shape::Map(plan) => plan.x == name || plan.y == name,
-        Shape::Lines(plan) => plan.x == name,
-    };
+fn fixed(survey: &Survey, drawn: &[String]) -> String {
     let mut words = Vec::new();
-    for axis in survey.axes.iter().filter(|axis| !drawn(&axis.name)) {
+    for axis in survey.axes.iter().filter(|axis| !drawn.contains(&axis.name)) {
         match axis.values.as_slice() {
             [one] if !axis.infinite => {
                 words.push(axis.told(*one));
@@ -253,7 +294,12 @@ impl Scene<'_> {
         }
     }
 
-    /// The same in the scaled units of the model, in which the library computes.
+    /// What a unit of the model of a quantity is in the units of the dataset.
+    fn size(&self, name: &str) -> f64 {
+        Quantity::from_name(name).map_or(1.0, |quantity| self.source.units.size(quantity.unit(Scale::Model)))
+    }
+
+    /// The value of a quantity in the scaled units of the model, in which the library computes.
     fn scaled(&self, groups: &groups::Groups, group: usize, name: &str) -> Option<f64> {
         let unit = Quantity::from_name(name)?.unit(Scale::Model);
         Some(self.source.units.scaled(unit, self.value(groups, group, name)?))

@@ -2,11 +2,12 @@
 
 use super::choice::Shape;
 use super::groups::Groups;
+use super::map::{self, Mapped};
 use super::survey::Survey;
 use super::{Scene, lines, plain};
 use crate::model::{Law, Transition};
 use crate::plot::canvas::Stroke;
-use crate::plot::figure::{Figure, Layer};
+use crate::plot::figure::{Entry, Figure, Key, Layer};
 use crate::plot::{PlotError, colour, label};
 use crate::protocol::optimal::crossover::{self, CrossoverTimes, Wanted};
 
@@ -19,18 +20,25 @@ const MOST_MARKED: usize = 3;
 /// What a transition depends on.
 const AXES: [&str; 4] = ["a", "b", "v_i", "v_f"];
 
+/// Steps along a curve of durations.
+const CURVE_POINTS: usize = 120;
+
 /// Accuracy of a mark: finer than a picture shows.
 const RTOL: f64 = 1e-6;
 
 pub fn draw(scene: &Scene<'_>, shape: &Shape) -> Result<Figure, PlotError> {
     let Shape::Lines(plan) = shape else {
-        let mut figure = plain(scene, shape)?;
-        if let (Shape::Map(plan), Some(colours)) = (shape, &mut figure.colours)
-            && plan.value == "work"
-        {
-            colours.label = label::axis("work_optimal", &scene.survey.unit("work"), 0);
-        }
-        return Ok(figure);
+        return match shape {
+            Shape::Map(plan) if plan.value == "strategy" => strategies(scene, plan),
+            Shape::Map(plan) => {
+                let mut figure = plain(scene, shape)?;
+                if let Some(colours) = figure.colours.as_mut().filter(|_| plan.value == "work") {
+                    colours.label = label::axis("work_optimal", &scene.survey.unit("work"), 0);
+                }
+                Ok(figure)
+            }
+            Shape::Lines(_) => plain(scene, shape),
+        };
     };
     let lined = lines::lines(scene.survey, plan, |_, _| {})?;
     let mut figure = lined.figure;
@@ -42,7 +50,8 @@ pub fn draw(scene: &Scene<'_>, shape: &Shape) -> Result<Figure, PlotError> {
     if plan.x != "t_f" || count > MOST_MARKED {
         return Ok(figure);
     }
-    for group in 0..count {
+    // Of lines that coincide one is drawn.
+    for group in (0..count).filter(|&group| lined.leaders[group] == group) {
         let times = times(scene, &lined.groups, group)?;
         let colour = if count == 1 { "#555".to_owned() } else { colour::series(group).colour };
         for (name, time) in MARKED.iter().zip(times) {
@@ -54,6 +63,63 @@ pub fn draw(scene: &Scene<'_>, shape: &Shape) -> Result<Figure, PlotError> {
                 panel.layers.push(Layer::Mark(time, words, stroke.clone()));
             }
         }
+    }
+    Ok(figure)
+}
+
+/// A map of the strategy, with the durations at which it changes.
+fn strategies(scene: &Scene<'_>, plan: &map::Plan) -> Result<Figure, PlotError> {
+    let Mapped { mut figure, groups, cells, .. } = map::map(scene.survey, plan)?;
+    let styles = [
+        ("t_cross", Stroke::solid("#000", 0.9)),
+        ("t_hold", Stroke { dashes: &[3.0, 1.6], ..Stroke::solid("#000", 0.9) }),
+    ];
+    // The place of the duration among the axes, and what the other axis is.
+    let (time, other) = match (plan.x.as_str(), plan.y.as_str()) {
+        ("t_f", other) => (0, other),
+        (other, "t_f") => (1, other),
+        _ => return Ok(figure),
+    };
+    let Some(place) = AXES.iter().position(|axis| *axis == other) else { return Ok(figure) };
+    let (unit, unit_of_time) = (scene.size(other), scene.source.units.size("l/v_0"));
+    let mut is_drawn = [false; 2];
+    for (group, panel) in figure.panels.iter_mut().enumerate() {
+        let mut values = [0.0; AXES.len()];
+        let known = AXES.iter().zip(&mut values).enumerate().all(|(axis, (name, value))| {
+            let found = if axis == place { Some(0.0) } else { scene.scaled(&groups, group, name) };
+            found.map(|found| *value = found).is_some()
+        });
+        if !known {
+            continue;
+        }
+        let mut curves = [Vec::new(), Vec::new()];
+        for step in 0..=CURVE_POINTS {
+            let at = cells[1 - time].scale.value(step as f64 / CURVE_POINTS as f64);
+            values[place] = at / unit;
+            let [a, b, v_i, v_f] = values;
+            let is_legal = a > 0.0 && b >= 0.0 && v_i > 1.0 && v_f > 1.0 && v_i != v_f;
+            let wanted = Wanted { cross: true, hold: true, cheapest: false, min: false, turn: false, free: false };
+            let times = is_legal.then(|| {
+                let transition = Transition { law: Law { a, b }, v_i, v_f };
+                crossover::solve(&transition, scene.source.bounded, RTOL, wanted).1
+            });
+            let [cross, hold] = [times.as_ref().and_then(|t| t.t_cross), times.as_ref().and_then(|t| t.t_hold)];
+            for (curve, found) in curves.iter_mut().zip([cross, hold]) {
+                let found = found.map_or(f64::NAN, |found| found * unit_of_time);
+                curve.push(if time == 0 { (found, at) } else { (at, found) });
+            }
+        }
+        for ((curve, (_, stroke)), is_drawn) in curves.into_iter().zip(&styles).zip(&mut is_drawn) {
+            let scale = if time == 0 { panel.x.scale } else { panel.y.scale };
+            let of = |&(x, y): &(f64, f64)| scale.share(if time == 0 { x } else { y });
+            if curve.iter().any(|point| (0.0..=1.0).contains(&of(point))) {
+                *is_drawn = true;
+                panel.layers.push(Layer::Contour(vec![curve], stroke.clone()));
+            }
+        }
+    }
+    for ((name, stroke), _) in styles.into_iter().zip(is_drawn).filter(|(_, is_drawn)| *is_drawn) {
+        figure.legend.push(Entry { key: Key::Contour(stroke), text: label::name(name) });
     }
     Ok(figure)
 }

@@ -5,15 +5,23 @@ use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::path::PathBuf;
 
 use super::condition::Condition;
+use super::groups::Gridded;
 use crate::dataset::frame::{self, Cells, Heading};
 use crate::dataset::{Folder, Manifest, ReadError};
 use crate::grid::Quantity;
+use crate::names;
 use crate::plot::{PlotError, label};
 use crate::protocol::Status;
 use crate::table::{self, Kind, STATUS};
 
 /// Most different values of an axis that are told apart; beyond, an axis is a range.
 const MOST_VALUES: usize = 100_000;
+
+/// Most labels of a column: more are not read in a picture.
+const MOST_LABELS: usize = 1000;
+
+/// Most values of an axis that a message lists.
+const FEW: usize = 12;
 
 /// The values of an axis in the rows that are left.
 #[derive(Debug, Clone, PartialEq)]
@@ -42,7 +50,7 @@ impl Values {
     pub fn shown(&self, value: f64) -> String {
         match self.words.get(value as usize) {
             Some(word) if value >= 0.0 => word.replace('_', " "),
-            _ => label::number(value),
+            _ => label::number_among(value, &self.values),
         }
     }
 
@@ -66,6 +74,10 @@ pub struct Survey {
     pub rows: u64,
     /// Parts that are missing.
     pub missing: u64,
+    /// Its labels: text columns that came with the points, and their words.
+    pub labels: Vec<(String, Vec<String>)>,
+    /// Which of the axes make up the grid.
+    pub gridded: Gridded,
     parts: Vec<PathBuf>,
     conditions: Vec<Condition>,
 }
@@ -84,7 +96,7 @@ impl Survey {
             .iter()
             .find(|table| table.name == name)
             .ok_or_else(|| PlotError::NoTable { name: name.to_owned(), found: found() })?;
-        let (parts, missing) = frame::parts(folder, table);
+        let (parts, missing) = folder.verified(manifest, table).map_err(ReadError::from)?;
         let first = parts.first().ok_or_else(|| PlotError::Empty { table: name.to_owned() })?;
         let (headings, _) = frame::headings(first).map_err(ReadError::from)?;
         let mut survey = Survey {
@@ -93,6 +105,8 @@ impl Survey {
             axes: Vec::new(),
             rows: 0,
             missing,
+            labels: Vec::new(),
+            gridded: Gridded::of(&manifest.spec),
             parts,
             conditions: conditions.to_vec(),
         };
@@ -100,7 +114,51 @@ impl Survey {
             survey.check("--where", &condition.column)?;
         }
         survey.look()?;
+        survey.look_for_labels()?;
         Ok(survey)
+    }
+
+    /// Finds the labels and their words, unless those are too many to be told apart in a picture.
+    fn look_for_labels(&mut self) -> Result<(), PlotError> {
+        let known = table::find(&self.table);
+        let is_column =
+            |name: &str| known.is_some_and(|table| table.columns().iter().any(|column| column.name == name));
+        let is_label = |heading: &&Heading| {
+            let name = heading.name.as_str();
+            !heading.is_number && Quantity::from_name(name).is_none() && !is_column(name) && name != STATUS
+        };
+        let names: Vec<String> = self.headings.iter().filter(is_label).map(|heading| heading.name.clone()).collect();
+        let mut labels: Vec<(String, Vec<String>)> = names.into_iter().map(|name| (name, Vec::new())).collect();
+        let parts = if labels.is_empty() { &[] } else { self.parts.as_slice() };
+        for part in parts {
+            let names: Vec<&str> = labels.iter().map(|(name, _)| name.as_str()).collect();
+            let frame = frame::read(part, &names).map_err(ReadError::from)?;
+            for ((_, all), (_, cells)) in labels.iter_mut().zip(&frame.columns) {
+                let Cells::Words(_, words) = cells else { continue };
+                for word in words {
+                    if all.len() <= MOST_LABELS && !all.contains(word) {
+                        all.push(word.clone());
+                    }
+                }
+            }
+        }
+        labels.retain(|(_, words)| !words.is_empty() && words.len() <= MOST_LABELS);
+        self.labels = labels;
+        Ok(())
+    }
+
+    /// The label of a row in markup, from the cells of the columns of labels.
+    pub fn label(&self, cells: &[f64]) -> String {
+        let word = |((_, words), cell): (&(String, Vec<String>), &f64)| {
+            let word = words.get(*cell as usize).filter(|_| !cell.is_nan())?;
+            Some(label::literal(word))
+        };
+        self.labels.iter().zip(cells).filter_map(word).collect::<Vec<_>>().join(", ")
+    }
+
+    /// The names of the columns of labels.
+    pub fn label_columns(&self) -> Vec<&str> {
+        self.labels.iter().map(|(name, _)| name.as_str()).collect()
     }
 
     /// That a column is there.
@@ -137,6 +195,9 @@ impl Survey {
     /// The words that a column may hold, in the order of their places.
     pub fn words(&self, column: &str) -> Vec<String> {
         let owned = |words: &[&str]| words.iter().map(|&word| word.to_owned()).collect();
+        if let Some((_, words)) = self.labels.iter().find(|(name, _)| name == column) {
+            return words.clone();
+        }
         if column == STATUS {
             return Status::ALL.iter().map(|status| status.name().to_owned()).collect();
         }
@@ -161,7 +222,17 @@ impl Survey {
     }
 
     /// The same until `visit` has seen enough, which it says by `false`.
-    pub fn each_while(&self, columns: &[&str], mut visit: impl FnMut(&[f64]) -> bool) -> Result<(), PlotError> {
+    pub fn each_while(&self, columns: &[&str], visit: impl FnMut(&[f64]) -> bool) -> Result<(), PlotError> {
+        self.each_of(&self.parts, columns, visit)
+    }
+
+    /// The same in some of the parts: of those that are skipped by the statistics of their columns nothing is read.
+    fn each_of(
+        &self,
+        parts: &[PathBuf],
+        columns: &[&str],
+        mut visit: impl FnMut(&[f64]) -> bool,
+    ) -> Result<(), PlotError> {
         let mut names: Vec<&str> = Vec::new();
         let mut place = |name| {
             names.iter().position(|known| *known == name).unwrap_or_else(|| {
@@ -173,8 +244,14 @@ impl Survey {
         let tests: Vec<(usize, &Condition)> =
             self.conditions.iter().map(|condition| (place(condition.column.as_str()), condition)).collect();
         let mut cells = vec![f64::NAN; columns.len()];
-        for part in &self.parts {
-            let frame = frame::read(part, &names).map_err(ReadError::from)?;
+        let may_hold = |range: &dyn Fn(&str) -> Option<(f64, f64)>| {
+            let holds = |condition: &Condition| {
+                range(&condition.column).is_none_or(|(low, high)| condition.may_hold(low, high))
+            };
+            self.conditions.iter().all(holds)
+        };
+        for part in parts {
+            let frame = frame::read_where(part, &names, &may_hold).map_err(ReadError::from)?;
             // The places of the words of this part among all.
             let codes: Vec<Vec<f64>> = names
                 .iter()
@@ -262,7 +339,7 @@ impl Survey {
         let mut infinite = vec![false; columns.len()];
         let mut ranges = vec![(f64::INFINITY, f64::NEG_INFINITY); columns.len()];
         let mut rows = 0;
-        self.each(&columns, |cells| {
+        let mut look = |cells: &[f64]| {
             rows += 1;
             for (place, &value) in cells.iter().enumerate() {
                 let (values, last) = &mut found[place];
@@ -280,7 +357,18 @@ impl Survey {
                     infinite[place] = true;
                 }
             }
-        })?;
+            true
+        };
+        // Parts without such a row are not read again.
+        let mut parts = Vec::new();
+        for part in &self.parts {
+            let mut is_used = false;
+            self.each_of(std::slice::from_ref(part), &columns, |cells| {
+                is_used = true;
+                look(cells)
+            })?;
+            parts.extend(is_used.then(|| part.clone()));
+        }
         self.rows = rows;
         let mut axes = Vec::new();
         for (place, name) in names.iter().enumerate() {
@@ -299,39 +387,78 @@ impl Survey {
         if rows == 0 {
             return Err(self.without_rows()?);
         }
+        self.parts = parts;
         Ok(())
     }
 
-    /// What to say where the conditions leave no row: the values that there are.
+    /// What to say where the conditions leave no row: the values that there are, and the nearest ones.
     fn without_rows(&mut self) -> Result<PlotError, PlotError> {
+        self.look_for_labels()?;
         let conditions = std::mem::take(&mut self.conditions);
         let texts: Vec<String> = conditions.iter().map(Condition::shown).collect();
-        self.look()?;
         let mut names: Vec<&str> = conditions.iter().map(|condition| condition.column.as_str()).collect();
+        names.sort_unstable();
         names.dedup();
-        let values = names.iter().map(|name| match self.axis(name) {
-            Some(axis) if axis.values.len() <= 12 => {
-                let shown: Vec<String> = axis.values.iter().map(|&value| axis.plainly(value)).collect();
-                format!("{name} = {}", shown.join(", "))
+        let mut values: Vec<(BTreeSet<u64>, f64, f64)> =
+            vec![(BTreeSet::new(), f64::INFINITY, f64::NEG_INFINITY); names.len()];
+        let wanted: Vec<Option<f64>> = conditions.iter().map(Condition::wanted).collect();
+        let mut nearest = vec![f64::NAN; conditions.len()];
+        let places: Vec<Option<usize>> =
+            conditions.iter().map(|condition| names.iter().position(|name| *name == condition.column)).collect();
+        self.each(&names, |cells| {
+            for ((values, low, high), &cell) in values.iter_mut().zip(cells).filter(|(_, cell)| !cell.is_nan()) {
+                (*low, *high) = (low.min(cell), high.max(cell));
+                if values.len() <= FEW {
+                    values.insert(ordered(cell));
+                }
             }
-            Some(axis) => {
-                let (first, last) = (axis.values[0], axis.values[axis.values.len() - 1]);
-                format!("{name} from {first} to {last}")
+            for ((nearest, wanted), place) in nearest.iter_mut().zip(&wanted).zip(&places) {
+                let (Some(wanted), Some(place)) = (wanted, place) else { continue };
+                if nearest.is_nan() || (cells[*place] - wanted).abs() < (*nearest - wanted).abs() {
+                    *nearest = cells[*place];
+                }
             }
-            None => format!("other values of {name}"),
+        })?;
+        let told = names.iter().zip(&values).map(|(name, (values, low, high))| {
+            let words = self.words(name);
+            if values.len() > FEW {
+                return format!("{name} from {} to {}", plainly(&words, *low), plainly(&words, *high));
+            }
+            let values: Vec<String> = values.iter().map(|bits| plainly(&words, disordered(*bits))).collect();
+            format!("{name} = {}", values.join(", "))
         });
-        let found = values.collect::<Vec<_>>().join("; ");
-        Ok(PlotError::NoRows { table: self.table.clone(), text: texts.join(", "), found })
+        let found = told.collect::<Vec<_>>().join("; ");
+        // A number that is only nearly that of a row may be meant.
+        let offer = |(condition, nearest): (&Condition, &f64)| {
+            let is_axis = self.axis(&condition.column).is_some_and(|axis| axis.words.is_empty());
+            let other = (is_axis && nearest.is_finite() && !condition.holds(*nearest)).then_some(*nearest);
+            (condition.typed(other), other.is_some())
+        };
+        let offers: Vec<(String, bool)> = conditions.iter().zip(&nearest).map(offer).collect();
+        let is_offered = offers.iter().any(|(_, is_other)| *is_other);
+        let typed: Vec<String> = offers.into_iter().map(|(text, _)| text).collect();
+        let meant = conditions.iter().find_map(|condition| {
+            let (word, words) = (condition.word()?, self.words(&condition.column));
+            let known = words.iter().any(|known| known == word);
+            let meant = names::nearest(word, words.iter().map(String::as_str)).filter(|_| !known)?;
+            Some(meant.to_owned())
+        });
+        let help = if let Some(meant) = meant {
+            format!("did you mean `{meant}`?")
+        } else if is_offered {
+            format!("the nearest rows have --where \"{}\"", typed.join(", "))
+        } else {
+            "change the condition".to_owned()
+        };
+        Ok(PlotError::NoRows { table: self.table.clone(), text: texts.join(", "), found, help })
     }
 }
 
-impl Values {
-    /// A value as it is typed.
-    fn plainly(&self, value: f64) -> String {
-        match self.words.get(value as usize) {
-            Some(word) if value >= 0.0 => word.clone(),
-            _ => format!("{value}"),
-        }
+/// A value as it is typed: one of the words, if the column has words.
+fn plainly(words: &[String], value: f64) -> String {
+    match words.get(value as usize) {
+        Some(word) if value >= 0.0 => word.clone(),
+        _ => format!("{value:?}").trim_end_matches(".0").to_owned(),
     }
 }
 

@@ -50,8 +50,8 @@ const CLOSE: f64 = 1e-5;
 /// The shortcut of least work over the whole plane where `v >= 1` (`bounded`) or `v > 0`.
 ///
 /// `Infeasible` where no cubic shortcut is admissible. Without the bound `BelowBound` where `v < 1` somewhere; a
-/// `v_min` of 0 then means that the least work is only approached, at the border `v = 0`. `Nonphysical` as for the
-/// optimum.
+/// `v_min` of 0 then means that the least work is only approached, at the border `v = 0`, where friction is negative.
+/// `NegativeFriction` where `tau < 0` somewhere, `Nonphysical` as for the optimum.
 pub fn solve(transition: &Transition, t_f: f64, bounded: bool, rtol: f64) -> Solved<Best> {
     let optimum = optimal::solve(transition, t_f, bounded, rtol.min(1e-12));
     let mut effort = optimum.effort;
@@ -66,7 +66,8 @@ pub fn solve(transition: &Transition, t_f: f64, bounded: bool, rtol: f64) -> Sol
     // Where friction is as low as that there may be no shortcut of least work, or one that costs less than the extremal.
     let steady = |v: f64| 1.0 + (law.a - law.b) * ln(v);
     let lowest = steady(transition.v_i).min(steady(transition.v_f));
-    let doubtful = optimum.status == Status::Nonphysical || lowest <= (law.b - law.a).max(0.0);
+    let doubtful =
+        matches!(optimum.status, Status::Nonphysical | Status::NegativeFriction) || lowest <= (law.b - law.a).max(0.0);
     let unsolved = |status, effort| {
         let status = if doubtful && status == Status::NotConverged { Status::Nonphysical } else { status };
         Solved { status, value: None, effort }
@@ -94,11 +95,8 @@ pub fn solve(transition: &Transition, t_f: f64, bounded: bool, rtol: f64) -> Sol
             _ => return unsolved(Status::NotConverged, effort),
         }
     };
-    let status = match optimum.status {
-        Status::Ok | Status::BelowBound if v_min < 1.0 => Status::BelowBound,
-        Status::BelowBound => Status::Ok,
-        status => status,
-    };
+    let own = if v_min < 1.0 { Status::BelowBound } else { Status::Ok };
+    let status = own.with_friction(path.friction_min(law)).beside(optimum.status);
     let [a_2, a_3] = plane.coefficients(least.place).map(|a| a.high);
     let gap = excess / optimum_value.work;
     let value = Best { a_2, a_3, work, work_optimal: optimum_value.work, gap, v_min };

@@ -44,12 +44,14 @@ pub struct Compliant {
 /// Solves for the member of a transition from `v_i` to `v_f` under `slider.law` within `t_f`.
 ///
 /// `Infeasible` where `t_f` is not above `t_min`, or where an argument is outside its domain (`a > 0`, `b >= 0`, `v_i,
-/// v_f > 1`, `t_f > 0`, `m >= 0`, all finite; `k > 0`).
+/// v_f > 1`, `t_f > 0`, `m >= 0`, all finite; `k > 0`). `NegativeFriction` where `tau < 0` somewhere.
 pub fn solve(slider: &Slider, (v_i, v_f): (f64, f64), t_f: f64, rtol: f64) -> Solved<Compliant> {
     let mut effort = Effort::default();
-    let mut range = Range { work: 0.0, control: Extent::NONE };
+    let mut range = Range { work: 0.0, friction_min: f64::INFINITY, control: Extent::NONE };
     let followed = follow(slider, (v_i, v_f), t_f, rtol, &mut effort, |curve, panel| {
-        range.work += panel.work(&slider.law, curve);
+        let (work, friction_min) = panel.sum(&slider.law, curve);
+        range.work += work;
+        range.friction_min = range.friction_min.min(friction_min);
         panel.range(curve, Tolerance::OfRange(rtol), &mut range.control, |jet, bend| {
             [slider.control(jet), slider.control_rate(jet, bend)]
         });
@@ -74,7 +76,7 @@ pub fn solve(slider: &Slider, (v_i, v_f): (f64, f64), t_f: f64, rtol: f64) -> So
     };
     let numbers = [value.work, value.v_max, value.control_min, value.control_max];
     if numbers.iter().all(|number| number.is_finite()) {
-        Solved { status: Status::Ok, value: Some(value), effort }
+        Solved { status: Status::Ok.with_friction(range.friction_min), value: Some(value), effort }
     } else {
         Solved { status: Status::NotConverged, value: None, effort }
     }
@@ -91,6 +93,7 @@ pub fn path(slider: &Slider, (v_i, v_f): (f64, f64), t_f: f64, rtol: f64) -> Res
 /// What is gathered along the way.
 struct Range {
     work: f64,
+    friction_min: f64,
     control: Extent,
 }
 

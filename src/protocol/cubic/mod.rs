@@ -7,6 +7,7 @@
 mod bins;
 mod bundle;
 mod cells;
+mod friction;
 mod kernel;
 mod moments;
 mod motion;
@@ -26,12 +27,15 @@ use crate::numerics::lanes::LANES;
 use bins::Bins;
 use bundle::Friction;
 use cells::Frame;
+use friction::{Floors, Open};
 use kernel::Slice;
 pub(super) use moments::{Basis, Moments};
 pub(super) use path::{Ends, Path, rise};
 use queue::Queue;
 use rules::{Accuracy, Panel, Zeros, choose};
-use screen::{SEARCH, SPAN, SPANS, end_velocities, end_velocities_of_span, inner_velocities, on_side, screen, settle};
+use screen::{
+    SEARCH, SPAN, SPANS, Verdict, end_velocities, end_velocities_of_span, inner_velocities, on_side, screen, settle,
+};
 use works::Works;
 
 /// The work landscape of one transition in one time over the plane of `(alpha_2, alpha_3)`.
@@ -39,6 +43,7 @@ use works::Works;
 pub struct Landscape {
     law: Law,
     friction: Friction,
+    floors: Floors,
     ends: Ends,
     ln_t_f: f64,
     frame: Frame,
@@ -53,7 +58,7 @@ pub struct Shortcuts<'a> {
     pub work: &'a mut [f64],
     /// Least velocity on `[0, t_f]`; left untouched where infeasible, and everywhere if empty (not asked for).
     pub v_min: &'a mut [f64],
-    /// `Ok`, `BelowBound` or `Infeasible`.
+    /// `Ok`, `BelowBound`, `NegativeFriction` or `Infeasible`.
     pub status: &'a mut [Status],
 }
 
@@ -66,6 +71,7 @@ impl Landscape {
         Landscape {
             law: transition.law,
             friction: Friction::new(transition.law, &ends),
+            floors: Floors::new(transition.law, &ends),
             ends,
             ln_t_f: ln(t_f),
             frame: Frame::new(&ends, &accuracy),
@@ -102,10 +108,11 @@ impl Landscape {
         let (mut open, mut bins) = (Queue::<SEARCH>::EMPTY, Bins::take());
         bins.cells.begin(&self.frame);
         let mut works = Works::new(self, &mut work[..count_of_works], &mut bins);
+        let mut doubtful: Vec<Open> = Vec::new();
         for start in (0..count).step_by(SPAN * SPANS) {
             let stretch = start..(start + SPAN * SPANS).min(count);
             let settled = match (a_2[stretch.clone()].try_into(), a_3[stretch.clone()].try_into()) {
-                (Ok(a_2), Ok(a_3)) => settle(&self.ends, a_2, a_3),
+                (Ok(a_2), Ok(a_3)) => settle(&self.ends, &self.floors, a_2, a_3),
                 _ => [None; SPANS],
             };
             for (first, common) in stretch.clone().step_by(SPAN).zip(settled) {
@@ -113,8 +120,12 @@ impl Landscape {
                 if let (Some(common), Ok(a_2), Ok(a_3)) =
                     (common, a_2[span.clone()].try_into(), a_3[span.clone()].try_into())
                 {
+                    let Verdict { status: common, sound } = common;
                     status[span].fill(common);
                     if common != Status::Infeasible {
+                        if !sound {
+                            doubtful.push(Open { first, count: SPAN, line: true });
+                        }
                         if first < velocities {
                             self.velocities_of_span(first, [a_2, a_3], &mut open, status, &mut v_min[..velocities]);
                         }
@@ -132,6 +143,9 @@ impl Landscape {
                     if found.iter().all(|&found| found == Status::Infeasible) {
                         continue;
                     }
+                    let unsure = self.floors.open(&self.ends, &a_2_lanes, &a_3_lanes, &found);
+                    let unsure = block.clone().enumerate().filter(|(lane, _)| unsure & (1 << lane) != 0);
+                    doubtful.extend(unsure.map(|(_, first)| Open { first, count: 1, line: false }));
                     if first < velocities {
                         let mut least = [0.0; LANES];
                         let left = end_velocities(&self.ends, &a_2_lanes, &a_3_lanes, &found, &mut least);
@@ -152,6 +166,10 @@ impl Landscape {
         self.inner_velocities(&mut open, status, &mut v_min[..velocities]);
         let effort = works.finish();
         bins.keep();
+        // Until here the status tells on which side of v = 1 a velocity is.
+        for open in doubtful {
+            open.decide(self.law, |i| Path::new(&self.ends, a_2[i], a_3[i]), status);
+        }
         effort
     }
 

@@ -7,6 +7,7 @@
 
 use multiversion::multiversion;
 
+use super::friction::Floors;
 use super::path::{Ends, MOST_STEPS, Path};
 use crate::numerics::cubic::Cubic;
 use crate::numerics::lanes::{LANES, Lanes};
@@ -19,19 +20,27 @@ pub(super) const SPAN: usize = 32;
 /// Spans that are looked at together: two ends each.
 pub(super) const SPANS: usize = LANES / 2;
 
+/// What the ends of a span settle.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Verdict {
+    pub status: Status,
+    /// Whether friction is surely positive.
+    pub sound: bool,
+}
+
 /// The one status of all shortcuts of each of consecutive spans; `None` where they differ or rounding leaves doubt, and
 /// where a span is not part of a line along one of the coordinates, between its first and its last place.
 ///
 /// What is positive at both ends of a span is positive on all of it, and so is what is negative at both ends for the
 /// same `x`.
-pub(super) fn settle(ends: &Ends, a_2: &Stretch, a_3: &Stretch) -> [Option<Status>; SPANS] {
+pub(super) fn settle(ends: &Ends, floors: &Floors, a_2: &Stretch, a_3: &Stretch) -> [Option<Verdict>; SPANS] {
     let (mut first_2, mut first_3) = ([0.0; LANES], [0.0; LANES]);
     for span in 0..SPANS {
         for (lane, place) in [(span, span * SPAN), (span + SPANS, (span + 1) * SPAN - 1)] {
             (first_2[lane], first_3[lane]) = (a_2[place], a_3[place]);
         }
     }
-    let mut found = verdicts(ends, &first_2, &first_3);
+    let mut found = verdicts(ends, floors, &first_2, &first_3);
     let straight = straight(a_2, a_3);
     for (verdict, straight) in found.iter_mut().zip(straight) {
         *verdict = verdict.filter(|_| straight);
@@ -75,19 +84,22 @@ fn is_along(moving: &[f64], fixed: &[f64]) -> bool {
     "x86_64+avx+avx2+bmi1+bmi2+avx512f+avx512bw+avx512cd+avx512dq+avx512vl",
     "x86_64+avx+avx2+bmi1+bmi2"
 ))]
-fn verdicts(ends: &Ends, a_2: &Lanes, a_3: &Lanes) -> [Option<Status>; SPANS] {
+fn verdicts(ends: &Ends, floors: &Floors, a_2: &Lanes, a_3: &Lanes) -> [Option<Verdict>; SPANS] {
     // Where each of the three has its least value, and whether that is positive, or negative at the other end too.
     let (mut places, mut positive, mut negative) = ([[0.0; LANES]; 3], [[false; LANES]; 3], [[false; LANES]; 3]);
+    // And whether the first two are above the values that friction needs.
+    let mut high = [[false; LANES]; 3];
     let (mut others_2, mut others_3) = ([0.0; LANES], [0.0; LANES]);
     for i in 0..LANES {
         (others_2[i], others_3[i]) = (a_2[(i + SPANS) % LANES], a_3[(i + SPANS) % LANES]);
     }
-    for k in 0..3 {
+    for (k, floor) in [floors.n, floors.theta, 0.0].into_iter().enumerate() {
         for i in 0..LANES {
             let (cubic, doubt) = polynomial(ends, a_2[i], a_3[i], k);
             let (place, least) = cubic.lowest();
             places[k][i] = place;
             positive[k][i] = least > doubt;
+            high[k][i] = least > floor + doubt;
         }
         for i in 0..LANES {
             let (cubic, doubt) = polynomial(ends, a_2[i], a_3[i], k);
@@ -102,7 +114,8 @@ fn verdicts(ends: &Ends, a_2: &Lanes, a_3: &Lanes) -> [Option<Status>; SPANS] {
         let tame = (a_2[i].abs() + a_3[i].abs() < WILD) & (a_2[j].abs() + a_3[j].abs() < WILD);
         let [n, theta, surplus] = [0, 1, 2].map(|k| positive[k][i] & positive[k][j]);
         let [no_n, no_theta, no_surplus] = [0, 1, 2].map(|k| negative[k][i] | negative[k][j]);
-        *found = if !tame {
+        let sound = high[0][i] & high[0][j] & high[1][i] & high[1][j];
+        let status = if !tame {
             None
         } else if no_n | no_theta {
             Some(Status::Infeasible)
@@ -113,6 +126,7 @@ fn verdicts(ends: &Ends, a_2: &Lanes, a_3: &Lanes) -> [Option<Status>; SPANS] {
         } else {
             None
         };
+        *found = status.map(|status| Verdict { status, sound });
     }
     found
 }

@@ -76,6 +76,37 @@ pub(super) struct Sums {
     pub nodes: u32,
 }
 
+/// Least friction of a part of an arc with the constant `c`, from one `(theta, ln u)` to another: at its ends, or between
+/// them if it falls below 0 there.
+///
+/// With `tau = 1 + a ln u + (b - a) ln theta = a (u - 1) - C theta` the rate `theta tau' = tau + a - b u` vanishes where
+/// `theta = (a - b) u/C`. There equation (2) of docs/theory.md is `u - 1 - ln u = [1 + a - b + (b - a) ln((a - b)/C)]/b`,
+/// and `tau = b u - a` is a minimum for `(u - 1)(b - a) < 0`: while theta rises for `b > a`, while it falls for `b < a`.
+pub(super) fn least_friction(law: &Law, c: f64, ends: [(f64, f64); 2]) -> f64 {
+    let Law { a, b } = *law;
+    let friction = |(theta, ln_u): (f64, f64)| 1.0 + a * ln_u + (b - a) * ln(theta);
+    let least = friction(ends[0]).min(friction(ends[1]));
+    let [(theta_start, start), (theta_end, end)] = ends;
+    let scale = (a - b) / c;
+    let may_dip = if b > a { start < 0.0 } else { end > 0.0 };
+    if !(may_dip && b > 0.0 && scale > 0.0 && scale.is_finite()) {
+        return least;
+    }
+    let rest = (1.0 + a - b + (b - a) * ln(scale)) / b;
+    if rest < 0.0 {
+        return least;
+    }
+    let Turning { ln_u, excess, .. } = turning((2.0 * rest).sqrt().copysign(a - b));
+    let theta = scale * (1.0 + excess);
+    let inside = if b > a {
+        theta >= theta_start && (end >= 0.0 || theta <= theta_end)
+    } else {
+        theta >= theta_end && (start <= 0.0 || theta <= theta_start)
+    };
+    // Only then is it on the arc, and only its sign counts.
+    if inside && ln_u.is_finite() { least.min(b * (1.0 + excess) - a) } else { least }
+}
+
 /// `phi(z) = e^z - 1 - z`, the left side of the turning equation, without cancellation near 0.
 pub(super) fn phi(z: f64) -> f64 {
     phi_and_slope(z).0

@@ -57,20 +57,20 @@ pub struct Wanted {
 /// and the window without hold do not exist otherwise).
 ///
 /// Each is one quadrature, no search over `t_f` (docs/theory.md, "Crossover times"). The status is `Nonphysical` where
-/// friction falls to `max(0, b - a)` on one of the paths, `Infeasible` outside the domain of the law, `NotConverged`
+/// friction falls to `max(0, b - a)` on one of the paths, `NegativeFriction` where it falls below 0, `Infeasible` outside the domain of the law, `NotConverged`
 /// where a quadrature failed.
 pub fn solve(transition: &Transition, bounded: bool, rtol: f64, wanted: Wanted) -> (Status, CrossoverTimes, Effort) {
     let mut times = CrossoverTimes::default();
     let Some(problem) = Problem::of(transition, bounded) else {
         return (Status::Infeasible, times, Effort::default());
     };
-    let mut survey = Survey { problem, rtol, status: Status::Ok, effort: Effort::default() };
+    let mut survey = Survey { problem, rtol, status: Status::Ok, friction: f64::INFINITY, effort: Effort::default() };
     if transition.v_f > transition.v_i {
         acceleration(&mut survey, wanted, &mut times);
     } else {
         deceleration(&mut survey, wanted, &mut times);
     }
-    (survey.status, times, survey.effort)
+    (survey.status.with_friction(survey.friction), times, survey.effort)
 }
 
 /// The quadratures of one transition, with the worst status met.
@@ -78,10 +78,20 @@ struct Survey {
     problem: Problem,
     rtol: f64,
     status: Status,
+    /// Least friction on any of the paths.
+    friction: f64,
     effort: Effort,
 }
 
 impl Survey {
+    /// Takes in the least friction of a path.
+    fn meet(&mut self, friction: f64) {
+        self.friction = self.friction.min(friction);
+        if friction <= self.problem.unique_above() {
+            self.status = self.status.max(Status::Nonphysical);
+        }
+    }
+
     /// Time and work of an extremal that exists.
     fn measure(&mut self, extremal: Option<Extremal>) -> (Option<f64>, Option<f64>) {
         let sums = extremal.as_ref().and_then(|e| e.arc.sums(quadrature_tolerance(self.rtol)));
@@ -93,9 +103,7 @@ impl Survey {
         };
         self.effort.quadratures += 1;
         self.effort.nodes += sums.nodes;
-        if extremal.friction_min(&self.problem, &sums) <= self.problem.unique_above() {
-            self.status = self.status.max(Status::Nonphysical);
-        }
+        self.meet(extremal.friction_min(&self.problem, &sums));
         (Some(extremal.time(&sums)), Some(extremal.work(&self.problem, &sums)))
     }
 }
@@ -129,9 +137,7 @@ fn deceleration(survey: &mut Survey, wanted: Wanted, times: &mut CrossoverTimes)
         let t_min = problem.t_min();
         times.t_min = Some(t_min);
         times.work_min = Some(hold::work(&problem.law, problem.from, t_min));
-        if 1.0 + b * problem.from.ln <= problem.unique_above() {
-            survey.status = survey.status.max(Status::Nonphysical);
-        }
+        survey.meet(1.0 + b * problem.from.ln);
     }
     let turns = problem.friction_end() > b - a;
     if wanted.turn && turns {

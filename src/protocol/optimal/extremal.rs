@@ -14,7 +14,7 @@
 //!
 //! A search counts `q` from `q_hold` where that exists, so that short holds keep their digits.
 
-use super::arc::{Arc, Chart, Sums, phi, phi_and_slope};
+use super::arc::{Arc, Chart, Sums, least_friction, phi, phi_and_slope};
 use super::hold;
 use super::lifetime::Lifetime;
 use crate::model::Law;
@@ -400,12 +400,12 @@ impl Problem {
 }
 
 impl Extremal {
-    /// Least friction on the way: at the nodes, at both ends of the arc and at the start of a hold.
+    /// Least friction on the way: at the nodes, at both ends of the arc, where it is stationary between them, and at the
+    /// start of a hold.
     pub fn friction_min(&self, problem: &Problem, sums: &Sums) -> f64 {
-        let Law { a, b } = problem.law;
-        let friction = |ln_u: f64, theta: f64| 1.0 + a * ln_u + (b - a) * ln(theta);
-        let held = if self.hold_time > 0.0 { 1.0 + b * problem.from.ln } else { f64::INFINITY };
-        sums.friction_min.min(friction(self.start, self.theta_s)).min(friction(self.end, problem.to.theta)).min(held)
+        let ends = [(self.theta_s, self.start), (problem.to.theta, self.end)];
+        let held = if self.hold_time > 0.0 { 1.0 + problem.law.b * problem.from.ln } else { f64::INFINITY };
+        sums.friction_min.min(least_friction(&problem.law, self.arc.c(), ends)).min(held)
     }
 
     /// Work of the hold and the arc together.

@@ -71,7 +71,8 @@ pub struct Optimum {
 ///
 /// `Infeasible` where no protocol is fast enough under the bound (`t_f < t_min`), or where an argument is outside its
 /// domain (`a > 0`, `b >= 0`, `v_i, v_f > 1`, `t_f > 0`, all finite). Without the bound, `BelowBound` where `v(0+) <
-/// 1`.
+/// 1`. `Nonphysical` where `tau <= max(0, b - a)` somewhere, `NegativeFriction` where `tau < 0`; an extremal that falls
+/// below the bound there has no numbers.
 pub fn solve(transition: &Transition, t_f: f64, bounded: bool, rtol: f64) -> Solved<Optimum> {
     let Some(problem) = Problem::of(transition, bounded).filter(|_| t_f > 0.0 && t_f.is_finite()) else {
         return Solved { status: Status::Infeasible, value: None, effort: Effort::default() };

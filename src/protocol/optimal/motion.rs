@@ -1,6 +1,6 @@
 //! The optimal protocol over time: the hold, then the arc along the coordinate of its chart.
 
-use super::arc::Pieces;
+use super::arc::{Arc, Pieces};
 use super::extremal::{Extremal, Problem};
 use super::lifetime::Lifetime;
 use crate::model::Law;
@@ -25,7 +25,7 @@ impl Optimal {
     /// The motion of `extremal`, or of the hold alone, in time `t_f`.
     pub(super) fn new(problem: &Problem, t_f: f64, extremal: Option<Extremal>) -> Optimal {
         let (theta_s, hold_time) = extremal.map_or((problem.to.theta, t_f), |found| (found.theta_s, found.hold_time));
-        let arc = extremal.map(|found| Timed::new(found.arc.pieces(), hold_time, t_f));
+        let arc = extremal.map(|found| Timed::new(&found.arc, hold_time, t_f));
         let hold = Hold {
             law: problem.law,
             from: problem.from,
@@ -152,6 +152,8 @@ impl Hold {
 /// The arc with its time.
 pub(super) struct Timed {
     pub pieces: Pieces,
+    /// The conserved `C`.
+    pub c: f64,
     /// When it begins.
     pub start: f64,
     t_f: f64,
@@ -166,7 +168,8 @@ pub(super) struct Timed {
 }
 
 impl Timed {
-    fn new(pieces: Pieces, hold_time: f64, t_f: f64) -> Timed {
+    fn new(arc: &Arc, hold_time: f64, t_f: f64) -> Timed {
+        let pieces = arc.pieces();
         let edge = |piece: usize| piece as f64 / f64::from(pieces.count);
         let times: Vec<f64> = (0..pieces.count as usize).map(|i| pieces.time(edge(i), edge(i + 1))).collect();
         let sums = |times: &mut dyn Iterator<Item = &f64>| {
@@ -185,7 +188,7 @@ impl Timed {
         // Rounding of the search goes to the hold, if there is one.
         let (start, scale) = if hold_time > 0.0 { ((t_f - total).max(0.0), 1.0) } else { (0.0, t_f / total) };
         let middle = gone.iter().skip(1).zip(&left).find(|(gone, left)| gone > left).map_or(0.0, |(_, &left)| left);
-        Timed { pieces, start, t_f, gone, left, scale, middle: t_f - scale * middle }
+        Timed { pieces, c: arc.c(), start, t_f, gone, left, scale, middle: t_f - scale * middle }
     }
 
     /// Time since the start of the protocol: from the nearer end of the arc, so that the layers at both ends keep their

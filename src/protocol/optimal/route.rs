@@ -1,5 +1,6 @@
 //! The optimal protocol asked at a given time: derivatives, what happens between two places, and the control it takes.
 
+use super::arc::least_friction;
 use super::hold;
 use super::motion::{Optimal, Timed};
 use crate::model::Law;
@@ -118,6 +119,24 @@ impl Optimal {
             sites.extend(arc.parts(start, end).map(|(_, to)| Site::Moving(to)));
         }
         sites
+    }
+
+    /// Least friction between two places: at one of them, or in between if it falls below 0 there.
+    pub fn friction_min(&self, from: Site, to: Site) -> f64 {
+        let mut least = f64::INFINITY;
+        if let Site::Held(start) = from {
+            // It rises all the way.
+            least = 1.0 + self.law.b * self.hold.from.aged(start).ln;
+        }
+        if let (Site::Moving(end), Some(arc)) = (to, &self.arc) {
+            let start = if let Site::Moving(start) = from { start } else { 0.0 };
+            let state = |place| {
+                let here = arc.pieces.at(place);
+                (here.theta, here.ln_u)
+            };
+            least = least.min(least_friction(&self.law, arc.c, [state(start), state(end)]));
+        }
+        least
     }
 
     /// What happens from one place to a later one.

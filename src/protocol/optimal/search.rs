@@ -175,13 +175,19 @@ pub(super) fn find_beyond(problem: &Problem, time: Time, rtol: f64) -> (Solved<O
     } else {
         Strategy::SlowDown
     };
-    let status = if friction <= unique_above || (problem.bounded && below) {
+    let doubtful = friction <= unique_above || (problem.bounded && below);
+    if doubtful && problem.bounded && (below || least_velocity(&found) < 1.0 - ROUNDING) {
+        // Where friction is this low an extremal may fall below the bound on its way: then it is no protocol under it.
+        return (Solved { status: Status::Nonphysical, value: None, effort }, None);
+    }
+    let status = if doubtful {
         Status::Nonphysical
     } else if v_start < 1.0 && !problem.bounded {
         Status::BelowBound
     } else {
         Status::Ok
     };
+    let status = status.with_friction(friction);
     let value = Optimum {
         work,
         v_start,
@@ -193,6 +199,39 @@ pub(super) fn find_beyond(problem: &Problem, time: Time, rtol: f64) -> (Solved<O
     };
     (Solved { status, value: Some(value), effort }, Some(found))
 }
+
+/// Least velocity of the arc of an extremal: at an end, or where friction rises through `b - a`.
+fn least_velocity(found: &Extremal) -> f64 {
+    let (pieces, law) = (found.arc.pieces(), found.arc.law);
+    let look = |place: f64| {
+        let here = pieces.at(place);
+        let friction = 1.0 + law.a * here.ln_u + (law.b - law.a) * here.ln_theta;
+        (friction - (law.b - law.a), here.ln_u - here.ln_theta)
+    };
+    let place = |k: u32| f64::from(k) / f64::from(PLACES);
+    let mut before = look(0.0);
+    let mut least = before.1;
+    for k in 1..=PLACES {
+        let after = look(place(k));
+        if before.0 < 0.0 && after.0 >= 0.0 {
+            let (mut low, mut high) = (place(k - 1), place(k));
+            for _ in 0..HALVINGS {
+                let middle = 0.5 * (low + high);
+                if look(middle).0 < 0.0 { low = middle } else { high = middle }
+            }
+            least = least.min(look(low).1);
+        }
+        least = least.min(after.1);
+        before = after;
+    }
+    exp(least)
+}
+
+/// Places at which an arc is looked at for its least velocity: friction rises through `b - a` once at the most.
+const PLACES: u32 = 64;
+
+/// Halvings of what lies between two of them: the velocity is flat there, so half of the digits of a place are enough.
+const HALVINGS: u32 = 30;
 
 /// The last probe of a search.
 struct Probed {
@@ -270,6 +309,7 @@ fn shortest(problem: &Problem, t_min: f64) -> Solved<Optimum> {
     let law = problem.law;
     let friction = 1.0 + law.b * problem.from.ln;
     let status = if friction <= problem.unique_above() { Status::Nonphysical } else { Status::Ok };
+    let status = status.with_friction(friction);
     let value = Optimum {
         work: hold::work(&law, problem.from, t_min),
         v_start: 1.0,

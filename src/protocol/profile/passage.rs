@@ -32,6 +32,8 @@ pub struct Resolved {
 pub struct Passage {
     pub work: f64,
     pub friction_max: f64,
+    /// As [`Resolved::sum`] has it.
+    pub friction_min: f64,
 }
 
 /// Where a passage starts.
@@ -249,13 +251,43 @@ impl Resolved {
         radau().u.into_iter().zip(self.theta).zip(self.rate).map(|((u, theta), rate)| (u, theta, rate))
     }
 
-    /// Work of friction on the panel.
-    pub fn work<E: Exponent>(&self, law: &Law, curve: &Curve<E>) -> f64 {
-        let mut power = radau().w;
-        for ((power, &v), &theta) in power.iter_mut().zip(&self.v).zip(&self.theta) {
-            *power *= friction_at(law, v, theta) * v;
+    /// Work of friction on the panel, and the least friction on it: at a node, or between two if only there it falls
+    /// below 0.
+    pub fn sum<E: Exponent>(&self, law: &Law, curve: &Curve<E>) -> (f64, f64) {
+        let (friction, rise, power) = frictions(law, curve, self, radau());
+        let first = self.first(law, curve);
+        (self.duration(curve) * power, self.least(law, curve, first, &friction, &rise))
+    }
+
+    /// Friction at the start.
+    fn first<E: Exponent>(&self, law: &Law, curve: &Curve<E>) -> Sample {
+        let friction = friction_at(law, self.v_start, self.theta_start);
+        Sample { u: 0.0, friction, rise: self.rise(law, curve, 0.0, self.v_start, self.theta_start, self.rate_start) }
+    }
+
+    /// The least friction, from that at the start and at the nodes.
+    fn least<E: Exponent>(
+        &self,
+        law: &Law,
+        curve: &Curve<E>,
+        mut before: Sample,
+        friction: &Nodes,
+        rise: &Nodes,
+    ) -> f64 {
+        let mut least = friction.iter().copied().fold(before.friction, f64::min);
+        for j in 0..NODES {
+            let after = Sample { u: radau().u[j], friction: friction[j], rise: rise[j] };
+            // The tangent bounds a minimum in between.
+            if least >= 0.0
+                && before.rise < 0.0
+                && after.rise > 0.0
+                && before.friction + before.rise * (after.u - before.u) < 0.0
+            {
+                least = least.min(self.turn(law, curve, SIGN, before, after, -1.0));
+            }
+            before = after;
         }
-        self.duration(curve) * total(&power)
+        least
     }
 
     /// Adds the work of the panel, and raises the greatest friction to what is found on it, good to `rtol`.
@@ -263,11 +295,8 @@ impl Resolved {
         let rule = radau();
         let (friction, rise, power) = frictions(law, curve, self, rule);
         passage.work += self.duration(curve) * power;
-        let mut before = Sample {
-            u: 0.0,
-            friction: friction_at(law, self.v_start, self.theta_start),
-            rise: self.rise(law, curve, 0.0, self.v_start, self.theta_start, self.rate_start),
-        };
+        let mut before = self.first(law, curve);
+        passage.friction_min = passage.friction_min.min(self.least(law, curve, before, &friction, &rise));
         passage.friction_max = passage.friction_max.max(before.friction);
         for j in 0..NODES {
             let after = Sample { u: rule.u[j], friction: friction[j], rise: rise[j] };
@@ -277,7 +306,7 @@ impl Resolved {
                 && after.rise < 0.0
                 && before.friction + before.rise * (after.u - before.u) > passage.friction_max
             {
-                let greatest = self.summit(law, curve, rtol, before, after);
+                let greatest = self.turn(law, curve, rtol, before, after, 1.0);
                 passage.friction_max = passage.friction_max.max(greatest);
             }
             before = after;
@@ -292,10 +321,18 @@ impl Resolved {
         length * (law.a * curve.exponent.slope(x, z) * (1.0 - curve.floor / v) + law.b * curve.t_f * rate / theta)
     }
 
-    /// The greatest friction between two samples where it first rises and then falls: the root of `tau'` by the
-    /// Illinois method.
-    fn summit<E: Exponent>(&self, law: &Law, curve: &Curve<E>, rtol: f64, mut low: Sample, mut high: Sample) -> f64 {
-        let mut greatest = low.friction.max(high.friction);
+    /// The greatest friction (`side` 1) between two samples where it first rises and then falls, or the least one (-1)
+    /// where it first falls and then rises: the root of `tau'` by the Illinois method.
+    fn turn<E: Exponent>(
+        &self,
+        law: &Law,
+        curve: &Curve<E>,
+        rtol: f64,
+        mut low: Sample,
+        mut high: Sample,
+        side: f64,
+    ) -> f64 {
+        let mut extreme = side * (side * low.friction).max(side * high.friction);
         let (mut rise_low, mut rise_high) = (low.rise, high.rise);
         let mut last = 0.0;
         for _ in 0..MOST_STEPS {
@@ -306,13 +343,13 @@ impl Resolved {
             let v = curve.floor + curve.w_f * exp(curve.exponent.value(x, z));
             let rise = self.rise(law, curve, u, v, theta, rate);
             let friction = friction_at(law, v, theta);
-            greatest = greatest.max(friction);
+            extreme = side * (side * extreme).max(side * friction);
             // What is left to gain is less than the rise over the bracket.
             if rise.abs() * (high.u - low.u) <= 0.1 * rtol * friction.abs() {
                 break;
             }
             let sample = Sample { u, friction, rise };
-            if rise > 0.0 {
+            if side * rise > 0.0 {
                 (low, rise_low) = (sample, rise);
                 rise_high *= if last > 0.0 { 0.5 } else { 1.0 };
                 last = 1.0;
@@ -322,9 +359,12 @@ impl Resolved {
                 last = -1.0;
             }
         }
-        greatest
+        extreme
     }
 }
+
+/// Accuracy of a least friction of which only the sign counts, relative to itself: it ends where that is certain.
+const SIGN: f64 = 0.1;
 
 /// Friction at a place and its slope there.
 #[derive(Debug, Clone, Copy)]

@@ -45,7 +45,8 @@ pub struct Regularised {
 /// outside its domain (`delta_t > 0`, `k > 0`, `m >= 0`), or where the protocol all but stands still: without the bound
 /// a deceleration jumps down by about `e^(1/a)`; pieces are drawn down to 1e-12 of the velocity at the end, and down to
 /// 1e-100. `BelowBound` where a piece dips below `v = 1`: next to a hold
-/// each must, since theta there is as large as `v >= 1` allows.
+/// each must, since theta there is as large as `v >= 1` allows. `NegativeFriction` where `tau < 0` on the way;
+/// `Nonphysical` where the optimum need not be the only one.
 pub fn solve(
     slider: &Slider,
     (v_i, v_f): (f64, f64),
@@ -98,12 +99,20 @@ fn assemble(
     let (solved, route) = route(&Transition { law: slider.law, v_i, v_f }, t_f, bounded, rtol);
     let mut effort = solved.effort;
     let (Some(optimum), Some(route)) = (solved.value, route) else { return none(solved.status, effort) };
-    let mut sum =
-        Sum { slider: *slider, rtol, visit, excess: 0.0, replaced: 0.0, v: Extent::NONE, control: Extent::NONE };
+    let mut sum = Sum {
+        slider: *slider,
+        rtol,
+        visit,
+        excess: 0.0,
+        replaced: 0.0,
+        friction_min: f64::INFINITY,
+        v: Extent::NONE,
+        control: Extent::NONE,
+    };
     if let Err(status) = sum.gather(&route, (v_i, v_f), (delta_t, t_f), &mut effort) {
         // Where the optimum need not be unique, it need not be exact enough for pieces either.
-        let doubtful = solved.status == Status::Nonphysical && status == Status::NotConverged;
-        return none(if doubtful { solved.status } else { status }, effort);
+        let doubtful = is_doubtful(solved.status) && status == Status::NotConverged;
+        return none(if doubtful { Status::Nonphysical } else { status }, effort);
     }
     if slider.k == f64::INFINITY {
         sum.control = sum.v;
@@ -120,15 +129,17 @@ fn assemble(
     };
     let numbers = [value.work, value.v_max, value.control_min, value.control_max];
     if !numbers.iter().all(|number| number.is_finite()) {
-        let doubtful = solved.status == Status::Nonphysical;
-        return none(if doubtful { solved.status } else { Status::NotConverged }, effort);
+        let doubtful = is_doubtful(solved.status);
+        return none(if doubtful { Status::Nonphysical } else { Status::NotConverged }, effort);
     }
-    let status = match solved.status {
-        Status::Ok | Status::BelowBound if value.v_min < 1.0 => Status::BelowBound,
-        Status::BelowBound => Status::Ok,
-        status => status,
-    };
+    let own = if value.v_min < 1.0 { Status::BelowBound } else { Status::Ok };
+    let status = own.with_friction(sum.friction_min).beside(solved.status);
     (Solved { status, value: Some(value), effort }, Some(route))
+}
+
+/// Whether the optimum need not be unique.
+fn is_doubtful(status: Status) -> bool {
+    matches!(status, Status::Nonphysical | Status::NegativeFriction)
 }
 
 /// Velocities below this one count as none.
@@ -144,6 +155,8 @@ struct Sum<F> {
     excess: f64,
     /// Work of the pieces.
     replaced: f64,
+    /// Least friction.
+    friction_min: f64,
     v: Extent,
     control: Extent,
 }
@@ -180,6 +193,7 @@ impl<F: FnMut(Part)> Sum<F> {
         if route.time(to) - route.time(from) <= 4.0 * f64::EPSILON * route.duration() {
             return;
         }
+        self.friction_min = self.friction_min.min(route.friction_min(from, to));
         route.control(&self.slider, from, to, self.rtol, &mut self.control);
         (self.visit)(Part::Kept(from, to));
     }
@@ -199,6 +213,7 @@ impl<F: FnMut(Part)> Sum<F> {
         }
         self.excess += piece.work - span.work;
         self.replaced += piece.work;
+        self.friction_min = self.friction_min.min(piece.friction_min);
         self.v.add(piece.v.low);
         self.v.add(piece.v.high);
         self.control.add(piece.control.low);

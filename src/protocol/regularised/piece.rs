@@ -36,6 +36,8 @@ pub(super) struct End {
 pub(super) struct Piece {
     /// Work of friction.
     pub work: f64,
+    /// Least friction, as [`Resolved::sum`](crate::protocol::profile::Resolved::sum) has it.
+    pub friction_min: f64,
     /// Range of the velocity.
     pub v: Extent,
     /// Range of the control velocity.
@@ -124,9 +126,12 @@ impl Piece {
         let problem = Problem::between(ends, -growth / end.theta, end.rate / end.theta, spare, curve);
         let curve = curve.with(problem.solve(0.0, rtol, reach(rtol), effort).ok_or(Status::NotConverged)?);
         let from = Start { v: start.v[0], theta: start.theta, rate: start.rate, slow: false };
-        let mut piece = Piece { work: 0.0, v: Extent::NONE, control: Extent::NONE, curve, from };
+        let mut piece =
+            Piece { work: 0.0, friction_min: f64::INFINITY, v: Extent::NONE, control: Extent::NONE, curve, from };
         let theta = pass(&curve, from, rtol, INTERPOLATION * reach(rtol), effort, |panel| {
-            piece.work += panel.work(&slider.law, &curve);
+            let (work, friction_min) = panel.sum(&slider.law, &curve);
+            piece.work += work;
+            piece.friction_min = piece.friction_min.min(friction_min);
             panel.range(&curve, Tolerance::OfValue(rtol), &mut piece.v, |jet, _| [jet.v[0], jet.v[1] / jet.v[0]]);
             panel.range(&curve, Tolerance::OfRange(rtol), &mut piece.control, |jet, bend| {
                 [slider.control(jet), slider.control_rate(jet, bend)]

@@ -38,13 +38,14 @@ impl Family for Cubic {
             (v_min, v_max) = (v_min.min(v), v_max.max(v));
         }
         let extrema = curve.extrema(case.transition.law.a, case.transition.law.b - case.transition.law.a);
-        let frictions = extrema.into_iter().map(|(side, d)| curve.friction(side, d));
+        let frictions: Vec<f64> = extrema.into_iter().map(|(side, d)| curve.friction(side, d)).collect();
         Ok(Swift {
             alpha: None,
             work,
             v_min,
             v_max,
-            friction_max: frictions.fold(f64::NEG_INFINITY, f64::max),
+            friction_max: frictions.iter().copied().fold(f64::NEG_INFINITY, f64::max),
+            friction_min: frictions.iter().copied().fold(f64::INFINITY, f64::min),
             miss: 0.0,
         })
     }

@@ -36,14 +36,17 @@ pub struct Swift {
     pub v_max: f64,
     /// Greatest friction there.
     pub friction_max: f64,
+    /// Least friction there, or a lower bound of it that is not below 0.
+    pub friction_min: f64,
     /// Relative distance from the target at `t_f`, `theta(t_f) v_f - 1`; 0 for a family that arrives.
     pub miss: f64,
 }
 
 impl Swift {
-    /// `Ok`, or `BelowBound` where it leaves the range of the friction law.
+    /// `Ok`, or `BelowBound` or `NegativeFriction` where it leaves the range of the friction law.
     pub fn status(&self) -> Status {
-        if self.v_min < 1.0 { Status::BelowBound } else { Status::Ok }
+        let status = if self.v_min < 1.0 { Status::BelowBound } else { Status::Ok };
+        status.with_friction(self.friction_min)
     }
 }
 

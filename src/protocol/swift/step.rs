@@ -36,13 +36,14 @@ impl Family for Step {
         let end = v_f * t_f;
         let steady = 1.0 + (law.a - law.b) * ln(v_f);
         // Theta falls or rises all the way.
-        let ln_ratio = decay.ln_at(if decay.k > 0.0 { 0.0 } else { end });
+        let ratios = [decay.ln_at(0.0), decay.ln_at(end)];
         Ok(Swift {
             alpha: None,
             work: end * steady + law.b * decay.integral(end),
             v_min: v_f,
             v_max: v_f,
-            friction_max: steady + law.b * ln_ratio,
+            friction_max: steady + law.b * ratios[0].max(ratios[1]),
+            friction_min: steady + law.b * ratios[0].min(ratios[1]),
             miss: decay.k * exp(-end),
         })
     }

@@ -4,6 +4,7 @@ use super::Known;
 use super::case::{self, Case, Route};
 use super::optimal::{least_time, least_work, transition};
 use super::sweeps::Grid;
+use crate::friction::of_cubic;
 use crate::reference::{self, Row};
 
 pub const KNOWN: Known = Known {
@@ -45,6 +46,8 @@ fn point(row: &Row, border: bool) -> Option<Case> {
         "ok" => ("ok", "v >= 1"),
         _ => ("below_bound", "below v = 1"),
     };
+    let friction = of_cubic(&transition, t_f, row.number("a_2"), row.number("a_3"));
+    let status = if friction < 0.0 { "negative_friction" } else { status };
     let case = case.within(if border { "next to the border" } else { regime });
     let case = case.reference(row, &["work", "v_min"]).word("status", status, Route::Reference);
     Some(case::gap(case, work, work_optimal))

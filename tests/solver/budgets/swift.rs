@@ -6,6 +6,7 @@ use super::Known;
 use super::case::{self, Case, Route, Truth, Value};
 use super::optimal::{AXES, least_time, least_work, transition};
 use super::sweeps::Grid;
+use crate::friction::of_cubic;
 use crate::reference::{self, Row};
 
 pub const KNOWN: Known = Known {
@@ -79,9 +80,30 @@ fn point(row: &Row, family: &'static str, tau_max: f64, regime: &'static str) ->
     match least_work(&transition, t_f, !late) {
         Some(least) => {
             let status = if row.number("v_min") < 1.0 { "below_bound" } else { "ok" };
+            let status = if friction(row, family, &transition, tau_max) < 0.0 { "negative_friction" } else { status };
             case::gap(case, row.number("work"), least).word("status", status, Route::Reference)
         }
         // Where the optimum is not certain to be one, the status says so, and the rest is still what it is.
         None => case,
+    }
+}
+
+/// About the least friction, from the formula of the family; for `bounded_velocity` at both ends, where it is least.
+fn friction(row: &Row, family: &str, transition: &Transition, tau_max: f64) -> f64 {
+    let &Transition { law, v_i, v_f } = transition;
+    match family {
+        "cubic" => of_cubic(transition, row.number("t_f"), 0.0, 3.0 * (v_i - v_f) / (v_i * v_f)),
+        "bounded_friction" => {
+            let room = |v: f64| tau_max - 1.0 - (law.a - law.b) * v.ln();
+            let (alpha, l) = (row.number("alpha"), (room(v_f) / room(v_i)).ln());
+            let friction = |x: f64| tau_max - room(v_i) * (l * x + alpha * x * (1.0 - x)).exp();
+            (0..=5_000).map(|k| friction(f64::from(k) / 5_000.0)).fold(f64::INFINITY, f64::min)
+        }
+        "step" => {
+            let end = 1.0 + (v_f / v_i - 1.0) * (-v_f * row.number("t_f")).exp();
+            let friction = |theta_v: f64| 1.0 + (law.a - law.b) * v_f.ln() + law.b * theta_v.ln();
+            friction(v_f / v_i).min(friction(end))
+        }
+        _ => [v_i, v_f].map(|v| 1.0 + (law.a - law.b) * v.ln()).into_iter().fold(f64::INFINITY, f64::min),
     }
 }

@@ -41,7 +41,8 @@ fn every_best_shortcut_is_the_best_or_says_so() {
         let Best { a_2, a_3, work, work_optimal, gap, v_min } = best;
         let numbers = [a_2, a_3, work, work_optimal, gap, v_min];
         row.fact("finite", numbers.iter().all(|number| number.is_finite()));
-        if solved.status == Status::Nonphysical {
+        // Where friction is that low, the extremal that the gap compares with need not be the least.
+        if matches!(solved.status, Status::Nonphysical | Status::NegativeFriction) {
             return;
         }
         row.fact("the bound is kept", v_min >= if bounded { 1.0 } else { 0.0 });

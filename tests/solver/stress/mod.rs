@@ -2,7 +2,7 @@
 //! invariants that hold at each of them, and no row that is not converged.
 //!
 //! `SLIPSWEEP_STRESS` is the number of points of each table, fewer in proportion of open loops, which are simulated;
-//! without it they are what continuous integration can afford. Point number `i` of a table is the same whatever that
+//! without it they are as many as `SLIPSWEEP_TESTS` allows. Point number `i` of a table is the same whatever that
 //! number: `SLIPSWEEP_STRESS_POINT=i` runs it alone. `SLIPSWEEP_STRESS_PRINT=1` prints the points instead. `tests/nightly/run`
 //! runs them by the million.
 
@@ -25,11 +25,15 @@ use std::sync::Mutex;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Instant;
 
+use crate::extent::quick_or_long;
 use random::Random;
 use slipsweep::protocol::Status;
 
 /// Points of a table in continuous integration.
 const POINTS: u64 = 10_000;
+
+/// How many times fewer points a quick test has: `cargo test --test solver stress` then takes 14 s of processor time.
+const QUICK: u64 = 25;
 
 /// Failures that a report names.
 const NAMED: usize = 8;
@@ -118,7 +122,8 @@ fn sample<P: Debug>(
 ) {
     let number = |name: &str| std::env::var(name).ok().map(|text| text.parse::<u64>().expect("is a number of points"));
     let alone = number("SLIPSWEEP_STRESS_POINT");
-    let points = number("SLIPSWEEP_STRESS").map_or(default, |points| points * default / POINTS);
+    let points =
+        number("SLIPSWEEP_STRESS").map_or(quick_or_long(default / QUICK, default), |points| points * default / POINTS);
     let indices = alone.map_or(0..points, |index| index..index + 1);
     if number("SLIPSWEEP_STRESS_PRINT").is_some() {
         indices.for_each(|index| println!("{table} {index}: {:?}", draw(&mut Random::of(table, index))));

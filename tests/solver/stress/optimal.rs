@@ -82,12 +82,12 @@ fn sound(transition: &Transition, t_f: f64, bounded: bool, solved: &Solved<Optim
     let numbers = [work, v_start, v_end, hold_time, hamiltonian, theta_max];
     row.fact("finite", numbers.iter().all(|number| number.is_finite()));
     row.fact("has a status with numbers", !matches!(solved.status, Status::Infeasible | Status::NotConverged));
+    row.fact("velocities are positive", v_start >= 0.0 && v_end >= 0.0);
+    row.fact("the bound is kept", !bounded || (v_start >= 1.0 && v_end >= 1.0 && theta_max <= 1.0));
     if certain(solved).is_none() {
         return;
     }
     row.fact("work is positive", work > 0.0);
-    row.fact("velocities are positive", v_start >= 0.0 && v_end >= 0.0);
-    row.fact("the bound is kept", !bounded || (v_start >= 1.0 && v_end >= 1.0 && theta_max <= 1.0));
     row.fact("hold within the time", (0.0..=t_f).contains(&hold_time));
     let expected = if hold_time > 0.0 {
         Strategy::Hold

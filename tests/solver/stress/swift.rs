@@ -129,10 +129,10 @@ fn slip(case: &Case, found: &Swift) -> f64 {
 }
 
 fn sound(found: &Swift, row: &mut Row) {
-    let &Swift { alpha, work, v_min, v_max, friction_max, miss } = found;
-    let numbers = [alpha.unwrap_or(0.0), work, v_min, v_max, friction_max, miss];
+    let &Swift { alpha, work, v_min, v_max, friction_max, friction_min, miss } = found;
+    let numbers = [alpha.unwrap_or(0.0), work, v_min, v_max, friction_max, friction_min, miss];
     row.fact("finite", numbers.iter().all(|number| number.is_finite()));
-    row.fact("in order", 0.0 <= v_min && v_min <= v_max);
+    row.fact("in order", 0.0 <= v_min && v_min <= v_max && friction_min <= friction_max);
 }
 
 fn promises(name: &str, case: &Case, found: &Swift, row: &mut Row) {
@@ -153,6 +153,7 @@ fn not_below_the_optimum(name: &str, case: &Case, found: &Swift, noise: f64, row
     let optimum = optimal::solve(&case.transition, case.t_f, bounded, FINE);
     if let (Some(best), Status::Ok | Status::BelowBound) = (optimum.value, optimum.status)
         && name != "step"
+        && found.friction_min >= 0.0
     {
         let rounding = 8.0 * f64::EPSILON * case.t_f * best.hamiltonian.abs();
         row.at_most("gap >= 0", best.work - found.work, noise * best.work + rounding);

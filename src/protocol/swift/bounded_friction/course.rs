@@ -254,6 +254,15 @@ impl Course {
         }
     }
 
+    /// The change of `alpha_3` that rounding of a meeting's sum stands for, without that of `t_f`, which no measure escapes; 0
+    /// for the other measures.
+    pub fn lost_in_sum(&self, end: &End) -> f64 {
+        match self.measure {
+            Measure::Meeting { .. } => self.rounding(end) / (1.0 + self.t_f / end.sum),
+            _ => 0.0,
+        }
+    }
+
     /// `ln[(tau_M - tau)/gap]` with the gap of this side: where `alpha_3` is next to `-ln R`, the sum of both is exact.
     #[inline(always)]
     pub fn exponent(&self, anchor: &Anchor, near: f64) -> f64 {
@@ -308,14 +317,20 @@ impl Course {
 
     /// Greatest friction: at an end, or at the vertex of the parabola.
     pub fn friction_max(&self) -> f64 {
-        let [first, last] = &self.anchors;
-        let ends = first.friction.max(last.friction);
-        let vertex = 0.5 + 0.5 * first.l / self.alpha;
-        if self.alpha < 0.0 && vertex > 0.0 && vertex < 1.0 {
-            self.friction(Side::Start, vertex).max(ends)
-        } else {
-            ends
-        }
+        let ends = self.anchors[0].friction.max(self.anchors[1].friction);
+        self.vertex_friction().filter(|_| self.alpha < 0.0).map_or(ends, |vertex| vertex.max(ends))
+    }
+
+    /// Least friction: at an end, or at the vertex of the parabola.
+    pub fn friction_min(&self) -> f64 {
+        let ends = self.anchors[0].friction.min(self.anchors[1].friction);
+        self.vertex_friction().filter(|_| self.alpha > 0.0).map_or(ends, |vertex| vertex.min(ends))
+    }
+
+    /// Friction at the vertex of the parabola, where that lies between the ends.
+    fn vertex_friction(&self) -> Option<f64> {
+        let vertex = 0.5 + 0.5 * self.anchors[0].l / self.alpha;
+        (vertex > 0.0 && vertex < 1.0).then(|| self.friction(Side::Start, vertex))
     }
 
     /// The rate of theta in units of `theta_0`, `v_0 t_f`, with the sign of the integration against time.

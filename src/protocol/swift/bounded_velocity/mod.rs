@@ -45,9 +45,10 @@ impl Family for BoundedVelocity {
         if v_i == v_f {
             let friction_max = 1.0 + (law.a - law.b) * ln(v_i);
             let work = friction_max * v_i * case.t_f;
-            return Ok(Swift { alpha: Some(0.0), work, v_min: v_i, v_max: v_i, friction_max, miss: 0.0 });
+            let friction_min = friction_max;
+            return Ok(Swift { alpha: Some(0.0), work, v_min: v_i, v_max: v_i, friction_max, friction_min, miss: 0.0 });
         }
-        let mut passage = Passage { work: 0.0, friction_max: f64::NEG_INFINITY };
+        let mut passage = Passage { work: 0.0, friction_max: f64::NEG_INFINITY, friction_min: f64::INFINITY };
         follow(&curve, case, rtol, effort, |panel| panel.gather(&law, &curve, rtol, &mut passage))?;
         if !passage.work.is_finite() {
             return Err(Obstacle::NotConverged);
@@ -59,6 +60,7 @@ impl Family for BoundedVelocity {
             v_min: v_i.min(v_f).min(vertex),
             v_max: v_i.max(v_f).max(vertex),
             friction_max: passage.friction_max,
+            friction_min: passage.friction_min,
             miss: 0.0,
         })
     }

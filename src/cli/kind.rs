@@ -1,0 +1,226 @@
+//! What a path is: a command that gets something else than it takes says which command takes it.
+
+use std::fs::{self, File};
+use std::io::{self, Read};
+use std::path::{Path, PathBuf};
+
+use super::{Failure, wrong};
+use crate::dataset::Folder;
+
+/// The file that makes a folder a dataset.
+pub const MANIFEST: &str = "manifest.json";
+
+/// Most bytes at the start of a file that are looked at, which is all of a spec that one writes by hand.
+const MOST_LOOKED_AT: u64 = 1 << 20;
+
+/// Names of datasets that a message lists.
+const MOST_NAMED: usize = 4;
+
+/// What a path is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Kind {
+    /// The folder of a dataset.
+    Dataset,
+    /// A folder with datasets in it, such as `results`.
+    Datasets,
+    /// The folder of a table of a dataset.
+    Table,
+    /// A part of a table.
+    Part,
+    /// The manifest of a dataset.
+    Manifest,
+    /// Another folder.
+    Folder,
+    /// A spec.
+    Spec,
+    /// A protocol over time.
+    Trace,
+    /// Another file of rows, CSV or Parquet.
+    Rows,
+    /// A page that `report` wrote, or another.
+    Page,
+    /// A picture that `plot` wrote, or another.
+    Picture,
+    /// Another file.
+    File,
+    /// What is read once, by who knows what is to come.
+    Device,
+    /// Nothing.
+    Nothing,
+}
+
+impl Kind {
+    /// What `path` is.
+    pub fn of(path: &Path) -> Kind {
+        let ending = path.extension().and_then(|ending| ending.to_str()).unwrap_or_default().to_lowercase();
+        if path.is_dir() {
+            return match () {
+                () if path.join(MANIFEST).exists() => Kind::Dataset,
+                () if above(path).is_some_and(|above| above.join(MANIFEST).exists()) => Kind::Table,
+                () if !datasets(path).is_empty() => Kind::Datasets,
+                // Its parts say what a lost manifest said.
+                () if matches!(Folder::at(path).manifest(), Ok(Some(_))) => Kind::Dataset,
+                () => Kind::Folder,
+            };
+        }
+        if !path.is_file() {
+            return if path.exists() { Kind::Device } else { Kind::Nothing };
+        }
+        let Ok(start) = start(path) else { return Kind::File };
+        let is_in_dataset = above(path).and_then(|table| above(&table)).is_some_and(|f| f.join(MANIFEST).exists());
+        match ending.as_str() {
+            "json" if path.file_name().is_some_and(|name| name == MANIFEST) => Kind::Manifest,
+            "html" | "htm" => Kind::Page,
+            "svg" | "png" | "pdf" => Kind::Picture,
+            _ if start.starts_with(b"PAR1") && is_in_dataset => Kind::Part,
+            _ if start.starts_with(b"PAR1") || ending == "parquet" => rows(has_columns_of_trace(path)),
+            "csv" => rows(is_trace(&String::from_utf8_lossy(&start))),
+            "toml" => Kind::Spec,
+            _ if is_spec(&start) => Kind::Spec,
+            _ => Kind::File,
+        }
+    }
+
+    /// It in words.
+    fn words(self) -> &'static str {
+        match self {
+            Kind::Dataset => "a dataset",
+            Kind::Datasets => "a folder of datasets",
+            Kind::Table => "the folder of a table",
+            Kind::Part => "a part of a table",
+            Kind::Manifest => "the manifest of a dataset",
+            Kind::Folder => "a folder without a manifest.json",
+            Kind::Spec => "a spec",
+            Kind::Trace => "a trace",
+            Kind::Rows => "a file of rows",
+            Kind::Page => "a page of HTML",
+            Kind::Picture => "a picture",
+            Kind::File => "a file of another kind",
+            Kind::Device => "a device or a named pipe, not a file",
+            Kind::Nothing => "there is no such file or folder",
+        }
+    }
+
+    /// What is expected of an argument of this kind.
+    fn expected(self) -> &'static str {
+        match self {
+            Kind::Spec => "a spec, such as NAME.toml",
+            Kind::Trace => "a trace, which `slipsweep trace … --out FILE.csv` writes",
+            _ => "the folder of a dataset, such as results/NAME",
+        }
+    }
+
+    /// What may be done with it.
+    fn help(self, path: &Path) -> String {
+        let shown = path.display();
+        let dataset = |path: Option<PathBuf>| path.map_or_else(String::new, |path| path.display().to_string());
+        match self {
+            Kind::Dataset => format!("`slipsweep summary {shown}` says what it contains"),
+            Kind::Datasets => format!("name one of them: {}", datasets(path).join(", ")),
+            Kind::Table => format!("name its dataset, {}", dataset(above(path))),
+            Kind::Part => format!("name its dataset, {}", dataset(above(path).and_then(|table| above(&table)))),
+            Kind::Manifest => format!("name its folder, {}", dataset(above(path))),
+            Kind::Spec => format!("`slipsweep run {shown}` computes its dataset, {}: name that", results(path)),
+            Kind::Trace => format!("`slipsweep plot {shown}` draws it"),
+            Kind::Rows => {
+                let table = path.file_stem().map_or_else(String::new, |stem| stem.to_string_lossy().into_owned());
+                format!("`slipsweep query {shown} \"SELECT * FROM \\\"{table}\\\"\"` shows it")
+            }
+            Kind::Page => "open it in a browser".to_owned(),
+            Kind::Picture => "open it in a viewer".to_owned(),
+            Kind::Folder | Kind::File | Kind::Device => "name a folder that `slipsweep run` wrote".to_owned(),
+            Kind::Nothing => "check the name".to_owned(),
+        }
+    }
+}
+
+/// That `path` is one of `kinds`.
+pub fn expect(path: &Path, kinds: &[Kind]) -> Result<(), Failure> {
+    let found = Kind::of(path);
+    if kinds.contains(&found) {
+        return Ok(());
+    }
+    let not: Vec<&str> = kinds.iter().map(|kind| kind.words()).collect();
+    let expected: Vec<&str> = kinds.iter().map(|kind| kind.expected()).collect();
+    let what = match found {
+        Kind::Nothing | Kind::Device => found.words().to_owned(),
+        _ => format!("{}, not {}", found.words(), not.join(" or ")),
+    };
+    Err(wrong(format!(
+        "{}: {what}\n  expected: {}\n  help: {}",
+        path.display(),
+        expected.join(", or "),
+        found.help(path)
+    )))
+}
+
+/// That `path` may be a spec: the reader of specs says what else is wrong.
+pub fn expect_spec(path: &Path) -> Result<(), Failure> {
+    match Kind::of(path) {
+        Kind::Spec | Kind::File | Kind::Folder | Kind::Device | Kind::Nothing => Ok(()),
+        _ => expect(path, &[Kind::Spec]),
+    }
+}
+
+/// That `path` is not something that has no rows: the reader of datasets, or of files of rows, says what else is wrong.
+pub fn expect_rows(path: &Path) -> Result<(), Failure> {
+    match Kind::of(path) {
+        Kind::Spec | Kind::Manifest | Kind::Datasets | Kind::Page | Kind::Picture => expect(path, &[Kind::Dataset]),
+        _ => Ok(()),
+    }
+}
+
+/// The folder that a path is in.
+fn above(path: &Path) -> Option<PathBuf> {
+    let real = fs::canonicalize(path).ok()?;
+    let real = real.parent()?.to_owned();
+    // As it was typed, if that names it.
+    let typed = path.parent().filter(|typed| fs::canonicalize(typed).is_ok_and(|typed| typed == real));
+    Some(typed.map_or(real.clone(), Path::to_owned))
+}
+
+/// The first datasets in a folder.
+fn datasets(folder: &Path) -> Vec<String> {
+    let entries = fs::read_dir(folder).into_iter().flatten().filter_map(|entry| Some(entry.ok()?.path()));
+    let mut found: Vec<PathBuf> = entries.filter(|path| path.join(MANIFEST).exists()).collect();
+    found.sort();
+    found.truncate(MOST_NAMED);
+    found.into_iter().map(|path| path.display().to_string()).collect()
+}
+
+fn start(path: &Path) -> io::Result<Vec<u8>> {
+    let mut start = Vec::new();
+    File::open(path)?.take(MOST_LOOKED_AT).read_to_end(&mut start)?;
+    Ok(start)
+}
+
+fn rows(is_trace: bool) -> Kind {
+    if is_trace { Kind::Trace } else { Kind::Rows }
+}
+
+/// Whether a CSV has a time and a velocity, after the lines that say what it is.
+fn is_trace(text: &str) -> bool {
+    let names = text.lines().find(|line| !line.starts_with('#')).unwrap_or_default();
+    let has = |name| names.split(',').any(|column| column.trim() == name);
+    has("t") && has("v")
+}
+
+fn has_columns_of_trace(path: &Path) -> bool {
+    let names = crate::dataset::frame::headings(path).map(|(headings, _)| headings).unwrap_or_default();
+    let has = |name| names.iter().any(|heading| heading.name == name);
+    has("t") && has("v")
+}
+
+/// Whether a text without the ending of a spec is one.
+fn is_spec(text: &[u8]) -> bool {
+    let table: Option<toml::Table> = std::str::from_utf8(text).ok().and_then(|text| text.parse().ok());
+    table.is_some_and(|table| ["axes", "tables", "block"].iter().any(|key| table.contains_key(*key)))
+}
+
+/// The dataset that a spec makes by default.
+fn results(spec: &Path) -> String {
+    let text = start(spec).ok().and_then(|text| String::from_utf8(text).ok());
+    let table: Option<toml::Table> = text.and_then(|text| text.parse().ok());
+    let name = table.as_ref().and_then(|table| table.get("name")).and_then(toml::Value::as_str);
+    format!("results/{}", name.unwrap_or("NAME"))
+}

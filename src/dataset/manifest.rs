@@ -1,0 +1,98 @@
+//! The manifest of a dataset: its tables, each with the hash of what it follows from, and the text of the spec.
+
+use std::ops::Range;
+
+use serde::{Deserialize, Serialize};
+use sha2::{Digest, Sha256};
+
+/// The program that computes a dataset: programs of different builds never share one.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Build {
+    /// Its version.
+    pub version: String,
+    /// Its numerics revision: a hash of the sources that numbers follow from, which differ between commits of one version.
+    pub revision: String,
+}
+
+impl Build {
+    /// This program.
+    pub fn this() -> Build {
+        Build { version: env!("CARGO_PKG_VERSION").to_owned(), revision: env!("SLIPSWEEP_REVISION").to_owned() }
+    }
+}
+
+/// One table of a dataset.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct ManifestTable {
+    /// Its name, also of its folder.
+    pub name: String,
+    /// SHA-256 of all that its rows follow from: grid, model, columns and accuracy. Comments, spacing and description do not enter it, nor do
+    /// other tables.
+    pub hash: String,
+    /// All its rows.
+    pub rows: u64,
+    /// Its parts.
+    pub parts: u64,
+    /// Rows of every part but the last, which may have fewer.
+    pub rows_per_part: u64,
+}
+
+impl ManifestTable {
+    /// The rows of part number `part`; none if there is no such part, whatever a manifest claims.
+    pub fn rows_of(&self, part: u64) -> Range<u64> {
+        let start = part.saturating_mul(self.rows_per_part).min(self.rows);
+        start..start.saturating_add(self.rows_per_part).min(self.rows)
+    }
+}
+
+/// `manifest.json`: what the finished dataset consists of. It is there before the first part, and follows from the spec as well as from the
+/// parts.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Manifest {
+    /// The name of the dataset.
+    pub name: String,
+    /// The program that computes it.
+    #[serde(flatten)]
+    pub build: Build,
+    /// The tables, in the order of the spec.
+    pub tables: Vec<ManifestTable>,
+    /// The text of the spec; empty if the manifest is lost and the parts do not have it.
+    pub spec: String,
+    /// Why this is not what the file says but what the parts say.
+    #[serde(skip)]
+    pub rebuilt: Option<String>,
+}
+
+impl Manifest {
+    /// The table of this name.
+    pub fn table(&self, name: &str) -> Option<&ManifestTable> {
+        self.tables.iter().find(|table| table.name == name)
+    }
+
+    /// Whether it has all tables of `other`, the same in everything, by the same program.
+    pub fn covers(&self, other: &Manifest) -> bool {
+        self.build == other.build && other.tables.iter().all(|table| self.table(&table.name) == Some(table))
+    }
+
+    /// The bytes of the file: the same for the same manifest. The last entry is the SHA-256 of the text without it.
+    pub(super) fn to_bytes(&self) -> serde_json::Result<Vec<u8>> {
+        let mut text = serde_json::to_vec_pretty(self)?;
+        let checksum: String = Sha256::digest(&text).iter().map(|byte| format!("{byte:02x}")).collect();
+        text.truncate(text.len() - "\n}".len());
+        text.extend(format!(",\n  \"sha256\": \"{checksum}\"\n}}\n").into_bytes());
+        Ok(text)
+    }
+
+    /// Reads the bytes of the file; every changed bit is found, since only the bytes as they were written are accepted.
+    ///
+    /// # Errors
+    ///
+    /// In what way they are damaged.
+    pub(super) fn from_bytes(bytes: &[u8]) -> Result<Manifest, String> {
+        let manifest: Manifest = serde_json::from_slice(bytes).map_err(|error| error.to_string())?;
+        match manifest.to_bytes() {
+            Ok(written) if written == bytes => Ok(manifest),
+            _ => Err("its checksum does not match".to_owned()),
+        }
+    }
+}

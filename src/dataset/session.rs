@@ -1,0 +1,220 @@
+//! A run at work on a dataset: it publishes its manifest so that it replaces no other, and compares the one in place before each part.
+//!
+//! The lock is a courtesy to users alone. That no two specs mix follows from the manifest: the first one in place stays.
+
+use std::fs::{self, File, TryLockError};
+use std::io;
+use std::path::Path;
+use std::sync::{Mutex, PoisonError};
+use std::time::SystemTime;
+
+use super::atomic;
+use super::folder::{DatasetError, Folder, failed, unwritten};
+use super::manifest::Manifest;
+
+/// Times that a manifest is published where another one comes and goes.
+const ATTEMPTS: usize = 4;
+
+/// A run at work on a dataset.
+#[derive(Debug)]
+pub struct Session {
+    folder: Folder,
+    /// The manifest in place.
+    pub manifest: Manifest,
+    /// The tables of this run.
+    planned: Manifest,
+    /// The manifest's file when it was last compared.
+    seen: Mutex<Option<Stamp>>,
+    /// Unlocked when it is closed.
+    _lock: Option<File>,
+}
+
+/// Whether a run allows another one beside it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Company {
+    /// A run of the whole sweep is alone.
+    Alone,
+    /// Shards run side by side, one shard twice after a requeue.
+    Shards,
+}
+
+/// What changes when a file is replaced: length, time and, where there is one, the number of the file.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+struct Stamp(u64, Option<SystemTime>, u64);
+
+impl Stamp {
+    fn of(path: &Path) -> io::Result<Stamp> {
+        let metadata = fs::metadata(path)?;
+        #[cfg(unix)]
+        let number = std::os::unix::fs::MetadataExt::ino(&metadata);
+        #[cfg(not(unix))]
+        let number = 0;
+        Ok(Stamp(metadata.len(), metadata.modified().ok(), number))
+    }
+}
+
+impl Folder {
+    /// Makes the folder ready for the parts of `planned`. A dataset in it that has the same tables and others is left as it is; one that lacks
+    /// some of the tables gets them.
+    ///
+    /// # Errors
+    ///
+    /// If the folder belongs to something else, or another run is at work in it.
+    pub fn open(&self, planned: &Manifest, company: Company) -> Result<Session, DatasetError> {
+        self.settle(planned)?;
+        let create =
+            |folder: &Path| atomic::create_folder(folder).map_err(|error| failed(folder, "create the folder", error));
+        create(self.path())?;
+        let lock = lock(self.path(), company)?;
+        let manifest = self.publish(planned)?;
+        let now = SystemTime::now();
+        atomic::sweep(self.path(), now);
+        for table in &planned.tables {
+            let folder = self.path().join(&table.name);
+            create(&folder)?;
+            atomic::sweep(&folder, now);
+        }
+        let folder = self.clone();
+        let session = Session { folder, manifest, planned: planned.clone(), seen: Mutex::default(), _lock: lock };
+        session.check()?;
+        Ok(session)
+    }
+
+    /// The manifest that the folder should have for `planned`, and what is to be done for it.
+    fn settle(&self, planned: &Manifest) -> Result<(Manifest, Step), DatasetError> {
+        let (found, step) = match self.read_manifest() {
+            Ok(Some(found)) => (Some(found), Step::Keep),
+            Ok(None) => {
+                let occupied = fs::read_dir(self.path()).is_ok_and(|entries| {
+                    entries.flatten().any(|entry| !entry.file_name().to_string_lossy().starts_with('.'))
+                });
+                // Another run may have published its manifest, the first file with a name, a moment ago.
+                match self.read_manifest() {
+                    Ok(None) if !occupied => (None, Step::Create),
+                    Ok(None) => match self.manifest_of_parts() {
+                        Some(rebuilt) => (Some(rebuilt), Step::Create),
+                        None => return Err(DatasetError::Occupied { folder: self.path().display().to_string() }),
+                    },
+                    found => (found?, Step::Keep),
+                }
+            }
+            Err(error @ DatasetError::Manifest { .. }) => match self.manifest_of_parts() {
+                // Nobody can say what the parts belong to.
+                None if self.has_parts() => return Err(error),
+                found => (found, Step::Replace),
+            },
+            Err(error) => return Err(error),
+        };
+        let Some(found) = found else { return Ok((planned.clone(), step)) };
+        self.compare(planned, &found)?;
+        if found.covers(planned) && step == Step::Keep {
+            return Ok((found, Step::Keep));
+        }
+        let step = if step == Step::Keep { Step::Replace } else { step };
+        let mut settled = if found.tables.len() > planned.tables.len() { found } else { planned.clone() };
+        settled.rebuilt = None;
+        if settled.spec.is_empty() {
+            settled.spec.clone_from(&planned.spec);
+        }
+        Ok((settled, step))
+    }
+
+    /// Puts the manifest for `planned` in its place, and returns it.
+    fn publish(&self, planned: &Manifest) -> Result<Manifest, DatasetError> {
+        let path = self.manifest_path();
+        for _ in 0..ATTEMPTS {
+            let (manifest, step) = self.settle(planned)?;
+            let damage = |error: serde_json::Error| DatasetError::Manifest {
+                path: path.display().to_string(),
+                why: error.to_string(),
+            };
+            match step {
+                Step::Keep => return Ok(manifest),
+                Step::Replace => {
+                    let bytes = manifest.to_bytes().map_err(damage)?;
+                    atomic::write(&path, &bytes).map_err(|error| unwritten(&path, error))?;
+                    return Ok(manifest);
+                }
+                Step::Create => {
+                    let bytes = manifest.to_bytes().map_err(damage)?;
+                    if atomic::write_new(&path, &bytes).map_err(|error| unwritten(&path, error))? {
+                        return Ok(manifest);
+                    }
+                    // Another run was faster.
+                }
+            }
+        }
+        Err(self.taken("manifest.json comes and goes"))
+    }
+
+    fn taken(&self, what: &'static str) -> DatasetError {
+        DatasetError::Taken { folder: self.path().display().to_string(), what }
+    }
+}
+
+/// What a manifest needs.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Step {
+    /// It is in place.
+    Keep,
+    /// It gets tables, or is damaged.
+    Replace,
+    /// There is none.
+    Create,
+}
+
+impl Session {
+    /// Writes a part, whole or not at all, if the dataset is still that of this run.
+    pub fn write_part(&self, table: &str, part: u64, bytes: &[u8]) -> Result<(), DatasetError> {
+        self.check()?;
+        self.folder.write_part(table, part, bytes)
+    }
+
+    /// Compares the manifest in place with that of this run, if its file has changed.
+    ///
+    /// # Errors
+    ///
+    /// If it is not there any more, or is another one.
+    pub fn check(&self) -> Result<(), DatasetError> {
+        let stamp = Stamp::of(&self.folder.manifest_path()).ok();
+        let mut seen = self.seen.lock().unwrap_or_else(PoisonError::into_inner);
+        if stamp.is_some() && *seen == stamp {
+            return Ok(());
+        }
+        match self.folder.read_manifest() {
+            Ok(Some(found)) if found.covers(&self.planned) => {
+                *seen = stamp;
+                Ok(())
+            }
+            Ok(None) => Err(self.folder.taken("manifest.json was removed")),
+            _ => Err(self.folder.taken("manifest.json was replaced by another one")),
+        }
+    }
+}
+
+/// The lock of a run on the folder of its dataset; none where folders cannot be locked.
+fn lock(folder: &Path, company: Company) -> Result<Option<File>, DatasetError> {
+    let Ok(file) = File::open(folder) else { return Ok(None) };
+    let locked = match company {
+        Company::Alone => file.try_lock(),
+        Company::Shards => file.try_lock_shared(),
+    };
+    match locked {
+        Err(TryLockError::WouldBlock) => {
+            let process = holder(&file).map_or_else(String::new, |process| format!(" (process {process})"));
+            Err(DatasetError::Busy { folder: folder.display().to_string(), process })
+        }
+        _ => Ok(Some(file)),
+    }
+}
+
+/// The process that holds a lock on `file`, as Linux lists it: `1: FLOCK  ADVISORY  WRITE 4711 08:01:131075 0 EOF`.
+fn holder(file: &File) -> Option<u32> {
+    #[cfg(unix)]
+    let number = std::os::unix::fs::MetadataExt::ino(&file.metadata().ok()?);
+    #[cfg(not(unix))]
+    let number = file.metadata().ok()?.len();
+    let locks = fs::read_to_string("/proc/locks").ok()?;
+    let ours = |line: &&str| line.split_whitespace().nth(5).is_some_and(|place| place.ends_with(&format!(":{number}")));
+    locks.lines().find(ours)?.split_whitespace().nth(4)?.parse().ok()
+}

@@ -1,0 +1,150 @@
+//! Whether friction falls below 0 on a shortcut.
+//!
+//! `tau = 1 + a ln(n/t_f) + (b - a) ln theta`. Least values of `n` and theta rule that out for most (`Floors`). Both
+//! are linear in the coefficients, so for `b >= a` friction at every `x` is concave in them: what is not below 0 at both
+//! ends of a line is so nowhere on it. The rest is looked at one by one: the places where friction is stationary are
+//! roots of a polynomial of degree four.
+
+use multiversion::multiversion;
+
+use super::path::{Ends, Path};
+use crate::model::Law;
+use crate::numerics::elementary::{exp, ln};
+use crate::numerics::lanes::{LANES, Lanes};
+use crate::numerics::polynomial::roots_between;
+use crate::protocol::Status;
+
+/// Values of `n` and theta above which friction is positive.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Floors {
+    pub n: f64,
+    pub theta: f64,
+}
+
+/// What either logarithm may take of the friction of 1: half of it, less what rounding could cost.
+const HALF: f64 = 0.499;
+
+impl Floors {
+    pub fn new(law: Law, ends: &Ends) -> Floors {
+        let Law { a, b } = law;
+        let theta = if b > a {
+            exp(-HALF / (b - a))
+        } else if (a - b) * ln(ends.theta_0.high + ends.t_f) < HALF {
+            // Theta grows by the time at the most.
+            0.0
+        } else {
+            f64::INFINITY
+        };
+        Floors { n: ends.t_f * exp(-HALF / a), theta }
+    }
+
+    /// Which of eight feasible shortcuts the floors do not settle, a bit for each.
+    pub fn open(&self, ends: &Ends, a_2: &Lanes, a_3: &Lanes, status: &[Status; LANES]) -> u32 {
+        let mut open = 0;
+        for (i, &sure) in self.sure(ends, a_2, a_3).iter().enumerate() {
+            if sure == 0.0 && status[i] != Status::Infeasible && !self.settle(&Path::new(ends, a_2[i], a_3[i])) {
+                open |= 1 << i;
+            }
+        }
+        open
+    }
+
+    /// 1 where the coefficients in Bernstein's form are above the floors.
+    fn sure(&self, ends: &Ends, a_2: &Lanes, a_3: &Lanes) -> Lanes {
+        bounds(self, ends, a_2, a_3)
+    }
+
+    /// Whether the least values are above the floors.
+    fn settle(&self, path: &Path) -> bool {
+        let slack = path.slack();
+        path.n().least() > self.n + path.n().doubt() + 3.0 * slack
+            && path.theta().least() > self.theta + path.theta().doubt() + slack
+    }
+}
+
+#[multiversion(targets(
+    "x86_64+avx+avx2+bmi1+bmi2+avx512f+avx512bw+avx512cd+avx512dq+avx512vl",
+    "x86_64+avx+avx2+bmi1+bmi2"
+))]
+fn bounds(floors: &Floors, ends: &Ends, a_2: &Lanes, a_3: &Lanes) -> Lanes {
+    let mut sure = [0.0; LANES];
+    for i in 0..LANES {
+        let path = Path::new(ends, a_2[i], a_3[i]);
+        let slack = path.slack();
+        let n = path.n().bounds().0 > floors.n + path.n().doubt() + 3.0 * slack;
+        let theta = path.theta().bounds().0 > floors.theta + path.theta().doubt() + slack;
+        sure[i] = if n & theta { 1.0 } else { 0.0 };
+    }
+    sure
+}
+
+/// Shortcuts that are left open: consecutive ones, on a line in the plane or not.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Open {
+    pub first: usize,
+    pub count: usize,
+    pub line: bool,
+}
+
+impl Open {
+    /// Gives those whose friction falls below 0 their status; `path` is the shortcut at a place.
+    pub fn decide<'a>(&self, law: Law, path: impl Fn(usize) -> Path<'a>, status: &mut [Status]) {
+        let Open { first, count, line } = *self;
+        let is_negative = |i: usize| path(i).friction_min(law) < 0.0;
+        if line && law.b >= law.a && !is_negative(first) && !is_negative(first + count - 1) {
+            return;
+        }
+        for (i, status) in status.iter_mut().enumerate().skip(first).take(count) {
+            if *status != Status::Infeasible && is_negative(i) {
+                *status = Status::NegativeFriction;
+            }
+        }
+    }
+}
+
+impl Path<'_> {
+    /// Least friction, or some friction below 0.
+    pub fn friction_min(&self, law: Law) -> f64 {
+        let friction = |x: f64| {
+            let (theta, n) = self.at(x);
+            if n > 0.0 && theta > 0.0 {
+                1.0 + law.a * ln(n / self.ends.t_f) + (law.b - law.a) * ln(theta)
+            } else {
+                // The border of what is feasible.
+                f64::NEG_INFINITY
+            }
+        };
+        let lows = [0.0, 1.0, self.theta().minimum(), self.n().minimum()];
+        let mut least = lows.into_iter().map(friction).fold(f64::INFINITY, f64::min);
+        for end in [0.0, 1.0] {
+            if least < 0.0 {
+                break;
+            }
+            for d in self.stationary(law, end) {
+                least = least.min(friction(if end == 0.0 { d } else { 1.0 - d }));
+            }
+        }
+        least
+    }
+
+    /// Where friction is stationary in the half next to an end, as distances from it: `a n' theta + (b - a) n theta' =
+    /// 0`.
+    fn stationary(&self, law: Law, end: f64) -> Vec<f64> {
+        let ([t0, t1, t2, t3], [n0, n1, n2]) = self.about(end);
+        let side = if end == 0.0 { 1.0 } else { -1.0 };
+        let (theta, n) = ([t0, side * t1, t2, side * t3], [n0, side * n1, n2]);
+        let (theta_slope, n_slope) = ([theta[1], 2.0 * theta[2], 3.0 * theta[3]], [n[1], 2.0 * n[2]]);
+        let mut c = [0.0; 5];
+        for (i, n_slope) in n_slope.into_iter().enumerate() {
+            for (j, theta) in theta.into_iter().enumerate() {
+                c[i + j] += law.a * n_slope * theta;
+            }
+        }
+        for (i, n) in n.into_iter().enumerate() {
+            for (j, theta_slope) in theta_slope.into_iter().enumerate() {
+                c[i + j] += (law.b - law.a) * n * theta_slope;
+            }
+        }
+        roots_between(&c, 0.0, 0.5)
+    }
+}

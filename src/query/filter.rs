@@ -1,0 +1,418 @@
+//! Conditions on rows that need no more than a look at one column: row groups that cannot hold such rows are not read, and rows that do not
+//! obey are dropped before polars sees them.
+
+use arrow_array::cast::AsArray;
+use arrow_array::types::{Float64Type, Int32Type};
+use arrow_array::{Array, RecordBatch};
+use arrow_schema::DataType as ArrowType;
+use parquet::file::metadata::RowGroupMetaData;
+use parquet::file::statistics::Statistics;
+use polars::lazy::dsl::Expr as PolarsExpr;
+use polars::lazy::dsl::Operator;
+use polars::prelude::{AnyValue, DataType, LiteralValue, Schema};
+use sqlparser::ast::{BinaryOperator, Expr, UnaryOperator, Value, ValueWithSpan};
+
+use crate::dataset::label;
+
+/// What a row obeys: a comparison of a column with a constant, which null never obeys.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Condition {
+    /// The column.
+    pub column: String,
+    test: Test,
+}
+
+#[derive(Debug, Clone, PartialEq)]
+enum Test {
+    Number(Comparison, f64),
+    Word(Comparison, String),
+    /// Whether a word is like a pattern of SQL, or unlike it.
+    Like(String, bool),
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Comparison {
+    Less,
+    AtMost,
+    More,
+    AtLeast,
+    Equal,
+    Unequal,
+}
+
+impl Comparison {
+    fn mirrored(self) -> Comparison {
+        match self {
+            Comparison::Less => Comparison::More,
+            Comparison::AtMost => Comparison::AtLeast,
+            Comparison::More => Comparison::Less,
+            Comparison::AtLeast => Comparison::AtMost,
+            same => same,
+        }
+    }
+
+    /// Whether something between `least` and `most` may compare so with `bound`.
+    fn allows<T: PartialOrd + ?Sized>(self, least: &T, most: &T, bound: &T) -> bool {
+        match self {
+            Comparison::Less => least < bound,
+            Comparison::AtMost => least <= bound,
+            Comparison::More => most > bound,
+            Comparison::AtLeast => most >= bound,
+            Comparison::Equal => least <= bound && bound <= most,
+            Comparison::Unequal => true,
+        }
+    }
+}
+
+/// Conditions that every row obeys which `predicate` keeps: comparisons that are joined by AND.
+pub fn of_predicate(predicate: &PolarsExpr) -> Vec<Condition> {
+    let PolarsExpr::BinaryExpr { left, op, right } = predicate else { return Vec::new() };
+    let comparison = match op {
+        Operator::And | Operator::LogicalAnd => {
+            let mut both = of_predicate(left);
+            both.extend(of_predicate(right));
+            return both;
+        }
+        Operator::Lt => Comparison::Less,
+        Operator::LtEq => Comparison::AtMost,
+        Operator::Gt => Comparison::More,
+        Operator::GtEq => Comparison::AtLeast,
+        Operator::Eq => Comparison::Equal,
+        _ => return Vec::new(),
+    };
+    let (column, comparison, constant) = match (left.as_ref(), right.as_ref()) {
+        (PolarsExpr::Column(name), constant) => (name, comparison, constant),
+        (constant, PolarsExpr::Column(name)) => (name, comparison.mirrored(), constant),
+        _ => return Vec::new(),
+    };
+    let test = constant_of(constant).map(|constant| constant.compared(comparison));
+    test.into_iter().map(|test| Condition { column: column.to_string(), test }).collect()
+}
+
+enum Constant {
+    Number(f64),
+    Word(String),
+}
+
+impl Constant {
+    fn compared(self, comparison: Comparison) -> Test {
+        match self {
+            Constant::Number(number) => Test::Number(comparison, number),
+            Constant::Word(word) => Test::Word(comparison, word),
+        }
+    }
+}
+
+fn constant_of(expression: &PolarsExpr) -> Option<Constant> {
+    match expression {
+        PolarsExpr::Cast { expr, .. } => constant_of(expr),
+        PolarsExpr::Literal(literal @ (LiteralValue::Scalar(_) | LiteralValue::Dyn(_))) => {
+            let value: AnyValue = literal.to_any_value()?;
+            match value.get_str() {
+                Some(word) => Some(Constant::Word(word.to_owned())),
+                None => value.extract::<f64>().filter(|number| !number.is_nan()).map(Constant::Number),
+            }
+        }
+        _ => None,
+    }
+}
+
+/// The conditions that a `WHERE` on a table with these columns comes to; `None` if it is more than that.
+pub fn of_where(condition: Option<&Expr>, schema: &Schema) -> Option<Vec<Condition>> {
+    let mut conditions = Vec::new();
+    if let Some(condition) = condition {
+        collect(condition, &mut conditions)?;
+    }
+    let fits = |condition: &Condition| {
+        let kind = schema.get(&condition.column);
+        match (&condition.test, kind) {
+            (Test::Number(..), Some(DataType::Float64)) => true,
+            (Test::Word(Comparison::Equal | Comparison::Unequal, _) | Test::Like(..), Some(kind)) => {
+                kind.is_categorical()
+            }
+            _ => false,
+        }
+    };
+    conditions.iter().all(fits).then_some(conditions)
+}
+
+fn collect(condition: &Expr, conditions: &mut Vec<Condition>) -> Option<()> {
+    let mut add = |column: &Expr, comparison: Comparison, constant: &Expr| {
+        let test = literal(constant)?.compared(comparison);
+        conditions.push(Condition { column: column_of(column)?, test });
+        Some(())
+    };
+    match condition {
+        Expr::Nested(inner) => collect(inner, conditions),
+        Expr::BinaryOp { left, op: BinaryOperator::And, right } => {
+            collect(left, conditions)?;
+            collect(right, conditions)
+        }
+        Expr::BinaryOp { left, op, right } => {
+            let comparison = match op {
+                BinaryOperator::Lt => Comparison::Less,
+                BinaryOperator::LtEq => Comparison::AtMost,
+                BinaryOperator::Gt => Comparison::More,
+                BinaryOperator::GtEq => Comparison::AtLeast,
+                BinaryOperator::Eq => Comparison::Equal,
+                BinaryOperator::NotEq => Comparison::Unequal,
+                _ => return None,
+            };
+            match column_of(left) {
+                Some(_) => add(left, comparison, right),
+                None => add(right, comparison.mirrored(), left),
+            }
+        }
+        Expr::Between { expr, negated: false, low, high } => {
+            add(expr, Comparison::AtLeast, low)?;
+            add(expr, Comparison::AtMost, high)
+        }
+        Expr::Like { negated, any: false, expr, pattern, escape_char: None } => {
+            let Expr::Cast { expr, .. } = expr.as_ref() else { return None };
+            let Constant::Word(pattern) = literal(pattern)? else { return None };
+            let test = Test::Like(pattern.clone(), *negated);
+            conditions.push(Condition { column: column_of(expr)?, test });
+            (!pattern.contains('\\')).then_some(())
+        }
+        _ => None,
+    }
+}
+
+fn column_of(expression: &Expr) -> Option<String> {
+    match expression {
+        Expr::Identifier(name) => Some(name.value.clone()),
+        Expr::Nested(inner) => column_of(inner),
+        _ => None,
+    }
+}
+
+fn literal(expression: &Expr) -> Option<Constant> {
+    match expression {
+        Expr::Nested(inner) => literal(inner),
+        Expr::UnaryOp { op: UnaryOperator::Minus, expr } => match literal(expr)? {
+            Constant::Number(number) => Some(Constant::Number(-number)),
+            Constant::Word(_) => None,
+        },
+        Expr::Value(ValueWithSpan { value: Value::Number(digits, _), .. }) => digits.parse().ok().map(Constant::Number),
+        Expr::Value(ValueWithSpan { value: Value::SingleQuotedString(word), .. }) => Some(Constant::Word(word.clone())),
+        _ => None,
+    }
+}
+
+impl Condition {
+    /// Whether a group of rows may hold one that obeys, for all that its statistics say.
+    pub fn allows(&self, group: &RowGroupMetaData) -> bool {
+        let chunk = group.columns().iter().find(|chunk| chunk.column_path().string() == self.column);
+        let Some(statistics) = chunk.and_then(|chunk| chunk.statistics()) else { return true };
+        match (&self.test, statistics) {
+            (Test::Number(comparison, bound), Statistics::Double(range)) => {
+                let range = range.min_opt().zip(range.max_opt());
+                range.is_none_or(|(least, most)| comparison.allows(least, most, bound))
+            }
+            (Test::Word(comparison, bound), Statistics::ByteArray(range)) => {
+                let range = range.min_opt().zip(range.max_opt());
+                range.is_none_or(|(least, most)| comparison.allows(least.data(), most.data(), bound.as_bytes()))
+            }
+            _ => true,
+        }
+    }
+
+    /// Takes the rows of a batch out of `kept` that do not obey; all others stay where the column is of another type.
+    pub fn mark(&self, batch: &RecordBatch, kept: &mut [bool]) {
+        let Some(array) = batch.column_by_name(&self.column) else { return };
+        match (&self.test, array.data_type()) {
+            (Test::Number(comparison, bound), ArrowType::Float64) => {
+                let numbers = array.as_primitive::<Float64Type>().values();
+                let bound = *bound;
+                // As in polars, which is written here without branches: NaN is the greatest number.
+                match comparison {
+                    Comparison::Less => each(kept, numbers, |number| number < bound),
+                    Comparison::AtMost => each(kept, numbers, |number| number <= bound),
+                    Comparison::More => each(kept, numbers, |number| number > bound || number.is_nan()),
+                    Comparison::AtLeast => each(kept, numbers, |number| number >= bound || number.is_nan()),
+                    Comparison::Equal => each(kept, numbers, |number| number == bound),
+                    Comparison::Unequal => each(kept, numbers, |number| number != bound),
+                }
+            }
+            (test, kind) if *kind == label() => {
+                let codes = array.as_dictionary::<Int32Type>();
+                let words = codes.values().as_string::<i32>();
+                let obeys: Vec<bool> = match test {
+                    Test::Word(Comparison::Equal, bound) => words.iter().map(|word| word == Some(bound)).collect(),
+                    Test::Word(Comparison::Unequal, bound) => words.iter().map(|word| word != Some(bound)).collect(),
+                    Test::Like(pattern, negated) => {
+                        words.iter().map(|word| word.is_some_and(|word| like(word, pattern) != *negated)).collect()
+                    }
+                    _ => return,
+                };
+                let obeys = |key: &i32| usize::try_from(*key).ok().and_then(|key| obeys.get(key)).is_some_and(|x| *x);
+                each(kept, codes.keys().values(), |key| obeys(&key));
+            }
+            _ => return,
+        }
+        if let Some(nulls) = array.nulls() {
+            kept.iter_mut().zip(nulls.iter()).for_each(|(kept, is_there)| *kept &= is_there);
+        }
+    }
+}
+
+fn each<T: Copy>(kept: &mut [bool], values: &[T], obeys: impl Fn(T) -> bool) {
+    kept.iter_mut().zip(values).for_each(|(kept, &value)| *kept &= obeys(value));
+}
+
+/// Whether a word is like a pattern of SQL: % is any text, _ any character.
+fn like(word: &str, pattern: &str) -> bool {
+    let (word, pattern): (Vec<char>, Vec<char>) = (word.chars().collect(), pattern.chars().collect());
+    let (mut letter, mut sign) = (0, 0);
+    // The last % met, and where the text after what it stands for begins: a % takes as little as it can.
+    let mut last: Option<(usize, usize)> = None;
+    while letter < word.len() {
+        match pattern.get(sign) {
+            Some('%') => {
+                last = Some((sign, letter));
+                sign += 1;
+            }
+            Some(&other) if other == '_' || other == word[letter] => {
+                letter += 1;
+                sign += 1;
+            }
+            _ => {
+                let Some((place, from)) = last else { return false };
+                last = Some((place, from + 1));
+                (sign, letter) = (place + 1, from + 1);
+            }
+        }
+    }
+    pattern[sign..].iter().all(|sign| *sign == '%')
+}
+
+/// The rows of a batch that obey all conditions.
+pub fn kept(conditions: &[Condition], batch: &RecordBatch) -> Vec<bool> {
+    let mut kept = vec![true; batch.num_rows()];
+    conditions.iter().for_each(|condition| condition.mark(batch, &mut kept));
+    kept
+}
+
+/// The first rows in the order of a column of numbers.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Top {
+    /// The column.
+    pub column: String,
+    /// Whether the greatest come first.
+    pub descending: bool,
+    /// Whether null comes last.
+    pub nulls_last: bool,
+    /// How many rows.
+    pub most: usize,
+    /// Whether nothing orders rows that are equal in this column but their place.
+    pub alone: bool,
+}
+
+impl Top {
+    /// Takes rows out of `kept` that cannot be among the first.
+    pub fn mark(&self, batch: &RecordBatch, kept: &mut [bool]) {
+        let Some(array) = batch.column_by_name(&self.column) else { return };
+        let Some(array) = array.as_primitive_opt::<Float64Type>() else { return };
+        let sign = if self.descending { -1.0 } else { 1.0 };
+        // Ascending; NaN, the greatest number, at its end.
+        let rank = |row: usize| {
+            let number = array.value(row);
+            match (number.is_nan(), self.descending) {
+                (true, false) => f64::INFINITY,
+                (true, true) => f64::NEG_INFINITY,
+                (false, _) => sign * number,
+            }
+        };
+        let rows = || (0..kept.len()).filter(|&row| kept[row]);
+        let nulls = rows().filter(|&row| array.is_null(row)).count();
+        let mut ranks: Vec<f64> = rows().filter(|&row| array.is_valid(row)).map(rank).collect();
+        // Nulls come before or after all numbers.
+        let (most_nulls, most) = match self.nulls_last {
+            true => (self.most.saturating_sub(ranks.len()), self.most),
+            false => (self.most, self.most.saturating_sub(nulls)),
+        };
+        let all_nulls = if self.alone {
+            most_nulls
+        } else if most_nulls > 0 {
+            usize::MAX
+        } else {
+            0
+        };
+        let last = match most.checked_sub(1) {
+            Some(place) if place < ranks.len() => Some(*ranks.select_nth_unstable_by(place, f64::total_cmp).1),
+            Some(_) => Some(f64::INFINITY),
+            None => None,
+        };
+        let before = last.map_or(0, |last| ranks.iter().filter(|&&rank| rank < last).count());
+        let mut ties = if self.alone { most.saturating_sub(before) } else { usize::MAX };
+        let mut nulls = all_nulls;
+        for (row, kept) in kept.iter_mut().enumerate().filter(|(_, kept)| **kept) {
+            let left = match (array.is_null(row), last) {
+                (true, _) => &mut nulls,
+                (false, None) => {
+                    *kept = false;
+                    continue;
+                }
+                (false, Some(last)) if rank(row) < last => continue,
+                (false, Some(last)) if rank(row) == last => &mut ties,
+                (false, Some(_)) => {
+                    *kept = false;
+                    continue;
+                }
+            };
+            *kept = *left > 0;
+            *left = left.saturating_sub(1);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    //! Which rows are kept.
+
+    use std::sync::Arc;
+
+    use arrow_array::{ArrayRef, Float64Array, RecordBatch};
+
+    use super::{Top, like};
+
+    #[test]
+    fn words_are_like_patterns() {
+        for (word, pattern, expected) in [
+            ("infeasible", "inf%", true),
+            ("ok", "inf%", false),
+            ("ok", "o_", true),
+            ("ok", "_", false),
+            ("a%b", "%b", true),
+            ("", "%", true),
+            ("µm", "_m", true),
+            ("aab", "%ab", true),
+            ("abab", "a%b", true),
+            ("abc", "a%b", false),
+            ("", "", true),
+            ("a", "", false),
+            (&"a".repeat(200), "%a%a%a%a%a%a%a%b", false),
+        ] {
+            assert_eq!(like(word, pattern), expected, "{word} {pattern}");
+        }
+    }
+
+    #[test]
+    fn the_first_rows_are_kept() {
+        let numbers = [Some(3.0), None, Some(1.0), Some(2.0), Some(1.0), Some(f64::NAN)];
+        let array: ArrayRef = Arc::new(Float64Array::from(numbers.to_vec()));
+        let batch = RecordBatch::try_from_iter([("x", array)]).expect("is a table");
+        let first = |descending, nulls_last, most, alone| {
+            let mut kept = vec![true; 6];
+            Top { column: "x".to_owned(), descending, nulls_last, most, alone }.mark(&batch, &mut kept);
+            (0..6).filter(|&row| kept[row]).collect::<Vec<_>>()
+        };
+        assert_eq!(first(false, true, 1, true), [2]);
+        assert_eq!(first(false, true, 1, false), [2, 4]);
+        assert_eq!(first(false, true, 4, true), [0, 2, 3, 4]);
+        assert_eq!(first(false, true, 6, true), [0, 1, 2, 3, 4, 5]);
+        assert_eq!(first(true, false, 2, true), [1, 5]);
+        assert_eq!(first(true, true, 2, true), [0, 5]);
+        assert_eq!(first(false, true, 0, true), Vec::<usize>::new());
+    }
+}

@@ -1,0 +1,353 @@
+//! Groups of rows with their counts, sums, least and greatest numbers, straight from the columns of a file.
+//!
+//! Most queries over many rows are of this kind. polars, which is not optimised in the release build, would answer them several times
+//! slower than Python polars; `benches/query/run` compares, and `an_answer_in_pieces_is_the_answer_at_once` checks one route by the other.
+
+use std::collections::HashMap;
+use std::collections::hash_map::Entry;
+
+use arrow_array::cast::AsArray;
+use arrow_array::types::{Float64Type, Int32Type};
+use arrow_array::{Array, RecordBatch};
+use indexmap::IndexSet;
+use polars::prelude::{
+    BooleanChunked, Column, DataFrame, DataType, Float64Chunked, Int64Chunked, IntoColumn, NewChunkedArray,
+    PolarsResult, Schema, StringChunked,
+};
+
+use super::filter::{Condition, kept};
+
+/// An aggregate of a group.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Measure {
+    /// How many rows it has.
+    Rows,
+    /// How many values a column has.
+    Count(String),
+    /// The sum of a column.
+    Sum(String),
+    /// The least number of a column.
+    Least(String),
+    /// The greatest number of a column.
+    Greatest(String),
+}
+
+impl Measure {
+    /// The column.
+    pub fn column(&self) -> Option<&str> {
+        match self {
+            Measure::Rows => None,
+            Measure::Count(name) | Measure::Sum(name) | Measure::Least(name) | Measure::Greatest(name) => Some(name),
+        }
+    }
+}
+
+/// What values of a key are.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Kind {
+    /// Doubles.
+    Number,
+    /// True and false.
+    Flag,
+    /// Words that repeat.
+    Word,
+}
+
+impl Kind {
+    /// That of a column.
+    pub fn of(name: &str, schema: &Schema) -> Option<Kind> {
+        match schema.get(name)? {
+            DataType::Float64 => Some(Kind::Number),
+            DataType::Boolean => Some(Kind::Flag),
+            kind => kind.is_categorical().then_some(Kind::Word),
+        }
+    }
+}
+
+/// A question for groups.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Groups {
+    /// What rows obey.
+    pub conditions: Vec<Condition>,
+    /// The columns whose values make the groups.
+    pub keys: Vec<(String, Kind)>,
+    /// The aggregates of each group.
+    pub measures: Vec<Measure>,
+}
+
+impl Groups {
+    /// Whether what is measured is of types that are counted here.
+    pub fn fits(&self, schema: &Schema) -> bool {
+        self.measures.iter().all(|measure| match measure {
+            Measure::Rows => true,
+            Measure::Count(name) => schema.get(name).is_some(),
+            other => other.column().is_some_and(|name| Kind::of(name, schema) == Some(Kind::Number)),
+        })
+    }
+
+    /// The columns that are read.
+    pub fn columns(&self) -> Vec<String> {
+        let measured = self.measures.iter().filter_map(|measure| measure.column().map(str::to_owned));
+        let mut names: Vec<String> = self.keys.iter().map(|(name, _)| name.clone()).chain(measured).collect();
+        names.extend(self.conditions.iter().map(|condition| condition.column.clone()));
+        names.sort();
+        names.dedup();
+        names
+    }
+}
+
+/// A value that makes a group.
+#[derive(Debug, Clone, PartialEq, Eq, Hash)]
+enum Value {
+    Missing,
+    /// The bits of a number; zero has one sign and NaN one pattern.
+    Number(u64),
+    Flag(bool),
+    Word(String),
+}
+
+fn bits(number: f64) -> u64 {
+    if number.is_nan() { f64::NAN.to_bits() } else { (number + 0.0).to_bits() }
+}
+
+/// The values of one key so far.
+#[derive(Default)]
+struct Key {
+    places: HashMap<Value, u32>,
+    /// The same for numbers, which are many.
+    numbers: HashMap<u64, u32>,
+    values: Vec<Value>,
+}
+
+impl Key {
+    fn place(&mut self, value: Value) -> u32 {
+        match self.places.entry(value) {
+            Entry::Occupied(known) => *known.get(),
+            Entry::Vacant(new) => {
+                let place = self.values.len() as u32;
+                self.values.push(new.key().clone());
+                *new.insert(place)
+            }
+        }
+    }
+
+    fn number(&mut self, bits: u64) -> u32 {
+        *self.numbers.entry(bits).or_insert_with(|| {
+            self.values.push(Value::Number(bits));
+            self.values.len() as u32 - 1
+        })
+    }
+
+    /// The places of the values of `rows`.
+    fn places(&mut self, array: &dyn Array, rows: &[u32]) -> Vec<u32> {
+        if let Some(numbers) = array.as_primitive_opt::<Float64Type>() {
+            // Axes change rarely from row to row.
+            let mut last: Option<(u64, u32)> = None;
+            let missing = if array.null_count() > 0 { Some(self.place(Value::Missing)) } else { None };
+            let place = |&row: &u32| {
+                if let (Some(missing), true) = (missing, array.is_null(row as usize)) {
+                    return missing;
+                }
+                let bits = bits(numbers.value(row as usize));
+                match last {
+                    Some((known, place)) if known == bits => place,
+                    _ => {
+                        let place = self.number(bits);
+                        last = Some((bits, place));
+                        place
+                    }
+                }
+            };
+            return rows.iter().map(place).collect();
+        }
+        let missing = self.place(Value::Missing);
+        if let Some(flags) = array.as_boolean_opt() {
+            let both = [false, true].map(|flag| self.place(Value::Flag(flag)));
+            let place = |&row: &u32| match flags.is_null(row as usize) {
+                true => missing,
+                false => both[usize::from(flags.value(row as usize))],
+            };
+            return rows.iter().map(place).collect();
+        }
+        let codes = array.as_dictionary::<Int32Type>();
+        let words = codes.values().as_string::<i32>();
+        let known: Vec<u32> =
+            words.iter().map(|word| word.map_or(missing, |word| self.place(Value::Word(word.to_owned())))).collect();
+        let place = |&row: &u32| codes.key(row as usize).and_then(|key| known.get(key)).copied().unwrap_or(missing);
+        rows.iter().map(place).collect()
+    }
+}
+
+/// Groups that are being counted.
+pub struct Counting<'a> {
+    groups: &'a Groups,
+    keys: Vec<Key>,
+    /// The groups of the first keys, by those of one key less and the place of the value of the next.
+    pairs: Vec<IndexSet<(u32, u32)>>,
+    /// How many groups there are.
+    count: usize,
+    tallies: Vec<Vec<Tally>>,
+}
+
+#[derive(Debug, Clone, Copy)]
+struct Tally {
+    count: i64,
+    number: f64,
+}
+
+impl<'a> Counting<'a> {
+    /// No rows yet.
+    pub fn new(groups: &'a Groups) -> Counting<'a> {
+        let keys = groups.keys.len();
+        let mut counting = Counting {
+            groups,
+            keys: (0..keys).map(|_| Key::default()).collect(),
+            pairs: vec![IndexSet::new(); keys],
+            count: 0,
+            tallies: vec![Vec::new(); groups.measures.len()],
+        };
+        if keys == 0 {
+            counting.count = 1;
+            counting.grow();
+        }
+        counting
+    }
+
+    fn grow(&mut self) {
+        for (measure, tallies) in self.groups.measures.iter().zip(&mut self.tallies) {
+            let number = if matches!(measure, Measure::Sum(_)) { 0.0 } else { f64::NAN };
+            tallies.resize(self.count, Tally { count: 0, number });
+        }
+    }
+
+    /// Counts the rows of a batch.
+    pub fn add(&mut self, batch: &RecordBatch) {
+        let kept = kept(&self.groups.conditions, batch);
+        let rows: Vec<u32> = (0..).zip(&kept).filter(|(_, kept)| **kept).map(|(row, _)| row).collect();
+        let ids = self.ids(batch, &rows);
+        self.grow();
+        for (measure, tallies) in self.groups.measures.iter().zip(&mut self.tallies) {
+            let array = measure.column().and_then(|name| batch.column_by_name(name));
+            let Some(array) = array else {
+                ids.iter().for_each(|&id| tallies[id as usize].count += 1);
+                continue;
+            };
+            let cells = ids.iter().zip(&rows).filter(|(_, row)| array.is_valid(**row as usize));
+            if let Measure::Count(_) = measure {
+                cells.for_each(|(&id, _)| tallies[id as usize].count += 1);
+                continue;
+            }
+            let numbers = array.as_primitive::<Float64Type>().values();
+            let cells = cells.map(|(&id, &row)| (id as usize, numbers[row as usize]));
+            match measure {
+                Measure::Sum(_) => cells.for_each(|(id, number)| {
+                    tallies[id].count += 1;
+                    tallies[id].number += number;
+                }),
+                Measure::Least(_) => tally(cells, tallies, |number, least| number < least),
+                _ => tally(cells, tallies, |number, greatest| number > greatest),
+            }
+        }
+    }
+
+    /// The groups of `rows`.
+    fn ids(&mut self, batch: &RecordBatch, rows: &[u32]) -> Vec<u32> {
+        let mut ids: Vec<u32> = vec![0; rows.len()];
+        for (index, (name, _)) in self.groups.keys.iter().enumerate() {
+            let Some(array) = batch.column_by_name(name) else { continue };
+            let places = self.keys[index].places(array.as_ref(), rows);
+            let pairs = &mut self.pairs[index];
+            let mut last: Option<((u32, u32), u32)> = None;
+            for (id, place) in ids.iter_mut().zip(places) {
+                let pair = (*id, place);
+                *id = match last {
+                    Some((known, group)) if known == pair => group,
+                    _ => {
+                        let group = pairs.insert_full(pair).0 as u32;
+                        last = Some((pair, group));
+                        group
+                    }
+                };
+            }
+        }
+        if let Some(pairs) = self.pairs.last() {
+            self.count = pairs.len();
+        }
+        ids
+    }
+
+    /// The groups as a table: columns `__g0`, `__g1`, ... of keys, and `__a0`, `__a1`, ... of measures.
+    pub fn frame(self) -> PolarsResult<DataFrame> {
+        let height = self.count;
+        let mut columns: Vec<Column> = Vec::new();
+        let places = self.places();
+        for (index, (key, places)) in self.keys.iter().zip(&places).enumerate() {
+            let name = format!("__g{index}").into();
+            let values = || places.iter().map(|&place| key.values.get(place as usize));
+            columns.push(match self.groups.keys[index].1 {
+                Kind::Word => {
+                    let word = |value: Option<&'_ Value>| match value {
+                        Some(Value::Word(word)) => Some(word.clone()),
+                        _ => None,
+                    };
+                    StringChunked::from_iter_options(name, values().map(word)).into_column()
+                }
+                Kind::Number => {
+                    let number = |value: Option<&Value>| match value {
+                        Some(Value::Number(bits)) => Some(f64::from_bits(*bits)),
+                        _ => None,
+                    };
+                    Float64Chunked::from_iter_options(name, values().map(number)).into_column()
+                }
+                Kind::Flag => {
+                    let flag = |value: Option<&Value>| match value {
+                        Some(Value::Flag(flag)) => Some(*flag),
+                        _ => None,
+                    };
+                    BooleanChunked::from_iter_options(name, values().map(flag)).into_column()
+                }
+            });
+        }
+        for (index, (measure, tallies)) in self.groups.measures.iter().zip(&self.tallies).enumerate() {
+            let name = format!("__a{index}").into();
+            columns.push(match measure {
+                Measure::Rows | Measure::Count(_) => {
+                    Int64Chunked::from_iter_values(name, tallies.iter().map(|tally| tally.count)).into_column()
+                }
+                Measure::Sum(_) => {
+                    Float64Chunked::from_iter_values(name, tallies.iter().map(|tally| tally.number)).into_column()
+                }
+                _ => {
+                    let number = |tally: &Tally| (tally.count > 0).then_some(tally.number);
+                    Float64Chunked::from_iter_options(name, tallies.iter().map(number)).into_column()
+                }
+            });
+        }
+        DataFrame::new(height, columns)
+    }
+
+    /// The places of the values of each key, group by group.
+    fn places(&self) -> Vec<Vec<u32>> {
+        let mut places = vec![vec![0; self.count]; self.keys.len()];
+        for group in 0..self.count {
+            let mut id = group as u32;
+            for (pairs, places) in self.pairs.iter().zip(&mut places).rev() {
+                if let Some(&(rest, place)) = pairs.get_index(id as usize) {
+                    (places[group], id) = (place, rest);
+                }
+            }
+        }
+        places
+    }
+}
+
+/// Keeps of each group the number that is `better` than others; NaN is better than none.
+fn tally(cells: impl Iterator<Item = (usize, f64)>, tallies: &mut [Tally], better: impl Fn(f64, f64) -> bool) {
+    for (id, number) in cells {
+        let tally = &mut tallies[id];
+        if tally.number.is_nan() || better(number, tally.number) {
+            tally.number = number;
+        }
+        tally.count += 1;
+    }
+}

@@ -1,0 +1,529 @@
+//! Questions to one table that can be answered piece by piece, so that memory holds what is kept and not the table.
+//!
+//! Rows that are chosen one by one come as they are read; of `ORDER BY ... LIMIT` each piece gives its first rows; of `GROUP BY` each piece
+//! gives its groups, with sums, counts, least and greatest values that are then put together.
+
+use std::ops::ControlFlow;
+
+use polars::prelude::Schema;
+use sqlparser::ast::{
+    BinaryOperator, DataType, Distinct, Expr, Function, FunctionArg, FunctionArgExpr, FunctionArguments, GroupByExpr,
+    Ident, LimitClause, OrderByKind, Query, Select, SelectItem, SetExpr, TableFactor, Value, ValueWithSpan,
+};
+
+use super::Source;
+use super::filter::{Condition, Top, of_where};
+use super::groups::{Groups, Kind, Measure};
+use super::question::{cast, if_else_null, name};
+use super::walk::{Visit, walk};
+
+/// How a question is answered piece by piece.
+pub struct Pieces {
+    /// The table.
+    pub table: String,
+    /// The query that each piece of the table answers.
+    pub partial: String,
+    /// The same where it needs no more than counts, sums and extremes of columns.
+    pub groups: Option<Groups>,
+    /// What all rows obey, where `WHERE` is no more than that.
+    pub conditions: Vec<Condition>,
+    /// Which rows of a piece come first, where one column of numbers decides.
+    pub top: Option<Top>,
+    /// What makes the same of several such answers, together the table [`PARTS`]; where there is none, they are rows.
+    pub merge: Option<String>,
+    /// What makes the answer of those, the table [`PARTS`].
+    pub finish: Option<String>,
+    /// How the rows are ordered by the columns `__k0`, `__k1`, ...
+    pub keys: Vec<Key>,
+    /// Rows to leave out at the start.
+    pub offset: usize,
+    /// Rows to give at most.
+    pub limit: Option<usize>,
+    /// The columns of the answer.
+    pub names: Vec<String>,
+}
+
+/// The direction of a column that rows are ordered by.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Key {
+    pub descending: bool,
+    pub nulls_last: bool,
+}
+
+/// The name of the partial answers as a table.
+pub const PARTS: &str = "__parts";
+
+/// Functions of the row alone.
+const SCALAR: [&str; 44] = [
+    "abs",
+    "acos",
+    "asin",
+    "atan",
+    "atan2",
+    "cbrt",
+    "ceil",
+    "ceiling",
+    "coalesce",
+    "concat",
+    "cos",
+    "degrees",
+    "ends_with",
+    "exp",
+    "floor",
+    "greatest",
+    "if",
+    "ifnull",
+    "least",
+    "left",
+    "length",
+    "ln",
+    "log",
+    "log10",
+    "log1p",
+    "log2",
+    "lower",
+    "mod",
+    "nullif",
+    "octet_length",
+    "pi",
+    "pow",
+    "power",
+    "radians",
+    "replace",
+    "right",
+    "round",
+    "sign",
+    "sin",
+    "sqrt",
+    "starts_with",
+    "strpos",
+    "tan",
+    "upper",
+];
+
+/// Functions of groups that can be put together.
+const AGGREGATE: [&str; 6] = ["avg", "count", "max", "mean", "min", "sum"];
+
+/// How to answer `query` piece by piece; `None` where all of it has to be there at once.
+pub fn pieces(query: &Query, sources: &[Source]) -> Option<Pieces> {
+    let SetExpr::Select(select) = query.body.as_ref() else { return None };
+    if !is_bare(query) || !is_simple(select) {
+        return None;
+    }
+    // One table, and no function that needs all its rows.
+    let (source, alias) = table_of(select, sources)?;
+    let mut select = select.as_ref().clone();
+    let mut order = query.order_by.clone();
+    let mut plain = Plain { table: &source.name, alias: &alias, functions: Functions::default() };
+    let plainly = walk(&mut select.projection, &mut plain)
+        && walk(&mut select.selection, &mut plain)
+        && walk(&mut select.having, &mut plain)
+        && walk(&mut select.group_by, &mut plain)
+        && walk(&mut order, &mut plain);
+    let Functions { aggregates, others } = plain.functions;
+    if !plainly || others {
+        return None;
+    }
+    let items = items(&select, source)?;
+    let names = items.iter().map(|(name, _)| name.clone()).collect();
+    let (limit, offset) = limits(query)?;
+    let (ordered, keys) = order_of(order.map(|order| order.kind), &items)?;
+    let GroupByExpr::Expressions(groups, modifiers) = select.group_by else { return None };
+    if !modifiers.is_empty() {
+        return None;
+    }
+    let schema = source.files.as_ref()?.schema();
+    let conditions = of_where(select.selection.as_ref(), schema);
+    let table = source.name.clone();
+    let question = One { table, source, items, condition: select.selection, having: select.having, ordered };
+    let mut pieces = Pieces {
+        table: question.table.clone(),
+        partial: String::new(),
+        groups: None,
+        conditions: conditions.clone().unwrap_or_default(),
+        top: None,
+        merge: None,
+        finish: None,
+        keys,
+        offset,
+        limit,
+        names,
+    };
+    if groups.is_empty() && !aggregates {
+        if question.having.is_some() || !pieces.keys.is_empty() && limit.is_none() {
+            return None;
+        }
+        let most = limit.map(|limit| limit.saturating_add(offset));
+        pieces.partial = question.rows(most);
+        pieces.top = conditions.and_then(|_| question.top(&pieces.keys, most?, schema));
+    } else {
+        let (partial, merge, finish, measured) = question.groups(groups)?;
+        pieces.groups = conditions.and_then(|conditions| counted(measured?, conditions, schema));
+        (pieces.partial, pieces.merge, pieces.finish) = (partial, Some(merge), Some(finish));
+    }
+    Some(pieces)
+}
+
+/// The groups, if counting columns is enough to find them.
+fn counted((keys, measures): Measured, conditions: Vec<Condition>, schema: &Schema) -> Option<Groups> {
+    let kinds = keys.into_iter().map(|key| Some((key.clone(), Kind::of(&key, schema)?)));
+    let groups = Groups { conditions, keys: kinds.collect::<Option<_>>()?, measures };
+    groups.fits(schema).then_some(groups)
+}
+
+/// Whether a query has nothing but a body, ORDER BY, LIMIT and OFFSET.
+fn is_bare(query: &Query) -> bool {
+    query.with.is_none()
+        && query.fetch.is_none()
+        && query.locks.is_empty()
+        && query.for_clause.is_none()
+        && query.settings.is_none()
+        && query.format_clause.is_none()
+        && query.pipe_operators.is_empty()
+}
+
+/// The only table of a SELECT, and its name there.
+fn table_of<'a>(select: &Select, sources: &'a [Source]) -> Option<(&'a Source, String)> {
+    let [from] = select.from.as_slice() else { return None };
+    let TableFactor::Table { name, alias, args: None, sample: None, version: None, .. } = &from.relation else {
+        return None;
+    };
+    if !from.joins.is_empty() || alias.as_ref().is_some_and(|alias| !alias.columns.is_empty()) {
+        return None;
+    }
+    let table = &name.0.last()?.as_ident()?.value;
+    let source = sources.iter().find(|source| source.name == *table)?;
+    // Names that begin so are those of columns of partial answers.
+    if source.columns.iter().any(|column| column.starts_with("__")) {
+        return None;
+    }
+    Some((source, alias.as_ref().map_or(table, |alias| &alias.name.value).clone()))
+}
+
+/// The expressions that rows are ordered by, and their directions.
+fn order_of(kind: Option<OrderByKind>, items: &[(String, Expr)]) -> Option<(Vec<Expr>, Vec<Key>)> {
+    let keys = match kind {
+        None => Vec::new(),
+        Some(OrderByKind::All(_)) => return None,
+        Some(OrderByKind::Expressions(keys)) => keys,
+    };
+    let (mut ordered, mut directions) = (Vec::new(), Vec::new());
+    for key in keys {
+        if key.with_fill.is_some() {
+            return None;
+        }
+        let descending = !key.options.asc.unwrap_or(true);
+        // As in PostgreSQL: null is the greatest.
+        directions.push(Key { descending, nulls_last: !key.options.nulls_first.unwrap_or(descending) });
+        ordered.push(item(&key.expr, items).unwrap_or(key.expr));
+    }
+    Some((ordered, directions))
+}
+
+/// Whether a SELECT has nothing but items, one table, WHERE, GROUP BY and HAVING.
+fn is_simple(select: &Select) -> bool {
+    matches!(select.distinct, None | Some(Distinct::All))
+        && select.top.is_none()
+        && select.exclude.is_none()
+        && select.into.is_none()
+        && select.lateral_views.is_empty()
+        && select.prewhere.is_none()
+        && select.connect_by.is_empty()
+        && select.cluster_by.is_empty()
+        && select.distribute_by.is_empty()
+        && select.sort_by.is_empty()
+        && select.named_window.is_empty()
+        && select.qualify.is_none()
+        && select.value_table_mode.is_none()
+        && select.select_modifiers.is_none()
+}
+
+/// The names and expressions of the columns of an answer.
+fn items(select: &Select, source: &Source) -> Option<Vec<(String, Expr)>> {
+    let mut items = Vec::new();
+    for item in &select.projection {
+        match item {
+            SelectItem::UnnamedExpr(expression) => items.push((name(expression), expression.clone())),
+            SelectItem::ExprWithAlias { expr, alias } => items.push((alias.value.clone(), expr.clone())),
+            SelectItem::Wildcard(options) if options.to_string().is_empty() => {
+                items.extend(source.columns.iter().map(|column| (column.clone(), quoted(column))));
+            }
+            _ => return None,
+        }
+    }
+    let mut names: Vec<&String> = items.iter().map(|(name, _)| name).collect();
+    names.sort();
+    let distinct = names.windows(2).all(|pair| pair[0] != pair[1]);
+    (distinct && !items.is_empty()).then_some(items)
+}
+
+fn quoted(name: &str) -> Expr {
+    Expr::Identifier(Ident::with_quote('"', name))
+}
+
+/// The item that `ORDER BY` or `GROUP BY` names, by its name or its place.
+fn item(expression: &Expr, items: &[(String, Expr)]) -> Option<Expr> {
+    let found = match expression {
+        Expr::Identifier(name) => items.iter().find(|(known, _)| *known == name.value),
+        Expr::Value(ValueWithSpan { value: Value::Number(digits, _), .. }) => {
+            items.get(digits.parse::<usize>().ok()?.checked_sub(1)?)
+        }
+        _ => None,
+    };
+    found.map(|(_, expression)| expression.clone())
+}
+
+/// The numbers of `LIMIT` and `OFFSET`; `None` if they are no plain numbers.
+fn limits(query: &Query) -> Option<(Option<usize>, usize)> {
+    let number = |expression: &Expr| match expression {
+        Expr::Value(ValueWithSpan { value: Value::Number(digits, _), .. }) => digits.parse::<usize>().ok(),
+        _ => None,
+    };
+    match &query.limit_clause {
+        None => Some((None, 0)),
+        Some(LimitClause::LimitOffset { limit, offset, limit_by }) if limit_by.is_empty() => {
+            let limit = match limit {
+                Some(limit) => Some(number(limit)?),
+                None => None,
+            };
+            let offset = match offset {
+                Some(offset) => number(&offset.value)?,
+                None => 0,
+            };
+            Some((limit, offset))
+        }
+        Some(_) => None,
+    }
+}
+
+/// A question to one table.
+struct One<'a> {
+    table: String,
+    source: &'a Source,
+    items: Vec<(String, Expr)>,
+    condition: Option<Expr>,
+    having: Option<Expr>,
+    ordered: Vec<Expr>,
+}
+
+impl One<'_> {
+    /// Which rows of a piece may be among the first `most`, if the first of `keys` is a column of numbers.
+    fn top(&self, keys: &[Key], most: usize, schema: &Schema) -> Option<Top> {
+        let (Expr::Identifier(column), Key { descending, nulls_last }) = (self.ordered.first()?, *keys.first()?) else {
+            return None;
+        };
+        let column = column.value.clone();
+        let is_number = Kind::of(&column, schema) == Some(Kind::Number);
+        is_number.then_some(Top { column, descending, nulls_last, most, alone: keys.len() == 1 })
+    }
+
+    /// The query of a piece for its rows, at most `most`.
+    fn rows(&self, most: Option<usize>) -> String {
+        let items = self.items.iter().map(|(name, expression)| aliased(expression, name));
+        let keys = self.ordered.iter().enumerate().map(|(place, key)| aliased(key, &format!("__k{place}")));
+        let mut sql = format!("SELECT {} FROM {}", joined(items.chain(keys)), quoted(&self.table));
+        if let Some(condition) = &self.condition {
+            sql.push_str(&format!(" WHERE {condition}"));
+        }
+        if self.ordered.is_empty()
+            && let Some(most) = most
+        {
+            sql.push_str(&format!(" LIMIT {most}"));
+        }
+        sql
+    }
+
+    /// The query of a piece for its groups, the one that merges such answers, and the one that makes the final answer of them.
+    fn groups(&self, groups: Vec<Expr>) -> Option<(String, String, String, Option<Measured>)> {
+        let mut keys = Vec::new();
+        for group in groups {
+            let is_column = matches!(&group, Expr::Identifier(name) if self.source.columns.contains(&name.value));
+            keys.push(if is_column { group } else { item(&group, &self.items).unwrap_or(group) });
+        }
+        let mut lift = Lift { keys: &keys, partial: Vec::new(), measures: Vec::new() };
+        let mut columns = Vec::new();
+        for (name, expression) in &self.items {
+            columns.push(aliased(&lift.lifted(expression)?, name));
+        }
+        for (place, key) in self.ordered.iter().enumerate() {
+            columns.push(aliased(&lift.lifted(key)?, &format!("__k{place}")));
+        }
+        let having = match &self.having {
+            Some(having) => format!(" WHERE {}", lift.lifted(having)?),
+            None => String::new(),
+        };
+        let finish = format!("SELECT {} FROM {}{having}", joined(columns.into_iter()), quoted(PARTS));
+        let names: Vec<String> = (0..keys.len()).map(|place| format!("__g{place}")).collect();
+        let key_columns = keys.iter().zip(&names).map(|(key, name)| aliased(key, name));
+        let parts = lift.partial.iter().enumerate().map(|(place, (sql, _))| format!("{sql} AS \"__a{place}\""));
+        let merged = lift
+            .partial
+            .iter()
+            .enumerate()
+            .map(|(place, (_, merge))| format!("{merge}(\"__a{place}\") AS \"__a{place}\""));
+        let mut partial = format!("SELECT {} FROM {}", joined(key_columns.chain(parts)), quoted(&self.table));
+        if let Some(condition) = &self.condition {
+            partial.push_str(&format!(" WHERE {condition}"));
+        }
+        let quoted_names = || names.iter().map(|name| format!("\"{name}\""));
+        let mut merge = format!("SELECT {} FROM {}", joined(quoted_names().chain(merged)), quoted(PARTS));
+        if !keys.is_empty() {
+            partial.push_str(&format!(" GROUP BY {}", joined(keys.iter().map(ToString::to_string))));
+            merge.push_str(&format!(" GROUP BY {}", joined(quoted_names())));
+        }
+        let plain = |key: &Expr| match key {
+            Expr::Identifier(name) => Some(name.value.clone()),
+            _ => None,
+        };
+        let measured = keys.iter().map(plain).collect::<Option<Vec<_>>>();
+        let measured = measured.zip(lift.measures.into_iter().collect::<Option<Vec<_>>>());
+        Some((partial, merge, finish, measured))
+    }
+}
+
+/// The columns that make groups, and the aggregates.
+type Measured = (Vec<String>, Vec<Measure>);
+
+fn aliased(expression: &Expr, name: &str) -> String {
+    format!("{expression} AS {}", quoted(name))
+}
+
+fn joined(parts: impl Iterator<Item = String>) -> String {
+    parts.collect::<Vec<_>>().join(", ")
+}
+
+/// Takes the groups and their sums, counts and extremes out of expressions.
+struct Lift<'a> {
+    keys: &'a [Expr],
+    /// Aggregates of a piece, each with the function that merges them.
+    partial: Vec<(String, &'static str)>,
+    /// The same of columns, where it is that.
+    measures: Vec<Option<Measure>>,
+}
+
+impl Lift<'_> {
+    /// `expression` of the columns of partial answers; `None` if it has others.
+    fn lifted(&mut self, expression: &Expr) -> Option<Expr> {
+        let mut expression = expression.clone();
+        walk(&mut expression, self).then_some(expression)
+    }
+
+    /// The column of partial answers with `sql`.
+    fn column(&mut self, sql: String, merge: &'static str, measure: Option<Measure>) -> Expr {
+        let known = self.partial.iter().position(|(other, by)| *other == sql && *by == merge);
+        let place = known.unwrap_or_else(|| {
+            self.partial.push((sql, merge));
+            self.measures.push(measure);
+            self.partial.len() - 1
+        });
+        quoted(&format!("__a{place}"))
+    }
+
+    fn aggregate(&mut self, function: &Function) -> Option<Expr> {
+        let called = function.name.to_string().to_lowercase();
+        let FunctionArguments::List(list) = &function.args else { return None };
+        let (argument, column) = match list.args.as_slice() {
+            [FunctionArg::Unnamed(FunctionArgExpr::Expr(argument))] => match argument {
+                Expr::Identifier(name) => (argument.to_string(), Some(name.value.clone())),
+                _ => (argument.to_string(), None),
+            },
+            [FunctionArg::Unnamed(FunctionArgExpr::Wildcard)] if called == "count" => ("*".to_owned(), None),
+            _ => return None,
+        };
+        let counted = if argument == "*" { Some(Measure::Rows) } else { column.clone().map(Measure::Count) };
+        let count = format!("CAST(count({argument}) AS BIGINT)");
+        Some(match called.as_str() {
+            "min" => self.column(format!("min({argument})"), "min", column.map(Measure::Least)),
+            "max" => self.column(format!("max({argument})"), "max", column.map(Measure::Greatest)),
+            "sum" => self.column(format!("sum({argument})"), "sum", column.map(Measure::Sum)),
+            "count" => self.column(count, "sum", counted),
+            _ => {
+                let sum = self.column(format!("sum(CAST({argument} AS DOUBLE))"), "sum", column.map(Measure::Sum));
+                let count = self.column(count, "sum", counted);
+                let count = cast(count, DataType::Double(sqlparser::ast::ExactNumberInfo::None));
+                let quotient = |left: Expr, right: Expr| Expr::BinaryOp {
+                    left: Box::new(left),
+                    op: BinaryOperator::Divide,
+                    right: Box::new(right),
+                };
+                // Nothing has no mean, rather than 0/0.
+                let zero = Expr::value(Value::Number("0.0".to_owned(), false));
+                let left = Box::new(count.clone());
+                let some = Expr::BinaryOp { left, op: BinaryOperator::Gt, right: Box::new(zero) };
+                if_else_null(some, quotient(sum, count))
+            }
+        })
+    }
+}
+
+impl Visit for Lift<'_> {
+    fn before(&mut self, expression: &mut Expr) -> ControlFlow<()> {
+        if let Some(place) = self.keys.iter().position(|key| key == expression) {
+            *expression = quoted(&format!("__g{place}"));
+            return ControlFlow::Continue(());
+        }
+        match expression {
+            Expr::Identifier(name) if name.value.starts_with("__") => ControlFlow::Continue(()),
+            Expr::Identifier(_) => ControlFlow::Break(()),
+            Expr::Function(function) if is_one_of(&AGGREGATE, function) => match self.aggregate(function) {
+                Some(column) => {
+                    *expression = column;
+                    ControlFlow::Continue(())
+                }
+                None => ControlFlow::Break(()),
+            },
+            _ => ControlFlow::Continue(()),
+        }
+    }
+}
+
+fn is_one_of(names: &[&str], function: &Function) -> bool {
+    names.contains(&function.name.to_string().to_lowercase().as_str())
+}
+
+/// Which functions a question calls.
+#[derive(Default)]
+struct Functions {
+    aggregates: bool,
+    /// Those that need all rows at once, or are not known.
+    others: bool,
+}
+
+/// Takes the name of the table off columns, and finds what needs all rows at once.
+struct Plain<'a> {
+    table: &'a str,
+    alias: &'a str,
+    functions: Functions,
+}
+
+impl Visit for Plain<'_> {
+    fn query(&mut self, _: &mut Query) -> ControlFlow<()> {
+        ControlFlow::Break(())
+    }
+
+    fn before(&mut self, expression: &mut Expr) -> ControlFlow<()> {
+        match expression {
+            Expr::CompoundIdentifier(names) => match names.as_slice() {
+                [table, column] if table.value == self.table || table.value == self.alias => {
+                    *expression = Expr::Identifier(column.clone());
+                }
+                _ => return ControlFlow::Break(()),
+            },
+            Expr::Function(function) => {
+                let bare = function.over.is_none()
+                    && function.filter.is_none()
+                    && function.within_group.is_empty()
+                    && function.null_treatment.is_none();
+                let list = match &function.args {
+                    FunctionArguments::List(list) => list.duplicate_treatment.is_none() && list.clauses.is_empty(),
+                    _ => false,
+                };
+                let aggregate = is_one_of(&AGGREGATE, function);
+                self.functions.aggregates |= aggregate;
+                self.functions.others |= !bare || !list || !aggregate && !is_one_of(&SCALAR, function);
+            }
+            _ => {}
+        }
+        ControlFlow::Continue(())
+    }
+}

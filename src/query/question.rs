@@ -1,0 +1,568 @@
+//! A question: one SELECT from the tables that are there, checked, and spelt as polars reads it.
+
+use std::collections::HashSet;
+use std::ops::ControlFlow;
+
+use sqlparser::ast::helpers::attached_token::AttachedToken;
+use sqlparser::ast::{
+    BinaryOperator, CaseWhen, CastKind, DataType, DuplicateTreatment, Expr, Function, FunctionArg, FunctionArgExpr,
+    FunctionArguments, Ident, JoinConstraint, JoinOperator, ObjectName, ObjectNamePart, OrderByKind, Query, Select,
+    SelectItem, SetExpr, Statement, TableFactor, UnaryOperator, Value, ValueWithSpan,
+};
+use sqlparser::dialect::GenericDialect;
+use sqlparser::parser::{Parser, ParserError};
+
+use super::Source;
+use super::walk::{Visit, walk};
+use crate::names::hint;
+
+/// A question that can be answered.
+pub struct Question {
+    /// It, as polars reads it.
+    pub query: Box<Query>,
+    /// The units of its columns by their names, as far as they are known.
+    pub units: Vec<(String, String)>,
+}
+
+/// What is wrong with a question, and what to do.
+pub struct Fault {
+    pub found: String,
+    pub help: String,
+}
+
+impl Fault {
+    fn new(found: impl Into<String>, help: impl Into<String>) -> Fault {
+        Fault { found: found.into(), help: help.into() }
+    }
+}
+
+/// Functions of text. In polars they take text alone; functions of numbers take text too, and return nulls for it.
+const TEXT: [&str; 26] = [
+    "array_agg",
+    "bit_length",
+    "concat",
+    "concat_ws",
+    "ends_with",
+    "greatest",
+    "initcap",
+    "least",
+    "left",
+    "length",
+    "lower",
+    "ltrim",
+    "max",
+    "min",
+    "octet_length",
+    "regexp_like",
+    "replace",
+    "reverse",
+    "right",
+    "rtrim",
+    "split_part",
+    "starts_with",
+    "string_agg",
+    "strpos",
+    "substr",
+    "upper",
+];
+
+/// What helps with most questions.
+pub const CORRECT: &str =
+    "correct the query; text goes in 'single quotes', names with odd characters in \"double\" ones";
+
+impl Question {
+    /// The question `sql` to the tables `sources`.
+    pub fn parse(sql: &str, sources: &[Source]) -> Result<Question, Fault> {
+        let statements = Parser::parse_sql(&GenericDialect {}, sql).map_err(|error| match error {
+            ParserError::RecursionLimitExceeded => Fault::new("too many parentheses inside each other", "simplify it"),
+            ParserError::TokenizerError(text) | ParserError::ParserError(text) => {
+                Fault::new(format!("not SQL: {text}"), CORRECT)
+            }
+        })?;
+        let [statement] =
+            <[Statement; 1]>::try_from(statements).map_err(|_| Fault::new("not one statement", "write one SELECT"))?;
+        let Statement::Query(mut query) = statement else {
+            let words = statement.to_string();
+            let first = words.split_whitespace().next().unwrap_or_default().to_uppercase();
+            return Err(Fault::new(
+                format!("{first} is not a question: `query` reads and never writes"),
+                "write one SELECT",
+            ));
+        };
+        let mut check = Check { sources, tables: HashSet::new(), fault: None };
+        walk(query.as_mut(), &mut check);
+        if let Some(fault) = check.fault {
+            return Err(fault);
+        }
+        let words = sources.iter().flat_map(|source| source.words.iter().cloned()).collect();
+        walk(query.as_mut(), &mut Names);
+        let units = units(&query, sources);
+        walk(query.as_mut(), &mut Spelling { words });
+        Ok(Question { query, units })
+    }
+}
+
+/// Finds what a question may not ask.
+struct Check<'a> {
+    sources: &'a [Source],
+    /// Names that the question itself gives to tables.
+    tables: HashSet<String>,
+    fault: Option<Fault>,
+}
+
+impl Check<'_> {
+    fn refuse(&mut self, fault: Fault) -> ControlFlow<()> {
+        self.fault = Some(fault);
+        ControlFlow::Break(())
+    }
+}
+
+impl Visit for Check<'_> {
+    fn query(&mut self, query: &mut Query) -> ControlFlow<()> {
+        for table in query.with.iter().flat_map(|with| &with.cte_tables) {
+            let name = &table.alias.name.value;
+            // polars would read the table of the dataset.
+            if self.sources.iter().any(|source| source.name == *name) {
+                return self.refuse(Fault::new(format!("WITH {name}: a table has this name"), "choose another name"));
+            }
+            self.tables.insert(name.clone());
+        }
+        match query.body.as_ref() {
+            SetExpr::Insert(_) | SetExpr::Update(_) | SetExpr::Delete(_) | SetExpr::Merge(_) => {
+                self.refuse(Fault::new("not a question: `query` reads and never writes", "write one SELECT"))
+            }
+            _ => ControlFlow::Continue(()),
+        }
+    }
+
+    fn before(&mut self, expression: &mut Expr) -> ControlFlow<()> {
+        let Expr::Function(function) = &*expression else { return ControlFlow::Continue(()) };
+        let called = function.name.to_string().to_lowercase();
+        let argument = first_argument(function).filter(|argument| is_constant(argument));
+        if argument.is_some() && AGGREGATES.contains(&called.as_str()) {
+            return self.refuse(Fault::new(
+                format!("`{expression}`: no column in it"),
+                "count(*) counts rows; name a column for other aggregates",
+            ));
+        }
+        ControlFlow::Continue(())
+    }
+
+    fn select(&mut self, select: &mut Select) -> ControlFlow<()> {
+        let joins = select.from.iter().flat_map(|from| &from.joins);
+        let condition = joins.filter_map(|join| outer_condition(&join.join_operator));
+        if let Some(condition) = condition.into_iter().find(|condition| !is_equalities(condition)) {
+            // polars would apply the rest to the joined rows, and lose those without a match.
+            return self.refuse(Fault::new(
+                format!("ON {condition}: an outer join compares columns with columns by ="),
+                "filter in a subquery: FROM a LEFT JOIN (SELECT * FROM b WHERE ...) AS b ON a.x = b.x",
+            ));
+        }
+        if select.into.is_some() {
+            return self.refuse(Fault::new(
+                "SELECT INTO writes a table, and `query` never does",
+                "leave INTO out; `--out FILE` writes the answer",
+            ));
+        }
+        ControlFlow::Continue(())
+    }
+
+    fn table(&mut self, table: &mut TableFactor) -> ControlFlow<()> {
+        let name = match &*table {
+            TableFactor::Table { name, args: None, .. } => name,
+            TableFactor::Table { name, .. } => {
+                return self.refuse(Fault::new(
+                    format!("`{name}(...)`: only the tables of the dataset can be read"),
+                    "name another dataset or file on the command line instead",
+                ));
+            }
+            TableFactor::TableFunction { .. } | TableFactor::Function { .. } => {
+                return self.refuse(Fault::new(
+                    "a function in FROM: only the tables of the dataset can be read",
+                    "name another dataset or file on the command line instead",
+                ));
+            }
+            _ => return ControlFlow::Continue(()),
+        };
+        let word = match name.0.as_slice() {
+            [ObjectNamePart::Identifier(word)] => word.value.clone(),
+            _ => name.to_string(),
+        };
+        if self.tables.contains(&word) || self.sources.iter().any(|source| source.name == word) {
+            return ControlFlow::Continue(());
+        }
+        let help = hint(&word, self.sources.iter().map(|source| source.name.as_str()));
+        self.refuse(Fault::new(format!("no table `{word}`"), help))
+    }
+}
+
+/// Aggregates that polars applies to a constant as if it were one row.
+const AGGREGATES: [&str; 12] = [
+    "avg",
+    "max",
+    "mean",
+    "median",
+    "min",
+    "quantile_cont",
+    "quantile_disc",
+    "stddev",
+    "stdev",
+    "sum",
+    "var",
+    "variance",
+];
+
+/// The condition of a join that keeps rows without a match, or compares with those.
+fn outer_condition(join: &JoinOperator) -> Option<&Expr> {
+    match join {
+        JoinOperator::Left(constraint)
+        | JoinOperator::LeftOuter(constraint)
+        | JoinOperator::Right(constraint)
+        | JoinOperator::RightOuter(constraint)
+        | JoinOperator::FullOuter(constraint)
+        | JoinOperator::Semi(constraint)
+        | JoinOperator::LeftSemi(constraint)
+        | JoinOperator::RightSemi(constraint)
+        | JoinOperator::Anti(constraint)
+        | JoinOperator::LeftAnti(constraint)
+        | JoinOperator::RightAnti(constraint) => match constraint {
+            JoinConstraint::On(condition) => Some(condition),
+            _ => None,
+        },
+        _ => None,
+    }
+}
+
+/// Whether a condition compares columns with columns by =, and nothing else.
+fn is_equalities(condition: &Expr) -> bool {
+    let is_column = |side: &Expr| matches!(side, Expr::Identifier(_) | Expr::CompoundIdentifier(_));
+    match condition {
+        Expr::Nested(inner) => is_equalities(inner),
+        Expr::BinaryOp { left, op: BinaryOperator::And, right } => is_equalities(left) && is_equalities(right),
+        Expr::BinaryOp { left, op: BinaryOperator::Eq, right } => is_column(left) && is_column(right),
+        _ => false,
+    }
+}
+
+/// Whether no column enters an expression.
+fn is_constant(expression: &Expr) -> bool {
+    struct Columns;
+    impl Visit for Columns {
+        fn before(&mut self, expression: &mut Expr) -> ControlFlow<()> {
+            match expression {
+                Expr::Identifier(_) | Expr::CompoundIdentifier(_) | Expr::Wildcard(_) | Expr::QualifiedWildcard(..) => {
+                    ControlFlow::Break(())
+                }
+                _ => ControlFlow::Continue(()),
+            }
+        }
+    }
+    walk(&mut expression.clone(), &mut Columns)
+}
+
+/// Gives the columns of every SELECT their names, and lets ORDER BY use them.
+struct Names;
+
+impl Visit for Names {
+    fn query(&mut self, query: &mut Query) -> ControlFlow<()> {
+        let SetExpr::Select(select) = query.body.as_mut() else { return ControlFlow::Continue(()) };
+        let mut taken: HashSet<String> = HashSet::new();
+        for item in &mut select.projection {
+            let (expression, name) = match item {
+                // It stands for several columns, which have their names.
+                SelectItem::UnnamedExpr(Expr::Function(function))
+                    if function.name.to_string().eq_ignore_ascii_case("columns") =>
+                {
+                    continue;
+                }
+                SelectItem::UnnamedExpr(expression) => (expression.clone(), name(expression)),
+                SelectItem::ExprWithAlias { alias, .. } => {
+                    taken.insert(alias.value.clone());
+                    continue;
+                }
+                _ => continue,
+            };
+            let mut free = name.clone();
+            let mut number = 0;
+            while !taken.insert(free.clone()) {
+                number += 1;
+                free = format!("{name}_{number}");
+            }
+            let is_plain = matches!(expression, Expr::Identifier(_) | Expr::CompoundIdentifier(_));
+            if !is_plain || number > 0 {
+                *item = SelectItem::ExprWithAlias { expr: expression, alias: Ident::with_quote('"', free) };
+            }
+        }
+        let Some(OrderByKind::Expressions(keys)) = query.order_by.as_mut().map(|order| &mut order.kind) else {
+            return ControlFlow::Continue(());
+        };
+        for key in keys {
+            let is_plain = matches!(key.expr, Expr::Identifier(_) | Expr::CompoundIdentifier(_) | Expr::Value(_));
+            let same = select.projection.iter().find_map(|item| match item {
+                SelectItem::ExprWithAlias { expr, alias } if *expr == key.expr => Some(alias.clone()),
+                _ => None,
+            });
+            if let (false, Some(alias)) = (is_plain, same) {
+                key.expr = Expr::Identifier(alias);
+            }
+        }
+        ControlFlow::Continue(())
+    }
+}
+
+/// The name of a column that has none, as DuckDB gives it; `count(*)` is `count`.
+pub fn name(expression: &Expr) -> String {
+    match expression {
+        Expr::Identifier(name) => name.value.clone(),
+        Expr::CompoundIdentifier(names) => names.last().map(|name| name.value.clone()).unwrap_or_default(),
+        Expr::Nested(inner) => name(inner),
+        Expr::BinaryOp { left, op, right } => format!("({} {op} {})", name(left), name(right)),
+        Expr::Ceil { expr, .. } => format!("ceil({})", name(expr)),
+        Expr::Floor { expr, .. } => format!("floor({})", name(expr)),
+        Expr::Function(function) => {
+            let called = function.name.to_string().to_lowercase();
+            let FunctionArguments::List(list) = &function.args else { return expression.to_string() };
+            let is_plain = function.over.is_none() && function.filter.is_none() && list.clauses.is_empty();
+            if !is_plain {
+                return expression.to_string();
+            }
+            if called == "count" && matches!(list.args.as_slice(), [FunctionArg::Unnamed(FunctionArgExpr::Wildcard)]) {
+                return called;
+            }
+            let distinct = match list.duplicate_treatment {
+                Some(DuplicateTreatment::Distinct) => "DISTINCT ",
+                _ => "",
+            };
+            let argument = |argument: &FunctionArg| match argument {
+                FunctionArg::Unnamed(FunctionArgExpr::Expr(inner)) => name(inner),
+                other => other.to_string(),
+            };
+            let arguments: Vec<String> = list.args.iter().map(argument).collect();
+            format!("{called}({distinct}{})", arguments.join(", "))
+        }
+        other => other.to_string(),
+    }
+}
+
+/// The units of the columns that a question gives, by name.
+fn units(query: &Query, sources: &[Source]) -> Vec<(String, String)> {
+    let mut units = Vec::new();
+    let mut body = query.body.as_ref();
+    while let SetExpr::SetOperation { left, .. } = body {
+        body = left;
+    }
+    let SetExpr::Select(select) = body else { return units };
+    for item in &select.projection {
+        match item {
+            SelectItem::UnnamedExpr(expression) => units.push((name(expression), unit(expression, sources))),
+            SelectItem::ExprWithAlias { expr, alias } => units.push((alias.value.clone(), unit(expr, sources))),
+            _ => {
+                for column in sources.iter().flat_map(|source| &source.columns) {
+                    units.push((column.clone(), column_unit(column, sources)));
+                }
+            }
+        }
+    }
+    units
+}
+
+/// The unit of a column, if all tables that have it agree.
+fn column_unit(name: &str, sources: &[Source]) -> String {
+    let known = sources.iter().flat_map(|source| source.columns.iter().zip(&source.units));
+    let mut known = known.filter(|(column, _)| *column == name).map(|(_, unit)| unit);
+    match known.next() {
+        Some(first) if known.all(|other| other == first) => first.clone(),
+        _ => String::new(),
+    }
+}
+
+/// The unit of an expression that has that of one column.
+fn unit(expression: &Expr, sources: &[Source]) -> String {
+    match expression {
+        Expr::Identifier(name) => column_unit(&name.value, sources),
+        Expr::CompoundIdentifier(names) => match names.as_slice() {
+            [.., column] => column_unit(&column.value, sources),
+            [] => String::new(),
+        },
+        Expr::Nested(inner) | Expr::UnaryOp { expr: inner, .. } | Expr::Cast { expr: inner, .. } => {
+            unit(inner, sources)
+        }
+        Expr::Function(function) => {
+            const KEEP: [&str; 12] = [
+                "min",
+                "max",
+                "avg",
+                "mean",
+                "sum",
+                "median",
+                "first",
+                "last",
+                "abs",
+                "quantile_cont",
+                "quantile_disc",
+                "stddev",
+            ];
+            let called = function.name.to_string().to_lowercase();
+            match first_argument(function) {
+                Some(inner) if KEEP.contains(&called.as_str()) => unit(inner, sources),
+                _ => String::new(),
+            }
+        }
+        _ => String::new(),
+    }
+}
+
+fn first_argument(function: &Function) -> Option<&Expr> {
+    let FunctionArguments::List(list) = &function.args else { return None };
+    match list.args.first()? {
+        FunctionArg::Unnamed(FunctionArgExpr::Expr(inner)) => Some(inner),
+        _ => None,
+    }
+}
+
+/// Spells a question as polars reads it.
+struct Spelling {
+    /// Columns of words, which are categories in polars: functions take them as text.
+    words: HashSet<String>,
+}
+
+impl Spelling {
+    /// Whether an expression is a column of words.
+    fn is_words(&self, expression: &Expr) -> bool {
+        match expression {
+            Expr::Identifier(name) => self.words.contains(&name.value),
+            Expr::CompoundIdentifier(names) => names.last().is_some_and(|name| self.words.contains(&name.value)),
+            _ => false,
+        }
+    }
+
+    fn as_text(&self, expression: &mut Expr) {
+        if self.is_words(expression) {
+            *expression = cast(expression.clone(), DataType::Varchar(None));
+        }
+    }
+}
+
+/// `expression` as `data_type`.
+pub fn cast(expression: Expr, data_type: DataType) -> Expr {
+    Expr::Cast { kind: CastKind::Cast, expr: Box::new(expression), data_type, array: false, format: None }
+}
+
+impl Visit for Spelling {
+    fn after(&mut self, expression: &mut Expr) -> ControlFlow<()> {
+        match expression {
+            Expr::Value(ValueWithSpan { value: Value::Number(digits, _), .. }) => *digits = plain(digits),
+            Expr::Like { expr, .. }
+            | Expr::ILike { expr, .. }
+            | Expr::SimilarTo { expr, .. }
+            | Expr::RLike { expr, .. } => {
+                **expr = cast((**expr).clone(), DataType::Varchar(None));
+            }
+            Expr::Substring { expr, .. } | Expr::Trim { expr, .. } | Expr::Position { r#in: expr, .. } => {
+                self.as_text(expr);
+            }
+            Expr::BinaryOp { left, op: BinaryOperator::StringConcat, right } => {
+                self.as_text(left);
+                self.as_text(right);
+            }
+            Expr::InList { list, .. } => numbers_alike(list),
+            Expr::Function(function) => {
+                self.function(function);
+                if let Some(sum) = sum(function) {
+                    *expression = sum;
+                }
+            }
+            _ => {}
+        }
+        ControlFlow::Continue(())
+    }
+}
+
+impl Spelling {
+    fn function(&self, function: &mut Function) {
+        let called = function.name.to_string().to_lowercase();
+        let FunctionArguments::List(list) = &mut function.args else { return };
+        // A constant is there in every row.
+        if let ("count", [FunctionArg::Unnamed(FunctionArgExpr::Expr(argument))]) = (called.as_str(), &mut *list.args)
+            && list.duplicate_treatment.is_none()
+            && is_constant(argument)
+            && !matches!(argument, Expr::Value(ValueWithSpan { value: Value::Null, .. }))
+        {
+            list.args = vec![FunctionArg::Unnamed(FunctionArgExpr::Wildcard)];
+            return;
+        }
+        // As in DuckDB and PostgreSQL, the logarithm of one number has the base 10.
+        if called == "log" && list.args.len() == 1 {
+            function.name = ObjectName::from(vec![Ident::new("log10")]);
+        }
+        if !TEXT.contains(&called.as_str()) {
+            return;
+        }
+        for argument in &mut list.args {
+            if let FunctionArg::Unnamed(FunctionArgExpr::Expr(inner)) = argument {
+                self.as_text(inner);
+            }
+        }
+    }
+}
+
+/// A sum as standard SQL has it: null of no values, of which polars makes 0.
+fn sum(function: &Function) -> Option<Expr> {
+    let FunctionArguments::List(list) = &function.args else { return None };
+    let is_plain = function.over.is_none()
+        && function.filter.is_none()
+        && list.duplicate_treatment.is_none()
+        && list.clauses.is_empty()
+        && list.args.len() == 1;
+    if !is_plain || !function.name.to_string().eq_ignore_ascii_case("sum") {
+        return None;
+    }
+    let count = Function { name: ObjectName::from(vec![Ident::new("count")]), ..function.clone() };
+    let zero = Expr::value(Value::Number("0".to_owned(), false));
+    let some = Expr::BinaryOp { left: Box::new(Expr::Function(count)), op: BinaryOperator::Gt, right: Box::new(zero) };
+    Some(if_else_null(some, Expr::Function(function.clone())))
+}
+
+/// `result` where `condition` holds, else null.
+pub fn if_else_null(condition: Expr, result: Expr) -> Expr {
+    Expr::Case {
+        case_token: AttachedToken::empty(),
+        end_token: AttachedToken::empty(),
+        operand: None,
+        conditions: vec![CaseWhen { condition, result }],
+        else_result: None,
+    }
+}
+
+/// Takes the brackets off the numbers of a list, and makes all of them decimals if one is: polars wants one type.
+fn numbers_alike(list: &mut [Expr]) {
+    for item in list.iter_mut() {
+        while let Expr::Nested(inner) = item {
+            *item = (**inner).clone();
+        }
+    }
+    fn digits(item: &mut Expr) -> Option<&mut String> {
+        match item {
+            Expr::UnaryOp { op: UnaryOperator::Minus | UnaryOperator::Plus, expr } => digits(expr),
+            Expr::Value(ValueWithSpan { value: Value::Number(digits, _), .. }) => Some(digits),
+            _ => None,
+        }
+    }
+    let is_decimal = |item: &mut Expr| digits(item).is_some_and(|digits| digits.contains('.'));
+    if list.iter_mut().any(is_decimal) {
+        for digits in list.iter_mut().filter_map(digits).filter(|digits| !digits.contains('.')) {
+            digits.push_str(".0");
+        }
+    }
+}
+
+/// A number with an exponent, without one; others as they are.
+fn plain(digits: &str) -> String {
+    let value: Option<f64> = digits.parse().ok().filter(|value: &f64| value.is_finite());
+    match value.filter(|_| digits.contains(['e', 'E'])) {
+        // Without a point it would be a whole number, of at most 64 bits.
+        Some(value) if value.fract() == 0.0 => format!("{value}.0"),
+        Some(value) => format!("{value}"),
+        None => digits.to_owned(),
+    }
+}

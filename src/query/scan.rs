@@ -1,0 +1,474 @@
+//! Parquet files as a table of polars: only the columns and the row groups that a question needs are read, on all threads.
+
+use std::any::Any;
+use std::fs::File;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use arrow_array::cast::AsArray;
+use arrow_array::types::{
+    ArrowPrimitiveType, Date32Type, Float32Type, Float64Type, Int8Type, Int16Type, Int32Type, Int64Type,
+    TimestampMicrosecondType, TimestampMillisecondType, TimestampNanosecondType, TimestampSecondType, UInt8Type,
+    UInt16Type, UInt32Type, UInt64Type,
+};
+use arrow_array::{Array, BooleanArray, RecordBatch, RecordBatchOptions};
+use arrow_schema::{DataType as ArrowType, FieldRef, Fields, Schema as ArrowSchema, TimeUnit as ArrowTimeUnit};
+use arrow_select::filter::filter_record_batch;
+use parquet::arrow::ProjectionMask;
+use parquet::arrow::arrow_reader::{ArrowReaderMetadata, ArrowReaderOptions, ParquetRecordBatchReaderBuilder};
+use parquet::errors::ParquetError;
+use parquet::file::metadata::RowGroupMetaData;
+use polars::lazy::dsl::{Expr, Operator};
+use polars::prelude::{
+    AnonymousScan, AnonymousScanArgs, BooleanChunked, Categories, ChunkedArray, Column, DataFrame, DataType, IdxCa,
+    IntoLazy, IntoSeries, LazyFrame, NamedFrom, PlSmallStr, PolarsError, PolarsNumericType, PolarsResult,
+    ScanArgsAnonymous, Schema, SchemaRef, Series, StringChunked, TimeUnit,
+};
+use rayon::prelude::*;
+
+use super::filter::{Condition, Top, kept, of_predicate};
+use super::groups::{Counting, Groups};
+use crate::dataset::{check_footer, check_pages, guarded, label};
+
+/// The rows of Parquet files of the same columns, one file after another.
+#[derive(Clone)]
+pub struct Files {
+    paths: Vec<PathBuf>,
+    schema: SchemaRef,
+    /// What rows obey; all others are left out.
+    conditions: Vec<Condition>,
+    /// Which of those come first; others may be left out.
+    top: Option<Top>,
+}
+
+impl Files {
+    /// The table in the files of `paths`, whose columns are those of the first.
+    pub fn new(paths: Vec<PathBuf>) -> PolarsResult<Files> {
+        let mut schema = Schema::default();
+        if let Some(first) = paths.first() {
+            for field in open(first).map_err(|error| unreadable(first, &error))?.1.schema().fields() {
+                schema.insert(PlSmallStr::from_str(field.name()), kind(field.data_type()).unwrap_or(DataType::Null));
+            }
+        }
+        Ok(Files { paths, schema: Arc::new(schema), conditions: Vec::new(), top: None })
+    }
+
+    /// Its columns and their types.
+    pub fn schema(&self) -> &Schema {
+        &self.schema
+    }
+
+    /// Those rows alone that obey `conditions`, and of each part those alone that may be among the first.
+    pub fn only(mut self, conditions: Vec<Condition>, top: Option<Top>) -> Files {
+        (self.conditions, self.top) = (conditions, top);
+        self
+    }
+
+    /// The groups of all rows.
+    pub fn groups(&self, groups: &Groups) -> PolarsResult<DataFrame> {
+        let mut counting = Counting::new(groups);
+        let names = groups.columns();
+        for path in &self.paths {
+            let count = || {
+                batches(path, (&names, &self.schema), &groups.conditions, None, &mut |batch| {
+                    counting.add(&batch);
+                    Ok(batch.num_rows())
+                })
+            };
+            let done = guarded(count).unwrap_or_else(|| Err(ParquetError::General("it is damaged".to_owned())));
+            done.map_err(|error| unreadable(path, &error))?;
+        }
+        counting.frame()
+    }
+
+    /// The names of its columns of words.
+    pub fn words(&self) -> Vec<String> {
+        let fields = self.schema.iter().filter(|(_, kind)| kind.is_categorical());
+        fields.map(|(name, _)| name.to_string()).collect()
+    }
+
+    /// The table as polars plans with it.
+    pub fn frame(&self) -> PolarsResult<LazyFrame> {
+        let options = ScanArgsAnonymous { schema: Some(self.schema.clone()), ..ScanArgsAnonymous::default() };
+        LazyFrame::anonymous_scan(Arc::new(self.clone()), options)
+    }
+
+    /// Each file as a table of its own.
+    pub fn pieces(&self) -> Vec<Files> {
+        self.paths.iter().map(|path| Files { paths: vec![path.clone()], ..self.clone() }).collect()
+    }
+
+    /// The rows of one file that `predicate` keeps, at most the first `most` of the file.
+    fn read(
+        &self,
+        path: &Path,
+        names: &[PlSmallStr],
+        predicate: Option<&Expr>,
+        most: Option<usize>,
+    ) -> PolarsResult<DataFrame> {
+        let predicate = predicate.map(without_hints).transpose()?.flatten();
+        let rows = || self.decode(path, names, predicate.as_ref(), most);
+        let frame = guarded(rows).unwrap_or_else(|| Err(ParquetError::General("it is damaged".to_owned())));
+        let frame = frame.map_err(|error| unreadable(path, &error))?;
+        match predicate {
+            Some(predicate) => frame.lazy().filter(predicate).collect(),
+            None => Ok(frame),
+        }
+    }
+}
+
+/// A predicate without what polars adds to it for a top-k: bounds that it learns as it goes, which need not be applied, and which an
+/// expression can only display.
+fn without_hints(predicate: &Expr) -> PolarsResult<Option<Expr>> {
+    if !predicate.into_iter().any(|part| matches!(part, Expr::Display { .. })) {
+        return Ok(Some(predicate.clone()));
+    }
+    match predicate {
+        Expr::Display { .. } => Ok(None),
+        Expr::BinaryExpr { left, op: Operator::And | Operator::LogicalAnd, right } => {
+            let (left, right) = (without_hints(left)?, without_hints(right)?);
+            Ok(match (left, right) {
+                (Some(left), Some(right)) => Some(left.and(right)),
+                (left, right) => left.or(right),
+            })
+        }
+        _ => Err(PolarsError::ComputeError(format!("a condition that is not supported: {predicate}").into())),
+    }
+}
+
+impl AnonymousScan for Files {
+    fn as_any(&self) -> &dyn Any {
+        self
+    }
+
+    fn schema(&self, _: Option<usize>) -> PolarsResult<SchemaRef> {
+        Ok(self.schema.clone())
+    }
+
+    fn allows_predicate_pushdown(&self) -> bool {
+        true
+    }
+
+    fn allows_projection_pushdown(&self) -> bool {
+        true
+    }
+
+    fn scan(&self, options: AnonymousScanArgs) -> PolarsResult<DataFrame> {
+        let names: Vec<PlSmallStr> = match &options.with_columns {
+            Some(names) => names.to_vec(),
+            None => self.schema.iter_names().cloned().collect(),
+        };
+        let predicate = options.predicate.as_ref();
+        let empty = || {
+            let columns = names.iter().map(|name| {
+                let kind = self.schema.get(name).cloned().unwrap_or(DataType::Null);
+                Column::new_empty(name.clone(), &kind)
+            });
+            DataFrame::new(0, columns.collect())
+        };
+        let mut rows = match (options.n_rows, predicate) {
+            (Some(most), None) => {
+                let mut rows = empty()?;
+                for path in &self.paths {
+                    if rows.height() >= most {
+                        break;
+                    }
+                    let part = self.read(path, &names, None, Some(most - rows.height()))?;
+                    append(&mut rows, part)?;
+                }
+                rows
+            }
+            _ => {
+                let parts: PolarsResult<Vec<DataFrame>> =
+                    self.paths.par_iter().map(|path| self.read(path, &names, predicate, None)).collect();
+                let mut rows = empty()?;
+                for part in parts? {
+                    append(&mut rows, part)?;
+                }
+                rows
+            }
+        };
+        if let Some(most) = options.n_rows {
+            rows = rows.head(Some(most));
+        }
+        Ok(rows)
+    }
+}
+
+/// Adds `more` rows.
+pub fn append(rows: &mut DataFrame, more: DataFrame) -> PolarsResult<()> {
+    if rows.height() == 0 && (more.height() > 0 || rows.columns().is_empty()) {
+        *rows = more;
+    } else if rows.columns().is_empty() {
+        *rows = DataFrame::new(rows.height() + more.height(), Vec::new())?;
+    } else if more.height() > 0 {
+        rows.vstack_mut_owned(more)?;
+    }
+    Ok(())
+}
+
+/// What errors of files say.
+const UNREADABLE: &str = "cannot be read as Parquet";
+
+fn unreadable(path: &Path, error: &ParquetError) -> PolarsError {
+    PolarsError::ComputeError(format!("{}: {UNREADABLE}: {error}", path.display()).into())
+}
+
+/// Whether a file is at fault, rather than the question.
+pub fn is_unreadable(error: &PolarsError) -> bool {
+    error.to_string().contains(UNREADABLE)
+}
+
+/// A Parquet file, and its columns as they are read: words are dictionaries where they are so in a dataset, else text.
+fn open(path: &Path) -> Result<(File, ArrowReaderMetadata), ParquetError> {
+    let file = File::open(path)?;
+    check_footer(&file)?;
+    let stored = ArrowReaderMetadata::load(&file, ArrowReaderOptions::new())?;
+    let read = |field: &FieldRef| match field.data_type() {
+        ArrowType::Dictionary(..) if *field.data_type() != label() => {
+            Arc::new(field.as_ref().clone().with_data_type(ArrowType::Utf8))
+        }
+        _ => field.clone(),
+    };
+    let fields: Fields = stored.schema().fields().iter().map(read).collect();
+    let options = ArrowReaderOptions::new().with_schema(Arc::new(ArrowSchema::new(fields)));
+    let metadata = ArrowReaderMetadata::try_new(stored.metadata().clone(), options)?;
+    Ok((file, metadata))
+}
+
+/// Hands over the columns `names` of a file, which are to be those of `schema`, a row group at a time, as far as it may hold rows that obey `conditions`, until `take`, which
+/// returns how many rows it took, has `most`.
+fn batches(
+    path: &Path,
+    (names, schema): (&[String], &Schema),
+    conditions: &[Condition],
+    most: Option<usize>,
+    take: &mut dyn FnMut(RecordBatch) -> Result<usize, ParquetError>,
+) -> Result<(), ParquetError> {
+    let (file, metadata) = open(path)?;
+    check_pages(&file, metadata.metadata())?;
+    for name in names {
+        let found = metadata.schema().field_with_name(name).ok();
+        let found = found.map(|field| kind(field.data_type()).unwrap_or(DataType::Null));
+        if found.as_ref() != schema.get(name) {
+            let found = found.map_or("is missing".to_owned(), |kind| format!("has the type {kind}"));
+            return Err(ParquetError::General(format!("column `{name}` {found}, unlike in the first file")));
+        }
+    }
+    // Statistics of other writers leave NaN out, which polars counts as the greatest number.
+    let is_ours = is_ours(&metadata);
+    let allows = |group: &RowGroupMetaData| !is_ours || conditions.iter().all(|condition| condition.allows(group));
+    let mask = ProjectionMask::columns(metadata.parquet_schema(), names.iter().map(String::as_str));
+    let mut missing = most;
+    for (index, group) in metadata.metadata().row_groups().iter().enumerate() {
+        if missing == Some(0) {
+            break;
+        }
+        if !allows(group) {
+            continue;
+        }
+        let rows = usize::try_from(group.num_rows()).unwrap_or(0);
+        let wanted = missing.map_or(rows, |missing| rows.min(missing));
+        let mut took = 0;
+        if names.is_empty() {
+            let options = RecordBatchOptions::new().with_row_count(Some(wanted));
+            took += take(RecordBatch::try_new_with_options(Arc::new(ArrowSchema::empty()), Vec::new(), &options)?)?;
+        } else {
+            let builder = ParquetRecordBatchReaderBuilder::new_with_metadata(file.try_clone()?, metadata.clone());
+            let reader = builder
+                .with_row_groups(vec![index])
+                .with_projection(mask.clone())
+                .with_batch_size(wanted.max(1))
+                .with_limit(wanted)
+                .build()?;
+            for batch in reader {
+                took += take(batch?)?;
+            }
+        }
+        missing = missing.map(|missing| missing - took.min(missing));
+    }
+    Ok(())
+}
+
+impl Files {
+    /// The columns `names` of the rows of a file that `predicate` may keep.
+    fn decode(
+        &self,
+        path: &Path,
+        names: &[PlSmallStr],
+        predicate: Option<&Expr>,
+        most: Option<usize>,
+    ) -> Result<DataFrame, ParquetError> {
+        let mut conditions = self.conditions.clone();
+        conditions.extend(predicate.map(of_predicate).unwrap_or_default());
+        let mut read: Vec<String> = names.iter().map(ToString::to_string).collect();
+        read.extend(conditions.iter().map(|condition| condition.column.clone()));
+        read.extend(self.top.iter().map(|top| top.column.clone()));
+        read.sort();
+        read.dedup();
+        // Where rows are left out, as many more have to be read.
+        let most = most.filter(|_| conditions.is_empty() && self.top.is_none());
+        let mut frame: Option<DataFrame> = None;
+        batches(path, (&read, &self.schema), &conditions, most, &mut |batch| {
+            let mut kept = kept(&conditions, &batch);
+            if let Some(top) = &self.top {
+                top.mark(&batch, &mut kept);
+            }
+            let batch = match kept.iter().all(|kept| *kept) {
+                true => batch,
+                false => filter_record_batch(&batch, &BooleanArray::from(kept))?,
+            };
+            add(&mut frame, columns(&batch, names)?).map_err(foreign)?;
+            Ok(batch.num_rows())
+        })?;
+        match frame {
+            Some(frame) => Ok(frame),
+            None => {
+                let column = |name: &PlSmallStr| {
+                    Column::new_empty(name.clone(), &self.schema.get(name).cloned().unwrap_or(DataType::Null))
+                };
+                DataFrame::new(0, names.iter().map(column).collect()).map_err(foreign)
+            }
+        }
+    }
+}
+
+fn add(frame: &mut Option<DataFrame>, more: DataFrame) -> PolarsResult<()> {
+    match frame {
+        Some(frame) => append(frame, more),
+        None => {
+            *frame = Some(more);
+            Ok(())
+        }
+    }
+}
+
+fn foreign(error: PolarsError) -> ParquetError {
+    ParquetError::General(error.to_string())
+}
+
+/// Whether slipsweep wrote a file.
+fn is_ours(metadata: &ArrowReaderMetadata) -> bool {
+    let entries = metadata.metadata().file_metadata().key_value_metadata();
+    entries.into_iter().flatten().any(|entry| entry.key == "slipsweep.version")
+}
+
+/// The columns `names` of a batch, in that order.
+fn columns(batch: &RecordBatch, names: &[PlSmallStr]) -> Result<DataFrame, ParquetError> {
+    let column = |name: &PlSmallStr| {
+        let array =
+            batch.column_by_name(name).ok_or_else(|| ParquetError::General(format!("it has no column `{name}`")))?;
+        series(name, array.as_ref()).map(Column::from)
+    };
+    let columns: Result<Vec<Column>, ParquetError> = names.iter().map(column).collect();
+    DataFrame::new(batch.num_rows(), columns?).map_err(foreign)
+}
+
+/// The type of a column in polars; `None` of one that is not read.
+fn kind(kind: &ArrowType) -> Option<DataType> {
+    Some(match kind {
+        ArrowType::Float64 => DataType::Float64,
+        ArrowType::Float32 => DataType::Float32,
+        ArrowType::Int8 | ArrowType::Int16 | ArrowType::Int32 => DataType::Int32,
+        ArrowType::Int64 => DataType::Int64,
+        ArrowType::UInt8 | ArrowType::UInt16 | ArrowType::UInt32 => DataType::UInt32,
+        ArrowType::UInt64 => DataType::UInt64,
+        ArrowType::Boolean => DataType::Boolean,
+        ArrowType::Utf8 | ArrowType::LargeUtf8 | ArrowType::Utf8View => DataType::String,
+        ArrowType::Date32 => DataType::Date,
+        ArrowType::Timestamp(unit, _) => DataType::Datetime(time_unit(unit), None),
+        kind if *kind == label() => words_type(),
+        _ => return None,
+    })
+}
+
+fn time_unit(unit: &ArrowTimeUnit) -> TimeUnit {
+    match unit {
+        ArrowTimeUnit::Second | ArrowTimeUnit::Millisecond => TimeUnit::Milliseconds,
+        ArrowTimeUnit::Microsecond => TimeUnit::Microseconds,
+        ArrowTimeUnit::Nanosecond => TimeUnit::Nanoseconds,
+    }
+}
+
+/// Words that repeat.
+fn words_type() -> DataType {
+    DataType::from_categories(Categories::global())
+}
+
+/// An array as a column of polars.
+fn series(name: &PlSmallStr, array: &dyn Array) -> Result<Series, ParquetError> {
+    let name = name.clone();
+    Ok(match array.data_type() {
+        ArrowType::Float64 => numbers::<Float64Type, polars::prelude::Float64Type>(name, array).into_series(),
+        ArrowType::Float32 => numbers::<Float32Type, polars::prelude::Float32Type>(name, array).into_series(),
+        ArrowType::Int8 => numbers::<Int8Type, polars::prelude::Int32Type>(name, array).into_series(),
+        ArrowType::Int16 => numbers::<Int16Type, polars::prelude::Int32Type>(name, array).into_series(),
+        ArrowType::Int32 => numbers::<Int32Type, polars::prelude::Int32Type>(name, array).into_series(),
+        ArrowType::Int64 => numbers::<Int64Type, polars::prelude::Int64Type>(name, array).into_series(),
+        ArrowType::UInt8 => numbers::<UInt8Type, polars::prelude::UInt32Type>(name, array).into_series(),
+        ArrowType::UInt16 => numbers::<UInt16Type, polars::prelude::UInt32Type>(name, array).into_series(),
+        ArrowType::UInt32 => numbers::<UInt32Type, polars::prelude::UInt32Type>(name, array).into_series(),
+        ArrowType::UInt64 => numbers::<UInt64Type, polars::prelude::UInt64Type>(name, array).into_series(),
+        ArrowType::Date32 => numbers::<Date32Type, polars::prelude::Int32Type>(name, array).into_date().into_series(),
+        ArrowType::Timestamp(unit, _) => {
+            let ticks = match unit {
+                ArrowTimeUnit::Second => {
+                    &numbers::<TimestampSecondType, polars::prelude::Int64Type>(name, array) * 1000_i64
+                }
+                ArrowTimeUnit::Millisecond => {
+                    numbers::<TimestampMillisecondType, polars::prelude::Int64Type>(name, array)
+                }
+                ArrowTimeUnit::Microsecond => {
+                    numbers::<TimestampMicrosecondType, polars::prelude::Int64Type>(name, array)
+                }
+                ArrowTimeUnit::Nanosecond => {
+                    numbers::<TimestampNanosecondType, polars::prelude::Int64Type>(name, array)
+                }
+            };
+            ticks.into_datetime(time_unit(unit), None).into_series()
+        }
+        ArrowType::Boolean => {
+            let flags: Vec<Option<bool>> = array.as_boolean().iter().collect();
+            BooleanChunked::new(name, flags).into_series()
+        }
+        ArrowType::Utf8 => text(name, array.as_string::<i32>().iter()),
+        ArrowType::LargeUtf8 => text(name, array.as_string::<i64>().iter()),
+        ArrowType::Utf8View => text(name, array.as_string_view().iter()),
+        kind if *kind == label() => {
+            let codes = array.as_dictionary::<Int32Type>();
+            let known = text(PlSmallStr::EMPTY, codes.values().as_string::<i32>().iter());
+            let words = known.cast(&words_type()).map_err(foreign)?;
+            let places = codes.keys().iter().map(|key| key.and_then(|key| u32::try_from(key).ok()));
+            let places: IdxCa = places.collect();
+            words.take(&places).map_err(foreign)?.with_name(name)
+        }
+        kind => {
+            return Err(ParquetError::General(format!(
+                "column `{name}` is of type {kind}, which `query` does not read"
+            )));
+        }
+    })
+}
+
+fn numbers<A, P>(name: PlSmallStr, array: &dyn Array) -> ChunkedArray<P>
+where
+    A: ArrowPrimitiveType,
+    P: PolarsNumericType,
+    A::Native: Into<P::Native>,
+{
+    let array = array.as_primitive::<A>();
+    match array.null_count() {
+        0 => ChunkedArray::from_vec(name, array.values().iter().map(|&number| number.into()).collect()),
+        _ => {
+            let mut numbers: ChunkedArray<P> = array.iter().map(|number| number.map(Into::into)).collect();
+            numbers.rename(name);
+            numbers
+        }
+    }
+}
+
+fn text<'a>(name: PlSmallStr, words: impl Iterator<Item = Option<&'a str>>) -> Series {
+    let mut text: StringChunked = words.collect();
+    text.rename(name);
+    text.into_series()
+}

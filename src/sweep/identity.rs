@@ -1,0 +1,148 @@
+//! What a table follows from: its hash, and the first key in which two specs differ. Both are of the meaning of a spec, never of its text.
+
+use std::fmt::{self, Write};
+
+use sha2::{Digest, Sha256};
+
+use super::check::{Request, Sweep};
+use super::place;
+use crate::dataset::DatasetError;
+use crate::model::Units;
+use crate::names::shown;
+use crate::table;
+
+/// Characters of a value that a message shows.
+const MAX_SHOWN_CHARS: usize = 100;
+
+impl Sweep {
+    /// SHA-256 of everything that the rows of a table follow from.
+    pub fn hash(&self, request: &Request) -> String {
+        let hash = || {
+            let mut hash = Hashed(Sha256::new());
+            self.facts(request, &mut |key, value| {
+                // Never fails.
+                let _ = writeln!(hash, "{key} {value}");
+            });
+            hash.0.finalize().iter().map(|byte| format!("{byte:02x}")).collect()
+        };
+        request.hash.get_or_init(hash).clone()
+    }
+
+    /// Gives `fact` each key of the spec that the rows of a table follow from, with its value in one way of writing it. Of the axes those
+    /// count that the table depends on, and those that they, or the condition, are made of.
+    fn facts(&self, request: &Request, fact: &mut dyn FnMut(&str, fmt::Arguments<'_>)) {
+        fact("model.velocity_bound", format_args!("{}", self.bounded));
+        match &self.grid.units {
+            Units::Scaled => fact("model.units", format_args!("dimensionless")),
+            Units::Si(scales) => {
+                fact("model.units", format_args!("si"));
+                fact("model.mu_0", format_args!("{:?}", scales.mu_0));
+                fact("model.l", format_args!("{:?}", scales.l));
+                fact("model.v_0", format_args!("{:?}", scales.v_0));
+                fact("model.normal_load", format_args!("{:?}", scales.normal_load));
+            }
+        }
+        let name = request.table.name();
+        let reduced = table::REDUCED.iter().any(|(_, table)| table.name() == name);
+        let written = if reduced { table::find("gap") } else { None }.unwrap_or(request.table);
+        let blocks = &self.grid.blocks;
+        fact("block", format_args!("{}", blocks.len()));
+        for (number, block) in blocks.iter().enumerate() {
+            let prefix = if blocks.len() > 1 { format!("block[{number}].") } else { String::new() };
+            let mut needed = written.axes().to_vec();
+            needed.extend(block.condition.iter().flat_map(|condition| condition.reads()));
+            for derived in block.derived.iter().rev() {
+                if needed.contains(&derived.quantity) {
+                    needed.extend(derived.expression.reads());
+                }
+            }
+            let mut order = Vec::new();
+            let (mut axes, mut single) = (Vec::new(), Vec::new());
+            for factor in &block.factors {
+                let used: Vec<_> = factor.axes.iter().filter(|axis| needed.contains(&axis.quantity)).collect();
+                for label in factor.labels.iter().filter(|_| !used.is_empty()) {
+                    fact(&format!("{prefix}points"), format_args!("{label:?}"));
+                }
+                if factor.len() > 1 {
+                    let names: Vec<&str> = used.iter().map(|axis| axis.quantity.name()).collect();
+                    order.extend((!names.is_empty()).then(|| names.join(" with ")));
+                    axes.extend(used);
+                } else {
+                    single.extend(used);
+                }
+            }
+            // The order of axes of one value has no meaning.
+            single.sort_by_key(|axis| axis.quantity);
+            for axis in axes.into_iter().chain(single) {
+                let (name, unit) = (axis.quantity.name(), axis.quantity.unit(axis.scale));
+                fact(&format!("{prefix}axes.{name}"), format_args!("{:?} {unit}", axis.values));
+            }
+            fact(&format!("{prefix}axes"), format_args!("{}", order.join(", ")));
+            for derived in block.derived.iter().filter(|derived| needed.contains(&derived.quantity)) {
+                let (name, unit) = (derived.quantity.name(), derived.quantity.unit(derived.scale));
+                fact(&format!("{prefix}axes.{name}"), format_args!("{:?} {unit}", derived.expression));
+            }
+            match &block.condition {
+                Some(condition) => fact(&format!("{prefix}where"), format_args!("{condition:?}")),
+                None => fact(&format!("{prefix}where"), format_args!("none")),
+            }
+        }
+        let key = written.name();
+        fact(&format!("tables.{key}.reduce"), format_args!("{name}"));
+        fact(&format!("tables.{key}.rtol"), format_args!("{:?}", request.rtol));
+        let columns = request.selection.indices().iter().map(|&column| request.table.columns()[column].name);
+        fact(&format!("tables.{key}.columns"), format_args!("{}", columns.collect::<Vec<_>>().join(", ")));
+    }
+
+    /// The same error with the first key in which this spec and that of the dataset differ.
+    pub(super) fn explain(&self, error: DatasetError) -> DatasetError {
+        let DatasetError::OtherSpec { folder, table, expected, found, spec } = error else { return error };
+        let [mut here, mut there] = [expected, found];
+        match Sweep::parse(&spec, &self.folder) {
+            Ok(other) => match self.difference(&other, &table) {
+                Some(difference) => [here, there] = difference,
+                None => {
+                    here = "the points that the spec refers to".to_owned();
+                    there = "other contents of the same file".to_owned();
+                }
+            },
+            // It refers to files that are not here.
+            Err(_) if spec.is_empty() => {}
+            Err(error) => there = format!("a spec that cannot be read from here: {}", error.found),
+        }
+        DatasetError::OtherSpec { folder, table, expected: here, found: there, spec }
+    }
+
+    /// The first key in which two specs differ for a table: with its values here and there, and its line here.
+    fn difference(&self, other: &Sweep, table: &str) -> Option<[String; 2]> {
+        let facts = |sweep: &Sweep| {
+            let mut facts = Vec::new();
+            if let Some(request) = sweep.requests.iter().find(|request| request.table.name() == table) {
+                sweep.facts(request, &mut |key, value| facts.push((key.to_owned(), value.to_string())));
+            }
+            facts
+        };
+        let [here, there] = [facts(self), facts(other)];
+        let (key, value) = here.iter().find(|fact| !there.contains(fact))?;
+        let other_value = there.iter().find(|(known, _)| known == key).map_or("nothing", |(_, value)| value);
+        let is_written = |key: &str| [self, other].iter().any(|sweep| place::value(&sweep.text, key).is_some());
+        let key = if key.ends_with(".rtol") && !is_written(key) { "accuracy.rtol" } else { key };
+        // A default as it is meant.
+        let written = |sweep: &Sweep, value: &str| match place::value(&sweep.text, key) {
+            Some(text) => shown(&text, MAX_SHOWN_CHARS).into_owned(),
+            None => shown(value, MAX_SHOWN_CHARS).into_owned(),
+        };
+        let line = place::line(&self.text, key).map_or_else(String::new, |line| format!(" (line {line})"));
+        Some([format!("{key} = {}{line}", written(self, value)), format!("{key} = {}", written(other, other_value))])
+    }
+}
+
+/// The hash of a text that is never held as a whole: written out, the values of large files of points are many times as long.
+struct Hashed(Sha256);
+
+impl Write for Hashed {
+    fn write_str(&mut self, text: &str) -> fmt::Result {
+        self.0.update(text);
+        Ok(())
+    }
+}

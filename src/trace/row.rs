@@ -1,0 +1,108 @@
+//! The protocol of a row of a dataset.
+
+use super::Protocol;
+use crate::dataset::{Cell, Row};
+use crate::grid::Quantity;
+use crate::model::{Law, Transition};
+use crate::protocol::Status;
+use crate::protocol::swift::{self, Case};
+use crate::table::STATUS;
+
+/// Tables whose rows have a path over time.
+pub const TABLES: [&str; 8] = ["optimal", "gap", "gap_min", "best", "swift", "step", "compliant", "regularised"];
+
+/// Why a row has no path.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum Pathless {
+    /// A row of this table stands for no protocol, or for many.
+    #[error("a row of table `{0}` has no path over time\n  expected: a table of {list}", list = TABLES.join(", "))]
+    Table(String),
+    /// Its status says that there is none.
+    #[error("{0}")]
+    Status(&'static str),
+    /// A number that tells the protocol was not written.
+    #[error("it has no `{0}`, which tells the protocol")]
+    Missing(&'static str),
+    /// The response to a step goes on and on.
+    #[error("the response to a step has no duration of its own\n  help: add --t-f T, in the units of the dataset")]
+    Duration,
+}
+
+/// The name, the protocol and the case of a row of `table` in the units of the model. `relative` says which of `alpha_2`,
+/// `alpha_3` are given relative to the duration, `t_f` is how long the response to a step is shown.
+///
+/// # Errors
+/// If the row has no path.
+pub fn protocol_of(
+    table: &str,
+    row: &Row,
+    (bounded, relative): (bool, [bool; 2]),
+    t_f: Option<f64>,
+) -> Result<(String, Protocol, Case), Pathless> {
+    if !TABLES.contains(&table) {
+        return Err(Pathless::Table(table.to_owned()));
+    }
+    let word = |name: &str| match row.iter().find(|(known, _)| known == name) {
+        Some((_, Cell::Word(word))) => Some(word.as_str()),
+        _ => None,
+    };
+    match word(STATUS) {
+        Some(status) if status == Status::Infeasible.name() => {
+            return Err(Pathless::Status("its status is infeasible: there is no such protocol"));
+        }
+        Some(status) if status == Status::NotConverged.name() => {
+            return Err(Pathless::Status("its status is not_converged: the solver could not certify its answer"));
+        }
+        _ => {}
+    }
+    let number = |quantity: Quantity| match row.iter().find(|(known, _)| known == quantity.name()) {
+        Some((_, Cell::Number(number))) => Ok(*number),
+        _ => Err(Pathless::Missing(quantity.name())),
+    };
+    let transition = Transition {
+        law: Law { a: number(Quantity::A)?, b: number(Quantity::B)? },
+        v_i: number(Quantity::InitialVelocity)?,
+        v_f: number(Quantity::FinalVelocity)?,
+    };
+    let t_f = if table == "step" { t_f.ok_or(Pathless::Duration)? } else { number(Quantity::Time)? };
+    let family = word("family").and_then(swift::find);
+    let tau_max = number(Quantity::FrictionBound).unwrap_or(f64::INFINITY);
+    let case = Case { transition, t_f, tau_max };
+    let spring = || Ok((number(Quantity::Stiffness)?, number(Quantity::Mass)?));
+    let protocol = match (table, family) {
+        ("optimal", _) => Protocol::Optimal { bounded },
+        ("best", _) => Protocol::Best { bounded },
+        ("gap" | "gap_min", _) => {
+            let scaled =
+                |alpha: Quantity, unit: f64, relative: bool| Ok(number(alpha)? * if relative { 1.0 } else { unit });
+            Protocol::FreeCubic {
+                a_2: scaled(Quantity::Alpha2, t_f, relative[0])?,
+                a_3: scaled(Quantity::Alpha3, t_f * t_f, relative[1])?,
+            }
+        }
+        ("step", _) => {
+            let (k, m) = spring()?;
+            // A rigid spring, and no change of velocity, take the velocity along at once.
+            match swift::find("step") {
+                Some(step) if k == f64::INFINITY || transition.v_i == transition.v_f => Protocol::Family(step),
+                _ => Protocol::Response { k, m },
+            }
+        }
+        ("compliant", _) => {
+            let (k, m) = spring()?;
+            Protocol::Compliant { k, m }
+        }
+        ("regularised", _) => {
+            let (k, m) = spring()?;
+            Protocol::Regularised { k, m, delta_t: number(Quantity::Smoothing)?, bounded }
+        }
+        (_, Some(family)) => Protocol::Family(family),
+        _ => return Err(Pathless::Missing("family")),
+    };
+    let name = match protocol {
+        Protocol::FreeCubic { .. } => "free_cubic",
+        Protocol::Family(family) => family.name(),
+        _ => table,
+    };
+    Ok((name.to_owned(), protocol, case))
+}
