@@ -61,6 +61,7 @@ ONLY_THE_CHECK = {
     "reduce_where",
     "rows_overflow",
     "si_out_of_range",
+    "si_scaled_velocity",
     "si_underflow",
     "sobol_unequal",
     "where_a_number",
