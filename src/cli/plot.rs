@@ -213,8 +213,8 @@ impl Arguments {
         let encoded =
             waiting(&Wait::new("writing the picture"), || place.format.encode(&figure.draw(width).svg, self.dpi));
         let bytes = encoded.map_err(PlotError::from)?;
-        if !place.folder.as_os_str().is_empty() {
-            fs::create_dir_all(&place.folder).map_err(failed)?;
+        if let Some(folder) = path.parent() {
+            fs::create_dir_all(folder).map_err(failed)?;
         }
         to_file(&path, |file| file.write_all(&bytes)).map_err(failed)?;
         Ok(path)

@@ -49,7 +49,14 @@ pub fn status(arguments: &Arguments) -> Result<(), Failure> {
         text.push_str(if arguments.check { "complete, every bit as written\n" } else { "complete\n" });
         return say(&text);
     }
-    text.push_str(&remedy(path, &manifest, &survey));
+    let runs = folder.runs();
+    for run in &runs {
+        let what = if run.is_alone { "a run" } else { "a run of a shard" };
+        let _ = writeln!(text, "{what} is writing this dataset (process {})", run.process);
+    }
+    if !runs.iter().any(|run| run.is_alone) {
+        text.push_str(&remedy(path, &manifest, &survey));
+    }
     say(&text)?;
     let (all, there) =
         survey.tables.iter().fold((0, 0), |(all, there), table| (all + table.parts, there + table.there));

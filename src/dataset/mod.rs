@@ -39,7 +39,7 @@ pub use layout::Layout;
 pub(crate) use layout::{field, label};
 pub use manifest::{Build, Manifest, ManifestTable};
 pub use part::encode;
-pub use session::{Company, Session};
+pub use session::{Company, Holder, Session};
 pub use state::{Look, OpenPart, State};
 #[cfg(feature = "read")]
 pub use survey::{Survey, TableSurvey};

@@ -201,20 +201,43 @@ fn lock(folder: &Path, company: Company) -> Result<Option<File>, DatasetError> {
     };
     match locked {
         Err(TryLockError::WouldBlock) => {
-            let process = holder(&file).map_or_else(String::new, |process| format!(" (process {process})"));
+            let process =
+                holders(&file).first().map_or_else(String::new, |holder| format!(" (process {})", holder.process));
             Err(DatasetError::Busy { folder: folder.display().to_string(), process })
         }
         _ => Ok(Some(file)),
     }
 }
 
-/// The process that holds a lock on `file`, as Linux lists it: `1: FLOCK  ADVISORY  WRITE 4711 08:01:131075 0 EOF`.
-fn holder(file: &File) -> Option<u32> {
+/// A run that holds a lock on the folder of a dataset.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Holder {
+    /// Its process, on this machine.
+    pub process: u32,
+    /// Whether it is a run of the whole sweep, not of a shard.
+    pub is_alone: bool,
+}
+
+impl Folder {
+    /// The runs of this machine that are writing the dataset, as far as the system lists them; no lock is taken for that.
+    pub fn runs(&self) -> Vec<Holder> {
+        File::open(self.path()).map_or_else(|_| Vec::new(), |file| holders(&file))
+    }
+}
+
+/// The processes that hold a lock on `file`, as Linux lists them: `1: FLOCK  ADVISORY  WRITE 4711 08:01:131075 0 EOF`.
+fn holders(file: &File) -> Vec<Holder> {
     #[cfg(unix)]
-    let number = std::os::unix::fs::MetadataExt::ino(&file.metadata().ok()?);
+    let number = file.metadata().map(|metadata| std::os::unix::fs::MetadataExt::ino(&metadata));
     #[cfg(not(unix))]
-    let number = file.metadata().ok()?.len();
-    let locks = fs::read_to_string("/proc/locks").ok()?;
-    let ours = |line: &&str| line.split_whitespace().nth(5).is_some_and(|place| place.ends_with(&format!(":{number}")));
-    locks.lines().find(ours)?.split_whitespace().nth(4)?.parse().ok()
+    let number = file.metadata().map(|metadata| metadata.len());
+    let (Ok(number), Ok(locks)) = (number, fs::read_to_string("/proc/locks")) else { return Vec::new() };
+    let place = format!(":{number}");
+    let holder = |line: &str| {
+        let words: Vec<&str> = line.split_whitespace().collect();
+        let is_ours = words.get(1) == Some(&"FLOCK") && words.get(5).is_some_and(|word| word.ends_with(&place));
+        let process = words.get(4)?.parse().ok()?;
+        is_ours.then_some(Holder { process, is_alone: words[3] == "WRITE" })
+    };
+    locks.lines().filter_map(holder).collect()
 }

@@ -2,6 +2,7 @@
 
 use std::fs;
 use std::path::Path;
+use std::process::Command;
 use std::sync::Barrier;
 
 use crate::common::{MATERIAL, files, run, sweep};
@@ -249,6 +250,9 @@ fn the_second_run_on_a_dataset_says_that_the_first_one_is_at_work() {
     let planned = Plan::new(&sweep).manifest(&sweep);
     let place = Folder::new(folder.path(), "test");
     let open = |company| place.open(&planned, company);
+    // Whether each of them is alone; only Linux lists them.
+    let runs = || place.runs().iter().map(|holder| holder.is_alone).collect::<Vec<_>>();
+    let listed = |runs: &[bool]| if cfg!(target_os = "linux") { runs.to_vec() } else { Vec::new() };
     let first = open(Company::Alone).expect("is free");
     for company in [Company::Alone, Company::Shards] {
         let told = open(company).expect_err("is taken").to_string();
@@ -259,8 +263,16 @@ fn the_second_run_on_a_dataset_says_that_the_first_one_is_at_work() {
             "{told}"
         );
     }
+    assert_eq!(runs(), listed(&[true]));
+    let status =
+        Command::new(env!("CARGO_BIN_EXE_slipsweep")).arg("status").arg(place.path()).output().expect("starts");
+    let shown = String::from_utf8_lossy(&status.stdout);
+    assert!(shown.contains("a run is writing this dataset (process ") || !cfg!(target_os = "linux"), "{shown}");
+    assert!(!shown.contains("to finish it:") || !cfg!(target_os = "linux"), "{shown}");
     drop(first);
+    assert_eq!(runs(), listed(&[]));
     let shards = [open(Company::Shards).expect("is free"), open(Company::Shards).expect("shards run side by side")];
+    assert_eq!(runs(), listed(&[false; 2]));
     assert!(matches!(open(Company::Alone), Err(DatasetError::Busy { .. })));
     drop(shards);
     open(Company::Alone).expect("is free");
