@@ -4,7 +4,6 @@
 //! that are kept. The digits of a row that the condition does not read multiply what the bitmap counts.
 
 use std::ops::Range;
-use std::sync::Arc;
 
 use rayon::prelude::*;
 use roaring::RoaringBitmap;
@@ -251,6 +250,8 @@ pub fn first_wrong(block: &Block, quantity: Quantity, wrong: impl Fn(f64) -> boo
 #[cfg(test)]
 mod tests {
     //! Kept rows are those of nested loops, however many chunks of combinations there are.
+
+    use std::sync::Arc;
 
     use super::super::axis::{Axis, Values};
     use super::super::block::Factor;

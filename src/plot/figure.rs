@@ -330,7 +330,6 @@ impl Figure {
                 (panel.x.scale.ticks(x_count, as_powers), panel.y.scale.ticks(y_count, as_powers))
             })
             .collect();
-        let has_title = self.panels.iter().any(|panel| !panel.title.is_empty());
         let labelled = |place: usize| {
             let same_below = self.panels.get(place + columns).is_some_and(|below| below.x.same(&self.panels[place].x));
             let is_first = place.is_multiple_of(columns);
@@ -346,14 +345,15 @@ impl Figure {
             rights[column] = rights[column].max(room.right);
             belows[row] = belows[row].max(room.below);
         }
-        let above = if has_title { SIZE + TITLE_SPACE + 1.5 } else { 4.0 };
+        let room: f64 = lefts.iter().sum::<f64>() + rights.iter().sum::<f64>();
+        let panel_width = ((inner - room) / columns as f64).max(20.0);
+        let lines = self.panels.iter().map(|panel| wrapped(&panel.title, SIZE, panel_width).len()).max().unwrap_or(0);
+        let above = if lines > 0 { lines as f64 * (SIZE + 1.5) + TITLE_SPACE } else { 4.0 };
         // Titles of columns stand above the first row.
         let titled = |row: usize| if row == 0 || self.rows.is_empty() { above } else { 4.0 };
         let has_words = |row: usize| self.panels.iter().skip(row * columns).take(columns).any(Panel::has_words_above);
         let above: Vec<f64> =
             (0..rows).map(|row| titled(row) + if has_words(row) { WORDS_ABOVE } else { 0.0 }).collect();
-        let room: f64 = lefts.iter().sum::<f64>() + rights.iter().sum::<f64>();
-        let panel_width = ((inner - room) / columns as f64).max(20.0);
         let panel_height = (panel_width * aspect).max(20.0);
         let mut y = top;
         let mut hovers = Vec::new();
@@ -382,7 +382,7 @@ impl Figure {
         }
         if let Some(colours) = &self.colours {
             let first = top + above.first().copied().unwrap_or(0.0);
-            let tall = (y - belows.last().copied().unwrap_or(0.0) - first).min(220.0);
+            let tall = y - belows.last().copied().unwrap_or(0.0) - first;
             let beside = if self.rows.is_empty() { 0.0 } else { ROW_TITLE };
             let area = Area { x: MARGIN + inner + beside + 6.0, y: first, width: 8.0, height: tall };
             colours.draw(canvas, area, as_powers);
@@ -511,9 +511,10 @@ impl Panel {
         }
         self.marks(canvas, area);
         self.ticks(canvas, area, plan, labelled, left);
-        if !self.title.is_empty() {
+        for (line, title) in wrapped(&self.title, SIZE, area.width).iter().rev().enumerate() {
             let above = if self.has_words_above() { WORDS_ABOVE } else { 0.0 };
-            canvas.text((area.x, area.y - TITLE_SPACE - above), &self.title, SIZE, Anchor::Start, false);
+            let y = area.y - TITLE_SPACE - above - line as f64 * (SIZE + 1.5);
+            canvas.text((area.x, y), title, SIZE, Anchor::Start, false);
         }
     }
 

@@ -114,6 +114,8 @@ pub struct Groups {
     left_out: usize,
     /// Where two axes are crossed, the titles of the rows and of the columns of panels, in markup: the groups fill the rows.
     pub crossed: Option<[Vec<String>; 2]>,
+    /// The values, in markup, at which further axes are held where two are crossed.
+    pub held: Vec<String>,
     places: BTreeMap<Vec<u64>, usize>,
 }
 
@@ -155,6 +157,7 @@ impl Groups {
                 all: 1,
                 left_out: 0,
                 crossed: None,
+                held: Vec::new(),
                 places: BTreeMap::from([(Vec::new(), 0)]),
             });
         }
@@ -194,7 +197,7 @@ impl Groups {
             })
             .collect();
         let (places, left_out) = (places_of(&shown), all - shown.len());
-        let mut found = Groups { axes, shown, all, left_out, crossed: None, places };
+        let mut found = Groups { axes, shown, all, left_out, crossed: None, held: Vec::new(), places };
         if is_crossed {
             found.cross(survey, &groups, most);
         }
@@ -234,18 +237,28 @@ impl Groups {
         Ok(())
     }
 
+    /// Crosses two axes: of more that vary the last two, where the others have their first values.
     fn cross(&mut self, survey: &Survey, found: &[Vec<f64>], most: usize) {
-        let [first, second] = self.axes.as_slice() else { return };
-        let (Some(first), Some(second)) = (survey.axis(first), survey.axis(second)) else { return };
+        let varying: Vec<usize> =
+            (0..self.axes.len()).filter(|&axis| found.iter().any(|group| group[axis] != found[0][axis])).collect();
+        let [.., first, second] = varying.as_slice() else { return };
+        let crossed = [*first, *second];
+        let axis = |place: usize| survey.axis(&self.axes[place]);
+        let [Some(first), Some(second)] = crossed.map(axis) else { return };
+        let is_held = |axis: &usize| !crossed.contains(axis);
+        let found_here: Vec<&Vec<f64>> = found
+            .iter()
+            .filter(|group| (0..group.len()).filter(is_held).all(|axis| group[axis] == found[0][axis]))
+            .collect();
         let values = |axis: usize| {
-            let mut values: Vec<f64> = found.iter().map(|group| group[axis]).collect();
+            let mut values: Vec<f64> = found_here.iter().map(|group| group[axis]).collect();
             values.sort_by(f64::total_cmp);
             values.dedup();
             values
         };
-        let (rows, columns) = (values(0), values(1));
+        let [rows, columns] = crossed.map(values);
         // Axes that advance together have fewer pairs than a row and a column of a table take.
-        if rows.len() < 2 || columns.len() < 2 || found.len() < rows.len() + columns.len() {
+        if rows.len() < 2 || columns.len() < 2 || found_here.len() < rows.len() + columns.len() {
             return;
         }
         let some = |values: &[f64], most: usize| -> Vec<f64> {
@@ -258,17 +271,17 @@ impl Groups {
         };
         let (rows, columns) =
             (some(&rows, side(rows.len(), columns.len())), some(&columns, side(columns.len(), rows.len())));
-        let name = |axis: &Values, value: f64| axis.told(value);
-        self.shown = rows
-            .iter()
-            .flat_map(|&row| columns.iter().map(move |&column| (row, column)))
-            .map(|(row, column)| Group {
-                name: format!("{}, {}", name(first, row), name(second, column)),
-                values: vec![row, column],
-            })
-            .collect();
-        let titles = |axis: &Values, values: &[f64]| values.iter().map(|&value| name(axis, value)).collect();
+        let group = |(row, column): (f64, f64)| {
+            let mut values = found[0].clone();
+            (values[crossed[0]], values[crossed[1]]) = (row, column);
+            Group { name: format!("{}, {}", first.told(row), second.told(column)), values }
+        };
+        let shown = rows.iter().flat_map(|&row| columns.iter().map(move |&column| (row, column))).map(group).collect();
+        let titles = |axis: &Values, values: &[f64]| values.iter().map(|&value| axis.told(value)).collect();
+        let held = varying.iter().filter(|axis| is_held(axis));
+        self.held = held.filter_map(|&place| Some(axis(place)?.told(found[0][place]))).collect();
         self.crossed = Some([titles(first, &rows), titles(second, &columns)]);
+        self.shown = shown;
         self.places = places_of(&self.shown);
         self.left_out = found.iter().filter(|group| self.place(group).is_none()).count();
     }

@@ -144,6 +144,7 @@ pub fn map(survey: &Survey, plan: &Plan) -> Result<Mapped, PlotError> {
         columns: groups.crossed.as_ref().map_or_else(|| columns_of(groups.shown.len()), |[_, columns]| columns.len()),
         rows: groups.crossed.clone().map_or_else(Vec::new, |[rows, _]| rows),
         aspect: if groups.shown.len() > 1 { 0.9 } else { 0.8 },
+        subtitle: groups.held.join(", "),
         shared: true,
         ..Figure::default()
     };

@@ -49,6 +49,7 @@ fn panels(groups: &Groups) -> Figure {
         rows: groups.crossed.clone().map_or_else(Vec::new, |[rows, _]| rows),
         aspect: if groups.shown.len() > 1 { 0.9 } else { 0.7 },
         shared: true,
+        subtitle: groups.held.join(", "),
         remarks: groups.note("panels").into_iter().collect(),
         ..Figure::default()
     }
