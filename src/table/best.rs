@@ -3,32 +3,58 @@
 use std::ops::Range;
 
 use super::optima::{OPTIMUM_AXES, transition};
-use super::{Column, Job, Kind, Selection, Sheet, Stopped, Table, Work, rows};
+use super::{Column, Field, Job, Kind, Selection, Sheet, Stopped, Table, Work, columns, place, rows};
 use crate::grid::{Quantity, Scale};
-use crate::protocol::{best, error};
+use crate::protocol::{Effort, best, error};
 
 /// One row a transition and time.
 pub struct Best;
 
-const COLUMNS: &[Column] = &[
-    Column::new(
-        "alpha_2",
-        Kind::Quantity(Quantity::Alpha2),
-        "coefficient of t of the best shortcut; in the unit of the spec's alpha_2, 1/t_f if it has none",
+/// A row.
+struct Row {
+    best: best::Best,
+    /// Coefficients in the units of their columns.
+    alpha_2: f64,
+    alpha_3: f64,
+    work_error: f64,
+}
+
+const FIELDS: [Field<Row>; 7] = [
+    Field::new(
+        Column::new(
+            "alpha_2",
+            Kind::Quantity(Quantity::Alpha2),
+            "coefficient of t of the best shortcut; in the unit of the spec's alpha_2, 1/t_f if it has none",
+        ),
+        |row| row.alpha_2,
     ),
-    Column::new(
-        "alpha_3",
-        Kind::Quantity(Quantity::Alpha3),
-        "coefficient of t^2 of the best shortcut; in the unit of the spec's alpha_3, 1/t_f^2 if it has none",
+    Field::new(
+        Column::new(
+            "alpha_3",
+            Kind::Quantity(Quantity::Alpha3),
+            "coefficient of t^2 of the best shortcut; in the unit of the spec's alpha_3, 1/t_f^2 if it has none",
+        ),
+        |row| row.alpha_3,
     ),
-    Column::number("work", "mu_0 sigma l", "work of friction W_s of the best shortcut"),
-    Column::number("work_optimal", "mu_0 sigma l", "least work of friction W* of any protocol"),
-    Column::number("gap", "1", "(W_s - W*)/W*, without cancellation: good to 1e-7 of itself or 1e-20"),
-    Column::number("v_min", "v_0", "least velocity of the best shortcut"),
-    Column::number("work_error", "mu_0 sigma l", "bound of the error of work, by a second search").optional(),
+    Field::new(Column::number("work", "mu_0 sigma l", "work of friction W_s of the best shortcut"), |row| {
+        row.best.work
+    }),
+    Field::new(Column::number("work_optimal", "mu_0 sigma l", "least work of friction W* of any protocol"), |row| {
+        row.best.work_optimal
+    }),
+    Field::new(
+        Column::number("gap", "1", "(W_s - W*)/W*, without cancellation: good to 1e-7 of itself or 1e-20"),
+        |row| row.best.gap,
+    ),
+    Field::new(Column::number("v_min", "v_0", "least velocity of the best shortcut"), |row| row.best.v_min),
+    Field::new(
+        Column::number("work_error", "mu_0 sigma l", "bound of the error of work, by a second search").optional(),
+        |row| row.work_error,
+    ),
 ];
 
-const WORK_ERROR: usize = 6;
+const COLUMNS: [Column; 7] = columns(&FIELDS);
+const WORK_ERROR: usize = place(&COLUMNS, "work_error");
 
 impl Table for Best {
     fn name(&self) -> &'static str {
@@ -44,7 +70,7 @@ impl Table for Best {
     }
 
     fn columns(&self) -> &'static [Column] {
-        COLUMNS
+        &COLUMNS
     }
 
     fn rows_per_part(&self) -> u64 {
@@ -62,29 +88,23 @@ impl Table for Best {
     fn compute(&self, job: &Job<'_>, range: Range<u64>, sheet: &mut Sheet) -> Result<Work, Stopped> {
         let natural = |quantity| job.grid.scale(quantity) == Some(Scale::Model);
         let (natural_2, natural_3) = (natural(Quantity::Alpha2), natural(Quantity::Alpha3));
-        rows::each(job, range, (COLUMNS.len(), 1), sheet, |_, point, cells| {
+        rows::each(job, range, 1, sheet, &FIELDS, |_, point| {
             let t_f = point[Quantity::Time];
             let solve = |rtol| best::solve(&transition(point), t_f, job.bounded, rtol);
             let solved = solve(job.rtol);
             let mut effort = solved.effort;
-            if let Some(best) = solved.value {
-                if job.selection.has(WORK_ERROR) {
-                    let finest = solve(error::FINEST);
-                    effort += finest.effort;
-                    if let Some(finest) = finest.value {
-                        cells[WORK_ERROR] = error::bound(best.work, finest.work, best.work);
-                    }
+            let row = solved.value.map(|best| {
+                let finest = job.selection.has(WORK_ERROR).then(|| solve(error::FINEST));
+                effort += finest.map_or_else(Effort::default, |finest| finest.effort);
+                let finest = finest.and_then(|finest| finest.value);
+                Row {
+                    best,
+                    alpha_2: if natural_2 { best.a_2 / t_f } else { best.a_2 },
+                    alpha_3: if natural_3 { best.a_3 / (t_f * t_f) } else { best.a_3 },
+                    work_error: finest.map_or(f64::NAN, |finest| error::bound(best.work, finest.work, best.work)),
                 }
-                cells[..WORK_ERROR].copy_from_slice(&[
-                    if natural_2 { best.a_2 / t_f } else { best.a_2 },
-                    if natural_3 { best.a_3 / (t_f * t_f) } else { best.a_3 },
-                    best.work,
-                    best.work_optimal,
-                    best.gap,
-                    best.v_min,
-                ]);
-            }
-            (solved.status, Work { best: 1, ..Work::from(effort) })
+            });
+            (solved.status, row, Work { best: 1, ..Work::from(effort) })
         })
     }
 }

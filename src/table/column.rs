@@ -64,6 +64,55 @@ impl Column {
     }
 }
 
+/// A column of a table whose rows are computed one by one, and its cell in a row `R`.
+pub struct Field<R> {
+    /// The column.
+    pub column: Column,
+    /// The cell in the units of the model: a number, NaN where there is none, the place of a word, or 1 or 0 of a flag.
+    pub cell: fn(&R) -> f64,
+}
+
+impl<R> Field<R> {
+    /// A column and its cell.
+    pub const fn new(column: Column, cell: fn(&R) -> f64) -> Field<R> {
+        Field { column, cell }
+    }
+}
+
+/// The columns of these fields.
+pub const fn columns<R, const N: usize>(fields: &[Field<R>; N]) -> [Column; N] {
+    let mut columns = [fields[0].column; N];
+    let mut place = 0;
+    while place < N {
+        columns[place] = fields[place].column;
+        place += 1;
+    }
+    columns
+}
+
+/// The place of the column of this name. A constant of a column that is not there does not compile.
+pub const fn place(columns: &[Column], name: &str) -> usize {
+    let mut place = 0;
+    while !is_same(columns[place].name, name) {
+        place += 1;
+    }
+    place
+}
+
+/// A cell that may be missing.
+pub fn number(value: Option<f64>) -> f64 {
+    value.unwrap_or(f64::NAN)
+}
+
+const fn is_same(a: &str, b: &str) -> bool {
+    let (a, b) = (a.as_bytes(), b.as_bytes());
+    let mut at = 0;
+    while at < a.len() && at < b.len() && a[at] == b[at] {
+        at += 1;
+    }
+    at == a.len() && at == b.len()
+}
+
 /// Name of the last column of every table.
 pub const STATUS: &str = "status";
 

@@ -3,9 +3,9 @@
 use std::ops::Range;
 
 use super::optima::transition;
-use super::{Column, Job, Selection, Sheet, Stopped, Table, Work, rows};
+use super::{Column, Field, Job, Selection, Sheet, Stopped, Table, Work, columns, number, place, rows};
 use crate::grid::Quantity;
-use crate::protocol::optimal::crossover::{self, Wanted};
+use crate::protocol::optimal::crossover::{self, CrossoverTimes, Wanted};
 
 /// One row a transition.
 pub struct Crossover;
@@ -13,20 +13,36 @@ pub struct Crossover;
 const TIME: &str = "l/v_0";
 const WORK: &str = "mu_0 sigma l";
 
-const COLUMNS: &[Column] = &[
-    Column::number("t_cross", TIME, "acceleration: duration at which v(0+) = v_i"),
-    Column::number("t_hold", TIME, "acceleration: duration at which v(0+) reaches the bound 1"),
-    Column::number("t_cheapest", TIME, "acceleration: duration of least W*"),
-    Column::number("t_min", TIME, "deceleration: shortest possible duration"),
-    Column::number("t_turn", TIME, "deceleration: duration at which v(t_f-) = v_f"),
-    Column::number("t_free_in", TIME, "deceleration: start of the window of durations without hold"),
-    Column::number("t_free_out", TIME, "deceleration: end of the window of durations without hold"),
-    Column::number("work_cross", WORK, "W* at t_cross"),
-    Column::number("work_hold", WORK, "W* at t_hold"),
-    Column::number("work_cheapest", WORK, "W* at t_cheapest"),
-    Column::number("work_min", WORK, "W* at t_min"),
-    Column::number("work_turn", WORK, "W* at t_turn"),
+const FIELDS: [Field<CrossoverTimes>; 12] = [
+    Field::new(Column::number("t_cross", TIME, "acceleration: duration at which v(0+) = v_i"), |times| {
+        number(times.t_cross)
+    }),
+    Field::new(Column::number("t_hold", TIME, "acceleration: duration at which v(0+) reaches the bound 1"), |times| {
+        number(times.t_hold)
+    }),
+    Field::new(Column::number("t_cheapest", TIME, "acceleration: duration of least W*"), |times| {
+        number(times.t_cheapest)
+    }),
+    Field::new(Column::number("t_min", TIME, "deceleration: shortest possible duration"), |times| number(times.t_min)),
+    Field::new(Column::number("t_turn", TIME, "deceleration: duration at which v(t_f-) = v_f"), |times| {
+        number(times.t_turn)
+    }),
+    Field::new(
+        Column::number("t_free_in", TIME, "deceleration: start of the window of durations without hold"),
+        |times| number(times.t_free_in),
+    ),
+    Field::new(
+        Column::number("t_free_out", TIME, "deceleration: end of the window of durations without hold"),
+        |times| number(times.t_free_out),
+    ),
+    Field::new(Column::number("work_cross", WORK, "W* at t_cross"), |times| number(times.work_cross)),
+    Field::new(Column::number("work_hold", WORK, "W* at t_hold"), |times| number(times.work_hold)),
+    Field::new(Column::number("work_cheapest", WORK, "W* at t_cheapest"), |times| number(times.work_cheapest)),
+    Field::new(Column::number("work_min", WORK, "W* at t_min"), |times| number(times.work_min)),
+    Field::new(Column::number("work_turn", WORK, "W* at t_turn"), |times| number(times.work_turn)),
 ];
+
+const COLUMNS: [Column; 12] = columns(&FIELDS);
 
 impl Table for Crossover {
     fn name(&self) -> &'static str {
@@ -42,7 +58,7 @@ impl Table for Crossover {
     }
 
     fn columns(&self) -> &'static [Column] {
-        COLUMNS
+        &COLUMNS
     }
 
     fn rows_per_part(&self) -> u64 {
@@ -58,35 +74,18 @@ impl Table for Crossover {
     }
 
     fn compute(&self, job: &Job<'_>, range: Range<u64>, sheet: &mut Sheet) -> Result<Work, Stopped> {
-        let asked = |columns: &[usize]| job.selection.has_any(columns.iter().copied());
+        let wanted = |names: [&str; 2]| job.selection.has_any(names.map(|name| place(&COLUMNS, name)));
         let wanted = Wanted {
-            cross: asked(&[0, 7]),
-            hold: asked(&[1, 8]),
-            cheapest: asked(&[2, 9]),
-            min: asked(&[3, 10]),
-            turn: asked(&[4, 11]),
-            free: asked(&[5, 6]),
+            cross: wanted(["t_cross", "work_cross"]),
+            hold: wanted(["t_hold", "work_hold"]),
+            cheapest: wanted(["t_cheapest", "work_cheapest"]),
+            min: wanted(["t_min", "work_min"]),
+            turn: wanted(["t_turn", "work_turn"]),
+            free: wanted(["t_free_in", "t_free_out"]),
         };
-        rows::each(job, range, (COLUMNS.len(), 64), sheet, |_, point, cells| {
+        rows::each(job, range, 64, sheet, &FIELDS, |_, point| {
             let (status, times, effort) = crossover::solve(&transition(point), job.bounded, job.rtol, wanted);
-            let values = [
-                times.t_cross,
-                times.t_hold,
-                times.t_cheapest,
-                times.t_min,
-                times.t_turn,
-                times.t_free_in,
-                times.t_free_out,
-                times.work_cross,
-                times.work_hold,
-                times.work_cheapest,
-                times.work_min,
-                times.work_turn,
-            ];
-            for (cell, value) in cells.iter_mut().zip(values) {
-                *cell = value.unwrap_or(f64::NAN);
-            }
-            (status, Work { crossovers: 1, ..Work::from(effort) })
+            (status, Some(times), Work { crossovers: 1, ..Work::from(effort) })
         })
     }
 }

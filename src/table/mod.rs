@@ -6,6 +6,7 @@ mod compliant;
 mod crossover;
 mod fault;
 mod gap;
+mod memo;
 mod optima;
 mod optimal;
 mod reduced;
@@ -21,7 +22,7 @@ use std::ops::Range;
 
 use crate::grid::{Grid, Point, Projection, Quantity, Tuples};
 
-pub use column::{Column, Kind, STATUS, STATUS_DOC};
+pub use column::{Column, Field, Kind, STATUS, STATUS_DOC, columns, number, place};
 pub use optima::{OPTIMUM_AXES, Optima};
 #[cfg(feature = "plot")]
 pub(crate) use reduced::EDGES as HISTOGRAM_EDGES;

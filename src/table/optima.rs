@@ -1,8 +1,8 @@
 //! Optimal protocols shared by every table and part of a run: each transition and time is solved once.
 
-use std::collections::HashMap;
-use std::sync::{Arc, Mutex, OnceLock, PoisonError};
+use std::sync::OnceLock;
 
+use super::memo::Memo;
 use super::{Job, Work};
 use crate::grid::{Point, Quantity};
 use crate::model::{Law, Transition};
@@ -84,7 +84,7 @@ enum Slots {
     /// One for each number.
     Dense(Vec<Slot>),
     /// Only for the numbers that occur.
-    Sparse(Mutex<HashMap<u64, Arc<Slot>>>),
+    Sparse(Memo<u64, Solved<Optimum>>),
 }
 
 impl Optima {
@@ -99,7 +99,7 @@ impl Optima {
     /// The same where their numbers lie below `span`, most of which may not occur.
     pub fn among(tuples: u64, span: u64, bounded: bool, rtol: f64) -> Optima {
         let slots = if span > Self::MOST_KEPT && tuples <= Self::MOST_KEPT {
-            Slots::Sparse(Mutex::default())
+            Slots::Sparse(Memo::default())
         } else {
             let kept = if span <= Self::MOST_KEPT { span as usize } else { 0 };
             Slots::Dense(std::iter::repeat_with(OnceLock::new).take(kept).collect())
@@ -120,12 +120,7 @@ impl Optima {
                 Some(slot) => *slot.get_or_init(solve),
                 None => solve(),
             },
-            Slots::Sparse(slots) => {
-                let mut slots = slots.lock().unwrap_or_else(PoisonError::into_inner);
-                let slot = slots.entry(tuple).or_default().clone();
-                drop(slots);
-                *slot.get_or_init(solve)
-            }
+            Slots::Sparse(slots) => slots.get(tuple, solve),
         };
         (solved, work)
     }

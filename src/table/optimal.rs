@@ -3,31 +3,47 @@
 use std::ops::Range;
 
 use super::optima::{OPTIMUM_AXES, work_error};
-use super::{Column, Job, Kind, Selection, Sheet, Stopped, Table, Work, rows};
+use super::{Column, Field, Job, Kind, Selection, Sheet, Stopped, Table, Work, columns, place, rows};
 use crate::grid::Quantity;
+use crate::protocol::optimal::Optimum;
 
 /// One row a transition and time.
 pub struct Optimal;
 
-const WORK_ERROR: usize = 7;
-
 /// The words of `strategy`, in the order of [`Strategy::ALL`](crate::protocol::optimal::Strategy::ALL).
 const STRATEGIES: &[&str] = &["speed_up", "slow_down", "hold"];
 
-const COLUMNS: &[Column] = &[
-    Column::number("work", "mu_0 sigma l", "least work of friction W*"),
-    Column::number("v_start", "v_0", "velocity just after the start, v(0+)"),
-    Column::number("v_end", "v_0", "velocity just before the end, v(t_f-)"),
-    Column::number("hold_time", "l/v_0", "time spent on the bound v = 1"),
-    Column::number("hamiltonian", "mu_0 sigma v_0", "dW*/dt_f"),
-    Column::number("theta_max", "l/v_0", "largest contact lifetime on the way"),
-    Column::new(
-        "strategy",
-        Kind::Label(STRATEGIES),
-        "how it starts: speed_up v(0+) > v_i, slow_down 1 < v(0+) <= v_i, hold on the bound v = 1",
+/// A row.
+struct Row {
+    optimum: Optimum,
+    work_error: f64,
+}
+
+const FIELDS: [Field<Row>; 8] = [
+    Field::new(Column::number("work", "mu_0 sigma l", "least work of friction W*"), |row| row.optimum.work),
+    Field::new(Column::number("v_start", "v_0", "velocity just after the start, v(0+)"), |row| row.optimum.v_start),
+    Field::new(Column::number("v_end", "v_0", "velocity just before the end, v(t_f-)"), |row| row.optimum.v_end),
+    Field::new(Column::number("hold_time", "l/v_0", "time spent on the bound v = 1"), |row| row.optimum.hold_time),
+    Field::new(Column::number("hamiltonian", "mu_0 sigma v_0", "dW*/dt_f"), |row| row.optimum.hamiltonian),
+    Field::new(Column::number("theta_max", "l/v_0", "largest contact lifetime on the way"), |row| {
+        row.optimum.theta_max
+    }),
+    Field::new(
+        Column::new(
+            "strategy",
+            Kind::Label(STRATEGIES),
+            "how it starts: speed_up v(0+) > v_i, slow_down 1 < v(0+) <= v_i, hold on the bound v = 1",
+        ),
+        |row| f64::from(row.optimum.strategy as u8),
     ),
-    Column::number("work_error", "mu_0 sigma l", "bound of the error of work, by a second solve").optional(),
+    Field::new(
+        Column::number("work_error", "mu_0 sigma l", "bound of the error of work, by a second solve").optional(),
+        |row| row.work_error,
+    ),
 ];
+
+const COLUMNS: [Column; 8] = columns(&FIELDS);
+const WORK_ERROR: usize = place(&COLUMNS, "work_error");
 
 impl Table for Optimal {
     fn name(&self) -> &'static str {
@@ -43,7 +59,7 @@ impl Table for Optimal {
     }
 
     fn columns(&self) -> &'static [Column] {
-        COLUMNS
+        &COLUMNS
     }
 
     fn rows_per_part(&self) -> u64 {
@@ -59,23 +75,14 @@ impl Table for Optimal {
     }
 
     fn compute(&self, job: &Job<'_>, range: Range<u64>, sheet: &mut Sheet) -> Result<Work, Stopped> {
-        rows::each(job, range, (COLUMNS.len(), 64), sheet, |tuple, point, cells| {
+        rows::each(job, range, 64, sheet, &FIELDS, |tuple, point| {
             let (solved, mut work) = job.optima.get(tuple, point);
-            if let Some(optimum) = solved.value {
-                if job.selection.has(WORK_ERROR) {
-                    cells[WORK_ERROR] = work_error(job, point, &optimum, &mut work);
-                }
-                cells[..WORK_ERROR].copy_from_slice(&[
-                    optimum.work,
-                    optimum.v_start,
-                    optimum.v_end,
-                    optimum.hold_time,
-                    optimum.hamiltonian,
-                    optimum.theta_max,
-                    f64::from(optimum.strategy as u8),
-                ]);
-            }
-            (solved.status, work)
+            let row = solved.value.map(|optimum| {
+                let wanted = job.selection.has(WORK_ERROR);
+                let work_error = if wanted { work_error(job, point, &optimum, &mut work) } else { f64::NAN };
+                Row { optimum, work_error }
+            });
+            (solved.status, row, work)
         })
     }
 }

@@ -3,27 +3,49 @@
 use std::ops::Range;
 
 use super::compliant::{slider, velocities};
-use super::{Column, Job, Selection, Sheet, Stopped, Table, Work, rows};
+use super::{Column, Field, Job, Selection, Sheet, Stopped, Table, Work, columns, place, rows};
 use crate::grid::Quantity;
-use crate::protocol::{error, regularised};
+use crate::protocol::regularised::{self, Regularised as Found};
+use crate::protocol::{Effort, error};
 
 /// One row a transition, time, stiffness, mass and length of the pieces.
 pub struct Regularised;
 
-const COLUMNS: &[Column] = &[
-    Column::number("work", "mu_0 sigma l", "work of friction"),
-    Column::number("work_optimal", "mu_0 sigma l", "least work of friction W* of any protocol"),
-    Column::number("gap", "1", "(work - W*)/W*, good to rtol of itself"),
-    Column::number("v_min", "v_0", "least velocity of the block; fewer digits where it dips far below 1"),
-    Column::number("v_max", "v_0", "greatest velocity of the block"),
-    Column::number("v_c_min", "v_0", "least control velocity; both good to rtol of the greater of the two"),
-    Column::number("v_c_max", "v_0", "greatest control velocity"),
-    Column::number("work_error", "mu_0 sigma l", "bound of the error of work, by a second solve").optional(),
-    Column::number("gap_error", "1", "bound of the error of gap, by a second solve").optional(),
+/// A row.
+struct Row {
+    found: Found,
+    work_error: f64,
+    gap_error: f64,
+}
+
+const FIELDS: [Field<Row>; 9] = [
+    Field::new(Column::number("work", "mu_0 sigma l", "work of friction"), |row| row.found.work),
+    Field::new(Column::number("work_optimal", "mu_0 sigma l", "least work of friction W* of any protocol"), |row| {
+        row.found.work_optimal
+    }),
+    Field::new(Column::number("gap", "1", "(work - W*)/W*, good to rtol of itself"), |row| row.found.gap),
+    Field::new(
+        Column::number("v_min", "v_0", "least velocity of the block; fewer digits where it dips far below 1"),
+        |row| row.found.v_min,
+    ),
+    Field::new(Column::number("v_max", "v_0", "greatest velocity of the block"), |row| row.found.v_max),
+    Field::new(
+        Column::number("v_c_min", "v_0", "least control velocity; both good to rtol of the greater of the two"),
+        |row| row.found.control_min,
+    ),
+    Field::new(Column::number("v_c_max", "v_0", "greatest control velocity"), |row| row.found.control_max),
+    Field::new(
+        Column::number("work_error", "mu_0 sigma l", "bound of the error of work, by a second solve").optional(),
+        |row| row.work_error,
+    ),
+    Field::new(Column::number("gap_error", "1", "bound of the error of gap, by a second solve").optional(), |row| {
+        row.gap_error
+    }),
 ];
 
-const WORK_ERROR: usize = 7;
-const GAP_ERROR: usize = 8;
+const COLUMNS: [Column; 9] = columns(&FIELDS);
+const WORK_ERROR: usize = place(&COLUMNS, "work_error");
+const GAP_ERROR: usize = place(&COLUMNS, "gap_error");
 
 impl Table for Regularised {
     fn name(&self) -> &'static str {
@@ -48,7 +70,7 @@ impl Table for Regularised {
     }
 
     fn columns(&self) -> &'static [Column] {
-        COLUMNS
+        &COLUMNS
     }
 
     fn rows_per_part(&self) -> u64 {
@@ -64,31 +86,23 @@ impl Table for Regularised {
     }
 
     fn compute(&self, job: &Job<'_>, range: Range<u64>, sheet: &mut Sheet) -> Result<Work, Stopped> {
-        rows::each(job, range, (COLUMNS.len(), 16), sheet, |_, point, cells| {
+        rows::each(job, range, 16, sheet, &FIELDS, |_, point| {
             let (t_f, delta_t) = (point[Quantity::Time], point[Quantity::Smoothing]);
             let solve = |rtol| regularised::solve(&slider(point), velocities(point), t_f, delta_t, job.bounded, rtol);
             let solved = solve(job.rtol);
             let mut effort = solved.effort;
-            if let Some(found) = solved.value {
-                if job.selection.has_any([WORK_ERROR, GAP_ERROR]) {
-                    let finest = solve(error::FINEST);
-                    effort += finest.effort;
-                    if let Some(finest) = finest.value {
-                        cells[WORK_ERROR] = error::bound(found.work, finest.work, found.work);
-                        cells[GAP_ERROR] = error::of_excess(found.gap, finest.gap, found.replaced / found.work_optimal);
-                    }
+            let row = solved.value.map(|found| {
+                let finest = job.selection.has_any([WORK_ERROR, GAP_ERROR]).then(|| solve(error::FINEST));
+                effort += finest.map_or_else(Effort::default, |finest| finest.effort);
+                let finest = finest.and_then(|finest| finest.value);
+                let scale = found.replaced / found.work_optimal;
+                Row {
+                    found,
+                    work_error: finest.map_or(f64::NAN, |finest| error::bound(found.work, finest.work, found.work)),
+                    gap_error: finest.map_or(f64::NAN, |finest| error::of_excess(found.gap, finest.gap, scale)),
                 }
-                cells[..WORK_ERROR].copy_from_slice(&[
-                    found.work,
-                    found.work_optimal,
-                    found.gap,
-                    found.v_min,
-                    found.v_max,
-                    found.control_min,
-                    found.control_max,
-                ]);
-            }
-            (solved.status, Work { optima: 1, ..Work::from(effort) })
+            });
+            (solved.status, row, Work { optima: 1, ..Work::from(effort) })
         })
     }
 }

@@ -5,20 +5,23 @@ use std::ops::Range;
 use rayon::prelude::*;
 
 use super::fault;
-use super::{Job, Repeats, Sheet, Stopped, Work};
+use super::{Field, Job, Repeats, Sheet, Stopped, Work};
 use crate::grid::{Point, Quantity, Runs};
 use crate::protocol::Status;
 
-/// Computes `rows` with `row`, which is given the number of the optimal problem and fills the cells of all `width` columns of the table
-/// (given as missing), and returns the status.
+/// What a row is: its status, its values if it has any, and what they cost.
+pub type Solved<R> = (Status, Option<R>, Work);
+
+/// Computes `rows` with `row`, which is given the number of the optimal problem. The cells of a row without values are missing.
 ///
 /// Rows are spread over the threads in chunks of `chunk` rows.
-pub fn each(
+pub fn each<R>(
     job: &Job<'_>,
     rows: Range<u64>,
-    (width, chunk): (usize, usize),
+    chunk: usize,
     sheet: &mut Sheet,
-    row: impl Fn(u64, &Point, &mut [f64]) -> (Status, Work) + Sync,
+    fields: &[Field<R>],
+    row: impl Fn(u64, &Point) -> Solved<R> + Sync,
 ) -> Result<Work, Stopped> {
     let view = job.rows.view(rows.clone());
     let tuples = view.tuples(&job.tuples, rows.clone());
@@ -46,7 +49,14 @@ pub fn each(
         job.signal.check()?;
         let count = chunk.status.len() as u64;
         let known = repeats.as_ref().map(|(repeats, tuples)| (*repeats, tuples.as_slice()));
-        let work = chunk.compute(job, &axes, &tuples, known, width, &row);
+        let fill = |tuple: u64, point: &Point, cells: &mut [f64]| {
+            let (status, values, work) = row(tuple, point);
+            for (cell, &index) in cells.iter_mut().zip(job.selection.indices()) {
+                *cell = values.as_ref().map_or(f64::NAN, fields[index].cell);
+            }
+            (status, work)
+        };
+        let work = chunk.compute(job, &axes, &tuples, known, &fill);
         job.signal.advance(count);
         Ok(work)
     });
@@ -78,8 +88,7 @@ impl Chunk<'_> {
         axes: &[Steps],
         tuples: &[Numbered],
         repeats: Option<(&Repeats, &[Numbered])>,
-        width: usize,
-        row: &impl Fn(u64, &Point, &mut [f64]) -> (Status, Work),
+        fill: &impl Fn(u64, &Point, &mut [f64]) -> (Status, Work),
     ) -> Work {
         let count = self.status.len();
         let values: Vec<(Quantity, Vec<f64>)> = axes
@@ -92,7 +101,7 @@ impl Chunk<'_> {
                 (axis.quantity, values)
             })
             .collect();
-        let (mut point, mut cells) = (Point::default(), vec![f64::NAN; width]);
+        let (mut point, mut cells) = (Point::default(), vec![f64::NAN; self.columns.len()]);
         let mut work = Work::default();
         let mut tuple = tuples.partition_point(|(_, rows)| rows.end <= self.start);
         for place in 0..count {
@@ -103,9 +112,8 @@ impl Chunk<'_> {
             for (quantity, values) in &values {
                 point[*quantity] = values[place];
             }
-            cells.fill(f64::NAN);
             fault::strike(std::iter::once(at));
-            let compute = |cells: &mut [f64]| row(tuples[tuple].0, &point, cells);
+            let compute = |cells: &mut [f64]| fill(tuples[tuple].0, &point, cells);
             let (status, spent) = match repeats {
                 None => compute(&mut cells),
                 Some((repeats, numbers)) => {
@@ -114,8 +122,8 @@ impl Chunk<'_> {
                 }
             };
             self.status[place] = status;
-            for ((column, &index), size) in self.columns.iter_mut().zip(job.selection.indices()).zip(job.sizes) {
-                column[place] = cells[index] * size;
+            for ((column, cell), size) in self.columns.iter_mut().zip(&cells).zip(job.sizes) {
+                column[place] = cell * size;
             }
             work += spent;
         }

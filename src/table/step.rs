@@ -1,63 +1,115 @@
 //! `step`: the response of a block on a spring to an abrupt step of the control velocity.
 
-use std::collections::HashMap;
 use std::ops::Range;
-use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
+use super::memo::Memo;
 use super::optima::transition;
-use super::{Column, Job, Kind, Prediction, Selection, Sheet, Stopped, Table, Work, rows};
+use super::{Column, Field, Job, Kind, Prediction, Selection, Sheet, Stopped, Table, Work, columns, number, rows};
 use crate::grid::Quantity;
 use crate::model::Law;
-use crate::stability::response::{self, Course, Outcome, Scaled};
+use crate::stability::response::{self, Course, Outcome, Response, Sustained};
 use crate::stability::{SteadySliding, lyapunov_coefficient};
 
 /// One row a transition, stiffness and mass.
 pub struct Step;
 
-const LYAPUNOV: usize = 10;
+/// A row.
+struct Row {
+    response: Option<Response>,
+    lyapunov: Option<f64>,
+}
 
-const COLUMNS: &[Column] = &[
-    Column::number(
-        "v_peak",
-        "v_0",
-        "greatest velocity from when v = v_f is first met on, at least v_f; null if undecided",
+impl Row {
+    fn told(&self, number: impl Fn(&Response) -> f64) -> f64 {
+        self.response.as_ref().map_or(f64::NAN, number)
+    }
+
+    fn cycle(&self, number: impl Fn(&Sustained) -> f64) -> f64 {
+        self.told(|response| response.cycle.as_ref().map_or(f64::NAN, &number))
+    }
+}
+
+const FIELDS: [Field<Row>; 11] = [
+    Field::new(
+        Column::number(
+            "v_peak",
+            "v_0",
+            "greatest velocity from when v = v_f is first met on, at least v_f; null if undecided",
+        ),
+        |row| row.told(|response| response.v_peak),
     ),
-    Column::number(
-        "v_trough",
-        "v_0",
-        "least velocity from when v = v_f is first met on, at most v_f; 0 below the range of doubles, null if undecided or \
+    Field::new(
+        Column::number(
+            "v_trough",
+            "v_0",
+            "least velocity from when v = v_f is first met on, at most v_f; 0 below the range of doubles, null if undecided or \
          not known to rtol",
+        ),
+        |row| row.told(|response| response.v_trough),
     ),
-    Column::number(
-        "t_peak",
-        "l/v_0",
-        "time of v_peak, good to rtol of itself over the overshoot v_peak/v_f - 1; null where the peak is only approached, \
+    Field::new(
+        Column::number(
+            "t_peak",
+            "l/v_0",
+            "time of v_peak, good to rtol of itself over the overshoot v_peak/v_f - 1; null where the peak is only approached, \
          if undecided and if not known to that",
+        ),
+        |row| row.told(|response| number(response.t_peak)),
     ),
-    Column::new("outcome", Kind::Label(&Outcome::NAMES), "what becomes of the response in the end"),
-    Column::new("stick_slip", Kind::Flag, "whether the oscillation is sustained; null if undecided"),
-    Column::number(
-        "settling_time",
-        "l/v_0",
-        "time after which v stays within 1 % of v_f; null unless the outcome is settled, and if not known to rtol",
+    Field::new(
+        Column::new("outcome", Kind::Label(&Outcome::NAMES), "what becomes of the response in the end"),
+        |row| row.told(|response| f64::from(response.outcome as u8)),
     ),
-    Column::number("period", "l/v_0", "duration of the limit cycle; null without one"),
-    Column::number("cycle_peak", "v_0", "greatest velocity on the limit cycle; null without one").optional(),
-    Column::number(
-        "cycle_trough",
-        "v_0",
-        "least velocity on the limit cycle; null without one, and if not known to rtol",
-    )
-    .optional(),
-    Column::number("t_end", "l/v_0", "time up to which the response was integrated").optional(),
-    Column::number(
-        "lyapunov",
-        "1",
-        "first Lyapunov coefficient at the critical stiffness for this mass and v_f: negative if the Hopf point is \
+    Field::new(
+        Column::new("stick_slip", Kind::Flag, "whether the oscillation is sustained; null if undecided"),
+        |row| {
+            row.told(|response| match response.outcome {
+                Outcome::Settled => 0.0,
+                Outcome::LimitCycle => 1.0,
+                Outcome::Undecided => f64::NAN,
+            })
+        },
+    ),
+    Field::new(
+        Column::number(
+            "settling_time",
+            "l/v_0",
+            "time after which v stays within 1 % of v_f; null unless the outcome is settled, and if not known to rtol",
+        ),
+        |row| row.told(|response| number(response.settling_time)),
+    ),
+    Field::new(Column::number("period", "l/v_0", "duration of the limit cycle; null without one"), |row| {
+        row.cycle(|cycle| cycle.period)
+    }),
+    Field::new(
+        Column::number("cycle_peak", "v_0", "greatest velocity on the limit cycle; null without one").optional(),
+        |row| row.cycle(|cycle| cycle.v_peak),
+    ),
+    Field::new(
+        Column::number(
+            "cycle_trough",
+            "v_0",
+            "least velocity on the limit cycle; null without one, and if not known to rtol",
+        )
+        .optional(),
+        |row| row.cycle(|cycle| cycle.v_trough),
+    ),
+    Field::new(Column::number("t_end", "l/v_0", "time up to which the response was integrated").optional(), |row| {
+        row.told(|response| response.t_end)
+    }),
+    Field::new(
+        Column::number(
+            "lyapunov",
+            "1",
+            "first Lyapunov coefficient at the critical stiffness for this mass and v_f: negative if the Hopf point is \
          supercritical, positive if a limit cycle may be met above it; null for b <= a and for m = 0",
-    )
-    .optional(),
+        )
+        .optional(),
+        |row| number(row.lyapunov),
+    ),
 ];
+
+const COLUMNS: [Column; 11] = columns(&FIELDS);
 
 impl Table for Step {
     fn name(&self) -> &'static str {
@@ -80,7 +132,7 @@ impl Table for Step {
     }
 
     fn columns(&self) -> &'static [Column] {
-        COLUMNS
+        &COLUMNS
     }
 
     fn rows_per_part(&self) -> u64 {
@@ -121,56 +173,25 @@ impl Table for Step {
     }
 
     fn compute(&self, job: &Job<'_>, range: Range<u64>, sheet: &mut Sheet) -> Result<Work, Stopped> {
-        let courses = Courses::default();
-        rows::each(job, range, (COLUMNS.len(), 4), sheet, |_, point, cells| {
+        let courses = Memo::<[u64; 5], Course>::default();
+        rows::each(job, range, 4, sheet, &FIELDS, |_, point| {
             let step = response::Step {
                 transition: transition(point),
                 k: point[Quantity::Stiffness],
                 m: point[Quantity::Mass],
             };
             let mut work = Work::default();
-            let course = step.scaled().map(|scaled| courses.get(&scaled, job.rtol, &mut work));
+            // Steps that share their scaled numbers share their course.
+            let course = step.scaled().map(|scaled| {
+                courses.get(scaled.key(), || {
+                    let course = scaled.follow(job.rtol);
+                    work = Work { simulations: 1, steps: course.steps.into(), ..Work::default() };
+                    course
+                })
+            });
             let (status, response) = step.from_course(course.as_ref(), job.rtol);
-            let law = step.transition.law;
-            cells[LYAPUNOV] = lyapunov_coefficient(law, step.inertia()).unwrap_or(f64::NAN);
-            if let Some(response) = response {
-                let cycle = response.cycle;
-                cells[..LYAPUNOV].copy_from_slice(&[
-                    response.v_peak,
-                    response.v_trough,
-                    response.t_peak.unwrap_or(f64::NAN),
-                    response.outcome as usize as f64,
-                    match response.outcome {
-                        Outcome::Settled => 0.0,
-                        Outcome::LimitCycle => 1.0,
-                        Outcome::Undecided => f64::NAN,
-                    },
-                    response.settling_time.unwrap_or(f64::NAN),
-                    cycle.map_or(f64::NAN, |cycle| cycle.period),
-                    cycle.map_or(f64::NAN, |cycle| cycle.v_peak),
-                    cycle.map_or(f64::NAN, |cycle| cycle.v_trough),
-                    response.t_end,
-                ]);
-            }
-            (status, work)
-        })
-    }
-}
-
-/// The courses of a part so far, followed once each.
-#[derive(Default)]
-struct Courses(Mutex<HashMap<[u64; 5], Arc<OnceLock<Course>>>>);
-
-impl Courses {
-    /// The course; adds what is spent by this call alone.
-    fn get(&self, scaled: &Scaled, rtol: f64, work: &mut Work) -> Course {
-        let mut courses = self.0.lock().unwrap_or_else(PoisonError::into_inner);
-        let course = courses.entry(scaled.key()).or_default().clone();
-        drop(courses);
-        *course.get_or_init(|| {
-            let course = scaled.follow(rtol);
-            *work += Work { simulations: 1, steps: course.steps.into(), ..Work::default() };
-            course
+            let lyapunov = lyapunov_coefficient(step.transition.law, step.inertia());
+            (status, Some(Row { response, lyapunov }), work)
         })
     }
 }

@@ -1,11 +1,10 @@
 //! `swift`: the members of the shortcut families that solve a transition.
 
-use std::collections::HashMap;
 use std::ops::Range;
-use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
+use super::memo::Memo;
 use super::optima::{self, Comparison, transition};
-use super::{Column, Job, Kind, Selection, Sheet, Stopped, Table, Work, rows};
+use super::{Column, Field, Job, Kind, Selection, Sheet, Stopped, Table, Work, columns, number, place, rows};
 use crate::grid::{Point, Quantity};
 use crate::protocol::swift::{Case, FAMILIES, Family, Obstacle, Swift as Member};
 use crate::protocol::{Effort, error};
@@ -13,30 +12,77 @@ use crate::protocol::{Effort, error};
 /// One row a transition, time, family and bound on friction.
 pub struct Swift;
 
-const WORK_OPTIMAL: usize = 2;
-const GAP: usize = 3;
-const BOUND: usize = 8;
-const WORK_ERROR: usize = 9;
-const GAP_ERROR: usize = 10;
+/// A row: the member of the family, or what makes it infeasible.
+struct Row {
+    member: Option<Member>,
+    obstacle: Option<Obstacle>,
+    /// What `alpha` is multiplied by to be in the unit of its column.
+    alpha_unit: f64,
+    work_error: f64,
+    least: Comparison,
+}
 
-const COLUMNS: &[Column] = &[
-    Column::number(
-        "alpha",
-        "1; (v_0/l)^2 for bounded_velocity",
-        "the family's parameter alpha_3 of the paper; null for step and cubic, which have none, 0 where tau_max = inf",
+impl Row {
+    fn told(&self, number: impl Fn(&Member) -> f64) -> f64 {
+        self.member.as_ref().map_or(f64::NAN, number)
+    }
+}
+
+const FIELDS: [Field<Row>; 11] = [
+    Field::new(
+        Column::number(
+            "alpha",
+            "1; (v_0/l)^2 for bounded_velocity",
+            "the family's parameter alpha_3 of the paper; null for step and cubic, which have none, 0 where tau_max = inf",
+        ),
+        |row| row.told(|member| number(member.alpha)) * row.alpha_unit,
     ),
-    Column::number("work", "mu_0 sigma l", "work of friction W_s"),
-    Column::number("work_optimal", "mu_0 sigma l", "least work of friction W* of any protocol"),
-    Column::number("gap", "1", "(W_s - W*)/W*, good to rtol of 1 + gap; below 0 for a step that has not arrived"),
-    Column::number("v_min", "v_0", "least velocity between the ends; 0 below the range of doubles"),
-    Column::number("v_max", "v_0", "greatest velocity between the ends"),
-    Column::number("friction_max", "mu_0 sigma", "greatest friction between the ends"),
-    Column::number("end_error", "1", "theta(t_f) v_f - 1: how far from its target a step is; 0 for the other families")
+    Field::new(Column::number("work", "mu_0 sigma l", "work of friction W_s"), |row| row.told(|member| member.work)),
+    Field::new(Column::number("work_optimal", "mu_0 sigma l", "least work of friction W* of any protocol"), |row| {
+        row.least.work
+    }),
+    Field::new(
+        Column::number("gap", "1", "(W_s - W*)/W*, good to rtol of 1 + gap; below 0 for a step that has not arrived"),
+        |row| row.least.gap,
+    ),
+    Field::new(
+        Column::number("v_min", "v_0", "least velocity between the ends; 0 below the range of doubles"),
+        |row| row.told(|member| member.v_min),
+    ),
+    Field::new(Column::number("v_max", "v_0", "greatest velocity between the ends"), |row| {
+        row.told(|member| member.v_max)
+    }),
+    Field::new(Column::number("friction_max", "mu_0 sigma", "greatest friction between the ends"), |row| {
+        row.told(|member| member.friction_max)
+    }),
+    Field::new(
+        Column::number(
+            "end_error",
+            "1",
+            "theta(t_f) v_f - 1: how far from its target a step is; 0 for the other families",
+        )
         .optional(),
-    Column::new("bound", Kind::Label(&Obstacle::NAMES), "which bound makes the row infeasible").optional(),
-    Column::number("work_error", "mu_0 sigma l", "bound of the error of work, by a second solve").optional(),
-    Column::number("gap_error", "1", "bound of the error of gap, by a second solve of both works").optional(),
+        |row| row.told(|member| member.miss),
+    ),
+    Field::new(
+        Column::new("bound", Kind::Label(&Obstacle::NAMES), "which bound makes the row infeasible").optional(),
+        |row| number(row.obstacle.map(|obstacle| obstacle.code() as f64)),
+    ),
+    Field::new(
+        Column::number("work_error", "mu_0 sigma l", "bound of the error of work, by a second solve").optional(),
+        |row| row.work_error,
+    ),
+    Field::new(
+        Column::number("gap_error", "1", "bound of the error of gap, by a second solve of both works").optional(),
+        |row| row.least.gap_error,
+    ),
 ];
+
+const COLUMNS: [Column; 11] = columns(&FIELDS);
+const WORK_OPTIMAL: usize = place(&COLUMNS, "work_optimal");
+const GAP: usize = place(&COLUMNS, "gap");
+const WORK_ERROR: usize = place(&COLUMNS, "work_error");
+const GAP_ERROR: usize = place(&COLUMNS, "gap_error");
 
 impl Table for Swift {
     fn name(&self) -> &'static str {
@@ -60,7 +106,7 @@ impl Table for Swift {
     }
 
     fn columns(&self) -> &'static [Column] {
-        COLUMNS
+        &COLUMNS
     }
 
     fn rows_per_part(&self) -> u64 {
@@ -77,54 +123,42 @@ impl Table for Swift {
 
     fn compute(&self, job: &Job<'_>, range: Range<u64>, sheet: &mut Sheet) -> Result<Work, Stopped> {
         let members = Members::default();
-        rows::each(job, range, (COLUMNS.len(), 16), sheet, |tuple, point, cells| {
+        rows::each(job, range, 16, sheet, &FIELDS, |tuple, point| {
             let mut work = Work::default();
-            let (swift, work_error) = match members.get(job, tuple, point, &mut work) {
-                Ok(found) => found,
+            let mut row =
+                Row { member: None, obstacle: None, alpha_unit: 1.0, work_error: f64::NAN, least: Comparison::NONE };
+            let member = match members.get(job, tuple, point, &mut work) {
+                Ok((member, work_error)) => {
+                    row.work_error = work_error;
+                    member
+                }
                 Err(obstacle) => {
-                    cells[BOUND] = obstacle.code() as f64;
-                    return (obstacle.status(), work);
+                    row.obstacle = Some(obstacle);
+                    return (obstacle.status(), Some(row), work);
                 }
             };
-            let mut status = swift.status();
-            let mut least = Comparison::NONE;
+            let mut status = member.status();
             if self.needs_optimum(job.selection) {
                 let bounded = job.selection.has(GAP_ERROR);
-                least = optima::compare(job, (tuple, point), (swift.work, work_error), bounded, &mut work);
-                status = status.beside(least.optimum);
+                row.least = optima::compare(job, (tuple, point), (member.work, row.work_error), bounded, &mut work);
+                status = status.beside(row.least.optimum);
             }
             let family = FAMILIES.get(point[Quantity::Family] as usize);
-            let rate = if family.is_some_and(|family| family.name() == "bounded_velocity") {
-                job.grid.units.size("v_0/l")
-            } else {
-                1.0
-            };
-            cells[..BOUND].copy_from_slice(&[
-                swift.alpha.map_or(f64::NAN, |alpha| alpha * rate * rate),
-                swift.work,
-                least.work,
-                least.gap,
-                swift.v_min,
-                swift.v_max,
-                swift.friction_max,
-                swift.miss,
-            ]);
-            cells[WORK_ERROR] = work_error;
-            cells[GAP_ERROR] = least.gap_error;
-            (status, work)
+            if family.is_some_and(|family| family.name() == "bounded_velocity") {
+                row.alpha_unit = job.grid.units.size("v_0/l").powi(2);
+            }
+            row.member = Some(member);
+            (status, Some(row), work)
         })
     }
 }
 
-/// A member, and the bound of the error of its work where that is asked for.
+/// A member, and the bound of the error of its work where that is requested.
 type Solution = Result<(Member, f64), Obstacle>;
 
-/// The members solved so far, by tuple and family.
-type Solved = HashMap<(u64, usize), Arc<OnceLock<Solution>>>;
-
-/// The members of families that do not heed the bound on friction, solved once each whatever its values.
+/// The members of families that do not depend on the bound on friction, by tuple and family: solved once each whatever its values.
 #[derive(Default)]
-struct Members(Mutex<Solved>);
+struct Members(Memo<(u64, usize), Solution>);
 
 impl Members {
     /// The member for `point`, which belongs to tuple number `tuple`; adds what is spent by this call alone.
@@ -134,10 +168,7 @@ impl Members {
         if family.heeds_tau_max() {
             return solve(job, family, point, work);
         }
-        let mut members = self.0.lock().unwrap_or_else(PoisonError::into_inner);
-        let member = members.entry((tuple, number)).or_default().clone();
-        drop(members);
-        *member.get_or_init(|| solve(job, family, point, work))
+        self.0.get((tuple, number), || solve(job, family, point, work))
     }
 }
 
