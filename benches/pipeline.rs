@@ -5,17 +5,22 @@
 //! times, and prints the least time of each and their ratios. The floor of a run is the larger of computing and encoding
 //! where the two overlap, and their sum on a machine of one processor (`taskset -c 0`). Two runs side by side that share nothing tell what the machine allows a second thread. Then,
 //! on other runs: rows a second against `rtol`, with what encoding and the disk add to the computation (a run whose
-//! files stay in memory tells them apart, where there is `/dev/shm`); the memory of ever longer runs; and what the
-//! columns of some tables cost.
+//! files stay in memory tells them apart, where there is `/dev/shm`); what `ArrowWriter` would cost; the memory of ever longer
+//! runs; and what the columns of some tables cost.
 
 use std::hint::black_box;
 use std::path::Path;
 use std::sync::Mutex;
 use std::time::{Duration, Instant};
 
+use parquet::arrow::ArrowWriter;
+use parquet::basic::{Compression, Encoding, ZstdLevel};
+use parquet::file::properties::{EnabledStatistics, WriterProperties};
+use parquet::schema::types::ColumnPath;
 use slipsweep::dataset::{self, Folder, Footer, Layout};
+use slipsweep::grid::Projection;
 use slipsweep::sweep::{self, Plan, Sweep};
-use slipsweep::table::{self, Signal};
+use slipsweep::table::{self, Sheet, Signal};
 
 /// As in the program.
 #[global_allocator]
@@ -73,6 +78,7 @@ fn main() -> Outcome<()> {
 
 fn measure(folder: &Path) -> Outcome<()> {
     threads(folder)?;
+    writers(folder)?;
     accuracy(folder)?;
     memory(folder)?;
     columns(folder)
@@ -105,7 +111,7 @@ fn threads(folder: &Path) -> Outcome<()> {
     // Nothing is written before these are done: the system writes files back long after the run.
     let alone = least(ROUNDS, || Ok([compute(&sweep, 1)?, compute(&sweep, 2)?, side_by_side(&sweep)?]))?;
     let [one, two, encoded, one_on_disk, two_on_disk] = least(ROUNDS, || {
-        let (computed, encoded) = (compute(&sweep, 1)?, encode(&sweep)?);
+        let (computed, encoded) = (compute(&sweep, 1)?, encode(&sweep, ours)?);
         let written = [pipeline(&sweep, folder, 1)?, pipeline(&sweep, folder, 2)?];
         Ok([computed, compute(&sweep, 2)?, encoded, written[0], written[1]])
     })?;
@@ -225,8 +231,49 @@ fn compute(sweep: &Sweep, threads: usize) -> Outcome<f64> {
     Ok(start.elapsed().as_secs_f64())
 }
 
+/// The bytes of a part.
+type Encoder = fn(&Layout, &Projection, &Sheet, &Footer) -> Option<Vec<u8>>;
+
+/// The encoder of the program: with the digest and the checksums of the part and of its pages.
+fn ours(layout: &Layout, projection: &Projection, sheet: &Sheet, footer: &Footer) -> Option<Vec<u8>> {
+    dataset::encode(layout, projection, sheet, footer).ok().map(|(bytes, _)| bytes)
+}
+
+/// `ArrowWriter` with the encodings and the compression of the program: no digest, and no checksums, which it cannot write.
+fn arrow(layout: &Layout, projection: &Projection, sheet: &Sheet, footer: &Footer) -> Option<Vec<u8>> {
+    let batch = dataset::batch(layout, projection, footer.rows.clone(), sheet).ok()?;
+    let mut properties = WriterProperties::builder()
+        .set_compression(Compression::ZSTD(ZstdLevel::try_new(1).ok()?))
+        .set_statistics_enabled(EnabledStatistics::Chunk)
+        .set_offset_index_disabled(true)
+        .set_max_row_group_row_count(Some(1 << 16));
+    // Axes and columns that repeat are dictionaries; of the others every number differs.
+    for name in ["work", "gap", "v_min"] {
+        let column = ColumnPath::from(name);
+        properties = properties.set_column_dictionary_enabled(column.clone(), false);
+        properties = properties.set_column_encoding(column, Encoding::BYTE_STREAM_SPLIT);
+    }
+    let mut writer = ArrowWriter::try_new(Vec::new(), batch.schema(), Some(properties.build())).ok()?;
+    writer.write(&batch).ok()?;
+    writer.into_inner().ok()
+}
+
+/// What `ArrowWriter` would cost.
+fn writers(folder: &Path) -> Outcome<()> {
+    let sweep = landscapes(folder, FEW, 1e-10)?;
+    let rows = Plan::new(&sweep).tables[0].rows as f64;
+    let [computed, ours, arrow] =
+        least(5, || Ok([compute(&sweep, 1)?, encode(&sweep, ours)?, encode(&sweep, arrow)?]))?;
+    println!("\n### Writers\n\n| | ns a row |\n| --- | --- |");
+    println!("| compute, 1 thread | {:.1} |", 1e9 * computed / rows);
+    println!("| encode by the program, digest and checksums included | {:.1} |", 1e9 * ours / rows);
+    println!("| encode by `ArrowWriter`, without them | {:.1} |", 1e9 * arrow / rows);
+    println!("| compute and encode, `ArrowWriter` over the program | {:.2} |", (computed + arrow) / (computed + ours));
+    Ok(())
+}
+
 /// Seconds that encoding takes of every part, on the thread that has just computed it.
-fn encode(sweep: &Sweep) -> Outcome<f64> {
+fn encode(sweep: &Sweep, encoder: Encoder) -> Outcome<f64> {
     let pool = sweep::pool(1)?;
     let plan = Plan::new(sweep);
     let manifest = plan.manifest(sweep);
@@ -240,7 +287,7 @@ fn encode(sweep: &Sweep) -> Outcome<f64> {
         let Ok(sheet) = sheet else { return };
         let start = Instant::now();
         let footer = Footer::new(&manifest, &table.name, table.rows_of(number));
-        let _ = black_box(dataset::encode(&layout, job.rows, &sheet, &footer));
+        black_box(encoder(&layout, job.rows, &sheet, &footer));
         if let Ok(mut spent) = spent.lock() {
             *spent += start.elapsed();
         }
