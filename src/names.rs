@@ -59,7 +59,7 @@ pub fn nearest<'a>(name: &str, known: impl IntoIterator<Item = &'a str>) -> Opti
 }
 
 /// What to do about `name`, which is none of `known`.
-#[cfg(feature = "read")]
+#[cfg(any(feature = "plot", feature = "query"))]
 pub fn hint<'a>(name: &str, known: impl IntoIterator<Item = &'a str>) -> String {
     match nearest(name, known) {
         Some(meant) => format!("did you mean `{meant}`?"),

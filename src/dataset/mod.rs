@@ -36,7 +36,9 @@ pub(crate) use guard::guarded;
 #[cfg(feature = "cli")]
 pub(crate) use guard::is_guarded;
 pub use layout::Layout;
-pub(crate) use layout::{field, label};
+pub(crate) use layout::field;
+#[cfg(feature = "query")]
+pub(crate) use layout::label;
 pub use manifest::{Build, Manifest, ManifestTable};
 pub use part::encode;
 pub use session::{Company, Holder, Session};
