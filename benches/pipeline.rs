@@ -77,11 +77,12 @@ fn main() -> Outcome<()> {
 }
 
 fn measure(folder: &Path) -> Outcome<()> {
-    threads(folder)?;
-    writers(folder)?;
-    accuracy(folder)?;
-    memory(folder)?;
-    columns(folder)
+    let parts: [(&str, fn(&Path) -> Outcome<()>); 5] =
+        [("threads", threads), ("writers", writers), ("accuracy", accuracy), ("memory", memory), ("columns", columns)];
+    // `-- writers` is for that part alone; cargo adds `--bench`.
+    let wanted: Vec<String> = std::env::args().skip(1).filter(|word| !word.starts_with('-')).collect();
+    let is_wanted = |name: &str| wanted.is_empty() || wanted.iter().any(|word| word == name);
+    parts.into_iter().filter(|(name, _)| is_wanted(name)).try_for_each(|(_, part)| part(folder))
 }
 
 /// A sweep with these axes, these lines under `[accuracy]` and this under `[tables]`.

@@ -1,7 +1,8 @@
 //! A column chunk made here, page by page, and spliced into a Parquet file.
 //!
 //! The writer of the `parquet` crate takes values one by one; here the runs of an axis, of the rows that have a value and of
-//! values that repeat are known, so that most of its work need not be done.
+//! values that repeat are known, so that most of its work need not be done. It also writes no checksums of pages. A landscape that is
+//! computed and encoded takes 2.2 times as long with it (`cargo bench --bench pipeline -- writers`).
 
 use bytes::Bytes;
 use parquet::basic::{Compression, Encoding, ZstdLevel};
