@@ -166,6 +166,9 @@ pub struct Marker {
     pub series: usize,
 }
 
+/// Curves through fewer points show them.
+pub const MARKED: usize = 50;
+
 /// A row as a mark.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Dot {
@@ -209,6 +212,26 @@ pub enum Key {
     Fill([u8; 3]),
     /// Only words.
     None,
+}
+
+impl Key {
+    /// The line of series number `series`, with its marks if they are drawn.
+    pub fn series(series: usize, is_marked: bool) -> Key {
+        let stroke = super::colour::series(series);
+        if is_marked { Key::Marked(stroke, Marker { series }) } else { Key::Line(stroke) }
+    }
+}
+
+impl Entry {
+    /// Entries for several curves, one for each that is drawn in place of all that it leads.
+    pub fn of_series(names: &[impl AsRef<str>], leaders: &[usize], key: impl Fn(usize) -> Key) -> Vec<Entry> {
+        let drawn = (0..names.len()).filter(|&place| leaders[place] == place && names.len() > 1);
+        let entry = |place| {
+            let same = names.iter().zip(leaders).filter(|(_, leader)| **leader == place);
+            Entry { key: key(place), text: same.map(|(name, _)| name.as_ref()).collect::<Vec<_>>().join("; ") }
+        };
+        drawn.map(entry).collect()
+    }
 }
 
 /// A figure as SVG, and where its maps are.
