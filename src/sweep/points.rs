@@ -243,64 +243,70 @@ fn parquet(path: &Path, units: &Units) -> Result<Vec<Column>, SpecError> {
     check_count(path, usize::try_from(rows).unwrap_or(0))?;
     let mut columns = header(&name, reader.schema().fields().iter().map(|field| field.name().as_str()))?;
     for (column, field) in columns.iter().zip(reader.schema().fields()) {
-        let (kind, is_text) = (field.data_type(), *field.data_type() == text());
-        let held = || {
-            format!(
-                "{name}: column `{}` holds {}",
-                column.name,
-                if is_text { "words".to_owned() } else { kind.to_string() }
-            )
-        };
-        match &column.cells {
-            Cells::Axis(quantity, _) if !quantity.words().is_empty() && !is_text => {
-                return Err(fault(held(), "words", "write the column as text"));
-            }
-            Cells::Axis(..) if !kind.is_numeric() => {
-                return Err(fault(held(), "numbers", "write the column as numbers"));
-            }
-            Cells::Label(_) if !is_text => return Err(unknown_column(&name, &column.name)),
-            _ => {}
-        }
+        column.check_type(&name, field.data_type())?;
     }
     let reader = reader.with_batch_size(BATCH).build().map_err(|error| unsound(&error))?;
     let mut first = 0;
     for batch in reader {
         let batch = batch.map_err(|error| unsound(&error))?;
         check_count(path, first + batch.num_rows())?;
-        for (Column { name: column, cells }, array) in columns.iter_mut().zip(batch.columns()) {
-            let place = |row: usize| format!("{name}: row {} of column `{column}`", first + row);
-            let null = (0..array.len()).find(|&row| array.is_null(row));
-            match cells {
-                Cells::Label(texts) => {
-                    for (row, cell) in texts_of(array).enumerate() {
-                        texts.push(|| place(row), cell.unwrap_or_default().trim())?;
-                    }
-                }
-                Cells::Axis(quantity, values) => {
-                    let words = quantity.words();
-                    if let Some(row) = null {
-                        let expected = if words.is_empty() { "a number" } else { "a word" };
-                        return Err(fault(format!("{}: no value", place(row)), expected, "fill in the value"));
-                    }
-                    if !words.is_empty() {
-                        for (row, cell) in texts_of(array).enumerate() {
-                            values.push(word(|| place(row), &words, cell.unwrap_or_default())?);
-                        }
-                        continue;
-                    }
-                    let Some(numbers) = numbers(array) else {
-                        let found = format!("{name}: column `{column}` holds {}", array.data_type());
-                        return Err(fault(found, "numbers", "write the column as floating-point numbers"));
-                    };
-                    for (row, value) in numbers.into_iter().enumerate() {
-                        values.push(legal(|| place(row), units, *quantity, value)?);
-                    }
-                }
-            }
+        for (column, array) in columns.iter_mut().zip(batch.columns()) {
+            column.extend(&name, first, array, units)?;
         }
         first += batch.num_rows();
     }
     Ok(columns)
+}
+
+impl Column {
+    /// That the column of `file` has the type that its name asks for.
+    fn check_type(&self, file: &impl Display, kind: &DataType) -> Result<(), SpecError> {
+        let is_text = *kind == text();
+        let wrong = |expected: &str, help: &str| {
+            let held = if is_text { "words".to_owned() } else { kind.to_string() };
+            Err(fault(format!("{file}: column `{}` holds {held}", self.name), expected, help))
+        };
+        match &self.cells {
+            Cells::Axis(quantity, _) if !quantity.words().is_empty() && !is_text => {
+                wrong("words", "write the column as text")
+            }
+            Cells::Axis(..) if !kind.is_numeric() => wrong("numbers", "write the column as numbers"),
+            Cells::Label(_) if !is_text => Err(unknown_column(file, &self.name)),
+            _ => Ok(()),
+        }
+    }
+
+    /// Adds the rows of a batch, whose first one has number `first` in `file`.
+    fn extend(&mut self, file: &impl Display, first: usize, array: &ArrayRef, units: &Units) -> Result<(), SpecError> {
+        let name = &self.name;
+        let place = |row: usize| format!("{file}: row {} of column `{name}`", first + row);
+        let (quantity, values) = match &mut self.cells {
+            Cells::Label(texts) => {
+                let mut cells = texts_of(array).enumerate();
+                return cells.try_for_each(|(row, cell)| texts.push(|| place(row), cell.unwrap_or_default().trim()));
+            }
+            Cells::Axis(quantity, values) => (*quantity, values),
+        };
+        let words = quantity.words();
+        if let Some(row) = (0..array.len()).find(|&row| array.is_null(row)) {
+            let expected = if words.is_empty() { "a number" } else { "a word" };
+            return Err(fault(format!("{}: no value", place(row)), expected, "fill in the value"));
+        }
+        if !words.is_empty() {
+            for (row, cell) in texts_of(array).enumerate() {
+                values.push(word(|| place(row), &words, cell.unwrap_or_default())?);
+            }
+            return Ok(());
+        }
+        let Some(numbers) = numbers(array) else {
+            let found = format!("{file}: column `{name}` holds {}", array.data_type());
+            return Err(fault(found, "numbers", "write the column as floating-point numbers"));
+        };
+        for (row, value) in numbers.into_iter().enumerate() {
+            values.push(legal(|| place(row), units, quantity, value)?);
+        }
+        Ok(())
+    }
 }
 
 /// The type of text as it is read: codes, so that a word that is there a million times takes memory once.
