@@ -4,20 +4,19 @@ use std::borrow::Cow;
 use std::fmt::{self, Display, Formatter};
 use std::fs;
 use std::path::Path;
-use std::sync::Arc;
 
 use arrow_array::cast::AsArray;
 use arrow_array::types::{
     Float32Type, Float64Type, Int8Type, Int16Type, Int32Type, Int64Type, UInt8Type, UInt16Type, UInt32Type, UInt64Type,
 };
 use arrow_array::{Array, ArrayRef, ArrowPrimitiveType, PrimitiveArray};
-use arrow_schema::{DataType, Fields, Schema};
+use arrow_schema::DataType;
 use indexmap::IndexSet;
-use parquet::arrow::arrow_reader::{ArrowReaderMetadata, ArrowReaderOptions, ParquetRecordBatchReaderBuilder};
-use parquet::errors::ParquetError;
+use parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
 
 use super::error::{MOST_OF_NAME, SpecError, unknown};
-use crate::dataset::{check_footer, check_pages, guarded};
+use crate::dataset::frame::coded;
+use crate::dataset::{guarded, label};
 use crate::grid::{Axis, Factor, Label, Quantity, Scale, Values};
 use crate::model::Units;
 use crate::names::shown;
@@ -223,21 +222,12 @@ fn unsound(path: &Path, error: &dyn Display) -> SpecError {
 }
 
 /// Parquet: columns of numbers, or of text for axes of words, whose names are axes; other columns of text are labels.
-///
-/// What Arrow or pandas add to a file about its types is not asked for: a column is what Parquet says that it is.
 fn parquet(path: &Path, units: &Units) -> Result<Vec<Column>, SpecError> {
     let name = path.display();
     check_size(path)?;
     let unsound = |error: &dyn Display| unsound(path, error);
     let file = fs::File::open(path).map_err(|error| unreadable(path, &error))?;
-    let options = ArrowReaderOptions::new().with_skip_arrow_metadata(true);
-    // What the file says of itself comes first: a few bytes can stand for any number of rows.
-    let metadata = check_footer(&file).and_then(|()| {
-        let metadata = ArrowReaderMetadata::load(&file, options)?;
-        check_pages(&file, metadata.metadata())?;
-        coded(metadata)
-    });
-    let metadata = metadata.map_err(|error| unsound(&error))?;
+    let metadata = coded(&file).map_err(|error| unsound(&error))?;
     let reader = ParquetRecordBatchReaderBuilder::new_with_metadata(file, metadata);
     let rows = reader.metadata().file_metadata().num_rows();
     check_count(path, usize::try_from(rows).unwrap_or(0))?;
@@ -261,7 +251,7 @@ fn parquet(path: &Path, units: &Units) -> Result<Vec<Column>, SpecError> {
 impl Column {
     /// That the column of `file` has the type that its name asks for.
     fn check_type(&self, file: &impl Display, kind: &DataType) -> Result<(), SpecError> {
-        let is_text = *kind == text();
+        let is_text = *kind == label();
         let wrong = |expected: &str, help: &str| {
             let held = if is_text { "words".to_owned() } else { kind.to_string() };
             Err(fault(format!("{file}: column `{}` holds {held}", self.name), expected, help))
@@ -307,21 +297,6 @@ impl Column {
         }
         Ok(())
     }
-}
-
-/// The type of text as it is read: codes, so that a word that is there a million times takes memory once.
-fn text() -> DataType {
-    DataType::Dictionary(Box::new(DataType::Int32), Box::new(DataType::Utf8))
-}
-
-/// The file with text as codes.
-fn coded(metadata: ArrowReaderMetadata) -> Result<ArrowReaderMetadata, ParquetError> {
-    let fields = metadata.schema().fields().iter().map(|field| match field.data_type() {
-        DataType::Utf8 => Arc::new(field.as_ref().clone().with_data_type(text())),
-        _ => field.clone(),
-    });
-    let options = ArrowReaderOptions::new().with_schema(Arc::new(Schema::new(fields.collect::<Fields>())));
-    ArrowReaderMetadata::try_new(metadata.metadata().clone(), options)
 }
 
 /// The cells of a column of text.
