@@ -11,7 +11,7 @@ use super::{FAILED, Failure, WRONG, dataset, no_table, put, say, to_file, words,
 use crate::dataset::{Cell, Folder, ManifestTable, Row, frame};
 use crate::grid::{Domain, Quantity, RTOL, Scale};
 use crate::model::{Law, Transition, Units};
-use crate::names::nearest;
+use crate::names::hint;
 use crate::plot::table::Condition;
 use crate::protocol::Status;
 use crate::protocol::swift::{self, Case};
@@ -423,8 +423,7 @@ fn the_row(path: &Path, folder: &Folder, table: &ManifestTable, conditions: &[St
             let headings = frame::headings(&file).map_err(Failure::failed)?.0;
             let known: Vec<&str> = headings.iter().map(|heading| heading.name.as_str()).collect();
             if let Some(unknown) = names.iter().find(|name| !known.contains(name)) {
-                let help = nearest(unknown, known.iter().copied())
-                    .map_or_else(|| "choose one of these".to_owned(), |meant| format!("did you mean `{meant}`?"));
+                let help = hint(unknown, known.iter().copied());
                 let expected = known.join(", ");
                 return Err(wrong(format!(
                     "--where: `{}` has no column `{unknown}`\n  expected: {expected}\n  help: {help}",

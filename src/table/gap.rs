@@ -18,11 +18,11 @@ use crate::protocol::{Status, error};
 
 const WORK_OPTIMAL: usize = 1;
 /// The place of `gap` among its columns.
-pub const WORK_GAP: usize = 2;
+pub(super) const WORK_GAP: usize = 2;
 const WORK_ERROR: usize = 4;
 const GAP_ERROR: usize = 5;
 
-const COLUMNS: &[Column] = &[
+pub(super) const COLUMNS: &[Column] = &[
     Column::number("work", "mu_0 sigma l", "work of friction W_s of the shortcut"),
     Column::number("work_optimal", "mu_0 sigma l", "least work of friction W* of any protocol"),
     Column::number("gap", "1", "(W_s - W*)/W*, good to rtol of 1 + gap, not of itself"),
@@ -59,7 +59,7 @@ fn needs_optimum(selection: &Selection) -> bool {
     selection.has_any([WORK_OPTIMAL, WORK_GAP, GAP_ERROR])
 }
 
-fn compute(job: &Job<'_>, rows: Range<u64>, sheet: &mut Sheet) -> Result<Work, Stopped> {
+pub(super) fn compute(job: &Job<'_>, rows: Range<u64>, sheet: &mut Sheet) -> Result<Work, Stopped> {
     let view = job.rows.view(rows.clone());
     let (groups, order) = groups(&view, job, &rows);
     let coefficients = Coefficients::new(job, view, &rows, order.as_deref());

@@ -7,7 +7,7 @@ use std::ops::Range;
 
 use super::gap;
 use super::optima::OPTIMUM_AXES;
-use super::{Column, Job, Kind, Selection, Sheet, Signal, Stopped, Table, Work};
+use super::{Column, Definition, Job, Kind, Selection, Sheet, Signal, Stopped, Work};
 use crate::grid::Quantity;
 use crate::protocol::Status;
 
@@ -19,16 +19,49 @@ enum Reduction {
     Histogram,
 }
 
-/// One row a transition and time.
-#[derive(Debug)]
-pub struct Reduced(Reduction);
-
 /// The shortcut of least gap.
-pub const MINIMUM: Reduced = Reduced(Reduction::Minimum);
+pub static MINIMUM: Definition = reduced(
+    "gap_min",
+    "the shortcut of least gap among those of a spec (reduce = \"min\" of gap)",
+    MINIMUM_COLUMNS,
+    |job, rows, sheet| compute(Reduction::Minimum, job, rows, sheet),
+);
+
 /// Quantiles of the gap.
-pub const QUANTILES: Reduced = Reduced(Reduction::Quantiles);
+pub static QUANTILES: Definition = reduced(
+    "gap_quantiles",
+    "quantiles of the gap of the shortcuts of a spec (reduce = \"quantiles\" of gap)",
+    QUANTILE_COLUMNS,
+    |job, rows, sheet| compute(Reduction::Quantiles, job, rows, sheet),
+);
+
 /// Numbers of shortcuts by decades of the gap.
-pub const HISTOGRAM: Reduced = Reduced(Reduction::Histogram);
+pub static HISTOGRAM: Definition = reduced(
+    "gap_histogram",
+    "how many shortcuts of a spec have which gap (reduce = \"histogram\" of gap)",
+    HISTOGRAM_COLUMNS,
+    |job, rows, sheet| compute(Reduction::Histogram, job, rows, sheet),
+);
+
+/// One row a transition and time; the cost is that of a landscape of 400 x 400 shortcuts.
+const fn reduced(
+    name: &'static str,
+    doc: &'static str,
+    columns: &'static [Column],
+    compute: fn(&Job<'_>, Range<u64>, &mut Sheet) -> Result<Work, Stopped>,
+) -> Definition {
+    let needs_optimum = |_: &Selection| true;
+    Definition {
+        name,
+        doc,
+        axes: OPTIMUM_AXES,
+        columns,
+        rows_per_part: 1 << 8,
+        cost: 16_000_000,
+        needs_optimum,
+        compute,
+    }
+}
 
 /// Rows of a landscape that are held at a time.
 const PIECE: usize = 1 << 16;
@@ -80,83 +113,40 @@ const HISTOGRAM_COLUMNS: &[Column] = &[
     Column::number("from_10", "1", "shortcuts with a gap of 10 or more"),
 ];
 
-impl Table for Reduced {
-    fn name(&self) -> &'static str {
-        match self.0 {
-            Reduction::Minimum => "gap_min",
-            Reduction::Quantiles => "gap_quantiles",
-            Reduction::Histogram => "gap_histogram",
+fn compute(reduction: Reduction, job: &Job<'_>, rows: Range<u64>, sheet: &mut Sheet) -> Result<Work, Stopped> {
+    let Some(members) = job.members else {
+        // A checked sweep has them.
+        sheet.columns.iter_mut().for_each(|column| column.fill(f64::NAN));
+        sheet.status.fill(Status::NotConverged);
+        return Ok(Work::default());
+    };
+    let each = members.rows() / job.rows.rows().max(1);
+    let (selection, signal) = (Selection::usual(gap::COLUMNS), Signal::default());
+    let tuples = members.tuples(OPTIMUM_AXES);
+    // Progress is counted in rows of this table, so that of the landscape goes nowhere.
+    let sizes: Vec<f64> = gap::COLUMNS.iter().map(|column| column.size(job.grid)).collect();
+    let landscape = Job {
+        rows: members,
+        tuples,
+        selection: &selection,
+        sizes: &sizes,
+        signal: &signal,
+        members: None,
+        repeats: None,
+        ..*job
+    };
+    let mut all = Work::default();
+    // One after another: the threads share each landscape, and no more than one a part is in memory.
+    for (place, row) in rows.enumerate() {
+        let (status, cells, work) = reduction.cells(job, &landscape, row * each..(row + 1) * each)?;
+        sheet.status[place] = status;
+        for (column, &index) in sheet.columns.iter_mut().zip(job.selection.indices()) {
+            column[place] = cells[index];
         }
+        all += work;
+        job.signal.advance(1);
     }
-
-    fn doc(&self) -> &'static str {
-        match self.0 {
-            Reduction::Minimum => "the shortcut of least gap among those of a spec (reduce = \"min\" of gap)",
-            Reduction::Quantiles => "quantiles of the gap of the shortcuts of a spec (reduce = \"quantiles\" of gap)",
-            Reduction::Histogram => "how many shortcuts of a spec have which gap (reduce = \"histogram\" of gap)",
-        }
-    }
-
-    fn axes(&self) -> &'static [Quantity] {
-        OPTIMUM_AXES
-    }
-
-    fn columns(&self) -> &'static [Column] {
-        match self.0 {
-            Reduction::Minimum => MINIMUM_COLUMNS,
-            Reduction::Quantiles => QUANTILE_COLUMNS,
-            Reduction::Histogram => HISTOGRAM_COLUMNS,
-        }
-    }
-
-    fn rows_per_part(&self) -> u64 {
-        1 << 8
-    }
-
-    fn cost(&self) -> u64 {
-        // A landscape of 400 x 400 shortcuts.
-        16_000_000
-    }
-
-    fn needs_optimum(&self, _selection: &Selection) -> bool {
-        true
-    }
-
-    fn compute(&self, job: &Job<'_>, rows: Range<u64>, sheet: &mut Sheet) -> Result<Work, Stopped> {
-        let Some(members) = job.members else {
-            // A checked sweep has them.
-            sheet.columns.iter_mut().for_each(|column| column.fill(f64::NAN));
-            sheet.status.fill(Status::NotConverged);
-            return Ok(Work::default());
-        };
-        let each = members.rows() / job.rows.rows().max(1);
-        let (selection, signal) = (Selection::usual(gap::GAP.columns()), Signal::default());
-        let tuples = members.tuples(OPTIMUM_AXES);
-        // Progress is counted in rows of this table, so that of the landscape goes nowhere.
-        let sizes: Vec<f64> = gap::GAP.columns().iter().map(|column| column.size(job.grid)).collect();
-        let landscape = Job {
-            rows: members,
-            tuples,
-            selection: &selection,
-            sizes: &sizes,
-            signal: &signal,
-            members: None,
-            repeats: None,
-            ..*job
-        };
-        let mut all = Work::default();
-        // One after another: the threads share each landscape, and no more than one a part is in memory.
-        for (place, row) in rows.enumerate() {
-            let (status, cells, work) = self.tell(job, &landscape, row * each..(row + 1) * each)?;
-            sheet.status[place] = status;
-            for (column, &index) in sheet.columns.iter_mut().zip(job.selection.indices()) {
-                column[place] = cells[index];
-            }
-            all += work;
-            job.signal.advance(1);
-        }
-        Ok(all)
-    }
+    Ok(all)
 }
 
 /// What is kept of a landscape while it is computed.
@@ -203,17 +193,25 @@ impl Tally {
     }
 }
 
-impl Reduced {
+impl Reduction {
+    fn columns(self) -> &'static [Column] {
+        match self {
+            Reduction::Minimum => MINIMUM_COLUMNS,
+            Reduction::Quantiles => QUANTILE_COLUMNS,
+            Reduction::Histogram => HISTOGRAM_COLUMNS,
+        }
+    }
+
     /// Status and cells of the row whose shortcuts are `rows` of the landscape.
-    fn tell(&self, job: &Job<'_>, landscape: &Job<'_>, rows: Range<u64>) -> Result<(Status, Vec<f64>, Work), Stopped> {
+    fn cells(self, job: &Job<'_>, landscape: &Job<'_>, rows: Range<u64>) -> Result<(Status, Vec<f64>, Work), Stopped> {
         let mut sheet = Sheet::new(landscape.selection.indices().len());
         let (mut work, mut tally) = (Work::default(), Tally::default());
         for start in rows.clone().step_by(PIECE) {
             job.signal.check()?;
             let piece = start..rows.end.min(start + PIECE as u64);
             sheet.resize((piece.end - piece.start) as usize);
-            work += gap::GAP.compute(landscape, piece, &mut sheet)?;
-            tally.add(self.0, start, &sheet);
+            work += gap::compute(landscape, piece, &mut sheet)?;
+            tally.add(self, start, &sheet);
         }
         let status = tally.status();
         let mut cells = vec![f64::NAN; self.columns().len()];
@@ -221,7 +219,7 @@ impl Reduced {
             return Ok((status, cells, work));
         }
         cells[0] = tally.statuses[Status::Ok as usize] as f64;
-        match self.0 {
+        match self {
             Reduction::Minimum => {
                 if let Some((row, [work, work_optimal, gap, v_min])) = tally.least {
                     let point = landscape.rows.point(row);
