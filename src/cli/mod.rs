@@ -170,6 +170,12 @@ pub fn main(stdout_is_closed: bool) -> ExitCode {
     ended(perform(arguments))
 }
 
+/// Writes a file, whole or not at all.
+fn write_file(path: &Path, bytes: &[u8]) -> Result<(), Failure> {
+    to_file(path, |file| file.write_all(bytes))
+        .map_err(|error| Failure::failed(format!("cannot write {}: {error}", path.display())))
+}
+
 /// A table that is not among `names`; the message begins with `place`.
 fn no_table(place: &str, name: &str, names: &[&str]) -> Failure {
     let help = hint(name, names.iter().copied());

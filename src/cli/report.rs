@@ -1,11 +1,10 @@
 //! `slipsweep report DATASET`: one page of HTML with what is in a dataset, without network.
 
-use std::io;
 use std::path::{Path, PathBuf};
 
 use super::summary::Piece;
 use super::watch::{Wait, waiting};
-use super::{Failure, dataset, plan, say, summary, to_file, words};
+use super::{Failure, dataset, plan, say, summary, words, write_file};
 use crate::dataset::TableSurvey;
 use crate::plot::table::{Request, Source};
 use crate::plot::{COLUMN, PAGE, Page, PlotError};
@@ -44,8 +43,7 @@ pub fn report(arguments: &Arguments) -> Result<(), Failure> {
     plan_of(&mut page, &manifest.spec, &arguments.dataset)?;
     page.heading("Spec");
     page.verbatim(&manifest.spec);
-    to_file(&path, |file| file.write_all(page.html().as_bytes()))
-        .map_err(|error: io::Error| Failure::failed(format!("cannot write {}: {error}", path.display())))?;
+    write_file(&path, page.html().as_bytes())?;
     say(&format!("written to {}\n", path.display()))
 }
 

@@ -5,7 +5,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-use super::{Failure, WRONG, load, say, to_file, words, wrong};
+use super::{Failure, load, say, to_file, words, wrong};
 use crate::dataset::Folder;
 use crate::sweep::{Plan, Shard, check_parts, estimate};
 
@@ -180,12 +180,11 @@ fn tasks(arguments: &Arguments, parts: u64, seconds: f64) -> (u64, Option<String
 /// leave its patterns alone.
 fn check_path(engine: Engine, out: &Path) -> Result<(), Failure> {
     if engine == Engine::Slurm && out.to_string_lossy().contains('\\') {
-        let (out, code) = (out.display(), WRONG);
-        let message = format!(
-            "error: {out}: Slurm writes no log below a folder whose name has a backslash\n  expected: a path without `\\`\n  help: write \
-             elsewhere with --out DIR"
-        );
-        return Err(Failure { code, message });
+        return Err(wrong(format!(
+            "{}: Slurm writes no log below a folder whose name has a backslash\n  expected: a path without `\\`\n  help: write \
+             elsewhere with --out DIR",
+            out.display()
+        )));
     }
     Ok(())
 }
@@ -196,7 +195,7 @@ fn refused(path: &Path, action: &str, error: &std::io::Error) -> Failure {
 
 /// The path as it is from anywhere. One that is not Unicode cannot stand in a script.
 fn absolute(path: &Path) -> Result<PathBuf, Failure> {
-    let wrong = |why: String| Failure { code: WRONG, message: format!("error: {}: {why}", path.display()) };
+    let wrong = |why: String| wrong(format!("{}: {why}", path.display()));
     let absolute = std::path::absolute(path).map_err(|error| wrong(error.to_string()))?;
     match absolute.to_str() {
         Some(text) if !text.chars().any(char::is_control) => Ok(absolute),

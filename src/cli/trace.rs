@@ -7,7 +7,7 @@ use clap::ValueEnum;
 use clap::builder::{PossibleValue, PossibleValuesParser, StringValueParser, TypedValueParser};
 
 use super::output::{self, Output};
-use super::{FAILED, Failure, WRONG, dataset, no_table, put, say, to_file, words, wrong};
+use super::{FAILED, Failure, WRONG, dataset, no_table, put, say, words, write_file, wrong};
 use crate::dataset::{Cell, Folder, ManifestTable, Row, frame};
 use crate::grid::{Domain, Quantity, RTOL, Scale};
 use crate::model::{Law, Transition, Units};
@@ -188,8 +188,7 @@ pub fn trace(arguments: &Arguments) -> Result<(), Failure> {
     if output.is_stdout() {
         return put(&bytes);
     }
-    to_file(&output.out, |file| file.write_all(&bytes))
-        .map_err(|error| Failure::failed(format!("cannot write {}: {error}", output.out.display())))?;
+    write_file(&output.out, &bytes)?;
     say(&format!("{header}written to {}\n", output.out.display()))
 }
 
