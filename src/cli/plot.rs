@@ -130,13 +130,13 @@ impl Arguments {
             Some(table) => vec![table.clone()],
             None => source.tables(),
         };
-        if tables.len() > 1 {
-            if let Some(flag) = self.given(("--out with the name of a file", place.file.is_some())) {
-                let tables = tables.join(", ");
-                return Err(wrong(format!(
-                    "{flag} is for one table\n  found: {tables}\n  help: name one of them with --table"
-                )));
-            }
+        if tables.len() > 1
+            && let Some(flag) = self.given(("--out with the name of a file", place.file.is_some()))
+        {
+            let tables = tables.join(", ");
+            return Err(wrong(format!(
+                "{flag} is for one table\n  found: {tables}\n  help: name one of them with --table"
+            )));
         }
         let mut damage = None;
         for table in &tables {

@@ -221,19 +221,18 @@ fn one_unit(courses: &[Course]) -> Result<(), PlotError> {
 
 /// For each course the first one that it lies on in all panels.
 fn leaders(count: usize, panels: &[(Panel, Vec<Curve>)]) -> Vec<usize> {
-    let shares = |course: usize| -> Vec<Vec<(usize, Vec<(f64, f64)>)>> {
-        let of_panel = |(panel, curves): &(Panel, Vec<Curve>)| {
-            let share = |(x, y): &(f64, f64)| (panel.x.scale.share(*x), panel.y.scale.share(*y));
-            let own = curves.iter().filter(|curve| curve.course == course);
-            own.map(|curve| (curve.rank, curve.points.iter().map(share).collect())).collect()
-        };
-        panels.iter().map(of_panel).collect()
+    // The curves of a course in shares of the panels.
+    let in_shares = |(panel, curves): &(Panel, Vec<Curve>), course: usize| -> Vec<Curve> {
+        let share = |(x, y): &(f64, f64)| (panel.x.scale.share(*x), panel.y.scale.share(*y));
+        let own = curves.iter().filter(|curve| curve.course == course);
+        own.map(|curve| Curve { points: curve.points.iter().map(share).collect(), ..*curve }).collect()
     };
-    let shares: Vec<_> = (0..count).map(shares).collect();
+    let shares: Vec<Vec<Vec<Curve>>> =
+        (0..count).map(|course| panels.iter().map(|panel| in_shares(panel, course)).collect()).collect();
     coincide::leaders(count, |one, other| {
         shares[one].iter().zip(&shares[other]).all(|(one, other)| {
             let mut pairs = one.iter().zip(other);
-            one.len() == other.len() && pairs.all(|((i, a), (j, b))| i == j && coincide::anywhere(a, b))
+            one.len() == other.len() && pairs.all(|(a, b)| a.rank == b.rank && coincide::anywhere(&a.points, &b.points))
         })
     })
 }
