@@ -3,8 +3,7 @@
 use std::path::PathBuf;
 
 use super::query::unreadable;
-use super::{Failure, kind, say, summary, words, wrong};
-use crate::names::hint;
+use super::{Failure, kind, no_table, say, summary, words};
 use crate::query::{Source, Tables};
 use crate::table;
 
@@ -38,9 +37,7 @@ pub fn head(arguments: &Arguments) -> Result<(), Failure> {
 
 fn unknown(arguments: &Arguments, name: &str, tables: &Tables) -> Failure {
     let names: Vec<&str> = tables.sources.iter().map(|source| source.name.as_str()).collect();
-    let path = arguments.dataset.display();
-    let help = hint(name, names.iter().copied());
-    wrong(format!("{path}: no table `{name}`\n  expected: {}\n  help: {help}", names.join(", ")))
+    no_table(&format!("{}: ", arguments.dataset.display()), name, &names)
 }
 
 /// A line on the table, then names, units and rows.

@@ -38,7 +38,7 @@ use clap::{CommandFactory, Parser, Subcommand};
 
 use self::watch::{Wait, waiting};
 use crate::dataset::{Folder, Manifest, atomic};
-use crate::names::nearest;
+use crate::names::{hint, nearest};
 use crate::query::QueryError;
 use crate::sweep::{SpecError, Sweep};
 
@@ -168,6 +168,18 @@ pub fn main(stdout_is_closed: bool) -> ExitCode {
         }
     };
     ended(perform(arguments))
+}
+
+/// Writes a file, whole or not at all.
+fn write_file(path: &Path, bytes: &[u8]) -> Result<(), Failure> {
+    to_file(path, |file| file.write_all(bytes))
+        .map_err(|error| Failure::failed(format!("cannot write {}: {error}", path.display())))
+}
+
+/// A table that is not among `names`; the message begins with `place`.
+fn no_table(place: &str, name: &str, names: &[&str]) -> Failure {
+    let help = hint(name, names.iter().copied());
+    wrong(format!("{place}no table `{name}`\n  expected: {}\n  help: {help}", names.join(", ")))
 }
 
 /// Does what the arguments say.

@@ -106,15 +106,8 @@ struct Place {
 
 impl Arguments {
     fn traces(&self, sources: &[PathBuf], place: &Place) -> Result<(), Failure> {
-        let of_tables = [
-            ("--table", self.table.is_some()),
-            ("--where", !self.conditions.is_empty()),
-            ("--x", self.x.is_some()),
-            ("--y", self.y.is_some()),
-            ("--color", self.color.is_some()),
-        ];
         let courses = sources.iter().map(|path| plot::trace::read(path)).collect::<Result<Vec<_>, _>>()?;
-        if let Some((flag, _)) = of_tables.iter().find(|(_, is_given)| *is_given) {
+        if let Some(flag) = self.given(("--table", self.table.is_some())) {
             return Err(wrong(format!(
                 "{flag}: traces have no tables\n  expected: the folder of a dataset, such as results/NAME"
             )));
@@ -137,20 +130,13 @@ impl Arguments {
             Some(table) => vec![table.clone()],
             None => source.tables(),
         };
-        if tables.len() > 1 {
-            let several = [
-                ("--out with the name of a file", place.file.is_some()),
-                ("--where", !self.conditions.is_empty()),
-                ("--x", self.x.is_some()),
-                ("--y", self.y.is_some()),
-                ("--color", self.color.is_some()),
-            ];
-            if let Some((flag, _)) = several.iter().find(|(_, is_given)| *is_given) {
-                let tables = tables.join(", ");
-                return Err(wrong(format!(
-                    "{flag} is for one table\n  found: {tables}\n  help: name one of them with --table"
-                )));
-            }
+        if tables.len() > 1
+            && let Some(flag) = self.given(("--out with the name of a file", place.file.is_some()))
+        {
+            let tables = tables.join(", ");
+            return Err(wrong(format!(
+                "{flag} is for one table\n  found: {tables}\n  help: name one of them with --table"
+            )));
         }
         let mut damage = None;
         for table in &tables {
@@ -172,6 +158,13 @@ impl Arguments {
             say(&format!("{table}: written to {}\n{}", path.display(), remarks(&figure)))?;
         }
         damage.map_or(Ok(()), Err)
+    }
+
+    /// The first argument that is given of `first` and those that concern one table.
+    fn given(&self, first: (&'static str, bool)) -> Option<&'static str> {
+        let [x, y, color] = [&self.x, &self.y, &self.color].map(Option::is_some);
+        let all = [first, ("--where", !self.conditions.is_empty()), ("--x", x), ("--y", y), ("--color", color)];
+        all.into_iter().find(|(_, is_given)| *is_given).map(|(flag, _)| flag)
     }
 
     fn request(&self) -> Result<Request, Failure> {

@@ -118,6 +118,16 @@ fn keep_datasets(out: &Path) -> Result<(), Failure> {
     Ok(())
 }
 
+/// This program once more, to answer the question; what it says, and its answer if that is copied, comes through pipes.
+fn child(is_copied: bool) -> io::Result<Child> {
+    let mut command = Command::new(env::current_exe()?);
+    command.args(env::args_os().skip(1)).env(INSIDE, "1").stdin(Stdio::piped()).stderr(Stdio::piped());
+    if is_copied {
+        command.stdout(Stdio::piped());
+    }
+    command.spawn()
+}
+
 /// Answers a question in a process of its own.
 fn apart(arguments: &Arguments) -> Result<(), Failure> {
     let signal = Arc::new(AtomicUsize::new(0));
@@ -133,16 +143,7 @@ fn apart(arguments: &Arguments) -> Result<(), Failure> {
     // What goes on is said on a terminal until the answer begins, which a terminal therefore gets through this process.
     let shown = io::stderr().is_terminal();
     let is_copied = shown && arguments.output.is_stdout() && io::stdout().is_terminal();
-    let mut child = env::current_exe()
-        .and_then(|program| {
-            let mut command = Command::new(program);
-            command.args(env::args_os().skip(1)).env(INSIDE, "1").stdin(Stdio::piped()).stderr(Stdio::piped());
-            if is_copied {
-                command.stdout(Stdio::piped());
-            }
-            command.spawn()
-        })
-        .map_err(none)?;
+    let mut child = child(is_copied).map_err(none)?;
     let mut said = child.stderr.take();
     let listen = move || {
         let mut text = String::new();

@@ -1,11 +1,11 @@
 //! `slipsweep report DATASET`: one page of HTML with what is in a dataset, without network.
 
-use std::io;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use super::summary::Piece;
 use super::watch::{Wait, waiting};
-use super::{Failure, dataset, plan, say, summary, to_file, words};
+use super::{Failure, dataset, plan, say, summary, words, write_file};
+use crate::dataset::TableSurvey;
 use crate::plot::table::{Request, Source};
 use crate::plot::{COLUMN, PAGE, Page, PlotError};
 use crate::protocol::Status;
@@ -37,8 +37,19 @@ pub fn report(arguments: &Arguments) -> Result<(), Failure> {
     let units = units_of(&manifest.spec)?;
     let tables = summary::contents(&folder, &manifest)?.tables;
 
+    pictures(&mut page, Source::new(folder, manifest.clone(), units))?;
+    statuses(&mut page, &tables);
+    summaries(&mut page, &tables);
+    plan_of(&mut page, &manifest.spec, &arguments.dataset)?;
+    page.heading("Spec");
+    page.verbatim(&manifest.spec);
+    write_file(&path, page.html().as_bytes())?;
+    say(&format!("written to {}\n", path.display()))
+}
+
+/// A picture of each table.
+fn pictures(page: &mut Page, source: Source) -> Result<(), Failure> {
     page.heading("Pictures");
-    let source = Source::new(folder, manifest.clone(), units);
     for table in source.tables() {
         let drawing = format!("drawing {table}");
         match waiting(&Wait::new(&drawing), || source.figure(&table, &Request::default())) {
@@ -51,7 +62,11 @@ pub fn report(arguments: &Arguments) -> Result<(), Failure> {
             Err(error) => page.words(error.to_string().lines().next().unwrap_or_default()),
         }
     }
+    Ok(())
+}
 
+/// How many rows of each table have which status.
+fn statuses(page: &mut Page, tables: &[TableSurvey]) {
     page.heading("Rows and statuses");
     let used: Vec<usize> =
         (0..Status::ALL.len()).filter(|&status| tables.iter().any(|table| table.digest.status[status] > 0)).collect();
@@ -66,9 +81,12 @@ pub fn report(arguments: &Arguments) -> Result<(), Failure> {
     });
     let rows: Vec<Vec<String>> = counted.collect();
     page.table(&names, &rows);
+}
 
+/// What `summary` says.
+fn summaries(page: &mut Page, tables: &[TableSurvey]) {
     page.heading("Summary");
-    for table in &tables {
+    for table in tables {
         for piece in summary::pieces(&table.name, table.rows, &table.digest) {
             match piece {
                 Piece::Line(_, line) => page.words(&line),
@@ -83,21 +101,19 @@ pub fn report(arguments: &Arguments) -> Result<(), Failure> {
             }
         }
     }
+}
 
+/// What `plan` says of the spec of the dataset in `folder`.
+fn plan_of(page: &mut Page, spec: &str, folder: &Path) -> Result<(), Failure> {
     page.heading("Plan");
-    match Sweep::parse_at(&manifest.spec, &arguments.dataset.join("manifest.json")) {
+    match Sweep::parse_at(spec, &folder.join("manifest.json")) {
         Ok(sweep) => {
             let sample = Wait::new("computing a sample");
-            let estimates = waiting(&sample, || estimate(&sweep, &arguments.dataset)).map_err(Failure::failed)?;
+            let estimates = waiting(&sample, || estimate(&sweep, folder)).map_err(Failure::failed)?;
             page.verbatim(&plan::in_words(&sweep, &estimates, 0.0));
         }
         // Points are files beside the spec, not in the dataset.
         Err(error) => page.words(&format!("It cannot be recomputed from the dataset alone: {}", error.found)),
     }
-
-    page.heading("Spec");
-    page.verbatim(&manifest.spec);
-    to_file(&path, |file| file.write_all(page.html().as_bytes()))
-        .map_err(|error: io::Error| Failure::failed(format!("cannot write {}: {error}", path.display())))?;
-    say(&format!("written to {}\n", path.display()))
+    Ok(())
 }

@@ -7,7 +7,7 @@ use std::time::Instant;
 
 use super::plan::too_large;
 use super::watch::{Wait, waiting, watched};
-use super::{AGAIN, FAILED, Failure, NOT_STRICT, WRONG, load, next, say, summary, words, wrong};
+use super::{AGAIN, FAILED, Failure, NOT_STRICT, load, next, say, summary, words, wrong};
 use crate::dataset::atomic::nearest_folder;
 use crate::dataset::{DatasetError, Folder};
 use crate::protocol::Status;
@@ -175,11 +175,10 @@ fn subject(arguments: &Arguments) -> Result<(Sweep, Folder), Failure> {
     let folder = Folder::at(path);
     let found = folder.manifest().map_err(Failure::failed)?;
     let Some(manifest) = found else {
-        let message = format!(
-            "error: {}: neither a spec nor a dataset\n  expected: a TOML file, or a folder that `slipsweep run` wrote\n  help: check the path",
+        return Err(wrong(format!(
+            "{}: neither a spec nor a dataset\n  expected: a TOML file, or a folder that `slipsweep run` wrote\n  help: check the path",
             path.display()
-        );
-        return Err(Failure { code: WRONG, message });
+        )));
     };
     if manifest.spec.is_empty() {
         let message = "its manifest is lost and its parts do not carry the spec";
@@ -214,17 +213,19 @@ fn explain(error: RunError, caught: Option<i32>, arguments: &Arguments, (there, 
             | DatasetError::OtherTables { .. }
             | DatasetError::ForeignPart { .. }
             | DatasetError::Occupied { .. },
-        ) => Failure { code: WRONG, message: format!("error: {error}") },
-        RunError::Threads { .. } if arguments.threads.is_some() => {
-            Failure { code: WRONG, message: format!("error: {error}") }
-        }
-        RunError::Dataset(DatasetError::Busy { .. } | DatasetError::Taken { .. }) if arguments.requeue => {
-            Failure { code: AGAIN, message: format!("error: {error}") }
-        }
-        RunError::Dataset(DatasetError::Io { ref source, .. }) if arguments.requeue && is_passing(source) => {
-            Failure { code: AGAIN, message: format!("error: {error}") }
-        }
+        ) => wrong(error),
+        RunError::Threads { .. } if arguments.threads.is_some() => wrong(error),
+        _ if arguments.requeue && may_pass(&error) => Failure { code: AGAIN, message: format!("error: {error}") },
         _ => Failure::failed(error),
+    }
+}
+
+/// Whether another try may succeed.
+fn may_pass(error: &RunError) -> bool {
+    match error {
+        RunError::Dataset(DatasetError::Busy { .. } | DatasetError::Taken { .. }) => true,
+        RunError::Dataset(DatasetError::Io { source, .. }) => is_passing(source),
+        _ => false,
     }
 }
 

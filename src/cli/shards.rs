@@ -5,7 +5,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-use super::{Failure, WRONG, load, say, to_file, words, wrong};
+use super::{Failure, load, say, to_file, words, wrong};
 use crate::dataset::Folder;
 use crate::sweep::{Plan, Shard, check_parts, estimate};
 
@@ -110,32 +110,13 @@ pub fn shards(arguments: &Arguments) -> Result<(), Failure> {
     let rows = plan.tables.iter().fold(0_u64, |sum, table| sum.saturating_add(table.rows));
 
     let engine = arguments.engine;
-    let worth = match arguments.minutes {
-        0.0 => Shard::MOST,
-        minutes => (seconds / (60.0 * minutes * arguments.cpus as f64)) as u64,
-    };
-    let bounds = [
-        (parts, "there are no more parts".to_owned()),
-        (engine.most_tasks(), "MaxArraySize of Slurm allows no more tasks in an array".to_owned()),
-        (worth.max(1), format!("more of them would have less than {} minutes of work each", arguments.minutes)),
-    ];
-    let shares = bounds.iter().map(|(most, _)| *most).fold(arguments.shards, u64::min);
+    let (shares, fewer) = tasks(arguments, parts, seconds);
     let each = seconds / (shares * arguments.cpus) as f64;
 
     let out = absolute(&arguments.out)?;
     let folder = Folder::new(&out, &sweep.name);
     let script = engine.script(folder.path());
-    if engine == Engine::Slurm && out.to_string_lossy().contains('\\') {
-        // Slurm removes backslashes from the path of a log, and reads two of them as an order to leave its patterns alone.
-        return Err(Failure {
-            code: WRONG,
-            message: format!(
-                "error: {}: Slurm writes no log below a folder whose name has a backslash\n  expected: a path without `\\`\n  help: write \
-                 elsewhere with --out DIR",
-                out.display()
-            ),
-        });
-    }
+    check_path(engine, &out)?;
     fs::create_dir_all(&arguments.out).map_err(|error| refused(&arguments.out, "create the folder", &error))?;
     let program =
         std::env::current_exe().map_err(|error| Failure::failed(format!("where is this program? {error}")))?;
@@ -166,7 +147,7 @@ pub fn shards(arguments: &Arguments) -> Result<(), Failure> {
         words::duration(each),
         words::things(arguments.cpus, "processor"),
     );
-    if let Some((_, reason)) = bounds.iter().find(|(most, _)| *most == shares && shares < arguments.shards) {
+    if let Some(reason) = fewer {
         let _ = writeln!(said, "fewer than the {} requested: {reason}", words::count(arguments.shards));
     }
     if engine == Engine::Slurm
@@ -179,13 +160,42 @@ pub fn shards(arguments: &Arguments) -> Result<(), Failure> {
     say(&said)
 }
 
+/// How many tasks there are, and why they are fewer than requested.
+fn tasks(arguments: &Arguments, parts: u64, seconds: f64) -> (u64, Option<String>) {
+    let worth = match arguments.minutes {
+        0.0 => Shard::MOST,
+        minutes => (seconds / (60.0 * minutes * arguments.cpus as f64)) as u64,
+    };
+    let bounds = [
+        (parts, "there are no more parts".to_owned()),
+        (arguments.engine.most_tasks(), "MaxArraySize of Slurm allows no more tasks in an array".to_owned()),
+        (worth.max(1), format!("more of them would have less than {} minutes of work each", arguments.minutes)),
+    ];
+    let tasks = bounds.iter().map(|(most, _)| *most).fold(arguments.shards, u64::min);
+    let reason = bounds.into_iter().find(|(most, _)| *most == tasks && tasks < arguments.shards);
+    (tasks, reason.map(|(_, reason)| reason))
+}
+
+/// That the scheduler can write logs below a folder: Slurm removes backslashes from the path of a log, and reads two of them as an order to
+/// leave its patterns alone.
+fn check_path(engine: Engine, out: &Path) -> Result<(), Failure> {
+    if engine == Engine::Slurm && out.to_string_lossy().contains('\\') {
+        return Err(wrong(format!(
+            "{}: Slurm writes no log below a folder whose name has a backslash\n  expected: a path without `\\`\n  help: write \
+             elsewhere with --out DIR",
+            out.display()
+        )));
+    }
+    Ok(())
+}
+
 fn refused(path: &Path, action: &str, error: &std::io::Error) -> Failure {
     Failure::failed(format!("{}: cannot {action}: {error}\n  help: write elsewhere with --out DIR", path.display()))
 }
 
 /// The path as it is from anywhere. One that is not Unicode cannot stand in a script.
 fn absolute(path: &Path) -> Result<PathBuf, Failure> {
-    let wrong = |why: String| Failure { code: WRONG, message: format!("error: {}: {why}", path.display()) };
+    let wrong = |why: String| wrong(format!("{}: {why}", path.display()));
     let absolute = std::path::absolute(path).map_err(|error| wrong(error.to_string()))?;
     match absolute.to_str() {
         Some(text) if !text.chars().any(char::is_control) => Ok(absolute),

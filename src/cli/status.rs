@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
 use super::shards::{quoted, scripts};
-use super::{FAILED, Failure, WRONG, kind, say, summary, words};
+use super::{FAILED, Failure, kind, say, summary, words, wrong};
 use crate::dataset::{Build, Folder, Look, Manifest, Survey};
 use crate::protocol::Status;
 use crate::sweep::{Plan, Sweep, shares_with};
@@ -31,12 +31,11 @@ pub fn status(arguments: &Arguments) -> Result<(), Failure> {
     kind::expect_rows(path)?;
     let folder = Folder::at(path);
     let Some(manifest) = folder.manifest().map_err(Failure::failed)? else {
-        let message = format!(
-            "error: {}: not a dataset\n  expected: a folder with a manifest.json or at least one part\n  help: name a folder that \
+        return Err(wrong(format!(
+            "{}: not a dataset\n  expected: a folder with a manifest.json or at least one part\n  help: name a folder that \
              `slipsweep run` wrote",
             path.display()
-        );
-        return Err(Failure { code: WRONG, message });
+        )));
     };
     let survey = summary::survey(&folder, &manifest, if arguments.check { Look::Whole } else { Look::Footer });
     let mut text = format!("{}: {}, made by slipsweep {}\n", path.display(), manifest.name, manifest.build.version);

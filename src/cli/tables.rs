@@ -1,8 +1,7 @@
 //! `slipsweep tables [TABLE]`: tables and their columns, from their definitions.
 
-use super::{Failure, say, words, wrong};
+use super::{Failure, no_table, say, words};
 use crate::grid::{Grid, Quantity, Scale};
-use crate::names::hint;
 use crate::table::{self, Kind, STATUS, STATUS_DOC, Table};
 
 /// Arguments of `tables`.
@@ -22,17 +21,11 @@ pub fn tables(arguments: &Arguments) -> Result<(), Failure> {
         None => all,
         Some(name) => match all.iter().find(|table| table.name() == name) {
             Some(table) => vec![*table],
-            None => return Err(unknown(name, &all)),
+            None => return Err(no_table("", name, &all.iter().map(|table| table.name()).collect::<Vec<_>>())),
         },
     };
     let texts: Vec<String> = chosen.into_iter().map(text).collect();
     say(&texts.join("\n"))
-}
-
-fn unknown(name: &str, all: &[&dyn Table]) -> Failure {
-    let names: Vec<&str> = all.iter().map(|table| table.name()).collect();
-    let help = hint(name, names.iter().copied());
-    wrong(format!("no table `{name}`\n  expected: {}\n  help: {help}", names.join(", ")))
 }
 
 /// A line on a table, then its columns with units and meanings.

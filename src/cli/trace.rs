@@ -7,11 +7,11 @@ use clap::ValueEnum;
 use clap::builder::{PossibleValue, PossibleValuesParser, StringValueParser, TypedValueParser};
 
 use super::output::{self, Output};
-use super::{FAILED, Failure, WRONG, dataset, put, say, to_file, words, wrong};
+use super::{FAILED, Failure, WRONG, dataset, no_table, put, say, words, write_file, wrong};
 use crate::dataset::{Cell, Folder, ManifestTable, Row, frame};
 use crate::grid::{Domain, Quantity, RTOL, Scale};
 use crate::model::{Law, Transition, Units};
-use crate::names::nearest;
+use crate::names::hint;
 use crate::plot::table::Condition;
 use crate::protocol::Status;
 use crate::protocol::swift::{self, Case};
@@ -188,8 +188,7 @@ pub fn trace(arguments: &Arguments) -> Result<(), Failure> {
     if output.is_stdout() {
         return put(&bytes);
     }
-    to_file(&output.out, |file| file.write_all(&bytes))
-        .map_err(|error| Failure::failed(format!("cannot write {}: {error}", output.out.display())))?;
+    write_file(&output.out, &bytes)?;
     say(&format!("{header}written to {}\n", output.out.display()))
 }
 
@@ -208,9 +207,8 @@ impl Arguments {
                 folder = self.subject
             )));
         }
-        let needed = [("--t-f", self.t_f), ("--a", self.a), ("--b", self.b), ("--v-i", self.v_i), ("--v-f", self.v_f)];
-        let missing: Vec<&str> =
-            needed.into_iter().filter(|(_, given)| given.is_none()).map(|(flag, _)| flag).collect();
+        let needed = &self.flags()[..5];
+        let missing: Vec<&str> = needed.iter().filter(|(_, is_given)| !is_given).map(|(flag, _)| *flag).collect();
         if !missing.is_empty() {
             return Err(wrong(format!("`{}` needs {}", self.subject, missing.join(", "))));
         }
@@ -227,10 +225,10 @@ impl Arguments {
         })
     }
 
-    /// The protocol of a row of a table.
-    fn row_of(&self, name: &str) -> Result<Asked, Failure> {
-        let given = [
-            ("--t-f", self.t_f.is_some() && name != "step"),
+    /// The flags of the numbers of a protocol, those first that every protocol needs, and whether they are given.
+    fn flags(&self) -> [(&'static str, bool); 12] {
+        [
+            ("--t-f", self.t_f.is_some()),
             ("--a", self.a.is_some()),
             ("--b", self.b.is_some()),
             ("--v-i", self.v_i.is_some()),
@@ -242,18 +240,20 @@ impl Arguments {
             ("--m", self.m.is_some()),
             ("--delta-t", self.delta_t.is_some()),
             ("--unbounded", self.unbounded),
-        ];
-        if let Some((flag, _)) = given.into_iter().find(|(_, is_given)| *is_given) {
+        ]
+    }
+
+    /// The protocol of a row of a table.
+    fn row_of(&self, name: &str) -> Result<Asked, Failure> {
+        let is_own = |flag: &str| !(flag == "--t-f" && name == "step");
+        if let Some((flag, _)) = self.flags().into_iter().find(|(flag, is_given)| *is_given && is_own(flag)) {
             return Err(wrong(format!("{flag}: the row of a dataset has its own\n  help: leave {flag} out")));
         }
         let path = Path::new(&self.subject);
         let (folder, manifest) = dataset(path)?;
         let Some(listed) = manifest.tables.iter().find(|table| table.name == name) else {
             let names: Vec<&str> = manifest.tables.iter().map(|table| table.name.as_str()).collect();
-            let help = nearest(name, names.iter().copied())
-                .map_or_else(|| "choose one of these".to_owned(), |meant| format!("did you mean `{meant}`?"));
-            let names = names.join(", ");
-            return Err(wrong(format!("{}: no table `{name}`\n  expected: {names}\n  help: {help}", path.display())));
+            return Err(no_table(&format!("{}: ", path.display()), name, &names));
         };
         if !trace::TABLES.contains(&name) {
             return Err(wrong(Pathless::Table(name.to_owned())));
@@ -422,8 +422,7 @@ fn the_row(path: &Path, folder: &Folder, table: &ManifestTable, conditions: &[St
             let headings = frame::headings(&file).map_err(Failure::failed)?.0;
             let known: Vec<&str> = headings.iter().map(|heading| heading.name.as_str()).collect();
             if let Some(unknown) = names.iter().find(|name| !known.contains(name)) {
-                let help = nearest(unknown, known.iter().copied())
-                    .map_or_else(|| "choose one of these".to_owned(), |meant| format!("did you mean `{meant}`?"));
+                let help = hint(unknown, known.iter().copied());
                 let expected = known.join(", ");
                 return Err(wrong(format!(
                     "--where: `{}` has no column `{unknown}`\n  expected: {expected}\n  help: {help}",

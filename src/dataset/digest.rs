@@ -275,6 +275,16 @@ fn is_key(name: &str, has_family: bool) -> bool {
     name != axis.name() && (name == Quantity::Family.name() || OPTIMUM_AXES.iter().any(|axis| axis.name() == name))
 }
 
+/// The first row of `stretch` with status `ok`, and the one of least gap.
+fn least_in(stretch: ops::Range<usize>, gaps: &[f64], status: &[Status]) -> Option<(usize, usize)> {
+    let mut rows = stretch.filter(|&row| status[row] == Status::Ok && !gaps[row].is_nan());
+    let first = rows.next()?;
+    Some((first, rows.fold(first, |least, row| if gaps[row] < gaps[least] { row } else { least })))
+}
+
+/// The key of a transition, its first row with status `ok` and its row of least gap.
+type Found = (Vec<f64>, usize, usize);
+
 /// Whether there are many transitions; and of each, or of all if they are many, the first row with status `ok` and the row of least gap, as
 /// places in `sheet`.
 fn least(layout: &Layout, view: &View<'_>, rows: &ops::Range<u64>, sheet: &Sheet) -> (bool, Vec<(usize, usize)>) {
@@ -286,7 +296,7 @@ fn least(layout: &Layout, view: &View<'_>, rows: &ops::Range<u64>, sheet: &Sheet
     // The runs of every key that are not over yet: its value, and the place at which it ends.
     let mut runs: Vec<_> = keys.iter().map(|(_, runs)| (runs.over(rows.clone()), f64::NAN, 0)).collect();
     let family = keys.iter().position(|(axis, _)| *axis == Quantity::Family);
-    let (mut many, mut found) = (false, Vec::<(Vec<f64>, usize, usize)>::new());
+    let (mut many, mut found) = (false, Vec::<Found>::new());
     let (mut place, mut current) = (0, 0);
     while place < sheet.status.len() {
         let mut end = sheet.status.len();
@@ -304,20 +314,9 @@ fn least(layout: &Layout, view: &View<'_>, rows: &ops::Range<u64>, sheet: &Sheet
         if member.is_some_and(|member| !member.arrives()) {
             continue;
         }
-        let mut best: Option<(usize, usize)> = None;
-        for row in stretch {
-            let gap = gaps[row];
-            if gap.is_nan() || sheet.status[row] != Status::Ok {
-                continue;
-            }
-            match &mut best {
-                Some((_, least)) if gap < gaps[*least] => *least = row,
-                Some(_) => {}
-                None => best = Some((row, row)),
-            }
-        }
+        let best = least_in(stretch, gaps, &sheet.status);
         let Some((first, least)) = best else { continue };
-        let is_same = |(key, ..): &(Vec<f64>, usize, usize)| {
+        let is_same = |(key, ..): &Found| {
             many || key.iter().zip(&runs).all(|(key, (_, value, _))| key.to_bits() == value.to_bits())
         };
         if !found.get(current).is_some_and(is_same) {
@@ -330,13 +329,9 @@ fn least(layout: &Layout, view: &View<'_>, rows: &ops::Range<u64>, sheet: &Sheet
         }
         if found.len() > FEW {
             many = true;
-            let is_less =
-                |one: usize, other: usize| gaps[one] < gaps[other] || (gaps[one] == gaps[other] && one < other);
-            found = found
-                .into_iter()
-                .reduce(|one, other| if is_less(other.2, one.2) { other } else { one })
-                .into_iter()
-                .collect();
+            let rank = |row: usize| (gaps[row], row);
+            let less = |one: Found, other: Found| if rank(other.2) < rank(one.2) { other } else { one };
+            found = found.into_iter().reduce(less).into_iter().collect();
             current = 0;
         }
     }

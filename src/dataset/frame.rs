@@ -1,5 +1,6 @@
 //! Columns of a table, read part by part: the memory does not grow with the table.
 
+use std::fs::File;
 use std::path::Path;
 use std::sync::Arc;
 
@@ -213,6 +214,22 @@ pub fn row(path: &Path, row: usize) -> Result<Row, FrameError> {
     if frame.height == 1 { Ok(frame.row(0)) } else { Err(wrong(path, format!("it has no row {row}"))) }
 }
 
+/// What a Parquet file says of itself, checked: a few bytes can stand for any number of rows. Words are read as codes, whoever wrote them.
+///
+/// What Arrow or pandas add to a file about its types is not asked for: a column is what Parquet says that it is.
+pub(crate) fn coded(file: &File) -> Result<ArrowReaderMetadata, ParquetError> {
+    check_footer(file)?;
+    let plain = ArrowReaderMetadata::load(file, ArrowReaderOptions::new().with_skip_arrow_metadata(true))?;
+    check_pages(file, plain.metadata())?;
+    let coded = |field: &FieldRef| match field.data_type() {
+        DataType::Utf8 => Arc::new(field.as_ref().clone().with_data_type(label())),
+        _ => field.clone(),
+    };
+    let schema: Fields = plain.schema().fields().iter().map(coded).collect();
+    let options = ArrowReaderOptions::new().with_schema(Arc::new(Schema::new(schema)));
+    ArrowReaderMetadata::try_new(plain.metadata().clone(), options)
+}
+
 /// Which rows of a file are read.
 enum Rows<'a> {
     All,
@@ -226,18 +243,7 @@ enum Rows<'a> {
 fn open(path: &Path, names: Option<&[&str]>, rows: Rows<'_>) -> Result<Frame, FrameError> {
     let read = || -> Result<Frame, ParquetError> {
         let file = file::open(path)?;
-        let plain = ArrowReaderOptions::new().with_skip_arrow_metadata(true);
-        check_footer(&file)?;
-        let plain = ArrowReaderMetadata::load(&file, plain)?;
-        check_pages(&file, plain.metadata())?;
-        // Words as codes, whoever wrote them.
-        let coded = |field: &FieldRef| match field.data_type() {
-            DataType::Utf8 => Arc::new(field.as_ref().clone().with_data_type(label())),
-            _ => field.clone(),
-        };
-        let schema: Fields = plain.schema().fields().iter().map(coded).collect();
-        let options = ArrowReaderOptions::new().with_schema(Arc::new(Schema::new(schema)));
-        let metadata = ArrowReaderMetadata::try_new(plain.metadata().clone(), options)?;
+        let metadata = coded(&file)?;
         let mut builder =
             ParquetRecordBatchReaderBuilder::new_with_metadata(file, metadata).with_batch_size(ROWS_AT_ONCE);
         if let Some(names) = names {

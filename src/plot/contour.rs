@@ -16,39 +16,20 @@ pub struct Field<'a> {
 /// An edge of the grid: its first corner, and whether it leads to the next row.
 type Edge = (usize, bool);
 
+/// The edges that pieces of lines lead to from each edge.
+type Pieces = BTreeMap<Edge, Vec<Edge>>;
+
 /// The lines `field = level`, in units of columns and rows. Cells with a corner without value have none.
 pub fn contour(field: Field<'_>, level: f64) -> Vec<Vec<(f64, f64)>> {
     let Field { columns, rows, values } = field;
     if columns < 2 || rows < 2 || values.len() < columns * rows {
         return Vec::new();
     }
-    let mut next: BTreeMap<Edge, Vec<Edge>> = BTreeMap::new();
-    for row in 0..rows - 1 {
-        for column in 0..columns - 1 {
-            let corner = row * columns + column;
-            let corners = [corner, corner + 1, corner + columns + 1, corner + columns];
-            let heights = corners.map(|corner| values[corner] - level);
-            if heights.iter().any(|height| height.is_nan()) {
-                continue;
-            }
-            let above = heights.map(|height| height >= 0.0);
-            // Edges of the cell, in the order of its corners.
-            let edges: [Edge; 4] = [(corner, false), (corner + 1, true), (corner + columns, false), (corner, true)];
-            let crossed: Vec<Edge> =
-                (0..4).filter(|&side| above[side] != above[(side + 1) % 4]).map(|side| edges[side]).collect();
-            let pairs = match crossed.len() {
-                2 => vec![(crossed[0], crossed[1])],
-                // A saddle: the mean tells which corners belong together.
-                4 if (heights.iter().sum::<f64>() >= 0.0) == above[0] => {
-                    vec![(crossed[0], crossed[1]), (crossed[2], crossed[3])]
-                }
-                4 => vec![(crossed[3], crossed[0]), (crossed[1], crossed[2])],
-                _ => continue,
-            };
-            for (from, to) in pairs {
-                next.entry(from).or_default().push(to);
-                next.entry(to).or_default().push(from);
-            }
+    let mut pieces = Pieces::new();
+    for corner in (0..(rows - 1) * columns).filter(|corner| corner % columns < columns - 1) {
+        for (from, to) in crossings(corner, columns, |corner| values[corner] - level) {
+            pieces.entry(from).or_default().push(to);
+            pieces.entry(to).or_default().push(from);
         }
     }
     let place = |(corner, upwards): Edge| {
@@ -58,20 +39,43 @@ pub fn contour(field: Field<'_>, level: f64) -> Vec<Vec<(f64, f64)>> {
         let (x, y) = ((corner % columns) as f64, (corner / columns) as f64);
         if upwards { (x, y + share) } else { (x + share, y) }
     };
+    joined(pieces).into_iter().map(|line| line.into_iter().map(place).collect()).collect()
+}
+
+/// The pieces of lines through the cell whose first corner is `corner`, from edge to edge.
+fn crossings(corner: usize, columns: usize, height: impl Fn(usize) -> f64) -> Vec<(Edge, Edge)> {
+    let heights = [corner, corner + 1, corner + columns + 1, corner + columns].map(height);
+    if heights.iter().any(|height| height.is_nan()) {
+        return Vec::new();
+    }
+    let above = heights.map(|height| height >= 0.0);
+    // Edges of the cell, in the order of its corners.
+    let edges: [Edge; 4] = [(corner, false), (corner + 1, true), (corner + columns, false), (corner, true)];
+    let crossed: Vec<Edge> =
+        (0..4).filter(|&side| above[side] != above[(side + 1) % 4]).map(|side| edges[side]).collect();
+    match crossed[..] {
+        [a, b] => vec![(a, b)],
+        // A saddle: the mean tells which corners belong together.
+        [a, b, c, d] if (heights.iter().sum::<f64>() >= 0.0) == above[0] => vec![(a, b), (c, d)],
+        [a, b, c, d] => vec![(d, a), (b, c)],
+        _ => Vec::new(),
+    }
+}
+
+/// The pieces joined to lines: open lines start where only one piece does, what is left are rings.
+fn joined(mut pieces: Pieces) -> Vec<Vec<Edge>> {
+    let starts: Vec<Edge> = pieces.iter().filter(|(_, to)| to.len() == 1).map(|(edge, _)| *edge).collect();
+    let all: Vec<Edge> = pieces.keys().copied().collect();
     let mut lines = Vec::new();
-    // Open lines start where only one piece does; what is left are rings.
-    let starts: Vec<Edge> = next.iter().filter(|(_, to)| to.len() == 1).map(|(edge, _)| *edge).collect();
-    let all: Vec<Edge> = next.keys().copied().collect();
     for start in starts.into_iter().chain(all) {
-        let mut line = vec![place(start)];
-        let mut here = start;
-        while let Some(to) = next.get_mut(&here).and_then(Vec::pop) {
-            if let Some(back) = next.get_mut(&to)
+        let (mut line, mut here) = (vec![start], start);
+        while let Some(to) = pieces.get_mut(&here).and_then(Vec::pop) {
+            if let Some(back) = pieces.get_mut(&to)
                 && let Some(entry) = back.iter().position(|edge| *edge == here)
             {
                 back.swap_remove(entry);
             }
-            line.push(place(to));
+            line.push(to);
             here = to;
         }
         if line.len() > 1 {

@@ -166,6 +166,9 @@ pub struct Marker {
     pub series: usize,
 }
 
+/// Curves through fewer points show them.
+pub const MARKED: usize = 50;
+
 /// A row as a mark.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Dot {
@@ -211,6 +214,26 @@ pub enum Key {
     None,
 }
 
+impl Key {
+    /// The line of series number `series`, with its marks if they are drawn.
+    pub fn series(series: usize, is_marked: bool) -> Key {
+        let stroke = super::colour::series(series);
+        if is_marked { Key::Marked(stroke, Marker { series }) } else { Key::Line(stroke) }
+    }
+}
+
+impl Entry {
+    /// Entries for several curves, one for each that is drawn in place of all that it leads.
+    pub fn of_series(names: &[impl AsRef<str>], leaders: &[usize], key: impl Fn(usize) -> Key) -> Vec<Entry> {
+        let drawn = (0..names.len()).filter(|&place| leaders[place] == place && names.len() > 1);
+        let entry = |place| {
+            let same = names.iter().zip(leaders).filter(|(_, leader)| **leader == place);
+            Entry { key: key(place), text: same.map(|(name, _)| name.as_ref()).collect::<Vec<_>>().join("; ") }
+        };
+        drawn.map(entry).collect()
+    }
+}
+
 /// A figure as SVG, and where its maps are.
 #[derive(Debug, Clone)]
 pub struct Drawn {
@@ -220,6 +243,25 @@ pub struct Drawn {
     pub size: (f64, f64),
     /// Maps with values, and where they are in the picture.
     pub hovers: Vec<(Area, Axis, Axis, Hover)>,
+}
+
+/// The ticks of a panel, and whether its axes are labelled.
+struct Plan {
+    x: Ticks,
+    y: Ticks,
+    x_label: bool,
+    y_label: bool,
+}
+
+/// Where panels of one size stand: the room around them in each column and row.
+struct Layout {
+    plans: Vec<Plan>,
+    lefts: Vec<f64>,
+    rights: Vec<f64>,
+    aboves: Vec<f64>,
+    belows: Vec<f64>,
+    width: f64,
+    height: f64,
 }
 
 /// Room around a panel for its labels.
@@ -308,6 +350,46 @@ impl Figure {
         axes.chain(self.colours.iter().map(|colours| colours.scale)).any(|scale| scale.needs_powers())
     }
 
+    /// How panels are set out on `inner` points.
+    fn layout(&self, inner: f64, as_powers: bool) -> Layout {
+        let columns = self.columns.clamp(1, self.panels.len().max(1));
+        let rows = self.panels.len().div_ceil(columns);
+        // A first guess of a panel's width decides how many ticks it has, and so how much room their labels take.
+        let guess = inner / columns as f64 - 40.0;
+        let plan = |(place, panel): (usize, &Panel)| {
+            let x_count = panel.x.fitting(guess, false);
+            let y_count = panel.y.fitting(guess * self.aspect, true);
+            let same_below = self.panels.get(place + columns).is_some_and(|below| below.x.same(&panel.x));
+            Plan {
+                x: panel.x.scale.ticks(x_count, as_powers),
+                y: panel.y.scale.ticks(y_count, as_powers),
+                x_label: !(self.shared && same_below),
+                y_label: !self.shared || place.is_multiple_of(columns),
+            }
+        };
+        let plans: Vec<Plan> = self.panels.iter().enumerate().map(plan).collect();
+        let mut lefts = vec![0.0_f64; columns];
+        let mut rights = vec![0.0_f64; columns];
+        let mut belows = vec![0.0_f64; rows];
+        for (place, (panel, plan)) in self.panels.iter().zip(&plans).enumerate() {
+            let room = panel.room(plan, guess);
+            let (row, column) = (place / columns, place % columns);
+            lefts[column] = lefts[column].max(room.left);
+            rights[column] = rights[column].max(room.right);
+            belows[row] = belows[row].max(room.below);
+        }
+        let room: f64 = lefts.iter().sum::<f64>() + rights.iter().sum::<f64>();
+        let width = ((inner - room) / columns as f64).max(20.0);
+        let lines = self.panels.iter().map(|panel| wrapped(&panel.title, SIZE, width).len()).max().unwrap_or(0);
+        let above = if lines > 0 { lines as f64 * (SIZE + 1.5) + TITLE_SPACE } else { 4.0 };
+        // Titles of columns stand above the first row.
+        let titled = |row: usize| if row == 0 || self.rows.is_empty() { above } else { 4.0 };
+        let words = |row: &[Panel]| if row.iter().any(Panel::has_words_above) { WORDS_ABOVE } else { 0.0 };
+        let aboves = self.panels.chunks(columns).enumerate().map(|(row, panels)| titled(row) + words(panels)).collect();
+        Layout { plans, lefts, rights, aboves, belows, width, height: (width * self.aspect).max(20.0) }
+    }
+
+    /// Draws the panels and the colour bar; the place below them, and the maps.
     fn panels(
         &self,
         canvas: &mut Canvas,
@@ -315,74 +397,33 @@ impl Figure {
         inner: f64,
         as_powers: bool,
     ) -> (f64, Vec<(Area, Axis, Axis, Hover)>) {
-        let columns = self.columns.clamp(1, self.panels.len().max(1));
-        let rows = self.panels.len().div_ceil(columns);
-        let count = self.panels.len();
-        // A first guess of a panel's width decides how many ticks it has, and so how much room their labels take.
-        let guess = inner / columns as f64 - 40.0;
-        let aspect = self.aspect;
-        let plans: Vec<(Ticks, Ticks)> = self
-            .panels
-            .iter()
-            .map(|panel| {
-                let x_count = panel.x.fitting(guess, false);
-                let y_count = panel.y.fitting(guess * aspect, true);
-                (panel.x.scale.ticks(x_count, as_powers), panel.y.scale.ticks(y_count, as_powers))
-            })
-            .collect();
-        let labelled = |place: usize| {
-            let same_below = self.panels.get(place + columns).is_some_and(|below| below.x.same(&self.panels[place].x));
-            let is_first = place.is_multiple_of(columns);
-            (!(self.shared && same_below && place + columns < count), !self.shared || is_first)
-        };
-        let mut lefts = vec![0.0_f64; columns];
-        let mut rights = vec![0.0_f64; columns];
-        let mut belows = vec![0.0_f64; rows];
-        for (place, (panel, (x, y))) in self.panels.iter().zip(&plans).enumerate() {
-            let room = panel.room(x, y, labelled(place), guess);
-            let (row, column) = (place / columns, place % columns);
-            lefts[column] = lefts[column].max(room.left);
-            rights[column] = rights[column].max(room.right);
-            belows[row] = belows[row].max(room.below);
-        }
-        let room: f64 = lefts.iter().sum::<f64>() + rights.iter().sum::<f64>();
-        let panel_width = ((inner - room) / columns as f64).max(20.0);
-        let lines = self.panels.iter().map(|panel| wrapped(&panel.title, SIZE, panel_width).len()).max().unwrap_or(0);
-        let above = if lines > 0 { lines as f64 * (SIZE + 1.5) + TITLE_SPACE } else { 4.0 };
-        // Titles of columns stand above the first row.
-        let titled = |row: usize| if row == 0 || self.rows.is_empty() { above } else { 4.0 };
-        let has_words = |row: usize| self.panels.iter().skip(row * columns).take(columns).any(Panel::has_words_above);
-        let above: Vec<f64> =
-            (0..rows).map(|row| titled(row) + if has_words(row) { WORDS_ABOVE } else { 0.0 }).collect();
-        let panel_height = (panel_width * aspect).max(20.0);
+        let layout = self.layout(inner, as_powers);
+        let Layout { width, height, .. } = layout;
+        let columns = layout.lefts.len();
         let mut y = top;
         let mut hovers = Vec::new();
-        for (row, (above, below)) in above.iter().zip(&belows).enumerate() {
-            y += above;
+        for (row, panels) in self.panels.chunks(columns).enumerate() {
+            y += layout.aboves[row];
             let mut x = MARGIN;
-            for column in 0..columns {
-                x += lefts[column];
-                let place = row * columns + column;
-                if let Some(panel) = self.panels.get(place) {
-                    let area = Area { x, y, width: panel_width, height: panel_height };
-                    panel.draw(canvas, area, &plans[place], labelled(place), lefts[column]);
-                    for layer in &panel.layers {
-                        if let Layer::Map(Map { hover: Some(hover), .. }) = layer {
-                            hovers.push((area, panel.x.clone(), panel.y.clone(), hover.clone()));
-                        }
+            for (column, panel) in panels.iter().enumerate() {
+                x += layout.lefts[column];
+                let area = Area { x, y, width, height };
+                panel.draw(canvas, area, &layout.plans[row * columns + column], layout.lefts[column]);
+                for layer in &panel.layers {
+                    if let Layer::Map(Map { hover: Some(hover), .. }) = layer {
+                        hovers.push((area, panel.x.clone(), panel.y.clone(), hover.clone()));
                     }
                 }
-                x += panel_width + rights[column];
+                x += width + layout.rights[column];
             }
             if let Some(title) = self.rows.get(row) {
-                let place = (MARGIN + inner + SIZE, y + 0.5 * panel_height);
-                canvas.text(place, title, SIZE, Anchor::Middle, true);
+                canvas.text((MARGIN + inner + SIZE, y + 0.5 * height), title, SIZE, Anchor::Middle, true);
             }
-            y += panel_height + below;
+            y += height + layout.belows[row];
         }
         if let Some(colours) = &self.colours {
-            let first = top + above.first().copied().unwrap_or(0.0);
-            let tall = y - belows.last().copied().unwrap_or(0.0) - first;
+            let first = top + layout.aboves.first().copied().unwrap_or(0.0);
+            let tall = y - layout.belows.last().copied().unwrap_or(0.0) - first;
             let beside = if self.rows.is_empty() { 0.0 } else { ROW_TITLE };
             let area = Area { x: MARGIN + inner + beside + 6.0, y: first, width: 8.0, height: tall };
             colours.draw(canvas, area, as_powers);
@@ -424,97 +465,99 @@ fn widest(ticks: &Ticks) -> f64 {
 
 impl Panel {
     /// Room for the labels around a panel about `length` wide.
-    fn room(&self, x: &Ticks, y: &Ticks, (x_label, y_label): (bool, bool), length: f64) -> Room {
+    fn room(&self, Plan { x, y, x_label, y_label }: &Plan, length: f64) -> Room {
         // The first and the last label of the horizontal axis may hang over.
         let over = |tick: &Tick, share: f64| {
             0.5 * TICK_SIZE * tick.label.as_deref().map_or(0.0, label::width) - share.max(0.0) * length
         };
         let before = x.ticks.iter().map(|tick| over(tick, self.x.scale.share(tick.value))).fold(0.0, f64::max);
         let after = x.ticks.iter().map(|tick| over(tick, 1.0 - self.x.scale.share(tick.value))).fold(0.0, f64::max);
-        let labels = if y_label { TICK + 2.0 + widest(y) + 3.0 + SIZE + 3.0 } else { 5.0 };
-        let below = if x_label { TICK + TICK_SIZE + 4.0 + SIZE + 6.0 } else { 2.0 };
+        let labels = if *y_label { TICK + 2.0 + widest(y) + 3.0 + SIZE + 3.0 } else { 5.0 };
+        let below = if *x_label { TICK + TICK_SIZE + 4.0 + SIZE + 6.0 } else { 2.0 };
         Room { left: labels.max(before + 3.0), right: after + 2.0, below }
     }
 
-    fn draw(&self, canvas: &mut Canvas, area: Area, plan: &(Ticks, Ticks), labelled: (bool, bool), left: f64) {
-        let place = |(x, y): (f64, f64)| {
-            (area.x + area.width * self.x.scale.share(x), area.y + area.height * (1.0 - self.y.scale.share(y)))
-        };
-        let all = |lines: &[Vec<(f64, f64)>]| -> Vec<Vec<(f64, f64)>> {
-            lines.iter().flat_map(|line| pieces(line.iter().map(|point| place(*point)))).collect()
-        };
-        canvas.clipped(area, |canvas| {
-            for layer in &self.layers {
-                match layer {
-                    Layer::Hatch => canvas.hatch(area),
-                    Layer::Map(map) => canvas.image(area, &map.png),
-                    Layer::Lines(lines, stroke) => canvas.lines(&all(lines), stroke),
-                    Layer::Contour(lines, stroke) => contour_line(canvas, &all(lines), stroke),
-                    Layer::Mark(x, _, stroke) => {
-                        let (x, _) = place((*x, self.y.scale.low));
-                        canvas.line((x, area.y), (x, area.y + area.height), stroke);
-                    }
-                    Layer::Level(y, stroke) => {
-                        let (_, y) = place((self.x.scale.low, *y));
-                        canvas.line((area.x, y), (area.x + area.width, y), stroke);
-                    }
-                    Layer::Band(points, colour) => {
-                        for run in points.split(|(_, low, high)| !(low.is_finite() && high.is_finite())) {
-                            let lower = run.iter().map(|&(x, low, _)| place((x, low)));
-                            let upper = run.iter().rev().map(|&(x, _, high)| place((x, high)));
-                            canvas.shape(&lower.chain(upper).collect::<Vec<_>>(), &hex(*colour), None);
-                        }
-                    }
-                    Layer::Bars(bars, colour) => {
-                        for &(from, to, height) in bars.iter().filter(|(.., height)| *height > 0.0) {
-                            let ((left, top), (right, bottom)) = (place((from, height)), place((to, 0.0)));
-                            let bar = Area { x: left, y: top, width: right - left, height: bottom - top };
-                            canvas.fill(bar, &hex(*colour));
-                            canvas.frame(bar, &Stroke::solid("#000", 0.3));
-                        }
-                    }
-                    Layer::Points(..) | Layer::Dots(_) | Layer::Names(_) | Layer::Stars(_) => {}
-                }
-            }
-        });
+    fn draw(&self, canvas: &mut Canvas, area: Area, plan: &Plan, left: f64) {
+        canvas.clipped(area, |canvas| self.layers.iter().for_each(|layer| self.fill(canvas, area, layer)));
         // Marks on the frame are not to be cut.
-        let inside = |&(x, y): &(f64, f64)| {
-            let (x, y) = (self.x.scale.share(x), self.y.scale.share(y));
-            (-1e-9..=1.0 + 1e-9).contains(&x) && (-1e-9..=1.0 + 1e-9).contains(&y)
-        };
         canvas.frame(area, &Stroke::solid("#000", FRAME));
-        for layer in &self.layers {
-            match layer {
-                Layer::Points(points, marker) => {
-                    points.iter().filter(|point| inside(point)).for_each(|point| marker.draw(canvas, place(*point)));
-                }
-                Layer::Dots(dots) => {
-                    for Dot { at, fill, shape } in dots.iter().filter(|dot| inside(&dot.at)) {
-                        let (x, y) = place(*at);
-                        match fill {
-                            Some(fill) => symbol(canvas, (x, y), *shape, &hex(*fill), &dot_rim()),
-                            None => symbol(canvas, (x, y), *shape, "none", &Stroke::solid("#888", 0.4)),
-                        }
-                    }
-                }
-                Layer::Names(names) => {
-                    names
-                        .iter()
-                        .filter(|(at, _)| inside(at))
-                        .for_each(|(at, name)| beside(canvas, area, place(*at), name));
-                }
-                Layer::Stars(points) => {
-                    points.iter().filter(|point| inside(point)).for_each(|point| clear(canvas, area, place(*point)));
-                }
-                _ => {}
-            }
-        }
+        self.layers.iter().for_each(|layer| self.mark(canvas, area, layer));
         self.marks(canvas, area);
-        self.ticks(canvas, area, plan, labelled, left);
+        self.ticks(canvas, area, plan, left);
         for (line, title) in wrapped(&self.title, SIZE, area.width).iter().rev().enumerate() {
             let above = if self.has_words_above() { WORDS_ABOVE } else { 0.0 };
             let y = area.y - TITLE_SPACE - above - line as f64 * (SIZE + 1.5);
             canvas.text((area.x, y), title, SIZE, Anchor::Start, false);
+        }
+    }
+
+    /// Where a point is on the sheet.
+    fn place(&self, area: Area, (x, y): (f64, f64)) -> (f64, f64) {
+        (area.x + area.width * self.x.scale.share(x), area.y + area.height * (1.0 - self.y.scale.share(y)))
+    }
+
+    /// Draws what is cut at the frame: areas and lines.
+    fn fill(&self, canvas: &mut Canvas, area: Area, layer: &Layer) {
+        let place = |point| self.place(area, point);
+        let all = |lines: &[Vec<(f64, f64)>]| -> Vec<Vec<(f64, f64)>> {
+            lines.iter().flat_map(|line| pieces(line.iter().map(|point| place(*point)))).collect()
+        };
+        match layer {
+            Layer::Hatch => canvas.hatch(area),
+            Layer::Map(map) => canvas.image(area, &map.png),
+            Layer::Lines(lines, stroke) => canvas.lines(&all(lines), stroke),
+            Layer::Contour(lines, stroke) => contour_line(canvas, &all(lines), stroke),
+            Layer::Mark(x, _, stroke) => {
+                let (x, _) = place((*x, self.y.scale.low));
+                canvas.line((x, area.y), (x, area.y + area.height), stroke);
+            }
+            Layer::Level(y, stroke) => {
+                let (_, y) = place((self.x.scale.low, *y));
+                canvas.line((area.x, y), (area.x + area.width, y), stroke);
+            }
+            Layer::Band(points, colour) => {
+                for run in points.split(|(_, low, high)| !(low.is_finite() && high.is_finite())) {
+                    let lower = run.iter().map(|&(x, low, _)| place((x, low)));
+                    let upper = run.iter().rev().map(|&(x, _, high)| place((x, high)));
+                    canvas.shape(&lower.chain(upper).collect::<Vec<_>>(), &hex(*colour), None);
+                }
+            }
+            Layer::Bars(bars, colour) => {
+                for &(from, to, height) in bars.iter().filter(|(.., height)| *height > 0.0) {
+                    let ((left, top), (right, bottom)) = (place((from, height)), place((to, 0.0)));
+                    let bar = Area { x: left, y: top, width: right - left, height: bottom - top };
+                    canvas.fill(bar, &hex(*colour));
+                    canvas.frame(bar, &Stroke::solid("#000", 0.3));
+                }
+            }
+            Layer::Points(..) | Layer::Dots(_) | Layer::Names(_) | Layer::Stars(_) => {}
+        }
+    }
+
+    /// Draws the marks of points inside, whole.
+    fn mark(&self, canvas: &mut Canvas, area: Area, layer: &Layer) {
+        let inside = |&(x, y): &(f64, f64)| {
+            let is_share = |share: f64| (-1e-9..=1.0 + 1e-9).contains(&share);
+            (is_share(self.x.scale.share(x)) && is_share(self.y.scale.share(y))).then(|| self.place(area, (x, y)))
+        };
+        match layer {
+            Layer::Points(points, marker) => {
+                points.iter().filter_map(inside).for_each(|place| marker.draw(canvas, place));
+            }
+            Layer::Dots(dots) => {
+                for (place, dot) in dots.iter().filter_map(|dot| Some((inside(&dot.at)?, dot))) {
+                    match dot.fill {
+                        Some(fill) => symbol(canvas, place, dot.shape, &hex(fill), &dot_rim()),
+                        None => symbol(canvas, place, dot.shape, "none", &Stroke::solid("#888", 0.4)),
+                    }
+                }
+            }
+            Layer::Names(names) => {
+                let names = names.iter().filter_map(|(at, name)| Some((inside(at)?, name)));
+                names.for_each(|(place, name)| beside(canvas, area, place, name));
+            }
+            Layer::Stars(points) => points.iter().filter_map(inside).for_each(|place| clear(canvas, area, place)),
+            _ => {}
         }
     }
 
@@ -546,14 +589,7 @@ impl Panel {
     }
 
     /// Ticks and labels; the label of the vertical axis is at the outer edge of the room to the left, `left` wide.
-    fn ticks(
-        &self,
-        canvas: &mut Canvas,
-        area: Area,
-        (x, y): &(Ticks, Ticks),
-        (x_label, y_label): (bool, bool),
-        left: f64,
-    ) {
+    fn ticks(&self, canvas: &mut Canvas, area: Area, Plan { x, y, x_label, y_label }: &Plan, left: f64) {
         let thin = Stroke::solid("#000", FRAME);
         let (bottom, right) = (area.y + area.height, area.x + area.width);
         let mut edge = f64::NEG_INFINITY;
@@ -564,7 +600,7 @@ impl Panel {
             }
             let length = if tick.label.is_some() { TICK } else { 0.6 * TICK };
             canvas.line((place, bottom), (place, bottom + length), &thin);
-            if let (true, Some(words)) = (x_label, &tick.label) {
+            if let (true, Some(words)) = (*x_label, &tick.label) {
                 let half = 0.5 * TICK_SIZE * label::width(words);
                 if place - half > edge + 2.0 {
                     canvas.text((place, bottom + TICK + 1.0 + TICK_SIZE), words, TICK_SIZE, Anchor::Middle, false);
@@ -580,7 +616,7 @@ impl Panel {
             }
             let length = if tick.label.is_some() { TICK } else { 0.6 * TICK };
             canvas.line((area.x - length, place), (area.x, place), &thin);
-            if let (true, Some(words)) = (y_label, &tick.label)
+            if let (true, Some(words)) = (*y_label, &tick.label)
                 && edge - place > TICK_SIZE + 0.5
             {
                 let right = area.x - TICK - 2.0;
@@ -588,12 +624,12 @@ impl Panel {
                 edge = place;
             }
         }
-        if x_label {
+        if *x_label {
             let words = self.x.label(x.power);
             let place = (area.x + 0.5 * area.width, bottom + TICK + TICK_SIZE + 4.0 + SIZE);
             canvas.text(place, &words, SIZE, Anchor::Middle, false);
         }
-        if y_label {
+        if *y_label {
             let words = self.y.label(y.power);
             canvas.text((area.x - left + SIZE + 1.0, area.y + 0.5 * area.height), &words, SIZE, Anchor::Middle, true);
         }

@@ -5,7 +5,7 @@ use std::path::Path;
 use super::canvas::Stroke;
 use super::colour::{self, MOST_SERIES};
 use super::error::PlotError;
-use super::figure::{Axis, Entry, Figure, Key, Layer, Marker, Panel};
+use super::figure::{Axis, Entry, Figure, Key, Layer, MARKED, Marker, Panel};
 use super::scale::Scale;
 use super::{coincide, label};
 use crate::dataset::frame::{self, Cells, Facts};
@@ -22,8 +22,8 @@ const MOST_POINTS: usize = 8000;
 /// are compared in one.
 const SHOWN: [&[&str]; 3] = [&["v", "v_c"], &["theta"], &["tau"]];
 
-/// Curves through fewer equally spaced points show them.
-const MARKED: usize = 50;
+/// Unit of axes on which the least velocity of the model is 1.
+const UNIT_OF_BOUND: &str = "v_0";
 
 /// A trace read back.
 #[derive(Debug, Clone)]
@@ -137,147 +137,157 @@ fn unit(name: &str) -> &'static str {
     }
 }
 
+impl Course {
+    fn column(&self, name: &str) -> Option<&Column> {
+        self.columns.iter().find(|column| column.name == name)
+    }
+
+    /// Its points in a panel: a column over the time.
+    fn points(&self, name: &str) -> Option<Vec<(f64, f64)>> {
+        let (t, values) = (self.column("t")?, self.column(name)?);
+        Some(thinned(t.cells.iter().copied().zip(values.cells.iter().copied()).collect()))
+    }
+
+    fn is_marked(&self) -> bool {
+        self.points.is_some_and(|points| points < MARKED)
+    }
+}
+
 /// A curve of a panel: the number of its trace, that of its column, and its points.
-type Curve = (usize, usize, Vec<(f64, f64)>);
+struct Curve {
+    course: usize,
+    rank: usize,
+    points: Vec<(f64, f64)>,
+}
 
 /// The figure of traces: a panel for each column that any of them has.
 pub fn figure(courses: &[Course]) -> Result<Figure, PlotError> {
     if courses.len() > MOST_SERIES {
         return Err(PlotError::TooManyTraces { found: courses.len(), most: MOST_SERIES });
     }
-    fn column<'a>(course: &'a Course, name: &str) -> Option<&'a Column> {
-        course.columns.iter().find(|column| column.name == name)
-    }
-    let all = |name: &str| {
-        courses
-            .iter()
-            .filter_map(|course| column(course, name))
-            .flat_map(|column| column.cells.clone())
-            .collect::<Vec<_>>()
-    };
-    let unit =
-        |name: &str| courses.iter().find_map(|course| Some(column(course, name)?.unit.clone())).unwrap_or_default();
-    for name in SHOWN.iter().flat_map(|names| names.iter().copied()).chain(["t"]) {
-        let mut units = courses.iter().filter_map(|course| Some(column(course, name)?.unit.as_str()));
-        let first = units.next();
-        if let (Some(first), Some(other)) = (first, units.find(|unit| Some(*unit) != first)) {
-            let units = [first.to_owned(), other.to_owned()];
-            return Err(PlotError::Units { column: name.to_owned(), units });
-        }
-    }
-    let has = |name: &str| courses.iter().any(|course| column(course, name).is_some());
-    let time = Scale { log: false, ..Scale::of(all("t")).ok_or(PlotError::Nothing)? };
-    let x = time.with_room(0.03);
+    one_unit(courses)?;
+    let time = Scale { log: false, ..Scale::of(cells(courses, "t")).ok_or(PlotError::Nothing)? };
+    let axis = |names: &[&str], scale| Axis { column: names.join(", "), unit: unit_in(courses, names[0]), scale };
     let mut panels = Vec::new();
-    // The curves of each panel.
-    let mut curves: Vec<Vec<Curve>> = Vec::new();
     for names in SHOWN {
-        let names: Vec<&str> = names.iter().copied().filter(|name| has(name)).collect();
-        let Some(scale) = Scale::of(names.iter().flat_map(|name| all(name))) else { continue };
-        let y = Axis { column: names.join(", "), unit: unit(names[0]), scale: scale.with_room(0.06) };
-        let mut layers = Vec::new();
-        if names[0] == "v" && (0.0..2.0).contains(&scale.low) && bound(&y.unit) {
-            layers.push(Layer::Level(1.0, Stroke { colour: "#888".to_owned(), width: 0.5, dashes: &[1.0, 1.5] }));
-        }
-        let mut drawn = Vec::new();
-        for (place, course) in courses.iter().enumerate() {
-            for (rank, name) in names.iter().enumerate() {
-                let (Some(t), Some(values)) = (column(course, "t"), column(course, name)) else { continue };
-                drawn.push((place, rank, thinned(t.cells.iter().copied().zip(values.cells.iter().copied()).collect())));
-            }
-        }
-        curves.push(drawn);
-        panels.push(Panel {
-            title: String::new(),
-            x: Axis { column: "t".to_owned(), unit: unit("t"), scale: x },
-            y,
-            layers,
-        });
-    }
-    // Courses that lie on each other in all panels are one.
-    let shares: Vec<Vec<Curve>> = panels
-        .iter()
-        .zip(&curves)
-        .map(|(panel, curves)| {
-            let share = |(x, y): &(f64, f64)| (panel.x.scale.share(*x), panel.y.scale.share(*y));
-            curves.iter().map(|(place, rank, points)| (*place, *rank, points.iter().map(share).collect())).collect()
-        })
-        .collect();
-    let leaders = coincide::leaders(courses.len(), |one, other| {
-        shares.iter().all(|curves| {
-            let of = |course| curves.iter().filter(move |(place, ..)| *place == course);
-            let same = |((_, rank, a), (_, other, b)): (&(usize, usize, _), &(usize, usize, _))| {
-                rank == other && coincide::anywhere(a as &Vec<(f64, f64)>, b as &Vec<(f64, f64)>)
-            };
-            of(one).count() == of(other).count() && of(one).zip(of(other)).all(same)
-        })
-    });
-    let is_marked = |place: usize| courses[place].points.is_some_and(|points| points < MARKED);
-    for (panel, curves) in panels.iter_mut().zip(curves) {
-        for (place, rank, points) in curves.into_iter().filter(|(place, ..)| leaders[*place] == *place) {
-            let stroke = if rank == 0 { colour::series(place) } else { control(place) };
-            panel.layers.push(Layer::Lines(vec![points.clone()], stroke));
-            if is_marked(place) && rank == 0 {
-                panel.layers.push(Layer::Points(points, Marker { series: place }));
-            }
-        }
-    }
-    // What all of them have in common is said once, what tells them apart in the legend.
-    let known: Vec<&Course> = courses.iter().filter(|course| !course.parameters.is_empty()).collect();
-    let common: Vec<&(String, f64)> = known.first().map_or_else(Vec::new, |first| {
-        first.parameters.iter().filter(|entry| known.iter().all(|course| course.parameters.contains(entry))).collect()
-    });
-    let unit_of_time = unit("t");
-    let list = |entries: &[&(String, f64)]| {
-        let words = entries
-            .iter()
-            .map(|(name, value)| label::equation(name, &label::number(*value), unit_of(name, &unit_of_time)));
-        words.collect::<Vec<_>>().join(", ")
-    };
-    let told = |course: &Course| {
-        let own: Vec<&(String, f64)> = course.parameters.iter().filter(|entry| !common.contains(entry)).collect();
-        if own.is_empty() { course.name.clone() } else { format!("{}, {}", course.name, list(&own)) }
-    };
-    let mut legend = Vec::new();
-    for place in (0..courses.len()).filter(|&place| leaders[place] == place && courses.len() > 1) {
-        let same = courses.iter().zip(&leaders).filter(|(_, leader)| **leader == place);
-        let key = match is_marked(place) {
-            true => Key::Marked(colour::series(place), Marker { series: place }),
-            false => Key::Line(colour::series(place)),
+        let has = |name: &&str| courses.iter().any(|course| course.column(name).is_some());
+        let names: Vec<&str> = names.iter().copied().filter(has).collect();
+        let Some(scale) = Scale::of(names.iter().flat_map(|name| cells(courses, name))) else { continue };
+        let (x, y) = (axis(&["t"], time.with_room(0.03)), axis(&names, scale.with_room(0.06)));
+        let bound = Layer::Level(1.0, Stroke { colour: "#888".to_owned(), width: 0.5, dashes: &[1.0, 1.5] });
+        let has_bound = names[0] == "v" && (0.0..2.0).contains(&scale.low) && y.unit == UNIT_OF_BOUND;
+        let layers = has_bound.then_some(bound).into_iter().collect();
+        let of_course = |(course, of): (usize, &Course)| {
+            let points = names.iter().enumerate().map(|(rank, name)| (rank, of.points(name)));
+            points.filter_map(|(rank, points)| Some(Curve { course, rank, points: points? })).collect::<Vec<_>>()
         };
-        legend.push(Entry { key, text: same.map(|(course, _)| told(course)).collect::<Vec<_>>().join("; ") });
+        let curves: Vec<Curve> = courses.iter().enumerate().flat_map(of_course).collect();
+        panels.push((Panel { title: String::new(), x, y, layers }, curves));
     }
-    if has("v_c") {
-        if courses.len() == 1 {
-            legend.push(Entry { key: Key::Line(colour::series(0)), text: label::name("v") });
-        }
-        let text = if courses.len() == 1 { label::name("v_c") } else { format!("thin: {}", label::name("v_c")) };
-        legend.push(Entry { key: Key::Line(control(0)), text });
-    }
+    let leaders = leaders(courses.len(), &panels);
+    let common = common(courses);
     let title = match courses {
         [one] => format!("Protocol {}", one.name),
         _ => "Protocols".to_owned(),
     };
-    Ok(Figure {
-        title,
-        subtitle: list(&common),
-        panels,
-        columns: 1,
-        aspect: 0.42,
-        shared: true,
-        legend,
-        ..Figure::default()
+    let subtitle = equations(&common, &unit_in(courses, "t"));
+    let legend = legend(courses, &leaders, &common);
+    let panels = panels.into_iter().map(|(panel, curves)| draw(panel, curves, courses, &leaders)).collect();
+    Ok(Figure { title, subtitle, panels, columns: 1, aspect: 0.42, shared: true, legend, ..Figure::default() })
+}
+
+/// The cells of a column in all courses.
+fn cells(courses: &[Course], name: &str) -> impl Iterator<Item = f64> {
+    courses.iter().filter_map(|course| course.column(name)).flat_map(|column| column.cells.iter().copied())
+}
+
+/// The unit of a column, which is the same in all courses.
+fn unit_in(courses: &[Course], name: &str) -> String {
+    courses.iter().find_map(|course| Some(course.column(name)?.unit.clone())).unwrap_or_default()
+}
+
+/// That the courses agree on the units of what is shown.
+fn one_unit(courses: &[Course]) -> Result<(), PlotError> {
+    for name in SHOWN.into_iter().flatten().chain(&["t"]) {
+        let first = unit_in(courses, name);
+        let mut units = courses.iter().filter_map(|course| Some(course.column(name)?.unit.as_str()));
+        if let Some(other) = units.find(|unit| *unit != first) {
+            let units = [first, other.to_owned()];
+            return Err(PlotError::Units { column: (*name).to_owned(), units });
+        }
+    }
+    Ok(())
+}
+
+/// For each course the first one that it lies on in all panels.
+fn leaders(count: usize, panels: &[(Panel, Vec<Curve>)]) -> Vec<usize> {
+    // The curves of a course in shares of the panels.
+    let in_shares = |(panel, curves): &(Panel, Vec<Curve>), course: usize| -> Vec<Curve> {
+        let share = |(x, y): &(f64, f64)| (panel.x.scale.share(*x), panel.y.scale.share(*y));
+        let own = curves.iter().filter(|curve| curve.course == course);
+        own.map(|curve| Curve { points: curve.points.iter().map(share).collect(), ..*curve }).collect()
+    };
+    let shares: Vec<Vec<Vec<Curve>>> =
+        (0..count).map(|course| panels.iter().map(|panel| in_shares(panel, course)).collect()).collect();
+    coincide::leaders(count, |one, other| {
+        shares[one].iter().zip(&shares[other]).all(|(one, other)| {
+            let mut pairs = one.iter().zip(other);
+            one.len() == other.len() && pairs.all(|(a, b)| a.rank == b.rank && coincide::anywhere(&a.points, &b.points))
+        })
     })
+}
+
+/// The panel with the curves of the courses that lead.
+fn draw(mut panel: Panel, curves: Vec<Curve>, courses: &[Course], leaders: &[usize]) -> Panel {
+    for Curve { course, rank, points } in curves.into_iter().filter(|curve| leaders[curve.course] == curve.course) {
+        let stroke = if rank == 0 { colour::series(course) } else { control(course) };
+        panel.layers.push(Layer::Lines(vec![points.clone()], stroke));
+        if courses[course].is_marked() && rank == 0 {
+            panel.layers.push(Layer::Points(points, Marker { series: course }));
+        }
+    }
+    panel
+}
+
+/// The parameters that all courses with parameters have in common: they are said once.
+fn common(courses: &[Course]) -> Vec<&(String, f64)> {
+    let mut known = courses.iter().map(|course| &course.parameters).filter(|parameters| !parameters.is_empty());
+    let first = known.next().into_iter().flatten();
+    let others: Vec<_> = known.collect();
+    first.filter(|entry| others.iter().all(|parameters| parameters.contains(entry))).collect()
+}
+
+/// Parameters as equations, of a trace whose times are in `time`.
+fn equations(parameters: &[&(String, f64)], time: &str) -> String {
+    let equation = |(name, value): &&(String, f64)| label::equation(name, &label::number(*value), unit_of(name, time));
+    parameters.iter().map(equation).collect::<Vec<_>>().join(", ")
+}
+
+/// What tells courses apart, and which line is the control.
+fn legend(courses: &[Course], leaders: &[usize], common: &[&(String, f64)]) -> Vec<Entry> {
+    let name = |course: &Course| {
+        let own: Vec<_> = course.parameters.iter().filter(|entry| !common.contains(entry)).collect();
+        let name = course.name.clone();
+        if own.is_empty() { name } else { format!("{name}, {}", equations(&own, &unit_in(courses, "t"))) }
+    };
+    let names: Vec<String> = courses.iter().map(name).collect();
+    let mut legend = Entry::of_series(&names, leaders, |place| Key::series(place, courses[place].is_marked()));
+    if courses.iter().any(|course| course.column("v_c").is_some()) {
+        let (v, v_c) = (label::name("v"), label::name("v_c"));
+        let thin = Key::Line(control(0));
+        if courses.len() == 1 {
+            legend.push(Entry { key: Key::series(0, false), text: v });
+            legend.push(Entry { key: thin, text: v_c });
+        } else {
+            legend.push(Entry { key: thin, text: format!("thin: {v_c}") });
+        }
+    }
+    legend
 }
 
 /// The line of the control velocity of a course: thinner than that of the block.
 fn control(place: usize) -> Stroke {
     Stroke { width: 0.5, ..colour::series(place) }
-}
-
-/// Whether the least velocity of the model, 1, is on an axis with this unit.
-fn bound(unit: &str) -> bool {
-    unit == "v_0"
 }
 
 /// The unit of a parameter of a trace whose times are in `time`.

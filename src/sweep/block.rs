@@ -64,271 +64,280 @@ pub fn check(spec: &BlockSpec, prefix: String, units: Option<&Units>, folder: &P
             held.push(quantity);
         }
     }
-    let block = units.and_then(|units| block(spec, &prefix, units, factors, &axes, &held, faults));
+    let draft = |units| Draft { spec, prefix: &prefix, units, axes: &axes, held: &held };
+    let block = units.and_then(|units| draft(units).block(factors, faults));
     Checked { prefix, held, block }
 }
 
-/// The block of these points and axes, of which it has all of `held`.
-fn block(
-    spec: &BlockSpec,
-    prefix: &str,
-    units: &Units,
-    mut factors: Vec<Factor>,
-    axes: &[(Quantity, Option<Written>)],
-    held: &[Quantity],
-    faults: &mut Faults,
-) -> Option<Block> {
-    let has_points = !factors.is_empty();
-    let zips = zips(spec, prefix, &factors, axes, held, faults);
-    let samples = faults.take(samples(prefix, units, axes))?;
-    let mut computed = Vec::new();
-    let mut placed: Vec<Quantity> = Vec::new();
-    for (quantity, axis) in axes {
-        if placed.contains(quantity) {
-            continue;
-        }
-        let factor = match axis {
-            None => continue,
-            Some(Written::Computed { scale, text }) => {
-                computed.push((*quantity, *scale, text.as_str()));
+/// A block of a spec whose axes are read one by one.
+#[derive(Clone, Copy)]
+struct Draft<'a> {
+    spec: &'a BlockSpec,
+    prefix: &'a str,
+    units: &'a Units,
+    axes: &'a [(Quantity, Option<Written>)],
+    held: &'a [Quantity],
+}
+
+impl Draft<'_> {
+    /// The block with these points.
+    fn block(self, mut factors: Vec<Factor>, faults: &mut Faults) -> Option<Block> {
+        let Draft { spec, prefix, axes, held, .. } = self;
+        let has_points = !factors.is_empty();
+        let zips = self.zips(&factors, faults);
+        let samples = faults.take(self.samples())?;
+        let mut computed = Vec::new();
+        let mut placed: Vec<Quantity> = Vec::new();
+        for (quantity, axis) in axes {
+            if placed.contains(quantity) {
                 continue;
             }
-            Some(Written::Values(axis)) => match zips.iter().find(|axes| axes[0].quantity == *quantity) {
-                Some(axes) => axes.clone(),
-                None => vec![axis.clone()],
-            },
-            Some(Written::Sampled(sampled)) => samples
-                .iter()
-                .find(|(design, _)| *design == sampled.design)
-                .map_or_else(Vec::new, |(_, axes)| axes.clone()),
+            let factor = match axis {
+                None => continue,
+                Some(Written::Computed { scale, text }) => {
+                    computed.push((*quantity, *scale, text.as_str()));
+                    continue;
+                }
+                Some(Written::Values(axis)) => match zips.iter().find(|axes| axes[0].quantity == *quantity) {
+                    Some(axes) => axes.clone(),
+                    None => vec![axis.clone()],
+                },
+                Some(Written::Sampled(sampled)) => samples
+                    .iter()
+                    .find(|(design, _)| *design == sampled.design)
+                    .map_or_else(Vec::new, |(_, axes)| axes.clone()),
+            };
+            placed.extend(factor.iter().map(|axis| axis.quantity));
+            factors.push(Factor { axes: factor, ..Factor::default() });
+        }
+        for quantity in Quantity::ALL {
+            let held = factors.iter().any(|factor| factor.holds_any(&[quantity]))
+                || computed.iter().any(|(other, ..)| *other == quantity);
+            let values = quantity.default();
+            if !held && !values.is_empty() {
+                let axis = Axis { quantity, scale: Scale::Model, values: Values::List(values) };
+                factors.push(Factor { axes: vec![axis], ..Factor::default() });
+            }
+        }
+        let derived = self.derived(&computed, faults);
+        let points = factors.first().filter(|_| has_points);
+        // Without the points nobody knows their labels.
+        let are_known = has_points || spec.points.is_none();
+        let condition = spec.condition.as_ref().filter(|_| are_known && !faults.concern(&format!("{prefix}where")));
+        let condition = condition.map(|text| {
+            let condition = Expression::condition(text, held, points);
+            faults.take(condition.map_err(|fault| explain(format!("{prefix}where"), "axis", fault)))
+        });
+        let block = Block { factors, derived, condition: condition.flatten() };
+        // Only of what is legal so far, since this takes time.
+        for (quantity, _, text) in computed {
+            if faults.are_none() {
+                faults.take(self.check_values(&block, quantity, text));
+            }
+        }
+        Some(block)
+    }
+
+    /// The axes of each zip, all of equal length, in the order of the axes.
+    fn zips(self, factors: &[Factor], faults: &mut Faults) -> Vec<Vec<Axis>> {
+        let Draft { spec, prefix, axes, .. } = self;
+        let mut zips: Vec<Vec<Axis>> = Vec::new();
+        for (number, names) in spec.zip.iter().enumerate() {
+            let key = format!("{prefix}zip[{number}]");
+            if names.len() < 2 {
+                let found = format!("a zip of {}", if names.is_empty() { "no axis" } else { "one axis" });
+                faults.push(SpecError::new(key, found, "two axes or more", "add axes, or remove the zip"));
+                continue;
+            }
+            let mut zip: Vec<Axis> = Vec::new();
+            for (place, name) in names.iter().enumerate() {
+                let zipped = self.zipped(name, format!("{key}[{place}]"), factors, (&zips, &zip));
+                zip.extend(faults.take(zipped).flatten());
+            }
+            zip.sort_by_key(|axis| axes.iter().position(|(quantity, _)| *quantity == axis.quantity));
+            zips.extend((!zip.is_empty()).then_some(zip));
+        }
+        zips
+    }
+
+    /// The axis `name` of a zip at `key`, after those of other zips and of its own; `None` if it is not known what that axis says.
+    fn zipped(
+        self,
+        name: &str,
+        key: String,
+        factors: &[Factor],
+        (zips, zip): (&[Vec<Axis>], &[Axis]),
+    ) -> Result<Option<Axis>, SpecError> {
+        let Draft { axes, held, .. } = self;
+        let axis = match axes.iter().find(|(quantity, _)| quantity.name() == name).map(|(_, axis)| axis.as_ref()) {
+            Some(Some(Written::Values(axis))) => axis,
+            Some(Some(Written::Computed { .. })) => {
+                let found = format!("`{name}` is computed from other axes at every point");
+                return Err(SpecError::new(key, found, "axes with values of their own", "remove it here"));
+            }
+            Some(Some(Written::Sampled(sampled))) => {
+                let found = format!("`{name}` varies together with all axes of `{}`", sampled.design.name());
+                return Err(SpecError::new(key, found, "axes with values of their own", "remove it here"));
+            }
+            Some(None) => return Ok(None),
+            None if factors.iter().flat_map(|factor| &factor.axes).any(|axis| axis.quantity.name() == name) => {
+                let found = format!("`{name}` is a column of `points`, which vary together anyway");
+                return Err(SpecError::new(key, found, "names of [axes]", "remove it here"));
+            }
+            // An axis that is there only by default has one value, or one of each word.
+            None if held.iter().any(|quantity| quantity.name() == name && quantity.default().is_empty()) => {
+                return Ok(None);
+            }
+            None => {
+                let known: Vec<&str> = axes.iter().map(|(quantity, _)| quantity.name()).collect();
+                return Err(unknown(key, "axis", name, &known));
+            }
         };
-        placed.extend(factor.iter().map(|axis| axis.quantity));
-        factors.push(Factor { axes: factor, ..Factor::default() });
-    }
-    for quantity in Quantity::ALL {
-        let held = factors.iter().any(|factor| factor.holds_any(&[quantity]))
-            || computed.iter().any(|(other, ..)| *other == quantity);
-        let values = quantity.default();
-        if !held && !values.is_empty() {
-            let axis = Axis { quantity, scale: Scale::Model, values: Values::List(values) };
-            factors.push(Factor { axes: vec![axis], ..Factor::default() });
+        if zips.iter().flatten().chain(zip).any(|other| other.quantity == axis.quantity) {
+            return Err(SpecError::new(
+                key,
+                format!("`{name}` is there twice"),
+                "each axis in one zip",
+                "remove one of the two",
+            ));
         }
-    }
-    let derived = derived(prefix, &computed, held, faults);
-    let points = factors.first().filter(|_| has_points);
-    // Without the points nobody knows their labels.
-    let are_known = has_points || spec.points.is_none();
-    let condition = spec.condition.as_ref().filter(|_| are_known && !faults.concern(&format!("{prefix}where")));
-    let condition = condition.map(|text| {
-        let condition = Expression::condition(text, held, points);
-        faults.take(condition.map_err(|fault| explain(format!("{prefix}where"), "axis", fault)))
-    });
-    let block = Block { factors, derived, condition: condition.flatten() };
-    // Only of what is legal so far, since this takes time.
-    for (quantity, _, text) in computed {
-        if faults.are_none() {
-            faults.take(check_values(&block, prefix, units, quantity, text));
+        if let Some(first) = zip.first()
+            && first.values.len() != axis.values.len()
+        {
+            let (one, other) = (values(first.values.len()), values(axis.values.len()));
+            let found = format!("`{}` has {one}, `{name}` has {other}", first.quantity.name());
+            let help = "give both the same number; nothing is repeated or left out";
+            return Err(SpecError::new(key, found, "axes of equal length", help));
         }
+        Ok(Some(axis.clone()))
     }
-    Some(block)
-}
 
-/// The axes of each zip, all of equal length, in the order of the axes.
-fn zips(
-    spec: &BlockSpec,
-    prefix: &str,
-    factors: &[Factor],
-    axes: &[(Quantity, Option<Written>)],
-    held: &[Quantity],
-    faults: &mut Faults,
-) -> Vec<Vec<Axis>> {
-    let mut zips: Vec<Vec<Axis>> = Vec::new();
-    for (number, names) in spec.zip.iter().enumerate() {
-        let key = format!("{prefix}zip[{number}]");
-        if names.len() < 2 {
-            let found = format!("a zip of {}", if names.is_empty() { "no axis" } else { "one axis" });
-            faults.push(SpecError::new(key, found, "two axes or more", "add axes, or remove the zip"));
-            continue;
+    /// The joint samples, one a kind.
+    fn samples(self) -> Result<Vec<(Design, Vec<Axis>)>, SpecError> {
+        let Draft { prefix, units, axes, .. } = self;
+        let mut samples = Vec::new();
+        for design in [Design::Sobol, Design::LatinHypercube] {
+            let axes: Vec<(Quantity, Sampled)> = axes
+                .iter()
+                .filter_map(|(quantity, axis)| match axis {
+                    Some(Written::Sampled(sampled)) if sampled.design == design => Some((*quantity, *sampled)),
+                    _ => None,
+                })
+                .collect();
+            let Some((first, sample)) = axes.first() else { continue };
+            let seeded = axes.iter().find_map(|(quantity, axis)| Some((quantity, axis.seed?)));
+            for (quantity, axis) in &axes {
+                let key = format!("{prefix}axes.{}", quantity.name());
+                if axis.count != sample.count {
+                    let found = format!("{} points, but `{}` has {}", axis.count, first.name(), sample.count);
+                    let expected =
+                        format!("the same count for all axes of `{}`, which are sampled jointly", design.name());
+                    return Err(SpecError::new(
+                        format!("{key}.{}[2]", design.name()),
+                        found,
+                        expected,
+                        "make them equal",
+                    ));
+                }
+                if let (Some(seed), Some((other, first_seed))) = (axis.seed, seeded)
+                    && seed != first_seed
+                {
+                    let found = format!("seed {seed}, but `{}` has {first_seed}", other.name());
+                    let expected = format!("one seed for all axes of `{}`, which are sampled jointly", design.name());
+                    return Err(SpecError::new(format!("{key}.seed"), found, expected, "remove one of the two"));
+                }
+            }
+            let seed = seeded.map_or(0, |(_, seed)| seed);
+            let draw = |(number, (quantity, axis)): (usize, &(Quantity, Sampled))| {
+                let (least, greatest) = (axis.least, axis.greatest);
+                let inside = design.values(number as u32, axis.count, seed);
+                // Either end counts with a weight, so that no difference overflows; rounding must not leave the box.
+                let values: Vec<f64> =
+                    inside.into_iter().map(|u| (least * (1.0 - u) + greatest * u).clamp(least, greatest)).collect();
+                // Both ends are legal; between 0, where that lies apart, and the others are numbers that are not.
+                if let Some((value, Err(legal))) = values
+                    .iter()
+                    .map(|&value| (value, legal(units, *quantity, axis.scale, value)))
+                    .find(|(_, legal)| legal.is_err())
+                {
+                    let key = format!("{prefix}axes.{}.{}", quantity.name(), design.name());
+                    let found = format!("a value of the sample, {value:?}, is out of range");
+                    return Err(SpecError::new(key, found, legal, "begin with the least number but 0"));
+                }
+                Ok(Axis { quantity: *quantity, scale: axis.scale, values: Values::List(values) })
+            };
+            samples.push((design, axes.iter().enumerate().map(draw).collect::<Result<_, _>>()?));
         }
-        let mut zip: Vec<Axis> = Vec::new();
-        for (place, name) in names.iter().enumerate() {
-            let zipped = zipped(name, format!("{key}[{place}]"), factors, axes, held, (&zips, &zip));
-            zip.extend(faults.take(zipped).flatten());
-        }
-        zip.sort_by_key(|axis| axes.iter().position(|(quantity, _)| *quantity == axis.quantity));
-        zips.extend((!zip.is_empty()).then_some(zip));
+        Ok(samples)
     }
-    zips
-}
 
-/// The axis `name` of a zip at `key`, after those of other zips and of its own; `None` if it is not known what that axis says.
-fn zipped(
-    name: &str,
-    key: String,
-    factors: &[Factor],
-    axes: &[(Quantity, Option<Written>)],
-    held: &[Quantity],
-    (zips, zip): (&[Vec<Axis>], &[Axis]),
-) -> Result<Option<Axis>, SpecError> {
-    let axis = match axes.iter().find(|(quantity, _)| quantity.name() == name).map(|(_, axis)| axis.as_ref()) {
-        Some(Some(Written::Values(axis))) => axis,
-        Some(Some(Written::Computed { .. })) => {
-            let found = format!("`{name}` is computed from other axes at every point");
-            return Err(SpecError::new(key, found, "axes with values of their own", "remove it here"));
+    /// Computed axes, each after those that it is made of.
+    fn derived(self, computed: &[(Quantity, Scale, &str)], faults: &mut Faults) -> Vec<Derived> {
+        let key = |quantity| self.key_of_expression(quantity);
+        let mut waiting = Vec::new();
+        for &(quantity, scale, text) in computed {
+            let expression = Expression::number(text, self.held).map_err(|fault| explain(key(quantity), "axis", fault));
+            waiting.extend(faults.take(expression).map(|expression| Derived { quantity, scale, expression }));
         }
-        Some(Some(Written::Sampled(sampled))) => {
-            let found = format!("`{name}` varies together with all axes of `{}`", sampled.design.name());
-            return Err(SpecError::new(key, found, "axes with values of their own", "remove it here"));
+        let mut derived = Vec::new();
+        while !waiting.is_empty() {
+            let is_waiting = |quantity: &Quantity| waiting.iter().any(|other: &Derived| other.quantity == *quantity);
+            let next = |one: &Derived| one.expression.reads().into_iter().find(|read| is_waiting(read));
+            if let Some(ready) = waiting.iter().position(|one| next(one).is_none()) {
+                derived.push(waiting.remove(ready));
+                continue;
+            }
+            // From axis to axis until one is met again.
+            let mut path: Vec<Quantity> = vec![waiting[0].quantity];
+            while let Some(read) = waiting.iter().find(|one| path.last() == Some(&one.quantity)).and_then(next) {
+                if let Some(start) = path.iter().position(|met| *met == read) {
+                    path.push(read);
+                    path.drain(..start);
+                    break;
+                }
+                path.push(read);
+            }
+            let names: Vec<String> = path.iter().map(|quantity| format!("`{}`", quantity.name())).collect();
+            faults.push(SpecError::new(
+                key(path[0]),
+                format!("depends on itself: {}", names.join(", which is computed from ").replacen(", which", "", 1)),
+                "axes that are computed from others",
+                "give one of them values of its own",
+            ));
+            break;
         }
-        Some(None) => return Ok(None),
-        None if factors.iter().flat_map(|factor| &factor.axes).any(|axis| axis.quantity.name() == name) => {
-            let found = format!("`{name}` is a column of `points`, which vary together anyway");
-            return Err(SpecError::new(key, found, "names of [axes]", "remove it here"));
-        }
-        // An axis that is there only by default has one value, or one of each word.
-        None if held.iter().any(|quantity| quantity.name() == name && quantity.default().is_empty()) => {
-            return Ok(None);
-        }
-        None => {
-            let known: Vec<&str> = axes.iter().map(|(quantity, _)| quantity.name()).collect();
-            return Err(unknown(key, "axis", name, &known));
-        }
-    };
-    if zips.iter().flatten().chain(zip).any(|other| other.quantity == axis.quantity) {
-        return Err(SpecError::new(
-            key,
-            format!("`{name}` is there twice"),
-            "each axis in one zip",
-            "remove one of the two",
-        ));
+        derived
     }
-    if let Some(first) = zip.first()
-        && first.values.len() != axis.values.len()
-    {
-        let (one, other) = (values(first.values.len()), values(axis.values.len()));
-        let found = format!("`{}` has {one}, `{name}` has {other}", first.quantity.name());
-        let help = "give both the same number; nothing is repeated or left out";
-        return Err(SpecError::new(key, found, "axes of equal length", help));
+
+    /// Every kept value of a computed axis has to be legal.
+    fn check_values(self, block: &Block, quantity: Quantity, text: &str) -> Result<(), SpecError> {
+        let (units, key) = (self.units, self.key_of_expression(quantity));
+        let scale = block.scale(quantity).unwrap_or(Scale::Model);
+        match first_wrong(block, quantity, |value| legal(units, quantity, scale, value).is_err()) {
+            Some(None) => Ok(()),
+            Some(Some((value, place))) => {
+                let place: Vec<String> =
+                    place.iter().map(|(axis, value)| format!("{} = {value:?}", axis.name())).collect();
+                let place = if place.is_empty() { String::new() } else { format!(" at {}", place.join(", ")) };
+                Err(SpecError::new(
+                    key,
+                    format!("`{text}` is {value:?}{place}"),
+                    legal(units, quantity, scale, value).err().unwrap_or_default(),
+                    "correct the expression, or leave such points out with `where`",
+                ))
+            }
+            None => Err(too_many(key)),
+        }
     }
-    Ok(Some(axis.clone()))
+
+    /// The key of the expression of an axis.
+    fn key_of_expression(self, quantity: Quantity) -> String {
+        format!("{}axes.{}.expr", self.prefix, quantity.name())
+    }
 }
 
 fn values(count: u64) -> String {
     if count == 1 { "1 value".to_owned() } else { format!("{count} values") }
-}
-
-/// The joint samples, one a kind.
-fn samples(
-    prefix: &str,
-    units: &Units,
-    axes: &[(Quantity, Option<Written>)],
-) -> Result<Vec<(Design, Vec<Axis>)>, SpecError> {
-    let mut samples = Vec::new();
-    for design in [Design::Sobol, Design::LatinHypercube] {
-        let axes: Vec<(Quantity, Sampled)> = axes
-            .iter()
-            .filter_map(|(quantity, axis)| match axis {
-                Some(Written::Sampled(sampled)) if sampled.design == design => Some((*quantity, *sampled)),
-                _ => None,
-            })
-            .collect();
-        let Some((first, sample)) = axes.first() else { continue };
-        let seeded = axes.iter().find_map(|(quantity, axis)| Some((quantity, axis.seed?)));
-        for (quantity, axis) in &axes {
-            let key = format!("{prefix}axes.{}", quantity.name());
-            if axis.count != sample.count {
-                let found = format!("{} points, but `{}` has {}", axis.count, first.name(), sample.count);
-                let expected = format!("the same count for all axes of `{}`, which are sampled jointly", design.name());
-                return Err(SpecError::new(format!("{key}.{}[2]", design.name()), found, expected, "make them equal"));
-            }
-            if let (Some(seed), Some((other, first_seed))) = (axis.seed, seeded)
-                && seed != first_seed
-            {
-                let found = format!("seed {seed}, but `{}` has {first_seed}", other.name());
-                let expected = format!("one seed for all axes of `{}`, which are sampled jointly", design.name());
-                return Err(SpecError::new(format!("{key}.seed"), found, expected, "remove one of the two"));
-            }
-        }
-        let seed = seeded.map_or(0, |(_, seed)| seed);
-        let draw = |(number, (quantity, axis)): (usize, &(Quantity, Sampled))| {
-            let (least, greatest) = (axis.least, axis.greatest);
-            let inside = design.values(number as u32, axis.count, seed);
-            // Either end counts with a weight, so that no difference overflows; rounding must not leave the box.
-            let values: Vec<f64> =
-                inside.into_iter().map(|u| (least * (1.0 - u) + greatest * u).clamp(least, greatest)).collect();
-            // Both ends are legal; between 0, where that lies apart, and the others are numbers that are not.
-            if let Some((value, Err(legal))) = values
-                .iter()
-                .map(|&value| (value, legal(units, *quantity, axis.scale, value)))
-                .find(|(_, legal)| legal.is_err())
-            {
-                let key = format!("{prefix}axes.{}.{}", quantity.name(), design.name());
-                let found = format!("a value of the sample, {value:?}, is out of range");
-                return Err(SpecError::new(key, found, legal, "begin with the least number but 0"));
-            }
-            Ok(Axis { quantity: *quantity, scale: axis.scale, values: Values::List(values) })
-        };
-        samples.push((design, axes.iter().enumerate().map(draw).collect::<Result<_, _>>()?));
-    }
-    Ok(samples)
-}
-
-/// Computed axes, each after those that it is made of.
-fn derived(prefix: &str, computed: &[(Quantity, Scale, &str)], held: &[Quantity], faults: &mut Faults) -> Vec<Derived> {
-    let key = |quantity: Quantity| format!("{prefix}axes.{}.expr", quantity.name());
-    let mut waiting = Vec::new();
-    for &(quantity, scale, text) in computed {
-        let expression = Expression::number(text, held).map_err(|fault| explain(key(quantity), "axis", fault));
-        waiting.extend(faults.take(expression).map(|expression| Derived { quantity, scale, expression }));
-    }
-    let mut derived = Vec::new();
-    while !waiting.is_empty() {
-        let is_waiting = |quantity: &Quantity| waiting.iter().any(|other: &Derived| other.quantity == *quantity);
-        let next = |one: &Derived| one.expression.reads().into_iter().find(|read| is_waiting(read));
-        if let Some(ready) = waiting.iter().position(|one| next(one).is_none()) {
-            derived.push(waiting.remove(ready));
-            continue;
-        }
-        // From axis to axis until one is met again.
-        let mut path: Vec<Quantity> = vec![waiting[0].quantity];
-        while let Some(read) = waiting.iter().find(|one| path.last() == Some(&one.quantity)).and_then(next) {
-            if let Some(start) = path.iter().position(|met| *met == read) {
-                path.push(read);
-                path.drain(..start);
-                break;
-            }
-            path.push(read);
-        }
-        let names: Vec<String> = path.iter().map(|quantity| format!("`{}`", quantity.name())).collect();
-        faults.push(SpecError::new(
-            key(path[0]),
-            format!("depends on itself: {}", names.join(", which is computed from ").replacen(", which", "", 1)),
-            "axes that are computed from others",
-            "give one of them values of its own",
-        ));
-        break;
-    }
-    derived
-}
-
-/// Every kept value of a computed axis has to be legal.
-fn check_values(block: &Block, prefix: &str, units: &Units, quantity: Quantity, text: &str) -> Result<(), SpecError> {
-    let key = format!("{prefix}axes.{}.expr", quantity.name());
-    let scale = block.scale(quantity).unwrap_or(Scale::Model);
-    match first_wrong(block, quantity, |value| legal(units, quantity, scale, value).is_err()) {
-        Some(None) => Ok(()),
-        Some(Some((value, place))) => {
-            let place: Vec<String> = place.iter().map(|(axis, value)| format!("{} = {value:?}", axis.name())).collect();
-            let place = if place.is_empty() { String::new() } else { format!(" at {}", place.join(", ")) };
-            Err(SpecError::new(
-                key,
-                format!("`{text}` is {value:?}{place}"),
-                legal(units, quantity, scale, value).err().unwrap_or_default(),
-                "correct the expression, or leave such points out with `where`",
-            ))
-        }
-        None => Err(too_many(key)),
-    }
 }
 
 /// An expression or condition that would take too long to evaluate.

@@ -8,9 +8,9 @@ use std::fmt;
 use std::ops::{Deref, Range};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::atomic::{AtomicUsize, Ordering};
-use std::sync::mpsc::{Sender, channel, sync_channel};
+use std::sync::mpsc::{Receiver, Sender, SyncSender, channel, sync_channel};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
-use std::thread;
+use std::thread::{self, Scope};
 
 use rayon::prelude::*;
 use rayon::{ThreadPool, ThreadPoolBuilder};
@@ -19,7 +19,7 @@ use super::check::Sweep;
 use super::plan::Plan;
 use super::shard::{Shard, TooManyParts};
 use crate::dataset::{
-    Company, DatasetError, Digest, Folder, Footer, Layout, Look, Manifest, ManifestTable, State, encode,
+    Company, DatasetError, Digest, Folder, Footer, Layout, Look, ManifestTable, Session, State, encode,
 };
 use crate::grid::Quantity;
 use crate::table::{Job, Phase, Sheet, Signal, Stopped, Table, Work};
@@ -144,109 +144,46 @@ fn run_in(
     let session = folder.open(&plan.manifest(sweep), company).map_err(|error| sweep.explain(error))?;
     let pool = pool(threads)?;
     let optima = sweep.optima();
-    let mut outcome = Outcome { tables: Vec::new(), digests: Vec::new(), work: Work::default() };
-    let failure = Failure::default();
-    let defects = Mutex::new(Vec::new());
+    let run = Run {
+        folder,
+        session: &session,
+        pool: &pool,
+        signal,
+        queued: AtomicUsize::new(0),
+        failures: Failures::default(),
+    };
     let stages: Vec<Stage<'_>> = (sweep.requests.iter().zip(&plan.tables))
         .zip(&optima)
         .map(|((request, table), optima)| Stage {
-            manifest: &session.manifest,
+            run: &run,
+            definition: request.table,
             table,
             job: sweep.job(request, optima, signal),
             layout: Layout::new(request.table, &request.selection, &sweep.grid),
             digest: Mutex::default(),
         })
         .collect();
+
     signal.enter(Phase::Checking);
-    let checked = stages.iter().zip(&shares).map(|(stage, share)| stage.check(folder, share, &pool, signal));
-    let checked = checked.collect::<Result<Vec<_>, RunError>>()?;
+    let sound = stages.iter().zip(&shares).map(|(stage, share)| stage.check(share));
+    let sound = sound.collect::<Result<Vec<_>, RunError>>()?;
+
     signal.enter(Phase::Computing);
-    // Parts that the disk has not finished.
-    let queued = AtomicUsize::new(0);
+    let mut outcome = Outcome { tables: Vec::new(), digests: Vec::new(), work: Work::default() };
     thread::scope(|scope| {
-        // The disk has threads of its own, so that no thread that computes waits for it.
-        let (to_disk, parts) = sync_channel::<Part<'_>>(1);
-        let (queued, session, failure, parts) = (&queued, &session, &failure, Arc::new(Mutex::new(parts)));
-        let next = move || locked(&parts).recv();
-        let write = move || {
-            while let Ok(Part { stage, number, content }) = next() {
-                // Who asks to stop does not want to wait for the parts that are queued here.
-                failure.keep(signal.check().map_err(RunError::from).and_then(|()| {
-                    let bytes = match content {
-                        Content::Bytes(bytes) => bytes,
-                        Content::Sheet(sheet) => stage.encode(folder, number, &sheet)?,
-                    };
-                    session.write_part(&stage.table.name, number, &bytes).map_err(RunError::from)
-                }));
-                queued.fetch_sub(1, Ordering::Relaxed);
-            }
-        };
-        for write in std::iter::repeat_n(write, WRITERS) {
-            thread::Builder::new().spawn_scoped(scope, write).map_err(RunError::Writer)?;
-        }
-        for (((request, stage), share), checked) in sweep.requests.iter().zip(&stages).zip(shares).zip(checked) {
-            let table = stage.table;
-            let mut done = TableOutcome { kept: checked.len() as u64, ..TableOutcome::default() };
-            let missing = share.into_iter().flatten().filter(|number| checked.binary_search(number).is_err());
-            let missing = missing.filter(|&number| {
-                // Another run may have made it by now.
-                match stage.look(folder, number, signal) {
-                    Ok(true) => {
-                        done.kept += 1;
-                        return false;
-                    }
-                    Ok(false) => {}
-                    Err(State::Damaged { .. }) => done.damaged += 1,
-                    Err(state) => {
-                        failure.keep(stage.refuse(folder, number, state));
-                        return false;
-                    }
-                }
-                let rows = table.rows_of(number);
-                done.made += 1;
-                done.rows += rows.end - rows.start;
-                true
-            });
-            let wanted = missing.take_while(|_| !failure.is_there() && signal.check().is_ok());
-            outcome.work += compute(&pool, request.table, &stage.job, table, wanted, |number, sheet| {
-                let sheet = match sheet {
-                    Ok(sheet) => sheet,
-                    Err(defect) => return locked(&defects).push(defect),
-                };
-                let take = |parts: usize| (parts < AHEAD).then_some(parts + 1);
-                let is_free = queued.fetch_update(Ordering::Relaxed, Ordering::Relaxed, take).is_ok();
-                let content = if is_free {
-                    Content::Sheet(sheet)
-                } else {
-                    match stage.encode(folder, number, &sheet) {
-                        Ok(bytes) => {
-                            queued.fetch_add(1, Ordering::Relaxed);
-                            Content::Bytes(bytes)
-                        }
-                        Err(error) => return failure.keep(Err(error)),
-                    }
-                };
-                // The other end is there until every sender is gone.
-                let _ = to_disk.send(Part { stage, number, content });
-            })?;
-            signal.check()?;
+        let (to_disk, parts) = sync_channel(1);
+        run.start_writers(scope, parts)?;
+        for ((stage, share), sound) in stages.iter().zip(&shares).zip(&sound) {
+            let (done, work) = stage.solve(share, sound, &to_disk)?;
             outcome.tables.push(done);
+            outcome.work += work;
         }
         signal.enter(Phase::Writing);
         Ok::<(), RunError>(())
     })?;
-    failure.into_result()?;
-    session.check()?;
-    outcome.digests =
-        stages.into_iter().map(|stage| stage.digest.into_inner().unwrap_or_else(PoisonError::into_inner)).collect();
-    let mut defects = defects.into_inner().unwrap_or_else(PoisonError::into_inner);
-    // Threads find them in no particular order.
-    defects.sort_by_key(|defect| (plan.tables.iter().position(|table| table.name == defect.table), defect.rows.start));
-    let others = defects.len().saturating_sub(1);
-    match defects.into_iter().next() {
-        Some(defect) => Err(RunError::Defect { defect, others }),
-        None => Ok(outcome),
-    }
+    outcome.digests = stages.into_iter().map(|stage| content(stage.digest)).collect();
+    run.failures.into_result(&plan, || session.check())?;
+    Ok(outcome)
 }
 
 /// The threads of a run.
@@ -311,7 +248,7 @@ pub fn compute(
             });
         }
     });
-    result.into_inner().unwrap_or_else(PoisonError::into_inner)
+    content(result)
 }
 
 /// Computes `rows` into `sheet`; the message if that panics.
@@ -348,9 +285,43 @@ fn culprit(table: &dyn Table, job: &Job<'_>, mut rows: Range<u64>, mut message: 
     Defect { table: table.name().to_owned(), rows, axes, message }
 }
 
+/// What the stages of a run have in common.
+struct Run<'a> {
+    folder: &'a Folder,
+    session: &'a Session,
+    pool: &'a ThreadPool,
+    signal: &'a Signal,
+    /// Parts that the disk has not finished.
+    queued: AtomicUsize,
+    failures: Failures,
+}
+
+impl Run<'_> {
+    /// Starts the threads that publish parts. The disk has threads of its own, so that no thread that computes waits for it.
+    fn start_writers<'scope, 'a: 'scope>(
+        &'scope self,
+        scope: &'scope Scope<'scope, '_>,
+        parts: Receiver<Part<'a>>,
+    ) -> Result<(), RunError> {
+        let parts = Arc::new(Mutex::new(parts));
+        let next = move || locked(&parts).recv();
+        let write = move || {
+            while let Ok(part) = next() {
+                self.failures.keep(part.publish());
+                self.queued.fetch_sub(1, Ordering::Relaxed);
+            }
+        };
+        for write in std::iter::repeat_n(write, WRITERS) {
+            thread::Builder::new().spawn_scoped(scope, write).map_err(RunError::Writer)?;
+        }
+        Ok(())
+    }
+}
+
 /// One table of a run.
 struct Stage<'a> {
-    manifest: &'a Manifest,
+    run: &'a Run<'a>,
+    definition: &'a dyn Table,
     table: &'a ManifestTable,
     job: Job<'a>,
     layout: Layout,
@@ -361,16 +332,10 @@ struct Stage<'a> {
 /// Parts that are checked before what they contain is added up, so that the memory does not grow with the dataset.
 const CHECKED_TOGETHER: usize = 1 << 10;
 
-impl Stage<'_> {
-    /// The numbers of the sound parts of `share` that are there, ascending; every bit of them is checked, on all threads of `pool`.
-    fn check(
-        &self,
-        folder: &Folder,
-        share: &[Range<u64>],
-        pool: &ThreadPool,
-        signal: &Signal,
-    ) -> Result<Vec<u64>, RunError> {
-        let mut there = folder.parts_there(self.table);
+impl<'a> Stage<'a> {
+    /// The numbers of the sound parts of `share` that are there, ascending; every bit of them is checked, on all threads of the run.
+    fn check(&self, share: &[Range<u64>]) -> Result<Vec<u64>, RunError> {
+        let mut there = self.run.folder.parts_there(self.table);
         // Both are ascending.
         there.retain(|number| {
             share.get(share.partition_point(|range| range.end <= *number)).is_some_and(|range| range.contains(number))
@@ -378,23 +343,84 @@ impl Stage<'_> {
         let mut sound = Vec::with_capacity(there.len());
         for numbers in there.chunks(CHECKED_TOGETHER) {
             let look = |&number: &u64| {
-                signal.check()?;
-                match self.look(folder, number, signal) {
+                self.run.signal.check()?;
+                match self.look(number) {
                     Ok(is_there) => Ok(is_there),
                     Err(State::Damaged { .. }) => Ok(false),
-                    Err(state) => self.refuse(folder, number, state).map(|()| false),
+                    Err(state) => self.refuse(number, state).map(|()| false),
                 }
             };
-            let looks =
-                pool.install(|| numbers.par_iter().with_max_len(1).map(look).collect::<Result<Vec<bool>, RunError>>())?;
+            let looks = || numbers.par_iter().with_max_len(1).map(look).collect::<Result<Vec<bool>, RunError>>();
+            let looks = self.run.pool.install(looks)?;
             sound.extend(numbers.iter().zip(looks).filter(|(_, is_sound)| *is_sound).map(|(number, _)| *number));
         }
         Ok(sound)
     }
 
+    /// Computes the parts of `share` but for the `sound` ones, and hands them to the disk.
+    fn solve(
+        &'a self,
+        share: &[Range<u64>],
+        sound: &[u64],
+        to_disk: &SyncSender<Part<'a>>,
+    ) -> Result<(TableOutcome, Work), RunError> {
+        let Run { pool, signal, failures, .. } = self.run;
+        let mut done = TableOutcome { kept: sound.len() as u64, ..TableOutcome::default() };
+        let missing = share.iter().cloned().flatten().filter(|number| sound.binary_search(number).is_err());
+        let missing = missing.filter(|&number| self.is_missing(number, &mut done));
+        let wanted = missing.take_while(|_| failures.is_empty() && signal.check().is_ok());
+        let take = |number, sheet: Result<Filled, Defect>| match sheet {
+            Ok(sheet) => self.hand_over(number, sheet, to_disk),
+            Err(defect) => locked(&failures.defects).push(defect),
+        };
+        let work = compute(pool, self.definition, &self.job, self.table, wanted, take)?;
+        signal.check()?;
+        Ok((done, work))
+    }
+
+    /// Whether a part is to be computed: another run may have made it by now.
+    fn is_missing(&self, number: u64, done: &mut TableOutcome) -> bool {
+        match self.look(number) {
+            Ok(true) => {
+                done.kept += 1;
+                return false;
+            }
+            Ok(false) => {}
+            Err(State::Damaged { .. }) => done.damaged += 1,
+            Err(state) => {
+                self.run.failures.keep(self.refuse(number, state));
+                return false;
+            }
+        }
+        let rows = self.table.rows_of(number);
+        done.made += 1;
+        done.rows += rows.end - rows.start;
+        true
+    }
+
+    /// Gives a part to the threads that publish, encoded if they have enough to do.
+    fn hand_over(&'a self, number: u64, sheet: Filled, to_disk: &SyncSender<Part<'a>>) {
+        let Run { queued, failures, .. } = self.run;
+        let take = |parts: usize| (parts < AHEAD).then_some(parts + 1);
+        let content = if queued.fetch_update(Ordering::Relaxed, Ordering::Relaxed, take).is_ok() {
+            Content::Sheet(sheet)
+        } else {
+            match self.encode(number, &sheet) {
+                Ok(bytes) => {
+                    queued.fetch_add(1, Ordering::Relaxed);
+                    Content::Bytes(bytes)
+                }
+                Err(error) => return failures.keep(Err(error)),
+            }
+        };
+        // The other end is there until every sender is gone.
+        let _ = to_disk.send(Part { stage: self, number, content });
+    }
+
     /// Whether a part is there, every bit of it; then it is counted. What is in its place if that is something else.
-    fn look(&self, folder: &Folder, number: u64, signal: &Signal) -> Result<bool, State> {
-        match folder.state(self.manifest, &self.table.name, number, Look::Whole) {
+    fn look(&self, number: u64) -> Result<bool, State> {
+        let Run { folder, session, signal, .. } = self.run;
+        match folder.state(&session.manifest, &self.table.name, number, Look::Whole) {
             State::There { digest } => {
                 let rows = self.table.rows_of(number);
                 signal.keep(rows.end - rows.start);
@@ -407,9 +433,9 @@ impl Stage<'_> {
     }
 
     /// A failure because of what is in the place of a part, if it is foreign.
-    fn refuse(&self, folder: &Folder, number: u64, state: State) -> Result<(), RunError> {
+    fn refuse(&self, number: u64, state: State) -> Result<(), RunError> {
         let State::Foreign { what, expected, found } = state else { return Ok(()) };
-        let path = folder.part(&self.table.name, number).display().to_string();
+        let path = self.run.folder.part(&self.table.name, number).display().to_string();
         Err(DatasetError::ForeignPart { path, what, expected, found }.into())
     }
 
@@ -420,9 +446,9 @@ impl Stage<'_> {
     }
 
     /// The bytes of a part, which is counted.
-    fn encode(&self, folder: &Folder, number: u64, sheet: &Sheet) -> Result<Vec<u8>, RunError> {
-        let name = &self.table.name;
-        let footer = Footer::new(self.manifest, name, self.table.rows_of(number));
+    fn encode(&self, number: u64, sheet: &Sheet) -> Result<Vec<u8>, RunError> {
+        let (Run { folder, session, .. }, name) = (self.run, &self.table.name);
+        let footer = Footer::new(&session.manifest, name, self.table.rows_of(number));
         let (bytes, digest) = encode(&self.layout, self.job.rows, sheet, &footer)
             .map_err(|source| DatasetError::encode(folder, name, number, source))?;
         self.count(digest);
@@ -435,6 +461,20 @@ struct Part<'a> {
     stage: &'a Stage<'a>,
     number: u64,
     content: Content,
+}
+
+impl Part<'_> {
+    /// Writes the part, encoded before if it is not yet.
+    fn publish(self) -> Result<(), RunError> {
+        let Part { stage, number, content } = self;
+        // Who asks to stop does not want to wait for the parts that are queued here.
+        stage.run.signal.check()?;
+        let bytes = match content {
+            Content::Bytes(bytes) => bytes,
+            Content::Sheet(sheet) => stage.encode(number, &sheet)?,
+        };
+        Ok(stage.run.session.write_part(&stage.table.name, number, &bytes)?)
+    }
 }
 
 /// What is there of a part.
@@ -464,27 +504,43 @@ impl Drop for Filled {
     }
 }
 
-/// The first failure of any thread.
+/// The first failure of any thread, and all rows that panic.
 #[derive(Default)]
-struct Failure(Mutex<Option<RunError>>);
+struct Failures {
+    first: Mutex<Option<RunError>>,
+    defects: Mutex<Vec<Defect>>,
+}
 
-impl Failure {
+impl Failures {
     fn keep(&self, result: Result<(), RunError>) {
         if let Err(error) = result {
-            locked(&self.0).get_or_insert(error);
+            locked(&self.first).get_or_insert(error);
         }
     }
 
-    fn is_there(&self) -> bool {
-        locked(&self.0).is_some()
+    fn is_empty(&self) -> bool {
+        locked(&self.first).is_none()
     }
 
-    fn into_result(self) -> Result<(), RunError> {
-        self.0.into_inner().unwrap_or_else(PoisonError::into_inner).map_or(Ok(()), Err)
+    /// The failure of a run: the first one, else that of `check`, else that of the first defect.
+    fn into_result(self, plan: &Plan, check: impl FnOnce() -> Result<(), DatasetError>) -> Result<(), RunError> {
+        content(self.first).map_or(Ok(()), Err)?;
+        check()?;
+        let mut defects = content(self.defects);
+        // Threads find them in no particular order.
+        let table = |defect: &Defect| plan.tables.iter().position(|table| table.name == defect.table);
+        defects.sort_by_key(|defect| (table(defect), defect.rows.start));
+        let others = defects.len().saturating_sub(1);
+        defects.into_iter().next().map_or(Ok(()), |defect| Err(RunError::Defect { defect, others }))
     }
 }
 
 /// The content of `mutex`, also if a thread died while it held it.
 fn locked<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// The same once no thread needs it.
+fn content<T>(mutex: Mutex<T>) -> T {
+    mutex.into_inner().unwrap_or_else(PoisonError::into_inner)
 }

@@ -13,7 +13,7 @@ use super::engine::{RunError, WRITERS, pool};
 use super::plan::Plan;
 use crate::dataset::{DatasetError, Footer, Layout, Manifest, atomic, encode};
 use crate::grid::Point;
-use crate::table::{Optima, Sheet, Signal};
+use crate::table::{Job, Optima, Sheet, Signal};
 
 /// Time that the samples of a sweep may take together: `plan` is to answer within a second or two.
 const BUDGET: Duration = Duration::from_millis(1500);
@@ -166,28 +166,7 @@ impl Sampler<'_> {
     fn table(&self, request: &Request, optima: &Optima, optimum: f64, budget: f64) -> Result<Estimate, RunError> {
         let signal = Signal::default();
         let job = self.sweep.job(request, optima, &signal);
-        let layout = Layout::new(request.table, &request.selection, &self.sweep.grid);
-        let compute = |rows: Range<u64>| -> Result<Sample, RunError> {
-            let mut sheet = Sheet::new(request.selection.indices().len());
-            sheet.resize((rows.end - rows.start) as usize);
-            let work = request.table.compute(&job, rows.clone(), &mut sheet)?;
-            let footer = Footer::new(&self.manifest, request.table.name(), rows.clone());
-            let (bytes, _) = encode(&layout, job.rows, &sheet, &footer).map_err(DatasetError::Sample)?;
-            let optima = if optimum > 0.0 { work.optima } else { 0 };
-            Ok(Sample { rows: rows.end - rows.start, optima, bytes: bytes.len() as u64 })
-        };
-        // Seconds, bytes and rows of a range, on the mean of `places` ranges of `length` rows, or as many as are begun within `limit` seconds.
-        let sample = |length: u64, places: u64, limit: f64| -> Result<[f64; 3], RunError> {
-            let start = Instant::now();
-            let ranges = (0..places as usize).into_par_iter().with_max_len(1).filter_map(|place| {
-                let is_late = start.elapsed().as_secs_f64() > limit && place > 0;
-                (!is_late).then(|| compute(place_of(request.rows, place as u64, length)))
-            });
-            let taken = self.pool.install(|| ranges.collect::<Result<Vec<_>, _>>())?;
-            let sum: Sample = taken.iter().copied().sum();
-            let seconds = start.elapsed().as_secs_f64() - sum.optima as f64 * optimum;
-            Ok([seconds.max(0.0), sum.bytes as f64, sum.rows as f64].map(|all| all / taken.len() as f64))
-        };
+        let sample = |length, places, limit| self.mean(request, &job, optimum, (length, places, limit));
         let began = Instant::now();
         let left = || budget - began.elapsed().as_secs_f64();
         // Rows that cost much leave time for a few.
@@ -229,6 +208,36 @@ impl Sampler<'_> {
         let parts = request.rows.div_ceil(request.table.rows_per_part());
         let threads = self.pool.current_num_threads() as f64;
         Ok(Estimate { seconds: seconds.of(parts, request.rows) * threads, bytes: bytes.of(parts, request.rows) })
+    }
+
+    /// Seconds, bytes and rows of a range of a table, on the mean of `places` ranges of `length` rows, or as many as are begun within `limit`
+    /// seconds.
+    fn mean(
+        &self,
+        request: &Request,
+        job: &Job<'_>,
+        optimum: f64,
+        (length, places, limit): (u64, u64, f64),
+    ) -> Result<[f64; 3], RunError> {
+        let layout = Layout::new(request.table, &request.selection, &self.sweep.grid);
+        let compute = |rows: Range<u64>| -> Result<Sample, RunError> {
+            let mut sheet = Sheet::new(request.selection.indices().len());
+            sheet.resize((rows.end - rows.start) as usize);
+            let work = request.table.compute(job, rows.clone(), &mut sheet)?;
+            let footer = Footer::new(&self.manifest, request.table.name(), rows.clone());
+            let (bytes, _) = encode(&layout, job.rows, &sheet, &footer).map_err(DatasetError::Sample)?;
+            let optima = if optimum > 0.0 { work.optima } else { 0 };
+            Ok(Sample { rows: rows.end - rows.start, optima, bytes: bytes.len() as u64 })
+        };
+        let start = Instant::now();
+        let ranges = (0..places as usize).into_par_iter().with_max_len(1).filter_map(|place| {
+            let is_late = start.elapsed().as_secs_f64() > limit && place > 0;
+            (!is_late).then(|| compute(place_of(request.rows, place as u64, length)))
+        });
+        let taken = self.pool.install(|| ranges.collect::<Result<Vec<_>, _>>())?;
+        let sum: Sample = taken.iter().copied().sum();
+        let seconds = start.elapsed().as_secs_f64() - sum.optima as f64 * optimum;
+        Ok([seconds.max(0.0), sum.bytes as f64, sum.rows as f64].map(|all| all / taken.len() as f64))
     }
 
     /// Seconds of all threads together for an optimal protocol that tables share; 0 if there is none.

@@ -7,6 +7,7 @@ use sha2::{Digest, Sha256};
 use super::check::{Request, Sweep};
 use super::place;
 use crate::dataset::DatasetError;
+use crate::grid::{Block, Quantity};
 use crate::model::Units;
 use crate::names::shown;
 use crate::table;
@@ -49,43 +50,7 @@ impl Sweep {
         fact("block", format_args!("{}", blocks.len()));
         for (number, block) in blocks.iter().enumerate() {
             let prefix = if blocks.len() > 1 { format!("block[{number}].") } else { String::new() };
-            let mut needed = written.axes().to_vec();
-            needed.extend(block.condition.iter().flat_map(|condition| condition.reads()));
-            for derived in block.derived.iter().rev() {
-                if needed.contains(&derived.quantity) {
-                    needed.extend(derived.expression.reads());
-                }
-            }
-            let mut order = Vec::new();
-            let (mut axes, mut single) = (Vec::new(), Vec::new());
-            for factor in &block.factors {
-                let used: Vec<_> = factor.axes.iter().filter(|axis| needed.contains(&axis.quantity)).collect();
-                for label in factor.labels.iter().filter(|_| !used.is_empty()) {
-                    fact(&format!("{prefix}points"), format_args!("{label:?}"));
-                }
-                if factor.len() > 1 {
-                    let names: Vec<&str> = used.iter().map(|axis| axis.quantity.name()).collect();
-                    order.extend((!names.is_empty()).then(|| names.join(" with ")));
-                    axes.extend(used);
-                } else {
-                    single.extend(used);
-                }
-            }
-            // The order of axes of one value has no meaning.
-            single.sort_by_key(|axis| axis.quantity);
-            for axis in axes.into_iter().chain(single) {
-                let (name, unit) = (axis.quantity.name(), axis.quantity.unit(axis.scale));
-                fact(&format!("{prefix}axes.{name}"), format_args!("{:?} {unit}", axis.values));
-            }
-            fact(&format!("{prefix}axes"), format_args!("{}", order.join(", ")));
-            for derived in block.derived.iter().filter(|derived| needed.contains(&derived.quantity)) {
-                let (name, unit) = (derived.quantity.name(), derived.quantity.unit(derived.scale));
-                fact(&format!("{prefix}axes.{name}"), format_args!("{:?} {unit}", derived.expression));
-            }
-            match &block.condition {
-                Some(condition) => fact(&format!("{prefix}where"), format_args!("{condition:?}")),
-                None => fact(&format!("{prefix}where"), format_args!("none")),
-            }
+            block_facts(block, written.axes(), &mut |key, value| fact(&format!("{prefix}{key}"), value));
         }
         let key = written.name();
         fact(&format!("tables.{key}.reduce"), format_args!("{name}"));
@@ -134,6 +99,47 @@ impl Sweep {
         };
         let line = place::line(&self.text, key).map_or_else(String::new, |line| format!(" (line {line})"));
         Some([format!("{key} = {}{line}", written(self, value)), format!("{key} = {}", written(other, other_value))])
+    }
+}
+
+/// What a block says of `needed` axes, and of those that they, or the condition, are made of.
+fn block_facts(block: &Block, needed: &[Quantity], fact: &mut dyn FnMut(&str, fmt::Arguments<'_>)) {
+    let mut needed = needed.to_vec();
+    needed.extend(block.condition.iter().flat_map(|condition| condition.reads()));
+    for derived in block.derived.iter().rev() {
+        if needed.contains(&derived.quantity) {
+            needed.extend(derived.expression.reads());
+        }
+    }
+    let mut order = Vec::new();
+    let (mut axes, mut single) = (Vec::new(), Vec::new());
+    for factor in &block.factors {
+        let used: Vec<_> = factor.axes.iter().filter(|axis| needed.contains(&axis.quantity)).collect();
+        for label in factor.labels.iter().filter(|_| !used.is_empty()) {
+            fact("points", format_args!("{label:?}"));
+        }
+        if factor.len() > 1 {
+            let names: Vec<&str> = used.iter().map(|axis| axis.quantity.name()).collect();
+            order.extend((!names.is_empty()).then(|| names.join(" with ")));
+            axes.extend(used);
+        } else {
+            single.extend(used);
+        }
+    }
+    // The order of axes of one value has no meaning.
+    single.sort_by_key(|axis| axis.quantity);
+    for axis in axes.into_iter().chain(single) {
+        let (name, unit) = (axis.quantity.name(), axis.quantity.unit(axis.scale));
+        fact(&format!("axes.{name}"), format_args!("{:?} {unit}", axis.values));
+    }
+    fact("axes", format_args!("{}", order.join(", ")));
+    for derived in block.derived.iter().filter(|derived| needed.contains(&derived.quantity)) {
+        let (name, unit) = (derived.quantity.name(), derived.quantity.unit(derived.scale));
+        fact(&format!("axes.{name}"), format_args!("{:?} {unit}", derived.expression));
+    }
+    match &block.condition {
+        Some(condition) => fact("where", format_args!("{condition:?}")),
+        None => fact("where", format_args!("none")),
     }
 }
 

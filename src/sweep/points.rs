@@ -4,20 +4,19 @@ use std::borrow::Cow;
 use std::fmt::{self, Display, Formatter};
 use std::fs;
 use std::path::Path;
-use std::sync::Arc;
 
 use arrow_array::cast::AsArray;
 use arrow_array::types::{
     Float32Type, Float64Type, Int8Type, Int16Type, Int32Type, Int64Type, UInt8Type, UInt16Type, UInt32Type, UInt64Type,
 };
 use arrow_array::{Array, ArrayRef, ArrowPrimitiveType, PrimitiveArray};
-use arrow_schema::{DataType, Fields, Schema};
+use arrow_schema::DataType;
 use indexmap::IndexSet;
-use parquet::arrow::arrow_reader::{ArrowReaderMetadata, ArrowReaderOptions, ParquetRecordBatchReaderBuilder};
-use parquet::errors::ParquetError;
+use parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
 
 use super::error::{MOST_OF_NAME, SpecError, unknown};
-use crate::dataset::{check_footer, check_pages, guarded};
+use crate::dataset::frame::coded;
+use crate::dataset::{guarded, label};
 use crate::grid::{Axis, Factor, Label, Quantity, Scale, Values};
 use crate::model::Units;
 use crate::names::shown;
@@ -223,99 +222,81 @@ fn unsound(path: &Path, error: &dyn Display) -> SpecError {
 }
 
 /// Parquet: columns of numbers, or of text for axes of words, whose names are axes; other columns of text are labels.
-///
-/// What Arrow or pandas add to a file about its types is not asked for: a column is what Parquet says that it is.
 fn parquet(path: &Path, units: &Units) -> Result<Vec<Column>, SpecError> {
     let name = path.display();
     check_size(path)?;
     let unsound = |error: &dyn Display| unsound(path, error);
     let file = fs::File::open(path).map_err(|error| unreadable(path, &error))?;
-    let options = ArrowReaderOptions::new().with_skip_arrow_metadata(true);
-    // What the file says of itself comes first: a few bytes can stand for any number of rows.
-    let metadata = check_footer(&file).and_then(|()| {
-        let metadata = ArrowReaderMetadata::load(&file, options)?;
-        check_pages(&file, metadata.metadata())?;
-        coded(metadata)
-    });
-    let metadata = metadata.map_err(|error| unsound(&error))?;
+    let metadata = coded(&file).map_err(|error| unsound(&error))?;
     let reader = ParquetRecordBatchReaderBuilder::new_with_metadata(file, metadata);
     let rows = reader.metadata().file_metadata().num_rows();
     check_count(path, usize::try_from(rows).unwrap_or(0))?;
     let mut columns = header(&name, reader.schema().fields().iter().map(|field| field.name().as_str()))?;
     for (column, field) in columns.iter().zip(reader.schema().fields()) {
-        let (kind, is_text) = (field.data_type(), *field.data_type() == text());
-        let held = || {
-            format!(
-                "{name}: column `{}` holds {}",
-                column.name,
-                if is_text { "words".to_owned() } else { kind.to_string() }
-            )
-        };
-        match &column.cells {
-            Cells::Axis(quantity, _) if !quantity.words().is_empty() && !is_text => {
-                return Err(fault(held(), "words", "write the column as text"));
-            }
-            Cells::Axis(..) if !kind.is_numeric() => {
-                return Err(fault(held(), "numbers", "write the column as numbers"));
-            }
-            Cells::Label(_) if !is_text => return Err(unknown_column(&name, &column.name)),
-            _ => {}
-        }
+        column.check_type(&name, field.data_type())?;
     }
     let reader = reader.with_batch_size(BATCH).build().map_err(|error| unsound(&error))?;
     let mut first = 0;
     for batch in reader {
         let batch = batch.map_err(|error| unsound(&error))?;
         check_count(path, first + batch.num_rows())?;
-        for (Column { name: column, cells }, array) in columns.iter_mut().zip(batch.columns()) {
-            let place = |row: usize| format!("{name}: row {} of column `{column}`", first + row);
-            let null = (0..array.len()).find(|&row| array.is_null(row));
-            match cells {
-                Cells::Label(texts) => {
-                    for (row, cell) in texts_of(array).enumerate() {
-                        texts.push(|| place(row), cell.unwrap_or_default().trim())?;
-                    }
-                }
-                Cells::Axis(quantity, values) => {
-                    let words = quantity.words();
-                    if let Some(row) = null {
-                        let expected = if words.is_empty() { "a number" } else { "a word" };
-                        return Err(fault(format!("{}: no value", place(row)), expected, "fill in the value"));
-                    }
-                    if !words.is_empty() {
-                        for (row, cell) in texts_of(array).enumerate() {
-                            values.push(word(|| place(row), &words, cell.unwrap_or_default())?);
-                        }
-                        continue;
-                    }
-                    let Some(numbers) = numbers(array) else {
-                        let found = format!("{name}: column `{column}` holds {}", array.data_type());
-                        return Err(fault(found, "numbers", "write the column as floating-point numbers"));
-                    };
-                    for (row, value) in numbers.into_iter().enumerate() {
-                        values.push(legal(|| place(row), units, *quantity, value)?);
-                    }
-                }
-            }
+        for (column, array) in columns.iter_mut().zip(batch.columns()) {
+            column.extend(&name, first, array, units)?;
         }
         first += batch.num_rows();
     }
     Ok(columns)
 }
 
-/// The type of text as it is read: codes, so that a word that is there a million times takes memory once.
-fn text() -> DataType {
-    DataType::Dictionary(Box::new(DataType::Int32), Box::new(DataType::Utf8))
-}
+impl Column {
+    /// That the column of `file` has the type that its name asks for.
+    fn check_type(&self, file: &impl Display, kind: &DataType) -> Result<(), SpecError> {
+        let is_text = *kind == label();
+        let wrong = |expected: &str, help: &str| {
+            let held = if is_text { "words".to_owned() } else { kind.to_string() };
+            Err(fault(format!("{file}: column `{}` holds {held}", self.name), expected, help))
+        };
+        match &self.cells {
+            Cells::Axis(quantity, _) if !quantity.words().is_empty() && !is_text => {
+                wrong("words", "write the column as text")
+            }
+            Cells::Axis(..) if !kind.is_numeric() => wrong("numbers", "write the column as numbers"),
+            Cells::Label(_) if !is_text => Err(unknown_column(file, &self.name)),
+            _ => Ok(()),
+        }
+    }
 
-/// The file with text as codes.
-fn coded(metadata: ArrowReaderMetadata) -> Result<ArrowReaderMetadata, ParquetError> {
-    let fields = metadata.schema().fields().iter().map(|field| match field.data_type() {
-        DataType::Utf8 => Arc::new(field.as_ref().clone().with_data_type(text())),
-        _ => field.clone(),
-    });
-    let options = ArrowReaderOptions::new().with_schema(Arc::new(Schema::new(fields.collect::<Fields>())));
-    ArrowReaderMetadata::try_new(metadata.metadata().clone(), options)
+    /// Adds the rows of a batch, whose first one has number `first` in `file`.
+    fn extend(&mut self, file: &impl Display, first: usize, array: &ArrayRef, units: &Units) -> Result<(), SpecError> {
+        let name = &self.name;
+        let place = |row: usize| format!("{file}: row {} of column `{name}`", first + row);
+        let (quantity, values) = match &mut self.cells {
+            Cells::Label(texts) => {
+                let mut cells = texts_of(array).enumerate();
+                return cells.try_for_each(|(row, cell)| texts.push(|| place(row), cell.unwrap_or_default().trim()));
+            }
+            Cells::Axis(quantity, values) => (*quantity, values),
+        };
+        let words = quantity.words();
+        if let Some(row) = (0..array.len()).find(|&row| array.is_null(row)) {
+            let expected = if words.is_empty() { "a number" } else { "a word" };
+            return Err(fault(format!("{}: no value", place(row)), expected, "fill in the value"));
+        }
+        if !words.is_empty() {
+            for (row, cell) in texts_of(array).enumerate() {
+                values.push(word(|| place(row), &words, cell.unwrap_or_default())?);
+            }
+            return Ok(());
+        }
+        let Some(numbers) = numbers(array) else {
+            let found = format!("{file}: column `{name}` holds {}", array.data_type());
+            return Err(fault(found, "numbers", "write the column as floating-point numbers"));
+        };
+        for (row, value) in numbers.into_iter().enumerate() {
+            values.push(legal(|| place(row), units, quantity, value)?);
+        }
+        Ok(())
+    }
 }
 
 /// The cells of a column of text.

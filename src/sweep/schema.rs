@@ -13,120 +13,99 @@ use crate::table::{self, STATUS, Table};
 
 /// The schema, in draft 7, which editors know.
 pub fn schema() -> Value {
-    let axes = |units: &Units| object(Quantity::ALL.map(|quantity| (quantity.name(), axis(quantity, units))));
-    // What the scales are does not matter to a schema.
-    let si = Units::Si(Scales { mu_0: 1.0, l: 1.0, v_0: 1.0, normal_load: 1.0 });
-    let tables = object(table::ALL.map(|table| (table.name(), table_of(table))));
-    let names: Vec<&str> = Quantity::ALL.map(Quantity::name).into();
-    let condition = "Condition of the points to keep, such as v_f > v_i";
-    let grid = [
-        (
-            "zip",
-            json!({
-                "type": "array",
-                "items": { "type": "array", "minItems": 2, "uniqueItems": true, "items": { "enum": names } },
-                "description": "Axes of equal length that advance together, such as [[\"a\", \"b\"]]",
-            }),
-        ),
-        ("where", json!({ "type": "string", "minLength": 1, "description": condition })),
-        (
-            "points",
-            json!({
-                "type": "string",
-                "pattern": "\\.([cC][sS][vV]|[pP][aA][rR][qQ][uU][eE][tT])$",
-                "description": "A CSV or Parquet file, relative to the spec: one row a point; its columns are axes that vary together, and labels of text",
-            }),
-        ),
-        ("axes", json!({ "type": "object", "description": "The axes, the last varies fastest" })),
-    ];
+    let grid = grid();
+    let grid_keys = grid.each_ref().map(|(key, _)| *key);
     let block = json!({
         "type": "array",
         "minItems": 1,
         "items": { "type": "object", "additionalProperties": false, "properties": object(grid.clone()) },
         "description": "Grids to unite, in order, each with axes of its own",
     });
-    let grid_keys = ["zip", "where", "points", "axes"];
-    let own = [
-        (
-            "name",
-            json!({
-                "type": "string",
-                "pattern": "^[A-Za-z0-9_-][A-Za-z0-9._-]*$",
-                "maxLength": LONGEST_NAME,
-                "description": "Name of the dataset, which goes to results/NAME",
-            }),
-        ),
-        ("description", json!({ "type": "string", "description": "What the sweep is for" })),
-        (
-            "model",
-            json!({
-                "type": "object",
-                "additionalProperties": false,
-                "description": "What is modelled",
-                "properties": {
-                    "velocity_bound": {
-                        "type": "boolean",
-                        "default": true,
-                        "description": "Whether optimal protocols obey v >= 1",
-                    },
-                    "units": {
-                        "anyOf": [{ "enum": ["dimensionless", "si"] }, { "pattern": any_case("dimensionless") }, { "pattern": any_case("si") }],
-                        "type": "string",
-                        "default": "dimensionless",
-                        "description": "Units of the values",
-                    },
-                    "mu_0": scale("Friction coefficient at v_0, for SI units"),
-                    "l": scale("Length over which contacts are renewed in m, for SI units"),
-                    "v_0": scale("Velocity from which on the friction law holds in m/s, for SI units"),
-                    "normal_load": scale("Normal load in Pa, for SI units"),
-                },
-            }),
-        ),
-        (
-            "accuracy",
-            json!({
-                "type": "object",
-                "additionalProperties": false,
-                "description": "How accurate the numbers are",
-                "properties": { "rtol": rtol(json!(1e-10)) },
-            }),
-        ),
-        (
-            "tables",
-            json!({
-                "type": "object",
-                "additionalProperties": false,
-                "minProperties": 1,
-                "description": "The tables to compute; only those that are named are written",
-                "properties": tables,
-            }),
-        ),
-    ];
+    // What the scales are does not matter to a schema.
+    let si = Units::Si(Scales { mu_0: 1.0, l: 1.0, v_0: 1.0, normal_load: 1.0 });
     json!({
         "$schema": "http://json-schema.org/draft-07/schema#",
         "title": format!("Sweep spec of slipsweep {}", env!("CARGO_PKG_VERSION")),
         "type": "object",
         "additionalProperties": false,
         "required": ["name", "tables"],
-        "properties": object(own.into_iter().chain(grid).chain([("block", block)])),
+        "properties": object(own().into_iter().chain(grid).chain([("block", block)])),
         "allOf": table::ALL.map(needs).into_iter().chain([units()]).collect::<Vec<Value>>(),
         // Everything about the grid is in the blocks, if there are any.
         "dependencies": { "block": { "not": { "anyOf": grid_keys.map(|key| json!({ "required": [key] })) } } },
-        "definitions": {
-            "axes": {
-                "type": "object",
-                "additionalProperties": false,
-                "description": format!("The axes, {}: a Cartesian product, the last varies fastest", names.join(", ")),
-                "properties": axes(&Units::Scaled),
-            },
-            "axes_si": {
-                "type": "object",
-                "additionalProperties": false,
-                "description": format!("The axes in SI units, {}: a Cartesian product, the last varies fastest", names.join(", ")),
-                "properties": axes(&si),
-            },
-        },
+        "definitions": { "axes": axes("The axes", &Units::Scaled), "axes_si": axes("The axes in SI units", &si) },
     })
+}
+
+/// A table of TOML with these keys and no others.
+fn keys<'a>(description: &str, properties: impl IntoIterator<Item = (&'a str, Value)>) -> Value {
+    json!({
+        "type": "object",
+        "additionalProperties": false,
+        "description": description,
+        "properties": object(properties),
+    })
+}
+
+/// The keys that may also stand in a block.
+fn grid() -> [(&'static str, Value); 4] {
+    let points = "A CSV or Parquet file, relative to the spec: one row a point; its columns are axes that vary together, and labels of text";
+    let condition = "Condition of the points to keep, such as v_f > v_i";
+    let zip = json!({
+        "type": "array",
+        "items": { "type": "array", "minItems": 2, "uniqueItems": true, "items": { "enum": Quantity::ALL.map(Quantity::name) } },
+        "description": "Axes of equal length that advance together, such as [[\"a\", \"b\"]]",
+    });
+    let ending = "\\.([cC][sS][vV]|[pP][aA][rR][qQ][uU][eE][tT])$";
+    [
+        ("zip", zip),
+        ("where", json!({ "type": "string", "minLength": 1, "description": condition })),
+        ("points", json!({ "type": "string", "pattern": ending, "description": points })),
+        ("axes", json!({ "type": "object", "description": "The axes, the last varies fastest" })),
+    ]
+}
+
+/// The keys that concern the whole spec.
+fn own() -> [(&'static str, Value); 5] {
+    let name = json!({
+        "type": "string",
+        "pattern": "^[A-Za-z0-9_-][A-Za-z0-9._-]*$",
+        "maxLength": LONGEST_NAME,
+        "description": "Name of the dataset, which goes to results/NAME",
+    });
+    let bound = json!({ "type": "boolean", "default": true, "description": "Whether optimal protocols obey v >= 1" });
+    let units = json!({
+        "anyOf": [{ "enum": ["dimensionless", "si"] }, { "pattern": any_case("dimensionless") }, { "pattern": any_case("si") }],
+        "type": "string",
+        "default": "dimensionless",
+        "description": "Units of the values",
+    });
+    let scale = |description: &str| json!({ "type": "number", "exclusiveMinimum": 0.0, "description": description });
+    let model = [
+        ("velocity_bound", bound),
+        ("units", units),
+        ("mu_0", scale("Friction coefficient at v_0, for SI units")),
+        ("l", scale("Length over which contacts are renewed in m, for SI units")),
+        ("v_0", scale("Velocity from which on the friction law holds in m/s, for SI units")),
+        ("normal_load", scale("Normal load in Pa, for SI units")),
+    ];
+    let named = table::ALL.map(|table| (table.name(), table_of(table)));
+    let mut tables = keys("The tables to compute; only those that are named are written", named);
+    tables["minProperties"] = json!(1);
+    [
+        ("name", name),
+        ("description", json!({ "type": "string", "description": "What the sweep is for" })),
+        ("model", keys("What is modelled", model)),
+        ("accuracy", keys("How accurate the numbers are", [("rtol", rtol(json!(1e-10)))])),
+        ("tables", tables),
+    ]
+}
+
+/// The axes in these units.
+fn axes(what: &str, units: &Units) -> Value {
+    let names = Quantity::ALL.map(Quantity::name).join(", ");
+    let description = format!("{what}, {names}: a Cartesian product, the last varies fastest");
+    keys(&description, Quantity::ALL.map(|quantity| (quantity.name(), axis(quantity, units))))
 }
 
 /// Which axes are meant: those in SI units go with the four scales, the others without.
@@ -151,11 +130,6 @@ fn units() -> Value {
 fn any_case(word: &str) -> String {
     let letters = word.chars().map(|letter| format!("[{letter}{}]", letter.to_ascii_uppercase()));
     format!("^{}$", letters.collect::<String>())
-}
-
-/// One of the scales of SI units.
-fn scale(description: &str) -> Value {
-    json!({ "type": "number", "exclusiveMinimum": 0.0, "description": description })
 }
 
 fn object<'a>(entries: impl IntoIterator<Item = (&'a str, Value)>) -> Value {
@@ -307,21 +281,15 @@ fn table_of(table: &dyn Table) -> Value {
         table.columns().iter().chain(reduced()).map(|column| column.name).chain([STATUS]).collect();
     let meanings: Vec<String> =
         table.columns().iter().map(|column| format!("{}: {}", column.name, column.doc)).collect();
-    let mut known = json!({
-        "type": "object",
-        "additionalProperties": false,
-        "description": table.doc(),
-        "properties": {
-            "columns": {
-                "type": "array",
-                "minItems": 1,
-                "uniqueItems": true,
-                "items": { "enum": columns },
-                "description": format!("Only these columns are computed and written\n{}", meanings.join("\n")),
-            },
-            "rtol": rtol(table.default_rtol().map_or(Value::Null, |rtol| json!(rtol))),
-        },
+    let chosen = json!({
+        "type": "array",
+        "minItems": 1,
+        "uniqueItems": true,
+        "items": { "enum": columns },
+        "description": format!("Only these columns are computed and written\n{}", meanings.join("\n")),
     });
+    let accuracy = rtol(table.default_rtol().map_or(Value::Null, |rtol| json!(rtol)));
+    let mut known = keys(table.doc(), [("columns", chosen), ("rtol", accuracy)]);
     if !reductions.is_empty() {
         let words: Vec<&str> = reductions.iter().map(|(word, _)| *word).collect();
         let description =

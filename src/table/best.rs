@@ -3,12 +3,9 @@
 use std::ops::Range;
 
 use super::optima::{OPTIMUM_AXES, transition};
-use super::{Column, Field, Job, Kind, Selection, Sheet, Stopped, Table, Work, columns, place, rows};
+use super::{Column, Definition, Field, Job, Kind, Sheet, Stopped, Work, columns, place, rows};
 use crate::grid::{Quantity, Scale};
 use crate::protocol::{Effort, best, error};
-
-/// One row a transition and time.
-pub struct Best;
 
 /// A row.
 struct Row {
@@ -56,55 +53,37 @@ const FIELDS: [Field<Row>; 7] = [
 const COLUMNS: [Column; 7] = columns(&FIELDS);
 const WORK_ERROR: usize = place(&COLUMNS, "work_error");
 
-impl Table for Best {
-    fn name(&self) -> &'static str {
-        "best"
-    }
+/// One row a transition and time.
+pub static BEST: Definition = Definition {
+    name: "best",
+    doc: "the cubic shortcut of least work, over the whole (alpha_2, alpha_3) plane",
+    axes: OPTIMUM_AXES,
+    columns: &COLUMNS,
+    rows_per_part: 1 << 10,
+    cost: 1_500_000,
+    needs_optimum: |_| false,
+    compute,
+};
 
-    fn doc(&self) -> &'static str {
-        "the cubic shortcut of least work, over the whole (alpha_2, alpha_3) plane"
-    }
-
-    fn axes(&self) -> &'static [Quantity] {
-        OPTIMUM_AXES
-    }
-
-    fn columns(&self) -> &'static [Column] {
-        &COLUMNS
-    }
-
-    fn rows_per_part(&self) -> u64 {
-        1 << 10
-    }
-
-    fn cost(&self) -> u64 {
-        1_500_000
-    }
-
-    fn needs_optimum(&self, _selection: &Selection) -> bool {
-        false
-    }
-
-    fn compute(&self, job: &Job<'_>, range: Range<u64>, sheet: &mut Sheet) -> Result<Work, Stopped> {
-        let natural = |quantity| job.grid.scale(quantity) == Some(Scale::Model);
-        let (natural_2, natural_3) = (natural(Quantity::Alpha2), natural(Quantity::Alpha3));
-        rows::each(job, range, 1, sheet, &FIELDS, |_, point| {
-            let t_f = point[Quantity::Time];
-            let solve = |rtol| best::solve(&transition(point), t_f, job.bounded, rtol);
-            let solved = solve(job.rtol);
-            let mut effort = solved.effort;
-            let row = solved.value.map(|best| {
-                let finest = job.selection.has(WORK_ERROR).then(|| solve(error::FINEST));
-                effort += finest.map_or_else(Effort::default, |finest| finest.effort);
-                let finest = finest.and_then(|finest| finest.value);
-                Row {
-                    best,
-                    alpha_2: if natural_2 { best.a_2 / t_f } else { best.a_2 },
-                    alpha_3: if natural_3 { best.a_3 / (t_f * t_f) } else { best.a_3 },
-                    work_error: finest.map_or(f64::NAN, |finest| error::bound(best.work, finest.work, best.work)),
-                }
-            });
-            (solved.status, row, Work { best: 1, ..Work::from(effort) })
-        })
-    }
+fn compute(job: &Job<'_>, range: Range<u64>, sheet: &mut Sheet) -> Result<Work, Stopped> {
+    let natural = |quantity| job.grid.scale(quantity) == Some(Scale::Model);
+    let (natural_2, natural_3) = (natural(Quantity::Alpha2), natural(Quantity::Alpha3));
+    rows::each(job, range, 1, sheet, &FIELDS, |_, point| {
+        let t_f = point[Quantity::Time];
+        let solve = |rtol| best::solve(&transition(point), t_f, job.bounded, rtol);
+        let solved = solve(job.rtol);
+        let mut effort = solved.effort;
+        let row = solved.value.map(|best| {
+            let finest = job.selection.has(WORK_ERROR).then(|| solve(error::FINEST));
+            effort += finest.map_or_else(Effort::default, |finest| finest.effort);
+            let finest = finest.and_then(|finest| finest.value);
+            Row {
+                best,
+                alpha_2: if natural_2 { best.a_2 / t_f } else { best.a_2 },
+                alpha_3: if natural_3 { best.a_3 / (t_f * t_f) } else { best.a_3 },
+                work_error: finest.map_or(f64::NAN, |finest| error::bound(best.work, finest.work, best.work)),
+            }
+        });
+        (solved.status, row, Work { best: 1, ..Work::from(effort) })
+    })
 }

@@ -4,14 +4,11 @@ use std::ops::Range;
 
 use super::memo::Memo;
 use super::optima::{self, Comparison, transition};
-use super::{Column, Field, Job, Selection, Sheet, Stopped, Table, Work, columns, number, place, rows};
+use super::{Column, Definition, Field, Job, Selection, Sheet, Stopped, Work, columns, number, place, rows};
 use crate::grid::{Point, Quantity};
 use crate::protocol::compliant::{self, Compliant as Member};
 use crate::protocol::{Slider, Solved, error};
 use crate::stability::{Followed, amplification, held_error, loop_error};
-
-/// One row a transition, time, stiffness, mass and time between samples.
-pub struct Compliant;
 
 /// A row.
 struct Row {
@@ -67,70 +64,55 @@ const LOOP_ERROR: usize = place(&COLUMNS, "loop_error");
 const WORK_ERROR: usize = place(&COLUMNS, "work_error");
 const GAP_ERROR: usize = place(&COLUMNS, "gap_error");
 
-impl Table for Compliant {
-    fn name(&self) -> &'static str {
-        "compliant"
-    }
+/// One row a transition, time, stiffness, mass and time between samples.
+pub static COMPLIANT: Definition = Definition {
+    name: "compliant",
+    doc: "the smooth shortcut at finite stiffness",
+    axes: &[
+        Quantity::Time,
+        Quantity::A,
+        Quantity::B,
+        Quantity::InitialVelocity,
+        Quantity::FinalVelocity,
+        Quantity::Stiffness,
+        Quantity::Mass,
+        Quantity::Sampling,
+    ],
+    columns: &COLUMNS,
+    rows_per_part: 1 << 12,
+    cost: 700_000,
+    needs_optimum,
+    compute,
+};
 
-    fn doc(&self) -> &'static str {
-        "the smooth shortcut at finite stiffness"
-    }
+fn needs_optimum(selection: &Selection) -> bool {
+    selection.has_any([WORK_OPTIMAL, GAP, GAP_ERROR])
+}
 
-    fn axes(&self) -> &'static [Quantity] {
-        &[
-            Quantity::Time,
-            Quantity::A,
-            Quantity::B,
-            Quantity::InitialVelocity,
-            Quantity::FinalVelocity,
-            Quantity::Stiffness,
-            Quantity::Mass,
-            Quantity::Sampling,
-        ]
-    }
-
-    fn columns(&self) -> &'static [Column] {
-        &COLUMNS
-    }
-
-    fn rows_per_part(&self) -> u64 {
-        1 << 12
-    }
-
-    fn cost(&self) -> u64 {
-        700_000
-    }
-
-    fn needs_optimum(&self, selection: &Selection) -> bool {
-        selection.has_any([WORK_OPTIMAL, GAP, GAP_ERROR])
-    }
-
-    fn compute(&self, job: &Job<'_>, range: Range<u64>, sheet: &mut Sheet) -> Result<Work, Stopped> {
-        let members = Members::default();
-        rows::each(job, range, 4, sheet, &FIELDS, |tuple, point| {
-            let mut work = Work::default();
-            let Solution { solved, amplification, work_error } = members.get(job, tuple, point, &mut work);
-            let Some(member) = solved.value else { return (solved.status, None, work) };
-            let mut status = solved.status;
-            let mut least = Comparison::NONE;
-            if self.needs_optimum(job.selection) {
-                let bounded = job.selection.has(GAP_ERROR);
-                least = optima::compare(job, (tuple, point), (member.work, work_error), bounded, &mut work);
-                status = status.beside(least.optimum);
-            }
-            let (slider, t_f, dt) = (slider(point), point[Quantity::Time], point[Quantity::Sampling]);
-            let is_held = job.selection.has(END_ERROR) && dt > 0.0;
-            let is_followed = job.selection.has(LOOP_ERROR);
-            let path = (is_held || is_followed)
-                .then(|| compliant::path(&slider, velocities(point), t_f, job.rtol).ok())
-                .flatten();
-            let end_error =
-                path.as_ref().filter(|_| is_held).and_then(|path| told_by(held_error(path, dt, job.rtol), &mut work));
-            let loop_error =
-                path.as_ref().filter(|_| is_followed).and_then(|path| told_by(loop_error(path, job.rtol), &mut work));
-            (status, Some(Row { member, slider, t_f, least, amplification, end_error, loop_error, work_error }), work)
-        })
-    }
+fn compute(job: &Job<'_>, range: Range<u64>, sheet: &mut Sheet) -> Result<Work, Stopped> {
+    let members = Members::default();
+    rows::each(job, range, 4, sheet, &FIELDS, |tuple, point| {
+        let mut work = Work::default();
+        let Solution { solved, amplification, work_error } = members.get(job, tuple, point, &mut work);
+        let Some(member) = solved.value else { return (solved.status, None, work) };
+        let mut status = solved.status;
+        let mut least = Comparison::NONE;
+        if needs_optimum(job.selection) {
+            let bounded = job.selection.has(GAP_ERROR);
+            least = optima::compare(job, (tuple, point), (member.work, work_error), bounded, &mut work);
+            status = status.beside(least.optimum);
+        }
+        let (slider, t_f, dt) = (slider(point), point[Quantity::Time], point[Quantity::Sampling]);
+        let is_held = job.selection.has(END_ERROR) && dt > 0.0;
+        let is_followed = job.selection.has(LOOP_ERROR);
+        let path =
+            (is_held || is_followed).then(|| compliant::path(&slider, velocities(point), t_f, job.rtol).ok()).flatten();
+        let end_error =
+            path.as_ref().filter(|_| is_held).and_then(|path| told_by(held_error(path, dt, job.rtol), &mut work));
+        let loop_error =
+            path.as_ref().filter(|_| is_followed).and_then(|path| told_by(loop_error(path, job.rtol), &mut work));
+        (status, Some(Row { member, slider, t_f, least, amplification, end_error, loop_error, work_error }), work)
+    })
 }
 
 /// The number of a simulation, whose work is added.

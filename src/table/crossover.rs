@@ -3,12 +3,9 @@
 use std::ops::Range;
 
 use super::optima::transition;
-use super::{Column, Field, Job, Selection, Sheet, Stopped, Table, Work, columns, number, place, rows};
+use super::{Column, Definition, Field, Job, Sheet, Stopped, Work, columns, number, place, rows};
 use crate::grid::Quantity;
 use crate::protocol::optimal::crossover::{self, CrossoverTimes, Wanted};
-
-/// One row a transition.
-pub struct Crossover;
 
 const TIME: &str = "l/v_0";
 const WORK: &str = "mu_0 sigma l";
@@ -44,48 +41,30 @@ const FIELDS: [Field<CrossoverTimes>; 12] = [
 
 const COLUMNS: [Column; 12] = columns(&FIELDS);
 
-impl Table for Crossover {
-    fn name(&self) -> &'static str {
-        "crossover"
-    }
+/// One row a transition.
+pub static CROSSOVER: Definition = Definition {
+    name: "crossover",
+    doc: "the durations at which the optimal strategy changes",
+    axes: &[Quantity::A, Quantity::B, Quantity::InitialVelocity, Quantity::FinalVelocity],
+    columns: &COLUMNS,
+    rows_per_part: 1 << 16,
+    cost: 1_800,
+    needs_optimum: |_| false,
+    compute,
+};
 
-    fn doc(&self) -> &'static str {
-        "the durations at which the optimal strategy changes"
-    }
-
-    fn axes(&self) -> &'static [Quantity] {
-        &[Quantity::A, Quantity::B, Quantity::InitialVelocity, Quantity::FinalVelocity]
-    }
-
-    fn columns(&self) -> &'static [Column] {
-        &COLUMNS
-    }
-
-    fn rows_per_part(&self) -> u64 {
-        1 << 16
-    }
-
-    fn cost(&self) -> u64 {
-        1_800
-    }
-
-    fn needs_optimum(&self, _selection: &Selection) -> bool {
-        false
-    }
-
-    fn compute(&self, job: &Job<'_>, range: Range<u64>, sheet: &mut Sheet) -> Result<Work, Stopped> {
-        let wanted = |names: [&str; 2]| job.selection.has_any(names.map(|name| place(&COLUMNS, name)));
-        let wanted = Wanted {
-            cross: wanted(["t_cross", "work_cross"]),
-            hold: wanted(["t_hold", "work_hold"]),
-            cheapest: wanted(["t_cheapest", "work_cheapest"]),
-            min: wanted(["t_min", "work_min"]),
-            turn: wanted(["t_turn", "work_turn"]),
-            free: wanted(["t_free_in", "t_free_out"]),
-        };
-        rows::each(job, range, 64, sheet, &FIELDS, |_, point| {
-            let (status, times, effort) = crossover::solve(&transition(point), job.bounded, job.rtol, wanted);
-            (status, Some(times), Work { crossovers: 1, ..Work::from(effort) })
-        })
-    }
+fn compute(job: &Job<'_>, range: Range<u64>, sheet: &mut Sheet) -> Result<Work, Stopped> {
+    let wanted = |names: [&str; 2]| job.selection.has_any(names.map(|name| place(&COLUMNS, name)));
+    let wanted = Wanted {
+        cross: wanted(["t_cross", "work_cross"]),
+        hold: wanted(["t_hold", "work_hold"]),
+        cheapest: wanted(["t_cheapest", "work_cheapest"]),
+        min: wanted(["t_min", "work_min"]),
+        turn: wanted(["t_turn", "work_turn"]),
+        free: wanted(["t_free_in", "t_free_out"]),
+    };
+    rows::each(job, range, 64, sheet, &FIELDS, |_, point| {
+        let (status, times, effort) = crossover::solve(&transition(point), job.bounded, job.rtol, wanted);
+        (status, Some(times), Work { crossovers: 1, ..Work::from(effort) })
+    })
 }

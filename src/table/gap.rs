@@ -10,22 +10,19 @@ use rayon::prelude::*;
 
 use super::fault;
 use super::optima::{transition, work_error};
-use super::{Column, Job, Selection, Sheet, Stopped, Table, Work};
+use super::{Column, Definition, Job, Selection, Sheet, Stopped, Work};
 use crate::grid::{Point, Quantity, Runs, Scale, View};
 use crate::model::Transition;
 use crate::protocol::cubic::{Landscape, Shortcuts};
 use crate::protocol::{Status, error};
 
-/// One row a shortcut.
-pub struct Gap;
-
 const WORK_OPTIMAL: usize = 1;
 /// The place of `gap` among its columns.
-pub const GAP: usize = 2;
+pub(super) const WORK_GAP: usize = 2;
 const WORK_ERROR: usize = 4;
 const GAP_ERROR: usize = 5;
 
-const COLUMNS: &[Column] = &[
+pub(super) const COLUMNS: &[Column] = &[
     Column::number("work", "mu_0 sigma l", "work of friction W_s of the shortcut"),
     Column::number("work_optimal", "mu_0 sigma l", "least work of friction W* of any protocol"),
     Column::number("gap", "1", "(W_s - W*)/W*, good to rtol of 1 + gap, not of itself"),
@@ -38,67 +35,53 @@ const COLUMNS: &[Column] = &[
 /// Rows that a thread takes at a time: short enough to stop within a fraction of a second at any accuracy.
 const CHUNK: usize = 1 << 13;
 
-impl Table for Gap {
-    fn name(&self) -> &'static str {
-        "gap"
-    }
+/// One row a shortcut.
+pub static GAP: Definition = Definition {
+    name: "gap",
+    doc: "the work of a cubic shortcut and its distance from the optimum",
+    axes: &[
+        Quantity::Time,
+        Quantity::A,
+        Quantity::B,
+        Quantity::InitialVelocity,
+        Quantity::FinalVelocity,
+        Quantity::Alpha2,
+        Quantity::Alpha3,
+    ],
+    columns: COLUMNS,
+    rows_per_part: 1 << 18,
+    cost: 100,
+    needs_optimum,
+    compute,
+};
 
-    fn doc(&self) -> &'static str {
-        "the work of a cubic shortcut and its distance from the optimum"
-    }
+fn needs_optimum(selection: &Selection) -> bool {
+    selection.has_any([WORK_OPTIMAL, WORK_GAP, GAP_ERROR])
+}
 
-    fn axes(&self) -> &'static [Quantity] {
-        &[
-            Quantity::Time,
-            Quantity::A,
-            Quantity::B,
-            Quantity::InitialVelocity,
-            Quantity::FinalVelocity,
-            Quantity::Alpha2,
-            Quantity::Alpha3,
-        ]
+pub(super) fn compute(job: &Job<'_>, rows: Range<u64>, sheet: &mut Sheet) -> Result<Work, Stopped> {
+    let view = job.rows.view(rows.clone());
+    let (groups, order) = groups(&view, job, &rows);
+    let coefficients = Coefficients::new(job, view, &rows, order.as_deref());
+    let works = chunks(&groups, sheet, job.selection)
+        .into_par_iter()
+        // Chunks cost very different times: no thread may keep several to itself while another one is idle.
+        .with_max_len(1)
+        .map(|chunk| {
+            job.signal.check()?;
+            let length = chunk.cells.status.len() as u64;
+            let work = evaluate(job, &groups, &coefficients, chunk);
+            job.signal.advance(length);
+            Ok(work)
+        })
+        .collect::<Result<Vec<Work>, Stopped>>()?;
+    if let Some(order) = order {
+        scatter(sheet, &order);
     }
-
-    fn columns(&self) -> &'static [Column] {
-        COLUMNS
+    for (column, size) in sheet.columns.iter_mut().zip(job.sizes).filter(|(_, size)| **size != 1.0) {
+        column.iter_mut().for_each(|cell| *cell *= size);
     }
-
-    fn rows_per_part(&self) -> u64 {
-        1 << 18
-    }
-
-    fn cost(&self) -> u64 {
-        100
-    }
-
-    fn needs_optimum(&self, selection: &Selection) -> bool {
-        selection.has_any([WORK_OPTIMAL, GAP, GAP_ERROR])
-    }
-
-    fn compute(&self, job: &Job<'_>, rows: Range<u64>, sheet: &mut Sheet) -> Result<Work, Stopped> {
-        let view = job.rows.view(rows.clone());
-        let (groups, order) = groups(&view, job, &rows);
-        let coefficients = Coefficients::new(job, view, &rows, order.as_deref());
-        let works = chunks(&groups, sheet, job.selection)
-            .into_par_iter()
-            // Chunks cost very different times: no thread may keep several to itself while another one is idle.
-            .with_max_len(1)
-            .map(|chunk| {
-                job.signal.check()?;
-                let length = chunk.cells.status.len() as u64;
-                let work = evaluate(job, &groups, &coefficients, chunk);
-                job.signal.advance(length);
-                Ok(work)
-            })
-            .collect::<Result<Vec<Work>, Stopped>>()?;
-        if let Some(order) = order {
-            scatter(sheet, &order);
-        }
-        for (column, size) in sheet.columns.iter_mut().zip(job.sizes).filter(|(_, size)| **size != 1.0) {
-            column.iter_mut().for_each(|cell| *cell *= size);
-        }
-        Ok(works.into_iter().sum())
-    }
+    Ok(works.into_iter().sum())
 }
 
 /// Rows of one transition and time, side by side in the order of computation.
@@ -275,8 +258,7 @@ fn evaluate(job: &Job<'_>, groups: &[Group], coefficients: &Coefficients<'_>, ch
         };
 
         let [work_s, work_optimal, gap, v_min, work_error, gap_error] = now.columns;
-        let with_gap = !gap.is_empty();
-        let with_work = with_gap || prepared.finest.is_some();
+        let with_work = !gap.is_empty() || prepared.finest.is_some();
         let works = if work_s.is_empty() && with_work { buffer(&mut work_buffer, length) } else { work_s };
         let v_min = if v_min.is_empty() { buffer(&mut v_min_buffer, length) } else { v_min };
         let out = Shortcuts { work: &mut *works, v_min: &mut *v_min, status: &mut *now.status };
@@ -295,32 +277,48 @@ fn evaluate(job: &Job<'_>, groups: &[Group], coefficients: &Coefficients<'_>, ch
             }
         }
 
-        for (i, status) in now.status.iter().enumerate() {
-            if *status == Status::NotConverged {
-                [works.get_mut(i), v_min.get_mut(i)].into_iter().flatten().for_each(|cell| *cell = f64::NAN);
-            }
-        }
-        if let Some((optimum, value)) = prepared.optimum {
-            for (i, status) in now.status.iter_mut().enumerate() {
-                if matches!(status, Status::Infeasible | Status::NotConverged) {
-                    continue;
-                }
-                if let Some(value) = value {
-                    if let Some(cell) = work_optimal.get_mut(i) {
-                        *cell = value;
-                    }
-                    if with_gap {
-                        gap[i] = (works[i] - value) / value;
-                    }
-                    if let Some(cell) = gap_error.get_mut(i) {
-                        *cell = error::of_gap((works[i], errors[i]), (value, prepared.error_optimal));
-                    }
-                }
-                *status = status.beside(optimum);
-            }
-        }
+        compare(prepared, Compared { status: now.status, works, v_min, work_optimal, gap, errors, gap_error });
     }
     work
+}
+
+/// The cells of a group in a chunk, its work computed; a column that is not asked for is empty.
+struct Compared<'a> {
+    status: &'a mut [Status],
+    works: &'a mut [f64],
+    v_min: &'a mut [f64],
+    work_optimal: &'a mut [f64],
+    gap: &'a mut [f64],
+    errors: &'a [f64],
+    gap_error: &'a mut [f64],
+}
+
+/// Drops what did not converge and compares the work with that of the optimum.
+fn compare(prepared: &Prepared, cells: Compared<'_>) {
+    let Compared { status, works, v_min, work_optimal, gap, errors, gap_error } = cells;
+    for (i, status) in status.iter().enumerate() {
+        if *status == Status::NotConverged {
+            [works.get_mut(i), v_min.get_mut(i)].into_iter().flatten().for_each(|cell| *cell = f64::NAN);
+        }
+    }
+    let Some((optimum, value)) = prepared.optimum else { return };
+    for (i, status) in status.iter_mut().enumerate() {
+        if matches!(status, Status::Infeasible | Status::NotConverged) {
+            continue;
+        }
+        if let Some(value) = value {
+            if let Some(cell) = work_optimal.get_mut(i) {
+                *cell = value;
+            }
+            if let Some(cell) = gap.get_mut(i) {
+                *cell = (works[i] - value) / value;
+            }
+            if let Some(cell) = gap_error.get_mut(i) {
+                *cell = error::of_gap((works[i], errors[i]), (value, prepared.error_optimal));
+            }
+        }
+        *status = status.beside(optimum);
+    }
 }
 
 fn buffer(buffer: &mut Vec<f64>, length: usize) -> &mut [f64] {
@@ -336,7 +334,7 @@ fn prepare(job: &Job<'_>, group: &Group, point: &Point, work: &mut Work) -> Prep
     }
     work.landscapes += 1;
     let mut error_optimal = f64::NAN;
-    let optimum = Gap.needs_optimum(job.selection).then(|| {
+    let optimum = needs_optimum(job.selection).then(|| {
         let (solved, spent) = job.optima.get(group.tuple, point);
         *work += spent;
         if let Some(optimum) = solved.value.filter(|_| job.selection.has(GAP_ERROR)) {

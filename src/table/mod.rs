@@ -68,6 +68,52 @@ pub trait Table: Sync {
     fn compute(&self, job: &Job<'_>, rows: Range<u64>, sheet: &mut Sheet) -> Result<Work, Stopped>;
 }
 
+/// A table of which everything is known in advance.
+pub struct Definition {
+    name: &'static str,
+    doc: &'static str,
+    axes: &'static [Quantity],
+    columns: &'static [Column],
+    rows_per_part: u64,
+    cost: u64,
+    needs_optimum: fn(&Selection) -> bool,
+    compute: fn(&Job<'_>, Range<u64>, &mut Sheet) -> Result<Work, Stopped>,
+}
+
+impl Table for Definition {
+    fn name(&self) -> &'static str {
+        self.name
+    }
+
+    fn doc(&self) -> &'static str {
+        self.doc
+    }
+
+    fn axes(&self) -> &'static [Quantity] {
+        self.axes
+    }
+
+    fn columns(&self) -> &'static [Column] {
+        self.columns
+    }
+
+    fn rows_per_part(&self) -> u64 {
+        self.rows_per_part
+    }
+
+    fn cost(&self) -> u64 {
+        self.cost
+    }
+
+    fn needs_optimum(&self, selection: &Selection) -> bool {
+        (self.needs_optimum)(selection)
+    }
+
+    fn compute(&self, job: &Job<'_>, rows: Range<u64>, sheet: &mut Sheet) -> Result<Work, Stopped> {
+        (self.compute)(job, rows, sheet)
+    }
+}
+
 /// What a simpler theory says of a column of words: a summary counts it against what was found.
 #[derive(Debug, Clone, Copy)]
 pub struct Prediction {
@@ -87,15 +133,15 @@ pub struct Prediction {
 
 /// Every table, in the order in which they are listed. A new table is a file and a line here.
 pub const ALL: [&dyn Table; 9] = [
-    &gap::Gap,
-    &best::Best,
-    &optimal::Optimal,
-    &crossover::Crossover,
-    &swift::Swift,
-    &stability::Stability,
+    &gap::GAP,
+    &best::BEST,
+    &optimal::OPTIMAL,
+    &crossover::CROSSOVER,
+    &swift::SWIFT,
+    &stability::STABILITY,
     &step::Step,
-    &compliant::Compliant,
-    &regularised::Regularised,
+    &compliant::COMPLIANT,
+    &regularised::REGULARISED,
 ];
 
 /// Ways to reduce the landscapes of `gap`, by the word that a spec has for each, and the tables that hold what comes of them.

@@ -3,12 +3,8 @@
 use std::ops::Range;
 
 use super::optima::{OPTIMUM_AXES, work_error};
-use super::{Column, Field, Job, Kind, Selection, Sheet, Stopped, Table, Work, columns, place, rows};
-use crate::grid::Quantity;
+use super::{Column, Definition, Field, Job, Kind, Sheet, Stopped, Work, columns, place, rows};
 use crate::protocol::optimal::Optimum;
-
-/// One row a transition and time.
-pub struct Optimal;
 
 /// The words of `strategy`, in the order of [`Strategy::ALL`](crate::protocol::optimal::Strategy::ALL).
 const STRATEGIES: &[&str] = &["speed_up", "slow_down", "hold"];
@@ -45,46 +41,28 @@ const FIELDS: [Field<Row>; 8] = [
 const COLUMNS: [Column; 8] = columns(&FIELDS);
 const WORK_ERROR: usize = place(&COLUMNS, "work_error");
 
-impl Table for Optimal {
-    fn name(&self) -> &'static str {
-        "optimal"
-    }
+/// One row a transition and time.
+pub static OPTIMAL: Definition = Definition {
+    name: "optimal",
+    doc: "the protocol of least work",
+    axes: OPTIMUM_AXES,
+    columns: &COLUMNS,
+    rows_per_part: 1 << 16,
+    cost: 2_500,
+    needs_optimum: |_| true,
+    compute,
+};
 
-    fn doc(&self) -> &'static str {
-        "the protocol of least work"
-    }
-
-    fn axes(&self) -> &'static [Quantity] {
-        OPTIMUM_AXES
-    }
-
-    fn columns(&self) -> &'static [Column] {
-        &COLUMNS
-    }
-
-    fn rows_per_part(&self) -> u64 {
-        1 << 16
-    }
-
-    fn cost(&self) -> u64 {
-        2_500
-    }
-
-    fn needs_optimum(&self, _selection: &Selection) -> bool {
-        true
-    }
-
-    fn compute(&self, job: &Job<'_>, range: Range<u64>, sheet: &mut Sheet) -> Result<Work, Stopped> {
-        rows::each(job, range, 64, sheet, &FIELDS, |tuple, point| {
-            let (solved, mut work) = job.optima.get(tuple, point);
-            let row = solved.value.map(|optimum| {
-                let wanted = job.selection.has(WORK_ERROR);
-                let work_error = if wanted { work_error(job, point, &optimum, &mut work) } else { f64::NAN };
-                Row { optimum, work_error }
-            });
-            (solved.status, row, work)
-        })
-    }
+fn compute(job: &Job<'_>, range: Range<u64>, sheet: &mut Sheet) -> Result<Work, Stopped> {
+    rows::each(job, range, 64, sheet, &FIELDS, |tuple, point| {
+        let (solved, mut work) = job.optima.get(tuple, point);
+        let row = solved.value.map(|optimum| {
+            let wanted = job.selection.has(WORK_ERROR);
+            let work_error = if wanted { work_error(job, point, &optimum, &mut work) } else { f64::NAN };
+            Row { optimum, work_error }
+        });
+        (solved.status, row, work)
+    })
 }
 
 #[cfg(test)]

@@ -5,9 +5,9 @@
 
 use std::ops::Range;
 
-use super::gap::{GAP, Gap};
+use super::gap;
 use super::optima::OPTIMUM_AXES;
-use super::{Column, Job, Kind, Selection, Sheet, Signal, Stopped, Table, Work};
+use super::{Column, Definition, Job, Kind, Selection, Sheet, Signal, Stopped, Work};
 use crate::grid::Quantity;
 use crate::protocol::Status;
 
@@ -19,16 +19,49 @@ enum Reduction {
     Histogram,
 }
 
-/// One row a transition and time.
-#[derive(Debug)]
-pub struct Reduced(Reduction);
-
 /// The shortcut of least gap.
-pub const MINIMUM: Reduced = Reduced(Reduction::Minimum);
+pub static MINIMUM: Definition = reduced(
+    "gap_min",
+    "the shortcut of least gap among those of a spec (reduce = \"min\" of gap)",
+    MINIMUM_COLUMNS,
+    |job, rows, sheet| compute(Reduction::Minimum, job, rows, sheet),
+);
+
 /// Quantiles of the gap.
-pub const QUANTILES: Reduced = Reduced(Reduction::Quantiles);
+pub static QUANTILES: Definition = reduced(
+    "gap_quantiles",
+    "quantiles of the gap of the shortcuts of a spec (reduce = \"quantiles\" of gap)",
+    QUANTILE_COLUMNS,
+    |job, rows, sheet| compute(Reduction::Quantiles, job, rows, sheet),
+);
+
 /// Numbers of shortcuts by decades of the gap.
-pub const HISTOGRAM: Reduced = Reduced(Reduction::Histogram);
+pub static HISTOGRAM: Definition = reduced(
+    "gap_histogram",
+    "how many shortcuts of a spec have which gap (reduce = \"histogram\" of gap)",
+    HISTOGRAM_COLUMNS,
+    |job, rows, sheet| compute(Reduction::Histogram, job, rows, sheet),
+);
+
+/// One row a transition and time; the cost is that of a landscape of 400 x 400 shortcuts.
+const fn reduced(
+    name: &'static str,
+    doc: &'static str,
+    columns: &'static [Column],
+    compute: fn(&Job<'_>, Range<u64>, &mut Sheet) -> Result<Work, Stopped>,
+) -> Definition {
+    let needs_optimum = |_: &Selection| true;
+    Definition {
+        name,
+        doc,
+        axes: OPTIMUM_AXES,
+        columns,
+        rows_per_part: 1 << 8,
+        cost: 16_000_000,
+        needs_optimum,
+        compute,
+    }
+}
 
 /// Rows of a landscape that are held at a time.
 const PIECE: usize = 1 << 16;
@@ -80,147 +113,130 @@ const HISTOGRAM_COLUMNS: &[Column] = &[
     Column::number("from_10", "1", "shortcuts with a gap of 10 or more"),
 ];
 
-impl Table for Reduced {
-    fn name(&self) -> &'static str {
-        match self.0 {
-            Reduction::Minimum => "gap_min",
-            Reduction::Quantiles => "gap_quantiles",
-            Reduction::Histogram => "gap_histogram",
+fn compute(reduction: Reduction, job: &Job<'_>, rows: Range<u64>, sheet: &mut Sheet) -> Result<Work, Stopped> {
+    let Some(members) = job.members else {
+        // A checked sweep has them.
+        sheet.columns.iter_mut().for_each(|column| column.fill(f64::NAN));
+        sheet.status.fill(Status::NotConverged);
+        return Ok(Work::default());
+    };
+    let each = members.rows() / job.rows.rows().max(1);
+    let (selection, signal) = (Selection::usual(gap::COLUMNS), Signal::default());
+    let tuples = members.tuples(OPTIMUM_AXES);
+    // Progress is counted in rows of this table, so that of the landscape goes nowhere.
+    let sizes: Vec<f64> = gap::COLUMNS.iter().map(|column| column.size(job.grid)).collect();
+    let landscape = Job {
+        rows: members,
+        tuples,
+        selection: &selection,
+        sizes: &sizes,
+        signal: &signal,
+        members: None,
+        repeats: None,
+        ..*job
+    };
+    let mut all = Work::default();
+    // One after another: the threads share each landscape, and no more than one a part is in memory.
+    for (place, row) in rows.enumerate() {
+        let (status, cells, work) = reduction.cells(job, &landscape, row * each..(row + 1) * each)?;
+        sheet.status[place] = status;
+        for (column, &index) in sheet.columns.iter_mut().zip(job.selection.indices()) {
+            column[place] = cells[index];
+        }
+        all += work;
+        job.signal.advance(1);
+    }
+    Ok(all)
+}
+
+/// What is kept of a landscape while it is computed.
+#[derive(Default)]
+struct Tally {
+    /// Shortcuts of each status.
+    statuses: [u64; Status::ALL.len()],
+    /// The row of least gap and its cells.
+    least: Option<(u64, [f64; 4])>,
+    /// The gaps of all shortcuts with status `ok`.
+    gaps: Vec<f64>,
+    /// Those shortcuts by class of the histogram.
+    classes: [u64; EDGES.len() + 1],
+}
+
+impl Tally {
+    /// The worst status that concerns the whole landscape; one that has nothing that is ok says why.
+    fn status(&self) -> Status {
+        [Status::NotConverged, Status::Ok, Status::Nonphysical, Status::NegativeFriction, Status::BelowBound]
+            .into_iter()
+            .find(|status| self.statuses[*status as usize] > 0)
+            .unwrap_or(Status::Infeasible)
+    }
+
+    /// Adds a piece of the landscape, whose first row is `start`, as far as `reduction` needs it.
+    fn add(&mut self, reduction: Reduction, start: u64, sheet: &Sheet) {
+        for (place, status) in sheet.status.iter().enumerate() {
+            self.statuses[*status as usize] += 1;
+            let gap = sheet.columns[gap::WORK_GAP][place];
+            if *status != Status::Ok || gap.is_nan() {
+                continue;
+            }
+            match reduction {
+                Reduction::Minimum => {
+                    if self.least.is_none_or(|(_, least)| gap < least[gap::WORK_GAP]) {
+                        let cells = std::array::from_fn(|column| sheet.columns[column][place]);
+                        self.least = Some((start + place as u64, cells));
+                    }
+                }
+                Reduction::Quantiles => self.gaps.push(gap),
+                Reduction::Histogram => self.classes[EDGES.partition_point(|edge| *edge <= gap)] += 1,
+            }
         }
     }
+}
 
-    fn doc(&self) -> &'static str {
-        match self.0 {
-            Reduction::Minimum => "the shortcut of least gap among those of a spec (reduce = \"min\" of gap)",
-            Reduction::Quantiles => "quantiles of the gap of the shortcuts of a spec (reduce = \"quantiles\" of gap)",
-            Reduction::Histogram => "how many shortcuts of a spec have which gap (reduce = \"histogram\" of gap)",
-        }
-    }
-
-    fn axes(&self) -> &'static [Quantity] {
-        OPTIMUM_AXES
-    }
-
-    fn columns(&self) -> &'static [Column] {
-        match self.0 {
+impl Reduction {
+    fn columns(self) -> &'static [Column] {
+        match self {
             Reduction::Minimum => MINIMUM_COLUMNS,
             Reduction::Quantiles => QUANTILE_COLUMNS,
             Reduction::Histogram => HISTOGRAM_COLUMNS,
         }
     }
 
-    fn rows_per_part(&self) -> u64 {
-        1 << 8
-    }
-
-    fn cost(&self) -> u64 {
-        // A landscape of 400 x 400 shortcuts.
-        16_000_000
-    }
-
-    fn needs_optimum(&self, _selection: &Selection) -> bool {
-        true
-    }
-
-    fn compute(&self, job: &Job<'_>, rows: Range<u64>, sheet: &mut Sheet) -> Result<Work, Stopped> {
-        let Some(members) = job.members else {
-            // A checked sweep has them.
-            sheet.columns.iter_mut().for_each(|column| column.fill(f64::NAN));
-            sheet.status.fill(Status::NotConverged);
-            return Ok(Work::default());
-        };
-        let each = members.rows() / job.rows.rows().max(1);
-        let (selection, signal) = (Selection::usual(Gap.columns()), Signal::default());
-        let tuples = members.tuples(OPTIMUM_AXES);
-        // Progress is counted in rows of this table, so that of the landscape goes nowhere.
-        let sizes: Vec<f64> = Gap.columns().iter().map(|column| column.size(job.grid)).collect();
-        let landscape = Job {
-            rows: members,
-            tuples,
-            selection: &selection,
-            sizes: &sizes,
-            signal: &signal,
-            members: None,
-            repeats: None,
-            ..*job
-        };
-        let mut all = Work::default();
-        // One after another: the threads share each landscape, and no more than one a part is in memory.
-        for (place, row) in rows.enumerate() {
-            let (status, cells, work) = self.tell(job, &landscape, row * each..(row + 1) * each)?;
-            sheet.status[place] = status;
-            for (column, &index) in sheet.columns.iter_mut().zip(job.selection.indices()) {
-                column[place] = cells[index];
-            }
-            all += work;
-            job.signal.advance(1);
-        }
-        Ok(all)
-    }
-}
-
-impl Reduced {
     /// Status and cells of the row whose shortcuts are `rows` of the landscape.
-    fn tell(&self, job: &Job<'_>, landscape: &Job<'_>, rows: Range<u64>) -> Result<(Status, Vec<f64>, Work), Stopped> {
+    fn cells(self, job: &Job<'_>, landscape: &Job<'_>, rows: Range<u64>) -> Result<(Status, Vec<f64>, Work), Stopped> {
         let mut sheet = Sheet::new(landscape.selection.indices().len());
-        let mut statuses = [0_u64; Status::ALL.len()];
-        let mut work = Work::default();
-        let mut least: Option<(u64, [f64; 4])> = None;
-        let mut gaps = Vec::new();
-        let mut classes = [0_u64; EDGES.len() + 1];
+        let (mut work, mut tally) = (Work::default(), Tally::default());
         for start in rows.clone().step_by(PIECE) {
             job.signal.check()?;
             let piece = start..rows.end.min(start + PIECE as u64);
             sheet.resize((piece.end - piece.start) as usize);
-            work += Gap.compute(landscape, piece.clone(), &mut sheet)?;
-            for (place, status) in sheet.status.iter().enumerate() {
-                statuses[*status as usize] += 1;
-                let gap = sheet.columns[GAP][place];
-                if *status != Status::Ok || gap.is_nan() {
-                    continue;
-                }
-                match self.0 {
-                    Reduction::Minimum => {
-                        if least.is_none_or(|(_, least)| gap < least[GAP]) {
-                            let cells = std::array::from_fn(|column| sheet.columns[column][place]);
-                            least = Some((piece.start + place as u64, cells));
-                        }
-                    }
-                    Reduction::Quantiles => gaps.push(gap),
-                    Reduction::Histogram => classes[EDGES.partition_point(|edge| *edge <= gap)] += 1,
-                }
-            }
+            work += gap::compute(landscape, piece, &mut sheet)?;
+            tally.add(self, start, &sheet);
         }
-        let count = statuses[Status::Ok as usize];
+        let status = tally.status();
         let mut cells = vec![f64::NAN; self.columns().len()];
-        // The worst that concerns the whole landscape; one that has nothing that is ok says why.
-        let status =
-            [Status::NotConverged, Status::Ok, Status::Nonphysical, Status::NegativeFriction, Status::BelowBound]
-                .into_iter()
-                .find(|status| statuses[*status as usize] > 0)
-                .unwrap_or(Status::Infeasible);
         if status == Status::NotConverged {
             return Ok((status, cells, work));
         }
-        cells[0] = count as f64;
-        match self.0 {
+        cells[0] = tally.statuses[Status::Ok as usize] as f64;
+        match self {
             Reduction::Minimum => {
-                if let Some((row, [work, work_optimal, gap, v_min])) = least {
+                if let Some((row, [work, work_optimal, gap, v_min])) = tally.least {
                     let point = landscape.rows.point(row);
                     let (alpha_2, alpha_3) = (point[Quantity::Alpha2], point[Quantity::Alpha3]);
                     cells[1..].copy_from_slice(&[alpha_2, alpha_3, work, work_optimal, gap, v_min]);
                 }
             }
             Reduction::Quantiles => {
-                gaps.sort_unstable_by(f64::total_cmp);
-                let count = gaps.len() as u64;
+                tally.gaps.sort_unstable_by(f64::total_cmp);
+                let count = tally.gaps.len() as u64;
                 for (cell, hundredths) in cells[1..].iter_mut().zip(HUNDREDTHS) {
                     let rank = (hundredths * count).div_ceil(100).max(1);
-                    *cell = gaps.get(rank as usize - 1).copied().unwrap_or(f64::NAN);
+                    *cell = tally.gaps.get(rank as usize - 1).copied().unwrap_or(f64::NAN);
                 }
             }
             Reduction::Histogram => {
-                cells[1..].iter_mut().zip(classes).for_each(|(cell, count)| *cell = count as f64);
+                cells[1..].iter_mut().zip(tally.classes).for_each(|(cell, count)| *cell = count as f64);
             }
         }
         Ok((status, cells, work))

@@ -3,13 +3,10 @@
 use std::ops::Range;
 
 use super::compliant::{slider, velocities};
-use super::{Column, Field, Job, Selection, Sheet, Stopped, Table, Work, columns, place, rows};
+use super::{Column, Definition, Field, Job, Sheet, Stopped, Work, columns, place, rows};
 use crate::grid::Quantity;
 use crate::protocol::regularised::{self, Regularised as Found};
 use crate::protocol::{Effort, error};
-
-/// One row a transition, time, stiffness, mass and length of the pieces.
-pub struct Regularised;
 
 /// A row.
 struct Row {
@@ -47,62 +44,44 @@ const COLUMNS: [Column; 9] = columns(&FIELDS);
 const WORK_ERROR: usize = place(&COLUMNS, "work_error");
 const GAP_ERROR: usize = place(&COLUMNS, "gap_error");
 
-impl Table for Regularised {
-    fn name(&self) -> &'static str {
-        "regularised"
-    }
+/// One row a transition, time, stiffness, mass and length of the pieces.
+pub static REGULARISED: Definition = Definition {
+    name: "regularised",
+    doc: "the optimal protocol, its jumps made smooth",
+    axes: &[
+        Quantity::Time,
+        Quantity::A,
+        Quantity::B,
+        Quantity::InitialVelocity,
+        Quantity::FinalVelocity,
+        Quantity::Stiffness,
+        Quantity::Mass,
+        Quantity::Smoothing,
+    ],
+    columns: &COLUMNS,
+    rows_per_part: 1 << 14,
+    cost: 50_000,
+    needs_optimum: |_| false,
+    compute,
+};
 
-    fn doc(&self) -> &'static str {
-        "the optimal protocol, its jumps made smooth"
-    }
-
-    fn axes(&self) -> &'static [Quantity] {
-        &[
-            Quantity::Time,
-            Quantity::A,
-            Quantity::B,
-            Quantity::InitialVelocity,
-            Quantity::FinalVelocity,
-            Quantity::Stiffness,
-            Quantity::Mass,
-            Quantity::Smoothing,
-        ]
-    }
-
-    fn columns(&self) -> &'static [Column] {
-        &COLUMNS
-    }
-
-    fn rows_per_part(&self) -> u64 {
-        1 << 14
-    }
-
-    fn cost(&self) -> u64 {
-        50_000
-    }
-
-    fn needs_optimum(&self, _selection: &Selection) -> bool {
-        false
-    }
-
-    fn compute(&self, job: &Job<'_>, range: Range<u64>, sheet: &mut Sheet) -> Result<Work, Stopped> {
-        rows::each(job, range, 16, sheet, &FIELDS, |_, point| {
-            let (t_f, delta_t) = (point[Quantity::Time], point[Quantity::Smoothing]);
-            let solve = |rtol| regularised::solve(&slider(point), velocities(point), t_f, delta_t, job.bounded, rtol);
-            let solved = solve(job.rtol);
-            let mut effort = solved.effort;
-            let row = solved.value.map(|found| {
-                let finest = job.selection.has_any([WORK_ERROR, GAP_ERROR]).then(|| solve(error::FINEST));
-                effort += finest.map_or_else(Effort::default, |finest| finest.effort);
-                let finest = finest.and_then(|finest| finest.value);
-                let scale = found.replaced / found.work_optimal;
-                Row {
-                    found,
-                    work_error: finest.map_or(f64::NAN, |finest| error::bound(found.work, finest.work, found.work)),
-                    gap_error: finest.map_or(f64::NAN, |finest| error::of_excess(found.gap, finest.gap, scale)),
-                }
-            });
-            (solved.status, row, Work { optima: 1, ..Work::from(effort) })
-        })
-    }
+fn compute(job: &Job<'_>, range: Range<u64>, sheet: &mut Sheet) -> Result<Work, Stopped> {
+    rows::each(job, range, 16, sheet, &FIELDS, |_, point| {
+        let (t_f, delta_t) = (point[Quantity::Time], point[Quantity::Smoothing]);
+        let solve = |rtol| regularised::solve(&slider(point), velocities(point), t_f, delta_t, job.bounded, rtol);
+        let solved = solve(job.rtol);
+        let mut effort = solved.effort;
+        let row = solved.value.map(|found| {
+            let finest = job.selection.has_any([WORK_ERROR, GAP_ERROR]).then(|| solve(error::FINEST));
+            effort += finest.map_or_else(Effort::default, |finest| finest.effort);
+            let finest = finest.and_then(|finest| finest.value);
+            let scale = found.replaced / found.work_optimal;
+            Row {
+                found,
+                work_error: finest.map_or(f64::NAN, |finest| error::bound(found.work, finest.work, found.work)),
+                gap_error: finest.map_or(f64::NAN, |finest| error::of_excess(found.gap, finest.gap, scale)),
+            }
+        });
+        (solved.status, row, Work { optima: 1, ..Work::from(effort) })
+    })
 }

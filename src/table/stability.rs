@@ -3,14 +3,11 @@
 use std::ops::Range;
 
 use super::optima::transition;
-use super::{Column, Field, Job, Kind, Selection, Sheet, Stopped, Table, Work, columns, number, place, rows};
+use super::{Column, Definition, Field, Job, Kind, Sheet, Stopped, Work, columns, number, place, rows};
 use crate::grid::Quantity;
 use crate::model::{Law, Transition};
 use crate::protocol::Status;
 use crate::stability::{Eigenvalues, Hopf, SteadySliding, critical_velocity};
-
-/// One row a transition, stiffness and mass.
-pub struct Stability;
 
 /// A row.
 struct Row {
@@ -54,50 +51,32 @@ const GROWTH_RATE: usize = place(&COLUMNS, "growth_rate");
 const FREQUENCY: usize = place(&COLUMNS, "frequency");
 const DECAY_RATE: usize = place(&COLUMNS, "decay_rate");
 
-impl Table for Stability {
-    fn name(&self) -> &'static str {
-        "stability"
-    }
+/// One row a transition, stiffness and mass.
+pub static STABILITY: Definition = Definition {
+    name: "stability",
+    doc: "linear stability of steady sliding at both velocities",
+    axes: &[
+        Quantity::A,
+        Quantity::B,
+        Quantity::InitialVelocity,
+        Quantity::FinalVelocity,
+        Quantity::Stiffness,
+        Quantity::Mass,
+    ],
+    columns: &COLUMNS,
+    rows_per_part: 1 << 17,
+    cost: 150,
+    needs_optimum: |_| false,
+    compute,
+};
 
-    fn doc(&self) -> &'static str {
-        "linear stability of steady sliding at both velocities"
-    }
-
-    fn axes(&self) -> &'static [Quantity] {
-        &[
-            Quantity::A,
-            Quantity::B,
-            Quantity::InitialVelocity,
-            Quantity::FinalVelocity,
-            Quantity::Stiffness,
-            Quantity::Mass,
-        ]
-    }
-
-    fn columns(&self) -> &'static [Column] {
-        &COLUMNS
-    }
-
-    fn rows_per_part(&self) -> u64 {
-        1 << 17
-    }
-
-    fn cost(&self) -> u64 {
-        150
-    }
-
-    fn needs_optimum(&self, _selection: &Selection) -> bool {
-        false
-    }
-
-    fn compute(&self, job: &Job<'_>, range: Range<u64>, sheet: &mut Sheet) -> Result<Work, Stopped> {
-        let with_eigenvalues = job.selection.has_any([GROWTH_RATE, FREQUENCY, DECAY_RATE]);
-        rows::each(job, range, 1024, sheet, &FIELDS, |_, point| {
-            let Transition { law, v_i, v_f } = transition(point);
-            let (k, m) = (point[Quantity::Stiffness], point[Quantity::Mass]);
-            let [at_start, at_end] = [v_i, v_f].map(|v| SteadySliding::new(law, k, m, v));
-            let eigenvalues = with_eigenvalues.then(|| at_end.eigenvalues()).flatten();
-            (Status::Ok, Some(Row { law, v_f, k, m, at_start, at_end, eigenvalues }), Work::default())
-        })
-    }
+fn compute(job: &Job<'_>, range: Range<u64>, sheet: &mut Sheet) -> Result<Work, Stopped> {
+    let with_eigenvalues = job.selection.has_any([GROWTH_RATE, FREQUENCY, DECAY_RATE]);
+    rows::each(job, range, 1024, sheet, &FIELDS, |_, point| {
+        let Transition { law, v_i, v_f } = transition(point);
+        let (k, m) = (point[Quantity::Stiffness], point[Quantity::Mass]);
+        let [at_start, at_end] = [v_i, v_f].map(|v| SteadySliding::new(law, k, m, v));
+        let eigenvalues = with_eigenvalues.then(|| at_end.eigenvalues()).flatten();
+        (Status::Ok, Some(Row { law, v_f, k, m, at_start, at_end, eigenvalues }), Work::default())
+    })
 }

@@ -4,13 +4,10 @@ use std::ops::Range;
 
 use super::memo::Memo;
 use super::optima::{self, Comparison, transition};
-use super::{Column, Field, Job, Kind, Selection, Sheet, Stopped, Table, Work, columns, number, place, rows};
+use super::{Column, Definition, Field, Job, Kind, Selection, Sheet, Stopped, Work, columns, number, place, rows};
 use crate::grid::{Point, Quantity};
 use crate::protocol::swift::{Case, FAMILIES, Family, Obstacle, Swift as Member};
 use crate::protocol::{Effort, error};
-
-/// One row a transition, time, family and bound on friction.
-pub struct Swift;
 
 /// A row: the member of the family, or what makes it infeasible.
 struct Row {
@@ -84,73 +81,59 @@ const GAP: usize = place(&COLUMNS, "gap");
 const WORK_ERROR: usize = place(&COLUMNS, "work_error");
 const GAP_ERROR: usize = place(&COLUMNS, "gap_error");
 
-impl Table for Swift {
-    fn name(&self) -> &'static str {
-        "swift"
-    }
+/// One row a transition, time, family and bound on friction.
+pub static SWIFT: Definition = Definition {
+    name: "swift",
+    doc: "the shortcut of a family",
+    axes: &[
+        Quantity::Time,
+        Quantity::A,
+        Quantity::B,
+        Quantity::InitialVelocity,
+        Quantity::FinalVelocity,
+        Quantity::Family,
+        Quantity::FrictionBound,
+    ],
+    columns: &COLUMNS,
+    rows_per_part: 1 << 14,
+    cost: 25_000,
+    needs_optimum,
+    compute,
+};
 
-    fn doc(&self) -> &'static str {
-        "the shortcut of a family"
-    }
+fn needs_optimum(selection: &Selection) -> bool {
+    selection.has_any([WORK_OPTIMAL, GAP, GAP_ERROR])
+}
 
-    fn axes(&self) -> &'static [Quantity] {
-        &[
-            Quantity::Time,
-            Quantity::A,
-            Quantity::B,
-            Quantity::InitialVelocity,
-            Quantity::FinalVelocity,
-            Quantity::Family,
-            Quantity::FrictionBound,
-        ]
-    }
-
-    fn columns(&self) -> &'static [Column] {
-        &COLUMNS
-    }
-
-    fn rows_per_part(&self) -> u64 {
-        1 << 14
-    }
-
-    fn cost(&self) -> u64 {
-        25_000
-    }
-
-    fn needs_optimum(&self, selection: &Selection) -> bool {
-        selection.has_any([WORK_OPTIMAL, GAP, GAP_ERROR])
-    }
-
-    fn compute(&self, job: &Job<'_>, range: Range<u64>, sheet: &mut Sheet) -> Result<Work, Stopped> {
-        let members = Members::default();
-        rows::each(job, range, 16, sheet, &FIELDS, |tuple, point| {
-            let mut work = Work::default();
-            let mut row =
-                Row { member: None, obstacle: None, alpha_unit: 1.0, work_error: f64::NAN, least: Comparison::NONE };
-            let member = match members.get(job, tuple, point, &mut work) {
-                Ok((member, work_error)) => {
-                    row.work_error = work_error;
-                    member
-                }
-                Err(obstacle) => {
-                    row.obstacle = Some(obstacle);
-                    return (obstacle.status(), Some(row), work);
-                }
-            };
-            let mut status = member.status();
-            if self.needs_optimum(job.selection) {
-                let bounded = job.selection.has(GAP_ERROR);
-                row.least = optima::compare(job, (tuple, point), (member.work, row.work_error), bounded, &mut work);
-                status = status.beside(row.least.optimum);
+fn compute(job: &Job<'_>, range: Range<u64>, sheet: &mut Sheet) -> Result<Work, Stopped> {
+    let members = Members::default();
+    rows::each(job, range, 16, sheet, &FIELDS, |tuple, point| {
+        let mut work = Work::default();
+        let mut row =
+            Row { member: None, obstacle: None, alpha_unit: 1.0, work_error: f64::NAN, least: Comparison::NONE };
+        let member = match members.get(job, tuple, point, &mut work) {
+            Ok((member, work_error)) => {
+                row.work_error = work_error;
+                member
             }
-            let family = FAMILIES.get(point[Quantity::Family] as usize);
-            if family.is_some_and(|family| family.name() == "bounded_velocity") {
-                row.alpha_unit = job.grid.units.size("v_0/l").powi(2);
+            Err(obstacle) => {
+                row.obstacle = Some(obstacle);
+                return (obstacle.status(), Some(row), work);
             }
-            row.member = Some(member);
-            (status, Some(row), work)
-        })
-    }
+        };
+        let mut status = member.status();
+        if needs_optimum(job.selection) {
+            let bounded = job.selection.has(GAP_ERROR);
+            row.least = optima::compare(job, (tuple, point), (member.work, row.work_error), bounded, &mut work);
+            status = status.beside(row.least.optimum);
+        }
+        let family = FAMILIES.get(point[Quantity::Family] as usize);
+        if family.is_some_and(|family| family.name() == "bounded_velocity") {
+            row.alpha_unit = job.grid.units.size("v_0/l").powi(2);
+        }
+        row.member = Some(member);
+        (status, Some(row), work)
+    })
 }
 
 /// A member, and the bound of the error of its work where that is requested.

@@ -68,7 +68,7 @@ pub fn protocol_of(
     let family = word("family").and_then(swift::find);
     let tau_max = number(Quantity::FrictionBound).unwrap_or(f64::INFINITY);
     let case = Case { transition, t_f, tau_max };
-    let spring = || Ok((number(Quantity::Stiffness)?, number(Quantity::Mass)?));
+    let [k, m] = [Quantity::Stiffness, Quantity::Mass].map(number);
     let protocol = match (table, family) {
         ("optimal", _) => Protocol::Optimal { bounded },
         ("best", _) => Protocol::Best { bounded },
@@ -80,22 +80,13 @@ pub fn protocol_of(
                 a_3: scaled(Quantity::Alpha3, t_f * t_f, relative[1])?,
             }
         }
-        ("step", _) => {
-            let (k, m) = spring()?;
-            // A rigid spring, and no change of velocity, take the velocity along at once.
-            match swift::find("step") {
-                Some(step) if k == f64::INFINITY || transition.v_i == transition.v_f => Protocol::Family(step),
-                _ => Protocol::Response { k, m },
-            }
-        }
-        ("compliant", _) => {
-            let (k, m) = spring()?;
-            Protocol::Compliant { k, m }
-        }
-        ("regularised", _) => {
-            let (k, m) = spring()?;
-            Protocol::Regularised { k, m, delta_t: number(Quantity::Smoothing)?, bounded }
-        }
+        // A rigid spring, and no change of velocity, take the velocity along at once.
+        ("step", _) => match (k?, m?, swift::find("step")) {
+            (k, _, Some(step)) if k == f64::INFINITY || transition.v_i == transition.v_f => Protocol::Family(step),
+            (k, m, _) => Protocol::Response { k, m },
+        },
+        ("compliant", _) => Protocol::Compliant { k: k?, m: m? },
+        ("regularised", _) => Protocol::Regularised { k: k?, m: m?, delta_t: number(Quantity::Smoothing)?, bounded },
         (_, Some(family)) => Protocol::Family(family),
         _ => return Err(Pathless::Missing("family")),
     };

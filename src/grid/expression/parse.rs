@@ -1,8 +1,10 @@
 //! From text to a checked expression: the grammar is that of an SQL condition, of which only arithmetic and comparisons are let in.
 
+use std::fmt::Display;
+
 use sqlparser::ast::{
-    BinaryOperator, CeilFloorKind, DateTimeField, Expr, FunctionArg, FunctionArgExpr, FunctionArguments, Spanned,
-    UnaryOperator, Value,
+    BinaryOperator, CeilFloorKind, DateTimeField, Expr, Function, FunctionArg, FunctionArgExpr, FunctionArguments,
+    Ident, Spanned, UnaryOperator, Value,
 };
 use sqlparser::dialect::PostgreSqlDialect;
 use sqlparser::parser::{Parser, ParserError};
@@ -159,6 +161,33 @@ fn syntax(line: &str, error: ParserError) -> Fault {
     Fault::new(position, found, GRAMMAR, "correct the expression")
 }
 
+/// A number or a truth.
+fn literal(value: &Value, expression: &Expr) -> Result<(f64, Kind), Fault> {
+    match value {
+        Value::Number(digits, false) => match digits.parse() {
+            Ok(number) if f64::is_finite(number) => Ok((number, Kind::Number)),
+            _ => {
+                let found = format!("`{digits}` is beyond the range of numbers");
+                Err(Fault::new(position(expression), found, "a number", "write `inf` for infinity"))
+            }
+        },
+        Value::Boolean(is) => Ok((f64::from(u8::from(*is)), Kind::Truth)),
+        _ => Err(foreign(expression)),
+    }
+}
+
+/// The name and the arguments of a function that is called without anything else.
+fn plain(call: &Function) -> Option<(&str, Vec<&Expr>)> {
+    let is_plain = call.filter.is_none() && call.over.is_none() && call.within_group.is_empty();
+    let FunctionArguments::List(list) = &call.args else { return None };
+    let arguments = list.args.iter().map(|argument| match argument {
+        FunctionArg::Unnamed(FunctionArgExpr::Expr(expression)) => Some(expression),
+        _ => None,
+    });
+    let name = call.name.0.first().filter(|_| is_plain)?.as_ident()?;
+    Some((name.value.as_str(), arguments.collect::<Option<_>>()?))
+}
+
 struct Compiler<'a> {
     line: &'a str,
     axes: &'a [Quantity],
@@ -170,43 +199,16 @@ impl Compiler<'_> {
     fn compile(&mut self, expression: &Expr) -> Result<Kind, Fault> {
         match expression {
             Expr::Nested(inner) => self.compile(inner),
-            // Infinity is no axis, but stands where a number may.
-            Expr::Identifier(name) if name.value == "inf" => {
-                self.program.push(Op::Number(f64::INFINITY));
+            Expr::Identifier(name) => {
+                let operand = self.name(name, expression)?;
+                self.program.push(operand);
                 Ok(Kind::Number)
             }
-            Expr::Identifier(name) if self.label(&name.value).is_some() => {
-                let word =
-                    self.label(&name.value).and_then(|(_, _, label)| label.words.first()).map_or("", String::as_str);
-                let (found, help) = (format!("`{name}` is a label"), format!("write `{name} = '{word}'`"));
-                Err(Fault::new(position(expression), found, "a comparison with a word", help))
+            Expr::Value(value) => {
+                let (number, kind) = literal(&value.value, expression)?;
+                self.program.push(Op::Number(number));
+                Ok(kind)
             }
-            Expr::Identifier(name) if name.quote_style.is_none() => {
-                let quantity = self.axis(&name.value, expression)?;
-                if !quantity.words().is_empty() {
-                    let found = format!("`{quantity}` stands for words", quantity = quantity.name());
-                    let help = format!("write `{} = '{}'`", quantity.name(), quantity.words()[0]);
-                    return Err(Fault::new(position(expression), found, "a comparison with a word", help));
-                }
-                self.program.push(Op::Axis(quantity));
-                Ok(Kind::Number)
-            }
-            Expr::Value(value) => match &value.value {
-                Value::Number(digits, false) => {
-                    let number: f64 = digits.parse().unwrap_or(f64::INFINITY);
-                    if number.is_infinite() {
-                        let found = format!("`{digits}` is beyond the range of numbers");
-                        return Err(Fault::new(position(expression), found, "a number", "write `inf` for infinity"));
-                    }
-                    self.program.push(Op::Number(number));
-                    Ok(Kind::Number)
-                }
-                Value::Boolean(is) => {
-                    self.program.push(Op::Number(f64::from(u8::from(*is))));
-                    Ok(Kind::Truth)
-                }
-                _ => Err(foreign(expression)),
-            },
             Expr::UnaryOp { op, expr } => {
                 let (function, kind) = match op {
                     UnaryOperator::Minus => (Some(Unary::Negate), Kind::Number),
@@ -238,22 +240,8 @@ impl Compiler<'_> {
                 Ok(Kind::Truth)
             }
             Expr::Function(call) => {
-                let plain = call.filter.is_none() && call.over.is_none() && call.within_group.is_empty();
-                let (Some(name), FunctionArguments::List(list), true) =
-                    (call.name.0.first().and_then(|part| part.as_ident()), &call.args, plain)
-                else {
-                    return Err(foreign(expression));
-                };
-                let arguments: Option<Vec<&Expr>> = list
-                    .args
-                    .iter()
-                    .map(|argument| match argument {
-                        FunctionArg::Unnamed(FunctionArgExpr::Expr(expression)) => Some(expression),
-                        _ => None,
-                    })
-                    .collect();
-                let arguments = arguments.ok_or_else(|| foreign(expression))?;
-                self.call(&name.value, &arguments, expression)
+                let (name, arguments) = plain(call).ok_or_else(|| foreign(expression))?;
+                self.call(name, &arguments, expression)
             }
             // The grammar has these two apart from other functions.
             Expr::Floor { expr, field: CeilFloorKind::DateTimeField(DateTimeField::NoDateTime) } => {
@@ -263,6 +251,29 @@ impl Compiler<'_> {
                 self.call("ceil", &[expr], expression)
             }
             _ => Err(foreign(expression)),
+        }
+    }
+
+    /// What a name stands for where a number may stand.
+    fn name(&self, name: &Ident, expression: &Expr) -> Result<Op, Fault> {
+        // Infinity is no axis.
+        if name.value == "inf" {
+            return Ok(Op::Number(f64::INFINITY));
+        }
+        let wordy = |found: String, name: &dyn Display, word: &str| {
+            Fault::new(position(expression), found, "a comparison with a word", format!("write `{name} = '{word}'`"))
+        };
+        if let Some((_, _, label)) = self.label(&name.value) {
+            let word = label.words.first().map_or("", String::as_str);
+            return Err(wordy(format!("`{name}` is a label"), name, word));
+        }
+        if name.quote_style.is_some() {
+            return Err(foreign(expression));
+        }
+        let quantity = self.axis(&name.value, expression)?;
+        match quantity.words().first() {
+            Some(word) => Err(wordy(format!("`{}` stands for words", quantity.name()), &quantity.name(), word)),
+            None => Ok(Op::Axis(quantity)),
         }
     }
 

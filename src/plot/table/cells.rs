@@ -65,6 +65,11 @@ impl AxisCells {
         self.middles.len()
     }
 
+    /// From the first middle to the last.
+    pub fn ends(&self) -> Scale {
+        Scale { low: self.middles[0], high: self.middles[self.len() - 1], log: self.scale.log }
+    }
+
     /// The cell of a value.
     pub fn place(&self, value: f64) -> Option<usize> {
         if !value.is_finite() {

@@ -38,30 +38,103 @@ pub enum Shape {
 
 /// The shape of a picture.
 pub fn choose(survey: &Survey, defaults: &Defaults, request: &Request) -> Result<Shape, PlotError> {
+    let choice = Choice::new(survey, defaults, request)?;
     let (x, y, colour) = (request.x.as_deref(), request.y.as_deref(), request.colour.as_deref());
-    if let Some(x) = x {
-        axis(survey, "--x", x)?;
+    let is_axis = |name: &&str| survey.axis(name).is_some();
+    // Two axes, or a column of colours, ask for a map; another column for lines.
+    if let Some(y) = y.filter(is_axis) {
+        let x = x.map(str::to_owned).or_else(|| choice.find(defaults.x, Some(y), 2)).or_else(|| choice.longest());
+        let x = x.filter(|x| x != y).ok_or_else(|| choice.one_row())?;
+        return choice.map(x, y.to_owned());
     }
-    for (argument, column) in [("--y", y), ("--color", colour)] {
-        if let Some(column) = column {
-            survey.check(argument, column)?;
+    let wants_map = colour.filter(|colour| !is_axis(colour));
+    let wants_lines = y.is_some() || colour.is_some_and(|colour| is_axis(&colour));
+    if !wants_lines && let Some((x, y)) = choice.two_axes(wants_map.is_some())? {
+        return choice.map(x, y);
+    }
+    if let Some(column) = wants_map {
+        return Err(PlotError::NoMap { table: survey.table.clone(), column: column.to_owned() });
+    }
+    let preferred = || choice.find(defaults.x, colour, 3).or_else(|| choice.longest());
+    let preferred = || preferred().or_else(|| choice.find(defaults.x, colour, 2));
+    let x = x.map(str::to_owned).or_else(preferred).ok_or_else(|| choice.one_row())?;
+    let written = || defaults.lines.iter().copied().filter(|column| survey.has(column));
+    let y = y.map_or_else(|| written().map(str::to_owned).collect(), |y| vec![y.to_owned()]);
+    let series = colour.map(str::to_owned).or_else(|| choice.find(defaults.series, Some(&x), 2));
+    Ok(Shape::Lines(lines::Plan { x, log: Vec::new(), y, series }))
+}
+
+/// What a choice depends on.
+struct Choice<'a> {
+    survey: &'a Survey,
+    defaults: &'a Defaults,
+    request: &'a Request,
+    varying: Vec<&'a Values>,
+}
+
+impl<'a> Choice<'a> {
+    /// A choice for a request whose columns are all there.
+    fn new(survey: &'a Survey, defaults: &'a Defaults, request: &'a Request) -> Result<Choice<'a>, PlotError> {
+        if let Some(x) = &request.x {
+            axis(survey, "--x", x)?;
         }
+        for (argument, column) in [("--y", &request.y), ("--color", &request.colour)] {
+            if let Some(column) = column {
+                survey.check(argument, column)?;
+            }
+        }
+        Ok(Choice { survey, defaults, request, varying: survey.axes.iter().filter(|axis| axis.varies()).collect() })
     }
-    let is_axis = |name: &str| survey.axis(name).is_some();
-    let varying: Vec<&Values> = survey.axes.iter().filter(|axis| axis.varies()).collect();
-    let find = |names: &[&str], not: Option<&str>, least: usize| -> Option<String> {
+
+    /// The first of `names` that has `least` values or more, but for `not`.
+    fn find(&self, names: &[&str], not: Option<&str>, least: usize) -> Option<String> {
         let fits = |axis: &&&Values| Some(axis.name.as_str()) != not && (axis.values.len() >= least || axis.many);
-        let named = names.iter().find_map(|name| varying.iter().filter(fits).find(|axis| axis.name == *name));
-        Some(named?.name.clone())
-    };
-    let longest = || {
-        let long = varying.iter().filter(|axis| axis.words.is_empty());
-        long.max_by_key(|axis| axis.values.len()).map(|axis| axis.name.clone())
-    };
-    let value = || {
+        let named = |name: &&str| self.varying.iter().filter(fits).find(|axis| axis.name == *name);
+        Some(names.iter().find_map(named)?.name.clone())
+    }
+
+    /// The axis of numbers with the most values.
+    fn longest(&self) -> Option<String> {
+        let long = self.varying.iter().filter(|axis| axis.words.is_empty());
+        Some(long.max_by_key(|axis| axis.values.len())?.name.clone())
+    }
+
+    fn one_row(&self) -> PlotError {
+        PlotError::OneRow { table: self.survey.table.clone() }
+    }
+
+    /// The axes of a map, if there are two that are long enough.
+    fn two_axes(&self, wants_map: bool) -> Result<Option<(String, String)>, PlotError> {
+        let Choice { survey, defaults, varying, .. } = self;
+        let longest = varying.iter().map(|axis| axis.values.len()).max().unwrap_or(0);
+        let is_scattered = defaults.scatters && varying.len() > 1 && survey.rows <= 2 * longest as u64;
+        let least = if wants_map || is_scattered { 2 } else { defaults.least_map };
+        let first = self.request.x.clone().or_else(|| self.find(defaults.x, None, least));
+        let Some(first) = first.filter(|_| least < usize::MAX) else { return Ok(None) };
+        // An axis that only changes along with the first would make a map of a single line.
+        // One of the grid comes before one that is computed from others.
+        let others = [defaults.y, defaults.x].concat();
+        let (gridded, computed): (Vec<&str>, Vec<&str>) = others.into_iter().partition(|name| survey.gridded.has(name));
+        for second in [gridded, computed].concat() {
+            if let Some(second) = self.find(&[second], Some(&first), least)
+                && !survey.follows(&second, &first)?
+            {
+                return Ok(Some((first, second)));
+            }
+        }
+        Ok(None)
+    }
+
+    fn map(&self, x: String, y: String) -> Result<Shape, PlotError> {
+        let value = self.request.colour.clone().map_or_else(|| self.value(), Ok)?;
+        Ok(Shape::Map(map::Plan { x, y, value }))
+    }
+
+    /// The column of the colours: of words that vary, or the first in which any row has a value.
+    fn value(&self) -> Result<String, PlotError> {
+        let Choice { survey, defaults, .. } = self;
         for class in defaults.classes.iter().filter(|class| survey.has(class)) {
-            let mut seen = None;
-            let mut varies = false;
+            let (mut seen, mut varies) = (None, false);
             survey.each_while(&[class], |row| {
                 varies |= row[0].is_finite() && seen.is_some_and(|seen| seen != row[0]);
                 seen = seen.or(Some(row[0]).filter(|place| place.is_finite()));
@@ -71,61 +144,15 @@ pub fn choose(survey: &Survey, defaults: &Defaults, request: &Request) -> Result
                 return Ok((*class).to_owned());
             }
         }
-        let there = defaults.value.iter().filter(|column| survey.has(column));
-        let mut columns: Vec<String> = there.map(|&column| column.to_owned()).collect();
-        // The first in which any row has a value.
+        let columns: Vec<&str> = defaults.value.iter().copied().filter(|column| survey.has(column)).collect();
         let mut found = vec![false; columns.len()];
-        let names: Vec<&str> = columns.iter().map(String::as_str).collect();
-        survey.each_while(&names, |row| {
+        survey.each_while(&columns, |row| {
             found.iter_mut().zip(row).for_each(|(found, cell)| *found |= cell.is_finite());
             !found.first().is_some_and(|first| *first)
         })?;
         let place = found.iter().position(|&found| found).ok_or(PlotError::Nothing)?;
-        Ok::<String, PlotError>(columns.swap_remove(place))
-    };
-    let as_map = |x: String, y: String| -> Result<Shape, PlotError> {
-        let value = match colour {
-            Some(column) => column.to_owned(),
-            None => value()?,
-        };
-        Ok(Shape::Map(map::Plan { x, y, value }))
-    };
-    // Two axes, or a column of colours, ask for a map; another column for lines.
-    if let Some(y) = y.filter(|y| is_axis(y)) {
-        let x = x.map(str::to_owned).or_else(|| find(defaults.x, Some(y), 2)).or_else(longest);
-        let x = x.filter(|x| x != y).ok_or_else(|| PlotError::OneRow { table: survey.table.clone() })?;
-        return as_map(x, y.to_owned());
+        Ok(columns[place].to_owned())
     }
-    let wants_map = colour.is_some_and(|colour| !is_axis(colour));
-    let wants_lines = y.is_some() || colour.is_some_and(is_axis);
-    let longest_axis = varying.iter().map(|axis| axis.values.len()).max().unwrap_or(0);
-    let is_scattered = defaults.scatters && varying.len() > 1 && survey.rows <= 2 * longest_axis as u64;
-    let least = if wants_map || is_scattered { 2 } else { defaults.least_map };
-    let first = x.map(str::to_owned).or_else(|| find(defaults.x, None, least));
-    if let Some(first) = first.filter(|_| !wants_lines && least < usize::MAX) {
-        // An axis that only changes along with the first would make a map of a single line.
-        // One of the grid comes before one that is computed from others.
-        let others = [defaults.y, defaults.x].concat();
-        let (gridded, computed): (Vec<&str>, Vec<&str>) = others.into_iter().partition(|name| survey.gridded.has(name));
-        for second in [gridded, computed].concat() {
-            if let Some(second) = find(&[second], Some(&first), least)
-                && !survey.follows(&second, &first)?
-            {
-                return as_map(first, second);
-            }
-        }
-    }
-    if wants_map {
-        return Err(PlotError::NoMap { table: survey.table.clone(), column: colour.unwrap_or_default().to_owned() });
-    }
-    let preferred = || find(defaults.x, colour, 3).or_else(longest).or_else(|| find(defaults.x, colour, 2));
-    let x = x.map(str::to_owned).or_else(preferred).ok_or_else(|| PlotError::OneRow { table: survey.table.clone() })?;
-    let columns = match y {
-        Some(y) => vec![y.to_owned()],
-        None => defaults.lines.iter().filter(|column| survey.has(column)).map(|&column| column.to_owned()).collect(),
-    };
-    let series = colour.map(str::to_owned).or_else(|| find(defaults.series, Some(&x), 2));
-    Ok(Shape::Lines(lines::Plan { x, log: Vec::new(), y: columns, series }))
 }
 
 fn axis(survey: &Survey, argument: &str, name: &str) -> Result<(), PlotError> {

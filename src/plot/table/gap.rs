@@ -3,11 +3,9 @@
 use super::Scene;
 use super::cells::AxisCells;
 use super::choice::Shape;
-use super::condition::Condition;
 use super::groups::Groups;
 use super::lines;
 use super::map::{self, Mapped};
-use super::survey::Survey;
 use crate::model::Units;
 use crate::numerics::cubic::Cubic;
 use crate::plot::PlotError;
@@ -108,19 +106,7 @@ fn bound(scene: &Scene<'_>, groups: &Groups, panel: usize, cells: &[AxisCells; 2
 /// The best shortcut of each panel, from the table `best`, if the dataset has it.
 fn best(scene: &Scene<'_>, groups: &Groups) -> Result<Vec<Option<(f64, f64)>>, PlotError> {
     let mut found = vec![None; groups.shown.len()];
-    let source = scene.source;
-    if !source.manifest.tables.iter().any(|table| table.name == "best") {
-        return Ok(found);
-    }
-    let none: [Condition; 0] = [];
-    let survey = match Survey::new(&source.folder, &source.manifest, "best", &none) {
-        // A table that is not there yet has no star.
-        Err(PlotError::Empty { .. }) => return Ok(found),
-        survey => survey?,
-    };
-    if !ALPHAS.iter().all(|alpha| survey.has(alpha)) {
-        return Ok(found);
-    }
+    let Some(survey) = scene.other("best", &ALPHAS)? else { return Ok(found) };
     let axes: Vec<&str> = OPTIMUM_AXES.iter().map(|axis| axis.name()).collect();
     let values: Vec<Option<Vec<f64>>> =
         (0..found.len()).map(|group| axes.iter().map(|axis| scene.value(groups, group, axis)).collect()).collect();

@@ -1,12 +1,16 @@
 //! What is left of a table once the axes of a panel are chosen: the values of the further axes, each of which makes a panel or a line.
 
+use std::cmp::Ordering;
 use std::collections::BTreeMap;
 
 use super::survey::{Survey, Values};
-use crate::plot::{PlotError, label};
+use crate::plot::{Figure, PlotError, label};
 
 /// Most different groups that are told apart.
 const MOST_GROUPS: usize = 4096;
+
+/// Most panels of a figure.
+const MOST_PANELS: usize = 9;
 
 /// Most panels in a row, and in a column, of a figure that crosses two axes.
 const MOST_CROSSED: usize = 4;
@@ -120,6 +124,12 @@ pub struct Groups {
 }
 
 impl Groups {
+    /// The groups of the rows of `survey`, of which each makes a panel over the `drawn` axes, and a sentence on axes that only change along.
+    pub fn of_panels(survey: &Survey, drawn: &[&str]) -> Result<(Groups, Option<String>), PlotError> {
+        let (further, along) = further(survey, drawn)?;
+        Ok((Groups::new(survey, &further, (MOST_PANELS, true), |_| {}, |_| false)?, along))
+    }
+
     /// The groups of the rows of `survey` over `axes`, at most `most` of them, evenly chosen, those of infinite values included; one
     /// group of all rows if there are too many to choose from. `alike` makes values equal that mean the same; a group that is to be
     /// kept is shown before others. Two axes that vary independently are crossed if that is wanted: the first makes rows of panels, the
@@ -131,80 +141,33 @@ impl Groups {
         alike: impl Fn(&mut [f64]),
         is_kept: impl Fn(&[f64]) -> bool,
     ) -> Result<Groups, PlotError> {
-        let mut found: BTreeMap<Vec<u64>, Vec<f64>> = BTreeMap::new();
-        let mut last: Vec<f64> = Vec::new();
-        let mut cells_alike = Vec::new();
-        survey.each_while(axes, |cells| {
-            let same = last.len() == cells.len() && last.iter().zip(cells).all(|(a, b)| a.to_bits() == b.to_bits());
-            if same && !last.is_empty() {
-                return true;
-            }
-            last.clear();
-            last.extend_from_slice(cells);
-            cells_alike.clear();
-            cells_alike.extend_from_slice(cells);
-            alike(&mut cells_alike);
-            found.entry(key(&cells_alike)).or_insert_with(|| cells_alike.clone());
-            // Without axes there is one group, however many rows.
-            !axes.is_empty() && found.len() <= MOST_GROUPS
-        })?;
-        let axes: Vec<String> = axes.iter().map(|&axis| axis.to_owned()).collect();
+        let found = keys(survey, axes, &alike)?;
         if found.len() > MOST_GROUPS {
-            let whole = Group { values: Vec::new(), name: String::new() };
-            return Ok(Groups {
-                axes: Vec::new(),
-                shown: vec![whole],
-                all: 1,
-                left_out: 0,
-                crossed: None,
-                held: Vec::new(),
-                places: BTreeMap::from([(Vec::new(), 0)]),
-            });
+            return Ok(Groups::of(Vec::new(), vec![Group { values: Vec::new(), name: String::new() }], 1));
         }
-        let mut groups: Vec<Vec<f64>> = found.into_values().collect();
-        // In the order of the values, not of their bits.
-        groups.sort_by(|a, b| {
-            a.iter()
-                .zip(b)
-                .map(|(a, b)| a.total_cmp(b))
-                .find(|order| order.is_ne())
-                .unwrap_or(std::cmp::Ordering::Equal)
+        let varying = varying(&found);
+        let shown = choice(&found, most, is_kept).into_iter().map(|place| {
+            // A value that means nothing here was made NaN.
+            let named =
+                varying.iter().map(|&axis| (axes[axis], found[place][axis])).filter(|(_, value)| !value.is_nan());
+            let words = named.filter_map(|(name, value)| Some(survey.axis(name)?.told(value)));
+            Group { name: words.collect::<Vec<_>>().join(", "), values: found[place].clone() }
         });
-        let all = groups.len();
-        let varies: Vec<bool> =
-            (0..axes.len()).map(|axis| groups.iter().any(|group| group[axis] != groups[0][axis])).collect();
-        let (kept, others): (Vec<usize>, Vec<usize>) = (0..all).partition(|&place| is_kept(&groups[place]));
-        let mut places = kept;
-        places.truncate(most);
-        let room = most - places.len();
-        if varies.iter().filter(|varies| **varies).count() > 2 {
-            // Neighbours in the order of the grid differ in one axis, and compare.
-            places.extend(others.into_iter().take(room));
-        } else {
-            places.extend(chosen(others.len(), room).into_iter().map(|place| others[place]));
-        }
-        places.sort_unstable();
-        let shown: Vec<Group> = places
-            .into_iter()
-            .map(|place| {
-                let values = groups[place].clone();
-                let named = axes.iter().zip(&values).zip(&varies).filter(|(_, varies)| **varies);
-                let words = named.filter_map(|((axis, value), _)| {
-                    // A value that means nothing here was made NaN.
-                    survey.axis(axis).filter(|_| !value.is_nan()).map(|axis| axis.told(*value))
-                });
-                Group { name: words.collect::<Vec<_>>().join(", "), values }
-            })
-            .collect();
-        let (places, left_out) = (places_of(&shown), all - shown.len());
-        let mut found = Groups { axes, shown, all, left_out, crossed: None, held: Vec::new(), places };
+        let axes = axes.iter().map(|&axis| axis.to_owned()).collect();
+        let mut groups = Groups::of(axes, shown.collect(), found.len());
         if is_crossed {
-            found.cross(survey, &groups, most);
+            groups.cross(survey, &found, most);
         }
-        if found.crossed.is_none() {
-            found.label(survey, alike)?;
+        if groups.crossed.is_none() {
+            groups.label(survey, alike)?;
         }
-        Ok(found)
+        Ok(groups)
+    }
+
+    /// Some groups of `all`, which are not crossed.
+    fn of(axes: Vec<String>, shown: Vec<Group>, all: usize) -> Groups {
+        let (places, left_out) = (places_of(&shown), all - shown.len());
+        Groups { axes, shown, all, left_out, crossed: None, held: Vec::new(), places }
     }
 
     /// Names the groups by their labels, if each has one of its own.
@@ -239,8 +202,7 @@ impl Groups {
 
     /// Crosses two axes: of more that vary the last two, where the others have their first values.
     fn cross(&mut self, survey: &Survey, found: &[Vec<f64>], most: usize) {
-        let varying: Vec<usize> =
-            (0..self.axes.len()).filter(|&axis| found.iter().any(|group| group[axis] != found[0][axis])).collect();
+        let varying = varying(found);
         let [.., first, second] = varying.as_slice() else { return };
         let crossed = [*first, *second];
         let axis = |place: usize| survey.axis(&self.axes[place]);
@@ -291,19 +253,42 @@ impl Groups {
         self.places.get(&key(values)).copied()
     }
 
-    /// Drops the groups for which `is_kept`, asked in their order, is false, and returns their names.
-    pub fn retain(&mut self, mut is_kept: impl FnMut() -> bool) -> Vec<String> {
-        let mut dropped = Vec::new();
-        self.shown.retain(|group| {
-            let keep = is_kept();
-            if !keep {
-                dropped.push(group.name.clone());
-            }
-            keep
-        });
+    /// Drops the groups whose item is not kept, with it, and returns a sentence on them.
+    pub fn retain<T>(&mut self, items: &mut Vec<T>, is_kept: impl Fn(&T) -> bool) -> Option<String> {
+        let pairs = std::mem::take(&mut self.shown).into_iter().zip(std::mem::take(items));
+        let (kept, dropped): (Vec<_>, Vec<_>) = pairs.partition(|(_, item)| is_kept(item));
+        (self.shown, *items) = kept.into_iter().unzip();
         self.all -= dropped.len();
         self.places = places_of(&self.shown);
-        dropped
+        let names: Vec<String> = dropped.into_iter().map(|(group, _)| group.name).collect();
+        (!names.is_empty()).then(|| format!("No value for {}.", names.join("; ")))
+    }
+
+    /// A figure without panels yet, of which each group makes one; `aspect` is that of a single panel.
+    pub fn figure(&self, aspect: f64) -> Figure {
+        let [rows, columns] = self.crossed.clone().unwrap_or_default();
+        Figure {
+            columns: match (columns.len(), self.shown.len()) {
+                (0, 0 | 1) => 1,
+                (0, 2 | 4) => 2,
+                (0, _) => 3,
+                (columns, _) => columns,
+            },
+            rows,
+            aspect: if self.shown.len() > 1 { 0.9 } else { aspect },
+            shared: true,
+            subtitle: self.held.join(", "),
+            remarks: self.note("panels").into_iter().collect(),
+            ..Figure::default()
+        }
+    }
+
+    /// The title of a panel: where axes are crossed that of its column.
+    pub fn title(&self, place: usize) -> String {
+        match &self.crossed {
+            Some([_, columns]) => columns.get(place).cloned().unwrap_or_default(),
+            None => self.shown[place].name.clone(),
+        }
     }
 
     /// What is left out, for who can ask for it.
@@ -313,6 +298,51 @@ impl Groups {
             format!("{shown} of {all} {what} ({}); choose others with --where", self.axes.join(", "))
         })
     }
+}
+
+/// The different values of `axes` in ascending order, those that are alike once; more than `MOST_GROUPS` if there are too many.
+fn keys(survey: &Survey, axes: &[&str], alike: impl Fn(&mut [f64])) -> Result<Vec<Vec<f64>>, PlotError> {
+    let mut found: BTreeMap<Vec<u64>, Vec<f64>> = BTreeMap::new();
+    let mut last: Vec<f64> = Vec::new();
+    survey.each_while(axes, |cells| {
+        let same = last.len() == cells.len() && last.iter().zip(cells).all(|(a, b)| a.to_bits() == b.to_bits());
+        if same && !last.is_empty() {
+            return true;
+        }
+        last.clear();
+        last.extend_from_slice(cells);
+        let mut cells = cells.to_vec();
+        alike(&mut cells);
+        found.entry(key(&cells)).or_insert(cells);
+        // Without axes there is one group, however many rows.
+        !axes.is_empty() && found.len() <= MOST_GROUPS
+    })?;
+    let mut found: Vec<Vec<f64>> = found.into_values().collect();
+    // In the order of the values, not of their bits.
+    let in_order = |(a, b): (&f64, &f64)| a.total_cmp(b);
+    found.sort_by(|a, b| a.iter().zip(b).map(in_order).find(|order| order.is_ne()).unwrap_or(Ordering::Equal));
+    Ok(found)
+}
+
+/// The axes that vary in groups.
+fn varying(found: &[Vec<f64>]) -> Vec<usize> {
+    let axes = found.first().map_or(0, Vec::len);
+    (0..axes).filter(|&axis| found.iter().any(|group| group[axis] != found[0][axis])).collect()
+}
+
+/// The places of the groups that are shown, at most `most`: first those that are kept.
+fn choice(found: &[Vec<f64>], most: usize, is_kept: impl Fn(&[f64]) -> bool) -> Vec<usize> {
+    let (mut places, others): (Vec<usize>, Vec<usize>) = (0..found.len()).partition(|&place| is_kept(&found[place]));
+    places.truncate(most);
+    let room = most - places.len();
+    if varying(found).len() > 2 {
+        // Neighbours in the order of the grid differ in one axis, and compare.
+        places.extend(others.into_iter().take(room));
+    } else {
+        places.extend(chosen(others.len(), room).into_iter().map(|place| others[place]));
+    }
+    places.sort_unstable();
+    places
 }
 
 fn places_of(groups: &[Group]) -> BTreeMap<Vec<u64>, usize> {

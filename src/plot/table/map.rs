@@ -1,7 +1,7 @@
 //! Maps: a column as colours over two axes, a panel for each group of the further ones.
 
 use super::cells::AxisCells;
-use super::groups::{self, Groups};
+use super::groups::Groups;
 use super::survey::{Survey, Values};
 use crate::plot::colour::{class, viridis};
 use crate::plot::export::image;
@@ -10,9 +10,6 @@ use crate::plot::scale::Scale;
 use crate::plot::{PlotError, label};
 use crate::protocol::Status;
 use crate::table::STATUS;
-
-/// Most panels of a map.
-const MOST_PANELS: usize = 9;
 
 /// Most cells of an axis, alone and in one of several panels: finer ones are not seen in print.
 const MOST_CELLS: usize = 720;
@@ -71,151 +68,198 @@ struct Sheet {
     least: Option<(f64, f64, f64)>,
 }
 
+/// The places of the rows of a panel.
+struct Raster {
+    cells: [AxisCells; 2],
+    /// Whether rows are dots instead of cells.
+    are_dots: bool,
+}
+
+/// The colours of a column: of words one for each, of numbers a scale.
+struct Shading<'a> {
+    column: &'a str,
+    words: Vec<String>,
+    colours: Option<Colours>,
+}
+
 /// Draws the map.
 pub fn map(survey: &Survey, plan: &Plan) -> Result<Mapped, PlotError> {
-    let Plan { x, y, value } = plan;
-    let (further, along) = groups::further(survey, &[x, y])?;
-    let groups = Groups::new(survey, &further, (MOST_PANELS, true), |_| {}, |_| false)?;
-    let further: Vec<&str> = groups.axes.iter().map(String::as_str).collect();
-    let most = if groups.shown.len() > 1 { MOST_CELLS_SHARED } else { MOST_CELLS };
-    let (Some(x_axis), Some(y_axis)) = (survey.axis(x), survey.axis(y)) else { return Err(PlotError::Nothing) };
-    if x_axis.values.is_empty() || y_axis.values.is_empty() {
-        return Err(PlotError::Nothing);
-    }
-    // Rows at places of their own, such as those of a sampled design, are dots; of too many, several share a cell.
-    let per_panel = survey.rows as f64 / groups.all as f64;
-    let is_sparse = SPARSE * (x_axis.values.len() * y_axis.values.len()) as f64 > per_panel
-        || is_scattered(survey.rows / groups.all as u64, [x_axis, y_axis]);
-    let are_dots = is_sparse && per_panel <= MOST_DOTS;
-    let most = if is_sparse && !are_dots { most.min((0.5 * per_panel.sqrt()) as usize) } else { most };
-    let mut cells = [x_axis, y_axis].map(|axis| AxisCells::new(axis, most));
-    if are_dots {
-        // Room for the dots at the ends.
-        for (cells, axis) in cells.iter_mut().zip([x_axis, y_axis]) {
-            let (low, high) = (axis.values[0], axis.values[axis.values.len() - 1]);
-            cells.scale = Scale { low, high, log: cells.scale.log }.with_room(DOT_ROOM);
-        }
-    }
-    let (columns, rows) = (cells[0].len(), cells[1].len());
-    let count = if are_dots { 0 } else { columns * rows };
-    let empty = || Sheet { value: vec![f64::NAN; count], status: vec![0; count], dots: Vec::new(), least: None };
-    let mut sheets: Vec<Sheet> = groups.shown.iter().map(|_| empty()).collect();
-    let mut wanted = vec![x.as_str(), y.as_str(), value.as_str(), STATUS];
-    let is_named = are_dots && survey.rows <= MOST_NAMED;
-    let labels = wanted.len();
-    wanted.extend(survey.label_columns().into_iter().filter(|_| is_named));
-    let fixed = wanted.len();
-    wanted.extend(&further);
-    let ok = Status::ALL.iter().position(|status| *status == Status::Ok).unwrap_or(0) as f64;
-    survey.each(&wanted, |row| {
-        let Some(panel) = groups.place(&row[fixed..]) else { return };
-        let (Some(column), Some(line)) = (cells[0].place(row[0]), cells[1].place(row[1])) else { return };
-        let sheet = &mut sheets[panel];
-        let mut cell = line * columns + column;
-        let found = row[2];
-        if are_dots {
-            cell = sheet.dots.len();
-            sheet.dots.push(((row[0], row[1]), survey.label(&row[labels..fixed])));
-            sheet.value.push(f64::NAN);
-            sheet.status.push(0);
-        }
-        // A cell of several rows shows the least of them; NaN is above any number.
-        if sheet.status[cell] == 0 || found < sheet.value[cell] || sheet.value[cell].is_nan() {
-            sheet.value[cell] = found;
-            sheet.status[cell] = row[3].min((Status::ALL.len() - 1) as f64) as u8 + 1;
-        }
-        if row[3] == ok && !found.is_nan() && sheet.least.is_none_or(|(.., least)| found < least) {
-            sheet.least = Some((row[0], row[1], found));
-        }
-    })?;
+    let (mut groups, along) = Groups::of_panels(survey, &[&plan.x, &plan.y])?;
+    let raster = Raster::new(survey, plan, &groups)?;
+    let mut sheets = raster.read(survey, plan, &groups)?;
     // A group in which nothing has a value makes no panel.
-    let is_empty = |sheet: &Sheet| sheet.value.iter().all(|value| value.is_nan());
-    let mut groups = groups;
-    let mut left_out = Vec::new();
-    if groups.crossed.is_none() && sheets.iter().any(|sheet| !is_empty(sheet)) {
-        let mut keep = sheets.iter().map(|sheet| !is_empty(sheet)).collect::<Vec<bool>>().into_iter();
-        left_out = groups.retain(|| keep.next().unwrap_or(true));
-        sheets.retain(|sheet| !is_empty(sheet));
-    }
-    let words = survey.words(value);
-    let numbers = || sheets.iter().flat_map(|sheet| sheet.value.iter().copied());
-    let colours = if words.is_empty() { colours(survey, value, numbers())? } else { None };
-    let mut figure = Figure {
-        columns: groups.crossed.as_ref().map_or_else(|| columns_of(groups.shown.len()), |[_, columns]| columns.len()),
-        rows: groups.crossed.clone().map_or_else(Vec::new, |[rows, _]| rows),
-        aspect: if groups.shown.len() > 1 { 0.9 } else { 0.8 },
-        subtitle: groups.held.join(", "),
-        shared: true,
-        ..Figure::default()
-    };
-    let holes = sheets.iter().any(|sheet| sheet.value.iter().any(|value| value.is_nan()));
-    for (place, (sheet, group)) in sheets.iter().zip(&groups.shown).enumerate() {
-        let title = match &groups.crossed {
-            Some([_, columns]) => columns.get(place).cloned().unwrap_or_default(),
-            None => group.name.clone(),
-        };
-        let colour = |cell: usize| -> Option<[u8; 3]> {
-            let value = sheet.value[cell];
-            match &colours {
-                _ if value.is_nan() => None,
-                Some(colours) => {
-                    Some(viridis(if value > 0.0 || !colours.scale.log { colours.scale.share(value) } else { 0.0 }))
-                }
-                None => Some(class(shade(plan, value as usize))),
-            }
-        };
-        let layers = if are_dots {
-            let dot = |(dot, (at, _)): (usize, &((f64, f64), String))| {
-                let is_word = !words.is_empty() && !sheet.value[dot].is_nan();
-                let shape = if is_word { shade(plan, sheet.value[dot] as usize) } else { 0 };
-                Dot { at: *at, fill: colour(dot), shape }
-            };
-            let names = sheet.dots.iter().filter(|(_, name)| !name.is_empty()).cloned().collect();
-            vec![Layer::Dots(sheet.dots.iter().enumerate().map(dot).collect()), Layer::Names(names)]
-        } else {
-            let image = pixels(&cells, colour);
-            let filled = image.map(|png| Layer::Map(Map { png, hover: Some(hover(&cells, sheet, &words, value)) }));
-            [Layer::Hatch].into_iter().chain(filled).collect()
-        };
+    let has_value = |sheet: &Sheet| sheet.value.iter().any(|value| !value.is_nan());
+    let is_full = groups.crossed.is_some() || !sheets.iter().any(has_value);
+    let no_value = groups.retain(&mut sheets, |sheet| is_full || has_value(sheet));
+    let shading = Shading::new(survey, &plan.value, &sheets)?;
+    let mut figure = groups.figure(0.8);
+    let axis =
+        |name: &String, cells: &AxisCells| Axis { column: name.clone(), unit: survey.unit(name), scale: cells.scale };
+    for (place, sheet) in sheets.iter().enumerate() {
         figure.panels.push(Panel {
-            title,
-            x: Axis { column: x.clone(), unit: survey.unit(x), scale: cells[0].scale },
-            y: Axis { column: y.clone(), unit: survey.unit(y), scale: cells[1].scale },
-            layers,
+            title: groups.title(place),
+            x: axis(&plan.x, &raster.cells[0]),
+            y: axis(&plan.y, &raster.cells[1]),
+            layers: raster.layers(sheet, &shading),
         });
     }
-    if words.is_empty() {
-        figure.colours = colours;
-    } else {
-        for (place, word) in words.iter().enumerate() {
-            if numbers().any(|value| value == place as f64) {
-                let text = meaning(plan, word);
-                let shade = shade(plan, place);
-                let key = if are_dots { Key::Dot(class(shade), shade) } else { Key::Fill(class(shade)) };
-                figure.legend.push(Entry { key, text });
+    figure.legend = shading.legend(&sheets, raster.are_dots);
+    figure.colours = shading.colours;
+    figure.notes.extend(along.into_iter().chain(no_value).chain(raster.note(plan)));
+    let least = sheets.iter().map(|sheet| sheet.least).collect();
+    Ok(Mapped { figure, groups, least, cells: raster.cells })
+}
+
+impl Raster {
+    fn new(survey: &Survey, plan: &Plan, groups: &Groups) -> Result<Raster, PlotError> {
+        let axis = |name| survey.axis(name).filter(|axis| !axis.values.is_empty()).ok_or(PlotError::Nothing);
+        let axes = [axis(&plan.x)?, axis(&plan.y)?];
+        let most = if groups.shown.len() > 1 { MOST_CELLS_SHARED } else { MOST_CELLS };
+        // Rows at places of their own, such as those of a sampled design, are dots; of too many, several share a cell.
+        let per_panel = survey.rows as f64 / groups.all as f64;
+        let is_sparse = SPARSE * (axes[0].values.len() * axes[1].values.len()) as f64 > per_panel
+            || is_scattered(survey.rows / groups.all as u64, axes);
+        let are_dots = is_sparse && per_panel <= MOST_DOTS;
+        let most = if is_sparse && !are_dots { most.min((0.5 * per_panel.sqrt()) as usize) } else { most };
+        let cells = axes.map(|axis| {
+            let mut cells = AxisCells::new(axis, most);
+            if are_dots {
+                // Room for the dots at the ends.
+                let (low, high) = (axis.values[0], axis.values[axis.values.len() - 1]);
+                cells.scale = Scale { low, high, log: cells.scale.log }.with_room(DOT_ROOM);
             }
+            cells
+        });
+        Ok(Raster { cells, are_dots })
+    }
+
+    /// The cells or dots of each panel.
+    fn read(&self, survey: &Survey, plan: &Plan, groups: &Groups) -> Result<Vec<Sheet>, PlotError> {
+        let [columns, rows] = self.cells.each_ref().map(AxisCells::len);
+        let count = if self.are_dots { 0 } else { columns * rows };
+        let empty = |_| Sheet { value: vec![f64::NAN; count], status: vec![0; count], dots: Vec::new(), least: None };
+        let mut sheets: Vec<Sheet> = groups.shown.iter().map(empty).collect();
+        let is_named = self.are_dots && survey.rows <= MOST_NAMED;
+        let labels = if is_named { survey.label_columns() } else { Vec::new() };
+        let axes: Vec<&str> = groups.axes.iter().map(String::as_str).collect();
+        let wanted = [&[plan.x.as_str(), &plan.y, &plan.value, STATUS], &axes[..], &labels].concat();
+        let ok = Status::ALL.iter().position(|status| *status == Status::Ok).unwrap_or(0) as f64;
+        survey.each(&wanted, |row| {
+            let &[x, y, found, status, ref rest @ ..] = row else { return };
+            let (key, labels) = rest.split_at(axes.len());
+            let (Some(panel), Some(column), Some(line)) =
+                (groups.place(key), self.cells[0].place(x), self.cells[1].place(y))
+            else {
+                return;
+            };
+            let sheet = &mut sheets[panel];
+            let mut cell = line * columns + column;
+            if self.are_dots {
+                cell = sheet.dots.len();
+                sheet.dots.push(((x, y), survey.label(labels)));
+                sheet.value.push(f64::NAN);
+                sheet.status.push(0);
+            }
+            // A cell of several rows shows the least of them; NaN is above any number.
+            if sheet.status[cell] == 0 || found < sheet.value[cell] || sheet.value[cell].is_nan() {
+                sheet.value[cell] = found;
+                sheet.status[cell] = status.min((Status::ALL.len() - 1) as f64) as u8 + 1;
+            }
+            if status == ok && !found.is_nan() && sheet.least.is_none_or(|(.., least)| found < least) {
+                sheet.least = Some((x, y, found));
+            }
+        })?;
+        Ok(sheets)
+    }
+
+    /// The dots of a panel and their names, or its cells on a hatched background.
+    fn layers(&self, sheet: &Sheet, shading: &Shading<'_>) -> Vec<Layer> {
+        if self.are_dots {
+            let dot = |((at, _), &value): (&((f64, f64), String), &f64)| {
+                let shape = if shading.words.is_empty() || value.is_nan() { 0 } else { shading.shade(value) };
+                Dot { at: *at, fill: shading.colour(value), shape }
+            };
+            let names = sheet.dots.iter().filter(|(_, name)| !name.is_empty()).cloned().collect();
+            return vec![Layer::Dots(sheet.dots.iter().zip(&sheet.value).map(dot).collect()), Layer::Names(names)];
+        }
+        let image = pixels(&self.cells, |cell| shading.colour(sheet.value[cell]));
+        let hover = || Some(hover(&self.cells, sheet, &shading.words, shading.column));
+        let filled = image.map(|png| Layer::Map(Map { png, hover: hover() }));
+        [Layer::Hatch].into_iter().chain(filled).collect()
+    }
+
+    /// A sentence on cells that several rows share.
+    fn note(&self, plan: &Plan) -> Option<String> {
+        let shared =
+            [&plan.x, &plan.y].into_iter().zip(&self.cells).filter(|(_, cells)| !cells.exact && !self.are_dots);
+        let shared: Vec<String> =
+            shared.map(|(name, cells)| format!("{} cells of {}", cells.len(), label::name(name))).collect();
+        (!shared.is_empty()).then(|| format!("Rows share {}: each shows the least of its rows.", shared.join(" and ")))
+    }
+}
+
+impl Shading<'_> {
+    fn new<'a>(survey: &Survey, column: &'a str, sheets: &[Sheet]) -> Result<Shading<'a>, PlotError> {
+        let words = survey.words(column);
+        if !words.is_empty() {
+            return Ok(Shading { column, words, colours: None });
+        }
+        let values = || sheets.iter().flat_map(|sheet| sheet.value.iter().copied());
+        let all = Scale::of(values()).ok_or(PlotError::Nothing)?;
+        // A gap is never below zero but for rounding: its logarithm is what tells.
+        let scale = match Scale::of(values().filter(|value| *value > 0.0)) {
+            Some(positive) if column == "gap" && positive.high > positive.low => Scale { log: true, ..positive },
+            _ if all.high > all.low => all,
+            _ => all.with_room(0.05),
+        };
+        Ok(Shading {
+            column,
+            words,
+            colours: Some(Colours { label: label::axis(column, &survey.unit(column), 0), scale }),
+        })
+    }
+
+    /// Whether the column is a flag of stability: stable is shown as light as what settles, and in words.
+    fn is_stability(&self) -> bool {
+        self.column.starts_with("stable")
+    }
+
+    /// The class of a word, given by its place.
+    fn shade(&self, word: f64) -> usize {
+        if self.is_stability() { 1 - (word as usize).min(1) } else { word as usize }
+    }
+
+    /// The colour of a value, if it is one.
+    fn colour(&self, value: f64) -> Option<[u8; 3]> {
+        (!value.is_nan()).then(|| match &self.colours {
+            Some(Colours { scale, .. }) if scale.log && value <= 0.0 => viridis(0.0),
+            Some(Colours { scale, .. }) => viridis(scale.share(value)),
+            None => class(self.shade(value)),
+        })
+    }
+
+    /// Entries for the words that occur, and for cells or dots without a value.
+    fn legend(&self, sheets: &[Sheet], are_dots: bool) -> Vec<Entry> {
+        let has =
+            |wanted: &dyn Fn(f64) -> bool| sheets.iter().any(|sheet| sheet.value.iter().any(|value| wanted(*value)));
+        let words = self.words.iter().enumerate().map(|(place, word)| (place as f64, word));
+        let words = words.filter(|(place, _)| has(&|value| value == *place)).map(|(place, word)| {
+            let shade = self.shade(place);
+            let key = if are_dots { Key::Dot(class(shade), shade) } else { Key::Fill(class(shade)) };
+            Entry { key, text: self.meaning(word) }
+        });
+        let hole = || Entry { key: if are_dots { Key::Hollow } else { Key::Hatch }, text: nothing(sheets) };
+        words.chain(has(&f64::is_nan).then(hole)).collect()
+    }
+
+    fn meaning(&self, word: &str) -> String {
+        match word {
+            "no" if self.is_stability() => "unstable".to_owned(),
+            "yes" if self.is_stability() => "stable".to_owned(),
+            "no" | "yes" => format!("{}: {word}", label::name(self.column)),
+            word => word.replace('_', " "),
         }
     }
-    if holes {
-        let key = if are_dots { Key::Hollow } else { Key::Hatch };
-        figure.legend.push(Entry { key, text: nothing(&sheets) });
-    }
-    figure.remarks.extend(groups.note("panels"));
-    figure.notes.extend(along);
-    if !left_out.is_empty() {
-        figure.notes.push(format!("No value for {}.", left_out.join("; ")));
-    }
-    let binned: Vec<String> = [x, y]
-        .iter()
-        .zip(&cells)
-        .filter(|(_, cells)| !cells.exact && !are_dots)
-        .map(|(name, cells)| format!("{} cells of {}", cells.len(), label::name(name)))
-        .collect();
-    if !binned.is_empty() {
-        figure.notes.push(format!("Rows share {}: each shows the least of its rows.", binned.join(" and ")));
-    }
-    let least = sheets.iter().map(|sheet| sheet.least).collect();
-    Ok(Mapped { figure, groups, least, cells })
 }
 
 /// Whether rows are single points of a plane, of which a map would be mostly blank.
@@ -224,48 +268,6 @@ fn is_scattered(rows: u64, axes: [&Values; 2]) -> bool {
     let least = axes.map(|axis| axis.values.len()).into_iter().min().unwrap_or(0);
     // Rows of which each pair of values has one are a grid.
     rows <= (SCATTERED * most) as u64 && rows < (most * least) as u64
-}
-
-/// Whether the column is a flag of stability: stable is shown as light as what settles, and in words.
-fn is_stability(plan: &Plan) -> bool {
-    plan.value.starts_with("stable")
-}
-
-fn shade(plan: &Plan, place: usize) -> usize {
-    if is_stability(plan) { 1 - place.min(1) } else { place }
-}
-
-fn meaning(plan: &Plan, word: &str) -> String {
-    match word {
-        "no" if is_stability(plan) => "unstable".to_owned(),
-        "yes" if is_stability(plan) => "stable".to_owned(),
-        "no" | "yes" => format!("{}: {word}", label::name(&plan.value)),
-        word => word.replace('_', " "),
-    }
-}
-
-/// Panels side by side.
-pub fn columns_of(panels: usize) -> usize {
-    match panels {
-        0 | 1 => 1,
-        2 | 4 => 2,
-        _ => 3,
-    }
-}
-
-fn colours(
-    survey: &Survey,
-    column: &str,
-    values: impl Iterator<Item = f64> + Clone,
-) -> Result<Option<Colours>, PlotError> {
-    let all = Scale::of(values.clone()).ok_or(PlotError::Nothing)?;
-    // A gap is never below zero but for rounding: its logarithm is what tells.
-    let scale = match Scale::of(values.filter(|value| *value > 0.0)) {
-        Some(positive) if column == "gap" && positive.high > positive.low => Scale { log: true, ..positive },
-        _ if all.high > all.low => all,
-        _ => all.with_room(0.05),
-    };
-    Ok(Some(Colours { label: label::axis(column, &survey.unit(column), 0), scale }))
 }
 
 /// What a hatched region is, from the status of its rows.

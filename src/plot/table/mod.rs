@@ -294,6 +294,18 @@ impl Scene<'_> {
         }
     }
 
+    /// Another table of the dataset, if it has these columns and any part is there.
+    fn other(&self, table: &str, columns: &[&str]) -> Result<Option<Survey>, PlotError> {
+        let Source { folder, manifest, .. } = self.source;
+        if manifest.table(table).is_none() {
+            return Ok(None);
+        }
+        match Survey::new(folder, manifest, table, &[]) {
+            Err(PlotError::Empty { .. }) => Ok(None),
+            survey => Ok(Some(survey?).filter(|survey| columns.iter().all(|column| survey.has(column)))),
+        }
+    }
+
     /// What a unit of the model of a quantity is in the units of the dataset.
     fn size(&self, name: &str) -> f64 {
         Quantity::from_name(name).map_or(1.0, |quantity| self.source.units.size(quantity.unit(Scale::Model)))

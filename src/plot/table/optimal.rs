@@ -3,7 +3,6 @@
 use super::choice::Shape;
 use super::groups::Groups;
 use super::map::{self, Mapped};
-use super::survey::Survey;
 use super::{Scene, lines, plain};
 use crate::model::{Law, Transition};
 use crate::plot::canvas::Stroke;
@@ -142,17 +141,7 @@ fn times(scene: &Scene<'_>, groups: &Groups, group: usize) -> Result<Vec<Option<
 }
 
 fn tabled(scene: &Scene<'_>, values: &[f64]) -> Result<Option<Vec<Option<f64>>>, PlotError> {
-    let source = scene.source;
-    if !source.manifest.tables.iter().any(|table| table.name == "crossover") {
-        return Ok(None);
-    }
-    let survey = match Survey::new(&source.folder, &source.manifest, "crossover", &[]) {
-        Err(PlotError::Empty { .. }) => return Ok(None),
-        survey => survey?,
-    };
-    if !MARKED.iter().all(|column| survey.has(column)) {
-        return Ok(None);
-    }
+    let Some(survey) = scene.other("crossover", &MARKED)? else { return Ok(None) };
     let columns: Vec<&str> = AXES.into_iter().chain(MARKED).collect();
     let mut found = None;
     survey.each(&columns, |row| {

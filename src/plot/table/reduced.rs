@@ -1,17 +1,13 @@
 //! Landscapes that were reduced while they were computed: quantiles of the gap over an axis, and bars of a histogram.
 
 use super::cells::AxisCells;
-use super::groups::{self, Groups};
-use super::map::columns_of;
+use super::groups::Groups;
 use super::survey::Survey;
 use crate::plot::canvas::Stroke;
-use crate::plot::figure::{Axis, Entry, Figure, Key, Layer, Marker, Panel};
+use crate::plot::figure::{Axis, Entry, Figure, Key, Layer, MARKED, Marker, Panel};
 use crate::plot::scale::Scale;
 use crate::plot::{PlotError, colour, label};
 use crate::table::{HISTOGRAM_EDGES, REDUCED, Table};
-
-/// Most panels of a figure.
-const MOST_PANELS: usize = 9;
 
 /// The horizontal axes, the one that is preferred first.
 const ACROSS: [&str; 5] = ["t_f", "v_f", "v_i", "b", "a"];
@@ -31,8 +27,16 @@ const QUANTILES: [(&str, f64); 7] = [
     ("gap_max", 1.0),
 ];
 
-/// Curves through fewer points show them.
-const MARKED: usize = 50;
+/// The bands from back to front: between which columns, their shade and their name.
+const BANDS: [(&str, &str, [u8; 3], &str); 2] =
+    [("gap_q05", "gap_q95", OUTER, "5 % to 95 % of the shortcuts"), ("gap_q25", "gap_q75", INNER, "25 % to 75 %")];
+
+/// The curves: column, name and series.
+const CURVES: [(&str, &str, usize); 3] =
+    [("gap_q50", "median", 0), ("gap_min", "least", 2), ("gap_max", "greatest", 1)];
+
+/// Most places along an axis.
+const MOST_PLACES: usize = 1024;
 
 /// The columns of a reduced table, without the number of shortcuts.
 fn columns(survey: &Survey) -> Vec<&'static str> {
@@ -41,33 +45,10 @@ fn columns(survey: &Survey) -> Vec<&'static str> {
     names.filter(|name| survey.has(name)).collect()
 }
 
-/// A figure of panels that all have the same axes, one for each group.
-fn panels(groups: &Groups) -> Figure {
-    let columns = groups.crossed.as_ref().map_or_else(|| columns_of(groups.shown.len()), |[_, columns]| columns.len());
-    Figure {
-        columns,
-        rows: groups.crossed.clone().map_or_else(Vec::new, |[rows, _]| rows),
-        aspect: if groups.shown.len() > 1 { 0.9 } else { 0.7 },
-        shared: true,
-        subtitle: groups.held.join(", "),
-        remarks: groups.note("panels").into_iter().collect(),
-        ..Figure::default()
-    }
-}
-
-/// The title of a panel.
-fn title(groups: &Groups, place: usize) -> String {
-    match &groups.crossed {
-        Some([_, columns]) => columns.get(place).cloned().unwrap_or_default(),
-        None => groups.shown[place].name.clone(),
-    }
-}
-
 /// Bars: how many shortcuts have which gap.
 pub fn histogram(survey: &Survey) -> Result<(Figure, Vec<String>), PlotError> {
     let columns = columns(survey);
-    let (further, along) = groups::further(survey, &[])?;
-    let groups = Groups::new(survey, &further, (MOST_PANELS, true), |_| {}, |_| false)?;
+    let (groups, along) = Groups::of_panels(survey, &[])?;
     let wanted: Vec<&str> = columns.iter().copied().chain(groups.axes.iter().map(String::as_str)).collect();
     let mut counts = vec![vec![0.0; columns.len()]; groups.shown.len()];
     survey.each(&wanted, |row| {
@@ -90,11 +71,11 @@ pub fn histogram(survey: &Survey) -> Result<(Figure, Vec<String>), PlotError> {
     let x = Scale { low: edges[first].0, high: edges[last].1, log: true };
     let most = counts.iter().flatten().fold(0.0_f64, |most, count| most.max(*count));
     let y = Scale { low: 0.0, high: 1.06 * most, log: false };
-    let mut figure = panels(&groups);
+    let mut figure = groups.figure(0.7);
     for (place, counts) in counts.iter().enumerate() {
         let bars = edges.iter().zip(counts).map(|(&(from, to), &count)| (from, to, count));
         figure.panels.push(Panel {
-            title: title(&groups, place),
+            title: groups.title(place),
             x: Axis { column: "gap".to_owned(), unit: "1".to_owned(), scale: x },
             y: Axis { column: "shortcuts".to_owned(), unit: "1".to_owned(), scale: y },
             layers: vec![Layer::Bars(bars.collect(), INNER)],
@@ -132,76 +113,78 @@ pub fn quantiles(survey: &Survey) -> Result<(Figure, Vec<String>), PlotError> {
     }
 }
 
+/// What is drawn over an axis: the values of each column, one for each place of the axis; none of a column that was not written.
+struct Quantiles<'a> {
+    cells: &'a AxisCells,
+    columns: &'a [(&'a str, f64)],
+    values: Vec<Vec<f64>>,
+}
+
 fn bands(survey: &Survey, across: &str, columns: &[(&str, f64)]) -> Result<(Figure, Vec<String>), PlotError> {
-    let (further, along) = groups::further(survey, &[across])?;
-    let groups = Groups::new(survey, &further, (MOST_PANELS, true), |_| {}, |_| false)?;
-    let axis = survey.axis(across).ok_or(PlotError::Nothing)?;
-    let cells = AxisCells::new(axis, 1024);
-    let mut values = vec![vec![vec![f64::NAN; cells.len()]; columns.len()]; groups.shown.len()];
-    let wanted: Vec<&str> = [across]
-        .into_iter()
-        .chain(columns.iter().map(|(name, _)| *name))
-        .chain(groups.axes.iter().map(String::as_str))
-        .collect();
+    let (groups, along) = Groups::of_panels(survey, &[across])?;
+    let cells = AxisCells::new(survey.axis(across).ok_or(PlotError::Nothing)?, MOST_PLACES);
+    let empty = |_| Quantiles { cells: &cells, columns, values: vec![vec![f64::NAN; cells.len()]; columns.len()] };
+    let mut quantiles: Vec<Quantiles> = groups.shown.iter().map(empty).collect();
+    let names = columns.iter().map(|(name, _)| *name);
+    let wanted: Vec<&str> = [across].into_iter().chain(names).chain(groups.axes.iter().map(String::as_str)).collect();
     survey.each(&wanted, |row| {
         let (found, key) = row[1..].split_at(columns.len());
         let (Some(group), Some(place)) = (groups.place(key), cells.place(row[0])) else { return };
-        values[group].iter_mut().zip(found).for_each(|(column, value)| column[place] = *value);
+        quantiles[group].values.iter_mut().zip(found).for_each(|(column, value)| column[place] = *value);
     })?;
-    let y = Scale::of(values.iter().flatten().flatten().copied()).ok_or(PlotError::Nothing)?.with_room(0.04);
-    let (low, high) = (cells.middles[0], cells.middles[cells.len() - 1]);
-    let x = Scale { low, high, log: cells.scale.log }.with_room(0.02);
-    let place = |name: &str| columns.iter().position(|(column, _)| *column == name);
-    let styles = [
-        ("gap_q50", "median", colour::series(0)),
-        ("gap_min", "least", colour::series(2)),
-        ("gap_max", "greatest", colour::series(1)),
-    ];
-    let is_marked = cells.exact && cells.len() < MARKED;
-    let mut figure = panels(&groups);
-    for (group, values) in values.iter().enumerate() {
-        let mut layers = Vec::new();
-        for (low, high, shade) in [("gap_q05", "gap_q95", OUTER), ("gap_q25", "gap_q75", INNER)] {
-            let (Some(low), Some(high)) = (place(low), place(high)) else { continue };
-            let points = cells.middles.iter().zip(values[low].iter().zip(&values[high]));
-            layers.push(Layer::Band(points.map(|(x, (low, high))| (*x, *low, *high)).collect(), shade));
-        }
-        for (series, (name, _, stroke)) in styles.iter().enumerate() {
-            let Some(column) = place(name) else { continue };
-            let points: Vec<(f64, f64)> = cells.middles.iter().copied().zip(values[column].iter().copied()).collect();
-            layers.push(Layer::Lines(vec![points.clone()], stroke.clone()));
-            if is_marked {
-                let points = points.into_iter().filter(|(_, value)| value.is_finite()).collect();
-                layers.push(Layer::Points(points, Marker { series: SERIES[series] }));
-            }
-        }
+    let all = quantiles.iter().flat_map(|drawn| drawn.values.iter().flatten().copied());
+    let y = Scale::of(all).ok_or(PlotError::Nothing)?.with_room(0.04);
+    let mut figure = groups.figure(0.7);
+    for (group, drawn) in quantiles.iter().enumerate() {
         figure.panels.push(Panel {
-            title: title(&groups, group),
-            x: Axis { column: across.to_owned(), unit: survey.unit(across), scale: x },
+            title: groups.title(group),
+            x: Axis { column: across.to_owned(), unit: survey.unit(across), scale: cells.ends().with_room(0.02) },
             y: Axis { column: "gap".to_owned(), unit: "1".to_owned(), scale: y },
-            layers,
+            layers: drawn.layers(),
         });
     }
-    for (series, (name, text, stroke)) in styles.into_iter().enumerate() {
-        if place(name).is_some() {
-            let marker = Marker { series: SERIES[series] };
-            let key = if is_marked { Key::Marked(stroke, marker) } else { Key::Line(stroke) };
-            figure.legend.push(Entry { key, text: text.to_owned() });
-        }
-    }
-    for (low, high, shade, text) in
-        [("gap_q25", "gap_q75", INNER, "25 % to 75 %"), ("gap_q05", "gap_q95", OUTER, "5 % to 95 % of the shortcuts")]
-    {
-        if place(low).is_some() && place(high).is_some() {
-            figure.legend.push(Entry { key: Key::Fill(shade), text: text.to_owned() });
-        }
-    }
+    figure.legend = quantiles.first().map_or_else(Vec::new, Quantiles::legend);
     figure.notes.extend(along);
     Ok((figure, vec![across.to_owned()]))
 }
 
-/// The series of the median, the least and the greatest gap.
-const SERIES: [usize; 3] = [0, 2, 1];
+impl Quantiles<'_> {
+    fn column(&self, name: &str) -> Option<&[f64]> {
+        self.values.get(self.columns.iter().position(|(column, _)| *column == name)?).map(Vec::as_slice)
+    }
+
+    fn is_marked(&self) -> bool {
+        self.cells.exact && self.cells.len() < MARKED
+    }
+
+    fn layers(&self) -> Vec<Layer> {
+        let mut layers = Vec::new();
+        for (low, high, shade, _) in BANDS {
+            let (Some(low), Some(high)) = (self.column(low), self.column(high)) else { continue };
+            let points = self.cells.middles.iter().zip(low.iter().zip(high));
+            layers.push(Layer::Band(points.map(|(x, (low, high))| (*x, *low, *high)).collect(), shade));
+        }
+        for (name, _, series) in CURVES {
+            let Some(column) = self.column(name) else { continue };
+            let points: Vec<(f64, f64)> = self.cells.middles.iter().copied().zip(column.iter().copied()).collect();
+            layers.push(Layer::Lines(vec![points.clone()], colour::series(series)));
+            if self.is_marked() {
+                let points = points.into_iter().filter(|(_, value)| value.is_finite()).collect();
+                layers.push(Layer::Points(points, Marker { series }));
+            }
+        }
+        layers
+    }
+
+    fn legend(&self) -> Vec<Entry> {
+        let is_there = |name: &str| self.column(name).is_some();
+        let curves = CURVES.into_iter().filter(|(name, ..)| is_there(name));
+        let curves = curves.map(|(_, text, series)| (Key::series(series, self.is_marked()), text));
+        let bands = BANDS.into_iter().rev().filter(|(low, high, ..)| is_there(low) && is_there(high));
+        let bands = bands.map(|(.., shade, text)| (Key::Fill(shade), text));
+        curves.chain(bands).map(|(key, text)| Entry { key, text: text.to_owned() }).collect()
+    }
+}
 
 fn distribution(survey: &Survey, columns: &[(&str, f64)]) -> Result<(Figure, Vec<String>), PlotError> {
     let names: Vec<&str> = columns.iter().map(|(name, _)| *name).collect();
