@@ -10,7 +10,7 @@
 //! with steady sliding at 0. They stay regular for `M = 0`, where the last one is a constraint, and no velocity is too
 //! low for them.
 
-use crate::numerics::elementary::{exp, exp_and_m1, exp_m1};
+use crate::numerics::elementary::{exp, exp_and_m1};
 use crate::numerics::stiff::{Linearised, Points, System};
 
 /// Place of the scaled force in a [`State`].
@@ -45,11 +45,9 @@ impl Slider {
         [(self.a - self.b) * x, -x, x]
     }
 
-    /// Rate at which friction beyond its steady value at `v_f` takes energy from the motion about steady sliding,
-    /// `E = M (e^x - 1)^2/2 + z^2/(2 k)`, in two terms: `-E' = (e^x - 1) a x + (e^x - 1) b y`.
-    pub fn loss(&self, y: f64, x: f64) -> [f64; 2] {
-        let excess = exp_m1(x);
-        [excess * (self.a * x), excess * (self.b * y)]
+    /// Whether `k = b - a` exactly.
+    pub fn is_critical(&self) -> bool {
+        self.k == self.b - self.a && self.b - self.k == self.a
     }
 
     /// The state after an arrest that takes no time, if one is under way.
