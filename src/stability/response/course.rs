@@ -65,7 +65,7 @@ const ACCURACIES: [f64; 4] = [3.0, 0.3, 0.03, 0.003];
 const ROUNDED: f64 = 1e-11;
 
 /// `ln(v/v_f)` whose velocity is 0 in doubles, whatever its unit.
-const VANISHING: f64 = -1000.0;
+pub(super) const VANISHING: f64 = -1000.0;
 
 /// Follows the response that starts from steady sliding at `e^x v_f`, `x` not 0, with numbers good to `rtol`: at finer and
 /// finer steps, until nothing changes by more than that from one run to the next. Where that does not happen it is

@@ -14,14 +14,11 @@
 
 use super::fate::{Follower, excess};
 use super::orbit::{Orbit, Stop};
-use super::slider::{Y, Z};
+use super::slider::Place;
 use crate::numerics::elementary::{exp, ln, ln_1p};
 use crate::numerics::elimination::eliminate;
 use crate::numerics::root::crossing;
 use crate::numerics::stiff::radau_iia_9;
-
-/// A place on the section: `ln z` and `y`.
-pub(super) type Place = [f64; 2];
 
 /// A cycle from the section to itself.
 #[derive(Debug, Clone, Copy)]
@@ -71,6 +68,9 @@ const WORTH: f64 = 30.0;
 
 /// Most iterations of Newton's method.
 const MOST_ITERATIONS: u32 = 8;
+
+/// What an iteration leaves of its error, at least.
+const RELAPSE: f64 = 0.01;
 
 /// Most leaps in a row.
 const MOST_LEAPS: u32 = 200;
@@ -127,14 +127,11 @@ pub(super) fn distance([w, y]: Place, size: f64) -> f64 {
 impl Follower<'_> {
     /// The cycle from a place.
     pub(super) fn lap(&mut self, from: Place, tolerance: f64) -> Result<Lap, Stop> {
-        let slider = self.slider;
-        let z = exp(from[0]);
-        // Without mass friction carries the spring's force.
-        let y = if slider.inertia > 0.0 { from[1] } else { z / slider.b };
-        let mut orbit = Orbit::new(slider, [z, y, 0.0], tolerance);
+        let mut orbit = Orbit::new(self.slider, self.slider.state(from), tolerance);
         let cycle = orbit.cycle(false, &mut self.budget)?;
         let range = cycle.extrema.map(|seen| seen.map_or(0.0, |seen| orbit.polished(seen).x));
-        let change = [ln_1p((cycle.end[Z] - z) / z), cycle.end[Y] - from[1]];
+        let end = self.slider.place(&cycle.end);
+        let change = [end[0] - from[0], end[1] - from[1]];
         if change[0].is_nan() {
             return Err(Stop::Faint);
         }
@@ -165,6 +162,7 @@ impl Follower<'_> {
             if self.dies_out(&lap) {
                 return Ok(Leapt::At { place: lap.from, time });
             }
+            if std::env::var("DBG").is_ok() {eprintln!("  leap from {:?} {:?} {:?} jac {jacobian:?} cycles {cycles} b {}", lap.from, lap.change, lap.range, self.budget);}
             cycles = if cycles > 0.0 { cycles } else { NEAR / speed };
             let next = self.leap(&lap, jacobian, &mut cycles)?;
             let Some((leap, n)) = next else {
@@ -205,7 +203,7 @@ impl Follower<'_> {
             let place = [lap.from[0] + step[0], lap.from[1] + step[1]];
             let tolerance = (0.01 * self.rtol * lap.distance(lap.change) / distance).clamp(self.finest, self.tolerance);
             lap = self.lap(place, tolerance * lap.size())?;
-            if distance < 0.1 * self.rtol || distance < 3.0 * noise {
+            if distance < 0.01 * self.rtol || distance < 3.0 * noise {
                 let sure = noise < NEAR && self.linear.encloses(lap.size());
                 let multiplier = multiplier(jacobian, 10.0 * lap.tolerance / (lap.size() * NUDGE));
                 return Ok(multiplier.filter(|_| sure).map(|monotone| Fixed { lap, monotone }));
@@ -225,7 +223,9 @@ impl Follower<'_> {
         while *cycles > WORTH {
             let n = cycles.floor();
             let leap = self.stages(lap, jacobian, n)?;
-            let error = leap.as_ref().and_then(|leap| leap.error(lap, jacobian, n)).unwrap_or(f64::INFINITY) / allowed;
+            // Newton's method may converge in half of it.
+            let error = leap.as_ref().and_then(|leap| leap.error(lap, jacobian, n)).map_or(64.0, |error| error / allowed);
+            if std::env::var("DBG").is_ok() {eprintln!("    n {n} error {error} {}", leap.is_some());}
             *cycles = n * (0.9 * exp(-ln(error.max(1e-10)) / (S + 1) as f64)).clamp(0.2, 8.0);
             if let Some(leap) = leap.filter(|_| error < 1.0) {
                 return Ok(Some((leap, n)));
@@ -247,7 +247,7 @@ impl Follower<'_> {
             }
         }
         let mut leap = Leap { change: [[0.0; S]; 2], laps: [*lap; S] };
-        let enough = 0.01 * self.tolerance.max(self.finest);
+        let enough = 0.1 * self.tolerance.max(self.finest);
         let mut last = f64::INFINITY;
         for _ in 0..MOST_ITERATIONS {
             let mut right = vec![0.0; 2 * S];
@@ -272,10 +272,11 @@ impl Follower<'_> {
                     leap.change[r][i] += step[r];
                 }
             }
-            if last.is_finite() && moved < enough.max(3.0 * n * lap.tolerance / lap.size()) {
+            let rate = moved / last;
+            if rate > 0.0 && rate < 0.5 && moved * rate.max(RELAPSE) < enough.max(n * lap.tolerance / lap.size()) {
                 return Ok(Some(leap));
             }
-            if !(moved < 0.5 * last && moved < LONGEST) {
+            if !(moved < 0.7 * last && moved < LONGEST) {
                 return Ok(None);
             }
             last = moved;

@@ -2,11 +2,11 @@
 //!
 //! Cycles are followed one by one while they change fast; where they change slowly, `envelope.rs` leaps over many.
 
-use super::course::{Course, Doubts, Fate};
-use super::envelope::{FINEST, Fixed, Lap, Leapt, Place, distance, size};
+use super::course::{Course, Doubts, Fate, VANISHING};
+use super::envelope::{FINEST, Fixed, Lap, Leapt, distance, size};
 use super::orbit::{BAND, Cycle, Extremum, Orbit, Seen, Stop};
-use super::slider::{Slider, State, X, Y, Z};
-use crate::numerics::elementary::{exp, ln, ln_1p};
+use super::slider::{Place, Slider, State, X};
+use crate::numerics::elementary::{exp, ln};
 
 /// Small motions about steady sliding.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -39,6 +39,9 @@ const FAST: f64 = 0.5;
 /// Cycles that are followed before the next try to leap, and after a limit cycle is found.
 const PATIENCE: u32 = 10;
 
+/// Share of `rtol` by which a limit cycle may still be missed.
+const ARRIVED: f64 = 0.03;
+
 /// Peaks that differ by less than this, in units of `rtol`, are as high as each other.
 const ALIKE_PEAKS: f64 = 0.3;
 
@@ -55,7 +58,7 @@ pub(super) fn follow_once(slider: &Slider, linear: Linear, x: f64, rtol: f64, sh
         vague_peak: false,
         t: 0.0,
     };
-    let fate = follower.run(slider.steady(x)).unwrap_or(Fate::Undecided);
+    let fate = follower.run(slider.steady(x));if fate.is_err() && std::env::var("DBG").is_ok() {eprintln!("{fate:?} {share}");}let fate=fate.unwrap_or(Fate::Undecided);
     let Follower { extrema: [low, high], t, budget, vague_peak, .. } = follower;
     let doubts = Doubts { t_peak: vague_peak, ..Doubts::default() };
     Course { fate, high, low, t, steps: MOST_STEPS - budget, doubts }
@@ -125,11 +128,11 @@ impl<'a> Follower<'a> {
                 return settled.map(|time| Fate::Settled { time }).ok_or(stop);
             };
             self.note(&mut way, cycle.extrema);
-            let place = [ln(cycle.end[Z]), cycle.end[Y]];
-            let Some(last) = before.replace(place).filter(|last| last[0].is_finite()) else { continue };
+            let place = self.slider.place(&cycle.end);
+            let Some(last) = before.replace(place).filter(|last| (place[0] - last[0]).is_finite()) else { continue };
             let range = cycle.range();
             let size = size(range);
-            let change = [ln_1p(exp(place[0] - last[0]) - 1.0), place[1] - last[1]];
+            let change = [place[0] - last[0], place[1] - last[1]];
             count += 1;
             pace.take(distance(change, size));
 
@@ -140,8 +143,10 @@ impl<'a> Follower<'a> {
                     return Ok(Fate::Settled { time });
                 }
             }
+            if std::env::var("DBG").is_ok() {eprintln!("c {count} t {} {place:?} {change:?} {range:?} pace {pace:?} tol {} b {}", self.t, way.tolerance, self.budget);}
             // A limit cycle?
-            if pace.left < self.rtol && size > 1e-7 && !self.may_die_out(&lap) {
+            pace.take_low(range[0]);
+            if pace.left < ARRIVED * self.rtol && size > 1e-7 && !self.may_die_out(&lap) && pace.has_arrived(self.rtol) {
                 let [low, high] = cycle.exact_range(&mut way.orbit);
                 return Ok(Fate::Cycle { period: cycle.period, high, low });
             }
@@ -158,7 +163,7 @@ impl<'a> Follower<'a> {
                     Leapt::At { place, time } if time > 0.0 => {
                         let stays = excess(range) < 0.0;
                         let since = if stays { way.settled_at().unwrap_or(f64::NAN) } else { f64::NAN };
-                        let offset = self.t + time;
+                        let offset = way.offset + cycle.t + time;
                         way = self.restart(place, size, offset, since);
                         (before, pace) = (Some(place), Pace::default());
                         continue;
@@ -168,19 +173,17 @@ impl<'a> Follower<'a> {
             }
             // Steps as fine as the motion asks for.
             let asked = self.step_error(size);
-            if asked < 0.1 * way.tolerance || asked > 100.0 * way.tolerance {
+            if !self.linear.stable && asked < 0.1 * way.tolerance || asked > 100.0 * way.tolerance {
                 let since = way.settled_at().unwrap_or(f64::NAN);
-                way = self.restart(place, size, self.t, since);
+                way = self.restart(place, size, way.offset + cycle.t, since);
             }
         }
     }
 
     /// Goes on from a place on the section.
-    fn restart(&self, [w, y]: Place, size: f64, offset: f64, since: f64) -> Way<'a> {
+    fn restart(&self, place: Place, size: f64, offset: f64, since: f64) -> Way<'a> {
         let tolerance = self.step_error(size);
-        let z = exp(w);
-        let y = if self.slider.inertia > 0.0 { y } else { z / self.slider.b };
-        Way { orbit: Orbit::new(self.slider, [z, y, 0.0], tolerance), offset, since, tolerance }
+        Way { orbit: Orbit::new(self.slider, self.slider.state(place), tolerance), offset, since, tolerance }
     }
 
     /// Error of a step in a motion of this size.
@@ -243,11 +246,15 @@ struct Pace {
     shares: [f64; 2],
     /// Estimate of all changes to come: those of a geometric series.
     left: f64,
+    /// The slowest moment, and its changes to come.
+    low: f64,
+    lower: f64,
+    lingers: u32,
 }
 
 impl Default for Pace {
     fn default() -> Pace {
-        Pace { change: f64::NAN, shares: [f64::NAN; 2], left: f64::INFINITY }
+        Pace { change: f64::NAN, shares: [f64::NAN; 2], left: f64::INFINITY, low: f64::NAN, lower: f64::NAN, lingers: 0 }
     }
 }
 
@@ -258,6 +265,18 @@ impl Pace {
         // False for NaN.
         self.left = if largest < FAST { change * largest / (1.0 - largest) } else { f64::INFINITY };
         (self.change, self.shares) = (change, [share, self.shares[0]]);
+    }
+
+    /// Takes in the slowest moment.
+    fn take_low(&mut self, low: f64) {
+        self.lower = (low - self.low).abs() * self.shares[0].max(0.01);
+        self.low = low;
+    }
+
+    /// Whether the slowest moment changes no more, which may magnify changes of the section; or errors of steps keep it from that.
+    fn has_arrived(&mut self, rtol: f64) -> bool {
+        self.lingers += 1;
+        self.lower < ARRIVED * rtol || self.low < VANISHING || self.lingers > PATIENCE
     }
 
     /// Whether cycles change little, and the next one will change about as much.
