@@ -39,6 +39,8 @@ pub(super) struct Fixed {
     pub lap: Lap,
     /// Whether places near it come to it from one side, so that none overshoots.
     pub monotone: bool,
+    /// How far the response was from it when it was found.
+    pub missed: f64,
 }
 
 /// What leaps led to.
@@ -54,6 +56,9 @@ pub(super) enum Leapt {
 /// Stages of a leap.
 const S: usize = 5;
 
+/// Size of a limit cycle that is told from sliding.
+pub(super) const SMALLEST: f64 = 1e-7;
+
 /// Difference of places for the derivative of the map: the power 1/3 of the error of a lap at rtol 1e-6.
 const NUDGE: f64 = 1e-3;
 
@@ -64,7 +69,7 @@ pub(super) const FINEST: f64 = 1e-14;
 const NEAR: f64 = 0.1;
 
 /// Cycles that a leap, which takes about as many laps, has to skip.
-const WORTH: f64 = 30.0;
+const WORTH: f64 = 20.0;
 
 /// Most iterations of Newton's method.
 const MOST_ITERATIONS: u32 = 8;
@@ -157,13 +162,14 @@ impl Follower<'_> {
             lap = self.lap(lap.from, self.lap_tolerance(lap.size(), speed))?;
             let jacobian = self.derivative(&lap)?;
             if let Some(fixed) = self.fixed(&lap, jacobian)? {
-                return Ok(if fixed.monotone { Leapt::Cycle(fixed) } else { Leapt::At { place: lap.from, time } });
+                let comes = fixed.monotone || fixed.missed < self.asked;
+                return Ok(if comes { Leapt::Cycle(fixed) } else { Leapt::At { place: lap.from, time } });
             }
             if self.dies_out(&lap) {
                 return Ok(Leapt::At { place: lap.from, time });
             }
             if std::env::var("DBG").is_ok() {eprintln!("  leap from {:?} {:?} {:?} jac {jacobian:?} cycles {cycles} b {}", lap.from, lap.change, lap.range, self.budget);}
-            cycles = if cycles > 0.0 { cycles } else { NEAR / speed };
+            cycles = if cycles > 0.0 { cycles } else { (3.0 * NEAR / speed).max(1.5 * WORTH) };
             let next = self.leap(&lap, jacobian, &mut cycles)?;
             let Some((leap, n)) = next else {
                 return Ok(if time > 0.0 { Leapt::At { place: lap.from, time } } else { Leapt::Nowhere });
@@ -189,29 +195,32 @@ impl Follower<'_> {
 
     /// The attracting fixed point next to a lap.
     fn fixed(&mut self, lap: &Lap, jacobian: Matrix) -> Result<Option<Fixed>, Stop> {
-        let (mut lap, mut jacobian, start) = (*lap, jacobian, lap.from);
+        let (mut lap, mut jacobian, mut missed) = (*lap, jacobian, f64::NAN);
         let mut before = NEAR;
         for _ in 0..MOST_ITERATIONS {
             let Some(step) = solve(jacobian, lap.change.map(|change| -change)) else { return Ok(None) };
             let distance = lap.distance(step);
-            // What errors of steps leave.
-            let noise = 10.0 * lap.tolerance / lap.size() * distance / lap.distance(lap.change);
+            // What errors of steps leave, and what rounding does where it stops the method.
+            let slack = distance / lap.distance(lap.change);
+            let noise = 10.0 * lap.tolerance / lap.size() * slack;
+            let ends = distance < 0.01 * self.rtol || distance < 3.0 * noise;
+            let stops = distance > before && distance < NEAR * self.asked;
             // False for NaN.
-            if !(distance < before.max(3.0 * noise)) {
+            if !(distance < before || ends || stops) {
                 return Ok(None);
             }
+            missed = if missed.is_nan() { distance } else { missed };
             let place = [lap.from[0] + step[0], lap.from[1] + step[1]];
-            let tolerance = (0.01 * self.rtol * lap.distance(lap.change) / distance).clamp(self.finest, self.tolerance);
+            let tolerance = (0.01 * self.rtol / slack).clamp(self.finest, self.tolerance.max(self.finest));
             lap = self.lap(place, tolerance * lap.size())?;
-            if distance < 0.01 * self.rtol || distance < 3.0 * noise {
-                let sure = noise < NEAR && self.linear.encloses(lap.size());
-                let multiplier = multiplier(jacobian, 10.0 * lap.tolerance / (lap.size() * NUDGE));
-                return Ok(multiplier.filter(|_| sure).map(|monotone| Fixed { lap, monotone }));
+            if ends || stops {
+                let sure = noise < NEAR && lap.size() > SMALLEST;
+                let monotone = multiplier(jacobian, 10.0 * lap.tolerance / (lap.size() * NUDGE));
+                return Ok(monotone.filter(|_| sure).map(|monotone| Fixed { lap, monotone, missed }));
             }
             before = 0.5 * distance;
             jacobian = self.derivative(&lap)?;
         }
-        let _ = start;
         Ok(None)
     }
 

@@ -3,7 +3,7 @@
 //! Cycles are followed one by one while they change fast; where they change slowly, `envelope.rs` leaps over many.
 
 use super::course::{Course, Doubts, Fate, VANISHING};
-use super::envelope::{FINEST, Fixed, Lap, Leapt, distance, size};
+use super::envelope::{FINEST, SMALLEST, Fixed, Lap, Leapt, distance, size};
 use super::orbit::{BAND, Cycle, Extremum, Orbit, Seen, Stop};
 use super::slider::{Place, Slider, State, X};
 use crate::numerics::elementary::{exp, ln};
@@ -50,6 +50,7 @@ pub(super) fn follow_once(slider: &Slider, linear: Linear, x: f64, rtol: f64, sh
     let mut follower = Follower {
         slider,
         linear,
+        asked: rtol,
         rtol: share * rtol,
         tolerance: STEP * share * rtol,
         finest: FINEST * (share / 0.3).max(1.0),
@@ -67,7 +68,8 @@ pub(super) fn follow_once(slider: &Slider, linear: Linear, x: f64, rtol: f64, sh
 pub(super) struct Follower<'a> {
     pub slider: &'a Slider,
     pub linear: Linear,
-    /// Accuracy of the numbers.
+    /// Accuracy that the numbers are asked for with, and that of this run.
+    pub asked: f64,
     pub rtol: f64,
     /// Error of a step.
     pub tolerance: f64,
@@ -100,13 +102,6 @@ impl Way<'_> {
     }
 }
 
-impl Linear {
-    /// Whether a limit cycle of this size is none of the errors of steps about sliding.
-    pub(super) fn encloses(&self, size: f64) -> bool {
-        size > 1e-7
-    }
-}
-
 impl<'a> Follower<'a> {
     fn run(&mut self, start: State) -> Result<Fate, Stop> {
         let tolerance = self.step_error(start[X].abs());
@@ -114,7 +109,6 @@ impl<'a> Follower<'a> {
             Way { orbit: Orbit::new(self.slider, start, tolerance), offset: 0.0, since: 0.0, tolerance };
         let mut before: Option<Place> = None;
         let mut pace = Pace::default();
-        let mut found: Option<Fixed> = None;
         let (mut count, mut again) = (0, 0);
         loop {
             // Follow one cycle.
@@ -146,17 +140,12 @@ impl<'a> Follower<'a> {
             if std::env::var("DBG").is_ok() {eprintln!("c {count} t {} {place:?} {change:?} {range:?} pace {pace:?} tol {} b {}", self.t, way.tolerance, self.budget);}
             // A limit cycle?
             pace.take_low(range[0]);
-            if pace.left < ARRIVED * self.rtol && size > 1e-7 && !self.may_die_out(&lap) && pace.has_arrived(self.rtol) {
+            if pace.left < ARRIVED * self.rtol && size > SMALLEST && !self.may_die_out(&lap) && pace.has_arrived(self.rtol) {
                 let [low, high] = cycle.exact_range(&mut way.orbit);
                 return Ok(Fate::Cycle { period: cycle.period, high, low });
             }
-            if let Some(Fixed { lap, .. }) = &found
-                && lap.distance([place[0] - lap.from[0], place[1] - lap.from[1]]) < self.rtol
-            {
-                return Ok(lap.limit());
-            }
             // Leap over cycles that hardly change.
-            if pace.is_slow() && found.is_none() && count >= again {
+            if pace.is_slow() && count >= again {
                 again = count + PATIENCE;
                 match self.leap_on(place, size, pace.change)? {
                     Leapt::Cycle(Fixed { lap, .. }) => return Ok(lap.limit()),
