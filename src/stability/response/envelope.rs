@@ -77,6 +77,12 @@ const MOST_ITERATIONS: u32 = 8;
 /// What an iteration leaves of its error, at least.
 const RELAPSE: f64 = 0.01;
 
+/// Most steps of a lap: ten times those of a deep slip at the finest tolerance.
+const MOST_STEPS: u32 = 3000;
+
+/// Times by which finest steps become coarser where they only follow rounding.
+const COARSER: f64 = 1e3;
+
 /// Most leaps in a row.
 const MOST_LEAPS: u32 = 200;
 
@@ -133,7 +139,16 @@ impl Follower<'_> {
     /// The cycle from a place.
     pub(super) fn lap(&mut self, from: Place, tolerance: f64) -> Result<Lap, Stop> {
         let mut orbit = Orbit::new(self.slider, self.slider.state(from), tolerance);
-        let cycle = orbit.cycle(false, &mut self.budget)?;
+        let mut budget = self.budget.min(MOST_STEPS);
+        let before = budget;
+        let cycle = orbit.cycle(false, &mut budget);
+        self.budget -= before - budget;
+        if cycle == Err(Stop::Budget) && self.budget > 0 {
+            // Steps as fine as these only follow rounding.
+            self.finest *= COARSER;
+            return Err(Stop::Faint);
+        }
+        let cycle = cycle?;
         let range = cycle.extrema.map(|seen| seen.map_or(0.0, |seen| orbit.polished(seen).x));
         let end = self.slider.place(&cycle.end);
         let change = [end[0] - from[0], end[1] - from[1]];

@@ -147,7 +147,10 @@ impl<'a> Follower<'a> {
             // Leap over cycles that hardly change.
             if pace.is_slow() && count >= again {
                 again = count + PATIENCE;
-                match self.leap_on(place, size, pace.change)? {
+                match self.leap_on(place, size, pace.change) {
+                    Err(Stop::Faint) => {}
+                    Err(stop) => return Err(stop),
+                    Ok(leapt) => match leapt {
                     Leapt::Cycle(Fixed { lap, .. }) => return Ok(lap.limit()),
                     Leapt::At { place, time } if time > 0.0 => {
                         let stays = excess(range) < 0.0;
@@ -158,6 +161,7 @@ impl<'a> Follower<'a> {
                         continue;
                     }
                     Leapt::At { .. } | Leapt::Nowhere => {}
+}
                 }
             }
             // Steps as fine as the motion asks for.
