@@ -83,6 +83,9 @@ const MOST_STEPS: u32 = 3000;
 /// Times by which finest steps become coarser where they only follow rounding.
 const COARSER: f64 = 1e3;
 
+/// Most tries of a leap.
+const MOST_TRIES: u32 = 3;
+
 /// Most leaps in a row.
 const MOST_LEAPS: u32 = 200;
 
@@ -218,22 +221,23 @@ impl Follower<'_> {
             // What errors of steps leave, and what rounding does where it stops the method.
             let slack = distance / lap.distance(lap.change);
             let noise = 10.0 * lap.tolerance / lap.size() * slack;
-            let ends = distance < 0.01 * self.rtol || distance < 3.0 * noise;
-            let stops = distance > before && distance < NEAR * self.asked;
+            let tolerance = (0.01 * self.rtol / slack).clamp(self.finest, self.tolerance.max(self.finest));
+            let fine = lap.tolerance <= 2.0 * tolerance * lap.size();
+            let ends = distance < 0.01 * self.rtol || (fine && distance < 3.0 * noise);
+            let stops = fine && distance > before && distance < NEAR * self.asked;
             // False for NaN.
             if !(distance < before || ends || stops) {
                 return Ok(None);
             }
             missed = if missed.is_nan() { distance } else { missed };
             let place = [lap.from[0] + step[0], lap.from[1] + step[1]];
-            let tolerance = (0.01 * self.rtol / slack).clamp(self.finest, self.tolerance.max(self.finest));
             lap = self.lap(place, tolerance * lap.size())?;
             if ends || stops {
                 let sure = noise < NEAR && lap.size() > SMALLEST;
                 let monotone = multiplier(jacobian, 10.0 * lap.tolerance / (lap.size() * NUDGE));
                 return Ok(monotone.filter(|_| sure).map(|monotone| Fixed { lap, monotone, missed }));
             }
-            before = 0.5 * distance;
+            before = if fine { 0.5 * distance } else { before };
             jacobian = self.derivative(&lap)?;
         }
         Ok(None)
@@ -244,11 +248,14 @@ impl Follower<'_> {
     fn leap(&mut self, lap: &Lap, jacobian: Matrix, cycles: &mut f64) -> Result<Option<(Leap, f64)>, Stop> {
         // The estimate is of order S, the error of order 2 S - 1.
         let allowed = exp(0.6 * ln(self.tolerance.max(self.finest)));
-        while *cycles > WORTH {
+        for _ in 0..MOST_TRIES {
+            if *cycles < WORTH {
+                break;
+            }
             let n = cycles.floor();
             let leap = self.stages(lap, jacobian, n)?;
-            // Newton's method may converge in half of it.
-            let error = leap.as_ref().and_then(|leap| leap.error(lap, jacobian, n)).map_or(64.0, |error| error / allowed);
+            // Newton's method may converge in a third of it.
+            let error = leap.as_ref().and_then(|leap| leap.error(lap, jacobian, n)).map_or(400.0, |error| error / allowed);
             if std::env::var("DBG").is_ok() {eprintln!("    n {n} error {error} {}", leap.is_some());}
             *cycles = n * (0.9 * exp(-ln(error.max(1e-10)) / (S + 1) as f64)).clamp(0.2, 8.0);
             if let Some(leap) = leap.filter(|_| error < 1.0) {

@@ -34,7 +34,11 @@ const FELT: f64 = 1e-3;
 const SLOW: f64 = 0.03;
 
 /// What a cycle leaves of the change of the one before if cycles come to a limit cycle fast.
-const FAST: f64 = 0.5;
+const FAST: f64 = 0.95;
+const AT_ONCE: f64 = 0.02;
+
+/// What it leaves if they change at about the same rate.
+const STEADY: std::ops::Range<f64> = 0.5..2.0;
 
 /// Cycles that are followed before the next try to leap, and after a limit cycle is found.
 const PATIENCE: u32 = 10;
@@ -145,8 +149,8 @@ impl<'a> Follower<'a> {
                 return Ok(Fate::Cycle { period: cycle.period, high, low });
             }
             // Leap over cycles that hardly change.
-            if pace.is_slow() && count >= again {
-                again = count + PATIENCE;
+            if (pace.is_slow() || pace.change < self.rtol) && count >= again {
+                again = 2 * count + PATIENCE;
                 match self.leap_on(place, size, pace.change) {
                     Err(Stop::Faint) => {}
                     Err(stop) => return Err(stop),
@@ -254,7 +258,7 @@ impl Default for Pace {
 impl Pace {
     fn take(&mut self, change: f64) {
         let share = change / self.change;
-        let largest = if share < FAST * FAST * FAST * FAST * FAST * FAST { share } else { share.max(self.shares[0]) };
+        let largest = if share < AT_ONCE { share } else { self.shares.into_iter().fold(share, f64::max) };
         // False for NaN.
         self.left = if largest < FAST { change * largest / (1.0 - largest) } else { f64::INFINITY };
         (self.change, self.shares) = (change, [share, self.shares[0]]);
@@ -274,7 +278,7 @@ impl Pace {
 
     /// Whether cycles change little, and the next one will change about as much.
     fn is_slow(&self) -> bool {
-        self.change < SLOW && self.shares.iter().all(|share| (FAST..1.0 / FAST).contains(share))
+        self.change < SLOW && self.shares.iter().all(|share| STEADY.contains(share))
     }
 }
 
