@@ -74,9 +74,6 @@ const WORTH: f64 = 20.0;
 /// Most iterations of Newton's method.
 const MOST_ITERATIONS: u32 = 8;
 
-/// What an iteration leaves of its error, at least.
-const RELAPSE: f64 = 0.01;
-
 /// Most steps of a lap: ten times those of a deep slip at the finest tolerance.
 const MOST_STEPS: u32 = 3000;
 
@@ -177,7 +174,10 @@ impl Follower<'_> {
         let (mut time, mut cycles) = (0.0, 0.0);
         for _ in 0..MOST_LEAPS {
             let speed = lap.distance(lap.change);
-            lap = self.lap(lap.from, self.lap_tolerance(lap.size(), speed))?;
+            let tolerance = self.lap_tolerance(lap.size(), speed);
+            if tolerance < 0.3 * lap.tolerance {
+                lap = self.lap(lap.from, tolerance)?;
+            }
             let jacobian = self.derivative(&lap)?;
             if let Some(fixed) = self.fixed(&lap, jacobian)? {
                 let comes = fixed.monotone || fixed.missed < self.asked;
@@ -278,39 +278,46 @@ impl Follower<'_> {
             }
         }
         let mut leap = Leap { change: [[0.0; S]; 2], laps: [*lap; S] };
-        let enough = 0.1 * self.tolerance.max(self.finest);
+        let enough = (0.1 * self.tolerance.max(self.finest)).max(n * lap.tolerance / lap.size());
+        let weights: [f64; 2 * S] = std::array::from_fn(|i| if i < S { 1.0 } else { lap.size().powi(-2) });
+        let dot_steps = |p: &[f64], q: &[f64]| (0..2 * S).map(|i| weights[i] * p[i] * q[i]).sum::<f64>();
+        let mut steps: Vec<Vec<f64>> = Vec::new();
         let mut last = f64::INFINITY;
         for _ in 0..MOST_ITERATIONS {
-            let mut right = vec![0.0; 2 * S];
+            let mut step = vec![0.0; 2 * S];
             for i in 0..S {
                 let place = [0, 1].map(|r| lap.from[r] + dot(&before[i], &leap.change[r]));
-                // The first guess is that all are alike.
-                if last.is_finite() {
+                // At first all begin where the leap does.
+                if !steps.is_empty() {
                     leap.laps[i] = self.lap(place, lap.tolerance)?;
                 }
                 for r in 0..2 {
-                    right[r * S + i] = leap.laps[i].change[r] - dot(&slopes[i], &leap.change[r]);
+                    step[r * S + i] = leap.laps[i].change[r] - dot(&slopes[i], &leap.change[r]);
                 }
             }
-            if eliminate(&mut matrix.clone(), &mut right, 2 * S).is_none() {
+            if eliminate(&mut matrix.clone(), &mut step, 2 * S).is_none() {
                 return Ok(None);
             }
-            let mut moved = 0.0f64;
-            for i in 0..S {
-                let step = [right[i], right[S + i]];
-                moved = moved.max(lap.distance(step));
-                for r in 0..2 {
-                    leap.change[r][i] += step[r];
-                }
+            // Broyden's update (Kelley, Iterative Methods for Linear and Nonlinear Equations, section 7.3).
+            for pair in steps.windows(2) {
+                let share = dot_steps(&pair[0], &step) / dot_steps(&pair[0], &pair[0]);
+                step.iter_mut().zip(&pair[1]).for_each(|(step, next)| *step += share * next);
             }
+            if let Some(last) = steps.last() {
+                let share = 1.0 - dot_steps(last, &step) / dot_steps(last, last);
+                step.iter_mut().for_each(|step| *step /= share);
+            }
+            (0..2 * S).for_each(|i| leap.change[i / S][i % S] += step[i]);
+            let moved = (0..S).map(|i| lap.distance([step[i], step[S + i]])).fold(0.0, f64::max);
             let rate = moved / last;
-            if rate > 0.0 && rate < 0.5 && moved * rate.max(RELAPSE) < enough.max(n * lap.tolerance / lap.size()) {
+            if !steps.is_empty() && rate < 0.5 && moved * rate < enough {
                 return Ok(Some(leap));
             }
             if !(moved < 0.7 * last && moved < LONGEST) {
                 return Ok(None);
             }
             last = moved;
+            steps.push(step);
         }
         Ok(None)
     }
