@@ -1,6 +1,6 @@
 //! A response followed to its end at finer and finer steps, until none of its numbers changes.
 
-use super::fate::{Linear, MOST_STEPS, follow_once};
+use super::fate::{Linear, MOST_STEPS, follow_once, step_error};
 use super::orbit::Extremum;
 use super::slider::Slider;
 
@@ -78,12 +78,13 @@ pub fn follow(slider: &Slider, linear: Linear, x: f64, rtol: f64) -> Course {
     }
     let mut course = follow_once(slider, linear, x, rtol, ACCURACIES[0]);
     let mut known = false;
-    for share in &ACCURACIES[1..] {
-        // Finer steps would be more.
-        if course.fate == Fate::Undecided && course.steps >= MOST_STEPS {
+    for shares in ACCURACIES.windows(2) {
+        let [coarse, fine] = [shares[0], shares[1]].map(|share| step_error(rtol, share));
+        // Finer steps would be more, and the same steps lead to the same.
+        if (course.fate == Fate::Undecided && course.steps >= MOST_STEPS) || fine > 0.5 * coarse {
             break;
         }
-        let finer = follow_once(slider, linear, x, rtol, *share);
+        let finer = follow_once(slider, linear, x, rtol, shares[1]);
         let doubts = course.compared(&finer, rtol.max(ROUNDED));
         course = Course { steps: course.steps + finer.steps, doubts: doubts.unwrap_or_default(), ..finer };
         // A number that is still in doubt at a third run seldom becomes clear.

@@ -186,7 +186,6 @@ impl Follower<'_> {
             if self.dies_out(&lap) {
                 return Ok(Leapt::At { place: lap.from, time });
             }
-            if std::env::var("DBG").is_ok() {eprintln!("  leap from {:?} {:?} {:?} jac {jacobian:?} cycles {cycles} b {}", lap.from, lap.change, lap.range, self.budget);}
             cycles = if cycles > 0.0 { cycles } else { (3.0 * NEAR / speed).max(1.5 * WORTH) };
             let next = self.leap(&lap, jacobian, &mut cycles)?;
             let Some((leap, n)) = next else {
@@ -256,7 +255,6 @@ impl Follower<'_> {
             let leap = self.stages(lap, jacobian, n)?;
             // Newton's method may converge in a third of it.
             let error = leap.as_ref().and_then(|leap| leap.error(lap, jacobian, n)).map_or(400.0, |error| error / allowed);
-            if std::env::var("DBG").is_ok() {eprintln!("    n {n} error {error} {}", leap.is_some());}
             *cycles = n * (0.9 * exp(-ln(error.max(1e-10)) / (S + 1) as f64)).clamp(0.2, 8.0);
             if let Some(leap) = leap.filter(|_| error < 1.0) {
                 return Ok(Some((leap, n)));

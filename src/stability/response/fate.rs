@@ -56,17 +56,22 @@ pub(super) fn follow_once(slider: &Slider, linear: Linear, x: f64, rtol: f64, sh
         linear,
         asked: rtol,
         rtol: share * rtol,
-        tolerance: STEP * share * rtol,
+        tolerance: step_error(rtol, share),
         finest: FINEST * (share / 0.3).max(1.0),
         budget: MOST_STEPS,
         extrema: [None; 2],
         vague_peak: false,
         t: 0.0,
     };
-    let fate = follower.run(slider.steady(x));if fate.is_err() && std::env::var("DBG").is_ok() {eprintln!("{fate:?} {share}");}let fate=fate.unwrap_or(Fate::Undecided);
+    let fate = follower.run(slider.steady(x)).unwrap_or(Fate::Undecided);
     let Follower { extrema: [low, high], t, budget, vague_peak, .. } = follower;
     let doubts = Doubts { t_peak: vague_peak, ..Doubts::default() };
     Course { fate, high, low, t, steps: MOST_STEPS - budget, doubts }
+}
+
+/// Error of a step that leaves this share of `rtol`; those of the first two runs always differ.
+pub(super) fn step_error(rtol: f64, share: f64) -> f64 {
+    (STEP * share * rtol).max(FINEST * (share / 0.3).max(1.0))
 }
 
 pub(super) struct Follower<'a> {
@@ -141,10 +146,9 @@ impl<'a> Follower<'a> {
                     return Ok(Fate::Settled { time });
                 }
             }
-            if std::env::var("DBG").is_ok() {eprintln!("c {count} t {} {place:?} {change:?} {range:?} pace {pace:?} tol {} b {}", self.t, way.tolerance, self.budget);}
             // A limit cycle?
             pace.take_low(range[0]);
-            if pace.left < ARRIVED * self.rtol && size > SMALLEST && !self.may_die_out(&lap) && pace.has_arrived(self.rtol) {
+            if pace.left < ARRIVED * self.asked && size > SMALLEST && !self.may_die_out(&lap) && pace.has_arrived(self.asked) {
                 let [low, high] = cycle.exact_range(&mut way.orbit);
                 return Ok(Fate::Cycle { period: cycle.period, high, low });
             }
