@@ -167,14 +167,14 @@ impl Follower<'_> {
         Ok([0, 1].map(|i| [slope(by_w[i], lap.change[i], NUDGE), slope(by_y[i], lap.change[i], step)]))
     }
 
-    /// Goes on in leaps from a place where a cycle of this size changes `q` by this distance.
-    pub(super) fn leap_on(&mut self, place: Place, size: f64, change: f64) -> Result<Leapt, Stop> {
-        let tolerance = self.lap_tolerance(size, change);
+    /// Goes on in leaps from a place where a cycle between these velocities changes `q` by this distance.
+    pub(super) fn leap_on(&mut self, place: Place, range: [f64; 2], change: f64) -> Result<Leapt, Stop> {
+        let tolerance = self.lap_tolerance(range, change);
         let mut lap = self.lap(place, tolerance)?;
         let (mut time, mut cycles) = (0.0, 0.0);
         for _ in 0..MOST_LEAPS {
             let speed = lap.distance(lap.change);
-            let tolerance = self.lap_tolerance(lap.size(), speed);
+            let tolerance = self.lap_tolerance(lap.range, speed);
             if tolerance < 0.3 * lap.tolerance {
                 lap = self.lap(lap.from, tolerance)?;
             }
@@ -204,10 +204,11 @@ impl Follower<'_> {
         Ok(Leapt::Nowhere)
     }
 
-    /// Error of the steps of a lap whose change is to be known to a part of `rtol`.
-    fn lap_tolerance(&self, size: f64, change: f64) -> f64 {
-        let asked = 0.01 * self.rtol * change;
-        size * asked.clamp(self.finest, self.tolerance.max(self.finest))
+    /// Error of the steps of a lap between these velocities of which a change is to be known to a part of `rtol`.
+    fn lap_tolerance(&self, range: [f64; 2], change: f64) -> f64 {
+        // Rounding is that of the largest logarithm.
+        let finest = self.finest * (range[1] - range[0]).max(1.0);
+        size(range) * (0.01 * self.rtol * change).clamp(finest, self.tolerance.max(finest))
     }
 
     /// The attracting fixed point next to a lap.
@@ -220,8 +221,8 @@ impl Follower<'_> {
             // What errors of steps leave, and what rounding does where it stops the method.
             let slack = distance / lap.distance(lap.change);
             let noise = 10.0 * lap.tolerance / lap.size() * slack;
-            let tolerance = (0.01 * self.rtol / slack).clamp(self.finest, self.tolerance.max(self.finest));
-            let fine = lap.tolerance <= 2.0 * tolerance * lap.size();
+            let tolerance = self.lap_tolerance(lap.range, 1.0 / slack);
+            let fine = lap.tolerance <= 2.0 * tolerance;
             let ends = distance < 0.01 * self.rtol || (fine && distance < 3.0 * noise);
             let stops = fine && distance > before && distance < NEAR * self.asked;
             // False for NaN.
@@ -230,7 +231,7 @@ impl Follower<'_> {
             }
             missed = if missed.is_nan() { distance } else { missed };
             let place = [lap.from[0] + step[0], lap.from[1] + step[1]];
-            lap = self.lap(place, tolerance * lap.size())?;
+            lap = self.lap(place, tolerance)?;
             if ends || stops {
                 let sure = noise < NEAR && lap.size() > SMALLEST;
                 let monotone = multiplier(jacobian, 10.0 * lap.tolerance / (lap.size() * NUDGE));

@@ -155,7 +155,7 @@ impl<'a> Follower<'a> {
             // Leap over cycles that hardly change.
             if (pace.is_slow() || pace.change < self.rtol) && count >= again {
                 again = 2 * count + PATIENCE;
-                match self.leap_on(place, size, pace.change) {
+                match self.leap_on(place, range, pace.change) {
                     Err(Stop::Faint) => {}
                     Err(stop) => return Err(stop),
                     Ok(leapt) => match leapt {
