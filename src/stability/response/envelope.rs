@@ -57,7 +57,7 @@ pub(super) enum Leapt {
 const S: usize = 5;
 
 /// Size of a limit cycle that is told from sliding.
-pub(super) const SMALLEST: f64 = 1e-7;
+const SMALLEST: f64 = 1e-7;
 
 /// Difference of places for the derivative of the map: the power 1/3 of the error of a lap at rtol 1e-6.
 const NUDGE: f64 = 1e-3;
@@ -233,7 +233,7 @@ impl Follower<'_> {
             let place = [lap.from[0] + step[0], lap.from[1] + step[1]];
             lap = self.lap(place, tolerance)?;
             if ends || stops {
-                let sure = noise < NEAR && lap.size() > SMALLEST;
+                let sure = noise < NEAR && lap.size() > SMALLEST && self.is_driven();
                 let monotone = multiplier(jacobian, 10.0 * lap.tolerance / (lap.size() * NUDGE));
                 return Ok(monotone.filter(|_| sure).map(|monotone| Fixed { lap, monotone, missed }));
             }
@@ -255,7 +255,8 @@ impl Follower<'_> {
             let n = cycles.floor();
             let leap = self.stages(lap, jacobian, n)?;
             // Newton's method may converge in a third of it.
-            let error = leap.as_ref().and_then(|leap| leap.error(lap, jacobian, n)).map_or(400.0, |error| error / allowed);
+            let error =
+                leap.as_ref().and_then(|leap| leap.error(lap, jacobian, n)).map_or(400.0, |error| error / allowed);
             *cycles = n * (0.9 * exp(-ln(error.max(1e-10)) / (S + 1) as f64)).clamp(0.2, 8.0);
             if let Some(leap) = leap.filter(|_| error < 1.0) {
                 return Ok(Some((leap, n)));

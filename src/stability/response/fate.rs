@@ -3,7 +3,7 @@
 //! Cycles are followed one by one while they change fast; where they change slowly, `envelope.rs` leaps over many.
 
 use super::course::{Course, Doubts, Fate, VANISHING};
-use super::envelope::{FINEST, SMALLEST, Fixed, Lap, Leapt, distance, size};
+use super::envelope::{FINEST, Fixed, Lap, Leapt, distance, size};
 use super::orbit::{BAND, Cycle, Extremum, Orbit, Seen, Stop};
 use super::slider::{Place, Slider, State, X};
 use crate::numerics::elementary::{exp, ln};
@@ -42,6 +42,9 @@ const STEADY: std::ops::Range<f64> = 0.5..2.0;
 
 /// Cycles that are followed before the next try to leap, and after a limit cycle is found.
 const PATIENCE: u32 = 10;
+
+/// Share of the first of a row of changes that the last one is at most.
+const FAR: f64 = 0.01;
 
 /// Share of `rtol` by which a limit cycle may still be missed.
 const ARRIVED: f64 = 0.03;
@@ -101,6 +104,9 @@ struct Way<'a> {
     since: f64,
     /// Error of its steps.
     tolerance: f64,
+    /// Where the last cycle ended.
+    place: Option<Place>,
+    pace: Pace,
 }
 
 impl Way<'_> {
@@ -113,78 +119,88 @@ impl Way<'_> {
 
 impl<'a> Follower<'a> {
     fn run(&mut self, start: State) -> Result<Fate, Stop> {
-        let tolerance = self.step_error(start[X].abs());
-        let mut way =
-            Way { orbit: Orbit::new(self.slider, start, tolerance), offset: 0.0, since: 0.0, tolerance };
-        let mut before: Option<Place> = None;
-        let mut pace = Pace::default();
+        let mut way = self.way(start, start[X].abs(), 0.0, 0.0);
+        // Cycles so far, and after how many to try the next leap.
         let (mut count, mut again) = (0, 0);
         loop {
             // Follow one cycle.
-            let cycle = way.orbit.cycle(self.linear.stable, &mut self.budget);
-            self.t = way.offset + way.orbit.t();
-            let Ok(cycle) = cycle else {
-                let extrema = way.orbit.extrema();
-                self.note(&mut way, extrema);
-                let stop = cycle.expect_err("is none");
-                let settled = if stop == Stop::Quiet { way.settled_at() } else { None };
-                return settled.map(|time| Fate::Settled { time }).ok_or(stop);
-            };
-            self.note(&mut way, cycle.extrema);
-            let place = self.slider.place(&cycle.end);
-            let Some(last) = before.replace(place).filter(|last| (place[0] - last[0]).is_finite()) else { continue };
-            let range = cycle.range();
-            let size = size(range);
-            let change = [place[0] - last[0], place[1] - last[1]];
-            count += 1;
-            pace.take(distance(change, size));
-
-            // Steady sliding?
-            let lap = Lap { from: last, change, period: cycle.period, range, tolerance: way.tolerance };
-            if self.dies_out(&lap) || (self.may_die_out(&lap) && self.dies_out_exactly(&lap)?) {
-                if let Some(time) = way.settled_at() {
-                    return Ok(Fate::Settled { time });
+            let cycle = match self.cycle(&mut way) {
+                Err(Stop::Quiet) => {
+                    return way.settled_at().map(|time| Fate::Settled { time }).ok_or(Stop::Quiet);
                 }
+                cycle => cycle?,
+            };
+            let Some(lap) = self.compare(&mut way, &cycle) else { continue };
+            let size = lap.size();
+            count += 1;
+            // Steady sliding?
+            if self.may_die_out(&lap)
+                && (self.dies_out(&lap) || self.dies_out_exactly(&lap)?)
+                && let Some(time) = way.settled_at()
+            {
+                return Ok(Fate::Settled { time });
             }
-            // A limit cycle?
-            pace.take_low(range[0]);
-            if pace.left < ARRIVED * self.asked && size > SMALLEST && !self.may_die_out(&lap) && pace.has_arrived(self.asked) {
+            // A limit cycle? Small cycles may only have stopped to change fast: Newton's method finds those.
+            if size >= 1.0 && self.is_driven() && way.pace.has_arrived(self.asked) {
                 let [low, high] = cycle.exact_range(&mut way.orbit);
                 return Ok(Fate::Cycle { period: cycle.period, high, low });
             }
             // Leap over cycles that hardly change.
-            if (pace.is_slow() || pace.change < self.rtol) && count >= again {
+            let end = way.offset + cycle.t;
+            if (way.pace.is_slow() || way.pace.change < self.rtol) && count >= again {
                 again = 2 * count + PATIENCE;
-                match self.leap_on(place, range, pace.change) {
-                    Err(Stop::Faint) => {}
-                    Err(stop) => return Err(stop),
-                    Ok(leapt) => match leapt {
-                    Leapt::Cycle(Fixed { lap, .. }) => return Ok(lap.limit()),
-                    Leapt::At { place, time } if time > 0.0 => {
-                        let stays = excess(range) < 0.0;
-                        let since = if stays { way.settled_at().unwrap_or(f64::NAN) } else { f64::NAN };
-                        let offset = way.offset + cycle.t + time;
-                        way = self.restart(place, size, offset, since);
-                        (before, pace) = (Some(place), Pace::default());
+                match self.leap_on(self.slider.place(&cycle.end), lap.range, way.pace.change) {
+                    Ok(Leapt::Cycle(Fixed { lap, .. })) => return Ok(lap.limit()),
+                    Ok(Leapt::At { place, time }) if time > 0.0 => {
+                        let since = way.settled_at().filter(|_| excess(lap.range) < 0.0);
+                        let pace = Pace::default();
+                        way = self.way(self.slider.state(place), size, end + time, since.unwrap_or(f64::NAN));
+                        (way.place, way.pace) = (Some(place), pace);
                         continue;
                     }
-                    Leapt::At { .. } | Leapt::Nowhere => {}
-}
+                    Ok(_) | Err(Stop::Faint) => {}
+                    Err(stop) => return Err(stop),
                 }
             }
             // Steps as fine as the motion asks for.
             let asked = self.step_error(size);
-            if !self.linear.stable && asked < 0.1 * way.tolerance || asked > 100.0 * way.tolerance {
+            if (!self.linear.stable && asked < 0.1 * way.tolerance) || asked > 100.0 * way.tolerance {
                 let since = way.settled_at().unwrap_or(f64::NAN);
-                way = self.restart(place, size, way.offset + cycle.t, since);
+                way = Way { place: way.place, pace: way.pace, ..self.way(cycle.end, size, end, since) };
             }
         }
     }
 
-    /// Goes on from a place on the section.
-    fn restart(&self, place: Place, size: f64, offset: f64, since: f64) -> Way<'a> {
+    /// The next cycle; its extrema are kept.
+    fn cycle(&mut self, way: &mut Way<'_>) -> Result<Cycle, Stop> {
+        let cycle = way.orbit.cycle(self.linear.stable, &mut self.budget);
+        self.t = way.offset + way.orbit.t();
+        let extrema = cycle.as_ref().map_or_else(|_| way.orbit.extrema(), |cycle| cycle.extrema);
+        self.note(way, extrema);
+        cycle
+    }
+
+    /// A cycle compared with where it began; `None` for the first one, and for rounding at rest.
+    fn compare(&self, way: &mut Way<'_>, cycle: &Cycle) -> Option<Lap> {
+        let place = self.slider.place(&cycle.end);
+        let from = way.place.replace(place)?;
+        let change = [place[0] - from[0], place[1] - from[1]];
+        let range = cycle.range();
+        way.pace.take(distance(change, size(range)), range[0]);
+        let lap = Lap { from, change, period: cycle.period, range, tolerance: way.tolerance };
+        change[0].is_finite().then_some(lap)
+    }
+
+    /// Whether there may be a limit cycle: friction weakens with velocity, and inertia limits what grows.
+    pub(super) fn is_driven(&self) -> bool {
+        self.slider.b > self.slider.a && self.slider.inertia > 0.0
+    }
+
+    /// A way on from a state, with a motion of this size.
+    fn way(&self, state: State, size: f64, offset: f64, since: f64) -> Way<'a> {
         let tolerance = self.step_error(size);
-        Way { orbit: Orbit::new(self.slider, self.slider.state(place), tolerance), offset, since, tolerance }
+        let orbit = Orbit::new(self.slider, state, tolerance);
+        Way { orbit, offset, since, tolerance, place: None, pace: Pace::default() }
     }
 
     /// Error of a step in a motion of this size.
@@ -245,39 +261,46 @@ struct Pace {
     change: f64,
     /// Shares that a change left of the one before, the last two.
     shares: [f64; 2],
-    /// Estimate of all changes to come: those of a geometric series.
-    left: f64,
-    /// The slowest moment, and its changes to come.
+    /// The change from which on all have become less.
+    first: f64,
+    /// The slowest moment, and its change.
     low: f64,
     lower: f64,
+    /// Cycles since the section has arrived.
     lingers: u32,
 }
 
 impl Default for Pace {
     fn default() -> Pace {
-        Pace { change: f64::NAN, shares: [f64::NAN; 2], left: f64::INFINITY, low: f64::NAN, lower: f64::NAN, lingers: 0 }
+        let unknown = f64::NAN;
+        Pace { change: unknown, shares: [unknown; 2], first: unknown, low: unknown, lower: unknown, lingers: 0 }
     }
 }
 
 impl Pace {
-    fn take(&mut self, change: f64) {
+    /// Takes in the change of the section over a cycle, and its slowest moment.
+    fn take(&mut self, change: f64, low: f64) {
         let share = change / self.change;
-        let largest = if share < AT_ONCE { share } else { self.shares.into_iter().fold(share, f64::max) };
-        // False for NaN.
-        self.left = if largest < FAST { change * largest / (1.0 - largest) } else { f64::INFINITY };
+        if share < FAST {
+            self.first = self.first.max(self.change);
+        } else {
+            self.first = f64::NAN;
+        }
         (self.change, self.shares) = (change, [share, self.shares[0]]);
+        (self.low, self.lower) = (low, (low - self.low).abs());
     }
 
-    /// Takes in the slowest moment.
-    fn take_low(&mut self, low: f64) {
-        self.lower = (low - self.low).abs() * self.shares[0].max(0.01);
-        self.low = low;
-    }
-
-    /// Whether the slowest moment changes no more, which may magnify changes of the section; or errors of steps keep it from that.
+    /// Whether all changes to come, a geometric series, are less than a part of `rtol`, and those of the slowest moment, which
+    /// may magnify them, unless errors of steps keep it from that. A row of changes from far away shows that they are no errors.
     fn has_arrived(&mut self, rtol: f64) -> bool {
-        self.lingers += 1;
-        self.lower < ARRIVED * rtol || self.low < VANISHING || self.lingers > PATIENCE
+        let [share, before] = self.shares;
+        let largest = if share < AT_ONCE { share } else { share.max(before) };
+        let left = largest / (1.0 - largest);
+        // False for NaN.
+        let arrived = self.change < FAR * self.first && largest < FAST && self.change * left < ARRIVED * rtol;
+        self.lingers += u32::from(arrived);
+        let lower = self.lower * left.max(0.01);
+        arrived && (lower < ARRIVED * rtol || self.low < VANISHING || self.lingers > PATIENCE)
     }
 
     /// Whether cycles change little, and the next one will change about as much.

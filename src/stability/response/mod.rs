@@ -170,9 +170,11 @@ impl Response {
     fn new(course: &Course, v_f: f64, rtol: f64) -> Option<Response> {
         let velocity = |x: f64| v_f * exp(x);
         let (outcome, settling_time, cycle) = match course.fate {
-            Fate::Settled { time } => {
-                (Outcome::Settled, Some(time / v_f).filter(|time| !course.doubts.settling_time && time.is_finite()), None)
-            }
+            Fate::Settled { time } => (
+                Outcome::Settled,
+                Some(time / v_f).filter(|time| !course.doubts.settling_time && time.is_finite()),
+                None,
+            ),
             Fate::Cycle { period, high, low } => (Outcome::LimitCycle, None, Some((period, high, low))),
             Fate::Undecided => (Outcome::Undecided, None, None),
             Fate::Ends => return None,

@@ -208,12 +208,8 @@ impl<'a> Orbit<'a> {
     fn close(&mut self, leg: &Leg, u: f64) -> Cycle {
         let (end, t, part) = self.exactly(leg, u, 0.0);
         let time = part.map_or(u * leg.h(), |part| part.h());
-        let cycle = Cycle {
-            end: [end[Z], end[Y], 0.0],
-            t,
-            period: self.elapsed + time,
-            extrema: [self.low, self.high],
-        };
+        let cycle =
+            Cycle { end: [end[Z], end[Y], 0.0], t, period: self.elapsed + time, extrema: [self.low, self.high] };
         // The whole step will be added.
         self.elapsed = -time;
         cycle
