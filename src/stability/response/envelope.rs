@@ -92,7 +92,7 @@ const LONGEST: f64 = 2.0;
 type Matrix = [[f64; 2]; 2];
 
 struct Leap {
-    /// Changes of `ln z` and `y` at the nodes.
+    /// Changes of `w` and of `y` relative to `e^w` at the nodes.
     change: [[f64; S]; 2],
     laps: [Lap; S],
 }
@@ -101,6 +101,20 @@ struct Leap {
 fn basis(u: f64) -> [f64; S] {
     let powers = &radau_iia_9().powers;
     std::array::from_fn(|j| (0..S).rev().fold(0.0, |sum, k| (sum + powers[k][j]) * u))
+}
+
+/// A place with `y` relative to `e^w`, which small motions keep, in units of that at the start of a leap.
+fn relative([w, y]: Place, start: &Lap) -> Place {
+    [w, y * exp(start.from[0] - w)]
+}
+
+/// The place that is so.
+fn absolute([w, y]: Place, start: &Lap) -> Place {
+    [w, y * exp(w - start.from[0])]
+}
+
+fn sum([w, y]: Place, [by_w, by_y]: Place) -> Place {
+    [w + by_w, y + by_y]
 }
 
 fn dot(weights: &[f64; S], values: &[f64; S]) -> f64 {
@@ -115,6 +129,20 @@ fn solve(matrix: Matrix, right: Place) -> Option<Place> {
 }
 
 impl Lap {
+    /// Its change relative to `e^w`.
+    fn relative(&self, start: &Lap) -> Place {
+        let [from, to] = [self.from, sum(self.from, self.change)].map(|place| relative(place, start));
+        [self.change[0], to[1] - from[1]]
+    }
+
+    /// The derivative of that at its start, from that of `g`.
+    fn relative_derivative(&self, [[ww, wy], [yw, yy]]: Matrix) -> Matrix {
+        let (y, share, end) = (self.from[1], exp(-self.change[0]), self.from[1] + self.change[1]);
+        // Of the place where it ends, by w and y, then at a fixed share of y in e^w.
+        let [to_w, to_y] = [[1.0 + ww, wy], [share * (yw - end * (1.0 + ww)), share * (1.0 + yy - end * wy)]];
+        [[to_w[0] + y * to_w[1] - 1.0, to_w[1]], [to_y[0] + y * to_y[1], to_y[1] - 1.0]]
+    }
+
     /// How large the motion is, in `ln v`.
     pub fn size(&self) -> f64 {
         size(self.range)
@@ -187,7 +215,7 @@ impl Follower<'_> {
                 return Ok(Leapt::At { place: lap.from, time });
             }
             cycles = if cycles > 0.0 { cycles } else { (3.0 * NEAR / speed).max(1.5 * WORTH) };
-            let next = self.leap(&lap, jacobian, &mut cycles)?;
+            let next = self.leap(&lap, lap.relative_derivative(jacobian), &mut cycles)?;
             let Some((leap, n)) = next else {
                 return Ok(if time > 0.0 { Leapt::At { place: lap.from, time } } else { Leapt::Nowhere });
             };
@@ -286,13 +314,14 @@ impl Follower<'_> {
         for _ in 0..MOST_ITERATIONS {
             let mut step = vec![0.0; 2 * S];
             for i in 0..S {
-                let place = [0, 1].map(|r| lap.from[r] + dot(&before[i], &leap.change[r]));
+                let place = absolute(sum(lap.from, [0, 1].map(|r| dot(&before[i], &leap.change[r]))), lap);
                 // At first all begin where the leap does.
                 if !steps.is_empty() {
                     leap.laps[i] = self.lap(place, lap.tolerance)?;
                 }
+                let change = leap.laps[i].relative(lap);
                 for r in 0..2 {
-                    step[r * S + i] = leap.laps[i].change[r] - dot(&slopes[i], &leap.change[r]);
+                    step[r * S + i] = change[r] - dot(&slopes[i], &leap.change[r]);
                 }
             }
             if eliminate(&mut matrix.clone(), &mut step, 2 * S).is_none() {
@@ -358,7 +387,7 @@ impl Leap {
     /// The place at a share of it.
     fn place(&self, lap: &Lap, u: f64) -> Place {
         let basis = basis(u);
-        [0, 1].map(|r| lap.from[r] + dot(&basis, &self.change[r]))
+        absolute(sum(lap.from, [0, 1].map(|r| dot(&basis, &self.change[r]))), lap)
     }
 
     /// Time of the first `j` of its `n` cycles.
@@ -371,7 +400,8 @@ impl Leap {
     /// Its error: the defect of the first cycle, which is no node, as for a step of Radau IIA.
     fn error(&self, lap: &Lap, jacobian: Matrix, n: f64) -> Option<f64> {
         let first = basis(1.0 / n);
-        let defect = [0, 1].map(|r| lap.change[r] - dot(&first, &self.change[r]));
+        let change = lap.relative(lap);
+        let defect = [0, 1].map(|r| change[r] - dot(&first, &self.change[r]));
         let rate = (S + 1) as f64 / n;
         let matrix = [0, 1].map(|r| [0, 1].map(|c| if r == c { rate } else { 0.0 } - jacobian[r][c]));
         solve(matrix, defect).map(|error| lap.distance(error))
