@@ -72,7 +72,7 @@ const NEAR: f64 = 0.1;
 const WORTH: f64 = 20.0;
 
 /// Most iterations of Newton's method.
-const MOST_ITERATIONS: u32 = 8;
+const MOST_ITERATIONS: u32 = 16;
 
 /// Most steps of a lap: ten times those of a deep slip at the finest tolerance.
 const MOST_STEPS: u32 = 3000;
@@ -285,7 +285,7 @@ impl Follower<'_> {
             // Newton's method may converge in a third of it.
             let error =
                 leap.as_ref().and_then(|leap| leap.error(lap, jacobian, n)).map_or(400.0, |error| error / allowed);
-            *cycles = n * (0.9 * exp(-ln(error.max(1e-10)) / (S + 1) as f64)).clamp(0.2, 8.0);
+            *cycles = n * (0.9 * exp(-ln(error.max(1e-10)) / (S + 1) as f64)).clamp(0.2, 4.0);
             if let Some(leap) = leap.filter(|_| error < 1.0) {
                 return Ok(Some((leap, n)));
             }
