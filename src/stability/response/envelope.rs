@@ -135,14 +135,6 @@ impl Lap {
         [self.change[0], to[1] - from[1]]
     }
 
-    /// The derivative of that at its start, from that of `g`.
-    fn relative_derivative(&self, [[ww, wy], [yw, yy]]: Matrix) -> Matrix {
-        let (y, share, end) = (self.from[1], exp(-self.change[0]), self.from[1] + self.change[1]);
-        // Of the place where it ends, by w and y, then at a fixed share of y in e^w.
-        let [to_w, to_y] = [[1.0 + ww, wy], [share * (yw - end * (1.0 + ww)), share * (1.0 + yy - end * wy)]];
-        [[to_w[0] + y * to_w[1] - 1.0, to_w[1]], [to_y[0] + y * to_y[1], to_y[1] - 1.0]]
-    }
-
     /// How large the motion is, in `ln v`.
     pub fn size(&self) -> f64 {
         size(self.range)
@@ -186,13 +178,16 @@ impl Follower<'_> {
         Ok(Lap { from, change, period: cycle.period, range, tolerance })
     }
 
-    /// Derivative of `g` at the start of a lap.
+    /// Derivative of `g` at the start of a lap, with `y` relative to `e^w`: nudging `w` then moves along small motions.
     fn derivative(&mut self, lap: &Lap) -> Result<Matrix, Stop> {
-        let ([w, y], step) = (lap.from, NUDGE * lap.size());
-        let by_w = self.lap([w + NUDGE, y], lap.tolerance)?.change;
-        let by_y = self.lap([w, y + step], lap.tolerance)?.change;
-        let slope = |moved: f64, here: f64, step: f64| (moved - here) / step;
-        Ok([0, 1].map(|i| [slope(by_w[i], lap.change[i], NUDGE), slope(by_y[i], lap.change[i], step)]))
+        let nudges = [[NUDGE, 0.0], [0.0, NUDGE * lap.size()]];
+        let here = lap.relative(lap);
+        let mut slopes = [[0.0; 2]; 2];
+        for (c, nudge) in nudges.into_iter().enumerate() {
+            let moved = self.lap(absolute(sum(lap.from, nudge), lap), lap.tolerance)?.relative(lap);
+            (0..2).for_each(|r| slopes[r][c] = (moved[r] - here[r]) / nudge[c]);
+        }
+        Ok(slopes)
     }
 
     /// Goes on in leaps from a place where a cycle between these velocities changes `q` by this distance.
@@ -215,7 +210,7 @@ impl Follower<'_> {
                 return Ok(Leapt::At { place: lap.from, time });
             }
             cycles = if cycles > 0.0 { cycles } else { (3.0 * NEAR / speed).max(1.5 * WORTH) };
-            let next = self.leap(&lap, lap.relative_derivative(jacobian), &mut cycles)?;
+            let next = self.leap(&lap, jacobian, &mut cycles)?;
             let Some((leap, n)) = next else {
                 return Ok(if time > 0.0 { Leapt::At { place: lap.from, time } } else { Leapt::Nowhere });
             };
@@ -244,7 +239,7 @@ impl Follower<'_> {
         let (mut lap, mut jacobian, mut missed) = (*lap, jacobian, f64::NAN);
         let mut before = NEAR;
         for _ in 0..MOST_ITERATIONS {
-            let Some(step) = solve(jacobian, lap.change.map(|change| -change)) else { return Ok(None) };
+            let Some(step) = solve(jacobian, lap.relative(&lap).map(|change| -change)) else { return Ok(None) };
             let distance = lap.distance(step);
             // What errors of steps leave, and what rounding does where it stops the method.
             let slack = distance / lap.distance(lap.change);
@@ -258,8 +253,7 @@ impl Follower<'_> {
                 return Ok(None);
             }
             missed = if missed.is_nan() { distance } else { missed };
-            let place = [lap.from[0] + step[0], lap.from[1] + step[1]];
-            lap = self.lap(place, tolerance)?;
+            lap = self.lap(absolute(sum(lap.from, step), &lap), tolerance)?;
             if ends || stops {
                 let sure = noise < NEAR && lap.size() > SMALLEST && self.is_driven();
                 let monotone = multiplier(jacobian, 10.0 * lap.tolerance / (lap.size() * NUDGE));
