@@ -60,7 +60,7 @@ const S: usize = 5;
 const SMALLEST: f64 = 1e-7;
 
 /// Difference of places for the derivative of the map: the power 1/3 of the error of a lap at rtol 1e-6.
-const NUDGE: f64 = 1e-3;
+pub(super) const NUDGE: f64 = 1e-3;
 
 /// Least error of a step. Its rounding, 50 units in the last place.
 pub(super) const FINEST: f64 = 1e-14;

@@ -3,7 +3,7 @@
 //! Cycles are followed one by one while they change fast; where they change slowly, `envelope.rs` leaps over many.
 
 use super::course::{Course, Doubts, Fate, VANISHING};
-use super::envelope::{FINEST, Fixed, Lap, Leapt, distance, size};
+use super::envelope::{FINEST, NUDGE, Fixed, Lap, Leapt, distance, size};
 use super::orbit::{BAND, Cycle, Extremum, Orbit, Seen, Stop};
 use super::slider::{Place, Slider, State, X};
 use crate::numerics::elementary::{exp, ln};
@@ -141,7 +141,7 @@ impl<'a> Follower<'a> {
                 return Ok(Fate::Settled { time });
             }
             // A limit cycle? Small cycles may only have stopped to change fast: Newton's method finds those.
-            if size >= 1.0 && self.is_driven() && way.pace.has_arrived(self.asked) {
+            if size >= 1.0 && self.is_driven() && way.pace.has_arrived(self.asked) && self.attracts(&lap)? {
                 let [low, high] = cycle.exact_range(&mut way.orbit);
                 return Ok(Fate::Cycle { period: cycle.period, high, low });
             }
@@ -201,6 +201,12 @@ impl<'a> Follower<'a> {
         let tolerance = self.step_error(size);
         let orbit = Orbit::new(self.slider, state, tolerance);
         Way { orbit, offset, since, tolerance, place: None, pace: Pace::default() }
+    }
+
+    /// Whether a cycle that begins beside this one comes to it: that one changes little does not show that.
+    fn attracts(&mut self, lap: &Lap) -> Result<bool, Stop> {
+        let beside = self.lap([lap.from[0] + NUDGE, lap.from[1]], lap.tolerance)?;
+        Ok((1.0 + (beside.change[0] - lap.change[0]) / NUDGE).abs() < FAST)
     }
 
     /// Error of a step in a motion of this size.
