@@ -605,7 +605,7 @@ fn regress_limit_cycles_that_errors_of_steps_drive_off() {
 /// Swings of heavy blocks die out or end on a small limit cycle, however close to the critical stiffness.
 #[test]
 fn reference_heavy_blocks_next_to_the_critical_stiffness() {
-    let (law, mass, rtol) = (Law { a: 0.01, b: 0.02 }, 100.0, 1e-5);
+    let (law, mass, rtol) = (Law { a: 0.01, b: 0.02 }, 1.0, 1e-5);
     let critical = SteadySliding::new(law, 1.0, mass, 1.0).critical_stiffness();
     for share in [1e-6, 1e-4] {
         for x in [-3.0, 0.5, 4.0_f64] {

@@ -3,7 +3,7 @@
 //! Cycles are followed one by one while they change fast; where they change slowly, `envelope.rs` leaps over many.
 
 use super::course::{Course, Doubts, Fate, VANISHING};
-use super::envelope::{FINEST, NUDGE, Fixed, Lap, Leapt, distance, size};
+use super::envelope::{FINEST, Fixed, Lap, Leapt, NUDGE, distance, size};
 use super::orbit::{BAND, Cycle, Extremum, Orbit, Seen, Stop};
 use super::slider::{Place, Slider, State, X};
 use crate::numerics::elementary::{exp, ln};
