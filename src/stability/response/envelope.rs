@@ -59,6 +59,9 @@ const S: usize = 5;
 /// Size of a limit cycle that is told from sliding.
 const SMALLEST: f64 = 1e-7;
 
+/// Error of the slowest moment of a limit cycle beyond which it is unknown, in units of `rtol`. Chosen: two runs then still tell it.
+const TROUGH: f64 = 0.3;
+
 /// Difference of places for the derivative of the map: the power 1/3 of the error of a lap at rtol 1e-6.
 pub(super) const NUDGE: f64 = 1e-3;
 
@@ -238,13 +241,15 @@ impl Follower<'_> {
     fn fixed(&mut self, lap: &Lap, jacobian: Matrix) -> Result<Option<Fixed>, Stop> {
         let (mut lap, mut jacobian, mut missed) = (*lap, jacobian, f64::NAN);
         let mut before = NEAR;
+        // Whether steps are the finest, since the slowest moment magnifies their errors.
+        let mut is_exact = false;
         for _ in 0..MOST_ITERATIONS {
             let Some(step) = solve(jacobian, lap.relative(&lap).map(|change| -change)) else { return Ok(None) };
             let distance = lap.distance(step);
             // What errors of steps leave, and what rounding does where it stops the method.
             let slack = distance / lap.distance(lap.change);
             let noise = 10.0 * lap.tolerance / lap.size() * slack;
-            let tolerance = self.lap_tolerance(lap.range, 1.0 / slack);
+            let tolerance = self.lap_tolerance(lap.range, if is_exact { 0.0 } else { 1.0 / slack });
             let fine = lap.tolerance <= 2.0 * tolerance;
             let ends = distance < 0.01 * self.rtol || (fine && distance < 3.0 * noise);
             let stops = fine && distance > before && distance < NEAR * self.asked;
@@ -253,8 +258,20 @@ impl Follower<'_> {
                 return Ok(None);
             }
             missed = if missed.is_nan() { distance } else { missed };
+            let trough = lap.range[0];
             lap = self.lap(absolute(sum(lap.from, step), &lap), tolerance)?;
             if ends || stops {
+                // A part of the last change is left, and so is what errors of steps make of it.
+                let left = (lap.range[0] - trough).abs() * (0.01 + 0.1 * noise / distance);
+                if left > TROUGH * self.asked && !is_exact {
+                    is_exact = true;
+                    lap = self.lap(lap.from, self.lap_tolerance(lap.range, 0.0))?;
+                    before = NEAR;
+                    continue;
+                }
+                if left > TROUGH * self.asked {
+                    lap.range[0] = f64::NAN;
+                }
                 let sure = noise < NEAR && lap.size() > SMALLEST && self.is_driven();
                 let monotone = multiplier(jacobian, 10.0 * lap.tolerance / (lap.size() * NUDGE));
                 return Ok(monotone.filter(|_| sure).map(|monotone| Fixed { lap, monotone, missed }));

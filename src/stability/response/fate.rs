@@ -141,7 +141,7 @@ impl<'a> Follower<'a> {
                 return Ok(Fate::Settled { time });
             }
             // A limit cycle? Small cycles may only have stopped to change fast: Newton's method finds those.
-            if size >= 1.0 && self.is_driven() && way.pace.has_arrived(self.asked) && self.attracts(&lap)? {
+            if size >= 1.0 && self.is_driven() && way.pace.has_arrived(self.rtol) && self.attracts(&lap)? {
                 let [low, high] = cycle.exact_range(&mut way.orbit);
                 return Ok(Fate::Cycle { period: cycle.period, high, low });
             }
