@@ -105,8 +105,7 @@ mod tests {
         }
     }
 
-    /// Change of `ln A` over a small cycle at the critical stiffness, divided by `(pi/2) A^2`, from the energy that friction
-    /// takes; the contact lifetime has relaxed for some cycles.
+    /// Change of `ln A` over a small cycle at the critical stiffness, divided by `(pi/2) A^2`; the contact lifetime has relaxed for some cycles.
     fn followed(law: Law, inertia: f64, z: f64) -> f64 {
         let Law { a, b } = law;
         let slider = Slider { a, b, inertia, k: (b - a) * (1.0 + inertia / a) };
@@ -117,7 +116,7 @@ mod tests {
             before = orbit.cycle(false, &mut budget).expect("goes on").end[Z];
         }
         let cycle = orbit.cycle(false, &mut budget).expect("goes on");
-        let change = -cycle.loss[0] * slider.k / (before * before);
+        let change = (cycle.end[Z] / before).ln();
         let [low, high] = cycle.extrema.map(|seen| orbit.polished(seen.expect("oscillates")).x);
         let amplitude = 0.5 * (high - low);
         change / (0.5 * std::f64::consts::PI * amplitude * amplitude)

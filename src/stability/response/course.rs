@@ -1,16 +1,15 @@
-//! A response followed to its end as finely as its numbers ask for: at finer and finer steps, until none of them moves.
+//! A response followed to its end at finer and finer steps, until none of its numbers changes.
 
-use super::fate::{Linear, MOST_STEPS, follow_once};
-use super::orbit::{Extremum, quiet};
+use super::fate::{Linear, MOST_STEPS, follow_once, step_error};
+use super::orbit::Extremum;
 use super::slider::Slider;
-use super::{averaging, massless, strengthening};
 
 /// The end of a response.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Fate {
     /// Steady sliding.
     Settled {
-        /// Time after which the velocity stays within [`SETTLED`](super::SETTLED), in `l/v_f`.
+        /// Time after which the velocity stays within [`SETTLED`](super::SETTLED), in `l/v_f`; NaN if unknown.
         time: f64,
     },
     /// A limit cycle.
@@ -33,7 +32,7 @@ pub enum Fate {
 pub struct Course {
     /// Its end.
     pub fate: Fate,
-    /// Its fastest moment since `v = v_f` was first met, if there was one.
+    /// Its fastest moment since `v = v_f` was first met, if there was one; its time is NaN if unknown.
     pub high: Option<Extremum>,
     /// Its slowest.
     pub low: Option<Extremum>,
@@ -41,7 +40,7 @@ pub struct Course {
     pub t: f64,
     /// Steps taken.
     pub steps: u32,
-    /// What of it is not known.
+    /// Numbers that two accuracies do not agree on.
     pub doubts: Doubts,
 }
 
@@ -59,70 +58,36 @@ pub struct Doubts {
     pub settling_time: bool,
 }
 
-/// Accuracy, in units of what is asked for, with which a response is first followed, and share of it that is taken each
-/// time after that: a change by `rtol` from one time to the next then leaves an error of a tenth of that.
-pub(super) const COARSE: f64 = 3.0;
-pub(super) const FINER: f64 = 0.1;
+/// Accuracies of the runs, in units of `rtol`. A change by `rtol` from one run to the next leaves an error of a tenth of that.
+const ACCURACIES: [f64; 4] = [3.0, 0.3, 0.03, 0.003];
 
-/// What a trough may make of the errors of the finest steps but one: below it nothing would be told.
+/// Least change of a logarithm between two runs that tells them apart. Rounding of a state of size 1 in 1e4 steps.
 const ROUNDED: f64 = 1e-11;
 
-/// Times that a response is followed more finely.
-const MOST_TIMES: u32 = 3;
-
-/// Logarithm of a velocity that is 0 in doubles, whatever its unit.
+/// `ln(v/v_f)` whose velocity is 0 in doubles, whatever its unit.
 pub(super) const VANISHING: f64 = -1000.0;
 
 /// Follows the response that starts from steady sliding at `e^x v_f`, `x` not 0, with numbers good to `rtol`: at finer and
-/// finer steps, until nothing changes by more than that from one time to the next. Where that does not happen it is
-/// `Undecided`, or in doubt in what little else hangs on.
-///
-/// A start closer than 1e-4 to sliding that is unstable is moved out to there or, by whole cycles, to below 1e-3: what
-/// grows from it has the same shape, but comes later, so that the times of its extrema are NaN.
-///
-/// A block whose swings friction hardly changes is not simulated, nor is one without mass whose velocity becomes infinite. What
-/// comes to rest without fail, but not within the work allowed, is told as far as the first swings do.
+/// finer steps, until nothing changes by more than that from one run to the next. Where that does not happen it is
+/// `Undecided`, or in doubt in the numbers that change.
 pub fn follow(slider: &Slider, linear: Linear, x: f64, rtol: f64) -> Course {
-    if let Some(course) = massless::end(slider, linear) {
-        return course;
-    }
-    let course = follow_to_the_end(slider, linear, x, rtol);
-    if course.fate != Fate::Undecided {
-        return course;
-    }
-    let told = strengthening::course(slider, x, rtol).or_else(|| massless::course(slider, linear, x, rtol));
-    told.map_or(course, |told| Course { steps: course.steps + told.steps, ..told })
-}
-
-/// The same without what the first swings tell.
-fn follow_to_the_end(slider: &Slider, linear: Linear, x: f64, rtol: f64) -> Course {
-    let told = averaging::course(slider, linear, x, rtol);
-    if let Some(course) = told.or_else(|| averaging::course_after_first_swings(slider, linear, x, rtol)) {
-        return course;
-    }
-    if linear.is_neutral(slider) && x.abs() > quiet(linear.step_error(x, rtol, COARSE * FINER)) {
-        let fate = Fate::Undecided;
+    if slider.inertia == 0.0 && slider.b > slider.a && !linear.stable {
+        // Below the critical stiffness the potential of theory.md grows without bound; at it nothing changes.
+        let fate = if slider.is_critical() { Fate::Undecided } else { Fate::Ends };
         return Course { fate, high: None, low: None, t: 0.0, steps: 0, doubts: Doubts::default() };
     }
-    let mut course = follow_once(slider, linear, x, rtol, COARSE);
-    // Finer steps would be more.
-    if course.fate == Fate::Undecided && course.steps == MOST_STEPS {
-        return course;
-    }
-    let mut share = COARSE;
+    let mut course = follow_once(slider, linear, x, rtol, ACCURACIES[0]);
     let mut known = false;
-    for _ in 0..MOST_TIMES {
-        let errors = [share, FINER * share].map(|share| linear.step_error(x, rtol, share));
-        // The same steps would tell the same.
-        if errors[1] > 0.5 * errors[0] {
+    for shares in ACCURACIES.windows(2) {
+        let [coarse, fine] = [shares[0], shares[1]].map(|share| step_error(rtol, share));
+        // Finer steps would be more, and the same steps lead to the same.
+        if (course.fate == Fate::Undecided && course.steps >= MOST_STEPS) || fine > 0.5 * coarse {
             break;
         }
-        share *= FINER;
-        let finer = follow_once(slider, linear, x, rtol, share);
+        let finer = follow_once(slider, linear, x, rtol, shares[1]);
         let doubts = course.compared(&finer, rtol.max(ROUNDED));
-        let steps = course.steps + finer.steps;
-        course = Course { steps, doubts: doubts.unwrap_or_default(), ..finer };
-        // What is left in doubt seldom becomes clear.
+        course = Course { steps: course.steps + finer.steps, doubts: doubts.unwrap_or_default(), ..finer };
+        // A number that is still in doubt at a third run seldom becomes clear.
         if doubts.is_some_and(|doubts| known || doubts == Doubts::default()) {
             return course;
         }
@@ -145,12 +110,11 @@ impl Course {
         [low.min(reached(self.low)), high.max(reached(self.high))]
     }
 
-    /// Which of its numbers differ by more than `rtol` from those of another; `None` if those do that say what becomes of
-    /// it and how high it swings.
+    /// Which of its numbers differ by more than `rtol` from those of another; `None` if the end or the peak does.
     fn compared(&self, other: &Course, rtol: f64) -> Option<Doubts> {
         let near = |x: f64, y: f64| (x - y).abs() <= rtol;
         let alike = |x: f64, y: f64| near(x / y, 1.0) || x == y;
-        let slow = |x: f64, y: f64| as_slow(x, y, rtol);
+        let slow = |x: f64, y: f64| near(x, y) || (x < VANISHING && y < VANISHING);
         let mut doubts = other.doubts;
         let ends = match (self.fate, other.fate) {
             (Fate::Settled { time }, Fate::Settled { time: other }) => {
@@ -167,24 +131,13 @@ impl Course {
         let ([low, high], [bottom, top]) = (self.range(), other.range());
         // That of the cycle may be the least of all.
         doubts.trough = !slow(low, bottom) || (doubts.cycle_trough && bottom > VANISHING);
-        doubts.t_peak = match (self.peak(rtol), other.peak(rtol)) {
-            // On the way to a cycle all but as high moments are many, and none of them is told.
+        // The flatter a peak, the less is known of when it was. On the way to a cycle all but as high moments are many.
+        let later = |peak: Extremum, exact: Extremum| !((peak.t / exact.t - 1.0).abs() <= rtol / exact.x.min(1.0));
+        doubts.t_peak |= match (self.peak(rtol), other.peak(rtol)) {
             (None, None) => false,
-            // NaN is told as such.
-            (Some(peak), Some(other)) => doubts.t_peak || is_later(peak, other, rtol),
+            (Some(peak), Some(other)) => later(peak, other),
             _ => true,
         };
         (ends && near(high, top)).then_some(doubts)
     }
-}
-
-/// Whether two logarithms of a least velocity are the same: to `rtol`, or both of 0 in doubles.
-pub(super) fn as_slow(x: f64, y: f64, rtol: f64) -> bool {
-    (x - y).abs() <= rtol || (x < VANISHING && y < VANISHING)
-}
-
-/// Whether two peaks, the second of them the more exact, are not at the same time to `rtol`: the flatter a peak, the less is
-/// known of when it was.
-pub(super) fn is_later(peak: Extremum, exact: Extremum, rtol: f64) -> bool {
-    (peak.t / exact.t - 1.0).abs() > rtol / exact.x.min(1.0)
 }

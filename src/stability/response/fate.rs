@@ -1,14 +1,12 @@
-//! What becomes of a response in the end: rest, a limit cycle, or nothing that could be decided.
+//! The end of a response: steady sliding, a limit cycle, or nothing that could be decided.
 //!
-//! A cycle maps the section `v = v_f` onto itself. On it the energy is `E = z^2/(2 k)`, so what friction takes over a
-//! cycle is the change of `ln z` without a difference of nearly equal numbers, however slow it is. While cycles
-//! change fast they are followed one by one; where they change slowly, many are passed over at once (`slide.rs`).
+//! Cycles are followed one by one while they change fast; where they change slowly, `envelope.rs` leaps over many.
 
-use super::course::{COARSE, Course, Doubts, FINER, Fate, VANISHING};
+use super::course::{Course, Doubts, Fate, VANISHING};
+use super::envelope::{FINEST, Fixed, Lap, Leapt, NUDGE, distance, size};
 use super::orbit::{BAND, Cycle, Extremum, Orbit, Seen, Stop};
-use super::slide::{Place, Slide};
-use super::slider::{Slider, State, Y, Z};
-use crate::numerics::elementary::{exp, ln, ln_1p};
+use super::slider::{Place, Slider, State, X};
+use crate::numerics::elementary::{exp, ln};
 
 /// Small motions about steady sliding.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -17,461 +15,327 @@ pub struct Linear {
     pub stable: bool,
     /// Change of `ln z` over a cycle, if they oscillate.
     pub growth: Option<f64>,
-    /// Their period in `l/v_f`, if they oscillate.
-    pub period: Option<f64>,
-    /// Rate at which they come to oscillate alone, in `v_f/l`: minus the third eigenvalue, or infinite.
-    pub relaxation: f64,
 }
 
-/// Steps of one response.
+/// Steps of one run.
 pub(super) const MOST_STEPS: u32 = 100_000;
 
-/// A motion this small is still told from the errors of its steps, but not whether it is a limit cycle.
-pub(super) const FAINT: f64 = 1e-4;
-
-/// Share of a motion about unstable sliding that the error estimate of a step may be: an estimate as large as the
-/// motion would let steps grow until they damp what grows.
-const FELT: f64 = 1e-3;
-
-/// A cycle of less than `SMALL` in `ln v` takes the period of small motions, up to a factor of `ALIKE`.
-const SMALL: f64 = 0.1;
-const ALIKE: f64 = 3.0;
-
-/// Least error of a step that is asked for, relative to the size of the motion.
-const FINEST: f64 = 1e-14;
-
-/// A rate this many times larger than what the finest steps leave of it has a sign.
-pub(super) const LEGIBLE: f64 = 30.0;
-
-/// Swings move the spring's force by less than this share of `a` where a block slides neutrally.
-const SOFT: f64 = 1e-3;
-
-/// Cycles over which `ln z` changes by less than this are sampled.
-pub(super) const SLOW: f64 = 0.1;
-
-/// On a limit cycle friction gives and takes the same, up to this share of it.
-const BALANCED: f64 = 0.01;
-
-/// Cycles that are followed after sampling has led to another place.
-const PATIENCE: u32 = 10;
-
-/// Cycles next to a limit cycle that samples have found between them have come to it where they move by less than this in
-/// `PATIENCE` of them, in units of `rtol`: what is left are errors of steps, whose shares of each other are chance.
-const STILL: f64 = 0.1;
-
-/// How far from a cycle in `ln z` another begins that shows whether it attracts.
-const BESIDE: f64 = 0.03;
-
-/// It attracts at once where one cycle leaves less than this share of that.
-const AT_ONCE: f64 = 0.1;
-
-/// What errors of steps may leave on the side from which cycles come slowly, in units of `rtol`.
-const SLOW_SIDE: f64 = 10.0;
-
-/// Peaks that differ by less than this, in units of `rtol`, are as high as each other.
-const ALIKE_PEAKS: f64 = 0.3;
-
-/// Error of a step, in units of the accuracy of the numbers.
-pub(super) const STEP: f64 = 0.03;
+/// Error of a step in units of the accuracy of the numbers: as many steps as this is small may add up.
+const STEP: f64 = 0.03;
 
 /// Error of an extremum in the dense output.
 const ROUGH: f64 = 1e-2;
 
-/// Follows the response from `e^x v_f` once, with steps whose errors are to leave this `share` of `rtol` of its numbers. The
-/// coarsest run takes cycles that hardly change for a limit cycle, which a finer one has to confirm.
+/// Share of a motion that the error estimate of a step may be: an estimate as large as the motion would let steps grow
+/// until they damp what grows.
+const FELT: f64 = 1e-3;
+
+/// Change of a cycle below which it is worth the laps of a leap.
+const SLOW: f64 = 0.03;
+
+/// What a cycle leaves of the change of the one before if cycles come to a limit cycle fast.
+const FAST: f64 = 0.95;
+const AT_ONCE: f64 = 0.02;
+
+/// What it leaves if they change at about the same rate.
+const STEADY: std::ops::Range<f64> = 0.5..2.0;
+
+/// Cycles that are followed before the next try to leap, and after a limit cycle is found.
+const PATIENCE: u32 = 10;
+
+/// Share of the first of a row of changes that the last one is at most.
+const FAR: f64 = 0.01;
+
+/// Share of `rtol` by which a limit cycle may still be missed.
+const ARRIVED: f64 = 0.03;
+
+/// Peaks that differ by less than this, in units of `rtol`, are as high as each other.
+const ALIKE_PEAKS: f64 = 0.3;
+
+/// Follows the response from `e^x v_f` once, with steps whose errors are to leave this `share` of `rtol` of its numbers.
 pub(super) fn follow_once(slider: &Slider, linear: Linear, x: f64, rtol: f64, share: f64) -> Course {
-    let start = linear.start(x);
-    let faint = start != x;
     let mut follower = Follower {
         slider,
         linear,
+        asked: rtol,
         rtol: share * rtol,
-        tolerance: linear.step_error(x, rtol, share),
-        trusts: share >= COARSE,
+        tolerance: step_error(rtol, share),
+        finest: FINEST * (share / 0.3).max(1.0),
         budget: MOST_STEPS,
-        high: None,
-        low: None,
-        t: 0.0,
-        counting: f64::INFINITY,
-        vague: false,
-        vague_time: false,
+        extrema: [None; 2],
         vague_peak: false,
-        passed: 0.0,
-        miscounted: 0.0,
+        t: 0.0,
     };
-    let fate = match follower.run(slider.steady(start)) {
-        Ok(fate) if linear.allows(slider, &fate, if faint { start.abs() } else { 0.0 }) => fate,
-        Ok(_) | Err(_) => Fate::Undecided,
-    };
-    let Follower { high, low, t, budget, vague, vague_time, vague_peak, .. } = follower;
-    let doubts = Doubts { cycle_trough: vague, settling_time: vague_time, t_peak: vague_peak, ..Doubts::default() };
-    let [low, high] =
-        [low, high].map(|seen| seen.map(|seen: Extremum| if faint { Extremum { t: f64::NAN, ..seen } } else { seen }));
+    let fate = follower.run(slider.steady(x)).unwrap_or(Fate::Undecided);
+    let Follower { extrema: [low, high], t, budget, vague_peak, .. } = follower;
+    let doubts = Doubts { t_peak: vague_peak, ..Doubts::default() };
     Course { fate, high, low, t, steps: MOST_STEPS - budget, doubts }
 }
 
-/// Error of a step that tells a motion of this size about unstable sliding: its estimate is allowed to be the power
-/// 6/10 of it.
-fn telling(size: f64) -> f64 {
-    exp(ln(FELT * size) / 0.6).max(finest(size))
-}
-
-/// Least error of a step that a motion of this size is asked for.
-pub(super) fn finest(size: f64) -> f64 {
-    FINEST * size.min(1.0)
-}
-
-impl Linear {
-    /// Whether a light block on a soft spring slides so nearly neutrally, for `b` next to `a`, that the finest steps cannot
-    /// tell swings that die out from those that grow.
-    ///
-    /// On the way of `ln v` by 1 the spring's force changes by `k/omega`, and a step's error in it is a share of
-    /// [`Slider::force`].
-    pub(super) fn is_neutral(&self, slider: &Slider) -> bool {
-        let (Some(growth), Some(period)) = (self.growth, self.period) else { return false };
-        let swing = slider.k * period / (2.0 * std::f64::consts::PI);
-        swing < SOFT * slider.a && growth.abs() * swing < LEGIBLE * FINEST * slider.force()
-    }
-
-    /// Where the response from `e^x v_f` is followed from.
-    fn start(&self, x: f64) -> f64 {
-        if !self.stable && x.abs() < FAINT { self.moved_out(x) } else { x }
-    }
-
-    /// Error of a step of the run that is to leave a `share` of `rtol`: of the first two it always differs.
-    pub(super) fn step_error(&self, x: f64, rtol: f64, share: f64) -> f64 {
-        let size = self.start(x).abs();
-        let told = if self.stable { f64::INFINITY } else { telling(size) * share / COARSE };
-        (STEP * share * rtol).min(told).max(finest(size) * (share / (COARSE * FINER)).max(1.0))
-    }
-
-    /// A start closer than `FAINT`, moved out to where it grows, by whole cycles if they are short enough.
-    fn moved_out(&self, x: f64) -> f64 {
-        let whole = self.growth.map(|growth| growth * (ln(FAINT / x.abs()) / growth).ceil());
-        let size = whole.map(|whole| x.abs() * exp(whole)).filter(|size| (FAINT..10.0 * FAINT).contains(size));
-        size.unwrap_or(FAINT).copysign(x)
-    }
-
-    /// Whether an end that was found is no artefact: a limit cycle is driven by friction that weakens with velocity, is
-    /// larger than the errors of its steps, encloses a start that was moved out to the distance `moved`, and if it is
-    /// small has the period of small motions.
-    fn allows(&self, slider: &Slider, fate: &Fate, moved: f64) -> bool {
-        let &Fate::Cycle { period, high, low } = fate else { return true };
-        let alike = self.period.is_none_or(|linear| period > linear / ALIKE && period < linear * ALIKE);
-        let driven = slider.b > slider.a && slider.inertia > 0.0;
-        driven && period > 0.0 && high - low > FAINT.max(4.0 * moved) && (alike || high - low > SMALL)
-    }
+/// Error of a step that leaves this share of `rtol`; those of the first two runs always differ.
+pub(super) fn step_error(rtol: f64, share: f64) -> f64 {
+    (STEP * share * rtol).max(FINEST * (share / 0.3).max(1.0))
 }
 
 pub(super) struct Follower<'a> {
-    pub(super) slider: &'a Slider,
-    pub(super) linear: Linear,
-    pub(super) rtol: f64,
-    pub(super) tolerance: f64,
-    /// Whether what hardly changes is a limit cycle without being asked.
-    trusts: bool,
-    pub(super) budget: u32,
-    high: Option<Extremum>,
-    low: Option<Extremum>,
-    t: f64,
-    /// Relative error of rates with which cycles can be counted.
-    pub(super) counting: f64,
-    /// Whether the least velocity still changes on the limit cycle.
-    vague: bool,
-    /// Whether the number of cycles that were passed over is not known.
-    pub(super) vague_time: bool,
+    pub slider: &'a Slider,
+    pub linear: Linear,
+    /// Accuracy that the numbers are asked for with, and that of this run.
+    pub asked: f64,
+    pub rtol: f64,
+    /// Error of a step.
+    pub tolerance: f64,
+    /// Least error of a step relative to the motion.
+    pub finest: f64,
+    pub budget: u32,
+    /// Slowest and fastest moment so far.
+    extrema: [Option<Extremum>; 2],
     /// Whether another moment was as fast as the fastest.
     vague_peak: bool,
-    /// Cycles that were passed over, and by how many this number may be off.
-    pub(super) passed: f64,
-    pub(super) miscounted: f64,
+    t: f64,
 }
 
-impl Follower<'_> {
+/// A response under way: an orbit that may have begun after others.
+struct Way<'a> {
+    orbit: Orbit<'a>,
+    /// Time before the orbit.
+    offset: f64,
+    /// Since when the orbit has been settled if it began so; NaN if that was not seen.
+    since: f64,
+    /// Error of its steps.
+    tolerance: f64,
+    /// Where the last cycle ended.
+    place: Option<Place>,
+    pace: Pace,
+}
+
+impl Way<'_> {
+    /// When it settled; `None` outside the band.
+    fn settled_at(&mut self) -> Option<f64> {
+        let time = self.orbit.settled_at()?;
+        Some(if time == 0.0 { self.since } else { self.offset + time })
+    }
+}
+
+impl<'a> Follower<'a> {
     fn run(&mut self, start: State) -> Result<Fate, Stop> {
-        let slider = self.slider;
-        let mut orbit = Orbit::new(slider, start, self.tolerance);
-        // Time before this orbit began.
-        let mut offset = 0.0;
-        // Since when this orbit has been settled, if it began so.
-        let mut since = 0.0;
-        let mut before: Option<Place> = None;
-        let mut last_rate = f64::NAN;
-        let mut contraction = Contraction::after(f64::NAN);
-        // Cycles so far, and after how many sampling may be tried again.
+        let mut way = self.way(start, start[X].abs(), 0.0, 0.0);
+        // Cycles so far, and after how many to try the next leap.
         let (mut count, mut again) = (0, 0);
-        // After how many it may be asked again whether they come to a limit cycle.
-        let mut asked = 0;
-        let (mut last_low, mut lingers) = (f64::NAN, 0);
-        // Whether cycles have come so near to each other that what is left are errors of steps.
-        let mut arrived = false;
-        // Where samples have found a limit cycle, and at which cycle.
-        let mut found: Option<(Place, u32)> = None;
-        // Whether this is the response itself, not another way to the same end.
-        let mut real = true;
         loop {
-            let cycle = orbit.cycle(self.linear.stable, &mut self.budget);
-            // Another way to the same end begins anew.
-            self.t = self.t.max(offset + orbit.t());
-            let cycle = match cycle {
-                Ok(cycle) => cycle,
-                Err(stop) => {
-                    let extrema = orbit.extrema();
-                    if real {
-                        self.note(offset, &mut orbit, extrema);
-                    }
-                    return match (stop, orbit.settled_at()) {
-                        (Stop::Quiet, Some(time)) => Ok(Fate::Settled { time: latest(since, offset, time) }),
-                        _ => Err(stop),
-                    };
+            // Follow one cycle.
+            let cycle = match self.cycle(&mut way) {
+                Err(Stop::Quiet) => {
+                    return way.settled_at().map(|time| Fate::Settled { time }).ok_or(Stop::Quiet);
                 }
+                cycle => cycle?,
             };
-            if real {
-                self.note(offset, &mut orbit, cycle.extrema);
-            }
-            let place = Place { z: cycle.end[Z], y: cycle.end[Y] };
-            let Some(last) = before.replace(place) else { continue };
-            let rate = self.rate(&cycle, last.z);
-            let [low, high] = cycle.range();
-            let doubt = gross(&cycle, last.z, slider) / (high - low).min(1.0) * self.tolerance;
-            if self.dies_out(rate, doubt, low, high)
-                && place.y.abs() < 0.1
-                && let Some(time) = orbit.settled_at()
-            {
-                return Ok(Fate::Settled { time: latest(since, offset, time) });
-            }
+            let Some(lap) = self.compare(&mut way, &cycle) else { continue };
+            let size = lap.size();
             count += 1;
-            // Both coordinates of the section: relative to its size, or to what moves ln v by 1.
-            let distance =
-                |from: Place| ((place.z - from.z) / place.z.max(slider.force())).abs().max((place.y - from.y).abs());
-            let change = distance(last);
-            // Down to where rounding and the errors of steps stop it.
-            let left = contraction.left;
-            contraction.take(change, self.tolerance);
-            // A motion that has become smaller is to be told from the errors of its steps as well.
-            let enough = telling(high - low);
-            if !self.linear.stable && enough < 0.3 * self.tolerance {
-                self.tolerance = (0.1 * enough).max(finest(high - low));
-                offset += cycle.t;
-                orbit = Orbit::new(slider, [place.z, place.y, 0.0], self.tolerance);
-                (last_rate, contraction) = (f64::NAN, Contraction::after(f64::NAN));
-                continue;
+            // Steady sliding?
+            if self.may_die_out(&lap)
+                && (self.dies_out(&lap) || self.dies_out_exactly(&lap)?)
+                && let Some(time) = way.settled_at()
+            {
+                return Ok(Fate::Settled { time });
             }
-            let still = found.is_some_and(|(from, since)| {
-                count >= since + PATIENCE && distance(from) < STILL * self.rtol && change < STILL * self.rtol
-            });
-            arrived &= change < self.rtol;
-            let near =
-                contraction.left < 0.03 * self.rtol || (left < self.rtol && contraction.row == 0) || still || arrived;
-            let lower = (low - last_low).abs();
-            last_low = low;
-            // Small cycles may only have stopped to change fast.
-            let ends =
-                near && place.z > 0.0 && high - low > SMALL && rate.abs() < BALANCED * gross(&cycle, last.z, slider);
-            // Changes that are errors of steps do not show that cycles change slowly.
-            let mut creeps = false;
-            if ends && !arrived && !still && count >= asked {
-                asked = 2 * count;
-                arrived = self.trusts || self.attracts(last, place, change, !real)?;
-                creeps = !arrived;
+            // A limit cycle? Small cycles may only have stopped to change fast: Newton's method finds those.
+            if size >= 1.0 && self.is_driven() && way.pace.has_arrived(self.rtol) && self.attracts(&lap)? {
+                let [low, high] = cycle.exact_range(&mut way.orbit);
+                return Ok(Fate::Cycle { period: cycle.period, high, low });
             }
-            if ends && (arrived || still) {
-                // Friction may magnify what the section does not show.
-                let [low, high] = cycle.exact_range(&mut orbit);
-                let vague = lower > 0.1 * self.rtol && low > VANISHING;
-                if !vague || lingers == PATIENCE {
-                    self.vague = vague;
-                    return Ok(Fate::Cycle { period: cycle.period, high, low });
-                }
-                lingers += 1;
-                last_rate = rate;
-                continue;
-            }
-            let slow = rate.abs() < SLOW && (contraction.is_slow() || creeps);
-            if slow && place.z > 0.0 && count >= again {
-                let bend = if creeps { 0.0 } else { (rate - last_rate) / last_rate };
-                match self.slide(place, bend) {
-                    Ok(Slide::Decided(Fate::Settled { time })) => {
-                        let inside = orbit.settled_at().filter(|_| time == 0.0);
-                        let time = inside.map_or(offset + cycle.t + time, |time| latest(since, offset, time));
-                        return Ok(Fate::Settled { time });
-                    }
-                    Ok(Slide::Decided(fate)) => return Ok(fate),
-                    Ok(Slide::Fast { place, time }) => {
-                        let stays = excess(low, high) < 0.0 && rate < 0.0;
-                        let inside = orbit.settled_at().filter(|_| stays);
-                        since = inside.map_or(offset + cycle.t + time, |time| latest(since, offset, time));
-                        offset += cycle.t + time;
-                        orbit = Orbit::new(slider, [place.z, place.y, 0.0], self.tolerance);
-                        before = Some(place);
-                        (last_rate, contraction) = (f64::NAN, Contraction::after(f64::NAN));
+            // Leap over cycles that hardly change.
+            let end = way.offset + cycle.t;
+            if (way.pace.is_slow() || way.pace.change < self.rtol) && count >= again {
+                again = 2 * count + PATIENCE;
+                match self.leap_on(self.slider.place(&cycle.end), lap.range, way.pace.change) {
+                    Ok(Leapt::Cycle(Fixed { lap, .. })) => return Ok(lap.limit()),
+                    Ok(Leapt::At { place, time }) if time > 0.0 => {
+                        let since = way.settled_at().filter(|_| excess(lap.range) < 0.0);
+                        let pace = Pace::default();
+                        way = self.way(self.slider.state(place), size, end + time, since.unwrap_or(f64::NAN));
+                        (way.place, way.pace) = (Some(place), pace);
                         continue;
                     }
-                    // Errors of steps drive cycles off again.
-                    Ok(Slide::Near { place, enclosed: true, .. })
-                        if found.is_some_and(|(from, _)| ln(place.z / from.z).abs() < self.rtol)
-                            && change < self.rtol =>
-                    {
-                        let [low, high] = cycle.exact_range(&mut orbit);
-                        self.vague = true;
-                        return Ok(Fate::Cycle { period: cycle.period, high, low });
-                    }
-                    Ok(Slide::Near { place, change, enclosed }) => {
-                        real = false;
-                        found = enclosed.then_some((place, count));
-                        orbit = Orbit::new(slider, [place.z, place.y, 0.0], self.tolerance);
-                        before = Some(place);
-                        (last_rate, contraction) = (f64::NAN, Contraction::after(change));
-                        again = count + PATIENCE;
-                        continue;
-                    }
-                    Ok(Slide::Coupled) | Err(Stop::Unrelaxed) => again = 2 * count,
+                    Ok(_) | Err(Stop::Faint) => {}
                     Err(stop) => return Err(stop),
                 }
             }
-            last_rate = rate;
-        }
-    }
-
-    /// Whether cycles that begin beside the last one, which went from one place to another, come to it so fast that all its
-    /// changes to come, `change` having been the last, add up to less than `rtol`.
-    ///
-    /// That a cycle changes little does not tell: friction may only give and take almost the same, as it does next to the
-    /// critical stiffness, or be little beside inertia.
-    fn attracts(&mut self, from: Place, to: Place, change: f64, sampled: bool) -> Result<bool, Stop> {
-        let gap = |place: Place, beside: Place| ln(beside.z / place.z).abs().max((beside.y - place.y).abs());
-        // What samples led to may be approached fast from one side and slowly from the other.
-        let sides = if sampled { [BESIDE, -BESIDE].as_slice() } else { &[BESIDE] };
-        for &side in sides {
-            let mut beside = self.next(Place { z: from.z * exp(side), ..from })?;
-            let first = gap(to, beside);
-            let mut share = first / BESIDE;
-            if share > AT_ONCE {
-                // The first cycle was for the contact lifetime to follow.
-                beside = self.next(beside)?;
-                share = gap(self.next(to)?, beside) / first;
-            }
-            let told = 1.0 - share > 10.0 * self.tolerance / BESIDE;
-            let enough = if side > 0.0 { self.rtol } else { SLOW_SIDE * self.rtol };
-            if !(told && change * share < enough * (1.0 - share)) {
-                return Ok(false);
+            // Steps as fine as the motion asks for.
+            let asked = self.step_error(size);
+            if (!self.linear.stable && asked < 0.1 * way.tolerance) || asked > 100.0 * way.tolerance {
+                let since = way.settled_at().unwrap_or(f64::NAN);
+                way = Way { place: way.place, pace: way.pace, ..self.way(cycle.end, size, end, since) };
             }
         }
-        Ok(true)
     }
 
-    /// Where the cycle ends that begins at a place.
-    fn next(&mut self, Place { z, y }: Place) -> Result<Place, Stop> {
-        let end = Orbit::new(self.slider, [z, y, 0.0], self.tolerance).cycle(false, &mut self.budget)?.end;
-        Ok(Place { z: end[Z], y: end[Y] })
+    /// The next cycle; its extrema are kept.
+    fn cycle(&mut self, way: &mut Way<'_>) -> Result<Cycle, Stop> {
+        let cycle = way.orbit.cycle(self.linear.stable, &mut self.budget);
+        self.t = way.offset + way.orbit.t();
+        let extrema = cycle.as_ref().map_or_else(|_| way.orbit.extrema(), |cycle| cycle.extrema);
+        self.note(way, extrema);
+        cycle
     }
 
-    /// Change of `ln z` over a cycle that began at `z`.
-    pub(super) fn rate(&self, cycle: &Cycle, z: f64) -> f64 {
-        let energy = 0.5 * z * z / self.slider.k;
-        0.5 * ln_1p((-cycle.loss[0] / energy).max(-1.0 + 1e-12))
+    /// A cycle compared with where it began; `None` for the first one, and for rounding at rest.
+    fn compare(&self, way: &mut Way<'_>, cycle: &Cycle) -> Option<Lap> {
+        let place = self.slider.place(&cycle.end);
+        let from = way.place.replace(place)?;
+        let change = [place[0] - from[0], place[1] - from[1]];
+        let range = cycle.range();
+        way.pace.take(distance(change, size(range)), range[0]);
+        let lap = Lap { from, change, period: cycle.period, range, tolerance: way.tolerance };
+        change[0].is_finite().then_some(lap)
     }
 
-    /// Whether cycles of these extrema stay in the band of settled velocities, and shrink from here down to rest; the
-    /// rate is known up to `doubt`.
-    ///
-    /// For small cycles the rate is `growth + c z^2`, up to a share of the second term of about the square of the
-    /// extrema.
-    pub(super) fn dies_out(&self, rate: f64, doubt: f64, low: f64, high: f64) -> bool {
-        // Without small oscillations, cycles cannot die out slowly.
-        let growth = self.linear.growth.unwrap_or(-1.0);
-        let rest = 10.0 * high.max(-low) * high.max(-low) * (rate - growth).abs();
-        self.linear.stable && excess(low, high) < 0.0 && rate < -2.0 * (rest + doubt) && growth < -2.0 * rest
+    /// Whether there may be a limit cycle: friction weakens with velocity, and inertia limits what grows.
+    pub(super) fn is_driven(&self) -> bool {
+        self.slider.b > self.slider.a && self.slider.inertia > 0.0
+    }
+
+    /// A way on from a state, with a motion of this size.
+    fn way(&self, state: State, size: f64, offset: f64, since: f64) -> Way<'a> {
+        let tolerance = self.step_error(size);
+        let orbit = Orbit::new(self.slider, state, tolerance);
+        Way { orbit, offset, since, tolerance, place: None, pace: Pace::default() }
+    }
+
+    /// Whether a cycle that begins beside this one comes to it: that one changes little does not show that.
+    fn attracts(&mut self, lap: &Lap) -> Result<bool, Stop> {
+        let beside = self.lap([lap.from[0] + NUDGE, lap.from[1]], lap.tolerance)?;
+        Ok((1.0 + (beside.change[0] - lap.change[0]) / NUDGE).abs() < FAST)
+    }
+
+    /// Error of a step in a motion of this size.
+    fn step_error(&self, size: f64) -> f64 {
+        let felt = exp(ln(FELT * size) / 0.6);
+        self.tolerance.min(felt).max(self.finest * size.min(1.0))
+    }
+
+    /// Whether a cycle stays in the band of settled velocities, about sliding that is stable, so that it may die out.
+    fn may_die_out(&self, lap: &Lap) -> bool {
+        self.linear.stable && excess(lap.range) < 0.0 && lap.from[1].abs() < 0.1
+    }
+
+    /// Whether it shrinks beyond the errors of its steps, and so do all smaller ones: the change of `ln z` in small cycles is
+    /// `growth + c A^2` of the amplitude `A`.
+    pub(super) fn dies_out(&self, lap: &Lap) -> bool {
+        let shrinks = lap.change[0] < -1e3 * lap.tolerance / lap.size();
+        self.may_die_out(lap) && shrinks && self.linear.growth.is_none_or(|growth| growth < 0.0)
+    }
+
+    /// The same with the finest steps.
+    fn dies_out_exactly(&mut self, lap: &Lap) -> Result<bool, Stop> {
+        let fine = self.lap(lap.from, self.finest * lap.size())?;
+        Ok(self.dies_out(&fine))
     }
 
     /// Keeps the extrema of a cycle if they are further out than those before.
-    fn note(&mut self, offset: f64, orbit: &mut Orbit<'_>, extrema: [Option<Seen>; 2]) {
-        let kept = [&mut self.low, &mut self.high];
-        for ((seen, kept), sign) in extrema.into_iter().zip(kept).zip([-1.0, 1.0]) {
-            let Some(seen) = seen else { continue };
-            if kept.is_none_or(|kept| sign * seen.rough.x > sign * kept.x - ROUGH) {
-                let extremum = orbit.polished(seen);
-                if sign > 0.0 && kept.is_none_or(|kept| extremum.x > kept.x - ALIKE_PEAKS * self.rtol) {
-                    self.vague_peak = kept.is_some_and(|kept| extremum.x < kept.x + ALIKE_PEAKS * self.rtol);
-                }
-                if kept.is_none_or(|kept| sign * extremum.x > sign * kept.x) {
-                    *kept = Some(Extremum { t: offset + extremum.t, ..extremum });
-                }
+    fn note(&mut self, way: &mut Way<'_>, extrema: [Option<Seen>; 2]) {
+        for (i, sign) in [(0, -1.0), (1, 1.0)] {
+            let (Some(seen), kept) = (extrema[i], self.extrema[i]) else { continue };
+            if kept.is_some_and(|kept| sign * seen.rough.x <= sign * kept.x - ROUGH) {
+                continue;
+            }
+            let extremum = way.orbit.polished(seen);
+            if i == 1 && kept.is_none_or(|kept| extremum.x > kept.x - ALIKE_PEAKS * self.rtol) {
+                self.vague_peak = kept.is_some_and(|kept| extremum.x < kept.x + ALIKE_PEAKS * self.rtol);
+            }
+            if kept.is_none_or(|kept| sign * extremum.x > sign * kept.x) {
+                self.extrema[i] = Some(Extremum { t: way.offset + extremum.t, ..extremum });
+            }
+        }
+    }
+
+    /// The same for a cycle whose time is not known.
+    pub(super) fn note_unseen(&mut self, range: [f64; 2]) {
+        for (i, sign) in [(0, -1.0), (1, 1.0)] {
+            if self.extrema[i].is_none_or(|kept| sign * range[i] > sign * kept.x + ALIKE_PEAKS * self.rtol) {
+                self.extrema[i] = Some(Extremum { x: range[i], t: f64::NAN });
             }
         }
     }
 }
 
-/// How cycles come closer to each other.
+/// How fast cycles come to each other.
 #[derive(Debug, Clone, Copy)]
-struct Contraction {
+struct Pace {
     /// The last change of the section.
     change: f64,
-    /// What was left of a change by the next one, the last two times.
+    /// Shares that a change left of the one before, the last two.
     shares: [f64; 2],
-    /// Changes in a row that were smaller than the one before.
-    row: u32,
-    /// Estimate of all changes to come.
-    left: f64,
+    /// The change from which on all have become less.
+    first: f64,
+    /// The slowest moment, and its change.
+    low: f64,
+    lower: f64,
+    /// Cycles since the section has arrived.
+    lingers: u32,
 }
 
-impl Contraction {
-    /// After a change, or NaN.
-    fn after(change: f64) -> Contraction {
-        Contraction { change, shares: [f64::NAN; 2], row: 0, left: f64::INFINITY }
+impl Default for Pace {
+    fn default() -> Pace {
+        let unknown = f64::NAN;
+        Pace { change: unknown, shares: [unknown; 2], first: unknown, low: unknown, lower: unknown, lingers: 0 }
     }
+}
 
-    /// Takes in the next change, with the error of a step.
-    fn take(&mut self, change: f64, tolerance: f64) {
+impl Pace {
+    /// Takes in the change of the section over a cycle, and its slowest moment.
+    fn take(&mut self, change: f64, low: f64) {
         let share = change / self.change;
-        let contracts = share < 0.999;
-        if !contracts {
-            *self = Contraction { shares: [share, self.shares[0]], ..Contraction::after(change) };
-            return;
-        }
-        let largest = share.max(self.shares[0]);
-        // The slower, the longer it must go on to be told from chance.
-        let enough = match largest {
-            _ if share < 0.01 && change < 100.0 * tolerance && self.change > 1e3 * tolerance => 1,
-            largest if largest < 0.5 => 2,
-            _ => 8,
-        };
-        self.row += 1;
-        if self.row >= enough {
-            self.left = self.left.min(change * largest / (1.0 - largest));
+        if share < FAST {
+            self.first = self.first.max(self.change);
+        } else {
+            self.first = f64::NAN;
         }
         (self.change, self.shares) = (change, [share, self.shares[0]]);
+        (self.low, self.lower) = (low, (low - self.low).abs());
     }
 
-    /// Whether changes stay about the same.
+    /// Whether all changes to come, a geometric series, are less than a part of `rtol`, and those of the slowest moment, which
+    /// may magnify them, unless errors of steps keep it from that. A row of changes from far away shows that they are no errors.
+    fn has_arrived(&mut self, rtol: f64) -> bool {
+        let [share, before] = self.shares;
+        let largest = if share < AT_ONCE { share } else { share.max(before) };
+        let left = largest / (1.0 - largest);
+        // False for NaN.
+        let arrived = self.change < FAR * self.first && largest < FAST && self.change * left < ARRIVED * rtol;
+        self.lingers += u32::from(arrived);
+        let lower = self.lower * left.max(0.01);
+        arrived && (lower < ARRIVED * rtol || self.low < VANISHING || self.lingers > PATIENCE)
+    }
+
+    /// Whether cycles change little, and the next one will change about as much.
     fn is_slow(&self) -> bool {
-        self.shares.iter().all(|share| (0.5..2.0).contains(share))
+        self.change < SLOW && self.shares.iter().all(|share| STEADY.contains(share))
     }
 }
 
 impl Cycle {
     /// `ln(v/v_f)` at its slowest and fastest, as they were seen.
-    pub(super) fn range(&self) -> [f64; 2] {
+    fn range(&self) -> [f64; 2] {
         self.extrema.map(|extremum| extremum.map_or(0.0, |seen| seen.rough.x))
     }
 
     /// The same to the order of the method.
-    pub(super) fn exact_range(&self, orbit: &mut Orbit<'_>) -> [f64; 2] {
+    fn exact_range(&self, orbit: &mut Orbit<'_>) -> [f64; 2] {
         self.extrema.map(|extremum| extremum.map_or(0.0, |seen| orbit.polished(seen).x))
     }
 }
 
-/// When a response settled: at `time` of an orbit that began at `offset`, or at `since` if that is at its start.
-fn latest(since: f64, offset: f64, time: f64) -> f64 {
-    if time == 0.0 { since } else { offset + time }
-}
-
-/// What friction gives and takes over a cycle that began at `z`, added up, as a change of `ln z`.
-pub(super) fn gross(cycle: &Cycle, z: f64, slider: &Slider) -> f64 {
-    cycle.loss[1] * slider.k / (z * z)
+impl Lap {
+    /// The limit cycle that it is.
+    fn limit(&self) -> Fate {
+        let [low, high] = self.range;
+        Fate::Cycle { period: self.period, high, low }
+    }
 }
 
 /// How far a cycle goes beyond the band of settled velocities, relative to it; negative within.
-pub(super) fn excess(low: f64, high: f64) -> f64 {
+pub(super) fn excess([low, high]: [f64; 2]) -> f64 {
     (high / BAND[1]).max(low / BAND[0]) - 1.0
 }

@@ -2,21 +2,17 @@
 //! there.
 //!
 //! In the scaled variables of `slider.rs` only `a`, `b`, `k`, `m v_f^2` and `v_i/v_f` enter. The response is
-//! integrated until its end is decided (`fate.rs`), and its numbers are known (`course.rs`), unless theory tells them
-//! (`averaging.rs`, `strengthening.rs`, `massless.rs`).
+//! integrated (`run.rs`, `orbit.rs`) until its end is decided (`fate.rs`), cycles that hardly change are skipped
+//! (`envelope.rs`), and all is repeated at finer steps until the numbers agree (`course.rs`).
 
-mod averaging;
 mod course;
+mod envelope;
 mod fate;
-mod massless;
 mod motion;
 mod orbit;
 mod run;
 mod series;
-mod slide;
 mod slider;
-mod strengthening;
-mod swings;
 
 use crate::model::{Law, Transition};
 use crate::numerics::elementary::{exp, ln};
@@ -174,9 +170,11 @@ impl Response {
     fn new(course: &Course, v_f: f64, rtol: f64) -> Option<Response> {
         let velocity = |x: f64| v_f * exp(x);
         let (outcome, settling_time, cycle) = match course.fate {
-            Fate::Settled { time } => {
-                (Outcome::Settled, Some(time / v_f).filter(|_| !course.doubts.settling_time), None)
-            }
+            Fate::Settled { time } => (
+                Outcome::Settled,
+                Some(time / v_f).filter(|time| !course.doubts.settling_time && time.is_finite()),
+                None,
+            ),
             Fate::Cycle { period, high, low } => (Outcome::LimitCycle, None, Some((period, high, low))),
             Fate::Undecided => (Outcome::Undecided, None, None),
             Fate::Ends => return None,
@@ -209,11 +207,10 @@ impl Linear {
     fn of(slider: &Slider) -> Linear {
         let law = Law { a: slider.a, b: slider.b };
         let sliding = SteadySliding::new(law, slider.k, slider.inertia, 1.0);
-        let mut linear = Linear { stable: sliding.is_stable(), growth: None, period: None, relaxation: f64::INFINITY };
+        let mut linear = Linear { stable: sliding.is_stable(), growth: None };
         if let Some(eigenvalues) = sliding.eigenvalues().filter(|eigenvalues| eigenvalues.frequency > 0.0) {
             let period = 2.0 * std::f64::consts::PI / eigenvalues.frequency;
-            (linear.growth, linear.period) = (Some(eigenvalues.growth_rate * period), Some(period));
-            linear.relaxation = eigenvalues.decay_rate.map_or(f64::INFINITY, |decay| -decay);
+            linear.growth = Some(eigenvalues.growth_rate * period);
         }
         linear
     }

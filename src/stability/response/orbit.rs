@@ -1,10 +1,9 @@
-//! Following a response cycle by cycle: extrema, the section `v = v_f` crossed upwards, and the energy that is lost.
+//! Following a response cycle by cycle: extrema, and the section `v = v_f` crossed upwards.
 
 use std::collections::VecDeque;
 
-use super::run::{Leg, Run, STAGES, between, step_to};
+use super::run::{Leg, Run, between, step_to};
 use super::slider::{Slider, State, X, Y, Z};
-use crate::numerics::gauss;
 use crate::numerics::root::crossing;
 use crate::numerics::stiff::radau_iia_9;
 
@@ -26,8 +25,6 @@ pub struct Cycle {
     pub t: f64,
     /// Duration.
     pub period: f64,
-    /// Energy that friction took, the sum of its sizes over the steps, and that of the sizes of its two terms.
-    pub loss: [f64; 3],
     /// Slowest and fastest moment; `None` if the first cycle has none.
     pub extrema: [Option<Seen>; 2],
 }
@@ -41,8 +38,6 @@ pub enum Stop {
     Ends,
     /// The work allowed is used up.
     Budget,
-    /// The contact lifetime has not come to rest.
-    Unrelaxed,
     /// The motion is too small to be told from the errors of its steps.
     Faint,
 }
@@ -62,9 +57,6 @@ pub const BAND: [f64; 2] = [-0.01005033585350144, 0.009950330853168083];
 /// Shares of a step, and of the step that this leads to, within which an extremum is looked for again.
 const NEAR: [f64; 2] = [0.125, 0.125];
 
-/// Nodes of the energy lost over a series.
-const NODES: usize = 8;
-
 /// A response under way.
 #[derive(Debug)]
 pub struct Orbit<'a> {
@@ -72,8 +64,6 @@ pub struct Orbit<'a> {
     run: Run<'a>,
     /// Distance from steady sliding within which it rests.
     quiet: f64,
-    /// Energy lost from the last section to the start of the last step, and the sums of its sizes.
-    lost: [f64; 3],
     /// Time from the last section to the start of the last step: the time since the start has too few digits for short cycles
     /// after a long rest.
     elapsed: f64,
@@ -111,7 +101,6 @@ impl<'a> Orbit<'a> {
             slider,
             run: slider.run(state, slider.first_step(&state), tolerance),
             quiet: quiet(tolerance),
-            lost: [0.0; 3],
             elapsed: 0.0,
             met: state[X] == 0.0,
             closed: VecDeque::new(),
@@ -150,8 +139,6 @@ impl<'a> Orbit<'a> {
             }
             let leg = step_to(&mut self.run, f64::MAX).map_err(|_| Stop::Ends)?;
             self.look(&leg);
-            let loss = self.loss(&leg);
-            self.lost = [0, 1, 2].map(|i| self.lost[i] + loss[i]);
             self.elapsed += leg.h();
         }
     }
@@ -220,17 +207,11 @@ impl<'a> Orbit<'a> {
     /// The cycle that ends at the section, at about the share `u` of a step.
     fn close(&mut self, leg: &Leg, u: f64) -> Cycle {
         let (end, t, part) = self.exactly(leg, u, 0.0);
-        let loss = part.map_or([0.0; 3], |part| self.loss(&part));
         let time = part.map_or(u * leg.h(), |part| part.h());
-        let cycle = Cycle {
-            end: [end[Z], end[Y], 0.0],
-            t,
-            period: self.elapsed + time,
-            loss: [0, 1, 2].map(|i| self.lost[i] + loss[i]),
-            extrema: [self.low, self.high],
-        };
+        let cycle =
+            Cycle { end: [end[Z], end[Y], 0.0], t, period: self.elapsed + time, extrema: [self.low, self.high] };
         // The whole step will be added.
-        (self.elapsed, self.lost) = (-time, loss.map(|loss| -loss));
+        self.elapsed = -time;
         cycle
     }
 
@@ -273,28 +254,6 @@ impl<'a> Orbit<'a> {
     pub fn settled_at(&mut self) -> Option<f64> {
         let Entry { edge, place } = self.entry?;
         Some(place.map_or(0.0, |(leg, u)| self.exactly(&leg, u, edge).1))
-    }
-
-    /// Energy that friction takes over a step, the sum of its sizes, and that of its terms: for an implicit one by its own
-    /// quadrature.
-    fn loss(&self, leg: &Leg) -> [f64; 3] {
-        let mut loss = [0.0; 3];
-        let mut add = |u: f64, weight: f64| {
-            let (terms, time) = (self.slider.loss(leg.value(Y, u), leg.value(X, u)), leg.h() * weight);
-            let rate = time * (terms[0] + terms[1]);
-            loss = [loss[0] + rate, loss[1] + rate.abs(), loss[2] + time * (terms[0].abs() + terms[1].abs())];
-        };
-        match leg {
-            Leg::Stiff(_) => {
-                let rule = radau_iia_9();
-                rule.nodes.into_iter().zip(rule.integration[STAGES - 1]).for_each(|(u, weight)| add(u, weight));
-            }
-            Leg::Mild(_) => {
-                let rule = gauss::rule(NODES);
-                rule.x.iter().zip(&rule.w).for_each(|(x, weight)| add(0.5 * (1.0 + x), 0.5 * weight));
-            }
-        }
-        loss
     }
 }
 

@@ -10,7 +10,7 @@
 //! with steady sliding at 0. They stay regular for `M = 0`, where the last one is a constraint, and no velocity is too
 //! low for them.
 
-use crate::numerics::elementary::{exp, exp_and_m1, exp_m1};
+use crate::numerics::elementary::{exp, exp_and_m1, ln};
 use crate::numerics::stiff::{Linearised, Points, System};
 
 /// Place of the scaled force in a [`State`].
@@ -22,6 +22,9 @@ pub const X: usize = 2;
 
 /// `[z, y, x]`, in the order in which they are eliminated.
 pub type State = [f64; 3];
+
+/// A place on the section `v = v_f`, crossed upwards: the logarithm of the force about which the block swings, and `y`.
+pub type Place = [f64; 2];
 
 /// Below every tolerance.
 const UNFELT: f64 = 1e-14;
@@ -45,11 +48,27 @@ impl Slider {
         [(self.a - self.b) * x, -x, x]
     }
 
-    /// Rate at which friction beyond its steady value at `v_f` takes energy from the motion about steady sliding,
-    /// `E = M (e^x - 1)^2/2 + z^2/(2 k)`, in two terms: `-E' = (e^x - 1) a x + (e^x - 1) b y`.
-    pub fn loss(&self, y: f64, x: f64) -> [f64; 2] {
-        let excess = exp_m1(x);
-        [excess * (self.a * x), excess * (self.b * y)]
+    /// Whether `k = b - a` exactly.
+    pub fn is_critical(&self) -> bool {
+        self.k == self.b - self.a && self.b - self.k == self.a
+    }
+
+    /// The state on the section `v = v_f` at a [`Place`].
+    pub fn state(&self, [w, y]: Place) -> State {
+        let pull = exp(w);
+        if self.inertia > 0.0 { [pull + self.frozen() * y, y, 0.0] } else { [pull, pull / self.b, 0.0] }
+    }
+
+    /// The place of a state on the section; NaN where rounding at rest has led to it.
+    pub fn place(&self, &[z, y, _]: &State) -> Place {
+        let pull = z - self.frozen() * y;
+        [if pull > 0.0 { ln(pull) } else { f64::NAN }, y]
+    }
+
+    /// Share of `ln theta` in the force about which the block swings: `b` where it swings faster than contacts age.
+    fn frozen(&self) -> f64 {
+        let swings = self.k * self.inertia > self.a * self.a && self.k > self.inertia;
+        if swings { self.b } else { 0.0 }
     }
 
     /// The state after an arrest that takes no time, if one is under way.

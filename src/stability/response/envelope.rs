@@ -1,0 +1,430 @@
+//! Cycles that hardly change: the return map of the section `v = v_f`, its fixed points, and leaps over many of its steps.
+//!
+//! With `q = (ln z, y)` on the section, the map is `q -> q + g(q)`. Its fixed points are the limit cycles; Newton's method
+//! finds one, and its Floquet multipliers, the eigenvalues of `1 + dg/dq`, tell whether it attracts.
+//!
+//! A leap over `n` cycles (multirevolution collocation; Calvo, Jay, Montijano and Rández, Appl. Numer. Math. 51, 2004) is a
+//! polynomial `p(j)` in the number of cycles with
+//!
+//! ```text
+//! p(j_i + 1/2) - p(j_i - 1/2) = g(p(j_i - 1/2)),    j_i = c_i n,
+//! ```
+//!
+//! `c_i` the nodes of Radau IIA. It is implicit, so a contact lifetime that relaxes in a few cycles limits no leap.
+
+use super::fate::{Follower, excess};
+use super::orbit::{Orbit, Stop};
+use super::slider::Place;
+use crate::numerics::elementary::{exp, ln, ln_1p};
+use crate::numerics::elimination::eliminate;
+use crate::numerics::root::crossing;
+use crate::numerics::stiff::radau_iia_9;
+
+/// A cycle from the section to itself.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Lap {
+    pub from: Place,
+    /// `g`.
+    pub change: Place,
+    pub period: f64,
+    /// `ln(v/v_f)` at its slowest and fastest.
+    pub range: [f64; 2],
+    /// Error of its steps.
+    pub tolerance: f64,
+}
+
+/// A fixed point of the return map.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Fixed {
+    pub lap: Lap,
+    /// Whether places near it come to it from one side, so that none overshoots.
+    pub monotone: bool,
+    /// How far the response was from it when it was found.
+    pub missed: f64,
+}
+
+/// What leaps led to.
+pub(super) enum Leapt {
+    /// The response comes to this limit cycle.
+    Cycle(Fixed),
+    /// It is here after some time; cycles change fast, or come into the band of settled velocities.
+    At { place: Place, time: f64 },
+    /// Cycles have to be followed one by one.
+    Nowhere,
+}
+
+/// Stages of a leap.
+const S: usize = 5;
+
+/// Size of a limit cycle that is told from sliding.
+const SMALLEST: f64 = 1e-7;
+
+/// Error of the slowest moment of a limit cycle beyond which it is unknown, in units of `rtol`. Chosen: two runs then still tell it.
+const TROUGH: f64 = 0.3;
+
+/// Difference of places for the derivative of the map: the power 1/3 of the error of a lap at rtol 1e-6.
+pub(super) const NUDGE: f64 = 1e-3;
+
+/// Least error of a step. Its rounding, 50 units in the last place.
+pub(super) const FINEST: f64 = 1e-14;
+
+/// Distance in `q` within which the map is nearly linear.
+const NEAR: f64 = 0.1;
+
+/// Cycles that a leap, which takes about as many laps, has to skip.
+const WORTH: f64 = 20.0;
+
+/// Most iterations of Newton's method.
+const MOST_ITERATIONS: u32 = 16;
+
+/// Most steps of a lap: ten times those of a deep slip at the finest tolerance.
+const MOST_STEPS: u32 = 3000;
+
+/// Times by which finest steps become coarser where they only follow rounding.
+const COARSER: f64 = 1e3;
+
+/// Most tries of a leap.
+const MOST_TRIES: u32 = 3;
+
+/// Most leaps in a row.
+const MOST_LEAPS: u32 = 200;
+
+/// Greatest change of `q` in a leap: its first derivative is taken at the start.
+const LONGEST: f64 = 2.0;
+
+type Matrix = [[f64; 2]; 2];
+
+struct Leap {
+    /// Changes of `w` and of `y` relative to `e^w` at the nodes.
+    change: [[f64; S]; 2],
+    laps: [Lap; S],
+}
+
+/// The polynomials that are 1 at one node and 0 at the others and at 0, at `u`.
+fn basis(u: f64) -> [f64; S] {
+    let powers = &radau_iia_9().powers;
+    std::array::from_fn(|j| (0..S).rev().fold(0.0, |sum, k| (sum + powers[k][j]) * u))
+}
+
+/// A place with `y` relative to `e^w`, which small motions keep, in units of that at the start of a leap.
+fn relative([w, y]: Place, start: &Lap) -> Place {
+    [w, y * exp(start.from[0] - w)]
+}
+
+/// The place that is so.
+fn absolute([w, y]: Place, start: &Lap) -> Place {
+    [w, y * exp(w - start.from[0])]
+}
+
+fn sum([w, y]: Place, [by_w, by_y]: Place) -> Place {
+    [w + by_w, y + by_y]
+}
+
+fn dot(weights: &[f64; S], values: &[f64; S]) -> f64 {
+    weights.iter().zip(values).map(|(weight, value)| weight * value).sum()
+}
+
+/// `x` with `matrix x = right`.
+fn solve(matrix: Matrix, right: Place) -> Option<Place> {
+    let mut right = right;
+    eliminate(matrix.concat().as_mut_slice(), &mut right, 2)?;
+    Some(right)
+}
+
+impl Lap {
+    /// Its change relative to `e^w`.
+    fn relative(&self, start: &Lap) -> Place {
+        let [from, to] = [self.from, sum(self.from, self.change)].map(|place| relative(place, start));
+        [self.change[0], to[1] - from[1]]
+    }
+
+    /// How large the motion is, in `ln v`.
+    pub fn size(&self) -> f64 {
+        size(self.range)
+    }
+
+    /// Size of a change of place, as one of `ln v` relative to the motion.
+    pub fn distance(&self, change: Place) -> f64 {
+        distance(change, self.size())
+    }
+}
+
+/// Of a motion between two velocities, at most 1.
+pub(super) fn size([low, high]: [f64; 2]) -> f64 {
+    (high - low).min(1.0)
+}
+
+pub(super) fn distance([w, y]: Place, size: f64) -> f64 {
+    w.abs().max(y.abs() / size)
+}
+
+impl Follower<'_> {
+    /// The cycle from a place.
+    pub(super) fn lap(&mut self, from: Place, tolerance: f64) -> Result<Lap, Stop> {
+        let mut orbit = Orbit::new(self.slider, self.slider.state(from), tolerance);
+        let mut budget = self.budget.min(MOST_STEPS);
+        let before = budget;
+        let cycle = orbit.cycle(false, &mut budget);
+        self.budget -= before - budget;
+        if cycle == Err(Stop::Budget) && self.budget > 0 {
+            // Steps as fine as these only follow rounding.
+            self.finest *= COARSER;
+            return Err(Stop::Faint);
+        }
+        let cycle = cycle?;
+        let range = cycle.extrema.map(|seen| seen.map_or(0.0, |seen| orbit.polished(seen).x));
+        let end = self.slider.place(&cycle.end);
+        let change = [end[0] - from[0], end[1] - from[1]];
+        if change[0].is_nan() {
+            return Err(Stop::Faint);
+        }
+        Ok(Lap { from, change, period: cycle.period, range, tolerance })
+    }
+
+    /// Derivative of `g` at the start of a lap, with `y` relative to `e^w`: nudging `w` then moves along small motions.
+    fn derivative(&mut self, lap: &Lap) -> Result<Matrix, Stop> {
+        let nudges = [[NUDGE, 0.0], [0.0, NUDGE * lap.size()]];
+        let here = lap.relative(lap);
+        let mut slopes = [[0.0; 2]; 2];
+        for (c, nudge) in nudges.into_iter().enumerate() {
+            let moved = self.lap(absolute(sum(lap.from, nudge), lap), lap.tolerance)?.relative(lap);
+            (0..2).for_each(|r| slopes[r][c] = (moved[r] - here[r]) / nudge[c]);
+        }
+        Ok(slopes)
+    }
+
+    /// Goes on in leaps from a place where a cycle between these velocities changes `q` by this distance.
+    pub(super) fn leap_on(&mut self, place: Place, range: [f64; 2], change: f64) -> Result<Leapt, Stop> {
+        let tolerance = self.lap_tolerance(range, change);
+        let mut lap = self.lap(place, tolerance)?;
+        let (mut time, mut cycles) = (0.0, 0.0);
+        for _ in 0..MOST_LEAPS {
+            let speed = lap.distance(lap.change);
+            let tolerance = self.lap_tolerance(lap.range, speed);
+            if tolerance < 0.3 * lap.tolerance {
+                lap = self.lap(lap.from, tolerance)?;
+            }
+            let jacobian = self.derivative(&lap)?;
+            if let Some(fixed) = self.fixed(&lap, jacobian)? {
+                let comes = fixed.monotone || fixed.missed < self.asked;
+                return Ok(if comes { Leapt::Cycle(fixed) } else { Leapt::At { place: lap.from, time } });
+            }
+            if self.dies_out(&lap) {
+                return Ok(Leapt::At { place: lap.from, time });
+            }
+            cycles = if cycles > 0.0 { cycles } else { (3.0 * NEAR / speed).max(1.5 * WORTH) };
+            let next = self.leap(&lap, jacobian, &mut cycles)?;
+            let Some((leap, n)) = next else {
+                return Ok(if time > 0.0 { Leapt::At { place: lap.from, time } } else { Leapt::Nowhere });
+            };
+            let end = leap.laps[S - 1];
+            if self.linear.stable && lap.beyond() > 0.0 && end.beyond() < 0.0 {
+                let (place, part) = leap.last_beyond(&lap, n);
+                return Ok(Leapt::At { place, time: time + part });
+            }
+            time += leap.time(n, n);
+            self.note_unseen(end.range);
+            let place = leap.place(&lap, 1.0);
+            lap = self.lap(place, end.tolerance)?;
+        }
+        Ok(Leapt::Nowhere)
+    }
+
+    /// Error of the steps of a lap between these velocities of which a change is to be known to a part of `rtol`.
+    fn lap_tolerance(&self, range: [f64; 2], change: f64) -> f64 {
+        // Rounding is that of the largest logarithm.
+        let finest = self.finest * (range[1] - range[0]).max(1.0);
+        size(range) * (0.01 * self.rtol * change).clamp(finest, self.tolerance.max(finest))
+    }
+
+    /// The attracting fixed point next to a lap.
+    fn fixed(&mut self, lap: &Lap, jacobian: Matrix) -> Result<Option<Fixed>, Stop> {
+        let (mut lap, mut jacobian, mut missed) = (*lap, jacobian, f64::NAN);
+        let mut before = NEAR;
+        // Whether steps are the finest, since the slowest moment magnifies their errors.
+        let mut is_exact = false;
+        for _ in 0..MOST_ITERATIONS {
+            let Some(step) = solve(jacobian, lap.relative(&lap).map(|change| -change)) else { return Ok(None) };
+            let distance = lap.distance(step);
+            // What errors of steps leave, and what rounding does where it stops the method.
+            let slack = distance / lap.distance(lap.change);
+            let noise = 10.0 * lap.tolerance / lap.size() * slack;
+            let tolerance = self.lap_tolerance(lap.range, if is_exact { 0.0 } else { 1.0 / slack });
+            let fine = lap.tolerance <= 2.0 * tolerance;
+            let ends = distance < 0.01 * self.rtol || (fine && distance < 3.0 * noise);
+            let stops = fine && distance > before && distance < NEAR * self.asked;
+            // False for NaN.
+            if !(distance < before || ends || stops) {
+                return Ok(None);
+            }
+            missed = if missed.is_nan() { distance } else { missed };
+            let trough = lap.range[0];
+            lap = self.lap(absolute(sum(lap.from, step), &lap), tolerance)?;
+            if ends || stops {
+                // A part of the last change is left, and so is what errors of steps make of it.
+                let left = (lap.range[0] - trough).abs() * (0.01 + 0.1 * noise / distance);
+                if left > TROUGH * self.asked && !is_exact {
+                    is_exact = true;
+                    lap = self.lap(lap.from, self.lap_tolerance(lap.range, 0.0))?;
+                    before = NEAR;
+                    continue;
+                }
+                if left > TROUGH * self.asked {
+                    lap.range[0] = f64::NAN;
+                }
+                let sure = noise < NEAR && lap.size() > SMALLEST && self.is_driven();
+                let monotone = multiplier(jacobian, 10.0 * lap.tolerance / (lap.size() * NUDGE));
+                return Ok(monotone.filter(|_| sure).map(|monotone| Fixed { lap, monotone, missed }));
+            }
+            before = if fine { 0.5 * distance } else { before };
+            jacobian = self.derivative(&lap)?;
+        }
+        Ok(None)
+    }
+
+    /// A leap from the start of a lap, of about `cycles`, which become those proposed for the next one; `None` if it is not worth
+    /// it.
+    fn leap(&mut self, lap: &Lap, jacobian: Matrix, cycles: &mut f64) -> Result<Option<(Leap, f64)>, Stop> {
+        // The estimate is of order S, the error of order 2 S - 1.
+        let allowed = exp(0.6 * ln(self.tolerance.max(self.finest)));
+        for _ in 0..MOST_TRIES {
+            if *cycles < WORTH {
+                break;
+            }
+            let n = cycles.floor();
+            let leap = self.stages(lap, jacobian, n)?;
+            // Newton's method may converge in a third of it.
+            let error =
+                leap.as_ref().and_then(|leap| leap.error(lap, jacobian, n)).map_or(400.0, |error| error / allowed);
+            *cycles = n * (0.9 * exp(-ln(error.max(1e-10)) / (S + 1) as f64)).clamp(0.2, 4.0);
+            if let Some(leap) = leap.filter(|_| error < 1.0) {
+                return Ok(Some((leap, n)));
+            }
+        }
+        Ok(None)
+    }
+
+    /// Newton's method for the changes at the nodes, with the derivative at the start; `None` if it fails.
+    fn stages(&mut self, lap: &Lap, jacobian: Matrix, n: f64) -> Result<Option<Leap>, Stop> {
+        let nodes = radau_iia_9().nodes;
+        let before = nodes.map(|u| basis(u - 0.5 / n));
+        let slopes = slopes(n);
+        let mut matrix = vec![0.0; 4 * S * S];
+        for (i, j) in (0..S).flat_map(|i| (0..S).map(move |j| (i, j))) {
+            for (r, c) in [(0, 0), (0, 1), (1, 0), (1, 1)] {
+                let slope = if r == c { slopes[i][j] } else { 0.0 };
+                matrix[(r * S + i) * 2 * S + c * S + j] = slope - if i == j { jacobian[r][c] } else { 0.0 };
+            }
+        }
+        let mut leap = Leap { change: [[0.0; S]; 2], laps: [*lap; S] };
+        let enough = (0.1 * self.tolerance.max(self.finest)).max(n * lap.tolerance / lap.size());
+        let weights: [f64; 2 * S] = std::array::from_fn(|i| if i < S { 1.0 } else { lap.size().powi(-2) });
+        let dot_steps = |p: &[f64], q: &[f64]| (0..2 * S).map(|i| weights[i] * p[i] * q[i]).sum::<f64>();
+        let mut steps: Vec<Vec<f64>> = Vec::new();
+        let mut last = f64::INFINITY;
+        for _ in 0..MOST_ITERATIONS {
+            let mut step = vec![0.0; 2 * S];
+            for i in 0..S {
+                let place = absolute(sum(lap.from, [0, 1].map(|r| dot(&before[i], &leap.change[r]))), lap);
+                // At first all begin where the leap does.
+                if !steps.is_empty() {
+                    leap.laps[i] = self.lap(place, lap.tolerance)?;
+                }
+                let change = leap.laps[i].relative(lap);
+                for r in 0..2 {
+                    step[r * S + i] = change[r] - dot(&slopes[i], &leap.change[r]);
+                }
+            }
+            if eliminate(&mut matrix.clone(), &mut step, 2 * S).is_none() {
+                return Ok(None);
+            }
+            // Broyden's update (Kelley, Iterative Methods for Linear and Nonlinear Equations, section 7.3).
+            for pair in steps.windows(2) {
+                let share = dot_steps(&pair[0], &step) / dot_steps(&pair[0], &pair[0]);
+                step.iter_mut().zip(&pair[1]).for_each(|(step, next)| *step += share * next);
+            }
+            if let Some(last) = steps.last() {
+                let share = 1.0 - dot_steps(last, &step) / dot_steps(last, last);
+                step.iter_mut().for_each(|step| *step /= share);
+            }
+            (0..2 * S).for_each(|i| leap.change[i / S][i % S] += step[i]);
+            let moved = (0..S).map(|i| lap.distance([step[i], step[S + i]])).fold(0.0, f64::max);
+            let rate = moved / last;
+            if !steps.is_empty() && rate < 0.5 && moved * rate < enough {
+                return Ok(Some(leap));
+            }
+            if !(moved < 0.7 * last && moved < LONGEST) {
+                return Ok(None);
+            }
+            last = moved;
+            steps.push(step);
+        }
+        Ok(None)
+    }
+}
+
+/// `slopes[i][j]`: change over a cycle at node `i` of the polynomial of node `j`.
+fn slopes(n: f64) -> [[f64; S]; S] {
+    let half = 0.5 / n;
+    radau_iia_9().nodes.map(|u| {
+        let [before, after] = [basis(u - half), basis(u + half)];
+        std::array::from_fn(|j| after[j] - before[j])
+    })
+}
+
+/// Whether a fixed point with this derivative of `g`, known up to `error`, attracts, and if so, whether places come to it from
+/// one side.
+fn multiplier([[ww, wy], [yw, yy]]: Matrix, error: f64) -> Option<bool> {
+    // Of 1 + dg/dq.
+    let (half, product) = (1.0 + 0.5 * (ww + yy), (1.0 + ww) * (1.0 + yy) - wy * yw);
+    let square = 0.25 * (ww - yy) * (ww - yy) + wy * yw;
+    if square < 0.0 {
+        return (product < 1.0 - error).then_some(false);
+    }
+    let root = square.sqrt();
+    // 1 less the greater one, without a difference of numbers close to 1.
+    let left = -0.5 * (ww + yy) - root;
+    (left > error && half - root > -1.0).then_some(half + root > 0.5 && half - root > -0.5)
+}
+
+impl Lap {
+    /// How far it goes beyond the band of settled velocities, in powers of e; negative within.
+    pub fn beyond(&self) -> f64 {
+        ln_1p(excess(self.range))
+    }
+}
+
+impl Leap {
+    /// The place at a share of it.
+    fn place(&self, lap: &Lap, u: f64) -> Place {
+        let basis = basis(u);
+        absolute(sum(lap.from, [0, 1].map(|r| dot(&basis, &self.change[r]))), lap)
+    }
+
+    /// Time of the first `j` of its `n` cycles.
+    fn time(&self, n: f64, j: f64) -> f64 {
+        let mut times = self.laps.map(|lap| lap.period);
+        let solved = eliminate(slopes(n).concat().as_mut_slice(), &mut times, S);
+        solved.map_or(f64::NAN, |()| dot(&basis(j / n), &times))
+    }
+
+    /// Its error: the defect of the first cycle, which is no node, as for a step of Radau IIA.
+    fn error(&self, lap: &Lap, jacobian: Matrix, n: f64) -> Option<f64> {
+        let first = basis(1.0 / n);
+        let change = lap.relative(lap);
+        let defect = [0, 1].map(|r| change[r] - dot(&first, &self.change[r]));
+        let rate = (S + 1) as f64 / n;
+        let matrix = [0, 1].map(|r| [0, 1].map(|c| if r == c { rate } else { 0.0 } - jacobian[r][c]));
+        solve(matrix, defect).map(|error| lap.distance(error))
+    }
+
+    /// A section soon before the last cycle that leaves the band of settled velocities, and its time.
+    fn last_beyond(&self, lap: &Lap, n: f64) -> (Place, f64) {
+        let ends = self.laps.map(|end| end.beyond() - lap.beyond());
+        // These cycles begin half a cycle before their nodes.
+        let beyond = |u: f64| lap.beyond() + dot(&basis(u), &ends);
+        let u = crossing(beyond, [0.0, 1.0], [lap.beyond(), lap.beyond() + ends[S - 1]], 1e-6);
+        let j = ((u * n).floor() - 2.0).max(0.0);
+        (self.place(lap, j / n), self.time(n, j))
+    }
+}
