@@ -1,7 +1,8 @@
 #!/usr/bin/env python3
-"""Reference table of the family bounded_friction.
+"""Reference tables of the family bounded_friction.
 
-    venv/bin/pip install python-flint && venv/bin/python generate_swift_friction.py          # five minutes
+    venv/bin/pip install python-flint mpmath gmpy2
+    venv/bin/python generate_swift_friction.py              # both tables, ten minutes; or name one of them
 
 Arithmetic: 66 digits. ln theta is a Taylor series of 90 terms on every step, found by Newton's method on series, in the direction in which theta
 contracts; alpha_3 is bracketed at few digits and finished by Newton's method with the derivative from the equation of variations. Extrema of the
@@ -10,6 +11,8 @@ collocation. Inputs are doubles, written by repr and used exactly.
 """
 import csv, math, random, sys
 from flint import arb, arb_poly, arb_series, ctx
+
+import generate
 
 HEADER = ["a", "b", "v_i", "v_f", "t_f", "tau_max", "t_least", "alpha", "work", "v_min", "v_max", "friction_max", "status"]
 # Bits, terms and accuracy of a step: a rough pass, the pass that counts, and the one that checks it.
@@ -251,27 +254,69 @@ def cases():
         yield a, b, v_i, v_f, t_f, ends + 10 ** chance.uniform(-3, 1)
 
 
-def main():
-    ctx.prec = FINE[0]
-    with open("swift_friction.csv", "w", newline="") as file:
+def slowing():
+    """From fast to slow within the physical domain: member and optimum differ by what is spent before a standstill."""
+    reported = 0.0791568165593238, 0.17585334461193852, 12580.311800324214, 3.002349387942489
+    for t_f, tau_max in ((0.4055424603833174, 1.5), (0.4055424603833174, 3.0), (0.35, 1.5), (2.0, 1.5)):
+        yield *reported, t_f, tau_max
+    chance = random.Random(7)
+    for _ in range(36):
+        a = 10 ** chance.uniform(-3, -0.53)
+        b = chance.choice([0.0, a * chance.uniform(0.1, 0.99), a * chance.uniform(1.01, 3), a * 10 ** chance.uniform(0.3, 1.3)])
+        v_f = 1 + 10 ** chance.uniform(-2, 3)
+        v_i = v_f * 10 ** chance.uniform(0.5, 5)
+        t_f = (1 / v_f - 1 / v_i) * (1 + 10 ** chance.uniform(-3, 1.5))
+        ends = max(1 + (a - b) * math.log(v) for v in (v_i, v_f))
+        if b <= 0.5 and 1e-3 <= t_f * v_i <= 1e7 and t_f <= 1e4:
+            yield a, b, v_i, v_f, t_f, ends + 10 ** chance.uniform(-2, 0.5)
+
+
+def least_work(case):
+    """Least work under the bound on v, without it where the bound leaves too little time; None where it is not physical."""
+    a, b, v_i, v_f, t_f, _ = case
+    bounded = t_f > generate.Problem(a, b, v_i, v_f, True).least_time()
+    try:
+        work = generate.optimal_row(a, b, v_i, v_f, t_f, bounded)[0]
+    except generate.Unphysical:
+        return "", int(bounded)
+    return generate.show(work), int(bounded)
+
+
+def rows(cases):
+    """Of each case its numbers; those of which the series do not find all digits are left out, and said to be."""
+    for case in cases:
+        ctx.prec = FINE[0]
+        exact = tuple(map(arb, case))
+        try:
+            least = least_time(exact)
+            numbers = Course(exact).member(least.mid()) if exact[4] > least else None
+        except (ArithmeticError, AssertionError) as error:
+            print("skipped", case, error, file=sys.stderr, flush=True)
+            continue
+        status = "infeasible" if numbers is None else "ok" if numbers[2] >= 1 else "below_bound"
+        shown = [x.str(25, radius=False) for x in numbers] if numbers else [""] * 5
+        shown = [least.mid().str(25, radius=False) if least.is_finite() else ""] + shown
+        print(case, status, file=sys.stderr, flush=True)
+        yield case, [repr(x) for x in case] + shown + [status]
+
+
+def write(name, header, rows):
+    with open(f"{name}.csv", "w", newline="") as file:
         file.write("# made by generate_swift_friction.py: Taylor series of 110 terms at 84 digits, 25 digits checked\n")
         writer = csv.writer(file, lineterminator="\n")
-        writer.writerow(HEADER)
-        for case in cases():
-            ctx.prec = FINE[0]
-            exact = tuple(map(arb, case))
-            try:
-                least = least_time(exact)
-                numbers = Course(exact).member(least.mid()) if exact[4] > least else None
-            except (ArithmeticError, AssertionError) as error:
-                print("skipped", case, error, file=sys.stderr, flush=True)
-                continue
-            status = "infeasible" if numbers is None else "ok" if numbers[2] >= 1 else "below_bound"
-            shown = [x.str(25, radius=False) for x in numbers] if numbers else [""] * 5
-            shown = [least.mid().str(25, radius=False) if least.is_finite() else ""] + shown
-            writer.writerow([repr(x) for x in case] + shown + [status])
+        writer.writerow(header)
+        for row in rows:
+            writer.writerow(row)
             file.flush()
-            print(case, status, file=sys.stderr, flush=True)
+
+
+def main():
+    names = sys.argv[1:] or ["swift_friction", "swift_friction_slowing"]
+    if "swift_friction" in names:
+        write("swift_friction", HEADER, (row for _, row in rows(cases())))
+    if "swift_friction_slowing" in names:
+        header = HEADER + ["work_optimal", "bounded"]
+        write("swift_friction_slowing", header, ([*row, *least_work(case)] for case, row in rows(slowing())))
 
 
 if __name__ == "__main__":

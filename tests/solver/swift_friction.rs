@@ -5,7 +5,7 @@ use ode_solvers::dop_shared::OutputType;
 use ode_solvers::{Dop853, SVector, System};
 use slipsweep::model::{Law, Transition};
 use slipsweep::protocol::swift::{Case, Obstacle, Swift, find};
-use slipsweep::protocol::{Effort, Motion, Status};
+use slipsweep::protocol::{Effort, Motion, Status, error, optimal};
 
 const PAPER: Law = Law { a: 0.03, b: 0.05 };
 
@@ -83,6 +83,45 @@ fn reference_every_number_is_good_to_rtol() {
         }
     }
     assert!(faults.is_empty(), "{} faults:\n{}", faults.len(), faults.join("\n"));
+}
+
+/// From fast to slow: the member may stand still in between, and steady sliding before that may last for thousands of
+/// contact lifetimes.
+#[test]
+fn reference_every_number_of_a_slowing_block_is_good_to_rtol_and_its_error_is_bounded() {
+    let family = find("bounded_friction").expect("is a family");
+    let rows = reference::table("swift_friction_slowing");
+    assert!(rows.len() >= 20, "{} rows", rows.len());
+    for row in &rows {
+        let case = in_table(row);
+        let status = if row.text("status") == "ok" { Status::Ok } else { Status::BelowBound };
+        for rtol in [1e-6, 1e-8, 1e-10, 1e-12] {
+            let swift = solve(&case, rtol).unwrap_or_else(|o| panic!("{o} at {rtol} in {row:?}"));
+            assert_eq!(swift.status(), status.with_friction(swift.friction_min), "{row:?}");
+            let work = row.number("work");
+            let bound = error::of_member(family, &case, &swift, &mut Effort::default()).expect("has a bound");
+            assert!((swift.work - work).abs() <= bound, "{rtol}: off by {:e} > {bound:e}", swift.work - work);
+            let budget = rtol.max(1e-10) + lost_in_time(&case, row);
+            let mut numbers = vec![
+                ("alpha", swift.alpha.unwrap_or(f64::NAN), row.number("alpha"), 1.0),
+                ("work", swift.work, work, 1.0),
+                // A velocity of next to nothing carries the rounding of its exponent.
+                ("v_min", swift.v_min, row.number("v_min"), 1.0 + row.number("v_min").max(1e-308).ln().abs()),
+                ("v_max", swift.v_max, row.number("v_max"), 1.0),
+                ("friction_max", swift.friction_max, row.number("friction_max"), 1.0),
+            ];
+            if let Some(least) = row.optional("work_optimal") {
+                let optimum = optimal::solve(&case.transition, case.t_f, row.number("bounded") == 1.0, rtol);
+                let found = optimum.value.expect("has an optimum").work;
+                // The gap is good to rtol of 1 + gap.
+                numbers.push(("1 + gap", swift.work / found, work / least, 2.0));
+            }
+            for (name, found, exact, terms) in numbers {
+                let error = relative(found, exact);
+                assert!(error <= budget * terms, "{name} at {rtol}: {found} off by {error:.1e} in {row:?}");
+            }
+        }
+    }
 }
 
 /// `ln theta`, work and `x`, along the formula for tau.
