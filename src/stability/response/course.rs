@@ -3,6 +3,7 @@
 use super::fate::{Linear, MOST_STEPS, follow_once, step_error};
 use super::orbit::Extremum;
 use super::slider::Slider;
+use crate::numerics::elementary::exp;
 
 /// The end of a response.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -62,7 +63,7 @@ pub struct Doubts {
 const ACCURACIES: [f64; 4] = [3.0, 0.3, 0.03, 0.003];
 
 /// Least change of a logarithm between two runs that tells them apart. Rounding of a state of size 1 in 1e4 steps.
-const ROUNDED: f64 = 1e-11;
+pub(super) const ROUNDED: f64 = 1e-11;
 
 /// `ln(v/v_f)` whose velocity is 0 in doubles, whatever its unit.
 pub(super) const VANISHING: f64 = -1000.0;
@@ -75,6 +76,9 @@ pub fn follow(slider: &Slider, linear: Linear, x: f64, rtol: f64) -> Course {
         // Below the critical stiffness the potential of theory.md grows without bound; at it nothing changes.
         let fate = if slider.is_critical() { Fate::Undecided } else { Fate::Ends };
         return Course { fate, high: None, low: None, t: 0.0, steps: 0, doubts: Doubts::default() };
+    }
+    if !is_checked(slider, x) {
+        return Course { fate: Fate::Undecided, high: None, low: None, t: 0.0, steps: 0, doubts: Doubts::default() };
     }
     let mut course = follow_once(slider, linear, x, rtol, ACCURACIES[0]);
     let mut known = false;
@@ -94,6 +98,20 @@ pub fn follow(slider: &Slider, linear: Linear, x: f64, rtol: f64) -> Course {
         known = doubts.is_some();
     }
     if known { course } else { Course { fate: Fate::Undecided, ..course } }
+}
+
+/// How far beyond the physical domain responses are followed, a factor of each bound. Chosen: the random sample of
+/// `tests/solver/stress/step.rs` checks numbers up to there.
+const BEYOND: f64 = 100.0;
+
+/// Whether a response lies in the physical domain of docs/accuracy.md, or not far from it.
+fn is_checked(slider: &Slider, x: f64) -> bool {
+    let near = |value: f64, [least, greatest]: [f64; 2]| (least / BEYOND..=greatest * BEYOND).contains(&value);
+    near(slider.a, [1e-3, 0.3])
+        && slider.b <= BEYOND * 20.0 * slider.a
+        && near(slider.k / slider.a, [1e-4, 1e5])
+        && (slider.inertia == 0.0 || near(slider.inertia / slider.a, [1e-8, 1e4]))
+        && near(exp(x), [1e-6, 1e6])
 }
 
 impl Course {

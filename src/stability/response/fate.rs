@@ -2,7 +2,7 @@
 //!
 //! Cycles are followed one by one while they change fast; where they change slowly, `envelope.rs` leaps over many.
 
-use super::course::{Course, Doubts, Fate, VANISHING};
+use super::course::{Course, Doubts, Fate, ROUNDED, VANISHING};
 use super::envelope::{FINEST, Fixed, Lap, Leapt, NUDGE, distance, size};
 use super::orbit::{BAND, Cycle, Extremum, Orbit, Seen, Stop};
 use super::slider::{Place, Slider, State, X};
@@ -57,7 +57,7 @@ pub(super) fn follow_once(slider: &Slider, linear: Linear, x: f64, rtol: f64, sh
     let mut follower = Follower {
         slider,
         linear,
-        asked: rtol,
+        asked: rtol.max(ROUNDED),
         rtol: share * rtol,
         tolerance: step_error(rtol, share),
         finest: FINEST * (share / 0.3).max(1.0),
@@ -141,7 +141,7 @@ impl<'a> Follower<'a> {
                 return Ok(Fate::Settled { time });
             }
             // A limit cycle? Small cycles may only have stopped to change fast: Newton's method finds those.
-            if size >= 1.0 && self.is_driven() && way.pace.has_arrived(self.rtol) && self.attracts(&lap)? {
+            if size >= 1.0 && self.is_driven() && way.pace.has_arrived(self.asked) && self.attracts(&lap)? {
                 let [low, high] = cycle.exact_range(&mut way.orbit);
                 return Ok(Fate::Cycle { period: cycle.period, high, low });
             }
