@@ -102,7 +102,7 @@ pub fn follow(slider: &Slider, linear: Linear, x: f64, rtol: f64) -> Course {
 
 /// How far beyond the physical domain responses are followed, a factor of each bound. Chosen: the random sample of
 /// `tests/solver/stress/step.rs` checks numbers up to there.
-const BEYOND: f64 = 100.0;
+const BEYOND: f64 = 1e6;
 
 /// Whether a response lies in the physical domain of docs/accuracy.md, or not far from it.
 fn is_checked(slider: &Slider, x: f64) -> bool {
