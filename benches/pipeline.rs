@@ -68,6 +68,9 @@ const ROUNDS: usize = 15;
 
 type Outcome<T> = Result<T, Box<dyn std::error::Error>>;
 
+/// A part of the measurement.
+type Part = fn(&Path) -> Outcome<()>;
+
 fn main() -> Outcome<()> {
     let folder = std::env::temp_dir().join(format!("slipsweep-pipeline-{}", std::process::id()));
     std::fs::create_dir_all(&folder)?;
@@ -77,7 +80,7 @@ fn main() -> Outcome<()> {
 }
 
 fn measure(folder: &Path) -> Outcome<()> {
-    let parts: [(&str, fn(&Path) -> Outcome<()>); 5] =
+    let parts: [(&str, Part); 5] =
         [("threads", threads), ("writers", writers), ("accuracy", accuracy), ("memory", memory), ("columns", columns)];
     // `-- writers` is for that part alone; cargo adds `--bench`.
     let wanted: Vec<String> = std::env::args().skip(1).filter(|word| !word.starts_with('-')).collect();

@@ -150,10 +150,10 @@ impl Course {
         // That of the cycle may be the least of all.
         doubts.trough = !slow(low, bottom) || (doubts.cycle_trough && bottom > VANISHING);
         // The flatter a peak, the less is known of when it was. On the way to a cycle all but as high moments are many.
-        let later = |peak: Extremum, exact: Extremum| !((peak.t / exact.t - 1.0).abs() <= rtol / exact.x.min(1.0));
+        let simultaneous = |peak: Extremum, exact: Extremum| (peak.t / exact.t - 1.0).abs() <= rtol / exact.x.min(1.0);
         doubts.t_peak |= match (self.peak(rtol), other.peak(rtol)) {
             (None, None) => false,
-            (Some(peak), Some(other)) => later(peak, other),
+            (Some(peak), Some(other)) => !simultaneous(peak, other),
             _ => true,
         };
         (ends && near(high, top)).then_some(doubts)
