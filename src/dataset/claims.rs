@@ -3,9 +3,16 @@
 //! Footers and page headers are structs of Thrift's compact protocol. They are walked without knowing all of their fields:
 //! no list may be longer than the bytes that are left, and of the numbers only those count that memory is taken by.
 
+use std::fs::File;
+use std::sync::Arc;
+
+use arrow_schema::{DataType, FieldRef, Fields, Schema};
+use parquet::arrow::arrow_reader::{ArrowReaderMetadata, ArrowReaderOptions};
 use parquet::errors::ParquetError;
 use parquet::file::metadata::ParquetMetaData;
 use parquet::file::reader::ChunkReader;
+
+use super::layout::label;
 
 /// Most bytes of a footer.
 const MOST_OF_FOOTER: usize = 1 << 24;
@@ -17,6 +24,22 @@ const MOST_OF_PAGE: i64 = 40 << 20;
 const MOST_VALUES: i64 = 1 << 22;
 /// Most groups of rows, since their number has 16 bits.
 const MOST_GROUPS: i64 = i16::MAX as i64;
+
+/// What a Parquet file says of itself, checked: a few bytes can stand for any number of rows. Words are read as codes, whoever wrote them.
+///
+/// What Arrow or pandas add to a file about its types is not asked for: a column is what Parquet says that it is.
+pub(crate) fn coded(file: &File) -> Result<ArrowReaderMetadata, ParquetError> {
+    check_footer(file)?;
+    let plain = ArrowReaderMetadata::load(file, ArrowReaderOptions::new().with_skip_arrow_metadata(true))?;
+    check_pages(file, plain.metadata())?;
+    let coded = |field: &FieldRef| match field.data_type() {
+        DataType::Utf8 => Arc::new(field.as_ref().clone().with_data_type(label())),
+        _ => field.clone(),
+    };
+    let schema: Fields = plain.schema().fields().iter().map(coded).collect();
+    let options = ArrowReaderOptions::new().with_schema(Arc::new(Schema::new(schema)));
+    ArrowReaderMetadata::try_new(plain.metadata().clone(), options)
+}
 
 /// Whether the lists of the footer, if there is one, are as long as they say.
 pub fn check_footer(file: &impl ChunkReader) -> Result<(), ParquetError> {

@@ -1,21 +1,19 @@
 //! Columns of a table, read part by part: the memory does not grow with the table.
 
-use std::fs::File;
 use std::path::Path;
-use std::sync::Arc;
 
 use arrow_array::cast::AsArray;
 use arrow_array::types::{Float64Type, Int32Type};
 use arrow_array::{Array, RecordBatchReader};
-use arrow_schema::{DataType, FieldRef, Fields, Schema};
-use parquet::arrow::arrow_reader::{ArrowReaderMetadata, ArrowReaderOptions, ParquetRecordBatchReaderBuilder};
+use arrow_schema::DataType;
+use parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
 use parquet::arrow::{ProjectionMask, parquet_to_arrow_schema};
 use parquet::errors::ParquetError;
 use parquet::file::metadata::{ParquetMetaDataReader, RowGroupMetaData};
 use parquet::file::statistics::Statistics;
 
 use super::cell::Cell;
-use super::claims::{check_footer, check_pages};
+use super::claims::{check_footer, coded};
 use super::folder::DatasetError;
 use super::guard::guarded;
 use super::layout::label;
@@ -212,22 +210,6 @@ fn range(group: &RowGroupMetaData, name: &str) -> Option<(f64, f64)> {
 pub fn row(path: &Path, row: usize) -> Result<Row, FrameError> {
     let frame = open(path, None, Rows::One(row))?;
     if frame.height == 1 { Ok(frame.row(0)) } else { Err(wrong(path, format!("it has no row {row}"))) }
-}
-
-/// What a Parquet file says of itself, checked: a few bytes can stand for any number of rows. Words are read as codes, whoever wrote them.
-///
-/// What Arrow or pandas add to a file about its types is not asked for: a column is what Parquet says that it is.
-pub(crate) fn coded(file: &File) -> Result<ArrowReaderMetadata, ParquetError> {
-    check_footer(file)?;
-    let plain = ArrowReaderMetadata::load(file, ArrowReaderOptions::new().with_skip_arrow_metadata(true))?;
-    check_pages(file, plain.metadata())?;
-    let coded = |field: &FieldRef| match field.data_type() {
-        DataType::Utf8 => Arc::new(field.as_ref().clone().with_data_type(label())),
-        _ => field.clone(),
-    };
-    let schema: Fields = plain.schema().fields().iter().map(coded).collect();
-    let options = ArrowReaderOptions::new().with_schema(Arc::new(Schema::new(schema)));
-    ArrowReaderMetadata::try_new(plain.metadata().clone(), options)
 }
 
 /// Which rows of a file are read.

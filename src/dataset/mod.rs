@@ -26,6 +26,8 @@ mod survey;
 
 pub use batch::batch;
 pub use cell::Cell;
+pub(crate) use claims::coded;
+#[cfg(feature = "query")]
 pub(crate) use claims::{check_footer, check_pages};
 pub use digest::{Counts, Digest, FEW, Row as DigestRow};
 pub use folder::{DatasetError, Folder};
@@ -36,9 +38,7 @@ pub(crate) use guard::guarded;
 #[cfg(feature = "cli")]
 pub(crate) use guard::is_guarded;
 pub use layout::Layout;
-pub(crate) use layout::field;
-#[cfg(feature = "query")]
-pub(crate) use layout::label;
+pub(crate) use layout::{field, label};
 pub use manifest::{Build, Manifest, ManifestTable};
 pub use part::encode;
 pub use session::{Company, Holder, Session};

@@ -15,8 +15,7 @@ use indexmap::IndexSet;
 use parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
 
 use super::error::{MOST_OF_NAME, SpecError, unknown};
-use crate::dataset::frame::coded;
-use crate::dataset::{guarded, label};
+use crate::dataset::{coded, guarded, label};
 use crate::grid::{Axis, Factor, Label, Quantity, Scale, Values};
 use crate::model::Units;
 use crate::names::shown;
