@@ -53,7 +53,7 @@ impl Slider {
         self.k == self.b - self.a && self.b - self.k == self.a
     }
 
-    /// The state on the section `v = v_f` at a [`Place`].
+    /// The state on the section `v = v_f` at a place.
     pub fn state(&self, [w, y]: Place) -> State {
         let pull = exp(w);
         if self.inertia > 0.0 { [pull + self.frozen() * y, y, 0.0] } else { [pull, pull / self.b, 0.0] }
