@@ -777,3 +777,16 @@ fn reference_settling_times_after_many_cycles() {
     }
     assert!(checked >= 3);
 }
+
+/// Just above the critical stiffness, where a large step comes slowly to a stable cycle and was said to settle. LSODA, an integrator of
+/// another kind, takes 600 cycles to peaks that tend to 3534480.
+#[test]
+fn regress_a_large_step_ends_on_the_cycle_around_stable_sliding() {
+    let transition = Transition { law: PAPER, v_i: 1e5, v_f: 735207.536387918 };
+    let step = Step { transition, k: 0.005170920242896759, m: MASS };
+    assert!(SteadySliding::new(PAPER, step.k, MASS, transition.v_f).is_stable());
+    for rtol in [1e-4, 1e-6, 1e-8] {
+        let cycle = respond(&step, rtol).cycle.expect("is a limit cycle");
+        assert!(relative(cycle.v_peak, 3534480.0) < 1e-5, "{rtol}: {cycle:?}");
+    }
+}
