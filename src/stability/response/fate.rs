@@ -229,8 +229,12 @@ impl<'a> Follower<'a> {
 
     /// The same with the finest steps.
     fn dies_out_exactly(&mut self, lap: &Lap) -> Result<bool, Stop> {
-        let fine = self.lap(lap.from, self.finest * lap.size())?;
-        Ok(self.dies_out(&fine))
+        match self.lap(lap.from, self.finest * lap.size()) {
+            Ok(fine) => Ok(self.dies_out(&fine)),
+            // Steps that only follow rounding: the next cycle tries coarser ones.
+            Err(Stop::Faint) => Ok(false),
+            Err(stop) => Err(stop),
+        }
     }
 
     /// Keeps the extrema of a cycle if they are further out than those before.
