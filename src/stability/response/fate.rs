@@ -307,7 +307,9 @@ impl Pace {
         let largest = if share < AT_ONCE { share } else { share.max(before) };
         let left = largest / (1.0 - largest);
         // False for NaN.
-        let arrived = self.change < FAR * self.first && largest < FAST && self.change * left < ARRIVED * rtol;
+        let comes = self.change < FAR * self.first && largest < FAST && self.change * left < ARRIVED * rtol;
+        // What has arrived changes by errors of steps, whose shares of each other are chance.
+        let arrived = comes || (self.lingers > 0 && self.change < ARRIVED * rtol);
         self.lingers += u32::from(arrived);
         let lower = self.lower * left.max(0.01);
         arrived && (lower < ARRIVED * rtol || self.low < VANISHING || self.lingers > PATIENCE)
