@@ -96,7 +96,7 @@ pub fn estimate(sweep: &Sweep, folder: &Path) -> Result<Estimates, RunError> {
     // What cannot be written is not for an estimate to complain about.
     let written = |bytes: f64| atomic::time(folder, bytes as usize).map_or(0.0, |time| time.as_secs_f64());
     let (sync, part) = (written(0.0), written(bytes));
-    let shared = optimum * plan.optima as f64 * pool.current_num_threads() as f64;
+    let shared = optimum * plan.optima as f64;
     Ok(Estimates { tables, shared, sync, part, parts })
 }
 
@@ -119,8 +119,8 @@ pub fn sizes(sweep: &Sweep) -> Result<Vec<f64>, RunError> {
 #[derive(Debug, Clone, Copy, Default)]
 struct Sample {
     rows: u64,
-    /// Optimal protocols that were solved for other tables, too.
-    optima: u64,
+    /// Seconds of the threads that computed and encoded them, without those that waited for the last range of a sample.
+    seconds: f64,
     bytes: u64,
 }
 
@@ -128,13 +128,13 @@ impl Sum for Sample {
     fn sum<I: Iterator<Item = Sample>>(samples: I) -> Sample {
         samples.fold(Sample::default(), |sum, one| Sample {
             rows: sum.rows + one.rows,
-            optima: sum.optima + one.optima,
+            seconds: sum.seconds + one.seconds,
             bytes: sum.bytes + one.bytes,
         })
     }
 }
 
-/// What a range of rows costs, however many it has, and each of its rows: in seconds of all threads together, or in bytes.
+/// What a range of rows costs, however many it has, and each of its rows: in seconds of one thread, or in bytes.
 #[derive(Debug, Clone, Copy)]
 struct Line {
     range: f64,
@@ -153,7 +153,7 @@ impl Line {
     }
 }
 
-/// Who takes samples.
+/// Computes samples of the tables of a sweep.
 struct Sampler<'a> {
     sweep: &'a Sweep,
     plan: &'a Plan,
@@ -170,7 +170,8 @@ impl Sampler<'_> {
         let began = Instant::now();
         let left = || budget - began.elapsed().as_secs_f64();
         // Rows that cost much leave time for a few.
-        let mut places = self.pool.current_num_threads() as u64;
+        let threads = self.pool.current_num_threads();
+        let mut places = threads as u64;
         let mut one = sample(1, places, f64::INFINITY)?;
         if left() > 0.8 * budget {
             places = PLACES;
@@ -184,7 +185,7 @@ impl Sampler<'_> {
         while length < longest {
             let is_flat = length == 1 || long[0] < 2.0 * one[0];
             let row = (SPREAD * 1e-9 * request.table.cost() as f64).min(long[0] / length as f64);
-            let next = (long[0] + 3.0 * length as f64 * row) * places as f64;
+            let next = (long[0] + 3.0 * length as f64 * row) * places as f64 / threads as f64;
             let is_bearable = began.elapsed().as_secs_f64() + next < LONGEST;
             if left() < 0.6 * budget && !(is_flat && is_bearable) {
                 break;
@@ -206,11 +207,10 @@ impl Sampler<'_> {
             }
         }
         let parts = request.rows.div_ceil(request.table.rows_per_part());
-        let threads = self.pool.current_num_threads() as f64;
-        Ok(Estimate { seconds: seconds.of(parts, request.rows) * threads, bytes: bytes.of(parts, request.rows) })
+        Ok(Estimate { seconds: seconds.of(parts, request.rows), bytes: bytes.of(parts, request.rows) })
     }
 
-    /// Seconds, bytes and rows of a range of a table, on the mean of `places` ranges of `length` rows, or as many as are begun within `limit`
+    /// Seconds of one thread, bytes and rows of a range of a table, on the mean of `places` ranges of `length` rows, or as many as are begun within `limit`
     /// seconds.
     fn mean(
         &self,
@@ -221,13 +221,15 @@ impl Sampler<'_> {
     ) -> Result<[f64; 3], RunError> {
         let layout = Layout::new(request.table, &request.selection, &self.sweep.grid);
         let compute = |rows: Range<u64>| -> Result<Sample, RunError> {
+            let start = Instant::now();
             let mut sheet = Sheet::new(request.selection.indices().len());
             sheet.resize((rows.end - rows.start) as usize);
             let work = request.table.compute(job, rows.clone(), &mut sheet)?;
             let footer = Footer::new(&self.manifest, request.table.name(), rows.clone());
             let (bytes, _) = encode(&layout, job.rows, &sheet, &footer).map_err(DatasetError::Sample)?;
             let optima = if optimum > 0.0 { work.optima } else { 0 };
-            Ok(Sample { rows: rows.end - rows.start, optima, bytes: bytes.len() as u64 })
+            let seconds = start.elapsed().as_secs_f64() - optima as f64 * optimum;
+            Ok(Sample { rows: rows.end - rows.start, seconds: seconds.max(0.0), bytes: bytes.len() as u64 })
         };
         let start = Instant::now();
         let ranges = (0..places as usize).into_par_iter().with_max_len(1).filter_map(|place| {
@@ -236,11 +238,10 @@ impl Sampler<'_> {
         });
         let taken = self.pool.install(|| ranges.collect::<Result<Vec<_>, _>>())?;
         let sum: Sample = taken.iter().copied().sum();
-        let seconds = start.elapsed().as_secs_f64() - sum.optima as f64 * optimum;
-        Ok([seconds.max(0.0), sum.bytes as f64, sum.rows as f64].map(|all| all / taken.len() as f64))
+        Ok([sum.seconds, sum.bytes as f64, sum.rows as f64].map(|all| all / taken.len() as f64))
     }
 
-    /// Seconds of all threads together for an optimal protocol that tables share; 0 if there is none.
+    /// Seconds of one thread for an optimal protocol that tables share; 0 if there is none.
     fn optimum(&self, budget: f64) -> f64 {
         let Some(rows) = self.sweep.optimum_rows.as_ref().filter(|_| self.plan.optima <= Optima::MOST_KEPT) else {
             return 0.0;
@@ -253,7 +254,7 @@ impl Sampler<'_> {
             let points: Vec<Point> = starts.map(|row| self.sweep.grid.scaled(&rows.point(row))).collect();
             let start = Instant::now();
             self.pool.install(|| points.par_iter().for_each(|point| _ = optima.get(0, point)));
-            let each = start.elapsed().as_secs_f64() / places as f64;
+            let each = start.elapsed().as_secs_f64() * self.pool.current_num_threads() as f64 / places as f64;
             let most = rows.rows().min(MOST_PLACES);
             if places == most || began.elapsed().as_secs_f64() > 0.2 * budget {
                 return each;

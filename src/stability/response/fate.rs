@@ -186,7 +186,7 @@ impl<'a> Follower<'a> {
         let from = way.place.replace(place)?;
         let change = [place[0] - from[0], place[1] - from[1]];
         let range = cycle.range();
-        way.pace.take(distance(change, size(range)), range[0]);
+        way.pace.take(distance(change, size(range)), range[0], self.asked);
         let lap = Lap { from, change, period: cycle.period, range, tolerance: way.tolerance };
         change[0].is_finite().then_some(lap)
     }
@@ -276,7 +276,7 @@ struct Pace {
     /// The slowest moment, and its change.
     low: f64,
     lower: f64,
-    /// Cycles since the section has arrived.
+    /// Cycles that changed less than a part of `rtol`.
     lingers: u32,
 }
 
@@ -288,31 +288,32 @@ impl Default for Pace {
 }
 
 impl Pace {
-    /// Takes in the change of the section over a cycle, and its slowest moment.
-    fn take(&mut self, change: f64, low: f64) {
+    /// Takes in the change of the section over a cycle, and its slowest moment. Rises of a change below `rtol` may be
+    /// errors of steps.
+    fn take(&mut self, change: f64, low: f64, rtol: f64) {
         let share = change / self.change;
         if share < FAST {
             self.first = self.first.max(self.change);
-        } else {
+        } else if change.is_nan() || change > rtol {
             self.first = f64::NAN;
         }
         (self.change, self.shares) = (change, [share, self.shares[0]]);
         (self.low, self.lower) = (low, (low - self.low).abs());
     }
 
-    /// Whether all changes to come, a geometric series, are less than a part of `rtol`, and those of the slowest moment, which
-    /// may magnify them, unless errors of steps keep it from that. A row of changes from far away shows that they are no errors.
+    /// Whether all changes to come, a geometric series, are less than a part of `rtol`, and so are those of the slowest moment,
+    /// which may magnify them. A row of changes from far away shows that they are no errors of steps; where those are all that
+    /// is left, the series has no ratio, and changes as small as that have lasted.
     fn has_arrived(&mut self, rtol: f64) -> bool {
         let [share, before] = self.shares;
         let largest = if share < AT_ONCE { share } else { share.max(before) };
         let left = largest / (1.0 - largest);
         // False for NaN.
-        let comes = self.change < FAR * self.first && largest < FAST && self.change * left < ARRIVED * rtol;
-        // What has arrived changes by errors of steps, whose shares of each other are chance.
-        let arrived = comes || (self.lingers > 0 && self.change < ARRIVED * rtol);
-        self.lingers += u32::from(arrived);
+        let comes_from_far = self.change < FAR * self.first;
+        let comes = comes_from_far && largest < FAST && self.change * left < ARRIVED * rtol;
+        self.lingers += u32::from(comes_from_far && self.change < ARRIVED * rtol);
         let lower = self.lower * left.max(0.01);
-        arrived && (lower < ARRIVED * rtol || self.low < VANISHING || self.lingers > PATIENCE)
+        (comes && (lower < ARRIVED * rtol || self.low < VANISHING)) || self.lingers > PATIENCE
     }
 
     /// Whether cycles change little, and the next one will change about as much.
