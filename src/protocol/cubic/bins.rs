@@ -85,11 +85,17 @@ impl Bins {
         }
     }
 
-    /// Puts a panel of the shortcut at `index`, given by its coordinates and bounds, into a bin; a full bin is emptied
+    /// Puts a panel of the shortcut at `index`, given by its lane of a plan, its coordinates and bounds, into a bin; a full bin is emptied
     /// and summed, its sums added to the works.
     #[inline(always)]
-    #[allow(clippy::too_many_arguments)]
-    pub fn add(&mut self, of: &Landscape, plan: &Plan, lane: usize, panel: [f64; 4], index: usize, work: &mut [f64]) {
+    pub fn add(
+        &mut self,
+        of: &Landscape,
+        (plan, lane): (&Plan, usize),
+        panel: [f64; 4],
+        index: usize,
+        work: &mut [f64],
+    ) {
         let bin = plan.bin[lane] as usize;
         let Load { bundle, indices, count, .. } = &mut self.loads[self.order[bin]];
         let last = *count % LANES;
@@ -108,12 +114,10 @@ impl Bins {
     /// As [`Bins::add`], for eight shortcuts of one bin from lane `first` on, over all of `[0, 1]`: a bundle
     /// of their own.
     #[inline(always)]
-    #[allow(clippy::too_many_arguments)]
     pub fn add_all(
         &mut self,
         of: &Landscape,
-        plan: &Plan,
-        first: usize,
+        (plan, first): (&Plan, usize),
         [a_2, a_3]: [&Block; 2],
         indices: &[usize],
         work: &mut [f64],

@@ -342,60 +342,22 @@ fn chart(frame: &Frame, cells: &[Place; TOGETHER]) -> [Cell; TOGETHER] {
         }
     }
     let Places { re, im, doubt } = places::<f32>(ends, &a_2, &a_3);
-    let (straight, shadow) = nearest(&re, &im, &[0.0; BLOCK], &[1.0; BLOCK]);
-    // One map for each cell: how far beyond the upper and the lower end it has to be at most.
-    let (mut above, mut below) = ([0.0f32; BLOCK], [0.0f32; BLOCK]);
-    for i in 0..BLOCK {
-        let upper = shadow[i] > 0.5;
-        let beyond = if upper { shadow[i] - 1.0 } else { -shadow[i] };
-        let beyond = if beyond > 0.0 { beyond } else { 0.0 };
-        (above[i], below[i]) = if upper { (beyond, -1.0) } else { (-1.0, beyond) };
+    let (mut straight, shadow) = nearest(&re, &im, &[0.0; BLOCK], &[1.0; BLOCK]);
+    for straight in &mut straight {
+        *straight = 2.0 * straight.sqrt();
     }
-    let (above, below) = (lowest(&above), lowest(&below));
-    let (mut sides, mut gaps) = ([0.0f32; TOGETHER], [0.0f32; TOGETHER]);
-    for c in 0..TOGETHER {
-        let beyond = if above[c] >= 0.0 { above[c] } else { below[c] };
-        sides[c] = if above[c] >= 0.0 { 1.0 } else { -1.0 };
-        gaps[c] = SAFE as f32 * beyond;
-    }
-    let (side, gap) = (spread(sides), spread(gaps));
-    let (mut near, mut far) = ([0.0f32; BLOCK], [0.0f32; BLOCK]);
-    for i in 0..BLOCK {
-        (near[i], far[i]) = (gap[i].sqrt(), (1.0 + gap[i]).sqrt());
-    }
-    let mut least = [f32::MAX; BLOCK];
-    for k in 0..ZEROS {
-        for i in 0..BLOCK {
-            let end = if side[i] > 0.0 { 1.0 - re[k][i] } else { re[k][i] };
-            let (x, y) = (gap[i] + end, im[k][i]);
-            let size = if PAIRS.contains(&k) { (x * x + y * y).sqrt() } else { x.abs() };
-            let (_, sum) = rooted(size, x, near[i], far[i]);
-            least[i] = if sum < least[i] { sum } else { least[i] };
-        }
-    }
-    let mut focal = [[0.0f32; BLOCK]; 2];
-    for i in 0..BLOCK {
-        focal[0][i] = 2.0 * straight[i].sqrt();
-        focal[1][i] = 2.0 * least[i].sqrt() / (far[i] - near[i]);
-    }
-    // As in the plan of one shortcut, a larger power might help where the centre of the map itself is what hinders.
-    let mut room = [0.0f32; BLOCK];
-    for i in 0..BLOCK {
-        let ceiling = 4.0 * near[i] / (far[i] - near[i]);
-        room[i] = 0.5 * ceiling - (focal[1][i] - 2.0);
-    }
-    let room = lowest(&room);
-    let (straight, squared) = (lowest(&focal[0]), lowest(&focal[1]));
+    let centres = Centres::of(&shadow);
+    let Squared { focal: squared, room } = Squared::of(&re, &im, &centres);
     let mut gain = [0.0f32; TOGETHER];
-    for c in 0..TOGETHER {
-        gain[c] = squared[c] - straight[c];
+    for (gain, (squared, straight)) in gain.iter_mut().zip(lowest(&squared).into_iter().zip(lowest(&straight))) {
+        *gain = squared - straight;
     }
-    let gains = spread(gain);
-    let (mut paces, mut sound, mut unsure) = ([0.0; BLOCK], [0.0; BLOCK], [0.0f32; TOGETHER]);
+    let (gains, sides) = (spread(gain), spread(centres.side));
+    let (mut paces, mut sound) = ([0.0; BLOCK], [true; TOGETHER]);
     let steady = if ends.rise.high < 0.0 { 1.0 } else { -1.0 };
     let mean = ends.t_f - ends.rise.high;
     for i in 0..BLOCK {
-        let focal = if gains[i] > 0.0 { focal[1][i] } else { focal[0][i] };
+        let focal = if gains[i] > 0.0 { squared[i] } else { straight[i] };
         // What errors of the zeros may cost.
         let excess = (f64::from(focal) - 2.0) * (0.5 / (1.0 + COARSE));
         let excess = if excess > 0.0 { excess } else { 0.0 };
@@ -403,44 +365,115 @@ fn chart(frame: &Frame, cells: &[Place; TOGETHER]) -> [Cell; TOGETHER] {
     }
     for i in 0..CORNERS * TOGETHER {
         let path = Path::new(ends, a_2[i], a_3[i]);
-        let side = if gains[i] > 0.0 { f64::from(side[i]) } else { steady };
+        let side = if gains[i] > 0.0 { f64::from(sides[i]) } else { steady };
         // The mean of n is the least sum of its coefficients' sizes.
         let kept = path.is_sound(side > 0.0, 0.0, -side, accuracy) & (accuracy.rounding * mean >= 3.0 * path.slack());
-        sound[i] = if kept { 1.0 } else { 0.0 };
+        sound[i % TOGETHER] &= kept;
     }
-    for doubts in doubt.chunks_exact(TOGETHER) {
-        for c in 0..TOGETHER {
-            unsure[c] += doubts[c];
-        }
+    for (i, doubt) in doubt.into_iter().enumerate() {
+        sound[i % TOGETHER] &= doubt == 0.0;
     }
-    let mut found = [Cell::NONE; TOGETHER];
-    for (c, cell) in found.iter_mut().enumerate() {
-        let [mm, mp, pm, pp, m_low, m_high, low_m, high_m] = std::array::from_fn(|sample| paces[sample * TOGETHER + c]);
-        let off = |middle: f64, one: f64, other: f64| (middle - 0.5 * (one + other)).abs();
-        let greater = |a: f64, b: f64| if a > b { a } else { b };
-        let off_u = greater(off(m_low, mm, pm), off(m_high, mp, pp));
-        let off_v = greater(off(low_m, mm, mp), off(high_m, pm, pp));
-        let slack = off_u + off_v;
-        let lowest = -greater(greater(-mm, -mp), greater(-pm, -pp));
+    std::array::from_fn(|c| {
         let squared = gain[c] > 0.0;
-        let (side, gap) = if squared { (f64::from(sides[c]), f64::from(gaps[c])) } else { (steady, 0.0) };
-        let one_map =
-            !squared || ((above[c] >= 0.0) | (below[c] >= 0.0)) & ((gap == 0.0) | (gap >= BLURRED)) & (gap <= 1.0);
-        let corners = (0..CORNERS).all(|corner| sound[corner * TOGETHER + c] > 0.0);
+        let (side, gap) = if squared { (centres.side[c], centres.gap[c]) } else { (steady as f32, 0.0) };
+        let one_map = !squared || centres.common[c] & ((gap == 0.0) | (gap >= BLURRED as f32)) & (gap <= 1.0);
         let meant = middles[0][c].abs() + middles[1][c].abs() < FARTHEST;
-        *cell = Cell { place: cells[c], ..Cell::NONE };
-        if unsure[c] == 0.0 && one_map && corners && meant && slack <= ROUGH * lowest {
-            cell.pace = [
-                0.25 * ((mm + pp) + (mp + pm)) - slack,
-                0.5 * ((pp - mm) + (pm - mp)),
-                0.5 * ((pp - mm) - (pm - mp)),
-                (pp + mm) - (pm + mp),
-            ];
-            (cell.side, cell.gap, cell.squarings) = (side, gap, if squared { 1.0 } else { 0.0 });
-            (cell.from, cell.to) = if squared { (gap.sqrt(), (1.0 + gap).sqrt()) } else { (0.0, 1.0) };
-            let most = if squared && room[c] < 0.0 { CHEAP / STEP } else { WHOLE };
-            cell.least = 1.0 / most as f64;
+        let none = Cell { place: cells[c], ..Cell::NONE };
+        if !(sound[c] && one_map && meant) {
+            return none;
         }
+        let (side, gap) = (f64::from(side), f64::from(gap));
+        let (from, to) = if squared { (gap.sqrt(), (1.0 + gap).sqrt()) } else { (0.0, 1.0) };
+        let most = if squared && room[c] < 0.0 { CHEAP / STEP } else { WHOLE };
+        let squarings = if squared { 1.0 } else { 0.0 };
+        let cell = Cell { side, gap, squarings, from, to, least: 1.0 / most as f64, ..none };
+        interpolated(std::array::from_fn(|sample| paces[sample * TOGETHER + c]))
+            .map_or(none, |pace| Cell { pace, ..cell })
+    })
+}
+
+/// ln rho over a cell from that at its samples; `None` where it is not smooth enough.
+#[inline(always)]
+fn interpolated([mm, mp, pm, pp, m_low, m_high, low_m, high_m]: [f64; SAMPLES.len()]) -> Option<[f64; 4]> {
+    let off = |middle: f64, one: f64, other: f64| (middle - 0.5 * (one + other)).abs();
+    let greater = |a: f64, b: f64| if a > b { a } else { b };
+    let off_u = greater(off(m_low, mm, pm), off(m_high, mp, pp));
+    let off_v = greater(off(low_m, mm, mp), off(high_m, pm, pp));
+    let slack = off_u + off_v;
+    let lowest = -greater(greater(-mm, -mp), greater(-pm, -pp));
+    (slack <= ROUGH * lowest).then_some([
+        0.25 * ((mm + pp) + (mp + pm)) - slack,
+        0.5 * ((pp - mm) + (pm - mp)),
+        0.5 * ((pp - mm) - (pm - mp)),
+        (pp + mm) - (pm + mp),
+    ])
+}
+
+/// The centres of one map for each cell.
+struct Centres {
+    /// Beyond which end: +1 the upper, -1 the lower.
+    side: [f32; TOGETHER],
+    /// How far beyond it.
+    gap: [f32; TOGETHER],
+    /// Whether all samples of a cell ask for the same end.
+    common: [bool; TOGETHER],
+}
+
+impl Centres {
+    /// As far beyond an end as the shadows of the samples allow.
+    #[inline(always)]
+    fn of(shadow: &[f32; BLOCK]) -> Centres {
+        let (mut above, mut below) = ([0.0f32; BLOCK], [0.0f32; BLOCK]);
+        for i in 0..BLOCK {
+            let upper = shadow[i] > 0.5;
+            let beyond = if upper { shadow[i] - 1.0 } else { -shadow[i] };
+            let beyond = if beyond > 0.0 { beyond } else { 0.0 };
+            (above[i], below[i]) = if upper { (beyond, -1.0) } else { (-1.0, beyond) };
+        }
+        let (above, below) = (lowest(&above), lowest(&below));
+        let mut centres = Centres { side: [0.0; TOGETHER], gap: [0.0; TOGETHER], common: [false; TOGETHER] };
+        for c in 0..TOGETHER {
+            let beyond = if above[c] >= 0.0 { above[c] } else { below[c] };
+            centres.side[c] = if above[c] >= 0.0 { 1.0 } else { -1.0 };
+            centres.gap[c] = SAFE as f32 * beyond;
+            centres.common[c] = (above[c] >= 0.0) | (below[c] >= 0.0);
+        }
+        centres
     }
-    found
+}
+
+/// What the map `r ± s^2` does for the samples of each cell.
+struct Squared {
+    /// Their focal sums.
+    focal: [f32; BLOCK],
+    /// Below 0 where the centre of the map itself is what hinders, so that a larger power might help.
+    room: [f32; TOGETHER],
+}
+
+impl Squared {
+    #[inline(always)]
+    fn of(re: &[[f32; BLOCK]; ZEROS], im: &[[f32; BLOCK]; ZEROS], centres: &Centres) -> Squared {
+        let (side, gap) = (spread(centres.side), spread(centres.gap));
+        let (mut near, mut far) = ([0.0f32; BLOCK], [0.0f32; BLOCK]);
+        for i in 0..BLOCK {
+            (near[i], far[i]) = (gap[i].sqrt(), (1.0 + gap[i]).sqrt());
+        }
+        let mut least = [f32::MAX; BLOCK];
+        for k in 0..ZEROS {
+            for i in 0..BLOCK {
+                let end = if side[i] > 0.0 { 1.0 - re[k][i] } else { re[k][i] };
+                let (x, y) = (gap[i] + end, im[k][i]);
+                let size = if PAIRS.contains(&k) { (x * x + y * y).sqrt() } else { x.abs() };
+                let (_, sum) = rooted(size, x, near[i], far[i]);
+                least[i] = if sum < least[i] { sum } else { least[i] };
+            }
+        }
+        let (mut focal, mut room) = ([0.0f32; BLOCK], [0.0f32; BLOCK]);
+        for i in 0..BLOCK {
+            focal[i] = 2.0 * least[i].sqrt() / (far[i] - near[i]);
+            let ceiling = 4.0 * near[i] / (far[i] - near[i]);
+            room[i] = 0.5 * ceiling - (focal[i] - 2.0);
+        }
+        Squared { focal, room: lowest(&room) }
+    }
 }

@@ -104,11 +104,17 @@ impl Landscape {
     pub fn evaluate(&self, a_2: &[f64], a_3: &[f64], out: Shortcuts<'_>) -> Effort {
         let Shortcuts { work, v_min, status } = out;
         let count = a_2.len().min(a_3.len()).min(status.len());
-        let (velocities, count_of_works) = (count.min(v_min.len()), count.min(work.len()));
-        let (mut open, mut bins) = (Queue::<SEARCH>::EMPTY, Bins::take());
+        let (velocities, works) = (count.min(v_min.len()), count.min(work.len()));
+        let mut bins = Bins::take();
         bins.cells.begin(&self.frame);
-        let mut works = Works::new(self, &mut work[..count_of_works], &mut bins);
-        let mut doubtful: Vec<Open> = Vec::new();
+        let mut evaluation = Evaluation {
+            of: self,
+            status,
+            v_min: &mut v_min[..velocities],
+            open: Queue::EMPTY,
+            works: Works::new(self, &mut work[..works], &mut bins),
+            doubtful: Vec::new(),
+        };
         for start in (0..count).step_by(SPAN * SPANS) {
             let stretch = start..(start + SPAN * SPANS).min(count);
             let settled = match (a_2[stretch.clone()].try_into(), a_3[stretch.clone()].try_into()) {
@@ -117,121 +123,26 @@ impl Landscape {
             };
             for (first, common) in stretch.clone().step_by(SPAN).zip(settled) {
                 let span = first..(first + SPAN).min(stretch.end);
-                if let (Some(common), Ok(a_2), Ok(a_3)) =
-                    (common, a_2[span.clone()].try_into(), a_3[span.clone()].try_into())
-                {
-                    let Verdict { status: common, sound } = common;
-                    status[span].fill(common);
-                    if common != Status::Infeasible {
-                        if !sound {
-                            doubtful.push(Open { first, count: SPAN, line: true });
-                        }
-                        if first < velocities {
-                            self.velocities_of_span(first, [a_2, a_3], &mut open, status, &mut v_min[..velocities]);
-                        }
-                        works.push_span(first, a_2, a_3);
-                    }
-                    continue;
-                }
-                for first in span.clone().step_by(LANES) {
-                    let block = first..(first + LANES).min(span.end);
-                    let (mut a_2_lanes, mut a_3_lanes) = ([0.0; LANES], [0.0; LANES]);
-                    a_2_lanes[..block.len()].copy_from_slice(&a_2[block.clone()]);
-                    a_3_lanes[..block.len()].copy_from_slice(&a_3[block.clone()]);
-                    let found = screen(&self.ends, &a_2_lanes, &a_3_lanes);
-                    status[block.clone()].copy_from_slice(&found[..block.len()]);
-                    if found.iter().all(|&found| found == Status::Infeasible) {
-                        continue;
-                    }
-                    let unsure = self.floors.open(&self.ends, &a_2_lanes, &a_3_lanes, &found);
-                    let unsure = block.clone().enumerate().filter(|(lane, _)| unsure & (1 << lane) != 0);
-                    doubtful.extend(unsure.map(|(_, first)| Open { first, count: 1, line: false }));
-                    if first < velocities {
-                        let mut least = [0.0; LANES];
-                        let left = end_velocities(&self.ends, &a_2_lanes, &a_3_lanes, &found, &mut least);
-                        for ((v_min, least), found) in v_min[..velocities][first..].iter_mut().zip(least).zip(found) {
-                            *v_min = if found == Status::Infeasible { *v_min } else { least };
-                        }
-                        let places = [&a_2_lanes, &a_3_lanes];
-                        self.search(first, left, places, &mut open, status, &mut v_min[..velocities]);
-                    }
-                    for i in block {
-                        if status[i] != Status::Infeasible {
-                            works.push(i, a_2[i], a_3[i]);
+                match (common, a_2[span.clone()].try_into(), a_3[span.clone()].try_into()) {
+                    (Some(common), Ok(a_2), Ok(a_3)) => evaluation.span(first, a_2, a_3, common),
+                    _ => {
+                        for first in span.clone().step_by(LANES) {
+                            let block = first..(first + LANES).min(span.end);
+                            evaluation.block(first, &a_2[block.clone()], &a_3[block]);
                         }
                     }
                 }
             }
         }
-        self.inner_velocities(&mut open, status, &mut v_min[..velocities]);
+        evaluation.inner_velocities();
+        let Evaluation { status, works, doubtful, .. } = evaluation;
         let effort = works.finish();
-        bins.keep();
         // Until here the status tells on which side of v = 1 a velocity is.
         for open in doubtful {
             open.decide(self.law, |i| Path::new(&self.ends, a_2[i], a_3[i]), status);
         }
+        bins.keep();
         effort
-    }
-
-    /// Writes the least velocities of a span of feasible shortcuts with one status; those that no end is sure to have
-    /// are left open.
-    #[inline(always)]
-    fn velocities_of_span(
-        &self,
-        first: usize,
-        places: [&[f64; SPAN]; 2],
-        open: &mut Queue<SEARCH>,
-        status: &[Status],
-        v_min: &mut [f64],
-    ) {
-        let [a_2, a_3] = places;
-        let mut least = [0.0; SPAN];
-        let wanted = &mut v_min[first..];
-        let left = match wanted.first_chunk_mut() {
-            Some(wanted) => end_velocities_of_span(&self.ends, a_2, a_3, status[first], wanted),
-            None => {
-                let left = end_velocities_of_span(&self.ends, a_2, a_3, status[first], &mut least);
-                wanted.copy_from_slice(&least[..wanted.len()]);
-                left
-            }
-        };
-        match wanted.first_chunk_mut() {
-            Some(wanted) if left == u32::MAX => {
-                *wanted = inner_velocities(&self.ends, a_2, a_3).map(|found| on_side(found, status[first]));
-            }
-            _ => self.search(first, left, places, open, status, v_min),
-        }
-    }
-
-    /// Leaves the shortcuts from `first` on that have a bit open for a search of their least velocities, if wanted.
-    #[inline(always)]
-    fn search<const N: usize>(
-        &self,
-        first: usize,
-        mut left: u32,
-        [a_2, a_3]: [&[f64; N]; 2],
-        open: &mut Queue<SEARCH>,
-        status: &[Status],
-        v_min: &mut [f64],
-    ) {
-        while left != 0 {
-            let lane = left.trailing_zeros() as usize;
-            left &= left - 1;
-            let i = first + lane;
-            let wanted = i < v_min.len() && status[i] != Status::Infeasible;
-            if wanted && open.push(i, a_2[lane], a_3[lane]) {
-                self.inner_velocities(open, status, v_min);
-            }
-        }
-    }
-
-    /// The least velocities of feasible shortcuts, wherever they are.
-    fn inner_velocities(&self, queue: &mut Queue<SEARCH>, status: &[Status], v_min: &mut [f64]) {
-        if let Some((indices, [a_2, a_3])) = queue.take() {
-            for (&i, found) in indices.iter().zip(inner_velocities(&self.ends, a_2, a_3)) {
-                v_min[i] = on_side(found, status[i]);
-            }
-        }
     }
 
     /// `W_s = int tau v dt`.
@@ -265,5 +176,112 @@ impl Landscape {
             half: 0.5 * (panel.to - panel.from),
         };
         slice.sum(panel.map, rule)
+    }
+}
+
+/// The shortcuts of one call, on their way from statuses over least velocities to works.
+struct Evaluation<'a> {
+    of: &'a Landscape,
+    status: &'a mut [Status],
+    v_min: &'a mut [f64],
+    /// Shortcuts whose least velocity no end is sure to have.
+    open: Queue<SEARCH>,
+    works: Works<'a>,
+    /// Shortcuts whose friction may be negative.
+    doubtful: Vec<Open>,
+}
+
+impl Evaluation<'_> {
+    /// A span of shortcuts from `first` on, of one status.
+    #[inline(always)]
+    fn span(&mut self, first: usize, a_2: &[f64; SPAN], a_3: &[f64; SPAN], Verdict { status, sound }: Verdict) {
+        self.status[first..first + SPAN].fill(status);
+        if status == Status::Infeasible {
+            return;
+        }
+        if !sound {
+            self.doubtful.push(Open { first, count: SPAN, line: true });
+        }
+        if first < self.v_min.len() {
+            self.velocities_of_span(first, a_2, a_3);
+        }
+        self.works.push_span(first, a_2, a_3);
+    }
+
+    /// Up to eight shortcuts from `first` on, each with a status of its own.
+    #[inline(always)]
+    fn block(&mut self, first: usize, a_2: &[f64], a_3: &[f64]) {
+        let ends = &self.of.ends;
+        let block = first..first + a_2.len();
+        let (mut a_2_lanes, mut a_3_lanes) = ([0.0; LANES], [0.0; LANES]);
+        a_2_lanes[..a_2.len()].copy_from_slice(a_2);
+        a_3_lanes[..a_3.len()].copy_from_slice(a_3);
+        let found = screen(ends, &a_2_lanes, &a_3_lanes);
+        self.status[block.clone()].copy_from_slice(&found[..block.len()]);
+        if found.iter().all(|&found| found == Status::Infeasible) {
+            return;
+        }
+        let unsure = self.of.floors.open(ends, &a_2_lanes, &a_3_lanes, &found);
+        let unsure = block.clone().enumerate().filter(|(lane, _)| unsure & (1 << lane) != 0);
+        self.doubtful.extend(unsure.map(|(_, first)| Open { first, count: 1, line: false }));
+        if first < self.v_min.len() {
+            let mut least = [0.0; LANES];
+            let left = end_velocities(ends, &a_2_lanes, &a_3_lanes, &found, &mut least);
+            for ((v_min, least), found) in self.v_min[first..].iter_mut().zip(least).zip(found) {
+                *v_min = if found == Status::Infeasible { *v_min } else { least };
+            }
+            self.search(first, left, &a_2_lanes, &a_3_lanes);
+        }
+        for (lane, i) in block.enumerate() {
+            if self.status[i] != Status::Infeasible {
+                self.works.push(i, a_2[lane], a_3[lane]);
+            }
+        }
+    }
+
+    /// Writes the least velocities of a span of feasible shortcuts with one status; those that no end is sure to have
+    /// are left open.
+    #[inline(always)]
+    fn velocities_of_span(&mut self, first: usize, a_2: &[f64; SPAN], a_3: &[f64; SPAN]) {
+        let (ends, status) = (&self.of.ends, self.status[first]);
+        let wanted = &mut self.v_min[first..];
+        let left = match wanted.first_chunk_mut() {
+            Some(wanted) => end_velocities_of_span(ends, a_2, a_3, status, wanted),
+            None => {
+                let mut least = [0.0; SPAN];
+                let left = end_velocities_of_span(ends, a_2, a_3, status, &mut least);
+                wanted.copy_from_slice(&least[..wanted.len()]);
+                left
+            }
+        };
+        match wanted.first_chunk_mut() {
+            Some(wanted) if left == u32::MAX => {
+                *wanted = inner_velocities(ends, a_2, a_3).map(|found| on_side(found, status));
+            }
+            _ => self.search(first, left, a_2, a_3),
+        }
+    }
+
+    /// Leaves the shortcuts from `first` on that have a bit open for a search of their least velocities, if wanted.
+    #[inline(always)]
+    fn search<const N: usize>(&mut self, first: usize, mut left: u32, a_2: &[f64; N], a_3: &[f64; N]) {
+        while left != 0 {
+            let lane = left.trailing_zeros() as usize;
+            left &= left - 1;
+            let i = first + lane;
+            let wanted = i < self.v_min.len() && self.status[i] != Status::Infeasible;
+            if wanted && self.open.push(i, a_2[lane], a_3[lane]) {
+                self.inner_velocities();
+            }
+        }
+    }
+
+    /// The least velocities of feasible shortcuts, wherever they are.
+    fn inner_velocities(&mut self) {
+        if let Some((indices, [a_2, a_3])) = self.open.take() {
+            for (&i, found) in indices.iter().zip(inner_velocities(&self.of.ends, a_2, a_3)) {
+                self.v_min[i] = on_side(found, self.status[i]);
+            }
+        }
     }
 }

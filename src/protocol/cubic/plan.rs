@@ -9,7 +9,7 @@ use multiversion::multiversion;
 
 use super::bins::BINS;
 use super::path::{Ends, Path};
-use super::rules::{APART, Accuracy, FAR, THETA_ZEROS, ZEROS, is_near_start, polished, rough_zeros};
+use super::rules::{APART, Accuracy, FAR, STEP, THETA_ZEROS, ZEROS, cut, is_near_start, polished, rough_zeros};
 use crate::numerics::real::Real;
 
 /// One panel for each shortcut.
@@ -26,8 +26,6 @@ pub(super) struct Plan {
     /// Bounds of the mapped variable.
     pub from: Block,
     pub to: Block,
-    /// 1 where a larger power might save nodes.
-    pub deeper: Block,
     /// Where a panel that asks for too many nodes is best cut.
     pub cut: Block,
 }
@@ -36,7 +34,7 @@ impl Plan {
     /// Not yet made.
     pub const EMPTY: Plan = {
         let none = [0.0; BLOCK];
-        Plan { bin: [0; BLOCK], squarings: none, side: none, gap: none, from: none, to: none, deeper: none, cut: none }
+        Plan { bin: [0; BLOCK], squarings: none, side: none, gap: none, from: none, to: none, cut: none }
     };
 }
 
@@ -84,23 +82,13 @@ const APART_SQUARE: f64 = 1e-3;
 /// What errors of the zeros in single precision cost the focal sum beyond 2.
 pub(super) const COARSE: f64 = 0.03;
 
-/// Chooses the panels over `[0, 1]` of the shortcuts `(a_2[i], a_3[i])`, all feasible, without powers beyond the square
-/// and in single precision: `deeper` where that is not enough.
+/// Chooses the panels over `[0, 1]` of the shortcuts `(a_2[i], a_3[i])`, all feasible, in single precision.
 #[multiversion(targets(
     "x86_64+avx+avx2+bmi1+bmi2+avx512f+avx512bw+avx512cd+avx512dq+avx512vl",
     "x86_64+avx+avx2+bmi1+bmi2"
 ))]
 pub(super) fn plan(ends: &Ends, a_2: &Block, a_3: &Block, accuracy: &Accuracy, plan: &mut Plan) {
-    panels::<f32, 1>(ends, a_2, a_3, &[0.0; BLOCK], &[1.0; BLOCK], accuracy, plan);
-}
-
-/// Chooses the panels over `[0, 1]` with all powers.
-#[multiversion(targets(
-    "x86_64+avx+avx2+bmi1+bmi2+avx512f+avx512bw+avx512cd+avx512dq+avx512vl",
-    "x86_64+avx+avx2+bmi1+bmi2"
-))]
-pub(super) fn plan_deeper(ends: &Ends, a_2: &Block, a_3: &Block, accuracy: &Accuracy, plan: &mut Plan) {
-    panels::<f64, MOST_SQUARINGS>(ends, a_2, a_3, &[0.0; BLOCK], &[1.0; BLOCK], accuracy, plan);
+    panels::<f32>(ends, [a_2, a_3, &[0.0; BLOCK], &[1.0; BLOCK]], accuracy, plan);
 }
 
 /// Chooses panels over `[low[i], high[i]]`, of which one is an end of `[0, 1]`.
@@ -108,8 +96,8 @@ pub(super) fn plan_deeper(ends: &Ends, a_2: &Block, a_3: &Block, accuracy: &Accu
     "x86_64+avx+avx2+bmi1+bmi2+avx512f+avx512bw+avx512cd+avx512dq+avx512vl",
     "x86_64+avx+avx2+bmi1+bmi2"
 ))]
-pub(super) fn plan_parts(ends: &Ends, [a_2, a_3, low, high]: [&Block; 4], accuracy: &Accuracy, plan: &mut Plan) {
-    panels::<f64, MOST_SQUARINGS>(ends, a_2, a_3, low, high, accuracy, plan);
+pub(super) fn plan_parts(ends: &Ends, parts: [&Block; 4], accuracy: &Accuracy, plan: &mut Plan) {
+    panels::<f64>(ends, parts, accuracy, plan);
 }
 
 /// The zeros of theta and of n of each shortcut, in the closed upper half plane, a pair once.
@@ -147,53 +135,71 @@ pub(super) fn places<T: Real>(ends: &Ends, a_2: &Block, a_3: &Block) -> Places<T
             doubt[i] = if is_tame(theta, n) & apart { 0.0 } else { 1.0 };
         }
     }
-    let mut close = [0.0f32; BLOCK];
-    for k in 0..ZEROS {
-        for i in 0..BLOCK {
-            close[i] += if is_near_start(re[k][i], im[k][i]) { 1.0 } else { 0.0 };
-        }
-    }
-    for i in (0..BLOCK).filter(|&i| close[i] > 0.0) {
-        for k in 0..ZEROS {
-            if is_near_start(re[k][i], im[k][i]) {
-                let (theta, [n0, n1, n2]) = Path::new(ends, a_2[i], a_3[i]).about_start();
-                let c = if k < THETA_ZEROS { theta } else { [n0, n1, n2, 0.0] };
-                match polished(&c.map(T::of), re[k][i], im[k][i]) {
-                    Some(zero) => (re[k][i], im[k][i]) = zero,
-                    None => doubt[i] += if is_coarse::<T>() { 1.0 } else { 0.0 },
-                }
-            }
-        }
-    }
-    // The closed forms do not tell how far a pair this close to the real axis is from it. That of theta is looked at again.
-    for k in 0..ZEROS {
-        let least = T::of(if k < THETA_ZEROS || is_coarse::<T>() { APART } else { CLOSEST });
-        let weight = if k < THETA_ZEROS { 1.0 } else { OF_N };
-        for i in 0..BLOCK {
-            let close = (re[k][i] > zero) & (re[k][i] < T::of(1.0)) & (im[k][i] < least);
-            doubt[i] += if close { weight } else { 0.0 };
-        }
-    }
-    for i in 0..BLOCK {
-        let of_theta = !is_coarse::<T>() && doubt[i] > 0.0 && doubt[i] < OF_N;
-        let pair = of_theta.then(|| Path::new(ends, a_2[i], a_3[i]).close_pair()).flatten();
-        if let Some((x, height, reach)) = pair {
-            for k in 0..THETA_ZEROS {
-                if (re[k][i].wide() - x).abs() < reach && im[k][i].wide() < reach {
-                    (re[k][i], im[k][i]) = (T::of(x), T::of(height));
-                }
-            }
-            doubt[i] = 0.0;
-        }
-    }
+    let mut places = Places { re, im, doubt };
+    places.polish_near_start(ends, a_2, a_3);
+    places.settle_close_pairs(ends, a_2, a_3);
     // A pair is counted once.
     for k in PAIRS {
         for i in 0..BLOCK {
-            let (place, height) = (re[k + 1][i], im[k + 1][i]);
-            (re[k + 1][i], im[k + 1][i]) = (if height > zero { T::of(FAR) } else { place }, zero);
+            let (place, height) = (places.re[k + 1][i], places.im[k + 1][i]);
+            places.re[k + 1][i] = if height > zero { T::of(FAR) } else { place };
+            places.im[k + 1][i] = zero;
         }
     }
-    Places { re, im, doubt }
+    places
+}
+
+impl<T: Real> Places<T> {
+    /// Corrects the zeros that the expansion about the end gives too few digits of.
+    #[inline(always)]
+    fn polish_near_start(&mut self, ends: &Ends, a_2: &Block, a_3: &Block) {
+        let Places { re, im, doubt } = self;
+        let mut close = [0.0f32; BLOCK];
+        for k in 0..ZEROS {
+            for i in 0..BLOCK {
+                close[i] += if is_near_start(re[k][i], im[k][i]) { 1.0 } else { 0.0 };
+            }
+        }
+        for i in (0..BLOCK).filter(|&i| close[i] > 0.0) {
+            for k in 0..ZEROS {
+                if is_near_start(re[k][i], im[k][i]) {
+                    let (theta, [n0, n1, n2]) = Path::new(ends, a_2[i], a_3[i]).about_start();
+                    let c = if k < THETA_ZEROS { theta } else { [n0, n1, n2, 0.0] };
+                    match polished(&c.map(T::of), re[k][i], im[k][i]) {
+                        Some(zero) => (re[k][i], im[k][i]) = zero,
+                        None => doubt[i] += if is_coarse::<T>() { 1.0 } else { 0.0 },
+                    }
+                }
+            }
+        }
+    }
+
+    /// Doubts pairs next to the real axis: the closed forms do not tell how far from it they are. That of theta is looked at
+    /// again.
+    #[inline(always)]
+    fn settle_close_pairs(&mut self, ends: &Ends, a_2: &Block, a_3: &Block) {
+        let Places { re, im, doubt } = self;
+        for k in 0..ZEROS {
+            let least = T::of(if k < THETA_ZEROS || is_coarse::<T>() { APART } else { CLOSEST });
+            let weight = if k < THETA_ZEROS { 1.0 } else { OF_N };
+            for i in 0..BLOCK {
+                let close = (re[k][i] > T::of(0.0)) & (re[k][i] < T::of(1.0)) & (im[k][i] < least);
+                doubt[i] += if close { weight } else { 0.0 };
+            }
+        }
+        for i in 0..BLOCK {
+            let of_theta = !is_coarse::<T>() && doubt[i] > 0.0 && doubt[i] < OF_N;
+            let pair = of_theta.then(|| Path::new(ends, a_2[i], a_3[i]).close_pair()).flatten();
+            if let Some((x, height, reach)) = pair {
+                for k in 0..THETA_ZEROS {
+                    if (re[k][i].wide() - x).abs() < reach && im[k][i].wide() < reach {
+                        (re[k][i], im[k][i]) = (T::of(x), T::of(height));
+                    }
+                }
+                doubt[i] = 0.0;
+            }
+        }
+    }
 }
 
 /// Of the zeros of each shortcut the one that hinders a straight rule over `[low[i], high[i]]` most: the square of the
@@ -239,38 +245,23 @@ pub(super) fn rooted(size: f32, real: f32, a: f32, b: f32) -> (f32, f32) {
 }
 
 #[inline(always)]
-#[allow(clippy::too_many_arguments)]
-fn panels<T: Real, const SQUARINGS: u32>(
-    ends: &Ends,
-    a_2: &Block,
-    a_3: &Block,
-    low: &Block,
-    high: &Block,
-    accuracy: &Accuracy,
-    plan: &mut Plan,
-) {
+fn panels<T: Real>(ends: &Ends, [a_2, a_3, low, high]: [&Block; 4], accuracy: &Accuracy, plan: &mut Plan) {
     let zero = T::of(0.0);
-    // A focal sum that is not safe from the errors of the zeros does not count in full.
-    let enough = |focal: f64| (if is_coarse::<T>() { focal + COARSE * (focal - 2.0) } else { focal }) as f32;
-    let cheap = enough(accuracy.enough(CHEAP));
     let Places { re, im, mut doubt } = places::<T>(ends, a_2, a_3);
+    // The straight rule, and the end and the centre of a map that serves better.
     let (least, shadow) = nearest(&re, &im, low, high);
     let mut focal = [0.0f32; BLOCK];
     let (mut side, mut gap) = ([zero; BLOCK], [zero; BLOCK]);
-    let (mut near, mut far) = ([zero; BLOCK], [zero; BLOCK]);
-    let (mut real, mut size) = ([[0.0f32; BLOCK]; ZEROS], [[0.0f32; BLOCK]; ZEROS]);
     for i in 0..BLOCK {
         let (low, high) = (T::of(low[i]), T::of(high[i]));
-        let length = high - low;
-        focal[i] = 2.0 * least[i].sqrt() / length.narrow();
+        focal[i] = 2.0 * least[i].sqrt() / (high - low).narrow();
         let upper = shadow[i] + shadow[i] > low + high;
         let beyond = if upper { shadow[i] - high } else { low - shadow[i] };
         side[i] = T::of(if upper { 1.0 } else { -1.0 });
         gap[i] = if beyond > zero { beyond } else { zero };
-        near[i] = gap[i];
-        far[i] = gap[i] + length;
     }
     // A place is its real part and its size, which is all that the distances from real ends ask for.
+    let (mut real, mut size) = ([[0.0f32; BLOCK]; ZEROS], [[0.0f32; BLOCK]; ZEROS]);
     for k in 0..ZEROS {
         for i in 0..BLOCK {
             let end = if side[i] > zero { T::of(high[i]) - re[k][i] } else { re[k][i] - T::of(low[i]) };
@@ -284,10 +275,58 @@ fn panels<T: Real, const SQUARINGS: u32>(
         let blurred = (side[i] > zero) & (high[i] == 1.0) & (gap[i] > zero) & (gap[i] < T::of(BLURRED));
         doubt[i] += if blurred { OF_N } else { 0.0 };
     }
+    // A focal sum that is not safe from the errors of the zeros does not count in full.
+    let lost = if is_coarse::<T>() { COARSE } else { 0.0 };
+    let steps = accuracy.in_steps();
+    let limits: [f32; BINS] = std::array::from_fn(|i| (steps[i] + lost * (steps[i] - 2.0)) as f32);
+    let cheap = limits[CHEAP / STEP - 1];
+    let squarings = powers([real, size], &gap, [low, high], cheap, &mut focal);
+    let bin = bins(&limits, &focal);
+    for i in 0..BLOCK {
+        let (low, high) = (low[i], high[i]);
+        let length = high - low;
+        plan.cut[i] = cut(low, high, shadow[i].wide());
+        let straight = squarings[i] == 0.0;
+        // Over all of [0, 1] a straight rule grows from the end where theta is less.
+        let steady = if ends.rise.high < 0.0 { 1.0 } else { -1.0 };
+        let whole = (low == 0.0) & (high == 1.0);
+        let side = if straight & whole { steady } else { side[i].wide() };
+        let gap = if straight { 0.0 } else { gap[i].wide() };
+        (plan.squarings[i], plan.side[i], plan.gap[i]) = (f64::from(squarings[i]), side, gap);
+        (plan.from[i], plan.to[i]) = (gap, gap + length);
+        // The polynomials are expanded about an end of [0, 1].
+        let centre = if whole { side } else { 1.0 - 2.0 * f64::from(low == 0.0) };
+        let near = (if side > 0.0 { high } else { low }) - if centre > 0.0 { 1.0 } else { 0.0 };
+        let sound = Path::new(ends, a_2[i], a_3[i]).is_sound(centre > 0.0, near, near - side * length, accuracy);
+        plan.bin[i] = if sound & (doubt[i] == 0.0) { bin[i] as u32 } else { BINS as u32 };
+    }
+    for level in 1..=MOST_SQUARINGS {
+        for ((from, to), &squarings) in plan.from.iter_mut().zip(&mut plan.to).zip(&squarings) {
+            let more = squarings >= level as f32;
+            *from = if more { from.sqrt() } else { *from };
+            *to = if more { to.sqrt() } else { *to };
+        }
+    }
+}
+/// The power of each map, as log2, from the real parts and sizes of the zeros relative to its centre; `focal` grows where
+/// one helps. Powers beyond the square are tried where the sum is not `cheap`.
+#[inline(always)]
+fn powers<T: Real>(
+    [mut real, mut size]: [[[f32; BLOCK]; ZEROS]; 2],
+    gap: &[T; BLOCK],
+    [low, high]: [&Block; 2],
+    cheap: f32,
+    focal: &mut [f32; BLOCK],
+) -> [f32; BLOCK] {
+    let (mut near, mut far) = (*gap, *gap);
+    for i in 0..BLOCK {
+        far[i] = gap[i] + (T::of(high[i]) - T::of(low[i]));
+    }
     let mut squarings = [0.0f32; BLOCK];
-    // The focal sum that the centre of the map itself allows, mapped to 0.
-    let mut ceiling = [2.0f32; BLOCK];
-    for level in 1..=SQUARINGS {
+    for level in 1..=MOST_SQUARINGS {
+        if level > 1 && focal.iter().all(|&focal| focal >= cheap) {
+            break;
+        }
         let (mut a, mut b) = ([0.0f32; BLOCK], [0.0f32; BLOCK]);
         for i in 0..BLOCK {
             near[i] = near[i].sqrt();
@@ -310,61 +349,25 @@ fn panels<T: Real, const SQUARINGS: u32>(
             let better = open & (reached > focal[i]);
             focal[i] = if better { reached } else { focal[i] };
             squarings[i] = if better { level as f32 } else { squarings[i] };
-            ceiling[i] = 2.0 * (a[i] + b[i]) / (b[i] - a[i]);
         }
     }
-    let mut deeper = [0.0f32; BLOCK];
-    for i in 0..BLOCK {
-        // A larger power moves the interval away from the centre, but hardly from other zeros.
-        let near = focal[i] - 2.0 > 0.5 * (ceiling[i] - 2.0);
-        let short = (focal[i] < cheap) & (squarings[i] == SQUARINGS as f32) & near;
-        let unsure = is_coarse::<T>() & (doubt[i] > 0.0);
-        deeper[i] = if short | unsure { 1.0 } else { 0.0 };
-    }
-    let mut limits = [0.0f32; BINS];
-    for (limit, &focal) in limits.iter_mut().zip(accuracy.in_steps()) {
-        *limit = enough(focal);
-    }
+    squarings
+}
+
+/// How many of the falling limits each focal sum misses.
+#[inline(always)]
+fn bins(limits: &[f32; BINS], focal: &[f32; BLOCK]) -> [f32; BLOCK] {
     let mut bin = [0.0f32; BLOCK];
     for (bins, focals) in bin.chunks_exact_mut(WIDTH).zip(focal.chunks_exact(WIDTH)) {
         let mut counts = [0.0f32; WIDTH];
         for limit in limits {
             for i in 0..WIDTH {
-                counts[i] += if focals[i] >= limit { 0.0 } else { 1.0 };
+                counts[i] += if focals[i] >= *limit { 0.0 } else { 1.0 };
             }
         }
         bins.copy_from_slice(&counts);
     }
-    for i in 0..BLOCK {
-        let (low, high) = (low[i], high[i]);
-        let (length, shadow) = (high - low, shadow[i].wide());
-        let inside = (shadow > low + 0.05 * length) & (shadow < high - 0.05 * length);
-        plan.cut[i] = if inside { shadow } else { 0.5 * (low + high) };
-        let straight = squarings[i] == 0.0;
-        // Over all of [0, 1] a straight rule grows from the end where theta is less.
-        let steady = if ends.rise.high < 0.0 { 1.0 } else { -1.0 };
-        let whole = (low == 0.0) & (high == 1.0);
-        let side = if straight & whole { steady } else { side[i].wide() };
-        let other = if low == 0.0 { -1.0 } else { 1.0 };
-        let centre = if whole { side } else { other };
-        let end = if side > 0.0 { high } else { low };
-        let near = end - if centre > 0.0 { 1.0 } else { 0.0 };
-        let far = near - side * length;
-        let gap = if straight { 0.0 } else { gap[i].wide() };
-        (plan.squarings[i], plan.side[i], plan.gap[i]) = (f64::from(squarings[i]), side, gap);
-        (plan.from[i], plan.to[i]) = (gap, gap + length);
-        plan.deeper[i] = f64::from(deeper[i]);
-        let path = Path::new(ends, a_2[i], a_3[i]);
-        let sound = path.is_sound(centre > 0.0, near, far, accuracy);
-        plan.bin[i] = if sound & (doubt[i] == 0.0) { bin[i] as u32 } else { BINS as u32 };
-    }
-    for level in 1..=SQUARINGS {
-        for ((from, to), &squarings) in plan.from.iter_mut().zip(&mut plan.to).zip(&squarings) {
-            let more = squarings >= level as f32;
-            *from = if more { from.sqrt() } else { *from };
-            *to = if more { to.sqrt() } else { *to };
-        }
-    }
+    bin
 }
 
 /// Whether single precision is enough for estimates of the zeros of theta and n, given about the end.

@@ -247,7 +247,7 @@ pub(super) fn choose(zeros: &Zeros, low: f64, high: f64, accuracy: &Accuracy, de
     let (mut panel, focal) = best_panel(zeros, low, high, accuracy);
     panel.nodes = accuracy.nodes(focal);
     if panel.nodes > LONG && depth < DEEPEST {
-        let cut = cut_at(zeros, low, high);
+        let cut = cut(low, high, zeros.re[hindrance(zeros, low, high)]);
         choose(zeros, low, cut, accuracy, depth + 1, panels);
         choose(zeros, cut, high, accuracy, depth + 1, panels);
     } else {
@@ -262,35 +262,34 @@ pub(super) fn choose(zeros: &Zeros, low: f64, high: f64, accuracy: &Accuracy, de
     "x86_64+avx+avx2+bmi1+bmi2"
 ))]
 fn best_panel(zeros: &Zeros, low: f64, high: f64, accuracy: &Accuracy) -> (Panel, f64) {
-    let mut best = line(zeros, low, high);
-    let mut largest = 2.0;
+    let mut best = (line(zeros, low, high), 2.0);
     let plain = accuracy.enough(PLAIN);
     let gaps = [real_gap(zeros, high, 1.0), real_gap(zeros, low, -1.0)];
     let (nearest, gap, other) = if gaps[0] <= gaps[1] { (1.0, gaps[0], gaps[1]) } else { (-1.0, gaps[1], gaps[0]) };
     // A real zero this near rules the plain rule out before its ellipse is computed.
     let hopeless = 2.0 + 4.0 * gap / (high - low) < plain;
     if !hopeless {
-        largest = focal(&zeros.re, &zeros.im, low, high);
-        if largest >= plain {
-            return (best, largest);
+        best.1 = focal(&zeros.re, &zeros.im, low, high);
+        if best.1 >= plain {
+            return best;
         }
     }
     for (side, gap) in [(nearest, gap), (-nearest, other)] {
-        power(zeros, low, high, side, gap, plain, &mut best, &mut largest);
-        if largest >= plain {
-            return (best, largest);
+        best = power(zeros, [low, high], (side, gap), plain, best);
+        if best.1 >= plain {
+            return best;
         }
     }
     if hopeless {
         let straight = focal(&zeros.re, &zeros.im, low, high);
-        if straight > largest {
-            (best, largest) = (line(zeros, low, high), straight);
+        if straight > best.1 {
+            best = (line(zeros, low, high), straight);
         }
     }
-    if largest < accuracy.enough(POOR) {
-        sinh(zeros, low, high, &mut best, &mut largest);
+    if best.1 < accuracy.enough(POOR) {
+        best = sinh(zeros, low, high, best);
     }
-    (best, largest)
+    best
 }
 
 /// The straight rule, expanded about the end that is nearer to the most hindering zero: the polynomials are small
@@ -329,15 +328,20 @@ fn real_gap(zeros: &Zeros, end: f64, side: f64) -> f64 {
     least(&gaps)
 }
 
-/// Tries the power maps about the real zero a `gap` beyond the upper (`side = 1`) or the lower end, as long as they
-/// gain.
-#[allow(clippy::too_many_arguments)]
+/// The better of a panel with its focal sum and the power maps about the real zero a `gap` beyond the upper (`side = 1`) or
+/// the lower end, which are tried as long as they gain.
 #[inline(always)]
-fn power(zeros: &Zeros, low: f64, high: f64, side: f64, gap: f64, plain: f64, best: &mut Panel, largest: &mut f64) {
+fn power(
+    zeros: &Zeros,
+    [low, high]: [f64; 2],
+    (side, gap): (f64, f64),
+    plain: f64,
+    mut best: (Panel, f64),
+) -> (Panel, f64) {
     let end = if side > 0.0 { high } else { low };
     let length = high - low;
     if gap > 0.5 * length {
-        return;
+        return best;
     }
     // Distances from the zero, to be rooted again and again.
     let (mut near, mut far) = (gap, gap + length);
@@ -349,24 +353,24 @@ fn power(zeros: &Zeros, low: f64, high: f64, side: f64, gap: f64, plain: f64, be
         }
         // The zero itself is mapped to 0.
         let image = focal(&re, &im, near, far).min(2.0 * (near + far) / (far - near));
-        if image - 2.0 <= 1.2 * (*largest - 2.0) {
-            return;
+        if image - 2.0 <= 1.2 * (best.1 - 2.0) {
+            break;
         }
-        *largest = image;
-        *best = Panel { centre: end, map: Map::Power { side, gap, squarings }, from: near, to: far, nodes: 0 };
+        best = (Panel { centre: end, map: Map::Power { side, gap, squarings }, from: near, to: far, nodes: 0 }, image);
         if image >= plain {
-            return;
+            break;
         }
     }
+    best
 }
 
-/// Tries the sinh map over the complex pair that hinders most.
+/// The better of a panel with its focal sum and the sinh map over the complex pair that hinders most.
 #[inline(always)]
-fn sinh(zeros: &Zeros, low: f64, high: f64, best: &mut Panel, largest: &mut f64) {
+fn sinh(zeros: &Zeros, low: f64, high: f64, best: (Panel, f64)) -> (Panel, f64) {
     let hindrance = hindrance(zeros, low, high);
     let (centre, height) = (zeros.re[hindrance], zeros.im[hindrance]);
     if height == 0.0 {
-        return;
+        return best;
     }
     let (from, to) = (asinh((low - centre) / height), asinh((high - centre) / height));
     let (mut re, mut im) = ([0.0; LANES], [0.0; LANES]);
@@ -374,10 +378,8 @@ fn sinh(zeros: &Zeros, low: f64, high: f64, best: &mut Panel, largest: &mut f64)
         (re[i], im[i]) = complex_asinh((zeros.re[i] - centre) / height, zeros.im[i] / height);
     }
     let image = focal(&re, &im, from, to);
-    if image - 2.0 > 2.0 * (*largest - 2.0) {
-        *largest = image;
-        *best = Panel { centre, map: Map::Sinh { height }, from, to, nodes: 0 };
-    }
+    let panel = Panel { centre, map: Map::Sinh { height }, from, to, nodes: 0 };
+    if image - 2.0 > 2.0 * (best.1 - 2.0) { (panel, image) } else { best }
 }
 
 /// The zero with the smallest ellipse.
@@ -387,11 +389,11 @@ fn hindrance(zeros: &Zeros, low: f64, high: f64) -> usize {
     (1..LANES).fold(0, |best, i| if sums[i] < sums[best] { i } else { best })
 }
 
-/// Where to cut: below the hindrance if that lies inside, else in the middle.
-fn cut_at(zeros: &Zeros, low: f64, high: f64) -> f64 {
-    let length = high - low;
-    let re = zeros.re[hindrance(zeros, low, high)];
-    if re > low + 0.05 * length && re < high - 0.05 * length { re } else { 0.5 * (low + high) }
+/// Where a panel is best cut: below the most hindering zero if that lies inside, else in the middle.
+#[inline(always)]
+pub(super) fn cut(low: f64, high: f64, shadow: f64) -> f64 {
+    let edge = 0.05 * (high - low);
+    if (shadow > low + edge) & (shadow < high - edge) { shadow } else { 0.5 * (low + high) }
 }
 
 /// The square root in the first quadrant or on its border, for `im >= 0` up to the sign of `im`.

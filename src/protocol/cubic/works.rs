@@ -4,13 +4,12 @@ use super::Landscape;
 use super::bins::{BINS, Bins, WHOLE, nodes_of};
 use super::cells::OWN;
 use super::path::Path;
-use super::plan::{BLOCK, Block, Plan, plan, plan_deeper, plan_parts};
+use super::plan::{BLOCK, Block, Plan, plan, plan_parts};
 use super::queue::{Cuts, Queue};
 use crate::numerics::lanes::LANES;
 use crate::protocol::Effort;
 
-/// Works in the making. A shortcut waits for the plan of its cell, perhaps for one of its own, perhaps for one with
-/// larger powers, and then for its sum.
+/// Works in the making. A shortcut waits for the plan of its cell, perhaps for one of its own, and then for its sum.
 pub(super) struct Works<'a> {
     due: Queue<BLOCK>,
     planned: Planned<'a>,
@@ -19,7 +18,6 @@ pub(super) struct Works<'a> {
 /// Shortcuts that the plan of their cell is not enough for, and the last plans.
 struct Planned<'a> {
     alone: Queue<BLOCK>,
-    deep: Queue<BLOCK>,
     from_cells: Plan,
     own: Plan,
     sums: Sums<'a>,
@@ -39,7 +37,7 @@ impl<'a> Works<'a> {
     pub fn new(of: &'a Landscape, work: &'a mut [f64], bins: &'a mut Bins) -> Works<'a> {
         let sums = Sums { of, work, cut: Cuts::EMPTY, bins, effort: Effort::default() };
         let (from_cells, own) = (Plan::EMPTY, Plan::EMPTY);
-        let planned = Planned { alone: Queue::EMPTY, deep: Queue::EMPTY, from_cells, own, sums };
+        let planned = Planned { alone: Queue::EMPTY, from_cells, own, sums };
         Works { due: Queue::EMPTY, planned }
     }
 
@@ -64,11 +62,10 @@ impl<'a> Works<'a> {
     }
 
     /// Sums what is left.
-    pub fn finish(&mut self) -> Effort {
+    pub fn finish(mut self) -> Effort {
         self.plan();
-        let Planned { alone, deep, own, sums, .. } = &mut self.planned;
-        sums.plan(alone, deep, own);
-        sums.deepen(deep);
+        let Planned { alone, own, sums, .. } = &mut self.planned;
+        sums.plan(alone, own);
         sums.part();
         sums.bins.close(sums.of, sums.work);
         sums.effort
@@ -84,7 +81,7 @@ impl<'a> Works<'a> {
 impl Planned<'_> {
     /// Plans shortcuts from their cells; those for which these are not enough wait for a plan of their own.
     fn plan(&mut self, indices: &[usize], [a_2, a_3]: [&Block; 2]) {
-        let Planned { alone, deep, from_cells: plan, own, sums } = self;
+        let Planned { alone, from_cells: plan, own, sums } = self;
         sums.bins.cells.plan(&sums.of.frame, a_2, a_3, plan);
         for (k, indices) in indices.chunks(LANES).enumerate() {
             let first = k * LANES;
@@ -97,7 +94,7 @@ impl Planned<'_> {
                 if plan.bin[lane] != OWN {
                     sums.settle(plan, lane, i, [a_2[lane], a_3[lane]]);
                 } else if alone.push(i, a_2[lane], a_3[lane]) {
-                    sums.plan(alone, deep, own);
+                    sums.plan(alone, own);
                 }
             }
         }
@@ -106,15 +103,11 @@ impl Planned<'_> {
 
 impl Sums<'_> {
     /// Plans shortcuts by themselves.
-    fn plan(&mut self, alone: &mut Queue<BLOCK>, deep: &mut Queue<BLOCK>, made: &mut Plan) {
+    fn plan(&mut self, alone: &mut Queue<BLOCK>, made: &mut Plan) {
         let Some((indices, [a_2, a_3])) = alone.take() else { return };
         plan(&self.of.ends, a_2, a_3, &self.of.accuracy, made);
         for (lane, &i) in indices.iter().enumerate() {
-            if made.deeper[lane] == 0.0 {
-                self.settle(made, lane, i, [a_2[lane], a_3[lane]]);
-            } else if deep.push(i, a_2[lane], a_3[lane]) {
-                self.deepen(deep);
-            }
+            self.settle(made, lane, i, [a_2[lane], a_3[lane]]);
         }
     }
 
@@ -123,17 +116,7 @@ impl Sums<'_> {
     fn settle_all(&mut self, plan: &Plan, first: usize, indices: &[usize], places: [&Block; 2]) {
         self.effort.quadratures += LANES as u32;
         self.effort.nodes += LANES as u32 * nodes_of(plan.bin[first] as usize);
-        self.bins.add_all(self.of, plan, first, places, indices, self.work);
-    }
-
-    /// Plans shortcuts with larger powers.
-    fn deepen(&mut self, deep: &mut Queue<BLOCK>) {
-        let Some((indices, [a_2, a_3])) = deep.take() else { return };
-        let mut plan = Plan::EMPTY;
-        plan_deeper(&self.of.ends, a_2, a_3, &self.of.accuracy, &mut plan);
-        for (lane, &i) in indices.iter().enumerate() {
-            self.settle(&plan, lane, i, [a_2[lane], a_3[lane]]);
-        }
+        self.bins.add_all(self.of, (plan, first), places, indices, self.work);
     }
 
     /// Puts the shortcut at `index` where its plan says.
@@ -144,7 +127,7 @@ impl Sums<'_> {
             self.work[index] = 0.0;
             self.effort.quadratures += 1;
             self.effort.nodes += nodes_of(bin);
-            self.bins.add(self.of, plan, lane, [place[0], place[1], 0.0, 1.0], index, self.work);
+            self.bins.add(self.of, (plan, lane), [place[0], place[1], 0.0, 1.0], index, self.work);
         } else if self.cut.push(index, place, plan.cut[lane]) {
             self.part();
         }
@@ -167,7 +150,7 @@ impl Sums<'_> {
                 work[i] = 0.0;
                 for lane in lanes {
                     effort.nodes += nodes_of(plan.bin[lane] as usize);
-                    bins.add(of, &plan, lane, [a_2[lane], a_3[lane], low[lane], high[lane]], i, work);
+                    bins.add(of, (&plan, lane), [a_2[lane], a_3[lane], low[lane], high[lane]], i, work);
                 }
             } else {
                 work[i] = of.work(&path, effort);
