@@ -538,57 +538,6 @@ fn regress_every_number_that_is_told_is_good_to_rtol() {
     assert!(compared.iter().all(|&count| 300 * count > 80 * sample), "{compared:?}");
 }
 
-/// Rounding errors of the friction, which takes a share of 1e-43 a swing, make no limit cycle.
-#[test]
-fn regress_equal_effects_of_velocity_and_contacts_drive_nothing() {
-    let law = Law { a: 1.1021004188962902e-3, b: 1.1021004188962902e-3 };
-    for (inertia, k, x) in [(3.84e52, 3.07e10, 0.3369_f64), (3.05e43, 5.56e-38, -18.95), (4.85e9, 1e3, 2.0)] {
-        let step = Step { transition: Transition { law, v_i: x.exp(), v_f: 1.0 }, k, m: inertia };
-        assert_ne!(respond(&step, 1e-4).outcome, Outcome::LimitCycle, "{step:?}");
-    }
-}
-
-/// Equal peaks one after the other: which is the greatest is not told.
-#[test]
-fn regress_the_time_of_a_peak_among_equals_is_not_told() {
-    let law = Law { a: 1e-3, b: 0.0 };
-    let (impedance, omega) = (6e4, 3e3);
-    let transition = Transition { law, v_i: 0.967, v_f: 1.0 };
-    let step = Step { transition, k: impedance * omega, m: impedance / omega };
-    for rtol in [1.5e-4, 1.5e-5, 1.5e-6, 1.5e-7] {
-        let response = respond(&step, rtol);
-        // Without contacts that age friction takes from every swing: the first is the highest.
-        let first = std::f64::consts::PI / omega;
-        assert!(response.t_peak.is_none_or(|t| relative(t, first) < 1e-4), "{rtol}: {response:?}");
-    }
-}
-
-/// Errors of steps drive cycles off limit cycles on which a heavy block all but rests once in a swing: they have arrived
-/// where nothing but that moves them.
-#[test]
-fn regress_limit_cycles_that_errors_of_steps_drive_off() {
-    for (a, weakening, mass, k, x) in [
-        (6.68e-3, 0.353, 1.08e5, 2.28e3, 0.1452_f64),
-        (6.33e-4, 1.51, 8.9, 7.76, -5.87),
-        (3.97e-3, 0.947, 6.47e5, 89.6, 8.083),
-        (4.65e-2, 4.79, 3.03e4, 96.7, -0.4829),
-    ] {
-        let law = Law { a, b: a * (1.0 + weakening) };
-        let step = Step { transition: Transition { law, v_i: x.exp(), v_f: 1.0 }, k: k * a, m: mass * a };
-        let [coarse, fine] = [1e-6, 1e-7].map(|rtol| respond(&step, rtol));
-        assert_eq!([coarse.outcome, fine.outcome], [Outcome::LimitCycle; 2], "{step:?}");
-        let [coarse, fine] = [coarse, fine].map(|response| response.cycle.expect("is a limit cycle"));
-        assert!(relative(coarse.v_peak, fine.v_peak) < 1e-6, "{step:?}: {coarse:?} {fine:?}");
-        assert!(relative(coarse.period, fine.period) < 1e-6, "{step:?}: {coarse:?} {fine:?}");
-        let troughs = [coarse, fine].map(|cycle| cycle.v_trough);
-        let told = troughs.iter().all(|trough| !trough.is_nan());
-        assert!(!told || relative(troughs[0], troughs[1]) < 1e-6, "{step:?}: {coarse:?} {fine:?}");
-        // Friction makes an almost free block swing from rest to 2 v_f.
-        let free = std::f64::consts::TAU * (mass / k).sqrt();
-        assert!((1.8..2.01).contains(&coarse.v_peak) && relative(coarse.period, free) < 0.2, "{step:?}: {coarse:?}");
-    }
-}
-
 /// Swings of heavy blocks die out or end on a small limit cycle, however close to the critical stiffness.
 #[test]
 fn reference_heavy_blocks_next_to_the_critical_stiffness() {
@@ -637,44 +586,6 @@ fn regress_motions_within_1e_5_of_the_final_velocity_are_told() {
     }
 }
 
-/// Swings that friction changes by 1e-7 of themselves, or of which it gives as much as it takes, are no limit cycle.
-#[test]
-fn regress_what_hardly_changes_is_no_limit_cycle() {
-    let below = Law { a: 1.3218331381257936e-6, b: 1.0028531539030115e-5 };
-    let above = Law { a: 0.0018650442311370467, b: 0.006462420414556991 };
-    let neutral = Law { a: 7.280313102015968, b: 7.280313102031584 };
-    let cases = [
-        (below, [1.1817928163219251, 1.0951933757494372], 34.774726365844984, 4.401544839861419, 1.2e-5),
-        (above, [1.0000000000007274, 1.118762060696573], 116641.0071753458, 37805.49045120459, 1e-6),
-        (neutral, [1.0000993711549193, 1.0001726867713676], 16529.661416626215, 7703632231474514.0, 3.9e-8),
-    ];
-    for (law, [v_i, v_f], k, m, rtol) in cases {
-        let found = respond(&Step { transition: Transition { law, v_i, v_f }, k, m }, rtol);
-        assert!(found.cycle.is_none_or(|cycle| cycle.v_peak < v_f * (1.0 + 1e-5)), "{found:?}");
-    }
-}
-
-/// The rate of cycles is 1e-7 beside the limit cycle, and 1e-2 in a distance.
-#[test]
-fn regress_limit_cycles_where_the_rate_bends_are_found() {
-    let law = Law { a: 0.5401665375930877, b: 1.2379871388134032 };
-    let transition = Transition { law, v_i: 1.0000000000506755, v_f: 1.983476098447413 };
-    let step = Step { transition, k: 0.6978206013086433, m: 1.735729886784671e-11 };
-    for rtol in [1.7e-3, 1.7e-4, 1.7e-5] {
-        let cycle = respond(&step, rtol).cycle.expect("ends on a limit cycle");
-        assert!(relative(cycle.v_peak / transition.v_f, 6348.3526) <= 0.1 * rtol, "{rtol}: {cycle:?}");
-    }
-}
-
-/// Without mass there is no limit cycle: rounding of the spring's force made one.
-#[test]
-fn regress_without_mass_there_is_no_limit_cycle() {
-    let law = Law { a: 2.436194722874896e-6, b: 2.0537999570900105 };
-    let transition = Transition { law, v_i: 1.0000000000012021, v_f: 1.0000000000363836 };
-    let step = Step { transition, k: 2.053783995210945, m: 0.0 };
-    assert_eq!(step.respond(6e-7), (Status::Infeasible, None));
-}
-
 /// Next to the critical stiffness a block without mass comes to rest after more swings than can be followed.
 #[test]
 fn responses_without_mass_next_to_the_critical_stiffness_are_decided() {
@@ -689,42 +600,6 @@ fn responses_without_mass_next_to_the_critical_stiffness_are_decided() {
             "{rough:?} {fine:?}"
         );
         assert_eq!(Step { k: 0.5f64.next_down(), ..step }.respond(1e-6), (Status::Infeasible, None));
-    }
-}
-
-/// Terms of `1/theta` that were too small to be felt in a series grew over seventy powers of e within one step of a slip, and the next
-/// cycle was off by a thousand times the error of a step.
-#[test]
-fn regress_cycles_of_long_slips_are_alike_at_every_accuracy() {
-    let slider =
-        Slider { a: 1.8342438123566077e-5, b: 9.799475947200603e-5, inertia: 5.635e-30, k: 4.984302511808676e-6 };
-    for tolerance in [5e-4, 1.7e-4, 5e-5, 1.7e-5, 1e-6] {
-        let mut orbit = Orbit::new(&slider, slider.steady(-2.32), tolerance);
-        let mut budget = 10_000;
-        let periods: Vec<f64> = (0..6).map(|_| orbit.cycle(false, &mut budget).expect("goes on").period).collect();
-        assert!(relative(periods[4], periods[5]) < 0.01 * tolerance.max(1e-4), "{tolerance:e}: {periods:?}");
-    }
-}
-
-/// Cycles were counted with rates too coarse for it, up to a place that was not where they come into the band.
-#[test]
-fn regress_cycles_until_it_settles_are_counted() {
-    let light = Law { a: 7.800928358237422e-6, b: 0.024779000929800166 };
-    let heavy = Law { a: 0.1931690592553601, b: 1.4518214224180492 };
-    let cases = [
-        (
-            light,
-            [10310.918710403183, 1.0129941889216252],
-            0.024771240385117264,
-            3.7149710843086593e-16,
-            1.7e-3,
-            4566.62848,
-        ),
-        (heavy, [4.924451308600438, 1.0000000000066644], 2.2020110691423884, 0.14478001957119171, 7.5e-6, 44152.22435),
-    ];
-    for (law, [v_i, v_f], k, m, rtol, expected) in cases {
-        let found = respond(&Step { transition: Transition { law, v_i, v_f }, k, m }, rtol).settling_time;
-        assert!(found.is_none_or(|time| relative(time * v_f, expected) <= rtol), "{found:?}");
     }
 }
 
@@ -788,5 +663,18 @@ fn regress_a_large_step_ends_on_the_cycle_around_stable_sliding() {
     for rtol in [1e-4, 1e-6, 1e-8] {
         let cycle = respond(&step, rtol).cycle.expect("is a limit cycle");
         assert!(relative(cycle.v_peak, 3534480.0) < 1e-5, "{rtol}: {cycle:?}");
+    }
+}
+
+/// Next to its limit cycle errors of steps alternate in sign, so that changes from one cycle to the next no longer shrink: the case was
+/// undecided at two accuracies.
+#[test]
+fn regress_errors_of_steps_keep_no_cycle_from_its_limit() {
+    let step = Step { transition: Transition { law: PAPER, v_i: 1e5, v_f: 158554.0 }, k: 0.0048241, m: MASS };
+    let expected = respond(&step, 1e-9).cycle.expect("is a limit cycle");
+    for rtol in [1e-5, 1e-6, 3e-7, 1e-7] {
+        let cycle = respond(&step, rtol).cycle.unwrap_or_else(|| panic!("undecided at {rtol}"));
+        assert!(relative(cycle.v_peak, expected.v_peak) <= rtol, "{rtol}: {cycle:?}");
+        assert!(relative(cycle.period, expected.period) <= rtol, "{rtol}: {cycle:?}");
     }
 }
