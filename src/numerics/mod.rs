@@ -4,7 +4,6 @@ pub mod cubic;
 pub mod dilogarithm;
 pub mod double_double;
 pub mod elementary;
-pub mod elimination;
 pub mod gauss;
 pub mod lanes;
 pub mod polynomial;

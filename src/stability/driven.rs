@@ -16,8 +16,8 @@ use crate::protocol::compliant::Path;
 use crate::protocol::{Motion, Slider};
 use crate::stability::Followed;
 
-/// Most samples of one simulation.
-const MOST_SAMPLES: f64 = 1e5;
+/// Samples of one simulation, at most. Chosen: each takes some steps, and a row shall not take minutes.
+const MAX_SAMPLES: f64 = 1e5;
 
 /// Distance from the target at `t_f`, the Euclidean norm in `(ln v, ln theta, k s/a)`, if `v_c` is told continuously:
 /// what `rtol` and the rounding of the protocol leave, amplified from wherever they arise. None where the simulation does
@@ -29,9 +29,9 @@ pub fn loop_error(path: &Path, rtol: f64) -> Followed {
         return Followed { number: Some(distance(&path.slider.law, [0.0, ln(theta * v_f)])), steps: 0 };
     }
     let driven = Driven::new(path, Control::Continuous(path));
-    let mut budget = MOST_STEPS;
-    let end = driven.follow(driven.start(path), (0.0, 1.0), FIRST, rtol, &mut budget);
-    Followed { number: end.map(|(state, _)| driven.distance(&state)), steps: MOST_STEPS - budget }
+    let mut budget = MAX_STEPS;
+    let end = driven.follow(driven.start(path), (0.0, 1.0), FIRST_STEP, rtol, &mut budget);
+    Followed { number: end.map(|(state, _)| driven.distance(&state)), steps: MAX_STEPS - budget }
 }
 
 /// Distance from the target at `t_f`, as in [`loop_error`], if `v_c` is sampled at `0`, `dt`, `2 dt`, … and each sample
@@ -40,7 +40,7 @@ pub fn loop_error(path: &Path, rtol: f64) -> Followed {
 pub fn held_error(path: &Path, dt: f64, rtol: f64) -> Followed {
     let t_f = path.duration();
     let samples = (t_f / dt).ceil().max(1.0);
-    if samples.is_nan() || samples > MOST_SAMPLES {
+    if samples.is_nan() || samples > MAX_SAMPLES {
         return Followed { number: None, steps: 0 };
     }
     let (slider, count) = (&path.slider, samples as u32);
@@ -58,21 +58,21 @@ pub fn held_error(path: &Path, dt: f64, rtol: f64) -> Followed {
         return Followed { number: Some(distance(&slider.law, [ln(v / v_f), ln(theta * v_f)])), steps: 0 };
     }
     let mut driven = Driven::new(path, Control::Held(0.0));
-    let mut budget = MOST_STEPS;
-    let mut here = Some((driven.start(path), FIRST));
+    let mut budget = MAX_STEPS;
+    let mut here = Some((driven.start(path), FIRST_STEP));
     for i in 0..count {
         let Some((state, h)) = here else { break };
         driven.control = Control::Held(sample(i));
         here = driven.follow(state, (time(i), time(i + 1)), h, rtol, &mut budget);
     }
-    Followed { number: here.map(|(state, _)| driven.distance(&state)), steps: MOST_STEPS - budget }
+    Followed { number: here.map(|(state, _)| driven.distance(&state)), steps: MAX_STEPS - budget }
 }
 
-/// First step, in units of `t_f`; it is shortened as needed.
-const FIRST: f64 = 1e-3;
+/// First step, in units of `t_f`. Chosen: it is shortened as needed.
+const FIRST_STEP: f64 = 1e-3;
 
-/// Most steps of one simulation.
-const MOST_STEPS: u32 = 200_000;
+/// Steps of one simulation, at most. Chosen: two for each sample.
+const MAX_STEPS: u32 = 200_000;
 
 /// Places of the variables, in the order in which they are eliminated.
 const Z: usize = 0;
@@ -116,7 +116,7 @@ impl<'a> Driven<'a> {
         rtol: f64,
         budget: &mut u32,
     ) -> Option<([f64; 3], f64)> {
-        let accuracy = Accuracy { tolerance: (SHARE * rtol).max(1e-13), scale: [self.slider.law.a, 1.0, 1.0] };
+        let accuracy = Accuracy { tolerance: (STEP_ERROR * rtol).max(1e-13), scale: [self.slider.law.a, 1.0, 1.0] };
         let mut run = Integrator::new(self, radau_iia_9(), accuracy, from, state, h);
         while run.t() < to {
             *budget = budget.checked_sub(1)?;
@@ -131,8 +131,8 @@ impl<'a> Driven<'a> {
     }
 }
 
-/// The share of the accuracy that a step may take.
-const SHARE: f64 = 0.01;
+/// Error of a step, fraction of the accuracy. Chosen: a hundred steps of the same sign add up to it.
+const STEP_ERROR: f64 = 0.01;
 
 /// Distance where the spring is rigid and pulls with the friction alone.
 fn distance(law: &Law, [x, y]: [f64; 2]) -> f64 {

@@ -41,11 +41,12 @@ pub struct Eigenvalues {
     pub decay_rate: Option<f64>,
 }
 
-/// Two eigenvalues whose squared half distance is below this share of their product are close.
-const CLOSE: f64 = 1e-3;
+/// Square of half the distance of two eigenvalues, fraction of their product, below which it is formed in double-double. Chosen: half
+/// of the digits of the distance are left there.
+const CLOSE_PAIR: f64 = 1e-3;
 
-/// A difference below this share of its terms is formed in double-double.
-const CANCELS: f64 = 0.125;
+/// Difference, fraction of its terms, below which it is formed in double-double. Chosen: three bits are lost there.
+const CANCELLATION: f64 = 0.125;
 
 impl SteadySliding {
     /// Steady sliding at velocity `v > 0`, on a spring of stiffness `k > 0` (infinite: rigid), of a mass `m >= 0`.
@@ -57,13 +58,13 @@ impl SteadySliding {
         let sum = inertia + law.a;
         let (pull, push) = (law.a * k, weakening * sum);
         let mut sliding = SteadySliding { law, k, m, v, inertia, sum, c: k - weakening, hurwitz: pull - push };
-        if k.is_finite() && sliding.hurwitz.abs() < CANCELS * pull {
+        if k.is_finite() && sliding.hurwitz.abs() < CANCELLATION * pull {
             let inertia = DoubleDouble::product(v, v) * DoubleDouble::new(m);
             let weakening = DoubleDouble::sum(law.b, -law.a);
             let push = weakening * (inertia + DoubleDouble::new(law.a));
             sliding.hurwitz = (DoubleDouble::product(law.a, k) - push).high;
         }
-        if k.is_finite() && sliding.c.abs() < CANCELS * k {
+        if k.is_finite() && sliding.c.abs() < CANCELLATION * k {
             sliding.c = (DoubleDouble::new(k) - DoubleDouble::sum(law.b, -law.a)).high;
         }
         sliding
@@ -105,7 +106,7 @@ impl SteadySliding {
 pub fn critical_velocity(law: Law, k: f64, m: f64) -> Option<f64> {
     let weakening = law.b - law.a;
     let mut spare = k - weakening;
-    if spare.abs() < CANCELS * k {
+    if spare.abs() < CANCELLATION * k {
         spare = (DoubleDouble::new(k) - DoubleDouble::sum(law.b, -law.a)).high;
     }
     let velocity = (law.a * (spare / weakening) / m).sqrt();
@@ -118,8 +119,8 @@ enum Pair {
     Real { low: f64, high: f64 },
 }
 
-/// Newton steps after which rounding alone is left, also next to a double root.
-const MOST_STEPS: usize = 100;
+/// Newton steps, at most. Chosen: a double root takes one for each bit.
+const MAX_STEPS: usize = 100;
 
 impl SteadySliding {
     /// `R = -M x` of a real root `x`, the largest `R` or the only one: a root of `R^3 - (M + a) R^2 + c M R - k M^2`.
@@ -138,7 +139,7 @@ impl SteadySliding {
             sum + inertia * self.growth_bound()
         };
         let from_above = r > inflection;
-        for _ in 0..MOST_STEPS {
+        for _ in 0..MAX_STEPS {
             let step = value(r) / slope(r);
             let next = r - step;
             // Steps go one way until rounding turns one.
@@ -202,7 +203,7 @@ impl SteadySliding {
         }
         let half = 0.5 * p;
         let mut squares = (half - q.sqrt()) * (half + q.sqrt());
-        if squares.abs() < CLOSE * q {
+        if squares.abs() < CLOSE_PAIR * q {
             squares = self.discriminant(r, by_sum);
         }
         if squares < 0.0 {

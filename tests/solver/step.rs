@@ -7,7 +7,7 @@ use slipsweep::model::{Law, Transition};
 use slipsweep::protocol::Status;
 use slipsweep::stability::SteadySliding;
 use slipsweep::stability::lyapunov_coefficient;
-use slipsweep::stability::response::{Orbit, Outcome, Response, Slider, Step, Sustained};
+use slipsweep::stability::response::{Orbit, Outcome, Response, Step, Sustained};
 
 const PAPER: Law = Law { a: 0.005, b: 0.01 };
 const V_F: f64 = 3.2e6;

@@ -52,13 +52,13 @@ impl Friction {
     pub fn new(law: Law, ends: &Ends) -> Friction {
         let ln_theta = ln(ends.theta_0.high) + ln(ends.theta_1.high);
         let slope = law.b - law.a;
-        let unit = if slope.abs() > FAINT * law.a { slope } else { FAINT * law.a };
+        let unit = if slope.abs() > MIN_WEAKENING * law.a { slope } else { MIN_WEAKENING * law.a };
         Friction { a: law.a, slope, drive: unit * ends.t_f, constant: 1.0 - law.a * ln(ends.t_f), ln_theta }
     }
 }
 
-/// `b - a` in units of `a` that stands for less, far below the rounding of `a`.
-const FAINT: f64 = 1e-30;
+/// `b - a` in units of `a`, at least, in which the drive is summed. Chosen: far below the rounding of `a`.
+const MIN_WEAKENING: f64 = 1e-30;
 
 /// Room for the values at the nodes: sums and differences of those on both sides of the middle.
 #[derive(Debug, Clone)]

@@ -8,10 +8,10 @@
 
 use multiversion::multiversion;
 
-use super::bins::WHOLE;
+use super::bins::CUT_FROM;
 use super::path::{Ends, Path};
-use super::plan::{BLOCK, BLURRED, Block, CHEAP, COARSE, PAIRS, Places, Plan, nearest, places, rooted};
-use super::rules::{Accuracy, STEP, ZEROS};
+use super::plan::{BLOCK, Block, CHEAP_NODES, MIN_GAP, PAIRS, Places, Plan, SINGLE_COST, nearest, places, rooted};
+use super::rules::{Accuracy, NODE_STEP, ZEROS};
 use crate::numerics::elementary::rough_ln;
 use crate::numerics::lanes::{LANES, Vector};
 
@@ -39,7 +39,7 @@ struct Cell {
     place: Place,
     /// The age of its frame.
     age: u64,
-    /// ln rho in units of that for which [`STEP`] nodes are enough, in powers of the distances from the middle: 1, `u`,
+    /// ln rho in units of that for which [`NODE_STEP`] nodes are enough, in powers of the distances from the middle: 1, `u`,
     /// `v` and `u v`.
     pace: [f64; 4],
     /// Where ln rho is no more than that a shortcut needs a plan of its own; 0 if all of a cell do.
@@ -55,7 +55,7 @@ struct Cell {
 /// Which cell: bits of the coordinates of its middle.
 type Place = [u64; 2];
 
-/// Cells that are kept: those of two or three lines of a map.
+/// Cells that are kept. Chosen: those of two or three lines of a map.
 const SLOTS: usize = 64;
 
 /// Cells that are planned together, each from as many places.
@@ -68,20 +68,23 @@ const SAMPLES: [[f64; 2]; 8] =
 /// The first of them.
 const CORNERS: usize = 4;
 
-/// Cells in the power of 2 below the mean of n, the scale of the whole domain.
+/// Cells in the power of 2 below the mean of n, the scale of the feasible set. Measured: more cells cost more plans, fewer a worse map
+/// (`cargo bench --bench landscape`).
 const CELLS: f64 = 8.0;
 
 /// `1.5 * 2^52`, whose last bit is 1: added to a number, it leaves the nearest integer.
 const ONES: f64 = 6755399441055744.0;
 
-/// Cells farther away are not planned.
-const FARTHEST: f64 = 1e9;
+/// Cells from the origin that are planned. Chosen: places of farther ones lose digits.
+const MAX_CELL: f64 = 1e9;
 
-/// The share of the distance to the zero beyond the end that the map grows from, so that none comes between.
-const SAFE: f64 = 0.97;
+/// Distance of the centre of a map beyond the end, fraction of that of the nearest zero at the samples. Chosen: no zero of the cell
+/// comes between.
+const GAP_SHARE: f64 = 0.97;
 
-/// Largest share of ln rho that it may be off.
-const ROUGH: f64 = 0.12;
+/// Error of the interpolated ln rho, fraction of it, at most. Measured: a plan of its own costs more nodes than that saves
+/// (`cargo bench --bench landscape`).
+const MAX_SLACK: f64 = 0.12;
 
 /// The bin of a shortcut that needs a plan of its own.
 pub(super) const OWN: u32 = u32::MAX;
@@ -359,7 +362,7 @@ fn chart(frame: &Frame, cells: &[Place; TOGETHER]) -> [Cell; TOGETHER] {
     for i in 0..BLOCK {
         let focal = if gains[i] > 0.0 { squared[i] } else { straight[i] };
         // What errors of the zeros may cost.
-        let excess = (f64::from(focal) - 2.0) * (0.5 / (1.0 + COARSE));
+        let excess = (f64::from(focal) - 2.0) * (0.5 / (1.0 + SINGLE_COST));
         let excess = if excess > 0.0 { excess } else { 0.0 };
         paces[i] = rough_ln(1.0 + excess + (excess * (2.0 + excess)).sqrt()) / accuracy.pace;
     }
@@ -376,15 +379,15 @@ fn chart(frame: &Frame, cells: &[Place; TOGETHER]) -> [Cell; TOGETHER] {
     std::array::from_fn(|c| {
         let squared = gain[c] > 0.0;
         let (side, gap) = if squared { (centres.side[c], centres.gap[c]) } else { (steady as f32, 0.0) };
-        let one_map = !squared || centres.common[c] & ((gap == 0.0) | (gap >= BLURRED as f32)) & (gap <= 1.0);
-        let meant = middles[0][c].abs() + middles[1][c].abs() < FARTHEST;
+        let one_map = !squared || centres.common[c] & ((gap == 0.0) | (gap >= MIN_GAP as f32)) & (gap <= 1.0);
+        let meant = middles[0][c].abs() + middles[1][c].abs() < MAX_CELL;
         let none = Cell { place: cells[c], ..Cell::NONE };
         if !(sound[c] && one_map && meant) {
             return none;
         }
         let (side, gap) = (f64::from(side), f64::from(gap));
         let (from, to) = if squared { (gap.sqrt(), (1.0 + gap).sqrt()) } else { (0.0, 1.0) };
-        let most = if squared && room[c] < 0.0 { CHEAP / STEP } else { WHOLE };
+        let most = if squared && room[c] < 0.0 { CHEAP_NODES / NODE_STEP } else { CUT_FROM };
         let squarings = if squared { 1.0 } else { 0.0 };
         let cell = Cell { side, gap, squarings, from, to, least: 1.0 / most as f64, ..none };
         interpolated(std::array::from_fn(|sample| paces[sample * TOGETHER + c]))
@@ -401,7 +404,7 @@ fn interpolated([mm, mp, pm, pp, m_low, m_high, low_m, high_m]: [f64; SAMPLES.le
     let off_v = greater(off(low_m, mm, mp), off(high_m, pm, pp));
     let slack = off_u + off_v;
     let lowest = -greater(greater(-mm, -mp), greater(-pm, -pp));
-    (slack <= ROUGH * lowest).then_some([
+    (slack <= MAX_SLACK * lowest).then_some([
         0.25 * ((mm + pp) + (mp + pm)) - slack,
         0.5 * ((pp - mm) + (pm - mp)),
         0.5 * ((pp - mm) - (pm - mp)),
@@ -435,7 +438,7 @@ impl Centres {
         for c in 0..TOGETHER {
             let beyond = if above[c] >= 0.0 { above[c] } else { below[c] };
             centres.side[c] = if above[c] >= 0.0 { 1.0 } else { -1.0 };
-            centres.gap[c] = SAFE as f32 * beyond;
+            centres.gap[c] = GAP_SHARE as f32 * beyond;
             centres.common[c] = (above[c] >= 0.0) | (below[c] >= 0.0);
         }
         centres

@@ -21,7 +21,7 @@ pub(super) struct Floors {
     pub theta: f64,
 }
 
-/// What either logarithm may take of the friction of 1: half of it, less what rounding could cost.
+/// What either logarithm may take of the friction of 1. Derived: a half, less what rounding costs.
 const HALF: f64 = 0.499;
 
 impl Floors {

@@ -42,7 +42,7 @@ impl Motion for FreeCubic {
             landmarks.push(centre);
             while reach < 1.0 {
                 landmarks.extend([centre - reach, centre + reach]);
-                reach *= STRETCH;
+                reach *= LANDMARK_RATIO;
             }
         }
         landmarks.retain(|x| (0.0..=1.0).contains(x));
@@ -60,5 +60,5 @@ impl Motion for FreeCubic {
     }
 }
 
-/// Ratio of the distances of neighbouring landmarks from a zero.
-const STRETCH: f64 = 8.0;
+/// Ratio of the distances of neighbouring landmarks from a zero. Chosen: a trace shows what lies between.
+const LANDMARK_RATIO: f64 = 8.0;

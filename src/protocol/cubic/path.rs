@@ -3,7 +3,7 @@
 //! In `x = t/t_f`: `theta = theta_0 + A_2 x + A_3 x^2 + A_4 x^3` and `n = t_f (1 - theta') = t_f - dtheta/dx`, so `v =
 //! n/(t_f theta)`.
 
-use super::rules::{APART, Accuracy};
+use super::rules::{Accuracy, MIN_THIRD};
 use crate::numerics::cubic::{Cubic, ExactCubic, exact_quadratic_zeros};
 use crate::numerics::double_double::DoubleDouble;
 use crate::protocol::Status;
@@ -145,8 +145,8 @@ impl<'a> Path<'a> {
         let x = self.theta.minimum();
         let half_bend = c2 + 3.0 * c3 * x;
         let third = -c2 / c3 - 2.0 * x;
-        let alone = (third - x).abs() > APART || third.is_nan();
-        let reach = APART.min(0.5 * (third - x).abs());
+        let alone = (third - x).abs() > MIN_THIRD || third.is_nan();
+        let reach = MIN_THIRD.min(0.5 * (third - x).abs());
         let least = self.exact_theta().at(x).high;
         let close = least < 1e-6 * (c0.abs() + c1.abs() + c2.abs() + c3.abs());
         (x > 0.0 && alone && close && half_bend > 0.0 && least > 0.0).then(|| (x, (least / half_bend).sqrt(), reach))
@@ -198,7 +198,7 @@ impl<'a> Path<'a> {
             let fine = (accuracy.rounding * theta >= theta_size) & (accuracy.slight * n >= n_size);
             // The logarithm of n at an end counts over the whole panel, and the sums multiply theta and n of two nodes.
             let size = theta * n;
-            sound &= n >= STEEPEST * (n0.abs() + n1.abs() + n2.abs());
+            sound &= n >= MIN_END * (n0.abs() + n1.abs() + n2.abs());
             sound &= (fine | (x == 0.0)) & (size > 1e-120) & (size < 1e120);
         }
         sound
@@ -271,7 +271,7 @@ impl<'a> Path<'a> {
         let t_f = DoubleDouble::new(self.ends.t_f);
         let at = |x: f64| (self.exact_n().at(x) / (t_f * self.exact_theta().at(x))).high;
         let mut v = at(x);
-        for _ in 0..MOST_STEPS {
+        for _ in 0..MAX_STEPS {
             let lower = at(self.exact_surplus(v).minimum());
             if lower.is_nan() || lower >= v || lower <= 0.0 {
                 break;
@@ -282,9 +282,9 @@ impl<'a> Path<'a> {
     }
 }
 
-/// Least share of n in its coefficients at an end of a panel that is summed without logarithms: below it `n'/n` is so
-/// steep there that its rounding shows.
-const STEEPEST: f64 = 1e-4;
+/// n at an end of a panel, fraction of its coefficients, that is summed without logarithms, at least. Measured: below it the rounding
+/// of `n'/n` shows (`tests/solver/stress/landscape.rs`).
+const MIN_END: f64 = 1e-4;
 
-/// More steps than the doubling of digits can use.
-pub(super) const MOST_STEPS: u32 = 60;
+/// Steps of Dinkelbach's method, at most. Chosen: the digits double with each.
+pub(super) const MAX_STEPS: u32 = 60;

@@ -9,7 +9,9 @@ use multiversion::multiversion;
 
 use super::bins::BINS;
 use super::path::{Ends, Path};
-use super::rules::{APART, Accuracy, FAR, STEP, THETA_ZEROS, ZEROS, cut, is_near_start, polished, rough_zeros};
+use super::rules::{
+    Accuracy, FAR, MIN_THIRD, NODE_STEP, THETA_ZEROS, ZEROS, cut, is_near_start, polished, rough_zeros,
+};
 use crate::numerics::real::Real;
 
 /// One panel for each shortcut.
@@ -50,37 +52,40 @@ pub(super) type Block = [f64; BLOCK];
 /// log2 of the largest power tried.
 pub(super) const MOST_SQUARINGS: u32 = 3;
 
-/// Nodes that a larger power cannot save much of.
-pub(super) const CHEAP: usize = 32;
+/// Nodes that a larger power cannot save much of. Measured (`cargo bench --bench landscape`).
+pub(super) const CHEAP_NODES: usize = 32;
 
-/// Half the distance of a pair of zeros of n from each other that is known to some digits.
-const CLOSEST: f64 = 1e-6;
+/// Half the distance of a pair of zeros of n, at least, that is known to some digits. Derived: the root of the rounding of the
+/// discriminant, times 100.
+const MIN_PAIR: f64 = 1e-6;
 
-/// A distance of a real zero from the end that has lost digits which the map needs.
-pub(super) const BLURRED: f64 = 1e-10;
+/// Distance of a real zero beyond an end, at least, that has the digits which a map needs. Derived: six digits are left of it.
+pub(super) const MIN_GAP: f64 = 1e-10;
 
 /// Zeros that may be complex, each followed by its conjugate or by another real one; all others are real.
 pub(super) const PAIRS: [usize; 2] = [1, 3];
 
-/// What a doubtful zero of n counts, more than all of theta.
-const OF_N: f32 = 8.0;
+/// What a doubtful zero of n counts. Chosen: more than all of theta.
+const DOUBT_OF_N: f32 = 8.0;
 
 /// Whether zeros are computed to few digits; what these do not tell is left to the next plan.
 const fn is_coarse<T: Real>() -> bool {
     size_of::<T>() < size_of::<f64>()
 }
 
-/// In single precision: sizes of the coefficients of theta, relative to theta at the end, and of n, whose powers stay in
-/// range and keep some digits of all zeros.
-const TAME_THETA: (f64, f64) = (1e-4, 3e3);
-const TAME_N: (f64, f64) = (1e-10, 1e10);
+/// Sizes of the coefficients of theta, relative to theta at the end, whose powers stay in the range of single precision and keep some
+/// digits of all zeros. Measured (`tests/solver/stress/landscape.rs`).
+const THETA_RANGE: (f64, f64) = (1e-4, 3e3);
 
-/// The square of the distance of two zeros of theta, relative to their distance from the end, at which single precision
-/// has lost half of its digits of it.
-const APART_SQUARE: f64 = 1e-3;
+/// The same of those of n.
+const N_RANGE: (f64, f64) = (1e-10, 1e10);
 
-/// What errors of the zeros in single precision cost the focal sum beyond 2.
-pub(super) const COARSE: f64 = 0.03;
+/// Square of the distance of two zeros of theta, relative to their distance from the end, at least. Derived: single precision has lost
+/// half of its digits of it there.
+const MIN_PAIR_SQUARED: f64 = 1e-3;
+
+/// Errors of the focal sum beyond 2 by zeros in single precision, relative. Measured (`tests/solver/stress/landscape.rs`).
+pub(super) const SINGLE_COST: f64 = 0.03;
 
 /// Chooses the panels over `[0, 1]` of the shortcuts `(a_2[i], a_3[i])`, all feasible, in single precision.
 #[multiversion(targets(
@@ -131,7 +136,7 @@ pub(super) fn places<T: Real>(ends: &Ends, a_2: &Block, a_3: &Block) -> Places<T
             let (between, from_end) = (zeros.re[1] - zeros.re[2], zeros.re[1] - T::of(1.0));
             let square = between * between + T::of(4.0) * zeros.im[1] * zeros.im[1];
             let size = from_end * from_end + zeros.im[1] * zeros.im[1];
-            let apart = square >= T::of(APART_SQUARE) * size;
+            let apart = square >= T::of(MIN_PAIR_SQUARED) * size;
             doubt[i] = if is_tame(theta, n) & apart { 0.0 } else { 1.0 };
         }
     }
@@ -180,15 +185,15 @@ impl<T: Real> Places<T> {
     fn settle_close_pairs(&mut self, ends: &Ends, a_2: &Block, a_3: &Block) {
         let Places { re, im, doubt } = self;
         for k in 0..ZEROS {
-            let least = T::of(if k < THETA_ZEROS || is_coarse::<T>() { APART } else { CLOSEST });
-            let weight = if k < THETA_ZEROS { 1.0 } else { OF_N };
+            let least = T::of(if k < THETA_ZEROS || is_coarse::<T>() { MIN_THIRD } else { MIN_PAIR });
+            let weight = if k < THETA_ZEROS { 1.0 } else { DOUBT_OF_N };
             for i in 0..BLOCK {
                 let close = (re[k][i] > T::of(0.0)) & (re[k][i] < T::of(1.0)) & (im[k][i] < least);
                 doubt[i] += if close { weight } else { 0.0 };
             }
         }
         for i in 0..BLOCK {
-            let of_theta = !is_coarse::<T>() && doubt[i] > 0.0 && doubt[i] < OF_N;
+            let of_theta = !is_coarse::<T>() && doubt[i] > 0.0 && doubt[i] < DOUBT_OF_N;
             let pair = of_theta.then(|| Path::new(ends, a_2[i], a_3[i]).close_pair()).flatten();
             if let Some((x, height, reach)) = pair {
                 for k in 0..THETA_ZEROS {
@@ -272,14 +277,14 @@ fn panels<T: Real>(ends: &Ends, [a_2, a_3, low, high]: [&Block; 4], accuracy: &A
     }
     // A zero beyond the end is known from 1, not from there.
     for i in 0..BLOCK {
-        let blurred = (side[i] > zero) & (high[i] == 1.0) & (gap[i] > zero) & (gap[i] < T::of(BLURRED));
-        doubt[i] += if blurred { OF_N } else { 0.0 };
+        let blurred = (side[i] > zero) & (high[i] == 1.0) & (gap[i] > zero) & (gap[i] < T::of(MIN_GAP));
+        doubt[i] += if blurred { DOUBT_OF_N } else { 0.0 };
     }
     // A focal sum that is not safe from the errors of the zeros does not count in full.
-    let lost = if is_coarse::<T>() { COARSE } else { 0.0 };
+    let lost = if is_coarse::<T>() { SINGLE_COST } else { 0.0 };
     let steps = accuracy.in_steps();
     let limits: [f32; BINS] = std::array::from_fn(|i| (steps[i] + lost * (steps[i] - 2.0)) as f32);
-    let cheap = limits[CHEAP / STEP - 1];
+    let cheap = limits[CHEAP_NODES / NODE_STEP - 1];
     let squarings = powers([real, size], &gap, [low, high], cheap, &mut focal);
     let bin = bins(&limits, &focal);
     for i in 0..BLOCK {
@@ -374,8 +379,8 @@ fn bins(limits: &[f32; BINS], focal: &[f32; BLOCK]) -> [f32; BLOCK] {
 #[inline(always)]
 fn is_tame<T: Real>([q0, q1, q2, q3]: [T; 4], [n0, n1, n2]: [T; 3]) -> bool {
     let (theta, n) = (q1.abs() + q2.abs() + q3.abs(), n0.abs() + n1.abs() + n2.abs());
-    (theta > T::of(TAME_THETA.0) * q0)
-        & (theta < T::of(TAME_THETA.1) * q0)
-        & (n > T::of(TAME_N.0))
-        & (n < T::of(TAME_N.1))
+    (theta > T::of(THETA_RANGE.0) * q0)
+        & (theta < T::of(THETA_RANGE.1) * q0)
+        & (n > T::of(N_RANGE.0))
+        & (n < T::of(N_RANGE.1))
 }

@@ -52,27 +52,29 @@ pub(super) struct Panel {
     pub nodes: usize,
 }
 
-/// Nodes that are taken without looking for a better map: the search costs as much as some sixteen nodes.
-const PLAIN: usize = 32;
-/// Nodes from which the sinh map is tried.
-const POOR: usize = 40;
-/// Nodes beyond which a panel is cut.
-const LONG: usize = 80;
+/// Nodes that are taken without looking for a better map. Measured: the search costs as much as some sixteen nodes (`cargo bench
+/// --bench landscape`).
+const PLAIN_NODES: usize = 32;
+/// Nodes from which the sinh map is tried. Measured: its logarithms and exponentials pay from there on (`cargo bench --bench landscape`).
+const SINH_FROM: usize = 40;
+/// Nodes beyond which a panel is cut: the last of the bins.
+const CUT_FROM: usize = 80;
 /// Most nodes of one panel.
 const MOST_NODES: usize = 256;
-/// Numbers of nodes differ by this.
-pub(super) const STEP: usize = 4;
-/// Depth of cutting: a panel is never shorter than `2^-12` of its parent's share.
-const DEEPEST: u32 = 12;
-/// Safety of the estimate: `e^MARGIN` stands for the residues' share in the integral.
+/// Numbers of nodes are multiples of this: half of the lanes.
+pub(super) const NODE_STEP: usize = 4;
+/// Cuts of a panel in a row, at most: a panel is never shorter than `2^-12` of its parent.
+const MAX_DEPTH: u32 = 12;
+/// Safety of the estimate: `e^MARGIN` stands for the fraction of the residues in the integral. Measured: `tests/budgets.csv` holds the
+/// errors that are left.
 const MARGIN: f64 = 3.5;
 
 /// The accuracy asked for, as the focal sums (see [`focal`]) from which a number of nodes is enough.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Accuracy {
-    /// Element `i` is for `(i + 1) STEP` nodes; falling.
-    focal: [f64; MOST_NODES / STEP],
-    /// ln rho from which [`STEP`] nodes are enough.
+    /// Element `i` is for `(i + 1) NODE_STEP` nodes; falling.
+    focal: [f64; MOST_NODES / NODE_STEP],
+    /// ln rho from which [`NODE_STEP`] nodes are enough.
     pub pace: f64,
     /// Largest share of an error in theta.
     pub rounding: f64,
@@ -82,12 +84,12 @@ pub(super) struct Accuracy {
     pub longest: f64,
 }
 
-/// Accuracy below which parts of a cut panel are not planned.
-const FEWEST_DIGITS: f64 = 1e-5;
+/// Accuracy of parts of a cut panel, at most. Measured: below it the residues of a close pair exceed [`MARGIN`].
+const LOOSEST_PARTS: f64 = 1e-5;
 
-/// The focal sums from which [`STEP`] nodes are enough for `tolerance`, twice as many, and so on.
-fn focal_sums(tolerance: f64) -> [f64; MOST_NODES / STEP] {
-    let mut focal = [0.0; MOST_NODES / STEP];
+/// The focal sums from which [`NODE_STEP`] nodes are enough for `tolerance`, twice as many, and so on.
+fn focal_sums(tolerance: f64) -> [f64; MOST_NODES / NODE_STEP] {
+    let mut focal = [0.0; MOST_NODES / NODE_STEP];
     for (i, focal) in focal.iter_mut().enumerate() {
         // rho + 1/rho.
         let ln_rho = pace(tolerance) / (i + 1) as f64;
@@ -96,9 +98,9 @@ fn focal_sums(tolerance: f64) -> [f64; MOST_NODES / STEP] {
     focal
 }
 
-/// ln rho from which [`STEP`] nodes are enough for `tolerance`: `rho^(2 nodes) = e^digits`.
+/// ln rho from which [`NODE_STEP`] nodes are enough for `tolerance`: `rho^(2 nodes) = e^digits`.
 fn pace(tolerance: f64) -> f64 {
-    0.5 * (MARGIN - ln(tolerance)) / STEP as f64
+    0.5 * (MARGIN - ln(tolerance)) / NODE_STEP as f64
 }
 
 impl Accuracy {
@@ -109,7 +111,7 @@ impl Accuracy {
         let longest = rounding / ((law.b - law.a).abs() * f64::EPSILON);
         // A pair of zeros between the ends that no cut is made for is as far from the real axis as the height of the smallest
         // ellipse in units of half the panel, and theta there as small as its square.
-        let height = 0.5 * (MARGIN - ln(tolerance)) / LONG as f64;
+        let height = 0.5 * (MARGIN - ln(tolerance)) / CUT_FROM as f64;
         let slight = if most <= longest * (0.25 * height * height) { rounding / law.a } else { 0.0 };
         Accuracy { focal: focal_sums(tolerance), pace: pace(tolerance), rounding, slight, longest }
     }
@@ -117,17 +119,17 @@ impl Accuracy {
     /// For parts of a panel that is cut at a close pair of zeros, which fills what is left: at low accuracies its share is
     /// larger than the margin.
     pub fn of_parts(&self, tolerance: f64) -> Accuracy {
-        let tolerance = tolerance.min(FEWEST_DIGITS);
+        let tolerance = tolerance.min(LOOSEST_PARTS);
         Accuracy { focal: focal_sums(tolerance), pace: pace(tolerance), ..*self }
     }
 
     /// The focal sum from which `nodes` are enough.
     #[inline(always)]
     pub fn enough(&self, nodes: usize) -> f64 {
-        self.focal[nodes / STEP - 1]
+        self.focal[nodes / NODE_STEP - 1]
     }
 
-    /// The focal sums from which [`STEP`] nodes are enough, twice as many, and so on.
+    /// The focal sums from which [`NODE_STEP`] nodes are enough, twice as many, and so on.
     #[inline(always)]
     pub fn in_steps(&self) -> &[f64] {
         &self.focal
@@ -137,7 +139,7 @@ impl Accuracy {
     /// enough.
     pub fn nodes(&self, focal: f64) -> usize {
         let more = self.focal.iter().position(|&enough| focal >= enough);
-        more.map_or(MOST_NODES, |i| ((i + 1) * STEP).next_multiple_of(LANES))
+        more.map_or(MOST_NODES, |i| ((i + 1) * NODE_STEP).next_multiple_of(LANES))
     }
 }
 
@@ -157,7 +159,7 @@ pub(super) const ZEROS: usize = 5;
 /// Those of theta, which come first.
 pub(super) const THETA_ZEROS: usize = 3;
 
-/// Zeros are not put farther away than this.
+/// Distance of a zero, at most. Chosen: none farther away counts.
 pub(super) const FAR: f64 = 1e9;
 
 /// Zeros of theta and of `1 - theta'`: cheaper than [`Zeros::of`], and not as good for a close pair at the start.
@@ -205,12 +207,12 @@ pub(super) fn polished<T: Real>(c: &[T; 4], x: T, y: T) -> Option<(T, T)> {
     let scale = T::of(1.0) / norm;
     let step = (value * slope + value_i * slope_i) * scale;
     let step_i = (value_i * slope - value * slope_i) * scale;
-    let small = step.abs() + step_i.abs() < T::of(LARGEST_CORRECTION);
+    let small = step.abs() + step_i.abs() < T::of(MAX_CORRECTION);
     small.then(|| (x - step, (y - step_i).abs()))
 }
 
-/// Zeros are found to a few digits of the farthest; what is left to correct is less than this.
-const LARGEST_CORRECTION: f64 = 1e-3;
+/// Correction of a zero by a Newton step, at most. Chosen: the closed forms give some digits of the farthest.
+const MAX_CORRECTION: f64 = 1e-3;
 
 /// `x` within `[-FAR, FAR]`; what is not a number is far away.
 #[inline(always)]
@@ -239,14 +241,14 @@ impl Zeros {
     }
 }
 
-/// How far from a close pair of zeros the third one is at least; their closed form is better than half of this.
-pub(super) const APART: f64 = 0.03;
+/// Distance of the third zero from a close pair, at least. Derived: the closed form is better than half of this.
+pub(super) const MIN_THIRD: f64 = 0.03;
 
 /// Appends the panels that integrate over `[low, high]`.
 pub(super) fn choose(zeros: &Zeros, low: f64, high: f64, accuracy: &Accuracy, depth: u32, panels: &mut Vec<Panel>) {
     let (mut panel, focal) = best_panel(zeros, low, high, accuracy);
     panel.nodes = accuracy.nodes(focal);
-    if panel.nodes > LONG && depth < DEEPEST {
+    if panel.nodes > CUT_FROM && depth < MAX_DEPTH {
         let cut = cut(low, high, zeros.re[hindrance(zeros, low, high)]);
         choose(zeros, low, cut, accuracy, depth + 1, panels);
         choose(zeros, cut, high, accuracy, depth + 1, panels);
@@ -263,7 +265,7 @@ pub(super) fn choose(zeros: &Zeros, low: f64, high: f64, accuracy: &Accuracy, de
 ))]
 fn best_panel(zeros: &Zeros, low: f64, high: f64, accuracy: &Accuracy) -> (Panel, f64) {
     let mut best = (line(zeros, low, high), 2.0);
-    let plain = accuracy.enough(PLAIN);
+    let plain = accuracy.enough(PLAIN_NODES);
     let gaps = [real_gap(zeros, high, 1.0), real_gap(zeros, low, -1.0)];
     let (nearest, gap, other) = if gaps[0] <= gaps[1] { (1.0, gaps[0], gaps[1]) } else { (-1.0, gaps[1], gaps[0]) };
     // A real zero this near rules the plain rule out before its ellipse is computed.
@@ -286,7 +288,7 @@ fn best_panel(zeros: &Zeros, low: f64, high: f64, accuracy: &Accuracy) -> (Panel
             best = (line(zeros, low, high), straight);
         }
     }
-    if best.1 < accuracy.enough(POOR) {
+    if best.1 < accuracy.enough(SINH_FROM) {
         best = sinh(zeros, low, high, best);
     }
     best

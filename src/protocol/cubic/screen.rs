@@ -8,13 +8,13 @@
 use multiversion::multiversion;
 
 use super::friction::Floors;
-use super::path::{Ends, MOST_STEPS, Path};
+use super::path::{Ends, MAX_STEPS, Path};
 use crate::numerics::cubic::Cubic;
 use crate::numerics::lanes::{LANES, Lanes};
 use crate::numerics::real::Real;
 use crate::protocol::Status;
 
-/// Shortcuts of a span, which its ends may settle.
+/// Shortcuts of a span, which its ends may settle: as many as are planned together.
 pub(super) const SPAN: usize = 32;
 
 /// Spans that are looked at together: two ends each.
@@ -111,7 +111,7 @@ fn verdicts(ends: &Ends, floors: &Floors, a_2: &Lanes, a_3: &Lanes) -> [Option<V
     let mut found = [None; SPANS];
     for (i, found) in found.iter_mut().enumerate() {
         let j = i + SPANS;
-        let tame = (a_2[i].abs() + a_3[i].abs() < WILD) & (a_2[j].abs() + a_3[j].abs() < WILD);
+        let tame = (a_2[i].abs() + a_3[i].abs() < MAX_COORDINATE) & (a_2[j].abs() + a_3[j].abs() < MAX_COORDINATE);
         let [n, theta, surplus] = [0, 1, 2].map(|k| positive[k][i] & positive[k][j]);
         let [no_n, no_theta, no_surplus] = [0, 1, 2].map(|k| negative[k][i] | negative[k][j]);
         let sound = high[0][i] & high[0][j] & high[1][i] & high[1][j];
@@ -174,7 +174,7 @@ fn signs(ends: &Ends, a_2: &Lanes, a_3: &Lanes) -> Option<[Lanes; 3]> {
     for i in 0..LANES {
         let path = Path::new(ends, a_2[i], a_3[i]);
         let sign = sign_of_quadratic(path.n(), 3.0 * path.slack());
-        let tame = a_2[i].abs() + a_3[i].abs() < WILD;
+        let tame = a_2[i].abs() + a_3[i].abs() < MAX_COORDINATE;
         n[i] = if tame { sign } else { -1.0 };
     }
     if n.iter().all(|&n| n < 0.0) {
@@ -361,7 +361,7 @@ fn least<const N: usize>(ends: &Ends, a_2: &[f64; N], a_3: &[f64; N]) -> [[f64; 
         let (below, above) = (c2 + 2.0 * x * c3, c2 + c3 + 2.0 * x * c3);
         let factor = if below < above { below } else { above };
         let outward = if first { slope >= 0.0 } else { slope <= 0.0 };
-        let settled = (factor > 0.0) & ((slope * slope < LEVEL * n * factor) | (!inside & outward));
+        let settled = (factor > 0.0) & ((slope * slope < SLOPE_SQUARED * n * factor) | (!inside & outward));
         (v_min[i], place[i]) = (v, x);
         due[i] = if settled { 0.0 } else { 1.0 };
     }
@@ -402,7 +402,7 @@ fn rough_places<const N: usize>(ends: &Ends, a_2: &[f64; N], a_3: &[f64; N]) -> 
             place[i] = if less { x } else { place[i] };
         }
     }
-    for _ in 0..STEPS {
+    for _ in 0..ROUGH_STEPS {
         for i in 0..N {
             place[i] = nearer([theta[0][i], theta[1][i], theta[2][i], theta[3][i]], t_f, place[i]);
         }
@@ -426,11 +426,13 @@ fn nearer<T: Real>([c0, c1, c2, c3]: [T; 4], t_f: T, x: T) -> T {
     if change < zero { within } else { x }
 }
 
-/// Steps in single precision.
-const STEPS: usize = 3;
+/// Newton steps in single precision. Derived: from one of five places, three give the digits that one more in double precision
+/// completes.
+const ROUGH_STEPS: usize = 3;
 
-/// The square of the slope of `n - v t_f theta` that shows in the velocity, relative to `n` and the curvature.
-const LEVEL: f64 = 1e-15;
+/// Square of the slope of `n - v t_f theta`, relative to `n` and the curvature, that shows in the velocity. Derived: its quarter is
+/// the relative change of the velocity.
+const SLOPE_SQUARED: f64 = 1e-15;
 
 /// `v = n/(t_f theta) >= m` where the cubic `n - m t_f theta` is not negative. The minimum of that cubic gives the
 /// next, lower `m`: Dinkelbach's method (Management Science 13, 492, 1967), which falls to the least ratio and doubles
@@ -444,13 +446,13 @@ fn lower<const N: usize>(
     place: &mut [f64; N],
     mut due: [f64; N],
 ) {
-    for _ in 0..MOST_STEPS {
+    for _ in 0..MAX_STEPS {
         for i in 0..N {
             let path = Path::new(ends, a_2[i], a_3[i]);
             let x = path.surplus(v_min[i] * ends.t_f).minimum();
             let v = path.n().at(x) / (ends.t_f * path.theta().at(x));
             let lower = (due[i] > 0.0) & (v < v_min[i]) & (v > 0.0);
-            let last = v >= (1.0 - SMALL_STEP) * v_min[i];
+            let last = v >= (1.0 - LAST_STEP) * v_min[i];
             v_min[i] = if lower { v } else { v_min[i] };
             // Where the velocity is lost in rounding it is looked at again.
             place[i] = if lower | (v <= 0.0) { x } else { place[i] };
@@ -462,8 +464,8 @@ fn lower<const N: usize>(
     }
 }
 
-/// After a step as small as this, relative, the next one is within rounding.
-const SMALL_STEP: f64 = 1e-9;
+/// Relative step after which the next one is within rounding. Derived: the digits double.
+const LAST_STEP: f64 = 1e-9;
 
 /// Whether rounding may cost the value of a cubic at `x` a share `loss` of it (or it is not a number).
 #[inline(always)]
@@ -473,6 +475,6 @@ fn is_faint(cubic: &Cubic, slack: f64, x: f64, loss: f64) -> bool {
     !sound
 }
 
-/// Coordinates of this size are not feasible for any time that is meant: the quadratic `n >= 0` has the mean `t_f -
-/// rise`, so its ends are at most nine times that. Their squares do not overflow below it.
-const WILD: f64 = 1e100;
+/// Coordinates that are feasible for no duration in use. Derived: the quadratic `n >= 0` has the mean `t_f - rise`, so its ends are
+/// at most nine times that. Squares do not overflow below it.
+const MAX_COORDINATE: f64 = 1e100;

@@ -1,7 +1,7 @@
 //! The works of many shortcuts, each summed beside others that ask for as many nodes.
 
 use super::Landscape;
-use super::bins::{BINS, Bins, WHOLE, nodes_of};
+use super::bins::{BINS, Bins, CUT_FROM, nodes_of};
 use super::cells::OWN;
 use super::path::Path;
 use super::plan::{BLOCK, Block, Plan, plan, plan_parts};
@@ -123,7 +123,7 @@ impl Sums<'_> {
     #[inline(always)]
     fn settle(&mut self, plan: &Plan, lane: usize, index: usize, place: [f64; 2]) {
         let bin = plan.bin[lane] as usize;
-        if bin < WHOLE {
+        if bin < CUT_FROM {
             self.work[index] = 0.0;
             self.effort.quadratures += 1;
             self.effort.nodes += nodes_of(bin);

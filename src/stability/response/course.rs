@@ -1,6 +1,6 @@
 //! A response followed to its end at finer and finer steps, until none of its numbers changes.
 
-use super::fate::{Linear, MOST_STEPS, follow_once, step_error};
+use super::fate::{Linear, MAX_STEPS, follow_once, step_error};
 use super::orbit::Extremum;
 use super::slider::Slider;
 use crate::numerics::elementary::exp;
@@ -85,7 +85,7 @@ pub fn follow(slider: &Slider, linear: Linear, x: f64, rtol: f64) -> Course {
     for shares in ACCURACIES.windows(2) {
         let [coarse, fine] = [shares[0], shares[1]].map(|share| step_error(rtol, share));
         // Finer steps would be more, and the same steps lead to the same.
-        if (course.fate == Fate::Undecided && course.steps >= MOST_STEPS) || fine > 0.5 * coarse {
+        if (course.fate == Fate::Undecided && course.steps >= MAX_STEPS) || fine > 0.5 * coarse {
             break;
         }
         let finer = follow_once(slider, linear, x, rtol, shares[1]);

@@ -12,11 +12,12 @@
 //!
 //! `c_i` the nodes of Radau IIA. It is implicit, so a contact lifetime that relaxes in a few cycles limits no leap.
 
+use nalgebra::{Matrix2, SMatrix, SVector, Vector2};
+
 use super::fate::{Follower, excess};
 use super::orbit::{Orbit, Stop};
 use super::slider::Place;
 use crate::numerics::elementary::{exp, ln, ln_1p};
-use crate::numerics::elimination::eliminate;
 use crate::numerics::root::crossing;
 use crate::numerics::stiff::radau_iia_9;
 
@@ -53,14 +54,16 @@ pub(super) enum Leapt {
     Nowhere,
 }
 
-/// Stages of a leap.
+/// Stages of a leap, and the numbers of its system.
 const S: usize = 5;
+const SYSTEM: usize = 2 * S;
 
-/// Size of a limit cycle that is told from sliding.
-const SMALLEST: f64 = 1e-7;
+/// Width of a limit cycle, in `ln v`, at least. Chosen: ten times the motion that rounding of the force makes in the physical domain.
+const MIN_CYCLE: f64 = 1e-7;
 
-/// Error of the slowest moment of a limit cycle beyond which it is unknown, in units of `rtol`. Chosen: two runs then still tell it.
-const TROUGH: f64 = 0.3;
+/// Error of the slowest moment of a limit cycle, in units of `rtol`, at most; beyond it the moment is unknown. Chosen: two runs then
+/// still agree on it.
+const TROUGH_ERROR: f64 = 0.3;
 
 /// Difference of places for the derivative of the map: the power 1/3 of the error of a lap at rtol 1e-6.
 pub(super) const NUDGE: f64 = 1e-3;
@@ -68,31 +71,29 @@ pub(super) const NUDGE: f64 = 1e-3;
 /// Least error of a step. Its rounding, 50 units in the last place.
 pub(super) const FINEST: f64 = 1e-14;
 
-/// Distance in `q` within which the map is nearly linear.
-const NEAR: f64 = 0.1;
+/// Distance in `q` within which the map is nearly linear. Chosen: Newton's method then gains a digit a step.
+const LINEAR: f64 = 0.1;
 
-/// Cycles that a leap, which takes about as many laps, has to skip.
-const WORTH: f64 = 20.0;
+/// Cycles that a leap skips, at least. Chosen: it takes about as many laps.
+const MIN_SKIPPED: f64 = 20.0;
 
-/// Most iterations of Newton's method.
-const MOST_ITERATIONS: u32 = 16;
+/// Iterations of Newton's method, at most. Chosen: it takes four to eight.
+const MAX_ITERATIONS: u32 = 16;
 
-/// Most steps of a lap: ten times those of a deep slip at the finest tolerance.
-const MOST_STEPS: u32 = 3000;
+/// Steps of a lap, at most. Chosen: ten times those of a deep slip at the tightest tolerance.
+const MAX_LAP_STEPS: u32 = 3000;
 
-/// Times by which finest steps become coarser where they only follow rounding.
-const COARSER: f64 = 1e3;
+/// Factor by which the least error of a step grows where steps only follow rounding. Chosen: one try then is enough.
+const COARSENING: f64 = 1e3;
 
-/// Most tries of a leap.
-const MOST_TRIES: u32 = 3;
+/// Tries of a leap, at most. Chosen: each is a quarter to a fifth as long as the last.
+const MAX_TRIES: u32 = 3;
 
-/// Most leaps in a row.
-const MOST_LEAPS: u32 = 200;
+/// Leaps of a response, at most. Chosen: each grows by up to four, so that more belong to no response that is decided.
+const MAX_LEAPS: u32 = 200;
 
-/// Greatest change of `q` in a leap: its first derivative is taken at the start.
-const LONGEST: f64 = 2.0;
-
-type Matrix = [[f64; 2]; 2];
+/// Change of `q` in a leap, at most. Chosen: its derivative is that at the start.
+const MAX_LEAP: f64 = 2.0;
 
 struct Leap {
     /// Changes of `w` and of `y` relative to `e^w` at the nodes.
@@ -124,11 +125,9 @@ fn dot(weights: &[f64; S], values: &[f64; S]) -> f64 {
     weights.iter().zip(values).map(|(weight, value)| weight * value).sum()
 }
 
-/// `x` with `matrix x = right`.
-fn solve(matrix: Matrix, right: Place) -> Option<Place> {
-    let mut right = right;
-    eliminate(matrix.concat().as_mut_slice(), &mut right, 2)?;
-    Some(right)
+/// `x` with `matrix x = right`; `None` where the matrix is singular.
+fn solve(matrix: Matrix2<f64>, right: Place) -> Option<Place> {
+    matrix.lu().solve(&Vector2::from(right)).map(Into::into)
 }
 
 impl Lap {
@@ -162,13 +161,13 @@ impl Follower<'_> {
     /// The cycle from a place.
     pub(super) fn lap(&mut self, from: Place, tolerance: f64) -> Result<Lap, Stop> {
         let mut orbit = Orbit::new(self.slider, self.slider.state(from), tolerance);
-        let mut budget = self.budget.min(MOST_STEPS);
+        let mut budget = self.budget.min(MAX_LAP_STEPS);
         let before = budget;
         let cycle = orbit.cycle(false, &mut budget);
         self.budget -= before - budget;
         if cycle == Err(Stop::Budget) && self.budget > 0 {
             // Steps as fine as these only follow rounding.
-            self.finest *= COARSER;
+            self.finest *= COARSENING;
             return Err(Stop::Faint);
         }
         let cycle = cycle?;
@@ -182,13 +181,13 @@ impl Follower<'_> {
     }
 
     /// Derivative of `g` at the start of a lap, with `y` relative to `e^w`: nudging `w` then moves along small motions.
-    fn derivative(&mut self, lap: &Lap) -> Result<Matrix, Stop> {
+    fn derivative(&mut self, lap: &Lap) -> Result<Matrix2<f64>, Stop> {
         let nudges = [[NUDGE, 0.0], [0.0, NUDGE * lap.size()]];
         let here = lap.relative(lap);
-        let mut slopes = [[0.0; 2]; 2];
+        let mut slopes = Matrix2::zeros();
         for (c, nudge) in nudges.into_iter().enumerate() {
             let moved = self.lap(absolute(sum(lap.from, nudge), lap), lap.tolerance)?.relative(lap);
-            (0..2).for_each(|r| slopes[r][c] = (moved[r] - here[r]) / nudge[c]);
+            (0..2).for_each(|r| slopes[(r, c)] = (moved[r] - here[r]) / nudge[c]);
         }
         Ok(slopes)
     }
@@ -198,7 +197,7 @@ impl Follower<'_> {
         let tolerance = self.lap_tolerance(range, change);
         let mut lap = self.lap(place, tolerance)?;
         let (mut time, mut cycles) = (0.0, 0.0);
-        for _ in 0..MOST_LEAPS {
+        for _ in 0..MAX_LEAPS {
             let speed = lap.distance(lap.change);
             let tolerance = self.lap_tolerance(lap.range, speed);
             if tolerance < 0.3 * lap.tolerance {
@@ -212,7 +211,7 @@ impl Follower<'_> {
             if self.dies_out(&lap) {
                 return Ok(Leapt::At { place: lap.from, time });
             }
-            cycles = if cycles > 0.0 { cycles } else { (3.0 * NEAR / speed).max(1.5 * WORTH) };
+            cycles = if cycles > 0.0 { cycles } else { (3.0 * LINEAR / speed).max(1.5 * MIN_SKIPPED) };
             let next = self.leap(&lap, jacobian, &mut cycles)?;
             let Some((leap, n)) = next else {
                 return Ok(if time > 0.0 { Leapt::At { place: lap.from, time } } else { Leapt::Nowhere });
@@ -238,12 +237,12 @@ impl Follower<'_> {
     }
 
     /// The attracting fixed point next to a lap.
-    fn fixed(&mut self, lap: &Lap, jacobian: Matrix) -> Result<Option<Fixed>, Stop> {
+    fn fixed(&mut self, lap: &Lap, jacobian: Matrix2<f64>) -> Result<Option<Fixed>, Stop> {
         let (mut lap, mut jacobian, mut missed) = (*lap, jacobian, f64::NAN);
-        let mut before = NEAR;
+        let mut before = LINEAR;
         // Whether steps are the finest, since the slowest moment magnifies their errors.
         let mut is_exact = false;
-        for _ in 0..MOST_ITERATIONS {
+        for _ in 0..MAX_ITERATIONS {
             let Some(step) = solve(jacobian, lap.relative(&lap).map(|change| -change)) else { return Ok(None) };
             let distance = lap.distance(step);
             // What errors of steps leave, and what rounding does where it stops the method.
@@ -252,7 +251,7 @@ impl Follower<'_> {
             let tolerance = self.lap_tolerance(lap.range, if is_exact { 0.0 } else { 1.0 / slack });
             let fine = lap.tolerance <= 2.0 * tolerance;
             let ends = distance < 0.01 * self.rtol || (fine && distance < 3.0 * noise);
-            let stops = fine && distance > before && distance < NEAR * self.asked;
+            let stops = fine && distance > before && distance < LINEAR * self.asked;
             // False for NaN.
             if !(distance < before || ends || stops) {
                 return Ok(None);
@@ -263,16 +262,16 @@ impl Follower<'_> {
             if ends || stops {
                 // A part of the last change is left, and so is what errors of steps make of it.
                 let left = (lap.range[0] - trough).abs() * (0.01 + 0.1 * noise / distance);
-                if left > TROUGH * self.asked && !is_exact {
+                if left > TROUGH_ERROR * self.asked && !is_exact {
                     is_exact = true;
                     lap = self.lap(lap.from, self.lap_tolerance(lap.range, 0.0))?;
-                    before = NEAR;
+                    before = LINEAR;
                     continue;
                 }
-                if left > TROUGH * self.asked {
+                if left > TROUGH_ERROR * self.asked {
                     lap.range[0] = f64::NAN;
                 }
-                let sure = noise < NEAR && lap.size() > SMALLEST && self.is_driven();
+                let sure = noise < LINEAR && lap.size() > MIN_CYCLE && self.is_driven();
                 let monotone = multiplier(jacobian, 10.0 * lap.tolerance / (lap.size() * NUDGE));
                 return Ok(monotone.filter(|_| sure).map(|monotone| Fixed { lap, monotone, missed }));
             }
@@ -284,11 +283,11 @@ impl Follower<'_> {
 
     /// A leap from the start of a lap, of about `cycles`, which become those proposed for the next one; `None` if it is not worth
     /// it.
-    fn leap(&mut self, lap: &Lap, jacobian: Matrix, cycles: &mut f64) -> Result<Option<(Leap, f64)>, Stop> {
+    fn leap(&mut self, lap: &Lap, jacobian: Matrix2<f64>, cycles: &mut f64) -> Result<Option<(Leap, f64)>, Stop> {
         // The estimate is of order S, the error of order 2 S - 1.
         let allowed = exp(0.6 * ln(self.tolerance.max(self.finest)));
-        for _ in 0..MOST_TRIES {
-            if *cycles < WORTH {
+        for _ in 0..MAX_TRIES {
+            if *cycles < MIN_SKIPPED {
                 break;
             }
             let n = cycles.floor();
@@ -305,25 +304,26 @@ impl Follower<'_> {
     }
 
     /// Newton's method for the changes at the nodes, with the derivative at the start; `None` if it fails.
-    fn stages(&mut self, lap: &Lap, jacobian: Matrix, n: f64) -> Result<Option<Leap>, Stop> {
+    fn stages(&mut self, lap: &Lap, jacobian: Matrix2<f64>, n: f64) -> Result<Option<Leap>, Stop> {
         let nodes = radau_iia_9().nodes;
         let before = nodes.map(|u| basis(u - 0.5 / n));
         let slopes = slopes(n);
-        let mut matrix = vec![0.0; 4 * S * S];
+        let mut matrix = SMatrix::<f64, SYSTEM, SYSTEM>::zeros();
         for (i, j) in (0..S).flat_map(|i| (0..S).map(move |j| (i, j))) {
             for (r, c) in [(0, 0), (0, 1), (1, 0), (1, 1)] {
                 let slope = if r == c { slopes[i][j] } else { 0.0 };
-                matrix[(r * S + i) * 2 * S + c * S + j] = slope - if i == j { jacobian[r][c] } else { 0.0 };
+                matrix[(r * S + i, c * S + j)] = slope - if i == j { jacobian[(r, c)] } else { 0.0 };
             }
         }
+        let matrix = matrix.lu();
         let mut leap = Leap { change: [[0.0; S]; 2], laps: [*lap; S] };
         let enough = (0.1 * self.tolerance.max(self.finest)).max(n * lap.tolerance / lap.size());
-        let weights: [f64; 2 * S] = std::array::from_fn(|i| if i < S { 1.0 } else { lap.size().powi(-2) });
-        let dot_steps = |p: &[f64], q: &[f64]| (0..2 * S).map(|i| weights[i] * p[i] * q[i]).sum::<f64>();
-        let mut steps: Vec<Vec<f64>> = Vec::new();
+        let weights = SVector::<f64, SYSTEM>::from_fn(|i, _| if i < S { 1.0 } else { lap.size().powi(-2) });
+        let weighed = |p: &SVector<f64, SYSTEM>, q: &SVector<f64, SYSTEM>| weights.component_mul(p).dot(q);
+        let mut steps: Vec<SVector<f64, SYSTEM>> = Vec::new();
         let mut last = f64::INFINITY;
-        for _ in 0..MOST_ITERATIONS {
-            let mut step = vec![0.0; 2 * S];
+        for _ in 0..MAX_ITERATIONS {
+            let mut step = SVector::<f64, SYSTEM>::zeros();
             for i in 0..S {
                 let place = absolute(sum(lap.from, [0, 1].map(|r| dot(&before[i], &leap.change[r]))), lap);
                 // At first all begin where the leap does.
@@ -335,25 +335,24 @@ impl Follower<'_> {
                     step[r * S + i] = change[r] - dot(&slopes[i], &leap.change[r]);
                 }
             }
-            if eliminate(&mut matrix.clone(), &mut step, 2 * S).is_none() {
+            if !matrix.solve_mut(&mut step) {
                 return Ok(None);
             }
             // Broyden's update (Kelley, Iterative Methods for Linear and Nonlinear Equations, section 7.3).
             for pair in steps.windows(2) {
-                let share = dot_steps(&pair[0], &step) / dot_steps(&pair[0], &pair[0]);
-                step.iter_mut().zip(&pair[1]).for_each(|(step, next)| *step += share * next);
+                let share = weighed(&pair[0], &step) / weighed(&pair[0], &pair[0]);
+                step += share * pair[1];
             }
             if let Some(last) = steps.last() {
-                let share = 1.0 - dot_steps(last, &step) / dot_steps(last, last);
-                step.iter_mut().for_each(|step| *step /= share);
+                step /= 1.0 - weighed(last, &step) / weighed(last, last);
             }
-            (0..2 * S).for_each(|i| leap.change[i / S][i % S] += step[i]);
+            (0..SYSTEM).for_each(|i| leap.change[i / S][i % S] += step[i]);
             let moved = (0..S).map(|i| lap.distance([step[i], step[S + i]])).fold(0.0, f64::max);
             let rate = moved / last;
             if !steps.is_empty() && rate < 0.5 && moved * rate < enough {
                 return Ok(Some(leap));
             }
-            if !(moved < 0.7 * last && moved < LONGEST) {
+            if !(moved < 0.7 * last && moved < MAX_LEAP) {
                 return Ok(None);
             }
             last = moved;
@@ -374,7 +373,8 @@ fn slopes(n: f64) -> [[f64; S]; S] {
 
 /// Whether a fixed point with this derivative of `g`, known up to `error`, attracts, and if so, whether places come to it from
 /// one side.
-fn multiplier([[ww, wy], [yw, yy]]: Matrix, error: f64) -> Option<bool> {
+fn multiplier(derivative: Matrix2<f64>, error: f64) -> Option<bool> {
+    let [[ww, yw], [wy, yy]]: [[f64; 2]; 2] = derivative.into();
     // Of 1 + dg/dq.
     let (half, product) = (1.0 + 0.5 * (ww + yy), (1.0 + ww) * (1.0 + yy) - wy * yw);
     let square = 0.25 * (ww - yy) * (ww - yy) + wy * yw;
@@ -403,19 +403,18 @@ impl Leap {
 
     /// Time of the first `j` of its `n` cycles.
     fn time(&self, n: f64, j: f64) -> f64 {
-        let mut times = self.laps.map(|lap| lap.period);
-        let solved = eliminate(slopes(n).concat().as_mut_slice(), &mut times, S);
-        solved.map_or(f64::NAN, |()| dot(&basis(j / n), &times))
+        let matrix = SMatrix::<f64, S, S>::from(slopes(n)).transpose();
+        let times = matrix.lu().solve(&SVector::from(self.laps.map(|lap| lap.period)));
+        times.map_or(f64::NAN, |times| SVector::from(basis(j / n)).dot(&times))
     }
 
     /// Its error: the defect of the first cycle, which is no node, as for a step of Radau IIA.
-    fn error(&self, lap: &Lap, jacobian: Matrix, n: f64) -> Option<f64> {
+    fn error(&self, lap: &Lap, jacobian: Matrix2<f64>, n: f64) -> Option<f64> {
         let first = basis(1.0 / n);
         let change = lap.relative(lap);
         let defect = [0, 1].map(|r| change[r] - dot(&first, &self.change[r]));
         let rate = (S + 1) as f64 / n;
-        let matrix = [0, 1].map(|r| [0, 1].map(|c| if r == c { rate } else { 0.0 } - jacobian[r][c]));
-        solve(matrix, defect).map(|error| lap.distance(error))
+        solve(Matrix2::from_diagonal_element(rate) - jacobian, defect).map(|error| lap.distance(error))
     }
 
     /// A section soon before the last cycle that leaves the band of settled velocities, and its time.

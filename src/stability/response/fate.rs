@@ -17,40 +17,44 @@ pub struct Linear {
     pub growth: Option<f64>,
 }
 
-/// Steps of one run.
-pub(super) const MOST_STEPS: u32 = 100_000;
+/// Steps of one run, at most. Chosen: some ten times those of a response that leaps decide.
+pub(super) const MAX_STEPS: u32 = 100_000;
 
-/// Error of a step in units of the accuracy of the numbers: as many steps as this is small may add up.
-const STEP: f64 = 0.03;
+/// Error of a step, fraction of the error that a run may leave. Chosen: the errors of the thirty-odd steps of a slip add up.
+const STEP_ERROR: f64 = 0.03;
 
-/// Error of an extremum in the dense output.
-const ROUGH: f64 = 1e-2;
+/// Error of `ln(v/v_f)` at an extremum of the dense output, at most. Measured at the loosest tolerance.
+const DENSE_OUTPUT_ERROR: f64 = 1e-2;
 
-/// Share of a motion that the error estimate of a step may be: an estimate as large as the motion would let steps grow
-/// until they damp what grows.
-const FELT: f64 = 1e-3;
+/// Error estimate of a step, fraction of the motion, at most. Chosen: an estimate as large as the motion lets steps grow until
+/// they damp what grows.
+const ERROR_OF_MOTION: f64 = 1e-3;
 
-/// Change of a cycle below which it is worth the laps of a leap.
-const SLOW: f64 = 0.03;
+/// Change of a cycle, relative, below which a leap is tried. Chosen: its inverse is about the number of laps that a leap takes.
+const LEAP_CHANGE: f64 = 0.03;
 
-/// What a cycle leaves of the change of the one before if cycles come to a limit cycle fast.
-const FAST: f64 = 0.95;
-const AT_ONCE: f64 = 0.02;
+/// Ratio of consecutive changes, at most, of cycles that are followed to their limit. Chosen: they come to 1e-6 of it within 270
+/// cycles.
+const MAX_RATIO: f64 = 0.95;
 
-/// What it leaves if they change at about the same rate.
-const STEADY: std::ops::Range<f64> = 0.5..2.0;
+/// Ratio of consecutive changes below which the last one alone counts. Chosen: errors of steps may have made the one before.
+const SMALL_RATIO: f64 = 0.02;
 
-/// Cycles that are followed before the next try to leap, and after a limit cycle is found.
-const PATIENCE: u32 = 10;
+/// Ratios of consecutive changes at a nearly constant rate. Chosen: a leap that the next cycle refuses costs little.
+const CONSTANT_RATE: std::ops::Range<f64> = 0.5..2.0;
 
-/// Share of the first of a row of changes that the last one is at most.
-const FAR: f64 = 0.01;
+/// Cycles between two tries to leap, and within the tolerance before changes count as errors of steps. Chosen: fewer cost less than
+/// a try.
+const MIN_CYCLES: u32 = 10;
 
-/// Share of `rtol` by which a limit cycle may still be missed.
-const ARRIVED: f64 = 0.03;
+/// Ratio of the last to the first of a row of falling changes, at most. Chosen: errors of steps differ by less.
+const FALL: f64 = 0.01;
 
-/// Peaks that differ by less than this, in units of `rtol`, are as high as each other.
-const ALIKE_PEAKS: f64 = 0.3;
+/// Distance from the limit cycle, in units of `rtol`. Chosen: the error of a step, [`STEP_ERROR`].
+const LIMIT_ERROR: f64 = 0.03;
+
+/// Difference of `ln v` within which two peaks are equal, in units of `rtol`: the accuracy of the second run of a course.
+const PEAK_TIE: f64 = 0.3;
 
 /// Follows the response from `e^x v_f` once, with steps whose errors are to leave this `share` of `rtol` of its numbers.
 pub(super) fn follow_once(slider: &Slider, linear: Linear, x: f64, rtol: f64, share: f64) -> Course {
@@ -61,7 +65,7 @@ pub(super) fn follow_once(slider: &Slider, linear: Linear, x: f64, rtol: f64, sh
         rtol: share * rtol,
         tolerance: step_error(rtol, share),
         finest: FINEST * (share / 0.3).max(1.0),
-        budget: MOST_STEPS,
+        budget: MAX_STEPS,
         extrema: [None; 2],
         vague_peak: false,
         t: 0.0,
@@ -69,12 +73,12 @@ pub(super) fn follow_once(slider: &Slider, linear: Linear, x: f64, rtol: f64, sh
     let fate = follower.run(slider.steady(x)).unwrap_or(Fate::Undecided);
     let Follower { extrema: [low, high], t, budget, vague_peak, .. } = follower;
     let doubts = Doubts { t_peak: vague_peak, ..Doubts::default() };
-    Course { fate, high, low, t, steps: MOST_STEPS - budget, doubts }
+    Course { fate, high, low, t, steps: MAX_STEPS - budget, doubts }
 }
 
 /// Error of a step that leaves this share of `rtol`; those of the first two runs always differ.
 pub(super) fn step_error(rtol: f64, share: f64) -> f64 {
-    (STEP * share * rtol).max(FINEST * (share / 0.3).max(1.0))
+    (STEP_ERROR * share * rtol).max(FINEST * (share / 0.3).max(1.0))
 }
 
 pub(super) struct Follower<'a> {
@@ -148,7 +152,7 @@ impl<'a> Follower<'a> {
             // Leap over cycles that hardly change.
             let end = way.offset + cycle.t;
             if (way.pace.is_slow() || way.pace.change < self.rtol) && count >= again {
-                again = 2 * count + PATIENCE;
+                again = 2 * count + MIN_CYCLES;
                 match self.leap_on(self.slider.place(&cycle.end), lap.range, way.pace.change) {
                     Ok(Leapt::Cycle(Fixed { lap, .. })) => return Ok(lap.limit()),
                     Ok(Leapt::At { place, time }) if time > 0.0 => {
@@ -206,12 +210,12 @@ impl<'a> Follower<'a> {
     /// Whether a cycle that begins beside this one comes to it: that one changes little does not show that.
     fn attracts(&mut self, lap: &Lap) -> Result<bool, Stop> {
         let beside = self.lap([lap.from[0] + NUDGE, lap.from[1]], lap.tolerance)?;
-        Ok((1.0 + (beside.change[0] - lap.change[0]) / NUDGE).abs() < FAST)
+        Ok((1.0 + (beside.change[0] - lap.change[0]) / NUDGE).abs() < MAX_RATIO)
     }
 
     /// Error of a step in a motion of this size.
     fn step_error(&self, size: f64) -> f64 {
-        let felt = exp(ln(FELT * size) / 0.6);
+        let felt = exp(ln(ERROR_OF_MOTION * size) / 0.6);
         self.tolerance.min(felt).max(self.finest * size.min(1.0))
     }
 
@@ -241,12 +245,12 @@ impl<'a> Follower<'a> {
     fn note(&mut self, way: &mut Way<'_>, extrema: [Option<Seen>; 2]) {
         for (i, sign) in [(0, -1.0), (1, 1.0)] {
             let (Some(seen), kept) = (extrema[i], self.extrema[i]) else { continue };
-            if kept.is_some_and(|kept| sign * seen.rough.x <= sign * kept.x - ROUGH) {
+            if kept.is_some_and(|kept| sign * seen.rough.x <= sign * kept.x - DENSE_OUTPUT_ERROR) {
                 continue;
             }
             let extremum = way.orbit.polished(seen);
-            if i == 1 && kept.is_none_or(|kept| extremum.x > kept.x - ALIKE_PEAKS * self.rtol) {
-                self.vague_peak = kept.is_some_and(|kept| extremum.x < kept.x + ALIKE_PEAKS * self.rtol);
+            if i == 1 && kept.is_none_or(|kept| extremum.x > kept.x - PEAK_TIE * self.rtol) {
+                self.vague_peak = kept.is_some_and(|kept| extremum.x < kept.x + PEAK_TIE * self.rtol);
             }
             if kept.is_none_or(|kept| sign * extremum.x > sign * kept.x) {
                 self.extrema[i] = Some(Extremum { t: way.offset + extremum.t, ..extremum });
@@ -257,7 +261,7 @@ impl<'a> Follower<'a> {
     /// The same for a cycle whose time is not known.
     pub(super) fn note_unseen(&mut self, range: [f64; 2]) {
         for (i, sign) in [(0, -1.0), (1, 1.0)] {
-            if self.extrema[i].is_none_or(|kept| sign * range[i] > sign * kept.x + ALIKE_PEAKS * self.rtol) {
+            if self.extrema[i].is_none_or(|kept| sign * range[i] > sign * kept.x + PEAK_TIE * self.rtol) {
                 self.extrema[i] = Some(Extremum { x: range[i], t: f64::NAN });
             }
         }
@@ -292,7 +296,7 @@ impl Pace {
     /// errors of steps.
     fn take(&mut self, change: f64, low: f64, rtol: f64) {
         let share = change / self.change;
-        if share < FAST {
+        if share < MAX_RATIO {
             self.first = self.first.max(self.change);
         } else if change.is_nan() || change > rtol {
             self.first = f64::NAN;
@@ -306,19 +310,19 @@ impl Pace {
     /// is left, the series has no ratio, and changes as small as that have lasted.
     fn has_arrived(&mut self, rtol: f64) -> bool {
         let [share, before] = self.shares;
-        let largest = if share < AT_ONCE { share } else { share.max(before) };
+        let largest = if share < SMALL_RATIO { share } else { share.max(before) };
         let left = largest / (1.0 - largest);
         // False for NaN.
-        let comes_from_far = self.change < FAR * self.first;
-        let comes = comes_from_far && largest < FAST && self.change * left < ARRIVED * rtol;
-        self.lingers += u32::from(comes_from_far && self.change < ARRIVED * rtol);
+        let comes_from_far = self.change < FALL * self.first;
+        let comes = comes_from_far && largest < MAX_RATIO && self.change * left < LIMIT_ERROR * rtol;
+        self.lingers += u32::from(comes_from_far && self.change < LIMIT_ERROR * rtol);
         let lower = self.lower * left.max(0.01);
-        (comes && (lower < ARRIVED * rtol || self.low < VANISHING)) || self.lingers > PATIENCE
+        (comes && (lower < LIMIT_ERROR * rtol || self.low < VANISHING)) || self.lingers > MIN_CYCLES
     }
 
     /// Whether cycles change little, and the next one will change about as much.
     fn is_slow(&self) -> bool {
-        self.change < SLOW && self.shares.iter().all(|share| STEADY.contains(share))
+        self.change < LEAP_CHANGE && self.shares.iter().all(|share| CONSTANT_RATE.contains(share))
     }
 }
 

@@ -8,10 +8,10 @@ use crate::numerics::elementary::{exp, ln};
 use crate::numerics::gauss;
 use crate::protocol::{Moment, Motion};
 
-/// More stretches than any response that is to be looked at has.
-const MOST_STRETCHES: usize = 1 << 18;
+/// Stretches of a traced response, at most. Chosen: beyond a quarter of a million a picture shows nothing, and memory counts.
+const MAX_STRETCHES: usize = 1 << 18;
 
-/// Nodes for the work of one stretch.
+/// Gauss nodes for the work of one stretch. Chosen: of the order of a step, 16.
 const NODES: usize = 8;
 
 /// The response to a step, up to some time.
@@ -63,7 +63,7 @@ impl Step {
                 run.jump(arrested, slider.first_step(&arrested));
             }
             stretches.push(Stretch::Leg(step_to(&mut run, end).ok()?));
-            if stretches.len() > MOST_STRETCHES {
+            if stretches.len() > MAX_STRETCHES {
                 return None;
             }
         }

@@ -42,11 +42,11 @@ pub enum Stop {
     Faint,
 }
 
-/// A state this close to steady sliding is in its linear neighbourhood.
+/// Distance from steady sliding, in `ln v`, within which motions are linear to ten digits: their squares.
 const LINEAR: f64 = 1e-5;
 
-/// Distance from rest, in errors of a step, that cannot be told from it.
-const UNTOLD: f64 = 3.0;
+/// Distance from rest, in errors of a step, that counts as rest. Chosen: errors of three steps may add up before they decay.
+const REST: f64 = 3.0;
 
 /// Settled means `|v/v_f - 1|` below this, for good.
 pub const SETTLED: f64 = 0.01;
@@ -54,8 +54,9 @@ pub const SETTLED: f64 = 0.01;
 /// `ln(1 - SETTLED)` and `ln(1 + SETTLED)`.
 pub const BAND: [f64; 2] = [-0.01005033585350144, 0.009950330853168083];
 
-/// Shares of a step, and of the step that this leads to, within which an extremum is looked for again.
-const NEAR: [f64; 2] = [0.125, 0.125];
+/// Fractions of a step, before and after, within which an extremum is looked for again. Chosen: the dense output, of order 5, is
+/// nearer at every tolerance.
+const POLISH_WINDOW: [f64; 2] = [0.125, 0.125];
 
 /// A response under way.
 #[derive(Debug)]
@@ -234,7 +235,7 @@ impl<'a> Orbit<'a> {
     /// An extremum, integrated again about where it was seen, on ever shorter steps.
     pub fn polished(&mut self, Seen { rough, place }: Seen) -> Extremum {
         let Some((mut leg, mut u)) = place else { return rough };
-        for near in NEAR {
+        for near in POLISH_WINDOW {
             let Some(part) = between(&mut self.run, &leg, (u - near).max(0.0), u + near) else { return rough };
             let slopes = [part.slope(X, 0.0), part.slope(X, 1.0)];
             if slopes[0] * slopes[1] >= 0.0 {
@@ -260,7 +261,7 @@ impl<'a> Orbit<'a> {
 /// How close to steady sliding a motion rests whose steps have errors below `tolerance`: what is left of it is linear, and
 /// of the size of these errors.
 pub(super) fn quiet(tolerance: f64) -> f64 {
-    LINEAR.min(UNTOLD * tolerance)
+    LINEAR.min(REST * tolerance)
 }
 
 fn is_inside(x: f64) -> bool {

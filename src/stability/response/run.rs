@@ -37,41 +37,46 @@ pub struct Run<'a> {
     series: u32,
 }
 
-/// A series longer than this in units of the fastest motion would let errors grow.
-const STABLE: f64 = 5.0;
+/// Length of a series, in units of the fastest motion, at most. Chosen: about the stability interval of a series of order 16 (Hairer
+/// and Wanner, Solving Ordinary Differential Equations II, section IV.2); beyond it errors grow.
+const MAX_REACH: f64 = 5.0;
 
-/// Greatest change of `ln theta` in a series: beyond it terms of `1/theta` that are too small to be felt would grow before they
+/// Change of `ln theta` in a series, at most. Chosen: beyond it terms of `1/theta` below the rounding of the others grow before they
 /// vanish.
-const FAR: f64 = 6.0;
+const MAX_CHANGE: f64 = 6.0;
 
-/// Times that a series is cut for that: where the velocity falls, the first cut is too little.
-const MOST_CUTS: u32 = 6;
+/// Times that a series is cut for that, at most. Chosen: where the velocity falls, the first cut is too little.
+const MAX_CUTS: u32 = 6;
 
-/// Lengths of steps in that unit from which on they become implicit, and up to which they become series again: steps of
-/// either kind cost as much there.
-const STIFF: f64 = 15.0;
-const MILD: f64 = 10.0;
+/// Length of a step, in units of the fastest motion, from which on steps are implicit. Measured: either kind costs as much there
+/// (`cargo bench --bench step`).
+const IMPLICIT_FROM: f64 = 15.0;
 
-/// A slip of a light block on a soft spring lasts at least this share of the rest before it.
-const SLIP: f64 = 1e-120;
+/// Length of a step, in the same unit, below which implicit steps become series again. Chosen: less than [`IMPLICIT_FROM`], so that
+/// steps do not alternate.
+const SERIES_BELOW: f64 = 10.0;
 
-/// Share of the tolerance for implicit steps: they are where an error of the contact lifetime becomes one of the time of
-/// the next slip, and where accuracy costs least.
-const IMPLICIT: f64 = 0.03;
+/// Duration of a slip of a light block on a soft spring, fraction of the rest before it, at least. Chosen: far below any of the
+/// physical domain.
+const SHORTEST_SLIP: f64 = 1e-120;
+
+/// Error of an implicit step, fraction of the tolerance. Chosen: an error of the contact lifetime in a stick phase becomes one of the
+/// time of the next slip, and accuracy costs least there.
+const IMPLICIT_ERROR: f64 = 0.03;
 
 impl Slider {
     /// An integration from `state`, with errors of a step below `tolerance` in `x`, `y` and `z/force`.
     pub fn run(&self, state: State, h: f64, tolerance: f64) -> Run<'_> {
         let accuracy = Accuracy { tolerance, scale: [self.force(), 1.0, 1.0] };
-        let implicit = Accuracy { tolerance: IMPLICIT * tolerance, ..accuracy };
+        let implicit = Accuracy { tolerance: IMPLICIT_ERROR * tolerance, ..accuracy };
         let mut integrator = Integrator::new(self, radau_iia_9(), implicit, 0.0, state, h);
         if self.inertia > 0.0 || self.k > self.b - self.a {
-            integrator.may_step(SLIP);
+            integrator.may_step(SHORTEST_SLIP);
         }
         // A series stays this short where nothing happens: rounding errors of the force enter its terms over factorials.
         let order = TERMS as f64;
         let rounding = exp((ln(tolerance / f64::EPSILON) + libm::lgamma(order + 1.0)) / order);
-        let stiff = STIFF.min(0.7 * rounding);
+        let stiff = IMPLICIT_FROM.min(0.7 * rounding);
         Run { slider: self, integrator, accuracy, stiff, mild: true, series: 0 }
     }
 }
@@ -112,7 +117,7 @@ impl Run<'_> {
         let rates = Rates::of(state[Y], state[X]);
         let fast = slider.fast(rates.v, rates.ageing);
         // False for numbers out of range.
-        let short = fast * self.integrator.proposal() < MILD;
+        let short = fast * self.integrator.proposal() < SERIES_BELOW;
         if !self.mild && !short {
             return None;
         }
@@ -123,16 +128,16 @@ impl Run<'_> {
         if !self.mild {
             return None;
         }
-        let h = reach.min(STABLE) * unit;
+        let h = reach.min(MAX_REACH) * unit;
         let mut whole = h.min(self.integrator.left(limit));
         let over = |h: f64| Piece::from_powers(self.t(), h, state, stretched(&powers, h / unit));
         let mut piece = over(whole);
-        for _ in 0..MOST_CUTS {
+        for _ in 0..MAX_CUTS {
             let change = (piece.end[Y] - state[Y]).abs();
-            if change <= FAR {
+            if change <= MAX_CHANGE {
                 break;
             }
-            whole *= 0.9 * FAR / change;
+            whole *= 0.9 * MAX_CHANGE / change;
             piece = over(whole);
         }
         let advances = piece.end.iter().all(|end| end.is_finite()) && self.integrator.leap(whole, piece.end, h);

@@ -26,8 +26,8 @@ pub type State = [f64; 3];
 /// A place on the section `v = v_f`, crossed upwards: the logarithm of the force about which the block swings, and `y`.
 pub type Place = [f64; 2];
 
-/// Below every tolerance.
-const UNFELT: f64 = 1e-14;
+/// Change of a logarithm, at most, that an arrest of no duration leaves out. Chosen: below the tightest tolerance.
+const NEGLIGIBLE: f64 = 1e-14;
 
 /// The four numbers that the response to a step depends on, beside where it starts.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -75,13 +75,13 @@ impl Slider {
     ///
     /// Where the spring holds the block back, the velocity falls faster than exponentially to where friction carries
     /// the spring's force, `a x = z - b y`, which may be thousands of decades below. It gets there within `M e^x/(a x
-    /// + b y - z)`; once nothing else changes by more than `UNFELT` in this time, the rest of the way is left out.
+    /// + b y - z)`; once nothing else changes by more than `NEGLIGIBLE` in this time, the rest of the way is left out.
     pub fn arrest(&self, &[z, y, x]: &State) -> Option<State> {
         let resting = (z - self.b * y) / self.a;
         let pull = self.a * (x - resting);
         let time = self.inertia * exp(x) / pull;
         let rate = self.k / self.force() + exp(-y) + exp(x);
-        (x > resting + 1.0 && time * rate < UNFELT).then_some([z, y, resting])
+        (x > resting + 1.0 && time * rate < NEGLIGIBLE).then_some([z, y, resting])
     }
 
     /// A step so short that little changes in it.
