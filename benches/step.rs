@@ -1,13 +1,13 @@
-//! The step response: time of a response, what a sweep costs on average, and the fates of a random sample.
+//! The step response: time of a response, of a plane of responses, and outcomes and errors over the physical domain.
 //!
-//! `cargo bench --bench step` prints all three on one thread. Steps are exact; times are medians. The floor is the
+//! `cargo bench --bench step` prints all on one thread; `cargo bench --bench step -- domain 100000` prints the random points of the
+//! physical domain alone, as many as it says. Steps are exact; times are medians. The floor is the
 //! arithmetic of a series at every step, 500 multiplications and as many additions, at the rate of a vectorised loop.
 
 use std::hint::black_box;
 
 use slipsweep::model::{Law, Transition};
-use slipsweep::protocol::Status;
-use slipsweep::stability::response::{Outcome, Step};
+use slipsweep::stability::response::{Outcome, Response, Step};
 
 mod support;
 
@@ -21,8 +21,11 @@ const CRITICAL: f64 = 0.00756;
 /// Rows and columns of the plane of stiffness and final velocity.
 const PLANE: usize = 60;
 
-/// Random steps.
-const SAMPLE: usize = 10_000;
+/// Random points of the physical domain.
+const SAMPLE: usize = 2_000;
+
+/// Accuracy of the random points, and of the responses that judge them.
+const RTOL: [f64; 2] = [1e-6, 1e-8];
 
 fn paper(k: f64, v_f: f64) -> Step {
     Step { transition: Transition { law: PAPER, v_i: 1e5, v_f }, k, m: MASS }
@@ -32,6 +35,11 @@ fn paper(k: f64, v_f: f64) -> Step {
 const OF_A_STEP: f64 = 1000.0;
 
 fn main() {
+    let arguments: Vec<String> = std::env::args().collect();
+    if let Some(place) = arguments.iter().position(|argument| argument == "domain") {
+        let points = arguments.get(place + 1).and_then(|points| points.parse().ok());
+        return domain(points.expect("`domain` takes a number of points"));
+    }
     let series = OF_A_STEP * support::one_vector_operation();
     println!("a step's multiplications and additions of a vector: {:.1} ns", 1e9 * series);
     for (name, k) in [
@@ -66,40 +74,59 @@ fn main() {
         })
     });
     println!("plane of k and v_f, {} responses: {:.3} ms each", plane.len(), 1e3 * seconds / plane.len() as f64);
-    fates();
+    domain(SAMPLE);
 }
 
-/// Steps over the whole range of every parameter, logarithmically uniform; one in eleven without mass.
-fn fates() {
+/// Outcomes, times and errors at random points of the physical domain, logarithmically uniform; one in eleven without mass.
+fn domain(points: usize) {
     let mut state = 7;
     let mut random = |least: f64, greatest: f64| least * (greatest / least).powf(uniform(&mut state));
-    let steps: Vec<Step> = (0..SAMPLE)
-        .map(|_| {
-            let (a, share, m) = (random(1e-4, 0.3), random(1.0, 11.0) - 1.0, random(1e-22, 1e-3));
-            let law = Law { a, b: share * a };
-            let transition = Transition { law, v_i: random(1.001, 1e9), v_f: random(1.001, 1e9) };
-            Step { transition, k: random(1e-6, 1e3), m: if m < 1e-20 { 0.0 } else { m } }
+    let steps: Vec<Step> = (0..points)
+        .map(|i| {
+            let a = random(1e-3, 0.3);
+            let law = Law { a, b: (a * random(0.05, 20.0)).min(0.5) };
+            let m = if i % 11 == 0 { 0.0 } else { a * random(1e-8, 1e4) / 1e12 };
+            let transition = Transition { law, v_i: 1e6 * random(1e-6, 1e6), v_f: 1e6 };
+            Step { transition, k: a * random(1e-4, 1e5), m }
         })
         .collect();
-    let (mut counts, mut most) = ([0; 4], 0);
-    let seconds = support::median(1, || {
-        for step in &steps {
-            let (status, response) = step.respond(1e-6);
-            most = most.max(response.map_or(0, |response| response.steps));
-            counts[match (status, response.map(|response| response.outcome)) {
-                (_, Some(Outcome::Settled)) => 0,
-                (_, Some(Outcome::LimitCycle)) => 1,
-                (_, Some(Outcome::Undecided)) => 2,
-                (Status::Infeasible, None) => 3,
-                (status, None) => panic!("{status:?} without a response: {step:?}"),
-            }] += 1;
+    let respond = |rtol| -> Vec<Option<Response>> { steps.iter().map(|step| step.respond(rtol).1).collect() };
+    let (mut found, mut most) = (Vec::new(), 0);
+    let seconds = support::median(1, || found = respond(RTOL[0]));
+    let judges = respond(RTOL[1]);
+    // Settled, limit cycles, undecided, infinite.
+    let (mut counts, mut others) = ([0; 4], 0);
+    let mut errors = [("v_peak", 0.0), ("v_trough", 0.0), ("settling_time", 0.0), ("period", 0.0)];
+    for (found, judge) in found.iter().zip(&judges) {
+        let place = found.map_or(3, |response| response.outcome as usize);
+        counts[place] += 1;
+        let (Some(found), Some(judge)) = (found, judge) else { continue };
+        most = most.max(found.steps);
+        if [found.outcome, judge.outcome].contains(&Outcome::Undecided) {
+            continue;
         }
-    });
+        if found.outcome != judge.outcome {
+            others += 1;
+            continue;
+        }
+        let numbers = |response: &Response| {
+            let time = response.settling_time.unwrap_or(f64::NAN);
+            let period = response.cycle.map_or(f64::NAN, |cycle| cycle.period);
+            [response.v_peak, response.v_trough, time, period]
+        };
+        for (((_, largest), found), judge) in errors.iter_mut().zip(numbers(found)).zip(numbers(judge)) {
+            // NaN, which is unknown, counts nothing.
+            *largest = if found == judge { *largest } else { f64::max(*largest, (found / judge - 1.0).abs()) };
+        }
+    }
     let [settled, cycles, undecided, infinite] = counts;
-    println!(
-        "random sample of {SAMPLE}: {settled} settled, {cycles} limit cycles, {undecided} undecided, {infinite} infinite"
-    );
-    println!("  {:.2} ms each, at most {most} steps", 1e3 * seconds / SAMPLE as f64);
+    println!("{points} random points of the physical domain at {:e}:", RTOL[0]);
+    println!("  {settled} settled, {cycles} limit cycles, {undecided} undecided, {infinite} infinite");
+    println!("  {:.2} ms each, at most {most} steps", 1e3 * seconds / points as f64);
+    println!("  {others} outcomes differ from those at {:e}; largest differences:", RTOL[1]);
+    for (name, largest) in errors {
+        println!("    {name:13} {largest:.1e}");
+    }
 }
 
 /// Numbers between 0 and 1 from a fixed linear congruence.
