@@ -54,7 +54,7 @@ fn main() {
 /// Points over the range of every parameter, logarithmically uniform; one in ten without mass, one in ten on a rigid spring.
 fn statuses() {
     let mut state = 7;
-    let mut random = |least: f64, greatest: f64| least * (greatest / least).powf(uniform(&mut state));
+    let mut random = |least: f64, greatest: f64| least * (greatest / least).powf(support::uniform(&mut state));
     let (mut smooth, mut pieces, mut most) = ([0; 5], [0; 5], 0);
     let seconds = support::median(1, || {
         for _ in 0..SAMPLE {
@@ -77,10 +77,4 @@ fn statuses() {
         println!("random sample of {SAMPLE}, {name}: {}", counts.join(", "));
     }
     println!("  {:.3} ms a point, at most {most} nodes", 1e3 * seconds / SAMPLE as f64);
-}
-
-/// Numbers between 0 and 1 from a fixed linear congruence.
-fn uniform(state: &mut u64) -> f64 {
-    *state = state.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
-    (*state >> 11) as f64 / (1_u64 << 53) as f64
 }

@@ -80,7 +80,7 @@ fn main() {
 /// Outcomes, times and errors at random points of the physical domain, logarithmically uniform; one in eleven without mass.
 fn domain(points: usize) {
     let mut state = 7;
-    let mut random = |least: f64, greatest: f64| least * (greatest / least).powf(uniform(&mut state));
+    let mut random = |least: f64, greatest: f64| least * (greatest / least).powf(support::uniform(&mut state));
     let steps: Vec<Step> = (0..points)
         .map(|i| {
             let a = random(1e-3, 0.3);
@@ -127,10 +127,4 @@ fn domain(points: usize) {
     for (name, largest) in errors {
         println!("    {name:13} {largest:.1e}");
     }
-}
-
-/// Numbers between 0 and 1 from a fixed linear congruence.
-fn uniform(state: &mut u64) -> f64 {
-    *state = state.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
-    (*state >> 11) as f64 / (1_u64 << 53) as f64
 }

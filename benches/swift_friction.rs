@@ -139,19 +139,8 @@ fn shoot(case: &Case, alpha: f64, forward: bool) -> Option<f64> {
     miss.is_finite().then_some(if forward { miss } else { -miss })
 }
 
-/// A generator of uniform numbers in `(0, 1)`.
-fn uniform() -> impl FnMut() -> f64 {
-    let mut state = 88172645463325252u64;
-    move || {
-        state ^= state << 13;
-        state ^= state >> 7;
-        state ^= state << 17;
-        (state >> 11) as f64 / (1u64 << 53) as f64
-    }
-}
-
 fn typical() -> Vec<Case> {
-    let mut next = uniform();
+    let mut next = support::xorshift();
     let mut within = |low: f64, high: f64| low * (high / low).powf(next());
     (0..CASES)
         .map(|_| {
@@ -164,7 +153,7 @@ fn typical() -> Vec<Case> {
 }
 
 fn wide() -> Vec<Case> {
-    let mut next = uniform();
+    let mut next = support::xorshift();
     let mut within = |low: f64, high: f64| low * (high / low).powf(next());
     (0..CASES)
         .map(|_| {

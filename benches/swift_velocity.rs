@@ -176,13 +176,7 @@ fn shoot(case: &Case, c: f64, tolerance: f64) -> Option<(f64, f64)> {
 }
 
 fn random(count: usize, v: (f64, f64), ratio: (f64, f64), share: (f64, f64)) -> Vec<Case> {
-    let mut state = 88172645463325252u64;
-    let mut next = move || {
-        state ^= state << 13;
-        state ^= state >> 7;
-        state ^= state << 17;
-        (state >> 11) as f64 / (1u64 << 53) as f64
-    };
+    let mut next = support::xorshift();
     let mut cases = Vec::with_capacity(count);
     while cases.len() < count {
         let mut log_uniform = |(low, high): (f64, f64)| low * (high / low).powf(next());

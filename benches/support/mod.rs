@@ -9,6 +9,23 @@ use multiversion::multiversion;
 use slipsweep::numerics::elementary::{exp, ln};
 use slipsweep::numerics::turning::turning_lanes;
 
+/// Numbers between 0 and 1 from a fixed linear congruence.
+pub fn uniform(state: &mut u64) -> f64 {
+    *state = state.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
+    (*state >> 11) as f64 / (1_u64 << 53) as f64
+}
+
+/// Numbers between 0 and 1 by xorshift.
+pub fn xorshift() -> impl FnMut() -> f64 {
+    let mut state = 88172645463325252u64;
+    move || {
+        state ^= state << 13;
+        state ^= state >> 7;
+        state ^= state << 17;
+        (state >> 11) as f64 / (1u64 << 53) as f64
+    }
+}
+
 /// The median time of several runs, in seconds.
 pub fn median(runs: usize, mut run: impl FnMut()) -> f64 {
     let mut times: Vec<f64> = (0..runs)

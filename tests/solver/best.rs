@@ -1,6 +1,7 @@
 //! The best cubic shortcut against a 40-digit table, the paper's figures, and a search by brute force.
 
 use crate::reference;
+use crate::support::relative;
 use slipsweep::model::{Law, Transition};
 use slipsweep::protocol::best::{Best, solve};
 use slipsweep::protocol::cubic::{Landscape, Shortcuts};
@@ -16,10 +17,6 @@ fn best(transition: &Transition, t_f: f64, bounded: bool) -> Best {
     let expected = at_border || matches!(solved.status, Status::Ok | Status::BelowBound);
     assert!(expected, "{transition:?} {t_f} {:?}", solved.status);
     found
-}
-
-fn relative(found: f64, expected: f64) -> f64 {
-    ((found - expected) / expected).abs()
 }
 
 /// Least work over a grid of `n x n` places around `(a_2, a_3)`, at a distance of up to `reach`, among those with `v >=

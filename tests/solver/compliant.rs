@@ -2,6 +2,7 @@
 //! finite perturbations, limits and orders; and the loop closed.
 
 use crate::reference;
+use crate::support::relative;
 use nalgebra::Matrix3;
 use ode_solvers::dop_shared::OutputType;
 use ode_solvers::{Dop853, SVector, System};
@@ -26,10 +27,6 @@ fn solve((slider, velocities, t_f): (Slider, (f64, f64), f64), rtol: f64) -> Com
 
 fn path((slider, velocities, t_f): (Slider, (f64, f64), f64)) -> Path {
     compliant::path(&slider, velocities, t_f, 1e-12).expect("has a member")
-}
-
-fn relative(found: f64, expected: f64) -> f64 {
-    if found == expected { 0.0 } else { ((found - expected) / expected).abs() }
 }
 
 #[test]

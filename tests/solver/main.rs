@@ -21,6 +21,8 @@ mod reference;
 mod regularised;
 mod step;
 mod stress;
+#[path = "../support/mod.rs"]
+mod support;
 mod swift_edges;
 mod swift_friction;
 mod swift_velocity;

@@ -3,6 +3,7 @@
 
 use crate::reference;
 use crate::stress::crossover::columns;
+use crate::support::relative;
 use ode_solvers::dop_shared::OutputType;
 use ode_solvers::{Dop853, SVector, System};
 use slipsweep::model::{Law, Transition};
@@ -23,10 +24,6 @@ fn times(transition: &Transition) -> CrossoverTimes {
     let (status, times, _) = crossover::solve(transition, true, 1e-13, EVERY_TIME);
     assert_eq!(status, Status::Ok, "{transition:?}");
     times
-}
-
-fn relative(found: f64, expected: f64) -> f64 {
-    if found == expected { 0.0 } else { ((found - expected) / expected).abs() }
 }
 
 fn transition(row: &reference::Row) -> Transition {

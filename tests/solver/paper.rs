@@ -1,5 +1,6 @@
 //! The paper's figures of protocols over time, and its limits of short and long times, derived anew in each test.
 
+use crate::support::relative;
 use slipsweep::model::{Law, Transition};
 use slipsweep::protocol::optimal::crossover::{self, Wanted};
 use slipsweep::protocol::optimal::{self, Optimum};
@@ -62,10 +63,6 @@ fn mean(f: impl Fn(f64) -> f64) -> f64 {
 
 fn tau_ss(v: f64) -> f64 {
     1.0 + (LAW.a - LAW.b) * v.ln()
-}
-
-fn relative(found: f64, expected: f64) -> f64 {
-    ((found - expected) / expected).abs()
 }
 
 /// `theta` of the cubic along which v is continuous at both ends, and its slope, at `x = t/t_f`.

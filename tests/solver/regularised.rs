@@ -1,6 +1,7 @@
 //! The regularised optimum: every number against a library's integration of the paper's equations and of pieces built
 //! anew, the order and the limit of its excess work, and its edges.
 
+use crate::support::relative;
 use nalgebra::{SMatrix, SVector as Vector};
 use ode_solvers::dop_shared::OutputType;
 use ode_solvers::{Dop853, SVector, System};
@@ -34,10 +35,6 @@ fn optimum(case: &Case) -> Optimum {
     let (v_i, v_f) = case.velocities;
     let transition = Transition { law: case.slider.law, v_i, v_f };
     optimal::solve(&transition, case.t_f, case.bounded, 1e-13).value.expect("exists")
-}
-
-fn relative(found: f64, expected: f64) -> f64 {
-    ((found - expected) / expected).abs()
 }
 
 /// A moment: `ln v` with two derivatives in time, and `ln theta`.

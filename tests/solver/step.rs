@@ -3,6 +3,7 @@
 
 use crate::extent::quick_or_long;
 use crate::reference;
+use crate::support::{relative, uniform};
 use slipsweep::model::{Law, Transition};
 use slipsweep::protocol::Status;
 use slipsweep::stability::SteadySliding;
@@ -25,10 +26,6 @@ fn critical() -> f64 {
 fn respond(step: &Step, rtol: f64) -> Response {
     let (status, response) = step.respond(rtol);
     response.unwrap_or_else(|| panic!("{step:?}: {status:?}"))
-}
-
-fn relative(found: f64, expected: f64) -> f64 {
-    (found / expected - 1.0).abs()
 }
 
 #[test]
@@ -437,12 +434,6 @@ fn regress_without_mass_only_a_soft_spring_is_infeasible() {
     assert!((heights[0] - heights[1]).abs() < 1e-6 && (heights[1] - 223.744532248).abs() < 1e-8, "{heights:?}");
     let (status, response) = Step { transition, k: 1e-6, m: 0.0 }.respond(1e-6);
     assert_eq!((status, response), (Status::Infeasible, None));
-}
-
-/// Numbers between 0 and 1 from a fixed linear congruence.
-fn uniform(state: &mut u64) -> f64 {
-    *state = state.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
-    (*state >> 11) as f64 / (1_u64 << 53) as f64
 }
 
 #[test]

@@ -3,6 +3,7 @@
 //! A member is judged by what it cannot miss: its motion ends on theta's balance of ageing and slip, it costs no less
 //! than the optimum, and it stays within the bound of its family.
 
+use crate::support::relative;
 use slipsweep::model::{Law, Transition};
 use slipsweep::protocol::swift::{Case, FAMILIES, Family, Obstacle, Swift, find};
 use slipsweep::protocol::{Effort, Motion, Status, optimal};
@@ -21,10 +22,6 @@ fn friction_of_ends(law: Law, v_i: f64, v_f: f64) -> f64 {
 
 fn solve(family: &dyn Family, case: &Case) -> Result<Swift, Obstacle> {
     family.solve(case, RTOL, &mut Effort::default())
-}
-
-fn relative(found: f64, expected: f64) -> f64 {
-    if found == expected { 0.0 } else { ((found - expected) / expected).abs() }
 }
 
 /// Gauss-Legendre nodes and weights for the interval from 0 to 1.

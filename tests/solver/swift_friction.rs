@@ -1,6 +1,7 @@
 //! The family `bounded_friction` against a high-precision table, a library's ODE integrator and invariants.
 
 use crate::reference;
+use crate::support::relative;
 use ode_solvers::dop_shared::OutputType;
 use ode_solvers::{Dop853, SVector, System};
 use slipsweep::model::{Law, Transition};
@@ -19,10 +20,6 @@ fn solve(case: &Case, rtol: f64) -> Result<Swift, Obstacle> {
 
 fn motion(case: &Case) -> Box<dyn Motion> {
     find("bounded_friction").expect("is a family").motion(case, 1e-11).unwrap_or_else(|o| panic!("{case:?}: {o}"))
-}
-
-fn relative(found: f64, expected: f64) -> f64 {
-    if found == expected { 0.0 } else { ((found - expected) / expected).abs() }
 }
 
 fn in_table(row: &reference::Row) -> Case {

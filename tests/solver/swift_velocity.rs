@@ -2,6 +2,7 @@
 //! invariants; and the numerical tools that only they use.
 
 use crate::reference::{self, Row};
+use crate::support::relative;
 use ode_solvers::dop_shared::OutputType;
 use ode_solvers::{Dop853, SVector, System};
 use slipsweep::model::{Law, Transition};
@@ -23,10 +24,6 @@ fn solve(family: &str, case: &Case, rtol: f64) -> Result<Swift, Obstacle> {
 
 fn motion(family: &str, case: &Case) -> Box<dyn Motion> {
     find(family).expect("is a family").motion(case, 1e-12).unwrap_or_else(|o| panic!("{family} {case:?}: {o}"))
-}
-
-fn relative(found: f64, expected: f64) -> f64 {
-    if found == expected { 0.0 } else { ((found - expected) / expected).abs() }
 }
 
 const FAMILIES: [&str; 3] = ["step", "cubic", "bounded_velocity"];

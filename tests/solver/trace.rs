@@ -1,6 +1,7 @@
 //! Traces against the equations of motion, against the work and the costate that they must carry, and against their own
 //! promise that straight lines between few rows are enough.
 
+use crate::support::relative;
 use ode_solvers::dop_shared::OutputType;
 use ode_solvers::{Dop853, SVector, System};
 use slipsweep::model::{Law, Transition};
@@ -25,10 +26,6 @@ fn optimum(transition: Transition, t_f: f64) -> Course {
 
 fn fewest(course: &Course, transition: Transition) -> Trace {
     Trace::of(&*course.motion, &transition, Times::Fewest).expect("can be resolved")
-}
-
-fn relative(found: f64, expected: f64) -> f64 {
-    if found == expected { 0.0 } else { ((found - expected) / expected).abs() }
 }
 
 /// Optimal protocols of every kind: fast, slow, with and without a hold, up and down, on both sides of `a = b`.

@@ -1,0 +1,12 @@
+//! What the tests share: how far a number is from the expected one, and random numbers.
+
+/// The relative error of a number; 0 where both are the same, 0 and infinity included.
+pub fn relative(found: f64, expected: f64) -> f64 {
+    if found == expected { 0.0 } else { ((found - expected) / expected).abs() }
+}
+
+/// Numbers between 0 and 1 from a fixed linear congruence.
+pub fn uniform(state: &mut u64) -> f64 {
+    *state = state.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
+    (*state >> 11) as f64 / (1_u64 << 53) as f64
+}
