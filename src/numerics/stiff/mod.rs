@@ -44,7 +44,7 @@
 //! continued, is the first guess.
 
 mod blocks;
-mod collocation;
+pub(super) mod collocation;
 mod integrator;
 mod piece;
 mod system;
