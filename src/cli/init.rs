@@ -5,9 +5,9 @@ use std::path::{Path, PathBuf};
 
 use clap::ValueEnum;
 
-use super::{FAILED, Failure, say, schema, to_file, wrong};
+use super::{FAILED, Failure, say, to_file, wrong};
 use crate::file;
-use crate::sweep::check_name;
+use crate::sweep::{check_name, schema};
 
 /// Arguments of `init`.
 #[derive(Debug, clap::Args)]
@@ -92,7 +92,7 @@ pub fn init(arguments: &Arguments) -> Result<(), Failure> {
         to_file(path, |file| file.write_all(text.as_bytes())).map_err(failed)
     };
     let schema_path = folder.join(SCHEMA);
-    let schema = schema::text();
+    let schema = format!("{:#}\n", schema());
     // One of another version would complain of what this version can do.
     if !file::open(&schema_path).and_then(io::read_to_string).is_ok_and(|found| found == schema) {
         write(&schema_path, &schema)?;

@@ -5,14 +5,12 @@ mod head;
 mod init;
 mod kind;
 mod man;
-mod next;
 mod output;
 mod plan;
 mod plot;
 mod query;
 mod report;
 mod run;
-mod schema;
 mod shards;
 mod status;
 mod summary;
@@ -40,7 +38,7 @@ use self::watch::{Wait, waiting};
 use crate::dataset::{Folder, Manifest, atomic};
 use crate::names::{hint, nearest};
 use crate::query::QueryError;
-use crate::sweep::{SpecError, Sweep};
+use crate::sweep::{SpecError, Sweep, schema};
 
 use kind::Kind;
 
@@ -198,7 +196,7 @@ fn perform(arguments: Arguments) -> Result<(), Failure> {
         Command::Report(arguments) => report::report(&arguments),
         Command::Verify(arguments) => verify::verify(&arguments),
         Command::Tables(arguments) => tables::tables(&arguments),
-        Command::Schema => schema::print(),
+        Command::Schema => say(&format!("{:#}\n", schema())),
         Command::Completions(arguments) => completions::completions(&arguments),
         Command::Man(arguments) => man::man(&arguments),
     }

@@ -22,8 +22,8 @@ pub struct Arguments {
     check: bool,
 }
 
-/// Parts and files that are listed one by one of each kind.
-const LISTED: usize = 10;
+/// Parts and files of each kind that are listed one by one. Chosen: five kinds fit a screen.
+const MAX_LISTED: usize = 10;
 
 /// Says what there is of a dataset.
 pub fn status(arguments: &Arguments) -> Result<(), Failure> {
@@ -89,17 +89,17 @@ fn faults(folder: &Folder, survey: &Survey) -> String {
             return;
         }
         let _ = writeln!(text, "{title}");
-        for line in lines.iter().take(LISTED) {
+        for line in lines.iter().take(MAX_LISTED) {
             let _ = writeln!(text, "  {line}");
         }
-        if lines.len() > LISTED {
-            let _ = writeln!(text, "  and {} more", words::count((lines.len() - LISTED) as u64));
+        if lines.len() > MAX_LISTED {
+            let _ = writeln!(text, "  and {} more", words::count((lines.len() - MAX_LISTED) as u64));
         }
     };
     let missing = survey.tables.iter().filter(|table| !table.missing.is_empty());
     let missing = missing.map(|table| {
-        let first = table.missing.iter().take(LISTED).map(|parts| words::range(parts.start, parts.end - 1));
-        let more = if table.missing.len() > LISTED { ", …" } else { "" };
+        let first = table.missing.iter().take(MAX_LISTED).map(|parts| words::range(parts.start, parts.end - 1));
+        let more = if table.missing.len() > MAX_LISTED { ", …" } else { "" };
         format!("{}: {}{more}", table.name, first.collect::<Vec<_>>().join(","))
     });
     list("missing parts:", missing.collect());
