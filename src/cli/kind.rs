@@ -4,7 +4,7 @@ use std::fs::{self, File};
 use std::io::{self, Read};
 use std::path::{Path, PathBuf};
 
-use super::{Failure, wrong};
+use super::{Failure, refused};
 use crate::dataset::Folder;
 
 /// The file that makes a folder a dataset.
@@ -135,7 +135,7 @@ pub fn expect(path: &Path, kinds: &[Kind]) -> Result<(), Failure> {
     if !matches!(found, Kind::Nothing | Kind::Device) {
         what = &not;
     }
-    Err(wrong(format!("{}: {what}\n  expected: {}\n  help: {help}", path.display(), expected.join(", or "))))
+    Err(refused(format!("{}: {what}", path.display()), expected.join(", or "), help))
 }
 
 /// That `path` may be a spec: the reader of specs says what else is wrong.

@@ -176,8 +176,7 @@ fn write_file(path: &Path, bytes: &[u8]) -> Result<(), Failure> {
 
 /// A table that is not among `names`; the message begins with `place`.
 fn no_table(place: &str, name: &str, names: &[&str]) -> Failure {
-    let help = hint(name, names.iter().copied());
-    wrong(format!("{place}no table `{name}`\n  expected: {}\n  help: {help}", names.join(", ")))
+    refused(format!("{place}no table `{name}`"), names.join(", "), hint(name, names.iter().copied()))
 }
 
 /// Does what the arguments say.
@@ -251,6 +250,11 @@ fn load(path: &Path) -> Result<Sweep, Failure> {
 /// The failure of somebody who asked for something wrong.
 fn wrong(message: impl Display) -> Failure {
     Failure { code: WRONG, message: format!("error: {message}") }
+}
+
+/// The same with what is right and what to do.
+fn refused(found: impl Display, expected: impl Display, help: impl Display) -> Failure {
+    wrong(format!("{found}\n  expected: {expected}\n  help: {help}"))
 }
 
 /// The dataset in `path`, which must be one.

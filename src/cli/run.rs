@@ -8,7 +8,7 @@ use std::time::Instant;
 use super::plan::too_large;
 use super::shards::quoted;
 use super::watch::{Wait, waiting, watched};
-use super::{AGAIN, FAILED, Failure, NOT_STRICT, load, say, summary, words, wrong};
+use super::{AGAIN, FAILED, Failure, NOT_STRICT, load, refused, say, summary, words, wrong};
 use crate::dataset::atomic::nearest_folder;
 use crate::dataset::{DatasetError, Folder};
 use crate::grid::Quantity;
@@ -106,14 +106,11 @@ fn report(
         let all = done.kept + done.made;
         match shard {
             None => text.push_str(&summary::digest(&table.name, table.rows, digest)),
-            Some(shard) => text.push_str(&format!(
-                "{}: {} of {} in share {} of {}\n",
-                table.name,
-                words::count(all),
-                words::things(table.parts, "part"),
-                shard.index(),
-                shard.count()
-            )),
+            Some(shard) => {
+                let (ours, parts) = (words::count(all), words::things(table.parts, "part"));
+                let (index, count) = (shard.index(), shard.count());
+                text.push_str(&format!("{}: {ours} of {parts} in share {index} of {count}\n", table.name));
+            }
         }
         if done.kept > 0 {
             let (kept, all) = (words::count(done.kept), words::things(all, "part"));
@@ -177,23 +174,18 @@ fn subject(arguments: &Arguments) -> Result<(Sweep, Folder), Failure> {
     let folder = Folder::at(path);
     let found = folder.manifest().map_err(Failure::failed)?;
     let Some(manifest) = found else {
-        return Err(wrong(format!(
-            "{}: neither a spec nor a dataset\n  expected: a TOML file, or a folder that `slipsweep run` wrote\n  help: check the path",
-            path.display()
-        )));
+        let found = format!("{}: neither a spec nor a dataset", path.display());
+        return Err(refused(found, "a TOML file, or a folder that `slipsweep run` wrote", "check the path"));
     };
     if manifest.spec.is_empty() {
         let message = "its manifest is lost and its parts do not carry the spec";
         return Err(wrong(format!("{}: {message}\n  help: run the spec that it was made from", path.display())));
     }
     let sweep = Sweep::parse_at(&manifest.spec, &path.join("manifest.json")).map_err(|error| {
-        let out = path.parent().filter(|out| !out.as_os_str().is_empty()).unwrap_or(Path::new("."));
-        wrong(format!(
-            "{}: the spec in it does not do without the files that it names\n  found: {error}\n  help: run the file that it was made from: \
-             slipsweep run SPEC --out {}",
-            path.display(),
-            out.display()
-        ))
+        let out = path.parent().filter(|out| !out.as_os_str().is_empty()).unwrap_or(Path::new(".")).display();
+        let what = format!("{}: the spec in it does not do without the files that it names", path.display());
+        let help = format!("run the file that it was made from: slipsweep run SPEC --out {out}");
+        wrong(format!("{what}\n  found: {error}\n  help: {help}"))
     })?;
     let folder = arguments.out.as_deref().map_or(folder, |out| Folder::new(out, &sweep.name));
     Ok((sweep, folder))
@@ -201,14 +193,11 @@ fn subject(arguments: &Arguments) -> Result<(Sweep, Folder), Failure> {
 
 fn explain(error: RunError, caught: Option<i32>, arguments: &Arguments, (there, all): (u64, u64)) -> Failure {
     match error {
-        RunError::Stopped(_) => Failure {
-            code: caught.and_then(|number| u8::try_from(128 + number).ok()).unwrap_or(FAILED),
-            message: format!(
-                "stopped; {} of {} finished: the same command goes on from there",
-                words::count(there),
-                words::things(all, "part")
-            ),
-        },
+        RunError::Stopped(_) => {
+            let (there, all) = (words::count(there), words::things(all, "part"));
+            let message = format!("stopped; {there} of {all} finished: the same command goes on from there");
+            Failure { code: caught.and_then(|number| u8::try_from(128 + number).ok()).unwrap_or(FAILED), message }
+        }
         RunError::Dataset(
             DatasetError::Foreign { .. }
             | DatasetError::OtherSpec { .. }
@@ -261,12 +250,8 @@ fn account(outcome: &Outcome, seconds: f64) -> String {
         return "nothing to compute: every part was there\n".to_owned();
     }
     let Work { optima, landscapes, best, swifts, crossovers, simulations, steps, quadratures, nodes } = outcome.work;
-    let mut text = format!(
-        "{} in {}: {} rows a second, Parquet on disk included\n",
-        words::things(rows, "row"),
-        words::duration(seconds),
-        words::count((rows as f64 / seconds) as u64),
-    );
+    let (all, rate) = (words::things(rows, "row"), words::count((rows as f64 / seconds) as u64));
+    let mut text = format!("{all} in {}: {rate} rows a second, Parquet on disk included\n", words::duration(seconds));
     let spent: Vec<String> = [
         (optima, "optimal protocol"),
         (landscapes, "landscape"),

@@ -134,16 +134,10 @@ pub fn shards(arguments: &Arguments) -> Result<(), Failure> {
     to_file(&script, |file| file.write_all(job.script(engine).as_bytes()))
         .map_err(|error| refused(&script, "write", &error))?;
 
-    let mut said = format!(
-        "{}: {} in {}, about {} of one processor\n{} of about {} on {} each\n",
-        sweep.name,
-        words::things(rows, "row"),
-        words::things(parts, "part"),
-        words::duration(seconds),
-        words::things(shares, "task"),
-        words::duration(each),
-        words::things(arguments.cpus, "processor"),
-    );
+    let (rows, parts, work) = (words::things(rows, "row"), words::things(parts, "part"), words::duration(seconds));
+    let (tasks, cpus) = (words::things(shares, "task"), words::things(arguments.cpus, "processor"));
+    let mut said = format!("{}: {rows} in {parts}, about {work} of one processor\n", sweep.name);
+    let _ = writeln!(said, "{tasks} of about {} on {cpus} each", words::duration(each));
     if let Some(reason) = fewer {
         let _ = writeln!(said, "fewer than the {} requested: {reason}", words::count(arguments.shards));
     }

@@ -7,7 +7,7 @@ use clap::ValueEnum;
 use clap::builder::{PossibleValue, PossibleValuesParser, StringValueParser, TypedValueParser};
 
 use super::output::{self, Output};
-use super::{FAILED, Failure, WRONG, dataset, no_table, put, say, words, write_file, wrong};
+use super::{FAILED, Failure, WRONG, dataset, no_table, put, refused, say, words, write_file, wrong};
 use crate::dataset::{Cell, Folder, ManifestTable, Row, frame};
 use crate::grid::{Domain, Point, Quantity, RTOL, Scale};
 use crate::model::{Law, Transition, Units};
@@ -249,11 +249,9 @@ impl Arguments {
     /// The protocol that the arguments name.
     fn asked(&self) -> Result<Asked, Failure> {
         if Path::new(&self.subject).is_dir() {
-            return Err(wrong(format!(
-                "{folder}: a folder, without a table\n  expected: a protocol, or a dataset with a table and a row\n  \
-                 help: slipsweep trace {folder} optimal --row 0",
-                folder = self.subject
-            )));
+            let (folder, expected) = (&self.subject, "a protocol, or a dataset with a table and a row");
+            let help = format!("slipsweep trace {folder} optimal --row 0");
+            return Err(refused(format!("{folder}: a folder, without a table"), expected, help));
         }
         let name = self.subject.as_str();
         self.check(name)?;
@@ -339,11 +337,9 @@ impl Arguments {
         let number = match self.row {
             Some(row) => row,
             None if self.conditions.is_empty() => {
-                return Err(wrong(format!(
-                    "{}: which row of `{name}`?\n  expected: --row N, from 0 to {}, or --where CONDITION\n  help: add --row 0",
-                    path.display(),
-                    listed.rows.saturating_sub(1)
-                )));
+                let last = listed.rows.saturating_sub(1);
+                let expected = format!("--row N, from 0 to {last}, or --where CONDITION");
+                return Err(refused(format!("{}: which row of `{name}`?", path.display()), expected, "add --row 0"));
             }
             None => the_row(path, &folder, listed, &self.conditions)?,
         };
@@ -396,20 +392,14 @@ fn axes_of(row: &Row, units: &Units) -> Vec<Named> {
 /// The part of a row of a table, and the row.
 fn row_at(path: &Path, folder: &Folder, table: &ManifestTable, row: u64) -> Result<(std::path::PathBuf, Row), Failure> {
     if row >= table.rows {
-        return Err(wrong(format!(
-            "{}: no row {row} in `{}`\n  expected: a row from 0 to {}",
-            path.display(),
-            table.name,
-            table.rows.saturating_sub(1)
-        )));
+        let (path, last) = (path.display(), table.rows.saturating_sub(1));
+        return Err(wrong(format!("{path}: no row {row} in `{}`\n  expected: a row from 0 to {last}", table.name)));
     }
     let part = row / table.rows_per_part.max(1);
     let file = folder.part(&table.name, part);
     if !file.is_file() {
-        return Err(wrong(format!(
-            "{}: row {row} is in a part that is missing\n  help: run the sweep again, which makes only what is missing",
-            file.display()
-        )));
+        let (file, help) = (file.display(), "run the sweep again, which makes only what is missing");
+        return Err(wrong(format!("{file}: row {row} is in a part that is missing\n  help: {help}")));
     }
     let place = usize::try_from(row - table.rows_of(part).start).map_err(Failure::failed)?;
     let row = frame::row(&file, place).map_err(Failure::failed)?;
@@ -433,12 +423,8 @@ fn the_row(path: &Path, folder: &Folder, table: &ManifestTable, conditions: &[St
             let headings = frame::headings(&file).map_err(Failure::failed)?.0;
             let known: Vec<&str> = headings.iter().map(|heading| heading.name.as_str()).collect();
             if let Some(unknown) = names.iter().find(|name| !known.contains(name)) {
-                let help = hint(unknown, known.iter().copied());
-                let expected = known.join(", ");
-                return Err(wrong(format!(
-                    "--where: `{}` has no column `{unknown}`\n  expected: {expected}\n  help: {help}",
-                    table.name
-                )));
+                let found = format!("--where: `{}` has no column `{unknown}`", table.name);
+                return Err(refused(found, known.join(", "), hint(unknown, known.iter().copied())));
             }
         }
         let frame = frame::read(&file, &names).map_err(Failure::failed)?;
@@ -455,27 +441,19 @@ fn the_row(path: &Path, folder: &Folder, table: &ManifestTable, conditions: &[St
             break;
         }
     }
+    let (path, name, conditions) = (path.display(), &table.name, conditions.join(", "));
     match found.as_slice() {
         [row] => Ok(*row),
-        [] => Err(wrong(format!(
-            "{}: no row of `{}` meets --where {:?}\n  help: slipsweep head {} {}",
-            path.display(),
-            table.name,
-            conditions.join(", "),
-            path.display(),
-            table.name
-        ))),
+        [] => {
+            let found = format!("{path}: no row of `{name}` meets --where {conditions:?}");
+            Err(wrong(format!("{found}\n  help: slipsweep head {path} {name}")))
+        }
         several => {
             let shown: Vec<String> = several.iter().take(MAX_NAMED_ROWS).map(u64::to_string).collect();
             let more = if several.len() > MAX_NAMED_ROWS { " and more" } else { "" };
-            Err(wrong(format!(
-                "{}: several rows of `{}` meet --where {:?}\n  found: rows {}{more}\n  expected: one row\n  help: --row {}",
-                path.display(),
-                table.name,
-                conditions.join(", "),
-                shown.join(", "),
-                several[0]
-            )))
+            let what = format!("{path}: several rows of `{name}` meet --where {conditions:?}");
+            let found = format!("{what}\n  found: rows {}{more}", shown.join(", "));
+            Err(refused(found, "one row", format!("--row {}", several[0])))
         }
     }
 }
@@ -541,11 +519,11 @@ fn header(arguments: &Arguments, asked: &Asked, course: &Course, trace: &Trace) 
         Some(_) => {
             text.push_str(&format!("  {rows}: equally spaced times, and the states on the other side of a jump\n"))
         }
-        None => text.push_str(&format!(
-            "  {rows}; straight lines between them are good to {} of the range of a column, and to {} of v and theta\n",
-            words::number(GOOD),
-            words::number(CLOSE_UP)
-        )),
+        None => {
+            let (range, value) = (words::number(GOOD), words::number(CLOSE_UP));
+            let lines = format!("straight lines between them are good to {range} of the range of a column");
+            text.push_str(&format!("  {rows}; {lines}, and to {value} of v and theta\n"));
+        }
     }
     text
 }

@@ -128,43 +128,32 @@ impl<'a> View<'a> {
     /// The words of the label `name` over `rows`, some of the rows, each with the number of rows in a row that have it; `None` where rows
     /// have none.
     pub fn label(&self, name: &str, rows: Range<u64>) -> Vec<(Option<&'a str>, usize)> {
-        let stretches = self.projection.stretches();
-        let mut runs: Vec<(Option<&str>, usize)> = Vec::new();
-        let mut push = |word: Option<&'a str>, length: u64| match runs.last_mut() {
-            Some((last, run)) if *last == word => *run += length as usize,
-            _ => runs.push((word, length as usize)),
-        };
-        let segments: Vec<Segment> = self.segments(rows).collect();
-        for group in segments.chunk_by(|one, next| one.stretch == next.stretch) {
-            let label = stretches[group[0].stretch].label(name);
-            for Segment { raw, .. } in group {
-                let Some((digit, label)) = label else {
-                    push(None, raw.end - raw.start);
-                    continue;
-                };
-                let mut row = raw.start;
-                while row < raw.end {
-                    let next = digit.next(row).min(raw.end);
-                    push(label.word(digit.step(row)), next - row);
-                    row = next;
-                }
-            }
-        }
-        runs
+        let labels: Vec<_> = self.projection.stretches().iter().map(|stretch| stretch.label(name)).collect();
+        let runs = self.runs_of(rows, |stretch, raw| match labels[stretch] {
+            Some((digit, label)) => (label.word(digit.step(raw)), digit.next(raw)),
+            None => (None, u64::MAX),
+        });
+        runs.into_iter().map(|(word, rows)| (word, (rows.end - rows.start) as usize)).collect()
     }
 
     /// The tuples of `rows`, some of the rows, each with the rows in a row that have it.
     pub fn tuples(&self, tuples: &Tuples, rows: Range<u64>) -> Vec<(u64, Range<u64>)> {
-        let mut runs: Vec<(u64, Range<u64>)> = Vec::new();
+        self.runs_of(rows, |stretch, raw| tuples.of(stretch, raw))
+    }
+
+    /// Runs of equal values over `rows`. Of a row of the product of a block `of` gives the value, and the first row after it that may have
+    /// another one.
+    fn runs_of<T: PartialEq>(&self, rows: Range<u64>, of: impl Fn(usize, u64) -> (T, u64)) -> Vec<(T, Range<u64>)> {
+        let mut runs: Vec<(T, Range<u64>)> = Vec::new();
         for segment in self.segments(rows) {
             let mut raw = segment.raw.start;
             while raw < segment.raw.end {
-                let (tuple, next) = tuples.of(segment.stretch, raw);
+                let (value, next) = of(segment.stretch, raw);
                 let next = next.min(segment.raw.end);
-                let end = segment.first + (next - segment.raw.start);
+                let [start, end] = [raw, next].map(|raw| segment.first + (raw - segment.raw.start));
                 match runs.last_mut() {
-                    Some((last, run)) if *last == tuple => run.end = end,
-                    _ => runs.push((tuple, segment.first + (raw - segment.raw.start)..end)),
+                    Some((last, run)) if *last == value => run.end = end,
+                    _ => runs.push((value, start..end)),
                 }
                 raw = next;
             }

@@ -135,6 +135,7 @@ fn run_in(
     threads: usize,
     signal: &Signal,
 ) -> Result<Outcome, RunError> {
+    // Plan: the parts of each table that are ours, and the dataset that takes them.
     let plan = Plan::new(sweep);
     let shares = shard.parts(sweep, &plan)?;
     let session = folder.open(&plan.manifest(sweep), company).map_err(|error| sweep.explain(error))?;
@@ -160,10 +161,12 @@ fn run_in(
         })
         .collect();
 
+    // Parts that are there and sound are kept.
     signal.enter(Phase::Checking);
     let sound = stages.iter().zip(&shares).map(|(stage, share)| stage.check(share));
     let sound = sound.collect::<Result<Vec<_>, RunError>>()?;
 
+    // The others are solved by the pool, encoded, and published by the writers.
     signal.enter(Phase::Computing);
     let mut outcome = Outcome { tables: Vec::new(), digests: Vec::new(), work: Work::default() };
     thread::scope(|scope| {

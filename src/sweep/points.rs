@@ -297,9 +297,8 @@ fn numbers(column: &ArrayRef) -> Option<Vec<f64>> {
             }
         };
     }
-    Some(
-        values!(Float64Type Float32Type Int8Type Int16Type Int32Type Int64Type UInt8Type UInt16Type UInt32Type UInt64Type),
-    )
+    Some(values!(Float64Type Float32Type Int8Type Int16Type Int32Type Int64Type
+                UInt8Type UInt16Type UInt32Type UInt64Type))
 }
 
 fn unreadable(path: &Path, error: &dyn Display) -> SpecError {

@@ -3,7 +3,6 @@
 use std::path::PathBuf;
 
 use indexmap::IndexMap;
-use serde::de::Unexpected;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
@@ -33,7 +32,7 @@ impl Spec {
 pub fn read(text: &str, faults: &mut Faults) -> Result<Spec, SpecError> {
     let document = DeTable::parse(text).map_err(|error| syntax(text, &error))?;
     let value = DeValue::Table(document.into_inner());
-    let mut spec: Spec = Entry { key: "", start: 0, value: &value, text }.read(faults).unwrap_or_default();
+    let mut spec = Spec::read(Entry { key: "", start: 0, value: &value, text }, faults).unwrap_or_default();
     if value.get("name").is_none() && !faults.concern("name") {
         let missing = SpecError::new("", "`name` is missing", "a key `name`", "add `name = ...`");
         faults.push(SpecError { line: Some(1), ..missing });
@@ -77,20 +76,16 @@ pub trait Read: Sized {
 }
 
 impl Entry<'_> {
-    fn read<T: Read>(self, faults: &mut Faults) -> Option<T> {
-        T::read(self, faults)
-    }
-
     /// Notes a value of the wrong type.
     pub fn wrong<T>(self, expected: &str, faults: &mut Faults) -> Option<T> {
         let found = match self.value {
-            DeValue::String(word) => Unexpected::Str(word).to_string(),
+            DeValue::String(word) => format!("string {word:?}"),
             DeValue::Integer(number) => format!("integer `{number}`"),
             DeValue::Float(number) => format!("floating point `{number}`"),
-            DeValue::Boolean(is) => Unexpected::Bool(*is).to_string(),
+            DeValue::Boolean(is) => format!("boolean `{is}`"),
             DeValue::Datetime(_) => "a date".to_owned(),
-            DeValue::Array(_) => Unexpected::Seq.to_string(),
-            DeValue::Table(_) => Unexpected::Map.to_string(),
+            DeValue::Array(_) => "sequence".to_owned(),
+            DeValue::Table(_) => "map".to_owned(),
         };
         self.fault(SpecError::new(self.key, format!("found {found}"), expected, "change the value"), faults);
         None
@@ -134,10 +129,12 @@ impl Entry<'_> {
             if known.is_empty() || known.contains(&name) {
                 take(name, entry, faults);
             } else {
-                nearest(name, known.iter().copied())
-                    .into_iter()
-                    .for_each(|meant| faults.suspect(format!("{prefix}{meant}")));
+                let meant = nearest(name, known.iter().copied());
+                meant.into_iter().for_each(|meant| faults.suspect(format!("{prefix}{meant}")));
                 entry.fault(unknown(key.clone(), "key", name, known), faults);
+            }
+            if faults.are_enough() {
+                break;
             }
         }
         Some(())

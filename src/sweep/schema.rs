@@ -47,7 +47,8 @@ fn keys(description: &str, properties: Value) -> Value {
 /// The keys that may also stand in a block.
 fn grid() -> Map<String, Value> {
     let points = "A CSV or Parquet file, relative to the spec: one row a point; its columns are axes that vary together, and labels of text";
-    let zip = json!({ "type": "array", "minItems": 2, "uniqueItems": true, "items": { "enum": Quantity::ALL.map(Quantity::name) } });
+    let names = json!({ "enum": Quantity::ALL.map(Quantity::name) });
+    let zip = json!({ "type": "array", "minItems": 2, "uniqueItems": true, "items": names });
     let zips = "Axes of equal length that advance together, such as [[\"a\", \"b\"]]";
     let condition = "Condition of the points to keep, such as v_f > v_i";
     let ending = "\\.([cC][sS][vV]|[pP][aA][rR][qQ][uU][eE][tT])$";
@@ -66,7 +67,11 @@ fn own() -> Value {
     let model = json!({
         "velocity_bound": { "type": "boolean", "default": true, "description": "Whether optimal protocols obey v >= 1" },
         "units": {
-            "anyOf": [{ "enum": ["dimensionless", "si"] }, { "pattern": any_case("dimensionless") }, { "pattern": any_case("si") }],
+            "anyOf": [
+                { "enum": ["dimensionless", "si"] },
+                { "pattern": any_case("dimensionless") },
+                { "pattern": any_case("si") },
+            ],
             "type": "string",
             "default": "dimensionless",
             "description": "Units of the values",
@@ -109,7 +114,8 @@ fn units() -> Value {
         json!({ "required": ["units"], "properties": { "units": { "type": "string", "pattern": any_case("si") } } });
     let both = |axes: &str, model: Value| {
         let axes = json!({ "$ref": axes });
-        json!({ "properties": { "model": model, "axes": axes, "block": { "items": { "properties": { "axes": axes } } } } })
+        let block = json!({ "items": { "properties": { "axes": axes } } });
+        json!({ "properties": { "model": model, "axes": axes, "block": block } })
     };
     let no_scales = json!({ "not": { "anyOf": scales.map(|scale| json!({ "required": [scale] })) } });
     json!({
