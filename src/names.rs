@@ -2,8 +2,8 @@
 
 use std::borrow::Cow;
 
-/// Longest name for which a suggestion is looked for, in bytes.
-const LONGEST: usize = 64;
+/// Bytes of a name for which a suggestion is looked for, at most: three times those of the longest name that there is.
+const MAX_NAME_BYTES: usize = 64;
 
 /// A text that somebody else wrote, for a message: its first `most` characters, and none that a terminal would obey.
 pub fn shown(text: &str, most: usize) -> Cow<'_, str> {
@@ -37,21 +37,21 @@ const SYNONYMS: [(&str, &[&str]); 13] = [
     ("m", &["mass"]),
 ];
 
-/// Longest name of which the first letter has to be right, in characters: one letter away from `sin` are `min` and `bin`.
-const SHORT: usize = 4;
+/// Characters of a name at most of which the first has to be right: one letter away from `sin` are `min` and `bin`.
+const MAX_SHORT_CHARS: usize = 4;
 
 /// The name among `known`, all in lower case, that `name` was most likely meant to be: one that means the same, or a similar one.
 ///
-/// None of a name of more than [`LONGEST`] bytes: comparing two takes memory in proportion to the product of their lengths.
+/// None of a name of more than [`MAX_NAME_BYTES`] bytes: comparing two takes memory in proportion to the product of their lengths.
 pub fn nearest<'a>(name: &str, known: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
-    if name.len() > LONGEST {
+    if name.len() > MAX_NAME_BYTES {
         return None;
     }
     let name = name.to_lowercase();
     let ours = SYNONYMS.iter().find(|(_, theirs)| theirs.contains(&name.as_str())).map(|(ours, _)| *ours);
     let distance = |candidate: &str| {
         let (distance, longer) = (strsim::damerau_levenshtein(&name, candidate), candidate.len().max(name.len()));
-        let is_far = longer <= SHORT && name.chars().next() != candidate.chars().next();
+        let is_far = longer <= MAX_SHORT_CHARS && name.chars().next() != candidate.chars().next();
         (ours == Some(candidate)).then_some(0).or((!is_far && distance <= longer.div_ceil(3)).then_some(distance))
     };
     let near = known.into_iter().filter_map(|candidate| Some((distance(candidate)?, candidate)));

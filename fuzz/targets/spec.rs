@@ -31,7 +31,7 @@ fuzz_target!(|text: &str| {
 
 /// Whether a legal spec takes long because it asks for long: no defect, and no speed for finding one.
 fn is_long(text: &str) -> bool {
-    let Ok(spec) = toml::from_str::<Spec>(text) else { return false };
+    let Ok(spec) = Spec::parse(text) else { return false };
     let top = spec.top();
     std::iter::once(&top).chain(&spec.block).any(|block| evaluates(block) && combinations(block) > MOST_COMBINATIONS)
 }

@@ -29,15 +29,13 @@ pub fn head(arguments: &Arguments) -> Result<(), Failure> {
     let tables = Tables::open(&arguments.dataset)?;
     let chosen: Vec<&Source> = match &arguments.table {
         None => tables.sources.iter().collect(),
-        Some(name) => vec![tables.find(name).ok_or_else(|| unknown(arguments, name, &tables))?],
+        Some(name) => vec![tables.find(name).ok_or_else(|| {
+            let names: Vec<&str> = tables.sources.iter().map(|source| source.name.as_str()).collect();
+            no_table(&format!("{}: ", arguments.dataset.display()), name, &names)
+        })?],
     };
     let texts: Vec<String> = chosen.into_iter().map(|source| first(source, arguments)).collect::<Result<_, _>>()?;
     say(&texts.join("\n"))
-}
-
-fn unknown(arguments: &Arguments, name: &str, tables: &Tables) -> Failure {
-    let names: Vec<&str> = tables.sources.iter().map(|source| source.name.as_str()).collect();
-    no_table(&format!("{}: ", arguments.dataset.display()), name, &names)
 }
 
 /// A line on the table, then names, units and rows.

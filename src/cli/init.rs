@@ -5,9 +5,9 @@ use std::path::{Path, PathBuf};
 
 use clap::ValueEnum;
 
-use super::{FAILED, Failure, say, schema, to_file, wrong};
+use super::{Failure, refused, say, to_file};
 use crate::file;
-use crate::sweep::check_name;
+use crate::sweep::{check_name, schema};
 
 /// Arguments of `init`.
 #[derive(Debug, clap::Args)]
@@ -61,38 +61,29 @@ pub fn init(arguments: &Arguments) -> Result<(), Failure> {
     };
     let name = bare.file_name().unwrap_or_default().to_string_lossy();
     let folder = bare.parent().unwrap_or(Path::new(""));
-    check_name(&name).map_err(|error| {
-        wrong(format!("`{given}`: {}\n  expected: {}\n  help: {}", error.found, error.expected, error.help))
-    })?;
+    check_name(&name).map_err(|error| refused(format!("`{given}`: {}", error.found), error.expected, error.help))?;
     if !(folder.as_os_str().is_empty() || folder.is_dir()) {
-        let folder = folder.display();
-        return Err(wrong(format!(
-            "`{given}`: there is no folder `{folder}`\n  expected: a name such as {name}, or one in a folder that is there\n  \
-             help: slipsweep init {name}"
-        )));
+        let found = format!("`{given}`: there is no folder `{}`", folder.display());
+        let expected = format!("a name such as {name}, or one in a folder that is there");
+        return Err(refused(found, expected, format!("slipsweep init {name}")));
     }
     let text = format!("#:schema ./{SCHEMA}\n{}", arguments.question.spec().replace("NAME", &name));
     let path = folder.join(format!("{name}.toml"));
     // The spec as it would be written is no other one.
     let found = file::open(&path).and_then(io::read_to_string);
     if path.exists() && !found.is_ok_and(|found| found == text) {
-        return Err(wrong(format!(
-            "{}: is there already\n  expected: a new name\n  help: choose another name, or remove the file",
-            path.display()
-        )));
+        let found = format!("{}: is there already", path.display());
+        return Err(refused(found, "a new name", "choose another name, or remove the file"));
     }
     let write = |path: &Path, text: &str| {
-        let failed = |error: io::Error| Failure {
-            code: FAILED,
-            message: format!(
-                "error: {}: cannot write: {error}\n  help: choose a folder that is there and can be written to",
-                path.display()
-            ),
-        };
-        to_file(path, |file| file.write_all(text.as_bytes())).map_err(failed)
+        let help = "choose a folder that is there and can be written to";
+        let written = to_file(path, |file| file.write_all(text.as_bytes()));
+        written.map_err(|error: io::Error| {
+            Failure::failed(format!("{}: cannot write: {error}\n  help: {help}", path.display()))
+        })
     };
     let schema_path = folder.join(SCHEMA);
-    let schema = schema::text();
+    let schema = format!("{:#}\n", schema());
     // One of another version would complain of what this version can do.
     if !file::open(&schema_path).and_then(io::read_to_string).is_ok_and(|found| found == schema) {
         write(&schema_path, &schema)?;

@@ -4,17 +4,17 @@ use std::fs::{self, File};
 use std::io::{self, Read};
 use std::path::{Path, PathBuf};
 
-use super::{Failure, wrong};
+use super::{Failure, refused};
 use crate::dataset::Folder;
 
 /// The file that makes a folder a dataset.
 pub const MANIFEST: &str = "manifest.json";
 
-/// Most bytes at the start of a file that are looked at, which is all of a spec that one writes by hand.
-const MOST_LOOKED_AT: u64 = 1 << 20;
+/// Bytes at the start of a file that are looked at. Chosen: all of a spec that one writes by hand.
+const MAX_START_BYTES: u64 = 1 << 20;
 
-/// Names of datasets that a message lists.
-const MOST_NAMED: usize = 4;
+/// Names of datasets that a message lists. Chosen: they fit a line.
+const MAX_NAMED_DATASETS: usize = 4;
 
 /// What a path is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -81,26 +81,6 @@ impl Kind {
         }
     }
 
-    /// It in words.
-    fn words(self) -> &'static str {
-        match self {
-            Kind::Dataset => "a dataset",
-            Kind::Datasets => "a folder of datasets",
-            Kind::Table => "the folder of a table",
-            Kind::Part => "a part of a table",
-            Kind::Manifest => "the manifest of a dataset",
-            Kind::Folder => "a folder without a manifest.json",
-            Kind::Spec => "a spec",
-            Kind::Trace => "a trace",
-            Kind::Rows => "a file of rows",
-            Kind::Page => "a page of HTML",
-            Kind::Picture => "a picture",
-            Kind::File => "a file of another kind",
-            Kind::Device => "a device or a named pipe, not a file",
-            Kind::Nothing => "there is no such file or folder",
-        }
-    }
-
     /// What is expected of an argument of this kind.
     fn expected(self) -> &'static str {
         match self {
@@ -110,26 +90,34 @@ impl Kind {
         }
     }
 
-    /// What may be done with it.
-    fn help(self, path: &Path) -> String {
+    /// It in words, and what may be done with it, which is in `path`.
+    fn words(self, path: &Path) -> (&'static str, String) {
         let shown = path.display();
-        let dataset = |path: Option<PathBuf>| path.map_or_else(String::new, |path| path.display().to_string());
+        let name = |path: Option<PathBuf>, what: &str| {
+            let path = path.map_or_else(String::new, |path| path.display().to_string());
+            format!("name its {what}, {path}")
+        };
+        let ours = || "name a folder that `slipsweep run` wrote".to_owned();
         match self {
-            Kind::Dataset => format!("`slipsweep summary {shown}` says what it contains"),
-            Kind::Datasets => format!("name one of them: {}", datasets(path).join(", ")),
-            Kind::Table => format!("name its dataset, {}", dataset(above(path))),
-            Kind::Part => format!("name its dataset, {}", dataset(above(path).and_then(|table| above(&table)))),
-            Kind::Manifest => format!("name its folder, {}", dataset(above(path))),
-            Kind::Spec => format!("`slipsweep run {shown}` computes its dataset, {}: name that", results(path)),
-            Kind::Trace => format!("`slipsweep plot {shown}` draws it"),
+            Kind::Dataset => ("a dataset", format!("`slipsweep summary {shown}` says what it contains")),
+            Kind::Datasets => ("a folder of datasets", format!("name one of them: {}", datasets(path).join(", "))),
+            Kind::Table => ("the folder of a table", name(above(path), "dataset")),
+            Kind::Part => ("a part of a table", name(above(path).and_then(|table| above(&table)), "dataset")),
+            Kind::Manifest => ("the manifest of a dataset", name(above(path), "folder")),
+            Kind::Folder => ("a folder without a manifest.json", ours()),
+            Kind::Spec => {
+                ("a spec", format!("`slipsweep run {shown}` computes its dataset, {}: name that", results(path)))
+            }
+            Kind::Trace => ("a trace", format!("`slipsweep plot {shown}` draws it")),
             Kind::Rows => {
                 let table = path.file_stem().map_or_else(String::new, |stem| stem.to_string_lossy().into_owned());
-                format!("`slipsweep query {shown} \"SELECT * FROM \\\"{table}\\\"\"` shows it")
+                ("a file of rows", format!("`slipsweep query {shown} \"SELECT * FROM \\\"{table}\\\"\"` shows it"))
             }
-            Kind::Page => "open it in a browser".to_owned(),
-            Kind::Picture => "open it in a viewer".to_owned(),
-            Kind::Folder | Kind::File | Kind::Device => "name a folder that `slipsweep run` wrote".to_owned(),
-            Kind::Nothing => "check the name".to_owned(),
+            Kind::Page => ("a page of HTML", "open it in a browser".to_owned()),
+            Kind::Picture => ("a picture", "open it in a viewer".to_owned()),
+            Kind::File => ("a file of another kind", ours()),
+            Kind::Device => ("a device or a named pipe, not a file", ours()),
+            Kind::Nothing => ("there is no such file or folder", "check the name".to_owned()),
         }
     }
 }
@@ -140,18 +128,14 @@ pub fn expect(path: &Path, kinds: &[Kind]) -> Result<(), Failure> {
     if kinds.contains(&found) {
         return Ok(());
     }
-    let not: Vec<&str> = kinds.iter().map(|kind| kind.words()).collect();
+    let not: Vec<&str> = kinds.iter().map(|kind| kind.words(path).0).collect();
     let expected: Vec<&str> = kinds.iter().map(|kind| kind.expected()).collect();
-    let what = match found {
-        Kind::Nothing | Kind::Device => found.words().to_owned(),
-        _ => format!("{}, not {}", found.words(), not.join(" or ")),
-    };
-    Err(wrong(format!(
-        "{}: {what}\n  expected: {}\n  help: {}",
-        path.display(),
-        expected.join(", or "),
-        found.help(path)
-    )))
+    let (mut what, help) = found.words(path);
+    let not = format!("{what}, not {}", not.join(" or "));
+    if !matches!(found, Kind::Nothing | Kind::Device) {
+        what = &not;
+    }
+    Err(refused(format!("{}: {what}", path.display()), expected.join(", or "), help))
 }
 
 /// That `path` may be a spec: the reader of specs says what else is wrong.
@@ -184,13 +168,13 @@ fn datasets(folder: &Path) -> Vec<String> {
     let entries = fs::read_dir(folder).into_iter().flatten().filter_map(|entry| Some(entry.ok()?.path()));
     let mut found: Vec<PathBuf> = entries.filter(|path| path.join(MANIFEST).exists()).collect();
     found.sort();
-    found.truncate(MOST_NAMED);
+    found.truncate(MAX_NAMED_DATASETS);
     found.into_iter().map(|path| path.display().to_string()).collect()
 }
 
 fn start(path: &Path) -> io::Result<Vec<u8>> {
     let mut start = Vec::new();
-    File::open(path)?.take(MOST_LOOKED_AT).read_to_end(&mut start)?;
+    File::open(path)?.take(MAX_START_BYTES).read_to_end(&mut start)?;
     Ok(start)
 }
 

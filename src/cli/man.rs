@@ -3,7 +3,7 @@
 use clap::CommandFactory;
 use clap_mangen::Man;
 
-use super::{Failure, put, wrong};
+use super::{Failure, put, refused};
 use crate::names::hint;
 
 /// Arguments of `man`.
@@ -24,17 +24,15 @@ pub fn man(arguments: &Arguments) -> Result<(), Failure> {
         None => program,
         Some(name) => match program.find_subcommand(name) {
             Some(command) => command.clone(),
-            None => return Err(unknown(name, &program)),
+            None => {
+                let names: Vec<&str> = program.get_subcommands().map(clap::Command::get_name).collect();
+                let help = hint(name, names.iter().copied());
+                return Err(refused(format!("no command `{name}`"), names.join(", "), help));
+            }
         },
     };
     let mut page = Vec::new();
     Man::new(command).render(&mut page).map_err(Failure::failed)?;
     // What stands after the options of a command are its examples.
     put(String::from_utf8_lossy(&page).replace(".SH EXTRA", ".SH EXAMPLES").as_bytes())
-}
-
-fn unknown(name: &str, program: &clap::Command) -> Failure {
-    let names: Vec<&str> = program.get_subcommands().map(clap::Command::get_name).collect();
-    let help = hint(name, names.iter().copied());
-    wrong(format!("no command `{name}`\n  expected: {}\n  help: {help}", names.join(", ")))
 }

@@ -5,14 +5,12 @@ mod head;
 mod init;
 mod kind;
 mod man;
-mod next;
 mod output;
 mod plan;
 mod plot;
 mod query;
 mod report;
 mod run;
-mod schema;
 mod shards;
 mod status;
 mod summary;
@@ -40,7 +38,7 @@ use self::watch::{Wait, waiting};
 use crate::dataset::{Folder, Manifest, atomic};
 use crate::names::{hint, nearest};
 use crate::query::QueryError;
-use crate::sweep::{SpecError, Sweep};
+use crate::sweep::{SpecError, Sweep, schema};
 
 use kind::Kind;
 
@@ -178,8 +176,7 @@ fn write_file(path: &Path, bytes: &[u8]) -> Result<(), Failure> {
 
 /// A table that is not among `names`; the message begins with `place`.
 fn no_table(place: &str, name: &str, names: &[&str]) -> Failure {
-    let help = hint(name, names.iter().copied());
-    wrong(format!("{place}no table `{name}`\n  expected: {}\n  help: {help}", names.join(", ")))
+    refused(format!("{place}no table `{name}`"), names.join(", "), hint(name, names.iter().copied()))
 }
 
 /// Does what the arguments say.
@@ -198,7 +195,7 @@ fn perform(arguments: Arguments) -> Result<(), Failure> {
         Command::Report(arguments) => report::report(&arguments),
         Command::Verify(arguments) => verify::verify(&arguments),
         Command::Tables(arguments) => tables::tables(&arguments),
-        Command::Schema => schema::print(),
+        Command::Schema => say(&format!("{:#}\n", schema())),
         Command::Completions(arguments) => completions::completions(&arguments),
         Command::Man(arguments) => man::man(&arguments),
     }
@@ -253,6 +250,11 @@ fn load(path: &Path) -> Result<Sweep, Failure> {
 /// The failure of somebody who asked for something wrong.
 fn wrong(message: impl Display) -> Failure {
     Failure { code: WRONG, message: format!("error: {message}") }
+}
+
+/// The same with what is right and what to do.
+fn refused(found: impl Display, expected: impl Display, help: impl Display) -> Failure {
+    wrong(format!("{found}\n  expected: {expected}\n  help: {help}"))
 }
 
 /// The dataset in `path`, which must be one.

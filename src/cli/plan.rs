@@ -23,7 +23,7 @@ pub struct Arguments {
 
 /// Seconds below which the start of the process and its first pages of memory count as much as the rows: `benches/waiting/run` prints committed
 /// sweeps that take up to 0.07 s more than their rows.
-const SHORT: f64 = 0.2;
+const SHORT_SECONDS: f64 = 0.2;
 
 /// Prints the plan of a spec.
 pub fn plan(arguments: &Arguments) -> Result<(), Failure> {
@@ -82,7 +82,11 @@ pub fn in_words(sweep: &Sweep, estimates: &Estimates, reading: f64) -> String {
     text.push_str(&format!(
         "in all: about {} on disk, {} on {}\n",
         words::bytes(estimates.bytes()),
-        if seconds < SHORT { "less than 0.3 s".to_owned() } else { format!("about {}", words::duration(seconds)) },
+        if seconds < SHORT_SECONDS {
+            "less than 0.3 s".to_owned()
+        } else {
+            format!("about {}", words::duration(seconds))
+        },
         words::things(threads as u64, "thread"),
     ));
     text.push_str("(sizes and times from a small sample)\n");

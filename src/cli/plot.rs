@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 use super::kind::{self, Kind};
 use super::watch::{Wait, waiting};
-use super::{FAILED, Failure, WRONG, dataset, say, to_file, wrong};
+use super::{FAILED, Failure, WRONG, dataset, refused, say, to_file, wrong};
 use crate::plot::table::{Condition, Request, Source};
 use crate::plot::{self, COLUMN, Figure, Format, PAGE, PlotError};
 use crate::sweep::units_of;
@@ -84,10 +84,8 @@ pub fn plot(arguments: &Arguments) -> Result<(), Failure> {
         sources => {
             for source in sources {
                 if source.is_dir() && sources.len() > 1 {
-                    return Err(wrong(format!(
-                        "{}: a folder beside other arguments\n  expected: one dataset, or traces\n  help: draw them one after the other",
-                        source.display()
-                    )));
+                    let found = format!("{}: a folder beside other arguments", source.display());
+                    return Err(refused(found, "one dataset, or traces", "draw them one after the other"));
                 }
                 kind::expect(source, &[Kind::Dataset, Kind::Trace])?;
             }

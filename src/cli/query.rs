@@ -68,10 +68,10 @@ impl output::Format for Format {
 const INSIDE: &str = "SLIPSWEEP_ANSWERS";
 
 /// Time between two looks at the process that answers. Chosen: a short query does not wait longer than that for its end.
-const LOOK: Duration = Duration::from_millis(5);
+const POLL: Duration = Duration::from_millis(5);
 
-/// Bytes of the stack on which a question is read and planned. A term takes some kilobytes of it, and a question has thousands at most.
-const STACK: usize = 256 << 20;
+/// Bytes of the stack on which a question is read and planned. Chosen: a term takes some kilobytes of it, and a question has thousands at most.
+const STACK_BYTES: usize = 256 << 20;
 
 /// Answers a question.
 pub fn query(arguments: &Arguments) -> Result<(), Failure> {
@@ -95,14 +95,17 @@ pub fn query(arguments: &Arguments) -> Result<(), Failure> {
     apart(arguments)
 }
 
+/// A file that is named, or what it links to, and its folder.
+fn real(out: &Path) -> (PathBuf, PathBuf) {
+    let real = fs::canonicalize(out).unwrap_or_else(|_| out.to_owned());
+    let folder = real.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let folder = fs::canonicalize(folder).unwrap_or_else(|_| folder.to_owned());
+    (real, folder)
+}
+
 /// Refuses to write where a part or the manifest of a dataset is.
 fn keep_datasets(out: &Path) -> Result<(), Failure> {
-    let real = fs::canonicalize(out).unwrap_or_else(|_| out.to_owned());
-    let folder = match real.parent() {
-        Some(folder) if !folder.as_os_str().is_empty() => folder.to_owned(),
-        _ => PathBuf::from("."),
-    };
-    let folder = fs::canonicalize(&folder).unwrap_or(folder);
+    let (real, folder) = real(out);
     // A lost manifest does not make its parts anybody's.
     let is_dataset =
         |folder: &Path| folder.join("manifest.json").exists() || matches!(Folder::at(folder).manifest(), Ok(Some(_)));
@@ -135,29 +138,18 @@ fn apart(arguments: &Arguments) -> Result<(), Failure> {
         // Where a signal cannot be listened to, it keeps its usual effect.
         let _ = signal_hook::flag::register_usize(number, signal.clone(), number as usize);
     }
-    let none = |error: io::Error| {
-        Failure::failed(format!(
-            "cannot start the process that answers: {error}\n  help: raise the number of processes allowed (ulimit -u), or end others"
-        ))
-    };
     // What goes on is said on a terminal until the answer begins, which a terminal therefore gets through this process.
     let shown = io::stderr().is_terminal();
     let is_copied = shown && arguments.output.is_stdout() && io::stdout().is_terminal();
-    let mut child = child(is_copied).map_err(none)?;
+    let mut child = child(is_copied).map_err(|error| cannot_start("the process that answers", error))?;
     let mut said = child.stderr.take();
-    let listen = move || {
-        let mut text = String::new();
-        if let Some(said) = &mut said {
-            let _ = said.read_to_string(&mut text);
-        }
-        text
-    };
+    let listen = move || said.as_mut().and_then(|said| io::read_to_string(said).ok()).unwrap_or_default();
     let listener = match thread::Builder::new().spawn(listen) {
         Ok(listener) => listener,
         Err(error) => {
             let _ = child.kill();
             let _ = child.wait();
-            return Err(none(error));
+            return Err(cannot_start("the process that answers", error));
         }
     };
     let line = Arc::new(Mutex::new(Line { bar: None, is_over: !shown }));
@@ -187,6 +179,11 @@ fn apart(arguments: &Arguments) -> Result<(), Failure> {
             Err(Failure::failed(reason(status, &text)))
         }
     }
+}
+
+fn cannot_start(what: &str, error: io::Error) -> Failure {
+    let help = "raise the number of processes allowed (ulimit -u), or end others";
+    Failure::failed(format!("cannot start {what}: {error}\n  help: {help}"))
 }
 
 /// The line that says on a terminal what goes on.
@@ -235,7 +232,7 @@ fn wait(child: &mut Child, signal: &AtomicUsize, line: &Mutex<Line>) -> io::Resu
         {
             line.bar.get_or_insert_with(|| text_line(0)).set_message("answering; Ctrl-C leaves no file behind");
         }
-        thread::sleep(LOOK);
+        thread::sleep(POLL);
     };
     if let Ok(mut line) = line.lock() {
         line.end();
@@ -263,18 +260,12 @@ fn reason(status: ExitStatus, said: &str) -> String {
 
 /// Removes what a process that was ended left of the file `out`.
 fn sweep(out: &Path) {
-    let real = fs::canonicalize(out).unwrap_or_else(|_| out.to_owned());
-    let folder = real.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    atomic::sweep(folder, SystemTime::now());
+    atomic::sweep(&real(out).1, SystemTime::now());
 }
 
 /// Answers a question in this process, which ends with its answer, or with the process that started it.
 fn inside(arguments: &Arguments) -> Result<(), Failure> {
-    let no_thread = |error: io::Error| {
-        Failure::failed(format!(
-            "cannot start a thread: {error}\n  help: raise the number of processes allowed (ulimit -u), or end others"
-        ))
-    };
+    let no_thread = |error| cannot_start("a thread", error);
     limit_memory();
     // A panic is reported by the message of the query.
     let panicked: Arc<Mutex<Option<String>>> = Arc::default();
@@ -293,7 +284,7 @@ fn inside(arguments: &Arguments) -> Result<(), Failure> {
     thread::Builder::new().spawn(watch).map_err(no_thread)?;
     thread::scope(|scope| {
         let work = || panic::catch_unwind(AssertUnwindSafe(|| answer(arguments)));
-        let thread = thread::Builder::new().stack_size(STACK).spawn_scoped(scope, work).map_err(no_thread)?;
+        let thread = thread::Builder::new().stack_size(STACK_BYTES).spawn_scoped(scope, work).map_err(no_thread)?;
         let done = thread.join().and_then(|done| done);
         let unsupported = |_| Err(Failure::failed("the query failed: it is not supported\n  help: ask in another way"));
         done.unwrap_or_else(unsupported).map_err(|mut failure| {

@@ -6,13 +6,15 @@ use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use super::plan::too_large;
+use super::shards::quoted;
 use super::watch::{Wait, waiting, watched};
-use super::{AGAIN, FAILED, Failure, NOT_STRICT, load, next, say, summary, words, wrong};
+use super::{AGAIN, FAILED, Failure, NOT_STRICT, load, refused, say, summary, words, wrong};
 use crate::dataset::atomic::nearest_folder;
 use crate::dataset::{DatasetError, Folder};
+use crate::grid::Quantity;
 use crate::protocol::Status;
-use crate::sweep::{self, Outcome, Plan, RunError, Shard, Sweep};
-use crate::table::{Signal, Work};
+use crate::sweep::{self, Outcome, Plan, Request, RunError, Shard, Sweep, holds};
+use crate::table::{Kind, Signal, Work};
 
 /// Arguments of `run`.
 #[derive(Debug, clap::Args)]
@@ -42,36 +44,18 @@ pub struct Arguments {
     strict: bool,
 }
 
-/// Runs a spec.
+/// Runs a spec: reads and plans it, solves, encodes and publishes the parts that are missing, and says what they contain.
 pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let start = Instant::now();
-    let shard = arguments.shard.unwrap_or(Shard::WHOLE);
     let (sweep, folder) = subject(arguments)?;
     let planning = Wait { quiet: arguments.quiet, ..Wait::new("planning the sweep") };
     let (plan, parts) = waiting(&planning, || {
         let plan = Plan::new(&sweep);
-        let parts = shard.parts(&sweep, &plan).map_err(wrong)?;
+        let parts = arguments.shard.unwrap_or(Shard::WHOLE).parts(&sweep, &plan).map_err(wrong)?;
         check_room(&sweep, &plan, &parts, &folder)?;
         Ok::<_, Failure>((plan, parts))
     })?;
-    let rows = plan.tables.iter().zip(&parts).flat_map(|(table, parts)| {
-        parts
-            .iter()
-            .filter(|range| !range.is_empty())
-            .map(|range| table.rows_of(range.end - 1).end - table.rows_of(range.start).start)
-    });
-    let rows = rows.fold(0_u64, u64::saturating_add);
-    let signal = Signal::default();
-    let threads = arguments.threads.map_or(0, usize::from);
-    let (done, caught) = watched(&signal, rows, arguments.quiet, || match arguments.shard {
-        None => sweep::run(&sweep, &folder, threads, &signal),
-        Some(shard) => sweep::run_shard(&sweep, &folder, shard, threads, &signal),
-    });
-    let outcome = done.map_err(|error| {
-        let there = plan.tables.iter().map(|table| folder.parts_there(table).len() as u64).sum();
-        let all = plan.tables.iter().map(|table| table.parts).sum();
-        explain(error, caught, arguments, (there, all))
-    })?;
+    let outcome = solve(arguments, &sweep, &folder, &plan, &parts)?;
     if !arguments.quiet {
         say(&report(&sweep, &plan, &folder, &outcome, arguments.shard, start))?;
     }
@@ -81,6 +65,31 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
         return Err(Failure { code: NOT_STRICT, message });
     }
     Ok(())
+}
+
+/// Makes the `parts` of each table that are missing, and shows how far it is.
+fn solve(
+    arguments: &Arguments,
+    sweep: &Sweep,
+    folder: &Folder,
+    plan: &Plan,
+    parts: &[Vec<Range<u64>>],
+) -> Result<Outcome, Failure> {
+    let rows = plan.tables.iter().zip(parts).flat_map(|(table, parts)| {
+        let parts = parts.iter().filter(|range| !range.is_empty());
+        parts.map(|range| table.rows_of(range.end - 1).end - table.rows_of(range.start).start)
+    });
+    let rows = rows.fold(0_u64, u64::saturating_add);
+    let (signal, threads) = (Signal::default(), arguments.threads.map_or(0, usize::from));
+    let (done, caught) = watched(&signal, rows, arguments.quiet, || match arguments.shard {
+        None => sweep::run(sweep, folder, threads, &signal),
+        Some(shard) => sweep::run_shard(sweep, folder, shard, threads, &signal),
+    });
+    done.map_err(|error| {
+        let there = plan.tables.iter().map(|table| folder.parts_there(table).len() as u64).sum();
+        let all = plan.tables.iter().map(|table| table.parts).sum();
+        explain(error, caught, arguments, (there, all))
+    })
 }
 
 /// What the tables contain, what was done since `start`, and what to do next.
@@ -97,21 +106,15 @@ fn report(
         let all = done.kept + done.made;
         match shard {
             None => text.push_str(&summary::digest(&table.name, table.rows, digest)),
-            Some(shard) => text.push_str(&format!(
-                "{}: {} of {} in share {} of {}\n",
-                table.name,
-                words::count(all),
-                words::things(table.parts, "part"),
-                shard.index(),
-                shard.count()
-            )),
+            Some(shard) => {
+                let (ours, parts) = (words::count(all), words::things(table.parts, "part"));
+                let (index, count) = (shard.index(), shard.count());
+                text.push_str(&format!("{}: {ours} of {parts} in share {index} of {count}\n", table.name));
+            }
         }
         if done.kept > 0 {
-            text.push_str(&format!(
-                "  {} of {} kept from before\n",
-                words::count(done.kept),
-                words::things(all, "part")
-            ));
+            let (kept, all) = (words::count(done.kept), words::things(all, "part"));
+            text.push_str(&format!("  {kept} of {all} kept from before\n"));
         }
         if done.damaged > 0 {
             text.push_str(&format!("  {} made again\n", words::things(done.damaged, "damaged part")));
@@ -123,16 +126,16 @@ fn report(
     text.push_str(&account(outcome, start.elapsed().as_secs_f64()));
     text.push_str(&format!("written to {}\n", folder.path().display()));
     if shard.is_none() {
-        text.push_str(&next::commands(sweep, folder.path()));
+        text.push_str(&next_commands(sweep, folder.path()));
     }
     text
 }
 
-/// Bytes of a cell on disk: more than any takes, but for long labels.
-const MOST_OF_CELL: f64 = 16.0;
+/// Bytes of a cell on disk at most, long labels apart: twice those of a double, the longest of all.
+const MAX_CELL_BYTES: f64 = 16.0;
 
-/// Bytes of a part besides its rows and the spec: more than its footer takes.
-const MOST_OF_FOOTER: f64 = 65536.0;
+/// Bytes of a part besides its rows and the spec at most: five times the longest of all tables, `compliant`, whose part of one row has 12,207.
+const MAX_FOOTER_BYTES: f64 = 65536.0;
 
 /// Whether the parts among `shares`, those of each table, that are missing have room on the disk.
 fn check_room(sweep: &Sweep, plan: &Plan, shares: &[Vec<Range<u64>>], folder: &Folder) -> Result<(), Failure> {
@@ -140,18 +143,14 @@ fn check_room(sweep: &Sweep, plan: &Plan, shares: &[Vec<Range<u64>>], folder: &F
     let free = free as f64;
     let missing: Vec<u64> = (plan.tables.iter().zip(shares))
         .map(|(table, share)| {
-            // Both are ascending.
-            let is_ours = |part: &u64| {
-                share.get(share.partition_point(|range| range.end <= *part)).is_some_and(|range| range.contains(part))
-            };
-            let there = folder.parts_there(table).iter().filter(|part| is_ours(part)).count() as u64;
+            let there = folder.parts_there(table).iter().filter(|part| holds(share, **part)).count() as u64;
             share.iter().map(|range| range.end - range.start).sum::<u64>() - there
         })
         .collect();
     let most = (sweep.requests.iter().zip(&plan.tables).zip(&missing)).map(|((request, table), &parts)| {
         let rows = parts as f64 * table.rows_per_part.min(table.rows) as f64;
         let cells = request.table.axes().len() + request.selection.indices().len() + 1;
-        rows * cells as f64 * MOST_OF_CELL + parts as f64 * (MOST_OF_FOOTER + sweep.text.len() as f64)
+        rows * cells as f64 * MAX_CELL_BYTES + parts as f64 * (MAX_FOOTER_BYTES + sweep.text.len() as f64)
     });
     if most.sum::<f64>() < free {
         return Ok(());
@@ -175,23 +174,18 @@ fn subject(arguments: &Arguments) -> Result<(Sweep, Folder), Failure> {
     let folder = Folder::at(path);
     let found = folder.manifest().map_err(Failure::failed)?;
     let Some(manifest) = found else {
-        return Err(wrong(format!(
-            "{}: neither a spec nor a dataset\n  expected: a TOML file, or a folder that `slipsweep run` wrote\n  help: check the path",
-            path.display()
-        )));
+        let found = format!("{}: neither a spec nor a dataset", path.display());
+        return Err(refused(found, "a TOML file, or a folder that `slipsweep run` wrote", "check the path"));
     };
     if manifest.spec.is_empty() {
         let message = "its manifest is lost and its parts do not carry the spec";
         return Err(wrong(format!("{}: {message}\n  help: run the spec that it was made from", path.display())));
     }
     let sweep = Sweep::parse_at(&manifest.spec, &path.join("manifest.json")).map_err(|error| {
-        let out = path.parent().filter(|out| !out.as_os_str().is_empty()).unwrap_or(Path::new("."));
-        wrong(format!(
-            "{}: the spec in it does not do without the files that it names\n  found: {error}\n  help: run the file that it was made from: \
-             slipsweep run SPEC --out {}",
-            path.display(),
-            out.display()
-        ))
+        let out = path.parent().filter(|out| !out.as_os_str().is_empty()).unwrap_or(Path::new(".")).display();
+        let what = format!("{}: the spec in it does not do without the files that it names", path.display());
+        let help = format!("run the file that it was made from: slipsweep run SPEC --out {out}");
+        wrong(format!("{what}\n  found: {error}\n  help: {help}"))
     })?;
     let folder = arguments.out.as_deref().map_or(folder, |out| Folder::new(out, &sweep.name));
     Ok((sweep, folder))
@@ -199,14 +193,11 @@ fn subject(arguments: &Arguments) -> Result<(Sweep, Folder), Failure> {
 
 fn explain(error: RunError, caught: Option<i32>, arguments: &Arguments, (there, all): (u64, u64)) -> Failure {
     match error {
-        RunError::Stopped(_) => Failure {
-            code: caught.and_then(|number| u8::try_from(128 + number).ok()).unwrap_or(FAILED),
-            message: format!(
-                "stopped; {} of {} finished: the same command goes on from there",
-                words::count(there),
-                words::things(all, "part")
-            ),
-        },
+        RunError::Stopped(_) => {
+            let (there, all) = (words::count(there), words::things(all, "part"));
+            let message = format!("stopped; {there} of {all} finished: the same command goes on from there");
+            Failure { code: caught.and_then(|number| u8::try_from(128 + number).ok()).unwrap_or(FAILED), message }
+        }
         RunError::Dataset(
             DatasetError::Foreign { .. }
             | DatasetError::OtherSpec { .. }
@@ -259,12 +250,8 @@ fn account(outcome: &Outcome, seconds: f64) -> String {
         return "nothing to compute: every part was there\n".to_owned();
     }
     let Work { optima, landscapes, best, swifts, crossovers, simulations, steps, quadratures, nodes } = outcome.work;
-    let mut text = format!(
-        "{} in {}: {} rows a second, Parquet on disk included\n",
-        words::things(rows, "row"),
-        words::duration(seconds),
-        words::count((rows as f64 / seconds) as u64),
-    );
+    let (all, rate) = (words::things(rows, "row"), words::count((rows as f64 / seconds) as u64));
+    let mut text = format!("{all} in {}: {rate} rows a second, Parquet on disk included\n", words::duration(seconds));
     let spent: Vec<String> = [
         (optima, "optimal protocol"),
         (landscapes, "landscape"),
@@ -284,4 +271,37 @@ fn account(outcome: &Outcome, seconds: f64) -> String {
         text.push_str(&format!("work: {}\n", spent.join(", ")));
     }
     text
+}
+
+/// The commands that look at the dataset of `sweep` in `path`.
+fn next_commands(sweep: &Sweep, path: &Path) -> String {
+    let path = quoted(path);
+    let mut text = "next:\n".to_owned();
+    text.push_str(&format!("  slipsweep head {path}\n  slipsweep plot {path}\n"));
+    if let Some(question) = sweep.requests.iter().map(question).next() {
+        text.push_str(&format!("  slipsweep query {path} \"{question}\"\n"));
+    }
+    text
+}
+
+/// A question that makes sense for a table: its least gap, work or crossover time, or how many rows have which word, over the axis that varies
+/// slowest.
+fn question(request: &Request) -> String {
+    let table = request.table;
+    let columns = || request.selection.indices().iter().map(|&index| &table.columns()[index]);
+    let stretches = request.projection.stretches();
+    let varies = |axis: &&Quantity| {
+        stretches.iter().any(|stretch| stretch.axis(**axis).is_some_and(|(_, axis)| axis.values.len() > 1))
+    };
+    let axis = table.axes().iter().find(varies).map(|axis| axis.name());
+    let least = ["gap", "work", "t_cross"].into_iter().find(|name| columns().any(|column| column.name == *name));
+    let word = columns().find(|column| matches!(column.kind, Kind::Label(_) | Kind::Flag)).map(|column| column.name);
+    let name = table.name();
+    match (least, word, axis) {
+        (Some(least), _, Some(axis)) => {
+            format!("SELECT {axis}, min({least}) FROM {name} WHERE status = 'ok' GROUP BY {axis} ORDER BY {axis}")
+        }
+        (_, Some(word), _) => format!("SELECT {word}, count(*) AS points FROM {name} GROUP BY {word} ORDER BY {word}"),
+        _ => format!("SELECT status, count(*) AS points FROM {name} GROUP BY status ORDER BY status"),
+    }
 }

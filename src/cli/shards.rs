@@ -131,22 +131,13 @@ pub fn shards(arguments: &Arguments) -> Result<(), Failure> {
         cpus: arguments.cpus,
         each,
     };
-    let text = match engine {
-        Engine::Slurm => job.slurm(),
-        Engine::Hyperqueue => job.hyperqueue(),
-    };
-    to_file(&script, |file| file.write_all(text.as_bytes())).map_err(|error| refused(&script, "write", &error))?;
+    to_file(&script, |file| file.write_all(job.script(engine).as_bytes()))
+        .map_err(|error| refused(&script, "write", &error))?;
 
-    let mut said = format!(
-        "{}: {} in {}, about {} of one processor\n{} of about {} on {} each\n",
-        sweep.name,
-        words::things(rows, "row"),
-        words::things(parts, "part"),
-        words::duration(seconds),
-        words::things(shares, "task"),
-        words::duration(each),
-        words::things(arguments.cpus, "processor"),
-    );
+    let (rows, parts, work) = (words::things(rows, "row"), words::things(parts, "part"), words::duration(seconds));
+    let (tasks, cpus) = (words::things(shares, "task"), words::things(arguments.cpus, "processor"));
+    let mut said = format!("{}: {rows} in {parts}, about {work} of one processor\n", sweep.name);
+    let _ = writeln!(said, "{tasks} of about {} on {cpus} each", words::duration(each));
     if let Some(reason) = fewer {
         let _ = writeln!(said, "fewer than the {} requested: {reason}", words::count(arguments.shards));
     }
@@ -236,48 +227,36 @@ struct Job<'a> {
 }
 
 impl Job<'_> {
-    fn slurm(&self) -> String {
-        let Job { name, program, spec, out, shares, cpus, .. } = self;
+    /// The script, whose head is that of a scheduler, as is the number of a task.
+    fn script(&self, engine: Engine) -> String {
+        let Job { name, program, spec, out, dataset, shares, cpus, .. } = self;
+        let (last, about) = (shares - 1, words::duration(self.each));
         // Predictions are from a small sample, and not all machines are as fast.
         let minutes = (10.0 + 3.0 * self.each / 60.0).ceil();
         // Slurm takes % for a pattern.
         let log = self.log.display().to_string().replace('%', "%%").replace('"', "\\\"");
+        let task =
+            format!("# A task is about {about} of work. It may be killed, repeated or run twice at a time at no harm.");
+        let (head, again, number) = match engine {
+            Engine::Slurm => (
+                format!(
+                    "#SBATCH --job-name={name}\n#SBATCH --array=0-{last}\n#SBATCH --cpus-per-task={cpus}\n#SBATCH --time={minutes}\n\
+                     #SBATCH --requeue\n#SBATCH --open-mode=append\n#SBATCH --output=\"{log}-%a.log\"\n"
+                ),
+                "# Exit code 75 asks for another try, five times at most, where RequeueExit of Slurm has it.\n\
+                 again=--requeue\n\
+                 [ \"${SLURM_RESTART_COUNT:-0}\" -lt 5 ] || again=\n",
+                ("$SLURM_ARRAY_TASK_ID", " $again"),
+            ),
+            Engine::Hyperqueue => {
+                (format!("#HQ --name={name}\n#HQ --array=0-{last}\n#HQ --cpus={cpus}\n"), "", ("$HQ_TASK_ID", ""))
+            }
+        };
+        let (number, flag) = number;
         format!(
-            "#!/bin/bash\n\
-             #SBATCH --job-name={name}\n\
-             #SBATCH --array=0-{last}\n\
-             #SBATCH --cpus-per-task={cpus}\n\
-             #SBATCH --time={minutes}\n\
-             #SBATCH --requeue\n\
-             #SBATCH --open-mode=append\n\
-             #SBATCH --output=\"{log}-%a.log\"\n\
-             {SHARES}{shares}\n\
-             # A task is about {about} of work. It may be killed, repeated or run twice at a time at no harm.\n\
-             # Exit code 75 asks for another try, five times at most, where RequeueExit of Slurm has it.\n\
-             again=--requeue\n\
-             [ \"${{SLURM_RESTART_COUNT:-0}}\" -lt 5 ] || again=\n\
-             exec {program} run {spec} --out {out} --shard \"$SLURM_ARRAY_TASK_ID/{shares}\" --threads {cpus} $again\n\
-             # What is missing: {program} status {dataset}\n",
-            last = shares - 1,
-            about = words::duration(self.each),
-            dataset = self.dataset,
-        )
-    }
-
-    fn hyperqueue(&self) -> String {
-        let Job { name, program, spec, out, shares, cpus, .. } = self;
-        format!(
-            "#!/bin/bash\n\
-             #HQ --name={name}\n\
-             #HQ --array=0-{last}\n\
-             #HQ --cpus={cpus}\n\
-             {SHARES}{shares}\n\
-             # A task is about {about} of work. It may be killed, repeated or run twice at a time at no harm.\n\
-             exec {program} run {spec} --out {out} --shard \"$HQ_TASK_ID/{shares}\" --threads {cpus}\n\
-             # What is missing: {program} status {dataset}\n",
-            last = shares - 1,
-            about = words::duration(self.each),
-            dataset = self.dataset,
+            "#!/bin/bash\n{head}{SHARES}{shares}\n{task}\n{again}\
+             exec {program} run {spec} --out {out} --shard \"{number}/{shares}\" --threads {cpus}{flag}\n\
+             # What is missing: {program} status {dataset}\n"
         )
     }
 }

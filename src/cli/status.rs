@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
 use super::shards::{quoted, scripts};
-use super::{FAILED, Failure, kind, say, summary, words, wrong};
+use super::{FAILED, Failure, kind, refused, say, summary, words};
 use crate::dataset::{Build, Folder, Look, Manifest, Survey};
 use crate::protocol::Status;
 use crate::sweep::{Plan, Sweep, shares_with};
@@ -22,8 +22,8 @@ pub struct Arguments {
     check: bool,
 }
 
-/// Parts and files that are listed one by one of each kind.
-const LISTED: usize = 10;
+/// Parts and files of each kind that are listed one by one. Chosen: five kinds fit a screen.
+const MAX_LISTED: usize = 10;
 
 /// Says what there is of a dataset.
 pub fn status(arguments: &Arguments) -> Result<(), Failure> {
@@ -31,11 +31,8 @@ pub fn status(arguments: &Arguments) -> Result<(), Failure> {
     kind::expect_rows(path)?;
     let folder = Folder::at(path);
     let Some(manifest) = folder.manifest().map_err(Failure::failed)? else {
-        return Err(wrong(format!(
-            "{}: not a dataset\n  expected: a folder with a manifest.json or at least one part\n  help: name a folder that \
-             `slipsweep run` wrote",
-            path.display()
-        )));
+        let (found, help) = (format!("{}: not a dataset", path.display()), "name a folder that `slipsweep run` wrote");
+        return Err(refused(found, "a folder with a manifest.json or at least one part", help));
     };
     let survey = summary::survey(&folder, &manifest, if arguments.check { Look::Whole } else { Look::Footer });
     let mut text = format!("{}: {}, made by slipsweep {}\n", path.display(), manifest.name, manifest.build.version);
@@ -83,45 +80,41 @@ fn counts(survey: &Survey) -> String {
 
 /// What is wrong, one by one.
 fn faults(folder: &Folder, survey: &Survey) -> String {
-    let mut text = String::new();
-    let mut list = |title: &str, lines: Vec<String>| {
-        if lines.is_empty() {
-            return;
-        }
-        let _ = writeln!(text, "{title}");
-        for line in lines.iter().take(LISTED) {
-            let _ = writeln!(text, "  {line}");
-        }
-        if lines.len() > LISTED {
-            let _ = writeln!(text, "  and {} more", words::count((lines.len() - LISTED) as u64));
-        }
-    };
-    let missing = survey.tables.iter().filter(|table| !table.missing.is_empty());
-    let missing = missing.map(|table| {
-        let first = table.missing.iter().take(LISTED).map(|parts| words::range(parts.start, parts.end - 1));
-        let more = if table.missing.len() > LISTED { ", …" } else { "" };
+    let tables = || survey.tables.iter();
+    let missing = tables().filter(|table| !table.missing.is_empty()).map(|table| {
+        let first = table.missing.iter().take(MAX_LISTED).map(|parts| words::range(parts.start, parts.end - 1));
+        let more = if table.missing.len() > MAX_LISTED { ", …" } else { "" };
         format!("{}: {}{more}", table.name, first.collect::<Vec<_>>().join(","))
     });
-    list("missing parts:", missing.collect());
-    let tables = || survey.tables.iter();
     let damaged =
         tables().flat_map(|table| table.damaged.iter().map(|(part, why)| (folder.part(&table.name, *part), why)));
-    list(
-        "damaged; the next run makes them again:",
-        damaged.map(|(path, why)| format!("{}: {why}", path.display())).collect(),
-    );
+    let damaged = damaged.map(|(path, why)| format!("{}: {why}", path.display()));
     let foreign =
         tables().flat_map(|table| table.foreign.iter().map(|(part, is)| (folder.part(&table.name, *part), is)));
     let foreign = foreign.map(|(path, [what, expected, found])| {
         format!("{}: belongs to another {what}\n    expected: {expected}\n    found: {found}", path.display())
     });
-    list("foreign; a run leaves them alone and fails:", foreign.collect());
-    let shown = |paths: &[PathBuf]| paths.iter().map(|path| path.display().to_string()).collect();
-    list(
-        "temporary files of runs that are under way or were killed; a run removes those of the dead:",
-        shown(&survey.temporary),
-    );
-    list("other files, which nobody minds:", shown(&survey.others));
+    let shown = |paths: &[PathBuf]| -> Vec<String> { paths.iter().map(|path| path.display().to_string()).collect() };
+    let lists: [(&str, Vec<String>); 5] = [
+        ("missing parts:", missing.collect()),
+        ("damaged; the next run makes them again:", damaged.collect()),
+        ("foreign; a run leaves them alone and fails:", foreign.collect()),
+        (
+            "temporary files of runs that are under way or were killed; a run removes those of the dead:",
+            shown(&survey.temporary),
+        ),
+        ("other files, which nobody minds:", shown(&survey.others)),
+    ];
+    let mut text = String::new();
+    for (title, lines) in lists.iter().filter(|(_, lines)| !lines.is_empty()) {
+        let _ = writeln!(text, "{title}");
+        for line in lines.iter().take(MAX_LISTED) {
+            let _ = writeln!(text, "  {line}");
+        }
+        if lines.len() > MAX_LISTED {
+            let _ = writeln!(text, "  and {} more", words::count((lines.len() - MAX_LISTED) as u64));
+        }
+    }
     text
 }
 

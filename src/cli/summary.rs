@@ -30,11 +30,8 @@ pub fn summary(arguments: &Arguments) -> Result<(), Failure> {
         text.push_str(&digest(&table.name, table.rows, &table.digest));
         let missing = table.parts - table.there;
         if missing > 0 {
-            text.push_str(&format!(
-                "  {} of {} not there yet: `slipsweep run` makes what is missing\n",
-                words::count(missing),
-                words::things(table.parts, "part")
-            ));
+            let (missing, all) = (words::count(missing), words::things(table.parts, "part"));
+            text.push_str(&format!("  {missing} of {all} not there yet: `slipsweep run` makes what is missing\n"));
         }
     }
     say(&text)

@@ -7,9 +7,9 @@ use clap::ValueEnum;
 use clap::builder::{PossibleValue, PossibleValuesParser, StringValueParser, TypedValueParser};
 
 use super::output::{self, Output};
-use super::{FAILED, Failure, WRONG, dataset, no_table, put, say, words, write_file, wrong};
+use super::{FAILED, Failure, WRONG, dataset, no_table, put, refused, say, words, write_file, wrong};
 use crate::dataset::{Cell, Folder, ManifestTable, Row, frame};
-use crate::grid::{Domain, Quantity, RTOL, Scale};
+use crate::grid::{Domain, Point, Quantity, RTOL, Scale};
 use crate::model::{Law, Transition, Units};
 use crate::names::hint;
 use crate::plot::table::Condition;
@@ -152,14 +152,28 @@ struct Asked {
     protocol: Protocol,
     /// In the units of the model.
     case: Case,
-    /// What tells the protocol, number by number: name, value and unit as they were given.
-    numbers: Vec<(String, f64, &'static str)>,
+    /// The numbers of the protocol, as they were given.
+    numbers: Vec<Named>,
     /// Whether `v >= 1`, where that matters.
     bounded: Option<bool>,
     rtol: f64,
     units: Units,
     /// Dataset, table and row that it is from.
-    origin: Vec<(&'static str, String)>,
+    origin: Option<Origin>,
+}
+
+/// A number with its unit where that is SI.
+struct Named {
+    name: String,
+    value: f64,
+    unit: &'static str,
+}
+
+/// The row of a dataset.
+struct Origin {
+    dataset: String,
+    table: String,
+    row: u64,
 }
 
 /// Traces a protocol.
@@ -197,56 +211,118 @@ fn absent(protocol: &str, absence: Absence) -> Failure {
     Failure { code, message: format!("error: no `{protocol}` protocol: {absence}") }
 }
 
+/// Relative accuracy of a protocol that is no row of a table: that of a spec which names none.
+const DEFAULT_RTOL: f64 = 1e-10;
+
+/// Whether the bound `v >= 1` matters to a protocol.
+fn has_bound(protocol: &str) -> bool {
+    matches!(protocol, "optimal" | "best" | "regularised")
+}
+
+/// What every protocol needs.
+const NEEDED: [Quantity; 5] =
+    [Quantity::Time, Quantity::A, Quantity::B, Quantity::InitialVelocity, Quantity::FinalVelocity];
+
+/// The flag that gives a quantity.
+fn flag(quantity: Quantity) -> String {
+    format!("--{}", quantity.name().replace('_', "-"))
+}
+
 impl Arguments {
-    /// What the arguments name.
+    /// The numbers of a protocol.
+    fn given(&self) -> [(Quantity, Option<f64>); 11] {
+        [
+            (Quantity::Time, self.t_f),
+            (Quantity::A, self.a),
+            (Quantity::B, self.b),
+            (Quantity::InitialVelocity, self.v_i),
+            (Quantity::FinalVelocity, self.v_f),
+            (Quantity::FrictionBound, self.tau_max),
+            (Quantity::Alpha2, self.alpha_2),
+            (Quantity::Alpha3, self.alpha_3),
+            (Quantity::Stiffness, self.k),
+            (Quantity::Mass, self.m),
+            (Quantity::Smoothing, self.delta_t),
+        ]
+    }
+
+    /// The protocol that the arguments name.
     fn asked(&self) -> Result<Asked, Failure> {
         if Path::new(&self.subject).is_dir() {
-            return Err(wrong(format!(
-                "{folder}: a folder, without a table\n  expected: a protocol, or a dataset with a table and a row\n  \
-                 help: slipsweep trace {folder} optimal --row 0",
-                folder = self.subject
-            )));
+            let (folder, expected) = (&self.subject, "a protocol, or a dataset with a table and a row");
+            let help = format!("slipsweep trace {folder} optimal --row 0");
+            return Err(refused(format!("{folder}: a folder, without a table"), expected, help));
         }
-        let needed = &self.flags()[..5];
-        let missing: Vec<&str> = needed.iter().filter(|(_, is_given)| !is_given).map(|(flag, _)| *flag).collect();
-        if !missing.is_empty() {
-            return Err(wrong(format!("`{}` needs {}", self.subject, missing.join(", "))));
+        let name = self.subject.as_str();
+        self.check(name)?;
+        let mut point = Point::default();
+        for (quantity, given) in self.given() {
+            point[quantity] = given.or(quantity.default().first().copied()).unwrap_or(f64::NAN);
         }
-        let bounded = matches!(self.subject.as_str(), "optimal" | "best" | "regularised").then_some(!self.unbounded);
+        let [t_f, a, b, v_i, v_f] = NEEDED.map(|quantity| point[quantity]);
+        let (k, m, bounded) = (point[Quantity::Stiffness], point[Quantity::Mass], !self.unbounded);
+        let protocol = match (name, swift::find(name)) {
+            ("optimal", _) => Protocol::Optimal { bounded },
+            ("best", _) => Protocol::Best { bounded },
+            ("compliant", _) => Protocol::Compliant { k, m },
+            ("regularised", _) => Protocol::Regularised { k, m, delta_t: point[Quantity::Smoothing], bounded },
+            ("step", _) if k.is_finite() && v_i != v_f => Protocol::Response { k, m },
+            ("free_cubic", _) => Protocol::FreeCubic { a_2: point[Quantity::Alpha2], a_3: point[Quantity::Alpha3] },
+            (_, Some(family)) => Protocol::Family(family),
+            _ => return Err(wrong(format!("no protocol is named `{name}`"))),
+        };
+        let numbers = self.given().into_iter().filter(|(quantity, _)| !quantity.has_scale());
         Ok(Asked {
-            name: self.subject.clone(),
-            protocol: self.protocol()?,
-            case: self.case(),
-            numbers: self.numbers(),
-            bounded,
+            name: name.to_owned(),
+            protocol,
+            case: Case {
+                transition: Transition { law: Law { a, b }, v_i, v_f },
+                t_f,
+                tau_max: point[Quantity::FrictionBound],
+            },
+            numbers: numbers.filter_map(|(quantity, given)| Some(Named::new(quantity.name(), given?, ""))).collect(),
+            bounded: has_bound(name).then_some(bounded),
             rtol: self.rtol.unwrap_or(DEFAULT_RTOL),
             units: Units::Scaled,
-            origin: Vec::new(),
+            origin: None,
         })
     }
 
-    /// The flags of the numbers of a protocol, those first that every protocol needs, and whether they are given.
-    fn flags(&self) -> [(&'static str, bool); 12] {
-        [
-            ("--t-f", self.t_f.is_some()),
-            ("--a", self.a.is_some()),
-            ("--b", self.b.is_some()),
-            ("--v-i", self.v_i.is_some()),
-            ("--v-f", self.v_f.is_some()),
-            ("--tau-max", self.tau_max.is_some()),
-            ("--alpha-2", self.alpha_2.is_some()),
-            ("--alpha-3", self.alpha_3.is_some()),
-            ("--k", self.k.is_some()),
-            ("--m", self.m.is_some()),
-            ("--delta-t", self.delta_t.is_some()),
-            ("--unbounded", self.unbounded),
-        ]
+    /// That the numbers that the protocol `name` needs are given, and no others.
+    fn check(&self, name: &str) -> Result<(), Failure> {
+        let missing = self.given().into_iter().filter(|(quantity, given)| given.is_none() && NEEDED.contains(quantity));
+        let missing: Vec<String> = missing.map(|(quantity, _)| flag(quantity)).collect();
+        if !missing.is_empty() {
+            return Err(wrong(format!("`{name}` needs {}", missing.join(", "))));
+        }
+        let heeded: &[Quantity] = match name {
+            "free_cubic" => &[Quantity::Alpha2, Quantity::Alpha3],
+            "step" | "compliant" => &[Quantity::Stiffness, Quantity::Mass],
+            "regularised" => &[Quantity::Stiffness, Quantity::Mass, Quantity::Smoothing],
+            _ if swift::find(name).is_some_and(|family| family.heeds_tau_max()) => &[Quantity::FrictionBound],
+            _ => &[],
+        };
+        for (quantity, given) in self.given().into_iter().filter(|(quantity, _)| !NEEDED.contains(quantity)) {
+            let is_heeded = heeded.contains(&quantity);
+            if given.is_some() && !is_heeded {
+                return Err(wrong(format!("`{name}` takes no {}", flag(quantity))));
+            }
+            if given.is_none() && is_heeded && quantity.default().is_empty() {
+                return Err(wrong(format!("`{name}` needs {}", flag(quantity))));
+            }
+        }
+        if self.unbounded && !has_bound(name) {
+            return Err(wrong(format!("`{name}` takes no --unbounded")));
+        }
+        Ok(())
     }
 
     /// The protocol of a row of a table.
     fn row_of(&self, name: &str) -> Result<Asked, Failure> {
-        let is_own = |flag: &str| !(flag == "--t-f" && name == "step");
-        if let Some((flag, _)) = self.flags().into_iter().find(|(flag, is_given)| *is_given && is_own(flag)) {
+        let is_own = |quantity: Quantity| !(quantity == Quantity::Time && name == "step");
+        let given = self.given().into_iter().find(|(quantity, given)| given.is_some() && is_own(*quantity));
+        let given = given.map(|(quantity, _)| flag(quantity)).or(self.unbounded.then(|| "--unbounded".to_owned()));
+        if let Some(flag) = given {
             return Err(wrong(format!("{flag}: the row of a dataset has its own\n  help: leave {flag} out")));
         }
         let path = Path::new(&self.subject);
@@ -261,16 +337,14 @@ impl Arguments {
         let number = match self.row {
             Some(row) => row,
             None if self.conditions.is_empty() => {
-                return Err(wrong(format!(
-                    "{}: which row of `{name}`?\n  expected: --row N, from 0 to {}, or --where CONDITION\n  help: add --row 0",
-                    path.display(),
-                    listed.rows.saturating_sub(1)
-                )));
+                let last = listed.rows.saturating_sub(1);
+                let expected = format!("--row N, from 0 to {last}, or --where CONDITION");
+                return Err(refused(format!("{}: which row of `{name}`?", path.display()), expected, "add --row 0"));
             }
             None => the_row(path, &folder, listed, &self.conditions)?,
         };
         let (part, written) = row_at(path, &folder, listed, number)?;
-        let spec: Spec = toml::from_str(&manifest.spec).map_err(Failure::failed)?;
+        let spec = Spec::parse(&manifest.spec).map_err(Failure::failed)?;
         let units = units(&spec.model)?;
         let headings = frame::headings(&part).map_err(Failure::failed)?.0;
         let relative = [Quantity::Alpha2, Quantity::Alpha3].map(|alpha| {
@@ -290,94 +364,27 @@ impl Arguments {
         let own = spec.tables.get(key).and_then(|table| table.rtol);
         let own = own.or(definition.and_then(|table| table.default_rtol())).unwrap_or(spec.accuracy.rtol);
         let mut numbers = axes_of(&written, &units);
-        numbers.extend(self.t_f.map(|t_f| ("t_f".to_owned(), t_f, units.name("l/v_0"))));
+        numbers.extend(self.t_f.map(|t_f| Named::new("t_f", t_f, units.name("l/v_0"))));
         Ok(Asked {
-            bounded: matches!(name, "optimal" | "best" | "regularised").then_some(bounded),
+            bounded: has_bound(name).then_some(bounded),
             name: protocol_name,
             protocol,
             case,
             numbers,
             rtol: self.rtol.unwrap_or(own),
             units,
-            origin: vec![("dataset", manifest.name.clone()), ("table", name.to_owned()), ("row", number.to_string())],
+            origin: Some(Origin { dataset: manifest.name.clone(), table: name.to_owned(), row: number }),
         })
-    }
-
-    /// The protocol, once the arguments that it needs are there and no others.
-    fn protocol(&self) -> Result<Protocol, Failure> {
-        let name = self.subject.as_str();
-        let family = swift::find(name);
-        let given = [
-            ("--tau-max", self.tau_max.is_some(), family.is_some_and(|family| family.heeds_tau_max()), false),
-            ("--alpha-2", self.alpha_2.is_some(), name == "free_cubic", true),
-            ("--alpha-3", self.alpha_3.is_some(), name == "free_cubic", true),
-            ("--k", self.k.is_some(), matches!(name, "step" | "compliant" | "regularised"), false),
-            ("--m", self.m.is_some(), matches!(name, "step" | "compliant" | "regularised"), false),
-            ("--delta-t", self.delta_t.is_some(), name == "regularised", true),
-            ("--unbounded", self.unbounded, matches!(name, "optimal" | "best" | "regularised"), false),
-        ];
-        for (flag, is_given, is_heeded, is_needed) in given {
-            if is_given && !is_heeded {
-                return Err(wrong(format!("`{name}` takes no {flag}")));
-            }
-            if !is_given && is_heeded && is_needed {
-                return Err(wrong(format!("`{name}` needs {flag}")));
-            }
-        }
-        let bounded = !self.unbounded;
-        let (k, m) = (self.k.unwrap_or(f64::INFINITY), self.m.unwrap_or(0.0));
-        Ok(match (name, self.alpha_2, self.alpha_3, family) {
-            ("optimal", ..) => Protocol::Optimal { bounded },
-            ("best", ..) => Protocol::Best { bounded },
-            ("compliant", ..) => Protocol::Compliant { k, m },
-            ("regularised", ..) => Protocol::Regularised { k, m, delta_t: self.delta_t.unwrap_or(f64::NAN), bounded },
-            ("step", ..) if k.is_finite() && self.v_i != self.v_f => Protocol::Response { k, m },
-            (_, Some(a_2), Some(a_3), _) => Protocol::FreeCubic { a_2, a_3 },
-            (.., Some(family)) => Protocol::Family(family),
-            _ => return Err(wrong(format!("no protocol is named `{name}`"))),
-        })
-    }
-
-    /// The case of a protocol, all of whose numbers are given.
-    fn case(&self) -> Case {
-        let [t_f, a, b, v_i, v_f] =
-            [self.t_f, self.a, self.b, self.v_i, self.v_f].map(|given| given.unwrap_or(f64::NAN));
-        Case {
-            transition: Transition { law: Law { a, b }, v_i, v_f },
-            t_f,
-            tau_max: self.tau_max.unwrap_or(f64::INFINITY),
-        }
-    }
-
-    /// What was asked for, number by number.
-    fn numbers(&self) -> Vec<(String, f64, &'static str)> {
-        let given = [
-            ("t_f", self.t_f),
-            ("a", self.a),
-            ("b", self.b),
-            ("v_i", self.v_i),
-            ("v_f", self.v_f),
-            ("tau_max", self.tau_max),
-            ("k", self.k),
-            ("m", self.m),
-            ("delta_t", self.delta_t),
-        ];
-        given.into_iter().filter_map(|(name, given)| Some((name.to_owned(), given?, ""))).collect()
     }
 }
 
-/// Relative accuracy of a protocol that is no row of a table.
-const DEFAULT_RTOL: f64 = 1e-10;
-
 /// The axes of a row that are finite numbers, with their units where those are SI; the coefficients of a cubic are among its
 /// parameters.
-fn axes_of(row: &Row, units: &Units) -> Vec<(String, f64, &'static str)> {
+fn axes_of(row: &Row, units: &Units) -> Vec<Named> {
     let axis = |(name, cell): &(String, Cell)| {
-        let quantity = Quantity::from_name(name)?;
+        let quantity = Quantity::from_name(name).filter(|quantity| !quantity.has_scale())?;
         let Cell::Number(value) = cell else { return None };
-        let shown = value.is_finite() && !matches!(quantity, Quantity::Alpha2 | Quantity::Alpha3);
-        let unit = if *units == Units::Scaled { "" } else { units.name(quantity.unit(Scale::Model)) };
-        shown.then(|| (name.clone(), *value, unit))
+        value.is_finite().then(|| Named::new(name, *value, si_name(units, quantity.unit(Scale::Model))))
     };
     row.iter().filter_map(axis).collect()
 }
@@ -385,28 +392,22 @@ fn axes_of(row: &Row, units: &Units) -> Vec<(String, f64, &'static str)> {
 /// The part of a row of a table, and the row.
 fn row_at(path: &Path, folder: &Folder, table: &ManifestTable, row: u64) -> Result<(std::path::PathBuf, Row), Failure> {
     if row >= table.rows {
-        return Err(wrong(format!(
-            "{}: no row {row} in `{}`\n  expected: a row from 0 to {}",
-            path.display(),
-            table.name,
-            table.rows.saturating_sub(1)
-        )));
+        let (path, last) = (path.display(), table.rows.saturating_sub(1));
+        return Err(wrong(format!("{path}: no row {row} in `{}`\n  expected: a row from 0 to {last}", table.name)));
     }
     let part = row / table.rows_per_part.max(1);
     let file = folder.part(&table.name, part);
     if !file.is_file() {
-        return Err(wrong(format!(
-            "{}: row {row} is in a part that is missing\n  help: run the sweep again, which makes only what is missing",
-            file.display()
-        )));
+        let (file, help) = (file.display(), "run the sweep again, which makes only what is missing");
+        return Err(wrong(format!("{file}: row {row} is in a part that is missing\n  help: {help}")));
     }
     let place = usize::try_from(row - table.rows_of(part).start).map_err(Failure::failed)?;
     let row = frame::row(&file, place).map_err(Failure::failed)?;
     Ok((file, row))
 }
 
-/// Rows that a message names.
-const NAMED: usize = 5;
+/// Rows that a message names. Chosen: they fit a line.
+const MAX_NAMED_ROWS: usize = 5;
 
 /// The one row of a table that meets all conditions; of the parts only the columns of the conditions are read.
 fn the_row(path: &Path, folder: &Folder, table: &ManifestTable, conditions: &[String]) -> Result<u64, Failure> {
@@ -422,12 +423,8 @@ fn the_row(path: &Path, folder: &Folder, table: &ManifestTable, conditions: &[St
             let headings = frame::headings(&file).map_err(Failure::failed)?.0;
             let known: Vec<&str> = headings.iter().map(|heading| heading.name.as_str()).collect();
             if let Some(unknown) = names.iter().find(|name| !known.contains(name)) {
-                let help = hint(unknown, known.iter().copied());
-                let expected = known.join(", ");
-                return Err(wrong(format!(
-                    "--where: `{}` has no column `{unknown}`\n  expected: {expected}\n  help: {help}",
-                    table.name
-                )));
+                let found = format!("--where: `{}` has no column `{unknown}`", table.name);
+                return Err(refused(found, known.join(", "), hint(unknown, known.iter().copied())));
             }
         }
         let frame = frame::read(&file, &names).map_err(Failure::failed)?;
@@ -439,92 +436,96 @@ fn the_row(path: &Path, folder: &Folder, table: &ManifestTable, conditions: &[St
                 Cell::Missing => false,
             })
         };
-        found.extend((0..frame.height).filter(meets).take(NAMED + 1).map(|place| first + place as u64));
-        if found.len() > NAMED {
+        found.extend((0..frame.height).filter(meets).take(MAX_NAMED_ROWS + 1).map(|place| first + place as u64));
+        if found.len() > MAX_NAMED_ROWS {
             break;
         }
     }
+    let (path, name, conditions) = (path.display(), &table.name, conditions.join(", "));
     match found.as_slice() {
         [row] => Ok(*row),
-        [] => Err(wrong(format!(
-            "{}: no row of `{}` meets --where {:?}\n  help: slipsweep head {} {}",
-            path.display(),
-            table.name,
-            conditions.join(", "),
-            path.display(),
-            table.name
-        ))),
+        [] => {
+            let found = format!("{path}: no row of `{name}` meets --where {conditions:?}");
+            Err(wrong(format!("{found}\n  help: slipsweep head {path} {name}")))
+        }
         several => {
-            let shown: Vec<String> = several.iter().take(NAMED).map(u64::to_string).collect();
-            let more = if several.len() > NAMED { " and more" } else { "" };
-            Err(wrong(format!(
-                "{}: several rows of `{}` meet --where {:?}\n  found: rows {}{more}\n  expected: one row\n  help: --row {}",
-                path.display(),
-                table.name,
-                conditions.join(", "),
-                shown.join(", "),
-                several[0]
-            )))
+            let shown: Vec<String> = several.iter().take(MAX_NAMED_ROWS).map(u64::to_string).collect();
+            let more = if several.len() > MAX_NAMED_ROWS { " and more" } else { "" };
+            let what = format!("{path}: several rows of `{name}` meet --where {conditions:?}");
+            let found = format!("{what}\n  found: rows {}{more}", shown.join(", "));
+            Err(refused(found, "one row", format!("--row {}", several[0])))
         }
     }
 }
 
-/// The value of a parameter in the units of what was asked for, and that unit where it is SI.
-fn in_units(parameter: &Parameter, asked: &Asked) -> (f64, &'static str) {
-    // The one parameter of a family that has a dimension.
-    if parameter.name == "alpha" && asked.name == "bounded_velocity" && asked.units != Units::Scaled {
-        let rate = asked.units.size("v_0/l");
-        return (parameter.value * rate * rate, "1/s^2");
-    }
-    let unit = if asked.units == Units::Scaled { "" } else { asked.units.name(parameter.unit) };
-    (parameter.value * asked.units.size(parameter.unit), unit)
+/// The name of a unit where that is SI.
+fn si_name(units: &Units, unit: &'static str) -> &'static str {
+    if *units == Units::Scaled { "" } else { units.name(unit) }
 }
 
-/// A number with its unit, if that is to be shown.
-fn with_unit(name: &str, value: f64, unit: &str) -> String {
-    let gap = if unit.is_empty() || unit == "1" { "" } else { " " };
-    let unit = if unit == "1" { "" } else { unit };
-    format!("{name} = {}{gap}{unit}", words::number(value))
+impl Named {
+    fn new(name: &str, value: f64, unit: &'static str) -> Named {
+        Named { name: name.to_owned(), value, unit: if unit == "1" { "" } else { unit } }
+    }
+
+    /// `value` in the units of the model, as a number in `units`.
+    fn scaled(name: &str, value: f64, unit: &'static str, units: &Units) -> Named {
+        Named::new(name, value * units.size(unit), si_name(units, unit))
+    }
+
+    fn words(&self) -> String {
+        format!("{} = {} {}", self.name, words::number(self.value), self.unit).trim_end().to_owned()
+    }
+}
+
+/// The parameters of a protocol in the units of what was asked for, each with its meaning.
+fn parameters(asked: &Asked, course: &Course) -> Vec<(Named, &'static str)> {
+    let named = |parameter: &Parameter| {
+        // The one parameter of a family that has a dimension.
+        if parameter.name == "alpha" && asked.name == "bounded_velocity" && asked.units != Units::Scaled {
+            let rate = asked.units.size("v_0/l");
+            return (Named::new(parameter.name, parameter.value * rate * rate, "1/s^2"), parameter.doc);
+        }
+        (Named::scaled(parameter.name, parameter.value, parameter.unit, &asked.units), parameter.doc)
+    };
+    course.parameters.iter().map(named).collect()
+}
+
+/// What comes out.
+fn results(asked: &Asked, course: &Course, trace: &Trace) -> [Named; 3] {
+    // The trace is in the units of what was asked for.
+    let velocity = |name, value| Named::new(name, value, si_name(&asked.units, "v_0"));
+    let work = Named::scaled("work", course.work, "mu_0 sigma l", &asked.units);
+    [work, velocity("v_min", trace.v_min), velocity("v_max", trace.v_max)]
 }
 
 /// What the protocol is, in a few lines.
 fn header(arguments: &Arguments, asked: &Asked, course: &Course, trace: &Trace) -> String {
-    let doc = asked.protocol.doc(&asked.name);
-    let numbers: Vec<String> = asked.numbers.iter().map(|(name, value, unit)| with_unit(name, *value, unit)).collect();
-    let mut text = format!("{}: {doc}\n  at {}", asked.name, numbers.join(", "));
+    let all = |numbers: &[Named]| numbers.iter().map(Named::words).collect::<Vec<_>>().join(", ");
+    let mut text = format!("{}: {}\n  at {}", asked.name, asked.protocol.doc(&asked.name), all(&asked.numbers));
     if asked.bounded == Some(false) {
         text.push_str(", without the bound v >= 1");
     }
     text.push('\n');
-    if let [(_, dataset), (_, table), (_, row)] = asked.origin.as_slice() {
+    if let Some(Origin { dataset, table, row }) = &asked.origin {
         text.push_str(&format!("  row {row} of table {table} of {dataset}\n"));
     }
-    for parameter in &course.parameters {
-        let (value, unit) = in_units(parameter, asked);
-        text.push_str(&format!("  {}: {}\n", with_unit(parameter.name, value, unit), parameter.doc));
+    for (parameter, doc) in parameters(asked, course) {
+        text.push_str(&format!("  {}: {doc}\n", parameter.words()));
     }
-    let results: Vec<String> =
-        results(asked, course, trace).into_iter().map(|(name, value, unit)| with_unit(name, value, unit)).collect();
-    text.push_str(&format!("  {}\n  status {}\n", results.join(", "), status(course.status)));
+    text.push_str(&format!("  {}\n  status {}\n", all(&results(asked, course, trace)), status(course.status)));
     let rows = words::things(trace.moments.len() as u64, "row");
     match arguments.points {
         Some(_) => {
             text.push_str(&format!("  {rows}: equally spaced times, and the states on the other side of a jump\n"))
         }
-        None => text.push_str(&format!(
-            "  {rows}; straight lines between them are good to {} of the range of a column, and to {} of v and theta\n",
-            words::number(GOOD),
-            words::number(CLOSE_UP)
-        )),
+        None => {
+            let (range, value) = (words::number(GOOD), words::number(CLOSE_UP));
+            let lines = format!("straight lines between them are good to {range} of the range of a column");
+            text.push_str(&format!("  {rows}; {lines}, and to {value} of v and theta\n"));
+        }
     }
     text
-}
-
-/// What comes out: name, value and unit where that is SI.
-fn results(asked: &Asked, course: &Course, trace: &Trace) -> [(&'static str, f64, &'static str); 3] {
-    let unit = |unit| if asked.units == Units::Scaled { "" } else { asked.units.name(unit) };
-    let work = course.work * asked.units.size("mu_0 sigma l");
-    [("work", work, unit("mu_0 sigma l")), ("v_min", trace.v_min, unit("v_0")), ("v_max", trace.v_max, unit("v_0"))]
 }
 
 fn status(status: Status) -> String {
@@ -563,25 +564,16 @@ fn table(trace: &Trace, units: &Units) -> String {
 
 /// What a file says of itself.
 fn facts(arguments: &Arguments, asked: &Asked, course: &Course, trace: &Trace) -> Vec<(String, String)> {
-    let mut facts = vec![("protocol".to_owned(), asked.name.clone())];
-    let mut number = |name: &str, value: f64| facts.push((name.to_owned(), format!("{value:?}")));
-    for (name, value, _) in &asked.numbers {
-        number(name, *value);
+    let mut facts = vec![("protocol", asked.name.clone())];
+    let (parameters, results) = (parameters(asked, course), results(asked, course, trace));
+    let rtol = Named::new("rtol", asked.rtol, "");
+    let numbers = asked.numbers.iter().chain([&rtol]).chain(parameters.iter().map(|(parameter, _)| parameter));
+    facts.extend(numbers.chain(&results).map(|number| (number.name.as_str(), format!("{:?}", number.value))));
+    facts.extend(asked.bounded.map(|bounded| ("velocity_bound", bounded.to_string())));
+    facts.extend(arguments.points.map(|points| ("points", points.to_string())));
+    facts.push(("status", course.status.name().to_owned()));
+    if let Some(Origin { dataset, table, row }) = &asked.origin {
+        facts.extend([("dataset", dataset.clone()), ("table", table.clone()), ("row", row.to_string())]);
     }
-    number("rtol", asked.rtol);
-    for parameter in &course.parameters {
-        number(parameter.name, in_units(parameter, asked).0);
-    }
-    for (name, value, _) in results(asked, course, trace) {
-        number(name, value);
-    }
-    if let Some(bounded) = asked.bounded {
-        facts.push(("velocity_bound".to_owned(), bounded.to_string()));
-    }
-    if let Some(points) = arguments.points {
-        facts.push(("points".to_owned(), points.to_string()));
-    }
-    facts.push(("status".to_owned(), course.status.name().to_owned()));
-    facts.extend(asked.origin.iter().map(|(key, value)| ((*key).to_owned(), value.clone())));
-    facts
+    facts.into_iter().map(|(key, value)| (key.to_owned(), value)).collect()
 }

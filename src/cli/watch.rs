@@ -13,10 +13,10 @@ use signal_hook::consts::{SIGINT, SIGTERM};
 use super::words;
 use crate::table::{Phase, Signal};
 
-/// How often work is looked at: Ctrl-C and the progress answer within this time.
+/// How often work is looked at. Chosen: Ctrl-C and the progress seem to answer at once.
 const LOOK: Duration = Duration::from_millis(50);
 
-/// How often a line is written where there is no terminal.
+/// How often a line is written where there is no terminal. Chosen: a log of a day then has less than 10,000.
 const LINE: Duration = Duration::from_secs(10);
 
 /// Time after which a terminal says what is going on. Chosen: nobody waits longer than a second without knowing for what.
@@ -35,7 +35,7 @@ pub fn watched<T>(signal: &Signal, rows: u64, quiet: bool, work: impl FnOnce() -
         show.update(signal);
     };
     let result = while_looking(look, work);
-    show.end();
+    show.bar.iter().for_each(ProgressBar::finish_and_clear);
     (result, signals().caught())
 }
 
@@ -169,85 +169,55 @@ fn set_style(bar: &ProgressBar, has_bar: bool) {
     }
 }
 
-/// The ways to show the progress of a run.
-enum Show {
-    Nothing,
-    Bar { bar: ProgressBar, pace: Pace },
-    Lines { last: Instant, pace: Pace },
-}
-
-impl Show {
-    fn new(rows: u64, quiet: bool) -> Show {
-        let now = Instant::now();
-        let pace = Pace { rows, phase: Phase::Checking, since: now };
-        if quiet {
-            Show::Nothing
-        } else if stderr().is_terminal() {
-            Show::Bar { bar: text_line(0), pace }
-        } else {
-            Show::Lines { last: now, pace }
-        }
-    }
-
-    fn update(&mut self, signal: &Signal) {
-        match self {
-            Show::Nothing => {}
-            Show::Bar { bar, pace } => {
-                let is_new = pace.follow(signal);
-                if pace.phase == Phase::Computing {
-                    if is_new {
-                        bar.set_length(pace.rows);
-                        set_style(bar, true);
-                    }
-                    bar.set_position(signal.rows() + signal.kept());
-                    bar.set_message(pace.text(signal));
-                } else if pace.since.elapsed() > SILENCE {
-                    set_style(bar, false);
-                    bar.set_message(pace.text(signal));
-                }
-            }
-            Show::Lines { last, pace } => {
-                pace.follow(signal);
-                if last.elapsed() >= LINE {
-                    *last = Instant::now();
-                    let done = words::count(signal.rows() + signal.kept());
-                    // Progress that cannot be shown is not worth a failure.
-                    let _ = match pace.phase {
-                        Phase::Computing => {
-                            writeln!(stderr(), "{done} of {} rows, {}", words::count(pace.rows), pace.text(signal))
-                        }
-                        _ => writeln!(stderr(), "{}", pace.text(signal)),
-                    };
-                }
-            }
-        }
-    }
-
-    fn end(self) {
-        if let Show::Bar { bar, .. } = self {
-            bar.finish_and_clear();
-        }
-    }
-}
-
-/// How fast a run is.
-struct Pace {
+/// The progress of a run: a bar on a terminal, else a line from time to time.
+struct Show {
     /// All rows.
     rows: u64,
+    quiet: bool,
+    bar: Option<ProgressBar>,
+    /// When a line was written last.
+    last: Instant,
     /// What the run is doing.
     phase: Phase,
     /// Since when.
     since: Instant,
 }
 
-impl Pace {
-    /// Looks at what the run is doing now; whether that is something new.
-    fn follow(&mut self, signal: &Signal) -> bool {
+impl Show {
+    fn new(rows: u64, quiet: bool) -> Show {
+        let bar = (!quiet && stderr().is_terminal()).then(|| text_line(0));
+        let now = Instant::now();
+        Show { rows, quiet, bar, last: now, phase: Phase::Checking, since: now }
+    }
+
+    fn update(&mut self, signal: &Signal) {
         let is_new = signal.phase() != self.phase;
         if is_new {
             (self.phase, self.since) = (signal.phase(), Instant::now());
         }
-        is_new
+        let done = signal.rows() + signal.kept();
+        let is_computing = self.phase == Phase::Computing;
+        match &self.bar {
+            Some(bar) if is_computing => {
+                if is_new {
+                    bar.set_length(self.rows);
+                    set_style(bar, true);
+                }
+                bar.set_position(done);
+                bar.set_message(self.text(signal));
+            }
+            Some(bar) if self.since.elapsed() > SILENCE => {
+                set_style(bar, false);
+                bar.set_message(self.text(signal));
+            }
+            None if !self.quiet && self.last.elapsed() >= LINE => {
+                self.last = Instant::now();
+                let rows = format!("{} of {} rows, ", words::count(done), words::count(self.rows));
+                // Progress that cannot be shown is not worth a failure.
+                let _ = writeln!(stderr(), "{}{}", if is_computing { &rows } else { "" }, self.text(signal));
+            }
+            _ => {}
+        }
     }
 
     fn text(&self, signal: &Signal) -> String {

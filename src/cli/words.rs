@@ -1,5 +1,7 @@
 //! Numbers, amounts and tables as words.
 
+use indicatif::HumanCount;
+
 /// `value` to nine significant digits.
 pub fn number(value: f64) -> String {
     if value == 0.0 || !value.is_finite() {
@@ -23,15 +25,7 @@ fn trimmed(digits: &str) -> &str {
 
 /// `count` with a comma between thousands.
 pub fn count(count: u64) -> String {
-    let digits = count.to_string();
-    let mut text = String::new();
-    for (place, digit) in digits.chars().enumerate() {
-        if place > 0 && (digits.len() - place).is_multiple_of(3) {
-            text.push(',');
-        }
-        text.push(digit);
-    }
-    text
+    HumanCount(count).to_string()
 }
 
 /// `number` things, in the singular or with an s.

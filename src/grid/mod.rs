@@ -3,7 +3,6 @@
 mod axis;
 mod block;
 mod design;
-mod digits;
 mod expression;
 mod projection;
 mod quantity;
@@ -12,9 +11,8 @@ mod sieve;
 mod view;
 
 pub use axis::{Axis, Values};
-pub use block::{Block, Derived, Factor, Label};
+pub use block::{Block, Derived, Digit, Digits, Factor, Label};
 pub use design::Design;
-pub use digits::{Digit, Digits};
 pub use expression::{Expression, Fault};
 pub use projection::{Grid, Projection, Stretch, TooMany, Tuples};
 pub use quantity::{Domain, Point, Quantity, RTOL, Scale};

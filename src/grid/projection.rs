@@ -9,8 +9,7 @@ use std::ops::Range;
 use std::sync::Arc;
 
 use super::axis::Axis;
-use super::block::{Block, Label};
-use super::digits::{Digit, Digits};
+use super::block::{Block, Digit, Digits, Label};
 use super::quantity::{Point, Quantity, Scale};
 use super::sieve::Sieve;
 use super::view::{Segment, View};
@@ -107,6 +106,12 @@ impl Stretch {
             let axes = &self.block.factors[digit.factor].axes;
             Some((*digit, axes.iter().find(|axis| axis.quantity == quantity)?))
         })
+    }
+
+    /// Whether the rows tell the value of `quantity`: an axis, or computed from axes that all are there.
+    pub fn tells(&self, quantity: Quantity) -> bool {
+        let is_there = |root: &Quantity| self.axis(*root).is_some();
+        self.block.scale(quantity).is_some() && self.block.roots(&[quantity]).iter().all(is_there)
     }
 
     /// The digit that has the label `name`, and the label, if one has.

@@ -117,66 +117,60 @@ impl Quantity {
         Quantity::ALL.into_iter().find(|quantity| quantity.name() == name)
     }
 
+    /// Name, unit and meaning.
+    fn definition(self) -> [&'static str; 3] {
+        match self {
+            Quantity::Time => ["t_f", "l/v_0", "duration of the protocol"],
+            Quantity::A => ["a", "mu_0", "direct effect of the velocity on friction"],
+            Quantity::B => ["b", "mu_0", "effect of the contact lifetime on friction"],
+            Quantity::InitialVelocity => ["v_i", "v_0", "velocity of the initial steady state"],
+            Quantity::FinalVelocity => ["v_f", "v_0", "velocity of the final steady state"],
+            Quantity::Family => ["family", "", "family of shortcuts"],
+            Quantity::FrictionBound => ["tau_max", "mu_0 sigma", "bound on friction, which bounded_friction heeds"],
+            Quantity::Alpha2 => ["alpha_2", "1", "coefficient of t in the contact lifetime of the cubic shortcut"],
+            Quantity::Alpha3 => {
+                ["alpha_3", "v_0/l", "coefficient of t^2 in the contact lifetime of the cubic shortcut"]
+            }
+            Quantity::Stiffness => ["k", "mu_0 sigma/l", "stiffness of the spring"],
+            Quantity::Mass => ["m", "mu_0 sigma l/v_0^2", "mass of the block"],
+            Quantity::Sampling => [
+                "dt",
+                "l/v_0",
+                "time between samples of the control velocity, each held until the next; 0: not sampled",
+            ],
+            Quantity::Smoothing => {
+                ["delta_t", "l/v_0", "length of the smooth pieces that replace the jumps of the optimum"]
+            }
+        }
+    }
+
     /// The name in specs and tables.
     pub fn name(self) -> &'static str {
-        match self {
-            Quantity::Time => "t_f",
-            Quantity::A => "a",
-            Quantity::B => "b",
-            Quantity::InitialVelocity => "v_i",
-            Quantity::FinalVelocity => "v_f",
-            Quantity::Family => "family",
-            Quantity::FrictionBound => "tau_max",
-            Quantity::Alpha2 => "alpha_2",
-            Quantity::Alpha3 => "alpha_3",
-            Quantity::Stiffness => "k",
-            Quantity::Mass => "m",
-            Quantity::Sampling => "dt",
-            Quantity::Smoothing => "delta_t",
-        }
+        self.definition()[0]
     }
 
     /// What it means, in one line.
     pub fn doc(self) -> &'static str {
-        match self {
-            Quantity::Time => "duration of the protocol",
-            Quantity::A => "direct effect of the velocity on friction",
-            Quantity::B => "effect of the contact lifetime on friction",
-            Quantity::InitialVelocity => "velocity of the initial steady state",
-            Quantity::FinalVelocity => "velocity of the final steady state",
-            Quantity::Family => "family of shortcuts",
-            Quantity::FrictionBound => "bound on friction, which bounded_friction heeds",
-            Quantity::Alpha2 => "coefficient of t in the contact lifetime of the cubic shortcut",
-            Quantity::Alpha3 => "coefficient of t^2 in the contact lifetime of the cubic shortcut",
-            Quantity::Stiffness => "stiffness of the spring",
-            Quantity::Mass => "mass of the block",
-            Quantity::Sampling => {
-                "time between samples of the control velocity, each held until the next; 0: not sampled"
-            }
-            Quantity::Smoothing => "length of the smooth pieces that replace the jumps of the optimum",
-        }
+        self.definition()[2]
     }
 
     /// Its unit, for values given in `scale`.
     pub fn unit(self, scale: Scale) -> &'static str {
         match (self, scale) {
-            (Quantity::Time | Quantity::Sampling | Quantity::Smoothing, _) => "l/v_0",
-            (Quantity::A | Quantity::B, _) => "mu_0",
-            (Quantity::InitialVelocity | Quantity::FinalVelocity, _) => "v_0",
-            (Quantity::Family, _) => "",
-            (Quantity::FrictionBound, _) => "mu_0 sigma",
-            (Quantity::Alpha2, Scale::Model) => "1",
             (Quantity::Alpha2, Scale::Duration) => "1/t_f",
-            (Quantity::Alpha3, Scale::Model) => "v_0/l",
             (Quantity::Alpha3, Scale::Duration) => "1/t_f^2",
-            (Quantity::Stiffness, _) => "mu_0 sigma/l",
-            (Quantity::Mass, _) => "mu_0 sigma l/v_0^2",
+            _ => self.definition()[1],
         }
     }
 
     /// Whether its values can be given relative to `t_f`.
     pub fn has_scale(self) -> bool {
         matches!(self, Quantity::Alpha2 | Quantity::Alpha3)
+    }
+
+    /// The units in which its values can be given.
+    pub fn scales(self) -> &'static [Scale] {
+        if self.has_scale() { &[Scale::Duration, Scale::Model] } else { &[Scale::Model] }
     }
 
     /// The words it takes instead of numbers, each of which stands for its place; none for a number.

@@ -3,13 +3,12 @@
 use std::ops::Range;
 
 use super::axis::{Axis, Values};
-use super::block::{Block, Derived, Label};
-use super::digits::{Digit, Digits};
+use super::block::{Block, Derived, Digit, Digits, Label};
 use super::expression::{Columns, Expression, Stack};
 use super::quantity::Quantity;
 
-/// Ranges of at most this many values are computed once and looked up.
-const TABULATED: u64 = 1 << 10;
+/// Values of a range at most that are computed once and looked up. Chosen: they fit the cache of a core.
+const MAX_TABLE_VALUES: u64 = 1 << 10;
 
 /// What some quantities of a block are over the rows of a product.
 pub struct Sampler<'a> {
@@ -63,7 +62,7 @@ impl<'a> Sampler<'a> {
         for digit in &digits.digits {
             for axis in block.factors[digit.factor].axes.iter().filter(|axis| roots.contains(&axis.quantity)) {
                 let is_range = !matches!(axis.values, Values::List(_));
-                let table = (is_range && digit.len <= TABULATED)
+                let table = (is_range && digit.len <= MAX_TABLE_VALUES)
                     .then(|| (0..digit.len).map(|step| axis.values.at(step)).collect());
                 sources.push(Source { digit: *digit, content: Content::Axis(axis, table) });
             }
@@ -105,7 +104,7 @@ impl<'a> Sampler<'a> {
             column.clear();
             let Digit { len, stride, .. } = source.digit;
             let (mut row, mut step) = (rows.start, source.digit.step(rows.start));
-            let mut end = (row / stride + 1).saturating_mul(stride);
+            let mut end = source.digit.next(row);
             while row < rows.end {
                 let until = end.min(rows.end);
                 column.resize(column.len() + (until - row) as usize, source.at(step));

@@ -8,23 +8,22 @@ use std::ops::Range;
 use rayon::prelude::*;
 use roaring::RoaringBitmap;
 
-use super::block::Block;
-use super::digits::Digits;
+use super::block::{Block, Digits};
 use super::expression::Expression;
 use super::quantity::Quantity;
 use super::sampler::{Sampler, Scratch};
 
-/// Combinations that a thread evaluates in one task, a multiple of 64.
-const CHUNK: u64 = 1 << 16;
+/// Combinations that a thread evaluates in one task, a multiple of 64. Chosen: some milliseconds.
+const CHUNK_COMBINATIONS: u64 = 1 << 16;
 
-/// Points that are evaluated at a time.
-const BATCH: u64 = 1 << 10;
+/// Points that are evaluated at a time. Chosen: their columns fit the cache of a core.
+const BATCH_POINTS: u64 = 1 << 10;
 
-/// Most combinations of the axes that a condition or a computed axis reads: evaluating them takes seconds, and a bit for each 128 MiB.
-pub const MOST_COMBINATIONS: u64 = 1 << 30;
+/// Combinations of the axes that a condition or a computed axis reads, at most. Chosen: evaluating them takes seconds, a bit for each 128 MiB.
+pub const MAX_COMBINATIONS: u64 = 1 << 30;
 
-/// Combinations from which on evaluation is worth several threads.
-const WORTH_THREADS: u64 = 1 << 18;
+/// Points from which on evaluation is worth several threads. Chosen: some milliseconds, a hundred times the start of a thread.
+const MIN_PARALLEL_POINTS: u64 = 1 << 18;
 
 /// The rows of a product that a condition keeps.
 #[derive(Debug)]
@@ -64,25 +63,12 @@ impl Sieve {
         let combinations = levels.iter().map(|level| level.read).product();
         // A row is kept if the condition holds with any step of the factors that rows do not tell.
         factors.extend(reads.iter().filter(|factor| !digits.digits.iter().any(|digit| digit.factor == **factor)));
-        let all = Digits::new(block, &factors).filter(|all| all.rows <= MOST_COMBINATIONS)?;
+        let all = Digits::new(block, &factors).filter(|all| all.rows <= MAX_COMBINATIONS)?;
         let sampler = Sampler::new(block, &all, &condition.reads()).with_labels(block, &all, Some(condition));
         let hidden = all.rows / combinations;
-        let chunk = |chunk: u64, scratch: &mut Scratch| {
-            let told = chunk * CHUNK..((chunk + 1) * CHUNK).min(combinations);
-            evaluate(&sampler, condition, hidden, told, scratch)
-        };
-        let chunks = combinations.div_ceil(CHUNK);
-        let pool = (all.rows >= WORTH_THREADS).then(|| rayon::ThreadPoolBuilder::new().build().ok()).flatten();
-        let bytes: Vec<Vec<u8>> = match pool {
-            Some(pool) => {
-                pool.install(|| (0..chunks).into_par_iter().map_init(Scratch::default, |s, c| chunk(c, s)).collect())
-            }
-            None => {
-                let mut scratch = Scratch::default();
-                (0..chunks).map(|number| chunk(number, &mut scratch)).collect()
-            }
-        };
-        Some(Sieve { lead, levels, combinations, kept: RoaringBitmap::from_lsb0_bytes(0, &bytes.concat()) })
+        let bits = |told, scratch: &mut Scratch| evaluate(&sampler, condition, hidden, told, scratch);
+        let bytes = in_chunks(combinations, all.rows, bits).concat();
+        Some(Sieve { lead, levels, combinations, kept: RoaringBitmap::from_lsb0_bytes(0, &bytes) })
     }
 
     /// Whether it keeps every row.
@@ -162,6 +148,21 @@ struct Place {
     inside: u64,
 }
 
+/// What `each` makes of the numbers below `count`, range by range; on all threads if there are many `points` to evaluate.
+fn in_chunks<T: Send>(count: u64, points: u64, each: impl Fn(Range<u64>, &mut Scratch) -> T + Sync) -> Vec<T> {
+    let chunks = 0..count.div_ceil(CHUNK_COMBINATIONS);
+    let each = |scratch: &mut Scratch, number: u64| {
+        each(number * CHUNK_COMBINATIONS..((number + 1) * CHUNK_COMBINATIONS).min(count), scratch)
+    };
+    match (points >= MIN_PARALLEL_POINTS).then(|| rayon::ThreadPoolBuilder::new().build().ok()).flatten() {
+        Some(pool) => pool.install(|| chunks.into_par_iter().map_init(Scratch::default, each).collect()),
+        None => {
+            let mut scratch = Scratch::default();
+            chunks.map(|number| each(&mut scratch, number)).collect()
+        }
+    }
+}
+
 /// A bit for each of `told` combinations: whether `condition` holds for any of its `hidden` points.
 fn evaluate(
     sampler: &Sampler<'_>,
@@ -174,7 +175,7 @@ fn evaluate(
     let end = told.end * hidden;
     let mut start = told.start * hidden;
     while start < end {
-        let stop = (start + BATCH).min(end);
+        let stop = (start + BATCH_POINTS).min(end);
         sampler.load(start..stop, scratch);
         for (place, &holds) in scratch.evaluate(condition).iter().enumerate() {
             if holds != 0.0 {
@@ -209,13 +210,12 @@ pub fn first_wrong(block: &Block, quantity: Quantity, wrong: impl Fn(f64) -> boo
     let mut reads = vec![quantity];
     reads.extend(block.condition.iter().flat_map(Expression::reads));
     let roots = block.roots(&reads);
-    let digits = Digits::new(block, &block.factors_of(&roots)).filter(|digits| digits.rows <= MOST_COMBINATIONS)?;
+    let digits = Digits::new(block, &block.factors_of(&roots)).filter(|digits| digits.rows <= MAX_COMBINATIONS)?;
     let sampler = Sampler::new(block, &digits, &reads).with_labels(block, &digits, block.condition.as_ref());
-    let search = |chunk: u64, scratch: &mut Scratch| -> Option<u64> {
-        let end = ((chunk + 1) * CHUNK).min(digits.rows);
-        let mut start = chunk * CHUNK;
-        while start < end {
-            let stop = (start + BATCH).min(end);
+    let search = |rows: Range<u64>, scratch: &mut Scratch| -> Option<u64> {
+        let mut start = rows.start;
+        while start < rows.end {
+            let stop = (start + BATCH_POINTS).min(rows.end);
             sampler.load(start..stop, scratch);
             let kept = block.condition.as_ref().map(|condition| scratch.evaluate(condition).to_vec());
             let values = scratch.column(quantity);
@@ -228,18 +228,7 @@ pub fn first_wrong(block: &Block, quantity: Quantity, wrong: impl Fn(f64) -> boo
         }
         None
     };
-    let chunks = digits.rows.div_ceil(CHUNK);
-    let pool = (digits.rows >= WORTH_THREADS).then(|| rayon::ThreadPoolBuilder::new().build().ok()).flatten();
-    let found = match pool {
-        Some(pool) => pool.install(|| {
-            let each = (0..chunks).into_par_iter().map_init(Scratch::default, |scratch, chunk| search(chunk, scratch));
-            each.find_first(Option::is_some).flatten()
-        }),
-        None => {
-            let mut scratch = Scratch::default();
-            (0..chunks).find_map(|chunk| search(chunk, &mut scratch))
-        }
-    };
+    let found = in_chunks(digits.rows, digits.rows, search).into_iter().flatten().next();
     Some(found.map(|row| {
         let mut scratch = Scratch::default();
         sampler.pick(&[row], &mut scratch);

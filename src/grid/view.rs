@@ -4,16 +4,16 @@ use std::collections::HashMap;
 use std::ops::Range;
 
 use super::axis::Axis;
-use super::digits::Digit;
+use super::block::Digit;
 use super::projection::{Projection, Tuples};
 use super::quantity::{Point, Quantity};
 use super::sampler::{Sampler, Scratch};
 
-/// Points at which an expression is evaluated at a time.
-const BATCH: usize = 1 << 10;
+/// Points at which an expression is evaluated at a time. Chosen: their columns fit the cache of a core.
+const BATCH_POINTS: usize = 1 << 10;
 
-/// Axes of at most this many steps have a code for each in a table.
-const TABULATED: u64 = 1 << 16;
+/// Steps of an axis at most that have a code each in a table. Chosen: it takes half a MiB.
+const MAX_TABLE_STEPS: u64 = 1 << 16;
 
 /// Rows of a table that are neighbours in the product of a block.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -71,14 +71,11 @@ impl<'a> View<'a> {
                     point[axis.quantity] = axis.values.at(digit.step(segment.raw.start));
                 }
             }
-            if block.derived.is_empty() {
+            let made = block.derived.iter().map(|derived| derived.quantity);
+            let made: Vec<Quantity> = made.filter(|quantity| stretch.tells(*quantity)).collect();
+            if made.is_empty() {
                 return point;
             }
-            let made = block.derived.iter().map(|derived| derived.quantity).filter(|quantity| {
-                // All that it is made of is there.
-                block.roots(&[*quantity]).iter().all(|root| stretch.axis(*root).is_some())
-            });
-            let made: Vec<Quantity> = made.collect();
             let mut scratch = Scratch::default();
             Sampler::new(block, &stretch.digits, &made).pick(&[segment.raw.start], &mut scratch);
             for quantity in made {
@@ -91,11 +88,7 @@ impl<'a> View<'a> {
     /// The values of `quantity` over `rows`, some of the rows, as runs of equal values; `None` if the table has no such axis.
     pub fn runs(&self, quantity: Quantity, rows: Range<u64>) -> Option<Runs> {
         let stretches = self.projection.stretches();
-        let is_known = |stretch: &super::projection::Stretch| {
-            let block = &stretch.block;
-            block.scale(quantity).is_some() && block.roots(&[quantity]).iter().all(|root| stretch.axis(*root).is_some())
-        };
-        if !stretches.iter().all(is_known) {
+        if !stretches.iter().all(|stretch| stretch.tells(quantity)) {
             return None;
         }
         let segments: Vec<Segment> = self.segments(rows.clone()).collect();
@@ -123,7 +116,7 @@ impl<'a> View<'a> {
                     starts.push((segment.first + (raw - segment.raw.start), raw));
                     raw = (raw / stride + 1).saturating_mul(stride);
                 }
-                if starts.len() >= BATCH {
+                if starts.len() >= BATCH_POINTS {
                     runs.take_values(&sampler, quantity, &mut starts, &mut scratch);
                 }
             }
@@ -135,43 +128,32 @@ impl<'a> View<'a> {
     /// The words of the label `name` over `rows`, some of the rows, each with the number of rows in a row that have it; `None` where rows
     /// have none.
     pub fn label(&self, name: &str, rows: Range<u64>) -> Vec<(Option<&'a str>, usize)> {
-        let stretches = self.projection.stretches();
-        let mut runs: Vec<(Option<&str>, usize)> = Vec::new();
-        let mut push = |word: Option<&'a str>, length: u64| match runs.last_mut() {
-            Some((last, run)) if *last == word => *run += length as usize,
-            _ => runs.push((word, length as usize)),
-        };
-        let segments: Vec<Segment> = self.segments(rows).collect();
-        for group in segments.chunk_by(|one, next| one.stretch == next.stretch) {
-            let label = stretches[group[0].stretch].label(name);
-            for Segment { raw, .. } in group {
-                let Some((digit, label)) = label else {
-                    push(None, raw.end - raw.start);
-                    continue;
-                };
-                let mut row = raw.start;
-                while row < raw.end {
-                    let next = (row / digit.stride + 1).saturating_mul(digit.stride).min(raw.end);
-                    push(label.word(digit.step(row)), next - row);
-                    row = next;
-                }
-            }
-        }
-        runs
+        let labels: Vec<_> = self.projection.stretches().iter().map(|stretch| stretch.label(name)).collect();
+        let runs = self.runs_of(rows, |stretch, raw| match labels[stretch] {
+            Some((digit, label)) => (label.word(digit.step(raw)), digit.next(raw)),
+            None => (None, u64::MAX),
+        });
+        runs.into_iter().map(|(word, rows)| (word, (rows.end - rows.start) as usize)).collect()
     }
 
     /// The tuples of `rows`, some of the rows, each with the rows in a row that have it.
     pub fn tuples(&self, tuples: &Tuples, rows: Range<u64>) -> Vec<(u64, Range<u64>)> {
-        let mut runs: Vec<(u64, Range<u64>)> = Vec::new();
+        self.runs_of(rows, |stretch, raw| tuples.of(stretch, raw))
+    }
+
+    /// Runs of equal values over `rows`. Of a row of the product of a block `of` gives the value, and the first row after it that may have
+    /// another one.
+    fn runs_of<T: PartialEq>(&self, rows: Range<u64>, of: impl Fn(usize, u64) -> (T, u64)) -> Vec<(T, Range<u64>)> {
+        let mut runs: Vec<(T, Range<u64>)> = Vec::new();
         for segment in self.segments(rows) {
             let mut raw = segment.raw.start;
             while raw < segment.raw.end {
-                let (tuple, next) = tuples.of(segment.stretch, raw);
+                let (value, next) = of(segment.stretch, raw);
                 let next = next.min(segment.raw.end);
-                let end = segment.first + (next - segment.raw.start);
+                let [start, end] = [raw, next].map(|raw| segment.first + (raw - segment.raw.start));
                 match runs.last_mut() {
-                    Some((last, run)) if *last == tuple => run.end = end,
-                    _ => runs.push((tuple, segment.first + (raw - segment.raw.start)..end)),
+                    Some((last, run)) if *last == value => run.end = end,
+                    _ => runs.push((value, start..end)),
                 }
                 raw = next;
             }
@@ -199,12 +181,12 @@ impl Listed {
     /// Adds the steps of an axis of a factor over `segments`, each value once.
     fn take_steps(&mut self, digit: Digit, axis: &Axis, segments: &[Segment]) {
         // What each step is coded as: a table where it is small, since there may be as many runs as rows.
-        let mut table = vec![None; if digit.len <= TABULATED { digit.len as usize } else { 0 }];
+        let mut table = vec![None; if digit.len <= MAX_TABLE_STEPS { digit.len as usize } else { 0 }];
         let mut map = HashMap::new();
         for segment in segments {
             let mut raw = segment.raw.start;
             let mut step = digit.step(raw);
-            let mut next = (raw / digit.stride + 1).saturating_mul(digit.stride);
+            let mut next = digit.next(raw);
             while raw < segment.raw.end {
                 let slot = match table.get_mut(step as usize) {
                     Some(slot) => slot,
@@ -285,8 +267,7 @@ impl Runs {
             _ if rows.is_empty() => (0, 0),
             Order::Cyclic { digit, segment } => {
                 let raw = segment.raw.start + (row - segment.first);
-                let turn = (raw / digit.stride + 1).saturating_mul(digit.stride);
-                (self.step_of(row), row.saturating_add(turn - raw))
+                (self.step_of(row), row.saturating_add(digit.next(raw) - raw))
             }
             Order::Listed { starts, .. } => (Runs::run_at(starts, row), 0),
         };

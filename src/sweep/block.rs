@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use super::axis::{Sampled, Written, read};
-use super::error::{Faults, SpecError, unknown};
+use super::error::{Faults, SpecError, refuse, unknown};
 use super::points;
 use super::spec::BlockSpec;
 use super::units::legal;
@@ -46,12 +46,8 @@ pub fn check(spec: &BlockSpec, prefix: String, units: Option<&Units>, folder: &P
         };
         let is_sound = !faults.concern(&key);
         if factors.iter().any(|factor: &Factor| factor.holds_any(&[quantity])) {
-            faults.push(SpecError::new(
-                key.as_str(),
-                format!("`{name}` is also a column of `points`"),
-                "each axis once",
-                "remove the axis here or the column there",
-            ));
+            let found = format!("`{name}` is also a column of `points`");
+            faults.push(SpecError::new(&*key, found, "each axis once", "remove the axis here or the column there"));
         }
         let written = units.filter(|_| is_sound).and_then(|units| faults.take(read(quantity, units, &key, axis)));
         axes.push((quantity, written));
@@ -126,7 +122,7 @@ impl Draft<'_> {
         let condition = spec.condition.as_ref().filter(|_| are_known && !faults.concern(&format!("{prefix}where")));
         let condition = condition.map(|text| {
             let condition = Expression::condition(text, held, points);
-            faults.take(condition.map_err(|fault| explain(format!("{prefix}where"), "axis", fault)))
+            faults.take(condition.map_err(|fault| explain(format!("{prefix}where"), fault)))
         });
         let block = Block { factors, derived, condition: condition.flatten() };
         // Only of what is legal so far, since this takes time.
@@ -173,16 +169,16 @@ impl Draft<'_> {
             Some(Some(Written::Values(axis))) => axis,
             Some(Some(Written::Computed { .. })) => {
                 let found = format!("`{name}` is computed from other axes at every point");
-                return Err(SpecError::new(key, found, "axes with values of their own", "remove it here"));
+                return refuse(key, found, "axes with values of their own", "remove it here");
             }
             Some(Some(Written::Sampled(sampled))) => {
                 let found = format!("`{name}` varies together with all axes of `{}`", sampled.design.name());
-                return Err(SpecError::new(key, found, "axes with values of their own", "remove it here"));
+                return refuse(key, found, "axes with values of their own", "remove it here");
             }
             Some(None) => return Ok(None),
             None if factors.iter().flat_map(|factor| &factor.axes).any(|axis| axis.quantity.name() == name) => {
                 let found = format!("`{name}` is a column of `points`, which vary together anyway");
-                return Err(SpecError::new(key, found, "names of [axes]", "remove it here"));
+                return refuse(key, found, "names of [axes]", "remove it here");
             }
             // An axis that is there only by default has one value, or one of each word.
             None if held.iter().any(|quantity| quantity.name() == name && quantity.default().is_empty()) => {
@@ -194,12 +190,7 @@ impl Draft<'_> {
             }
         };
         if zips.iter().flatten().chain(zip).any(|other| other.quantity == axis.quantity) {
-            return Err(SpecError::new(
-                key,
-                format!("`{name}` is there twice"),
-                "each axis in one zip",
-                "remove one of the two",
-            ));
+            return refuse(key, format!("`{name}` is there twice"), "each axis in one zip", "remove one of the two");
         }
         if let Some(first) = zip.first()
             && first.values.len() != axis.values.len()
@@ -207,7 +198,7 @@ impl Draft<'_> {
             let (one, other) = (values(first.values.len()), values(axis.values.len()));
             let found = format!("`{}` has {one}, `{name}` has {other}", first.quantity.name());
             let help = "give both the same number; nothing is repeated or left out";
-            return Err(SpecError::new(key, found, "axes of equal length", help));
+            return refuse(key, found, "axes of equal length", help);
         }
         Ok(Some(axis.clone()))
     }
@@ -227,24 +218,18 @@ impl Draft<'_> {
             let Some((first, sample)) = axes.first() else { continue };
             let seeded = axes.iter().find_map(|(quantity, axis)| Some((quantity, axis.seed?)));
             for (quantity, axis) in &axes {
-                let key = format!("{prefix}axes.{}", quantity.name());
+                let (key, kind) = (format!("{prefix}axes.{}", quantity.name()), design.name());
                 if axis.count != sample.count {
                     let found = format!("{} points, but `{}` has {}", axis.count, first.name(), sample.count);
-                    let expected =
-                        format!("the same count for all axes of `{}`, which are sampled jointly", design.name());
-                    return Err(SpecError::new(
-                        format!("{key}.{}[2]", design.name()),
-                        found,
-                        expected,
-                        "make them equal",
-                    ));
+                    let expected = format!("the same count for all axes of `{kind}`, which are sampled jointly");
+                    return refuse(format!("{key}.{kind}[2]"), found, expected, "make them equal");
                 }
                 if let (Some(seed), Some((other, first_seed))) = (axis.seed, seeded)
                     && seed != first_seed
                 {
                     let found = format!("seed {seed}, but `{}` has {first_seed}", other.name());
-                    let expected = format!("one seed for all axes of `{}`, which are sampled jointly", design.name());
-                    return Err(SpecError::new(format!("{key}.seed"), found, expected, "remove one of the two"));
+                    let expected = format!("one seed for all axes of `{kind}`, which are sampled jointly");
+                    return refuse(format!("{key}.seed"), found, expected, "remove one of the two");
                 }
             }
             let seed = seeded.map_or(0, |(_, seed)| seed);
@@ -255,14 +240,12 @@ impl Draft<'_> {
                 let values: Vec<f64> =
                     inside.into_iter().map(|u| (least * (1.0 - u) + greatest * u).clamp(least, greatest)).collect();
                 // Both ends are legal; between 0, where that lies apart, and the others are numbers that are not.
-                if let Some((value, Err(legal))) = values
-                    .iter()
-                    .map(|&value| (value, legal(units, *quantity, axis.scale, value)))
-                    .find(|(_, legal)| legal.is_err())
-                {
-                    let key = format!("{prefix}axes.{}.{}", quantity.name(), design.name());
-                    let found = format!("a value of the sample, {value:?}, is out of range");
-                    return Err(SpecError::new(key, found, legal, "begin with the least number but 0"));
+                for &value in &values {
+                    if let Err(legal) = legal(units, *quantity, axis.scale, value) {
+                        let key = format!("{prefix}axes.{}.{}", quantity.name(), design.name());
+                        let found = format!("a value of the sample, {value:?}, is out of range");
+                        return refuse(key, found, legal, "begin with the least number but 0");
+                    }
                 }
                 Ok(Axis { quantity: *quantity, scale: axis.scale, values: Values::List(values) })
             };
@@ -276,7 +259,7 @@ impl Draft<'_> {
         let key = |quantity| self.key_of_expression(quantity);
         let mut waiting = Vec::new();
         for &(quantity, scale, text) in computed {
-            let expression = Expression::number(text, self.held).map_err(|fault| explain(key(quantity), "axis", fault));
+            let expression = Expression::number(text, self.held).map_err(|fault| explain(key(quantity), fault));
             waiting.extend(faults.take(expression).map(|expression| Derived { quantity, scale, expression }));
         }
         let mut derived = Vec::new();
@@ -298,12 +281,9 @@ impl Draft<'_> {
                 path.push(read);
             }
             let names: Vec<String> = path.iter().map(|quantity| format!("`{}`", quantity.name())).collect();
-            faults.push(SpecError::new(
-                key(path[0]),
-                format!("depends on itself: {}", names.join(", which is computed from ").replacen(", which", "", 1)),
-                "axes that are computed from others",
-                "give one of them values of its own",
-            ));
+            let names = names.join(", which is computed from ").replacen(", which", "", 1);
+            let (expected, help) = ("axes that are computed from others", "give one of them values of its own");
+            faults.push(SpecError::new(key(path[0]), format!("depends on itself: {names}"), expected, help));
             break;
         }
         derived
@@ -319,12 +299,9 @@ impl Draft<'_> {
                 let place: Vec<String> =
                     place.iter().map(|(axis, value)| format!("{} = {value:?}", axis.name())).collect();
                 let place = if place.is_empty() { String::new() } else { format!(" at {}", place.join(", ")) };
-                Err(SpecError::new(
-                    key,
-                    format!("`{text}` is {value:?}{place}"),
-                    legal(units, quantity, scale, value).err().unwrap_or_default(),
-                    "correct the expression, or leave such points out with `where`",
-                ))
+                let legal = legal(units, quantity, scale, value).err().unwrap_or_default();
+                let help = "correct the expression, or leave such points out with `where`";
+                refuse(key, format!("`{text}` is {value:?}{place}"), legal, help)
             }
             None => Err(too_many(key)),
         }
@@ -342,20 +319,13 @@ fn values(count: u64) -> String {
 
 /// An expression or condition that would take too long to evaluate.
 pub fn too_many(key: String) -> SpecError {
-    SpecError::new(
-        key,
-        "more than 2^30 combinations of the axes that it reads",
-        "at most 2^30, which take seconds",
-        "take fewer values on these axes, or split them over several [[block]]s or specs",
-    )
+    let help = "take fewer values on these axes, or split them over several [[block]]s or specs";
+    let found = "more than 2^30 combinations of the axes that it reads";
+    SpecError::new(key, found, "at most 2^30, which take seconds", help)
 }
 
 /// A fault of an expression at `key`.
-fn explain(key: String, what: &str, fault: Fault) -> SpecError {
+fn explain(key: String, fault: Fault) -> SpecError {
     let place = fault.position.map_or_else(String::new, |position| format!("position {position}: "));
-    let found = format!("{place}{}", fault.found);
-    match fault.unknown.map(|unknown| *unknown) {
-        Some((name, known)) => SpecError { found: found.into(), ..unknown(key, what, &name, &known) },
-        None => SpecError::new(key, found, fault.expected, fault.help),
-    }
+    SpecError::new(key, format!("{place}{}", fault.found), fault.expected, fault.help)
 }

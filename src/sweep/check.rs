@@ -6,8 +6,8 @@ use std::path::{Path, PathBuf};
 use std::sync::{Arc, OnceLock};
 
 use super::block::{self, Checked, too_many};
-use super::error::{Faults, SpecError, unknown};
-use super::place;
+use super::error::{Faults, SpecError, refuse, unknown};
+use super::read;
 use super::spec::{Spec, TableSpec};
 use super::units::{UNIT_KEYS, doubt, units};
 use crate::file;
@@ -16,11 +16,11 @@ use crate::model::Units;
 use crate::names::nearest;
 use crate::table::{self, OPTIMUM_AXES, Optima, STATUS, Selection, Table};
 
-/// Most bytes of a spec: reading one takes about a hundred times as much memory.
-const MOST_BYTES: u64 = 1 << 22;
+/// Bytes of a spec at most. Chosen: reading one takes about a hundred times as much memory, 400 MiB.
+const MAX_SPEC_BYTES: u64 = 1 << 22;
 
-/// Longest name, in bytes: names of files have at most 255.
-pub(super) const LONGEST_NAME: usize = 200;
+/// Bytes of a name at most: names of files have 255 (`NAME_MAX` of Linux), of which a script beside the dataset takes some.
+pub(super) const MAX_NAME_BYTES: usize = 200;
 
 /// A sweep that is known to be legal.
 pub struct Sweep {
@@ -72,8 +72,7 @@ fn path_hint(path: &Path) -> String {
     names.retain(|name| name.ends_with(".toml"));
     names.sort();
     let stem = path.file_stem().unwrap_or_default().to_string_lossy();
-    let meant = nearest(&format!("{stem}.toml"), names.iter().map(String::as_str));
-    match meant {
+    match nearest(&format!("{stem}.toml"), names.iter().map(String::as_str)) {
         Some(name) => format!("did you mean `{}`?", path.with_file_name(name).display()),
         None => "check the path".to_owned(),
     }
@@ -88,15 +87,15 @@ impl Sweep {
     pub fn load(path: &Path) -> Result<Sweep, SpecError> {
         let fault = |found: String, expected: &str, help: &str| SpecError::new("", found, expected, help).of(path);
         let mut bytes = Vec::new();
-        let read = file::open(path).and_then(|file| file.take(MOST_BYTES + 1).read_to_end(&mut bytes));
+        let read = file::open(path).and_then(|file| file.take(MAX_SPEC_BYTES + 1).read_to_end(&mut bytes));
         read.map_err(|error| match error.kind() {
             io::ErrorKind::InvalidInput => {
                 fault(error.to_string(), "a TOML file", "write the spec to a file, and name that file")
             }
             _ => fault(format!("cannot read: {error}"), "a readable TOML file", &path_hint(path)),
         })?;
-        if bytes.len() as u64 > MOST_BYTES {
-            let expected = format!("a spec of at most {MOST_BYTES} bytes");
+        if bytes.len() as u64 > MAX_SPEC_BYTES {
+            let expected = format!("a spec of at most {MAX_SPEC_BYTES} bytes");
             return Err(fault("too long".to_owned(), &expected, "write lists of values as a file of `points`"));
         }
         let text = String::from_utf8(bytes).map_err(|error| {
@@ -123,10 +122,8 @@ impl Sweep {
     /// What is wrong with the spec, and in which lines.
     pub fn parse(text: &str, folder: &Path) -> Result<Sweep, SpecError> {
         let mut faults = Faults::default();
-        match place::read(text, &mut faults) {
-            Some(spec) => Sweep::checked(&spec, text, folder, faults),
-            None => faults.finish(text).and_then(|()| Sweep::check(&Spec::default(), text, folder)),
-        }
+        let spec = read::read(text, &mut faults)?;
+        Sweep::checked(&spec, text, folder, faults)
     }
 
     /// Checks `spec`, read from `text`; files that it names are relative to `folder`.
@@ -154,7 +151,7 @@ impl Sweep {
         let grid = Grid { blocks, units: units.unwrap_or_default() };
         let placed = |fault| {
             let mut faults = [fault];
-            place::find_lines(text, &mut faults);
+            read::find_lines(text, &mut faults);
             let [fault] = faults;
             fault
         };
@@ -173,7 +170,7 @@ impl Sweep {
             let axes = block.factors.iter().flat_map(|factor| &factor.axes);
             warnings.extend(axes.filter_map(|axis| doubt(prefix, &grid.units, axis)));
         }
-        place::find_lines(text, &mut warnings);
+        read::find_lines(text, &mut warnings);
         Ok(Sweep {
             name: spec.name.clone(),
             description: spec.description.clone(),
@@ -222,15 +219,11 @@ impl Sweep {
 /// Whether a dataset can have this name.
 pub fn check_name(name: &str) -> Result<(), SpecError> {
     let legal = |c: char| c.is_ascii_alphanumeric() || matches!(c, '-' | '_' | '.');
-    if (1..=LONGEST_NAME).contains(&name.len()) && name.chars().all(legal) && !name.starts_with('.') {
+    if (1..=MAX_NAME_BYTES).contains(&name.len()) && name.chars().all(legal) && !name.starts_with('.') {
         return Ok(());
     }
-    Err(SpecError::new(
-        "name",
-        format!("`{name}` cannot name a folder"),
-        format!("at most {LONGEST_NAME} letters, digits, '-', '_' and '.', the first not '.'"),
-        "choose another name",
-    ))
+    let expected = format!("at most {MAX_NAME_BYTES} letters, digits, '-', '_' and '.', the first not '.'");
+    refuse("name", format!("`{name}` cannot name a folder"), expected, "choose another name")
 }
 
 /// The blocks of `spec`.
@@ -246,32 +239,23 @@ fn blocks(spec: &Spec, units: Option<&Units>, folder: &Path, faults: &mut Faults
         ("where", top.condition.is_some()),
     ];
     for (key, _) in outside.into_iter().filter(|(_, is_there)| *is_there) {
-        faults.push(SpecError::new(
-            key,
-            format!("`{key}` outside of the blocks"),
-            "everything about the grid in [[block]]s, or no block",
-            "move it into the blocks that it concerns",
-        ));
+        let (found, expected) =
+            (format!("`{key}` outside of the blocks"), "everything about the grid in [[block]]s, or no block");
+        faults.push(SpecError::new(key, found, expected, "move it into the blocks that it concerns"));
     }
     let blocks = spec.block.iter().enumerate();
     let blocks: Vec<Checked> =
         blocks.map(|(number, one)| block::check(one, format!("block[{number}]."), units, folder, faults)).collect();
     for quantity in Quantity::ALL {
         let scale = |checked: &Checked| checked.block.as_ref()?.scale(quantity);
-        let scales: Vec<_> =
-            blocks.iter().enumerate().filter_map(|(number, block)| Some((number, scale(block)?))).collect();
-        if let Some((number, scale)) = scales.iter().find(|(_, scale)| *scale != scales[0].1) {
-            faults.push(SpecError::new(
-                format!("block[{number}].axes.{}", quantity.name()),
-                format!(
-                    "in units of \"{}\", but \"{}\" in block[{}]",
-                    quantity.unit(*scale),
-                    quantity.unit(scales[0].1),
-                    scales[0].0
-                ),
-                "one unit, since all blocks share a column",
-                "convert the values of one of them",
-            ));
+        let mut scales = blocks.iter().enumerate().filter_map(|(number, block)| Some((number, scale(block)?)));
+        let Some((first, usual)) = scales.next() else { continue };
+        if let Some((number, scale)) = scales.find(|(_, scale)| *scale != usual) {
+            let (key, units) =
+                (format!("block[{number}].axes.{}", quantity.name()), [scale, usual].map(|scale| quantity.unit(scale)));
+            let found = format!("in units of \"{}\", but \"{}\" in block[{first}]", units[0], units[1]);
+            let help = "convert the values of one of them";
+            faults.push(SpecError::new(key, found, "one unit, since all blocks share a column", help));
         }
     }
     blocks
@@ -281,7 +265,7 @@ fn check_rtol(key: &str, rtol: f64) -> Result<(), SpecError> {
     if RTOL.contains(rtol) {
         return Ok(());
     }
-    Err(SpecError::new(key, format!("{rtol:?} is out of range"), RTOL.text, "choose a value in the range"))
+    refuse(key, format!("{rtol:?} is out of range"), RTOL.text, "choose a value in the range")
 }
 
 /// A table of a spec that is legal on its own.
@@ -299,13 +283,8 @@ struct Draft {
 /// The tables of `spec`. An axis that a table lacks counts as held from then on: one fault names it.
 fn tables(spec: &Spec, blocks: &mut [Checked], faults: &mut Faults) -> Vec<Draft> {
     if spec.tables.is_empty() && !faults.concern("tables") {
-        let known = table::ALL.map(|table| table.name());
-        faults.push(SpecError::new(
-            "tables",
-            "no table is asked for",
-            format!("at least one of {}", known.join(", ")),
-            "add a line such as [tables.optimal]",
-        ));
+        let expected = format!("at least one of {}", table::ALL.map(|table| table.name()).join(", "));
+        faults.push(SpecError::new("tables", "no table is asked for", expected, "add a line such as [tables.optimal]"));
     }
     spec.tables.iter().filter_map(|(name, table)| draft(name, table, spec.accuracy.rtol, blocks, faults)).collect()
 }
@@ -343,12 +322,9 @@ fn lacks(key: &str, table: &dyn Table, prefix: &str, missing: &[Quantity]) -> Sp
     let names: Vec<String> = missing.iter().map(|axis| format!("`{}`", axis.name())).collect();
     let lines: Vec<String> = missing.iter().map(|axis| format!("`{} = ...`", axis.name())).collect();
     let noun = if missing.len() == 1 { "axis" } else { "axes" };
-    SpecError::new(
-        key,
-        format!("needs the {noun} {}, which {place} does not have", names.join(", ")),
-        format!("axes {}", table.axes().iter().map(|axis| axis.name()).collect::<Vec<_>>().join(", ")),
-        format!("add {} to {axes}, or remove the table", lines.join(", ")),
-    )
+    let found = format!("needs the {noun} {}, which {place} does not have", names.join(", "));
+    let expected = format!("axes {}", table.axes().iter().map(|axis| axis.name()).collect::<Vec<_>>().join(", "));
+    SpecError::new(key, found, expected, format!("add {} to {axes}, or remove the table", lines.join(", ")))
 }
 
 /// A table over its rows of `grid`, whose blocks have keys that begin with `prefixes`.
@@ -357,21 +333,16 @@ fn request(draft: Draft, grid: &Grid, prefixes: &[String]) -> Result<Request, Sp
     let key = format!("tables.{name}");
     let members = if written.name() == table.name() { None } else { Some(members(written, table, &key, grid)?) };
     let projection = grid.project(table.axes()).map_err(|error| match error {
-        TooMany::Rows => SpecError::new(
-            key,
-            "more rows than 64 bits can count",
-            "at most 2^64 - 1 rows",
-            "take fewer values on its axes",
-        ),
+        TooMany::Rows => {
+            let (found, help) = ("more rows than 64 bits can count", "take fewer values on its axes");
+            SpecError::new(key, found, "at most 2^64 - 1 rows", help)
+        }
         TooMany::Combinations(block) => too_many(format!("{}where", prefixes[block])),
     })?;
     if let Some(empty) = projection.stretches().iter().position(|stretch| stretch.rows() == 0) {
-        return Err(SpecError::new(
-            format!("{}where", prefixes[empty]),
-            "matches no points",
-            "a condition that some point meets",
-            "correct the condition, or the axes that it reads",
-        ));
+        let help = "correct the condition, or the axes that it reads";
+        let key = format!("{}where", prefixes[empty]);
+        return refuse(key, "matches no points", "a condition that some point meets", help);
     }
     let sizes = selection.indices().iter().map(|&column| table.columns()[column].size(grid)).collect();
     Ok(Request { table, selection, rtol, rows: projection.rows(), projection, members, hash: OnceLock::new(), sizes })
@@ -382,12 +353,7 @@ fn reduced(table: &'static dyn Table, key: &str, reduce: Option<&str>) -> Result
     let Some(word) = reduce else { return Ok(table) };
     let key = format!("{key}.reduce");
     if table.name() != "gap" {
-        return Err(SpecError::new(
-            key,
-            format!("`{}` cannot be reduced", table.name()),
-            "tables.gap.reduce",
-            "remove the key",
-        ));
+        return refuse(key, format!("`{}` cannot be reduced", table.name()), "tables.gap.reduce", "remove the key");
     }
     match table::REDUCED.into_iter().find(|(known, _)| *known == word) {
         Some((_, reduced)) => Ok(reduced),
@@ -421,12 +387,10 @@ fn members(landscape: &dyn Table, reduced: &dyn Table, key: &str, grid: &Grid) -
     let (last, first): (Vec<Factor>, Vec<Factor>) = block.factors.iter().cloned().partition(is_fast);
     let each = last.iter().map(Factor::len).fold(1, u64::saturating_mul);
     if reduced.name() == "gap_quantiles" && each > table::MOST_SORTED {
-        return Err(SpecError::new(
-            format!("{key}.reduce"),
-            format!("quantiles of {each} shortcuts of each transition and time"),
-            format!("at most {}, which are sorted in memory", table::MOST_SORTED),
-            "take fewer values of alpha_2 and alpha_3, or reduce to \"min\" or \"histogram\"",
-        ));
+        let found = format!("quantiles of {each} shortcuts of each transition and time");
+        let expected = format!("at most {}, which are sorted in memory", table::MOST_SORTED);
+        let help = "take fewer values of alpha_2 and alpha_3, or reduce to \"min\" or \"histogram\"";
+        return refuse(format!("{key}.reduce"), found, expected, help);
     }
     let ordered = Block { factors: first.into_iter().chain(last).collect(), ..Block::clone(block) };
     let projection = Grid { blocks: vec![Arc::new(ordered)], units: grid.units }.project(landscape.axes());
@@ -444,23 +408,19 @@ fn selection(table: &dyn Table, key: &str, names: Option<&[String]>, faults: &mu
         let key = format!("{key}.columns[{place}]");
         match known.iter().position(|column| column == name) {
             _ if name == STATUS => {}
-            Some(index) if indices.contains(&index) => faults.push(SpecError::new(
-                key,
-                format!("`{name}` is there twice"),
-                "each column once",
-                "remove one of the two",
-            )),
+            Some(index) if indices.contains(&index) => {
+                let found = format!("`{name}` is there twice");
+                faults.push(SpecError::new(key, found, "each column once", "remove one of the two"));
+            }
             Some(index) => indices.push(index),
             None => faults.push(unknown(key, "column", name, &known)),
         }
     }
-    if indices.is_empty() && !faults.concern(&format!("{key}.columns")) {
-        faults.push(SpecError::new(
-            format!("{key}.columns"),
-            "no column is asked for",
-            format!("at least one of {}", known.join(", ")),
-            "name columns, or remove `columns` to have the usual ones",
-        ));
+    let key = format!("{key}.columns");
+    if indices.is_empty() && !faults.concern(&key) {
+        let expected = format!("at least one of {}", known.join(", "));
+        let help = "name columns, or remove `columns` to have the usual ones";
+        faults.push(SpecError::new(key, "no column is asked for", expected, help));
     }
     Selection::new(indices)
 }

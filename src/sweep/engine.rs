@@ -17,7 +17,7 @@ use rayon::{ThreadPool, ThreadPoolBuilder};
 
 use super::check::Sweep;
 use super::plan::Plan;
-use super::shard::{Shard, TooManyParts};
+use super::shard::{Shard, TooManyParts, holds};
 use crate::dataset::{
     Company, DatasetError, Digest, Folder, Footer, Layout, Look, ManifestTable, Session, State, encode,
 };
@@ -69,7 +69,10 @@ pub enum RunError {
     #[error(transparent)]
     Parts(#[from] TooManyParts),
     /// A row made the program panic; all other parts are finished.
-    #[error("{defect}\n  help: this is a defect of slipsweep, please report it; {}", rest(*others))]
+    #[error("{defect}\n  help: this is a defect of slipsweep, please report it; {}", match others {
+        0 => "all other parts are finished".to_owned(),
+        _ => format!("{others} more parts have such a row, all others are finished"),
+    })]
     Defect {
         /// The first of them.
         defect: Defect,
@@ -79,13 +82,6 @@ pub enum RunError {
     /// It was asked to stop.
     #[error(transparent)]
     Stopped(#[from] Stopped),
-}
-
-fn rest(others: usize) -> String {
-    match others {
-        0 => "all other parts are finished".to_owned(),
-        _ => format!("{others} more parts have such a row, all others are finished"),
-    }
 }
 
 /// A row that made the program panic, which no row should.
@@ -139,6 +135,7 @@ fn run_in(
     threads: usize,
     signal: &Signal,
 ) -> Result<Outcome, RunError> {
+    // Plan: the parts of each table that are ours, and the dataset that takes them.
     let plan = Plan::new(sweep);
     let shares = shard.parts(sweep, &plan)?;
     let session = folder.open(&plan.manifest(sweep), company).map_err(|error| sweep.explain(error))?;
@@ -164,10 +161,12 @@ fn run_in(
         })
         .collect();
 
+    // Parts that are there and sound are kept.
     signal.enter(Phase::Checking);
     let sound = stages.iter().zip(&shares).map(|(stage, share)| stage.check(share));
     let sound = sound.collect::<Result<Vec<_>, RunError>>()?;
 
+    // The others are solved by the pool, encoded, and published by the writers.
     signal.enter(Phase::Computing);
     let mut outcome = Outcome { tables: Vec::new(), digests: Vec::new(), work: Work::default() };
     thread::scope(|scope| {
@@ -194,10 +193,11 @@ pub fn pool(threads: usize) -> Result<ThreadPool, RunError> {
     })
 }
 
-/// Most bytes of the sheets that are being filled at a time, unless there are fewer than two.
-const SHEETS: u64 = 1 << 27;
+/// Bytes of the sheets that are being filled at most, unless there are fewer than two. Chosen: a part takes a few MiB, so it limits machines of many
+/// threads alone.
+const MAX_SHEET_BYTES: u64 = 1 << 27;
 
-/// Threads that encode and write: while one waits for the disk to sync its part, another one has the processor.
+/// Threads that encode and write. Chosen: while one waits for the disk to sync its part, another one has the processor.
 pub(super) const WRITERS: usize = 2;
 
 /// Parts that those threads may have before them, the ones that they are at included: with fewer they would wait for the next.
@@ -219,7 +219,7 @@ pub fn compute(
     let (give_back, free) = channel();
     let columns = job.selection.indices().len();
     let size = parts.rows_per_part.min(parts.rows).saturating_mul(8 * columns as u64 + 1);
-    let sheets = (pool.current_num_threads() as u64 + 1 + AHEAD as u64).min((SHEETS / size.max(1)).max(2));
+    let sheets = (pool.current_num_threads() as u64 + 1 + AHEAD as u64).min((MAX_SHEET_BYTES / size.max(1)).max(2));
     for _ in 0..sheets {
         let _ = give_back.send(Sheet::new(columns));
     }
@@ -329,32 +329,17 @@ struct Stage<'a> {
     digest: Mutex<Digest>,
 }
 
-/// Parts that are checked before what they contain is added up, so that the memory does not grow with the dataset.
-const CHECKED_TOGETHER: usize = 1 << 10;
-
 impl<'a> Stage<'a> {
     /// The numbers of the sound parts of `share` that are there, ascending; every bit of them is checked, on all threads of the run.
     fn check(&self, share: &[Range<u64>]) -> Result<Vec<u64>, RunError> {
         let mut there = self.run.folder.parts_there(self.table);
-        // Both are ascending.
-        there.retain(|number| {
-            share.get(share.partition_point(|range| range.end <= *number)).is_some_and(|range| range.contains(number))
-        });
-        let mut sound = Vec::with_capacity(there.len());
-        for numbers in there.chunks(CHECKED_TOGETHER) {
-            let look = |&number: &u64| {
-                self.run.signal.check()?;
-                match self.look(number) {
-                    Ok(is_there) => Ok(is_there),
-                    Err(State::Damaged { .. }) => Ok(false),
-                    Err(state) => self.refuse(number, state).map(|()| false),
-                }
-            };
-            let looks = || numbers.par_iter().with_max_len(1).map(look).collect::<Result<Vec<bool>, RunError>>();
-            let looks = self.run.pool.install(looks)?;
-            sound.extend(numbers.iter().zip(looks).filter(|(_, is_sound)| *is_sound).map(|(number, _)| *number));
-        }
-        Ok(sound)
+        there.retain(|number| holds(share, *number));
+        let sound = |number: u64| {
+            self.run.signal.check()?;
+            Ok((self.look(number)? == Found::Sound).then_some(number))
+        };
+        let sound = || there.into_par_iter().with_max_len(1).map(sound).collect::<Result<Vec<_>, RunError>>();
+        Ok(self.run.pool.install(sound)?.into_iter().flatten().collect())
     }
 
     /// Computes the parts of `share` but for the `sound` ones, and hands them to the disk.
@@ -381,14 +366,14 @@ impl<'a> Stage<'a> {
     /// Whether a part is to be computed: another run may have made it by now.
     fn is_missing(&self, number: u64, done: &mut TableOutcome) -> bool {
         match self.look(number) {
-            Ok(true) => {
+            Ok(Found::Sound) => {
                 done.kept += 1;
                 return false;
             }
-            Ok(false) => {}
-            Err(State::Damaged { .. }) => done.damaged += 1,
-            Err(state) => {
-                self.run.failures.keep(self.refuse(number, state));
+            Ok(Found::Nothing) => {}
+            Ok(Found::Damaged) => done.damaged += 1,
+            Err(error) => {
+                self.run.failures.keep(Err(error));
                 return false;
             }
         }
@@ -417,26 +402,23 @@ impl<'a> Stage<'a> {
         let _ = to_disk.send(Part { stage: self, number, content });
     }
 
-    /// Whether a part is there, every bit of it; then it is counted. What is in its place if that is something else.
-    fn look(&self, number: u64) -> Result<bool, State> {
+    /// What is in the place of a part; a sound one is counted.
+    fn look(&self, number: u64) -> Result<Found, RunError> {
         let Run { folder, session, signal, .. } = self.run;
         match folder.state(&session.manifest, &self.table.name, number, Look::Whole) {
             State::There { digest } => {
                 let rows = self.table.rows_of(number);
                 signal.keep(rows.end - rows.start);
                 self.count(*digest);
-                Ok(true)
+                Ok(Found::Sound)
             }
-            State::Missing => Ok(false),
-            state => Err(state),
+            State::Missing => Ok(Found::Nothing),
+            State::Damaged { .. } => Ok(Found::Damaged),
+            State::Foreign { what, expected, found } => {
+                let path = folder.part(&self.table.name, number).display().to_string();
+                Err(DatasetError::ForeignPart { path, what, expected, found }.into())
+            }
         }
-    }
-
-    /// A failure because of what is in the place of a part, if it is foreign.
-    fn refuse(&self, number: u64, state: State) -> Result<(), RunError> {
-        let State::Foreign { what, expected, found } = state else { return Ok(()) };
-        let path = self.run.folder.part(&self.table.name, number).display().to_string();
-        Err(DatasetError::ForeignPart { path, what, expected, found }.into())
     }
 
     /// Adds what a part contains.
@@ -454,6 +436,15 @@ impl<'a> Stage<'a> {
         self.count(digest);
         Ok(bytes)
     }
+}
+
+/// What is in the place of a part.
+#[derive(PartialEq)]
+enum Found {
+    /// The part, every bit of it.
+    Sound,
+    Damaged,
+    Nothing,
 }
 
 /// A part on its way to the disk.

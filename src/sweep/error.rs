@@ -3,7 +3,7 @@
 use std::fmt;
 use std::path::{Path, PathBuf};
 
-use super::place;
+use super::read;
 use crate::names::{nearest, shown};
 
 /// What is wrong with a spec: a fault, and those that are independent of it.
@@ -25,14 +25,14 @@ pub struct SpecError {
     pub others: Box<[SpecError]>,
 }
 
-/// Characters of a key that a message shows.
-const MOST_OF_KEY: usize = 200;
+/// Characters of a key that a message shows. Chosen: twice those of the longest legal key.
+const MAX_KEY_CHARS: usize = 200;
 
-/// Characters of a name, or of a cell of a file, that a message shows.
-pub const MOST_OF_NAME: usize = 100;
+/// Characters of a name, or of a cell of a file, that a message shows. Chosen: a line.
+pub const MAX_NAME_CHARS: usize = 100;
 
-/// Characters of what was found that a message shows: more than twice those of the longest expression.
-const MOST_OF_FOUND: usize = 2500;
+/// Characters of what was found that a message shows: more than twice the 1000 of the longest expression.
+const MAX_FOUND_CHARS: usize = 2500;
 
 impl SpecError {
     /// A fault at `key`, whose place is not known yet.
@@ -62,8 +62,8 @@ impl SpecError {
     }
 }
 
-/// Most faults that one message names.
-const MOST_FAULTS: usize = 10;
+/// Faults that one message names. Chosen: they fit a screen.
+const MAX_FAULTS: usize = 10;
 
 /// The faults that a check has found so far.
 #[derive(Debug, Default)]
@@ -109,7 +109,7 @@ impl Faults {
 
     /// Whether no more are added: there are more than are named.
     pub fn are_enough(&self) -> bool {
-        self.found.len() > MOST_FAULTS
+        self.found.len() > MAX_FAULTS
     }
 
     /// All faults as one error, in the order of their lines in `text`.
@@ -118,7 +118,7 @@ impl Faults {
     ///
     /// If there is any fault.
     pub fn finish(mut self, text: &str) -> Result<(), SpecError> {
-        place::find_lines(text, &mut self.found);
+        read::find_lines(text, &mut self.found);
         // Faults of the whole spec come last.
         self.found.sort_by_key(|fault| fault.line.unwrap_or(usize::MAX));
         let mut found = self.found.into_iter();
@@ -138,10 +138,10 @@ impl fmt::Display for SpecError {
             (None, None) => {}
         }
         if !self.key.is_empty() {
-            write!(f, "{}: ", shown(&self.key, MOST_OF_KEY))?;
+            write!(f, "{}: ", shown(&self.key, MAX_KEY_CHARS))?;
         }
-        write!(f, "{}\n  expected: {}\n  help: {}", shown(&self.found, MOST_OF_FOUND), self.expected, self.help)?;
-        let (named, rest) = self.others.split_at(self.others.len().min(MOST_FAULTS - 1));
+        write!(f, "{}\n  expected: {}\n  help: {}", shown(&self.found, MAX_FOUND_CHARS), self.expected, self.help)?;
+        let (named, rest) = self.others.split_at(self.others.len().min(MAX_FAULTS - 1));
         for other in named {
             write!(f, "\nerror: {other}")?;
         }
@@ -154,11 +154,21 @@ impl fmt::Display for SpecError {
 
 impl std::error::Error for SpecError {}
 
+/// The fault at `key` as the result of a check.
+pub fn refuse<T>(
+    key: impl Into<Box<str>>,
+    found: impl Into<Box<str>>,
+    expected: impl Into<Box<str>>,
+    help: impl Into<Box<str>>,
+) -> Result<T, SpecError> {
+    Err(SpecError::new(key, found, expected, help))
+}
+
 /// A fault of a name that is none of `known`, with the nearest of them.
 pub fn unknown(key: String, what: &str, name: &str, known: &[&str]) -> SpecError {
     let help = match nearest(name, known.iter().copied()) {
         Some(meant) => format!("did you mean `{meant}`?"),
         None => "remove it, or choose one of these".to_owned(),
     };
-    SpecError::new(key, format!("unknown {what} `{}`", shown(name, MOST_OF_NAME)), known.join(", "), help)
+    SpecError::new(key, format!("unknown {what} `{}`", shown(name, MAX_NAME_CHARS)), known.join(", "), help)
 }

@@ -5,7 +5,7 @@ use std::fmt::{self, Write};
 use sha2::{Digest, Sha256};
 
 use super::check::{Request, Sweep};
-use super::place;
+use super::read;
 use crate::dataset::DatasetError;
 use crate::grid::{Block, Quantity};
 use crate::model::Units;
@@ -90,14 +90,14 @@ impl Sweep {
         let [here, there] = [facts(self), facts(other)];
         let (key, value) = here.iter().find(|fact| !there.contains(fact))?;
         let other_value = there.iter().find(|(known, _)| known == key).map_or("nothing", |(_, value)| value);
-        let is_written = |key: &str| [self, other].iter().any(|sweep| place::value(&sweep.text, key).is_some());
+        let is_written = |key: &str| [self, other].iter().any(|sweep| read::value(&sweep.text, key).is_some());
         let key = if key.ends_with(".rtol") && !is_written(key) { "accuracy.rtol" } else { key };
         // A default as it is meant.
-        let written = |sweep: &Sweep, value: &str| match place::value(&sweep.text, key) {
+        let written = |sweep: &Sweep, value: &str| match read::value(&sweep.text, key) {
             Some(text) => shown(&text, MAX_SHOWN_CHARS).into_owned(),
             None => shown(value, MAX_SHOWN_CHARS).into_owned(),
         };
-        let line = place::line(&self.text, key).map_or_else(String::new, |line| format!(" (line {line})"));
+        let line = read::line(&self.text, key).map_or_else(String::new, |line| format!(" (line {line})"));
         Some([format!("{key} = {}{line}", written(self, value)), format!("{key} = {}", written(other, other_value))])
     }
 }

@@ -9,12 +9,12 @@ use arrow_array::cast::AsArray;
 use arrow_array::types::{
     Float32Type, Float64Type, Int8Type, Int16Type, Int32Type, Int64Type, UInt8Type, UInt16Type, UInt32Type, UInt64Type,
 };
-use arrow_array::{Array, ArrayRef, ArrowPrimitiveType, PrimitiveArray};
+use arrow_array::{Array, ArrayRef, ArrowPrimitiveType};
 use arrow_schema::DataType;
 use indexmap::IndexSet;
 use parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
 
-use super::error::{MOST_OF_NAME, SpecError, unknown};
+use super::error::{MAX_NAME_CHARS, SpecError, unknown};
 use crate::dataset::{coded, guarded, label};
 use crate::grid::{Axis, Factor, Label, Quantity, Scale, Values};
 use crate::model::Units;
@@ -27,7 +27,8 @@ pub fn read(path: &Path, units: &Units) -> Result<Factor, SpecError> {
     let extension = path.extension().map(|extension| extension.to_ascii_lowercase());
     let columns = match extension.as_ref().and_then(|extension| extension.to_str()) {
         Some("csv") => csv(path, units)?,
-        Some("parquet") => sound(path, units)?,
+        // Damage that the reader did not think of is a fault like any other.
+        Some("parquet") => guarded(|| parquet(path, units)).unwrap_or_else(|| Err(unsound(path, &"it is damaged")))?,
         _ => {
             let (expected, help) = ("a file whose name ends in .csv or .parquet", "write the points as CSV");
             return Err(fault(format!("{}: neither CSV nor Parquet", path.display()), expected, help));
@@ -52,11 +53,11 @@ pub fn read(path: &Path, units: &Units) -> Result<Factor, SpecError> {
     Ok(factor)
 }
 
-/// Most points of a file.
-const MOST_POINTS: usize = 1 << 22;
+/// Points of a file at most. Chosen: their values of all 13 quantities take some 400 MiB of memory.
+const MAX_POINTS: usize = 1 << 22;
 
-/// Most bytes of a file.
-const MOST_BYTES: u64 = 1 << 28;
+/// Bytes of a file at most: 64 a point of [`MAX_POINTS`].
+const MAX_FILE_BYTES: u64 = 1 << 28;
 
 /// Whether the file is one that can be taken into memory: no device, no folder, not too large.
 fn check_size(path: &Path) -> Result<(), SpecError> {
@@ -64,20 +65,20 @@ fn check_size(path: &Path) -> Result<(), SpecError> {
     if !file.is_file() {
         return Err(unreadable(path, &"not a file"));
     }
-    if file.len() > MOST_BYTES {
+    if file.len() > MAX_FILE_BYTES {
         let found = format!("{}: {} bytes", path.display(), file.len());
-        return Err(fault(found, &format!("at most {MOST_BYTES} bytes"), "take fewer points, or several sweeps"));
+        return Err(fault(found, &format!("at most {MAX_FILE_BYTES} bytes"), "take fewer points, or several sweeps"));
     }
     Ok(())
 }
 
 /// Whether there are no more than that many points.
 fn check_count(path: &Path, count: usize) -> Result<(), SpecError> {
-    if count <= MOST_POINTS {
+    if count <= MAX_POINTS {
         return Ok(());
     }
-    let found = format!("{}: more than {MOST_POINTS} points", path.display());
-    Err(fault(found, &format!("at most {MOST_POINTS}"), "take fewer points, or several sweeps"))
+    let found = format!("{}: more than {MAX_POINTS} points", path.display());
+    Err(fault(found, &format!("at most {MAX_POINTS}"), "take fewer points, or several sweeps"))
 }
 
 /// A column of a file of points.
@@ -114,8 +115,8 @@ impl Texts {
             Some(number) => number,
             None => {
                 let length = cell.chars().count();
-                if length > LONGEST_LABEL {
-                    let (expected, help) = (format!("at most {LONGEST_LABEL}"), "shorten the label");
+                if length > MAX_LABEL_CHARS {
+                    let (expected, help) = (format!("at most {MAX_LABEL_CHARS}"), "shorten the label");
                     return Err(fault(format!("{}: a label of {length} characters", place()), &expected, help));
                 }
                 if cell.contains(char::is_control) {
@@ -131,8 +132,8 @@ impl Texts {
     }
 }
 
-/// Longest label, in characters: it names a line of a picture.
-const LONGEST_LABEL: usize = 200;
+/// Characters of a label at most. Chosen: it names a line of a picture.
+const MAX_LABEL_CHARS: usize = 200;
 
 /// CSV: a header of names, then a point a line. Empty lines and lines that begin with # are passed over.
 fn csv(path: &Path, units: &Units) -> Result<Vec<Column>, SpecError> {
@@ -151,11 +152,7 @@ fn csv(path: &Path, units: &Units) -> Result<Vec<Column>, SpecError> {
         .map(|(index, line)| (Line { file: path, number: index + 1 }, line.trim()))
         .filter(|(_, line)| !line.is_empty() && !line.starts_with('#'));
     let mut columns = match lines.next() {
-        Some((place, line)) => {
-            let names: Result<Vec<Cow<'_, str>>, SpecError> =
-                cells_of(line).map(|cell| cell.map_err(|cell| unclosed(&place, cell))).collect();
-            header(&place, names?.iter().map(AsRef::as_ref))?
-        }
+        Some((place, line)) => header(&place, cells_of(&place, line)?.iter().map(AsRef::as_ref))?,
         None => Vec::new(),
     };
     for (count, (place, line)) in lines.enumerate() {
@@ -165,54 +162,35 @@ fn csv(path: &Path, units: &Units) -> Result<Vec<Column>, SpecError> {
     Ok(columns)
 }
 
-/// The cells of a line of CSV, which spreadsheets put between quotes where they hold commas or quotes; as it stands, and the last one, if its
-/// quotes do not end where it ends.
-struct Split<'a> {
-    rest: Option<&'a str>,
-}
-
-fn cells_of(line: &str) -> Split<'_> {
-    Split { rest: Some(line) }
-}
-
-impl<'a> Iterator for Split<'a> {
-    type Item = Result<Cow<'a, str>, &'a str>;
-
-    fn next(&mut self) -> Option<Self::Item> {
-        let line = self.rest.take()?.trim_start();
+/// The cells of a line of CSV, which spreadsheets put between quotes where they hold commas or quotes.
+fn cells_of<'a>(place: &Line<'_>, line: &'a str) -> Result<Vec<Cow<'a, str>>, SpecError> {
+    let mut cells: Vec<Cow<'_, str>> = Vec::new();
+    let mut rest = Some(line);
+    while let Some(line) = rest.map(str::trim_start) {
         let Some(quoted) = line.strip_prefix('"') else {
-            let (cell, rest) = line.split_once(',').map_or((line, None), |(cell, rest)| (cell, Some(rest)));
-            self.rest = rest;
-            return Some(Ok(cell.trim_end().into()));
+            let (cell, others) = line.split_once(',').map_or((line, None), |(cell, others)| (cell, Some(others)));
+            cells.push(cell.trim_end().into());
+            rest = others;
+            continue;
         };
-        let unclosed = Some(Err(line.split(',').next().unwrap_or(line).trim_end()));
         // Two quotes within quotes are one.
-        let mut from = 0;
-        let end = loop {
-            let Some(end) = quoted[from..].find('"').map(|place| from + place) else { return unclosed };
-            if !quoted[end + 1..].starts_with('"') {
-                break end;
-            }
-            from = end + 2;
-        };
-        let after = quoted[end + 1..].trim_start();
-        match after.strip_prefix(',') {
-            None if !after.is_empty() => return unclosed,
-            rest => self.rest = rest,
+        let mut end = quoted.find('"');
+        while let Some(place) = end.filter(|place| quoted[place + 1..].starts_with('"')) {
+            end = quoted[place + 2..].find('"').map(|next| place + 2 + next);
         }
-        let cell = &quoted[..end];
-        Some(Ok(if from == 0 { cell.trim().into() } else { cell.replace("\"\"", "\"").trim().to_owned().into() }))
+        let after = end.map(|end| (&quoted[..end], quoted[end + 1..].trim_start()));
+        let Some((cell, after)) = after.filter(|(_, after)| after.is_empty() || after.starts_with(',')) else {
+            return Err(unclosed(place, line.split(',').next().unwrap_or(line).trim_end()));
+        };
+        cells.push(cell.replace("\"\"", "\"").trim().to_owned().into());
+        rest = after.strip_prefix(',');
     }
+    Ok(cells)
 }
 
 fn unclosed(place: &Line<'_>, cell: &str) -> SpecError {
-    let found = format!("{place}: `{}`, a quote that is not closed", shown(cell, MOST_OF_NAME));
+    let found = format!("{place}: `{}`, a quote that is not closed", shown(cell, MAX_NAME_CHARS));
     fault(found, "quotes around a whole cell", "close the quote, or remove it")
-}
-
-/// Parquet, where damage that the reader did not think of is a fault like any other.
-fn sound(path: &Path, units: &Units) -> Result<Vec<Column>, SpecError> {
-    guarded(|| parquet(path, units)).unwrap_or_else(|| Err(unsound(path, &"it is damaged")))
 }
 
 fn unsound(path: &Path, error: &dyn Display) -> SpecError {
@@ -234,7 +212,7 @@ fn parquet(path: &Path, units: &Units) -> Result<Vec<Column>, SpecError> {
     for (column, field) in columns.iter().zip(reader.schema().fields()) {
         column.check_type(&name, field.data_type())?;
     }
-    let reader = reader.with_batch_size(BATCH).build().map_err(|error| unsound(&error))?;
+    let reader = reader.with_batch_size(BATCH_ROWS).build().map_err(|error| unsound(&error))?;
     let mut first = 0;
     for batch in reader {
         let batch = batch.map_err(|error| unsound(&error))?;
@@ -306,28 +284,21 @@ fn texts_of(column: &ArrayRef) -> impl Iterator<Item = Option<&str>> {
     column.into_iter().flat_map(|column| column.keys()).map(cell)
 }
 
-/// Rows of a Parquet file that are held as it gives them.
-const BATCH: usize = 1 << 16;
+/// Rows of a Parquet file that are held as it gives them. Chosen: a column of them fits a cache of 512 KiB.
+const BATCH_ROWS: usize = 1 << 16;
 
 /// The values of a column of numbers, none of them null; `None` for decimals and halves.
 fn numbers(column: &ArrayRef) -> Option<Vec<f64>> {
-    fn all<T: ArrowPrimitiveType>(column: &ArrayRef, number: fn(T::Native) -> f64) -> Option<Vec<f64>> {
-        let column: &PrimitiveArray<T> = column.as_primitive_opt()?;
-        Some(column.values().iter().map(|value| number(*value)).collect())
+    macro_rules! values {
+        ($($type:ident)+) => {
+            match column.data_type() {
+                $(&$type::DATA_TYPE => column.as_primitive::<$type>().values().iter().map(|x| *x as f64).collect(),)+
+                _ => return None,
+            }
+        };
     }
-    match column.data_type() {
-        DataType::Float64 => all::<Float64Type>(column, |x| x),
-        DataType::Float32 => all::<Float32Type>(column, f64::from),
-        DataType::Int8 => all::<Int8Type>(column, f64::from),
-        DataType::Int16 => all::<Int16Type>(column, f64::from),
-        DataType::Int32 => all::<Int32Type>(column, f64::from),
-        DataType::Int64 => all::<Int64Type>(column, |x| x as f64),
-        DataType::UInt8 => all::<UInt8Type>(column, f64::from),
-        DataType::UInt16 => all::<UInt16Type>(column, f64::from),
-        DataType::UInt32 => all::<UInt32Type>(column, f64::from),
-        DataType::UInt64 => all::<UInt64Type>(column, |x| x as f64),
-        _ => None,
-    }
+    Some(values!(Float64Type Float32Type Int8Type Int16Type Int32Type Int64Type
+                UInt8Type UInt16Type UInt32Type UInt64Type))
 }
 
 fn unreadable(path: &Path, error: &dyn Display) -> SpecError {
@@ -348,7 +319,7 @@ fn word(place: impl Fn() -> String, words: &[&str], cell: &str) -> Result<f64, S
     match words.iter().position(|word| *word == cell) {
         Some(number) => Ok(number as f64),
         None => {
-            let found = format!("{}: unknown word `{}`", place(), shown(cell, MOST_OF_NAME));
+            let found = format!("{}: unknown word `{}`", place(), shown(cell, MAX_NAME_CHARS));
             Err(fault(found, &words.join(", "), "correct the word"))
         }
     }
@@ -389,17 +360,11 @@ fn header<'a>(place: &impl Display, names: impl Iterator<Item = &'a str>) -> Res
     for (number, name) in names.enumerate() {
         if name.is_empty() {
             let found = format!("{place}: column {} has no name", number + 1);
-            return Err(fault(
-                found,
-                "the name of an axis or label over every column",
-                "name it, or remove the column",
-            ));
+            let expected = "the name of an axis or label over every column";
+            return Err(fault(found, expected, "name it, or remove the column"));
         }
-        let cells = match Quantity::from_name(name) {
-            Some(quantity) => Cells::Axis(quantity, Vec::new()),
-            None => Cells::Label(Texts::default()),
-        };
-        if matches!(cells, Cells::Label(_)) {
+        let quantity = Quantity::from_name(name);
+        if quantity.is_none() {
             if let Some(separator) = name.chars().find(|c| matches!(c, ';' | '\t' | '\r')) {
                 let found = format!("{place}: columns or lines that end with {separator:?}");
                 return Err(fault(found, "columns that end with commas, lines with newlines", "save it as such CSV"));
@@ -408,7 +373,7 @@ fn header<'a>(place: &impl Display, names: impl Iterator<Item = &'a str>) -> Res
                 let found = format!("{place}: the label `{name}` has the name of a column or status of a table");
                 return Err(fault(found, "a name that no table has", &format!("name it `{name}_label`")));
             }
-            if name.len() > MOST_OF_NAME || name.contains(char::is_control) || is_misspelt(name) {
+            if name.len() > MAX_NAME_CHARS || name.contains(char::is_control) || is_misspelt(name) {
                 return Err(unknown_column(place, name));
             }
         }
@@ -416,6 +381,8 @@ fn header<'a>(place: &impl Display, names: impl Iterator<Item = &'a str>) -> Res
             let found = format!("{place}: column `{name}` is there twice");
             return Err(fault(found, "each column once", "remove one of the two"));
         }
+        let label = || Cells::Label(Texts::default());
+        let cells = quantity.map_or_else(label, |quantity| Cells::Axis(quantity, Vec::new()));
         columns.push(Column { name: name.to_owned(), cells });
     }
     Ok(columns)
@@ -434,16 +401,12 @@ impl Display for Line<'_> {
 }
 
 fn point(place: &Line<'_>, line: &str, units: &Units, columns: &mut [Column]) -> Result<(), SpecError> {
-    let count = cells_of(line).count();
-    if count != columns.len() {
-        if let Some(Err(cell)) = cells_of(line).last() {
-            return Err(unclosed(place, cell));
-        }
-        let found = format!("{place}: {count} values under {} column names", columns.len());
+    let texts = cells_of(place, line)?;
+    if texts.len() != columns.len() {
+        let found = format!("{place}: {} values under {} column names", texts.len(), columns.len());
         return Err(fault(found, "a value for each column", "correct the line"));
     }
-    for (Column { name, cells }, cell) in columns.iter_mut().zip(cells_of(line)) {
-        let cell = cell.map_err(|cell| unclosed(place, cell))?;
+    for (Column { name, cells }, cell) in columns.iter_mut().zip(texts) {
         let place = || format!("{place}: column `{name}`");
         match cells {
             Cells::Label(texts) => texts.push(place, &cell)?,
@@ -454,7 +417,7 @@ fn point(place: &Line<'_>, line: &str, units: &Units, columns: &mut [Column]) ->
                     continue;
                 }
                 let Ok(value) = cell.parse::<f64>() else {
-                    let found = format!("{}: `{}` is not a number", place(), shown(&cell, MOST_OF_NAME));
+                    let found = format!("{}: `{}` is not a number", place(), shown(&cell, MAX_NAME_CHARS));
                     return Err(fault(found, "a number such as 0.03 or 1e-3", "correct the value"));
                 };
                 values.push(legal(place, units, *quantity, value)?);

@@ -3,7 +3,7 @@
 //! The answer follows from the spec and the version alone. Every process works it out for itself, so that none has to ask another.
 
 use std::cmp::Reverse;
-use std::collections::BinaryHeap;
+use std::collections::{BTreeSet, BinaryHeap};
 use std::ops::Range;
 use std::str::FromStr;
 
@@ -29,10 +29,10 @@ pub struct Shard {
 }
 
 impl Shard {
-    /// Most shards of a sweep.
+    /// Shards of a sweep at most. Chosen: beyond the tasks of an array of any scheduler.
     pub const MOST: u64 = 1_000_000;
 
-    /// Most parts of a sweep in shares.
+    /// Parts of a sweep in shares at most. Chosen: dealing them takes a tenth of a second.
     pub const MOST_PARTS: u64 = 1 << 23;
 
     /// The whole sweep.
@@ -63,9 +63,12 @@ impl Shard {
             return Ok(plan.tables.iter().map(|table| std::iter::once(0..table.parts).collect()).collect());
         }
         check_parts(plan)?;
-        let deal = Deal::new(piles(sweep, plan), self.count);
         let mut parts = vec![Vec::new(); plan.tables.len()];
-        deal.parts_of(self.index, |table, part| parts[table].push(part..part + 1));
+        deal(&piles(sweep, plan), self.count, |table, part, shard| {
+            if shard == self.index {
+                parts[table].push(part..part + 1);
+            }
+        });
         // The last part of a table is a pile of its own.
         parts.iter_mut().for_each(|parts| parts.sort_unstable_by_key(|range| range.start));
         Ok(parts)
@@ -90,6 +93,11 @@ impl FromStr for Shard {
     }
 }
 
+/// Whether `part` is among `share`, ascending ranges of parts.
+pub fn holds(share: &[Range<u64>], part: u64) -> bool {
+    share.get(share.partition_point(|range| range.end <= part)).is_some_and(|range| range.contains(&part))
+}
+
 /// Whether the parts of `plan` can be shared out.
 pub fn check_parts(plan: &Plan) -> Result<(), TooManyParts> {
     let parts = plan.tables.iter().fold(0, |parts: u64, table| parts.saturating_add(table.parts));
@@ -108,16 +116,13 @@ pub fn shares_with(
     mut wanted: impl FnMut(usize, u64) -> bool,
 ) -> Result<Vec<u64>, TooManyParts> {
     check_parts(plan)?;
-    let deal = Deal::new(piles(sweep, plan), count);
-    let mut shares = Vec::new();
-    deal.every(|table, part, shard| {
+    let mut shares = BTreeSet::new();
+    deal(&piles(sweep, plan), count, |table, part, shard| {
         if wanted(table, part) {
-            shares.push(shard);
+            shares.insert(shard);
         }
     });
-    shares.sort_unstable();
-    shares.dedup();
-    Ok(shares)
+    Ok(shares.into_iter().collect())
 }
 
 /// Parts of equal predicted cost: consecutive parts of one table.
@@ -146,68 +151,25 @@ fn piles(sweep: &Sweep, plan: &Plan) -> Vec<Pile> {
     piles
 }
 
-/// Which shard has which part. The parts of a pile are dealt in rounds, one part to each shard; what is left of all piles goes, the most expensive
-/// part first, to the shard that has least so far. No shard then has more than one part above the mean.
+/// Gives `take` every part, by table and number, and the shard among `count` that has it.
 ///
-/// The shard that a round begins with changes from round to round: costs that repeat along a table would otherwise meet in the same shard
-/// whenever their period divides the number of shards.
-struct Deal {
-    piles: Vec<Pile>,
-    count: u64,
-    /// Table, part and shard of what is left after the rounds.
-    rest: Vec<(usize, u64, u64)>,
-}
-
-impl Deal {
-    fn new(piles: Vec<Pile>, count: u64) -> Deal {
-        let mut shards: BinaryHeap<Reverse<(u64, u64, u64)>> =
-            (0..count).map(|shard| Reverse((0, mix(shard), shard))).collect();
-        let mut rest = Vec::new();
-        for pile in &piles {
-            for part in pile.parts.start + pile.rounds(count) * count..pile.parts.end {
-                let Some(Reverse((load, order, shard))) = shards.pop() else { break };
-                rest.push((pile.table, part, shard));
-                shards.push(Reverse((load.saturating_add(pile.cost), mix(order), shard)));
-            }
+/// The parts of a pile are dealt in rounds, one part to each shard; what is left of all piles goes, the most expensive part first, to the shard
+/// that has least so far. No shard then has more than one part above the mean. The shard that a round begins with changes from round to round:
+/// costs that repeat along a table would otherwise meet in the same shard whenever their period divides the number of shards.
+fn deal(piles: &[Pile], count: u64, mut take: impl FnMut(usize, u64, u64)) {
+    let mut loads: BinaryHeap<Reverse<(u64, u64, u64)>> =
+        (0..count).map(|shard| Reverse((0, mix(shard), shard))).collect();
+    for Pile { table, parts, cost } in piles {
+        let rounds = (parts.end - parts.start) / count;
+        for round in 0..rounds {
+            let first = mix(round ^ mix(*table as u64)) % count;
+            (0..count).for_each(|place| take(*table, parts.start + round * count + place, (first + place) % count));
         }
-        Deal { piles, count, rest }
-    }
-
-    /// Gives `take` each part of a shard, by table and number.
-    fn parts_of(&self, shard: u64, mut take: impl FnMut(usize, u64)) {
-        for pile in &self.piles {
-            for round in 0..pile.rounds(self.count) {
-                let place = (shard + self.count - pile.first(round, self.count)) % self.count;
-                take(pile.table, pile.parts.start + round * self.count + place);
-            }
+        for part in parts.start + rounds * count..parts.end {
+            let Some(Reverse((load, order, shard))) = loads.pop() else { break };
+            take(*table, part, shard);
+            loads.push(Reverse((load.saturating_add(*cost), mix(order), shard)));
         }
-        self.rest.iter().filter(|rest| rest.2 == shard).for_each(|&(table, part, _)| take(table, part));
-    }
-
-    /// Gives `take` every part, by table and number, and its shard.
-    fn every(&self, mut take: impl FnMut(usize, u64, u64)) {
-        for pile in &self.piles {
-            for round in 0..pile.rounds(self.count) {
-                let first = pile.first(round, self.count);
-                for place in 0..self.count {
-                    let part = pile.parts.start + round * self.count + place;
-                    take(pile.table, part, (first + place) % self.count);
-                }
-            }
-        }
-        self.rest.iter().for_each(|&(table, part, shard)| take(table, part, shard));
-    }
-}
-
-impl Pile {
-    /// Rounds in which each of `count` shards gets one of its parts.
-    fn rounds(&self, count: u64) -> u64 {
-        (self.parts.end - self.parts.start) / count
-    }
-
-    /// The shard that a round begins with.
-    fn first(&self, round: u64, count: u64) -> u64 {
-        mix(round ^ mix(self.table as u64)) % count
     }
 }
 
@@ -239,17 +201,12 @@ mod tests {
         for count in (1..50).chain([64, 100, 699, 700, 775, 776, 1000]) {
             let mut loads = vec![0; count as usize];
             let mut dealt = std::collections::BTreeMap::new();
-            let deal = Deal::new(piles.clone(), count);
-            deal.every(|table, part, shard| {
+            deal(&piles, count, |table, part, shard| {
                 let pile = piles.iter().find(|pile| pile.table == table && pile.parts.contains(&part));
                 loads[shard as usize] += pile.expect("is of a pile").cost;
                 assert_eq!(dealt.insert((table, part), shard), None);
             });
             assert_eq!(dealt.len(), 701 + 13 + 1 + 60);
-            for shard in 0..count {
-                deal.parts_of(shard, |table, part| assert_eq!(dealt.remove(&(table, part)), Some(shard)));
-            }
-            assert!(dealt.is_empty());
             assert_eq!(loads.iter().sum::<u64>(), total);
             let greatest = loads.iter().copied().max().unwrap_or(0);
             assert!(greatest as f64 <= total as f64 / count as f64 + 90.0, "{count}: {greatest}");
@@ -262,8 +219,7 @@ mod tests {
         for count in [2_u64, 4, 8, 16] {
             // In truth every `count`-th part costs 100 times as much.
             let mut loads = vec![0; count as usize];
-            Deal::new(piles.to_vec(), count)
-                .every(|_, part, shard| loads[shard as usize] += if part % count == 0 { 100 } else { 1 });
+            deal(&piles, count, |_, part, shard| loads[shard as usize] += if part % count == 0 { 100 } else { 1 });
             let mean = loads.iter().sum::<u64>() as f64 / count as f64;
             // As even as chance makes it; dealt in turn, one shard would have nearly everything.
             assert!(loads.iter().all(|load| (*load as f64) < 1.6 * mean), "{count}: {loads:?}");

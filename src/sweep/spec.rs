@@ -1,57 +1,46 @@
 //! The spec as it is written: its keys and their types, and nothing about what is legal.
 
-use std::fmt;
 use std::path::PathBuf;
 
 use indexmap::IndexMap;
-use serde::de::value::{MapAccessDeserializer, SeqAccessDeserializer};
-use serde::de::{MapAccess, SeqAccess, Visitor};
-use serde::{Deserialize, Deserializer};
+use toml::de::DeValue;
+
+use super::error::Faults;
+use super::read::{Entry, Read, keys};
 
 /// A sweep spec.
-#[derive(Debug, Clone, PartialEq, Default, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[derive(Debug, Clone, PartialEq, Default)]
 pub struct Spec {
     /// Name of the dataset and of its folder.
     pub name: String,
     /// What the sweep is for.
-    #[serde(default)]
     pub description: String,
     /// A file of points whose columns are axes that vary together, and labels; relative to the spec.
     pub points: Option<PathBuf>,
     /// Axes that advance together.
-    #[serde(default)]
     pub zip: Vec<Vec<String>>,
     /// Condition of the points to keep.
-    #[serde(rename = "where")]
     pub condition: Option<String>,
     /// Grids to unite, each with axes of its own.
-    #[serde(default)]
     pub block: Vec<BlockSpec>,
     /// What is modelled.
-    #[serde(default)]
     pub model: ModelSpec,
     /// How accurate the numbers are.
-    #[serde(default)]
     pub accuracy: AccuracySpec,
     /// The axes, the last varies fastest.
-    #[serde(default)]
     pub axes: IndexMap<String, AxisSpec>,
     /// The tables to write.
-    #[serde(default)]
     pub tables: IndexMap<String, TableSpec>,
 }
 
 /// A key of `[[block]]`, or of the top level of a spec without blocks.
-#[derive(Debug, Clone, PartialEq, Default, Deserialize)]
-#[serde(deny_unknown_fields, default)]
+#[derive(Debug, Clone, PartialEq, Default)]
 pub struct BlockSpec {
     /// A file of points whose columns are axes that vary together, and labels; relative to the spec.
     pub points: Option<PathBuf>,
     /// Axes that advance together.
     pub zip: Vec<Vec<String>>,
     /// Condition of the points to keep.
-    #[serde(rename = "where")]
     pub condition: Option<String>,
     /// The axes, the last varies fastest.
     pub axes: IndexMap<String, AxisSpec>,
@@ -75,8 +64,7 @@ impl Spec {
 }
 
 /// `[model]`.
-#[derive(Debug, Clone, PartialEq, Deserialize)]
-#[serde(deny_unknown_fields, default)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct ModelSpec {
     /// Whether optimal protocols obey `v >= 1`.
     pub velocity_bound: bool,
@@ -106,8 +94,7 @@ impl Default for ModelSpec {
 }
 
 /// `[accuracy]`.
-#[derive(Debug, Clone, PartialEq, Deserialize)]
-#[serde(deny_unknown_fields, default)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct AccuracySpec {
     /// Relative accuracy of the numbers.
     pub rtol: f64,
@@ -140,8 +127,7 @@ pub enum AxisValue {
 }
 
 /// An axis written as a table.
-#[derive(Debug, Clone, PartialEq, Default, Deserialize)]
-#[serde(deny_unknown_fields, default)]
+#[derive(Debug, Clone, PartialEq, Default)]
 pub struct AxisForm {
     /// `[first, last, count]`, evenly spaced.
     pub linspace: Option<Vec<f64>>,
@@ -160,8 +146,7 @@ pub struct AxisForm {
 }
 
 /// The value of a key of `[tables]`.
-#[derive(Debug, Clone, PartialEq, Default, Deserialize)]
-#[serde(deny_unknown_fields, default)]
+#[derive(Debug, Clone, PartialEq, Default)]
 pub struct TableSpec {
     /// The columns to compute and write; all by default.
     pub columns: Option<Vec<String>>,
@@ -171,66 +156,32 @@ pub struct TableSpec {
     pub reduce: Option<String>,
 }
 
-impl<'de> Deserialize<'de> for AxisSpec {
-    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        deserializer.deserialize_any(AxisVisitor)
+keys! {
+    Spec {
+        "name": name, "description": description, "points": points, "zip": zip, "where": condition, "block": block,
+        "model": model, "accuracy": accuracy, "axes": axes, "tables": tables
     }
+    BlockSpec { "points": points, "zip": zip, "where": condition, "axes": axes }
+    ModelSpec {
+        "velocity_bound": velocity_bound, "units": units, "mu_0": mu_0, "l": l, "v_0": v_0, "normal_load": normal_load
+    }
+    AccuracySpec { "rtol": rtol }
+    AxisForm {
+        "linspace": linspace, "geomspace": geomspace, "unit": unit, "expr": expr, "sobol": sobol, "lhs": lhs, "seed": seed
+    }
+    TableSpec { "columns": columns, "rtol": rtol, "reduce": reduce }
 }
 
-struct AxisVisitor;
+/// What an axis of numbers may be.
+pub const AXIS: &str = "a number, a list of numbers or a range such as { linspace = [first, last, count] }";
 
-impl<'de> Visitor<'de> for AxisVisitor {
-    type Value = AxisSpec;
-
-    fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str("a number, a list of numbers or a range such as { linspace = [first, last, count] }")
-    }
-
-    fn visit_f64<E>(self, value: f64) -> Result<AxisSpec, E> {
-        Ok(AxisSpec::One(AxisValue::Number(value)))
-    }
-
-    fn visit_i64<E>(self, value: i64) -> Result<AxisSpec, E> {
-        Ok(AxisSpec::One(AxisValue::Number(value as f64)))
-    }
-
-    fn visit_str<E>(self, word: &str) -> Result<AxisSpec, E> {
-        Ok(AxisSpec::One(AxisValue::Word(word.to_owned())))
-    }
-
-    fn visit_seq<A: SeqAccess<'de>>(self, values: A) -> Result<AxisSpec, A::Error> {
-        Vec::deserialize(SeqAccessDeserializer::new(values)).map(AxisSpec::List)
-    }
-
-    fn visit_map<A: MapAccess<'de>>(self, form: A) -> Result<AxisSpec, A::Error> {
-        AxisForm::deserialize(MapAccessDeserializer::new(form)).map(AxisSpec::Form)
-    }
-}
-
-impl<'de> Deserialize<'de> for AxisValue {
-    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        deserializer.deserialize_any(ValueVisitor)
-    }
-}
-
-struct ValueVisitor;
-
-impl Visitor<'_> for ValueVisitor {
-    type Value = AxisValue;
-
-    fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str("a number")
-    }
-
-    fn visit_f64<E>(self, value: f64) -> Result<AxisValue, E> {
-        Ok(AxisValue::Number(value))
-    }
-
-    fn visit_i64<E>(self, value: i64) -> Result<AxisValue, E> {
-        Ok(AxisValue::Number(value as f64))
-    }
-
-    fn visit_str<E>(self, word: &str) -> Result<AxisValue, E> {
-        Ok(AxisValue::Word(word.to_owned()))
+impl Read for AxisSpec {
+    fn read(entry: Entry<'_>, faults: &mut Faults) -> Option<AxisSpec> {
+        match entry.value {
+            DeValue::Array(_) => Read::read(entry, faults).map(AxisSpec::List),
+            DeValue::Table(_) => Read::read(entry, faults).map(AxisSpec::Form),
+            DeValue::Datetime(_) => entry.wrong("a number, a word, a list or a table", faults),
+            _ => entry.one().map(AxisSpec::One).or_else(|| entry.wrong(AXIS, faults)),
+        }
     }
 }

@@ -1,7 +1,7 @@
 //! `[model] units`: whether a sweep is given in scaled units or in SI, and which values are legal in them.
 
-use super::error::SpecError;
-use super::spec::ModelSpec;
+use super::error::{SpecError, refuse};
+use super::spec::{ModelSpec, Spec};
 use crate::grid::{Axis, Quantity, Scale, Values};
 use crate::model::{Scales, Units};
 
@@ -19,39 +19,32 @@ pub fn units(model: &ModelSpec) -> Result<Units, SpecError> {
     match model.units.to_ascii_lowercase().as_str() {
         "dimensionless" => match scales.into_iter().find(|(_, value, _)| value.is_some()) {
             None => Ok(Units::Scaled),
-            Some((name, ..)) => Err(SpecError::new(
-                format!("model.{name}"),
-                "a scale of a dimensionless sweep",
-                "units = \"si\" beside it",
-                "add `units = \"si\"` and give SI values, or remove it",
-            )),
+            Some((name, ..)) => {
+                let (key, help) = (format!("model.{name}"), "add `units = \"si\"` and give SI values, or remove it");
+                refuse(key, "a scale of a dimensionless sweep", "units = \"si\" beside it", help)
+            }
         },
         "si" => {
             let mut values = [0.0; 4];
             for (place, (name, value, unit)) in scales.into_iter().enumerate() {
                 let Some(value) = value else {
-                    return Err(SpecError::new(
-                        "model.units",
-                        format!("\"si\" without `{name}`"),
-                        "mu_0, l in m, v_0 in m/s and normal_load in Pa",
-                        format!("add `{name} = ...` to [model]"),
-                    ));
+                    let expected = "mu_0, l in m, v_0 in m/s and normal_load in Pa";
+                    let (found, help) = (format!("\"si\" without `{name}`"), format!("add `{name} = ...` to [model]"));
+                    return refuse("model.units", found, expected, help);
                 };
                 if !(value > 0.0 && value.is_finite()) {
                     let (key, expected) = (format!("model.{name}"), format!("{name} > 0, finite, in {unit}"));
-                    return Err(SpecError::new(key, format!("{value:?} is out of range"), expected, "correct it"));
+                    return refuse(key, format!("{value:?} is out of range"), expected, "correct it");
                 }
                 values[place] = value;
             }
             let [mu_0, l, v_0, normal_load] = values;
             Ok(Units::Si(Scales { mu_0, l, v_0, normal_load }))
         }
-        _ => Err(SpecError::new(
-            "model.units",
-            format!("unknown unit system {:?}", model.units),
-            "\"dimensionless\" or \"si\"",
-            "write units = \"si\" and give SI values, or remove the line",
-        )),
+        _ => {
+            let (found, expected) = (format!("unknown unit system {:?}", model.units), "\"dimensionless\" or \"si\"");
+            refuse("model.units", found, expected, "write units = \"si\" and give SI values, or remove the line")
+        }
     }
 }
 
@@ -95,25 +88,18 @@ pub fn doubt(prefix: &str, units: &Units, axis: &Axis) -> Option<SpecError> {
     if *units == Units::Scaled || !matches!(axis.quantity, Quantity::InitialVelocity | Quantity::FinalVelocity) {
         return None;
     }
-    let values: Box<dyn Iterator<Item = f64>> = match &axis.values {
-        Values::List(values) => Box::new(values.iter().copied()),
-        Values::Linspace { first, last, .. } | Values::Geomspace { first, last, .. } => {
-            Box::new([*first, *last].into_iter())
-        }
+    let greatest = match &axis.values {
+        Values::List(values) => values.iter().copied().fold(0.0, f64::max),
+        Values::Linspace { first, last, .. } | Values::Geomspace { first, last, .. } => first.max(*last),
     };
-    let greatest = values.fold(0.0, f64::max);
     (greatest > DOUBTFUL_VELOCITY).then(|| {
-        SpecError::new(
-            format!("{prefix}axes.{}", axis.quantity.name()),
-            format!("{greatest:?} m/s is faster than anything slides"),
-            "velocities in m/s, as `units = \"si\"` says",
-            SCALED_IN_SI,
-        )
+        let (key, expected) =
+            (format!("{prefix}axes.{}", axis.quantity.name()), "velocities in m/s, as `units = \"si\"` says");
+        SpecError::new(key, format!("{greatest:?} m/s is faster than anything slides"), expected, SCALED_IN_SI)
     })
 }
 
 /// The units of the dataset that was made from the spec `text`.
 pub fn units_of(text: &str) -> Result<Units, SpecError> {
-    let spec = super::place::parse(text)?;
-    units(&spec.model)
+    units(&Spec::parse(text)?.model)
 }

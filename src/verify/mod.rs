@@ -73,7 +73,7 @@ pub struct VerifyError(String);
 
 /// Audits `sample` rows of every table of the dataset in `path`.
 pub fn verify(path: &Path, manifest: &Manifest, sample: u64, seed: u64) -> Result<Vec<Audit>, VerifyError> {
-    let spec: Spec = toml::from_str(&manifest.spec)
+    let spec = Spec::parse(&manifest.spec)
         .map_err(|error| VerifyError(format!("the spec in the manifest cannot be read: {error}")))?;
     let units = sweep::units(&spec.model).map_err(|error| VerifyError(error.to_string()))?;
     let folder = Folder::at(path);

@@ -15,8 +15,8 @@ use super::super::quantity::Quantity;
 use super::program::{Binary, Expression, Op, Unary};
 use crate::names::nearest;
 
-/// The longest expression, in bytes: it bounds memory and depth.
-const LONGEST: usize = 1000;
+/// Bytes of an expression at most. Chosen: a few lines of text; it bounds memory and depth.
+const MAX_BYTES: usize = 1000;
 
 /// What is wrong with an expression.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -29,8 +29,6 @@ pub struct Fault {
     pub expected: String,
     /// What to do.
     pub help: String,
-    /// A name that is not known, and those that are.
-    pub unknown: Option<Box<(String, Vec<&'static str>)>>,
 }
 
 impl Fault {
@@ -40,7 +38,14 @@ impl Fault {
         expected: impl Into<String>,
         help: impl Into<String>,
     ) -> Fault {
-        Fault { position, found: found.into(), expected: expected.into(), help: help.into(), unknown: None }
+        Fault { position, found: found.into(), expected: expected.into(), help: help.into() }
+    }
+
+    /// That of a name which is none of `known`.
+    fn unknown(position: Option<u64>, what: &str, name: &str, known: &[&str]) -> Fault {
+        let meant = nearest(name, known.iter().copied()).map(|meant| format!("did you mean `{meant}`?"));
+        let help = meant.unwrap_or_else(|| "remove it, or choose one of these".to_owned());
+        Fault::new(position, format!("unknown {what} `{name}`"), known.join(", "), help)
     }
 }
 
@@ -78,12 +83,8 @@ impl Expression {
         if kind == Kind::Number {
             return Ok(expression);
         }
-        Err(Fault::new(
-            None,
-            format!("`{text}` is true or false"),
-            "a number",
-            "use it in `where`, or compute a number",
-        ))
+        let help = "use it in `where`, or compute a number";
+        Err(Fault::new(None, format!("`{text}` is true or false"), "a number", help))
     }
 
     /// Reads a condition on `axes` and on the labels of `points`.
@@ -104,9 +105,9 @@ enum Kind {
 }
 
 fn read(text: &str, axes: &[Quantity], points: Option<&Factor>) -> Result<(Expression, Kind), Fault> {
-    if text.len() > LONGEST {
+    if text.len() > MAX_BYTES {
         let found = format!("{} characters", text.chars().count());
-        return Err(Fault::new(None, found, format!("at most {LONGEST}"), "shorten the expression"));
+        return Err(Fault::new(None, found, format!("at most {MAX_BYTES}"), "shorten the expression"));
     }
     // To SQL the first two begin comments: what follows them would be passed over.
     let foreign = [("--", "put a space or parentheses between"), ("/*", "remove it"), ("**", "write `^` for a power")];
@@ -140,12 +141,8 @@ fn read(text: &str, axes: &[Quantity], points: Option<&Factor>) -> Result<(Expre
 fn syntax(line: &str, error: ParserError) -> Fault {
     let message = match error {
         ParserError::RecursionLimitExceeded => {
-            return Fault::new(
-                None,
-                "parentheses too deep inside each other",
-                "a flatter expression",
-                "take parentheses away",
-            );
+            let found = "parentheses too deep inside each other";
+            return Fault::new(None, found, "a flatter expression", "take parentheses away");
         }
         ParserError::TokenizerError(message) | ParserError::ParserError(message) => message,
     };
@@ -280,11 +277,8 @@ impl Compiler<'_> {
     fn axis(&self, name: &str, expression: &Expr) -> Result<Quantity, Fault> {
         let known = self.axes.iter().copied().find(|quantity| quantity.name() == name);
         known.ok_or_else(|| {
-            let known = self.axes.iter().map(|quantity| quantity.name()).collect();
-            Fault {
-                unknown: Some(Box::new((name.to_owned(), known))),
-                ..Fault::new(position(expression), format!("unknown axis `{name}`"), "", "")
-            }
+            let known: Vec<&str> = self.axes.iter().map(|quantity| quantity.name()).collect();
+            Fault::unknown(position(expression), "axis", name, &known)
         })
     }
 
@@ -300,21 +294,13 @@ impl Compiler<'_> {
         if found == wanted {
             return Ok(());
         }
-        let position = position(expression);
-        Err(match found {
-            Kind::Truth => Fault::new(
-                position,
-                format!("`{expression}` is true or false"),
-                "a number",
-                "write each comparison on its own, as in `1 < v_i and v_i < 3`",
-            ),
-            Kind::Number => Fault::new(
-                position,
-                format!("`{expression}` is a number"),
-                "true or false",
-                "compare it, as in `v_f > 3`",
-            ),
-        })
+        let (is, expected, help) = match found {
+            Kind::Truth => {
+                ("true or false", "a number", "write each comparison on its own, as in `1 < v_i and v_i < 3`")
+            }
+            Kind::Number => ("a number", "true or false", "compare it, as in `v_f > 3`"),
+        };
+        Err(Fault::new(position(expression), format!("`{expression}` is {is}"), expected, help))
     }
 
     /// The fault of a comparison of `axis` with a word, `other`, that does not stand in single quotes.
@@ -339,9 +325,9 @@ impl Compiler<'_> {
                 return Err(fault);
             }
         }
-        let (axis, word) = match (word(left), word(right)) {
-            (None, Some(word)) => (left, (word, right)),
-            (Some(word), None) => (right, (word, left)),
+        let (axis, word, place) = match (word(left), word(right)) {
+            (None, Some(word)) => (left, word, right),
+            (Some(word), None) => (right, word, left),
             _ => {
                 self.operand(left, Kind::Number)?;
                 self.operand(right, Kind::Number)?;
@@ -349,23 +335,16 @@ impl Compiler<'_> {
                 return Ok(());
             }
         };
-        let (word, place) = word;
         let Expr::Identifier(name) = axis else { return Err(foreign(place)) };
         if let Some((axis, number, label)) = self.label(&name.value) {
             let Some(code) = label.words.iter().position(|known| known == word) else {
-                let (found, expected) =
-                    (format!("no point has the {name} '{word}'"), format!("a word of the column `{name}`"));
-                let help = match nearest(word, label.words.iter().map(String::as_str)) {
-                    Some(meant) => format!("did you mean `{meant}`?"),
-                    None => "correct the word".to_owned(),
-                };
-                return Err(Fault::new(position(place), found, expected, help));
+                let found = format!("no point has the {name} '{word}'");
+                let meant = nearest(word, label.words.iter().map(String::as_str));
+                let help = meant.map_or("correct the word".to_owned(), |meant| format!("did you mean `{meant}`?"));
+                return Err(Fault::new(position(place), found, format!("a word of the column `{name}`"), help));
             };
-            self.program.extend([
-                Op::Label { label: number, axis },
-                Op::Number(code as f64),
-                Op::Binary(Binary::Equal),
-            ]);
+            let label = Op::Label { label: number, axis };
+            self.program.extend([label, Op::Number(code as f64), Op::Binary(Binary::Equal)]);
             return Ok(());
         }
         let quantity = self.axis(&name.value, axis)?;
@@ -375,10 +354,7 @@ impl Compiler<'_> {
                 let found = format!("'{word}' is a word, `{}` a number", quantity.name());
                 return Err(Fault::new(position(place), found, "a number", "remove the quotes"));
             }
-            return Err(Fault {
-                unknown: Some(Box::new((word.to_owned(), words))),
-                ..Fault::new(position(place), format!("unknown {} `{word}`", quantity.name()), "", "")
-            });
+            return Err(Fault::unknown(position(place), quantity.name(), word, &words));
         };
         self.program.extend([Op::Axis(quantity), Op::Number(number as f64), Op::Binary(Binary::Equal)]);
         Ok(())
@@ -450,11 +426,8 @@ impl Compiler<'_> {
                 self.program.extend((place > 0).then_some(Op::Binary(*function)));
             }
         } else {
-            let known = UNARY.iter().map(|(name, _)| *name).chain(BINARY.iter().map(|(name, _)| *name)).collect();
-            return Err(Fault {
-                unknown: Some(Box::new((name.to_owned(), known))),
-                ..Fault::new(position(whole), format!("unknown function `{name}`"), "", "")
-            });
+            let known = UNARY.iter().map(|(name, _)| *name).chain(BINARY.iter().map(|(name, _)| *name));
+            return Err(Fault::unknown(position(whole), "function", name, &known.collect::<Vec<_>>()));
         }
         Ok(Kind::Number)
     }

@@ -1,0 +1,274 @@
+//! Reading a spec from TOML, every value by its type and every fault with its key and line; and where in a text a key is.
+
+use std::path::PathBuf;
+
+use indexmap::IndexMap;
+use toml::Spanned;
+use toml::de::{DeTable, DeValue};
+
+use super::error::{Faults, SpecError, unknown};
+use super::spec::{AxisValue, Spec};
+use crate::names::nearest;
+
+impl Spec {
+    /// Reads a spec from TOML.
+    ///
+    /// # Errors
+    ///
+    /// What keeps it from being read.
+    pub fn parse(text: &str) -> Result<Spec, SpecError> {
+        let mut faults = Faults::default();
+        let spec = read(text, &mut faults)?;
+        faults.finish(text).map(|()| spec)
+    }
+}
+
+/// Reads a spec from TOML, as far as it can be read. A key whose value has the wrong type, or that no spec has, is a fault, and left out: what is
+/// right is checked all the same.
+///
+/// # Errors
+///
+/// What is no TOML.
+pub fn read(text: &str, faults: &mut Faults) -> Result<Spec, SpecError> {
+    let document = DeTable::parse(text).map_err(|error| syntax(text, &error))?;
+    let value = DeValue::Table(document.into_inner());
+    let mut spec = Spec::read(Entry { key: "", start: 0, value: &value, text }, faults).unwrap_or_default();
+    if value.get("name").is_none() && !faults.concern("name") {
+        let missing = SpecError::new("", "`name` is missing", "a key `name`", "add `name = ...`");
+        faults.push(SpecError { line: Some(1), ..missing });
+    }
+    if !value.get("name").is_some_and(|name| name.get_ref().is_str()) {
+        // A name that is wrong is one fault.
+        spec.name = "missing".to_owned();
+    }
+    Ok(spec)
+}
+
+/// A complaint of the parser.
+fn syntax(text: &str, error: &toml::de::Error) -> SpecError {
+    let (message, span) = (error.message(), error.span());
+    let fault = if message.starts_with("duplicate key") {
+        let name = span.clone().and_then(|span| text.get(span)).unwrap_or_default();
+        SpecError::new("", format!("the key `{name}` is there twice"), "each key once", "remove one of the two")
+    } else {
+        let expected = "key = value, [table] or # comment";
+        SpecError::new("", format!("not TOML: {message}"), expected, "correct the line")
+    };
+    SpecError { line: span.map(|span| line_of(text, span.start)), ..fault }
+}
+
+/// A value of a spec in its place.
+#[derive(Clone, Copy)]
+pub struct Entry<'a> {
+    /// Its key, as in `axes.v_i[2]`.
+    key: &'a str,
+    /// Where it begins in the text.
+    start: usize,
+    /// What it is.
+    pub value: &'a DeValue<'a>,
+    text: &'a str,
+}
+
+/// What a value of TOML may be read as.
+pub trait Read: Sized {
+    /// The value of an entry; `None` if it is a fault, which is noted.
+    fn read(entry: Entry<'_>, faults: &mut Faults) -> Option<Self>;
+}
+
+impl Entry<'_> {
+    /// Notes a value of the wrong type.
+    pub fn wrong<T>(self, expected: &str, faults: &mut Faults) -> Option<T> {
+        let found = match self.value {
+            DeValue::String(word) => format!("string {word:?}"),
+            DeValue::Integer(number) => format!("integer `{number}`"),
+            DeValue::Float(number) => format!("floating point `{number}`"),
+            DeValue::Boolean(is) => format!("boolean `{is}`"),
+            DeValue::Datetime(_) => "a date".to_owned(),
+            DeValue::Array(_) => "sequence".to_owned(),
+            DeValue::Table(_) => "map".to_owned(),
+        };
+        self.fault(SpecError::new(self.key, format!("found {found}"), expected, "change the value"), faults);
+        None
+    }
+
+    fn fault(self, fault: SpecError, faults: &mut Faults) {
+        faults.push(SpecError { line: Some(line_of(self.text, self.start)), ..fault });
+    }
+
+    fn integer(self) -> Option<i64> {
+        let number = self.value.as_integer()?;
+        i64::from_str_radix(number.as_str(), number.radix()).ok()
+    }
+
+    /// The value as a number; one beyond the range of doubles is none.
+    fn number(self) -> Option<f64> {
+        let Some(number) = self.value.as_float() else { return self.integer().map(|number| number as f64) };
+        let value = number.as_str().parse::<f64>().ok()?;
+        (value.is_finite() || !number.as_str().contains(|c: char| c.is_ascii_digit())).then_some(value)
+    }
+
+    /// The value as one of an axis.
+    pub fn one(self) -> Option<AxisValue> {
+        let word = self.value.as_str().map(|word| AxisValue::Word(word.to_owned()));
+        word.or_else(|| self.number().map(AxisValue::Number))
+    }
+
+    /// Gives `take` each entry of a table whose keys are `known`; any keys without those.
+    pub fn each(
+        self,
+        known: &[&str],
+        faults: &mut Faults,
+        mut take: impl FnMut(&str, Entry<'_>, &mut Faults),
+    ) -> Option<()> {
+        let DeValue::Table(table) = self.value else { return self.wrong("a table", faults) };
+        let prefix = if self.key.is_empty() { String::new() } else { format!("{}.", self.key) };
+        for (name, value) in table {
+            let (start, name) = (name.span().start, name.get_ref().as_ref());
+            let key = format!("{prefix}{name}");
+            let entry = Entry { key: &key, start, value: value.get_ref(), ..self };
+            if known.is_empty() || known.contains(&name) {
+                take(name, entry, faults);
+            } else {
+                let meant = nearest(name, known.iter().copied());
+                meant.into_iter().for_each(|meant| faults.suspect(format!("{prefix}{meant}")));
+                entry.fault(unknown(key.clone(), "key", name, known), faults);
+            }
+            if faults.are_enough() {
+                break;
+            }
+        }
+        Some(())
+    }
+}
+
+/// Reads tables from the entries of TOML, each key to its field; those that are not there keep their defaults.
+macro_rules! keys {
+    ($($table:ty { $($key:literal: $field:ident),+ })+) => { $(
+        impl Read for $table {
+            fn read(entry: Entry<'_>, faults: &mut Faults) -> Option<Self> {
+                let mut read = Self::default();
+                entry.each(&[$($key),+], faults, |name, entry, faults| match name {
+                    $($key => read.$field = Read::read(entry, faults).unwrap_or(std::mem::take(&mut read.$field)),)+
+                    _ => {}
+                })?;
+                Some(read)
+            }
+        }
+    )+ };
+}
+pub(super) use keys;
+
+/// Reads values of one type, with what a message expects.
+macro_rules! values {
+    ($($type:ty, $expected:literal: $read:expr;)+) => { $(
+        impl Read for $type {
+            fn read(entry: Entry<'_>, faults: &mut Faults) -> Option<$type> {
+                let read: fn(Entry<'_>) -> Option<$type> = $read;
+                read(entry).or_else(|| entry.wrong($expected, faults))
+            }
+        }
+    )+ };
+}
+
+values! {
+    String, "a string": |entry| entry.value.as_str().map(str::to_owned);
+    PathBuf, "a string": |entry| entry.value.as_str().map(PathBuf::from);
+    bool, "true or false": |entry| entry.value.as_bool();
+    i64, "a whole number": |entry| entry.integer();
+    f64, "a number": |entry| entry.number();
+    AxisValue, "a number": |entry| entry.one();
+}
+
+impl<T: Read> Read for Option<T> {
+    fn read(entry: Entry<'_>, faults: &mut Faults) -> Option<Option<T>> {
+        T::read(entry, faults).map(Some)
+    }
+}
+
+impl<T: Read> Read for Vec<T> {
+    fn read(entry: Entry<'_>, faults: &mut Faults) -> Option<Vec<T>> {
+        let items = match entry.value {
+            DeValue::Array(items) => items.iter().enumerate(),
+            DeValue::Table(_) if entry.key == "block" => {
+                let (expected, help) = ("[[block]], as often as there are blocks", "write two brackets");
+                entry.fault(SpecError::new("block", "one [block]", expected, help), faults);
+                return None;
+            }
+            _ => return entry.wrong("a list", faults),
+        };
+        let mut read = |(index, item): (usize, &Spanned<DeValue<'_>>)| {
+            let key = format!("{}[{index}]", entry.key);
+            T::read(Entry { key: &key, start: item.span().start, value: item.get_ref(), text: entry.text }, faults)
+        };
+        items.map(&mut read).collect()
+    }
+}
+
+impl<T: Read> Read for IndexMap<String, T> {
+    fn read(entry: Entry<'_>, faults: &mut Faults) -> Option<IndexMap<String, T>> {
+        let mut read = IndexMap::new();
+        entry.each(&[], faults, |name, entry, faults| {
+            read.extend(T::read(entry, faults).map(|value| (name.to_owned(), value)));
+        })?;
+        Some(read)
+    }
+}
+
+/// Gives faults without a line that of their key (as in `axes.v_i[2]`) in `text`, or of the closest part of it that exists.
+pub fn find_lines(text: &str, faults: &mut [SpecError]) {
+    let Ok(document) = DeTable::parse(text) else { return };
+    for fault in faults.iter_mut().filter(|fault| fault.line.is_none()) {
+        fault.line = find(document.get_ref(), &fault.key).map(|found| line_of(text, found.start));
+    }
+}
+
+/// The line of `key` (as in `axes.v_i[2]`), or of the closest part of it that exists.
+pub fn line(text: &str, key: &str) -> Option<usize> {
+    let document = DeTable::parse(text).ok()?;
+    Some(line_of(text, find(document.get_ref(), key)?.start))
+}
+
+/// The value of `key` as it is written; `None` if it is not there, or a table of its own.
+pub fn value(text: &str, key: &str) -> Option<String> {
+    let document = DeTable::parse(text).ok()?;
+    let found = find(document.get_ref(), key).filter(|found| found.is_whole)?;
+    let written = text.get(found.value.span())?;
+    // The span of a `[table]` is that of its header.
+    let is_value = !found.value.get_ref().is_table() || written.starts_with('{');
+    is_value.then(|| written.split_whitespace().collect::<Vec<_>>().join(" "))
+}
+
+/// The entry of a key, or of the closest part of it that exists.
+struct Found<'a, 'i> {
+    start: usize,
+    value: &'a Spanned<DeValue<'i>>,
+    /// Whether it is all of the key.
+    is_whole: bool,
+}
+
+fn find<'a, 'i>(document: &'a DeTable<'i>, key: &str) -> Option<Found<'a, 'i>> {
+    let entry = |table: &'a DeTable<'i>, name: &str| {
+        let (key, value) = table.get_key_value(name)?;
+        Some(Found { start: key.span().start, value, is_whole: true })
+    };
+    let mut steps = key.split(['.', '[', ']']).filter(|step| !step.is_empty());
+    let mut found = entry(document, steps.next()?)?;
+    for step in steps {
+        let next = match found.value.get_ref() {
+            DeValue::Table(table) => entry(table, step),
+            DeValue::Array(items) => step.parse().ok().and_then(|index: usize| {
+                items.get(index).map(|value| Found { start: value.span().start, value, is_whole: true })
+            }),
+            _ => None,
+        };
+        match next {
+            Some(next) => found = next,
+            None => return Some(Found { is_whole: false, ..found }),
+        }
+    }
+    Some(found)
+}
+
+fn line_of(text: &str, offset: usize) -> usize {
+    1 + text.bytes().take(offset).filter(|&byte| byte == b'\n').count()
+}
