@@ -6,8 +6,9 @@ use super::figure::{Axis, Drawn, Hover};
 const STYLE: &str = include_str!("page/style.css");
 const SCRIPT: &str = include_str!("page/script.js");
 
-/// Most values of the maps of a picture that go into the page: of finer maps every second cell along both axes, or every third.
-const MOST_CELLS: usize = 500_000;
+/// Values of the maps of a picture that go into the page: of finer maps every second cell along both axes, or every third. Chosen: a few
+/// megabytes of text.
+const MAX_CELLS: usize = 500_000;
 
 /// A page under construction.
 #[derive(Debug)]
@@ -63,7 +64,7 @@ impl Page {
             .replace("url(#clip", &format!("url(#p{place}-clip"));
         self.body.push_str(&format!("<figure id=\"picture-{place}\">{svg}"));
         let cells: usize = drawn.hovers.iter().map(|(.., hover)| hover.word.len()).sum();
-        let step = (1..).find(|step| cells / (step * step) <= MOST_CELLS).unwrap_or(1);
+        let step = (1..).find(|step| cells / (step * step) <= MAX_CELLS).unwrap_or(1);
         if !drawn.hovers.is_empty() {
             let maps: Vec<serde_json::Value> = drawn
                 .hovers

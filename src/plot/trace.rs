@@ -3,10 +3,11 @@
 use std::path::Path;
 
 use super::canvas::Stroke;
-use super::colour::{self, MOST_SERIES};
+use super::colour::{self, MAX_SERIES};
 use super::error::PlotError;
-use super::figure::{Axis, Entry, Figure, Key, Layer, MARKED, Marker, Panel};
+use super::figure::{Axis, Entry, Figure, Key, Layer, MAX_MARKED_POINTS, Panel};
 use super::scale::Scale;
+use super::symbol::Symbol;
 use super::{coincide, label};
 use crate::dataset::frame::{self, Cells, Facts};
 use crate::file;
@@ -15,8 +16,11 @@ use crate::model::{Scales, Units};
 use crate::table::Kind;
 use crate::trace::COLUMNS;
 
-/// Points of a picture beyond which a line is thinned: four to a dot of a wide picture in print.
-const MOST_POINTS: usize = 8000;
+/// Points of a line, above which it is thinned. Chosen: four to a dot of a wide picture in print.
+const MAX_POINTS: usize = 8000;
+
+/// Ratio of height to width of a panel. Chosen: three of them make a square.
+const ASPECT: f64 = 0.42;
 
 /// What a trace may hold besides the time, and what a picture shows of it, a panel each: the velocity of the block and that of the control
 /// are compared in one.
@@ -149,7 +153,7 @@ impl Course {
     }
 
     fn is_marked(&self) -> bool {
-        self.points.is_some_and(|points| points < MARKED)
+        self.points.is_some_and(|points| points < MAX_MARKED_POINTS)
     }
 }
 
@@ -162,8 +166,8 @@ struct Curve {
 
 /// The figure of traces: a panel for each column that any of them has.
 pub fn figure(courses: &[Course]) -> Result<Figure, PlotError> {
-    if courses.len() > MOST_SERIES {
-        return Err(PlotError::TooManyTraces { found: courses.len(), most: MOST_SERIES });
+    if courses.len() > MAX_SERIES {
+        return Err(PlotError::TooManyTraces { found: courses.len(), most: MAX_SERIES });
     }
     one_unit(courses)?;
     let time = Scale { log: false, ..Scale::of(cells(courses, "t")).ok_or(PlotError::Nothing)? };
@@ -193,7 +197,7 @@ pub fn figure(courses: &[Course]) -> Result<Figure, PlotError> {
     let subtitle = equations(&common, &unit_in(courses, "t"));
     let legend = legend(courses, &leaders, &common);
     let panels = panels.into_iter().map(|(panel, curves)| draw(panel, curves, courses, &leaders)).collect();
-    Ok(Figure { title, subtitle, panels, columns: 1, aspect: 0.42, shared: true, legend, ..Figure::default() })
+    Ok(Figure { title, subtitle, panels, columns: 1, aspect: ASPECT, legend, ..Figure::default() })
 }
 
 /// The cells of a column in all courses.
@@ -243,7 +247,7 @@ fn draw(mut panel: Panel, curves: Vec<Curve>, courses: &[Course], leaders: &[usi
         let stroke = if rank == 0 { colour::series(course) } else { control(course) };
         panel.layers.push(Layer::Lines(vec![points.clone()], stroke));
         if courses[course].is_marked() && rank == 0 {
-            panel.layers.push(Layer::Points(points, Marker { series: course }));
+            panel.layers.push(Layer::Marks(points.into_iter().map(|at| (at, Symbol::of_series(course))).collect()));
         }
     }
     panel
@@ -300,11 +304,11 @@ fn unit_of(parameter: &str, time: &str) -> &'static str {
 
 /// The first, least, greatest and last point of each stretch of time, where there are more points than a picture shows.
 fn thinned(points: Vec<(f64, f64)>) -> Vec<(f64, f64)> {
-    if points.len() <= MOST_POINTS {
+    if points.len() <= MAX_POINTS {
         return points;
     }
-    let stretch = points.len().div_ceil(MOST_POINTS / 4);
-    let mut kept = Vec::with_capacity(MOST_POINTS + 4);
+    let stretch = points.len().div_ceil(MAX_POINTS / 4);
+    let mut kept = Vec::with_capacity(MAX_POINTS + 4);
     for chunk in points.chunks(stretch) {
         let by_value = |i: &usize, j: &usize| chunk[*i].1.total_cmp(&chunk[*j].1);
         let mut places =
@@ -333,7 +337,7 @@ mod tests {
         points[54_321].1 = 1e6;
         points[67_890].1 = -1e6;
         let kept = thinned(points.clone());
-        assert!(kept.len() <= MOST_POINTS + 4);
+        assert!(kept.len() <= MAX_POINTS + 4);
         assert!(kept.contains(&points[54_321]) && kept.contains(&points[67_890]));
         assert_eq!((kept.first(), kept.last()), (points.first(), points.last()));
     }

@@ -61,7 +61,7 @@ pub fn choose(survey: &Survey, defaults: &Defaults, request: &Request) -> Result
     let written = || defaults.lines.iter().copied().filter(|column| survey.has(column));
     let y = y.map_or_else(|| written().map(str::to_owned).collect(), |y| vec![y.to_owned()]);
     let series = colour.map(str::to_owned).or_else(|| choice.find(defaults.series, Some(&x), 2));
-    Ok(Shape::Lines(lines::Plan { x, log: Vec::new(), y, series }))
+    Ok(Shape::Lines(lines::Plan { x, y, series }))
 }
 
 /// What a choice depends on.
