@@ -17,7 +17,9 @@ use crate::protocol::Status;
 use crate::protocol::swift::{self, Case};
 use crate::sweep::{Spec, units};
 use crate::table;
-use crate::trace::{self, Absence, CLOSE_UP, COLUMNS, Course, GOOD, Parameter, Pathless, Protocol, Times, Trace};
+use crate::trace::{
+    self, Absence, COLUMNS, Course, Parameter, Pathless, Protocol, RANGE_RTOL, Times, Trace, VALUE_RTOL,
+};
 use crate::verify::scale;
 
 /// Arguments of `trace`.
@@ -513,8 +515,8 @@ fn header(arguments: &Arguments, asked: &Asked, course: &Course, trace: &Trace) 
         }
         None => text.push_str(&format!(
             "  {rows}; straight lines between them are good to {} of the range of a column, and to {} of v and theta\n",
-            words::number(GOOD),
-            words::number(CLOSE_UP)
+            words::number(RANGE_RTOL),
+            words::number(VALUE_RTOL)
         )),
     }
     text

@@ -139,14 +139,10 @@ impl Canvas {
     }
 
     /// A circle.
-    pub fn circle(&mut self, centre: (f64, f64), radius: f64, fill: &str, stroke: &Stroke) {
+    pub fn circle(&mut self, (x, y): (f64, f64), radius: f64, fill: &str, stroke: &Stroke) {
+        let place = format!("cx=\"{}\" cy=\"{}\" r=\"{}\"", at(x), at(y), at(radius));
         let style = format!("fill=\"{fill}\" stroke=\"{}\" stroke-width=\"{}\"", stroke.colour, at(stroke.width));
-        self.push(format_args!(
-            "<circle cx=\"{}\" cy=\"{}\" r=\"{}\" {style}/>",
-            at(centre.0),
-            at(centre.1),
-            at(radius)
-        ));
+        self.push(format_args!("<circle {place} {style}/>"));
     }
 
     /// A filled rectangle.

@@ -1,5 +1,6 @@
 //! Traces as the paper has its protocols: velocity, contact lifetime and friction over time, several of them over each other.
 
+use std::collections::BTreeSet;
 use std::path::Path;
 
 use super::canvas::Stroke;
@@ -74,20 +75,15 @@ pub fn read(path: &Path) -> Result<Course, PlotError> {
 }
 
 fn parquet(path: &Path) -> Result<(Vec<Column>, Facts), PlotError> {
-    let (headings, facts) = frame::headings(path).map_err(PlotError::Trace)?;
-    let names: Vec<&str> = headings.iter().filter(|heading| heading.is_number).map(|h| h.name.as_str()).collect();
-    let numbers =
-        frame::read(path, &names).map_err(PlotError::Trace)?.columns.into_iter().map(|(_, cells)| match cells {
-            Cells::Numbers(numbers) => numbers,
-            Cells::Words(..) => Vec::new(),
-        });
-    let numeric = headings.iter().filter(|heading| heading.is_number);
-    let column = |(heading, cells): (&frame::Heading, Vec<f64>)| Column {
-        name: heading.name.clone(),
-        unit: heading.unit.clone(),
-        cells,
+    let (mut headings, facts) = frame::headings(path).map_err(PlotError::Trace)?;
+    headings.retain(|heading| heading.is_number);
+    let names: Vec<&str> = headings.iter().map(|heading| heading.name.as_str()).collect();
+    let frame = frame::read(path, &names).map_err(PlotError::Trace)?;
+    let column = |(heading, (name, cells)): (&frame::Heading, (String, Cells))| match cells {
+        Cells::Numbers(cells) => Some(Column { name, unit: heading.unit.clone(), cells }),
+        Cells::Words(..) => None,
     };
-    Ok((numeric.zip(numbers).map(column).collect(), facts))
+    Ok((headings.iter().zip(frame.columns).filter_map(column).collect(), facts))
 }
 
 /// The columns of a CSV, and what its comments `# key = value` say; without a comment on units they are those of the
@@ -225,18 +221,19 @@ fn one_unit(courses: &[Course]) -> Result<(), PlotError> {
 
 /// For each course the first one that it lies on in all panels.
 fn leaders(count: usize, panels: &[(Panel, Vec<Curve>)]) -> Vec<usize> {
-    // The curves of a course in shares of the panels.
-    let in_shares = |(panel, curves): &(Panel, Vec<Curve>), course: usize| -> Vec<Curve> {
+    // The curves of a course in fractions of the panel, each with its column.
+    let curves = |(panel, curves): &(Panel, Vec<Curve>), course: usize| -> Vec<(usize, Vec<(f64, f64)>)> {
         let share = |(x, y): &(f64, f64)| (panel.x.scale.share(*x), panel.y.scale.share(*y));
         let own = curves.iter().filter(|curve| curve.course == course);
-        own.map(|curve| Curve { points: curve.points.iter().map(share).collect(), ..*curve }).collect()
+        own.map(|curve| (curve.rank, curve.points.iter().map(share).collect())).collect()
     };
-    let shares: Vec<Vec<Vec<Curve>>> =
-        (0..count).map(|course| panels.iter().map(|panel| in_shares(panel, course)).collect()).collect();
     coincide::leaders(count, |one, other| {
-        shares[one].iter().zip(&shares[other]).all(|(one, other)| {
-            let mut pairs = one.iter().zip(other);
-            one.len() == other.len() && pairs.all(|(a, b)| a.rank == b.rank && coincide::anywhere(&a.points, &b.points))
+        panels.iter().all(|panel| {
+            let (one, other) = (curves(panel, one), curves(panel, other));
+            let is_same = |((rank, points), (other_rank, other_points)): (&(usize, Vec<_>), &(usize, Vec<_>))| {
+                rank == other_rank && coincide::anywhere(points, other_points)
+            };
+            one.len() == other.len() && one.iter().zip(&other).all(is_same)
         })
     })
 }
@@ -307,20 +304,12 @@ fn thinned(points: Vec<(f64, f64)>) -> Vec<(f64, f64)> {
     if points.len() <= MAX_POINTS {
         return points;
     }
-    let stretch = points.len().div_ceil(MAX_POINTS / 4);
     let mut kept = Vec::with_capacity(MAX_POINTS + 4);
-    for chunk in points.chunks(stretch) {
+    for chunk in points.chunks(points.len().div_ceil(MAX_POINTS / 4)) {
         let by_value = |i: &usize, j: &usize| chunk[*i].1.total_cmp(&chunk[*j].1);
-        let mut places =
-            [Some(0), (0..chunk.len()).min_by(by_value), (0..chunk.len()).max_by(by_value), chunk.len().checked_sub(1)];
-        places.sort_unstable();
-        let mut last = None;
-        for place in places.into_iter().flatten() {
-            if last != Some(place) {
-                kept.push(chunk[place]);
-                last = Some(place);
-            }
-        }
+        let (least, greatest) = ((0..chunk.len()).min_by(by_value), (0..chunk.len()).max_by(by_value));
+        let places: BTreeSet<usize> = [0, chunk.len() - 1].into_iter().chain(least).chain(greatest).collect();
+        kept.extend(places.into_iter().map(|place| chunk[place]));
     }
     kept
 }

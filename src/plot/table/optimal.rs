@@ -83,27 +83,13 @@ fn strategies(scene: &Scene<'_>, plan: &map::Plan) -> Result<Figure, PlotError> 
     let (unit, unit_of_time) = (scene.size(other), scene.source.units.size("l/v_0"));
     let mut is_drawn = [false; 2];
     for (group, panel) in figure.panels.iter_mut().enumerate() {
-        let mut values = [0.0; AXES.len()];
-        let known = AXES.iter().zip(&mut values).enumerate().all(|(axis, (name, value))| {
-            let found = if axis == place { Some(0.0) } else { scene.scaled(&groups, group, name) };
-            found.map(|found| *value = found).is_some()
-        });
-        if !known {
-            continue;
-        }
+        let value = |&axis: &&str| if axis == other { Some(0.0) } else { scene.scaled(&groups, group, axis) };
+        let Some(mut values) = AXES.iter().map(value).collect::<Option<Vec<f64>>>() else { continue };
         let mut curves = [Vec::new(), Vec::new()];
         for step in 0..=CURVE_STEPS {
             let at = cells[1 - time].scale.value(step as f64 / CURVE_STEPS as f64);
             values[place] = at / unit;
-            let [a, b, v_i, v_f] = values;
-            let is_legal = a > 0.0 && b >= 0.0 && v_i > 1.0 && v_f > 1.0 && v_i != v_f;
-            let wanted = Wanted { cross: true, hold: true, cheapest: false, min: false, turn: false, free: false };
-            let times = is_legal.then(|| {
-                let transition = Transition { law: Law { a, b }, v_i, v_f };
-                crossover::solve(&transition, scene.source.bounded, RTOL, wanted).1
-            });
-            let [cross, hold] = [times.as_ref().and_then(|t| t.t_cross), times.as_ref().and_then(|t| t.t_hold)];
-            for (curve, found) in curves.iter_mut().zip([cross, hold]) {
+            for (curve, found) in curves.iter_mut().zip(changes(&values, scene.source.bounded)) {
                 let found = found.map_or(f64::NAN, |found| found * unit_of_time);
                 curve.push(if time == 0 { (found, at) } else { (at, found) });
             }
@@ -121,6 +107,18 @@ fn strategies(scene: &Scene<'_>, plan: &map::Plan) -> Result<Figure, PlotError> 
         figure.legend.push(Entry { key: Key::Contour(stroke), text: label::name(name) });
     }
     Ok(figure)
+}
+
+/// The durations `t_cross` and `t_hold` of a transition, its values in the order of [`AXES`].
+fn changes(values: &[f64], bounded: bool) -> [Option<f64>; 2] {
+    let &[a, b, v_i, v_f] = values else { return [None; 2] };
+    if !(a > 0.0 && b >= 0.0 && v_i > 1.0 && v_f > 1.0 && v_i != v_f) {
+        return [None; 2];
+    }
+    let transition = Transition { law: Law { a, b }, v_i, v_f };
+    let wanted = Wanted { cross: true, hold: true, cheapest: false, min: false, turn: false, free: false };
+    let (_, times, _) = crossover::solve(&transition, bounded, RTOL, wanted);
+    [times.t_cross, times.t_hold]
 }
 
 /// The durations of a line, in the order of [`MARKED`].

@@ -113,12 +113,10 @@ impl Survey {
         name: &str,
         conditions: &[Condition],
     ) -> Result<Survey, PlotError> {
-        let found = || manifest.tables.iter().map(|table| table.name.clone()).collect();
-        let table = manifest
-            .tables
-            .iter()
-            .find(|table| table.name == name)
-            .ok_or_else(|| PlotError::NoTable { name: name.to_owned(), found: found() })?;
+        let table = manifest.table(name).ok_or_else(|| PlotError::NoTable {
+            name: name.to_owned(),
+            found: manifest.tables.iter().map(|table| table.name.clone()).collect(),
+        })?;
         let (parts, missing) = folder.verified(manifest, table).map_err(ReadError::from)?;
         let first = parts.first().ok_or_else(|| PlotError::Empty { table: name.to_owned() })?;
         let (headings, _) = frame::headings(first).map_err(ReadError::from)?;
@@ -134,7 +132,7 @@ impl Survey {
             conditions: conditions.to_vec(),
         };
         for condition in conditions {
-            survey.check("--where", &condition.column)?;
+            survey.check("--where", "column", &condition.column)?;
         }
         let known = table::find(name).map_or(&[][..], |table| table.axes());
         let names = survey.headings.iter().map(|heading| heading.name.as_str());
@@ -203,15 +201,18 @@ impl Survey {
         self.labels.iter().map(|(name, _)| name.as_str()).collect()
     }
 
-    /// That a column is there.
-    pub fn check(&self, argument: &str, column: &str) -> Result<&Heading, PlotError> {
-        self.heading(column).ok_or_else(|| PlotError::NoColumn {
-            argument: argument.to_owned(),
-            table: self.table.clone(),
-            what: "column",
-            name: column.to_owned(),
-            found: self.headings.iter().map(|heading| heading.name.clone()).collect(),
-        })
+    /// # Errors
+    /// If there is no axis, or no column (`what`), of this name.
+    pub fn check(&self, argument: &str, what: &'static str, name: &str) -> Result<(), PlotError> {
+        let found: Vec<String> = match what {
+            "axis" => self.axes.iter().map(|axis| axis.name.clone()).collect(),
+            _ => self.headings.iter().map(|heading| heading.name.clone()).collect(),
+        };
+        if found.iter().any(|known| known == name) {
+            return Ok(());
+        }
+        let (argument, table) = (argument.to_owned(), self.table.clone());
+        Err(PlotError::NoColumn { argument, table, what, name: name.to_owned(), found })
     }
 
     /// The column of this name, if it was written.
