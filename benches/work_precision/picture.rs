@@ -31,7 +31,7 @@ pub fn draw(title: &str, error: &str, records: &[&Record]) -> Option<String> {
             let of_line = |record: &&&Record| record.cases == kind && record.method == *method;
             let line: Vec<(f64, f64)> =
                 records.iter().filter(of_line).filter(seen).map(|record| place(record)).collect();
-            layers.push(Layer::Lines(vec![line.clone()], series(series_place)));
+            layers.push(Layer::Line(line.clone(), series(series_place)));
             layers.push(Layer::Marks(line.into_iter().map(|at| (at, Symbol::of_series(series_place))).collect()));
         }
         // What is ours is drawn last, on top.

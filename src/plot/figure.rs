@@ -46,6 +46,9 @@ const BAR_WIDTH: f64 = 8.0;
 /// Colours of a colour bar. Chosen: steps are not seen.
 const BAR_STEPS: usize = 128;
 
+/// Width of an entry of the legend before its words, in points. Chosen: a dash and its space are seen in it.
+const KEY_WIDTH: f64 = 20.0;
+
 /// Points of a curve from which on they are not marked. Chosen: their marks touch.
 pub const MAX_MARKED_POINTS: usize = 50;
 
@@ -118,9 +121,9 @@ pub enum Layer {
     Hatch,
     /// Colours that fill the panel.
     Map(Map),
-    /// Lines through points.
-    Lines(Vec<Vec<(f64, f64)>>, Stroke),
-    /// A line that is seen on any colour: dark, with a light rim.
+    /// A line through points.
+    Line(Vec<(f64, f64)>, Stroke),
+    /// Lines that are seen on any colour: dark, with a light rim.
     Contour(Vec<Vec<(f64, f64)>>, Stroke),
     /// Between two curves, each point with its least and greatest value: filled.
     Band(Vec<(f64, f64, f64)>, [u8; 3]),
@@ -210,8 +213,6 @@ pub enum Key {
     Hatch,
     /// A colour.
     Fill([u8; 3]),
-    /// Only words.
-    None,
 }
 
 impl Key {
@@ -239,14 +240,22 @@ impl Entry {
 pub struct Drawn {
     /// The picture.
     pub svg: String,
-    /// Width and height in points.
-    pub size: (f64, f64),
     /// Maps with values, and where they are in the picture.
     pub hovers: Vec<Shown>,
 }
 
-/// A map with values: where it is in the picture, its axes and its values.
-type Shown = (Area, Axis, Axis, Hover);
+/// A map with values in a picture.
+#[derive(Debug, Clone)]
+pub struct Shown {
+    /// Where it is.
+    pub area: Area,
+    /// Its horizontal axis.
+    pub x: Axis,
+    /// Its vertical axis.
+    pub y: Axis,
+    /// Its values.
+    pub hover: Hover,
+}
 
 /// The ticks of a panel, and whether its axes are labelled.
 struct Plan {
@@ -287,21 +296,20 @@ impl Figure {
             foot = paragraph(&mut canvas, note, &NOTE, foot, (inner, 2.0));
         }
         let height = foot + MARGIN;
-        Drawn { svg: canvas.svg(width, height, &label::plain(&self.title)), size: (width, height), hovers }
+        Drawn { svg: canvas.svg(width, height, &label::plain(&self.title)), hovers }
     }
 
     /// Draws the legend below `top`; returns the place below it.
     fn draw_legend(&self, canvas: &mut Canvas, top: f64, inner: f64) -> f64 {
         let (mut x, mut y) = (MARGIN, top + SIZE);
         for entry in &self.legend {
-            let key = if matches!(entry.key, Key::None) { 0.0 } else { 20.0 };
-            let wide = key + SIZE * label::width(&entry.text) + 10.0;
+            let wide = KEY_WIDTH + SIZE * label::width(&entry.text) + 10.0;
             if x > MARGIN && x + wide - 8.0 > MARGIN + inner {
                 x = MARGIN;
                 y += SIZE + 3.0;
             }
             entry.key.draw(canvas, (x, y - 0.35 * SIZE));
-            canvas.text((x + key, y), &entry.text, &LABEL);
+            canvas.text((x + KEY_WIDTH, y), &entry.text, &LABEL);
             x += wide;
         }
         y + 4.0
@@ -366,7 +374,7 @@ impl Figure {
                 panel.draw(canvas, area, &layout.plans[row * columns + column], layout.lefts[column]);
                 for layer in &panel.layers {
                     if let Layer::Map(Map { hover: Some(hover), .. }) = layer {
-                        hovers.push((area, panel.x.clone(), panel.y.clone(), hover.clone()));
+                        hovers.push(Shown { area, x: panel.x.clone(), y: panel.y.clone(), hover: hover.clone() });
                     }
                 }
                 x += width + layout.rights[column];
@@ -487,7 +495,6 @@ impl Key {
                 canvas.fill(area, &hex(*colour));
                 canvas.frame(area, &Stroke::solid("#777", 0.4));
             }
-            Key::None => {}
         }
     }
 }
@@ -526,14 +533,14 @@ impl Panel {
     /// Draws what is cut at the frame: areas and lines.
     fn fill(&self, canvas: &mut Canvas, area: Area, layer: &Layer) {
         let place = |point| self.place(area, point);
-        let all = |lines: &[Vec<(f64, f64)>]| -> Vec<Vec<(f64, f64)>> {
-            lines.iter().flat_map(|line| pieces(line.iter().map(|point| place(*point)))).collect()
-        };
+        let pieces = |line: &Vec<(f64, f64)>| pieces(line.iter().map(|point| place(*point)));
         match layer {
             Layer::Hatch => canvas.hatch(area),
             Layer::Map(map) => canvas.image(area, &map.png),
-            Layer::Lines(lines, stroke) => canvas.lines(&all(lines), stroke),
-            Layer::Contour(lines, stroke) => draw_contour(canvas, &all(lines), stroke),
+            Layer::Line(line, stroke) => canvas.lines(&pieces(line), stroke),
+            Layer::Contour(lines, stroke) => {
+                draw_contour(canvas, &lines.iter().flat_map(pieces).collect::<Vec<_>>(), stroke);
+            }
             Layer::Vertical(x, _, stroke) => {
                 let (x, _) = place((*x, self.y.scale.low));
                 canvas.line((x, area.y), (x, area.y + area.height), stroke);

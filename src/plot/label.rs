@@ -155,25 +155,16 @@ pub fn unit(unit: &str) -> String {
     if unit == "1" {
         return String::new();
     }
-    let mut markup = String::new();
-    let mut word = String::new();
-    let flush = |word: &mut String, markup: &mut String| {
-        match word.split_once('^') {
-            Some((base, power)) => markup.push_str(&format!("{}^{{{power}}}", scale(base))),
-            None => markup.push_str(&scale(word)),
-        }
-        word.clear();
+    let between = [' ', '/', '(', ')'];
+    let typeset = |piece: &str| {
+        let word = piece.trim_end_matches(between);
+        let shown = match word.split_once('^') {
+            Some((base, power)) => format!("{}^{{{power}}}", scale(base)),
+            None => scale(word),
+        };
+        shown + &piece[word.len()..]
     };
-    for letter in unit.chars() {
-        if matches!(letter, ' ' | '/' | '(' | ')') {
-            flush(&mut word, &mut markup);
-            markup.push(letter);
-        } else {
-            word.push(letter);
-        }
-    }
-    flush(&mut word, &mut markup);
-    markup
+    unit.split_inclusive(between).map(typeset).collect()
 }
 
 /// The label of an axis: name and unit, and the power of ten that its numbers leave out.
@@ -207,18 +198,15 @@ pub fn number(value: f64) -> String {
 pub fn number_among(value: f64, others: &[f64]) -> String {
     let needs_power = |other: &f64| other.is_finite() && *other != 0.0 && !(1e-3..99_999.5).contains(&other.abs());
     let as_powers = others.iter().any(needs_power);
-    if value == 0.0 {
-        return "0".to_owned();
-    }
-    if !value.is_finite() {
-        return if value.is_nan() {
-            "–"
-        } else if value > 0.0 {
-            "∞"
-        } else {
-            "−∞"
-        }
-        .to_owned();
+    let special = match value {
+        0.0 => "0",
+        f64::INFINITY => "∞",
+        f64::NEG_INFINITY => "−∞",
+        _ if value.is_nan() => "–",
+        _ => "",
+    };
+    if !special.is_empty() {
+        return special.to_owned();
     }
     let scientific = format!("{:.4e}", value.abs());
     let (digits, exponent) = scientific.split_once('e').unwrap_or((&scientific, "0"));

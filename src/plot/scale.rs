@@ -84,12 +84,6 @@ impl Scale {
         Scale { low: self.low - room, high: self.high + room, log: false }
     }
 
-    /// Grown so that it holds `other`.
-    pub fn and(self, other: Scale) -> Scale {
-        let (low, high) = (self.low.min(other.low), self.high.max(other.high));
-        Scale { low, high, log: low > 0.0 && (self.log || other.log || high / low >= LOG_RATIO) }
-    }
-
     /// Where `value` is, 0 at the start and 1 at the end; NaN where the scale does not reach.
     pub fn share(&self, value: f64) -> f64 {
         if self.log {

@@ -242,7 +242,7 @@ fn leaders(count: usize, panels: &[(Panel, Vec<Curve>)]) -> Vec<usize> {
 fn draw(mut panel: Panel, curves: Vec<Curve>, courses: &[Course], leaders: &[usize]) -> Panel {
     for Curve { course, rank, points } in curves.into_iter().filter(|curve| leaders[curve.course] == curve.course) {
         let stroke = if rank == 0 { colour::series(course) } else { control(course) };
-        panel.layers.push(Layer::Lines(vec![points.clone()], stroke));
+        panel.layers.push(Layer::Line(points.clone(), stroke));
         if courses[course].is_marked() && rank == 0 {
             panel.layers.push(Layer::Marks(points.into_iter().map(|at| (at, Symbol::of_series(course))).collect()));
         }

@@ -315,13 +315,13 @@ impl Makes {
 /// The different values of `axes` in ascending order, those that are alike once; more than `MAX_GROUPS` if there are too many.
 fn keys(survey: &Survey, axes: &[&str], makes: Makes) -> Result<Vec<Vec<f64>>, PlotError> {
     let mut found: HashMap<Vec<u64>, Vec<f64>> = HashMap::new();
-    let mut last: Option<Vec<u64>> = None;
+    let mut last: Vec<f64> = Vec::new();
     survey.each_while(axes, |cells| {
-        let here = bits(cells);
-        if last.as_ref() == Some(&here) {
+        if !last.is_empty() && last.iter().zip(cells).all(|(last, cell)| last.to_bits() == cell.to_bits()) {
             return true;
         }
-        last = Some(here);
+        last.clear();
+        last.extend_from_slice(cells);
         let mut cells = cells.to_vec();
         makes.merge(axes, &mut cells);
         found.entry(bits(&cells)).or_insert(cells);

@@ -220,7 +220,7 @@ impl Rows {
     fn draw(&self, Graph { mut panel, curves, .. }: Graph, leaders: &[usize]) -> Panel {
         for (series, mut points) in curves.into_iter().enumerate().filter(|(series, _)| leaders[*series] == *series) {
             if !self.are_scattered {
-                panel.layers.push(Layer::Lines(vec![points.clone()], colour::series(series)));
+                panel.layers.push(Layer::Line(points.clone(), colour::series(series)));
             }
             let named = points.iter().filter_map(|&(x, y)| {
                 let name = self.lines[series].names.get(self.cells.place(x)?)?.clone();

@@ -266,8 +266,9 @@ impl Shading<'_> {
 
 /// Whether rows are single points of a plane, of which a map would be mostly blank.
 fn is_scattered(rows: u64, axes: [&Values; 2]) -> bool {
-    let most = axes.map(|axis| axis.values.len()).into_iter().max().unwrap_or(0);
-    let least = axes.map(|axis| axis.values.len()).into_iter().min().unwrap_or(0);
+    let mut sizes = axes.map(|axis| axis.values.len());
+    sizes.sort_unstable();
+    let [least, most] = sizes;
     // Rows of which each pair of values has one are a grid.
     rows <= (MAX_SCATTERED_RATIO * most) as u64 && rows < (most * least) as u64
 }

@@ -81,6 +81,7 @@ fn strategies(scene: &Scene<'_>, plan: &map::Plan) -> Result<Figure, PlotError> 
     };
     let Some(place) = AXES.iter().position(|axis| *axis == other) else { return Ok(figure) };
     let (unit, unit_of_time) = (scene.size(other), scene.source.units.size("l/v_0"));
+    let wanted = Wanted { cross: true, hold: true, cheapest: false, min: false, turn: false, free: false };
     let mut is_drawn = [false; 2];
     for (group, panel) in figure.panels.iter_mut().enumerate() {
         let value = |&axis: &&str| if axis == other { Some(0.0) } else { scene.scaled(&groups, group, axis) };
@@ -89,7 +90,12 @@ fn strategies(scene: &Scene<'_>, plan: &map::Plan) -> Result<Figure, PlotError> 
         for step in 0..=CURVE_STEPS {
             let at = cells[1 - time].scale.value(step as f64 / CURVE_STEPS as f64);
             values[place] = at / unit;
-            for (curve, found) in curves.iter_mut().zip(changes(&values, scene.source.bounded)) {
+            let is_legal = matches!(
+                values[..], [a, b, v_i, v_f] if a > 0.0 && b >= 0.0 && v_i > 1.0 && v_f > 1.0 && v_i != v_f
+            );
+            let times = is_legal.then(|| solved(scene, &values, wanted)).flatten();
+            let found = times.map_or([None; 2], |times| [times.t_cross, times.t_hold]);
+            for (curve, found) in curves.iter_mut().zip(found) {
                 let found = found.map_or(f64::NAN, |found| found * unit_of_time);
                 curve.push(if time == 0 { (found, at) } else { (at, found) });
             }
@@ -109,26 +115,19 @@ fn strategies(scene: &Scene<'_>, plan: &map::Plan) -> Result<Figure, PlotError> 
     Ok(figure)
 }
 
-/// The durations `t_cross` and `t_hold` of a transition, its values in the order of [`AXES`].
-fn changes(values: &[f64], bounded: bool) -> [Option<f64>; 2] {
-    let &[a, b, v_i, v_f] = values else { return [None; 2] };
-    if !(a > 0.0 && b >= 0.0 && v_i > 1.0 && v_f > 1.0 && v_i != v_f) {
-        return [None; 2];
-    }
-    let transition = Transition { law: Law { a, b }, v_i, v_f };
-    let wanted = Wanted { cross: true, hold: true, cheapest: false, min: false, turn: false, free: false };
-    let (_, times, _) = crossover::solve(&transition, bounded, RTOL, wanted);
-    [times.t_cross, times.t_hold]
-}
-
 /// The durations of a line, in the order of [`MARKED`].
 fn times(scene: &Scene<'_>, groups: &Groups, group: usize) -> [Option<f64>; MARKED.len()] {
     let scaled: Option<Vec<f64>> = AXES.iter().map(|axis| scene.scaled(groups, group, axis)).collect();
-    let Some(&[a, b, v_i, v_f]) = scaled.as_deref() else { return [None; MARKED.len()] };
-    let transition = Transition { law: Law { a, b }, v_i, v_f };
     let wanted = Wanted { cross: true, hold: true, cheapest: true, min: true, turn: true, free: false };
-    let (_, times, _) = crossover::solve(&transition, scene.source.bounded, RTOL, wanted);
+    let Some(times) = scaled.and_then(|values| solved(scene, &values, wanted)) else { return [None; MARKED.len()] };
     let CrossoverTimes { t_cross, t_hold, t_cheapest, t_min, t_turn, .. } = times;
     let unit = scene.source.units.size("l/v_0");
     [t_cheapest, t_cross, t_hold, t_min, t_turn].map(|time| Some(time? * unit))
+}
+
+/// The durations at which the strategy changes, for a transition whose values are in the order of [`AXES`].
+fn solved(scene: &Scene<'_>, values: &[f64], wanted: Wanted) -> Option<CrossoverTimes> {
+    let &[a, b, v_i, v_f] = values else { return None };
+    let transition = Transition { law: Law { a, b }, v_i, v_f };
+    Some(crossover::solve(&transition, scene.source.bounded, RTOL, wanted).1)
 }

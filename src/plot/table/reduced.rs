@@ -168,7 +168,7 @@ impl Quantiles<'_> {
         for (name, _, series) in CURVES {
             let Some(column) = self.column(name) else { continue };
             let points: Vec<(f64, f64)> = self.cells.middles.iter().copied().zip(column.iter().copied()).collect();
-            layers.push(Layer::Lines(vec![points.clone()], colour::series(series)));
+            layers.push(Layer::Line(points.clone(), colour::series(series)));
             if self.is_marked() {
                 let points = points.into_iter().filter(|(_, value)| value.is_finite());
                 layers.push(Layer::Marks(points.map(|at| (at, Symbol::of_series(series))).collect()));
@@ -204,7 +204,7 @@ fn distribution(survey: &Survey, columns: &[(&str, f64)]) -> Result<(Figure, Vec
             scale: Scale { low: 0.0, high: 100.0, log: false }.with_room(0.04),
         },
         layers: vec![
-            Layer::Lines(vec![points.clone()], Stroke::solid("#000", 1.1)),
+            Layer::Line(points.clone(), Stroke::solid("#000", 1.1)),
             Layer::Marks(points.into_iter().map(|at| (at, Symbol::of_series(0))).collect()),
         ],
     };

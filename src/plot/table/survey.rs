@@ -361,7 +361,8 @@ impl Survey {
                 *last = value;
                 axis.infinite |= value.is_infinite();
                 if value.is_finite() {
-                    axis.values = vec![axis.values[0].min(value), axis.values[1].max(value)];
+                    axis.values[0] = axis.values[0].min(value);
+                    axis.values[1] = axis.values[1].max(value);
                     if distinct.len() <= MAX_VALUES {
                         // There is one zero.
                         distinct.insert((value + 0.0).to_bits());
