@@ -1,6 +1,6 @@
 //! Pictures of time against error: a panel for each kind of cases, a line with marks for each method.
 
-use slipsweep::plot::{Axis, Entry, Figure, Key, Layer, Marker, PAGE, Panel, Scale, series};
+use slipsweep::plot::{Axis, Entry, Figure, Key, Layer, PAGE, Panel, Scale, Symbol, series};
 
 use super::measure::Record;
 
@@ -31,8 +31,8 @@ pub fn draw(title: &str, error: &str, records: &[&Record]) -> Option<String> {
             let of_line = |record: &&&Record| record.cases == kind && record.method == *method;
             let line: Vec<(f64, f64)> =
                 records.iter().filter(of_line).filter(seen).map(|record| place(record)).collect();
-            layers.push(Layer::Lines(vec![line.clone()], series(series_place)));
-            layers.push(Layer::Points(line, Marker { series: series_place }));
+            layers.push(Layer::Line(line.clone(), series(series_place)));
+            layers.push(Layer::Marks(line.into_iter().map(|at| (at, Symbol::of_series(series_place))).collect()));
         }
         // What is ours is drawn last, on top.
         layers.rotate_left(2);
@@ -57,7 +57,7 @@ pub fn draw(title: &str, error: &str, records: &[&Record]) -> Option<String> {
         }
     }
     let entry = |(place, method): (usize, &&str)| Entry {
-        key: Key::Marked(series(place), Marker { series: place }),
+        key: Key::Marked(series(place), Symbol::of_series(place)),
         text: (*method).to_owned(),
     };
     let figure = Figure {
@@ -67,7 +67,6 @@ pub fn draw(title: &str, error: &str, records: &[&Record]) -> Option<String> {
         ),
         columns: panels.len(),
         aspect: if panels.len() > 1 { 0.9 } else { 0.5 },
-        shared: true,
         legend: methods.iter().enumerate().map(entry).collect(),
         panels,
         notes,

@@ -203,7 +203,7 @@ impl Arguments {
         let width = self.width.unwrap_or(if figure.columns > 1 { PAGE } else { COLUMN });
         let encoded =
             waiting(&Wait::new("writing the picture"), || place.format.encode(&figure.draw(width).svg, self.dpi));
-        let bytes = encoded.map_err(PlotError::from)?;
+        let bytes = encoded?;
         if let Some(folder) = path.parent() {
             fs::create_dir_all(folder).map_err(failed)?;
         }

@@ -17,7 +17,9 @@ use crate::protocol::Status;
 use crate::protocol::swift::{self, Case};
 use crate::sweep::{Spec, units};
 use crate::table;
-use crate::trace::{self, Absence, CLOSE_UP, COLUMNS, Course, GOOD, Parameter, Pathless, Protocol, Times, Trace};
+use crate::trace::{
+    self, Absence, COLUMNS, Course, Parameter, Pathless, Protocol, RANGE_RTOL, Times, Trace, VALUE_RTOL,
+};
 use crate::verify::scale;
 
 /// Arguments of `trace`.
@@ -520,7 +522,7 @@ fn header(arguments: &Arguments, asked: &Asked, course: &Course, trace: &Trace) 
             text.push_str(&format!("  {rows}: equally spaced times, and the states on the other side of a jump\n"))
         }
         None => {
-            let (range, value) = (words::number(GOOD), words::number(CLOSE_UP));
+            let (range, value) = (words::number(RANGE_RTOL), words::number(VALUE_RTOL));
             let lines = format!("straight lines between them are good to {range} of the range of a column");
             text.push_str(&format!("  {rows}; {lines}, and to {value} of v and theta\n"));
         }

@@ -2,10 +2,13 @@
 
 use std::fmt::Write;
 
-use super::label::{self, DROP, FAMILIES, RISE, SMALL};
+use super::label::{self, FAMILIES, SCRIPT_SIZE, SUBSCRIPT_DROP, SUPERSCRIPT_RISE};
 
 /// Points of a millimetre.
 pub const MILLIMETRE: f64 = 72.0 / 25.4;
+
+/// Distance of the lines of a hatched area, along its edges, in points. Chosen: single lines are seen in print.
+const HATCH_STEP: f64 = 3.2;
 
 /// How a line is drawn.
 #[derive(Debug, Clone, PartialEq)]
@@ -49,6 +52,26 @@ pub struct Area {
     pub height: f64,
 }
 
+impl Area {
+    fn attributes(&self) -> String {
+        let Area { x, y, width, height } = self;
+        format!("x=\"{}\" y=\"{}\" width=\"{}\" height=\"{}\"", at(*x), at(*y), at(*width), at(*height))
+    }
+}
+
+/// How words are set.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Text<'a> {
+    /// Height of the letters, in points.
+    pub size: f64,
+    /// Where the words are relative to their place.
+    pub anchor: Anchor,
+    /// Whether they are turned by a quarter to the left.
+    pub upwards: bool,
+    /// Colour.
+    pub colour: &'a str,
+}
+
 /// The sheet.
 #[derive(Debug, Default)]
 pub struct Canvas {
@@ -61,6 +84,13 @@ fn at(value: f64) -> String {
     let text = format!("{:.2}", if value.is_finite() { value.clamp(-1e5, 1e5) } else { 0.0 });
     let text = text.trim_end_matches('0').trim_end_matches('.');
     if text == "-0" { "0".to_owned() } else { text.to_owned() }
+}
+
+/// The path through points.
+fn path(points: &[(f64, f64)]) -> String {
+    let step =
+        |(place, &(x, y)): (usize, &(f64, f64))| format!("{}{} {}", if place == 0 { 'M' } else { 'L' }, at(x), at(y));
+    points.iter().enumerate().map(step).collect()
 }
 
 /// Text that is safe inside XML.
@@ -92,12 +122,7 @@ impl Canvas {
 
     /// Lines through points, each list its own line.
     pub fn lines(&mut self, lines: &[Vec<(f64, f64)>], stroke: &Stroke) {
-        let mut path = String::new();
-        for line in lines.iter().filter(|line| line.len() > 1) {
-            for (place, &(x, y)) in line.iter().enumerate() {
-                path.push_str(&format!("{}{} {}", if place == 0 { 'M' } else { 'L' }, at(x), at(y)));
-            }
-        }
+        let path: String = lines.iter().filter(|line| line.len() > 1).map(|line| path(line)).collect();
         if !path.is_empty() {
             let style = Self::stroke(stroke);
             self.push(format_args!("<path d=\"{path}\" stroke-linejoin=\"round\" {style}/>"));
@@ -106,10 +131,7 @@ impl Canvas {
 
     /// A closed shape.
     pub fn shape(&mut self, points: &[(f64, f64)], fill: &str, stroke: Option<&Stroke>) {
-        let mut path = String::new();
-        for (place, &(x, y)) in points.iter().enumerate() {
-            path.push_str(&format!("{}{} {}", if place == 0 { 'M' } else { 'L' }, at(x), at(y)));
-        }
+        let path = path(points);
         let line = stroke.map_or_else(String::new, |stroke| {
             format!(" stroke=\"{}\" stroke-width=\"{}\" stroke-linejoin=\"round\"", stroke.colour, at(stroke.width))
         });
@@ -117,41 +139,31 @@ impl Canvas {
     }
 
     /// A circle.
-    pub fn circle(&mut self, centre: (f64, f64), radius: f64, fill: &str, stroke: &Stroke) {
+    pub fn circle(&mut self, (x, y): (f64, f64), radius: f64, fill: &str, stroke: &Stroke) {
+        let place = format!("cx=\"{}\" cy=\"{}\" r=\"{}\"", at(x), at(y), at(radius));
         let style = format!("fill=\"{fill}\" stroke=\"{}\" stroke-width=\"{}\"", stroke.colour, at(stroke.width));
-        self.push(format_args!(
-            "<circle cx=\"{}\" cy=\"{}\" r=\"{}\" {style}/>",
-            at(centre.0),
-            at(centre.1),
-            at(radius)
-        ));
+        self.push(format_args!("<circle {place} {style}/>"));
     }
 
     /// A filled rectangle.
     pub fn fill(&mut self, area: Area, colour: &str) {
-        let Area { x, y, width, height } = area;
-        let style = format!("width=\"{}\" height=\"{}\" fill=\"{colour}\"", at(width), at(height));
-        self.push(format_args!("<rect x=\"{}\" y=\"{}\" {style}/>", at(x), at(y)));
+        self.push(format_args!("<rect {} fill=\"{colour}\"/>", area.attributes()));
     }
 
     /// The frame of a rectangle.
     pub fn frame(&mut self, area: Area, stroke: &Stroke) {
-        let Area { x, y, width, height } = area;
-        let style = Self::stroke(stroke);
-        let size = format!("width=\"{}\" height=\"{}\"", at(width), at(height));
-        self.push(format_args!("<rect x=\"{}\" y=\"{}\" {size} {style}/>", at(x), at(y)));
+        self.push(format_args!("<rect {} {}/>", area.attributes(), Self::stroke(stroke)));
     }
 
     /// A rectangle of grey diagonal lines: no data.
     pub fn hatch(&mut self, area: Area) {
         self.fill(area, "#efefef");
         self.clipped(area, |canvas| {
-            let step = 3.2;
             let mut lines = Vec::new();
             let mut start = -area.height;
             while start < area.width {
                 lines.push(vec![(area.x + start, area.y + area.height), (area.x + start + area.height, area.y)]);
-                start += step;
+                start += HATCH_STEP;
             }
             canvas.lines(&lines, &Stroke::solid("#a8a8a8", 0.4));
         });
@@ -161,8 +173,7 @@ impl Canvas {
     pub fn image(&mut self, area: Area, png: &[u8]) {
         use base64::Engine;
         let data = base64::engine::general_purpose::STANDARD.encode(png);
-        let Area { x, y, width, height } = area;
-        let place = format!("x=\"{}\" y=\"{}\" width=\"{}\" height=\"{}\"", at(x), at(y), at(width), at(height));
+        let place = area.attributes();
         self.push(format_args!(
             "<image {place} preserveAspectRatio=\"none\" style=\"image-rendering:pixelated\" \
              xlink:href=\"data:image/png;base64,{data}\"/>"
@@ -171,30 +182,16 @@ impl Canvas {
 
     /// What `draw` draws, as far as it is inside `area`.
     pub fn clipped(&mut self, area: Area, draw: impl FnOnce(&mut Canvas)) {
-        let Area { x, y, width, height } = area;
         self.clips += 1;
-        let id = self.clips;
-        let rect = format!("x=\"{}\" y=\"{}\" width=\"{}\" height=\"{}\"", at(x), at(y), at(width), at(height));
+        let (id, rect) = (self.clips, area.attributes());
         self.push(format_args!("<clipPath id=\"clip{id}\"><rect {rect}/></clipPath><g clip-path=\"url(#clip{id})\">"));
         draw(self);
         self.push(format_args!("</g>"));
     }
 
-    /// A text in markup on the line through `place`, turned by a quarter to the left if `upwards`.
-    pub fn text(&mut self, place: (f64, f64), markup: &str, size: f64, anchor: Anchor, upwards: bool) {
-        self.coloured(place, markup, size, anchor, upwards, "#000");
-    }
-
-    /// The same in a colour.
-    pub fn coloured(
-        &mut self,
-        place: (f64, f64),
-        markup: &str,
-        size: f64,
-        anchor: Anchor,
-        upwards: bool,
-        colour: &str,
-    ) {
+    /// A text in markup on the line through `place`.
+    pub fn text(&mut self, place: (f64, f64), markup: &str, style: &Text<'_>) {
+        let Text { size, anchor, upwards, colour } = *style;
         // Anchors are computed from the metrics of the font: a viewer need not agree on how spans of several styles are anchored.
         let width = size * label::width(markup);
         let shift = match anchor {
@@ -206,8 +203,8 @@ impl Canvas {
         let mut level = 0;
         for span in label::spans(markup) {
             let height = |level: i8| match level {
-                1 => -RISE * size,
-                -1 => DROP * size,
+                1 => -SUPERSCRIPT_RISE * size,
+                -1 => SUBSCRIPT_DROP * size,
                 _ => 0.0,
             };
             let mut style = String::new();
@@ -216,7 +213,7 @@ impl Canvas {
                 level = span.level;
             }
             if span.level != 0 {
-                style.push_str(&format!(" font-size=\"{}\"", at(SMALL * size)));
+                style.push_str(&format!(" font-size=\"{}\"", at(SCRIPT_SIZE * size)));
             }
             if span.italic {
                 style.push_str(" font-style=\"italic\"");

@@ -1,14 +1,14 @@
 //! Which curves lie on each other in print: they are drawn once.
 
-/// How far two curves may be apart, as a share of the panel, to be one: the width of a line, 1.1 points of a panel 100 points high.
-const APART: f64 = 0.01;
+/// Distance, as a fraction of the panel, up to which two curves are one. The width of a line: 1.1 points in a panel 100 points high.
+const MAX_DISTANCE: f64 = 0.01;
 
-/// Most points of a curve whose distance from another is looked at.
-const MOST_POINTS: usize = 400;
+/// Points of a curve whose distance from another is computed. Chosen: closer ones are not told apart in print.
+const MAX_POINTS: usize = 400;
 
 /// Whether two curves with values at the same places coincide, in shares of the panel.
 pub fn at_places(first: &[(f64, f64)], second: &[(f64, f64)]) -> bool {
-    let near = |(a, b): (&(f64, f64), &(f64, f64))| a.1.is_nan() && b.1.is_nan() || (a.1 - b.1).abs() <= APART;
+    let near = |(a, b): (&(f64, f64), &(f64, f64))| a.1.is_nan() && b.1.is_nan() || (a.1 - b.1).abs() <= MAX_DISTANCE;
     first.len() == second.len() && first.iter().zip(second).all(near)
 }
 
@@ -18,9 +18,9 @@ pub fn anywhere(first: &[(f64, f64)], second: &[(f64, f64)]) -> bool {
 }
 
 fn is_near(points: &[(f64, f64)], line: &[(f64, f64)]) -> bool {
-    let every = points.len().div_ceil(MOST_POINTS).max(1);
+    let every = points.len().div_ceil(MAX_POINTS).max(1);
     let mut some = points.iter().step_by(every).chain(points.last());
-    some.all(|point| line.windows(2).any(|pair| distance(*point, pair[0], pair[1]) <= APART))
+    some.all(|point| line.windows(2).any(|pair| distance(*point, pair[0], pair[1]) <= MAX_DISTANCE))
 }
 
 /// The distance of a point from a line between two others; NaN if any has no place.

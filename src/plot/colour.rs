@@ -64,8 +64,8 @@ const SERIES: [&str; 7] = ["#000000", "#0072b2", "#d55e00", "#009e73", "#cc79a7"
 const DASHES: [&[f64]; 7] =
     [&[], &[5.0, 1.8], &[1.2, 1.4], &[6.0, 1.5, 1.2, 1.5], &[2.6, 1.4], &[8.0, 2.0], &[6.0, 1.4, 1.2, 1.4, 1.2, 1.4]];
 
-/// Most series of a panel: each has a colour and a dash of its own.
-pub const MOST_SERIES: usize = SERIES.len();
+/// Series of a panel: each has a colour and a dash of its own.
+pub const MAX_SERIES: usize = SERIES.len();
 
 /// The line of series number `place`.
 pub fn series(place: usize) -> Stroke {

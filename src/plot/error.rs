@@ -1,6 +1,5 @@
 //! Why a picture cannot be drawn.
 
-use super::export::ExportError;
 use crate::dataset::ReadError;
 use crate::dataset::frame::FrameError;
 use crate::names;
@@ -143,7 +142,15 @@ pub enum PlotError {
     /// A part of a table.
     #[error(transparent)]
     Part(#[from] ReadError),
-    /// The picture.
-    #[error(transparent)]
-    Export(#[from] ExportError),
+    /// The converter does not understand the picture.
+    #[error("cannot convert the picture: {0}\n  help: write it as .svg")]
+    Convert(String),
+    /// More pixels than can be held.
+    #[error("a picture of {width} x {height} pixels is too large\n  help: ask for fewer with --dpi")]
+    Size {
+        /// Width in pixels.
+        width: f64,
+        /// Height in pixels.
+        height: f64,
+    },
 }

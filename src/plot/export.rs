@@ -7,6 +7,7 @@ use resvg::tiny_skia::{Color, Pixmap, PremultipliedColorU8, Transform};
 use resvg::usvg::{self, fontdb};
 use svg2pdf::{ConversionOptions, PageOptions};
 
+use super::error::PlotError;
 use super::label::FONTS;
 
 /// How a picture is written.
@@ -21,21 +22,11 @@ pub enum Format {
     Pdf,
 }
 
-/// Why a picture cannot be written.
-#[derive(Debug, thiserror::Error)]
-pub enum ExportError {
-    /// The picture is not understood by the converter.
-    #[error("cannot convert the picture: {0}\n  help: write it as .svg")]
-    Convert(String),
-    /// More pixels than can be held.
-    #[error("a picture of {width} x {height} pixels is too large\n  help: ask for fewer with --dpi")]
-    Size {
-        /// Width in pixels.
-        width: f64,
-        /// Height in pixels.
-        height: f64,
-    },
-}
+/// Pixels of a picture, above which it is not written: 64 million. Chosen: they take 256 MB.
+const MAX_PIXELS: f64 = 6.4e7;
+
+/// Pixels of CSS to the inch, the unit of lengths in an SVG (CSS Values and Units, section 6.2).
+const CSS_DPI: f64 = 96.0;
 
 impl Format {
     /// The format that the name of a file ends in.
@@ -58,20 +49,20 @@ impl Format {
     }
 
     /// The picture `svg` in this format; pixels with `dpi` to the inch.
-    pub fn encode(self, svg: &str, dpi: f64) -> Result<Vec<u8>, ExportError> {
+    pub fn encode(self, svg: &str, dpi: f64) -> Result<Vec<u8>, PlotError> {
         match self {
             Format::Svg => Ok(svg.as_bytes().to_vec()),
             Format::Png => png(&tree(svg)?, dpi),
             Format::Pdf => {
-                let page = PageOptions { dpi: 96.0 };
-                svg2pdf::to_pdf(&tree(svg)?, ConversionOptions::default(), page)
-                    .map_err(|error| ExportError::Convert(error.to_string()))
+                let page = PageOptions { dpi: CSS_DPI as f32 };
+                let pdf = svg2pdf::to_pdf(&tree(svg)?, ConversionOptions::default(), page);
+                pdf.map_err(|error| PlotError::Convert(error.to_string()))
             }
         }
     }
 }
 
-fn tree(svg: &str) -> Result<usvg::Tree, ExportError> {
+fn tree(svg: &str) -> Result<usvg::Tree, PlotError> {
     let mut fonts = fontdb::Database::new();
     for font in FONTS {
         fonts.load_font_data(font.to_vec());
@@ -79,25 +70,21 @@ fn tree(svg: &str) -> Result<usvg::Tree, ExportError> {
     fonts.set_sans_serif_family("Arimo");
     let options =
         usvg::Options { font_family: "Arimo".to_owned(), fontdb: Arc::new(fonts), ..usvg::Options::default() };
-    usvg::Tree::from_str(svg, &options).map_err(|error| ExportError::Convert(error.to_string()))
+    usvg::Tree::from_str(svg, &options).map_err(|error| PlotError::Convert(error.to_string()))
 }
 
-/// Most pixels of a picture, 64 million.
-const MOST_PIXELS: f64 = 6.4e7;
-
-fn png(tree: &usvg::Tree, dpi: f64) -> Result<Vec<u8>, ExportError> {
-    // A CSS pixel is a 96th of an inch.
-    let scale = dpi / 96.0;
+fn png(tree: &usvg::Tree, dpi: f64) -> Result<Vec<u8>, PlotError> {
+    let scale = dpi / CSS_DPI;
     let (width, height) =
         ((f64::from(tree.size().width()) * scale).ceil(), (f64::from(tree.size().height()) * scale).ceil());
-    let size = ExportError::Size { width, height };
-    if !(width >= 1.0 && height >= 1.0 && width * height <= MOST_PIXELS) {
+    let size = PlotError::Size { width, height };
+    if !(width >= 1.0 && height >= 1.0 && width * height <= MAX_PIXELS) {
         return Err(size);
     }
     let mut pixels = Pixmap::new(width as u32, height as u32).ok_or(size)?;
     pixels.fill(Color::WHITE);
     resvg::render(tree, Transform::from_scale(scale as f32, scale as f32), &mut pixels.as_mut());
-    pixels.encode_png().map_err(|error| ExportError::Convert(error.to_string()))
+    pixels.encode_png().map_err(|error| PlotError::Convert(error.to_string()))
 }
 
 /// Pixels as a PNG, row after row from the top: a colour, or nothing where it is transparent. `None` without pixels.

@@ -1,28 +1,60 @@
 //! A figure: panels with axes and layers, a legend, a colour bar and a few words, set out on a sheet of given width.
 
-use super::canvas::{Anchor, Area, Canvas, MILLIMETRE, Stroke};
+use super::canvas::{Anchor, Area, Canvas, MILLIMETRE, Stroke, Text};
 use super::colour::{hex, viridis};
 use super::label;
 use super::scale::{Scale, Tick, Ticks};
+use super::symbol::{self, STAR_RADIUS, Symbol};
 
-/// Size of the words of a figure, in points: legible when it is printed as wide as it is.
+/// Height of letters, in points. Chosen: as in the captions of journals, legible in print.
 const SIZE: f64 = 7.5;
+
+/// Height of the numbers at ticks, in points. Chosen: a little below the labels of axes.
 const TICK_SIZE: f64 = 7.0;
+
+/// Height of the letters of notes, in points. Chosen: the least that is legible in print.
 const NOTE_SIZE: f64 = 6.2;
-const TICK: f64 = 2.6;
+
+/// Length of a tick with a number, in points; others have 0.6 of it. Chosen: a third of its number.
+const TICK_LENGTH: f64 = 2.6;
+
+/// Space between the figure and the edge of the sheet, in points. Chosen: it separates the figure from the text around it.
 const MARGIN: f64 = 5.0;
-const FRAME: f64 = 0.6;
-/// Space between the line of a title and the frame below: letters below the line keep clear of it.
+
+/// Width of the lines of frames and ticks, in points. Chosen: half a curve's.
+const FRAME_WIDTH: f64 = 0.6;
+
+/// Space between the line of a title and the frame below, in points. Chosen: it holds the letters below the line.
 const TITLE_SPACE: f64 = 5.0;
-/// Room for the titles of rows.
-const ROW_TITLE: f64 = SIZE + 6.0;
-/// Radius of a star.
-const STAR: f64 = 4.6;
-/// Length of what leads from a vertical line to its words, and the space between words.
-const LEADER: f64 = 5.0;
-const MARK_SPACE: f64 = 5.0;
-/// Height of both.
-const WORDS_ABOVE: f64 = LEADER + 2.5 + NOTE_SIZE;
+
+/// Space of the titles of rows of panels, in points: a line and its distance from the frame.
+const ROW_TITLE_WIDTH: f64 = SIZE + 6.0;
+
+/// Length of the line from the end of a vertical line to its words, in points. Chosen: words may move aside by several letters.
+const LEADER_LENGTH: f64 = 5.0;
+
+/// Space between words at vertical lines, in points. Chosen: two spaces between words.
+const WORD_SPACE: f64 = 5.0;
+
+/// Height of leaders and words above a panel, in points.
+const WORDS_HEIGHT: f64 = LEADER_LENGTH + 2.5 + NOTE_SIZE;
+
+/// Space between a map and its colour bar, and the width of the bar, in points. Chosen: as wide as a letter is high.
+const BAR_SPACE: f64 = 6.0;
+const BAR_WIDTH: f64 = 8.0;
+
+/// Colours of a colour bar. Chosen: steps are not seen.
+const BAR_STEPS: usize = 128;
+
+/// Width of an entry of the legend before its words, in points. Chosen: a dash and its space are seen in it.
+const KEY_WIDTH: f64 = 20.0;
+
+/// Points of a curve from which on they are not marked. Chosen: their marks touch.
+pub const MAX_MARKED_POINTS: usize = 50;
+
+/// How the words of figures, and those of notes, are set.
+const LABEL: Text<'static> = Text { size: SIZE, anchor: Anchor::Start, upwards: false, colour: "#000" };
+const NOTE: Text<'static> = Text { size: NOTE_SIZE, anchor: Anchor::Start, upwards: false, colour: "#444" };
 
 /// A figure.
 #[derive(Debug, Clone, Default)]
@@ -39,8 +71,6 @@ pub struct Figure {
     pub rows: Vec<String>,
     /// Height of a panel relative to its width.
     pub aspect: f64,
-    /// Whether all panels have the same axes, so that only the outer ones are labelled.
-    pub shared: bool,
     /// What is explained.
     pub legend: Vec<Entry>,
     /// The colours of maps.
@@ -74,7 +104,7 @@ pub struct Panel {
 }
 
 /// An axis.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Axis {
     /// Name of its column.
     pub column: String,
@@ -91,24 +121,22 @@ pub enum Layer {
     Hatch,
     /// Colours that fill the panel.
     Map(Map),
-    /// Lines through points.
-    Lines(Vec<Vec<(f64, f64)>>, Stroke),
-    /// A line that is seen on any colour: dark, with a light rim.
+    /// A line through points.
+    Line(Vec<(f64, f64)>, Stroke),
+    /// Lines that are seen on any colour: dark, with a light rim.
     Contour(Vec<Vec<(f64, f64)>>, Stroke),
     /// Between two curves, each point with its least and greatest value: filled.
     Band(Vec<(f64, f64, f64)>, [u8; 3]),
     /// Bars from zero: where each begins and ends, and its height.
     Bars(Vec<(f64, f64, f64)>, [u8; 3]),
-    /// Small marks, by series.
-    Points(Vec<(f64, f64)>, Marker),
-    /// Small marks of single rows.
-    Dots(Vec<Dot>),
+    /// Small marks at points.
+    Marks(Vec<((f64, f64), Symbol)>),
     /// Names of points, in markup, beside them.
     Names(Vec<((f64, f64), String)>),
-    /// Stars.
-    Stars(Vec<(f64, f64)>),
+    /// A star.
+    Star((f64, f64)),
     /// A vertical line with words above its upper end, in markup.
-    Mark(f64, String, Stroke),
+    Vertical(f64, String, Stroke),
     /// A horizontal line.
     Level(f64, Stroke),
 }
@@ -159,27 +187,6 @@ impl Hover {
     }
 }
 
-/// A mark at a point.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Marker {
-    /// Which shape and colour.
-    pub series: usize,
-}
-
-/// Curves through fewer points show them.
-pub const MARKED: usize = 50;
-
-/// A row as a mark.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Dot {
-    /// Where it is.
-    pub at: (f64, f64),
-    /// Its colour; a row without a value is hollow.
-    pub fill: Option<[u8; 3]>,
-    /// Its shape.
-    pub shape: usize,
-}
-
 /// An entry of a legend.
 #[derive(Debug, Clone)]
 pub struct Entry {
@@ -197,28 +204,22 @@ pub enum Key {
     /// A line with a light rim.
     Contour(Stroke),
     /// A mark.
-    Point(Marker),
+    Mark(Symbol),
     /// A line with marks.
-    Marked(Stroke, Marker),
+    Marked(Stroke, Symbol),
     /// A star.
     Star,
     /// The hatched background.
     Hatch,
-    /// A hollow dot.
-    Hollow,
-    /// A coloured mark of a row.
-    Dot([u8; 3], usize),
     /// A colour.
     Fill([u8; 3]),
-    /// Only words.
-    None,
 }
 
 impl Key {
     /// The line of series number `series`, with its marks if they are drawn.
     pub fn series(series: usize, is_marked: bool) -> Key {
         let stroke = super::colour::series(series);
-        if is_marked { Key::Marked(stroke, Marker { series }) } else { Key::Line(stroke) }
+        if is_marked { Key::Marked(stroke, Symbol::of_series(series)) } else { Key::Line(stroke) }
     }
 }
 
@@ -239,10 +240,21 @@ impl Entry {
 pub struct Drawn {
     /// The picture.
     pub svg: String,
-    /// Width and height in points.
-    pub size: (f64, f64),
     /// Maps with values, and where they are in the picture.
-    pub hovers: Vec<(Area, Axis, Axis, Hover)>,
+    pub hovers: Vec<Shown>,
+}
+
+/// A map with values in a picture.
+#[derive(Debug, Clone)]
+pub struct Shown {
+    /// Where it is.
+    pub area: Area,
+    /// Its horizontal axis.
+    pub x: Axis,
+    /// Its vertical axis.
+    pub y: Axis,
+    /// Its values.
+    pub hover: Hover,
 }
 
 /// The ticks of a panel, and whether its axes are labelled.
@@ -264,81 +276,40 @@ struct Layout {
     height: f64,
 }
 
-/// Room around a panel for its labels.
-#[derive(Debug, Clone, Copy)]
-struct Room {
-    left: f64,
-    right: f64,
-    below: f64,
-}
-
 impl Figure {
     /// Draws the figure, `width` millimetres wide.
     pub fn draw(&self, width: f64) -> Drawn {
         let width = width * MILLIMETRE;
         let mut canvas = Canvas::default();
-        let mut y = MARGIN;
         let inner = width - 2.0 * MARGIN;
-        for line in wrapped(&self.title, SIZE + 0.5, inner) {
-            y += SIZE + 1.5;
-            canvas.text((MARGIN, y), &line, SIZE + 0.5, Anchor::Start, false);
-        }
-        for line in wrapped(&self.subtitle, NOTE_SIZE, inner) {
-            y += NOTE_SIZE + 2.2;
-            canvas.coloured((MARGIN, y), &line, NOTE_SIZE, Anchor::Start, false, "#444");
-        }
-        y += 4.0;
+        let title = Text { size: SIZE + 0.5, ..LABEL };
+        let top = paragraph(&mut canvas, &self.title, &title, MARGIN, (inner, 1.0));
+        let mut top = paragraph(&mut canvas, &self.subtitle, &NOTE, top, (inner, 2.2)) + 4.0;
         if !self.legend.is_empty() {
-            y = self.legend(&mut canvas, y, inner);
+            top = self.draw_legend(&mut canvas, top, inner);
         }
         let as_powers = self.as_powers();
         let bar = self.colours.as_ref().map_or(0.0, |colours| colours.width(as_powers));
-        let rows = if self.rows.is_empty() { 0.0 } else { ROW_TITLE };
-        let (bottom, hovers) = self.panels(&mut canvas, y, inner - bar - rows, as_powers);
-        let mut foot = bottom;
+        let rows = if self.rows.is_empty() { 0.0 } else { ROW_TITLE_WIDTH };
+        let (mut foot, hovers) = self.draw_panels(&mut canvas, top, inner - bar - rows, as_powers);
         for note in &self.notes {
-            for line in wrapped(note, NOTE_SIZE, inner) {
-                foot += NOTE_SIZE + 2.0;
-                canvas.coloured((MARGIN, foot), &line, NOTE_SIZE, Anchor::Start, false, "#444");
-            }
+            foot = paragraph(&mut canvas, note, &NOTE, foot, (inner, 2.0));
         }
         let height = foot + MARGIN;
-        Drawn { svg: canvas.svg(width, height, &label::plain(&self.title)), size: (width, height), hovers }
+        Drawn { svg: canvas.svg(width, height, &label::plain(&self.title)), hovers }
     }
 
-    fn legend(&self, canvas: &mut Canvas, top: f64, inner: f64) -> f64 {
+    /// Draws the legend below `top`; returns the place below it.
+    fn draw_legend(&self, canvas: &mut Canvas, top: f64, inner: f64) -> f64 {
         let (mut x, mut y) = (MARGIN, top + SIZE);
         for entry in &self.legend {
-            let key = if matches!(entry.key, Key::None) { 0.0 } else { 20.0 };
-            let wide = key + SIZE * label::width(&entry.text) + 10.0;
+            let wide = KEY_WIDTH + SIZE * label::width(&entry.text) + 10.0;
             if x > MARGIN && x + wide - 8.0 > MARGIN + inner {
                 x = MARGIN;
                 y += SIZE + 3.0;
             }
-            let middle = y - 0.35 * SIZE;
-            let area = Area { x, y: middle - 3.5, width: 16.0, height: 7.0 };
-            match &entry.key {
-                Key::Line(stroke) => canvas.line((x, middle), (x + 16.0, middle), stroke),
-                Key::Contour(stroke) => contour_line(canvas, &[vec![(x, middle), (x + 16.0, middle)]], stroke),
-                Key::Point(marker) => marker.draw(canvas, (x + 8.0, middle)),
-                Key::Marked(stroke, marker) => {
-                    canvas.line((x, middle), (x + 16.0, middle), stroke);
-                    marker.draw(canvas, (x + 8.0, middle));
-                }
-                Key::Star => star(canvas, (x + 8.0, middle)),
-                Key::Hatch => {
-                    canvas.hatch(area);
-                    canvas.frame(area, &Stroke::solid("#777", 0.4));
-                }
-                Key::Hollow => symbol(canvas, (x + 8.0, middle), 0, "none", &Stroke::solid("#888", 0.4)),
-                Key::Dot(colour, shape) => symbol(canvas, (x + 8.0, middle), *shape, &hex(*colour), &dot_rim()),
-                Key::Fill(colour) => {
-                    canvas.fill(area, &hex(*colour));
-                    canvas.frame(area, &Stroke::solid("#777", 0.4));
-                }
-                Key::None => {}
-            }
-            canvas.text((x + key, y), &entry.text, SIZE, Anchor::Start, false);
+            entry.key.draw(canvas, (x, y - 0.35 * SIZE));
+            canvas.text((x + KEY_WIDTH, y), &entry.text, &LABEL);
             x += wide;
         }
         y + 4.0
@@ -350,33 +321,31 @@ impl Figure {
         axes.chain(self.colours.iter().map(|colours| colours.scale)).any(|scale| scale.needs_powers())
     }
 
-    /// How panels are set out on `inner` points.
+    /// Sets the panels out on `inner` points.
     fn layout(&self, inner: f64, as_powers: bool) -> Layout {
         let columns = self.columns.clamp(1, self.panels.len().max(1));
-        let rows = self.panels.len().div_ceil(columns);
         // A first guess of a panel's width decides how many ticks it has, and so how much room their labels take.
         let guess = inner / columns as f64 - 40.0;
-        let plan = |(place, panel): (usize, &Panel)| {
-            let x_count = panel.x.fitting(guess, false);
-            let y_count = panel.y.fitting(guess * self.aspect, true);
-            let same_below = self.panels.get(place + columns).is_some_and(|below| below.x.same(&panel.x));
-            Plan {
-                x: panel.x.scale.ticks(x_count, as_powers),
-                y: panel.y.scale.ticks(y_count, as_powers),
-                x_label: !(self.shared && same_below),
-                y_label: !self.shared || place.is_multiple_of(columns),
-            }
+        let plan = |(place, panel): (usize, &Panel)| Plan {
+            x: panel.x.scale.ticks(fitting(guess, if panel.x.scale.log { 27.0 } else { 30.0 }), as_powers),
+            y: panel.y.scale.ticks(fitting(guess * self.aspect, 17.0), as_powers),
+            x_label: self.panels.get(place + columns).is_none_or(|below| below.x != panel.x),
+            y_label: place.is_multiple_of(columns),
         };
         let plans: Vec<Plan> = self.panels.iter().enumerate().map(plan).collect();
         let mut lefts = vec![0.0_f64; columns];
         let mut rights = vec![0.0_f64; columns];
-        let mut belows = vec![0.0_f64; rows];
-        for (place, (panel, plan)) in self.panels.iter().zip(&plans).enumerate() {
-            let room = panel.room(plan, guess);
+        let mut belows = vec![0.0_f64; self.panels.len().div_ceil(columns)];
+        for (place, plan) in plans.iter().enumerate() {
             let (row, column) = (place / columns, place % columns);
-            lefts[column] = lefts[column].max(room.left);
-            rights[column] = rights[column].max(room.right);
-            belows[row] = belows[row].max(room.below);
+            // The first and the last label of the horizontal axis may hang over.
+            let before = plan.x.beyond(guess, |share| share);
+            let after = plan.x.beyond(guess, |share| 1.0 - share);
+            let left = if plan.y_label { TICK_LENGTH + 2.0 + widest(&plan.y) + 3.0 + SIZE + 3.0 } else { 5.0 };
+            lefts[column] = lefts[column].max(left.max(before + 3.0));
+            rights[column] = rights[column].max(after + 2.0);
+            let below = if plan.x_label { TICK_LENGTH + TICK_SIZE + 4.0 + SIZE + 6.0 } else { 2.0 };
+            belows[row] = belows[row].max(below);
         }
         let room: f64 = lefts.iter().sum::<f64>() + rights.iter().sum::<f64>();
         let width = ((inner - room) / columns as f64).max(20.0);
@@ -384,19 +353,13 @@ impl Figure {
         let above = if lines > 0 { lines as f64 * (SIZE + 1.5) + TITLE_SPACE } else { 4.0 };
         // Titles of columns stand above the first row.
         let titled = |row: usize| if row == 0 || self.rows.is_empty() { above } else { 4.0 };
-        let words = |row: &[Panel]| if row.iter().any(Panel::has_words_above) { WORDS_ABOVE } else { 0.0 };
+        let words = |row: &[Panel]| if row.iter().any(Panel::has_words_above) { WORDS_HEIGHT } else { 0.0 };
         let aboves = self.panels.chunks(columns).enumerate().map(|(row, panels)| titled(row) + words(panels)).collect();
         Layout { plans, lefts, rights, aboves, belows, width, height: (width * self.aspect).max(20.0) }
     }
 
-    /// Draws the panels and the colour bar; the place below them, and the maps.
-    fn panels(
-        &self,
-        canvas: &mut Canvas,
-        top: f64,
-        inner: f64,
-        as_powers: bool,
-    ) -> (f64, Vec<(Area, Axis, Axis, Hover)>) {
+    /// Draws the panels and the colour bar; returns the place below them, and the maps.
+    fn draw_panels(&self, canvas: &mut Canvas, top: f64, inner: f64, as_powers: bool) -> (f64, Vec<Shown>) {
         let layout = self.layout(inner, as_powers);
         let Layout { width, height, .. } = layout;
         let columns = layout.lefts.len();
@@ -411,51 +374,45 @@ impl Figure {
                 panel.draw(canvas, area, &layout.plans[row * columns + column], layout.lefts[column]);
                 for layer in &panel.layers {
                     if let Layer::Map(Map { hover: Some(hover), .. }) = layer {
-                        hovers.push((area, panel.x.clone(), panel.y.clone(), hover.clone()));
+                        hovers.push(Shown { area, x: panel.x.clone(), y: panel.y.clone(), hover: hover.clone() });
                     }
                 }
                 x += width + layout.rights[column];
             }
             if let Some(title) = self.rows.get(row) {
-                canvas.text((MARGIN + inner + SIZE, y + 0.5 * height), title, SIZE, Anchor::Middle, true);
+                let place = (MARGIN + inner + SIZE, y + 0.5 * height);
+                canvas.text(place, title, &Text { anchor: Anchor::Middle, upwards: true, ..LABEL });
             }
             y += height + layout.belows[row];
         }
         if let Some(colours) = &self.colours {
             let first = top + layout.aboves.first().copied().unwrap_or(0.0);
             let tall = y - layout.belows.last().copied().unwrap_or(0.0) - first;
-            let beside = if self.rows.is_empty() { 0.0 } else { ROW_TITLE };
-            let area = Area { x: MARGIN + inner + beside + 6.0, y: first, width: 8.0, height: tall };
+            let beside = if self.rows.is_empty() { 0.0 } else { ROW_TITLE_WIDTH };
+            let area = Area { x: MARGIN + inner + beside + BAR_SPACE, y: first, width: BAR_WIDTH, height: tall };
             colours.draw(canvas, area, as_powers);
         }
         (y, hovers)
     }
 }
 
+/// Draws a paragraph of lines of at most `width` points, `space` between them, below `top`; returns the place below it.
+fn paragraph(canvas: &mut Canvas, markup: &str, style: &Text<'_>, top: f64, (width, space): (f64, f64)) -> f64 {
+    let mut y = top;
+    for line in wrapped(markup, style.size, width) {
+        y += style.size + space;
+        canvas.text((MARGIN, y), &line, style);
+    }
+    y
+}
+
 fn wrapped(markup: &str, size: f64, width: f64) -> Vec<String> {
     if markup.is_empty() { Vec::new() } else { label::wrapped(markup, width / size) }
 }
 
-impl Axis {
-    /// About how many labels fit on `length` points.
-    fn fitting(&self, length: f64, is_vertical: bool) -> usize {
-        let each = if is_vertical {
-            17.0
-        } else if self.scale.log {
-            27.0
-        } else {
-            30.0
-        };
-        ((length / each) as usize).clamp(2, 9)
-    }
-
-    fn same(&self, other: &Axis) -> bool {
-        self.column == other.column && self.scale == other.scale
-    }
-
-    fn label(&self, power: i32) -> String {
-        label::axis(&self.column, &self.unit, power)
-    }
+/// About how many labels fit on `length` points, if each takes `each`.
+fn fitting(length: f64, each: f64) -> usize {
+    ((length / each) as usize).clamp(2, 9)
 }
 
 fn widest(ticks: &Ticks) -> f64 {
@@ -463,31 +420,108 @@ fn widest(ticks: &Ticks) -> f64 {
     TICK_SIZE * widths.fold(0.0, f64::max)
 }
 
-impl Panel {
-    /// Room for the labels around a panel about `length` wide.
-    fn room(&self, Plan { x, y, x_label, y_label }: &Plan, length: f64) -> Room {
-        // The first and the last label of the horizontal axis may hang over.
-        let over = |tick: &Tick, share: f64| {
-            0.5 * TICK_SIZE * tick.label.as_deref().map_or(0.0, label::width) - share.max(0.0) * length
-        };
-        let before = x.ticks.iter().map(|tick| over(tick, self.x.scale.share(tick.value))).fold(0.0, f64::max);
-        let after = x.ticks.iter().map(|tick| over(tick, 1.0 - self.x.scale.share(tick.value))).fold(0.0, f64::max);
-        let labels = if *y_label { TICK + 2.0 + widest(y) + 3.0 + SIZE + 3.0 } else { 5.0 };
-        let below = if *x_label { TICK + TICK_SIZE + 4.0 + SIZE + 6.0 } else { 2.0 };
-        Room { left: labels.max(before + 3.0), right: after + 2.0, below }
+impl Ticks {
+    /// How far labels hang over an end of an axis about `length` long, from which they are a fraction `away` of it.
+    fn beyond(&self, length: f64, away: impl Fn(f64) -> f64) -> f64 {
+        let half = |label: &Option<String>| 0.5 * TICK_SIZE * label.as_deref().map_or(0.0, label::width);
+        let over = self.ticks.iter().map(|tick| half(&tick.label) - away(tick.share).max(0.0) * length);
+        over.fold(0.0, f64::max)
     }
 
+    /// Draws the ticks and the numbers of a horizontal axis below a panel.
+    fn draw_below(&self, canvas: &mut Canvas, area: Area, is_labelled: bool) {
+        let bottom = area.y + area.height;
+        let mut edge = f64::NEG_INFINITY;
+        for tick in &self.ticks {
+            let x = area.x + area.width * tick.share;
+            canvas.line((x, bottom), (x, bottom + tick.length()), &Stroke::solid("#000", FRAME_WIDTH));
+            let Some(words) = tick.label.as_deref().filter(|_| is_labelled) else { continue };
+            let half = 0.5 * TICK_SIZE * label::width(words);
+            if x - half > edge + 2.0 {
+                let style = Text { size: TICK_SIZE, anchor: Anchor::Middle, ..LABEL };
+                canvas.text((x, bottom + TICK_LENGTH + 1.0 + TICK_SIZE), words, &style);
+                edge = x + half;
+            }
+        }
+    }
+
+    /// Draws the ticks and the numbers of a vertical axis to the right or to the left of `area`.
+    fn draw_beside(&self, canvas: &mut Canvas, area: Area, is_right: bool, is_labelled: bool) {
+        let x = if is_right { area.x + area.width } else { area.x };
+        let mut edge = f64::INFINITY;
+        for tick in &self.ticks {
+            let y = area.y + area.height * (1.0 - tick.share);
+            let (from, to) = if is_right { (x, x + tick.length()) } else { (x - tick.length(), x) };
+            canvas.line((from, y), (to, y), &Stroke::solid("#000", FRAME_WIDTH));
+            let Some(words) = tick.label.as_deref().filter(|_| is_labelled) else { continue };
+            if edge - y > TICK_SIZE + 0.5 {
+                let (x, anchor) = if is_right {
+                    (x + TICK_LENGTH + 2.0, Anchor::Start)
+                } else {
+                    (x - TICK_LENGTH - 2.0, Anchor::End)
+                };
+                canvas.text((x, y + 0.35 * TICK_SIZE), words, &Text { size: TICK_SIZE, anchor, ..LABEL });
+                edge = y;
+            }
+        }
+    }
+}
+
+impl Tick {
+    fn length(&self) -> f64 {
+        if self.label.is_some() { TICK_LENGTH } else { 0.6 * TICK_LENGTH }
+    }
+}
+
+impl Key {
+    /// Draws it to the right of `(x, middle)`.
+    fn draw(&self, canvas: &mut Canvas, (x, middle): (f64, f64)) {
+        let (centre, end) = ((x + 8.0, middle), (x + 16.0, middle));
+        let area = Area { x, y: middle - 3.5, width: 16.0, height: 7.0 };
+        match self {
+            Key::Line(stroke) => canvas.line((x, middle), end, stroke),
+            Key::Contour(stroke) => draw_contour(canvas, &[vec![(x, middle), end]], stroke),
+            Key::Mark(symbol) => symbol.draw(canvas, centre),
+            Key::Marked(stroke, symbol) => {
+                canvas.line((x, middle), end, stroke);
+                symbol.draw(canvas, centre);
+            }
+            Key::Star => symbol::draw_star(canvas, centre),
+            Key::Hatch => {
+                canvas.hatch(area);
+                canvas.frame(area, &Stroke::solid("#777", 0.4));
+            }
+            Key::Fill(colour) => {
+                canvas.fill(area, &hex(*colour));
+                canvas.frame(area, &Stroke::solid("#777", 0.4));
+            }
+        }
+    }
+}
+
+impl Panel {
+    /// Draws the panel; the label of its vertical axis is at the outer edge of the room to the left, `left` wide.
     fn draw(&self, canvas: &mut Canvas, area: Area, plan: &Plan, left: f64) {
         canvas.clipped(area, |canvas| self.layers.iter().for_each(|layer| self.fill(canvas, area, layer)));
         // Marks on the frame are not to be cut.
-        canvas.frame(area, &Stroke::solid("#000", FRAME));
+        canvas.frame(area, &Stroke::solid("#000", FRAME_WIDTH));
         self.layers.iter().for_each(|layer| self.mark(canvas, area, layer));
-        self.marks(canvas, area);
-        self.ticks(canvas, area, plan, left);
+        self.draw_words_above(canvas, area);
+        plan.x.draw_below(canvas, area, plan.x_label);
+        plan.y.draw_beside(canvas, area, false, plan.y_label);
+        let middle = Text { anchor: Anchor::Middle, ..LABEL };
+        if plan.x_label {
+            let place = (area.x + 0.5 * area.width, area.y + area.height + TICK_LENGTH + TICK_SIZE + 4.0 + SIZE);
+            canvas.text(place, &self.x.label(plan.x.power), &middle);
+        }
+        if plan.y_label {
+            let place = (area.x - left + SIZE + 1.0, area.y + 0.5 * area.height);
+            canvas.text(place, &self.y.label(plan.y.power), &Text { upwards: true, ..middle });
+        }
+        let above = if self.has_words_above() { WORDS_HEIGHT } else { 0.0 };
         for (line, title) in wrapped(&self.title, SIZE, area.width).iter().rev().enumerate() {
-            let above = if self.has_words_above() { WORDS_ABOVE } else { 0.0 };
             let y = area.y - TITLE_SPACE - above - line as f64 * (SIZE + 1.5);
-            canvas.text((area.x, y), title, SIZE, Anchor::Start, false);
+            canvas.text((area.x, y), title, &LABEL);
         }
     }
 
@@ -499,15 +533,15 @@ impl Panel {
     /// Draws what is cut at the frame: areas and lines.
     fn fill(&self, canvas: &mut Canvas, area: Area, layer: &Layer) {
         let place = |point| self.place(area, point);
-        let all = |lines: &[Vec<(f64, f64)>]| -> Vec<Vec<(f64, f64)>> {
-            lines.iter().flat_map(|line| pieces(line.iter().map(|point| place(*point)))).collect()
-        };
+        let pieces = |line: &Vec<(f64, f64)>| pieces(line.iter().map(|point| place(*point)));
         match layer {
             Layer::Hatch => canvas.hatch(area),
             Layer::Map(map) => canvas.image(area, &map.png),
-            Layer::Lines(lines, stroke) => canvas.lines(&all(lines), stroke),
-            Layer::Contour(lines, stroke) => contour_line(canvas, &all(lines), stroke),
-            Layer::Mark(x, _, stroke) => {
+            Layer::Line(line, stroke) => canvas.lines(&pieces(line), stroke),
+            Layer::Contour(lines, stroke) => {
+                draw_contour(canvas, &lines.iter().flat_map(pieces).collect::<Vec<_>>(), stroke);
+            }
+            Layer::Vertical(x, _, stroke) => {
                 let (x, _) = place((*x, self.y.scale.low));
                 canvas.line((x, area.y), (x, area.y + area.height), stroke);
             }
@@ -530,7 +564,7 @@ impl Panel {
                     canvas.frame(bar, &Stroke::solid("#000", 0.3));
                 }
             }
-            Layer::Points(..) | Layer::Dots(_) | Layer::Names(_) | Layer::Stars(_) => {}
+            Layer::Marks(_) | Layer::Names(_) | Layer::Star(_) => {}
         }
     }
 
@@ -541,98 +575,55 @@ impl Panel {
             (is_share(self.x.scale.share(x)) && is_share(self.y.scale.share(y))).then(|| self.place(area, (x, y)))
         };
         match layer {
-            Layer::Points(points, marker) => {
-                points.iter().filter_map(inside).for_each(|place| marker.draw(canvas, place));
-            }
-            Layer::Dots(dots) => {
-                for (place, dot) in dots.iter().filter_map(|dot| Some((inside(&dot.at)?, dot))) {
-                    match dot.fill {
-                        Some(fill) => symbol(canvas, place, dot.shape, &hex(fill), &dot_rim()),
-                        None => symbol(canvas, place, dot.shape, "none", &Stroke::solid("#888", 0.4)),
-                    }
-                }
+            Layer::Marks(marks) => {
+                let marks = marks.iter().filter_map(|(at, symbol)| Some((inside(at)?, symbol)));
+                marks.for_each(|(place, symbol)| symbol.draw(canvas, place));
             }
             Layer::Names(names) => {
                 let names = names.iter().filter_map(|(at, name)| Some((inside(at)?, name)));
-                names.for_each(|(place, name)| beside(canvas, area, place, name));
+                names.for_each(|(place, name)| draw_name(canvas, area, place, name));
             }
-            Layer::Stars(points) => points.iter().filter_map(inside).for_each(|place| clear(canvas, area, place)),
+            Layer::Star(at) => {
+                if let Some(place) = inside(at) {
+                    draw_clear_star(canvas, area, place);
+                }
+            }
             _ => {}
         }
     }
 
-    /// Whether vertical lines have words, which stand above the panel.
-    fn has_words_above(&self) -> bool {
-        let visible = |x: f64| (0.0..=1.0).contains(&self.x.scale.share(x));
-        self.layers.iter().any(|layer| matches!(layer, Layer::Mark(x, words, _) if !words.is_empty() && visible(*x)))
+    /// The vertical lines inside that have words: each with its place, as a fraction of the panel, its words and its stroke.
+    fn words(&self) -> impl Iterator<Item = (f64, &str, &Stroke)> {
+        self.layers.iter().filter_map(|layer| {
+            let Layer::Vertical(x, words, stroke) = layer else { return None };
+            let share = self.x.scale.share(*x);
+            (!words.is_empty() && (0.0..=1.0).contains(&share)).then_some((share, words.as_str(), stroke))
+        })
     }
 
-    /// The words at vertical lines: above the panel, as near to their lines as they do not run over each other.
-    fn marks(&self, canvas: &mut Canvas, area: Area) {
-        let mut marks: Vec<(f64, &str, &Stroke)> = Vec::new();
-        for layer in &self.layers {
-            let Layer::Mark(x, words, stroke) = layer else { continue };
-            let share = self.x.scale.share(*x);
-            if !words.is_empty() && (0.0..=1.0).contains(&share) {
-                marks.push((area.x + area.width * share, words, stroke));
-            }
-        }
+    fn has_words_above(&self) -> bool {
+        self.words().next().is_some()
+    }
+
+    /// Draws the words at vertical lines: above the panel, as near to their lines as they do not run over each other.
+    fn draw_words_above(&self, canvas: &mut Canvas, area: Area) {
+        let marks = self.words().map(|(share, words, stroke)| (area.x + area.width * share, words, stroke));
+        let mut marks: Vec<(f64, &str, &Stroke)> = marks.collect();
         marks.sort_by(|left, right| left.0.total_cmp(&right.0));
         let wishes: Vec<(f64, f64)> =
-            marks.iter().map(|(line, words, _)| (*line, NOTE_SIZE * label::width(words) + MARK_SPACE)).collect();
+            marks.iter().map(|(line, words, _)| (*line, NOTE_SIZE * label::width(words) + WORD_SPACE)).collect();
         for ((line, words, stroke), place) in marks.iter().zip(apart(&wishes, area.x, area.x + area.width)) {
             let leader = Stroke::solid(&stroke.colour, stroke.width);
-            canvas.line((*line, area.y), (place, area.y - LEADER), &leader);
-            let foot = area.y - LEADER - 2.5;
-            canvas.coloured((place, foot), words, NOTE_SIZE, Anchor::Middle, false, &stroke.colour);
+            canvas.line((*line, area.y), (place, area.y - LEADER_LENGTH), &leader);
+            let style = Text { anchor: Anchor::Middle, colour: &stroke.colour, ..NOTE };
+            canvas.text((place, area.y - LEADER_LENGTH - 2.5), words, &style);
         }
     }
+}
 
-    /// Ticks and labels; the label of the vertical axis is at the outer edge of the room to the left, `left` wide.
-    fn ticks(&self, canvas: &mut Canvas, area: Area, Plan { x, y, x_label, y_label }: &Plan, left: f64) {
-        let thin = Stroke::solid("#000", FRAME);
-        let (bottom, right) = (area.y + area.height, area.x + area.width);
-        let mut edge = f64::NEG_INFINITY;
-        for tick in &x.ticks {
-            let place = area.x + area.width * self.x.scale.share(tick.value);
-            if place < area.x - 0.1 || place > right + 0.1 {
-                continue;
-            }
-            let length = if tick.label.is_some() { TICK } else { 0.6 * TICK };
-            canvas.line((place, bottom), (place, bottom + length), &thin);
-            if let (true, Some(words)) = (*x_label, &tick.label) {
-                let half = 0.5 * TICK_SIZE * label::width(words);
-                if place - half > edge + 2.0 {
-                    canvas.text((place, bottom + TICK + 1.0 + TICK_SIZE), words, TICK_SIZE, Anchor::Middle, false);
-                    edge = place + half;
-                }
-            }
-        }
-        let mut edge = f64::INFINITY;
-        for tick in &y.ticks {
-            let place = area.y + area.height * (1.0 - self.y.scale.share(tick.value));
-            if place < area.y - 0.1 || place > bottom + 0.1 {
-                continue;
-            }
-            let length = if tick.label.is_some() { TICK } else { 0.6 * TICK };
-            canvas.line((area.x - length, place), (area.x, place), &thin);
-            if let (true, Some(words)) = (*y_label, &tick.label)
-                && edge - place > TICK_SIZE + 0.5
-            {
-                let right = area.x - TICK - 2.0;
-                canvas.text((right, place + 0.35 * TICK_SIZE), words, TICK_SIZE, Anchor::End, false);
-                edge = place;
-            }
-        }
-        if *x_label {
-            let words = self.x.label(x.power);
-            let place = (area.x + 0.5 * area.width, bottom + TICK + TICK_SIZE + 4.0 + SIZE);
-            canvas.text(place, &words, SIZE, Anchor::Middle, false);
-        }
-        if *y_label {
-            let words = self.y.label(y.power);
-            canvas.text((area.x - left + SIZE + 1.0, area.y + 0.5 * area.height), &words, SIZE, Anchor::Middle, true);
-        }
+impl Axis {
+    fn label(&self, power: i32) -> String {
+        label::axis(&self.column, &self.unit, power)
     }
 }
 
@@ -689,110 +680,59 @@ fn pieces(points: impl Iterator<Item = (f64, f64)>) -> Vec<Vec<(f64, f64)>> {
     pieces
 }
 
-fn contour_line(canvas: &mut Canvas, lines: &[Vec<(f64, f64)>], stroke: &Stroke) {
+/// Draws lines that are seen on any colour.
+fn draw_contour(canvas: &mut Canvas, lines: &[Vec<(f64, f64)>], stroke: &Stroke) {
     canvas.lines(lines, &Stroke::solid("#fff", stroke.width + 1.2));
     canvas.lines(lines, stroke);
 }
 
-/// The rim of a mark of a row.
-fn dot_rim() -> Stroke {
-    Stroke::solid("#222", 0.3)
-}
-
-/// The name of a row beside its mark, on the side where it stays inside.
-fn beside(canvas: &mut Canvas, area: Area, (x, y): (f64, f64), name: &str) {
+/// Draws the name of a row beside its mark, on the side where it stays inside.
+fn draw_name(canvas: &mut Canvas, area: Area, (x, y): (f64, f64), name: &str) {
     let wide = NOTE_SIZE * label::width(name) + 4.0;
     let (place, anchor) =
         if x + wide > area.x + area.width { (x - 3.5, Anchor::End) } else { (x + 3.5, Anchor::Start) };
     let line = (y + 0.35 * NOTE_SIZE).clamp(area.y + NOTE_SIZE, area.y + area.height - 2.0);
-    canvas.coloured((place, line), name, NOTE_SIZE, anchor, false, "#333");
+    canvas.text((place, line), name, &Text { anchor, colour: "#333", ..NOTE });
 }
 
-/// A star that is clear of the frame: near it, the star stands inside and a line leads to its place.
-fn clear(canvas: &mut Canvas, area: Area, (x, y): (f64, f64)) {
-    let room = STAR + 1.4;
+/// Draws a star clear of the frame: near it, the star stands inside and a line leads to its place.
+fn draw_clear_star(canvas: &mut Canvas, area: Area, (x, y): (f64, f64)) {
+    let room = STAR_RADIUS + 1.4;
     let inside = |value: f64, start: f64, length: f64| value.min(start + length - room).max(start + room);
-    let place = (inside(x, area.x, area.width), inside(y, area.y, area.height));
+    let mut place = (inside(x, area.x, area.width), inside(y, area.y, area.height));
     if place != (x, y) {
-        let away = (place.0 - x).hypot(place.1 - y);
         // Farther in, so that the line is seen.
-        let place = (place.0 + 1.5 * (place.0 - x) / away * STAR, place.1 + 1.5 * (place.1 - y) / away * STAR);
+        let away = (place.0 - x).hypot(place.1 - y);
+        let farther = |here: f64, from: f64| here + 1.5 * (here - from) / away * STAR_RADIUS;
+        place = (farther(place.0, x), farther(place.1, y));
         canvas.line((x, y), place, &Stroke::solid("#fff", 1.6));
         canvas.line((x, y), place, &Stroke::solid("#000", 0.7));
         canvas.circle((x, y), 1.0, "#000", &Stroke::solid("#fff", 0.4));
-        return star(canvas, place);
     }
-    star(canvas, place);
-}
-
-/// A star with five points.
-fn star(canvas: &mut Canvas, (x, y): (f64, f64)) {
-    let corner = |i: usize| {
-        let angle = std::f64::consts::PI * (i as f64 / 5.0 - 0.5);
-        let radius = if i.is_multiple_of(2) { STAR } else { 1.9 };
-        (x + radius * angle.cos(), y + radius * angle.sin())
-    };
-    let corners: Vec<(f64, f64)> = (0..10).map(corner).collect();
-    canvas.shape(&corners, "#fff", Some(&Stroke::solid("#000", 0.8)));
-}
-
-impl Marker {
-    fn draw(&self, canvas: &mut Canvas, place: (f64, f64)) {
-        let colour = super::colour::series(self.series).colour;
-        symbol(canvas, place, self.series, "#fff", &Stroke::solid(&colour, 0.8));
-    }
-}
-
-/// A circle, a square, a triangle or a rhombus.
-fn symbol(canvas: &mut Canvas, (x, y): (f64, f64), shape: usize, fill: &str, stroke: &Stroke) {
-    let r = 2.0;
-    let corners: &[(f64, f64)] = match shape % 4 {
-        0 => return canvas.circle((x, y), r, fill, stroke),
-        1 => &[(-r, -r), (r, -r), (r, r), (-r, r)],
-        2 => &[(0.0, -r - 0.5), (r + 0.3, r), (-r - 0.3, r)],
-        _ => &[(0.0, -r - 0.8), (r + 0.8, 0.0), (0.0, r + 0.8), (-r - 0.8, 0.0)],
-    };
-    let corners: Vec<(f64, f64)> = corners.iter().map(|(right, down)| (x + right, y + down)).collect();
-    canvas.shape(&corners, fill, Some(stroke));
+    symbol::draw_star(canvas, place);
 }
 
 impl Colours {
     fn width(&self, as_powers: bool) -> f64 {
-        6.0 + 8.0 + TICK + 2.0 + widest(&self.scale.ticks(6, as_powers)) + 4.0 + SIZE + 1.0
+        let ticks = self.scale.ticks(6, as_powers);
+        BAR_SPACE + BAR_WIDTH + TICK_LENGTH + 2.0 + widest(&ticks) + 4.0 + SIZE + 1.0
     }
 
     fn draw(&self, canvas: &mut Canvas, area: Area, as_powers: bool) {
-        let steps = 128;
-        let pixels: Vec<Option<[u8; 3]>> =
-            (0..steps).map(|i| Some(viridis(1.0 - (i as f64 + 0.5) / steps as f64))).collect();
-        if let Some(png) = super::export::image(1, &pixels) {
+        let colour = |i| Some(viridis(1.0 - (i as f64 + 0.5) / BAR_STEPS as f64));
+        if let Some(png) = super::export::image(1, &(0..BAR_STEPS).map(colour).collect::<Vec<_>>()) {
             canvas.image(area, &png);
         }
-        canvas.frame(area, &Stroke::solid("#000", FRAME));
+        canvas.frame(area, &Stroke::solid("#000", FRAME_WIDTH));
         let ticks = self.scale.ticks(6, as_powers);
-        let right = area.x + area.width;
-        let mut edge = f64::INFINITY;
-        for tick in &ticks.ticks {
-            let share = self.scale.share(tick.value);
-            if !(-1e-9..=1.0 + 1e-9).contains(&share) {
-                continue;
-            }
-            let y = area.y + area.height * (1.0 - share);
-            let length = if tick.label.is_some() { TICK } else { 0.6 * TICK };
-            canvas.line((right, y), (right + length, y), &Stroke::solid("#000", FRAME));
-            if let Some(words) = &tick.label
-                && edge - y > TICK_SIZE + 0.5
-            {
-                canvas.text((right + TICK + 2.0, y + 0.35 * TICK_SIZE), words, TICK_SIZE, Anchor::Start, false);
-                edge = y;
-            }
-        }
+        ticks.draw_beside(canvas, area, true, true);
         let mut words = self.label.clone();
         if ticks.power != 0 {
             words.push_str(&format!(" (10^{{{}}})", label::signed(ticks.power)));
         }
-        let x = right + TICK + 2.0 + widest(&ticks) + 4.0 + SIZE - 1.0;
-        canvas.text((x, area.y + 0.5 * area.height), &words, SIZE, Anchor::Middle, true);
+        let x = area.x + area.width + TICK_LENGTH + 2.0 + widest(&ticks) + 4.0 + SIZE - 1.0;
+        let style = Text { anchor: Anchor::Middle, upwards: true, ..LABEL };
+        canvas.text((x, area.y + 0.5 * area.height), &words, &style);
     }
 }
 

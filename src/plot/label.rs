@@ -14,14 +14,14 @@ pub const FONTS: [&[u8]; 2] = [include_bytes!("fonts/arimo-Regular.ttf"), includ
 /// The families of a text, in the order of preference.
 pub const FAMILIES: &str = "Arimo, Arial, 'Liberation Sans', Helvetica, sans-serif";
 
-/// Size of what is above or below the line, relative to the line.
-pub const SMALL: f64 = 0.72;
+/// Size of letters above or below the line, relative to those on it. Chosen: as TeX sets them at this size.
+pub const SCRIPT_SIZE: f64 = 0.72;
 
-/// How far it is from the line, in units of the size of the font.
-pub const RISE: f64 = 0.38;
+/// Distance of superscripts above the line, relative to the size of letters. Chosen: their tops are those of capitals.
+pub const SUPERSCRIPT_RISE: f64 = 0.38;
 
-/// How far it is below the line.
-pub const DROP: f64 = 0.2;
+/// Distance of subscripts below the line, relative to the size of letters. Chosen: they stay clear of the next line.
+pub const SUBSCRIPT_DROP: f64 = 0.2;
 
 /// Some letters in one style.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -70,7 +70,7 @@ pub fn width(markup: &str) -> f64 {
 fn span_width(span: &Span) -> f64 {
     static FACES: OnceLock<[Option<Face<'static>>; 2]> = OnceLock::new();
     let faces = FACES.get_or_init(|| FONTS.map(|font| Face::parse(font, 0).ok()));
-    let size = if span.level == 0 { 1.0 } else { SMALL };
+    let size = if span.level == 0 { 1.0 } else { SCRIPT_SIZE };
     let Some(face) = &faces[usize::from(span.italic)] else { return 0.6 * size * span.text.len() as f64 };
     let advance = |letter: char| face.glyph_index(letter).and_then(|glyph| face.glyph_hor_advance(glyph));
     let units: u32 =
@@ -83,79 +83,60 @@ pub fn plain(markup: &str) -> String {
     spans(markup).into_iter().map(|span| span.text).collect()
 }
 
-/// The symbol of a quantity, a column or a unit, in markup.
-fn symbol(name: &str) -> Option<&'static str> {
-    Some(match name {
-        "t_f" => "*t*_{f}",
-        "t" => "*t*",
-        "a" => "*a*",
-        "b" => "*b*",
-        "k" => "*k*",
-        "m" => "*m*",
-        "l" => "*l*",
+/// The symbol of a quantity, a column or a unit, in markup: an italic letter, with what follows the first `_` below the line.
+fn symbol(name: &str) -> Option<String> {
+    let known = match name {
         "dt" => "d*t*",
         "delta_t" => "*δt*",
-        "v_i" => "*v*_{i}",
-        "v_f" => "*v*_{f}",
-        "v_0" => "*v*_{0}",
-        "v" => "*v*",
-        "v_c" => "*v*_{c}",
         "v, v_c" => "*v*, *v*_{c}",
-        "theta" => "*θ*",
-        "tau" => "*τ*",
-        "beta" => "*β*",
-        "tau_max" => "*τ*_{max}",
-        "alpha" => "*α*",
-        "alpha_2" => "*α*_{2}",
-        "alpha_3" => "*α*_{3}",
-        "mu_0" => "*μ*_{0}",
-        "sigma" => "*σ*",
         "work" => "*W*",
         "work_optimal" => "*W*∗",
-        "v_start" => "*v*(0+)",
-        "v_end" => "*v*(*t*_{f}−)",
-        "v_min" => "*v*_{min}",
-        "v_max" => "*v*_{max}",
-        "v_c_min" => "*v*_{c,min}",
-        "v_c_max" => "*v*_{c,max}",
-        "v_peak" => "*v*_{peak}",
-        "v_trough" => "*v*_{trough}",
-        "v_crit" => "*v*_{crit}",
-        "t_peak" => "*t*_{peak}",
-        "t_end" => "*t*_{end}",
-        "theta_max" => "*θ*_{max}",
-        "friction_max" => "*τ*_{max}",
-        "hamiltonian" => "d*W*∗/d*t*_{f}",
-        "t_cross" => "*t*_{cross}",
-        "t_hold" => "*t*_{hold}",
-        "t_cheapest" => "*t*_{cheapest}",
-        "t_min" => "*t*_{min}",
-        "t_turn" => "*t*_{turn}",
-        "t_free_in" => "*t*_{free in}",
-        "t_free_out" => "*t*_{free out}",
         "work_cross" => "*W*∗(*t*_{cross})",
         "work_hold" => "*W*∗(*t*_{hold})",
         "work_cheapest" => "*W*∗(*t*_{cheapest})",
         "work_min" => "*W*∗(*t*_{min})",
         "work_turn" => "*W*∗(*t*_{turn})",
-        "k_qs" => "*k*_{qs}",
+        "v_start" => "*v*(0+)",
+        "v_end" => "*v*(*t*_{f}−)",
+        "friction_max" => "*τ*_{max}",
+        "hamiltonian" => "d*W*∗/d*t*_{f}",
+        "t_free_in" => "*t*_{free in}",
+        "t_free_out" => "*t*_{free out}",
         "k_c_i" => "*k*_{c}(*v*_{i})",
         "k_c_f" => "*k*_{c}(*v*_{f})",
         "rigid" => "*k t*_{f}^{2}/*m*",
+        _ => "",
+    };
+    if !known.is_empty() {
+        return Some(known.to_owned());
+    }
+    let (base, below) = name.split_once('_').map_or((name, None), |(base, below)| (base, Some(below)));
+    let letter = match base {
+        "alpha" => "α",
+        "beta" => "β",
+        "theta" => "θ",
+        "mu" => "μ",
+        "sigma" => "σ",
+        "tau" => "τ",
+        "t" | "a" | "b" | "k" | "m" | "l" | "v" => base,
         _ => return None,
+    };
+    Some(match below {
+        Some(below) => format!("*{letter}*_{{{}}}", below.replace('_', ",")),
+        None => format!("*{letter}*"),
     })
 }
 
 /// The name of a column in markup: its symbol, or its name in words.
 pub fn name(column: &str) -> String {
-    symbol(column).map_or_else(|| column.replace('_', " "), str::to_owned)
+    symbol(column).unwrap_or_else(|| column.replace('_', " "))
 }
 
 /// The symbols that units of the model are made of. In SI, letters are upright and `m` is a metre.
 const SCALES: [&str; 5] = ["mu_0", "sigma", "l", "v_0", "t_f"];
 
-fn scale(word: &str) -> Option<&'static str> {
-    SCALES.contains(&word).then(|| symbol(word)).flatten()
+fn scale(word: &str) -> String {
+    symbol(word).filter(|_| SCALES.contains(&word)).unwrap_or_else(|| word.to_owned())
 }
 
 /// A value of a column, in markup, with its unit.
@@ -174,26 +155,16 @@ pub fn unit(unit: &str) -> String {
     if unit == "1" {
         return String::new();
     }
-    let mut markup = String::new();
-    let mut word = String::new();
-    let flush = |word: &mut String, markup: &mut String| {
-        if let Some((base, power)) = word.split_once('^') {
-            markup.push_str(&format!("{}^{{{power}}}", scale(base).unwrap_or(base)));
-        } else {
-            markup.push_str(scale(word).unwrap_or(word));
-        }
-        word.clear();
+    let between = [' ', '/', '(', ')'];
+    let typeset = |piece: &str| {
+        let word = piece.trim_end_matches(between);
+        let shown = match word.split_once('^') {
+            Some((base, power)) => format!("{}^{{{power}}}", scale(base)),
+            None => scale(word),
+        };
+        shown + &piece[word.len()..]
     };
-    for letter in unit.chars() {
-        if matches!(letter, ' ' | '/' | '(' | ')') {
-            flush(&mut word, &mut markup);
-            markup.push(letter);
-        } else {
-            word.push(letter);
-        }
-    }
-    flush(&mut word, &mut markup);
-    markup
+    unit.split_inclusive(between).map(typeset).collect()
 }
 
 /// The label of an axis: name and unit, and the power of ten that its numbers leave out.
@@ -227,18 +198,15 @@ pub fn number(value: f64) -> String {
 pub fn number_among(value: f64, others: &[f64]) -> String {
     let needs_power = |other: &f64| other.is_finite() && *other != 0.0 && !(1e-3..99_999.5).contains(&other.abs());
     let as_powers = others.iter().any(needs_power);
-    if value == 0.0 {
-        return "0".to_owned();
-    }
-    if !value.is_finite() {
-        return if value.is_nan() {
-            "–"
-        } else if value > 0.0 {
-            "∞"
-        } else {
-            "−∞"
-        }
-        .to_owned();
+    let special = match value {
+        0.0 => "0",
+        f64::INFINITY => "∞",
+        f64::NEG_INFINITY => "−∞",
+        _ if value.is_nan() => "–",
+        _ => "",
+    };
+    if !special.is_empty() {
+        return special.to_owned();
     }
     let scientific = format!("{:.4e}", value.abs());
     let (digits, exponent) = scientific.split_once('e').unwrap_or((&scientific, "0"));

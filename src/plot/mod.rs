@@ -10,19 +10,21 @@ mod figure;
 mod label;
 mod page;
 mod scale;
+mod symbol;
 pub mod table;
 pub mod trace;
 
 pub use canvas::Stroke;
 pub use colour::series;
 pub use error::PlotError;
-pub use export::{ExportError, Format};
-pub use figure::{Axis, Dot, Drawn, Entry, Figure, Key, Layer, Marker, Panel};
+pub use export::Format;
+pub use figure::{Axis, Drawn, Entry, Figure, Key, Layer, Panel, Shown};
 pub use page::Page;
 pub use scale::Scale;
+pub use symbol::Symbol;
 
-/// Width of a picture in one column of a journal, in millimetres.
+/// Width of a picture in one column, in millimetres. That of Nature's journals.
 pub const COLUMN: f64 = 89.0;
 
-/// Width of a picture over two columns.
+/// Width of a picture over two columns, in millimetres. That of Nature's journals.
 pub const PAGE: f64 = 183.0;

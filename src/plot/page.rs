@@ -1,13 +1,14 @@
 //! A page of HTML that holds everything it shows: sections, pictures whose maps tell their values, tables that sort.
 
 use super::canvas::escaped;
-use super::figure::{Axis, Drawn, Hover};
+use super::figure::{Axis, Drawn, Hover, Shown};
 
 const STYLE: &str = include_str!("page/style.css");
 const SCRIPT: &str = include_str!("page/script.js");
 
-/// Most values of the maps of a picture that go into the page: of finer maps every second cell along both axes, or every third.
-const MOST_CELLS: usize = 500_000;
+/// Values of the maps of a picture that go into the page: of finer maps every second cell along both axes, or every third. Chosen: a few
+/// megabytes of text.
+const MAX_CELLS: usize = 500_000;
 
 /// A page under construction.
 #[derive(Debug)]
@@ -62,26 +63,22 @@ impl Page {
             .replace("id=\"clip", &format!("id=\"p{place}-clip"))
             .replace("url(#clip", &format!("url(#p{place}-clip"));
         self.body.push_str(&format!("<figure id=\"picture-{place}\">{svg}"));
-        let cells: usize = drawn.hovers.iter().map(|(.., hover)| hover.word.len()).sum();
-        let step = (1..).find(|step| cells / (step * step) <= MOST_CELLS).unwrap_or(1);
+        let cells: usize = drawn.hovers.iter().map(|shown| shown.hover.word.len()).sum();
+        let step = (1..).find(|step| cells / (step * step) <= MAX_CELLS).unwrap_or(1);
         if !drawn.hovers.is_empty() {
-            let maps: Vec<serde_json::Value> = drawn
-                .hovers
-                .iter()
-                .map(|(area, x, y, hover)| (area, x, y, hover.every(step)))
-                .map(|(area, x, y, hover)| {
-                    serde_json::json!({
-                        "area": [area.x, area.y, area.width, area.height],
-                        "x": axis(x, &hover.x),
-                        "y": axis(y, &hover.y),
-                        "column": hover.column,
-                        "values": values(&hover),
-                        "words": hover.words,
-                        "word": hover.word,
-                    })
+            let maps = drawn.hovers.iter().map(|Shown { area, x, y, hover }| {
+                let hover = hover.every(step);
+                serde_json::json!({
+                    "area": [area.x, area.y, area.width, area.height],
+                    "x": axis(x, &hover.x),
+                    "y": axis(y, &hover.y),
+                    "column": hover.column,
+                    "values": values(&hover),
+                    "words": hover.words,
+                    "word": hover.word,
                 })
-                .collect();
-            let data = serde_json::Value::Array(maps).to_string().replace("</", "<\\/");
+            });
+            let data = serde_json::Value::Array(maps.collect()).to_string().replace("</", "<\\/");
             self.body.push_str(&format!("<script type=\"application/json\">{data}</script>"));
         }
         self.body.push_str("</figure>\n");

@@ -2,17 +2,16 @@
 
 use super::label;
 
-/// Ratio of the greatest to the least value from which on a logarithm is used.
-const LOGARITHMIC: f64 = 30.0;
+/// Ratio of the greatest to the least value, from which on a logarithm is used. Chosen: a decade and a half.
+pub const LOG_RATIO: f64 = 30.0;
 
-/// The same ratio of the values above zero, where others are zero, which a logarithm cannot show: a double's digits show less of them.
-const LOGARITHMIC_BESIDE_ZERO: f64 = 1e9;
+/// The same ratio of the values above zero where others are zero, which a logarithm cannot show. Chosen: many decades are worth their loss.
+const LOG_RATIO_BESIDE_ZERO: f64 = 1e9;
 
-/// What is left of numbers of size 1 that cancel, with room for a few hundred roundings of 1.1e-16 each: smaller values, relative to the
-/// greatest, may be zeros.
-const ROUNDING: f64 = 1e-12;
+/// Size, relative to the greatest value, below which values may be zeros: a few thousand roundings of 1.1e-16 each.
+const ROUNDING_RTOL: f64 = 1e-12;
 
-/// Decades without a value that part such zeros from values: neighbouring points of a curve are closer.
+/// Decades without a value that part such zeros from values. Chosen: neighbouring points of a curve are closer.
 const EMPTY_DECADES: usize = 6;
 
 /// A range of values, and whether it is shown logarithmically.
@@ -29,8 +28,8 @@ pub struct Scale {
 /// A mark of a scale.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Tick {
-    /// Where it is.
-    pub value: f64,
+    /// Where it is, 0 at the start of the scale and 1 at the end.
+    pub share: f64,
     /// Its text in markup; none for a small mark.
     pub label: Option<String>,
 }
@@ -62,7 +61,7 @@ impl Scale {
         }
         let zero = rounding(&finite, high);
         let (least, _) = span(&mut finite.iter().copied().filter(|value| *value > zero));
-        let ratio = if low == 0.0 { LOGARITHMIC_BESIDE_ZERO } else { LOGARITHMIC };
+        let ratio = if low == 0.0 { LOG_RATIO_BESIDE_ZERO } else { LOG_RATIO };
         Some(if high / least >= ratio { Scale { low: least, high, log: true } } else { linear })
     }
 
@@ -83,12 +82,6 @@ impl Scale {
             1.0
         };
         Scale { low: self.low - room, high: self.high + room, log: false }
-    }
-
-    /// Grown so that it holds `other`.
-    pub fn and(self, other: Scale) -> Scale {
-        let (low, high) = (self.low.min(other.low), self.high.max(other.high));
-        Scale { low, high, log: low > 0.0 && (self.log || other.log || high / low >= LOGARITHMIC) }
     }
 
     /// Where `value` is, 0 at the start and 1 at the end; NaN where the scale does not reach.
@@ -138,7 +131,7 @@ impl Scale {
             let value = place as f64 * step;
             let text = format!("{:.decimals$}", (value / unit).abs());
             let minus = if place < 0 { "−" } else { "" };
-            Tick { value, label: Some(format!("{minus}{text}")) }
+            Tick { share: self.share(value), label: Some(format!("{minus}{text}")) }
         });
         Ticks { ticks: ticks.collect(), power }
     }
@@ -176,7 +169,7 @@ impl Scale {
                         format!("{digit}×10^{{{}}}", label::signed(power))
                     }
                 };
-                ticks.push(Tick { value, label: is_labelled.then(text) });
+                ticks.push(Tick { share: self.share(value), label: is_labelled.then(text) });
             }
         }
         Ticks { ticks, power: 0 }
@@ -193,7 +186,7 @@ fn rounding(values: &[f64], high: f64) -> f64 {
     for (place, is_used) in used.into_iter().enumerate() {
         empty = if is_used { 0 } else { empty + 1 };
         if empty == EMPTY_DECADES {
-            let zeros = values.iter().copied().filter(|value| *value <= ROUNDING * high && decade(*value) > place);
+            let zeros = values.iter().copied().filter(|value| *value <= ROUNDING_RTOL * high && decade(*value) > place);
             return zeros.fold(0.0, f64::max);
         }
     }
@@ -223,7 +216,7 @@ pub fn is_logarithmic(values: &[f64]) -> bool {
     // Of uneven values, such as samples, half are to be left of the middle.
     let scale = |log| Scale { low, high, log };
     let off = |log: bool| (scale(log).share(values[values.len() / 2]) - 0.5).abs();
-    high / low >= LOGARITHMIC && (values.len() < 4 || off(true) <= off(false))
+    high / low >= LOG_RATIO && (values.len() < 4 || off(true) <= off(false))
 }
 
 #[cfg(test)]

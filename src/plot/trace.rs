@@ -1,12 +1,14 @@
 //! Traces as the paper has its protocols: velocity, contact lifetime and friction over time, several of them over each other.
 
+use std::collections::BTreeSet;
 use std::path::Path;
 
 use super::canvas::Stroke;
-use super::colour::{self, MOST_SERIES};
+use super::colour::{self, MAX_SERIES};
 use super::error::PlotError;
-use super::figure::{Axis, Entry, Figure, Key, Layer, MARKED, Marker, Panel};
+use super::figure::{Axis, Entry, Figure, Key, Layer, MAX_MARKED_POINTS, Panel};
 use super::scale::Scale;
+use super::symbol::Symbol;
 use super::{coincide, label};
 use crate::dataset::frame::{self, Cells, Facts};
 use crate::file;
@@ -15,8 +17,11 @@ use crate::model::{Scales, Units};
 use crate::table::Kind;
 use crate::trace::COLUMNS;
 
-/// Points of a picture beyond which a line is thinned: four to a dot of a wide picture in print.
-const MOST_POINTS: usize = 8000;
+/// Points of a line, above which it is thinned. Chosen: four to a dot of a wide picture in print.
+const MAX_POINTS: usize = 8000;
+
+/// Ratio of height to width of a panel. Chosen: three of them make a square.
+const ASPECT: f64 = 0.42;
 
 /// What a trace may hold besides the time, and what a picture shows of it, a panel each: the velocity of the block and that of the control
 /// are compared in one.
@@ -70,20 +75,15 @@ pub fn read(path: &Path) -> Result<Course, PlotError> {
 }
 
 fn parquet(path: &Path) -> Result<(Vec<Column>, Facts), PlotError> {
-    let (headings, facts) = frame::headings(path).map_err(PlotError::Trace)?;
-    let names: Vec<&str> = headings.iter().filter(|heading| heading.is_number).map(|h| h.name.as_str()).collect();
-    let numbers =
-        frame::read(path, &names).map_err(PlotError::Trace)?.columns.into_iter().map(|(_, cells)| match cells {
-            Cells::Numbers(numbers) => numbers,
-            Cells::Words(..) => Vec::new(),
-        });
-    let numeric = headings.iter().filter(|heading| heading.is_number);
-    let column = |(heading, cells): (&frame::Heading, Vec<f64>)| Column {
-        name: heading.name.clone(),
-        unit: heading.unit.clone(),
-        cells,
+    let (mut headings, facts) = frame::headings(path).map_err(PlotError::Trace)?;
+    headings.retain(|heading| heading.is_number);
+    let names: Vec<&str> = headings.iter().map(|heading| heading.name.as_str()).collect();
+    let frame = frame::read(path, &names).map_err(PlotError::Trace)?;
+    let column = |(heading, (name, cells)): (&frame::Heading, (String, Cells))| match cells {
+        Cells::Numbers(cells) => Some(Column { name, unit: heading.unit.clone(), cells }),
+        Cells::Words(..) => None,
     };
-    Ok((numeric.zip(numbers).map(column).collect(), facts))
+    Ok((headings.iter().zip(frame.columns).filter_map(column).collect(), facts))
 }
 
 /// The columns of a CSV, and what its comments `# key = value` say; without a comment on units they are those of the
@@ -149,7 +149,7 @@ impl Course {
     }
 
     fn is_marked(&self) -> bool {
-        self.points.is_some_and(|points| points < MARKED)
+        self.points.is_some_and(|points| points < MAX_MARKED_POINTS)
     }
 }
 
@@ -162,8 +162,8 @@ struct Curve {
 
 /// The figure of traces: a panel for each column that any of them has.
 pub fn figure(courses: &[Course]) -> Result<Figure, PlotError> {
-    if courses.len() > MOST_SERIES {
-        return Err(PlotError::TooManyTraces { found: courses.len(), most: MOST_SERIES });
+    if courses.len() > MAX_SERIES {
+        return Err(PlotError::TooManyTraces { found: courses.len(), most: MAX_SERIES });
     }
     one_unit(courses)?;
     let time = Scale { log: false, ..Scale::of(cells(courses, "t")).ok_or(PlotError::Nothing)? };
@@ -193,7 +193,7 @@ pub fn figure(courses: &[Course]) -> Result<Figure, PlotError> {
     let subtitle = equations(&common, &unit_in(courses, "t"));
     let legend = legend(courses, &leaders, &common);
     let panels = panels.into_iter().map(|(panel, curves)| draw(panel, curves, courses, &leaders)).collect();
-    Ok(Figure { title, subtitle, panels, columns: 1, aspect: 0.42, shared: true, legend, ..Figure::default() })
+    Ok(Figure { title, subtitle, panels, columns: 1, aspect: ASPECT, legend, ..Figure::default() })
 }
 
 /// The cells of a column in all courses.
@@ -221,18 +221,19 @@ fn one_unit(courses: &[Course]) -> Result<(), PlotError> {
 
 /// For each course the first one that it lies on in all panels.
 fn leaders(count: usize, panels: &[(Panel, Vec<Curve>)]) -> Vec<usize> {
-    // The curves of a course in shares of the panels.
-    let in_shares = |(panel, curves): &(Panel, Vec<Curve>), course: usize| -> Vec<Curve> {
+    // The curves of a course in fractions of the panel, each with its column.
+    let curves = |(panel, curves): &(Panel, Vec<Curve>), course: usize| -> Vec<(usize, Vec<(f64, f64)>)> {
         let share = |(x, y): &(f64, f64)| (panel.x.scale.share(*x), panel.y.scale.share(*y));
         let own = curves.iter().filter(|curve| curve.course == course);
-        own.map(|curve| Curve { points: curve.points.iter().map(share).collect(), ..*curve }).collect()
+        own.map(|curve| (curve.rank, curve.points.iter().map(share).collect())).collect()
     };
-    let shares: Vec<Vec<Vec<Curve>>> =
-        (0..count).map(|course| panels.iter().map(|panel| in_shares(panel, course)).collect()).collect();
     coincide::leaders(count, |one, other| {
-        shares[one].iter().zip(&shares[other]).all(|(one, other)| {
-            let mut pairs = one.iter().zip(other);
-            one.len() == other.len() && pairs.all(|(a, b)| a.rank == b.rank && coincide::anywhere(&a.points, &b.points))
+        panels.iter().all(|panel| {
+            let (one, other) = (curves(panel, one), curves(panel, other));
+            let is_same = |((rank, points), (other_rank, other_points)): (&(usize, Vec<_>), &(usize, Vec<_>))| {
+                rank == other_rank && coincide::anywhere(points, other_points)
+            };
+            one.len() == other.len() && one.iter().zip(&other).all(is_same)
         })
     })
 }
@@ -241,9 +242,9 @@ fn leaders(count: usize, panels: &[(Panel, Vec<Curve>)]) -> Vec<usize> {
 fn draw(mut panel: Panel, curves: Vec<Curve>, courses: &[Course], leaders: &[usize]) -> Panel {
     for Curve { course, rank, points } in curves.into_iter().filter(|curve| leaders[curve.course] == curve.course) {
         let stroke = if rank == 0 { colour::series(course) } else { control(course) };
-        panel.layers.push(Layer::Lines(vec![points.clone()], stroke));
+        panel.layers.push(Layer::Line(points.clone(), stroke));
         if courses[course].is_marked() && rank == 0 {
-            panel.layers.push(Layer::Points(points, Marker { series: course }));
+            panel.layers.push(Layer::Marks(points.into_iter().map(|at| (at, Symbol::of_series(course))).collect()));
         }
     }
     panel
@@ -300,23 +301,15 @@ fn unit_of(parameter: &str, time: &str) -> &'static str {
 
 /// The first, least, greatest and last point of each stretch of time, where there are more points than a picture shows.
 fn thinned(points: Vec<(f64, f64)>) -> Vec<(f64, f64)> {
-    if points.len() <= MOST_POINTS {
+    if points.len() <= MAX_POINTS {
         return points;
     }
-    let stretch = points.len().div_ceil(MOST_POINTS / 4);
-    let mut kept = Vec::with_capacity(MOST_POINTS + 4);
-    for chunk in points.chunks(stretch) {
+    let mut kept = Vec::with_capacity(MAX_POINTS + 4);
+    for chunk in points.chunks(points.len().div_ceil(MAX_POINTS / 4)) {
         let by_value = |i: &usize, j: &usize| chunk[*i].1.total_cmp(&chunk[*j].1);
-        let mut places =
-            [Some(0), (0..chunk.len()).min_by(by_value), (0..chunk.len()).max_by(by_value), chunk.len().checked_sub(1)];
-        places.sort_unstable();
-        let mut last = None;
-        for place in places.into_iter().flatten() {
-            if last != Some(place) {
-                kept.push(chunk[place]);
-                last = Some(place);
-            }
-        }
+        let (least, greatest) = ((0..chunk.len()).min_by(by_value), (0..chunk.len()).max_by(by_value));
+        let places: BTreeSet<usize> = [0, chunk.len() - 1].into_iter().chain(least).chain(greatest).collect();
+        kept.extend(places.into_iter().map(|place| chunk[place]));
     }
     kept
 }
@@ -333,7 +326,7 @@ mod tests {
         points[54_321].1 = 1e6;
         points[67_890].1 = -1e6;
         let kept = thinned(points.clone());
-        assert!(kept.len() <= MOST_POINTS + 4);
+        assert!(kept.len() <= MAX_POINTS + 4);
         assert!(kept.contains(&points[54_321]) && kept.contains(&points[67_890]));
         assert_eq!((kept.first(), kept.last()), (points.first(), points.last()));
     }

@@ -14,7 +14,7 @@ use crate::table::{Column, Kind};
 pub use protocol::{Absence, Course, Parameter, Protocol, names};
 #[cfg(feature = "read")]
 pub use row::{Pathless, TABLES, protocol_of};
-pub use sample::{CLOSE_UP, GOOD};
+pub use sample::{RANGE_RTOL, VALUE_RTOL};
 pub use write::{csv, parquet};
 
 /// The columns of a trace; `v_c` only where the spring is elastic, `beta` only where the protocol is an extremal.
@@ -31,13 +31,13 @@ pub const COLUMNS: [Column; 6] = [
     ),
 ];
 
-/// Velocities closer than this (relative) are no jump.
-const JUMP: f64 = 1e-9;
+/// Relative difference of velocities, up to which they do not jump. Chosen: above the rounding of every motion.
+const JUMP_RTOL: f64 = 1e-9;
 
 /// Which times are shown.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Times {
-    /// The fewest between which straight lines are good to [`GOOD`] of the range of every column, and to [`CLOSE_UP`] of velocities and
+    /// The fewest between which straight lines are good to [`RANGE_RTOL`] of the range of every column, and to [`VALUE_RTOL`] of velocities and
     /// contact lifetimes themselves (those below `1e-12` of the greatest aside).
     Fewest,
     /// So many, at least 2, equally spaced from 0 to `t_f`.
@@ -66,7 +66,7 @@ impl Trace {
             Times::Fewest => samples.fewest(),
             Times::Spaced(count) => sample::spaced(motion, count)?,
         };
-        let apart = |here: f64, steady: f64| (here - steady).abs() > JUMP * steady;
+        let apart = |here: f64, steady: f64| (here - steady).abs() > JUMP_RTOL * steady;
         let jumps = |here: &Moment, steady: &Moment| {
             apart(here.v, steady.v) || here.v_c.is_some_and(|v_c| apart(v_c, steady.v))
         };

@@ -1,7 +1,5 @@
 //! The protocols that can be traced, by name, and what is said of one beside its moments.
 
-use std::fmt;
-
 use crate::model::Transition;
 use crate::protocol::cubic::{Landscape, Shortcuts};
 use crate::protocol::swift::{Case, FAMILIES, Family, Obstacle};
@@ -102,32 +100,44 @@ impl Parameter {
     }
 }
 
+/// The bound on the velocity.
+fn bound(bounded: &bool) -> &'static str {
+    if *bounded { "v >= 1" } else { "v > 0" }
+}
+
 /// Why there is no protocol.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 pub enum Absence {
     /// The family's reason.
+    #[error("{0}")]
     Obstacle(Obstacle),
     /// No protocol is that fast.
+    #[error("t_f = {t_f} is too short for {}: the least is t_min = {t_min}", bound(.bounded))]
     Time {
-        /// The time asked for.
+        /// The requested duration.
         t_f: f64,
-        /// The least time.
+        /// The least duration.
         t_min: f64,
         /// Whether `v >= 1`, else `v > 0`.
         bounded: bool,
     },
     /// No cubic shortcut keeps `v >= 1` (`bounded`) or `v > 0` in this time.
+    #[error("no cubic shortcut keeps {} in this time", bound(.bounded))]
     Cubic {
         /// Whether `v >= 1`, else `v > 0`.
         bounded: bool,
     },
     /// The least work of all cubic shortcuts is approached at the border `v = 0`, not attained.
+    #[error("the least work is only approached, as v falls to 0 somewhere; with the bound v >= 1 it is attained")]
     Border,
     /// The smooth pieces do not fit.
+    #[error("two pieces of length delta_t must fit into t_f, and v stay well above 0 in them")]
     Pieces,
     /// The velocity becomes infinite, or oscillates too often to be shown.
+    #[error("before t_f the velocity becomes infinite, or there are more oscillations than can be shown")]
     Response,
     /// Friction is so low somewhere that the extremal need not be unique, and none was found.
+    #[error("friction is too low: where tau <= max(0, b - a) there need not be an optimum, and none was found")]
     Nonphysical,
 }
 
@@ -135,31 +145,6 @@ impl Absence {
     /// Whether it is a defect of ours.
     pub fn is_defect(self) -> bool {
         self == Absence::Obstacle(Obstacle::NotConverged)
-    }
-}
-
-impl fmt::Display for Absence {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let least = |bounded| if bounded { "v >= 1" } else { "v > 0" };
-        match *self {
-            Absence::Obstacle(obstacle) => obstacle.fmt(f),
-            Absence::Time { t_f, t_min, bounded } => {
-                write!(f, "t_f = {t_f} is too short for {}: the least is t_min = {t_min}", least(bounded))
-            }
-            Absence::Cubic { bounded } => write!(f, "no cubic shortcut keeps {} in this time", least(bounded)),
-            Absence::Border => f.write_str(
-                "the least work is only approached, as v falls to 0 somewhere; with the bound v >= 1 it is attained",
-            ),
-            Absence::Pieces => {
-                f.write_str("two pieces of length delta_t must fit into t_f, and v stay well above 0 in them")
-            }
-            Absence::Response => f.write_str(
-                "before t_f the velocity becomes infinite, or there are more oscillations than can be shown",
-            ),
-            Absence::Nonphysical => f.write_str(
-                "friction is too low: where tau <= max(0, b - a) there need not be an optimum, and none was found",
-            ),
-        }
     }
 }
 
@@ -254,6 +239,13 @@ fn scaled(a_2: f64, a_3: f64) -> Vec<Parameter> {
     ]
 }
 
+/// A parameter, and the range of the control velocity.
+fn with_control(first: Parameter, least: f64, greatest: f64) -> Vec<Parameter> {
+    let control = |name, value, doc| Parameter::new(name, value, "v_0", doc);
+    let least = control("v_c_min", least, "least control velocity");
+    vec![first, least, control("v_c_max", greatest, "greatest control velocity")]
+}
+
 fn response(case: &Case, k: f64, m: f64, rtol: f64) -> Result<Course, Absence> {
     let swing = Step { transition: case.transition, k, m }.motion(case.t_f, rtol).ok_or(Absence::Response)?;
     let status = if swing.least_velocity() < 1.0 { Status::BelowBound } else { Status::Ok };
@@ -272,11 +264,8 @@ fn smooth(case: &Case, k: f64, m: f64, rtol: f64) -> Result<Course, Absence> {
             _ => Obstacle::NotConverged.into(),
         });
     };
-    let parameters = vec![
-        Parameter::new("alpha", value.alpha, "1", "coefficient of x^3 (1 - x)^3 in ln(v - 1), x = t/t_f"),
-        Parameter::new("v_c_min", value.control_min, "v_0", "least control velocity"),
-        Parameter::new("v_c_max", value.control_max, "v_0", "greatest control velocity"),
-    ];
+    let alpha = Parameter::new("alpha", value.alpha, "1", "coefficient of x^3 (1 - x)^3 in ln(v - 1), x = t/t_f");
+    let parameters = with_control(alpha, value.control_min, value.control_max);
     Ok(Course { motion: Box::new(path), status: solved.status, work: value.work, parameters })
 }
 
@@ -291,11 +280,8 @@ fn pieced(case: &Case, (k, m): (f64, f64), delta_t: f64, bounded: bool, rtol: f6
             _ => Obstacle::NotConverged.into(),
         });
     };
-    let parameters = vec![
-        Parameter::new("gap", value.gap, "1", "(work - W*)/W*"),
-        Parameter::new("v_c_min", value.control_min, "v_0", "least control velocity"),
-        Parameter::new("v_c_max", value.control_max, "v_0", "greatest control velocity"),
-    ];
+    let gap = Parameter::new("gap", value.gap, "1", "(work - W*)/W*");
+    let parameters = with_control(gap, value.control_min, value.control_max);
     Ok(Course { motion, status: solved.status, work: value.work, parameters })
 }
 
@@ -305,12 +291,8 @@ fn member(family: &dyn Family, case: &Case, rtol: f64) -> Result<Course, Absence
     // A step takes any time, but where no protocol arrives it is not counted either.
     let late = case.t_f < case.transition.least_time();
     let status = if late { Status::Infeasible } else { swift.status() };
-    let mut parameters: Vec<_> = swift
-        .alpha
-        .into_iter()
-        .zip(family.alpha())
-        .map(|(alpha, meaning)| Parameter::new("alpha", alpha, "1", meaning))
-        .collect();
+    let alpha = swift.alpha.into_iter().zip(family.alpha());
+    let mut parameters: Vec<_> = alpha.map(|(alpha, doc)| Parameter::new("alpha", alpha, "1", doc)).collect();
     if swift.miss != 0.0 {
         parameters.push(Parameter::new("miss", swift.miss, "1", "distance from the target, theta(t_f) v_f - 1"));
     }

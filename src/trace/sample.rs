@@ -1,30 +1,32 @@
 //! Where to look at a motion: the fewest moments between which straight lines are good, or moments equally spaced.
 
+use crate::numerics::root::crossing;
 use crate::protocol::{Moment, Motion};
 
-/// How far a straight line between neighbouring moments may be from the motion, relative to the range of the column.
-pub const GOOD: f64 = 1e-4;
+/// Distance of a straight line between neighbouring moments from the motion, relative to the range of the column. Chosen: less than a
+/// picture shows.
+pub const RANGE_RTOL: f64 = 1e-4;
 
-/// How far it may be relative to a velocity or a contact lifetime, which logarithmic axes show over decades.
-pub const CLOSE_UP: f64 = 0.01;
+/// The same relative to a velocity or a contact lifetime itself. Chosen: logarithmic axes show it over decades.
+pub const VALUE_RTOL: f64 = 0.01;
 
 /// Columns for which that holds: the velocity and the contact lifetime.
-const POSITIVE: usize = 2;
+const POSITIVE_COLUMNS: usize = 2;
 
-/// What is asked of the samples, as a share of both; between them is left what is missing.
-const AIM: f64 = 0.98;
+/// Fraction of both that the samples use. Chosen: between samples is left the rest.
+const SAMPLES_FRACTION: f64 = 0.98;
 
-/// Changes below this share of the greatest value of a column are rounding.
-const NOISE: f64 = 1e-12;
+/// Change relative to the greatest value of a column that is rounding: a few thousand roundings of 1.1e-16 each.
+const ROUNDING_RTOL: f64 = 1e-12;
 
-/// Times closer than this, relative to the later one, are not told apart.
-const CLOSE: f64 = 8.0 * f64::EPSILON;
+/// Difference of times relative to the later one, up to which they are one: eight roundings.
+const SAME_TIME_RTOL: f64 = 8.0 * f64::EPSILON;
 
-/// Steps of a piece of the motion that is looked at: a chord is compared with the motion at all places between them.
+/// Steps of a piece of the motion: a chord is compared with the motion at all places between them. Chosen: halves keep their samples.
 const STEPS: usize = 8;
 
-/// More moments than any motion that can be resolved asks for.
-const MOST_MOMENTS: usize = 1 << 21;
+/// Moments, above which a motion cannot be resolved. Chosen: a few hundred megabytes.
+const MAX_MOMENTS: usize = 1 << 21;
 
 /// A moment and its place on the curve.
 #[derive(Debug, Clone, Copy)]
@@ -52,10 +54,10 @@ struct Tolerance {
 impl Tolerance {
     /// What is allowed in a column where its value is `value`.
     fn at(&self, column: usize, value: f64) -> f64 {
-        if column >= POSITIVE {
+        if column >= POSITIVE_COLUMNS {
             return self.range[column];
         }
-        self.range[column].min((AIM * CLOSE_UP * value.abs()).max(self.noise[column]))
+        self.range[column].min((SAMPLES_FRACTION * VALUE_RTOL * value.abs()).max(self.noise[column]))
     }
 }
 
@@ -88,7 +90,7 @@ impl Samples {
             let (first, last) = (piece[0], piece[STEPS]);
             if is_even(&piece) && is_straight(&first, &last, &piece[1..STEPS], &tolerance) {
                 samples.extend(&piece[1..]);
-                if samples.len() > MOST_MOMENTS {
+                if samples.len() > MAX_MOMENTS {
                     return None;
                 }
                 continue;
@@ -168,10 +170,10 @@ impl Samples {
     }
 }
 
-/// `(sqrt 5 - 1)/2`.
+/// Ratio of a golden section, `(sqrt 5 - 1)/2`.
 const GOLDEN: f64 = 0.618_033_988_749_894_9;
 
-/// Sections after which a smooth maximum is flat within rounding: the interval has shrunk by `1e-8`.
+/// Golden sections of an interval, which shrinks by `1e-8`: a smooth maximum is flat within rounding there.
 const SECTIONS: u32 = 40;
 
 /// The moments at `count >= 2` equally spaced times from 0 to `t_f`. `None` as for [`Samples::of`].
@@ -191,42 +193,25 @@ pub fn spaced(motion: &dyn Motion, count: usize) -> Option<Vec<Moment>> {
     Some(rows)
 }
 
-/// The moment at time `t` between two samples: regula falsi, where one end that stays for long counts half (the
-/// Illinois method: Dowell and Jarratt, BIT 11, 168, 1971), and bisection where that is slow.
+/// The moment at time `t` between two samples. `None` as for [`Samples::of`].
 fn meet(motion: &dyn Motion, t: f64, low: &Sample, high: &Sample) -> Option<Moment> {
-    let (mut low, mut high) = (*low, *high);
-    let (mut below, mut above) = (low.moment.t - t, high.moment.t - t);
-    let mut nearest = if -below < above { low } else { high };
-    let mut was_below = None;
-    for step in 0..MOST_LOOKS {
-        let secant = low.s - below * (high.s - low.s) / (above - below);
-        let inside = secant > low.s && secant < high.s && step % 4 < 3;
-        let s = if inside { secant } else { 0.5 * (low.s + high.s) };
-        if !(s > low.s && s < high.s) {
-            break;
-        }
-        let sample = look(motion, s)?;
-        let distance = sample.moment.t - t;
-        if distance.abs() < (nearest.moment.t - t).abs() {
+    let off = |sample: &Sample| sample.moment.t - t;
+    let ends = [off(low), off(high)];
+    let mut nearest = if -ends[0] < ends[1] { *low } else { *high };
+    let mut is_number = true;
+    let distance = |s| {
+        let Some(sample) = look(motion, s) else {
+            is_number = false;
+            return 0.0;
+        };
+        if off(&sample).abs() < off(&nearest).abs() {
             nearest = sample;
         }
-        if distance.abs() <= f64::EPSILON * t {
-            break;
-        }
-        let is_below = distance < 0.0;
-        let again = was_below == Some(is_below);
-        if is_below {
-            (low, below, above) = (sample, distance, if again { 0.5 * above } else { above });
-        } else {
-            (high, above, below) = (sample, distance, if again { 0.5 * below } else { below });
-        }
-        was_below = Some(is_below);
-    }
-    Some(nearest.moment)
+        if off(&sample).abs() <= f64::EPSILON * t { 0.0 } else { off(&sample) }
+    };
+    crossing(distance, [low.s, high.s], ends, f64::EPSILON * high.s);
+    is_number.then_some(nearest.moment)
 }
-
-/// Looks for one time: a bisection alone takes fewer.
-const MOST_LOOKS: u32 = 120;
 
 fn look(motion: &dyn Motion, s: f64) -> Option<Sample> {
     let moment = motion.at(s);
@@ -243,8 +228,8 @@ fn tolerance<'a>(moments: impl Iterator<Item = &'a Moment>) -> Tolerance {
             }
         }
     }
-    let noise = ranges.map(|(least, greatest)| NOISE * least.abs().max(greatest.abs()));
-    let range = std::array::from_fn(|i| (AIM * GOOD * (ranges[i].1 - ranges[i].0)).max(noise[i]));
+    let noise = ranges.map(|(least, greatest)| ROUNDING_RTOL * least.abs().max(greatest.abs()));
+    let range = std::array::from_fn(|i| (SAMPLES_FRACTION * RANGE_RTOL * (ranges[i].1 - ranges[i].0)).max(noise[i]));
     Tolerance { range, noise }
 }
 
@@ -252,13 +237,14 @@ fn tolerance<'a>(moments: impl Iterator<Item = &'a Moment>) -> Tolerance {
 fn is_even(piece: &[Sample]) -> bool {
     let time = |from: &Sample, to: &Sample| to.moment.t - from.moment.t;
     let whole = time(&piece[0], &piece[STEPS]);
-    whole <= CLOSE * piece[STEPS].moment.t || piece.windows(2).all(|pair| time(&pair[0], &pair[1]) <= 0.5 * whole)
+    whole <= SAME_TIME_RTOL * piece[STEPS].moment.t
+        || piece.windows(2).all(|pair| time(&pair[0], &pair[1]) <= 0.5 * whole)
 }
 
 /// Whether the straight line in time from `from` to `to` is within `tolerance` of the motion at all places `between`.
 fn is_straight(from: &Sample, to: &Sample, between: &[Sample], tolerance: &Tolerance) -> bool {
     let time = to.moment.t - from.moment.t;
-    if time <= CLOSE * to.moment.t {
+    if time <= SAME_TIME_RTOL * to.moment.t {
         return true;
     }
     let values = |sample: &Sample| columns(&sample.moment).map(|value| value.unwrap_or(0.0));

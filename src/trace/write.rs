@@ -2,14 +2,13 @@
 
 use std::sync::Arc;
 
+use arrow_array::{ArrayRef, Float64Array, RecordBatch};
 use arrow_schema::{DataType, Schema};
-use parquet::arrow::{ArrowSchemaConverter, add_encoded_arrow_schema_to_metadata};
+use parquet::arrow::ArrowWriter;
 use parquet::basic::{Compression, ZstdLevel};
-use parquet::data_type::DoubleType;
 use parquet::errors::Result;
 use parquet::file::metadata::KeyValue;
 use parquet::file::properties::WriterProperties;
-use parquet::file::writer::SerializedFileWriter;
 
 use super::{COLUMNS, Trace, unit};
 use crate::dataset::field;
@@ -51,31 +50,22 @@ pub fn parquet(trace: &Trace, units: &Units, facts: &[(String, String)], version
         let column = &COLUMNS[place];
         field(column.name, DataType::Float64, is_partial(place), units.name(unit(place)), column.doc)
     });
-    let layout = Arc::new(Schema::new(fields.collect::<Vec<_>>()));
-    let schema = ArrowSchemaConverter::new().convert(&layout)?;
+    let schema = Arc::new(Schema::new(fields.collect::<Vec<_>>()));
     let entry = |key: &str, value: &str| KeyValue::new(format!("slipsweep.{key}"), value.to_owned());
     let mut entries = vec![entry("version", version)];
     entries.extend(facts.iter().map(|(key, value)| entry(key, value)));
-    let mut properties = WriterProperties::builder()
+    let properties = WriterProperties::builder()
         .set_created_by(format!("slipsweep version {version}"))
         .set_key_value_metadata(Some(entries))
         .set_compression(Compression::ZSTD(ZstdLevel::default()))
         .set_dictionary_enabled(false)
         .build();
-    add_encoded_arrow_schema_to_metadata(&layout, &mut properties);
-    let mut file = SerializedFileWriter::new(Vec::new(), schema.root_schema_ptr(), Arc::new(properties))?;
-    let mut group = file.next_row_group()?;
-    for column in columns {
-        let cells: Vec<Option<f64>> = trace.moments.iter().map(|moment| Trace::value(moment, column)).collect();
-        let values: Vec<f64> = cells.iter().copied().flatten().collect();
-        let levels: Vec<i16> = cells.iter().map(|cell| i16::from(cell.is_some())).collect();
-        if let Some(mut writer) = group.next_column()? {
-            let levels = is_partial(column).then_some(levels.as_slice());
-            writer.typed::<DoubleType>().write_batch(&values, levels, None)?;
-            writer.close()?;
-        }
-    }
-    group.close()?;
+    let cells = |&column: &usize| -> ArrayRef {
+        Arc::new(trace.moments.iter().map(|moment| Trace::value(moment, column)).collect::<Float64Array>())
+    };
+    let rows = RecordBatch::try_new(schema.clone(), columns.iter().map(cells).collect())?;
+    let mut file = ArrowWriter::try_new(Vec::new(), schema, Some(properties))?;
+    file.write(&rows)?;
     file.into_inner()
 }
 

@@ -7,7 +7,7 @@ use ode_solvers::{Dop853, SVector, System};
 use slipsweep::model::{Law, Transition};
 use slipsweep::protocol::swift::{self, Case};
 use slipsweep::protocol::{Effort, Moment, Motion, Status, optimal};
-use slipsweep::trace::{Absence, Course, GOOD, Protocol, Times, Trace};
+use slipsweep::trace::{Absence, Course, Protocol, RANGE_RTOL, Times, Trace};
 
 const PAPER: Transition = Transition { law: Law { a: 0.03, b: 0.05 }, v_i: 3.0, v_f: 100.0 };
 const BACK: Transition = Transition { v_i: 100.0, v_f: 3.0, ..PAPER };
@@ -267,7 +267,7 @@ fn straight_lines_between_rows_are_good_to_1e_4_of_the_range_everywhere() {
                 for column in 0..4 {
                     let error = (start[column] + share * (end[column] - start[column]) - value[column]).abs();
                     assert!(
-                        error.is_nan() || error <= GOOD * ranges[column],
+                        error.is_nan() || error <= RANGE_RTOL * ranges[column],
                         "{transition:?} {}: column {column} off by {:.2e} at {}",
                         motion.duration(),
                         error / ranges[column],
@@ -283,7 +283,7 @@ fn straight_lines_between_rows_are_good_to_1e_4_of_the_range_everywhere() {
 /// differences of an equally spaced trace give that for the worst of the columns.
 fn least_rows(course: &Course, transition: Transition) -> f64 {
     let trace = fewest(course, transition);
-    let tolerance = ranges(&trace).map(|range| GOOD * range);
+    let tolerance = ranges(&trace).map(|range| RANGE_RTOL * range);
     let fine = Trace::of(&*course.motion, &transition, Times::Spaced(100_001)).expect("can be resolved");
     let bend = |three: &[Moment]| {
         let [before, here, after] = [0, 1, 2].map(|i| columns(&three[i]));

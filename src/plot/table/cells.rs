@@ -1,7 +1,7 @@
 //! An axis cut into cells: one for each of its values while those are few, else one for several that follow each other.
 
 use super::survey::Values;
-use crate::plot::scale::{Scale, is_logarithmic};
+use crate::plot::scale::{LOG_RATIO, Scale, is_logarithmic};
 
 /// The cells of an axis.
 #[derive(Debug, Clone, PartialEq)]
@@ -23,7 +23,7 @@ impl AxisCells {
     pub fn new(axis: &Values, most: usize) -> AxisCells {
         let values = &axis.values;
         let (low, high) = (values[0], values[values.len() - 1]);
-        let log = if axis.many { low > 0.0 && high / low > 30.0 } else { is_logarithmic(values) };
+        let log = if axis.many { low > 0.0 && high / low > LOG_RATIO } else { is_logarithmic(values) };
         let span = Scale { low, high, log };
         if axis.many {
             let middles = (0..most).map(|cell| span.value((cell as f64 + 0.5) / most as f64)).collect();

@@ -61,7 +61,7 @@ pub fn choose(survey: &Survey, defaults: &Defaults, request: &Request) -> Result
     let written = || defaults.lines.iter().copied().filter(|column| survey.has(column));
     let y = y.map_or_else(|| written().map(str::to_owned).collect(), |y| vec![y.to_owned()]);
     let series = colour.map(str::to_owned).or_else(|| choice.find(defaults.series, Some(&x), 2));
-    Ok(Shape::Lines(lines::Plan { x, log: Vec::new(), y, series }))
+    Ok(Shape::Lines(lines::Plan { x, y, series }))
 }
 
 /// What a choice depends on.
@@ -76,11 +76,11 @@ impl<'a> Choice<'a> {
     /// A choice for a request whose columns are all there.
     fn new(survey: &'a Survey, defaults: &'a Defaults, request: &'a Request) -> Result<Choice<'a>, PlotError> {
         if let Some(x) = &request.x {
-            axis(survey, "--x", x)?;
+            survey.check("--x", "axis", x)?;
         }
         for (argument, column) in [("--y", &request.y), ("--color", &request.colour)] {
             if let Some(column) = column {
-                survey.check(argument, column)?;
+                survey.check(argument, "column", column)?;
             }
         }
         Ok(Choice { survey, defaults, request, varying: survey.axes.iter().filter(|axis| axis.varies()).collect() })
@@ -153,13 +153,4 @@ impl<'a> Choice<'a> {
         let place = found.iter().position(|&found| found).ok_or(PlotError::Nothing)?;
         Ok(columns[place].to_owned())
     }
-}
-
-fn axis(survey: &Survey, argument: &str, name: &str) -> Result<(), PlotError> {
-    let found: Vec<String> = survey.axes.iter().map(|axis| axis.name.clone()).collect();
-    if found.iter().any(|axis| axis == name) {
-        return Ok(());
-    }
-    let (argument, table) = (argument.to_owned(), survey.table.clone());
-    Err(PlotError::NoColumn { argument, table, what: "axis", name: name.to_owned(), found })
 }

@@ -1,5 +1,6 @@
 //! Conditions on rows: `--where "a=0.03"`.
 
+use crate::dataset::frame::Cells;
 use crate::plot::PlotError;
 
 /// How a cell relates to a value.
@@ -24,8 +25,8 @@ const SIGNS: [(&str, Relation); 7] = [
     (">", Relation::Greater),
 ];
 
-/// Numbers this close, relative to the greater, are equal: what nine digits show.
-const CLOSE: f64 = 1e-9;
+/// Relative difference below which numbers are equal. Chosen: nine typed digits find a number.
+const EQUAL_RTOL: f64 = 1e-9;
 
 /// A condition on a column.
 #[derive(Debug, Clone, PartialEq)]
@@ -63,7 +64,7 @@ impl Condition {
     /// Whether a number fulfils it; where there is none, it never does.
     pub fn holds(&self, cell: f64) -> bool {
         let Ok(value) = self.value.parse::<f64>() else { return false };
-        let equal = cell == value || (cell - value).abs() <= CLOSE * cell.abs().max(value.abs());
+        let equal = cell == value || (cell - value).abs() <= EQUAL_RTOL * cell.abs().max(value.abs());
         match self.relation {
             Relation::Equal => equal,
             Relation::Unequal => !equal && !cell.is_nan(),
@@ -104,6 +105,14 @@ impl Condition {
     fn shown_with(&self, value: &str) -> String {
         let sign = SIGNS.iter().rev().find(|(_, relation)| *relation == self.relation).map_or("=", |(sign, _)| sign);
         format!("{} {sign} {value}", self.column)
+    }
+
+    /// Whether the cell of a row fulfils it.
+    pub fn holds_in(&self, cells: &Cells, row: usize) -> bool {
+        match cells {
+            Cells::Numbers(numbers) => self.holds(numbers[row]),
+            Cells::Words(places, words) => self.holds_word(places[row].map(|place| words[place as usize].as_str())),
+        }
     }
 
     /// Whether a word fulfils it.

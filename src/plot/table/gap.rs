@@ -1,11 +1,12 @@
 //! The landscape of the work gap: where v falls below 1, and the best shortcut.
 
-use super::Scene;
 use super::cells::AxisCells;
 use super::choice::Shape;
 use super::groups::Groups;
 use super::lines;
 use super::map::{self, Mapped};
+use super::survey::Survey;
+use super::{Scene, Source};
 use crate::model::Units;
 use crate::numerics::cubic::Cubic;
 use crate::plot::PlotError;
@@ -17,12 +18,12 @@ use crate::table::OPTIMUM_AXES;
 /// The axes of the landscape.
 const ALPHAS: [&str; 2] = ["alpha_2", "alpha_3"];
 
-/// Steps of the grid on which the line `v = 1` is found, along both axes.
+/// Steps of the grid on which the line `v = 1` is found, along both axes. Chosen: finer than the dots of print.
 const STEPS: usize = 300;
 
 pub fn draw(scene: &Scene<'_>, shape: &Shape) -> Result<Figure, PlotError> {
     let plan = match shape {
-        Shape::Lines(plan) => return Ok(lines::lines(scene.survey, plan, |_, _| {})?.figure),
+        Shape::Lines(plan) => return Ok(lines::lines(scene.survey, plan)?.figure),
         Shape::Map(plan) => plan,
     };
     let Mapped { mut figure, groups, least, cells } = map::map(scene.survey, plan)?;
@@ -41,7 +42,7 @@ pub fn draw(scene: &Scene<'_>, shape: &Shape) -> Result<Figure, PlotError> {
         }
         let star = if from_table { best[place] } else { least[place].map(|(x, y, _)| (x, y)) };
         any_star |= star.is_some();
-        panel.layers.extend(star.map(|star| Layer::Stars(vec![star])));
+        panel.layers.extend(star.map(Layer::Star));
     }
     if any_line {
         figure.legend.push(Entry { key: Key::Contour(stroke), text: bound_in_words(scene, any_zero) });
@@ -106,7 +107,17 @@ fn bound(scene: &Scene<'_>, groups: &Groups, panel: usize, cells: &[AxisCells; 2
 /// The best shortcut of each panel, from the table `best`, if the dataset has it.
 fn best(scene: &Scene<'_>, groups: &Groups) -> Result<Vec<Option<(f64, f64)>>, PlotError> {
     let mut found = vec![None; groups.shown.len()];
-    let Some(survey) = scene.other("best", &ALPHAS)? else { return Ok(found) };
+    let Source { folder, manifest, .. } = scene.source;
+    if manifest.table("best").is_none() {
+        return Ok(found);
+    }
+    let survey = match Survey::new(folder, manifest, "best", &[]) {
+        Err(PlotError::Empty { .. }) => return Ok(found),
+        survey => survey?,
+    };
+    if !ALPHAS.iter().all(|alpha| survey.heading(alpha).is_some()) {
+        return Ok(found);
+    }
     let axes: Vec<&str> = OPTIMUM_AXES.iter().map(|axis| axis.name()).collect();
     let values: Vec<Option<Vec<f64>>> =
         (0..found.len()).map(|group| axes.iter().map(|axis| scene.value(groups, group, axis)).collect()).collect();

@@ -1,19 +1,22 @@
 //! What is left of a table once the axes of a panel are chosen: the values of the further axes, each of which makes a panel or a line.
 
 use std::cmp::Ordering;
-use std::collections::BTreeMap;
+use std::collections::{HashMap, HashSet};
 
-use super::survey::{Survey, Values};
+use super::survey::{Survey, Values, bits};
+use crate::grid::Quantity;
+use crate::plot::colour::MAX_SERIES;
 use crate::plot::{Figure, PlotError, label};
+use crate::protocol::swift::FAMILIES;
 
-/// Most different groups that are told apart.
-const MOST_GROUPS: usize = 4096;
+/// Groups, above which all rows are one group. Chosen: far more than a picture shows.
+const MAX_GROUPS: usize = 4096;
 
-/// Most panels of a figure.
-const MOST_PANELS: usize = 9;
+/// Panels of a figure. Chosen: three rows of three are legible on a page.
+const MAX_PANELS: usize = 9;
 
-/// Most panels in a row, and in a column, of a figure that crosses two axes.
-const MOST_CROSSED: usize = 4;
+/// Panels in a row, or in a column, of a figure that crosses two axes. Chosen: narrower panels have no room for labels.
+const MAX_CROSSED_PANELS: usize = 4;
 
 /// The axes that vary besides those that are drawn and tell rows apart, and a sentence on those that only change along. An axis of the
 /// grid always tells them apart, whichever rows are left of it.
@@ -116,92 +119,89 @@ pub struct Groups {
     pub all: usize,
     /// How many are not shown.
     left_out: usize,
+    makes: Makes,
     /// Where two axes are crossed, the titles of the rows and of the columns of panels, in markup: the groups fill the rows.
     pub crossed: Option<[Vec<String>; 2]>,
     /// The values, in markup, at which further axes are held where two are crossed.
     pub held: Vec<String>,
-    places: BTreeMap<Vec<u64>, usize>,
+    places: HashMap<Vec<u64>, usize>,
+}
+
+/// The part of a figure that shows a group.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Makes {
+    /// A panel.
+    Panels,
+    /// A line in each panel; groups of a family that does not depend on the bound on friction make one.
+    Lines,
 }
 
 impl Groups {
     /// The groups of the rows of `survey`, of which each makes a panel over the `drawn` axes, and a sentence on axes that only change along.
     pub fn of_panels(survey: &Survey, drawn: &[&str]) -> Result<(Groups, Option<String>), PlotError> {
         let (further, along) = further(survey, drawn)?;
-        Ok((Groups::new(survey, &further, (MOST_PANELS, true), |_| {}, |_| false)?, along))
+        Ok((Groups::new(survey, &further, Makes::Panels)?, along))
     }
 
-    /// The groups of the rows of `survey` over `axes`, at most `most` of them, evenly chosen, those of infinite values included; one
-    /// group of all rows if there are too many to choose from. `alike` makes values equal that mean the same; a group that is to be
-    /// kept is shown before others. Two axes that vary independently are crossed if that is wanted: the first makes rows of panels, the
-    /// second columns, and the groups are those of all pairs of some values of both, also of pairs without rows.
-    pub fn new(
-        survey: &Survey,
-        axes: &[&str],
-        (most, is_crossed): (usize, bool),
-        alike: impl Fn(&mut [f64]),
-        is_kept: impl Fn(&[f64]) -> bool,
-    ) -> Result<Groups, PlotError> {
-        let found = keys(survey, axes, &alike)?;
-        if found.len() > MOST_GROUPS {
-            return Ok(Groups::of(Vec::new(), vec![Group { values: Vec::new(), name: String::new() }], 1));
+    /// The groups of the rows of `survey` over `axes`, some of them, evenly chosen, where there are more than a figure shows; one group of
+    /// all rows if there are too many to choose from. Two axes that vary independently make rows and columns of panels, also for pairs
+    /// without rows.
+    pub fn new(survey: &Survey, axes: &[&str], makes: Makes) -> Result<Groups, PlotError> {
+        let found = keys(survey, axes, makes)?;
+        if found.len() > MAX_GROUPS {
+            return Ok(Groups::of(Vec::new(), vec![Group { values: Vec::new(), name: String::new() }], 1, makes));
         }
+        let most = if makes == Makes::Panels { MAX_PANELS } else { MAX_SERIES };
         let varying = varying(&found);
-        let shown = choice(&found, most, is_kept).into_iter().map(|place| {
-            // A value that means nothing here was made NaN.
+        let shown = choice(&found, most, makes).into_iter().map(|place| {
             let named =
                 varying.iter().map(|&axis| (axes[axis], found[place][axis])).filter(|(_, value)| !value.is_nan());
             let words = named.filter_map(|(name, value)| Some(survey.axis(name)?.told(value)));
             Group { name: words.collect::<Vec<_>>().join(", "), values: found[place].clone() }
         });
         let axes = axes.iter().map(|&axis| axis.to_owned()).collect();
-        let mut groups = Groups::of(axes, shown.collect(), found.len());
-        if is_crossed {
-            groups.cross(survey, &found, most);
+        let mut groups = Groups::of(axes, shown.collect(), found.len(), makes);
+        if makes == Makes::Panels {
+            groups.cross(survey, &found);
         }
         if groups.crossed.is_none() {
-            groups.label(survey, alike)?;
+            groups.label(survey)?;
         }
         Ok(groups)
     }
 
     /// Some groups of `all`, which are not crossed.
-    fn of(axes: Vec<String>, shown: Vec<Group>, all: usize) -> Groups {
+    fn of(axes: Vec<String>, shown: Vec<Group>, all: usize, makes: Makes) -> Groups {
         let (places, left_out) = (places_of(&shown), all - shown.len());
-        Groups { axes, shown, all, left_out, crossed: None, held: Vec::new(), places }
+        Groups { axes, shown, all, left_out, makes, crossed: None, held: Vec::new(), places }
     }
 
     /// Names the groups by their labels, if each has one of its own.
-    fn label(&mut self, survey: &Survey, alike: impl Fn(&mut [f64])) -> Result<(), PlotError> {
+    fn label(&mut self, survey: &Survey) -> Result<(), PlotError> {
         if survey.labels.is_empty() || self.shown.len() < 2 {
             return Ok(());
         }
-        let axes = self.axes.clone();
-        let columns: Vec<&str> = axes.iter().map(String::as_str).chain(survey.label_columns()).collect();
-        let mut labels: Vec<Option<String>> = vec![None; self.shown.len()];
+        let columns: Vec<&str> = self.axes.iter().map(String::as_str).chain(survey.label_columns()).collect();
+        let mut labels = vec![String::new(); self.shown.len()];
         let mut is_one = true;
         survey.each_while(&columns, |row| {
-            let (key, cells) = row.split_at(axes.len());
-            let mut key = key.to_vec();
-            alike(&mut key);
-            if let Some(place) = self.place(&key) {
+            let (group, cells) = row.split_at(self.axes.len());
+            if let Some(place) = self.place(group) {
                 let label = survey.label(cells);
-                is_one = labels[place].get_or_insert_with(|| label.clone()) == &label && !label.is_empty();
+                is_one = !label.is_empty() && (labels[place].is_empty() || labels[place] == label);
+                labels[place] = label;
             }
             is_one
         })?;
-        let mut different: Vec<&String> = labels.iter().flatten().collect();
-        different.sort_unstable();
-        different.dedup();
+        let different: HashSet<&String> = labels.iter().filter(|label| !label.is_empty()).collect();
         if is_one && different.len() == self.shown.len() {
-            for (group, label) in self.shown.iter_mut().zip(labels.into_iter().flatten()) {
-                group.name = label;
-            }
+            self.shown.iter_mut().zip(labels).for_each(|(group, label)| group.name = label);
         }
         Ok(())
     }
 
     /// Crosses two axes: of more that vary the last two, where the others have their first values.
-    fn cross(&mut self, survey: &Survey, found: &[Vec<f64>], most: usize) {
+    fn cross(&mut self, survey: &Survey, found: &[Vec<f64>]) {
         let varying = varying(found);
         let [.., first, second] = varying.as_slice() else { return };
         let crossed = [*first, *second];
@@ -228,8 +228,8 @@ impl Groups {
         };
         // A square of panels, or what the shorter axis leaves to the other.
         let side = |mine: usize, other: usize| {
-            let square = (most as f64).sqrt() as usize;
-            mine.min(if other < square { (most / other).min(MOST_CROSSED) } else { square })
+            let square = MAX_PANELS.isqrt();
+            mine.min(if other < square { (MAX_PANELS / other).min(MAX_CROSSED_PANELS) } else { square })
         };
         let (rows, columns) =
             (some(&rows, side(rows.len(), columns.len())), some(&columns, side(columns.len(), rows.len())));
@@ -238,19 +238,20 @@ impl Groups {
             (values[crossed[0]], values[crossed[1]]) = (row, column);
             Group { name: format!("{}, {}", first.told(row), second.told(column)), values }
         };
-        let shown = rows.iter().flat_map(|&row| columns.iter().map(move |&column| (row, column))).map(group).collect();
+        self.shown = rows.iter().flat_map(|&row| columns.iter().map(move |&column| (row, column))).map(group).collect();
         let titles = |axis: &Values, values: &[f64]| values.iter().map(|&value| axis.told(value)).collect();
         let held = varying.iter().filter(|axis| is_held(axis));
         self.held = held.filter_map(|&place| Some(axis(place)?.told(found[0][place]))).collect();
         self.crossed = Some([titles(first, &rows), titles(second, &columns)]);
-        self.shown = shown;
         self.places = places_of(&self.shown);
         self.left_out = found.iter().filter(|group| self.place(group).is_none()).count();
     }
 
     /// The group with these values of the axes, if it is shown.
     pub fn place(&self, values: &[f64]) -> Option<usize> {
-        self.places.get(&key(values)).copied()
+        let mut values = values.to_vec();
+        self.makes.merge(&self.axes, &mut values);
+        self.places.get(&bits(&values)).copied()
     }
 
     /// Drops the groups whose item is not kept, with it, and returns a sentence on them.
@@ -276,9 +277,8 @@ impl Groups {
             },
             rows,
             aspect: if self.shown.len() > 1 { 0.9 } else { aspect },
-            shared: true,
             subtitle: self.held.join(", "),
-            remarks: self.note("panels").into_iter().collect(),
+            remarks: self.note().into_iter().collect(),
             ..Figure::default()
         }
     }
@@ -292,33 +292,43 @@ impl Groups {
     }
 
     /// What is left out, for who can ask for it.
-    pub fn note(&self, what: &str) -> Option<String> {
+    pub fn note(&self) -> Option<String> {
         (self.left_out > 0).then(|| {
+            let what = if self.makes == Makes::Panels { "panels" } else { "lines" };
             let (shown, all) = (self.all - self.left_out, self.all);
             format!("{shown} of {all} {what} ({}); choose others with --where", self.axes.join(", "))
         })
     }
 }
 
-/// The different values of `axes` in ascending order, those that are alike once; more than `MOST_GROUPS` if there are too many.
-fn keys(survey: &Survey, axes: &[&str], alike: impl Fn(&mut [f64])) -> Result<Vec<Vec<f64>>, PlotError> {
-    let mut found: BTreeMap<Vec<u64>, Vec<f64>> = BTreeMap::new();
+impl Makes {
+    /// Makes the bound on friction NaN for a family that does not depend on it, where such rows are one line.
+    fn merge(self, axes: &[impl AsRef<str>], values: &mut [f64]) {
+        let place = |axis: Quantity| axes.iter().position(|name| self == Makes::Lines && name.as_ref() == axis.name());
+        let (Some(family), Some(bound)) = (place(Quantity::Family), place(Quantity::FrictionBound)) else { return };
+        if !FAMILIES.get(values[family] as usize).is_some_and(|family| family.heeds_tau_max()) {
+            values[bound] = f64::NAN;
+        }
+    }
+}
+
+/// The different values of `axes` in ascending order, those that are alike once; more than `MAX_GROUPS` if there are too many.
+fn keys(survey: &Survey, axes: &[&str], makes: Makes) -> Result<Vec<Vec<f64>>, PlotError> {
+    let mut found: HashMap<Vec<u64>, Vec<f64>> = HashMap::new();
     let mut last: Vec<f64> = Vec::new();
     survey.each_while(axes, |cells| {
-        let same = last.len() == cells.len() && last.iter().zip(cells).all(|(a, b)| a.to_bits() == b.to_bits());
-        if same && !last.is_empty() {
+        if !last.is_empty() && last.iter().zip(cells).all(|(last, cell)| last.to_bits() == cell.to_bits()) {
             return true;
         }
         last.clear();
         last.extend_from_slice(cells);
         let mut cells = cells.to_vec();
-        alike(&mut cells);
-        found.entry(key(&cells)).or_insert(cells);
+        makes.merge(axes, &mut cells);
+        found.entry(bits(&cells)).or_insert(cells);
         // Without axes there is one group, however many rows.
-        !axes.is_empty() && found.len() <= MOST_GROUPS
+        !axes.is_empty() && found.len() <= MAX_GROUPS
     })?;
     let mut found: Vec<Vec<f64>> = found.into_values().collect();
-    // In the order of the values, not of their bits.
     let in_order = |(a, b): (&f64, &f64)| a.total_cmp(b);
     found.sort_by(|a, b| a.iter().zip(b).map(in_order).find(|order| order.is_ne()).unwrap_or(Ordering::Equal));
     Ok(found)
@@ -330,9 +340,10 @@ fn varying(found: &[Vec<f64>]) -> Vec<usize> {
     (0..axes).filter(|&axis| found.iter().any(|group| group[axis] != found[0][axis])).collect()
 }
 
-/// The places of the groups that are shown, at most `most`: first those that are kept.
-fn choice(found: &[Vec<f64>], most: usize, is_kept: impl Fn(&[f64]) -> bool) -> Vec<usize> {
-    let (mut places, others): (Vec<usize>, Vec<usize>) = (0..found.len()).partition(|&place| is_kept(&found[place]));
+/// The places of the groups that are shown, at most `most`: first merged lines.
+fn choice(found: &[Vec<f64>], most: usize, makes: Makes) -> Vec<usize> {
+    let is_kept = |place: &usize| makes == Makes::Lines && found[*place].iter().any(|value| value.is_nan());
+    let (mut places, others): (Vec<usize>, Vec<usize>) = (0..found.len()).partition(is_kept);
     places.truncate(most);
     let room = most - places.len();
     if varying(found).len() > 2 {
@@ -345,12 +356,8 @@ fn choice(found: &[Vec<f64>], most: usize, is_kept: impl Fn(&[f64]) -> bool) -> 
     places
 }
 
-fn places_of(groups: &[Group]) -> BTreeMap<Vec<u64>, usize> {
-    groups.iter().enumerate().map(|(place, group)| (key(&group.values), place)).collect()
-}
-
-fn key(values: &[f64]) -> Vec<u64> {
-    values.iter().map(|value| (value + 0.0).to_bits()).collect()
+fn places_of(groups: &[Group]) -> HashMap<Vec<u64>, usize> {
+    groups.iter().enumerate().map(|(place, group)| (bits(&group.values), place)).collect()
 }
 
 /// `most` of `all` places, the first and the last among them, evenly spread.

@@ -1,21 +1,29 @@
 //! Lines: columns over an axis, a panel for each column and a line for each group of the further axes.
 
 use super::cells::AxisCells;
-use super::groups::{self, Groups};
+use super::groups::{self, Groups, Makes};
 use super::survey::Survey;
-use crate::plot::colour::{self, MOST_SERIES};
-use crate::plot::figure::{Axis, Entry, Figure, Key, Layer, MARKED, Marker, Panel};
+use crate::plot::colour;
+use crate::plot::figure::{Axis, Entry, Figure, Key, Layer, MAX_MARKED_POINTS, Panel};
 use crate::plot::scale::Scale;
+use crate::plot::symbol::Symbol;
 use crate::plot::{PlotError, coincide, label};
 
-/// Most places along a line: more are not seen in print.
-const MOST_PLACES: usize = 4096;
+/// Places along a line, above which rows share them. Chosen: more are not seen in print.
+const MAX_PLACES: usize = 4096;
 
-/// Most rows whose names stand beside their points.
-const MOST_NAMED: u64 = 60;
+/// Rows, above which no names stand beside their points. Chosen: more names run over each other.
+pub const MAX_NAMED_ROWS: u64 = 60;
 
-/// Values of a column that differ less, relative to the greatest, are one value: what a picture shows of them is rounding.
-const CONSTANT: f64 = 1e-9;
+/// Range of a column relative to its greatest value, below which it is one value. Chosen: the range is rounding.
+const CONSTANT_RTOL: f64 = 1e-9;
+
+/// Ratio of height to width of a panel, alone and of several above each other. Chosen: curves rise by about 45 degrees, and all panels fit on
+/// a page.
+const ASPECTS: [f64; 2] = [0.7, 0.45];
+
+/// Room beyond the first and the last point, as a fraction of the axes. Chosen: no mark touches the frame.
+const ROOM: [f64; 2] = [0.02, 0.06];
 
 /// What lines show.
 #[derive(Debug, Clone)]
@@ -24,17 +32,8 @@ pub struct Plan {
     pub x: String,
     /// Columns of the panels, from the top.
     pub y: Vec<String>,
-    /// Where only logarithms or only values are of use, for each panel; else what the values ask for.
-    pub log: Vec<Option<bool>>,
     /// The axis whose values are told apart first.
     pub series: Option<String>,
-}
-
-impl Plan {
-    /// Whether a panel is to be logarithmic, if that does not depend on its values.
-    fn log(&self, panel: usize) -> Option<bool> {
-        self.log.get(panel).copied().flatten()
-    }
 }
 
 /// Lines before they are drawn.
@@ -48,8 +47,6 @@ pub struct Lined {
     pub leaders: Vec<usize>,
     /// The range of the horizontal axis.
     pub x: Scale,
-    /// Whether a logarithm that was asked for leaves out values, which are not above zero.
-    pub leaves_out: bool,
 }
 
 /// The rows of a table along the horizontal axis, by group.
@@ -81,71 +78,76 @@ struct Graph {
     is_cut: bool,
 }
 
-/// Draws the lines; `alike` makes values of the further axes NaN that mean nothing, and lines with such a value are shown before others.
-pub fn lines(survey: &Survey, plan: &Plan, alike: impl Fn(&[&str], &mut [f64])) -> Result<Lined, PlotError> {
-    let mut rows = Rows::read(survey, plan, alike)?;
+/// Draws the lines.
+pub fn lines(survey: &Survey, plan: &Plan) -> Result<Lined, PlotError> {
+    let mut rows = Rows::read(survey, plan)?;
     let no_value =
         rows.groups.retain(&mut rows.lines, |line| line.ranges.iter().flatten().any(|(low, _)| !low.is_nan()));
-    let leaves_out =
-        (0..plan.y.len()).any(|panel| plan.log(panel) == Some(true) && rows.values(panel).any(|value| value <= 0.0));
-    let x = rows.cells.ends().with_room(0.02);
+    let x = rows.cells.ends().with_room(ROOM[0]);
     let graphs = (0..plan.y.len()).filter_map(|panel| rows.graph(survey, plan, panel, x));
-    // A column that is the same everywhere is said, not drawn, unless there is nothing else.
-    let (mut said, mut drawn): (Vec<Graph>, Vec<Graph>) = graphs.partition(|graph| graph.constant.is_some());
+    // A column that is the same everywhere is stated, not drawn, unless there is nothing else.
+    let (mut stated, mut drawn): (Vec<Graph>, Vec<Graph>) = graphs.partition(|graph| graph.constant.is_some());
     if drawn.is_empty() {
-        drawn = std::mem::take(&mut said);
+        drawn = std::mem::take(&mut stated);
     }
     if drawn.is_empty() {
         return Err(PlotError::Nothing);
     }
-    let aspect = if plan.y.len() > 1 { 0.45 } else { 0.7 };
-    let subtitle = said.iter().filter_map(Graph::equation).collect::<Vec<_>>().join(", ");
     let leaders = rows.leaders(&drawn);
-    let mut figure = Figure { columns: 1, aspect, shared: true, subtitle, ..Figure::default() };
-    figure.legend = rows.legend(&drawn, &leaders);
-    figure.remarks.extend(rows.groups.note("lines"));
+    let mut notes = Vec::new();
     if drawn.iter().any(|graph| graph.is_cut) {
-        figure.notes.push("Zeros, and rounding errors in their place, are below the logarithmic axes.".to_owned());
+        notes.push("Zeros, and rounding errors in their place, are below the logarithmic axes.".to_owned());
     }
-    figure.notes.extend(rows.along.take().into_iter().chain(no_value));
+    notes.extend(rows.along.take().into_iter().chain(no_value));
     if !rows.cells.exact {
         let (count, name) = (rows.cells.len(), label::name(&plan.x));
-        figure
-            .notes
-            .push(format!("Rows share {count} places of {name}: the least and the greatest of each are drawn."));
+        notes.push(format!("Rows share {count} places of {name}: the least and the greatest of each are drawn."));
     }
-    figure.panels = drawn.into_iter().map(|graph| rows.draw(graph, &leaders)).collect();
-    Ok(Lined { figure, groups: rows.groups, leaders, x, leaves_out })
+    let leaves_out = |panel| is_gap_of_families(survey, plan, panel) && rows.values(panel).any(|value| value <= 0.0);
+    if (0..plan.y.len()).any(leaves_out) {
+        notes.push("Gaps below zero, of steps that have not arrived, are not drawn.".to_owned());
+    }
+    let figure = Figure {
+        columns: 1,
+        aspect: ASPECTS[usize::from(plan.y.len() > 1)],
+        subtitle: stated.iter().filter_map(Graph::equation).collect::<Vec<_>>().join(", "),
+        legend: rows.legend(&drawn, &leaders),
+        remarks: rows.groups.note().into_iter().collect(),
+        notes,
+        panels: drawn.into_iter().map(|graph| rows.draw(graph, &leaders)).collect(),
+        ..Figure::default()
+    };
+    Ok(Lined { figure, groups: rows.groups, leaders, x })
+}
+
+/// Whether a panel shows the gaps of families, whose logarithm is drawn: those of steps that have not arrived are negative, the others
+/// span decades.
+fn is_gap_of_families(survey: &Survey, plan: &Plan, panel: usize) -> bool {
+    survey.table == "swift" && plan.y[panel] == "gap"
 }
 
 impl Rows {
     /// Reads the rows of a table.
-    fn read(survey: &Survey, plan: &Plan, alike: impl Fn(&[&str], &mut [f64])) -> Result<Rows, PlotError> {
+    fn read(survey: &Survey, plan: &Plan) -> Result<Rows, PlotError> {
         let axis = survey.axis(&plan.x).filter(|axis| !axis.values.is_empty()).ok_or(PlotError::Nothing)?;
         let (mut further, along) = groups::further(survey, &[&plan.x])?;
         let are_scattered = groups::is_scattered(survey, &plan.x, &further)?;
         further.sort_by_key(|name| Some(*name) != plan.series.as_deref());
-        let is_kept = |cells: &[f64]| cells.iter().any(|cell| cell.is_nan());
-        let groups = Groups::new(survey, &further, (MOST_SERIES, false), |cells| alike(&further, cells), is_kept)?;
-        let axes: Vec<&str> = groups.axes.iter().map(String::as_str).collect();
-        let is_named = are_scattered && survey.rows <= MOST_NAMED;
+        let groups = Groups::new(survey, &further, Makes::Lines)?;
+        let is_named = are_scattered && survey.rows <= MAX_NAMED_ROWS;
         let labels = if is_named { survey.label_columns() } else { Vec::new() };
-        let cells = AxisCells::new(axis, MOST_PLACES);
+        let cells = AxisCells::new(axis, MAX_PLACES);
         let line = |_| Line {
             ranges: vec![vec![(f64::NAN, f64::NAN); cells.len()]; plan.y.len()],
             names: vec![String::new(); if is_named { cells.len() } else { 0 }],
         };
         let mut lines: Vec<Line> = groups.shown.iter().map(line).collect();
-        let mut wanted = vec![plan.x.as_str()];
-        wanted.extend(plan.y.iter().map(String::as_str).chain(axes.iter().copied()).chain(labels));
-        let mut key = Vec::new();
-        survey.each(&wanted, |row| {
+        let columns = [&plan.x].into_iter().chain(&plan.y).chain(&groups.axes).map(String::as_str);
+        let columns: Vec<&str> = columns.chain(labels).collect();
+        survey.each(&columns, |row| {
             let (values, rest) = row[1..].split_at(plan.y.len());
-            let (group, labels) = rest.split_at(axes.len());
-            key.clear();
-            key.extend_from_slice(group);
-            alike(&axes, &mut key);
-            let (Some(group), Some(place)) = (groups.place(&key), cells.place(row[0])) else { return };
+            let (group, labels) = rest.split_at(groups.axes.len());
+            let (Some(group), Some(place)) = (groups.place(group), cells.place(row[0])) else { return };
             let line = &mut lines[group];
             if let Some(name) = line.names.get_mut(place) {
                 *name = survey.label(labels);
@@ -166,20 +168,20 @@ impl Rows {
 
     /// A panel without layers and its curves, if anything in it has a value.
     fn graph(&self, survey: &Survey, plan: &Plan, panel: usize, x: Scale) -> Option<Graph> {
-        let scale = match plan.log(panel) {
-            Some(true) => Scale { log: true, ..Scale::of(self.values(panel).filter(|value| *value > 0.0))? },
-            Some(false) => Scale { log: false, ..Scale::of(self.values(panel))? },
-            None => Scale::of(self.values(panel))?,
+        let is_log = is_gap_of_families(survey, plan, panel);
+        let scale = match is_log {
+            true => Scale { log: true, ..Scale::of(self.values(panel).filter(|value| *value > 0.0))? },
+            false => Scale::of(self.values(panel))?,
         };
         // What is zero throughout is never below zero.
         let scale = if scale.low == 0.0 && scale.high == 0.0 { Scale { high: 1.0, ..scale } } else { scale };
         let axis = |column: &String, scale| Axis { column: column.clone(), unit: survey.unit(column), scale };
-        let (x, y) = (axis(&plan.x, x), axis(&plan.y[panel], scale.with_room(0.06)));
+        let (x, y) = (axis(&plan.x, x), axis(&plan.y[panel], scale.with_room(ROOM[1])));
         Some(Graph {
             panel: Panel { title: String::new(), x, y, layers: Vec::new() },
             curves: self.lines.iter().map(|line| self.curve(&line.ranges[panel])).collect(),
             constant: constant(self.values(panel)),
-            is_cut: plan.log(panel).is_none() && scale.log && self.values(panel).any(|value| value < scale.low),
+            is_cut: !is_log && scale.log && self.values(panel).any(|value| value < scale.low),
         })
     }
 
@@ -210,14 +212,15 @@ impl Rows {
 
     /// Whether the points of a curve are marked.
     fn is_marked(&self, curve: &[(f64, f64)]) -> bool {
-        self.are_scattered || self.cells.exact && curve.iter().filter(|(_, y)| y.is_finite()).count() < MARKED
+        self.are_scattered
+            || self.cells.exact && curve.iter().filter(|(_, y)| y.is_finite()).count() < MAX_MARKED_POINTS
     }
 
     /// The panel with the curves that are drawn.
     fn draw(&self, Graph { mut panel, curves, .. }: Graph, leaders: &[usize]) -> Panel {
         for (series, mut points) in curves.into_iter().enumerate().filter(|(series, _)| leaders[*series] == *series) {
             if !self.are_scattered {
-                panel.layers.push(Layer::Lines(vec![points.clone()], colour::series(series)));
+                panel.layers.push(Layer::Line(points.clone(), colour::series(series)));
             }
             let named = points.iter().filter_map(|&(x, y)| {
                 let name = self.lines[series].names.get(self.cells.place(x)?)?.clone();
@@ -226,7 +229,7 @@ impl Rows {
             panel.layers.push(Layer::Names(named.collect()));
             if self.is_marked(&points) {
                 points.retain(|(_, value)| value.is_finite());
-                panel.layers.push(Layer::Points(points, Marker { series }));
+                panel.layers.push(Layer::Marks(points.into_iter().map(|at| (at, Symbol::of_series(series))).collect()));
             }
         }
         panel
@@ -235,7 +238,7 @@ impl Rows {
     fn legend(&self, graphs: &[Graph], leaders: &[usize]) -> Vec<Entry> {
         let names: Vec<&str> = self.groups.shown.iter().map(|group| group.name.as_str()).collect();
         Entry::of_series(&names, leaders, |series| match self.are_scattered {
-            true => Key::Point(Marker { series }),
+            true => Key::Mark(Symbol::of_series(series)),
             false => Key::series(series, graphs.iter().any(|graph| self.is_marked(&graph.curves[series]))),
         })
     }
@@ -252,5 +255,5 @@ impl Graph {
 /// The value that all of these are, if they are one.
 fn constant(values: impl Iterator<Item = f64>) -> Option<f64> {
     let (low, high) = values.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), v| (low.min(v), high.max(v)));
-    (high - low <= CONSTANT * low.abs().max(high.abs())).then_some(low)
+    (high - low <= CONSTANT_RTOL * low.abs().max(high.abs())).then_some(low)
 }

@@ -2,36 +2,34 @@
 
 use super::cells::AxisCells;
 use super::groups::Groups;
+use super::lines::MAX_NAMED_ROWS;
 use super::survey::{Survey, Values};
 use crate::plot::colour::{class, viridis};
 use crate::plot::export::image;
-use crate::plot::figure::{Axis, Colours, Dot, Entry, Figure, Hover, Key, Layer, Map, Panel};
+use crate::plot::figure::{Axis, Colours, Entry, Figure, Hover, Key, Layer, Map, Panel};
 use crate::plot::scale::Scale;
+use crate::plot::symbol::Symbol;
 use crate::plot::{PlotError, label};
 use crate::protocol::Status;
 use crate::table::STATUS;
 
-/// Most cells of an axis, alone and in one of several panels: finer ones are not seen in print.
-const MOST_CELLS: usize = 720;
-const MOST_CELLS_SHARED: usize = 480;
+/// Cells of an axis of a single panel, and of one of several. Chosen: finer ones are not seen in print.
+const MAX_CELLS: usize = 720;
+const MAX_CELLS_OF_SEVERAL: usize = 480;
 
-/// A map of which rows fill a smaller fraction is sparse: half of what a condition such as `v_f > v_i` leaves of a grid.
-const SPARSE: f64 = 0.25;
+/// Fraction of a map that rows fill, below which it is sparse. Chosen: half of what a condition such as `v_f > v_i` leaves of a grid.
+const SPARSE_FILL: f64 = 0.25;
 
-/// Rows that are so many times as many as the values of either axis, or fewer, are single points, such as materials of which each has
-/// its own values of both axes: not a grid, and not half of one.
-const SCATTERED: usize = 2;
+/// Ratio of rows to the values of the longer axis, up to which rows are single points, such as materials. Chosen: no grid has fewer.
+const MAX_SCATTERED_RATIO: usize = 2;
 
-/// Most rows whose names stand beside their dots.
-const MOST_NAMED: u64 = 60;
+/// Dots of a panel, above which several share a cell. Chosen: more cover each other.
+const MAX_DOTS: f64 = 5000.0;
 
-/// Most dots of a panel.
-const MOST_DOTS: f64 = 5000.0;
-
-/// Room beyond the first and the last dot, as a fraction of the axis. Chosen by eye: no dot touches the frame in a panel of a third of a page.
+/// Room beyond the first and the last dot, as a fraction of the axis. Chosen: no dot touches the frame in a panel of a third of a page.
 const DOT_ROOM: f64 = 0.04;
 
-/// Pixels of a panel whose cells are not equally wide.
+/// Pixels along an axis of a panel whose cells are not equally wide. Chosen: more than its cells.
 const PIXELS: usize = 1024;
 
 /// What a map shows.
@@ -114,12 +112,12 @@ impl Raster {
     fn new(survey: &Survey, plan: &Plan, groups: &Groups) -> Result<Raster, PlotError> {
         let axis = |name| survey.axis(name).filter(|axis| !axis.values.is_empty()).ok_or(PlotError::Nothing);
         let axes = [axis(&plan.x)?, axis(&plan.y)?];
-        let most = if groups.shown.len() > 1 { MOST_CELLS_SHARED } else { MOST_CELLS };
+        let most = if groups.shown.len() > 1 { MAX_CELLS_OF_SEVERAL } else { MAX_CELLS };
         // Rows at places of their own, such as those of a sampled design, are dots; of too many, several share a cell.
         let per_panel = survey.rows as f64 / groups.all as f64;
-        let is_sparse = SPARSE * (axes[0].values.len() * axes[1].values.len()) as f64 > per_panel
+        let is_sparse = SPARSE_FILL * (axes[0].values.len() * axes[1].values.len()) as f64 > per_panel
             || is_scattered(survey.rows / groups.all as u64, axes);
-        let are_dots = is_sparse && per_panel <= MOST_DOTS;
+        let are_dots = is_sparse && per_panel <= MAX_DOTS;
         let most = if is_sparse && !are_dots { most.min((0.5 * per_panel.sqrt()) as usize) } else { most };
         let cells = axes.map(|axis| {
             let mut cells = AxisCells::new(axis, most);
@@ -139,7 +137,7 @@ impl Raster {
         let count = if self.are_dots { 0 } else { columns * rows };
         let empty = |_| Sheet { value: vec![f64::NAN; count], status: vec![0; count], dots: Vec::new(), least: None };
         let mut sheets: Vec<Sheet> = groups.shown.iter().map(empty).collect();
-        let is_named = self.are_dots && survey.rows <= MOST_NAMED;
+        let is_named = self.are_dots && survey.rows <= MAX_NAMED_ROWS;
         let labels = if is_named { survey.label_columns() } else { Vec::new() };
         let axes: Vec<&str> = groups.axes.iter().map(String::as_str).collect();
         let wanted = [&[plan.x.as_str(), &plan.y, &plan.value, STATUS], &axes[..], &labels].concat();
@@ -176,11 +174,11 @@ impl Raster {
     fn layers(&self, sheet: &Sheet, shading: &Shading<'_>) -> Vec<Layer> {
         if self.are_dots {
             let dot = |((at, _), &value): (&((f64, f64), String), &f64)| {
-                let shape = if shading.words.is_empty() || value.is_nan() { 0 } else { shading.shade(value) };
-                Dot { at: *at, fill: shading.colour(value), shape }
+                let shape = if shading.words.is_empty() { 0 } else { shading.shade(value) };
+                (*at, Symbol::of_row(shading.colour(value), shape))
             };
             let names = sheet.dots.iter().filter(|(_, name)| !name.is_empty()).cloned().collect();
-            return vec![Layer::Dots(sheet.dots.iter().zip(&sheet.value).map(dot).collect()), Layer::Names(names)];
+            return vec![Layer::Marks(sheet.dots.iter().zip(&sheet.value).map(dot).collect()), Layer::Names(names)];
         }
         let image = pixels(&self.cells, |cell| shading.colour(sheet.value[cell]));
         let hover = || Some(hover(&self.cells, sheet, &shading.words, shading.column));
@@ -245,10 +243,14 @@ impl Shading<'_> {
         let words = self.words.iter().enumerate().map(|(place, word)| (place as f64, word));
         let words = words.filter(|(place, _)| has(&|value| value == *place)).map(|(place, word)| {
             let shade = self.shade(place);
-            let key = if are_dots { Key::Dot(class(shade), shade) } else { Key::Fill(class(shade)) };
+            let key =
+                if are_dots { Key::Mark(Symbol::of_row(Some(class(shade)), shade)) } else { Key::Fill(class(shade)) };
             Entry { key, text: self.meaning(word) }
         });
-        let hole = || Entry { key: if are_dots { Key::Hollow } else { Key::Hatch }, text: nothing(sheets) };
+        let hole = || Entry {
+            key: if are_dots { Key::Mark(Symbol::of_row(None, 0)) } else { Key::Hatch },
+            text: nothing(sheets),
+        };
         words.chain(has(&f64::is_nan).then(hole)).collect()
     }
 
@@ -264,10 +266,11 @@ impl Shading<'_> {
 
 /// Whether rows are single points of a plane, of which a map would be mostly blank.
 fn is_scattered(rows: u64, axes: [&Values; 2]) -> bool {
-    let most = axes.map(|axis| axis.values.len()).into_iter().max().unwrap_or(0);
-    let least = axes.map(|axis| axis.values.len()).into_iter().min().unwrap_or(0);
+    let mut sizes = axes.map(|axis| axis.values.len());
+    sizes.sort_unstable();
+    let [least, most] = sizes;
     // Rows of which each pair of values has one are a grid.
-    rows <= (SCATTERED * most) as u64 && rows < (most * least) as u64
+    rows <= (MAX_SCATTERED_RATIO * most) as u64 && rows < (most * least) as u64
 }
 
 /// What a hatched region is, from the status of its rows.

@@ -11,7 +11,6 @@ mod optimal;
 mod phase;
 mod reduced;
 mod survey;
-mod swift;
 
 use super::figure::Figure;
 use super::{PlotError, label};
@@ -147,7 +146,7 @@ const KINDS: [Kind; 12] = [
             least_map: usize::MAX,
             ..OVER_TIME
         },
-        draw: swift::draw,
+        draw: plain,
     },
     Kind {
         table: "stability",
@@ -232,10 +231,8 @@ impl Source {
     /// The picture of a table.
     pub fn figure(&self, table: &str, request: &Request) -> Result<Figure, PlotError> {
         let survey = Survey::new(&self.folder, &self.manifest, table, &request.conditions)?;
-        let kind = KINDS
-            .iter()
-            .find(|kind| kind.table == table)
-            .ok_or_else(|| PlotError::NoTable { name: table.to_owned(), found: self.tables() })?;
+        let no_table = || PlotError::NoTable { name: table.to_owned(), found: self.tables() };
+        let kind = KINDS.iter().find(|kind| kind.table == table).ok_or_else(no_table)?;
         let is_alone = request.x.is_none() && request.y.is_none() && request.colour.is_none();
         let (mut figure, drawn) = match table {
             "gap_histogram" if is_alone => reduced::histogram(&survey)?,
@@ -263,7 +260,7 @@ impl Source {
 fn plain(scene: &Scene<'_>, shape: &Shape) -> Result<Figure, PlotError> {
     match shape {
         Shape::Map(plan) => Ok(map::map(scene.survey, plan)?.figure),
-        Shape::Lines(plan) => Ok(lines::lines(scene.survey, plan, |_, _| {})?.figure),
+        Shape::Lines(plan) => Ok(lines::lines(scene.survey, plan)?.figure),
     }
 }
 
@@ -291,18 +288,6 @@ impl Scene<'_> {
         match self.survey.axis(name)?.values.as_slice() {
             [one] => Some(*one),
             _ => None,
-        }
-    }
-
-    /// Another table of the dataset, if it has these columns and any part is there.
-    fn other(&self, table: &str, columns: &[&str]) -> Result<Option<Survey>, PlotError> {
-        let Source { folder, manifest, .. } = self.source;
-        if manifest.table(table).is_none() {
-            return Ok(None);
-        }
-        match Survey::new(folder, manifest, table, &[]) {
-            Err(PlotError::Empty { .. }) => Ok(None),
-            survey => Ok(Some(survey?).filter(|survey| columns.iter().all(|column| survey.has(column)))),
         }
     }
 

@@ -13,16 +13,16 @@ use crate::protocol::optimal::crossover::{self, CrossoverTimes, Wanted};
 /// The durations that are marked.
 const MARKED: [&str; 5] = ["t_cheapest", "t_cross", "t_hold", "t_min", "t_turn"];
 
-/// Most lines for which they are marked: more marks hide what they are to show.
-const MOST_MARKED: usize = 3;
+/// Lines, above which they are not marked. Chosen: more marks hide the curves.
+const MAX_MARKED_LINES: usize = 3;
 
 /// What a transition depends on.
 const AXES: [&str; 4] = ["a", "b", "v_i", "v_f"];
 
-/// Steps along a curve of durations.
-const CURVE_POINTS: usize = 120;
+/// Steps along a curve of durations. Chosen: no corner is seen in print.
+const CURVE_STEPS: usize = 120;
 
-/// Accuracy of a mark: finer than a picture shows.
+/// Relative tolerance of a mark. Chosen: finer than a picture shows.
 const RTOL: f64 = 1e-6;
 
 pub fn draw(scene: &Scene<'_>, shape: &Shape) -> Result<Figure, PlotError> {
@@ -39,19 +39,19 @@ pub fn draw(scene: &Scene<'_>, shape: &Shape) -> Result<Figure, PlotError> {
             Shape::Lines(_) => plain(scene, shape),
         };
     };
-    let lined = lines::lines(scene.survey, plan, |_, _| {})?;
+    let lined = lines::lines(scene.survey, plan)?;
     let mut figure = lined.figure;
     let count = lined.groups.shown.len();
     // This work is the least one.
     for panel in figure.panels.iter_mut().filter(|panel| panel.y.column == "work") {
         panel.y.column = "work_optimal".to_owned();
     }
-    if plan.x != "t_f" || count > MOST_MARKED {
+    if plan.x != "t_f" || count > MAX_MARKED_LINES {
         return Ok(figure);
     }
     // Of lines that coincide one is drawn.
     for group in (0..count).filter(|&group| lined.leaders[group] == group) {
-        let times = times(scene, &lined.groups, group)?;
+        let times = times(scene, &lined.groups, group);
         let colour = if count == 1 { "#555".to_owned() } else { colour::series(group).colour };
         for (name, time) in MARKED.iter().zip(times) {
             let Some(time) = time.filter(|time| (lined.x.low..=lined.x.high).contains(time)) else { continue };
@@ -59,7 +59,7 @@ pub fn draw(scene: &Scene<'_>, shape: &Shape) -> Result<Figure, PlotError> {
             for (place, panel) in figure.panels.iter_mut().enumerate() {
                 // One panel says what the marks are.
                 let words = if place == 0 { label::name(name) } else { String::new() };
-                panel.layers.push(Layer::Mark(time, words, stroke.clone()));
+                panel.layers.push(Layer::Vertical(time, words, stroke.clone()));
             }
         }
     }
@@ -81,29 +81,21 @@ fn strategies(scene: &Scene<'_>, plan: &map::Plan) -> Result<Figure, PlotError> 
     };
     let Some(place) = AXES.iter().position(|axis| *axis == other) else { return Ok(figure) };
     let (unit, unit_of_time) = (scene.size(other), scene.source.units.size("l/v_0"));
+    let wanted = Wanted { cross: true, hold: true, cheapest: false, min: false, turn: false, free: false };
     let mut is_drawn = [false; 2];
     for (group, panel) in figure.panels.iter_mut().enumerate() {
-        let mut values = [0.0; AXES.len()];
-        let known = AXES.iter().zip(&mut values).enumerate().all(|(axis, (name, value))| {
-            let found = if axis == place { Some(0.0) } else { scene.scaled(&groups, group, name) };
-            found.map(|found| *value = found).is_some()
-        });
-        if !known {
-            continue;
-        }
+        let value = |&axis: &&str| if axis == other { Some(0.0) } else { scene.scaled(&groups, group, axis) };
+        let Some(mut values) = AXES.iter().map(value).collect::<Option<Vec<f64>>>() else { continue };
         let mut curves = [Vec::new(), Vec::new()];
-        for step in 0..=CURVE_POINTS {
-            let at = cells[1 - time].scale.value(step as f64 / CURVE_POINTS as f64);
+        for step in 0..=CURVE_STEPS {
+            let at = cells[1 - time].scale.value(step as f64 / CURVE_STEPS as f64);
             values[place] = at / unit;
-            let [a, b, v_i, v_f] = values;
-            let is_legal = a > 0.0 && b >= 0.0 && v_i > 1.0 && v_f > 1.0 && v_i != v_f;
-            let wanted = Wanted { cross: true, hold: true, cheapest: false, min: false, turn: false, free: false };
-            let times = is_legal.then(|| {
-                let transition = Transition { law: Law { a, b }, v_i, v_f };
-                crossover::solve(&transition, scene.source.bounded, RTOL, wanted).1
-            });
-            let [cross, hold] = [times.as_ref().and_then(|t| t.t_cross), times.as_ref().and_then(|t| t.t_hold)];
-            for (curve, found) in curves.iter_mut().zip([cross, hold]) {
+            let is_legal = matches!(
+                values[..], [a, b, v_i, v_f] if a > 0.0 && b >= 0.0 && v_i > 1.0 && v_f > 1.0 && v_i != v_f
+            );
+            let times = is_legal.then(|| solved(scene, &values, wanted)).flatten();
+            let found = times.map_or([None; 2], |times| [times.t_cross, times.t_hold]);
+            for (curve, found) in curves.iter_mut().zip(found) {
                 let found = found.map_or(f64::NAN, |found| found * unit_of_time);
                 curve.push(if time == 0 { (found, at) } else { (at, found) });
             }
@@ -123,31 +115,19 @@ fn strategies(scene: &Scene<'_>, plan: &map::Plan) -> Result<Figure, PlotError> 
     Ok(figure)
 }
 
-/// The durations of a line: from the table `crossover` if the dataset has it, else solved.
-fn times(scene: &Scene<'_>, groups: &Groups, group: usize) -> Result<Vec<Option<f64>>, PlotError> {
-    let values: Option<Vec<f64>> = AXES.iter().map(|axis| scene.value(groups, group, axis)).collect();
-    let Some(values) = values else { return Ok(Vec::new()) };
-    if let Some(times) = tabled(scene, &values)? {
-        return Ok(times);
-    }
+/// The durations of a line, in the order of [`MARKED`].
+fn times(scene: &Scene<'_>, groups: &Groups, group: usize) -> [Option<f64>; MARKED.len()] {
     let scaled: Option<Vec<f64>> = AXES.iter().map(|axis| scene.scaled(groups, group, axis)).collect();
-    let Some(&[a, b, v_i, v_f]) = scaled.as_deref() else { return Ok(Vec::new()) };
-    let transition = Transition { law: Law { a, b }, v_i, v_f };
     let wanted = Wanted { cross: true, hold: true, cheapest: true, min: true, turn: true, free: false };
-    let (_, times, _) = crossover::solve(&transition, scene.source.bounded, RTOL, wanted);
+    let Some(times) = scaled.and_then(|values| solved(scene, &values, wanted)) else { return [None; MARKED.len()] };
     let CrossoverTimes { t_cross, t_hold, t_cheapest, t_min, t_turn, .. } = times;
     let unit = scene.source.units.size("l/v_0");
-    Ok([t_cheapest, t_cross, t_hold, t_min, t_turn].into_iter().map(|time| Some(time? * unit)).collect())
+    [t_cheapest, t_cross, t_hold, t_min, t_turn].map(|time| Some(time? * unit))
 }
 
-fn tabled(scene: &Scene<'_>, values: &[f64]) -> Result<Option<Vec<Option<f64>>>, PlotError> {
-    let Some(survey) = scene.other("crossover", &MARKED)? else { return Ok(None) };
-    let columns: Vec<&str> = AXES.into_iter().chain(MARKED).collect();
-    let mut found = None;
-    survey.each(&columns, |row| {
-        if row[..AXES.len()] == *values {
-            found = Some(row[AXES.len()..].iter().map(|&time| time.is_finite().then_some(time)).collect());
-        }
-    })?;
-    Ok(found)
+/// The durations at which the strategy changes, for a transition whose values are in the order of [`AXES`].
+fn solved(scene: &Scene<'_>, values: &[f64], wanted: Wanted) -> Option<CrossoverTimes> {
+    let &[a, b, v_i, v_f] = values else { return None };
+    let transition = Transition { law: Law { a, b }, v_i, v_f };
+    Some(crossover::solve(&transition, scene.source.bounded, RTOL, wanted).1)
 }

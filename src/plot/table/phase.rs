@@ -10,8 +10,8 @@ use crate::plot::canvas::Stroke;
 use crate::plot::figure::{Entry, Figure, Key, Layer};
 use crate::stability::SteadySliding;
 
-/// Points of the curve.
-const POINTS: usize = 400;
+/// Steps along the curve. Chosen: no corner is seen in print.
+const CURVE_STEPS: usize = 400;
 
 pub fn draw(scene: &Scene<'_>, shape: &Shape) -> Result<Figure, PlotError> {
     let Shape::Map(plan) = shape else { return plain(scene, shape) };
@@ -27,8 +27,8 @@ pub fn draw(scene: &Scene<'_>, shape: &Shape) -> Result<Figure, PlotError> {
     let mut any = false;
     for (place, panel) in figure.panels.iter_mut().enumerate() {
         let Some((law, m)) = slider(scene, &groups, place) else { continue };
-        let curve = (0..=POINTS).map(|i| {
-            let v = cells[velocity].scale.value(i as f64 / POINTS as f64);
+        let curve = (0..=CURVE_STEPS).map(|i| {
+            let v = cells[velocity].scale.value(i as f64 / CURVE_STEPS as f64);
             let k = SteadySliding::new(law, 1.0, m, v / unit_of_v).critical_stiffness() * unit_of_k;
             if velocity == 0 { (v, k) } else { (k, v) }
         });

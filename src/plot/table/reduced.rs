@@ -4,8 +4,9 @@ use super::cells::AxisCells;
 use super::groups::Groups;
 use super::survey::Survey;
 use crate::plot::canvas::Stroke;
-use crate::plot::figure::{Axis, Entry, Figure, Key, Layer, MARKED, Marker, Panel};
+use crate::plot::figure::{Axis, Entry, Figure, Key, Layer, MAX_MARKED_POINTS, Panel};
 use crate::plot::scale::Scale;
+use crate::plot::symbol::Symbol;
 use crate::plot::{PlotError, colour, label};
 use crate::table::{HISTOGRAM_EDGES, REDUCED, Table};
 
@@ -35,8 +36,8 @@ const BANDS: [(&str, &str, [u8; 3], &str); 2] =
 const CURVES: [(&str, &str, usize); 3] =
     [("gap_q50", "median", 0), ("gap_min", "least", 2), ("gap_max", "greatest", 1)];
 
-/// Most places along an axis.
-const MOST_PLACES: usize = 1024;
+/// Places along an axis, above which rows share them. Chosen: more are not seen in print.
+const MAX_PLACES: usize = 1024;
 
 /// The columns of a reduced table, without the number of shortcuts.
 fn columns(survey: &Survey) -> Vec<&'static str> {
@@ -122,7 +123,7 @@ struct Quantiles<'a> {
 
 fn bands(survey: &Survey, across: &str, columns: &[(&str, f64)]) -> Result<(Figure, Vec<String>), PlotError> {
     let (groups, along) = Groups::of_panels(survey, &[across])?;
-    let cells = AxisCells::new(survey.axis(across).ok_or(PlotError::Nothing)?, MOST_PLACES);
+    let cells = AxisCells::new(survey.axis(across).ok_or(PlotError::Nothing)?, MAX_PLACES);
     let empty = |_| Quantiles { cells: &cells, columns, values: vec![vec![f64::NAN; cells.len()]; columns.len()] };
     let mut quantiles: Vec<Quantiles> = groups.shown.iter().map(empty).collect();
     let names = columns.iter().map(|(name, _)| *name);
@@ -154,7 +155,7 @@ impl Quantiles<'_> {
     }
 
     fn is_marked(&self) -> bool {
-        self.cells.exact && self.cells.len() < MARKED
+        self.cells.exact && self.cells.len() < MAX_MARKED_POINTS
     }
 
     fn layers(&self) -> Vec<Layer> {
@@ -167,10 +168,10 @@ impl Quantiles<'_> {
         for (name, _, series) in CURVES {
             let Some(column) = self.column(name) else { continue };
             let points: Vec<(f64, f64)> = self.cells.middles.iter().copied().zip(column.iter().copied()).collect();
-            layers.push(Layer::Lines(vec![points.clone()], colour::series(series)));
+            layers.push(Layer::Line(points.clone(), colour::series(series)));
             if self.is_marked() {
-                let points = points.into_iter().filter(|(_, value)| value.is_finite()).collect();
-                layers.push(Layer::Points(points, Marker { series }));
+                let points = points.into_iter().filter(|(_, value)| value.is_finite());
+                layers.push(Layer::Marks(points.map(|at| (at, Symbol::of_series(series))).collect()));
             }
         }
         layers
@@ -203,8 +204,8 @@ fn distribution(survey: &Survey, columns: &[(&str, f64)]) -> Result<(Figure, Vec
             scale: Scale { low: 0.0, high: 100.0, log: false }.with_room(0.04),
         },
         layers: vec![
-            Layer::Lines(vec![points.clone()], Stroke::solid("#000", 1.1)),
-            Layer::Points(points, Marker { series: 0 }),
+            Layer::Line(points.clone(), Stroke::solid("#000", 1.1)),
+            Layer::Marks(points.into_iter().map(|at| (at, Symbol::of_series(0))).collect()),
         ],
     };
     Ok((Figure { columns: 1, aspect: 0.7, panels: vec![panel], ..Figure::default() }, Vec::new()))

@@ -1,12 +1,15 @@
 //! What is in a table: its columns, the values of its axes, and its rows, one after the other under conditions.
 
+use std::borrow::Cow;
 use std::cmp::Ordering;
-use std::collections::{BTreeMap, BTreeSet, HashMap};
-use std::path::PathBuf;
+use std::collections::{HashMap, HashSet};
+use std::path::{Path, PathBuf};
+
+use indexmap::IndexSet;
 
 use super::condition::Condition;
 use super::groups::Gridded;
-use crate::dataset::frame::{self, Cells, Heading};
+use crate::dataset::frame::{self, Cells, Frame, Heading};
 use crate::dataset::{Folder, Manifest, ReadError};
 use crate::grid::Quantity;
 use crate::names;
@@ -14,14 +17,14 @@ use crate::plot::{PlotError, label};
 use crate::protocol::Status;
 use crate::table::{self, Kind, STATUS};
 
-/// Most different values of an axis that are told apart; beyond, an axis is a range.
-const MOST_VALUES: usize = 100_000;
+/// Distinct values of an axis, above which only its range is kept. Chosen: 25 times the cells of the finest picture, and a few megabytes.
+const MAX_VALUES: usize = 100_000;
 
-/// Most labels of a column: more are not read in a picture.
-const MOST_LABELS: usize = 1000;
+/// Distinct labels of a column, above which it is not used. Chosen: more cannot be read in a picture.
+const MAX_LABELS: usize = 1000;
 
-/// Most values of an axis that a message lists.
-const FEW: usize = 12;
+/// Values of a column, above which a message states only the least and the greatest. Chosen: two lines of a terminal.
+const MAX_LISTED_VALUES: usize = 12;
 
 /// The values of an axis in the rows that are left.
 #[derive(Debug, Clone, PartialEq)]
@@ -59,6 +62,26 @@ impl Values {
         let shown = self.shown(value);
         if self.words.is_empty() { label::equation(&self.name, &shown, &self.unit) } else { shown }
     }
+
+    /// The values as they are typed: all of them while they are few, else the least and the greatest.
+    fn listed(&self) -> String {
+        let infinite = self.infinite.then_some(f64::INFINITY);
+        let typed: Vec<String> = self.values.iter().copied().chain(infinite).map(|value| self.typed(value)).collect();
+        match typed.as_slice() {
+            [first, .., last] if self.many || typed.len() > MAX_LISTED_VALUES => {
+                format!("{} from {first} to {last}", self.name)
+            }
+            all => format!("{} = {}", self.name, all.join(", ")),
+        }
+    }
+
+    /// A value as it is typed: one of the words, if the column has words.
+    fn typed(&self, value: f64) -> String {
+        match self.words.get(value as usize) {
+            Some(word) if value >= 0.0 => word.clone(),
+            _ => format!("{value:?}").trim_end_matches(".0").to_owned(),
+        }
+    }
 }
 
 /// A table under conditions.
@@ -90,12 +113,10 @@ impl Survey {
         name: &str,
         conditions: &[Condition],
     ) -> Result<Survey, PlotError> {
-        let found = || manifest.tables.iter().map(|table| table.name.clone()).collect();
-        let table = manifest
-            .tables
-            .iter()
-            .find(|table| table.name == name)
-            .ok_or_else(|| PlotError::NoTable { name: name.to_owned(), found: found() })?;
+        let table = manifest.table(name).ok_or_else(|| PlotError::NoTable {
+            name: name.to_owned(),
+            found: manifest.tables.iter().map(|table| table.name.clone()).collect(),
+        })?;
         let (parts, missing) = folder.verified(manifest, table).map_err(ReadError::from)?;
         let first = parts.first().ok_or_else(|| PlotError::Empty { table: name.to_owned() })?;
         let (headings, _) = frame::headings(first).map_err(ReadError::from)?;
@@ -111,15 +132,24 @@ impl Survey {
             conditions: conditions.to_vec(),
         };
         for condition in conditions {
-            survey.check("--where", &condition.column)?;
+            survey.check("--where", "column", &condition.column)?;
         }
-        survey.look()?;
-        survey.look_for_labels()?;
-        Ok(survey)
+        let known = table::find(name).map_or(&[][..], |table| table.axes());
+        let names = survey.headings.iter().map(|heading| heading.name.as_str());
+        let axes: Vec<&str> = names.filter(|name| known.iter().any(|axis| axis.name() == *name)).collect();
+        (survey.axes, survey.rows) = survey.values(&axes)?;
+        match survey.rows {
+            0 if conditions.is_empty() => Err(PlotError::Empty { table: survey.table }),
+            0 => Err(survey.without_rows()?),
+            _ => {
+                survey.labels = survey.read_labels()?;
+                Ok(survey)
+            }
+        }
     }
 
-    /// Finds the labels and their words, unless those are too many to be told apart in a picture.
-    fn look_for_labels(&mut self) -> Result<(), PlotError> {
+    /// The labels and their words, unless those are too many to be told apart in a picture.
+    fn read_labels(&self) -> Result<Vec<(String, Vec<String>)>, PlotError> {
         let known = table::find(&self.table);
         let is_column =
             |name: &str| known.is_some_and(|table| table.columns().iter().any(|column| column.name == name));
@@ -132,19 +162,29 @@ impl Survey {
         let parts = if labels.is_empty() { &[] } else { self.parts.as_slice() };
         for part in parts {
             let names: Vec<&str> = labels.iter().map(|(name, _)| name.as_str()).collect();
-            let frame = frame::read(part, &names).map_err(ReadError::from)?;
+            let frame = self.frame(part, &names)?;
             for ((_, all), (_, cells)) in labels.iter_mut().zip(&frame.columns) {
                 let Cells::Words(_, words) = cells else { continue };
                 for word in words {
-                    if all.len() <= MOST_LABELS && !all.contains(word) {
+                    if all.len() <= MAX_LABELS && !all.contains(word) {
                         all.push(word.clone());
                     }
                 }
             }
         }
-        labels.retain(|(_, words)| !words.is_empty() && words.len() <= MOST_LABELS);
-        self.labels = labels;
-        Ok(())
+        labels.retain(|(_, words)| !words.is_empty() && words.len() <= MAX_LABELS);
+        Ok(labels)
+    }
+
+    /// Columns of a part, without row groups whose statistics exclude the conditions.
+    fn frame(&self, part: &Path, names: &[&str]) -> Result<Frame, PlotError> {
+        let may_hold = |range: &dyn Fn(&str) -> Option<(f64, f64)>| {
+            let holds = |condition: &Condition| {
+                range(&condition.column).is_none_or(|(low, high)| condition.may_hold(low, high))
+            };
+            self.conditions.iter().all(holds)
+        };
+        Ok(frame::read_where(part, names, &may_hold).map_err(ReadError::from)?)
     }
 
     /// The label of a row in markup, from the cells of the columns of labels.
@@ -161,15 +201,18 @@ impl Survey {
         self.labels.iter().map(|(name, _)| name.as_str()).collect()
     }
 
-    /// That a column is there.
-    pub fn check(&self, argument: &str, column: &str) -> Result<&Heading, PlotError> {
-        self.heading(column).ok_or_else(|| PlotError::NoColumn {
-            argument: argument.to_owned(),
-            table: self.table.clone(),
-            what: "column",
-            name: column.to_owned(),
-            found: self.headings.iter().map(|heading| heading.name.clone()).collect(),
-        })
+    /// # Errors
+    /// If there is no axis, or no column (`what`), of this name.
+    pub fn check(&self, argument: &str, what: &'static str, name: &str) -> Result<(), PlotError> {
+        let found: Vec<String> = match what {
+            "axis" => self.axes.iter().map(|axis| axis.name.clone()).collect(),
+            _ => self.headings.iter().map(|heading| heading.name.clone()).collect(),
+        };
+        if found.iter().any(|known| known == name) {
+            return Ok(());
+        }
+        let (argument, table) = (argument.to_owned(), self.table.clone());
+        Err(PlotError::NoColumn { argument, table, what, name: name.to_owned(), found })
     }
 
     /// The column of this name, if it was written.
@@ -221,75 +264,40 @@ impl Survey {
         })
     }
 
-    /// The same until `visit` has seen enough, which it says by `false`.
-    pub fn each_while(&self, columns: &[&str], visit: impl FnMut(&[f64]) -> bool) -> Result<(), PlotError> {
-        self.each_of(&self.parts, columns, visit)
-    }
-
-    /// The same in some of the parts: of those that are skipped by the statistics of their columns nothing is read.
-    fn each_of(
-        &self,
-        parts: &[PathBuf],
-        columns: &[&str],
-        mut visit: impl FnMut(&[f64]) -> bool,
-    ) -> Result<(), PlotError> {
-        let mut names: Vec<&str> = Vec::new();
-        let mut place = |name| {
-            names.iter().position(|known| *known == name).unwrap_or_else(|| {
-                names.push(name);
-                names.len() - 1
-            })
-        };
-        let wanted: Vec<usize> = columns.iter().map(|&column| place(column)).collect();
-        let tests: Vec<(usize, &Condition)> =
-            self.conditions.iter().map(|condition| (place(condition.column.as_str()), condition)).collect();
-        let mut cells = vec![f64::NAN; columns.len()];
-        let may_hold = |range: &dyn Fn(&str) -> Option<(f64, f64)>| {
-            let holds = |condition: &Condition| {
-                range(&condition.column).is_none_or(|(low, high)| condition.may_hold(low, high))
-            };
-            self.conditions.iter().all(holds)
-        };
-        for part in parts {
-            let frame = frame::read_where(part, &names, &may_hold).map_err(ReadError::from)?;
-            // The places of the words of this part among all.
-            let codes: Vec<Vec<f64>> = names
-                .iter()
-                .zip(&frame.columns)
-                .map(|(name, (_, column))| match column {
-                    Cells::Numbers(_) => Vec::new(),
-                    Cells::Words(_, words) => {
-                        let all = self.words(name);
-                        let place = |word: &String| all.iter().position(|known| known == word);
-                        words.iter().map(|word| place(word).map_or(f64::NAN, |place| place as f64)).collect()
-                    }
-                })
-                .collect();
-            let cell = |column: usize, row: usize| match &frame.columns[column].1 {
-                Cells::Numbers(numbers) => numbers[row],
-                Cells::Words(places, _) => {
-                    places[row].and_then(|place| codes[column].get(place as usize)).copied().unwrap_or(f64::NAN)
-                }
-            };
-            let holds = |(column, condition): &(usize, &Condition), row: usize| match &frame.columns[*column].1 {
-                Cells::Numbers(numbers) => condition.holds(numbers[row]),
-                Cells::Words(places, words) => {
-                    condition.holds_word(places[row].and_then(|place| words.get(place as usize)).map(String::as_str))
-                }
-            };
-            for row in 0..frame.height {
-                if !tests.iter().all(|test| holds(test, row)) {
-                    continue;
-                }
-                for (cell_out, &column) in cells.iter_mut().zip(&wanted) {
-                    *cell_out = cell(column, row);
-                }
-                if !visit(&cells) {
+    /// Like [`Survey::each`], until `visit` returns `false`.
+    pub fn each_while(&self, columns: &[&str], mut visit: impl FnMut(&[f64]) -> bool) -> Result<(), PlotError> {
+        let tested = self.conditions.iter().map(|condition| condition.column.as_str());
+        let names: IndexSet<&str> = columns.iter().copied().chain(tested).collect();
+        let names: Vec<&str> = names.into_iter().collect();
+        let mut row = Vec::with_capacity(columns.len());
+        for part in &self.parts {
+            let frame = self.frame(part, &names)?;
+            let numbers = columns.iter().filter_map(|name| Some(self.numbers(name, frame.column(name)?)));
+            let numbers: Vec<Cow<'_, [f64]>> = numbers.collect();
+            let tests = self.conditions.iter().filter_map(|test| Some((test, frame.column(&test.column)?)));
+            let tests: Vec<(&Condition, &Cells)> = tests.collect();
+            for place in (0..frame.height).filter(|&row| tests.iter().all(|(test, cells)| test.holds_in(cells, row))) {
+                row.clear();
+                row.extend(numbers.iter().map(|column| column[place]));
+                if !visit(&row) {
                     return Ok(());
                 }
             }
         }
         Ok(())
+    }
+
+    /// Cells as numbers: of words, their places in [`Survey::words`].
+    fn numbers<'a>(&self, column: &str, cells: &'a Cells) -> Cow<'a, [f64]> {
+        match cells {
+            Cells::Numbers(numbers) => Cow::Borrowed(numbers),
+            Cells::Words(places, words) => {
+                let all = self.words(column);
+                let code = |word| all.iter().position(|known| known == word).map_or(f64::NAN, |place| place as f64);
+                let codes: Vec<f64> = words.iter().map(code).collect();
+                places.iter().map(|place| place.map_or(f64::NAN, |place| codes[place as usize])).collect()
+            }
+        }
     }
 
     /// Which of `axes` have but one value wherever those of `given` are the same: such an axis tells no rows apart. None has, as far as
@@ -299,13 +307,13 @@ impl Survey {
         let mut known: HashMap<Vec<u64>, Vec<u64>> = HashMap::new();
         let columns: Vec<&str> = given.iter().chain(axes).copied().collect();
         self.each_while(&columns, |row| {
-            let bits: Vec<u64> = row.iter().map(|value| (value + 0.0).to_bits()).collect();
+            let bits = bits(row);
             let (key, values) = bits.split_at(given.len());
             if let Some(before) = known.get(key) {
                 for ((determined, before), value) in determined.iter_mut().zip(before).zip(values) {
                     *determined &= before == value;
                 }
-            } else if known.len() < MOST_VALUES {
+            } else if known.len() < MAX_VALUES {
                 known.insert(key.to_vec(), values.to_vec());
             } else {
                 determined.fill(false);
@@ -317,126 +325,78 @@ impl Survey {
 
     /// Whether two axes rise or fall together: each value of `x` comes with one of `y`, in order.
     pub fn follows(&self, y: &str, x: &str) -> Result<bool, PlotError> {
-        let mut known: BTreeMap<u64, f64> = BTreeMap::new();
+        let mut known: HashMap<u64, [f64; 2]> = HashMap::new();
         let mut follows = true;
         self.each_while(&[x, y], |row| {
-            let found = *known.entry(ordered(row[0])).or_insert(row[1]);
-            follows = found == row[1] && known.len() <= MOST_VALUES;
+            let found = known.entry((row[0] + 0.0).to_bits()).or_insert([row[0], row[1]]);
+            follows = found[1] == row[1] && known.len() <= MAX_VALUES;
             follows
         })?;
-        let values: Vec<f64> = known.into_values().collect();
-        let in_order = |order: Ordering| values.windows(2).all(|pair| pair[0].total_cmp(&pair[1]) != order);
+        let mut pairs: Vec<[f64; 2]> = known.into_values().collect();
+        pairs.sort_by(|left, right| left[0].total_cmp(&right[0]));
+        let in_order = |order: Ordering| pairs.windows(2).all(|pair| pair[0][1].total_cmp(&pair[1][1]) != order);
         Ok(follows && (in_order(Ordering::Greater) || in_order(Ordering::Less)))
     }
 
-    /// Finds the axes and their values.
-    fn look(&mut self) -> Result<(), PlotError> {
-        let known = table::find(&self.table).map_or(&[][..], |table| table.axes());
-        let is_axis = |heading: &&Heading| known.iter().any(|axis| axis.name() == heading.name);
-        let names: Vec<String> = self.headings.iter().filter(is_axis).map(|heading| heading.name.clone()).collect();
-        let columns: Vec<&str> = names.iter().map(String::as_str).collect();
-        let mut found: Vec<(BTreeSet<u64>, f64)> = vec![(BTreeSet::new(), f64::NAN); columns.len()];
-        let mut infinite = vec![false; columns.len()];
-        let mut ranges = vec![(f64::INFINITY, f64::NEG_INFINITY); columns.len()];
+    /// The values of columns in the rows that are left, and how many rows those are.
+    fn values(&self, names: &[&str]) -> Result<(Vec<Values>, u64), PlotError> {
+        let axis = |name: &&str| Values {
+            name: (*name).to_owned(),
+            unit: self.unit(name),
+            values: vec![f64::INFINITY, f64::NEG_INFINITY],
+            words: self.words(name),
+            many: false,
+            infinite: false,
+        };
+        let mut axes: Vec<Values> = names.iter().map(axis).collect();
+        let mut distinct: Vec<HashSet<u64>> = vec![HashSet::new(); names.len()];
+        let mut last = vec![f64::NAN; names.len()];
         let mut rows = 0;
-        let mut look = |cells: &[f64]| {
+        self.each(names, |row| {
             rows += 1;
-            for (place, &value) in cells.iter().enumerate() {
-                let (values, last) = &mut found[place];
+            for (((&value, last), axis), distinct) in row.iter().zip(&mut last).zip(&mut axes).zip(&mut distinct) {
                 if value.to_bits() == last.to_bits() {
                     continue;
                 }
                 *last = value;
+                axis.infinite |= value.is_infinite();
                 if value.is_finite() {
-                    let range = &mut ranges[place];
-                    *range = (range.0.min(value), range.1.max(value));
-                    if values.len() <= MOST_VALUES {
-                        values.insert(ordered(value));
+                    axis.values[0] = axis.values[0].min(value);
+                    axis.values[1] = axis.values[1].max(value);
+                    if distinct.len() <= MAX_VALUES {
+                        // There is one zero.
+                        distinct.insert((value + 0.0).to_bits());
                     }
-                } else {
-                    infinite[place] = true;
-                }
-            }
-            true
-        };
-        // Parts without such a row are not read again.
-        let mut parts = Vec::new();
-        for part in &self.parts {
-            let mut is_used = false;
-            self.each_of(std::slice::from_ref(part), &columns, |cells| {
-                is_used = true;
-                look(cells)
-            })?;
-            parts.extend(is_used.then(|| part.clone()));
-        }
-        self.rows = rows;
-        let mut axes = Vec::new();
-        for (place, name) in names.iter().enumerate() {
-            let many = found[place].0.len() > MOST_VALUES;
-            let values = match ranges[place] {
-                (low, high) if many => vec![low, high],
-                _ => found[place].0.iter().map(|&bits| disordered(bits)).collect(),
-            };
-            let (unit, words) = (self.unit(name), self.words(name));
-            axes.push(Values { name: name.clone(), unit, values, words, many, infinite: infinite[place] });
-        }
-        self.axes = axes;
-        if rows == 0 && self.conditions.is_empty() {
-            return Err(PlotError::Empty { table: self.table.clone() });
-        }
-        if rows == 0 {
-            return Err(self.without_rows()?);
-        }
-        self.parts = parts;
-        Ok(())
-    }
-
-    /// What to say where the conditions leave no row: the values that there are, and the nearest ones.
-    fn without_rows(&mut self) -> Result<PlotError, PlotError> {
-        self.look_for_labels()?;
-        let conditions = std::mem::take(&mut self.conditions);
-        let texts: Vec<String> = conditions.iter().map(Condition::shown).collect();
-        let mut names: Vec<&str> = conditions.iter().map(|condition| condition.column.as_str()).collect();
-        names.sort_unstable();
-        names.dedup();
-        let mut values: Vec<(BTreeSet<u64>, f64, f64)> =
-            vec![(BTreeSet::new(), f64::INFINITY, f64::NEG_INFINITY); names.len()];
-        let wanted: Vec<Option<f64>> = conditions.iter().map(Condition::wanted).collect();
-        let mut nearest = vec![f64::NAN; conditions.len()];
-        let places: Vec<Option<usize>> =
-            conditions.iter().map(|condition| names.iter().position(|name| *name == condition.column)).collect();
-        self.each(&names, |cells| {
-            for ((values, low, high), &cell) in values.iter_mut().zip(cells).filter(|(_, cell)| !cell.is_nan()) {
-                (*low, *high) = (low.min(cell), high.max(cell));
-                if values.len() <= FEW {
-                    values.insert(ordered(cell));
-                }
-            }
-            for ((nearest, wanted), place) in nearest.iter_mut().zip(&wanted).zip(&places) {
-                let (Some(wanted), Some(place)) = (wanted, place) else { continue };
-                if nearest.is_nan() || (cells[*place] - wanted).abs() < (*nearest - wanted).abs() {
-                    *nearest = cells[*place];
                 }
             }
         })?;
-        let told = names.iter().zip(&values).map(|(name, (values, low, high))| {
-            let words = self.words(name);
-            if values.len() > FEW {
-                return format!("{name} from {} to {}", plainly(&words, *low), plainly(&words, *high));
+        for (axis, distinct) in axes.iter_mut().zip(distinct) {
+            axis.many = distinct.len() > MAX_VALUES;
+            if !axis.many {
+                axis.values = distinct.into_iter().map(f64::from_bits).collect();
+                axis.values.sort_by(f64::total_cmp);
             }
-            let values: Vec<String> = values.iter().map(|bits| plainly(&words, disordered(*bits))).collect();
-            format!("{name} = {}", values.join(", "))
-        });
-        let found = told.collect::<Vec<_>>().join("; ");
+        }
+        Ok((axes, rows))
+    }
+
+    /// The error where the conditions leave no row: the values of their columns, and the nearest ones.
+    fn without_rows(mut self) -> Result<PlotError, PlotError> {
+        let conditions = std::mem::take(&mut self.conditions);
+        self.labels = self.read_labels()?;
+        let mut names: Vec<&str> = conditions.iter().map(|condition| condition.column.as_str()).collect();
+        names.sort_unstable();
+        names.dedup();
+        let (columns, _) = self.values(&names)?;
         // A number that is only nearly that of a row may be meant.
-        let offer = |(condition, nearest): (&Condition, &f64)| {
-            let is_axis = self.axis(&condition.column).is_some_and(|axis| axis.words.is_empty());
-            let other = (is_axis && nearest.is_finite() && !condition.holds(*nearest)).then_some(*nearest);
-            (condition.typed(other), other.is_some())
+        let near = |condition: &Condition| {
+            let (wanted, axis) = (condition.wanted()?, self.axis(&condition.column)?);
+            let column = columns.iter().find(|column| column.name == axis.name && !column.many)?;
+            let off = |value: &f64| (value - wanted).abs();
+            let nearest = column.values.iter().copied().min_by(|left, right| off(left).total_cmp(&off(right)))?;
+            (axis.words.is_empty() && !condition.holds(nearest)).then_some(nearest)
         };
-        let offers: Vec<(String, bool)> = conditions.iter().zip(&nearest).map(offer).collect();
-        let is_offered = offers.iter().any(|(_, is_other)| *is_other);
-        let typed: Vec<String> = offers.into_iter().map(|(text, _)| text).collect();
+        let near: Vec<Option<f64>> = conditions.iter().map(near).collect();
         let meant = conditions.iter().find_map(|condition| {
             let (word, words) = (condition.word()?, self.words(&condition.column));
             let known = words.iter().any(|known| known == word);
@@ -445,45 +405,19 @@ impl Survey {
         });
         let help = if let Some(meant) = meant {
             format!("did you mean `{meant}`?")
-        } else if is_offered {
-            format!("the nearest rows have --where \"{}\"", typed.join(", "))
+        } else if near.iter().any(Option::is_some) {
+            let typed = conditions.iter().zip(near).map(|(condition, near)| condition.typed(near));
+            format!("the nearest rows have --where \"{}\"", typed.collect::<Vec<_>>().join(", "))
         } else {
             "change the condition".to_owned()
         };
-        Ok(PlotError::NoRows { table: self.table.clone(), text: texts.join(", "), found, help })
+        let text = conditions.iter().map(Condition::shown).collect::<Vec<_>>().join(", ");
+        let found = columns.iter().map(Values::listed).collect::<Vec<_>>().join("; ");
+        Ok(PlotError::NoRows { table: self.table, text, found, help })
     }
 }
 
-/// A value as it is typed: one of the words, if the column has words.
-fn plainly(words: &[String], value: f64) -> String {
-    match words.get(value as usize) {
-        Some(word) if value >= 0.0 => word.clone(),
-        _ => format!("{value:?}").trim_end_matches(".0").to_owned(),
-    }
-}
-
-/// The bits of a number such that they are ordered as numbers are.
-fn ordered(value: f64) -> u64 {
-    // There is one zero.
-    let bits = (value + 0.0).to_bits();
-    if bits >> 63 == 1 { !bits } else { bits | 1 << 63 }
-}
-
-fn disordered(bits: u64) -> f64 {
-    f64::from_bits(if bits >> 63 == 1 { bits & !(1 << 63) } else { !bits })
-}
-
-#[cfg(test)]
-mod tests {
-    //! Bits in the order of numbers.
-
-    use super::*;
-
-    #[test]
-    fn numbers_keep_their_order() {
-        let numbers = [-1e300, -2.0, -1e-300, 0.0, 1e-300, 1.0, 2.0, 1e300];
-        assert!(numbers.windows(2).all(|pair| ordered(pair[0]) < ordered(pair[1])));
-        assert!(numbers.iter().all(|&number| disordered(ordered(number)) == number));
-        assert_eq!(ordered(-0.0), ordered(0.0));
-    }
+/// The bits of numbers as a key; there is one zero.
+pub fn bits(values: &[f64]) -> Vec<u64> {
+    values.iter().map(|value| (value + 0.0).to_bits()).collect()
 }
