@@ -144,11 +144,17 @@ fn make() -> Radau {
     let nodes = nodes::<NODES>();
     let w = method.integration[NODES - 1];
     let places: [f64; NODES + 1] = std::array::from_fn(|k| if k < NODES { nodes[k].high } else { 0.0 });
-    let barycentric = std::array::from_fn(|k| {
+    let barycentric: [f64; NODES + 1] = std::array::from_fn(|k| {
         let others = (0..=NODES).filter(|&j| j != k);
         // The factor keeps the products near 1; it cancels in the formula.
         others.fold(1.0, |weight, j| weight / (4.0 * (places[k] - places[j])))
     });
+    let mut slopes = transposed(&method.differentiation);
+    for j in 0..NODES {
+        // The slope of a constant is 0, with the place 0 in the sum: a diagonal that is so by rounding, too.
+        let at_0 = barycentric[NODES] / barycentric[j] / places[j];
+        slopes[j][j] = -(0..NODES).filter(|&k| k != j).map(|k| slopes[k][j]).sum::<f64>() - at_0;
+    }
     let highest = [NODES - 2, NODES - 1].map(|m| {
         std::array::from_fn(|k| {
             let x = nodes[k] + nodes[k] - one;
@@ -162,7 +168,7 @@ fn make() -> Radau {
         w,
         columns: transposed(&method.integration),
         barycentric,
-        slopes: transposed(&method.differentiation),
+        slopes,
         slopes_at_0: method.start_slope,
         highest,
     }
