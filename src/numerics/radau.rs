@@ -6,7 +6,6 @@
 use std::sync::OnceLock;
 
 use super::double_double::DoubleDouble;
-use super::stiff::collocation::{self, Collocation};
 
 /// Nodes: two vectors of eight.
 pub const NODES: usize = 16;
@@ -140,42 +139,70 @@ pub(super) fn nodes<const S: usize>() -> [DoubleDouble; S] {
 
 fn make() -> Radau {
     let one = DoubleDouble::new(1.0);
-    let method: Collocation<NODES> = collocation::make();
-    let nodes = nodes::<NODES>();
-    let w = method.integration[NODES - 1];
-    let places: [f64; NODES + 1] = std::array::from_fn(|k| if k < NODES { nodes[k].high } else { 0.0 });
-    let barycentric: [f64; NODES + 1] = std::array::from_fn(|k| {
-        let others = (0..=NODES).filter(|&j| j != k);
-        // The factor keeps the products near 1; it cancels in the formula.
-        others.fold(1.0, |weight, j| weight / (4.0 * (places[k] - places[j])))
-    });
-    let mut slopes = transposed(&method.differentiation);
+    let half = DoubleDouble::new(0.5);
+    let n = NODES as f64;
+    let u = nodes::<NODES>();
+    let nodes = u.map(|u| u + u - one);
+    let polynomials = nodes.map(legendre);
+    let count = DoubleDouble::new(n * n);
+    let mut rule = Radau {
+        u: [0.0; NODES],
+        rest: [0.0; NODES],
+        w: [0.0; NODES],
+        columns: [[0.0; NODES]; NODES],
+        barycentric: [1.0; NODES + 1],
+        slopes: [[0.0; NODES]; NODES],
+        slopes_at_0: [0.0; NODES],
+        highest: [[0.0; NODES]; 2],
+    };
+    for k in 0..NODES {
+        let last = polynomials[k][NODES - 1];
+        let weight = half * (one + nodes[k]) / (count * last * last);
+        rule.u[k] = u[k].high;
+        rule.rest[k] = (one - u[k]).high;
+        rule.w[k] = weight.high;
+        for j in 0..NODES {
+            // int_-1^x P_m = (P_(m+1) - P_(m-1))/(2m + 1); the rule keeps the P_m orthogonal up to m = n - 1.
+            let mut sum = one + nodes[j];
+            for m in 1..NODES {
+                sum = sum + polynomials[k][m] * (polynomials[j][m + 1] - polynomials[j][m - 1]);
+            }
+            rule.columns[k][j] = (weight * half * sum).high;
+        }
+        for (i, highest) in rule.highest.iter_mut().enumerate() {
+            let m = NODES - 2 + i;
+            highest[k] = (weight * polynomials[k][m]).high * (2 * m + 1) as f64;
+        }
+    }
+    let places: [f64; NODES + 1] = std::array::from_fn(|k| if k < NODES { rule.u[k] } else { 0.0 });
+    for k in 0..=NODES {
+        for j in (0..=NODES).filter(|&j| j != k) {
+            // The factor keeps the products near 1; it cancels in the formula.
+            rule.barycentric[k] /= 4.0 * (places[k] - places[j]);
+        }
+    }
     for j in 0..NODES {
-        // The slope of a constant is 0, with the place 0 in the sum: a diagonal that is so by rounding, too.
-        let at_0 = barycentric[NODES] / barycentric[j] / places[j];
-        slopes[j][j] = -(0..NODES).filter(|&k| k != j).map(|k| slopes[k][j]).sum::<f64>() - at_0;
+        // The slope of a constant is 0: that tells the diagonal, with the place 0 in the sum.
+        let entry = |k: usize| rule.barycentric[k] / rule.barycentric[j] / (places[j] - places[k]);
+        let others: Vec<f64> = (0..=NODES).map(|k| if k == j { 0.0 } else { entry(k) }).collect();
+        for k in 0..NODES {
+            rule.slopes[k][j] = if k == j { -others.iter().sum::<f64>() } else { others[k] };
+        }
     }
-    let highest = [NODES - 2, NODES - 1].map(|m| {
-        std::array::from_fn(|k| {
-            let x = nodes[k] + nodes[k] - one;
-            let (p, _) = (2..=m).fold((x, one), |(last, before), m| (next(m, x, last, before), last));
-            w[k] * p.high * (2 * m + 1) as f64
-        })
-    });
-    Radau {
-        u: method.nodes,
-        rest: nodes.map(|u| (one - u).high),
-        w,
-        columns: transposed(&method.integration),
-        barycentric,
-        slopes,
-        slopes_at_0: method.start_slope,
-        highest,
+    for k in 0..NODES {
+        rule.slopes_at_0[k] = -rule.barycentric[k] / rule.barycentric[NODES] / rule.u[k];
     }
+    rule
 }
 
-fn transposed(rows: &[Nodes; NODES]) -> [Nodes; NODES] {
-    std::array::from_fn(|k| std::array::from_fn(|j| rows[j][k]))
+/// `P_0 … P_n`.
+fn legendre(x: DoubleDouble) -> [DoubleDouble; NODES + 1] {
+    let mut p = [DoubleDouble::new(1.0); NODES + 1];
+    p[1] = x;
+    for m in 2..=NODES {
+        p[m] = next(m, x, p[m - 1], p[m - 2]);
+    }
+    p
 }
 
 /// `P_m` from the two before it (DLMF 18.9.1).

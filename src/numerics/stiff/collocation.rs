@@ -44,7 +44,7 @@ pub fn radau_iia_13() -> &'static Collocation<7> {
     RULE.get_or_init(make)
 }
 
-pub(in crate::numerics) fn make<const S: usize>() -> Collocation<S> {
+fn make<const S: usize>() -> Collocation<S> {
     let one = DoubleDouble::new(1.0);
     let c = radau::nodes::<S>();
     // The basis polynomial j is u/c_j prod_(k != j) (u - c_k)/(c_j - c_k): its factors, multiplied out one by one.

@@ -44,7 +44,7 @@
 //! continued, is the first guess.
 
 mod blocks;
-pub(super) mod collocation;
+mod collocation;
 mod integrator;
 mod piece;
 mod system;
