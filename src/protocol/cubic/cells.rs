@@ -356,7 +356,7 @@ fn chart(frame: &Frame, cells: &[Place; TOGETHER]) -> [Cell; TOGETHER] {
         *gain = squared - straight;
     }
     let (gains, sides) = (spread(gain), spread(centres.side));
-    let (mut paces, mut sound) = ([0.0; BLOCK], [true; TOGETHER]);
+    let (mut paces, mut lost, mut unsure) = ([0.0; BLOCK], [0.0f32; BLOCK], [0.0f32; TOGETHER]);
     let steady = if ends.rise.high < 0.0 { 1.0 } else { -1.0 };
     let mean = ends.t_f - ends.rise.high;
     for i in 0..BLOCK {
@@ -371,10 +371,12 @@ fn chart(frame: &Frame, cells: &[Place; TOGETHER]) -> [Cell; TOGETHER] {
         let side = if gains[i] > 0.0 { f64::from(sides[i]) } else { steady };
         // The mean of n is the least sum of its coefficients' sizes.
         let kept = path.is_sound(side > 0.0, 0.0, -side, accuracy) & (accuracy.rounding * mean >= 3.0 * path.slack());
-        sound[i % TOGETHER] &= kept;
+        lost[i] = if kept { 0.0 } else { 1.0 };
     }
-    for (i, doubt) in doubt.into_iter().enumerate() {
-        sound[i % TOGETHER] &= doubt == 0.0;
+    for (lost, doubt) in lost.chunks_exact(TOGETHER).zip(doubt.chunks_exact(TOGETHER)) {
+        for c in 0..TOGETHER {
+            unsure[c] += lost[c] + doubt[c];
+        }
     }
     std::array::from_fn(|c| {
         let squared = gain[c] > 0.0;
@@ -382,7 +384,7 @@ fn chart(frame: &Frame, cells: &[Place; TOGETHER]) -> [Cell; TOGETHER] {
         let one_map = !squared || centres.common[c] & ((gap == 0.0) | (gap >= MIN_GAP as f32)) & (gap <= 1.0);
         let meant = middles[0][c].abs() + middles[1][c].abs() < MAX_CELL;
         let none = Cell { place: cells[c], ..Cell::NONE };
-        if !(sound[c] && one_map && meant) {
+        if !(unsure[c] == 0.0 && one_map && meant) {
             return none;
         }
         let (side, gap) = (f64::from(side), f64::from(gap));

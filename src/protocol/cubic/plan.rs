@@ -28,6 +28,8 @@ pub(super) struct Plan {
     /// Bounds of the mapped variable.
     pub from: Block,
     pub to: Block,
+    /// 1 where a larger power might save nodes.
+    pub deeper: Block,
     /// Where a panel that asks for too many nodes is best cut.
     pub cut: Block,
 }
@@ -36,7 +38,7 @@ impl Plan {
     /// Not yet made.
     pub const EMPTY: Plan = {
         let none = [0.0; BLOCK];
-        Plan { bin: [0; BLOCK], squarings: none, side: none, gap: none, from: none, to: none, cut: none }
+        Plan { bin: [0; BLOCK], squarings: none, side: none, gap: none, from: none, to: none, deeper: none, cut: none }
     };
 }
 
@@ -87,22 +89,23 @@ const MIN_PAIR_SQUARED: f64 = 1e-3;
 /// Errors of the focal sum beyond 2 by zeros in single precision, relative. Measured (`tests/solver/stress/landscape.rs`).
 pub(super) const SINGLE_COST: f64 = 0.03;
 
-/// Chooses the panels over `[0, 1]` of the shortcuts `(a_2[i], a_3[i])`, all feasible, in single precision.
+/// Chooses the panels over `[0, 1]` of the shortcuts `(a_2[i], a_3[i])`, all feasible, without powers beyond the square
+/// and in single precision: `deeper` where that is not enough.
 #[multiversion(targets(
     "x86_64+avx+avx2+bmi1+bmi2+avx512f+avx512bw+avx512cd+avx512dq+avx512vl",
     "x86_64+avx+avx2+bmi1+bmi2"
 ))]
 pub(super) fn plan(ends: &Ends, a_2: &Block, a_3: &Block, accuracy: &Accuracy, plan: &mut Plan) {
-    panels::<f32>(ends, [a_2, a_3, &[0.0; BLOCK], &[1.0; BLOCK]], accuracy, plan);
+    panels::<f32, 1>(ends, [a_2, a_3, &[0.0; BLOCK], &[1.0; BLOCK]], accuracy, plan);
 }
 
-/// Chooses panels over `[low[i], high[i]]`, of which one is an end of `[0, 1]`.
+/// Chooses panels over `[low[i], high[i]]`, of which one is an end of `[0, 1]`, with all powers.
 #[multiversion(targets(
     "x86_64+avx+avx2+bmi1+bmi2+avx512f+avx512bw+avx512cd+avx512dq+avx512vl",
     "x86_64+avx+avx2+bmi1+bmi2"
 ))]
 pub(super) fn plan_parts(ends: &Ends, parts: [&Block; 4], accuracy: &Accuracy, plan: &mut Plan) {
-    panels::<f64>(ends, parts, accuracy, plan);
+    panels::<f64, MOST_SQUARINGS>(ends, parts, accuracy, plan);
 }
 
 /// The zeros of theta and of n of each shortcut, in the closed upper half plane, a pair once.
@@ -250,7 +253,12 @@ pub(super) fn rooted(size: f32, real: f32, a: f32, b: f32) -> (f32, f32) {
 }
 
 #[inline(always)]
-fn panels<T: Real>(ends: &Ends, [a_2, a_3, low, high]: [&Block; 4], accuracy: &Accuracy, plan: &mut Plan) {
+fn panels<T: Real, const SQUARINGS: u32>(
+    ends: &Ends,
+    [a_2, a_3, low, high]: [&Block; 4],
+    accuracy: &Accuracy,
+    plan: &mut Plan,
+) {
     let zero = T::of(0.0);
     let Places { re, im, mut doubt } = places::<T>(ends, a_2, a_3);
     // The straight rule, and the end and the centre of a map that serves better.
@@ -285,7 +293,7 @@ fn panels<T: Real>(ends: &Ends, [a_2, a_3, low, high]: [&Block; 4], accuracy: &A
     let steps = accuracy.in_steps();
     let limits: [f32; BINS] = std::array::from_fn(|i| (steps[i] + lost * (steps[i] - 2.0)) as f32);
     let cheap = limits[CHEAP_NODES / NODE_STEP - 1];
-    let squarings = powers([real, size], &gap, [low, high], cheap, &mut focal);
+    let Powers { squarings, short } = powers::<T, SQUARINGS>([real, size], &gap, [low, high], cheap, &mut focal);
     let bin = bins(&limits, &focal);
     for i in 0..BLOCK {
         let (low, high) = (low[i], high[i]);
@@ -300,12 +308,16 @@ fn panels<T: Real>(ends: &Ends, [a_2, a_3, low, high]: [&Block; 4], accuracy: &A
         (plan.squarings[i], plan.side[i], plan.gap[i]) = (f64::from(squarings[i]), side, gap);
         (plan.from[i], plan.to[i]) = (gap, gap + length);
         // The polynomials are expanded about an end of [0, 1].
-        let centre = if whole { side } else { 1.0 - 2.0 * f64::from(low == 0.0) };
+        let other = if low == 0.0 { -1.0 } else { 1.0 };
+        let centre = if whole { side } else { other };
         let near = (if side > 0.0 { high } else { low }) - if centre > 0.0 { 1.0 } else { 0.0 };
         let sound = Path::new(ends, a_2[i], a_3[i]).is_sound(centre > 0.0, near, near - side * length, accuracy);
         plan.bin[i] = if sound & (doubt[i] == 0.0) { bin[i] as u32 } else { BINS as u32 };
     }
-    for level in 1..=MOST_SQUARINGS {
+    for i in 0..BLOCK {
+        plan.deeper[i] = if (short[i] > 0.0) | (is_coarse::<T>() & (doubt[i] > 0.0)) { 1.0 } else { 0.0 };
+    }
+    for level in 1..=SQUARINGS {
         for ((from, to), &squarings) in plan.from.iter_mut().zip(&mut plan.to).zip(&squarings) {
             let more = squarings >= level as f32;
             *from = if more { from.sqrt() } else { *from };
@@ -313,22 +325,32 @@ fn panels<T: Real>(ends: &Ends, [a_2, a_3, low, high]: [&Block; 4], accuracy: &A
         }
     }
 }
-/// The power of each map, as log2, from the real parts and sizes of the zeros relative to its centre; `focal` grows where
+/// The powers of maps.
+struct Powers {
+    /// As log2.
+    squarings: [f32; BLOCK],
+    /// 1 where a larger power might save nodes.
+    short: [f32; BLOCK],
+}
+
+/// The power of each map from the real parts and sizes of the zeros relative to its centre; `focal` grows where
 /// one helps. Powers beyond the square are tried where the sum is not `cheap`.
 #[inline(always)]
-fn powers<T: Real>(
+fn powers<T: Real, const SQUARINGS: u32>(
     [mut real, mut size]: [[[f32; BLOCK]; ZEROS]; 2],
     gap: &[T; BLOCK],
     [low, high]: [&Block; 2],
     cheap: f32,
     focal: &mut [f32; BLOCK],
-) -> [f32; BLOCK] {
+) -> Powers {
     let (mut near, mut far) = (*gap, *gap);
     for i in 0..BLOCK {
         far[i] = gap[i] + (T::of(high[i]) - T::of(low[i]));
     }
     let mut squarings = [0.0f32; BLOCK];
-    for level in 1..=MOST_SQUARINGS {
+    // The focal sum that the centre of the map itself allows, mapped to 0.
+    let mut ceiling = [2.0f32; BLOCK];
+    for level in 1..=SQUARINGS {
         if level > 1 && focal.iter().all(|&focal| focal >= cheap) {
             break;
         }
@@ -354,9 +376,16 @@ fn powers<T: Real>(
             let better = open & (reached > focal[i]);
             focal[i] = if better { reached } else { focal[i] };
             squarings[i] = if better { level as f32 } else { squarings[i] };
+            ceiling[i] = 2.0 * (a[i] + b[i]) / (b[i] - a[i]);
         }
     }
-    squarings
+    let mut short = [0.0f32; BLOCK];
+    for i in 0..BLOCK {
+        // A larger power moves the interval away from the centre, but hardly from other zeros.
+        let near = focal[i] - 2.0 > 0.5 * (ceiling[i] - 2.0);
+        short[i] = if (focal[i] < cheap) & (squarings[i] == SQUARINGS as f32) & near { 1.0 } else { 0.0 };
+    }
+    Powers { squarings, short }
 }
 
 /// How many of the falling limits each focal sum misses.

@@ -9,7 +9,8 @@ use super::queue::{Cuts, Queue};
 use crate::numerics::lanes::LANES;
 use crate::protocol::Effort;
 
-/// Works in the making. A shortcut waits for the plan of its cell, perhaps for one of its own, and then for its sum.
+/// Works in the making. A shortcut waits for the plan of its cell, perhaps for one of its own, perhaps for one with
+/// larger powers, and then for its sum.
 pub(super) struct Works<'a> {
     due: Queue<BLOCK>,
     planned: Planned<'a>,
@@ -18,6 +19,7 @@ pub(super) struct Works<'a> {
 /// Shortcuts that the plan of their cell is not enough for, and the last plans.
 struct Planned<'a> {
     alone: Queue<BLOCK>,
+    deep: Queue<BLOCK>,
     from_cells: Plan,
     own: Plan,
     sums: Sums<'a>,
@@ -37,7 +39,7 @@ impl<'a> Works<'a> {
     pub fn new(of: &'a Landscape, work: &'a mut [f64], bins: &'a mut Bins) -> Works<'a> {
         let sums = Sums { of, work, cut: Cuts::EMPTY, bins, effort: Effort::default() };
         let (from_cells, own) = (Plan::EMPTY, Plan::EMPTY);
-        let planned = Planned { alone: Queue::EMPTY, from_cells, own, sums };
+        let planned = Planned { alone: Queue::EMPTY, deep: Queue::EMPTY, from_cells, own, sums };
         Works { due: Queue::EMPTY, planned }
     }
 
@@ -64,8 +66,9 @@ impl<'a> Works<'a> {
     /// Sums what is left.
     pub fn finish(mut self) -> Effort {
         self.plan();
-        let Planned { alone, own, sums, .. } = &mut self.planned;
-        sums.plan(alone, own);
+        let Planned { alone, deep, own, sums, .. } = &mut self.planned;
+        sums.plan(alone, deep, own);
+        sums.deepen(deep);
         sums.part();
         sums.bins.close(sums.of, sums.work);
         sums.effort
@@ -81,7 +84,7 @@ impl<'a> Works<'a> {
 impl Planned<'_> {
     /// Plans shortcuts from their cells; those for which these are not enough wait for a plan of their own.
     fn plan(&mut self, indices: &[usize], [a_2, a_3]: [&Block; 2]) {
-        let Planned { alone, from_cells: plan, own, sums } = self;
+        let Planned { alone, deep, from_cells: plan, own, sums } = self;
         sums.bins.cells.plan(&sums.of.frame, a_2, a_3, plan);
         for (k, indices) in indices.chunks(LANES).enumerate() {
             let first = k * LANES;
@@ -94,7 +97,7 @@ impl Planned<'_> {
                 if plan.bin[lane] != OWN {
                     sums.settle(plan, lane, i, [a_2[lane], a_3[lane]]);
                 } else if alone.push(i, a_2[lane], a_3[lane]) {
-                    sums.plan(alone, own);
+                    sums.plan(alone, deep, own);
                 }
             }
         }
@@ -103,11 +106,25 @@ impl Planned<'_> {
 
 impl Sums<'_> {
     /// Plans shortcuts by themselves.
-    fn plan(&mut self, alone: &mut Queue<BLOCK>, made: &mut Plan) {
+    fn plan(&mut self, alone: &mut Queue<BLOCK>, deep: &mut Queue<BLOCK>, made: &mut Plan) {
         let Some((indices, [a_2, a_3])) = alone.take() else { return };
         plan(&self.of.ends, a_2, a_3, &self.of.accuracy, made);
         for (lane, &i) in indices.iter().enumerate() {
-            self.settle(made, lane, i, [a_2[lane], a_3[lane]]);
+            if made.deeper[lane] == 0.0 {
+                self.settle(made, lane, i, [a_2[lane], a_3[lane]]);
+            } else if deep.push(i, a_2[lane], a_3[lane]) {
+                self.deepen(deep);
+            }
+        }
+    }
+
+    /// Plans shortcuts with larger powers.
+    fn deepen(&mut self, deep: &mut Queue<BLOCK>) {
+        let Some((indices, [a_2, a_3])) = deep.take() else { return };
+        let mut plan = Plan::EMPTY;
+        plan_parts(&self.of.ends, [a_2, a_3, &[0.0; BLOCK], &[1.0; BLOCK]], &self.of.accuracy, &mut plan);
+        for (lane, &i) in indices.iter().enumerate() {
+            self.settle(&plan, lane, i, [a_2[lane], a_3[lane]]);
         }
     }
 
