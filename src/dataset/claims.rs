@@ -1,7 +1,8 @@
 //! What a Parquet file says that it holds, checked before its reader takes memory for it: a few bytes can claim gigabytes.
 //!
 //! Footers and page headers are structs of Thrift's compact protocol. They are walked without knowing all of their fields:
-//! no list may be longer than the bytes that are left, and of the numbers only those count that memory is taken by.
+//! no list may be longer than the bytes that are left, and of the numbers only those count that memory is taken by. The
+//! reader takes the fields of a footer for what Parquet says that they are, whatever the file says, so the two must agree.
 
 use std::fs::File;
 use std::sync::Arc;
@@ -54,7 +55,7 @@ pub fn check_footer(file: &impl ChunkReader) -> Result<(), ParquetError> {
     }
     let footer = file.get_bytes(start, length)?;
     let (mut elements, mut claims) = (0, Ok(()));
-    let end = walk(&footer, &mut |path, value| match path {
+    let end = walk(&footer, kind_in_footer, &mut |path, value| match path {
         [2] => elements = value,
         [2, 5] if !(0..=elements).contains(&value) => claims = Err(excess("a node", value, elements, "children")),
         [4] if value > MOST_GROUPS => claims = Err(excess("a file", value, MOST_GROUPS, "groups of rows")),
@@ -100,7 +101,7 @@ pub fn page_headers(
 /// The bytes of a header, and from its start to the end of its page; `None` if the header goes on beyond `bytes`.
 fn check_page(bytes: &[u8]) -> Result<Option<(usize, u64)>, ParquetError> {
     let (mut compressed, mut claims) = (None, Ok(()));
-    let header = walk(bytes, &mut |path, value| match path {
+    let header = walk(bytes, |_| None, &mut |path, value| match path {
         [2] if value > MOST_OF_PAGE => claims = Err(excess("a page", value, MOST_OF_PAGE, "bytes")),
         [3] => compressed = u64::try_from(value).ok(),
         [5 | 7 | 8, 1] if value > MOST_VALUES => claims = Err(excess("a page", value, MOST_VALUES, "values")),
@@ -124,11 +125,77 @@ fn damaged(what: &str) -> ParquetError {
 
 /// Walks the struct that `bytes` begin with and tells `visit` of every whole number in it and of the length of every
 /// list, each with the numbers of the fields that lead there. Returns the length of the struct; `None` if it is damaged
-/// or goes on beyond `bytes`.
-fn walk(bytes: &[u8], visit: &mut dyn FnMut(&[i16], i64)) -> Option<usize> {
-    let mut walker = Walker { bytes, at: 0, path: Vec::new(), visit };
+/// or goes on beyond `bytes`, or if a field is of another kind than `kind_of` says.
+fn walk(bytes: &[u8], kind_of: fn(&[i16]) -> Option<Kind>, visit: &mut dyn FnMut(&[i16], i64)) -> Option<usize> {
+    let mut walker = Walker { bytes, at: 0, path: Vec::new(), kind_of, visit };
     walker.fields()?;
     Some(walker.at)
+}
+
+/// What a field is read as.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Kind {
+    Flag,
+    Byte,
+    Whole,
+    Text,
+    Struct,
+    /// Of values of one kind.
+    List(&'static Kind),
+}
+
+impl Kind {
+    /// Whether Thrift's number of a type stands for it.
+    fn is(self, number: u8) -> bool {
+        match self {
+            Kind::Flag => matches!(number, 1 | 2),
+            Kind::Byte => number == 3,
+            Kind::Whole => matches!(number, 4..=6),
+            Kind::Text => number == 8,
+            Kind::List(_) => number == 9,
+            Kind::Struct => number == 12,
+        }
+    }
+}
+
+/// The kind of a field of `FileMetaData` (parquet.thrift of Apache Parquet 2.11); `None` for those that the reader skips.
+fn kind_in_footer(path: &[i16]) -> Option<Kind> {
+    use Kind::{Byte, Flag, List, Struct, Text, Whole};
+    Some(match path {
+        [1 | 3] => Whole,
+        [2 | 4 | 5 | 7] => List(&Struct),
+        [6] => Text,
+        // SchemaElement, and its LogicalType.
+        [2, 4] => Text,
+        [2, 1..=9] => Whole,
+        [2, 10] | [2, 10, _] | [2, 10, 7 | 8, 2] | [2, 10, 7 | 8, 2, _] => Struct,
+        [2, 10, 5, 1 | 2] | [2, 10, 18, 2] => Whole,
+        [2, 10, 7 | 8, 1] | [2, 10, 10, 2] => Flag,
+        [2, 10, 10 | 16, 1] => Byte,
+        [2, 10, 17 | 18, 1] => Text,
+        // RowGroup, and its SortingColumn.
+        [4, 1 | 4] => List(&Struct),
+        [4, 2 | 3 | 5..=7] | [4, 4, 1] => Whole,
+        [4, 4, 2 | 3] => Flag,
+        // ColumnChunk.
+        [4, 1, 1] => Text,
+        [4, 1, 2 | 4..=7] => Whole,
+        [4, 1, 3] => Struct,
+        // ColumnMetaData, its Statistics, PageEncodingStats and SizeStatistics.
+        [4, 1, 3, 1 | 4..=7 | 9..=11 | 14 | 15] => Whole,
+        [4, 1, 3, 2] => List(&Whole),
+        [4, 1, 3, 3] => List(&Text),
+        [4, 1, 3, 8 | 13] => List(&Struct),
+        [4, 1, 3, 12 | 16 | 17] => Struct,
+        [4, 1, 3, 12, 1 | 2 | 5 | 6] => Text,
+        [4, 1, 3, 12, 3 | 4] | [4, 1, 3, 13, 1..=3] | [4, 1, 3, 16, 1] => Whole,
+        [4, 1, 3, 12, 7 | 8] => Flag,
+        [4, 1, 3, 16, 2 | 3] => List(&Whole),
+        // KeyValue, and ColumnOrder.
+        [4, 1, 3, 8, 1 | 2] | [5, 1 | 2] => Text,
+        [7, 1] => Struct,
+        _ => return None,
+    })
 }
 
 /// Most structs in one another; Parquet has six.
@@ -138,6 +205,7 @@ struct Walker<'a> {
     bytes: &'a [u8],
     at: usize,
     path: Vec<i16>,
+    kind_of: fn(&[i16]) -> Option<Kind>,
     visit: &'a mut dyn FnMut(&[i16], i64),
 }
 
@@ -188,6 +256,9 @@ impl Walker<'_> {
                 step => field.checked_add(step.into())?,
             };
             self.path.push(field);
+            if (self.kind_of)(&self.path).is_some_and(|kind| !kind.is(head & 0xf)) {
+                return None;
+            }
             // The type of a field is its value where that is true or false.
             if !matches!(head & 0xf, 1 | 2) {
                 self.value(head & 0xf)?;
@@ -221,6 +292,11 @@ impl Walker<'_> {
                 (self.visit)(&self.path, count as i64);
                 // Parquet has no lists of lists, and no maps.
                 let kind = Some(head & 0xf).filter(|kind| !matches!(kind, 9 | 10))?;
+                if let Some(Kind::List(element)) = (self.kind_of)(&self.path)
+                    && !element.is(kind)
+                {
+                    return None;
+                }
                 (0..count).try_for_each(|_| self.value(kind))
             }
             12 => self.fields(),
@@ -258,6 +334,10 @@ mod tests {
         );
         // A list of lists; structs in structs; a list and a text longer than what is left; no end.
         let deep = [0x1c; 20];
+        // A flag where the reader takes a whole number; texts where it takes structs.
+        for damaged in [&[0x29, 0x1c, 0x32, 0, 0][..], &[0x29, 0x18, 0x01, b'x', 0]] {
+            assert!(footer(damaged).ends_with("its footer is damaged"), "{damaged:x?}");
+        }
         for damaged in [&[0x19, 0x19, 0x05, 0, 0][..], &deep, &[0x19, 0xf5, 0x7f, 0], &[0x18, 0x7f, 0], &[0x15]] {
             assert!(footer(damaged).ends_with("its footer is damaged"), "{damaged:x?}");
         }
