@@ -7,7 +7,7 @@ use std::hint::black_box;
 
 use slipsweep::model::{Law, Transition};
 use slipsweep::protocol::{Slider, Status, compliant, regularised};
-use slipsweep::stability::{amplification, held_error, loop_error};
+use slipsweep::stability::{amplification, held_error, open_loop_error};
 
 mod support;
 
@@ -34,12 +34,12 @@ fn main() {
         report("  amplification", steps(amplification(&here, rtol).steps), &|| {
             black_box(amplification(&path(), rtol));
         });
-        report("  loop_error", steps(loop_error(&here, rtol).steps), &|| {
-            black_box(loop_error(&path(), rtol));
+        report("  open_loop_error", steps(open_loop_error(&here, rtol).steps), &|| {
+            black_box(open_loop_error(&path(), rtol));
         });
         for samples in [100.0, 1000.0] {
             let held = |path: &compliant::Path| held_error(path, TIME / samples, rtol);
-            report(&format!("  end_error, {samples} samples"), steps(held(&here).steps), &|| {
+            report(&format!("  sampling_error, {samples} samples"), steps(held(&here).steps), &|| {
                 black_box(held(&path()));
             });
         }

@@ -48,8 +48,8 @@ const TABLES: [(&str, &str); 6] = [
     ("optimal", "t_f = { linspace = [0.02, 0.5, 4000] }\na = 0.03\nb = 0.05\nv_i = 3.0\nv_f = 100.0\n"),
     ("crossover", "a = 0.03\nb = 0.05\nv_i = 3.0\nv_f = { geomspace = [10.0, 1e4, 4000] }\n"),
     (
-        "swift",
-        "t_f = { linspace = [0.02, 0.5, 50] }\na = 0.03\nb = 0.05\nv_i = 3.0\nv_f = 100.0\ntau_max = 1.6\n\
+        "shortcut",
+        "t_f = { linspace = [0.02, 0.5, 50] }\na = 0.03\nb = 0.05\nv_i = 3.0\nv_f = 100.0\ntau_ceiling = 1.6\n\
                family = [\"step\", \"cubic\", \"bounded_velocity\", \"bounded_friction\"]\n",
     ),
     (
@@ -58,7 +58,7 @@ const TABLES: [(&str, &str); 6] = [
                    k = { geomspace = [1e-3, 1e-1, 200] }\n",
     ),
     (
-        "step",
+        "step_response",
         "a = 0.005\nb = 0.01\nv_i = 1e5\nm = 2.5e-16\nv_f = { geomspace = [2e5, 1e7, 8] }\n\
               k = { geomspace = [1e-3, 1e-1, 8] }\n",
     ),

@@ -11,7 +11,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     for v_f in [10.0, 100.0, 1000.0] {
         let transition = Transition { law: Law { a: 0.03, b: 0.05 }, v_i: 3.0, v_f };
         let wanted =
-            crossover::Wanted { cross: true, hold: false, cheapest: false, min: false, turn: false, free: false };
+            crossover::Wanted { cross: true, floor: false, cheapest: false, min: false, turn: false, free: false };
         let (status, times, _) = crossover::solve(&transition, true, 1e-10, wanted);
         let t_cross = times.t_cross.ok_or(status.name())?;
         // Just before it speeds up, just after it slows down.

@@ -4,7 +4,7 @@
 
 use slipsweep::model::{Law, Transition};
 use slipsweep::stability::SteadySliding;
-use slipsweep::stability::response::{Outcome, Step};
+use slipsweep::stability::step_response::{Outcome, Step};
 
 fn main() {
     let (k, m, v_i, v_f) = (7.5e-3, 2.5e-16, 1e5, 3.2e6);

@@ -29,7 +29,7 @@ const SYNONYMS: [(&str, &[&str]); 13] = [
     ("where", &["filter", "condition"]),
     ("rtol", &["tol", "tolerance", "accuracy", "precision"]),
     ("l", &["d_c", "dc", "d_rs", "length"]),
-    ("normal_load", &["sigma", "sigma_n", "normal_stress", "pressure"]),
+    ("normal_stress", &["sigma", "sigma_n", "normal_stress", "pressure"]),
     ("mu_0", &["f_0", "f0", "mu"]),
     ("v_0", &["v_ref", "v_star"]),
     ("t_f", &["t", "time", "duration"]),
@@ -90,8 +90,8 @@ mod tests {
     #[test]
     fn words_of_others_lead_to_ours() {
         assert_eq!(nearest("jobs", ["out", "threads", "shard"]), Some("threads"));
-        assert_eq!(nearest("D_c", ["mu_0", "l", "v_0", "normal_load"]), Some("l"));
-        assert_eq!(nearest("sigma", ["mu_0", "l", "v_0", "normal_load"]), Some("normal_load"));
+        assert_eq!(nearest("D_c", ["mu_0", "l", "v_0", "normal_stress"]), Some("l"));
+        assert_eq!(nearest("sigma", ["mu_0", "l", "v_0", "normal_stress"]), Some("normal_stress"));
         assert_eq!(nearest("jobs", ["out"]), None);
     }
 

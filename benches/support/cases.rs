@@ -6,9 +6,9 @@ use slipsweep::protocol::optimal::crossover::{self, Wanted};
 #[path = "../../tests/reference/mod.rs"]
 pub mod reference;
 
-/// Only `t_cross`, `work_cross`.
+/// Only `t_cross`, `work_at_t_cross`.
 pub const ONLY_CROSS: Wanted =
-    Wanted { cross: true, hold: false, cheapest: false, min: false, turn: false, free: false };
+    Wanted { cross: true, floor: false, cheapest: false, min: false, turn: false, free: false };
 
 /// One problem: the transition, its time, and whether `v >= 1`.
 pub type Case = (Transition, f64, bool);

@@ -14,7 +14,7 @@ pub fn subject(tolerances: &[f64]) -> Subject {
     let rows: Vec<_> =
         reference::table("crossover").into_iter().filter(|row| row.optional("t_cross").is_some()).collect();
     let truth = |row: &reference::Row| Truth {
-        answer: [row.number("t_cross"), row.number("work_cross")],
+        answer: [row.number("t_cross"), row.number("work_at_t_cross")],
         doubt: 256.0 * f64::EPSILON,
     };
     let truths = rows.iter().map(truth).collect();
@@ -22,7 +22,7 @@ pub fn subject(tolerances: &[f64]) -> Subject {
     let methods = vec![
         Method::each("ours", Kind::Ours, tolerances, &cases, |transition: &Transition, rtol| {
             let (_, times, _) = crossover::solve(transition, true, rtol, ONLY_CROSS);
-            Some([times.t_cross?, times.work_cross?])
+            Some([times.t_cross?, times.work_at_t_cross?])
         }),
         Method::each("bisection over our optimal solves", Kind::Other, tolerances, &cases, bisection),
     ];

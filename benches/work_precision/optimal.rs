@@ -27,7 +27,7 @@ pub fn subjects(tolerances: &[f64]) -> [Subject; 2] {
 
 /// Whether the paper's own equations hold all along: nothing but the extremal, and `v >= 1` on it.
 fn is_regular(row: &Row) -> bool {
-    row.number("v_f") > row.number("v_i") && row.text("bounded") == "1" && row.text("strategy") != "hold"
+    row.number("v_f") > row.number("v_i") && row.text("bounded") == "1" && row.text("strategy") != "floor"
 }
 
 pub fn transition(row: &Row) -> Transition {

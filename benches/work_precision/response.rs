@@ -4,7 +4,7 @@
 use std::rc::Rc;
 
 use slipsweep::model::{Law, Transition};
-use slipsweep::stability::response::{Orbit, Scaled, Step};
+use slipsweep::stability::step_response::{Orbit, Scaled, Step};
 
 use super::integrate::dop853;
 use super::measure::{Answer, Kind, Method, Subject, Truth};
@@ -23,7 +23,7 @@ struct Case {
 }
 
 pub fn subject(tolerances: &[f64]) -> Subject {
-    let rows = reference::table("step");
+    let rows = reference::table("step_response");
     let truth = |row: &Row| {
         let z = row.number("k") * row.number("s_3") / row.number("a");
         Truth { answer: [z, row.number("theta_3").ln()], doubt: 64.0 * f64::EPSILON }

@@ -5,7 +5,7 @@ use std::rc::Rc;
 use slipsweep::model::Transition;
 use slipsweep::numerics::root::{Probe, newton};
 use slipsweep::protocol::Effort;
-use slipsweep::protocol::swift::{Case, find};
+use slipsweep::protocol::shortcut::{Case, find};
 
 use super::integrate::dop853;
 use super::measure::{Answer, Kind, Method, Subject, Truth};
@@ -22,7 +22,7 @@ const NUDGE: f64 = 1e-5;
 const SHORT: f64 = 30.0;
 
 pub fn subjects(tolerances: &[f64]) -> [Subject; 2] {
-    let rows = reference::table("swift_friction").into_iter();
+    let rows = reference::table("shortcut_friction").into_iter();
     let is_known = |row: &Row| row.text("status") != "infeasible" && lost_in_time(row) <= LOST;
     let is_short = |row: &Row| row.number("t_f") * row.number("v_max") <= SHORT;
     let (short, stiff) = rows.filter(is_known).partition(is_short);
@@ -32,12 +32,16 @@ pub fn subjects(tolerances: &[f64]) -> [Subject; 2] {
 fn subject(cases: &'static str, rows: Vec<Row>, tolerances: &[f64]) -> Subject {
     let truth = |row: &Row| Truth { answer: [row.number("work"), row.number("alpha")], doubt: rounding(row) };
     let truths = rows.iter().map(truth).collect();
-    let case = |row: &Row| Case { transition: transition(row), t_f: row.number("t_f"), tau_max: row.number("tau_max") };
+    let case = |row: &Row| Case {
+        transition: transition(row),
+        t_f: row.number("t_f"),
+        tau_ceiling: row.number("tau_ceiling"),
+    };
     let tasks = Rc::new(rows.iter().map(case).collect());
     let methods = vec![
         Method::each("ours", Kind::Ours, tolerances, &tasks, |case: &Case, rtol| {
-            let swift = find("bounded_friction")?.solve(case, rtol, &mut Effort::default()).ok()?;
-            Some([swift.work, swift.alpha?])
+            let shortcut = find("bounded_friction")?.solve(case, rtol, &mut Effort::default()).ok()?;
+            Some([shortcut.work, shortcut.alpha?])
         }),
         Method::each("shooting, DOP853", Kind::Other, tolerances, &tasks, shooting),
     ];
@@ -60,8 +64,8 @@ fn lost_in_time(row: &Row) -> f64 {
 /// What rounding of the case makes: of `t_f`, of the exponent `(tau - 1)/a` of theta, and of the rest that a great
 /// change of velocity leaves of theta.
 fn rounding(row: &Row) -> f64 {
-    let [a, b, v_i, v_f, tau_max] = ["a", "b", "v_i", "v_f", "tau_max"].map(|name| row.number(name));
-    let exponent = 64.0 * f64::EPSILON * (1.0 + (tau_max.abs() + b) / a);
+    let [a, b, v_i, v_f, tau_ceiling] = ["a", "b", "v_i", "v_f", "tau_ceiling"].map(|name| row.number(name));
+    let exponent = 64.0 * f64::EPSILON * (1.0 + (tau_ceiling.abs() + b) / a);
     let rest = f64::EPSILON * v_i / v_f + if (v_f / v_i).ln().abs() > 8.0 { 2e-11 } else { 0.0 };
     exponent + lost_in_time(row) + rest
 }
@@ -72,12 +76,12 @@ fn shooting(case: &Case, tolerance: f64) -> Option<Answer> {
     let Transition { law, v_i, v_f } = case.transition;
     let forward = law.b <= law.a;
     let (first, last) = if forward { (v_i, v_f) } else { (v_f, v_i) };
-    let spare = |v: f64| case.tau_max - 1.0 - (law.a - law.b) * v.ln();
+    let spare = |v: f64| case.tau_ceiling - 1.0 - (law.a - law.b) * v.ln();
     let way = (spare(v_f) / spare(v_i)).ln();
     let direction = if forward { 1.0 } else { -1.0 };
     let shoot = |alpha: f64| {
         let slope = |&[y, _, x]: &[f64; 3]| {
-            let tau = case.tau_max - spare(v_i) * (x * way + alpha * x * (1.0 - x)).exp();
+            let tau = case.tau_ceiling - spare(v_i) * (x * way + alpha * x * (1.0 - x)).exp();
             let v = ((tau - 1.0 - law.b * y) / law.a).exp();
             [direction * case.t_f * ((-y).exp() - v), case.t_f * tau * v, direction]
         };

@@ -18,7 +18,7 @@ import pyarrow.parquet as pq
 import xarray as xr
 
 # The quantities that can be axes, in the order of their columns.
-AXES = ["t_f", "a", "b", "v_i", "v_f", "family", "tau_max", "alpha_2", "alpha_3", "k", "m", "dt", "delta_t"]
+AXES = ["t_f", "a", "b", "v_i", "v_f", "family", "tau_ceiling", "alpha_2", "alpha_3", "k", "m", "dt", "delta_t"]
 
 
 # The program that a clone of the repository builds.
@@ -54,7 +54,7 @@ def open(dataset, table):
 
     columns = {name: _values(rows[name]) for name in rows.column_names}
     attributes = {field.name: _attributes(field) for field in rows.schema}
-    # Axis columns come first; `best` has results of the same names as axes, which stand after.
+    # Axis columns come first; `best_cubic` has results of the same names as axes, which stand after.
     axes = []
     for name in rows.column_names:
         if name not in AXES or (axes and AXES.index(name) <= AXES.index(axes[-1])) or rows.schema.field(name).nullable:

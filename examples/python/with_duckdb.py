@@ -7,7 +7,7 @@ import duckdb
 
 results = Path(sys.argv[1])
 database = duckdb.connect()
-for dataset, names in {"landscape": ["gap"], "crossover": ["optimal", "crossover"], "stick-slip": ["step"]}.items():
+for dataset, names in {"landscape": ["gap"], "crossover": ["optimal", "crossover"], "stick-slip": ["step_response"]}.items():
     for name in names:
         files = (results / dataset / name / "*.parquet").as_posix()
         database.execute(f"CREATE VIEW {name} AS SELECT * FROM read_parquet('{files}', hive_partitioning = false)")

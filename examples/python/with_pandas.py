@@ -27,7 +27,7 @@ for row in crossover.sort_values(["b", "v_f"]).itertuples():
     print(f"crossover: b={row.b} v_f={row.v_f:.6g} t_cross={row.t_cross:.6f} first={row.first:.6f}")
 
 # Which material falls into stick-slip: the stiffest spring that does, at each final velocity.
-step = table("stick-slip", "step")
+step = table("stick-slip", "step_response")
 step = step[step["stick_slip"] == True]  # noqa: E712, a flag may be null
 for v_f, springs in step.groupby("v_f")["k"]:
     print(f"stick-slip: v_f={v_f:.6g} springs={len(springs)} stiffest={springs.max():.6g}")

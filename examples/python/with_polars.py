@@ -26,7 +26,7 @@ for row in crossover.iter_rows(named=True):
     print(f"crossover: b={row['b']} v_f={row['v_f']:.6g} t_cross={row['t_cross']:.6f} first={row['first']:.6f}")
 
 # Which material falls into stick-slip: the stiffest spring that does, at each final velocity.
-step = table("stick-slip", "step").filter(pl.col("stick_slip"))
+step = table("stick-slip", "step_response").filter(pl.col("stick_slip"))
 stiffest = step.group_by("v_f").agg(pl.col("k").max(), pl.len().alias("springs")).sort("v_f").collect()
 for row in stiffest.iter_rows(named=True):
     print(f"stick-slip: v_f={row['v_f']:.6g} springs={row['springs']} stiffest={row['k']:.6g}")

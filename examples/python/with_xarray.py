@@ -27,7 +27,7 @@ for b in crossover["b"].values:
         print(f"crossover: b={b} v_f={v_f:.6g} t_cross={t_cross:.6f} first={at:.6f}")
 
 # Which material falls into stick-slip: the stiffest spring that does, at each final velocity.
-step = slipsweep_dataset.open(results / "stick-slip", "step")
+step = slipsweep_dataset.open(results / "stick-slip", "step_response")
 slips = step["stick_slip"] == True  # noqa: E712, a flag may be null
 for v_f in step["v_f"].values:
     springs = slips.sel(v_f=v_f)

@@ -59,7 +59,7 @@ const AGAIN: u8 = 75;
   slipsweep init granite
   slipsweep run granite.toml
   slipsweep plot results/granite
-  slipsweep query results/granite \"SELECT t_f, gap FROM best\"
+  slipsweep query results/granite \"SELECT t_f, gap FROM best_cubic\"
 
 `slipsweep COMMAND --help` shows an example of each command.
 

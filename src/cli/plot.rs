@@ -17,7 +17,7 @@ use crate::sweep::units_of;
   slipsweep plot results/landscape                       every table, a picture each
   slipsweep plot results/landscape --format png --out pictures
   slipsweep plot results/landscape --table gap --where t_f=0.02 --out gap.pdf
-  slipsweep plot results/crossover --table crossover --x v_f --y b --color t_hold --where v_i=1.1
+  slipsweep plot results/crossover --table crossover --x v_f --y b --color t_floor --where v_i=1.1
   slipsweep plot optimal.csv best.csv --out protocols.png")]
 pub struct Arguments {
     /// Folder of a dataset, such as results/NAME, or traces that `slipsweep trace` wrote (.csv, .parquet)

@@ -29,7 +29,7 @@ use crate::query::{self, Answer, AnswerError, Tables};
 #[command(after_help = "Examples:
   slipsweep query results/granite \"SELECT t_f, min(gap), max(gap) FROM gap GROUP BY t_f ORDER BY t_f\"
   slipsweep query results/granite \"SELECT status, count(*) FROM gap GROUP BY status\"
-  slipsweep query results/granite \"SELECT * FROM best WHERE status = 'ok'\" --out best.csv")]
+  slipsweep query results/granite \"SELECT * FROM best_cubic WHERE status = 'ok'\" --out best.csv")]
 pub struct Arguments {
     /// Folder of the dataset, such as results/NAME; or a Parquet or CSV file, which is a table under its own name
     dataset: PathBuf,

@@ -249,17 +249,17 @@ fn account(outcome: &Outcome, seconds: f64) -> String {
     if rows == 0 {
         return "nothing to compute: every part was there\n".to_owned();
     }
-    let Work { optima, landscapes, best, swifts, crossovers, simulations, steps, quadratures, nodes } = outcome.work;
+    let Work { optima, landscapes, best, shortcuts, crossovers, simulations, steps, quadratures, nodes } = outcome.work;
     let (all, rate) = (words::things(rows, "row"), words::count((rows as f64 / seconds) as u64));
     let mut text = format!("{all} in {}: {rate} rows a second, Parquet on disk included\n", words::duration(seconds));
     let spent: Vec<String> = [
         (optima, "optimal protocol"),
         (landscapes, "landscape"),
         (best, "best shortcut"),
-        (swifts, "family shortcut"),
+        (shortcuts, "family shortcut"),
         (crossovers, "transition"),
         (simulations, "simulation"),
-        (steps, "step"),
+        (steps, "step_response"),
         (quadratures, "quadrature"),
         (nodes, "node"),
     ]

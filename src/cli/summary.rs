@@ -97,7 +97,7 @@ pub fn pieces(name: &str, rows: u64, digest: &Digest) -> Vec<Piece> {
             let least: Vec<&DigestRow> = digest.least().collect();
             if !least.is_empty() {
                 // A family may hold protocols that miss the final state, with any work.
-                let arriving = if name == "swift" { " and arrive" } else { "" };
+                let arriving = if name == "shortcut" { " and arrive" } else { "" };
                 pieces.push(Piece::Line(2, format!("least gap among the rows that are ok{arriving}:")));
                 pieces.extend(listing(digest, &least));
             }
@@ -161,7 +161,7 @@ fn listing(digest: &Digest, rows: &[&DigestRow]) -> Vec<Piece> {
     let mut results_begin = false;
     for (place, (name, unit)) in digest.columns.iter().enumerate() {
         let cell = first.cell(place);
-        // `best` has result columns of the same names as axes: axes end where they stop coming in the order of quantities.
+        // `best_cubic` has result columns of the same names as axes: axes end where they stop coming in the order of quantities.
         results_begin |= !is_axis(name);
         let varies = rows.iter().any(|row| row.cell(place) != cell);
         let missing = rows.iter().all(|row| *row.cell(place) == Cell::Missing);

@@ -14,7 +14,7 @@ use crate::model::{Law, Transition, Units};
 use crate::names::hint;
 use crate::plot::table::Condition;
 use crate::protocol::Status;
-use crate::protocol::swift::{self, Case};
+use crate::protocol::shortcut::{self, Case};
 use crate::sweep::{Spec, units};
 use crate::table;
 use crate::trace::{
@@ -28,7 +28,7 @@ use crate::verify::scale;
     allow_negative_numbers = true,
     after_help = "Examples:
   slipsweep trace optimal --t-f 0.02 --a 0.03 --b 0.05 --v-i 3 --v-f 100
-  slipsweep trace free_cubic --alpha-2 -0.12 --alpha-3 -0.066 --t-f 0.02 --a 0.03 --b 0.05 --v-i 3 --v-f 100 --out cubic.csv
+  slipsweep trace gap --alpha-2 -0.12 --alpha-3 -0.066 --t-f 0.02 --a 0.03 --b 0.05 --v-i 3 --v-f 100 --out cubic.csv
   slipsweep trace results/NAME optimal --row 17
   slipsweep trace results/NAME gap --where \"t_f=0.02, alpha_2=-0.12, alpha_3=-0.066\" --out row.csv"
 )]
@@ -44,7 +44,7 @@ pub struct Arguments {
     /// Conditions that one row of the table meets, such as "t_f=0.02, v_f=100"
     #[arg(long = "where", value_name = "CONDITION", requires = "table")]
     conditions: Vec<String>,
-    /// Duration, in l/v_0; with a row of `step` how much of the response to show, in the units of the dataset
+    /// Duration, in l/v_0; with a row of `step_response` how much of the response to show, in the units of the dataset
     #[arg(long, value_name = "T", value_parser = |text: &str| legal(text, Quantity::Time.domain()))]
     t_f: Option<f64>,
     /// Direct effect of the velocity on friction, in mu_0
@@ -61,23 +61,23 @@ pub struct Arguments {
     v_f: Option<f64>,
     /// Bound on friction, in mu_0 sigma (bounded_friction)
     #[arg(long, value_name = "M", value_parser = |text: &str| legal(text, Quantity::FrictionBound.domain()))]
-    tau_max: Option<f64>,
-    /// Coefficient of t in theta, in units of 1/t_f as in the table `best` (free_cubic)
+    tau_ceiling: Option<f64>,
+    /// Coefficient of t in theta, in units of 1/t_f as in the table `best_cubic` (gap)
     #[arg(long, value_name = "X", value_parser = |text: &str| legal(text, Quantity::Alpha2.domain()))]
     alpha_2: Option<f64>,
-    /// Coefficient of t^2 in theta, in units of 1/t_f^2 (free_cubic)
+    /// Coefficient of t^2 in theta, in units of 1/t_f^2 (gap)
     #[arg(long, value_name = "Y", value_parser = |text: &str| legal(text, Quantity::Alpha3.domain()))]
     alpha_3: Option<f64>,
-    /// Stiffness of the spring, in mu_0 sigma/l; rigid by default (compliant, regularised; step, which then is the response to a jump of v_c)
+    /// Stiffness of the spring, in mu_0 sigma/l; rigid by default (step_response, compliant, regularised)
     #[arg(long, value_name = "K", value_parser = |text: &str| legal(text, Quantity::Stiffness.domain()))]
     k: Option<f64>,
-    /// Mass of the block, in mu_0 sigma l/v_0^2; 0 by default (step, compliant, regularised)
+    /// Mass of the block, in mu_0 sigma l/v_0^2; 0 by default (step_response, compliant, regularised)
     #[arg(long, value_name = "M", value_parser = |text: &str| legal(text, Quantity::Mass.domain()))]
     m: Option<f64>,
     /// Length of the smooth pieces, in l/v_0 (regularised)
     #[arg(long, value_name = "D", value_parser = |text: &str| legal(text, Quantity::Smoothing.domain()))]
     delta_t: Option<f64>,
-    /// Without the bound v >= 1 (optimal, best, regularised)
+    /// Without the bound v >= 1 (optimal, best_cubic, regularised)
     #[arg(long)]
     unbounded: bool,
     /// Relative accuracy of the solution [default: 1e-10, or that of the table]
@@ -218,7 +218,7 @@ const DEFAULT_RTOL: f64 = 1e-10;
 
 /// Whether the bound `v >= 1` matters to a protocol.
 fn has_bound(protocol: &str) -> bool {
-    matches!(protocol, "optimal" | "best" | "regularised")
+    matches!(protocol, "optimal" | "best_cubic" | "regularised")
 }
 
 /// What every protocol needs.
@@ -239,7 +239,7 @@ impl Arguments {
             (Quantity::B, self.b),
             (Quantity::InitialVelocity, self.v_i),
             (Quantity::FinalVelocity, self.v_f),
-            (Quantity::FrictionBound, self.tau_max),
+            (Quantity::FrictionBound, self.tau_ceiling),
             (Quantity::Alpha2, self.alpha_2),
             (Quantity::Alpha3, self.alpha_3),
             (Quantity::Stiffness, self.k),
@@ -263,13 +263,13 @@ impl Arguments {
         }
         let [t_f, a, b, v_i, v_f] = NEEDED.map(|quantity| point[quantity]);
         let (k, m, bounded) = (point[Quantity::Stiffness], point[Quantity::Mass], !self.unbounded);
-        let protocol = match (name, swift::find(name)) {
+        let protocol = match (name, shortcut::find(name)) {
             ("optimal", _) => Protocol::Optimal { bounded },
-            ("best", _) => Protocol::Best { bounded },
+            ("best_cubic", _) => Protocol::BestCubic { bounded },
             ("compliant", _) => Protocol::Compliant { k, m },
             ("regularised", _) => Protocol::Regularised { k, m, delta_t: point[Quantity::Smoothing], bounded },
-            ("step", _) if k.is_finite() && v_i != v_f => Protocol::Response { k, m },
-            ("free_cubic", _) => Protocol::FreeCubic { a_2: point[Quantity::Alpha2], a_3: point[Quantity::Alpha3] },
+            ("step_response", _) => Protocol::step_response(k, m, v_i != v_f),
+            ("gap", _) => Protocol::CubicPoint { a_2: point[Quantity::Alpha2], a_3: point[Quantity::Alpha3] },
             (_, Some(family)) => Protocol::Family(family),
             _ => return Err(wrong(format!("no protocol is named `{name}`"))),
         };
@@ -280,7 +280,7 @@ impl Arguments {
             case: Case {
                 transition: Transition { law: Law { a, b }, v_i, v_f },
                 t_f,
-                tau_max: point[Quantity::FrictionBound],
+                tau_ceiling: point[Quantity::FrictionBound],
             },
             numbers: numbers.filter_map(|(quantity, given)| Some(Named::new(quantity.name(), given?, ""))).collect(),
             bounded: has_bound(name).then_some(bounded),
@@ -298,10 +298,10 @@ impl Arguments {
             return Err(wrong(format!("`{name}` needs {}", missing.join(", "))));
         }
         let heeded: &[Quantity] = match name {
-            "free_cubic" => &[Quantity::Alpha2, Quantity::Alpha3],
-            "step" | "compliant" => &[Quantity::Stiffness, Quantity::Mass],
+            "gap" => &[Quantity::Alpha2, Quantity::Alpha3],
+            "step_response" | "compliant" => &[Quantity::Stiffness, Quantity::Mass],
             "regularised" => &[Quantity::Stiffness, Quantity::Mass, Quantity::Smoothing],
-            _ if swift::find(name).is_some_and(|family| family.heeds_tau_max()) => &[Quantity::FrictionBound],
+            _ if shortcut::find(name).is_some_and(|family| family.heeds_tau_ceiling()) => &[Quantity::FrictionBound],
             _ => &[],
         };
         for (quantity, given) in self.given().into_iter().filter(|(quantity, _)| !NEEDED.contains(quantity)) {
@@ -321,7 +321,7 @@ impl Arguments {
 
     /// The protocol of a row of a table.
     fn row_of(&self, name: &str) -> Result<Asked, Failure> {
-        let is_own = |quantity: Quantity| !(quantity == Quantity::Time && name == "step");
+        let is_own = |quantity: Quantity| !(quantity == Quantity::Time && name == "step_response");
         let given = self.given().into_iter().find(|(quantity, given)| given.is_some() && is_own(*quantity));
         let given = given.map(|(quantity, _)| flag(quantity)).or(self.unbounded.then(|| "--unbounded".to_owned()));
         if let Some(flag) = given {
@@ -535,7 +535,7 @@ fn status(status: Status) -> String {
         Status::BelowBound => ": v < 1 somewhere, outside the range of the friction law",
         Status::Infeasible => ": no protocol with v >= 1 arrives in this time",
         Status::NegativeFriction => ": friction < 0 somewhere, outside any friction law",
-        Status::Nonphysical => ": friction is so low that the extremal need not be the only one",
+        Status::Unproven => ": friction is so low that the extremal need not be the only one",
         _ => "",
     };
     format!("{}{meaning}", status.name())

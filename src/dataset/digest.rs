@@ -14,7 +14,7 @@ use super::footer::StatusCounts;
 use super::layout::Layout;
 use crate::grid::{Point, Projection, Quantity, Scale, View};
 use crate::protocol::Status;
-use crate::protocol::swift::FAMILIES;
+use crate::protocol::shortcut::FAMILIES;
 use crate::table::{Kind, OPTIMUM_AXES, Sheet};
 
 /// Tables of at most this many rows are kept whole, and least values are told apart for at most this many transitions.

@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use crate::protocol::swift::FAMILIES;
+use crate::protocol::shortcut::FAMILIES;
 
 /// A quantity that can be an axis of a sweep.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -126,7 +126,7 @@ impl Quantity {
             Quantity::InitialVelocity => ["v_i", "v_0", "velocity of the initial steady state"],
             Quantity::FinalVelocity => ["v_f", "v_0", "velocity of the final steady state"],
             Quantity::Family => ["family", "", "family of shortcuts"],
-            Quantity::FrictionBound => ["tau_max", "mu_0 sigma", "bound on friction, which bounded_friction heeds"],
+            Quantity::FrictionBound => ["tau_ceiling", "mu_0 sigma", "bound on friction, which bounded_friction heeds"],
             Quantity::Alpha2 => ["alpha_2", "1", "coefficient of t in the contact lifetime of the cubic shortcut"],
             Quantity::Alpha3 => {
                 ["alpha_3", "v_0/l", "coefficient of t^2 in the contact lifetime of the cubic shortcut"]
@@ -194,7 +194,7 @@ impl Quantity {
             Quantity::Family => Domain::new("a family", 0.0, (FAMILIES.len() - 1) as f64),
             Quantity::FrictionBound => Domain {
                 apart: Some(f64::INFINITY),
-                ..Domain::new("1e-20 <= tau_max <= 1e20, or inf: no bound", 1e-20, 1e20)
+                ..Domain::new("1e-20 <= tau_ceiling <= 1e20, or inf: no bound", 1e-20, 1e20)
             },
             Quantity::Alpha2 => Domain::new("-1e100 <= alpha_2 <= 1e100", -1e100, 1e100),
             Quantity::Alpha3 => Domain::new("-1e100 <= alpha_3 <= 1e100", -1e100, 1e100),

@@ -10,7 +10,7 @@ pub struct Scales {
     /// Velocity from which on the friction law holds, in m/s.
     pub v_0: f64,
     /// Normal load `sigma` on the interface, in Pa.
-    pub normal_load: f64,
+    pub normal_stress: f64,
 }
 
 /// In which units values are given and reported.
@@ -33,11 +33,11 @@ const UNITS: [(&str, &str, Size); 13] = [
     ("l/v_0", "s", |s| s.l / s.v_0),
     ("v_0/l", "1/s", |s| s.v_0 / s.l),
     ("v_0", "m/s", |s| s.v_0),
-    ("mu_0 sigma", "Pa", |s| s.mu_0 * s.normal_load),
-    ("mu_0 sigma/l", "Pa/m", |s| s.mu_0 * s.normal_load / s.l),
-    ("mu_0 sigma l", "J/m^2", |s| s.mu_0 * s.normal_load * s.l),
-    ("mu_0 sigma v_0", "W/m^2", |s| s.mu_0 * s.normal_load * s.v_0),
-    ("mu_0 sigma l/v_0^2", "kg/m^2", |s| s.mu_0 * s.normal_load * s.l / (s.v_0 * s.v_0)),
+    ("mu_0 sigma", "Pa", |s| s.mu_0 * s.normal_stress),
+    ("mu_0 sigma/l", "Pa/m", |s| s.mu_0 * s.normal_stress / s.l),
+    ("mu_0 sigma l", "J/m^2", |s| s.mu_0 * s.normal_stress * s.l),
+    ("mu_0 sigma v_0", "W/m^2", |s| s.mu_0 * s.normal_stress * s.v_0),
+    ("mu_0 sigma l/v_0^2", "kg/m^2", |s| s.mu_0 * s.normal_stress * s.l / (s.v_0 * s.v_0)),
     // A coefficient that is told relative to the duration stays so, contact lifetimes in units of l/v_0.
     ("1/t_f", "1/t_f", |_| 1.0),
     ("1/t_f^2", "1/t_f^2", |_| 1.0),

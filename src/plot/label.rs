@@ -91,11 +91,11 @@ fn symbol(name: &str) -> Option<String> {
         "v, v_c" => "*v*, *v*_{c}",
         "work" => "*W*",
         "work_optimal" => "*W*∗",
-        "work_cross" => "*W*∗(*t*_{cross})",
-        "work_hold" => "*W*∗(*t*_{hold})",
-        "work_cheapest" => "*W*∗(*t*_{cheapest})",
-        "work_min" => "*W*∗(*t*_{min})",
-        "work_turn" => "*W*∗(*t*_{turn})",
+        "work_at_t_cross" => "*W*∗(*t*_{cross})",
+        "work_at_t_floor" => "*W*∗(*t*_{hold})",
+        "work_at_t_cheapest" => "*W*∗(*t*_{cheapest})",
+        "work_at_t_min" => "*W*∗(*t*_{min})",
+        "work_at_t_turn" => "*W*∗(*t*_{turn})",
         "v_start" => "*v*(0+)",
         "v_end" => "*v*(*t*_{f}−)",
         "friction_max" => "*τ*_{max}",
@@ -104,7 +104,7 @@ fn symbol(name: &str) -> Option<String> {
         "t_free_out" => "*t*_{free out}",
         "k_c_i" => "*k*_{c}(*v*_{i})",
         "k_c_f" => "*k*_{c}(*v*_{f})",
-        "rigid" => "*k t*_{f}^{2}/*m*",
+        "stiffness_ratio" => "*k t*_{f}^{2}/*m*",
         _ => "",
     };
     if !known.is_empty() {
@@ -257,7 +257,7 @@ mod tests {
         assert_eq!(axis("t_f", "l/v_0", -6), "*t*_{f} (10^{−6} *l*/*v*_{0})");
         assert_eq!(axis("m", "mu_0 sigma l/v_0^2", 0), "*m* (*μ*_{0} *σ* *l*/*v*_{0}^{2})");
         assert_eq!(axis("alpha_2", "1/t_f", 0), "*α*_{2} *t*_{f}");
-        assert_eq!(axis("end_error", "1", 0), "end error");
+        assert_eq!(axis("terminal_error", "1", 0), "terminal error");
         assert_eq!(axis("k", "Pa/m", 3), "*k* (10^{3} Pa/m)");
         assert_eq!(axis("m", "kg/m^2", 0), "*m* (kg/m^{2})");
         assert_eq!(equation("v_i", "3×10^{−9}", "m/s"), "*v*_{i} = 3×10^{−9} m/s");

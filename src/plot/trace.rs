@@ -67,8 +67,9 @@ pub fn read(path: &Path) -> Result<Course, PlotError> {
     }
     let fact = |name: &str| facts.iter().find(|(key, _)| key == &format!("slipsweep.{name}")).map(|(_, value)| value);
     let number = |name: &&str| Some(((*name).to_owned(), fact(name)?.parse().ok()?));
-    let parameters =
-        ["t_f", "a", "b", "v_i", "v_f", "tau_max", "alpha_2", "alpha_3", "k", "m", "delta_t"].iter().filter_map(number);
+    let parameters = ["t_f", "a", "b", "v_i", "v_f", "tau_ceiling", "alpha_2", "alpha_3", "k", "m", "delta_t"]
+        .iter()
+        .filter_map(number);
     let name = label::literal(&fact("protocol").map_or(stem, Clone::clone));
     let points = fact("points").and_then(|points| points.parse().ok());
     Ok(Course { name, parameters: parameters.collect(), columns, points })
@@ -295,7 +296,7 @@ fn control(place: usize) -> Stroke {
 fn unit_of(parameter: &str, time: &str) -> &'static str {
     let of = Quantity::from_name(parameter).map_or("1", |quantity| quantity.unit(grid::Scale::Duration));
     // Names of units in SI do not depend on the scales.
-    let scales = Scales { mu_0: 1.0, l: 1.0, v_0: 1.0, normal_load: 1.0 };
+    let scales = Scales { mu_0: 1.0, l: 1.0, v_0: 1.0, normal_stress: 1.0 };
     if time == "s" { Units::Si(scales).name(of) } else { of }
 }
 

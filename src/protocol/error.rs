@@ -6,7 +6,7 @@
 use crate::model::{Law, Transition};
 use crate::numerics::elementary::ln;
 use crate::protocol::optimal::{self, Optimum};
-use crate::protocol::swift::{Case, Family, Swift};
+use crate::protocol::shortcut::{Case, Family, Shortcut};
 use crate::protocol::{Effort, Solved, Status};
 
 /// The accuracy of the second solve, the finest that solvers tell from rounding.
@@ -56,11 +56,11 @@ pub fn of_optimum(transition: &Transition, t_f: f64, bounded: bool, optimum: &Op
 /// A third one, given a little more time, tells what rounding of the time makes of a member that has hardly any to
 /// spare. Where friction is bounded, theta and `v` are powers `e^((tau - 1)/a)`, whose exponent is rounded; the factor by which
 /// velocities far apart raise that was measured.
-pub fn of_member(family: &dyn Family, case: &Case, member: &Swift, effort: &mut Effort) -> Option<f64> {
+pub fn of_member(family: &dyn Family, case: &Case, member: &Shortcut, effort: &mut Effort) -> Option<f64> {
     let finest = family.solve(case, FINEST, effort).ok()?;
     let Transition { law: Law { a, b }, v_i, v_f } = case.transition;
-    let (exponent, delay) = if family.heeds_tau_max() {
-        (0.05 * (0.25 * ln(v_f / v_i)).powi(4).max(1.0) * (case.tau_max.abs() + b) / a, 1.5 * ROUNDING)
+    let (exponent, delay) = if family.heeds_tau_ceiling() {
+        (0.05 * (0.25 * ln(v_f / v_i)).powi(4).max(1.0) * (case.tau_ceiling.abs() + b) / a, 1.5 * ROUNDING)
     } else {
         (0.0, 0.5 * ROUNDING)
     };

@@ -1,6 +1,6 @@
 //! Protocols that bring a block from one steady velocity to another: the optimal one and its shortcuts.
 
-pub mod best;
+pub mod best_cubic;
 pub mod compliant;
 mod control;
 pub mod cubic;
@@ -10,7 +10,7 @@ pub mod optimal;
 mod outcome;
 mod profile;
 pub mod regularised;
-pub mod swift;
+pub mod shortcut;
 
 pub use control::{Jet, Slider};
 pub use motion::{Moment, Motion};

@@ -13,7 +13,7 @@ pub enum Status {
     /// Computed, but `tau < 0` somewhere on this path: outside any friction law.
     NegativeFriction,
     /// `tau <= max(0, b - a)` somewhere on the optimal path, where the extremal need not be unique.
-    Nonphysical,
+    Unproven,
     /// A defect of ours: the solver could not certify its answer.
     NotConverged,
 }
@@ -25,7 +25,7 @@ impl Status {
         Status::BelowBound,
         Status::Infeasible,
         Status::NegativeFriction,
-        Status::Nonphysical,
+        Status::Unproven,
         Status::NotConverged,
     ];
 
@@ -36,7 +36,7 @@ impl Status {
             Status::BelowBound => "below_bound",
             Status::Infeasible => "infeasible",
             Status::NegativeFriction => "negative_friction",
-            Status::Nonphysical => "nonphysical",
+            Status::Unproven => "unproven",
             Status::NotConverged => "not_converged",
         }
     }
@@ -47,7 +47,7 @@ impl Status {
     /// numbers has no friction.
     pub fn with_friction(self, least: f64) -> Status {
         match self {
-            Status::Ok | Status::BelowBound | Status::Nonphysical if least < 0.0 => Status::NegativeFriction,
+            Status::Ok | Status::BelowBound | Status::Unproven if least < 0.0 => Status::NegativeFriction,
             status => status,
         }
     }
@@ -61,7 +61,7 @@ impl Status {
             (Status::Infeasible | Status::NotConverged, _) => self,
             (_, Status::Infeasible | Status::NotConverged) => optimum,
             (Status::NegativeFriction, _) => self,
-            (_, Status::NegativeFriction | Status::Nonphysical) => Status::Nonphysical,
+            (_, Status::NegativeFriction | Status::Unproven) => Status::Unproven,
             _ => self,
         }
     }

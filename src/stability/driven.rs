@@ -22,7 +22,7 @@ const MAX_SAMPLES: f64 = 1e5;
 /// Distance from the target at `t_f`, the Euclidean norm in `(ln v, ln theta, k s/a)`, if `v_c` is told continuously:
 /// what `rtol` and the rounding of the protocol leave, amplified from wherever they arise. None where the simulation does
 /// not get there.
-pub fn loop_error(path: &Path, rtol: f64) -> Followed {
+pub fn open_loop_error(path: &Path, rtol: f64) -> Followed {
     let v_f = path.jet(path.pieces() - 1, 1.0).v[0];
     if path.slider.k == f64::INFINITY {
         let theta = path.jet(path.pieces() - 1, 1.0).theta;
@@ -34,7 +34,7 @@ pub fn loop_error(path: &Path, rtol: f64) -> Followed {
     Followed { number: end.map(|(state, _)| driven.distance(&state)), steps: MAX_STEPS - budget }
 }
 
-/// Distance from the target at `t_f`, as in [`loop_error`], if `v_c` is sampled at `0`, `dt`, `2 dt`, … and each sample
+/// Distance from the target at `t_f`, as in [`open_loop_error`], if `v_c` is sampled at `0`, `dt`, `2 dt`, … and each sample
 /// is held until the next. None where that takes more than 100,000 or the simulation does not get there,
 /// most often because a held `v_c` stops the block or lets it run away.
 pub fn held_error(path: &Path, dt: f64, rtol: f64) -> Followed {

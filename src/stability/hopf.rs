@@ -57,7 +57,7 @@ mod tests {
     use super::*;
     use crate::model::Transition;
     use crate::stability::SteadySliding;
-    use crate::stability::response::{Orbit, Outcome, Slider, Step, Z};
+    use crate::stability::step_response::{Orbit, Outcome, Slider, Step, Z};
 
     type C = Complex<f64>;
 

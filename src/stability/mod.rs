@@ -3,10 +3,10 @@
 mod driven;
 mod hopf;
 mod linear;
-pub mod response;
 mod sensitivity;
+pub mod step_response;
 
-pub use driven::{held_error, loop_error};
+pub use driven::{held_error, open_loop_error};
 pub use hopf::{Hopf, lyapunov_coefficient};
 pub use linear::{Eigenvalues, SteadySliding, critical_velocity};
 pub use sensitivity::amplification;

@@ -28,7 +28,7 @@ const MOST_PLACES: u64 = 1 << 14;
 /// long for a plan.
 const LONGEST: f64 = 5.0;
 
-/// Greatest cost of a row over the mean cost of its table. Chosen: rows of `step` differ by three orders of magnitude.
+/// Greatest cost of a row over the mean cost of its table. Chosen: rows of `step_response` differ by three orders of magnitude.
 const SPREAD: f64 = 1000.0;
 
 /// What a table costs.

@@ -40,7 +40,7 @@ impl Sweep {
                 fact("model.mu_0", format_args!("{:?}", scales.mu_0));
                 fact("model.l", format_args!("{:?}", scales.l));
                 fact("model.v_0", format_args!("{:?}", scales.v_0));
-                fact("model.normal_load", format_args!("{:?}", scales.normal_load));
+                fact("model.normal_stress", format_args!("{:?}", scales.normal_stress));
             }
         }
         let name = request.table.name();

@@ -14,7 +14,7 @@ use crate::table::{self, STATUS, Table};
 /// The schema, in draft 7, which editors know.
 pub fn schema() -> Value {
     // What the scales are does not matter to a schema.
-    let si = Units::Si(Scales { mu_0: 1.0, l: 1.0, v_0: 1.0, normal_load: 1.0 });
+    let si = Units::Si(Scales { mu_0: 1.0, l: 1.0, v_0: 1.0, normal_stress: 1.0 });
     let grid = grid();
     let grid_keys: Vec<Value> = grid.keys().map(|key| json!({ "required": [key] })).collect();
     let mut properties = own();
@@ -79,7 +79,7 @@ fn own() -> Value {
         "mu_0": scale("Friction coefficient at v_0, for SI units"),
         "l": scale("Length over which contacts are renewed in m, for SI units"),
         "v_0": scale("Velocity from which on the friction law holds in m/s, for SI units"),
-        "normal_load": scale("Normal load in Pa, for SI units"),
+        "normal_stress": scale("Normal load in Pa, for SI units"),
     });
     let named: Map<String, Value> =
         table::ALL.map(|table| (table.name().to_owned(), table_of(table))).into_iter().collect();
@@ -109,7 +109,7 @@ fn axes(what: &str, units: &Units) -> Value {
 
 /// Which axes are meant: those in SI units go with the four scales, the others without.
 fn units() -> Value {
-    let scales = ["mu_0", "l", "v_0", "normal_load"];
+    let scales = ["mu_0", "l", "v_0", "normal_stress"];
     let is_si =
         json!({ "required": ["units"], "properties": { "units": { "type": "string", "pattern": any_case("si") } } });
     let both = |axes: &str, model: Value| {

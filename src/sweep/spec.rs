@@ -77,7 +77,7 @@ pub struct ModelSpec {
     /// Velocity in m/s, for SI units.
     pub v_0: Option<f64>,
     /// Normal load in Pa, for SI units.
-    pub normal_load: Option<f64>,
+    pub normal_stress: Option<f64>,
 }
 
 impl Default for ModelSpec {
@@ -88,7 +88,7 @@ impl Default for ModelSpec {
             mu_0: None,
             l: None,
             v_0: None,
-            normal_load: None,
+            normal_stress: None,
         }
     }
 }
@@ -163,7 +163,7 @@ keys! {
     }
     BlockSpec { "points": points, "zip": zip, "where": condition, "axes": axes }
     ModelSpec {
-        "velocity_bound": velocity_bound, "units": units, "mu_0": mu_0, "l": l, "v_0": v_0, "normal_load": normal_load
+        "velocity_bound": velocity_bound, "units": units, "mu_0": mu_0, "l": l, "v_0": v_0, "normal_stress": normal_stress
     }
     AccuracySpec { "rtol": rtol }
     AxisForm {

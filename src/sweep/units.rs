@@ -6,7 +6,7 @@ use crate::grid::{Axis, Quantity, Scale, Values};
 use crate::model::{Scales, Units};
 
 /// The keys of `[model]` that determine the units.
-pub const UNIT_KEYS: [&str; 5] = ["units", "mu_0", "l", "v_0", "normal_load"];
+pub const UNIT_KEYS: [&str; 5] = ["units", "mu_0", "l", "v_0", "normal_stress"];
 
 /// The units that `model` asks for.
 pub fn units(model: &ModelSpec) -> Result<Units, SpecError> {
@@ -14,7 +14,7 @@ pub fn units(model: &ModelSpec) -> Result<Units, SpecError> {
         ("mu_0", model.mu_0, "1"),
         ("l", model.l, "m"),
         ("v_0", model.v_0, "m/s"),
-        ("normal_load", model.normal_load, "Pa"),
+        ("normal_stress", model.normal_stress, "Pa"),
     ];
     match model.units.to_ascii_lowercase().as_str() {
         "dimensionless" => match scales.into_iter().find(|(_, value, _)| value.is_some()) {
@@ -28,7 +28,7 @@ pub fn units(model: &ModelSpec) -> Result<Units, SpecError> {
             let mut values = [0.0; 4];
             for (place, (name, value, unit)) in scales.into_iter().enumerate() {
                 let Some(value) = value else {
-                    let expected = "mu_0, l in m, v_0 in m/s and normal_load in Pa";
+                    let expected = "mu_0, l in m, v_0 in m/s and normal_stress in Pa";
                     let (found, help) = (format!("\"si\" without `{name}`"), format!("add `{name} = ...` to [model]"));
                     return refuse("model.units", found, expected, help);
                 };
@@ -38,8 +38,8 @@ pub fn units(model: &ModelSpec) -> Result<Units, SpecError> {
                 }
                 values[place] = value;
             }
-            let [mu_0, l, v_0, normal_load] = values;
-            Ok(Units::Si(Scales { mu_0, l, v_0, normal_load }))
+            let [mu_0, l, v_0, normal_stress] = values;
+            Ok(Units::Si(Scales { mu_0, l, v_0, normal_stress }))
         }
         _ => {
             let (found, expected) = (format!("unknown unit system {:?}", model.units), "\"dimensionless\" or \"si\"");

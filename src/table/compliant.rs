@@ -8,7 +8,7 @@ use super::{Column, Definition, Field, Job, Selection, Sheet, Stopped, Work, col
 use crate::grid::{Point, Quantity};
 use crate::protocol::compliant::{self, Compliant as Member};
 use crate::protocol::{Slider, Solved, error};
-use crate::stability::{Followed, amplification, held_error, loop_error};
+use crate::stability::{Followed, amplification, held_error, open_loop_error};
 
 /// A row.
 struct Row {
@@ -17,8 +17,8 @@ struct Row {
     t_f: f64,
     least: Comparison,
     amplification: Option<f64>,
-    end_error: Option<f64>,
-    loop_error: Option<f64>,
+    sampling_error: Option<f64>,
+    open_loop_error: Option<f64>,
     work_error: f64,
 }
 
@@ -38,19 +38,19 @@ const FIELDS: [Field<Row>; 14] = [
          below 1e-30, where only rounding is left of the error; null beyond 3000 steps of its integration and beyond the range of doubles",
     ), |row| number(row.amplification)),
     Field::new(Column::number(
-        "end_error",
+        "sampling_error",
         "1",
         "distance from the target in that norm if v_c is sampled every dt and held, to rtol of 1; null for dt = 0, \
          beyond 100000 samples, and where the motion does not last",
-    ), |row| number(row.end_error)),
-    Field::new(Column::number("rigid", "1", "k t_f^2/m: a large one makes the spring rigid; inf without mass"), |row| if row.slider.m > 0.0 { row.slider.k * row.t_f * row.t_f / row.slider.m } else { f64::INFINITY }),
+    ), |row| number(row.sampling_error)),
+    Field::new(Column::number("stiffness_ratio", "1", "k t_f^2/m: a large one makes the spring rigid; inf without mass"), |row| if row.slider.m > 0.0 { row.slider.k * row.t_f * row.t_f / row.slider.m } else { f64::INFINITY }),
     Field::new(Column::number(
-        "loop_error",
+        "open_loop_error",
         "1",
         "distance from the target in that norm if v_c is simulated as it is, at rtol: what that and rounding leave, \
          amplified; null where the motion does not last",
     )
-    .optional(), |row| number(row.loop_error)),
+    .optional(), |row| number(row.open_loop_error)),
     Field::new(Column::number("work_error", "mu_0 sigma l", "bound of the error of work, by a second solve").optional(), |row| row.work_error),
     Field::new(Column::number("gap_error", "1", "bound of the error of gap, by a second solve of both works").optional(), |row| row.least.gap_error),
 ];
@@ -59,8 +59,8 @@ const COLUMNS: [Column; 14] = columns(&FIELDS);
 const WORK_OPTIMAL: usize = place(&COLUMNS, "work_optimal");
 const GAP: usize = place(&COLUMNS, "gap");
 const AMPLIFICATION: usize = place(&COLUMNS, "amplification");
-const END_ERROR: usize = place(&COLUMNS, "end_error");
-const LOOP_ERROR: usize = place(&COLUMNS, "loop_error");
+const SAMPLING_ERROR: usize = place(&COLUMNS, "sampling_error");
+const OPEN_LOOP_ERROR: usize = place(&COLUMNS, "open_loop_error");
 const WORK_ERROR: usize = place(&COLUMNS, "work_error");
 const GAP_ERROR: usize = place(&COLUMNS, "gap_error");
 
@@ -103,15 +103,19 @@ fn compute(job: &Job<'_>, range: Range<u64>, sheet: &mut Sheet) -> Result<Work, 
             status = status.beside(least.optimum);
         }
         let (slider, t_f, dt) = (slider(point), point[Quantity::Time], point[Quantity::Sampling]);
-        let is_held = job.selection.has(END_ERROR) && dt > 0.0;
-        let is_followed = job.selection.has(LOOP_ERROR);
+        let is_held = job.selection.has(SAMPLING_ERROR) && dt > 0.0;
+        let is_followed = job.selection.has(OPEN_LOOP_ERROR);
         let path =
             (is_held || is_followed).then(|| compliant::path(&slider, velocities(point), t_f, job.rtol).ok()).flatten();
-        let end_error =
+        let sampling_error =
             path.as_ref().filter(|_| is_held).and_then(|path| told_by(held_error(path, dt, job.rtol), &mut work));
-        let loop_error =
-            path.as_ref().filter(|_| is_followed).and_then(|path| told_by(loop_error(path, job.rtol), &mut work));
-        (status, Some(Row { member, slider, t_f, least, amplification, end_error, loop_error, work_error }), work)
+        let open_loop_error =
+            path.as_ref().filter(|_| is_followed).and_then(|path| told_by(open_loop_error(path, job.rtol), &mut work));
+        (
+            status,
+            Some(Row { member, slider, t_f, least, amplification, sampling_error, open_loop_error, work_error }),
+            work,
+        )
     })
 }
 
@@ -141,7 +145,7 @@ impl Members {
         self.0.get((tuple, slider.k.to_bits(), slider.m.to_bits()), || {
             let (velocities, t_f) = (velocities(point), point[Quantity::Time]);
             let solved = compliant::solve(&slider, velocities, t_f, job.rtol);
-            *work += Work { swifts: 1, ..Work::from(solved.effort) };
+            *work += Work { shortcuts: 1, ..Work::from(solved.effort) };
             let wanted = job.selection.has(AMPLIFICATION) && solved.value.is_some();
             let path = wanted.then(|| compliant::path(&slider, velocities, t_f, job.rtol).ok()).flatten();
             let amplification = path.and_then(|path| told_by(amplification(&path, job.rtol), work));

@@ -14,8 +14,8 @@ const FIELDS: [Field<CrossoverTimes>; 12] = [
     Field::new(Column::number("t_cross", TIME, "acceleration: duration at which v(0+) = v_i"), |times| {
         number(times.t_cross)
     }),
-    Field::new(Column::number("t_hold", TIME, "acceleration: duration at which v(0+) reaches the bound 1"), |times| {
-        number(times.t_hold)
+    Field::new(Column::number("t_floor", TIME, "acceleration: duration at which v(0+) reaches the bound 1"), |times| {
+        number(times.t_floor)
     }),
     Field::new(Column::number("t_cheapest", TIME, "acceleration: duration of least W*"), |times| {
         number(times.t_cheapest)
@@ -25,18 +25,20 @@ const FIELDS: [Field<CrossoverTimes>; 12] = [
         number(times.t_turn)
     }),
     Field::new(
-        Column::number("t_free_in", TIME, "deceleration: start of the window of durations without hold"),
+        Column::number("t_free_in", TIME, "deceleration: start of the window of durations that never reach the floor"),
         |times| number(times.t_free_in),
     ),
     Field::new(
-        Column::number("t_free_out", TIME, "deceleration: end of the window of durations without hold"),
+        Column::number("t_free_out", TIME, "deceleration: end of the window of durations that never reach the floor"),
         |times| number(times.t_free_out),
     ),
-    Field::new(Column::number("work_cross", WORK, "W* at t_cross"), |times| number(times.work_cross)),
-    Field::new(Column::number("work_hold", WORK, "W* at t_hold"), |times| number(times.work_hold)),
-    Field::new(Column::number("work_cheapest", WORK, "W* at t_cheapest"), |times| number(times.work_cheapest)),
-    Field::new(Column::number("work_min", WORK, "W* at t_min"), |times| number(times.work_min)),
-    Field::new(Column::number("work_turn", WORK, "W* at t_turn"), |times| number(times.work_turn)),
+    Field::new(Column::number("work_at_t_cross", WORK, "W* at t_cross"), |times| number(times.work_at_t_cross)),
+    Field::new(Column::number("work_at_t_floor", WORK, "W* at t_floor"), |times| number(times.work_at_t_floor)),
+    Field::new(Column::number("work_at_t_cheapest", WORK, "W* at t_cheapest"), |times| {
+        number(times.work_at_t_cheapest)
+    }),
+    Field::new(Column::number("work_at_t_min", WORK, "W* at t_min"), |times| number(times.work_at_t_min)),
+    Field::new(Column::number("work_at_t_turn", WORK, "W* at t_turn"), |times| number(times.work_at_t_turn)),
 ];
 
 const COLUMNS: [Column; 12] = columns(&FIELDS);
@@ -56,11 +58,11 @@ pub static CROSSOVER: Definition = Definition {
 fn compute(job: &Job<'_>, range: Range<u64>, sheet: &mut Sheet) -> Result<Work, Stopped> {
     let wanted = |names: [&str; 2]| job.selection.has_any(names.map(|name| place(&COLUMNS, name)));
     let wanted = Wanted {
-        cross: wanted(["t_cross", "work_cross"]),
-        hold: wanted(["t_hold", "work_hold"]),
-        cheapest: wanted(["t_cheapest", "work_cheapest"]),
-        min: wanted(["t_min", "work_min"]),
-        turn: wanted(["t_turn", "work_turn"]),
+        cross: wanted(["t_cross", "work_at_t_cross"]),
+        floor: wanted(["t_floor", "work_at_t_floor"]),
+        cheapest: wanted(["t_cheapest", "work_at_t_cheapest"]),
+        min: wanted(["t_min", "work_at_t_min"]),
+        turn: wanted(["t_turn", "work_at_t_turn"]),
         free: wanted(["t_free_in", "t_free_out"]),
     };
     rows::each(job, range, 64, sheet, &FIELDS, |_, point| {

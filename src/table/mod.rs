@@ -1,6 +1,6 @@
 //! What a row means: the tables, one file each, and what they have in common.
 
-mod best;
+mod best_cubic;
 mod column;
 mod compliant;
 mod crossover;
@@ -14,9 +14,9 @@ mod regularised;
 mod repeats;
 mod rows;
 mod sheet;
+mod shortcut;
 mod stability;
-mod step;
-mod swift;
+mod step_response;
 
 use std::ops::Range;
 
@@ -134,12 +134,12 @@ pub struct Prediction {
 /// Every table, in the order in which they are listed. A new table is a file and a line here.
 pub const ALL: [&dyn Table; 9] = [
     &gap::GAP,
-    &best::BEST,
+    &best_cubic::BEST_CUBIC,
     &optimal::OPTIMAL,
     &crossover::CROSSOVER,
-    &swift::SWIFT,
+    &shortcut::SHORTCUT,
     &stability::STABILITY,
-    &step::Step,
+    &step_response::StepResponse,
     &compliant::COMPLIANT,
     &regularised::REGULARISED,
 ];

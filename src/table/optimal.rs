@@ -7,7 +7,7 @@ use super::{Column, Definition, Field, Job, Kind, Sheet, Stopped, Work, columns,
 use crate::protocol::optimal::Optimum;
 
 /// The words of `strategy`, in the order of [`Strategy::ALL`](crate::protocol::optimal::Strategy::ALL).
-const STRATEGIES: &[&str] = &["speed_up", "slow_down", "hold"];
+const STRATEGIES: &[&str] = &["speed_up", "slow_down", "floor"];
 
 /// A row.
 struct Row {
@@ -19,7 +19,9 @@ const FIELDS: [Field<Row>; 8] = [
     Field::new(Column::number("work", "mu_0 sigma l", "least work of friction W*"), |row| row.optimum.work),
     Field::new(Column::number("v_start", "v_0", "velocity just after the start, v(0+)"), |row| row.optimum.v_start),
     Field::new(Column::number("v_end", "v_0", "velocity just before the end, v(t_f-)"), |row| row.optimum.v_end),
-    Field::new(Column::number("hold_time", "l/v_0", "time spent on the bound v = 1"), |row| row.optimum.hold_time),
+    Field::new(Column::number("time_at_floor", "l/v_0", "time spent on the velocity floor v = 1"), |row| {
+        row.optimum.time_at_floor
+    }),
     Field::new(Column::number("hamiltonian", "mu_0 sigma v_0", "dW*/dt_f"), |row| row.optimum.hamiltonian),
     Field::new(Column::number("theta_max", "l/v_0", "largest contact lifetime on the way"), |row| {
         row.optimum.theta_max
@@ -28,7 +30,7 @@ const FIELDS: [Field<Row>; 8] = [
         Column::new(
             "strategy",
             Kind::Label(STRATEGIES),
-            "how it starts: speed_up v(0+) > v_i, slow_down 1 < v(0+) <= v_i, hold on the bound v = 1",
+            "how it starts: speed_up v(0+) > v_i, slow_down 1 < v(0+) <= v_i, floor starts on v = 1",
         ),
         |row| f64::from(row.optimum.strategy as u8),
     ),

@@ -165,7 +165,7 @@ struct Tally {
 impl Tally {
     /// The worst status that concerns the whole landscape; one that has nothing that is ok says why.
     fn status(&self) -> Status {
-        [Status::NotConverged, Status::Ok, Status::Nonphysical, Status::NegativeFriction, Status::BelowBound]
+        [Status::NotConverged, Status::Ok, Status::Unproven, Status::NegativeFriction, Status::BelowBound]
             .into_iter()
             .find(|status| self.statuses[*status as usize] > 0)
             .unwrap_or(Status::Infeasible)

@@ -72,7 +72,7 @@ pub struct Work {
     /// Best shortcuts searched.
     pub best: u64,
     /// Shortcuts of a family solved.
-    pub swifts: u64,
+    pub shortcuts: u64,
     /// Transitions whose crossover times were computed.
     pub crossovers: u64,
     /// Simulations of a block on a spring.
@@ -90,7 +90,7 @@ impl std::ops::AddAssign for Work {
         self.optima += other.optima;
         self.landscapes += other.landscapes;
         self.best += other.best;
-        self.swifts += other.swifts;
+        self.shortcuts += other.shortcuts;
         self.crossovers += other.crossovers;
         self.simulations += other.simulations;
         self.steps += other.steps;

@@ -22,7 +22,7 @@ struct Row {
 
 const FIELDS: [Field<Row>; 10] = [
     Field::new(Column::number(
-        "k_qs",
+        "k_od",
         "mu_0 sigma/l",
         "quasi-static critical stiffness b - a; not positive: stable at any stiffness",
     ), |row| row.law.b - row.law.a),
@@ -39,7 +39,7 @@ const FIELDS: [Field<Row>; 10] = [
     Field::new(Column::number("frequency", "v_0/l", "imaginary part of that pair (angular frequency), 0 if all three are real"), |row| row.eigenvalues.map_or(f64::NAN, |eigenvalues| eigenvalues.frequency)),
     Field::new(Column::number("decay_rate", "v_0/l", "the third eigenvalue at v_f, real; null for m = 0, which has two"), |row| number(row.eigenvalues.and_then(|eigenvalues| eigenvalues.decay_rate))),
     Field::new(Column::new(
-        "hopf",
+        "hopf_type",
         Kind::Label(&Hopf::NAMES),
         "side of k_c_f on which small limit cycles at v_f live: supercritical below it, subcritical above; null for m = 0, b <= a",
     )

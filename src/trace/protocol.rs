@@ -2,9 +2,9 @@
 
 use crate::model::Transition;
 use crate::protocol::cubic::{Landscape, Shortcuts};
-use crate::protocol::swift::{Case, FAMILIES, Family, Obstacle};
-use crate::protocol::{Effort, Motion, Slider, Status, best, compliant, optimal, regularised};
-use crate::stability::response::Step;
+use crate::protocol::shortcut::{self, Case, FAMILIES, Family, Obstacle};
+use crate::protocol::{Effort, Motion, Slider, Status, best_cubic, compliant, optimal, regularised};
+use crate::stability::step_response::Step;
 
 /// A protocol, and the spring that drives it where that is elastic.
 #[derive(Clone, Copy)]
@@ -15,12 +15,12 @@ pub enum Protocol {
         bounded: bool,
     },
     /// The cubic shortcut of least work, with `v >= 1` where `bounded`.
-    Best {
+    BestCubic {
         /// Whether `v >= 1`.
         bounded: bool,
     },
     /// A point of the landscape, scaled: `alpha_2 t_f` and `alpha_3 t_f^2`.
-    FreeCubic {
+    CubicPoint {
         /// `alpha_2 t_f`.
         a_2: f64,
         /// `alpha_3 t_f^2`.
@@ -29,7 +29,7 @@ pub enum Protocol {
     /// The member of a family.
     Family(&'static dyn Family),
     /// The response of a block on a spring to a step of the control velocity.
-    Response {
+    StepResponse {
         /// Stiffness of the spring.
         k: f64,
         /// Mass of the block.
@@ -55,14 +55,26 @@ pub enum Protocol {
     },
 }
 
+impl Protocol {
+    /// The response of a block on a spring to a step of the control velocity. A rigid spring, or no change of velocity, takes the
+    /// block along at once.
+    pub fn step_response(k: f64, m: f64, changes: bool) -> Protocol {
+        match shortcut::find("step") {
+            Some(step) if k == f64::INFINITY || !changes => Protocol::Family(step),
+            _ => Protocol::StepResponse { k, m },
+        }
+    }
+}
+
 /// Names and meanings of all protocols: first those that are no family, then [`FAMILIES`], then those on a spring.
 pub fn names() -> impl Iterator<Item = (&'static str, &'static str)> {
     let others = [
         ("optimal", "least work of friction of all protocols; v may jump at both ends"),
-        ("best", "least work of all free cubics"),
-        ("free_cubic", "theta a cubic in time with alpha_2 and alpha_3 given; v may jump at both ends"),
+        ("best_cubic", "theta a cubic in time, of least work; v may jump at both ends"),
+        ("gap", "theta a cubic in time with alpha_2 and alpha_3 given; v may jump at both ends"),
     ];
     let elastic = [
+        ("step_response", "a block on a spring whose far end jumps to v_f at once; with its v_c"),
         ("compliant", "v, v' and v'' continuous, so that an elastic spring can drive it; with its v_c"),
         ("regularised", "the optimal protocol, its jumps made smooth in pieces of length delta_t; with its v_c"),
     ];
@@ -73,7 +85,7 @@ pub fn names() -> impl Iterator<Item = (&'static str, &'static str)> {
 pub struct Course {
     /// How it moves.
     pub motion: Box<dyn Motion>,
-    /// `Ok`, `BelowBound` or `Nonphysical`.
+    /// `Ok`, `BelowBound` or `Unproven`.
     pub status: Status,
     /// Work of friction, `int tau v dt`.
     pub work: f64,
@@ -138,7 +150,7 @@ pub enum Absence {
     Response,
     /// Friction is so low somewhere that the extremal need not be unique, and none was found.
     #[error("friction is too low: where tau <= max(0, b - a) there need not be an optimum, and none was found")]
-    Nonphysical,
+    Unproven,
 }
 
 impl Absence {
@@ -158,7 +170,7 @@ impl Protocol {
     /// What it is, in one line.
     pub fn doc(&self, name: &str) -> &'static str {
         match self {
-            Protocol::Response { .. } => {
+            Protocol::StepResponse { .. } => {
                 "the control velocity jumps to v_f and stays there; the block on its spring up to t_f"
             }
             _ => names().find(|(known, _)| *known == name).map_or("", |(_, doc)| doc),
@@ -169,10 +181,10 @@ impl Protocol {
     pub fn course(&self, case: &Case, rtol: f64) -> Result<Course, Absence> {
         match *self {
             Protocol::Optimal { bounded } => optimum(case, bounded, rtol),
-            Protocol::Best { bounded } => least_cubic(case, bounded, rtol),
-            Protocol::FreeCubic { a_2, a_3 } => free_cubic(case, a_2, a_3, rtol),
+            Protocol::BestCubic { bounded } => least_cubic(case, bounded, rtol),
+            Protocol::CubicPoint { a_2, a_3 } => gap(case, a_2, a_3, rtol),
             Protocol::Family(family) => member(family, case, rtol),
-            Protocol::Response { k, m } => response(case, k, m, rtol),
+            Protocol::StepResponse { k, m } => response(case, k, m, rtol),
             Protocol::Compliant { k, m } => smooth(case, k, m, rtol),
             Protocol::Regularised { k, m, delta_t, bounded } => pieced(case, (k, m), delta_t, bounded, rtol),
         }
@@ -186,14 +198,14 @@ fn optimum(case: &Case, bounded: bool, rtol: f64) -> Result<Course, Absence> {
     };
     let parameters = vec![
         Parameter::new("hamiltonian", value.hamiltonian, "mu_0 sigma v_0", "dW*/dt_f"),
-        Parameter::new("hold_time", value.hold_time, "l/v_0", "time spent on the bound v = 1"),
+        Parameter::new("time_at_floor", value.time_at_floor, "l/v_0", "time spent on the bound v = 1"),
     ];
     Ok(Course { motion, status: solved.status, work: value.work, parameters })
 }
 
 fn without_optimum(case: &Case, bounded: bool, status: Status) -> Absence {
     match (status, optimal::shortest_time(&case.transition, bounded)) {
-        (Status::Nonphysical, _) => Absence::Nonphysical,
+        (Status::Unproven, _) => Absence::Unproven,
         (Status::Infeasible, Some(t_min)) if case.t_f <= t_min => Absence::Time { t_f: case.t_f, t_min, bounded },
         (Status::Infeasible, _) => Obstacle::Domain.into(),
         _ => Obstacle::NotConverged.into(),
@@ -201,14 +213,14 @@ fn without_optimum(case: &Case, bounded: bool, status: Status) -> Absence {
 }
 
 fn least_cubic(case: &Case, bounded: bool, rtol: f64) -> Result<Course, Absence> {
-    let solved = best::solve(&case.transition, case.t_f, bounded, rtol);
+    let solved = best_cubic::solve(&case.transition, case.t_f, bounded, rtol);
     let Some(value) = solved.value else {
         // Where there is no optimum there is no shortcut either.
         let optimum = optimal::solve(&case.transition, case.t_f, bounded, rtol);
         return Err(match (optimum.value, solved.status) {
             (None, _) => without_optimum(case, bounded, optimum.status),
             (_, Status::Infeasible) => Absence::Cubic { bounded },
-            (_, Status::Nonphysical) => Absence::Nonphysical,
+            (_, Status::Unproven) => Absence::Unproven,
             _ => Obstacle::NotConverged.into(),
         });
     };
@@ -224,7 +236,7 @@ fn least_cubic(case: &Case, bounded: bool, rtol: f64) -> Result<Course, Absence>
     Ok(Course { motion, status: solved.status, work: value.work, parameters })
 }
 
-fn free_cubic(case: &Case, a_2: f64, a_3: f64, rtol: f64) -> Result<Course, Absence> {
+fn gap(case: &Case, a_2: f64, a_3: f64, rtol: f64) -> Result<Course, Absence> {
     let landscape = Landscape::new(&case.transition, case.t_f, rtol);
     let (mut work, mut status) = ([0.0], [Status::Infeasible]);
     landscape.evaluate(&[a_2], &[a_3], Shortcuts { work: &mut work, v_min: &mut [], status: &mut status });
@@ -286,15 +298,15 @@ fn pieced(case: &Case, (k, m): (f64, f64), delta_t: f64, bounded: bool, rtol: f6
 }
 
 fn member(family: &dyn Family, case: &Case, rtol: f64) -> Result<Course, Absence> {
-    let swift = family.solve(case, rtol, &mut Effort::default())?;
+    let shortcut = family.solve(case, rtol, &mut Effort::default())?;
     let motion = family.motion(case, rtol)?;
     // A step takes any time, but where no protocol arrives it is not counted either.
     let late = case.t_f < case.transition.least_time();
-    let status = if late { Status::Infeasible } else { swift.status() };
-    let alpha = swift.alpha.into_iter().zip(family.alpha());
+    let status = if late { Status::Infeasible } else { shortcut.status() };
+    let alpha = shortcut.alpha.into_iter().zip(family.alpha());
     let mut parameters: Vec<_> = alpha.map(|(alpha, doc)| Parameter::new("alpha", alpha, "1", doc)).collect();
-    if swift.miss != 0.0 {
-        parameters.push(Parameter::new("miss", swift.miss, "1", "distance from the target, theta(t_f) v_f - 1"));
+    if shortcut.miss != 0.0 {
+        parameters.push(Parameter::new("miss", shortcut.miss, "1", "distance from the target, theta(t_f) v_f - 1"));
     }
-    Ok(Course { motion, status, work: swift.work, parameters })
+    Ok(Course { motion, status, work: shortcut.work, parameters })
 }

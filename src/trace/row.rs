@@ -5,11 +5,12 @@ use crate::dataset::{Cell, Row};
 use crate::grid::Quantity;
 use crate::model::{Law, Transition};
 use crate::protocol::Status;
-use crate::protocol::swift::{self, Case};
+use crate::protocol::shortcut::{self, Case};
 use crate::table::STATUS;
 
 /// Tables whose rows have a path over time.
-pub const TABLES: [&str; 8] = ["optimal", "gap", "gap_min", "best", "swift", "step", "compliant", "regularised"];
+pub const TABLES: [&str; 8] =
+    ["optimal", "gap", "gap_min", "best_cubic", "shortcut", "step_response", "compliant", "regularised"];
 
 /// Why a row has no path.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -64,34 +65,30 @@ pub fn protocol_of(
         v_i: number(Quantity::InitialVelocity)?,
         v_f: number(Quantity::FinalVelocity)?,
     };
-    let t_f = if table == "step" { t_f.ok_or(Pathless::Duration)? } else { number(Quantity::Time)? };
-    let family = word("family").and_then(swift::find);
-    let tau_max = number(Quantity::FrictionBound).unwrap_or(f64::INFINITY);
-    let case = Case { transition, t_f, tau_max };
+    let t_f = if table == "step_response" { t_f.ok_or(Pathless::Duration)? } else { number(Quantity::Time)? };
+    let family = word("family").and_then(shortcut::find);
+    let tau_ceiling = number(Quantity::FrictionBound).unwrap_or(f64::INFINITY);
+    let case = Case { transition, t_f, tau_ceiling };
     let [k, m] = [Quantity::Stiffness, Quantity::Mass].map(number);
     let protocol = match (table, family) {
         ("optimal", _) => Protocol::Optimal { bounded },
-        ("best", _) => Protocol::Best { bounded },
+        ("best_cubic", _) => Protocol::BestCubic { bounded },
         ("gap" | "gap_min", _) => {
             let scaled =
                 |alpha: Quantity, unit: f64, relative: bool| Ok(number(alpha)? * if relative { 1.0 } else { unit });
-            Protocol::FreeCubic {
+            Protocol::CubicPoint {
                 a_2: scaled(Quantity::Alpha2, t_f, relative[0])?,
                 a_3: scaled(Quantity::Alpha3, t_f * t_f, relative[1])?,
             }
         }
-        // A rigid spring, and no change of velocity, take the velocity along at once.
-        ("step", _) => match (k?, m?, swift::find("step")) {
-            (k, _, Some(step)) if k == f64::INFINITY || transition.v_i == transition.v_f => Protocol::Family(step),
-            (k, m, _) => Protocol::Response { k, m },
-        },
+        ("step_response", _) => Protocol::step_response(k?, m?, transition.v_i != transition.v_f),
         ("compliant", _) => Protocol::Compliant { k: k?, m: m? },
         ("regularised", _) => Protocol::Regularised { k: k?, m: m?, delta_t: number(Quantity::Smoothing)?, bounded },
         (_, Some(family)) => Protocol::Family(family),
         _ => return Err(Pathless::Missing("family")),
     };
     let name = match protocol {
-        Protocol::FreeCubic { .. } => "free_cubic",
+        Protocol::CubicPoint { .. } => "gap",
         Protocol::Family(family) => family.name(),
         _ => table,
     };

@@ -78,7 +78,7 @@ pub fn check(row: &Row, context: &Context, rtol: f64) -> Verdict {
     let size = Some(low.abs().max(high.abs()));
     verdict.compare(row, "v_c_min", Some(low), size);
     verdict.compare(row, "v_c_max", Some(high), size);
-    verdict.compare(row, "rigid", Some(if m > 0.0 { k * t_f * t_f / m } else { f64::INFINITY }), None);
+    verdict.compare(row, "stiffness_ratio", Some(if m > 0.0 { k * t_f * t_f / m } else { f64::INFINITY }), None);
     let told = Told { slider, v_i: problem.v_i, v_f: problem.v_f, t_f, velocity: |x| exponent.velocity(x), control };
     let least = states.iter().map(|y| here.velocity(y)).fold(f64::INFINITY, f64::min);
     // What the spring pulls with, in units of a, and what it would under the greatest control alone: rounding of the one, and
@@ -117,12 +117,12 @@ where
 {
     let dt = number(row, "dt").unwrap_or(0.0);
     if dt == 0.0 {
-        verdict.compare(row, "end_error", None, None);
+        verdict.compare(row, "sampling_error", None, None);
     }
-    let columns = ["amplification", "end_error", "loop_error"];
+    let columns = ["amplification", "sampling_error", "open_loop_error"];
     let [grown, held, closed] = columns.map(|column| number(row, column));
     if row.iter().any(|(name, cell)| {
-        *cell == Cell::Missing && (name != "end_error" || dt > 0.0) && columns.contains(&name.as_str())
+        *cell == Cell::Missing && (name != "sampling_error" || dt > 0.0) && columns.contains(&name.as_str())
     }) {
         verdict.miss("numbers of a motion that was given up");
     }
@@ -146,10 +146,10 @@ where
         None => verdict.miss("motions too stiff for an explicit integrator"),
     };
     if closed.is_some() {
-        compare("loop_error", None, felt);
+        compare("open_loop_error", None, felt);
     }
     if held.is_some() && told.t_f / dt <= MOST_SAMPLES {
-        compare("end_error", Some(dt), felt);
+        compare("sampling_error", Some(dt), felt);
     } else if held.is_some() {
         verdict.miss("controls sampled more than 3000 times");
     }

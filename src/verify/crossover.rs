@@ -1,6 +1,6 @@
 //! `crossover`: the extremals of the defining initial or final conditions, integrated until theta arrives.
 
-use super::extremal::{Extremal, branch, from_end, from_start, hold, least_time};
+use super::extremal::{Extremal, branch, floor, from_end, from_start, least_time};
 use super::verdict::NEGATIVE;
 use super::{Context, Verdict, transition, word};
 use crate::dataset::Row;
@@ -27,14 +27,14 @@ pub fn check(row: &Row, context: &Context) -> Verdict {
         verdict.compare(row, columns[1], extremal.map(|e| e.work), None);
     };
     let cross = accelerates && tau_i > b - a && problem.v_f * tau_f > problem.v_i * tau_i;
-    pair(["t_cross", "work_cross"], cross, from_start(&problem, 0.0, false, None));
+    pair(["t_cross", "work_at_t_cross"], cross, from_start(&problem, 0.0, false, None));
     let start = 1.0 + a - b * ln_i;
     let hold_exists = accelerates && start - a > b - a && problem.v_f * tau_f > problem.v_i * start - a;
-    pair(["t_hold", "work_hold"], hold_exists, from_start(&problem, -ln_i, false, None));
+    pair(["t_floor", "work_at_t_floor"], hold_exists, from_start(&problem, -ln_i, false, None));
     // C = 0: a (e^z - 1 - z) = tau_ss(v_i).
     let cheapest = accelerates && tau_i > 0.0 && tau_f > 0.0;
     let fastest = branch(tau_i / a, true).and_then(|z| from_start(&problem, z, false, None));
-    pair(["t_cheapest", "work_cheapest"], cheapest, fastest);
+    pair(["t_cheapest", "work_at_t_cheapest"], cheapest, fastest);
     if !accelerates {
         let turn = tau_f > b - a;
         if problem.v_f < problem.v_i {
@@ -48,13 +48,13 @@ pub fn check(row: &Row, context: &Context) -> Verdict {
                 }),
                 _ => None,
             };
-            pair(["t_turn", "work_turn"], turn, mean);
+            pair(["t_turn", "work_at_t_turn"], turn, mean);
         }
         let t_min = least_time(&problem);
         let bounded = context.bounded;
         verdict.compare(row, "t_min", bounded.then_some(t_min), (t_min == 0.0).then_some(1.0));
-        let work = bounded.then(|| hold(problem.law, 1.0 / problem.v_i, t_min)).flatten();
-        verdict.compare(row, "work_min", work, (t_min == 0.0).then_some(1.0));
+        let work = bounded.then(|| floor(problem.law, 1.0 / problem.v_i, t_min)).flatten();
+        verdict.compare(row, "work_at_t_min", work, (t_min == 0.0).then_some(1.0));
     }
     let window = if accelerates || !context.bounded { None } else { window(&problem) };
     match window {

@@ -13,7 +13,7 @@ pub struct Extremal {
     pub work: f64,
     pub v_start: f64,
     pub v_end: f64,
-    pub hold_time: f64,
+    pub time_at_floor: f64,
     pub c: f64,
     /// Largest contact lifetime.
     pub theta_max: f64,
@@ -60,10 +60,10 @@ pub fn energy(law: Law, c: f64, theta: f64) -> f64 {
 /// Where `z` gives way to `ln theta` as the variable: the turn, at `z = 0`, is behind.
 const TURNED: f64 = 0.2;
 
-/// From `theta` at `z_0`, after a hold of `hold_time`, until `theta` is `1/v_f`, falling or rising.
+/// From `theta` at `z_0`, after a hold of `time_at_floor`, until `theta` is `1/v_f`, falling or rising.
 fn arc(
     problem: &Transition,
-    hold_time: f64,
+    time_at_floor: f64,
     theta: f64,
     z_0: f64,
     falling: bool,
@@ -79,8 +79,8 @@ fn arc(
     // The power of friction of the varied protocol.
     let varied = |y: &[f64; 5]| {
         let Some(Variation { size, k, t_f, bounded }) = variation else { return 0.0 };
-        let length = t_f - hold_time;
-        let (sin, cos) = (PI * k * (y[1] - hold_time) / length).sin_cos();
+        let length = t_f - time_at_floor;
+        let (sin, cos) = (PI * k * (y[1] - time_at_floor) / length).sin_cos();
         let (factor, growth) = (1.0 + size * sin * sin, 2.0 * size * PI * k / length * sin * cos);
         let theta = y[0].exp();
         let v = (1.0 + y[3].exp_m1() * factor - theta * growth) / (theta * factor);
@@ -102,8 +102,8 @@ fn arc(
         let dz = (law.a - law.b - c * theta) / (law.a * theta) * dt;
         [1.0, dt, friction(y) * z.exp() / theta * dt, dz, varied(y) * dt]
     };
-    let held = hold(law, 1.0 / problem.v_i, hold_time)?;
-    let start = [theta.ln(), hold_time, held, z_0, held];
+    let held = floor(law, 1.0 / problem.v_i, time_at_floor)?;
+    let start = [theta.ln(), time_at_floor, held, z_0, held];
     let y = if falling && z_1 > TURNED {
         let turned = if z_0 < TURNED { integrate(by_z, start, (z_0, TURNED))? } else { start };
         integrate(by_theta, turned, (turned[0], end))?
@@ -121,7 +121,7 @@ fn arc(
         work: y[2],
         v_start,
         v_end: y[3].exp() * problem.v_f,
-        hold_time,
+        time_at_floor,
         c,
         theta_max: turn.max(1.0 / problem.v_f).max(theta),
         varied: (variation.is_some() && admissible.get()).then_some(y[4]),
@@ -134,7 +134,7 @@ pub fn least_time(problem: &Transition) -> f64 {
 }
 
 /// Work of the hold at `v = 1`.
-pub fn hold(law: Law, theta: f64, time: f64) -> Option<f64> {
+pub fn floor(law: Law, theta: f64, time: f64) -> Option<f64> {
     let slope = |y: &[f64; 2]| [1.0 - y[0], 1.0 + law.b * y[0].ln()];
     integrate(slope, [theta, 0.0], (0.0, time)).map(|y| y[1])
 }
@@ -221,15 +221,15 @@ const LONG: f64 = 12.0;
 
 /// The optimum of a long duration: what comes after the hold hardly depends on it.
 fn find_held(problem: &Transition, t_f: f64) -> Option<(Extremal, Member)> {
-    let mut hold = t_f;
+    let mut floor = t_f;
     for _ in 0..50 {
-        let member = Member::Held(hold);
+        let member = Member::Held(floor);
         let extremal = at(problem, member, true, None)?;
-        let next = t_f - (extremal.time - hold);
-        if (next - hold).abs() <= 4.0 * f64::EPSILON * t_f {
+        let next = t_f - (extremal.time - floor);
+        if (next - floor).abs() <= 4.0 * f64::EPSILON * t_f {
             return Some((extremal, member));
         }
-        hold = next;
+        floor = next;
     }
     None
 }

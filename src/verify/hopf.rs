@@ -98,14 +98,14 @@ const VAGUE: f64 = 1e-13;
 pub fn compare_coefficient(verdict: &mut Verdict, row: &Row, law: Law, mass: f64, rtol: f64) {
     let expected = coefficient(law, mass);
     let noise = 1e-14 * law.a / mass / rtol;
-    verdict.compare(row, "lyapunov", expected, expected.map(|l| l.abs() + noise));
+    verdict.compare(row, "first_lyapunov_coefficient", expected, expected.map(|l| l.abs() + noise));
 }
 
 /// Compares `hopf`.
 pub fn compare_kind(verdict: &mut Verdict, row: &Row, law: Law, mass: f64) {
     match coefficient(law, mass) {
         Some(l) if l.abs() < VAGUE * law.a / mass => verdict.miss("Hopf points between the two kinds"),
-        Some(l) => verdict.compare_word(row, "hopf", if l < 0.0 { "supercritical" } else { "subcritical" }),
-        None => verdict.demand_nothing(row, "hopf"),
+        Some(l) => verdict.compare_word(row, "hopf_type", if l < 0.0 { "supercritical" } else { "subcritical" }),
+        None => verdict.demand_nothing(row, "hopf_type"),
     }
 }

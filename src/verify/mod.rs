@@ -1,6 +1,6 @@
 //! A dataset audited: a sample of its rows solved again by a route that shares nothing with the solvers that made it.
 
-mod best;
+mod best_cubic;
 mod compliant;
 mod course;
 mod crossover;
@@ -14,9 +14,9 @@ mod pieces;
 mod reduced;
 mod route;
 mod sample;
+mod shortcut;
 mod stability;
-mod step;
-mod swift;
+mod step_response;
 mod swing;
 mod units;
 mod verdict;
@@ -104,11 +104,11 @@ pub fn verify(path: &Path, manifest: &Manifest, sample: u64, seed: u64) -> Resul
                 "gap" => gap::check(&row, &context),
                 "optimal" => optimal::check(&row, &context),
                 "crossover" => crossover::check(&row, &context),
-                "best" => best::check(&row, &context, rtol),
-                "swift" => swift::check(&row, &context),
+                "best_cubic" => best_cubic::check(&row, &context, rtol),
+                "shortcut" => shortcut::check(&row, &context),
                 "compliant" => compliant::check(&row, &context, rtol),
                 "regularised" => pieces::check(&row, &context, rtol),
-                "step" => step::check(&row, &context, rtol),
+                "step_response" => step_response::check(&row, &context, rtol),
                 "stability" => stability::check(&row, &context),
                 _ if is_reduced => reduced::check(&row, &units, &spec, &context),
                 _ => Verdict::unchecked("there is no independent route for this table"),

@@ -27,12 +27,12 @@ pub fn check(row: &Row, context: &Context) -> Verdict {
     verdict.compare(row, "work", Some(extremal.work), Some(size));
     verdict.compare(row, "v_start", Some(extremal.v_start), None);
     verdict.compare(row, "v_end", Some(extremal.v_end), None);
-    verdict.compare(row, "hold_time", Some(extremal.hold_time), (extremal.hold_time == 0.0).then_some(t_f));
+    verdict.compare(row, "time_at_floor", Some(extremal.time_at_floor), (extremal.time_at_floor == 0.0).then_some(t_f));
     verdict.compare(row, "hamiltonian", Some(-extremal.c), None);
     verdict.compare(row, "theta_max", Some(extremal.theta_max), None);
     verdict.friction(row, friction_min(&problem, &extremal));
     let strategy = match extremal.v_start {
-        _ if extremal.hold_time > 0.0 => "hold",
+        _ if extremal.time_at_floor > 0.0 => "floor",
         v if v > problem.v_i => "speed_up",
         _ => "slow_down",
     };
@@ -50,9 +50,12 @@ const PLACES: u32 = 4000;
 /// Least friction: on the hold it rises; on the arc `u - 1 - ln u` follows from theta, rising and then falling.
 fn friction_min(problem: &Transition, extremal: &Extremal) -> f64 {
     let Transition { law, v_i, v_f } = *problem;
-    let held = if extremal.hold_time > 0.0 { 1.0 - law.b * v_i.ln() } else { f64::INFINITY };
-    let start =
-        if extremal.hold_time > 0.0 { 1.0 + (1.0 / v_i - 1.0) * (-extremal.hold_time).exp() } else { 1.0 / v_i };
+    let held = if extremal.time_at_floor > 0.0 { 1.0 - law.b * v_i.ln() } else { f64::INFINITY };
+    let start = if extremal.time_at_floor > 0.0 {
+        1.0 + (1.0 / v_i - 1.0) * (-extremal.time_at_floor).exp()
+    } else {
+        1.0 / v_i
+    };
     let friction = |z: f64, theta: f64| 1.0 + law.a * z + (law.b - law.a) * theta.ln();
     let mut least = held.min(friction((extremal.v_start * start).ln(), start));
     least = least.min(friction((extremal.v_end / v_f).ln(), 1.0 / v_f));

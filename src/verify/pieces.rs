@@ -270,32 +270,32 @@ fn again<'a>(slider: &'a Slider, problem: &Transition, t_f: f64, delta_t: f64, b
     let none = [f64::INFINITY, f64::NEG_INFINITY];
     let mut found =
         Found { slider, excess: 0.0, replaced: 0.0, vague: 0.0, v: none, friction_min: f64::INFINITY, control: none };
-    let hold = best.hold_time;
+    let floor = best.time_at_floor;
     let held = |t: f64| Moment { q: [0.0; 3], y: (1.0 - (1.0 - 1.0 / problem.v_i) * (-t).exp()).ln(), work: 0.0 };
-    let worked = |from: f64, to: f64| super::extremal::hold(law, held(from).y.exp(), to - from);
+    let worked = |from: f64, to: f64| super::extremal::floor(law, held(from).y.exp(), to - from);
     // Where the arc begins, and where the optimum ends.
-    let begin = Moment::moving(law, best.v_start.ln(), held(hold).y, 0.0);
+    let begin = Moment::moving(law, best.v_start.ln(), held(floor).y, 0.0);
     let last = Moment::moving(law, best.v_end.ln(), -problem.v_f.ln(), 0.0);
-    if t_f - hold < delta_t {
+    if t_f - floor < delta_t {
         return None;
     }
     let arriving = further(law, &last, -delta_t)?;
-    let (leaving, work) = if hold > delta_t {
+    let (leaving, work) = if floor > delta_t {
         (held(delta_t), worked(0.0, delta_t)?)
     } else {
-        let leaving = further(law, &begin, delta_t - hold)?;
-        (leaving, worked(0.0, hold)? + leaving.work)
+        let leaving = further(law, &begin, delta_t - floor)?;
+        (leaving, worked(0.0, floor)? + leaving.work)
     };
     found.replace([Moment::steady(problem.v_i), leaving], [true, false], delta_t, work)?;
-    let (mut from, mut gone) = (leaving, delta_t.max(hold));
-    if hold > delta_t {
-        let start = (hold - 0.5 * delta_t).max(delta_t);
-        let (end, work, until) = if hold + 0.5 * delta_t < t_f - delta_t {
+    let (mut from, mut gone) = (leaving, delta_t.max(floor));
+    if floor > delta_t {
+        let start = (floor - 0.5 * delta_t).max(delta_t);
+        let (end, work, until) = if floor + 0.5 * delta_t < t_f - delta_t {
             let end = further(law, &begin, 0.5 * delta_t)?;
-            (end, worked(start, hold)? + end.work, hold + 0.5 * delta_t)
+            (end, worked(start, floor)? + end.work, floor + 0.5 * delta_t)
         } else {
-            let end = further(law, &begin, t_f - delta_t - hold)?;
-            (end, worked(start, hold)? + end.work, t_f - delta_t)
+            let end = further(law, &begin, t_f - delta_t - floor)?;
+            (end, worked(start, floor)? + end.work, t_f - delta_t)
         };
         for moment in [leaving, held(start)] {
             let told = found.control(moment.velocity(), moment.y);
@@ -337,8 +337,8 @@ pub fn check(row: &Row, context: &Context, rtol: f64) -> Verdict {
         verdict.status(row, overlaps);
         return verdict;
     }
-    if word(row, STATUS) == Some("nonphysical") {
-        verdict.miss("status is nonphysical");
+    if word(row, STATUS) == Some("unproven") {
+        verdict.miss("status is unproven");
         return verdict;
     }
     ["work", "gap", "v_min", "v_max", "v_c_min", "v_c_max"].iter().for_each(|column| verdict.demand(row, column));

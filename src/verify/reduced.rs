@@ -101,7 +101,7 @@ pub fn check(written: &Row, units: &Units, spec: &Spec, context: &Context) -> Ve
     let order = [
         Status::NotConverged,
         Status::Ok,
-        Status::Nonphysical,
+        Status::Unproven,
         Status::NegativeFriction,
         Status::BelowBound,
         Status::Infeasible,

@@ -79,7 +79,7 @@ pub fn check(row: &Row, _: &Context) -> Verdict {
     let weakening = b - a;
     let critical = |v: f64| weakening * (double(1.0) + double(m) * double(v) * double(v) / a);
     let mut verdict = Verdict::default();
-    verdict.compare(row, "k_qs", Some(weakening.high), None);
+    verdict.compare(row, "k_od", Some(weakening.high), None);
     for (k_c, stable, v) in [("k_c_i", "stable_i", problem.v_i), ("k_c_f", "stable_f", problem.v_f)] {
         let critical = critical(v);
         verdict.compare(row, k_c, Some(critical.high), None);

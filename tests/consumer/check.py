@@ -15,7 +15,7 @@ import polars as pl
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-STATUS = {"ok", "below_bound", "infeasible", "negative_friction", "nonphysical", "not_converged"}
+STATUS = {"ok", "below_bound", "infeasible", "negative_friction", "unproven", "not_converged"}
 AXES = ["t_f", "a", "b", "v_i", "v_f", "alpha_2", "alpha_3"]
 GAP = AXES + ["work", "work_optimal", "gap", "v_min", "status"]
 
@@ -30,7 +30,7 @@ def check_manifest(dataset):
     assert manifest["name"] == "small"
     assert "tables.gap" in manifest["spec"]
     rows = {table["name"]: table["rows"] for table in manifest["tables"]}
-    assert rows == {"gap": 3 * 21 * 41, "best": 3, "optimal": 3, "crossover": 1}
+    assert rows == {"gap": 3 * 21 * 41, "best_cubic": 3, "optimal": 3, "crossover": 1}
     for table in manifest["tables"]:
         parts = sorted(path.name for path in (dataset / table["name"]).iterdir())
         assert parts == [f"part-{part:06}.parquet" for part in range(table["parts"])]
@@ -77,7 +77,7 @@ def check_polars(dataset, frame):
     optimal = pl.read_parquet(dataset / "optimal" / "*.parquet")
     assert optimal["strategy"].cast(pl.String).to_list() == ["speed_up", "speed_up", "slow_down"]
     # The paper's figures: the gap's minimum at t_f = 0.02 and the crossover.
-    best = pl.read_parquet(dataset / "best" / "*.parquet")
+    best = pl.read_parquet(dataset / "best_cubic" / "*.parquet")
     assert math.isclose(best["gap"][0], 6.580308e-7, rel_tol=1e-6)
     assert math.isclose(best["alpha_2"][0], -0.1198296, rel_tol=1e-6)
     crossover = pl.read_parquet(dataset / "crossover" / "*.parquet")

@@ -19,7 +19,7 @@ fn landscape() -> tempfile::TempDir {
 }
 
 fn small() -> tempfile::TempDir {
-    dataset(&format!("t_f = [0.02, 0.037, 0.049]\n{MATERIAL}"), "[tables.optimal]\n[tables.best]\n")
+    dataset(&format!("t_f = [0.02, 0.037, 0.049]\n{MATERIAL}"), "[tables.optimal]\n[tables.best_cubic]\n")
 }
 
 fn slipsweep(folder: &Path, arguments: &[&str]) -> Output {
@@ -60,7 +60,7 @@ fn summaries_state_units() {
     let expected = "\
 optimal: 3 rows (3 ok)
   at a = 0.03 mu_0, b = 0.05 mu_0, v_i = 3 v_0, v_f = 100 v_0
-    t_f    work          v_start     v_end       hold_time  hamiltonian     theta_max    strategy
+    t_f    work          v_start     v_end       time_at_floor  hamiltonian     theta_max    strategy
     l/v_0  mu_0 sigma l  v_0         v_0         l/v_0      mu_0 sigma v_0  l/v_0
     0.02   3.80811142    19.9230141  3392.16787  0          2.59678653      0.333333333  speed_up
 ";
@@ -95,7 +95,7 @@ fn head_shows_names_units_and_rows() {
     let head = printed(folder.path(), &["head", "results/test", "optimal", "-n", "2"]);
     let expected = "\
 optimal: 3 rows, each the protocol of least work
-  t_f    a     b     v_i  v_f  work          v_start     v_end       hold_time  hamiltonian     theta_max    strategy  status
+  t_f    a     b     v_i  v_f  work          v_start     v_end       time_at_floor  hamiltonian     theta_max    strategy  status
   l/v_0  mu_0  mu_0  v_0  v_0  mu_0 sigma l  v_0         v_0         l/v_0      mu_0 sigma v_0  l/v_0
   0.02   0.03  0.05  3    100  3.80811142    19.9230141  3392.16787  0          2.59678653      0.333333333  speed_up  ok
   0.037  0.03  0.05  3    100  3.85650171    3.12297925  3380.58505  0          2.93400965      0.333333333  speed_up  ok
@@ -168,13 +168,13 @@ fn a_reader_that_has_had_enough_is_no_failure() {
 fn wrong_questions_are_answered_with_what_there_is() {
     let folder = small();
     let tables = "  expected: a SELECT from these tables:\n    \
-                  optimal: t_f, a, b, v_i, v_f, work, v_start, v_end, hold_time, hamiltonian, theta_max, strategy, status\n    \
+                  optimal: t_f, a, b, v_i, v_f, work, v_start, v_end, time_at_floor, hamiltonian, theta_max, strategy, status\n    \
                   best: t_f, a, b, v_i, v_f, alpha_2, alpha_3, work, work_optimal, gap, v_min, status\n";
     let correct = "correct the query; text goes in 'single quotes', names with odd characters in \"double\" ones";
     for (question, found, help) in [
         ("SELECT worck FROM best", "no column `worck`", "did you mean `work`?"),
         ("SELECT temperature FROM best", "no column `temperature`", "choose one of these"),
-        ("SELECT gap FROM bets", "no table `bets`", "did you mean `best`?"),
+        ("SELECT gap FROM bets", "no table `bets`", "did you mean `best_cubic`?"),
         ("SELEC gap FROM best", "not SQL: Expected: an SQL statement, found: SELEC at Line: 1, Column: 1", correct),
         ("SELECT frobnicate(gap) FROM best", "unsupported function 'frobnicate'", correct),
         ("", "not one statement", "write one SELECT"),

@@ -32,7 +32,7 @@ fn batches_are_the_parts() {
         (LANDSCAPE.to_owned(), &["gap"][..]),
         (
             format!("t_f = [0.001, 0.02, 0.07]\n{MATERIAL}\nk = [1e-3, 1e-1]\n"),
-            &["optimal", "swift", "stability", "step"],
+            &["optimal", "shortcut", "stability", "step_response"],
         ),
     ] {
         let asked: String = tables.iter().map(|table| format!("[tables.{table}]\n")).collect();
@@ -48,7 +48,7 @@ fn batches_are_the_parts() {
                 assert_eq!(batch.columns(), part.columns(), "{table}");
             }
         }
-        assert!(sweep.batches("best").is_none());
+        assert!(sweep.batches("best_cubic").is_none());
         std::fs::remove_dir_all(folder.path().join("results")).expect("was written");
     }
 }
@@ -57,7 +57,7 @@ fn batches_are_the_parts() {
 fn a_wrong_spec_says_where() {
     let error = Sweep::parse("name = \"x\"\n[axes]\nv_i = 1.0\n[tables.optimum]\n", Path::new(".")).err();
     let message = "line 3: axes.v_i: 1.0 is out of range\n  expected: 1 < v_i <= 1e12\n  help: choose values in the range\n\
-                   error: line 4: tables.optimum: unknown table `optimum`\n  expected: gap, best, optimal, crossover, swift, \
-                   stability, step, compliant, regularised\n  help: did you mean `optimal`?";
+                   error: line 4: tables.optimum: unknown table `optimum`\n  expected: gap, best_cubic, optimal, crossover, shortcut, \
+                   stability, step_response, compliant, regularised\n  help: did you mean `optimal`?";
     assert_eq!(error.expect("is refused").to_string(), message);
 }

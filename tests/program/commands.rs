@@ -24,7 +24,7 @@ fn write_spec(folder: &Path, axes: &str, tables: &str) {
 #[test]
 fn run_tells_what_a_physicist_asks() {
     let folder = tempfile::tempdir().expect("is writable");
-    write_spec(folder.path(), LANDSCAPE, "[tables.gap]\n[tables.best]\n[tables.optimal]\n[tables.crossover]\n");
+    write_spec(folder.path(), LANDSCAPE, "[tables.gap]\n[tables.best_cubic]\n[tables.optimal]\n[tables.crossover]\n");
     let output = slipsweep(folder.path()).args(["run", "spec.toml"]).output().expect("runs");
     assert_eq!((output.status.code(), String::from_utf8_lossy(&output.stderr).as_ref()), (Some(0), ""));
     let text = String::from_utf8_lossy(&output.stdout);

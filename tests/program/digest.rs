@@ -24,11 +24,11 @@ const SPECS: [(&str, &str); 5] = [
     (MANY, "[tables.gap]\n[tables.optimal]\n"),
     (
         "t_f = [0.02, 0.037]\na = 0.03\nb = [0.05, 0.06]\nv_i = 3.0\nv_f = [50.0, 100.0]\nfamily = [\"step\", \"cubic\", \"bounded_velocity\"]\n",
-        "[tables.swift]\n",
+        "[tables.shortcut]\n",
     ),
     (
         "a = 0.03\nb = 0.05\nv_i = 3.0\nv_f = [50.0, 100.0]\nk = { geomspace = [1e-3, 1.0, 5] }\nm = [0.0, 1e-10]\n",
-        "[tables.stability]\n[tables.step]\n",
+        "[tables.stability]\n[tables.step_response]\n",
     ),
     (MATERIAL, "[tables.stability]\n"),
 ];
@@ -101,7 +101,7 @@ fn compare(name: &str, digest: &Digest, rows: &[Row]) {
     }
     let least: Vec<_> = least.into_iter().map(|(_, row)| cells(row)).collect();
     assert_eq!(digest.least().map(|row| row.cells.clone()).collect::<Vec<_>>(), least, "{name}");
-    assert_eq!(least.is_empty(), !["gap", "swift"].contains(&name), "{name}");
+    assert_eq!(least.is_empty(), !["gap", "shortcut"].contains(&name), "{name}");
     let mut predicted = BTreeMap::new();
     for (prediction, row) in
         table.prediction().iter().flat_map(|prediction| rows.iter().map(move |row| (prediction, row)))
@@ -117,7 +117,7 @@ fn compare(name: &str, digest: &Digest, rows: &[Row]) {
     }
     let predicted = predicted.into_iter().map(|((predicted, found), rows)| (predicted, found, rows));
     assert_eq!(digest.predicted, predicted.collect::<Vec<_>>(), "{name}");
-    assert_eq!(digest.predicted.is_empty(), name != "step", "{name}");
+    assert_eq!(digest.predicted.is_empty(), name != "step_response", "{name}");
 }
 
 fn survey(out: &Path, sweep: &slipsweep::sweep::Sweep) -> Survey {

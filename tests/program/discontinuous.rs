@@ -15,12 +15,12 @@ use crate::common::{numbers, read, run, sweep, words};
 /// Every table with its axes but those of the material.
 const TABLES: [(&str, &str); 9] = [
     ("gap", "t_f = [0.02, 0.04]\nalpha_2 = [-0.1, 0.1]\nalpha_3 = [-0.1, 0.1]\n"),
-    ("best", "t_f = [0.02]\n"),
+    ("best_cubic", "t_f = [0.02]\n"),
     ("optimal", "t_f = [0.02, 0.04]\n"),
     ("crossover", ""),
-    ("swift", "t_f = [0.02]\nfamily = [\"step\", \"cubic\"]\ntau_max = [1.5]\n"),
+    ("shortcut", "t_f = [0.02]\nfamily = [\"step\", \"cubic\"]\ntau_ceiling = [1.5]\n"),
     ("stability", "k = [7.5e-3, 1.0]\nm = [1e-12, 1e-6]\n"),
-    ("step", "k = [1.0]\nm = [1e-12, 1e-6]\n"),
+    ("step_response", "k = [1.0]\nm = [1e-12, 1e-6]\n"),
     ("compliant", "t_f = [0.02]\nk = [1.0]\nm = [1e-12]\ndt = [0.0]\n"),
     ("regularised", "t_f = [0.02]\nk = [7.5e-3]\nm = [1e-12, 1e-6]\ndelta_t = [1e-3]\n"),
 ];
@@ -119,7 +119,7 @@ fn regress_ends_of_ranges_are_solved() {
             ("v_f", "[1.0000000000000002, 2.9999999999999996, 3.0000000000000004, 1e12]"),
             ("k", "[1e-40, 1e40, inf]"),
             ("m", "[0.0, 1e-40, 1e-20]"),
-            ("tau_max", "[1e-20, 1e20, inf]"),
+            ("tau_ceiling", "[1e-20, 1e20, inf]"),
         ] {
             let axes = format!("{own}a = 0.03\nb = 0.05\nv_i = 3.0\nv_f = 100.0\n");
             let line = |line: &str| line.split(" = ").next() == Some(axis);
@@ -131,7 +131,7 @@ fn regress_ends_of_ranges_are_solved() {
             let (rows, _) = table(folder.path(), &lines.collect::<String>(), name);
             defects += words(&rows, "status").iter().filter(|status| *status == "not_converged").count();
             for column in rows.columns().iter().filter(|column| column.dtype().is_float()) {
-                let infinite = ["k", "tau_max", "rigid"].contains(&column.name().as_str());
+                let infinite = ["k", "tau_ceiling", "stiffness_ratio"].contains(&column.name().as_str());
                 for value in numbers(&rows, column.name()).into_iter().flatten() {
                     assert!(value.is_finite() || infinite, "{name} {axis} {}: {value}", column.name());
                 }

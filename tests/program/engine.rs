@@ -10,7 +10,7 @@ use slipsweep::dataset::{Build, Folder};
 use slipsweep::sweep::{Plan, RunError, Sweep, TableOutcome};
 use slipsweep::table::{Signal, Work};
 
-const ALL_TABLES: &str = "[tables.gap]\n[tables.best]\n[tables.optimal]\n[tables.crossover]\n";
+const ALL_TABLES: &str = "[tables.gap]\n[tables.best_cubic]\n[tables.optimal]\n[tables.crossover]\n";
 
 #[test]
 fn bytes_do_not_depend_on_threads() {
@@ -129,11 +129,11 @@ fn coefficients_are_the_same_in_either_unit() {
          alpha_3 = { linspace = [-0.25, 0.25, 3], unit = \"1/t_f^2\" }\n",
     );
     let plain = axes("alpha_2 = [-0.5, 0.0, 0.5]\nalpha_3 = { linspace = [-1.0, 1.0, 3], unit = \"v_0/l\" }\n");
-    let tables = "[tables.gap]\n[tables.best]\n";
+    let tables = "[tables.gap]\n[tables.best_cubic]\n";
     let [relative, plain] = [("relative", relative), ("plain", plain)].map(|(name, axes)| {
         let out = folder.path().join(name);
         run(&sweep(folder.path(), &axes, tables), &out, 1);
-        (read(&out, "gap"), read(&out, "best"))
+        (read(&out, "gap"), read(&out, "best_cubic"))
     });
     assert_eq!(numbers(&relative.0, "alpha_3"), [-0.25, 0.0, 0.25].repeat(3).into_iter().map(Some).collect::<Vec<_>>());
     assert_eq!(numbers(&plain.0, "alpha_3"), [-1.0, 0.0, 1.0].repeat(3).into_iter().map(Some).collect::<Vec<_>>());
@@ -179,27 +179,34 @@ fn points_vary_together_and_slowest() {
 #[test]
 fn columns_are_those_of_the_contract() {
     let folder = tempfile::tempdir().expect("is writable");
-    let axes = format!("t_f = 0.02\n{MATERIAL}alpha_2 = 0.0\nalpha_3 = 0.0\nk = inf\nm = 0.0\ntau_max = 2.0\n");
-    run(&sweep(folder.path(), &axes, &format!("{ALL_TABLES}[tables.swift]\n[tables.stability]\n")), folder.path(), 1);
+    let axes = format!("t_f = 0.02\n{MATERIAL}alpha_2 = 0.0\nalpha_3 = 0.0\nk = inf\nm = 0.0\ntau_ceiling = 2.0\n");
+    run(
+        &sweep(folder.path(), &axes, &format!("{ALL_TABLES}[tables.shortcut]\n[tables.stability]\n")),
+        folder.path(),
+        1,
+    );
     let names = |table| {
         let frame = read(folder.path(), table);
         frame.get_column_names().into_iter().map(|name| name.as_str()).collect::<Vec<_>>().join(" ")
     };
     assert_eq!(names("gap"), "t_f a b v_i v_f alpha_2 alpha_3 work work_optimal gap v_min status");
-    assert_eq!(names("best"), "t_f a b v_i v_f alpha_2 alpha_3 work work_optimal gap v_min status");
-    assert_eq!(names("optimal"), "t_f a b v_i v_f work v_start v_end hold_time hamiltonian theta_max strategy status");
+    assert_eq!(names("best_cubic"), "t_f a b v_i v_f alpha_2 alpha_3 work work_optimal gap v_min status");
     assert_eq!(
-        names("swift"),
-        "t_f a b v_i v_f family tau_max alpha work work_optimal gap v_min v_max friction_max status"
+        names("optimal"),
+        "t_f a b v_i v_f work v_start v_end time_at_floor hamiltonian theta_max strategy status"
+    );
+    assert_eq!(
+        names("shortcut"),
+        "t_f a b v_i v_f family tau_ceiling alpha work work_optimal gap v_min v_max friction_max status"
     );
     assert_eq!(
         names("stability"),
-        "a b v_i v_f k m k_qs k_c_i k_c_f stable_i stable_f v_crit growth_rate frequency decay_rate status"
+        "a b v_i v_f k m k_od k_c_i k_c_f stable_i stable_f v_crit growth_rate frequency decay_rate status"
     );
     assert_eq!(
         names("crossover"),
-        "a b v_i v_f t_cross t_hold t_cheapest t_min t_turn t_free_in t_free_out work_cross work_hold work_cheapest work_min \
-         work_turn status"
+        "a b v_i v_f t_cross t_floor t_cheapest t_min t_turn t_free_in t_free_out work_at_t_cross work_at_t_floor work_at_t_cheapest work_at_t_min \
+         work_at_t_turn status"
     );
 }
 
@@ -212,8 +219,8 @@ fn numbers_are_null_where_there_are_none() {
     run(&sweep(folder.path(), axes, "[tables.gap]\n[tables.optimal]\n"), folder.path(), 1);
     let optimal = read(folder.path(), "optimal");
     assert_eq!(words(&optimal, "status"), ["infeasible", "ok"]);
-    assert_eq!(words(&optimal, "strategy"), ["", "hold"]);
-    for column in ["work", "v_start", "v_end", "hold_time", "hamiltonian", "theta_max"] {
+    assert_eq!(words(&optimal, "strategy"), ["", "floor"]);
+    for column in ["work", "v_start", "v_end", "time_at_floor", "hamiltonian", "theta_max"] {
         let cells = numbers(&optimal, column);
         assert_eq!((cells[0], cells[1].is_some()), (None, true), "{column}");
     }
@@ -324,25 +331,25 @@ fn paper_landscape_read_back() {
 fn families_are_words_and_say_which_bound_stops_them() {
     let folder = tempfile::tempdir().expect("is writable");
     let axes = "t_f = [0.35, 0.41]\na = 0.03\nb = 0.05\nv_i = 100.0\nv_f = 3.0\n\
-                family = [\"bounded_friction\", \"step\"]\ntau_max = [0.5, 1.5]\n";
-    let tables = "[tables.swift]\ncolumns = [\"work\", \"end_error\", \"bound\"]\n";
+                family = [\"bounded_friction\", \"step\"]\ntau_ceiling = [0.5, 1.5]\n";
+    let tables = "[tables.shortcut]\ncolumns = [\"work\", \"terminal_error\", \"bound\"]\n";
     run(&sweep(folder.path(), axes, tables), folder.path(), 1);
-    let swift = read(folder.path(), "swift");
-    let names = swift.get_column_names().into_iter().map(|name| name.as_str()).collect::<Vec<_>>().join(" ");
-    assert_eq!(names, "t_f a b v_i v_f family tau_max work end_error bound status");
-    let families: Vec<String> = words(&swift, "family");
+    let shortcut = read(folder.path(), "shortcut");
+    let names = shortcut.get_column_names().into_iter().map(|name| name.as_str()).collect::<Vec<_>>().join(" ");
+    assert_eq!(names, "t_f a b v_i v_f family tau_ceiling work terminal_error bound status");
+    let families: Vec<String> = words(&shortcut, "family");
     let of_one_time = ["bounded_friction", "bounded_friction", "step", "step"];
     assert_eq!(families, [of_one_time, of_one_time].concat());
     // t_min is 0.395, and friction at the ends is 0.91 and 0.98.
-    assert_eq!(words(&swift, "bound")[..5], ["time", "time", "time", "time", "friction"]);
-    assert_eq!(words(&swift, "status")[..5], ["infeasible"; 5]);
-    let (work, end_error) = (numbers(&swift, "work"), numbers(&swift, "end_error"));
+    assert_eq!(words(&shortcut, "bound")[..5], ["time", "time", "time", "time", "friction"]);
+    assert_eq!(words(&shortcut, "status")[..5], ["infeasible"; 5]);
+    let (work, terminal_error) = (numbers(&shortcut, "work"), numbers(&shortcut, "terminal_error"));
     assert_eq!(work[..5], [None; 5]);
     for row in [6, 7] {
         // theta(t_f) v_f - 1 of a step in closed form.
         let expected = (3.0 / 100.0 - 1.0) * (-3.0 * 0.41_f64).exp();
-        assert!(end_error[row].is_some_and(|error| (error / expected - 1.0).abs() < 1e-12));
-        assert_eq!((words(&swift, "status")[row].as_str(), work[row].is_some()), ("ok", true));
+        assert!(terminal_error[row].is_some_and(|error| (error / expected - 1.0).abs() < 1e-12));
+        assert_eq!((words(&shortcut, "status")[row].as_str(), work[row].is_some()), ("ok", true));
     }
 }
 
@@ -369,15 +376,15 @@ fn errors_are_told_of_every_work_and_gap_where_a_spec_names_them() {
     let folder = tempfile::tempdir().expect("is writable");
     let axes = format!(
         "t_f = [0.02, 0.037, 0.06]\n{MATERIAL}alpha_2 = {{ linspace = [-0.2, 0.2, 5], unit = \"1/t_f\" }}\n\
-         alpha_3 = {{ linspace = [-0.2, 0.2, 5], unit = \"1/t_f^2\" }}\nk = 0.01\nm = 1e-9\ndelta_t = 1e-4\ntau_max = 1.5\n"
+         alpha_3 = {{ linspace = [-0.2, 0.2, 5], unit = \"1/t_f^2\" }}\nk = 0.01\nm = 1e-9\ndelta_t = 1e-4\ntau_ceiling = 1.5\n"
     );
-    let tables = ["gap", "optimal", "best", "swift", "compliant", "regularised"];
+    let tables = ["gap", "optimal", "best_cubic", "shortcut", "compliant", "regularised"];
     for rtol in [1e-6, 1e-10] {
         let specs: String = tables
             .iter()
             .map(|&table| {
                 let columns = match table {
-                    "optimal" | "best" => "\"work\", \"work_error\"",
+                    "optimal" | "best_cubic" => "\"work\", \"work_error\"",
                     _ => "\"work\", \"gap\", \"work_error\", \"gap_error\"",
                 };
                 format!("[tables.{table}]\nrtol = {rtol:e}\ncolumns = [{columns}]\n")

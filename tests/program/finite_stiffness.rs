@@ -10,7 +10,7 @@ fn compliant_is_written_and_its_members_are_shared_between_samplings() {
     let axes = format!("{MATERIAL}{AXES}dt = [0.0, 1e-4, 1e-9]\n");
     let sweep = sweep(folder.path(), &axes, "[tables.compliant]\n");
     let outcome = run(&sweep, folder.path(), 1);
-    assert_eq!((outcome.work.swifts, outcome.work.optima), (4, 2));
+    assert_eq!((outcome.work.shortcuts, outcome.work.optima), (4, 2));
     // On the elastic spring the flow is linearised for each of two times, and the control sampled once for each.
     assert_eq!(outcome.work.simulations, 4);
     assert!(outcome.work.steps > 0, "{:?}", outcome.work);
@@ -18,7 +18,7 @@ fn compliant_is_written_and_its_members_are_shared_between_samplings() {
     let names: Vec<&str> = frame.get_column_names().into_iter().map(|name| name.as_str()).collect();
     assert_eq!(
         names.join(" "),
-        "t_f a b v_i v_f k m dt alpha work work_optimal gap v_min v_max v_c_min v_c_max amplification end_error rigid \
+        "t_f a b v_i v_f k m dt alpha work work_optimal gap v_min v_max v_c_min v_c_max amplification sampling_error stiffness_ratio \
          status"
     );
     assert_eq!(words(&frame, "status"), ["ok"; 12]);
@@ -27,11 +27,11 @@ fn compliant_is_written_and_its_members_are_shared_between_samplings() {
         assert!(column(name).iter().all(Option::is_some), "{name}");
     }
     let (dt, k, t_f) = (column("dt"), column("k"), column("t_f"));
-    for (row, error) in column("end_error").into_iter().enumerate() {
+    for (row, error) in column("sampling_error").into_iter().enumerate() {
         // Not sampled, sampled, sampled more often than is simulated.
         assert_eq!(error.is_some(), dt[row] == Some(1e-4), "row {row}: {error:?}");
-        let rigid = column("rigid")[row].zip(k[row]).zip(t_f[row]).expect("is given");
-        assert_eq!(rigid.0.0, rigid.0.1 * rigid.1 * rigid.1 / 1e-6);
+        let ratio = column("stiffness_ratio")[row].zip(k[row]).zip(t_f[row]).expect("is given");
+        assert_eq!(ratio.0.0, ratio.0.1 * ratio.1 * ratio.1 / 1e-6);
     }
     for row in (0..12).filter(|&row| k[row] == Some(f64::INFINITY)) {
         assert_eq!([column("v_c_min")[row], column("v_c_max")[row]], [column("v_min")[row], column("v_max")[row]]);
@@ -41,13 +41,13 @@ fn compliant_is_written_and_its_members_are_shared_between_samplings() {
 #[test]
 fn compliant_tells_how_the_loop_closes_if_asked() {
     let folder = tempfile::tempdir().expect("is writable");
-    let tables = "[tables.compliant]\ncolumns = [\"loop_error\", \"amplification\"]\n";
+    let tables = "[tables.compliant]\ncolumns = [\"open_loop_error\", \"amplification\"]\n";
     let outcome = run(&sweep(folder.path(), &format!("{MATERIAL}{AXES}"), tables), folder.path(), 2);
     assert_eq!(outcome.work.simulations, 4);
     let frame = read(folder.path(), "compliant");
     // Without an axis dt the control is not sampled.
     assert_eq!(numbers(&frame, "dt"), [Some(0.0); 4]);
-    for (error, growth) in numbers(&frame, "loop_error").into_iter().zip(numbers(&frame, "amplification")) {
+    for (error, growth) in numbers(&frame, "open_loop_error").into_iter().zip(numbers(&frame, "amplification")) {
         assert!(error.zip(growth).is_some_and(|(error, growth)| error < 1e-10 * (1.0 + growth)), "{error:?}");
     }
 }

@@ -294,7 +294,7 @@ const UNION: &str = "[[block]]\nzip = [[\"t_f\", \"v_i\"]]\nwhere = \"v_f > 20 a
 #[test]
 fn a_union_of_every_kind_of_block_is_the_same_on_any_threads() {
     let folder = tempfile::tempdir().expect("is writable");
-    let sweep = load(folder.path(), UNION, "[tables.gap]\n[tables.optimal]\n[tables.stability]\n[tables.swift]\n")
+    let sweep = load(folder.path(), UNION, "[tables.gap]\n[tables.optimal]\n[tables.stability]\n[tables.shortcut]\n")
         .expect("is legal");
     let plan = Plan::new(&sweep);
     let rows: Vec<u64> = plan.tables.iter().map(|table| table.rows).collect();
@@ -357,14 +357,14 @@ fn a_grid_written_in_another_way_has_the_same_rows() {
 fn words_are_compared_by_name() {
     let folder = tempfile::tempdir().expect("is writable");
     let text = format!(
-        "where = \"family = 'bounded_friction' or tau_max = inf\"\n[axes]\nt_f = 0.02\n{MATERIAL}v_i = 3.0\nv_f = 100.0\n\
-         tau_max = [1.2, 1.6, inf]\n"
+        "where = \"family = 'bounded_friction' or tau_ceiling = inf\"\n[axes]\nt_f = 0.02\n{MATERIAL}v_i = 3.0\nv_f = 100.0\n\
+         tau_ceiling = [1.2, 1.6, inf]\n"
     );
-    let sweep = load(folder.path(), &text, "[tables.swift]\ncolumns = [\"work\"]\n").expect("is legal");
+    let sweep = load(folder.path(), &text, "[tables.shortcut]\ncolumns = [\"work\"]\n").expect("is legal");
     run(&sweep, folder.path(), 1);
-    let frame = read(folder.path(), "swift");
+    let frame = read(folder.path(), "shortcut");
     let families = words(&frame, "family");
-    // tau_max varies slower than family, which is not written.
+    // tau_ceiling varies slower than family, which is not written.
     let rest = ["step", "cubic", "bounded_velocity", "bounded_friction"];
     assert_eq!(families, [&["bounded_friction", "bounded_friction"][..], &rest].concat());
 }
@@ -449,7 +449,7 @@ fn expressions_mean_what_they_say() {
 
 /// All tables over a small grid, with scales that are powers of two: nothing is rounded on the way.
 const SI: &str = "[model]\nunits = \"si\"\nmu_0 = 0.5\nl = 0.00000095367431640625\nv_0 = 0.000000000931322574615478515625\n\
-                  normal_load = 1048576.0\n";
+                  normal_stress = 1048576.0\n";
 
 /// The same point in SI and scaled units.
 fn both(folder: &Path) -> [std::path::PathBuf; 2] {
@@ -457,7 +457,7 @@ fn both(folder: &Path) -> [std::path::PathBuf; 2] {
     let axes = |one: f64, time: f64, v: f64, stress: f64, stiffness: f64, mass: f64, rate: f64| {
         let list = |size: f64, values: &[f64]| format!("{:?}", values.iter().map(|x| x * size).collect::<Vec<f64>>());
         format!(
-            "t_f = {}\na = {}\nb = {}\nv_i = {}\nv_f = {}\ntau_max = {}\nk = [{:?}, inf]\nm = {}\ndt = {}\ndelta_t = {}\nalpha_2 = {}\nalpha_3 = {}\n",
+            "t_f = {}\na = {}\nb = {}\nv_i = {}\nv_f = {}\ntau_ceiling = {}\nk = [{:?}, inf]\nm = {}\ndt = {}\ndelta_t = {}\nalpha_2 = {}\nalpha_3 = {}\n",
             list(time, &[0.02, 0.5]),
             list(one, &[0.03]),
             list(one, &[0.05]),
@@ -472,7 +472,7 @@ fn both(folder: &Path) -> [std::path::PathBuf; 2] {
             list(rate, &[-160.0, 0.0]),
         )
     };
-    let tables = "[tables.gap]\n[tables.best]\n[tables.optimal]\n[tables.crossover]\n[tables.swift]\n[tables.stability]\n[tables.step]\n\
+    let tables = "[tables.gap]\n[tables.best_cubic]\n[tables.optimal]\n[tables.crossover]\n[tables.shortcut]\n[tables.stability]\n[tables.step_response]\n\
                   [tables.compliant]\n[tables.regularised]\n";
     let (stress, time) = (mu_0 * sigma, l / v_0);
     let si = axes(mu_0, time, v_0, stress, stress / l, stress * l / (v_0 * v_0), 1.0 / time);
@@ -508,7 +508,7 @@ fn si_and_scaled_runs_agree_to_the_last_bit() {
         let [mine, theirs] = [&si, &scaled].map(|out| read(out, table.name()));
         let axes = Quantity::ALL.into_iter().filter(|axis| table.axes().contains(axis));
         let units = axes.map(|axis| (axis.name(), axis.unit(Scale::Model)));
-        // `best` has its coefficients in the units of the axes, which are not relative here.
+        // `best_cubic` has its coefficients in the units of the axes, which are not relative here.
         let columns = table.columns().iter().filter(|column| !column.optional).map(|column| {
             let unit = match column.kind {
                 slipsweep::table::Kind::Quantity(quantity) => quantity.unit(Scale::Model),

@@ -15,18 +15,18 @@ v_i = 3.0
 v_f = { geomspace = [50.0, 200.0, 5] }
 alpha_2 = { linspace = [-0.3, 0.1, 21], unit = "1/t_f" }
 alpha_3 = { linspace = [-0.3, 0.3, 21], unit = "1/t_f^2" }
-tau_max = [1.1, 2.0]
+tau_ceiling = [1.1, 2.0]
 k = { geomspace = [0.01, 0.1, 5] }
 m = 1e-9
 dt = [0.0, 0.001]
 delta_t = [1e-4, 1e-3]
 [tables.gap]
-[tables.best]
+[tables.best_cubic]
 [tables.optimal]
 [tables.crossover]
-[tables.swift]
+[tables.shortcut]
 [tables.stability]
-[tables.step]
+[tables.step_response]
 [tables.compliant]
 [tables.regularised]
 "#;
@@ -90,7 +90,17 @@ fn every_table_has_its_picture() {
     let folder = folder.path();
     let said = shown(folder, &["plot", "results/small"]);
     let written: String = said.lines().filter(|line| !line.starts_with("  ")).map(|line| format!("{line}\n")).collect();
-    let tables = ["gap", "best", "optimal", "crossover", "swift", "stability", "step", "compliant", "regularised"];
+    let tables = [
+        "gap",
+        "best_cubic",
+        "optimal",
+        "crossover",
+        "shortcut",
+        "stability",
+        "step_response",
+        "compliant",
+        "regularised",
+    ];
     assert_eq!(written, tables.map(|table| format!("{table}: written to small-{table}.svg\n")).concat());
     assert!(said.contains("\n  8 of 10 panels (t_f, v_f); choose others with --where\n"), "{said}");
     let all: Vec<String> = tables.iter().map(|table| read(folder, &format!("small-{table}.svg"))).collect();
@@ -160,7 +170,7 @@ fn refusals(folder: &Path) {
     assert!(contradiction.starts_with("error: --out gap.pdf: the ending contradicts --format\n"), "{contradiction}");
     assert_eq!(
         complaint(folder, &["plot", "results/small", "--table", "gop"]),
-        "error: the dataset has no table `gop`\n  found: gap, best, optimal, crossover, swift, stability, step, compliant, \
+        "error: the dataset has no table `gop`\n  found: gap, best_cubic, optimal, crossover, shortcut, stability, step_response, compliant, \
          regularised\n  help: did you mean `gap`?\n"
     );
     let many = complaint(folder, &["plot", "results/small", "--x", "t_f"]);
@@ -176,7 +186,7 @@ fn the_wrong_kind_of_file_is_named_with_the_command_that_takes_it() {
     fs::write(folder.join("tiny.toml"), spec).expect("is writable");
     shown(folder, &["run", "tiny.toml", "--quiet"]);
     let case = ["--t-f", "0.02", "--a", "0.03", "--b", "0.05", "--v-i", "3", "--v-f", "100"];
-    shown(folder, &[&["trace", "best", "--out", "best.csv"], &case[..]].concat());
+    shown(folder, &[&["trace", "best_cubic", "--out", "best.csv"], &case[..]].concat());
     fs::write(folder.join("other.csv"), "a,b\n0,1\n").expect("is writable");
     let spec = "a spec, not a dataset";
     let run = "help: `slipsweep run tiny.toml` computes its dataset, results/tiny: name that\n";
@@ -209,14 +219,14 @@ fn all_tables_go_into_a_folder_in_a_format() {
     let folder = tempfile::tempdir().expect("a folder");
     let folder = folder.path();
     let spec = "name = \"tiny\"\n[axes]\nt_f = [0.02, 0.03, 0.04]\na = 0.03\nb = 0.05\nv_i = 3.0\nv_f = 100.0\n\
-                [tables.optimal]\n[tables.best]\n";
+                [tables.optimal]\n[tables.best_cubic]\n";
     fs::write(folder.join("tiny.toml"), spec).expect("is writable");
     shown(folder, &["run", "tiny.toml", "--quiet"]);
     let said = shown(folder, &["plot", "results/tiny", "--format", "png", "--out", "new/pictures", "--dpi", "60"]);
     let path = |table: &str| format!("new/pictures/tiny-{table}.png");
-    assert_eq!(said, ["optimal", "best"].map(|table| format!("{table}: written to {}\n", path(table))).concat());
-    assert!(fs::read(folder.join(path("best"))).expect("is there").starts_with(b"\x89PNG"));
-    shown(folder, &["plot", "results/tiny", "--format", "pdf", "--table", "best"]);
+    assert_eq!(said, ["optimal", "best_cubic"].map(|table| format!("{table}: written to {}\n", path(table))).concat());
+    assert!(fs::read(folder.join(path("best_cubic"))).expect("is there").starts_with(b"\x89PNG"));
+    shown(folder, &["plot", "results/tiny", "--format", "pdf", "--table", "best_cubic"]);
     assert!(fs::read(folder.join("tiny-best.pdf")).expect("is there").starts_with(b"%PDF-"));
 }
 
@@ -226,7 +236,7 @@ fn traces_are_drawn_over_each_other() {
     let folder = folder.path();
     let case = ["--t-f", "0.02", "--a", "0.03", "--b", "0.05", "--v-i", "3", "--v-f", "100"];
     shown(folder, &[&["trace", "optimal", "--out", "optimal.parquet"], &case[..]].concat());
-    shown(folder, &[&["trace", "best", "--out", "best.csv"], &case[..]].concat());
+    shown(folder, &[&["trace", "best_cubic", "--out", "best.csv"], &case[..]].concat());
     assert_eq!(shown(folder, &["plot", "optimal.parquet"]), "written to optimal.svg\n");
     let alone = words(&read(folder, "optimal.svg"));
     for part in ["Protocol optimal", "tf = 0.02", "v (v0)", "θ (l/v0)", "τ (μ0 σ)", "t (l/v0)"] {
@@ -270,13 +280,13 @@ fn many_rows_share_cells_and_the_picture_says_so() {
     let folder = tempfile::tempdir().expect("a folder");
     let folder = folder.path();
     let spec = "name = \"many\"\n[axes]\nt_f = { geomspace = [0.001, 2.0, 9000] }\na = 0.03\nb = 0.05\nv_i = 3.0\nv_f = 100.0\n\
-                [tables.optimal]\ncolumns = [\"hold_time\"]\n";
+                [tables.optimal]\ncolumns = [\"time_at_floor\"]\n";
     fs::write(folder.join("many.toml"), spec).expect("is writable");
     shown(folder, &["run", "many.toml"]);
     shown(folder, &["plot", "results/many"]);
     let words = words(&read(folder, "many-optimal.svg"));
     assert!(words.contains("Rows share 3000 places of tf: the least and the greatest of each are drawn."), "{words}");
-    for mark in ["tcheapest", "tcross", "thold"] {
+    for mark in ["tcheapest", "tcross", "tfloor"] {
         assert!(words.contains(mark), "{mark} in {words}");
     }
 }
@@ -392,7 +402,7 @@ fn the_map_of_optima_shows_the_strategy_and_when_it_changes() {
         "[axes]\nt_f = {{ geomspace = [0.01, 0.1, 15] }}\n{MATERIAL}v_f = {{ geomspace = [50.0, 200.0, 15] }}\n[tables.optimal]\n"
     );
     let (map, _) = picture("strategies", &spec, "optimal");
-    for part in ["speed up", "slow down", "hold", "\ntcross\n", "\nthold\n"] {
+    for part in ["speed up", "slow down", "floor", "\ntcross\n", "\ntfloor\n"] {
         assert!(map.contains(part), "{part} in {map}");
     }
     let (same, _) = picture("same", &spec.replace("0.01, 0.1", "0.001, 0.01"), "optimal");
@@ -427,7 +437,7 @@ fn single_materials_are_symbols_of_their_outcome() {
     let points =
         "a,b,k,m\n0.01,0.015,0.004,1e-15\n0.005,0.01,0.006,2e-16\n0.012,0.02,0.006,3e-16\n0.008,0.011,0.02,1e-16\n";
     fs::write(folder.join("points.csv"), points).expect("is writable");
-    let spec = "name = \"materials\"\npoints = \"points.csv\"\n[axes]\nv_i = 1e5\nv_f = 1e6\n[tables.step]\n";
+    let spec = "name = \"materials\"\npoints = \"points.csv\"\n[axes]\nv_i = 1e5\nv_f = 1e6\n[tables.step_response]\n";
     fs::write(folder.join("spec.toml"), spec).expect("is writable");
     shown(folder, &["run", "spec.toml", "--quiet"]);
     shown(folder, &["plot", "results/materials"]);

@@ -298,7 +298,7 @@ proptest! {
             ("optimal", "v_start", v_0),
             ("optimal", "hamiltonian", stress * v_0),
             ("optimal", "theta_max", l / v_0),
-            ("stability", "k_qs", stress / l),
+            ("stability", "k_od", stress / l),
             ("stability", "frequency", v_0 / l),
         ] {
             let (one, other) = (column(&batches(&scaled, table), column_of), column(&batches(&si, table), column_of));

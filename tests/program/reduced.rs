@@ -68,7 +68,7 @@ fn reductions_are_those_of_the_whole_table() {
             assert_eq!(keys[row], group.key);
             let cells: Vec<Option<f64>> = told.iter().map(|column| column[row]).collect();
             assert_eq!(cells[0], Some(group.gaps.len() as f64));
-            let some = ["ok", "nonphysical", "below_bound", "infeasible"];
+            let some = ["ok", "unproven", "below_bound", "infeasible"];
             let expected = some.into_iter().find(|word| group.status.iter().any(|status| status == word));
             assert_eq!(Some(status[row].as_str()), expected);
             let mut sorted = group.gaps.clone();

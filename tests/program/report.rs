@@ -16,7 +16,7 @@ a = 0.03
 alpha_2 = { linspace = [-0.3, 0.1, 21], unit = "1/t_f" }
 alpha_3 = { linspace = [-0.3, 0.3, 21], unit = "1/t_f^2" }
 [tables.gap]
-[tables.best]
+[tables.best_cubic]
 [tables.crossover]
 "#;
 

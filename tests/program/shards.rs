@@ -9,7 +9,7 @@ use slipsweep::dataset::{Company, Folder};
 use slipsweep::sweep::{self, Plan, Shard, TableOutcome, shares_with};
 use slipsweep::table::Signal;
 
-/// 31 parts of `best`, `optimal`, `gap` and `crossover` of very different cost.
+/// 31 parts of `best_cubic`, `optimal`, `gap` and `crossover` of very different cost.
 const AXES: &str = "t_f = { geomspace = [0.001, 10.0, 400] }\na = 0.03\nb = [0.04, 0.05]\nv_i = 3.0\nv_f = 100.0\n\
                     alpha_2 = { linspace = [-0.5, 0.5, 40], unit = \"1/t_f\" }\n\
                     alpha_3 = { linspace = [-0.5, 0.5, 40], unit = \"1/t_f^2\" }\n";

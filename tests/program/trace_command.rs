@@ -7,7 +7,7 @@ use std::process::{Command, Output, Stdio};
 use arrow_array::cast::AsArray;
 use arrow_array::types::Float64Type;
 use parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
-use slipsweep::protocol::swift;
+use slipsweep::protocol::shortcut;
 use slipsweep::trace::COLUMNS;
 
 const UP: &[&str] = &["--t-f", "0.02", "--a", "0.03", "--b", "0.05", "--v-i", "3", "--v-f", "100"];
@@ -50,7 +50,7 @@ fn a_table_tells_a_physicist_what_he_sees() {
     let head = "optimal: least work of friction of all protocols; v may jump at both ends\n  \
                 at t_f = 0.02, a = 0.03, b = 0.05, v_i = 3, v_f = 100\n  \
                 hamiltonian = 2.59678653: dW*/dt_f\n  \
-                hold_time = 0: time spent on the bound v = 1\n  \
+                time_at_floor = 0: time spent on the bound v = 1\n  \
                 work = 3.80811142, v_min = 19.9230141, v_max = 3392.16787\n  \
                 status ok\n  \
                 117 rows; straight lines between them are good to 0.0001 of the range of a column, and to 0.01 of v and theta\n\n  \
@@ -80,7 +80,7 @@ fn times_that_nine_digits_do_not_tell_apart_are_shown_in_full() {
 #[test]
 fn csv_reads_back_the_same_numbers_and_parquet_too() {
     let folder = tempfile::tempdir().expect("is writable");
-    for name in ["optimal", "best", "bounded_velocity", "compliant"] {
+    for name in ["optimal", "best_cubic", "bounded_velocity", "compliant"] {
         let csv = csv(&[&[name], UP, &["--out", "-"]]);
         let output = trace(folder.path(), &[&[name], UP, &["--out", "trace.parquet"]]);
         assert_eq!(output.status.code(), Some(0));
@@ -136,7 +136,7 @@ fn points_are_equally_spaced() {
 
 #[test]
 fn coefficients_are_scaled_with_the_duration() {
-    let free = csv(&[&["free_cubic"], UP, &["--alpha-2", "-0.12", "--alpha-3", "-0.068"]]);
+    let free = csv(&[&["gap"], UP, &["--alpha-2", "-0.12", "--alpha-3", "-0.068"]]);
     let start: Vec<f64> =
         free.lines().nth(2).expect("has rows").split(',').map(|cell| cell.parse().expect("is a number")).collect();
     // v = (1 - theta')/theta with theta' = -0.12/t_f.
@@ -146,16 +146,16 @@ fn coefficients_are_scaled_with_the_duration() {
 #[test]
 fn what_does_not_exist_says_which_bound() {
     let t_min = "0.3954147722546";
-    for name in ["optimal", "best", "bounded_velocity", "compliant"] {
+    for name in ["optimal", "best_cubic", "bounded_velocity", "compliant"] {
         let (code, text) = complaint(&[&[name], DOWN]);
         assert!(code == Some(1) && text.starts_with(&format!("error: no `{name}` protocol: ")), "{text}");
         assert!(text.contains(&format!("the least is t_min = {t_min}")), "{text}");
     }
-    let low = complaint(&[&["bounded_friction", "--tau-max", "0.9"], UP]);
-    let expected = "error: no `bounded_friction` protocol: tau_max must be above the friction of both ends, 0.978";
+    let low = complaint(&[&["bounded_friction", "--tau-ceiling", "0.9"], UP]);
+    let expected = "error: no `bounded_friction` protocol: tau_ceiling must be above the friction of both ends, 0.978";
     assert!(low.0 == Some(1) && low.1.starts_with(expected), "{low:?}");
-    let steep = complaint(&[&["free_cubic", "--alpha-2", "3", "--alpha-3", "0"], UP]);
-    let expected = "error: no `free_cubic` protocol: v or theta would not stay positive";
+    let steep = complaint(&[&["gap", "--alpha-2", "3", "--alpha-3", "0"], UP]);
+    let expected = "error: no `gap` protocol: v or theta would not stay positive";
     assert_eq!(steep, (Some(1), expected.to_owned()));
 }
 
@@ -163,9 +163,9 @@ fn what_does_not_exist_says_which_bound() {
 fn wrong_arguments_get_one_clear_message() {
     let cases: [(&[&[&str]], &str); 10] = [
         (&[&["optimal", "--t-f", "1"]], "error: `optimal` needs --a, --b, --v-i, --v-f"),
-        (&[&["optimal", "--tau-max", "2"], UP], "error: `optimal` takes no --tau-max"),
+        (&[&["optimal", "--tau-ceiling", "2"], UP], "error: `optimal` takes no --tau-ceiling"),
         (&[&["cubic", "--unbounded"], UP], "error: `cubic` takes no --unbounded"),
-        (&[&["free_cubic", "--alpha-2", "0"], UP], "error: `free_cubic` needs --alpha-3"),
+        (&[&["gap", "--alpha-2", "0"], UP], "error: `gap` needs --alpha-3"),
         (
             &[&["optimal", "--t-f", "-1"], &UP[2..]],
             "error: invalid value '-1' for '--t-f <T>': expected 1e-20 <= t_f <= 1e20",
@@ -193,7 +193,7 @@ fn help_lists_every_protocol_with_its_meaning() {
     for (name, doc) in slipsweep::trace::names() {
         assert!(text.lines().any(|line| line.contains(&format!("- {name}:")) && line.ends_with(doc)), "{name}\n{text}");
     }
-    assert!(swift::FAMILIES.iter().all(|family| text.contains(family.name())));
+    assert!(shortcut::FAMILIES.iter().all(|family| text.contains(family.name())));
 }
 
 #[test]
@@ -329,7 +329,7 @@ units = "si"
 mu_0 = 0.6
 l = 1e-6
 v_0 = 1e-9
-normal_load = 1e6
+normal_stress = 1e6
 [axes]
 t_f = [2e1, 3e2]
 a = 0.018
@@ -344,11 +344,11 @@ delta_t = 1.0
 family = ["step", "bounded_velocity"]
 [tables.gap]
 [tables.optimal]
-[tables.best]
-[tables.swift]
+[tables.best_cubic]
+[tables.shortcut]
 [tables.compliant]
 [tables.regularised]
-[tables.step]
+[tables.step_response]
 [tables.crossover]
 "#;
     fs::write(folder.join("rows.toml"), spec).expect("is writable");
@@ -367,7 +367,7 @@ fn a_row_over_time_is_the_protocol_of_its_numbers() {
     dataset(folder.path());
     let run = |arguments: &[&str]| trace(folder.path(), &[&["results/rows"], arguments]);
     let text = |output: Output| String::from_utf8(output.stdout).expect("is text");
-    for table in ["gap", "optimal", "best", "swift", "compliant", "regularised"] {
+    for table in ["gap", "optimal", "best_cubic", "shortcut", "compliant", "regularised"] {
         let output = run(&[table, "--row", "0", "--format", "csv"]);
         assert_eq!(output.status.code(), Some(0), "{table}: {}", String::from_utf8_lossy(&output.stderr));
         let found = text(output);

@@ -14,10 +14,10 @@ use slipsweep::dataset::Folder;
 use slipsweep::sweep::Sweep;
 
 const AXES: &str = "t_f = [0.02, 0.3, 0.41]\na = 0.03\nb = [0.01, 0.03, 0.05]\nv_i = 3.0\nv_f = [100.0, 2.0]\n\
-                    alpha_2 = { linspace = [-0.2, 0.2, 3], unit = \"1/t_f\" }\nalpha_3 = 0.0\ntau_max = 1.6\nk = [0.01, 0.03]\nm = 1e-5\n";
+                    alpha_2 = { linspace = [-0.2, 0.2, 3], unit = \"1/t_f\" }\nalpha_3 = 0.0\ntau_ceiling = 1.6\nk = [0.01, 0.03]\nm = 1e-5\n";
 
 const TABLES: &str =
-    "[tables.gap]\n[tables.best]\n[tables.optimal]\n[tables.crossover]\n[tables.swift]\n[tables.stability]\n";
+    "[tables.gap]\n[tables.best_cubic]\n[tables.optimal]\n[tables.crossover]\n[tables.shortcut]\n[tables.stability]\n";
 
 fn verify(folder: &Path, arguments: &[&str]) -> Output {
     let mut command = Command::new(env!("CARGO_BIN_EXE_slipsweep"));
@@ -39,7 +39,7 @@ fn a_sound_dataset_passes() {
         "best: 18 rows",
         "optimal: 18 rows",
         "crossover: 6 rows",
-        "swift: 72 rows",
+        "shortcut: 72 rows",
         "stability: 12 rows",
     ] {
         assert!(text(&output).contains(table), "{}", text(&output));
@@ -59,7 +59,7 @@ fn corrupt(folder: &Path, table: &str, column: &str) -> usize {
 fn change(folder: &Path, table: &str, column: &str, factor: f64) -> usize {
     let path = Folder::new(folder, "test").part(table, 0);
     let rows = batch(&path);
-    // `best` has result columns of the same names as axes: none of those is used here.
+    // `best_cubic` has result columns of the same names as axes: none of those is used here.
     let place = rows.schema().index_of(column).expect("is there");
     let mut values: Vec<Option<f64>> = rows.column(place).as_primitive::<Float64Type>().iter().collect();
     let row = values.iter().position(Option::is_some).expect("has a value");
@@ -78,19 +78,19 @@ fn a_planted_error_is_found_and_named() {
         ("gap", "work"),
         ("gap", "v_min"),
         ("gap", "work_optimal"),
-        ("best", "work"),
+        ("best_cubic", "work"),
         ("optimal", "work"),
         ("optimal", "v_start"),
         ("optimal", "v_end"),
         ("optimal", "hamiltonian"),
         ("optimal", "theta_max"),
         ("crossover", "t_cross"),
-        ("crossover", "work_cheapest"),
+        ("crossover", "work_at_t_cheapest"),
         ("crossover", "t_min"),
-        ("swift", "alpha"),
-        ("swift", "work"),
-        ("swift", "v_max"),
-        ("swift", "friction_max"),
+        ("shortcut", "alpha"),
+        ("shortcut", "work"),
+        ("shortcut", "v_max"),
+        ("shortcut", "friction_max"),
         ("stability", "k_c_f"),
         ("stability", "growth_rate"),
         ("stability", "frequency"),
@@ -111,13 +111,16 @@ fn a_planted_error_is_found_and_named() {
 
 /// Decelerations with a window without hold, and members that do not exist for each of their reasons.
 const EDGES: &str = "t_f = [1e-4, 1e-3, 0.02, 0.3]\na = 0.03\nb = [0.01, 0.03, 0.05]\nv_i = 3.0\n\
-                     v_f = [2.98, 3.0, 30.0]\ntau_max = [0.9, 1.2, 3.0, inf]\n";
+                     v_f = [2.98, 3.0, 30.0]\ntau_ceiling = [0.9, 1.2, 3.0, inf]\n";
 
 #[test]
 fn windows_and_missing_members_are_decided_again() {
     let folder = tempfile::tempdir().expect("is writable");
-    let sweep =
-        sweep(folder.path(), EDGES, "[tables.crossover]\n[tables.swift]\ncolumns = [\"alpha\", \"work\", \"bound\"]\n");
+    let sweep = sweep(
+        folder.path(),
+        EDGES,
+        "[tables.crossover]\n[tables.shortcut]\ncolumns = [\"alpha\", \"work\", \"bound\"]\n",
+    );
     run(&sweep, folder.path(), 2);
     let output = verify(folder.path(), &["--sample", "10000"]);
     assert_eq!(output.status.code(), Some(0), "{}{}", text(&output), String::from_utf8_lossy(&output.stderr));
@@ -126,9 +129,9 @@ fn windows_and_missing_members_are_decided_again() {
         text.split("\n\n").find(|section| section.starts_with(table)).expect("has a section").to_owned()
     };
     assert!(text_of("crossover", &output).contains("t_free_out"), "{}", text(&output));
-    assert!(text_of("swift", &output).contains("status"), "{}", text(&output));
+    assert!(text_of("shortcut", &output).contains("status"), "{}", text(&output));
     for (table, column, factor, blamed) in
-        [("crossover", "t_free_in", 1.0 + 1e-7, "t_free_in"), ("swift", "t_f", 1e3, "status")]
+        [("crossover", "t_free_in", 1.0 + 1e-7, "t_free_in"), ("shortcut", "t_f", 1e3, "status")]
     {
         let part = Folder::new(folder.path(), "test").part(table, 0);
         let sound = fs::read(&part).expect("is there");
@@ -178,12 +181,12 @@ fn motions_are_followed_again() {
     // Columns beside those that are changed, and what one value of each is multiplied with.
     type Numbers<'a> = &'a [(&'a str, f64)];
     let tables: [(&str, &str, &str, Numbers<'_>); 4] = [
-        ("stability", "", "[\"hopf\"]", &[("m", 1e-3)]),
+        ("stability", "", "[\"hopf_type\"]", &[("m", 1e-3)]),
         (
-            "step",
+            "step_response",
             "rtol = 1e-8",
             "[\"outcome\", \"stick_slip\", \"v_peak\", \"v_trough\", \"t_peak\", \"settling_time\", \"period\", \"cycle_peak\", \
-             \"cycle_trough\", \"lyapunov\"]",
+             \"cycle_trough\", \"first_lyapunov_coefficient\"]",
             &[
                 ("v_peak", 1.0 + 1e-6),
                 ("v_trough", 1.0 + 1e-5),
@@ -192,19 +195,19 @@ fn motions_are_followed_again() {
                 ("period", 1.0 + 1e-6),
                 ("cycle_peak", 1.0 + 1e-6),
                 ("cycle_trough", 1.0 + 1e-5),
-                ("lyapunov", 1.0 + 1e-6),
+                ("first_lyapunov_coefficient", 1.0 + 1e-6),
             ],
         ),
         (
             "compliant",
             "",
-            "[\"v_c_min\", \"v_c_max\", \"amplification\", \"end_error\", \"loop_error\"]",
+            "[\"v_c_min\", \"v_c_max\", \"amplification\", \"sampling_error\", \"open_loop_error\"]",
             &[
                 ("v_c_min", 1.0 + 1e-7),
                 ("v_c_max", 1.0 + 1e-7),
                 ("amplification", 1.0 + 1e-7),
-                ("end_error", 1.0 + 1e-3),
-                ("loop_error", 1e9),
+                ("sampling_error", 1.0 + 1e-3),
+                ("open_loop_error", 1e9),
             ],
         ),
         (
@@ -236,7 +239,7 @@ fn motions_are_followed_again() {
         let output = verify(folder.path(), &["--sample", "1000"]);
         assert_eq!(output.status.code(), Some(3), "{table}: {}", text(&output));
         for (column, _) in changed {
-            let blamed = if *column == "m" { "hopf" } else { column };
+            let blamed = if *column == "m" { "hopf_type" } else { column };
             let text = text(&output);
             let mut lines = text.lines().map(|line| line.split_whitespace().collect::<Vec<_>>());
             let line = lines.find(|cells| cells.first() == Some(&blamed)).expect("has the column");
@@ -286,7 +289,8 @@ fn regress_coefficients_in_a_file_of_points_are_not_relative() {
     let points = "t_f,a,b,v_i,v_f,alpha_2,alpha_3\n0.02,0.03,0.05,3,100,0.1,0.2\n0.03,0.03,0.05,3,100,0.1,0.2\n";
     fs::write(folder.path().join("cases.csv"), points).expect("is writable");
     let spec = folder.path().join("spec.toml");
-    fs::write(&spec, "name = \"test\"\npoints = \"cases.csv\"\n[tables.gap]\n[tables.best]\n").expect("is writable");
+    fs::write(&spec, "name = \"test\"\npoints = \"cases.csv\"\n[tables.gap]\n[tables.best_cubic]\n")
+        .expect("is writable");
     run(&Sweep::load(&spec).expect("is legal"), folder.path(), 1);
     let output = verify(folder.path(), &[]);
     assert_eq!(output.status.code(), Some(0), "{}", text(&output));

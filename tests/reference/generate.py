@@ -302,7 +302,7 @@ def optimal_row(a, b, v_i, v_f, t_f, bounded):
     assert abs(slope + c) < mpf(10) ** -10 * abs(c) + mpf(10) ** -10, (slope, c)
     v_start = mpf(1) if t_1 else exp(z_start) * problem.v_i
     theta_max = arc.theta_h if arc.theta_h is not None else max(problem.theta_0, problem.theta_1)
-    strategy = "hold" if t_1 else "speed_up" if v_start > problem.v_i else "slow_down"
+    strategy = "floor" if t_1 else "speed_up" if v_start > problem.v_i else "slow_down"
     return [work, v_start, exp(z_end) * problem.v_f, t_1, -c, theta_max, strategy]
 
 
@@ -343,9 +343,9 @@ def crossover_row(a, b, v_i, v_f):
         if min(tau(p.theta_0), tau(p.theta_1), 1 + p.b * log(p.theta_0)) <= low:
             raise Unphysical
         t_cross, w_cross = measure(p.by_start(mpf(0)))
-        t_hold, w_hold = measure(p.by_start(log(p.theta_0)))
+        t_floor, w_hold = measure(p.by_start(log(p.theta_0)))
         t_cheap, w_cheap = measure(p.by_start(ln_u(tau(p.theta_0) / p.a, 1)))
-        return [t_cross, t_hold, t_cheap, None, None, None, None, w_cross, w_hold, w_cheap, None, None]
+        return [t_cross, t_floor, t_cheap, None, None, None, None, w_cross, w_hold, w_cheap, None, None]
     t_min = p.least_time()
     if min(tau(p.theta_1), 1 + p.b * log(p.theta_0)) <= low:
         raise Unphysical
@@ -375,8 +375,8 @@ def crossover_rows():
             pass
 
 
-def short_hold_cases():
-    """Accelerations just after t_hold, where the hold is a small share of t_f."""
+def short_floor_cases():
+    """Accelerations just after t_floor, where the hold is a small share of t_f."""
     precision(DIGITS)
     cases = []
     for a, b, v_i, v_f in (
@@ -387,9 +387,9 @@ def short_hold_cases():
         (0.1, 0.15, 1.001, 1e6),
         (0.001, 0.0, 50.0, 50.00005),
     ):
-        t_hold = Problem(a, b, v_i, v_f, True).by_start(-log(mpf(v_i)))[2].time
+        t_floor = Problem(a, b, v_i, v_f, True).by_start(-log(mpf(v_i)))[2].time
         for excess in (1e-4, 1e-7, 1e-10):
-            cases.append(("short_hold", a, b, v_i, v_f, float(t_hold * (1 + mpf(excess))), 1))
+            cases.append(("short_floor", a, b, v_i, v_f, float(t_floor * (1 + mpf(excess))), 1))
     return cases
 
 
@@ -438,7 +438,7 @@ def optimal_rows():
         if t_f > 1e3:
             continue
         cases.append((kind, a, b, v_i, v_f, t_f, bounded))
-    cases += short_hold_cases()
+    cases += short_floor_cases()
     yield from solved(cases)
 
 
@@ -724,7 +724,7 @@ def edge_rows():
     for a, b, v_i, v_f in materials:
         precision(DIGITS)
         times = crossover_row(a, b, v_i, v_f)
-        for name, t in zip(("t_cross", "t_hold", "t_cheapest", None, "t_turn", "t_free", "t_free"), times):
+        for name, t in zip(("t_cross", "t_floor", "t_cheapest", None, "t_turn", "t_free", "t_free"), times):
             if name is None or t is None:
                 continue
             for share in (1e-7, 1e-13):
@@ -819,15 +819,15 @@ TABLES = {
     "gauss": (["n", "i", "x", "weight"], gauss_rows),
     "elementary": (["x", "ln", "ln_1p", "exp", "exp_m1"], elementary_rows),
     "turning": (["w", "ln_u"], turning_rows),
-    "crossover": (["a", "b", "v_i", "v_f", "t_cross", "t_hold", "t_cheapest", "t_min", "t_turn", "t_free_in", "t_free_out",
-                   "work_cross", "work_hold", "work_cheapest", "work_min", "work_turn"], crossover_rows),
-    "optimal": (["regime", "a", "b", "v_i", "v_f", "t_f", "bounded", "work", "v_start", "v_end", "hold_time", "hamiltonian", "theta_max", "strategy"], optimal_rows),
+    "crossover": (["a", "b", "v_i", "v_f", "t_cross", "t_floor", "t_cheapest", "t_min", "t_turn", "t_free_in", "t_free_out",
+                   "work_at_t_cross", "work_at_t_floor", "work_at_t_cheapest", "work_at_t_min", "work_at_t_turn"], crossover_rows),
+    "optimal": (["regime", "a", "b", "v_i", "v_f", "t_f", "bounded", "work", "v_start", "v_end", "time_at_floor", "hamiltonian", "theta_max", "strategy"], optimal_rows),
     "landscape": (["a", "b", "v_i", "v_f", "t_f", "a_2", "a_3", "work", "v_min", "status"], landscape_rows),
     "stability": (["a", "b", "k", "m", "v", "growth_rate", "frequency", "decay_rate"], stability_rows),
-    "optimal_edges": (["regime", "a", "b", "v_i", "v_f", "t_f", "bounded", "work", "v_start", "v_end", "hold_time", "hamiltonian", "theta_max", "strategy"], edge_rows),
-    "best_touching": (["a", "b", "v_i", "v_f", "t_f", "bounded", "a_2", "a_3", "work", "work_optimal", "gap"], touching_rows),
-    "hopf": (["a", "b", "v_i", "v_f", "k", "m", "lyapunov"], hopf_rows),
-    "best": (["a", "b", "v_i", "v_f", "t_f", "bounded", "a_2", "a_3", "work", "work_optimal", "gap", "v_min"], best_rows),
+    "optimal_edges": (["regime", "a", "b", "v_i", "v_f", "t_f", "bounded", "work", "v_start", "v_end", "time_at_floor", "hamiltonian", "theta_max", "strategy"], edge_rows),
+    "best_cubic_touching": (["a", "b", "v_i", "v_f", "t_f", "bounded", "a_2", "a_3", "work", "work_optimal", "gap"], touching_rows),
+    "hopf": (["a", "b", "v_i", "v_f", "k", "m", "first_lyapunov_coefficient"], hopf_rows),
+    "best_cubic": (["a", "b", "v_i", "v_f", "t_f", "bounded", "a_2", "a_3", "work", "work_optimal", "gap", "v_min"], best_rows),
 }
 
 if __name__ == "__main__":

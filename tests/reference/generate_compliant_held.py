@@ -91,7 +91,7 @@ def main():
     with open("compliant_held.csv", "w", newline="") as file:
         file.write("# made by generate_compliant_held.py, Taylor series of order 40 at 50 digits\n")
         writer = csv.writer(file, lineterminator="\n")
-        writer.writerow(["a", "b", "v_i", "v_f", "t_f", "k", "m", "dt", "end_error"])
+        writer.writerow(["a", "b", "v_i", "v_f", "t_f", "k", "m", "dt", "sampling_error"])
         writer.writerows(out)
 
 

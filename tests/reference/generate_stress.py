@@ -7,23 +7,23 @@
 The formulas are those of generate.py, at 80 digits: between velocities and times twenty decades apart half of them cancel. A point is left out
 where the optimum is not physical, where there is none, where a hold lasts longer than the digits tell theta from 1, and where the quadrature
 does not reach the digits that its own checks ask for, or takes more than a minute (a quarter of that for
-bounded_friction); what is left out is counted. Members of bounded_friction are Taylor series as in generate_swift_friction.py.
+bounded_friction); what is left out is counted. Members of bounded_friction are Taylor series as in generate_shortcut_friction.py.
 """
 import csv, functools, multiprocessing, re, signal, sys
 
 import generate
-import generate_swift_friction as friction
-import generate_swift_velocity as swift
+import generate_shortcut_friction as friction
+import generate_shortcut_velocity as shortcut
 from generate import Problem, Unphysical, crossover_row, landscape_point, landscape_status, optimal_row, show, stability_row
 from mpmath import mp, mpf
 
 DIGITS = 80
-SECONDS = {"swift bounded_friction": 15}
+SECONDS = {"shortcut bounded_friction": 15}
 MOST_SECONDS = 60
 HOLD = 60
 
 FIELD = re.compile(r"\b(\w+): (true|false|inf|-?[0-9][0-9.e+-]*)")
-POINT = re.compile(r"((?:swift )?\w+) (\d+): (Point .*)")
+POINT = re.compile(r"((?:shortcut )?\w+) (\d+): (Point .*)")
 LAW = ("a", "b", "v_i", "v_f")
 
 
@@ -88,7 +88,7 @@ def of_stability(p):
 
 def of_family(family, p):
     key = [p[name] for name in (*LAW, "t_f")]
-    solve = swift.FAMILIES[family]
+    solve = shortcut.FAMILIES[family]
     row = solve(*key) if family == "bounded_velocity" else solve(*map(mpf, key))
     if family != "bounded_velocity" and row[1] is not None:
         mp.dps = DIGITS // 2
@@ -99,9 +99,9 @@ def of_family(family, p):
 
 
 def of_friction(p):
-    key = [p[name] for name in (*LAW, "t_f", "tau_max")]
+    key = [p[name] for name in (*LAW, "t_f", "tau_ceiling")]
     # Without a bound there is no member.
-    if p["tau_max"] == float("inf"):
+    if p["tau_ceiling"] == float("inf"):
         raise Unphysical
     friction.ctx.prec = friction.FINE[0]
     exact = tuple(map(friction.arb, key))
@@ -111,13 +111,13 @@ def of_friction(p):
     return key, [mpf(x.str(40, radius=False)) for x in friction.Course(exact).member(least.mid())]
 
 
-FAMILY = ["a", "b", "v_i", "v_f", "t_f", *swift.HEADER[6:]]
+FAMILY = ["a", "b", "v_i", "v_f", "t_f", *shortcut.HEADER[6:]]
 TABLES = {
-    **{f"swift {family}": (FAMILY, functools.partial(of_family, family), 60) for family in swift.FAMILIES},
-    "swift bounded_friction": (["a", "b", "v_i", "v_f", "t_f", "tau_max", "alpha", "work", "v_min", "v_max", "friction_max"], of_friction, 400),
-    "optimal": (["a", "b", "v_i", "v_f", "t_f", "bounded", "work", "v_start", "v_end", "hold_time", "hamiltonian", "theta_max", "strategy"], of_optimal, 160),
-    "crossover": (["a", "b", "v_i", "v_f", "t_cross", "t_hold", "t_cheapest", "t_min", "t_turn", "t_free_in", "t_free_out",
-                   "work_cross", "work_hold", "work_cheapest", "work_min", "work_turn"], of_crossover, 100),
+    **{f"shortcut {family}": (FAMILY, functools.partial(of_family, family), 60) for family in shortcut.FAMILIES},
+    "shortcut bounded_friction": (["a", "b", "v_i", "v_f", "t_f", "tau_ceiling", "alpha", "work", "v_min", "v_max", "friction_max"], of_friction, 400),
+    "optimal": (["a", "b", "v_i", "v_f", "t_f", "bounded", "work", "v_start", "v_end", "time_at_floor", "hamiltonian", "theta_max", "strategy"], of_optimal, 160),
+    "crossover": (["a", "b", "v_i", "v_f", "t_cross", "t_floor", "t_cheapest", "t_min", "t_turn", "t_free_in", "t_free_out",
+                   "work_at_t_cross", "work_at_t_floor", "work_at_t_cheapest", "work_at_t_min", "work_at_t_turn"], of_crossover, 100),
     "gap": (["a", "b", "v_i", "v_f", "t_f", "a_2", "a_3", "work", "v_min", "status"], of_gap, 200),
     "stability": (["a", "b", "k", "m", "v", "growth_rate", "frequency", "decay_rate"], of_stability, 200),
 }
@@ -147,8 +147,8 @@ def main(path, tables):
         header, _, most = TABLES[table]
         jobs = [(table, index, point) for index, point in points(path, table)][:most]
         left_out = {}
-        with multiprocessing.Pool(2) as pool, open(f"stress_{table.removeprefix('swift ')}.csv", "w", newline="") as file:
-            digits = "Arb at 84 digits" if table == "swift bounded_friction" else f"mpmath at {DIGITS} digits"
+        with multiprocessing.Pool(2) as pool, open(f"stress_{table.removeprefix('shortcut ')}.csv", "w", newline="") as file:
+            digits = "Arb at 84 digits" if table == "shortcut bounded_friction" else f"mpmath at {DIGITS} digits"
             file.write(f"# made by generate_stress.py, {digits}, of the first {len(jobs)} points\n")
             out = csv.writer(file, lineterminator="\n")
             out.writerow(["point"] + header)

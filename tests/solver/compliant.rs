@@ -9,7 +9,7 @@ use ode_solvers::{Dop853, SVector, System};
 use slipsweep::model::Law;
 use slipsweep::protocol::compliant::{self, Compliant, Path};
 use slipsweep::protocol::{Slider, Status};
-use slipsweep::stability::{amplification, held_error, loop_error};
+use slipsweep::stability::{amplification, held_error, open_loop_error};
 
 /// The paper's block and spring, and what is asked of it: `(v_i, v_f)` and `t_f`.
 const PAPER: (Slider, (f64, f64), f64) =
@@ -232,7 +232,7 @@ fn the_loop_closes_to_what_the_amplification_allows() {
         let path = path(case);
         let grown = amplification(&path, 1e-10).number.expect("is solved");
         for rtol in [1e-4, 1e-6, 1e-8, 1e-10] {
-            let missed = loop_error(&path, rtol).number.expect("is simulated");
+            let missed = open_loop_error(&path, rtol).number.expect("is simulated");
             assert!(missed <= rtol * (1.0 + grown), "{case:?} at {rtol}: {missed}, amplification {grown}");
         }
     }
@@ -352,7 +352,8 @@ fn regress_work_counts() {
     let solved = compliant::solve(&PAPER.0, PAPER.1, PAPER.2, 1e-10);
     assert_eq!((solved.effort.quadratures, solved.effort.nodes), (7, 480));
     let path = path(PAPER);
-    let followed = [amplification(&path, 1e-10), loop_error(&path, 1e-10), held_error(&path, PAPER.2 / 100.0, 1e-10)];
+    let followed =
+        [amplification(&path, 1e-10), open_loop_error(&path, 1e-10), held_error(&path, PAPER.2 / 100.0, 1e-10)];
     let [grown, told, held] = followed.map(|followed| followed.steps);
     // At least a step a sample.
     assert!(grown == 16 && told < 100 && (100..400).contains(&held), "{grown} {told} {held}");

@@ -4,8 +4,8 @@
 use slipsweep::model::{Law, Transition};
 use slipsweep::protocol::cubic::{Landscape, Shortcuts};
 use slipsweep::protocol::optimal::{self, Optimum};
-use slipsweep::protocol::swift::{Case, find};
-use slipsweep::protocol::{Effort, Slider, Status, best, compliant, error};
+use slipsweep::protocol::shortcut::{Case, find};
+use slipsweep::protocol::{Effort, Slider, Status, best_cubic, compliant, error};
 
 use crate::extent::quick_or_long;
 use crate::stress::random::Random;
@@ -172,11 +172,11 @@ fn claims(name: &str, rtols: &[f64], solve: impl Fn(&reference::Row, f64) -> Opt
 
 #[test]
 fn reference_work_errors_of_families_are_bounded() {
-    for name in ["swift_velocity", "swift_friction"] {
+    for name in ["shortcut_velocity", "shortcut_friction"] {
         claims(name, &RTOLS[..5], |row, rtol| {
-            let family = if name == "swift_friction" { "bounded_friction" } else { row.text("family") };
-            let tau_max = if name == "swift_friction" { row.number("tau_max") } else { f64::INFINITY };
-            let case = Case { transition: transition(row), t_f: row.number("t_f"), tau_max };
+            let family = if name == "shortcut_friction" { "bounded_friction" } else { row.text("family") };
+            let tau_ceiling = if name == "shortcut_friction" { row.number("tau_ceiling") } else { f64::INFINITY };
+            let case = Case { transition: transition(row), t_f: row.number("t_f"), tau_ceiling };
             let (family, effort) = (find(family)?, &mut Effort::default());
             let member = family.solve(&case, rtol, effort).ok()?;
             let bound = error::of_member(family, &case, &member, effort)?;
@@ -194,9 +194,10 @@ fn reference_work_errors_of_smooth_and_best_shortcuts_are_bounded() {
         let found = solve(rtol)?;
         Some(Claim { found, bound: error::bound(found, solve(error::FINEST)?, found), truth: row.number("work") })
     });
-    claims("best", &[1e-10, 1e-12], |row, rtol| {
-        let solve =
-            |rtol| Some(best::solve(&transition(row), row.number("t_f"), row.text("bounded") == "1", rtol).value?.work);
+    claims("best_cubic", &[1e-10, 1e-12], |row, rtol| {
+        let solve = |rtol| {
+            Some(best_cubic::solve(&transition(row), row.number("t_f"), row.text("bounded") == "1", rtol).value?.work)
+        };
         let found = solve(rtol)?;
         Some(Claim { found, bound: error::bound(found, solve(error::FINEST)?, found), truth: row.number("work") })
     });

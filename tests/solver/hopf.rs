@@ -1,7 +1,7 @@
 //! The kind of the Hopf point, from closed form, against limit cycles of simulated responses on both sides of it.
 
 use slipsweep::model::{Law, Transition};
-use slipsweep::stability::response::{Outcome, Response, Step};
+use slipsweep::stability::step_response::{Outcome, Response, Step};
 use slipsweep::stability::{Hopf, SteadySliding};
 
 const A: f64 = 0.005;

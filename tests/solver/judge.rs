@@ -288,8 +288,8 @@ pub fn optimal_work(transition: &Transition, t_f: f64, optimum: &Optimum) -> Opt
     let wholes = [t_f, optimum.work.abs()];
     let (a, slope) = (dd(a), dd(b) - dd(a));
     let (mut theta, mut v, mut sums) = (start, dd(optimum.v_start), [dd(0.0); 2]);
-    if optimum.hold_time > 0.0 {
-        let time = dd(optimum.hold_time);
+    if optimum.time_at_floor > 0.0 {
+        let time = dd(optimum.time_at_floor);
         let (from, (kept, lost)) = (dd(1.0) - start, exp_and_m1(-time));
         let lifetime = |s: Dd| start - from * exp_and_m1(-s).1;
         // Over the time, or over 1 - theta where that is long.

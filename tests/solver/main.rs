@@ -1,7 +1,7 @@
 //! The mathematics without tables or files: every solver against references, invariants and limits. One binary of all
 //! tests of a kind, since linking one for each file took most of the time and of the disk.
 
-mod best;
+mod best_cubic;
 mod budgets;
 mod compliant;
 mod error;
@@ -19,11 +19,11 @@ mod properties;
 #[path = "../reference/mod.rs"]
 mod reference;
 mod regularised;
-mod step;
+mod shortcut_edges;
+mod shortcut_friction;
+mod shortcut_velocity;
+mod step_response;
 mod stress;
 #[path = "../support/mod.rs"]
 mod support;
-mod swift_edges;
-mod swift_friction;
-mod swift_velocity;
 mod trace;

@@ -4,7 +4,7 @@ use crate::support::relative;
 use slipsweep::model::{Law, Transition};
 use slipsweep::protocol::optimal::crossover::{self, Wanted};
 use slipsweep::protocol::optimal::{self, Optimum};
-use slipsweep::protocol::swift::{self, Case, Obstacle, Swift};
+use slipsweep::protocol::shortcut::{self, Case, Obstacle, Shortcut};
 use slipsweep::protocol::{Effort, Moment, Motion};
 use slipsweep::trace::{Protocol, Times, Trace};
 
@@ -13,16 +13,16 @@ const UP: Transition = Transition { law: LAW, v_i: 3.0, v_f: 100.0 };
 const DOWN: Transition = Transition { law: LAW, v_i: 100.0, v_f: 3.0 };
 
 fn case(transition: Transition, t_f: f64) -> Case {
-    Case { transition, t_f, tau_max: 1.6 }
+    Case { transition, t_f, tau_ceiling: 1.6 }
 }
 
-fn swift(family: &str, case: &Case) -> Swift {
-    let family = swift::find(family).expect("is a family");
+fn shortcut(family: &str, case: &Case) -> Shortcut {
+    let family = shortcut::find(family).expect("is a family");
     family.solve(case, 1e-11, &mut Effort::default()).unwrap_or_else(|obstacle| panic!("{case:?}: {obstacle}"))
 }
 
 fn motion(family: &str, case: &Case) -> Box<dyn Motion> {
-    let family = swift::find(family).expect("is a family");
+    let family = shortcut::find(family).expect("is a family");
     family.motion(case, 1e-11).unwrap_or_else(|obstacle| panic!("{case:?}: {obstacle}"))
 }
 
@@ -74,7 +74,7 @@ fn cubic(Transition { v_i, v_f, .. }: Transition, x: f64) -> (f64, f64) {
 
 #[test]
 fn paper_figure_s1_the_cubic_goes_far_above_v_f_and_scales_with_the_inverse_of_short_times() {
-    let found = swift("cubic", &case(UP, 0.02));
+    let found = shortcut("cubic", &case(UP, 0.02));
     assert!(found.v_max > 5.0 * UP.v_f && found.v_min == UP.v_i, "{found:?}");
     // v = (1 - theta')/theta with theta a function of x alone: v t_f = g(x) + t_f/theta, g = -(dtheta/dx)/theta.
     let g = |x: f64| {
@@ -90,15 +90,15 @@ fn paper_figure_s1_the_cubic_goes_far_above_v_f_and_scales_with_the_inverse_of_s
         }
     }
     let greatest = (0..=100_000).map(|i| g(f64::from(i) / 1e5)).fold(0.0, f64::max);
-    assert!(relative(swift("cubic", &case(UP, 1e-9)).v_max * 1e-9, greatest) < 1e-7);
+    assert!(relative(shortcut("cubic", &case(UP, 1e-9)).v_max * 1e-9, greatest) < 1e-7);
 }
 
 #[test]
 fn paper_figure_s2_the_bounded_velocity_decelerates_inside_the_model_where_the_cubic_does_not() {
     let case = case(DOWN, 0.5);
-    let found = swift("bounded_velocity", &case);
+    let found = shortcut("bounded_velocity", &case);
     assert!(found.v_min > 1.0 && found.v_min < 1.2 && found.v_max == DOWN.v_i, "{found:?}");
-    assert!(swift("cubic", &case).v_min < 0.2);
+    assert!(shortcut("cubic", &case).v_min < 0.2);
     let rows = moments(&*motion("bounded_velocity", &case), 50);
     assert!(rows.windows(2).all(|pair| pair[1].theta >= pair[0].theta - 1e-15));
     assert!(rows.iter().all(|row| row.v > 1.0));
@@ -111,7 +111,7 @@ fn paper_figure_s2_the_bounded_velocity_decelerates_inside_the_model_where_the_c
 fn paper_figure_s2_no_protocol_above_the_bound_is_faster_than_0_39() {
     let t_min = (DOWN.v_f / DOWN.v_i).ln() + ((DOWN.v_i - 1.0) / (DOWN.v_f - 1.0)).ln();
     assert!((t_min - 0.395).abs() < 1e-3);
-    let family = swift::find("bounded_velocity").expect("is a family");
+    let family = shortcut::find("bounded_velocity").expect("is a family");
     let solve = |t_f: f64| family.solve(&case(DOWN, t_f), 1e-10, &mut Effort::default());
     let Err(Obstacle::Time { t_min: told }) = solve(0.99 * t_min) else { panic!("too fast") };
     assert!(relative(told, t_min) < 1e-14);
@@ -126,24 +126,24 @@ fn paper_figure_s3_friction_stays_below_1_6_and_meets_both_ends() {
         let case = case(transition, t_f);
         let motion = motion("bounded_friction", &case);
         let rows = moments(&*motion, 50);
-        assert!(rows.iter().all(|row| row.friction < case.tau_max), "{case:?}");
+        assert!(rows.iter().all(|row| row.friction < case.tau_ceiling), "{case:?}");
         let (first, last) = (rows[0], rows[rows.len() - 1]);
         let ends = [(first, transition.v_i), (last, transition.v_f)];
         for (row, v) in ends {
             assert!(relative(row.friction, tau_ss(v)) < 1e-10 && relative(row.v, v) < 1e-8, "{case:?} {row:?}");
         }
         // tau = tau_M - (tau_M - tau_i) R^x e^{alpha x (1 - x)}.
-        let alpha = swift("bounded_friction", &case).alpha.expect("has one");
+        let alpha = shortcut("bounded_friction", &case).alpha.expect("has one");
         let (tau_i, tau_f) = (tau_ss(transition.v_i), tau_ss(transition.v_f));
-        let ratio = (case.tau_max - tau_f) / (case.tau_max - tau_i);
+        let ratio = (case.tau_ceiling - tau_f) / (case.tau_ceiling - tau_i);
         for row in &rows {
             let x = row.t / t_f;
-            let tau = case.tau_max - (case.tau_max - tau_i) * ratio.powf(x) * (alpha * x * (1.0 - x)).exp();
+            let tau = case.tau_ceiling - (case.tau_ceiling - tau_i) * ratio.powf(x) * (alpha * x * (1.0 - x)).exp();
             assert!((row.friction - tau).abs() < 1e-9, "{case:?} {row:?} {tau}");
         }
         // Erratum: with the printed R the protocol would end elsewhere.
-        let printed = (tau_f + case.tau_max - 2.0) / (tau_i + case.tau_max - 2.0);
-        let end = case.tau_max - (case.tau_max - tau_i) * printed;
+        let printed = (tau_f + case.tau_ceiling - 2.0) / (tau_i + case.tau_ceiling - 2.0);
+        let end = case.tau_ceiling - (case.tau_ceiling - tau_i) * printed;
         assert!((end - tau_f).abs() > 0.01, "{end} {tau_f}");
     }
 }
@@ -228,7 +228,7 @@ fn paper_limit_of_short_times_for_the_families() {
             assert!(excess > -1e-5 && excess < t_f * UP.v_f + 1e-5, "{family} {t_f}: {excess}");
         }
         // The step does not get there at all: theta stays and the work is that of sliding at v_f for t_f.
-        let step = swift("step", &case(UP, t_f));
+        let step = shortcut("step", &case(UP, t_f));
         assert!(relative(step.miss, UP.v_f / UP.v_i - 1.0) < 110.0 * t_f, "{t_f}: {step:?}");
         let tau = 1.0 + LAW.a * UP.v_f.ln() - LAW.b * UP.v_i.ln();
         assert!(relative(step.work, t_f * UP.v_f * tau) < 3.0 * t_f, "{t_f}: {step:?}");
@@ -238,9 +238,9 @@ fn paper_limit_of_short_times_for_the_families() {
             let g = -slope / theta;
             g * (1.0 + LAW.a * (g / t_f).ln() + LAW.b * theta.ln())
         });
-        assert!(relative(swift("cubic", &case(UP, t_f)).work, work) < 30.0 * t_f + 1e-9, "{t_f}: {work}");
+        assert!(relative(shortcut("cubic", &case(UP, t_f)).work, work) < 30.0 * t_f + 1e-9, "{t_f}: {work}");
         // The bounds are met from inside: friction grows like a ln(1/t_f) towards tau_M, velocity like 1/t_f.
-        let friction = swift("bounded_friction", &case(UP, t_f));
+        let friction = shortcut("bounded_friction", &case(UP, t_f));
         assert!(friction.friction_max < 1.6 && friction.friction_max > 1.04 + 0.02 * (0.01 / t_f).ln(), "{friction:?}");
     }
 }
@@ -281,7 +281,7 @@ fn paper_limit_of_long_times_for_the_optimum() {
             let found = optimum(transition, t_f);
             assert!((found.hamiltonian - 1.0).abs() < 1e-12, "{found:?}");
             assert!(relative(found.v_end, u(theta_f) * transition.v_f) < 1e-10, "{found:?}");
-            assert!((t_f - found.hold_time - time).abs() < 1e-8, "{found:?} {time}");
+            assert!((t_f - found.time_at_floor - time).abs() < 1e-8, "{found:?} {time}");
             assert!((found.work - t_f - held - beyond).abs() < 1e-7, "{found:?} {held} {beyond}");
         }
     }
@@ -310,12 +310,12 @@ fn paper_limit_of_long_times_for_the_families() {
                     0.5 * (rate(&pair[0]) + rate(&pair[1])) * (pair[1].t - pair[0].t)
                 })
                 .sum();
-            assert!(relative(swift(family, &case(transition, t_f)).work, steady) < 1e-3, "{family}");
+            assert!(relative(shortcut(family, &case(transition, t_f)).work, steady) < 1e-3, "{family}");
         }
         let Transition { v_i, v_f, .. } = transition;
         let distance = |t_f: f64| {
-            let velocity = swift("bounded_velocity", &case(transition, t_f)).alpha.expect("has one");
-            let friction = swift("bounded_friction", &case(transition, t_f)).alpha.expect("has one");
+            let velocity = shortcut("bounded_velocity", &case(transition, t_f)).alpha.expect("has one");
+            let friction = shortcut("bounded_friction", &case(transition, t_f)).alpha.expect("has one");
             [
                 velocity * t_f * t_f / -((v_f - 1.0) / (v_i - 1.0)).ln() - 1.0,
                 friction / -((1.6 - tau_ss(v_f)) / (1.6 - tau_ss(v_i))).ln() - 1.0,
@@ -325,7 +325,7 @@ fn paper_limit_of_long_times_for_the_families() {
             assert!(long.abs() < 1e-3 && relative(short / long, 10.0) < 0.1, "{short} {long}");
         }
         // The step waits at v_f for almost all of the time.
-        let step = swift("step", &case(transition, 1e4));
+        let step = shortcut("step", &case(transition, 1e4));
         assert!(step.miss.abs() < 1e-15 && relative(step.work, 1e4 * v_f * tau_ss(v_f)) < 1e-4);
     }
 }

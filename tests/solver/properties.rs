@@ -10,8 +10,8 @@ use slipsweep::model::{Law, Transition};
 use slipsweep::numerics::elementary::ln;
 use slipsweep::protocol::optimal::crossover::{self, CrossoverTimes, Wanted};
 use slipsweep::protocol::optimal::{self, Optimum, Strategy as Start};
-use slipsweep::protocol::swift::{Case, find};
-use slipsweep::protocol::{Effort, Status, best};
+use slipsweep::protocol::shortcut::{Case, find};
+use slipsweep::protocol::{Effort, Status, best_cubic};
 
 const RTOL: f64 = 1e-10;
 
@@ -107,7 +107,7 @@ proptest! {
         }
         for pair in [first, second, least, third, fourth].windows(2) {
             prop_assert!(pair[1].v_start <= pair[0].v_start * (1.0 + RTOL), "{pair:?}");
-            prop_assert!(pair[1].hold_time >= pair[0].hold_time * (1.0 - RTOL), "{pair:?}");
+            prop_assert!(pair[1].time_at_floor >= pair[0].time_at_floor * (1.0 - RTOL), "{pair:?}");
         }
         prop_assert!(first.hamiltonian <= 0.0 && fourth.hamiltonian >= 0.0 || before[1] == cheapest, "{first:?} {fourth:?}");
     }
@@ -128,7 +128,7 @@ proptest! {
     /// The strategy changes where the crossover table says.
     #[test]
     fn strategies_change_at_the_crossover_times(transition in acceleration(), share in decades(1e-9, 1.0)) {
-        let CrossoverTimes { t_cross: Some(cross), t_hold: Some(hold), t_cheapest: Some(cheapest), .. } = times(&transition)? else {
+        let CrossoverTimes { t_cross: Some(cross), t_floor: Some(hold), t_cheapest: Some(cheapest), .. } = times(&transition)? else {
             return Err(TestCaseError::reject("none"));
         };
         prop_assert!(cheapest <= cross * (1.0 + RTOL) && cross <= hold * (1.0 + RTOL), "{cheapest} {cross} {hold}");
@@ -172,11 +172,11 @@ proptest! {
         let t_f = time(&transition, share);
         let least = optimum(&transition, t_f, true)?;
         for name in ["cubic", "bounded_velocity", "bounded_friction"] {
-            let case = Case { transition, t_f, tau_max: f64::INFINITY };
-            let Ok(swift) = find(name).expect("is a family").solve(&case, RTOL, &mut Effort::default()) else { continue };
-            let size = swift.work.abs().max(least.work.abs());
-            prop_assert!(swift.v_min < 1.0 || swift.work >= least.work - 2.0 * RTOL * size, "{name} {swift:?} {least:?}");
-            prop_assert!(swift.v_min <= swift.v_max, "{name} {swift:?}");
+            let case = Case { transition, t_f, tau_ceiling: f64::INFINITY };
+            let Ok(shortcut) = find(name).expect("is a family").solve(&case, RTOL, &mut Effort::default()) else { continue };
+            let size = shortcut.work.abs().max(least.work.abs());
+            prop_assert!(shortcut.v_min < 1.0 || shortcut.work >= least.work - 2.0 * RTOL * size, "{name} {shortcut:?} {least:?}");
+            prop_assert!(shortcut.v_min <= shortcut.v_max, "{name} {shortcut:?}");
         }
     }
 }
@@ -189,13 +189,13 @@ proptest! {
     fn the_best_shortcut_lies_between_the_cubic_and_the_optimum(transition in transition(), share in decades(1e-2, 1e2)) {
         let t_f = time(&transition, share);
         let least = optimum(&transition, t_f, true)?;
-        let found = best::solve(&transition, t_f, true, RTOL);
+        let found = best_cubic::solve(&transition, t_f, true, RTOL);
         let Some(found) = found.value.filter(|_| found.status == Status::Ok) else {
             return Err(TestCaseError::reject("none"));
         };
         prop_assert!(found.gap >= 0.0 && close(found.work_optimal, least.work, 2.0 * RTOL), "{found:?} {least:?}");
         prop_assert!(found.v_min >= 1.0 - RTOL, "{found:?}");
-        let case = Case { transition, t_f, tau_max: f64::INFINITY };
+        let case = Case { transition, t_f, tau_ceiling: f64::INFINITY };
         if let Ok(cubic) = find("cubic").expect("is a family").solve(&case, RTOL, &mut Effort::default())
             && cubic.v_min >= 1.0
         {

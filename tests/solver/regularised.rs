@@ -265,7 +265,7 @@ fn again(case: &Case, delta_t: f64, floors: [f64; 2]) -> Found {
     let held = |t: f64| Moment { q: [0.0; 3], y: (1.0 - (1.0 - 1.0 / v_i) * (-t).exp()).ln() };
     let moment = |state: &SVector<f64, 3>| forwards(law).moment(state[0], state[1]);
     // Where the first piece ends, and the optimum from there on.
-    let hold = best.hold_time;
+    let hold = best.time_at_floor;
     let (leaving, work, last_start) = if hold > 0.0 {
         // A hold is long here: the first piece lies on it, the corner has a piece of its own.
         assert!(hold > 1.5 * delta_t && t_f - hold > 1.5 * delta_t);
@@ -455,7 +455,7 @@ fn regress_what_does_not_exist_is_infeasible() {
     assert_eq!(broken(Slider { m: -1.0, ..FAST.slider }), Status::Infeasible);
     let b = 3.0;
     let weak = Case { slider: Slider { law: Law { a: 0.03, b }, ..FAST.slider }, ..FAST };
-    assert_eq!(at(weak, 0.01 * t_f), Status::Nonphysical);
+    assert_eq!(at(weak, 0.01 * t_f), Status::Unproven);
 }
 
 #[test]
@@ -543,7 +543,7 @@ fn regress_pieces_meet_where_the_optimum_need_not_be_unique() {
     let exact = solve(&case, 5.35e-4 * t_f, 1e-12);
     for rtol in [1e-6, 1e-8, 1e-10] {
         let found = solve(&case, 5.35e-4 * t_f, rtol);
-        assert_eq!((found.status, exact.status), (Status::Nonphysical, Status::Nonphysical));
+        assert_eq!((found.status, exact.status), (Status::Unproven, Status::Unproven));
         let (found, exact) = (found.value.expect("has numbers"), exact.value.expect("has numbers"));
         assert!(relative(found.work, exact.work) < rtol && relative(found.gap, exact.gap) < 10.0 * rtol, "{found:?}");
     }

@@ -5,7 +5,7 @@ use crate::support::relative;
 use ode_solvers::dop_shared::OutputType;
 use ode_solvers::{Dop853, SVector, System};
 use slipsweep::model::{Law, Transition};
-use slipsweep::protocol::swift::{self, Case};
+use slipsweep::protocol::shortcut::{self, Case};
 use slipsweep::protocol::{Effort, Moment, Motion, Status, optimal};
 use slipsweep::trace::{Absence, Course, Protocol, RANGE_RTOL, Times, Trace};
 
@@ -13,7 +13,7 @@ const PAPER: Transition = Transition { law: Law { a: 0.03, b: 0.05 }, v_i: 3.0, 
 const BACK: Transition = Transition { v_i: 100.0, v_f: 3.0, ..PAPER };
 
 fn case(transition: Transition, t_f: f64) -> Case {
-    Case { transition, t_f, tau_max: 1.6 }
+    Case { transition, t_f, tau_ceiling: 1.6 }
 }
 
 fn course(protocol: Protocol, case: Case) -> Course {
@@ -47,15 +47,15 @@ fn optima() -> Vec<(Transition, f64)> {
 fn shortcuts() -> Vec<(Protocol, Case)> {
     let mut cases = Vec::new();
     for (transition, t_f) in [(PAPER, 0.02), (PAPER, 0.5), (PAPER, 20.0), (BACK, 0.5), (BACK, 20.0)] {
-        for family in swift::FAMILIES {
+        for family in shortcut::FAMILIES {
             let case = case(transition, t_f);
-            if !matches!(family.solve(&case, 1e-10, &mut Effort::default()), Err(swift::Obstacle::Friction)) {
+            if !matches!(family.solve(&case, 1e-10, &mut Effort::default()), Err(shortcut::Obstacle::Friction)) {
                 cases.push((Protocol::Family(family), case));
             }
         }
     }
-    cases.extend([0.02, 0.037, 0.049].map(|t_f| (Protocol::Best { bounded: true }, case(PAPER, t_f))));
-    cases.push((Protocol::FreeCubic { a_2: 0.01, a_3: -0.5 }, case(PAPER, 0.02)));
+    cases.extend([0.02, 0.037, 0.049].map(|t_f| (Protocol::BestCubic { bounded: true }, case(PAPER, t_f))));
+    cases.push((Protocol::CubicPoint { a_2: 0.01, a_3: -0.5 }, case(PAPER, 0.02)));
     cases
 }
 
@@ -294,9 +294,9 @@ fn least_rows(course: &Course, transition: Transition) -> f64 {
 
 #[test]
 fn rows_are_few() {
-    let step = Protocol::Family(swift::find("step").expect("exists"));
-    let cubic = Protocol::Family(swift::find("cubic").expect("exists"));
-    let best = Protocol::Best { bounded: true };
+    let step = Protocol::Family(shortcut::find("step").expect("exists"));
+    let cubic = Protocol::Family(shortcut::find("cubic").expect("exists"));
+    let best = Protocol::BestCubic { bounded: true };
     let optimal = Protocol::Optimal { bounded: true };
     let known = [
         (optimal, PAPER, 0.02, 117),
@@ -322,7 +322,7 @@ fn rows_are_few() {
 #[test]
 fn a_constant_protocol_has_two_rows() {
     let still = Transition { v_f: 3.0, ..PAPER };
-    let cubic = Protocol::Family(swift::find("cubic").expect("exists"));
+    let cubic = Protocol::Family(shortcut::find("cubic").expect("exists"));
     let course = course(cubic, case(still, 0.1));
     let trace = fewest(&course, still);
     let rows: Vec<(f64, f64)> = trace.moments.iter().map(|moment| (moment.t, moment.v)).collect();
@@ -342,7 +342,7 @@ fn jumps_are_two_rows_at_the_same_time() {
     assert!(relative(last.friction, tau(100.0)) < 1e-14);
     assert!(rows[rows.len() - 2].t == 0.02 && relative(rows[rows.len() - 2].v, 3392.17) < 1e-5);
     // The bounded velocity starts and ends without a jump: one row each.
-    let family = Protocol::Family(swift::find("bounded_velocity").expect("exists"));
+    let family = Protocol::Family(shortcut::find("bounded_velocity").expect("exists"));
     let smooth = fewest(&course(family, case(PAPER, 0.02)), PAPER);
     assert!(smooth.moments[1].t > 0.0 && smooth.moments[smooth.moments.len() - 2].t < 0.02);
     assert_eq!(smooth.columns().len(), 4);
@@ -412,9 +412,9 @@ fn extrema_of_the_velocity_are_those_of_the_solvers() {
     }
     for (protocol, case) in shortcuts() {
         let Protocol::Family(family) = protocol else { continue };
-        let swift = family.solve(&case, 1e-10, &mut Effort::default()).expect("exists");
+        let shortcut = family.solve(&case, 1e-10, &mut Effort::default()).expect("exists");
         let trace = fewest(&course(protocol, case), case.transition);
-        for (found, expected) in [(trace.v_min, swift.v_min), (trace.v_max, swift.v_max)] {
+        for (found, expected) in [(trace.v_min, shortcut.v_min), (trace.v_max, shortcut.v_max)] {
             assert!(relative(found, expected) < 1e-9, "{} {case:?}: {found} {expected}", family.name());
         }
     }
@@ -431,8 +431,8 @@ fn what_does_not_exist_says_which_bound() {
     assert!(relative(t_min, 0.395414772254663) < 1e-14);
     let free = absent(optimal(false), BACK, 0.3);
     assert_eq!(free.to_string(), "t_f = 0.3 is too short for v > 0: the least is t_min = 0.3233333333333333");
-    assert_eq!(absent(Protocol::Best { bounded: true }, BACK, 0.3955), Absence::Cubic { bounded: true });
-    let steep = Protocol::FreeCubic { a_2: 3.0, a_3: 0.0 };
+    assert_eq!(absent(Protocol::BestCubic { bounded: true }, BACK, 0.3955), Absence::Cubic { bounded: true });
+    let steep = Protocol::CubicPoint { a_2: 3.0, a_3: 0.0 };
     assert_eq!(absent(steep, PAPER, 0.02).to_string(), "v or theta would not stay positive");
     // Without the bound the optimum may leave the model, and says so.
     let below = course(optimal(false), case(PAPER, 0.06));

@@ -1,4 +1,4 @@
-//! The integrators of this crate: the one of the table `step`, and Radau IIA alone.
+//! The integrators of this crate: the one of the table `step_response`, and Radau IIA alone.
 
 use multiversion::multiversion;
 
@@ -10,7 +10,7 @@ use crate::peaks::Peaks;
 use crate::run::{between, step_to};
 use crate::slider::{Slider, State, X};
 
-/// Series where nothing is stiff, Radau IIA of order 9 elsewhere: what the table `step` uses.
+/// Series where nothing is stiff, Radau IIA of order 9 elsewhere: what the table `step_response` uses.
 pub struct Switching;
 
 impl Method for Switching {

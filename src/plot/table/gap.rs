@@ -104,14 +104,14 @@ fn bound(scene: &Scene<'_>, groups: &Groups, panel: usize, cells: &[AxisCells; 2
     Some(Border { lines: lines.into_iter().map(|line| line.into_iter().map(place).collect()).collect(), meets_zero })
 }
 
-/// The best shortcut of each panel, from the table `best`, if the dataset has it.
+/// The best shortcut of each panel, from the table `best_cubic`, if the dataset has it.
 fn best(scene: &Scene<'_>, groups: &Groups) -> Result<Vec<Option<(f64, f64)>>, PlotError> {
     let mut found = vec![None; groups.shown.len()];
     let Source { folder, manifest, .. } = scene.source;
-    if manifest.table("best").is_none() {
+    if manifest.table("best_cubic").is_none() {
         return Ok(found);
     }
-    let survey = match Survey::new(folder, manifest, "best", &[]) {
+    let survey = match Survey::new(folder, manifest, "best_cubic", &[]) {
         Err(PlotError::Empty { .. }) => return Ok(found),
         survey => survey?,
     };

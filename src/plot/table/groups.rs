@@ -7,7 +7,7 @@ use super::survey::{Survey, Values, bits};
 use crate::grid::Quantity;
 use crate::plot::colour::MAX_SERIES;
 use crate::plot::{Figure, PlotError, label};
-use crate::protocol::swift::FAMILIES;
+use crate::protocol::shortcut::FAMILIES;
 
 /// Groups, above which all rows are one group. Chosen: far more than a picture shows.
 const MAX_GROUPS: usize = 4096;
@@ -306,7 +306,7 @@ impl Makes {
     fn merge(self, axes: &[impl AsRef<str>], values: &mut [f64]) {
         let place = |axis: Quantity| axes.iter().position(|name| self == Makes::Lines && name.as_ref() == axis.name());
         let (Some(family), Some(bound)) = (place(Quantity::Family), place(Quantity::FrictionBound)) else { return };
-        if !FAMILIES.get(values[family] as usize).is_some_and(|family| family.heeds_tau_max()) {
+        if !FAMILIES.get(values[family] as usize).is_some_and(|family| family.heeds_tau_ceiling()) {
             values[bound] = f64::NAN;
         }
     }

@@ -123,7 +123,7 @@ pub fn lines(survey: &Survey, plan: &Plan) -> Result<Lined, PlotError> {
 /// Whether a panel shows the gaps of families, whose logarithm is drawn: those of steps that have not arrived are negative, the others
 /// span decades.
 fn is_gap_of_families(survey: &Survey, plan: &Plan, panel: usize) -> bool {
-    survey.table == "swift" && plan.y[panel] == "gap"
+    survey.table == "shortcut" && plan.y[panel] == "gap"
 }
 
 impl Rows {

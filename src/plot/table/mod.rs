@@ -104,7 +104,7 @@ const KINDS: [Kind; 12] = [
         draw: gap::draw,
     },
     Kind {
-        table: "best",
+        table: "best_cubic",
         title: "Best cubic shortcut",
         defaults: Defaults { value: &["gap"], lines: &["gap", "alpha_2", "alpha_3", "v_min"], ..OVER_TIME },
         draw: plain,
@@ -115,7 +115,7 @@ const KINDS: [Kind; 12] = [
         defaults: Defaults {
             classes: &["strategy"],
             value: &["work"],
-            lines: &["work", "v_start", "hold_time"],
+            lines: &["work", "v_start", "time_at_floor"],
             ..OVER_TIME
         },
         draw: optimal::draw,
@@ -126,8 +126,8 @@ const KINDS: [Kind; 12] = [
         defaults: Defaults {
             x: &["v_f", "v_i", "b", "a"],
             y: &["v_i", "b", "a"],
-            value: &["t_cross", "t_hold", "t_cheapest", "t_turn", "t_min"],
-            lines: &["t_cheapest", "t_cross", "t_hold", "t_min", "t_turn"],
+            value: &["t_cross", "t_floor", "t_cheapest", "t_turn", "t_min"],
+            lines: &["t_cheapest", "t_cross", "t_floor", "t_min", "t_turn"],
             series: &["b", "a"],
             least_map: 5,
             ..OVER_TIME
@@ -135,10 +135,10 @@ const KINDS: [Kind; 12] = [
         draw: plain,
     },
     Kind {
-        table: "swift",
+        table: "shortcut",
         title: "Families of shortcuts",
         defaults: Defaults {
-            x: &["t_f", "v_f", "v_i", "tau_max", "b", "a"],
+            x: &["t_f", "v_f", "v_i", "tau_ceiling", "b", "a"],
             y: &[],
             value: &["gap", "work"],
             lines: &["gap", "v_max"],
@@ -152,7 +152,7 @@ const KINDS: [Kind; 12] = [
         table: "stability",
         title: "Stability of steady sliding",
         defaults: Defaults {
-            classes: &["stable_f", "hopf"],
+            classes: &["stable_f", "hopf_type"],
             value: &["growth_rate", "k_c_f", "stable_f"],
             lines: &["growth_rate", "frequency", "k_c_f"],
             ..ON_A_SPRING
@@ -160,7 +160,7 @@ const KINDS: [Kind; 12] = [
         draw: phase::draw,
     },
     Kind {
-        table: "step",
+        table: "step_response",
         title: "What becomes of the response to a step",
         defaults: Defaults {
             classes: &["outcome", "stick_slip"],
@@ -176,8 +176,8 @@ const KINDS: [Kind; 12] = [
         defaults: Defaults {
             x: &["t_f", "k", "dt", "m", "v_f"],
             y: &["k", "m", "v_f", "v_i"],
-            value: &["end_error", "amplification", "v_c_min"],
-            lines: &["amplification", "end_error", "v_c_min", "v_c_max"],
+            value: &["sampling_error", "amplification", "v_c_min"],
+            lines: &["amplification", "sampling_error", "v_c_min", "v_c_max"],
             series: &["k", "dt"],
             least_map: 12,
             ..OVER_TIME
@@ -272,7 +272,7 @@ fn fixed(survey: &Survey, drawn: &[String]) -> String {
             [one] if !axis.infinite => {
                 words.push(axis.told(*one));
             }
-            [] if axis.infinite && axis.name != "tau_max" => words.push(format!("{} = ∞", label::name(&axis.name))),
+            [] if axis.infinite && axis.name != "tau_ceiling" => words.push(format!("{} = ∞", label::name(&axis.name))),
             _ => {}
         }
     }

@@ -11,7 +11,7 @@ use crate::plot::{PlotError, colour, label};
 use crate::protocol::optimal::crossover::{self, CrossoverTimes, Wanted};
 
 /// The durations that are marked.
-const MARKED: [&str; 5] = ["t_cheapest", "t_cross", "t_hold", "t_min", "t_turn"];
+const MARKED: [&str; 5] = ["t_cheapest", "t_cross", "t_floor", "t_min", "t_turn"];
 
 /// Lines, above which they are not marked. Chosen: more marks hide the curves.
 const MAX_MARKED_LINES: usize = 3;
@@ -71,7 +71,7 @@ fn strategies(scene: &Scene<'_>, plan: &map::Plan) -> Result<Figure, PlotError> 
     let Mapped { mut figure, groups, cells, .. } = map::map(scene.survey, plan)?;
     let styles = [
         ("t_cross", Stroke::solid("#000", 0.9)),
-        ("t_hold", Stroke { dashes: &[3.0, 1.6], ..Stroke::solid("#000", 0.9) }),
+        ("t_floor", Stroke { dashes: &[3.0, 1.6], ..Stroke::solid("#000", 0.9) }),
     ];
     // The place of the duration among the axes, and what the other axis is.
     let (time, other) = match (plan.x.as_str(), plan.y.as_str()) {
@@ -81,7 +81,7 @@ fn strategies(scene: &Scene<'_>, plan: &map::Plan) -> Result<Figure, PlotError> 
     };
     let Some(place) = AXES.iter().position(|axis| *axis == other) else { return Ok(figure) };
     let (unit, unit_of_time) = (scene.size(other), scene.source.units.size("l/v_0"));
-    let wanted = Wanted { cross: true, hold: true, cheapest: false, min: false, turn: false, free: false };
+    let wanted = Wanted { cross: true, floor: true, cheapest: false, min: false, turn: false, free: false };
     let mut is_drawn = [false; 2];
     for (group, panel) in figure.panels.iter_mut().enumerate() {
         let value = |&axis: &&str| if axis == other { Some(0.0) } else { scene.scaled(&groups, group, axis) };
@@ -94,7 +94,7 @@ fn strategies(scene: &Scene<'_>, plan: &map::Plan) -> Result<Figure, PlotError> 
                 values[..], [a, b, v_i, v_f] if a > 0.0 && b >= 0.0 && v_i > 1.0 && v_f > 1.0 && v_i != v_f
             );
             let times = is_legal.then(|| solved(scene, &values, wanted)).flatten();
-            let found = times.map_or([None; 2], |times| [times.t_cross, times.t_hold]);
+            let found = times.map_or([None; 2], |times| [times.t_cross, times.t_floor]);
             for (curve, found) in curves.iter_mut().zip(found) {
                 let found = found.map_or(f64::NAN, |found| found * unit_of_time);
                 curve.push(if time == 0 { (found, at) } else { (at, found) });
@@ -118,11 +118,11 @@ fn strategies(scene: &Scene<'_>, plan: &map::Plan) -> Result<Figure, PlotError> 
 /// The durations of a line, in the order of [`MARKED`].
 fn times(scene: &Scene<'_>, groups: &Groups, group: usize) -> [Option<f64>; MARKED.len()] {
     let scaled: Option<Vec<f64>> = AXES.iter().map(|axis| scene.scaled(groups, group, axis)).collect();
-    let wanted = Wanted { cross: true, hold: true, cheapest: true, min: true, turn: true, free: false };
+    let wanted = Wanted { cross: true, floor: true, cheapest: true, min: true, turn: true, free: false };
     let Some(times) = scaled.and_then(|values| solved(scene, &values, wanted)) else { return [None; MARKED.len()] };
-    let CrossoverTimes { t_cross, t_hold, t_cheapest, t_min, t_turn, .. } = times;
+    let CrossoverTimes { t_cross, t_floor, t_cheapest, t_min, t_turn, .. } = times;
     let unit = scene.source.units.size("l/v_0");
-    [t_cheapest, t_cross, t_hold, t_min, t_turn].map(|time| Some(time? * unit))
+    [t_cheapest, t_cross, t_floor, t_min, t_turn].map(|time| Some(time? * unit))
 }
 
 /// The durations at which the strategy changes, for a transition whose values are in the order of [`AXES`].

@@ -94,7 +94,7 @@ impl Landscape {
     pub fn motion(&self, a_2: f64, a_3: f64) -> Option<Box<dyn Motion>> {
         let mut status = [Status::Infeasible];
         self.evaluate(&[a_2], &[a_3], Shortcuts { work: &mut [], v_min: &mut [], status: &mut status });
-        let motion = motion::FreeCubic::new(self.law, self.ends, a_2, a_3);
+        let motion = motion::CubicPoint::new(self.law, self.ends, a_2, a_3);
         (status != [Status::Infeasible]).then(|| Box::new(motion) as Box<dyn Motion>)
     }
 

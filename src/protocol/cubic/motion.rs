@@ -7,17 +7,17 @@ use crate::numerics::elementary::ln;
 use crate::protocol::{Moment, Motion};
 
 /// The motion of one shortcut; its parameter is `x = t/t_f`.
-pub(super) struct FreeCubic {
+pub(super) struct CubicPoint {
     law: Law,
     ends: Ends,
     a_2: f64,
     a_3: f64,
 }
 
-impl FreeCubic {
+impl CubicPoint {
     /// The shortcut with `alpha_2 t_f = a_2`, `alpha_3 t_f^2 = a_3`, which is feasible.
-    pub fn new(law: Law, ends: Ends, a_2: f64, a_3: f64) -> FreeCubic {
-        FreeCubic { law, ends, a_2, a_3 }
+    pub fn new(law: Law, ends: Ends, a_2: f64, a_3: f64) -> CubicPoint {
+        CubicPoint { law, ends, a_2, a_3 }
     }
 
     fn path(&self) -> Path<'_> {
@@ -25,7 +25,7 @@ impl FreeCubic {
     }
 }
 
-impl Motion for FreeCubic {
+impl Motion for CubicPoint {
     fn duration(&self) -> f64 {
         self.ends.t_f
     }

@@ -1,7 +1,7 @@
 //! The times at which the optimal strategy changes: closed forms, one quadrature each.
 
 use super::extremal::{Extremal, Problem};
-use super::hold;
+use super::floor;
 use super::search::quadrature_tolerance;
 use crate::model::{Law, Transition};
 use crate::numerics::turning::turning;
@@ -13,7 +13,7 @@ pub struct CrossoverTimes {
     /// Acceleration: `v(0+) = v_i`.
     pub t_cross: Option<f64>,
     /// Acceleration: `v(0+)` reaches the bound 1.
-    pub t_hold: Option<f64>,
+    pub t_floor: Option<f64>,
     /// Acceleration: least `W*` over `t_f`.
     pub t_cheapest: Option<f64>,
     /// Deceleration: shortest possible time under `v >= 1`.
@@ -25,29 +25,29 @@ pub struct CrossoverTimes {
     /// Deceleration: end of the window without hold.
     pub t_free_out: Option<f64>,
     /// `W*` at `t_cross`.
-    pub work_cross: Option<f64>,
-    /// `W*` at `t_hold`.
-    pub work_hold: Option<f64>,
+    pub work_at_t_cross: Option<f64>,
+    /// `W*` at `t_floor`.
+    pub work_at_t_floor: Option<f64>,
     /// `W*` at `t_cheapest`.
-    pub work_cheapest: Option<f64>,
+    pub work_at_t_cheapest: Option<f64>,
     /// `W*` at `t_min`.
-    pub work_min: Option<f64>,
+    pub work_at_t_min: Option<f64>,
     /// `W*` at `t_turn`.
-    pub work_turn: Option<f64>,
+    pub work_at_t_turn: Option<f64>,
 }
 
 /// Which of the columns are asked for; the others are not computed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Wanted {
-    /// `t_cross` or `work_cross`.
+    /// `t_cross` or `work_at_t_cross`.
     pub cross: bool,
-    /// `t_hold` or `work_hold`.
-    pub hold: bool,
-    /// `t_cheapest` or `work_cheapest`.
+    /// `t_floor` or `work_at_t_floor`.
+    pub floor: bool,
+    /// `t_cheapest` or `work_at_t_cheapest`.
     pub cheapest: bool,
-    /// `t_min`, `work_min`.
+    /// `t_min`, `work_at_t_min`.
     pub min: bool,
-    /// `t_turn`, `work_turn`.
+    /// `t_turn`, `work_at_t_turn`.
     pub turn: bool,
     /// `t_free_in`, `t_free_out`.
     pub free: bool,
@@ -56,7 +56,7 @@ pub struct Wanted {
 /// All special times of a transition, to relative accuracy `rtol`; `bounded` says whether `v >= 1` is imposed (`t_min`
 /// and the window without hold do not exist otherwise).
 ///
-/// Each is one quadrature, no search over `t_f` (docs/theory.md, "Crossover times"). The status is `Nonphysical` where
+/// Each is one quadrature, no search over `t_f` (docs/theory.md, "Crossover times"). The status is `Unproven` where
 /// friction falls to `max(0, b - a)` on one of the paths, `NegativeFriction` where it falls below 0, `Infeasible` outside the domain of the law, `NotConverged`
 /// where a quadrature failed.
 pub fn solve(transition: &Transition, bounded: bool, rtol: f64, wanted: Wanted) -> (Status, CrossoverTimes, Effort) {
@@ -88,7 +88,7 @@ impl Survey {
     fn meet(&mut self, friction: f64) {
         self.friction = self.friction.min(friction);
         if friction <= self.problem.unique_above() {
-            self.status = self.status.max(Status::Nonphysical);
+            self.status = self.status.max(Status::Unproven);
         }
     }
 
@@ -97,7 +97,7 @@ impl Survey {
         let sums = extremal.as_ref().and_then(|e| e.arc.sums(quadrature_tolerance(self.rtol)));
         let (Some(extremal), Some(sums)) = (extremal, sums) else {
             // Where friction fails already in a steady state, no arc need exist.
-            let failed = if self.problem.is_doubtful() { Status::Nonphysical } else { Status::NotConverged };
+            let failed = if self.problem.is_doubtful() { Status::Unproven } else { Status::NotConverged };
             self.status = self.status.max(failed);
             return (None, None);
         };
@@ -117,15 +117,15 @@ fn acceleration(survey: &mut Survey, wanted: Wanted, times: &mut CrossoverTimes)
     let ln_v_i = -problem.from.ln;
     let ratio = 1.0 + problem.fall;
     if wanted.cross && friction_0 > b - a && ratio * friction_1 > friction_0 {
-        (times.t_cross, times.work_cross) = survey.measure(problem.extremal(0.0, None));
+        (times.t_cross, times.work_at_t_cross) = survey.measure(problem.extremal(0.0, None));
     }
-    if wanted.hold && 1.0 - b * ln_v_i > b - a && ratio * friction_1 > 1.0 + a - b * ln_v_i - a * problem.from.theta {
+    if wanted.floor && 1.0 - b * ln_v_i > b - a && ratio * friction_1 > 1.0 + a - b * ln_v_i - a * problem.from.theta {
         let unheld = Problem { bounded: true, ..problem }.q_hold().and_then(|q| problem.extremal(q, None));
-        (times.t_hold, times.work_hold) = survey.measure(unheld);
+        (times.t_floor, times.work_at_t_floor) = survey.measure(unheld);
     }
     if wanted.cheapest && friction_0 > 0.0 && friction_1 > 0.0 {
         let z_0 = turning((2.0 * friction_0 / a).sqrt()).ln_u;
-        (times.t_cheapest, times.work_cheapest) = survey.measure(problem.extremal(z_0, None));
+        (times.t_cheapest, times.work_at_t_cheapest) = survey.measure(problem.extremal(z_0, None));
     }
 }
 
@@ -136,12 +136,12 @@ fn deceleration(survey: &mut Survey, wanted: Wanted, times: &mut CrossoverTimes)
     if wanted.min && problem.bounded {
         let t_min = problem.t_min();
         times.t_min = Some(t_min);
-        times.work_min = Some(hold::work(&problem.law, problem.from, t_min));
+        times.work_at_t_min = Some(floor::work(&problem.law, problem.from, t_min));
         survey.meet(1.0 + b * problem.from.ln);
     }
     let turns = problem.friction_end() > b - a;
     if wanted.turn && turns {
-        (times.t_turn, times.work_turn) =
+        (times.t_turn, times.work_at_t_turn) =
             if problem.rises() { survey.measure(problem.extremal(0.0, None)) } else { (Some(0.0), Some(0.0)) };
     }
     if wanted.free

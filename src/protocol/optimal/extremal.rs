@@ -15,7 +15,7 @@
 //! A search counts `q` from `q_hold` where that exists, so that short holds keep their digits.
 
 use super::arc::{Arc, Chart, Sums, least_friction, phi, phi_and_slope};
-use super::hold;
+use super::floor;
 use super::lifetime::Lifetime;
 use crate::model::Law;
 use crate::numerics::elementary::{exp, exp_m1, ln, ln_1p};
@@ -41,7 +41,7 @@ const MOST_LN_U: f64 = 690.0;
 /// One member of the family.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Extremal {
-    pub hold_time: f64,
+    pub time_at_floor: f64,
     /// Contact lifetime where the arc starts.
     pub theta_s: f64,
     /// By how much later than `t_min` the arc starts (negative: sooner), free of cancellation; for arcs of rising problems
@@ -61,7 +61,7 @@ pub(super) struct Extremal {
 #[derive(Debug, Clone, Copy)]
 enum Rate {
     /// `gain (I + inner) + outer`, on the part of the family that a hold parametrises.
-    Hold { gain: f64, inner: f64, outer: f64 },
+    Floor { gain: f64, inner: f64, outer: f64 },
     /// `gain (I + inner) + outer`.
     Turning { gain: f64, inner: f64, outer: f64 },
     /// `gain` times the sensitivity of the direct chart.
@@ -72,7 +72,7 @@ enum Rate {
 
 /// How an arc of a rising problem starts.
 struct Leaving {
-    hold_time: f64,
+    time_at_floor: f64,
     /// What is to be added to the arc's lag.
     late: f64,
     /// `ln(theta_s/theta_1)`.
@@ -93,7 +93,7 @@ impl Problem {
     pub fn t_min(&self) -> f64 {
         match (self.rises(), self.bounded) {
             (false, _) => 0.0,
-            (true, true) => hold::time(-self.fall * self.to.theta, self.to.rest),
+            (true, true) => floor::time(-self.fall * self.to.theta, self.to.rest),
             (true, false) => -self.fall * self.to.theta,
         }
     }
@@ -108,7 +108,7 @@ impl Problem {
 
     /// `growth - ln(1 + growth/rest)`: what a growth of theta up to its end takes at rest, less what it takes at `v = 1`.
     fn growth_beyond(&self, growth: f64) -> f64 {
-        let time = hold::time(growth, self.to.rest);
+        let time = floor::time(growth, self.to.rest);
         if time > 1.0 { growth - time } else { phi(time) - growth * self.to.theta / self.to.rest }
     }
 
@@ -235,9 +235,9 @@ impl Problem {
         // d ln theta_h/d ln theta_c from C(theta_h) = C_leaving(theta_c); the hold's own time cancels against the start
         // of the arc.
         let m = (1.0 + law.a - law.b + law.b * z) / theta * theta_h / (c_h + law.a - law.b);
-        let rate = Rate::Hold { gain: unit * m * rest / theta, inner: self.to.theta / end.excess, outer: unit * m };
+        let rate = Rate::Floor { gain: unit * m * rest / theta, inner: self.to.theta / end.excess, outer: unit * m };
         Some(Extremal {
-            hold_time: self.t_min() + time,
+            time_at_floor: self.t_min() + time,
             theta_s: theta,
             late: time,
             lags: false,
@@ -251,7 +251,7 @@ impl Problem {
     /// An arc from theta at the start to theta at the end.
     fn without_hold(&self, arc: Arc, start: f64, end: f64, rate: Rate) -> Option<Extremal> {
         let (late, lags) = (self.rest_beyond(), self.rises());
-        Some(Extremal { hold_time: 0.0, theta_s: self.from.theta, late, lags, arc, start, end, rate })
+        Some(Extremal { time_at_floor: 0.0, theta_s: self.from.theta, late, lags, arc, start, end, rate })
     }
 
     /// Falling problem, `q = ln u(0+) > 0`.
@@ -324,8 +324,8 @@ impl Problem {
         let excess = law.a * phi_1;
         let friction_a = self.friction_a();
         let pull = friction_a - excess;
-        let Leaving { hold_time, late, d } = self.leaving(law.a * (self.to.theta * exp_m1(eta) - eta));
-        let theta_s = if hold_time > 0.0 { self.to.theta * exp(d) } else { self.from.theta };
+        let Leaving { time_at_floor, late, d } = self.leaving(law.a * (self.to.theta * exp_m1(eta) - eta));
+        let theta_s = if time_at_floor > 0.0 { self.to.theta * exp(d) } else { self.from.theta };
         let rising = Rate::OneWay { gain: -stretch * excess_1 / self.to.theta };
         if may_turn(&law, excess, pull)
             && let Some(xi) = turning_distance(&law, excess, pull).filter(|&xi| xi <= 1.0)
@@ -346,11 +346,20 @@ impl Problem {
                     outer: stretch * self.to.theta * swing,
                 }
             };
-            return Some(Extremal { hold_time, theta_s, late, lags: true, arc, start: start.ln_u, end: z_1, rate });
+            return Some(Extremal { time_at_floor, theta_s, late, lags: true, arc, start: start.ln_u, end: z_1, rate });
         }
         let chart = Chart::Direct { theta_a: self.to.theta, z_a: z_1, friction_a, y_start: d, y_end: 0.0 };
         let arc = Arc { law, chart };
-        Some(Extremal { hold_time, theta_s, late, lags: true, arc, start: arc.start()?.ln_u, end: z_1, rate: rising })
+        Some(Extremal {
+            time_at_floor,
+            theta_s,
+            late,
+            lags: true,
+            arc,
+            start: arc.start()?.ln_u,
+            end: z_1,
+            rate: rising,
+        })
     }
 
     /// Rising problem, `q >= 0`: `X = layer q` at the end.
@@ -363,8 +372,8 @@ impl Problem {
         let (theta_h, ln_theta_h) = (self.to.theta * (1.0 + x2), self.to.ln + grown);
         let c_h = 1.0 + (law.b - law.a) * ln_theta_h;
         let excess = (law.a - law.b) * grown + c_h * x2 / (1.0 + x2);
-        let Leaving { hold_time, late, d } = self.leaving(excess - law.a * phi(self.to.ln));
-        let theta_s = if hold_time > 0.0 { self.to.theta * exp(d) } else { self.from.theta };
+        let Leaving { time_at_floor, late, d } = self.leaving(excess - law.a * phi(self.to.ln));
+        let theta_s = if time_at_floor > 0.0 { self.to.theta * exp(d) } else { self.from.theta };
         let x_squares = -(1.0 + x2) * exp_m1(-d);
         let x_start = -(x2 - x_squares).sqrt();
         let arc = Arc { law, chart: Chart::Turning { theta_h, ln_theta_h, x_start, x_end, x_squares } };
@@ -374,19 +383,19 @@ impl Problem {
             inner: -theta_s / start.excess,
             outer: layer * edge(&law, theta_h, ln_theta_h, x_end, &end),
         };
-        Some(Extremal { hold_time, theta_s, late, lags: true, arc, start: start.ln_u, end: end.ln_u, rate })
+        Some(Extremal { time_at_floor, theta_s, late, lags: true, arc, start: start.ln_u, end: end.ln_u, rate })
     }
 
     /// For a rising problem: where the arc starts, from `kappa = theta_1 (C - C_leaving(theta_1))`.
     fn leaving(&self, kappa: f64) -> Leaving {
         // ln(theta_0/theta_1), from what has its digits.
         let all = if self.fall < -0.5 { self.from.ln - self.to.ln } else { -ln_1p(self.rise()) };
-        let at_once = Leaving { hold_time: 0.0, late: self.rest_beyond(), d: all };
+        let at_once = Leaving { time_at_floor: 0.0, late: self.rest_beyond(), d: all };
         if !self.bounded {
             return at_once;
         }
         // Where no arc leaves the bound (friction at v = 1 too low) only the protocol without a hold is left.
-        let Some(d) = hold::leave(&self.law, self.to.ln, kappa).filter(|&d| d > all) else {
+        let Some(d) = floor::leave(&self.law, self.to.ln, kappa).filter(|&d| d > all) else {
             return at_once;
         };
         let held = self.to.theta * exp_m1(d) - self.fall * self.to.theta;
@@ -395,7 +404,7 @@ impl Problem {
         }
         // 1 - theta_s comes from theta_1: it is a small difference where v_f is next to 1.
         let left = -self.to.theta * exp_m1(d);
-        Leaving { hold_time: hold::time(held, self.to.rest + left), late: self.growth_beyond(left), d }
+        Leaving { time_at_floor: floor::time(held, self.to.rest + left), late: self.growth_beyond(left), d }
     }
 }
 
@@ -404,18 +413,18 @@ impl Extremal {
     /// start of a hold.
     pub fn friction_min(&self, problem: &Problem, sums: &Sums) -> f64 {
         let ends = [(self.theta_s, self.start), (problem.to.theta, self.end)];
-        let held = if self.hold_time > 0.0 { 1.0 + problem.law.b * problem.from.ln } else { f64::INFINITY };
+        let held = if self.time_at_floor > 0.0 { 1.0 + problem.law.b * problem.from.ln } else { f64::INFINITY };
         sums.friction_min.min(least_friction(&problem.law, self.arc.c(), ends)).min(held)
     }
 
     /// Work of the hold and the arc together.
     pub fn work(&self, problem: &Problem, sums: &Sums) -> f64 {
-        hold::work(&problem.law, problem.from, self.hold_time) + sums.work
+        floor::work(&problem.law, problem.from, self.time_at_floor) + sums.work
     }
 
     /// Total time.
     pub fn time(&self, sums: &Sums) -> f64 {
-        self.hold_time + sums.time
+        self.time_at_floor + sums.time
     }
 
     /// The total time beyond the least time `t_min` of the problem.
@@ -428,13 +437,13 @@ impl Extremal {
     pub fn probe(&self, problem: &Problem, sums: &Sums, beyond: f64) -> Probe {
         let time = self.time_beyond(sums);
         let rate = match self.rate {
-            Rate::Hold { gain, inner, outer } | Rate::Turning { gain, inner, outer } => {
+            Rate::Floor { gain, inner, outer } | Rate::Turning { gain, inner, outer } => {
                 gain * (sums.sensitivity + inner) + outer
             }
             Rate::Direct { gain } => gain * sums.sensitivity,
             Rate::OneWay { gain } => gain * sums.swing,
         };
-        let (value, slope) = if let Rate::Hold { .. } = self.rate {
+        let (value, slope) = if let Rate::Floor { .. } = self.rate {
             (time / beyond - 1.0, rate / beyond)
         } else if time > 0.0 {
             (ln(time / beyond), rate / time)

@@ -6,8 +6,8 @@
 mod arc;
 pub mod crossover;
 mod extremal;
+mod floor;
 mod guess;
-mod hold;
 mod lifetime;
 mod motion;
 mod route;
@@ -31,19 +31,19 @@ pub enum Strategy {
     /// Jumps down, but stays off the bound: `1 < v(0+) <= v_i`.
     SlowDown,
     /// Starts on the bound `v = 1`.
-    Hold,
+    Floor,
 }
 
 impl Strategy {
     /// All strategies, in their order.
-    pub const ALL: [Strategy; 3] = [Strategy::SpeedUp, Strategy::SlowDown, Strategy::Hold];
+    pub const ALL: [Strategy; 3] = [Strategy::SpeedUp, Strategy::SlowDown, Strategy::Floor];
 
     /// The name that is written into tables.
     pub fn name(self) -> &'static str {
         match self {
             Strategy::SpeedUp => "speed_up",
             Strategy::SlowDown => "slow_down",
-            Strategy::Hold => "hold",
+            Strategy::Floor => "floor",
         }
     }
 }
@@ -58,7 +58,7 @@ pub struct Optimum {
     /// Velocity just before the end, `v(t_f-)`.
     pub v_end: f64,
     /// Time spent on the bound `v = 1`.
-    pub hold_time: f64,
+    pub time_at_floor: f64,
     /// `dW*/dt_f = -C`, the Hamiltonian.
     pub hamiltonian: f64,
     /// Largest contact lifetime on the way.
@@ -71,7 +71,7 @@ pub struct Optimum {
 ///
 /// `Infeasible` where no protocol is fast enough under the bound (`t_f < t_min`), or where an argument is outside its
 /// domain (`a > 0`, `b >= 0`, `v_i, v_f > 1`, `t_f > 0`, all finite). Without the bound, `BelowBound` where `v(0+) <
-/// 1`. `Nonphysical` where `tau <= max(0, b - a)` somewhere, `NegativeFriction` where `tau < 0`; an extremal that falls
+/// 1`. `Unproven` where `tau <= max(0, b - a)` somewhere, `NegativeFriction` where `tau < 0`; an extremal that falls
 /// below the bound there has no numbers.
 pub fn solve(transition: &Transition, t_f: f64, bounded: bool, rtol: f64) -> Solved<Optimum> {
     let Some(problem) = Problem::of(transition, bounded).filter(|_| t_f > 0.0 && t_f.is_finite()) else {
@@ -176,10 +176,10 @@ pub(super) fn feedback(
     let (solved, extremal) = search::find_beyond(&problem, time, rtol);
     *effort += solved.effort;
     let optimum = solved.value?;
-    let pressure = if optimum.strategy == Strategy::Hold {
+    let pressure = if optimum.strategy == Strategy::Floor {
         // On the bound -C = friction + V_theta (1 - theta), with the C of the arc that leaves it at theta_c, where 1 -
         // theta_c = (1 - theta) e^-t: nothing cancels next to theta = 1.
-        let held = optimum.hold_time;
+        let held = optimum.time_at_floor;
         let released = from.aged(held);
         let grown = ln_1p(from.growth(held) / from.theta);
         let leaving = (1.0 + law.a + law.b * released.ln) * exp(-held) / released.theta;
@@ -190,7 +190,7 @@ pub(super) fn feedback(
         0.0
     };
     let ln_v = match extremal {
-        Some(extremal) if optimum.strategy != Strategy::Hold => extremal.start - from.ln,
+        Some(extremal) if optimum.strategy != Strategy::Floor => extremal.start - from.ln,
         _ => 0.0,
     };
     Some(Feedback { v: optimum.v_start, ln_v, pressure })

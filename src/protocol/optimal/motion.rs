@@ -12,7 +12,7 @@ pub struct Optimal {
     pub(super) law: Law,
     pub(super) t_f: f64,
     bounded: bool,
-    pub(super) hold: Hold,
+    pub(super) floor: Floor,
     /// The part of `s` that the hold takes.
     share: f64,
     pub(super) arc: Option<Timed>,
@@ -24,18 +24,19 @@ const ROUNDING: f64 = 1e-9;
 impl Optimal {
     /// The motion of `extremal`, or of the hold alone, in time `t_f`.
     pub(super) fn new(problem: &Problem, t_f: f64, extremal: Option<Extremal>) -> Optimal {
-        let (theta_s, hold_time) = extremal.map_or((problem.to.theta, t_f), |found| (found.theta_s, found.hold_time));
-        let arc = extremal.map(|found| Timed::new(&found.arc, hold_time, t_f));
-        let hold = Hold {
+        let (theta_s, time_at_floor) =
+            extremal.map_or((problem.to.theta, t_f), |found| (found.theta_s, found.time_at_floor));
+        let arc = extremal.map(|found| Timed::new(&found.arc, time_at_floor, t_f));
+        let floor = Floor {
             law: problem.law,
             from: problem.from,
             theta_s,
             time: arc.as_ref().map_or(t_f, |arc| arc.start),
             beta_s: -(1.0 + problem.law.a + problem.law.b * ln(theta_s)) / theta_s,
         };
-        let (held, moving) = (hold.length(), arc.as_ref().map_or(0.0, |arc| arc.pieces.length.abs()));
+        let (held, moving) = (floor.length(), arc.as_ref().map_or(0.0, |arc| arc.pieces.length.abs()));
         let share = if arc.is_none() { 1.0 } else { held / (held + moving) };
-        Optimal { law: problem.law, t_f, bounded: problem.bounded, hold, share, arc }
+        Optimal { law: problem.law, t_f, bounded: problem.bounded, floor, share, arc }
     }
 }
 
@@ -47,7 +48,7 @@ impl Motion for Optimal {
     fn landmarks(&self) -> Vec<f64> {
         let mut landmarks = vec![0.0];
         if self.share > 0.0 {
-            let (first, length) = (self.hold.first(), self.hold.length());
+            let (first, length) = (self.floor.first(), self.floor.length());
             for (from, to) in [(0.0, first), (first, length)] {
                 let pieces = (to - from).ceil().max(1.0);
                 let place = |i: u32| (from + (to - from) * f64::from(i) / pieces) / length;
@@ -68,7 +69,7 @@ impl Motion for Optimal {
         let s = s.clamp(0.0, 1.0);
         let arc = match &self.arc {
             Some(arc) if s >= self.share => arc,
-            _ => return self.hold.at(s / self.share),
+            _ => return self.floor.at(s / self.share),
         };
         let Law { a, b } = self.law;
         let place = if s == 1.0 { 1.0 } else { ((s - self.share) / (1.0 - self.share)).min(1.0) };
@@ -89,7 +90,7 @@ impl Motion for Optimal {
 }
 
 /// The hold: `v = 1` until the contact lifetime is `theta_s`.
-pub(super) struct Hold {
+pub(super) struct Floor {
     pub law: Law,
     pub from: Lifetime,
     theta_s: f64,
@@ -98,7 +99,7 @@ pub(super) struct Hold {
     beta_s: f64,
 }
 
-impl Hold {
+impl Floor {
     /// Length of its coordinate. `ln theta` changes over its first value at the start, and theta and the costate over 1 at
     /// both ends: the logarithm of the time from either end, in these units, opens them.
     fn length(&self) -> f64 {
@@ -168,7 +169,7 @@ pub(super) struct Timed {
 }
 
 impl Timed {
-    fn new(arc: &Arc, hold_time: f64, t_f: f64) -> Timed {
+    fn new(arc: &Arc, time_at_floor: f64, t_f: f64) -> Timed {
         let pieces = arc.pieces();
         let edge = |piece: usize| piece as f64 / f64::from(pieces.count);
         let times: Vec<f64> = (0..pieces.count as usize).map(|i| pieces.time(edge(i), edge(i + 1))).collect();
@@ -186,7 +187,7 @@ impl Timed {
         left.reverse();
         let total = left[0];
         // Rounding of the search goes to the hold, if there is one.
-        let (start, scale) = if hold_time > 0.0 { ((t_f - total).max(0.0), 1.0) } else { (0.0, t_f / total) };
+        let (start, scale) = if time_at_floor > 0.0 { ((t_f - total).max(0.0), 1.0) } else { (0.0, t_f / total) };
         let middle = gone.iter().skip(1).zip(&left).find(|(gone, left)| gone > left).map_or(0.0, |(_, &left)| left);
         Timed { pieces, c: arc.c(), start, t_f, gone, left, scale, middle: t_f - scale * middle }
     }

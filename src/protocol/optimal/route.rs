@@ -1,7 +1,7 @@
 //! The optimal protocol asked at a given time: derivatives, what happens between two places, and the control it takes.
 
 use super::arc::least_friction;
-use super::hold;
+use super::floor;
 use super::motion::{Optimal, Timed};
 use crate::model::Law;
 use crate::numerics::elementary::{exp, exp_m1, ln};
@@ -36,7 +36,7 @@ impl Optimal {
 
     /// The place just after the start.
     pub fn first(&self) -> Site {
-        if self.arc.is_some() && self.hold.time == 0.0 { Site::Moving(0.0) } else { Site::Held(0.0) }
+        if self.arc.is_some() && self.floor.time == 0.0 { Site::Moving(0.0) } else { Site::Held(0.0) }
     }
 
     /// The place just before the end.
@@ -86,7 +86,7 @@ impl Optimal {
     }
 
     fn held(&self, time: f64) -> Jet {
-        let now = self.hold.from.aged(time);
+        let now = self.floor.from.aged(time);
         Jet { v: [1.0, 0.0, 0.0, 0.0], theta: now.theta, rate: now.rest }
     }
 
@@ -103,11 +103,11 @@ impl Optimal {
     pub fn landmarks(&self, from: Site, to: Site) -> Vec<Site> {
         let mut sites = vec![from];
         if let Site::Held(start) = from {
-            let end = if let Site::Held(end) = to { end } else { self.hold.time };
+            let end = if let Site::Held(end) = to { end } else { self.floor.time };
             // Theta changes over its first value, and then over 1.
             let mut time = start;
             while time < end && sites.len() < MOST_MARKS {
-                time = (time + 0.5 * self.hold.from.aged(time).theta).min(end);
+                time = (time + 0.5 * self.floor.from.aged(time).theta).min(end);
                 sites.push(Site::Held(time));
             }
         }
@@ -126,7 +126,7 @@ impl Optimal {
         let mut least = f64::INFINITY;
         if let Site::Held(start) = from {
             // It rises all the way.
-            least = 1.0 + self.law.b * self.hold.from.aged(start).ln;
+            least = 1.0 + self.law.b * self.floor.from.aged(start).ln;
         }
         if let (Site::Moving(end), Some(arc)) = (to, &self.arc) {
             let start = if let Site::Moving(start) = from { start } else { 0.0 };
@@ -143,11 +143,11 @@ impl Optimal {
     pub fn span(&self, from: Site, to: Site) -> Span {
         let mut span = Span { time: 0.0, lag: 0.0, work: 0.0 };
         if let Site::Held(start) = from {
-            let end = if let Site::Held(end) = to { end } else { self.hold.time };
-            let (now, time) = (self.hold.from.aged(start), end - start);
+            let end = if let Site::Held(end) = to { end } else { self.floor.time };
+            let (now, time) = (self.floor.from.aged(start), end - start);
             span.time += time;
             span.lag += lag_at_bound(now.theta, time);
-            span.work += hold::work(&self.law, now, time);
+            span.work += floor::work(&self.law, now, time);
         }
         if let (Site::Moving(end), Some(arc)) = (to, &self.arc) {
             let start = if let Site::Moving(start) = from { start } else { 0.0 };
@@ -165,7 +165,7 @@ impl Optimal {
     pub fn control(&self, slider: &Slider, from: Site, to: Site, rtol: f64, extent: &mut Extent) {
         if let Site::Held(start) = from {
             // v_c = 1 + (b/k) theta'/theta falls all the way.
-            let end = if let Site::Held(end) = to { end } else { self.hold.time };
+            let end = if let Site::Held(end) = to { end } else { self.floor.time };
             extent.add(slider.control(&self.held(start)));
             extent.add(slider.control(&self.held(end)));
         }

@@ -3,7 +3,7 @@
 use super::arc::Sums;
 use super::extremal::{Extremal, Problem};
 use super::guess::{Guess, guess};
-use super::{Optimum, Strategy, hold};
+use super::{Optimum, Strategy, floor};
 use crate::numerics::elementary::exp;
 use crate::numerics::root::newton_in_pieces;
 use crate::protocol::{Effort, Solved, Status};
@@ -83,7 +83,7 @@ pub(super) fn find_beyond(problem: &Problem, time: Time, rtol: f64) -> (Solved<O
     let mut friction_min = f64::INFINITY;
     let mut probe = |p, share: f64| {
         let extremal = problem.extremal(p, family.q_hold)?;
-        let piece = family.piece(p, extremal.hold_time);
+        let piece = family.piece(p, extremal.time_at_floor);
         let before = last.as_ref().filter(|last| last.piece == piece).map(|last| last.value);
         let (sums, probe) = loop {
             let sums = extremal.arc.sums((tolerance * share).max(FINEST))?;
@@ -114,7 +114,7 @@ pub(super) fn find_beyond(problem: &Problem, time: Time, rtol: f64) -> (Solved<O
         outcome = found.map(|(x, found, _)| (x, found));
         // The slope jumps where a hold begins: a last step across such a seam is taken again from the other side.
         match found {
-            Some((x, found, piece)) if family.piece(x, found.hold_time) != piece => start = x,
+            Some((x, found, piece)) if family.piece(x, found.time_at_floor) != piece => start = x,
             _ => break,
         }
     }
@@ -122,12 +122,12 @@ pub(super) fn find_beyond(problem: &Problem, time: Time, rtol: f64) -> (Solved<O
     // without a hold may be one with a hold of less than the error.
     for _ in 0..MOST_REFINEMENTS {
         let Some((x, found)) = &mut outcome else { break };
-        let held = found.hold_time > 0.0;
+        let held = found.time_at_floor > 0.0;
         let beside = if problem.rises() { found.start - problem.from.ln } else { *x };
         let seam = family.q_hold.filter(|_| !held && beside < SEAM);
         let share = match seam {
             Some(_) => 0.0,
-            None if held && found.hold_time < SHORT * t_f => found.hold_time / t_f,
+            None if held && found.time_at_floor < SHORT * t_f => found.time_at_floor / t_f,
             None => break,
         };
         let Some((last, _)) = probe(*x, share).filter(|(last, _)| last.slope > 0.0) else { break };
@@ -137,11 +137,11 @@ pub(super) fn find_beyond(problem: &Problem, time: Time, rtol: f64) -> (Solved<O
         let crosses = family.q_hold.is_some() && finer * x.signum() < 0.0;
         let finer = if crosses { f64::MIN_POSITIVE.copysign(finer) } else { finer };
         let Some(extremal) = problem.extremal(finer, family.q_hold) else { break };
-        let before = found.hold_time;
+        let before = found.time_at_floor;
         (*x, *found) = (finer, extremal);
         // A hold that such a step changes is not yet known to the square of that change.
-        let settled = (found.hold_time - before).abs() <= SETTLED * before || last.value.abs() <= SPENT;
-        if held == (found.hold_time > 0.0) && last.value.abs() <= accuracy.enough && settled && !crosses {
+        let settled = (found.time_at_floor - before).abs() <= SETTLED * before || last.value.abs() <= SPENT;
+        if held == (found.time_at_floor > 0.0) && last.value.abs() <= accuracy.enough && settled && !crosses {
             break;
         }
     }
@@ -151,7 +151,7 @@ pub(super) fn find_beyond(problem: &Problem, time: Time, rtol: f64) -> (Solved<O
         (outcome, last.filter(|last| last.value.abs() <= close))
     else {
         let doubtful = friction_min <= unique_above || problem.is_doubtful();
-        let status = if doubtful { Status::Nonphysical } else { Status::NotConverged };
+        let status = if doubtful { Status::Unproven } else { Status::NotConverged };
         return (Solved { status, value: None, effort }, None);
     };
 
@@ -160,7 +160,7 @@ pub(super) fn find_beyond(problem: &Problem, time: Time, rtol: f64) -> (Solved<O
     let (c_probed, c) = (probed.arc.c(), found.arc.c());
     let lag = beyond - probed.time_beyond(&sums);
     let work = probed.work(problem, &sums) - 0.5 * (c_probed + c) * lag;
-    let held = found.hold_time > 0.0;
+    let held = found.time_at_floor > 0.0;
     let v_start = if held { 1.0 } else { exp(found.start) / problem.from.theta };
     // Just off the bound, rounding may take v(0+) below it; further below there is no protocol on the bound at all.
     let below = v_start < 1.0 - ROUNDING;
@@ -169,7 +169,7 @@ pub(super) fn find_beyond(problem: &Problem, time: Time, rtol: f64) -> (Solved<O
     let v_end = if problem.bounded && v_end > 1.0 - ROUNDING { v_end.max(1.0) } else { v_end };
     let friction = found.friction_min(problem, &sums);
     let strategy = if held {
-        Strategy::Hold
+        Strategy::Floor
     } else if v_start * problem.from.theta > 1.0 {
         Strategy::SpeedUp
     } else {
@@ -178,10 +178,10 @@ pub(super) fn find_beyond(problem: &Problem, time: Time, rtol: f64) -> (Solved<O
     let doubtful = friction <= unique_above || (problem.bounded && below);
     if doubtful && problem.bounded && (below || least_velocity(&found) < 1.0 - ROUNDING) {
         // Where friction is this low an extremal may fall below the bound on its way: then it is no protocol under it.
-        return (Solved { status: Status::Nonphysical, value: None, effort }, None);
+        return (Solved { status: Status::Unproven, value: None, effort }, None);
     }
     let status = if doubtful {
-        Status::Nonphysical
+        Status::Unproven
     } else if v_start < 1.0 && !problem.bounded {
         Status::BelowBound
     } else {
@@ -192,7 +192,7 @@ pub(super) fn find_beyond(problem: &Problem, time: Time, rtol: f64) -> (Solved<O
         work,
         v_start,
         v_end,
-        hold_time: found.hold_time,
+        time_at_floor: found.time_at_floor,
         hamiltonian: -c,
         theta_max: found.arc.theta_max(),
         strategy,
@@ -257,9 +257,9 @@ struct Piece {
 }
 
 impl Family {
-    fn piece(&self, p: f64, hold_time: f64) -> Piece {
+    fn piece(&self, p: f64, time_at_floor: f64) -> Piece {
         let q_hold = self.q_hold.unwrap_or(0.0);
-        Piece { beyond: p > 0.0, turned: p + q_hold > 0.0, held: hold_time > 0.0 }
+        Piece { beyond: p > 0.0, turned: p + q_hold > 0.0, held: time_at_floor > 0.0 }
     }
 }
 
@@ -308,16 +308,16 @@ const COARSEST: f64 = 1e-4;
 fn shortest(problem: &Problem, t_min: f64) -> Solved<Optimum> {
     let law = problem.law;
     let friction = 1.0 + law.b * problem.from.ln;
-    let status = if friction <= problem.unique_above() { Status::Nonphysical } else { Status::Ok };
+    let status = if friction <= problem.unique_above() { Status::Unproven } else { Status::Ok };
     let status = status.with_friction(friction);
     let value = Optimum {
-        work: hold::work(&law, problem.from, t_min),
+        work: floor::work(&law, problem.from, t_min),
         v_start: 1.0,
         v_end: 1.0,
-        hold_time: t_min,
-        hamiltonian: -hold::c_leaving(&law, problem.to.theta, problem.to.ln),
+        time_at_floor: t_min,
+        hamiltonian: -floor::c_leaving(&law, problem.to.theta, problem.to.ln),
         theta_max: problem.to.theta,
-        strategy: Strategy::Hold,
+        strategy: Strategy::Floor,
     };
     Solved { status, value: Some(value), effort: Effort::default() }
 }

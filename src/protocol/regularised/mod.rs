@@ -46,7 +46,7 @@ pub struct Regularised {
 /// a deceleration jumps down by about `e^(1/a)`; pieces are drawn down to 1e-12 of the velocity at the end, and down to
 /// 1e-100. `BelowBound` where a piece dips below `v = 1`: next to a hold
 /// each must, since theta there is as large as `v >= 1` allows. `NegativeFriction` where `tau < 0` on the way;
-/// `Nonphysical` where the optimum need not be the only one.
+/// `Unproven` where the optimum need not be the only one.
 pub fn solve(
     slider: &Slider,
     (v_i, v_f): (f64, f64),
@@ -112,7 +112,7 @@ fn assemble(
     if let Err(status) = sum.gather(&route, (v_i, v_f), (delta_t, t_f), &mut effort) {
         // Where the optimum need not be unique, it need not be exact enough for pieces either.
         let doubtful = is_doubtful(solved.status) && status == Status::NotConverged;
-        return none(if doubtful { Status::Nonphysical } else { status }, effort);
+        return none(if doubtful { Status::Unproven } else { status }, effort);
     }
     if slider.k == f64::INFINITY {
         sum.control = sum.v;
@@ -130,7 +130,7 @@ fn assemble(
     let numbers = [value.work, value.v_max, value.control_min, value.control_max];
     if !numbers.iter().all(|number| number.is_finite()) {
         let doubtful = is_doubtful(solved.status);
-        return none(if doubtful { Status::Nonphysical } else { Status::NotConverged }, effort);
+        return none(if doubtful { Status::Unproven } else { Status::NotConverged }, effort);
     }
     let own = if value.v_min < 1.0 { Status::BelowBound } else { Status::Ok };
     let status = own.with_friction(sum.friction_min).beside(solved.status);
@@ -139,7 +139,7 @@ fn assemble(
 
 /// Whether the optimum need not be unique.
 fn is_doubtful(status: Status) -> bool {
-    matches!(status, Status::Nonphysical | Status::NegativeFriction)
+    matches!(status, Status::Unproven | Status::NegativeFriction)
 }
 
 /// Velocities below this one count as none.

@@ -33,9 +33,9 @@ fn cases() -> Vec<Case> {
         "v_c_min",
         "v_c_max",
         "amplification",
-        "end_error",
-        "rigid",
-        "loop_error",
+        "sampling_error",
+        "stiffness_ratio",
+        "open_loop_error",
         "work_error",
         "gap_error",
     ];
@@ -65,14 +65,14 @@ fn point(row: &Row) -> Case {
     let greater = low.abs().max(high.abs());
     let case =
         case.scaled("v_c_min", low, greater, Route::Reference).scaled("v_c_max", high, greater, Route::Reference);
-    let case = case.nulls(&["end_error"], Route::Law);
+    let case = case.nulls(&["sampling_error"], Route::Law);
     let case = match m > 0.0 && k.is_finite() {
-        true => case.number("rigid", k * t_f * t_f / m, Route::Formula),
-        false => case.knows("rigid", Truth::Exact(f64::INFINITY), Route::Formula),
+        true => case.number("stiffness_ratio", k * t_f * t_f / m, Route::Formula),
+        false => case.knows("stiffness_ratio", Truth::Exact(f64::INFINITY), Route::Formula),
     };
     // Told as it is, the control arrives but for what grows on the way.
     let grown = 1.0 + row.number("amplification");
-    let case = case.scaled("loop_error", 0.0, grown, Route::Law);
+    let case = case.scaled("open_loop_error", 0.0, grown, Route::Law);
     match least_work(&transition(row), t_f, true) {
         Some(least) => case::gap(case, row.number("work"), least).word("status", "ok", Route::Reference),
         None => case,
@@ -80,5 +80,10 @@ fn point(row: &Row) -> Case {
 }
 
 fn held(row: &Row) -> Case {
-    axes(row, row.number("dt")).within("sampled").scaled("end_error", row.number("end_error"), 1.0, Route::Reference)
+    axes(row, row.number("dt")).within("sampled").scaled(
+        "sampling_error",
+        row.number("sampling_error"),
+        1.0,
+        Route::Reference,
+    )
 }

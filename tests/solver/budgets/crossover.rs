@@ -32,17 +32,17 @@ fn regime(row: &Row) -> &'static str {
 fn cases() -> Vec<Case> {
     let columns = [
         "t_cross",
-        "t_hold",
+        "t_floor",
         "t_cheapest",
         "t_min",
         "t_turn",
         "t_free_in",
         "t_free_out",
-        "work_cross",
-        "work_hold",
-        "work_cheapest",
-        "work_min",
-        "work_turn",
+        "work_at_t_cross",
+        "work_at_t_floor",
+        "work_at_t_cheapest",
+        "work_at_t_min",
+        "work_at_t_turn",
     ];
     let case = |row: Row| {
         let case = Case::of(&row, &["a", "b", "v_i", "v_f"]).within(regime(&row)).reference(&row, &columns);

@@ -5,7 +5,7 @@
 //! tables of `docs/accuracy.md` are those of the file. `SLIPSWEEP_BUDGETS=write` writes both anew: budgets that hold
 //! and are tight stay as they are, others become about three times what is measured.
 
-mod best;
+mod best_cubic;
 mod case;
 mod compliant;
 mod crossover;
@@ -16,10 +16,10 @@ mod optimal;
 mod page;
 mod reduced;
 mod regularised;
+mod shortcut;
 mod stability;
-mod step;
+mod step_response;
 mod sweeps;
-mod swift;
 
 use std::collections::BTreeMap;
 
@@ -47,12 +47,12 @@ const KNOWN: [Known; 12] = [
     reduced::MINIMUM,
     reduced::QUANTILES,
     reduced::HISTOGRAM,
-    best::KNOWN,
+    best_cubic::KNOWN,
     optimal::KNOWN,
     crossover::KNOWN,
-    swift::KNOWN,
+    shortcut::KNOWN,
     stability::KNOWN,
-    step::KNOWN,
+    step_response::KNOWN,
     compliant::KNOWN,
     regularised::KNOWN,
 ];

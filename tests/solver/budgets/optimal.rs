@@ -17,12 +17,12 @@ pub const KNOWN: Known = Known {
         ("speeds up", "accelerations that start with v(0+) > v_i"),
         ("slows down", "accelerations that slow down first, above v = 1"),
         ("holds", "accelerations that wait at v = 1"),
-        ("short hold", "accelerations in 1e-4 to 1e-10 more than t_hold, relatively"),
+        ("short floor", "accelerations in 1e-4 to 1e-10 more than t_floor, relatively"),
         ("deceleration", "decelerations in more than 1.01 t_min"),
         ("next to t_min", "decelerations in 1 to 1.01 t_min"),
         (
             "special times",
-            "1e-7 and 1e-13, relatively, after t_cross, t_hold, t_cheapest, t_turn, t_free_in and t_free_out",
+            "1e-7 and 1e-13, relatively, after t_cross, t_floor, t_cheapest, t_turn, t_free_in and t_free_out",
         ),
         ("v near 1", "the lower velocity 1e-3 to 1e-12 above v = 1"),
         ("no bound", "accelerations that may fall below v = 1"),
@@ -59,7 +59,7 @@ fn regime(row: &Row) -> &'static str {
     let Transition { v_i, v_f, .. } = transition(row);
     let bounded = row.text("bounded") == "1";
     match row.text("strategy") {
-        _ if row.text("regime") == "short_hold" => "short hold",
+        _ if row.text("regime") == "short_floor" => "short floor",
         _ if row.text("regime") == "v_near_1" => "v near 1",
         _ if row.text("regime").starts_with("next_to_") => "special times",
         _ if v_f < v_i && !bounded => "no bound down",
@@ -68,17 +68,17 @@ fn regime(row: &Row) -> &'static str {
         _ if !bounded => "no bound",
         "speed_up" => "speeds up",
         "slow_down" => "slows down",
-        "hold" => "holds",
+        "floor" => "holds",
         word => panic!("`{word}` is no strategy"),
     }
 }
 
 fn cases() -> Vec<Case> {
-    let numbers = ["work", "v_start", "v_end", "hold_time", "hamiltonian", "theta_max"];
+    let numbers = ["work", "v_start", "v_end", "time_at_floor", "hamiltonian", "theta_max"];
     let mut cases: Vec<Case> = Vec::new();
     for row in reference::table("optimal").into_iter().chain(reference::table("optimal_edges")) {
         let bounded = row.text("bounded") == "1";
-        let strategy = ["speed_up", "slow_down", "hold"].into_iter().find(|word| *word == row.text("strategy"));
+        let strategy = ["speed_up", "slow_down", "floor"].into_iter().find(|word| *word == row.text("strategy"));
         let below = !bounded && row.number("v_start") < 1.0;
         let case = Case { bounded, ..Case::of(&row, &AXES).within(regime(&row)) };
         let case = case.reference(&row, &numbers);

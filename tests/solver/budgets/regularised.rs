@@ -11,7 +11,7 @@ pub const KNOWN: Known = Known {
     grid: Grid::Points,
     regimes: &[
         ("off the bound", "accelerations that stay above v = 1"),
-        ("hold", "accelerations with a hold, so that pieces dip below v = 1"),
+        ("floor", "accelerations with a hold, so that pieces dip below v = 1"),
         ("no bound", "accelerations that may fall below v = 1"),
         ("infeasible", "pieces that overlap, or less time than t_min"),
     ],
@@ -35,8 +35,8 @@ fn cases() -> Vec<Case> {
 fn point(row: &Row) -> Case {
     let bounded = row.text("bounded") == "1";
     let axes = AXES.into_iter().chain(["k", "m", "delta_t"]).map(|axis| (axis, row.number(axis)));
-    let regime = match row.text("hold") {
-        "1" => "hold",
+    let regime = match row.text("floor") {
+        "1" => "floor",
         _ if bounded => "off the bound",
         _ => "no bound",
     };

@@ -22,7 +22,7 @@ pub const KNOWN: Known = Known {
     cases,
 };
 
-/// The axes of the table, and of `step`.
+/// The axes of the table, and of `step_response`.
 pub const AXES: [&str; 6] = ["a", "b", "v_i", "v_f", "k", "m"];
 
 /// The material, spring, mass and final velocity of a point.
@@ -85,7 +85,7 @@ fn point(sliding: &Sliding, regime: &'static str) -> Case {
         None
     };
     let stable = |v: f64| k.is_infinite() || (dd(k) - critical(sliding, v)).high > 0.0;
-    case.number("k_qs", weakening.high, Route::Formula)
+    case.number("k_od", weakening.high, Route::Formula)
         .number("k_c_i", critical(sliding, v_i).high, Route::Formula)
         .number("k_c_f", critical(sliding, v).high, Route::Formula)
         .knows("stable_i", Truth::Flag(stable(v_i)), Route::Formula)
@@ -115,9 +115,9 @@ fn massless_eigenvalues(case: Case, sliding: &Sliding) -> Case {
 /// A row of the table of Lyapunov coefficients.
 fn hopf(row: &Row) -> Case {
     let case = Case::of(row, &AXES).within("Hopf point");
-    match row.optional("lyapunov") {
-        Some(coefficient) if coefficient < 0.0 => case.word("hopf", "supercritical", Route::Reference),
-        Some(_) => case.word("hopf", "subcritical", Route::Reference),
-        None => case.nulls(&["hopf"], Route::Reference),
+    match row.optional("first_lyapunov_coefficient") {
+        Some(coefficient) if coefficient < 0.0 => case.word("hopf_type", "supercritical", Route::Reference),
+        Some(_) => case.word("hopf_type", "subcritical", Route::Reference),
+        None => case.nulls(&["hopf_type"], Route::Reference),
     }
 }

@@ -25,17 +25,17 @@ const FINE: f64 = 1e-13;
 pub fn columns(times: &CrossoverTimes) -> [(&'static str, Option<f64>); 12] {
     [
         ("t_cross", times.t_cross),
-        ("t_hold", times.t_hold),
+        ("t_floor", times.t_floor),
         ("t_cheapest", times.t_cheapest),
         ("t_min", times.t_min),
         ("t_turn", times.t_turn),
         ("t_free_in", times.t_free_in),
         ("t_free_out", times.t_free_out),
-        ("work_cross", times.work_cross),
-        ("work_hold", times.work_hold),
-        ("work_cheapest", times.work_cheapest),
-        ("work_min", times.work_min),
-        ("work_turn", times.work_turn),
+        ("work_at_t_cross", times.work_at_t_cross),
+        ("work_at_t_floor", times.work_at_t_floor),
+        ("work_at_t_cheapest", times.work_at_t_cheapest),
+        ("work_at_t_min", times.work_at_t_min),
+        ("work_at_t_turn", times.work_at_t_turn),
     ]
 }
 
@@ -63,14 +63,14 @@ fn every_special_time_is_right_or_is_said_not_to_be() {
 }
 
 fn order(transition: &Transition, times: &CrossoverTimes, row: &mut Row) {
-    let &CrossoverTimes { t_cross, t_hold, t_cheapest, t_min, t_turn, t_free_in, t_free_out, .. } = times;
+    let &CrossoverTimes { t_cross, t_floor, t_cheapest, t_min, t_turn, t_free_in, t_free_out, .. } = times;
     let rises = |chain: &[Option<f64>]| {
         let known: Vec<f64> = chain.iter().copied().flatten().collect();
         known.windows(2).all(|pair| pair[0] <= pair[1] * (1.0 + 8.0 * FINE))
     };
-    row.fact("in order", rises(&[t_cheapest, t_cross, t_hold]) && rises(&[t_min, t_free_in, t_turn, t_free_out]));
+    row.fact("in order", rises(&[t_cheapest, t_cross, t_floor]) && rises(&[t_min, t_free_in, t_turn, t_free_out]));
     let faster = transition.v_f > transition.v_i;
-    let of_the_other = if faster { [t_min, t_turn, t_free_in] } else { [t_cross, t_hold, t_cheapest] };
+    let of_the_other = if faster { [t_min, t_turn, t_free_in] } else { [t_cross, t_floor, t_cheapest] };
     row.fact("of its own direction", of_the_other.iter().all(Option::is_none));
 }
 
@@ -89,11 +89,11 @@ fn happens(point: &Point, times: &CrossoverTimes, row: &mut Row) {
     let steady = |v: f64| v * (1.0 + (a - b) * v.ln());
     let size = |v: f64| v * (1.0 + (a + b) * v.ln());
     let works = [
-        (times.t_cross, times.work_cross),
-        (times.t_hold.filter(|_| bounded), times.work_hold),
-        (times.t_cheapest, times.work_cheapest),
-        (times.t_min, times.work_min),
-        (times.t_turn, times.work_turn),
+        (times.t_cross, times.work_at_t_cross),
+        (times.t_floor.filter(|_| bounded), times.work_at_t_floor),
+        (times.t_cheapest, times.work_at_t_cheapest),
+        (times.t_min, times.work_at_t_min),
+        (times.t_turn, times.work_at_t_turn),
     ];
     for (time, work) in works {
         if let (Some((t, found)), Some(work)) = (at(time), work) {
@@ -116,9 +116,9 @@ fn happens(point: &Point, times: &CrossoverTimes, row: &mut Row) {
         let slope = found.hamiltonian.abs() * t;
         row.at_most("C = 0 at t_cheapest", slope, doubt(t) * (found.work + size(v_i) * t) * (1.0 + 1.0 / a));
     }
-    if let Some((t, found)) = at(times.t_hold.filter(|_| bounded)) {
-        row.at_most("v(0+) = 1 at t_hold", found.v_start - 1.0, doubt(t) / a.min(1.0));
-        row.at_most("no hold at t_hold", found.hold_time, 16.0 * f64::EPSILON * t + doubt(t) * t);
+    if let Some((t, found)) = at(times.t_floor.filter(|_| bounded)) {
+        row.at_most("v(0+) = 1 at t_floor", found.v_start - 1.0, doubt(t) / a.min(1.0));
+        row.at_most("no hold at t_floor", found.time_at_floor, 16.0 * f64::EPSILON * t + doubt(t) * t);
     }
 }
 

@@ -6,7 +6,7 @@
 //! number: `SLIPSWEEP_STRESS_POINT=i` runs it alone. `SLIPSWEEP_STRESS_PRINT=1` prints the points instead. `tests/nightly/run`
 //! runs them by the million.
 
-mod best;
+mod best_cubic;
 mod compliant;
 pub mod crossover;
 mod landscape;
@@ -14,9 +14,9 @@ mod optimal;
 pub mod random;
 mod reference;
 mod regularised;
+mod shortcut;
 mod stability;
-mod step;
-mod swift;
+mod step_response;
 
 use std::collections::BTreeMap;
 use std::fmt::Debug;

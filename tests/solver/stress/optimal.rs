@@ -78,8 +78,8 @@ fn every_optimum_is_right_or_says_so() {
 
 /// What any row must be.
 fn sound(transition: &Transition, t_f: f64, bounded: bool, solved: &Solved<Optimum>, found: &Optimum, row: &mut Row) {
-    let &Optimum { work, v_start, v_end, hold_time, hamiltonian, theta_max, strategy } = found;
-    let numbers = [work, v_start, v_end, hold_time, hamiltonian, theta_max];
+    let &Optimum { work, v_start, v_end, time_at_floor, hamiltonian, theta_max, strategy } = found;
+    let numbers = [work, v_start, v_end, time_at_floor, hamiltonian, theta_max];
     row.fact("finite", numbers.iter().all(|number| number.is_finite()));
     row.fact("has a status with numbers", !matches!(solved.status, Status::Infeasible | Status::NotConverged));
     row.fact("velocities are positive", v_start >= 0.0 && v_end >= 0.0);
@@ -88,15 +88,15 @@ fn sound(transition: &Transition, t_f: f64, bounded: bool, solved: &Solved<Optim
         return;
     }
     row.fact("work is positive", work > 0.0);
-    row.fact("hold within the time", (0.0..=t_f).contains(&hold_time));
-    let expected = if hold_time > 0.0 {
-        Strategy::Hold
+    row.fact("hold within the time", (0.0..=t_f).contains(&time_at_floor));
+    let expected = if time_at_floor > 0.0 {
+        Strategy::Floor
     } else if v_start / transition.v_i > 1.0 {
         Strategy::SpeedUp
     } else {
         Strategy::SlowDown
     };
-    let sure = hold_time > 0.0 || (v_start / transition.v_i - 1.0).abs() > 4.0 * f64::EPSILON;
+    let sure = time_at_floor > 0.0 || (v_start / transition.v_i - 1.0).abs() > 4.0 * f64::EPSILON;
     row.fact("strategy as it starts", !sure || strategy == expected);
     let ends = 1.0 / transition.v_i.min(transition.v_f);
     row.at_most("theta_max is the largest", ends / theta_max - 1.0, 4.0 * f64::EPSILON);
@@ -114,8 +114,8 @@ fn accuracies_agree(point: &Point, doubt: &Doubt, rough: &Optimum, fine: &Optimu
     row.at_most("hamiltonian to rtol", (rough.hamiltonian - fine.hamiltonian).abs(), budget(doubt.time) * size);
     // A short hold is what is left of t_f, or of the time in which theta grows.
     let rest = doubt.t_f * doubt.time + f64::EPSILON * (doubt.t_f + fine.theta_max);
-    let hold = budget(0.0) * fine.hold_time + 32.0 * rest;
-    row.at_most("hold_time to rtol", (rough.hold_time - fine.hold_time).abs(), hold);
+    let hold = budget(0.0) * fine.time_at_floor + 32.0 * rest;
+    row.at_most("time_at_floor to rtol", (rough.time_at_floor - fine.time_at_floor).abs(), hold);
 }
 
 /// `C = v (a (u - ln u) - tau_ss(v) - a)` at both ends, with `u = theta v`, where they are on the arc.
@@ -131,7 +131,7 @@ fn conserved(transition: &Transition, doubt: &Doubt, fine: &Optimum, row: &mut R
         row.at_most(invariant, (c + fine.hamiltonian).abs(), allowed);
     };
     at("C at the end", transition.v_f, fine.v_end);
-    if fine.hold_time == 0.0 && fine.v_start > f64::MIN_POSITIVE {
+    if fine.time_at_floor == 0.0 && fine.v_start > f64::MIN_POSITIVE {
         at("C at the start", transition.v_i, fine.v_start);
     }
 }

@@ -121,8 +121,8 @@ impl Random {
         let t_f = match self.uniform() {
             kind if kind < 0.35 => {
                 let (_, times, _) = crossover::solve(transition, bounded, 1e-13, EVERY_TIME);
-                let CrossoverTimes { t_cross, t_hold, t_cheapest, t_turn, t_free_in, t_free_out, .. } = times;
-                let special = [t_cross, t_hold, t_cheapest, Some(least), t_turn, t_free_in, t_free_out];
+                let CrossoverTimes { t_cross, t_floor, t_cheapest, t_turn, t_free_in, t_free_out, .. } = times;
+                let special = [t_cross, t_floor, t_cheapest, Some(least), t_turn, t_free_in, t_free_out];
                 let special: Vec<f64> = special.into_iter().flatten().filter(|&t| t > 0.0).collect();
                 if special.is_empty() { self.between(1e-9, 1e9) * fast } else { self.one(&special) }
             }

@@ -68,8 +68,12 @@ fn reference_optima_of_the_sample() {
             // It vanishes at the cheapest time: a rounding of t_f moves it by that share of W/t_f.
             let small = row.number("work").abs() / (t_f * row.number("hamiltonian").abs());
             close(row, "hamiltonian", value.hamiltonian, within(time + f64::EPSILON * small));
-            let hold = (value.hold_time - row.number("hold_time")).abs();
-            assert!(hold <= within(time) * t_f, "hold_time: {} is off by {hold:.1e} in {row:?}", value.hold_time);
+            let hold = (value.time_at_floor - row.number("time_at_floor")).abs();
+            assert!(
+                hold <= within(time) * t_f,
+                "time_at_floor: {} is off by {hold:.1e} in {row:?}",
+                value.time_at_floor
+            );
         }
     }
 }

@@ -54,7 +54,7 @@ fn every_regularised_is_right_or_says_so() {
                 row.fact("numbers as the status says", found.value.is_some())
             }
             Status::Infeasible => row.fact("numbers as the status says", found.value.is_none()),
-            Status::Nonphysical | Status::NotConverged => {}
+            Status::Unproven | Status::NotConverged => {}
         }
         let Some(value) = found.value else { return };
         let Regularised { work, work_optimal, gap, v_min, v_max, control_min, control_max, .. } = value;
@@ -82,7 +82,7 @@ fn accurate(point: &Point, rough: &Regularised, row: &mut Row) {
     let &Point { slider, velocities, t_f, delta_t, bounded, rtol } = point;
     let found = regularised::solve(&slider, velocities, t_f, delta_t, bounded, FINE);
     // Where the extremal need not be unique, no number is promised.
-    if found.status == Status::Nonphysical {
+    if found.status == Status::Unproven {
         return;
     }
     let Some(fine) = found.value else { return row.fact("exists at 1e-12", false) };

@@ -1,0 +1,39 @@
+//! The distance of steady friction from its bound, `tau_M - 1 - (a - b) ln v`, to all its digits where it is small.
+
+use crate::model::Law;
+use crate::numerics::double_double::DoubleDouble;
+use crate::numerics::elementary::ln;
+
+/// `ln 2` less its nearest double.
+const LN_2_REST: f64 = 2.3190468138462996e-17;
+
+/// Below this share of its terms the distance is formed with 32 digits.
+const CANCELLED: f64 = 0.1;
+
+/// The distance for steady sliding at `v >= 1`.
+pub(super) fn gap(law: Law, tau_ceiling: f64, v: f64) -> f64 {
+    let room = tau_ceiling - 1.0;
+    let plain = room - (law.a - law.b) * ln(v);
+    if plain.abs() > CANCELLED * room.abs().max(1.0) {
+        return plain;
+    }
+    let slope = DoubleDouble::sum(law.a, -law.b);
+    (DoubleDouble::sum(tau_ceiling, -1.0) - slope * logarithm(v)).high
+}
+
+/// `ln v`: `k ln 2 + 2 atanh s`, `s = (m - 1)/(m + 1)`, for `v = 2^k m`.
+fn logarithm(v: f64) -> DoubleDouble {
+    let (mut m, mut k) = libm::frexp(v);
+    if m < std::f64::consts::FRAC_1_SQRT_2 {
+        (m, k) = (2.0 * m, k - 1);
+    }
+    let s = DoubleDouble::sum(m, -1.0) / DoubleDouble::sum(m, 1.0);
+    let square = s * s;
+    // s^2 is below 0.0295: its twenty-first power ends the series.
+    let mut sum = DoubleDouble::new(0.0);
+    for n in (0..21).rev() {
+        sum = sum * square + DoubleDouble::new(1.0) / DoubleDouble::new(f64::from(2 * n + 1));
+    }
+    let ln_2 = DoubleDouble { high: std::f64::consts::LN_2, low: LN_2_REST };
+    DoubleDouble::new(f64::from(k)) * ln_2 + DoubleDouble::new(2.0) * s * sum
+}

@@ -1,0 +1,208 @@
+//! `cubic`: theta is the cubic in time along which v is continuous at both ends.
+//!
+//! With `x = t/t_f`, `z = 1 - x` and `rise = 1/v_f - 1/v_i`: `theta = 1/v_i + rise (3 x^2 - 2 x^3)` and `n = t_f (1 -
+//! theta') = t_f - 6 rise x z`, so `v = n/(t_f theta)`. It is the shortcut `alpha_2 = 0`, `alpha_3 t_f^2 = 3 rise` of
+//! the landscape, which gives its work. The extrema of `p ln n + q ln theta` are roots of a polynomial of degree four;
+//! both halves have their own, in the distance from their end.
+
+use super::{Case, Family, Obstacle, Shortcut};
+use crate::model::Law;
+use crate::numerics::double_double::DoubleDouble;
+use crate::numerics::elementary::ln;
+use crate::numerics::polynomial::roots_between;
+use crate::protocol::cubic::{Landscape, Shortcuts, rise};
+use crate::protocol::{Effort, Moment, Motion, Status};
+
+/// The family.
+pub struct Cubic;
+
+impl Family for Cubic {
+    fn name(&self) -> &'static str {
+        "cubic"
+    }
+
+    fn doc(&self) -> &'static str {
+        "theta a cubic in time, v continuous at both ends"
+    }
+
+    fn alpha(&self) -> Option<&'static str> {
+        None
+    }
+
+    fn solve(&self, case: &Case, rtol: f64, effort: &mut Effort) -> Result<Shortcut, Obstacle> {
+        let curve = Curve::new(case)?;
+        let work = curve.work(case, rtol, effort)?;
+        let (mut v_min, mut v_max) = (f64::INFINITY, 0.0f64);
+        for (side, d) in curve.extrema(1.0, -1.0) {
+            let v = curve.velocity(side, d);
+            (v_min, v_max) = (v_min.min(v), v_max.max(v));
+        }
+        let extrema = curve.extrema(case.transition.law.a, case.transition.law.b - case.transition.law.a);
+        let frictions: Vec<f64> = extrema.into_iter().map(|(side, d)| curve.friction(side, d)).collect();
+        Ok(Shortcut {
+            alpha: None,
+            work,
+            v_min,
+            v_max,
+            friction_max: frictions.iter().copied().fold(f64::NEG_INFINITY, f64::max),
+            friction_min: frictions.iter().copied().fold(f64::INFINITY, f64::min),
+            miss: 0.0,
+        })
+    }
+
+    fn motion(&self, case: &Case, _rtol: f64) -> Result<Box<dyn Motion>, Obstacle> {
+        let curve = Curve::new(case)?;
+        Ok(Box::new(Trace { curve, stops: curve.stops() }))
+    }
+}
+
+/// The end from which a place is measured.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Side {
+    Start,
+    End,
+}
+
+/// The one member.
+#[derive(Debug, Clone, Copy)]
+struct Curve {
+    law: Law,
+    t_f: f64,
+    v_i: f64,
+    v_f: f64,
+    theta_i: f64,
+    theta_f: f64,
+    /// `1/v_f - 1/v_i`.
+    rise: f64,
+    /// `n` at `x = 1/2`, its least value where theta rises: `t_f - 1.5 rise`.
+    waist: f64,
+}
+
+impl Curve {
+    fn new(case: &Case) -> Result<Curve, Obstacle> {
+        let (law, v_i, v_f, t_f) = (case.transition.law, case.transition.v_i, case.transition.v_f, case.t_f);
+        let sound = law.a > 0.0 && law.b >= 0.0 && t_f > 0.0 && v_i >= 1.0 && v_f >= 1.0;
+        if !sound || ![law.a, law.b, t_f, v_i, v_f].iter().all(|x| x.is_finite()) {
+            return Err(Obstacle::Domain);
+        }
+        let rise = rise(v_i, v_f);
+        let waist = (DoubleDouble::new(t_f) - DoubleDouble::new(1.5) * rise).high;
+        if waist <= 0.0 {
+            return Err(Obstacle::Velocity);
+        }
+        Ok(Curve { law, t_f, v_i, v_f, theta_i: 1.0 / v_i, theta_f: 1.0 / v_f, rise: rise.high, waist })
+    }
+
+    /// Work from the landscape, of which this is one point.
+    fn work(&self, case: &Case, rtol: f64, effort: &mut Effort) -> Result<f64, Obstacle> {
+        if self.v_i == self.v_f {
+            return Ok(self.friction(Side::Start, 0.0) * self.v_i * self.t_f);
+        }
+        let (mut work, mut status) = ([0.0], [Status::Infeasible]);
+        let spent = Landscape::new(&case.transition, self.t_f, rtol).evaluate(
+            &[0.0],
+            &[3.0 * self.rise],
+            Shortcuts { work: &mut work, v_min: &mut [], status: &mut status },
+        );
+        effort.quadratures += spent.quadratures;
+        effort.nodes += spent.nodes;
+        if status[0] == Status::Infeasible { Err(Obstacle::Velocity) } else { Ok(work[0]) }
+    }
+
+    fn theta(&self, side: Side, d: f64) -> f64 {
+        match side {
+            Side::Start => self.theta_i + self.rise * d * d * (3.0 - 2.0 * d),
+            Side::End => self.theta_f - self.rise * d * d * (3.0 - 2.0 * d),
+        }
+    }
+
+    fn velocity(&self, side: Side, d: f64) -> f64 {
+        if d == 0.0 || self.rise == 0.0 {
+            return if side == Side::Start { self.v_i } else { self.v_f };
+        }
+        let n = if self.rise > 0.0 {
+            let y = 0.5 - d;
+            self.waist + 6.0 * self.rise * y * y
+        } else {
+            self.t_f - 6.0 * self.rise * d * (1.0 - d)
+        };
+        n / (self.t_f * self.theta(side, d))
+    }
+
+    fn friction(&self, side: Side, d: f64) -> f64 {
+        1.0 + self.law.a * ln(self.velocity(side, d)) + self.law.b * ln(self.theta(side, d))
+    }
+
+    /// The ends and the places between them where `p ln n + q ln theta` is stationary: where `-p (1 - 2 x) theta + q x
+    /// z n = 0`.
+    fn extrema(&self, p: f64, q: f64) -> Vec<(Side, f64)> {
+        let Curve { t_f, rise, .. } = *self;
+        let mut places = Vec::with_capacity(8);
+        for (side, start) in [(Side::Start, -p * self.theta_i), (Side::End, p * self.theta_f)] {
+            let mixed = rise * (2.0 * p + 3.0 * q);
+            let square = -3.0 * p * rise - q * t_f - 6.0 * q * rise;
+            let c = [start, q * t_f - 2.0 * start, square, 4.0 * mixed, -2.0 * mixed];
+            places.push((side, 0.0));
+            places.extend(roots_between(&c, 0.0, 0.5).into_iter().map(|d| (side, d)));
+        }
+        places.push((Side::Start, 0.5));
+        places
+    }
+
+    /// The places between which nothing is much narrower than their distance, in the order of time: they double from
+    /// the ends, on the scales on which `n` and theta leave their end values.
+    fn stops(&self) -> Vec<(Side, f64)> {
+        let steepest = 6.0 * self.rise.abs();
+        let doubling = |theta: f64| {
+            let grain = (2.0 * theta / steepest).sqrt().min(self.t_f / steepest).min(COARSEST);
+            std::iter::successors(Some(grain), |d| Some(2.0 * d)).take_while(|&d| d < 0.4)
+        };
+        let mut stops = vec![(Side::Start, 0.0)];
+        stops.extend(doubling(self.theta_i).map(|d| (Side::Start, d)));
+        stops.push((Side::Start, 0.5));
+        let mut last: Vec<_> = doubling(self.theta_f).map(|d| (Side::End, d)).collect();
+        last.reverse();
+        stops.extend(last);
+        stops.push((Side::End, 0.0));
+        stops
+    }
+}
+
+/// Distance from the ends of the first stops, at most.
+const COARSEST: f64 = 0.125;
+
+/// The motion: pieces of equal length in the parameter `s` between the stops.
+struct Trace {
+    curve: Curve,
+    stops: Vec<(Side, f64)>,
+}
+
+impl Motion for Trace {
+    fn duration(&self) -> f64 {
+        self.curve.t_f
+    }
+
+    fn landmarks(&self) -> Vec<f64> {
+        let pieces = self.stops.len() - 1;
+        (0..=pieces).map(|k| k as f64 / pieces as f64).collect()
+    }
+
+    fn at(&self, s: f64) -> Moment {
+        let pieces = self.stops.len() - 1;
+        let along = s.clamp(0.0, 1.0) * pieces as f64;
+        let k = (along as usize).min(pieces - 1);
+        let ((_, from), (side, to)) = (self.stops[k], self.stops[k + 1]);
+        // The middle is a stop from the start, and as far from the end.
+        let share = along - k as f64;
+        let d = from * (1.0 - share) + to * share;
+        let x = if side == Side::Start { d } else { 1.0 - d };
+        Moment {
+            t: self.curve.t_f * x,
+            v: self.curve.velocity(side, d),
+            theta: self.curve.theta(side, d),
+            friction: self.curve.friction(side, d),
+            v_c: None,
+            beta: None,
+        }
+    }
+}

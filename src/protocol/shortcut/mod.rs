@@ -1,0 +1,156 @@
+//! The shortcut families of the rigid limit: one file each, and a line in [`FAMILIES`].
+//!
+//! All but `step` lead from steady sliding at `v_i` to steady sliding at `v_f` within `t_f`.
+
+mod bounded_friction;
+mod bounded_velocity;
+mod cubic;
+mod step;
+
+use std::fmt;
+
+use super::{Effort, Motion, Status};
+use crate::model::Transition;
+
+/// What a family is asked for.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Case {
+    /// From where to where.
+    pub transition: Transition,
+    /// Duration, `t_f > 0`.
+    pub t_f: f64,
+    /// Bound on friction `tau_M`; only `bounded_friction` heeds it.
+    pub tau_ceiling: f64,
+}
+
+/// A member of a family that solves a [`Case`], every number to the requested relative accuracy.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Shortcut {
+    /// The parameter of the family; `None` for a family without.
+    pub alpha: Option<f64>,
+    /// Work of friction, `int tau v dt`.
+    pub work: f64,
+    /// Least velocity on the open interval `(0, t_f)`, that is, without what lies before and after a jump.
+    pub v_min: f64,
+    /// Greatest velocity there.
+    pub v_max: f64,
+    /// Greatest friction there.
+    pub friction_max: f64,
+    /// Least friction there, or a lower bound of it that is not below 0.
+    pub friction_min: f64,
+    /// Relative distance from the target at `t_f`, `theta(t_f) v_f - 1`; 0 for a family that arrives.
+    pub miss: f64,
+}
+
+impl Shortcut {
+    /// `Ok`, or `BelowBound` or `NegativeFriction` where it leaves the range of the friction law.
+    pub fn status(&self) -> Status {
+        let status = if self.v_min < 1.0 { Status::BelowBound } else { Status::Ok };
+        status.with_friction(self.friction_min)
+    }
+}
+
+/// Why a family has no member for a case, or none that could be certified.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Obstacle {
+    /// An argument outside its domain: `a > 0`, `b >= 0`, `t_f > 0`, `v_i, v_f >= 1`, all finite.
+    Domain,
+    /// No protocol with `v >= 1` is fast enough: `t_f` is not above `t_min`.
+    Time {
+        /// The least duration under `v >= 1`.
+        t_min: f64,
+    },
+    /// The family keeps `v > 1`, so neither end may lie on `v = 1`.
+    End,
+    /// `v <= 0` or `theta <= 0` somewhere.
+    Velocity,
+    /// `tau_ceiling` is not above the friction of both ends.
+    FrictionAtEnds {
+        /// The greater friction of the two ends.
+        friction: f64,
+    },
+    /// Even friction at `tau_ceiling` throughout does not get there in this time.
+    Friction,
+    /// A defect of ours: the answer could not be certified.
+    NotConverged,
+}
+
+impl Obstacle {
+    /// Every name, in the order of [`Obstacle::code`].
+    pub const NAMES: [&'static str; 5] = ["domain", "time", "velocity", "friction", "not_converged"];
+
+    /// Which bound it is: an index into [`Obstacle::NAMES`].
+    pub fn code(self) -> usize {
+        match self {
+            Obstacle::Domain => 0,
+            Obstacle::Time { .. } => 1,
+            Obstacle::End | Obstacle::Velocity => 2,
+            Obstacle::FrictionAtEnds { .. } | Obstacle::Friction => 3,
+            Obstacle::NotConverged => 4,
+        }
+    }
+
+    /// The status of the row.
+    pub fn status(self) -> Status {
+        if self == Obstacle::NotConverged { Status::NotConverged } else { Status::Infeasible }
+    }
+}
+
+impl fmt::Display for Obstacle {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Obstacle::Domain => {
+                f.write_str("an argument is outside its domain (a > 0, b >= 0, t_f > 0, v_i, v_f >= 1)")
+            }
+            Obstacle::Time { t_min } => {
+                write!(f, "the time is too short for v >= 1: the least is t_min = {t_min}")
+            }
+            Obstacle::End => f.write_str("v stays above 1, so v_i and v_f must be above 1"),
+            Obstacle::Velocity => f.write_str("v or theta would not stay positive"),
+            Obstacle::FrictionAtEnds { friction } => {
+                write!(f, "tau_ceiling must be above the friction of both ends, {friction}")
+            }
+            Obstacle::Friction => {
+                f.write_str("tau_ceiling is too low for this time: not even tau = tau_ceiling gets there")
+            }
+            Obstacle::NotConverged => f.write_str("the solver could not certify its answer (a defect of ours)"),
+        }
+    }
+}
+
+/// A family of shortcuts.
+pub trait Family: Sync {
+    /// Its name in specs and tables.
+    fn name(&self) -> &'static str;
+
+    /// What it is, in one line.
+    fn doc(&self) -> &'static str;
+
+    /// What its parameter is, in one line; `None` for a family without.
+    fn alpha(&self) -> Option<&'static str>;
+
+    /// Whether it heeds `tau_ceiling`.
+    fn heeds_tau_ceiling(&self) -> bool {
+        false
+    }
+
+    /// Whether its members arrive at the final state.
+    fn arrives(&self) -> bool {
+        true
+    }
+
+    /// The member that solves `case`, every number good to `rtol`; adds to `effort`.
+    fn solve(&self, case: &Case, rtol: f64, effort: &mut Effort) -> Result<Shortcut, Obstacle>;
+
+    /// The motion of that member.
+    fn motion(&self, case: &Case, rtol: f64) -> Result<Box<dyn Motion>, Obstacle>;
+}
+
+/// Every family, in the order in which they are listed.
+pub const FAMILIES: [&dyn Family; 4] =
+    [&step::Step, &cubic::Cubic, &bounded_velocity::BoundedVelocity, &bounded_friction::BoundedFriction];
+
+/// The family of this name.
+pub fn find(name: &str) -> Option<&'static dyn Family> {
+    FAMILIES.into_iter().find(|family| family.name() == name)
+}

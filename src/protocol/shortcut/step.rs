@@ -1,0 +1,175 @@
+//! `step`: the velocity jumps to `v_f` and stays there.
+//!
+//! With `p = v_f t` and `k = v_f/v_i - 1` the contact lifetime is `theta = (1 + k e^-p)/v_f`, so all numbers are in
+//! closed form; the work holds `int ln(1 + k e^-p) dp`, a difference of two dilogarithms.
+
+use super::{Case, Family, Obstacle, Shortcut};
+use crate::model::Law;
+use crate::numerics::dilogarithm::dilogarithm;
+use crate::numerics::elementary::{exp, exp_m1, ln, ln_1p};
+use crate::numerics::gauss::rule;
+use crate::protocol::{Effort, Moment, Motion};
+
+/// The family.
+pub struct Step;
+
+impl Family for Step {
+    fn name(&self) -> &'static str {
+        "step"
+    }
+
+    fn doc(&self) -> &'static str {
+        "the velocity jumps to v_f at once and stays there; theta only approaches its target"
+    }
+
+    fn alpha(&self) -> Option<&'static str> {
+        None
+    }
+
+    fn arrives(&self) -> bool {
+        false
+    }
+
+    fn solve(&self, case: &Case, _rtol: f64, effort: &mut Effort) -> Result<Shortcut, Obstacle> {
+        let Relaxation { law, v_f, t_f, decay } = Relaxation::new(case)?;
+        effort.quadratures += 1;
+        let end = v_f * t_f;
+        let steady = 1.0 + (law.a - law.b) * ln(v_f);
+        // Theta falls or rises all the way.
+        let ratios = [decay.ln_at(0.0), decay.ln_at(end)];
+        Ok(Shortcut {
+            alpha: None,
+            work: end * steady + law.b * decay.integral(end),
+            v_min: v_f,
+            v_max: v_f,
+            friction_max: steady + law.b * ratios[0].max(ratios[1]),
+            friction_min: steady + law.b * ratios[0].min(ratios[1]),
+            miss: decay.k * exp(-end),
+        })
+    }
+
+    fn motion(&self, case: &Case, _rtol: f64) -> Result<Box<dyn Motion>, Obstacle> {
+        Ok(Box::new(Relaxation::new(case)?))
+    }
+}
+
+/// The motion: theta relaxes at constant velocity.
+#[derive(Debug, Clone, Copy)]
+struct Relaxation {
+    law: Law,
+    v_f: f64,
+    t_f: f64,
+    decay: Decay,
+}
+
+impl Relaxation {
+    fn new(case: &Case) -> Result<Relaxation, Obstacle> {
+        let (law, v_i, v_f, t_f) = (case.transition.law, case.transition.v_i, case.transition.v_f, case.t_f);
+        let sound = law.a > 0.0 && law.b >= 0.0 && t_f > 0.0 && v_i >= 1.0 && v_f >= 1.0;
+        if !sound || ![law.a, law.b, t_f, v_i, v_f].iter().all(|x| x.is_finite()) {
+            return Err(Obstacle::Domain);
+        }
+        Ok(Relaxation { law, v_f, t_f, decay: Decay { k: (v_f - v_i) / v_i, ratio: v_f / v_i } })
+    }
+
+    /// The finest detail in `p`: theta grows from nothing within the ratio of the velocities.
+    fn grain(&self) -> f64 {
+        self.decay.ratio.min(1.0)
+    }
+
+    /// `p` at `s`; geometric from the grain on.
+    fn stretched(&self, s: f64) -> f64 {
+        let grain = self.grain();
+        grain * exp_m1(s * ln_1p(self.v_f * self.t_f / grain))
+    }
+}
+
+/// Where `e^-p` has vanished beside 1.
+const SETTLED: f64 = 37.0;
+
+impl Motion for Relaxation {
+    fn duration(&self) -> f64 {
+        self.t_f
+    }
+
+    fn landmarks(&self) -> Vec<f64> {
+        let (end, grain) = (self.v_f * self.t_f, self.grain());
+        let settled = SETTLED + ln_1p(self.decay.k.max(0.0));
+        let mut places = vec![0.0];
+        let mut p = grain;
+        while p < 0.9 * end && places.len() < MOST_LANDMARKS {
+            places.push(ln_1p(p / grain) / ln_1p(end / grain));
+            // Doubling, but never more than one unit as long as theta relaxes.
+            p += if p < settled { p.min(1.0) } else { p };
+        }
+        places.push(1.0);
+        places
+    }
+
+    fn at(&self, s: f64) -> Moment {
+        let s = s.clamp(0.0, 1.0);
+        let (p, t) =
+            if s < 1.0 { (self.stretched(s), self.stretched(s) / self.v_f) } else { (self.v_f * self.t_f, self.t_f) };
+        let ln_ratio = self.decay.ln_at(p);
+        Moment {
+            t: t.min(self.t_f),
+            v: self.v_f,
+            theta: self.decay.at(p) / self.v_f,
+            friction: 1.0 + (self.law.a - self.law.b) * ln(self.v_f) + self.law.b * ln_ratio,
+            v_c: None,
+            beta: None,
+        }
+    }
+}
+
+/// More landmarks than a time of 1e300 takes.
+const MOST_LANDMARKS: usize = 1200;
+
+/// `1 + k e^-p`, where `k = ratio - 1 > -1`.
+#[derive(Debug, Clone, Copy)]
+struct Decay {
+    k: f64,
+    ratio: f64,
+}
+
+impl Decay {
+    /// `1 + k e^-p`, without cancellation.
+    fn at(&self, p: f64) -> f64 {
+        // ratio e^-p + (1 - e^-p): both terms positive.
+        self.ratio * exp(-p) - exp_m1(-p)
+    }
+
+    /// `ln(1 + k e^-p)`, also where it is near 0.
+    fn ln_at(&self, p: f64) -> f64 {
+        let change = self.k * exp(-p);
+        if change > -0.5 { ln_1p(change) } else { ln(self.at(p)) }
+    }
+
+    /// `int_0^end ln(1 + k e^-p) dp = Li_2(-k e^-end) - Li_2(-k)`, to a few units in the last place.
+    fn integral(&self, end: f64) -> f64 {
+        let Decay { k, ratio } = *self;
+        // Distance of the singularity 1 + k e^-p = 0 from the start; it is complex for k > 0.
+        let gap = if k >= 0.0 {
+            std::f64::consts::PI
+        } else if ratio < 0.5 {
+            -ln_1p(-ratio)
+        } else {
+            -ln(-k)
+        };
+        if end <= gap.min(SHORT) {
+            // The dilogarithms would cancel. The singularity is at least a length away: 5.8^-32 is left.
+            let rule = rule(16);
+            let weigh = |(x, w): (&f64, &f64)| w * self.ln_at(0.5 * end * (1.0 + x));
+            0.5 * end * rule.x.iter().zip(&rule.w).map(weigh).sum::<f64>()
+        } else if k < 0.0 && end < std::f64::consts::LN_2 {
+            // Reflected, since both arguments are close to 1.
+            let rest = self.at(end);
+            gap * ln(rest / ratio) + end * ln(rest) + dilogarithm(ratio) - dilogarithm(rest)
+        } else {
+            dilogarithm(-k * exp(-end)) - dilogarithm(-k)
+        }
+    }
+}
+
+/// Below it Gauss' rule takes the whole integral.
+const SHORT: f64 = 2.0;

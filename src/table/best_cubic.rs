@@ -1,0 +1,89 @@
+//! `best_cubic`: the cubic shortcut of least work.
+
+use std::ops::Range;
+
+use super::optima::{OPTIMUM_AXES, transition};
+use super::{Column, Definition, Field, Job, Kind, Sheet, Stopped, Work, columns, place, rows};
+use crate::grid::{Quantity, Scale};
+use crate::protocol::{Effort, best_cubic, error};
+
+/// A row.
+struct Row {
+    best: best_cubic::BestCubic,
+    /// Coefficients in the units of their columns.
+    alpha_2: f64,
+    alpha_3: f64,
+    work_error: f64,
+}
+
+const FIELDS: [Field<Row>; 7] = [
+    Field::new(
+        Column::new(
+            "alpha_2",
+            Kind::Quantity(Quantity::Alpha2),
+            "coefficient of t of the best shortcut; in the unit of the spec's alpha_2, 1/t_f if it has none",
+        ),
+        |row| row.alpha_2,
+    ),
+    Field::new(
+        Column::new(
+            "alpha_3",
+            Kind::Quantity(Quantity::Alpha3),
+            "coefficient of t^2 of the best shortcut; in the unit of the spec's alpha_3, 1/t_f^2 if it has none",
+        ),
+        |row| row.alpha_3,
+    ),
+    Field::new(Column::number("work", "mu_0 sigma l", "work of friction W_s of the best shortcut"), |row| {
+        row.best.work
+    }),
+    Field::new(Column::number("work_optimal", "mu_0 sigma l", "least work of friction W* of any protocol"), |row| {
+        row.best.work_optimal
+    }),
+    Field::new(
+        Column::number("gap", "1", "(W_s - W*)/W*, without cancellation: good to 1e-7 of itself or 1e-20"),
+        |row| row.best.gap,
+    ),
+    Field::new(Column::number("v_min", "v_0", "least velocity of the best shortcut"), |row| row.best.v_min),
+    Field::new(
+        Column::number("work_error", "mu_0 sigma l", "bound of the error of work, by a second search").optional(),
+        |row| row.work_error,
+    ),
+];
+
+const COLUMNS: [Column; 7] = columns(&FIELDS);
+const WORK_ERROR: usize = place(&COLUMNS, "work_error");
+
+/// One row a transition and time.
+pub static BEST_CUBIC: Definition = Definition {
+    name: "best_cubic",
+    doc: "the cubic shortcut of least work, over the whole (alpha_2, alpha_3) plane",
+    axes: OPTIMUM_AXES,
+    columns: &COLUMNS,
+    rows_per_part: 1 << 10,
+    cost: 1_500_000,
+    needs_optimum: |_| false,
+    compute,
+};
+
+fn compute(job: &Job<'_>, range: Range<u64>, sheet: &mut Sheet) -> Result<Work, Stopped> {
+    let natural = |quantity| job.grid.scale(quantity) == Some(Scale::Model);
+    let (natural_2, natural_3) = (natural(Quantity::Alpha2), natural(Quantity::Alpha3));
+    rows::each(job, range, 1, sheet, &FIELDS, |_, point| {
+        let t_f = point[Quantity::Time];
+        let solve = |rtol| best_cubic::solve(&transition(point), t_f, job.bounded, rtol);
+        let solved = solve(job.rtol);
+        let mut effort = solved.effort;
+        let row = solved.value.map(|best| {
+            let finest = job.selection.has(WORK_ERROR).then(|| solve(error::FINEST));
+            effort += finest.map_or_else(Effort::default, |finest| finest.effort);
+            let finest = finest.and_then(|finest| finest.value);
+            Row {
+                best,
+                alpha_2: if natural_2 { best.a_2 / t_f } else { best.a_2 },
+                alpha_3: if natural_3 { best.a_3 / (t_f * t_f) } else { best.a_3 },
+                work_error: finest.map_or(f64::NAN, |finest| error::bound(best.work, finest.work, best.work)),
+            }
+        });
+        (solved.status, row, Work { best: 1, ..Work::from(effort) })
+    })
+}

@@ -1,0 +1,173 @@
+//! `shortcut`: the members of the shortcut families that solve a transition.
+
+use std::ops::Range;
+
+use super::memo::Memo;
+use super::optima::{self, Comparison, transition};
+use super::{Column, Definition, Field, Job, Kind, Selection, Sheet, Stopped, Work, columns, number, place, rows};
+use crate::grid::{Point, Quantity};
+use crate::protocol::shortcut::{Case, FAMILIES, Family, Obstacle, Shortcut as Member};
+use crate::protocol::{Effort, error};
+
+/// A row: the member of the family, or what makes it infeasible.
+struct Row {
+    member: Option<Member>,
+    obstacle: Option<Obstacle>,
+    /// What `alpha` is multiplied by to be in the unit of its column.
+    alpha_unit: f64,
+    work_error: f64,
+    least: Comparison,
+}
+
+impl Row {
+    fn told(&self, number: impl Fn(&Member) -> f64) -> f64 {
+        self.member.as_ref().map_or(f64::NAN, number)
+    }
+}
+
+const FIELDS: [Field<Row>; 11] = [
+    Field::new(
+        Column::number(
+            "alpha",
+            "1; (v_0/l)^2 for bounded_velocity",
+            "the family's parameter alpha_3 of the paper; null for step and cubic, which have none, 0 where tau_ceiling = inf",
+        ),
+        |row| row.told(|member| number(member.alpha)) * row.alpha_unit,
+    ),
+    Field::new(Column::number("work", "mu_0 sigma l", "work of friction W_s"), |row| row.told(|member| member.work)),
+    Field::new(Column::number("work_optimal", "mu_0 sigma l", "least work of friction W* of any protocol"), |row| {
+        row.least.work
+    }),
+    Field::new(
+        Column::number("gap", "1", "(W_s - W*)/W*, good to rtol of 1 + gap; below 0 for a step that has not arrived"),
+        |row| row.least.gap,
+    ),
+    Field::new(
+        Column::number("v_min", "v_0", "least velocity between the ends; 0 below the range of doubles"),
+        |row| row.told(|member| member.v_min),
+    ),
+    Field::new(Column::number("v_max", "v_0", "greatest velocity between the ends"), |row| {
+        row.told(|member| member.v_max)
+    }),
+    Field::new(Column::number("friction_max", "mu_0 sigma", "greatest friction between the ends"), |row| {
+        row.told(|member| member.friction_max)
+    }),
+    Field::new(
+        Column::number(
+            "terminal_error",
+            "1",
+            "theta(t_f) v_f - 1: how far from its target a step is; 0 for the other families",
+        )
+        .optional(),
+        |row| row.told(|member| member.miss),
+    ),
+    Field::new(
+        Column::new("bound", Kind::Label(&Obstacle::NAMES), "which bound makes the row infeasible").optional(),
+        |row| number(row.obstacle.map(|obstacle| obstacle.code() as f64)),
+    ),
+    Field::new(
+        Column::number("work_error", "mu_0 sigma l", "bound of the error of work, by a second solve").optional(),
+        |row| row.work_error,
+    ),
+    Field::new(
+        Column::number("gap_error", "1", "bound of the error of gap, by a second solve of both works").optional(),
+        |row| row.least.gap_error,
+    ),
+];
+
+const COLUMNS: [Column; 11] = columns(&FIELDS);
+const WORK_OPTIMAL: usize = place(&COLUMNS, "work_optimal");
+const GAP: usize = place(&COLUMNS, "gap");
+const WORK_ERROR: usize = place(&COLUMNS, "work_error");
+const GAP_ERROR: usize = place(&COLUMNS, "gap_error");
+
+/// One row a transition, time, family and bound on friction.
+pub static SHORTCUT: Definition = Definition {
+    name: "shortcut",
+    doc: "the shortcut of a family",
+    axes: &[
+        Quantity::Time,
+        Quantity::A,
+        Quantity::B,
+        Quantity::InitialVelocity,
+        Quantity::FinalVelocity,
+        Quantity::Family,
+        Quantity::FrictionBound,
+    ],
+    columns: &COLUMNS,
+    rows_per_part: 1 << 14,
+    cost: 25_000,
+    needs_optimum,
+    compute,
+};
+
+fn needs_optimum(selection: &Selection) -> bool {
+    selection.has_any([WORK_OPTIMAL, GAP, GAP_ERROR])
+}
+
+fn compute(job: &Job<'_>, range: Range<u64>, sheet: &mut Sheet) -> Result<Work, Stopped> {
+    let members = Members::default();
+    rows::each(job, range, 16, sheet, &FIELDS, |tuple, point| {
+        let mut work = Work::default();
+        let mut row =
+            Row { member: None, obstacle: None, alpha_unit: 1.0, work_error: f64::NAN, least: Comparison::NONE };
+        let member = match members.get(job, tuple, point, &mut work) {
+            Ok((member, work_error)) => {
+                row.work_error = work_error;
+                member
+            }
+            Err(obstacle) => {
+                row.obstacle = Some(obstacle);
+                return (obstacle.status(), Some(row), work);
+            }
+        };
+        let mut status = member.status();
+        if needs_optimum(job.selection) {
+            let bounded = job.selection.has(GAP_ERROR);
+            row.least = optima::compare(job, (tuple, point), (member.work, row.work_error), bounded, &mut work);
+            status = status.beside(row.least.optimum);
+        }
+        let family = FAMILIES.get(point[Quantity::Family] as usize);
+        if family.is_some_and(|family| family.name() == "bounded_velocity") {
+            row.alpha_unit = job.grid.units.size("v_0/l").powi(2);
+        }
+        row.member = Some(member);
+        (status, Some(row), work)
+    })
+}
+
+/// A member, and the bound of the error of its work where that is requested.
+type Solution = Result<(Member, f64), Obstacle>;
+
+/// The members of families that do not depend on the bound on friction, by tuple and family: solved once each whatever its values.
+#[derive(Default)]
+struct Members(Memo<(u64, usize), Solution>);
+
+impl Members {
+    /// The member for `point`, which belongs to tuple number `tuple`; adds what is spent by this call alone.
+    fn get(&self, job: &Job<'_>, tuple: u64, point: &Point, work: &mut Work) -> Solution {
+        let number = point[Quantity::Family] as usize;
+        let Some(&family) = FAMILIES.get(number) else { return Err(Obstacle::Domain) };
+        if family.heeds_tau_ceiling() {
+            return solve(job, family, point, work);
+        }
+        self.0.get((tuple, number), || solve(job, family, point, work))
+    }
+}
+
+fn solve(job: &Job<'_>, family: &dyn Family, point: &Point, work: &mut Work) -> Solution {
+    let case =
+        Case { transition: transition(point), t_f: point[Quantity::Time], tau_ceiling: point[Quantity::FrictionBound] };
+    let t_min = case.transition.least_time();
+    if job.bounded && case.t_f < t_min {
+        return Err(Obstacle::Time { t_min });
+    }
+    let mut effort = Effort::default();
+    let solved = family.solve(&case, job.rtol, &mut effort).map(|member| {
+        let wanted = job.selection.has_any([WORK_ERROR, GAP_ERROR]);
+        let bound = wanted.then(|| error::of_member(family, &case, &member, &mut effort)).flatten();
+        (member, bound.unwrap_or(f64::NAN))
+    });
+    *work += Work { shortcuts: 1, ..Work::from(effort) };
+    solved
+}

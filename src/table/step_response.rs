@@ -1,0 +1,197 @@
+//! `step_response`: the response of a block on a spring to an abrupt step of the control velocity.
+
+use std::ops::Range;
+
+use super::memo::Memo;
+use super::optima::transition;
+use super::{Column, Field, Job, Kind, Prediction, Selection, Sheet, Stopped, Table, Work, columns, number, rows};
+use crate::grid::Quantity;
+use crate::model::Law;
+use crate::stability::step_response::{self, Course, Outcome, Response, Sustained};
+use crate::stability::{SteadySliding, lyapunov_coefficient};
+
+/// One row a transition, stiffness and mass.
+pub struct StepResponse;
+
+/// A row.
+struct Row {
+    response: Option<Response>,
+    lyapunov: Option<f64>,
+}
+
+impl Row {
+    fn told(&self, number: impl Fn(&Response) -> f64) -> f64 {
+        self.response.as_ref().map_or(f64::NAN, number)
+    }
+
+    fn cycle(&self, number: impl Fn(&Sustained) -> f64) -> f64 {
+        self.told(|response| response.cycle.as_ref().map_or(f64::NAN, &number))
+    }
+}
+
+const FIELDS: [Field<Row>; 11] = [
+    Field::new(
+        Column::number(
+            "v_peak",
+            "v_0",
+            "greatest velocity from when v = v_f is first met on, at least v_f; null if undecided",
+        ),
+        |row| row.told(|response| response.v_peak),
+    ),
+    Field::new(
+        Column::number(
+            "v_trough",
+            "v_0",
+            "least velocity from when v = v_f is first met on, at most v_f; 0 below the range of doubles, null if undecided or \
+         not known to rtol",
+        ),
+        |row| row.told(|response| response.v_trough),
+    ),
+    Field::new(
+        Column::number(
+            "t_peak",
+            "l/v_0",
+            "time of v_peak, good to rtol of itself over the overshoot v_peak/v_f - 1; null where the peak is only approached, \
+         if undecided and if not known to that",
+        ),
+        |row| row.told(|response| number(response.t_peak)),
+    ),
+    Field::new(
+        Column::new("outcome", Kind::Label(&Outcome::NAMES), "what becomes of the response in the end"),
+        |row| row.told(|response| f64::from(response.outcome as u8)),
+    ),
+    Field::new(
+        Column::new("stick_slip", Kind::Flag, "whether the oscillation is sustained; null if undecided"),
+        |row| {
+            row.told(|response| match response.outcome {
+                Outcome::Settled => 0.0,
+                Outcome::LimitCycle => 1.0,
+                Outcome::Undecided => f64::NAN,
+            })
+        },
+    ),
+    Field::new(
+        Column::number(
+            "settling_time",
+            "l/v_0",
+            "time after which v stays within 1 % of v_f; null unless the outcome is settled, and if not known to rtol",
+        ),
+        |row| row.told(|response| number(response.settling_time)),
+    ),
+    Field::new(Column::number("period", "l/v_0", "duration of the limit cycle; null without one"), |row| {
+        row.cycle(|cycle| cycle.period)
+    }),
+    Field::new(
+        Column::number("cycle_peak", "v_0", "greatest velocity on the limit cycle; null without one").optional(),
+        |row| row.cycle(|cycle| cycle.v_peak),
+    ),
+    Field::new(
+        Column::number(
+            "cycle_trough",
+            "v_0",
+            "least velocity on the limit cycle; null without one, and if not known to rtol",
+        )
+        .optional(),
+        |row| row.cycle(|cycle| cycle.v_trough),
+    ),
+    Field::new(Column::number("t_end", "l/v_0", "time up to which the response was integrated").optional(), |row| {
+        row.told(|response| response.t_end)
+    }),
+    Field::new(
+        Column::number(
+            "first_lyapunov_coefficient",
+            "1",
+            "first Lyapunov coefficient at the critical stiffness for this mass and v_f: negative if the Hopf point is \
+         supercritical, positive if a limit cycle may be met above it; null for b <= a and for m = 0",
+        )
+        .optional(),
+        |row| number(row.lyapunov),
+    ),
+];
+
+const COLUMNS: [Column; 11] = columns(&FIELDS);
+
+impl Table for StepResponse {
+    fn name(&self) -> &'static str {
+        "step_response"
+    }
+
+    fn doc(&self) -> &'static str {
+        "the response to an abrupt step of the control velocity"
+    }
+
+    fn axes(&self) -> &'static [Quantity] {
+        &[
+            Quantity::A,
+            Quantity::B,
+            Quantity::InitialVelocity,
+            Quantity::FinalVelocity,
+            Quantity::Stiffness,
+            Quantity::Mass,
+        ]
+    }
+
+    fn columns(&self) -> &'static [Column] {
+        &COLUMNS
+    }
+
+    fn rows_per_part(&self) -> u64 {
+        1 << 12
+    }
+
+    fn cost(&self) -> u64 {
+        350_000
+    }
+
+    fn needs_optimum(&self, _selection: &Selection) -> bool {
+        false
+    }
+
+    /// Simulated: each digit more costs time.
+    fn default_rtol(&self) -> Option<f64> {
+        Some(1e-6)
+    }
+
+    fn prediction(&self) -> Option<Prediction> {
+        Some(Prediction {
+            column: "outcome",
+            theory: "linear stability at v_f (settled above k_c)",
+            surprise: Outcome::NAMES[Outcome::LimitCycle as usize],
+            why: "stable against small disturbances, but the step leads onto a cycle that surrounds steady sliding",
+            axes: &[Quantity::A, Quantity::B, Quantity::FinalVelocity, Quantity::Stiffness, Quantity::Mass],
+            word: |point| {
+                let law = Law { a: point[Quantity::A], b: point[Quantity::B] };
+                let (k, m) = (point[Quantity::Stiffness], point[Quantity::Mass]);
+                let outcome = if SteadySliding::new(law, k, m, point[Quantity::FinalVelocity]).is_stable() {
+                    Outcome::Settled
+                } else {
+                    Outcome::LimitCycle
+                };
+                Outcome::NAMES[outcome as usize]
+            },
+        })
+    }
+
+    fn compute(&self, job: &Job<'_>, range: Range<u64>, sheet: &mut Sheet) -> Result<Work, Stopped> {
+        let courses = Memo::<[u64; 5], Course>::default();
+        rows::each(job, range, 4, sheet, &FIELDS, |_, point| {
+            let step = step_response::Step {
+                transition: transition(point),
+                k: point[Quantity::Stiffness],
+                m: point[Quantity::Mass],
+            };
+            let mut work = Work::default();
+            // Steps that share their scaled numbers share their course.
+            let course = step.scaled().map(|scaled| {
+                courses.get(scaled.key(), || {
+                    let course = scaled.follow(job.rtol);
+                    work = Work { simulations: 1, steps: course.steps.into(), ..Work::default() };
+                    course
+                })
+            });
+            let (status, response) = step.from_course(course.as_ref(), job.rtol);
+            let lyapunov = lyapunov_coefficient(step.transition.law, step.inertia());
+            (status, Some(Row { response, lyapunov }), work)
+        })
+    }
+}

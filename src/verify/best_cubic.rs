@@ -1,0 +1,60 @@
+//! `best_cubic`: the work at the row's coefficients, integrated over time, and a search around them that tries to do better.
+
+use super::extremal::solve;
+use super::gap::Cubic;
+use super::verdict::NEGATIVE;
+use super::{Context, Verdict, number, transition, word};
+use crate::dataset::Row;
+use crate::table::STATUS;
+
+/// Shares of the coefficients by which the search moves.
+const SHARES: [f64; 4] = [1e-1, 1e-2, 1e-3, 1e-4];
+
+pub fn check(row: &Row, context: &Context, rtol: f64) -> Verdict {
+    let (Some(problem), Some(t_f)) = (transition(row), number(row, "t_f")) else {
+        return Verdict::unchecked("an axis is missing");
+    };
+    if !matches!(word(row, STATUS), Some("ok" | NEGATIVE)) {
+        return Verdict::unchecked("status is neither ok nor negative_friction");
+    }
+    let (Some(alpha_2), Some(alpha_3)) = (number(row, "alpha_2"), number(row, "alpha_3")) else {
+        return Verdict::unchecked("a coefficient was not written");
+    };
+    let a_2 = if context.relative[0] { alpha_2 } else { alpha_2 * t_f };
+    let a_3 = if context.relative[1] { alpha_3 } else { alpha_3 * t_f * t_f };
+    let cubic = Cubic::new(&problem, t_f, a_2, a_3);
+    let Some(work) = cubic.work() else { return Verdict::unchecked("the integrator did not get there") };
+    let mut verdict = Verdict::default();
+    verdict.compare(row, "work", Some(work), None);
+    // The coefficients are written to double precision: v_min has to be as close to the bound as they allow.
+    verdict.compare(row, "v_min", Some(cubic.v_min()), None);
+    verdict.friction(row, cubic.friction_min());
+    if let Some(optimum) = solve(&problem, t_f, context.bounded) {
+        verdict.compare(row, "work_optimal", Some(optimum.work), None);
+        // Good to 1e-7 of itself, whatever rtol. The difference of two integrations tells it to 1e-12, or to what they
+        // leave of the works.
+        let gap = (work - optimum.work) / optimum.work;
+        let written = [("work", work), ("work_optimal", optimum.work)];
+        let off = written.map(|(column, found)| number(row, column).map_or(0.0, |written| (written - found).abs()));
+        let noise = 1e-12 + (off[0] + off[1]) / optimum.work.abs();
+        verdict.compare(row, "gap", Some(gap), Some((1e-7 * gap.abs()).max(noise) / rtol));
+    } else {
+        verdict.miss("the integrator did not get there");
+    }
+    let least = if context.bounded { 1.0 } else { 0.0 };
+    let size = a_2.abs() + a_3.abs();
+    let mut saved = 0.0_f64;
+    for share in SHARES {
+        for turn in 0..8 {
+            let angle = f64::from(turn) * std::f64::consts::FRAC_PI_4;
+            let (sin, cos) = angle.sin_cos();
+            let near = Cubic::new(&problem, t_f, a_2 + share * size * cos, a_3 + share * size * sin);
+            if near.slack() > 0.0 && near.v_min() >= least {
+                saved = saved.max(near.work().map_or(0.0, |near| (work - near) / work));
+            }
+        }
+    }
+    // Differences below the rounding of an integration are none.
+    verdict.push("beaten", if saved > rtol { saved } else { 0.0 });
+    verdict
+}

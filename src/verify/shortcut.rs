@@ -1,0 +1,174 @@
+//! `shortcut`: the family's formula with the row's `alpha`, integrated over time in the direction in which it contracts.
+
+use super::course::{Course, Formula, arriving};
+use super::extremal::solve;
+use super::gap::Cubic;
+use super::route::integrate;
+use super::verdict::NEGATIVE;
+use super::{Context, Verdict, number, transition, word};
+use crate::dataset::Row;
+use crate::model::Transition;
+use crate::table::STATUS;
+
+/// An end this close to the target (in `ln theta`) tells that the protocol was followed.
+const TOLD: f64 = 1e-9;
+
+/// A relative change of alpha that is rounding.
+const MOVED: f64 = 1e-9;
+
+/// `ln(v_f/v_i)` beyond which theta, as the difference of numbers of the size of its greatest value, has too few digits.
+const FAR: f64 = 11.5;
+
+pub fn check(row: &Row, context: &Context) -> Verdict {
+    let (Some(problem), Some(t_f), Some(family)) = (transition(row), number(row, "t_f"), word(row, "family")) else {
+        return Verdict::unchecked("an axis is missing");
+    };
+    let tau_ceiling = number(row, "tau_ceiling").unwrap_or(f64::INFINITY);
+    match word(row, STATUS) {
+        Some("ok" | "below_bound" | NEGATIVE | "infeasible") => {}
+        _ => return Verdict::unchecked("status is neither ok, below_bound, negative_friction nor infeasible"),
+    }
+    let Some(bound) = obstacle(&problem, t_f, family, tau_ceiling, context.bounded) else {
+        return Verdict::unchecked("too close to the border to tell whether the family has a member");
+    };
+    let mut verdict = Verdict::default();
+    verdict.status(row, bound.is_some());
+    if let Some(bound) = bound {
+        verdict.compare_word(row, "bound", bound);
+        return verdict;
+    }
+    if word(row, STATUS) == Some("infeasible") {
+        return verdict;
+    }
+    if tau_ceiling == f64::INFINITY && family == "bounded_friction" {
+        verdict.miss("without a bound on friction alpha is 0, which tells nothing");
+        return verdict;
+    }
+    let alpha = number(row, "alpha");
+    if alpha.is_none() && family.starts_with("bounded") {
+        verdict.miss("alpha was not written");
+        return verdict;
+    }
+    let course = |alpha: f64| course(problem, t_f, family, alpha, tau_ceiling);
+    let course_here = course(alpha.unwrap_or(0.0));
+    let Some(states) = course_here.states() else {
+        verdict.miss("the integrator did not get there");
+        return verdict;
+    };
+    let Some(end) = states.last() else { return verdict };
+    let target = course_here.target();
+    match alpha {
+        Some(alpha) if alpha != 0.0 => {
+            let arriving = arriving(alpha, end[0], target, course);
+            let doubtful = (end[0] - target).abs() > TOLD;
+            let tells = arriving.is_finite() && (arriving - alpha).abs() > MOVED * alpha.abs();
+            if doubtful && !tells {
+                // A change of its last digits moves the end: as a double alpha does not tell the protocol.
+                verdict.miss("alpha has too few digits to follow the protocol again");
+                return verdict;
+            }
+            verdict.compare(row, "alpha", Some(arriving), None);
+        }
+        _ if (problem.v_f / problem.v_i).ln().abs() > FAR => {
+            verdict.miss("velocities too far apart for the formula in doubles");
+            return verdict;
+        }
+        Some(_) => verdict.compare(row, "alpha", Some(0.0), None),
+        None if family == "cubic" => verdict.push("arrival", (end[0] - target).abs()),
+        None => {}
+    }
+    verdict.compare(row, "terminal_error", Some((end[0] - target).exp_m1()), Some(1.0));
+    verdict.compare(row, "work", Some(end[1]), None);
+    verdict.compare(row, "v_min", Some(course_here.least(&states, |y| course_here.velocity(y))), None);
+    verdict.compare(row, "v_max", Some(-course_here.least(&states, |y| -course_here.velocity(y))), None);
+    let friction_max = -course_here.least(&states, |y| -course_here.friction(y));
+    verdict.compare(row, "friction_max", Some(friction_max), Some(friction_max.abs().max(1.0)));
+    verdict.friction(row, course_here.least(&states, |y| course_here.friction(y)));
+    match solve(&problem, t_f, context.bounded) {
+        Some(optimum) => {
+            verdict.compare(row, "work_optimal", Some(optimum.work), None);
+            let gap = (end[1] - optimum.work) / optimum.work;
+            verdict.compare(row, "gap", Some(gap), Some(gap.abs().max(1.0)));
+        }
+        None => verdict.miss("the integrator did not get there"),
+    }
+    verdict
+}
+
+/// How close to 0, relative to what it is made of, a number leaves open on which side of 0 it is.
+const UNSURE: f64 = 1e-11;
+
+/// Which bound leaves the family without a member, from the extreme protocols of the family integrated: `None` where
+/// that is too close to call.
+fn obstacle(
+    problem: &Transition,
+    t_f: f64,
+    family: &str,
+    tau_ceiling: f64,
+    bounded: bool,
+) -> Option<Option<&'static str>> {
+    let Transition { law, v_i, v_f } = *problem;
+    let settle = |bound: &'static str, room: f64, size: f64| match room / size {
+        room if room > UNSURE => Some(None),
+        room if room < -UNSURE => Some(Some(bound)),
+        _ => None,
+    };
+    // Along v = 1 theta ages most; it ends beyond its target if there is time to spare.
+    let aged = integrate(|y: &[f64; 1]| [1.0 - y[0]], [1.0 / v_i], (0.0, t_f))?[0];
+    let spare = settle("time", aged * v_f - 1.0, 1.0);
+    if bounded && v_f < v_i && spare != Some(None) {
+        return spare;
+    }
+    match family {
+        "cubic" => {
+            let slack = Cubic::new(problem, t_f, 0.0, -3.0 * (v_f - v_i) / (v_i * v_f)).slack();
+            settle("velocity", slack, 1.0)
+        }
+        "bounded_velocity" if v_i == 1.0 || v_f == 1.0 => Some(Some("velocity")),
+        "bounded_velocity" if v_f < v_i => spare,
+        "bounded_friction" => {
+            let steady = |v: f64| 1.0 + (law.a - law.b) * v.ln();
+            let highest = steady(v_i).max(steady(v_f));
+            match settle("friction", tau_ceiling - highest, highest.abs() + 1.0) {
+                Some(None) if v_f > v_i && tau_ceiling.is_finite() => {
+                    // With tau = tau_ceiling throughout, the time in which theta falls to its target, over ln theta.
+                    let time = |y: &[f64; 2]| {
+                        let surplus = (tau_ceiling - 1.0) / law.a + (1.0 - law.b / law.a) * y[0];
+                        [-1.0, y[0].exp() / surplus.exp_m1()]
+                    };
+                    let fall = (v_f / v_i).ln();
+                    let least = integrate(time, [-v_i.ln(), 0.0], (0.0, fall))?[1];
+                    settle("friction", t_f - least, t_f)
+                }
+                // With v = 0 throughout, theta ages by the time.
+                Some(None) if v_f < v_i => settle("velocity", t_f - (1.0 / v_f - 1.0 / v_i), t_f),
+                decided => decided,
+            }
+        }
+        _ => Some(None),
+    }
+}
+
+fn course(problem: Transition, t_f: f64, family: &str, alpha: f64, tau_ceiling: f64) -> Course {
+    let Transition { law, v_i, v_f } = problem;
+    let formula = match family {
+        "step" => Formula::Velocity(Box::new(move |_| v_f)),
+        "cubic" => {
+            let cubic = Cubic::new(&problem, t_f, 0.0, -3.0 * (v_f - v_i) / (v_i * v_f));
+            Formula::Velocity(Box::new(move |x| cubic.velocity(x)))
+        }
+        "bounded_velocity" => {
+            let l = ((v_f - 1.0) / (v_i - 1.0)).ln();
+            let scale = alpha * t_f * t_f;
+            Formula::Velocity(Box::new(move |x| 1.0 + (v_i - 1.0) * (l * x - scale * x * (1.0 - x)).exp()))
+        }
+        _ => {
+            let steady = |v: f64| 1.0 + (law.a - law.b) * v.ln();
+            let (spare_i, spare_f) = (tau_ceiling - steady(v_i), tau_ceiling - steady(v_f));
+            let l = (spare_f / spare_i).ln();
+            Formula::Friction(Box::new(move |x| tau_ceiling - spare_i * (l * x + alpha * x * (1.0 - x)).exp()))
+        }
+    };
+    let backward = matches!(formula, Formula::Friction(_)) && law.b > law.a;
+    Course { problem, t_f, formula, backward }
+}
