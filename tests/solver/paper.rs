@@ -155,7 +155,7 @@ fn paper_comparison_the_velocity_jumps_up_is_nearly_continuous_or_drops_towards_
     assert!(fast.v > 6.6 * UP.v_i, "{fast:?}");
     // 0.037 is the crossover 0.0374184 as read off a plot: 4 % remain there, nothing at the crossover itself.
     assert!((cross.v / UP.v_i - 1.041).abs() < 1e-3, "{cross:?}");
-    let wanted = Wanted { cross: true, hold: false, cheapest: false, min: false, turn: false, free: false };
+    let wanted = Wanted { cross: true, floor: false, cheapest: false, min: false, turn: false, free: false };
     let (_, times, _) = crossover::solve(&UP, true, 1e-12, wanted);
     assert!(relative(start(times.t_cross.expect("exists")).v, UP.v_i) < 1e-9);
     assert!(slow.v > 1.0 && slow.v < 1.05, "{slow:?}");

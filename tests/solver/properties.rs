@@ -72,7 +72,7 @@ fn optimum(transition: &Transition, t_f: f64, bounded: bool) -> Result<Optimum, 
 }
 
 fn times(transition: &Transition) -> Result<CrossoverTimes, TestCaseError> {
-    let wanted = Wanted { cross: true, hold: true, cheapest: true, min: true, turn: true, free: true };
+    let wanted = Wanted { cross: true, floor: true, cheapest: true, min: true, turn: true, free: true };
     let (status, times, _) = crossover::solve(transition, true, RTOL, wanted);
     prop_assert_ne!(status, Status::NotConverged, "{:?}", transition);
     if status == Status::Ok { Ok(times) } else { Err(TestCaseError::reject("outside of the model")) }
@@ -135,7 +135,7 @@ proptest! {
         for (t_f, strategy) in [
             (cross * (1.0 - share), Start::SpeedUp),
             (cross + share * (hold - cross), Start::SlowDown),
-            (hold * (1.0 + share), Start::Hold),
+            (hold * (1.0 + share), Start::Floor),
         ] {
             // Closer than the accuracy of the times either may be found.
             let clear = [cross, hold].iter().all(|time| (t_f / time - 1.0).abs() > 1e-9);

@@ -9,7 +9,7 @@ use slipsweep::protocol::optimal::shortest_time;
 use slipsweep::stability::SteadySliding;
 
 /// All special times.
-pub const EVERY_TIME: Wanted = Wanted { cross: true, hold: true, cheapest: true, min: true, turn: true, free: true };
+pub const EVERY_TIME: Wanted = Wanted { cross: true, floor: true, cheapest: true, min: true, turn: true, free: true };
 
 /// Units in the last place from a boundary.
 const STEPS: [i64; 7] = [0, 1, -1, 10, -10, 1000, -1000];
