@@ -6,13 +6,13 @@
 use std::hint::black_box;
 
 use slipsweep::model::{Law, Transition};
-use slipsweep::protocol::{Slider, Status, compliant, regularised};
+use slipsweep::protocol::{SpringBlock, Status, compliant, regularised};
 use slipsweep::stability::{amplification, held_error, open_loop_error};
 
 mod support;
 
 /// The paper's case.
-const SLIDER: Slider = Slider { law: Law { a: 0.005, b: 0.01 }, k: 7.5e-3, m: 2.5e-16 };
+const SLIDER: SpringBlock = SpringBlock { law: Law { a: 0.005, b: 0.01 }, k: 7.5e-3, m: 2.5e-16 };
 const VELOCITIES: (f64, f64) = (1e5, 3.2e6);
 const TIME: f64 = 3.1e-6;
 
@@ -25,7 +25,7 @@ fn main() {
             println!("{name:34} rtol {rtol:e}: {:8.4} ms, {work}", 1e3 * support::median(21, run));
         };
         let solve = || compliant::solve(black_box(&SLIDER), VELOCITIES, TIME, rtol);
-        report("compliant", format!("{} nodes", solve().effort.nodes), &|| {
+        report("compliant", format!("{} nodes", solve().stats.nodes), &|| {
             black_box(solve());
         });
         let path = || compliant::path(black_box(&SLIDER), VELOCITIES, TIME, rtol).expect("exists");
@@ -44,7 +44,7 @@ fn main() {
             });
         }
         let pieces = || regularised::solve(black_box(&SLIDER), VELOCITIES, TIME, 0.1 * TIME, true, rtol);
-        report("regularised", format!("{} nodes", pieces().effort.nodes), &|| {
+        report("regularised", format!("{} nodes", pieces().stats.nodes), &|| {
             black_box(pieces());
         });
     }
@@ -61,7 +61,8 @@ fn statuses() {
             let (a, share) = (random(1e-4, 0.3), random(1.0, 11.0) - 1.0);
             let law = Law { a, b: share * a };
             let (k, m) = (random(1e-6, 1e4), random(1e-22, 1e-1));
-            let slider = Slider { law, k: if k > 1e3 { f64::INFINITY } else { k }, m: if m > 1e-3 { 0.0 } else { m } };
+            let slider =
+                SpringBlock { law, k: if k > 1e3 { f64::INFINITY } else { k }, m: if m > 1e-3 { 0.0 } else { m } };
             let (v_i, v_f) = (1.0 + random(1e-9, 1e9), 1.0 + random(1e-9, 1e9));
             let t_min = Transition { law, v_i, v_f }.least_time();
             let t_f = t_min + random(1e-9, 1e9) / v_i.max(v_f);
@@ -69,7 +70,7 @@ fn statuses() {
             let regular = regularised::solve(&slider, (v_i, v_f), t_f, t_f * random(1e-6, 0.5), true, 1e-10);
             smooth[found.status as usize] += 1;
             pieces[regular.status as usize] += 1;
-            most = most.max(found.effort.nodes).max(regular.effort.nodes);
+            most = most.max(found.stats.nodes).max(regular.stats.nodes);
         }
     });
     for (name, counts) in [("compliant", smooth), ("regularised", pieces)] {

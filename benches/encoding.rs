@@ -12,7 +12,7 @@ use parquet::basic::{Compression, Encoding, ZstdLevel};
 use parquet::file::properties::WriterProperties;
 use slipsweep::model::{Law, Transition};
 use slipsweep::protocol::Status;
-use slipsweep::protocol::cubic::{Landscape, Shortcuts};
+use slipsweep::protocol::cubic::{Landscape, LandscapeBuffers};
 use slipsweep::protocol::optimal;
 
 const POINTS: usize = 401;
@@ -56,7 +56,7 @@ fn columns() -> [ArrayRef; 3] {
         for &a_2 in &axis {
             let (mut work, mut v_min) = ([0.0; POINTS], [0.0; POINTS]);
             let mut status = [Status::Infeasible; POINTS];
-            let out = Shortcuts { work: &mut work, v_min: &mut v_min, status: &mut status };
+            let out = LandscapeBuffers { work: &mut work, v_min: &mut v_min, status: &mut status };
             landscape.evaluate(&[a_2; POINTS], &axis, out);
             for i in 0..POINTS {
                 let feasible = status[i] != Status::Infeasible;

@@ -13,7 +13,7 @@ use std::hint::black_box;
 
 use slipsweep::model::{Law, Transition};
 use slipsweep::protocol::Status;
-use slipsweep::protocol::cubic::{Landscape, Shortcuts};
+use slipsweep::protocol::cubic::{Landscape, LandscapeBuffers};
 use support::{least, one_ln, one_vector_ln, one_vector_operation};
 
 const POINTS: usize = 401;
@@ -96,7 +96,7 @@ fn pass(landscape: &Landscape, a_2: &[f64], a_3: &[f64], columns: &mut Columns) 
     let Columns { work, v_min, status } = columns;
     let count = a_2.len().min(a_3.len());
     let (work, v_min, status) = (&mut work[..count], &mut v_min[..count], &mut status[..count]);
-    let effort = landscape.evaluate(black_box(a_2), a_3, Shortcuts { work, v_min, status });
+    let stats = landscape.evaluate(black_box(a_2), a_3, LandscapeBuffers { work, v_min, status });
     black_box(columns);
-    (effort.quadratures, effort.nodes)
+    (stats.quadratures, stats.nodes)
 }

@@ -13,7 +13,7 @@ mod support;
 use std::hint::black_box;
 
 use cases::{Case, ONLY_CROSS, random_accelerations, reference_cases};
-use slipsweep::protocol::Effort;
+use slipsweep::protocol::SolverStats;
 use slipsweep::protocol::optimal::crossover;
 use slipsweep::protocol::optimal::solve;
 use support::{least, one_ln, one_vector_exp, one_vector_turning};
@@ -35,7 +35,7 @@ fn main() {
     for (name, cases) in [("optimal, random", &random), ("optimal, reference table", &hard)] {
         for rtol in [1e-6, 1e-10, 1e-12] {
             measure(name, rtol, cases, [ln, node], |(transition, t_f, bounded)| {
-                solve(transition, *t_f, *bounded, rtol).effort
+                solve(transition, *t_f, *bounded, rtol).stats
             });
         }
     }
@@ -44,12 +44,12 @@ fn main() {
     });
 }
 
-fn measure(name: &str, rtol: f64, cases: &[Case], [ln, node]: [f64; 2], run: impl Fn(&Case) -> Effort) {
+fn measure(name: &str, rtol: f64, cases: &[Case], [ln, node]: [f64; 2], run: impl Fn(&Case) -> SolverStats) {
     let (mut quadratures, mut nodes) = (0, 0);
     for case in cases {
-        let effort = run(case);
-        quadratures += effort.quadratures;
-        nodes += effort.nodes;
+        let stats = run(case);
+        quadratures += stats.quadratures;
+        nodes += stats.nodes;
     }
     let spells: Vec<&[Case]> = cases.chunks(SPELL).collect();
     let time = least(ROUNDS, &spells, |cases| {

@@ -18,9 +18,9 @@ use parquet::basic::{Compression, Encoding, ZstdLevel};
 use parquet::file::properties::{EnabledStatistics, WriterProperties};
 use parquet::schema::types::ColumnPath;
 use slipsweep::dataset::{self, Folder, Footer, Layout};
-use slipsweep::grid::Projection;
+use slipsweep::grid::RowIndex;
 use slipsweep::sweep::{self, Plan, Sweep};
-use slipsweep::table::{self, Sheet, Signal};
+use slipsweep::table::{self, ColumnBuffer, Signal};
 
 /// As in the program.
 #[global_allocator]
@@ -226,7 +226,7 @@ fn least<const N: usize>(rounds: usize, measure: impl Fn() -> Outcome<[f64; N]>)
 fn compute(sweep: &Sweep, threads: usize) -> Outcome<f64> {
     let pool = sweep::pool(threads)?;
     let plan = Plan::new(sweep);
-    let optima = sweep.optima();
+    let optima = sweep.optimum_cache();
     let signal = Signal::default();
     let request = &sweep.requests[0];
     let job = sweep.job(request, &optima[0], &signal);
@@ -236,15 +236,15 @@ fn compute(sweep: &Sweep, threads: usize) -> Outcome<f64> {
 }
 
 /// The bytes of a part.
-type Encoder = fn(&Layout, &Projection, &Sheet, &Footer) -> Option<Vec<u8>>;
+type Encoder = fn(&Layout, &RowIndex, &ColumnBuffer, &Footer) -> Option<Vec<u8>>;
 
 /// The encoder of the program: with the digest and the checksums of the part and of its pages.
-fn ours(layout: &Layout, projection: &Projection, sheet: &Sheet, footer: &Footer) -> Option<Vec<u8>> {
+fn ours(layout: &Layout, projection: &RowIndex, sheet: &ColumnBuffer, footer: &Footer) -> Option<Vec<u8>> {
     dataset::encode(layout, projection, sheet, footer).ok().map(|(bytes, _)| bytes)
 }
 
 /// `ArrowWriter` with the encodings and the compression of the program: no digest, and no checksums, which it cannot write.
-fn arrow(layout: &Layout, projection: &Projection, sheet: &Sheet, footer: &Footer) -> Option<Vec<u8>> {
+fn arrow(layout: &Layout, projection: &RowIndex, sheet: &ColumnBuffer, footer: &Footer) -> Option<Vec<u8>> {
     let batch = dataset::batch(layout, projection, footer.rows.clone(), sheet).ok()?;
     let mut properties = WriterProperties::builder()
         .set_compression(Compression::ZSTD(ZstdLevel::try_new(1).ok()?))
@@ -281,7 +281,7 @@ fn encode(sweep: &Sweep, encoder: Encoder) -> Outcome<f64> {
     let pool = sweep::pool(1)?;
     let plan = Plan::new(sweep);
     let manifest = plan.manifest(sweep);
-    let optima = sweep.optima();
+    let optima = sweep.optimum_cache();
     let signal = Signal::default();
     let (request, table) = (&sweep.requests[0], &plan.tables[0]);
     let job = sweep.job(request, &optima[0], &signal);

@@ -17,7 +17,7 @@ use ode_solvers::dop_shared::OutputType;
 use ode_solvers::{Dop853, SVector, System};
 use slipsweep::model::{Law, Transition};
 use slipsweep::numerics::root::{Probe, newton};
-use slipsweep::protocol::Effort;
+use slipsweep::protocol::SolverStats;
 use slipsweep::protocol::shortcut::{Case, Obstacle, find};
 use support::{median, one_vector_exp};
 
@@ -31,10 +31,10 @@ fn main() {
     println!("three exponentials of a vector: {:.2} ns", 1e9 * node);
     for (name, cases, rtols) in [("typical", typical(), &[1e-6, 1e-10, 1e-13][..]), ("wide", wide(), &[1e-10])] {
         for &rtol in rtols {
-            let mut effort = Effort::default();
+            let mut stats = SolverStats::default();
             let mut ends = BTreeMap::new();
             for case in &cases {
-                let end = match family.solve(case, rtol, &mut effort) {
+                let end = match family.solve(case, rtol, &mut stats) {
                     Ok(_) => "solved",
                     Err(Obstacle::NotConverged) => "not converged",
                     Err(_) => "infeasible",
@@ -43,17 +43,17 @@ fn main() {
             }
             let time = median(3, || {
                 for case in &cases {
-                    let _ = black_box(family.solve(case, rtol, &mut Effort::default()));
+                    let _ = black_box(family.solve(case, rtol, &mut SolverStats::default()));
                 }
             });
             let count = cases.len() as f64;
-            let floor = f64::from(effort.nodes) * node;
+            let floor = f64::from(stats.nodes) * node;
             println!(
                 "{name:<10} {rtol:>6e}: {:>8.1} us, {:>4.1} of the floor, {:>6.0} nodes, {:>4.1} passes, {ends:?}",
                 1e6 * time / count,
                 time / floor,
-                f64::from(effort.nodes) / count,
-                f64::from(effort.quadratures) / count
+                f64::from(stats.nodes) / count,
+                f64::from(stats.quadratures) / count
             );
         }
     }
@@ -66,8 +66,10 @@ fn main() {
 fn shooting(cases: &[Case], contracting: bool) {
     let family = find("bounded_friction").expect("is a family");
     let (mut solved, mut feasible, mut error) = (0, 0, 0.0f64);
-    let members: Vec<_> =
-        cases.iter().map(|case| family.solve(case, 1e-12, &mut Effort::default()).ok().and_then(|s| s.alpha)).collect();
+    let members: Vec<_> = cases
+        .iter()
+        .map(|case| family.solve(case, 1e-12, &mut SolverStats::default()).ok().and_then(|s| s.alpha))
+        .collect();
     let time = median(1, || {
         for (case, member) in cases.iter().zip(&members) {
             let Some(member) = member else { continue };

@@ -20,7 +20,7 @@ use ode_solvers::dop_shared::OutputType;
 use ode_solvers::{Dop853, SVector, System};
 use slipsweep::model::{Law, Transition};
 use slipsweep::numerics::root::{Probe, newton};
-use slipsweep::protocol::Effort;
+use slipsweep::protocol::SolverStats;
 use slipsweep::protocol::shortcut::{Case, find};
 use support::{median, one_ln, one_vector_exp, one_vector_ln};
 
@@ -63,16 +63,16 @@ fn main() {
         let of_a_node = if family == "bounded_velocity" { vector_exp } else { 2.0 * vector_ln };
         let family = find(family).expect("is a family");
         for rtol in [1e-6, 1e-10, 1e-13] {
-            let mut effort = Effort::default();
+            let mut stats = SolverStats::default();
             for case in cases {
-                let _ = family.solve(case, rtol, &mut effort);
+                let _ = family.solve(case, rtol, &mut stats);
             }
             let time = median(RUNS, || {
                 for case in cases {
-                    let _ = black_box(family.solve(case, rtol, &mut Effort::default()));
+                    let _ = black_box(family.solve(case, rtol, &mut SolverStats::default()));
                 }
             });
-            let (count, nodes) = (cases.len() as f64, f64::from(effort.nodes));
+            let (count, nodes) = (cases.len() as f64, f64::from(stats.nodes));
             let each = time / count;
             let floor = nodes / count * of_a_node;
             let share = if floor > 0.0 { format!("{:.1}", each / floor) } else { "-".to_owned() };
@@ -110,7 +110,7 @@ fn shooting(cases: &[Case], tolerance: f64, ln: f64) {
             };
             let root = newton(probe, -4.0, (-400.0, f64::INFINITY), false, 10.0 * tolerance);
             let work = root.and_then(|root| shoot(case, root.x, tolerance)).map(|(_, work)| work);
-            if let (Some(work), Ok(shortcut)) = (work, family.solve(case, 1e-13, &mut Effort::default())) {
+            if let (Some(work), Ok(shortcut)) = (work, family.solve(case, 1e-13, &mut SolverStats::default())) {
                 solved += 1;
                 error = error.max((work / shortcut.work - 1.0).abs());
             }

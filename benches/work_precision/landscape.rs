@@ -12,7 +12,7 @@ use slipsweep::model::{Law, Transition};
 use slipsweep::numerics::elementary::ln;
 use slipsweep::numerics::gauss::{Rule, rule};
 use slipsweep::protocol::Status;
-use slipsweep::protocol::cubic::{Landscape, Shortcuts};
+use slipsweep::protocol::cubic::{Landscape, LandscapeBuffers};
 
 use super::measure::{Answer, Kind, Method, NONE, Setting, Subject, Truth, relative};
 use super::optimal::transition;
@@ -111,7 +111,7 @@ fn ours(rows: &[Row], rtol: f64) -> Setting {
         let mut first = range.start;
         while first < range.end {
             let next = ends[ends.partition_point(|&end| end <= first)].min(range.end).min(first + work.len());
-            let out = Shortcuts { work: &mut work, v_min: &mut [], status: &mut status[..next - first] };
+            let out = LandscapeBuffers { work: &mut work, v_min: &mut [], status: &mut status[..next - first] };
             landscapes[first].evaluate(&a_2[first..next], &a_3[first..next], out);
             for i in first..next {
                 let feasible = status[i - first] != Status::Infeasible;

@@ -4,7 +4,7 @@ use std::rc::Rc;
 
 use slipsweep::model::Transition;
 use slipsweep::numerics::root::{Probe, newton};
-use slipsweep::protocol::Effort;
+use slipsweep::protocol::SolverStats;
 use slipsweep::protocol::shortcut::{Case, find};
 
 use super::integrate::dop853;
@@ -40,7 +40,7 @@ fn subject(cases: &'static str, rows: Vec<Row>, tolerances: &[f64]) -> Subject {
     let tasks = Rc::new(rows.iter().map(case).collect());
     let methods = vec![
         Method::each("ours", Kind::Ours, tolerances, &tasks, |case: &Case, rtol| {
-            let shortcut = find("bounded_friction")?.solve(case, rtol, &mut Effort::default()).ok()?;
+            let shortcut = find("bounded_friction")?.solve(case, rtol, &mut SolverStats::default()).ok()?;
             Some([shortcut.work, shortcut.alpha?])
         }),
         Method::each("shooting, DOP853", Kind::Other, tolerances, &tasks, shooting),

@@ -68,15 +68,16 @@ fn pictures(page: &mut Page, source: Source) -> Result<(), Failure> {
 /// How many rows of each table have which status.
 fn statuses(page: &mut Page, tables: &[TableSurvey]) {
     page.heading("Rows and statuses");
-    let used: Vec<usize> =
-        (0..Status::ALL.len()).filter(|&status| tables.iter().any(|table| table.digest.status[status] > 0)).collect();
+    let used: Vec<usize> = (0..Status::ALL.len())
+        .filter(|&status| tables.iter().any(|table| table.statistics.status[status] > 0))
+        .collect();
     let names: Vec<&str> = ["table", "rows", "parts", "missing parts"]
         .into_iter()
         .chain(used.iter().map(|&status| Status::ALL[status].name()))
         .collect();
     let counted = tables.iter().map(|table| {
         let counts = [table.rows, table.parts, table.parts - table.there].map(words::count);
-        let statuses = used.iter().map(|&status| words::count(table.digest.status[status]));
+        let statuses = used.iter().map(|&status| words::count(table.statistics.status[status]));
         [table.name.clone()].into_iter().chain(counts).chain(statuses).collect()
     });
     let rows: Vec<Vec<String>> = counted.collect();
@@ -87,7 +88,7 @@ fn statuses(page: &mut Page, tables: &[TableSurvey]) {
 fn summaries(page: &mut Page, tables: &[TableSurvey]) {
     page.heading("Summary");
     for table in tables {
-        for piece in summary::pieces(&table.name, table.rows, &table.digest) {
+        for piece in summary::pieces(&table.name, table.rows, &table.statistics) {
             match piece {
                 Piece::Line(_, line) => page.words(&line),
                 Piece::Table(_, names, units, rows) => {

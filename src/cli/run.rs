@@ -14,7 +14,7 @@ use crate::dataset::{DatasetError, Folder};
 use crate::grid::Quantity;
 use crate::protocol::Status;
 use crate::sweep::{self, Outcome, Plan, Request, RunError, Shard, Sweep, holds};
-use crate::table::{Kind, Signal, Work};
+use crate::table::{Kind, RunStats, Signal};
 
 /// Arguments of `run`.
 #[derive(Debug, clap::Args)]
@@ -59,7 +59,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     if !arguments.quiet {
         say(&report(&sweep, &plan, &folder, &outcome, arguments.shard, start))?;
     }
-    let defects: u64 = outcome.digests.iter().map(|digest| digest.status[Status::NotConverged as usize]).sum();
+    let defects: u64 = outcome.digests.iter().map(|statistics| statistics.status[Status::NotConverged as usize]).sum();
     if arguments.strict && defects > 0 {
         let message = format!("error: {} not_converged", words::things(defects, "row"));
         return Err(Failure { code: NOT_STRICT, message });
@@ -102,10 +102,10 @@ fn report(
     start: Instant,
 ) -> String {
     let mut text = String::new();
-    for ((table, digest), done) in plan.tables.iter().zip(&outcome.digests).zip(&outcome.tables) {
+    for ((table, statistics), done) in plan.tables.iter().zip(&outcome.digests).zip(&outcome.tables) {
         let all = done.kept + done.made;
         match shard {
-            None => text.push_str(&summary::digest(&table.name, table.rows, digest)),
+            None => text.push_str(&summary::statistics(&table.name, table.rows, statistics)),
             Some(shard) => {
                 let (ours, parts) = (words::count(all), words::things(table.parts, "part"));
                 let (index, count) = (shard.index(), shard.count());
@@ -249,7 +249,8 @@ fn account(outcome: &Outcome, seconds: f64) -> String {
     if rows == 0 {
         return "nothing to compute: every part was there\n".to_owned();
     }
-    let Work { optima, landscapes, best, shortcuts, crossovers, simulations, steps, quadratures, nodes } = outcome.work;
+    let RunStats { optima, landscapes, best, shortcuts, crossovers, simulations, steps, quadratures, nodes } =
+        outcome.work;
     let (all, rate) = (words::things(rows, "row"), words::count((rows as f64 / seconds) as u64));
     let mut text = format!("{all} in {}: {rate} rows a second, Parquet on disk included\n", words::duration(seconds));
     let spent: Vec<String> = [

@@ -67,10 +67,10 @@ fn counts(survey: &Survey) -> String {
     for table in &survey.tables {
         let missing = table.missing.iter().map(|range| range.end - range.start).sum();
         let (damaged, foreign) = (table.damaged.len() as u64, table.foreign.len() as u64);
-        let by_status = Status::ALL.iter().zip(table.digest.status).filter(|(_, rows)| *rows > 0);
+        let by_status = Status::ALL.iter().zip(table.statistics.status).filter(|(_, rows)| *rows > 0);
         let by_status: Vec<String> =
             by_status.map(|(status, rows)| format!("{} {}", words::count(rows), status.name())).collect();
-        let rows = format!("{} of {}", words::count(table.digest.status.iter().sum()), words::count(table.rows));
+        let rows = format!("{} of {}", words::count(table.statistics.status.iter().sum()), words::count(table.rows));
         let rows = if by_status.is_empty() { rows } else { format!("{rows}: {}", by_status.join(", ")) };
         let numbers = [table.parts, table.there, missing, damaged, foreign].map(words::count);
         lines.push([table.name.clone()].into_iter().chain(numbers).chain([rows]).collect());

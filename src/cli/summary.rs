@@ -5,7 +5,7 @@ use std::sync::atomic::AtomicU64;
 
 use super::watch::{Wait, waiting};
 use super::{Failure, dataset, say, words};
-use crate::dataset::{Cell, Counts, Digest, DigestRow, FEW, Folder, Look, Manifest, Survey};
+use crate::dataset::{Cell, Counts, FEW, Folder, Look, Manifest, StatisticsRow, Survey, TableStatistics};
 use crate::grid::Quantity;
 use crate::protocol::Status;
 use crate::table::{self, STATUS};
@@ -27,7 +27,7 @@ pub fn summary(arguments: &Arguments) -> Result<(), Failure> {
         if !text.is_empty() {
             text.push('\n');
         }
-        text.push_str(&digest(&table.name, table.rows, &table.digest));
+        text.push_str(&statistics(&table.name, table.rows, &table.statistics));
         let missing = table.parts - table.there;
         if missing > 0 {
             let (missing, all) = (words::count(missing), words::things(table.parts, "part"));
@@ -70,8 +70,8 @@ pub enum Piece {
 }
 
 /// One table in a few lines.
-pub fn digest(name: &str, rows: u64, digest: &Digest) -> String {
-    let lines = pieces(name, rows, digest).into_iter().map(|piece| match piece {
+pub fn statistics(name: &str, rows: u64, statistics: &TableStatistics) -> String {
+    let lines = pieces(name, rows, statistics).into_iter().map(|piece| match piece {
         Piece::Line(indent, line) => format!("{:indent$}{line}\n", ""),
         Piece::Table(indent, names, units, rows) => {
             let units = Some(units).filter(|units| units.iter().any(|unit| !unit.is_empty()));
@@ -83,46 +83,46 @@ pub fn digest(name: &str, rows: u64, digest: &Digest) -> String {
 }
 
 /// What is said of a table of `rows` rows.
-pub fn pieces(name: &str, rows: u64, digest: &Digest) -> Vec<Piece> {
+pub fn pieces(name: &str, rows: u64, statistics: &TableStatistics) -> Vec<Piece> {
     let counts: Vec<String> = Status::ALL
         .iter()
-        .zip(digest.status)
+        .zip(statistics.status)
         .filter(|(_, rows)| *rows > 0)
         .map(|(status, rows)| format!("{} {}", words::count(rows), status.name()))
         .collect();
     let mut pieces = vec![Piece::Line(0, format!("{name}: {} ({})", words::things(rows, "row"), counts.join(", ")))];
-    match &digest.rows {
-        Some(rows) => pieces.extend(listing(digest, &rows.iter().collect::<Vec<_>>())),
+    match &statistics.rows {
+        Some(rows) => pieces.extend(listing(statistics, &rows.iter().collect::<Vec<_>>())),
         None => {
-            let least: Vec<&DigestRow> = digest.least().collect();
+            let least: Vec<&StatisticsRow> = statistics.least().collect();
             if !least.is_empty() {
                 // A family may hold protocols that miss the final state, with any work.
                 let arriving = if name == "shortcut" { " and arrive" } else { "" };
                 pieces.push(Piece::Line(2, format!("least gap among the rows that are ok{arriving}:")));
-                pieces.extend(listing(digest, &least));
+                pieces.extend(listing(statistics, &least));
             }
-            pieces.extend(ranges(digest));
+            pieces.extend(ranges(statistics));
             let counted = |column: &str, counts: &Counts| {
                 let counts: Vec<String> =
                     counts.iter().map(|(word, rows)| format!("{} {word}", words::count(*rows))).collect();
                 Piece::Line(2, format!("{column}: {}", counts.join(", ")))
             };
-            pieces.extend(digest.labels.iter().map(|(label, counts)| match counts {
+            pieces.extend(statistics.labels.iter().map(|(label, counts)| match counts {
                 Some(counts) => counted(label, counts),
                 None => Piece::Line(2, format!("{label}: more than {FEW} different labels")),
             }));
-            pieces.extend(digest.words.iter().map(|(column, counts)| counted(column, counts)));
+            pieces.extend(statistics.words.iter().map(|(column, counts)| counted(column, counts)));
         }
     }
-    pieces.extend(predicted(name, digest));
+    pieces.extend(predicted(name, statistics));
     pieces
 }
 
 /// The columns of numbers.
-fn ranges(digest: &Digest) -> Option<Piece> {
-    let ranges = digest.ranges.iter().filter(|range| range.count > 0).map(|range| {
+fn ranges(statistics: &TableStatistics) -> Option<Piece> {
+    let ranges = statistics.ranges.iter().filter(|range| range.count > 0).map(|range| {
         let ends = [range.least, range.greatest].map(words::number);
-        let of = [range.column.clone(), digest.unit(&range.column).to_owned(), words::count(range.count)];
+        let of = [range.column.clone(), statistics.unit(&range.column).to_owned(), words::count(range.count)];
         of.into_iter().chain(ends).collect()
     });
     let names = ["column", "unit", "rows", "least", "greatest"].map(str::to_owned);
@@ -131,20 +131,20 @@ fn ranges(digest: &Digest) -> Option<Piece> {
 }
 
 /// What a simpler theory predicts of a column, beside what was found.
-fn predicted(name: &str, digest: &Digest) -> Vec<Piece> {
+fn predicted(name: &str, statistics: &TableStatistics) -> Vec<Piece> {
     let prediction = table::find(name).and_then(|table| table.prediction());
-    let Some(prediction) = prediction.filter(|_| !digest.predicted.is_empty()) else { return Vec::new() };
+    let Some(prediction) = prediction.filter(|_| !statistics.predicted.is_empty()) else { return Vec::new() };
     let line =
         |(predicted, found, rows): &(String, String, u64)| vec![predicted.clone(), found.clone(), words::count(*rows)];
     let names = ["predicted", "found", "rows"].map(str::to_owned);
     let mut pieces = vec![
         Piece::Line(2, format!("{} as {} predicts it, and as found:", prediction.column, prediction.theory)),
-        Piece::Table(4, names.to_vec(), Vec::new(), digest.predicted.iter().map(line).collect()),
+        Piece::Table(4, names.to_vec(), Vec::new(), statistics.predicted.iter().map(line).collect()),
     ];
     let is_surprise = |(predicted, found, _): &&(String, String, u64)| {
         found == prediction.surprise && predicted != prediction.surprise
     };
-    let differ: u64 = digest.predicted.iter().filter(is_surprise).map(|(.., rows)| rows).sum();
+    let differ: u64 = statistics.predicted.iter().filter(is_surprise).map(|(.., rows)| rows).sum();
     if differ > 0 {
         let rows = words::things(differ, "row");
         pieces.push(Piece::Line(4, format!("{rows} of {}: {}", prediction.surprise, prediction.why)));
@@ -153,13 +153,13 @@ fn predicted(name: &str, digest: &Digest) -> Vec<Piece> {
 }
 
 /// Rows under names and units; axes that do not vary stand above, columns without any value are left out.
-fn listing(digest: &Digest, rows: &[&DigestRow]) -> Vec<Piece> {
+fn listing(statistics: &TableStatistics, rows: &[&StatisticsRow]) -> Vec<Piece> {
     let Some(first) = rows.first() else { return Vec::new() };
     let is_axis = |name: &str| Quantity::from_name(name).is_some();
     let mut common = Vec::new();
     let mut places = Vec::new();
     let mut results_begin = false;
-    for (place, (name, unit)) in digest.columns.iter().enumerate() {
+    for (place, (name, unit)) in statistics.columns.iter().enumerate() {
         let cell = first.cell(place);
         // `best_cubic` has result columns of the same names as axes: axes end where they stop coming in the order of quantities.
         results_begin |= !is_axis(name);
@@ -173,8 +173,8 @@ fn listing(digest: &Digest, rows: &[&DigestRow]) -> Vec<Piece> {
         }
     }
     let at = (!common.is_empty()).then(|| Piece::Line(2, format!("at {}", common.join(", "))));
-    let names = places.iter().map(|&place| digest.columns[place].0.clone()).collect();
-    let units = places.iter().map(|&place| digest.columns[place].1.clone()).collect();
+    let names = places.iter().map(|&place| statistics.columns[place].0.clone()).collect();
+    let units = places.iter().map(|&place| statistics.columns[place].1.clone()).collect();
     let rows = rows.iter().map(|row| places.iter().map(|&place| shown(row.cell(place))).collect()).collect();
     at.into_iter().chain([Piece::Table(4, names, units, rows)]).collect()
 }

@@ -18,7 +18,7 @@ use crate::protocol::shortcut::{self, Case};
 use crate::sweep::{Spec, units};
 use crate::table;
 use crate::trace::{
-    self, Absence, COLUMNS, Course, Parameter, Pathless, Protocol, RANGE_RTOL, Times, Trace, VALUE_RTOL,
+    self, Absence, COLUMNS, Parameter, Pathless, Protocol, RANGE_RTOL, Times, Trace, TracedPath, VALUE_RTOL,
 };
 use crate::verify::scale;
 
@@ -148,7 +148,7 @@ fn legal(text: &str, domain: Domain) -> Result<f64, String> {
 }
 
 /// What is to be traced, however it was named.
-struct Asked {
+struct TraceRequest {
     /// The name of the protocol.
     name: String,
     protocol: Protocol,
@@ -181,25 +181,26 @@ struct Origin {
 /// Traces a protocol.
 pub fn trace(arguments: &Arguments) -> Result<(), Failure> {
     let (format, output) = (arguments.output.format()?, &arguments.output);
-    let asked = match &arguments.table {
+    let request = match &arguments.table {
         Some(table) => arguments.row_of(table)?,
-        None => arguments.asked()?,
+        None => arguments.request()?,
     };
-    let mut course = asked.protocol.course(&asked.case, asked.rtol).map_err(|absence| absent(&asked.name, absence))?;
+    let mut path =
+        request.protocol.path(&request.case, request.rtol).map_err(|absence| absent(&request.name, absence))?;
     let times = arguments.points.map_or(Times::Fewest, |count| Times::Spaced(count as usize));
-    let Some(trace) = Trace::of(&*course.motion, &asked.case.transition, times) else {
+    let Some(trace) = Trace::of(&*path.motion, &request.case.transition, times) else {
         return Err(Failure::failed("the protocol shows more detail than can be resolved"));
     };
     let least = trace.moments.iter().map(|moment| moment.friction).fold(f64::INFINITY, f64::min);
-    course.status = course.status.with_friction(least);
-    let trace = trace.in_units(&asked.units);
-    let header = header(arguments, &asked, &course, &trace);
-    let facts = facts(arguments, &asked, &course, &trace);
+    path.status = path.status.with_friction(least);
+    let trace = trace.in_units(&request.units);
+    let header = header(arguments, &request, &path, &trace);
+    let facts = facts(arguments, &request, &path, &trace);
     let version = env!("CARGO_PKG_VERSION");
     let bytes = match format {
-        Format::Table => format!("{header}\n{}", table(&trace, &asked.units)).into_bytes(),
-        Format::Csv => trace::csv(&trace, &asked.units, &facts, version).into_bytes(),
-        Format::Parquet => trace::parquet(&trace, &asked.units, &facts, version).map_err(Failure::failed)?,
+        Format::Table => format!("{header}\n{}", table(&trace, &request.units)).into_bytes(),
+        Format::Csv => trace::csv(&trace, &request.units, &facts, version).into_bytes(),
+        Format::Parquet => trace::parquet(&trace, &request.units, &facts, version).map_err(Failure::failed)?,
     };
     if output.is_stdout() {
         return put(&bytes);
@@ -249,7 +250,7 @@ impl Arguments {
     }
 
     /// The protocol that the arguments name.
-    fn asked(&self) -> Result<Asked, Failure> {
+    fn request(&self) -> Result<TraceRequest, Failure> {
         if Path::new(&self.subject).is_dir() {
             let (folder, expected) = (&self.subject, "a protocol, or a dataset with a table and a row");
             let help = format!("slipsweep trace {folder} optimal --row 0");
@@ -274,7 +275,7 @@ impl Arguments {
             _ => return Err(wrong(format!("no protocol is named `{name}`"))),
         };
         let numbers = self.given().into_iter().filter(|(quantity, _)| !quantity.has_scale());
-        Ok(Asked {
+        Ok(TraceRequest {
             name: name.to_owned(),
             protocol,
             case: Case {
@@ -320,7 +321,7 @@ impl Arguments {
     }
 
     /// The protocol of a row of a table.
-    fn row_of(&self, name: &str) -> Result<Asked, Failure> {
+    fn row_of(&self, name: &str) -> Result<TraceRequest, Failure> {
         let is_own = |quantity: Quantity| !(quantity == Quantity::Time && name == "step_response");
         let given = self.given().into_iter().find(|(quantity, given)| given.is_some() && is_own(*quantity));
         let given = given.map(|(quantity, _)| flag(quantity)).or(self.unbounded.then(|| "--unbounded".to_owned()));
@@ -367,7 +368,7 @@ impl Arguments {
         let own = own.or(definition.and_then(|table| table.default_rtol())).unwrap_or(spec.accuracy.rtol);
         let mut numbers = axes_of(&written, &units);
         numbers.extend(self.t_f.map(|t_f| Named::new("t_f", t_f, units.name("l/v_0"))));
-        Ok(Asked {
+        Ok(TraceRequest {
             bounded: has_bound(name).then_some(bounded),
             name: protocol_name,
             protocol,
@@ -481,41 +482,41 @@ impl Named {
 }
 
 /// The parameters of a protocol in the units of what was asked for, each with its meaning.
-fn parameters(asked: &Asked, course: &Course) -> Vec<(Named, &'static str)> {
+fn parameters(request: &TraceRequest, path: &TracedPath) -> Vec<(Named, &'static str)> {
     let named = |parameter: &Parameter| {
         // The one parameter of a family that has a dimension.
-        if parameter.name == "alpha" && asked.name == "bounded_velocity" && asked.units != Units::Scaled {
-            let rate = asked.units.size("v_0/l");
+        if parameter.name == "alpha" && request.name == "bounded_velocity" && request.units != Units::Scaled {
+            let rate = request.units.size("v_0/l");
             return (Named::new(parameter.name, parameter.value * rate * rate, "1/s^2"), parameter.doc);
         }
-        (Named::scaled(parameter.name, parameter.value, parameter.unit, &asked.units), parameter.doc)
+        (Named::scaled(parameter.name, parameter.value, parameter.unit, &request.units), parameter.doc)
     };
-    course.parameters.iter().map(named).collect()
+    path.parameters.iter().map(named).collect()
 }
 
 /// What comes out.
-fn results(asked: &Asked, course: &Course, trace: &Trace) -> [Named; 3] {
+fn results(request: &TraceRequest, path: &TracedPath, trace: &Trace) -> [Named; 3] {
     // The trace is in the units of what was asked for.
-    let velocity = |name, value| Named::new(name, value, si_name(&asked.units, "v_0"));
-    let work = Named::scaled("work", course.work, "mu_0 sigma l", &asked.units);
+    let velocity = |name, value| Named::new(name, value, si_name(&request.units, "v_0"));
+    let work = Named::scaled("work", path.work, "mu_0 sigma l", &request.units);
     [work, velocity("v_min", trace.v_min), velocity("v_max", trace.v_max)]
 }
 
 /// What the protocol is, in a few lines.
-fn header(arguments: &Arguments, asked: &Asked, course: &Course, trace: &Trace) -> String {
+fn header(arguments: &Arguments, request: &TraceRequest, path: &TracedPath, trace: &Trace) -> String {
     let all = |numbers: &[Named]| numbers.iter().map(Named::words).collect::<Vec<_>>().join(", ");
-    let mut text = format!("{}: {}\n  at {}", asked.name, asked.protocol.doc(&asked.name), all(&asked.numbers));
-    if asked.bounded == Some(false) {
+    let mut text = format!("{}: {}\n  at {}", request.name, request.protocol.doc(&request.name), all(&request.numbers));
+    if request.bounded == Some(false) {
         text.push_str(", without the bound v >= 1");
     }
     text.push('\n');
-    if let Some(Origin { dataset, table, row }) = &asked.origin {
+    if let Some(Origin { dataset, table, row }) = &request.origin {
         text.push_str(&format!("  row {row} of table {table} of {dataset}\n"));
     }
-    for (parameter, doc) in parameters(asked, course) {
+    for (parameter, doc) in parameters(request, path) {
         text.push_str(&format!("  {}: {doc}\n", parameter.words()));
     }
-    text.push_str(&format!("  {}\n  status {}\n", all(&results(asked, course, trace)), status(course.status)));
+    text.push_str(&format!("  {}\n  status {}\n", all(&results(request, path, trace)), status(path.status)));
     let rows = words::things(trace.moments.len() as u64, "row");
     match arguments.points {
         Some(_) => {
@@ -565,16 +566,16 @@ fn table(trace: &Trace, units: &Units) -> String {
 }
 
 /// What a file says of itself.
-fn facts(arguments: &Arguments, asked: &Asked, course: &Course, trace: &Trace) -> Vec<(String, String)> {
-    let mut facts = vec![("protocol", asked.name.clone())];
-    let (parameters, results) = (parameters(asked, course), results(asked, course, trace));
-    let rtol = Named::new("rtol", asked.rtol, "");
-    let numbers = asked.numbers.iter().chain([&rtol]).chain(parameters.iter().map(|(parameter, _)| parameter));
+fn facts(arguments: &Arguments, request: &TraceRequest, path: &TracedPath, trace: &Trace) -> Vec<(String, String)> {
+    let mut facts = vec![("protocol", request.name.clone())];
+    let (parameters, results) = (parameters(request, path), results(request, path, trace));
+    let rtol = Named::new("rtol", request.rtol, "");
+    let numbers = request.numbers.iter().chain([&rtol]).chain(parameters.iter().map(|(parameter, _)| parameter));
     facts.extend(numbers.chain(&results).map(|number| (number.name.as_str(), format!("{:?}", number.value))));
-    facts.extend(asked.bounded.map(|bounded| ("velocity_bound", bounded.to_string())));
+    facts.extend(request.bounded.map(|bounded| ("velocity_bound", bounded.to_string())));
     facts.extend(arguments.points.map(|points| ("points", points.to_string())));
-    facts.push(("status", course.status.name().to_owned()));
-    if let Some(Origin { dataset, table, row }) = &asked.origin {
+    facts.push(("status", path.status.name().to_owned()));
+    if let Some(Origin { dataset, table, row }) = &request.origin {
         facts.extend([("dataset", dataset.clone()), ("table", table.clone()), ("row", row.to_string())]);
     }
     facts.into_iter().map(|(key, value)| (key.to_owned(), value)).collect()

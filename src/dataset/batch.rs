@@ -8,9 +8,9 @@ use arrow_array::{ArrayRef, BooleanArray, DictionaryArray, Float64Array, Int32Ar
 use arrow_schema::ArrowError;
 
 use super::layout::Layout;
-use crate::grid::Projection;
+use crate::grid::RowIndex;
 use crate::protocol::Status;
-use crate::table::{Kind, Sheet};
+use crate::table::{ColumnBuffer, Kind};
 
 /// The cells of `sheet`, which are the rows `rows` of a table, with the columns and types that a part on disk has.
 ///
@@ -19,9 +19,9 @@ use crate::table::{Kind, Sheet};
 /// A column that does not fit the layout.
 pub fn batch(
     layout: &Layout,
-    projection: &Projection,
+    projection: &RowIndex,
     rows: Range<u64>,
-    sheet: &Sheet,
+    sheet: &ColumnBuffer,
 ) -> Result<RecordBatch, ArrowError> {
     let view = projection.view(rows.clone());
     let mut columns: Vec<ArrayRef> = Vec::with_capacity(layout.schema.fields().len());

@@ -13,8 +13,8 @@ use parquet::file::statistics::Statistics;
 use parquet::schema::types::ColumnDescPtr;
 use zstd::bulk::Compressor;
 
-use super::hybrid;
 use super::part::ZSTD_LEVEL;
+use super::rle;
 
 /// Runs of equal codes: a code, and for how many rows.
 pub type Runs = Vec<(u32, usize)>;
@@ -39,7 +39,7 @@ pub struct Chunk {
 /// Begins a data page of up to `size` bytes with the levels of a column with nulls: which rows have a value (1) and which have none (0).
 pub fn page(present: Option<&Runs>, size: usize) -> Vec<u8> {
     let Some(present) = present else { return Vec::with_capacity(size) };
-    let levels = hybrid::encode(present.iter().copied(), 1);
+    let levels = rle::encode(present.iter().copied(), 1);
     let mut data = Vec::with_capacity(4 + levels.len() + size);
     data.extend((levels.len() as u32).to_le_bytes());
     data.extend(levels);

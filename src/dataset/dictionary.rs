@@ -9,8 +9,8 @@ use parquet::basic::Encoding;
 use parquet::file::statistics::Statistics;
 
 use super::chunk::{Chunk, Runs, page};
-use super::hybrid;
 use super::numbers::double_statistics;
+use super::rle;
 
 /// Numbers by the runs of their places in `values`, which may hold a number twice.
 pub fn numbers(values: &[f64], runs: impl Iterator<Item = (usize, usize)>, present: Option<&Runs>) -> Chunk {
@@ -53,9 +53,9 @@ fn chunk(
     present: Option<&Runs>,
     statistics: impl FnOnce(u64) -> Statistics,
 ) -> Chunk {
-    let bit_width = hybrid::bit_width(values);
+    let bit_width = rle::bit_width(values);
     let mut with_value = 0;
-    let codes = hybrid::encode(runs.inspect(|(_, length)| with_value += length), bit_width);
+    let codes = rle::encode(runs.inspect(|(_, length)| with_value += length), bit_width);
     let rows = present.map_or(with_value, |present| present.iter().map(|(_, length)| length).sum());
     let mut data = page(present, 1 + codes.len());
     data.push(bit_width);

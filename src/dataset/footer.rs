@@ -5,9 +5,9 @@ use std::ops::Range;
 
 use parquet::file::metadata::KeyValue;
 
-use super::digest::Digest;
+use super::checksum;
 use super::manifest::{Build, Manifest, ManifestTable};
-use super::seal;
+use super::statistics::TableStatistics;
 use crate::protocol::Status;
 
 /// Most bytes of a spec that each part carries: a fortieth of a part of 2^18 rows of a landscape. Of a longer spec the manifest has the one copy,
@@ -63,8 +63,8 @@ impl Footer {
     }
 
     /// As Parquet metadata, with the digest of the rows, and the places of the checksums last.
-    pub fn entries(&self, digest: &Digest) -> Vec<KeyValue> {
-        let counts: BTreeMap<&str, u64> = Status::ALL.map(Status::name).into_iter().zip(digest.status).collect();
+    pub fn entries(&self, statistics: &TableStatistics) -> Vec<KeyValue> {
+        let counts: BTreeMap<&str, u64> = Status::ALL.map(Status::name).into_iter().zip(statistics.status).collect();
         let counts = serde_json::to_string(&counts).unwrap_or_default();
         let tables = serde_json::to_string(&self.tables).unwrap_or_default();
         let entries = [
@@ -77,11 +77,11 @@ impl Footer {
             (ROW_START, self.rows.start.to_string()),
             (ROW_END, self.rows.end.to_string()),
             (STATUS, counts),
-            (DIGEST, serde_json::to_string(digest).unwrap_or_default()),
+            (DIGEST, serde_json::to_string(statistics).unwrap_or_default()),
         ];
         let spec = self.spec.iter().map(|spec| (SPEC, spec.clone()));
         let entries = spec.chain(entries).map(|(key, value)| KeyValue::new(key.to_owned(), value));
-        entries.chain(seal::entries()).collect()
+        entries.chain(checksum::entries()).collect()
     }
 
     /// From Parquet metadata, `None` if anything is missing.
@@ -98,13 +98,13 @@ impl Footer {
     }
 
     /// The digest of the rows of the part, from its Parquet metadata.
-    pub fn digest(entries: &[KeyValue]) -> Option<Digest> {
+    pub fn statistics(entries: &[KeyValue]) -> Option<TableStatistics> {
         let get = |key: &str| entries.iter().find(|entry| entry.key == key)?.value.as_deref();
         let counts: BTreeMap<String, u64> = serde_json::from_str(get(STATUS)?).ok()?;
         let status = Status::ALL.map(|status| counts.get(status.name()).copied().unwrap_or(0));
-        let mut digest: Digest = serde_json::from_str(get(DIGEST)?).ok()?;
-        digest.status = status;
-        Some(digest)
+        let mut statistics: TableStatistics = serde_json::from_str(get(DIGEST)?).ok()?;
+        statistics.status = status;
+        Some(statistics)
     }
 
     /// Its table, as the dataset has it.

@@ -13,10 +13,10 @@ use parquet::file::metadata::{ParquetMetaDataReader, RowGroupMetaData};
 use parquet::file::statistics::Statistics;
 
 use super::cell::Cell;
-use super::claims::{check_footer, coded};
 use super::folder::DatasetError;
 use super::guard::guarded;
 use super::layout::label;
+use super::metadata_limits::{check_footer, coded};
 use crate::file;
 
 /// Rows that are decoded together.

@@ -7,7 +7,7 @@ use arrow_schema::{DataType, Field, Schema, SchemaRef};
 
 use crate::grid::{Grid, Quantity, Scale};
 use crate::model::Units;
-use crate::table::{Column, Kind, Prediction, STATUS, STATUS_DOC, Selection, Table};
+use crate::table::{Column, Kind, Prediction, Projection, STATUS, STATUS_DOC, Table};
 
 /// Meaning of a column of labels.
 const LABEL_DOC: &str = "label of the row's point, from the file of `points`";
@@ -31,7 +31,7 @@ pub struct Layout {
 
 impl Layout {
     /// The layout of `table` over `grid`, with the columns of `selection`.
-    pub fn new(table: &dyn Table, selection: &Selection, grid: &Grid) -> Layout {
+    pub fn new(table: &dyn Table, selection: &Projection, grid: &Grid) -> Layout {
         let axes: Vec<Quantity> = Quantity::ALL.into_iter().filter(|axis| table.axes().contains(axis)).collect();
         let columns: Vec<Column> = selection.indices().iter().map(|&index| table.columns()[index]).collect();
         let mut labels: Vec<String> = Vec::new();

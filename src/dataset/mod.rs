@@ -3,33 +3,29 @@
 pub(crate) mod atomic;
 mod batch;
 mod cell;
+mod checksum;
 mod chunk;
-mod claims;
 mod dictionary;
-mod digest;
 mod flags;
 mod folder;
 mod footer;
 #[cfg(feature = "read")]
 pub mod frame;
 mod guard;
-mod hybrid;
 mod layout;
 mod manifest;
+mod metadata_limits;
 mod numbers;
 mod part;
-mod seal;
+mod rle;
 mod session;
 mod state;
+mod statistics;
 #[cfg(feature = "read")]
 mod survey;
 
 pub use batch::batch;
 pub use cell::Cell;
-pub(crate) use claims::coded;
-#[cfg(feature = "query")]
-pub(crate) use claims::{check_footer, check_pages};
-pub use digest::{Counts, Digest, FEW, Row as DigestRow};
 pub use folder::{DatasetError, Folder};
 pub use footer::{Footer, StatusCounts};
 #[cfg(feature = "read")]
@@ -40,8 +36,12 @@ pub(crate) use guard::is_guarded;
 pub use layout::Layout;
 pub(crate) use layout::{field, label};
 pub use manifest::{Build, Manifest, ManifestTable};
+pub(crate) use metadata_limits::coded;
+#[cfg(feature = "query")]
+pub(crate) use metadata_limits::{check_footer, check_pages};
 pub use part::encode;
 pub use session::{Company, Holder, Session};
 pub use state::{Look, OpenPart, State};
+pub use statistics::{Counts, FEW, Row as StatisticsRow, TableStatistics};
 #[cfg(feature = "read")]
 pub use survey::{Survey, TableSurvey};

@@ -11,13 +11,13 @@ use parquet::schema::types::ColumnDescPtr;
 use zstd::bulk::Compressor;
 
 use super::chunk::{Chunk, Runs};
-use super::digest::Digest;
 use super::footer::Footer;
 use super::layout::Layout;
-use super::{dictionary, flags, numbers, seal};
-use crate::grid::Projection;
+use super::statistics::TableStatistics;
+use super::{checksum, dictionary, flags, numbers};
+use crate::grid::RowIndex;
 use crate::protocol::Status;
-use crate::table::{Kind, Sheet};
+use crate::table::{ColumnBuffer, Kind};
 
 /// Rows of a row group: what a reader skips by the statistics of a column.
 const ROWS_PER_GROUP: usize = 1 << 16;
@@ -29,12 +29,17 @@ const BYTES_PER_ROW: usize = 9;
 pub const ZSTD_LEVEL: i32 = 1;
 
 /// The bytes of a part, the same on every machine, with their checksums; and the digest of its rows, which they hold.
-pub fn encode(layout: &Layout, projection: &Projection, sheet: &Sheet, footer: &Footer) -> Result<(Vec<u8>, Digest)> {
-    let digest = Digest::of(layout, projection, footer.rows.clone(), sheet)?;
+pub fn encode(
+    layout: &Layout,
+    projection: &RowIndex,
+    sheet: &ColumnBuffer,
+    footer: &Footer,
+) -> Result<(Vec<u8>, TableStatistics)> {
+    let statistics = TableStatistics::of(layout, projection, footer.rows.clone(), sheet)?;
     let schema = ArrowSchemaConverter::new().convert(&layout.schema)?;
     let mut properties = WriterProperties::builder()
         .set_created_by(format!("slipsweep version {}", footer.build.version))
-        .set_key_value_metadata(Some(footer.entries(&digest)))
+        .set_key_value_metadata(Some(footer.entries(&statistics)))
         .set_offset_index_disabled(true)
         .build();
     add_encoded_arrow_schema_to_metadata(&layout.schema, &mut properties);
@@ -77,7 +82,7 @@ pub fn encode(layout: &Layout, projection: &Projection, sheet: &Sheet, footer: &
         group.status(&sheet.status[range])?;
         group.writer.close()?;
     }
-    Ok((seal::sealed(file.into_inner()?)?, digest))
+    Ok((checksum::sealed(file.into_inner()?)?, statistics))
 }
 
 /// A row group in the making, and the columns that it still lacks.

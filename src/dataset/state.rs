@@ -7,11 +7,11 @@ use std::sync::Arc;
 
 use parquet::file::metadata::{KeyValue, ParquetMetaData, ParquetMetaDataReader};
 
-use super::claims::check_footer;
-use super::digest::Digest;
+use super::checksum;
 use super::footer::{Footer, PREFIX};
 use super::manifest::{Manifest, ManifestTable};
-use super::seal;
+use super::metadata_limits::check_footer;
+use super::statistics::TableStatistics;
 
 /// How closely a part is looked at.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -30,7 +30,7 @@ pub enum State {
     /// The part.
     There {
         /// What its rows contain.
-        digest: Box<Digest>,
+        statistics: Box<TableStatistics>,
     },
     /// Something that was not made from this spec by this version; it may be of use to somebody.
     Foreign {
@@ -60,19 +60,21 @@ pub struct OpenPart {
     /// What it says of itself.
     pub footer: Footer,
     /// What its rows contain.
-    pub digest: Digest,
+    pub statistics: TableStatistics,
 }
 
 /// Looks at the file in the place of a part, number `part` of `table` in the dataset of `manifest`, which is written in `path`.
 pub fn state(path: &Path, manifest: &Manifest, table: &str, part: u64, look: Look) -> State {
     let found = match look {
-        Look::Footer => open_part(path, manifest, table, part).map(|part| part.map(|part| part.digest)),
+        Look::Footer => open_part(path, manifest, table, part).map(|part| part.map(|part| part.statistics)),
         Look::Whole => whole(path).and_then(|entries| {
-            entries.map(|entries| belongs(&entries, manifest, table, part).map(|(_, digest)| digest)).transpose()
+            entries
+                .map(|entries| belongs(&entries, manifest, table, part).map(|(_, statistics)| statistics))
+                .transpose()
         }),
     };
     match found {
-        Ok(Some(digest)) => State::There { digest: Box::new(digest) },
+        Ok(Some(statistics)) => State::There { statistics: Box::new(statistics) },
         Ok(None) => State::Missing,
         Err(state) => state,
     }
@@ -87,7 +89,7 @@ pub fn open_part(path: &Path, manifest: &Manifest, table: &str, part: u64) -> Re
     let Some(file) = open(path)? else { return Ok(None) };
     let metadata = metadata(&file)?;
     let entries = entries(&metadata);
-    match seal::is_head_intact(&file, &metadata) {
+    match checksum::is_head_intact(&file, &metadata) {
         Ok(Some(true)) => {}
         Ok(None) if Footer::from_entries(&entries).is_none() => {
             return Err(stranger("a Parquet file without its marks"));
@@ -95,15 +97,15 @@ pub fn open_part(path: &Path, manifest: &Manifest, table: &str, part: u64) -> Re
         Ok(_) => return damaged("the checksum of its footer and page headers does not match"),
         Err(error) => return damaged(&error.to_string()),
     }
-    let (footer, digest) = belongs(&entries, manifest, table, part)?;
-    Ok(Some(OpenPart { path: path.to_owned(), file, metadata: metadata.into(), footer, digest }))
+    let (footer, statistics) = belongs(&entries, manifest, table, part)?;
+    Ok(Some(OpenPart { path: path.to_owned(), file, metadata: metadata.into(), footer, statistics }))
 }
 
 /// What the footer of a part says, if it is as it was written.
 pub fn footer_of(path: &Path) -> Option<Footer> {
     let file = open(path).ok()??;
     let metadata = metadata(&file).ok()?;
-    let sound = seal::is_head_intact(&file, &metadata).ok()??;
+    let sound = checksum::is_head_intact(&file, &metadata).ok()??;
     if sound { Footer::from_entries(&entries(&metadata)) } else { None }
 }
 
@@ -129,7 +131,7 @@ fn whole(path: &Path) -> Result<Option<Vec<KeyValue>>, State> {
         return damaged(&unreadable(&error));
     }
     let bytes = bytes::Bytes::from(bytes);
-    match seal::is_intact(&bytes) {
+    match checksum::is_intact(&bytes) {
         Some(true) => metadata(&bytes).map(|metadata| Some(entries(&metadata))),
         Some(false) => damaged("its checksum does not match its bytes"),
         // Either the checksum is broken, or the file is somebody else's.
@@ -165,11 +167,16 @@ fn entries(metadata: &ParquetMetaData) -> Vec<KeyValue> {
 }
 
 /// What a file says of itself, if that is what the part that should be there says.
-fn belongs(entries: &[KeyValue], manifest: &Manifest, table: &str, part: u64) -> Result<(Footer, Digest), State> {
+fn belongs(
+    entries: &[KeyValue],
+    manifest: &Manifest,
+    table: &str,
+    part: u64,
+) -> Result<(Footer, TableStatistics), State> {
     let foreign = |what, expected: &str, found: &str| {
         Err(State::Foreign { what, expected: expected.to_owned(), found: found.to_owned() })
     };
-    let (Some(found), Some(digest)) = (Footer::from_entries(entries), Footer::digest(entries)) else {
+    let (Some(found), Some(statistics)) = (Footer::from_entries(entries), Footer::statistics(entries)) else {
         return Err(stranger("a Parquet file without its marks"));
     };
     let planned = manifest.table(table);
@@ -192,6 +199,6 @@ fn belongs(entries: &[KeyValue], manifest: &Manifest, table: &str, part: u64) ->
         let show = |rows: &std::ops::Range<u64>| format!("rows {} to {}", rows.start, rows.end);
         foreign("place in the table", &rows.as_ref().map(show).unwrap_or_default(), &show(&found.rows))
     } else {
-        Ok((found, digest))
+        Ok((found, statistics))
     }
 }

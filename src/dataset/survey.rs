@@ -6,10 +6,10 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 use rayon::prelude::*;
 
-use super::digest::Digest;
 use super::folder::Folder;
 use super::manifest::Manifest;
 use super::state::{Look, State};
+use super::statistics::TableStatistics;
 
 /// What was found in the folder of a dataset.
 #[derive(Debug, Clone, PartialEq)]
@@ -40,7 +40,7 @@ pub struct TableSurvey {
     /// Parts whose place is taken by something else: in what it differs, what was expected and what was found.
     pub foreign: Vec<(u64, [String; 3])>,
     /// What the parts that are there contain.
-    pub digest: Digest,
+    pub statistics: TableStatistics,
 }
 
 /// Parts that are looked at before what they contain is added up, so that the memory does not grow with the dataset.
@@ -80,7 +80,7 @@ impl Survey {
                 missing: Vec::new(),
                 damaged: Vec::new(),
                 foreign: Vec::new(),
-                digest: Digest::default(),
+                statistics: TableStatistics::default(),
             };
             let mut next = 0;
             let there = folder.parts_there(table);
@@ -99,9 +99,9 @@ impl Survey {
                 survey.miss(next..part);
                 next = part + 1;
                 match state {
-                    State::There { digest } => {
+                    State::There { statistics } => {
                         survey.there += 1;
-                        survey.digest = std::mem::take(&mut survey.digest).merge(*digest);
+                        survey.statistics = std::mem::take(&mut survey.statistics).merge(*statistics);
                     }
                     // It went away a moment ago.
                     State::Missing => survey.miss(part..part + 1),

@@ -5,8 +5,8 @@ use std::ops::Range;
 
 use super::axis::Axis;
 use super::block::Digit;
-use super::projection::{Projection, Tuples};
 use super::quantity::{Point, Quantity};
+use super::row_index::{RowIndex, Tuples};
 use super::sampler::{Sampler, Scratch};
 
 /// Points at which an expression is evaluated at a time. Chosen: their columns fit the cache of a core.
@@ -42,13 +42,13 @@ impl Segment {
 /// Consecutive rows of a table.
 #[derive(Debug, Clone)]
 pub struct View<'a> {
-    projection: &'a Projection,
+    row_index: &'a RowIndex,
     segments: Vec<Segment>,
 }
 
 impl<'a> View<'a> {
-    pub(super) fn new(projection: &'a Projection, segments: Vec<Segment>) -> View<'a> {
-        View { projection, segments }
+    pub(super) fn new(row_index: &'a RowIndex, segments: Vec<Segment>) -> View<'a> {
+        View { row_index, segments }
     }
 
     fn segments(&self, rows: Range<u64>) -> impl Iterator<Item = Segment> + '_ {
@@ -64,7 +64,7 @@ impl<'a> View<'a> {
     pub fn point(&self, row: u64) -> Point {
         let mut point = Point::default();
         if let Some(segment) = self.segments(row..row + 1).next() {
-            let stretch = &self.projection.stretches()[segment.stretch];
+            let stretch = &self.row_index.stretches()[segment.stretch];
             let block = &stretch.block;
             for digit in &stretch.digits.digits {
                 for axis in &block.factors[digit.factor].axes {
@@ -87,7 +87,7 @@ impl<'a> View<'a> {
 
     /// The values of `quantity` over `rows`, some of the rows, as runs of equal values; `None` if the table has no such axis.
     pub fn runs(&self, quantity: Quantity, rows: Range<u64>) -> Option<Runs> {
-        let stretches = self.projection.stretches();
+        let stretches = self.row_index.stretches();
         if !stretches.iter().all(|stretch| stretch.tells(quantity)) {
             return None;
         }
@@ -128,7 +128,7 @@ impl<'a> View<'a> {
     /// The words of the label `name` over `rows`, some of the rows, each with the number of rows in a row that have it; `None` where rows
     /// have none.
     pub fn label(&self, name: &str, rows: Range<u64>) -> Vec<(Option<&'a str>, usize)> {
-        let labels: Vec<_> = self.projection.stretches().iter().map(|stretch| stretch.label(name)).collect();
+        let labels: Vec<_> = self.row_index.stretches().iter().map(|stretch| stretch.label(name)).collect();
         let runs = self.runs_of(rows, |stretch, raw| match labels[stretch] {
             Some((digit, label)) => (label.word(digit.step(raw)), digit.next(raw)),
             None => (None, u64::MAX),

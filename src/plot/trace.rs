@@ -32,7 +32,7 @@ const UNIT_OF_BOUND: &str = "v_0";
 
 /// A trace read back.
 #[derive(Debug, Clone)]
-pub struct Course {
+pub struct TraceFile {
     /// What it is called in a legend, in markup.
     pub name: String,
     /// Its parameters, by name.
@@ -55,7 +55,7 @@ pub struct Column {
 }
 
 /// Reads a trace that `slipsweep trace` wrote as CSV or Parquet.
-pub fn read(path: &Path) -> Result<Course, PlotError> {
+pub fn read(path: &Path) -> Result<TraceFile, PlotError> {
     let shown = path.display().to_string();
     let stem = path.file_stem().map_or_else(|| shown.clone(), |stem| stem.to_string_lossy().into_owned());
     let is_csv = path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("csv"));
@@ -72,7 +72,7 @@ pub fn read(path: &Path) -> Result<Course, PlotError> {
         .filter_map(number);
     let name = label::literal(&fact("protocol").map_or(stem, Clone::clone));
     let points = fact("points").and_then(|points| points.parse().ok());
-    Ok(Course { name, parameters: parameters.collect(), columns, points })
+    Ok(TraceFile { name, parameters: parameters.collect(), columns, points })
 }
 
 fn parquet(path: &Path) -> Result<(Vec<Column>, Facts), PlotError> {
@@ -138,7 +138,7 @@ fn unit(name: &str) -> &'static str {
     }
 }
 
-impl Course {
+impl TraceFile {
     fn column(&self, name: &str) -> Option<&Column> {
         self.columns.iter().find(|column| column.name == name)
     }
@@ -156,62 +156,62 @@ impl Course {
 
 /// A curve of a panel: the number of its trace, that of its column, and its points.
 struct Curve {
-    course: usize,
+    trace: usize,
     rank: usize,
     points: Vec<(f64, f64)>,
 }
 
 /// The figure of traces: a panel for each column that any of them has.
-pub fn figure(courses: &[Course]) -> Result<Figure, PlotError> {
-    if courses.len() > MAX_SERIES {
-        return Err(PlotError::TooManyTraces { found: courses.len(), most: MAX_SERIES });
+pub fn figure(traces: &[TraceFile]) -> Result<Figure, PlotError> {
+    if traces.len() > MAX_SERIES {
+        return Err(PlotError::TooManyTraces { found: traces.len(), most: MAX_SERIES });
     }
-    one_unit(courses)?;
-    let time = Scale { log: false, ..Scale::of(cells(courses, "t")).ok_or(PlotError::Nothing)? };
-    let axis = |names: &[&str], scale| Axis { column: names.join(", "), unit: unit_in(courses, names[0]), scale };
+    one_unit(traces)?;
+    let time = Scale { log: false, ..Scale::of(cells(traces, "t")).ok_or(PlotError::Nothing)? };
+    let axis = |names: &[&str], scale| Axis { column: names.join(", "), unit: unit_in(traces, names[0]), scale };
     let mut panels = Vec::new();
     for names in SHOWN {
-        let has = |name: &&str| courses.iter().any(|course| course.column(name).is_some());
+        let has = |name: &&str| traces.iter().any(|trace| trace.column(name).is_some());
         let names: Vec<&str> = names.iter().copied().filter(has).collect();
-        let Some(scale) = Scale::of(names.iter().flat_map(|name| cells(courses, name))) else { continue };
+        let Some(scale) = Scale::of(names.iter().flat_map(|name| cells(traces, name))) else { continue };
         let (x, y) = (axis(&["t"], time.with_room(0.03)), axis(&names, scale.with_room(0.06)));
         let bound = Layer::Level(1.0, Stroke { colour: "#888".to_owned(), width: 0.5, dashes: &[1.0, 1.5] });
         let has_bound = names[0] == "v" && (0.0..2.0).contains(&scale.low) && y.unit == UNIT_OF_BOUND;
         let layers = has_bound.then_some(bound).into_iter().collect();
-        let of_course = |(course, of): (usize, &Course)| {
+        let of_course = |(trace, of): (usize, &TraceFile)| {
             let points = names.iter().enumerate().map(|(rank, name)| (rank, of.points(name)));
-            points.filter_map(|(rank, points)| Some(Curve { course, rank, points: points? })).collect::<Vec<_>>()
+            points.filter_map(|(rank, points)| Some(Curve { trace, rank, points: points? })).collect::<Vec<_>>()
         };
-        let curves: Vec<Curve> = courses.iter().enumerate().flat_map(of_course).collect();
+        let curves: Vec<Curve> = traces.iter().enumerate().flat_map(of_course).collect();
         panels.push((Panel { title: String::new(), x, y, layers }, curves));
     }
-    let leaders = leaders(courses.len(), &panels);
-    let common = common(courses);
-    let title = match courses {
+    let leaders = leaders(traces.len(), &panels);
+    let common = common(traces);
+    let title = match traces {
         [one] => format!("Protocol {}", one.name),
         _ => "Protocols".to_owned(),
     };
-    let subtitle = equations(&common, &unit_in(courses, "t"));
-    let legend = legend(courses, &leaders, &common);
-    let panels = panels.into_iter().map(|(panel, curves)| draw(panel, curves, courses, &leaders)).collect();
+    let subtitle = equations(&common, &unit_in(traces, "t"));
+    let legend = legend(traces, &leaders, &common);
+    let panels = panels.into_iter().map(|(panel, curves)| draw(panel, curves, traces, &leaders)).collect();
     Ok(Figure { title, subtitle, panels, columns: 1, aspect: ASPECT, legend, ..Figure::default() })
 }
 
 /// The cells of a column in all courses.
-fn cells(courses: &[Course], name: &str) -> impl Iterator<Item = f64> {
-    courses.iter().filter_map(|course| course.column(name)).flat_map(|column| column.cells.iter().copied())
+fn cells(traces: &[TraceFile], name: &str) -> impl Iterator<Item = f64> {
+    traces.iter().filter_map(|trace| trace.column(name)).flat_map(|column| column.cells.iter().copied())
 }
 
 /// The unit of a column, which is the same in all courses.
-fn unit_in(courses: &[Course], name: &str) -> String {
-    courses.iter().find_map(|course| Some(course.column(name)?.unit.clone())).unwrap_or_default()
+fn unit_in(traces: &[TraceFile], name: &str) -> String {
+    traces.iter().find_map(|trace| Some(trace.column(name)?.unit.clone())).unwrap_or_default()
 }
 
 /// That the courses agree on the units of what is shown.
-fn one_unit(courses: &[Course]) -> Result<(), PlotError> {
+fn one_unit(traces: &[TraceFile]) -> Result<(), PlotError> {
     for name in SHOWN.into_iter().flatten().chain(&["t"]) {
-        let first = unit_in(courses, name);
-        let mut units = courses.iter().filter_map(|course| Some(course.column(name)?.unit.as_str()));
+        let first = unit_in(traces, name);
+        let mut units = traces.iter().filter_map(|trace| Some(trace.column(name)?.unit.as_str()));
         if let Some(other) = units.find(|unit| *unit != first) {
             let units = [first, other.to_owned()];
             return Err(PlotError::Units { column: (*name).to_owned(), units });
@@ -223,9 +223,9 @@ fn one_unit(courses: &[Course]) -> Result<(), PlotError> {
 /// For each course the first one that it lies on in all panels.
 fn leaders(count: usize, panels: &[(Panel, Vec<Curve>)]) -> Vec<usize> {
     // The curves of a course in fractions of the panel, each with its column.
-    let curves = |(panel, curves): &(Panel, Vec<Curve>), course: usize| -> Vec<(usize, Vec<(f64, f64)>)> {
+    let curves = |(panel, curves): &(Panel, Vec<Curve>), trace: usize| -> Vec<(usize, Vec<(f64, f64)>)> {
         let share = |(x, y): &(f64, f64)| (panel.x.scale.share(*x), panel.y.scale.share(*y));
-        let own = curves.iter().filter(|curve| curve.course == course);
+        let own = curves.iter().filter(|curve| curve.trace == trace);
         own.map(|curve| (curve.rank, curve.points.iter().map(share).collect())).collect()
     };
     coincide::leaders(count, |one, other| {
@@ -240,20 +240,20 @@ fn leaders(count: usize, panels: &[(Panel, Vec<Curve>)]) -> Vec<usize> {
 }
 
 /// The panel with the curves of the courses that lead.
-fn draw(mut panel: Panel, curves: Vec<Curve>, courses: &[Course], leaders: &[usize]) -> Panel {
-    for Curve { course, rank, points } in curves.into_iter().filter(|curve| leaders[curve.course] == curve.course) {
-        let stroke = if rank == 0 { colour::series(course) } else { control(course) };
+fn draw(mut panel: Panel, curves: Vec<Curve>, traces: &[TraceFile], leaders: &[usize]) -> Panel {
+    for Curve { trace, rank, points } in curves.into_iter().filter(|curve| leaders[curve.trace] == curve.trace) {
+        let stroke = if rank == 0 { colour::series(trace) } else { control(trace) };
         panel.layers.push(Layer::Line(points.clone(), stroke));
-        if courses[course].is_marked() && rank == 0 {
-            panel.layers.push(Layer::Marks(points.into_iter().map(|at| (at, Symbol::of_series(course))).collect()));
+        if traces[trace].is_marked() && rank == 0 {
+            panel.layers.push(Layer::Marks(points.into_iter().map(|at| (at, Symbol::of_series(trace))).collect()));
         }
     }
     panel
 }
 
 /// The parameters that all courses with parameters have in common: they are said once.
-fn common(courses: &[Course]) -> Vec<&(String, f64)> {
-    let mut known = courses.iter().map(|course| &course.parameters).filter(|parameters| !parameters.is_empty());
+fn common(traces: &[TraceFile]) -> Vec<&(String, f64)> {
+    let mut known = traces.iter().map(|trace| &trace.parameters).filter(|parameters| !parameters.is_empty());
     let first = known.next().into_iter().flatten();
     let others: Vec<_> = known.collect();
     first.filter(|entry| others.iter().all(|parameters| parameters.contains(entry))).collect()
@@ -266,18 +266,18 @@ fn equations(parameters: &[&(String, f64)], time: &str) -> String {
 }
 
 /// What tells courses apart, and which line is the control.
-fn legend(courses: &[Course], leaders: &[usize], common: &[&(String, f64)]) -> Vec<Entry> {
-    let name = |course: &Course| {
-        let own: Vec<_> = course.parameters.iter().filter(|entry| !common.contains(entry)).collect();
-        let name = course.name.clone();
-        if own.is_empty() { name } else { format!("{name}, {}", equations(&own, &unit_in(courses, "t"))) }
+fn legend(traces: &[TraceFile], leaders: &[usize], common: &[&(String, f64)]) -> Vec<Entry> {
+    let name = |trace: &TraceFile| {
+        let own: Vec<_> = trace.parameters.iter().filter(|entry| !common.contains(entry)).collect();
+        let name = trace.name.clone();
+        if own.is_empty() { name } else { format!("{name}, {}", equations(&own, &unit_in(traces, "t"))) }
     };
-    let names: Vec<String> = courses.iter().map(name).collect();
-    let mut legend = Entry::of_series(&names, leaders, |place| Key::series(place, courses[place].is_marked()));
-    if courses.iter().any(|course| course.column("v_c").is_some()) {
+    let names: Vec<String> = traces.iter().map(name).collect();
+    let mut legend = Entry::of_series(&names, leaders, |place| Key::series(place, traces[place].is_marked()));
+    if traces.iter().any(|trace| trace.column("v_c").is_some()) {
         let (v, v_c) = (label::name("v"), label::name("v_c"));
         let thin = Key::Line(control(0));
-        if courses.len() == 1 {
+        if traces.len() == 1 {
             legend.push(Entry { key: Key::series(0, false), text: v });
             legend.push(Entry { key: thin, text: v_c });
         } else {

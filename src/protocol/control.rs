@@ -8,7 +8,7 @@ use crate::numerics::elementary::ln;
 
 /// A block on a spring under friction.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Slider {
+pub struct SpringBlock {
     /// The friction law.
     pub law: Law,
     /// Stiffness of the spring, `k > 0`; infinite for a rigid one.
@@ -28,7 +28,7 @@ pub struct Jet {
     pub rate: f64,
 }
 
-impl Slider {
+impl SpringBlock {
     /// Friction.
     pub fn friction(&self, jet: &Jet) -> f64 {
         1.0 + self.law.a * ln(jet.v[0]) + self.law.b * ln(jet.theta)

@@ -7,7 +7,7 @@ use crate::model::{Law, Transition};
 use crate::numerics::elementary::ln;
 use crate::protocol::optimal::{self, Optimum};
 use crate::protocol::shortcut::{Case, Family, Shortcut};
-use crate::protocol::{Effort, Solved, Status};
+use crate::protocol::{Solved, SolverStats, Status};
 
 /// The accuracy of the second solve, the finest that solvers tell from rounding.
 pub const FINEST: f64 = 1e-15;
@@ -43,11 +43,11 @@ pub fn of_excess(found: f64, finest: f64, replaced: f64) -> f64 {
 /// is no finer one.
 ///
 /// A work that is a small difference is as sensitive to `t_f` as `dW*/dt_f` says, so that rounding of times counts.
-pub fn of_optimum(transition: &Transition, t_f: f64, bounded: bool, optimum: &Optimum) -> (Option<f64>, Effort) {
-    let Solved { status, value, effort } = optimal::solve(transition, t_f, bounded, FINEST);
+pub fn of_optimum(transition: &Transition, t_f: f64, bounded: bool, optimum: &Optimum) -> (Option<f64>, SolverStats) {
+    let Solved { status, value, stats } = optimal::solve(transition, t_f, bounded, FINEST);
     let finest = value.filter(|_| status != Status::NotConverged);
     let scale = optimum.work.abs() + 0.25 * (optimum.hamiltonian * t_f).abs();
-    (finest.map(|finest| bound(optimum.work, finest.work, scale)), effort)
+    (finest.map(|finest| bound(optimum.work, finest.work, scale)), stats)
 }
 
 /// Bound of the error of the work of a `member` of a family, found with the same case; `None` where there is no finer
@@ -56,8 +56,8 @@ pub fn of_optimum(transition: &Transition, t_f: f64, bounded: bool, optimum: &Op
 /// A third one, given a little more time, tells what rounding of the time makes of a member that has hardly any to
 /// spare. Where friction is bounded, theta and `v` are powers `e^((tau - 1)/a)`, whose exponent is rounded; the factor by which
 /// velocities far apart raise that was measured.
-pub fn of_member(family: &dyn Family, case: &Case, member: &Shortcut, effort: &mut Effort) -> Option<f64> {
-    let finest = family.solve(case, FINEST, effort).ok()?;
+pub fn of_member(family: &dyn Family, case: &Case, member: &Shortcut, stats: &mut SolverStats) -> Option<f64> {
+    let finest = family.solve(case, FINEST, stats).ok()?;
     let Transition { law: Law { a, b }, v_i, v_f } = case.transition;
     let (exponent, delay) = if family.heeds_tau_ceiling() {
         (0.05 * (0.25 * ln(v_f / v_i)).powi(4).max(1.0) * (case.tau_ceiling.abs() + b) / a, 1.5 * ROUNDING)
@@ -65,7 +65,7 @@ pub fn of_member(family: &dyn Family, case: &Case, member: &Shortcut, effort: &m
         (0.0, 0.5 * ROUNDING)
     };
     let later = Case { t_f: case.t_f * (1.0 + delay), ..*case };
-    let late = (family.solve(&later, FINEST, effort).ok()?.work - finest.work).abs();
+    let late = (family.solve(&later, FINEST, stats).ok()?.work - finest.work).abs();
     Some(late + bound(member.work, finest.work, (1.0 + exponent) * member.work))
 }
 

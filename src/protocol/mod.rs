@@ -12,6 +12,6 @@ mod profile;
 pub mod regularised;
 pub mod shortcut;
 
-pub use control::{Jet, Slider};
+pub use control::{Jet, SpringBlock};
 pub use motion::{Moment, Motion};
-pub use outcome::{Effort, Solved, Status};
+pub use outcome::{Solved, SolverStats, Status};

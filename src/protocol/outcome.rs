@@ -69,15 +69,15 @@ impl Status {
 
 /// Work spent on a solve; exact and the same on every machine.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub struct Effort {
+pub struct SolverStats {
     /// Quadratures evaluated.
     pub quadratures: u32,
     /// Quadrature nodes evaluated, all quadratures together.
     pub nodes: u32,
 }
 
-impl std::ops::AddAssign for Effort {
-    fn add_assign(&mut self, other: Effort) {
+impl std::ops::AddAssign for SolverStats {
+    fn add_assign(&mut self, other: SolverStats) {
         self.quadratures = self.quadratures.saturating_add(other.quadratures);
         self.nodes = self.nodes.saturating_add(other.nodes);
     }
@@ -91,5 +91,5 @@ pub struct Solved<T> {
     /// The numbers; `None` wherever the status is `Infeasible` or `NotConverged`.
     pub value: Option<T>,
     /// Work spent.
-    pub effort: Effort,
+    pub stats: SolverStats,
 }

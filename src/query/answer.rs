@@ -21,9 +21,9 @@ use polars_io::SerWriter;
 use polars_io::prelude::CsvWriter;
 use rayon::prelude::*;
 
-use super::pieces::{Key, PARTS, Pieces};
 use super::plan;
 use super::scan::{Files, append};
+use super::streaming::{Key, PARTS, Pieces};
 use crate::dataset::{Cell, field, guarded, label};
 
 /// Rows that are handed over at a time. Chosen: few enough that a reader sees the first ones soon.
@@ -37,7 +37,7 @@ pub struct Answer {
     columns: Vec<String>,
     units: Vec<String>,
     frame: LazyFrame,
-    pieces: Option<(Files, Pieces)>,
+    streaming: Option<(Files, Pieces)>,
 }
 
 /// How an answer is written to a file.
@@ -80,14 +80,14 @@ impl From<ParquetError> for AnswerError {
 type Take<'a> = &'a mut dyn FnMut(&DataFrame) -> Result<(), AnswerError>;
 
 impl Answer {
-    /// The answer that `frame` will give, with `columns` in these `units`; or `pieces` of files.
+    /// The answer that `frame` will give, with `columns` in these `units`; or `streaming` of files.
     pub(super) fn new(
         frame: LazyFrame,
         columns: Vec<String>,
         units: Vec<String>,
-        pieces: Option<(Files, Pieces)>,
+        streaming: Option<(Files, Pieces)>,
     ) -> Answer {
-        Answer { columns, units, frame, pieces }
+        Answer { columns, units, frame, streaming }
     }
 
     /// The names of its columns.
@@ -158,10 +158,12 @@ impl Answer {
 
     /// Finds the answer on all threads and hands it over piece by piece, at least one even if there is no row.
     fn find(self, take: Take) -> Result<(), AnswerError> {
-        let Answer { frame, pieces, .. } = self;
-        match pieces {
-            Some((files, pieces)) if pieces.merge.is_none() && pieces.keys.is_empty() => stream(&files, &pieces, take),
-            Some((files, pieces)) => match guarded(|| combine(&files, &pieces)) {
+        let Answer { frame, streaming, .. } = self;
+        match streaming {
+            Some((files, streaming)) if streaming.merge.is_none() && streaming.keys.is_empty() => {
+                stream(&files, &streaming, take)
+            }
+            Some((files, streaming)) => match guarded(|| combine(&files, &streaming)) {
                 Some(Ok(found)) => hand(&found, take),
                 // What cannot be merged may be answered in one piece; if not, that error is the one to report.
                 _ => hand(&whole(frame)?, take),
@@ -198,12 +200,12 @@ fn at_once() -> usize {
 }
 
 /// What each of `files` gives, in their order.
-fn ask(files: &[Files], pieces: &Pieces) -> PolarsResult<Vec<DataFrame>> {
-    let answer = |files: &Files| match &pieces.groups {
+fn ask(files: &[Files], streaming: &Pieces) -> PolarsResult<Vec<DataFrame>> {
+    let answer = |files: &Files| match &streaming.groups {
         Some(groups) => files.groups(groups),
         None => {
-            let rows = files.clone().only(pieces.conditions.clone(), pieces.top.clone());
-            guarded(|| plan([(pieces.table.as_str(), rows.frame()?)], &pieces.partial)?.collect())
+            let rows = files.clone().only(streaming.conditions.clone(), streaming.top.clone());
+            guarded(|| plan([(streaming.table.as_str(), rows.frame()?)], &streaming.partial)?.collect())
                 .unwrap_or_else(|| Err(unsupported()))
         }
     };
@@ -211,12 +213,12 @@ fn ask(files: &[Files], pieces: &Pieces) -> PolarsResult<Vec<DataFrame>> {
 }
 
 /// Hands rows over as they are read.
-fn stream(files: &Files, pieces: &Pieces, take: Take) -> Result<(), AnswerError> {
-    let mut skip = pieces.offset;
-    let mut left = pieces.limit;
+fn stream(files: &Files, streaming: &Pieces, take: Take) -> Result<(), AnswerError> {
+    let mut skip = streaming.offset;
+    let mut left = streaming.limit;
     let mut first = true;
-    for wave in files.pieces().chunks(at_once()) {
-        for mut found in ask(wave, pieces)? {
+    for wave in files.streaming().chunks(at_once()) {
+        for mut found in ask(wave, streaming)? {
             let skipped = skip.min(found.height());
             skip -= skipped;
             found = found.slice(skipped as i64, left.unwrap_or(usize::MAX));
@@ -233,29 +235,30 @@ fn stream(files: &Files, pieces: &Pieces, take: Take) -> Result<(), AnswerError>
 }
 
 /// The answer, put together from those of pieces.
-fn combine(files: &Files, pieces: &Pieces) -> PolarsResult<DataFrame> {
-    let most = pieces.limit.map(|limit| limit.saturating_add(pieces.offset));
+fn combine(files: &Files, streaming: &Pieces) -> PolarsResult<DataFrame> {
+    let most = streaming.limit.map(|limit| limit.saturating_add(streaming.offset));
     let mut parts = DataFrame::default();
-    for wave in files.pieces().chunks(at_once()) {
-        for part in ask(wave, pieces)? {
-            let part = if pieces.merge.is_some() { part } else { ordered(part, &pieces.keys, 0, most)? };
+    for wave in files.streaming().chunks(at_once()) {
+        for part in ask(wave, streaming)? {
+            let part = if streaming.merge.is_some() { part } else { ordered(part, &streaming.keys, 0, most)? };
             append(&mut parts, part)?;
         }
         if parts.height() > MOST_PARTIAL {
-            parts = merged(parts, pieces, most)?;
+            parts = merged(parts, streaming, most)?;
         }
     }
-    parts = merged(parts, pieces, most)?;
-    if let Some(finish) = &pieces.finish {
+    parts = merged(parts, streaming, most)?;
+    if let Some(finish) = &streaming.finish {
         parts = plan([(PARTS, parts.lazy())], finish)?.collect()?;
     }
-    ordered(parts, &pieces.keys, pieces.offset, pieces.limit)?.select(pieces.names.iter().map(String::as_str))
+    ordered(parts, &streaming.keys, streaming.offset, streaming.limit)?
+        .select(streaming.names.iter().map(String::as_str))
 }
 
-fn merged(parts: DataFrame, pieces: &Pieces, most: Option<usize>) -> PolarsResult<DataFrame> {
-    match &pieces.merge {
+fn merged(parts: DataFrame, streaming: &Pieces, most: Option<usize>) -> PolarsResult<DataFrame> {
+    match &streaming.merge {
         Some(merge) => plan([(PARTS, parts.lazy())], merge)?.collect(),
-        None => ordered(parts, &pieces.keys, 0, most),
+        None => ordered(parts, &streaming.keys, 0, most),
     }
 }
 

@@ -1,16 +1,16 @@
 //! Questions to tables on disk, in SQL: the tables of a dataset, or a single file, as they lie in their folder.
 //!
-//! `question` checks a question and spells it as polars reads it; `pieces` splits it, where that can be done, so that memory holds what
+//! `question` checks a question and spells it as polars reads it; `streaming` splits it, where that can be done, so that memory holds what
 //! is kept and not the table; `scan` reads of the files what is needed, `filter` drops rows and `groups` counts them on the way, and `answer` writes what comes out. Nothing is read but the tables
 //! that were opened.
 
 mod answer;
 mod filter;
 mod groups;
-mod pieces;
 mod question;
 mod scan;
 mod source;
+mod streaming;
 mod walk;
 
 use std::path::Path;
@@ -125,9 +125,10 @@ impl Tables {
             known.map_or_else(String::new, |(_, unit)| unit.clone())
         };
         let units = columns.iter().map(unit).collect();
-        let pieces = pieces::pieces(&question.query, &self.sources).filter(|pieces| pieces.names == columns);
-        let pieces = pieces.and_then(|pieces| Some((self.find(&pieces.table)?.files.clone()?, pieces)));
-        Ok(Answer::new(frame, columns, units, pieces))
+        let streaming =
+            streaming::streaming(&question.query, &self.sources).filter(|streaming| streaming.names == columns);
+        let streaming = streaming.and_then(|streaming| Some((self.find(&streaming.table)?.files.clone()?, streaming)));
+        Ok(Answer::new(frame, columns, units, streaming))
     }
 
     fn parse(&self, sql: &str) -> Result<Question, QueryError> {

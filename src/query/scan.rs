@@ -94,7 +94,7 @@ impl Files {
     }
 
     /// Each file as a table of its own.
-    pub fn pieces(&self) -> Vec<Files> {
+    pub fn streaming(&self) -> Vec<Files> {
         self.paths.iter().map(|path| Files { paths: vec![path.clone()], ..self.clone() }).collect()
     }
 

@@ -13,7 +13,7 @@ use crate::model::Law;
 use crate::numerics::elementary::{exp, exp_m1, ln};
 use crate::numerics::stiff::{Accuracy, Integrator, Linearised, Points, System, radau_iia_9};
 use crate::protocol::compliant::Path;
-use crate::protocol::{Motion, Slider};
+use crate::protocol::{Motion, SpringBlock};
 use crate::stability::Followed;
 
 /// Samples of one simulation, at most. Chosen: each takes some steps, and a row shall not take minutes.
@@ -87,7 +87,7 @@ enum Control<'a> {
 
 /// The equations of motion.
 struct Driven<'a> {
-    slider: Slider,
+    slider: SpringBlock,
     t_f: f64,
     v_f: f64,
     control: Control<'a>,
@@ -143,7 +143,7 @@ fn distance(law: &Law, [x, y]: [f64; 2]) -> f64 {
 impl System<3> for Driven<'_> {
     fn linearise<const L: usize>(&self, points: &Points<3, L>) -> Linearised<3, L> {
         let mut at = Linearised { residual: [[0.0; L]; 3], mass: [[1.0; L]; 3], jacobian: [[[0.0; L]; 3]; 3] };
-        let Slider { law: Law { a, b }, k, m } = self.slider;
+        let SpringBlock { law: Law { a, b }, k, m } = self.slider;
         let [z, y, x] = &points.y;
         let [z_slope, y_slope, x_slope] = &points.slope;
         // Velocities times t_f.

@@ -57,7 +57,7 @@ mod tests {
     use super::*;
     use crate::model::Transition;
     use crate::stability::SteadySliding;
-    use crate::stability::step_response::{Orbit, Outcome, Slider, Step, Z};
+    use crate::stability::step_response::{Orbit, Outcome, ScaledBlock, Step, Z};
 
     type C = Complex<f64>;
 
@@ -108,7 +108,7 @@ mod tests {
     /// Change of `ln A` over a small cycle at the critical stiffness, divided by `(pi/2) A^2`; the contact lifetime has relaxed for some cycles.
     fn followed(law: Law, inertia: f64, z: f64) -> f64 {
         let Law { a, b } = law;
-        let slider = Slider { a, b, inertia, k: (b - a) * (1.0 + inertia / a) };
+        let slider = ScaledBlock { a, b, inertia, k: (b - a) * (1.0 + inertia / a) };
         let mut orbit = Orbit::new(&slider, [z, 0.0, 0.0], 1e-13);
         let mut budget = 100_000;
         let mut before = z;

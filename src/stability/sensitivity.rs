@@ -17,7 +17,7 @@ use nalgebra::{DMatrix, DVectorView, Matrix3};
 use crate::numerics::elementary::exp;
 use crate::numerics::radau::{NODES, Radau, radau};
 use crate::protocol::compliant::Path;
-use crate::protocol::{Jet, Slider};
+use crate::protocol::{Jet, SpringBlock};
 use crate::stability::Followed;
 
 /// Largest factor by which a small error of the state at the start has grown at the end, both measured by the Euclidean
@@ -94,7 +94,7 @@ fn decay(path: &Path, rule: &Radau) -> f64 {
 }
 
 /// A first step: what the rates at the start allow.
-fn first(slider: &Slider, jet: &Jet) -> f64 {
+fn first(slider: &SpringBlock, jet: &Jet) -> f64 {
     let v = jet.v[0];
     let swing = if slider.m > 0.0 { (slider.k / slider.m).sqrt().min(slider.law.a / slider.m / v) } else { 0.0 };
     1.0 / (swing + v * (1.0 + slider.k / slider.law.a) + 1.0 / jet.theta)
@@ -143,7 +143,7 @@ fn step(
 }
 
 /// The linearised flow.
-fn rates(slider: &Slider, jet: &Jet) -> Matrix3<f64> {
+fn rates(slider: &SpringBlock, jet: &Jet) -> Matrix3<f64> {
     let ratio = slider.law.b / slider.law.a;
     let v = jet.v[0];
     let pull = slider.k / slider.law.a * v;

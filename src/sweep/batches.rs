@@ -8,7 +8,7 @@ use arrow_schema::{ArrowError, SchemaRef};
 use super::check::{Request, Sweep};
 use super::plan::Plan;
 use crate::dataset::{Layout, ManifestTable, batch};
-use crate::table::{Optima, Sheet, Signal};
+use crate::table::{ColumnBuffer, OptimumCache, Signal};
 
 /// The batches of a table, each of which is computed, on all threads, when it is asked for.
 pub struct Batches<'a> {
@@ -16,7 +16,7 @@ pub struct Batches<'a> {
     request: &'a Request,
     table: ManifestTable,
     layout: Layout,
-    optima: Arc<Optima>,
+    optimum_cache: Arc<OptimumCache>,
     next: u64,
 }
 
@@ -25,14 +25,14 @@ impl Sweep {
     /// Parquet files that a run would write; `None` if the sweep does not ask for this table.
     pub fn batches(&self, table: &str) -> Option<Batches<'_>> {
         let plan = Plan::new(self);
-        let tables = self.requests.iter().zip(plan.tables).zip(self.optima());
-        let ((request, table), optima) = tables.into_iter().find(|((_, planned), _)| planned.name == table)?;
+        let tables = self.requests.iter().zip(plan.tables).zip(self.optimum_cache());
+        let ((request, table), optimum_cache) = tables.into_iter().find(|((_, planned), _)| planned.name == table)?;
         Some(Batches {
             sweep: self,
             request,
             table,
             layout: Layout::new(request.table, &request.selection, &self.grid),
-            optima,
+            optimum_cache,
             next: 0,
         })
     }
@@ -55,8 +55,8 @@ impl Iterator for Batches<'_> {
         let rows = self.table.rows_of(self.next);
         self.next += 1;
         let signal = Signal::default();
-        let job = self.sweep.job(self.request, &self.optima, &signal);
-        let mut sheet = Sheet::new(self.request.selection.indices().len());
+        let job = self.sweep.job(self.request, &self.optimum_cache, &signal);
+        let mut sheet = ColumnBuffer::new(self.request.selection.indices().len());
         sheet.resize((rows.end - rows.start) as usize);
         // Nobody else has the signal, so that nothing stops the computation.
         self.request.table.compute(&job, rows.clone(), &mut sheet).ok()?;

@@ -11,10 +11,10 @@ use super::read;
 use super::spec::{Spec, TableSpec};
 use super::units::{UNIT_KEYS, doubt, units};
 use crate::file;
-use crate::grid::{Block, Factor, Grid, Projection, Quantity, RTOL, TooMany};
+use crate::grid::{Block, Factor, Grid, Quantity, RTOL, RowIndex, TooMany};
 use crate::model::Units;
 use crate::names::nearest;
-use crate::table::{self, OPTIMUM_AXES, Optima, STATUS, Selection, Table};
+use crate::table::{self, OPTIMUM_AXES, OptimumCache, Projection, STATUS, Table};
 
 /// Bytes of a spec at most. Chosen: reading one takes about a hundred times as much memory, 400 MiB.
 const MAX_SPEC_BYTES: u64 = 1 << 22;
@@ -39,7 +39,7 @@ pub struct Sweep {
     /// The tables to write, in the order of the spec.
     pub requests: Vec<Request>,
     /// The rows that tell all optimal problems of the tables that need them; `None` if none does.
-    pub optimum_rows: Option<Projection>,
+    pub optimum_rows: Option<RowIndex>,
     /// What is legal and yet doubtful.
     pub warnings: Vec<SpecError>,
 }
@@ -49,15 +49,15 @@ pub struct Request {
     /// The table.
     pub table: &'static dyn Table,
     /// Its columns.
-    pub selection: Selection,
+    pub selection: Projection,
     /// Its accuracy.
     pub rtol: f64,
     /// The number of its rows.
     pub rows: u64,
     /// Its rows.
-    pub projection: Projection,
+    pub projection: RowIndex,
     /// Of a reduced table: the rows of the landscapes, those of one of its rows side by side.
-    pub members: Option<Projection>,
+    pub members: Option<RowIndex>,
     /// The hash of what its rows follow from, once it is computed.
     pub(super) hash: OnceLock<String>,
     /// What the values of each column are multiplied by to be in the units of the grid.
@@ -192,23 +192,23 @@ impl Sweep {
 
     /// How many different optimal problems the tables that need them have; 0 if none does.
     pub fn optimum_tuples(&self) -> u64 {
-        self.optimum_rows.as_ref().map_or(0, |rows| rows.distinct(OPTIMUM_AXES, Optima::MOST_KEPT))
+        self.optimum_rows.as_ref().map_or(0, |rows| rows.distinct(OPTIMUM_AXES, OptimumCache::MOST_KEPT))
     }
 
     /// An empty store of them for each table: one for all tables of the same accuracy, so that no table depends on that of another one.
-    pub fn optima(&self) -> Vec<Arc<Optima>> {
+    pub fn optimum_cache(&self) -> Vec<Arc<OptimumCache>> {
         let span = self.optimum_rows.as_ref().map_or(0, |rows| rows.tuples(OPTIMUM_AXES).span());
         let tuples = self.optimum_tuples();
-        let mut stores: Vec<(u64, Arc<Optima>)> = Vec::new();
+        let mut stores: Vec<(u64, Arc<OptimumCache>)> = Vec::new();
         let store = |request: &Request| {
             if !request.table.needs_optimum(&request.selection) {
-                return Arc::new(Optima::new(0, self.bounded, request.rtol));
+                return Arc::new(OptimumCache::new(0, self.bounded, request.rtol));
             }
             let key = request.rtol.to_bits();
             if let Some((_, store)) = stores.iter().find(|(known, _)| *known == key) {
                 return store.clone();
             }
-            let store = Arc::new(Optima::among(tuples, span, self.bounded, request.rtol));
+            let store = Arc::new(OptimumCache::among(tuples, span, self.bounded, request.rtol));
             stores.push((key, store.clone()));
             store
         };
@@ -276,7 +276,7 @@ struct Draft {
     written: &'static dyn Table,
     /// The table that is written: that one, or what `reduce` makes of it.
     table: &'static dyn Table,
-    selection: Selection,
+    selection: Projection,
     rtol: f64,
 }
 
@@ -362,7 +362,7 @@ fn reduced(table: &'static dyn Table, key: &str, reduce: Option<&str>) -> Result
 }
 
 /// The rows of `landscape` with those of each row of `reduced` side by side: its other axes are made the fastest.
-fn members(landscape: &dyn Table, reduced: &dyn Table, key: &str, grid: &Grid) -> Result<Projection, SpecError> {
+fn members(landscape: &dyn Table, reduced: &dyn Table, key: &str, grid: &Grid) -> Result<RowIndex, SpecError> {
     let wrong = |found: &str, help: &str| {
         let expected = "one grid, in which alpha_2 and alpha_3 are axes of their own that nothing else depends on";
         SpecError::new(format!("{key}.reduce"), found, expected, help)
@@ -398,10 +398,10 @@ fn members(landscape: &dyn Table, reduced: &dyn Table, key: &str, grid: &Grid) -
 }
 
 /// The columns of these names; the usual ones without any.
-fn selection(table: &dyn Table, key: &str, names: Option<&[String]>, faults: &mut Faults) -> Selection {
+fn selection(table: &dyn Table, key: &str, names: Option<&[String]>, faults: &mut Faults) -> Projection {
     let known: Vec<&str> = table.columns().iter().map(|column| column.name).collect();
     let Some(names) = names else {
-        return Selection::usual(table.columns());
+        return Projection::usual(table.columns());
     };
     let mut indices = Vec::new();
     for (place, name) in names.iter().enumerate() {
@@ -422,5 +422,5 @@ fn selection(table: &dyn Table, key: &str, names: Option<&[String]>, faults: &mu
         let help = "name columns, or remove `columns` to have the usual ones";
         faults.push(SpecError::new(key, "no column is asked for", expected, help));
     }
-    Selection::new(indices)
+    Projection::new(indices)
 }

@@ -19,10 +19,10 @@ use super::check::Sweep;
 use super::plan::Plan;
 use super::shard::{Shard, TooManyParts, holds};
 use crate::dataset::{
-    Company, DatasetError, Digest, Folder, Footer, Layout, Look, ManifestTable, Session, State, encode,
+    Company, DatasetError, Folder, Footer, Layout, Look, ManifestTable, Session, State, TableStatistics, encode,
 };
 use crate::grid::Quantity;
-use crate::table::{Job, Phase, Sheet, Signal, Stopped, Table, Work};
+use crate::table::{ColumnBuffer, Job, Phase, RunStats, Signal, Stopped, Table};
 
 /// What a run did.
 #[derive(Debug, Clone, PartialEq)]
@@ -30,9 +30,9 @@ pub struct Outcome {
     /// What it did for each table, in the order of the spec.
     pub tables: Vec<TableOutcome>,
     /// What the parts of each table contain, those that were kept and those that were made.
-    pub digests: Vec<Digest>,
+    pub digests: Vec<TableStatistics>,
     /// All work that was spent.
-    pub work: Work,
+    pub work: RunStats,
 }
 
 /// What a run did for one table.
@@ -140,7 +140,7 @@ fn run_in(
     let shares = shard.parts(sweep, &plan)?;
     let session = folder.open(&plan.manifest(sweep), company).map_err(|error| sweep.explain(error))?;
     let pool = pool(threads)?;
-    let optima = sweep.optima();
+    let optimum_cache = sweep.optimum_cache();
     let run = Run {
         folder,
         session: &session,
@@ -150,14 +150,14 @@ fn run_in(
         failures: Failures::default(),
     };
     let stages: Vec<Stage<'_>> = (sweep.requests.iter().zip(&plan.tables))
-        .zip(&optima)
-        .map(|((request, table), optima)| Stage {
+        .zip(&optimum_cache)
+        .map(|((request, table), optimum_cache)| Stage {
             run: &run,
             definition: request.table,
             table,
-            job: sweep.job(request, optima, signal),
+            job: sweep.job(request, optimum_cache, signal),
             layout: Layout::new(request.table, &request.selection, &sweep.grid),
-            digest: Mutex::default(),
+            statistics: Mutex::default(),
         })
         .collect();
 
@@ -168,7 +168,7 @@ fn run_in(
 
     // The others are solved by the pool, encoded, and published by the writers.
     signal.enter(Phase::Computing);
-    let mut outcome = Outcome { tables: Vec::new(), digests: Vec::new(), work: Work::default() };
+    let mut outcome = Outcome { tables: Vec::new(), digests: Vec::new(), work: RunStats::default() };
     thread::scope(|scope| {
         let (to_disk, parts) = sync_channel(1);
         run.start_writers(scope, parts)?;
@@ -180,7 +180,7 @@ fn run_in(
         signal.enter(Phase::Writing);
         Ok::<(), RunError>(())
     })?;
-    outcome.digests = stages.into_iter().map(|stage| content(stage.digest)).collect();
+    outcome.digests = stages.into_iter().map(|stage| content(stage.statistics)).collect();
     run.failures.into_result(&plan, || session.check())?;
     Ok(outcome)
 }
@@ -215,15 +215,15 @@ pub fn compute(
     parts: &ManifestTable,
     numbers: impl Iterator<Item = u64>,
     take: impl Fn(u64, Result<Filled, Defect>) + Sync,
-) -> Result<Work, Stopped> {
+) -> Result<RunStats, Stopped> {
     let (give_back, free) = channel();
     let columns = job.selection.indices().len();
     let size = parts.rows_per_part.min(parts.rows).saturating_mul(8 * columns as u64 + 1);
     let sheets = (pool.current_num_threads() as u64 + 1 + AHEAD as u64).min((MAX_SHEET_BYTES / size.max(1)).max(2));
     for _ in 0..sheets {
-        let _ = give_back.send(Sheet::new(columns));
+        let _ = give_back.send(ColumnBuffer::new(columns));
     }
-    let result = Mutex::new(Ok(Work::default()));
+    let result = Mutex::new(Ok(RunStats::default()));
     pool.in_place_scope(|scope| {
         for number in numbers {
             // Never fails: every sheet is given back.
@@ -240,7 +240,7 @@ pub fn compute(
                     }),
                     Err(message) => {
                         take(number, Err(culprit(table, job, rows, message)));
-                        Ok(Work::default())
+                        Ok(RunStats::default())
                     }
                 };
                 let mut result = locked(result);
@@ -256,8 +256,8 @@ fn attempt(
     table: &dyn Table,
     job: &Job<'_>,
     rows: Range<u64>,
-    sheet: &mut Sheet,
-) -> Result<Result<Work, Stopped>, String> {
+    sheet: &mut ColumnBuffer,
+) -> Result<Result<RunStats, Stopped>, String> {
     sheet.resize((rows.end - rows.start) as usize);
     // What a panic leaves half done is the sheet, which is filled anew, and solves that were not stored.
     catch_unwind(AssertUnwindSafe(|| table.compute(job, rows, sheet))).map_err(|payload| {
@@ -268,7 +268,7 @@ fn attempt(
 
 /// The row among `rows`, which panicked with `message`, that is to blame: found by halves, since any rows can be computed on their own.
 fn culprit(table: &dyn Table, job: &Job<'_>, mut rows: Range<u64>, mut message: String) -> Defect {
-    let mut sheet = Sheet::new(job.selection.indices().len());
+    let mut sheet = ColumnBuffer::new(job.selection.indices().len());
     while rows.end - rows.start > 1 {
         let middle = rows.start + (rows.end - rows.start) / 2;
         let halves = [rows.start..middle, middle..rows.end];
@@ -326,7 +326,7 @@ struct Stage<'a> {
     job: Job<'a>,
     layout: Layout,
     /// What the parts contain that are kept or made by now.
-    digest: Mutex<Digest>,
+    statistics: Mutex<TableStatistics>,
 }
 
 impl<'a> Stage<'a> {
@@ -348,7 +348,7 @@ impl<'a> Stage<'a> {
         share: &[Range<u64>],
         sound: &[u64],
         to_disk: &SyncSender<Part<'a>>,
-    ) -> Result<(TableOutcome, Work), RunError> {
+    ) -> Result<(TableOutcome, RunStats), RunError> {
         let Run { pool, signal, failures, .. } = self.run;
         let mut done = TableOutcome { kept: sound.len() as u64, ..TableOutcome::default() };
         let missing = share.iter().cloned().flatten().filter(|number| sound.binary_search(number).is_err());
@@ -388,7 +388,7 @@ impl<'a> Stage<'a> {
         let Run { queued, failures, .. } = self.run;
         let take = |parts: usize| (parts < AHEAD).then_some(parts + 1);
         let content = if queued.fetch_update(Ordering::Relaxed, Ordering::Relaxed, take).is_ok() {
-            Content::Sheet(sheet)
+            Content::ColumnBuffer(sheet)
         } else {
             match self.encode(number, &sheet) {
                 Ok(bytes) => {
@@ -406,10 +406,10 @@ impl<'a> Stage<'a> {
     fn look(&self, number: u64) -> Result<Found, RunError> {
         let Run { folder, session, signal, .. } = self.run;
         match folder.state(&session.manifest, &self.table.name, number, Look::Whole) {
-            State::There { digest } => {
+            State::There { statistics } => {
                 let rows = self.table.rows_of(number);
                 signal.keep(rows.end - rows.start);
-                self.count(*digest);
+                self.count(*statistics);
                 Ok(Found::Sound)
             }
             State::Missing => Ok(Found::Nothing),
@@ -422,18 +422,18 @@ impl<'a> Stage<'a> {
     }
 
     /// Adds what a part contains.
-    fn count(&self, part: Digest) {
-        let mut digest = locked(&self.digest);
-        *digest = std::mem::take(&mut *digest).merge(part);
+    fn count(&self, part: TableStatistics) {
+        let mut statistics = locked(&self.statistics);
+        *statistics = std::mem::take(&mut *statistics).merge(part);
     }
 
     /// The bytes of a part, which is counted.
-    fn encode(&self, number: u64, sheet: &Sheet) -> Result<Vec<u8>, RunError> {
+    fn encode(&self, number: u64, sheet: &ColumnBuffer) -> Result<Vec<u8>, RunError> {
         let (Run { folder, session, .. }, name) = (self.run, &self.table.name);
         let footer = Footer::new(&session.manifest, name, self.table.rows_of(number));
-        let (bytes, digest) = encode(&self.layout, self.job.rows, sheet, &footer)
+        let (bytes, statistics) = encode(&self.layout, self.job.rows, sheet, &footer)
             .map_err(|source| DatasetError::encode(folder, name, number, source))?;
-        self.count(digest);
+        self.count(statistics);
         Ok(bytes)
     }
 }
@@ -462,7 +462,7 @@ impl Part<'_> {
         stage.run.signal.check()?;
         let bytes = match content {
             Content::Bytes(bytes) => bytes,
-            Content::Sheet(sheet) => stage.encode(number, &sheet)?,
+            Content::ColumnBuffer(sheet) => stage.encode(number, &sheet)?,
         };
         Ok(stage.run.session.write_part(&stage.table.name, number, &bytes)?)
     }
@@ -470,20 +470,20 @@ impl Part<'_> {
 
 /// What is there of a part.
 enum Content {
-    Sheet(Filled),
+    ColumnBuffer(Filled),
     Bytes(Vec<u8>),
 }
 
 /// The cells of a part. They go back to where the next part is computed once they are dropped.
 pub struct Filled {
-    sheet: Sheet,
-    give_back: Sender<Sheet>,
+    sheet: ColumnBuffer,
+    give_back: Sender<ColumnBuffer>,
 }
 
 impl Deref for Filled {
-    type Target = Sheet;
+    type Target = ColumnBuffer;
 
-    fn deref(&self) -> &Sheet {
+    fn deref(&self) -> &ColumnBuffer {
         &self.sheet
     }
 }
@@ -491,7 +491,7 @@ impl Deref for Filled {
 impl Drop for Filled {
     fn drop(&mut self) {
         // Nobody waits for it once all parts are computed.
-        let _ = self.give_back.send(std::mem::replace(&mut self.sheet, Sheet::new(0)));
+        let _ = self.give_back.send(std::mem::replace(&mut self.sheet, ColumnBuffer::new(0)));
     }
 }
 

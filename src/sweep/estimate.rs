@@ -13,7 +13,7 @@ use super::engine::{RunError, WRITERS, pool};
 use super::plan::Plan;
 use crate::dataset::{DatasetError, Footer, Layout, Manifest, atomic, encode};
 use crate::grid::Point;
-use crate::table::{Job, Optima, Sheet, Signal};
+use crate::table::{ColumnBuffer, Job, OptimumCache, Signal};
 
 /// Time that the samples of a sweep may take together: `plan` is to answer within a second or two.
 const BUDGET: Duration = Duration::from_millis(1500);
@@ -87,7 +87,7 @@ pub fn estimate(sweep: &Sweep, folder: &Path) -> Result<Estimates, RunError> {
     let shares = sweep.requests.len() as u32 + u32::from(plan.optima > 0);
     let budget = BUDGET.as_secs_f64() / f64::from(shares);
     let optimum = sampler.optimum(budget);
-    let optima = sweep.optima();
+    let optima = sweep.optimum_cache();
     let tables =
         sweep.requests.iter().zip(&optima).map(|(request, optima)| sampler.table(request, optima, optimum, budget));
     let tables: Vec<Estimate> = tables.collect::<Result<_, _>>()?;
@@ -109,7 +109,7 @@ pub fn sizes(sweep: &Sweep) -> Result<Vec<f64>, RunError> {
     let (plan, pool) = (Plan::new(sweep), pool(0)?);
     let sampler = Sampler { sweep, plan: &plan, manifest: plan.manifest(sweep), pool: &pool };
     let budget = 0.2 * BUDGET.as_secs_f64() / sweep.requests.len() as f64;
-    let optima = sweep.optima();
+    let optima = sweep.optimum_cache();
     let tables =
         sweep.requests.iter().zip(&optima).map(|(request, optima)| sampler.table(request, optima, 0.0, budget));
     tables.map(|table| table.map(|table| table.bytes)).collect()
@@ -163,7 +163,7 @@ struct Sampler<'a> {
 
 impl Sampler<'_> {
     /// What a table costs, if a shared optimal protocol costs `optimum`, from samples that take about `budget`.
-    fn table(&self, request: &Request, optima: &Optima, optimum: f64, budget: f64) -> Result<Estimate, RunError> {
+    fn table(&self, request: &Request, optima: &OptimumCache, optimum: f64, budget: f64) -> Result<Estimate, RunError> {
         let signal = Signal::default();
         let job = self.sweep.job(request, optima, &signal);
         let sample = |length, places, limit| self.mean(request, &job, optimum, (length, places, limit));
@@ -222,7 +222,7 @@ impl Sampler<'_> {
         let layout = Layout::new(request.table, &request.selection, &self.sweep.grid);
         let compute = |rows: Range<u64>| -> Result<Sample, RunError> {
             let start = Instant::now();
-            let mut sheet = Sheet::new(request.selection.indices().len());
+            let mut sheet = ColumnBuffer::new(request.selection.indices().len());
             sheet.resize((rows.end - rows.start) as usize);
             let work = request.table.compute(job, rows.clone(), &mut sheet)?;
             let footer = Footer::new(&self.manifest, request.table.name(), rows.clone());
@@ -243,11 +243,12 @@ impl Sampler<'_> {
 
     /// Seconds of one thread for an optimal protocol that tables share; 0 if there is none.
     fn optimum(&self, budget: f64) -> f64 {
-        let Some(rows) = self.sweep.optimum_rows.as_ref().filter(|_| self.plan.optima <= Optima::MOST_KEPT) else {
+        let Some(rows) = self.sweep.optimum_rows.as_ref().filter(|_| self.plan.optima <= OptimumCache::MOST_KEPT)
+        else {
             return 0.0;
         };
         // A store without room: each is solved however often it was met.
-        let optima = Optima::new(u64::MAX, self.sweep.bounded, self.sweep.optimum_rtol());
+        let optima = OptimumCache::new(u64::MAX, self.sweep.bounded, self.sweep.optimum_rtol());
         let (began, mut places) = (Instant::now(), rows.rows().min(PLACES));
         loop {
             let starts = (0..places).map(|place| place_of(rows.rows(), place, 1).start);

@@ -2,7 +2,7 @@
 
 use super::check::{Request, Sweep};
 use crate::dataset::{Build, Manifest, ManifestTable};
-use crate::table::{Job, OPTIMUM_AXES, Optima, Repeats, Signal};
+use crate::table::{Job, OPTIMUM_AXES, OptimumCache, RepeatedRows, Signal};
 
 /// What a sweep consists of.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -46,18 +46,18 @@ impl Plan {
 
 impl Sweep {
     /// The job of one of its tables.
-    pub fn job<'a>(&'a self, request: &'a Request, optima: &'a Optima, signal: &'a Signal) -> Job<'a> {
+    pub fn job<'a>(&'a self, request: &'a Request, optimum_cache: &'a OptimumCache, signal: &'a Signal) -> Job<'a> {
         Job {
             grid: &self.grid,
             rows: &request.projection,
             tuples: request.projection.tuples(OPTIMUM_AXES),
-            repeats: Repeats::among(&request.projection, request.table.axes()),
+            repeated_rows: RepeatedRows::among(&request.projection, request.table.axes()),
             members: request.members.as_ref(),
             selection: &request.selection,
             sizes: &request.sizes,
             bounded: self.bounded,
             rtol: request.rtol,
-            optima,
+            optimum_cache,
             signal,
         }
     }

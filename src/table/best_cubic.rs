@@ -2,10 +2,10 @@
 
 use std::ops::Range;
 
-use super::optima::{OPTIMUM_AXES, transition};
-use super::{Column, Definition, Field, Job, Kind, Sheet, Stopped, Work, columns, place, rows};
+use super::optimum_cache::{OPTIMUM_AXES, transition};
+use super::{Column, ColumnBuffer, Definition, Field, Job, Kind, RunStats, Stopped, columns, place, rows};
 use crate::grid::{Quantity, Scale};
-use crate::protocol::{Effort, best_cubic, error};
+use crate::protocol::{SolverStats, best_cubic, error};
 
 /// A row.
 struct Row {
@@ -65,17 +65,17 @@ pub static BEST_CUBIC: Definition = Definition {
     compute,
 };
 
-fn compute(job: &Job<'_>, range: Range<u64>, sheet: &mut Sheet) -> Result<Work, Stopped> {
+fn compute(job: &Job<'_>, range: Range<u64>, column_buffer: &mut ColumnBuffer) -> Result<RunStats, Stopped> {
     let natural = |quantity| job.grid.scale(quantity) == Some(Scale::Model);
     let (natural_2, natural_3) = (natural(Quantity::Alpha2), natural(Quantity::Alpha3));
-    rows::each(job, range, 1, sheet, &FIELDS, |_, point| {
+    rows::each(job, range, 1, column_buffer, &FIELDS, |_, point| {
         let t_f = point[Quantity::Time];
         let solve = |rtol| best_cubic::solve(&transition(point), t_f, job.bounded, rtol);
         let solved = solve(job.rtol);
-        let mut effort = solved.effort;
+        let mut stats = solved.stats;
         let row = solved.value.map(|best| {
             let finest = job.selection.has(WORK_ERROR).then(|| solve(error::FINEST));
-            effort += finest.map_or_else(Effort::default, |finest| finest.effort);
+            stats += finest.map_or_else(SolverStats::default, |finest| finest.stats);
             let finest = finest.and_then(|finest| finest.value);
             Row {
                 best,
@@ -84,6 +84,6 @@ fn compute(job: &Job<'_>, range: Range<u64>, sheet: &mut Sheet) -> Result<Work, 
                 work_error: finest.map_or(f64::NAN, |finest| error::bound(best.work, finest.work, best.work)),
             }
         });
-        (solved.status, row, Work { best: 1, ..Work::from(effort) })
+        (solved.status, row, RunStats { best: 1, ..RunStats::from(stats) })
     })
 }

@@ -3,17 +3,19 @@
 use std::ops::Range;
 
 use super::memo::Memo;
-use super::optima::{self, Comparison, transition};
-use super::{Column, Definition, Field, Job, Selection, Sheet, Stopped, Work, columns, number, place, rows};
+use super::optimum_cache::{self, Comparison, transition};
+use super::{
+    Column, ColumnBuffer, Definition, Field, Job, Projection, RunStats, Stopped, columns, number, place, rows,
+};
 use crate::grid::{Point, Quantity};
 use crate::protocol::compliant::{self, Compliant as Member};
-use crate::protocol::{Slider, Solved, error};
+use crate::protocol::{Solved, SpringBlock, error};
 use crate::stability::{Followed, amplification, held_error, open_loop_error};
 
 /// A row.
 struct Row {
     member: Member,
-    slider: Slider,
+    slider: SpringBlock,
     t_f: f64,
     least: Comparison,
     amplification: Option<f64>,
@@ -85,21 +87,21 @@ pub static COMPLIANT: Definition = Definition {
     compute,
 };
 
-fn needs_optimum(selection: &Selection) -> bool {
+fn needs_optimum(selection: &Projection) -> bool {
     selection.has_any([WORK_OPTIMAL, GAP, GAP_ERROR])
 }
 
-fn compute(job: &Job<'_>, range: Range<u64>, sheet: &mut Sheet) -> Result<Work, Stopped> {
-    let members = Members::default();
-    rows::each(job, range, 4, sheet, &FIELDS, |tuple, point| {
-        let mut work = Work::default();
+fn compute(job: &Job<'_>, range: Range<u64>, column_buffer: &mut ColumnBuffer) -> Result<RunStats, Stopped> {
+    let members = MemberCache::default();
+    rows::each(job, range, 4, column_buffer, &FIELDS, |tuple, point| {
+        let mut work = RunStats::default();
         let Solution { solved, amplification, work_error } = members.get(job, tuple, point, &mut work);
         let Some(member) = solved.value else { return (solved.status, None, work) };
         let mut status = solved.status;
         let mut least = Comparison::NONE;
         if needs_optimum(job.selection) {
             let bounded = job.selection.has(GAP_ERROR);
-            least = optima::compare(job, (tuple, point), (member.work, work_error), bounded, &mut work);
+            least = optimum_cache::compare(job, (tuple, point), (member.work, work_error), bounded, &mut work);
             status = status.beside(least.optimum);
         }
         let (slider, t_f, dt) = (slider(point), point[Quantity::Time], point[Quantity::Sampling]);
@@ -120,8 +122,9 @@ fn compute(job: &Job<'_>, range: Range<u64>, sheet: &mut Sheet) -> Result<Work, 
 }
 
 /// The number of a simulation, whose work is added.
-fn told_by(followed: Followed, work: &mut Work) -> Option<f64> {
-    *work += Work { simulations: u64::from(followed.steps > 0), steps: followed.steps.into(), ..Work::default() };
+fn told_by(followed: Followed, work: &mut RunStats) -> Option<f64> {
+    *work +=
+        RunStats { simulations: u64::from(followed.steps > 0), steps: followed.steps.into(), ..RunStats::default() };
     followed.number
 }
 
@@ -136,23 +139,23 @@ struct Solution {
 
 /// The members by tuple, stiffness and mass: solved once each whatever the time between samples.
 #[derive(Default)]
-struct Members(Memo<(u64, u64, u64), Solution>);
+struct MemberCache(Memo<(u64, u64, u64), Solution>);
 
-impl Members {
+impl MemberCache {
     /// The member for `point`, which belongs to tuple number `tuple`; adds what is spent by this call alone.
-    fn get(&self, job: &Job<'_>, tuple: u64, point: &Point, work: &mut Work) -> Solution {
+    fn get(&self, job: &Job<'_>, tuple: u64, point: &Point, work: &mut RunStats) -> Solution {
         let slider = slider(point);
         self.0.get((tuple, slider.k.to_bits(), slider.m.to_bits()), || {
             let (velocities, t_f) = (velocities(point), point[Quantity::Time]);
             let solved = compliant::solve(&slider, velocities, t_f, job.rtol);
-            *work += Work { shortcuts: 1, ..Work::from(solved.effort) };
+            *work += RunStats { shortcuts: 1, ..RunStats::from(solved.stats) };
             let wanted = job.selection.has(AMPLIFICATION) && solved.value.is_some();
             let path = wanted.then(|| compliant::path(&slider, velocities, t_f, job.rtol).ok()).flatten();
             let amplification = path.and_then(|path| told_by(amplification(&path, job.rtol), work));
             let work_error =
                 solved.value.filter(|_| job.selection.has_any([WORK_ERROR, GAP_ERROR])).and_then(|member| {
                     let finest = compliant::solve(&slider, velocities, t_f, error::FINEST);
-                    *work += Work::from(finest.effort);
+                    *work += RunStats::from(finest.stats);
                     Some(error::bound(member.work, finest.value?.work, member.work))
                 });
             Solution { solved, amplification, work_error: number(work_error) }
@@ -161,8 +164,8 @@ impl Members {
 }
 
 /// Block and spring of a point that holds at least `a`, `b`, `v_i`, `v_f`, `k` and `m`.
-pub fn slider(point: &Point) -> Slider {
-    Slider { law: transition(point).law, k: point[Quantity::Stiffness], m: point[Quantity::Mass] }
+pub fn slider(point: &Point) -> SpringBlock {
+    SpringBlock { law: transition(point).law, k: point[Quantity::Stiffness], m: point[Quantity::Mass] }
 }
 
 /// Velocities of a point, `(v_i, v_f)`.

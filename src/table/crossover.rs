@@ -2,8 +2,8 @@
 
 use std::ops::Range;
 
-use super::optima::transition;
-use super::{Column, Definition, Field, Job, Sheet, Stopped, Work, columns, number, place, rows};
+use super::optimum_cache::transition;
+use super::{Column, ColumnBuffer, Definition, Field, Job, RunStats, Stopped, columns, number, place, rows};
 use crate::grid::Quantity;
 use crate::protocol::optimal::crossover::{self, CrossoverTimes, Wanted};
 
@@ -55,7 +55,7 @@ pub static CROSSOVER: Definition = Definition {
     compute,
 };
 
-fn compute(job: &Job<'_>, range: Range<u64>, sheet: &mut Sheet) -> Result<Work, Stopped> {
+fn compute(job: &Job<'_>, range: Range<u64>, column_buffer: &mut ColumnBuffer) -> Result<RunStats, Stopped> {
     let wanted = |names: [&str; 2]| job.selection.has_any(names.map(|name| place(&COLUMNS, name)));
     let wanted = Wanted {
         cross: wanted(["t_cross", "work_at_t_cross"]),
@@ -65,8 +65,8 @@ fn compute(job: &Job<'_>, range: Range<u64>, sheet: &mut Sheet) -> Result<Work, 
         turn: wanted(["t_turn", "work_at_t_turn"]),
         free: wanted(["t_free_in", "t_free_out"]),
     };
-    rows::each(job, range, 64, sheet, &FIELDS, |_, point| {
-        let (status, times, effort) = crossover::solve(&transition(point), job.bounded, job.rtol, wanted);
-        (status, Some(times), Work { crossovers: 1, ..Work::from(effort) })
+    rows::each(job, range, 64, column_buffer, &FIELDS, |_, point| {
+        let (status, times, stats) = crossover::solve(&transition(point), job.bounded, job.rtol, wanted);
+        (status, Some(times), RunStats { crossovers: 1, ..RunStats::from(stats) })
     })
 }

@@ -8,12 +8,12 @@ use std::sync::OnceLock;
 
 use rayon::prelude::*;
 
-use super::fault;
-use super::optima::{transition, work_error};
-use super::{Column, Definition, Job, Selection, Sheet, Stopped, Work};
+use super::failpoint;
+use super::optimum_cache::{transition, work_error};
+use super::{Column, ColumnBuffer, Definition, Job, Projection, RunStats, Stopped};
 use crate::grid::{Point, Quantity, Runs, Scale, View};
 use crate::model::Transition;
-use crate::protocol::cubic::{Landscape, Shortcuts};
+use crate::protocol::cubic::{Landscape, LandscapeBuffers};
 use crate::protocol::{Status, error};
 
 const WORK_OPTIMAL: usize = 1;
@@ -55,15 +55,15 @@ pub static GAP: Definition = Definition {
     compute,
 };
 
-fn needs_optimum(selection: &Selection) -> bool {
+fn needs_optimum(selection: &Projection) -> bool {
     selection.has_any([WORK_OPTIMAL, WORK_GAP, GAP_ERROR])
 }
 
-pub(super) fn compute(job: &Job<'_>, rows: Range<u64>, sheet: &mut Sheet) -> Result<Work, Stopped> {
+pub(super) fn compute(job: &Job<'_>, rows: Range<u64>, column_buffer: &mut ColumnBuffer) -> Result<RunStats, Stopped> {
     let view = job.rows.view(rows.clone());
     let (groups, order) = groups(&view, job, &rows);
     let coefficients = Coefficients::new(job, view, &rows, order.as_deref());
-    let works = chunks(&groups, sheet, job.selection)
+    let works = chunks(&groups, column_buffer, job.selection)
         .into_par_iter()
         // Chunks cost very different times: no thread may keep several to itself while another one is idle.
         .with_max_len(1)
@@ -74,11 +74,11 @@ pub(super) fn compute(job: &Job<'_>, rows: Range<u64>, sheet: &mut Sheet) -> Res
             job.signal.advance(length);
             Ok(work)
         })
-        .collect::<Result<Vec<Work>, Stopped>>()?;
+        .collect::<Result<Vec<RunStats>, Stopped>>()?;
     if let Some(order) = order {
-        scatter(sheet, &order);
+        scatter(column_buffer, &order);
     }
-    for (column, size) in sheet.columns.iter_mut().zip(job.sizes).filter(|(_, size)| **size != 1.0) {
+    for (column, size) in column_buffer.columns.iter_mut().zip(job.sizes).filter(|(_, size)| **size != 1.0) {
         column.iter_mut().for_each(|cell| *cell *= size);
     }
     Ok(works.into_iter().sum())
@@ -209,9 +209,9 @@ struct Chunk<'a> {
 }
 
 /// Cuts a part into chunks.
-fn chunks<'a>(groups: &[Group], sheet: &'a mut Sheet, selection: &Selection) -> Vec<Chunk<'a>> {
-    let mut rest = Cells { columns: std::array::from_fn(|_| Default::default()), status: &mut sheet.status };
-    for (column, &index) in sheet.columns.iter_mut().zip(selection.indices()) {
+fn chunks<'a>(groups: &[Group], column_buffer: &'a mut ColumnBuffer, selection: &Projection) -> Vec<Chunk<'a>> {
+    let mut rest = Cells { columns: std::array::from_fn(|_| Default::default()), status: &mut column_buffer.status };
+    for (column, &index) in column_buffer.columns.iter_mut().zip(selection.indices()) {
         rest.columns[index] = column;
     }
     let mut chunks = Vec::new();
@@ -233,18 +233,18 @@ fn chunks<'a>(groups: &[Group], sheet: &'a mut Sheet, selection: &Selection) -> 
 }
 
 /// Computes a chunk, group by group.
-fn evaluate(job: &Job<'_>, groups: &[Group], coefficients: &Coefficients<'_>, chunk: Chunk<'_>) -> Work {
+fn evaluate(job: &Job<'_>, groups: &[Group], coefficients: &Coefficients<'_>, chunk: Chunk<'_>) -> RunStats {
     let Chunk { first_group, mut place, mut cells } = chunk;
     cells.columns.iter_mut().for_each(|column| column.fill(f64::NAN));
     let (mut a_2, mut a_3) = (Vec::with_capacity(CHUNK), Vec::with_capacity(CHUNK));
     let (mut work_buffer, mut v_min_buffer, mut error_buffer) = (Vec::new(), Vec::new(), Vec::new());
-    let mut work = Work::default();
+    let mut work = RunStats::default();
     for group in &groups[first_group..] {
         if cells.status.is_empty() {
             break;
         }
         let length = (group.places.end - place).min(cells.status.len());
-        fault::strike((place..place + length).map(|place| coefficients.row(place)));
+        failpoint::panic_at((place..place + length).map(|place| coefficients.row(place)));
         let (now, later) = cells.split(length);
         cells = later;
         let point = job.grid.scaled(&coefficients.view.point(group.row));
@@ -261,8 +261,8 @@ fn evaluate(job: &Job<'_>, groups: &[Group], coefficients: &Coefficients<'_>, ch
         let with_work = !gap.is_empty() || prepared.finest.is_some();
         let works = if work_s.is_empty() && with_work { buffer(&mut work_buffer, length) } else { work_s };
         let v_min = if v_min.is_empty() { buffer(&mut v_min_buffer, length) } else { v_min };
-        let out = Shortcuts { work: &mut *works, v_min: &mut *v_min, status: &mut *now.status };
-        work += Work::from(landscape.evaluate(&a_2, &a_3, out));
+        let out = LandscapeBuffers { work: &mut *works, v_min: &mut *v_min, status: &mut *now.status };
+        work += RunStats::from(landscape.evaluate(&a_2, &a_3, out));
         let errors = if work_error.is_empty() && prepared.finest.is_some() {
             buffer(&mut error_buffer, length)
         } else {
@@ -270,8 +270,8 @@ fn evaluate(job: &Job<'_>, groups: &[Group], coefficients: &Coefficients<'_>, ch
         };
         if let Some((finest, transition, t_f)) = &prepared.finest {
             let mut again = now.status.to_vec();
-            let out = Shortcuts { work: &mut *errors, v_min: &mut [], status: &mut again };
-            work += Work::from(finest.evaluate(&a_2, &a_3, out));
+            let out = LandscapeBuffers { work: &mut *errors, v_min: &mut [], status: &mut again };
+            work += RunStats::from(finest.evaluate(&a_2, &a_3, out));
             for ((error, &work_s), &v_min) in errors.iter_mut().zip(&*works).zip(&*v_min) {
                 *error = error::of_shortcut(transition, *t_f, v_min, work_s, *error);
             }
@@ -327,7 +327,7 @@ fn buffer(buffer: &mut Vec<f64>, length: usize) -> &mut [f64] {
     buffer
 }
 
-fn prepare(job: &Job<'_>, group: &Group, point: &Point, work: &mut Work) -> Prepared {
+fn prepare(job: &Job<'_>, group: &Group, point: &Point, work: &mut RunStats) -> Prepared {
     let (transition, t_f) = (transition(point), point[Quantity::Time]);
     if job.bounded && t_f < transition.least_time() {
         return Prepared { landscape: None, finest: None, optimum: None, error_optimal: f64::NAN };
@@ -335,7 +335,7 @@ fn prepare(job: &Job<'_>, group: &Group, point: &Point, work: &mut Work) -> Prep
     work.landscapes += 1;
     let mut error_optimal = f64::NAN;
     let optimum = needs_optimum(job.selection).then(|| {
-        let (solved, spent) = job.optima.get(group.tuple, point);
+        let (solved, spent) = job.optimum_cache.get(group.tuple, point);
         *work += spent;
         if let Some(optimum) = solved.value.filter(|_| job.selection.has(GAP_ERROR)) {
             error_optimal = work_error(job, point, &optimum, work);
@@ -348,15 +348,15 @@ fn prepare(job: &Job<'_>, group: &Group, point: &Point, work: &mut Work) -> Prep
 }
 
 /// Brings a sheet from the order of computation into the order of rows.
-fn scatter(sheet: &mut Sheet, order: &[u32]) {
-    for column in &mut sheet.columns {
+fn scatter(column_buffer: &mut ColumnBuffer, order: &[u32]) {
+    for column in &mut column_buffer.columns {
         let computed = column.clone();
         for (value, &row) in computed.into_iter().zip(order) {
             column[row as usize] = value;
         }
     }
-    let computed = sheet.status.clone();
+    let computed = column_buffer.status.clone();
     for (status, &row) in computed.into_iter().zip(order) {
-        sheet.status[row as usize] = status;
+        column_buffer.status[row as usize] = status;
     }
 }

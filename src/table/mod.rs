@@ -2,33 +2,33 @@
 
 mod best_cubic;
 mod column;
+mod column_buffer;
 mod compliant;
 mod crossover;
-mod fault;
+mod failpoint;
 mod gap;
 mod memo;
-mod optima;
 mod optimal;
+mod optimum_cache;
 mod reduced;
 mod regularised;
-mod repeats;
+mod repeated_rows;
 mod rows;
-mod sheet;
 mod shortcut;
 mod stability;
 mod step_response;
 
 use std::ops::Range;
 
-use crate::grid::{Grid, Point, Projection, Quantity, Tuples};
+use crate::grid::{Grid, Point, Quantity, RowIndex, Tuples};
 
 pub use column::{Column, Field, Kind, STATUS, STATUS_DOC, columns, number, place};
-pub use optima::{OPTIMUM_AXES, Optima};
+pub use column_buffer::{ColumnBuffer, Phase, Projection, RunStats, Signal, Stopped};
+pub use optimum_cache::{OPTIMUM_AXES, OptimumCache};
 #[cfg(feature = "plot")]
 pub(crate) use reduced::EDGES as HISTOGRAM_EDGES;
 pub use reduced::MOST_SORTED;
-pub use repeats::Repeats;
-pub use sheet::{Phase, Selection, Sheet, Signal, Stopped, Work};
+pub use repeated_rows::RepeatedRows;
 
 /// A table: what its rows depend on, what they hold and how they are computed.
 pub trait Table: Sync {
@@ -51,8 +51,8 @@ pub trait Table: Sync {
     /// compare matters.
     fn cost(&self) -> u64;
 
-    /// Whether the selected columns need the optimal protocol of every row, shared through [`Optima`].
-    fn needs_optimum(&self, selection: &Selection) -> bool;
+    /// Whether the selected columns need the optimal protocol of every row, shared through [`OptimumCache`].
+    fn needs_optimum(&self, selection: &Projection) -> bool;
 
     /// Relative accuracy where the spec gives the table none of its own; that of the whole sweep if `None`.
     fn default_rtol(&self) -> Option<f64> {
@@ -64,8 +64,8 @@ pub trait Table: Sync {
         None
     }
 
-    /// Computes `rows` into `sheet`, which has the columns of the selection and as many rows: every cell is written.
-    fn compute(&self, job: &Job<'_>, rows: Range<u64>, sheet: &mut Sheet) -> Result<Work, Stopped>;
+    /// Computes `rows` into `column_buffer`, which has the columns of the selection and as many rows: every cell is written.
+    fn compute(&self, job: &Job<'_>, rows: Range<u64>, column_buffer: &mut ColumnBuffer) -> Result<RunStats, Stopped>;
 }
 
 /// A table of which everything is known in advance.
@@ -76,8 +76,8 @@ pub struct Definition {
     columns: &'static [Column],
     rows_per_part: u64,
     cost: u64,
-    needs_optimum: fn(&Selection) -> bool,
-    compute: fn(&Job<'_>, Range<u64>, &mut Sheet) -> Result<Work, Stopped>,
+    needs_optimum: fn(&Projection) -> bool,
+    compute: fn(&Job<'_>, Range<u64>, &mut ColumnBuffer) -> Result<RunStats, Stopped>,
 }
 
 impl Table for Definition {
@@ -105,12 +105,12 @@ impl Table for Definition {
         self.cost
     }
 
-    fn needs_optimum(&self, selection: &Selection) -> bool {
+    fn needs_optimum(&self, selection: &Projection) -> bool {
         (self.needs_optimum)(selection)
     }
 
-    fn compute(&self, job: &Job<'_>, rows: Range<u64>, sheet: &mut Sheet) -> Result<Work, Stopped> {
-        (self.compute)(job, rows, sheet)
+    fn compute(&self, job: &Job<'_>, rows: Range<u64>, column_buffer: &mut ColumnBuffer) -> Result<RunStats, Stopped> {
+        (self.compute)(job, rows, column_buffer)
     }
 }
 
@@ -159,15 +159,15 @@ pub struct Job<'a> {
     /// The grid of the sweep.
     pub grid: &'a Grid,
     /// The rows of the table.
-    pub rows: &'a Projection,
+    pub rows: &'a RowIndex,
     /// The different optimal problems among its rows.
     pub tuples: Tuples,
     /// Its rows that are there more than once, if any are.
-    pub repeats: Option<Repeats>,
+    pub repeated_rows: Option<RepeatedRows>,
     /// Of a table that reduces landscapes: their rows, those of one of its rows side by side, in the order of its rows.
-    pub members: Option<&'a Projection>,
+    pub members: Option<&'a RowIndex>,
     /// The columns asked for.
-    pub selection: &'a Selection,
+    pub selection: &'a Projection,
     /// What the values of each of them are multiplied by to be in the units of the grid.
     pub sizes: &'a [f64],
     /// Whether optimal protocols obey `v >= 1`.
@@ -175,7 +175,7 @@ pub struct Job<'a> {
     /// Relative accuracy of the table.
     pub rtol: f64,
     /// The shared optimal protocols.
-    pub optima: &'a Optima,
+    pub optimum_cache: &'a OptimumCache,
     /// How far the run is, and whether to stop.
     pub signal: &'a Signal,
 }

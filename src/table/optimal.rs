@@ -2,8 +2,8 @@
 
 use std::ops::Range;
 
-use super::optima::{OPTIMUM_AXES, work_error};
-use super::{Column, Definition, Field, Job, Kind, Sheet, Stopped, Work, columns, place, rows};
+use super::optimum_cache::{OPTIMUM_AXES, work_error};
+use super::{Column, ColumnBuffer, Definition, Field, Job, Kind, RunStats, Stopped, columns, place, rows};
 use crate::protocol::optimal::Optimum;
 
 /// The words of `strategy`, in the order of [`Strategy::ALL`](crate::protocol::optimal::Strategy::ALL).
@@ -55,9 +55,9 @@ pub static OPTIMAL: Definition = Definition {
     compute,
 };
 
-fn compute(job: &Job<'_>, range: Range<u64>, sheet: &mut Sheet) -> Result<Work, Stopped> {
-    rows::each(job, range, 64, sheet, &FIELDS, |tuple, point| {
-        let (solved, mut work) = job.optima.get(tuple, point);
+fn compute(job: &Job<'_>, range: Range<u64>, column_buffer: &mut ColumnBuffer) -> Result<RunStats, Stopped> {
+    rows::each(job, range, 64, column_buffer, &FIELDS, |tuple, point| {
+        let (solved, mut work) = job.optimum_cache.get(tuple, point);
         let row = solved.value.map(|optimum| {
             let wanted = job.selection.has(WORK_ERROR);
             let work_error = if wanted { work_error(job, point, &optimum, &mut work) } else { f64::NAN };

@@ -6,8 +6,8 @@
 use std::ops::Range;
 
 use super::gap;
-use super::optima::OPTIMUM_AXES;
-use super::{Column, Definition, Job, Kind, Selection, Sheet, Signal, Stopped, Work};
+use super::optimum_cache::OPTIMUM_AXES;
+use super::{Column, ColumnBuffer, Definition, Job, Kind, Projection, RunStats, Signal, Stopped};
 use crate::grid::Quantity;
 use crate::protocol::Status;
 
@@ -24,7 +24,7 @@ pub static MINIMUM: Definition = reduced(
     "gap_min",
     "the shortcut of least gap among those of a spec (reduce = \"min\" of gap)",
     MINIMUM_COLUMNS,
-    |job, rows, sheet| compute(Reduction::Minimum, job, rows, sheet),
+    |job, rows, column_buffer| compute(Reduction::Minimum, job, rows, column_buffer),
 );
 
 /// Quantiles of the gap.
@@ -32,7 +32,7 @@ pub static QUANTILES: Definition = reduced(
     "gap_quantiles",
     "quantiles of the gap of the shortcuts of a spec (reduce = \"quantiles\" of gap)",
     QUANTILE_COLUMNS,
-    |job, rows, sheet| compute(Reduction::Quantiles, job, rows, sheet),
+    |job, rows, column_buffer| compute(Reduction::Quantiles, job, rows, column_buffer),
 );
 
 /// Numbers of shortcuts by decades of the gap.
@@ -40,7 +40,7 @@ pub static HISTOGRAM: Definition = reduced(
     "gap_histogram",
     "how many shortcuts of a spec have which gap (reduce = \"histogram\" of gap)",
     HISTOGRAM_COLUMNS,
-    |job, rows, sheet| compute(Reduction::Histogram, job, rows, sheet),
+    |job, rows, column_buffer| compute(Reduction::Histogram, job, rows, column_buffer),
 );
 
 /// One row a transition and time; the cost is that of a landscape of 400 x 400 shortcuts.
@@ -48,9 +48,9 @@ const fn reduced(
     name: &'static str,
     doc: &'static str,
     columns: &'static [Column],
-    compute: fn(&Job<'_>, Range<u64>, &mut Sheet) -> Result<Work, Stopped>,
+    compute: fn(&Job<'_>, Range<u64>, &mut ColumnBuffer) -> Result<RunStats, Stopped>,
 ) -> Definition {
-    let needs_optimum = |_: &Selection| true;
+    let needs_optimum = |_: &Projection| true;
     Definition {
         name,
         doc,
@@ -113,15 +113,20 @@ const HISTOGRAM_COLUMNS: &[Column] = &[
     Column::number("from_10", "1", "shortcuts with a gap of 10 or more"),
 ];
 
-fn compute(reduction: Reduction, job: &Job<'_>, rows: Range<u64>, sheet: &mut Sheet) -> Result<Work, Stopped> {
+fn compute(
+    reduction: Reduction,
+    job: &Job<'_>,
+    rows: Range<u64>,
+    column_buffer: &mut ColumnBuffer,
+) -> Result<RunStats, Stopped> {
     let Some(members) = job.members else {
         // A checked sweep has them.
-        sheet.columns.iter_mut().for_each(|column| column.fill(f64::NAN));
-        sheet.status.fill(Status::NotConverged);
-        return Ok(Work::default());
+        column_buffer.columns.iter_mut().for_each(|column| column.fill(f64::NAN));
+        column_buffer.status.fill(Status::NotConverged);
+        return Ok(RunStats::default());
     };
     let each = members.rows() / job.rows.rows().max(1);
-    let (selection, signal) = (Selection::usual(gap::COLUMNS), Signal::default());
+    let (selection, signal) = (Projection::usual(gap::COLUMNS), Signal::default());
     let tuples = members.tuples(OPTIMUM_AXES);
     // Progress is counted in rows of this table, so that of the landscape goes nowhere.
     let sizes: Vec<f64> = gap::COLUMNS.iter().map(|column| column.size(job.grid)).collect();
@@ -132,15 +137,15 @@ fn compute(reduction: Reduction, job: &Job<'_>, rows: Range<u64>, sheet: &mut Sh
         sizes: &sizes,
         signal: &signal,
         members: None,
-        repeats: None,
+        repeated_rows: None,
         ..*job
     };
-    let mut all = Work::default();
+    let mut all = RunStats::default();
     // One after another: the threads share each landscape, and no more than one a part is in memory.
     for (place, row) in rows.enumerate() {
         let (status, cells, work) = reduction.cells(job, &landscape, row * each..(row + 1) * each)?;
-        sheet.status[place] = status;
-        for (column, &index) in sheet.columns.iter_mut().zip(job.selection.indices()) {
+        column_buffer.status[place] = status;
+        for (column, &index) in column_buffer.columns.iter_mut().zip(job.selection.indices()) {
             column[place] = cells[index];
         }
         all += work;
@@ -172,17 +177,17 @@ impl Tally {
     }
 
     /// Adds a piece of the landscape, whose first row is `start`, as far as `reduction` needs it.
-    fn add(&mut self, reduction: Reduction, start: u64, sheet: &Sheet) {
-        for (place, status) in sheet.status.iter().enumerate() {
+    fn add(&mut self, reduction: Reduction, start: u64, column_buffer: &ColumnBuffer) {
+        for (place, status) in column_buffer.status.iter().enumerate() {
             self.statuses[*status as usize] += 1;
-            let gap = sheet.columns[gap::WORK_GAP][place];
+            let gap = column_buffer.columns[gap::WORK_GAP][place];
             if *status != Status::Ok || gap.is_nan() {
                 continue;
             }
             match reduction {
                 Reduction::Minimum => {
                     if self.least.is_none_or(|(_, least)| gap < least[gap::WORK_GAP]) {
-                        let cells = std::array::from_fn(|column| sheet.columns[column][place]);
+                        let cells = std::array::from_fn(|column| column_buffer.columns[column][place]);
                         self.least = Some((start + place as u64, cells));
                     }
                 }
@@ -203,15 +208,20 @@ impl Reduction {
     }
 
     /// Status and cells of the row whose shortcuts are `rows` of the landscape.
-    fn cells(self, job: &Job<'_>, landscape: &Job<'_>, rows: Range<u64>) -> Result<(Status, Vec<f64>, Work), Stopped> {
-        let mut sheet = Sheet::new(landscape.selection.indices().len());
-        let (mut work, mut tally) = (Work::default(), Tally::default());
+    fn cells(
+        self,
+        job: &Job<'_>,
+        landscape: &Job<'_>,
+        rows: Range<u64>,
+    ) -> Result<(Status, Vec<f64>, RunStats), Stopped> {
+        let mut column_buffer = ColumnBuffer::new(landscape.selection.indices().len());
+        let (mut work, mut tally) = (RunStats::default(), Tally::default());
         for start in rows.clone().step_by(PIECE) {
             job.signal.check()?;
             let piece = start..rows.end.min(start + PIECE as u64);
-            sheet.resize((piece.end - piece.start) as usize);
-            work += gap::compute(landscape, piece, &mut sheet)?;
-            tally.add(self, start, &sheet);
+            column_buffer.resize((piece.end - piece.start) as usize);
+            work += gap::compute(landscape, piece, &mut column_buffer)?;
+            tally.add(self, start, &column_buffer);
         }
         let status = tally.status();
         let mut cells = vec![f64::NAN; self.columns().len()];

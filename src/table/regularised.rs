@@ -3,10 +3,10 @@
 use std::ops::Range;
 
 use super::compliant::{slider, velocities};
-use super::{Column, Definition, Field, Job, Sheet, Stopped, Work, columns, place, rows};
+use super::{Column, ColumnBuffer, Definition, Field, Job, RunStats, Stopped, columns, place, rows};
 use crate::grid::Quantity;
 use crate::protocol::regularised::{self, Regularised as Found};
-use crate::protocol::{Effort, error};
+use crate::protocol::{SolverStats, error};
 
 /// A row.
 struct Row {
@@ -65,15 +65,15 @@ pub static REGULARISED: Definition = Definition {
     compute,
 };
 
-fn compute(job: &Job<'_>, range: Range<u64>, sheet: &mut Sheet) -> Result<Work, Stopped> {
-    rows::each(job, range, 16, sheet, &FIELDS, |_, point| {
+fn compute(job: &Job<'_>, range: Range<u64>, column_buffer: &mut ColumnBuffer) -> Result<RunStats, Stopped> {
+    rows::each(job, range, 16, column_buffer, &FIELDS, |_, point| {
         let (t_f, delta_t) = (point[Quantity::Time], point[Quantity::Smoothing]);
         let solve = |rtol| regularised::solve(&slider(point), velocities(point), t_f, delta_t, job.bounded, rtol);
         let solved = solve(job.rtol);
-        let mut effort = solved.effort;
+        let mut stats = solved.stats;
         let row = solved.value.map(|found| {
             let finest = job.selection.has_any([WORK_ERROR, GAP_ERROR]).then(|| solve(error::FINEST));
-            effort += finest.map_or_else(Effort::default, |finest| finest.effort);
+            stats += finest.map_or_else(SolverStats::default, |finest| finest.stats);
             let finest = finest.and_then(|finest| finest.value);
             let scale = found.replaced / found.work_optimal;
             Row {
@@ -82,6 +82,6 @@ fn compute(job: &Job<'_>, range: Range<u64>, sheet: &mut Sheet) -> Result<Work, 
                 gap_error: finest.map_or(f64::NAN, |finest| error::of_excess(found.gap, finest.gap, scale)),
             }
         });
-        (solved.status, row, Work { optima: 1, ..Work::from(effort) })
+        (solved.status, row, RunStats { optima: 1, ..RunStats::from(stats) })
     })
 }

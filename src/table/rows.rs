@@ -4,13 +4,13 @@ use std::ops::Range;
 
 use rayon::prelude::*;
 
-use super::fault;
-use super::{Field, Job, Repeats, Sheet, Stopped, Work};
+use super::failpoint;
+use super::{ColumnBuffer, Field, Job, RepeatedRows, RunStats, Stopped};
 use crate::grid::{Point, Quantity, Runs};
 use crate::protocol::Status;
 
 /// What a row is: its status, its values if it has any, and what they cost.
-pub type Solved<R> = (Status, Option<R>, Work);
+pub type Solved<R> = (Status, Option<R>, RunStats);
 
 /// Computes `rows` with `row`, which is given the number of the optimal problem. The cells of a row without values are missing.
 ///
@@ -19,13 +19,16 @@ pub fn each<R>(
     job: &Job<'_>,
     rows: Range<u64>,
     chunk: usize,
-    sheet: &mut Sheet,
+    column_buffer: &mut ColumnBuffer,
     fields: &[Field<R>],
     row: impl Fn(u64, &Point) -> Solved<R> + Sync,
-) -> Result<Work, Stopped> {
+) -> Result<RunStats, Stopped> {
     let view = job.rows.view(rows.clone());
     let tuples = view.tuples(&job.tuples, rows.clone());
-    let repeats = job.repeats.as_ref().map(|repeats| (repeats, view.tuples(&repeats.tuples, rows.clone())));
+    let repeated_rows = job
+        .repeated_rows
+        .as_ref()
+        .map(|repeated_rows| (repeated_rows, view.tuples(&repeated_rows.tuples, rows.clone())));
     // Values are taken from the axes once a step, not once a row.
     let axes: Vec<Steps> = Quantity::ALL
         .into_iter()
@@ -36,9 +39,9 @@ pub fn each<R>(
         })
         .collect();
     let starts = rows.clone().step_by(chunk);
-    let mut columns: Vec<_> = sheet.columns.iter_mut().map(|column| column.chunks_mut(chunk)).collect();
+    let mut columns: Vec<_> = column_buffer.columns.iter_mut().map(|column| column.chunks_mut(chunk)).collect();
     let chunks: Vec<Chunk<'_>> = starts
-        .zip(sheet.status.chunks_mut(chunk))
+        .zip(column_buffer.status.chunks_mut(chunk))
         .map(|(start, status)| Chunk {
             start,
             columns: columns.iter_mut().filter_map(Iterator::next).collect(),
@@ -48,7 +51,7 @@ pub fn each<R>(
     let works = chunks.into_par_iter().with_max_len(1).map(|chunk| {
         job.signal.check()?;
         let count = chunk.status.len() as u64;
-        let known = repeats.as_ref().map(|(repeats, tuples)| (*repeats, tuples.as_slice()));
+        let known = repeated_rows.as_ref().map(|(repeated_rows, tuples)| (*repeated_rows, tuples.as_slice()));
         let fill = |tuple: u64, point: &Point, cells: &mut [f64]| {
             let (status, values, work) = row(tuple, point);
             for (cell, &index) in cells.iter_mut().zip(job.selection.indices()) {
@@ -60,7 +63,7 @@ pub fn each<R>(
         job.signal.advance(count);
         Ok(work)
     });
-    Ok(works.collect::<Result<Vec<Work>, Stopped>>()?.into_iter().sum())
+    Ok(works.collect::<Result<Vec<RunStats>, Stopped>>()?.into_iter().sum())
 }
 
 /// An axis over the rows of a part, its values in the units of the model.
@@ -87,9 +90,9 @@ impl Chunk<'_> {
         job: &Job<'_>,
         axes: &[Steps],
         tuples: &[Numbered],
-        repeats: Option<(&Repeats, &[Numbered])>,
-        fill: &impl Fn(u64, &Point, &mut [f64]) -> (Status, Work),
-    ) -> Work {
+        repeated_rows: Option<(&RepeatedRows, &[Numbered])>,
+        fill: &impl Fn(u64, &Point, &mut [f64]) -> (Status, RunStats),
+    ) -> RunStats {
         let count = self.status.len();
         let values: Vec<(Quantity, Vec<f64>)> = axes
             .iter()
@@ -102,7 +105,7 @@ impl Chunk<'_> {
             })
             .collect();
         let (mut point, mut cells) = (Point::default(), vec![f64::NAN; self.columns.len()]);
-        let mut work = Work::default();
+        let mut work = RunStats::default();
         let mut tuple = tuples.partition_point(|(_, rows)| rows.end <= self.start);
         for place in 0..count {
             let at = self.start + place as u64;
@@ -112,13 +115,13 @@ impl Chunk<'_> {
             for (quantity, values) in &values {
                 point[*quantity] = values[place];
             }
-            fault::strike(std::iter::once(at));
+            failpoint::panic_at(std::iter::once(at));
             let compute = |cells: &mut [f64]| fill(tuples[tuple].0, &point, cells);
-            let (status, spent) = match repeats {
+            let (status, spent) = match repeated_rows {
                 None => compute(&mut cells),
-                Some((repeats, numbers)) => {
+                Some((repeated_rows, numbers)) => {
                     let number = numbers[numbers.partition_point(|(_, rows)| rows.end <= at)].0;
-                    repeats.get(number, &mut cells, compute)
+                    repeated_rows.get(number, &mut cells, compute)
                 }
             };
             self.status[place] = status;

@@ -3,11 +3,13 @@
 use std::ops::Range;
 
 use super::memo::Memo;
-use super::optima::{self, Comparison, transition};
-use super::{Column, Definition, Field, Job, Kind, Selection, Sheet, Stopped, Work, columns, number, place, rows};
+use super::optimum_cache::{self, Comparison, transition};
+use super::{
+    Column, ColumnBuffer, Definition, Field, Job, Kind, Projection, RunStats, Stopped, columns, number, place, rows,
+};
 use crate::grid::{Point, Quantity};
 use crate::protocol::shortcut::{Case, FAMILIES, Family, Obstacle, Shortcut as Member};
-use crate::protocol::{Effort, error};
+use crate::protocol::{SolverStats, error};
 
 /// A row: the member of the family, or what makes it infeasible.
 struct Row {
@@ -101,14 +103,14 @@ pub static SHORTCUT: Definition = Definition {
     compute,
 };
 
-fn needs_optimum(selection: &Selection) -> bool {
+fn needs_optimum(selection: &Projection) -> bool {
     selection.has_any([WORK_OPTIMAL, GAP, GAP_ERROR])
 }
 
-fn compute(job: &Job<'_>, range: Range<u64>, sheet: &mut Sheet) -> Result<Work, Stopped> {
-    let members = Members::default();
-    rows::each(job, range, 16, sheet, &FIELDS, |tuple, point| {
-        let mut work = Work::default();
+fn compute(job: &Job<'_>, range: Range<u64>, column_buffer: &mut ColumnBuffer) -> Result<RunStats, Stopped> {
+    let members = MemberCache::default();
+    rows::each(job, range, 16, column_buffer, &FIELDS, |tuple, point| {
+        let mut work = RunStats::default();
         let mut row =
             Row { member: None, obstacle: None, alpha_unit: 1.0, work_error: f64::NAN, least: Comparison::NONE };
         let member = match members.get(job, tuple, point, &mut work) {
@@ -124,7 +126,7 @@ fn compute(job: &Job<'_>, range: Range<u64>, sheet: &mut Sheet) -> Result<Work, 
         let mut status = member.status();
         if needs_optimum(job.selection) {
             let bounded = job.selection.has(GAP_ERROR);
-            row.least = optima::compare(job, (tuple, point), (member.work, row.work_error), bounded, &mut work);
+            row.least = optimum_cache::compare(job, (tuple, point), (member.work, row.work_error), bounded, &mut work);
             status = status.beside(row.least.optimum);
         }
         let family = FAMILIES.get(point[Quantity::Family] as usize);
@@ -141,11 +143,11 @@ type Solution = Result<(Member, f64), Obstacle>;
 
 /// The members of families that do not depend on the bound on friction, by tuple and family: solved once each whatever its values.
 #[derive(Default)]
-struct Members(Memo<(u64, usize), Solution>);
+struct MemberCache(Memo<(u64, usize), Solution>);
 
-impl Members {
+impl MemberCache {
     /// The member for `point`, which belongs to tuple number `tuple`; adds what is spent by this call alone.
-    fn get(&self, job: &Job<'_>, tuple: u64, point: &Point, work: &mut Work) -> Solution {
+    fn get(&self, job: &Job<'_>, tuple: u64, point: &Point, work: &mut RunStats) -> Solution {
         let number = point[Quantity::Family] as usize;
         let Some(&family) = FAMILIES.get(number) else { return Err(Obstacle::Domain) };
         if family.heeds_tau_ceiling() {
@@ -155,19 +157,19 @@ impl Members {
     }
 }
 
-fn solve(job: &Job<'_>, family: &dyn Family, point: &Point, work: &mut Work) -> Solution {
+fn solve(job: &Job<'_>, family: &dyn Family, point: &Point, work: &mut RunStats) -> Solution {
     let case =
         Case { transition: transition(point), t_f: point[Quantity::Time], tau_ceiling: point[Quantity::FrictionBound] };
     let t_min = case.transition.least_time();
     if job.bounded && case.t_f < t_min {
         return Err(Obstacle::Time { t_min });
     }
-    let mut effort = Effort::default();
-    let solved = family.solve(&case, job.rtol, &mut effort).map(|member| {
+    let mut stats = SolverStats::default();
+    let solved = family.solve(&case, job.rtol, &mut stats).map(|member| {
         let wanted = job.selection.has_any([WORK_ERROR, GAP_ERROR]);
-        let bound = wanted.then(|| error::of_member(family, &case, &member, &mut effort)).flatten();
+        let bound = wanted.then(|| error::of_member(family, &case, &member, &mut stats)).flatten();
         (member, bound.unwrap_or(f64::NAN))
     });
-    *work += Work { shortcuts: 1, ..Work::from(effort) };
+    *work += RunStats { shortcuts: 1, ..RunStats::from(stats) };
     solved
 }

@@ -2,8 +2,8 @@
 
 use std::ops::Range;
 
-use super::optima::transition;
-use super::{Column, Definition, Field, Job, Kind, Sheet, Stopped, Work, columns, number, place, rows};
+use super::optimum_cache::transition;
+use super::{Column, ColumnBuffer, Definition, Field, Job, Kind, RunStats, Stopped, columns, number, place, rows};
 use crate::grid::Quantity;
 use crate::model::{Law, Transition};
 use crate::protocol::Status;
@@ -70,13 +70,13 @@ pub static STABILITY: Definition = Definition {
     compute,
 };
 
-fn compute(job: &Job<'_>, range: Range<u64>, sheet: &mut Sheet) -> Result<Work, Stopped> {
+fn compute(job: &Job<'_>, range: Range<u64>, column_buffer: &mut ColumnBuffer) -> Result<RunStats, Stopped> {
     let with_eigenvalues = job.selection.has_any([GROWTH_RATE, FREQUENCY, DECAY_RATE]);
-    rows::each(job, range, 1024, sheet, &FIELDS, |_, point| {
+    rows::each(job, range, 1024, column_buffer, &FIELDS, |_, point| {
         let Transition { law, v_i, v_f } = transition(point);
         let (k, m) = (point[Quantity::Stiffness], point[Quantity::Mass]);
         let [at_start, at_end] = [v_i, v_f].map(|v| SteadySliding::new(law, k, m, v));
         let eigenvalues = with_eigenvalues.then(|| at_end.eigenvalues()).flatten();
-        (Status::Ok, Some(Row { law, v_f, k, m, at_start, at_end, eigenvalues }), Work::default())
+        (Status::Ok, Some(Row { law, v_f, k, m, at_start, at_end, eigenvalues }), RunStats::default())
     })
 }

@@ -3,11 +3,13 @@
 use std::ops::Range;
 
 use super::memo::Memo;
-use super::optima::transition;
-use super::{Column, Field, Job, Kind, Prediction, Selection, Sheet, Stopped, Table, Work, columns, number, rows};
+use super::optimum_cache::transition;
+use super::{
+    Column, ColumnBuffer, Field, Job, Kind, Prediction, Projection, RunStats, Stopped, Table, columns, number, rows,
+};
 use crate::grid::Quantity;
 use crate::model::Law;
-use crate::stability::step_response::{self, Course, Outcome, Response, Sustained};
+use crate::stability::step_response::{self, Outcome, Response, Simulation, Sustained};
 use crate::stability::{SteadySliding, lyapunov_coefficient};
 
 /// One row a transition, stiffness and mass.
@@ -143,7 +145,7 @@ impl Table for StepResponse {
         350_000
     }
 
-    fn needs_optimum(&self, _selection: &Selection) -> bool {
+    fn needs_optimum(&self, _selection: &Projection) -> bool {
         false
     }
 
@@ -172,24 +174,24 @@ impl Table for StepResponse {
         })
     }
 
-    fn compute(&self, job: &Job<'_>, range: Range<u64>, sheet: &mut Sheet) -> Result<Work, Stopped> {
-        let courses = Memo::<[u64; 5], Course>::default();
-        rows::each(job, range, 4, sheet, &FIELDS, |_, point| {
+    fn compute(&self, job: &Job<'_>, range: Range<u64>, column_buffer: &mut ColumnBuffer) -> Result<RunStats, Stopped> {
+        let simulations = Memo::<[u64; 5], Simulation>::default();
+        rows::each(job, range, 4, column_buffer, &FIELDS, |_, point| {
             let step = step_response::Step {
                 transition: transition(point),
                 k: point[Quantity::Stiffness],
                 m: point[Quantity::Mass],
             };
-            let mut work = Work::default();
+            let mut work = RunStats::default();
             // Steps that share their scaled numbers share their course.
-            let course = step.scaled().map(|scaled| {
-                courses.get(scaled.key(), || {
-                    let course = scaled.follow(job.rtol);
-                    work = Work { simulations: 1, steps: course.steps.into(), ..Work::default() };
-                    course
+            let simulation = step.scaled().map(|scaled| {
+                simulations.get(scaled.key(), || {
+                    let simulation = scaled.follow(job.rtol);
+                    work = RunStats { simulations: 1, steps: simulation.steps.into(), ..RunStats::default() };
+                    simulation
                 })
             });
-            let (status, response) = step.from_course(course.as_ref(), job.rtol);
+            let (status, response) = step.from_simulation(simulation.as_ref(), job.rtol);
             let lyapunov = lyapunov_coefficient(step.transition.law, step.inertia());
             (status, Some(Row { response, lyapunov }), work)
         })

@@ -11,7 +11,7 @@ use crate::numerics::elementary::ln;
 use crate::protocol::{Moment, Motion};
 use crate::table::{Column, Kind};
 
-pub use protocol::{Absence, Course, Parameter, Protocol, names};
+pub use protocol::{Absence, Parameter, Protocol, TracedPath, names};
 #[cfg(feature = "read")]
 pub use row::{Pathless, TABLES, protocol_of};
 pub use sample::{RANGE_RTOL, VALUE_RTOL};

@@ -1,9 +1,9 @@
 //! The protocols that can be traced, by name, and what is said of one beside its moments.
 
 use crate::model::Transition;
-use crate::protocol::cubic::{Landscape, Shortcuts};
+use crate::protocol::cubic::{Landscape, LandscapeBuffers};
 use crate::protocol::shortcut::{self, Case, FAMILIES, Family, Obstacle};
-use crate::protocol::{Effort, Motion, Slider, Status, best_cubic, compliant, optimal, regularised};
+use crate::protocol::{Motion, SolverStats, SpringBlock, Status, best_cubic, compliant, optimal, regularised};
 use crate::stability::step_response::Step;
 
 /// A protocol, and the spring that drives it where that is elastic.
@@ -82,7 +82,7 @@ pub fn names() -> impl Iterator<Item = (&'static str, &'static str)> {
 }
 
 /// A protocol that exists: how it moves, and its numbers.
-pub struct Course {
+pub struct TracedPath {
     /// How it moves.
     pub motion: Box<dyn Motion>,
     /// `Ok`, `BelowBound` or `Unproven`.
@@ -178,7 +178,7 @@ impl Protocol {
     }
 
     /// The protocol that solves `case`, its numbers good to `rtol`.
-    pub fn course(&self, case: &Case, rtol: f64) -> Result<Course, Absence> {
+    pub fn path(&self, case: &Case, rtol: f64) -> Result<TracedPath, Absence> {
         match *self {
             Protocol::Optimal { bounded } => optimum(case, bounded, rtol),
             Protocol::BestCubic { bounded } => least_cubic(case, bounded, rtol),
@@ -191,7 +191,7 @@ impl Protocol {
     }
 }
 
-fn optimum(case: &Case, bounded: bool, rtol: f64) -> Result<Course, Absence> {
+fn optimum(case: &Case, bounded: bool, rtol: f64) -> Result<TracedPath, Absence> {
     let (solved, motion) = optimal::motion(&case.transition, case.t_f, bounded, rtol);
     let (Some(value), Some(motion)) = (solved.value, motion) else {
         return Err(without_optimum(case, bounded, solved.status));
@@ -200,7 +200,7 @@ fn optimum(case: &Case, bounded: bool, rtol: f64) -> Result<Course, Absence> {
         Parameter::new("hamiltonian", value.hamiltonian, "mu_0 sigma v_0", "dW*/dt_f"),
         Parameter::new("time_at_floor", value.time_at_floor, "l/v_0", "time spent on the bound v = 1"),
     ];
-    Ok(Course { motion, status: solved.status, work: value.work, parameters })
+    Ok(TracedPath { motion, status: solved.status, work: value.work, parameters })
 }
 
 fn without_optimum(case: &Case, bounded: bool, status: Status) -> Absence {
@@ -212,7 +212,7 @@ fn without_optimum(case: &Case, bounded: bool, status: Status) -> Absence {
     }
 }
 
-fn least_cubic(case: &Case, bounded: bool, rtol: f64) -> Result<Course, Absence> {
+fn least_cubic(case: &Case, bounded: bool, rtol: f64) -> Result<TracedPath, Absence> {
     let solved = best_cubic::solve(&case.transition, case.t_f, bounded, rtol);
     let Some(value) = solved.value else {
         // Where there is no optimum there is no shortcut either.
@@ -233,15 +233,15 @@ fn least_cubic(case: &Case, bounded: bool, rtol: f64) -> Result<Course, Absence>
     };
     let mut parameters = scaled(value.a_2, value.a_3);
     parameters.push(Parameter::new("gap", value.gap, "1", "(W_s - W*)/W*"));
-    Ok(Course { motion, status: solved.status, work: value.work, parameters })
+    Ok(TracedPath { motion, status: solved.status, work: value.work, parameters })
 }
 
-fn gap(case: &Case, a_2: f64, a_3: f64, rtol: f64) -> Result<Course, Absence> {
+fn gap(case: &Case, a_2: f64, a_3: f64, rtol: f64) -> Result<TracedPath, Absence> {
     let landscape = Landscape::new(&case.transition, case.t_f, rtol);
     let (mut work, mut status) = ([0.0], [Status::Infeasible]);
-    landscape.evaluate(&[a_2], &[a_3], Shortcuts { work: &mut work, v_min: &mut [], status: &mut status });
+    landscape.evaluate(&[a_2], &[a_3], LandscapeBuffers { work: &mut work, v_min: &mut [], status: &mut status });
     let motion = landscape.motion(a_2, a_3).ok_or(Obstacle::Velocity)?;
-    Ok(Course { motion, status: status[0], work: work[0], parameters: scaled(a_2, a_3) })
+    Ok(TracedPath { motion, status: status[0], work: work[0], parameters: scaled(a_2, a_3) })
 }
 
 fn scaled(a_2: f64, a_3: f64) -> Vec<Parameter> {
@@ -258,15 +258,15 @@ fn with_control(first: Parameter, least: f64, greatest: f64) -> Vec<Parameter> {
     vec![first, least, control("v_c_max", greatest, "greatest control velocity")]
 }
 
-fn response(case: &Case, k: f64, m: f64, rtol: f64) -> Result<Course, Absence> {
+fn response(case: &Case, k: f64, m: f64, rtol: f64) -> Result<TracedPath, Absence> {
     let swing = Step { transition: case.transition, k, m }.motion(case.t_f, rtol).ok_or(Absence::Response)?;
     let status = if swing.least_velocity() < 1.0 { Status::BelowBound } else { Status::Ok };
-    Ok(Course { work: swing.work(), motion: Box::new(swing), status, parameters: Vec::new() })
+    Ok(TracedPath { work: swing.work(), motion: Box::new(swing), status, parameters: Vec::new() })
 }
 
-fn smooth(case: &Case, k: f64, m: f64, rtol: f64) -> Result<Course, Absence> {
+fn smooth(case: &Case, k: f64, m: f64, rtol: f64) -> Result<TracedPath, Absence> {
     let Case { transition: Transition { law, v_i, v_f }, t_f, .. } = *case;
-    let slider = Slider { law, k, m };
+    let slider = SpringBlock { law, k, m };
     let solved = compliant::solve(&slider, (v_i, v_f), t_f, rtol);
     let t_min = case.transition.least_time();
     let (Some(value), Ok(path)) = (solved.value, compliant::path(&slider, (v_i, v_f), t_f, rtol)) else {
@@ -278,12 +278,12 @@ fn smooth(case: &Case, k: f64, m: f64, rtol: f64) -> Result<Course, Absence> {
     };
     let alpha = Parameter::new("alpha", value.alpha, "1", "coefficient of x^3 (1 - x)^3 in ln(v - 1), x = t/t_f");
     let parameters = with_control(alpha, value.control_min, value.control_max);
-    Ok(Course { motion: Box::new(path), status: solved.status, work: value.work, parameters })
+    Ok(TracedPath { motion: Box::new(path), status: solved.status, work: value.work, parameters })
 }
 
-fn pieced(case: &Case, (k, m): (f64, f64), delta_t: f64, bounded: bool, rtol: f64) -> Result<Course, Absence> {
+fn pieced(case: &Case, (k, m): (f64, f64), delta_t: f64, bounded: bool, rtol: f64) -> Result<TracedPath, Absence> {
     let Case { transition: Transition { law, v_i, v_f }, t_f, .. } = *case;
-    let (solved, motion) = regularised::motion(&Slider { law, k, m }, (v_i, v_f), t_f, delta_t, bounded, rtol);
+    let (solved, motion) = regularised::motion(&SpringBlock { law, k, m }, (v_i, v_f), t_f, delta_t, bounded, rtol);
     let (Some(value), Some(motion)) = (solved.value, motion) else {
         let optimum = optimal::solve(&case.transition, t_f, bounded, rtol);
         return Err(match solved.status {
@@ -294,11 +294,11 @@ fn pieced(case: &Case, (k, m): (f64, f64), delta_t: f64, bounded: bool, rtol: f6
     };
     let gap = Parameter::new("gap", value.gap, "1", "(work - W*)/W*");
     let parameters = with_control(gap, value.control_min, value.control_max);
-    Ok(Course { motion, status: solved.status, work: value.work, parameters })
+    Ok(TracedPath { motion, status: solved.status, work: value.work, parameters })
 }
 
-fn member(family: &dyn Family, case: &Case, rtol: f64) -> Result<Course, Absence> {
-    let shortcut = family.solve(case, rtol, &mut Effort::default())?;
+fn member(family: &dyn Family, case: &Case, rtol: f64) -> Result<TracedPath, Absence> {
+    let shortcut = family.solve(case, rtol, &mut SolverStats::default())?;
     let motion = family.motion(case, rtol)?;
     // A step takes any time, but where no protocol arrives it is not counted either.
     let late = case.t_f < case.transition.least_time();
@@ -308,5 +308,5 @@ fn member(family: &dyn Family, case: &Case, rtol: f64) -> Result<Course, Absence
     if shortcut.miss != 0.0 {
         parameters.push(Parameter::new("miss", shortcut.miss, "1", "distance from the target, theta(t_f) v_f - 1"));
     }
-    Ok(Course { motion, status, work: shortcut.work, parameters })
+    Ok(TracedPath { motion, status, work: shortcut.work, parameters })
 }

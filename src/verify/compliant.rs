@@ -1,12 +1,12 @@
 //! `compliant`: the smooth shortcut integrated over time, its control velocity looked at on the way.
 
-use super::course::{Course, Formula, State, arriving};
 use super::extremal::{least_time, solve};
+use super::formula_path::{Formula, FormulaPath, State, arriving};
 use super::open_loop::{Told, growth, is_stiff};
 use super::verdict::{Context, Verdict, number, transition, word};
 use crate::dataset::{Cell, Row};
 use crate::model::Transition;
-use crate::protocol::Slider;
+use crate::protocol::SpringBlock;
 use crate::table::STATUS;
 
 /// `ln(v - 1)` over `x = t/t_f`, as the sum of the powers from 0 to 6.
@@ -49,25 +49,25 @@ pub fn check(row: &Row, context: &Context, rtol: f64) -> Verdict {
         return verdict;
     }
     verdict.demand(row, "alpha");
-    let course = |alpha: f64| {
+    let formula_path = |alpha: f64| {
         let exponent = Exponent::new(&problem, alpha);
         let formula = Formula::Velocity(Box::new(move |x| exponent.velocity(x)));
-        Course { problem, t_f, formula, backward: false }
+        FormulaPath { problem, t_f, formula, backward: false }
     };
-    let Some(alpha) = number(row, "alpha").or_else(|| member(&problem, course)) else {
+    let Some(alpha) = number(row, "alpha").or_else(|| member(&problem, formula_path)) else {
         verdict.miss("alpha was not written, and theta at the end does not tell it");
         return verdict;
     };
-    let here = course(alpha);
+    let here = formula_path(alpha);
     let Some(states) = here.states() else { return Verdict::unchecked("the integrator did not get there") };
     let Some(&[ln_theta, work, _]) = states.last() else { return verdict };
-    let arriving = if alpha == 0.0 { 0.0 } else { arriving(alpha, ln_theta, here.target(), course) };
+    let arriving = if alpha == 0.0 { 0.0 } else { arriving(alpha, ln_theta, here.target(), formula_path) };
     verdict.compare(row, "alpha", Some(arriving), None);
     verdict.compare(row, "work", Some(work), None);
     verdict.compare(row, "v_min", Some(here.least(&states, |y| here.velocity(y))), None);
     verdict.compare(row, "v_max", Some(-here.least(&states, |y| -here.velocity(y))), None);
     verdict.friction(row, here.least(&states, |y| here.friction(y)));
-    let slider = Slider { law: problem.law, k, m };
+    let slider = SpringBlock { law: problem.law, k, m };
     let exponent = Exponent::new(&problem, alpha);
     let control = |x: f64, ln_theta: f64| {
         let [v, v1, v2] = exponent.moment(x, t_f);
@@ -86,14 +86,14 @@ pub fn check(row: &Row, context: &Context, rtol: f64) -> Verdict {
     let pull = |y: &State| (here.friction(y) + m * exponent.moment(y[2], t_f)[1]).abs() / problem.law.a;
     let pull = states.iter().map(pull).fold(0.0, f64::max);
     let reach = if k.is_finite() { k / problem.law.a * t_f * low.abs().max(high.abs()) } else { 0.0 };
-    open_loop(&mut verdict, row, &told, &Along { course: &here, states: &states, least, pull, reach }, rtol);
+    open_loop(&mut verdict, row, &told, &Along { formula_path: &here, states: &states, least, pull, reach }, rtol);
     compare_optimum(&mut verdict, row, &problem, t_f, context);
     verdict
 }
 
 /// A protocol on its way.
 struct Along<'a> {
-    course: &'a Course,
+    formula_path: &'a FormulaPath,
     states: &'a [State],
     /// Least velocity.
     least: f64,
@@ -133,7 +133,7 @@ where
         verdict.miss("motions too stiff for an explicit integrator");
         return;
     }
-    let Some(growth) = growth(&told.slider, along.course, along.states, &told.velocity) else {
+    let Some(growth) = growth(&told.slider, along.formula_path, along.states, &told.velocity) else {
         verdict.miss("motions too stiff for an explicit integrator");
         return;
     };
@@ -156,11 +156,11 @@ where
 }
 
 /// The parameter for which theta arrives; `None` where that does not tell it.
-fn member(problem: &Transition, course: impl Fn(f64) -> Course) -> Option<f64> {
+fn member(problem: &Transition, formula_path: impl Fn(f64) -> FormulaPath) -> Option<f64> {
     const CLOSE: f64 = 1e-10;
     let miss = |alpha: f64| {
-        let course = course(alpha);
-        Some(course.states()?.last()?[0] - course.target())
+        let formula_path = formula_path(alpha);
+        Some(formula_path.states()?.last()?[0] - formula_path.target())
     };
     // Theta at the end falls as alpha rises.
     let rise = ((problem.v_f - 1.0) / (problem.v_i - 1.0)).ln().abs().max(1.0);

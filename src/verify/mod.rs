@@ -1,23 +1,23 @@
 //! A dataset audited: a sample of its rows solved again by a route that shares nothing with the solvers that made it.
 
 mod best_cubic;
+mod block_motion;
 mod compliant;
-mod course;
 mod crossover;
 mod extremal;
-mod fate;
+mod formula_path;
 mod gap;
 mod hopf;
+mod long_term;
 mod open_loop;
 mod optimal;
-mod pieces;
 mod reduced;
+mod regularised_motion;
 mod route;
 mod sample;
 mod shortcut;
 mod stability;
 mod step_response;
-mod swing;
 mod units;
 mod verdict;
 
@@ -107,7 +107,7 @@ pub fn verify(path: &Path, manifest: &Manifest, sample: u64, seed: u64) -> Resul
                 "best_cubic" => best_cubic::check(&row, &context, rtol),
                 "shortcut" => shortcut::check(&row, &context),
                 "compliant" => compliant::check(&row, &context, rtol),
-                "regularised" => pieces::check(&row, &context, rtol),
+                "regularised" => regularised_motion::check(&row, &context, rtol),
                 "step_response" => step_response::check(&row, &context, rtol),
                 "stability" => stability::check(&row, &context),
                 _ if is_reduced => reduced::check(&row, &units, &spec, &context),

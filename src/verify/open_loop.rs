@@ -2,9 +2,9 @@
 //!
 //! In the variables of the model, `v`, `theta` and the spring's length `s`, with the library's explicit integrator.
 
-use super::course::{Course, State};
+use super::formula_path::{FormulaPath, State};
 use super::route::integrate;
-use crate::protocol::Slider;
+use crate::protocol::SpringBlock;
 
 /// A small error in `(ln v, ln theta, k s/a)`, column by column.
 type Matrix = [[f64; 3]; 3];
@@ -22,14 +22,19 @@ pub struct Growth {
 const STIFF: f64 = 1e-4;
 
 /// Whether an explicit integrator cannot follow the block at its greatest velocity.
-pub fn is_stiff(slider: &Slider, least: f64, t_f: f64) -> bool {
+pub fn is_stiff(slider: &SpringBlock, least: f64, t_f: f64) -> bool {
     slider.m > 0.0 && slider.m * least / slider.law.a < STIFF * t_f
 }
 
 /// The growth of errors over a protocol of which `states` are known, `velocity(x)` at a share `x` of the time.
-pub fn growth(slider: &Slider, course: &Course, states: &[State], velocity: impl Fn(f64) -> f64) -> Option<Growth> {
-    let Slider { law, k, m } = *slider;
-    let (t_f, ratio) = (course.t_f, law.b / law.a);
+pub fn growth(
+    slider: &SpringBlock,
+    formula_path: &FormulaPath,
+    states: &[State],
+    velocity: impl Fn(f64) -> f64,
+) -> Option<Growth> {
+    let SpringBlock { law, k, m } = *slider;
+    let (t_f, ratio) = (formula_path.t_f, law.b / law.a);
     // By piece: the errors at its end for unit errors at its start. What follows from the others is not an error of its own.
     let piece = |pair: &[State]| {
         let (from, to) = (pair[0][2], pair[1][2]);
@@ -114,7 +119,7 @@ fn norm(matrix: &Matrix) -> f64 {
 
 /// A protocol to be told to the spring, over the share `x` of the time.
 pub struct Told<V, C> {
-    pub slider: Slider,
+    pub slider: SpringBlock,
     pub v_i: f64,
     pub v_f: f64,
     pub t_f: f64,
@@ -128,7 +133,7 @@ impl<V: Fn(f64) -> f64, C: Fn(f64, f64) -> f64> Told<V, C> {
     /// Distance from the target at the end, in `(ln v, ln theta, k s/a)`, of a block that starts in steady sliding, under
     /// the control told continuously or, every `dt`, sampled and held.
     pub fn miss(&self, dt: Option<f64>) -> Option<f64> {
-        let &Told { slider: Slider { law, k, m }, v_i, v_f, t_f, .. } = self;
+        let &Told { slider: SpringBlock { law, k, m }, v_i, v_f, t_f, .. } = self;
         let (ratio, pull) = (law.b / law.a, k / law.a);
         // p = (k s - tau_ss(v_f))/a, y = ln(theta v_f), x = ln(v/v_f), and ln theta of the protocol.
         let start = (v_i / v_f).ln();

@@ -11,7 +11,7 @@ use crate::grid::Quantity;
 use crate::model::Units;
 use crate::protocol::Status;
 use crate::sweep::{AxisSpec, AxisValue, BlockSpec, Spec, Sweep, TableSpec};
-use crate::table::{OPTIMUM_AXES, STATUS, Sheet, Signal};
+use crate::table::{ColumnBuffer, OPTIMUM_AXES, STATUS, Signal};
 
 /// Shortcuts of a landscape that are held at a time.
 const PIECE: usize = 1 << 16;
@@ -66,15 +66,16 @@ pub fn check(written: &Row, units: &Units, spec: &Spec, context: &Context) -> Ve
     let Some(sweep) = landscape(written, spec) else {
         return Verdict::unchecked("what its shortcuts are is told by a file of points");
     };
-    let (stores, signal) = (sweep.optima(), Signal::default());
+    let (stores, signal) = (sweep.optimum_cache(), Signal::default());
     let (Some(request), Some(optima)) = (sweep.requests.first(), stores.first()) else {
         return Verdict::unchecked("its spec does not ask for it");
     };
     let job = sweep.job(request, optima, &signal);
     let mut verdict = Verdict::default();
-    let mut sheet = Sheet::new(request.selection.indices().len());
+    let mut sheet = ColumnBuffer::new(request.selection.indices().len());
     let mut told = Told::default();
-    let cells = |sheet: &Sheet, place: usize| sheet.columns.iter().map(|column| column[place]).collect::<Vec<f64>>();
+    let cells =
+        |sheet: &ColumnBuffer, place: usize| sheet.columns.iter().map(|column| column[place]).collect::<Vec<f64>>();
     let all = request.rows;
     // From the middle of equal parts of the landscape.
     let solved = (0..SOLVED).map(|part| ((2 * part + 1) as f64 / (2 * SOLVED) as f64 * all as f64) as u64);

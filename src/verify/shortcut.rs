@@ -1,7 +1,7 @@
 //! `shortcut`: the family's formula with the row's `alpha`, integrated over time in the direction in which it contracts.
 
-use super::course::{Course, Formula, arriving};
 use super::extremal::solve;
+use super::formula_path::{Formula, FormulaPath, arriving};
 use super::gap::Cubic;
 use super::route::integrate;
 use super::verdict::NEGATIVE;
@@ -49,8 +49,8 @@ pub fn check(row: &Row, context: &Context) -> Verdict {
         verdict.miss("alpha was not written");
         return verdict;
     }
-    let course = |alpha: f64| course(problem, t_f, family, alpha, tau_ceiling);
-    let course_here = course(alpha.unwrap_or(0.0));
+    let formula_path = |alpha: f64| formula_path(problem, t_f, family, alpha, tau_ceiling);
+    let course_here = formula_path(alpha.unwrap_or(0.0));
     let Some(states) = course_here.states() else {
         verdict.miss("the integrator did not get there");
         return verdict;
@@ -59,7 +59,7 @@ pub fn check(row: &Row, context: &Context) -> Verdict {
     let target = course_here.target();
     match alpha {
         Some(alpha) if alpha != 0.0 => {
-            let arriving = arriving(alpha, end[0], target, course);
+            let arriving = arriving(alpha, end[0], target, formula_path);
             let doubtful = (end[0] - target).abs() > TOLD;
             let tells = arriving.is_finite() && (arriving - alpha).abs() > MOVED * alpha.abs();
             if doubtful && !tells {
@@ -149,7 +149,7 @@ fn obstacle(
     }
 }
 
-fn course(problem: Transition, t_f: f64, family: &str, alpha: f64, tau_ceiling: f64) -> Course {
+fn formula_path(problem: Transition, t_f: f64, family: &str, alpha: f64, tau_ceiling: f64) -> FormulaPath {
     let Transition { law, v_i, v_f } = problem;
     let formula = match family {
         "step" => Formula::Velocity(Box::new(move |_| v_f)),
@@ -170,5 +170,5 @@ fn course(problem: Transition, t_f: f64, family: &str, alpha: f64, tau_ceiling: 
         }
     };
     let backward = matches!(formula, Formula::Friction(_)) && law.b > law.a;
-    Course { problem, t_f, formula, backward }
+    FormulaPath { problem, t_f, formula, backward }
 }

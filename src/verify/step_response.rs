@@ -2,9 +2,9 @@
 
 use std::cell::Cell;
 
-use super::fate::{Fate, follow};
+use super::block_motion::Block;
 use super::hopf;
-use super::swing::Block;
+use super::long_term::{LongTermBehaviour, follow};
 use super::verdict::{Context, Verdict, number, transition, word};
 use crate::dataset::Row;
 use crate::stability::SteadySliding;
@@ -60,8 +60,8 @@ pub fn check(row: &Row, _: &Context, rtol: f64) -> Verdict {
         fast: (0.01 * rtol).cbrt(),
         work: Cell::new(0),
     };
-    let course = follow(&block, stable, start, rtol);
-    let infinite = matches!(course.fate, Ok(Fate::Infinite));
+    let simulation = follow(&block, stable, start, rtol);
+    let infinite = matches!(simulation.long_term, Ok(LongTermBehaviour::Infinite));
     if infinite || word(row, STATUS) == Some("infeasible") {
         verdict.status(row, infinite);
         return verdict;
@@ -69,10 +69,10 @@ pub fn check(row: &Row, _: &Context, rtol: f64) -> Verdict {
     let velocity = |x: f64| v_f * x.exp();
     // How much an error of the spring's force moves ln v where it follows.
     let felt = (block.pull * block.mu).sqrt().max(1.0).sqrt();
-    let high = course.high.map_or(0.0, |high| high.x.max(0.0));
-    let low = course.low.map_or(0.0, |low| low.x.min(0.0));
+    let high = simulation.high.map_or(0.0, |high| high.x.max(0.0));
+    let low = simulation.low.map_or(0.0, |low| low.x.min(0.0));
     let peak_time = |verdict: &mut Verdict| {
-        let Some(top) = course.high.filter(|top| top.x > NONE) else { return };
+        let Some(top) = simulation.high.filter(|top| top.x > NONE) else { return };
         let scale = (top.t / top.x.exp_m1().min(1.0)).max(top.flatness);
         verdict.compare_number(row, "t_peak", top.t / v_f, scale / v_f);
     };
@@ -83,8 +83,8 @@ pub fn check(row: &Row, _: &Context, rtol: f64) -> Verdict {
         }
     };
     // What is not known to rtol is null.
-    match course.fate {
-        Ok(Fate::Settled { time, speed, margin }) => {
+    match simulation.long_term {
+        Ok(LongTermBehaviour::Settled { time, speed, margin }) => {
             compare_status(&mut verdict, low);
             verdict.compare_word(row, "outcome", "settled");
             verdict.compare_word(row, "stick_slip", "no");
@@ -99,7 +99,7 @@ pub fn check(row: &Row, _: &Context, rtol: f64) -> Verdict {
             }
             ["period", "cycle_peak", "cycle_trough"].iter().for_each(|column| verdict.compare(row, column, None, None));
         }
-        Ok(Fate::Cycle(cycle)) => {
+        Ok(LongTermBehaviour::Cycle(cycle)) => {
             verdict.compare_word(row, "outcome", "limit_cycle");
             verdict.compare_word(row, "stick_slip", "yes");
             // A cycle that hardly attracts hardly tells where it is.
@@ -117,11 +117,11 @@ pub fn check(row: &Row, _: &Context, rtol: f64) -> Verdict {
             verdict.compare_number(row, "cycle_trough", trough, vague * felt * trough);
             verdict.compare(row, "settling_time", None, None);
         }
-        Ok(Fate::Infinite) => {}
+        Ok(LongTermBehaviour::Infinite) => {}
         Err(reason) => {
             verdict.miss(reason);
             // What happens before it was left does not depend on the end.
-            if number(row, "t_peak").is_some_and(|t| t * v_f < course.t) {
+            if number(row, "t_peak").is_some_and(|t| t * v_f < simulation.t) {
                 verdict.compare(row, "v_peak", Some(velocity(high)), None);
                 peak_time(&mut verdict);
             }

@@ -9,7 +9,7 @@ use crate::common::{LANDSCAPE, MATERIAL, files};
 use slipsweep::dataset::{Folder, Footer, Layout, encode};
 use slipsweep::protocol::Status;
 use slipsweep::sweep::{Plan, Sweep};
-use slipsweep::table::Sheet;
+use slipsweep::table::ColumnBuffer;
 
 fn slipsweep(folder: &Path) -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_slipsweep"));
@@ -63,7 +63,7 @@ fn strict_fails_where_a_row_is_not_converged() {
     let sweep = Sweep::load(&folder.path().join("spec.toml")).expect("is legal");
     let request = &sweep.requests[0];
     let layout = Layout::new(request.table, &request.selection, &sweep.grid);
-    let mut sheet = Sheet::new(layout.columns.len());
+    let mut sheet = ColumnBuffer::new(layout.columns.len());
     sheet.resize(2);
     sheet.status = vec![Status::Ok, Status::NotConverged];
     let footer = Footer::new(&Plan::new(&sweep).manifest(&sweep), "optimal", 0..2);

@@ -8,7 +8,7 @@ use std::process::Command;
 use polars::prelude::DataFrame;
 use slipsweep::dataset::frame;
 use slipsweep::sweep::Sweep;
-use slipsweep::table::Work;
+use slipsweep::table::RunStats;
 
 use crate::common::{numbers, read, run, sweep, words};
 
@@ -28,7 +28,7 @@ const TABLES: [(&str, &str); 9] = [
 /// The axes that all tables have.
 const COMMON: &str = "a = [0.03]\nb = [0.04, 0.02]\nv_i = [2.0, 3.0]\nv_f = [50.0, 100.0]\n";
 
-fn table(folder: &Path, axes: &str, name: &str) -> (DataFrame, Work) {
+fn table(folder: &Path, axes: &str, name: &str) -> (DataFrame, RunStats) {
     let out = folder.join("out");
     let _ = fs::remove_dir_all(&out);
     let outcome = run(&sweep(folder, axes, &format!("[tables.{name}]\n")), &out, 2);
@@ -68,7 +68,7 @@ fn regress_values_that_repeat_are_solved_once_and_written_as_asked() {
         let (once, work) = table(folder.path(), &format!("{own}{material}{once}"), name);
         let (all, again) = table(folder.path(), &format!("{own}{material}{twice}"), name);
         // The points of a landscape are no solves; that it is prepared and its optimum are.
-        let solves = |work: Work| if name == "gap" { Work { quadratures: 0, nodes: 0, ..work } } else { work };
+        let solves = |work: RunStats| if name == "gap" { RunStats { quadratures: 0, nodes: 0, ..work } } else { work };
         assert_eq!(solves(work), solves(again), "{name}");
         assert_eq!(all.height(), 3 * once.height(), "{name}");
         for row in 0..all.height() {
@@ -96,7 +96,7 @@ fn regress_minus_zero_is_zero() {
         assert!(plus.equals_missing(&minus), "{name}");
         assert_eq!(work, again, "{name}");
         assert!(both.height() > plus.height(), "{name}");
-        let solves = |work: Work| if name == "gap" { Work { quadratures: 0, nodes: 0, ..work } } else { work };
+        let solves = |work: RunStats| if name == "gap" { RunStats { quadratures: 0, nodes: 0, ..work } } else { work };
         assert_eq!(solves(work), solves(once), "{name}");
         // Written as asked.
         let signs: Vec<bool> =

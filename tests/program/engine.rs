@@ -8,7 +8,7 @@ use arrow_array::{ArrayRef, Float64Array, Int64Array, RecordBatch};
 use parquet::file::reader::{FileReader, SerializedFileReader};
 use slipsweep::dataset::{Build, Folder};
 use slipsweep::sweep::{Plan, RunError, Sweep, TableOutcome};
-use slipsweep::table::{Signal, Work};
+use slipsweep::table::{RunStats, Signal};
 
 const ALL_TABLES: &str = "[tables.gap]\n[tables.best_cubic]\n[tables.optimal]\n[tables.crossover]\n";
 
@@ -40,7 +40,7 @@ fn finished_parts_are_kept_and_the_rest_is_the_same_as_without_a_break() {
     assert_eq!((outcome.work.optima, outcome.work.landscapes), (2, 2));
     assert_eq!(files(&folder.path().join("test")), whole);
     let again = run(&sweep, folder.path(), 2);
-    assert_eq!(again.work, Work::default());
+    assert_eq!(again.work, RunStats::default());
     assert_eq!(files(&folder.path().join("test")), whole);
 }
 
@@ -83,7 +83,7 @@ fn columns_that_are_not_asked_for_cost_nothing() {
     assert_eq!(feasible, 217_891);
     let out = folder.path().join("v_min");
     let sweep = sweep(folder.path(), LANDSCAPE, "[tables.gap]\ncolumns = [\"v_min\"]\n");
-    assert_eq!(run(&sweep, &out, 2).work, Work { landscapes: 4, ..Work::default() });
+    assert_eq!(run(&sweep, &out, 2).work, RunStats { landscapes: 4, ..RunStats::default() });
     assert_eq!(numbers(&read(&out, "gap"), "v_min"), numbers(&read(folder.path(), "gap"), "v_min"));
 }
 
@@ -300,15 +300,15 @@ fn paper_landscape_read_back() {
     let folder = tempfile::tempdir().expect("is writable");
     let sweep = sweep(folder.path(), LANDSCAPE, "[tables.gap]\n[tables.crossover]\n");
     let outcome = run(&sweep, folder.path(), 2);
-    let digest = &outcome.digests[0];
-    assert_eq!(digest.status.iter().sum::<u64>(), 482_403);
+    let statistics = &outcome.digests[0];
+    assert_eq!(statistics.status.iter().sum::<u64>(), 482_403);
     // Near theta = 0 the friction of 83 shortcuts is negative.
-    assert_eq!(digest.status[3..], [83, 0, 0]);
-    let least: Vec<_> = digest.least().collect();
+    assert_eq!(statistics.status[3..], [83, 0, 0]);
+    let least: Vec<_> = statistics.least().collect();
     assert_eq!(least.len(), 3);
     // Where the paper sees the best shortcut at t_f = 0.02: (-0.12, -0.068), to a step of the grid.
     let cell = |row: usize, column: &str| {
-        let place = digest.columns.iter().position(|(name, _)| name == column).expect("is there");
+        let place = statistics.columns.iter().position(|(name, _)| name == column).expect("is there");
         let slipsweep::dataset::Cell::Number(value) = least[row].cell(place) else { panic!("{:?}", least[row]) };
         *value
     };

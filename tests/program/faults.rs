@@ -48,7 +48,7 @@ fn a_flipped_bit_is_found_wherever_it_is() {
     let path = Folder::new(folder.path(), "test").part("optimal", 0);
     let good = fs::read(&path).expect("is there");
     let sound = part_of(&sweep, folder.path(), Look::Whole);
-    assert!(matches!(&sound, State::There { digest } if digest.status[0] == 30), "{sound:?}");
+    assert!(matches!(&sound, State::There { statistics } if statistics.status[0] == 30), "{sound:?}");
     let mut next = numbers();
     // The last bytes are the checksum, the schema, and what Parquet ends with.
     let random = (0..1000).map(|_| next(good.len())).collect::<Vec<_>>();

@@ -6,7 +6,7 @@ use std::path::Path;
 use std::sync::Arc;
 
 use crate::common::{files, numbers, read, run, words};
-use slipsweep::grid::{Axis, Block, Derived, Expression, Factor, Grid, Projection, Quantity, Scale, Values};
+use slipsweep::grid::{Axis, Block, Derived, Expression, Factor, Grid, Quantity, RowIndex, Scale, Values};
 use slipsweep::sweep::{Plan, SpecError, Sweep};
 use slipsweep::table::OPTIMUM_AXES;
 
@@ -167,7 +167,7 @@ impl Known {
 }
 
 /// Compares every way to ask for rows with the rows themselves.
-fn check(projection: &Projection, expected: &[Values1], axes: &[Quantity], random: &mut Random, place: &str) {
+fn check(projection: &RowIndex, expected: &[Values1], axes: &[Quantity], random: &mut Random, place: &str) {
     assert_eq!(projection.rows(), expected.len() as u64, "{place}");
     let count = expected.len();
     for _ in 0..4 {

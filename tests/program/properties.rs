@@ -13,7 +13,7 @@ use proptest::collection::vec;
 use proptest::prelude::*;
 use proptest::sample::{select, subsequence};
 use proptest::test_runner::{Config, FileFailurePersistence, RngSeed};
-use slipsweep::grid::{Point, Projection, Quantity};
+use slipsweep::grid::{Point, Quantity, RowIndex};
 use slipsweep::sweep::{SpecError, Sweep};
 
 fn config(cases: u32) -> Config {
@@ -37,7 +37,7 @@ fn parse(text: &str) -> Result<Sweep, SpecError> {
     Sweep::parse(text, Path::new(""))
 }
 
-fn rows(text: &str) -> Projection {
+fn rows(text: &str) -> RowIndex {
     parse(text).unwrap_or_else(|error| panic!("{text}{error}")).requests.swap_remove(0).projection
 }
 
@@ -46,7 +46,7 @@ fn bits(point: &Point) -> Vec<u64> {
     Quantity::ALL.map(|quantity| point[quantity].to_bits()).to_vec()
 }
 
-fn all(rows: &Projection) -> Vec<Vec<u64>> {
+fn all(rows: &RowIndex) -> Vec<Vec<u64>> {
     (0..rows.rows()).map(|row| bits(&rows.point(row))).collect()
 }
 

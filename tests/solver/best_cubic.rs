@@ -4,7 +4,7 @@ use crate::reference;
 use crate::support::relative;
 use slipsweep::model::{Law, Transition};
 use slipsweep::protocol::best_cubic::{BestCubic, solve};
-use slipsweep::protocol::cubic::{Landscape, Shortcuts};
+use slipsweep::protocol::cubic::{Landscape, LandscapeBuffers};
 use slipsweep::protocol::{Status, optimal};
 
 const PAPER: Transition = Transition { law: Law { a: 0.03, b: 0.05 }, v_i: 3.0, v_f: 100.0 };
@@ -29,7 +29,7 @@ fn scan(transition: &Transition, t_f: f64, bounded: bool, centre: (f64, f64), re
     for i in 0..n {
         let (mut work, mut v_min) = (vec![0.0; n], vec![0.0; n]);
         let mut status = vec![Status::NotConverged; n];
-        let out = Shortcuts { work: &mut work, v_min: &mut v_min, status: &mut status };
+        let out = LandscapeBuffers { work: &mut work, v_min: &mut v_min, status: &mut status };
         landscape.evaluate(&vec![at(centre.0, i); n], &a_3, out);
         for (work, status) in work.into_iter().zip(status) {
             let admissible = match status {
@@ -257,7 +257,7 @@ fn regress_best_shortcuts_of_far_changes() {
             for reach in [1e-6, 1e-3, 0.1] {
                 let size = reach * best.a_2.abs().max(best.a_3.abs());
                 let (mut work, mut status) = ([f64::NAN], [Status::NotConverged]);
-                let out = Shortcuts { work: &mut work, v_min: &mut [], status: &mut status };
+                let out = LandscapeBuffers { work: &mut work, v_min: &mut [], status: &mut status };
                 landscape.evaluate(&[best.a_2 + size * cosine], &[best.a_3 + size * sine], out);
                 assert!(status[0] != Status::Ok || work[0] >= best.work * (1.0 - 4e-12), "{transition:?} {k} {reach}");
             }

@@ -8,24 +8,24 @@ use ode_solvers::dop_shared::OutputType;
 use ode_solvers::{Dop853, SVector, System};
 use slipsweep::model::Law;
 use slipsweep::protocol::compliant::{self, Compliant, Path};
-use slipsweep::protocol::{Slider, Status};
+use slipsweep::protocol::{SpringBlock, Status};
 use slipsweep::stability::{amplification, held_error, open_loop_error};
 
 /// The paper's block and spring, and what is asked of it: `(v_i, v_f)` and `t_f`.
-const PAPER: (Slider, (f64, f64), f64) =
-    (Slider { law: Law { a: 0.005, b: 0.01 }, k: 7.5e-3, m: 2.5e-16 }, (1e5, 3.2e6), 3.1e-6);
+const PAPER: (SpringBlock, (f64, f64), f64) =
+    (SpringBlock { law: Law { a: 0.005, b: 0.01 }, k: 7.5e-3, m: 2.5e-16 }, (1e5, 3.2e6), 3.1e-6);
 
 /// A slower one, of the material of the paper's rigid figures.
-const SLOW: (Slider, (f64, f64), f64) =
-    (Slider { law: Law { a: 0.03, b: 0.05 }, k: 0.5, m: 1e-6 }, (3.0, 100.0), 0.037);
+const SLOW: (SpringBlock, (f64, f64), f64) =
+    (SpringBlock { law: Law { a: 0.03, b: 0.05 }, k: 0.5, m: 1e-6 }, (3.0, 100.0), 0.037);
 
-fn solve((slider, velocities, t_f): (Slider, (f64, f64), f64), rtol: f64) -> Compliant {
+fn solve((slider, velocities, t_f): (SpringBlock, (f64, f64), f64), rtol: f64) -> Compliant {
     let solved = compliant::solve(&slider, velocities, t_f, rtol);
     assert_eq!(solved.status, Status::Ok, "{slider:?} {velocities:?} {t_f}");
     solved.value.expect("has a member")
 }
 
-fn path((slider, velocities, t_f): (Slider, (f64, f64), f64)) -> Path {
+fn path((slider, velocities, t_f): (SpringBlock, (f64, f64), f64)) -> Path {
     compliant::path(&slider, velocities, t_f, 1e-12).expect("has a member")
 }
 
@@ -35,8 +35,11 @@ fn reference_every_number_is_good_to_rtol() {
     assert!(rows.len() >= 40, "{} rows", rows.len());
     for rtol in [1e-6, 1e-10, 1e-13] {
         for row in &rows {
-            let slider =
-                Slider { law: Law { a: row.number("a"), b: row.number("b") }, k: row.number("k"), m: row.number("m") };
+            let slider = SpringBlock {
+                law: Law { a: row.number("a"), b: row.number("b") },
+                k: row.number("k"),
+                m: row.number("m"),
+            };
             let (v_i, v_f, t_f) = (row.number("v_i"), row.number("v_f"), row.number("t_f"));
             let found = solve((slider, (v_i, v_f), t_f), rtol);
             // t_min is known to a few eps of itself, so alpha near it is known to that share of t_f - t_min.
@@ -79,7 +82,7 @@ fn paper_larger_steps_of_the_control_leave_visible_oscillations() {
 /// time over `t_f`, which the library does not tell exactly inside its steps.
 #[derive(Clone, Copy)]
 struct Sliding {
-    slider: Slider,
+    slider: SpringBlock,
     velocities: (f64, f64),
     t_f: f64,
     alpha: f64,
@@ -87,7 +90,7 @@ struct Sliding {
 }
 
 impl Sliding {
-    fn new((slider, velocities, t_f): (Slider, (f64, f64), f64)) -> Sliding {
+    fn new((slider, velocities, t_f): (SpringBlock, (f64, f64), f64)) -> Sliding {
         Sliding { slider, velocities, t_f, alpha: solve((slider, velocities, t_f), 1e-13).alpha, held: None }
     }
 
@@ -109,7 +112,7 @@ impl Sliding {
 
 impl System<f64, SVector<f64, 5>> for Sliding {
     fn system(&self, _: f64, y: &SVector<f64, 5>, dy: &mut SVector<f64, 5>) {
-        let Slider { law, k, m } = self.slider;
+        let SpringBlock { law, k, m } = self.slider;
         let x = y[4];
         let (w_i, w_f, z) = (self.velocities.0 - 1.0, self.velocities.1 - 1.0, 1.0 - x);
         let v = y[0].exp();
@@ -149,12 +152,12 @@ fn integrate(sliding: Sliding, (t, t_end): (f64, f64), start: SVector<f64, 5>) -
     *stepper.y_out().last().expect("has an end")
 }
 
-fn steady(slider: &Slider, v: f64) -> SVector<f64, 5> {
+fn steady(slider: &SpringBlock, v: f64) -> SVector<f64, 5> {
     SVector::<f64, 5>::new(v.ln(), -v.ln(), (slider.law.a - slider.law.b) * v.ln(), -v.ln(), 0.0)
 }
 
 /// The difference of two states in `(ln v, ln theta, k s/a)`.
-fn scaled(slider: &Slider, difference: SVector<f64, 5>) -> [f64; 3] {
+fn scaled(slider: &SpringBlock, difference: SVector<f64, 5>) -> [f64; 3] {
     [difference[0], difference[1], difference[2] / slider.law.a]
 }
 
@@ -211,8 +214,8 @@ fn reference_a_held_control_misses_by_what_a_library_finds() {
 
 #[test]
 fn the_error_of_a_held_control_is_of_second_order() {
-    let rigid = (Slider { k: f64::INFINITY, ..SLOW.0 }, SLOW.1, SLOW.2);
-    let light = (Slider { m: 0.0, ..SLOW.0 }, SLOW.1, SLOW.2);
+    let rigid = (SpringBlock { k: f64::INFINITY, ..SLOW.0 }, SLOW.1, SLOW.2);
+    let light = (SpringBlock { m: 0.0, ..SLOW.0 }, SLOW.1, SLOW.2);
     // A rigid spring forgives the third order later.
     for (case, n) in [(PAPER, 800.0), (SLOW, 800.0), (light, 800.0), (rigid, 6400.0)] {
         let path = path(case);
@@ -226,7 +229,7 @@ fn the_error_of_a_held_control_is_of_second_order() {
 
 #[test]
 fn the_loop_closes_to_what_the_amplification_allows() {
-    let light = (Slider { m: 0.0, ..PAPER.0 }, PAPER.1, PAPER.2);
+    let light = (SpringBlock { m: 0.0, ..PAPER.0 }, PAPER.1, PAPER.2);
     let back = (SLOW.0, (100.0, 3.0), 0.5);
     for case in [PAPER, light, SLOW, back] {
         let path = path(case);
@@ -260,25 +263,26 @@ fn derivatives_are_those_of_the_path() {
 #[test]
 fn stiff_springs_and_light_blocks_tend_to_rigid_ones_and_to_none() {
     let (slider, velocities, t_f) = SLOW;
-    let rigid = (Slider { k: f64::INFINITY, ..slider }, velocities, t_f);
+    let rigid = (SpringBlock { k: f64::INFINITY, ..slider }, velocities, t_f);
     let expected = solve(rigid, 1e-12);
     assert_eq!([expected.control_min, expected.control_max], [expected.v_min, expected.v_max]);
     let grown = amplification(&path(rigid), 1e-10).number.expect("is solved");
     let mut last = f64::INFINITY;
     for k in [1e3, 1e5, 1e7] {
-        let found = solve((Slider { k, ..slider }, velocities, t_f), 1e-12);
+        let found = solve((SpringBlock { k, ..slider }, velocities, t_f), 1e-12);
         assert_eq!([found.alpha, found.work, found.v_max], [expected.alpha, expected.work, expected.v_max]);
         let lag = relative(found.control_max, expected.control_max);
         assert!(lag < 0.02 * last && lag < 200.0 / k, "{k}: {lag}");
         last = lag;
-        let without_mass = path((Slider { k, m: 0.0, ..slider }, velocities, t_f));
+        let without_mass = path((SpringBlock { k, m: 0.0, ..slider }, velocities, t_f));
         let found = amplification(&without_mass, 1e-10).number.expect("is solved");
         assert!(relative(found, grown) < 10.0 / k, "{k}: {found} {grown}");
     }
-    let without_mass = path((Slider { m: 0.0, ..slider }, velocities, t_f));
+    let without_mass = path((SpringBlock { m: 0.0, ..slider }, velocities, t_f));
     let expected = amplification(&without_mass, 1e-10).number.expect("is solved");
     for m in [1e-8, 1e-10, 1e-12] {
-        let found = amplification(&path((Slider { m, ..slider }, velocities, t_f)), 1e-10).number.expect("is solved");
+        let found =
+            amplification(&path((SpringBlock { m, ..slider }, velocities, t_f)), 1e-10).number.expect("is solved");
         assert!(relative(found, expected) < 1e5 * m, "{m}: {found} {expected}");
     }
 }
@@ -297,7 +301,7 @@ fn regress_equal_velocities_are_a_constant_protocol() {
 fn regress_what_does_not_exist_is_infeasible() {
     let (slider, velocities, t_f) = SLOW;
     let t_min = ((100.0f64 - 3.0) / (100.0 * 2.0)).ln_1p();
-    let status = |slider: Slider, velocities, t_f| {
+    let status = |slider: SpringBlock, velocities, t_f| {
         let solved = compliant::solve(&slider, velocities, t_f, 1e-10);
         assert!(solved.value.is_none());
         solved.status
@@ -309,10 +313,10 @@ fn regress_what_does_not_exist_is_infeasible() {
         (slider, velocities, 0.0),
         (slider, velocities, f64::INFINITY),
         (slider, velocities, f64::NAN),
-        (Slider { k: 0.0, ..slider }, velocities, t_f),
-        (Slider { m: -1.0, ..slider }, velocities, t_f),
-        (Slider { m: f64::INFINITY, ..slider }, velocities, t_f),
-        (Slider { law: Law { a: 0.0, b: 0.05 }, ..slider }, velocities, t_f),
+        (SpringBlock { k: 0.0, ..slider }, velocities, t_f),
+        (SpringBlock { m: -1.0, ..slider }, velocities, t_f),
+        (SpringBlock { m: f64::INFINITY, ..slider }, velocities, t_f),
+        (SpringBlock { law: Law { a: 0.0, b: 0.05 }, ..slider }, velocities, t_f),
     ] {
         assert_eq!(status(slider, velocities, t_f), Status::Infeasible, "{slider:?} {velocities:?} {t_f}");
     }
@@ -329,7 +333,7 @@ fn regress_every_corner_of_the_range_is_solved() {
             for share in [1e-9, 1e-6, 1e-3, 0.1, 1.0, 10.0, 1e3, 1e6] {
                 for (k, m) in [(1e-3, 0.0), (1.0, 1e-6), (f64::INFINITY, 1.0)] {
                     for t_f in [share / v_f, t_min * (1.0 + share)] {
-                        let slider = Slider { law: Law { a: 1e-3, b: 2e-3 }, k, m };
+                        let slider = SpringBlock { law: Law { a: 1e-3, b: 2e-3 }, k, m };
                         for rtol in [1e-6, 1e-10, 1e-13] {
                             let found = compliant::solve(&slider, (v_i, v_f), t_f, rtol);
                             assert_ne!(found.status, Status::NotConverged, "{slider:?} {v_i} {v_f} {t_f} {rtol}");
@@ -350,7 +354,7 @@ fn regress_every_corner_of_the_range_is_solved() {
 #[test]
 fn regress_work_counts() {
     let solved = compliant::solve(&PAPER.0, PAPER.1, PAPER.2, 1e-10);
-    assert_eq!((solved.effort.quadratures, solved.effort.nodes), (7, 480));
+    assert_eq!((solved.stats.quadratures, solved.stats.nodes), (7, 480));
     let path = path(PAPER);
     let followed =
         [amplification(&path, 1e-10), open_loop_error(&path, 1e-10), held_error(&path, PAPER.2 / 100.0, 1e-10)];
@@ -364,7 +368,7 @@ fn regress_work_counts() {
 #[test]
 fn regress_amplifications_beyond_the_square_root_of_the_largest_double() {
     let at = |t_f| {
-        let slider = Slider { law: Law { a: 0.01, b: 0.05 }, k: 0.001, m: 0.0 };
+        let slider = SpringBlock { law: Law { a: 0.01, b: 0.05 }, k: 0.001, m: 0.0 };
         amplification(&path((slider, (100.0, 1000.0), t_f)), 1e-10).number
     };
     for (t_f, expected) in [(0.2, 176.42), (0.3, 263.3)] {
@@ -380,7 +384,7 @@ fn regress_amplifications_beyond_the_square_root_of_the_largest_double() {
 fn regress_control_velocities_of_slow_protocols_on_soft_springs() {
     let (law, k, t_f) = (Law { a: 0.03, b: 0.05 }, 1e-20, 1e13);
     for rtol in [1e-6, 1e-10] {
-        let found = solve((Slider { law, k, m: 1e-9 }, (2.0, 3.0), t_f), rtol);
+        let found = solve((SpringBlock { law, k, m: 1e-9 }, (2.0, 3.0), t_f), rtol);
         let rise = 2f64.ln();
         let told = |x: f64| {
             let (flat, z) = (x * x * (1.0 - x) * (1.0 - x), 1.0 - x);
@@ -402,6 +406,6 @@ fn regress_control_velocities_of_slow_protocols_on_soft_springs() {
 fn regress_a_soft_spring_that_slides_steadily_is_driven_as_fast() {
     let law = Law { a: 0.00018869557042703084, b: 0.00018869557042703084 };
     let v = 1.0000219636724441;
-    let found = solve((Slider { law, k: 5.39280429386416e-32, m: 1e-30 }, (v, v), 3.953104389605138e8), 4e-3);
+    let found = solve((SpringBlock { law, k: 5.39280429386416e-32, m: 1e-30 }, (v, v), 3.953104389605138e8), 4e-3);
     assert_eq!((found.control_min, found.control_max), (v, v));
 }

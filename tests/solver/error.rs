@@ -2,10 +2,10 @@
 //! random points, and the 40-digit tables.
 
 use slipsweep::model::{Law, Transition};
-use slipsweep::protocol::cubic::{Landscape, Shortcuts};
+use slipsweep::protocol::cubic::{Landscape, LandscapeBuffers};
 use slipsweep::protocol::optimal::{self, Optimum};
 use slipsweep::protocol::shortcut::{Case, find};
-use slipsweep::protocol::{Effort, Slider, Status, best_cubic, compliant, error};
+use slipsweep::protocol::{SolverStats, SpringBlock, Status, best_cubic, compliant, error};
 
 use crate::extent::quick_or_long;
 use crate::stress::random::Random;
@@ -56,7 +56,7 @@ fn assert_honest(tag: &str, claims: &[Claim]) {
 /// Work, least velocity and status.
 fn work(transition: &Transition, t_f: f64, rtol: f64, (a_2, a_3): (f64, f64)) -> (f64, f64, Status) {
     let (mut work, mut v_min, mut status) = ([f64::NAN], [f64::NAN], [Status::NotConverged]);
-    let out = Shortcuts { work: &mut work, v_min: &mut v_min, status: &mut status };
+    let out = LandscapeBuffers { work: &mut work, v_min: &mut v_min, status: &mut status };
     Landscape::new(transition, t_f, rtol).evaluate(&[a_2], &[a_3], out);
     (work[0], v_min[0], status[0])
 }
@@ -177,9 +177,9 @@ fn reference_work_errors_of_families_are_bounded() {
             let family = if name == "shortcut_friction" { "bounded_friction" } else { row.text("family") };
             let tau_ceiling = if name == "shortcut_friction" { row.number("tau_ceiling") } else { f64::INFINITY };
             let case = Case { transition: transition(row), t_f: row.number("t_f"), tau_ceiling };
-            let (family, effort) = (find(family)?, &mut Effort::default());
-            let member = family.solve(&case, rtol, effort).ok()?;
-            let bound = error::of_member(family, &case, &member, effort)?;
+            let (family, stats) = (find(family)?, &mut SolverStats::default());
+            let member = family.solve(&case, rtol, stats).ok()?;
+            let bound = error::of_member(family, &case, &member, stats)?;
             Some(Claim { found: member.work, bound, truth: row.optional("work")? })
         });
     }
@@ -189,7 +189,7 @@ fn reference_work_errors_of_families_are_bounded() {
 fn reference_work_errors_of_smooth_and_best_shortcuts_are_bounded() {
     claims("compliant", &RTOLS, |row, rtol| {
         let Transition { law, v_i, v_f } = transition(row);
-        let slider = Slider { law, k: row.number("k"), m: row.number("m") };
+        let slider = SpringBlock { law, k: row.number("k"), m: row.number("m") };
         let solve = |rtol| Some(compliant::solve(&slider, (v_i, v_f), row.number("t_f"), rtol).value?.work);
         let found = solve(rtol)?;
         Some(Claim { found, bound: error::bound(found, solve(error::FINEST)?, found), truth: row.number("work") })

@@ -1,9 +1,9 @@
 //! Friction below 0: every protocol says so, as friction sampled along its way does.
 
 use slipsweep::model::{Law, Transition};
-use slipsweep::protocol::cubic::{Landscape, Shortcuts};
+use slipsweep::protocol::cubic::{Landscape, LandscapeBuffers};
 use slipsweep::protocol::shortcut::{Case, FAMILIES};
-use slipsweep::protocol::{Effort, Motion, Slider, Status, best_cubic, compliant, optimal, regularised};
+use slipsweep::protocol::{Motion, SolverStats, SpringBlock, Status, best_cubic, compliant, optimal, regularised};
 
 use super::stress::random::Random;
 
@@ -59,7 +59,7 @@ fn regress_a_shortcut_that_nearly_touches_theta_0_has_negative_friction() {
     let t_f = 19.32972805754538;
     let (a_2, a_3) = (-0.02161332584291592 * t_f, -0.0003163286739292417 * t_f * t_f);
     let (mut work, mut v_min, mut status) = ([0.0], [0.0], [Status::Ok]);
-    let out = Shortcuts { work: &mut work, v_min: &mut v_min, status: &mut status };
+    let out = LandscapeBuffers { work: &mut work, v_min: &mut v_min, status: &mut status };
     Landscape::new(&transition, t_f, 1e-10).evaluate(&[a_2], &[a_3], out);
     assert_eq!(status, [Status::NegativeFriction]);
     assert!(work[0] < -3e8 && v_min[0] >= 1.0, "{work:?} {v_min:?}");
@@ -81,11 +81,11 @@ fn shortcuts_of_a_landscape_have_the_friction_of_their_paths() {
         for shortcuts in [line, scattered] {
             let [a_2, a_3] = [0, 1].map(|i| shortcuts.iter().map(|a| a[i]).collect::<Vec<f64>>());
             let mut status = vec![Status::NotConverged; a_2.len()];
-            let out = Shortcuts { work: &mut [], v_min: &mut [], status: &mut status };
+            let out = LandscapeBuffers { work: &mut [], v_min: &mut [], status: &mut status };
             landscape.evaluate(&a_2, &a_3, out);
             for ((&a_2, &a_3), &status) in a_2.iter().zip(&a_3).zip(&status) {
                 let mut alone = [Status::NotConverged];
-                let out = Shortcuts { work: &mut [], v_min: &mut [], status: &mut alone };
+                let out = LandscapeBuffers { work: &mut [], v_min: &mut [], status: &mut alone };
                 landscape.evaluate(&[a_2], &[a_3], out);
                 assert_eq!(alone, [status], "{transition:?} {t_f} {a_2} {a_3}");
                 if status == Status::Infeasible {
@@ -115,12 +115,12 @@ fn protocols_have_the_friction_of_their_motions() {
         }
         for family in FAMILIES {
             let case = Case { transition, t_f, tau_ceiling: f64::INFINITY };
-            let Ok(found) = family.solve(&case, 1e-8, &mut Effort::default()) else { continue };
+            let Ok(found) = family.solve(&case, 1e-8, &mut SolverStats::default()) else { continue };
             let Ok(motion) = family.motion(&case, 1e-8) else { continue };
             compare(found.status(), sampled(&*motion), &(what, family.name()));
             note(1, found.status());
         }
-        let slider = Slider { law: transition.law, k: 1.0, m: 0.0 };
+        let slider = SpringBlock { law: transition.law, k: 1.0, m: 0.0 };
         let solved = compliant::solve(&slider, (transition.v_i, transition.v_f), t_f, 1e-8);
         if let Ok(path) = compliant::path(&slider, (transition.v_i, transition.v_f), t_f, 1e-8) {
             compare(solved.status, sampled(&path), &what);

@@ -3,8 +3,8 @@
 use crate::judge;
 use slipsweep::model::{Law, Transition};
 use slipsweep::numerics::gauss::rule;
-use slipsweep::protocol::cubic::{Landscape, Shortcuts};
-use slipsweep::protocol::{Effort, Status};
+use slipsweep::protocol::cubic::{Landscape, LandscapeBuffers};
+use slipsweep::protocol::{SolverStats, Status};
 
 const PAPER: Transition = Transition { law: Law { a: 0.03, b: 0.05 }, v_i: 3.0, v_f: 100.0 };
 const PAPER_TIMES: [f64; 3] = [0.02, 0.037, 0.049];
@@ -25,7 +25,7 @@ struct Found {
     work: f64,
     v_min: f64,
     status: Status,
-    effort: Effort,
+    stats: SolverStats,
 }
 
 impl Plain {
@@ -117,9 +117,9 @@ impl Plain {
 
     fn found(&self, landscape: &Landscape) -> Found {
         let (mut work, mut v_min, mut status) = ([f64::NAN], [f64::NAN], [Status::NotConverged]);
-        let out = Shortcuts { work: &mut work, v_min: &mut v_min, status: &mut status };
-        let effort = landscape.evaluate(&[self.a_2], &[self.a_3], out);
-        Found { work: work[0], v_min: v_min[0], status: status[0], effort }
+        let out = LandscapeBuffers { work: &mut work, v_min: &mut v_min, status: &mut status };
+        let stats = landscape.evaluate(&[self.a_2], &[self.a_3], out);
+        Found { work: work[0], v_min: v_min[0], status: status[0], stats }
     }
 }
 
@@ -129,12 +129,12 @@ fn axis(count: usize) -> Vec<f64> {
 }
 
 /// One line of the landscape: all `a_3` at one `a_2`.
-fn line(landscape: &Landscape, a_2: f64, a_3: &[f64]) -> (Vec<f64>, Vec<f64>, Vec<Status>, Effort) {
+fn line(landscape: &Landscape, a_2: f64, a_3: &[f64]) -> (Vec<f64>, Vec<f64>, Vec<Status>, SolverStats) {
     let count = a_3.len();
     let (mut work, mut v_min, mut status) = (vec![0.0; count], vec![0.0; count], vec![Status::NotConverged; count]);
-    let out = Shortcuts { work: &mut work, v_min: &mut v_min, status: &mut status };
-    let effort = landscape.evaluate(&vec![a_2; count], a_3, out);
-    (work, v_min, status, effort)
+    let out = LandscapeBuffers { work: &mut work, v_min: &mut v_min, status: &mut status };
+    let stats = landscape.evaluate(&vec![a_2; count], a_3, out);
+    (work, v_min, status, stats)
 }
 
 /// Numbers between 0 and 1, the same everywhere (xorshift64).
@@ -319,18 +319,18 @@ fn a_result_does_not_depend_on_its_neighbours() {
     let landscape = Landscape::new(&PAPER, 0.037, 1e-10);
     let a_3 = axis(101);
     for a_2 in [-0.31, -0.05364, 0.0171] {
-        let (work, v_min, status, effort) = line(&landscape, a_2, &a_3);
-        let mut total = Effort::default();
+        let (work, v_min, status, stats) = line(&landscape, a_2, &a_3);
+        let mut total = SolverStats::default();
         for (i, &a_3) in a_3.iter().enumerate() {
             let alone = Plain { transition: PAPER, t_f: 0.037, a_2, a_3 }.found(&landscape);
             assert_eq!(alone.status, status[i]);
             if status[i] != Status::Infeasible {
                 assert_eq!((alone.work.to_bits(), alone.v_min.to_bits()), (work[i].to_bits(), v_min[i].to_bits()));
             }
-            total.quadratures += alone.effort.quadratures;
-            total.nodes += alone.effort.nodes;
+            total.quadratures += alone.stats.quadratures;
+            total.nodes += alone.stats.nodes;
         }
-        assert_eq!(total, effort);
+        assert_eq!(total, stats);
     }
 }
 
@@ -348,7 +348,11 @@ fn no_order_and_no_split_changes_a_bit() {
             let (a_2, a_3): (Vec<f64>, Vec<f64>) = places.iter().copied().unzip();
             let (mut work, mut v_min) = (vec![0.0; places.len()], vec![0.0; places.len()]);
             let mut status = vec![Status::NotConverged; places.len()];
-            landscape.evaluate(&a_2, &a_3, Shortcuts { work: &mut work, v_min: &mut v_min, status: &mut status });
+            landscape.evaluate(
+                &a_2,
+                &a_3,
+                LandscapeBuffers { work: &mut work, v_min: &mut v_min, status: &mut status },
+            );
             let bits = |values: Vec<f64>| values.into_iter().map(f64::to_bits).collect::<Vec<u64>>();
             (bits(work), bits(v_min), status)
         };
@@ -384,7 +388,7 @@ fn spans_of_a_line_are_as_their_shortcuts_alone() {
         // Fewer velocities than shortcuts are wanted, down to none of the last spans.
         for wanted in (0..a_3.len()).step_by(29) {
             let (mut some, mut status) = (vec![0.0; wanted], status.clone());
-            let out = Shortcuts { work: &mut [], v_min: &mut some, status: &mut status };
+            let out = LandscapeBuffers { work: &mut [], v_min: &mut some, status: &mut status };
             landscape.evaluate(&[a_2; 401], &a_3, out);
             assert_eq!(some[..], v_min[..wanted]);
         }
@@ -412,12 +416,12 @@ fn equal_effects_of_velocity_and_contacts_keep_their_digits() {
 fn effort_is_spent_on_feasible_points_alone() {
     let landscape = Landscape::new(&PAPER, 0.02, 1e-10);
     let a_3 = axis(401);
-    let (mut feasible, mut total) = (0, Effort::default());
+    let (mut feasible, mut total) = (0, SolverStats::default());
     for a_2 in axis(401) {
-        let (.., status, effort) = line(&landscape, a_2, &a_3);
+        let (.., status, stats) = line(&landscape, a_2, &a_3);
         feasible += status.iter().filter(|&&s| s != Status::Infeasible).count() as u32;
-        total.quadratures += effort.quadratures;
-        total.nodes += effort.nodes;
+        total.quadratures += stats.quadratures;
+        total.nodes += stats.nodes;
     }
     assert_eq!(total.quadratures, feasible);
     assert_eq!(feasible, 69446);
@@ -429,11 +433,11 @@ fn what_is_not_asked_for_is_not_computed() {
     let landscape = Landscape::new(&PAPER, 0.02, 1e-10);
     let (a_2, a_3) = ([-0.12, 0.4], [-0.07, 0.4]);
     let mut status = [Status::NotConverged; 2];
-    let effort = landscape.evaluate(&a_2, &a_3, Shortcuts { work: &mut [], v_min: &mut [], status: &mut status });
+    let stats = landscape.evaluate(&a_2, &a_3, LandscapeBuffers { work: &mut [], v_min: &mut [], status: &mut status });
     assert_eq!(status, [Status::Ok, Status::Infeasible]);
-    assert_eq!(effort, Effort::default());
+    assert_eq!(stats, SolverStats::default());
     let (mut work, mut v_min) = ([7.0; 2], [7.0; 2]);
-    landscape.evaluate(&a_2, &a_3, Shortcuts { work: &mut work, v_min: &mut v_min, status: &mut status });
+    landscape.evaluate(&a_2, &a_3, LandscapeBuffers { work: &mut work, v_min: &mut v_min, status: &mut status });
     assert!(work[0] != 7.0 && v_min[0] != 7.0);
     assert_eq!((work[1], v_min[1]), (7.0, 7.0));
 }
@@ -524,7 +528,7 @@ fn regress_works_with_zeros_of_several_scales() {
         let transition = Transition { law: Law { a, b }, v_i, v_f };
         let (truth, size) = judge::shortcut_work(&transition, t_f, place).expect("is judged");
         let (mut work, mut status) = ([f64::NAN], [Status::NotConverged]);
-        let out = Shortcuts { work: &mut work, v_min: &mut [], status: &mut status };
+        let out = LandscapeBuffers { work: &mut work, v_min: &mut [], status: &mut status };
         Landscape::new(&transition, t_f, rtol).evaluate(&[place.0], &[place.1], out);
         assert!((work[0] - truth).abs() <= rtol * size, "{v_i} {v_f}: {} {truth}", work[0]);
     }

@@ -3,7 +3,7 @@
 use crate::reference;
 use slipsweep::model::{Law, Transition};
 use slipsweep::protocol::Status;
-use slipsweep::protocol::cubic::{Landscape, Shortcuts};
+use slipsweep::protocol::cubic::{Landscape, LandscapeBuffers};
 
 #[test]
 fn reference_landscape_points_are_good_to_rtol_up_to_the_border_of_feasibility() {
@@ -17,7 +17,7 @@ fn reference_landscape_points_are_good_to_rtol_up_to_the_border_of_feasibility()
             Landscape::new(&transition, row.number("t_f"), rtol).evaluate(
                 &[row.number("a_2")],
                 &[row.number("a_3")],
-                Shortcuts { work: &mut work, v_min: &mut v_min, status: &mut status },
+                LandscapeBuffers { work: &mut work, v_min: &mut v_min, status: &mut status },
             );
             assert_eq!(status[0].name(), row.text("status"), "{row:?}");
             if let (Some(expected_work), Some(expected_v_min)) = (row.optional("work"), row.optional("v_min")) {

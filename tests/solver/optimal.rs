@@ -480,9 +480,9 @@ fn protocols_that_cannot_be_fast_enough_are_infeasible() {
 
 #[test]
 fn the_usual_effort_is_two_quadratures_and_rises_with_the_accuracy_only() {
-    let effort = |rtol| solve(&PAPER, 0.02, true, rtol).effort;
-    assert_eq!((effort(1e-6).quadratures, effort(1e-6).nodes), (EFFORT_6.0, EFFORT_6.1));
-    assert_eq!((effort(1e-12).quadratures, effort(1e-12).nodes), (EFFORT_12.0, EFFORT_12.1));
+    let stats = |rtol| solve(&PAPER, 0.02, true, rtol).stats;
+    assert_eq!((stats(1e-6).quadratures, stats(1e-6).nodes), (EFFORT_6.0, EFFORT_6.1));
+    assert_eq!((stats(1e-12).quadratures, stats(1e-12).nodes), (EFFORT_12.0, EFFORT_12.1));
     let (_, _, crossover) = crossover::solve(&PAPER, true, 1e-12, EVERY_TIME);
     assert_eq!(crossover.quadratures, 3);
 }

@@ -5,7 +5,7 @@ use slipsweep::model::{Law, Transition};
 use slipsweep::protocol::optimal::crossover::{self, Wanted};
 use slipsweep::protocol::optimal::{self, Optimum};
 use slipsweep::protocol::shortcut::{self, Case, Obstacle, Shortcut};
-use slipsweep::protocol::{Effort, Moment, Motion};
+use slipsweep::protocol::{Moment, Motion, SolverStats};
 use slipsweep::trace::{Protocol, Times, Trace};
 
 const LAW: Law = Law { a: 0.03, b: 0.05 };
@@ -18,7 +18,7 @@ fn case(transition: Transition, t_f: f64) -> Case {
 
 fn shortcut(family: &str, case: &Case) -> Shortcut {
     let family = shortcut::find(family).expect("is a family");
-    family.solve(case, 1e-11, &mut Effort::default()).unwrap_or_else(|obstacle| panic!("{case:?}: {obstacle}"))
+    family.solve(case, 1e-11, &mut SolverStats::default()).unwrap_or_else(|obstacle| panic!("{case:?}: {obstacle}"))
 }
 
 fn motion(family: &str, case: &Case) -> Box<dyn Motion> {
@@ -32,10 +32,10 @@ fn optimum(transition: Transition, t_f: f64) -> Optimum {
 
 /// Rows of the optimum between the jumps.
 fn optimum_inside(transition: Transition, t_f: f64) -> Vec<Moment> {
-    let course = Protocol::Optimal { bounded: true }
-        .course(&case(transition, t_f), 1e-12)
+    let simulation = Protocol::Optimal { bounded: true }
+        .simulation(&case(transition, t_f), 1e-12)
         .unwrap_or_else(|absence| panic!("{transition:?} {t_f}: {absence}"));
-    let trace = Trace::of(&*course.motion, &transition, Times::Fewest).expect("can be resolved");
+    let trace = Trace::of(&*simulation.motion, &transition, Times::Fewest).expect("can be resolved");
     trace.moments.into_iter().filter(|moment| moment.beta.is_some()).collect()
 }
 
@@ -112,7 +112,7 @@ fn paper_figure_s2_no_protocol_above_the_bound_is_faster_than_0_39() {
     let t_min = (DOWN.v_f / DOWN.v_i).ln() + ((DOWN.v_i - 1.0) / (DOWN.v_f - 1.0)).ln();
     assert!((t_min - 0.395).abs() < 1e-3);
     let family = shortcut::find("bounded_velocity").expect("is a family");
-    let solve = |t_f: f64| family.solve(&case(DOWN, t_f), 1e-10, &mut Effort::default());
+    let solve = |t_f: f64| family.solve(&case(DOWN, t_f), 1e-10, &mut SolverStats::default());
     let Err(Obstacle::Time { t_min: told }) = solve(0.99 * t_min) else { panic!("too fast") };
     assert!(relative(told, t_min) < 1e-14);
     // Just above it v - 1 vanishes but at the ends.

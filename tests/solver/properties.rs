@@ -11,7 +11,7 @@ use slipsweep::numerics::elementary::ln;
 use slipsweep::protocol::optimal::crossover::{self, CrossoverTimes, Wanted};
 use slipsweep::protocol::optimal::{self, Optimum, Strategy as Start};
 use slipsweep::protocol::shortcut::{Case, find};
-use slipsweep::protocol::{Effort, Status, best_cubic};
+use slipsweep::protocol::{SolverStats, Status, best_cubic};
 
 const RTOL: f64 = 1e-10;
 
@@ -173,7 +173,7 @@ proptest! {
         let least = optimum(&transition, t_f, true)?;
         for name in ["cubic", "bounded_velocity", "bounded_friction"] {
             let case = Case { transition, t_f, tau_ceiling: f64::INFINITY };
-            let Ok(shortcut) = find(name).expect("is a family").solve(&case, RTOL, &mut Effort::default()) else { continue };
+            let Ok(shortcut) = find(name).expect("is a family").solve(&case, RTOL, &mut SolverStats::default()) else { continue };
             let size = shortcut.work.abs().max(least.work.abs());
             prop_assert!(shortcut.v_min < 1.0 || shortcut.work >= least.work - 2.0 * RTOL * size, "{name} {shortcut:?} {least:?}");
             prop_assert!(shortcut.v_min <= shortcut.v_max, "{name} {shortcut:?}");
@@ -196,7 +196,7 @@ proptest! {
         prop_assert!(found.gap >= 0.0 && close(found.work_optimal, least.work, 2.0 * RTOL), "{found:?} {least:?}");
         prop_assert!(found.v_min >= 1.0 - RTOL, "{found:?}");
         let case = Case { transition, t_f, tau_ceiling: f64::INFINITY };
-        if let Ok(cubic) = find("cubic").expect("is a family").solve(&case, RTOL, &mut Effort::default())
+        if let Ok(cubic) = find("cubic").expect("is a family").solve(&case, RTOL, &mut SolverStats::default())
             && cubic.v_min >= 1.0
         {
             prop_assert!(found.work <= cubic.work * (1.0 + 1e-9), "{found:?} {cubic:?}");

@@ -8,18 +8,18 @@ use ode_solvers::{Dop853, SVector, System};
 use slipsweep::model::{Law, Transition};
 use slipsweep::protocol::optimal::{self, Optimum};
 use slipsweep::protocol::regularised::{self, Regularised};
-use slipsweep::protocol::{Slider, Solved, Status, error};
+use slipsweep::protocol::{Solved, SpringBlock, Status, error};
 
 #[derive(Debug, Clone, Copy)]
 struct Case {
-    slider: Slider,
+    slider: SpringBlock,
     velocities: (f64, f64),
     t_f: f64,
     bounded: bool,
 }
 
 const fn case(velocities: (f64, f64), t_f: f64) -> Case {
-    Case { slider: Slider { law: Law { a: 0.03, b: 0.05 }, k: 0.5, m: 1e-6 }, velocities, t_f, bounded: true }
+    Case { slider: SpringBlock { law: Law { a: 0.03, b: 0.05 }, k: 0.5, m: 1e-6 }, velocities, t_f, bounded: true }
 }
 
 /// Speeds up at once, slows down first, and waits at `v = 1`.
@@ -189,14 +189,14 @@ impl Found {
     }
 
     /// Takes in a moment with these derivatives of `v`.
-    fn take(&mut self, slider: &Slider, [v, v_1, v_2]: [f64; 3], theta: f64) {
-        let Slider { law: Law { a, b }, k, m } = *slider;
+    fn take(&mut self, slider: &SpringBlock, [v, v_1, v_2]: [f64; 3], theta: f64) {
+        let SpringBlock { law: Law { a, b }, k, m } = *slider;
         self.v.push(v);
         self.control.push(v + (a * v_1 / v + b * (1.0 / theta - v) + m * v_2) / k);
     }
 
     /// Takes in the optimum along these states.
-    fn keep(&mut self, slider: &Slider, states: &[SVector<f64, 3>]) {
+    fn keep(&mut self, slider: &SpringBlock, states: &[SVector<f64, 3>]) {
         for state in states {
             let at = forwards(slider.law).moment(state[0], state[1]);
             let v = at.q[0].exp();
@@ -206,7 +206,13 @@ impl Found {
 
     /// Takes in a piece from one moment to another that replaces `work` of the optimum; `outer` tells which of the two
     /// are ends of the protocol.
-    fn replace(&mut self, slider: &Slider, floor: f64, (ends, outer, time): ([Moment; 2], [bool; 2], f64), work: f64) {
+    fn replace(
+        &mut self,
+        slider: &SpringBlock,
+        floor: f64,
+        (ends, outer, time): ([Moment; 2], [bool; 2], f64),
+        work: f64,
+    ) {
         let theta = ends.map(|at| at.y.exp());
         let mean = (time - (theta[1] - theta[0])) / (time * (theta[0] * theta[1]).sqrt()) - floor;
         let stretch = [0, 1].map(|i| if outer[i] { stretch((ends[i].q[0].exp() - floor) / mean) } else { 0.0 });
@@ -323,7 +329,8 @@ fn errors_told(case: &Case, delta_t: f64, (least, excess): (f64, f64)) -> u32 {
 fn reference_every_number_is_what_a_library_finds() {
     let mut told = 0;
     let unbounded = Case { bounded: false, ..case((3.0, 100.0), 0.045) };
-    let soft = Case { slider: Slider { law: Law { a: 0.05, b: 0.02 }, k: 0.05, m: 1e-4 }, ..case((5.0, 20.0), 0.03) };
+    let soft =
+        Case { slider: SpringBlock { law: Law { a: 0.05, b: 0.02 }, k: 0.05, m: 1e-4 }, ..case((5.0, 20.0), 0.03) };
     for (case, share, floors, status) in [
         (FAST, 0.1, [0.0, 0.0], Status::Ok),
         (FAST, 0.01, [0.0, 0.0], Status::Ok),
@@ -405,13 +412,14 @@ fn the_excess_is_of_first_order_with_the_derived_limit() {
 #[test]
 fn the_work_does_not_depend_on_the_spring() {
     for delta_t in [0.1, 0.01] {
-        let [soft, rigid] = [Slider { k: 0.01, m: 1.0, ..FAST.slider }, Slider { k: f64::INFINITY, ..FAST.slider }]
-            .map(|slider| solve(&Case { slider, ..FAST }, delta_t * FAST.t_f, 1e-10).value.expect("exists"));
+        let [soft, rigid] =
+            [SpringBlock { k: 0.01, m: 1.0, ..FAST.slider }, SpringBlock { k: f64::INFINITY, ..FAST.slider }]
+                .map(|slider| solve(&Case { slider, ..FAST }, delta_t * FAST.t_f, 1e-10).value.expect("exists"));
         assert_eq!([soft.work, soft.gap, soft.v_min, soft.v_max], [rigid.work, rigid.gap, rigid.v_min, rigid.v_max]);
         assert_eq!([rigid.control_min, rigid.control_max], [rigid.v_min, rigid.v_max]);
         let mut last = f64::INFINITY;
         for k in [1e7, 1e9, 1e11] {
-            let stiff = Case { slider: Slider { k, ..FAST.slider }, ..FAST };
+            let stiff = Case { slider: SpringBlock { k, ..FAST.slider }, ..FAST };
             let found = solve(&stiff, delta_t * FAST.t_f, 1e-10).value.expect("exists");
             let lag = relative(found.control_max, rigid.v_max);
             assert!(lag < 0.03 * last, "{k}: {lag} {last}");
@@ -451,10 +459,10 @@ fn regress_what_does_not_exist_is_infeasible() {
     assert_eq!(at(case((100.0, 3.0), 0.3), 0.01), Status::Infeasible);
     assert_eq!(at(case((1.0, 3.0), 0.3), 0.01), Status::Infeasible);
     let broken = |slider| at(Case { slider, ..FAST }, 0.01 * t_f);
-    assert_eq!(broken(Slider { k: 0.0, ..FAST.slider }), Status::Infeasible);
-    assert_eq!(broken(Slider { m: -1.0, ..FAST.slider }), Status::Infeasible);
+    assert_eq!(broken(SpringBlock { k: 0.0, ..FAST.slider }), Status::Infeasible);
+    assert_eq!(broken(SpringBlock { m: -1.0, ..FAST.slider }), Status::Infeasible);
     let b = 3.0;
-    let weak = Case { slider: Slider { law: Law { a: 0.03, b }, ..FAST.slider }, ..FAST };
+    let weak = Case { slider: SpringBlock { law: Law { a: 0.03, b }, ..FAST.slider }, ..FAST };
     assert_eq!(at(weak, 0.01 * t_f), Status::Unproven);
 }
 
@@ -489,7 +497,7 @@ fn regress_every_corner_of_the_range_is_solved() {
 #[test]
 fn regress_work_counts() {
     let solved = solve(&FAST, 0.1 * FAST.t_f, 1e-10);
-    assert_eq!((solved.effort.quadratures, solved.effort.nodes), (14, 808));
+    assert_eq!((solved.stats.quadratures, solved.stats.nodes), (14, 808));
 }
 
 #[test]
@@ -539,7 +547,7 @@ fn the_motion_carries_the_numbers() {
 fn regress_pieces_meet_where_the_optimum_need_not_be_unique() {
     let law = Law { a: 0.04441617478685306, b: 0.21926684639255162 };
     let (velocities, t_f) = ((8.261710127696999, 283.6422011468145), 1.092981213773395);
-    let case = Case { slider: Slider { law, k: f64::INFINITY, m: 0.0 }, velocities, t_f, bounded: true };
+    let case = Case { slider: SpringBlock { law, k: f64::INFINITY, m: 0.0 }, velocities, t_f, bounded: true };
     let exact = solve(&case, 5.35e-4 * t_f, 1e-12);
     for rtol in [1e-6, 1e-8, 1e-10] {
         let found = solve(&case, 5.35e-4 * t_f, rtol);
@@ -555,7 +563,7 @@ fn regress_long_pieces_do_not_peak() {
     let law = Law { a: 1.885e-4, b: 6.17e-4 };
     for (velocities, t_f) in [((3.57e6, 31886.0), 151.5), ((1.34, 3.0), 65.0), ((5.6, 2.2e4), 24.0), ((2.0, 58.0), 1e3)]
     {
-        let slider = Slider { law, k: f64::INFINITY, m: 0.0 };
+        let slider = SpringBlock { law, k: f64::INFINITY, m: 0.0 };
         for share in [0.3, 0.1, 1e-2, 1e-3] {
             let case = Case { slider, velocities, t_f, bounded: true };
             let found = solve(&case, share * t_f, 1e-10).value.expect("exists");
@@ -570,7 +578,7 @@ fn regress_long_pieces_do_not_peak() {
 fn regress_a_standstill_is_infeasible() {
     let t_min = 1.0 / 3.0 - 1.0 / 100.0;
     let at = |a: f64| {
-        let slider = Slider { law: Law { a, b: 0.01 }, k: 1.0, m: 1e-6 };
+        let slider = SpringBlock { law: Law { a, b: 0.01 }, k: 1.0, m: 1e-6 };
         let case = Case { slider, velocities: (100.0, 3.0), t_f: t_min + 0.1, bounded: false };
         let found = solve(&case, 1e-3, 1e-10);
         (found.status, found.value.is_some())
@@ -582,7 +590,7 @@ fn regress_a_standstill_is_infeasible() {
 #[test]
 fn regress_short_pieces_keep_the_digits_of_v_min() {
     let law = Law { a: 2.5401475772267644e-6, b: 0.0 };
-    let slider = Slider { law, k: 2.3583748302810077e23, m: 0.0136346039616178 };
+    let slider = SpringBlock { law, k: 2.3583748302810077e23, m: 0.0136346039616178 };
     let case =
         Case { slider, velocities: (6804880689.211707, 106433661.09597254), t_f: 9.248594399029421e-9, bounded: true };
     let v_min = |rtol| solve(&case, 1.5791875720478793e-13, rtol).value.expect("has pieces").v_min;

@@ -6,7 +6,7 @@
 use crate::support::relative;
 use slipsweep::model::{Law, Transition};
 use slipsweep::protocol::shortcut::{Case, FAMILIES, Family, Obstacle, Shortcut, find};
-use slipsweep::protocol::{Effort, Motion, Status, optimal};
+use slipsweep::protocol::{Motion, SolverStats, Status, optimal};
 
 const PAPER: Law = Law { a: 0.03, b: 0.05 };
 const RTOL: f64 = 1e-10;
@@ -21,7 +21,7 @@ fn friction_of_ends(law: Law, v_i: f64, v_f: f64) -> f64 {
 }
 
 fn solve(family: &dyn Family, case: &Case) -> Result<Shortcut, Obstacle> {
-    family.solve(case, RTOL, &mut Effort::default())
+    family.solve(case, RTOL, &mut SolverStats::default())
 }
 
 /// Gauss-Legendre nodes and weights for the interval from 0 to 1.

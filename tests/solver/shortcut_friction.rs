@@ -6,7 +6,7 @@ use ode_solvers::dop_shared::OutputType;
 use ode_solvers::{Dop853, SVector, System};
 use slipsweep::model::{Law, Transition};
 use slipsweep::protocol::shortcut::{Case, Obstacle, Shortcut, find};
-use slipsweep::protocol::{Effort, Motion, Status, error, optimal};
+use slipsweep::protocol::{Motion, SolverStats, Status, error, optimal};
 
 const PAPER: Law = Law { a: 0.03, b: 0.05 };
 
@@ -15,7 +15,7 @@ fn case(law: Law, v_i: f64, v_f: f64, t_f: f64, tau_ceiling: f64) -> Case {
 }
 
 fn solve(case: &Case, rtol: f64) -> Result<Shortcut, Obstacle> {
-    find("bounded_friction").expect("is a family").solve(case, rtol, &mut Effort::default())
+    find("bounded_friction").expect("is a family").solve(case, rtol, &mut SolverStats::default())
 }
 
 fn motion(case: &Case) -> Box<dyn Motion> {
@@ -96,7 +96,7 @@ fn reference_every_number_of_a_slowing_block_is_good_to_rtol_and_its_error_is_bo
             let shortcut = solve(&case, rtol).unwrap_or_else(|o| panic!("{o} at {rtol} in {row:?}"));
             assert_eq!(shortcut.status(), status.with_friction(shortcut.friction_min), "{row:?}");
             let work = row.number("work");
-            let bound = error::of_member(family, &case, &shortcut, &mut Effort::default()).expect("has a bound");
+            let bound = error::of_member(family, &case, &shortcut, &mut SolverStats::default()).expect("has a bound");
             assert!((shortcut.work - work).abs() <= bound, "{rtol}: off by {:e} > {bound:e}", shortcut.work - work);
             let budget = rtol.max(1e-10) + lost_in_time(&case, row);
             let mut numbers = vec![
@@ -402,7 +402,7 @@ fn regress_slips_known_to_the_rounding_of_the_time_to_spare_are_not_the_last_wor
     let family = slipsweep::protocol::shortcut::find("bounded_friction").expect("is a family");
     for tau_ceiling in [1.5, 3.0] {
         let case = Case { transition, t_f: 0.4055424603833174, tau_ceiling };
-        let work = |rtol| family.solve(&case, rtol, &mut Effort::default()).expect("has a member").work;
+        let work = |rtol| family.solve(&case, rtol, &mut SolverStats::default()).expect("has a member").work;
         let fine = work(1e-13);
         for rtol in [1e-8, 1e-10, 1e-12] {
             let error = (work(rtol) / fine - 1.0).abs();

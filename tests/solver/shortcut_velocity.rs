@@ -10,7 +10,7 @@ use slipsweep::numerics::dilogarithm::dilogarithm;
 use slipsweep::numerics::polynomial::roots_between;
 use slipsweep::numerics::radau::{NODES, radau};
 use slipsweep::protocol::shortcut::{Case, Obstacle, Shortcut, find};
-use slipsweep::protocol::{Effort, Motion, Status};
+use slipsweep::protocol::{Motion, SolverStats, Status};
 
 const PAPER: Law = Law { a: 0.03, b: 0.05 };
 
@@ -19,7 +19,7 @@ fn case(law: Law, v_i: f64, v_f: f64, t_f: f64) -> Case {
 }
 
 fn solve(family: &str, case: &Case, rtol: f64) -> Result<Shortcut, Obstacle> {
-    find(family).expect("is a family").solve(case, rtol, &mut Effort::default())
+    find(family).expect("is a family").solve(case, rtol, &mut SolverStats::default())
 }
 
 fn motion(family: &str, case: &Case) -> Box<dyn Motion> {
@@ -399,10 +399,10 @@ fn regress_every_corner_of_the_range_is_solved() {
 
 #[test]
 fn regress_work_counts() {
-    let mut effort = Effort::default();
+    let mut stats = SolverStats::default();
     let family = find("bounded_velocity").expect("is a family");
-    family.solve(&case(PAPER, 3.0, 100.0, 0.02), 1e-10, &mut effort).expect("has a member");
-    assert_eq!((effort.quadratures, effort.nodes), (5, 320));
+    family.solve(&case(PAPER, 3.0, 100.0, 0.02), 1e-10, &mut stats).expect("has a member");
+    assert_eq!((stats.quadratures, stats.nodes), (5, 320));
 }
 
 #[test]

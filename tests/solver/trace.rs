@@ -6,8 +6,8 @@ use ode_solvers::dop_shared::OutputType;
 use ode_solvers::{Dop853, SVector, System};
 use slipsweep::model::{Law, Transition};
 use slipsweep::protocol::shortcut::{self, Case};
-use slipsweep::protocol::{Effort, Moment, Motion, Status, optimal};
-use slipsweep::trace::{Absence, Course, Protocol, RANGE_RTOL, Times, Trace};
+use slipsweep::protocol::{Moment, Motion, SolverStats, Status, optimal};
+use slipsweep::trace::{Absence, Protocol, RANGE_RTOL, Times, Trace, TracedPath};
 
 const PAPER: Transition = Transition { law: Law { a: 0.03, b: 0.05 }, v_i: 3.0, v_f: 100.0 };
 const BACK: Transition = Transition { v_i: 100.0, v_f: 3.0, ..PAPER };
@@ -16,16 +16,16 @@ fn case(transition: Transition, t_f: f64) -> Case {
     Case { transition, t_f, tau_ceiling: 1.6 }
 }
 
-fn course(protocol: Protocol, case: Case) -> Course {
-    protocol.course(&case, 1e-10).unwrap_or_else(|absence| panic!("{case:?}: {absence}"))
+fn path(protocol: Protocol, case: Case) -> TracedPath {
+    protocol.path(&case, 1e-10).unwrap_or_else(|absence| panic!("{case:?}: {absence}"))
 }
 
-fn optimum(transition: Transition, t_f: f64) -> Course {
-    course(Protocol::Optimal { bounded: true }, case(transition, t_f))
+fn optimum(transition: Transition, t_f: f64) -> TracedPath {
+    path(Protocol::Optimal { bounded: true }, case(transition, t_f))
 }
 
-fn fewest(course: &Course, transition: Transition) -> Trace {
-    Trace::of(&*course.motion, &transition, Times::Fewest).expect("can be resolved")
+fn fewest(path: &TracedPath, transition: Transition) -> Trace {
+    Trace::of(&*path.motion, &transition, Times::Fewest).expect("can be resolved")
 }
 
 /// Optimal protocols of every kind: fast, slow, with and without a hold, up and down, on both sides of `a = b`.
@@ -49,7 +49,7 @@ fn shortcuts() -> Vec<(Protocol, Case)> {
     for (transition, t_f) in [(PAPER, 0.02), (PAPER, 0.5), (PAPER, 20.0), (BACK, 0.5), (BACK, 20.0)] {
         for family in shortcut::FAMILIES {
             let case = case(transition, t_f);
-            if !matches!(family.solve(&case, 1e-10, &mut Effort::default()), Err(shortcut::Obstacle::Friction)) {
+            if !matches!(family.solve(&case, 1e-10, &mut SolverStats::default()), Err(shortcut::Obstacle::Friction)) {
                 cases.push((Protocol::Family(family), case));
             }
         }
@@ -60,13 +60,13 @@ fn shortcuts() -> Vec<(Protocol, Case)> {
 }
 
 /// Every course with the transition that it leads through.
-fn courses() -> Vec<(Course, Transition)> {
-    let mut courses: Vec<(Course, Transition)> =
+fn paths() -> Vec<(TracedPath, Transition)> {
+    let mut paths: Vec<(TracedPath, Transition)> =
         optima().into_iter().map(|(transition, t_f)| (optimum(transition, t_f), transition)).collect();
     for (protocol, case) in shortcuts() {
-        courses.push((course(protocol, case), case.transition));
+        paths.push((path(protocol, case), case.transition));
     }
-    courses
+    paths
 }
 
 /// `int f dt` between two places of a motion: the trapezium with 32, 64, 128 and 256 steps, extrapolated (Romberg).
@@ -85,8 +85,8 @@ fn integral(motion: &dyn Motion, from: f64, to: f64, f: impl Fn(&Moment) -> f64)
 
 #[test]
 fn the_contact_lifetime_obeys_its_equation_and_friction_its_law() {
-    for (course, Transition { law, v_i, v_f }) in courses() {
-        let motion = &*course.motion;
+    for (path, Transition { law, v_i, v_f }) in paths() {
+        let motion = &*path.motion;
         for pair in motion.landmarks().windows(2) {
             let [from, to] = [pair[0], pair[1]].map(|s| motion.at(s));
             let lag = integral(motion, pair[0], pair[1], |moment| moment.theta * moment.v);
@@ -104,13 +104,13 @@ fn the_contact_lifetime_obeys_its_equation_and_friction_its_law() {
 
 #[test]
 fn work_along_the_motion_is_the_work_that_the_solver_states() {
-    for (course, transition) in courses() {
-        let motion = &*course.motion;
+    for (path, transition) in paths() {
+        let motion = &*path.motion;
         let landmarks = motion.landmarks();
         let pieces = landmarks.windows(2);
         let work: f64 =
             pieces.map(|pair| integral(motion, pair[0], pair[1], |moment| moment.friction * moment.v)).sum();
-        assert!(relative(work, course.work) < 1e-9, "{transition:?} {}: {work} {}", motion.duration(), course.work);
+        assert!(relative(work, path.work) < 1e-9, "{transition:?} {}: {work} {}", motion.duration(), path.work);
     }
 }
 
@@ -167,8 +167,8 @@ impl System<f64, SVector<f64, 3>> for Paper {
 #[test]
 fn paper_equations_integrated_from_row_to_row_give_the_next_row() {
     for (transition, t_f) in optima() {
-        let course = optimum(transition, t_f);
-        let motion = &*course.motion;
+        let path = optimum(transition, t_f);
+        let motion = &*path.motion;
         let held = motion.at(0.0).v == 1.0;
         // Where the hold ends: the last place where v = 1.
         let (mut low, mut high) = (0.0, 1.0);
@@ -250,9 +250,9 @@ fn inside(trace: &Trace) -> &[Moment] {
 
 #[test]
 fn straight_lines_between_rows_are_good_to_1e_4_of_the_range_everywhere() {
-    for (course, transition) in courses() {
-        let motion = &*course.motion;
-        let trace = fewest(&course, transition);
+    for (path, transition) in paths() {
+        let motion = &*path.motion;
+        let trace = fewest(&path, transition);
         let (rows, ranges) = (inside(&trace), ranges(&trace));
         let mut row = 0;
         for pair in motion.landmarks().windows(2) {
@@ -281,10 +281,10 @@ fn straight_lines_between_rows_are_good_to_1e_4_of_the_range_everywhere() {
 
 /// A straight line over a step `h` is off by `h^2 |f''|/8`, so it takes `int sqrt(|f''|/(8 tolerance)) dt` rows; second
 /// differences of an equally spaced trace give that for the worst of the columns.
-fn least_rows(course: &Course, transition: Transition) -> f64 {
-    let trace = fewest(course, transition);
+fn least_rows(path: &TracedPath, transition: Transition) -> f64 {
+    let trace = fewest(path, transition);
     let tolerance = ranges(&trace).map(|range| RANGE_RTOL * range);
-    let fine = Trace::of(&*course.motion, &transition, Times::Spaced(100_001)).expect("can be resolved");
+    let fine = Trace::of(&*path.motion, &transition, Times::Spaced(100_001)).expect("can be resolved");
     let bend = |three: &[Moment]| {
         let [before, here, after] = [0, 1, 2].map(|i| columns(&three[i]));
         (0..4).fold(0.0_f64, |most, i| most.max((before[i] - 2.0 * here[i] + after[i]).abs() / (8.0 * tolerance[i])))
@@ -310,9 +310,9 @@ fn rows_are_few() {
         (step, PAPER, 0.02, 53),
     ];
     for (protocol, transition, t_f, rows) in known {
-        let course = course(protocol, case(transition, t_f));
-        let found = fewest(&course, transition).moments.len();
-        let least = least_rows(&course, transition);
+        let path = path(protocol, case(transition, t_f));
+        let found = fewest(&path, transition).moments.len();
+        let least = least_rows(&path, transition);
         assert_eq!(found, rows, "{transition:?} {t_f}, least {least}");
         // Two rows more for the jumps.
         assert!((found as f64) < 1.1 * least + 3.0, "{transition:?} {t_f}: {found} of {least}");
@@ -323,8 +323,8 @@ fn rows_are_few() {
 fn a_constant_protocol_has_two_rows() {
     let still = Transition { v_f: 3.0, ..PAPER };
     let cubic = Protocol::Family(shortcut::find("cubic").expect("exists"));
-    let course = course(cubic, case(still, 0.1));
-    let trace = fewest(&course, still);
+    let path = path(cubic, case(still, 0.1));
+    let trace = fewest(&path, still);
     let rows: Vec<(f64, f64)> = trace.moments.iter().map(|moment| (moment.t, moment.v)).collect();
     assert_eq!(rows, [(0.0, 3.0), (0.1, 3.0)]);
 }
@@ -343,15 +343,15 @@ fn jumps_are_two_rows_at_the_same_time() {
     assert!(rows[rows.len() - 2].t == 0.02 && relative(rows[rows.len() - 2].v, 3392.17) < 1e-5);
     // The bounded velocity starts and ends without a jump: one row each.
     let family = Protocol::Family(shortcut::find("bounded_velocity").expect("exists"));
-    let smooth = fewest(&course(family, case(PAPER, 0.02)), PAPER);
+    let smooth = fewest(&path(family, case(PAPER, 0.02)), PAPER);
     assert!(smooth.moments[1].t > 0.0 && smooth.moments[smooth.moments.len() - 2].t < 0.02);
     assert_eq!(smooth.columns().len(), 4);
 }
 
 #[test]
 fn equally_spaced_times_are_exact_and_meet_the_motion() {
-    for (course, transition) in courses() {
-        let motion = &*course.motion;
+    for (path, transition) in paths() {
+        let motion = &*path.motion;
         let t_f = motion.duration();
         let spaced = Trace::of(motion, &transition, Times::Spaced(101)).expect("can be resolved");
         let rows = inside(&spaced);
@@ -412,8 +412,8 @@ fn extrema_of_the_velocity_are_those_of_the_solvers() {
     }
     for (protocol, case) in shortcuts() {
         let Protocol::Family(family) = protocol else { continue };
-        let shortcut = family.solve(&case, 1e-10, &mut Effort::default()).expect("exists");
-        let trace = fewest(&course(protocol, case), case.transition);
+        let shortcut = family.solve(&case, 1e-10, &mut SolverStats::default()).expect("exists");
+        let trace = fewest(&path(protocol, case), case.transition);
         for (found, expected) in [(trace.v_min, shortcut.v_min), (trace.v_max, shortcut.v_max)] {
             assert!(relative(found, expected) < 1e-9, "{} {case:?}: {found} {expected}", family.name());
         }
@@ -422,7 +422,7 @@ fn extrema_of_the_velocity_are_those_of_the_solvers() {
 
 #[test]
 fn what_does_not_exist_says_which_bound() {
-    let absent = |protocol: Protocol, transition, t_f| match protocol.course(&case(transition, t_f), 1e-10) {
+    let absent = |protocol: Protocol, transition, t_f| match protocol.path(&case(transition, t_f), 1e-10) {
         Ok(_) => panic!("{transition:?} {t_f} exists"),
         Err(absence) => absence,
     };
@@ -435,7 +435,7 @@ fn what_does_not_exist_says_which_bound() {
     let steep = Protocol::CubicPoint { a_2: 3.0, a_3: 0.0 };
     assert_eq!(absent(steep, PAPER, 0.02).to_string(), "v or theta would not stay positive");
     // Without the bound the optimum may leave the model, and says so.
-    let below = course(optimal(false), case(PAPER, 0.06));
+    let below = path(optimal(false), case(PAPER, 0.06));
     assert_eq!(below.status, Status::BelowBound);
     assert!(fewest(&below, PAPER).v_min < 1.0);
 }

@@ -11,7 +11,7 @@ use cases::{ONLY_CROSS, random_accelerations, reference_cases};
 use slipsweep::model::{Law, Transition};
 use slipsweep::numerics::elementary::ln;
 use slipsweep::protocol::Status;
-use slipsweep::protocol::cubic::{Landscape, Shortcuts};
+use slipsweep::protocol::cubic::{Landscape, LandscapeBuffers};
 use slipsweep::protocol::optimal::{crossover, solve};
 
 /// All kernels.
@@ -76,7 +76,7 @@ fn works(landscape: &Landscape) -> f64 {
         let a_3 = axis.repeat(lines.len());
         let (mut work, mut v_min) = (vec![0.0; a_2.len()], vec![0.0; a_2.len()]);
         let mut status = vec![Status::NotConverged; a_2.len()];
-        let out = Shortcuts { work: &mut work, v_min: &mut v_min, status: &mut status };
+        let out = LandscapeBuffers { work: &mut work, v_min: &mut v_min, status: &mut status };
         landscape.evaluate(&a_2, &a_3, out);
         sum += work.iter().sum::<f64>();
     }

@@ -4,7 +4,7 @@
 
 use super::blocks::{Factors, Square, inverse};
 use super::collocation::Collocation;
-use super::piece::Piece;
+use super::dense_output::DenseOutput;
 use super::{Points, System};
 use crate::numerics::double_double::DoubleDouble;
 use crate::numerics::elementary::{exp, ln};
@@ -20,7 +20,7 @@ pub struct Accuracy<const N: usize> {
 
 /// What an integration has cost; exact and the same on every machine.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub struct Cost {
+pub struct IntegratorStats {
     /// Steps taken.
     pub steps: u32,
     /// Steps given up, for their error or for Newton's method.
@@ -60,13 +60,13 @@ pub struct Integrator<'a, Y, const N: usize, const S: usize> {
     /// Length proposed for the next step.
     h: f64,
     last: Option<Last<N, S>>,
-    cost: Cost,
+    cost: IntegratorStats,
 }
 
 /// The last step, with its error estimate relative to what was allowed.
 #[derive(Debug, Clone, Copy)]
 struct Last<const N: usize, const S: usize> {
-    piece: Piece<N, S>,
+    dense_output: DenseOutput<N, S>,
     error: f64,
 }
 
@@ -98,7 +98,7 @@ impl<'a, Y: System<N>, const N: usize, const S: usize> Integrator<'a, Y, N, S> {
         // The estimate is of order S, the error of order 2 S - 1.
         let share = (S + 1) as f64 / (2 * S) as f64;
         let allowed = exp(share * ln(accuracy.tolerance));
-        let (t, cost) = (DoubleDouble::new(t), Cost::default());
+        let (t, cost) = (DoubleDouble::new(t), IntegratorStats::default());
         Integrator { system, rule, accuracy, allowed, t, rest: 0.0, shortest: SHORTEST, y, h, last: None, cost }
     }
 
@@ -124,7 +124,7 @@ impl<'a, Y: System<N>, const N: usize, const S: usize> Integrator<'a, Y, N, S> {
     }
 
     /// What it has cost so far.
-    pub fn cost(&self) -> Cost {
+    pub fn cost(&self) -> IntegratorStats {
         self.cost
     }
 
@@ -159,7 +159,7 @@ impl<'a, Y: System<N>, const N: usize, const S: usize> Integrator<'a, Y, N, S> {
 
     /// One step, which ends at `limit` at the latest (and then exactly there).
     #[inline(always)]
-    pub fn step(&mut self, limit: f64) -> Result<Piece<N, S>, Failure> {
+    pub fn step(&mut self, limit: f64) -> Result<DenseOutput<N, S>, Failure> {
         loop {
             let left = self.left(limit);
             let cut = self.h >= left;
@@ -185,44 +185,50 @@ impl<'a, Y: System<N>, const N: usize, const S: usize> Integrator<'a, Y, N, S> {
             }
             let next = h * factor.clamp(0.2, 8.0);
             self.h = if cut { next.max(self.h) } else { next };
-            let piece = Piece::new(self.rule, self.t.high, h, self.y, &change);
+            let dense_output = DenseOutput::new(self.rule, self.t.high, h, self.y, &change);
             if cut {
                 (self.t, self.rest) = (DoubleDouble::new(limit), 0.0);
             } else {
                 self.pass(h);
             }
-            self.y = piece.end;
-            self.last = Some(Last { piece, error });
+            self.y = dense_output.end;
+            self.last = Some(Last { dense_output, error });
             self.cost.steps += 1;
-            return Ok(piece);
+            return Ok(dense_output);
         }
     }
 
     /// The first part of a step that was taken, up to the share `u` of it: a step of its own, so its end has the order
     /// of the method. `None` if Newton's method fails.
     #[inline(always)]
-    pub fn part(&mut self, piece: &Piece<N, S>, u: f64) -> Option<Piece<N, S>> {
-        self.leg(piece, (piece.t, piece.start), 0.0, u)
+    pub fn part(&mut self, dense_output: &DenseOutput<N, S>, u: f64) -> Option<DenseOutput<N, S>> {
+        self.leg(dense_output, (dense_output.t, dense_output.start), 0.0, u)
     }
 
     /// A middle part of a step that was taken, between the shares `from` and `to`, as a step of its own: shorter, so
     /// its polynomial is closer to the solution. `None` if Newton's method fails.
     #[inline(always)]
-    pub fn between(&mut self, piece: &Piece<N, S>, from: f64, to: f64) -> Option<Piece<N, S>> {
-        let start = if from > 0.0 { self.part(piece, from)?.end } else { piece.start };
-        self.leg(piece, (piece.t + from * piece.h, start), from, to)
+    pub fn between(&mut self, dense_output: &DenseOutput<N, S>, from: f64, to: f64) -> Option<DenseOutput<N, S>> {
+        let start = if from > 0.0 { self.part(dense_output, from)?.end } else { dense_output.start };
+        self.leg(dense_output, (dense_output.t + from * dense_output.h, start), from, to)
     }
 
     /// A step from `(t, y)`, which is at the share `from` of a piece, to the share `to`.
     #[inline(always)]
-    fn leg(&mut self, piece: &Piece<N, S>, (t, y): (f64, [f64; N]), from: f64, to: f64) -> Option<Piece<N, S>> {
+    fn leg(
+        &mut self,
+        dense_output: &DenseOutput<N, S>,
+        (t, y): (f64, [f64; N]),
+        from: f64,
+        to: f64,
+    ) -> Option<DenseOutput<N, S>> {
         let guess = std::array::from_fn(|r| {
-            let before = piece.change(r, from);
-            self.rule.nodes.map(|node| piece.change(r, from + (to - from) * node) - before)
+            let before = dense_output.change(r, from);
+            self.rule.nodes.map(|node| dense_output.change(r, from + (to - from) * node) - before)
         });
-        let h = (to - from) * piece.h;
+        let h = (to - from) * dense_output.h;
         let solved = self.stages(t, &y, h, guess)?;
-        Some(Piece::new(self.rule, t, h, y, &solved.change))
+        Some(DenseOutput::new(self.rule, t, h, y, &solved.change))
     }
 
     /// How much longer the next step may be: the predictive controller (Gustafsson, ACM TOMS 20, 496, 1994).
@@ -235,7 +241,7 @@ impl<'a, Y: System<N>, const N: usize, const S: usize> Integrator<'a, Y, N, S> {
         match &self.last {
             Some(last) if error <= 1.0 => {
                 let before = ln(last.error.max(1e-2));
-                factor.min(safety * (h / last.piece.h) * exp((before - 2.0 * level) / order))
+                factor.min(safety * (h / last.dense_output.h) * exp((before - 2.0 * level) / order))
             }
             _ => factor,
         }
@@ -244,11 +250,11 @@ impl<'a, Y: System<N>, const N: usize, const S: usize> Integrator<'a, Y, N, S> {
     /// Changes at the nodes as the last step's polynomial foresees them.
     #[inline(always)]
     fn guess(&self, h: f64) -> [[f64; S]; N] {
-        let Some(Last { piece, .. }) = &self.last else { return [[0.0; S]; N] };
-        let share = h / piece.h;
+        let Some(Last { dense_output, .. }) = &self.last else { return [[0.0; S]; N] };
+        let share = h / dense_output.h;
         std::array::from_fn(|r| {
-            let end = piece.end[r] - piece.start[r];
-            std::array::from_fn(|i| piece.change(r, 1.0 + share * self.rule.nodes[i]) - end)
+            let end = dense_output.end[r] - dense_output.start[r];
+            std::array::from_fn(|i| dense_output.change(r, 1.0 + share * self.rule.nodes[i]) - end)
         })
     }
 
@@ -409,7 +415,7 @@ mod tests {
         for _ in 0..steps {
             let y = integrator.y;
             let solved = integrator.stages(0.0, &y, h, [[0.0; S]; 3]).expect("converges");
-            integrator.y = Piece::new(rule, 0.0, h, y, &solved.change).end;
+            integrator.y = DenseOutput::new(rule, 0.0, h, y, &solved.change).end;
         }
         let (sin, cos) = libm::sincos(end);
         let exact = [cos, sin, sin * cos];
@@ -446,7 +452,7 @@ mod tests {
         }
     }
 
-    fn follow(tolerance: f64) -> (f64, Cost) {
+    fn follow(tolerance: f64) -> (f64, IntegratorStats) {
         let accuracy = Accuracy { tolerance, scale: [1.0; 2] };
         let mut integrator = Integrator::new(&Follower, radau_iia_9(), accuracy, 0.0, [0.0, 2.0], 1e-3);
         while integrator.t() < 10.0 {
@@ -468,7 +474,7 @@ mod tests {
     #[test]
     fn work_is_known_exactly() {
         let (_, cost) = follow(1e-8);
-        assert_eq!(cost, Cost { steps: 28, rejected: 7, evaluations: 105, factorisations: 42 });
+        assert_eq!(cost, IntegratorStats { steps: 28, rejected: 7, evaluations: 105, factorisations: 42 });
     }
 
     /// `y' = e^y`, which is infinite at `t = e^-y(0)`.
@@ -505,10 +511,10 @@ mod tests {
         let mut integrator = Integrator::new(&Rotation, radau_iia_9(), accuracy, 0.0, [1.0, 0.0, 0.0], 0.1);
         let (mut dense, mut exact) = (0.0_f64, 0.0_f64);
         while integrator.t() < 6.0 {
-            let piece = integrator.step(6.0).expect("goes on");
-            let part = integrator.part(&piece, 0.4).expect("converges");
-            let cos = libm::cos(piece.t + 0.4 * piece.h);
-            dense = dense.max((piece.value(0, 0.4) - cos).abs());
+            let dense_output = integrator.step(6.0).expect("goes on");
+            let part = integrator.part(&dense_output, 0.4).expect("converges");
+            let cos = libm::cos(dense_output.t + 0.4 * dense_output.h);
+            dense = dense.max((dense_output.value(0, 0.4) - cos).abs());
             exact = exact.max((part.end[0] - cos).abs());
         }
         assert!(exact < 1e-6 && exact < 0.1 * dense, "{dense:.1e} {exact:.1e}");

@@ -2,7 +2,7 @@
 //!
 //! A [`System`] is a set of equations `mass y' = f(t, y)`, masses of 0 allowed (constraints of index 1), that gives its
 //! residual and its Jacobian at several points at once. An [`Integrator`] takes steps along a solution; each is a
-//! [`Piece`], the collocation polynomial.
+//! [`DenseOutput`], the collocation polynomial.
 //!
 //! ```
 //! use slipsweep::numerics::elementary::exp;
@@ -45,11 +45,11 @@
 
 mod blocks;
 mod collocation;
+mod dense_output;
 mod integrator;
-mod piece;
 mod system;
 
 pub use collocation::{Collocation, radau_iia_5, radau_iia_9, radau_iia_13};
-pub use integrator::{Accuracy, Cost, Failure, Integrator};
-pub use piece::Piece;
+pub use dense_output::DenseOutput;
+pub use integrator::{Accuracy, Failure, Integrator, IntegratorStats};
 pub use system::{Linearised, Points, System};

@@ -6,7 +6,7 @@
 //! its border and in its corners alike, to as many digits as the gradient has.
 
 use super::plane::{Place, Plane, moved};
-use crate::protocol::Effort;
+use crate::protocol::SolverStats;
 
 /// An ellipse: the images of the unit circle under `half`, about `centre`.
 #[derive(Debug, Clone, Copy)]
@@ -92,7 +92,7 @@ impl Ellipse {
     }
 
     /// Cuts until the place of least work is close.
-    pub fn close_in(&mut self, plane: &Plane, until: Until, effort: &mut Effort) -> Outcome {
+    pub fn close_in(&mut self, plane: &Plane, until: Until, stats: &mut SolverStats) -> Outcome {
         let mut found = None;
         for _ in 0..MOST_CUTS {
             // The condition that takes most of the ellipse away.
@@ -114,13 +114,13 @@ impl Ellipse {
                 continue;
             }
             found = Some(self.centre);
-            let moments = plane.moments(self.centre, effort);
-            let (length, direction) = self.span(moments.gradient.map(|g| -g));
+            let work_derivatives = plane.work_derivatives(self.centre, stats);
+            let (length, direction) = self.span(work_derivatives.gradient.map(|g| -g));
             let close = match until {
-                Until::Work(share) => length <= share * moments.work.abs(),
+                Until::Work(share) => length <= share * work_derivatives.work.abs(),
                 Until::Rounding => self.is_rounding(),
             };
-            if close || length == 0.0 || self.is_spent(moments.gradient, length) {
+            if close || length == 0.0 || self.is_spent(work_derivatives.gradient, length) {
                 return Outcome::Close(self.centre);
             }
             if length.is_nan() {

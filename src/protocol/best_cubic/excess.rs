@@ -16,7 +16,7 @@ use crate::numerics::double_double::DoubleDouble;
 use crate::numerics::elementary::{ln, ln_1p};
 use crate::numerics::gauss::rule;
 use crate::protocol::cubic::Path;
-use crate::protocol::{Effort, optimal};
+use crate::protocol::{SolverStats, optimal};
 
 /// Relative accuracy of the integral.
 const ACCURACY: f64 = 1e-10;
@@ -87,7 +87,7 @@ struct Excess<'a> {
     transition: &'a Transition,
     t_f: f64,
     bounded: bool,
-    effort: &'a mut Effort,
+    stats: &'a mut SolverStats,
 }
 
 impl Excess<'_> {
@@ -99,7 +99,7 @@ impl Excess<'_> {
         let v = at(side.n).max(0.0) / (self.t_f * theta);
         let position = optimal::Position { theta, rest, drop, time_left, margin };
         let Transition { law, v_f, .. } = *self.transition;
-        let best = optimal::feedback(law, v_f, position, self.bounded, FEEDBACK, self.effort)?;
+        let best = optimal::feedback(law, v_f, position, self.bounded, FEEDBACK, self.stats)?;
         let dearer = if best.v > FAINT * v {
             best.v * entropy((v - best.v) / best.v)
         } else {
@@ -137,10 +137,10 @@ pub(super) fn over_optimum(
     path: &Path,
     work: f64,
     bounded: bool,
-    effort: &mut Effort,
+    stats: &mut SolverStats,
 ) -> Option<f64> {
     let t_f = path.ends.t_f;
-    let mut excess = Excess { transition, t_f, bounded, effort };
+    let mut excess = Excess { transition, t_f, bounded, stats };
     let mut panels = Vec::new();
     let sides = [false, true].map(|from_end| Side::of(path, bounded, from_end));
     for side in &sides {

@@ -12,7 +12,7 @@ mod newton;
 mod plane;
 
 use super::cubic::Landscape;
-use super::{Effort, Solved, Status, optimal};
+use super::{Solved, SolverStats, Status, optimal};
 use crate::model::Transition;
 use crate::numerics::elementary::ln;
 use ellipse::{Ellipse, Outcome, Until};
@@ -54,9 +54,9 @@ const CLOSE: f64 = 1e-5;
 /// `NegativeFriction` where `tau < 0` somewhere, `Unproven` as for the optimum.
 pub fn solve(transition: &Transition, t_f: f64, bounded: bool, rtol: f64) -> Solved<BestCubic> {
     let optimum = optimal::solve(transition, t_f, bounded, rtol.min(1e-12));
-    let mut effort = optimum.effort;
+    let mut stats = optimum.stats;
     let Some(optimum_value) = optimum.value else {
-        return Solved { status: optimum.status, value: None, effort };
+        return Solved { status: optimum.status, value: None, stats };
     };
     let law = transition.law;
     let landscape = Landscape::new(transition, t_f, rtol.min(1e-12));
@@ -68,16 +68,16 @@ pub fn solve(transition: &Transition, t_f: f64, bounded: bool, rtol: f64) -> Sol
     let lowest = steady(transition.v_i).min(steady(transition.v_f));
     let doubtful =
         matches!(optimum.status, Status::Unproven | Status::NegativeFriction) || lowest <= (law.b - law.a).max(0.0);
-    let unsolved = |status, effort| {
+    let unsolved = |status, stats| {
         let status = if doubtful && status == Status::NotConverged { Status::Unproven } else { status };
-        Solved { status, value: None, effort }
+        Solved { status, value: None, stats }
     };
-    let least = match least(&rough, &plane, law.a, &mut effort) {
+    let least = match least(&rough, &plane, law.a, &mut stats) {
         Ok(least) => least,
-        Err(status) => return unsolved(status, effort),
+        Err(status) => return unsolved(status, stats),
     };
     let path = plane.path(least.place);
-    let work = plane.moments(least.place, &mut effort).work;
+    let work = plane.work_derivatives(least.place, &mut stats).work;
     let v_min = if least.touches { least_velocity } else { path.least_velocity() };
     let difference = work - optimum_value.work;
     let excess = if difference > PLAIN_DIFFERENCE * optimum_value.work {
@@ -86,13 +86,13 @@ pub fn solve(transition: &Transition, t_f: f64, bounded: bool, rtol: f64) -> Sol
         // Two routes to one number: they must agree as far as the coarser one goes, and as far as a rounding of t_f
         // leaves W* alone.
         let coarse = DIFFERENCE_ERROR * work + ROUNDINGS * f64::EPSILON * t_f * optimum_value.hamiltonian.abs();
-        let excess = excess::over_optimum(transition, &path, work, bounded, &mut effort);
+        let excess = excess::over_optimum(transition, &path, work, bounded, &mut stats);
         match excess {
             Some(excess) if (excess - difference).abs() <= coarse => excess,
             // A path may be nowhere further than a rounding from the least time: there is no feedback then, and the difference
             // is as good as both works.
             None if difference.abs() <= coarse => difference.max(0.0),
-            _ => return unsolved(Status::NotConverged, effort),
+            _ => return unsolved(Status::NotConverged, stats),
         }
     };
     let own = if v_min < 1.0 { Status::BelowBound } else { Status::Ok };
@@ -100,7 +100,7 @@ pub fn solve(transition: &Transition, t_f: f64, bounded: bool, rtol: f64) -> Sol
     let [a_2, a_3] = plane.coefficients(least.place).map(|a| a.high);
     let gap = excess / optimum_value.work;
     let value = BestCubic { a_2, a_3, work, work_optimal: optimum_value.work, gap, v_min };
-    Solved { status, value: Some(value), effort }
+    Solved { status, value: Some(value), stats }
 }
 
 /// The place of least work, and whether the velocity touches its least value there.
@@ -110,17 +110,17 @@ struct Least {
 }
 
 /// Close in on the place of least work, coarsely and then, if it is not inside the set, to the end.
-fn least(rough: &Plane, plane: &Plane, a: f64, effort: &mut Effort) -> Result<Least, Status> {
+fn least(rough: &Plane, plane: &Plane, a: f64, stats: &mut SolverStats) -> Result<Least, Status> {
     let mut ellipse = Ellipse::around(rough).ok_or(Status::Infeasible)?;
-    let start = match ellipse.close_in(rough, Until::Work(CLOSE * a.min(1.0)), effort) {
+    let start = match ellipse.close_in(rough, Until::Work(CLOSE * a.min(1.0)), stats) {
         Outcome::Empty => return Err(Status::Infeasible),
         Outcome::Close(place) => place,
         Outcome::Exhausted => return Err(Status::NotConverged),
     };
-    if let Some(place) = newton::descend(plane, a, start, effort) {
+    if let Some(place) = newton::descend(plane, a, start, stats) {
         return Ok(Least { place, touches: false });
     }
-    let Outcome::Close(place) = ellipse.close_in(plane, Until::Rounding, effort) else {
+    let Outcome::Close(place) = ellipse.close_in(plane, Until::Rounding, stats) else {
         return Err(Status::NotConverged);
     };
     let mut least = Least { place, touches: false };

@@ -1,8 +1,8 @@
 //! Newton's method from a place close to that of least work, inside the admissible set.
 
 use super::plane::{Place, Plane, moved};
-use crate::protocol::Effort;
-use crate::protocol::cubic::Moments;
+use crate::protocol::SolverStats;
+use crate::protocol::cubic::WorkDerivatives;
 
 /// Newton steps; each is halved as often as needed.
 const MOST_STEPS: u32 = 60;
@@ -22,7 +22,7 @@ struct Newton {
 }
 
 impl Newton {
-    fn of(Moments { gradient, hessian: [h_11, h_12, h_22], .. }: &Moments) -> Newton {
+    fn of(WorkDerivatives { gradient, hessian: [h_11, h_12, h_22], .. }: &WorkDerivatives) -> Newton {
         // In units in which both coordinates bend the work alike.
         let units = [h_11, h_22].map(|bend| 1.0 / bend.abs().max(f64::MIN_POSITIVE).sqrt());
         let [g_1, g_2] = [gradient[0] * units[0], gradient[1] * units[1]];
@@ -42,9 +42,9 @@ impl Newton {
 }
 
 /// Newton's method with halved steps. `None` where the descent runs into the border of the admissible set.
-pub(super) fn descend(plane: &Plane, a: f64, start: Place, effort: &mut Effort) -> Option<Place> {
+pub(super) fn descend(plane: &Plane, a: f64, start: Place, stats: &mut SolverStats) -> Option<Place> {
     let mut place = start;
-    let mut here = plane.moments(place, effort);
+    let mut here = plane.work_derivatives(place, stats);
     let mut before = f64::INFINITY;
     for _ in 0..MOST_STEPS {
         let Newton { step, decrement, sure } = Newton::of(&here);
@@ -65,7 +65,7 @@ pub(super) fn descend(plane: &Plane, a: f64, start: Place, effort: &mut Effort) 
                 if last {
                     return Some(trial);
                 }
-                let there = plane.moments(trial, effort);
+                let there = plane.work_derivatives(trial, stats);
                 if there.work <= here.work - 1e-4 * share * decrement + 1e-14 * work {
                     break (trial, there);
                 }

@@ -3,8 +3,8 @@
 use crate::model::Law;
 use crate::numerics::double_double::DoubleDouble;
 use crate::numerics::elementary::exp;
-use crate::protocol::Effort;
-use crate::protocol::cubic::{Basis, Landscape, Moments, Path};
+use crate::protocol::SolverStats;
+use crate::protocol::cubic::{Basis, Landscape, Path, WorkDerivatives};
 
 /// Two coefficients of theta, those of [`Basis`], to 32 digits: next to the border what is admissible may be thinner than
 /// the rounding of a double.
@@ -81,8 +81,8 @@ impl<'a> Plane<'a> {
     }
 
     /// Work, gradient and Hessian at an admissible place.
-    pub fn moments(&self, place: Place, effort: &mut Effort) -> Moments {
-        self.landscape.moments(&self.path(place), self.basis, effort)
+    pub fn work_derivatives(&self, place: Place, stats: &mut SolverStats) -> WorkDerivatives {
+        self.landscape.work_derivatives(&self.path(place), self.basis, stats)
     }
 
     /// What must not be negative: theta above its floor and velocity above its least, where each is least, and the

@@ -18,7 +18,7 @@ mod path;
 
 use super::control::{Extent, Tolerance};
 use super::profile::{Curve, Hermite, Problem, Resolved, Side, Start, pass, reach};
-use super::{Effort, Slider, Solved, Status};
+use super::{Solved, SolverStats, SpringBlock, Status};
 use crate::model::Transition;
 use crate::numerics::elementary::{ln, ln_1p};
 
@@ -45,10 +45,10 @@ pub struct Compliant {
 ///
 /// `Infeasible` where `t_f` is not above `t_min`, or where an argument is outside its domain (`a > 0`, `b >= 0`, `v_i,
 /// v_f > 1`, `t_f > 0`, `m >= 0`, all finite; `k > 0`). `NegativeFriction` where `tau < 0` somewhere.
-pub fn solve(slider: &Slider, (v_i, v_f): (f64, f64), t_f: f64, rtol: f64) -> Solved<Compliant> {
-    let mut effort = Effort::default();
+pub fn solve(slider: &SpringBlock, (v_i, v_f): (f64, f64), t_f: f64, rtol: f64) -> Solved<Compliant> {
+    let mut stats = SolverStats::default();
     let mut range = Range { work: 0.0, friction_min: f64::INFINITY, control: Extent::NONE };
-    let followed = follow(slider, (v_i, v_f), t_f, rtol, &mut effort, |curve, panel| {
+    let followed = follow(slider, (v_i, v_f), t_f, rtol, &mut stats, |curve, panel| {
         let (work, friction_min) = panel.sum(&slider.law, curve);
         range.work += work;
         range.friction_min = range.friction_min.min(friction_min);
@@ -58,7 +58,7 @@ pub fn solve(slider: &Slider, (v_i, v_f): (f64, f64), t_f: f64, rtol: f64) -> So
     });
     let curve = match followed {
         Ok(curve) => curve,
-        Err(status) => return Solved { status, value: None, effort },
+        Err(status) => return Solved { status, value: None, stats },
     };
     let turn = curve.exponent.turn().map_or(v_i, |x| 1.0 + curve.surplus(Side::Start, x));
     let (v_min, v_max) = (v_i.min(v_f).min(turn), v_i.max(v_f).max(turn));
@@ -76,17 +76,17 @@ pub fn solve(slider: &Slider, (v_i, v_f): (f64, f64), t_f: f64, rtol: f64) -> So
     };
     let numbers = [value.work, value.v_max, value.control_min, value.control_max];
     if numbers.iter().all(|number| number.is_finite()) {
-        Solved { status: Status::Ok.with_friction(range.friction_min), value: Some(value), effort }
+        Solved { status: Status::Ok.with_friction(range.friction_min), value: Some(value), stats }
     } else {
-        Solved { status: Status::NotConverged, value: None, effort }
+        Solved { status: Status::NotConverged, value: None, stats }
     }
 }
 
 /// The member over time; `Err` with the status that [`solve`] has where there is none.
-pub fn path(slider: &Slider, (v_i, v_f): (f64, f64), t_f: f64, rtol: f64) -> Result<Path, Status> {
+pub fn path(slider: &SpringBlock, (v_i, v_f): (f64, f64), t_f: f64, rtol: f64) -> Result<Path, Status> {
     let mut panels = Vec::new();
-    let mut effort = Effort::default();
-    let curve = follow(slider, (v_i, v_f), t_f, rtol, &mut effort, |_, panel| panels.push(*panel))?;
+    let mut stats = SolverStats::default();
+    let curve = follow(slider, (v_i, v_f), t_f, rtol, &mut stats, |_, panel| panels.push(*panel))?;
     Ok(Path::new(*slider, curve, panels))
 }
 
@@ -100,17 +100,16 @@ struct Range {
 /// Finds the member and passes along it, and sees whether theta arrives: that the root is one is shown by another route
 /// than found it.
 fn follow(
-    slider: &Slider,
+    slider: &SpringBlock,
     (v_i, v_f): (f64, f64),
     t_f: f64,
     rtol: f64,
-    effort: &mut Effort,
+    stats: &mut SolverStats,
     mut visit: impl FnMut(&Curve<Hermite>, &Resolved),
 ) -> Result<Curve<Hermite>, Status> {
-    let curve = member(slider, (v_i, v_f), t_f, rtol, effort)?;
-    let theta = pass(&curve, Start::steady(v_i, false), rtol, INTERPOLATION * reach(rtol), effort, |panel| {
-        visit(&curve, panel)
-    });
+    let curve = member(slider, (v_i, v_f), t_f, rtol, stats)?;
+    let theta =
+        pass(&curve, Start::steady(v_i, false), rtol, INTERPOLATION * reach(rtol), stats, |panel| visit(&curve, panel));
     let arrives = theta.is_some_and(|theta| (theta * v_f - 1.0).abs() <= 10.0 * rtol + ROUNDING);
     if arrives { Ok(curve) } else { Err(Status::NotConverged) }
 }
@@ -123,13 +122,13 @@ const ROUNDING: f64 = 1e-12;
 
 /// The velocity of the member.
 fn member(
-    slider: &Slider,
+    slider: &SpringBlock,
     (v_i, v_f): (f64, f64),
     t_f: f64,
     rtol: f64,
-    effort: &mut Effort,
+    stats: &mut SolverStats,
 ) -> Result<Curve<Hermite>, Status> {
-    let &Slider { law, k, m } = slider;
+    let &SpringBlock { law, k, m } = slider;
     let sound = law.a > 0.0 && law.b >= 0.0 && t_f > 0.0 && v_i > 1.0 && v_f > 1.0 && k > 0.0 && m >= 0.0;
     if !sound || ![law.a, law.b, t_f, v_i, v_f, m].iter().all(|x| x.is_finite()) {
         return Err(Status::Infeasible);
@@ -151,7 +150,7 @@ fn member(
     // Close to t_min, two layers whose slip is what there is to spare.
     let layers = 1.8 * t_f / spare;
     let start = if tight { layers * layers * layers } else { guess(w_i, w_f, rise, t_f, problem.required) };
-    let c = problem.solve(start, rtol, reach(rtol), effort);
+    let c = problem.solve(start, rtol, reach(rtol), stats);
     c.map(|c| curve.with(c)).ok_or(Status::NotConverged)
 }
 

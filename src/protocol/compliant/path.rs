@@ -1,19 +1,19 @@
 //! A member over time, with the control that drives it.
 
 use crate::protocol::profile::{Curve, Hermite, Resolution, Resolved};
-use crate::protocol::{Jet, Moment, Motion, Slider};
+use crate::protocol::{Jet, Moment, Motion, SpringBlock};
 
 /// The shortcut in pieces that follow each other in time, in each of which it is smooth on the scale of the piece.
 pub struct Path {
     /// The block and spring that it drives.
-    pub slider: Slider,
+    pub slider: SpringBlock,
     resolution: Resolution<Hermite>,
     /// When each piece begins, and the end.
     times: Vec<f64>,
 }
 
 impl Path {
-    pub(super) fn new(slider: Slider, curve: Curve<Hermite>, panels: Vec<Resolved>) -> Path {
+    pub(super) fn new(slider: SpringBlock, curve: Curve<Hermite>, panels: Vec<Resolved>) -> Path {
         let mut times: Vec<f64> = panels.iter().map(|panel| curve.t_f * panel.place(0.0).0).collect();
         times.push(curve.t_f);
         Path { slider, resolution: Resolution { law: slider.law, curve, panels }, times }

@@ -9,16 +9,16 @@ mod bundle;
 mod cells;
 mod friction;
 mod kernel;
-mod moments;
 mod motion;
 mod path;
 mod plan;
 mod queue;
 mod rules;
 mod screen;
+mod work_derivatives;
 mod works;
 
-use super::{Effort, Motion, Status};
+use super::{Motion, SolverStats, Status};
 use crate::model::{Law, Transition};
 use crate::numerics::double_double::DoubleDouble;
 use crate::numerics::elementary::ln;
@@ -29,13 +29,13 @@ use bundle::Friction;
 use cells::Frame;
 use friction::{Floors, Open};
 use kernel::Slice;
-pub(super) use moments::{Basis, Moments};
 pub(super) use path::{Ends, Path, rise};
 use queue::Queue;
 use rules::{Accuracy, Panel, Zeros, choose};
 use screen::{
     SEARCH, SPAN, SPANS, Verdict, end_velocities, end_velocities_of_span, inner_velocities, on_side, screen, settle,
 };
+pub(super) use work_derivatives::{Basis, WorkDerivatives};
 use works::Works;
 
 /// The work landscape of one transition in one time over the plane of `(alpha_2, alpha_3)`.
@@ -53,7 +53,7 @@ pub struct Landscape {
 
 /// The results of a run of shortcuts, one element a shortcut, laid out column by column.
 #[derive(Debug)]
-pub struct Shortcuts<'a> {
+pub struct LandscapeBuffers<'a> {
     /// `W_s`; left untouched where infeasible, and everywhere if empty (not asked for).
     pub work: &'a mut [f64],
     /// Least velocity on `[0, t_f]`; left untouched where infeasible, and everywhere if empty (not asked for).
@@ -93,7 +93,7 @@ impl Landscape {
     /// The motion of one shortcut, given scaled; `None` where it is infeasible.
     pub fn motion(&self, a_2: f64, a_3: f64) -> Option<Box<dyn Motion>> {
         let mut status = [Status::Infeasible];
-        self.evaluate(&[a_2], &[a_3], Shortcuts { work: &mut [], v_min: &mut [], status: &mut status });
+        self.evaluate(&[a_2], &[a_3], LandscapeBuffers { work: &mut [], v_min: &mut [], status: &mut status });
         let motion = motion::CubicPoint::new(self.law, self.ends, a_2, a_3);
         (status != [Status::Infeasible]).then(|| Box::new(motion) as Box<dyn Motion>)
     }
@@ -101,8 +101,8 @@ impl Landscape {
     /// Evaluates the shortcuts `(a_2[i], a_3[i])`, given scaled: `alpha_2 t_f` and `alpha_3 t_f^2`.
     ///
     /// As many as the shortest of `a_2`, `a_3` and `out.status` holds.
-    pub fn evaluate(&self, a_2: &[f64], a_3: &[f64], out: Shortcuts<'_>) -> Effort {
-        let Shortcuts { work, v_min, status } = out;
+    pub fn evaluate(&self, a_2: &[f64], a_3: &[f64], out: LandscapeBuffers<'_>) -> SolverStats {
+        let LandscapeBuffers { work, v_min, status } = out;
         let count = a_2.len().min(a_3.len()).min(status.len());
         let (velocities, works) = (count.min(v_min.len()), count.min(work.len()));
         let mut bins = Bins::take();
@@ -136,17 +136,17 @@ impl Landscape {
         }
         evaluation.inner_velocities();
         let Evaluation { status, works, doubtful, .. } = evaluation;
-        let effort = works.finish();
+        let stats = works.finish();
         // Until here the status tells on which side of v = 1 a velocity is.
         for open in doubtful {
             open.decide(self.law, |i| Path::new(&self.ends, a_2[i], a_3[i]), status);
         }
         bins.keep();
-        effort
+        stats
     }
 
     /// `W_s = int tau v dt`.
-    fn work(&self, path: &Path, effort: &mut Effort) -> f64 {
+    fn work(&self, path: &Path, stats: &mut SolverStats) -> f64 {
         let mut panels = Vec::with_capacity(8);
         let zeros = Zeros::of(path);
         if [false, true].iter().any(|&end| path.is_faint(end, self.accuracy.rounding)) {
@@ -156,14 +156,14 @@ impl Landscape {
         } else {
             choose(&zeros, 0.0, 1.0, &self.accuracy, 0, &mut panels);
         }
-        panels.iter().map(|panel| self.sum(path, panel, effort)).sum()
+        panels.iter().map(|panel| self.sum(path, panel, stats)).sum()
     }
 
     /// The part of one panel in the work.
     #[inline(always)]
-    fn sum(&self, path: &Path, panel: &Panel, effort: &mut Effort) -> f64 {
+    fn sum(&self, path: &Path, panel: &Panel, stats: &mut SolverStats) -> f64 {
         let rule = rule(panel.nodes);
-        effort.nodes += rule.x.len() as u32;
+        stats.nodes += rule.x.len() as u32;
         // Where a zero is near, the digits of the small theta there count.
         let (theta, n) = path.about(panel.centre);
         let slice = Slice {

@@ -7,7 +7,7 @@ use super::path::Path;
 use super::plan::{BLOCK, Block, Plan, plan, plan_parts};
 use super::queue::{Cuts, Queue};
 use crate::numerics::lanes::LANES;
-use crate::protocol::Effort;
+use crate::protocol::SolverStats;
 
 /// Works in the making. A shortcut waits for the plan of its cell, perhaps for one of its own, perhaps for one with
 /// larger powers, and then for its sum.
@@ -31,13 +31,13 @@ struct Sums<'a> {
     work: &'a mut [f64],
     cut: Cuts,
     bins: &'a mut Bins,
-    effort: Effort,
+    stats: SolverStats,
 }
 
 impl<'a> Works<'a> {
     /// For shortcuts of a landscape, whose works are to be written to `work`.
     pub fn new(of: &'a Landscape, work: &'a mut [f64], bins: &'a mut Bins) -> Works<'a> {
-        let sums = Sums { of, work, cut: Cuts::EMPTY, bins, effort: Effort::default() };
+        let sums = Sums { of, work, cut: Cuts::EMPTY, bins, stats: SolverStats::default() };
         let (from_cells, own) = (Plan::EMPTY, Plan::EMPTY);
         let planned = Planned { alone: Queue::EMPTY, deep: Queue::EMPTY, from_cells, own, sums };
         Works { due: Queue::EMPTY, planned }
@@ -64,14 +64,14 @@ impl<'a> Works<'a> {
     }
 
     /// Sums what is left.
-    pub fn finish(mut self) -> Effort {
+    pub fn finish(mut self) -> SolverStats {
         self.plan();
         let Planned { alone, deep, own, sums, .. } = &mut self.planned;
         sums.plan(alone, deep, own);
         sums.deepen(deep);
         sums.part();
         sums.bins.close(sums.of, sums.work);
-        sums.effort
+        sums.stats
     }
 
     fn plan(&mut self) {
@@ -131,8 +131,8 @@ impl Sums<'_> {
     /// Sums eight shortcuts that share a bin, those from lane `first` on, side by side.
     #[inline(always)]
     fn settle_all(&mut self, plan: &Plan, first: usize, indices: &[usize], places: [&Block; 2]) {
-        self.effort.quadratures += LANES as u32;
-        self.effort.nodes += LANES as u32 * nodes_of(plan.bin[first] as usize);
+        self.stats.quadratures += LANES as u32;
+        self.stats.nodes += LANES as u32 * nodes_of(plan.bin[first] as usize);
         self.bins.add_all(self.of, (plan, first), places, indices, self.work);
     }
 
@@ -142,8 +142,8 @@ impl Sums<'_> {
         let bin = plan.bin[lane] as usize;
         if bin < CUT_FROM {
             self.work[index] = 0.0;
-            self.effort.quadratures += 1;
-            self.effort.nodes += nodes_of(bin);
+            self.stats.quadratures += 1;
+            self.stats.nodes += nodes_of(bin);
             self.bins.add(self.of, (plan, lane), [place[0], place[1], 0.0, 1.0], index, self.work);
         } else if self.cut.push(index, place, plan.cut[lane]) {
             self.part();
@@ -152,13 +152,13 @@ impl Sums<'_> {
 
     /// Plans the parts of shortcuts that are cut in two. Those for which that is not enough are summed alone.
     fn part(&mut self) {
-        let Sums { of, work, cut, bins, effort } = self;
+        let Sums { of, work, cut, bins, stats } = self;
         let Some((indices, parts)) = cut.take() else { return };
         let mut plan = Plan::EMPTY;
         plan_parts(&of.ends, parts, &of.accuracy_of_parts, &mut plan);
         let [a_2, a_3, low, high] = parts;
         for (k, &i) in indices.iter().enumerate() {
-            effort.quadratures += 1;
+            stats.quadratures += 1;
             let lanes = [k, k + BLOCK / 2];
             let path = Path::new(&of.ends, a_2[k], a_3[k]);
             // Where it is cut a shortcut may be at its fastest.
@@ -166,11 +166,11 @@ impl Sums<'_> {
             if near && lanes.iter().all(|&lane| plan.bin[lane] < BINS as u32) {
                 work[i] = 0.0;
                 for lane in lanes {
-                    effort.nodes += nodes_of(plan.bin[lane] as usize);
+                    stats.nodes += nodes_of(plan.bin[lane] as usize);
                     bins.add(of, (&plan, lane), [a_2[lane], a_3[lane], low[lane], high[lane]], i, work);
                 }
             } else {
-                work[i] = of.work(&path, effort);
+                work[i] = of.work(&path, stats);
             }
         }
     }

@@ -5,7 +5,7 @@ use super::floor;
 use super::search::quadrature_tolerance;
 use crate::model::{Law, Transition};
 use crate::numerics::turning::turning;
-use crate::protocol::{Effort, Status};
+use crate::protocol::{SolverStats, Status};
 
 /// The special times of one transition, each with the work `W*` there; `None` where the time does not exist.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -59,18 +59,24 @@ pub struct Wanted {
 /// Each is one quadrature, no search over `t_f` (docs/theory.md, "Crossover times"). The status is `Unproven` where
 /// friction falls to `max(0, b - a)` on one of the paths, `NegativeFriction` where it falls below 0, `Infeasible` outside the domain of the law, `NotConverged`
 /// where a quadrature failed.
-pub fn solve(transition: &Transition, bounded: bool, rtol: f64, wanted: Wanted) -> (Status, CrossoverTimes, Effort) {
+pub fn solve(
+    transition: &Transition,
+    bounded: bool,
+    rtol: f64,
+    wanted: Wanted,
+) -> (Status, CrossoverTimes, SolverStats) {
     let mut times = CrossoverTimes::default();
     let Some(problem) = Problem::of(transition, bounded) else {
-        return (Status::Infeasible, times, Effort::default());
+        return (Status::Infeasible, times, SolverStats::default());
     };
-    let mut survey = Survey { problem, rtol, status: Status::Ok, friction: f64::INFINITY, effort: Effort::default() };
+    let mut survey =
+        Survey { problem, rtol, status: Status::Ok, friction: f64::INFINITY, stats: SolverStats::default() };
     if transition.v_f > transition.v_i {
         acceleration(&mut survey, wanted, &mut times);
     } else {
         deceleration(&mut survey, wanted, &mut times);
     }
-    (survey.status.with_friction(survey.friction), times, survey.effort)
+    (survey.status.with_friction(survey.friction), times, survey.stats)
 }
 
 /// The quadratures of one transition, with the worst status met.
@@ -80,7 +86,7 @@ struct Survey {
     status: Status,
     /// Least friction on any of the paths.
     friction: f64,
-    effort: Effort,
+    stats: SolverStats,
 }
 
 impl Survey {
@@ -101,8 +107,8 @@ impl Survey {
             self.status = self.status.max(failed);
             return (None, None);
         };
-        self.effort.quadratures += 1;
-        self.effort.nodes += sums.nodes;
+        self.stats.quadratures += 1;
+        self.stats.nodes += sums.nodes;
         self.meet(extremal.friction_min(&self.problem, &sums));
         (Some(extremal.time(&sums)), Some(extremal.work(&self.problem, &sums)))
     }

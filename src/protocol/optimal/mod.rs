@@ -13,7 +13,7 @@ mod motion;
 mod route;
 mod search;
 
-use super::{Effort, Motion, Solved, Status};
+use super::{Motion, Solved, SolverStats, Status};
 use crate::model::{Law, Transition};
 use crate::numerics::elementary::{exp, ln_1p};
 use extremal::Problem;
@@ -75,7 +75,7 @@ pub struct Optimum {
 /// below the bound there has no numbers.
 pub fn solve(transition: &Transition, t_f: f64, bounded: bool, rtol: f64) -> Solved<Optimum> {
     let Some(problem) = Problem::of(transition, bounded).filter(|_| t_f > 0.0 && t_f.is_finite()) else {
-        return Solved { status: Status::Infeasible, value: None, effort: Effort::default() };
+        return Solved { status: Status::Infeasible, value: None, stats: SolverStats::default() };
     };
     search::solve(&problem, t_f, rtol)
 }
@@ -100,7 +100,7 @@ pub fn motion(
 /// The same protocol, and the route that it takes.
 pub(super) fn route(transition: &Transition, t_f: f64, bounded: bool, rtol: f64) -> (Solved<Optimum>, Option<Route>) {
     let Some(problem) = Problem::of(transition, bounded).filter(|_| t_f > 0.0 && t_f.is_finite()) else {
-        return (Solved { status: Status::Infeasible, value: None, effort: Effort::default() }, None);
+        return (Solved { status: Status::Infeasible, value: None, stats: SolverStats::default() }, None);
     };
     let (solved, extremal) = search::find(&problem, t_f, rtol.min(MOTION_RTOL));
     let route = solved.value.map(|_| Route::new(&problem, t_f, extremal));
@@ -149,7 +149,7 @@ pub(super) fn feedback(
     position: Position,
     bounded: bool,
     rtol: f64,
-    effort: &mut Effort,
+    stats: &mut SolverStats,
 ) -> Option<Feedback> {
     let to = Lifetime::steady(v_f);
     let Position { theta, rest, drop, time_left, margin } = position;
@@ -174,7 +174,7 @@ pub(super) fn feedback(
     let beyond = if bounded && beyond <= rounding { 0.0 } else { beyond };
     let time = search::Time { whole: time_left, beyond, doubt: rounding / beyond };
     let (solved, extremal) = search::find_beyond(&problem, time, rtol);
-    *effort += solved.effort;
+    *stats += solved.stats;
     let optimum = solved.value?;
     let pressure = if optimum.strategy == Strategy::Floor {
         // On the bound -C = friction + V_theta (1 - theta), with the C of the arc that leaves it at theta_c, where 1 -

@@ -6,7 +6,7 @@ use super::motion::{Optimal, Timed};
 use crate::model::Law;
 use crate::numerics::elementary::{exp, exp_m1, ln};
 use crate::numerics::radau::radau;
-use crate::protocol::control::{Extent, Jet, Slider, Tolerance};
+use crate::protocol::control::{Extent, Jet, SpringBlock, Tolerance};
 
 /// A place on the protocol.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -162,7 +162,7 @@ impl Optimal {
     }
 
     /// Takes the range of `v_c` between two places into `extent`, turns good to `rtol`.
-    pub fn control(&self, slider: &Slider, from: Site, to: Site, rtol: f64, extent: &mut Extent) {
+    pub fn control(&self, slider: &SpringBlock, from: Site, to: Site, rtol: f64, extent: &mut Extent) {
         if let Site::Held(start) = from {
             // v_c = 1 + (b/k) theta'/theta falls all the way.
             let end = if let Site::Held(end) = to { end } else { self.floor.time };

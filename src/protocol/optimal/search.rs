@@ -6,7 +6,7 @@ use super::guess::{Guess, guess};
 use super::{Optimum, Strategy, floor};
 use crate::numerics::elementary::exp;
 use crate::numerics::root::newton_in_pieces;
-use crate::protocol::{Effort, Solved, Status};
+use crate::protocol::{Solved, SolverStats, Status};
 
 /// Tolerance of a quadrature whose results are to be good to `rtol`. Velocities at the ends change by up to some twenty
 /// times the relative change of the time, since the time goes like the way in `ln u`.
@@ -68,9 +68,9 @@ pub(super) struct Time {
 /// The same, where the time beyond the least may be known better than as a difference.
 pub(super) fn find_beyond(problem: &Problem, time: Time, rtol: f64) -> (Solved<Optimum>, Option<Extremal>) {
     let Time { whole: t_f, beyond, doubt } = time;
-    let mut effort = Effort::default();
+    let mut stats = SolverStats::default();
     if beyond < 0.0 || beyond.is_nan() || (beyond == 0.0 && !problem.bounded) {
-        return (Solved { status: Status::Infeasible, value: None, effort }, None);
+        return (Solved { status: Status::Infeasible, value: None, stats }, None);
     }
     if beyond == 0.0 {
         return (shortest(problem, problem.t_min()), None);
@@ -87,8 +87,8 @@ pub(super) fn find_beyond(problem: &Problem, time: Time, rtol: f64) -> (Solved<O
         let before = last.as_ref().filter(|last| last.piece == piece).map(|last| last.value);
         let (sums, probe) = loop {
             let sums = extremal.arc.sums((tolerance * share).max(FINEST))?;
-            effort.quadratures += 1;
-            effort.nodes += sums.nodes;
+            stats.quadratures += 1;
+            stats.nodes += sums.nodes;
             let probe = extremal.probe(problem, &sums, beyond);
             // A value within the error of its quadrature tells nothing, not even its sign.
             let doubtful = tolerance > accuracy.exact
@@ -152,7 +152,7 @@ pub(super) fn find_beyond(problem: &Problem, time: Time, rtol: f64) -> (Solved<O
     else {
         let doubtful = friction_min <= unique_above || problem.is_doubtful();
         let status = if doubtful { Status::Unproven } else { Status::NotConverged };
-        return (Solved { status, value: None, effort }, None);
+        return (Solved { status, value: None, stats }, None);
     };
 
     // W* is stationary in the parameter up to C dt: the trapezium of C over the last step leaves an error of third
@@ -178,7 +178,7 @@ pub(super) fn find_beyond(problem: &Problem, time: Time, rtol: f64) -> (Solved<O
     let doubtful = friction <= unique_above || (problem.bounded && below);
     if doubtful && problem.bounded && (below || least_velocity(&found) < 1.0 - ROUNDING) {
         // Where friction is this low an extremal may fall below the bound on its way: then it is no protocol under it.
-        return (Solved { status: Status::Unproven, value: None, effort }, None);
+        return (Solved { status: Status::Unproven, value: None, stats }, None);
     }
     let status = if doubtful {
         Status::Unproven
@@ -197,7 +197,7 @@ pub(super) fn find_beyond(problem: &Problem, time: Time, rtol: f64) -> (Solved<O
         theta_max: found.arc.theta_max(),
         strategy,
     };
-    (Solved { status, value: Some(value), effort }, Some(found))
+    (Solved { status, value: Some(value), stats }, Some(found))
 }
 
 /// Least velocity of the arc of an extremal: at an end, or where friction rises through `b - a`.
@@ -319,5 +319,5 @@ fn shortest(problem: &Problem, t_min: f64) -> Solved<Optimum> {
         theta_max: problem.to.theta,
         strategy: Strategy::Floor,
     };
-    Solved { status, value: Some(value), effort: Effort::default() }
+    Solved { status, value: Some(value), stats: SolverStats::default() }
 }

@@ -24,7 +24,7 @@ use super::curve::{Curve, MOST_PANELS, Panel, places};
 use crate::numerics::elementary::{exp, exp_m1, ln, ln_1p};
 use crate::numerics::radau::{NODES, Nodes, Radau, radau};
 use crate::numerics::root::{Probe, newton};
-use crate::protocol::Effort;
+use crate::protocol::SolverStats;
 
 /// What does not change with `c`.
 #[derive(Debug, Clone, Copy)]
@@ -105,13 +105,13 @@ impl<E: Exponent> Problem<E> {
     }
 
     /// `c` of the member that arrives, good to `rtol`; the search begins at `start`.
-    pub fn solve(&self, start: f64, rtol: f64, reach: f64, effort: &mut Effort) -> Option<f64> {
+    pub fn solve(&self, start: f64, rtol: f64, reach: f64, stats: &mut SolverStats) -> Option<f64> {
         let required = self.required;
         // Newton's step doubles the digits.
         let enough = (0.1 * rtol).sqrt();
         let probe = |c: f64| {
             let curve = self.curve.with(c);
-            let behind = self.behind(&curve, rtol, reach, effort)?;
+            let behind = self.behind(&curve, rtol, reach, stats)?;
             // So fast that the rest of theta is a rounding error of the sum.
             let left = if self.tight { 1.0 - behind.sum / self.free } else { 1.0 + behind.sum };
             if left < LOST {
@@ -137,11 +137,11 @@ impl<E: Exponent> Problem<E> {
 
     /// The integrals over the whole protocol; `None` where the velocity is so large that theta ends at 0,
     /// or numbers leave the range of a double.
-    fn behind(&self, curve: &Curve<E>, rtol: f64, reach: f64, effort: &mut Effort) -> Option<Behind> {
+    fn behind(&self, curve: &Curve<E>, rtol: f64, reach: f64, stats: &mut SolverStats) -> Option<Behind> {
         let rule = radau();
         let mut behind = Behind { v: self.v_1, slip: 0.0, turn: 0.0, sum: 0.0, slope: 0.0 };
         let mut count = 0;
-        effort.quadratures += 1;
+        stats.quadratures += 1;
         let scale = curve.exponent.size();
         for stretch in curve.stretches().backward() {
             let mut d = stretch.from;
@@ -153,7 +153,7 @@ impl<E: Exponent> Problem<E> {
                     return None;
                 }
                 count += 1;
-                effort.nodes += NODES as u32;
+                stats.nodes += NODES as u32;
                 let (left, counts) = if self.tight {
                     tight(self, curve, &panel, rule, &mut behind);
                     (self.free, behind.sum)

@@ -12,7 +12,7 @@ use super::curve::{Curve, MOST_PANELS, Panel, Side, place, places};
 use crate::model::Law;
 use crate::numerics::elementary::{exp, exp_m1, ln};
 use crate::numerics::radau::{NODES, Nodes, Radau, radau};
-use crate::protocol::Effort;
+use crate::protocol::SolverStats;
 
 /// One panel with v and theta at its start and at its nodes.
 #[derive(Debug, Clone, Copy)]
@@ -63,7 +63,7 @@ pub fn pass<E: Exponent>(
     start: Start,
     rtol: f64,
     reach: f64,
-    effort: &mut Effort,
+    stats: &mut SolverStats,
     mut visit: impl FnMut(&Resolved),
 ) -> Option<f64> {
     let rule = radau();
@@ -71,7 +71,7 @@ pub fn pass<E: Exponent>(
     // Slip since theta last left the slow solution, and by which share: at the start, or where v changes too fast.
     let (mut slip, mut off) = (0.0, if slow { lag(curve, Side::Start, 0.0, v) } else { 1.0 });
     let mut count = 0;
-    effort.quadratures += 1;
+    stats.quadratures += 1;
     for stretch in curve.stretches().forward() {
         let mut d = stretch.from;
         while d != stretch.to {
@@ -93,7 +93,7 @@ pub fn pass<E: Exponent>(
                 return None;
             }
             count += 1;
-            effort.nodes += NODES as u32;
+            stats.nodes += NODES as u32;
             let (resolved, slipped) = resolve(curve, panel, [v, theta, rate], stiff, rule);
             visit(&resolved);
             v = resolved.v[NODES - 1];

@@ -11,7 +11,7 @@ mod piece;
 
 use super::control::Extent;
 use super::optimal::{Route, Site, route};
-use super::{Effort, Motion, Slider, Solved, Status};
+use super::{Motion, Solved, SolverStats, SpringBlock, Status};
 use crate::model::Transition;
 use motion::Smooth;
 use piece::{End, Piece};
@@ -48,7 +48,7 @@ pub struct Regularised {
 /// each must, since theta there is as large as `v >= 1` allows. `NegativeFriction` where `tau < 0` on the way;
 /// `Unproven` where the optimum need not be the only one.
 pub fn solve(
-    slider: &Slider,
+    slider: &SpringBlock,
     (v_i, v_f): (f64, f64),
     t_f: f64,
     delta_t: f64,
@@ -60,7 +60,7 @@ pub fn solve(
 
 /// The same, and its motion wherever it has numbers.
 pub fn motion(
-    slider: &Slider,
+    slider: &SpringBlock,
     (v_i, v_f): (f64, f64),
     t_f: f64,
     delta_t: f64,
@@ -83,7 +83,7 @@ enum Part {
 
 /// Solves, and hands over the parts in the order of time.
 fn assemble(
-    slider: &Slider,
+    slider: &SpringBlock,
     (v_i, v_f): (f64, f64),
     t_f: f64,
     delta_t: f64,
@@ -91,14 +91,14 @@ fn assemble(
     rtol: f64,
     visit: impl FnMut(Part),
 ) -> (Solved<Regularised>, Option<Route>) {
-    let none = |status, effort| (Solved { status, value: None, effort }, None);
+    let none = |status, stats| (Solved { status, value: None, stats }, None);
     let sound = delta_t > 0.0 && 2.0 * delta_t <= t_f && slider.k > 0.0 && slider.m >= 0.0 && slider.m.is_finite();
     if !sound {
-        return none(Status::Infeasible, Effort::default());
+        return none(Status::Infeasible, SolverStats::default());
     }
     let (solved, route) = route(&Transition { law: slider.law, v_i, v_f }, t_f, bounded, rtol);
-    let mut effort = solved.effort;
-    let (Some(optimum), Some(route)) = (solved.value, route) else { return none(solved.status, effort) };
+    let mut stats = solved.stats;
+    let (Some(optimum), Some(route)) = (solved.value, route) else { return none(solved.status, stats) };
     let mut sum = Sum {
         slider: *slider,
         rtol,
@@ -109,10 +109,10 @@ fn assemble(
         v: Extent::NONE,
         control: Extent::NONE,
     };
-    if let Err(status) = sum.gather(&route, (v_i, v_f), (delta_t, t_f), &mut effort) {
+    if let Err(status) = sum.gather(&route, (v_i, v_f), (delta_t, t_f), &mut stats) {
         // Where the optimum need not be unique, it need not be exact enough for pieces either.
         let doubtful = is_doubtful(solved.status) && status == Status::NotConverged;
-        return none(if doubtful { Status::Unproven } else { status }, effort);
+        return none(if doubtful { Status::Unproven } else { status }, stats);
     }
     if slider.k == f64::INFINITY {
         sum.control = sum.v;
@@ -130,11 +130,11 @@ fn assemble(
     let numbers = [value.work, value.v_max, value.control_min, value.control_max];
     if !numbers.iter().all(|number| number.is_finite()) {
         let doubtful = is_doubtful(solved.status);
-        return none(if doubtful { Status::Unproven } else { Status::NotConverged }, effort);
+        return none(if doubtful { Status::Unproven } else { Status::NotConverged }, stats);
     }
     let own = if value.v_min < 1.0 { Status::BelowBound } else { Status::Ok };
     let status = own.with_friction(sum.friction_min).beside(solved.status);
-    (Solved { status, value: Some(value), effort }, Some(route))
+    (Solved { status, value: Some(value), stats }, Some(route))
 }
 
 /// Whether the optimum need not be unique.
@@ -147,7 +147,7 @@ const STANDSTILL: f64 = 1e-100;
 
 /// What is gathered along the way.
 struct Sum<F> {
-    slider: Slider,
+    slider: SpringBlock,
     rtol: f64,
     /// Takes the parts.
     visit: F,
@@ -169,22 +169,22 @@ impl<F: FnMut(Part)> Sum<F> {
         route: &Route,
         (v_i, v_f): (f64, f64),
         (delta_t, t_f): (f64, f64),
-        effort: &mut Effort,
+        stats: &mut SolverStats,
     ) -> Result<(), Status> {
         let (leaving, arriving) = (route.after(delta_t), route.before(delta_t));
         let at = |site| End::inner(&route.jet(site));
-        self.replace(route, (route.first(), End::outer(v_i)), (leaving, at(leaving)), effort)?;
+        self.replace(route, (route.first(), End::outer(v_i)), (leaving, at(leaving)), stats)?;
         let mut from = leaving;
         if let Some(corner) = route.corner().filter(|&corner| corner > delta_t && corner < t_f - delta_t) {
             let start = Site::Held((corner - 0.5 * delta_t).max(delta_t));
             let end =
                 if corner + 0.5 * delta_t < t_f - delta_t { route.after(corner + 0.5 * delta_t) } else { arriving };
             self.keep(route, from, start);
-            self.replace(route, (start, at(start)), (end, at(end)), effort)?;
+            self.replace(route, (start, at(start)), (end, at(end)), stats)?;
             from = end;
         }
         self.keep(route, from, arriving);
-        self.replace(route, (arriving, at(arriving)), (route.last(), End::outer(v_f)), effort)
+        self.replace(route, (arriving, at(arriving)), (route.last(), End::outer(v_f)), stats)
     }
 
     /// Leaves the optimum as it is between two places.
@@ -204,10 +204,10 @@ impl<F: FnMut(Part)> Sum<F> {
         route: &Route,
         (from, start): (Site, End),
         (to, end): (Site, End),
-        effort: &mut Effort,
+        stats: &mut SolverStats,
     ) -> Result<(), Status> {
         let span = route.span(from, to);
-        let piece = Piece::new(&self.slider, (&start, &end), &span, self.rtol, effort)?;
+        let piece = Piece::new(&self.slider, (&start, &end), &span, self.rtol, stats)?;
         if piece.v.low < STANDSTILL {
             return Err(Status::Infeasible);
         }

@@ -5,11 +5,11 @@ use std::sync::Arc;
 use super::Part;
 use crate::protocol::optimal::{Route, Site};
 use crate::protocol::profile::{Hermite, Resolution};
-use crate::protocol::{Jet, Moment, Motion, Slider};
+use crate::protocol::{Jet, Moment, Motion, SpringBlock};
 
 /// The motion: every stretch takes as much of the parameter as the next.
 pub(super) struct Smooth {
-    slider: Slider,
+    slider: SpringBlock,
     route: Route,
     stretches: Vec<Stretch>,
 }
@@ -24,7 +24,7 @@ enum Stretch {
 
 impl Smooth {
     /// The motion of these parts; `None` where numbers leave the range of a double.
-    pub fn new(slider: Slider, route: Route, parts: Vec<Part>, rtol: f64) -> Option<Smooth> {
+    pub fn new(slider: SpringBlock, route: Route, parts: Vec<Part>, rtol: f64) -> Option<Smooth> {
         let mut stretches = Vec::new();
         let mut time = 0.0;
         for part in parts {

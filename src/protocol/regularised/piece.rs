@@ -16,7 +16,7 @@ use crate::numerics::elementary::{ln, ln_1p};
 use crate::protocol::control::{Extent, Tolerance};
 use crate::protocol::optimal::{Span, lag_at_bound};
 use crate::protocol::profile::{Curve, Hermite, Problem, Resolution, Start, pass, reach};
-use crate::protocol::{Effort, Jet, Slider, Status};
+use crate::protocol::{Jet, SolverStats, SpringBlock, Status};
 
 use super::STANDSTILL;
 
@@ -74,15 +74,15 @@ impl End {
 impl Piece {
     /// The piece from `start` to `end` in place of a part of the optimum; `Err` with the status where there is none.
     pub fn new(
-        slider: &Slider,
+        slider: &SpringBlock,
         (start, end): (&End, &End),
         optimum: &Span,
         rtol: f64,
-        effort: &mut Effort,
+        stats: &mut SolverStats,
     ) -> Result<Piece, Status> {
-        let piece = Piece::above(0.0, slider, (start, end), optimum, rtol, effort)?;
+        let piece = Piece::above(0.0, slider, (start, end), optimum, rtol, stats)?;
         if piece.v.low < 1.0 && start.v[0] > 1.0 && end.v[0] > 1.0 {
-            let inside = Piece::above(1.0, slider, (start, end), optimum, rtol, effort);
+            let inside = Piece::above(1.0, slider, (start, end), optimum, rtol, stats);
             return Ok(inside.unwrap_or(piece));
         }
         Ok(piece)
@@ -91,11 +91,11 @@ impl Piece {
     /// The piece that stays above `floor`.
     fn above(
         floor: f64,
-        slider: &Slider,
+        slider: &SpringBlock,
         (start, end): (&End, &End),
         &Span { time, lag, .. }: &Span,
         rtol: f64,
-        effort: &mut Effort,
+        stats: &mut SolverStats,
     ) -> Result<Piece, Status> {
         if start.v[0].min(end.v[0]) < STANDSTILL {
             return Err(Status::Infeasible);
@@ -124,11 +124,11 @@ impl Piece {
         }
         let ends = [start.theta, end.theta];
         let problem = Problem::between(ends, -growth / end.theta, end.rate / end.theta, spare, curve);
-        let curve = curve.with(problem.solve(0.0, rtol, reach(rtol), effort).ok_or(Status::NotConverged)?);
+        let curve = curve.with(problem.solve(0.0, rtol, reach(rtol), stats).ok_or(Status::NotConverged)?);
         let from = Start { v: start.v[0], theta: start.theta, rate: start.rate, slow: false };
         let mut piece =
             Piece { work: 0.0, friction_min: f64::INFINITY, v: Extent::NONE, control: Extent::NONE, curve, from };
-        let theta = pass(&curve, from, rtol, INTERPOLATION * reach(rtol), effort, |panel| {
+        let theta = pass(&curve, from, rtol, INTERPOLATION * reach(rtol), stats, |panel| {
             let (work, friction_min) = panel.sum(&slider.law, &curve);
             piece.work += work;
             piece.friction_min = piece.friction_min.min(friction_min);
@@ -145,7 +145,7 @@ impl Piece {
     pub fn resolve(&self, law: Law, rtol: f64) -> Option<Resolution<Hermite>> {
         let mut panels = Vec::new();
         let reach = INTERPOLATION * reach(rtol);
-        pass(&self.curve, self.from, rtol, reach, &mut Effort::default(), |panel| panels.push(*panel))?;
+        pass(&self.curve, self.from, rtol, reach, &mut SolverStats::default(), |panel| panels.push(*panel))?;
         Some(Resolution { law, curve: self.curve, panels })
     }
 }

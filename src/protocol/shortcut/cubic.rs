@@ -10,8 +10,8 @@ use crate::model::Law;
 use crate::numerics::double_double::DoubleDouble;
 use crate::numerics::elementary::ln;
 use crate::numerics::polynomial::roots_between;
-use crate::protocol::cubic::{Landscape, Shortcuts, rise};
-use crate::protocol::{Effort, Moment, Motion, Status};
+use crate::protocol::cubic::{Landscape, LandscapeBuffers, rise};
+use crate::protocol::{Moment, Motion, SolverStats, Status};
 
 /// The family.
 pub struct Cubic;
@@ -29,9 +29,9 @@ impl Family for Cubic {
         None
     }
 
-    fn solve(&self, case: &Case, rtol: f64, effort: &mut Effort) -> Result<Shortcut, Obstacle> {
+    fn solve(&self, case: &Case, rtol: f64, stats: &mut SolverStats) -> Result<Shortcut, Obstacle> {
         let curve = Curve::new(case)?;
-        let work = curve.work(case, rtol, effort)?;
+        let work = curve.work(case, rtol, stats)?;
         let (mut v_min, mut v_max) = (f64::INFINITY, 0.0f64);
         for (side, d) in curve.extrema(1.0, -1.0) {
             let v = curve.velocity(side, d);
@@ -94,7 +94,7 @@ impl Curve {
     }
 
     /// Work from the landscape, of which this is one point.
-    fn work(&self, case: &Case, rtol: f64, effort: &mut Effort) -> Result<f64, Obstacle> {
+    fn work(&self, case: &Case, rtol: f64, stats: &mut SolverStats) -> Result<f64, Obstacle> {
         if self.v_i == self.v_f {
             return Ok(self.friction(Side::Start, 0.0) * self.v_i * self.t_f);
         }
@@ -102,10 +102,10 @@ impl Curve {
         let spent = Landscape::new(&case.transition, self.t_f, rtol).evaluate(
             &[0.0],
             &[3.0 * self.rise],
-            Shortcuts { work: &mut work, v_min: &mut [], status: &mut status },
+            LandscapeBuffers { work: &mut work, v_min: &mut [], status: &mut status },
         );
-        effort.quadratures += spent.quadratures;
-        effort.nodes += spent.nodes;
+        stats.quadratures += spent.quadratures;
+        stats.nodes += spent.nodes;
         if status[0] == Status::Infeasible { Err(Obstacle::Velocity) } else { Ok(work[0]) }
     }
 

@@ -9,7 +9,7 @@ mod step;
 
 use std::fmt;
 
-use super::{Effort, Motion, Status};
+use super::{Motion, SolverStats, Status};
 use crate::model::Transition;
 
 /// What a family is asked for.
@@ -139,8 +139,8 @@ pub trait Family: Sync {
         true
     }
 
-    /// The member that solves `case`, every number good to `rtol`; adds to `effort`.
-    fn solve(&self, case: &Case, rtol: f64, effort: &mut Effort) -> Result<Shortcut, Obstacle>;
+    /// The member that solves `case`, every number good to `rtol`; adds to `stats`.
+    fn solve(&self, case: &Case, rtol: f64, stats: &mut SolverStats) -> Result<Shortcut, Obstacle>;
 
     /// The motion of that member.
     fn motion(&self, case: &Case, rtol: f64) -> Result<Box<dyn Motion>, Obstacle>;

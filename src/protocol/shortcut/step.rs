@@ -8,7 +8,7 @@ use crate::model::Law;
 use crate::numerics::dilogarithm::dilogarithm;
 use crate::numerics::elementary::{exp, exp_m1, ln, ln_1p};
 use crate::numerics::gauss::rule;
-use crate::protocol::{Effort, Moment, Motion};
+use crate::protocol::{Moment, Motion, SolverStats};
 
 /// The family.
 pub struct Step;
@@ -30,9 +30,9 @@ impl Family for Step {
         false
     }
 
-    fn solve(&self, case: &Case, _rtol: f64, effort: &mut Effort) -> Result<Shortcut, Obstacle> {
+    fn solve(&self, case: &Case, _rtol: f64, stats: &mut SolverStats) -> Result<Shortcut, Obstacle> {
         let Relaxation { law, v_f, t_f, decay } = Relaxation::new(case)?;
-        effort.quadratures += 1;
+        stats.quadratures += 1;
         let end = v_f * t_f;
         let steady = 1.0 + (law.a - law.b) * ln(v_f);
         // Theta falls or rises all the way.

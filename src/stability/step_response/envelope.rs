@@ -14,9 +14,9 @@
 
 use nalgebra::{Matrix2, SMatrix, SVector, Vector2};
 
-use super::fate::{Follower, excess};
+use super::long_term::{Follower, excess};
 use super::orbit::{Orbit, Stop};
-use super::slider::Place;
+use super::scaled_block::Place;
 use crate::numerics::elementary::{exp, ln, ln_1p};
 use crate::numerics::root::crossing;
 use crate::numerics::stiff::radau_iia_9;

@@ -2,29 +2,29 @@
 //! there.
 //!
 //! In the scaled variables of `slider.rs` only `a`, `b`, `k`, `m v_f^2` and `v_i/v_f` enter. The response is
-//! integrated (`run.rs`, `orbit.rs`) until its end is decided (`fate.rs`), cycles that hardly change are skipped
-//! (`envelope.rs`), and all is repeated at finer steps until the numbers agree (`course.rs`).
+//! integrated (`run.rs`, `orbit.rs`) until its end is decided (`long_term.rs`), cycles that hardly change are skipped
+//! (`envelope.rs`), and all is repeated at finer steps until the numbers agree (`simulation.rs`).
 
-mod course;
 mod envelope;
-mod fate;
+mod long_term;
 mod motion;
 mod orbit;
 mod run;
+mod scaled_block;
 mod series;
-mod slider;
+mod simulation;
 
 use crate::model::{Law, Transition};
 use crate::numerics::elementary::{exp, ln};
 use crate::protocol::Status;
 use crate::stability::SteadySliding;
 
-pub use course::{Course, Doubts, Fate, follow};
-pub use fate::Linear;
+pub use long_term::Linear;
 pub use motion::Swing;
 pub use orbit::{Cycle, Extremum, Orbit, SETTLED, Seen, Stop};
 pub use run::{Leg, Run, step_to};
-pub use slider::{Slider, State, Z};
+pub use scaled_block::{ScaledBlock, State, Z};
+pub use simulation::{Doubts, LongTermBehaviour, Simulation, follow};
 
 /// A step of the control velocity.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -95,24 +95,24 @@ impl Step {
     /// What the response depends on; `None` where it takes no time: for a rigid spring, and from `v_f` to `v_f`.
     pub fn scaled(&self) -> Option<Scaled> {
         let Transition { law, v_i, v_f } = self.transition;
-        let slider = Slider { a: law.a, b: law.b, inertia: self.inertia(), k: self.k };
+        let slider = ScaledBlock { a: law.a, b: law.b, inertia: self.inertia(), k: self.k };
         (self.k.is_finite() && v_i != v_f).then_some(Scaled { slider, ratio: v_i / v_f })
     }
 
     /// The response, with numbers good to `rtol`.
     pub fn respond(&self, rtol: f64) -> (Status, Option<Response>) {
-        let course = self.scaled().map(|scaled| scaled.follow(rtol));
-        self.from_course(course.as_ref(), rtol)
+        let simulation = self.scaled().map(|scaled| scaled.follow(rtol));
+        self.from_simulation(simulation.as_ref(), rtol)
     }
 
     /// The same from the course of [`Step::scaled`], which other steps may share: `BelowBound` where the velocity falls
     /// below 1, `Infeasible` where it becomes infinite in finite time, as it does without mass below the critical
     /// stiffness.
-    pub fn from_course(&self, course: Option<&Course>, rtol: f64) -> (Status, Option<Response>) {
+    pub fn from_simulation(&self, simulation: Option<&Simulation>, rtol: f64) -> (Status, Option<Response>) {
         let Transition { v_i, v_f, .. } = self.transition;
-        let lowest = course.and_then(|course| course.low).map_or(v_f, |low| v_f * exp(low.x)).min(v_i);
-        let response = match course {
-            Some(course) => Response::new(course, v_f, rtol),
+        let lowest = simulation.and_then(|simulation| simulation.low).map_or(v_f, |low| v_f * exp(low.x)).min(v_i);
+        let response = match simulation {
+            Some(simulation) => Response::new(simulation, v_f, rtol),
             None => Some(Response::at_once(v_f)),
         };
         let status = match response {
@@ -128,14 +128,14 @@ impl Step {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Scaled {
     /// The block on its spring.
-    pub slider: Slider,
+    pub slider: ScaledBlock,
     /// `v_i/v_f`.
     pub ratio: f64,
 }
 
 impl Scaled {
     /// The response, followed to its end.
-    pub fn follow(&self, rtol: f64) -> Course {
+    pub fn follow(&self, rtol: f64) -> Simulation {
         follow(&self.slider, self.linear(), ln(self.ratio), rtol)
     }
 
@@ -146,7 +146,7 @@ impl Scaled {
 
     /// The same numbers as bits, to tell equal ones by.
     pub fn key(&self) -> [u64; 5] {
-        let Slider { a, b, inertia, k } = self.slider;
+        let ScaledBlock { a, b, inertia, k } = self.slider;
         [a, b, inertia, k, self.ratio].map(f64::to_bits)
     }
 }
@@ -167,24 +167,24 @@ impl Response {
     }
 
     /// In the units of the model; `None` for one that ends.
-    fn new(course: &Course, v_f: f64, rtol: f64) -> Option<Response> {
+    fn new(simulation: &Simulation, v_f: f64, rtol: f64) -> Option<Response> {
         let velocity = |x: f64| v_f * exp(x);
-        let (outcome, settling_time, cycle) = match course.fate {
-            Fate::Settled { time } => (
+        let (outcome, settling_time, cycle) = match simulation.long_term {
+            LongTermBehaviour::Settled { time } => (
                 Outcome::Settled,
-                Some(time / v_f).filter(|time| !course.doubts.settling_time && time.is_finite()),
+                Some(time / v_f).filter(|time| !simulation.doubts.settling_time && time.is_finite()),
                 None,
             ),
-            Fate::Cycle { period, high, low } => (Outcome::LimitCycle, None, Some((period, high, low))),
-            Fate::Undecided => (Outcome::Undecided, None, None),
-            Fate::Ends => return None,
+            LongTermBehaviour::Cycle { period, high, low } => (Outcome::LimitCycle, None, Some((period, high, low))),
+            LongTermBehaviour::Undecided => (Outcome::Undecided, None, None),
+            LongTermBehaviour::Ends => return None,
         };
-        let [low, high] = course.range();
+        let [low, high] = simulation.range();
         // What comes after the last step may go further.
         let decided = outcome != Outcome::Undecided;
         let known = |velocity: f64, known: bool| if known { velocity } else { f64::NAN };
-        let doubts = course.doubts;
-        let peak = course.peak(rtol).filter(|peak| decided && !doubts.t_peak && !peak.t.is_nan());
+        let doubts = simulation.doubts;
+        let peak = simulation.peak(rtol).filter(|peak| decided && !doubts.t_peak && !peak.t.is_nan());
         Some(Response {
             outcome,
             v_peak: known(velocity(high), decided),
@@ -196,15 +196,15 @@ impl Response {
                 v_peak: velocity(high),
                 v_trough: known(velocity(low), !doubts.cycle_trough),
             }),
-            t_end: course.t / v_f,
-            steps: course.steps,
+            t_end: simulation.t / v_f,
+            steps: simulation.steps,
         })
     }
 }
 
 impl Linear {
     /// Of steady sliding at `v_f`.
-    fn of(slider: &Slider) -> Linear {
+    fn of(slider: &ScaledBlock) -> Linear {
         let law = Law { a: slider.a, b: slider.b };
         let sliding = SteadySliding::new(law, slider.k, slider.inertia, 1.0);
         let mut linear = Linear { stable: sliding.is_stable(), growth: None };

@@ -2,7 +2,7 @@
 
 use super::Step;
 use super::run::{Leg, step_to};
-use super::slider::{Slider, State, X, Y};
+use super::scaled_block::{ScaledBlock, State, X, Y};
 use crate::model::{Law, Transition};
 use crate::numerics::elementary::{exp, ln};
 use crate::numerics::gauss;
@@ -52,7 +52,7 @@ impl Step {
         if !self.k.is_finite() || x == 0.0 {
             return None;
         }
-        let slider = Slider { a: law.a, b: law.b, inertia: self.m * v_f * v_f, k: self.k };
+        let slider = ScaledBlock { a: law.a, b: law.b, inertia: self.m * v_f * v_f, k: self.k };
         let start = slider.steady(x);
         let mut run = slider.run(start, slider.first_step(&start), 0.03 * rtol);
         let mut stretches = Vec::new();

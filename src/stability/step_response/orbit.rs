@@ -3,7 +3,7 @@
 use std::collections::VecDeque;
 
 use super::run::{Leg, Run, between, step_to};
-use super::slider::{Slider, State, X, Y, Z};
+use super::scaled_block::{ScaledBlock, State, X, Y, Z};
 use crate::numerics::root::crossing;
 use crate::numerics::stiff::radau_iia_9;
 
@@ -61,7 +61,7 @@ const POLISH_WINDOW: [f64; 2] = [0.125, 0.125];
 /// A response under way.
 #[derive(Debug)]
 pub struct Orbit<'a> {
-    slider: &'a Slider,
+    slider: &'a ScaledBlock,
     run: Run<'a>,
     /// Distance from steady sliding within which it rests.
     quiet: f64,
@@ -97,7 +97,7 @@ struct Entry {
 
 impl<'a> Orbit<'a> {
     /// Starts at `state`.
-    pub fn new(slider: &'a Slider, state: State, tolerance: f64) -> Orbit<'a> {
+    pub fn new(slider: &'a ScaledBlock, state: State, tolerance: f64) -> Orbit<'a> {
         Orbit {
             slider,
             run: slider.run(state, slider.first_step(&state), tolerance),
@@ -146,7 +146,7 @@ impl<'a> Orbit<'a> {
 
     fn is_quiet(&self) -> bool {
         let [z, y, x] = *self.run.y();
-        let Slider { a, b, inertia, k } = *self.slider;
+        let ScaledBlock { a, b, inertia, k } = *self.slider;
         // Friction turns a share b/a of ln theta into ln v, and a soft spring moves masses of M and a by its energy.
         let force = a.min((k * (inertia + a)).sqrt());
         x.abs() < self.quiet && y.abs() * a.max(b) < self.quiet * a && z.abs() < self.quiet * force

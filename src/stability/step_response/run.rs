@@ -6,10 +6,10 @@
 
 use multiversion::multiversion;
 
+use super::scaled_block::{Rates, ScaledBlock, State, X, Y};
 use super::series::{Powers, TERMS, reach};
-use super::slider::{Rates, Slider, State, X, Y};
 use crate::numerics::elementary::{exp, ln};
-use crate::numerics::stiff::{Accuracy, Cost, Failure, Integrator, Piece, radau_iia_9};
+use crate::numerics::stiff::{Accuracy, DenseOutput, Failure, Integrator, IntegratorStats, radau_iia_9};
 
 /// Stages of an implicit step: order 9.
 pub const STAGES: usize = 5;
@@ -19,16 +19,16 @@ pub const STAGES: usize = 5;
 #[expect(clippy::large_enum_variant, reason = "both kinds are as frequent, and live on the stack")]
 pub enum Leg {
     /// By Radau IIA: good to order 9 at its end, to order 5 between.
-    Stiff(Piece<3, STAGES>),
+    Stiff(DenseOutput<3, STAGES>),
     /// By a Taylor series: good everywhere.
-    Mild(Piece<3, TERMS>),
+    Mild(DenseOutput<3, TERMS>),
 }
 
 /// An integration along a response.
 #[derive(Debug, Clone)]
 pub struct Run<'a> {
-    slider: &'a Slider,
-    integrator: Integrator<'a, Slider, 3, STAGES>,
+    slider: &'a ScaledBlock,
+    integrator: Integrator<'a, ScaledBlock, 3, STAGES>,
     accuracy: Accuracy<3>,
     /// Length of a series in units of the fastest motion from which on steps are implicit.
     stiff: f64,
@@ -64,7 +64,7 @@ const SHORTEST_SLIP: f64 = 1e-120;
 /// time of the next slip, and accuracy costs least there.
 const IMPLICIT_ERROR: f64 = 0.03;
 
-impl Slider {
+impl ScaledBlock {
     /// An integration from `state`, with errors of a step below `tolerance` in `x`, `y` and `z/force`.
     pub fn run(&self, state: State, h: f64, tolerance: f64) -> Run<'_> {
         let accuracy = Accuracy { tolerance, scale: [self.force(), 1.0, 1.0] };
@@ -98,7 +98,7 @@ impl Run<'_> {
     }
 
     /// Series so far, and what implicit steps have cost.
-    pub fn cost(&self) -> (u32, Cost) {
+    pub fn cost(&self) -> (u32, IntegratorStats) {
         (self.series, self.integrator.cost())
     }
 
@@ -112,7 +112,7 @@ impl Run<'_> {
 
     /// A step by a series; `None` where something is stiff.
     #[inline(always)]
-    fn expand(&mut self, limit: f64) -> Option<Piece<3, TERMS>> {
+    fn expand(&mut self, limit: f64) -> Option<DenseOutput<3, TERMS>> {
         let (slider, state) = (self.slider, *self.integrator.y());
         let rates = Rates::of(state[Y], state[X]);
         let fast = slider.fast(rates.v, rates.ageing);
@@ -130,7 +130,7 @@ impl Run<'_> {
         }
         let h = reach.min(MAX_REACH) * unit;
         let mut whole = h.min(self.integrator.left(limit));
-        let over = |h: f64| Piece::from_powers(self.t(), h, state, stretched(&powers, h / unit));
+        let over = |h: f64| DenseOutput::from_powers(self.t(), h, state, stretched(&powers, h / unit));
         let mut piece = over(whole);
         for _ in 0..MAX_CUTS {
             let change = (piece.end[Y] - state[Y]).abs();
@@ -236,11 +236,11 @@ impl Leg {
 mod tests {
     //! Order, the error got for the error asked, and the work, exactly.
 
-    use super::super::slider::Z;
+    use super::super::scaled_block::Z;
     use super::*;
 
     /// The published material at `v_f = 3.2e6`.
-    const SLIDER: Slider = Slider { a: 0.005, b: 0.01, inertia: 2.56e-3, k: 7.5e-3 };
+    const SLIDER: ScaledBlock = ScaledBlock { a: 0.005, b: 0.01, inertia: 2.56e-3, k: 7.5e-3 };
 
     /// Near steady sliding, where errors are those of a linear problem.
     const NEAR: State = [2e-5, 2e-3, 3e-3];
@@ -252,7 +252,7 @@ mod tests {
     fn order_of_a_series_is_its_number_of_terms() {
         let piece = |state: &State, h: f64| {
             let powers = SLIDER.series(state, &Rates::of(state[Y], state[X]), h);
-            Piece::from_powers(0.0, h, *state, powers)
+            DenseOutput::from_powers(0.0, h, *state, powers)
         };
         let exact = |h: f64| (0..64).fold(NEAR, |state, _| piece(&state, h / 64.0).end);
         let error = |h: f64| {
@@ -273,8 +273,8 @@ mod tests {
     }
 
     /// The end of a response, how often it has risen through `v_f`, and the work.
-    fn follow(k: f64, t_end: f64, tolerance: f64) -> (State, usize, u32, Cost) {
-        let slider = Slider { k, ..SLIDER };
+    fn follow(k: f64, t_end: f64, tolerance: f64) -> (State, usize, u32, IntegratorStats) {
+        let slider = ScaledBlock { k, ..SLIDER };
         let start = slider.steady(-32.0_f64.ln());
         let mut run = slider.run(start, slider.first_step(&start), tolerance);
         let mut rises = 0;
@@ -309,7 +309,7 @@ mod tests {
             for digits in 3..=13 {
                 let tolerance = libm::pow(10.0, -f64::from(digits));
                 let (state, rises, ..) = follow(k, t_end, tolerance);
-                let unit = [Slider { k, ..SLIDER }.force(), 1.0, 1.0];
+                let unit = [ScaledBlock { k, ..SLIDER }.force(), 1.0, 1.0];
                 let error = (0..3).map(|r| (state[r] - end[r]).abs() / unit[r]).fold(0.0, f64::max);
                 // Below 1e-12 rounding errors grow like those of steps.
                 assert!(error <= growth * tolerance.max(1e-12), "{k} at {tolerance:.0e}: {error:.1e}");
@@ -324,11 +324,11 @@ mod tests {
         let [(.., paper, paper_implicit), (.., deep, deep_implicit)] = work;
         assert_eq!(
             (paper, paper_implicit),
-            (373, Cost { steps: 14, rejected: 0, evaluations: 51, factorisations: 15 })
+            (373, IntegratorStats { steps: 14, rejected: 0, evaluations: 51, factorisations: 15 })
         );
         assert_eq!(
             (deep, deep_implicit),
-            (1211, Cost { steps: 656, rejected: 51, evaluations: 2369, factorisations: 707 })
+            (1211, IntegratorStats { steps: 656, rejected: 51, evaluations: 2369, factorisations: 707 })
         );
     }
 }

@@ -8,7 +8,7 @@
 //!
 //! products of two series at most, so each coefficient follows from those before it.
 
-use super::slider::{Rates, Slider, State, X, Y, Z};
+use super::scaled_block::{Rates, ScaledBlock, State, X, Y, Z};
 use crate::numerics::elementary::{exp, ln};
 
 /// Terms: the order of a step.
@@ -17,7 +17,7 @@ pub const TERMS: usize = 16;
 /// Coefficients of `u … u^TERMS` of the changes of `[z, y, x]`.
 pub type Powers = [[f64; TERMS]; 3];
 
-impl Slider {
+impl ScaledBlock {
     /// The series about `state`, with its rates, in powers of the time in `unit`s, which keeps coefficients in the range
     /// of doubles.
     #[inline(always)]

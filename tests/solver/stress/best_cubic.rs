@@ -5,7 +5,7 @@ use slipsweep::numerics::cubic::{Cubic, ExactCubic};
 use slipsweep::numerics::double_double::DoubleDouble;
 use slipsweep::protocol::Status;
 use slipsweep::protocol::best_cubic::{BestCubic, solve};
-use slipsweep::protocol::cubic::{Landscape, Shortcuts};
+use slipsweep::protocol::cubic::{Landscape, LandscapeBuffers};
 use slipsweep::protocol::optimal;
 
 use super::random::Random;
@@ -68,7 +68,7 @@ fn neighbours(point: &Point, best: &BestCubic, row: &mut Row) {
     let size = best.a_2.abs().max(best.a_3.abs());
     for &(x, y, distance) in &point.neighbours {
         let (mut work, mut v_min, mut status) = ([f64::NAN], [f64::NAN], [Status::NotConverged]);
-        let out = Shortcuts { work: &mut work, v_min: &mut v_min, status: &mut status };
+        let out = LandscapeBuffers { work: &mut work, v_min: &mut v_min, status: &mut status };
         let reach = distance * size;
         let (a_2, a_3) = (best.a_2 + reach * x, best.a_3 + reach * y);
         landscape.evaluate(&[a_2], &[a_3], out);

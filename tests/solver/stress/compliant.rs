@@ -3,7 +3,7 @@
 
 use slipsweep::model::{Law, Transition};
 use slipsweep::protocol::compliant::{self, Compliant};
-use slipsweep::protocol::{Slider, Status, optimal};
+use slipsweep::protocol::{SpringBlock, Status, optimal};
 use slipsweep::stability::{amplification, held_error, open_loop_error};
 
 use super::random::Random;
@@ -22,7 +22,7 @@ const FINE: f64 = 1e-12;
 
 #[derive(Debug)]
 struct Point {
-    slider: Slider,
+    slider: SpringBlock,
     velocities: (f64, f64),
     t_f: f64,
     dt: f64,
@@ -46,7 +46,7 @@ fn every_compliant_is_right_or_says_so() {
         row.status(solved.status);
         let transition = Transition { law: slider.law, v_i, v_f };
         row.fact("exists if there is time", solved.value.is_some() == (t_f > transition.least_time()));
-        row.at_most("few nodes", f64::from(solved.effort.nodes), f64::from(MOST_NODES));
+        row.at_most("few nodes", f64::from(solved.stats.nodes), f64::from(MOST_NODES));
         let Some(rough) = solved.value else { return };
         let Compliant { alpha, work, v_min, v_max, control_min, control_max } = rough;
         let numbers = [alpha, work, v_min, v_max, control_min, control_max];
@@ -93,8 +93,8 @@ pub fn tells(Law { a, b }: Law, v_max: f64, range: f64) -> bool {
 
 /// Friction, inertia and spring may be weaker by the same factor: nothing but ratios of forces enters.
 fn forces(point: &Point, rough: &Compliant, row: &mut Row) {
-    let &Point { slider: Slider { law: Law { a, b }, k, m }, velocities, t_f, rtol, .. } = point;
-    let weaker = Slider { law: Law { a: 0.25 * a, b: 0.25 * b }, k: 0.25 * k, m: 0.25 * m };
+    let &Point { slider: SpringBlock { law: Law { a, b }, k, m }, velocities, t_f, rtol, .. } = point;
+    let weaker = SpringBlock { law: Law { a: 0.25 * a, b: 0.25 * b }, k: 0.25 * k, m: 0.25 * m };
     let Some(other) = compliant::solve(&weaker, velocities, t_f, rtol).value else {
         return row.fact("only ratios of forces enter", false);
     };
@@ -105,7 +105,7 @@ fn forces(point: &Point, rough: &Compliant, row: &mut Row) {
 /// The block does not know the spring; a rigid one moves with it.
 fn stiff(point: &Point, rough: &Compliant, row: &mut Row) {
     let &Point { slider, velocities, t_f, rtol, .. } = point;
-    let at = |k: f64| compliant::solve(&Slider { k, ..slider }, velocities, t_f, rtol).value;
+    let at = |k: f64| compliant::solve(&SpringBlock { k, ..slider }, velocities, t_f, rtol).value;
     let Some(rigid) = at(f64::INFINITY) else { return row.fact("exists on a rigid spring", false) };
     row.fact(
         "a rigid spring moves with the block",

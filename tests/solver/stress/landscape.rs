@@ -2,7 +2,7 @@
 
 use slipsweep::model::{Law, Transition};
 use slipsweep::numerics::double_double::DoubleDouble as Dd;
-use slipsweep::protocol::cubic::{Landscape, Shortcuts};
+use slipsweep::protocol::cubic::{Landscape, LandscapeBuffers};
 use slipsweep::protocol::{Status, optimal};
 
 use super::random::Random;
@@ -59,14 +59,14 @@ const POSITIVE: Law = Law { a: 1e-6, b: 0.0 };
 
 fn status(landscape: &Landscape, (a_2, a_3): (f64, f64)) -> Status {
     let mut status = [Status::NotConverged];
-    landscape.evaluate(&[a_2], &[a_3], Shortcuts { work: &mut [], v_min: &mut [], status: &mut status });
+    landscape.evaluate(&[a_2], &[a_3], LandscapeBuffers { work: &mut [], v_min: &mut [], status: &mut status });
     status[0]
 }
 
 /// Status, work and least velocity.
 fn evaluate(transition: &Transition, t_f: f64, rtol: f64, a_2: f64, a_3: f64) -> (Status, f64, f64) {
     let (mut work, mut v_min, mut status) = ([f64::NAN], [f64::NAN], [Status::NotConverged]);
-    let out = Shortcuts { work: &mut work, v_min: &mut v_min, status: &mut status };
+    let out = LandscapeBuffers { work: &mut work, v_min: &mut v_min, status: &mut status };
     Landscape::new(transition, t_f, rtol).evaluate(&[a_2], &[a_3], out);
     (status[0], work[0], v_min[0])
 }

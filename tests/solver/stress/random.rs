@@ -3,7 +3,7 @@
 
 use slipsweep::grid::Quantity;
 use slipsweep::model::{Law, Transition};
-use slipsweep::protocol::Slider;
+use slipsweep::protocol::SpringBlock;
 use slipsweep::protocol::optimal::crossover::{self, CrossoverTimes, Wanted};
 use slipsweep::protocol::optimal::shortest_time;
 use slipsweep::stability::SteadySliding;
@@ -135,7 +135,7 @@ impl Random {
 
     /// A block, one in ten without mass, on a spring, one in ten rigid; one in three at the critical stiffness of a
     /// velocity, or next to it.
-    pub fn slider(&mut self, law: Law, v: f64) -> Slider {
+    pub fn slider(&mut self, law: Law, v: f64) -> SpringBlock {
         let m = if self.chance(0.1) { 0.0 } else { self.legal(Quantity::Mass) };
         let critical = SteadySliding::new(law, 1.0, m, v).critical_stiffness();
         let k = match self.uniform() {
@@ -144,7 +144,7 @@ impl Random {
             kind if kind < 0.45 && critical > 0.0 => self.beside(critical),
             _ => self.legal(Quantity::Stiffness),
         };
-        Slider { law, k, m }
+        SpringBlock { law, k, m }
     }
 
     /// An accuracy that a spec may ask for.

@@ -1,9 +1,9 @@
 //! The first points of the sample against arithmetic of 80 digits: `tests/reference/generate_stress.py`.
 
 use slipsweep::model::{Law, Transition};
-use slipsweep::protocol::cubic::{Landscape, Shortcuts};
+use slipsweep::protocol::cubic::{Landscape, LandscapeBuffers};
 use slipsweep::protocol::optimal::{crossover, shortest_time, solve};
-use slipsweep::protocol::{Effort, Status};
+use slipsweep::protocol::{SolverStats, Status};
 use slipsweep::stability::SteadySliding;
 
 use super::crossover::columns;
@@ -31,9 +31,9 @@ fn reference_shortcuts_of_the_sample() {
     for row in &rows {
         for rtol in RTOLS {
             let (mut work, mut v_min, mut status) = ([f64::NAN], [f64::NAN], [Status::NotConverged]);
-            let out = Shortcuts { work: &mut work, v_min: &mut v_min, status: &mut status };
+            let out = LandscapeBuffers { work: &mut work, v_min: &mut v_min, status: &mut status };
             let landscape = Landscape::new(&transition(row), row.number("t_f"), rtol);
-            let _: Effort = landscape.evaluate(&[row.number("a_2")], &[row.number("a_3")], out);
+            let _: SolverStats = landscape.evaluate(&[row.number("a_2")], &[row.number("a_3")], out);
             assert_eq!(status[0].name(), row.text("status"), "{row:?}");
             if status[0] != Status::Infeasible {
                 close(row, "work", work[0], rtol + 64.0 * f64::EPSILON);

@@ -2,7 +2,7 @@
 
 use slipsweep::model::Transition;
 use slipsweep::protocol::regularised::{self, Regularised};
-use slipsweep::protocol::{Slider, Status, optimal};
+use slipsweep::protocol::{SpringBlock, Status, optimal};
 
 use super::compliant::tells;
 use super::random::Random;
@@ -19,7 +19,7 @@ const STEEP: f64 = 2e-10;
 
 #[derive(Debug)]
 struct Point {
-    slider: Slider,
+    slider: SpringBlock,
     velocities: (f64, f64),
     t_f: f64,
     delta_t: f64,
@@ -38,7 +38,7 @@ fn draw(random: &mut Random) -> Point {
 
 fn solve(point: &Point, k: f64) -> slipsweep::protocol::Solved<Regularised> {
     let &Point { slider, velocities, t_f, delta_t, bounded, rtol } = point;
-    regularised::solve(&Slider { k, ..slider }, velocities, t_f, delta_t, bounded, rtol)
+    regularised::solve(&SpringBlock { k, ..slider }, velocities, t_f, delta_t, bounded, rtol)
 }
 
 #[test]
@@ -46,7 +46,7 @@ fn every_regularised_is_right_or_says_so() {
     sample("regularised", POINTS, draw, |point, row| {
         let found = solve(point, point.slider.k);
         row.status(found.status);
-        row.at_most("few nodes", f64::from(found.effort.nodes), f64::from(MOST_NODES));
+        row.at_most("few nodes", f64::from(found.stats.nodes), f64::from(MOST_NODES));
         row.fact("overlapping pieces are infeasible", point.delta_t <= 0.5 * point.t_f || found.value.is_none());
         // A path on which the extremal need not be unique may be one that cannot be followed.
         match found.status {

@@ -3,7 +3,7 @@
 use slipsweep::grid::Quantity;
 use slipsweep::model::{Law, Transition};
 use slipsweep::protocol::shortcut::{Case, Family, Obstacle, Shortcut, find};
-use slipsweep::protocol::{Effort, Status, optimal};
+use slipsweep::protocol::{SolverStats, Status, optimal};
 
 use super::random::Random;
 use super::{POINTS, Row, sample};
@@ -40,7 +40,7 @@ fn draw(random: &mut Random) -> Point {
 }
 
 fn solve(family: &dyn Family, case: &Case, rtol: f64) -> Result<Shortcut, Obstacle> {
-    family.solve(case, rtol, &mut Effort::default())
+    family.solve(case, rtol, &mut SolverStats::default())
 }
 
 fn examine(name: &str, points: u64, draw: fn(&mut Random) -> Point) {

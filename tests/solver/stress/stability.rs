@@ -1,7 +1,7 @@
 //! `stability`: decided as in exact arithmetic, also within units in the last place of the critical stiffness.
 
 use slipsweep::model::Law;
-use slipsweep::protocol::{Slider, Status};
+use slipsweep::protocol::{SpringBlock, Status};
 use slipsweep::stability::{Eigenvalues, SteadySliding, critical_velocity, lyapunov_coefficient};
 
 use super::random::Random;
@@ -9,7 +9,7 @@ use super::{POINTS, sample};
 
 #[derive(Debug)]
 struct Point {
-    slider: Slider,
+    slider: SpringBlock,
     v: f64,
 }
 
@@ -66,7 +66,7 @@ fn is_stable(Law { a, b }: Law, k: f64, m: f64, v: f64) -> bool {
 #[test]
 fn every_steady_sliding_is_decided_and_scales() {
     sample("stability", POINTS, draw, |point, row| {
-        let &Point { slider: Slider { law, k, m }, v } = point;
+        let &Point { slider: SpringBlock { law, k, m }, v } = point;
         row.status(Status::Ok);
         let (stable, eigenvalues) = modes(law, k, m, v);
         row.fact("as in exact arithmetic", k == f64::INFINITY || stable == is_stable(law, k, m, v));

@@ -1,7 +1,7 @@
 //! `step_response`: a response ends as stability says, and scales.
 
 use slipsweep::model::Transition;
-use slipsweep::protocol::Slider;
+use slipsweep::protocol::SpringBlock;
 use slipsweep::stability::SteadySliding;
 use slipsweep::stability::step_response::{Outcome, Response, Step};
 
@@ -27,7 +27,7 @@ struct Point {
 
 fn draw(random: &mut Random) -> Point {
     let transition = random.transition();
-    let Slider { k, m, .. } = random.slider(transition.law, transition.v_f);
+    let SpringBlock { k, m, .. } = random.slider(transition.law, transition.v_f);
     let rtol = random.between(1e-8, 1e-2);
     Point { step: Step { transition, k, m }, rtol, held: random.chance(HELD) }
 }
@@ -36,8 +36,8 @@ fn draw(random: &mut Random) -> Point {
 fn every_response_is_right_or_undecided() {
     sample("step_response", POINTS, draw, |point, row| {
         let &Point { step, rtol, held } = point;
-        let course = step.scaled().map(|scaled| scaled.follow(rtol));
-        let (status, response) = step.from_course(course.as_ref(), rtol);
+        let simulation = step.scaled().map(|scaled| scaled.follow(rtol));
+        let (status, response) = step.from_simulation(simulation.as_ref(), rtol);
         row.status(status);
         let sliding = SteadySliding::new(step.transition.law, step.k, step.m, step.transition.v_f);
         // Only without mass does anything become infinite, and only below k_c.
@@ -58,7 +58,7 @@ fn every_response_is_right_or_undecided() {
         // Steps that share their scaled numbers share their course.
         let key = |step: &Step| step.scaled().map(|scaled| scaled.key());
         row.fact("scaled numbers", key(&other) == key(&step));
-        let scaled = other.from_course(course.as_ref(), rtol).1.expect("exists as the other one does");
+        let scaled = other.from_simulation(simulation.as_ref(), rtol).1.expect("exists as the other one does");
         let times = |t: Option<f64>| t.map(|t| 16.0 * t);
         row.fact(
             "scaling",
@@ -74,8 +74,8 @@ fn every_response_is_right_or_undecided() {
 /// What is told at one accuracy agrees with what is told at a finer one, if that decides at all.
 fn accurate(step: &Step, rough: &Response, rtol: f64, row: &mut Row) {
     let finer = FINER * rtol;
-    let course = step.scaled().map(|scaled| scaled.follow(finer));
-    let Some(fine) = step.from_course(course.as_ref(), finer).1 else { return };
+    let simulation = step.scaled().map(|scaled| scaled.follow(finer));
+    let Some(fine) = step.from_simulation(simulation.as_ref(), finer).1 else { return };
     if [rough.outcome, fine.outcome].contains(&Outcome::Undecided) {
         return;
     }

@@ -1,7 +1,7 @@
 //! Work and the extremes of velocity, gathered along a pass.
 
-use super::course::{Course, Side};
 use super::panel::Panel;
+use super::path::{FrictionPath, Side};
 use crate::model::Transition;
 use crate::numerics::radau::{NODES, radau};
 
@@ -22,16 +22,16 @@ impl Extent {
     }
 
     /// Of steady sliding.
-    pub fn steady(course: &Course, v: f64) -> Extent {
-        Extent { work: course.friction(Side::Start, 0.0) * v * course.t_f, v_min: v, v_max: v, last: None }
+    pub fn steady(path: &FrictionPath, v: f64) -> Extent {
+        Extent { work: path.friction(Side::Start, 0.0) * v * path.t_f, v_min: v, v_max: v, last: None }
     }
 
     /// Adds one panel.
-    pub fn add(&mut self, course: &Course, panel: &Panel) {
+    pub fn add(&mut self, path: &FrictionPath, panel: &Panel) {
         let rule = radau();
         let (mut before, mut sum) = (0.0, 0.0);
-        let (_, z) = panel.state(course, 0.0);
-        let mut bend_before = course.bend(panel.side, panel.from, panel.start, z);
+        let (_, z) = panel.state(path, 0.0);
+        let mut bend_before = path.bend(panel.side, panel.from, panel.start, z);
         // Where theta comes to follow the velocity from one panel to the next, the extremum lies between them.
         if panel.side == Side::Start && panel.from == 0.0 {
             self.last = None;
@@ -41,30 +41,30 @@ impl Extent {
         }
         for j in 0..NODES {
             let (near, w, z) = (panel.place(rule.u[j]), panel.w[j], panel.z[j]);
-            sum += rule.w[j] * course.friction(panel.side, near) * course.velocity(panel.side, w, z);
-            let bend = course.bend(panel.side, near, w, z);
+            sum += rule.w[j] * path.friction(panel.side, near) * path.velocity(panel.side, w, z);
+            let bend = path.bend(panel.side, near, w, z);
             if (bend > 0.0) != (bend_before > 0.0) {
-                self.turn(course, panel, (before, rule.u[j]), bend_before > 0.0);
+                self.turn(path, panel, (before, rule.u[j]), bend_before > 0.0);
             }
             (before, bend_before) = (rule.u[j], bend);
         }
-        self.last = Some((bend_before > 0.0, course.velocity(panel.side, panel.w[NODES - 1], panel.z[NODES - 1])));
-        self.work += course.t_f * (panel.to - panel.from).abs() * sum;
+        self.last = Some((bend_before > 0.0, path.velocity(panel.side, panel.w[NODES - 1], panel.z[NODES - 1])));
+        self.work += path.t_f * (panel.to - panel.from).abs() * sum;
     }
 
     /// The extremum between two places of a panel, by bisection.
-    fn turn(&mut self, course: &Course, panel: &Panel, (mut low, mut high): (f64, f64), rising: bool) {
+    fn turn(&mut self, path: &FrictionPath, panel: &Panel, (mut low, mut high): (f64, f64), rising: bool) {
         for _ in 0..MOST_HALVINGS {
             let middle = 0.5 * (low + high);
-            let (w, z) = panel.state(course, middle);
-            if (course.bend(panel.side, panel.place(middle), w, z) > 0.0) == rising {
+            let (w, z) = panel.state(path, middle);
+            if (path.bend(panel.side, panel.place(middle), w, z) > 0.0) == rising {
                 low = middle;
             } else {
                 high = middle;
             }
         }
-        let (w, z) = panel.state(course, low);
-        self.see(course.velocity(panel.side, w, z));
+        let (w, z) = panel.state(path, low);
+        self.see(path.velocity(panel.side, w, z));
     }
 
     /// Notes an extremum.

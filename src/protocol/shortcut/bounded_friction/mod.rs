@@ -23,22 +23,22 @@
 //! Where the block stands still in between, either pass would lose in the standstill what tells its start from its end:
 //! there both ends are followed to a place in it, and the slip on both ways is compared with the time to spare.
 
-mod course;
 mod extent;
 mod gap;
 mod motion;
 mod panel;
+mod path;
 
 use super::{Case, Family, Obstacle, Shortcut};
 use crate::numerics::elementary::{exp, exp_m1, ln, ln_1p};
 use crate::numerics::gauss::rule;
 use crate::numerics::root::{Probe, newton};
-use crate::protocol::{Effort, Motion};
-use course::{Course, Measure, Stop, Work};
+use crate::protocol::{Motion, SolverStats};
 use extent::Extent;
 use gap::gap;
 use motion::Resolution;
 use panel::Panel;
+use path::{FrictionPath, Measure, Stop, WorkSums};
 
 /// The family.
 pub struct BoundedFriction;
@@ -60,52 +60,52 @@ impl Family for BoundedFriction {
         true
     }
 
-    fn solve(&self, case: &Case, rtol: f64, effort: &mut Effort) -> Result<Shortcut, Obstacle> {
+    fn solve(&self, case: &Case, rtol: f64, stats: &mut SolverStats) -> Result<Shortcut, Obstacle> {
         let mut extent = None;
-        let course = member(case, rtol, effort, |course, panel| match panel {
-            Some(panel) => extent.get_or_insert_with(|| Extent::new(&case.transition)).add(course, panel),
+        let path = member(case, rtol, stats, |path, panel| match panel {
+            Some(panel) => extent.get_or_insert_with(|| Extent::new(&case.transition)).add(path, panel),
             None => extent = None,
         })?;
-        let extent = extent.unwrap_or_else(|| Extent::steady(&course, case.transition.v_i));
+        let extent = extent.unwrap_or_else(|| Extent::steady(&path, case.transition.v_i));
         if !extent.work.is_finite() {
             return Err(Obstacle::NotConverged);
         }
         Ok(Shortcut {
-            alpha: Some(if case.tau_ceiling == f64::INFINITY { 0.0 } else { course.alpha }),
+            alpha: Some(if case.tau_ceiling == f64::INFINITY { 0.0 } else { path.alpha }),
             work: extent.work,
             v_min: extent.v_min,
             v_max: extent.v_max,
-            friction_max: course.friction_max().min(case.tau_ceiling),
-            friction_min: course.friction_min(),
+            friction_max: path.friction_max().min(case.tau_ceiling),
+            friction_min: path.friction_min(),
             miss: 0.0,
         })
     }
 
     fn motion(&self, case: &Case, rtol: f64) -> Result<Box<dyn Motion>, Obstacle> {
         let mut panels = Vec::new();
-        let mut course = member(case, rtol, &mut Effort::default(), |_, panel| match panel {
+        let mut path = member(case, rtol, &mut SolverStats::default(), |_, panel| match panel {
             Some(panel) => panels.push(*panel),
             None => panels.clear(),
         })?;
         if panels.is_empty() {
             // Steady sliding: one panel tells it all.
             let tolerances = (0.1 * rtol, 0.1 * rtol);
-            let work = Work { accuracy: rtol, expected: 0.0 };
-            let again = course.pass(tolerances, Some(work), &mut Effort::default(), |_, panel| panels.push(*panel));
+            let work = WorkSums { accuracy: rtol, expected: 0.0 };
+            let again = path.pass(tolerances, Some(work), &mut SolverStats::default(), |_, panel| panels.push(*panel));
             again.map_err(|_| Obstacle::NotConverged)?;
-            course.alpha = 0.0;
+            path.alpha = 0.0;
         }
         // What was integrated backwards lies behind what was integrated forwards.
         let (mut panels, backward): (Vec<Panel>, Vec<Panel>) = panels.into_iter().partition(|panel| panel.forward);
         panels.extend(backward.into_iter().rev());
-        Ok(Box::new(Resolution { course, panels }))
+        Ok(Box::new(Resolution { path, panels }))
     }
 }
 
 /// Stands for an infinite distance from the bound.
 const FAR: f64 = 1e100;
 
-/// Below this share of [`Course::worth`] the time to spare is what a course is measured by.
+/// Below this share of [`FrictionPath::worth`] the time to spare is what a course is measured by.
 const CLOSE: f64 = 0.1;
 
 /// Share of the time that a standstill takes beyond which the ways to it are compared with the time to spare.
@@ -154,9 +154,9 @@ const ROUNDING: f64 = 8.0 * f64::EPSILON;
 fn member(
     case: &Case,
     rtol: f64,
-    effort: &mut Effort,
-    mut visit: impl FnMut(&Course, Option<&Panel>),
-) -> Result<Course, Obstacle> {
+    stats: &mut SolverStats,
+    mut visit: impl FnMut(&FrictionPath, Option<&Panel>),
+) -> Result<FrictionPath, Obstacle> {
     let (law, v_i, v_f, t_f) = (case.transition.law, case.transition.v_i, case.transition.v_f, case.t_f);
     let sound = law.a > 0.0 && law.b >= 0.0 && t_f > 0.0 && v_i >= 1.0 && v_f >= 1.0;
     if !sound || ![law.a, law.b, t_f, v_i, v_f].iter().all(|x| x.is_finite()) || case.tau_ceiling.is_nan() {
@@ -173,13 +173,13 @@ fn member(
     let share = (law.a - law.b) * log_ratio / gap_i;
     let ln_r = if share.abs() < 0.5 { ln_1p(share) } else { ln(gap_f / gap_i) };
     if v_i == v_f {
-        return Ok(Course::new(case, (gap_i, gap_f), ln_r, log_ratio, Measure::Level));
+        return Ok(FrictionPath::new(case, (gap_i, gap_f), ln_r, log_ratio, Measure::Level));
     }
     // Time beyond that of v = 0 or that of tau = tau_M.
     let accelerates = v_f > v_i;
     let spare = t_f
         - if accelerates {
-            fastest(law.a, v_i, -log_ratio, (gap_i, gap_f), effort)
+            fastest(law.a, v_i, -log_ratio, (gap_i, gap_f), stats)
         } else {
             (v_i - v_f) / v_i * (1.0 / v_f)
         };
@@ -187,12 +187,12 @@ fn member(
         return Err(if accelerates { Obstacle::Friction } else { Obstacle::Velocity });
     }
     let measure = if accelerates { Measure::Lag { spare } } else { Measure::Slip { spare } };
-    let course = Course::new(case, (gap_i, gap_f), ln_r, log_ratio, measure);
-    let close = spare < CLOSE * course.worth(0.0).min(t_f);
+    let path = FrictionPath::new(case, (gap_i, gap_f), ln_r, log_ratio, measure);
+    let close = spare < CLOSE * path.worth(0.0).min(t_f);
     // From a standstill theta grows, and forgets forwards what it was.
-    let measured = if accelerates { course } else { course.towards(true) };
-    let level = course.measured_by(Measure::Level);
-    let meeting = course.towards(true).measured_by(Measure::Meeting { spare });
+    let measured = if accelerates { path } else { path.towards(true) };
+    let level = path.measured_by(Measure::Level);
+    let meeting = path.towards(true).measured_by(Measure::Meeting { spare });
     let all = [measured, measured.reversed(), level, level.reversed(), meeting];
     // What a pass through a standstill loses grows like the ratio of the velocities, and where theta runs away, b/a
     // times.
@@ -214,13 +214,13 @@ fn member(
     for (strict, most_noise, rtol) in
         [(true, little, rtol), (true, most, rtol), (false, most, rtol), (false, most, fine)]
     {
-        for course in order.clone().map(|&place| all[place]) {
-            let Some((alpha, errors)) = rough(&course, start, strict, effort) else { continue };
-            start = start.or((course.measure == Measure::Level || errors < MOST_ERRORS).then_some(alpha));
+        for path in order.clone().map(|&place| all[place]) {
+            let Some((alpha, errors)) = rough(&path, start, strict, stats) else { continue };
+            start = start.or((path.measure == Measure::Level || errors < MOST_ERRORS).then_some(alpha));
             if strict && errors > MOST_ERRORS {
                 continue;
             }
-            if let Some(found) = refined(course.with(alpha), (rtol, most_noise), strict, effort, &mut visit) {
+            if let Some(found) = refined(path.with(alpha), (rtol, most_noise), strict, stats, &mut visit) {
                 return Ok(found);
             }
         }
@@ -229,89 +229,87 @@ fn member(
 }
 
 /// `alpha_3` to [`COARSE`], and by how much errors on the way would grow.
-fn rough(course: &Course, start: Option<f64>, strict: bool, effort: &mut Effort) -> Option<(f64, f64)> {
-    match course.measure {
-        Measure::Level => search(course, start.unwrap_or(0.0), strict, effort),
-        Measure::Slip { spare } | Measure::Meeting { spare } => {
-            closest(course, 2.0 * course.t_f / spare, strict, effort)
-        }
-        Measure::Lag { spare } => closest(course, -2.0 * course.t_f / spare, strict, effort),
+fn rough(path: &FrictionPath, start: Option<f64>, strict: bool, stats: &mut SolverStats) -> Option<(f64, f64)> {
+    match path.measure {
+        Measure::Level => search(path, start.unwrap_or(0.0), strict, stats),
+        Measure::Slip { spare } | Measure::Meeting { spare } => closest(path, 2.0 * path.t_f / spare, strict, stats),
+        Measure::Lag { spare } => closest(path, -2.0 * path.t_f / spare, strict, stats),
     }
 }
 
 /// [`close`], and once more to as much as the growth of errors asks for where there is no way on which they grow less.
-fn closest(course: &Course, start: f64, strict: bool, effort: &mut Effort) -> Option<(f64, f64)> {
-    let (alpha, errors) = close(course, start, (COARSE, ENOUGH), effort)?;
+fn closest(path: &FrictionPath, start: f64, strict: bool, stats: &mut SolverStats) -> Option<(f64, f64)> {
+    let (alpha, errors) = close(path, start, (COARSE, ENOUGH), stats)?;
     if strict || errors < MOST_ERRORS {
         return Some((alpha, errors));
     }
     let fine = ((COARSE / errors).max(FINEST), ENOUGH * ENOUGH);
-    close(course, alpha / course.unit(), fine, effort).or(Some((alpha, errors)))
+    close(path, alpha / path.unit(), fine, stats).or(Some((alpha, errors)))
 }
 
 /// The course from a rough `alpha_3` on to the one that arrives; `None` where it does not come so far.
 fn refined(
-    mut course: Course,
+    mut path: FrictionPath,
     (rtol, most_noise): (f64, f64),
     strict: bool,
-    effort: &mut Effort,
-    visit: &mut impl FnMut(&Course, Option<&Panel>),
-) -> Option<Course> {
-    visit(&course, None);
+    stats: &mut SolverStats,
+    visit: &mut impl FnMut(&FrictionPath, Option<&Panel>),
+) -> Option<FrictionPath> {
+    visit(&path, None);
     let (mut last_pass, mut before, mut tolerance, mut expected) = (false, f64::INFINITY, 0.1 * rtol, 0.0);
     for _ in 0..MOST_PASSES {
-        let pass = |course: &Course, panel: &Panel| {
+        let pass = |path: &FrictionPath, panel: &Panel| {
             if last_pass {
-                visit(course, Some(panel));
+                visit(path, Some(panel));
             }
         };
         // The last pass tells the work and the extremes too, which lie between the nodes.
         let nodes = (LAST * rtol).max(FINEST);
         let fine = nodes * nodes.sqrt();
         let (within_pass, work) = if last_pass {
-            ((tolerance.min(fine), fine), Some(Work { accuracy: nodes, expected: 0.5 * expected }))
+            ((tolerance.min(fine), fine), Some(WorkSums { accuracy: nodes, expected: 0.5 * expected }))
         } else {
             ((tolerance, 0.1 * rtol), None)
         };
-        let end = course.pass(within_pass, work, effort, pass).ok()?;
+        let end = path.pass(within_pass, work, stats, pass).ok()?;
         expected = end.work;
-        let (_, step) = course.miss(&end);
-        let scale = course.scale(&end);
+        let (_, step) = path.miss(&end);
+        let scale = path.scale(&end);
         let within = |share: f64| step.abs() <= share * scale;
         // Rounding allows no better, once Newton's method no longer gains; that of the bound, and of alpha itself, only
         // where no other way tells more.
-        let neighbours = step.abs() <= f64::EPSILON * course.alpha.abs();
-        let rounding = course.rounding(&end).max(if strict { 0.0 } else { course.blur });
+        let neighbours = step.abs() <= f64::EPSILON * path.alpha.abs();
+        let rounding = path.rounding(&end).max(if strict { 0.0 } else { path.blur });
         let spent = step.abs() <= ROUNDING * rounding && step.abs() >= 0.5 * before
-            || course.alpha + step == course.alpha
+            || path.alpha + step == path.alpha
             || neighbours && !strict;
         if end.noise * f64::EPSILON > most_noise {
             return None;
         }
         // Slips that add up to the time to spare are known to its rounding. Where that leaves more of alpha than is asked for,
         // theta at the end may tell the rest. What rounding of t_f itself leaves, no way tells.
-        let vague = ROUNDING * course.lost_in_sum(&end) > 0.5 * rtol.max(LITTLE_NOISE) * scale;
+        let vague = ROUNDING * path.lost_in_sum(&end) > 0.5 * rtol.max(LITTLE_NOISE) * scale;
         if strict && last_pass && vague {
             return None;
         }
         if last_pass && (within(0.5 * rtol) || spent) {
             // Where nothing depends on alpha but by rounding, this way tells nothing.
-            return within(if strict { SURE } else { 1.0 }).then_some(course);
+            return within(if strict { SURE } else { 1.0 }).then_some(path);
         }
         // From side to side of the next double: another way to the end may tell more.
         if !step.is_finite() || last_pass && neighbours {
             return None;
         }
         // What a panel may lack for the end to be as good as the step that is to come.
-        let share = 5.0 * rtol * scale * course.precision(&end) / course.size;
+        let share = 5.0 * rtol * scale * path.precision(&end) / path.size;
         let wanted =
-            if course.measure == Measure::Level { share } else { 0.1 * rtol * (scale / course.alpha.abs()).min(1.0) };
+            if path.measure == Measure::Level { share } else { 0.1 * rtol * (scale / path.alpha.abs()).min(1.0) };
         tolerance = wanted.clamp(f64::MIN_POSITIVE, 0.1 * rtol);
         // Newton's method doubles the digits.
         last_pass = within(rtol.sqrt()) || spent;
         before = step.abs();
-        course = course.with(course.alpha + step);
-        visit(&course, None);
+        path = path.with(path.alpha + step);
+        visit(&path, None);
     }
     None
 }
@@ -320,12 +318,12 @@ fn refined(
 ///
 /// `z = ln(theta v)` is linear in `y` there, from `gap_i/a` to `gap_f/a`; panels double with `z`, so that the pole at
 /// `z = 0` stays away.
-fn fastest(a: f64, v_i: f64, span: f64, (gap_i, gap_f): (f64, f64), effort: &mut Effort) -> f64 {
+fn fastest(a: f64, v_i: f64, span: f64, (gap_i, gap_f): (f64, f64), stats: &mut SolverStats) -> f64 {
     let rule = rule(24);
     let (z_i, z_f) = (gap_i / a, gap_f / a);
     let growth = (z_f / z_i).abs().max(z_i / z_f);
     let panels = (1.5 * ln(growth) + span).ceil().clamp(1.0, 400.0);
-    effort.quadratures += 1;
+    stats.quadratures += 1;
     let mut time = 0.0;
     for panel in 0..panels as u32 {
         // The share of the way and z: geometric in z, or even in y where z hardly changes.
@@ -338,7 +336,7 @@ fn fastest(a: f64, v_i: f64, span: f64, (gap_i, gap_f): (f64, f64), effort: &mut
             }
         };
         let (low, high) = (place(f64::from(panel) / panels), place(f64::from(panel + 1) / panels));
-        effort.nodes += rule.x.len() as u32;
+        stats.nodes += rule.x.len() as u32;
         for (x, w) in rule.x.iter().zip(&rule.w) {
             let between = |low: f64, high: f64| low + 0.5 * (high - low) * (1.0 + x);
             let (share, z) = (between(low.0, high.0), between(low.1, high.1));
@@ -349,12 +347,12 @@ fn fastest(a: f64, v_i: f64, span: f64, (gap_i, gap_f): (f64, f64), effort: &mut
 }
 
 /// `alpha_3` to [`COARSE`], from a start, and the growth of errors.
-fn search(course: &Course, start: f64, strict: bool, effort: &mut Effort) -> Option<(f64, f64)> {
-    let unit = course.unit();
+fn search(path: &FrictionPath, start: f64, strict: bool, stats: &mut SolverStats) -> Option<(f64, f64)> {
+    let unit = path.unit();
     let (mut gave_up, mut errors) = (false, f64::INFINITY);
     let probe = |x: f64| {
-        let course = course.with(unit * x);
-        let end = match course.pass((COARSE, COARSE), None, effort, |_, _| ()) {
+        let path = path.with(unit * x);
+        let end = match path.pass((COARSE, COARSE), None, stats, |_, _| ()) {
             Ok(end) => end,
             Err(Stop::Little) => return Some(Probe { value: -f64::MAX, slope: 0.0 }),
             Err(Stop::Much) => return Some(Probe { value: f64::MAX, slope: 0.0 }),
@@ -364,7 +362,7 @@ fn search(course: &Course, start: f64, strict: bool, effort: &mut Effort) -> Opt
             }
         };
         errors = end.errors;
-        let (miss, step) = course.miss(&end);
+        let (miss, step) = path.miss(&end);
         // In units of the change that alpha bears; a step that doubles alpha is far enough.
         let scale = 1.0 + x.abs();
         let bounded = (step / unit).clamp(-FARTHEST * scale, FARTHEST * scale);
@@ -373,7 +371,7 @@ fn search(course: &Course, start: f64, strict: bool, effort: &mut Effort) -> Opt
             return Some(Probe { value: miss, slope: 0.0 });
         }
         // A step that is small beside alpha may still lead beyond a theta that is about to be lost.
-        let weight = (1.0 / scale).max(FAR_OFF * miss.abs() / course.size / bounded.abs());
+        let weight = (1.0 / scale).max(FAR_OFF * miss.abs() / path.size / bounded.abs());
         // Theta may be about to arrive whatever alpha is: what grows there vanishes beyond.
         let weight = if strict && errors > MOST_ERRORS { weight.max(2.0 * ENOUGH / bounded.abs()) } else { weight };
         Some(Probe { value: -bounded * weight, slope: weight })
@@ -389,17 +387,22 @@ const FAR_OFF: f64 = 0.1;
 const FARTHEST: f64 = 4.0;
 
 /// `alpha_3` to a tolerance where the time is just long enough: far out, where the layers at the ends shrink like
-/// `1/alpha_3`, from a start in units of [`Course::unit`].
-fn close(course: &Course, start: f64, (tolerance, enough): (f64, f64), effort: &mut Effort) -> Option<(f64, f64)> {
-    let unit = course.unit();
+/// `1/alpha_3`, from a start in units of [`FrictionPath::unit`].
+fn close(
+    path: &FrictionPath,
+    start: f64,
+    (tolerance, enough): (f64, f64),
+    stats: &mut SolverStats,
+) -> Option<(f64, f64)> {
+    let unit = path.unit();
     let (mut gave_up, mut errors) = (false, f64::INFINITY);
     let place = |q: f64| 0.5 * unit * (exp_m1(q) - exp_m1(-q));
     let probe = |q: f64| {
-        let course = course.with(place(q));
-        match course.pass((tolerance, tolerance), None, effort, |_, _| ()) {
+        let path = path.with(place(q));
+        match path.pass((tolerance, tolerance), None, stats, |_, _| ()) {
             Ok(end) => {
                 errors = end.errors;
-                let (value, step) = course.miss(&end);
+                let (value, step) = path.miss(&end);
                 let stretch = 0.5 * unit * (exp(q) + exp(-q));
                 Some(Probe { value, slope: (-value / step * stretch).max(0.0) })
             }
@@ -416,5 +419,5 @@ fn close(course: &Course, start: f64, (tolerance, enough): (f64, f64), effort: &
     root.filter(|_| !gave_up).map(|root| (place(root.x), errors))
 }
 
-/// Logarithm of the greatest `alpha_3` in units of [`Course::unit`].
+/// Logarithm of the greatest `alpha_3` in units of [`FrictionPath::unit`].
 const FARTHEST_OUT: f64 = 100.0;

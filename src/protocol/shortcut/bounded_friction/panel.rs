@@ -2,7 +2,7 @@
 
 use multiversion::multiversion;
 
-use super::course::{Course, MILD, MOST_EXPONENT, Side};
+use super::path::{FrictionPath, MILD, MOST_EXPONENT, Side};
 use crate::numerics::elementary::{exp, exp_m1, ln_1p};
 use crate::numerics::radau::{NODES, Nodes, Radau, radau};
 
@@ -52,9 +52,9 @@ impl Panel {
     }
 
     /// `w` and `z` there.
-    pub fn state(&self, course: &Course, s: f64) -> (f64, f64) {
+    pub fn state(&self, path: &FrictionPath, s: f64) -> (f64, f64) {
         let w = self.level(s);
-        let z = if self.follows { radau().follow(&self.z, s) } else { course.excess(self.side, self.place(s), w) };
+        let z = if self.follows { radau().follow(&self.z, s) } else { path.excess(self.side, self.place(s), w) };
         (w, z)
     }
 }
@@ -82,27 +82,27 @@ const FARTHEST: f64 = 20.0;
     "x86_64+avx+avx2+bmi1+bmi2"
 ))]
 pub(super) fn collocate(
-    course: &Course,
+    path: &FrictionPath,
     side: Side,
     (from, to): (f64, f64),
     [start, turn]: [f64; 2],
     enough: f64,
     rule: &Radau,
 ) -> Option<Found> {
-    let anchor = course.anchor(side);
-    let scale = (to - from).abs() * course.pace(anchor);
-    let kappa = course.kappa;
+    let anchor = path.anchor(side);
+    let scale = (to - from).abs() * path.pace(anchor);
+    let kappa = path.kappa;
     let (mut drive, mut lean, mut doubt) = ([0.0; NODES], [0.0; NODES], [0.0; NODES]);
     for j in 0..NODES {
         let near = from * rule.rest[j] + to * rule.u[j];
-        let e = course.exponent(anchor, near);
-        drive[j] = course.drive(anchor, e);
-        let distance = anchor.gap / course.a * exp(if e < MOST_EXPONENT { e } else { MOST_EXPONENT });
+        let e = path.exponent(anchor, near);
+        drive[j] = path.drive(anchor, e);
+        let distance = anchor.gap / path.a * exp(if e < MOST_EXPONENT { e } else { MOST_EXPONENT });
         lean[j] = -near * (1.0 - near) * distance;
         // The drive rounds, and so does its exponent.
-        doubt[j] = drive[j].abs() + course.uncertainty(anchor, near) * distance;
+        doubt[j] = drive[j].abs() + path.uncertainty(anchor, near) * distance;
     }
-    let mut w = guess(course, side, from, start, scale, &drive, rule);
+    let mut w = guess(path, side, from, start, scale, &drive, rule);
     let mut before = f64::INFINITY;
     for _ in 0..MOST_STEPS {
         let (mut rate, mut speed, mut slope, mut push) = ([0.0; NODES], [0.0; NODES], [0.0; NODES], [0.0; NODES]);
@@ -177,7 +177,7 @@ pub(super) fn collocate(
                 uncertain += rule.w[j] * speed[j] * (1.0 + w[j].abs() + rounding[j]);
             }
             let lack = (rule.unresolved(&speed) - count * f64::EPSILON * uncertain).max(0.0);
-            let panel = Panel { forward: course.forward, side, from, to, start, w, z, follows };
+            let panel = Panel { forward: path.forward, side, from, to, start, w, z, follows };
             return Some(Found { panel, turn: last, slid, lack, noise: 8.0 * noise, growth, error });
         }
     }
@@ -219,20 +219,20 @@ const SLOPE_NOISE: f64 = 300.0;
 
 /// Where theta relaxes it comes to follow the drive, as `ln(theta v)` hardly changes; else it hardly changes itself.
 #[inline(always)]
-fn guess(course: &Course, side: Side, from: f64, start: f64, scale: f64, drive: &Nodes, rule: &Radau) -> Nodes {
-    let anchor = course.anchor(side);
-    let before = course.drive(anchor, course.exponent(anchor, from));
-    let excess = exp_m1(before + course.kappa * start);
-    let decay = -scale * exp(-start) * (excess - course.kappa * (1.0 + excess));
+fn guess(path: &FrictionPath, side: Side, from: f64, start: f64, scale: f64, drive: &Nodes, rule: &Radau) -> Nodes {
+    let anchor = path.anchor(side);
+    let before = path.drive(anchor, path.exponent(anchor, from));
+    let excess = exp_m1(before + path.kappa * start);
+    let decay = -scale * exp(-start) * (excess - path.kappa * (1.0 + excess));
     if decay <= STILL {
         return [start; NODES];
     }
     // The slope relaxes from what it is to that of a drive that goes on evenly.
     let slope = -scale * exp(-start) * excess;
-    let farthest = FARTHEST * course.kappa.abs();
+    let farthest = FARTHEST * path.kappa.abs();
     let mut w = [0.0; NODES];
     for j in 0..NODES {
-        let followed = -(drive[j] - before).clamp(-farthest, farthest) / course.kappa;
+        let followed = -(drive[j] - before).clamp(-farthest, farthest) / path.kappa;
         let passed = decay * rule.u[j];
         w[j] = start + followed - (slope * rule.u[j] - followed) * exp_m1(-passed) / passed;
     }

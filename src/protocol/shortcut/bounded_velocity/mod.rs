@@ -17,7 +17,7 @@ use super::{Case, Family, Obstacle, Shortcut};
 use crate::model::Transition;
 use crate::numerics::elementary::{ln, ln_1p};
 use crate::protocol::profile::{self, Passage, Problem, Resolution, Resolved, Side, Start, pass, reach};
-use crate::protocol::{Effort, Motion};
+use crate::protocol::{Motion, SolverStats};
 use parabola::Parabola;
 
 /// The velocity of a member.
@@ -39,8 +39,8 @@ impl Family for BoundedVelocity {
         Some("alpha_3 in v = 1 + (v_i - 1) exp[ln((v_f - 1)/(v_i - 1)) t/t_f - alpha_3 (t_f - t) t]")
     }
 
-    fn solve(&self, case: &Case, rtol: f64, effort: &mut Effort) -> Result<Shortcut, Obstacle> {
-        let curve = member(case, rtol, effort)?;
+    fn solve(&self, case: &Case, rtol: f64, stats: &mut SolverStats) -> Result<Shortcut, Obstacle> {
+        let curve = member(case, rtol, stats)?;
         let (law, v_i, v_f) = (case.transition.law, case.transition.v_i, case.transition.v_f);
         if v_i == v_f {
             let friction_max = 1.0 + (law.a - law.b) * ln(v_i);
@@ -57,7 +57,7 @@ impl Family for BoundedVelocity {
             });
         }
         let mut passage = Passage { work: 0.0, friction_max: f64::NEG_INFINITY, friction_min: f64::INFINITY };
-        follow(&curve, case, rtol, effort, |panel| panel.gather(&law, &curve, rtol, &mut passage))?;
+        follow(&curve, case, rtol, stats, |panel| panel.gather(&law, &curve, rtol, &mut passage))?;
         if !passage.work.is_finite() {
             return Err(Obstacle::NotConverged);
         }
@@ -74,10 +74,10 @@ impl Family for BoundedVelocity {
     }
 
     fn motion(&self, case: &Case, rtol: f64) -> Result<Box<dyn Motion>, Obstacle> {
-        let mut effort = Effort::default();
-        let curve = member(case, rtol, &mut effort)?;
+        let mut stats = SolverStats::default();
+        let curve = member(case, rtol, &mut stats)?;
         let mut panels = Vec::new();
-        follow(&curve, case, rtol, &mut effort, |panel| panels.push(*panel))?;
+        follow(&curve, case, rtol, &mut stats, |panel| panels.push(*panel))?;
         Ok(Box::new(Resolution { law: case.transition.law, curve, panels }))
     }
 }
@@ -88,13 +88,13 @@ fn follow(
     curve: &Curve,
     case: &Case,
     rtol: f64,
-    effort: &mut Effort,
+    stats: &mut SolverStats,
     visit: impl FnMut(&Resolved),
 ) -> Result<(), Obstacle> {
     let Transition { v_i, v_f, .. } = case.transition;
     // Theta is interpolated, which takes more nodes than a quadrature.
     let theta =
-        pass(curve, Start::steady(v_i, true), rtol, 0.75 * reach(rtol), effort, visit).ok_or(Obstacle::NotConverged)?;
+        pass(curve, Start::steady(v_i, true), rtol, 0.75 * reach(rtol), stats, visit).ok_or(Obstacle::NotConverged)?;
     let arrives = (theta * v_f - 1.0).abs() <= 10.0 * rtol + ROUNDING;
     if arrives { Ok(()) } else { Err(Obstacle::NotConverged) }
 }
@@ -103,7 +103,7 @@ fn follow(
 const ROUNDING: f64 = 1e-12;
 
 /// The velocity of the member that solves the case.
-fn member(case: &Case, rtol: f64, effort: &mut Effort) -> Result<Curve, Obstacle> {
+fn member(case: &Case, rtol: f64, stats: &mut SolverStats) -> Result<Curve, Obstacle> {
     let (law, v_i, v_f, t_f) = (case.transition.law, case.transition.v_i, case.transition.v_f, case.t_f);
     let sound = law.a > 0.0 && law.b >= 0.0 && t_f > 0.0 && v_i >= 1.0 && v_f >= 1.0;
     if !sound || ![law.a, law.b, t_f, v_i, v_f].iter().all(|x| x.is_finite()) {
@@ -128,7 +128,7 @@ fn member(case: &Case, rtol: f64, effort: &mut Effort) -> Result<Curve, Obstacle
     let (spare, tight) = (t_f - t_min, t_f < 2.0 * t_min);
     let problem = Problem::steady(v_i, v_f, curve, spare, tight);
     let start = if tight { 2.0 * t_f / spare } else { guess(w_i, w_f, l, t_f, problem.required) };
-    let c = problem.solve(start, rtol, reach(rtol), effort).ok_or(Obstacle::NotConverged)?;
+    let c = problem.solve(start, rtol, reach(rtol), stats).ok_or(Obstacle::NotConverged)?;
     Ok(curve.with(c))
 }
 

@@ -105,7 +105,7 @@ const SCALAR: [&str; 44] = [
 const AGGREGATE: [&str; 6] = ["avg", "count", "max", "mean", "min", "sum"];
 
 /// How to answer `query` piece by piece; `None` where all of it has to be there at once.
-pub fn pieces(query: &Query, sources: &[Source]) -> Option<Pieces> {
+pub fn streaming(query: &Query, sources: &[Source]) -> Option<Pieces> {
     let SetExpr::Select(select) = query.body.as_ref() else { return None };
     if !is_bare(query) || !is_simple(select) {
         return None;
@@ -136,7 +136,7 @@ pub fn pieces(query: &Query, sources: &[Source]) -> Option<Pieces> {
     let conditions = of_where(select.selection.as_ref(), schema);
     let table = source.name.clone();
     let question = One { table, source, items, condition: select.selection, having: select.having, ordered };
-    let mut pieces = Pieces {
+    let mut streaming = Pieces {
         table: question.table.clone(),
         partial: String::new(),
         groups: None,
@@ -150,18 +150,18 @@ pub fn pieces(query: &Query, sources: &[Source]) -> Option<Pieces> {
         names,
     };
     if groups.is_empty() && !aggregates {
-        if question.having.is_some() || !pieces.keys.is_empty() && limit.is_none() {
+        if question.having.is_some() || !streaming.keys.is_empty() && limit.is_none() {
             return None;
         }
         let most = limit.map(|limit| limit.saturating_add(offset));
-        pieces.partial = question.rows(most);
-        pieces.top = conditions.and_then(|_| question.top(&pieces.keys, most?, schema));
+        streaming.partial = question.rows(most);
+        streaming.top = conditions.and_then(|_| question.top(&streaming.keys, most?, schema));
     } else {
         let (partial, merge, finish, measured) = question.groups(groups)?;
-        pieces.groups = conditions.and_then(|conditions| counted(measured?, conditions, schema));
-        (pieces.partial, pieces.merge, pieces.finish) = (partial, Some(merge), Some(finish));
+        streaming.groups = conditions.and_then(|conditions| counted(measured?, conditions, schema));
+        (streaming.partial, streaming.merge, streaming.finish) = (partial, Some(merge), Some(finish));
     }
-    Some(pieces)
+    Some(streaming)
 }
 
 /// The groups, if counting columns is enough to find them.

@@ -27,7 +27,7 @@ const MIN_PARALLEL_POINTS: u64 = 1 << 18;
 
 /// The rows of a product that a condition keeps.
 #[derive(Debug)]
-pub struct Sieve {
+pub struct RowFilter {
     /// Rows of the digits slower than all that are read.
     lead: u64,
     levels: Vec<Level>,
@@ -43,9 +43,9 @@ struct Level {
     free: u64,
 }
 
-impl Sieve {
+impl RowFilter {
     /// The rows over `digits` of `block` for which its condition holds at any point; `None` if it reads too many combinations.
-    pub fn new(block: &Block, digits: &Digits, condition: &Expression) -> Option<Sieve> {
+    pub fn new(block: &Block, digits: &Digits, condition: &Expression) -> Option<RowFilter> {
         let reads = block.factors_of(&block.roots(&condition.reads()));
         let (mut lead, mut levels, mut factors) = (1, Vec::<Level>::new(), Vec::new());
         for digit in &digits.digits {
@@ -68,7 +68,7 @@ impl Sieve {
         let hidden = all.rows / combinations;
         let bits = |told, scratch: &mut Scratch| evaluate(&sampler, condition, hidden, told, scratch);
         let bytes = in_chunks(combinations, all.rows, bits).concat();
-        Some(Sieve { lead, levels, combinations, kept: RoaringBitmap::from_lsb0_bytes(0, &bytes) })
+        Some(RowFilter { lead, levels, combinations, kept: RoaringBitmap::from_lsb0_bytes(0, &bytes) })
     }
 
     /// Whether it keeps every row.
@@ -294,14 +294,15 @@ mod tests {
                 for factors in [&[0, 1, 2, 3, 4][..], &[0, 2, 4], &[1], &[3, 4], &[]] {
                     let digits = Digits::new(&block, factors).expect("is small");
                     let expected = kept(&lengths, factors, holds);
-                    let sieve = Sieve::new(&block, &digits, &condition).expect("is small");
+                    let row_filter = RowFilter::new(&block, &digits, &condition).expect("is small");
                     let place = format!("{text} over {factors:?} of {lengths:?}");
-                    assert_eq!(sieve.rows(), expected.len() as u64, "{place}");
-                    let all: Vec<u64> = sieve.ranges(0..sieve.rows()).into_iter().flatten().collect();
+                    assert_eq!(row_filter.rows(), expected.len() as u64, "{place}");
+                    let all: Vec<u64> = row_filter.ranges(0..row_filter.rows()).into_iter().flatten().collect();
                     assert_eq!(all, expected, "{place}");
                     for start in (0..expected.len()).step_by(1 + expected.len() / 7) {
                         let end = (start + 5).min(expected.len());
-                        let some: Vec<u64> = sieve.ranges(start as u64..end as u64).into_iter().flatten().collect();
+                        let some: Vec<u64> =
+                            row_filter.ranges(start as u64..end as u64).into_iter().flatten().collect();
                         assert_eq!(some, expected[start..end], "{place}");
                     }
                 }

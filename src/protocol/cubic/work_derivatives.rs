@@ -20,11 +20,11 @@ use super::path::Path;
 use super::rules::{Map, Panel, Zeros, choose};
 use crate::numerics::elementary::{exp, ln, ln_1p};
 use crate::numerics::gauss::rule;
-use crate::protocol::Effort;
+use crate::protocol::SolverStats;
 
 /// Work and its derivatives with respect to the two coefficients of a basis.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(in crate::protocol) struct Moments {
+pub(in crate::protocol) struct WorkDerivatives {
     pub work: f64,
     pub gradient: [f64; 2],
     /// `d2W/dy_1^2`, `d2W/dy_1 dy_2`, `d2W/dy_2^2`.
@@ -55,14 +55,19 @@ impl Basis {
 
 impl Landscape {
     /// Work, gradient and Hessian of a feasible shortcut.
-    pub(in crate::protocol) fn moments(&self, path: &Path, basis: Basis, effort: &mut Effort) -> Moments {
+    pub(in crate::protocol) fn work_derivatives(
+        &self,
+        path: &Path,
+        basis: Basis,
+        stats: &mut SolverStats,
+    ) -> WorkDerivatives {
         let (a, b) = (self.law.a, self.law.b);
         let slope = b - a;
         let constant = 1.0 - a * self.ln_t_f;
         let (theta_i, t_f) = (self.ends.theta_0.high, self.ends.t_f);
         let pull = (1.0 + slope * ln(theta_i) + a) * t_f;
-        let mut moments = Moments { work: 0.0, gradient: [0.0; 2], hessian: [0.0; 3] };
-        effort.quadratures += 1;
+        let mut work_derivatives = WorkDerivatives { work: 0.0, gradient: [0.0; 2], hessian: [0.0; 3] };
+        stats.quadratures += 1;
         let mut panels = Vec::with_capacity(4);
         choose(&Zeros::of(path), 0.0, 1.0, &self.accuracy, 0, &mut panels);
         for panel in panels {
@@ -70,7 +75,7 @@ impl Landscape {
             // theta - theta_0 and, in units of v_i/t_f, n - v_i t_f theta.
             let aged = path.change_about(panel.centre);
             let above = path.above_start_about(panel.centre);
-            effort.nodes += panel.nodes as u32;
+            stats.nodes += panel.nodes as u32;
             panel.each_node(|delta, weight| {
                 let theta = at(&q, delta);
                 // On the border v = 0 rounding may take n below 0.
@@ -86,11 +91,11 @@ impl Landscape {
                 let h_nn = a * inverse / n;
                 let h_mixed = (slope - l) * inverse * inverse;
                 let h_theta_theta = -(slope * n * inverse * inverse + 2.0 * by_theta) * inverse;
-                moments.work += weight * tau * n * inverse;
-                for (sum, (dn, dq)) in moments.gradient.iter_mut().zip(d_n.iter().zip(d_theta)) {
+                work_derivatives.work += weight * tau * n * inverse;
+                for (sum, (dn, dq)) in work_derivatives.gradient.iter_mut().zip(d_n.iter().zip(d_theta)) {
                     *sum += weight * (l * inverse * dn + by_theta * dq);
                 }
-                for (sum, (i, j)) in moments.hessian.iter_mut().zip([(0, 0), (0, 1), (1, 1)]) {
+                for (sum, (i, j)) in work_derivatives.hessian.iter_mut().zip([(0, 0), (0, 1), (1, 1)]) {
                     *sum += weight
                         * (h_nn * d_n[i] * d_n[j]
                             + h_mixed * (d_n[i] * d_theta[j] + d_n[j] * d_theta[i])
@@ -98,7 +103,7 @@ impl Landscape {
                 }
             });
         }
-        moments
+        work_derivatives
     }
 }
 

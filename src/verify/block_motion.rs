@@ -127,7 +127,7 @@ impl Block {
     }
 
     /// The fastest swing of small motions, which no leg may overlook.
-    fn swing(&self) -> f64 {
+    fn block_motion(&self) -> f64 {
         1.0 + (self.pull / self.mu).sqrt().min(self.pull)
     }
 
@@ -136,8 +136,8 @@ impl Block {
         if self.work.get() > MOST_WORK {
             return None;
         }
-        let swing = self.swing();
-        let pace = |slopes: [f64; 3]| 1.0 / slopes.iter().fold(swing, |sum, slope| sum.hypot(*slope));
+        let block_motion = self.block_motion();
+        let pace = |slopes: [f64; 3]| 1.0 / slopes.iter().fold(block_motion, |sum, slope| sum.hypot(*slope));
         if here.slaved {
             let slope = |y: &[f64; 3]| {
                 self.work.set(self.work.get() + 1);

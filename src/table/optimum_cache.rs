@@ -3,7 +3,7 @@
 use std::sync::OnceLock;
 
 use super::memo::Memo;
-use super::{Job, Work};
+use super::{Job, RunStats};
 use crate::grid::{Point, Quantity};
 use crate::model::{Law, Transition};
 use crate::protocol::optimal::{self, Optimum};
@@ -24,9 +24,9 @@ pub fn transition(point: &Point) -> Transition {
 
 /// Bound of the error of the work of an optimal protocol that was found for `point`, by a second solve; NaN where that
 /// has none. The work is added.
-pub fn work_error(job: &Job<'_>, point: &Point, optimum: &Optimum, work: &mut Work) -> f64 {
-    let (bound, effort) = error::of_optimum(&transition(point), point[Quantity::Time], job.bounded, optimum);
-    *work += Work { optima: 1, ..Work::from(effort) };
+pub fn work_error(job: &Job<'_>, point: &Point, optimum: &Optimum, work: &mut RunStats) -> f64 {
+    let (bound, stats) = error::of_optimum(&transition(point), point[Quantity::Time], job.bounded, optimum);
+    *work += RunStats { optima: 1, ..RunStats::from(stats) };
     bound.unwrap_or(f64::NAN)
 }
 
@@ -54,9 +54,9 @@ pub fn compare(
     (tuple, point): (u64, &Point),
     (work_s, error): (f64, f64),
     bounded: bool,
-    work: &mut Work,
+    work: &mut RunStats,
 ) -> Comparison {
-    let (optimum, spent) = job.optima.get(tuple, point);
+    let (optimum, spent) = job.optimum_cache.get(tuple, point);
     *work += spent;
     let status = if optimum.status == Status::Infeasible { Status::Ok } else { optimum.status };
     let Some(least) = optimum.value else { return Comparison { optimum: status, ..Comparison::NONE } };
@@ -73,7 +73,7 @@ type Slot = OnceLock<Solved<Optimum>>;
 
 /// The store of optimal protocols, by tuple number.
 #[derive(Debug)]
-pub struct Optima {
+pub struct OptimumCache {
     slots: Slots,
     bounded: bool,
     rtol: f64,
@@ -87,32 +87,32 @@ enum Slots {
     Sparse(Memo<u64, Solved<Optimum>>),
 }
 
-impl Optima {
+impl OptimumCache {
     /// Most tuples that are kept over a whole run (about 100 MB); a grid of more keeps none beyond its part.
     pub const MOST_KEPT: u64 = 1 << 20;
 
     /// A store for `tuples` different transitions and times, each solved to `rtol`, with `v >= 1` where `bounded`.
-    pub fn new(tuples: u64, bounded: bool, rtol: f64) -> Optima {
-        Optima::among(tuples, tuples, bounded, rtol)
+    pub fn new(tuples: u64, bounded: bool, rtol: f64) -> OptimumCache {
+        OptimumCache::among(tuples, tuples, bounded, rtol)
     }
 
     /// The same where their numbers lie below `span`, most of which may not occur.
-    pub fn among(tuples: u64, span: u64, bounded: bool, rtol: f64) -> Optima {
+    pub fn among(tuples: u64, span: u64, bounded: bool, rtol: f64) -> OptimumCache {
         let slots = if span > Self::MOST_KEPT && tuples <= Self::MOST_KEPT {
             Slots::Sparse(Memo::default())
         } else {
             let kept = if span <= Self::MOST_KEPT { span as usize } else { 0 };
             Slots::Dense(std::iter::repeat_with(OnceLock::new).take(kept).collect())
         };
-        Optima { slots, bounded, rtol }
+        OptimumCache { slots, bounded, rtol }
     }
 
     /// The optimal protocol of tuple number `tuple`, which `point` belongs to; the work is that of this call alone.
-    pub fn get(&self, tuple: u64, point: &Point) -> (Solved<Optimum>, Work) {
-        let mut work = Work::default();
+    pub fn get(&self, tuple: u64, point: &Point) -> (Solved<Optimum>, RunStats) {
+        let mut work = RunStats::default();
         let mut solve = || {
             let solved = optimal::solve(&transition(point), point[Quantity::Time], self.bounded, self.rtol);
-            work = Work { optima: 1, ..Work::from(solved.effort) };
+            work = RunStats { optima: 1, ..RunStats::from(solved.stats) };
             solved
         };
         let solved = match &self.slots {

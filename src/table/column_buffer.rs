@@ -9,17 +9,17 @@ use crate::protocol::Status;
 ///
 /// A missing number is NaN in here, and null outside: no solver returns NaN as a result. A label is the index of its word, a flag 1 or 0.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Sheet {
+pub struct ColumnBuffer {
     /// The columns that were asked for, in their order.
     pub columns: Vec<Vec<f64>>,
     /// The status of each row.
     pub status: Vec<Status>,
 }
 
-impl Sheet {
+impl ColumnBuffer {
     /// A sheet of `columns` columns and no row.
-    pub fn new(columns: usize) -> Sheet {
-        Sheet { columns: vec![Vec::new(); columns], status: Vec::new() }
+    pub fn new(columns: usize) -> ColumnBuffer {
+        ColumnBuffer { columns: vec![Vec::new(); columns], status: Vec::new() }
     }
 
     /// Makes it `rows` rows long, for another part; what the cells hold then means nothing.
@@ -31,19 +31,19 @@ impl Sheet {
 
 /// Which columns of a table are asked for.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Selection(Vec<usize>);
+pub struct Projection(Vec<usize>);
 
-impl Selection {
+impl Projection {
     /// The columns of these indices, in the order of the table.
-    pub fn new(mut indices: Vec<usize>) -> Selection {
+    pub fn new(mut indices: Vec<usize>) -> Projection {
         indices.sort_unstable();
         indices.dedup();
-        Selection(indices)
+        Projection(indices)
     }
 
     /// Those of `columns` that are written where a spec names none.
-    pub fn usual(columns: &[Column]) -> Selection {
-        Selection((0..columns.len()).filter(|&index| !columns[index].optional).collect())
+    pub fn usual(columns: &[Column]) -> Projection {
+        Projection((0..columns.len()).filter(|&index| !columns[index].optional).collect())
     }
 
     /// The indices, ascending.
@@ -64,7 +64,7 @@ impl Selection {
 
 /// Work that was spent, exactly and the same on every machine.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub struct Work {
+pub struct RunStats {
     /// Optimal protocols solved for `W*`.
     pub optima: u64,
     /// Landscapes prepared.
@@ -85,8 +85,8 @@ pub struct Work {
     pub nodes: u64,
 }
 
-impl std::ops::AddAssign for Work {
-    fn add_assign(&mut self, other: Work) {
+impl std::ops::AddAssign for RunStats {
+    fn add_assign(&mut self, other: RunStats) {
         self.optima += other.optima;
         self.landscapes += other.landscapes;
         self.best += other.best;
@@ -99,18 +99,18 @@ impl std::ops::AddAssign for Work {
     }
 }
 
-impl std::iter::Sum for Work {
-    fn sum<I: Iterator<Item = Work>>(iter: I) -> Work {
-        iter.fold(Work::default(), |mut sum, work| {
+impl std::iter::Sum for RunStats {
+    fn sum<I: Iterator<Item = RunStats>>(iter: I) -> RunStats {
+        iter.fold(RunStats::default(), |mut sum, work| {
             sum += work;
             sum
         })
     }
 }
 
-impl From<crate::protocol::Effort> for Work {
-    fn from(effort: crate::protocol::Effort) -> Work {
-        Work { quadratures: effort.quadratures.into(), nodes: effort.nodes.into(), ..Work::default() }
+impl From<crate::protocol::SolverStats> for RunStats {
+    fn from(stats: crate::protocol::SolverStats) -> RunStats {
+        RunStats { quadratures: stats.quadratures.into(), nodes: stats.nodes.into(), ..RunStats::default() }
     }
 }
 

@@ -10,7 +10,7 @@ use parquet::file::metadata::{KeyValue, ParquetMetaData, ParquetMetaDataReader};
 use parquet::file::reader::ChunkReader;
 use sha2::{Digest, Sha256};
 
-use super::claims::page_headers;
+use super::metadata_limits::page_headers;
 
 /// The key of the checksum of footer and headers.
 const HEAD: &str = "slipsweep.head_sha256";

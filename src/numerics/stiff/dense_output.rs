@@ -6,7 +6,7 @@ use super::collocation::Collocation;
 ///
 /// At the end it is good to the order of the method, `2 S - 1`; between, to order `S`.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Piece<const N: usize, const S: usize> {
+pub struct DenseOutput<const N: usize, const S: usize> {
     /// Time at its start.
     pub t: f64,
     /// Duration.
@@ -19,7 +19,7 @@ pub struct Piece<const N: usize, const S: usize> {
     powers: [[f64; S]; N],
 }
 
-impl<const N: usize, const S: usize> Piece<N, S> {
+impl<const N: usize, const S: usize> DenseOutput<N, S> {
     /// The polynomial through `start` and through `start + change` at the nodes.
     #[inline(always)]
     pub(super) fn new(rule: &Collocation<S>, t: f64, h: f64, start: [f64; N], change: &[[f64; S]; N]) -> Self {
@@ -29,17 +29,17 @@ impl<const N: usize, const S: usize> Piece<N, S> {
             powers[r] = rule.powers.map(|row| row.iter().zip(&change[r]).map(|(p, c)| p * c).sum());
             end[r] += change[r][S - 1];
         }
-        Piece { t, h, start, end, powers }
+        DenseOutput { t, h, start, end, powers }
     }
 
     /// The polynomial with the coefficients `powers` of `u … u^S`.
     #[inline(always)]
     pub fn from_powers(t: f64, h: f64, start: [f64; N], powers: [[f64; S]; N]) -> Self {
-        let mut piece = Piece { t, h, start, end: start, powers };
+        let mut dense_output = DenseOutput { t, h, start, end: start, powers };
         for r in 0..N {
-            piece.end[r] = piece.value(r, 1.0);
+            dense_output.end[r] = dense_output.value(r, 1.0);
         }
-        piece
+        dense_output
     }
 
     /// The same polynomial between two shares of the step.
@@ -59,7 +59,7 @@ impl<const N: usize, const S: usize> Piece<N, S> {
             }
         }
         let start = std::array::from_fn(|r| self.value(r, from));
-        Piece::from_powers(self.t + from * self.h, (to - from) * self.h, start, powers)
+        DenseOutput::from_powers(self.t + from * self.h, (to - from) * self.h, start, powers)
     }
 
     /// Time at its end.

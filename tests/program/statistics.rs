@@ -5,7 +5,7 @@ use std::fs;
 use std::path::Path;
 use std::sync::atomic::AtomicU64;
 
-use slipsweep::dataset::{Cell, Digest, Folder, Look, Row, Survey, frame};
+use slipsweep::dataset::{Cell, Folder, Look, Row, Survey, TableStatistics, frame};
 use slipsweep::grid::Point;
 use slipsweep::protocol::Status;
 use slipsweep::sweep::Plan;
@@ -52,22 +52,22 @@ fn rows(folder: &Folder, table: &str, parts: u64) -> Vec<Row> {
 }
 
 /// Compares a digest with the rows, one by one.
-fn compare(name: &str, digest: &Digest, rows: &[Row]) {
+fn compare(name: &str, statistics: &TableStatistics, rows: &[Row]) {
     let table = table::find(name).expect("is a table");
     for status in Status::ALL {
         let count = rows.iter().filter(|row| word(at(row, "status")) == status.name()).count() as u64;
-        assert_eq!(digest.status[status as usize], count, "{name} {}", status.name());
+        assert_eq!(statistics.status[status as usize], count, "{name} {}", status.name());
     }
-    assert_eq!(digest.columns.len(), rows[0].len(), "{name}");
+    assert_eq!(statistics.columns.len(), rows[0].len(), "{name}");
     for column in table.columns().iter().filter(|column| !at(&rows[0], column.name).eq(&Cell::Missing)) {
         let cells: Vec<&Cell> = rows.iter().map(|row| at(row, column.name)).collect();
         let numbers: Vec<f64> = cells.iter().filter_map(|cell| number(cell)).collect();
-        if let Some(range) = digest.ranges.iter().find(|range| range.column == column.name) {
+        if let Some(range) = statistics.ranges.iter().find(|range| range.column == column.name) {
             let least = numbers.iter().copied().fold(f64::INFINITY, f64::min);
             let greatest = numbers.iter().copied().fold(f64::NEG_INFINITY, f64::max);
             assert_eq!((range.count, range.least, range.greatest), (numbers.len() as u64, least, greatest), "{name}");
         } else {
-            let (_, counts) = digest.words.iter().find(|(known, _)| known == column.name).expect("is counted");
+            let (_, counts) = statistics.words.iter().find(|(known, _)| known == column.name).expect("is counted");
             let mut expected = BTreeMap::new();
             for cell in cells.iter().filter(|cell| ***cell != Cell::Missing) {
                 *expected.entry(word(cell).to_owned()).or_insert(0) += 1;
@@ -77,7 +77,11 @@ fn compare(name: &str, digest: &Digest, rows: &[Row]) {
     }
     let cells = |row: &Row| row.iter().map(|(_, cell)| cell.clone()).collect::<Vec<_>>();
     let whole = (rows.len() <= 12).then(|| rows.iter().map(cells).collect::<Vec<_>>());
-    assert_eq!(digest.rows.as_ref().map(|rows| rows.iter().map(|row| row.cells.clone()).collect()), whole, "{name}");
+    assert_eq!(
+        statistics.rows.as_ref().map(|rows| rows.iter().map(|row| row.cells.clone()).collect()),
+        whole,
+        "{name}"
+    );
     let is_counted = |row: &&Row| word(at(row, "status")) == "ok" && word(at(row, "family")) != "step";
     let mut least: Vec<(String, &Row)> = Vec::new();
     for row in rows.iter().filter(is_counted) {
@@ -100,7 +104,7 @@ fn compare(name: &str, digest: &Digest, rows: &[Row]) {
         least.truncate(1);
     }
     let least: Vec<_> = least.into_iter().map(|(_, row)| cells(row)).collect();
-    assert_eq!(digest.least().map(|row| row.cells.clone()).collect::<Vec<_>>(), least, "{name}");
+    assert_eq!(statistics.least().map(|row| row.cells.clone()).collect::<Vec<_>>(), least, "{name}");
     assert_eq!(least.is_empty(), !["gap", "shortcut"].contains(&name), "{name}");
     let mut predicted = BTreeMap::new();
     for (prediction, row) in
@@ -116,8 +120,8 @@ fn compare(name: &str, digest: &Digest, rows: &[Row]) {
         }
     }
     let predicted = predicted.into_iter().map(|((predicted, found), rows)| (predicted, found, rows));
-    assert_eq!(digest.predicted, predicted.collect::<Vec<_>>(), "{name}");
-    assert_eq!(digest.predicted.is_empty(), name != "step_response", "{name}");
+    assert_eq!(statistics.predicted, predicted.collect::<Vec<_>>(), "{name}");
+    assert_eq!(statistics.predicted.is_empty(), name != "step_response", "{name}");
 }
 
 fn survey(out: &Path, sweep: &slipsweep::sweep::Sweep) -> Survey {
@@ -133,9 +137,9 @@ fn footers_hold_what_the_rows_do() {
         let outcome = run(&sweep, folder.path(), 2);
         let at = Folder::new(folder.path(), &sweep.name);
         let surveyed = survey(folder.path(), &sweep);
-        for (table, digest) in surveyed.tables.iter().zip(&outcome.digests) {
-            assert_eq!(table.digest, *digest, "{}", table.name);
-            compare(&table.name, digest, &rows(&at, &table.name, table.parts));
+        for (table, statistics) in surveyed.tables.iter().zip(&outcome.digests) {
+            assert_eq!(table.statistics, *statistics, "{}", table.name);
+            compare(&table.name, statistics, &rows(&at, &table.name, table.parts));
         }
         // What is kept counts as what is made.
         for table in &surveyed.tables {
@@ -172,11 +176,11 @@ fn digests_add_up_in_any_order() {
     let sweep = sweep(folder.path(), MANY, "[tables.gap]\n[tables.optimal]\n");
     run(&sweep, folder.path(), 2);
     let at = Folder::new(folder.path(), "test");
-    let parts: Vec<Digest> = (0..2)
+    let parts: Vec<TableStatistics> = (0..2)
         .map(|part| {
             let manifest = Plan::new(&sweep).manifest(&sweep);
             match at.state(&manifest, "gap", part, Look::Whole) {
-                slipsweep::dataset::State::There { digest } => *digest,
+                slipsweep::dataset::State::There { statistics } => *statistics,
                 state => panic!("{state:?}"),
             }
         })
@@ -184,6 +188,6 @@ fn digests_add_up_in_any_order() {
     let [first, second] = [&parts[0], &parts[1]];
     assert_ne!(first, second);
     assert_eq!(first.clone().merge(second.clone()), second.clone().merge(first.clone()));
-    assert_eq!(Digest::default().merge(first.clone()), *first);
-    assert_eq!(first.clone().merge(Digest::default()), *first);
+    assert_eq!(TableStatistics::default().merge(first.clone()), *first);
+    assert_eq!(first.clone().merge(TableStatistics::default()), *first);
 }

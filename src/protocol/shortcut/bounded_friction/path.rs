@@ -13,7 +13,7 @@ use super::panel::{Panel, collocate};
 use crate::model::Transition;
 use crate::numerics::elementary::{exp, exp_m1, ln, ln_1p};
 use crate::numerics::radau::{NODES, Radau, radau};
-use crate::protocol::Effort;
+use crate::protocol::SolverStats;
 use crate::protocol::shortcut::Case;
 
 /// The end from which a place is measured, in the direction of integration.
@@ -58,7 +58,7 @@ pub(super) enum Measure {
 
 /// A member of the family for one `alpha_3`.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Course {
+pub(super) struct FrictionPath {
     pub alpha: f64,
     pub forward: bool,
     pub t_f: f64,
@@ -97,7 +97,7 @@ pub(super) struct End {
 
 /// What a pass has to tell the work to.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Work {
+pub(super) struct WorkSums {
     /// Share of the work that quadrature may leave.
     pub accuracy: f64,
     /// The work that is to be expected; 0 where it is not known.
@@ -133,8 +133,8 @@ pub(super) const MOST_EXPONENT: f64 = 400.0;
 /// Most panels of one pass: far more than a course takes that is not lost.
 const MOST_PANELS: usize = 4000;
 
-impl Course {
-    pub fn new(case: &Case, gaps: (f64, f64), ln_r: f64, log_ratio: f64, measure: Measure) -> Course {
+impl FrictionPath {
+    pub fn new(case: &Case, gaps: (f64, f64), ln_r: f64, log_ratio: f64, measure: Measure) -> FrictionPath {
         let Transition { law, v_i, v_f } = case.transition;
         let ratio = law.b / law.a;
         let anchor = |v: f64, gap: f64, l: f64, other: f64| {
@@ -149,7 +149,7 @@ impl Course {
         let (kappa, size) = ((law.a - law.b) / law.a, log_ratio.abs().min(1.0));
         let bound = if case.tau_ceiling.is_finite() { case.tau_ceiling.abs().max(1.0) } else { 0.0 };
         let blur = bound / gaps.0 * ((law.a - law.b) * log_ratio).abs() / gaps.1;
-        Course { alpha: 0.0, forward, t_f: case.t_f, a: law.a, ratio, kappa, size, blur, measure, anchors }
+        FrictionPath { alpha: 0.0, forward, t_f: case.t_f, a: law.a, ratio, kappa, size, blur, measure, anchors }
     }
 
     /// A change of `alpha_3` that counts: about a quarter of it is the change of `ln v`.
@@ -179,24 +179,24 @@ impl Course {
     }
 
     /// The course with another `alpha_3`.
-    pub fn with(self, alpha: f64) -> Course {
-        Course { alpha, ..self }
+    pub fn with(self, alpha: f64) -> FrictionPath {
+        FrictionPath { alpha, ..self }
     }
 
     /// The same course, integrated the other way.
-    pub fn reversed(self) -> Course {
+    pub fn reversed(self) -> FrictionPath {
         let [first, last] = self.anchors;
-        Course { forward: !self.forward, anchors: [last, first], ..self }
+        FrictionPath { forward: !self.forward, anchors: [last, first], ..self }
     }
 
     /// The same course, integrated forwards or not.
-    pub fn towards(self, forward: bool) -> Course {
+    pub fn towards(self, forward: bool) -> FrictionPath {
         if self.forward == forward { self } else { self.reversed() }
     }
 
     /// The course with another measure.
-    pub fn measured_by(self, measure: Measure) -> Course {
-        Course { measure, ..self }
+    pub fn measured_by(self, measure: Measure) -> FrictionPath {
+        FrictionPath { measure, ..self }
     }
 
     /// What is known at an end.
@@ -353,19 +353,19 @@ impl Course {
     pub fn pass(
         &self,
         tolerances: (f64, f64),
-        work: Option<Work>,
-        effort: &mut Effort,
-        mut visit: impl FnMut(&Course, &Panel),
+        work: Option<WorkSums>,
+        stats: &mut SolverStats,
+        mut visit: impl FnMut(&FrictionPath, &Panel),
     ) -> Result<End, Stop> {
         if !matches!(self.measure, Measure::Meeting { .. }) {
-            return self.leg(None, tolerances, work, effort, |panel| visit(self, panel));
+            return self.leg(None, tolerances, work, stats, |panel| visit(self, panel));
         }
         let other = self.reversed();
         let (side, near) = self.deepest().ok_or(Stop::Little)?;
-        let first = self.leg(Some((side, near)), tolerances, work, effort, |panel| visit(self, panel))?;
+        let first = self.leg(Some((side, near)), tolerances, work, stats, |panel| visit(self, panel))?;
         let opposite = if side == Side::Start { Side::End } else { Side::Start };
-        let second = other.leg(Some((opposite, near)), tolerances, work, effort, |panel| visit(&other, panel))?;
-        let theta = |course: &Course, side, end: &End| exp(end.w) / course.anchor(side).v;
+        let second = other.leg(Some((opposite, near)), tolerances, work, stats, |panel| visit(&other, panel))?;
+        let theta = |path: &FrictionPath, side, end: &End| exp(end.w) / path.anchor(side).v;
         Ok(End {
             w: 0.0,
             turn: theta(self, side, &first) * first.turn - theta(&other, opposite, &second) * second.turn,
@@ -395,8 +395,8 @@ impl Course {
         &self,
         until: Option<(Side, f64)>,
         (tolerance, loosest): (f64, f64),
-        work: Option<Work>,
-        effort: &mut Effort,
+        work: Option<WorkSums>,
+        stats: &mut SolverStats,
         mut visit: impl FnMut(&Panel),
     ) -> Result<End, Stop> {
         let rule = radau();
@@ -411,7 +411,7 @@ impl Course {
         let last_layer = SEEN * self.thin(Side::End);
         let settles = work.map_or(0.0, |work| self.settles(work.accuracy));
         let grows = until.is_some() && self.kappa * self.pace(self.anchor(Side::Start)) < 0.0;
-        effort.quadratures += 1;
+        stats.quadratures += 1;
         for (side, from, to, quiet) in self.stretches(until) {
             let anchor = self.anchor(side);
             if side != before {
@@ -447,7 +447,7 @@ impl Course {
                     return Err(if lost { self.lost() } else { Stop::GaveUp });
                 }
                 panels += 1;
-                effort.nodes += NODES as u32;
+                stats.nodes += NODES as u32;
                 let forgotten = match side {
                     _ if until.is_some() => 0.0,
                     Side::Start => damping * layer - FALL - self.size,
@@ -468,7 +468,7 @@ impl Course {
                 let mut excess = end_lacks(found.error / size) * size / tolerance;
                 excess = excess.max(end_lacks(lack) / relative);
                 let friction = self.friction(side, near).abs().max(self.friction(side, next).abs());
-                if let Some(Work { accuracy, expected }) = work {
+                if let Some(WorkSums { accuracy, expected }) = work {
                     let expected = expected.max(end.work + friction * found.slid).max(f64::MIN_POSITIVE);
                     excess = excess.max(end_lacks(friction * found.lack / expected / accuracy));
                 }

@@ -11,7 +11,7 @@ use std::sync::Arc;
 use super::axis::Axis;
 use super::block::{Block, Digit, Digits, Label};
 use super::quantity::{Point, Quantity, Scale};
-use super::sieve::Sieve;
+use super::row_filter::RowFilter;
 use super::view::{Segment, View};
 use crate::model::Units;
 
@@ -54,29 +54,31 @@ impl Grid {
     }
 
     /// The rows of a table that depends on `quantities`.
-    pub fn project(&self, quantities: &[Quantity]) -> Result<Projection, TooMany> {
+    pub fn project(&self, quantities: &[Quantity]) -> Result<RowIndex, TooMany> {
         let mut stretches = Vec::new();
         let (mut rows, mut raw): (u64, u64) = (0, 0);
         for (number, block) in self.blocks.iter().enumerate() {
             let factors = block.factors_of(&block.roots(quantities));
             let digits = Digits::new(block, &factors).ok_or(TooMany::Rows)?;
             raw = raw.checked_add(digits.rows).ok_or(TooMany::Rows)?;
-            let sieve = match &block.condition {
-                Some(condition) => Some(Sieve::new(block, &digits, condition).ok_or(TooMany::Combinations(number))?),
+            let row_filter = match &block.condition {
+                Some(condition) => {
+                    Some(RowFilter::new(block, &digits, condition).ok_or(TooMany::Combinations(number))?)
+                }
                 None => None,
             };
-            let sieve = sieve.filter(|sieve| !sieve.keeps_all()).map(Arc::new);
-            let kept = sieve.as_ref().map_or(digits.rows, |sieve| sieve.rows());
-            stretches.push(Stretch { block: block.clone(), digits, sieve, first: rows, rows: kept });
+            let row_filter = row_filter.filter(|row_filter| !row_filter.keeps_all()).map(Arc::new);
+            let kept = row_filter.as_ref().map_or(digits.rows, |row_filter| row_filter.rows());
+            stretches.push(Stretch { block: block.clone(), digits, row_filter, first: rows, rows: kept });
             rows += kept;
         }
-        Ok(Projection { stretches, rows, dropped: raw - rows })
+        Ok(RowIndex { stretches, rows, dropped: raw - rows })
     }
 }
 
 /// The rows of a table.
 #[derive(Debug, Clone)]
-pub struct Projection {
+pub struct RowIndex {
     stretches: Vec<Stretch>,
     rows: u64,
     dropped: u64,
@@ -89,7 +91,7 @@ pub struct Stretch {
     pub block: Arc<Block>,
     /// The digits of its rows, kept or not.
     pub digits: Digits,
-    sieve: Option<Arc<Sieve>>,
+    row_filter: Option<Arc<RowFilter>>,
     first: u64,
     rows: u64,
 }
@@ -123,7 +125,7 @@ impl Stretch {
     }
 }
 
-impl Projection {
+impl RowIndex {
     /// Number of rows.
     pub fn rows(&self) -> u64 {
         self.rows
@@ -153,8 +155,8 @@ impl Projection {
             if start >= end {
                 continue;
             }
-            let ranges = match &stretch.sieve {
-                Some(sieve) => sieve.ranges(start..end),
+            let ranges = match &stretch.row_filter {
+                Some(row_filter) => row_filter.ranges(start..end),
                 None => std::iter::once(start..end).collect(),
             };
             let mut first = stretch.first + start;
@@ -196,7 +198,7 @@ impl Projection {
     pub fn distinct(&self, quantities: &[Quantity], most: u64) -> u64 {
         let tuples = self.tuples(quantities);
         let repeats = tuples.repeat();
-        if self.stretches.iter().all(|stretch| stretch.sieve.is_none()) {
+        if self.stretches.iter().all(|stretch| stretch.row_filter.is_none()) {
             tuples.span
         } else if repeats && self.rows <= most {
             let seen: HashSet<u64> =

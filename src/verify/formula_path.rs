@@ -19,7 +19,7 @@ pub enum Formula {
 pub type State = [f64; 3];
 
 /// A protocol between two steady states.
-pub struct Course {
+pub struct FormulaPath {
     pub problem: Transition,
     pub t_f: f64,
     pub formula: Formula,
@@ -27,7 +27,7 @@ pub struct Course {
     pub backward: bool,
 }
 
-impl Course {
+impl FormulaPath {
     pub fn velocity(&self, y: &State) -> f64 {
         let law = self.problem.law;
         match &self.formula {
@@ -83,15 +83,15 @@ impl Course {
 }
 
 /// The parameter that would bring theta to the target, from the distance by which one of `alpha` misses it and from how
-/// far a slightly different one gets; `course(alpha)` makes a protocol.
-pub fn arriving(alpha: f64, end: f64, target: f64, course: impl Fn(f64) -> Course) -> f64 {
+/// far a slightly different one gets; `formula_path(alpha)` makes a protocol.
+pub fn arriving(alpha: f64, end: f64, target: f64, formula_path: impl Fn(f64) -> FormulaPath) -> f64 {
     const NUDGE: f64 = 1e-6;
     // What the integrator leaves: a long protocol forgets its parameter, which then cannot be told from where it ends.
     const NOISE: f64 = 3e-11;
     if (end - target).abs() <= NOISE {
         return alpha;
     }
-    let moved = course(alpha * (1.0 + NUDGE)).states().and_then(|states| Some(states.last()?[0] - end));
+    let moved = formula_path(alpha * (1.0 + NUDGE)).states().and_then(|states| Some(states.last()?[0] - end));
     let share = moved.map_or(f64::INFINITY, |moved| NUDGE * (end - target) / moved);
     alpha * (1.0 - share)
 }

@@ -31,7 +31,7 @@ const NEGLIGIBLE: f64 = 1e-14;
 
 /// The four numbers that the response to a step depends on, beside where it starts.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Slider {
+pub struct ScaledBlock {
     /// Direct effect `a > 0`.
     pub a: f64,
     /// Effect of the contact lifetime `b >= 0`.
@@ -42,7 +42,7 @@ pub struct Slider {
     pub k: f64,
 }
 
-impl Slider {
+impl ScaledBlock {
     /// Steady sliding at `e^x v_f`, held there until now by the spring.
     pub fn steady(&self, x: f64) -> State {
         [(self.a - self.b) * x, -x, x]
@@ -127,7 +127,7 @@ impl Rates {
     }
 }
 
-impl System<3> for Slider {
+impl System<3> for ScaledBlock {
     #[inline(always)]
     fn linearise<const L: usize>(&self, points: &Points<3, L>) -> Linearised<3, L> {
         let mut at = Linearised { residual: [[0.0; L]; 3], mass: [[1.0; L]; 3], jacobian: [[[0.0; L]; 3]; 3] };

@@ -3,7 +3,7 @@
 use std::sync::OnceLock;
 
 /// Panics if the environment variable `SLIPSWEEP_PANIC` is the number of one of `rows`.
-pub fn strike(mut rows: impl Iterator<Item = u64>) {
+pub fn panic_at(mut rows: impl Iterator<Item = u64>) {
     if !cfg!(debug_assertions) {
         return;
     }

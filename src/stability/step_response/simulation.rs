@@ -1,13 +1,13 @@
 //! A response followed to its end at finer and finer steps, until none of its numbers changes.
 
-use super::fate::{Linear, MAX_STEPS, follow_once, step_error};
+use super::long_term::{Linear, MAX_STEPS, follow_once, step_error};
 use super::orbit::Extremum;
-use super::slider::Slider;
+use super::scaled_block::ScaledBlock;
 use crate::numerics::elementary::exp;
 
 /// The end of a response.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Fate {
+pub enum LongTermBehaviour {
     /// Steady sliding.
     Settled {
         /// Time after which the velocity stays within [`SETTLED`](super::SETTLED), in `l/v_f`; NaN if unknown.
@@ -30,9 +30,9 @@ pub enum Fate {
 
 /// A response that was followed to its end.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Course {
+pub struct Simulation {
     /// Its end.
-    pub fate: Fate,
+    pub long_term: LongTermBehaviour,
     /// Its fastest moment since `v = v_f` was first met, if there was one; its time is NaN if unknown.
     pub high: Option<Extremum>,
     /// Its slowest.
@@ -71,33 +71,42 @@ pub(super) const VANISHING: f64 = -1000.0;
 /// Follows the response that starts from steady sliding at `e^x v_f`, `x` not 0, with numbers good to `rtol`: at finer and
 /// finer steps, until nothing changes by more than that from one run to the next. Where that does not happen it is
 /// `Undecided`, or in doubt in the numbers that change.
-pub fn follow(slider: &Slider, linear: Linear, x: f64, rtol: f64) -> Course {
+pub fn follow(slider: &ScaledBlock, linear: Linear, x: f64, rtol: f64) -> Simulation {
     if slider.inertia == 0.0 && slider.b > slider.a && !linear.stable {
         // Below the critical stiffness the potential of theory.md grows without bound; at it nothing changes.
-        let fate = if slider.is_critical() { Fate::Undecided } else { Fate::Ends };
-        return Course { fate, high: None, low: None, t: 0.0, steps: 0, doubts: Doubts::default() };
+        let long_term = if slider.is_critical() { LongTermBehaviour::Undecided } else { LongTermBehaviour::Ends };
+        return Simulation { long_term, high: None, low: None, t: 0.0, steps: 0, doubts: Doubts::default() };
     }
     if !is_checked(slider, x) {
-        return Course { fate: Fate::Undecided, high: None, low: None, t: 0.0, steps: 0, doubts: Doubts::default() };
+        return Simulation {
+            long_term: LongTermBehaviour::Undecided,
+            high: None,
+            low: None,
+            t: 0.0,
+            steps: 0,
+            doubts: Doubts::default(),
+        };
     }
-    let mut course = follow_once(slider, linear, x, rtol, ACCURACIES[0]);
+    let mut simulation = follow_once(slider, linear, x, rtol, ACCURACIES[0]);
     let mut known = false;
     for shares in ACCURACIES.windows(2) {
         let [coarse, fine] = [shares[0], shares[1]].map(|share| step_error(rtol, share));
         // Finer steps would be more, and the same steps lead to the same.
-        if (course.fate == Fate::Undecided && course.steps >= MAX_STEPS) || fine > 0.5 * coarse {
+        if (simulation.long_term == LongTermBehaviour::Undecided && simulation.steps >= MAX_STEPS)
+            || fine > 0.5 * coarse
+        {
             break;
         }
         let finer = follow_once(slider, linear, x, rtol, shares[1]);
-        let doubts = course.compared(&finer, rtol.max(ROUNDED));
-        course = Course { steps: course.steps + finer.steps, doubts: doubts.unwrap_or_default(), ..finer };
+        let doubts = simulation.compared(&finer, rtol.max(ROUNDED));
+        simulation = Simulation { steps: simulation.steps + finer.steps, doubts: doubts.unwrap_or_default(), ..finer };
         // A number that is still in doubt at a third run seldom becomes clear.
         if doubts.is_some_and(|doubts| known || doubts == Doubts::default()) {
-            return course;
+            return simulation;
         }
         known = doubts.is_some();
     }
-    if known { course } else { Course { fate: Fate::Undecided, ..course } }
+    if known { simulation } else { Simulation { long_term: LongTermBehaviour::Undecided, ..simulation } }
 }
 
 /// How far beyond the physical domain responses are followed, a factor of each bound. Chosen: the random sample of
@@ -105,7 +114,7 @@ pub fn follow(slider: &Slider, linear: Linear, x: f64, rtol: f64) -> Course {
 const BEYOND: f64 = 1e6;
 
 /// Whether a response lies in the physical domain of docs/accuracy.md, or not far from it.
-fn is_checked(slider: &Slider, x: f64) -> bool {
+fn is_checked(slider: &ScaledBlock, x: f64) -> bool {
     let near = |value: f64, [least, greatest]: [f64; 2]| (least / BEYOND..=greatest * BEYOND).contains(&value);
     near(slider.a, [1e-3, 0.3])
         && slider.b <= BEYOND * 20.0 * slider.a
@@ -114,36 +123,40 @@ fn is_checked(slider: &Slider, x: f64) -> bool {
         && near(exp(x), [1e-6, 1e6])
 }
 
-impl Course {
+impl Simulation {
     /// Fastest moment on the way, if it is one: what is only approached is not.
     pub fn peak(&self, rtol: f64) -> Option<Extremum> {
-        let last = if let Fate::Cycle { high, .. } = self.fate { high } else { 0.0 };
+        let last = if let LongTermBehaviour::Cycle { high, .. } = self.long_term { high } else { 0.0 };
         self.high.filter(|high| high.x > last + rtol)
     }
 
     /// `ln(v/v_f)` at its slowest and fastest, the end included.
     pub fn range(&self) -> [f64; 2] {
-        let [low, high] = if let Fate::Cycle { high, low, .. } = self.fate { [low, high] } else { [0.0; 2] };
+        let [low, high] =
+            if let LongTermBehaviour::Cycle { high, low, .. } = self.long_term { [low, high] } else { [0.0; 2] };
         let reached = |extremum: Option<Extremum>| extremum.map_or(0.0, |extremum| extremum.x);
         [low.min(reached(self.low)), high.max(reached(self.high))]
     }
 
     /// Which of its numbers differ by more than `rtol` from those of another; `None` if the end or the peak does.
-    fn compared(&self, other: &Course, rtol: f64) -> Option<Doubts> {
+    fn compared(&self, other: &Simulation, rtol: f64) -> Option<Doubts> {
         let near = |x: f64, y: f64| (x - y).abs() <= rtol;
         let alike = |x: f64, y: f64| near(x / y, 1.0) || x == y;
         let slow = |x: f64, y: f64| near(x, y) || (x < VANISHING && y < VANISHING);
         let mut doubts = other.doubts;
-        let ends = match (self.fate, other.fate) {
-            (Fate::Settled { time }, Fate::Settled { time: other }) => {
+        let ends = match (self.long_term, other.long_term) {
+            (LongTermBehaviour::Settled { time }, LongTermBehaviour::Settled { time: other }) => {
                 doubts.settling_time |= !alike(time, other);
                 true
             }
-            (Fate::Cycle { period, high, low }, Fate::Cycle { period: other, high: top, low: bottom }) => {
+            (
+                LongTermBehaviour::Cycle { period, high, low },
+                LongTermBehaviour::Cycle { period: other, high: top, low: bottom },
+            ) => {
                 doubts.cycle_trough |= !slow(low, bottom);
                 alike(period, other) && near(high, top)
             }
-            (Fate::Undecided, Fate::Undecided) => return Some(doubts),
+            (LongTermBehaviour::Undecided, LongTermBehaviour::Undecided) => return Some(doubts),
             _ => false,
         };
         let ([low, high], [bottom, top]) = (self.range(), other.range());

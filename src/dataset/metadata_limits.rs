@@ -54,14 +54,16 @@ pub fn check_footer(file: &impl ChunkReader) -> Result<(), ParquetError> {
         return Err(excess("a footer", length as i64, MOST_OF_FOOTER as i64, "bytes"));
     }
     let footer = file.get_bytes(start, length)?;
-    let (mut elements, mut claims) = (0, Ok(()));
+    let (mut elements, mut metadata_limits) = (0, Ok(()));
     let end = walk(&footer, kind_in_footer, &mut |path, value| match path {
         [2] => elements = value,
-        [2, 5] if !(0..=elements).contains(&value) => claims = Err(excess("a node", value, elements, "children")),
-        [4] if value > MOST_GROUPS => claims = Err(excess("a file", value, MOST_GROUPS, "groups of rows")),
+        [2, 5] if !(0..=elements).contains(&value) => {
+            metadata_limits = Err(excess("a node", value, elements, "children"))
+        }
+        [4] if value > MOST_GROUPS => metadata_limits = Err(excess("a file", value, MOST_GROUPS, "groups of rows")),
         _ => {}
     });
-    end.ok_or_else(|| damaged("footer")).and(claims)
+    end.ok_or_else(|| damaged("footer")).and(metadata_limits)
 }
 
 /// Whether no page takes more than memory has, and none is encoded so that its length is known only when it is decoded.
@@ -100,19 +102,19 @@ pub fn page_headers(
 
 /// The bytes of a header, and from its start to the end of its page; `None` if the header goes on beyond `bytes`.
 fn check_page(bytes: &[u8]) -> Result<Option<(usize, u64)>, ParquetError> {
-    let (mut compressed, mut claims) = (None, Ok(()));
+    let (mut compressed, mut metadata_limits) = (None, Ok(()));
     let header = walk(bytes, |_| None, &mut |path, value| match path {
-        [2] if value > MOST_OF_PAGE => claims = Err(excess("a page", value, MOST_OF_PAGE, "bytes")),
+        [2] if value > MOST_OF_PAGE => metadata_limits = Err(excess("a page", value, MOST_OF_PAGE, "bytes")),
         [3] => compressed = u64::try_from(value).ok(),
-        [5 | 7 | 8, 1] if value > MOST_VALUES => claims = Err(excess("a page", value, MOST_VALUES, "values")),
+        [5 | 7 | 8, 1] if value > MOST_VALUES => metadata_limits = Err(excess("a page", value, MOST_VALUES, "values")),
         [5 | 7, 2] | [8, 4] if matches!(value, 6 | 7) => {
-            claims = Err(ParquetError::General("words are encoded as differences".to_owned()));
+            metadata_limits = Err(ParquetError::General("words are encoded as differences".to_owned()));
         }
         _ => {}
     });
     let Some(header) = header else { return Ok(None) };
     let compressed = compressed.ok_or_else(|| damaged("page header"))?;
-    claims.map(|()| (header as u64).checked_add(compressed).map(|page| (header, page)))
+    metadata_limits.map(|()| (header as u64).checked_add(compressed).map(|page| (header, page)))
 }
 
 fn excess(what: &str, found: i64, most: i64, unit: &str) -> ParquetError {

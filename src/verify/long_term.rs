@@ -1,6 +1,6 @@
 //! What becomes of a block after a step, from following it cycle by cycle, and from the cycle that closes.
 
-use super::swing::{Block, Event, Here};
+use super::block_motion::{Block, Event, Here};
 
 /// `ln(v/v_f)` at the edges of the band of settled velocities, 1 % about `v_f`.
 fn band() -> [f64; 2] {
@@ -31,7 +31,7 @@ pub struct Cycle {
 
 /// The end that was found.
 #[derive(Debug, Clone, Copy)]
-pub enum Fate {
+pub enum LongTermBehaviour {
     /// Since when it is settled, how fast `ln v` changed then, and how close an earlier turn came to the edge of the band.
     Settled {
         time: f64,
@@ -45,8 +45,8 @@ pub enum Fate {
 
 /// A response as far as it was followed.
 #[derive(Debug, Clone, Copy)]
-pub struct Course {
-    pub fate: Result<Fate, &'static str>,
+pub struct Simulation {
+    pub long_term: Result<LongTermBehaviour, &'static str>,
     /// Extremes since `v = v_f` was first met.
     pub high: Option<Extremum>,
     pub low: Option<Extremum>,
@@ -76,10 +76,13 @@ const SLOW: f64 = 0.8;
 const TOO_LONG: &str = "responses too long or too stiff for an explicit integrator";
 
 /// Follows the response from `e^x v_f` to its end, whose numbers are to be told to `rtol`.
-pub fn follow(block: &Block, stable: bool, x: f64, rtol: f64) -> Course {
+pub fn follow(block: &Block, stable: bool, x: f64, rtol: f64) -> Simulation {
     let quiet = QUIET.min(UNTOLD * rtol);
-    let mut watch =
-        Watch { course: Course { fate: Err(TOO_LONG), high: None, low: None, t: 0.0 }, since: None, edge: 1.0 };
+    let mut watch = Watch {
+        simulation: Simulation { long_term: Err(TOO_LONG), high: None, low: None, t: 0.0 },
+        since: None,
+        edge: 1.0,
+    };
     let edges = band();
     let inside = |x: f64| x > edges[0] && x < edges[1];
     let levels = [edges[0], 0.0, edges[1]];
@@ -93,12 +96,12 @@ pub fn follow(block: &Block, stable: bool, x: f64, rtol: f64) -> Course {
     let mut next_try = 2;
     let mut found: Option<(Cycle, usize)> = None;
     loop {
-        let Some((end, events)) = block.leg(here, &levels) else { return watch.course };
+        let Some((end, events)) = block.leg(here, &levels) else { return watch.simulation };
         here = end;
-        watch.course.t = here.t;
+        watch.simulation.t = here.t;
         if block.mu == 0.0 && here.x > ENDLESS {
-            watch.course.fate = Ok(Fate::Infinite);
-            return watch.course;
+            watch.simulation.long_term = Ok(LongTermBehaviour::Infinite);
+            return watch.simulation;
         }
         for event in events {
             match event {
@@ -106,7 +109,7 @@ pub fn follow(block: &Block, stable: bool, x: f64, rtol: f64) -> Course {
                     let distance = edges.iter().map(|edge| (here.x - edge).abs()).fold(f64::INFINITY, f64::min);
                     watch.edge = watch.edge.min(distance);
                     (high, low) = (high.max(here.x), low.min(here.x));
-                    let kept = if top { &mut watch.course.high } else { &mut watch.course.low };
+                    let kept = if top { &mut watch.simulation.high } else { &mut watch.simulation.low };
                     let further = |kept: &Extremum| if top { here.x > kept.x } else { here.x < kept.x };
                     if met && kept.as_ref().is_none_or(further) {
                         let flatness = if top { block.flatness(&here).unwrap_or(f64::INFINITY) } else { 0.0 };
@@ -131,8 +134,8 @@ pub fn follow(block: &Block, stable: bool, x: f64, rtol: f64) -> Course {
                         if let Some((cycle, since)) = found {
                             let far = (here.p.ln() - cycle.section[0]).hypot(here.y - cycle.section[1]);
                             if far < ARRIVED || cycle.share > SLOW || sections.len() > since + MOST_LEFT {
-                                watch.course.fate = Ok(Fate::Cycle(cycle));
-                                return watch.course;
+                                watch.simulation.long_term = Ok(LongTermBehaviour::Cycle(cycle));
+                                return watch.simulation;
                             }
                         }
                     }
@@ -150,7 +153,7 @@ pub fn follow(block: &Block, stable: bool, x: f64, rtol: f64) -> Course {
 }
 
 struct Watch {
-    course: Course,
+    simulation: Simulation,
     /// The last entry into the band and the speed there; none outside.
     since: Option<(f64, f64)>,
     /// How close a turn came to an edge of the band.
@@ -158,11 +161,11 @@ struct Watch {
 }
 
 impl Watch {
-    fn settled(mut self) -> Course {
+    fn settled(mut self) -> Simulation {
         if let Some((time, speed)) = self.since {
-            self.course.fate = Ok(Fate::Settled { time, speed, margin: self.edge });
+            self.simulation.long_term = Ok(LongTermBehaviour::Settled { time, speed, margin: self.edge });
         }
-        self.course
+        self.simulation
     }
 }
 

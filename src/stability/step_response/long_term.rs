@@ -2,10 +2,10 @@
 //!
 //! Cycles are followed one by one while they change fast; where they change slowly, `envelope.rs` leaps over many.
 
-use super::course::{Course, Doubts, Fate, ROUNDED, VANISHING};
 use super::envelope::{FINEST, Fixed, Lap, Leapt, NUDGE, distance, size};
 use super::orbit::{BAND, Cycle, Extremum, Orbit, Seen, Stop};
-use super::slider::{Place, Slider, State, X};
+use super::scaled_block::{Place, ScaledBlock, State, X};
+use super::simulation::{Doubts, LongTermBehaviour, ROUNDED, Simulation, VANISHING};
 use crate::numerics::elementary::{exp, ln};
 
 /// Small motions about steady sliding.
@@ -57,7 +57,7 @@ const LIMIT_ERROR: f64 = 0.03;
 const PEAK_TIE: f64 = 0.3;
 
 /// Follows the response from `e^x v_f` once, with steps whose errors are to leave this `share` of `rtol` of its numbers.
-pub(super) fn follow_once(slider: &Slider, linear: Linear, x: f64, rtol: f64, share: f64) -> Course {
+pub(super) fn follow_once(slider: &ScaledBlock, linear: Linear, x: f64, rtol: f64, share: f64) -> Simulation {
     let mut follower = Follower {
         slider,
         linear,
@@ -70,10 +70,10 @@ pub(super) fn follow_once(slider: &Slider, linear: Linear, x: f64, rtol: f64, sh
         vague_peak: false,
         t: 0.0,
     };
-    let fate = follower.run(slider.steady(x)).unwrap_or(Fate::Undecided);
+    let long_term = follower.run(slider.steady(x)).unwrap_or(LongTermBehaviour::Undecided);
     let Follower { extrema: [low, high], t, budget, vague_peak, .. } = follower;
     let doubts = Doubts { t_peak: vague_peak, ..Doubts::default() };
-    Course { fate, high, low, t, steps: MAX_STEPS - budget, doubts }
+    Simulation { long_term, high, low, t, steps: MAX_STEPS - budget, doubts }
 }
 
 /// Error of a step that leaves this share of `rtol`; those of the first two runs always differ.
@@ -82,7 +82,7 @@ pub(super) fn step_error(rtol: f64, share: f64) -> f64 {
 }
 
 pub(super) struct Follower<'a> {
-    pub slider: &'a Slider,
+    pub slider: &'a ScaledBlock,
     pub linear: Linear,
     /// Accuracy that the numbers are asked for with, and that of this run.
     pub asked: f64,
@@ -122,7 +122,7 @@ impl Way<'_> {
 }
 
 impl<'a> Follower<'a> {
-    fn run(&mut self, start: State) -> Result<Fate, Stop> {
+    fn run(&mut self, start: State) -> Result<LongTermBehaviour, Stop> {
         let mut way = self.way(start, start[X].abs(), 0.0, 0.0);
         // Cycles so far, and after how many to try the next leap.
         let (mut count, mut again) = (0, 0);
@@ -130,7 +130,7 @@ impl<'a> Follower<'a> {
             // Follow one cycle.
             let cycle = match self.cycle(&mut way) {
                 Err(Stop::Quiet) => {
-                    return way.settled_at().map(|time| Fate::Settled { time }).ok_or(Stop::Quiet);
+                    return way.settled_at().map(|time| LongTermBehaviour::Settled { time }).ok_or(Stop::Quiet);
                 }
                 cycle => cycle?,
             };
@@ -142,12 +142,12 @@ impl<'a> Follower<'a> {
                 && (self.dies_out(&lap) || self.dies_out_exactly(&lap)?)
                 && let Some(time) = way.settled_at()
             {
-                return Ok(Fate::Settled { time });
+                return Ok(LongTermBehaviour::Settled { time });
             }
             // A limit cycle? Small cycles may only have stopped to change fast: Newton's method finds those.
             if size >= 1.0 && self.is_driven() && way.pace.has_arrived(self.asked) && self.attracts(&lap)? {
                 let [low, high] = cycle.exact_range(&mut way.orbit);
-                return Ok(Fate::Cycle { period: cycle.period, high, low });
+                return Ok(LongTermBehaviour::Cycle { period: cycle.period, high, low });
             }
             // Leap over cycles that hardly change.
             let end = way.offset + cycle.t;
@@ -340,9 +340,9 @@ impl Cycle {
 
 impl Lap {
     /// The limit cycle that it is.
-    fn limit(&self) -> Fate {
+    fn limit(&self) -> LongTermBehaviour {
         let [low, high] = self.range;
-        Fate::Cycle { period: self.period, high, low }
+        LongTermBehaviour::Cycle { period: self.period, high, low }
     }
 }
 

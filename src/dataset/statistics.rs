@@ -12,10 +12,10 @@ use super::batch::batch;
 use super::cell::{Cell, exact, first_row};
 use super::footer::StatusCounts;
 use super::layout::Layout;
-use crate::grid::{Point, Projection, Quantity, Scale, View};
+use crate::grid::{Point, Quantity, RowIndex, Scale, View};
 use crate::protocol::Status;
 use crate::protocol::shortcut::FAMILIES;
-use crate::table::{Kind, OPTIMUM_AXES, Sheet};
+use crate::table::{ColumnBuffer, Kind, OPTIMUM_AXES};
 
 /// Tables of at most this many rows are kept whole, and least values are told apart for at most this many transitions.
 pub const FEW: usize = 12;
@@ -25,7 +25,7 @@ const GAP: &str = "gap";
 
 /// What some rows of a table contain.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
-pub struct Digest {
+pub struct TableStatistics {
     /// Rows by status, in the order of [`Status::ALL`]. A footer has an entry of its own for them.
     #[serde(skip)]
     pub status: StatusCounts,
@@ -90,7 +90,7 @@ struct Candidate {
     row: Row,
 }
 
-impl Digest {
+impl TableStatistics {
     /// The digest of `rows`, whose cells are in `sheet`.
     ///
     /// # Errors
@@ -98,41 +98,44 @@ impl Digest {
     /// A sheet that does not fit the layout.
     pub fn of(
         layout: &Layout,
-        projection: &Projection,
+        projection: &RowIndex,
         rows: ops::Range<u64>,
-        sheet: &Sheet,
-    ) -> Result<Digest, ArrowError> {
+        sheet: &ColumnBuffer,
+    ) -> Result<TableStatistics, ArrowError> {
         let unit = |field: &arrow_schema::FieldRef| field.metadata().get("unit").cloned().unwrap_or_default();
         let fields = layout.schema.fields().iter();
-        let mut digest =
-            Digest { columns: fields.map(|field| (field.name().clone(), unit(field))).collect(), ..Digest::default() };
-        sheet.status.iter().for_each(|status| digest.status[*status as usize] += 1);
+        let mut statistics = TableStatistics {
+            columns: fields.map(|field| (field.name().clone(), unit(field))).collect(),
+            ..TableStatistics::default()
+        };
+        sheet.status.iter().for_each(|status| statistics.status[*status as usize] += 1);
         for (column, cells) in layout.columns.iter().zip(&sheet.columns) {
             match column.kind {
-                Kind::Number(_) | Kind::Quantity(_) => digest.ranges.push(Range::of(column.name, cells)),
-                Kind::Label(words) => digest.words.push((column.name.to_owned(), counts(words, cells))),
-                Kind::Flag => digest.words.push((column.name.to_owned(), counts(&["no", "yes"], cells))),
+                Kind::Number(_) | Kind::Quantity(_) => statistics.ranges.push(Range::of(column.name, cells)),
+                Kind::Label(words) => statistics.words.push((column.name.to_owned(), counts(words, cells))),
+                Kind::Flag => statistics.words.push((column.name.to_owned(), counts(&["no", "yes"], cells))),
             }
         }
         let view = projection.view(rows.clone());
         let labels = layout.labels.iter().map(|name| (name.clone(), labelled(&view.label(name, rows.clone()))));
-        digest.labels = labels.collect();
-        digest.predicted = predicted(layout, &view, &rows, sheet);
+        statistics.labels = labels.collect();
+        statistics.predicted = predicted(layout, &view, &rows, sheet);
         let whole = |places: &mut dyn Iterator<Item = usize>| -> Result<Vec<Row>, ArrowError> {
             places.map(|place| row(layout, projection, rows.start + place as u64, sheet, place)).collect()
         };
         if projection.rows() <= FEW as u64 {
-            digest.rows = Some(whole(&mut (0..sheet.status.len()))?);
+            statistics.rows = Some(whole(&mut (0..sheet.status.len()))?);
         }
         let (many, found) = least(layout, &view, &rows, sheet);
         let least = whole(&mut found.iter().map(|(_, place)| *place))?;
         let firsts = found.iter().map(|(first, _)| rows.start + *first as u64);
-        digest.least = Least { many, each: firsts.zip(least).map(|(first, row)| Candidate { first, row }).collect() };
-        Ok(digest)
+        statistics.least =
+            Least { many, each: firsts.zip(least).map(|(first, row)| Candidate { first, row }).collect() };
+        Ok(statistics)
     }
 
     /// The digest of the rows of both. The order does not matter, nor how many are merged at a time.
-    pub fn merge(mut self, other: Digest) -> Digest {
+    pub fn merge(mut self, other: TableStatistics) -> TableStatistics {
         if self.columns.is_empty() {
             return other;
         }
@@ -244,7 +247,12 @@ fn count(counts: &mut Vec<(String, String, u64)>, predicted: &str, found: &str, 
     }
 }
 
-fn predicted(layout: &Layout, view: &View<'_>, rows: &ops::Range<u64>, sheet: &Sheet) -> Vec<(String, String, u64)> {
+fn predicted(
+    layout: &Layout,
+    view: &View<'_>,
+    rows: &ops::Range<u64>,
+    sheet: &ColumnBuffer,
+) -> Vec<(String, String, u64)> {
     let mut counted = Vec::new();
     let Some(prediction) = &layout.prediction else { return counted };
     let column = layout.columns.iter().zip(&sheet.columns).find(|(column, _)| column.name == prediction.column);
@@ -287,7 +295,12 @@ type Found = (Vec<f64>, usize, usize);
 
 /// Whether there are many transitions; and of each, or of all if they are many, the first row with status `ok` and the row of least gap, as
 /// places in `sheet`.
-fn least(layout: &Layout, view: &View<'_>, rows: &ops::Range<u64>, sheet: &Sheet) -> (bool, Vec<(usize, usize)>) {
+fn least(
+    layout: &Layout,
+    view: &View<'_>,
+    rows: &ops::Range<u64>,
+    sheet: &ColumnBuffer,
+) -> (bool, Vec<(usize, usize)>) {
     let gaps = layout.columns.iter().zip(&sheet.columns).find(|(column, _)| column.name == GAP);
     let Some((_, gaps)) = gaps else { return (false, Vec::new()) };
     let has_family = layout.axes.contains(&Quantity::Family);
@@ -343,9 +356,15 @@ fn least(layout: &Layout, view: &View<'_>, rows: &ops::Range<u64>, sheet: &Sheet
 }
 
 /// Row number `number` of the table, the cells of which are at `place` in `sheet`.
-fn row(layout: &Layout, projection: &Projection, number: u64, sheet: &Sheet, place: usize) -> Result<Row, ArrowError> {
+fn row(
+    layout: &Layout,
+    projection: &RowIndex,
+    number: u64,
+    sheet: &ColumnBuffer,
+    place: usize,
+) -> Result<Row, ArrowError> {
     let columns = sheet.columns.iter().map(|column| vec![column[place]]).collect();
-    let single = Sheet { columns, status: vec![sheet.status[place]] };
+    let single = ColumnBuffer { columns, status: vec![sheet.status[place]] };
     Ok(Row { number, cells: first_row(&batch(layout, projection, number..number + 1, &single)?) })
 }
 

@@ -1,13 +1,13 @@
 //! `regularised`: its pieces built anew between moments of the optimum that a library integrates, and followed.
 
-use super::course::{Course, Formula, State};
 use super::extremal::{Extremal, least_time, solve};
+use super::formula_path::{Formula, FormulaPath, State};
 use super::gap::golden;
 use super::route::integrate;
 use super::verdict::{Context, Verdict, number, transition, word};
 use crate::dataset::Row;
 use crate::model::{Law, Transition};
-use crate::protocol::Slider;
+use crate::protocol::SpringBlock;
 use crate::table::STATUS;
 
 /// A moment of the optimum: `ln v` with two derivatives in time, `ln theta`, and work done.
@@ -42,7 +42,7 @@ impl Moment {
 
 /// What is gathered.
 struct Found<'a> {
-    slider: &'a Slider,
+    slider: &'a SpringBlock,
     excess: f64,
     /// Work of what was replaced: the size of what the excess is a difference of.
     replaced: f64,
@@ -60,7 +60,7 @@ impl Found<'_> {
     }
 
     fn control(&self, [v, v1, v2]: [f64; 3], y: f64) -> f64 {
-        let Slider { law, k, m } = self.slider;
+        let SpringBlock { law, k, m } = self.slider;
         v + (law.a * v1 / v + law.b * ((-y).exp() - v) + m * v2) / k
     }
 
@@ -160,7 +160,7 @@ impl Exponent {
 /// A piece, followed.
 struct Piece {
     exponent: Exponent,
-    course: Course,
+    formula_path: FormulaPath,
     states: Vec<State>,
 }
 
@@ -209,9 +209,9 @@ impl Piece {
         let follow = |bump: f64| {
             let exponent = Exponent { bump, ..exponent };
             let formula = Formula::Velocity(Box::new(move |x| exponent.velocity(x)[0]));
-            let course = Course { problem, t_f: time, formula, backward: false };
-            let states = course.states()?;
-            Some(Piece { exponent, course, states })
+            let formula_path = FormulaPath { problem, t_f: time, formula, backward: false };
+            let states = formula_path.states()?;
+            Some(Piece { exponent, formula_path, states })
         };
         // Theta falls as the bump rises: beyond what can be followed it is none.
         let miss = |bump: f64| {
@@ -246,7 +246,7 @@ impl Piece {
             let x = xi * (1.0 + q) / (1.0 + p * (1.0 - xi) + q * xi);
             let cell = ((x * (self.states.len() - 1) as f64) as usize).min(self.states.len() - 2);
             let from = &self.states[cell];
-            let slope = |s: &[f64; 2]| [self.course.t_f * ((-s[0]).exp() - self.exponent.velocity(s[1])[0]), 1.0];
+            let slope = |s: &[f64; 2]| [self.formula_path.t_f * ((-s[0]).exp() - self.exponent.velocity(s[1])[0]), 1.0];
             let y = integrate(slope, [from[0], from[2]], (0.0, x - from[2])).map_or(f64::NAN, |s| s[0]);
             f(y, self.exponent.velocity(x))
         };
@@ -265,7 +265,13 @@ impl Piece {
 const PLACES: f64 = 600.0;
 
 /// All of it.
-fn again<'a>(slider: &'a Slider, problem: &Transition, t_f: f64, delta_t: f64, best: &Extremal) -> Option<Found<'a>> {
+fn again<'a>(
+    slider: &'a SpringBlock,
+    problem: &Transition,
+    t_f: f64,
+    delta_t: f64,
+    best: &Extremal,
+) -> Option<Found<'a>> {
     let law = slider.law;
     let none = [f64::INFINITY, f64::NEG_INFINITY];
     let mut found =
@@ -342,7 +348,7 @@ pub fn check(row: &Row, context: &Context, rtol: f64) -> Verdict {
         return verdict;
     }
     ["work", "gap", "v_min", "v_max", "v_c_min", "v_c_max"].iter().for_each(|column| verdict.demand(row, column));
-    let slider = Slider { law: problem.law, k, m };
+    let slider = SpringBlock { law: problem.law, k, m };
     let Some(best) = solve(&problem, t_f, context.bounded) else {
         return Verdict::unchecked("the integrator did not get there");
     };
