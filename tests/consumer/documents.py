@@ -1,9 +1,17 @@
-"""Runs what README, docs and examples show: their commands and Python, in order, each document in a folder of its own; the notebook as a
-fresh clone opens it.
+"""Runs what the book shows: the commands, specs and Python of every page, the examples, and the notebook as a fresh clone opens it.
 
-Usage: documents.py FOLDER, in which the program `slipsweep` is.
+Usage: documents.py FOLDER [--write] [PAGE ...]
+
+FOLDER holds the program `slipsweep`. Without pages, all of them run, then the examples and the notebook. The blocks of a page run in
+order, in an empty folder of the page's own:
+
+- `toml` that begins with `name = "NAME"` is saved as NAME.toml before the first command;
+- `sh` and `python` run;
+- `text` must occur in their standard output;
+- a picture `pictures/NAME.svg` must be a file that they wrote, byte for byte; `--write` copies it to docs/pictures instead.
 """
 
+import argparse
 import os
 import re
 import shutil
@@ -15,33 +23,69 @@ from pathlib import Path
 import nbformat
 from nbclient import NotebookClient
 
-REPOSITORY = Path(__file__).resolve().parents[2]
-PYTHON = REPOSITORY / "examples/python"
-ENVIRONMENT = os.environ | {
-    "PATH": os.pathsep.join([str(Path(sys.argv[1]).resolve()), os.environ["PATH"]]),
-    "PYTHONPATH": str(PYTHON),
-    "MPLBACKEND": "Agg",
-}
+REPOSITORY = Path(os.environ.get("REPOSITORY", Path(__file__).resolve().parents[2]))
+EXAMPLES = REPOSITORY / "examples/python"
+PICTURES = REPOSITORY / "docs/pictures"
 
 
-def run(command, folder):
-    done = subprocess.run(command, cwd=folder, env=ENVIRONMENT, capture_output=True, text=True)
+def environment(folder):
+    """The environment of a command: the program on the path, the examples importable."""
+    return os.environ | {
+        "PATH": os.pathsep.join([str(folder), os.environ["PATH"]]),
+        "PYTHONPATH": str(EXAMPLES),
+        "MPLBACKEND": "Agg",
+    }
+
+
+def run(command, folder, variables):
+    """The standard output of a command; ends the program if it fails."""
+    done = subprocess.run(command, cwd=folder, env=variables, capture_output=True, text=True)
     if done.returncode != 0:
         sys.exit(f"{' '.join(command)[:300]}\n{done.stdout}{done.stderr}")
     return done.stdout
 
 
-def document(path, folder):
-    """Runs the blocks of a document; returns how many it has."""
-    blocks = re.findall(r"^```(sh|python)\n(.*?)^```$", path.read_text(), re.MULTILINE | re.DOTALL)
-    for language, code in blocks:
-        command = ["bash", "-euo", "pipefail", "-c"] if language == "sh" else [sys.executable, "-c"]
-        run([*command, code], folder)
-    return len(blocks)
+
+def blocks_of(text):
+    """The language and code of every block, in order."""
+    return re.findall(r"^```(\w+)\n(.*?)^```$", text, re.MULTILINE | re.DOTALL)
 
 
-def notebook(clone):
-    """Executes the notebook in the files of a clone, with the program in target/release and not on the path; returns how many cells it has."""
+def run_page(page, variables, write):
+    """Runs the blocks of a page and checks its output and pictures; returns how many blocks ran."""
+    text = page.read_text()
+    name = page.relative_to(REPOSITORY)
+    count = 0
+    with tempfile.TemporaryDirectory() as folder:
+        for language, code in blocks_of(text):
+            if language == "toml" and (named := re.match(r'name = "([\w-]+)"', code)):
+                (Path(folder) / f"{named[1]}.toml").write_text(code)
+        if page.name == "README.md" and page.parent == REPOSITORY:
+            # The first of its two commands, which also builds the program.
+            run(["slipsweep", "run", str(REPOSITORY / "sweeps/landscape.toml")], folder, variables)
+        printed = ""
+        for language, code in blocks_of(text):
+            if language in ("sh", "python"):
+                command = ["bash", "-euo", "pipefail", "-c"] if language == "sh" else [sys.executable, "-c"]
+                printed += run([*command, code], folder, variables)
+                count += 1
+        for language, code in blocks_of(text):
+            if language == "text" and code not in printed:
+                sys.exit(f"{name}: this output is not printed:\n{code}\nprinted:\n{printed}")
+        for picture in re.findall(r"\]\((?:\.\./)*(?:docs/)?pictures/([\w.-]+)\)", text):
+            made = Path(folder) / picture
+            if not made.is_file():
+                sys.exit(f"{name}: no command of the page writes the picture {picture}")
+            if write:
+                PICTURES.mkdir(exist_ok=True)
+                shutil.copy(made, PICTURES / picture)
+            elif made.read_bytes() != (PICTURES / picture).read_bytes():
+                sys.exit(f"{name}: the picture {picture} is not the committed one; write it with --write and look at it")
+    return count
+
+
+def run_notebook(clone, program):
+    """Executes the notebook in the files of a clone, with the program in target/release and not on the path; returns its number of cells."""
     listed = subprocess.run(
         ["git", "ls-files", "-z", "--cached", "--others", "--exclude-standard", "examples"],
         cwd=REPOSITORY, capture_output=True, text=True, check=True,
@@ -50,13 +94,13 @@ def notebook(clone):
         (clone / name).parent.mkdir(parents=True, exist_ok=True)
         shutil.copy(REPOSITORY / name, clone / name)
     (clone / "target/release").mkdir(parents=True)
-    shutil.copy(Path(sys.argv[1]) / "slipsweep", clone / "target/release")
-    place = clone / PYTHON.relative_to(REPOSITORY) / "first_look.ipynb"
-    cells = nbformat.read(place, as_version=4)
+    shutil.copy(program / "slipsweep", clone / "target/release")
+    path = clone / EXAMPLES.relative_to(REPOSITORY) / "first_look.ipynb"
+    cells = nbformat.read(path, as_version=4)
     folders = [folder for folder in os.environ["PATH"].split(os.pathsep) if not (Path(folder) / "slipsweep").exists()]
-    environment = {key: value for key, value in os.environ.items() if key != "PYTHONPATH"}
-    client = NotebookClient(cells, timeout=600, resources={"metadata": {"path": str(place.parent)}})
-    client.execute(env=environment | {"PATH": os.pathsep.join(folders), "PYTHONWARNINGS": "error::DeprecationWarning:__main__"})
+    variables = {key: value for key, value in os.environ.items() if key != "PYTHONPATH"}
+    client = NotebookClient(cells, timeout=600, resources={"metadata": {"path": str(path.parent)}})
+    client.execute(env=variables | {"PATH": os.pathsep.join(folders), "PYTHONWARNINGS": "error::DeprecationWarning:__main__"})
     code = [cell for cell in cells.cells if cell.cell_type == "code"]
     pictures = [output for cell in code for output in cell.outputs if "image/png" in output.get("data", {})]
     assert len(pictures) == 3, len(pictures)
@@ -64,26 +108,32 @@ def notebook(clone):
 
 
 def main():
-    blocks = 0
-    for path in [REPOSITORY / "README.md", *sorted((REPOSITORY / "docs").glob("*.md"))]:
-        with tempfile.TemporaryDirectory() as folder:
-            if path.name == "README.md":
-                # The first of its two commands, which builds the program besides.
-                run(["slipsweep", "run", str(REPOSITORY / "sweeps/landscape.toml")], folder)
-            blocks += document(path, folder)
-    assert blocks >= 10, blocks
+    parser = argparse.ArgumentParser(description="Run what the book shows.")
+    parser.add_argument("program", type=lambda text: Path(text).resolve(), metavar="FOLDER")
+    parser.add_argument("--write", action="store_true", help="copy the pictures to docs/pictures instead of comparing them")
+    parser.add_argument("pages", nargs="*", metavar="PAGE", type=lambda text: Path(text).resolve())
+    arguments = parser.parse_args()
+    variables = environment(arguments.program)
 
+    pages = arguments.pages or [REPOSITORY / "README.md", *sorted((REPOSITORY / "docs").rglob("*.md"))]
+    count = sum(run_page(page, variables, arguments.write) for page in pages)
+    print(f"{len(pages)} pages: {count} blocks")
+    if arguments.pages:
+        return
+    assert count >= 10, count
     with tempfile.TemporaryDirectory() as folder:
-        document(REPOSITORY / "examples/README.md", folder)
-        scripts = sorted(PYTHON.glob("with_*.py"))
-        answers = {script.stem: run([sys.executable, str(script), "answers"], folder) for script in scripts}
+        for language, code in blocks_of((REPOSITORY / "examples/README.md").read_text()):
+            if language == "sh":
+                run(["bash", "-euo", "pipefail", "-c", code], folder, variables)
+        scripts = sorted(EXAMPLES.glob("with_*.py"))
+        answers = {script.stem: run([sys.executable, str(script), "answers"], folder, variables) for script in scripts}
         assert len(answers) == 4 and len(set(answers.values())) == 1, answers
         answer = next(iter(answers.values()))
         for question in ["landscape", "crossover", "stick-slip"]:
             assert f"{question}: " in answer, answer
     with tempfile.TemporaryDirectory() as folder:
-        cells = notebook(Path(folder))
-    print(f"documents: {blocks} blocks, {len(answers)} examples that agree, a notebook of {cells} cells")
+        cells = run_notebook(Path(folder), arguments.program)
+    print(f"{len(answers)} examples that agree, a notebook of {cells} cells")
 
 
 main()

@@ -17,12 +17,24 @@ fn repository() -> PathBuf {
 /// The documents of the repository, relative to it.
 fn documents() -> Vec<PathBuf> {
     let mut found: Vec<PathBuf> =
-        ["README.md", "CONTRIBUTING.md", "CHANGELOG.md", "examples/README.md"].map(PathBuf::from).into();
-    let docs = fs::read_dir(repository().join("docs")).expect("is there").map(|entry| entry.expect("is readable"));
-    let docs = docs.map(|entry| Path::new("docs").join(entry.file_name()));
-    found.extend(docs.filter(|path| path.extension().is_some_and(|ending| ending == "md")));
+        ["README.md", "CONTRIBUTING.md", "CHANGELOG.md", "examples/README.md", "results/paper/README.md"]
+            .map(PathBuf::from)
+            .into();
+    found.extend(pages());
     found.sort();
     found
+}
+
+/// The pages of the book, relative to the repository.
+fn pages() -> Vec<PathBuf> {
+    let in_folder = |folder: &Path| -> Vec<PathBuf> {
+        let entries = fs::read_dir(repository().join(folder)).expect("exists").map(|entry| entry.expect("is readable"));
+        entries.map(|entry| folder.join(entry.file_name())).collect()
+    };
+    let (folders, files): (Vec<PathBuf>, Vec<PathBuf>) =
+        in_folder(Path::new("docs")).into_iter().partition(|path| repository().join(path).is_dir());
+    let below = folders.iter().flat_map(|folder| in_folder(folder));
+    files.into_iter().chain(below).filter(|path| path.extension().is_some_and(|ending| ending == "md")).collect()
 }
 
 fn text(document: &Path) -> String {
@@ -36,6 +48,14 @@ fn blocks(text: &str, language: &str) -> Vec<String> {
     ends.filter_map(|rest| rest.split("\n```").next()).map(str::to_owned).collect()
 }
 
+/// A spec of a document: a block that begins with its name.
+fn specs(text: &str) -> Vec<(String, String)> {
+    let blocks = blocks(text, "toml").into_iter();
+    let named = |spec: String| Some((spec.strip_prefix("name = \"")?.split('"').next()?.to_owned(), spec));
+    blocks.filter_map(named).collect()
+}
+
+/// The pages that a newcomer follows first. `tests/consumer/documents.py` runs those of the whole book with a release build.
 #[test]
 fn commands_run() {
     let program = Path::new(env!("CARGO_BIN_EXE_slipsweep")).parent().expect("is in a folder");
@@ -43,17 +63,16 @@ fn commands_run() {
         [program.to_owned()].into_iter().chain(env::split_paths(&env::var_os("PATH").unwrap_or_default())),
     );
     let path = path.expect("has no colon");
-    let mut documents_with_commands = 0;
-    for document in documents().iter().filter(|document| !document.ends_with("CONTRIBUTING.md")) {
-        let script = blocks(&text(document), "sh").join("\n");
-        if script.is_empty() {
-            continue;
-        }
-        documents_with_commands += 1;
+    for document in ["README.md", "docs/tutorial.md"].map(Path::new) {
+        let text = text(document);
+        let script = blocks(&text, "sh").join("\n");
         assert!(script.contains("slipsweep "), "{}", document.display());
         let folder = tempfile::tempdir().expect("is writable");
+        for (name, spec) in specs(&text) {
+            fs::write(folder.path().join(format!("{name}.toml")), spec).expect("is writable");
+        }
         if document == Path::new("README.md") {
-            // The first of its two commands, which builds the program besides.
+            // The first of its two commands, which also builds the program.
             let mut first = Command::new(env!("CARGO_BIN_EXE_slipsweep"));
             let first = first.arg("run").arg(repository().join("sweeps/landscape.toml")).current_dir(folder.path());
             assert!(first.output().expect("runs").status.success());
@@ -62,28 +81,25 @@ fn commands_run() {
         let bash = bash.args(["-euo", "pipefail", "-c", &script]).current_dir(folder.path()).env("PATH", &path);
         let output = bash.output().expect("runs");
         let stderr = String::from_utf8_lossy(&output.stderr);
-        assert!(output.status.success() && stderr.is_empty(), "{}: {stderr}", document.display());
-        // What is shown of the output is what comes out.
-        let stdout = String::from_utf8_lossy(&output.stdout);
-        for shown in blocks(&text(document), "text") {
-            assert!(stdout.contains(&shown), "{}:\n{shown}\n{stdout}", document.display());
-        }
+        assert!(output.status.success(), "{}: {stderr}", document.display());
     }
-    assert!(documents_with_commands >= 4);
 }
 
 #[test]
 fn specs_are_legal() {
-    let mut specs = 0;
+    let mut count = 0;
     for document in documents() {
-        for spec in blocks(&text(&document), "toml").iter().filter(|block| block.starts_with("name = ")) {
-            if let Err(error) = Sweep::parse(spec, Path::new(".")) {
-                panic!("{}: {error}", document.display());
+        for (name, spec) in specs(&text(&document)) {
+            // A spec with a file of points needs that file.
+            if !spec.contains("points = ")
+                && let Err(error) = Sweep::parse(&spec, Path::new("."))
+            {
+                panic!("{}: {name}: {error}", document.display());
             }
-            specs += 1;
+            count += 1;
         }
     }
-    assert!(specs >= 2);
+    assert!(count >= 20, "{count}");
 }
 
 /// The specs in a folder and those below it.
@@ -113,8 +129,7 @@ fn names_of_datasets_do_not_collide() {
             datasets.extend(written.filter_map(|spec| Some((named(spec)?, spec.to_owned()))));
             datasets.extend(block.lines().filter_map(begun).map(|name| (name, document.display().to_string())));
         }
-        let specs = blocks(&text, "toml").into_iter().filter(|block| block.starts_with("name = "));
-        datasets.extend(specs.map(|spec| (named(&spec).expect("has a name"), spec)));
+        datasets.extend(specs(&text));
     }
     assert!(datasets.len() >= 16, "{datasets:?}");
     for (name, spec) in &datasets {
@@ -160,9 +175,25 @@ fn the_least_compiler_is_the_one_of_the_manifest() {
 #[test]
 fn the_book_has_every_page() {
     let summary = text(Path::new("docs/SUMMARY.md"));
-    for document in documents().iter().filter(|document| document.starts_with("docs")) {
-        let name = document.file_name().expect("is a file").to_string_lossy();
+    for page in pages() {
+        let name = page.strip_prefix("docs").expect("is in docs").to_string_lossy();
         assert!(name == "SUMMARY.md" || summary.contains(&format!("]({name})")), "{name} is not in docs/SUMMARY.md");
+    }
+}
+
+/// Every table and every command of the program has a page.
+#[test]
+fn the_book_has_a_page_for_every_table_and_command() {
+    for table in table::ALL {
+        assert!(repository().join(format!("docs/tables/{}.md", table.name())).is_file(), "{}", table.name());
+    }
+    let help = Command::new(env!("CARGO_BIN_EXE_slipsweep")).arg("--help").output().expect("runs");
+    let help = String::from_utf8(help.stdout).expect("is text");
+    let listed = help.split("Commands:\n").nth(1).expect("lists commands").split("\n\n").next().expect("ends");
+    let names: Vec<&str> = listed.lines().filter_map(|line| line.split_whitespace().next()).collect();
+    assert!(names.len() > 10, "{names:?}");
+    for name in names.into_iter().filter(|name| *name != "help") {
+        assert!(repository().join(format!("docs/commands/{name}.md")).is_file(), "docs/commands/{name}.md");
     }
 }
 

@@ -319,7 +319,7 @@ fn a_manifest_that_contradicts_its_parts_is_refused() {
     let text = fs::read_to_string(place.manifest_path()).expect("is there");
     let (body, _) = text.split_once(",\n  \"sha256\"").expect("has a checksum");
     let body = body.replace("\"parts\": 2", "\"parts\": 1");
-    let statistics: String =
+    let checksum: String =
         sha2::Sha256::digest(format!("{body}\n}}")).iter().map(|byte| format!("{byte:02x}")).collect();
     fs::write(place.manifest_path(), format!("{body},\n  \"sha256\": \"{checksum}\"\n}}\n")).expect("is writable");
     let found = manifest(folder.path());
