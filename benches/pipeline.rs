@@ -239,13 +239,13 @@ fn compute(sweep: &Sweep, threads: usize) -> Outcome<f64> {
 type Encoder = fn(&Layout, &RowIndex, &ColumnBuffer, &Footer) -> Option<Vec<u8>>;
 
 /// The encoder of the program: with the digest and the checksums of the part and of its pages.
-fn ours(layout: &Layout, projection: &RowIndex, sheet: &ColumnBuffer, footer: &Footer) -> Option<Vec<u8>> {
-    dataset::encode(layout, projection, sheet, footer).ok().map(|(bytes, _)| bytes)
+fn ours(layout: &Layout, row_index: &RowIndex, buffer: &ColumnBuffer, footer: &Footer) -> Option<Vec<u8>> {
+    dataset::encode(layout, row_index, buffer, footer).ok().map(|(bytes, _)| bytes)
 }
 
 /// `ArrowWriter` with the encodings and the compression of the program: no digest, and no checksums, which it cannot write.
-fn arrow(layout: &Layout, projection: &RowIndex, sheet: &ColumnBuffer, footer: &Footer) -> Option<Vec<u8>> {
-    let batch = dataset::batch(layout, projection, footer.rows.clone(), sheet).ok()?;
+fn arrow(layout: &Layout, row_index: &RowIndex, buffer: &ColumnBuffer, footer: &Footer) -> Option<Vec<u8>> {
+    let batch = dataset::batch(layout, row_index, footer.rows.clone(), buffer).ok()?;
     let mut properties = WriterProperties::builder()
         .set_compression(Compression::ZSTD(ZstdLevel::try_new(1).ok()?))
         .set_statistics_enabled(EnabledStatistics::Chunk)
@@ -285,13 +285,13 @@ fn encode(sweep: &Sweep, encoder: Encoder) -> Outcome<f64> {
     let signal = Signal::default();
     let (request, table) = (&sweep.requests[0], &plan.tables[0]);
     let job = sweep.job(request, &optima[0], &signal);
-    let layout = Layout::new(request.table, &request.selection, &sweep.grid);
+    let layout = Layout::new(request.table, &request.projection, &sweep.grid);
     let spent = Mutex::new(Duration::ZERO);
-    sweep::compute(&pool, request.table, &job, table, 0..table.parts, |number, sheet| {
-        let Ok(sheet) = sheet else { return };
+    sweep::compute(&pool, request.table, &job, table, 0..table.parts, |number, buffer| {
+        let Ok(buffer) = buffer else { return };
         let start = Instant::now();
         let footer = Footer::new(&manifest, &table.name, table.rows_of(number));
-        black_box(encoder(&layout, job.rows, &sheet, &footer));
+        black_box(encoder(&layout, job.rows, &buffer, &footer));
         if let Ok(mut spent) = spent.lock() {
             *spent += start.elapsed();
         }

@@ -90,8 +90,8 @@ fn shooting(case: &Case, tolerance: f64) -> Option<Answer> {
     };
     let miss = |[y, ..]: [f64; 3]| direction * (y + last.ln());
     let probe = |alpha: f64| {
-        let (value, beside) = (miss(shoot(alpha)?), miss(shoot(alpha + NUDGE)?));
-        Some(Probe { value, slope: (beside - value) / NUDGE })
+        let (value, compared_with) = (miss(shoot(alpha)?), miss(shoot(alpha + NUDGE)?));
+        Some(Probe { value, slope: (compared_with - value) / NUDGE })
     };
     let root = newton(probe, 0.0, (-400.0, 400.0), !forward, 10.0 * tolerance)?;
     Some([shoot(root.x)?[1], root.x])

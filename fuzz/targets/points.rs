@@ -34,7 +34,7 @@ fuzz_target!(|bytes: &[u8]| {
         match Sweep::parse(&text, folder) {
             Ok(sweep) => {
                 for row in 0..sweep.requests[0].rows {
-                    sweep.requests[0].projection.point(row);
+                    sweep.requests[0].row_index.point(row);
                 }
             }
             Err(error) => assert!(error.to_string().len() < 4096),

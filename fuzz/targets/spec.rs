@@ -20,7 +20,7 @@ fuzz_target!(|text: &str| {
             sweep.requests.iter().for_each(|request| drop(sweep.hash(request)));
             for request in &sweep.requests {
                 for row in [0, request.rows / 2, request.rows - 1] {
-                    request.projection.point(row);
+                    request.row_index.point(row);
                 }
             }
         }

@@ -149,7 +149,7 @@ fn check_room(sweep: &Sweep, plan: &Plan, shares: &[Vec<Range<u64>>], folder: &F
         .collect();
     let most = (sweep.requests.iter().zip(&plan.tables).zip(&missing)).map(|((request, table), &parts)| {
         let rows = parts as f64 * table.rows_per_part.min(table.rows) as f64;
-        let cells = request.table.axes().len() + request.selection.indices().len() + 1;
+        let cells = request.table.axes().len() + request.projection.indices().len() + 1;
         rows * cells as f64 * MAX_CELL_BYTES + parts as f64 * (MAX_FOOTER_BYTES + sweep.text.len() as f64)
     });
     if most.sum::<f64>() < free {
@@ -289,8 +289,8 @@ fn next_commands(sweep: &Sweep, path: &Path) -> String {
 /// slowest.
 fn question(request: &Request) -> String {
     let table = request.table;
-    let columns = || request.selection.indices().iter().map(|&index| &table.columns()[index]);
-    let stretches = request.projection.stretches();
+    let columns = || request.projection.indices().iter().map(|&index| &table.columns()[index]);
+    let stretches = request.row_index.stretches();
     let varies = |axis: &&Quantity| {
         stretches.iter().any(|stretch| stretch.axis(**axis).is_some_and(|(_, axis)| axis.values.len() > 1))
     };

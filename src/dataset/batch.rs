@@ -12,21 +12,21 @@ use crate::grid::RowIndex;
 use crate::protocol::Status;
 use crate::table::{ColumnBuffer, Kind};
 
-/// The cells of `sheet`, which are the rows `rows` of a table, with the columns and types that a part on disk has.
+/// The cells of `buffer`, which are the rows `rows` of a table, with the columns and types that a part on disk has.
 ///
 /// # Errors
 ///
 /// A column that does not fit the layout.
 pub fn batch(
     layout: &Layout,
-    projection: &RowIndex,
+    row_index: &RowIndex,
     rows: Range<u64>,
-    sheet: &ColumnBuffer,
+    buffer: &ColumnBuffer,
 ) -> Result<RecordBatch, ArrowError> {
-    let view = projection.view(rows.clone());
+    let view = row_index.view(rows.clone());
     let mut columns: Vec<ArrayRef> = Vec::with_capacity(layout.schema.fields().len());
     for axis in &layout.axes {
-        let mut cells = Vec::with_capacity(sheet.status.len());
+        let mut cells = Vec::with_capacity(buffer.status.len());
         if let Some(runs) = view.runs(*axis, rows.clone()) {
             let values = runs.values();
             for (step, length) in runs.over(rows.clone()) {
@@ -41,7 +41,7 @@ pub fn batch(
         let cells = runs.iter().flat_map(|(word, length)| std::iter::repeat_n(*word, *length));
         columns.push(Arc::new(cells.collect::<DictionaryArray<Int32Type>>()));
     }
-    for (column, cells) in layout.columns.iter().zip(&sheet.columns) {
+    for (column, cells) in layout.columns.iter().zip(&buffer.columns) {
         columns.push(match column.kind {
             Kind::Number(_) | Kind::Quantity(_) => {
                 Arc::new(cells.iter().map(|&cell| some(cell)).collect::<Float64Array>())
@@ -50,7 +50,7 @@ pub fn batch(
             Kind::Flag => Arc::new(cells.iter().map(|&cell| Some(some(cell)? != 0.0)).collect::<BooleanArray>()),
         });
     }
-    let status: Vec<f64> = sheet.status.iter().map(|&status| f64::from(status as u8)).collect();
+    let status: Vec<f64> = buffer.status.iter().map(|&status| f64::from(status as u8)).collect();
     columns.push(labels(&Status::ALL.map(Status::name), &status)?);
     RecordBatch::try_new(layout.schema.clone(), columns)
 }

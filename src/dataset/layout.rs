@@ -30,10 +30,10 @@ pub struct Layout {
 }
 
 impl Layout {
-    /// The layout of `table` over `grid`, with the columns of `selection`.
-    pub fn new(table: &dyn Table, selection: &Projection, grid: &Grid) -> Layout {
+    /// The layout of `table` over `grid`, with the columns of `projection`.
+    pub fn new(table: &dyn Table, projection: &Projection, grid: &Grid) -> Layout {
         let axes: Vec<Quantity> = Quantity::ALL.into_iter().filter(|axis| table.axes().contains(axis)).collect();
-        let columns: Vec<Column> = selection.indices().iter().map(|&index| table.columns()[index]).collect();
+        let columns: Vec<Column> = projection.indices().iter().map(|&index| table.columns()[index]).collect();
         let mut labels: Vec<String> = Vec::new();
         for name in grid.blocks.iter().flat_map(|block| block.labels(table.axes())) {
             if !labels.iter().any(|known| known == name) {

@@ -31,11 +31,11 @@ pub const ZSTD_LEVEL: i32 = 1;
 /// The bytes of a part, the same on every machine, with their checksums; and the digest of its rows, which they hold.
 pub fn encode(
     layout: &Layout,
-    projection: &RowIndex,
-    sheet: &ColumnBuffer,
+    row_index: &RowIndex,
+    buffer: &ColumnBuffer,
     footer: &Footer,
 ) -> Result<(Vec<u8>, TableStatistics)> {
-    let statistics = TableStatistics::of(layout, projection, footer.rows.clone(), sheet)?;
+    let statistics = TableStatistics::of(layout, row_index, footer.rows.clone(), buffer)?;
     let schema = ArrowSchemaConverter::new().convert(&layout.schema)?;
     let mut properties = WriterProperties::builder()
         .set_created_by(format!("slipsweep version {}", footer.build.version))
@@ -44,13 +44,13 @@ pub fn encode(
         .build();
     add_encoded_arrow_schema_to_metadata(&layout.schema, &mut properties);
     let mut file = SerializedFileWriter::new(
-        Vec::with_capacity(sheet.status.len() * BYTES_PER_ROW),
+        Vec::with_capacity(buffer.status.len() * BYTES_PER_ROW),
         schema.root_schema_ptr(),
         Arc::new(properties),
     )?;
     let mut zstd = Compressor::new(ZSTD_LEVEL)?;
-    let rows = sheet.status.len();
-    let view = projection.view(footer.rows.clone());
+    let rows = buffer.status.len();
+    let view = row_index.view(footer.rows.clone());
     for start in (0..rows).step_by(ROWS_PER_GROUP) {
         let range = start..rows.min(start + ROWS_PER_GROUP);
         let mut columns = schema.columns().iter().cloned();
@@ -71,7 +71,7 @@ pub fn encode(
         for name in &layout.labels {
             group.label(&view.label(name, global.clone()))?;
         }
-        for (column, cells) in layout.columns.iter().zip(&sheet.columns) {
+        for (column, cells) in layout.columns.iter().zip(&buffer.columns) {
             let cells = &cells[range.clone()];
             match column.kind {
                 Kind::Number(_) | Kind::Quantity(_) => group.numbers(cells)?,
@@ -79,7 +79,7 @@ pub fn encode(
                 Kind::Flag => group.splice(flags::chunk(cells))?,
             }
         }
-        group.status(&sheet.status[range])?;
+        group.status(&buffer.status[range])?;
         group.writer.close()?;
     }
     Ok((checksum::sealed(file.into_inner()?)?, statistics))

@@ -91,16 +91,16 @@ struct Candidate {
 }
 
 impl TableStatistics {
-    /// The digest of `rows`, whose cells are in `sheet`.
+    /// The digest of `rows`, whose cells are in `buffer`.
     ///
     /// # Errors
     ///
     /// A sheet that does not fit the layout.
     pub fn of(
         layout: &Layout,
-        projection: &RowIndex,
+        row_index: &RowIndex,
         rows: ops::Range<u64>,
-        sheet: &ColumnBuffer,
+        buffer: &ColumnBuffer,
     ) -> Result<TableStatistics, ArrowError> {
         let unit = |field: &arrow_schema::FieldRef| field.metadata().get("unit").cloned().unwrap_or_default();
         let fields = layout.schema.fields().iter();
@@ -108,25 +108,25 @@ impl TableStatistics {
             columns: fields.map(|field| (field.name().clone(), unit(field))).collect(),
             ..TableStatistics::default()
         };
-        sheet.status.iter().for_each(|status| statistics.status[*status as usize] += 1);
-        for (column, cells) in layout.columns.iter().zip(&sheet.columns) {
+        buffer.status.iter().for_each(|status| statistics.status[*status as usize] += 1);
+        for (column, cells) in layout.columns.iter().zip(&buffer.columns) {
             match column.kind {
                 Kind::Number(_) | Kind::Quantity(_) => statistics.ranges.push(Range::of(column.name, cells)),
                 Kind::Label(words) => statistics.words.push((column.name.to_owned(), counts(words, cells))),
                 Kind::Flag => statistics.words.push((column.name.to_owned(), counts(&["no", "yes"], cells))),
             }
         }
-        let view = projection.view(rows.clone());
+        let view = row_index.view(rows.clone());
         let labels = layout.labels.iter().map(|name| (name.clone(), labelled(&view.label(name, rows.clone()))));
         statistics.labels = labels.collect();
-        statistics.predicted = predicted(layout, &view, &rows, sheet);
+        statistics.predicted = predicted(layout, &view, &rows, buffer);
         let whole = |places: &mut dyn Iterator<Item = usize>| -> Result<Vec<Row>, ArrowError> {
-            places.map(|place| row(layout, projection, rows.start + place as u64, sheet, place)).collect()
+            places.map(|place| row(layout, row_index, rows.start + place as u64, buffer, place)).collect()
         };
-        if projection.rows() <= FEW as u64 {
-            statistics.rows = Some(whole(&mut (0..sheet.status.len()))?);
+        if row_index.rows() <= FEW as u64 {
+            statistics.rows = Some(whole(&mut (0..buffer.status.len()))?);
         }
-        let (many, found) = least(layout, &view, &rows, sheet);
+        let (many, found) = least(layout, &view, &rows, buffer);
         let least = whole(&mut found.iter().map(|(_, place)| *place))?;
         let firsts = found.iter().map(|(first, _)| rows.start + *first as u64);
         statistics.least =
@@ -251,11 +251,11 @@ fn predicted(
     layout: &Layout,
     view: &View<'_>,
     rows: &ops::Range<u64>,
-    sheet: &ColumnBuffer,
+    buffer: &ColumnBuffer,
 ) -> Vec<(String, String, u64)> {
     let mut counted = Vec::new();
     let Some(prediction) = &layout.prediction else { return counted };
-    let column = layout.columns.iter().zip(&sheet.columns).find(|(column, _)| column.name == prediction.column);
+    let column = layout.columns.iter().zip(&buffer.columns).find(|(column, _)| column.name == prediction.column);
     let Some((Kind::Label(words), cells)) = column.map(|(column, cells)| (column.kind, cells)) else { return counted };
     let mut axes: Vec<(Quantity, Vec<f64>)> = Vec::new();
     for axis in prediction.axes {
@@ -294,14 +294,14 @@ fn least_in(stretch: ops::Range<usize>, gaps: &[f64], status: &[Status]) -> Opti
 type Found = (Vec<f64>, usize, usize);
 
 /// Whether there are many transitions; and of each, or of all if they are many, the first row with status `ok` and the row of least gap, as
-/// places in `sheet`.
+/// places in `buffer`.
 fn least(
     layout: &Layout,
     view: &View<'_>,
     rows: &ops::Range<u64>,
-    sheet: &ColumnBuffer,
+    buffer: &ColumnBuffer,
 ) -> (bool, Vec<(usize, usize)>) {
-    let gaps = layout.columns.iter().zip(&sheet.columns).find(|(column, _)| column.name == GAP);
+    let gaps = layout.columns.iter().zip(&buffer.columns).find(|(column, _)| column.name == GAP);
     let Some((_, gaps)) = gaps else { return (false, Vec::new()) };
     let has_family = layout.axes.contains(&Quantity::Family);
     let keys = layout.axes.iter().filter(|axis| is_key(axis.name(), has_family));
@@ -311,8 +311,8 @@ fn least(
     let family = keys.iter().position(|(axis, _)| *axis == Quantity::Family);
     let (mut many, mut found) = (false, Vec::<Found>::new());
     let (mut place, mut current) = (0, 0);
-    while place < sheet.status.len() {
-        let mut end = sheet.status.len();
+    while place < buffer.status.len() {
+        let mut end = buffer.status.len();
         for ((_, values), (run, value, stop)) in keys.iter().zip(&mut runs) {
             if *stop <= place
                 && let Some((step, length)) = run.next()
@@ -327,7 +327,7 @@ fn least(
         if member.is_some_and(|member| !member.arrives()) {
             continue;
         }
-        let best = least_in(stretch, gaps, &sheet.status);
+        let best = least_in(stretch, gaps, &buffer.status);
         let Some((first, least)) = best else { continue };
         let is_same = |(key, ..): &Found| {
             many || key.iter().zip(&runs).all(|(key, (_, value, _))| key.to_bits() == value.to_bits())
@@ -355,17 +355,17 @@ fn least(
     (many, found.into_iter().map(|(_, first, least)| (first, least)).collect())
 }
 
-/// Row number `number` of the table, the cells of which are at `place` in `sheet`.
+/// Row number `number` of the table, the cells of which are at `place` in `buffer`.
 fn row(
     layout: &Layout,
-    projection: &RowIndex,
+    row_index: &RowIndex,
     number: u64,
-    sheet: &ColumnBuffer,
+    buffer: &ColumnBuffer,
     place: usize,
 ) -> Result<Row, ArrowError> {
-    let columns = sheet.columns.iter().map(|column| vec![column[place]]).collect();
-    let single = ColumnBuffer { columns, status: vec![sheet.status[place]] };
-    Ok(Row { number, cells: first_row(&batch(layout, projection, number..number + 1, &single)?) })
+    let columns = buffer.columns.iter().map(|column| vec![column[place]]).collect();
+    let single = ColumnBuffer { columns, status: vec![buffer.status[place]] };
+    Ok(Row { number, cells: first_row(&batch(layout, row_index, number..number + 1, &single)?) })
 }
 
 impl Least {

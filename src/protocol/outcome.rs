@@ -56,7 +56,7 @@ impl Status {
     ///
     /// An optimum that need not be the least leaves the row in doubt, and so does one whose own friction is negative;
     /// negative friction on the path itself is the stronger statement.
-    pub fn beside(self, optimum: Status) -> Status {
+    pub fn compared_with(self, optimum: Status) -> Status {
         match (self, optimum) {
             (Status::Infeasible | Status::NotConverged, _) => self,
             (_, Status::Infeasible | Status::NotConverged) => optimum,

@@ -31,7 +31,7 @@ impl Sweep {
             sweep: self,
             request,
             table,
-            layout: Layout::new(request.table, &request.selection, &self.grid),
+            layout: Layout::new(request.table, &request.projection, &self.grid),
             optimum_cache,
             next: 0,
         })
@@ -56,10 +56,10 @@ impl Iterator for Batches<'_> {
         self.next += 1;
         let signal = Signal::default();
         let job = self.sweep.job(self.request, &self.optimum_cache, &signal);
-        let mut sheet = ColumnBuffer::new(self.request.selection.indices().len());
-        sheet.resize((rows.end - rows.start) as usize);
+        let mut buffer = ColumnBuffer::new(self.request.projection.indices().len());
+        buffer.resize((rows.end - rows.start) as usize);
         // Nobody else has the signal, so that nothing stops the computation.
-        self.request.table.compute(&job, rows.clone(), &mut sheet).ok()?;
-        Some(batch(&self.layout, job.rows, rows, &sheet))
+        self.request.table.compute(&job, rows.clone(), &mut buffer).ok()?;
+        Some(batch(&self.layout, job.rows, rows, &buffer))
     }
 }

@@ -49,13 +49,13 @@ pub struct Request {
     /// The table.
     pub table: &'static dyn Table,
     /// Its columns.
-    pub selection: Projection,
+    pub projection: Projection,
     /// Its accuracy.
     pub rtol: f64,
     /// The number of its rows.
     pub rows: u64,
     /// Its rows.
-    pub projection: RowIndex,
+    pub row_index: RowIndex,
     /// Of a reduced table: the rows of the landscapes, those of one of its rows side by side.
     pub members: Option<RowIndex>,
     /// The hash of what its rows follow from, once it is computed.
@@ -157,12 +157,12 @@ impl Sweep {
         };
         let requests = tables.into_iter().map(|table| request(table, &grid, &prefixes).map_err(placed));
         let requests = requests.collect::<Result<Vec<Request>, _>>()?;
-        let needed = requests.iter().any(|request| request.table.needs_optimum(&request.selection));
+        let needed = requests.iter().any(|request| request.table.needs_optimum(&request.projection));
         // A table that depends on nothing else has these very rows.
         let own = requests.iter().find(|request| request.table.axes() == OPTIMUM_AXES);
         let optimum_rows = match own {
             _ if !needed => None,
-            Some(request) => Some(request.projection.clone()),
+            Some(request) => Some(request.row_index.clone()),
             None => grid.project(OPTIMUM_AXES).ok(),
         };
         let mut warnings = Vec::new();
@@ -186,7 +186,7 @@ impl Sweep {
 
     /// Accuracy of the shared optimal protocols: the strictest of the tables that use them.
     pub fn optimum_rtol(&self) -> f64 {
-        let users = self.requests.iter().filter(|request| request.table.needs_optimum(&request.selection));
+        let users = self.requests.iter().filter(|request| request.table.needs_optimum(&request.projection));
         users.map(|request| request.rtol).fold(1.0, f64::min)
     }
 
@@ -201,7 +201,7 @@ impl Sweep {
         let tuples = self.optimum_tuples();
         let mut stores: Vec<(u64, Arc<OptimumCache>)> = Vec::new();
         let store = |request: &Request| {
-            if !request.table.needs_optimum(&request.selection) {
+            if !request.table.needs_optimum(&request.projection) {
                 return Arc::new(OptimumCache::new(0, self.bounded, request.rtol));
             }
             let key = request.rtol.to_bits();
@@ -276,7 +276,7 @@ struct Draft {
     written: &'static dyn Table,
     /// The table that is written: that one, or what `reduce` makes of it.
     table: &'static dyn Table,
-    selection: Projection,
+    projection: Projection,
     rtol: f64,
 }
 
@@ -309,8 +309,8 @@ fn draft(name: &str, spec: &TableSpec, rtol: f64, blocks: &mut [Checked], faults
         faults.take(check_rtol(&format!("{key}.rtol"), rtol));
     }
     // The columns are those of the reduced table.
-    let selection = selection(table, &key, spec.columns.as_deref().filter(|_| is_reduction_known), faults);
-    Some(Draft { name: name.to_owned(), written, table, selection, rtol })
+    let projection = projection(table, &key, spec.columns.as_deref().filter(|_| is_reduction_known), faults);
+    Some(Draft { name: name.to_owned(), written, table, projection, rtol })
 }
 
 /// A table that needs axes which the block of `prefix` does not have.
@@ -329,23 +329,23 @@ fn lacks(key: &str, table: &dyn Table, prefix: &str, missing: &[Quantity]) -> Sp
 
 /// A table over its rows of `grid`, whose blocks have keys that begin with `prefixes`.
 fn request(draft: Draft, grid: &Grid, prefixes: &[String]) -> Result<Request, SpecError> {
-    let Draft { name, written, table, selection, rtol } = draft;
+    let Draft { name, written, table, projection, rtol } = draft;
     let key = format!("tables.{name}");
     let members = if written.name() == table.name() { None } else { Some(members(written, table, &key, grid)?) };
-    let projection = grid.project(table.axes()).map_err(|error| match error {
+    let row_index = grid.project(table.axes()).map_err(|error| match error {
         TooMany::Rows => {
             let (found, help) = ("more rows than 64 bits can count", "take fewer values on its axes");
             SpecError::new(key, found, "at most 2^64 - 1 rows", help)
         }
         TooMany::Combinations(block) => too_many(format!("{}where", prefixes[block])),
     })?;
-    if let Some(empty) = projection.stretches().iter().position(|stretch| stretch.rows() == 0) {
+    if let Some(empty) = row_index.stretches().iter().position(|stretch| stretch.rows() == 0) {
         let help = "correct the condition, or the axes that it reads";
         let key = format!("{}where", prefixes[empty]);
         return refuse(key, "matches no points", "a condition that some point meets", help);
     }
-    let sizes = selection.indices().iter().map(|&column| table.columns()[column].size(grid)).collect();
-    Ok(Request { table, selection, rtol, rows: projection.rows(), projection, members, hash: OnceLock::new(), sizes })
+    let sizes = projection.indices().iter().map(|&column| table.columns()[column].size(grid)).collect();
+    Ok(Request { table, projection, rtol, rows: row_index.rows(), row_index, members, hash: OnceLock::new(), sizes })
 }
 
 /// The table that `reduce` makes of `table`, or `table` without it.
@@ -393,12 +393,12 @@ fn members(landscape: &dyn Table, reduced: &dyn Table, key: &str, grid: &Grid) -
         return refuse(format!("{key}.reduce"), found, expected, help);
     }
     let ordered = Block { factors: first.into_iter().chain(last).collect(), ..Block::clone(block) };
-    let projection = Grid { blocks: vec![Arc::new(ordered)], units: grid.units }.project(landscape.axes());
-    projection.map_err(|_| wrong("more shortcuts than 64 bits can count", "take fewer values on the axes"))
+    let row_index = Grid { blocks: vec![Arc::new(ordered)], units: grid.units }.project(landscape.axes());
+    row_index.map_err(|_| wrong("more shortcuts than 64 bits can count", "take fewer values on the axes"))
 }
 
 /// The columns of these names; the usual ones without any.
-fn selection(table: &dyn Table, key: &str, names: Option<&[String]>, faults: &mut Faults) -> Projection {
+fn projection(table: &dyn Table, key: &str, names: Option<&[String]>, faults: &mut Faults) -> Projection {
     let known: Vec<&str> = table.columns().iter().map(|column| column.name).collect();
     let Some(names) = names else {
         return Projection::usual(table.columns());

@@ -156,7 +156,7 @@ fn run_in(
             definition: request.table,
             table,
             job: sweep.job(request, optimum_cache, signal),
-            layout: Layout::new(request.table, &request.selection, &sweep.grid),
+            layout: Layout::new(request.table, &request.projection, &sweep.grid),
             statistics: Mutex::default(),
         })
         .collect();
@@ -217,24 +217,24 @@ pub fn compute(
     take: impl Fn(u64, Result<Filled, Defect>) + Sync,
 ) -> Result<RunStats, Stopped> {
     let (give_back, free) = channel();
-    let columns = job.selection.indices().len();
+    let columns = job.projection.indices().len();
     let size = parts.rows_per_part.min(parts.rows).saturating_mul(8 * columns as u64 + 1);
-    let sheets = (pool.current_num_threads() as u64 + 1 + AHEAD as u64).min((MAX_SHEET_BYTES / size.max(1)).max(2));
-    for _ in 0..sheets {
+    let buffers = (pool.current_num_threads() as u64 + 1 + AHEAD as u64).min((MAX_SHEET_BYTES / size.max(1)).max(2));
+    for _ in 0..buffers {
         let _ = give_back.send(ColumnBuffer::new(columns));
     }
     let result = Mutex::new(Ok(RunStats::default()));
     pool.in_place_scope(|scope| {
         for number in numbers {
             // Never fails: every sheet is given back.
-            let Ok(sheet) = free.recv() else { break };
+            let Ok(buffer) = free.recv() else { break };
             if locked(&result).is_err() {
                 break;
             }
-            let (mut filled, result, take) = (Filled { sheet, give_back: give_back.clone() }, &result, &take);
+            let (mut filled, result, take) = (Filled { buffer, give_back: give_back.clone() }, &result, &take);
             scope.spawn(move |_| {
                 let rows = parts.rows_of(number);
-                let computed = match attempt(table, job, rows.clone(), &mut filled.sheet) {
+                let computed = match attempt(table, job, rows.clone(), &mut filled.buffer) {
                     Ok(computed) => computed.and_then(|work| job.signal.check().map(|()| work)).inspect(|_| {
                         take(number, Ok(filled));
                     }),
@@ -251,16 +251,16 @@ pub fn compute(
     content(result)
 }
 
-/// Computes `rows` into `sheet`; the message if that panics.
+/// Computes `rows` into `buffer`; the message if that panics.
 fn attempt(
     table: &dyn Table,
     job: &Job<'_>,
     rows: Range<u64>,
-    sheet: &mut ColumnBuffer,
+    buffer: &mut ColumnBuffer,
 ) -> Result<Result<RunStats, Stopped>, String> {
-    sheet.resize((rows.end - rows.start) as usize);
+    buffer.resize((rows.end - rows.start) as usize);
     // What a panic leaves half done is the sheet, which is filled anew, and solves that were not stored.
-    catch_unwind(AssertUnwindSafe(|| table.compute(job, rows, sheet))).map_err(|payload| {
+    catch_unwind(AssertUnwindSafe(|| table.compute(job, rows, buffer))).map_err(|payload| {
         let text = payload.downcast_ref::<&str>().map(|text| (*text).to_owned());
         text.or_else(|| payload.downcast_ref::<String>().cloned()).unwrap_or_else(|| "no message".to_owned())
     })
@@ -268,12 +268,12 @@ fn attempt(
 
 /// The row among `rows`, which panicked with `message`, that is to blame: found by halves, since any rows can be computed on their own.
 fn culprit(table: &dyn Table, job: &Job<'_>, mut rows: Range<u64>, mut message: String) -> Defect {
-    let mut sheet = ColumnBuffer::new(job.selection.indices().len());
+    let mut buffer = ColumnBuffer::new(job.projection.indices().len());
     while rows.end - rows.start > 1 {
         let middle = rows.start + (rows.end - rows.start) / 2;
         let halves = [rows.start..middle, middle..rows.end];
         let panics = halves.into_iter().find_map(|half| {
-            let said = attempt(table, job, half.clone(), &mut sheet).err()?;
+            let said = attempt(table, job, half.clone(), &mut buffer).err()?;
             Some((half, said))
         });
         let Some((half, said)) = panics else { break };
@@ -354,8 +354,8 @@ impl<'a> Stage<'a> {
         let missing = share.iter().cloned().flatten().filter(|number| sound.binary_search(number).is_err());
         let missing = missing.filter(|&number| self.is_missing(number, &mut done));
         let wanted = missing.take_while(|_| failures.is_empty() && signal.check().is_ok());
-        let take = |number, sheet: Result<Filled, Defect>| match sheet {
-            Ok(sheet) => self.hand_over(number, sheet, to_disk),
+        let take = |number, buffer: Result<Filled, Defect>| match buffer {
+            Ok(buffer) => self.hand_over(number, buffer, to_disk),
             Err(defect) => locked(&failures.defects).push(defect),
         };
         let work = compute(pool, self.definition, &self.job, self.table, wanted, take)?;
@@ -384,13 +384,13 @@ impl<'a> Stage<'a> {
     }
 
     /// Gives a part to the threads that publish, encoded if they have enough to do.
-    fn hand_over(&'a self, number: u64, sheet: Filled, to_disk: &SyncSender<Part<'a>>) {
+    fn hand_over(&'a self, number: u64, buffer: Filled, to_disk: &SyncSender<Part<'a>>) {
         let Run { queued, failures, .. } = self.run;
         let take = |parts: usize| (parts < AHEAD).then_some(parts + 1);
         let content = if queued.fetch_update(Ordering::Relaxed, Ordering::Relaxed, take).is_ok() {
-            Content::ColumnBuffer(sheet)
+            Content::ColumnBuffer(buffer)
         } else {
-            match self.encode(number, &sheet) {
+            match self.encode(number, &buffer) {
                 Ok(bytes) => {
                     queued.fetch_add(1, Ordering::Relaxed);
                     Content::Bytes(bytes)
@@ -428,10 +428,10 @@ impl<'a> Stage<'a> {
     }
 
     /// The bytes of a part, which is counted.
-    fn encode(&self, number: u64, sheet: &ColumnBuffer) -> Result<Vec<u8>, RunError> {
+    fn encode(&self, number: u64, buffer: &ColumnBuffer) -> Result<Vec<u8>, RunError> {
         let (Run { folder, session, .. }, name) = (self.run, &self.table.name);
         let footer = Footer::new(&session.manifest, name, self.table.rows_of(number));
-        let (bytes, statistics) = encode(&self.layout, self.job.rows, sheet, &footer)
+        let (bytes, statistics) = encode(&self.layout, self.job.rows, buffer, &footer)
             .map_err(|source| DatasetError::encode(folder, name, number, source))?;
         self.count(statistics);
         Ok(bytes)
@@ -462,7 +462,7 @@ impl Part<'_> {
         stage.run.signal.check()?;
         let bytes = match content {
             Content::Bytes(bytes) => bytes,
-            Content::ColumnBuffer(sheet) => stage.encode(number, &sheet)?,
+            Content::ColumnBuffer(buffer) => stage.encode(number, &buffer)?,
         };
         Ok(stage.run.session.write_part(&stage.table.name, number, &bytes)?)
     }
@@ -476,7 +476,7 @@ enum Content {
 
 /// The cells of a part. They go back to where the next part is computed once they are dropped.
 pub struct Filled {
-    sheet: ColumnBuffer,
+    buffer: ColumnBuffer,
     give_back: Sender<ColumnBuffer>,
 }
 
@@ -484,14 +484,14 @@ impl Deref for Filled {
     type Target = ColumnBuffer;
 
     fn deref(&self) -> &ColumnBuffer {
-        &self.sheet
+        &self.buffer
     }
 }
 
 impl Drop for Filled {
     fn drop(&mut self) {
         // Nobody waits for it once all parts are computed.
-        let _ = self.give_back.send(std::mem::replace(&mut self.sheet, ColumnBuffer::new(0)));
+        let _ = self.give_back.send(std::mem::replace(&mut self.buffer, ColumnBuffer::new(0)));
     }
 }
 

@@ -219,14 +219,14 @@ impl Sampler<'_> {
         optimum: f64,
         (length, places, limit): (u64, u64, f64),
     ) -> Result<[f64; 3], RunError> {
-        let layout = Layout::new(request.table, &request.selection, &self.sweep.grid);
+        let layout = Layout::new(request.table, &request.projection, &self.sweep.grid);
         let compute = |rows: Range<u64>| -> Result<Sample, RunError> {
             let start = Instant::now();
-            let mut sheet = ColumnBuffer::new(request.selection.indices().len());
-            sheet.resize((rows.end - rows.start) as usize);
-            let work = request.table.compute(job, rows.clone(), &mut sheet)?;
+            let mut buffer = ColumnBuffer::new(request.projection.indices().len());
+            buffer.resize((rows.end - rows.start) as usize);
+            let work = request.table.compute(job, rows.clone(), &mut buffer)?;
             let footer = Footer::new(&self.manifest, request.table.name(), rows.clone());
-            let (bytes, _) = encode(&layout, job.rows, &sheet, &footer).map_err(DatasetError::Sample)?;
+            let (bytes, _) = encode(&layout, job.rows, &buffer, &footer).map_err(DatasetError::Sample)?;
             let optima = if optimum > 0.0 { work.optima } else { 0 };
             let seconds = start.elapsed().as_secs_f64() - optima as f64 * optimum;
             Ok(Sample { rows: rows.end - rows.start, seconds: seconds.max(0.0), bytes: bytes.len() as u64 })

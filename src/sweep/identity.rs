@@ -55,7 +55,7 @@ impl Sweep {
         let key = written.name();
         fact(&format!("tables.{key}.reduce"), format_args!("{name}"));
         fact(&format!("tables.{key}.rtol"), format_args!("{:?}", request.rtol));
-        let columns = request.selection.indices().iter().map(|&column| request.table.columns()[column].name);
+        let columns = request.projection.indices().iter().map(|&column| request.table.columns()[column].name);
         fact(&format!("tables.{key}.columns"), format_args!("{}", columns.collect::<Vec<_>>().join(", ")));
     }
 

@@ -28,7 +28,7 @@ impl Plan {
                 rows_per_part,
             }
         });
-        let dropped = sweep.requests.iter().map(|request| request.projection.dropped()).collect();
+        let dropped = sweep.requests.iter().map(|request| request.row_index.dropped()).collect();
         Plan { tables: tables.collect(), dropped, optima: sweep.optimum_tuples() }
     }
 
@@ -49,11 +49,11 @@ impl Sweep {
     pub fn job<'a>(&'a self, request: &'a Request, optimum_cache: &'a OptimumCache, signal: &'a Signal) -> Job<'a> {
         Job {
             grid: &self.grid,
-            rows: &request.projection,
-            tuples: request.projection.tuples(OPTIMUM_AXES),
-            repeated_rows: RepeatedRows::among(&request.projection, request.table.axes()),
+            rows: &request.row_index,
+            tuples: request.row_index.tuples(OPTIMUM_AXES),
+            repeated_rows: RepeatedRows::among(&request.row_index, request.table.axes()),
             members: request.members.as_ref(),
-            selection: &request.selection,
+            projection: &request.projection,
             sizes: &request.sizes,
             bounded: self.bounded,
             rtol: request.rtol,

@@ -65,16 +65,16 @@ pub static BEST_CUBIC: Definition = Definition {
     compute,
 };
 
-fn compute(job: &Job<'_>, range: Range<u64>, column_buffer: &mut ColumnBuffer) -> Result<RunStats, Stopped> {
+fn compute(job: &Job<'_>, range: Range<u64>, buffer: &mut ColumnBuffer) -> Result<RunStats, Stopped> {
     let natural = |quantity| job.grid.scale(quantity) == Some(Scale::Model);
     let (natural_2, natural_3) = (natural(Quantity::Alpha2), natural(Quantity::Alpha3));
-    rows::each(job, range, 1, column_buffer, &FIELDS, |_, point| {
+    rows::each(job, range, 1, buffer, &FIELDS, |_, point| {
         let t_f = point[Quantity::Time];
         let solve = |rtol| best_cubic::solve(&transition(point), t_f, job.bounded, rtol);
         let solved = solve(job.rtol);
         let mut stats = solved.stats;
         let row = solved.value.map(|best| {
-            let finest = job.selection.has(WORK_ERROR).then(|| solve(error::FINEST));
+            let finest = job.projection.has(WORK_ERROR).then(|| solve(error::FINEST));
             stats += finest.map_or_else(SolverStats::default, |finest| finest.stats);
             let finest = finest.and_then(|finest| finest.value);
             Row {

@@ -87,26 +87,26 @@ pub static COMPLIANT: Definition = Definition {
     compute,
 };
 
-fn needs_optimum(selection: &Projection) -> bool {
-    selection.has_any([WORK_OPTIMAL, GAP, GAP_ERROR])
+fn needs_optimum(projection: &Projection) -> bool {
+    projection.has_any([WORK_OPTIMAL, GAP, GAP_ERROR])
 }
 
-fn compute(job: &Job<'_>, range: Range<u64>, column_buffer: &mut ColumnBuffer) -> Result<RunStats, Stopped> {
+fn compute(job: &Job<'_>, range: Range<u64>, buffer: &mut ColumnBuffer) -> Result<RunStats, Stopped> {
     let members = MemberCache::default();
-    rows::each(job, range, 4, column_buffer, &FIELDS, |tuple, point| {
+    rows::each(job, range, 4, buffer, &FIELDS, |tuple, point| {
         let mut work = RunStats::default();
         let Solution { solved, amplification, work_error } = members.get(job, tuple, point, &mut work);
         let Some(member) = solved.value else { return (solved.status, None, work) };
         let mut status = solved.status;
         let mut least = Comparison::NONE;
-        if needs_optimum(job.selection) {
-            let bounded = job.selection.has(GAP_ERROR);
+        if needs_optimum(job.projection) {
+            let bounded = job.projection.has(GAP_ERROR);
             least = optimum_cache::compare(job, (tuple, point), (member.work, work_error), bounded, &mut work);
-            status = status.beside(least.optimum);
+            status = status.compared_with(least.optimum);
         }
         let (slider, t_f, dt) = (slider(point), point[Quantity::Time], point[Quantity::Sampling]);
-        let is_held = job.selection.has(SAMPLING_ERROR) && dt > 0.0;
-        let is_followed = job.selection.has(OPEN_LOOP_ERROR);
+        let is_held = job.projection.has(SAMPLING_ERROR) && dt > 0.0;
+        let is_followed = job.projection.has(OPEN_LOOP_ERROR);
         let path =
             (is_held || is_followed).then(|| compliant::path(&slider, velocities(point), t_f, job.rtol).ok()).flatten();
         let sampling_error =
@@ -149,11 +149,11 @@ impl MemberCache {
             let (velocities, t_f) = (velocities(point), point[Quantity::Time]);
             let solved = compliant::solve(&slider, velocities, t_f, job.rtol);
             *work += RunStats { shortcuts: 1, ..RunStats::from(solved.stats) };
-            let wanted = job.selection.has(AMPLIFICATION) && solved.value.is_some();
+            let wanted = job.projection.has(AMPLIFICATION) && solved.value.is_some();
             let path = wanted.then(|| compliant::path(&slider, velocities, t_f, job.rtol).ok()).flatten();
             let amplification = path.and_then(|path| told_by(amplification(&path, job.rtol), work));
             let work_error =
-                solved.value.filter(|_| job.selection.has_any([WORK_ERROR, GAP_ERROR])).and_then(|member| {
+                solved.value.filter(|_| job.projection.has_any([WORK_ERROR, GAP_ERROR])).and_then(|member| {
                     let finest = compliant::solve(&slider, velocities, t_f, error::FINEST);
                     *work += RunStats::from(finest.stats);
                     Some(error::bound(member.work, finest.value?.work, member.work))

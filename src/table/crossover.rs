@@ -55,8 +55,8 @@ pub static CROSSOVER: Definition = Definition {
     compute,
 };
 
-fn compute(job: &Job<'_>, range: Range<u64>, column_buffer: &mut ColumnBuffer) -> Result<RunStats, Stopped> {
-    let wanted = |names: [&str; 2]| job.selection.has_any(names.map(|name| place(&COLUMNS, name)));
+fn compute(job: &Job<'_>, range: Range<u64>, buffer: &mut ColumnBuffer) -> Result<RunStats, Stopped> {
+    let wanted = |names: [&str; 2]| job.projection.has_any(names.map(|name| place(&COLUMNS, name)));
     let wanted = Wanted {
         cross: wanted(["t_cross", "work_at_t_cross"]),
         floor: wanted(["t_floor", "work_at_t_floor"]),
@@ -65,7 +65,7 @@ fn compute(job: &Job<'_>, range: Range<u64>, column_buffer: &mut ColumnBuffer) -
         turn: wanted(["t_turn", "work_at_t_turn"]),
         free: wanted(["t_free_in", "t_free_out"]),
     };
-    rows::each(job, range, 64, column_buffer, &FIELDS, |_, point| {
+    rows::each(job, range, 64, buffer, &FIELDS, |_, point| {
         let (status, times, stats) = crossover::solve(&transition(point), job.bounded, job.rtol, wanted);
         (status, Some(times), RunStats { crossovers: 1, ..RunStats::from(stats) })
     })

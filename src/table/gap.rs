@@ -55,15 +55,15 @@ pub static GAP: Definition = Definition {
     compute,
 };
 
-fn needs_optimum(selection: &Projection) -> bool {
-    selection.has_any([WORK_OPTIMAL, WORK_GAP, GAP_ERROR])
+fn needs_optimum(projection: &Projection) -> bool {
+    projection.has_any([WORK_OPTIMAL, WORK_GAP, GAP_ERROR])
 }
 
-pub(super) fn compute(job: &Job<'_>, rows: Range<u64>, column_buffer: &mut ColumnBuffer) -> Result<RunStats, Stopped> {
+pub(super) fn compute(job: &Job<'_>, rows: Range<u64>, buffer: &mut ColumnBuffer) -> Result<RunStats, Stopped> {
     let view = job.rows.view(rows.clone());
     let (groups, order) = groups(&view, job, &rows);
     let coefficients = Coefficients::new(job, view, &rows, order.as_deref());
-    let works = chunks(&groups, column_buffer, job.selection)
+    let works = chunks(&groups, buffer, job.projection)
         .into_par_iter()
         // Chunks cost very different times: no thread may keep several to itself while another one is idle.
         .with_max_len(1)
@@ -76,9 +76,9 @@ pub(super) fn compute(job: &Job<'_>, rows: Range<u64>, column_buffer: &mut Colum
         })
         .collect::<Result<Vec<RunStats>, Stopped>>()?;
     if let Some(order) = order {
-        scatter(column_buffer, &order);
+        scatter(buffer, &order);
     }
-    for (column, size) in column_buffer.columns.iter_mut().zip(job.sizes).filter(|(_, size)| **size != 1.0) {
+    for (column, size) in buffer.columns.iter_mut().zip(job.sizes).filter(|(_, size)| **size != 1.0) {
         column.iter_mut().for_each(|cell| *cell *= size);
     }
     Ok(works.into_iter().sum())
@@ -209,9 +209,9 @@ struct Chunk<'a> {
 }
 
 /// Cuts a part into chunks.
-fn chunks<'a>(groups: &[Group], column_buffer: &'a mut ColumnBuffer, selection: &Projection) -> Vec<Chunk<'a>> {
-    let mut rest = Cells { columns: std::array::from_fn(|_| Default::default()), status: &mut column_buffer.status };
-    for (column, &index) in column_buffer.columns.iter_mut().zip(selection.indices()) {
+fn chunks<'a>(groups: &[Group], buffer: &'a mut ColumnBuffer, projection: &Projection) -> Vec<Chunk<'a>> {
+    let mut rest = Cells { columns: std::array::from_fn(|_| Default::default()), status: &mut buffer.status };
+    for (column, &index) in buffer.columns.iter_mut().zip(projection.indices()) {
         rest.columns[index] = column;
     }
     let mut chunks = Vec::new();
@@ -317,7 +317,7 @@ fn compare(prepared: &Prepared, cells: Compared<'_>) {
                 *cell = error::of_gap((works[i], errors[i]), (value, prepared.error_optimal));
             }
         }
-        *status = status.beside(optimum);
+        *status = status.compared_with(optimum);
     }
 }
 
@@ -334,29 +334,29 @@ fn prepare(job: &Job<'_>, group: &Group, point: &Point, work: &mut RunStats) -> 
     }
     work.landscapes += 1;
     let mut error_optimal = f64::NAN;
-    let optimum = needs_optimum(job.selection).then(|| {
+    let optimum = needs_optimum(job.projection).then(|| {
         let (solved, spent) = job.optimum_cache.get(group.tuple, point);
         *work += spent;
-        if let Some(optimum) = solved.value.filter(|_| job.selection.has(GAP_ERROR)) {
+        if let Some(optimum) = solved.value.filter(|_| job.projection.has(GAP_ERROR)) {
             error_optimal = work_error(job, point, &optimum, work);
         }
         (solved.status, solved.value.map(|optimum| optimum.work))
     });
     let landscape = |rtol| Landscape::new(&transition, t_f, rtol);
-    let finest = job.selection.has_any([WORK_ERROR, GAP_ERROR]).then(|| (landscape(error::FINEST), transition, t_f));
+    let finest = job.projection.has_any([WORK_ERROR, GAP_ERROR]).then(|| (landscape(error::FINEST), transition, t_f));
     Prepared { landscape: Some(landscape(job.rtol)), finest, optimum, error_optimal }
 }
 
 /// Brings a sheet from the order of computation into the order of rows.
-fn scatter(column_buffer: &mut ColumnBuffer, order: &[u32]) {
-    for column in &mut column_buffer.columns {
+fn scatter(buffer: &mut ColumnBuffer, order: &[u32]) {
+    for column in &mut buffer.columns {
         let computed = column.clone();
         for (value, &row) in computed.into_iter().zip(order) {
             column[row as usize] = value;
         }
     }
-    let computed = column_buffer.status.clone();
+    let computed = buffer.status.clone();
     for (status, &row) in computed.into_iter().zip(order) {
-        column_buffer.status[row as usize] = status;
+        buffer.status[row as usize] = status;
     }
 }

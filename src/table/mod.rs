@@ -52,7 +52,7 @@ pub trait Table: Sync {
     fn cost(&self) -> u64;
 
     /// Whether the selected columns need the optimal protocol of every row, shared through [`OptimumCache`].
-    fn needs_optimum(&self, selection: &Projection) -> bool;
+    fn needs_optimum(&self, projection: &Projection) -> bool;
 
     /// Relative accuracy where the spec gives the table none of its own; that of the whole sweep if `None`.
     fn default_rtol(&self) -> Option<f64> {
@@ -64,8 +64,8 @@ pub trait Table: Sync {
         None
     }
 
-    /// Computes `rows` into `column_buffer`, which has the columns of the selection and as many rows: every cell is written.
-    fn compute(&self, job: &Job<'_>, rows: Range<u64>, column_buffer: &mut ColumnBuffer) -> Result<RunStats, Stopped>;
+    /// Computes `rows` into `buffer`, which has the columns of the selection and as many rows: every cell is written.
+    fn compute(&self, job: &Job<'_>, rows: Range<u64>, buffer: &mut ColumnBuffer) -> Result<RunStats, Stopped>;
 }
 
 /// A table of which everything is known in advance.
@@ -105,12 +105,12 @@ impl Table for Definition {
         self.cost
     }
 
-    fn needs_optimum(&self, selection: &Projection) -> bool {
-        (self.needs_optimum)(selection)
+    fn needs_optimum(&self, projection: &Projection) -> bool {
+        (self.needs_optimum)(projection)
     }
 
-    fn compute(&self, job: &Job<'_>, rows: Range<u64>, column_buffer: &mut ColumnBuffer) -> Result<RunStats, Stopped> {
-        (self.compute)(job, rows, column_buffer)
+    fn compute(&self, job: &Job<'_>, rows: Range<u64>, buffer: &mut ColumnBuffer) -> Result<RunStats, Stopped> {
+        (self.compute)(job, rows, buffer)
     }
 }
 
@@ -167,7 +167,7 @@ pub struct Job<'a> {
     /// Of a table that reduces landscapes: their rows, those of one of its rows side by side, in the order of its rows.
     pub members: Option<&'a RowIndex>,
     /// The columns asked for.
-    pub selection: &'a Projection,
+    pub projection: &'a Projection,
     /// What the values of each of them are multiplied by to be in the units of the grid.
     pub sizes: &'a [f64],
     /// Whether optimal protocols obey `v >= 1`.

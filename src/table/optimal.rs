@@ -55,11 +55,11 @@ pub static OPTIMAL: Definition = Definition {
     compute,
 };
 
-fn compute(job: &Job<'_>, range: Range<u64>, column_buffer: &mut ColumnBuffer) -> Result<RunStats, Stopped> {
-    rows::each(job, range, 64, column_buffer, &FIELDS, |tuple, point| {
+fn compute(job: &Job<'_>, range: Range<u64>, buffer: &mut ColumnBuffer) -> Result<RunStats, Stopped> {
+    rows::each(job, range, 64, buffer, &FIELDS, |tuple, point| {
         let (solved, mut work) = job.optimum_cache.get(tuple, point);
         let row = solved.value.map(|optimum| {
-            let wanted = job.selection.has(WORK_ERROR);
+            let wanted = job.projection.has(WORK_ERROR);
             let work_error = if wanted { work_error(job, point, &optimum, &mut work) } else { f64::NAN };
             Row { optimum, work_error }
         });

@@ -24,7 +24,7 @@ pub static MINIMUM: Definition = reduced(
     "gap_min",
     "the shortcut of least gap among those of a spec (reduce = \"min\" of gap)",
     MINIMUM_COLUMNS,
-    |job, rows, column_buffer| compute(Reduction::Minimum, job, rows, column_buffer),
+    |job, rows, buffer| compute(Reduction::Minimum, job, rows, buffer),
 );
 
 /// Quantiles of the gap.
@@ -32,7 +32,7 @@ pub static QUANTILES: Definition = reduced(
     "gap_quantiles",
     "quantiles of the gap of the shortcuts of a spec (reduce = \"quantiles\" of gap)",
     QUANTILE_COLUMNS,
-    |job, rows, column_buffer| compute(Reduction::Quantiles, job, rows, column_buffer),
+    |job, rows, buffer| compute(Reduction::Quantiles, job, rows, buffer),
 );
 
 /// Numbers of shortcuts by decades of the gap.
@@ -40,7 +40,7 @@ pub static HISTOGRAM: Definition = reduced(
     "gap_histogram",
     "how many shortcuts of a spec have which gap (reduce = \"histogram\" of gap)",
     HISTOGRAM_COLUMNS,
-    |job, rows, column_buffer| compute(Reduction::Histogram, job, rows, column_buffer),
+    |job, rows, buffer| compute(Reduction::Histogram, job, rows, buffer),
 );
 
 /// One row a transition and time; the cost is that of a landscape of 400 x 400 shortcuts.
@@ -117,23 +117,23 @@ fn compute(
     reduction: Reduction,
     job: &Job<'_>,
     rows: Range<u64>,
-    column_buffer: &mut ColumnBuffer,
+    buffer: &mut ColumnBuffer,
 ) -> Result<RunStats, Stopped> {
     let Some(members) = job.members else {
         // A checked sweep has them.
-        column_buffer.columns.iter_mut().for_each(|column| column.fill(f64::NAN));
-        column_buffer.status.fill(Status::NotConverged);
+        buffer.columns.iter_mut().for_each(|column| column.fill(f64::NAN));
+        buffer.status.fill(Status::NotConverged);
         return Ok(RunStats::default());
     };
     let each = members.rows() / job.rows.rows().max(1);
-    let (selection, signal) = (Projection::usual(gap::COLUMNS), Signal::default());
+    let (projection, signal) = (Projection::usual(gap::COLUMNS), Signal::default());
     let tuples = members.tuples(OPTIMUM_AXES);
     // Progress is counted in rows of this table, so that of the landscape goes nowhere.
     let sizes: Vec<f64> = gap::COLUMNS.iter().map(|column| column.size(job.grid)).collect();
     let landscape = Job {
         rows: members,
         tuples,
-        selection: &selection,
+        projection: &projection,
         sizes: &sizes,
         signal: &signal,
         members: None,
@@ -144,8 +144,8 @@ fn compute(
     // One after another: the threads share each landscape, and no more than one a part is in memory.
     for (place, row) in rows.enumerate() {
         let (status, cells, work) = reduction.cells(job, &landscape, row * each..(row + 1) * each)?;
-        column_buffer.status[place] = status;
-        for (column, &index) in column_buffer.columns.iter_mut().zip(job.selection.indices()) {
+        buffer.status[place] = status;
+        for (column, &index) in buffer.columns.iter_mut().zip(job.projection.indices()) {
             column[place] = cells[index];
         }
         all += work;
@@ -177,17 +177,17 @@ impl Tally {
     }
 
     /// Adds a piece of the landscape, whose first row is `start`, as far as `reduction` needs it.
-    fn add(&mut self, reduction: Reduction, start: u64, column_buffer: &ColumnBuffer) {
-        for (place, status) in column_buffer.status.iter().enumerate() {
+    fn add(&mut self, reduction: Reduction, start: u64, buffer: &ColumnBuffer) {
+        for (place, status) in buffer.status.iter().enumerate() {
             self.statuses[*status as usize] += 1;
-            let gap = column_buffer.columns[gap::WORK_GAP][place];
+            let gap = buffer.columns[gap::WORK_GAP][place];
             if *status != Status::Ok || gap.is_nan() {
                 continue;
             }
             match reduction {
                 Reduction::Minimum => {
                     if self.least.is_none_or(|(_, least)| gap < least[gap::WORK_GAP]) {
-                        let cells = std::array::from_fn(|column| column_buffer.columns[column][place]);
+                        let cells = std::array::from_fn(|column| buffer.columns[column][place]);
                         self.least = Some((start + place as u64, cells));
                     }
                 }
@@ -214,14 +214,14 @@ impl Reduction {
         landscape: &Job<'_>,
         rows: Range<u64>,
     ) -> Result<(Status, Vec<f64>, RunStats), Stopped> {
-        let mut column_buffer = ColumnBuffer::new(landscape.selection.indices().len());
+        let mut buffer = ColumnBuffer::new(landscape.projection.indices().len());
         let (mut work, mut tally) = (RunStats::default(), Tally::default());
         for start in rows.clone().step_by(PIECE) {
             job.signal.check()?;
             let piece = start..rows.end.min(start + PIECE as u64);
-            column_buffer.resize((piece.end - piece.start) as usize);
-            work += gap::compute(landscape, piece, &mut column_buffer)?;
-            tally.add(self, start, &column_buffer);
+            buffer.resize((piece.end - piece.start) as usize);
+            work += gap::compute(landscape, piece, &mut buffer)?;
+            tally.add(self, start, &buffer);
         }
         let status = tally.status();
         let mut cells = vec![f64::NAN; self.columns().len()];

@@ -65,14 +65,14 @@ pub static REGULARISED: Definition = Definition {
     compute,
 };
 
-fn compute(job: &Job<'_>, range: Range<u64>, column_buffer: &mut ColumnBuffer) -> Result<RunStats, Stopped> {
-    rows::each(job, range, 16, column_buffer, &FIELDS, |_, point| {
+fn compute(job: &Job<'_>, range: Range<u64>, buffer: &mut ColumnBuffer) -> Result<RunStats, Stopped> {
+    rows::each(job, range, 16, buffer, &FIELDS, |_, point| {
         let (t_f, delta_t) = (point[Quantity::Time], point[Quantity::Smoothing]);
         let solve = |rtol| regularised::solve(&slider(point), velocities(point), t_f, delta_t, job.bounded, rtol);
         let solved = solve(job.rtol);
         let mut stats = solved.stats;
         let row = solved.value.map(|found| {
-            let finest = job.selection.has_any([WORK_ERROR, GAP_ERROR]).then(|| solve(error::FINEST));
+            let finest = job.projection.has_any([WORK_ERROR, GAP_ERROR]).then(|| solve(error::FINEST));
             stats += finest.map_or_else(SolverStats::default, |finest| finest.stats);
             let finest = finest.and_then(|finest| finest.value);
             let scale = found.replaced / found.work_optimal;

@@ -19,7 +19,7 @@ pub fn each<R>(
     job: &Job<'_>,
     rows: Range<u64>,
     chunk: usize,
-    column_buffer: &mut ColumnBuffer,
+    buffer: &mut ColumnBuffer,
     fields: &[Field<R>],
     row: impl Fn(u64, &Point) -> Solved<R> + Sync,
 ) -> Result<RunStats, Stopped> {
@@ -39,9 +39,9 @@ pub fn each<R>(
         })
         .collect();
     let starts = rows.clone().step_by(chunk);
-    let mut columns: Vec<_> = column_buffer.columns.iter_mut().map(|column| column.chunks_mut(chunk)).collect();
+    let mut columns: Vec<_> = buffer.columns.iter_mut().map(|column| column.chunks_mut(chunk)).collect();
     let chunks: Vec<Chunk<'_>> = starts
-        .zip(column_buffer.status.chunks_mut(chunk))
+        .zip(buffer.status.chunks_mut(chunk))
         .map(|(start, status)| Chunk {
             start,
             columns: columns.iter_mut().filter_map(Iterator::next).collect(),
@@ -54,7 +54,7 @@ pub fn each<R>(
         let known = repeated_rows.as_ref().map(|(repeated_rows, tuples)| (*repeated_rows, tuples.as_slice()));
         let fill = |tuple: u64, point: &Point, cells: &mut [f64]| {
             let (status, values, work) = row(tuple, point);
-            for (cell, &index) in cells.iter_mut().zip(job.selection.indices()) {
+            for (cell, &index) in cells.iter_mut().zip(job.projection.indices()) {
                 *cell = values.as_ref().map_or(f64::NAN, fields[index].cell);
             }
             (status, work)

@@ -22,7 +22,7 @@ struct Row {
 }
 
 impl Row {
-    fn told(&self, number: impl Fn(&Member) -> f64) -> f64 {
+    fn of_solution(&self, number: impl Fn(&Member) -> f64) -> f64 {
         self.member.as_ref().map_or(f64::NAN, number)
     }
 }
@@ -34,9 +34,11 @@ const FIELDS: [Field<Row>; 11] = [
             "1; (v_0/l)^2 for bounded_velocity",
             "the family's parameter alpha_3 of the paper; null for step and cubic, which have none, 0 where tau_ceiling = inf",
         ),
-        |row| row.told(|member| number(member.alpha)) * row.alpha_unit,
+        |row| row.of_solution(|member| number(member.alpha)) * row.alpha_unit,
     ),
-    Field::new(Column::number("work", "mu_0 sigma l", "work of friction W_s"), |row| row.told(|member| member.work)),
+    Field::new(Column::number("work", "mu_0 sigma l", "work of friction W_s"), |row| {
+        row.of_solution(|member| member.work)
+    }),
     Field::new(Column::number("work_optimal", "mu_0 sigma l", "least work of friction W* of any protocol"), |row| {
         row.least.work
     }),
@@ -46,13 +48,13 @@ const FIELDS: [Field<Row>; 11] = [
     ),
     Field::new(
         Column::number("v_min", "v_0", "least velocity between the ends; 0 below the range of doubles"),
-        |row| row.told(|member| member.v_min),
+        |row| row.of_solution(|member| member.v_min),
     ),
     Field::new(Column::number("v_max", "v_0", "greatest velocity between the ends"), |row| {
-        row.told(|member| member.v_max)
+        row.of_solution(|member| member.v_max)
     }),
     Field::new(Column::number("friction_max", "mu_0 sigma", "greatest friction between the ends"), |row| {
-        row.told(|member| member.friction_max)
+        row.of_solution(|member| member.friction_max)
     }),
     Field::new(
         Column::number(
@@ -61,7 +63,7 @@ const FIELDS: [Field<Row>; 11] = [
             "theta(t_f) v_f - 1: how far from its target a step is; 0 for the other families",
         )
         .optional(),
-        |row| row.told(|member| member.miss),
+        |row| row.of_solution(|member| member.miss),
     ),
     Field::new(
         Column::new("bound", Kind::Label(&Obstacle::NAMES), "which bound makes the row infeasible").optional(),
@@ -103,13 +105,13 @@ pub static SHORTCUT: Definition = Definition {
     compute,
 };
 
-fn needs_optimum(selection: &Projection) -> bool {
-    selection.has_any([WORK_OPTIMAL, GAP, GAP_ERROR])
+fn needs_optimum(projection: &Projection) -> bool {
+    projection.has_any([WORK_OPTIMAL, GAP, GAP_ERROR])
 }
 
-fn compute(job: &Job<'_>, range: Range<u64>, column_buffer: &mut ColumnBuffer) -> Result<RunStats, Stopped> {
+fn compute(job: &Job<'_>, range: Range<u64>, buffer: &mut ColumnBuffer) -> Result<RunStats, Stopped> {
     let members = MemberCache::default();
-    rows::each(job, range, 16, column_buffer, &FIELDS, |tuple, point| {
+    rows::each(job, range, 16, buffer, &FIELDS, |tuple, point| {
         let mut work = RunStats::default();
         let mut row =
             Row { member: None, obstacle: None, alpha_unit: 1.0, work_error: f64::NAN, least: Comparison::NONE };
@@ -124,10 +126,10 @@ fn compute(job: &Job<'_>, range: Range<u64>, column_buffer: &mut ColumnBuffer) -
             }
         };
         let mut status = member.status();
-        if needs_optimum(job.selection) {
-            let bounded = job.selection.has(GAP_ERROR);
+        if needs_optimum(job.projection) {
+            let bounded = job.projection.has(GAP_ERROR);
             row.least = optimum_cache::compare(job, (tuple, point), (member.work, row.work_error), bounded, &mut work);
-            status = status.beside(row.least.optimum);
+            status = status.compared_with(row.least.optimum);
         }
         let family = FAMILIES.get(point[Quantity::Family] as usize);
         if family.is_some_and(|family| family.name() == "bounded_velocity") {
@@ -166,7 +168,7 @@ fn solve(job: &Job<'_>, family: &dyn Family, point: &Point, work: &mut RunStats)
     }
     let mut stats = SolverStats::default();
     let solved = family.solve(&case, job.rtol, &mut stats).map(|member| {
-        let wanted = job.selection.has_any([WORK_ERROR, GAP_ERROR]);
+        let wanted = job.projection.has_any([WORK_ERROR, GAP_ERROR]);
         let bound = wanted.then(|| error::of_member(family, &case, &member, &mut stats)).flatten();
         (member, bound.unwrap_or(f64::NAN))
     });

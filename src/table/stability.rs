@@ -70,9 +70,9 @@ pub static STABILITY: Definition = Definition {
     compute,
 };
 
-fn compute(job: &Job<'_>, range: Range<u64>, column_buffer: &mut ColumnBuffer) -> Result<RunStats, Stopped> {
-    let with_eigenvalues = job.selection.has_any([GROWTH_RATE, FREQUENCY, DECAY_RATE]);
-    rows::each(job, range, 1024, column_buffer, &FIELDS, |_, point| {
+fn compute(job: &Job<'_>, range: Range<u64>, buffer: &mut ColumnBuffer) -> Result<RunStats, Stopped> {
+    let with_eigenvalues = job.projection.has_any([GROWTH_RATE, FREQUENCY, DECAY_RATE]);
+    rows::each(job, range, 1024, buffer, &FIELDS, |_, point| {
         let Transition { law, v_i, v_f } = transition(point);
         let (k, m) = (point[Quantity::Stiffness], point[Quantity::Mass]);
         let [at_start, at_end] = [v_i, v_f].map(|v| SteadySliding::new(law, k, m, v));

@@ -22,12 +22,12 @@ struct Row {
 }
 
 impl Row {
-    fn told(&self, number: impl Fn(&Response) -> f64) -> f64 {
+    fn of_solution(&self, number: impl Fn(&Response) -> f64) -> f64 {
         self.response.as_ref().map_or(f64::NAN, number)
     }
 
     fn cycle(&self, number: impl Fn(&Sustained) -> f64) -> f64 {
-        self.told(|response| response.cycle.as_ref().map_or(f64::NAN, &number))
+        self.of_solution(|response| response.cycle.as_ref().map_or(f64::NAN, &number))
     }
 }
 
@@ -38,7 +38,7 @@ const FIELDS: [Field<Row>; 11] = [
             "v_0",
             "greatest velocity from when v = v_f is first met on, at least v_f; null if undecided",
         ),
-        |row| row.told(|response| response.v_peak),
+        |row| row.of_solution(|response| response.v_peak),
     ),
     Field::new(
         Column::number(
@@ -47,7 +47,7 @@ const FIELDS: [Field<Row>; 11] = [
             "least velocity from when v = v_f is first met on, at most v_f; 0 below the range of doubles, null if undecided or \
          not known to rtol",
         ),
-        |row| row.told(|response| response.v_trough),
+        |row| row.of_solution(|response| response.v_trough),
     ),
     Field::new(
         Column::number(
@@ -56,16 +56,16 @@ const FIELDS: [Field<Row>; 11] = [
             "time of v_peak, good to rtol of itself over the overshoot v_peak/v_f - 1; null where the peak is only approached, \
          if undecided and if not known to that",
         ),
-        |row| row.told(|response| number(response.t_peak)),
+        |row| row.of_solution(|response| number(response.t_peak)),
     ),
     Field::new(
         Column::new("outcome", Kind::Label(&Outcome::NAMES), "what becomes of the response in the end"),
-        |row| row.told(|response| f64::from(response.outcome as u8)),
+        |row| row.of_solution(|response| f64::from(response.outcome as u8)),
     ),
     Field::new(
         Column::new("stick_slip", Kind::Flag, "whether the oscillation is sustained; null if undecided"),
         |row| {
-            row.told(|response| match response.outcome {
+            row.of_solution(|response| match response.outcome {
                 Outcome::Settled => 0.0,
                 Outcome::LimitCycle => 1.0,
                 Outcome::Undecided => f64::NAN,
@@ -78,7 +78,7 @@ const FIELDS: [Field<Row>; 11] = [
             "l/v_0",
             "time after which v stays within 1 % of v_f; null unless the outcome is settled, and if not known to rtol",
         ),
-        |row| row.told(|response| number(response.settling_time)),
+        |row| row.of_solution(|response| number(response.settling_time)),
     ),
     Field::new(Column::number("period", "l/v_0", "duration of the limit cycle; null without one"), |row| {
         row.cycle(|cycle| cycle.period)
@@ -97,7 +97,7 @@ const FIELDS: [Field<Row>; 11] = [
         |row| row.cycle(|cycle| cycle.v_trough),
     ),
     Field::new(Column::number("t_end", "l/v_0", "time up to which the response was integrated").optional(), |row| {
-        row.told(|response| response.t_end)
+        row.of_solution(|response| response.t_end)
     }),
     Field::new(
         Column::number(
@@ -174,9 +174,9 @@ impl Table for StepResponse {
         })
     }
 
-    fn compute(&self, job: &Job<'_>, range: Range<u64>, column_buffer: &mut ColumnBuffer) -> Result<RunStats, Stopped> {
+    fn compute(&self, job: &Job<'_>, range: Range<u64>, buffer: &mut ColumnBuffer) -> Result<RunStats, Stopped> {
         let simulations = Memo::<[u64; 5], Simulation>::default();
-        rows::each(job, range, 4, column_buffer, &FIELDS, |_, point| {
+        rows::each(job, range, 4, buffer, &FIELDS, |_, point| {
             let step = step_response::Step {
                 transition: transition(point),
                 k: point[Quantity::Stiffness],

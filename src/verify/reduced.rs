@@ -72,25 +72,25 @@ pub fn check(written: &Row, units: &Units, spec: &Spec, context: &Context) -> Ve
     };
     let job = sweep.job(request, optima, &signal);
     let mut verdict = Verdict::default();
-    let mut sheet = ColumnBuffer::new(request.selection.indices().len());
+    let mut buffer = ColumnBuffer::new(request.projection.indices().len());
     let mut told = Told::default();
     let cells =
-        |sheet: &ColumnBuffer, place: usize| sheet.columns.iter().map(|column| column[place]).collect::<Vec<f64>>();
+        |buffer: &ColumnBuffer, place: usize| buffer.columns.iter().map(|column| column[place]).collect::<Vec<f64>>();
     let all = request.rows;
     // From the middle of equal parts of the landscape.
     let solved = (0..SOLVED).map(|part| ((2 * part + 1) as f64 / (2 * SOLVED) as f64 * all as f64) as u64);
     let solved: Vec<u64> = solved.collect();
     for start in (0..all).step_by(PIECE) {
         let rows = start..all.min(start + PIECE as u64);
-        sheet.resize((rows.end - rows.start) as usize);
+        buffer.resize((rows.end - rows.start) as usize);
         // Nobody else has the signal, so that nothing stops the computation.
-        if request.table.compute(&job, rows.clone(), &mut sheet).is_err() {
+        if request.table.compute(&job, rows.clone(), &mut buffer).is_err() {
             break;
         }
         for (row, place) in rows.zip(0..) {
-            told.see(written, row, sheet.status[place], || cells(&sheet, place));
+            told.see(written, row, buffer.status[place], || cells(&buffer, place));
             if solved.contains(&row) {
-                let shortcut = shortcut(&sweep, row, &cells(&sheet, place), sheet.status[place]);
+                let shortcut = shortcut(&sweep, row, &cells(&buffer, place), buffer.status[place]);
                 let mut shortcut = [(row, shortcut)];
                 units::scale(&mut shortcut, request.table, units, context.relative);
                 let found = gap::check(&shortcut[0].1, context);
@@ -147,9 +147,9 @@ fn landscape(written: &Row, spec: &Spec) -> Option<Sweep> {
 /// Row number `row` of the landscape as `gap` would have it.
 fn shortcut(sweep: &Sweep, row: u64, cells: &[f64], status: Status) -> Row {
     let request = &sweep.requests[0];
-    let point = request.projection.point(row);
+    let point = request.row_index.point(row);
     let axes = request.table.axes().iter().map(|axis| (axis.name().to_owned(), Cell::Number(point[*axis])));
-    let columns = request.selection.indices().iter().zip(cells).map(|(&column, &value)| {
+    let columns = request.projection.indices().iter().zip(cells).map(|(&column, &value)| {
         let cell = if value.is_nan() { Cell::Missing } else { Cell::Number(value) };
         (request.table.columns()[column].name.to_owned(), cell)
     });
@@ -200,7 +200,7 @@ impl Told {
             verdict.compare(written, column, Some(count as f64), Some(1.0));
         }
         let request = &sweep.requests[0];
-        let point = self.least.as_ref().map(|(row, _)| request.projection.point(*row));
+        let point = self.least.as_ref().map(|(row, _)| request.row_index.point(*row));
         for axis in [Quantity::Alpha2, Quantity::Alpha3] {
             verdict.compare(written, axis.name(), point.as_ref().map(|point| point[axis]), Some(1.0));
         }

@@ -62,12 +62,12 @@ fn strict_fails_where_a_row_is_not_converged() {
 
     let sweep = Sweep::load(&folder.path().join("spec.toml")).expect("is legal");
     let request = &sweep.requests[0];
-    let layout = Layout::new(request.table, &request.selection, &sweep.grid);
-    let mut sheet = ColumnBuffer::new(layout.columns.len());
-    sheet.resize(2);
-    sheet.status = vec![Status::Ok, Status::NotConverged];
+    let layout = Layout::new(request.table, &request.projection, &sweep.grid);
+    let mut buffer = ColumnBuffer::new(layout.columns.len());
+    buffer.resize(2);
+    buffer.status = vec![Status::Ok, Status::NotConverged];
     let footer = Footer::new(&Plan::new(&sweep).manifest(&sweep), "optimal", 0..2);
-    let (bytes, _) = encode(&layout, &request.projection, &sheet, &footer).expect("is encoded");
+    let (bytes, _) = encode(&layout, &request.row_index, &buffer, &footer).expect("is encoded");
     Folder::new(&folder.path().join("results"), "test").write_part("optimal", 0, &bytes).expect("is writable");
 
     let message = "error: 1 row not_converged\n".to_owned();

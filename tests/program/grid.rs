@@ -167,14 +167,14 @@ impl Known {
 }
 
 /// Compares every way to ask for rows with the rows themselves.
-fn check(projection: &RowIndex, expected: &[Values1], axes: &[Quantity], random: &mut Random, place: &str) {
-    assert_eq!(projection.rows(), expected.len() as u64, "{place}");
+fn check(row_index: &RowIndex, expected: &[Values1], axes: &[Quantity], random: &mut Random, place: &str) {
+    assert_eq!(row_index.rows(), expected.len() as u64, "{place}");
     let count = expected.len();
     for _ in 0..4 {
         let start = random.below(count + 1);
         let end = start + random.below(count - start + 1);
         let (first, last) = (start as u64, end as u64);
-        let view = projection.view(first..last);
+        let view = row_index.view(first..last);
         for &quantity in axes {
             let runs = view.runs(quantity, first..last).expect("is an axis");
             let inner = first + (last - first) / 3;
@@ -213,10 +213,10 @@ fn rows_of_random_blocks_are_those_of_nested_loops() {
                 blocks.iter().map(|known| known.condition.as_ref().map(|formula| &formula.text)).collect();
             let place = format!("case {case}, table over {axes:?}, where {texts:?}");
             let expected: Vec<Values1> = blocks.iter().flat_map(|known| known.rows(&axes)).collect();
-            let projection = grid.project(&axes).expect("is small");
-            check(&projection, &expected, &axes, &mut random, &place);
+            let row_index = grid.project(&axes).expect("is small");
+            check(&row_index, &expected, &axes, &mut random, &place);
             with_condition += u64::from(texts.iter().any(Option::is_some));
-            dropped += projection.dropped();
+            dropped += row_index.dropped();
         }
     }
     assert!(with_condition > 500 && dropped > 10_000, "{with_condition} {dropped}");
@@ -234,10 +234,10 @@ fn optimal_problems_of_random_blocks_are_told_apart() {
         let roots = known.block.roots(OPTIMUM_AXES);
         // The number of a tuple, by its values: the same in either table, and another one for each.
         let mut number_of: HashMap<Vec<u64>, u64> = HashMap::new();
-        for projection in [&few, &all] {
-            let tuples = projection.tuples(OPTIMUM_AXES);
-            let view = projection.view(0..projection.rows());
-            for (tuple, rows) in view.tuples(&tuples, 0..projection.rows()) {
+        for row_index in [&few, &all] {
+            let tuples = row_index.tuples(OPTIMUM_AXES);
+            let view = row_index.view(0..row_index.rows());
+            for (tuple, rows) in view.tuples(&tuples, 0..row_index.rows()) {
                 assert!(tuple < tuples.span(), "case {case}");
                 for row in rows {
                     let point = view.point(row);
@@ -271,7 +271,7 @@ fn a_condition_over_billions_of_rows_costs_what_it_reads() {
     let pairs: u64 = 100 * 99 / 2;
     let rows: Vec<u64> = Plan::new(&sweep).tables.iter().map(|table| table.rows).collect();
     assert_eq!(rows, [100 * 10 * 10 * pairs * 200 * 1001, 100 * 10 * 10 * pairs, 10 * 10 * pairs]);
-    let gap = &sweep.requests[0].projection;
+    let gap = &sweep.requests[0].row_index;
     assert_eq!(gap.dropped(), 100 * 100 * 10 * 100 * 10 * 401 * 1001 - rows[0]);
     // The last row is the last point with v_i = 100, v_f = 101.
     let last = gap.point(rows[0] - 1);

@@ -38,7 +38,7 @@ fn parse(text: &str) -> Result<Sweep, SpecError> {
 }
 
 fn rows(text: &str) -> RowIndex {
-    parse(text).unwrap_or_else(|error| panic!("{text}{error}")).requests.swap_remove(0).projection
+    parse(text).unwrap_or_else(|error| panic!("{text}{error}")).requests.swap_remove(0).row_index
 }
 
 /// Two numbers are the same if no bit differs; a quantity that the grid lacks is NaN on both sides.
@@ -114,7 +114,7 @@ proptest! {
     fn a_condition_and_its_contrary_make_the_whole(axes in axes(), level in -1.0..3.0) {
         let condition = format!("alpha_2 + ln(v_i) - b * {level:?} < 2 and not (t_f > 50 or a = v_f)");
         let part = |condition: &str| match parse(&spec(&format!("where = \"{condition}\"\n"), &axes)) {
-            Ok(mut sweep) => all(&sweep.requests.swap_remove(0).projection),
+            Ok(mut sweep) => all(&sweep.requests.swap_remove(0).row_index),
             // Refused, for a sweep without a point is a mistake.
             Err(error) => { assert_eq!(&*error.found, "matches no points"); Vec::new() }
         };

@@ -96,7 +96,7 @@ pub fn solve(transition: &Transition, t_f: f64, bounded: bool, rtol: f64) -> Sol
         }
     };
     let own = if v_min < 1.0 { Status::BelowBound } else { Status::Ok };
-    let status = own.with_friction(path.friction_min(law)).beside(optimum.status);
+    let status = own.with_friction(path.friction_min(law)).compared_with(optimum.status);
     let [a_2, a_3] = plane.coefficients(least.place).map(|a| a.high);
     let gap = excess / optimum_value.work;
     let value = BestCubic { a_2, a_3, work, work_optimal: optimum_value.work, gap, v_min };

@@ -123,8 +123,8 @@ pub(super) fn find_beyond(problem: &Problem, time: Time, rtol: f64) -> (Solved<O
     for _ in 0..MOST_REFINEMENTS {
         let Some((x, found)) = &mut outcome else { break };
         let held = found.time_at_floor > 0.0;
-        let beside = if problem.rises() { found.start - problem.from.ln } else { *x };
-        let seam = family.q_hold.filter(|_| !held && beside < SEAM);
+        let compared_with = if problem.rises() { found.start - problem.from.ln } else { *x };
+        let seam = family.q_hold.filter(|_| !held && compared_with < SEAM);
         let share = match seam {
             Some(_) => 0.0,
             None if held && found.time_at_floor < SHORT * t_f => found.time_at_floor / t_f,

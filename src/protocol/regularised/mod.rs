@@ -133,7 +133,7 @@ fn assemble(
         return none(if doubtful { Status::Unproven } else { Status::NotConverged }, stats);
     }
     let own = if value.v_min < 1.0 { Status::BelowBound } else { Status::Ok };
-    let status = own.with_friction(sum.friction_min).beside(solved.status);
+    let status = own.with_friction(sum.friction_min).compared_with(solved.status);
     (Solved { status, value: Some(value), stats }, Some(route))
 }
 

@@ -209,8 +209,8 @@ impl<'a> Follower<'a> {
 
     /// Whether a cycle that begins beside this one comes to it: that one changes little does not show that.
     fn attracts(&mut self, lap: &Lap) -> Result<bool, Stop> {
-        let beside = self.lap([lap.from[0] + NUDGE, lap.from[1]], lap.tolerance)?;
-        Ok((1.0 + (beside.change[0] - lap.change[0]) / NUDGE).abs() < MAX_RATIO)
+        let compared_with = self.lap([lap.from[0] + NUDGE, lap.from[1]], lap.tolerance)?;
+        Ok((1.0 + (compared_with.change[0] - lap.change[0]) / NUDGE).abs() < MAX_RATIO)
     }
 
     /// Error of a step in a motion of this size.

@@ -69,7 +69,7 @@ impl Random {
     }
 
     /// `x` changed by a share of 1e-15 to 1e-3.
-    fn beside(&mut self, x: f64) -> f64 {
+    fn compared_with(&mut self, x: f64) -> f64 {
         x * (1.0 + self.sign() * self.between(1e-15, 1e-3))
     }
 
@@ -79,7 +79,7 @@ impl Random {
         let b = match (self.uniform() * 8.0) as u32 {
             0 => 0.0,
             1 => a,
-            2 => self.beside(a),
+            2 => self.compared_with(a),
             3 | 4 => a * self.uniform(),
             5 => a * self.between(1.0, 10.0),
             _ => self.between(1e-6, 10.0),
@@ -101,8 +101,8 @@ impl Random {
         let v_i = self.velocity();
         let v_f = match self.uniform() {
             kind if kind < 0.02 => v_i,
-            kind if kind < 0.12 => self.beside(v_i).max(1.0 + f64::EPSILON),
-            kind if kind < 0.22 => 1.0 + self.beside(v_i - 1.0).max(f64::EPSILON),
+            kind if kind < 0.12 => self.compared_with(v_i).max(1.0 + f64::EPSILON),
+            kind if kind < 0.22 => 1.0 + self.compared_with(v_i - 1.0).max(f64::EPSILON),
             _ => self.velocity(),
         };
         (v_i, v_f)
@@ -141,7 +141,7 @@ impl Random {
         let k = match self.uniform() {
             kind if kind < 0.1 => f64::INFINITY,
             kind if kind < 0.3 && critical > 0.0 => self.near(critical),
-            kind if kind < 0.45 && critical > 0.0 => self.beside(critical),
+            kind if kind < 0.45 && critical > 0.0 => self.compared_with(critical),
             _ => self.legal(Quantity::Stiffness),
         };
         SpringBlock { law, k, m }

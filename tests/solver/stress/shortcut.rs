@@ -95,13 +95,13 @@ fn allowed(family: &dyn Family, case: &Case, found: f64, noise: f64, number: imp
         tau_ceiling,
     };
     let inputs = [a, b, v_i, v_f, t_f, tau_ceiling];
-    let beside: [Case; 6] = std::array::from_fn(|k| {
+    let compared_with: [Case; 6] = std::array::from_fn(|k| {
         let mut moved = inputs;
         moved[k] = moved[k].next_up();
         with(moved)
     });
     let change = |case: &Case| solve(family, case, FINE).map_or(0.0, |found| (number(&found) - 1.0).abs());
-    noise + 8.0 * beside.iter().map(change).sum::<f64>()
+    noise + 8.0 * compared_with.iter().map(change).sum::<f64>()
 }
 
 /// Where a family must have a member, and where it cannot.
