@@ -21,7 +21,7 @@ const FIELDS: [Field<Row>; 7] = [
         Column::new(
             "alpha_2",
             Kind::Quantity(Quantity::Alpha2),
-            "coefficient of t of the best shortcut; in the unit of the spec's alpha_2, 1/t_f if it has none",
+            "coefficient of t in theta; in the unit of alpha_2 in the spec, 1/t_f by default",
         ),
         |row| row.alpha_2,
     ),
@@ -29,7 +29,7 @@ const FIELDS: [Field<Row>; 7] = [
         Column::new(
             "alpha_3",
             Kind::Quantity(Quantity::Alpha3),
-            "coefficient of t^2 of the best shortcut; in the unit of the spec's alpha_3, 1/t_f^2 if it has none",
+            "coefficient of t^2 in theta; in the unit of alpha_3 in the spec, 1/t_f^2 by default",
         ),
         |row| row.alpha_3,
     ),
@@ -40,7 +40,11 @@ const FIELDS: [Field<Row>; 7] = [
         row.best.work_optimal
     }),
     Field::new(
-        Column::number("gap", "1", "(W_s - W*)/W*, without cancellation: good to 1e-7 of itself or 1e-20"),
+        Column::number(
+            "gap",
+            "1",
+            "(W_s - W*)/W*, computed without cancellation: good to a relative 1e-7, or to 1e-20",
+        ),
         |row| row.best.gap,
     ),
     Field::new(Column::number("v_min", "v_0", "least velocity of the best shortcut"), |row| row.best.v_min),
@@ -53,7 +57,7 @@ const FIELDS: [Field<Row>; 7] = [
 const COLUMNS: [Column; 7] = columns(&FIELDS);
 const WORK_ERROR: usize = place(&COLUMNS, "work_error");
 
-/// One row a transition and time.
+/// One row for each transition and duration.
 pub static BEST_CUBIC: Definition = Definition {
     name: "best_cubic",
     doc: "the cubic shortcut of least work, over the whole (alpha_2, alpha_3) plane",

@@ -1,8 +1,8 @@
-//! A column: one definition gives its name, what it holds, its unit and its meaning.
+//! A column: one definition gives its name, type, unit and meaning.
 
 use crate::grid::{Grid, Quantity, Scale};
 
-/// What a column holds.
+/// The type of a column.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Kind {
     /// A number in this unit.
@@ -11,7 +11,7 @@ pub enum Kind {
     Quantity(Quantity),
     /// One of these words.
     Label(&'static [&'static str]),
-    /// Whether something is so: 1 or 0 in a sheet.
+    /// A truth value: 1 or 0 in a [`ColumnBuffer`](super::ColumnBuffer).
     Flag,
 }
 
@@ -20,7 +20,7 @@ pub enum Kind {
 pub struct Column {
     /// Its name.
     pub name: &'static str,
-    /// What it holds.
+    /// Its type.
     pub kind: Kind,
     /// Its meaning in one line.
     pub doc: &'static str,
@@ -39,7 +39,7 @@ impl Column {
         Column { name, kind, doc, optional: false }
     }
 
-    /// The same, written only if a spec names it.
+    /// This column, written only if a spec names it.
     pub const fn optional(self) -> Column {
         Column { optional: true, ..self }
     }
@@ -49,7 +49,7 @@ impl Column {
         grid.units.name(self.model_unit(grid))
     }
 
-    /// The same unit as the model has it.
+    /// The unit in the model.
     fn model_unit(&self, grid: &Grid) -> &'static str {
         match self.kind {
             Kind::Number(unit) => unit,
@@ -58,17 +58,17 @@ impl Column {
         }
     }
 
-    /// What a value in the units of the model is multiplied by to be one in those of `grid`.
+    /// The factor from the units of the model to those of `grid`.
     pub fn size(&self, grid: &Grid) -> f64 {
         grid.units.size(self.model_unit(grid))
     }
 }
 
-/// A column of a table whose rows are computed one by one, and its cell in a row `R`.
+/// A column of a table, and the value of its cell for a row `R`.
 pub struct Field<R> {
     /// The column.
     pub column: Column,
-    /// The cell in the units of the model: a number, NaN where there is none, the place of a word, or 1 or 0 of a flag.
+    /// The cell in the units of the model: a number, NaN for none; the index of a word; 1 or 0 for a flag.
     pub cell: fn(&R) -> f64,
 }
 
@@ -90,7 +90,7 @@ pub const fn columns<R, const N: usize>(fields: &[Field<R>; N]) -> [Column; N] {
     columns
 }
 
-/// The place of the column of this name. A constant of a column that is not there does not compile.
+/// The index of the column with this name. An unknown name in a constant does not compile.
 pub const fn place(columns: &[Column], name: &str) -> usize {
     let mut place = 0;
     while !is_same(columns[place].name, name) {
@@ -99,7 +99,7 @@ pub const fn place(columns: &[Column], name: &str) -> usize {
     place
 }
 
-/// A cell that may be missing.
+/// An optional number as a cell: NaN for `None`.
 pub fn number(value: Option<f64>) -> f64 {
     value.unwrap_or(f64::NAN)
 }
@@ -117,4 +117,4 @@ const fn is_same(a: &str, b: &str) -> bool {
 pub const STATUS: &str = "status";
 
 /// Meaning of the last column of every table.
-pub const STATUS_DOC: &str = "what became of the row; numbers are null where there are none";
+pub const STATUS_DOC: &str = "outcome of the row; a number that does not exist is null";

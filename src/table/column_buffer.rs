@@ -1,47 +1,47 @@
-//! The cells of a range of rows, column by column, before they are written.
+//! The columns of a range of rows in memory, and the state of a run: its counters and its signals.
 
 use std::sync::atomic::{AtomicBool, AtomicU8, AtomicU64, Ordering};
 
 use super::Column;
 use crate::protocol::Status;
 
-/// The cells that a part consists of, axes apart.
+/// The result columns of a range of rows.
 ///
-/// A missing number is NaN in here, and null outside: no solver returns NaN as a result. A label is the index of its word, a flag 1 or 0.
+/// NaN stands for a missing number, which is written as null; no solver returns NaN. A label is the index of its word, a flag 1 or 0.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ColumnBuffer {
-    /// The columns that were asked for, in their order.
+    /// The projected columns, in the order of the table.
     pub columns: Vec<Vec<f64>>,
     /// The status of each row.
     pub status: Vec<Status>,
 }
 
 impl ColumnBuffer {
-    /// A sheet of `columns` columns and no row.
+    /// A buffer of `columns` columns without rows.
     pub fn new(columns: usize) -> ColumnBuffer {
         ColumnBuffer { columns: vec![Vec::new(); columns], status: Vec::new() }
     }
 
-    /// Makes it `rows` rows long, for another part; what the cells hold then means nothing.
+    /// Sets the length to `rows` rows. The cells have no defined value afterwards.
     pub fn resize(&mut self, rows: usize) {
         self.columns.iter_mut().for_each(|column| column.resize(rows, f64::NAN));
         self.status.resize(rows, Status::NotConverged);
     }
 }
 
-/// Which columns of a table are asked for.
+/// The requested columns of a table.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Projection(Vec<usize>);
 
 impl Projection {
-    /// The columns of these indices, in the order of the table.
+    /// The columns with these indices, in the order of the table.
     pub fn new(mut indices: Vec<usize>) -> Projection {
         indices.sort_unstable();
         indices.dedup();
         Projection(indices)
     }
 
-    /// Those of `columns` that are written where a spec names none.
+    /// The columns that a table has by default: all that are not optional.
     pub fn usual(columns: &[Column]) -> Projection {
         Projection((0..columns.len()).filter(|&index| !columns[index].optional).collect())
     }
@@ -51,18 +51,18 @@ impl Projection {
         &self.0
     }
 
-    /// Whether the column of this index is asked for.
+    /// Whether the column with this index is requested.
     pub fn has(&self, index: usize) -> bool {
         self.0.binary_search(&index).is_ok()
     }
 
-    /// Whether any of these is.
+    /// Whether any of these columns is requested.
     pub fn has_any(&self, indices: impl IntoIterator<Item = usize>) -> bool {
         indices.into_iter().any(|index| self.has(index))
     }
 }
 
-/// Work that was spent, exactly and the same on every machine.
+/// Solver statistics of a run: exact counts, equal on every machine.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct RunStats {
     /// Optimal protocols solved for `W*`.
@@ -114,7 +114,7 @@ impl From<crate::protocol::SolverStats> for RunStats {
     }
 }
 
-/// The line between a run and whoever watches it: how far it is, and whether it should stop.
+/// Progress of a run, and the request to stop it.
 #[derive(Debug, Default)]
 pub struct Signal {
     stop: AtomicBool,
@@ -123,19 +123,19 @@ pub struct Signal {
     phase: AtomicU8,
 }
 
-/// What a run is doing.
+/// The phase of a run.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Phase {
-    /// It checks the parts that are there.
+    /// Existing parts are checked.
     Checking,
-    /// It computes rows.
+    /// Rows are computed.
     Computing,
-    /// It writes the last parts.
+    /// The last parts are written.
     Writing,
 }
 
 impl Signal {
-    /// Asks the run to stop soon.
+    /// Requests the run to stop.
     pub fn stop(&self) {
         self.stop.store(true, Ordering::Relaxed);
     }
@@ -145,12 +145,12 @@ impl Signal {
         self.rows.load(Ordering::Relaxed)
     }
 
-    /// Rows of parts that were there already and are sound.
+    /// Rows of existing parts that are intact.
     pub fn kept(&self) -> u64 {
         self.kept.load(Ordering::Relaxed)
     }
 
-    /// Counts `rows` more rows that are kept.
+    /// Adds `rows` rows of an existing part.
     pub fn keep(&self, rows: u64) {
         self.kept.fetch_add(rows, Ordering::Relaxed);
     }
@@ -164,23 +164,26 @@ impl Signal {
         }
     }
 
-    /// Notes what the run is doing.
+    /// Sets the phase.
     pub fn enter(&self, phase: Phase) {
         self.phase.store(phase as u8, Ordering::Relaxed);
     }
 
-    /// Counts `rows` more rows.
+    /// Adds `rows` computed rows.
     pub fn advance(&self, rows: u64) {
         self.rows.fetch_add(rows, Ordering::Relaxed);
     }
 
-    /// An error once the run should stop.
+    /// Checks for a request to stop.
+    ///
+    /// # Errors
+    /// [`Stopped`] after [`Signal::stop`].
     pub fn check(&self) -> Result<(), Stopped> {
         if self.stop.load(Ordering::Relaxed) { Err(Stopped) } else { Ok(()) }
     }
 }
 
-/// The run was asked to stop.
+/// The run was stopped on request.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[error("stopped")]
 pub struct Stopped;

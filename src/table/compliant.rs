@@ -1,4 +1,4 @@
-//! `compliant`: the smooth shortcut at finite stiffness, and what becomes of it open loop.
+//! `compliant`: the smooth shortcut on a spring of finite stiffness, and its errors under open-loop control.
 
 use std::ops::Range;
 
@@ -45,7 +45,7 @@ const FIELDS: [Field<Row>; 14] = [
         "distance from the target in that norm if v_c is sampled every dt and held, to rtol of 1; null for dt = 0, \
          beyond 100000 samples, and where the motion does not last",
     ), |row| number(row.sampling_error)),
-    Field::new(Column::number("stiffness_ratio", "1", "k t_f^2/m: a large one makes the spring rigid; inf without mass"), |row| if row.slider.m > 0.0 { row.slider.k * row.t_f * row.t_f / row.slider.m } else { f64::INFINITY }),
+    Field::new(Column::number("stiffness_ratio", "1", "k t_f^2/m: a large one makes the spring rigid; inf for m = 0"), |row| if row.slider.m > 0.0 { row.slider.k * row.t_f * row.t_f / row.slider.m } else { f64::INFINITY }),
     Field::new(Column::number(
         "open_loop_error",
         "1",
@@ -66,7 +66,7 @@ const OPEN_LOOP_ERROR: usize = place(&COLUMNS, "open_loop_error");
 const WORK_ERROR: usize = place(&COLUMNS, "work_error");
 const GAP_ERROR: usize = place(&COLUMNS, "gap_error");
 
-/// One row a transition, time, stiffness, mass and time between samples.
+/// One row for each transition, duration, stiffness, mass and sampling interval.
 pub static COMPLIANT: Definition = Definition {
     name: "compliant",
     doc: "the smooth shortcut at finite stiffness",
@@ -121,28 +121,28 @@ fn compute(job: &Job<'_>, range: Range<u64>, buffer: &mut ColumnBuffer) -> Resul
     })
 }
 
-/// The number of a simulation, whose work is added.
+/// The number that a simulation gives; its statistics are added.
 fn told_by(followed: Followed, work: &mut RunStats) -> Option<f64> {
     *work +=
         RunStats { simulations: u64::from(followed.steps > 0), steps: followed.steps.into(), ..RunStats::default() };
     followed.number
 }
 
-/// A member.
+/// The member of the family.
 #[derive(Clone, Copy)]
 struct Solution {
     solved: Solved<Member>,
     amplification: Option<f64>,
-    /// Bound of the error of its work, where that is requested.
+    /// Error bound of its work, if requested.
     work_error: f64,
 }
 
-/// The members by tuple, stiffness and mass: solved once each whatever the time between samples.
+/// The members by tuple, stiffness and mass. Each is solved once for all sampling intervals.
 #[derive(Default)]
 struct MemberCache(Memo<(u64, u64, u64), Solution>);
 
 impl MemberCache {
-    /// The member for `point`, which belongs to tuple number `tuple`; adds what is spent by this call alone.
+    /// The member for `point`, of tuple number `tuple`; adds the statistics of this call.
     fn get(&self, job: &Job<'_>, tuple: u64, point: &Point, work: &mut RunStats) -> Solution {
         let slider = slider(point);
         self.0.get((tuple, slider.k.to_bits(), slider.m.to_bits()), || {

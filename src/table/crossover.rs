@@ -14,7 +14,7 @@ const FIELDS: [Field<CrossoverTimes>; 12] = [
     Field::new(Column::number("t_cross", TIME, "acceleration: duration at which v(0+) = v_i"), |times| {
         number(times.t_cross)
     }),
-    Field::new(Column::number("t_floor", TIME, "acceleration: duration at which v(0+) reaches the bound 1"), |times| {
+    Field::new(Column::number("t_floor", TIME, "acceleration: duration at which v(0+) reaches the floor 1"), |times| {
         number(times.t_floor)
     }),
     Field::new(Column::number("t_cheapest", TIME, "acceleration: duration of least W*"), |times| {
@@ -43,7 +43,7 @@ const FIELDS: [Field<CrossoverTimes>; 12] = [
 
 const COLUMNS: [Column; 12] = columns(&FIELDS);
 
-/// One row a transition.
+/// One row for each transition.
 pub static CROSSOVER: Definition = Definition {
     name: "crossover",
     doc: "the durations at which the optimal strategy changes",

@@ -1,4 +1,4 @@
-//! A row that panics on demand, so that tests can see what a run makes of it. Builds without debug assertions do not have it.
+//! A failpoint for tests: a row that panics on request. Builds without debug assertions do not contain it.
 
 use std::sync::OnceLock;
 
@@ -10,6 +10,6 @@ pub fn panic_at(mut rows: impl Iterator<Item = u64>) {
     static ROW: OnceLock<Option<u64>> = OnceLock::new();
     let wanted = ROW.get_or_init(|| std::env::var("SLIPSWEEP_PANIC").ok()?.parse().ok());
     if let Some(wanted) = wanted {
-        assert!(!rows.any(|row| row == *wanted), "SLIPSWEEP_PANIC asks for it");
+        assert!(!rows.any(|row| row == *wanted), "requested by SLIPSWEEP_PANIC");
     }
 }

@@ -1,7 +1,7 @@
 //! `gap`: the landscape of the cubic shortcuts and their distance from the optimum.
 //!
-//! A part is computed transition by transition, whatever the order of its axes: rows of the same transition and time are brought together,
-//! share one landscape and one optimal protocol, and are evaluated in chunks that the threads take one by one.
+//! A part is computed transition by transition, in any order of its axes. Rows of one transition and duration share one landscape and one
+//! optimal protocol. Threads evaluate them in chunks.
 
 use std::ops::Range;
 use std::sync::OnceLock;
@@ -17,7 +17,7 @@ use crate::protocol::cubic::{Landscape, LandscapeBuffers};
 use crate::protocol::{Status, error};
 
 const WORK_OPTIMAL: usize = 1;
-/// The place of `gap` among its columns.
+/// Index of the column `gap`.
 pub(super) const WORK_GAP: usize = 2;
 const WORK_ERROR: usize = 4;
 const GAP_ERROR: usize = 5;
@@ -25,20 +25,20 @@ const GAP_ERROR: usize = 5;
 pub(super) const COLUMNS: &[Column] = &[
     Column::number("work", "mu_0 sigma l", "work of friction W_s of the shortcut"),
     Column::number("work_optimal", "mu_0 sigma l", "least work of friction W* of any protocol"),
-    Column::number("gap", "1", "(W_s - W*)/W*, good to rtol of 1 + gap, not of itself"),
+    Column::number("gap", "1", "(W_s - W*)/W*, good to rtol of 1 + gap"),
     Column::number("v_min", "v_0", "least velocity of the shortcut"),
     Column::number("work_error", "mu_0 sigma l", "bound of the error of work, by a second quadrature").optional(),
     Column::number("gap_error", "1", "bound of the error of gap, by a second quadrature and a second optimum")
         .optional(),
 ];
 
-/// Rows that a thread takes at a time: short enough to stop within a fraction of a second at any accuracy.
+/// Rows of a chunk. Chosen: a run stops within a fraction of a second at any accuracy.
 const CHUNK: usize = 1 << 13;
 
-/// One row a shortcut.
+/// One row for each shortcut.
 pub static GAP: Definition = Definition {
     name: "gap",
-    doc: "the work of a cubic shortcut and its distance from the optimum",
+    doc: "the work of a cubic shortcut and its gap to the optimum",
     axes: &[
         Quantity::Time,
         Quantity::A,
@@ -65,7 +65,7 @@ pub(super) fn compute(job: &Job<'_>, rows: Range<u64>, buffer: &mut ColumnBuffer
     let coefficients = Coefficients::new(job, view, &rows, order.as_deref());
     let works = chunks(&groups, buffer, job.projection)
         .into_par_iter()
-        // Chunks cost very different times: no thread may keep several to itself while another one is idle.
+        // The cost of chunks varies widely, so threads take them one by one.
         .with_max_len(1)
         .map(|chunk| {
             job.signal.check()?;
@@ -84,7 +84,7 @@ pub(super) fn compute(job: &Job<'_>, rows: Range<u64>, buffer: &mut ColumnBuffer
     Ok(works.into_iter().sum())
 }
 
-/// Rows of one transition and time, side by side in the order of computation.
+/// Rows of one transition and duration, contiguous in the order of computation.
 struct Group {
     tuple: u64,
     /// One of its rows.
@@ -95,17 +95,17 @@ struct Group {
 }
 
 struct Prepared {
-    /// `None` where no protocol with `v >= 1` is fast enough, so that every row is infeasible.
+    /// `None` if no protocol with `v >= 1` is fast enough: every row is infeasible.
     landscape: Option<Landscape>,
-    /// The same as fine as there is, its transition and its time, where errors are asked for.
+    /// The landscape at the tightest tolerance, its transition and duration, if error bounds are requested.
     finest: Option<(Landscape, Transition, f64)>,
-    /// Status and `W*` of the optimal protocol, where it is asked for.
+    /// Status and `W*` of the optimal protocol, if requested.
     optimum: Option<(Status, Option<f64>)>,
-    /// Bound of the error of `W*`, where it is asked for.
+    /// Error bound of `W*`, if requested.
     error_optimal: f64,
 }
 
-/// The groups of a part, and for each place in the order of computation its row, if that is not the order of rows.
+/// The groups of a part, and the row of each place in the order of computation, if the orders differ.
 fn groups(view: &View<'_>, job: &Job<'_>, rows: &Range<u64>) -> (Vec<Group>, Option<Vec<u32>>) {
     let mut runs = view.tuples(&job.tuples, rows.clone());
     let in_order = |runs: &[(u64, Range<u64>)]| {
@@ -182,7 +182,7 @@ impl<'a> Coefficients<'a> {
     }
 }
 
-/// The cells of consecutive places; a column that is not asked for is empty.
+/// The cells of consecutive places; a column that is not requested is empty.
 struct Cells<'a> {
     columns: [&'a mut [f64]; COLUMNS.len()],
     status: &'a mut [Status],
@@ -201,7 +201,7 @@ impl<'a> Cells<'a> {
     }
 }
 
-/// What a thread takes at a time: places of one or several groups.
+/// The work unit of a thread: places of one or several groups.
 struct Chunk<'a> {
     first_group: usize,
     place: usize,
@@ -282,7 +282,7 @@ fn evaluate(job: &Job<'_>, groups: &[Group], coefficients: &Coefficients<'_>, ch
     work
 }
 
-/// The cells of a group in a chunk, its work computed; a column that is not asked for is empty.
+/// The cells of a group in a chunk, its work computed; a column that is not requested is empty.
 struct Compared<'a> {
     status: &'a mut [Status],
     works: &'a mut [f64],
@@ -293,7 +293,7 @@ struct Compared<'a> {
     gap_error: &'a mut [f64],
 }
 
-/// Drops what did not converge and compares the work with that of the optimum.
+/// Removes rows that did not converge, and compares the work with the optimum.
 fn compare(prepared: &Prepared, cells: Compared<'_>) {
     let Compared { status, works, v_min, work_optimal, gap, errors, gap_error } = cells;
     for (i, status) in status.iter().enumerate() {
@@ -347,7 +347,7 @@ fn prepare(job: &Job<'_>, group: &Group, point: &Point, work: &mut RunStats) -> 
     Prepared { landscape: Some(landscape(job.rtol)), finest, optimum, error_optimal }
 }
 
-/// Brings a sheet from the order of computation into the order of rows.
+/// Sorts a buffer from the order of computation into the order of rows.
 fn scatter(buffer: &mut ColumnBuffer, order: &[u32]) {
     for column in &mut buffer.columns {
         let computed = column.clone();

@@ -1,4 +1,4 @@
-//! What a row means: the tables, one file each, and what they have in common.
+//! The tables: one file for each, and their common trait.
 
 mod best_cubic;
 mod column;
@@ -30,45 +30,48 @@ pub(crate) use reduced::EDGES as HISTOGRAM_EDGES;
 pub use reduced::MOST_SORTED;
 pub use repeated_rows::RepeatedRows;
 
-/// A table: what its rows depend on, what they hold and how they are computed.
+/// A table: the axes of its rows, its columns and its computation.
 pub trait Table: Sync {
-    /// Its name in specs and its folder's name.
+    /// Its name in specs, and the name of its folder.
     fn name(&self) -> &'static str;
 
-    /// What a row is, in one line.
+    /// The meaning of a row, in one line.
     fn doc(&self) -> &'static str;
 
-    /// The quantities that a row depends on; its first columns, in the order of [`Quantity::ALL`].
+    /// The axes of the table, which are its first columns, in the order of [`Quantity::ALL`].
     fn axes(&self) -> &'static [Quantity];
 
     /// The columns after the axes, without `status`.
     fn columns(&self) -> &'static [Column];
 
-    /// Rows of a part: fixed, so that the bytes of a part depend on the spec alone.
+    /// Rows of a part. A fixed number: the bytes of a part depend on the spec alone.
     fn rows_per_part(&self) -> u64;
 
-    /// What a row costs on average, in nanoseconds of one processor: fixed, for it decides which shard has which part. Only how tables
-    /// compare matters.
+    /// Mean cost of a row, in nanoseconds of one processor. A fixed number: the distribution of parts over shards depends on the ratios of
+    /// these costs.
     fn cost(&self) -> u64;
 
-    /// Whether the selected columns need the optimal protocol of every row, shared through [`OptimumCache`].
+    /// Whether the projected columns need the optimal protocol of every row, from [`OptimumCache`].
     fn needs_optimum(&self, projection: &Projection) -> bool;
 
-    /// Relative accuracy where the spec gives the table none of its own; that of the whole sweep if `None`.
+    /// Default relative accuracy of the table; `None`: that of the sweep.
     fn default_rtol(&self) -> Option<f64> {
         None
     }
 
-    /// What a simpler theory says of one of its columns, if it does.
+    /// The prediction of linear theory for one of its columns, if any.
     fn prediction(&self) -> Option<Prediction> {
         None
     }
 
-    /// Computes `rows` into `buffer`, which has the columns of the selection and as many rows: every cell is written.
+    /// Computes `rows` into `buffer`, which has the projected columns and this number of rows. Writes every cell.
+    ///
+    /// # Errors
+    /// [`Stopped`] if the run was stopped.
     fn compute(&self, job: &Job<'_>, rows: Range<u64>, buffer: &mut ColumnBuffer) -> Result<RunStats, Stopped>;
 }
 
-/// A table of which everything is known in advance.
+/// A table of constant properties.
 pub struct Definition {
     name: &'static str,
     doc: &'static str,
@@ -114,24 +117,24 @@ impl Table for Definition {
     }
 }
 
-/// What a simpler theory says of a column of words: a summary counts it against what was found.
+/// The prediction of a simpler theory for a column of words. The summary counts agreement.
 #[derive(Debug, Clone, Copy)]
 pub struct Prediction {
     /// The column.
     pub column: &'static str,
     /// The theory, in a few words.
     pub theory: &'static str,
-    /// A word that may be found where it is not predicted.
+    /// A word that may occur against the prediction.
     pub surprise: &'static str,
-    /// Why that may be.
+    /// The reason.
     pub why: &'static str,
-    /// The axes that it depends on.
+    /// The axes of the prediction.
     pub axes: &'static [Quantity],
-    /// The word that it predicts at a point.
+    /// The predicted word at a point.
     pub word: fn(&Point) -> &'static str,
 }
 
-/// Every table, in the order in which they are listed. A new table is a file and a line here.
+/// Every table, in the order of listings. A new table is a file and a line here.
 pub const ALL: [&dyn Table; 9] = [
     &gap::GAP,
     &best_cubic::BEST_CUBIC,
@@ -144,16 +147,16 @@ pub const ALL: [&dyn Table; 9] = [
     &regularised::REGULARISED,
 ];
 
-/// Ways to reduce the landscapes of `gap`, by the word that a spec has for each, and the tables that hold what comes of them.
+/// The reductions of `gap`: the word in a spec, and the table that it writes.
 pub const REDUCED: [(&str, &dyn Table); 3] =
     [("min", &reduced::MINIMUM), ("quantiles", &reduced::QUANTILES), ("histogram", &reduced::HISTOGRAM)];
 
-/// The table of this name, also one of [`REDUCED`].
+/// The table with this name, including those of [`REDUCED`].
 pub fn find(name: &str) -> Option<&'static dyn Table> {
     ALL.into_iter().chain(REDUCED.map(|(_, table)| table)).find(|table| table.name() == name)
 }
 
-/// What a table needs to compute any of its rows.
+/// The input of [`Table::compute`].
 #[derive(Debug)]
 pub struct Job<'a> {
     /// The grid of the sweep.
@@ -162,20 +165,20 @@ pub struct Job<'a> {
     pub rows: &'a RowIndex,
     /// The different optimal problems among its rows.
     pub tuples: Tuples,
-    /// Its rows that are there more than once, if any are.
+    /// The memo of repeated rows, if any row repeats.
     pub repeated_rows: Option<RepeatedRows>,
-    /// Of a table that reduces landscapes: their rows, those of one of its rows side by side, in the order of its rows.
+    /// The landscape rows of a reduced table, contiguous for each of its rows.
     pub members: Option<&'a RowIndex>,
-    /// The columns asked for.
+    /// The projected columns.
     pub projection: &'a Projection,
-    /// What the values of each of them are multiplied by to be in the units of the grid.
+    /// The factor of each projected column from the units of the model to those of the grid.
     pub sizes: &'a [f64],
     /// Whether optimal protocols obey `v >= 1`.
     pub bounded: bool,
     /// Relative accuracy of the table.
     pub rtol: f64,
-    /// The shared optimal protocols.
+    /// The cache of optimal protocols.
     pub optimum_cache: &'a OptimumCache,
-    /// How far the run is, and whether to stop.
+    /// Progress, and the request to stop.
     pub signal: &'a Signal,
 }

@@ -23,14 +23,14 @@ const FIELDS: [Field<Row>; 8] = [
         row.optimum.time_at_floor
     }),
     Field::new(Column::number("hamiltonian", "mu_0 sigma v_0", "dW*/dt_f"), |row| row.optimum.hamiltonian),
-    Field::new(Column::number("theta_max", "l/v_0", "largest contact lifetime on the way"), |row| {
+    Field::new(Column::number("theta_max", "l/v_0", "greatest state variable theta on the path"), |row| {
         row.optimum.theta_max
     }),
     Field::new(
         Column::new(
             "strategy",
             Kind::Label(STRATEGIES),
-            "how it starts: speed_up v(0+) > v_i, slow_down 1 < v(0+) <= v_i, floor starts on v = 1",
+            "start of the protocol: speed_up v(0+) > v_i, slow_down 1 < v(0+) <= v_i, floor v(0+) = 1",
         ),
         |row| f64::from(row.optimum.strategy as u8),
     ),
@@ -43,7 +43,7 @@ const FIELDS: [Field<Row>; 8] = [
 const COLUMNS: [Column; 8] = columns(&FIELDS);
 const WORK_ERROR: usize = place(&COLUMNS, "work_error");
 
-/// One row a transition and time.
+/// One row for each transition and duration.
 pub static OPTIMAL: Definition = Definition {
     name: "optimal",
     doc: "the protocol of least work",
@@ -69,7 +69,7 @@ fn compute(job: &Job<'_>, range: Range<u64>, buffer: &mut ColumnBuffer) -> Resul
 
 #[cfg(test)]
 mod tests {
-    //! The words of a label are those of its type.
+    //! The words of the column are those of its type.
 
     use super::*;
     use crate::protocol::optimal::Strategy;

@@ -1,4 +1,4 @@
-//! Optimal protocols shared by every table and part of a run: each transition and time is solved once.
+//! The cache of optimal protocols. All tables and parts of a run share it: each transition and duration is solved once.
 
 use std::sync::OnceLock;
 
@@ -9,7 +9,7 @@ use crate::model::{Law, Transition};
 use crate::protocol::optimal::{self, Optimum};
 use crate::protocol::{Solved, Status, error};
 
-/// What the optimal protocol depends on.
+/// The axes of the optimal protocol.
 pub const OPTIMUM_AXES: &[Quantity] =
     &[Quantity::Time, Quantity::A, Quantity::B, Quantity::InitialVelocity, Quantity::FinalVelocity];
 
@@ -22,33 +22,32 @@ pub fn transition(point: &Point) -> Transition {
     }
 }
 
-/// Bound of the error of the work of an optimal protocol that was found for `point`, by a second solve; NaN where that
-/// has none. The work is added.
+/// Error bound of the optimal work at `point`, from a second solve; NaN if that finds no optimum. Adds the solver statistics to `work`.
 pub fn work_error(job: &Job<'_>, point: &Point, optimum: &Optimum, work: &mut RunStats) -> f64 {
     let (bound, stats) = error::of_optimum(&transition(point), point[Quantity::Time], job.bounded, optimum);
     *work += RunStats { optima: 1, ..RunStats::from(stats) };
     bound.unwrap_or(f64::NAN)
 }
 
-/// The least work of any protocol, and how far above it one is.
+/// The least work of any protocol, and the gap of one protocol to it.
 pub struct Comparison {
-    /// The least work; NaN where it is not known.
+    /// The least work W*; NaN if unknown.
     pub work: f64,
-    /// What the protocol takes beyond it, as a share of it.
+    /// The gap (W - W*)/W*.
     pub gap: f64,
-    /// Bound of the error of the gap; NaN where it is not asked for.
+    /// Error bound of the gap; NaN if not requested.
     pub gap_error: f64,
-    /// The status of the optimum; `Ok` where it is not asked for, and where a bound or the time rules it out.
+    /// The status of the optimum; `Ok` if it is not requested or infeasible.
     pub optimum: Status,
 }
 
 impl Comparison {
-    /// Nothing is known.
+    /// A comparison without values.
     pub const NONE: Comparison = Comparison { work: f64::NAN, gap: f64::NAN, gap_error: f64::NAN, optimum: Status::Ok };
 }
 
-/// Compares a work, and the bound of its error, with the least one of the tuple that `point` belongs to; with the bound
-/// of the error of the gap where it is `bounded`. What is solved for it is added to `work`.
+/// Compares a work and its error bound with the least work of the tuple of `point`. `bounded` requests the error bound of the gap. Adds
+/// the solver statistics to `work`.
 pub fn compare(
     job: &Job<'_>,
     (tuple, point): (u64, &Point),
@@ -68,10 +67,10 @@ pub fn compare(
     Comparison { work: least.work, gap: (work_s - least.work) / least.work, gap_error, optimum: status }
 }
 
-/// An optimal protocol once it is solved.
+/// An optimal protocol that is solved at most once.
 type Slot = OnceLock<Solved<Optimum>>;
 
-/// The store of optimal protocols, by tuple number.
+/// The cache of optimal protocols, by tuple number.
 #[derive(Debug)]
 pub struct OptimumCache {
     slots: Slots,
@@ -81,22 +80,22 @@ pub struct OptimumCache {
 
 #[derive(Debug)]
 enum Slots {
-    /// One for each number.
+    /// A slot for each number.
     Dense(Vec<Slot>),
-    /// Only for the numbers that occur.
+    /// A slot for each number that occurs.
     Sparse(Memo<u64, Solved<Optimum>>),
 }
 
 impl OptimumCache {
-    /// Most tuples that are kept over a whole run (about 100 MB); a grid of more keeps none beyond its part.
+    /// Greatest number of tuples kept for a whole run (about 100 MB). Larger grids keep those of one part.
     pub const MOST_KEPT: u64 = 1 << 20;
 
-    /// A store for `tuples` different transitions and times, each solved to `rtol`, with `v >= 1` where `bounded`.
+    /// A cache for `tuples` different transitions and durations, solved to `rtol`, with `v >= 1` if `bounded`.
     pub fn new(tuples: u64, bounded: bool, rtol: f64) -> OptimumCache {
         OptimumCache::among(tuples, tuples, bounded, rtol)
     }
 
-    /// The same where their numbers lie below `span`, most of which may not occur.
+    /// A cache for sparse tuple numbers below `span`.
     pub fn among(tuples: u64, span: u64, bounded: bool, rtol: f64) -> OptimumCache {
         let slots = if span > Self::MOST_KEPT && tuples <= Self::MOST_KEPT {
             Slots::Sparse(Memo::default())
@@ -107,7 +106,7 @@ impl OptimumCache {
         OptimumCache { slots, bounded, rtol }
     }
 
-    /// The optimal protocol of tuple number `tuple`, which `point` belongs to; the work is that of this call alone.
+    /// The optimal protocol of `point`, which has tuple number `tuple`; adds the statistics of this call.
     pub fn get(&self, tuple: u64, point: &Point) -> (Solved<Optimum>, RunStats) {
         let mut work = RunStats::default();
         let mut solve = || {

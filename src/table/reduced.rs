@@ -1,7 +1,7 @@
-//! `gap_min`, `gap_quantiles`, `gap_histogram`: all shortcuts of a transition and time in one row, for landscapes that nobody wants to store.
+//! `gap_min`, `gap_quantiles`, `gap_histogram`: the landscape of a transition and duration reduced to one row.
 //!
-//! The landscape is computed piece by piece, as `gap` computes it, and forgotten. What is told of it does not depend on the pieces: counts, a
-//! least value whose ties go to the first row, and quantiles that are values of the landscape themselves.
+//! The landscape is computed in blocks, as `gap` computes it, and discarded. The results do not depend on the blocks: counts, a minimum whose
+//! ties go to the first row, and quantiles that are values of the landscape.
 
 use std::ops::Range;
 
@@ -11,7 +11,7 @@ use super::{Column, ColumnBuffer, Definition, Job, Kind, Projection, RunStats, S
 use crate::grid::Quantity;
 use crate::protocol::Status;
 
-/// What is told of a landscape.
+/// The reduction of a landscape.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Reduction {
     Minimum,
@@ -22,7 +22,7 @@ enum Reduction {
 /// The shortcut of least gap.
 pub static MINIMUM: Definition = reduced(
     "gap_min",
-    "the shortcut of least gap among those of a spec (reduce = \"min\" of gap)",
+    "the shortcut of least gap of a landscape (reduce = \"min\" of gap)",
     MINIMUM_COLUMNS,
     |job, rows, buffer| compute(Reduction::Minimum, job, rows, buffer),
 );
@@ -30,7 +30,7 @@ pub static MINIMUM: Definition = reduced(
 /// Quantiles of the gap.
 pub static QUANTILES: Definition = reduced(
     "gap_quantiles",
-    "quantiles of the gap of the shortcuts of a spec (reduce = \"quantiles\" of gap)",
+    "quantiles of the gap of a landscape (reduce = \"quantiles\" of gap)",
     QUANTILE_COLUMNS,
     |job, rows, buffer| compute(Reduction::Quantiles, job, rows, buffer),
 );
@@ -38,12 +38,12 @@ pub static QUANTILES: Definition = reduced(
 /// Numbers of shortcuts by decades of the gap.
 pub static HISTOGRAM: Definition = reduced(
     "gap_histogram",
-    "how many shortcuts of a spec have which gap (reduce = \"histogram\" of gap)",
+    "histogram of the gap of a landscape (reduce = \"histogram\" of gap)",
     HISTOGRAM_COLUMNS,
     |job, rows, buffer| compute(Reduction::Histogram, job, rows, buffer),
 );
 
-/// One row a transition and time; the cost is that of a landscape of 400 x 400 shortcuts.
+/// One row for each transition and duration. The cost is that of a landscape of 400 x 400 shortcuts.
 const fn reduced(
     name: &'static str,
     doc: &'static str,
@@ -63,13 +63,14 @@ const fn reduced(
     }
 }
 
-/// Rows of a landscape that are held at a time.
+/// Rows of a landscape in memory at a time.
 const PIECE: usize = 1 << 16;
 
-/// Most shortcuts of a transition and time of which quantiles are told: their gaps are sorted in memory.
+/// Greatest number of shortcuts of a row of `gap_quantiles`, whose gaps are sorted in memory.
 pub const MOST_SORTED: u64 = 1 << 21;
 
-const COUNT: Column = Column::number("shortcuts", "1", "shortcuts with status ok, the only ones that count");
+const COUNT: Column =
+    Column::number("shortcuts", "1", "number of shortcuts with status ok; only these enter the other columns");
 
 const MINIMUM_COLUMNS: &[Column] = &[
     COUNT,
@@ -77,11 +78,11 @@ const MINIMUM_COLUMNS: &[Column] = &[
     Column::new("alpha_3", Kind::Quantity(Quantity::Alpha3), "coefficient of t^2 of the shortcut of least gap"),
     Column::number("work", "mu_0 sigma l", "its work of friction W_s"),
     Column::number("work_optimal", "mu_0 sigma l", "least work of friction W* of any protocol"),
-    Column::number("gap", "1", "its (W_s - W*)/W*; of several with the same, that of the first row of the landscape"),
+    Column::number("gap", "1", "least (W_s - W*)/W*; ties go to the first row of the landscape"),
     Column::number("v_min", "v_0", "its least velocity"),
 ];
 
-/// The quantiles, in hundredths: the least gap that so many hundredths of the shortcuts do not exceed.
+/// The quantiles in percent: the least gap that this percentage of the shortcuts does not exceed.
 const HUNDREDTHS: [u64; 7] = [0, 5, 25, 50, 75, 95, 100];
 
 const QUANTILE_COLUMNS: &[Column] = &[
@@ -95,7 +96,7 @@ const QUANTILE_COLUMNS: &[Column] = &[
     Column::number("gap_max", "1", "greatest gap"),
 ];
 
-/// Where the classes of the histogram begin, but for the first.
+/// Lower edges of the classes of the histogram, without the first.
 pub const EDGES: [f64; 10] = [1e-8, 1e-7, 1e-6, 1e-5, 1e-4, 1e-3, 1e-2, 1e-1, 1.0, 10.0];
 
 const HISTOGRAM_COLUMNS: &[Column] = &[
@@ -128,7 +129,7 @@ fn compute(
     let each = members.rows() / job.rows.rows().max(1);
     let (projection, signal) = (Projection::usual(gap::COLUMNS), Signal::default());
     let tuples = members.tuples(OPTIMUM_AXES);
-    // Progress is counted in rows of this table, so that of the landscape goes nowhere.
+    // Progress counts rows of this table, not of the landscape.
     let sizes: Vec<f64> = gap::COLUMNS.iter().map(|column| column.size(job.grid)).collect();
     let landscape = Job {
         rows: members,
@@ -141,7 +142,7 @@ fn compute(
         ..*job
     };
     let mut all = RunStats::default();
-    // One after another: the threads share each landscape, and no more than one a part is in memory.
+    // One after another: the threads share each landscape, so a part holds one landscape in memory.
     for (place, row) in rows.enumerate() {
         let (status, cells, work) = reduction.cells(job, &landscape, row * each..(row + 1) * each)?;
         buffer.status[place] = status;
@@ -154,7 +155,7 @@ fn compute(
     Ok(all)
 }
 
-/// What is kept of a landscape while it is computed.
+/// The accumulated reduction of a landscape.
 #[derive(Default)]
 struct Tally {
     /// Shortcuts of each status.
@@ -168,7 +169,7 @@ struct Tally {
 }
 
 impl Tally {
-    /// The worst status that concerns the whole landscape; one that has nothing that is ok says why.
+    /// The status of the row: the worst status of the landscape, or the reason why no shortcut is ok.
     fn status(&self) -> Status {
         [Status::NotConverged, Status::Ok, Status::Unproven, Status::NegativeFriction, Status::BelowBound]
             .into_iter()
@@ -176,7 +177,7 @@ impl Tally {
             .unwrap_or(Status::Infeasible)
     }
 
-    /// Adds a piece of the landscape, whose first row is `start`, as far as `reduction` needs it.
+    /// Adds a block of the landscape that begins at row `start`.
     fn add(&mut self, reduction: Reduction, start: u64, buffer: &ColumnBuffer) {
         for (place, status) in buffer.status.iter().enumerate() {
             self.statuses[*status as usize] += 1;
@@ -207,7 +208,7 @@ impl Reduction {
         }
     }
 
-    /// Status and cells of the row whose shortcuts are `rows` of the landscape.
+    /// Status and cells of the row that reduces the landscape rows `rows`.
     fn cells(
         self,
         job: &Job<'_>,

@@ -20,11 +20,10 @@ const FIELDS: [Field<Row>; 9] = [
     Field::new(Column::number("work_optimal", "mu_0 sigma l", "least work of friction W* of any protocol"), |row| {
         row.found.work_optimal
     }),
-    Field::new(Column::number("gap", "1", "(work - W*)/W*, good to rtol of itself"), |row| row.found.gap),
-    Field::new(
-        Column::number("v_min", "v_0", "least velocity of the block; fewer digits where it dips far below 1"),
-        |row| row.found.v_min,
-    ),
+    Field::new(Column::number("gap", "1", "(work - W*)/W*, good to a relative rtol"), |row| row.found.gap),
+    Field::new(Column::number("v_min", "v_0", "least velocity of the block; fewer digits far below 1"), |row| {
+        row.found.v_min
+    }),
     Field::new(Column::number("v_max", "v_0", "greatest velocity of the block"), |row| row.found.v_max),
     Field::new(
         Column::number("v_c_min", "v_0", "least control velocity; both good to rtol of the greater of the two"),
@@ -44,10 +43,10 @@ const COLUMNS: [Column; 9] = columns(&FIELDS);
 const WORK_ERROR: usize = place(&COLUMNS, "work_error");
 const GAP_ERROR: usize = place(&COLUMNS, "gap_error");
 
-/// One row a transition, time, stiffness, mass and length of the pieces.
+/// One row for each transition, duration, stiffness, mass and length of the smooth pieces.
 pub static REGULARISED: Definition = Definition {
     name: "regularised",
-    doc: "the optimal protocol, its jumps made smooth",
+    doc: "the optimal protocol with its jumps replaced by smooth pieces",
     axes: &[
         Quantity::Time,
         Quantity::A,

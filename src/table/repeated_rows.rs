@@ -1,4 +1,4 @@
-//! Rows that a spec requests more than once: each is computed once a run and written as often as requested.
+//! The memo of repeated rows: a row that a spec requests several times is computed once a run.
 
 use std::sync::Arc;
 
@@ -7,26 +7,26 @@ use super::memo::Memo;
 use crate::grid::{Quantity, RowIndex, Tuples};
 use crate::protocol::Status;
 
-/// The rows of a table that has several with the same values on all axes.
+/// The memo of a table that has several rows with equal values on all axes.
 #[derive(Debug)]
 pub struct RepeatedRows {
-    /// The number of each row among those that differ.
+    /// The number of each row among the different rows.
     pub tuples: Tuples,
     rows: Memo<u64, (Status, Arc<[f64]>)>,
 }
 
 impl RepeatedRows {
-    /// Most different rows that are kept over a run; a table of more computes each as often as it is requested.
+    /// Greatest number of different rows in the memo; larger tables compute every row.
     const MOST_KEPT: u64 = 1 << 18;
 
-    /// Those of a table over `axes`; `None` where no list names a value twice.
+    /// The memo of a table over `axes`; `None` if no row repeats.
     pub fn among(rows: &RowIndex, axes: &[Quantity]) -> Option<RepeatedRows> {
         let tuples = rows.tuples(axes);
         let worthwhile = tuples.repeat() && tuples.span() <= Self::MOST_KEPT;
         worthwhile.then(|| RepeatedRows { tuples, rows: Memo::default() })
     }
 
-    /// The row of number `tuple`, into `cells`; `compute` fills them if it is not known yet. The work is that of this call alone.
+    /// Copies row number `tuple` into `cells`, computed by `compute` if it is unknown. Returns the statistics of this call.
     pub fn get(
         &self,
         tuple: u64,

@@ -1,4 +1,4 @@
-//! Tables that are computed row by row, each row on its own.
+//! Tables whose rows are computed independently.
 
 use std::ops::Range;
 
@@ -9,12 +9,12 @@ use super::{ColumnBuffer, Field, Job, RepeatedRows, RunStats, Stopped};
 use crate::grid::{Point, Quantity, Runs};
 use crate::protocol::Status;
 
-/// What a row is: its status, its values if it has any, and what they cost.
+/// A computed row: its status, its values if any, and solver statistics.
 pub type Solved<R> = (Status, Option<R>, RunStats);
 
-/// Computes `rows` with `row`, which is given the number of the optimal problem. The cells of a row without values are missing.
+/// Computes `rows` by calling `row` with the tuple number and the point of each. A row without values has missing cells.
 ///
-/// Rows are spread over the threads in chunks of `chunk` rows.
+/// The threads take chunks of `chunk` rows.
 pub fn each<R>(
     job: &Job<'_>,
     rows: Range<u64>,
@@ -29,7 +29,7 @@ pub fn each<R>(
         .repeated_rows
         .as_ref()
         .map(|repeated_rows| (repeated_rows, view.tuples(&repeated_rows.tuples, rows.clone())));
-    // Values are taken from the axes once a step, not once a row.
+    // Axis values are read once a step, not once a row.
     let axes: Vec<Steps> = Quantity::ALL
         .into_iter()
         .filter_map(|quantity| {
@@ -73,13 +73,13 @@ struct Steps {
     values: Vec<f64>,
 }
 
-/// The number of a tuple, and rows in a row that have it.
+/// The number of a tuple, and the consecutive rows that have it.
 type Numbered = (u64, Range<u64>);
 
 /// The cells of consecutive rows.
 struct Chunk<'a> {
     start: u64,
-    /// The selected columns.
+    /// The projected columns.
     columns: Vec<&'a mut [f64]>,
     status: &'a mut [Status],
 }

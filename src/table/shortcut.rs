@@ -11,11 +11,11 @@ use crate::grid::{Point, Quantity};
 use crate::protocol::shortcut::{Case, FAMILIES, Family, Obstacle, Shortcut as Member};
 use crate::protocol::{SolverStats, error};
 
-/// A row: the member of the family, or what makes it infeasible.
+/// A row: the member of the family, or the reason why it is infeasible.
 struct Row {
     member: Option<Member>,
     obstacle: Option<Obstacle>,
-    /// What `alpha` is multiplied by to be in the unit of its column.
+    /// Factor of `alpha` to the unit of its column.
     alpha_unit: f64,
     work_error: f64,
     least: Comparison,
@@ -32,7 +32,7 @@ const FIELDS: [Field<Row>; 11] = [
         Column::number(
             "alpha",
             "1; (v_0/l)^2 for bounded_velocity",
-            "the family's parameter alpha_3 of the paper; null for step and cubic, which have none, 0 where tau_ceiling = inf",
+            "parameter of the family (alpha_3 in the paper); null for step and cubic, 0 for tau_ceiling = inf",
         ),
         |row| row.of_solution(|member| number(member.alpha)) * row.alpha_unit,
     ),
@@ -43,13 +43,12 @@ const FIELDS: [Field<Row>; 11] = [
         row.least.work
     }),
     Field::new(
-        Column::number("gap", "1", "(W_s - W*)/W*, good to rtol of 1 + gap; below 0 for a step that has not arrived"),
+        Column::number("gap", "1", "(W_s - W*)/W*, good to rtol of 1 + gap; negative for a step that does not arrive"),
         |row| row.least.gap,
     ),
-    Field::new(
-        Column::number("v_min", "v_0", "least velocity between the ends; 0 below the range of doubles"),
-        |row| row.of_solution(|member| member.v_min),
-    ),
+    Field::new(Column::number("v_min", "v_0", "least velocity between the ends; 0 if it underflows"), |row| {
+        row.of_solution(|member| member.v_min)
+    }),
     Field::new(Column::number("v_max", "v_0", "greatest velocity between the ends"), |row| {
         row.of_solution(|member| member.v_max)
     }),
@@ -57,16 +56,12 @@ const FIELDS: [Field<Row>; 11] = [
         row.of_solution(|member| member.friction_max)
     }),
     Field::new(
-        Column::number(
-            "terminal_error",
-            "1",
-            "theta(t_f) v_f - 1: how far from its target a step is; 0 for the other families",
-        )
-        .optional(),
+        Column::number("terminal_error", "1", "theta(t_f) v_f - 1, the miss of a step; 0 for the other families")
+            .optional(),
         |row| row.of_solution(|member| member.miss),
     ),
     Field::new(
-        Column::new("bound", Kind::Label(&Obstacle::NAMES), "which bound makes the row infeasible").optional(),
+        Column::new("bound", Kind::Label(&Obstacle::NAMES), "the bound that makes the row infeasible").optional(),
         |row| number(row.obstacle.map(|obstacle| obstacle.code() as f64)),
     ),
     Field::new(
@@ -85,7 +80,7 @@ const GAP: usize = place(&COLUMNS, "gap");
 const WORK_ERROR: usize = place(&COLUMNS, "work_error");
 const GAP_ERROR: usize = place(&COLUMNS, "gap_error");
 
-/// One row a transition, time, family and bound on friction.
+/// One row for each transition, duration, family and friction ceiling.
 pub static SHORTCUT: Definition = Definition {
     name: "shortcut",
     doc: "the shortcut of a family",
@@ -140,15 +135,15 @@ fn compute(job: &Job<'_>, range: Range<u64>, buffer: &mut ColumnBuffer) -> Resul
     })
 }
 
-/// A member, and the bound of the error of its work where that is requested.
+/// A member, and the error bound of its work if requested.
 type Solution = Result<(Member, f64), Obstacle>;
 
-/// The members of families that do not depend on the bound on friction, by tuple and family: solved once each whatever its values.
+/// The members of families without a friction ceiling, by tuple and family. Each is solved once for all ceilings.
 #[derive(Default)]
 struct MemberCache(Memo<(u64, usize), Solution>);
 
 impl MemberCache {
-    /// The member for `point`, which belongs to tuple number `tuple`; adds what is spent by this call alone.
+    /// The member for `point`, of tuple number `tuple`; adds the statistics of this call.
     fn get(&self, job: &Job<'_>, tuple: u64, point: &Point, work: &mut RunStats) -> Solution {
         let number = point[Quantity::Family] as usize;
         let Some(&family) = FAMILIES.get(number) else { return Err(Obstacle::Domain) };

@@ -12,7 +12,7 @@ use crate::model::Law;
 use crate::stability::step_response::{self, Outcome, Response, Simulation, Sustained};
 use crate::stability::{SteadySliding, lyapunov_coefficient};
 
-/// One row a transition, stiffness and mass.
+/// One row for each transition, stiffness and mass.
 pub struct StepResponse;
 
 /// A row.
@@ -33,11 +33,7 @@ impl Row {
 
 const FIELDS: [Field<Row>; 11] = [
     Field::new(
-        Column::number(
-            "v_peak",
-            "v_0",
-            "greatest velocity from when v = v_f is first met on, at least v_f; null if undecided",
-        ),
+        Column::number("v_peak", "v_0", "greatest velocity after v first reaches v_f, at least v_f; null if undecided"),
         |row| row.of_solution(|response| response.v_peak),
     ),
     Field::new(
@@ -58,10 +54,9 @@ const FIELDS: [Field<Row>; 11] = [
         ),
         |row| row.of_solution(|response| number(response.t_peak)),
     ),
-    Field::new(
-        Column::new("outcome", Kind::Label(&Outcome::NAMES), "what becomes of the response in the end"),
-        |row| row.of_solution(|response| f64::from(response.outcome as u8)),
-    ),
+    Field::new(Column::new("outcome", Kind::Label(&Outcome::NAMES), "long-term behaviour of the response"), |row| {
+        row.of_solution(|response| f64::from(response.outcome as u8))
+    }),
     Field::new(
         Column::new("stick_slip", Kind::Flag, "whether the oscillation is sustained; null if undecided"),
         |row| {
@@ -76,7 +71,7 @@ const FIELDS: [Field<Row>; 11] = [
         Column::number(
             "settling_time",
             "l/v_0",
-            "time after which v stays within 1 % of v_f; null unless the outcome is settled, and if not known to rtol",
+            "time after which v stays within 1 % of v_f; null unless settled, or if not known to rtol",
         ),
         |row| row.of_solution(|response| number(response.settling_time)),
     ),
@@ -91,7 +86,7 @@ const FIELDS: [Field<Row>; 11] = [
         Column::number(
             "cycle_trough",
             "v_0",
-            "least velocity on the limit cycle; null without one, and if not known to rtol",
+            "least velocity on the limit cycle; null without one, or if not known to rtol",
         )
         .optional(),
         |row| row.cycle(|cycle| cycle.v_trough),
@@ -149,7 +144,7 @@ impl Table for StepResponse {
         false
     }
 
-    /// Simulated: each digit more costs time.
+    /// 1e-6. Each further digit of a simulation costs time.
     fn default_rtol(&self) -> Option<f64> {
         Some(1e-6)
     }
@@ -159,7 +154,7 @@ impl Table for StepResponse {
             column: "outcome",
             theory: "linear stability at v_f (settled above k_c)",
             surprise: Outcome::NAMES[Outcome::LimitCycle as usize],
-            why: "stable against small disturbances, but the step leads onto a cycle that surrounds steady sliding",
+            why: "stable against small disturbances, but the step leads to a limit cycle around steady sliding",
             axes: &[Quantity::A, Quantity::B, Quantity::FinalVelocity, Quantity::Stiffness, Quantity::Mass],
             word: |point| {
                 let law = Law { a: point[Quantity::A], b: point[Quantity::B] };
@@ -183,7 +178,7 @@ impl Table for StepResponse {
                 m: point[Quantity::Mass],
             };
             let mut work = RunStats::default();
-            // Steps that share their scaled numbers share their course.
+            // Steps with equal scaled numbers share one simulation.
             let simulation = step.scaled().map(|scaled| {
                 simulations.get(scaled.key(), || {
                     let simulation = scaled.follow(job.rtol);
