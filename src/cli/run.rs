@@ -13,7 +13,7 @@ use crate::dataset::atomic::nearest_folder;
 use crate::dataset::{DatasetError, Folder};
 use crate::grid::Quantity;
 use crate::protocol::Status;
-use crate::sweep::{self, Outcome, Plan, Request, RunError, Shard, Sweep, holds};
+use crate::sweep::{self, Outcome, Plan, Request, RunError, Shard, Sweep, contains_part};
 use crate::table::{Kind, RunStats, Signal};
 
 /// Arguments of `run`.
@@ -59,7 +59,8 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     if !arguments.quiet {
         say(&report(&sweep, &plan, &folder, &outcome, arguments.shard, start))?;
     }
-    let defects: u64 = outcome.digests.iter().map(|statistics| statistics.status[Status::NotConverged as usize]).sum();
+    let defects: u64 =
+        outcome.statistics.iter().map(|statistics| statistics.status[Status::NotConverged as usize]).sum();
     if arguments.strict && defects > 0 {
         let message = format!("error: {} not_converged", words::things(defects, "row"));
         return Err(Failure { code: NOT_STRICT, message });
@@ -102,7 +103,7 @@ fn report(
     start: Instant,
 ) -> String {
     let mut text = String::new();
-    for ((table, statistics), done) in plan.tables.iter().zip(&outcome.digests).zip(&outcome.tables) {
+    for ((table, statistics), done) in plan.tables.iter().zip(&outcome.statistics).zip(&outcome.tables) {
         let all = done.kept + done.made;
         match shard {
             None => text.push_str(&summary::statistics(&table.name, table.rows, statistics)),
@@ -143,7 +144,7 @@ fn check_room(sweep: &Sweep, plan: &Plan, shares: &[Vec<Range<u64>>], folder: &F
     let free = free as f64;
     let missing: Vec<u64> = (plan.tables.iter().zip(shares))
         .map(|(table, share)| {
-            let there = folder.parts_there(table).iter().filter(|part| holds(share, **part)).count() as u64;
+            let there = folder.parts_there(table).iter().filter(|part| contains_part(share, **part)).count() as u64;
             share.iter().map(|range| range.end - range.start).sum::<u64>() - there
         })
         .collect();

@@ -20,7 +20,7 @@ pub struct Arguments {
     #[arg(long, value_enum)]
     engine: Engine,
     /// Shares to make at most; fewer if a task would have too little to do
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=Shard::MOST))]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=Shard::MAX_COUNT))]
     shards: u64,
     /// Folder in which the dataset's folder is made, on a file system that all machines share
     #[arg(short, long, value_name = "DIR", default_value = "results")]
@@ -48,7 +48,7 @@ pub enum Engine {
 }
 
 /// What precedes the number of shares in a job script.
-const SHARES: &str = "# shares: ";
+const SHARDS: &str = "# shards: ";
 
 impl Engine {
     const ALL: [Engine; 2] = [Engine::Slurm, Engine::Hyperqueue];
@@ -68,9 +68,9 @@ impl Engine {
     }
 
     /// The command that submits `script`, or only some shares of it.
-    fn submit(self, script: &Path, shares: Option<&[u64]>) -> String {
+    fn submit(self, script: &Path, shards: Option<&[u64]>) -> String {
         let script = quoted(script);
-        let array = shares.map(|shares| words::ranges(shares.iter().copied()));
+        let array = shards.map(|shards| words::ranges(shards.iter().copied()));
         match (self, array) {
             (Engine::Slurm, None) => format!("sbatch {script}"),
             (Engine::Slurm, Some(array)) => format!("sbatch --array={array} {script}"),
@@ -83,7 +83,7 @@ impl Engine {
     fn most_tasks(self) -> u64 {
         match self {
             Engine::Slurm => slurm_config("MaxArraySize").and_then(|size| size.parse().ok()).unwrap_or(1001).max(1),
-            Engine::Hyperqueue => Shard::MOST,
+            Engine::Hyperqueue => Shard::MAX_COUNT,
         }
     }
 }
@@ -93,9 +93,9 @@ pub fn scripts(dataset: &Path) -> Vec<(u64, impl Fn(&[u64]) -> String)> {
     let scripts = Engine::ALL.into_iter().filter_map(|engine| {
         let path = engine.script(dataset);
         let text = fs::read_to_string(&path).ok()?;
-        let count: u64 = text.lines().find_map(|line| line.strip_prefix(SHARES))?.parse().ok()?;
-        let known = (1..=Shard::MOST).contains(&count);
-        known.then_some((count, move |shares: &[u64]| engine.submit(&path, Some(shares))))
+        let count: u64 = text.lines().find_map(|line| line.strip_prefix(SHARDS))?.parse().ok()?;
+        let known = (1..=Shard::MAX_COUNT).contains(&count);
+        known.then_some((count, move |shards: &[u64]| engine.submit(&path, Some(shards))))
     });
     scripts.collect()
 }
@@ -110,8 +110,8 @@ pub fn shards(arguments: &Arguments) -> Result<(), Failure> {
     let rows = plan.tables.iter().fold(0_u64, |sum, table| sum.saturating_add(table.rows));
 
     let engine = arguments.engine;
-    let (shares, fewer) = tasks(arguments, parts, seconds);
-    let each = seconds / (shares * arguments.cpus) as f64;
+    let (shards, fewer) = tasks(arguments, parts, seconds);
+    let each = seconds / (shards * arguments.cpus) as f64;
 
     let out = absolute(&arguments.out)?;
     let folder = Folder::new(&out, &sweep.name);
@@ -127,7 +127,7 @@ pub fn shards(arguments: &Arguments) -> Result<(), Failure> {
         out: quoted(&out),
         dataset: quoted(folder.path()),
         log: script.with_extension(""),
-        shares,
+        shards,
         cpus: arguments.cpus,
         each,
     };
@@ -135,7 +135,7 @@ pub fn shards(arguments: &Arguments) -> Result<(), Failure> {
         .map_err(|error| refused(&script, "write", &error))?;
 
     let (rows, parts, work) = (words::things(rows, "row"), words::things(parts, "part"), words::duration(seconds));
-    let (tasks, cpus) = (words::things(shares, "task"), words::things(arguments.cpus, "processor"));
+    let (tasks, cpus) = (words::things(shards, "task"), words::things(arguments.cpus, "processor"));
     let mut said = format!("{}: {rows} in {parts}, about {work} of one processor\n", sweep.name);
     let _ = writeln!(said, "{tasks} of about {} on {cpus} each", words::duration(each));
     if let Some(reason) = fewer {
@@ -154,7 +154,7 @@ pub fn shards(arguments: &Arguments) -> Result<(), Failure> {
 /// How many tasks there are, and why they are fewer than requested.
 fn tasks(arguments: &Arguments, parts: u64, seconds: f64) -> (u64, Option<String>) {
     let worth = match arguments.minutes {
-        0.0 => Shard::MOST,
+        0.0 => Shard::MAX_COUNT,
         minutes => (seconds / (60.0 * minutes * arguments.cpus as f64)) as u64,
     };
     let bounds = [
@@ -220,7 +220,7 @@ struct Job<'a> {
     out: String,
     dataset: String,
     log: PathBuf,
-    shares: u64,
+    shards: u64,
     cpus: u64,
     /// Seconds of a task, as predicted.
     each: f64,
@@ -229,8 +229,8 @@ struct Job<'a> {
 impl Job<'_> {
     /// The script, whose head is that of a scheduler, as is the number of a task.
     fn script(&self, engine: Engine) -> String {
-        let Job { name, program, spec, out, dataset, shares, cpus, .. } = self;
-        let (last, about) = (shares - 1, words::duration(self.each));
+        let Job { name, program, spec, out, dataset, shards, cpus, .. } = self;
+        let (last, about) = (shards - 1, words::duration(self.each));
         // Predictions are from a small sample, and not all machines are as fast.
         let minutes = (10.0 + 3.0 * self.each / 60.0).ceil();
         // Slurm takes % for a pattern.
@@ -254,8 +254,8 @@ impl Job<'_> {
         };
         let (number, flag) = number;
         format!(
-            "#!/bin/bash\n{head}{SHARES}{shares}\n{task}\n{again}\
-             exec {program} run {spec} --out {out} --shard \"{number}/{shares}\" --threads {cpus}{flag}\n\
+            "#!/bin/bash\n{head}{SHARDS}{shards}\n{task}\n{again}\
+             exec {program} run {spec} --out {out} --shard \"{number}/{shards}\" --threads {cpus}{flag}\n\
              # What is missing: {program} status {dataset}\n"
         )
     }

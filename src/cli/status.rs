@@ -7,7 +7,7 @@ use super::shards::{quoted, scripts};
 use super::{FAILED, Failure, kind, refused, say, summary, words};
 use crate::dataset::{Build, Folder, Look, Manifest, Survey};
 use crate::protocol::Status;
-use crate::sweep::{Plan, Sweep, shares_with};
+use crate::sweep::{Plan, Sweep, shards_with};
 
 /// Arguments of `status`.
 #[derive(Debug, clap::Args)]
@@ -149,8 +149,8 @@ fn remedy(path: &Path, manifest: &Manifest, survey: &Survey) -> String {
     let _ = writeln!(text, "  slipsweep run {}", quoted(path));
     for (count, submit) in scripts(path) {
         let wanted = |table: usize, part| survey.tables.get(table).is_some_and(|table| !table.has(part));
-        let Ok(shares) = shares_with(&sweep, &plan, count, wanted) else { continue };
-        let _ = writeln!(text, "or as tasks, {} of {count}:\n  {}", shares.len(), submit(&shares));
+        let Ok(shards) = shards_with(&sweep, &plan, count, wanted) else { continue };
+        let _ = writeln!(text, "or as tasks, {} of {count}:\n  {}", shards.len(), submit(&shards));
     }
     text
 }

@@ -1,4 +1,4 @@
-//! One axis of a spec: numbers, words, a range, an expression or a sample, each checked against what is legal.
+//! One axis of a spec: numbers, words, a range, an expression or a sample, checked against its legal values.
 
 use super::error::{SpecError, refuse, unknown};
 use super::spec::{AXIS, AxisForm, AxisSpec, AxisValue};
@@ -6,7 +6,7 @@ use super::units::{help, legal};
 use crate::grid::{Axis, Design, Quantity, Scale, Values};
 use crate::model::Units;
 
-/// What an axis of a spec says.
+/// The definition of an axis.
 pub enum Written {
     /// Its values.
     Values(Axis),
@@ -17,7 +17,7 @@ pub enum Written {
         /// The expression.
         text: String,
     },
-    /// Values drawn jointly with those of other axes.
+    /// Values drawn jointly with other axes.
     Sampled(Sampled),
 }
 
@@ -34,7 +34,7 @@ pub struct Sampled {
     pub greatest: f64,
     /// Points of the sample.
     pub count: u64,
-    /// The seed, if the axis tells it.
+    /// The seed, if the axis has one.
     pub seed: Option<u32>,
 }
 
@@ -67,7 +67,7 @@ fn quoted(words: &[&str]) -> String {
     words.iter().map(|word| format!("\"{word}\"")).collect::<Vec<_>>().join(", ")
 }
 
-/// An axis as far as it is read.
+/// An axis while it is read.
 #[derive(Clone, Copy)]
 struct Draft<'a> {
     quantity: Quantity,
@@ -85,7 +85,7 @@ impl Draft<'_> {
         legal(self.units, self.quantity, self.scale, value)
     }
 
-    /// One value: a number in its range, or the place of a word.
+    /// One value: a number in its range, or the index of a word.
     fn value(self, key: &str, value: &AxisValue) -> Result<f64, SpecError> {
         let words = self.quantity.words();
         match value {
@@ -153,7 +153,7 @@ impl Draft<'_> {
         }
     }
 
-    /// The three numbers of a range or sample, the first two of which are legal.
+    /// The three numbers of a range or sample. The first two are legal values.
     fn ends(self, key: &str, names: &str, numbers: &[f64]) -> Result<[f64; 3], SpecError> {
         let &[first, last, count] = numbers else {
             return refuse(key, format!("{} values", numbers.len()), names, "give exactly three values");
@@ -170,7 +170,7 @@ impl Draft<'_> {
     fn range(self, geometric: bool, numbers: &[f64]) -> Result<Written, SpecError> {
         let key = &format!("{}.{}", self.key, if geometric { "geomspace" } else { "linspace" });
         let [first, last, count] = self.ends(key, "[first, last, count]", numbers)?;
-        // From 2^53 on a double may stand for another whole number than the one that was written.
+        // From 2^53 on a double may differ from the integer in the spec.
         if !(2.0..9_007_199_254_740_992.0).contains(&count) || count.fract() != 0.0 {
             let help = match count {
                 1.0 => "for one value write the number itself",
@@ -190,7 +190,7 @@ impl Draft<'_> {
             let help = "use linspace, or a range on one side of zero";
             return refuse(key.as_str(), found, "ends of the same sign, neither 0", help);
         }
-        // Doubles lie farthest apart at the larger end.
+        // The spacing of doubles is greatest at the larger end.
         let largest = first.abs().max(last.abs());
         let steps = (count - 1) as f64;
         let (spacing, least, values) = match geometric {
@@ -202,7 +202,7 @@ impl Draft<'_> {
             let expected = "values that differ from each other";
             return refuse(format!("{key}[2]"), found, expected, "take fewer values, or a list");
         }
-        // From a value that is legal on its own to the others.
+        // From the isolated legal value to the interval.
         for value in [1, count - 2].map(|index| values.at(index)) {
             if let Err(legal) = self.legal(value) {
                 let found = format!("a value of the range, {value:?}, is out of range");

@@ -1,4 +1,4 @@
-//! A table of a sweep as Arrow record batches, in the order of its rows, without a file.
+//! A table of a sweep as Arrow record batches in row order, without a file.
 
 use std::sync::Arc;
 
@@ -10,7 +10,7 @@ use super::plan::Plan;
 use crate::dataset::{Layout, ManifestTable, batch};
 use crate::table::{ColumnBuffer, OptimumCache, Signal};
 
-/// The batches of a table, each of which is computed, on all threads, when it is asked for.
+/// An iterator over the batches of a table. All threads compute the next batch on request.
 pub struct Batches<'a> {
     sweep: &'a Sweep,
     request: &'a Request,
@@ -21,8 +21,8 @@ pub struct Batches<'a> {
 }
 
 impl Sweep {
-    /// The rows of one of its tables, by name, as Arrow record batches with the columns, types, units and row order of the
-    /// Parquet files that a run would write; `None` if the sweep does not ask for this table.
+    /// The rows of a table as Arrow record batches, with the columns, types, units and row order of the Parquet files of a run.
+    /// `None` if the spec does not request this table.
     pub fn batches(&self, table: &str) -> Option<Batches<'_>> {
         let plan = Plan::new(self);
         let tables = self.requests.iter().zip(plan.tables).zip(self.optimum_cache());
@@ -39,7 +39,7 @@ impl Sweep {
 }
 
 impl Batches<'_> {
-    /// The columns of every batch, units and meanings in the metadata of the fields.
+    /// The schema of every batch, with units and meanings in the field metadata.
     pub fn schema(&self) -> SchemaRef {
         self.layout.schema.clone()
     }
@@ -58,7 +58,7 @@ impl Iterator for Batches<'_> {
         let job = self.sweep.job(self.request, &self.optimum_cache, &signal);
         let mut buffer = ColumnBuffer::new(self.request.projection.indices().len());
         buffer.resize((rows.end - rows.start) as usize);
-        // Nobody else has the signal, so that nothing stops the computation.
+        // The signal is private, so nothing stops the computation.
         self.request.table.compute(&job, rows.clone(), &mut buffer).ok()?;
         Some(batch(&self.layout, job.rows, rows, &buffer))
     }

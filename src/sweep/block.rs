@@ -11,17 +11,17 @@ use crate::grid::{Axis, Block, Derived, Design, Expression, Factor, Fault, Quant
 use crate::model::Units;
 use crate::names::nearest;
 
-/// A block of a spec, as far as it is legal.
+/// The checked part of a block.
 pub struct Checked {
-    /// What its keys begin with.
+    /// The prefix of its keys.
     pub prefix: String,
-    /// Every axis that it has, or may have: that of a misspelt name too, and all if a file of points cannot be read.
+    /// Every axis that it may have, including that of a misspelt name, and all axes if a points file cannot be read.
     pub held: Vec<Quantity>,
-    /// It as a block of the grid; `None` if anything is wrong with it.
+    /// The block of the grid; `None` if the block has a fault.
     pub block: Option<Block>,
 }
 
-/// Checks `spec`, whose keys begin with `prefix`; files are relative to `folder`. Without `units` no value can be judged.
+/// Checks `spec`, whose keys begin with `prefix`; files are relative to `folder`. Values are not checked without `units`.
 pub fn check(spec: &BlockSpec, prefix: String, units: Option<&Units>, folder: &Path, faults: &mut Faults) -> Checked {
     let mut factors = Vec::new();
     let mut are_known = !(faults.concern(&format!("{prefix}points")) || prefix.is_empty() && faults.concern("block"));
@@ -34,7 +34,7 @@ pub fn check(spec: &BlockSpec, prefix: String, units: Option<&Units>, folder: &P
             None => are_known = false,
         }
     }
-    // Axes that are there, with what they say if that is legal.
+    // Axes in the spec, with their definition if it is legal.
     let mut axes: Vec<(Quantity, Option<Written>)> = Vec::new();
     for (name, axis) in &spec.axes {
         let key = format!("{prefix}axes.{name}");
@@ -65,7 +65,7 @@ pub fn check(spec: &BlockSpec, prefix: String, units: Option<&Units>, folder: &P
     Checked { prefix, held, block }
 }
 
-/// A block of a spec whose axes are read one by one.
+/// A block while its axes are read.
 #[derive(Clone, Copy)]
 struct Draft<'a> {
     spec: &'a BlockSpec,
@@ -117,7 +117,7 @@ impl Draft<'_> {
         }
         let derived = self.derived(&computed, faults);
         let points = factors.first().filter(|_| has_points);
-        // Without the points nobody knows their labels.
+        // Labels are unknown without the points.
         let are_known = has_points || spec.points.is_none();
         let condition = spec.condition.as_ref().filter(|_| are_known && !faults.concern(&format!("{prefix}where")));
         let condition = condition.map(|text| {
@@ -125,7 +125,7 @@ impl Draft<'_> {
             faults.take(condition.map_err(|fault| explain(format!("{prefix}where"), fault)))
         });
         let block = Block { factors, derived, condition: condition.flatten() };
-        // Only of what is legal so far, since this takes time.
+        // Only for legal blocks, since this takes time.
         for (quantity, _, text) in computed {
             if faults.are_none() {
                 faults.take(self.check_values(&block, quantity, text));
@@ -156,7 +156,7 @@ impl Draft<'_> {
         zips
     }
 
-    /// The axis `name` of a zip at `key`, after those of other zips and of its own; `None` if it is not known what that axis says.
+    /// The axis `name` of a zip at `key`, checked against other zips; `None` if the axis has a fault of its own.
     fn zipped(
         self,
         name: &str,
@@ -180,7 +180,7 @@ impl Draft<'_> {
                 let found = format!("`{name}` is a column of `points`, which vary together anyway");
                 return refuse(key, found, "names of [axes]", "remove it here");
             }
-            // An axis that is there only by default has one value, or one of each word.
+            // A default axis has one value, or one of each word.
             None if held.iter().any(|quantity| quantity.name() == name && quantity.default().is_empty()) => {
                 return Ok(None);
             }
@@ -203,7 +203,7 @@ impl Draft<'_> {
         Ok(Some(axis.clone()))
     }
 
-    /// The joint samples, one a kind.
+    /// The joint samples, one for each kind.
     fn samples(self) -> Result<Vec<(Design, Vec<Axis>)>, SpecError> {
         let Draft { prefix, units, axes, .. } = self;
         let mut samples = Vec::new();
@@ -236,10 +236,10 @@ impl Draft<'_> {
             let draw = |(number, (quantity, axis)): (usize, &(Quantity, Sampled))| {
                 let (least, greatest) = (axis.least, axis.greatest);
                 let inside = design.values(number as u32, axis.count, seed);
-                // Either end counts with a weight, so that no difference overflows; rounding must not leave the box.
+                // A weighted mean of both ends cannot overflow; rounding must not leave the interval.
                 let values: Vec<f64> =
                     inside.into_iter().map(|u| (least * (1.0 - u) + greatest * u).clamp(least, greatest)).collect();
-                // Both ends are legal; between 0, where that lies apart, and the others are numbers that are not.
+                // Both ends are legal, but numbers between an isolated 0 and the interval are not.
                 for &value in &values {
                     if let Err(legal) = legal(units, *quantity, axis.scale, value) {
                         let key = format!("{prefix}axes.{}.{}", quantity.name(), design.name());
@@ -254,7 +254,7 @@ impl Draft<'_> {
         Ok(samples)
     }
 
-    /// Computed axes, each after those that it is made of.
+    /// Computed axes, each after the axes in its expression.
     fn derived(self, computed: &[(Quantity, Scale, &str)], faults: &mut Faults) -> Vec<Derived> {
         let key = |quantity| self.key_of_expression(quantity);
         let mut waiting = Vec::new();
@@ -270,7 +270,7 @@ impl Draft<'_> {
                 derived.push(waiting.remove(ready));
                 continue;
             }
-            // From axis to axis until one is met again.
+            // Follows the cycle until an axis repeats.
             let mut path: Vec<Quantity> = vec![waiting[0].quantity];
             while let Some(read) = waiting.iter().find(|one| path.last() == Some(&one.quantity)).and_then(next) {
                 if let Some(start) = path.iter().position(|met| *met == read) {
@@ -289,7 +289,7 @@ impl Draft<'_> {
         derived
     }
 
-    /// Every kept value of a computed axis has to be legal.
+    /// Checks every value of a computed axis at the kept points.
     fn check_values(self, block: &Block, quantity: Quantity, text: &str) -> Result<(), SpecError> {
         let (units, key) = (self.units, self.key_of_expression(quantity));
         let scale = block.scale(quantity).unwrap_or(Scale::Model);
@@ -317,7 +317,7 @@ fn values(count: u64) -> String {
     if count == 1 { "1 value".to_owned() } else { format!("{count} values") }
 }
 
-/// An expression or condition that would take too long to evaluate.
+/// The fault of an expression or condition that takes too long to evaluate.
 pub fn too_many(key: String) -> SpecError {
     let help = "take fewer values on these axes, or split them over several [[block]]s or specs";
     let found = "more than 2^30 combinations of the axes that it reads";

@@ -1,4 +1,4 @@
-//! The checked sweep: from a spec to a grid, tables and columns that are all legal, or a fault that says what is not.
+//! The checked sweep: grid, tables and columns of a legal spec, or its faults.
 
 use std::fs;
 use std::io::{self, Read};
@@ -16,21 +16,21 @@ use crate::model::Units;
 use crate::names::nearest;
 use crate::table::{self, OPTIMUM_AXES, OptimumCache, Projection, STATUS, Table};
 
-/// Bytes of a spec at most. Chosen: reading one takes about a hundred times as much memory, 400 MiB.
+/// Greatest size of a spec, in bytes. Chosen: reading one takes about a hundred times this memory, 400 MiB.
 const MAX_SPEC_BYTES: u64 = 1 << 22;
 
-/// Bytes of a name at most: names of files have 255 (`NAME_MAX` of Linux), of which a script beside the dataset takes some.
+/// Greatest length of a name, in bytes. File names have at most 255 (`NAME_MAX` of Linux), and job scripts add a suffix.
 pub(super) const MAX_NAME_BYTES: usize = 200;
 
-/// A sweep that is known to be legal.
+/// A legal sweep.
 pub struct Sweep {
     /// Name of the dataset.
     pub name: String,
-    /// What it is for.
+    /// Description of the sweep.
     pub description: String,
-    /// The text that it was read from.
+    /// Its text.
     pub text: String,
-    /// The folder that the files it names are relative to.
+    /// The folder of relative file names.
     pub folder: PathBuf,
     /// All points.
     pub grid: Grid,
@@ -38,13 +38,13 @@ pub struct Sweep {
     pub bounded: bool,
     /// The tables to write, in the order of the spec.
     pub requests: Vec<Request>,
-    /// The rows that tell all optimal problems of the tables that need them; `None` if none does.
+    /// Rows that cover every optimal problem of the tables; `None` if no table needs the optimum.
     pub optimum_rows: Option<RowIndex>,
-    /// What is legal and yet doubtful.
+    /// Warnings: legal input that is probably a mistake.
     pub warnings: Vec<SpecError>,
 }
 
-/// A table that is asked for.
+/// A requested table.
 pub struct Request {
     /// The table.
     pub table: &'static dyn Table,
@@ -56,15 +56,15 @@ pub struct Request {
     pub rows: u64,
     /// Its rows.
     pub row_index: RowIndex,
-    /// Of a reduced table: the rows of the landscapes, those of one of its rows side by side.
+    /// The landscape rows of a reduced table, contiguous for each of its rows.
     pub members: Option<RowIndex>,
-    /// The hash of what its rows follow from, once it is computed.
+    /// The hash of the inputs of its rows, once computed.
     pub(super) hash: OnceLock<String>,
-    /// What the values of each column are multiplied by to be in the units of the grid.
+    /// The factor of each column from the units of the model to those of the grid.
     pub sizes: Vec<f64>,
 }
 
-/// What to do about a spec that cannot be read: the TOML file of nearly this name in the same folder, if there is one.
+/// Help for a spec that cannot be read: the TOML file with the nearest name in the same folder, if any.
 fn path_hint(path: &Path) -> String {
     let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
     let entries = fs::read_dir(folder).into_iter().flatten().flatten();
@@ -83,7 +83,7 @@ impl Sweep {
     ///
     /// # Errors
     ///
-    /// What is wrong with the file or with the spec, and in which lines.
+    /// The faults of the file or spec, with their lines.
     pub fn load(path: &Path) -> Result<Sweep, SpecError> {
         let fault = |found: String, expected: &str, help: &str| SpecError::new("", found, expected, help).of(path);
         let mut bytes = Vec::new();
@@ -107,7 +107,7 @@ impl Sweep {
         Sweep::parse_at(&text, path)
     }
 
-    /// Reads and checks the spec in `text`, which stands in `path`.
+    /// Reads and checks the spec in `text`, the content of `path`.
     pub(crate) fn parse_at(text: &str, path: &Path) -> Result<Sweep, SpecError> {
         let parsed = Sweep::parse(text, path.parent().unwrap_or(Path::new("")));
         let mut sweep = parsed.map_err(|error| error.of(path))?;
@@ -119,7 +119,7 @@ impl Sweep {
     ///
     /// # Errors
     ///
-    /// What is wrong with the spec, and in which lines.
+    /// The faults of the spec, with their lines.
     pub fn parse(text: &str, folder: &Path) -> Result<Sweep, SpecError> {
         let mut faults = Faults::default();
         let spec = read::read(text, &mut faults)?;
@@ -130,12 +130,12 @@ impl Sweep {
     ///
     /// # Errors
     ///
-    /// What is wrong with the spec, and in which lines.
+    /// The faults of the spec, with their lines.
     pub fn check(spec: &Spec, text: &str, folder: &Path) -> Result<Sweep, SpecError> {
         Sweep::checked(spec, text, folder, Faults::default())
     }
 
-    /// Checks `spec`, in which `faults` were found when it was read.
+    /// Checks `spec`; `faults` are those found on reading.
     fn checked(spec: &Spec, text: &str, folder: &Path, mut faults: Faults) -> Result<Sweep, SpecError> {
         faults.take(check_name(&spec.name));
         let is_any_wrong = UNIT_KEYS.iter().any(|key| faults.concern(&format!("model.{key}")));
@@ -145,7 +145,7 @@ impl Sweep {
         let tables = tables(spec, &mut blocks, &mut faults);
         faults.finish(text)?;
 
-        // Everything is legal on its own.
+        // Every key is legal by itself.
         let prefixes: Vec<String> = blocks.iter().map(|block| block.prefix.clone()).collect();
         let blocks = blocks.into_iter().filter_map(|block| block.block).map(Arc::new).collect();
         let grid = Grid { blocks, units: units.unwrap_or_default() };
@@ -158,7 +158,7 @@ impl Sweep {
         let requests = tables.into_iter().map(|table| request(table, &grid, &prefixes).map_err(placed));
         let requests = requests.collect::<Result<Vec<Request>, _>>()?;
         let needed = requests.iter().any(|request| request.table.needs_optimum(&request.projection));
-        // A table that depends on nothing else has these very rows.
+        // A table with these axes alone has the rows of the optimum.
         let own = requests.iter().find(|request| request.table.axes() == OPTIMUM_AXES);
         let optimum_rows = match own {
             _ if !needed => None,
@@ -184,18 +184,18 @@ impl Sweep {
         })
     }
 
-    /// Accuracy of the shared optimal protocols: the strictest of the tables that use them.
+    /// Relative accuracy of the shared optimal protocols: the tightest of the tables that use them.
     pub fn optimum_rtol(&self) -> f64 {
         let users = self.requests.iter().filter(|request| request.table.needs_optimum(&request.projection));
         users.map(|request| request.rtol).fold(1.0, f64::min)
     }
 
-    /// How many different optimal problems the tables that need them have; 0 if none does.
+    /// The number of different optimal problems; 0 if no table needs the optimum.
     pub fn optimum_tuples(&self) -> u64 {
-        self.optimum_rows.as_ref().map_or(0, |rows| rows.distinct(OPTIMUM_AXES, OptimumCache::MOST_KEPT))
+        self.optimum_rows.as_ref().map_or(0, |rows| rows.distinct(OPTIMUM_AXES, OptimumCache::MAX_CACHED))
     }
 
-    /// An empty store of them for each table: one for all tables of the same accuracy, so that no table depends on that of another one.
+    /// An empty optimum cache for each table. Tables of one accuracy share it, so no table depends on the accuracy of another.
     pub fn optimum_cache(&self) -> Vec<Arc<OptimumCache>> {
         let span = self.optimum_rows.as_ref().map_or(0, |rows| rows.tuples(OPTIMUM_AXES).span());
         let tuples = self.optimum_tuples();
@@ -216,7 +216,7 @@ impl Sweep {
     }
 }
 
-/// Whether a dataset can have this name.
+/// Whether `name` is legal for a dataset.
 pub fn check_name(name: &str) -> Result<(), SpecError> {
     let legal = |c: char| c.is_ascii_alphanumeric() || matches!(c, '-' | '_' | '.');
     if (1..=MAX_NAME_BYTES).contains(&name.len()) && name.chars().all(legal) && !name.starts_with('.') {
@@ -268,19 +268,19 @@ fn check_rtol(key: &str, rtol: f64) -> Result<(), SpecError> {
     refuse(key, format!("{rtol:?} is out of range"), RTOL.text, "choose a value in the range")
 }
 
-/// A table of a spec that is legal on its own.
+/// A table of a spec with legal keys.
 struct Draft {
-    /// Its name as it is written.
+    /// Its name in the spec.
     name: String,
     /// The table with the rows.
     written: &'static dyn Table,
-    /// The table that is written: that one, or what `reduce` makes of it.
+    /// The table to write: this table or its reduction.
     table: &'static dyn Table,
     projection: Projection,
     rtol: f64,
 }
 
-/// The tables of `spec`. An axis that a table lacks counts as held from then on: one fault names it.
+/// The tables of `spec`. A missing axis is reported once.
 fn tables(spec: &Spec, blocks: &mut [Checked], faults: &mut Faults) -> Vec<Draft> {
     if spec.tables.is_empty() && !faults.concern("tables") {
         let expected = format!("at least one of {}", table::ALL.map(|table| table.name()).join(", "));
@@ -313,7 +313,7 @@ fn draft(name: &str, spec: &TableSpec, rtol: f64, blocks: &mut [Checked], faults
     Some(Draft { name: name.to_owned(), written, table, projection, rtol })
 }
 
-/// A table that needs axes which the block of `prefix` does not have.
+/// The fault of a table that lacks axes in the block of `prefix`.
 fn lacks(key: &str, table: &dyn Table, prefix: &str, missing: &[Quantity]) -> SpecError {
     let (place, axes) = match prefix.trim_end_matches('.') {
         "" => ("the spec", "[axes]"),
@@ -348,7 +348,7 @@ fn request(draft: Draft, grid: &Grid, prefixes: &[String]) -> Result<Request, Sp
     Ok(Request { table, projection, rtol, rows: row_index.rows(), row_index, members, hash: OnceLock::new(), sizes })
 }
 
-/// The table that `reduce` makes of `table`, or `table` without it.
+/// The reduction of `table` that the key `reduce` names, or `table`.
 fn reduced(table: &'static dyn Table, key: &str, reduce: Option<&str>) -> Result<&'static dyn Table, SpecError> {
     let Some(word) = reduce else { return Ok(table) };
     let key = format!("{key}.reduce");
@@ -361,7 +361,7 @@ fn reduced(table: &'static dyn Table, key: &str, reduce: Option<&str>) -> Result
     }
 }
 
-/// The rows of `landscape` with those of each row of `reduced` side by side: its other axes are made the fastest.
+/// The rows of `landscape`, contiguous for each row of `reduced`: its further axes vary fastest.
 fn members(landscape: &dyn Table, reduced: &dyn Table, key: &str, grid: &Grid) -> Result<RowIndex, SpecError> {
     let wrong = |found: &str, help: &str| {
         let expected = "one grid, in which alpha_2 and alpha_3 are axes of their own that nothing else depends on";
@@ -386,9 +386,9 @@ fn members(landscape: &dyn Table, reduced: &dyn Table, key: &str, grid: &Grid) -
     }
     let (last, first): (Vec<Factor>, Vec<Factor>) = block.factors.iter().cloned().partition(is_fast);
     let each = last.iter().map(Factor::len).fold(1, u64::saturating_mul);
-    if reduced.name() == "gap_quantiles" && each > table::MOST_SORTED {
+    if reduced.name() == "gap_quantiles" && each > table::MAX_SORTED {
         let found = format!("quantiles of {each} shortcuts of each transition and time");
-        let expected = format!("at most {}, which are sorted in memory", table::MOST_SORTED);
+        let expected = format!("at most {}, which are sorted in memory", table::MAX_SORTED);
         let help = "take fewer values of alpha_2 and alpha_3, or reduce to \"min\" or \"histogram\"";
         return refuse(format!("{key}.reduce"), found, expected, help);
     }
@@ -397,7 +397,7 @@ fn members(landscape: &dyn Table, reduced: &dyn Table, key: &str, grid: &Grid) -
     row_index.map_err(|_| wrong("more shortcuts than 64 bits can count", "take fewer values on the axes"))
 }
 
-/// The columns of these names; the usual ones without any.
+/// The columns with these names, or the default ones.
 fn projection(table: &dyn Table, key: &str, names: Option<&[String]>, faults: &mut Faults) -> Projection {
     let known: Vec<&str> = table.columns().iter().map(|column| column.name).collect();
     let Some(names) = names else {

@@ -1,8 +1,7 @@
 //! The engine: computes the parts that are missing or damaged, encodes and writes them.
 //!
-//! A part is computed by all threads that have nothing else to do, and written by threads of their own while the next parts are computed. Those
-//! also encode a part if they have not enough to do; else one of those that compute does. Nothing of what is written depends on how the work was
-//! spread.
+//! All idle compute threads share a part. Writer threads publish it while the next parts are computed. A part is encoded by a writer if one
+//! is idle, else by a compute thread. The written bytes do not depend on this distribution.
 
 use std::fmt;
 use std::ops::{Deref, Range};
@@ -17,38 +16,38 @@ use rayon::{ThreadPool, ThreadPoolBuilder};
 
 use super::check::Sweep;
 use super::plan::Plan;
-use super::shard::{Shard, TooManyParts, holds};
+use super::shard::{Shard, TooManyParts, contains_part};
 use crate::dataset::{
     Company, DatasetError, Folder, Footer, Layout, Look, ManifestTable, Session, State, TableStatistics, encode,
 };
 use crate::grid::Quantity;
 use crate::table::{ColumnBuffer, Job, Phase, RunStats, Signal, Stopped, Table};
 
-/// What a run did.
+/// The result of a run.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Outcome {
-    /// What it did for each table, in the order of the spec.
+    /// The result for each table, in the order of the spec.
     pub tables: Vec<TableOutcome>,
-    /// What the parts of each table contain, those that were kept and those that were made.
-    pub digests: Vec<TableStatistics>,
-    /// All work that was spent.
+    /// The statistics of each table over kept and new parts.
+    pub statistics: Vec<TableStatistics>,
+    /// Solver statistics.
     pub work: RunStats,
 }
 
-/// What a run did for one table.
+/// The result of a run for one table.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct TableOutcome {
-    /// Parts that were there already.
+    /// Intact parts that existed before.
     pub kept: u64,
-    /// Parts that were made.
+    /// Parts that were written.
     pub made: u64,
-    /// Those of them that were there, but damaged.
+    /// Written parts that replace damaged ones.
     pub damaged: u64,
-    /// Rows that were computed.
+    /// Computed rows.
     pub rows: u64,
 }
 
-/// Why a run did not finish.
+/// The error of a run.
 #[derive(Debug, thiserror::Error)]
 pub enum RunError {
     /// The dataset cannot be written.
@@ -57,43 +56,43 @@ pub enum RunError {
     /// The threads cannot be started.
     #[error("cannot start {threads} threads: {source}\n  help: use fewer with --threads N")]
     Threads {
-        /// How many.
+        /// Their number.
         threads: usize,
-        /// Why not.
+        /// The error of the system.
         source: rayon::ThreadPoolBuildError,
     },
-    /// The thread that writes cannot be started.
+    /// A writer thread cannot be started.
     #[error("cannot start the thread that writes: {0}\n  help: allow the process more memory or more threads")]
     Writer(std::io::Error),
-    /// It cannot be shared out.
+    /// The sweep has too many parts for shards.
     #[error(transparent)]
     Parts(#[from] TooManyParts),
-    /// A row made the program panic; all other parts are finished.
+    /// A row panicked; all other parts are complete.
     #[error("{defect}\n  help: this is a defect of slipsweep, please report it; {}", match others {
         0 => "all other parts are finished".to_owned(),
         _ => format!("{others} more parts have such a row, all others are finished"),
     })]
     Defect {
-        /// The first of them.
+        /// The first such row.
         defect: Defect,
-        /// How many parts more have such a row.
+        /// The number of further parts with such a row.
         others: usize,
     },
-    /// It was asked to stop.
+    /// The run was stopped on request.
     #[error(transparent)]
     Stopped(#[from] Stopped),
 }
 
-/// A row that made the program panic, which no row should.
+/// A row that panicked: a defect of the program.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Defect {
     /// The table.
     pub table: String,
-    /// The row, by global number; several if no single one panics when it is computed on its own.
+    /// The global row number; several rows if no single row panics alone.
     pub rows: Range<u64>,
     /// The axes of the table at the first of them.
     pub axes: Vec<(&'static str, f64)>,
-    /// What the program said.
+    /// The panic message.
     pub message: String,
 }
 
@@ -109,15 +108,15 @@ impl fmt::Display for Defect {
     }
 }
 
-/// Runs `sweep` on `threads` threads (0: one a processor) into `folder`; parts that are there already are kept. No other run may be at work
-/// there.
+/// Runs `sweep` on `threads` threads (0: one for each processor) into `folder`, and keeps existing intact parts. No other run may use the
+/// folder.
 pub fn run(sweep: &Sweep, folder: &Folder, threads: usize, signal: &Signal) -> Result<Outcome, RunError> {
     run_in(sweep, folder, (Shard::WHOLE, Company::Alone), threads, signal)
 }
 
-/// The same for the parts of one shard alone. Any number of processes may do that at the same time, with the same shard too.
+/// Runs the parts of one shard. Any number of processes may run shards of one dataset at the same time, including the same shard.
 ///
-/// Every bit of a part that is there is checked: one that is damaged is made again, one of another sweep is left alone and ends the run.
+/// Every bit of an existing part is checked. A damaged part is recomputed; a part of another sweep stays and ends the run with an error.
 pub fn run_shard(
     sweep: &Sweep,
     folder: &Folder,
@@ -135,9 +134,9 @@ fn run_in(
     threads: usize,
     signal: &Signal,
 ) -> Result<Outcome, RunError> {
-    // Plan: the parts of each table that are ours, and the dataset that takes them.
+    // Plan: the parts of each table in this shard, and the dataset.
     let plan = Plan::new(sweep);
-    let shares = shard.parts(sweep, &plan)?;
+    let shards = shard.parts(sweep, &plan)?;
     let session = folder.open(&plan.manifest(sweep), company).map_err(|error| sweep.explain(error))?;
     let pool = pool(threads)?;
     let optimum_cache = sweep.optimum_cache();
@@ -149,9 +148,9 @@ fn run_in(
         queued: AtomicUsize::new(0),
         failures: Failures::default(),
     };
-    let stages: Vec<Stage<'_>> = (sweep.requests.iter().zip(&plan.tables))
+    let table_runs: Vec<TableRun<'_>> = (sweep.requests.iter().zip(&plan.tables))
         .zip(&optimum_cache)
-        .map(|((request, table), optimum_cache)| Stage {
+        .map(|((request, table), optimum_cache)| TableRun {
             run: &run,
             definition: request.table,
             table,
@@ -161,26 +160,26 @@ fn run_in(
         })
         .collect();
 
-    // Parts that are there and sound are kept.
+    // Check: intact parts are kept.
     signal.enter(Phase::Checking);
-    let sound = stages.iter().zip(&shares).map(|(stage, share)| stage.check(share));
-    let sound = sound.collect::<Result<Vec<_>, RunError>>()?;
+    let intact = table_runs.iter().zip(&shards).map(|(table_run, shard_parts)| table_run.check(shard_parts));
+    let intact = intact.collect::<Result<Vec<_>, RunError>>()?;
 
-    // The others are solved by the pool, encoded, and published by the writers.
+    // Solve, encode and publish the other parts.
     signal.enter(Phase::Computing);
-    let mut outcome = Outcome { tables: Vec::new(), digests: Vec::new(), work: RunStats::default() };
+    let mut outcome = Outcome { tables: Vec::new(), statistics: Vec::new(), work: RunStats::default() };
     thread::scope(|scope| {
-        let (to_disk, parts) = sync_channel(1);
+        let (to_writers, parts) = sync_channel(1);
         run.start_writers(scope, parts)?;
-        for ((stage, share), sound) in stages.iter().zip(&shares).zip(&sound) {
-            let (done, work) = stage.solve(share, sound, &to_disk)?;
+        for ((table_run, shard_parts), intact) in table_runs.iter().zip(&shards).zip(&intact) {
+            let (done, work) = table_run.solve(shard_parts, intact, &to_writers)?;
             outcome.tables.push(done);
             outcome.work += work;
         }
         signal.enter(Phase::Writing);
         Ok::<(), RunError>(())
     })?;
-    outcome.digests = stages.into_iter().map(|stage| content(stage.statistics)).collect();
+    outcome.statistics = table_runs.into_iter().map(|table_run| content(table_run.statistics)).collect();
     run.failures.into_result(&plan, || session.check())?;
     Ok(outcome)
 }
@@ -193,45 +192,46 @@ pub fn pool(threads: usize) -> Result<ThreadPool, RunError> {
     })
 }
 
-/// Bytes of the sheets that are being filled at most, unless there are fewer than two. Chosen: a part takes a few MiB, so it limits machines of many
-/// threads alone.
-const MAX_SHEET_BYTES: u64 = 1 << 27;
+/// Greatest size of all column buffers, in bytes, for two or more parts. Chosen: a part takes a few MiB, so this limits only machines with
+/// many threads.
+const MAX_BUFFER_BYTES: u64 = 1 << 27;
 
-/// Threads that encode and write. Chosen: while one waits for the disk to sync its part, another one has the processor.
+/// Writer threads. Chosen: while one waits for the disk, the other encodes.
 pub(super) const WRITERS: usize = 2;
 
-/// Parts that those threads may have before them, the ones that they are at included: with fewer they would wait for the next.
-const AHEAD: usize = WRITERS + 1;
+/// Parts in the queue of the writers, including those in progress. With fewer the writers idle.
+const QUEUE_PARTS: usize = WRITERS + 1;
 
-/// Computes the parts `numbers` of a table and hands the number and the sheet of each to `take`, in no particular order; of a part with a
-/// row that panics, the row.
+/// Computes the parts `numbers` of a table, and passes number and buffer of each to `take` in any order. For a part with a row that panics
+/// it passes that row.
 ///
-/// One part more than there are threads is under way at a time, so that no thread waits for the end of a part, and three may be kept by
-/// whoever takes them; fewer where parts are large and threads many, since the threads share the rows of a part.
+/// One part more than there are threads is in progress, so that no thread waits for the end of a part. `take` may hold three more. Large parts
+/// on many threads are limited by [`MAX_BUFFER_BYTES`].
 pub fn compute(
     pool: &ThreadPool,
     table: &dyn Table,
     job: &Job<'_>,
     parts: &ManifestTable,
     numbers: impl Iterator<Item = u64>,
-    take: impl Fn(u64, Result<Filled, Defect>) + Sync,
+    take: impl Fn(u64, Result<FilledBuffer, Defect>) + Sync,
 ) -> Result<RunStats, Stopped> {
     let (give_back, free) = channel();
     let columns = job.projection.indices().len();
     let size = parts.rows_per_part.min(parts.rows).saturating_mul(8 * columns as u64 + 1);
-    let buffers = (pool.current_num_threads() as u64 + 1 + AHEAD as u64).min((MAX_SHEET_BYTES / size.max(1)).max(2));
+    let buffers =
+        (pool.current_num_threads() as u64 + 1 + QUEUE_PARTS as u64).min((MAX_BUFFER_BYTES / size.max(1)).max(2));
     for _ in 0..buffers {
         let _ = give_back.send(ColumnBuffer::new(columns));
     }
     let result = Mutex::new(Ok(RunStats::default()));
     pool.in_place_scope(|scope| {
         for number in numbers {
-            // Never fails: every sheet is given back.
+            // Never fails: every buffer is returned.
             let Ok(buffer) = free.recv() else { break };
             if locked(&result).is_err() {
                 break;
             }
-            let (mut filled, result, take) = (Filled { buffer, give_back: give_back.clone() }, &result, &take);
+            let (mut filled, result, take) = (FilledBuffer { buffer, give_back: give_back.clone() }, &result, &take);
             scope.spawn(move |_| {
                 let rows = parts.rows_of(number);
                 let computed = match attempt(table, job, rows.clone(), &mut filled.buffer) {
@@ -259,14 +259,14 @@ fn attempt(
     buffer: &mut ColumnBuffer,
 ) -> Result<Result<RunStats, Stopped>, String> {
     buffer.resize((rows.end - rows.start) as usize);
-    // What a panic leaves half done is the sheet, which is filled anew, and solves that were not stored.
+    // A panic leaves a buffer that the next part overwrites, and solves that were not stored.
     catch_unwind(AssertUnwindSafe(|| table.compute(job, rows, buffer))).map_err(|payload| {
         let text = payload.downcast_ref::<&str>().map(|text| (*text).to_owned());
         text.or_else(|| payload.downcast_ref::<String>().cloned()).unwrap_or_else(|| "no message".to_owned())
     })
 }
 
-/// The row among `rows`, which panicked with `message`, that is to blame: found by halves, since any rows can be computed on their own.
+/// The row among `rows` that panics with `message`, found by bisection: any rows can be computed alone.
 fn culprit(table: &dyn Table, job: &Job<'_>, mut rows: Range<u64>, mut message: String) -> Defect {
     let mut buffer = ColumnBuffer::new(job.projection.indices().len());
     while rows.end - rows.start > 1 {
@@ -285,23 +285,23 @@ fn culprit(table: &dyn Table, job: &Job<'_>, mut rows: Range<u64>, mut message: 
     Defect { table: table.name().to_owned(), rows, axes, message }
 }
 
-/// What the stages of a run have in common.
+/// The shared state of the stages of a run.
 struct Run<'a> {
     folder: &'a Folder,
     session: &'a Session,
     pool: &'a ThreadPool,
     signal: &'a Signal,
-    /// Parts that the disk has not finished.
+    /// Parts in the queue of the writers.
     queued: AtomicUsize,
     failures: Failures,
 }
 
 impl Run<'_> {
-    /// Starts the threads that publish parts. The disk has threads of its own, so that no thread that computes waits for it.
+    /// Starts the writer threads, so that no compute thread waits for the disk.
     fn start_writers<'scope, 'a: 'scope>(
         &'scope self,
         scope: &'scope Scope<'scope, '_>,
-        parts: Receiver<Part<'a>>,
+        parts: Receiver<QueuedPart<'a>>,
     ) -> Result<(), RunError> {
         let parts = Arc::new(Mutex::new(parts));
         let next = move || locked(&parts).recv();
@@ -319,43 +319,43 @@ impl Run<'_> {
 }
 
 /// One table of a run.
-struct Stage<'a> {
+struct TableRun<'a> {
     run: &'a Run<'a>,
     definition: &'a dyn Table,
     table: &'a ManifestTable,
     job: Job<'a>,
     layout: Layout,
-    /// What the parts contain that are kept or made by now.
+    /// The statistics of the parts so far.
     statistics: Mutex<TableStatistics>,
 }
 
-impl<'a> Stage<'a> {
-    /// The numbers of the sound parts of `share` that are there, ascending; every bit of them is checked, on all threads of the run.
-    fn check(&self, share: &[Range<u64>]) -> Result<Vec<u64>, RunError> {
-        let mut there = self.run.folder.parts_there(self.table);
-        there.retain(|number| holds(share, *number));
-        let sound = |number: u64| {
+impl<'a> TableRun<'a> {
+    /// The numbers of the intact parts of `shard`, ascending. All threads of the run check every bit.
+    fn check(&self, shard_parts: &[Range<u64>]) -> Result<Vec<u64>, RunError> {
+        let mut existing = self.run.folder.parts_there(self.table);
+        existing.retain(|number| contains_part(shard_parts, *number));
+        let intact = |number: u64| {
             self.run.signal.check()?;
             Ok((self.look(number)? == Found::Sound).then_some(number))
         };
-        let sound = || there.into_par_iter().with_max_len(1).map(sound).collect::<Result<Vec<_>, RunError>>();
-        Ok(self.run.pool.install(sound)?.into_iter().flatten().collect())
+        let intact = || existing.into_par_iter().with_max_len(1).map(intact).collect::<Result<Vec<_>, RunError>>();
+        Ok(self.run.pool.install(intact)?.into_iter().flatten().collect())
     }
 
-    /// Computes the parts of `share` but for the `sound` ones, and hands them to the disk.
+    /// Computes the parts of `shard` without the `intact` ones, and passes them to the writers.
     fn solve(
         &'a self,
-        share: &[Range<u64>],
-        sound: &[u64],
-        to_disk: &SyncSender<Part<'a>>,
+        shard_parts: &[Range<u64>],
+        intact: &[u64],
+        to_writers: &SyncSender<QueuedPart<'a>>,
     ) -> Result<(TableOutcome, RunStats), RunError> {
         let Run { pool, signal, failures, .. } = self.run;
-        let mut done = TableOutcome { kept: sound.len() as u64, ..TableOutcome::default() };
-        let missing = share.iter().cloned().flatten().filter(|number| sound.binary_search(number).is_err());
+        let mut done = TableOutcome { kept: intact.len() as u64, ..TableOutcome::default() };
+        let missing = shard_parts.iter().cloned().flatten().filter(|number| intact.binary_search(number).is_err());
         let missing = missing.filter(|&number| self.is_missing(number, &mut done));
         let wanted = missing.take_while(|_| failures.is_empty() && signal.check().is_ok());
-        let take = |number, buffer: Result<Filled, Defect>| match buffer {
-            Ok(buffer) => self.hand_over(number, buffer, to_disk),
+        let take = |number, buffer: Result<FilledBuffer, Defect>| match buffer {
+            Ok(buffer) => self.queue(number, buffer, to_writers),
             Err(defect) => locked(&failures.defects).push(defect),
         };
         let work = compute(pool, self.definition, &self.job, self.table, wanted, take)?;
@@ -363,7 +363,7 @@ impl<'a> Stage<'a> {
         Ok((done, work))
     }
 
-    /// Whether a part is to be computed: another run may have made it by now.
+    /// Whether a part must be computed: another run may have written it.
     fn is_missing(&self, number: u64, done: &mut TableOutcome) -> bool {
         match self.look(number) {
             Ok(Found::Sound) => {
@@ -383,26 +383,26 @@ impl<'a> Stage<'a> {
         true
     }
 
-    /// Gives a part to the threads that publish, encoded if they have enough to do.
-    fn hand_over(&'a self, number: u64, buffer: Filled, to_disk: &SyncSender<Part<'a>>) {
+    /// Passes a part to the writers, encoded if all of them are busy.
+    fn queue(&'a self, number: u64, buffer: FilledBuffer, to_writers: &SyncSender<QueuedPart<'a>>) {
         let Run { queued, failures, .. } = self.run;
-        let take = |parts: usize| (parts < AHEAD).then_some(parts + 1);
+        let take = |parts: usize| (parts < QUEUE_PARTS).then_some(parts + 1);
         let content = if queued.fetch_update(Ordering::Relaxed, Ordering::Relaxed, take).is_ok() {
-            Content::ColumnBuffer(buffer)
+            PartContent::ColumnBuffer(buffer)
         } else {
             match self.encode(number, &buffer) {
                 Ok(bytes) => {
                     queued.fetch_add(1, Ordering::Relaxed);
-                    Content::Bytes(bytes)
+                    PartContent::Bytes(bytes)
                 }
                 Err(error) => return failures.keep(Err(error)),
             }
         };
-        // The other end is there until every sender is gone.
-        let _ = to_disk.send(Part { stage: self, number, content });
+        // The receiver exists as long as a sender.
+        let _ = to_writers.send(QueuedPart { table_run: self, number, content });
     }
 
-    /// What is in the place of a part; a sound one is counted.
+    /// The state of a part on disk; an intact one is counted.
     fn look(&self, number: u64) -> Result<Found, RunError> {
         let Run { folder, session, signal, .. } = self.run;
         match folder.state(&session.manifest, &self.table.name, number, Look::Whole) {
@@ -421,7 +421,7 @@ impl<'a> Stage<'a> {
         }
     }
 
-    /// Adds what a part contains.
+    /// Adds the statistics of a part.
     fn count(&self, part: TableStatistics) {
         let mut statistics = locked(&self.statistics);
         *statistics = std::mem::take(&mut *statistics).merge(part);
@@ -438,49 +438,49 @@ impl<'a> Stage<'a> {
     }
 }
 
-/// What is in the place of a part.
+/// A part in the queue of the writers.
 #[derive(PartialEq)]
 enum Found {
-    /// The part, every bit of it.
+    /// The encoded part.
     Sound,
     Damaged,
     Nothing,
 }
 
-/// A part on its way to the disk.
-struct Part<'a> {
-    stage: &'a Stage<'a>,
+/// A computed part before publication.
+struct QueuedPart<'a> {
+    table_run: &'a TableRun<'a>,
     number: u64,
-    content: Content,
+    content: PartContent,
 }
 
-impl Part<'_> {
-    /// Writes the part, encoded before if it is not yet.
+impl QueuedPart<'_> {
+    /// Encodes the part if necessary, and writes it.
     fn publish(self) -> Result<(), RunError> {
-        let Part { stage, number, content } = self;
-        // Who asks to stop does not want to wait for the parts that are queued here.
-        stage.run.signal.check()?;
+        let QueuedPart { table_run, number, content } = self;
+        // A stopped run does not write queued parts.
+        table_run.run.signal.check()?;
         let bytes = match content {
-            Content::Bytes(bytes) => bytes,
-            Content::ColumnBuffer(buffer) => stage.encode(number, &buffer)?,
+            PartContent::Bytes(bytes) => bytes,
+            PartContent::ColumnBuffer(buffer) => table_run.encode(number, &buffer)?,
         };
-        Ok(stage.run.session.write_part(&stage.table.name, number, &bytes)?)
+        Ok(table_run.run.session.write_part(&table_run.table.name, number, &bytes)?)
     }
 }
 
-/// What is there of a part.
-enum Content {
-    ColumnBuffer(Filled),
+/// The content of a queued part.
+enum PartContent {
+    ColumnBuffer(FilledBuffer),
     Bytes(Vec<u8>),
 }
 
-/// The cells of a part. They go back to where the next part is computed once they are dropped.
-pub struct Filled {
+/// The buffer of a part, returned to the pool when dropped.
+pub struct FilledBuffer {
     buffer: ColumnBuffer,
     give_back: Sender<ColumnBuffer>,
 }
 
-impl Deref for Filled {
+impl Deref for FilledBuffer {
     type Target = ColumnBuffer;
 
     fn deref(&self) -> &ColumnBuffer {
@@ -488,9 +488,9 @@ impl Deref for Filled {
     }
 }
 
-impl Drop for Filled {
+impl Drop for FilledBuffer {
     fn drop(&mut self) {
-        // Nobody waits for it once all parts are computed.
+        // The pool is gone once all parts are computed.
         let _ = self.give_back.send(std::mem::replace(&mut self.buffer, ColumnBuffer::new(0)));
     }
 }
@@ -518,7 +518,7 @@ impl Failures {
         content(self.first).map_or(Ok(()), Err)?;
         check()?;
         let mut defects = content(self.defects);
-        // Threads find them in no particular order.
+        // Threads report them in any order.
         let table = |defect: &Defect| plan.tables.iter().position(|table| table.name == defect.table);
         defects.sort_by_key(|defect| (table(defect), defect.rows.start));
         let others = defects.len().saturating_sub(1);
@@ -526,12 +526,12 @@ impl Failures {
     }
 }
 
-/// The content of `mutex`, also if a thread died while it held it.
+/// The content of `mutex`, including a poisoned one.
 fn locked<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// The same once no thread needs it.
+/// The owned content of `mutex`, including a poisoned one.
 fn content<T>(mutex: Mutex<T>) -> T {
     mutex.into_inner().unwrap_or_else(PoisonError::into_inner)
 }

@@ -1,4 +1,4 @@
-//! What is wrong with a spec: where, what was found, what was expected, and what to do.
+//! The errors of a spec: place, finding, expectation and help.
 
 use std::fmt;
 use std::path::{Path, PathBuf};
@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use super::read;
 use crate::names::{nearest, shown};
 
-/// What is wrong with a spec: a fault, and those that are independent of it.
+/// The error of a spec: its first fault, and the independent others.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct SpecError {
     /// The file, if there is one.
@@ -15,27 +15,27 @@ pub struct SpecError {
     pub line: Option<usize>,
     /// The key, as in `axes.v_i[2]`; empty if it concerns the whole file.
     pub key: Box<str>,
-    /// What was found.
+    /// The finding.
     pub found: Box<str>,
-    /// What would be right.
+    /// The expected input.
     pub expected: Box<str>,
-    /// What to do.
+    /// The help.
     pub help: Box<str>,
-    /// The other faults of the spec, in the order of their lines; of many, the first that were found.
+    /// The other faults of the spec, by line; the first ones of many.
     pub others: Box<[SpecError]>,
 }
 
-/// Characters of a key that a message shows. Chosen: twice those of the longest legal key.
+/// Greatest length of a key in a message, in characters. Chosen: twice the longest legal key.
 const MAX_KEY_CHARS: usize = 200;
 
-/// Characters of a name, or of a cell of a file, that a message shows. Chosen: a line.
+/// Greatest length of a name or cell in a message, in characters. Chosen: a line.
 pub const MAX_NAME_CHARS: usize = 100;
 
-/// Characters of what was found that a message shows: more than twice the 1000 of the longest expression.
+/// Greatest length of a finding in a message, in characters. Chosen: twice the 1000 of the longest expression.
 const MAX_FOUND_CHARS: usize = 2500;
 
 impl SpecError {
-    /// A fault at `key`, whose place is not known yet.
+    /// A fault at `key`, without a line yet.
     pub fn new(
         key: impl Into<Box<str>>,
         found: impl Into<Box<str>>,
@@ -62,19 +62,19 @@ impl SpecError {
     }
 }
 
-/// Faults that one message names. Chosen: they fit a screen.
+/// Greatest number of faults in a message. Chosen: they fit a screen.
 const MAX_FAULTS: usize = 10;
 
-/// The faults that a check has found so far.
+/// The faults of a check.
 #[derive(Debug, Default)]
 pub struct Faults {
     found: Vec<SpecError>,
-    /// Keys that are wrong, or that a misspelt one was meant to be.
+    /// Keys with a fault, and the probable meaning of misspelt keys.
     suspects: Vec<String>,
 }
 
 impl Faults {
-    /// Adds a fault, unless it is known or there are enough.
+    /// Adds a fault, unless it is known or the limit is reached.
     pub fn push(&mut self, fault: SpecError) {
         self.suspect(fault.key.to_string());
         if !self.are_enough() && !self.found.contains(&fault) {
@@ -87,14 +87,14 @@ impl Faults {
         result.map_err(|fault| self.push(fault)).ok()
     }
 
-    /// Adds a key about which nothing more can be said.
+    /// Excludes a key from further checks.
     pub fn suspect(&mut self, key: String) {
         if !self.are_enough() {
             self.suspects.push(key);
         }
     }
 
-    /// Whether a fault at `key`, above or below it, or one that was not added, may be the cause of what looks wrong there.
+    /// Whether a known fault at, above or below `key` may cause a fault there.
     pub fn concern(&self, key: &str) -> bool {
         let is_below = |key: &str, above: &str| {
             key.strip_prefix(above).is_some_and(|rest| rest.is_empty() || rest.starts_with(['.', '[']))
@@ -102,12 +102,12 @@ impl Faults {
         self.are_enough() || self.suspects.iter().any(|suspect| is_below(suspect, key) || is_below(key, suspect))
     }
 
-    /// Whether there is no fault so far.
+    /// Whether no fault is known.
     pub fn are_none(&self) -> bool {
         self.found.is_empty()
     }
 
-    /// Whether no more are added: there are more than are named.
+    /// Whether the limit is reached.
     pub fn are_enough(&self) -> bool {
         self.found.len() > MAX_FAULTS
     }
@@ -164,7 +164,7 @@ pub fn refuse<T>(
     Err(SpecError::new(key, found, expected, help))
 }
 
-/// A fault of a name that is none of `known`, with the nearest of them.
+/// The fault of a name that is not in `known`, with the nearest known name.
 pub fn unknown(key: String, what: &str, name: &str, known: &[&str]) -> SpecError {
     let help = match nearest(name, known.iter().copied()) {
         Some(meant) => format!("did you mean `{meant}`?"),

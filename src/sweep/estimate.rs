@@ -1,4 +1,4 @@
-//! The cost of a sweep, from samples that are computed, encoded and written as a run does it.
+//! The cost of a sweep, estimated from samples that are computed, encoded and written like parts.
 
 use std::iter::Sum;
 use std::ops::Range;
@@ -15,23 +15,22 @@ use crate::dataset::{DatasetError, Footer, Layout, Manifest, atomic, encode};
 use crate::grid::Point;
 use crate::table::{ColumnBuffer, Job, OptimumCache, Signal};
 
-/// Time that the samples of a sweep may take together: `plan` is to answer within a second or two.
-const BUDGET: Duration = Duration::from_millis(1500);
+/// Time for all samples of a sweep. Chosen: `plan` answers within two seconds.
+const SAMPLE_TIME: Duration = Duration::from_millis(1500);
 
-/// Ranges of rows of a first sample: enough to keep several threads busy.
-const PLACES: u64 = 16;
+/// Ranges of rows in the first sample. Chosen: several threads are busy.
+const FIRST_RANGES: u64 = 16;
 
-/// Ranges of rows of a sample at most: what is known of each is kept while it is taken.
-const MOST_PLACES: u64 = 1 << 14;
+/// Greatest number of ranges in a sample, whose costs are kept in memory.
+const MAX_RANGES: u64 = 1 << 14;
 
-/// Seconds that the sample of a table may take at most, where a range of rows costs much, however few rows it has. Chosen: a person waits that
-/// long for a plan.
-const LONGEST: f64 = 5.0;
+/// Greatest time of the sample of a table with expensive rows, in seconds. Chosen: the patience of a user of `plan`.
+const MAX_SAMPLE_SECONDS: f64 = 5.0;
 
-/// Greatest cost of a row over the mean cost of its table. Chosen: rows of `step_response` differ by three orders of magnitude.
-const SPREAD: f64 = 1000.0;
+/// Greatest cost of a row, in units of the mean cost of its table. Chosen: rows of `step_response` differ by three orders of magnitude.
+const MAX_COST_RATIO: f64 = 1000.0;
 
-/// What a table costs.
+/// The estimated cost of a table.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Estimate {
     /// Seconds of one thread, without the optimal protocols that tables share.
@@ -40,23 +39,23 @@ pub struct Estimate {
     pub bytes: f64,
 }
 
-/// What a sweep costs.
+/// The estimated cost of a sweep.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Estimates {
     /// Each of its tables, in the order of the spec.
     pub tables: Vec<Estimate>,
     /// Seconds of one thread for the optimal protocols that tables share.
     pub shared: f64,
-    /// Seconds until the disk has a file of no length and its name.
+    /// Seconds to write an empty file and its name.
     sync: f64,
-    /// The same for a part of the usual length.
+    /// Seconds to write a part of mean size.
     part: f64,
     /// All parts.
     parts: u64,
 }
 
 impl Estimates {
-    /// Seconds of one thread for everything that is computed.
+    /// Seconds of one thread for all computation.
     pub fn seconds(&self) -> f64 {
         self.shared + self.tables.iter().map(|table| table.seconds).sum::<f64>()
     }
@@ -66,7 +65,7 @@ impl Estimates {
         self.tables.iter().map(|table| table.bytes).sum()
     }
 
-    /// Seconds on the clock of a run on `threads` threads, once the spec is read.
+    /// Wall time of a run on `threads` threads, in seconds, without reading the spec.
     pub fn elapsed(&self, threads: usize) -> f64 {
         // First come the folder of the dataset, its manifest and the folders of the tables, one after the other.
         let opening = self.sync * (self.tables.len() + 2) as f64;
@@ -76,7 +75,7 @@ impl Estimates {
     }
 }
 
-/// Estimates `sweep` on as many threads as a run takes, for a dataset in `folder`, which need not be there yet.
+/// Estimates `sweep` on all threads of a run, for a dataset in `folder`, which may not exist yet.
 ///
 /// # Errors
 ///
@@ -84,8 +83,8 @@ impl Estimates {
 pub fn estimate(sweep: &Sweep, folder: &Path) -> Result<Estimates, RunError> {
     let (plan, pool) = (Plan::new(sweep), pool(0)?);
     let sampler = Sampler { sweep, plan: &plan, manifest: plan.manifest(sweep), pool: &pool };
-    let shares = sweep.requests.len() as u32 + u32::from(plan.optima > 0);
-    let budget = BUDGET.as_secs_f64() / f64::from(shares);
+    let samples = sweep.requests.len() as u32 + u32::from(plan.optima > 0);
+    let budget = SAMPLE_TIME.as_secs_f64() / f64::from(samples);
     let optimum = sampler.optimum(budget);
     let optima = sweep.optimum_cache();
     let tables =
@@ -93,7 +92,7 @@ pub fn estimate(sweep: &Sweep, folder: &Path) -> Result<Estimates, RunError> {
     let tables: Vec<Estimate> = tables.collect::<Result<_, _>>()?;
     let parts: u64 = plan.tables.iter().map(|table| table.parts).sum();
     let bytes = tables.iter().map(|table| table.bytes).sum::<f64>() / parts as f64;
-    // What cannot be written is not for an estimate to complain about.
+    // An estimate ignores write errors.
     let written = |bytes: f64| atomic::time(folder, bytes as usize).map_or(0.0, |time| time.as_secs_f64());
     let (sync, part) = (written(0.0), written(bytes));
     let shared = optimum * plan.optima as f64;
@@ -108,18 +107,18 @@ pub fn estimate(sweep: &Sweep, folder: &Path) -> Result<Estimates, RunError> {
 pub fn sizes(sweep: &Sweep) -> Result<Vec<f64>, RunError> {
     let (plan, pool) = (Plan::new(sweep), pool(0)?);
     let sampler = Sampler { sweep, plan: &plan, manifest: plan.manifest(sweep), pool: &pool };
-    let budget = 0.2 * BUDGET.as_secs_f64() / sweep.requests.len() as f64;
+    let budget = 0.2 * SAMPLE_TIME.as_secs_f64() / sweep.requests.len() as f64;
     let optima = sweep.optimum_cache();
     let tables =
         sweep.requests.iter().zip(&optima).map(|(request, optima)| sampler.table(request, optima, 0.0, budget));
     tables.map(|table| table.map(|table| table.bytes)).collect()
 }
 
-/// What some ranges of rows cost.
+/// The cost of a sample.
 #[derive(Debug, Clone, Copy, Default)]
 struct Sample {
     rows: u64,
-    /// Seconds of the threads that computed and encoded them, without those that waited for the last range of a sample.
+    /// Seconds of the threads that computed and encoded the ranges, without waiting.
     seconds: f64,
     bytes: u64,
 }
@@ -134,18 +133,18 @@ impl Sum for Sample {
     }
 }
 
-/// What a range of rows costs, however many it has, and each of its rows: in seconds of one thread, or in bytes.
+/// A cost that is linear in the number of rows: offset and slope, in seconds of one thread or in bytes.
 #[derive(Debug, Clone, Copy)]
-struct Line {
+struct LinearCost {
     range: f64,
     row: f64,
 }
 
-impl Line {
-    /// The line through ranges of `shorter` and `longer` rows; costs that fall are taken as constant.
-    fn through(shorter: (f64, f64), longer: (f64, f64)) -> Line {
+impl LinearCost {
+    /// The line through ranges of `shorter` and `longer` rows. A falling cost counts as constant.
+    fn through(shorter: (f64, f64), longer: (f64, f64)) -> LinearCost {
         let row = ((longer.1 - shorter.1) / (longer.0 - shorter.0)).max(0.0);
-        Line { range: (shorter.1 - row * shorter.0).max(0.0), row }
+        LinearCost { range: (shorter.1 - row * shorter.0).max(0.0), row }
     }
 
     fn of(self, ranges: u64, rows: u64) -> f64 {
@@ -162,45 +161,45 @@ struct Sampler<'a> {
 }
 
 impl Sampler<'_> {
-    /// What a table costs, if a shared optimal protocol costs `optimum`, from samples that take about `budget`.
+    /// The cost of a table if a shared optimal protocol costs `optimum`, from samples that take about `budget`.
     fn table(&self, request: &Request, optima: &OptimumCache, optimum: f64, budget: f64) -> Result<Estimate, RunError> {
         let signal = Signal::default();
         let job = self.sweep.job(request, optima, &signal);
         let sample = |length, places, limit| self.mean(request, &job, optimum, (length, places, limit));
         let began = Instant::now();
         let left = || budget - began.elapsed().as_secs_f64();
-        // Rows that cost much leave time for a few.
+        // Expensive rows leave time for few ranges.
         let threads = self.pool.current_num_threads();
         let mut places = threads as u64;
         let mut one = sample(1, places, f64::INFINITY)?;
         if left() > 0.8 * budget {
-            places = PLACES;
+            places = FIRST_RANGES;
             one = sample(1, places, f64::INFINITY)?;
         }
         let longest = request.table.rows_per_part().min(request.rows / places);
-        let (mut seconds, mut bytes) = (Line { range: 0.0, row: one[0] }, Line { range: one[1], row: 0.0 });
+        let (mut seconds, mut bytes) = (LinearCost { range: 0.0, row: one[0] }, LinearCost { range: one[1], row: 0.0 });
         let (mut length, mut long) = (1, one);
-        // Ranges grow until their rows, and not that there are ranges, take most of the time. As long as they do not, it costs little, and
-        // what is known of one row alone may be thousands of times too much.
+        // Ranges grow until the rows, not the fixed cost of a range, take most of the time. A single row may overestimate the cost a
+        // thousandfold.
         while length < longest {
             let is_flat = length == 1 || long[0] < 2.0 * one[0];
-            let row = (SPREAD * 1e-9 * request.table.cost() as f64).min(long[0] / length as f64);
+            let row = (MAX_COST_RATIO * 1e-9 * request.table.cost() as f64).min(long[0] / length as f64);
             let next = (long[0] + 3.0 * length as f64 * row) * places as f64 / threads as f64;
-            let is_bearable = began.elapsed().as_secs_f64() + next < LONGEST;
+            let is_bearable = began.elapsed().as_secs_f64() + next < MAX_SAMPLE_SECONDS;
             if left() < 0.6 * budget && !(is_flat && is_bearable) {
                 break;
             }
             length = (4 * length).min(longest);
             long = sample(length, places, f64::INFINITY)?;
-            seconds = Line::through((one[2], one[0]), (long[2], long[0]));
-            bytes = Line::through((one[2], one[1]), (long[2], long[1]));
+            seconds = LinearCost::through((one[2], one[0]), (long[2], long[0]));
+            bytes = LinearCost::through((one[2], one[1]), (long[2], long[1]));
             if seconds.range < 0.1 * long[0] && left() < 0.8 * budget {
                 break;
             }
         }
-        // What time is left goes into more of them, since rows differ.
+        // The remaining time goes into further ranges, since rows differ.
         if left() > 0.1 * budget {
-            let all = sample(length, MOST_PLACES.min(request.rows / length), left())?;
+            let all = sample(length, MAX_RANGES.min(request.rows / length), left())?;
             seconds.row = ((all[0] - seconds.range) / all[2]).max(0.0);
             if length > 1 {
                 bytes.row = ((all[1] - bytes.range) / all[2]).max(0.0);
@@ -243,20 +242,20 @@ impl Sampler<'_> {
 
     /// Seconds of one thread for an optimal protocol that tables share; 0 if there is none.
     fn optimum(&self, budget: f64) -> f64 {
-        let Some(rows) = self.sweep.optimum_rows.as_ref().filter(|_| self.plan.optima <= OptimumCache::MOST_KEPT)
+        let Some(rows) = self.sweep.optimum_rows.as_ref().filter(|_| self.plan.optima <= OptimumCache::MAX_CACHED)
         else {
             return 0.0;
         };
-        // A store without room: each is solved however often it was met.
+        // A cache without capacity: every request is solved.
         let optima = OptimumCache::new(u64::MAX, self.sweep.bounded, self.sweep.optimum_rtol());
-        let (began, mut places) = (Instant::now(), rows.rows().min(PLACES));
+        let (began, mut places) = (Instant::now(), rows.rows().min(FIRST_RANGES));
         loop {
             let starts = (0..places).map(|place| place_of(rows.rows(), place, 1).start);
             let points: Vec<Point> = starts.map(|row| self.sweep.grid.scaled(&rows.point(row))).collect();
             let start = Instant::now();
             self.pool.install(|| points.par_iter().for_each(|point| _ = optima.get(0, point)));
             let each = start.elapsed().as_secs_f64() * self.pool.current_num_threads() as f64 / places as f64;
-            let most = rows.rows().min(MOST_PLACES);
+            let most = rows.rows().min(MAX_RANGES);
             if places == most || began.elapsed().as_secs_f64() > 0.2 * budget {
                 return each;
             }

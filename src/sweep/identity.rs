@@ -1,4 +1,5 @@
-//! What a table follows from: its hash, and the first key in which two specs differ. Both are of the meaning of a spec, never of its text.
+//! The identity of a table: the hash of its inputs, and the first key in which two specs differ. Both depend on the meaning of a spec, not on its
+//! text.
 
 use std::fmt::{self, Write};
 
@@ -12,11 +13,11 @@ use crate::model::Units;
 use crate::names::shown;
 use crate::table;
 
-/// Characters of a value that a message shows.
+/// Greatest length of a value in a message, in characters. Chosen: a line.
 const MAX_SHOWN_CHARS: usize = 100;
 
 impl Sweep {
-    /// SHA-256 of everything that the rows of a table follow from.
+    /// SHA-256 of all inputs of a table.
     pub fn hash(&self, request: &Request) -> String {
         let hash = || {
             let mut hash = Hashed(Sha256::new());
@@ -29,8 +30,8 @@ impl Sweep {
         request.hash.get_or_init(hash).clone()
     }
 
-    /// Gives `fact` each key of the spec that the rows of a table follow from, with its value in one way of writing it. Of the axes those
-    /// count that the table depends on, and those that they, or the condition, are made of.
+    /// Passes each input of a table to `fact`: key and canonical value. These are the axes of the table, and the axes in their expressions and in
+    /// the condition.
     fn facts(&self, request: &Request, fact: &mut dyn FnMut(&str, fmt::Arguments<'_>)) {
         fact("model.velocity_bound", format_args!("{}", self.bounded));
         match &self.grid.units {
@@ -59,7 +60,7 @@ impl Sweep {
         fact(&format!("tables.{key}.columns"), format_args!("{}", columns.collect::<Vec<_>>().join(", ")));
     }
 
-    /// The same error with the first key in which this spec and that of the dataset differ.
+    /// The error with the first key in which this spec differs from that of the dataset.
     pub(super) fn explain(&self, error: DatasetError) -> DatasetError {
         let DatasetError::OtherSpec { folder, table, expected, found, spec } = error else { return error };
         let [mut here, mut there] = [expected, found];
@@ -71,14 +72,14 @@ impl Sweep {
                     there = "other contents of the same file".to_owned();
                 }
             },
-            // It refers to files that are not here.
+            // The spec of the dataset names files that do not exist here.
             Err(_) if spec.is_empty() => {}
             Err(error) => there = format!("a spec that cannot be read from here: {}", error.found),
         }
         DatasetError::OtherSpec { folder, table, expected: here, found: there, spec }
     }
 
-    /// The first key in which two specs differ for a table: with its values here and there, and its line here.
+    /// The first key in which two specs differ for a table, with both values and its line in this spec.
     fn difference(&self, other: &Sweep, table: &str) -> Option<[String; 2]> {
         let facts = |sweep: &Sweep| {
             let mut facts = Vec::new();
@@ -92,7 +93,7 @@ impl Sweep {
         let other_value = there.iter().find(|(known, _)| known == key).map_or("nothing", |(_, value)| value);
         let is_written = |key: &str| [self, other].iter().any(|sweep| read::value(&sweep.text, key).is_some());
         let key = if key.ends_with(".rtol") && !is_written(key) { "accuracy.rtol" } else { key };
-        // A default as it is meant.
+        // The default value.
         let written = |sweep: &Sweep, value: &str| match read::value(&sweep.text, key) {
             Some(text) => shown(&text, MAX_SHOWN_CHARS).into_owned(),
             None => shown(value, MAX_SHOWN_CHARS).into_owned(),
@@ -102,7 +103,7 @@ impl Sweep {
     }
 }
 
-/// What a block says of `needed` axes, and of those that they, or the condition, are made of.
+/// The inputs of a block for the `needed` axes, and for the axes in their expressions and in the condition.
 fn block_facts(block: &Block, needed: &[Quantity], fact: &mut dyn FnMut(&str, fmt::Arguments<'_>)) {
     let mut needed = needed.to_vec();
     needed.extend(block.condition.iter().flat_map(|condition| condition.reads()));
@@ -126,7 +127,7 @@ fn block_facts(block: &Block, needed: &[Quantity], fact: &mut dyn FnMut(&str, fm
             single.extend(used);
         }
     }
-    // The order of axes of one value has no meaning.
+    // The order of axes with one value has no meaning.
     single.sort_by_key(|axis| axis.quantity);
     for axis in axes.into_iter().chain(single) {
         let (name, unit) = (axis.quantity.name(), axis.quantity.unit(axis.scale));
@@ -143,7 +144,7 @@ fn block_facts(block: &Block, needed: &[Quantity], fact: &mut dyn FnMut(&str, fm
     }
 }
 
-/// The hash of a text that is never held as a whole: written out, the values of large files of points are many times as long.
+/// The hash of a text that is not kept in memory, since points files may hold millions of values.
 struct Hashed(Sha256);
 
 impl Write for Hashed {

@@ -1,4 +1,4 @@
-//! A sweep: spec (as written) -> check (against what is legal; block and axis make the grid) -> plan (what there is to do) -> engine (doing it).
+//! A sweep: spec (keys and types), check (legal values, grid), plan (rows and solves), engine (computation and publication).
 
 mod axis;
 mod batches;
@@ -26,7 +26,7 @@ pub use estimate::{Estimate, Estimates, estimate, sizes};
 pub use plan::Plan;
 pub use schema::schema;
 #[cfg(feature = "cli")]
-pub(crate) use shard::holds;
-pub use shard::{Shard, TooManyParts, check_parts, shares_with};
+pub(crate) use shard::contains_part;
+pub use shard::{Shard, TooManyParts, check_parts, shards_with};
 pub use spec::{AccuracySpec, AxisForm, AxisSpec, AxisValue, BlockSpec, ModelSpec, Spec, TableSpec};
 pub use units::{units, units_of};

@@ -1,22 +1,22 @@
-//! The plan: what there is to do, counted before anything is done.
+//! The plan: counts of rows and solves, before any computation.
 
 use super::check::{Request, Sweep};
 use crate::dataset::{Build, Manifest, ManifestTable};
 use crate::table::{Job, OPTIMUM_AXES, OptimumCache, RepeatedRows, Signal};
 
-/// What a sweep consists of.
+/// The plan of a sweep.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Plan {
     /// The tables.
     pub tables: Vec<ManifestTable>,
-    /// Rows of each table that `where` leaves out.
+    /// Rows of each table that `where` drops.
     pub dropped: Vec<u64>,
     /// Different optimal protocols that the tables share.
     pub optima: u64,
 }
 
 impl Plan {
-    /// Counts everything in `sweep`, however large, at once.
+    /// Counts rows and solves of `sweep` in closed form.
     pub fn new(sweep: &Sweep) -> Plan {
         let tables = sweep.requests.iter().map(|request| {
             let rows_per_part = request.table.rows_per_part();

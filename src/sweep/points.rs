@@ -1,4 +1,4 @@
-//! `points`: a file of points whose columns are axes that vary together, and labels, which name the points.
+//! The points file: its columns are axes that vary together, and labels.
 
 use std::borrow::Cow;
 use std::fmt::{self, Display, Formatter};
@@ -22,12 +22,12 @@ use crate::names::shown;
 use crate::protocol::Status;
 use crate::table::{self, STATUS};
 
-/// Reads the points of a CSV or Parquet file; values are in `units`, those of coefficients not relative to `t_f`.
+/// Reads the points of a CSV or Parquet file. Values are in `units`; coefficients are not relative to `t_f`.
 pub fn read(path: &Path, units: &Units) -> Result<Factor, SpecError> {
     let extension = path.extension().map(|extension| extension.to_ascii_lowercase());
     let columns = match extension.as_ref().and_then(|extension| extension.to_str()) {
         Some("csv") => csv(path, units)?,
-        // Damage that the reader did not think of is a fault like any other.
+        // A panic of the reader on a damaged file is a fault of the file.
         Some("parquet") => guarded(|| parquet(path, units)).unwrap_or_else(|| Err(unsound(path, &"it is damaged")))?,
         _ => {
             let (expected, help) = ("a file whose name ends in .csv or .parquet", "write the points as CSV");
@@ -53,13 +53,13 @@ pub fn read(path: &Path, units: &Units) -> Result<Factor, SpecError> {
     Ok(factor)
 }
 
-/// Points of a file at most. Chosen: their values of all 13 quantities take some 400 MiB of memory.
+/// Greatest number of points. Chosen: the values of all 13 quantities take 400 MiB of memory.
 const MAX_POINTS: usize = 1 << 22;
 
-/// Bytes of a file at most: 64 a point of [`MAX_POINTS`].
+/// Greatest size of a file, in bytes: 64 for each of [`MAX_POINTS`].
 const MAX_FILE_BYTES: u64 = 1 << 28;
 
-/// Whether the file is one that can be taken into memory: no device, no folder, not too large.
+/// Checks that the file fits into memory: a regular file of at most [`MAX_BYTES`].
 fn check_size(path: &Path) -> Result<(), SpecError> {
     let file = fs::metadata(path).map_err(|error| unreadable(path, &error))?;
     if !file.is_file() {
@@ -72,7 +72,7 @@ fn check_size(path: &Path) -> Result<(), SpecError> {
     Ok(())
 }
 
-/// Whether there are no more than that many points.
+/// Checks the number of points against [`MAX_POINTS`].
 fn check_count(path: &Path, count: usize) -> Result<(), SpecError> {
     if count <= MAX_POINTS {
         return Ok(());
@@ -87,25 +87,25 @@ struct Column {
     cells: Cells,
 }
 
-/// The cells of a column.
+/// The values of a column.
 enum Cells {
     /// Values of an axis.
     Axis(Quantity, Vec<f64>),
-    /// What names the points, if it has text.
+    /// Labels, if the column has text.
     Label(Texts),
 }
 
-/// Cells of text: each text once, and the place of that of each point; `None` where a point has none.
+/// A dictionary-encoded text column: the distinct texts, and the index of each point; `None` for an empty cell.
 #[derive(Default)]
 struct Texts {
     words: IndexSet<String>,
     places: Vec<Option<u32>>,
-    /// Whether one of them is no number.
+    /// Whether a text is not a number.
     has_text: bool,
 }
 
 impl Texts {
-    /// Adds the cell of a point, which has none if it is empty.
+    /// Adds the cell of a point; an empty one is missing.
     fn push(&mut self, place: impl Fn() -> String, cell: &str) -> Result<(), SpecError> {
         if cell.is_empty() {
             self.places.push(None);
@@ -132,10 +132,10 @@ impl Texts {
     }
 }
 
-/// Characters of a label at most. Chosen: it names a line of a picture.
+/// Greatest length of a label, in characters. Chosen: it fits the legend of a picture.
 const MAX_LABEL_CHARS: usize = 200;
 
-/// CSV: a header of names, then a point a line. Empty lines and lines that begin with # are passed over.
+/// Reads CSV: a header of names, then one line for each point. Skips empty lines and lines that begin with #.
 fn csv(path: &Path, units: &Units) -> Result<Vec<Column>, SpecError> {
     check_size(path)?;
     let bytes = fs::read(path).map_err(|error| unreadable(path, &error))?;
@@ -144,7 +144,7 @@ fn csv(path: &Path, units: &Units) -> Result<Vec<Column>, SpecError> {
         let place = Line { file: path, number: 1 + before.iter().filter(|&&byte| byte == b'\n').count() };
         fault(format!("{place}: not in UTF-8"), "CSV in UTF-8", "save it as CSV in UTF-8")
     })?;
-    // Spreadsheets put a byte order mark in front.
+    // Spreadsheets write a byte order mark.
     let mut lines = text
         .trim_start_matches('\u{feff}')
         .lines()
@@ -162,7 +162,7 @@ fn csv(path: &Path, units: &Units) -> Result<Vec<Column>, SpecError> {
     Ok(columns)
 }
 
-/// The cells of a line of CSV, which spreadsheets put between quotes where they hold commas or quotes.
+/// The cells of a line of CSV, quoted or not.
 fn cells_of<'a>(place: &Line<'_>, line: &'a str) -> Result<Vec<Cow<'a, str>>, SpecError> {
     let mut cells: Vec<Cow<'_, str>> = Vec::new();
     let mut rest = Some(line);
@@ -173,7 +173,7 @@ fn cells_of<'a>(place: &Line<'_>, line: &'a str) -> Result<Vec<Cow<'a, str>>, Sp
             rest = others;
             continue;
         };
-        // Two quotes within quotes are one.
+        // A doubled quote is a quote.
         let mut end = quoted.find('"');
         while let Some(place) = end.filter(|place| quoted[place + 1..].starts_with('"')) {
             end = quoted[place + 2..].find('"').map(|next| place + 2 + next);
@@ -198,7 +198,7 @@ fn unsound(path: &Path, error: &dyn Display) -> SpecError {
     fault(found, "a Parquet file, uncompressed or with Snappy or Zstandard", "write it so, or as CSV")
 }
 
-/// Parquet: columns of numbers, or of text for axes of words, whose names are axes; other columns of text are labels.
+/// Reads Parquet: numbers, or text for axes of words and for labels.
 fn parquet(path: &Path, units: &Units) -> Result<Vec<Column>, SpecError> {
     let name = path.display();
     check_size(path)?;
@@ -226,7 +226,7 @@ fn parquet(path: &Path, units: &Units) -> Result<Vec<Column>, SpecError> {
 }
 
 impl Column {
-    /// That the column of `file` has the type that its name asks for.
+    /// Checks the type of the column of `file` against its name.
     fn check_type(&self, file: &impl Display, kind: &DataType) -> Result<(), SpecError> {
         let is_text = *kind == label();
         let wrong = |expected: &str, help: &str| {
@@ -243,7 +243,7 @@ impl Column {
         }
     }
 
-    /// Adds the rows of a batch, whose first one has number `first` in `file`.
+    /// Adds the rows of a batch that begins at row `first` of `file`.
     fn extend(&mut self, file: &impl Display, first: usize, array: &ArrayRef, units: &Units) -> Result<(), SpecError> {
         let name = &self.name;
         let place = |row: usize| format!("{file}: row {} of column `{name}`", first + row);
@@ -284,7 +284,7 @@ fn texts_of(column: &ArrayRef) -> impl Iterator<Item = Option<&str>> {
     column.into_iter().flat_map(|column| column.keys()).map(cell)
 }
 
-/// Rows of a Parquet file that are held as it gives them. Chosen: a column of them fits a cache of 512 KiB.
+/// Rows of a record batch. Chosen: a column of them fits a cache of 512 KiB.
 const BATCH_ROWS: usize = 1 << 16;
 
 /// The values of a column of numbers, none of them null; `None` for decimals and halves.
@@ -306,7 +306,7 @@ fn unreadable(path: &Path, error: &dyn Display) -> SpecError {
     fault(found, "a readable file", "check the path; it is relative to the spec")
 }
 
-/// `value` if it is one that `quantity` can have.
+/// `value` if it is legal for `quantity`.
 fn legal(place: impl Fn() -> String, units: &Units, quantity: Quantity, value: f64) -> Result<f64, SpecError> {
     match super::units::legal(units, quantity, Scale::Model, value) {
         Ok(()) => Ok(value),
@@ -314,7 +314,7 @@ fn legal(place: impl Fn() -> String, units: &Units, quantity: Quantity, value: f
     }
 }
 
-/// The place of `cell` among `words`.
+/// The index of `cell` among `words`.
 fn word(place: impl Fn() -> String, words: &[&str], cell: &str) -> Result<f64, SpecError> {
     match words.iter().position(|word| *word == cell) {
         Some(number) => Ok(number as f64),
@@ -329,7 +329,7 @@ fn fault(found: impl Into<Box<str>>, expected: &str, help: &str) -> SpecError {
     SpecError::new("points", found, expected, help)
 }
 
-/// A column that is no axis and names no points either.
+/// The fault of a column that is neither an axis nor a label.
 fn unknown_column(place: &impl Display, name: &str) -> SpecError {
     let error = unknown("points".to_owned(), "axis", name, &Quantity::ALL.map(Quantity::name));
     let expected = format!("{}; or a label, a column of text", error.expected);
@@ -340,14 +340,14 @@ fn unknown_column(place: &impl Display, name: &str) -> SpecError {
     SpecError { found: format!("{place}: {}", error.found).into(), expected: expected.into(), help, ..error }
 }
 
-/// Whether `name` is so near to that of an axis that it is hardly meant as a label.
+/// Whether `name` is probably a misspelt axis.
 fn is_misspelt(name: &str) -> bool {
     let plain = |name: &str| name.chars().filter(|c| c.is_alphanumeric()).collect::<String>().to_lowercase();
     let name = plain(name);
     Quantity::ALL.iter().map(|axis| plain(axis.name())).any(|axis| strsim::damerau_levenshtein(&axis, &name) <= 1)
 }
 
-/// Whether `name` already means something where a label stands: in a table, or in a question to one.
+/// Whether `name` is reserved in tables or in SQL.
 fn is_taken(name: &str) -> bool {
     let tables = table::ALL.into_iter().chain(table::REDUCED.map(|(_, table)| table));
     let columns = tables.flat_map(|table| table.columns()).map(|column| column.name);
@@ -388,7 +388,7 @@ fn header<'a>(place: &impl Display, names: impl Iterator<Item = &'a str>) -> Res
     Ok(columns)
 }
 
-/// A line of a file, which is put into words only for a message: there are many.
+/// A line of a file, formatted lazily for messages.
 struct Line<'a> {
     file: &'a Path,
     number: usize,

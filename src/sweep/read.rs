@@ -1,4 +1,4 @@
-//! Reading a spec from TOML, every value by its type and every fault with its key and line; and where in a text a key is.
+//! Reads a spec from TOML: values by type, faults with key and line; and finds the line of a key.
 
 use std::path::PathBuf;
 
@@ -15,7 +15,7 @@ impl Spec {
     ///
     /// # Errors
     ///
-    /// What keeps it from being read.
+    /// The syntax error or the faults.
     pub fn parse(text: &str) -> Result<Spec, SpecError> {
         let mut faults = Faults::default();
         let spec = read(text, &mut faults)?;
@@ -23,12 +23,11 @@ impl Spec {
     }
 }
 
-/// Reads a spec from TOML, as far as it can be read. A key whose value has the wrong type, or that no spec has, is a fault, and left out: what is
-/// right is checked all the same.
+/// Reads a spec from TOML. An unknown key, or a value of the wrong type, is a fault and is left out, so that the other keys are still checked.
 ///
 /// # Errors
 ///
-/// What is no TOML.
+/// The syntax error.
 pub fn read(text: &str, faults: &mut Faults) -> Result<Spec, SpecError> {
     let document = DeTable::parse(text).map_err(|error| syntax(text, &error))?;
     let value = DeValue::Table(document.into_inner());
@@ -38,13 +37,13 @@ pub fn read(text: &str, faults: &mut Faults) -> Result<Spec, SpecError> {
         faults.push(SpecError { line: Some(1), ..missing });
     }
     if !value.get("name").is_some_and(|name| name.get_ref().is_str()) {
-        // A name that is wrong is one fault.
+        // A wrong name is one fault.
         spec.name = "missing".to_owned();
     }
     Ok(spec)
 }
 
-/// A complaint of the parser.
+/// A syntax error of the parser.
 fn syntax(text: &str, error: &toml::de::Error) -> SpecError {
     let (message, span) = (error.message(), error.span());
     let fault = if message.starts_with("duplicate key") {
@@ -57,26 +56,26 @@ fn syntax(text: &str, error: &toml::de::Error) -> SpecError {
     SpecError { line: span.map(|span| line_of(text, span.start)), ..fault }
 }
 
-/// A value of a spec in its place.
+/// A value of a spec with its key and span.
 #[derive(Clone, Copy)]
 pub struct Entry<'a> {
     /// Its key, as in `axes.v_i[2]`.
     key: &'a str,
-    /// Where it begins in the text.
+    /// Its byte offset in the text.
     start: usize,
-    /// What it is.
+    /// The value.
     pub value: &'a DeValue<'a>,
     text: &'a str,
 }
 
-/// What a value of TOML may be read as.
+/// A type that is read from a TOML value.
 pub trait Read: Sized {
-    /// The value of an entry; `None` if it is a fault, which is noted.
+    /// The value of an entry; `None` after adding a fault.
     fn read(entry: Entry<'_>, faults: &mut Faults) -> Option<Self>;
 }
 
 impl Entry<'_> {
-    /// Notes a value of the wrong type.
+    /// Adds the fault of a wrong type.
     pub fn wrong<T>(self, expected: &str, faults: &mut Faults) -> Option<T> {
         let found = match self.value {
             DeValue::String(word) => format!("string {word:?}"),
@@ -100,20 +99,20 @@ impl Entry<'_> {
         i64::from_str_radix(number.as_str(), number.radix()).ok()
     }
 
-    /// The value as a number; one beyond the range of doubles is none.
+    /// The value as a number; `None` beyond the range of doubles.
     fn number(self) -> Option<f64> {
         let Some(number) = self.value.as_float() else { return self.integer().map(|number| number as f64) };
         let value = number.as_str().parse::<f64>().ok()?;
         (value.is_finite() || !number.as_str().contains(|c: char| c.is_ascii_digit())).then_some(value)
     }
 
-    /// The value as one of an axis.
+    /// The value as an axis value.
     pub fn one(self) -> Option<AxisValue> {
         let word = self.value.as_str().map(|word| AxisValue::Word(word.to_owned()));
         word.or_else(|| self.number().map(AxisValue::Number))
     }
 
-    /// Gives `take` each entry of a table whose keys are `known`; any keys without those.
+    /// Passes each entry of a table to `take`; `known` are its legal keys, if any.
     pub fn each(
         self,
         known: &[&str],
@@ -141,7 +140,7 @@ impl Entry<'_> {
     }
 }
 
-/// Reads tables from the entries of TOML, each key to its field; those that are not there keep their defaults.
+/// Reads a struct from a TOML table, each key into its field. Missing keys keep their defaults.
 macro_rules! keys {
     ($($table:ty { $($key:literal: $field:ident),+ })+) => { $(
         impl Read for $table {
@@ -214,7 +213,7 @@ impl<T: Read> Read for IndexMap<String, T> {
     }
 }
 
-/// Gives faults without a line that of their key (as in `axes.v_i[2]`) in `text`, or of the closest part of it that exists.
+/// Sets the line of each fault without one: that of its key (as in `axes.v_i[2]`), or of the longest existing prefix of the key.
 pub fn find_lines(text: &str, faults: &mut [SpecError]) {
     let Ok(document) = DeTable::parse(text) else { return };
     for fault in faults.iter_mut().filter(|fault| fault.line.is_none()) {
@@ -222,13 +221,13 @@ pub fn find_lines(text: &str, faults: &mut [SpecError]) {
     }
 }
 
-/// The line of `key` (as in `axes.v_i[2]`), or of the closest part of it that exists.
+/// The line of `key` (as in `axes.v_i[2]`), or of its longest existing prefix.
 pub fn line(text: &str, key: &str) -> Option<usize> {
     let document = DeTable::parse(text).ok()?;
     Some(line_of(text, find(document.get_ref(), key)?.start))
 }
 
-/// The value of `key` as it is written; `None` if it is not there, or a table of its own.
+/// The text of the value of `key`; `None` if it is missing or a table.
 pub fn value(text: &str, key: &str) -> Option<String> {
     let document = DeTable::parse(text).ok()?;
     let found = find(document.get_ref(), key).filter(|found| found.is_whole)?;
@@ -238,7 +237,7 @@ pub fn value(text: &str, key: &str) -> Option<String> {
     is_value.then(|| written.split_whitespace().collect::<Vec<_>>().join(" "))
 }
 
-/// The entry of a key, or of the closest part of it that exists.
+/// The entry of a key, or of its longest existing prefix.
 struct Found<'a, 'i> {
     start: usize,
     value: &'a Spanned<DeValue<'i>>,

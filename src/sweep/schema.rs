@@ -1,6 +1,6 @@
 //! The JSON Schema of a spec, for editors and validators: axes, units, ranges, tables and columns from their definitions.
 //!
-//! It refuses what can be told key by key; what takes two keys or a file to see is left to the check.
+//! It refuses faults of single keys. Faults of several keys, or of a file, are left to the check.
 
 use std::collections::BTreeSet;
 
@@ -13,7 +13,7 @@ use crate::table::{self, STATUS, Table};
 
 /// The schema, in draft 7, which editors know.
 pub fn schema() -> Value {
-    // What the scales are does not matter to a schema.
+    // The values of the scales do not matter here.
     let si = Units::Si(Scales { mu_0: 1.0, l: 1.0, v_0: 1.0, normal_stress: 1.0 });
     let grid = grid();
     let grid_keys: Vec<Value> = grid.keys().map(|key| json!({ "required": [key] })).collect();
@@ -33,13 +33,13 @@ pub fn schema() -> Value {
         "required": ["name", "tables"],
         "properties": properties,
         "allOf": table::ALL.map(needs).into_iter().chain([units()]).collect::<Vec<Value>>(),
-        // Everything about the grid is in the blocks, if there are any.
+        // With blocks, the grid is in the blocks.
         "dependencies": { "block": { "not": { "anyOf": grid_keys } } },
         "definitions": { "axes": axes("The axes", &Units::Scaled), "axes_si": axes("The axes in SI units", &si) },
     })
 }
 
-/// A table of TOML with the keys of `properties` and no others.
+/// An object with the keys of `properties` and no others.
 fn keys(description: &str, properties: Value) -> Value {
     json!({ "type": "object", "additionalProperties": false, "description": description, "properties": properties })
 }
@@ -107,7 +107,7 @@ fn axes(what: &str, units: &Units) -> Value {
     keys(&description, Value::Object(axes.into_iter().collect()))
 }
 
-/// Which axes are meant: those in SI units go with the four scales, the others without.
+/// The condition of the units: SI units need the four scales.
 fn units() -> Value {
     let scales = ["mu_0", "l", "v_0", "normal_stress"];
     let is_si =
@@ -131,7 +131,7 @@ fn any_case(word: &str) -> String {
     format!("^{}$", letters.collect::<String>())
 }
 
-/// A table lacks no axis, unless the axes may come from elsewhere.
+/// The condition that a table has its axes, unless points or blocks may define them.
 fn needs(table: &dyn Table) -> Value {
     let axes = table.axes().iter().filter(|axis| axis.default().is_empty());
     let axes: Vec<&str> = axes.map(|axis| axis.name()).collect();
@@ -149,7 +149,7 @@ fn needs(table: &dyn Table) -> Value {
     })
 }
 
-/// What a key of `[axes]` may hold.
+/// The schema of a value of `[axes]`.
 fn axis(quantity: Quantity, units: &Units) -> Value {
     let words = quantity.words();
     let list = |one: &Value| json!({ "type": "array", "minItems": 1, "items": one });
@@ -168,7 +168,7 @@ fn axis(quantity: Quantity, units: &Units) -> Value {
     json!({ "description": description, "anyOf": [one, list(&one), form(quantity, units)] })
 }
 
-/// A number that is legal for `quantity`. How large a scale is the schema does not know: of a range it keeps the sign.
+/// The schema of a number of `quantity`. In SI units the range keeps its sign only, since the schema does not know the scales.
 fn legal(quantity: Quantity, units: &Units) -> Map<String, Value> {
     let domain = quantity.domain();
     let mut value = number(&domain);
@@ -183,7 +183,7 @@ fn legal(quantity: Quantity, units: &Units) -> Map<String, Value> {
     value
 }
 
-/// A number of this range; one from 0 on where 0 lies apart, since a hole would take two ranges.
+/// The schema of a number in this range; from 0 on if 0 is an isolated value, which would need two ranges.
 fn number(domain: &Domain) -> Map<String, Value> {
     let (least, is_excluded) = domain.least();
     let least = if domain.apart() == Some(0.0) { 0.0 } else { least };
@@ -236,7 +236,7 @@ fn form(quantity: Quantity, units: &Units) -> Value {
     })
 }
 
-/// What a key of `[tables]` may hold.
+/// The schema of a value of `[tables]`.
 fn table_of(table: &dyn Table) -> Value {
     let reductions = if table.name() == "gap" { &table::REDUCED[..] } else { &[] };
     let reduced = reductions.iter().flat_map(|(_, table)| table.columns());

@@ -1,6 +1,6 @@
-//! Shards: which parts of a sweep fall to whom when many processes share it.
+//! Shards: the distribution of the parts of a sweep over processes.
 //!
-//! The answer follows from the spec and the version alone. Every process works it out for itself, so that none has to ask another.
+//! It depends on the spec and the version alone, so the processes need no communication.
 
 use std::cmp::Reverse;
 use std::collections::{BTreeSet, BinaryHeap};
@@ -10,18 +10,18 @@ use std::str::FromStr;
 use super::check::Sweep;
 use super::plan::Plan;
 
-/// A sweep has more parts than can be shared out: every share would count them all, and list a folder with as many files.
+/// The error of a sweep with too many parts for shards: every shard counts all parts, and lists a folder with as many files.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[error(
-    "{parts} parts are too many to be shared out\n  expected: at most {}\n  help: write several specs, each with some of the values of an axis",
-    Shard::MOST_PARTS
+    "{parts} parts are too many for shards\n  expected: at most {}\n  help: write several specs, each with some of the values of an axis",
+    Shard::MAX_PARTS
 )]
 pub struct TooManyParts {
     /// All parts of the sweep.
     pub parts: u64,
 }
 
-/// Share number `index` of `count`.
+/// Shard number `index` of `count`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Shard {
     index: u64,
@@ -29,47 +29,47 @@ pub struct Shard {
 }
 
 impl Shard {
-    /// Shards of a sweep at most. Chosen: beyond the tasks of an array of any scheduler.
-    pub const MOST: u64 = 1_000_000;
+    /// Greatest number of shards. Chosen: beyond the array size of any scheduler.
+    pub const MAX_COUNT: u64 = 1_000_000;
 
-    /// Parts of a sweep in shares at most. Chosen: dealing them takes a tenth of a second.
-    pub const MOST_PARTS: u64 = 1 << 23;
+    /// Greatest number of parts in shards. Chosen: their distribution takes a tenth of a second.
+    pub const MAX_PARTS: u64 = 1 << 23;
 
     /// The whole sweep.
     pub const WHOLE: Shard = Shard { index: 0, count: 1 };
 
-    /// Share number `index`, from 0, of `count`; `None` if there is no such share, or more than [`Shard::MOST`].
+    /// Shard number `index`, from 0, of `count`; `None` if it does not exist, or for more than [`Shard::MAX_COUNT`].
     pub fn new(index: u64, count: u64) -> Option<Shard> {
-        (index < count && count <= Self::MOST).then_some(Shard { index, count })
+        (index < count && count <= Self::MAX_COUNT).then_some(Shard { index, count })
     }
 
-    /// The number of this share, from 0.
+    /// The index of this shard, from 0.
     pub fn index(self) -> u64 {
         self.index
     }
 
-    /// How many shares there are.
+    /// The number of shards.
     pub fn count(self) -> u64 {
         self.count
     }
 
-    /// The parts of this share, table by table in the order of the plan, each ascending.
+    /// The parts of this shard, table by table in the order of the plan, ascending.
     ///
     /// # Errors
     ///
-    /// If there are more parts than can be shared out; the whole sweep may have any number.
+    /// [`TooManyParts`]; a single shard may have any number.
     pub fn parts(self, sweep: &Sweep, plan: &Plan) -> Result<Vec<Vec<Range<u64>>>, TooManyParts> {
         if self.count == 1 {
             return Ok(plan.tables.iter().map(|table| std::iter::once(0..table.parts).collect()).collect());
         }
         check_parts(plan)?;
         let mut parts = vec![Vec::new(); plan.tables.len()];
-        deal(&piles(sweep, plan), self.count, |table, part, shard| {
+        deal(&part_groups(sweep, plan), self.count, |table, part, shard| {
             if shard == self.index {
                 parts[table].push(part..part + 1);
             }
         });
-        // The last part of a table is a pile of its own.
+        // The last part of a table is a group of its own.
         parts.iter_mut().for_each(|parts| parts.sort_unstable_by_key(|range| range.start));
         Ok(parts)
     }
@@ -79,87 +79,87 @@ impl FromStr for Shard {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Shard, String> {
-        let form = || format!("expected I/N, such as 0/16 for the first of 16 shares, found `{text}`");
+        let form = || format!("expected I/N, such as 0/16 for the first of 16 shards, found `{text}`");
         let (index, count) = text.split_once('/').ok_or_else(form)?;
         let [index, count]: [u64; 2] = match (index.parse(), count.parse()) {
             (Ok(index), Ok(count)) => [index, count],
             _ => return Err(form()),
         };
-        if count == 0 || count > Self::MOST {
-            return Err(format!("{count} shares; a sweep has between 1 and {} of them", Self::MOST));
+        if count == 0 || count > Self::MAX_COUNT {
+            return Err(format!("{count} shards; expected from 1 to {}", Self::MAX_COUNT));
         }
         Shard::new(index, count)
-            .ok_or_else(|| format!("there is no share {index} of {count}: they are numbered from 0 to {}", count - 1))
+            .ok_or_else(|| format!("no shard {index} of {count}: shards are numbered from 0 to {}", count - 1))
     }
 }
 
-/// Whether `part` is among `share`, ascending ranges of parts.
-pub fn holds(share: &[Range<u64>], part: u64) -> bool {
-    share.get(share.partition_point(|range| range.end <= part)).is_some_and(|range| range.contains(&part))
+/// Whether `part` is in `shard`, ascending ranges of parts.
+pub fn contains_part(shard_parts: &[Range<u64>], part: u64) -> bool {
+    shard_parts.get(shard_parts.partition_point(|range| range.end <= part)).is_some_and(|range| range.contains(&part))
 }
 
-/// Whether the parts of `plan` can be shared out.
+/// Checks that the parts of `plan` can be distributed over shards.
 pub fn check_parts(plan: &Plan) -> Result<(), TooManyParts> {
     let parts = plan.tables.iter().fold(0, |parts: u64, table| parts.saturating_add(table.parts));
-    if parts <= Shard::MOST_PARTS { Ok(()) } else { Err(TooManyParts { parts }) }
+    if parts <= Shard::MAX_PARTS { Ok(()) } else { Err(TooManyParts { parts }) }
 }
 
-/// The shares among `count` to which at least one of the parts belongs for which `wanted(table, part)` holds, ascending.
+/// The shards among `count` with at least one part for which `wanted(table, part)` holds, ascending.
 ///
 /// # Errors
 ///
-/// If there are more parts than can be shared out.
-pub fn shares_with(
+/// [`TooManyParts`].
+pub fn shards_with(
     sweep: &Sweep,
     plan: &Plan,
     count: u64,
     mut wanted: impl FnMut(usize, u64) -> bool,
 ) -> Result<Vec<u64>, TooManyParts> {
     check_parts(plan)?;
-    let mut shares = BTreeSet::new();
-    deal(&piles(sweep, plan), count, |table, part, shard| {
+    let mut shards = BTreeSet::new();
+    deal(&part_groups(sweep, plan), count, |table, part, shard| {
         if wanted(table, part) {
-            shares.insert(shard);
+            shards.insert(shard);
         }
     });
-    Ok(shares.into_iter().collect())
+    Ok(shards.into_iter().collect())
 }
 
 /// Parts of equal predicted cost: consecutive parts of one table.
 #[derive(Debug, Clone, PartialEq, Eq)]
-struct Pile {
+struct PartGroup {
     table: usize,
     parts: Range<u64>,
-    /// Nanoseconds a part.
+    /// Cost of a part, in nanoseconds.
     cost: u64,
 }
 
-/// The parts of a sweep, the most expensive first. All parts of a table but the last have as many rows, and so the same predicted cost.
-fn piles(sweep: &Sweep, plan: &Plan) -> Vec<Pile> {
-    let mut piles = Vec::new();
+/// The parts of a sweep in groups, the most expensive first. All parts of a table but the last have equal rows, and so equal predicted cost.
+fn part_groups(sweep: &Sweep, plan: &Plan) -> Vec<PartGroup> {
+    let mut part_groups = Vec::new();
     for (index, (request, table)) in sweep.requests.iter().zip(&plan.tables).enumerate() {
         let full = table.rows / table.rows_per_part;
         for parts in [0..full, full..table.parts] {
             if !parts.is_empty() {
                 let rows = table.rows_of(parts.start);
                 let cost = (rows.end - rows.start).saturating_mul(request.table.cost());
-                piles.push(Pile { table: index, parts, cost });
+                part_groups.push(PartGroup { table: index, parts, cost });
             }
         }
     }
-    piles.sort_by_key(|pile| Reverse(pile.cost));
-    piles
+    part_groups.sort_by_key(|group| Reverse(group.cost));
+    part_groups
 }
 
-/// Gives `take` every part, by table and number, and the shard among `count` that has it.
+/// Passes every part, by table and number, and its shard among `count` to `take`.
 ///
-/// The parts of a pile are dealt in rounds, one part to each shard; what is left of all piles goes, the most expensive part first, to the shard
-/// that has least so far. No shard then has more than one part above the mean. The shard that a round begins with changes from round to round:
-/// costs that repeat along a table would otherwise meet in the same shard whenever their period divides the number of shards.
-fn deal(piles: &[Pile], count: u64, mut take: impl FnMut(usize, u64, u64)) {
+/// The parts of a group are dealt in rounds, one part to each shard. The remaining parts of all groups go, most expensive first, to the shard
+/// with least cost. No shard then exceeds the mean by more than one part. Each round begins with another shard: otherwise periodic costs along a
+/// table would meet in one shard whenever their period divides the number of shards.
+fn deal(part_groups: &[PartGroup], count: u64, mut take: impl FnMut(usize, u64, u64)) {
     let mut loads: BinaryHeap<Reverse<(u64, u64, u64)>> =
         (0..count).map(|shard| Reverse((0, mix(shard), shard))).collect();
-    for Pile { table, parts, cost } in piles {
+    for PartGroup { table, parts, cost } in part_groups {
         let rounds = (parts.end - parts.start) / count;
         for round in 0..rounds {
             let first = mix(round ^ mix(*table as u64)) % count;
@@ -173,7 +173,7 @@ fn deal(piles: &[Pile], count: u64, mut take: impl FnMut(usize, u64, u64)) {
     }
 }
 
-/// A number that looks unlike `x` (the finalizer of SplitMix64 after its increment).
+/// A hash of `x`: the finalizer of SplitMix64 after its increment.
 fn mix(x: u64) -> u64 {
     let x = x.wrapping_add(0x9e37_79b9_7f4a_7c15);
     let x = (x ^ (x >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
@@ -183,27 +183,27 @@ fn mix(x: u64) -> u64 {
 
 #[cfg(test)]
 mod tests {
-    //! Every part is dealt once, evenly, and without regard to patterns along a table.
+    //! Every part is dealt once and evenly, also for periodic costs along a table.
 
     use super::*;
 
-    fn piles() -> Vec<Pile> {
+    fn part_groups() -> Vec<PartGroup> {
         [(0, 0..700, 20), (0, 700..701, 7), (1, 0..13, 90), (2, 0..1, 4), (3, 0..60, 1)]
-            .map(|(table, parts, cost)| Pile { table, parts, cost })
+            .map(|(table, parts, cost)| PartGroup { table, parts, cost })
             .into()
     }
 
     #[test]
     fn every_part_is_dealt_once_and_loads_differ_by_one_part() {
-        let mut piles = piles();
-        piles.sort_by_key(|pile| Reverse(pile.cost));
-        let total: u64 = piles.iter().map(|pile| pile.cost * (pile.parts.end - pile.parts.start)).sum();
+        let mut part_groups = part_groups();
+        part_groups.sort_by_key(|group| Reverse(group.cost));
+        let total: u64 = part_groups.iter().map(|group| group.cost * (group.parts.end - group.parts.start)).sum();
         for count in (1..50).chain([64, 100, 699, 700, 775, 776, 1000]) {
             let mut loads = vec![0; count as usize];
             let mut dealt = std::collections::BTreeMap::new();
-            deal(&piles, count, |table, part, shard| {
-                let pile = piles.iter().find(|pile| pile.table == table && pile.parts.contains(&part));
-                loads[shard as usize] += pile.expect("is of a pile").cost;
+            deal(&part_groups, count, |table, part, shard| {
+                let group = part_groups.iter().find(|group| group.table == table && group.parts.contains(&part));
+                loads[shard as usize] += group.expect("is of a pile").cost;
                 assert_eq!(dealt.insert((table, part), shard), None);
             });
             assert_eq!(dealt.len(), 701 + 13 + 1 + 60);
@@ -215,13 +215,15 @@ mod tests {
 
     #[test]
     fn costs_that_repeat_along_a_table_do_not_meet() {
-        let piles = [Pile { table: 0, parts: 0..4096, cost: 10 }];
+        let part_groups = [PartGroup { table: 0, parts: 0..4096, cost: 10 }];
         for count in [2_u64, 4, 8, 16] {
-            // In truth every `count`-th part costs 100 times as much.
+            // Every `count`-th part costs 100 times as much as predicted.
             let mut loads = vec![0; count as usize];
-            deal(&piles, count, |_, part, shard| loads[shard as usize] += if part % count == 0 { 100 } else { 1 });
+            deal(&part_groups, count, |_, part, shard| {
+                loads[shard as usize] += if part % count == 0 { 100 } else { 1 }
+            });
             let mean = loads.iter().sum::<u64>() as f64 / count as f64;
-            // As even as chance makes it; dealt in turn, one shard would have nearly everything.
+            // As even as random; dealt in turn, one shard would have nearly all cost.
             assert!(loads.iter().all(|load| (*load as f64) < 1.6 * mean), "{count}: {loads:?}");
         }
     }
@@ -232,8 +234,8 @@ mod tests {
         for (text, message) in [
             ("16/16", "there is no share 16 of 16: they are numbered from 0 to 15"),
             ("0/0", "0 shares; a sweep has between 1 and 1000000 of them"),
-            ("1", "expected I/N, such as 0/16 for the first of 16 shares, found `1`"),
-            ("-1/4", "expected I/N, such as 0/16 for the first of 16 shares, found `-1/4`"),
+            ("1", "expected I/N, such as 0/16 for the first of 16 shards, found `1`"),
+            ("-1/4", "expected I/N, such as 0/16 for the first of 16 shards, found `-1/4`"),
             ("0/9999999", "9999999 shares; a sweep has between 1 and 1000000 of them"),
         ] {
             assert_eq!(text.parse::<Shard>(), Err(message.to_owned()));

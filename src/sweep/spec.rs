@@ -1,4 +1,4 @@
-//! The spec as it is written: its keys and their types, and nothing about what is legal.
+//! The spec: keys and types, without checks of values.
 
 use std::path::PathBuf;
 
@@ -13,7 +13,7 @@ use super::read::{Entry, Read, keys};
 pub struct Spec {
     /// Name of the dataset and of its folder.
     pub name: String,
-    /// What the sweep is for.
+    /// Description of the sweep.
     pub description: String,
     /// A file of points whose columns are axes that vary together, and labels; relative to the spec.
     pub points: Option<PathBuf>,
@@ -21,11 +21,11 @@ pub struct Spec {
     pub zip: Vec<Vec<String>>,
     /// Condition of the points to keep.
     pub condition: Option<String>,
-    /// Grids to unite, each with axes of its own.
+    /// Blocks of a union of grids, each with its own axes.
     pub block: Vec<BlockSpec>,
-    /// What is modelled.
+    /// Model and units.
     pub model: ModelSpec,
-    /// How accurate the numbers are.
+    /// Requested accuracy.
     pub accuracy: AccuracySpec,
     /// The axes, the last varies fastest.
     pub axes: IndexMap<String, AxisSpec>,
@@ -57,7 +57,7 @@ impl Spec {
         }
     }
 
-    /// An axis as it is written where it is met first.
+    /// The first definition of an axis.
     pub fn axis(&self, name: &str) -> Option<&AxisSpec> {
         self.axes.get(name).or_else(|| self.block.iter().find_map(|block| block.axes.get(name)))
     }
@@ -76,7 +76,7 @@ pub struct ModelSpec {
     pub l: Option<f64>,
     /// Velocity in m/s, for SI units.
     pub v_0: Option<f64>,
-    /// Normal load in Pa, for SI units.
+    /// Normal stress in Pa, for SI units.
     pub normal_stress: Option<f64>,
 }
 
@@ -152,7 +152,7 @@ pub struct TableSpec {
     pub columns: Option<Vec<String>>,
     /// Accuracy of this table.
     pub rtol: Option<f64>,
-    /// What to write of each landscape instead of its rows; of `gap` alone.
+    /// Reduction of each landscape of `gap` to one row.
     pub reduce: Option<String>,
 }
 
@@ -172,7 +172,7 @@ keys! {
     TableSpec { "columns": columns, "rtol": rtol, "reduce": reduce }
 }
 
-/// What an axis of numbers may be.
+/// The legal forms of an axis of numbers.
 pub const AXIS: &str = "a number, a list of numbers or a range such as { linspace = [first, last, count] }";
 
 impl Read for AxisSpec {

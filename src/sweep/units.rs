@@ -64,7 +64,7 @@ pub fn legal(units: &Units, quantity: Quantity, scale: Scale, value: f64) -> Res
 }
 
 /// What to do about velocities that look scaled in a spec in SI.
-const SCALED_IN_SI: &str =
+const PROBABLY_SCALED: &str =
     "if these are in units of v_0, multiply them by v_0, or remove `units` and the scales from [model]";
 
 /// What to do about a value that `quantity` cannot have. Velocities out of range are often a matter of units.
@@ -74,14 +74,14 @@ pub fn help(units: &Units, quantity: Quantity, value: f64) -> &'static str {
     match units {
         _ if !is_velocity || value <= 0.0 || !value.is_finite() => "choose values in the range",
         Units::Scaled if scaled >= 1.0 => "choose values in the range",
-        Units::Si(_) if scaled > 1.0 => SCALED_IN_SI,
+        Units::Si(_) if scaled > 1.0 => PROBABLY_SCALED,
         Units::Scaled => "velocities are in units of v_0; for m/s, add `units = \"si\"` and the scales to [model]",
         Units::Si(_) => "velocities are in m/s, as `units = \"si\"` says, and above v_0; or lower v_0",
     }
 }
 
 /// A velocity in m/s above which SI values are likely to be scaled ones: a hundred times that of seismic waves, 1e4 m/s.
-const DOUBTFUL_VELOCITY: f64 = 1e6;
+const MAX_PLAUSIBLE_VELOCITY: f64 = 1e6;
 
 /// The doubt whether `axis`, whose key begins with `prefix`, is in SI units, if there is one.
 pub fn doubt(prefix: &str, units: &Units, axis: &Axis) -> Option<SpecError> {
@@ -92,10 +92,10 @@ pub fn doubt(prefix: &str, units: &Units, axis: &Axis) -> Option<SpecError> {
         Values::List(values) => values.iter().copied().fold(0.0, f64::max),
         Values::Linspace { first, last, .. } | Values::Geomspace { first, last, .. } => first.max(*last),
     };
-    (greatest > DOUBTFUL_VELOCITY).then(|| {
+    (greatest > MAX_PLAUSIBLE_VELOCITY).then(|| {
         let (key, expected) =
             (format!("{prefix}axes.{}", axis.quantity.name()), "velocities in m/s, as `units = \"si\"` says");
-        SpecError::new(key, format!("{greatest:?} m/s is faster than anything slides"), expected, SCALED_IN_SI)
+        SpecError::new(key, format!("{greatest:?} m/s is faster than anything slides"), expected, PROBABLY_SCALED)
     })
 }
 

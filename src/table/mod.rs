@@ -27,7 +27,7 @@ pub use column_buffer::{ColumnBuffer, Phase, Projection, RunStats, Signal, Stopp
 pub use optimum_cache::{OPTIMUM_AXES, OptimumCache};
 #[cfg(feature = "plot")]
 pub(crate) use reduced::EDGES as HISTOGRAM_EDGES;
-pub use reduced::MOST_SORTED;
+pub use reduced::MAX_SORTED;
 pub use repeated_rows::RepeatedRows;
 
 /// A table: the axes of its rows, its columns and its computation.

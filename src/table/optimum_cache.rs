@@ -88,7 +88,7 @@ enum Slots {
 
 impl OptimumCache {
     /// Greatest number of tuples kept for a whole run (about 100 MB). Larger grids keep those of one part.
-    pub const MOST_KEPT: u64 = 1 << 20;
+    pub const MAX_CACHED: u64 = 1 << 20;
 
     /// A cache for `tuples` different transitions and durations, solved to `rtol`, with `v >= 1` if `bounded`.
     pub fn new(tuples: u64, bounded: bool, rtol: f64) -> OptimumCache {
@@ -97,10 +97,10 @@ impl OptimumCache {
 
     /// A cache for sparse tuple numbers below `span`.
     pub fn among(tuples: u64, span: u64, bounded: bool, rtol: f64) -> OptimumCache {
-        let slots = if span > Self::MOST_KEPT && tuples <= Self::MOST_KEPT {
+        let slots = if span > Self::MAX_CACHED && tuples <= Self::MAX_CACHED {
             Slots::Sparse(Memo::default())
         } else {
-            let kept = if span <= Self::MOST_KEPT { span as usize } else { 0 };
+            let kept = if span <= Self::MAX_CACHED { span as usize } else { 0 };
             Slots::Dense(std::iter::repeat_with(OnceLock::new).take(kept).collect())
         };
         OptimumCache { slots, bounded, rtol }

@@ -64,10 +64,10 @@ const fn reduced(
 }
 
 /// Rows of a landscape in memory at a time.
-const PIECE: usize = 1 << 16;
+const BLOCK_ROWS: usize = 1 << 16;
 
 /// Greatest number of shortcuts of a row of `gap_quantiles`, whose gaps are sorted in memory.
-pub const MOST_SORTED: u64 = 1 << 21;
+pub const MAX_SORTED: u64 = 1 << 21;
 
 const COUNT: Column =
     Column::number("shortcuts", "1", "number of shortcuts with status ok; only these enter the other columns");
@@ -83,7 +83,7 @@ const MINIMUM_COLUMNS: &[Column] = &[
 ];
 
 /// The quantiles in percent: the least gap that this percentage of the shortcuts does not exceed.
-const HUNDREDTHS: [u64; 7] = [0, 5, 25, 50, 75, 95, 100];
+const PERCENTAGES: [u64; 7] = [0, 5, 25, 50, 75, 95, 100];
 
 const QUANTILE_COLUMNS: &[Column] = &[
     COUNT,
@@ -217,9 +217,9 @@ impl Reduction {
     ) -> Result<(Status, Vec<f64>, RunStats), Stopped> {
         let mut buffer = ColumnBuffer::new(landscape.projection.indices().len());
         let (mut work, mut tally) = (RunStats::default(), Tally::default());
-        for start in rows.clone().step_by(PIECE) {
+        for start in rows.clone().step_by(BLOCK_ROWS) {
             job.signal.check()?;
-            let piece = start..rows.end.min(start + PIECE as u64);
+            let piece = start..rows.end.min(start + BLOCK_ROWS as u64);
             buffer.resize((piece.end - piece.start) as usize);
             work += gap::compute(landscape, piece, &mut buffer)?;
             tally.add(self, start, &buffer);
@@ -241,7 +241,7 @@ impl Reduction {
             Reduction::Quantiles => {
                 tally.gaps.sort_unstable_by(f64::total_cmp);
                 let count = tally.gaps.len() as u64;
-                for (cell, hundredths) in cells[1..].iter_mut().zip(HUNDREDTHS) {
+                for (cell, hundredths) in cells[1..].iter_mut().zip(PERCENTAGES) {
                     let rank = (hundredths * count).div_ceil(100).max(1);
                     *cell = tally.gaps.get(rank as usize - 1).copied().unwrap_or(f64::NAN);
                 }

@@ -17,12 +17,12 @@ pub struct RepeatedRows {
 
 impl RepeatedRows {
     /// Greatest number of different rows in the memo; larger tables compute every row.
-    const MOST_KEPT: u64 = 1 << 18;
+    const MAX_CACHED: u64 = 1 << 18;
 
     /// The memo of a table over `axes`; `None` if no row repeats.
     pub fn among(rows: &RowIndex, axes: &[Quantity]) -> Option<RepeatedRows> {
         let tuples = rows.tuples(axes);
-        let worthwhile = tuples.repeat() && tuples.span() <= Self::MOST_KEPT;
+        let worthwhile = tuples.repeat() && tuples.span() <= Self::MAX_CACHED;
         worthwhile.then(|| RepeatedRows { tuples, rows: Memo::default() })
     }
 

@@ -300,7 +300,7 @@ fn paper_landscape_read_back() {
     let folder = tempfile::tempdir().expect("is writable");
     let sweep = sweep(folder.path(), LANDSCAPE, "[tables.gap]\n[tables.crossover]\n");
     let outcome = run(&sweep, folder.path(), 2);
-    let statistics = &outcome.digests[0];
+    let statistics = &outcome.statistics[0];
     assert_eq!(statistics.status.iter().sum::<u64>(), 482_403);
     // Near theta = 0 the friction of 83 shortcuts is negative.
     assert_eq!(statistics.status[3..], [83, 0, 0]);

@@ -6,7 +6,7 @@ use std::process::{Command, Output};
 
 use crate::common::{files, run, sweep};
 use slipsweep::dataset::{Company, Folder};
-use slipsweep::sweep::{self, Plan, Shard, TableOutcome, shares_with};
+use slipsweep::sweep::{self, Plan, Shard, TableOutcome, shards_with};
 use slipsweep::table::Signal;
 
 /// 31 parts of `best_cubic`, `optimal`, `gap` and `crossover` of very different cost.
@@ -90,7 +90,7 @@ fn every_part_is_in_one_share_of_any_number() {
             }
         }
         assert!(owners.iter().all(|owners| owners.len() == 1), "{count}: {owners:?}");
-        let lacking = shares_with(&sweep, &plan, count, |table, part| (table, part) == (1, 3));
+        let lacking = shards_with(&sweep, &plan, count, |table, part| (table, part) == (1, 3));
         assert_eq!(lacking.as_ref(), Ok(&owners[4]), "{count}");
     }
 }

@@ -137,7 +137,7 @@ fn footers_hold_what_the_rows_do() {
         let outcome = run(&sweep, folder.path(), 2);
         let at = Folder::new(folder.path(), &sweep.name);
         let surveyed = survey(folder.path(), &sweep);
-        for (table, statistics) in surveyed.tables.iter().zip(&outcome.digests) {
+        for (table, statistics) in surveyed.tables.iter().zip(&outcome.statistics) {
             assert_eq!(table.statistics, *statistics, "{}", table.name);
             compare(&table.name, statistics, &rows(&at, &table.name, table.parts));
         }
@@ -145,8 +145,8 @@ fn footers_hold_what_the_rows_do() {
         for table in &surveyed.tables {
             fs::remove_file(at.part(&table.name, 0)).expect("is there");
         }
-        assert_eq!(run(&sweep, folder.path(), 1).digests, outcome.digests);
-        assert_eq!(run(&sweep, folder.path(), 2).digests, outcome.digests);
+        assert_eq!(run(&sweep, folder.path(), 1).statistics, outcome.statistics);
+        assert_eq!(run(&sweep, folder.path(), 2).statistics, outcome.statistics);
     }
 }
 
