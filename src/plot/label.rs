@@ -92,7 +92,7 @@ fn symbol(name: &str) -> Option<String> {
         "work" => "*W*",
         "work_optimal" => "*W*∗",
         "work_at_t_cross" => "*W*∗(*t*_{cross})",
-        "work_at_t_floor" => "*W*∗(*t*_{hold})",
+        "work_at_t_floor" => "*W*∗(*t*_{floor})",
         "work_at_t_cheapest" => "*W*∗(*t*_{cheapest})",
         "work_at_t_min" => "*W*∗(*t*_{min})",
         "work_at_t_turn" => "*W*∗(*t*_{turn})",

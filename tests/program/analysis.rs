@@ -61,8 +61,8 @@ fn summaries_state_units() {
 optimal: 3 rows (3 ok)
   at a = 0.03 mu_0, b = 0.05 mu_0, v_i = 3 v_0, v_f = 100 v_0
     t_f    work          v_start     v_end       time_at_floor  hamiltonian     theta_max    strategy
-    l/v_0  mu_0 sigma l  v_0         v_0         l/v_0      mu_0 sigma v_0  l/v_0
-    0.02   3.80811142    19.9230141  3392.16787  0          2.59678653      0.333333333  speed_up
+    l/v_0  mu_0 sigma l  v_0         v_0         l/v_0          mu_0 sigma v_0  l/v_0
+    0.02   3.80811142    19.9230141  3392.16787  0              2.59678653      0.333333333  speed_up
 ";
     let summary = printed(small().path(), &["summary", "results/test"]);
     assert!(summary.starts_with(expected), "{summary}");
@@ -96,13 +96,13 @@ fn head_shows_names_units_and_rows() {
     let expected = "\
 optimal: 3 rows, each the protocol of least work
   t_f    a     b     v_i  v_f  work          v_start     v_end       time_at_floor  hamiltonian     theta_max    strategy  status
-  l/v_0  mu_0  mu_0  v_0  v_0  mu_0 sigma l  v_0         v_0         l/v_0      mu_0 sigma v_0  l/v_0
-  0.02   0.03  0.05  3    100  3.80811142    19.9230141  3392.16787  0          2.59678653      0.333333333  speed_up  ok
-  0.037  0.03  0.05  3    100  3.85650171    3.12297925  3380.58505  0          2.93400965      0.333333333  speed_up  ok
+  l/v_0  mu_0  mu_0  v_0  v_0  mu_0 sigma l  v_0         v_0         l/v_0          mu_0 sigma v_0  l/v_0
+  0.02   0.03  0.05  3    100  3.80811142    19.9230141  3392.16787  0              2.59678653      0.333333333  speed_up  ok
+  0.037  0.03  0.05  3    100  3.85650171    3.12297925  3380.58505  0              2.93400965      0.333333333  speed_up  ok
 ";
     assert_eq!(head, expected);
     let all = printed(folder.path(), &["head", "results/test"]);
-    assert!(all.starts_with("optimal: 3 rows") && all.contains("\n\nbest: 3 rows"), "{all}");
+    assert!(all.starts_with("optimal: 3 rows") && all.contains("\n\nbest_cubic: 3 rows"), "{all}");
     // A trace is a table too, with the units that its Parquet file knows and a CSV file does not.
     let arguments = "trace optimal --t-f 0.02 --a 0.03 --b 0.05 --v-i 3 --v-f 100 --out";
     for (file, second) in [("o.parquet", "  l/v_0"), ("o-1.csv", "  0 ")] {
@@ -169,27 +169,27 @@ fn wrong_questions_are_answered_with_what_there_is() {
     let folder = small();
     let tables = "  expected: a SELECT from these tables:\n    \
                   optimal: t_f, a, b, v_i, v_f, work, v_start, v_end, time_at_floor, hamiltonian, theta_max, strategy, status\n    \
-                  best: t_f, a, b, v_i, v_f, alpha_2, alpha_3, work, work_optimal, gap, v_min, status\n";
+                  best_cubic: t_f, a, b, v_i, v_f, alpha_2, alpha_3, work, work_optimal, gap, v_min, status\n";
     let correct = "correct the query; text goes in 'single quotes', names with odd characters in \"double\" ones";
     for (question, found, help) in [
-        ("SELECT worck FROM best", "no column `worck`", "did you mean `work`?"),
-        ("SELECT temperature FROM best", "no column `temperature`", "choose one of these"),
+        ("SELECT worck FROM best_cubic", "no column `worck`", "did you mean `work`?"),
+        ("SELECT temperature FROM best_cubic", "no column `temperature`", "choose one of these"),
         ("SELECT gap FROM bets", "no table `bets`", "did you mean `best_cubic`?"),
-        ("SELEC gap FROM best", "not SQL: Expected: an SQL statement, found: SELEC at Line: 1, Column: 1", correct),
-        ("SELECT frobnicate(gap) FROM best", "unsupported function 'frobnicate'", correct),
+        ("SELEC gap FROM best_cubic", "not SQL: Expected: an SQL statement, found: SELEC at Line: 1, Column: 1", correct),
+        ("SELECT frobnicate(gap) FROM best_cubic", "unsupported function 'frobnicate'", correct),
         ("", "not one statement", "write one SELECT"),
-        ("DROP TABLE best", "DROP is not a question: `query` reads and never writes", "write one SELECT"),
+        ("DROP TABLE best_cubic", "DROP is not a question: `query` reads and never writes", "write one SELECT"),
     ] {
         let expected = (1, format!("error: {found}\n{tables}  help: {help}\n"));
         assert_eq!(refused(folder.path(), &["query", "results/test", question]), expected, "{question}");
     }
     // Types that do not fit may show only while the rows are read.
     for (question, found) in [
-        ("SELECT * FROM best WHERE gap = 'x'", "cannot compare string with numeric type (f64)"),
-        ("SELECT sum(status) FROM best", "`sum` operation not supported for dtype `cat`"),
-        ("SELECT gap FROM best WHERE status = 1", "cannot compare categorical with i32"),
-        ("SELECT sqrt(status) FROM best", "cannot cast categorical types to Float64"),
-        ("SELECT avg(status) FROM best", "`mean` operation not supported for dtype `cat`"),
+        ("SELECT * FROM best_cubic WHERE gap = 'x'", "cannot compare string with numeric type (f64)"),
+        ("SELECT sum(status) FROM best_cubic", "`sum` operation not supported for dtype `cat`"),
+        ("SELECT gap FROM best_cubic WHERE status = 1", "cannot compare categorical with i32"),
+        ("SELECT sqrt(status) FROM best_cubic", "cannot cast categorical types to Float64"),
+        ("SELECT avg(status) FROM best_cubic", "`mean` operation not supported for dtype `cat`"),
     ] {
         let expected = (1, format!("error: {found}\n{tables}  help: {correct}\n"));
         assert_eq!(refused(folder.path(), &["query", "results/test", question]), expected, "{question}");
@@ -217,7 +217,7 @@ fn wrong_paths_and_names() {
     let (code, message) = refused(folder.path(), &["head", "broken.parquet"]);
     assert!(code == 2 && message.starts_with("error: broken.parquet: cannot read: "), "{message}");
     let message =
-        "error: results/test: no table `optima`\n  expected: optimal, best\n  help: did you mean `optimal`?\n";
+        "error: results/test: no table `optima`\n  expected: optimal, best_cubic\n  help: did you mean `optimal`?\n";
     assert_eq!(refused(folder.path(), &["head", "results/test", "optima"]), (1, message.to_owned()));
     let message = "error: x.pdf ends in none of .csv, .jsonl, .parquet, .txt: add --format\n";
     assert_eq!(
@@ -233,11 +233,11 @@ fn wrong_paths_and_names() {
 fn columns_without_a_name_are_named_as_in_duckdb() {
     let folder = small();
     for (question, names) in [
-        ("SELECT min(gap), max(gap), count(*) FROM best", "min(gap),max(gap),count"),
-        ("SELECT t_f, min(gap), min(gap) FROM best GROUP BY t_f", "t_f,min(gap),min(gap)_1"),
-        ("SELECT gap * 2, -gap, round(gap, 3), count(DISTINCT t_f) FROM best", ""),
-        ("SELECT count(t_f), b.gap FROM best b GROUP BY b.gap", "count(t_f),gap"),
-        ("SELECT * FROM (SELECT min(gap), max(gap) FROM best) AS both_of", "min(gap),max(gap)"),
+        ("SELECT min(gap), max(gap), count(*) FROM best_cubic", "min(gap),max(gap),count"),
+        ("SELECT t_f, min(gap), min(gap) FROM best_cubic GROUP BY t_f", "t_f,min(gap),min(gap)_1"),
+        ("SELECT gap * 2, -gap, round(gap, 3), count(DISTINCT t_f) FROM best_cubic", ""),
+        ("SELECT count(t_f), b.gap FROM best_cubic b GROUP BY b.gap", "count(t_f),gap"),
+        ("SELECT * FROM (SELECT min(gap), max(gap) FROM best_cubic) AS both_of", "min(gap),max(gap)"),
     ] {
         let csv = printed(folder.path(), &["query", "results/test", question, "--format", "csv"]);
         let first = csv.lines().next().expect("has names");
@@ -248,7 +248,7 @@ fn columns_without_a_name_are_named_as_in_duckdb() {
         }
     }
     // What is ordered by is the column of the answer.
-    let question = "SELECT t_f, max(work) FROM best GROUP BY t_f ORDER BY max(work) DESC";
+    let question = "SELECT t_f, max(work) FROM best_cubic GROUP BY t_f ORDER BY max(work) DESC";
     let csv = printed(folder.path(), &["query", "results/test", question, "--format", "csv"]);
     let work: Vec<f64> = csv.lines().skip(1).filter_map(|line| line.split(',').nth(1)?.parse().ok()).collect();
     assert!(work.len() == 3 && work.is_sorted_by(|one, next| one >= next), "{csv}");
@@ -306,31 +306,31 @@ fn regress_answers_are_those_of_standard_sql() {
     let folder = small();
     let ask = |question: &str| printed(folder.path(), &["query", "results/test", question, "--format", "csv"]);
     for (question, answer) in [
-        ("SELECT sum(gap) AS x, count(1) AS n FROM best WHERE t_f > 1", "x,n\n,0\n"),
-        ("SELECT t_f, sum(gap) AS x FROM (SELECT * FROM best) AS b WHERE t_f > 1 GROUP BY t_f", "t_f,x\n"),
-        ("SELECT count(1), count(*) FROM best", "count(1),count\n3,3\n"),
-        ("SELECT count(*) FROM best WHERE t_f IN (1, (0.02), -3)", "count\n1\n"),
+        ("SELECT sum(gap) AS x, count(1) AS n FROM best_cubic WHERE t_f > 1", "x,n\n,0\n"),
+        ("SELECT t_f, sum(gap) AS x FROM (SELECT * FROM best_cubic) AS b WHERE t_f > 1 GROUP BY t_f", "t_f,x\n"),
+        ("SELECT count(1), count(*) FROM best_cubic", "count(1),count\n3,3\n"),
+        ("SELECT count(*) FROM best_cubic WHERE t_f IN (1, (0.02), -3)", "count\n1\n"),
         (
-            "SELECT b.t_f, o.strategy FROM best b JOIN optimal o ON b.t_f = o.t_f ORDER BY o.work LIMIT 1",
+            "SELECT b.t_f, o.strategy FROM best_cubic b JOIN optimal o ON b.t_f = o.t_f ORDER BY o.work LIMIT 1",
             "t_f,strategy\n0.02,speed_up\n",
         ),
         (
-            "SELECT t_f, median(work) AS x FROM best WHERE t_f < 0.03 GROUP BY t_f ORDER BY t_f LIMIT 1",
+            "SELECT t_f, median(work) AS x FROM best_cubic WHERE t_f < 0.03 GROUP BY t_f ORDER BY t_f LIMIT 1",
             "t_f,x\n0.02,3.80811",
         ),
-        ("WITH x AS (SELECT t_f FROM best) SELECT t_f FROM x ORDER BY t_f DESC LIMIT 1", "t_f\n0.049\n"),
-        ("SELECT count(*) FROM best b LEFT JOIN optimal o ON b.t_f = o.t_f AND b.v_f = o.v_f", "count\n3\n"),
+        ("WITH x AS (SELECT t_f FROM best_cubic) SELECT t_f FROM x ORDER BY t_f DESC LIMIT 1", "t_f\n0.049\n"),
+        ("SELECT count(*) FROM best_cubic b LEFT JOIN optimal o ON b.t_f = o.t_f AND b.v_f = o.v_f", "count\n3\n"),
         ("SELECT count(*) FROM optimal WHERE strategy LIKE '%s%e%_%p%' AND strategy NOT LIKE '%x'", "count\n2\n"),
     ] {
         let found = ask(question);
         assert!(found.starts_with(answer), "{question}: {found}");
     }
     for (question, found) in [
-        ("SELECT sum(1) FROM best", "`sum(1)`: no column in it"),
-        ("SELECT avg(2.5) FROM best GROUP BY t_f", "`avg(2.5)`: no column in it"),
-        ("WITH best AS (SELECT t_f FROM optimal) SELECT * FROM best", "WITH best: a table has this name"),
+        ("SELECT sum(1) FROM best_cubic", "`sum(1)`: no column in it"),
+        ("SELECT avg(2.5) FROM best_cubic GROUP BY t_f", "`avg(2.5)`: no column in it"),
+        ("WITH best AS (SELECT t_f FROM optimal) SELECT * FROM best_cubic", "WITH best_cubic: a table has this name"),
         (
-            "SELECT count(*) FROM best b LEFT JOIN optimal o ON b.t_f = o.t_f AND o.t_f < 0.03",
+            "SELECT count(*) FROM best_cubic b LEFT JOIN optimal o ON b.t_f = o.t_f AND o.t_f < 0.03",
             "ON b.t_f = o.t_f AND o.t_f < 0.03: an outer join compares columns with columns by =",
         ),
     ] {
@@ -338,7 +338,7 @@ fn regress_answers_are_those_of_standard_sql() {
         assert!(code == 1 && message.starts_with(&format!("error: {found}\n")), "{question}: {message}");
     }
     // Lists go to JSON alone, and numbers that JSON has not are words.
-    let lists = "SELECT v_f, array_agg(t_f) AS all_of FROM best GROUP BY v_f";
+    let lists = "SELECT v_f, array_agg(t_f) AS all_of FROM best_cubic GROUP BY v_f";
     for file in ["x.parquet", "x.csv"] {
         let (code, message) = refused(folder.path(), &["query", "results/test", lists, "--out", file]);
         assert!(
@@ -348,7 +348,7 @@ fn regress_answers_are_those_of_standard_sql() {
     }
     let json = printed(folder.path(), &["query", "results/test", lists, "--format", "jsonl"]);
     assert_eq!(json, "{\"v_f\":100.0,\"all_of\":[0.02,0.037,0.049]}\n");
-    let infinite = "SELECT 1.0 / (t_f - t_f) AS x FROM best LIMIT 1";
+    let infinite = "SELECT 1.0 / (t_f - t_f) AS x FROM best_cubic LIMIT 1";
     assert_eq!(printed(folder.path(), &["query", "results/test", infinite, "--format", "jsonl"]), "{\"x\":\"inf\"}\n");
 }
 
@@ -356,7 +356,7 @@ fn regress_answers_are_those_of_standard_sql() {
 fn files_of_different_columns_are_no_table() {
     let folder = small();
     fs::create_dir(folder.path().join("mixed")).expect("is writable");
-    for (question, file) in [("SELECT t_f, gap AS x FROM best", "a"), ("SELECT t_f, status AS x FROM best", "b")] {
+    for (question, file) in [("SELECT t_f, gap AS x FROM best_cubic", "a"), ("SELECT t_f, status AS x FROM best_cubic", "b")] {
         printed(folder.path(), &["query", "results/test", question, "--out", &format!("mixed/{file}.parquet")]);
     }
     for question in ["SELECT count(*) FROM mixed WHERE x > 5", "SELECT count(x) FROM mixed", "SELECT x FROM mixed"] {
@@ -372,7 +372,7 @@ fn regress_a_dataset_without_a_manifest_is_read_and_kept() {
     let folder = small();
     fs::remove_file(folder.path().join("results/test/manifest.json")).expect("was there");
     let before = crate::common::files(&folder.path().join("results"));
-    let arguments = ["query", "results/test", "SELECT * FROM best", "--out", "results/test/best/part-000000.parquet"];
+    let arguments = ["query", "results/test", "SELECT * FROM best_cubic", "--out", "results/test/best_cubic/part-000000.parquet"];
     let (code, message) = refused(folder.path(), &arguments);
     assert!(code == 1 && message.contains("which only `slipsweep run` writes"), "{message}");
     for arguments in [vec!["plot", "results/test"], vec!["report", "results/test"], vec!["summary", "results/test"]] {
@@ -393,19 +393,19 @@ fn nothing_but_the_dataset_is_read_and_nothing_is_written() {
     let folder = small();
     let root = folder.path().display();
     for question in [
-        format!("SELECT * FROM read_parquet('{root}/results/test/best/part-000000.parquet')"),
+        format!("SELECT * FROM read_parquet('{root}/results/test/best_cubic/part-000000.parquet')"),
         format!("SELECT * FROM read_csv('{root}/spec.toml')"),
         "SELECT * FROM read_parquet('http://127.0.0.1:9/x.parquet')".to_owned(),
-        format!("SELECT * FROM '{root}/results/test/best/part-000000.parquet'"),
-        "SELECT * FROM best JOIN read_csv('x.csv') AS x ON best.t_f = x.t_f".to_owned(),
-        "DELETE FROM best".to_owned(),
-        "TRUNCATE TABLE best".to_owned(),
-        "CREATE TABLE copy AS SELECT * FROM best".to_owned(),
-        "INSERT INTO best VALUES (1)".to_owned(),
-        "SELECT * INTO copy FROM best".to_owned(),
-        "EXPLAIN SELECT * FROM best".to_owned(),
+        format!("SELECT * FROM '{root}/results/test/best_cubic/part-000000.parquet'"),
+        "SELECT * FROM best_cubic JOIN read_csv('x.csv') AS x ON best.t_f = x.t_f".to_owned(),
+        "DELETE FROM best_cubic".to_owned(),
+        "TRUNCATE TABLE best_cubic".to_owned(),
+        "CREATE TABLE copy AS SELECT * FROM best_cubic".to_owned(),
+        "INSERT INTO best_cubic VALUES (1)".to_owned(),
+        "SELECT * INTO copy FROM best_cubic".to_owned(),
+        "EXPLAIN SELECT * FROM best_cubic".to_owned(),
         "SHOW TABLES".to_owned(),
-        "SELECT * FROM best; SELECT * FROM best".to_owned(),
+        "SELECT * FROM best_cubic; SELECT * FROM best_cubic".to_owned(),
     ] {
         let (code, message) = refused(folder.path(), &["query", "results/test", &question]);
         assert!(code == 1 && message.contains("  expected: a SELECT from these tables:\n"), "{question}: {message}");
@@ -413,10 +413,10 @@ fn nothing_but_the_dataset_is_read_and_nothing_is_written() {
     // No answer replaces a part or a manifest.
     let before = crate::common::files(&folder.path().join("results"));
     for out in
-        ["results/test/best/part-000000.parquet", "results/test/best/other.parquet", "results/test/manifest.json"]
+        ["results/test/best_cubic/part-000000.parquet", "results/test/best/other.parquet", "results/test/manifest.json"]
     {
         let format = ["--format", "parquet"];
-        let arguments = ["query", "results/test", "SELECT * FROM best", "--out", out];
+        let arguments = ["query", "results/test", "SELECT * FROM best_cubic", "--out", out];
         let (code, message) = refused(folder.path(), &[&arguments[..], &format[..]].concat());
         assert!(code == 1 && message.contains("which only `slipsweep run` writes"), "{message}");
     }
@@ -427,14 +427,14 @@ fn nothing_but_the_dataset_is_read_and_nothing_is_written() {
 fn what_is_too_much_is_an_error() {
     let folder = small();
     // A cell longer than the widths of formats.
-    let long = "SELECT string_agg(status, ',') AS x FROM best a CROSS JOIN best b CROSS JOIN best c CROSS JOIN best d CROSS JOIN best e \
-                CROSS JOIN best f CROSS JOIN best g CROSS JOIN best h CROSS JOIN best i CROSS JOIN best j";
+    let long = "SELECT string_agg(status, ',') AS x FROM best_cubic a CROSS JOIN best_cubic b CROSS JOIN best_cubic c CROSS JOIN best_cubic d CROSS JOIN best_cubic e \
+                CROSS JOIN best_cubic f CROSS JOIN best_cubic g CROSS JOIN best_cubic h CROSS JOIN best_cubic i CROSS JOIN best_cubic j";
     let answered =
         slipsweep(folder.path(), &["query", "results/test", &long.replace("string_agg(status", "string_agg(a.status")]);
     let text = String::from_utf8_lossy(&answered.stdout).into_owned();
     assert!(answered.status.code() == Some(0) && text.len() > 65_535, "{answered:?}");
     // Thousands of terms are answered, or refused with a message.
-    let terms = format!("SELECT gap + {} AS x FROM best", vec!["1"; 30_000].join(" + "));
+    let terms = format!("SELECT gap + {} AS x FROM best_cubic", vec!["1"; 30_000].join(" + "));
     let output = slipsweep(folder.path(), &["query", "results/test", &terms]);
     let said = String::from_utf8_lossy(&output.stderr).into_owned();
     match output.status.code() {

@@ -90,7 +90,7 @@ fn a_spec_that_is_no_file() {
 #[test]
 fn doubtful_velocities() {
     let folder = tempfile::tempdir().expect("is writable");
-    let spec = "name = \"fast\"\n[model]\nunits = \"Si\"\nmu_0 = 0.6\nl = 1e-6\nv_0 = 1e-4\nnormal_load = 1e6\n[axes]\na = 0.018\nb = 0.03\n\
+    let spec = "name = \"fast\"\n[model]\nunits = \"Si\"\nmu_0 = 0.6\nl = 1e-6\nv_0 = 1e-4\nnormal_stress = 1e6\n[axes]\na = 0.018\nb = 0.03\n\
                 v_i = 3.0\nv_f = { geomspace = [10.0, 1e7, 3] }\n[tables.crossover]\n";
     fs::write(folder.path().join("fast.toml"), spec).expect("is writable");
     let output = slipsweep(&["plan", "fast.toml"], folder.path());

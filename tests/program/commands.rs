@@ -31,7 +31,7 @@ fn run_tells_what_a_physicist_asks() {
     for line in [
         "gap: 482,403 rows (",
         "  least gap among the rows that are ok:\n  at a = 0.03 mu_0, b = 0.05 mu_0, v_i = 3 v_0, v_f = 100 v_0\n",
-        "best: 3 rows (3 ok)",
+        "best_cubic: 3 rows (3 ok)",
         "optimal: 3 rows (3 ok)",
         "crossover: 1 row (1 ok)",
         "0.0374184121",

@@ -559,7 +559,7 @@ fn paper_parameters_in_si_are_the_scaled_ones() {
     // The paper's case of a soft spring: a = 0.003/0.6, b = 0.006/0.6, m = 2.5e-16, k = 7.5e-3, v from 1e5 to 3.2e6, t_f = 3.1e-6. It tells a and
     // mu_0; contacts are renewed over a micrometre, the law holds from 1 nm/s on, and the load is 1 MPa: then 4.5 GPa/m and 150 kg/m^2.
     let folder = tempfile::tempdir().expect("is writable");
-    let si = "[model]\nunits = \"si\"\nmu_0 = 0.6\nl = 1e-6\nv_0 = 1e-9\nnormal_load = 1e6\n[axes]\nt_f = 3.1e-3\na = 0.003\nb = 0.006\n\
+    let si = "[model]\nunits = \"si\"\nmu_0 = 0.6\nl = 1e-6\nv_0 = 1e-9\nnormal_stress = 1e6\n[axes]\nt_f = 3.1e-3\na = 0.003\nb = 0.006\n\
               v_i = 1e-4\nv_f = 3.2e-3\nk = 4.5e9\nm = 150.0\n";
     let sweep = load(folder.path(), si, "[tables.stability]\n[tables.compliant]\n").expect("is legal");
     let point = sweep.grid.scaled(&sweep.grid.project(&Quantity::ALL).expect("is small").point(0));

@@ -115,7 +115,7 @@ fn every_table_has_its_picture() {
         assert!(words[0].contains(part), "{part} in {}", words[0]);
     }
     assert!(words[2].contains("W* (μ0 σ l)"), "{}", words[2]);
-    assert!(words[4].contains("bounded friction, tf = 0.02 l/v0, τmax = 1.1 μ0 σ"), "{}", words[4]);
+    assert!(words[4].contains("bounded friction, tf = 0.02 l/v0, τceiling = 1.1 μ0 σ"), "{}", words[4]);
     // Scaled figures state their units too; nothing in a figure is for the command line.
     assert!(words[0].contains("a = 0.03 μ0, b = 0.05 μ0, vi = 3 v0"), "{}", words[0]);
     assert!(words.iter().all(|words| !words.contains("--")));
@@ -227,7 +227,7 @@ fn all_tables_go_into_a_folder_in_a_format() {
     assert_eq!(said, ["optimal", "best_cubic"].map(|table| format!("{table}: written to {}\n", path(table))).concat());
     assert!(fs::read(folder.join(path("best_cubic"))).expect("is there").starts_with(b"\x89PNG"));
     shown(folder, &["plot", "results/tiny", "--format", "pdf", "--table", "best_cubic"]);
-    assert!(fs::read(folder.join("tiny-best.pdf")).expect("is there").starts_with(b"%PDF-"));
+    assert!(fs::read(folder.join("tiny-best_cubic.pdf")).expect("is there").starts_with(b"%PDF-"));
 }
 
 #[test]
@@ -245,7 +245,7 @@ fn traces_are_drawn_over_each_other() {
     assert_eq!(shown(folder, &["plot", "optimal.parquet", "best.csv"]), "written to traces.svg\n");
     let both = words(&read(folder, "traces.svg"));
     // They lie on each other: one line, one entry of the legend.
-    assert!(both.contains("\noptimal; best, α2 = −0.11983/tf, α3 = −0.066423/tf2\n"), "{both}");
+    assert!(both.contains("\noptimal; best cubic, α2 = −0.11983/tf, α3 = −0.066423/tf2\n"), "{both}");
     shown(folder, &[&["trace", "step", "--out", "step.parquet"], &case[..]].concat());
     shown(folder, &["plot", "optimal.parquet", "step.parquet"]);
     let apart = words(&read(folder, "traces.svg"));
@@ -262,7 +262,7 @@ fn traces_are_drawn_over_each_other() {
     shown(folder, &["plot", "my_<best>*\u{1}.csv", "--out", "odd.png"]);
     shown(folder, &["plot", "my_<best>*\u{1}.csv", "--out", "odd.svg"]);
     let odd = words(&read(folder, "odd.svg"));
-    assert!(odd.starts_with("Protocol best"), "{odd}");
+    assert!(odd.starts_with("Protocol best cubic"), "{odd}");
     fs::write(folder.join("bad.csv"), "t,v\n0,1\n1,x\n").expect("is writable");
     assert_eq!(
         complaint(folder, &["plot", "bad.csv"]),
@@ -304,7 +304,7 @@ fn picture(name: &str, spec: &str, table: &str) -> (String, String) {
 
 #[test]
 fn pictures_in_si_units_show_the_same() {
-    let spec = "[model]\nunits = \"si\"\nmu_0 = 0.6\nl = 1e-6\nv_0 = 1e-9\nnormal_load = 10.0\n[axes]\nt_f = [20.0, 49.0]\na = 0.018\n\
+    let spec = "[model]\nunits = \"si\"\nmu_0 = 0.6\nl = 1e-6\nv_0 = 1e-9\nnormal_stress = 10.0\n[axes]\nt_f = [20.0, 49.0]\na = 0.018\n\
                 b = 0.03\nv_i = 3e-9\nv_f = 1e-7\nalpha_2 = { linspace = [-0.3, 0.1, 21], unit = \"1/t_f\" }\n\
                 alpha_3 = { linspace = [-0.3, 0.3, 21], unit = \"1/t_f^2\" }\n[tables.gap]\n[tables.optimal]\n";
     let (gap, _) = picture("si", spec, "gap");
@@ -315,7 +315,7 @@ fn pictures_in_si_units_show_the_same() {
     for part in ["W* (10−5 J/m2)", "v(0+) (10−8 m/s)", "tcross"] {
         assert!(optimal.contains(part), "{part} in {optimal}");
     }
-    let spec = "[model]\nunits = \"si\"\nmu_0 = 0.6\nl = 1e-6\nv_0 = 1e-9\nnormal_load = 10.0\n[axes]\na = 0.003\nb = 0.006\n\
+    let spec = "[model]\nunits = \"si\"\nmu_0 = 0.6\nl = 1e-6\nv_0 = 1e-9\nnormal_stress = 10.0\n[axes]\na = 0.003\nb = 0.006\n\
                 v_i = 1e-6\nv_f = { geomspace = [2e-6, 1e-2, 7] }\nk = { geomspace = [1e3, 1e5, 7] }\nm = 1.0\n[tables.stability]\n";
     let (stability, svg) = picture("spring", spec, "stability");
     for part in ["kc(vf)", "k (Pa/m)", "vf (m/s)", "m = 1 kg/m2"] {
@@ -441,7 +441,7 @@ fn single_materials_are_symbols_of_their_outcome() {
     fs::write(folder.join("spec.toml"), spec).expect("is writable");
     shown(folder, &["run", "spec.toml", "--quiet"]);
     shown(folder, &["plot", "results/materials"]);
-    let svg = read(folder, "materials-step.svg");
+    let svg = read(folder, "materials-step_response.svg");
     let words = words(&svg);
     assert!(words.contains("\nsettled\n") && words.contains("\nlimit cycle\n"), "{words}");
     // Two settle and two do not; each symbol is in the legend, too. Nothing is hatched or blank.

@@ -289,7 +289,7 @@ proptest! {
         let tables = "[tables.optimal]\n[tables.stability]\n";
         let scaled = format!("name = \"test\"\n[axes]\n{}{tables}", axes([1.0; 5]));
         let si = format!(
-            "name = \"test\"\n[model]\nunits = \"si\"\nmu_0 = {mu_0:?}\nl = {l:?}\nv_0 = {v_0:?}\nnormal_load = {load:?}\n[axes]\n{}{tables}",
+            "name = \"test\"\n[model]\nunits = \"si\"\nmu_0 = {mu_0:?}\nl = {l:?}\nv_0 = {v_0:?}\nnormal_stress = {load:?}\n[axes]\n{}{tables}",
             axes([l / v_0, v_0, mu_0, stress / l, stress * l / (v_0 * v_0)]),
         );
         for (table, column_of, size) in [

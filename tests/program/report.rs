@@ -50,7 +50,7 @@ fn the_page_holds_everything_and_opens_without_an_error() {
         assert!(page.contains(part), "{part}");
     }
     assert!(page.contains("<th>t_f [l/v_0]</th>") && page.contains("<th>unit</th>"), "units");
-    for table in ["gap: 882 rows", "best: 2 rows", "crossover: 1 row"] {
+    for table in ["gap: 882 rows", "best_cubic: 2 rows", "crossover: 1 row"] {
         assert_eq!(page.matches(table).count(), 1, "{table}");
     }
     // Two maps tell their values; nothing is asked of a network.
@@ -74,7 +74,7 @@ fn the_page_holds_everything_and_opens_without_an_error() {
     ];
     let places: Vec<Option<usize>> = order.iter().map(|part| page.find(part)).collect();
     assert!(places.iter().all(Option::is_some) && places.is_sorted(), "{places:?}");
-    assert_eq!(page.matches("best: 2 rows").count(), 1);
+    assert_eq!(page.matches("best_cubic: 2 rows").count(), 1);
     in_a_browser(folder);
 }
 
@@ -115,5 +115,5 @@ svg.dispatchEvent(new MouseEvent('mousemove', { clientX: at.x, clientY: at.y, bu
         assert!(tip.contains(part), "{part} in {tip}");
     }
     let first = dom.split("<tbody>").nth(1).unwrap_or_default().trim_start();
-    assert!(first.starts_with("<tr><td>best</td>"), "{}", first.chars().take(80).collect::<String>());
+    assert!(first.starts_with("<tr><td>best_cubic</td>"), "{}", first.chars().take(80).collect::<String>());
 }

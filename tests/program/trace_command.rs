@@ -274,11 +274,11 @@ fn paper_control_of_the_smooth_shortcut_turns_negative() {
 /// The response to a step: overshoot to 6.5585 `v_f`, and no jump of the velocity at either end.
 #[test]
 fn paper_step_on_a_spring_overshoots() {
-    let spring = ["step", "--t-f", "1e-5", "--a", "0.005", "--b", "0.01", "--v-i", "1e5", "--v-f", "3.2e6"];
+    let spring = ["step_response", "--t-f", "1e-5", "--a", "0.005", "--b", "0.01", "--v-i", "1e5", "--v-f", "3.2e6"];
     let text = shown(&[&spring, &["--k", "7.5e-3", "--m", "2.5e-16"]]);
     assert!(
         text.starts_with(
-            "step: the control velocity jumps to v_f and stays there; the block on its spring up to t_f\n"
+            "step_response: the control velocity jumps to v_f and stays there; the block on its spring up to t_f\n"
         )
     );
     let csv = csv(&[&spring, &["--k", "7.5e-3", "--m", "2.5e-16"]]);
@@ -299,7 +299,7 @@ fn paper_step_on_a_spring_overshoots() {
 /// A step response spans decades: rows that are good to the range of a column alone would make corners on a logarithmic axis.
 #[test]
 fn regress_slow_velocities_are_good_to_a_hundredth_of_themselves() {
-    let case = ["step", "--t-f", "3.1e-6", "--a", "0.005", "--b", "0.01", "--v-i", "1e5", "--v-f", "3.2e6"];
+    let case = ["step_response", "--t-f", "3.1e-6", "--a", "0.005", "--b", "0.01", "--v-i", "1e5", "--v-f", "3.2e6"];
     let spring = ["--k", "7.5e-3", "--m", "2.5e-16"];
     let rows = |more: &[&str]| -> Vec<Vec<f64>> {
         let csv = csv(&[&case, &spring, more]);
@@ -391,8 +391,8 @@ fn a_row_over_time_is_the_protocol_of_its_numbers() {
     }
     let by_words = run(&["optimal", "--where", "t_f=300, v_i=3e-9", "--format", "csv"]);
     assert_eq!(text(by_words), text(run(&["optimal", "--row", "2", "--format", "csv"])));
-    let step = text(run(&["step", "--row", "0", "--t-f", "100"]));
-    assert!(step.contains("t_f = 100 s") && step.contains("row 0 of table step of rows"), "{step}");
+    let step = text(run(&["step_response", "--row", "0", "--t-f", "100"]));
+    assert!(step.contains("t_f = 100 s") && step.contains("row 0 of table step_response of rows"), "{step}");
     // The picture of a CSV names the protocol and its parameters.
     assert_eq!(run(&["optimal", "--row", "0", "--out", "row.csv"]).status.code(), Some(0));
     let plot =
@@ -433,5 +433,5 @@ fn a_row_without_a_path_says_why() {
         let found = complaint(arguments);
         assert!(found.starts_with(expected), "{arguments:?}: {found}");
     }
-    assert!(complaint(&["step", "--row", "0"]).contains("has no duration of its own\n  help: add --t-f T"));
+    assert!(complaint(&["step_response", "--row", "0"]).contains("has no duration of its own\n  help: add --t-f T"));
 }

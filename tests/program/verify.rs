@@ -36,7 +36,7 @@ fn a_sound_dataset_passes() {
     assert_eq!(output.status.code(), Some(0), "{}{}", text(&output), String::from_utf8_lossy(&output.stderr));
     for table in [
         "gap: 54 rows",
-        "best: 18 rows",
+        "best_cubic: 18 rows",
         "optimal: 18 rows",
         "crossover: 6 rows",
         "shortcut: 72 rows",
@@ -251,7 +251,7 @@ fn motions_are_followed_again() {
 /// Two landscapes with something to tell and one without, in odd units.
 const LANDSCAPES: &str = "alpha_3 = { linspace = [-0.5, 0.5, 41], unit = \"1/t_f^2\" }\nt_f = [2e-5, 40.0]\na = 0.003\nb = 0.005\n\
                           v_i = 3e-9\nv_f = [100e-9, 2e-9]\nalpha_2 = { linspace = [-0.5, 0.5, 43], unit = \"1/t_f\" }\n\
-                          [model]\nunits = \"si\"\nmu_0 = 0.1\nl = 1e-6\nv_0 = 1e-9\nnormal_load = 1e6\n";
+                          [model]\nunits = \"si\"\nmu_0 = 0.1\nl = 1e-6\nv_0 = 1e-9\nnormal_stress = 1e6\n";
 
 #[test]
 fn reduced_landscapes_are_told_again() {
