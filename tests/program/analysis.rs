@@ -174,7 +174,7 @@ fn wrong_questions_are_answered_with_what_there_is() {
     for (question, found, help) in [
         ("SELECT worck FROM best_cubic", "no column `worck`", "did you mean `work`?"),
         ("SELECT temperature FROM best_cubic", "no column `temperature`", "choose one of these"),
-        ("SELECT gap FROM bets", "no table `bets`", "did you mean `best_cubic`?"),
+        ("SELECT gap FROM best_cubi", "no table `best_cubi`", "did you mean `best_cubic`?"),
         ("SELEC gap FROM best_cubic", "not SQL: Expected: an SQL statement, found: SELEC at Line: 1, Column: 1", correct),
         ("SELECT frobnicate(gap) FROM best_cubic", "unsupported function 'frobnicate'", correct),
         ("", "not one statement", "write one SELECT"),
@@ -328,7 +328,7 @@ fn regress_answers_are_those_of_standard_sql() {
     for (question, found) in [
         ("SELECT sum(1) FROM best_cubic", "`sum(1)`: no column in it"),
         ("SELECT avg(2.5) FROM best_cubic GROUP BY t_f", "`avg(2.5)`: no column in it"),
-        ("WITH best AS (SELECT t_f FROM optimal) SELECT * FROM best_cubic", "WITH best_cubic: a table has this name"),
+        ("WITH best_cubic AS (SELECT t_f FROM optimal) SELECT * FROM best_cubic", "WITH best_cubic: a table has this name"),
         (
             "SELECT count(*) FROM best_cubic b LEFT JOIN optimal o ON b.t_f = o.t_f AND o.t_f < 0.03",
             "ON b.t_f = o.t_f AND o.t_f < 0.03: an outer join compares columns with columns by =",

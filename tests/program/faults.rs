@@ -187,13 +187,13 @@ fn a_panic_names_the_row_and_the_other_parts_are_kept() {
         command.args(["run", "spec.toml", "--out", &out, "--threads", "2"]).env("SLIPSWEEP_PANIC", &out);
         let (code, message) = said(&command.output().expect("runs"));
         assert_eq!(code, Some(2), "{message}");
-        let told = format!("error: {table}: row {row} panicked: SLIPSWEEP_PANIC asks for it\n  at {axes}");
+        let told = format!("error: {table}: row {row} panicked: requested by SLIPSWEEP_PANIC\n  at {axes}");
         assert!(message.contains(&told), "{message}");
         assert!(
             message.contains("help: this is a defect of slipsweep, please report it; ") && message.contains(others)
         );
         // The usual message, which has the line of the source, comes once.
-        assert_eq!(message.matches("panicked at src/table/fault.rs:").count(), 1, "{message}");
+        assert_eq!(message.matches("panicked at src/table/failpoint.rs:").count(), 1, "{message}");
         let there = files(&folder.path().join(&out).join("test"));
         let lost: Vec<&PathBuf> = whole.keys().filter(|path| !there.contains_key(*path)).collect();
         assert_eq!(lost.len(), if others.is_empty() { 1 } else { 2 }, "{lost:?}");

@@ -350,7 +350,7 @@ fn axes_that_change_together_make_lines_and_sampled_ones_dots() {
         dots,
         64 + sampled.matches("speed up").count()
             + sampled.matches("slow down").count()
-            + sampled.matches("\nhold\n").count()
+            + sampled.matches("\nfloor\n").count()
     );
 }
 

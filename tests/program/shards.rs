@@ -210,7 +210,7 @@ fn tasks_that_would_have_too_little_to_do_are_not_made() {
     assert!(error.contains("expected a number of minutes, 0 or more, found `x`"), "{error}");
     let output = slipsweep(folder.path(), &["run", "spec.toml", "--shard", "4/4"]);
     assert_eq!(output.status.code(), Some(1));
-    let message = "there is no share 4 of 4: they are numbered from 0 to 3";
+    let message = "no shard 4 of 4: shards are numbered from 0 to 3";
     assert!(text(&output.stderr).contains(message), "{}", text(&output.stderr));
 }
 
@@ -295,7 +295,7 @@ fn regress_more_parts_than_can_be_shared_out_are_refused() {
         assert_eq!(output.status.code(), Some(1));
         assert_eq!(
             text(&output.stderr),
-            "error: 281474976710656 parts are too many to be shared out\n  expected: at most 8388608\n  help: write several specs, each \
+            "error: 281474976710656 parts are too many for shards\n  expected: at most 8388608\n  help: write several specs, each \
              with some of the values of an axis\n"
         );
     }
