@@ -1,11 +1,11 @@
-//! An axis: a finite sequence of values of one quantity, told by index and never accumulated.
+//! An axis: a finite sequence of values of one quantity. Each value is computed from its index.
 
 use super::quantity::{Quantity, Scale};
 
 /// The values of an axis.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Values {
-    /// Given one by one.
+    /// A list of values.
     List(Vec<f64>),
     /// `first + i step` with `step = (last - first)/(count - 1)`, both ends exact: the doubles of `numpy.linspace`.
     Linspace {
@@ -36,7 +36,7 @@ impl Values {
         }
     }
 
-    /// Whether there is no value at all.
+    /// Whether the axis has no values.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
@@ -60,7 +60,7 @@ impl Values {
 /// One quantity and the values it takes.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Axis {
-    /// What varies.
+    /// The quantity.
     pub quantity: Quantity,
     /// The unit of the values.
     pub scale: Scale,
@@ -70,7 +70,7 @@ pub struct Axis {
 
 #[cfg(test)]
 mod tests {
-    //! Ranges hit both ends exactly and never drift.
+    //! Ranges contain both ends exactly and do not drift.
 
     use super::*;
 

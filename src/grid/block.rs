@@ -1,4 +1,4 @@
-//! A block: independent factors, axes computed from other axes, and a condition on the points to keep. Rows of its product are numbers in mixed radix.
+//! A block: independent factors, computed axes, and a condition on its points. Rows of its product are numbers in mixed radix.
 
 use std::collections::HashMap;
 
@@ -15,14 +15,14 @@ pub struct Factor {
     pub labels: Vec<Label>,
 }
 
-/// A column of words that names the steps of a factor. No number depends on it.
+/// A label: a column of words for the steps of a factor. No number depends on it.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Label {
     /// Its name.
     pub name: String,
-    /// The words that occur, each once, in the order of the first step that has each.
+    /// The distinct words, in the order of their first step.
     pub words: Vec<String>,
-    /// The place in `words` of the word of each step; `None` where a step has none.
+    /// The index in `words` for each step; `None` for a step without a word.
     pub places: Vec<Option<u32>>,
 }
 
@@ -40,17 +40,17 @@ impl Factor {
         self.axes.first().map_or(0, |axis| axis.values.len())
     }
 
-    /// Whether the factor has no step at all.
+    /// Whether the factor has no steps.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
 
-    /// Whether it holds one of `quantities`.
+    /// Whether it contains an axis of `quantities`.
     pub fn holds_any(&self, quantities: &[Quantity]) -> bool {
         self.axes.iter().any(|axis| quantities.contains(&axis.quantity))
     }
 
-    /// How many different tuples of `quantities` the factor takes, and which one each step has, if not one a step.
+    /// The number of different tuples of `quantities`, and the tuple of each step unless every step has its own.
     ///
     /// Ranges are distinct by construction, so only what is stored value by value is compared.
     pub fn classes(&self, quantities: &[Quantity]) -> (u64, Option<Vec<u32>>) {
@@ -74,44 +74,44 @@ impl Factor {
 /// An axis whose value at a point is computed from other axes of its block.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Derived {
-    /// What is computed.
+    /// The computed quantity.
     pub quantity: Quantity,
     /// The unit of the values.
     pub scale: Scale,
-    /// How.
+    /// The expression.
     pub expression: Expression,
 }
 
-/// One product of factors, with what is computed from it and which of its points are kept.
+/// A product of factors, its computed axes and its condition.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Block {
     /// The factors, slowest first.
     pub factors: Vec<Factor>,
-    /// Computed axes, each after those that it is made of.
+    /// Computed axes, each after the axes in its expression.
     pub derived: Vec<Derived>,
-    /// The points to keep are those where it is true; all without one.
+    /// The condition of kept points; `None` keeps all.
     pub condition: Option<Expression>,
 }
 
 impl Block {
-    /// The axis of `quantity`, if a factor holds it.
+    /// The axis of `quantity`, if a factor contains it.
     pub fn axis(&self, quantity: Quantity) -> Option<&Axis> {
         self.factors.iter().flat_map(|factor| &factor.axes).find(|axis| axis.quantity == quantity)
     }
 
-    /// The names of the labels that rows over `quantities` have: those of the factors that such rows tell apart.
+    /// The names of the labels of rows over `quantities`: those of the factors with these axes.
     pub fn labels(&self, quantities: &[Quantity]) -> impl Iterator<Item = &str> {
         let factors = self.factors_of(&self.roots(quantities)).into_iter();
         factors.flat_map(|factor| &self.factors[factor].labels).map(|label| label.name.as_str())
     }
 
-    /// The unit in which the block gives `quantity`; `None` if it has no such axis.
+    /// The unit of `quantity` in the block; `None` without such an axis.
     pub fn scale(&self, quantity: Quantity) -> Option<Scale> {
         let derived = self.derived.iter().find(|derived| derived.quantity == quantity).map(|derived| derived.scale);
         derived.or_else(|| self.axis(quantity).map(|axis| axis.scale))
     }
 
-    /// The axes of the factors that `quantities` are, or are made of.
+    /// The factor axes on which `quantities` depend.
     pub fn roots(&self, quantities: &[Quantity]) -> Vec<Quantity> {
         let mut roots = quantities.to_vec();
         for derived in self.derived.iter().rev() {
@@ -123,7 +123,7 @@ impl Block {
         roots
     }
 
-    /// The numbers of the factors that hold one of `roots`, slowest first.
+    /// The numbers of the factors that contain an axis of `roots`, slowest first.
     pub fn factors_of(&self, roots: &[Quantity]) -> Vec<usize> {
         (0..self.factors.len()).filter(|&factor| self.factors[factor].holds_any(roots)).collect()
     }
@@ -136,7 +136,7 @@ pub struct Digit {
     pub factor: usize,
     /// Steps of the factor.
     pub len: u64,
-    /// Rows for which a step lasts.
+    /// Rows of one step.
     pub stride: u64,
 }
 
@@ -146,7 +146,7 @@ impl Digit {
         row / self.stride % self.len
     }
 
-    /// The first row after `row` that has another step.
+    /// The first row after `row` with another step.
     pub fn next(&self, row: u64) -> u64 {
         (row / self.stride + 1).saturating_mul(self.stride)
     }

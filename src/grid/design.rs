@@ -1,4 +1,4 @@
-//! Sampled designs: points that fill a box evenly without being a product.
+//! Sampled designs: points that fill a box evenly.
 
 use rand_pcg::Pcg64;
 use rand_pcg::rand_core::{Rng, SeedableRng};
@@ -6,7 +6,7 @@ use rand_pcg::rand_core::{Rng, SeedableRng};
 /// A kind of joint sample.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Design {
-    /// A Sobol sequence with Owen scrambling (Burley, JCGT 2020): any first `2^n` points fill the box evenly. Values are told to 24 bits.
+    /// A Sobol sequence with Owen scrambling (Burley, JCGT 2020): any first `2^n` points fill the box evenly. Values have 24 bits.
     Sobol,
     /// A Latin hypercube: of `n` points one lies in each of the `n` equal parts of every axis.
     LatinHypercube,
@@ -21,7 +21,7 @@ impl Design {
         }
     }
 
-    /// The most points it can have.
+    /// Its greatest number of points.
     pub fn most(self) -> u64 {
         match self {
             Design::Sobol => 1 << 16,
@@ -48,7 +48,7 @@ impl Design {
     }
 }
 
-/// A whole number below `end`, each as likely as any other (Lemire's multiplication with rejection, TOMACS 2019).
+/// A uniform random integer below `end` (Lemire's multiplication with rejection, TOMACS 2019).
 fn below(random: &mut Pcg64, end: u64) -> u64 {
     loop {
         let product = u128::from(random.next_u64()) * u128::from(end);

@@ -1,4 +1,4 @@
-//! What a sweep varies: quantities, the axes they run over, and the grid, whose rows a number decodes.
+//! The grid: quantities, axes, blocks, and the index of the rows of a table.
 
 mod axis;
 mod block;

@@ -12,7 +12,7 @@ pub enum Quantity {
     Time,
     /// Direct effect.
     A,
-    /// Effect of the contact lifetime.
+    /// Evolution effect.
     B,
     /// Initial velocity.
     InitialVelocity,
@@ -20,7 +20,7 @@ pub enum Quantity {
     FinalVelocity,
     /// Family of shortcuts.
     Family,
-    /// Bound on friction.
+    /// Friction ceiling.
     FrictionBound,
     /// Linear coefficient of the cubic shortcut.
     Alpha2,
@@ -36,7 +36,7 @@ pub enum Quantity {
     Smoothing,
 }
 
-/// The legal range of a number: an interval, perhaps with one value apart from it, and the text that messages show.
+/// The legal range of a number: an interval, at most one isolated value, and a text for messages.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Domain {
     /// The range in words, as in `1 < v_i <= 1e12`.
@@ -58,12 +58,12 @@ impl Domain {
         (self.least, self.least_excluded)
     }
 
-    /// The upper end of its interval, which belongs to it.
+    /// The upper end of its interval, which is included.
     pub fn greatest(&self) -> f64 {
         self.greatest
     }
 
-    /// The one legal value outside of its interval, 0 or infinity, if there is one.
+    /// The isolated legal value, 0 or infinity, if any.
     pub fn apart(&self) -> Option<f64> {
         self.apart
     }
@@ -81,10 +81,10 @@ impl fmt::Display for Domain {
     }
 }
 
-/// Legal range of every `rtol`: below it doubles cannot follow, above it a result means nothing.
+/// Legal range of every `rtol`. Smaller values are beyond double precision, greater ones are meaningless.
 pub const RTOL: Domain = Domain::new("1e-13 <= rtol <= 1e-2", 1e-13, 1e-2);
 
-/// The unit in which the values of a coefficient axis are given and reported.
+/// The unit of a coefficient axis.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Scale {
     /// The scaled units of the model: the value is the coefficient.
@@ -121,16 +121,14 @@ impl Quantity {
     fn definition(self) -> [&'static str; 3] {
         match self {
             Quantity::Time => ["t_f", "l/v_0", "duration of the protocol"],
-            Quantity::A => ["a", "mu_0", "direct effect of the velocity on friction"],
-            Quantity::B => ["b", "mu_0", "effect of the contact lifetime on friction"],
+            Quantity::A => ["a", "mu_0", "direct effect: coefficient of ln v in friction"],
+            Quantity::B => ["b", "mu_0", "evolution effect: coefficient of ln theta in friction"],
             Quantity::InitialVelocity => ["v_i", "v_0", "velocity of the initial steady state"],
             Quantity::FinalVelocity => ["v_f", "v_0", "velocity of the final steady state"],
             Quantity::Family => ["family", "", "family of shortcuts"],
             Quantity::FrictionBound => ["tau_ceiling", "mu_0 sigma", "bound on friction, which bounded_friction heeds"],
-            Quantity::Alpha2 => ["alpha_2", "1", "coefficient of t in the contact lifetime of the cubic shortcut"],
-            Quantity::Alpha3 => {
-                ["alpha_3", "v_0/l", "coefficient of t^2 in the contact lifetime of the cubic shortcut"]
-            }
+            Quantity::Alpha2 => ["alpha_2", "1", "coefficient of t in theta of the cubic shortcut"],
+            Quantity::Alpha3 => ["alpha_3", "v_0/l", "coefficient of t^2 in theta of the cubic shortcut"],
             Quantity::Stiffness => ["k", "mu_0 sigma/l", "stiffness of the spring"],
             Quantity::Mass => ["m", "mu_0 sigma l/v_0^2", "mass of the block"],
             Quantity::Sampling => [
@@ -149,7 +147,7 @@ impl Quantity {
         self.definition()[0]
     }
 
-    /// What it means, in one line.
+    /// Its meaning, in one line.
     pub fn doc(self) -> &'static str {
         self.definition()[2]
     }
@@ -168,12 +166,12 @@ impl Quantity {
         matches!(self, Quantity::Alpha2 | Quantity::Alpha3)
     }
 
-    /// The units in which its values can be given.
+    /// Its legal units.
     pub fn scales(self) -> &'static [Scale] {
         if self.has_scale() { &[Scale::Duration, Scale::Model] } else { &[Scale::Model] }
     }
 
-    /// The words it takes instead of numbers, each of which stands for its place; none for a number.
+    /// The words of an axis of words, coded by index; empty for a number.
     pub fn words(self) -> Vec<&'static str> {
         match self {
             Quantity::Family => FAMILIES.iter().map(|family| family.name()).collect(),
@@ -181,8 +179,7 @@ impl Quantity {
         }
     }
 
-    /// Its legal range: far beyond what a material or a machine can have, and no further, since from some size on no product
-    /// of quantities is a double any more.
+    /// Its legal range: far beyond the physical domain (docs/spec.md), and small enough that products of quantities do not overflow.
     pub fn domain(self) -> Domain {
         let velocity = |text| Domain { least_excluded: true, ..Domain::new(text, 1.0, 1e12) };
         match self {
@@ -209,7 +206,7 @@ impl Quantity {
         }
     }
 
-    /// The values it has in a spec that does not name it; none where every table that needs it must be told.
+    /// Its default values; empty if a spec must define it.
     pub fn default(self) -> Vec<f64> {
         match self {
             Quantity::Family => (0..FAMILIES.len()).map(|place| place as f64).collect(),
@@ -220,7 +217,7 @@ impl Quantity {
     }
 }
 
-/// The values of all quantities at one point of a grid; NaN for those that the grid does not hold.
+/// The values of all quantities at a point of a grid; NaN for a quantity that is not in the grid.
 #[derive(Debug, Clone, Copy)]
 pub struct Point([f64; Quantity::ALL.len()]);
 
@@ -246,7 +243,7 @@ impl std::ops::IndexMut<Quantity> for Point {
 
 #[cfg(test)]
 mod tests {
-    //! Ranges are what their texts say, and what the book says.
+    //! Ranges agree with their texts and with the book.
 
     use super::*;
 

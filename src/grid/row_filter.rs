@@ -1,7 +1,7 @@
-//! Which rows of a product a condition keeps: their exact number, and the row that each kept one is.
+//! The predicate of a block: the exact number of kept rows, and the product row of each.
 //!
-//! A condition reads some factors only. It is evaluated once for each combination of their steps, and a bitmap holds the combinations
-//! that are kept. The digits of a row that the condition does not read multiply what the bitmap counts.
+//! A condition reads some factors. It is evaluated once for each combination of their steps, and a bitmap stores the kept combinations. Digits
+//! that the condition does not read multiply the counts of the bitmap.
 
 use std::ops::Range;
 
@@ -19,10 +19,10 @@ const CHUNK_COMBINATIONS: u64 = 1 << 16;
 /// Points that are evaluated at a time. Chosen: their columns fit the cache of a core.
 const BATCH_POINTS: u64 = 1 << 10;
 
-/// Combinations of the axes that a condition or a computed axis reads, at most. Chosen: evaluating them takes seconds, a bit for each 128 MiB.
+/// Greatest number of combinations that a condition or a computed axis reads. Chosen: their evaluation takes seconds, their bitmap 128 MiB.
 pub const MAX_COMBINATIONS: u64 = 1 << 30;
 
-/// Points from which on evaluation is worth several threads. Chosen: some milliseconds, a hundred times the start of a thread.
+/// Least number of points for evaluation on several threads. Chosen: some milliseconds, a hundred times the start of a thread.
 const MIN_PARALLEL_POINTS: u64 = 1 << 18;
 
 /// The rows of a product that a condition keeps.
@@ -36,7 +36,7 @@ pub struct RowFilter {
     kept: RoaringBitmap,
 }
 
-/// Neighbouring digits: some that are read, then some that are not.
+/// Adjacent digits: some that are read, then some that are not.
 #[derive(Debug, Clone, Copy)]
 struct Level {
     read: u64,
@@ -44,7 +44,7 @@ struct Level {
 }
 
 impl RowFilter {
-    /// The rows over `digits` of `block` for which its condition holds at any point; `None` if it reads too many combinations.
+    /// The filter of rows over `digits` of `block`: a row is kept if the condition holds at any of its points. `None` beyond [`MAX_COMBINATIONS`].
     pub fn new(block: &Block, digits: &Digits, condition: &Expression) -> Option<RowFilter> {
         let reads = block.factors_of(&block.roots(&condition.reads()));
         let (mut lead, mut levels, mut factors) = (1, Vec::<Level>::new(), Vec::new());
@@ -61,12 +61,12 @@ impl RowFilter {
             }
         }
         let combinations = levels.iter().map(|level| level.read).product();
-        // A row is kept if the condition holds with any step of the factors that rows do not tell.
+        // A row is kept if the condition holds for any step of the factors that are not in the rows.
         factors.extend(reads.iter().filter(|factor| !digits.digits.iter().any(|digit| digit.factor == **factor)));
         let all = Digits::new(block, &factors).filter(|all| all.rows <= MAX_COMBINATIONS)?;
         let sampler = Sampler::new(block, &all, &condition.reads()).with_labels(block, &all, Some(condition));
         let hidden = all.rows / combinations;
-        let bits = |told, scratch: &mut Scratch| evaluate(&sampler, condition, hidden, told, scratch);
+        let bits = |visible, scratch: &mut Scratch| evaluate(&sampler, condition, hidden, visible, scratch);
         let bytes = in_chunks(combinations, all.rows, bits).concat();
         Some(RowFilter { lead, levels, combinations, kept: RoaringBitmap::from_lsb0_bytes(0, &bytes) })
     }
@@ -76,19 +76,19 @@ impl RowFilter {
         self.kept.len() == self.combinations
     }
 
-    /// Number of rows that are kept.
+    /// The number of kept rows.
     pub fn rows(&self) -> u64 {
         self.lead * self.kept.len() * self.levels.iter().map(|level| level.free).product::<u64>()
     }
 
-    /// The kept rows of numbers `kept`, as ranges of rows of the product, in order.
+    /// The kept rows with numbers `kept`, as ascending ranges of product rows.
     pub fn ranges(&self, kept: Range<u64>) -> Vec<Range<u64>> {
         let mut ranges: Vec<Range<u64>> = Vec::new();
         let last = self.levels.last().copied().unwrap_or(Level { read: 1, free: 1 });
         let mut left = kept.end.saturating_sub(kept.start);
         while left > 0 {
-            let Place { row, combination, mut inside } = self.locate(kept.end - left);
-            // To the end of the steps of the fastest digits that are read, or of what is requested.
+            let Location { row, combination, mut inside } = self.locate(kept.end - left);
+            // To the end of the steps of the fastest digits that are read, or of `kept`.
             let group = combination / last.read * last.read;
             let mut following = self.kept.range(combination as u32..(group + last.read) as u32);
             while let Some(run) = following.next_range().filter(|_| left > 0) {
@@ -106,17 +106,17 @@ impl RowFilter {
         ranges
     }
 
-    /// Kept combinations below a number.
+    /// The number of kept combinations below a number.
     fn before(&self, combination: u64) -> u64 {
         combination.checked_sub(1).map_or(0, |last| self.kept.rank(last as u32))
     }
 
-    /// Where a kept row is.
-    fn locate(&self, number: u64) -> Place {
+    /// The location of a kept row.
+    fn locate(&self, number: u64) -> Location {
         let mut free: u64 = self.levels.iter().map(|level| level.free).product();
         let all = self.kept.len() * free;
         let (mut row, mut rest) = (number / all, number % all);
-        // The combinations that share the digits found so far: their first, and how many.
+        // The combinations with the digits found so far: the first one, and their number.
         let (mut first, mut count) = (0, self.combinations);
         for (place, level) in self.levels.iter().enumerate() {
             count /= level.read;
@@ -134,12 +134,12 @@ impl RowFilter {
             row = row * level.free + rest / each;
             rest %= each;
         }
-        Place { row, combination: first, inside: rest }
+        Location { row, combination: first, inside: rest }
     }
 }
 
-/// Where a kept row is.
-struct Place {
+/// The location of a kept row.
+struct Location {
     /// The row of the product, without the fastest digits that are not read.
     row: u64,
     /// The combination.
@@ -148,7 +148,7 @@ struct Place {
     inside: u64,
 }
 
-/// What `each` makes of the numbers below `count`, range by range; on all threads if there are many `points` to evaluate.
+/// The results of `each` for the ranges below `count`, on all threads for many `points`.
 fn in_chunks<T: Send>(count: u64, points: u64, each: impl Fn(Range<u64>, &mut Scratch) -> T + Sync) -> Vec<T> {
     let chunks = 0..count.div_ceil(CHUNK_COMBINATIONS);
     let each = |scratch: &mut Scratch, number: u64| {
@@ -163,23 +163,23 @@ fn in_chunks<T: Send>(count: u64, points: u64, each: impl Fn(Range<u64>, &mut Sc
     }
 }
 
-/// A bit for each of `told` combinations: whether `condition` holds for any of its `hidden` points.
+/// A bit for each of `visible` combinations: whether `condition` holds for any of its `hidden` points.
 fn evaluate(
     sampler: &Sampler<'_>,
     condition: &Expression,
     hidden: u64,
-    told: Range<u64>,
+    visible: Range<u64>,
     scratch: &mut Scratch,
 ) -> Vec<u8> {
-    let mut bits = vec![0; (told.end - told.start).div_ceil(8) as usize];
-    let end = told.end * hidden;
-    let mut start = told.start * hidden;
+    let mut bits = vec![0; (visible.end - visible.start).div_ceil(8) as usize];
+    let end = visible.end * hidden;
+    let mut start = visible.start * hidden;
     while start < end {
         let stop = (start + BATCH_POINTS).min(end);
         sampler.load(start..stop, scratch);
         for (place, &holds) in scratch.evaluate(condition).iter().enumerate() {
             if holds != 0.0 {
-                let bit = (start + place as u64) / hidden - told.start;
+                let bit = (start + place as u64) / hidden - visible.start;
                 bits[(bit / 8) as usize] |= 1 << (bit % 8);
             }
         }
@@ -188,7 +188,7 @@ fn evaluate(
     bits
 }
 
-/// The last number below `count` for which `holds`, which holds for 0 and then up to some number.
+/// The last number below `count` for which `holds` is true, by bisection.
 fn last_below(count: u64, holds: impl Fn(u64) -> bool) -> u64 {
     let (mut low, mut high) = (0, count);
     while high - low > 1 {
@@ -202,10 +202,10 @@ fn last_below(count: u64, holds: impl Fn(u64) -> bool) -> u64 {
     low
 }
 
-/// A wrong value, and the point as values of the axes that tell it.
+/// A wrong value, and its point as axis values.
 pub type Wrong = (f64, Vec<(Quantity, f64)>);
 
-/// The first point of `block` that is kept and where `wrong` holds of the value of `quantity`, if there is one. `None` if too many combinations would have to be looked at.
+/// The first kept point of `block` with a wrong value of `quantity`, if any. `None` beyond [`MAX_COMBINATIONS`].
 pub fn first_wrong(block: &Block, quantity: Quantity, wrong: impl Fn(f64) -> bool + Sync) -> Option<Option<Wrong>> {
     let mut reads = vec![quantity];
     reads.extend(block.condition.iter().flat_map(Expression::reads));
@@ -238,7 +238,7 @@ pub fn first_wrong(block: &Block, quantity: Quantity, wrong: impl Fn(f64) -> boo
 
 #[cfg(test)]
 mod tests {
-    //! Kept rows are those of nested loops, however many chunks of combinations there are.
+    //! Kept rows are those of nested loops, for any number of chunks.
 
     use std::sync::Arc;
 
@@ -247,7 +247,7 @@ mod tests {
     use super::super::quantity::Scale;
     use super::*;
 
-    /// The factors `t_f`, `a`, `b`, `v_i`, `v_f` with the values 1, 2, 3 … each, and as many as `lengths` says.
+    /// The factors `t_f`, `a`, `b`, `v_i`, `v_f` with the values 1, 2, 3 …, and lengths `lengths`.
     fn block(lengths: &[u64]) -> Arc<Block> {
         let factors = lengths.iter().zip(Quantity::ALL).map(|(&length, quantity)| {
             let values = Values::List((1..=length).map(|value| value as f64).collect());
@@ -256,7 +256,7 @@ mod tests {
         Arc::new(Block { factors: factors.collect(), ..Block::default() })
     }
 
-    /// The kept rows over `factors`, by looking at every point.
+    /// The kept rows over `factors`, from every point.
     fn kept(lengths: &[u64], factors: &[usize], holds: impl Fn(&[u64]) -> bool) -> Vec<u64> {
         let points: u64 = lengths.iter().product();
         let mut rows: Vec<u64> = (0..points)
@@ -277,8 +277,8 @@ mod tests {
 
     #[test]
     fn kept_rows_are_those_of_nested_loops() {
-        type Holds = fn(&[u64]) -> bool;
-        let conditions: [(&str, Holds); 7] = [
+        type PeriodicRuns = fn(&[u64]) -> bool;
+        let conditions: [(&str, PeriodicRuns); 7] = [
             ("v_f > v_i", |x| x[4] > x[3]),
             ("t_f < v_f", |x| x[0] < x[4]),
             ("t_f + b > v_f", |x| x[0] + x[2] > x[4]),

@@ -1,8 +1,8 @@
-//! A grid, and the rows of a table over it.
+//! The grid, and the index of the rows of a table over it.
 //!
-//! A table depends on some axes. Its rows over a block are the combinations of the steps of those factors that hold one of these axes, or
-//! an axis from which one is computed, in the order of the product, the last factor fastest. A combination is kept if the condition of
-//! the block holds at any point of the block that has it. Blocks follow one another. Nothing here grows with the number of rows.
+//! A table depends on some axes. Its rows over a block are the combinations of the factors on which these axes depend, in product order, the
+//! last factor fastest. A combination is kept if the condition of the block holds at any of its points. Blocks follow one another. Memory and
+//! time do not grow with the number of rows.
 
 use std::collections::HashSet;
 use std::ops::Range;
@@ -24,22 +24,22 @@ pub struct Grid {
     pub units: Units,
 }
 
-/// Why the rows of a table cannot be enumerated.
+/// The error of rows that cannot be enumerated.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum TooMany {
-    /// 64 bits cannot count them.
+    /// Their number exceeds 64 bits.
     Rows,
-    /// The condition of this block reads axes with too many combinations.
+    /// The condition of this block reads too many combinations.
     Combinations(usize),
 }
 
 impl Grid {
-    /// The unit in which the grid gives `quantity`; `None` if no block has it.
+    /// The unit of `quantity` in the grid; `None` if no block has it.
     pub fn scale(&self, quantity: Quantity) -> Option<Scale> {
         self.blocks.iter().find_map(|block| block.scale(quantity))
     }
 
-    /// `value` of `quantity`, given in the units of the grid, in those of the model. Coefficients relative to the duration stay so; -0 is 0.
+    /// Converts `value` of `quantity` from the units of the grid to those of the model. Coefficients relative to the duration stay so; -0 is 0.
     pub fn scaled_value(&self, quantity: Quantity, value: f64) -> f64 {
         self.units.scaled(quantity.unit(self.scale(quantity).unwrap_or(Scale::Model)), value) + 0.0
     }
@@ -53,7 +53,7 @@ impl Grid {
         scaled
     }
 
-    /// The rows of a table that depends on `quantities`.
+    /// The row index of a table over `quantities`.
     pub fn project(&self, quantities: &[Quantity]) -> Result<RowIndex, TooMany> {
         let mut stretches = Vec::new();
         let (mut rows, mut raw): (u64, u64) = (0, 0);
@@ -76,7 +76,7 @@ impl Grid {
     }
 }
 
-/// The rows of a table.
+/// The row index of a table.
 #[derive(Debug, Clone)]
 pub struct RowIndex {
     stretches: Vec<Stretch>,
@@ -102,7 +102,7 @@ impl Stretch {
         self.rows
     }
 
-    /// The digit and axis that hold `quantity`, if a factor does.
+    /// The digit and axis of `quantity`, if a factor contains it.
     pub fn axis(&self, quantity: Quantity) -> Option<(Digit, &Axis)> {
         self.digits.digits.iter().find_map(|digit| {
             let axes = &self.block.factors[digit.factor].axes;
@@ -110,13 +110,13 @@ impl Stretch {
         })
     }
 
-    /// Whether the rows tell the value of `quantity`: an axis, or computed from axes that all are there.
+    /// Whether a row determines `quantity`: an axis of the rows, or computed from such axes.
     pub fn tells(&self, quantity: Quantity) -> bool {
         let is_there = |root: &Quantity| self.axis(*root).is_some();
         self.block.scale(quantity).is_some() && self.block.roots(&[quantity]).iter().all(is_there)
     }
 
-    /// The digit that has the label `name`, and the label, if one has.
+    /// The digit with the label `name`, and the label, if any.
     pub fn label(&self, name: &str) -> Option<(Digit, &Label)> {
         self.digits.digits.iter().find_map(|digit| {
             let labels = &self.block.factors[digit.factor].labels;
@@ -131,7 +131,7 @@ impl RowIndex {
         self.rows
     }
 
-    /// Rows that conditions leave out.
+    /// The number of rows that conditions drop.
     pub fn dropped(&self) -> u64 {
         self.dropped
     }
@@ -146,7 +146,7 @@ impl RowIndex {
         self.view(row..row + 1).point(row)
     }
 
-    /// Some consecutive rows.
+    /// A view of consecutive rows.
     pub fn view(&self, rows: Range<u64>) -> View<'_> {
         let mut segments = Vec::new();
         for (number, stretch) in self.stretches.iter().enumerate() {
@@ -180,7 +180,7 @@ impl RowIndex {
                 if factor.holds_any(&roots) {
                     let (distinct, class_of) = factor.classes(&roots);
                     digits.push(TupleDigit { digit: *digit, class_of, weight: count });
-                    // Never more than the rows, which fit.
+                    // At most the number of rows, which fits.
                     count *= distinct;
                 }
             }
@@ -191,10 +191,10 @@ impl RowIndex {
         Tuples { parts, span }
     }
 
-    /// How many different tuples of `quantities` the rows have, where no row differs from another in anything else.
+    /// The number of different tuples of `quantities` among the rows, which depend on nothing else.
     ///
-    /// Values that blocks share, and those that expressions map together, count each time; so do values that a list repeats if a
-    /// condition leaves more than `most` rows.
+    /// Equal tuples of different blocks, and tuples that expressions make equal, count each time; so do repeated values of a list if a condition
+    /// keeps more than `most` rows.
     pub fn distinct(&self, quantities: &[Quantity], most: u64) -> u64 {
         let tuples = self.tuples(quantities);
         let repeats = tuples.repeat();
@@ -223,12 +223,12 @@ struct TupleStretch {
     digits: Vec<TupleDigit>,
     /// Tuples of the blocks before.
     first: u64,
-    /// For how many rows of the product a tuple lasts, counted from a multiple of this number.
+    /// The length of a run of equal tuples, in product rows, from a multiple of this number.
     run: u64,
 }
 
-/// A numbering of the different tuples of some quantities among the rows of a projection. The same tuple of a block has the same number in
-/// every projection of the same grid that holds all the quantities.
+/// A numbering of the different tuples of some quantities among the rows of a table. A tuple of a block has one number in every row index of the
+/// grid that contains all the quantities.
 #[derive(Debug, Clone)]
 pub struct Tuples {
     parts: Vec<TupleStretch>,
@@ -241,12 +241,12 @@ impl Tuples {
         self.span
     }
 
-    /// Whether rows that differ in nothing else can share a tuple, since a list names a value twice.
+    /// Whether several rows can have one tuple, because a list repeats a value.
     pub fn repeat(&self) -> bool {
         self.parts.iter().any(|part| part.digits.iter().any(|digit| digit.class_of.is_some()))
     }
 
-    /// The tuple of row `raw` of the product of block number `stretch`, and the first row after it that may have another one.
+    /// The tuple of product row `raw` of block `stretch`, and the first row after it that may have another tuple.
     pub(super) fn of(&self, stretch: usize, raw: u64) -> (u64, u64) {
         let part = &self.parts[stretch];
         let number = part.digits.iter().map(|TupleDigit { digit, class_of, weight }| {

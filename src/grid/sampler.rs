@@ -1,4 +1,4 @@
-//! Values of axes and expressions over many rows at a time.
+//! Vectorised evaluation of axes and expressions over many rows.
 
 use std::ops::Range;
 
@@ -7,10 +7,10 @@ use super::block::{Block, Derived, Digit, Digits, Label};
 use super::expression::{Columns, Expression, Stack};
 use super::quantity::Quantity;
 
-/// Values of a range at most that are computed once and looked up. Chosen: they fit the cache of a core.
+/// Greatest number of tabulated values of a range. Chosen: they fit the cache of a core.
 const MAX_TABLE_VALUES: u64 = 1 << 10;
 
-/// What some quantities of a block are over the rows of a product.
+/// An evaluator of some quantities of a block over product rows.
 pub struct Sampler<'a> {
     sources: Vec<Source<'a>>,
     derived: Vec<&'a Derived>,
@@ -22,7 +22,7 @@ struct Source<'a> {
 }
 
 enum Content<'a> {
-    /// The values of an axis, which are looked up where they are tabulated.
+    /// The values of an axis, tabulated or not.
     Axis(&'a Axis, Option<Vec<f64>>),
     /// A label, and its number among those of its factor.
     Label(usize, &'a Label),
@@ -46,7 +46,7 @@ impl Source<'_> {
     }
 }
 
-/// The memory of one thread.
+/// The scratch memory of one thread.
 #[derive(Default)]
 pub struct Scratch {
     columns: Columns,
@@ -55,7 +55,7 @@ pub struct Scratch {
 }
 
 impl<'a> Sampler<'a> {
-    /// Of `quantities`, axes or computed, and all that they are made of; rows are told by `digits`.
+    /// An evaluator of `quantities` and the axes in their expressions, for rows over `digits`.
     pub fn new(block: &'a Block, digits: &Digits, quantities: &[Quantity]) -> Sampler<'a> {
         let roots = block.roots(quantities);
         let mut sources = Vec::new();
@@ -79,7 +79,7 @@ impl<'a> Sampler<'a> {
         Sampler { sources, derived }
     }
 
-    /// Of the labels of `condition`, too, whose axes it has.
+    /// Adds the labels of `condition`.
     pub fn with_labels(mut self, block: &'a Block, digits: &Digits, condition: Option<&Expression>) -> Sampler<'a> {
         for (axis, number) in condition.iter().flat_map(|condition| condition.labels()) {
             let holds = |digit: &&Digit| block.factors[digit.factor].holds_any(&[axis]);
@@ -91,12 +91,12 @@ impl<'a> Sampler<'a> {
         self
     }
 
-    /// For how many rows all the quantities stay the same at least, counted from a multiple of this number; `None` if they never change.
+    /// The length of runs with constant quantities, in rows, from a multiple of this number; `None` if they never change.
     pub fn run(&self) -> Option<u64> {
         self.sources.iter().map(|source| source.digit.stride).min()
     }
 
-    /// Takes the values at consecutive rows.
+    /// Evaluates consecutive rows.
     pub fn load(&self, rows: Range<u64>, scratch: &mut Scratch) {
         scratch.length = (rows.end - rows.start) as usize;
         for source in &self.sources {
@@ -116,7 +116,7 @@ impl<'a> Sampler<'a> {
         self.derive(scratch);
     }
 
-    /// Takes the values at any rows.
+    /// Evaluates any rows.
     pub fn pick(&self, rows: &[u64], scratch: &mut Scratch) {
         scratch.length = rows.len();
         for source in &self.sources {
@@ -136,12 +136,12 @@ impl<'a> Sampler<'a> {
 }
 
 impl Scratch {
-    /// The values of a quantity at the rows that were taken last.
+    /// The values of a quantity at the last evaluated rows.
     pub fn column(&self, quantity: Quantity) -> &[f64] {
         self.columns.get(quantity)
     }
 
-    /// The values of an expression there.
+    /// The values of an expression at the last evaluated rows.
     pub fn evaluate(&mut self, expression: &Expression) -> &[f64] {
         expression.evaluate(&self.columns, self.length, &mut self.stack)
     }

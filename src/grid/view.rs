@@ -1,4 +1,4 @@
-//! Consecutive rows of a table: their values as runs of equal ones.
+//! A view of consecutive rows of a table: values as runs.
 
 use std::collections::HashMap;
 use std::ops::Range;
@@ -9,13 +9,13 @@ use super::quantity::{Point, Quantity};
 use super::row_index::{RowIndex, Tuples};
 use super::sampler::{Sampler, Scratch};
 
-/// Points at which an expression is evaluated at a time. Chosen: their columns fit the cache of a core.
+/// Points of an evaluation batch. Chosen: their columns fit the cache of a core.
 const BATCH_POINTS: usize = 1 << 10;
 
-/// Steps of an axis at most that have a code each in a table. Chosen: it takes half a MiB.
+/// Greatest number of axis steps in a code table. Chosen: it takes half a MiB.
 const MAX_TABLE_STEPS: u64 = 1 << 16;
 
-/// Rows of a table that are neighbours in the product of a block.
+/// Rows of a table that are contiguous in the product of a block.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Segment {
     /// The number of the block.
@@ -31,7 +31,7 @@ impl Segment {
         self.first + (self.raw.end - self.raw.start)
     }
 
-    /// The part that lies in `rows` of the table.
+    /// The intersection with `rows` of the table.
     fn cut(&self, rows: &Range<u64>) -> Segment {
         let (start, end) = (rows.start.max(self.first), rows.end.min(self.end()));
         let raw = self.raw.start + (start - self.first)..self.raw.start + (end - self.first);
@@ -85,7 +85,7 @@ impl<'a> View<'a> {
         point
     }
 
-    /// The values of `quantity` over `rows`, some of the rows, as runs of equal values; `None` if the table has no such axis.
+    /// The values of `quantity` over `rows` as runs; `None` without such an axis.
     pub fn runs(&self, quantity: Quantity, rows: Range<u64>) -> Option<Runs> {
         let stretches = self.row_index.stretches();
         if !stretches.iter().all(|stretch| stretch.tells(quantity)) {
@@ -125,8 +125,7 @@ impl<'a> View<'a> {
         Some(Runs { values: runs.values, order: Order::Listed { starts: runs.starts, codes: runs.codes } })
     }
 
-    /// The words of the label `name` over `rows`, some of the rows, each with the number of rows in a row that have it; `None` where rows
-    /// have none.
+    /// The words of the label `name` over `rows` as runs: word, or `None`, and number of rows.
     pub fn label(&self, name: &str, rows: Range<u64>) -> Vec<(Option<&'a str>, usize)> {
         let labels: Vec<_> = self.row_index.stretches().iter().map(|stretch| stretch.label(name)).collect();
         let runs = self.runs_of(rows, |stretch, raw| match labels[stretch] {
@@ -136,13 +135,12 @@ impl<'a> View<'a> {
         runs.into_iter().map(|(word, rows)| (word, (rows.end - rows.start) as usize)).collect()
     }
 
-    /// The tuples of `rows`, some of the rows, each with the rows in a row that have it.
+    /// The tuples of `rows` as runs: tuple and rows.
     pub fn tuples(&self, tuples: &Tuples, rows: Range<u64>) -> Vec<(u64, Range<u64>)> {
         self.runs_of(rows, |stretch, raw| tuples.of(stretch, raw))
     }
 
-    /// Runs of equal values over `rows`. Of a row of the product of a block `of` gives the value, and the first row after it that may have
-    /// another one.
+    /// Runs of equal values over `rows`. `of` gives the value at a product row, and the first row after it that may have another value.
     fn runs_of<T: PartialEq>(&self, rows: Range<u64>, of: impl Fn(usize, u64) -> (T, u64)) -> Vec<(T, Range<u64>)> {
         let mut runs: Vec<(T, Range<u64>)> = Vec::new();
         for segment in self.segments(rows) {
@@ -162,7 +160,7 @@ impl<'a> View<'a> {
     }
 }
 
-/// Runs one by one: the first row of each, and the place of its value among those that occur.
+/// A builder of runs: the first row of each, and the index of its value.
 #[derive(Default)]
 struct Listed {
     starts: Vec<u64>,
@@ -178,9 +176,9 @@ impl Listed {
         }
     }
 
-    /// Adds the steps of an axis of a factor over `segments`, each value once.
+    /// Adds the steps of a factor axis over `segments`.
     fn take_steps(&mut self, digit: Digit, axis: &Axis, segments: &[Segment]) {
-        // What each step is coded as: a table where it is small, since there may be as many runs as rows.
+        // The code of each step, in a table if it is small: there may be as many runs as rows.
         let mut table = vec![None; if digit.len <= MAX_TABLE_STEPS { digit.len as usize } else { 0 }];
         let mut map = HashMap::new();
         for segment in segments {
@@ -232,14 +230,14 @@ pub struct Runs {
 
 #[derive(Debug, Clone)]
 enum Order {
-    /// The steps of an axis of a product, over and over again.
+    /// The periodic steps of a factor axis.
     Cyclic { digit: Digit, segment: Segment },
     /// The first row of each run, and the index of its value.
     Listed { starts: Vec<u64>, codes: Vec<u32> },
 }
 
 impl Runs {
-    /// The values that occur, one a step, in the order of their first row.
+    /// The values, one for each step, in the order of their first row.
     pub fn values(&self) -> &[f64] {
         &self.values
     }
@@ -259,10 +257,10 @@ impl Runs {
         starts.partition_point(|start| *start <= row).saturating_sub(1)
     }
 
-    /// The runs of equal values over `rows`, part of the rows of `self`: an index into [`Runs::values`], and for how many rows.
+    /// The runs over `rows`, a part of the rows: index into [`Runs::values`], and number of rows.
     pub fn over(&self, rows: Range<u64>) -> impl Iterator<Item = (usize, usize)> + '_ {
         let mut row = rows.start;
-        // The step of the axis of a product and the first row of the next one, or the run at hand.
+        // The step of a factor axis and the first row of the next step, or the current run.
         let (mut place, mut next) = match &self.order {
             _ if rows.is_empty() => (0, 0),
             Order::Cyclic { digit, segment } => {

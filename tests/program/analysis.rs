@@ -175,7 +175,11 @@ fn wrong_questions_are_answered_with_what_there_is() {
         ("SELECT worck FROM best_cubic", "no column `worck`", "did you mean `work`?"),
         ("SELECT temperature FROM best_cubic", "no column `temperature`", "choose one of these"),
         ("SELECT gap FROM best_cubi", "no table `best_cubi`", "did you mean `best_cubic`?"),
-        ("SELEC gap FROM best_cubic", "not SQL: Expected: an SQL statement, found: SELEC at Line: 1, Column: 1", correct),
+        (
+            "SELEC gap FROM best_cubic",
+            "not SQL: Expected: an SQL statement, found: SELEC at Line: 1, Column: 1",
+            correct,
+        ),
         ("SELECT frobnicate(gap) FROM best_cubic", "unsupported function 'frobnicate'", correct),
         ("", "not one statement", "write one SELECT"),
         ("DROP TABLE best_cubic", "DROP is not a question: `query` reads and never writes", "write one SELECT"),
@@ -328,7 +332,10 @@ fn regress_answers_are_those_of_standard_sql() {
     for (question, found) in [
         ("SELECT sum(1) FROM best_cubic", "`sum(1)`: no column in it"),
         ("SELECT avg(2.5) FROM best_cubic GROUP BY t_f", "`avg(2.5)`: no column in it"),
-        ("WITH best_cubic AS (SELECT t_f FROM optimal) SELECT * FROM best_cubic", "WITH best_cubic: a table has this name"),
+        (
+            "WITH best_cubic AS (SELECT t_f FROM optimal) SELECT * FROM best_cubic",
+            "WITH best_cubic: a table has this name",
+        ),
         (
             "SELECT count(*) FROM best_cubic b LEFT JOIN optimal o ON b.t_f = o.t_f AND o.t_f < 0.03",
             "ON b.t_f = o.t_f AND o.t_f < 0.03: an outer join compares columns with columns by =",
@@ -356,7 +363,9 @@ fn regress_answers_are_those_of_standard_sql() {
 fn files_of_different_columns_are_no_table() {
     let folder = small();
     fs::create_dir(folder.path().join("mixed")).expect("is writable");
-    for (question, file) in [("SELECT t_f, gap AS x FROM best_cubic", "a"), ("SELECT t_f, status AS x FROM best_cubic", "b")] {
+    for (question, file) in
+        [("SELECT t_f, gap AS x FROM best_cubic", "a"), ("SELECT t_f, status AS x FROM best_cubic", "b")]
+    {
         printed(folder.path(), &["query", "results/test", question, "--out", &format!("mixed/{file}.parquet")]);
     }
     for question in ["SELECT count(*) FROM mixed WHERE x > 5", "SELECT count(x) FROM mixed", "SELECT x FROM mixed"] {
@@ -372,7 +381,8 @@ fn regress_a_dataset_without_a_manifest_is_read_and_kept() {
     let folder = small();
     fs::remove_file(folder.path().join("results/test/manifest.json")).expect("was there");
     let before = crate::common::files(&folder.path().join("results"));
-    let arguments = ["query", "results/test", "SELECT * FROM best_cubic", "--out", "results/test/best_cubic/part-000000.parquet"];
+    let arguments =
+        ["query", "results/test", "SELECT * FROM best_cubic", "--out", "results/test/best_cubic/part-000000.parquet"];
     let (code, message) = refused(folder.path(), &arguments);
     assert!(code == 1 && message.contains("which only `slipsweep run` writes"), "{message}");
     for arguments in [vec!["plot", "results/test"], vec!["report", "results/test"], vec!["summary", "results/test"]] {

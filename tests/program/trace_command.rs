@@ -276,11 +276,9 @@ fn paper_control_of_the_smooth_shortcut_turns_negative() {
 fn paper_step_on_a_spring_overshoots() {
     let spring = ["step_response", "--t-f", "1e-5", "--a", "0.005", "--b", "0.01", "--v-i", "1e5", "--v-f", "3.2e6"];
     let text = shown(&[&spring, &["--k", "7.5e-3", "--m", "2.5e-16"]]);
-    assert!(
-        text.starts_with(
-            "step_response: the control velocity jumps to v_f and stays there; the block on its spring up to t_f\n"
-        )
-    );
+    assert!(text.starts_with(
+        "step_response: the control velocity jumps to v_f and stays there; the block on its spring up to t_f\n"
+    ));
     let csv = csv(&[&spring, &["--k", "7.5e-3", "--m", "2.5e-16"]]);
     let rows: Vec<Vec<f64>> = csv
         .lines()

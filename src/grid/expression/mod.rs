@@ -1,4 +1,4 @@
-//! Expressions of axes: read once, checked, and evaluated over many points at a time with the same result on every machine.
+//! Expressions of axes: parsed and checked once, then evaluated over many points with equal results on every machine.
 
 mod parse;
 mod program;

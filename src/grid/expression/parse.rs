@@ -1,4 +1,4 @@
-//! From text to a checked expression: the grammar is that of an SQL condition, of which only arithmetic and comparisons are let in.
+//! The parser of expressions: SQL conditions, restricted to arithmetic and comparisons.
 
 use std::fmt::Display;
 
@@ -15,19 +15,19 @@ use super::super::quantity::Quantity;
 use super::program::{Binary, Expression, Op, Unary};
 use crate::names::nearest;
 
-/// Bytes of an expression at most. Chosen: a few lines of text; it bounds memory and depth.
+/// Greatest length of an expression, in bytes. Chosen: a few lines of text. It bounds memory and depth.
 const MAX_BYTES: usize = 1000;
 
-/// What is wrong with an expression.
+/// The fault of an expression.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Fault {
-    /// Where, in characters from 1; `None` if it concerns the whole.
+    /// Its position, in characters from 1; `None` for the whole expression.
     pub position: Option<u64>,
-    /// What was found.
+    /// The finding.
     pub found: String,
-    /// What would be right.
+    /// The expected input.
     pub expected: String,
-    /// What to do.
+    /// The help.
     pub help: String,
 }
 
@@ -41,7 +41,7 @@ impl Fault {
         Fault { position, found: found.into(), expected: expected.into(), help: help.into() }
     }
 
-    /// That of a name which is none of `known`.
+    /// The fault of a name that is not in `known`.
     fn unknown(position: Option<u64>, what: &str, name: &str, known: &[&str]) -> Fault {
         let meant = nearest(name, known.iter().copied()).map(|meant| format!("did you mean `{meant}`?"));
         let help = meant.unwrap_or_else(|| "remove it, or choose one of these".to_owned());
@@ -49,7 +49,7 @@ impl Fault {
     }
 }
 
-/// The functions of one number. `log` is that of SQL.
+/// Functions of one number. `log` follows SQL.
 const UNARY: [(&str, Unary); 9] = [
     ("abs", Unary::Abs),
     ("sqrt", Unary::Sqrt),
@@ -62,7 +62,7 @@ const UNARY: [(&str, Unary); 9] = [
     ("ceiling", Unary::Ceil),
 ];
 
-/// The functions of two numbers, in both of SQL's spellings; only powers take no more.
+/// Functions of two numbers, in both spellings of SQL. All but powers take more arguments.
 const BINARY: [(&str, Binary); 6] = [
     ("min", Binary::Min),
     ("least", Binary::Min),
@@ -72,12 +72,12 @@ const BINARY: [(&str, Binary); 6] = [
     ("power", Binary::Power),
 ];
 
-/// What is let in, in words.
+/// The grammar, for messages.
 const GRAMMAR: &str = "axes, numbers, + - * / ^, comparisons, and, or, not, in (...), between, abs, sqrt, exp, ln (natural logarithm), \
                        log or log10 (to base 10), floor, ceil, min, max, pow";
 
 impl Expression {
-    /// Reads a number computed from `axes`.
+    /// Parses a number computed from `axes`.
     pub fn number(text: &str, axes: &[Quantity]) -> Result<Expression, Fault> {
         let (expression, kind) = read(text, axes, None)?;
         if kind == Kind::Number {
@@ -87,7 +87,7 @@ impl Expression {
         Err(Fault::new(None, format!("`{text}` is true or false"), "a number", help))
     }
 
-    /// Reads a condition on `axes` and on the labels of `points`.
+    /// Parses a condition on `axes` and on the labels of `points`.
     pub fn condition(text: &str, axes: &[Quantity], points: Option<&Factor>) -> Result<Expression, Fault> {
         let (expression, kind) = read(text, axes, points)?;
         if kind == Kind::Truth {
@@ -97,7 +97,7 @@ impl Expression {
     }
 }
 
-/// What an expression gives.
+/// The type of an expression.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Kind {
     Number,
@@ -109,7 +109,7 @@ fn read(text: &str, axes: &[Quantity], points: Option<&Factor>) -> Result<(Expre
         let found = format!("{} characters", text.chars().count());
         return Err(Fault::new(None, found, format!("at most {MAX_BYTES}"), "shorten the expression"));
     }
-    // To SQL the first two begin comments: what follows them would be passed over.
+    // The first two begin SQL comments, which would hide the rest.
     let foreign = [("--", "put a space or parentheses between"), ("/*", "remove it"), ("**", "write `^` for a power")];
     for (sign, help) in foreign {
         if let Some(place) = text.find(sign) {
@@ -137,7 +137,7 @@ fn read(text: &str, axes: &[Quantity], points: Option<&Factor>) -> Result<(Expre
     Ok((Expression { program: compiler.program }, kind))
 }
 
-/// What the parser says, without its habits.
+/// The message of the parser, simplified.
 fn syntax(line: &str, error: ParserError) -> Fault {
     let message = match error {
         ParserError::RecursionLimitExceeded => {
@@ -173,7 +173,7 @@ fn literal(value: &Value, expression: &Expr) -> Result<(f64, Kind), Fault> {
     }
 }
 
-/// The name and the arguments of a function that is called without anything else.
+/// Name and arguments of a plain function call.
 fn plain(call: &Function) -> Option<(&str, Vec<&Expr>)> {
     let is_plain = call.filter.is_none() && call.over.is_none() && call.within_group.is_empty();
     let FunctionArguments::List(list) = &call.args else { return None };
@@ -240,7 +240,7 @@ impl Compiler<'_> {
                 let (name, arguments) = plain(call).ok_or_else(|| foreign(expression))?;
                 self.call(name, &arguments, expression)
             }
-            // The grammar has these two apart from other functions.
+            // The grammar treats these two as operators.
             Expr::Floor { expr, field: CeilFloorKind::DateTimeField(DateTimeField::NoDateTime) } => {
                 self.call("floor", &[expr], expression)
             }
@@ -251,9 +251,9 @@ impl Compiler<'_> {
         }
     }
 
-    /// What a name stands for where a number may stand.
+    /// The value of a name in a numeric position.
     fn name(&self, name: &Ident, expression: &Expr) -> Result<Op, Fault> {
-        // Infinity is no axis.
+        // Infinity is not an axis.
         if name.value == "inf" {
             return Ok(Op::Number(f64::INFINITY));
         }
@@ -282,7 +282,7 @@ impl Compiler<'_> {
         })
     }
 
-    /// The label of this name: an axis that varies with it, its number among the labels, and itself.
+    /// The label with this name: an axis of its factor, its number among the labels, and the label.
     fn label(&self, name: &str) -> Option<(Quantity, usize, &Label)> {
         let points = self.points?;
         let place = points.labels.iter().position(|label| label.name == name)?;
@@ -303,7 +303,7 @@ impl Compiler<'_> {
         Err(Fault::new(position(expression), format!("`{expression}` is {is}"), expected, help))
     }
 
-    /// The fault of a comparison of `axis` with a word, `other`, that does not stand in single quotes.
+    /// The fault of a comparison of `axis` with an unquoted word `other`.
     fn unquoted(&self, axis: &Expr, other: &Expr) -> Option<Fault> {
         let (Expr::Identifier(axis), Expr::Identifier(word)) = (axis, other) else { return None };
         let quantity = self.axes.iter().find(|quantity| quantity.name() == axis.value)?;
@@ -318,7 +318,7 @@ impl Compiler<'_> {
         Some(Fault::new(position(other), format!("`{other}` is no word"), known.join(", "), help))
     }
 
-    /// Whether two sides are the same: numbers, or an axis of words, or a label, and a word.
+    /// The equality of two numbers, or of an axis of words or a label with a word.
     fn equal(&mut self, left: &Expr, right: &Expr) -> Result<(), Fault> {
         for (axis, other) in [(left, right), (right, left)] {
             if let Some(fault) = self.unquoted(axis, other) {
@@ -399,9 +399,9 @@ impl Compiler<'_> {
         Ok(kind)
     }
 
-    /// Where the operator after `left` is.
+    /// The position of the operator after `left`.
     fn operator(&self, left: &Expr, op: &BinaryOperator) -> Option<u64> {
-        // Parentheses are no part of a span.
+        // A span excludes parentheses.
         let end = left.span().end.column.saturating_sub(1);
         let rest: String = self.line.chars().skip(end as usize).collect();
         let place = rest.find(&op.to_string())?;
@@ -449,10 +449,10 @@ fn position(expression: &Expr) -> Option<u64> {
     (column > 0).then_some(column)
 }
 
-/// What to do about something that the language does not have.
+/// The help for unsupported syntax.
 const REMOVE: &str = "remove it, or write it with what is listed";
 
-/// A fault of what SQL allows and this language does not.
+/// The fault of SQL syntax that is not supported here.
 fn foreign(expression: &Expr) -> Fault {
     let help = match expression {
         _ if word(expression).is_some() => "compare an axis of words with it, as in `family = 'step'`",

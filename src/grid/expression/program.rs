@@ -1,13 +1,13 @@
-//! An expression as a program for a stack of columns.
+//! Expressions as programs of a stack machine over columns.
 
 use super::super::quantity::Quantity;
 
-/// One step. Truth is 1, falsehood 0.
+/// An instruction. Truth is 1, falsehood 0.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum Op {
     /// Pushes the values of an axis.
     Axis(Quantity),
-    /// Pushes the places of the words of a label, by its number among those of the factor that holds `axis`; -1 where a step has none.
+    /// Pushes the word indices of a label of the factor with `axis`; -1 for a step without a word.
     Label {
         /// The number of the label.
         label: usize,
@@ -55,13 +55,13 @@ pub(super) enum Binary {
     Max,
 }
 
-/// An expression of axes. Its functions are this crate's or exact, so that it has the same value on every machine.
+/// An expression of axes. Its functions are those of this crate or exact, so its value is equal on every machine.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Expression {
     pub(super) program: Vec<Op>,
 }
 
-/// Values of quantities, and places of the words of labels, at several points.
+/// Columns of quantities, and of word indices of labels.
 #[derive(Debug, Clone, Default)]
 pub struct Columns {
     values: [Vec<f64>; Quantity::ALL.len()],
@@ -74,12 +74,12 @@ impl Columns {
         &self.values[quantity as usize]
     }
 
-    /// The values of `quantity`, to be filled.
+    /// The values of `quantity`, for writing.
     pub fn get_mut(&mut self, quantity: Quantity) -> &mut Vec<f64> {
         &mut self.values[quantity as usize]
     }
 
-    /// The places of a label, to be filled.
+    /// The word indices of a label, for writing.
     pub fn label_mut(&mut self, label: usize) -> &mut Vec<f64> {
         if self.labels.len() <= label {
             self.labels.resize_with(label + 1, Vec::new);
@@ -88,12 +88,12 @@ impl Columns {
     }
 }
 
-/// The memory of an evaluation, which the next one takes over.
+/// Reusable scratch memory of an evaluation.
 #[derive(Debug, Clone, Default)]
 pub struct Stack(Vec<Vec<f64>>);
 
 impl Expression {
-    /// The quantities that it names, or that vary with labels that it names, each once.
+    /// The distinct quantities that it names, or that vary with its labels.
     pub fn reads(&self) -> Vec<Quantity> {
         let mut reads = Vec::new();
         for op in &self.program {
@@ -106,7 +106,7 @@ impl Expression {
         reads
     }
 
-    /// The labels that it names: an axis of the factor that has each, and its number there.
+    /// The labels that it names: an axis of the factor, and the number of the label.
     pub fn labels(&self) -> impl Iterator<Item = (Quantity, usize)> {
         self.program.iter().filter_map(|op| match op {
             Op::Label { label, axis } => Some((*axis, *label)),
