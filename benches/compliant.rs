@@ -58,8 +58,8 @@ fn statuses() {
     let (mut smooth, mut pieces, mut most) = ([0; 5], [0; 5], 0);
     let seconds = support::median(1, || {
         for _ in 0..SAMPLE {
-            let (a, share) = (random(1e-4, 0.3), random(1.0, 11.0) - 1.0);
-            let law = Law { a, b: share * a };
+            let (a, fraction) = (random(1e-4, 0.3), random(1.0, 11.0) - 1.0);
+            let law = Law { a, b: fraction * a };
             let (k, m) = (random(1e-6, 1e4), random(1e-22, 1e-1));
             let slider =
                 SpringBlock { law, k: if k > 1e3 { f64::INFINITY } else { k }, m: if m > 1e-3 { 0.0 } else { m } };

@@ -75,9 +75,9 @@ fn main() {
             let (count, nodes) = (cases.len() as f64, f64::from(stats.nodes));
             let each = time / count;
             let floor = nodes / count * of_a_node;
-            let share = if floor > 0.0 { format!("{:.1}", each / floor) } else { "-".to_owned() };
+            let fraction = if floor > 0.0 { format!("{:.1}", each / floor) } else { "-".to_owned() };
             println!(
-                "{name:<44} {rtol:>6e} {count:>6} {:>9.2} {:>8.0} {:>7.0} {:>10.3} {share:>6}",
+                "{name:<44} {rtol:>6e} {count:>6} {:>9.2} {:>8.0} {:>7.0} {:>10.3} {fraction:>6}",
                 1e6 * each,
                 each / ln,
                 nodes / count,
@@ -175,7 +175,7 @@ fn shoot(case: &Case, c: f64, tolerance: f64) -> Option<(f64, f64)> {
     last[0].is_finite().then_some((last[0], last[1]))
 }
 
-fn random(count: usize, v: (f64, f64), ratio: (f64, f64), share: (f64, f64)) -> Vec<Case> {
+fn random(count: usize, v: (f64, f64), ratio: (f64, f64), fraction: (f64, f64)) -> Vec<Case> {
     let mut next = support::xorshift();
     let mut cases = Vec::with_capacity(count);
     while cases.len() < count {
@@ -185,7 +185,7 @@ fn random(count: usize, v: (f64, f64), ratio: (f64, f64), share: (f64, f64)) -> 
         let high = (low * log_uniform(ratio)).min(1e8);
         let (v_i, v_f) = if log_uniform((0.5, 2.0)) > 1.0 { (low, high) } else { (high, low) };
         let least = ((v_i - v_f) / (v_i * (v_f - 1.0))).ln_1p().max(0.0);
-        let t_f = least + log_uniform(share) / v_f;
+        let t_f = least + log_uniform(fraction) / v_f;
         cases.push(Case { transition: Transition { law, v_i, v_f }, t_f, tau_ceiling: f64::INFINITY });
     }
     cases

@@ -38,12 +38,12 @@ pub fn random_accelerations(count: usize) -> Vec<Case> {
         let law = Law { a: log_uniform(0.005, 0.1), b: log_uniform(0.005, 0.1) };
         let v_i = log_uniform(2.0, 50.0);
         let v_f = v_i * log_uniform(2.0, 100.0);
-        let share = 0.1 + 1.1 * next();
+        let fraction = 0.1 + 1.1 * next();
         let transition = Transition { law, v_i, v_f };
         if let (_, crossover::CrossoverTimes { t_cross: Some(t_cross), .. }, _) =
             crossover::solve(&transition, true, 1e-12, ONLY_CROSS)
         {
-            cases.push((transition, share * t_cross, true));
+            cases.push((transition, fraction * t_cross, true));
         }
     }
     cases

@@ -1,4 +1,4 @@
-//! What the benchmarks share: how times are taken, and the units of time.
+//! What the benchmarks have in common: how times are taken, and the units of time.
 
 #![allow(dead_code)]
 

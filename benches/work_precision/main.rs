@@ -130,12 +130,12 @@ fn words(name: &str) -> &str {
 
 /// Where ours does not do what was asked.
 fn faults<'a>(records: impl Iterator<Item = &'a Record>) -> Vec<String> {
-    let ours = records.filter(|record| record.ours && (record.failures > 0 || record.share > 1.0));
+    let ours = records.filter(|record| record.ours && (record.failures > 0 || record.fraction > 1.0));
     ours.map(|record| {
-        let Record { cases, count, failures, setting, share, .. } = record;
+        let Record { cases, count, failures, setting, fraction, .. } = record;
         let name = words(record.subject);
         format!(
-            "{name}, {cases}, at {setting}: {failures} of {count} cases failed, and the greatest error is {share:.2} \
+            "{name}, {cases}, at {setting}: {failures} of {count} cases failed, and the greatest error is {fraction:.2} \
              times what was asked"
         )
     })

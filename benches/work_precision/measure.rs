@@ -123,8 +123,8 @@ pub struct Record {
     pub ns: f64,
     /// Median, 95 % quantile and greatest of the errors of all that did not fail.
     pub errors: [f64; 3],
-    /// The greatest of the errors less what the case's own rounding makes, as a share of the tolerance.
-    pub share: f64,
+    /// The greatest of the errors less what the case's own rounding makes, as a fraction of the tolerance.
+    pub fraction: f64,
 }
 
 /// A case fails if it is further off than so many times what was asked for.
@@ -189,7 +189,7 @@ pub fn judged(
     seconds: f64,
 ) -> Record {
     let limit = tolerance.map_or(WRONG_FROM[1], |asked| (WRONG * asked).clamp(WRONG_FROM[0], WRONG_FROM[1]));
-    let (mut errors, mut failures, mut answered, mut share) = (Vec::new(), 0, 0, 0.0_f64);
+    let (mut errors, mut failures, mut answered, mut fraction) = (Vec::new(), 0, 0, 0.0_f64);
     for (i, found) in solved {
         let Truth { answer, doubt } = subject.truths[*i];
         if answer[0].is_nan() {
@@ -201,14 +201,14 @@ pub fn judged(
         // NaN is a failure, too.
         if error <= limit + WRONG * doubt {
             errors.push(error);
-            share = share.max((error - doubt) / tolerance.unwrap_or(1.0));
+            fraction = fraction.max((error - doubt) / tolerance.unwrap_or(1.0));
         } else {
             failures += 1;
         }
     }
     errors.sort_by(f64::total_cmp);
-    let quantile = |share: f64| {
-        let place = (share * errors.len() as f64).ceil() as usize;
+    let quantile = |fraction: f64| {
+        let place = (fraction * errors.len() as f64).ceil() as usize;
         errors.get(place.saturating_sub(1)).copied().unwrap_or(f64::INFINITY)
     };
     Record {
@@ -222,6 +222,6 @@ pub fn judged(
         failures,
         ns: 1e9 * seconds / f64::from(answered.max(1)),
         errors: [quantile(0.5), quantile(0.95), quantile(1.0)],
-        share,
+        fraction,
     }
 }

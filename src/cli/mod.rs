@@ -95,7 +95,7 @@ enum Command {
     Query(query::Arguments),
     /// Say what is there of a dataset, what is missing, and what would finish it
     Status(status::Arguments),
-    /// Write the job script of a sweep in shares, for a scheduler, and say what to submit
+    /// Write the job script of a sweep in fractions, for a scheduler, and say what to submit
     Shards(shards::Arguments),
     /// Draw a picture as SVG, PNG or PDF
     Plot(plot::Arguments),

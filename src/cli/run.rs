@@ -1,4 +1,4 @@
-//! `slipsweep run SPEC`: computes what is missing of a dataset, or of a share of it, and says what is in it.
+//! `slipsweep run SPEC`: computes what is missing of a dataset, or of a shard of it, and says what is in it.
 
 use std::io;
 use std::ops::Range;
@@ -30,7 +30,7 @@ pub struct Arguments {
     /// Threads to use, at most 1024; one a processor by default
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
     threads: Option<u16>,
-    /// Make only share I, from 0, of N: every part is in one of them, and they may run side by side
+    /// Compute only shard I of N, counted from 0; all shards may run at the same time
     #[arg(long, value_name = "I/N")]
     shard: Option<Shard>,
     /// Exit with code 75, not 2, after a failure that another try may mend: schedulers then put the job back into the queue
@@ -110,7 +110,7 @@ fn report(
             Some(shard) => {
                 let (ours, parts) = (words::count(all), words::things(table.parts, "part"));
                 let (index, count) = (shard.index(), shard.count());
-                text.push_str(&format!("{}: {ours} of {parts} in share {index} of {count}\n", table.name));
+                text.push_str(&format!("{}: {ours} of {parts} in shard {index} of {count}\n", table.name));
             }
         }
         if done.kept > 0 {
@@ -138,14 +138,14 @@ const MAX_CELL_BYTES: f64 = 16.0;
 /// Bytes of a part besides its rows and the spec at most: five times the longest of all tables, `compliant`, whose part of one row has 12,207.
 const MAX_FOOTER_BYTES: f64 = 65536.0;
 
-/// Whether the parts among `shares`, those of each table, that are missing have room on the disk.
-fn check_room(sweep: &Sweep, plan: &Plan, shares: &[Vec<Range<u64>>], folder: &Folder) -> Result<(), Failure> {
+/// Whether the parts among `shards`, those of each table, that are missing have room on the disk.
+fn check_room(sweep: &Sweep, plan: &Plan, shards: &[Vec<Range<u64>>], folder: &Folder) -> Result<(), Failure> {
     let Ok(free) = fs4::available_space(nearest_folder(folder.path())) else { return Ok(()) };
     let free = free as f64;
-    let missing: Vec<u64> = (plan.tables.iter().zip(shares))
-        .map(|(table, share)| {
-            let there = folder.parts_there(table).iter().filter(|part| contains_part(share, **part)).count() as u64;
-            share.iter().map(|range| range.end - range.start).sum::<u64>() - there
+    let missing: Vec<u64> = (plan.tables.iter().zip(shards))
+        .map(|(table, shard)| {
+            let there = folder.parts_there(table).iter().filter(|part| contains_part(shard, **part)).count() as u64;
+            shard.iter().map(|range| range.end - range.start).sum::<u64>() - there
         })
         .collect();
     let most = (sweep.requests.iter().zip(&plan.tables).zip(&missing)).map(|((request, table), &parts)| {

@@ -1,4 +1,4 @@
-//! `slipsweep shards SPEC`: a sweep in shares, as an array job of a scheduler.
+//! `slipsweep shards SPEC`: a sweep in shards, as an array job of a scheduler.
 
 use std::fmt::Write as _;
 use std::fs;
@@ -19,10 +19,10 @@ pub struct Arguments {
     /// The scheduler
     #[arg(long, value_enum)]
     engine: Engine,
-    /// Shares to make at most; fewer if a task would have too little to do
+    /// Greatest number of shards; fewer if a task would have too little work
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=Shard::MAX_COUNT))]
     shards: u64,
-    /// Folder in which the dataset's folder is made, on a file system that all machines share
+    /// Folder of the dataset folder, on a file system common to all machines
     #[arg(short, long, value_name = "DIR", default_value = "results")]
     out: PathBuf,
     /// Processors of a task
@@ -47,7 +47,7 @@ pub enum Engine {
     Hyperqueue,
 }
 
-/// What precedes the number of shares in a job script.
+/// What precedes the number of shards in a job script.
 const SHARDS: &str = "# shards: ";
 
 impl Engine {
@@ -67,7 +67,7 @@ impl Engine {
         dataset.with_file_name(name)
     }
 
-    /// The command that submits `script`, or only some shares of it.
+    /// The command that submits `script`, or only some shards of it.
     fn submit(self, script: &Path, shards: Option<&[u64]>) -> String {
         let script = quoted(script);
         let array = shards.map(|shards| words::ranges(shards.iter().copied()));
@@ -88,7 +88,7 @@ impl Engine {
     }
 }
 
-/// The scripts beside `dataset`: how many shares each has, and how to submit some of them.
+/// The scripts beside `dataset`: how many shards each has, and how to submit some of them.
 pub fn scripts(dataset: &Path) -> Vec<(u64, impl Fn(&[u64]) -> String)> {
     let scripts = Engine::ALL.into_iter().filter_map(|engine| {
         let path = engine.script(dataset);

@@ -56,7 +56,8 @@ fn summary(audit: &Audit) -> String {
         format!("{}: {} sampled, rtol {:e}\n", audit.table, words::things(audit.rows as u64, "row"), audit.rtol);
     let mut lines = Vec::new();
     for (column, all) in &audit.columns {
-        let at = |share: f64| all.get(((all.len() - 1) as f64 * share).ceil() as usize).copied().unwrap_or(f64::NAN);
+        let at =
+            |fraction: f64| all.get(((all.len() - 1) as f64 * fraction).ceil() as usize).copied().unwrap_or(f64::NAN);
         let cells = [at(0.5), at(0.99), at(1.0)].map(units);
         lines.push([(*column).to_owned(), words::count(all.len() as u64)].into_iter().chain(cells).collect());
     }

@@ -71,12 +71,12 @@ impl Radau {
             if distance == 0.0 {
                 return value;
             }
-            let share = weight / distance;
-            above += share * value;
-            below += share;
+            let fraction = weight / distance;
+            above += fraction * value;
+            below += fraction;
         }
-        let share = self.barycentric[NODES] / u;
-        (above + share * start) / (below + share)
+        let fraction = self.barycentric[NODES] / u;
+        (above + fraction * start) / (below + fraction)
     }
 
     /// The polynomial through `f` at the nodes alone, at `u`.
@@ -88,9 +88,9 @@ impl Radau {
                 return value;
             }
             // The weights are those of the nodes and 0.
-            let share = weight * node / distance;
-            above += share * value;
-            below += share;
+            let fraction = weight * node / distance;
+            above += fraction * value;
+            below += fraction;
         }
         above / below
     }

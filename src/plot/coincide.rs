@@ -6,13 +6,13 @@ const MAX_DISTANCE: f64 = 0.01;
 /// Points of a curve whose distance from another is computed. Chosen: closer ones are not told apart in print.
 const MAX_POINTS: usize = 400;
 
-/// Whether two curves with values at the same places coincide, in shares of the panel.
+/// Whether two curves with values at the same places coincide, in fractions of the panel.
 pub fn at_places(first: &[(f64, f64)], second: &[(f64, f64)]) -> bool {
     let near = |(a, b): (&(f64, f64), &(f64, f64))| a.1.is_nan() && b.1.is_nan() || (a.1 - b.1).abs() <= MAX_DISTANCE;
     first.len() == second.len() && first.iter().zip(second).all(near)
 }
 
-/// Whether two curves coincide whatever their points are, in shares of the panel: each point of one is near the other.
+/// Whether two curves coincide whatever their points are, in fractions of the panel: each point of one is near the other.
 pub fn anywhere(first: &[(f64, f64)], second: &[(f64, f64)]) -> bool {
     is_near(first, second) && is_near(second, first)
 }
@@ -27,8 +27,9 @@ fn is_near(points: &[(f64, f64)], line: &[(f64, f64)]) -> bool {
 fn distance((x, y): (f64, f64), from: (f64, f64), to: (f64, f64)) -> f64 {
     let (along, up) = (to.0 - from.0, to.1 - from.1);
     let length = along * along + up * up;
-    let share = if length > 0.0 { (((x - from.0) * along + (y - from.1) * up) / length).clamp(0.0, 1.0) } else { 0.0 };
-    (x - from.0 - share * along).hypot(y - from.1 - share * up)
+    let fraction =
+        if length > 0.0 { (((x - from.0) * along + (y - from.1) * up) / length).clamp(0.0, 1.0) } else { 0.0 };
+    (x - from.0 - fraction * along).hypot(y - from.1 - fraction * up)
 }
 
 /// For each of `count` curves the first that it coincides with, itself if there is none before.

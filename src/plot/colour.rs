@@ -40,10 +40,10 @@ const VIRIDIS: [[u8; 3]; 33] = [
     [253, 231, 37],
 ];
 
-/// The colour of a share from 0 (dark) to 1 (light).
-pub fn viridis(share: f64) -> [u8; 3] {
+/// The colour of a fraction from 0 (dark) to 1 (light).
+pub fn viridis(fraction: f64) -> [u8; 3] {
     let last = VIRIDIS.len() - 1;
-    let place = (if share.is_nan() { 0.0 } else { share.clamp(0.0, 1.0) }) * last as f64;
+    let place = (if fraction.is_nan() { 0.0 } else { fraction.clamp(0.0, 1.0) }) * last as f64;
     let left = (place as usize).min(last - 1);
     let rest = place - left as f64;
     std::array::from_fn(|i| {

@@ -35,9 +35,9 @@ pub fn contour(field: Field<'_>, level: f64) -> Vec<Vec<(f64, f64)>> {
     let place = |(corner, upwards): Edge| {
         let other = if upwards { corner + columns } else { corner + 1 };
         let (from, to) = (values[corner] - level, values[other] - level);
-        let share = from / (from - to);
+        let fraction = from / (from - to);
         let (x, y) = ((corner % columns) as f64, (corner / columns) as f64);
-        if upwards { (x, y + share) } else { (x + share, y) }
+        if upwards { (x, y + fraction) } else { (x + fraction, y) }
     };
     joined(pieces).into_iter().map(|line| line.into_iter().map(place).collect()).collect()
 }

@@ -114,7 +114,7 @@ pub struct Axis {
     pub scale: Scale,
 }
 
-/// What is drawn between axes; places are values of the axes unless they are said to be shares.
+/// What is drawn between axes; places are values of the axes unless they are said to be fractions.
 #[derive(Debug, Clone)]
 pub enum Layer {
     /// The background where a map has no data: hatched.
@@ -339,8 +339,8 @@ impl Figure {
         for (place, plan) in plans.iter().enumerate() {
             let (row, column) = (place / columns, place % columns);
             // The first and the last label of the horizontal axis may hang over.
-            let before = plan.x.beyond(guess, |share| share);
-            let after = plan.x.beyond(guess, |share| 1.0 - share);
+            let before = plan.x.beyond(guess, |fraction| fraction);
+            let after = plan.x.beyond(guess, |fraction| 1.0 - fraction);
             let left = if plan.y_label { TICK_LENGTH + 2.0 + widest(&plan.y) + 3.0 + SIZE + 3.0 } else { 5.0 };
             lefts[column] = lefts[column].max(left.max(before + 3.0));
             rights[column] = rights[column].max(after + 2.0);
@@ -424,7 +424,7 @@ impl Ticks {
     /// How far labels hang over an end of an axis about `length` long, from which they are a fraction `away` of it.
     fn beyond(&self, length: f64, away: impl Fn(f64) -> f64) -> f64 {
         let half = |label: &Option<String>| 0.5 * TICK_SIZE * label.as_deref().map_or(0.0, label::width);
-        let over = self.ticks.iter().map(|tick| half(&tick.label) - away(tick.share).max(0.0) * length);
+        let over = self.ticks.iter().map(|tick| half(&tick.label) - away(tick.fraction).max(0.0) * length);
         over.fold(0.0, f64::max)
     }
 
@@ -433,7 +433,7 @@ impl Ticks {
         let bottom = area.y + area.height;
         let mut edge = f64::NEG_INFINITY;
         for tick in &self.ticks {
-            let x = area.x + area.width * tick.share;
+            let x = area.x + area.width * tick.fraction;
             canvas.line((x, bottom), (x, bottom + tick.length()), &Stroke::solid("#000", FRAME_WIDTH));
             let Some(words) = tick.label.as_deref().filter(|_| is_labelled) else { continue };
             let half = 0.5 * TICK_SIZE * label::width(words);
@@ -450,7 +450,7 @@ impl Ticks {
         let x = if is_right { area.x + area.width } else { area.x };
         let mut edge = f64::INFINITY;
         for tick in &self.ticks {
-            let y = area.y + area.height * (1.0 - tick.share);
+            let y = area.y + area.height * (1.0 - tick.fraction);
             let (from, to) = if is_right { (x, x + tick.length()) } else { (x - tick.length(), x) };
             canvas.line((from, y), (to, y), &Stroke::solid("#000", FRAME_WIDTH));
             let Some(words) = tick.label.as_deref().filter(|_| is_labelled) else { continue };
@@ -527,7 +527,7 @@ impl Panel {
 
     /// Where a point is on the sheet.
     fn place(&self, area: Area, (x, y): (f64, f64)) -> (f64, f64) {
-        (area.x + area.width * self.x.scale.share(x), area.y + area.height * (1.0 - self.y.scale.share(y)))
+        (area.x + area.width * self.x.scale.fraction(x), area.y + area.height * (1.0 - self.y.scale.fraction(y)))
     }
 
     /// Draws what is cut at the frame: areas and lines.
@@ -571,8 +571,9 @@ impl Panel {
     /// Draws the marks of points inside, whole.
     fn mark(&self, canvas: &mut Canvas, area: Area, layer: &Layer) {
         let inside = |&(x, y): &(f64, f64)| {
-            let is_share = |share: f64| (-1e-9..=1.0 + 1e-9).contains(&share);
-            (is_share(self.x.scale.share(x)) && is_share(self.y.scale.share(y))).then(|| self.place(area, (x, y)))
+            let is_inside = |fraction: f64| (-1e-9..=1.0 + 1e-9).contains(&fraction);
+            (is_inside(self.x.scale.fraction(x)) && is_inside(self.y.scale.fraction(y)))
+                .then(|| self.place(area, (x, y)))
         };
         match layer {
             Layer::Marks(marks) => {
@@ -596,8 +597,8 @@ impl Panel {
     fn words(&self) -> impl Iterator<Item = (f64, &str, &Stroke)> {
         self.layers.iter().filter_map(|layer| {
             let Layer::Vertical(x, words, stroke) = layer else { return None };
-            let share = self.x.scale.share(*x);
-            (!words.is_empty() && (0.0..=1.0).contains(&share)).then_some((share, words.as_str(), stroke))
+            let fraction = self.x.scale.fraction(*x);
+            (!words.is_empty() && (0.0..=1.0).contains(&fraction)).then_some((fraction, words.as_str(), stroke))
         })
     }
 
@@ -607,7 +608,7 @@ impl Panel {
 
     /// Draws the words at vertical lines: above the panel, as near to their lines as they do not run over each other.
     fn draw_words_above(&self, canvas: &mut Canvas, area: Area) {
-        let marks = self.words().map(|(share, words, stroke)| (area.x + area.width * share, words, stroke));
+        let marks = self.words().map(|(fraction, words, stroke)| (area.x + area.width * fraction, words, stroke));
         let mut marks: Vec<(f64, &str, &Stroke)> = marks.collect();
         marks.sort_by(|left, right| left.0.total_cmp(&right.0));
         let wishes: Vec<(f64, f64)> =

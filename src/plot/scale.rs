@@ -29,7 +29,7 @@ pub struct Scale {
 #[derive(Debug, Clone, PartialEq)]
 pub struct Tick {
     /// Where it is, 0 at the start of the scale and 1 at the end.
-    pub share: f64,
+    pub fraction: f64,
     /// Its text in markup; none for a small mark.
     pub label: Option<String>,
 }
@@ -66,16 +66,16 @@ impl Scale {
     }
 
     /// With a little room at both ends; a single value gets some around it.
-    pub fn with_room(self, share: f64) -> Scale {
+    pub fn with_room(self, fraction: f64) -> Scale {
         if self.log {
-            let room = (self.high / self.low).ln().max(1e-3) * share;
+            let room = (self.high / self.low).ln().max(1e-3) * fraction;
             return Scale { low: self.low * (-room).exp(), high: self.high * room.exp(), log: true };
         }
         let span = self.high - self.low;
         // Below this the range is rounding.
         let least = 1e-9 * self.low.abs().max(self.high.abs());
         let room = if span > least {
-            span * share
+            span * fraction
         } else if least > 0.0 {
             0.05 * self.high.abs().max(self.low.abs())
         } else {
@@ -85,7 +85,7 @@ impl Scale {
     }
 
     /// Where `value` is, 0 at the start and 1 at the end; NaN where the scale does not reach.
-    pub fn share(&self, value: f64) -> f64 {
+    pub fn fraction(&self, value: f64) -> f64 {
         if self.log {
             if value > 0.0 { (value / self.low).ln() / (self.high / self.low).ln() } else { f64::NAN }
         } else {
@@ -93,12 +93,12 @@ impl Scale {
         }
     }
 
-    /// The value at a share.
-    pub fn value(&self, share: f64) -> f64 {
+    /// The value at a fraction.
+    pub fn value(&self, fraction: f64) -> f64 {
         if self.log {
-            self.low * ((self.high / self.low).ln() * share).exp()
+            self.low * ((self.high / self.low).ln() * fraction).exp()
         } else {
-            self.low + (self.high - self.low) * share
+            self.low + (self.high - self.low) * fraction
         }
     }
 
@@ -131,7 +131,7 @@ impl Scale {
             let value = place as f64 * step;
             let text = format!("{:.decimals$}", (value / unit).abs());
             let minus = if place < 0 { "−" } else { "" };
-            Tick { share: self.share(value), label: Some(format!("{minus}{text}")) }
+            Tick { fraction: self.fraction(value), label: Some(format!("{minus}{text}")) }
         });
         Ticks { ticks: ticks.collect(), power }
     }
@@ -169,7 +169,7 @@ impl Scale {
                         format!("{digit}×10^{{{}}}", label::signed(power))
                     }
                 };
-                ticks.push(Tick { share: self.share(value), label: is_labelled.then(text) });
+                ticks.push(Tick { fraction: self.fraction(value), label: is_labelled.then(text) });
             }
         }
         Ticks { ticks, power: 0 }
@@ -215,7 +215,7 @@ pub fn is_logarithmic(values: &[f64]) -> bool {
     }
     // Of uneven values, such as samples, half are to be left of the middle.
     let scale = |log| Scale { low, high, log };
-    let off = |log: bool| (scale(log).share(values[values.len() / 2]) - 0.5).abs();
+    let off = |log: bool| (scale(log).fraction(values[values.len() / 2]) - 0.5).abs();
     high / low >= LOG_RATIO && (values.len() < 4 || off(true) <= off(false))
 }
 

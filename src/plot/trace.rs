@@ -224,9 +224,9 @@ fn one_unit(traces: &[TraceFile]) -> Result<(), PlotError> {
 fn leaders(count: usize, panels: &[(Panel, Vec<Curve>)]) -> Vec<usize> {
     // The curves of a course in fractions of the panel, each with its column.
     let curves = |(panel, curves): &(Panel, Vec<Curve>), trace: usize| -> Vec<(usize, Vec<(f64, f64)>)> {
-        let share = |(x, y): &(f64, f64)| (panel.x.scale.share(*x), panel.y.scale.share(*y));
+        let fraction = |(x, y): &(f64, f64)| (panel.x.scale.fraction(*x), panel.y.scale.fraction(*y));
         let own = curves.iter().filter(|curve| curve.trace == trace);
-        own.map(|curve| (curve.rank, curve.points.iter().map(share).collect())).collect()
+        own.map(|curve| (curve.rank, curve.points.iter().map(fraction).collect())).collect()
     };
     coincide::leaders(count, |one, other| {
         panels.iter().all(|panel| {

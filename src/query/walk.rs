@@ -1,4 +1,4 @@
-//! The walk through the parts of a question, which all visitors share: each visitor of sqlparser's would be code of its own for all of SQL.
+//! The walk through the parts of a question, common to all visitors: each visitor of sqlparser's would be code of its own for all of SQL.
 
 use std::ops::ControlFlow;
 

@@ -33,7 +33,7 @@ const MAX_COST_RATIO: f64 = 1000.0;
 /// The estimated cost of a table.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Estimate {
-    /// Seconds of one thread, without the optimal protocols that tables share.
+    /// Seconds of one thread, without the optimal protocols shared by tables.
     pub seconds: f64,
     /// Bytes on disk.
     pub bytes: f64,
@@ -44,7 +44,7 @@ pub struct Estimate {
 pub struct Estimates {
     /// Each of its tables, in the order of the spec.
     pub tables: Vec<Estimate>,
-    /// Seconds of one thread for the optimal protocols that tables share.
+    /// Seconds of one thread for the optimal protocols shared by tables.
     pub shared: f64,
     /// Seconds to write an empty file and its name.
     sync: f64,
@@ -240,7 +240,7 @@ impl Sampler<'_> {
         Ok([sum.seconds, sum.bytes as f64, sum.rows as f64].map(|all| all / taken.len() as f64))
     }
 
-    /// Seconds of one thread for an optimal protocol that tables share; 0 if there is none.
+    /// Seconds of one thread for an optimal protocol shared by tables; 0 if there is none.
     fn optimum(&self, budget: f64) -> f64 {
         let Some(rows) = self.sweep.optimum_rows.as_ref().filter(|_| self.plan.optima <= OptimumCache::MAX_CACHED)
         else {

@@ -11,7 +11,7 @@ pub struct Plan {
     pub tables: Vec<ManifestTable>,
     /// Rows of each table that `where` drops.
     pub dropped: Vec<u64>,
-    /// Different optimal protocols that the tables share.
+    /// Different optimal protocols shared by the tables.
     pub optima: u64,
 }
 

@@ -229,14 +229,14 @@ mod tests {
     }
 
     #[test]
-    fn words_for_wrong_shares() {
+    fn messages_of_wrong_shards() {
         assert_eq!("3/16".parse(), Ok(Shard { index: 3, count: 16 }));
         for (text, message) in [
-            ("16/16", "there is no share 16 of 16: they are numbered from 0 to 15"),
-            ("0/0", "0 shares; a sweep has between 1 and 1000000 of them"),
+            ("16/16", "no shard 16 of 16: shards are numbered from 0 to 15"),
+            ("0/0", "0 shards; expected from 1 to 1000000"),
             ("1", "expected I/N, such as 0/16 for the first of 16 shards, found `1`"),
             ("-1/4", "expected I/N, such as 0/16 for the first of 16 shards, found `-1/4`"),
-            ("0/9999999", "9999999 shares; a sweep has between 1 and 1000000 of them"),
+            ("0/9999999", "9999999 shards; expected from 1 to 1000000"),
         ] {
             assert_eq!(text.parse::<Shard>(), Err(message.to_owned()));
         }

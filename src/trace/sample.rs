@@ -250,8 +250,8 @@ fn is_straight(from: &Sample, to: &Sample, between: &[Sample], tolerance: &Toler
     let values = |sample: &Sample| columns(&sample.moment).map(|value| value.unwrap_or(0.0));
     let (start, end) = (values(from), values(to));
     between.iter().all(|sample| {
-        let share = (sample.moment.t - from.moment.t) / time;
+        let fraction = (sample.moment.t - from.moment.t) / time;
         let here = values(sample);
-        (0..COLUMNS).all(|i| (start[i] + share * (end[i] - start[i]) - here[i]).abs() <= tolerance.at(i, here[i]))
+        (0..COLUMNS).all(|i| (start[i] + fraction * (end[i] - start[i]) - here[i]).abs() <= tolerance.at(i, here[i]))
     })
 }

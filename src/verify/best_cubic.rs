@@ -7,8 +7,8 @@ use super::{Context, Verdict, number, transition, word};
 use crate::dataset::Row;
 use crate::table::STATUS;
 
-/// Shares of the coefficients by which the search moves.
-const SHARES: [f64; 4] = [1e-1, 1e-2, 1e-3, 1e-4];
+/// Fractions of the coefficients by which the search moves.
+const FRACTIONS: [f64; 4] = [1e-1, 1e-2, 1e-3, 1e-4];
 
 pub fn check(row: &Row, context: &Context, rtol: f64) -> Verdict {
     let (Some(problem), Some(t_f)) = (transition(row), number(row, "t_f")) else {
@@ -44,11 +44,11 @@ pub fn check(row: &Row, context: &Context, rtol: f64) -> Verdict {
     let least = if context.bounded { 1.0 } else { 0.0 };
     let size = a_2.abs() + a_3.abs();
     let mut saved = 0.0_f64;
-    for share in SHARES {
+    for fraction in FRACTIONS {
         for turn in 0..8 {
             let angle = f64::from(turn) * std::f64::consts::FRAC_PI_4;
             let (sin, cos) = angle.sin_cos();
-            let near = Cubic::new(&problem, t_f, a_2 + share * size * cos, a_3 + share * size * sin);
+            let near = Cubic::new(&problem, t_f, a_2 + fraction * size * cos, a_3 + fraction * size * sin);
             if near.slack() > 0.0 && near.v_min() >= least {
                 saved = saved.max(near.work().map_or(0.0, |near| (work - near) / work));
             }

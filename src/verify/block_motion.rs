@@ -108,7 +108,7 @@ impl Block {
         // As exact as x itself: its derivative along the way of p and y.
         let way = [-self.pull * x.exp_m1(), (-here.y).exp() - x.exp()];
         let step = 1e-3 / (way[0].abs() + way[1].abs());
-        let at = |share: f64| self.followed(here.p + share * step * way[0], here.y + share * step * way[1]).0;
+        let at = |fraction: f64| self.followed(here.p + fraction * step * way[0], here.y + fraction * step * way[1]).0;
         (8.0 * (at(1.0) - at(-1.0)) - (at(2.0) - at(-2.0))) / (12.0 * step)
     }
 

@@ -92,6 +92,6 @@ pub fn arriving(alpha: f64, end: f64, target: f64, formula_path: impl Fn(f64) ->
         return alpha;
     }
     let moved = formula_path(alpha * (1.0 + NUDGE)).states().and_then(|states| Some(states.last()?[0] - end));
-    let share = moved.map_or(f64::INFINITY, |moved| NUDGE * (end - target) / moved);
-    alpha * (1.0 - share)
+    let fraction = moved.map_or(f64::INFINITY, |moved| NUDGE * (end - target) / moved);
+    alpha * (1.0 - fraction)
 }

@@ -105,9 +105,9 @@ fn lowest(f: &dyn Fn(f64) -> f64) -> f64 {
 
 /// The least value in an interval that holds one minimum.
 pub fn golden(f: &dyn Fn(f64) -> f64, mut low: f64, mut high: f64) -> f64 {
-    let share = 0.5 * (5.0_f64.sqrt() - 1.0);
+    let fraction = 0.5 * (5.0_f64.sqrt() - 1.0);
     for _ in 0..80 {
-        let (left, right) = (high - share * (high - low), low + share * (high - low));
+        let (left, right) = (high - fraction * (high - low), low + fraction * (high - low));
         if f(left) < f(right) { high = right } else { low = left }
     }
     f(0.5 * (low + high))

@@ -42,10 +42,10 @@ fn solve(mut matrix: [[Complex; 3]; 3], mut right: Vector) -> Vector {
         right.swap(k, best);
         let pivot = inverse(matrix[k][k]);
         for i in k + 1..3 {
-            let share = scale(mul(matrix[i][k], pivot), -1.0);
+            let fraction = scale(mul(matrix[i][k], pivot), -1.0);
             let row = matrix[k];
-            matrix[i].iter_mut().zip(row).for_each(|(x, y)| *x = add(*x, mul(share, y)));
-            right[i] = add(right[i], mul(share, right[k]));
+            matrix[i].iter_mut().zip(row).for_each(|(x, y)| *x = add(*x, mul(fraction, y)));
+            right[i] = add(right[i], mul(fraction, right[k]));
         }
     }
     for k in (0..3).rev() {

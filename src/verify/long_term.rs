@@ -24,7 +24,7 @@ pub struct Cycle {
     pub high: f64,
     pub low: f64,
     /// What is left of a small distance from it after a cycle.
-    pub share: f64,
+    pub fraction: f64,
     /// `ln p` and `y` on the section.
     section: [f64; 2],
 }
@@ -60,11 +60,11 @@ const MOST_LEGS: u32 = 5_000;
 /// Velocities beyond `e^this v_f` without mass count as infinite.
 const ENDLESS: f64 = 60.0;
 
-/// Within this distance from steady sliding that is stable nothing happens any more, nor within a share of what is to be told.
+/// Within this distance from steady sliding that is stable nothing happens any more, nor within a fraction of what is to be told.
 const QUIET: f64 = 1e-5;
 const UNTOLD: f64 = 0.1;
 
-/// Swings within this share of the band stay in it.
+/// Swings within this fraction of the band stay in it.
 const INSIDE: f64 = 0.3;
 
 /// A section this close to that of the limit cycle, in `ln p` and `y`, has come to it; as many cycles may be left, and
@@ -133,7 +133,7 @@ pub fn follow(block: &Block, stable: bool, x: f64, rtol: f64) -> Simulation {
                         // What comes before may go further than the limit cycle.
                         if let Some((cycle, since)) = found {
                             let far = (here.p.ln() - cycle.section[0]).hypot(here.y - cycle.section[1]);
-                            if far < ARRIVED || cycle.share > SLOW || sections.len() > since + MOST_LEFT {
+                            if far < ARRIVED || cycle.fraction > SLOW || sections.len() > since + MOST_LEFT {
                                 watch.simulation.long_term = Ok(LongTermBehaviour::Cycle(cycle));
                                 return watch.simulation;
                             }
@@ -224,16 +224,16 @@ fn limit(block: &Block, sections: &[Here]) -> Option<Cycle> {
         if !size.is_finite() {
             return None;
         }
-        let share = (LONGEST / size).min(1.0);
-        (ln_p, y) = (ln_p + share * step[0], y + share * step[1]);
+        let fraction = (LONGEST / size).min(1.0);
+        (ln_p, y) = (ln_p + fraction * step[0], y + fraction * step[1]);
         if size < 1e-9 {
             // The greater multiplier.
             let (half, product) = (0.5 * (pp + yy), pp * yy - py * yp);
             let square = half * half - product;
-            let share = if square > 0.0 { half.abs() + square.sqrt() } else { product.sqrt() };
+            let fraction = if square > 0.0 { half.abs() + square.sqrt() } else { product.sqrt() };
             let way = ln_p - last.p.ln();
             let towards = way.abs() < 1e-6 || way * motion > 0.0;
-            return (share < 1.0 && towards).then_some(Cycle { period, high, low, share, section: [ln_p, y] });
+            return (fraction < 1.0 && towards).then_some(Cycle { period, high, low, fraction, section: [ln_p, y] });
         }
     }
     None

@@ -18,7 +18,7 @@ pub struct Growth {
     pub most: f64,
 }
 
-/// Time over which a block forgets its velocity, as a share of the protocol, below which an explicit integrator is no use.
+/// Time over which a block forgets its velocity, as a fraction of the protocol, below which an explicit integrator is no use.
 const STIFF: f64 = 1e-4;
 
 /// Whether an explicit integrator cannot follow the block at its greatest velocity.
@@ -26,7 +26,7 @@ pub fn is_stiff(slider: &SpringBlock, least: f64, t_f: f64) -> bool {
     slider.m > 0.0 && slider.m * least / slider.law.a < STIFF * t_f
 }
 
-/// The growth of errors over a protocol of which `states` are known, `velocity(x)` at a share `x` of the time.
+/// The growth of errors over a protocol of which `states` are known, `velocity(x)` at a fraction `x` of the time.
 pub fn growth(
     slider: &SpringBlock,
     formula_path: &FormulaPath,
@@ -106,18 +106,18 @@ fn norm(matrix: &Matrix) -> f64 {
     let trace = |square: &Matrix| (0..3).map(|i| square[i][i]).sum::<f64>();
     // The trace of the 2^n-th power, as its 2^n-th root.
     let mut logarithm = 0.0;
-    let mut share = 1.0;
+    let mut fraction = 1.0;
     for _ in 0..60 {
         let factor = trace(&square);
-        logarithm += share * factor.ln();
-        share *= 0.5;
+        logarithm += fraction * factor.ln();
+        fraction *= 0.5;
         let unit = square.map(|row| row.map(|x| x / factor));
         square = std::array::from_fn(|i| std::array::from_fn(|j| (0..3).map(|r| unit[i][r] * unit[r][j]).sum()));
     }
     size * (0.5 * logarithm).exp()
 }
 
-/// A protocol to be told to the spring, over the share `x` of the time.
+/// A protocol to be told to the spring, over the fraction `x` of the time.
 pub struct Told<V, C> {
     pub slider: SpringBlock,
     pub v_i: f64,
@@ -125,7 +125,7 @@ pub struct Told<V, C> {
     pub t_f: f64,
     /// Its velocity.
     pub velocity: V,
-    /// The control from the share of the time and `ln theta` of the protocol.
+    /// The control from the fraction of the time and `ln theta` of the protocol.
     pub control: C,
 }
 

@@ -62,8 +62,8 @@ fn friction_min(problem: &Transition, extremal: &Extremal) -> f64 {
     let legs = [(extremal.v_start * start < 1.0, start, false), (extremal.v_end > v_f, 1.0 / v_f, true)];
     for (_, theta, falling) in legs.into_iter().filter(|(is_there, ..)| *is_there) {
         for place in 0..=PLACES {
-            let share = f64::from(place) / f64::from(PLACES);
-            let theta = theta * (extremal.theta_max / theta).powf(share);
+            let fraction = f64::from(place) / f64::from(PLACES);
+            let theta = theta * (extremal.theta_max / theta).powf(fraction);
             if let Some(z) = branch(energy(law, extremal.c, theta), falling) {
                 least = least.min(friction(z, theta));
             }

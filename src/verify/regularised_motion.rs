@@ -119,7 +119,7 @@ fn further(law: Law, from: &Moment, time: f64) -> Option<Moment> {
     Some(Moment::moving(law, q, y, from.work + work))
 }
 
-/// `ln(v - floor)` over the share `x` of the time: a quintic without a rise, the rise over the stretched place, and a bump.
+/// `ln(v - floor)` over the fraction `x` of the time: a quintic without a rise, the rise over the stretched place, and a bump.
 #[derive(Debug, Clone, Copy)]
 struct Exponent {
     floor: f64,
@@ -182,7 +182,7 @@ impl Piece {
         if v[1][0] * time > FOLLOWING * (1.0 + stretches[1]) {
             stretches[1] = 0.0;
         }
-        // Slope and curvature of ln(v - floor) over the share of the time.
+        // Slope and curvature of ln(v - floor) over the fraction of the time.
         let [[p, q], [s, t]] = v.map(|[v, v1, v2]| {
             let slope = v1 / (v - floor);
             [time * slope, time * time * (v2 / (v - floor) - slope * slope)]

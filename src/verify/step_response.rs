@@ -103,7 +103,7 @@ pub fn check(row: &Row, _: &Context, rtol: f64) -> Verdict {
             verdict.compare_word(row, "outcome", "limit_cycle");
             verdict.compare_word(row, "stick_slip", "yes");
             // A cycle that hardly attracts hardly tells where it is.
-            let vague = (1e-10 / (1.0 - cycle.share) / rtol).max(1.0);
+            let vague = (1e-10 / (1.0 - cycle.fraction) / rtol).max(1.0);
             let (top, bottom) = (high.max(cycle.high), low.min(cycle.low));
             compare_status(&mut verdict, bottom);
             verdict.compare(row, "v_peak", Some(velocity(top)), Some(vague * velocity(top)));

@@ -1,4 +1,4 @@
-//! What the tests of whole runs share: specs in a folder of their own, runs, and tables read back.
+//! What the tests of whole runs have in common: specs in a folder of their own, runs, and tables read back.
 
 use std::collections::BTreeMap;
 use std::fs;

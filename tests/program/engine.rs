@@ -45,7 +45,7 @@ fn finished_parts_are_kept_and_the_rest_is_the_same_as_without_a_break() {
 }
 
 #[test]
-fn work_is_shared_and_counted_exactly() {
+fn work_is_insided_and_counted_exactly() {
     let folder = tempfile::tempdir().expect("is writable");
     let spent = |name: &str, tables: &str| {
         let out = folder.path().join(name);

@@ -276,7 +276,7 @@ fn traces_are_drawn_over_each_other() {
 }
 
 #[test]
-fn many_rows_share_cells_and_the_picture_says_so() {
+fn several_rows_of_a_cell_are_noted_in_the_picture() {
     let folder = tempfile::tempdir().expect("a folder");
     let folder = folder.path();
     let spec = "name = \"many\"\n[axes]\nt_f = { geomspace = [0.001, 2.0, 9000] }\na = 0.03\nb = 0.05\nv_i = 3.0\nv_f = 100.0\n\
@@ -285,7 +285,10 @@ fn many_rows_share_cells_and_the_picture_says_so() {
     shown(folder, &["run", "many.toml"]);
     shown(folder, &["plot", "results/many"]);
     let words = words(&read(folder, "many-optimal.svg"));
-    assert!(words.contains("Rows share 3000 places of tf: the least and the greatest of each are drawn."), "{words}");
+    assert!(
+        words.contains("3000 places of tf have several rows: the least and the greatest of each are drawn."),
+        "{words}"
+    );
     for mark in ["tcheapest", "tcross", "tfloor"] {
         assert!(words.contains(mark), "{mark} in {words}");
     }
@@ -341,7 +344,7 @@ fn axes_that_change_together_make_lines_and_sampled_ones_dots() {
         "optimal",
     );
     assert!(
-        !svg.contains("<image") && sampled.contains("\nspeed up\n") && !sampled.contains("Rows share"),
+        !svg.contains("<image") && sampled.contains("\nspeed up\n") && !sampled.contains("several rows"),
         "{sampled}"
     );
     let dots = svg.matches("stroke=\"#222\" stroke-width=\"0.3\"").count();

@@ -96,7 +96,7 @@ proptest! {
 
     /// What a row is does not depend on which rows it is seen with.
     #[test]
-    fn a_row_is_the_same_in_every_share(axes in axes(), cuts in vec(any::<prop::sample::Index>(), 1..6)) {
+    fn a_row_is_the_same_in_every_shard(axes in axes(), cuts in vec(any::<prop::sample::Index>(), 1..6)) {
         let rows = rows(&spec("where = \"v_f > v_i or alpha_2 > 0 or k < 1.5\"\n", &[axes, vec![("k", vec![1.0, 2.0])]].concat()));
         let mut cuts: Vec<u64> = cuts.iter().map(|cut| cut.index(rows.rows() as usize) as u64).collect();
         cuts.extend([0, rows.rows()]);

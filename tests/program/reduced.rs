@@ -77,10 +77,10 @@ fn reductions_are_those_of_the_whole_table() {
             let expected: Vec<Option<f64>> = match reduce {
                 "min" => sorted.first().map_or(vec![None; 6], |(_, row)| group.rows[*row].to_vec()),
                 "quantiles" => [0.0, 0.05, 0.25, 0.5, 0.75, 0.95, 1.0]
-                    .map(|share: f64| {
-                        // The first value that at least this share of all does not exceed.
+                    .map(|fraction: f64| {
+                        // The first value that at least this fraction of all does not exceed.
                         let all = sorted.len() as f64;
-                        let place = (0..sorted.len()).find(|place| (place + 1) as f64 >= share * all - 1e-9);
+                        let place = (0..sorted.len()).find(|place| (place + 1) as f64 >= fraction * all - 1e-9);
                         place.map(|place| sorted[place].0)
                     })
                     .to_vec(),

@@ -1,4 +1,4 @@
-//! Sweeps in shares: the bytes of one process, whoever made what; status, and what it advises.
+//! Sweeps in shards: the bytes of one process, whoever made what; status, and what it advises.
 
 use std::fs;
 use std::path::Path;
@@ -25,7 +25,7 @@ fn text(bytes: &[u8]) -> String {
 }
 
 #[test]
-fn any_number_of_shares_gives_the_bytes_of_one_process() {
+fn any_number_of_shards_gives_the_bytes_of_one_process() {
     let folder = tempfile::tempdir().expect("is writable");
     let sweep = sweep(folder.path(), AXES, TABLES);
     let whole = folder.path().join("whole");
@@ -51,7 +51,7 @@ fn any_number_of_shares_gives_the_bytes_of_one_process() {
 }
 
 #[test]
-fn a_share_makes_its_parts_and_solves_what_they_need() {
+fn a_shard_makes_its_parts_and_solves_what_they_need() {
     let folder = tempfile::tempdir().expect("is writable");
     let sweep = sweep(folder.path(), AXES, TABLES);
     let plan = Plan::new(&sweep);
@@ -77,7 +77,7 @@ fn a_share_makes_its_parts_and_solves_what_they_need() {
 }
 
 #[test]
-fn every_part_is_in_one_share_of_any_number() {
+fn every_part_is_in_one_shard_of_any_number() {
     let folder = tempfile::tempdir().expect("is writable");
     let sweep = sweep(folder.path(), AXES, TABLES);
     let plan = Plan::new(&sweep);
@@ -113,9 +113,9 @@ fn status_says_what_is_there_and_what_would_finish_it() {
     let (code, said, error) = say(&["run", "spec.toml", "--shard", "1/4"]);
     // A busy machine may have lines of progress.
     assert!(code == Some(0) && error.lines().all(|line| line.ends_with(" left")), "{said} {error}");
-    assert!(said.contains(" in share 1 of 4\n"), "{said}");
+    assert!(said.contains(" in shard 1 of 4\n"), "{said}");
 
-    // The script that would make the shares stands beside the dataset.
+    // The script that would make the shards stands beside the dataset.
     let (code, said, _) = say(&["shards", "spec.toml", "--engine", "slurm", "--shards", "4", "--minutes", "0"]);
     assert_eq!(code, Some(0));
     let script = folder.path().join("results/test.slurm.sh");

@@ -308,9 +308,9 @@ fn regress_slow_velocities_are_good_to_a_hundredth_of_themselves() {
     for here in &spaced[2..2001] {
         let next = fewest.partition_point(|row| row[0] < here[0]);
         let (from, to) = (&fewest[next - 1], &fewest[next]);
-        let share = (here[0] - from[0]) / (to[0] - from[0]);
+        let fraction = (here[0] - from[0]) / (to[0] - from[0]);
         for column in [1, 2] {
-            let line = from[column] + share * (to[column] - from[column]);
+            let line = from[column] + fraction * (to[column] - from[column]);
             assert!((line / here[column] - 1.0).abs() <= 0.01, "{here:?} {line}");
         }
         slowest = slowest.min(here[1]);

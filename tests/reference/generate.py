@@ -376,7 +376,7 @@ def crossover_rows():
 
 
 def short_floor_cases():
-    """Accelerations just after t_floor, where the hold is a small share of t_f."""
+    """Accelerations just after t_floor, where the hold is a small fraction of t_f."""
     precision(DIGITS)
     cases = []
     for a, b, v_i, v_f in (
@@ -651,15 +651,15 @@ def best_rows():
                     w, g, h = moments(a_2, a_3)
                     d = h[0] * h[2] - h[1] ** 2
                     step = (-(h[2] * g[0] - h[1] * g[1]) / d, -(h[0] * g[1] - h[1] * g[0]) / d)
-                    share = mpf(1)
+                    fraction = mpf(1)
                     while True:
-                        trial = moments(a_2 + share * step[0], a_3 + share * step[1]) if landscape_status(0, 0, v_i, v_f, t_f, a_2 + share * step[0], a_3 + share * step[1]) else None
+                        trial = moments(a_2 + fraction * step[0], a_3 + fraction * step[1]) if landscape_status(0, 0, v_i, v_f, t_f, a_2 + fraction * step[0], a_3 + fraction * step[1]) else None
                         if trial and trial[0] <= w * (1 + mpf(10) ** (3 - mp.dps)):
                             break
-                        share /= 2
-                        if share < mpf(10) ** -6:
+                        fraction /= 2
+                        if fraction < mpf(10) ** -6:
                             raise Unphysical
-                    a_2, a_3 = a_2 + share * step[0], a_3 + share * step[1]
+                    a_2, a_3 = a_2 + fraction * step[0], a_3 + fraction * step[1]
             mp.dps = DIGITS
             work, v_min, status = landscape_point(*case[:5], a_2, a_3)
             if status == "infeasible" or (case[5] and status != "ok"):
@@ -727,8 +727,8 @@ def edge_rows():
         for name, t in zip(("t_cross", "t_floor", "t_cheapest", None, "t_turn", "t_free", "t_free"), times):
             if name is None or t is None:
                 continue
-            for share in (1e-7, 1e-13):
-                cases.append(("next_to_" + name, a, b, v_i, v_f, float(t * (1 + mpf(share))), 1))
+            for fraction in (1e-7, 1e-13):
+                cases.append(("next_to_" + name, a, b, v_i, v_f, float(t * (1 + mpf(fraction))), 1))
     yield from solved(cases)
 
 
@@ -763,9 +763,9 @@ def stability_rows():
         b = a * log_uniform(rng, 1.01, 10)
         v = log_uniform(rng, 1, 1e8)
         m = a * log_uniform(rng, 1e-4, 1e4) / v**2
-        share = rng.choice([1, -1]) * log_uniform(rng, 1e-13, 1e-2)
+        fraction = rng.choice([1, -1]) * log_uniform(rng, 1e-13, 1e-2)
         critical = (mpf(b) - mpf(a)) * (1 + mpf(m) * mpf(v) ** 2 / mpf(a))
-        cases.append((a, b, float(critical * (1 + mpf(share))), m, v))
+        cases.append((a, b, float(critical * (1 + mpf(fraction))), m, v))
     for case in cases:
         yield stability_row(*case)
 
@@ -806,8 +806,8 @@ def hopf_rows():
         v = log_uniform(rng, 1.5, 1e8)
         cases.append((a, b, 0.5 * v + 0.6, v, a, a * log_uniform(rng, 1e-6, 1e4) / v**2))
     # Next to where the kind changes: where a mu = 1/(3 + 2 sqrt(3 + b/a)).
-    for share in (1e-2, -1e-2, 1e-6, -1e-6, 1e-12, -1e-12):
-        mu = (1 + mpf(share)) / (3 + 2 * sqrt(3 + mpf(0.01) / mpf(0.005)))
+    for fraction in (1e-2, -1e-2, 1e-6, -1e-6, 1e-12, -1e-12):
+        mu = (1 + mpf(fraction)) / (3 + 2 * sqrt(3 + mpf(0.01) / mpf(0.005)))
         cases.append((0.005, 0.01, 1e3, 1024.0, 7.5e-3, float(mpf(0.005) * mu / 2**20)))
     cases += [(0.005, 0.01, 10.0, 100.0, 0.1, 0.0), (0.01, 0.01, 10.0, 100.0, 0.1, 1e-6), (0.02, 0.01, 10.0, 100.0, 0.1, 1e-6)]
     for a, b, v_i, v_f, k, m in cases:

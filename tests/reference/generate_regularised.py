@@ -313,7 +313,7 @@ class Piece:
 
 
 def cases():
-    paper = lambda t_f, share, k=0.5, m=1e-6, bounded=1: (0.03, 0.05, 3.0, 100.0, t_f, k, m, share * t_f, bounded)
+    paper = lambda t_f, fraction, k=0.5, m=1e-6, bounded=1: (0.03, 0.05, 3.0, 100.0, t_f, k, m, fraction * t_f, bounded)
     yield paper(0.02, 0.1)
     yield paper(0.02, 0.01)
     yield paper(0.02, 0.4)

@@ -242,8 +242,8 @@ def cases():
     # Velocities and times.
     for law in (paper, (0.05, 0.03)):
         for v_i, v_f in ((1.001, 1e8), (1e8, 1.001), (1e8, 1e7), (1e7, 1e8), (1.001, 1.01), (1.01, 1.001), (3.0, 3.000003), (3.000003, 3.0)):
-            for share in (1e-6, 1.0, 1e3):
-                yield *law, v_i, v_f, max(1 / v_f - 1 / v_i, 0.0) + share / v_f, 3.0
+            for fraction in (1e-6, 1.0, 1e3):
+                yield *law, v_i, v_f, max(1 / v_f - 1 / v_i, 0.0) + fraction / v_f, 3.0
     chance = random.Random(5)
     for _ in range(40):
         a = 10 ** chance.uniform(-4, -1)

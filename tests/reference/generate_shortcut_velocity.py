@@ -233,8 +233,8 @@ def cases(family, rng, random_rows):
     yield from [(0.03, 0.05, 100.0, 3.0, 0.5)]
     ends = [(1.001, 1e8), (1e8, 1.001), (1e8, 1e7), (1e7, 1e8), (1.001, 1.01), (1.01, 1.001), (3.0, 3.000003), (3.000003, 3.0)]
     for v_i, v_f in ends:
-        for share in (1e-6, 1.0, 1e3):
-            yield (0.03, 0.05, v_i, v_f, share / v_f)
+        for fraction in (1e-6, 1.0, 1e3):
+            yield (0.03, 0.05, v_i, v_f, fraction / v_f)
     if family == "bounded_velocity":
         for v_i, v_f in ((100.0, 3.0), (1e8, 1e7), (1.01, 1.001), (3.000003, 3.0)):
             t_min = float(log1p((mpf(v_i) - mpf(v_f)) / (mpf(v_i) * (mpf(v_f) - 1))))

@@ -169,10 +169,10 @@ fn regress_ends_that_are_almost_the_same() {
 fn regress_the_optimum_that_is_a_cubic() {
     // For b = a and C = 0 the optimal theta is a straight line: the gap is 0, of which nothing is 1e-7.
     let transition = Transition { law: Law { a: 0.03, b: 0.03 }, v_i: 3.0, v_f: 100.0 };
-    for share in [0.0, 1e-6, 1e-5, 1e-4, 1e-3, 1e-2] {
-        let best = solve(&transition, 0.008745798437999044 * (1.0 + share), true, 1e-10);
-        assert_eq!(best.status, Status::Ok, "{share}");
-        assert!(best.value.is_some_and(|best| best.gap.abs() < 1e-17), "{share}");
+    for fraction in [0.0, 1e-6, 1e-5, 1e-4, 1e-3, 1e-2] {
+        let best = solve(&transition, 0.008745798437999044 * (1.0 + fraction), true, 1e-10);
+        assert_eq!(best.status, Status::Ok, "{fraction}");
+        assert!(best.value.is_some_and(|best| best.gap.abs() < 1e-17), "{fraction}");
     }
 }
 

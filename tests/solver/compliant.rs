@@ -42,7 +42,7 @@ fn reference_every_number_is_good_to_rtol() {
             };
             let (v_i, v_f, t_f) = (row.number("v_i"), row.number("v_f"), row.number("t_f"));
             let found = solve((slider, (v_i, v_f), t_f), rtol);
-            // t_min is known to a few eps of itself, so alpha near it is known to that share of t_f - t_min.
+            // t_min is known to a few eps of itself, so alpha near it is known to that fraction of t_f - t_min.
             let t_min = ((v_i - v_f) / (v_i * (v_f - 1.0))).ln_1p();
             let near = 3.0 * f64::EPSILON * t_min.abs() / (t_f - t_min);
             let allowed = rtol + 8.0 * f64::EPSILON;
@@ -330,9 +330,9 @@ fn regress_every_corner_of_the_range_is_solved() {
     for v_i in velocities {
         for v_f in velocities {
             let t_min = ((v_i - v_f) / (v_i * (v_f - 1.0))).ln_1p().max(0.0);
-            for share in [1e-9, 1e-6, 1e-3, 0.1, 1.0, 10.0, 1e3, 1e6] {
+            for fraction in [1e-9, 1e-6, 1e-3, 0.1, 1.0, 10.0, 1e3, 1e6] {
                 for (k, m) in [(1e-3, 0.0), (1.0, 1e-6), (f64::INFINITY, 1.0)] {
-                    for t_f in [share / v_f, t_min * (1.0 + share)] {
+                    for t_f in [fraction / v_f, t_min * (1.0 + fraction)] {
                         let slider = SpringBlock { law: Law { a: 1e-3, b: 2e-3 }, k, m };
                         for rtol in [1e-6, 1e-10, 1e-13] {
                             let found = compliant::solve(&slider, (v_i, v_f), t_f, rtol);

@@ -7,9 +7,9 @@ use slipsweep::stability::{Hopf, SteadySliding};
 const A: f64 = 0.005;
 const MASS: f64 = 2.5e-16;
 
-/// The paper's material but for `b`, at the velocity at which `m v^2/a` is this share of where the kind changes.
-fn sliding(ratio: f64, share: f64) -> (Law, f64) {
-    let mu = share / (3.0 + 2.0 * (3.0 + ratio).sqrt());
+/// The paper's material but for `b`, at the velocity at which `m v^2/a` is this fraction of where the kind changes.
+fn sliding(ratio: f64, fraction: f64) -> (Law, f64) {
+    let mu = fraction / (3.0 + 2.0 * (3.0 + ratio).sqrt());
     (Law { a: A, b: ratio * A }, (mu * A / MASS).sqrt())
 }
 

@@ -246,7 +246,7 @@ fn regress_arcs_next_to_zeros_of_e() {
 /// At `t_floor` there is none, and just beyond it grows with the time.
 #[test]
 fn regress_holds_that_have_just_begun() {
-    for (transition, share) in [
+    for (transition, fraction) in [
         (of(2.232932321957067e-6, 1.1660390051284325e-6, 1.0000000006334784, 707.1529406189476), 1e-14),
         (of(2.002346075951692e-6, 2.002346075951692e-6, 24325.93069823074, 24325.94756124686), 1e-14),
         // The time changes with the square of the hold.
@@ -254,7 +254,7 @@ fn regress_holds_that_have_just_begun() {
     ] {
         let t_floor = times(&transition).t_floor.expect("exists");
         let held = optimum(&transition, t_floor, true).time_at_floor;
-        assert!(held <= share * t_floor, "{transition:?}: {held:e} of {t_floor:e}");
+        assert!(held <= fraction * t_floor, "{transition:?}: {held:e} of {t_floor:e}");
     }
     for (transition, t_f) in [
         (of(0.0026565143379934414, 0.0026565143379934414, 75080.70918439691, 75080.70918439675), 5.039072645614445e-7),
@@ -508,7 +508,7 @@ impl Numbers {
 }
 
 #[test]
-fn every_random_case_has_an_answer_that_two_accuracies_share() {
+fn every_random_case_has_an_answer_common_to_two_accuracies() {
     let mut numbers = Numbers(88172645463325252);
     let mut counts = [0; 5];
     for _ in 0..20_000 {
@@ -562,7 +562,7 @@ fn reference_collocation_with_an_optimiser_finds_the_same_minimum() {
     }
 }
 
-/// Next to the least time without the bound `theta' = 1` up to a share of 1e-12, so that `theta` is known, and with the
+/// Next to the least time without the bound `theta' = 1` up to a fraction of 1e-12, so that `theta` is known, and with the
 /// multiplier `mu` of `int theta v dt`, the time beyond the least one, `1 + a + a ln v + b ln theta = mu theta`.
 #[test]
 fn regress_optima_that_all_but_stand_still() {

@@ -201,17 +201,17 @@ fn paper_comparison_friction_is_about_constant_between_the_jumps() {
 
 /// As `t_f -> 0` nothing ages: `theta' = -theta v`, so `int v dt = L = ln(v_f/v_i)` for every protocol that arrives,
 /// and the optimum has `v = L/t_f`, `W = L [1 + a ln(L/t_f) - (b/2) ln(v_i v_f)]`. Friction grows like
-/// `a ln(1/t_f)`, so the velocity is off by a share of `t_f ln(1/t_f)`, the work by one of `t_f`.
+/// `a ln(1/t_f)`, so the velocity is off by a fraction of `t_f ln(1/t_f)`, the work by one of `t_f`.
 #[test]
 fn paper_limit_of_short_times_for_the_optimum() {
     let way = (UP.v_f / UP.v_i).ln();
     for t_f in [1e-5, 1e-7, 1e-9] {
         let rows = optimum_inside(UP, t_f);
-        let share = t_f * (1.0 / t_f).ln();
-        assert!(rows.iter().all(|row| relative(row.v * t_f, way) < 75.0 * share), "{t_f}");
+        let fraction = t_f * (1.0 / t_f).ln();
+        assert!(rows.iter().all(|row| relative(row.v * t_f, way) < 75.0 * fraction), "{t_f}");
         for row in &rows {
             let theta = (-way * row.t / t_f).exp() / UP.v_i;
-            assert!(relative(row.theta, theta) < 40.0 * share, "{t_f} {row:?}");
+            assert!(relative(row.theta, theta) < 40.0 * fraction, "{t_f} {row:?}");
         }
         let work = way * (1.0 + LAW.a * (way / t_f).ln() - 0.5 * LAW.b * (UP.v_i * UP.v_f).ln());
         assert!(relative(optimum(UP, t_f).work, work) < 10.0 * t_f + 1e-13, "{t_f}");

@@ -57,8 +57,8 @@ fn slowed() -> impl Strategy<Value = Transition> {
 }
 
 /// A time that is feasible, and a matter of the transition.
-fn time(transition: &Transition, share: f64) -> f64 {
-    transition.least_time().max(0.0) * (1.0 + share) + share / transition.v_i
+fn time(transition: &Transition, fraction: f64) -> f64 {
+    transition.least_time().max(0.0) * (1.0 + fraction) + fraction / transition.v_i
 }
 
 /// The optimum where it is one of the model, else nothing to be said about.
@@ -89,10 +89,10 @@ proptest! {
     #[test]
     fn work_falls_until_the_cheapest_time_and_rises_after(
         transition in acceleration(),
-        shares in (decades(1e-6, 1.0), 0.0..1.0, decades(1.0, 1e4), decades(1.0, 1e2)),
+        fractions in (decades(1e-6, 1.0), 0.0..1.0, decades(1.0, 1e4), decades(1.0, 1e2)),
     ) {
         let Some(cheapest) = times(&transition)?.t_cheapest else { return Err(TestCaseError::reject("none")) };
-        let (far, near, late, later) = shares;
+        let (far, near, late, later) = fractions;
         let before = [cheapest * far * near, cheapest * far];
         let after = [cheapest * late, cheapest * late * later];
         let of = |t_f: f64| optimum(&transition, t_f, true);
@@ -127,15 +127,15 @@ proptest! {
 
     /// The strategy changes where the crossover table says.
     #[test]
-    fn strategies_change_at_the_crossover_times(transition in acceleration(), share in decades(1e-9, 1.0)) {
+    fn strategies_change_at_the_crossover_times(transition in acceleration(), fraction in decades(1e-9, 1.0)) {
         let CrossoverTimes { t_cross: Some(cross), t_floor: Some(hold), t_cheapest: Some(cheapest), .. } = times(&transition)? else {
             return Err(TestCaseError::reject("none"));
         };
         prop_assert!(cheapest <= cross * (1.0 + RTOL) && cross <= hold * (1.0 + RTOL), "{cheapest} {cross} {hold}");
         for (t_f, strategy) in [
-            (cross * (1.0 - share), Start::SpeedUp),
-            (cross + share * (hold - cross), Start::SlowDown),
-            (hold * (1.0 + share), Start::Floor),
+            (cross * (1.0 - fraction), Start::SpeedUp),
+            (cross + fraction * (hold - cross), Start::SlowDown),
+            (hold * (1.0 + fraction), Start::Floor),
         ] {
             // Closer than the accuracy of the times either may be found.
             let clear = [cross, hold].iter().all(|time| (t_f / time - 1.0).abs() > 1e-9);
@@ -146,8 +146,8 @@ proptest! {
     /// The bound costs work; without it the law has no velocity of its own: velocities may be taken `lambda` times as large and
     /// times as small if friction, `1 + (a - b) ln lambda` at the new unit, is told in units of that.
     #[test]
-    fn work_scales_with_the_unit_of_velocity(transition in transition(), share in decades(1e-6, 1e3), lambda in decades(1.0, 1e3)) {
-        let t_f = time(&transition, share);
+    fn work_scales_with_the_unit_of_velocity(transition in transition(), fraction in decades(1e-6, 1e3), lambda in decades(1.0, 1e3)) {
+        let t_f = time(&transition, fraction);
         let free = optimum(&transition, t_f, false)?;
         if let Ok(bounded) = optimum(&transition, t_f, true) {
             prop_assert!(bounded.work >= free.work * (1.0 - RTOL), "{bounded:?} {free:?}");
@@ -168,8 +168,8 @@ proptest! {
 
     /// No shortcut that keeps to `v >= 1` costs less than the optimum.
     #[test]
-    fn shortcuts_cost_no_less_than_the_optimum(transition in transition(), share in decades(1e-3, 1e3)) {
-        let t_f = time(&transition, share);
+    fn shortcuts_cost_no_less_than_the_optimum(transition in transition(), fraction in decades(1e-3, 1e3)) {
+        let t_f = time(&transition, fraction);
         let least = optimum(&transition, t_f, true)?;
         for name in ["cubic", "bounded_velocity", "bounded_friction"] {
             let case = Case { transition, t_f, tau_ceiling: f64::INFINITY };
@@ -186,8 +186,8 @@ proptest! {
 
     /// The best cubic shortcut is no worse than the one of continuous velocity, and no better than the optimum.
     #[test]
-    fn the_best_shortcut_lies_between_the_cubic_and_the_optimum(transition in transition(), share in decades(1e-2, 1e2)) {
-        let t_f = time(&transition, share);
+    fn the_best_shortcut_lies_between_the_cubic_and_the_optimum(transition in transition(), fraction in decades(1e-2, 1e2)) {
+        let t_f = time(&transition, fraction);
         let least = optimum(&transition, t_f, true)?;
         let found = best_cubic::solve(&transition, t_f, true, RTOL);
         let Some(found) = found.value.filter(|_| found.status == Status::Ok) else {

@@ -74,8 +74,8 @@ impl System<f64, SVector<f64, 3>> for Extremal {
     }
 }
 
-/// A piece: `ln(v - floor)` is a quintic in the share of the time, a step in the stretched one, and a bump; the state
-/// is `(ln theta, W, share)`.
+/// A piece: `ln(v - floor)` is a quintic in the fraction of the time, a step in the stretched one, and a bump; the state
+/// is `(ln theta, W, fraction)`.
 #[derive(Clone)]
 struct Piece {
     law: Law,
@@ -331,7 +331,7 @@ fn reference_every_number_is_what_a_library_finds() {
     let unbounded = Case { bounded: false, ..case((3.0, 100.0), 0.045) };
     let soft =
         Case { slider: SpringBlock { law: Law { a: 0.05, b: 0.02 }, k: 0.05, m: 1e-4 }, ..case((5.0, 20.0), 0.03) };
-    for (case, share, floors, status) in [
+    for (case, fraction, floors, status) in [
         (FAST, 0.1, [0.0, 0.0], Status::Ok),
         (FAST, 0.01, [0.0, 0.0], Status::Ok),
         (FAST, 0.4, [0.0, 0.0], Status::Ok),
@@ -341,21 +341,21 @@ fn reference_every_number_is_what_a_library_finds() {
         (HOLDING, 0.02, [0.0, 0.0], Status::BelowBound),
         (soft, 0.1, [0.0, 0.0], Status::Ok),
     ] {
-        let delta_t = share * case.t_f;
+        let delta_t = fraction * case.t_f;
         let solved = solve(&case, delta_t, 1e-10);
-        assert_eq!(solved.status, status, "{case:?} {share}");
+        assert_eq!(solved.status, status, "{case:?} {fraction}");
         let (value, expected) = (solved.value.expect("exists"), again(&case, delta_t, floors));
         let best = optimum(&case);
         assert!(relative(value.work_optimal, best.work) < 1e-12);
-        assert!(relative(value.gap, expected.excess / best.work) < 1e-8, "{case:?} {share}: {value:?}");
-        assert!(relative(value.work, best.work + expected.excess) < 1e-11, "{case:?} {share}: {value:?}");
+        assert!(relative(value.gap, expected.excess / best.work) < 1e-8, "{case:?} {fraction}: {value:?}");
+        assert!(relative(value.work, best.work + expected.excess) < 1e-11, "{case:?} {fraction}: {value:?}");
         told += errors_told(&case, delta_t, (best.work, expected.excess));
         let [v, control] = [&expected.v, &expected.control].map(|values| Found::range(values));
         // Of 20,000 places the best is off by the square of the distance between two.
         assert!(relative(value.v_min, v[0]) < 1e-6 && relative(value.v_max, v[1]) < 1e-6, "{value:?} {v:?}");
         let size = 1e-5 * control[1].max(-control[0]);
-        assert!((value.control_min - control[0]).abs() < size, "{case:?} {share}: {value:?} {control:?}");
-        assert!((value.control_max - control[1]).abs() < size, "{case:?} {share}: {value:?} {control:?}");
+        assert!((value.control_min - control[0]).abs() < size, "{case:?} {fraction}: {value:?} {control:?}");
+        assert!((value.control_max - control[1]).abs() < size, "{case:?} {fraction}: {value:?} {control:?}");
     }
     assert!(told >= 10, "{told}");
 }
@@ -396,8 +396,8 @@ fn the_excess_is_of_first_order_with_the_derived_limit() {
         let limit = case.slider.law.a * (start + end);
         // The term of the next order, from the longest, halves with the length.
         let rates: Vec<f64> = [1e-5, 1e-6, 1e-7]
-            .map(|share| {
-                let delta_t = share * case.t_f;
+            .map(|fraction| {
+                let delta_t = fraction * case.t_f;
                 solve(&case, delta_t, 1e-12).value.expect("exists").gap * best.work / delta_t
             })
             .to_vec();
@@ -431,14 +431,14 @@ fn the_work_does_not_depend_on_the_spring() {
 
 #[test]
 fn pieces_next_to_a_hold_dip_below_the_bound_and_say_so() {
-    for share in [0.3, 0.01, 1e-5] {
-        let solved = solve(&HOLDING, share * HOLDING.t_f, 1e-10);
+    for fraction in [0.3, 0.01, 1e-5] {
+        let solved = solve(&HOLDING, fraction * HOLDING.t_f, 1e-10);
         assert_eq!(solved.status, Status::BelowBound);
         assert!(solved.value.is_some_and(|value| value.v_min > 0.0 && value.v_min < 1.0));
     }
     // Where the optimum only slows down, they need not.
-    for share in [0.3, 0.01, 1e-5] {
-        let solved = solve(&SLOWING, share * SLOWING.t_f, 1e-10);
+    for fraction in [0.3, 0.01, 1e-5] {
+        let solved = solve(&SLOWING, fraction * SLOWING.t_f, 1e-10);
         assert_eq!(solved.status, Status::Ok);
         assert!(solved.value.is_some_and(|value| value.v_min > 1.0));
     }
@@ -473,8 +473,8 @@ fn regress_every_corner_of_the_range_is_solved() {
     for v_i in velocities {
         for v_f in velocities {
             let t_min = ((v_i - v_f) / (v_i * (v_f - 1.0))).ln_1p().max(0.0);
-            for share in [1e-3, 0.1, 1.0, 10.0] {
-                for t_f in [share / v_f, t_min * (1.0 + share)] {
+            for fraction in [1e-3, 0.1, 1.0, 10.0] {
+                for t_f in [fraction / v_f, t_min * (1.0 + fraction)] {
                     for part in [0.5, 0.2, 1e-2, 1e-4] {
                         let case = Case { velocities: (v_i, v_f), t_f, ..FAST };
                         let found = solve(&case, part * t_f, 1e-8);
@@ -502,8 +502,10 @@ fn regress_work_counts() {
 
 #[test]
 fn the_motion_carries_the_numbers() {
-    for (case, share) in [(FAST, 0.1), (FAST, 0.5), (SLOWING, 0.01), (HOLDING, 0.02), (case((100.0, 3.0), 0.5), 0.05)] {
-        let delta_t = share * case.t_f;
+    for (case, fraction) in
+        [(FAST, 0.1), (FAST, 0.5), (SLOWING, 0.01), (HOLDING, 0.02), (case((100.0, 3.0), 0.5), 0.05)]
+    {
+        let delta_t = fraction * case.t_f;
         let (solved, motion) =
             regularised::motion(&case.slider, case.velocities, case.t_f, delta_t, case.bounded, 1e-10);
         assert_eq!(solved, solve(&case, delta_t, 1e-10));
@@ -564,11 +566,11 @@ fn regress_long_pieces_do_not_peak() {
     for (velocities, t_f) in [((3.57e6, 31886.0), 151.5), ((1.34, 3.0), 65.0), ((5.6, 2.2e4), 24.0), ((2.0, 58.0), 1e3)]
     {
         let slider = SpringBlock { law, k: f64::INFINITY, m: 0.0 };
-        for share in [0.3, 0.1, 1e-2, 1e-3] {
+        for fraction in [0.3, 0.1, 1e-2, 1e-3] {
             let case = Case { slider, velocities, t_f, bounded: true };
-            let found = solve(&case, share * t_f, 1e-10).value.expect("exists");
+            let found = solve(&case, fraction * t_f, 1e-10).value.expect("exists");
             let most = velocities.0.max(velocities.1).max(optimum(&case).v_end);
-            assert!(found.v_max <= 2.0 * most, "{velocities:?} {t_f} {share}: {found:?}");
+            assert!(found.v_max <= 2.0 * most, "{velocities:?} {t_f} {fraction}: {found:?}");
         }
     }
 }

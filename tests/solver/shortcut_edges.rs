@@ -152,14 +152,14 @@ fn edge_times_of_1e_minus_6_and_1e3_and_velocities_of_1_001_to_1e8_in_both_direc
     let mut solved = [0; 4];
     for v_i in velocities {
         for v_f in velocities {
-            for share in [1e-6, 1e3] {
+            for fraction in [1e-6, 1e3] {
                 for b in [0.0, 0.03, 0.05, 0.4] {
-                    let case = case(Law { a: 0.03, b }, v_i, v_f, share / v_f);
+                    let case = case(Law { a: 0.03, b }, v_i, v_f, fraction / v_f);
                     for (count, family) in solved.iter_mut().zip(FAMILIES) {
                         if let Ok(shortcut) = examine(family, &case) {
                             *count += 1;
                             // A long time: steady sliding at v_f for most of it, or slower.
-                            if share == 1e3 && v_f >= v_i && family.name() == "bounded_velocity" {
+                            if fraction == 1e3 && v_f >= v_i && family.name() == "bounded_velocity" {
                                 assert!(shortcut.v_max <= 1.01 * v_f, "{} {case:?} {shortcut:?}", family.name());
                             }
                         }

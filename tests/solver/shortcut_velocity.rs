@@ -66,7 +66,7 @@ fn is_good_to_rtol(family: &str, rows: &[&Row]) {
             }
             let shortcut = solved.unwrap_or_else(|obstacle| panic!("{row:?}: {obstacle}"));
             assert_eq!(shortcut.status().name(), row.text("status"), "{row:?}");
-            // t_min is known to a few eps of itself, so alpha near it is known to that share of t_f - t_min.
+            // t_min is known to a few eps of itself, so alpha near it is known to that fraction of t_f - t_min.
             let t_min = least_time(v_i, v_f);
             let has_least = family == "bounded_velocity";
             let near = if has_least { 2.0 * f64::EPSILON * t_min.abs() / (t_f - t_min) } else { 0.0 };
@@ -314,7 +314,7 @@ fn regress_just_above_the_least_time_v_is_one_but_for_thin_layers() {
         let spare = t_f - t_min;
         let shortcut = solve("bounded_velocity", &case(PAPER, v_i, v_f, t_f), 1e-10).expect("has a member");
         assert_eq!(shortcut.v_min, 1.0, "{v_i} {v_f}");
-        // Both layers have the thickness 1/(alpha t_f): each slows theta by its share of t_f - t_min.
+        // Both layers have the thickness 1/(alpha t_f): each slows theta by its fraction of t_f - t_min.
         let layers = shortcut.alpha.expect("has a parameter") * t_f * spare;
         assert!(layers > 0.2 && layers < 50.0, "{v_i} {v_f}: {layers}");
         for short in [t_min, 0.5 * t_min, 1e-9 * t_min] {
@@ -373,9 +373,9 @@ fn regress_every_corner_of_the_range_is_solved() {
     let mut solved = 0;
     for v_i in velocities {
         for v_f in velocities {
-            for share in [1e-9, 1e-6, 1e-3, 0.1, 1.0, 10.0, 1e3, 1e6] {
+            for fraction in [1e-9, 1e-6, 1e-3, 0.1, 1.0, 10.0, 1e3, 1e6] {
                 for ratio in [0.0, 1.0, 50.0] {
-                    for t_f in [share / v_f, least_time(v_i, v_f).max(0.0) * (1.0 + share)] {
+                    for t_f in [fraction / v_f, least_time(v_i, v_f).max(0.0) * (1.0 + fraction)] {
                         let case = case(Law { a: 1e-4, b: 1e-4 * ratio }, v_i, v_f, t_f);
                         for rtol in [1e-6, 1e-10, 1e-13] {
                             match solve("bounded_velocity", &case, rtol) {

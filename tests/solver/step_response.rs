@@ -219,15 +219,15 @@ fn regress_small_cycles_are_the_same_at_every_tolerance() {
 #[test]
 fn regress_unstable_sliding_is_left_however_small_the_step() {
     let expected = respond(&paper(7.5e-3), 1e-6).cycle.expect("is a limit cycle");
-    for share in [1e-3, 1e-6, 1e-9, 1e-13, -1e-3, -1e-6, -1e-9, -1e-13] {
-        let transition = Transition { v_i: (1.0 + share) * V_F, ..paper(7.5e-3).transition };
+    for fraction in [1e-3, 1e-6, 1e-9, 1e-13, -1e-3, -1e-6, -1e-9, -1e-13] {
+        let transition = Transition { v_i: (1.0 + fraction) * V_F, ..paper(7.5e-3).transition };
         let response = respond(&Step { transition, ..paper(7.5e-3) }, 1e-6);
-        let cycle = response.cycle.unwrap_or_else(|| panic!("{share}: {response:?}"));
-        assert!(relative(cycle.v_peak, expected.v_peak) < 1e-6, "{share}: {cycle:?}");
+        let cycle = response.cycle.unwrap_or_else(|| panic!("{fraction}: {response:?}"));
+        assert!(relative(cycle.v_peak, expected.v_peak) < 1e-6, "{fraction}: {cycle:?}");
         // It is approached from below.
         assert_eq!((response.v_peak, response.t_peak), (cycle.v_peak, None));
         let stable = respond(&Step { transition, ..paper(8e-3) }, 1e-6);
-        assert_eq!((stable.outcome, stable.settling_time), (Outcome::Settled, Some(0.0)), "{share}");
+        assert_eq!((stable.outcome, stable.settling_time), (Outcome::Settled, Some(0.0)), "{fraction}");
     }
 }
 
@@ -255,10 +255,10 @@ fn reference_the_unstable_cycle_parts_steps_that_die_out_from_those_that_grow() 
         let k = (1.0 + distance) * critical;
         let sliding = SteadySliding::new(PAPER, k, MASS, v_f).eigenvalues().expect("has inertia");
         let amplitude = 2.0 * (-sliding.growth_rate / (sliding.frequency * coefficient)).sqrt();
-        for (share, outcome) in [(0.3, Outcome::Settled), (3.0, Outcome::LimitCycle)] {
-            let transition = Transition { law: PAPER, v_i: (1.0 - share * amplitude) * v_f, v_f };
+        for (fraction, outcome) in [(0.3, Outcome::Settled), (3.0, Outcome::LimitCycle)] {
+            let transition = Transition { law: PAPER, v_i: (1.0 - fraction * amplitude) * v_f, v_f };
             let response = respond(&Step { transition, k, m: MASS }, 1e-6);
-            assert_eq!(response.outcome, outcome, "{distance} {amplitude} {share}");
+            assert_eq!(response.outcome, outcome, "{distance} {amplitude} {fraction}");
         }
     }
 }
@@ -362,21 +362,21 @@ fn regress_small_steps_about_unstable_sliding_end_where_large_ones_do() {
         let expected = respond(&step, 1e-6).cycle.expect("is a limit cycle");
         let v_f = step.transition.v_f;
         for size in [1e-3, 1e-4, 3e-5, 2e-5, 1e-5, 5e-6, 2e-6] {
-            for share in [size, -size] {
-                let transition = Transition { v_i: (1.0 + share) * v_f, ..step.transition };
+            for fraction in [size, -size] {
+                let transition = Transition { v_i: (1.0 + fraction) * v_f, ..step.transition };
                 let response = respond(&Step { transition, ..step }, 1e-6);
-                let cycle = response.cycle.unwrap_or_else(|| panic!("{share}: {response:?}"));
-                assert!(relative(cycle.v_peak, expected.v_peak) < 1e-6, "{share}: {cycle:?} {expected:?}");
-                assert!(relative(cycle.v_trough, expected.v_trough) < 1e-5, "{share}: {cycle:?} {expected:?}");
-                assert!(relative(cycle.period, expected.period) < 1e-6, "{share}: {cycle:?} {expected:?}");
+                let cycle = response.cycle.unwrap_or_else(|| panic!("{fraction}: {response:?}"));
+                assert!(relative(cycle.v_peak, expected.v_peak) < 1e-6, "{fraction}: {cycle:?} {expected:?}");
+                assert!(relative(cycle.v_trough, expected.v_trough) < 1e-5, "{fraction}: {cycle:?} {expected:?}");
+                assert!(relative(cycle.period, expected.period) < 1e-6, "{fraction}: {cycle:?} {expected:?}");
             }
         }
     }
     // Without mass nothing limits the growth.
     for size in [1e-4, 1e-5, 5e-6, 1e-6, 1e-9] {
-        for share in [size, -size] {
-            let transition = Transition { v_i: (1.0 + share) * light.v_f, ..light };
-            assert_eq!(Step { transition, k: 0.004, m: 0.0 }.respond(1e-6), (Status::Infeasible, None), "{share}");
+        for fraction in [size, -size] {
+            let transition = Transition { v_i: (1.0 + fraction) * light.v_f, ..light };
+            assert_eq!(Step { transition, k: 0.004, m: 0.0 }.respond(1e-6), (Status::Infeasible, None), "{fraction}");
         }
     }
 }
@@ -534,21 +534,21 @@ fn regress_every_number_that_is_told_is_good_to_rtol() {
 fn reference_heavy_blocks_next_to_the_critical_stiffness() {
     let (law, mass, rtol) = (Law { a: 0.01, b: 0.02 }, 1.0, 1e-5);
     let critical = SteadySliding::new(law, 1.0, mass, 1.0).critical_stiffness();
-    for share in [1e-6, 1e-4] {
+    for fraction in [1e-6, 1e-4] {
         for x in [-3.0, 0.5, 4.0_f64] {
             let transition = Transition { law, v_i: x.exp(), v_f: 1.0 };
             let [above, below] = [1.0, -1.0]
-                .map(|sign| respond(&Step { transition, k: critical * (1.0 + sign * share), m: mass }, rtol));
-            assert_eq!([above.outcome, below.outcome], [Outcome::Settled, Outcome::LimitCycle], "{share:e} {x}");
-            assert!(relative(above.v_peak, below.v_peak) < rtol, "{share:e} {x}: {above:?} {below:?}");
+                .map(|sign| respond(&Step { transition, k: critical * (1.0 + sign * fraction), m: mass }, rtol));
+            assert_eq!([above.outcome, below.outcome], [Outcome::Settled, Outcome::LimitCycle], "{fraction:e} {x}");
+            assert!(relative(above.v_peak, below.v_peak) < rtol, "{fraction:e} {x}: {above:?} {below:?}");
             // To leading order friction gives b omega^2/(1 + omega^2)^2 (1 - k/k_c), and takes the bend times A^2/2.
             let cycle = below.cycle.expect("is a limit cycle");
             let omega_squared = (law.b - law.a) / law.a;
             let sum = 1.0 + omega_squared;
             let bend = 0.5 * law.a * omega_squared * (7.0 + 4.0 * omega_squared) / (sum * (1.0 + 4.0 * omega_squared));
-            let driven = law.b * omega_squared * share / (sum * sum);
+            let driven = law.b * omega_squared * fraction / (sum * sum);
             let size = (2.0 * driven / bend).sqrt();
-            assert!((cycle.v_peak - 1.0 - size).abs() < 0.2 * size + rtol * rtol, "{share:e}: {cycle:?} {size}");
+            assert!((cycle.v_peak - 1.0 - size).abs() < 0.2 * size + rtol * rtol, "{fraction:e}: {cycle:?} {size}");
         }
     }
 }

@@ -262,10 +262,10 @@ fn straight_lines_between_rows_are_good_to_1e_4_of_the_range_everywhere() {
                     row += 1;
                 }
                 let (from, to) = (&rows[row], &rows[row + 1]);
-                let share = (here.t - from.t) / (to.t - from.t);
+                let fraction = (here.t - from.t) / (to.t - from.t);
                 let (start, end, value) = (columns(from), columns(to), columns(&here));
                 for column in 0..4 {
-                    let error = (start[column] + share * (end[column] - start[column]) - value[column]).abs();
+                    let error = (start[column] + fraction * (end[column] - start[column]) - value[column]).abs();
                     assert!(
                         error.is_nan() || error <= RANGE_RTOL * ranges[column],
                         "{transition:?} {}: column {column} off by {:.2e} at {}",

@@ -1,4 +1,4 @@
-//! What the tests share: how far a number is from the expected one, and random numbers.
+//! What the tests have in common: how far a number is from the expected one, and random numbers.
 
 /// The relative error of a number; 0 where both are the same, 0 and infinity included.
 pub fn relative(found: f64, expected: f64) -> f64 {

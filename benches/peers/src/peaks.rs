@@ -26,7 +26,7 @@ impl Peaks {
         Peaks { count, first: (count > 0).then_some(first), ..Peaks::default() }
     }
 
-    /// Looks through a step, of which `x` gives `ln(v/v_f)` at the share of it.
+    /// Looks through a step, of which `x` gives `ln(v/v_f)` at the fraction of it.
     pub fn look(&mut self, mut x: impl FnMut(f64) -> f64) {
         let part = 1.0 / f64::from(PARTS);
         let (mut at, mut highest) = (0.0, f64::NEG_INFINITY);

@@ -34,8 +34,8 @@ fn time_to(points: &[Point], error: f64) -> Option<f64> {
         }
         if point.error <= error {
             return Some(before.map_or(point.seconds, |before| {
-                let share = (before.error / error).ln() / (before.error / point.error).ln();
-                before.seconds * (point.seconds / before.seconds).powf(share)
+                let fraction = (before.error / error).ln() / (before.error / point.error).ln();
+                before.seconds * (point.seconds / before.seconds).powf(fraction)
             }));
         }
         before = Some(point);

@@ -11,7 +11,7 @@ use crate::peaks::Peaks;
 use crate::slider::{State, X};
 
 pub struct Radau5 {
-    /// Share of the tolerance that is left to Newton's method; for 0 the library chooses one that goes with the
+    /// Fraction of the tolerance that is left to Newton's method; for 0 the library chooses one that goes with the
     /// tolerance.
     pub newton_tol: f64,
 }

@@ -35,9 +35,9 @@ impl<const N: usize, const S: usize> Factors<N, S> {
         let mut others = [[Block::Empty; N]; N];
         for r in 0..N {
             for i in 0..S {
-                let share = at.mass[r][i] / h;
+                let fraction = at.mass[r][i] / h;
                 for j in 0..S {
-                    pivots[r][i][j] = share * rule.differentiation[i][j];
+                    pivots[r][i][j] = fraction * rule.differentiation[i][j];
                 }
                 pivots[r][i][i] -= at.jacobian[r][r][i];
             }

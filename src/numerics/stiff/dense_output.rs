@@ -42,7 +42,7 @@ impl<const N: usize, const S: usize> DenseOutput<N, S> {
         dense_output
     }
 
-    /// The same polynomial between two shares of the step.
+    /// The same polynomial between two fractions of the step.
     pub fn between(&self, from: f64, to: f64) -> Self {
         let mut powers = self.powers;
         for row in &mut powers {
@@ -67,7 +67,7 @@ impl<const N: usize, const S: usize> DenseOutput<N, S> {
         self.t + self.h
     }
 
-    /// Change of variable `r` since the start at `u`, the share of the step (beyond 1: extrapolated).
+    /// Change of variable `r` since the start at `u`, the fraction of the step (beyond 1: extrapolated).
     #[inline(always)]
     pub fn change(&self, r: usize, u: f64) -> f64 {
         let mut sum = 0.0;

@@ -54,7 +54,7 @@ pub struct Integrator<'a, Y, const N: usize, const S: usize> {
     t: DoubleDouble,
     /// Time beyond it that its digits do not show.
     rest: f64,
-    /// Share of the time before it that a step is at least.
+    /// Fraction of the time before it that a step is at least.
     shortest: f64,
     y: [f64; N],
     /// Length proposed for the next step.
@@ -73,16 +73,16 @@ struct Last<const N: usize, const S: usize> {
 /// Error that a tolerance cannot ask for less of, relative to the variables: 32 units in the last place.
 const ROUNDING: f64 = 32.0 * f64::EPSILON;
 
-/// Share of the time before it that a step is at least, unless it [may be shorter](Integrator::may_step): 32 digits.
+/// Fraction of the time before it that a step is at least, unless it [may be shorter](Integrator::may_step): 32 digits.
 const SHORTEST: f64 = 6e-33;
 
 /// Newton iterations before a step is given up.
 const MOST_ITERATIONS: u32 = 12;
 
-/// Share of the tolerance that is left to Newton's method.
-const NEWTON_SHARE: f64 = 0.01;
+/// Fraction of the tolerance that is left to Newton's method.
+const NEWTON_TOLERANCE_FRACTION: f64 = 0.01;
 
-/// The matrix is made anew where an iteration leaves more than this share of the error.
+/// The matrix is made anew where an iteration leaves more than this fraction of the error.
 const SLOW: f64 = 0.1;
 
 impl<'a, Y: System<N>, const N: usize, const S: usize> Integrator<'a, Y, N, S> {
@@ -96,16 +96,16 @@ impl<'a, Y: System<N>, const N: usize, const S: usize> Integrator<'a, Y, N, S> {
         h: f64,
     ) -> Self {
         // The estimate is of order S, the error of order 2 S - 1.
-        let share = (S + 1) as f64 / (2 * S) as f64;
-        let allowed = exp(share * ln(accuracy.tolerance));
+        let fraction = (S + 1) as f64 / (2 * S) as f64;
+        let allowed = exp(fraction * ln(accuracy.tolerance));
         let (t, cost) = (DoubleDouble::new(t), IntegratorStats::default());
         Integrator { system, rule, accuracy, allowed, t, rest: 0.0, shortest: SHORTEST, y, h, last: None, cost }
     }
 
-    /// Lets a step be as short as this share of the time before it: where variables become infinite after all, it takes so
+    /// Lets a step be as short as this fraction of the time before it: where variables become infinite after all, it takes so
     /// much longer to see.
-    pub fn may_step(&mut self, share: f64) {
-        self.shortest = share;
+    pub fn may_step(&mut self, fraction: f64) {
+        self.shortest = fraction;
     }
 
     /// Time reached.
@@ -198,14 +198,14 @@ impl<'a, Y: System<N>, const N: usize, const S: usize> Integrator<'a, Y, N, S> {
         }
     }
 
-    /// The first part of a step that was taken, up to the share `u` of it: a step of its own, so its end has the order
+    /// The first part of a step that was taken, up to the fraction `u` of it: a step of its own, so its end has the order
     /// of the method. `None` if Newton's method fails.
     #[inline(always)]
     pub fn part(&mut self, dense_output: &DenseOutput<N, S>, u: f64) -> Option<DenseOutput<N, S>> {
         self.leg(dense_output, (dense_output.t, dense_output.start), 0.0, u)
     }
 
-    /// A middle part of a step that was taken, between the shares `from` and `to`, as a step of its own: shorter, so
+    /// A middle part of a step that was taken, between the fractions `from` and `to`, as a step of its own: shorter, so
     /// its polynomial is closer to the solution. `None` if Newton's method fails.
     #[inline(always)]
     pub fn between(&mut self, dense_output: &DenseOutput<N, S>, from: f64, to: f64) -> Option<DenseOutput<N, S>> {
@@ -213,7 +213,7 @@ impl<'a, Y: System<N>, const N: usize, const S: usize> Integrator<'a, Y, N, S> {
         self.leg(dense_output, (dense_output.t + from * dense_output.h, start), from, to)
     }
 
-    /// A step from `(t, y)`, which is at the share `from` of a piece, to the share `to`.
+    /// A step from `(t, y)`, which is at the fraction `from` of a piece, to the fraction `to`.
     #[inline(always)]
     fn leg(
         &mut self,
@@ -251,10 +251,10 @@ impl<'a, Y: System<N>, const N: usize, const S: usize> Integrator<'a, Y, N, S> {
     #[inline(always)]
     fn guess(&self, h: f64) -> [[f64; S]; N] {
         let Some(Last { dense_output, .. }) = &self.last else { return [[0.0; S]; N] };
-        let share = h / dense_output.h;
+        let fraction = h / dense_output.h;
         std::array::from_fn(|r| {
             let end = dense_output.end[r] - dense_output.start[r];
-            std::array::from_fn(|i| dense_output.change(r, 1.0 + share * self.rule.nodes[i]) - end)
+            std::array::from_fn(|i| dense_output.change(r, 1.0 + fraction * self.rule.nodes[i]) - end)
         })
     }
 
@@ -269,7 +269,7 @@ impl<'a, Y: System<N>, const N: usize, const S: usize> Integrator<'a, Y, N, S> {
     #[inline(always)]
     fn stages(&mut self, t: f64, y: &[f64; N], h: f64, mut change: [[f64; S]; N]) -> Option<Solved<N, S>> {
         let unit = self.units(y);
-        let enough = NEWTON_SHARE * self.accuracy.tolerance;
+        let enough = NEWTON_TOLERANCE_FRACTION * self.accuracy.tolerance;
         let mut factors: Option<Factors<N, S>> = None;
         let mut before = f64::NAN;
         for iterations in 1..=MOST_ITERATIONS {

@@ -1,12 +1,12 @@
 "use strict";
 const tip = document.getElementById("tip");
-const share = (axis, value) => axis.log
+const fraction = (axis, value) => axis.log
   ? Math.log(value / axis.low) / Math.log(axis.high / axis.low)
   : (value - axis.low) / (axis.high - axis.low);
 const nearest = (axis, place) => {
   let best = 0;
   axis.middles.forEach((middle, i) => {
-    if (Math.abs(share(axis, middle) - place) < Math.abs(share(axis, axis.middles[best]) - place)) best = i;
+    if (Math.abs(fraction(axis, middle) - place) < Math.abs(fraction(axis, axis.middles[best]) - place)) best = i;
   });
   return best;
 };

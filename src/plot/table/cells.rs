@@ -41,7 +41,7 @@ impl AxisCells {
         let even = values
             .iter()
             .enumerate()
-            .all(|(place, &value)| (span.share(value) * last as f64 - place as f64).abs() < 0.02);
+            .all(|(place, &value)| (span.fraction(value) * last as f64 - place as f64).abs() < 0.02);
         // A value or what is between two of them, by its place.
         let at = |place: f64| span.value(place / last as f64);
         if even {
@@ -52,10 +52,10 @@ impl AxisCells {
             return AxisCells { middles, scale, even, exact, firsts };
         }
         let middles: Vec<f64> = values.chunks(together).map(|chunk| chunk[chunk.len() / 2]).collect();
-        let shares: Vec<f64> = middles.iter().map(|&middle| span.share(middle)).collect();
+        let fractions: Vec<f64> = middles.iter().map(|&middle| span.fraction(middle)).collect();
         // Half a cell beyond the first and the last middle.
-        let beyond = |edge: usize, inner: usize| span.value(1.5 * shares[edge] - 0.5 * shares[inner]);
-        let end = shares.len() - 1;
+        let beyond = |edge: usize, inner: usize| span.value(1.5 * fractions[edge] - 0.5 * fractions[inner]);
+        let end = fractions.len() - 1;
         let scale = Scale { low: beyond(0, 1), high: beyond(end, end - 1), log };
         AxisCells { middles, scale, even, exact, firsts }
     }
@@ -81,14 +81,14 @@ impl AxisCells {
         if !self.firsts.is_empty() {
             return self.firsts.partition_point(|first| first.total_cmp(&(value + 0.0)).is_le()).checked_sub(1);
         }
-        let share = self.scale.share(value);
-        let place = (share * self.len() as f64).floor();
-        (-1e-12..=1.0 + 1e-12).contains(&share).then(|| (place.max(0.0) as usize).min(self.len() - 1))
+        let fraction = self.scale.fraction(value);
+        let place = (fraction * self.len() as f64).floor();
+        (-1e-12..=1.0 + 1e-12).contains(&fraction).then(|| (place.max(0.0) as usize).min(self.len() - 1))
     }
 
-    /// The cell whose middle is nearest to a share of the scale.
-    pub fn nearest(&self, share: f64) -> usize {
-        let value = self.scale.value(share);
+    /// The cell whose middle is nearest to a fraction of the scale.
+    pub fn nearest(&self, fraction: f64) -> usize {
+        let value = self.scale.value(fraction);
         let after = self.middles.partition_point(|&middle| middle < value);
         if after == 0 {
             return 0;
@@ -96,8 +96,8 @@ impl AxisCells {
         if after == self.len() {
             return after - 1;
         }
-        let (left, right) = (self.scale.share(self.middles[after - 1]), self.scale.share(self.middles[after]));
-        if share - left <= right - share { after - 1 } else { after }
+        let (left, right) = (self.scale.fraction(self.middles[after - 1]), self.scale.fraction(self.middles[after]));
+        if fraction - left <= right - fraction { after - 1 } else { after }
     }
 }
 
@@ -121,7 +121,7 @@ mod tests {
     }
 
     #[test]
-    fn many_values_share_cells() {
+    fn several_values_fall_into_a_cell() {
         let cells = AxisCells::new(&axis((0..1000).map(f64::from).collect()), 10);
         assert!(!cells.exact && cells.len() == 10);
         let places: Vec<usize> = (0..1000).filter_map(|value| cells.place(f64::from(value))).collect();

@@ -101,7 +101,8 @@ pub fn lines(survey: &Survey, plan: &Plan) -> Result<Lined, PlotError> {
     notes.extend(rows.along.take().into_iter().chain(no_value));
     if !rows.cells.exact {
         let (count, name) = (rows.cells.len(), label::name(&plan.x));
-        notes.push(format!("Rows share {count} places of {name}: the least and the greatest of each are drawn."));
+        notes
+            .push(format!("{count} places of {name} have several rows: the least and the greatest of each are drawn."));
     }
     let leaves_out = |panel| is_gap_of_families(survey, plan, panel) && rows.values(panel).any(|value| value <= 0.0);
     if (0..plan.y.len()).any(leaves_out) {
@@ -199,13 +200,13 @@ impl Rows {
 
     /// For each line the first one that it coincides with in all panels.
     fn leaders(&self, graphs: &[Graph]) -> Vec<usize> {
-        let share = |graph: &Graph, line: usize| -> Vec<(f64, f64)> {
-            graph.curves[line].iter().map(|&(x, y)| (x, graph.panel.y.scale.share(y))).collect()
+        let fraction = |graph: &Graph, line: usize| -> Vec<(f64, f64)> {
+            graph.curves[line].iter().map(|&(x, y)| (x, graph.panel.y.scale.fraction(y))).collect()
         };
-        let shares: Vec<Vec<_>> =
-            (0..self.lines.len()).map(|line| graphs.iter().map(|graph| share(graph, line)).collect()).collect();
+        let fractions: Vec<Vec<_>> =
+            (0..self.lines.len()).map(|line| graphs.iter().map(|graph| fraction(graph, line)).collect()).collect();
         coincide::leaders(self.lines.len(), |one, other| {
-            let mut panels = shares[one].iter().zip(&shares[other]);
+            let mut panels = fractions[one].iter().zip(&fractions[other]);
             !self.are_scattered && panels.all(|(one, other)| coincide::at_places(one, other))
         })
     }

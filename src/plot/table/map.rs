@@ -186,13 +186,15 @@ impl Raster {
         [Layer::Hatch].into_iter().chain(filled).collect()
     }
 
-    /// A sentence on cells that several rows share.
+    /// A note about cells with several rows.
     fn note(&self, plan: &Plan) -> Option<String> {
         let shared =
             [&plan.x, &plan.y].into_iter().zip(&self.cells).filter(|(_, cells)| !cells.exact && !self.are_dots);
         let shared: Vec<String> =
             shared.map(|(name, cells)| format!("{} cells of {}", cells.len(), label::name(name))).collect();
-        (!shared.is_empty()).then(|| format!("Rows share {}: each shows the least of its rows.", shared.join(" and ")))
+        (!shared.is_empty()).then(|| {
+            format!("Several rows fall into one place of {}: it shows the least of them.", shared.join(" and "))
+        })
     }
 }
 
@@ -231,7 +233,7 @@ impl Shading<'_> {
     fn colour(&self, value: f64) -> Option<[u8; 3]> {
         (!value.is_nan()).then(|| match &self.colours {
             Some(Colours { scale, .. }) if scale.log && value <= 0.0 => viridis(0.0),
-            Some(Colours { scale, .. }) => viridis(scale.share(value)),
+            Some(Colours { scale, .. }) => viridis(scale.fraction(value)),
             None => class(self.shade(value)),
         })
     }

@@ -102,7 +102,7 @@ fn strategies(scene: &Scene<'_>, plan: &map::Plan) -> Result<Figure, PlotError> 
         }
         for ((curve, (_, stroke)), is_drawn) in curves.into_iter().zip(&styles).zip(&mut is_drawn) {
             let scale = if time == 0 { panel.x.scale } else { panel.y.scale };
-            let of = |&(x, y): &(f64, f64)| scale.share(if time == 0 { x } else { y });
+            let of = |&(x, y): &(f64, f64)| scale.fraction(if time == 0 { x } else { y });
             if curve.iter().any(|point| (0.0..=1.0).contains(&of(point))) {
                 *is_drawn = true;
                 panel.layers.push(Layer::Contour(vec![curve], stroke.clone()));

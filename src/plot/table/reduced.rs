@@ -17,7 +17,7 @@ const ACROSS: [&str; 5] = ["t_f", "v_f", "v_i", "b", "a"];
 const OUTER: [u8; 3] = [0xd7, 0xe8, 0xf5];
 const INNER: [u8; 3] = [0x9e, 0xc4, 0xe4];
 
-/// The columns of quantiles, and the share of the shortcuts that does not exceed each.
+/// The columns of quantiles, and the fraction of the shortcuts that does not exceed each.
 const QUANTILES: [(&str, f64); 7] = [
     ("gap_min", 0.0),
     ("gap_q05", 0.05),
@@ -100,7 +100,7 @@ fn edges() -> Vec<(f64, f64)> {
     starts.zip(inner.into_iter().chain([10.0 * inner[inner.len() - 1]])).collect()
 }
 
-/// Bands: the quantiles of the gap over an axis; of a single landscape, the share of its shortcuts over the gap.
+/// Bands: the quantiles of the gap over an axis; of a single landscape, the fraction of its shortcuts over the gap.
 pub fn quantiles(survey: &Survey) -> Result<(Figure, Vec<String>), PlotError> {
     let varies = |name: &&&str| survey.axis(name).is_some_and(|axis| axis.values.len() > 2 || axis.many);
     let across = ACROSS
@@ -191,7 +191,7 @@ fn distribution(survey: &Survey, columns: &[(&str, f64)]) -> Result<(Figure, Vec
     let names: Vec<&str> = columns.iter().map(|(name, _)| *name).collect();
     let mut points = Vec::new();
     survey.each(&names, |row| {
-        points = row.iter().copied().zip(columns.iter().map(|(_, share)| 100.0 * share)).collect();
+        points = row.iter().copied().zip(columns.iter().map(|(_, fraction)| 100.0 * fraction)).collect();
     })?;
     points.retain(|(gap, _): &(f64, f64)| gap.is_finite());
     let x = Scale::of(points.iter().map(|(gap, _)| *gap)).ok_or(PlotError::Nothing)?.with_room(0.04);

@@ -29,7 +29,7 @@ pub(super) enum Outcome {
 /// How close is close enough.
 #[derive(Debug, Clone, Copy)]
 pub(super) enum Until {
-    /// The work changes by no more than this share in the ellipse.
+    /// The work changes by no more than this fraction in the ellipse.
     Work(f64),
     /// The ellipse is smaller than what is left of its coefficients after rounding.
     Rounding,
@@ -37,11 +37,11 @@ pub(super) enum Until {
 
 /// Cuts, most of which leave less than three quarters of the area.
 const MOST_CUTS: u32 = 1500;
-/// Share of a coefficient that its rounding is.
+/// Fraction of a coefficient that its rounding is.
 const ROUNDING: f64 = 1e-16;
-/// Share of a linear function of the place that is rounding of the place.
+/// Fraction of a linear function of the place that is rounding of the place.
 const DIGITS: f64 = 1e-30;
-/// Share of the larger coefficient that counts in the other, which may vanish.
+/// Fraction of the larger coefficient that counts in the other, which may vanish.
 const SMALL: f64 = 1e-8;
 
 impl Ellipse {
@@ -117,7 +117,7 @@ impl Ellipse {
             let work_derivatives = plane.work_derivatives(self.centre, stats);
             let (length, direction) = self.span(work_derivatives.gradient.map(|g| -g));
             let close = match until {
-                Until::Work(share) => length <= share * work_derivatives.work.abs(),
+                Until::Work(fraction) => length <= fraction * work_derivatives.work.abs(),
                 Until::Rounding => self.is_rounding(),
             };
             if close || length == 0.0 || self.is_spent(work_derivatives.gradient, length) {

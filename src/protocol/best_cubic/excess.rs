@@ -30,7 +30,7 @@ const NODES: usize = 12;
 const DEEPEST: u32 = 30;
 /// Most panels; smooth cases take two to eight, a kink some thirty.
 const MOST_PANELS: u32 = 1000;
-/// Share of the shortcut's velocity below which that of the optimum may be too small for a number.
+/// Fraction of the shortcut's velocity below which that of the optimum may be too small for a number.
 const FAINT: f64 = 1e-3;
 /// Panels towards an end are this much shorter, one after the other.
 const SHORTER: f64 = 0.2;

@@ -43,7 +43,7 @@ const DIFFERENCE_ERROR: f64 = 1e-11;
 /// Roundings of the time beyond the least one.
 const ROUNDINGS: f64 = 8.0;
 
-/// The ellipse is small enough where the work can change by no more than this share in it, times `a` where that is
+/// The ellipse is small enough where the work can change by no more than this fraction in it, times `a` where that is
 /// small: all shortcuts cost the same but for their velocities, which count by `a`. Newton's method converges from there.
 const CLOSE: f64 = 1e-5;
 

@@ -6,10 +6,10 @@ use crate::protocol::cubic::WorkDerivatives;
 
 /// Newton steps; each is halved as often as needed.
 const MOST_STEPS: u32 = 60;
-/// A step that gains this share of the work, times `a` where that is small, is the last: it changes velocities by a share
+/// A step that gains this fraction of the work, times `a` where that is small, is the last: it changes velocities by a fraction
 /// of 1e-11, and what is left by the square of that.
 const LAST: f64 = 1e-22;
-/// A share of the work that rounding of its gradient may seem to gain.
+/// A fraction of the work that rounding of its gradient may seem to gain.
 const NOISE: f64 = 1e-12;
 
 /// A step of Newton's method.
@@ -58,20 +58,20 @@ pub(super) fn descend(plane: &Plane, a: f64, start: Place, stats: &mut SolverSta
         }
         before = decrement;
         let last = sure && decrement <= LAST * a.min(1.0) * work;
-        let mut share = 1.0;
+        let mut fraction = 1.0;
         (place, here) = loop {
-            let trial = moved(place, step.map(|step| share * step));
+            let trial = moved(place, step.map(|step| fraction * step));
             if plane.admits(trial) {
                 if last {
                     return Some(trial);
                 }
                 let there = plane.work_derivatives(trial, stats);
-                if there.work <= here.work - 1e-4 * share * decrement + 1e-14 * work {
+                if there.work <= here.work - 1e-4 * fraction * decrement + 1e-14 * work {
                     break (trial, there);
                 }
             }
-            share *= 0.5;
-            if share < 1e-6 {
+            fraction *= 0.5;
+            if fraction < 1e-6 {
                 return None;
             }
         };

@@ -34,7 +34,7 @@ pub(super) struct Bundle {
     pub to: Lanes,
 }
 
-/// What the shortcuts of a landscape share of friction.
+/// What the shortcuts of a landscape fraction of friction.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Friction {
     a: f64,

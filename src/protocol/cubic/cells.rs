@@ -80,7 +80,7 @@ const MAX_CELL: f64 = 1e9;
 
 /// Distance of the centre of a map beyond the end, fraction of that of the nearest zero at the samples. Chosen: no zero of the cell
 /// comes between.
-const GAP_SHARE: f64 = 0.97;
+const GAP_FRACTION: f64 = 0.97;
 
 /// Error of the interpolated ln rho, fraction of it, at most. Measured: a plan of its own costs more nodes than that saves
 /// (`cargo bench --bench landscape`).
@@ -440,7 +440,7 @@ impl Centres {
         for c in 0..TOGETHER {
             let beyond = if above[c] >= 0.0 { above[c] } else { below[c] };
             centres.side[c] = if above[c] >= 0.0 { 1.0 } else { -1.0 };
-            centres.gap[c] = GAP_SHARE as f32 * beyond;
+            centres.gap[c] = GAP_FRACTION as f32 * beyond;
             centres.common[c] = (above[c] >= 0.0) | (below[c] >= 0.0);
         }
         centres

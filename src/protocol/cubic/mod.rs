@@ -85,7 +85,7 @@ impl Landscape {
         Path::exact(&self.ends, a_2, a_3)
     }
 
-    /// What all shortcuts share.
+    /// The data common to all shortcuts.
     pub(super) fn ends(&self) -> &Ends {
         &self.ends
     }

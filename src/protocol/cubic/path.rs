@@ -8,7 +8,7 @@ use crate::numerics::cubic::{Cubic, ExactCubic, exact_quadratic_zeros};
 use crate::numerics::double_double::DoubleDouble;
 use crate::protocol::Status;
 
-/// The ends that all shortcuts of a landscape share.
+/// The ends common to all shortcuts of a landscape.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(in crate::protocol) struct Ends {
     pub theta_0: DoubleDouble,
@@ -16,7 +16,7 @@ pub(in crate::protocol) struct Ends {
     /// `theta_1 - theta_0`.
     pub rise: DoubleDouble,
     pub t_f: f64,
-    /// Largest share of a velocity that rounding may cost.
+    /// Largest fraction of a velocity that rounding may cost.
     pub v_loss: f64,
 }
 
@@ -170,7 +170,7 @@ impl<'a> Path<'a> {
     }
 
     /// Whether theta at the start or at the end is so small that an expansion about the other end costs it more than the
-    /// share `loss` of its digits.
+    /// fraction `loss` of its digits.
     #[inline(always)]
     pub fn is_faint(&self, end: bool, loss: f64) -> bool {
         let [c0, c1, c2, c3] = self.theta.c;

@@ -76,9 +76,9 @@ pub(super) struct Accuracy {
     focal: [f64; MOST_NODES / NODE_STEP],
     /// ln rho from which [`NODE_STEP`] nodes are enough.
     pub pace: f64,
-    /// Largest share of an error in theta.
+    /// Largest fraction of an error in theta.
     pub rounding: f64,
-    /// Largest share of an error in n, whose logarithm counts; 0 where sums without logarithms lose too many digits.
+    /// Largest fraction of an error in n, whose logarithm counts; 0 where sums without logarithms lose too many digits.
     pub slight: f64,
     /// Largest distance, under constant velocity, over which sums without logarithms keep enough digits.
     pub longest: f64,
@@ -116,7 +116,7 @@ impl Accuracy {
         Accuracy { focal: focal_sums(tolerance), pace: pace(tolerance), rounding, slight, longest }
     }
 
-    /// For parts of a panel that is cut at a close pair of zeros, which fills what is left: at low accuracies its share is
+    /// For parts of a panel that is cut at a close pair of zeros, which fills what is left: at low accuracies its fraction is
     /// larger than the margin.
     pub fn of_parts(&self, tolerance: f64) -> Accuracy {
         let tolerance = tolerance.min(LOOSEST_PARTS);

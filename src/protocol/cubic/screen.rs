@@ -467,7 +467,7 @@ fn lower<const N: usize>(
 /// Relative step after which the next one is within rounding. Derived: the digits double.
 const LAST_STEP: f64 = 1e-9;
 
-/// Whether rounding may cost the value of a cubic at `x` a share `loss` of it (or it is not a number).
+/// Whether rounding may cost the value of a cubic at `x` a fraction `loss` of it (or it is not a number).
 #[inline(always)]
 fn is_faint(cubic: &Cubic, slack: f64, x: f64, loss: f64) -> bool {
     let [c0, c1, c2, c3] = cubic.c;

@@ -7,14 +7,14 @@ use crate::model::Law;
 use crate::numerics::elementary::{exp, exp_m1, ln, ln_1p};
 use crate::protocol::{Moment, Motion};
 
-/// The motion of one extremal. Its parameter `s` runs along the hold up to `share`, then along the arc.
+/// The motion of one extremal. Its parameter `s` runs along the hold up to `fraction`, then along the arc.
 pub struct Optimal {
     pub(super) law: Law,
     pub(super) t_f: f64,
     bounded: bool,
     pub(super) floor: Floor,
     /// The part of `s` that the hold takes.
-    share: f64,
+    fraction: f64,
     pub(super) arc: Option<Timed>,
 }
 
@@ -35,8 +35,8 @@ impl Optimal {
             beta_s: -(1.0 + problem.law.a + problem.law.b * ln(theta_s)) / theta_s,
         };
         let (held, moving) = (floor.length(), arc.as_ref().map_or(0.0, |arc| arc.pieces.length.abs()));
-        let share = if arc.is_none() { 1.0 } else { held / (held + moving) };
-        Optimal { law: problem.law, t_f, bounded: problem.bounded, floor, share, arc }
+        let fraction = if arc.is_none() { 1.0 } else { held / (held + moving) };
+        Optimal { law: problem.law, t_f, bounded: problem.bounded, floor, fraction, arc }
     }
 }
 
@@ -47,17 +47,18 @@ impl Motion for Optimal {
 
     fn landmarks(&self) -> Vec<f64> {
         let mut landmarks = vec![0.0];
-        if self.share > 0.0 {
+        if self.fraction > 0.0 {
             let (first, length) = (self.floor.first(), self.floor.length());
             for (from, to) in [(0.0, first), (first, length)] {
                 let pieces = (to - from).ceil().max(1.0);
                 let place = |i: u32| (from + (to - from) * f64::from(i) / pieces) / length;
-                landmarks.extend((1..=pieces as u32).map(|i| self.share * place(i)));
+                landmarks.extend((1..=pieces as u32).map(|i| self.fraction * place(i)));
             }
         }
         if let Some(arc) = &self.arc {
             let count = arc.pieces.count;
-            landmarks.extend((1..=count).map(|i| self.share + (1.0 - self.share) * f64::from(i) / f64::from(count)));
+            landmarks
+                .extend((1..=count).map(|i| self.fraction + (1.0 - self.fraction) * f64::from(i) / f64::from(count)));
         }
         if let Some(last) = landmarks.last_mut() {
             *last = 1.0;
@@ -68,11 +69,11 @@ impl Motion for Optimal {
     fn at(&self, s: f64) -> Moment {
         let s = s.clamp(0.0, 1.0);
         let arc = match &self.arc {
-            Some(arc) if s >= self.share => arc,
-            _ => return self.floor.at(s / self.share),
+            Some(arc) if s >= self.fraction => arc,
+            _ => return self.floor.at(s / self.fraction),
         };
         let Law { a, b } = self.law;
-        let place = if s == 1.0 { 1.0 } else { ((s - self.share) / (1.0 - self.share)).min(1.0) };
+        let place = if s == 1.0 { 1.0 } else { ((s - self.fraction) / (1.0 - self.fraction)).min(1.0) };
         let here = arc.pieces.at(place);
         let v = exp(here.ln_u - here.ln_theta);
         let on_bound = self.bounded && v < 1.0 && v > 1.0 - ROUNDING;

@@ -30,10 +30,10 @@ const SPENT: f64 = 4.0 * f64::EPSILON;
 /// a search may end there, with a corrected step that leaves an error of third order.
 const JUMP: f64 = 1e-2;
 
-/// Share of the whole time below which a hold is short.
+/// Fraction of the whole time below which a hold is short.
 const SHORT: f64 = 0.01;
 
-/// Share of `q_hold` below which parameters are counted from 0: counted from `q_hold`, a search could not tell them apart.
+/// Fraction of `q_hold` below which parameters are counted from 0: counted from `q_hold`, a search could not tell them apart.
 const NEAR: f64 = 1e-5;
 
 /// How far from the seam, in the scaled start of the arc or in `ln v(0+)`, a protocol without a hold is next to it.
@@ -81,12 +81,12 @@ pub(super) fn find_beyond(problem: &Problem, time: Time, rtol: f64) -> (Solved<O
     let mut tolerance = (1e-3 * error).max(accuracy.exact);
     let mut last: Option<Probed> = None;
     let mut friction_min = f64::INFINITY;
-    let mut probe = |p, share: f64| {
+    let mut probe = |p, fraction: f64| {
         let extremal = problem.extremal(p, family.q_hold)?;
         let piece = family.piece(p, extremal.time_at_floor);
         let before = last.as_ref().filter(|last| last.piece == piece).map(|last| last.value);
         let (sums, probe) = loop {
-            let sums = extremal.arc.sums((tolerance * share).max(FINEST))?;
+            let sums = extremal.arc.sums((tolerance * fraction).max(FINEST))?;
             stats.quadratures += 1;
             stats.nodes += sums.nodes;
             let probe = extremal.probe(problem, &sums, beyond);
@@ -103,13 +103,13 @@ pub(super) fn find_beyond(problem: &Problem, time: Time, rtol: f64) -> (Solved<O
         last = Some(Probed { extremal, sums, piece, value: probe.value });
         Some((probe, piece))
     };
-    // What counts is the time beyond the least, which may be a small share of the whole.
-    let share = beyond / t_f;
+    // What counts is the time beyond the least, which may be a small fraction of the whole.
+    let fraction = beyond / t_f;
     let bracket = problem.bracket(family.q_hold, beyond);
     let mut outcome = None;
     for _ in 0..MOST_CROSSINGS {
         let root =
-            newton_in_pieces(|p| probe(p, share), start, bracket, problem.rises(), accuracy.enough, accuracy.least);
+            newton_in_pieces(|p| probe(p, fraction), start, bracket, problem.rises(), accuracy.enough, accuracy.least);
         let found = root.and_then(|(root, piece)| Some((root.x, problem.extremal(root.x, family.q_hold)?, piece)));
         outcome = found.map(|(x, found, _)| (x, found));
         // The slope jumps where a hold begins: a last step across such a seam is taken again from the other side.
@@ -125,12 +125,12 @@ pub(super) fn find_beyond(problem: &Problem, time: Time, rtol: f64) -> (Solved<O
         let held = found.time_at_floor > 0.0;
         let compared_with = if problem.rises() { found.start - problem.from.ln } else { *x };
         let seam = family.q_hold.filter(|_| !held && compared_with < SEAM);
-        let share = match seam {
+        let fraction = match seam {
             Some(_) => 0.0,
             None if held && found.time_at_floor < SHORT * t_f => found.time_at_floor / t_f,
             None => break,
         };
-        let Some((last, _)) = probe(*x, share).filter(|(last, _)| last.slope > 0.0) else { break };
+        let Some((last, _)) = probe(*x, fraction).filter(|(last, _)| last.slope > 0.0) else { break };
         let finer = *x - last.value / last.slope;
         // The slope may be 1e5 times as large on the other side of the start of a hold: a step ends there, and goes on
         // with that side's own.

@@ -56,7 +56,7 @@ pub enum Truth {
     Flag(bool),
     /// This number and no other.
     Exact(f64),
-    /// A number, whose error is counted in shares of `scale`.
+    /// A number, whose error is counted in fractions of `scale`.
     Number {
         value: f64,
         scale: f64,
@@ -106,7 +106,7 @@ impl Case {
         self.scaled(column, value, scale, route)
     }
 
-    /// A number whose error is a share of `scale`.
+    /// A number whose error is a fraction of `scale`.
     pub fn scaled(self, column: &'static str, value: f64, scale: f64, route: Route) -> Case {
         self.knows(column, Truth::Number { value, scale }, route)
     }
@@ -135,7 +135,7 @@ impl Case {
     }
 }
 
-/// Least work and gap of a shortcut whose `work` is known, the gap to a share of one more than itself.
+/// Least work and gap of a shortcut whose `work` is known, the gap to a fraction of one more than itself.
 pub fn gap(case: Case, work: f64, work_optimal: f64) -> Case {
     let excess = (DoubleDouble::new(work) - DoubleDouble::new(work_optimal)) / DoubleDouble::new(work_optimal);
     let case = case.number("work_optimal", work_optimal, Route::Judge);

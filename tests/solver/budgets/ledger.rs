@@ -14,8 +14,8 @@ pub const LEAST_RTOLS: f64 = 1e-5;
 /// The least budget of a number in units of the last place.
 const LEAST_ULPS: f64 = 1.0;
 
-/// The least budget of a bound in shares of it: a bound holds if the share is at most 1.
-const LEAST_SHARE: f64 = 0.1;
+/// The least budget of a bound in fractions of it: a bound holds if the fraction is at most 1.
+const MIN_FRACTION: f64 = 0.1;
 
 /// How many times a budget may be what is measured.
 const LOOSE: f64 = 10.0;
@@ -46,9 +46,9 @@ impl Display for Key {
 /// What an error may be.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Budget {
-    /// In units of the accuracy asked for; 0 is exact; of a bound, in shares of it.
+    /// In units of the accuracy asked for; 0 is exact; of a bound, in fractions of it.
     pub rtols: f64,
-    /// In units of the last place at the tightest accuracy; 0 is exact; of a bound, in shares of it.
+    /// In units of the last place at the tightest accuracy; 0 is exact; of a bound, in fractions of it.
     pub ulps: f64,
     /// Whether what a unit in the last place of the inputs does is taken off.
     pub conditioned: bool,
@@ -91,7 +91,7 @@ impl Budget {
 
 /// The least and the greatest budget of what is known by these routes.
 fn limits(routes: &[Route]) -> ([f64; 2], f64) {
-    if routes == [Route::TrueError] { ([LEAST_SHARE; 2], 1.0) } else { ([LEAST_RTOLS, LEAST_ULPS], f64::INFINITY) }
+    if routes == [Route::TrueError] { ([MIN_FRACTION; 2], 1.0) } else { ([LEAST_RTOLS, LEAST_ULPS], f64::INFINITY) }
 }
 
 /// The next of 1, 2, 3, 5 times a power of ten.

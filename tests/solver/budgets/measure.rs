@@ -26,9 +26,9 @@ const NUDGES: [i64; 3] = [1 << 20, 1 << 10, 1 << 5];
 /// The greatest errors of a column in a regime.
 #[derive(Debug, Clone, Default)]
 pub struct Found {
-    /// In units of the accuracy asked for; of a bound, in shares of it.
+    /// In units of the accuracy asked for; of a bound, in fractions of it.
     pub rtols: f64,
-    /// In units of the last place at the tightest accuracy; of a bound, in shares of it.
+    /// In units of the last place at the tightest accuracy; of a bound, in fractions of it.
     pub ulps: f64,
     /// Both without taking off what the inputs account for.
     pub raw: [f64; 2],
@@ -175,17 +175,17 @@ impl Check {
 
     fn rtols(&self, error: f64, rtol: f64, columns: &Columns, place: usize) -> f64 {
         let unit = if self.bounds.is_some() { 1.0 } else { rtol };
-        share(error, self.size(columns, place)) / unit
+        fraction(error, self.size(columns, place)) / unit
     }
 
     fn ulps(&self, error: f64, columns: &Columns, place: usize) -> f64 {
         let size = self.size(columns, place);
-        share(error, if self.bounds.is_some() { size } else { last_place(size) })
+        fraction(error, if self.bounds.is_some() { size } else { last_place(size) })
     }
 }
 
 /// `error` in units of `size`.
-fn share(error: f64, size: f64) -> f64 {
+fn fraction(error: f64, size: f64) -> f64 {
     if error == 0.0 { 0.0 } else { error / size }
 }
 

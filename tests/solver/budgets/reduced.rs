@@ -119,8 +119,9 @@ fn minimum(case: Case, landscape: &Landscape) -> Case {
 fn quantiles(case: Case, landscape: &Landscape) -> Case {
     let mut gaps: Vec<f64> = landscape.shortcuts.iter().map(|shortcut| shortcut.gap).collect();
     gaps.sort_by(f64::total_cmp);
-    let shares = [("gap_min", 0), ("gap_q05", 5), ("gap_q25", 25), ("gap_q50", 50), ("gap_q75", 75), ("gap_q95", 95)];
-    shares.into_iter().chain([("gap_max", 100)]).fold(case, |case, (column, hundredths)| {
+    let fractions =
+        [("gap_min", 0), ("gap_q05", 5), ("gap_q25", 25), ("gap_q50", 50), ("gap_q75", 75), ("gap_q95", 95)];
+    fractions.into_iter().chain([("gap_max", 100)]).fold(case, |case, (column, hundredths)| {
         // The least that at least so many do not exceed.
         let least = gaps.iter().enumerate().find(|(place, _)| 100 * (place + 1) >= hundredths * gaps.len());
         match least {

@@ -124,8 +124,8 @@ fn happens(point: &Point, times: &CrossoverTimes, row: &mut Row) {
 
 /// The Hamiltonian is largest at the inflection of `W*`.
 fn inflection(transition: &Transition, bounded: bool, t: f64, least: f64, most: f64, size: f64, row: &mut Row) {
-    for share in [-1e-1, -1e-3, 1e-3, 1e-1, 10.0] {
-        let solved = optimal::solve(transition, t + share * (t - least), bounded, FINE);
+    for fraction in [-1e-1, -1e-3, 1e-3, 1e-1, 10.0] {
+        let solved = optimal::solve(transition, t + fraction * (t - least), bounded, FINE);
         if let (Some(found), Status::Ok | Status::BelowBound) = (solved.value, solved.status) {
             row.at_most("an inflection", found.hamiltonian - most, 8.0 * FINE * size);
         }

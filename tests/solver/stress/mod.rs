@@ -62,11 +62,11 @@ impl Row {
 
     /// What must be at most `allowed`; NaN is not.
     fn at_most(&mut self, invariant: &'static str, violation: f64, allowed: f64) {
-        let share = if violation <= 0.0 { 0.0 } else { violation / allowed };
-        self.checks.push((invariant, if share.is_nan() { f64::INFINITY } else { share }));
+        let fraction = if violation <= 0.0 { 0.0 } else { violation / allowed };
+        self.checks.push((invariant, if fraction.is_nan() { f64::INFINITY } else { fraction }));
     }
 
-    /// Two numbers that must agree to a share of the first.
+    /// Two numbers that must agree to a fraction of the first.
     fn agree(&mut self, invariant: &'static str, found: f64, expected: f64, allowed: f64) {
         let distance = if found == expected { 0.0 } else { (found - expected).abs() };
         self.at_most(invariant, distance, allowed * expected.abs());
@@ -94,16 +94,16 @@ impl Tally {
     fn add(&mut self, index: u64, point: &dyn Debug, row: Row) {
         *self.statuses.entry(row.status.map_or("panicked", Status::name)).or_default() += 1;
         let mut failed = String::new();
-        for (invariant, share) in row.checks {
+        for (invariant, fraction) in row.checks {
             let fare = self.fares.entry(invariant).or_default();
             fare.points += 1;
-            if share > 1.0 {
+            if fraction > 1.0 {
                 fare.failures += 1;
-                failed += &format!(" {invariant} {share:.1e};");
+                failed += &format!(" {invariant} {fraction:.1e};");
             }
             // The first of equals, whatever the order in which threads come.
-            if share > fare.worst || (share == fare.worst && index < fare.at) {
-                (fare.worst, fare.at) = (share, index);
+            if fraction > fare.worst || (fraction == fare.worst && index < fare.at) {
+                (fare.worst, fare.at) = (fraction, index);
             }
         }
         if !failed.is_empty() {

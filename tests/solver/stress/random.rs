@@ -42,8 +42,8 @@ impl Random {
     /// Log-uniform.
     pub fn between(&mut self, least: f64, greatest: f64) -> f64 {
         // In two factors, since the ratio may overflow.
-        let share = self.uniform();
-        least.powf(1.0 - share) * greatest.powf(share)
+        let fraction = self.uniform();
+        least.powf(1.0 - fraction) * greatest.powf(fraction)
     }
 
     /// Log-uniform over the legal domain.
@@ -68,7 +68,7 @@ impl Random {
         f64::from_bits(x.to_bits().saturating_add_signed(steps)).clamp(f64::from_bits(1), f64::MAX)
     }
 
-    /// `x` changed by a share of 1e-15 to 1e-3.
+    /// `x` changed by a fraction of 1e-15 to 1e-3.
     fn compared_with(&mut self, x: f64) -> f64 {
         x * (1.0 + self.sign() * self.between(1e-15, 1e-3))
     }

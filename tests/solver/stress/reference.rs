@@ -65,7 +65,7 @@ fn reference_optima_of_the_sample() {
             close(row, "v_start", value.v_start, within(end("v_start")));
             close(row, "v_end", value.v_end, within(end("v_end")));
             close(row, "theta_max", value.theta_max, within(time));
-            // It vanishes at the cheapest time: a rounding of t_f moves it by that share of W/t_f.
+            // It vanishes at the cheapest time: a rounding of t_f moves it by that fraction of W/t_f.
             let small = row.number("work").abs() / (t_f * row.number("hamiltonian").abs());
             close(row, "hamiltonian", value.hamiltonian, within(time + f64::EPSILON * small));
             let hold = (value.time_at_floor - row.number("time_at_floor")).abs();

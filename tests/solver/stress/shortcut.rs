@@ -124,7 +124,7 @@ fn exists(name: &str, case: &Case, solved: &Result<Shortcut, Obstacle>, row: &mu
     }
 }
 
-/// The rounding of the time, spent at the greatest velocity, as a share of the work.
+/// The rounding of the time, spent at the greatest velocity, as a fraction of the work.
 fn slip(case: &Case, found: &Shortcut) -> f64 {
     f64::EPSILON * case.t_f * found.v_max * found.friction_max.abs() / found.work.abs()
 }

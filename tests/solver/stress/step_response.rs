@@ -11,7 +11,7 @@ use super::{POINTS, Row, sample};
 /// Velocities below this may have too few bits to scale.
 const TINY: f64 = 1e-300;
 
-/// Share of the points that are held to a finer accuracy.
+/// Fraction of the points that are held to a finer accuracy.
 const HELD: f64 = 0.05;
 
 /// How much finer the accuracy is to which a response is held.
