@@ -1,6 +1,6 @@
 //! Computes the numerics revision: a hash of the sources that the bytes of a part follow from.
 //!
-//! It is part of the identity of a dataset, beside the version: commits of one version may differ in their numbers. Nobody has to remember
+//! It is part of the identity of a dataset, with the version: commits of one version may differ in their numbers. Nobody has to remember
 //! to raise it. Comments and unit tests do not enter it.
 
 use std::path::{Path, PathBuf};

@@ -1,4 +1,4 @@
-//! One landscape point over the paper's landscape, in units of one scalar `f64::ln` and beside two floors, all measured
+//! One landscape point over the paper's landscape, in units of one scalar `f64::ln` and compared with two floors, all measured
 //! in the same run: two logarithms a node, over an array and vectorised (what a sum of `tau v` needs), and the
 //! multiplications and additions of the sum as it is done here, without logarithms, at the rate of independent ones.
 //! The choice of the rule, feasibility and `v_min` are in neither.

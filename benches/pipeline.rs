@@ -3,9 +3,9 @@
 //! `cargo bench --bench pipeline` computes the landscape of sixty durations (9.6 million rows) into memory on one and
 //! on two threads, then in turn with the same encoded into memory and with runs that write Parquet to disk, each several
 //! times, and prints the least time of each and their ratios. The floor of a run is the larger of computing and encoding
-//! where the two overlap, and their sum on a machine of one processor (`taskset -c 0`). Two runs side by side that share nothing tell what the machine allows a second thread. Then,
+//! where the two overlap, and their sum on a machine of one processor (`taskset -c 0`). Two runs side by side that share nothing show the gain of a second thread. Then,
 //! on other runs: rows a second against `rtol`, with what encoding and the disk add to the computation (a run whose
-//! files stay in memory tells them apart, where there is `/dev/shm`); what `ArrowWriter` would cost; the memory of ever longer
+//! files stay in memory distinguishes them, where there is `/dev/shm`); what `ArrowWriter` would cost; the memory of ever longer
 //! runs; and what the columns of some tables cost.
 
 use std::hint::black_box;
@@ -139,7 +139,7 @@ fn threads(folder: &Path) -> Outcome<()> {
     Ok(())
 }
 
-/// Rows a second against the accuracy asked for. Writing has threads of its own, so what it adds is not what it takes.
+/// Rows a second against the accuracy requested. Writing has threads of its own, so what it adds is not what it takes.
 fn accuracy(folder: &Path) -> Outcome<()> {
     let in_memory = Path::new(IN_MEMORY);
     let in_memory = in_memory.is_dir().then(|| in_memory.join(format!("slipsweep-pipeline-{}", std::process::id())));
@@ -183,7 +183,7 @@ fn memory(folder: &Path) -> Outcome<()> {
     Ok(())
 }
 
-/// The greatest resident memory of this process so far, in MiB, where the system tells.
+/// The greatest resident memory of this process so far, in MiB, where the system reports it.
 fn peak() -> Option<f64> {
     let status = std::fs::read_to_string("/proc/self/status").ok()?;
     let line = status.lines().find_map(|line| line.strip_prefix("VmHWM:"))?;

@@ -1,4 +1,4 @@
-//! One solve of the family `bounded_friction`, beside the same root by shooting with a library's ODE integrator, in the
+//! One solve of the family `bounded_friction`, compared with the same root by shooting with a library's ODE integrator, in the
 //! paper's forward direction and in the one that contracts. One core.
 //!
 //! `cargo bench --bench shortcut_friction`. The cases: 300 random ones (a, b in 0.01 … 0.1, v in 2 … 100, tau_M in 1.2 … 3, t_f in

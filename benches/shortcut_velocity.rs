@@ -1,4 +1,4 @@
-//! One solve of the families `step`, `cubic` and `bounded_velocity`, beside bounded_velocity solved the paper's way:
+//! One solve of the families `step`, `cubic` and `bounded_velocity`, compared with bounded_velocity solved the paper's way:
 //! shooting with a library's ODE integrator, at the same error. One core.
 //!
 //! `cargo bench --bench shortcut_velocity`. The cases: 1,000 random ones (a, b in 0.005 … 0.1, v_i in 2 … 50, v_f/v_i or

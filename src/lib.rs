@@ -2,7 +2,7 @@
 //!
 //! The rooms of the crate, each of which imports only from those before it:
 //!
-//! - [`model`]: the friction law, the change of velocity asked of it, and units;
+//! - [`model`]: the friction law, the change of velocity required of it, and units;
 //! - [`numerics`]: tools that know no friction;
 //! - [`protocol`]: the optimal protocol, its crossover times, and the cubic shortcuts;
 //! - [`stability`]: steady sliding of a block on a spring;

@@ -24,7 +24,7 @@ mod early {
     static LOOK: extern "C" fn() = look;
 
     extern "C" fn look() {
-        // Asks for the flags of the descriptor, which changes nothing.
+        // Reads the flags of the descriptor, which changes nothing.
         let is_closed = unsafe { libc::fcntl(libc::STDOUT_FILENO, libc::F_GETFD) } == -1;
         STDOUT_IS_CLOSED.store(is_closed, Ordering::Relaxed);
     }

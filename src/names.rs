@@ -96,7 +96,7 @@ mod tests {
     }
 
     #[test]
-    fn regress_a_name_of_megabytes_is_neither_compared_nor_told() {
+    fn regress_a_name_of_megabytes_is_neither_compared_nor_shown() {
         let name = "é".repeat(1 << 20);
         assert_eq!(nearest(&name, ["linspace"]), None);
         assert_eq!(shown(&name, 64), format!("{}...", "é".repeat(64)));

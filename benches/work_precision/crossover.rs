@@ -1,4 +1,4 @@
-//! The crossover time: ours is one quadrature, beside a bisection in `t_f` over optimal solves.
+//! The crossover time: ours is one quadrature, compared with a bisection in `t_f` over optimal solves.
 
 use std::rc::Rc;
 

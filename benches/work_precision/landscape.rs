@@ -40,7 +40,7 @@ pub fn subjects(tolerances: &[f64]) -> [Subject; 2] {
     ]
 }
 
-/// Whether a row is of the paper's landscapes and not put next to the border of feasibility.
+/// Whether a row is of the paper's landscapes and not put near the border of feasibility.
 fn is_paper(row: &Row) -> bool {
     let inside = |name: &str| row.number(name).abs() <= 0.5;
     transition(row) == (Transition { law: Law { a: 0.03, b: 0.05 }, v_i: 3.0, v_f: 100.0 })
@@ -137,7 +137,7 @@ impl Cubic {
     }
 }
 
-/// With the logarithm of ours, by vector instructions; infeasible where a node tells so.
+/// With the logarithm of ours, by vector instructions; infeasible where a node shows it.
 #[multiversion(targets(
     "x86_64+avx+avx2+bmi1+bmi2+avx512f+avx512bw+avx512cd+avx512dq+avx512vl",
     "x86_64+avx+avx2+bmi1+bmi2"

@@ -1,4 +1,4 @@
-//! Time against true error, ours beside what one would use instead, in one run on one core.
+//! Time against true error, ours compared with what one would use instead, in one run on one core.
 //!
 //! `cargo bench --bench work_precision` takes some minutes, prints tables in Markdown, and writes
 //! `results/work_precision.parquet` and a picture for each subject. `-- --quick` takes seconds, writes nothing, and gives

@@ -56,7 +56,7 @@ pub enum Kind {
 /// A way with its tolerance or number of nodes.
 pub struct Setting {
     pub name: String,
-    /// The relative error that is asked for, if it can be asked.
+    /// The relative error that is requested, if the method has one.
     pub tolerance: Option<f64>,
     pub solve: Box<Solve>,
 }
@@ -127,7 +127,7 @@ pub struct Record {
     pub fraction: f64,
 }
 
-/// A case fails if it is further off than so many times what was asked for.
+/// A case fails if it is further off than so many times what was requested.
 const WRONG: f64 = 1e3;
 
 /// And so does every error above this; none below the other one does.

@@ -69,7 +69,7 @@ fn truth(row: &Row) -> Truth {
         (true, false) => t_f - (1.0 / v_f - 1.0 / v_i),
     };
     let doubt = 8.0 * f64::EPSILON + 4.0 * f64::EPSILON * t_f / beyond;
-    // Without the bound v(0+) may be as small as e^(-1/a): its tenth is not asked for.
+    // Without the bound v(0+) may be as small as e^(-1/a): its tenth is not requested.
     let v_start = if bounded { row.number("v_start") } else { f64::NAN };
     Truth { answer: [row.number("work"), v_start], doubt }
 }

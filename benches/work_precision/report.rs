@@ -25,7 +25,7 @@ pub fn table(records: &[&Record], ln: f64) -> String {
             match fastest(&own, target) {
                 Some(record) => {
                     let in_ln = digits(record.ns / ln);
-                    // A tolerance follows from the error; a number of nodes is to be told.
+                    // A tolerance follows from the error; a number of nodes is an input.
                     let setting = match record.tolerance {
                         None if !record.setting.is_empty() => format!(" ({})", record.setting),
                         _ => String::new(),

@@ -72,7 +72,7 @@ fn ours(case: &Case, tolerance: f64) -> Option<Answer> {
     Some([end[0] / slider.a, end[1]])
 }
 
-/// To the time of the crossing, which it is told.
+/// To the time of the crossing, which is an input.
 fn explicit(case: &Case, tolerance: f64) -> Option<Answer> {
     let Scaled { slider, ratio } = &case.scaled;
     let (a, b, inertia, k) = (slider.a, slider.b, slider.inertia, slider.k);

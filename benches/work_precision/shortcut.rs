@@ -49,7 +49,7 @@ fn subject(cases: &'static str, rows: Vec<Row>, tolerances: &[f64]) -> Subject {
     Subject { name: "bounded_friction", cases, error, truths, rows: Vec::new(), judge, methods }
 }
 
-/// The relative error of the work, and that of alpha beside 1.
+/// The relative error of the work, and that of alpha compared with 1.
 fn judge(found: &Answer, truth: &Answer) -> f64 {
     let work = ((found[0] - truth[0]) / truth[0]).abs();
     let alpha = (found[1] - truth[1]).abs() / truth[1].abs().max(1.0);

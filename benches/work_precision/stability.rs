@@ -29,7 +29,7 @@ pub fn subject() -> Subject {
     };
     let cases = Rc::new(rows.iter().map(case).collect());
     let once = |name: &str, kind, solve: fn(&Case, f64) -> Option<Answer>| {
-        // Nothing is asked of the others.
+        // Nothing is required of the others.
         let tolerance = (kind == Kind::Ours).then_some(TOLERANCE);
         let setting = Setting { name: String::new(), tolerance, ..Setting::each(TOLERANCE, &cases, solve) };
         Method { name: name.into(), kind, settings: vec![setting] }

@@ -1,4 +1,4 @@
-//! Any text as a spec: it is refused with a message, or it is a sweep whose rows can be told.
+//! Any text as a spec: it is refused with a message, or it is a sweep whose rows can be enumerated.
 #![no_main]
 
 use std::path::Path;
@@ -29,7 +29,7 @@ fuzz_target!(|text: &str| {
     }
 });
 
-/// Whether a legal spec takes long because it asks for long: no defect, and no speed for finding one.
+/// Whether a legal spec takes long because it is large: no defect.
 fn is_long(text: &str) -> bool {
     let Ok(spec) = Spec::parse(text) else { return false };
     let top = spec.top();

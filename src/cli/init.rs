@@ -49,10 +49,10 @@ impl Question {
     }
 }
 
-/// The file with which editors complete and check specs, beside them.
+/// The file with which editors complete and check specs.
 const SCHEMA: &str = "slipsweep.schema.json";
 
-/// Writes a spec, and the schema beside it.
+/// Writes a spec and its JSON Schema.
 pub fn init(arguments: &Arguments) -> Result<(), Failure> {
     let given = arguments.name.display();
     let bare = match arguments.name.extension() {
@@ -91,7 +91,7 @@ pub fn init(arguments: &Arguments) -> Result<(), Failure> {
     write(&path, &text)?;
     let path = path.display();
     say(&format!(
-        "{path}: a spec to start from, with {SCHEMA} beside it, by which editors complete and check it\n\
+        "{path}: a commented spec, and {SCHEMA}, with which editors complete and check it\n\
          next:\n  slipsweep plan {path}\n  slipsweep run {path}\n"
     ))
 }

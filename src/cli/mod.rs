@@ -48,7 +48,7 @@ const WRONG: u8 = 1;
 const FAILED: u8 = 2;
 /// `--strict`, and some row is `not_converged`.
 const NOT_STRICT: u8 = 3;
-/// `--requeue`, and another try may mend what failed (EX_TEMPFAIL of sysexits.h).
+/// `--requeue`, and another try may fix what failed (EX_TEMPFAIL of sysexits.h).
 const AGAIN: u8 = 75;
 
 /// Exact parameter sweeps over the control of rate-and-state friction.
@@ -93,7 +93,7 @@ enum Command {
     Head(head::Arguments),
     /// Ask a dataset a question in SQL
     Query(query::Arguments),
-    /// Say what is there of a dataset, what is missing, and what would finish it
+    /// Report complete, missing, damaged and foreign parts of a dataset
     Status(status::Arguments),
     /// Write the job script of a sweep in fractions, for a scheduler, and say what to submit
     Shards(shards::Arguments),
@@ -109,7 +109,7 @@ enum Command {
     #[command(after_help = "Example:
   slipsweep schema > slipsweep.schema.json
 
-With `#:schema ./slipsweep.schema.json` as its first line, a spec beside that file is completed and checked by editors that
+With `#:schema ./slipsweep.schema.json` as its first line, a spec in its folder is completed and checked by editors that
 use taplo, such as VS Code with Even Better TOML. `slipsweep init` writes both.")]
     Schema,
     /// Print what makes a shell complete commands and flags
@@ -149,7 +149,7 @@ static STDOUT_IS_CLOSED: AtomicBool = AtomicBool::new(false);
 /// start, is a failure.
 pub fn main(stdout_is_closed: bool) -> ExitCode {
     STDOUT_IS_CLOSED.store(stdout_is_closed, Ordering::Relaxed);
-    tell_first_panic();
+    report_first_panic();
     // A file that grows beyond the limit of its user is then a write that fails, not the end of the process.
     #[cfg(unix)]
     let _ = signal_hook::flag::register(signal_hook::consts::SIGXFSZ, Arc::new(AtomicBool::new(false)));
@@ -247,7 +247,7 @@ fn load(path: &Path) -> Result<Sweep, Failure> {
     Ok(sweep)
 }
 
-/// The failure of somebody who asked for something wrong.
+/// The failure of a wrong request.
 fn wrong(message: impl Display) -> Failure {
     Failure { code: WRONG, message: format!("error: {message}") }
 }
@@ -287,12 +287,12 @@ fn note_at(path: &Path) {
     }
 }
 
-/// Lets the process tell of its first panic alone: the engine provokes others when it looks for the row that is to blame. Those of a reader
-/// of damaged files are told as what they are, faults of the file.
-fn tell_first_panic() {
-    let (usual, told) = (panic::take_hook(), AtomicBool::new(false));
+/// Reports only the first panic of the process: the engine provokes others when it searches the faulty row. Panics of a reader
+/// of damaged files are reported as faults of the file.
+fn report_first_panic() {
+    let (usual, known) = (panic::take_hook(), AtomicBool::new(false));
     panic::set_hook(Box::new(move |panic| {
-        if !crate::dataset::is_guarded() && !told.swap(true, Ordering::Relaxed) {
+        if !crate::dataset::is_guarded() && !known.swap(true, Ordering::Relaxed) {
             usual(panic);
         }
     }));

@@ -1,4 +1,4 @@
-//! Where an answer goes, standard output or a file, and in which format: the one asked for, or what the name of the file ends in.
+//! Where an answer goes, standard output or a file, and in which format: the one requested, or what the name of the file ends in.
 
 use std::io::{self, IsTerminal};
 use std::path::PathBuf;
@@ -37,8 +37,8 @@ impl<F: Format> Output<F> {
     /// The format that the arguments come to.
     pub fn format(&self) -> Result<F, Failure> {
         let ending = self.out.extension().map(|ending| ending.to_string_lossy().to_lowercase());
-        let told = ending.and_then(|ending| F::ENDINGS.iter().find(|(known, _)| *known == ending));
-        let format = match (self.format, told) {
+        let known = ending.and_then(|ending| F::ENDINGS.iter().find(|(known, _)| *known == ending));
+        let format = match (self.format, known) {
             (Some(format), _) | (None, Some(&(_, format))) => format,
             (None, None) if self.is_stdout() => F::TABLE,
             (None, None) => {

@@ -1,4 +1,4 @@
-//! `slipsweep plan SPEC`: what there is to do, before anything is done.
+//! `slipsweep plan SPEC`: rows, solves, time and size of a sweep, before it runs.
 
 use std::path::{Path, PathBuf};
 use std::thread::available_parallelism;

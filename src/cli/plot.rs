@@ -35,7 +35,7 @@ pub struct Arguments {
     /// Vertical axis of a map, or the column that lines show
     #[arg(long, value_name = "AXIS|COLUMN")]
     y: Option<String>,
-    /// Column of a map's colours, or the axis that tells lines apart
+    /// Column of a map's colours, or the axis that distinguishes lines
     #[arg(long, visible_alias = "colour", value_name = "COLUMN|AXIS")]
     color: Option<String>,
     /// A file, whose ending determines the format (.svg, .png, .pdf), or a folder [default: here, by the name of the dataset and the table]
@@ -70,13 +70,13 @@ fn in_range(text: &str, least: f64, most: f64) -> Result<f64, String> {
 
 impl From<PlotError> for Failure {
     fn from(error: PlotError) -> Failure {
-        // A damaged file is no fault of who asks for its picture.
+        // A damaged file is not a fault of the arguments.
         let code = if matches!(error, PlotError::Part(_) | PlotError::Trace(_)) { FAILED } else { WRONG };
         Failure { code, message: format!("error: {error}") }
     }
 }
 
-/// Draws what the arguments ask for.
+/// Draws the requested pictures.
 pub fn plot(arguments: &Arguments) -> Result<(), Failure> {
     let place = arguments.place()?;
     match arguments.sources.as_slice() {
@@ -84,7 +84,7 @@ pub fn plot(arguments: &Arguments) -> Result<(), Failure> {
         sources => {
             for source in sources {
                 if source.is_dir() && sources.len() > 1 {
-                    let found = format!("{}: a folder beside other arguments", source.display());
+                    let found = format!("{}: a folder with other arguments", source.display());
                     return Err(refused(found, "one dataset, or traces", "draw them one after the other"));
                 }
                 kind::expect(source, &[Kind::Dataset, Kind::Trace])?;
@@ -212,7 +212,7 @@ impl Arguments {
     }
 }
 
-/// What is left out of a figure, for who can ask for it.
+/// A note about omitted panels.
 fn remarks(figure: &Figure) -> String {
     figure.remarks.iter().map(|remark| format!("  {remark}\n")).collect()
 }

@@ -248,7 +248,7 @@ fn reason(status: ExitStatus, said: &str) -> String {
     let signal: Option<i32> = None;
     // SIGKILL is what a machine sends that has no memory left.
     if said.contains("memory allocation of") || signal == Some(9) {
-        return "the query needs more memory than there is\n  help: ask for less: fewer columns, a WHERE, a LIMIT; or join on a column"
+        return "the query needs more memory than is free\n  help: request fewer columns, a WHERE, a LIMIT; or join on a column"
             .to_owned();
     }
     if said.contains("overflowed its stack") {

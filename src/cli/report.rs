@@ -113,7 +113,7 @@ fn plan_of(page: &mut Page, spec: &str, folder: &Path) -> Result<(), Failure> {
             let estimates = waiting(&sample, || estimate(&sweep, folder)).map_err(Failure::failed)?;
             page.verbatim(&plan::in_words(&sweep, &estimates, 0.0));
         }
-        // Points are files beside the spec, not in the dataset.
+        // Points files are not in the dataset.
         Err(error) => page.words(&format!("It cannot be recomputed from the dataset alone: {}", error.found)),
     }
     Ok(())

@@ -33,7 +33,7 @@ pub struct Arguments {
     /// Compute only shard I of N, counted from 0; all shards may run at the same time
     #[arg(long, value_name = "I/N")]
     shard: Option<Shard>,
-    /// Exit with code 75, not 2, after a failure that another try may mend: schedulers then put the job back into the queue
+    /// Exit with code 75, not 2, after a failure that another try may fix: schedulers then put the job back into the queue
     #[arg(long)]
     requeue: bool,
     /// Say nothing but errors

@@ -60,7 +60,7 @@ impl Engine {
         }
     }
 
-    /// The job script of a dataset: beside its folder.
+    /// The job script of a dataset, in the folder of the dataset folder.
     fn script(self, dataset: &Path) -> PathBuf {
         let mut name = dataset.file_name().unwrap_or_default().to_owned();
         name.push(format!(".{}.sh", self.name()));
@@ -88,7 +88,7 @@ impl Engine {
     }
 }
 
-/// The scripts beside `dataset`: how many shards each has, and how to submit some of them.
+/// The job scripts of `dataset`: number of shards, and the command that submits some of them.
 pub fn scripts(dataset: &Path) -> Vec<(u64, impl Fn(&[u64]) -> String)> {
     let scripts = Engine::ALL.into_iter().filter_map(|engine| {
         let path = engine.script(dataset);
@@ -243,7 +243,7 @@ impl Job<'_> {
                     "#SBATCH --job-name={name}\n#SBATCH --array=0-{last}\n#SBATCH --cpus-per-task={cpus}\n#SBATCH --time={minutes}\n\
                      #SBATCH --requeue\n#SBATCH --open-mode=append\n#SBATCH --output=\"{log}-%a.log\"\n"
                 ),
-                "# Exit code 75 asks for another try, five times at most, where RequeueExit of Slurm has it.\n\
+                "# Exit code 75 requeues the task, at most five times, if it is in RequeueExit of Slurm.\n\
                  again=--requeue\n\
                  [ \"${SLURM_RESTART_COUNT:-0}\" -lt 5 ] || again=\n",
                 ("$SLURM_ARRAY_TASK_ID", " $again"),

@@ -1,4 +1,4 @@
-//! `slipsweep status DATASET`: what is there of a dataset, what is not, and what would finish it.
+//! `slipsweep status DATASET`: complete, missing, damaged and foreign parts of a dataset.
 
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
@@ -25,7 +25,7 @@ pub struct Arguments {
 /// Parts and files of each kind that are listed one by one. Chosen: five kinds fit a screen.
 const MAX_LISTED: usize = 10;
 
-/// Says what there is of a dataset.
+/// Reports the parts of a dataset.
 pub fn status(arguments: &Arguments) -> Result<(), Failure> {
     let path = &arguments.dataset;
     kind::expect_rows(path)?;

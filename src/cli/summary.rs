@@ -19,7 +19,7 @@ pub struct Arguments {
     dataset: PathBuf,
 }
 
-/// Tells what is in a dataset.
+/// Prints the summary of a dataset.
 pub fn summary(arguments: &Arguments) -> Result<(), Failure> {
     let (folder, manifest) = dataset(&arguments.dataset)?;
     let mut text = String::new();
@@ -130,7 +130,7 @@ fn ranges(statistics: &TableStatistics) -> Option<Piece> {
     (!ranges.is_empty()).then(|| Piece::Table(2, names.to_vec(), Vec::new(), ranges))
 }
 
-/// What a simpler theory predicts of a column, beside what was found.
+/// The prediction of linear theory for a column, compared with the rows.
 fn predicted(name: &str, statistics: &TableStatistics) -> Vec<Piece> {
     let prediction = table::find(name).and_then(|table| table.prediction());
     let Some(prediction) = prediction.filter(|_| !statistics.predicted.is_empty()) else { return Vec::new() };

@@ -481,7 +481,7 @@ impl Named {
     }
 }
 
-/// The parameters of a protocol in the units of what was asked for, each with its meaning.
+/// The parameters of a protocol in the units of the request, each with its meaning.
 fn parameters(request: &TraceRequest, path: &TracedPath) -> Vec<(Named, &'static str)> {
     let named = |parameter: &Parameter| {
         // The one parameter of a family that has a dimension.
@@ -496,7 +496,7 @@ fn parameters(request: &TraceRequest, path: &TracedPath) -> Vec<(Named, &'static
 
 /// What comes out.
 fn results(request: &TraceRequest, path: &TracedPath, trace: &Trace) -> [Named; 3] {
-    // The trace is in the units of what was asked for.
+    // The trace is in the units of the request.
     let velocity = |name, value| Named::new(name, value, si_name(&request.units, "v_0"));
     let work = Named::scaled("work", path.work, "mu_0 sigma l", &request.units);
     [work, velocity("v_min", trace.v_min), velocity("v_max", trace.v_max)]
@@ -542,7 +542,7 @@ fn status(status: Status) -> String {
     format!("{}{meaning}", status.name())
 }
 
-/// The columns with their units, aligned. Times that nine digits do not tell apart are shown with all of theirs.
+/// The columns with their units, aligned. Times that nine digits do not distinguish are shown with all of theirs.
 fn table(trace: &Trace, units: &Units) -> String {
     let nine: Vec<String> = trace.moments.iter().map(|moment| words::number(moment.t)).collect();
     let pairs = trace.moments.windows(2).zip(nine.windows(2));

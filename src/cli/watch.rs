@@ -1,4 +1,4 @@
-//! Watching what takes long: progress for whoever looks, and the wish to stop.
+//! Progress of long commands, and signals that stop them.
 
 use std::io::{IsTerminal, Write, stderr};
 use std::process;
@@ -103,7 +103,7 @@ fn while_looking<T>(mut look: impl FnMut(Option<i32>) + Send, work: impl FnOnce(
     })
 }
 
-/// Tells the watcher, when it goes, that there is nothing to watch any more.
+/// Ends the progress display on drop.
 struct End<'a> {
     finished: &'a AtomicBool,
     signals: &'a Signals,

@@ -1,6 +1,6 @@
 //! Files that are there whole or not at all.
 //!
-//! The bytes go to a name of their own, are synced, and the name is changed; then the folder is synced. A process that dies in between
+//! The bytes go to a name of their own, are synced, and the name is changed; then the folder is synced. A process that is killed in between
 //! leaves a temporary file behind, which [`sweep`] removes.
 
 use std::fs::{self, File, TryLockError};
@@ -8,7 +8,7 @@ use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant, SystemTime};
 
-/// Age from which a temporary file of another machine is taken for abandoned, by the clock of the file system. Writing one takes seconds.
+/// Age from which a temporary file of another machine is treated as abandoned, by the clock of the file system. Writing one takes seconds.
 const ABANDONED: Duration = Duration::from_secs(24 * 60 * 60);
 
 /// Times that a file is written if its temporary file vanishes, which happens where a machine takes a living process for dead.
@@ -76,7 +76,7 @@ fn publish<E>(
         return Err(failed("write", io::Error::new(io::ErrorKind::InvalidInput, "not the path of a file")));
     };
     let (temporary, mut file) = create(folder, &name.to_string_lossy()).map_err(|error| failed("create", error))?;
-    // Tells processes of this machine that the file has an owner. Where files cannot be locked, its age tells.
+    // A lock shows processes of this machine that the file has an owner. Without locks its age decides.
     let _ = file.try_lock();
     let written = fill(&mut file)
         .and_then(|()| file.sync_all().map_err(|error| failed("sync", error)))
@@ -89,7 +89,7 @@ fn publish<E>(
     written
 }
 
-/// Creates a temporary file for `name` that no other process has: its name tells machine and process, and a number if that is taken.
+/// Creates a temporary file for `name` that no other process has: its name holds machine, process and, if necessary, a number.
 fn create(folder: &Path, name: &str) -> io::Result<(PathBuf, File)> {
     let (machine, process) = (machine(), std::process::id());
     let mut number = 0_u32;
@@ -120,7 +120,7 @@ pub fn is_temporary(name: &str) -> bool {
 
 /// Removes the temporary files in `folder` whose processes are gone. `now` is the time by the clock of the file system.
 ///
-/// A process holds a lock on its temporary file as long as it lives. Locks may not reach other machines, so a file of another machine
+/// A process holds a lock on its temporary file as long as it runs. Locks may not reach other machines, so a file of another machine
 /// counts as abandoned only when it is old. That something cannot be removed is no failure: such files do no harm.
 pub fn sweep(folder: &Path, now: SystemTime) {
     let ours = format!("@{}{SUFFIX}", machine());
@@ -158,7 +158,7 @@ pub fn nearest_folder(folder: &Path) -> PathBuf {
     there.unwrap_or(Path::new(".")).to_owned()
 }
 
-/// How long the disk of `folder` takes for a file of so many `bytes`, which is removed again.
+/// Seconds to write a file of `bytes` bytes into `folder`. The file is removed again.
 pub fn time(folder: &Path, bytes: usize) -> io::Result<Duration> {
     let folder = nearest_folder(folder);
     let content = vec![0; bytes];

@@ -1,4 +1,4 @@
-//! A range of rows as an Arrow record batch, for whoever keeps tables in memory.
+//! A range of rows as an Arrow record batch.
 
 use std::ops::Range;
 use std::sync::Arc;

@@ -68,7 +68,7 @@ pub mod exact {
     }
 }
 
-/// A word as a list of one, which tells it from a number.
+/// A word as a list of one, which distinguishes it from a number.
 mod single {
     use super::Deserialize;
     use serde::{Deserializer, Serialize, Serializer};

@@ -1,6 +1,6 @@
 //! The checksums of a part, kept in its own footer.
 //!
-//! One is the SHA-256 of all bytes of the file: whoever has the file can check it, and no bit of it, not one of the footer either, can change
+//! One is the SHA-256 of all bytes of the file: anyone can check the file, and no bit of it, including the footer, can change
 //! unnoticed. The other is that of the footer and of the headers of the pages, which is checked whenever a part is opened. What is in the pages
 //! has checksums of its own (CRC-32), checked whenever a page is read. Checksums count as zeros where they are computed.
 

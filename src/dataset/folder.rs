@@ -131,7 +131,7 @@ pub enum DatasetError {
     },
     /// The system refused.
     #[error(
-        "{path}: cannot {action}: {source}\n  help: mend that, then run the same command again, which keeps what is finished; or write \
+        "{path}: cannot {action}: {source}\n  help: fix that, then run the same command again, which keeps what is finished; or write \
          elsewhere with --out DIR"
     )]
     Io {
@@ -277,7 +277,7 @@ impl Folder {
         Ok(())
     }
 
-    /// The numbers of the parts of `table` in whose place there is something, ascending. One look at the folder tells, so that parts
+    /// The numbers of the parts of `table` in whose place there is something, ascending. One listing of the folder suffices, so that parts
     /// that are missing cost nothing, however many.
     pub fn parts_there(&self, table: &ManifestTable) -> Vec<u64> {
         let entries = fs::read_dir(self.path.join(&table.name)).into_iter().flatten().flatten();

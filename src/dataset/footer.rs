@@ -14,7 +14,7 @@ use crate::protocol::Status;
 /// to which the hash of the table leads.
 const MAX_SPEC_BYTES: usize = 1 << 16;
 
-/// The origin of a part. Any part tells what the whole dataset consists of.
+/// The origin of a part. Any part describes the whole dataset.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Footer {
     /// The name of the dataset.

@@ -49,7 +49,7 @@ pub enum Cells {
 pub struct Frame {
     /// Rows.
     pub height: usize,
-    /// The columns asked for, in that order, each with its name.
+    /// The columns requested, in that order, each with its name.
     pub columns: Vec<(String, Cells)>,
 }
 
@@ -115,7 +115,7 @@ fn place(words: &mut Vec<String>, word: &str) -> u32 {
 }
 
 impl Frame {
-    /// The cells of a column; `None` if it was not asked for.
+    /// The cells of a column; `None` if it was not requested.
     pub fn column(&self, name: &str) -> Option<&Cells> {
         self.columns.iter().find(|(known, _)| known == name).map(|(_, cells)| cells)
     }

@@ -7,7 +7,7 @@ thread_local! {
     static GUARDED: Cell<bool> = const { Cell::new(false) };
 }
 
-/// Whether a panic of this thread is one that becomes a fault of a file, so that nobody has to be told of it.
+/// Whether a panic of this thread is one that becomes a fault of a file, so that it is not reported.
 #[cfg(feature = "cli")]
 pub fn is_guarded() -> bool {
     GUARDED.get()

@@ -26,9 +26,9 @@ const MOST_VALUES: i64 = 1 << 22;
 /// Most groups of rows, since their number has 16 bits.
 const MOST_GROUPS: i64 = i16::MAX as i64;
 
-/// What a Parquet file says of itself, checked: a few bytes can stand for any number of rows. Words are read as codes, whoever wrote them.
+/// What a Parquet file says of itself, checked: a few bytes can stand for any number of rows. Words are read as codes, from any writer.
 ///
-/// What Arrow or pandas add to a file about its types is not asked for: a column is what Parquet says that it is.
+/// Type hints of Arrow or pandas are ignored: the type of a column is that of Parquet.
 pub(crate) fn coded(file: &File) -> Result<ArrowReaderMetadata, ParquetError> {
     check_footer(file)?;
     let plain = ArrowReaderMetadata::load(file, ArrowReaderOptions::new().with_skip_arrow_metadata(true))?;
@@ -125,7 +125,7 @@ fn damaged(what: &str) -> ParquetError {
     ParquetError::General(format!("its {what} is damaged"))
 }
 
-/// Walks the struct that `bytes` begin with and tells `visit` of every whole number in it and of the length of every
+/// Walks the struct that `bytes` begin with and passes every integer in it to `visit`, and the length of every
 /// list, each with the numbers of the fields that lead there. Returns the length of the struct; `None` if it is damaged
 /// or goes on beyond `bytes`, or if a field is of another kind than `kind_of` says.
 fn walk(bytes: &[u8], kind_of: fn(&[i16]) -> Option<Kind>, visit: &mut dyn FnMut(&[i16], i64)) -> Option<usize> {
@@ -315,14 +315,14 @@ mod tests {
     use bytes::Bytes;
     use parquet::file::metadata::ParquetMetaDataReader;
 
-    fn told(result: Result<(), ParquetError>) -> String {
+    fn message(result: Result<(), ParquetError>) -> String {
         result.err().map_or_else(String::new, |error| error.to_string())
     }
 
-    /// What is told of a file that is nothing but this footer.
+    /// The error of a file that consists of this footer.
     fn footer(bytes: &[u8]) -> String {
         let length = u32::try_from(bytes.len()).expect("is short").to_le_bytes();
-        told(check_footer(&Bytes::from([bytes, &length, b"PAR1"].concat())))
+        message(check_footer(&Bytes::from([bytes, &length, b"PAR1"].concat())))
     }
 
     #[test]
@@ -368,7 +368,7 @@ mod tests {
         let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("fuzz/corpus/points/bare.parquet");
         let whole = std::fs::File::open(&path).expect("is there");
         let metadata = ParquetMetaDataReader::new().parse_and_finish(&whole).expect("is sound");
-        assert_eq!(told(check_pages(&whole, &metadata)), "");
-        assert!(told(check_pages(&Bytes::from("PAR1"), &metadata)).ends_with("its list of columns is damaged"));
+        assert_eq!(message(check_pages(&whole, &metadata)), "");
+        assert!(message(check_pages(&Bytes::from("PAR1"), &metadata)).ends_with("its list of columns is damaged"));
     }
 }

@@ -1,4 +1,4 @@
-//! Tables on disk: Parquet parts, the manifest beside them, and reading them back.
+//! Tables on disk: Parquet parts, the manifest, and their readers.
 
 pub(crate) mod atomic;
 mod batch;

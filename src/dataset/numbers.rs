@@ -119,7 +119,7 @@ fn split(values: &[f64], streams: &mut [u8]) -> Option<(f64, f64)> {
 
 /// Statistics of a column of doubles: `range` is its least and greatest value.
 pub fn double_statistics(range: Option<(f64, f64)>, nulls: u64) -> Statistics {
-    // Readers may compare zeros of either sign as equal: the format asks for the outer one.
+    // Readers may compare zeros of either sign as equal: the format requests the outer one.
     let least = range.map(|(least, _)| if least == 0.0 { -0.0 } else { least });
     let greatest = range.map(|(_, greatest)| if greatest == 0.0 { 0.0 } else { greatest });
     Statistics::double(least, greatest, None, Some(nulls), false)
@@ -149,12 +149,12 @@ mod tests {
     }
 
     #[test]
-    fn presence_is_told_cell_by_cell() {
+    fn presence_is_written_cell_by_cell() {
         for count in [0, 1, 63, 64, 65, 1000, 4096] {
             let cells = cells(count);
-            let told: Vec<bool> =
+            let present: Vec<bool> =
                 presence(&cells).into_iter().flat_map(|(code, length)| vec![code == 1; length]).collect();
-            assert_eq!(told, cells.iter().map(|cell| !cell.is_nan()).collect::<Vec<_>>());
+            assert_eq!(present, cells.iter().map(|cell| !cell.is_nan()).collect::<Vec<_>>());
             assert!(presence(&cells).windows(2).all(|pair| pair[0].0 != pair[1].0));
         }
     }

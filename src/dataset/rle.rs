@@ -21,7 +21,7 @@ pub fn encode(runs: impl IntoIterator<Item = (u32, usize)>, bit_width: u8) -> Ve
     encoder.bytes
 }
 
-/// Bits that tell `count` values apart, at least 1.
+/// Bits of `count` distinct values, at least 1.
 pub fn bit_width(count: usize) -> u8 {
     (usize::BITS - count.saturating_sub(1).leading_zeros()).max(1) as u8
 }

@@ -29,7 +29,7 @@ pub struct Session {
     _lock: Option<File>,
 }
 
-/// Whether a run allows another one beside it.
+/// Whether a run allows concurrent runs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Company {
     /// A run of the whole sweep is alone.
@@ -219,7 +219,7 @@ pub struct Holder {
 }
 
 impl Folder {
-    /// The runs of this machine that are writing the dataset, as far as the system lists them; no lock is taken for that.
+    /// The runs of this machine that are writing the dataset, as far as the system lists them. Takes no lock.
     pub fn runs(&self) -> Vec<Holder> {
         File::open(self.path()).map_or_else(|_| Vec::new(), |file| holders(&file))
     }

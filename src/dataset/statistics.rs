@@ -17,7 +17,7 @@ use crate::protocol::Status;
 use crate::protocol::shortcut::FAMILIES;
 use crate::table::{ColumnBuffer, Kind, OPTIMUM_AXES};
 
-/// Tables of at most this many rows are kept whole, and least values are told apart for at most this many transitions.
+/// Tables of at most this many rows are kept whole, and least values are distinguished for at most this many transitions.
 pub const FEW: usize = 12;
 
 /// The column whose least values are looked for.
@@ -76,7 +76,7 @@ pub struct Row {
 /// The rows of least gap with status `ok`, of protocols that arrive.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 struct Least {
-    /// Whether there are too many transitions to tell them apart: then the least of all is the only one here.
+    /// Whether there are too many transitions to distinguish them: then the least of all is the only one here.
     many: bool,
     /// One a transition and time, in the order of their first rows.
     each: Vec<Candidate>,
@@ -277,7 +277,7 @@ fn predicted(
     counted
 }
 
-/// What tells rows apart for which a least gap each is of interest: the optimal problem, or the transition and the family.
+/// The key of a least gap: the optimal problem, or the transition and the family.
 fn is_key(name: &str, has_family: bool) -> bool {
     let axis = if has_family { Quantity::Time } else { Quantity::Family };
     name != axis.name() && (name == Quantity::Family.name() || OPTIMUM_AXES.iter().any(|axis| axis.name() == name))
@@ -349,7 +349,7 @@ fn least(
         }
     }
     if many {
-        // Where they are not told apart, the first row is that of the least gap.
+        // Where they are not distinguished, the first row is that of the least gap.
         found.iter_mut().for_each(|(_, first, least)| *first = *least);
     }
     (many, found.into_iter().map(|(_, first, least)| (first, least)).collect())

@@ -111,7 +111,7 @@ impl Stretch {
     }
 
     /// Whether a row determines `quantity`: an axis of the rows, or computed from such axes.
-    pub fn tells(&self, quantity: Quantity) -> bool {
+    pub fn determines(&self, quantity: Quantity) -> bool {
         let is_there = |root: &Quantity| self.axis(*root).is_some();
         self.block.scale(quantity).is_some() && self.block.roots(&[quantity]).iter().all(is_there)
     }

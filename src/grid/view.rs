@@ -72,7 +72,7 @@ impl<'a> View<'a> {
                 }
             }
             let made = block.derived.iter().map(|derived| derived.quantity);
-            let made: Vec<Quantity> = made.filter(|quantity| stretch.tells(*quantity)).collect();
+            let made: Vec<Quantity> = made.filter(|quantity| stretch.determines(*quantity)).collect();
             if made.is_empty() {
                 return point;
             }
@@ -88,7 +88,7 @@ impl<'a> View<'a> {
     /// The values of `quantity` over `rows` as runs; `None` without such an axis.
     pub fn runs(&self, quantity: Quantity, rows: Range<u64>) -> Option<Runs> {
         let stretches = self.row_index.stretches();
-        if !stretches.iter().all(|stretch| stretch.tells(quantity)) {
+        if !stretches.iter().all(|stretch| stretch.determines(quantity)) {
             return None;
         }
         let segments: Vec<Segment> = self.segments(rows.clone()).collect();

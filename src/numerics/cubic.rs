@@ -139,7 +139,7 @@ impl ExactCubic {
     }
 }
 
-/// A simple real zero next to `x`, by Newton's method.
+/// A simple real zero near `x`, by Newton's method.
 fn refined([c0, c1, c2, c3]: [DoubleDouble; 4], x: f64) -> DoubleDouble {
     let mut x = DoubleDouble::new(x);
     let mut last = f64::INFINITY;

@@ -54,7 +54,7 @@ pub fn ln_1p(x: f64) -> f64 {
     ln_grown(x, 1.0 / (1.0 + x))
 }
 
-/// [`ln_1p`] for whoever has `1/(1 + x)`.
+/// [`ln_1p`] from `1/(1 + x)`.
 #[inline(always)]
 pub fn ln_grown(x: f64, inverse: f64) -> f64 {
     let sum = 1.0 + x;

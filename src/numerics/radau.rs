@@ -31,7 +31,7 @@ pub struct Radau {
     slopes: [Nodes; NODES],
     /// The slope at 0 of the same polynomials.
     slopes_at_0: Nodes,
-    /// Weights of the two highest Legendre coefficients that the nodes tell.
+    /// Weights of the two highest Legendre coefficients that the nodes determine.
     highest: [Nodes; 2],
 }
 
@@ -182,7 +182,7 @@ fn make() -> Radau {
         }
     }
     for j in 0..NODES {
-        // The slope of a constant is 0: that tells the diagonal, with the place 0 in the sum.
+        // The slope of a constant is 0: that determines the diagonal, with the place 0 in the sum.
         let entry = |k: usize| rule.barycentric[k] / rule.barycentric[j] / (places[j] - places[k]);
         let others: Vec<f64> = (0..=NODES).map(|k| if k == j { 0.0 } else { entry(k) }).collect();
         for k in 0..NODES {

@@ -3,7 +3,7 @@
 /// The value and the slope of a function at one point.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Probe {
-    /// Value; its sign tells on which side the root lies.
+    /// Value; its sign determines on which side the root lies.
     pub value: f64,
     /// Derivative with respect to the argument.
     pub slope: f64,

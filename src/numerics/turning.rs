@@ -92,7 +92,7 @@ pub struct Turnings<const N: usize> {
     pub u: [f64; N],
     /// `U - 1`.
     pub excess: [f64; N],
-    /// `(U - 1)/w` as a fraction `over/under`, so that whoever divides by it divides only once.
+    /// `(U - 1)/w` as a fraction `over/under`, so that a division by it is the only one.
     pub over: [f64; N],
     /// See `over`.
     pub under: [f64; N],

@@ -3,7 +3,7 @@
 /// Distance, as a fraction of the panel, up to which two curves are one. The width of a line: 1.1 points in a panel 100 points high.
 const MAX_DISTANCE: f64 = 0.01;
 
-/// Points of a curve whose distance from another is computed. Chosen: closer ones are not told apart in print.
+/// Points of a curve whose distance from another is computed. Chosen: closer ones are not distinguished in print.
 const MAX_POINTS: usize = 400;
 
 /// Whether two curves with values at the same places coincide, in fractions of the panel.

@@ -1,4 +1,4 @@
-//! Colours that the colour-blind tell apart, and that print in grey: a map for numbers, and styles for series.
+//! Colours for colour-blind readers and for print in grey: a map for numbers, and styles for series.
 
 use super::canvas::Stroke;
 

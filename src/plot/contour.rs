@@ -55,7 +55,7 @@ fn crossings(corner: usize, columns: usize, height: impl Fn(usize) -> f64) -> Ve
         (0..4).filter(|&side| above[side] != above[(side + 1) % 4]).map(|side| edges[side]).collect();
     match crossed[..] {
         [a, b] => vec![(a, b)],
-        // A saddle: the mean tells which corners belong together.
+        // A saddle: the mean determines which corners belong together.
         [a, b, c, d] if (heights.iter().sum::<f64>() >= 0.0) == above[0] => vec![(a, b), (c, d)],
         [a, b, c, d] => vec![(d, a), (b, c)],
         _ => Vec::new(),

@@ -28,7 +28,7 @@ pub enum PlotError {
         path: String,
         /// The line, from 1.
         line: usize,
-        /// What is there.
+        /// The found names.
         found: String,
         /// What should be.
         expected: String,
@@ -47,7 +47,7 @@ pub enum PlotError {
         /// The columns that it has.
         found: Vec<String>,
     },
-    /// More traces than can be told apart.
+    /// More traces than can be distinguished.
     #[error("{found} traces are too many for one picture\n  expected: at most {most}")]
     TooManyTraces {
         /// So many were given.
@@ -56,7 +56,7 @@ pub enum PlotError {
         most: usize,
     },
     /// There is nothing to draw.
-    #[error("nothing to draw: no number in what was asked for")]
+    #[error("nothing to draw: no number in what was requested")]
     Nothing,
     /// No table of that name.
     #[error("the dataset has no table `{name}`\n  found: {}\n  help: {}", .found.join(", "), hint(.name, .found))]
@@ -77,7 +77,7 @@ pub enum PlotError {
         what: &'static str,
         /// The name.
         name: String,
-        /// What there is.
+        /// The known names.
         found: Vec<String>,
     },
     /// A condition that cannot be read.
@@ -146,7 +146,7 @@ pub enum PlotError {
     #[error("cannot convert the picture: {0}\n  help: write it as .svg")]
     Convert(String),
     /// More pixels than can be held.
-    #[error("a picture of {width} x {height} pixels is too large\n  help: ask for fewer with --dpi")]
+    #[error("a picture of {width} x {height} pixels is too large\n  help: request fewer with --dpi")]
     Size {
         /// Width in pixels.
         width: f64,

@@ -6,13 +6,13 @@ use super::label;
 use super::scale::{Scale, Tick, Ticks};
 use super::symbol::{self, STAR_RADIUS, Symbol};
 
-/// Height of letters, in points. Chosen: as in the captions of journals, legible in print.
+/// Height of letters, in points. Chosen: as in the captions of journals, readable in print.
 const SIZE: f64 = 7.5;
 
 /// Height of the numbers at ticks, in points. Chosen: a little below the labels of axes.
 const TICK_SIZE: f64 = 7.0;
 
-/// Height of the letters of notes, in points. Chosen: the least that is legible in print.
+/// Height of the letters of notes, in points. Chosen: the least that is readable in print.
 const NOTE_SIZE: f64 = 6.2;
 
 /// Length of a tick with a number, in points; others have 0.6 of it. Chosen: a third of its number.
@@ -93,7 +93,7 @@ pub struct Colours {
 /// A pair of axes and what is between them.
 #[derive(Debug, Clone)]
 pub struct Panel {
-    /// What tells it from the others, in markup.
+    /// Its distinguishing text, in markup.
     pub title: String,
     /// The horizontal axis.
     pub x: Axis,
@@ -131,7 +131,7 @@ pub enum Layer {
     Bars(Vec<(f64, f64, f64)>, [u8; 3]),
     /// Small marks at points.
     Marks(Vec<((f64, f64), Symbol)>),
-    /// Names of points, in markup, beside them.
+    /// Names of points, in markup.
     Names(Vec<((f64, f64), String)>),
     /// A star.
     Star((f64, f64)),
@@ -190,7 +190,7 @@ impl Hover {
 /// An entry of a legend.
 #[derive(Debug, Clone)]
 pub struct Entry {
-    /// What is drawn beside the words.
+    /// The sample of a legend entry.
     pub key: Key,
     /// The words, in markup.
     pub text: String,
@@ -388,8 +388,9 @@ impl Figure {
         if let Some(colours) = &self.colours {
             let first = top + layout.aboves.first().copied().unwrap_or(0.0);
             let tall = y - layout.belows.last().copied().unwrap_or(0.0) - first;
-            let beside = if self.rows.is_empty() { 0.0 } else { ROW_TITLE_WIDTH };
-            let area = Area { x: MARGIN + inner + beside + BAR_SPACE, y: first, width: BAR_WIDTH, height: tall };
+            let row_title_width = if self.rows.is_empty() { 0.0 } else { ROW_TITLE_WIDTH };
+            let area =
+                Area { x: MARGIN + inner + row_title_width + BAR_SPACE, y: first, width: BAR_WIDTH, height: tall };
             colours.draw(canvas, area, as_powers);
         }
         (y, hovers)
@@ -446,7 +447,7 @@ impl Ticks {
     }
 
     /// Draws the ticks and the numbers of a vertical axis to the right or to the left of `area`.
-    fn draw_beside(&self, canvas: &mut Canvas, area: Area, is_right: bool, is_labelled: bool) {
+    fn draw_side_axis(&self, canvas: &mut Canvas, area: Area, is_right: bool, is_labelled: bool) {
         let x = if is_right { area.x + area.width } else { area.x };
         let mut edge = f64::INFINITY;
         for tick in &self.ticks {
@@ -508,7 +509,7 @@ impl Panel {
         self.layers.iter().for_each(|layer| self.mark(canvas, area, layer));
         self.draw_words_above(canvas, area);
         plan.x.draw_below(canvas, area, plan.x_label);
-        plan.y.draw_beside(canvas, area, false, plan.y_label);
+        plan.y.draw_side_axis(canvas, area, false, plan.y_label);
         let middle = Text { anchor: Anchor::Middle, ..LABEL };
         if plan.x_label {
             let place = (area.x + 0.5 * area.width, area.y + area.height + TICK_LENGTH + TICK_SIZE + 4.0 + SIZE);
@@ -649,7 +650,7 @@ fn apart(wishes: &[(f64, f64)], low: f64, high: f64) -> Vec<f64> {
                 blocks.push(before);
                 break;
             }
-            // The middle of a block that grows at its end is where its words wish it, shifted by what they are beside it.
+            // The middle of a block that grows at its end is the place of its words, shifted by their own offset.
             let shift = |block: &Block, by: f64| block.wish + by * block.words as f64;
             let wish = shift(&before, 0.5 * last.width) + shift(&last, -0.5 * before.width);
             last = Block { wish, width: before.width + last.width, words: before.words + last.words };
@@ -687,7 +688,7 @@ fn draw_contour(canvas: &mut Canvas, lines: &[Vec<(f64, f64)>], stroke: &Stroke)
     canvas.lines(lines, stroke);
 }
 
-/// Draws the name of a row beside its mark, on the side where it stays inside.
+/// Draws the name of a row near its mark, on the side where it stays inside.
 fn draw_name(canvas: &mut Canvas, area: Area, (x, y): (f64, f64), name: &str) {
     let wide = NOTE_SIZE * label::width(name) + 4.0;
     let (place, anchor) =
@@ -726,7 +727,7 @@ impl Colours {
         }
         canvas.frame(area, &Stroke::solid("#000", FRAME_WIDTH));
         let ticks = self.scale.ticks(6, as_powers);
-        ticks.draw_beside(canvas, area, true, true);
+        ticks.draw_side_axis(canvas, area, true, true);
         let mut words = self.label.clone();
         if ticks.power != 0 {
             words.push_str(&format!(" (10^{{{}}})", label::signed(ticks.power)));
@@ -739,7 +740,7 @@ impl Colours {
 
 #[cfg(test)]
 mod tests {
-    //! Words beside each other; maps of fewer values.
+    //! Layout of words; thinned maps.
 
     use super::{Hover, apart};
 

@@ -8,7 +8,7 @@ use std::sync::OnceLock;
 use ttf_parser::Face;
 
 /// The fonts of every picture, upright and italic: Arimo, as wide as Arial, Helvetica and Liberation Sans, one of which a viewer of an
-/// SVG has. Their licence is beside them.
+/// SVG has. Their licence is in the same folder.
 pub const FONTS: [&[u8]; 2] = [include_bytes!("fonts/arimo-Regular.ttf"), include_bytes!("fonts/arimo-Italic.ttf")];
 
 /// The families of a text, in the order of preference.
@@ -227,7 +227,7 @@ fn trimmed(digits: &str) -> &str {
     if digits.contains('.') { digits.trim_end_matches('0').trim_end_matches('.') } else { digits }
 }
 
-/// Cuts a text in markup into lines of at most `most` (in units of the font size), between words, but not beside a sign of equality.
+/// Cuts a text in markup into lines of at most `most` (in units of the font size), between words, but not near a sign of equality.
 pub fn wrapped(markup: &str, most: f64) -> Vec<String> {
     let mut lines: Vec<String> = Vec::new();
     // Spaces within equations, while the text is cut.

@@ -1,4 +1,4 @@
-//! A page of HTML that holds everything it shows: sections, pictures whose maps tell their values, tables that sort.
+//! A page of HTML that holds everything it shows: sections, pictures whose maps show their values, sortable tables.
 
 use super::canvas::escaped;
 use super::figure::{Axis, Drawn, Hover, Shown};

@@ -6,7 +6,7 @@ use super::label;
 pub const LOG_RATIO: f64 = 30.0;
 
 /// The same ratio of the values above zero where others are zero, which a logarithm cannot show. Chosen: many decades are worth their loss.
-const LOG_RATIO_BESIDE_ZERO: f64 = 1e9;
+const LOG_RATIO_WITH_ZERO: f64 = 1e9;
 
 /// Size, relative to the greatest value, below which values may be zeros: a few thousand roundings of 1.1e-16 each.
 const ROUNDING_RTOL: f64 = 1e-12;
@@ -61,7 +61,7 @@ impl Scale {
         }
         let zero = rounding(&finite, high);
         let (least, _) = span(&mut finite.iter().copied().filter(|value| *value > zero));
-        let ratio = if low == 0.0 { LOG_RATIO_BESIDE_ZERO } else { LOG_RATIO };
+        let ratio = if low == 0.0 { LOG_RATIO_WITH_ZERO } else { LOG_RATIO };
         Some(if high / least >= ratio { Scale { low: least, high, log: true } } else { linear })
     }
 
@@ -248,7 +248,7 @@ mod tests {
         assert_eq!(labels(scale(1e-7, 1.0), 4), ["10^{−6}", "10^{−4}", "10^{−2}", "10^{0}"]);
         assert_eq!(labels(scale(0.01, 10.0), 4), ["0.01", "0.1", "1", "10"]);
         assert_eq!(labels(scale(3.0, 7.0), 4), ["3", "4", "5", "6", "7"]);
-        // One format a scale: no 0.01 beside a power of ten.
+        // One format a scale: no 0.01 near a power of ten.
         assert_eq!(labels(scale(1e-3, 1e3), 7), ["0.001", "0.01", "0.1", "1", "10", "100", "1000"]);
         assert_eq!(labels(scale(1e-4, 1.0), 5), ["10^{−4}", "10^{−3}", "10^{−2}", "10^{−1}", "10^{0}"]);
     }
@@ -259,10 +259,10 @@ mod tests {
         assert_eq!(Scale::of([1e-14, 3e-16, 0.02, 0.5, 3.0]), log(0.02, 3.0));
         // Without them there is no need of a logarithm.
         assert_eq!(Scale::of([1e-14, 1.0, 3.0]), Some(Scale { low: 1e-14, high: 3.0, log: false }));
-        // A curve that comes down step by step is no zero, and neither is a small number beside one that is not much greater.
+        // A curve that comes down step by step is no zero, and neither is a small number near one that is not much greater.
         assert_eq!(Scale::of([1.0, 1e-5, 1e-10, 1e-15]), log(1e-15, 1.0));
         assert_eq!(Scale::of([1.0, 1e-8]), log(1e-8, 1.0));
-        // Zeros beside values of a few decades need none, beside many they do.
+        // Zeros near values of a few decades need none, near many they do.
         assert_eq!(Scale::of([0.0, 1e-3, 1.0, 10.0]), Some(Scale { low: 0.0, high: 10.0, log: false }));
         assert_eq!(Scale::of([0.0, 1e-10, 1e-4, 1.0]), log(1e-10, 1.0));
     }

@@ -265,7 +265,7 @@ fn equations(parameters: &[&(String, f64)], time: &str) -> String {
     parameters.iter().map(equation).collect::<Vec<_>>().join(", ")
 }
 
-/// What tells courses apart, and which line is the control.
+/// The legend: differences between the traces, and the line of the control.
 fn legend(traces: &[TraceFile], leaders: &[usize], common: &[&(String, f64)]) -> Vec<Entry> {
     let name = |trace: &TraceFile| {
         let own: Vec<_> = trace.parameters.iter().filter(|entry| !common.contains(entry)).collect();

@@ -150,7 +150,7 @@ impl Tables {
     /// What is wrong with a question.
     fn explain(&self, sql: &str, error: &PolarsError) -> QueryError {
         let text = error.to_string();
-        // The first line says it, before lists of what there is and plans of queries.
+        // The first line says it, before lists of names and query plans.
         let line = text.lines().next().unwrap_or_default().trim_end_matches(':');
         if line.contains("unable to find column") {
             let name = line.split('"').nth(1).unwrap_or_default();

@@ -32,7 +32,7 @@ pub struct Source {
     pub(super) words: Vec<String>,
     /// Its Parquet files.
     pub(super) files: Option<Files>,
-    /// The table, to be read as far as it is asked for.
+    /// The table, read lazily.
     pub(super) frame: LazyFrame,
 }
 

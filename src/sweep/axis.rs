@@ -138,7 +138,7 @@ impl Draft<'_> {
             return refuse(key, format!("both {one} and {other}"), "one of them", "remove one of the two");
         }
         if form.seed.is_some() && form.sobol.is_none() && form.lhs.is_none() {
-            return refuse(format!("{key}.seed"), "a seed of nothing", "sobol or lhs beside it", "remove it");
+            return refuse(format!("{key}.seed"), "a seed of nothing", "sobol or lhs in the same axis", "remove it");
         }
         match form {
             AxisForm { linspace: Some(numbers), .. } => self.range(false, numbers),

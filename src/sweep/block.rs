@@ -190,7 +190,7 @@ impl Draft<'_> {
             }
         };
         if zips.iter().flatten().chain(zip).any(|other| other.quantity == axis.quantity) {
-            return refuse(key, format!("`{name}` is there twice"), "each axis in one zip", "remove one of the two");
+            return refuse(key, format!("`{name}` is a duplicate"), "each axis in one zip", "remove one of the two");
         }
         if let Some(first) = zip.first()
             && first.values.len() != axis.values.len()

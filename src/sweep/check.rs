@@ -284,7 +284,7 @@ struct Draft {
 fn tables(spec: &Spec, blocks: &mut [Checked], faults: &mut Faults) -> Vec<Draft> {
     if spec.tables.is_empty() && !faults.concern("tables") {
         let expected = format!("at least one of {}", table::ALL.map(|table| table.name()).join(", "));
-        faults.push(SpecError::new("tables", "no table is asked for", expected, "add a line such as [tables.optimal]"));
+        faults.push(SpecError::new("tables", "no table is requested", expected, "add a line such as [tables.optimal]"));
     }
     spec.tables.iter().filter_map(|(name, table)| draft(name, table, spec.accuracy.rtol, blocks, faults)).collect()
 }
@@ -409,7 +409,7 @@ fn projection(table: &dyn Table, key: &str, names: Option<&[String]>, faults: &m
         match known.iter().position(|column| column == name) {
             _ if name == STATUS => {}
             Some(index) if indices.contains(&index) => {
-                let found = format!("`{name}` is there twice");
+                let found = format!("`{name}` is a duplicate");
                 faults.push(SpecError::new(key, found, "each column once", "remove one of the two"));
             }
             Some(index) => indices.push(index),
@@ -420,7 +420,7 @@ fn projection(table: &dyn Table, key: &str, names: Option<&[String]>, faults: &m
     if indices.is_empty() && !faults.concern(&key) {
         let expected = format!("at least one of {}", known.join(", "));
         let help = "name columns, or remove `columns` to have the usual ones";
-        faults.push(SpecError::new(key, "no column is asked for", expected, help));
+        faults.push(SpecError::new(key, "no column is requested", expected, help));
     }
     Projection::new(indices)
 }

@@ -378,7 +378,7 @@ fn header<'a>(place: &impl Display, names: impl Iterator<Item = &'a str>) -> Res
             }
         }
         if columns.iter().any(|other| other.name == name) {
-            let found = format!("{place}: column `{name}` is there twice");
+            let found = format!("{place}: column `{name}` is a duplicate");
             return Err(fault(found, "each column once", "remove one of the two"));
         }
         let label = || Cells::Label(Texts::default());

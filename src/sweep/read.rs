@@ -48,7 +48,7 @@ fn syntax(text: &str, error: &toml::de::Error) -> SpecError {
     let (message, span) = (error.message(), error.span());
     let fault = if message.starts_with("duplicate key") {
         let name = span.clone().and_then(|span| text.get(span)).unwrap_or_default();
-        SpecError::new("", format!("the key `{name}` is there twice"), "each key once", "remove one of the two")
+        SpecError::new("", format!("the key `{name}` is a duplicate"), "each key once", "remove one of the two")
     } else {
         let expected = "key = value, [table] or # comment";
         SpecError::new("", format!("not TOML: {message}"), expected, "correct the line")

@@ -8,7 +8,7 @@ use crate::model::{Scales, Units};
 /// The keys of `[model]` that determine the units.
 pub const UNIT_KEYS: [&str; 5] = ["units", "mu_0", "l", "v_0", "normal_stress"];
 
-/// The units that `model` asks for.
+/// The units of `model`.
 pub fn units(model: &ModelSpec) -> Result<Units, SpecError> {
     let scales = [
         ("mu_0", model.mu_0, "1"),
@@ -21,7 +21,7 @@ pub fn units(model: &ModelSpec) -> Result<Units, SpecError> {
             None => Ok(Units::Scaled),
             Some((name, ..)) => {
                 let (key, help) = (format!("model.{name}"), "add `units = \"si\"` and give SI values, or remove it");
-                refuse(key, "a scale of a dimensionless sweep", "units = \"si\" beside it", help)
+                refuse(key, "a scale of a dimensionless sweep", "&", help)
             }
         },
         "si" => {

@@ -110,9 +110,9 @@ fn compute(job: &Job<'_>, range: Range<u64>, buffer: &mut ColumnBuffer) -> Resul
         let path =
             (is_held || is_followed).then(|| compliant::path(&slider, velocities(point), t_f, job.rtol).ok()).flatten();
         let sampling_error =
-            path.as_ref().filter(|_| is_held).and_then(|path| told_by(held_error(path, dt, job.rtol), &mut work));
+            path.as_ref().filter(|_| is_held).and_then(|path| value_of(held_error(path, dt, job.rtol), &mut work));
         let open_loop_error =
-            path.as_ref().filter(|_| is_followed).and_then(|path| told_by(open_loop_error(path, job.rtol), &mut work));
+            path.as_ref().filter(|_| is_followed).and_then(|path| value_of(open_loop_error(path, job.rtol), &mut work));
         (
             status,
             Some(Row { member, slider, t_f, least, amplification, sampling_error, open_loop_error, work_error }),
@@ -122,7 +122,7 @@ fn compute(job: &Job<'_>, range: Range<u64>, buffer: &mut ColumnBuffer) -> Resul
 }
 
 /// The number that a simulation gives; its statistics are added.
-fn told_by(followed: Followed, work: &mut RunStats) -> Option<f64> {
+fn value_of(followed: Followed, work: &mut RunStats) -> Option<f64> {
     *work +=
         RunStats { simulations: u64::from(followed.steps > 0), steps: followed.steps.into(), ..RunStats::default() };
     followed.number
@@ -151,7 +151,7 @@ impl MemberCache {
             *work += RunStats { shortcuts: 1, ..RunStats::from(solved.stats) };
             let wanted = job.projection.has(AMPLIFICATION) && solved.value.is_some();
             let path = wanted.then(|| compliant::path(&slider, velocities, t_f, job.rtol).ok()).flatten();
-            let amplification = path.and_then(|path| told_by(amplification(&path, job.rtol), work));
+            let amplification = path.and_then(|path| value_of(amplification(&path, job.rtol), work));
             let work_error =
                 solved.value.filter(|_| job.projection.has_any([WORK_ERROR, GAP_ERROR])).and_then(|member| {
                     let finest = compliant::solve(&slider, velocities, t_f, error::FINEST);

@@ -142,7 +142,7 @@ fn compute(
         ..*job
     };
     let mut all = RunStats::default();
-    // One after another: the threads share each landscape, so a part holds one landscape in memory.
+    // One after another: all threads work on one landscape, so a part holds one landscape in memory.
     for (place, row) in rows.enumerate() {
         let (status, cells, work) = reduction.cells(job, &landscape, row * each..(row + 1) * each)?;
         buffer.status[place] = status;

@@ -1,4 +1,4 @@
-//! The protocols that can be traced, by name, and what is said of one beside its moments.
+//! The protocols that can be traced, by name, and their parameters.
 
 use crate::model::Transition;
 use crate::protocol::cubic::{Landscape, LandscapeBuffers};

@@ -21,8 +21,8 @@ pub enum Pathless {
     /// Its status says that there is none.
     #[error("{0}")]
     Status(&'static str),
-    /// A number that tells the protocol was not written.
-    #[error("it has no `{0}`, which tells the protocol")]
+    /// A number that determines the protocol was not written.
+    #[error("it has no `{0}`, which the protocol needs")]
     Missing(&'static str),
     /// The response to a step goes on and on.
     #[error("the response to a step has no duration of its own\n  help: add --t-f T, in the units of the dataset")]

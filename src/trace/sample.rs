@@ -130,7 +130,7 @@ impl Samples {
                 next += 1;
             }
             let moment = samples[next].moment;
-            // Of moments that time does not tell apart the last one stands, which leads on.
+            // Of moments that time does not distinguish the last one stands, which leads on.
             if rows.len() > 1 && rows[rows.len() - 1].t == moment.t {
                 rows.pop();
             }

@@ -31,7 +31,7 @@ pub fn check(row: &Row, context: &Context, rtol: f64) -> Verdict {
     verdict.friction(row, cubic.friction_min());
     if let Some(optimum) = solve(&problem, t_f, context.bounded) {
         verdict.compare(row, "work_optimal", Some(optimum.work), None);
-        // Good to 1e-7 of itself, whatever rtol. The difference of two integrations tells it to 1e-12, or to what they
+        // Good to 1e-7 of itself, whatever rtol. The difference of two integrations determines it to 1e-12, or to what they
         // leave of the works.
         let gap = (work - optimum.work) / optimum.work;
         let written = [("work", work), ("work_optimal", optimum.work)];

@@ -2,7 +2,7 @@
 
 use super::extremal::{least_time, solve};
 use super::formula_path::{Formula, FormulaPath, State, arriving};
-use super::open_loop::{Told, growth, is_stiff};
+use super::open_loop::{ControlledProtocol, growth, is_stiff};
 use super::verdict::{Context, Verdict, number, transition, word};
 use crate::dataset::{Cell, Row};
 use crate::model::Transition;
@@ -55,7 +55,7 @@ pub fn check(row: &Row, context: &Context, rtol: f64) -> Verdict {
         FormulaPath { problem, t_f, formula, backward: false }
     };
     let Some(alpha) = number(row, "alpha").or_else(|| member(&problem, formula_path)) else {
-        verdict.miss("alpha was not written, and theta at the end does not tell it");
+        verdict.miss("alpha was not written, and theta at the end does not determine it");
         return verdict;
     };
     let here = formula_path(alpha);
@@ -79,14 +79,21 @@ pub fn check(row: &Row, context: &Context, rtol: f64) -> Verdict {
     verdict.compare(row, "v_c_min", Some(low), size);
     verdict.compare(row, "v_c_max", Some(high), size);
     verdict.compare(row, "stiffness_ratio", Some(if m > 0.0 { k * t_f * t_f / m } else { f64::INFINITY }), None);
-    let told = Told { slider, v_i: problem.v_i, v_f: problem.v_f, t_f, velocity: |x| exponent.velocity(x), control };
+    let protocol = ControlledProtocol {
+        slider,
+        v_i: problem.v_i,
+        v_f: problem.v_f,
+        t_f,
+        velocity: |x| exponent.velocity(x),
+        control,
+    };
     let least = states.iter().map(|y| here.velocity(y)).fold(f64::INFINITY, f64::min);
     // What the spring pulls with, in units of a, and what it would under the greatest control alone: rounding of the one, and
     // an error of the other, are felt in proportion.
     let pull = |y: &State| (here.friction(y) + m * exponent.moment(y[2], t_f)[1]).abs() / problem.law.a;
     let pull = states.iter().map(pull).fold(0.0, f64::max);
     let reach = if k.is_finite() { k / problem.law.a * t_f * low.abs().max(high.abs()) } else { 0.0 };
-    open_loop(&mut verdict, row, &told, &Along { formula_path: &here, states: &states, least, pull, reach }, rtol);
+    open_loop(&mut verdict, row, &protocol, &Along { formula_path: &here, states: &states, least, pull, reach }, rtol);
     compare_optimum(&mut verdict, row, &problem, t_f, context);
     verdict
 }
@@ -109,8 +116,8 @@ const MOST_SAMPLES: f64 = 3000.0;
 /// Amplifications below this have fewer digits.
 const FORGOTTEN: f64 = 1e-2;
 
-/// The columns that tell what becomes of the protocol open loop.
-fn open_loop<V, C>(verdict: &mut Verdict, row: &Row, told: &Told<V, C>, along: &Along<'_>, rtol: f64)
+/// The columns of open-loop control.
+fn open_loop<V, C>(verdict: &mut Verdict, row: &Row, protocol: &ControlledProtocol<V, C>, along: &Along<'_>, rtol: f64)
 where
     V: Fn(f64) -> f64,
     C: Fn(f64, f64) -> f64,
@@ -129,11 +136,11 @@ where
     if grown.or(held).or(closed).is_none() {
         return;
     }
-    if is_stiff(&told.slider, along.least, told.t_f) {
+    if is_stiff(&protocol.slider, along.least, protocol.t_f) {
         verdict.miss("motions too stiff for an explicit integrator");
         return;
     }
-    let Some(growth) = growth(&told.slider, along.formula_path, along.states, &told.velocity) else {
+    let Some(growth) = growth(&protocol.slider, along.formula_path, along.states, &protocol.velocity) else {
         verdict.miss("motions too stiff for an explicit integrator");
         return;
     };
@@ -141,21 +148,21 @@ where
     verdict.compare_number(row, "amplification", growth.whole, growth.whole.max(FORGOTTEN).max(noise));
     // An error of the control, good to rtol, has grown at the end from anywhere on the way.
     let felt = (1.0 + along.reach + 1e-14 / rtol * along.pull) * (1.0 + growth.most);
-    let mut compare = |column: &'static str, dt: Option<f64>, scale: f64| match told.miss(dt) {
+    let mut compare = |column: &'static str, dt: Option<f64>, scale: f64| match protocol.miss(dt) {
         Some(expected) => verdict.compare_number(row, column, expected, scale.max(expected)),
         None => verdict.miss("motions too stiff for an explicit integrator"),
     };
     if closed.is_some() {
         compare("open_loop_error", None, felt);
     }
-    if held.is_some() && told.t_f / dt <= MOST_SAMPLES {
+    if held.is_some() && protocol.t_f / dt <= MOST_SAMPLES {
         compare("sampling_error", Some(dt), felt);
     } else if held.is_some() {
         verdict.miss("controls sampled more than 3000 times");
     }
 }
 
-/// The parameter for which theta arrives; `None` where that does not tell it.
+/// The parameter for which theta arrives; `None` where that does not determine it.
 fn member(problem: &Transition, formula_path: impl Fn(f64) -> FormulaPath) -> Option<f64> {
     const CLOSE: f64 = 1e-10;
     let miss = |alpha: f64| {

@@ -17,7 +17,7 @@ pub struct Extremal {
     pub c: f64,
     /// Largest contact lifetime.
     pub theta_max: f64,
-    /// Work of the same protocol varied as asked for; `None` where that is not admissible.
+    /// Work of the same protocol varied as requested; `None` where that is not admissible.
     pub varied: Option<f64>,
 }
 
@@ -216,7 +216,7 @@ fn at(problem: &Transition, member: Member, bounded: bool, variation: Option<&Va
     }
 }
 
-/// A hold that takes this long brings theta so close to 1 that the end does not tell it any more.
+/// A hold that takes this long brings theta so close to 1 that the end does not determine it any more.
 const LONG: f64 = 12.0;
 
 /// The optimum of a long duration: what comes after the hold hardly depends on it.

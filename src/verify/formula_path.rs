@@ -86,7 +86,7 @@ impl FormulaPath {
 /// far a slightly different one gets; `formula_path(alpha)` makes a protocol.
 pub fn arriving(alpha: f64, end: f64, target: f64, formula_path: impl Fn(f64) -> FormulaPath) -> f64 {
     const NUDGE: f64 = 1e-6;
-    // What the integrator leaves: a long protocol forgets its parameter, which then cannot be told from where it ends.
+    // What the integrator leaves: a long protocol forgets its parameter, which then cannot be distinguished from where it ends.
     const NOISE: f64 = 3e-11;
     if (end - target).abs() <= NOISE {
         return alpha;

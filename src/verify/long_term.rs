@@ -13,7 +13,7 @@ pub struct Extremum {
     /// `ln(v/v_f)`.
     pub x: f64,
     pub t: f64,
-    /// Over how long it cannot be told from its neighbours.
+    /// Over how long it cannot be distinguished from its neighbours.
     pub flatness: f64,
 }
 
@@ -60,7 +60,7 @@ const MOST_LEGS: u32 = 5_000;
 /// Velocities beyond `e^this v_f` without mass count as infinite.
 const ENDLESS: f64 = 60.0;
 
-/// Within this distance from steady sliding that is stable nothing happens any more, nor within a fraction of what is to be told.
+/// Within this distance from steady sliding that is stable nothing happens any more, nor within a fraction of what is to be reported.
 const QUIET: f64 = 1e-5;
 const UNTOLD: f64 = 0.1;
 
@@ -75,7 +75,7 @@ const SLOW: f64 = 0.8;
 
 const TOO_LONG: &str = "responses too long or too stiff for an explicit integrator";
 
-/// Follows the response from `e^x v_f` to its end, whose numbers are to be told to `rtol`.
+/// Follows the response from `e^x v_f` to its end, whose numbers are to be known to `rtol`.
 pub fn follow(block: &Block, stable: bool, x: f64, rtol: f64) -> Simulation {
     let quiet = QUIET.min(UNTOLD * rtol);
     let mut watch = Watch {

@@ -87,7 +87,7 @@ pub fn verify(path: &Path, manifest: &Manifest, sample: u64, seed: u64) -> Resul
         let (mut rows, missing) = sample::rows(&folder, table, sample, seed).map_err(VerifyError)?;
         let relative = relative(&spec, &folder, table)?;
         let context = Context { bounded: spec.model.velocity_bound, relative };
-        // What a landscape is told in is compared as it was written.
+        // Reduced rows are compared as they were written.
         if let Some(table) = table::find(&table.name).filter(|_| !is_reduced) {
             units::scale(&mut rows, table, &units, relative);
         }
@@ -130,7 +130,7 @@ pub fn verify(path: &Path, manifest: &Manifest, sample: u64, seed: u64) -> Resul
 /// Whether `alpha_2`, `alpha_3` of `table` are given relative to the duration.
 fn relative(spec: &Spec, folder: &Folder, table: &ManifestTable) -> Result<[bool; 2], VerifyError> {
     let has_points = spec.points.is_some() || spec.block.iter().any(|block| block.points.is_some());
-    // What a file of points holds is told by the parts alone.
+    // The content of a points file is in the parts alone.
     let headings = match folder.parts_there(table).first() {
         Some(&part) if has_points => {
             frame::headings(&folder.part(&table.name, part)).map_err(|error| VerifyError(error.to_string()))?.0

@@ -1,4 +1,4 @@
-//! A shortcut driven open loop: how small errors grow, and where the block ends under a control that is told or held.
+//! A shortcut driven open loop: how small errors grow, and where the block ends under a continuous or a sampled control.
 //!
 //! In the variables of the model, `v`, `theta` and the spring's length `s`, with the library's explicit integrator.
 
@@ -117,8 +117,8 @@ fn norm(matrix: &Matrix) -> f64 {
     size * (0.5 * logarithm).exp()
 }
 
-/// A protocol to be told to the spring, over the fraction `x` of the time.
-pub struct Told<V, C> {
+/// A protocol as control of the spring, over the fraction `x` of the time.
+pub struct ControlledProtocol<V, C> {
     pub slider: SpringBlock,
     pub v_i: f64,
     pub v_f: f64,
@@ -129,11 +129,11 @@ pub struct Told<V, C> {
     pub control: C,
 }
 
-impl<V: Fn(f64) -> f64, C: Fn(f64, f64) -> f64> Told<V, C> {
+impl<V: Fn(f64) -> f64, C: Fn(f64, f64) -> f64> ControlledProtocol<V, C> {
     /// Distance from the target at the end, in `(ln v, ln theta, k s/a)`, of a block that starts in steady sliding, under
-    /// the control told continuously or, every `dt`, sampled and held.
+    /// the control continuous, or sampled every `dt` and held.
     pub fn miss(&self, dt: Option<f64>) -> Option<f64> {
-        let &Told { slider: SpringBlock { law, k, m }, v_i, v_f, t_f, .. } = self;
+        let &ControlledProtocol { slider: SpringBlock { law, k, m }, v_i, v_f, t_f, .. } = self;
         let (ratio, pull) = (law.b / law.a, k / law.a);
         // p = (k s - tau_ss(v_f))/a, y = ln(theta v_f), x = ln(v/v_f), and ln theta of the protocol.
         let start = (v_i / v_f).ln();

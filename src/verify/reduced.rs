@@ -1,4 +1,4 @@
-//! `gap_min`, `gap_quantiles`, `gap_histogram`: the landscape of the row, computed again and told in another way; some of its shortcuts
+//! `gap_min`, `gap_quantiles`, `gap_histogram`: the landscape of the row, computed and reduced independently; some of its shortcuts
 //! are solved by the route that checks `gap`.
 
 use std::path::Path;
@@ -52,7 +52,7 @@ const CLASSES: [(&str, f64); 11] = [
 
 /// What is known of a landscape once all of it was seen.
 #[derive(Default)]
-struct Told {
+struct Reduced {
     status: [u64; Status::ALL.len()],
     /// Number and cells of the first shortcut of least gap.
     least: Option<(u64, Vec<f64>)>,
@@ -64,16 +64,16 @@ struct Told {
 /// Checks a row as it was `written`, in `units`.
 pub fn check(written: &Row, units: &Units, spec: &Spec, context: &Context) -> Verdict {
     let Some(sweep) = landscape(written, spec) else {
-        return Verdict::unchecked("what its shortcuts are is told by a file of points");
+        return Verdict::unchecked("its shortcuts are in a points file");
     };
     let (stores, signal) = (sweep.optimum_cache(), Signal::default());
     let (Some(request), Some(optima)) = (sweep.requests.first(), stores.first()) else {
-        return Verdict::unchecked("its spec does not ask for it");
+        return Verdict::unchecked("its spec does not request it");
     };
     let job = sweep.job(request, optima, &signal);
     let mut verdict = Verdict::default();
     let mut buffer = ColumnBuffer::new(request.projection.indices().len());
-    let mut told = Told::default();
+    let mut reduced = Reduced::default();
     let cells =
         |buffer: &ColumnBuffer, place: usize| buffer.columns.iter().map(|column| column[place]).collect::<Vec<f64>>();
     let all = request.rows;
@@ -88,7 +88,7 @@ pub fn check(written: &Row, units: &Units, spec: &Spec, context: &Context) -> Ve
             break;
         }
         for (row, place) in rows.zip(0..) {
-            told.see(written, row, buffer.status[place], || cells(&buffer, place));
+            reduced.see(written, row, buffer.status[place], || cells(&buffer, place));
             if solved.contains(&row) {
                 let shortcut = shortcut(&sweep, row, &cells(&buffer, place), buffer.status[place]);
                 let mut shortcut = [(row, shortcut)];
@@ -107,10 +107,10 @@ pub fn check(written: &Row, units: &Units, spec: &Spec, context: &Context) -> Ve
         Status::BelowBound,
         Status::Infeasible,
     ];
-    let status = order.into_iter().find(|status| told.status[*status as usize] > 0);
+    let status = order.into_iter().find(|status| reduced.status[*status as usize] > 0);
     verdict.compare_word(written, STATUS, status.map_or("", Status::name));
     if status != Some(Status::NotConverged) {
-        told.compare(written, &sweep, &mut verdict);
+        reduced.compare(written, &sweep, &mut verdict);
     }
     verdict
 }
@@ -159,7 +159,7 @@ fn shortcut(sweep: &Sweep, row: u64, cells: &[f64], status: Status) -> Row {
 /// Where `gap` stands among the columns of the table `gap`.
 const GAP: usize = 2;
 
-impl Told {
+impl Reduced {
     fn see(&mut self, written: &Row, row: u64, status: Status, cells: impl FnOnce() -> Vec<f64>) {
         self.status[status as usize] += 1;
         if status != Status::Ok {

@@ -1,4 +1,4 @@
-//! `regularised`: its pieces built anew between moments of the optimum that a library integrates, and followed.
+//! `regularised`: its pieces built again between moments of the optimum that a library integrates, and followed.
 
 use super::extremal::{Extremal, least_time, solve};
 use super::formula_path::{Formula, FormulaPath, State};
@@ -46,7 +46,7 @@ struct Found<'a> {
     excess: f64,
     /// Work of what was replaced: the size of what the excess is a difference of.
     replaced: f64,
-    /// `theta` over what of it a piece takes, `int theta v dt`: where that is little, its rounding tells less of the piece.
+    /// `theta` over what of it a piece takes, `int theta v dt`: where that is little, its rounding limits the piece.
     vague: f64,
     v: [f64; 2],
     friction_min: f64,
@@ -78,18 +78,18 @@ impl Found<'_> {
         let law = self.slider.law;
         let friction = |moment: &Moment| 1.0 + law.a * moment.q[0] + law.b * moment.y;
         self.friction_min = moments.iter().map(friction).fold(self.friction_min, f64::min);
-        let told = |moment: &Moment| self.control(moment.velocity(), moment.y);
+        let control_velocity = |moment: &Moment| self.control(moment.velocity(), moment.y);
         let extreme = |sign: f64| {
-            let places = moments.iter().enumerate().map(|(i, moment)| (i, sign * told(moment)));
+            let places = moments.iter().enumerate().map(|(i, moment)| (i, sign * control_velocity(moment)));
             let (place, least) = places.min_by(|a, b| a.1.total_cmp(&b.1)).unwrap_or((0, f64::NAN));
-            let f = |s: f64| at(s).map_or(f64::INFINITY, |moment| sign * told(&moment));
+            let f = |s: f64| at(s).map_or(f64::INFINITY, |moment| sign * control_velocity(&moment));
             sign * golden(&f, place.saturating_sub(1) as f64, (place + 1).min(LEGS) as f64).min(least)
         };
         self.take([f64::INFINITY, f64::NEG_INFINITY], [extreme(1.0), extreme(-1.0)]);
         moments.pop()
     }
 
-    /// A piece between two moments `time` apart in place of `work`; `outer` tells which are ends of the protocol.
+    /// A piece between two moments `time` apart in place of `work`; `outer` determines which are ends of the protocol.
     fn replace(&mut self, ends: [Moment; 2], outer: [bool; 2], time: f64, work: f64) -> Option<()> {
         let mut piece = Piece::new(self.slider.law, 0.0, ends, outer, time)?;
         let off_bound = ends.iter().all(|end| end.q[0] > 0.0);
@@ -304,8 +304,8 @@ fn again<'a>(
             (end, worked(start, floor)? + end.work, t_f - delta_t)
         };
         for moment in [leaving, held(start)] {
-            let told = found.control(moment.velocity(), moment.y);
-            found.take([1.0, 1.0], [told, told]);
+            let control_velocity = found.control(moment.velocity(), moment.y);
+            found.take([1.0, 1.0], [control_velocity, control_velocity]);
         }
         found.replace([held(start), end], [false, false], until - start, work)?;
         (from, gone) = (end, until);
@@ -325,7 +325,7 @@ fn again<'a>(
 const MOST_VAGUE: f64 = 1e5;
 
 /// Below this, `v(0+)` hardly counts in the time that determines it.
-const FAINT: f64 = 0.1;
+const MIN_START_VELOCITY: f64 = 0.1;
 
 pub fn check(row: &Row, context: &Context, rtol: f64) -> Verdict {
     let numbers = ["t_f", "k", "m", "delta_t"].map(|name| number(row, name));
@@ -362,18 +362,18 @@ pub fn check(row: &Row, context: &Context, rtol: f64) -> Verdict {
     let gap = found.excess / best.work;
     verdict.compare(row, "gap", Some(gap), Some(gap.abs() + 1e-11 * found.replaced / best.work / rtol));
     verdict.compare(row, "v_max", Some(found.v[1]), None);
-    if best.v_start < FAINT {
+    if best.v_start < MIN_START_VELOCITY {
         verdict.miss("ranges of pieces that lead to a near standstill");
         return verdict;
     }
     if found.vague > MOST_VAGUE {
-        verdict.miss("ranges of pieces that take too little of theta to be told from it");
+        verdict.miss("ranges of pieces that take too little of theta to be distinguished from it");
         return verdict;
     }
-    let told = 1.0 + 1e-13 * found.vague / rtol;
-    verdict.compare(row, "v_min", Some(found.v[0]), Some(told * found.v[0]));
+    let size = 1.0 + 1e-13 * found.vague / rtol;
+    verdict.compare(row, "v_min", Some(found.v[0]), Some(size * found.v[0]));
     let range = if k.is_finite() { found.control } else { found.v };
-    let size = told * range[0].abs().max(range[1].abs());
+    let size = size * range[0].abs().max(range[1].abs());
     verdict.compare(row, "v_c_min", Some(range[0]), Some(size));
     verdict.compare(row, "v_c_max", Some(range[1]), Some(size));
     verdict.friction(row, found.friction_min);

@@ -10,8 +10,8 @@ use crate::dataset::Row;
 use crate::model::Transition;
 use crate::table::STATUS;
 
-/// An end this close to the target (in `ln theta`) tells that the protocol was followed.
-const TOLD: f64 = 1e-9;
+/// Greatest distance of the end from the target, in `ln theta`, of a protocol that was followed.
+const MAX_END_ERROR: f64 = 1e-9;
 
 /// A relative change of alpha that is rounding.
 const MOVED: f64 = 1e-9;
@@ -29,7 +29,7 @@ pub fn check(row: &Row, context: &Context) -> Verdict {
         _ => return Verdict::unchecked("status is neither ok, below_bound, negative_friction nor infeasible"),
     }
     let Some(bound) = obstacle(&problem, t_f, family, tau_ceiling, context.bounded) else {
-        return Verdict::unchecked("too close to the border to tell whether the family has a member");
+        return Verdict::unchecked("too close to the border to determine whether the family has a member");
     };
     let mut verdict = Verdict::default();
     verdict.status(row, bound.is_some());
@@ -41,7 +41,7 @@ pub fn check(row: &Row, context: &Context) -> Verdict {
         return verdict;
     }
     if tau_ceiling == f64::INFINITY && family == "bounded_friction" {
-        verdict.miss("without a bound on friction alpha is 0, which tells nothing");
+        verdict.miss("without a friction ceiling alpha is 0, which has no effect");
         return verdict;
     }
     let alpha = number(row, "alpha");
@@ -60,10 +60,10 @@ pub fn check(row: &Row, context: &Context) -> Verdict {
     match alpha {
         Some(alpha) if alpha != 0.0 => {
             let arriving = arriving(alpha, end[0], target, formula_path);
-            let doubtful = (end[0] - target).abs() > TOLD;
-            let tells = arriving.is_finite() && (arriving - alpha).abs() > MOVED * alpha.abs();
-            if doubtful && !tells {
-                // A change of its last digits moves the end: as a double alpha does not tell the protocol.
+            let doubtful = (end[0] - target).abs() > MAX_END_ERROR;
+            let determines = arriving.is_finite() && (arriving - alpha).abs() > MOVED * alpha.abs();
+            if doubtful && !determines {
+                // A change of its last digits moves the end: as a double alpha does not determine the protocol.
                 verdict.miss("alpha has too few digits to follow the protocol again");
                 return verdict;
             }

@@ -28,7 +28,7 @@ fn size(x: Complex) -> f64 {
     x[0].high.hypot(x[1].high)
 }
 
-/// Most rounds of the iteration: roots that differ by many decades are told apart by a factor a round.
+/// Most rounds of the iteration: roots that differ by many decades are distinguished by a factor a round.
 const ROUNDS: u32 = 2000;
 
 /// The roots of `x^n + c[n - 1] x^(n - 1) + … + c[0]` (Weierstrass, Durand, Kerner); `None` if they do not come to rest.
@@ -105,13 +105,13 @@ pub fn check(row: &Row, _: &Context) -> Verdict {
         roots([double(k) / a, c / a]).map(Vec::from)
     };
     let Some([growth, frequency, decay]) = all.map(modes) else {
-        verdict.miss("two eigenvalues are too close to be told apart");
+        verdict.miss("two eigenvalues are too close to be distinguished");
         return verdict;
     };
     // At the critical stiffness it is 0, which has no relative error.
     let modulus = growth.hypot(frequency);
     verdict.compare(row, "growth_rate", Some(v * growth), Some(v * growth.abs().max(1e-20 * modulus)));
-    // Next to a double root the frequency is the root of a small difference.
+    // Near a double root the frequency is the root of a small difference.
     verdict.compare(row, "frequency", Some(v * frequency), Some(v * modulus));
     verdict.compare(row, "decay_rate", (m > 0.0).then_some(v * decay), None);
     verdict

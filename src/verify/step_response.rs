@@ -11,7 +11,7 @@ use crate::stability::SteadySliding;
 use crate::table::STATUS;
 
 /// A step of less than this about unstable sliding comes too late to be followed.
-const FAINT: f64 = 1e-4;
+const MIN_AMPLITUDE: f64 = 1e-4;
 
 /// A turn this many rtol from the edge of the band of settled velocities may or may not leave it.
 const HAIR: f64 = 10.0;
@@ -49,7 +49,7 @@ pub fn check(row: &Row, _: &Context, rtol: f64) -> Verdict {
         return verdict;
     }
     let start = (v_i / v_f).ln();
-    if !stable && start.abs() < FAINT {
+    if !stable && start.abs() < MIN_AMPLITUDE {
         verdict.miss("steps of less than 1e-4 about unstable sliding");
         return verdict;
     }
@@ -102,7 +102,7 @@ pub fn check(row: &Row, _: &Context, rtol: f64) -> Verdict {
         Ok(LongTermBehaviour::Cycle(cycle)) => {
             verdict.compare_word(row, "outcome", "limit_cycle");
             verdict.compare_word(row, "stick_slip", "yes");
-            // A cycle that hardly attracts hardly tells where it is.
+            // A cycle that hardly attracts hardly determines where it is.
             let vague = (1e-10 / (1.0 - cycle.fraction) / rtol).max(1.0);
             let (top, bottom) = (high.max(cycle.high), low.min(cycle.low));
             compare_status(&mut verdict, bottom);

@@ -119,7 +119,7 @@ impl Verdict {
 /// The status of a path with friction below 0.
 pub const NEGATIVE: &str = "negative_friction";
 
-/// Least friction, in mu_0 sigma, that an independent route tells from 0: a hundred times the tolerance of its integrator.
+/// Least friction, in mu_0 sigma, that an independent route distinguishes from 0: a hundred times the tolerance of its integrator.
 const ZERO: f64 = 1e-9;
 
 pub fn number(row: &Row, column: &str) -> Option<f64> {

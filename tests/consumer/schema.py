@@ -1,6 +1,6 @@
-"""Validates specs against the JSON Schema: every good spec passes, every bad one fails that a schema can tell.
+"""Validates specs against the JSON Schema: every good spec passes, every bad one fails that a schema can detect.
 
-Usage: schema.py SCHEMA SPEC..., the output of `slipsweep schema`, and good specs beside those in sweeps/.
+Usage: schema.py SCHEMA SPEC..., the output of `slipsweep schema`, and good specs in addition to those in sweeps/.
 """
 
 import json

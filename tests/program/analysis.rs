@@ -45,7 +45,7 @@ fn refused(folder: &Path, arguments: &[&str]) -> (i32, String) {
 }
 
 #[test]
-fn summary_tells_what_the_run_told() {
+fn summary_repeats_the_report_of_the_run() {
     let folder = landscape();
     let run = printed(folder.path(), &["run", "spec.toml"]);
     let summary = printed(folder.path(), &["summary", "results/test"]);
@@ -73,7 +73,7 @@ optimal: 3 rows (3 ok)
 }
 
 #[test]
-fn what_is_missing_is_told() {
+fn missing_parts_are_reported() {
     let folder = landscape();
     let lost = folder.path().join("results/test/gap/part-000001.parquet");
     fs::remove_file(&lost).expect("was there");
@@ -165,7 +165,7 @@ fn a_reader_that_has_had_enough_is_no_failure() {
 }
 
 #[test]
-fn wrong_questions_are_answered_with_what_there_is() {
+fn wrong_questions_are_answered_with_the_known_names() {
     let folder = small();
     let tables = "  expected: a SELECT from these tables:\n    \
                   optimal: t_f, a, b, v_i, v_f, work, v_start, v_end, time_at_floor, hamiltonian, theta_max, strategy, status\n    \

@@ -39,7 +39,7 @@ fn batches_are_the_parts() {
         let sweep = crate::common::sweep(folder.path(), &axes, &asked);
         crate::common::run(&sweep, &folder.path().join("results"), 2);
         for table in tables {
-            let batches = sweep.batches(table).expect("is asked for");
+            let batches = sweep.batches(table).expect("is requested");
             let schema = batches.schema();
             let batches: Vec<RecordBatch> = batches.collect::<Result<_, _>>().expect("are computed");
             let parts = written(&folder.path().join("results/test"), table, batches.len());

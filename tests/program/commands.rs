@@ -22,7 +22,7 @@ fn write_spec(folder: &Path, axes: &str, tables: &str) {
 }
 
 #[test]
-fn run_tells_what_a_physicist_asks() {
+fn run_reports_the_answers_of_a_physicist() {
     let folder = tempfile::tempdir().expect("is writable");
     write_spec(folder.path(), LANDSCAPE, "[tables.gap]\n[tables.best_cubic]\n[tables.optimal]\n[tables.crossover]\n");
     let output = slipsweep(folder.path()).args(["run", "spec.toml"]).output().expect("runs");
@@ -128,7 +128,7 @@ fn an_interrupted_run_leaves_whole_parts_and_goes_on() {
     assert_eq!(output.status.code(), Some(0));
 
     for (name, code) in [("INT", 130), ("TERM", 143)] {
-        // A busy machine stretches seconds: one prompt end of five is asked for, everything else of each.
+        // A busy machine stretches seconds: one prompt end of five is required, everything else of each.
         let attempt = |number| interrupt(folder.path(), &format!("{name}-{number}"), name, code, &whole);
         assert!((0..5).map(attempt).any(|seconds| seconds < Duration::from_secs(1)));
     }
@@ -225,9 +225,9 @@ fn a_command_that_reads_can_be_stopped() {
         let kill = Command::new("kill").args(["-s", signal, &child.id().to_string()]).status().expect("runs");
         assert!(kill.success());
         let output = child.wait_with_output().expect("ends");
-        let told = String::from_utf8_lossy(&output.stderr);
+        let reported = String::from_utf8_lossy(&output.stderr);
         assert_eq!(
-            (output.status.code(), told.as_ref()),
+            (output.status.code(), reported.as_ref()),
             (Some(code), "stopped while reading the spec; nothing is changed\n")
         );
     }

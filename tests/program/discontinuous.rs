@@ -79,7 +79,7 @@ fn regress_values_that_repeat_are_solved_once_and_written_as_asked() {
     }
 }
 
-/// `-0` is 0, and another way to write what is there already.
+/// `-0` is 0, and another spelling of an existing value.
 #[test]
 fn regress_minus_zero_is_zero() {
     let folder = tempfile::tempdir().expect("is writable");
@@ -105,7 +105,7 @@ fn regress_minus_zero_is_zero() {
     }
 }
 
-/// Both ends of every range and what lies next to them, each alone and all at once: typed, finite, and no defect.
+/// Both ends of every range and what lies near them, each alone and all at once: typed, finite, and no defect.
 #[test]
 fn regress_ends_of_ranges_are_solved() {
     let folder = tempfile::tempdir().expect("is writable");

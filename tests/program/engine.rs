@@ -67,7 +67,7 @@ fn work_is_insided_and_counted_exactly() {
 }
 
 #[test]
-fn columns_that_are_not_asked_for_cost_nothing() {
+fn columns_that_are_not_requested_cost_nothing() {
     let folder = tempfile::tempdir().expect("is writable");
     let feasible = {
         let sweep = sweep(folder.path(), LANDSCAPE, "[tables.gap]\ncolumns = [\"v_min\", \"work\"]\n");
@@ -242,7 +242,7 @@ fn numbers_are_null_where_there_are_none() {
 }
 
 #[test]
-fn footers_tell_where_a_part_comes_from() {
+fn footers_name_the_origin_of_a_part() {
     let folder = tempfile::tempdir().expect("is writable");
     let sweep = sweep(folder.path(), LANDSCAPE, "[tables.gap]\ncolumns = [\"v_min\"]\n");
     run(&sweep, folder.path(), 2);
@@ -372,7 +372,7 @@ fn stability_is_flagged() {
 }
 
 #[test]
-fn errors_are_told_of_every_work_and_gap_where_a_spec_names_them() {
+fn errors_are_bounded_for_every_work_and_gap_where_a_spec_names_them() {
     let folder = tempfile::tempdir().expect("is writable");
     let axes = format!(
         "t_f = [0.02, 0.037, 0.06]\n{MATERIAL}alpha_2 = {{ linspace = [-0.2, 0.2, 5], unit = \"1/t_f\" }}\n\
@@ -394,7 +394,7 @@ fn errors_are_told_of_every_work_and_gap_where_a_spec_names_them() {
         run(&sweep(folder.path(), &axes, &specs), &out, 2);
         for table in tables {
             let frame = read(&out, table);
-            let mut told = 0;
+            let mut reported = 0;
             for (value, bound) in [("work", "work_error"), ("gap", "gap_error")] {
                 let Ok(_) = frame.column(bound) else { continue };
                 let scale = if value == "gap" { 1.0 } else { f64::NAN };
@@ -403,10 +403,10 @@ fn errors_are_told_of_every_work_and_gap_where_a_spec_names_them() {
                     let (Some(value), Some(bound)) = (value, bound) else { continue };
                     let size = value.abs().max(scale);
                     assert!(bound > 0.0 && bound < 2.0 * (rtol + 1e-13) * size, "{table} {value} {bound}");
-                    told += 1;
+                    reported += 1;
                 }
             }
-            assert!(told > 2, "{table}");
+            assert!(reported > 2, "{table}");
         }
     }
 }

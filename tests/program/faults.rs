@@ -30,7 +30,7 @@ fn numbers() -> impl FnMut(usize) -> usize {
     }
 }
 
-/// A file made anew: writing over it would wait for the disk.
+/// A file recomputed: writing over it would wait for the disk.
 fn rewrite(path: &Path, bytes: &[u8]) {
     fs::remove_file(path).expect("is there");
     fs::write(path, bytes).expect("is writable");
@@ -107,7 +107,7 @@ fn damaged_and_missing_parts_are_made_again() {
 }
 
 #[test]
-fn a_damaged_part_is_told_of_and_keeps_no_other_table_from_its_picture() {
+fn a_damaged_part_is_reported_and_keeps_no_other_table_from_its_picture() {
     let folder = tempfile::tempdir().expect("is writable");
     let sweep = sweep(folder.path(), AXES, "[tables.optimal]\n[tables.gap]\n");
     run(&sweep, folder.path(), 1);
@@ -121,18 +121,21 @@ fn a_damaged_part_is_told_of_and_keeps_no_other_table_from_its_picture() {
     {
         rewrite(&path, bad);
         for command in ["plot", "report"] {
-            let (code, told) = said_by(&[command, "test"]);
-            assert_eq!(code, Some(2), "{told}");
-            assert!(told.contains("test/gap/part-000000.parquet: ") && told.contains(cause), "{told}");
-            assert!(told.contains("\n  help: `slipsweep run test` recomputes it and keeps all sound parts"), "{told}");
+            let (code, reported) = said_by(&[command, "test"]);
+            assert_eq!(code, Some(2), "{reported}");
+            assert!(reported.contains("test/gap/part-000000.parquet: ") && reported.contains(cause), "{reported}");
+            assert!(
+                reported.contains("\n  help: `slipsweep run test` recomputes it and keeps all sound parts"),
+                "{reported}"
+            );
         }
         let picture = folder.path().join("test-optimal.svg");
         assert!(picture.is_file() && !folder.path().join("test-gap.svg").exists());
         fs::remove_file(picture).expect("is there");
         for question in [["head", "test", "gap"], ["query", "test", "SELECT sum(t_f) FROM gap"]] {
-            let (code, told) = said_by(&question);
-            assert_eq!(code, Some(2), "{told}");
-            assert!(told.contains("  help: ") && told.contains("run"), "{told}");
+            let (code, reported) = said_by(&question);
+            assert_eq!(code, Some(2), "{reported}");
+            assert!(reported.contains("  help: ") && reported.contains("run"), "{reported}");
         }
     }
 }
@@ -187,8 +190,8 @@ fn a_panic_names_the_row_and_the_other_parts_are_kept() {
         command.args(["run", "spec.toml", "--out", &out, "--threads", "2"]).env("SLIPSWEEP_PANIC", &out);
         let (code, message) = said(&command.output().expect("runs"));
         assert_eq!(code, Some(2), "{message}");
-        let told = format!("error: {table}: row {row} panicked: requested by SLIPSWEEP_PANIC\n  at {axes}");
-        assert!(message.contains(&told), "{message}");
+        let reported = format!("error: {table}: row {row} panicked: requested by SLIPSWEEP_PANIC\n  at {axes}");
+        assert!(message.contains(&reported), "{message}");
         assert!(
             message.contains("help: this is a defect of slipsweep, please report it; ") && message.contains(others)
         );
@@ -233,7 +236,7 @@ fn regress_what_is_no_file_is_never_waited_for() {
             let made = Command::new("mkfifo").arg(path).status().expect("runs");
             assert!(made.success());
             let path = path.to_owned();
-            // Whoever opened it for reading would get nothing, not wait for ever.
+            // A reader would get nothing, and not wait for ever.
             std::thread::spawn(move || drop(fs::OpenOptions::new().write(true).open(path)));
         };
         pipe(&path);
@@ -251,13 +254,13 @@ fn regress_what_is_no_file_is_never_waited_for() {
         stranger(&path, "a device, a named pipe or the like");
         fs::remove_file(&path).expect("is there");
         let manifest = folder.path().join("test/manifest.json");
-        let told = fs::read(&manifest).expect("is there");
+        let reported = fs::read(&manifest).expect("is there");
         fs::remove_file(&manifest).expect("is there");
         pipe(&manifest);
         let code = slipsweep(folder.path()).args(["status", "test"]).output().expect("runs");
         assert_eq!(said(&code), (Some(2), format!("error: {UNREADABLE}")));
         fs::remove_file(&manifest).expect("is there");
-        fs::write(&manifest, told).expect("is writable");
+        fs::write(&manifest, reported).expect("is writable");
     }
     assert_eq!(part_of(&sweep, folder.path(), Look::Whole), State::Missing);
     run(&sweep, folder.path(), 1);
@@ -265,5 +268,5 @@ fn regress_what_is_no_file_is_never_waited_for() {
 }
 
 /// What `status` says of a manifest that is no file.
-const UNREADABLE: &str = "test/manifest.json: cannot read: it is not a file\n  help: mend that, then run the same command again, which keeps \
+const UNREADABLE: &str = "test/manifest.json: cannot read: it is not a file\n  help: fix that, then run the same command again, which keeps \
                           what is finished; or write elsewhere with --out DIR\n";

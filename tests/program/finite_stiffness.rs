@@ -39,7 +39,7 @@ fn compliant_is_written_and_its_members_are_shared_between_samplings() {
 }
 
 #[test]
-fn compliant_tells_how_the_loop_closes_if_asked() {
+fn compliant_reports_open_loop_errors_on_request() {
     let folder = tempfile::tempdir().expect("is writable");
     let tables = "[tables.compliant]\ncolumns = [\"open_loop_error\", \"amplification\"]\n";
     let outcome = run(&sweep(folder.path(), &format!("{MATERIAL}{AXES}"), tables), folder.path(), 2);

@@ -84,7 +84,7 @@ fn condition(random: &mut Random, axes: &[Quantity], depth: usize) -> Formula {
     }
 }
 
-/// A random block beside everything that brute force needs to know of it.
+/// A random block, and its data for brute force.
 struct Known {
     block: Block,
     derived: Vec<(Quantity, Formula)>,
@@ -151,14 +151,14 @@ impl Known {
         let mut seen = BTreeSet::new();
         let roots = self.block.roots(axes);
         let factors = self.block.factors_of(&roots);
-        let told = |steps: &[u64]| factors.iter().map(|&factor| steps[factor]).collect::<Vec<u64>>();
+        let reported = |steps: &[u64]| factors.iter().map(|&factor| steps[factor]).collect::<Vec<u64>>();
         let mut rows: Vec<(Vec<u64>, Values1)> = self
             .points()
             .into_iter()
-            .filter(|(steps, _)| seen.insert(told(steps)))
+            .filter(|(steps, _)| seen.insert(reported(steps)))
             .map(|(steps, mut at)| {
                 at.retain(|quantity, _| axes.contains(quantity));
-                (told(&steps), at)
+                (reported(&steps), at)
             })
             .collect();
         rows.sort_by(|one, other| one.0.cmp(&other.0));
@@ -166,7 +166,7 @@ impl Known {
     }
 }
 
-/// Compares every way to ask for rows with the rows themselves.
+/// Compares every access to rows with the rows themselves.
 fn check(row_index: &RowIndex, expected: &[Values1], axes: &[Quantity], random: &mut Random, place: &str) {
     assert_eq!(row_index.rows(), expected.len() as u64, "{place}");
     let count = expected.len();
@@ -223,7 +223,7 @@ fn rows_of_random_blocks_are_those_of_nested_loops() {
 }
 
 #[test]
-fn optimal_problems_of_random_blocks_are_told_apart() {
+fn optimal_problems_of_random_blocks_are_distinguished() {
     let mut random = Random(2);
     for case in 0..200 {
         let known = Known::new(&mut random);
@@ -556,7 +556,7 @@ fn every_column_has_a_unit_that_si_knows() {
 
 #[test]
 fn paper_parameters_in_si_are_the_scaled_ones() {
-    // The paper's case of a soft spring: a = 0.003/0.6, b = 0.006/0.6, m = 2.5e-16, k = 7.5e-3, v from 1e5 to 3.2e6, t_f = 3.1e-6. It tells a and
+    // The paper's case of a soft spring: a = 0.003/0.6, b = 0.006/0.6, m = 2.5e-16, k = 7.5e-3, v from 1e5 to 3.2e6, t_f = 3.1e-6. It gives a and
     // mu_0; contacts are renewed over a micrometre, the law holds from 1 nm/s on, and the load is 1 MPa: then 4.5 GPa/m and 150 kg/m^2.
     let folder = tempfile::tempdir().expect("is writable");
     let si = "[model]\nunits = \"si\"\nmu_0 = 0.6\nl = 1e-6\nv_0 = 1e-9\nnormal_stress = 1e6\n[axes]\nt_f = 3.1e-3\na = 0.003\nb = 0.006\n\
@@ -585,13 +585,13 @@ fn paper_parameters_in_si_are_the_scaled_ones() {
 }
 
 #[test]
-fn odd_values_are_written_as_they_were_asked_for() {
+fn odd_values_are_written_as_they_were_requested() {
     let folder = tempfile::tempdir().expect("is writable");
     let axes = "[axes]\nt_f = [0.05, 0.02, 0.02, 1e-20]\na = [0.03, 1e-6]\nb = [-0.0, 5e-324]\nv_i = 3.0\n\
                 v_f = { linspace = [100.0, 2.0, 3] }\nm = [-0.0, 1e-40]\nk = [inf, 1e-40]\n";
     let sweep = load(folder.path(), axes, "[tables.optimal]\n[tables.stability]\n").expect("is legal");
     let outcome = run(&sweep, folder.path(), 1);
-    // A duration that is there twice is solved once.
+    // A repeated duration is solved once.
     assert_eq!(outcome.work.optima, 3 * 2 * 2 * 3);
     let optimal = read(folder.path(), "optimal");
     let bits = |frame: &polars::prelude::DataFrame, name: &str| -> Vec<u64> {

@@ -126,13 +126,13 @@ fn specs_are_compared_by_meaning_and_the_first_difference_is_named() {
             "where = none",
         ),
     ] {
-        let told = refusal(&load(&other), folder.path());
+        let reported = refusal(&load(&other), folder.path());
         let message = format!(
             "{}: holds a dataset of another spec\n  expected: {expected}\n  found: {found}\n  help: change `name` in the spec, or write \
              elsewhere with --out DIR, or remove the dataset",
             folder.path().join("test").display()
         );
-        assert_eq!(told, message);
+        assert_eq!(reported, message);
         assert_eq!(files(&folder.path().join("test")), before);
     }
 
@@ -141,8 +141,8 @@ fn specs_are_compared_by_meaning_and_the_first_difference_is_named() {
         .map(|axes| load(&text(&format!("{axes}\na = 0.03\nb = 0.05\nv_i = 3\n[tables.optimal]\n"), "")));
     let out = folder.path().join("order");
     run(&there, &out, 1);
-    let told = refusal(&here, &out);
-    assert!(told.contains("\n  expected: axes = v_f, t_f (line 2)\n  found: axes = t_f, v_f\n"), "{told}");
+    let reported = refusal(&here, &out);
+    assert!(reported.contains("\n  expected: axes = v_f, t_f (line 2)\n  found: axes = t_f, v_f\n"), "{reported}");
 }
 
 #[test]
@@ -155,10 +155,11 @@ fn other_points_in_the_same_file_are_another_spec() {
     fs::write(&points, "t_f\n0.02\n").expect("is writable");
     run(&Sweep::load(&path).expect("is legal"), folder.path(), 1);
     fs::write(&points, "t_f\n0.03\n").expect("is writable");
-    let told = refusal(&Sweep::load(&path).expect("is legal"), folder.path());
+    let reported = refusal(&Sweep::load(&path).expect("is legal"), folder.path());
     assert!(
-        told.contains("\n  expected: the points that the spec refers to\n  found: other contents of the same file\n"),
-        "{told}"
+        reported
+            .contains("\n  expected: the points that the spec refers to\n  found: other contents of the same file\n"),
+        "{reported}"
     );
 }
 
@@ -175,10 +176,10 @@ fn another_build_is_refused() {
         let out = folder.path().join(what);
         Folder::new(&out, "test").open(&other, Company::Alone).expect("is writable");
         let before = files(&out);
-        let told = refusal(&sweep, &out);
+        let reported = refusal(&sweep, &out);
         let message =
             format!("holds a dataset of another {what}\n  expected: {expected}\n  found: other\n  help: change `name`");
-        assert!(told.contains(&message), "{told}");
+        assert!(reported.contains(&message), "{reported}");
         assert_eq!(files(&out), before);
     }
 }
@@ -255,12 +256,13 @@ fn the_second_run_on_a_dataset_says_that_the_first_one_is_at_work() {
     let listed = |runs: &[bool]| if cfg!(target_os = "linux") { runs.to_vec() } else { Vec::new() };
     let first = open(Company::Alone).expect("is free");
     for company in [Company::Alone, Company::Shards] {
-        let told = open(company).expect_err("is taken").to_string();
+        let reported = open(company).expect_err("is taken").to_string();
         let process =
             if cfg!(target_os = "linux") { format!(" (process {})", std::process::id()) } else { String::new() };
         assert!(
-            told.starts_with(&format!("{}: another run is at work here{process}\n  help: ", place.path().display())),
-            "{told}"
+            reported
+                .starts_with(&format!("{}: another run is at work here{process}\n  help: ", place.path().display())),
+            "{reported}"
         );
     }
     assert_eq!(runs(), listed(&[true]));

@@ -59,7 +59,7 @@ fn every_question_begins_with_a_spec_that_runs() {
 }
 
 #[test]
-fn what_is_there_is_not_overwritten() {
+fn existing_files_are_not_overwritten() {
     let folder = tempfile::tempdir().expect("is writable");
     fs::write(folder.path().join("mine.toml"), "mine").expect("is writable");
     fs::write(folder.path().join("slipsweep.schema.json"), "of another version").expect("is writable");

@@ -76,7 +76,7 @@ fn bytes_with_labels_do_not_depend_on_threads_and_batches_are_the_parts() {
     let frame = read(&folder.path().join("1"), "stability");
     let expected: Vec<String> = (0..80_000).map(|row| format!("s{}", row / 6)).collect();
     assert_eq!(words(&frame, "sample"), expected);
-    let batches = sweep.batches("stability").expect("is asked for").map(|batch| batch.expect("is computed"));
+    let batches = sweep.batches("stability").expect("is requested").map(|batch| batch.expect("is computed"));
     let labels: Vec<String> = batches
         .flat_map(|batch| {
             let column = batch.column_by_name("sample").expect("is there");
@@ -89,7 +89,7 @@ fn bytes_with_labels_do_not_depend_on_threads_and_batches_are_the_parts() {
 }
 
 #[test]
-fn only_tables_whose_rows_tell_the_points_apart_have_labels() {
+fn only_tables_whose_rows_distinguish_the_points_have_labels() {
     let folder = tempfile::tempdir().expect("is writable");
     let cases = "k,machine\n1e-3,soft\n1e-2,stiff\n";
     let axes = "[axes]\nt_f = 0.02\na = 0.03\nb = 0.05\nv_i = 3.0\nv_f = 100.0\n";

@@ -127,7 +127,7 @@ fn every_table_has_its_picture() {
     formats(folder);
 }
 
-/// PNG and PDF, and the pixels asked for.
+/// PNG and PDF, and the pixels requested.
 fn formats(folder: &Path) {
     shown(folder, &["plot", "results/small", "--table", "optimal", "--width", "89", "--dpi", "100", "--out", "o.png"]);
     let png = fs::read(folder.join("o.png")).expect("is readable");
@@ -141,7 +141,7 @@ fn formats(folder: &Path) {
     assert!(pdf.windows(5).any(|bytes| bytes == b"Arimo"));
 }
 
-/// Messages name what there is.
+/// Messages list the known names.
 fn refusals(folder: &Path) {
     let gap = ["plot", "results/small", "--table", "gap"];
     let with = |more: &[&str]| complaint(folder, &[&gap, more].concat());

@@ -1,7 +1,7 @@
 //! Laws of specs, grids and readers that hold whatever is written: a failure is shrunk, and kept in
 //! `properties.regressions`, whose cases come first in every run.
 //!
-//! The draws are the same in every run; `PROPTEST_RNG_SEED` and `PROPTEST_CASES` ask for others and more of them.
+//! The draws are the same in every run; `PROPTEST_RNG_SEED` and `PROPTEST_CASES` request others and more of them.
 
 use std::fs;
 use std::path::Path;
@@ -266,7 +266,7 @@ fn column(batches: &[RecordBatch], name: &str) -> Vec<Option<f64>> {
 
 fn batches(text: &str, table: &str) -> Vec<RecordBatch> {
     let sweep = parse(text).unwrap_or_else(|error| panic!("{text}{error}"));
-    sweep.batches(table).expect("is asked for").collect::<Result<_, _>>().expect("is a table")
+    sweep.batches(table).expect("is requested").collect::<Result<_, _>>().expect("is a table")
 }
 
 proptest! {

@@ -62,11 +62,11 @@ fn reductions_are_those_of_the_whole_table() {
         let frame = read(&folder.path().join(format!("{reduce}-1")), &table);
         assert_eq!(frame.height(), 8);
         let names: Vec<&str> = frame.get_column_names().into_iter().map(|name| name.as_str()).collect();
-        let told: Vec<_> = names[5..names.len() - 1].iter().map(|name| numbers(&frame, name)).collect();
+        let reported: Vec<_> = names[5..names.len() - 1].iter().map(|name| numbers(&frame, name)).collect();
         let (keys, status) = (keys(&frame), words(&frame, "status"));
         for (row, group) in groups.iter().enumerate() {
             assert_eq!(keys[row], group.key);
-            let cells: Vec<Option<f64>> = told.iter().map(|column| column[row]).collect();
+            let cells: Vec<Option<f64>> = reported.iter().map(|column| column[row]).collect();
             assert_eq!(cells[0], Some(group.gaps.len() as f64));
             let some = ["ok", "unproven", "below_bound", "infeasible"];
             let expected = some.into_iter().find(|word| group.status.iter().any(|status| status == word));

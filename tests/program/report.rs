@@ -53,7 +53,7 @@ fn the_page_holds_everything_and_opens_without_an_error() {
     for table in ["gap: 882 rows", "best_cubic: 2 rows", "crossover: 1 row"] {
         assert_eq!(page.matches(table).count(), 1, "{table}");
     }
-    // Two maps tell their values; nothing is asked of a network.
+    // Two maps show their values; nothing is loaded from a network.
     assert_eq!(page.matches("\"column\":\"gap\"").count(), 2);
     assert!(!page.contains("src=") && !page.contains("<link") && !page.contains("@import") && !page.contains("fetch("));
     command(folder, &["report", "results/small", "--out", "again.html"]);

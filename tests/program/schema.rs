@@ -9,7 +9,7 @@ use slipsweep::grid::Quantity;
 use slipsweep::sweep::{Sweep, schema};
 use slipsweep::table;
 
-/// The keys that a spec may have where `text` has an unknown one, from what it is told.
+/// The keys that a spec may have where `text` has an unknown one, from its message.
 fn known(text: &str) -> BTreeSet<String> {
     let error = Sweep::parse(text, Path::new(".")).err().expect("has an unknown key");
     let mut faults = iter::once(&error).chain(&error.others);

@@ -1,4 +1,4 @@
-//! Sweeps in shards: the bytes of one process, whoever made what; status, and what it advises.
+//! Sweeps in shards: the bytes of one process; status and its advice.
 
 use std::fs;
 use std::path::Path;
@@ -96,7 +96,7 @@ fn every_part_is_in_one_shard_of_any_number() {
 }
 
 #[test]
-fn status_says_what_is_there_and_what_would_finish_it() {
+fn status_lists_parts_and_the_command_for_the_missing_ones() {
     let folder = tempfile::tempdir().expect("is writable");
     sweep(folder.path(), AXES, TABLES);
     let say = |arguments: &[&str]| {
@@ -115,7 +115,7 @@ fn status_says_what_is_there_and_what_would_finish_it() {
     assert!(code == Some(0) && error.lines().all(|line| line.ends_with(" left")), "{said} {error}");
     assert!(said.contains(" in shard 1 of 4\n"), "{said}");
 
-    // The script that would make the shards stands beside the dataset.
+    // The script that would make the shards stands in the folder of the dataset folder.
     let (code, said, _) = say(&["shards", "spec.toml", "--engine", "slurm", "--shards", "4", "--minutes", "0"]);
     assert_eq!(code, Some(0));
     let script = folder.path().join("results/test.slurm.sh");

@@ -45,7 +45,7 @@ fn complaint(arguments: &[&[&str]]) -> (Option<i32>, String) {
 }
 
 #[test]
-fn a_table_tells_a_physicist_what_he_sees() {
+fn a_table_names_its_columns_and_units() {
     let text = shown(&[&["optimal"], UP]);
     let head = "optimal: least work of friction of all protocols; v may jump at both ends\n  \
                 at t_f = 0.02, a = 0.03, b = 0.05, v_i = 3, v_f = 100\n  \
@@ -68,7 +68,7 @@ fn a_table_tells_a_physicist_what_he_sees() {
 }
 
 #[test]
-fn times_that_nine_digits_do_not_tell_apart_are_shown_in_full() {
+fn times_that_nine_digits_do_not_distinguish_are_shown_in_full() {
     let late = ["--t-f", "1000", "--a", "1e-3", "--b", "2e-3", "--v-i", "3", "--v-f", "1e6"];
     let text = shown(&[&["optimal"], &late]);
     let rows = text.lines().skip_while(|line| !line.starts_with("  t ")).skip(2);
@@ -384,8 +384,8 @@ fn a_row_over_time_is_the_protocol_of_its_numbers() {
         let row = slipsweep::dataset::frame::row(&part, 0).expect("is there");
         let work = row.iter().find(|(name, _)| name == "work").map(|(_, cell)| cell.clone());
         let slipsweep::dataset::Cell::Number(work) = work.expect("is a column") else { panic!("{table}: no work") };
-        let told: f64 = fact("work").and_then(|work| work.parse().ok()).expect("is a number");
-        assert!((told / work - 1.0).abs() < 1e-9, "{table}: {told} {work}");
+        let reported: f64 = fact("work").and_then(|work| work.parse().ok()).expect("is a number");
+        assert!((reported / work - 1.0).abs() < 1e-9, "{table}: {reported} {work}");
     }
     let by_words = run(&["optimal", "--where", "t_f=300, v_i=3e-9", "--format", "csv"]);
     assert_eq!(text(by_words), text(run(&["optimal", "--row", "2", "--format", "csv"])));

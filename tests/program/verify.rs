@@ -160,7 +160,7 @@ fn the_parts_that_are_there_are_audited() {
 }
 
 #[test]
-fn what_is_no_dataset_is_told() {
+fn a_folder_without_a_dataset_is_refused() {
     let folder = tempfile::tempdir().expect("is writable");
     assert_eq!(verify(folder.path(), &[]).status.code(), Some(1));
     run(&sweep(folder.path(), AXES, "[tables.optimal]\n"), folder.path(), 1);
@@ -178,7 +178,7 @@ const SPRINGS: &str = "t_f = [0.02, 0.5]\na = 0.03\nb = 0.05\nv_i = 3.0\nv_f = [
 
 #[test]
 fn motions_are_followed_again() {
-    // Columns beside those that are changed, and what one value of each is multiplied with.
+    // Columns besides the changed ones, and the factor of one value of each.
     type Numbers<'a> = &'a [(&'a str, f64)];
     let tables: [(&str, &str, &str, Numbers<'_>); 4] = [
         ("stability", "", "[\"hopf_type\"]", &[("m", 1e-3)]),
@@ -248,13 +248,13 @@ fn motions_are_followed_again() {
     }
 }
 
-/// Two landscapes with something to tell and one without, in odd units.
+/// Two landscapes with finite gaps and one without, in odd units.
 const LANDSCAPES: &str = "alpha_3 = { linspace = [-0.5, 0.5, 41], unit = \"1/t_f^2\" }\nt_f = [2e-5, 40.0]\na = 0.003\nb = 0.005\n\
                           v_i = 3e-9\nv_f = [100e-9, 2e-9]\nalpha_2 = { linspace = [-0.5, 0.5, 43], unit = \"1/t_f\" }\n\
                           [model]\nunits = \"si\"\nmu_0 = 0.1\nl = 1e-6\nv_0 = 1e-9\nnormal_stress = 1e6\n";
 
 #[test]
-fn reduced_landscapes_are_told_again() {
+fn reduced_landscapes_are_recomputed() {
     let folder = tempfile::tempdir().expect("is writable");
     for (reduce, columns) in [
         ("min", &["shortcuts", "alpha_2", "work", "gap", "v_min"][..]),

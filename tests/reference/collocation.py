@@ -64,7 +64,7 @@ def work(case, intervals):
 
 print("t_f,a,b,v_i,v_f,work,error")
 for case in CASES:
-    # Where IPOPT does not converge on a grid, the others tell.
+    # Where IPOPT does not converge on a grid, the others decide.
     found = [f for f in (work(case, intervals) for intervals in (31, 40, 53, 80)) if f is not None]
     if len(found) > 1:
         *others, finest = found

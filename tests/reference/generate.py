@@ -714,7 +714,7 @@ def touching_rows():
 
 
 def edge_rows():
-    """Optima next to where one regime passes into another, and next to v = 1."""
+    """Optima near where one regime passes into another, and near v = 1."""
     materials = [(0.03, 0.05, 3.0, 100.0), (0.03, 0.05, 100.0, 3.0), (0.1, 0.02, 3.0, 2.9)]
     cases = []
     for small in (1e-3, 1e-6, 1e-9, 1e-12):
@@ -728,14 +728,14 @@ def edge_rows():
             if name is None or t is None:
                 continue
             for fraction in (1e-7, 1e-13):
-                cases.append(("next_to_" + name, a, b, v_i, v_f, float(t * (1 + mpf(fraction))), 1))
+                cases.append(("near_" + name, a, b, v_i, v_f, float(t * (1 + mpf(fraction))), 1))
     yield from solved(cases)
 
 
 def stability_row(a, b, k, m, v):
     """Eigenvalues of steady sliding, times v: the roots of the characteristic polynomial, to many more digits than are shown."""
     law_a, law_b, stiffness, inertia = mpf(a), mpf(b), mpf(k), mpf(m) * mpf(v) ** 2
-    # Of what cancels next to the critical stiffness, of roots decades apart, and of close roots.
+    # Of what cancels near the critical stiffness, of roots decades apart, and of close roots.
     mp.dps = 120
     roots = mp.polyroots([inertia, inertia + law_a, stiffness + law_a - law_b, stiffness], maxsteps=2000, extraprec=2000)
     mp.dps = DIGITS
@@ -758,7 +758,7 @@ def stability_rows():
         v = log_uniform(rng, 1, 1e8)
         cases.append((a, b, log_uniform(rng, 1e-5, 1e2), a * log_uniform(rng, 1e-8, 1e6) / v**2, v))
     while len(cases) < 300:
-        # Next to the critical stiffness.
+        # Near the critical stiffness.
         a = log_uniform(rng, 1e-4, 0.3)
         b = a * log_uniform(rng, 1.01, 10)
         v = log_uniform(rng, 1, 1e8)
@@ -805,7 +805,7 @@ def hopf_rows():
         b = a * (1 + log_uniform(rng, 1e-3, 10))
         v = log_uniform(rng, 1.5, 1e8)
         cases.append((a, b, 0.5 * v + 0.6, v, a, a * log_uniform(rng, 1e-6, 1e4) / v**2))
-    # Next to where the kind changes: where a mu = 1/(3 + 2 sqrt(3 + b/a)).
+    # Near where the kind changes: where a mu = 1/(3 + 2 sqrt(3 + b/a)).
     for fraction in (1e-2, -1e-2, 1e-6, -1e-6, 1e-12, -1e-12):
         mu = (1 + mpf(fraction)) / (3 + 2 * sqrt(3 + mpf(0.01) / mpf(0.005)))
         cases.append((0.005, 0.01, 1e3, 1024.0, 7.5e-3, float(mpf(0.005) * mu / 2**20)))

@@ -17,7 +17,7 @@ LEAVES = mpfr("1e-32")
 def protocol(shortcut, alpha, times):
     """The control velocity at some times."""
     a, b, k, m, t_f = shortcut.a, shortcut.b, shortcut.k, shortcut.m, shortcut.t_f
-    x, theta, told = mpfr(0), 1 / shortcut.v_i, []
+    x, theta, control = mpfr(0), 1 / shortcut.v_i, []
     for time in times:
         target = time / t_f
         while True:
@@ -30,8 +30,8 @@ def protocol(shortcut, alpha, times):
         ln_v, ln_theta = logarithm(v[:4]), logarithm(series[:4])
         rate = (a * ln_v[1] + b * ln_theta[1]) / t_f
         bend = derivative(derivative(v))[0] / t_f**2
-        told.append(v[0] + (rate + m * bend) / k)
-    return told
+        control.append(v[0] + (rate + m * bend) / k)
+    return control
 
 
 def held(shortcut, controls, times):

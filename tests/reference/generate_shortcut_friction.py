@@ -103,7 +103,7 @@ class Course:
                     if last > 0:
                         reach = min(reach, (eps * size / last) ** (arb(1) / n), key=float)
             h = reach.mid() if float(reach) < 0.999 * float(limit - d) else (limit - d).mid()
-            # What the last terms cannot tell: v may rise from nothing within the step.
+            # What the last terms cannot show: v may rise from nothing within the step.
             while abs(at(log_v, h) - log_v[0]) > 20:
                 h = h / 2
             if h < 1e-45:

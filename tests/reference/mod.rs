@@ -1,4 +1,4 @@
-//! Reading the reference tables beside this file.
+//! Reader of the reference tables in this folder.
 
 use std::collections::BTreeMap;
 use std::path::Path;

@@ -218,7 +218,7 @@ fn regress_holds_shorter_than_a_panel_sees() {
 
 /// What the bound costs was formed from `v - 1` and from `1 - theta` as differences.
 #[test]
-fn regress_best_shortcuts_next_to_the_bound() {
+fn regress_best_shortcuts_near_the_bound() {
     for (a, b, v_i, v_f, t_f) in [
         (0.9716919041812424, 0.7540956419873299, 1.0000000000000004, 1.000009205942604, 0.009081888152565203),
         (1.118864779321712e-5, 9.265961534263374e-6, 1.0000000000000395, 1.0000000000112839, 1443492.5103811584),
@@ -265,7 +265,7 @@ fn regress_best_shortcuts_of_far_changes() {
     }
 }
 
-/// Admissible sets as thin as rounding; layers at both ends, of theta or in time; hardly any velocity; next to the least
+/// Admissible sets as thin as rounding; layers at both ends, of theta or in time; hardly any velocity; near the least
 /// time; optima whose velocity is too small for a number; and corners.
 #[test]
 fn regress_best_shortcuts_over_the_whole_domain() {

@@ -11,7 +11,7 @@ use slipsweep::protocol::compliant::{self, Compliant, Path};
 use slipsweep::protocol::{SpringBlock, Status};
 use slipsweep::stability::{amplification, held_error, open_loop_error};
 
-/// The paper's block and spring, and what is asked of it: `(v_i, v_f)` and `t_f`.
+/// The paper's block and spring, and what is required of it: `(v_i, v_f)` and `t_f`.
 const PAPER: (SpringBlock, (f64, f64), f64) =
     (SpringBlock { law: Law { a: 0.005, b: 0.01 }, k: 7.5e-3, m: 2.5e-16 }, (1e5, 3.2e6), 3.1e-6);
 
@@ -79,7 +79,7 @@ fn paper_larger_steps_of_the_control_leave_visible_oscillations() {
 }
 
 /// The equations of motion in `(ln v, ln theta, k s - 1)`, `ln theta` of the protocol itself, and
-/// time over `t_f`, which the library does not tell exactly inside its steps.
+/// time over `t_f`, which the library does not determine exactly inside its steps.
 #[derive(Clone, Copy)]
 struct Sliding {
     slider: SpringBlock,
@@ -95,7 +95,7 @@ impl Sliding {
     }
 
     /// `v_c` from the formula of the shortcut.
-    fn told(&self, x: f64, ln_theta: f64) -> f64 {
+    fn reported(&self, x: f64, ln_theta: f64) -> f64 {
         let (w_i, w_f) = (self.velocities.0 - 1.0, self.velocities.1 - 1.0);
         let (l, z) = ((w_f / w_i).ln(), 1.0 - x);
         let y = x * z;
@@ -120,7 +120,7 @@ impl System<f64, SVector<f64, 5>> for Sliding {
         let protocol = 1.0 + w_i * (exponent + self.alpha * (x * z).powi(3)).exp();
         dy[0] = self.t_f * (y[2] - law.a * y[0] - law.b * y[1]) / (m * v);
         dy[1] = self.t_f * ((-y[1]).exp() - v);
-        dy[2] = self.t_f * k * (self.held.unwrap_or_else(|| self.told(x, y[3])) - v);
+        dy[2] = self.t_f * k * (self.held.unwrap_or_else(|| self.reported(x, y[3])) - v);
         dy[3] = self.t_f * ((-y[3]).exp() - protocol);
         dy[4] = 1.0;
     }
@@ -253,8 +253,8 @@ fn derivatives_are_those_of_the_path() {
             assert!((slope - here.v[k + 1]).abs() < 1e-4 * size, "{i} {k}: {slope} {}", here.v[k + 1]);
         }
         let slope = (PAPER.0.control(&ahead) - PAPER.0.control(&behind)) / (2.0 * h);
-        let told = PAPER.0.control_rate(&here, -(here.rate * here.v[0] + here.theta * here.v[1]));
-        assert!((slope - told).abs() < 1e-4 * 3.2e6 * 30.0 / PAPER.2, "{i}: {slope} {told}");
+        let reported = PAPER.0.control_rate(&here, -(here.rate * here.v[0] + here.theta * here.v[1]));
+        assert!((slope - reported).abs() < 1e-4 * 3.2e6 * 30.0 / PAPER.2, "{i}: {slope} {reported}");
         let rate = (ahead.theta - behind.theta) / (2.0 * h);
         assert!((rate - here.rate).abs() < 1e-4, "{i}: {rate} {}", here.rate);
     }
@@ -358,9 +358,9 @@ fn regress_work_counts() {
     let path = path(PAPER);
     let followed =
         [amplification(&path, 1e-10), open_loop_error(&path, 1e-10), held_error(&path, PAPER.2 / 100.0, 1e-10)];
-    let [grown, told, held] = followed.map(|followed| followed.steps);
+    let [grown, reported, held] = followed.map(|followed| followed.steps);
     // At least a step a sample.
-    assert!(grown == 16 && told < 100 && (100..400).contains(&held), "{grown} {told} {held}");
+    assert!(grown == 16 && reported < 100 && (100..400).contains(&held), "{grown} {reported} {held}");
 }
 
 /// Squares of a large flow overflowed, and the amplification came out as 0. The logarithms are from an integration of the
@@ -386,15 +386,16 @@ fn regress_control_velocities_of_slow_protocols_on_soft_springs() {
     for rtol in [1e-6, 1e-10] {
         let found = solve((SpringBlock { law, k, m: 1e-9 }, (2.0, 3.0), t_f), rtol);
         let rise = 2f64.ln();
-        let told = |x: f64| {
+        let reported = |x: f64| {
             let (flat, z) = (x * x * (1.0 - x) * (1.0 - x), 1.0 - x);
             let f = rise * x * x * x * (10.0 - 15.0 * x + 6.0 * x * x) + found.alpha * (x * z).powi(3);
             let slope = 30.0 * rise * flat + 3.0 * found.alpha * flat * (1.0 - 2.0 * x);
             let v = 1.0 + f.exp();
             v + (law.a - law.b) * f.exp() * slope / (v * t_f * k)
         };
-        let places = (0..=200_000).map(|i| told(f64::from(i) / 200_000.0));
-        let (low, high) = places.fold((f64::MAX, f64::MIN), |(low, high), told| (low.min(told), high.max(told)));
+        let places = (0..=200_000).map(|i| reported(f64::from(i) / 200_000.0));
+        let (low, high) =
+            places.fold((f64::MAX, f64::MIN), |(low, high), reported| (low.min(reported), high.max(reported)));
         let size = low.abs().max(high.abs());
         assert!(size > 1e5);
         assert!((found.control_min - low).abs() <= (rtol + 1e-8) * size, "{found:?} {low}");

@@ -16,7 +16,7 @@ fn points() -> u64 {
     quick_or_long(100, 800)
 }
 
-/// Accuracies that are asked for.
+/// Accuracies that are requested.
 const RTOLS: [f64; 6] = [1e-4, 1e-6, 1e-8, 1e-10, 1e-12, 1e-13];
 
 /// Coefficients of a path that leans on the steady one.
@@ -203,9 +203,9 @@ fn reference_work_errors_of_smooth_and_best_shortcuts_are_bounded() {
     });
 }
 
-/// Next to `v_f = 1` the hold was the logarithm of a rest that had lost its digits.
+/// Near `v_f = 1` the hold was the logarithm of a rest that had lost its digits.
 #[test]
-fn regress_long_holds_next_to_the_bound_keep_their_digits() {
+fn regress_long_holds_near_the_bound_keep_their_digits() {
     let law = Law { a: 0.06892476098268442, b: 0.06892476098268442 };
     let transition = Transition { law, v_i: 3.8313585412225946, v_f: 1.0000145426281766 };
     let t_f = 10.83597917609958;

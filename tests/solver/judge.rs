@@ -151,7 +151,7 @@ fn piece(f: &dyn Fn(Dd) -> Pair, from: Dd, to: Dd) -> Pair {
 /// Change that counts as none.
 const SAME: f64 = 1e-21;
 
-/// Pieces after which an integral counts as one that 32 digits do not hold: next to a zero of theta they cancel.
+/// Number of pieces after which an integral counts as one that 32 digits do not hold: near a zero of theta they cancel.
 const MOST_PIECES: u32 = 400;
 
 /// Both integrals, halving until nothing changes, of them or of wholes of these sizes that they are parts of.
@@ -177,7 +177,7 @@ fn integrate(f: &dyn Fn(Dd) -> Pair, from: Dd, to: Dd, wholes: [f64; 2]) -> Opti
     halve(f, (from, to), piece(f, from, to), wholes, &mut { MOST_PIECES })
 }
 
-/// The work of a cubic shortcut, given scaled, and the size of what it is a sum of; `None` where 32 digits do not tell it.
+/// The work of a cubic shortcut, given scaled, and the size of what it is a sum of; `None` where 32 digits do not determine it.
 pub fn shortcut_work(transition: &Transition, t_f: f64, (a_2, a_3): (f64, f64)) -> Option<(f64, f64)> {
     let Transition { law: Law { a, b }, v_i, v_f } = *transition;
     let (start, end) = (dd(1.0) / dd(v_i), dd(1.0) / dd(v_f));
@@ -274,7 +274,7 @@ impl Extremal {
     }
 }
 
-/// A start that is slower tells too little of the extremal.
+/// A start that is slower determines too little of the extremal.
 const LEAST_VELOCITY: f64 = 1e-280;
 
 /// The least work at `t_f` from an optimum that is only nearly right: its own duration `T` and work `W` exactly, and

@@ -248,8 +248,8 @@ fn many_materials_keep_their_accuracy_up_to_the_border() {
             // The plain evaluation itself loses digits where theta or n is nearly 0 inside: it can judge no better than
             // 1e-10 there.
             let [theta, n, _] = shortcut.least(500);
-            let faint = (theta * transition.v_i.min(transition.v_f)).min(n / mean) < 0.03;
-            let judge = if faint { 1e-10 } else { 2e-13 };
+            let ill_conditioned = (theta * transition.v_i.min(transition.v_f)).min(n / mean) < 0.03;
+            let judge = if ill_conditioned { 1e-10 } else { 2e-13 };
             assert!(error <= rtol.max(judge), "{shortcut:?}: {error:e} at rtol {rtol:e}");
         }
         checked += 1;
@@ -276,7 +276,7 @@ fn regress_points_on_the_border_are_decided_exactly() {
     }
 }
 
-/// Reference: 50-digit quadrature. Close pairs of zeros near the start, next to zeros just beyond the end.
+/// Reference: 50-digit quadrature. Close pairs of zeros near the start, and zeros just beyond the end.
 #[test]
 fn regress_zeros_close_to_both_ends() {
     let cases = [
@@ -429,7 +429,7 @@ fn effort_is_spent_on_feasible_points_alone() {
 }
 
 #[test]
-fn what_is_not_asked_for_is_not_computed() {
+fn what_is_not_requested_is_not_computed() {
     let landscape = Landscape::new(&PAPER, 0.02, 1e-10);
     let (a_2, a_3) = ([-0.12, 0.4], [-0.07, 0.4]);
     let mut status = [Status::NotConverged; 2];
@@ -463,10 +463,10 @@ fn shortcut(v_i: f64, v_f: f64, t_f: f64, a_2: f64, a_3: f64, rtol: f64) -> (Sta
     (status[0], work[0], v_min[0])
 }
 
-/// 60-digit arithmetic. What rounding costs `A_4` beside its last bits had not been counted: velocities next to 0 were off
+/// 60-digit arithmetic. What rounding costs `A_4` near its last bits had not been counted: velocities near 0 were off
 /// or negative, and a shortcut that is not feasible was called so.
 #[test]
-fn regress_shortcuts_next_to_standstill() {
+fn regress_shortcuts_near_standstill() {
     let ends = (1.0000209365393198, 1.0000015231028443);
     let (_, _, v_min) =
         shortcut(ends.0, ends.1, 1.9413016820670486e-5, 1.941300051516957e-5, -1.645352653290548e-11, 1e-3);
@@ -487,9 +487,9 @@ fn regress_the_least_velocity_is_on_the_side_of_the_bound_that_the_status_says()
     assert_eq!((status, v_min), (Status::Ok, 1.0));
 }
 
-/// Next to `theta = 0` a pair of zeros is so close to the real axis that its closed form has no digit of the distance.
+/// Near `theta = 0` a pair of zeros is so close to the real axis that its closed form has no digit of the distance.
 #[test]
-fn regress_works_next_to_theta_0() {
+fn regress_works_near_theta_0() {
     for (v_i, v_f, t_f, a_2, a_3) in [
         (1.0000000000000262, 1.1909490862569156, 220111.22750737667, -2.513843771204648, -4.017770078845403e-5),
         (1.0000055294667975, 7695340.3526740745, 0.00205834334261616, -0.9999921503148949, -1.0010187767355003),
@@ -500,7 +500,7 @@ fn regress_works_next_to_theta_0() {
 }
 
 /// Zeros of several scales: a pair that all but touches the real axis near a third one at the start, `n` all but 0 everywhere, a
-/// zero 1e-16 beyond the end without a logarithm of theta, a way much longer than both ends tell.
+/// zero 1e-16 beyond the end without a logarithm of theta, a path much longer than both ends suggest.
 #[test]
 fn regress_works_with_zeros_of_several_scales() {
     for ([a, b, v_i, v_f, t_f], place, rtol) in [
@@ -537,7 +537,7 @@ fn regress_works_with_zeros_of_several_scales() {
 /// A close pair of zeros with the third one nearby, and a zero of theta 1e-15 beyond the end. Works from quadrature with 50
 /// digits, over panels that double away from every zero.
 #[test]
-fn reference_works_next_to_several_zeros() {
+fn reference_works_near_several_zeros() {
     for ((law, v_i, v_f, t_f), (a_2, a_3), reference) in [
         (
             (Law { a: 2.9874847423939768, b: 10.0 }, 241913802.79474756, 1.0000000002174823, 22.24890385365414),

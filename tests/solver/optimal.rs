@@ -81,7 +81,7 @@ fn reference_optimal_protocols_are_good_to_the_last_digits_that_t_f_allows() {
 }
 
 /// Reference: 66-digit quadrature. The last step crossed the start of the hold; the parameter of a short hold lost its
-/// digits beside that of the start.
+/// digits near that of the start.
 #[test]
 fn regress_short_holds_keep_their_digits() {
     let just_after = Transition {
@@ -126,9 +126,9 @@ fn regress_the_least_time_keeps_its_digits_near_the_bound() {
 }
 
 /// `1 - theta` where the hold ends, and the time by which the arc starts before or after `t_min`, were differences of
-/// numbers far larger where `v_f` is next to 1: such rows were not converged, or `t_turn` came before `t_min`.
+/// numbers far larger where `v_f` is near 1: such rows were not converged, or `t_turn` came before `t_min`.
 #[test]
-fn regress_decelerations_to_next_to_1_converge() {
+fn regress_decelerations_to_near_1_converge() {
     for (a, b, v_i, v_f, t_f) in [
         (1.1367981018286367e-6, 7.588149992733143e-7, 10967.458354116974, 1.0000000000464353, 23.792869986080476),
         (2.1524976448619266e-5, 2.4869148380863167e-5, 2234832.228788212, 1.000000013240263, 18.140002980200933),
@@ -144,7 +144,7 @@ fn regress_decelerations_to_next_to_1_converge() {
     }
 }
 
-/// For `C >= 0` and `a > b` a turning point next to the start was overlooked, and the quadrature with it: off by 6e-7 at
+/// For `C >= 0` and `a > b` a turning point near the start was overlooked, and the quadrature with it: off by 6e-7 at
 /// rtol 1e-13. At `t_cheapest` the Hamiltonian is 0, whatever the time from there.
 #[test]
 fn regress_the_cheapest_time_of_large_a() {
@@ -185,7 +185,7 @@ fn regress_low_accuracies_converge() {
     assert!(relative(rough.v_start, fine.v_start) < rtol && relative(rough.work, fine.work) < rtol, "{rough:?}");
 }
 
-/// Between equal velocities in so short a time that nothing can be gained by moving otherwise: the parameter was lost beside
+/// Between equal velocities in so short a time that nothing can be gained by moving otherwise: the parameter was lost near
 /// that of the hold.
 #[test]
 fn regress_short_times_between_equal_velocities() {
@@ -223,9 +223,9 @@ fn of(a: f64, b: f64, v_i: f64, v_f: f64) -> Transition {
     Transition { law: Law { a, b }, v_i, v_f }
 }
 
-/// Arcs over twenty `e`-folds of theta, and next to friction `b - a`.
+/// Arcs over twenty `e`-folds of theta, and near friction `b - a`.
 #[test]
-fn regress_arcs_next_to_zeros_of_e() {
+fn regress_arcs_near_zeros_of_e() {
     let fast = of(3.220836041326962, 0.0017277867539023518, 1.000000000000184, 570957275.3910675);
     let start = |rtol| solve(&fast, 0.00020765010770914226, true, rtol).value.expect("is solved").v_start;
     assert!(relative(start(2e-13), start(1e-16)) < 1e-13);
@@ -562,7 +562,7 @@ fn reference_collocation_with_an_optimiser_finds_the_same_minimum() {
     }
 }
 
-/// Next to the least time without the bound `theta' = 1` up to a fraction of 1e-12, so that `theta` is known, and with the
+/// Near the least time without the bound `theta' = 1` up to a fraction of 1e-12, so that `theta` is known, and with the
 /// multiplier `mu` of `int theta v dt`, the time beyond the least one, `1 + a + a ln v + b ln theta = mu theta`.
 #[test]
 fn regress_optima_that_all_but_stand_still() {
@@ -591,7 +591,7 @@ fn regress_optima_that_all_but_stand_still() {
 
 /// The search counted from the start of a hold that is far away, in steps that are longer than the time.
 #[test]
-fn regress_next_to_no_time_between_equal_velocities() {
+fn regress_near_no_time_between_equal_velocities() {
     for (a, b, v, t_f) in [
         (0.006680170666916859, 0.0, 1.0083052350101798, 1.5463404661196292e-18),
         (3.6259952227422163, 0.0, 7.781179593290561, 3.793469601848281e-16),

@@ -1,4 +1,4 @@
-//! The paper's figures of protocols over time, and its limits of short and long times, derived anew in each test.
+//! The paper's figures of protocols over time, and its limits of short and long times, derived in each test.
 
 use crate::support::relative;
 use slipsweep::model::{Law, Transition};
@@ -113,8 +113,8 @@ fn paper_figure_s2_no_protocol_above_the_bound_is_faster_than_0_39() {
     assert!((t_min - 0.395).abs() < 1e-3);
     let family = shortcut::find("bounded_velocity").expect("is a family");
     let solve = |t_f: f64| family.solve(&case(DOWN, t_f), 1e-10, &mut SolverStats::default());
-    let Err(Obstacle::Time { t_min: told }) = solve(0.99 * t_min) else { panic!("too fast") };
-    assert!(relative(told, t_min) < 1e-14);
+    let Err(Obstacle::Time { t_min: reported }) = solve(0.99 * t_min) else { panic!("too fast") };
+    assert!(relative(reported, t_min) < 1e-14);
     // Just above it v - 1 vanishes but at the ends.
     let slowest = solve(1.001 * t_min).expect("exists");
     assert!(slowest.v_min >= 1.0 && slowest.v_min < 1.0 + 1e-6, "{slowest:?}");

@@ -1,7 +1,7 @@
 //! Laws that hold at every point, at points drawn at random: a failure is shrunk, and kept in `properties.regressions`,
 //! whose points come first in every run.
 //!
-//! The draws are the same in every run; `PROPTEST_RNG_SEED` and `PROPTEST_CASES` ask for others and more of them.
+//! The draws are the same in every run; `PROPTEST_RNG_SEED` and `PROPTEST_CASES` request others and more of them.
 
 use proptest::prelude::*;
 use proptest::test_runner::{Config, FileFailurePersistence, RngSeed};
@@ -144,7 +144,7 @@ proptest! {
     }
 
     /// The bound costs work; without it the law has no velocity of its own: velocities may be taken `lambda` times as large and
-    /// times as small if friction, `1 + (a - b) ln lambda` at the new unit, is told in units of that.
+    /// times as small if friction, `1 + (a - b) ln lambda` at the new unit, is in units of that.
     #[test]
     fn work_scales_with_the_unit_of_velocity(transition in transition(), fraction in decades(1e-6, 1e3), lambda in decades(1.0, 1e3)) {
         let t_f = time(&transition, fraction);

@@ -1,5 +1,5 @@
 //! The regularised optimum: every number against a library's integration of the paper's equations and of pieces built
-//! anew, the order and the limit of its excess work, and its edges.
+//! again, the order and the limit of its excess work, and its edges.
 
 use crate::support::relative;
 use nalgebra::{SMatrix, SVector as Vector};
@@ -204,7 +204,7 @@ impl Found {
         }
     }
 
-    /// Takes in a piece from one moment to another that replaces `work` of the optimum; `outer` tells which of the two
+    /// Takes in a piece from one moment to another that replaces `work` of the optimum; `outer` determines which of the two
     /// are ends of the protocol.
     fn replace(
         &mut self,
@@ -261,7 +261,7 @@ impl Found {
     }
 }
 
-/// The regularised optimum, all of it anew but for `v` at both ends of the optimum and the time of its hold.
+/// An independent regularised optimum, except for `v` at both ends of the optimum and the time of its hold.
 fn again(case: &Case, delta_t: f64, floors: [f64; 2]) -> Found {
     let Case { slider, velocities: (v_i, v_f), t_f, .. } = *case;
     let best = optimum(case);
@@ -304,10 +304,10 @@ fn again(case: &Case, delta_t: f64, floors: [f64; 2]) -> Found {
 
 /// The bounds of the errors of work and gap hold, but for what the library leaves. How many of the errors are larger than
 /// that.
-fn errors_told(case: &Case, delta_t: f64, (least, excess): (f64, f64)) -> u32 {
+fn error_bounds(case: &Case, delta_t: f64, (least, excess): (f64, f64)) -> u32 {
     let at = |rtol| solve(case, delta_t, rtol).value.expect("exists");
     let finest = at(error::FINEST);
-    let mut told = 0;
+    let mut reported = 0;
     for rtol in [1e-2, 1e-3, 1e-4, 1e-5] {
         let found = at(rtol);
         for (found, finest, truth) in
@@ -318,16 +318,16 @@ fn errors_told(case: &Case, delta_t: f64, (least, excess): (f64, f64)) -> u32 {
             assert!(error <= bound + left, "{case:?} {delta_t} {rtol}: {error:e} of {bound:e}");
             if error > 10.0 * left {
                 assert!(bound < 10.0 * error, "{case:?} {delta_t} {rtol}: {error:e} of {bound:e}");
-                told += 1;
+                reported += 1;
             }
         }
     }
-    told
+    reported
 }
 
 #[test]
 fn reference_every_number_is_what_a_library_finds() {
-    let mut told = 0;
+    let mut reported = 0;
     let unbounded = Case { bounded: false, ..case((3.0, 100.0), 0.045) };
     let soft =
         Case { slider: SpringBlock { law: Law { a: 0.05, b: 0.02 }, k: 0.05, m: 1e-4 }, ..case((5.0, 20.0), 0.03) };
@@ -349,7 +349,7 @@ fn reference_every_number_is_what_a_library_finds() {
         assert!(relative(value.work_optimal, best.work) < 1e-12);
         assert!(relative(value.gap, expected.excess / best.work) < 1e-8, "{case:?} {fraction}: {value:?}");
         assert!(relative(value.work, best.work + expected.excess) < 1e-11, "{case:?} {fraction}: {value:?}");
-        told += errors_told(&case, delta_t, (best.work, expected.excess));
+        reported += error_bounds(&case, delta_t, (best.work, expected.excess));
         let [v, control] = [&expected.v, &expected.control].map(|values| Found::range(values));
         // Of 20,000 places the best is off by the square of the distance between two.
         assert!(relative(value.v_min, v[0]) < 1e-6 && relative(value.v_max, v[1]) < 1e-6, "{value:?} {v:?}");
@@ -357,7 +357,7 @@ fn reference_every_number_is_what_a_library_finds() {
         assert!((value.control_min - control[0]).abs() < size, "{case:?} {fraction}: {value:?} {control:?}");
         assert!((value.control_max - control[1]).abs() < size, "{case:?} {fraction}: {value:?} {control:?}");
     }
-    assert!(told >= 10, "{told}");
+    assert!(reported >= 10, "{reported}");
 }
 
 /// `int r ln r dx` of the limiting profile of a piece, `r = v/v_*` with `ln r = ln(rho) s(1 - xi) + alpha x^3 (1 -
@@ -430,7 +430,7 @@ fn the_work_does_not_depend_on_the_spring() {
 }
 
 #[test]
-fn pieces_next_to_a_hold_dip_below_the_bound_and_say_so() {
+fn pieces_near_a_hold_dip_below_the_bound_and_say_so() {
     for fraction in [0.3, 0.01, 1e-5] {
         let solved = solve(&HOLDING, fraction * HOLDING.t_f, 1e-10);
         assert_eq!(solved.status, Status::BelowBound);
@@ -517,7 +517,7 @@ fn the_motion_carries_the_numbers() {
         for pair in marks.windows(2) {
             let steps = 400;
             for i in 1..=steps {
-                // Next to a mark, so that a place just before and one just after are compared.
+                // Near a mark, so that a place just before and one just after are compared.
                 let s = pair[0] + (pair[1] - pair[0]) * (f64::from(i) / f64::from(steps)).min(1.0 - 1e-12);
                 let now = motion.at(s);
                 let h = now.t - before.t;
@@ -526,7 +526,7 @@ fn the_motion_carries_the_numbers() {
                 let grown = h * (1.0 - 0.5 * (before.theta * before.v + now.theta * now.v));
                 let change = now.theta - before.theta;
                 assert!((change - grown).abs() <= 1e-4 * (h + change.abs()) + 1e-13, "{case:?} at {s}: {now:?}");
-                for (range, x) in range.iter_mut().zip([now.v, now.v_c.expect("is told")]) {
+                for (range, x) in range.iter_mut().zip([now.v, now.v_c.expect("is reported")]) {
                     *range = [range[0].min(x), range[1].max(x)];
                 }
                 before = now;
@@ -588,7 +588,7 @@ fn regress_a_standstill_is_infeasible() {
     assert_eq!([0.05, 0.02].map(at), [(Status::NegativeFriction, true), (Status::Infeasible, false)]);
 }
 
-/// A piece that is short beside the lifetime of contacts: theta hardly tells what its velocity is, the slip does.
+/// A piece that is short near the lifetime of contacts: the slip, not theta, determines its velocity.
 #[test]
 fn regress_short_pieces_keep_the_digits_of_v_min() {
     let law = Law { a: 2.5401475772267644e-6, b: 0.0 };

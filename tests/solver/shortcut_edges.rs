@@ -1,4 +1,4 @@
-//! The edges of every shortcut family: what is asked of it is solved, and what does not exist says so.
+//! The edges of every shortcut family: what is required of it is solved, and what does not exist says so.
 //!
 //! A member is judged by what it cannot miss: its motion ends on theta's balance of ageing and slip, it costs no less
 //! than the optimum, and it stays within the bound of its family.
@@ -101,7 +101,7 @@ fn assert_arrives(family: &dyn Family, case: &Case, accuracy: f64) {
 }
 
 #[test]
-fn edge_time_of_the_hold_and_next_to_nothing_more() {
+fn edge_time_of_the_hold_and_near_nothing_more() {
     for (v_i, v_f) in [(100.0, 3.0), (1e8, 1.001), (1e8, 1e7), (1.01, 1.001), (3.000003, 3.0)] {
         for b in [0.03, 0.05] {
             let law = Law { a: 0.04, b };
@@ -127,7 +127,7 @@ fn edge_time_of_the_hold_and_next_to_nothing_more() {
 }
 
 #[test]
-fn edge_times_next_to_the_least_of_bounded_friction() {
+fn edge_times_near_the_least_of_bounded_friction() {
     let family = find("bounded_friction").expect("is a family");
     for (a, b) in [(0.03, 0.05), (0.05, 0.03), (0.03, 0.03)] {
         for (v_i, v_f) in [(100.0, 3.0), (3.0, 2.9), (1e4, 1e3)] {
@@ -207,7 +207,7 @@ fn edge_tau_max_from_1e_minus_9_above_both_ends_to_100_and_without_a_bound() {
                 Err(Obstacle::FrictionAtEnds { friction }) => {
                     assert!(above < 0.0 && relative(friction, ends) < 1e-15, "{case:?}");
                 }
-                // A bound next to nothing above the ends hardly accelerates.
+                // A bound near nothing above the ends hardly accelerates.
                 Err(obstacle) => assert!(obstacle == Obstacle::Friction && v_f > v_i && above < 0.1, "{case:?}"),
             }
         }
@@ -236,7 +236,7 @@ fn edge_a_bound_on_friction_at_infinity_is_a_parabola_in_time() {
 }
 
 #[test]
-fn edge_ratio_of_b_to_a_from_0_to_50_and_b_next_to_a() {
+fn edge_ratio_of_b_to_a_from_0_to_50_and_b_near_a() {
     for (v_i, v_f, t_f) in [(3.0, 100.0, 0.05), (100.0, 3.0, 0.6), (1.001, 1.01, 1.0)] {
         for family in FAMILIES {
             let work = |ratio: f64| {

@@ -55,7 +55,7 @@ fn reference_every_number_is_good_to_rtol() {
             }
             let shortcut = match solve(&case, rtol) {
                 Ok(shortcut) => shortcut,
-                // The time cannot tell as much as it is asked for.
+                // The time cannot determine it to the requested accuracy.
                 Err(Obstacle::NotConverged) if lost_in_time(&case, row) > 100.0 * rtol => continue,
                 Err(obstacle) => {
                     faults.push(format!("{rtol} {obstacle:?} in {row:?}"));
@@ -70,7 +70,7 @@ fn reference_every_number_is_good_to_rtol() {
                 ("friction_max", shortcut.friction_max),
             ] {
                 let error = relative(found, row.number(name));
-                // A velocity of next to nothing carries the rounding of its exponent.
+                // A velocity of near nothing carries the rounding of its exponent.
                 let exponent = if name == "v_min" { 1.0 + row.number(name).max(1e-308).ln().abs() } else { 1.0 };
                 let budget = (rtol + rounding(&case, row)) * exponent;
                 if error.is_nan() || error > budget {
@@ -102,7 +102,7 @@ fn reference_every_number_of_a_slowing_block_is_good_to_rtol_and_its_error_is_bo
             let mut numbers = vec![
                 ("alpha", shortcut.alpha.unwrap_or(f64::NAN), row.number("alpha"), 1.0),
                 ("work", shortcut.work, work, 1.0),
-                // A velocity of next to nothing carries the rounding of its exponent.
+                // A velocity of near nothing carries the rounding of its exponent.
                 ("v_min", shortcut.v_min, row.number("v_min"), 1.0 + row.number("v_min").max(1e-308).ln().abs()),
                 ("v_max", shortcut.v_max, row.number("v_max"), 1.0),
                 ("friction_max", shortcut.friction_max, row.number("friction_max"), 1.0),
@@ -234,8 +234,8 @@ fn motion_starts_and_ends_at_steady_sliding() {
 }
 
 /// Points of the whole legal domain that were not converged, or had wrong digits: `a`, `b`, `v_i`, `v_f`, `t_f`,
-/// `tau_ceiling`. Steady sliding that is followed for up to 1e22 contact lifetimes, a bound next to the friction of an end, a
-/// small change of velocity, `b` next to `a`, `b/a` of 1e5, velocities of 1e12.
+/// `tau_ceiling`. Steady sliding that is followed for up to 1e22 contact lifetimes, a bound near the friction of an end, a
+/// small change of velocity, `b` near `a`, `b/a` of 1e5, velocities of 1e12.
 #[rustfmt::skip]
 const WHOLE_DOMAIN: &[(f64, f64, f64, f64, f64, f64)] = &[
     (0.0002643118732845748, 0.001140772466982514, 819523465.4015598, 1.0000000006872276, 21.098355570687147, 1.0000001251304178),
@@ -279,7 +279,7 @@ const WHOLE_DOMAIN: &[(f64, f64, f64, f64, f64, f64)] = &[
 /// Points of the whole legal domain that were not converged, or had wrong digits, most of them for the sake of the
 /// standstill in a deceleration over many decades: theta comes to it from one end alike for every `alpha_3`, or with
 /// digits lost; steady sliding is left only just; friction is low enough for a standstill on one side of the middle
-/// alone. Others are accelerations with a bound next to the friction of an end, or with `b/a` of 1e4.
+/// alone. Others are accelerations with a bound near the friction of an end, or with `b/a` of 1e4.
 #[rustfmt::skip]
 const STANDSTILLS: &[(f64, f64, f64, f64, f64, f64)] = &[
     (0.00010302577752102117, 0.021530280115075306, 805868141.2491411, 4.892666289791259, 0.22864306281460942, 0.9659791467391248),
@@ -307,7 +307,7 @@ const STANDSTILLS: &[(f64, f64, f64, f64, f64, f64)] = &[
     (5.534197383053905e-6, 6.611110694825728, 277973.1354571624, 9557.49549032812, 0.000101088695484269, f64::INFINITY),
 ];
 
-/// Points of the whole legal domain that were `not_converged` at 1e-12 alone: `alpha_3` is next to `-ln R`, so that steady
+/// Points of the whole legal domain that were `not_converged` at 1e-12 alone: `alpha_3` is near `-ln R`, so that steady
 /// sliding at the start is left only just, and `b/a` of 1e6 magnifies the rounding of the friction that is left of both.
 #[rustfmt::skip]
 const LEFT_ONLY_JUST: &[(f64, f64, f64, f64, f64, f64)] = &[
@@ -347,7 +347,7 @@ fn regress_extremes_of_the_velocity_are_good_to_rtol_where_theta_does_not_show_t
     }
 }
 
-/// `b` next to `a`: forwards errors grow, which the rough search need not show; the other way they do not.
+/// `b` near `a`: forwards errors grow, which the rough search need not show; the other way they do not.
 #[test]
 fn regress_the_way_with_less_rounding_is_taken() {
     let (a, b) = (0.01108753783806471, 0.010272328997133002);

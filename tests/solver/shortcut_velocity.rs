@@ -88,9 +88,9 @@ fn is_good_to_rtol(family: &str, rows: &[&Row]) {
                 let Some(found) = found else { continue };
                 let error = relative(found, row.number(name));
                 // A subnormal miss has lost digits.
-                let faint = name == "miss" && found.abs() < 1e-300;
+                let ill_conditioned = name == "miss" && found.abs() < 1e-300;
                 assert!(
-                    error <= budget || faint,
+                    error <= budget || ill_conditioned,
                     "{name} at {rtol}: {found} off by {error:.1e} > {budget:.1e} in {row:?}"
                 );
             }
@@ -307,7 +307,7 @@ fn regress_a_cubic_that_dips_below_one_is_returned_and_says_so() {
 #[test]
 fn regress_just_above_the_least_time_v_is_one_but_for_thin_layers() {
     for (v_i, v_f) in [(100.0, 3.0), (1e8, 1.001), (1e8, 1e7), (1.01, 1.001), (3.000003, 3.0)] {
-        // The one double that the library takes for it, everywhere.
+        // The double of the library.
         let t_min = case(PAPER, v_i, v_f, 1.0).transition.least_time();
         assert!(relative(t_min, least_time(v_i, v_f)) < 4.0 * f64::EPSILON, "{v_i} {v_f}: {t_min}");
         let t_f = t_min * (1.0 + 1e-12);
@@ -471,9 +471,9 @@ fn reference_roots_of_polynomials() {
     assert!(roots_between(&[1.0, 0.0, 1.0], -5.0, 5.0).is_empty());
 }
 
-/// Ends so close to `v = 1` that theta hangs on excesses of 1e-14: works were off by up to 1e-8.
+/// Ends so close to `v = 1` that theta depends on excesses of 1e-14: works were off by up to 1e-8.
 #[test]
-fn regress_works_of_bounded_velocity_that_ends_next_to_1() {
+fn regress_works_of_bounded_velocity_that_ends_near_1() {
     for (a, b, v_i, v_f, t_f) in [
         (3.0337636112542627e-6, 5.154069349071326e-6, 193778775726.23297, 1.0000000000005314, 28.75928102330747),
         (0.12759216246512392, 0.08549748178616094, 2.7159654836887115, 1.0000000000000109, 31.710669870606424),
@@ -493,7 +493,7 @@ fn regress_works_of_bounded_velocity_that_ends_next_to_1() {
 /// Accelerations from a few units in the last place above 1: the time that theta has aged by was no number, or Newton's method
 /// went from side to side of the root.
 #[test]
-fn regress_accelerations_from_next_to_1_have_members() {
+fn regress_accelerations_from_near_1_have_members() {
     for (v_i, v_f, t_f) in [
         (1.0000000000000002, 3.9284274811939435, 3.562394294994745e-7),
         (1.0000000003117506, 145546016740.36246, 4.946497240424514e-10),

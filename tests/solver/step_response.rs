@@ -1,5 +1,4 @@
-//! The step response: the paper's case, Taylor series at 30 digits as judge, every fate decided, and the error asked
-//! for.
+//! The step response: the paper's case, Taylor series at 30 digits as judge, every outcome decided, and the requested error.
 
 use crate::extent::quick_or_long;
 use crate::reference;
@@ -147,7 +146,7 @@ fn settling_after_many_cycles_is_when_every_cycle_is_followed() {
 }
 
 #[test]
-fn next_to_the_critical_stiffness_the_linear_verdict_is_met() {
+fn near_the_critical_stiffness_the_linear_verdict_is_met() {
     let mut last: Option<f64> = None;
     for distance in [1e-3, 1e-4, 1e-5, 1e-6] {
         let above = respond(&paper((1.0 + distance) * critical()), 1e-6);
@@ -169,7 +168,7 @@ fn next_to_the_critical_stiffness_the_linear_verdict_is_met() {
 /// keeps up. Friction takes `(a - b) <A cos ln(1 + A cos)> = (a - b) (1 - sqrt(1 - A^2))` from `M A^2/2`: with `s =
 /// sqrt(1 - A^2)` the time is `M/(a - b)` times the growth of `-s - ln(1 - s)`.
 #[test]
-fn reference_heavy_block_settles_as_averaging_tells() {
+fn reference_heavy_block_settles_as_averaging_predicts() {
     let law = Law { a: 0.01, b: 0.005 };
     let mut last = f64::INFINITY;
     // The frequency stays 0.01, so that theta keeps up.
@@ -244,7 +243,7 @@ fn around_a_subcritical_point_the_size_of_the_step_decides() {
     assert_eq!(respond(&Step { k: 1.1 * critical, ..step }, 1e-6).outcome, Outcome::Settled);
 }
 
-/// Just above a subcritical point an unstable cycle of the amplitude `2 sqrt(-sigma/(omega l_1))` parts what dies out from
+/// Just above a subcritical point an unstable cycle of the amplitude `2 sqrt(-sigma/(omega l_1))` parts decaying responses from
 /// what grows; a step to `(1 - x) v_f` starts at about `x`.
 #[test]
 fn reference_the_unstable_cycle_parts_steps_that_die_out_from_those_that_grow() {
@@ -381,9 +380,9 @@ fn regress_small_steps_about_unstable_sliding_end_where_large_ones_do() {
     }
 }
 
-/// The limit cycle is as wide as the distance to the critical stiffness tells, or it is left undecided.
+/// The limit cycle is as wide as the distance to the critical stiffness determines, or it is left undecided.
 #[test]
-fn regress_no_limit_cycle_is_invented_next_to_the_critical_stiffness() {
+fn regress_no_limit_cycle_is_invented_near_the_critical_stiffness() {
     let step = paper((1.0 - 1e-6) * critical());
     let amplitude = |response: &Response| response.cycle.map(|cycle| (cycle.v_peak / cycle.v_trough).ln());
     let expected = amplitude(&respond(&step, 1e-6)).expect("is a limit cycle");
@@ -437,7 +436,7 @@ fn regress_without_mass_only_a_soft_spring_is_infeasible() {
 }
 
 #[test]
-fn every_fate_of_a_random_sample_is_decided() {
+fn every_outcome_of_a_random_sample_is_decided() {
     let sample = 1000;
     let mut state = 7;
     let mut random = |least: f64, greatest: f64| least * (greatest / least).powf(uniform(&mut state));
@@ -462,7 +461,7 @@ fn every_fate_of_a_random_sample_is_decided() {
             continue;
         }
         assert!(response.v_peak >= transition.v_f && response.v_peak.is_finite(), "{step:?} {response:?}");
-        // Where friction magnifies errors without measure, the least velocity is not told.
+        // Where friction magnifies errors without measure, the least velocity is not reported.
         unknown_troughs += usize::from(response.v_trough.is_nan());
         let known = (0.0..=transition.v_f).contains(&response.v_trough);
         assert!(known || response.v_trough.is_nan(), "{step:?} {response:?}");
@@ -485,7 +484,7 @@ fn every_fate_of_a_random_sample_is_decided() {
     assert!(unknown_troughs * 10 < sample && unknown_times * 20 < sample, "{unknown_troughs} {unknown_times}");
 }
 
-/// Asserts that what both of two responses tell agrees to `rtol`, and counts it.
+/// Asserts that what both of two responses determine agrees to `rtol`, and counts it.
 fn compare(step: &Step, both: [Response; 2], rtol: f64, compared: &mut [usize; 6]) {
     let cycle = |of: fn(Sustained) -> f64| both.map(|response| response.cycle.map_or(f64::NAN, of));
     let time = |of: fn(&Response) -> Option<f64>| both.map(|response| of(&response).unwrap_or(f64::NAN));
@@ -499,16 +498,16 @@ fn compare(step: &Step, both: [Response; 2], rtol: f64, compared: &mut [usize; 6
         (cycle(|cycle| cycle.v_trough), 1.0),
     ];
     for (i, ([found, judge], allowed)) in numbers.into_iter().enumerate() {
-        let told = !found.is_nan() && !judge.is_nan();
-        compared[i] += usize::from(told);
+        let reported = !found.is_nan() && !judge.is_nan();
+        compared[i] += usize::from(reported);
         let good = found == judge || relative(found, judge) <= rtol * allowed;
-        assert!(!told || good, "number {i} of {step:?} at {rtol:e}: {found} {judge}");
+        assert!(!reported || good, "number {i} of {step:?} at {rtol:e}: {found} {judge}");
     }
 }
 
-/// Finer steps are the judge: what is told at 1e-5 agrees with what is told at 1e-9, wherever both tell it.
+/// Finer steps are the judge: what is reported at 1e-5 agrees with what is reported at 1e-9, wherever both determine it.
 #[test]
-fn regress_every_number_that_is_told_is_good_to_rtol() {
+fn regress_every_reported_number_is_good_to_rtol() {
     const RTOL: f64 = 1e-5;
     let sample = quick_or_long(60, 300);
     let mut state = 11;
@@ -531,7 +530,7 @@ fn regress_every_number_that_is_told_is_good_to_rtol() {
 
 /// Swings of heavy blocks die out or end on a small limit cycle, however close to the critical stiffness.
 #[test]
-fn reference_heavy_blocks_next_to_the_critical_stiffness() {
+fn reference_heavy_blocks_near_the_critical_stiffness() {
     let (law, mass, rtol) = (Law { a: 0.01, b: 0.02 }, 1.0, 1e-5);
     let critical = SteadySliding::new(law, 1.0, mass, 1.0).critical_stiffness();
     for fraction in [1e-6, 1e-4] {
@@ -555,7 +554,7 @@ fn reference_heavy_blocks_next_to_the_critical_stiffness() {
 
 /// The peak and the trough of a motion within 1e-5 of `v_f`, which counted as rest.
 #[test]
-fn regress_motions_within_1e_5_of_the_final_velocity_are_told() {
+fn regress_motions_within_1e_5_of_the_final_velocity_are_reported() {
     let equal = Law { a: 0.3233401024753941, b: 0.32334010247665207 };
     let cases = [
         (Law { a: 0.018450554182241147, b: 0.0 }, [4247641877.583368, 4247642864.5342784], 26543896.623336684, 1e-18),
@@ -577,9 +576,9 @@ fn regress_motions_within_1e_5_of_the_final_velocity_are_told() {
     }
 }
 
-/// Next to the critical stiffness a block without mass comes to rest after more swings than can be followed.
+/// Near the critical stiffness a block without mass comes to rest after more swings than can be followed.
 #[test]
-fn responses_without_mass_next_to_the_critical_stiffness_are_decided() {
+fn responses_without_mass_near_the_critical_stiffness_are_decided() {
     let law = Law { a: 0.25, b: 0.75 };
     for v_i in [2.1, 1.9, 200.0, 1.0001] {
         let transition = Transition { law, v_i, v_f: 2.0 };
@@ -657,7 +656,7 @@ fn regress_a_large_step_ends_on_the_cycle_around_stable_sliding() {
     }
 }
 
-/// Next to its limit cycle errors of steps alternate in sign, so that changes from one cycle to the next no longer shrink: the case was
+/// Near its limit cycle errors of steps alternate in sign, so that changes from one cycle to the next no longer shrink: the case was
 /// undecided at two accuracies.
 #[test]
 fn regress_errors_of_steps_keep_no_cycle_from_its_limit() {

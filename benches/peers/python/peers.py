@@ -123,7 +123,7 @@ def optimal(write):
 
 
 def works(x, w, a, b, v_i, v_f, t_f, a_2, a_3):
-    """Works of many shortcuts in numpy; NaN where a node tells that there is none."""
+    """Works of many shortcuts in numpy; NaN where a node has none."""
     q, a_4 = 1 / v_i, 1 / v_f - 1 / v_i - a_2 - a_3
     work, feasible = np.zeros_like(a), np.ones(a.shape, bool)
     for place, weight in zip(x, w):

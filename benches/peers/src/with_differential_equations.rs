@@ -49,7 +49,7 @@ impl Method for Radau5 {
     }
 }
 
-/// Explicit and not for stiff problems: beside the others where the response is not stiff.
+/// Explicit and not for stiff problems: compared with the others where the response is not stiff.
 pub struct Dop853;
 
 impl Method for Dop853 {

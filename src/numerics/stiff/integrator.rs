@@ -70,7 +70,7 @@ struct Last<const N: usize, const S: usize> {
     error: f64,
 }
 
-/// Error that a tolerance cannot ask for less of, relative to the variables: 32 units in the last place.
+/// Least error of a tolerance, relative to the variables: 32 units in the last place.
 const ROUNDING: f64 = 32.0 * f64::EPSILON;
 
 /// Fraction of the time before it that a step is at least, unless it [may be shorter](Integrator::may_step): 32 digits.
@@ -82,7 +82,7 @@ const MOST_ITERATIONS: u32 = 12;
 /// Fraction of the tolerance that is left to Newton's method.
 const NEWTON_TOLERANCE_FRACTION: f64 = 0.01;
 
-/// The matrix is made anew where an iteration leaves more than this fraction of the error.
+/// The matrix is recomputed where an iteration leaves more than this fraction of the error.
 const SLOW: f64 = 0.1;
 
 impl<'a, Y: System<N>, const N: usize, const S: usize> Integrator<'a, Y, N, S> {
@@ -492,7 +492,7 @@ mod tests {
     }
 
     #[test]
-    fn solution_that_ends_is_told_where() {
+    fn a_solution_that_ends_reports_where() {
         let accuracy = Accuracy { tolerance: 1e-10, scale: [1.0] };
         let mut integrator = Integrator::new(&Burst, radau_iia_9(), accuracy, 0.0, [0.0], 0.1);
         let failure = loop {

@@ -19,7 +19,7 @@ pub struct Defaults {
     pub value: &'static [&'static str],
     /// Columns of lines, a panel each.
     pub lines: &'static [&'static str],
-    /// Axes whose values are told apart by lines.
+    /// Axes whose values are distinguished by lines.
     pub series: &'static [&'static str],
     /// Values of both axes from which on a map is drawn.
     pub least_map: usize,
@@ -41,7 +41,7 @@ pub fn choose(survey: &Survey, defaults: &Defaults, request: &Request) -> Result
     let choice = Choice::new(survey, defaults, request)?;
     let (x, y, colour) = (request.x.as_deref(), request.y.as_deref(), request.colour.as_deref());
     let is_axis = |name: &&str| survey.axis(name).is_some();
-    // Two axes, or a column of colours, ask for a map; another column for lines.
+    // Two axes, or a column of colours, request a map; another column for lines.
     if let Some(y) = y.filter(is_axis) {
         let x = x.map(str::to_owned).or_else(|| choice.find(defaults.x, Some(y), 2)).or_else(|| choice.longest());
         let x = x.filter(|x| x != y).ok_or_else(|| choice.one_row())?;

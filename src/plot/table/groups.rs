@@ -12,14 +12,14 @@ use crate::protocol::shortcut::FAMILIES;
 /// Groups, above which all rows are one group. Chosen: far more than a picture shows.
 const MAX_GROUPS: usize = 4096;
 
-/// Panels of a figure. Chosen: three rows of three are legible on a page.
+/// Panels of a figure. Chosen: three rows of three are readable on a page.
 const MAX_PANELS: usize = 9;
 
 /// Panels in a row, or in a column, of a figure that crosses two axes. Chosen: narrower panels have no room for labels.
 const MAX_CROSSED_PANELS: usize = 4;
 
-/// The axes that vary besides those that are drawn and tell rows apart, and a sentence on those that only change along. An axis of the
-/// grid always tells them apart, whichever rows are left of it.
+/// The axes that vary besides those that are drawn and distinguish rows, and a sentence on those that only change along. An axis of the
+/// grid always distinguishes them, whichever rows are left of it.
 pub fn further<'a>(survey: &'a Survey, drawn: &[&str]) -> Result<(Vec<&'a str>, Option<String>), PlotError> {
     let others =
         survey.axes.iter().filter(|axis| (axis.varies() || axis.infinite) && !drawn.contains(&axis.name.as_str()));
@@ -156,7 +156,7 @@ impl Groups {
         let shown = choice(&found, most, makes).into_iter().map(|place| {
             let named =
                 varying.iter().map(|&axis| (axes[axis], found[place][axis])).filter(|(_, value)| !value.is_nan());
-            let words = named.filter_map(|(name, value)| Some(survey.axis(name)?.told(value)));
+            let words = named.filter_map(|(name, value)| Some(survey.axis(name)?.text_of(value)));
             Group { name: words.collect::<Vec<_>>().join(", "), values: found[place].clone() }
         });
         let axes = axes.iter().map(|&axis| axis.to_owned()).collect();
@@ -236,12 +236,12 @@ impl Groups {
         let group = |(row, column): (f64, f64)| {
             let mut values = found[0].clone();
             (values[crossed[0]], values[crossed[1]]) = (row, column);
-            Group { name: format!("{}, {}", first.told(row), second.told(column)), values }
+            Group { name: format!("{}, {}", first.text_of(row), second.text_of(column)), values }
         };
         self.shown = rows.iter().flat_map(|&row| columns.iter().map(move |&column| (row, column))).map(group).collect();
-        let titles = |axis: &Values, values: &[f64]| values.iter().map(|&value| axis.told(value)).collect();
+        let titles = |axis: &Values, values: &[f64]| values.iter().map(|&value| axis.text_of(value)).collect();
         let held = varying.iter().filter(|axis| is_held(axis));
-        self.held = held.filter_map(|&place| Some(axis(place)?.told(found[0][place]))).collect();
+        self.held = held.filter_map(|&place| Some(axis(place)?.text_of(found[0][place]))).collect();
         self.crossed = Some([titles(first, &rows), titles(second, &columns)]);
         self.places = places_of(&self.shown);
         self.left_out = found.iter().filter(|group| self.place(group).is_none()).count();
@@ -291,7 +291,7 @@ impl Groups {
         }
     }
 
-    /// What is left out, for who can ask for it.
+    /// A note about omitted panels.
     pub fn note(&self) -> Option<String> {
         (self.left_out > 0).then(|| {
             let what = if self.makes == Makes::Panels { "panels" } else { "lines" };

@@ -12,7 +12,7 @@ use crate::plot::{PlotError, coincide, label};
 /// Places along a line, above which rows share them. Chosen: more are not seen in print.
 const MAX_PLACES: usize = 4096;
 
-/// Rows, above which no names stand beside their points. Chosen: more names run over each other.
+/// Greatest number of rows with names at their points. Chosen: more names overlap.
 pub const MAX_NAMED_ROWS: u64 = 60;
 
 /// Range of a column relative to its greatest value, below which it is one value. Chosen: the range is rounding.
@@ -32,7 +32,7 @@ pub struct Plan {
     pub x: String,
     /// Columns of the panels, from the top.
     pub y: Vec<String>,
-    /// The axis whose values are told apart first.
+    /// The axis whose values are distinguished first.
     pub series: Option<String>,
 }
 

@@ -206,7 +206,7 @@ impl Shading<'_> {
         }
         let values = || sheets.iter().flat_map(|sheet| sheet.value.iter().copied());
         let all = Scale::of(values()).ok_or(PlotError::Nothing)?;
-        // A gap is never below zero but for rounding: its logarithm is what tells.
+        // A gap is never below zero but for rounding: its logarithm is shown.
         let scale = match Scale::of(values().filter(|value| *value > 0.0)) {
             Some(positive) if column == "gap" && positive.high > positive.low => Scale { log: true, ..positive },
             _ if all.high > all.low => all,

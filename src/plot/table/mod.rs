@@ -22,7 +22,7 @@ use choice::{Defaults, Shape};
 pub use condition::Condition;
 use survey::Survey;
 
-/// What is asked for.
+/// What is requested.
 #[derive(Debug, Clone, Default)]
 pub struct Request {
     /// Rows that are shown.
@@ -31,7 +31,7 @@ pub struct Request {
     pub x: Option<String>,
     /// Vertical axis, or the column of lines.
     pub y: Option<String>,
-    /// Column of a map's colours, or the axis that tells lines apart.
+    /// Column of a map's colours, or the axis that distinguishes lines.
     pub colour: Option<String>,
 }
 
@@ -270,7 +270,7 @@ fn fixed(survey: &Survey, drawn: &[String]) -> String {
     for axis in survey.axes.iter().filter(|axis| !drawn.contains(&axis.name)) {
         match axis.values.as_slice() {
             [one] if !axis.infinite => {
-                words.push(axis.told(*one));
+                words.push(axis.text_of(*one));
             }
             [] if axis.infinite && axis.name != "tau_ceiling" => words.push(format!("{} = ∞", label::name(&axis.name))),
             _ => {}

@@ -1,4 +1,4 @@
-//! Phase diagrams of sliding on a spring: what happens over stiffness and velocity, beside the critical stiffness.
+//! Phase diagrams of sliding on a spring: the outcome over stiffness and velocity, and the critical stiffness.
 
 use super::choice::Shape;
 use super::groups::Groups;

@@ -55,7 +55,7 @@ pub fn histogram(survey: &Survey) -> Result<(Figure, Vec<String>), PlotError> {
     survey.each(&wanted, |row| {
         let (classes, key) = row.split_at(columns.len());
         let Some(group) = groups.place(key) else { return };
-        // Rows that no axis tells apart are counted together.
+        // Rows that no axis distinguishes are counted together.
         counts[group]
             .iter_mut()
             .zip(classes)

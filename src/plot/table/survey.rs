@@ -58,7 +58,7 @@ impl Values {
     }
 
     /// Name and value, in markup, with a unit of SI; a word speaks for itself.
-    pub fn told(&self, value: f64) -> String {
+    pub fn text_of(&self, value: f64) -> String {
         let shown = self.shown(value);
         if self.words.is_empty() { label::equation(&self.name, &shown, &self.unit) } else { shown }
     }
@@ -148,7 +148,7 @@ impl Survey {
         }
     }
 
-    /// The labels and their words, unless those are too many to be told apart in a picture.
+    /// The labels and their words, unless those are too many to be distinguished in a picture.
     fn read_labels(&self) -> Result<Vec<(String, Vec<String>)>, PlotError> {
         let known = table::find(&self.table);
         let is_column =
@@ -300,7 +300,7 @@ impl Survey {
         }
     }
 
-    /// Which of `axes` have but one value wherever those of `given` are the same: such an axis tells no rows apart. None has, as far as
+    /// Which of `axes` have but one value wherever those of `given` are the same: such an axis distinguishes no rows. None has, as far as
     /// is known, if `given` have too many values.
     pub fn determined(&self, axes: &[&str], given: &[&str]) -> Result<Vec<bool>, PlotError> {
         let mut determined = vec![true; axes.len()];

@@ -83,7 +83,7 @@ impl Ellipse {
         self.half.iter().zip(sizes).all(|(row, size)| libm::hypot(row[0], row[1]) <= ROUNDING * size)
     }
 
-    /// Whether a linear function varies by no more in the ellipse than by rounding of the place: a cut along it tells
+    /// Whether a linear function varies by no more in the ellipse than by rounding of the place: a cut along it determines
     /// nothing any more. Where the work rises straight into the set, the ellipse gets so thin across before it is short
     /// along the border: as short as the root of that.
     fn is_spent(&self, along: [f64; 2], span: f64) -> bool {

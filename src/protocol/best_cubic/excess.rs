@@ -31,7 +31,7 @@ const DEEPEST: u32 = 30;
 /// Most panels; smooth cases take two to eight, a kink some thirty.
 const MOST_PANELS: u32 = 1000;
 /// Fraction of the shortcut's velocity below which that of the optimum may be too small for a number.
-const FAINT: f64 = 1e-3;
+const MIN_DENSITY: f64 = 1e-3;
 /// Panels towards an end are this much shorter, one after the other.
 const SHORTER: f64 = 0.2;
 
@@ -100,7 +100,7 @@ impl Excess<'_> {
         let position = optimal::Position { theta, rest, drop, time_left, margin };
         let Transition { law, v_f, .. } = *self.transition;
         let best = optimal::feedback(law, v_f, position, self.bounded, FEEDBACK, self.stats)?;
-        let dearer = if best.v > FAINT * v {
+        let dearer = if best.v > MIN_DENSITY * v {
             best.v * entropy((v - best.v) / best.v)
         } else {
             v * (ln(v) - best.ln_v - 1.0) + best.v

@@ -6,7 +6,7 @@ use crate::numerics::elementary::exp;
 use crate::protocol::SolverStats;
 use crate::protocol::cubic::{Basis, Landscape, Path, WorkDerivatives};
 
-/// Two coefficients of theta, those of [`Basis`], to 32 digits: next to the border what is admissible may be thinner than
+/// Two coefficients of theta, those of [`Basis`], to 32 digits: near the border what is admissible may be thinner than
 /// the rounding of a double.
 pub(super) type Place = [DoubleDouble; 2];
 

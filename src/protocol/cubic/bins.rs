@@ -1,4 +1,4 @@
-//! Shortcuts sorted by the number of nodes that they ask for, eight of which are summed together.
+//! Shortcuts sorted by the number of nodes that they need, eight of which are summed together.
 
 use std::cell::Cell;
 
@@ -38,7 +38,7 @@ struct Load {
     indices: [usize; LANES],
     count: usize,
     bin: usize,
-    /// Whether no panel has another one beside it.
+    /// Whether every panel is alone.
     whole: bool,
 }
 

@@ -420,7 +420,7 @@ struct Centres {
     side: [f32; TOGETHER],
     /// How far beyond it.
     gap: [f32; TOGETHER],
-    /// Whether all samples of a cell ask for the same end.
+    /// Whether all samples of a cell need the same end.
     common: [bool; TOGETHER],
 }
 

@@ -127,7 +127,7 @@ impl Path<'_> {
         least
     }
 
-    /// Where friction is stationary in the half next to an end, as distances from it: `a n' theta + (b - a) n theta' =
+    /// Where friction is stationary in the half near an end, as distances from it: `a n' theta + (b - a) n theta' =
     /// 0`.
     fn stationary(&self, law: Law, end: f64) -> Vec<f64> {
         let ([t0, t1, t2, t3], [n0, n1, n2]) = self.about(end);

@@ -54,9 +54,9 @@ pub struct Landscape {
 /// The results of a run of shortcuts, one element a shortcut, laid out column by column.
 #[derive(Debug)]
 pub struct LandscapeBuffers<'a> {
-    /// `W_s`; left untouched where infeasible, and everywhere if empty (not asked for).
+    /// `W_s`; left untouched where infeasible, and everywhere if empty (not requested).
     pub work: &'a mut [f64],
-    /// Least velocity on `[0, t_f]`; left untouched where infeasible, and everywhere if empty (not asked for).
+    /// Least velocity on `[0, t_f]`; left untouched where infeasible, and everywhere if empty (not requested).
     pub v_min: &'a mut [f64],
     /// `Ok`, `BelowBound`, `NegativeFriction` or `Infeasible`.
     pub status: &'a mut [Status],
@@ -137,7 +137,7 @@ impl Landscape {
         evaluation.inner_velocities();
         let Evaluation { status, works, doubtful, .. } = evaluation;
         let stats = works.finish();
-        // Until here the status tells on which side of v = 1 a velocity is.
+        // Until here the status determines on which side of v = 1 a velocity is.
         for open in doubtful {
             open.decide(self.law, |i| Path::new(&self.ends, a_2[i], a_3[i]), status);
         }
@@ -149,7 +149,7 @@ impl Landscape {
     fn work(&self, path: &Path, stats: &mut SolverStats) -> f64 {
         let mut panels = Vec::with_capacity(8);
         let zeros = Zeros::of(path);
-        if [false, true].iter().any(|&end| path.is_faint(end, self.accuracy.rounding)) {
+        if [false, true].iter().any(|&end| path.is_lossy(end, self.accuracy.rounding)) {
             // Each half has its own expansions.
             choose(&zeros, 0.0, 0.5, &self.accuracy, 1, &mut panels);
             choose(&zeros, 0.5, 1.0, &self.accuracy, 1, &mut panels);

@@ -137,7 +137,7 @@ impl<'a> Path<'a> {
         }
     }
 
-    /// The complex pair of zeros of theta next to its least value, where that is so small that the closed form of the
+    /// The complex pair of zeros of theta near its least value, where that is so small that the closed form of the
     /// zeros has no digit of their distance from the real axis: its place, its height, and how far from there the closed
     /// form may put the two, but not the third one.
     pub fn close_pair(&self) -> Option<(f64, f64, f64)> {
@@ -172,7 +172,7 @@ impl<'a> Path<'a> {
     /// Whether theta at the start or at the end is so small that an expansion about the other end costs it more than the
     /// fraction `loss` of its digits.
     #[inline(always)]
-    pub fn is_faint(&self, end: bool, loss: f64) -> bool {
+    pub fn is_lossy(&self, end: bool, loss: f64) -> bool {
         let [c0, c1, c2, c3] = self.theta.c;
         let size = c0.abs() + c1.abs() + c2.abs() + c3.abs();
         let theta = if end { self.ends.theta_1.high } else { self.ends.theta_0.high };

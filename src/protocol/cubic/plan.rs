@@ -1,9 +1,9 @@
 //! One panel for each of many shortcuts at a time: the zeros and the power map that suits most of a landscape, without a
-//! branch that a lane takes for another one.
+//! branch that a lane treats as another one.
 //!
 //! The same estimate as in [`rules`](super::rules), restricted to what is cheap: the straight rule, and the maps `x = r
 //! ± s^2`, `s^4`, `s^8` about the shadow of the most hindering zero on the real axis beyond the nearer end. Where that
-//! asks for many nodes, the interval is cut in two, and where that does not help either, `rules` looks further.
+//! needs many nodes, the interval is cut in two, and where that does not help either, `rules` looks further.
 
 use multiversion::multiversion;
 
@@ -17,7 +17,7 @@ use crate::numerics::real::Real;
 /// One panel for each shortcut.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Plan {
-    /// The bin of the number of nodes that the map asks for; none from [`BINS`] on.
+    /// The bin of the number of nodes that the map needs; none from [`BINS`] on.
     pub bin: [u32; BLOCK],
     /// log2 of the power.
     pub squarings: Block,
@@ -30,7 +30,7 @@ pub(super) struct Plan {
     pub to: Block,
     /// 1 where a larger power might save nodes.
     pub deeper: Block,
-    /// Where a panel that asks for too many nodes is best cut.
+    /// The best cut of a panel with too many nodes.
     pub cut: Block,
 }
 
@@ -70,7 +70,7 @@ pub(super) const PAIRS: [usize; 2] = [1, 3];
 /// What a doubtful zero of n counts. Chosen: more than all of theta.
 const DOUBT_OF_N: f32 = 8.0;
 
-/// Whether zeros are computed to few digits; what these do not tell is left to the next plan.
+/// Whether zeros are computed to few digits; what these leave open is left to the next plan.
 const fn is_coarse<T: Real>() -> bool {
     size_of::<T>() < size_of::<f64>()
 }
@@ -182,7 +182,7 @@ impl<T: Real> Places<T> {
         }
     }
 
-    /// Doubts pairs next to the real axis: the closed forms do not tell how far from it they are. That of theta is looked at
+    /// Doubts pairs near the real axis: the closed forms do not determine how far from it they are. That of theta is looked at
     /// again.
     #[inline(always)]
     fn settle_close_pairs(&mut self, ends: &Ends, a_2: &Block, a_3: &Block) {
@@ -273,7 +273,7 @@ fn panels<T: Real, const SQUARINGS: u32>(
         side[i] = T::of(if upper { 1.0 } else { -1.0 });
         gap[i] = if beyond > zero { beyond } else { zero };
     }
-    // A place is its real part and its size, which is all that the distances from real ends ask for.
+    // A place is its real part and its size, which is all that the distances from real ends need.
     let (mut real, mut size) = ([[0.0f32; BLOCK]; ZEROS], [[0.0f32; BLOCK]; ZEROS]);
     for k in 0..ZEROS {
         for i in 0..BLOCK {

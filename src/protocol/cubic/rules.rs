@@ -69,7 +69,7 @@ const MAX_DEPTH: u32 = 12;
 /// errors that are left.
 const MARGIN: f64 = 3.5;
 
-/// The accuracy asked for, as the focal sums (see [`focal`]) from which a number of nodes is enough.
+/// The accuracy requested, as the focal sums (see [`focal`]) from which a number of nodes is enough.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Accuracy {
     /// Element `i` is for `(i + 1) NODE_STEP` nodes; falling.
@@ -135,7 +135,7 @@ impl Accuracy {
         &self.focal
     }
 
-    /// The nodes that a focal sum asks for, of a rule for [`LANES`] nodes at a time; `MOST_NODES` where that is not
+    /// The nodes that a focal sum needs, of a rule for [`LANES`] nodes at a time; `MOST_NODES` where that is not
     /// enough.
     pub fn nodes(&self, focal: f64) -> usize {
         let more = self.focal.iter().position(|&enough| focal >= enough);
@@ -149,7 +149,7 @@ impl Accuracy {
 pub(super) struct Zeros {
     re: Lanes,
     im: Lanes,
-    /// Real parts less 1, with all digits of a zero next to the end.
+    /// Real parts less 1, with all digits of a zero near the end.
     from_end: Lanes,
 }
 

@@ -291,7 +291,7 @@ fn ending<const N: usize>(
         let slack = path.slack();
         let doubt = surplus.doubt() + (3.0 + v * ends.t_f) * slack;
         let lost =
-            is_faint(path.n(), 3.0 * slack, place, ends.v_loss) | is_faint(path.theta(), slack, place, ends.v_loss);
+            is_lossy(path.n(), 3.0 * slack, place, ends.v_loss) | is_lossy(path.theta(), slack, place, ends.v_loss);
         v_min[i] = on_side(v, status[i]);
         let is_open = lost | !((first > doubt) & (second > doubt));
         open[i] = if is_open { 1u32 << i } else { 0 };
@@ -313,8 +313,8 @@ type Search = [f64; SEARCH];
 
 /// Least velocities of feasible shortcuts.
 pub(super) fn inner_velocities(ends: &Ends, a_2: &Search, a_3: &Search) -> Search {
-    let [mut v_min, place, faint] = least_velocities(ends, a_2, a_3);
-    for i in (0..SEARCH).filter(|&i| faint[i] > 0.0) {
+    let [mut v_min, place, lossy] = least_velocities(ends, a_2, a_3);
+    for i in (0..SEARCH).filter(|&i| lossy[i] > 0.0) {
         v_min[i] = Path::new(ends, a_2[i], a_3[i]).exact_velocity(place[i]);
     }
     v_min
@@ -368,15 +368,15 @@ fn least<const N: usize>(ends: &Ends, a_2: &[f64; N], a_3: &[f64; N]) -> [[f64; 
     if due != [0.0; N] {
         lower(ends, a_2, a_3, &mut v_min, &mut place, due);
     }
-    let mut faint = [0.0; N];
+    let mut lossy = [0.0; N];
     for i in 0..N {
         let path = Path::new(ends, a_2[i], a_3[i]);
         let slack = path.slack();
-        let lost = is_faint(path.n(), 3.0 * slack, place[i], ends.v_loss)
-            | is_faint(path.theta(), slack, place[i], ends.v_loss);
-        faint[i] = if lost { 1.0 } else { 0.0 };
+        let lost = is_lossy(path.n(), 3.0 * slack, place[i], ends.v_loss)
+            | is_lossy(path.theta(), slack, place[i], ends.v_loss);
+        lossy[i] = if lost { 1.0 } else { 0.0 };
     }
-    [v_min, place, faint]
+    [v_min, place, lossy]
 }
 
 /// Where to look for least velocities: from the least of some, a few steps of Newton's method.
@@ -469,7 +469,7 @@ const LAST_STEP: f64 = 1e-9;
 
 /// Whether rounding may cost the value of a cubic at `x` a fraction `loss` of it (or it is not a number).
 #[inline(always)]
-fn is_faint(cubic: &Cubic, slack: f64, x: f64, loss: f64) -> bool {
+fn is_lossy(cubic: &Cubic, slack: f64, x: f64, loss: f64) -> bool {
     let [c0, c1, c2, c3] = cubic.c;
     let sound = loss * cubic.at(x) > 4.0 * f64::EPSILON * (c0.abs() + c1.abs() + c2.abs() + c3.abs()) + slack;
     !sound

@@ -31,7 +31,7 @@ pub(in crate::protocol) struct WorkDerivatives {
     pub hessian: [f64; 3],
 }
 
-/// Two coefficients that tell a cubic theta between its ends.
+/// Two coefficients that determine a cubic theta between its ends.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(in crate::protocol) enum Basis {
     /// Those of `x` and `x^2`.

@@ -1,4 +1,4 @@
-//! The works of many shortcuts, each summed beside others that ask for as many nodes.
+//! The works of many shortcuts, summed with others of equal node count.
 
 use super::Landscape;
 use super::bins::{BINS, Bins, CUT_FROM, nodes_of};

@@ -186,7 +186,7 @@ impl Arc {
     /// way).
     pub fn sums(&self, tolerance: f64) -> Option<Sums> {
         let mut sums = self.sums_once(tolerance)?;
-        // Where friction falls below b - a, E has a minimum on the way: zeros next to it ask for more nodes than foreseen.
+        // Where friction falls below b - a, E has a minimum on the way: zeros near it need more nodes than foreseen.
         let mut asked = tolerance;
         while sums.friction_min <= self.law.b - self.law.a && asked > LEAST_TOLERANCE {
             asked *= asked.min(1e-3);
@@ -437,10 +437,10 @@ const MOST_NODES: f64 = 64.0;
 /// Most panels of an arc.
 const MOST_PANELS: u32 = 64;
 
-/// A quadrature that is asked for this much uses all panels and nodes that there are.
+/// The tolerance at which a quadrature uses the greatest numbers of panels and nodes.
 const LEAST_TOLERANCE: f64 = 1e-200;
 
-/// Sums over equal panels of a line, with as many Gauss nodes as the nearest singularity asks for.
+/// Sums over equal panels of a line, with as many Gauss nodes as the nearest singularity needs.
 fn panels<const N: usize>(line: &Line<N>, tolerance: f64, kernel: impl Fn(f64, f64, &Rule) -> Sums) -> Sums {
     let &Line { start, length, .. } = line;
     let (count, nodes) = line.cut(MOST_NODES, MOST_PANELS, tolerance);
@@ -480,8 +480,8 @@ fn nodes_needed(middle: f64, half: f64, singular: &[(f64, f64)], digits: f64) ->
 /// Stands for a singularity that is nowhere near.
 const FAR: f64 = 1e3;
 
-/// The pair of zeros of `a E = friction_a + (b - a) y + c e^y` beside the real axis, or of `a E - i shift`: a place of the
-/// upper half plane, to some tenths, and not above it. For `c <= 0` there is none next to an arc.
+/// The pair of zeros of `a E = friction_a + (b - a) y + c e^y` near the real axis, or of `a E - i shift`: a place of the
+/// upper half plane, to some tenths, and not above it. For `c <= 0` there is none near an arc.
 ///
 /// With `y = r + i s` it is where `c e^r cos s = -F` and `c e^r sin s = G`, of `F = friction_a + (b - a) r` and `G = shift +
 /// (a - b) s`, so that `s = pi/2 + atan(F/G)`; each round shrinks the error of `r` to a third or less, mostly far less.

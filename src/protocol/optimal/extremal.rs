@@ -402,7 +402,7 @@ impl Problem {
         if held <= 0.0 {
             return at_once;
         }
-        // 1 - theta_s comes from theta_1: it is a small difference where v_f is next to 1.
+        // 1 - theta_s comes from theta_1: it is a small difference where v_f is near 1.
         let left = -self.to.theta * exp_m1(d);
         Leaving { time_at_floor: floor::time(held, self.to.rest + left), late: self.growth_beyond(left), d }
     }
@@ -539,7 +539,7 @@ mod tests {
                         else {
                             continue;
                         };
-                        // Differences tell nothing across a seam of the family or where the time is all rounding.
+                        // Differences determine nothing across a seam of the family or where the time is all rounding.
                         let seams = [0.0, -q_hold.unwrap_or(0.0)];
                         let seam = seams.into_iter().any(|seam| (q - seam).abs() < 2.0 * step);
                         if seam || beyond < 1e-7 {

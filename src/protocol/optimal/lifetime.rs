@@ -1,4 +1,4 @@
-//! A contact lifetime beside its distance from 1, where contacts end up that age at `v = 1`.
+//! The state variable theta with its distance from 1, the limit of ageing at `v = 1`.
 
 use crate::numerics::elementary::{exp, exp_m1, ln, ln_1p};
 

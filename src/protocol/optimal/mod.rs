@@ -178,7 +178,7 @@ pub(super) fn feedback(
     let optimum = solved.value?;
     let pressure = if optimum.strategy == Strategy::Floor {
         // On the bound -C = friction + V_theta (1 - theta), with the C of the arc that leaves it at theta_c, where 1 -
-        // theta_c = (1 - theta) e^-t: nothing cancels next to theta = 1.
+        // theta_c = (1 - theta) e^-t: nothing cancels near theta = 1.
         let held = optimum.time_at_floor;
         let released = from.aged(held);
         let grown = ln_1p(from.growth(held) / from.theta);

@@ -171,23 +171,23 @@ impl Optimal {
         }
         let (Site::Moving(end), Some(arc)) = (to, &self.arc) else { return };
         let start = if let Site::Moving(start) = from { start } else { 0.0 };
-        let told = |place| {
+        let moment_at = |place| {
             let jet = self.jet(Site::Moving(place));
             let bend = -(jet.rate * jet.v[0] + jet.theta * jet.v[1]);
             [slider.control(&jet), slider.control_rate(&jet, bend)]
         };
         for (from, to) in arc.parts(start, end) {
-            let mut before = (from, told(from));
+            let mut before = (from, moment_at(from));
             extent.add(before.1[0]);
             for u in radau().u {
                 let place = from * (1.0 - u) + to * u;
-                let after = (place, told(place));
+                let after = (place, moment_at(place));
                 extent.add(after.1[0]);
                 if (before.1[1] > 0.0) != (after.1[1] > 0.0) {
                     let pace = arc.pieces.time(before.0, after.0) / (after.0 - before.0);
                     let along = |place, [value, slope]: [f64; 2]| (place, [value, pace * slope]);
                     let (first, last) = (along(before.0, before.1), along(after.0, after.1));
-                    extent.turn(first, last, Tolerance::OfRange(rtol), |place| along(place, told(place)).1);
+                    extent.turn(first, last, Tolerance::OfRange(rtol), |place| along(place, moment_at(place)).1);
                 }
                 before = after;
             }

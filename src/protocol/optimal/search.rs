@@ -33,16 +33,16 @@ const JUMP: f64 = 1e-2;
 /// Fraction of the whole time below which a hold is short.
 const SHORT: f64 = 0.01;
 
-/// Fraction of `q_hold` below which parameters are counted from 0: counted from `q_hold`, a search could not tell them apart.
+/// Fraction of `q_hold` below which parameters are counted from 0: counted from `q_hold`, a search could not distinguish them.
 const NEAR: f64 = 1e-5;
 
-/// How far from the seam, in the scaled start of the arc or in `ln v(0+)`, a protocol without a hold is next to it.
+/// How far from the seam, in the scaled start of the arc or in `ln v(0+)`, a protocol without time at the floor is near it.
 const SEAM: f64 = 1e-3;
 
 /// How far rounding may take a velocity off the bound.
 const ROUNDING: f64 = 1e-9;
 
-/// No quadrature is asked for more than this.
+/// Tightest tolerance of a quadrature.
 const FINEST: f64 = 1e-18;
 
 /// Solves `problem` in time `t_f` to relative accuracy `rtol`.
@@ -50,7 +50,7 @@ pub(super) fn solve(problem: &Problem, t_f: f64, rtol: f64) -> Solved<Optimum> {
     find(problem, t_f, rtol).0
 }
 
-/// The same, with the extremal; `None` where there is no solution, or no arc beside the hold.
+/// The same, with the extremal; `None` where there is no solution, or no arc after the floor.
 pub(super) fn find(problem: &Problem, t_f: f64, rtol: f64) -> (Solved<Optimum>, Option<Extremal>) {
     let beyond = t_f - problem.t_min();
     find_beyond(problem, Time { whole: t_f, beyond, doubt: 2.0 * f64::EPSILON * t_f / beyond }, rtol)
@@ -90,7 +90,7 @@ pub(super) fn find_beyond(problem: &Problem, time: Time, rtol: f64) -> (Solved<O
             stats.quadratures += 1;
             stats.nodes += sums.nodes;
             let probe = extremal.probe(problem, &sums, beyond);
-            // A value within the error of its quadrature tells nothing, not even its sign.
+            // A value within the error of its quadrature determines nothing, not even its sign.
             let doubtful = tolerance > accuracy.exact
                 && (probe.value.abs() <= 30.0 * tolerance || accuracy.may_end(probe.value, before));
             let next = accuracy.next(probe.value, before);
@@ -118,7 +118,7 @@ pub(super) fn find_beyond(problem: &Problem, time: Time, rtol: f64) -> (Solved<O
             _ => break,
         }
     }
-    // A short hold is a small difference of two times: more steps, as fine as the hold asks. Next to the seam a protocol
+    // A short hold is a small difference of two times: more steps, as fine as the hold asks. Near the seam a protocol
     // without a hold may be one with a hold of less than the error.
     for _ in 0..MOST_REFINEMENTS {
         let Some((x, found)) = &mut outcome else { break };

@@ -99,7 +99,7 @@ impl Case {
         self
     }
 
-    /// A number that is known by a route, to be told relatively.
+    /// A number that is known by a route, compared relatively.
     pub fn number(self, column: &'static str, value: f64, route: Route) -> Case {
         // Below the least normal double digits are lost.
         let scale = if value == 0.0 { 0.0 } else { value.abs().max(f64::MIN_POSITIVE) };

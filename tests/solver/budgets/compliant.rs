@@ -70,7 +70,7 @@ fn point(row: &Row) -> Case {
         true => case.number("stiffness_ratio", k * t_f * t_f / m, Route::Formula),
         false => case.knows("stiffness_ratio", Truth::Exact(f64::INFINITY), Route::Formula),
     };
-    // Told as it is, the control arrives but for what grows on the way.
+    // Under continuous control the error is rounding, amplified.
     let grown = 1.0 + row.number("amplification");
     let case = case.scaled("open_loop_error", 0.0, grown, Route::Law);
     match least_work(&transition(row), t_f, true) {

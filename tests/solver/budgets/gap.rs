@@ -13,13 +13,13 @@ pub const KNOWN: Known = Known {
     regimes: &[
         ("v >= 1", "shortcuts of the paper's landscapes and random ones that stay above v = 1"),
         ("below v = 1", "the same that fall below v = 1"),
-        ("next to the border", "shortcuts in 1e-3 to 1e-12 of the way to where theta or v is 0"),
+        ("near the border", "shortcuts in 1e-3 to 1e-12 of the way to where theta or v is 0"),
         ("infeasible", "theta or v at or below 0, or less time than t_min"),
     ],
     cases,
 };
 
-/// Where the rows next to the border of feasibility begin in the reference table.
+/// Where the rows near the border of feasibility begin in the reference table.
 const INSIDE: usize = 330;
 
 fn cases() -> Vec<Case> {
@@ -48,7 +48,7 @@ fn point(row: &Row, border: bool) -> Option<Case> {
     };
     let friction = of_cubic(&transition, t_f, row.number("a_2"), row.number("a_3"));
     let status = if friction < 0.0 { "negative_friction" } else { status };
-    let case = case.within(if border { "next to the border" } else { regime });
+    let case = case.within(if border { "near the border" } else { regime });
     let case = case.reference(row, &["work", "v_min"]).word("status", status, Route::Reference);
     Some(case::gap(case, work, work_optimal))
 }

@@ -46,7 +46,7 @@ impl Display for Key {
 /// What an error may be.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Budget {
-    /// In units of the accuracy asked for; 0 is exact; of a bound, in fractions of it.
+    /// In units of the accuracy requested; 0 is exact; of a bound, in fractions of it.
     pub rtols: f64,
     /// In units of the last place at the tightest accuracy; 0 is exact; of a bound, in fractions of it.
     pub ulps: f64,
@@ -119,7 +119,7 @@ const HEADER: &str = "table,column,regime,rtol,ulp,conditioned,truth";
 
 const COMMENT: &str = "\
 # The greatest error that each column of each table may have in each regime.
-# rtol: in units of the accuracy asked for. ulp: in units of the last place at the tightest accuracy, 1e-13. 0 is exact.
+# rtol: in units of the accuracy requested. ulp: in units of the last place at the tightest accuracy, 1e-13. 0 is exact.
 # Of work_error and gap_error both are the true error over the bound.
 # conditioned: what four units in the last place of each input do is taken off first. truth: how it is known.
 # docs/accuracy.md shows and explains them; tests/solver/budgets holds the tables to them.
@@ -148,7 +148,7 @@ impl Ledger {
                 routes: routes.split(" and ").map(Route::of).collect(),
             };
             let before = budgets.insert(Key::new(table, column, regime), budget);
-            assert!(before.is_none(), "`{line}` is there twice");
+            assert!(before.is_none(), "`{line}` is a duplicate");
         }
         Ledger(budgets)
     }

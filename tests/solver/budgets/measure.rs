@@ -11,7 +11,7 @@ use super::sweeps::{Cell, Columns, compute};
 /// Accuracies at which errors are counted in units of the accuracy.
 const ROUGH: [f64; 2] = [1e-6, 1e-10];
 
-/// The tightest accuracy that a spec may ask for, at which errors are counted in units of the last place.
+/// The tightest accuracy that a spec may request, at which errors are counted in units of the last place.
 const TIGHTEST: f64 = 1e-13;
 
 /// Units of the last place beyond which an error is asked whether the inputs account for it.
@@ -26,7 +26,7 @@ const NUDGES: [i64; 3] = [1 << 20, 1 << 10, 1 << 5];
 /// The greatest errors of a column in a regime.
 #[derive(Debug, Clone, Default)]
 pub struct Found {
-    /// In units of the accuracy asked for; of a bound, in fractions of it.
+    /// In units of the accuracy requested; of a bound, in fractions of it.
     pub rtols: f64,
     /// In units of the last place at the tightest accuracy; of a bound, in fractions of it.
     pub ulps: f64,
@@ -52,7 +52,7 @@ impl Display for Found {
     }
 }
 
-/// Measures a table. `ledger` tells where what the inputs account for is taken off; to `propose` budgets it is so
+/// Measures a table. `ledger` subtracts the part of the inputs; to `propose` budgets it is so
 /// wherever an error is suspect and the ledger has none.
 pub fn measure(known: &Known, cases: &[Case], ledger: &Ledger, propose: bool) -> BTreeMap<Key, Found> {
     let table = |rtol| compute(known.table, known.grid, cases, rtol);
@@ -88,7 +88,7 @@ pub fn measure(known: &Known, cases: &[Case], ledger: &Ledger, propose: bool) ->
             let ulps = |error: f64| check.ulps(error, &fine, place);
             let here = ulps((error(&fine) - taken).max(0.0));
             if here >= entry.ulps || entry.rtols.is_infinite() && entry.worst.is_empty() {
-                entry.worst = format!("{case}: {}", check.told(&fine, place));
+                entry.worst = format!("{case}: {}", check.reported(&fine, place));
             }
             entry.raw[1] = entry.raw[1].max(ulps(error(&fine)));
             entry.ulps = entry.ulps.max(here);
@@ -166,7 +166,7 @@ impl Check {
     }
 
     /// What is compared, in words.
-    fn told(&self, columns: &Columns, place: usize) -> String {
+    fn reported(&self, columns: &Columns, place: usize) -> String {
         let compared = &columns[self.bounds.unwrap_or(self.column)][place];
         let bound =
             if self.bounds.is_some() { format!(" within {:?}", columns[self.column][place]) } else { String::new() };

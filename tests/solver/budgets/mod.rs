@@ -2,7 +2,7 @@
 //!
 //! Each table is computed as a sweep computes it, on fixed points of each regime whose numbers are known by another
 //! route. A budget fails where an error is larger, where ten times less would do, and where a column has none; the
-//! tables of `docs/accuracy.md` are those of the file. `SLIPSWEEP_BUDGETS=write` writes both anew: budgets that hold
+//! tables of `docs/accuracy.md` are those of the file. `SLIPSWEEP_BUDGETS=write` writes both again: budgets that hold
 //! and are tight stay as they are, others become about three times what is measured.
 
 mod best_cubic;
@@ -101,7 +101,7 @@ fn every_column_keeps_its_budget_and_needs_it() {
     page::check(&ledger, &points);
 }
 
-/// The points of a table that a spec may ask for: some in the reference tables lie beyond.
+/// The points of a table that a spec may request: some in the reference tables lie beyond.
 fn legal_cases(known: &Known) -> Vec<Case> {
     let legal = |&(axis, value): &(&str, Value)| match value {
         Value::Number(number) => Quantity::from_name(axis).is_some_and(|axis| axis.domain().contains(number)),

@@ -19,7 +19,7 @@ pub const KNOWN: Known = Known {
         ("holds", "accelerations that wait at v = 1"),
         ("short floor", "accelerations in 1e-4 to 1e-10 more than t_floor, relatively"),
         ("deceleration", "decelerations in more than 1.01 t_min"),
-        ("next to t_min", "decelerations in 1 to 1.01 t_min"),
+        ("near t_min", "decelerations in 1 to 1.01 t_min"),
         (
             "special times",
             "1e-7 and 1e-13, relatively, after t_cross, t_floor, t_cheapest, t_turn, t_free_in and t_free_out",
@@ -46,7 +46,7 @@ pub fn least_time(v_i: f64, v_f: f64) -> f64 {
     ((v_i - v_f) / (v_i * (v_f - 1.0))).ln_1p()
 }
 
-/// `W*` by the judge, where the optimum is the only one and the judge can tell.
+/// `W*` by the judge, where the optimum is the only one and the judge can determine.
 pub fn least_work(transition: &Transition, t_f: f64, bounded: bool) -> Option<f64> {
     let solved = optimal::solve(transition, t_f, bounded, 1e-13);
     let optimum = solved.value.filter(|_| matches!(solved.status, Status::Ok | Status::BelowBound))?;
@@ -61,9 +61,9 @@ fn regime(row: &Row) -> &'static str {
     match row.text("strategy") {
         _ if row.text("regime") == "short_floor" => "short floor",
         _ if row.text("regime") == "v_near_1" => "v near 1",
-        _ if row.text("regime").starts_with("next_to_") => "special times",
+        _ if row.text("regime").starts_with("near_") => "special times",
         _ if v_f < v_i && !bounded => "no bound down",
-        _ if v_f < v_i && row.number("t_f") < 1.01 * least_time(v_i, v_f) => "next to t_min",
+        _ if v_f < v_i && row.number("t_f") < 1.01 * least_time(v_i, v_f) => "near t_min",
         _ if v_f < v_i => "deceleration",
         _ if !bounded => "no bound",
         "speed_up" => "speeds up",
@@ -82,15 +82,15 @@ fn cases() -> Vec<Case> {
         let below = !bounded && row.number("v_start") < 1.0;
         let case = Case { bounded, ..Case::of(&row, &AXES).within(regime(&row)) };
         let case = case.reference(&row, &numbers);
-        // Whether v(0+) is above v_i is told only where they differ by more than the accuracy.
-        let told = (row.number("v_start") / row.number("v_i") - 1.0).abs() > 1e-6;
-        let case = match told {
+        // Whether v(0+) is above v_i is reported only where they differ by more than the accuracy.
+        let reported = (row.number("v_start") / row.number("v_i") - 1.0).abs() > 1e-6;
+        let case = match reported {
             true => case.word("strategy", strategy.expect("is a strategy"), Route::Reference),
             false => case,
         };
         cases.push(case.word("status", if below { "below_bound" } else { "ok" }, Route::Reference));
         // In a little less than the least time there is none.
-        if cases.last().is_some_and(|case| case.regime == "next to t_min") {
+        if cases.last().is_some_and(|case| case.regime == "near t_min") {
             let Transition { v_i, v_f, .. } = transition(&row);
             let mut case = Case::of(&row, &AXES).within("infeasible");
             case.axes[0].1 = Value::Number(least_time(v_i, v_f) * (1.0 - 1e-12));

@@ -31,7 +31,7 @@ pub fn write(ledger: &Ledger, points: &Points) {
     fs::write(path(), filled(&text, ledger, points)).expect("is writable");
 }
 
-/// The page with every block between `<!-- BEGIN budgets of TABLE -->` and `<!-- END -->` written anew.
+/// The page with every block between `<!-- BEGIN budgets of TABLE -->` and `<!-- END -->` written again.
 fn filled(text: &str, ledger: &Ledger, points: &Points) -> String {
     let mut text = text.to_owned();
     for known in &KNOWN {

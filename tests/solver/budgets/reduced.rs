@@ -89,7 +89,7 @@ fn least_velocity(transition: &Transition, t_f: f64, [a_2, a_3]: [f64; 2]) -> f6
     v(0.5 * (low + high)).min(v(place(best)))
 }
 
-fn cases(tell: fn(Case, &Landscape) -> Case) -> Vec<Case> {
+fn cases(of_reduction: fn(Case, &Landscape) -> Case) -> Vec<Case> {
     let case = |landscape: &Landscape| {
         let case = Case::at(AXES.into_iter().zip(landscape.axes)).within("landscape");
         let count = landscape.shortcuts.len();
@@ -99,7 +99,7 @@ fn cases(tell: fn(Case, &Landscape) -> Case) -> Vec<Case> {
             _ => "ok",
         };
         let case = case.knows("shortcuts", Truth::Exact(count as f64), Route::Judge);
-        tell(case.word("status", status, Route::Judge), landscape)
+        of_reduction(case.word("status", status, Route::Judge), landscape)
     };
     landscapes().iter().map(case).collect()
 }

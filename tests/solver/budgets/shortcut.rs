@@ -16,7 +16,7 @@ pub const KNOWN: Known = Known {
         ("step", "family step"),
         ("cubic", "family cubic"),
         ("bounded_velocity", "family bounded_velocity, up, or down in more than 1.01 t_min"),
-        ("next to t_min", "family bounded_velocity, down in less than 1.01 t_min"),
+        ("near t_min", "family bounded_velocity, down in less than 1.01 t_min"),
         ("bounded_friction", "family bounded_friction, velocities within a factor 3000"),
         ("short friction", "the same in less than 1.01 of its least time"),
         ("far friction", "family bounded_friction, velocities further apart"),
@@ -36,7 +36,7 @@ fn cases() -> Vec<Case> {
         let family = families.into_iter().find(|family| *family == row.text("family")).expect("is a family");
         let Transition { v_i, v_f, .. } = transition(row);
         let near = family == "bounded_velocity" && v_f < v_i && row.number("t_f") < 1.01 * least_time(v_i, v_f);
-        let case = point(row, family, f64::INFINITY, if near { "next to t_min" } else { family });
+        let case = point(row, family, f64::INFINITY, if near { "near t_min" } else { family });
         match row.text("status") {
             "infeasible" => case,
             _ => case.reference(row, &["alpha"]).number("terminal_error", row.number("miss"), Route::Reference),

@@ -14,7 +14,7 @@ pub const KNOWN: Known = Known {
         ("b <= a", "no critical stiffness"),
         ("above k_c", "stiffer than critical at v_f, by more than a hundredth"),
         ("below k_c", "softer, by more than a hundredth"),
-        ("next to k_c", "within a hundredth of the critical stiffness at v_f, down to 1e-13"),
+        ("near k_c", "within a hundredth of the critical stiffness at v_f, down to 1e-13"),
         ("no mass", "m = 0"),
         ("rigid", "k = inf"),
         ("Hopf point", "the first Lyapunov coefficient from its definition"),
@@ -52,7 +52,7 @@ fn cases() -> Vec<Case> {
         let critical = critical(&sliding, sliding.v);
         let regime = match sliding.k / critical.high - 1.0 {
             _ if sliding.b <= sliding.a => "b <= a",
-            beyond if beyond.abs() < 0.01 => "next to k_c",
+            beyond if beyond.abs() < 0.01 => "near k_c",
             beyond if beyond > 0.0 => "above k_c",
             _ => "below k_c",
         };
@@ -102,7 +102,7 @@ fn massless_eigenvalues(case: Case, sliding: &Sliding) -> Case {
     let (growth, frequency) = if square.high < 0.0 {
         (-half, sqrt(-square))
     } else {
-        // Of the two, the greater; the product tells the smaller in size.
+        // Of the two, the greater; the product determines the smaller in size.
         let large = if half.high > 0.0 { -half - sqrt(square) } else { sqrt(square) - half };
         let small = dd(k) / dd(a) / large;
         (if large.high > small.high { large } else { small }, dd(0.0))

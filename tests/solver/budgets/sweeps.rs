@@ -35,7 +35,7 @@ pub enum Cell {
 /// The cells of points, by column.
 pub type Columns = BTreeMap<&'static str, Vec<Cell>>;
 
-/// All columns of a table, also those that are written only if asked for, at the points of `cases`.
+/// All columns of a table, also those that are written only if requested, at the points of `cases`.
 pub fn compute(name: &'static str, grid: Grid, cases: &[Case], rtol: f64) -> Columns {
     let table = table::find(name).expect("is a table");
     let names: Vec<&str> = table.columns().iter().map(|column| column.name).chain([table::STATUS]).collect();
@@ -123,7 +123,7 @@ fn blocks(cases: &[&Case]) -> String {
 /// The rows of a sweep of one table.
 fn run(spec: &str, names: &[&'static str]) -> Vec<Vec<Cell>> {
     let sweep = Sweep::parse(spec, Path::new(".")).unwrap_or_else(|error| panic!("{error}\n{spec}"));
-    let batches = sweep.batches(sweep.requests[0].table.name()).expect("is asked for");
+    let batches = sweep.batches(sweep.requests[0].table.name()).expect("is requested");
     let rows = |batch: RecordBatch| {
         let columns: Vec<_> = names.iter().map(|name| batch.column_by_name(name).expect("is there").clone()).collect();
         let row = move |row: usize| columns.iter().map(|column| cell(column.as_ref(), row)).collect::<Vec<Cell>>();

@@ -76,7 +76,7 @@ fn accurate(point: &Point, rough: &Compliant, row: &mut Row) {
     row.agree("v_min to rtol", rough.v_min, fine.v_min, noise);
     row.agree("v_max to rtol", rough.v_max, fine.v_max, noise);
     let range = fine.control_max.abs().max(fine.control_min.abs());
-    if tells(slider.law, fine.v_max, range) {
+    if determines_velocity(slider.law, fine.v_max, range) {
         // Ageing drives the spring at (b/k) (1/theta - v), which may cancel with v. Twice: the velocity itself has an error,
         // and its exponent, of terms of some hundred, a rounding.
         let allowed = (2.0 * noise + 128.0 * f64::EPSILON) * (range + slider.law.b / slider.k * fine.v_max);
@@ -86,8 +86,8 @@ fn accurate(point: &Point, rough: &Compliant, row: &mut Row) {
 }
 
 /// Whether the control velocity is no small remainder of large terms: friction changes by `a v'/v + b theta'/theta`, which
-/// cancel for `b` next to `a` where theta follows `1/v`, and a soft spring makes much of what is left.
-pub fn tells(Law { a, b }: Law, v_max: f64, range: f64) -> bool {
+/// cancel for `b` near `a` where theta follows `1/v`, and a soft spring makes much of what is left.
+pub fn determines_velocity(Law { a, b }: Law, v_max: f64, range: f64) -> bool {
     (b - a).abs() > 0.1 * a && range < 1e6 * v_max
 }
 

@@ -175,7 +175,7 @@ fn convex(point: &Point, status_there: Status, row: &mut Row) {
     let &Point { ref transition, t_f, a_2, a_3, rtol } = point;
     let landscape = Landscape::new(&Transition { law: POSITIVE, ..*transition }, t_f, rtol);
     let rise = 1.0 / transition.v_f - 1.0 / transition.v_i;
-    // Next to 1 that is as thin as the rounding of halfway.
+    // Near 1 that is as thin as the rounding of halfway.
     let thin = transition.v_i.min(transition.v_f) - 1.0 < 1e-14;
     if status(&landscape, (rise, 0.0)) == Status::Ok && !thin {
         let halfway = status(&landscape, (0.5 * (rise + a_2), 0.5 * a_3));

@@ -73,7 +73,7 @@ impl Random {
         x * (1.0 + self.sign() * self.between(1e-15, 1e-3))
     }
 
-    /// `b` is 0, `a`, next to it, less, or anything.
+    /// `b` is 0, `a`, near it, less, or anything.
     pub fn law(&mut self) -> Law {
         let a = if self.chance(0.1) { self.between(1e-6, 1e-3) } else { self.legal(Quantity::A) };
         let b = match (self.uniform() * 8.0) as u32 {
@@ -96,7 +96,7 @@ impl Random {
         }
     }
 
-    /// One in five from a velocity to one next to it, one in fifty to itself.
+    /// One in five from a velocity to one near it, one in fifty to itself.
     pub fn velocities(&mut self) -> (f64, f64) {
         let v_i = self.velocity();
         let v_f = match self.uniform() {
@@ -134,7 +134,7 @@ impl Random {
     }
 
     /// A block, one in ten without mass, on a spring, one in ten rigid; one in three at the critical stiffness of a
-    /// velocity, or next to it.
+    /// velocity, or near it.
     pub fn slider(&mut self, law: Law, v: f64) -> SpringBlock {
         let m = if self.chance(0.1) { 0.0 } else { self.legal(Quantity::Mass) };
         let critical = SteadySliding::new(law, 1.0, m, v).critical_stiffness();
@@ -147,7 +147,7 @@ impl Random {
         SpringBlock { law, k, m }
     }
 
-    /// An accuracy that a spec may ask for.
+    /// An accuracy that a spec may request.
     pub fn rtol(&mut self) -> f64 {
         self.between(1e-13, 1e-2)
     }

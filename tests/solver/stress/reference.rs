@@ -58,7 +58,7 @@ fn reference_optima_of_the_sample() {
             let value = solved.value.unwrap_or_else(|| panic!("{:?} in {row:?}", solved.status));
             assert!(matches!(solved.status, Status::Ok | Status::BelowBound), "{:?} in {row:?}", solved.status);
             let within = |doubt: f64| 2.0 * rtol + 8.0 * f64::EPSILON + 4.0 * doubt;
-            // Next to t_cross it is `speed_up` as well as `slow_down`.
+            // Near t_cross it is `speed_up` as well as `slow_down`.
             let crosses = (row.number("v_start") / transition.v_i - 1.0).abs() <= within(end("v_start"));
             assert!(crosses || value.strategy.name() == row.text("strategy"), "{} in {row:?}", value.strategy.name());
             close(row, "work", value.work, within(time));

@@ -4,7 +4,7 @@ use slipsweep::model::Transition;
 use slipsweep::protocol::regularised::{self, Regularised};
 use slipsweep::protocol::{SpringBlock, Status, optimal};
 
-use super::compliant::tells;
+use super::compliant::determines_velocity;
 use super::random::Random;
 use super::{POINTS, Row, sample};
 
@@ -96,7 +96,7 @@ fn accurate(point: &Point, rough: &Regularised, row: &mut Row) {
     row.agree("v_min to rtol", rough.v_min, fine.v_min, steep);
     row.agree("v_max to rtol", rough.v_max, fine.v_max, steep);
     let range = fine.control_max.abs().max(fine.control_min.abs());
-    if tells(slider.law, fine.v_max, range) {
+    if determines_velocity(slider.law, fine.v_max, range) {
         row.at_most("least control velocity to rtol", (rough.control_min - fine.control_min).abs(), steep * range);
         row.at_most("greatest control velocity to rtol", (rough.control_max - fine.control_max).abs(), steep * range);
     }

@@ -25,7 +25,7 @@ fn friction_of_ends(&Transition { law: Law { a, b }, v_i, v_f }: &Transition) ->
     steady(v_i).max(steady(v_f))
 }
 
-/// The bound on friction is next to the friction of an end, above it, or absent.
+/// The bound on friction is near the friction of an end, above it, or absent.
 fn draw(random: &mut Random) -> Point {
     let transition = random.transition();
     let bounded = random.chance(0.7);
@@ -69,7 +69,7 @@ fn examine(name: &str, points: u64, draw: fn(&mut Random) -> Point) {
             [("work to rtol", |s| s.work), ("v_max to rtol", |s| s.v_max), ("v_min to rtol", |s| s.v_min)];
         for (invariant, number) in numbers {
             let (rough, exact) = (number(&rough), number(&fine));
-            // A velocity that friction tells carries the rounding of ln theta, b/a times.
+            // A velocity that friction determines carries the rounding of ln theta, b/a times.
             let bounded = family.heeds_tau_ceiling() && invariant != "work to rtol";
             let carried = if bounded { 2.0 * f64::EPSILON * b / a * logarithms } else { 0.0 };
             let allowed = allowed(family, case, (rough - exact) / exact, noise + carried, |s| number(s) / exact);
@@ -83,7 +83,7 @@ fn examine(name: &str, points: u64, draw: fn(&mut Random) -> Point) {
     });
 }
 
-/// What two numbers may differ by: `noise`, or what the last places of the inputs stand for if that is more, as far as there are members beside.
+/// What two numbers may differ by: `noise`, or what the last places of the inputs stand for if that is more, as far as there are members near.
 fn allowed(family: &dyn Family, case: &Case, found: f64, noise: f64, number: impl Fn(&Shortcut) -> f64) -> f64 {
     if found.abs() <= noise || !family.heeds_tau_ceiling() {
         return noise;

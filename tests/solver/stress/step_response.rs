@@ -71,7 +71,7 @@ fn every_response_is_right_or_undecided() {
     });
 }
 
-/// What is told at one accuracy agrees with what is told at a finer one, if that decides at all.
+/// What is reported at one accuracy agrees with what is reported at a finer one, if that decides at all.
 fn accurate(step: &Step, rough: &Response, rtol: f64, row: &mut Row) {
     let finer = FINER * rtol;
     let simulation = step.scaled().map(|scaled| scaled.follow(finer));
@@ -112,7 +112,7 @@ fn sound(step: &Step, response: &Response, stable: bool, row: &mut Row) {
             row.fact("a limit cycle has a period", cycle.is_some_and(|cycle| cycle.period > 0.0));
             row.fact("a limit cycle takes b > a", step.transition.law.b > step.transition.law.a);
         }
-        Outcome::Undecided => row.fact("nothing is told if undecided", v_peak.is_nan() && settling_time.is_none()),
+        Outcome::Undecided => row.fact("nothing is reported if undecided", v_peak.is_nan() && settling_time.is_none()),
     }
     if outcome != Outcome::Undecided {
         row.fact("peak and trough about v_f", v_peak >= v_f && (v_trough.is_nan() || v_trough <= v_f));
