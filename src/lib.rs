@@ -1,20 +1,32 @@
 //! Exact parameter sweeps over the control of rate-and-state friction.
 //!
-//! The rooms of the crate, each of which imports only from those before it:
+//! ```text
+//! spec.toml ── sweep::Sweep ── sweep::Plan ── sweep::run ───────────────────────────────┐
+//!              keys, values    rows, solves   one part at a time, on all threads:       │
+//!              grid: rows by                  table  rows -> columns ── protocol,       │
+//!              number                                 stability, numerics, model        │
+//!                                             dataset columns -> Parquet part, manifest │
+//!                                                                                       │
+//! results/NAME/TABLE/part-000000.parquet  <─────────────────────────────────────────────┘
+//!   ├─ query   SQL            ├─ plot    SVG, PNG, PDF, HTML
+//!   ├─ verify  second solve   └─ trace   one row over time
+//! ```
 //!
-//! - [`model`]: the friction law, the change of velocity required of it, and units;
-//! - [`numerics`]: tools that know no friction;
-//! - [`protocol`]: the optimal protocol, its crossover times, and the cubic shortcuts;
-//! - [`stability`]: steady sliding of a block on a spring;
-//! - [`grid`]: quantities, axes, expressions, and the rows of a grid of blocks;
-//! - [`table`]: what a row means;
-//! - [`dataset`]: tables as Parquet parts on disk, and reading them back;
-//! - [`query`]: questions to tables on disk, in SQL;
+//! The modules, in the order in which a row meets them. Each imports only from those above it in `CONTRIBUTING.md`.
+//!
+//! - [`cli`]: the commands: arguments in, one call of the library, text out;
+//! - [`sweep`]: spec, check, plan, engine, shards;
+//! - [`grid`]: quantities, axes, expressions, and the index of the rows of a table;
+//! - [`table`]: the tables: axes, columns and computation, one file each;
+//! - [`protocol`]: optimal protocols, crossover times and shortcuts;
+//! - [`stability`]: linear stability and step responses of a block on a spring;
+//! - [`numerics`]: quadrature, roots and the stiff integrator, without friction;
+//! - [`model`]: the friction law, transitions and units;
+//! - [`dataset`]: Parquet parts, manifest and their readers;
+//! - [`query`]: SQL over the tables of a dataset;
+//! - [`plot`]: pictures of tables and traces;
 //! - [`trace`]: one protocol over time;
-//! - [`plot`]: pictures of traces and tables;
-//! - [`sweep`]: a spec, checked, planned and run;
-//! - [`verify`]: a sample of a dataset, solved again by an independent method;
-//! - [`cli`]: the commands.
+//! - [`verify`]: an independent solution of sampled rows.
 //!
 #![doc = include_str!("../docs/library.md")]
 
