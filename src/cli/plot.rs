@@ -95,7 +95,7 @@ pub fn plot(arguments: &Arguments) -> Result<(), Failure> {
 }
 
 /// Where pictures go.
-struct Place {
+struct OutputTarget {
     /// The only file, if that was named.
     file: Option<PathBuf>,
     folder: PathBuf,
@@ -103,7 +103,7 @@ struct Place {
 }
 
 impl Arguments {
-    fn traces(&self, sources: &[PathBuf], place: &Place) -> Result<(), Failure> {
+    fn traces(&self, sources: &[PathBuf], place: &OutputTarget) -> Result<(), Failure> {
         let courses = sources.iter().map(|path| plot::trace::read(path)).collect::<Result<Vec<_>, _>>()?;
         if let Some(flag) = self.given(("--table", self.table.is_some())) {
             return Err(wrong(format!(
@@ -119,7 +119,7 @@ impl Arguments {
         say(&format!("written to {}\n{}", path.display(), remarks(&figure)))
     }
 
-    fn dataset(&self, path: &Path, place: &Place) -> Result<(), Failure> {
+    fn dataset(&self, path: &Path, place: &OutputTarget) -> Result<(), Failure> {
         let (folder, manifest) = dataset(path)?;
         let units = units_of(&manifest.spec)?;
         let source = Source::new(folder, manifest, units);
@@ -174,12 +174,12 @@ impl Arguments {
     }
 
     /// Where it is to be written, and how.
-    fn place(&self) -> Result<Place, Failure> {
+    fn place(&self) -> Result<OutputTarget, Failure> {
         let format = self.format.unwrap_or(Format::Svg);
-        let Some(out) = &self.out else { return Ok(Place { file: None, folder: PathBuf::new(), format }) };
+        let Some(out) = &self.out else { return Ok(OutputTarget { file: None, folder: PathBuf::new(), format }) };
         let shown = out.display();
         if out.is_dir() || out.extension().is_none() {
-            return Ok(Place { file: None, folder: out.clone(), format });
+            return Ok(OutputTarget { file: None, folder: out.clone(), format });
         }
         match (Format::of(out), self.format) {
             (None, _) => Err(wrong(format!(
@@ -189,12 +189,12 @@ impl Arguments {
             (Some(named), Some(given)) if named != given => Err(wrong(format!(
                 "--out {shown}: the ending contradicts --format\n  help: leave out --format, or name a folder"
             ))),
-            (Some(format), _) => Ok(Place { file: Some(out.clone()), folder: PathBuf::new(), format }),
+            (Some(format), _) => Ok(OutputTarget { file: Some(out.clone()), folder: PathBuf::new(), format }),
         }
     }
 
     /// Writes a figure where it is to go, which it returns.
-    fn write(&self, figure: &Figure, stem: &str, place: &Place) -> Result<PathBuf, Failure> {
+    fn write(&self, figure: &Figure, stem: &str, place: &OutputTarget) -> Result<PathBuf, Failure> {
         let path = match &place.file {
             Some(file) => file.clone(),
             None => place.folder.join(format!("{stem}.{}", place.format.ending())),

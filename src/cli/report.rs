@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use super::summary::Piece;
+use super::summary::SummaryBlock;
 use super::watch::{Wait, waiting};
 use super::{Failure, dataset, plan, say, summary, words, write_file};
 use crate::dataset::TableSurvey;
@@ -88,10 +88,10 @@ fn statuses(page: &mut Page, tables: &[TableSurvey]) {
 fn summaries(page: &mut Page, tables: &[TableSurvey]) {
     page.heading("Summary");
     for table in tables {
-        for piece in summary::pieces(&table.name, table.rows, &table.statistics) {
+        for piece in summary::blocks(&table.name, table.rows, &table.statistics) {
             match piece {
-                Piece::Line(_, line) => page.words(&line),
-                Piece::Table(_, names, units, rows) => {
+                SummaryBlock::Line(_, line) => page.words(&line),
+                SummaryBlock::Table(_, names, units, rows) => {
                     let headed = |(place, name): (usize, &String)| match units.get(place) {
                         Some(unit) if !unit.is_empty() => format!("{name} [{unit}]"),
                         _ => name.clone(),

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use super::shards::{quoted, scripts};
 use super::{FAILED, Failure, kind, refused, say, summary, words};
-use crate::dataset::{Build, Folder, Look, Manifest, Survey};
+use crate::dataset::{Build, CheckDepth, Folder, Manifest, Survey};
 use crate::protocol::Status;
 use crate::sweep::{Plan, Sweep, shards_with};
 
@@ -34,7 +34,8 @@ pub fn status(arguments: &Arguments) -> Result<(), Failure> {
         let (found, help) = (format!("{}: not a dataset", path.display()), "name a folder that `slipsweep run` wrote");
         return Err(refused(found, "a folder with a manifest.json or at least one part", help));
     };
-    let survey = summary::survey(&folder, &manifest, if arguments.check { Look::Whole } else { Look::Footer });
+    let survey =
+        summary::survey(&folder, &manifest, if arguments.check { CheckDepth::Whole } else { CheckDepth::Footer });
     let mut text = format!("{}: {}, made by slipsweep {}\n", path.display(), manifest.name, manifest.build.version);
     if let Some(why) = &manifest.rebuilt {
         let _ = writeln!(text, "manifest.json is {why}; the parts give its contents, and a run writes it again");

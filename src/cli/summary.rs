@@ -5,7 +5,7 @@ use std::sync::atomic::AtomicU64;
 
 use super::watch::{Wait, waiting};
 use super::{Failure, dataset, say, words};
-use crate::dataset::{Cell, Counts, FEW, Folder, Look, Manifest, StatisticsRow, Survey, TableStatistics};
+use crate::dataset::{Cell, CheckDepth, Counts, FEW, Folder, Manifest, StatisticsRow, Survey, TableStatistics};
 use crate::grid::Quantity;
 use crate::protocol::Status;
 use crate::table::{self, STATUS};
@@ -38,12 +38,12 @@ pub fn summary(arguments: &Arguments) -> Result<(), Failure> {
 }
 
 /// Surveys a dataset, and says so if it takes long.
-pub fn survey(folder: &Folder, manifest: &Manifest, look: Look) -> Survey {
+pub fn survey(folder: &Folder, manifest: &Manifest, look: CheckDepth) -> Survey {
     let looked = AtomicU64::new(0);
     let there = manifest.tables.iter().map(|table| folder.parts_there(table).len() as u64).sum();
     let doing = match look {
-        Look::Footer => "reading the footers",
-        Look::Whole => "checking the parts that are there",
+        CheckDepth::Footer => "reading the footers",
+        CheckDepth::Whole => "checking the parts that are there",
     };
     let wait = Wait { done: Some((&looked, there, "part")), ..Wait::new(doing) };
     waiting(&wait, || Survey::new(folder, manifest, look, &looked))
@@ -51,7 +51,7 @@ pub fn survey(folder: &Folder, manifest: &Manifest, look: Look) -> Survey {
 
 /// What is in a dataset of which every part that is there is sound.
 pub fn contents(folder: &Folder, manifest: &Manifest) -> Result<Survey, Failure> {
-    let survey = survey(folder, manifest, Look::Footer);
+    let survey = survey(folder, manifest, CheckDepth::Footer);
     for table in &survey.tables {
         let parts = table.damaged.iter().map(|(part, _)| *part).chain(table.foreign.iter().map(|(part, _)| *part));
         for part in parts {
@@ -62,7 +62,7 @@ pub fn contents(folder: &Folder, manifest: &Manifest) -> Result<Survey, Failure>
 }
 
 /// A piece of what is said of a table, which stands in a text or on a page.
-pub enum Piece {
+pub enum SummaryBlock {
     /// A line, this far indented.
     Line(usize, String),
     /// Names, units (empty where there are none) and rows, this far indented.
@@ -71,9 +71,9 @@ pub enum Piece {
 
 /// One table in a few lines.
 pub fn statistics(name: &str, rows: u64, statistics: &TableStatistics) -> String {
-    let lines = pieces(name, rows, statistics).into_iter().map(|piece| match piece {
-        Piece::Line(indent, line) => format!("{:indent$}{line}\n", ""),
-        Piece::Table(indent, names, units, rows) => {
+    let lines = blocks(name, rows, statistics).into_iter().map(|piece| match piece {
+        SummaryBlock::Line(indent, line) => format!("{:indent$}{line}\n", ""),
+        SummaryBlock::Table(indent, names, units, rows) => {
             let units = Some(units).filter(|units| units.iter().any(|unit| !unit.is_empty()));
             let lines: Vec<Vec<String>> = [names].into_iter().chain(units).chain(rows).collect();
             words::aligned(&lines, indent)
@@ -83,43 +83,44 @@ pub fn statistics(name: &str, rows: u64, statistics: &TableStatistics) -> String
 }
 
 /// What is said of a table of `rows` rows.
-pub fn pieces(name: &str, rows: u64, statistics: &TableStatistics) -> Vec<Piece> {
+pub fn blocks(name: &str, rows: u64, statistics: &TableStatistics) -> Vec<SummaryBlock> {
     let counts: Vec<String> = Status::ALL
         .iter()
         .zip(statistics.status)
         .filter(|(_, rows)| *rows > 0)
         .map(|(status, rows)| format!("{} {}", words::count(rows), status.name()))
         .collect();
-    let mut pieces = vec![Piece::Line(0, format!("{name}: {} ({})", words::things(rows, "row"), counts.join(", ")))];
+    let mut blocks =
+        vec![SummaryBlock::Line(0, format!("{name}: {} ({})", words::things(rows, "row"), counts.join(", ")))];
     match &statistics.rows {
-        Some(rows) => pieces.extend(listing(statistics, &rows.iter().collect::<Vec<_>>())),
+        Some(rows) => blocks.extend(listing(statistics, &rows.iter().collect::<Vec<_>>())),
         None => {
             let least: Vec<&StatisticsRow> = statistics.least().collect();
             if !least.is_empty() {
                 // A family may hold protocols that miss the final state, with any work.
                 let arriving = if name == "shortcut" { " and arrive" } else { "" };
-                pieces.push(Piece::Line(2, format!("least gap among the rows that are ok{arriving}:")));
-                pieces.extend(listing(statistics, &least));
+                blocks.push(SummaryBlock::Line(2, format!("least gap among the rows that are ok{arriving}:")));
+                blocks.extend(listing(statistics, &least));
             }
-            pieces.extend(ranges(statistics));
+            blocks.extend(ranges(statistics));
             let counted = |column: &str, counts: &Counts| {
                 let counts: Vec<String> =
                     counts.iter().map(|(word, rows)| format!("{} {word}", words::count(*rows))).collect();
-                Piece::Line(2, format!("{column}: {}", counts.join(", ")))
+                SummaryBlock::Line(2, format!("{column}: {}", counts.join(", ")))
             };
-            pieces.extend(statistics.labels.iter().map(|(label, counts)| match counts {
+            blocks.extend(statistics.labels.iter().map(|(label, counts)| match counts {
                 Some(counts) => counted(label, counts),
-                None => Piece::Line(2, format!("{label}: more than {FEW} different labels")),
+                None => SummaryBlock::Line(2, format!("{label}: more than {FEW} different labels")),
             }));
-            pieces.extend(statistics.words.iter().map(|(column, counts)| counted(column, counts)));
+            blocks.extend(statistics.words.iter().map(|(column, counts)| counted(column, counts)));
         }
     }
-    pieces.extend(predicted(name, statistics));
-    pieces
+    blocks.extend(predicted(name, statistics));
+    blocks
 }
 
 /// The columns of numbers.
-fn ranges(statistics: &TableStatistics) -> Option<Piece> {
+fn ranges(statistics: &TableStatistics) -> Option<SummaryBlock> {
     let ranges = statistics.ranges.iter().filter(|range| range.count > 0).map(|range| {
         let ends = [range.least, range.greatest].map(words::number);
         let of = [range.column.clone(), statistics.unit(&range.column).to_owned(), words::count(range.count)];
@@ -127,19 +128,19 @@ fn ranges(statistics: &TableStatistics) -> Option<Piece> {
     });
     let names = ["column", "unit", "rows", "least", "greatest"].map(str::to_owned);
     let ranges: Vec<Vec<String>> = ranges.collect();
-    (!ranges.is_empty()).then(|| Piece::Table(2, names.to_vec(), Vec::new(), ranges))
+    (!ranges.is_empty()).then(|| SummaryBlock::Table(2, names.to_vec(), Vec::new(), ranges))
 }
 
 /// The prediction of linear theory for a column, compared with the rows.
-fn predicted(name: &str, statistics: &TableStatistics) -> Vec<Piece> {
+fn predicted(name: &str, statistics: &TableStatistics) -> Vec<SummaryBlock> {
     let prediction = table::find(name).and_then(|table| table.prediction());
     let Some(prediction) = prediction.filter(|_| !statistics.predicted.is_empty()) else { return Vec::new() };
     let line =
         |(predicted, found, rows): &(String, String, u64)| vec![predicted.clone(), found.clone(), words::count(*rows)];
     let names = ["predicted", "found", "rows"].map(str::to_owned);
-    let mut pieces = vec![
-        Piece::Line(2, format!("{} as {} predicts it, and as found:", prediction.column, prediction.theory)),
-        Piece::Table(4, names.to_vec(), Vec::new(), statistics.predicted.iter().map(line).collect()),
+    let mut blocks = vec![
+        SummaryBlock::Line(2, format!("{} as {} predicts it, and as found:", prediction.column, prediction.theory)),
+        SummaryBlock::Table(4, names.to_vec(), Vec::new(), statistics.predicted.iter().map(line).collect()),
     ];
     let is_surprise = |(predicted, found, _): &&(String, String, u64)| {
         found == prediction.surprise && predicted != prediction.surprise
@@ -147,13 +148,13 @@ fn predicted(name: &str, statistics: &TableStatistics) -> Vec<Piece> {
     let differ: u64 = statistics.predicted.iter().filter(is_surprise).map(|(.., rows)| rows).sum();
     if differ > 0 {
         let rows = words::things(differ, "row");
-        pieces.push(Piece::Line(4, format!("{rows} of {}: {}", prediction.surprise, prediction.why)));
+        blocks.push(SummaryBlock::Line(4, format!("{rows} of {}: {}", prediction.surprise, prediction.why)));
     }
-    pieces
+    blocks
 }
 
 /// Rows under names and units; axes that do not vary stand above, columns without any value are left out.
-fn listing(statistics: &TableStatistics, rows: &[&StatisticsRow]) -> Vec<Piece> {
+fn listing(statistics: &TableStatistics, rows: &[&StatisticsRow]) -> Vec<SummaryBlock> {
     let Some(first) = rows.first() else { return Vec::new() };
     let is_axis = |name: &str| Quantity::from_name(name).is_some();
     let mut common = Vec::new();
@@ -172,11 +173,11 @@ fn listing(statistics: &TableStatistics, rows: &[&StatisticsRow]) -> Vec<Piece> 
             places.push(place);
         }
     }
-    let at = (!common.is_empty()).then(|| Piece::Line(2, format!("at {}", common.join(", "))));
+    let at = (!common.is_empty()).then(|| SummaryBlock::Line(2, format!("at {}", common.join(", "))));
     let names = places.iter().map(|&place| statistics.columns[place].0.clone()).collect();
     let units = places.iter().map(|&place| statistics.columns[place].1.clone()).collect();
     let rows = rows.iter().map(|row| places.iter().map(|&place| shown(row.cell(place))).collect()).collect();
-    at.into_iter().chain([Piece::Table(4, names, units, rows)]).collect()
+    at.into_iter().chain([SummaryBlock::Table(4, names, units, rows)]).collect()
 }
 
 /// A cell as a reader sees it.

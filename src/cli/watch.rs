@@ -27,7 +27,7 @@ pub const SILENCE: Duration = Duration::from_secs(1);
 /// Returns what `work` returns, and which signal came, if one did. A second one ends the process at once, and so does one that
 /// comes when `work` is done.
 pub fn watched<T>(signal: &Signal, rows: u64, quiet: bool, work: impl FnOnce() -> T) -> (T, Option<i32>) {
-    let mut show = Show::new(rows, quiet);
+    let mut show = ProgressDisplay::new(rows, quiet);
     let look = |caught: Option<i32>| {
         if caught.is_some() {
             signal.stop();
@@ -170,7 +170,7 @@ fn set_style(bar: &ProgressBar, has_bar: bool) {
 }
 
 /// The progress of a run: a bar on a terminal, else a line from time to time.
-struct Show {
+struct ProgressDisplay {
     /// All rows.
     rows: u64,
     quiet: bool,
@@ -183,11 +183,11 @@ struct Show {
     since: Instant,
 }
 
-impl Show {
-    fn new(rows: u64, quiet: bool) -> Show {
+impl ProgressDisplay {
+    fn new(rows: u64, quiet: bool) -> ProgressDisplay {
         let bar = (!quiet && stderr().is_terminal()).then(|| text_line(0));
         let now = Instant::now();
-        Show { rows, quiet, bar, last: now, phase: Phase::Checking, since: now }
+        ProgressDisplay { rows, quiet, bar, last: now, phase: Phase::Checking, since: now }
     }
 
     fn update(&mut self, signal: &Signal) {

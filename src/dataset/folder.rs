@@ -9,7 +9,7 @@ use rayon::prelude::*;
 use super::atomic::{self, Unwritten};
 use super::footer::Footer;
 use super::manifest::{Manifest, ManifestTable};
-use super::state::{self, Look, OpenPart, State};
+use super::state::{self, CheckDepth, OpenPart, State};
 
 /// What to do about a dataset in the place of another one.
 const WAYS_OUT: &str = "change `name` in the spec, or write elsewhere with --out DIR, or remove the dataset";
@@ -287,7 +287,7 @@ impl Folder {
     }
 
     /// What is in the place of a part of the dataset of `manifest`.
-    pub fn state(&self, manifest: &Manifest, table: &str, part: u64, look: Look) -> State {
+    pub fn state(&self, manifest: &Manifest, table: &str, part: u64, look: CheckDepth) -> State {
         state::state(&self.part(table, part), manifest, table, part, look)
     }
 

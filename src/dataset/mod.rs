@@ -40,8 +40,8 @@ pub(crate) use metadata_limits::coded;
 #[cfg(feature = "query")]
 pub(crate) use metadata_limits::{check_footer, check_pages};
 pub use part::encode;
-pub use session::{Company, Holder, Session};
-pub use state::{Look, OpenPart, State};
+pub use session::{Concurrency, Holder, Session};
+pub use state::{CheckDepth, OpenPart, State};
 pub use statistics::{Counts, FEW, Row as StatisticsRow, TableStatistics};
 #[cfg(feature = "read")]
 pub use survey::{Survey, TableSurvey};

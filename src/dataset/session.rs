@@ -24,14 +24,14 @@ pub struct Session {
     /// The tables of this run.
     planned: Manifest,
     /// The manifest's file when it was last compared.
-    seen: Mutex<Option<Stamp>>,
+    seen: Mutex<Option<FileVersion>>,
     /// Unlocked when it is closed.
     _lock: Option<File>,
 }
 
 /// Whether a run allows concurrent runs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Company {
+pub enum Concurrency {
     /// A run of the whole sweep is alone.
     Alone,
     /// Shards run side by side, one shard twice after a requeue.
@@ -40,16 +40,16 @@ pub enum Company {
 
 /// What changes when a file is replaced: length, time and, where there is one, the number of the file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-struct Stamp(u64, Option<SystemTime>, u64);
+struct FileVersion(u64, Option<SystemTime>, u64);
 
-impl Stamp {
-    fn of(path: &Path) -> io::Result<Stamp> {
+impl FileVersion {
+    fn of(path: &Path) -> io::Result<FileVersion> {
         let metadata = fs::metadata(path)?;
         #[cfg(unix)]
         let number = std::os::unix::fs::MetadataExt::ino(&metadata);
         #[cfg(not(unix))]
         let number = 0;
-        Ok(Stamp(metadata.len(), metadata.modified().ok(), number))
+        Ok(FileVersion(metadata.len(), metadata.modified().ok(), number))
     }
 }
 
@@ -60,7 +60,7 @@ impl Folder {
     /// # Errors
     ///
     /// If the folder belongs to something else, or another run is at work in it.
-    pub fn open(&self, planned: &Manifest, company: Company) -> Result<Session, DatasetError> {
+    pub fn open(&self, planned: &Manifest, company: Concurrency) -> Result<Session, DatasetError> {
         self.settle(planned)?;
         let create =
             |folder: &Path| atomic::create_folder(folder).map_err(|error| failed(folder, "create the folder", error));
@@ -81,36 +81,36 @@ impl Folder {
     }
 
     /// The manifest that the folder should have for `planned`, and what is to be done for it.
-    fn settle(&self, planned: &Manifest) -> Result<(Manifest, Step), DatasetError> {
+    fn settle(&self, planned: &Manifest) -> Result<(Manifest, ManifestAction), DatasetError> {
         let (found, step) = match self.read_manifest() {
-            Ok(Some(found)) => (Some(found), Step::Keep),
+            Ok(Some(found)) => (Some(found), ManifestAction::Keep),
             Ok(None) => {
                 let occupied = fs::read_dir(self.path()).is_ok_and(|entries| {
                     entries.flatten().any(|entry| !entry.file_name().to_string_lossy().starts_with('.'))
                 });
                 // Another run may have published its manifest, the first file with a name, a moment ago.
                 match self.read_manifest() {
-                    Ok(None) if !occupied => (None, Step::Create),
+                    Ok(None) if !occupied => (None, ManifestAction::Create),
                     Ok(None) => match self.manifest_of_parts() {
-                        Some(rebuilt) => (Some(rebuilt), Step::Create),
+                        Some(rebuilt) => (Some(rebuilt), ManifestAction::Create),
                         None => return Err(DatasetError::Occupied { folder: self.path().display().to_string() }),
                     },
-                    found => (found?, Step::Keep),
+                    found => (found?, ManifestAction::Keep),
                 }
             }
             Err(error @ DatasetError::Manifest { .. }) => match self.manifest_of_parts() {
                 // Nobody can say what the parts belong to.
                 None if self.has_parts() => return Err(error),
-                found => (found, Step::Replace),
+                found => (found, ManifestAction::Replace),
             },
             Err(error) => return Err(error),
         };
         let Some(found) = found else { return Ok((planned.clone(), step)) };
         self.compare(planned, &found)?;
-        if found.covers(planned) && step == Step::Keep {
-            return Ok((found, Step::Keep));
+        if found.covers(planned) && step == ManifestAction::Keep {
+            return Ok((found, ManifestAction::Keep));
         }
-        let step = if step == Step::Keep { Step::Replace } else { step };
+        let step = if step == ManifestAction::Keep { ManifestAction::Replace } else { step };
         let mut settled = if found.tables.len() > planned.tables.len() { found } else { planned.clone() };
         settled.rebuilt = None;
         if settled.spec.is_empty() {
@@ -129,13 +129,13 @@ impl Folder {
                 why: error.to_string(),
             };
             match step {
-                Step::Keep => return Ok(manifest),
-                Step::Replace => {
+                ManifestAction::Keep => return Ok(manifest),
+                ManifestAction::Replace => {
                     let bytes = manifest.to_bytes().map_err(damage)?;
                     atomic::write(&path, &bytes).map_err(|error| unwritten(&path, error))?;
                     return Ok(manifest);
                 }
-                Step::Create => {
+                ManifestAction::Create => {
                     let bytes = manifest.to_bytes().map_err(damage)?;
                     if atomic::write_new(&path, &bytes).map_err(|error| unwritten(&path, error))? {
                         return Ok(manifest);
@@ -154,7 +154,7 @@ impl Folder {
 
 /// What a manifest needs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Step {
+enum ManifestAction {
     /// It is in place.
     Keep,
     /// It gets tables, or is damaged.
@@ -176,7 +176,7 @@ impl Session {
     ///
     /// If it is not there any more, or is another one.
     pub fn check(&self) -> Result<(), DatasetError> {
-        let stamp = Stamp::of(&self.folder.manifest_path()).ok();
+        let stamp = FileVersion::of(&self.folder.manifest_path()).ok();
         let mut seen = self.seen.lock().unwrap_or_else(PoisonError::into_inner);
         if stamp.is_some() && *seen == stamp {
             return Ok(());
@@ -193,11 +193,11 @@ impl Session {
 }
 
 /// The lock of a run on the folder of its dataset; none where folders cannot be locked.
-fn lock(folder: &Path, company: Company) -> Result<Option<File>, DatasetError> {
+fn lock(folder: &Path, company: Concurrency) -> Result<Option<File>, DatasetError> {
     let Ok(file) = File::open(folder) else { return Ok(None) };
     let locked = match company {
-        Company::Alone => file.try_lock(),
-        Company::Shards => file.try_lock_shared(),
+        Concurrency::Alone => file.try_lock(),
+        Concurrency::Shards => file.try_lock_shared(),
     };
     match locked {
         Err(TryLockError::WouldBlock) => {

@@ -15,7 +15,7 @@ use super::statistics::TableStatistics;
 
 /// How closely a part is looked at.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Look {
+pub enum CheckDepth {
     /// Its footer: finds a part that is cut short and one of another origin.
     Footer,
     /// Every bit, by the checksum.
@@ -64,10 +64,10 @@ pub struct OpenPart {
 }
 
 /// Looks at the file in the place of a part, number `part` of `table` in the dataset of `manifest`, which is written in `path`.
-pub fn state(path: &Path, manifest: &Manifest, table: &str, part: u64, look: Look) -> State {
+pub fn state(path: &Path, manifest: &Manifest, table: &str, part: u64, look: CheckDepth) -> State {
     let found = match look {
-        Look::Footer => open_part(path, manifest, table, part).map(|part| part.map(|part| part.statistics)),
-        Look::Whole => whole(path).and_then(|entries| {
+        CheckDepth::Footer => open_part(path, manifest, table, part).map(|part| part.map(|part| part.statistics)),
+        CheckDepth::Whole => whole(path).and_then(|entries| {
             entries
                 .map(|entries| belongs(&entries, manifest, table, part).map(|(_, statistics)| statistics))
                 .transpose()

@@ -43,7 +43,7 @@ pub struct TableStatistics {
     /// All rows in their order, if the table has few.
     pub rows: Option<Vec<Row>>,
     /// Where the gap is least.
-    least: Least,
+    least: LeastGaps,
 }
 
 /// Words and how many rows have each, in the order of words.
@@ -75,16 +75,16 @@ pub struct Row {
 
 /// The rows of least gap with status `ok`, of protocols that arrive.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
-struct Least {
+struct LeastGaps {
     /// Whether there are too many transitions to distinguish them: then the least of all is the only one here.
     many: bool,
     /// One a transition and time, in the order of their first rows.
-    each: Vec<Candidate>,
+    each: Vec<LeastGapRow>,
 }
 
 /// A row of least gap.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-struct Candidate {
+struct LeastGapRow {
     /// The first row of its transition and time that has status `ok`.
     first: u64,
     row: Row,
@@ -130,7 +130,7 @@ impl TableStatistics {
         let least = whole(&mut found.iter().map(|(_, place)| *place))?;
         let firsts = found.iter().map(|(first, _)| rows.start + *first as u64);
         statistics.least =
-            Least { many, each: firsts.zip(least).map(|(first, row)| Candidate { first, row }).collect() };
+            LeastGaps { many, each: firsts.zip(least).map(|(first, row)| LeastGapRow { first, row }).collect() };
         Ok(statistics)
     }
 
@@ -291,7 +291,7 @@ fn least_in(stretch: ops::Range<usize>, gaps: &[f64], status: &[Status]) -> Opti
 }
 
 /// The key of a transition, its first row with status `ok` and its row of least gap.
-type Found = (Vec<f64>, usize, usize);
+type LeastGapRows = (Vec<f64>, usize, usize);
 
 /// Whether there are many transitions; and of each, or of all if they are many, the first row with status `ok` and the row of least gap, as
 /// places in `buffer`.
@@ -309,7 +309,7 @@ fn least(
     // The runs of every key that are not over yet: its value, and the place at which it ends.
     let mut runs: Vec<_> = keys.iter().map(|(_, runs)| (runs.over(rows.clone()), f64::NAN, 0)).collect();
     let family = keys.iter().position(|(axis, _)| *axis == Quantity::Family);
-    let (mut many, mut found) = (false, Vec::<Found>::new());
+    let (mut many, mut found) = (false, Vec::<LeastGapRows>::new());
     let (mut place, mut current) = (0, 0);
     while place < buffer.status.len() {
         let mut end = buffer.status.len();
@@ -329,7 +329,7 @@ fn least(
         }
         let best = least_in(stretch, gaps, &buffer.status);
         let Some((first, least)) = best else { continue };
-        let is_same = |(key, ..): &Found| {
+        let is_same = |(key, ..): &LeastGapRows| {
             many || key.iter().zip(&runs).all(|(key, (_, value, _))| key.to_bits() == value.to_bits())
         };
         if !found.get(current).is_some_and(is_same) {
@@ -343,7 +343,7 @@ fn least(
         if found.len() > FEW {
             many = true;
             let rank = |row: usize| (gaps[row], row);
-            let less = |one: Found, other: Found| if rank(other.2) < rank(one.2) { other } else { one };
+            let less = |one: LeastGapRows, other: LeastGapRows| if rank(other.2) < rank(one.2) { other } else { one };
             found = found.into_iter().reduce(less).into_iter().collect();
             current = 0;
         }
@@ -368,8 +368,8 @@ fn row(
     Ok(Row { number, cells: first_row(&batch(layout, row_index, number..number + 1, &single)?) })
 }
 
-impl Least {
-    fn merge(mut self, other: Least, columns: &[(String, String)]) -> Least {
+impl LeastGaps {
+    fn merge(mut self, other: LeastGaps, columns: &[(String, String)]) -> LeastGaps {
         let place = |name: &str| columns.iter().position(|(column, _)| column == name);
         let Some(gap) = place(GAP) else { return self };
         let value = |row: &Row| row.cell(gap).number().unwrap_or(f64::INFINITY);
@@ -397,7 +397,7 @@ impl Least {
         if self.many {
             let least =
                 self.each.into_iter().reduce(|one, other| if is_less(&other.row, &one.row) { other } else { one });
-            self.each = least.map(|least| Candidate { first: least.row.number, ..least }).into_iter().collect();
+            self.each = least.map(|least| LeastGapRow { first: least.row.number, ..least }).into_iter().collect();
         }
         self.each.sort_by_key(|candidate| candidate.first);
         self

@@ -8,7 +8,7 @@ use rayon::prelude::*;
 
 use super::folder::Folder;
 use super::manifest::Manifest;
-use super::state::{Look, State};
+use super::state::{CheckDepth, State};
 use super::statistics::TableStatistics;
 
 /// What was found in the folder of a dataset.
@@ -68,7 +68,7 @@ impl TableSurvey {
 
 impl Survey {
     /// Surveys the dataset of `manifest` in `folder`, with a look of this kind at every part, once, on all processors; `looked` counts the parts.
-    pub fn new(folder: &Folder, manifest: &Manifest, look: Look, looked: &AtomicU64) -> Survey {
+    pub fn new(folder: &Folder, manifest: &Manifest, look: CheckDepth, looked: &AtomicU64) -> Survey {
         // Where no threads can be had, this one looks alone.
         let pool = rayon::ThreadPoolBuilder::new().build().ok();
         let tables = manifest.tables.iter().map(|table| {

@@ -140,27 +140,27 @@ pub fn turning_lanes<const N: usize>(w: &[f64; N]) -> Turnings<N> {
 
 /// On both sides of the seam at 1: both formulas, each on an argument in its range, then a choice.
 #[inline(always)]
-fn near_or_falling(w: f64) -> Place {
+fn near_or_falling(w: f64) -> Lane {
     choose(w < 1.0, near(if w < 1.0 { w } else { 0.5 }), falling(if w < 1.0 { 1.0 } else { w }))
 }
 
 /// All three formulas, then a choice.
 #[inline(always)]
-fn any(w: f64) -> Place {
+fn any(w: f64) -> Lane {
     let rises = w <= -1.0;
     choose(rises, rising(if rises { w } else { -1.0 }), near_or_falling(if rises { 0.5 } else { w }))
 }
 
 impl<const N: usize> Turnings<N> {
     #[inline(always)]
-    fn set(&mut self, i: usize, place: Place) {
+    fn set(&mut self, i: usize, place: Lane) {
         (self.ln_u[i], self.u[i], self.excess[i]) = (place.ln_u, place.u, place.excess);
         (self.over[i], self.under[i]) = (place.over, place.under);
     }
 }
 
 /// One element of [`Turnings`].
-struct Place {
+struct Lane {
     ln_u: f64,
     u: f64,
     excess: f64,
@@ -170,8 +170,8 @@ struct Place {
 
 /// The one or the other, without a branch.
 #[inline(always)]
-fn choose(first: bool, one: Place, other: Place) -> Place {
-    Place {
+fn choose(first: bool, one: Lane, other: Lane) -> Lane {
+    Lane {
         ln_u: if first { one.ln_u } else { other.ln_u },
         u: if first { one.u } else { other.u },
         excess: if first { one.excess } else { other.excess },
@@ -182,27 +182,27 @@ fn choose(first: bool, one: Place, other: Place) -> Place {
 
 /// `|w| < 1`: a polynomial for `ln U / w`; then `(U - 1)/w = ln U / w + w/2` needs no exponential.
 #[inline(always)]
-fn near(w: f64) -> Place {
+fn near(w: f64) -> Lane {
     let q = polynomial(&LN_U_OVER_W, w);
     let slope = q + 0.5 * w;
     let excess = w * slope;
-    Place { ln_u: w * q, u: 1.0 + excess, excess, over: slope, under: 1.0 }
+    Lane { ln_u: w * q, u: 1.0 + excess, excess, over: slope, under: 1.0 }
 }
 
 /// `w <= -1`, theta rises: `U = x (1 + ...)` is small, and `ln U = -1 - w^2/2 + U`.
 #[inline(always)]
-fn rising(w: f64) -> Place {
+fn rising(w: f64) -> Lane {
     let e = 0.5 * w * w;
     let g = exp(-e);
     let s = g / (1.0 + (1.0 - g).sqrt());
     let u = g * std::f64::consts::E.recip() * polynomial(&U_OVER_X, s);
-    Place { ln_u: u - (1.0 + e), u, excess: u - 1.0, over: u - 1.0, under: w }
+    Lane { ln_u: u - (1.0 + e), u, excess: u - 1.0, over: u - 1.0, under: w }
 }
 
 /// `w >= 1`, theta falls. A guess that is within 1.3e-4 everywhere, and what it lacks by the reversed series of
 /// `U - 1 - ln U` about it: one logarithm in all.
 #[inline(always)]
-fn falling(w: f64) -> Place {
+fn falling(w: f64) -> Lane {
     let e = 0.5 * w * w;
     let guess = 1.0 + far_excess(w, e);
     let d = guess - 1.0;
@@ -216,7 +216,7 @@ fn falling(w: f64) -> Place {
     let x = y * (1.0 + y * (second + y * (third + y * fourth)));
     let excess = d + guess * x;
     let ln_u = ln_guess + x * (1.0 - x * (0.5 - x * (1.0 / 3.0)));
-    Place { ln_u, u: 1.0 + excess, excess, over: excess, under: w }
+    Lane { ln_u, u: 1.0 + excess, excess, over: excess, under: w }
 }
 
 /// `U - 1` for `w >= 1` and `e = w^2/2`, within 1.3e-4 of `U`.

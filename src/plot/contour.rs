@@ -17,7 +17,7 @@ pub struct Field<'a> {
 type Edge = (usize, bool);
 
 /// The edges that pieces of lines lead to from each edge.
-type Pieces = BTreeMap<Edge, Vec<Edge>>;
+type Segments = BTreeMap<Edge, Vec<Edge>>;
 
 /// The lines `field = level`, in units of columns and rows. Cells with a corner without value have none.
 pub fn contour(field: Field<'_>, level: f64) -> Vec<Vec<(f64, f64)>> {
@@ -25,7 +25,7 @@ pub fn contour(field: Field<'_>, level: f64) -> Vec<Vec<(f64, f64)>> {
     if columns < 2 || rows < 2 || values.len() < columns * rows {
         return Vec::new();
     }
-    let mut pieces = Pieces::new();
+    let mut pieces = Segments::new();
     for corner in (0..(rows - 1) * columns).filter(|corner| corner % columns < columns - 1) {
         for (from, to) in crossings(corner, columns, |corner| values[corner] - level) {
             pieces.entry(from).or_default().push(to);
@@ -63,7 +63,7 @@ fn crossings(corner: usize, columns: usize, height: impl Fn(usize) -> f64) -> Ve
 }
 
 /// The pieces joined to lines: open lines start where only one piece does, what is left are rings.
-fn joined(mut pieces: Pieces) -> Vec<Vec<Edge>> {
+fn joined(mut pieces: Segments) -> Vec<Vec<Edge>> {
     let starts: Vec<Edge> = pieces.iter().filter(|(_, to)| to.len() == 1).map(|(edge, _)| *edge).collect();
     let all: Vec<Edge> = pieces.keys().copied().collect();
     let mut lines = Vec::new();

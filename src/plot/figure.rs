@@ -237,16 +237,16 @@ impl Entry {
 
 /// A figure as SVG, and where its maps are.
 #[derive(Debug, Clone)]
-pub struct Drawn {
+pub struct SvgFigure {
     /// The picture.
     pub svg: String,
     /// Maps with values, and where they are in the picture.
-    pub hovers: Vec<Shown>,
+    pub hovers: Vec<HoverMap>,
 }
 
 /// A map with values in a picture.
 #[derive(Debug, Clone)]
-pub struct Shown {
+pub struct HoverMap {
     /// Where it is.
     pub area: Area,
     /// Its horizontal axis.
@@ -278,7 +278,7 @@ struct Layout {
 
 impl Figure {
     /// Draws the figure, `width` millimetres wide.
-    pub fn draw(&self, width: f64) -> Drawn {
+    pub fn draw(&self, width: f64) -> SvgFigure {
         let width = width * MILLIMETRE;
         let mut canvas = Canvas::default();
         let inner = width - 2.0 * MARGIN;
@@ -296,7 +296,7 @@ impl Figure {
             foot = paragraph(&mut canvas, note, &NOTE, foot, (inner, 2.0));
         }
         let height = foot + MARGIN;
-        Drawn { svg: canvas.svg(width, height, &label::plain(&self.title)), hovers }
+        SvgFigure { svg: canvas.svg(width, height, &label::plain(&self.title)), hovers }
     }
 
     /// Draws the legend below `top`; returns the place below it.
@@ -359,7 +359,7 @@ impl Figure {
     }
 
     /// Draws the panels and the colour bar; returns the place below them, and the maps.
-    fn draw_panels(&self, canvas: &mut Canvas, top: f64, inner: f64, as_powers: bool) -> (f64, Vec<Shown>) {
+    fn draw_panels(&self, canvas: &mut Canvas, top: f64, inner: f64, as_powers: bool) -> (f64, Vec<HoverMap>) {
         let layout = self.layout(inner, as_powers);
         let Layout { width, height, .. } = layout;
         let columns = layout.lefts.len();
@@ -374,7 +374,7 @@ impl Figure {
                 panel.draw(canvas, area, &layout.plans[row * columns + column], layout.lefts[column]);
                 for layer in &panel.layers {
                     if let Layer::Map(Map { hover: Some(hover), .. }) = layer {
-                        hovers.push(Shown { area, x: panel.x.clone(), y: panel.y.clone(), hover: hover.clone() });
+                        hovers.push(HoverMap { area, x: panel.x.clone(), y: panel.y.clone(), hover: hover.clone() });
                     }
                 }
                 x += width + layout.rights[column];

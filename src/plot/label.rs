@@ -25,7 +25,7 @@ pub const SUBSCRIPT_DROP: f64 = 0.2;
 
 /// Some letters in one style.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Span {
+pub struct TextRun {
     /// The letters.
     pub text: String,
     /// Whether they are italic.
@@ -35,8 +35,8 @@ pub struct Span {
 }
 
 /// The spans of a text in markup.
-pub fn spans(markup: &str) -> Vec<Span> {
-    let mut spans: Vec<Span> = Vec::new();
+pub fn spans(markup: &str) -> Vec<TextRun> {
+    let mut spans: Vec<TextRun> = Vec::new();
     let (mut italic, mut level) = (false, 0);
     let mut letters = markup.chars().peekable();
     while let Some(letter) = letters.next() {
@@ -50,7 +50,7 @@ pub fn spans(markup: &str) -> Vec<Span> {
             '}' if level != 0 => level = 0,
             _ => match spans.last_mut() {
                 Some(span) if span.italic == italic && span.level == level => span.text.push(shown),
-                _ => spans.push(Span { text: shown.to_string(), italic, level }),
+                _ => spans.push(TextRun { text: shown.to_string(), italic, level }),
             },
         }
     }
@@ -67,7 +67,7 @@ pub fn width(markup: &str) -> f64 {
     spans(markup).iter().map(span_width).sum()
 }
 
-fn span_width(span: &Span) -> f64 {
+fn span_width(span: &TextRun) -> f64 {
     static FACES: OnceLock<[Option<Face<'static>>; 2]> = OnceLock::new();
     let faces = FACES.get_or_init(|| FONTS.map(|font| Face::parse(font, 0).ok()));
     let size = if span.level == 0 { 1.0 } else { SCRIPT_SIZE };

@@ -1,7 +1,7 @@
 //! A page of HTML that holds everything it shows: sections, pictures whose maps show their values, sortable tables.
 
 use super::canvas::escaped;
-use super::figure::{Axis, Drawn, Hover, Shown};
+use super::figure::{Axis, Hover, HoverMap, SvgFigure};
 
 const STYLE: &str = include_str!("page/style.css");
 const SCRIPT: &str = include_str!("page/script.js");
@@ -54,7 +54,7 @@ impl Page {
     }
 
     /// A picture; pointing at a map in it shows the value there.
-    pub fn picture(&mut self, drawn: &Drawn) {
+    pub fn picture(&mut self, drawn: &SvgFigure) {
         self.pictures += 1;
         let place = self.pictures;
         // The names of clip paths hold in the whole page.
@@ -66,7 +66,7 @@ impl Page {
         let cells: usize = drawn.hovers.iter().map(|shown| shown.hover.word.len()).sum();
         let step = (1..).find(|step| cells / (step * step) <= MAX_CELLS).unwrap_or(1);
         if !drawn.hovers.is_empty() {
-            let maps = drawn.hovers.iter().map(|Shown { area, x, y, hover }| {
+            let maps = drawn.hovers.iter().map(|HoverMap { area, x, y, hover }| {
                 let hover = hover.every(step);
                 serde_json::json!({
                     "area": [area.x, area.y, area.width, area.height],

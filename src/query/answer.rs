@@ -23,7 +23,7 @@ use rayon::prelude::*;
 
 use super::plan;
 use super::scan::{Files, append};
-use super::streaming::{Key, PARTS, Pieces};
+use super::streaming::{Key, PARTS, StreamPlan};
 use crate::dataset::{Cell, field, guarded, label};
 
 /// Rows that are handed over at a time. Chosen: few enough that a reader sees the first ones soon.
@@ -37,7 +37,7 @@ pub struct Answer {
     columns: Vec<String>,
     units: Vec<String>,
     frame: LazyFrame,
-    streaming: Option<(Files, Pieces)>,
+    streaming: Option<(Files, StreamPlan)>,
 }
 
 /// How an answer is written to a file.
@@ -85,7 +85,7 @@ impl Answer {
         frame: LazyFrame,
         columns: Vec<String>,
         units: Vec<String>,
-        streaming: Option<(Files, Pieces)>,
+        streaming: Option<(Files, StreamPlan)>,
     ) -> Answer {
         Answer { columns, units, frame, streaming }
     }
@@ -200,7 +200,7 @@ fn at_once() -> usize {
 }
 
 /// What each of `files` gives, in their order.
-fn ask(files: &[Files], streaming: &Pieces) -> PolarsResult<Vec<DataFrame>> {
+fn ask(files: &[Files], streaming: &StreamPlan) -> PolarsResult<Vec<DataFrame>> {
     let answer = |files: &Files| match &streaming.groups {
         Some(groups) => files.groups(groups),
         None => {
@@ -213,7 +213,7 @@ fn ask(files: &[Files], streaming: &Pieces) -> PolarsResult<Vec<DataFrame>> {
 }
 
 /// Hands rows over as they are read.
-fn stream(files: &Files, streaming: &Pieces, take: Take) -> Result<(), AnswerError> {
+fn stream(files: &Files, streaming: &StreamPlan, take: Take) -> Result<(), AnswerError> {
     let mut skip = streaming.offset;
     let mut left = streaming.limit;
     let mut first = true;
@@ -235,7 +235,7 @@ fn stream(files: &Files, streaming: &Pieces, take: Take) -> Result<(), AnswerErr
 }
 
 /// The answer, put together from those of pieces.
-fn combine(files: &Files, streaming: &Pieces) -> PolarsResult<DataFrame> {
+fn combine(files: &Files, streaming: &StreamPlan) -> PolarsResult<DataFrame> {
     let most = streaming.limit.map(|limit| limit.saturating_add(streaming.offset));
     let mut parts = DataFrame::default();
     for wave in files.streaming().chunks(at_once()) {
@@ -255,7 +255,7 @@ fn combine(files: &Files, streaming: &Pieces) -> PolarsResult<DataFrame> {
         .select(streaming.names.iter().map(String::as_str))
 }
 
-fn merged(parts: DataFrame, streaming: &Pieces, most: Option<usize>) -> PolarsResult<DataFrame> {
+fn merged(parts: DataFrame, streaming: &StreamPlan, most: Option<usize>) -> PolarsResult<DataFrame> {
     match &streaming.merge {
         Some(merge) => plan([(PARTS, parts.lazy())], merge)?.collect(),
         None => ordered(parts, &streaming.keys, 0, most),

@@ -97,7 +97,7 @@ impl Question {
         let words = sources.iter().flat_map(|source| source.words.iter().cloned()).collect();
         walk(query.as_mut(), &mut Names);
         let units = units(&query, sources);
-        walk(query.as_mut(), &mut Spelling { words });
+        walk(query.as_mut(), &mut PolarsDialect { words });
         Ok(Question { query, units })
     }
 }
@@ -421,12 +421,12 @@ fn first_argument(function: &Function) -> Option<&Expr> {
 }
 
 /// Spells a question as polars reads it.
-struct Spelling {
+struct PolarsDialect {
     /// Columns of words, which are categories in polars: functions take them as text.
     words: HashSet<String>,
 }
 
-impl Spelling {
+impl PolarsDialect {
     /// Whether an expression is a column of words.
     fn is_words(&self, expression: &Expr) -> bool {
         match expression {
@@ -448,7 +448,7 @@ pub fn cast(expression: Expr, data_type: DataType) -> Expr {
     Expr::Cast { kind: CastKind::Cast, expr: Box::new(expression), data_type, array: false, format: None }
 }
 
-impl Visit for Spelling {
+impl Visit for PolarsDialect {
     fn after(&mut self, expression: &mut Expr) -> ControlFlow<()> {
         match expression {
             Expr::Value(ValueWithSpan { value: Value::Number(digits, _), .. }) => *digits = plain(digits),
@@ -478,7 +478,7 @@ impl Visit for Spelling {
     }
 }
 
-impl Spelling {
+impl PolarsDialect {
     fn function(&self, function: &mut Function) {
         let called = function.name.to_string().to_lowercase();
         let FunctionArguments::List(list) = &mut function.args else { return };

@@ -18,7 +18,7 @@ use super::question::{cast, if_else_null, name};
 use super::walk::{Visit, walk};
 
 /// How a question is answered piece by piece.
-pub struct Pieces {
+pub struct StreamPlan {
     /// The table.
     pub table: String,
     /// The query that each piece of the table answers.
@@ -105,7 +105,7 @@ const SCALAR: [&str; 44] = [
 const AGGREGATE: [&str; 6] = ["avg", "count", "max", "mean", "min", "sum"];
 
 /// How to answer `query` piece by piece; `None` where all of it has to be there at once.
-pub fn streaming(query: &Query, sources: &[Source]) -> Option<Pieces> {
+pub fn streaming(query: &Query, sources: &[Source]) -> Option<StreamPlan> {
     let SetExpr::Select(select) = query.body.as_ref() else { return None };
     if !is_bare(query) || !is_simple(select) {
         return None;
@@ -114,7 +114,7 @@ pub fn streaming(query: &Query, sources: &[Source]) -> Option<Pieces> {
     let (source, alias) = table_of(select, sources)?;
     let mut select = select.as_ref().clone();
     let mut order = query.order_by.clone();
-    let mut plain = Plain { table: &source.name, alias: &alias, functions: Functions::default() };
+    let mut plain = ColumnSimplifier { table: &source.name, alias: &alias, functions: Functions::default() };
     let plainly = walk(&mut select.projection, &mut plain)
         && walk(&mut select.selection, &mut plain)
         && walk(&mut select.having, &mut plain)
@@ -135,8 +135,8 @@ pub fn streaming(query: &Query, sources: &[Source]) -> Option<Pieces> {
     let schema = source.files.as_ref()?.schema();
     let conditions = of_where(select.selection.as_ref(), schema);
     let table = source.name.clone();
-    let question = One { table, source, items, condition: select.selection, having: select.having, ordered };
-    let mut streaming = Pieces {
+    let question = TableQuestion { table, source, items, condition: select.selection, having: select.having, ordered };
+    let mut streaming = StreamPlan {
         table: question.table.clone(),
         partial: String::new(),
         groups: None,
@@ -165,7 +165,7 @@ pub fn streaming(query: &Query, sources: &[Source]) -> Option<Pieces> {
 }
 
 /// The groups, if counting columns is enough to find them.
-fn counted((keys, measures): Measured, conditions: Vec<Condition>, schema: &Schema) -> Option<Groups> {
+fn counted((keys, measures): GroupedColumns, conditions: Vec<Condition>, schema: &Schema) -> Option<Groups> {
     let kinds = keys.into_iter().map(|key| Some((key.clone(), Kind::of(&key, schema)?)));
     let groups = Groups { conditions, keys: kinds.collect::<Option<_>>()?, measures };
     groups.fits(schema).then_some(groups)
@@ -297,7 +297,7 @@ fn limits(query: &Query) -> Option<(Option<usize>, usize)> {
 }
 
 /// A question to one table.
-struct One<'a> {
+struct TableQuestion<'a> {
     table: String,
     source: &'a Source,
     items: Vec<(String, Expr)>,
@@ -306,7 +306,7 @@ struct One<'a> {
     ordered: Vec<Expr>,
 }
 
-impl One<'_> {
+impl TableQuestion<'_> {
     /// Which rows of a piece may be among the first `most`, if the first of `keys` is a column of numbers.
     fn top(&self, keys: &[Key], most: usize, schema: &Schema) -> Option<Top> {
         let (Expr::Identifier(column), Key { descending, nulls_last }) = (self.ordered.first()?, *keys.first()?) else {
@@ -334,13 +334,13 @@ impl One<'_> {
     }
 
     /// The query of a piece for its groups, the one that merges such answers, and the one that makes the final answer of them.
-    fn groups(&self, groups: Vec<Expr>) -> Option<(String, String, String, Option<Measured>)> {
+    fn groups(&self, groups: Vec<Expr>) -> Option<(String, String, String, Option<GroupedColumns>)> {
         let mut keys = Vec::new();
         for group in groups {
             let is_column = matches!(&group, Expr::Identifier(name) if self.source.columns.contains(&name.value));
             keys.push(if is_column { group } else { item(&group, &self.items).unwrap_or(group) });
         }
-        let mut lift = Lift { keys: &keys, partial: Vec::new(), measures: Vec::new() };
+        let mut lift = AggregateExtractor { keys: &keys, partial: Vec::new(), measures: Vec::new() };
         let mut columns = Vec::new();
         for (name, expression) in &self.items {
             columns.push(aliased(&lift.lifted(expression)?, name));
@@ -382,7 +382,7 @@ impl One<'_> {
 }
 
 /// The columns that make groups, and the aggregates.
-type Measured = (Vec<String>, Vec<Measure>);
+type GroupedColumns = (Vec<String>, Vec<Measure>);
 
 fn aliased(expression: &Expr, name: &str) -> String {
     format!("{expression} AS {}", quoted(name))
@@ -393,7 +393,7 @@ fn joined(parts: impl Iterator<Item = String>) -> String {
 }
 
 /// Takes the groups and their sums, counts and extremes out of expressions.
-struct Lift<'a> {
+struct AggregateExtractor<'a> {
     keys: &'a [Expr],
     /// Aggregates of a piece, each with the function that merges them.
     partial: Vec<(String, &'static str)>,
@@ -401,7 +401,7 @@ struct Lift<'a> {
     measures: Vec<Option<Measure>>,
 }
 
-impl Lift<'_> {
+impl AggregateExtractor<'_> {
     /// `expression` of the columns of partial answers; `None` if it has others.
     fn lifted(&mut self, expression: &Expr) -> Option<Expr> {
         let mut expression = expression.clone();
@@ -456,7 +456,7 @@ impl Lift<'_> {
     }
 }
 
-impl Visit for Lift<'_> {
+impl Visit for AggregateExtractor<'_> {
     fn before(&mut self, expression: &mut Expr) -> ControlFlow<()> {
         if let Some(place) = self.keys.iter().position(|key| key == expression) {
             *expression = quoted(&format!("__g{place}"));
@@ -490,13 +490,13 @@ struct Functions {
 }
 
 /// Takes the name of the table off columns, and finds what needs all rows at once.
-struct Plain<'a> {
+struct ColumnSimplifier<'a> {
     table: &'a str,
     alias: &'a str,
     functions: Functions,
 }
 
-impl Visit for Plain<'_> {
+impl Visit for ColumnSimplifier<'_> {
     fn query(&mut self, _: &mut Query) -> ControlFlow<()> {
         ControlFlow::Break(())
     }

@@ -41,7 +41,7 @@ pub struct Sampled {
 /// Reads the axis of `quantity` at `key`.
 pub fn read(quantity: Quantity, units: &Units, key: &str, spec: &AxisSpec) -> Result<Written, SpecError> {
     let words = quantity.words();
-    let axis = Draft { quantity, units, scale: Scale::Model, key };
+    let axis = AxisDraft { quantity, units, scale: Scale::Model, key };
     let values = match spec {
         AxisSpec::One(AxisValue::Word(word)) if words.is_empty() => {
             return refuse(key, format!("found string {word:?}"), AXIS, "change the value");
@@ -58,7 +58,7 @@ pub fn read(quantity: Quantity, units: &Units, key: &str, spec: &AxisSpec) -> Re
             let expected = format!("one or a list of {}", quoted(&words));
             return refuse(key, "a range", expected, "write the words as a list");
         }
-        AxisSpec::Form(form) => return Draft { scale: axis.scale_of(form)?, ..axis }.form(form),
+        AxisSpec::Form(form) => return AxisDraft { scale: axis.scale_of(form)?, ..axis }.form(form),
     };
     Ok(axis.written(Values::List(values)))
 }
@@ -69,14 +69,14 @@ fn quoted(words: &[&str]) -> String {
 
 /// An axis while it is read.
 #[derive(Clone, Copy)]
-struct Draft<'a> {
+struct AxisDraft<'a> {
     quantity: Quantity,
     units: &'a Units,
     scale: Scale,
     key: &'a str,
 }
 
-impl Draft<'_> {
+impl AxisDraft<'_> {
     fn written(self, values: Values) -> Written {
         Written::Values(Axis { quantity: self.quantity, scale: self.scale, values })
     }

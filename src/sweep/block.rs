@@ -60,14 +60,14 @@ pub fn check(spec: &BlockSpec, prefix: String, units: Option<&Units>, folder: &P
             held.push(quantity);
         }
     }
-    let draft = |units| Draft { spec, prefix: &prefix, units, axes: &axes, held: &held };
+    let draft = |units| BlockDraft { spec, prefix: &prefix, units, axes: &axes, held: &held };
     let block = units.and_then(|units| draft(units).block(factors, faults));
     Checked { prefix, held, block }
 }
 
 /// A block while its axes are read.
 #[derive(Clone, Copy)]
-struct Draft<'a> {
+struct BlockDraft<'a> {
     spec: &'a BlockSpec,
     prefix: &'a str,
     units: &'a Units,
@@ -75,10 +75,10 @@ struct Draft<'a> {
     held: &'a [Quantity],
 }
 
-impl Draft<'_> {
+impl BlockDraft<'_> {
     /// The block with these points.
     fn block(self, mut factors: Vec<Factor>, faults: &mut Faults) -> Option<Block> {
-        let Draft { spec, prefix, axes, held, .. } = self;
+        let BlockDraft { spec, prefix, axes, held, .. } = self;
         let has_points = !factors.is_empty();
         let zips = self.zips(&factors, faults);
         let samples = faults.take(self.samples())?;
@@ -136,7 +136,7 @@ impl Draft<'_> {
 
     /// The axes of each zip, all of equal length, in the order of the axes.
     fn zips(self, factors: &[Factor], faults: &mut Faults) -> Vec<Vec<Axis>> {
-        let Draft { spec, prefix, axes, .. } = self;
+        let BlockDraft { spec, prefix, axes, .. } = self;
         let mut zips: Vec<Vec<Axis>> = Vec::new();
         for (number, names) in spec.zip.iter().enumerate() {
             let key = format!("{prefix}zip[{number}]");
@@ -164,7 +164,7 @@ impl Draft<'_> {
         factors: &[Factor],
         (zips, zip): (&[Vec<Axis>], &[Axis]),
     ) -> Result<Option<Axis>, SpecError> {
-        let Draft { axes, held, .. } = self;
+        let BlockDraft { axes, held, .. } = self;
         let axis = match axes.iter().find(|(quantity, _)| quantity.name() == name).map(|(_, axis)| axis.as_ref()) {
             Some(Some(Written::Values(axis))) => axis,
             Some(Some(Written::Computed { .. })) => {
@@ -205,7 +205,7 @@ impl Draft<'_> {
 
     /// The joint samples, one for each kind.
     fn samples(self) -> Result<Vec<(Design, Vec<Axis>)>, SpecError> {
-        let Draft { prefix, units, axes, .. } = self;
+        let BlockDraft { prefix, units, axes, .. } = self;
         let mut samples = Vec::new();
         for design in [Design::Sobol, Design::LatinHypercube] {
             let axes: Vec<(Quantity, Sampled)> = axes

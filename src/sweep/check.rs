@@ -269,7 +269,7 @@ fn check_rtol(key: &str, rtol: f64) -> Result<(), SpecError> {
 }
 
 /// A table of a spec with legal keys.
-struct Draft {
+struct TableDraft {
     /// Its name in the spec.
     name: String,
     /// The table with the rows.
@@ -281,7 +281,7 @@ struct Draft {
 }
 
 /// The tables of `spec`. A missing axis is reported once.
-fn tables(spec: &Spec, blocks: &mut [Checked], faults: &mut Faults) -> Vec<Draft> {
+fn tables(spec: &Spec, blocks: &mut [Checked], faults: &mut Faults) -> Vec<TableDraft> {
     if spec.tables.is_empty() && !faults.concern("tables") {
         let expected = format!("at least one of {}", table::ALL.map(|table| table.name()).join(", "));
         faults.push(SpecError::new("tables", "no table is requested", expected, "add a line such as [tables.optimal]"));
@@ -289,7 +289,7 @@ fn tables(spec: &Spec, blocks: &mut [Checked], faults: &mut Faults) -> Vec<Draft
     spec.tables.iter().filter_map(|(name, table)| draft(name, table, spec.accuracy.rtol, blocks, faults)).collect()
 }
 
-fn draft(name: &str, spec: &TableSpec, rtol: f64, blocks: &mut [Checked], faults: &mut Faults) -> Option<Draft> {
+fn draft(name: &str, spec: &TableSpec, rtol: f64, blocks: &mut [Checked], faults: &mut Faults) -> Option<TableDraft> {
     let key = format!("tables.{name}");
     let Some(written) = table::ALL.into_iter().find(|table| table.name() == name) else {
         faults.push(unknown(key, "table", name, &table::ALL.map(|table| table.name())));
@@ -310,7 +310,7 @@ fn draft(name: &str, spec: &TableSpec, rtol: f64, blocks: &mut [Checked], faults
     }
     // The columns are those of the reduced table.
     let projection = projection(table, &key, spec.columns.as_deref().filter(|_| is_reduction_known), faults);
-    Some(Draft { name: name.to_owned(), written, table, projection, rtol })
+    Some(TableDraft { name: name.to_owned(), written, table, projection, rtol })
 }
 
 /// The fault of a table that lacks axes in the block of `prefix`.
@@ -328,8 +328,8 @@ fn lacks(key: &str, table: &dyn Table, prefix: &str, missing: &[Quantity]) -> Sp
 }
 
 /// A table over its rows of `grid`, whose blocks have keys that begin with `prefixes`.
-fn request(draft: Draft, grid: &Grid, prefixes: &[String]) -> Result<Request, SpecError> {
-    let Draft { name, written, table, projection, rtol } = draft;
+fn request(draft: TableDraft, grid: &Grid, prefixes: &[String]) -> Result<Request, SpecError> {
+    let TableDraft { name, written, table, projection, rtol } = draft;
     let key = format!("tables.{name}");
     let members = if written.name() == table.name() { None } else { Some(members(written, table, &key, grid)?) };
     let row_index = grid.project(table.axes()).map_err(|error| match error {

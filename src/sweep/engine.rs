@@ -18,7 +18,8 @@ use super::check::Sweep;
 use super::plan::Plan;
 use super::shard::{Shard, TooManyParts, contains_part};
 use crate::dataset::{
-    Company, DatasetError, Folder, Footer, Layout, Look, ManifestTable, Session, State, TableStatistics, encode,
+    CheckDepth, Concurrency, DatasetError, Folder, Footer, Layout, ManifestTable, Session, State, TableStatistics,
+    encode,
 };
 use crate::grid::Quantity;
 use crate::table::{ColumnBuffer, Job, Phase, RunStats, Signal, Stopped, Table};
@@ -111,7 +112,7 @@ impl fmt::Display for Defect {
 /// Runs `sweep` on `threads` threads (0: one for each processor) into `folder`, and keeps existing intact parts. No other run may use the
 /// folder.
 pub fn run(sweep: &Sweep, folder: &Folder, threads: usize, signal: &Signal) -> Result<Outcome, RunError> {
-    run_in(sweep, folder, (Shard::WHOLE, Company::Alone), threads, signal)
+    run_in(sweep, folder, (Shard::WHOLE, Concurrency::Alone), threads, signal)
 }
 
 /// Runs the parts of one shard. Any number of processes may run shards of one dataset at the same time, including the same shard.
@@ -124,13 +125,13 @@ pub fn run_shard(
     threads: usize,
     signal: &Signal,
 ) -> Result<Outcome, RunError> {
-    run_in(sweep, folder, (shard, Company::Shards), threads, signal)
+    run_in(sweep, folder, (shard, Concurrency::Shards), threads, signal)
 }
 
 fn run_in(
     sweep: &Sweep,
     folder: &Folder,
-    (shard, company): (Shard, Company),
+    (shard, company): (Shard, Concurrency),
     threads: usize,
     signal: &Signal,
 ) -> Result<Outcome, RunError> {
@@ -405,7 +406,7 @@ impl<'a> TableRun<'a> {
     /// The state of a part on disk; an intact one is counted.
     fn look(&self, number: u64) -> Result<Found, RunError> {
         let Run { folder, session, signal, .. } = self.run;
-        match folder.state(&session.manifest, &self.table.name, number, Look::Whole) {
+        match folder.state(&session.manifest, &self.table.name, number, CheckDepth::Whole) {
             State::There { statistics } => {
                 let rows = self.table.rows_of(number);
                 signal.keep(rows.end - rows.start);

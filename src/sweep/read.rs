@@ -238,17 +238,17 @@ pub fn value(text: &str, key: &str) -> Option<String> {
 }
 
 /// The entry of a key, or of its longest existing prefix.
-struct Found<'a, 'i> {
+struct KeyEntry<'a, 'i> {
     start: usize,
     value: &'a Spanned<DeValue<'i>>,
     /// Whether it is all of the key.
     is_whole: bool,
 }
 
-fn find<'a, 'i>(document: &'a DeTable<'i>, key: &str) -> Option<Found<'a, 'i>> {
+fn find<'a, 'i>(document: &'a DeTable<'i>, key: &str) -> Option<KeyEntry<'a, 'i>> {
     let entry = |table: &'a DeTable<'i>, name: &str| {
         let (key, value) = table.get_key_value(name)?;
-        Some(Found { start: key.span().start, value, is_whole: true })
+        Some(KeyEntry { start: key.span().start, value, is_whole: true })
     };
     let mut steps = key.split(['.', '[', ']']).filter(|step| !step.is_empty());
     let mut found = entry(document, steps.next()?)?;
@@ -256,13 +256,13 @@ fn find<'a, 'i>(document: &'a DeTable<'i>, key: &str) -> Option<Found<'a, 'i>> {
         let next = match found.value.get_ref() {
             DeValue::Table(table) => entry(table, step),
             DeValue::Array(items) => step.parse().ok().and_then(|index: usize| {
-                items.get(index).map(|value| Found { start: value.span().start, value, is_whole: true })
+                items.get(index).map(|value| KeyEntry { start: value.span().start, value, is_whole: true })
             }),
             _ => None,
         };
         match next {
             Some(next) => found = next,
-            None => return Some(Found { is_whole: false, ..found }),
+            None => return Some(KeyEntry { is_whole: false, ..found }),
         }
     }
     Some(found)

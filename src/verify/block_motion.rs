@@ -31,7 +31,7 @@ pub struct Block {
 
 /// A moment.
 #[derive(Debug, Clone, Copy)]
-pub struct Here {
+pub struct BlockState {
     pub p: f64,
     pub y: f64,
     pub x: f64,
@@ -44,9 +44,9 @@ pub struct Here {
 #[derive(Debug, Clone, Copy)]
 pub enum Event {
     /// The velocity turns, at a maximum or a minimum.
-    Turn { here: Here, top: bool },
+    Turn { here: BlockState, top: bool },
     /// It passes through a level.
-    Pass { here: Here, level: f64, up: bool },
+    Pass { here: BlockState, level: f64, up: bool },
 }
 
 /// Way of one leg: no variable changes by more.
@@ -62,13 +62,13 @@ const AT_ONCE: f64 = 1e-13;
 
 impl Block {
     /// Steady sliding at `e^x v_f`.
-    pub fn steady(&self, x: f64) -> Here {
-        Here { p: (1.0 - self.ratio) * x, y: -x, x, t: 0.0, slaved: self.mu == 0.0 }
+    pub fn steady(&self, x: f64) -> BlockState {
+        BlockState { p: (1.0 - self.ratio) * x, y: -x, x, t: 0.0, slaved: self.mu == 0.0 }
     }
 
     /// The section `v = v_f`.
-    pub fn section(&self, p: f64, y: f64) -> Here {
-        Here { p, y, ..self.steady(0.0) }
+    pub fn section(&self, p: f64, y: f64) -> BlockState {
+        BlockState { p, y, ..self.steady(0.0) }
     }
 
     fn slopes(&self, p: f64, y: f64, x: f64) -> [f64; 3] {
@@ -97,7 +97,7 @@ impl Block {
     }
 
     /// Rate at which `x` changes.
-    pub fn speed(&self, here: &Here) -> f64 {
+    pub fn speed(&self, here: &BlockState) -> f64 {
         if !here.slaved {
             return self.slopes(here.p, here.y, here.x)[2];
         }
@@ -113,7 +113,7 @@ impl Block {
     }
 
     /// How long a turn is about as fast as an error of the velocity's slope, in units of the slopes that it is made of.
-    pub fn flatness(&self, turn: &Here) -> Option<f64> {
+    pub fn flatness(&self, turn: &BlockState) -> Option<f64> {
         let later = self.advance(turn, 0.1 * LEG)?;
         let bend = (self.speed(&later) - self.speed(turn)) / (later.t - turn.t);
         let slopes = [self.pull * turn.x.exp_m1(), self.ratio * ((-turn.y).exp() - turn.x.exp())];
@@ -121,7 +121,7 @@ impl Block {
     }
 
     /// Rates at which the others change over that at which `x` follows.
-    fn ratio_of_rates(&self, here: &Here) -> f64 {
+    fn ratio_of_rates(&self, here: &BlockState) -> f64 {
         let v = here.x.exp();
         self.mu * v * ((self.pull + self.ratio) * (1.0 + v) + (1.0 + self.ratio) * (-here.y).exp())
     }
@@ -132,7 +132,7 @@ impl Block {
     }
 
     /// The moment a way further; `None` if the integrator gives up, or too much work is done.
-    fn advance(&self, here: &Here, way: f64) -> Option<Here> {
+    fn advance(&self, here: &BlockState, way: f64) -> Option<BlockState> {
         if self.work.get() > MOST_WORK {
             return None;
         }
@@ -147,7 +147,7 @@ impl Block {
                 [p * pace, age * pace, pace]
             };
             let [p, y, t] = integrate(slope, [here.p, here.y, 0.0], (0.0, way))?;
-            return Some(Here { p, y, x: self.followed(p, y).0, t: here.t + t, slaved: true });
+            return Some(BlockState { p, y, x: self.followed(p, y).0, t: here.t + t, slaved: true });
         }
         let slope = |y: &[f64; 4]| {
             self.work.set(self.work.get() + 1);
@@ -156,25 +156,25 @@ impl Block {
             [slopes[0] * pace, slopes[1] * pace, slopes[2] * pace, pace]
         };
         let [p, y, x, t] = integrate(slope, [here.p, here.y, here.x, 0.0], (0.0, way))?;
-        Some(Here { p, y, x, t: here.t + t, slaved: false })
+        Some(BlockState { p, y, x, t: here.t + t, slaved: false })
     }
 
     /// Whether `x` follows from here on.
-    fn settle(&self, here: Here) -> Here {
+    fn settle(&self, here: BlockState) -> BlockState {
         if self.mu == 0.0 {
             return here;
         }
         let fast = self.ratio_of_rates(&here);
         if here.slaved {
-            return Here { slaved: fast < 2.0 * self.fast, ..here };
+            return BlockState { slaved: fast < 2.0 * self.fast, ..here };
         }
         let x = self.followed(here.p, here.y).0;
         let follows = fast < AT_ONCE || (fast < self.fast && (here.x - x).abs() < CLOSE);
-        if follows { Here { x, slaved: true, ..here } } else { here }
+        if follows { BlockState { x, slaved: true, ..here } } else { here }
     }
 
     /// Way of the next leg: as long as it takes `x` to come closer to where it will follow, or some time of its relaxation.
-    fn length(&self, here: &Here) -> f64 {
+    fn length(&self, here: &BlockState) -> f64 {
         let fast = self.ratio_of_rates(here);
         if here.slaved || fast >= self.fast {
             return LEG;
@@ -183,14 +183,14 @@ impl Block {
     }
 
     /// A leg further, with what is seen of these levels, in ascending order, on the way.
-    pub fn leg(&self, here: Here, levels: &[f64]) -> Option<(Here, Vec<Event>)> {
+    pub fn leg(&self, here: BlockState, levels: &[f64]) -> Option<(BlockState, Vec<Event>)> {
         let before = here;
         let here = self.settle(here);
         let rising = self.speed(&here) > 0.0;
         // An arrest in no time passes levels too.
         let fallen = levels.iter().rev().filter(|level| **level < before.x && **level >= here.x);
         let mut events: Vec<Event> =
-            fallen.map(|&level| Event::Pass { here: Here { x: level, ..here }, level, up: false }).collect();
+            fallen.map(|&level| Event::Pass { here: BlockState { x: level, ..here }, level, up: false }).collect();
         let was_rising = self.speed(&before) > 0.0;
         if was_rising != rising {
             events.push(Event::Turn { here, top: was_rising });
@@ -212,7 +212,7 @@ impl Block {
     /// The levels met between two places of a leg between which the velocity only rises or only falls.
     fn passes(
         &self,
-        here: &Here,
+        here: &BlockState,
         (from, x_from): (f64, f64),
         (to, x_to): (f64, f64),
         levels: &[f64],
@@ -224,13 +224,18 @@ impl Block {
         met.sort_by(|a, b| if up { a.total_cmp(b) } else { b.total_cmp(a) });
         for level in met {
             let (_, at) = self.place(here, (from, to), |at| at.x - level)?;
-            events.push(Event::Pass { here: Here { x: level, ..at }, level, up });
+            events.push(Event::Pass { here: BlockState { x: level, ..at }, level, up });
         }
         Some(())
     }
 
     /// Where on a leg something vanishes that differs in sign at both places: Illinois method.
-    fn place(&self, here: &Here, (mut low, mut high): (f64, f64), f: impl Fn(&Here) -> f64) -> Option<(f64, Here)> {
+    fn place(
+        &self,
+        here: &BlockState,
+        (mut low, mut high): (f64, f64),
+        f: impl Fn(&BlockState) -> f64,
+    ) -> Option<(f64, BlockState)> {
         let at = |way: f64| if way == 0.0 { Some(*here) } else { self.advance(here, way) };
         let (mut f_low, mut f_high) = (f(&at(low)?), f(&at(high)?));
         let mut found = (low, at(low)?);

@@ -1,6 +1,6 @@
 //! What becomes of a block after a step, from following it cycle by cycle, and from the cycle that closes.
 
-use super::block_motion::{Block, Event, Here};
+use super::block_motion::{Block, BlockState, Event};
 
 /// `ln(v/v_f)` at the edges of the band of settled velocities, 1 % about `v_f`.
 fn band() -> [f64; 2] {
@@ -89,7 +89,7 @@ pub fn follow(block: &Block, stable: bool, x: f64, rtol: f64) -> Simulation {
     let mut here = block.steady(x);
     watch.since = inside(x).then_some((0.0, f64::INFINITY));
     let mut met = false;
-    let mut sections: Vec<Here> = Vec::new();
+    let mut sections: Vec<BlockState> = Vec::new();
     // Extremes since the last section.
     let (mut high, mut low) = (0.0f64, 0.0f64);
     let mut last_range = f64::INFINITY;
@@ -170,7 +170,7 @@ impl Watch {
 }
 
 /// From one section to the next: where it is met, how long that takes, and the extremes on the way.
-fn cycle(block: &Block, p: f64, y: f64) -> Option<(Here, f64, f64)> {
+fn cycle(block: &Block, p: f64, y: f64) -> Option<(BlockState, f64, f64)> {
     let mut here = block.section(p, y);
     let (mut high, mut low) = (0.0f64, 0.0f64);
     // The section that it starts from may be met by rounding.
@@ -201,7 +201,7 @@ const LONGEST: f64 = 0.5;
 
 /// The cycle that closes near the last of these sections, if they come to it: Newton's method for the section, in `ln p` and
 /// `y`.
-fn limit(block: &Block, sections: &[Here]) -> Option<Cycle> {
+fn limit(block: &Block, sections: &[BlockState]) -> Option<Cycle> {
     let [.., before, last] = sections else { return None };
     let motion = (last.p / before.p).ln();
     if motion.is_nan() || motion.abs() > LONGEST {

@@ -41,7 +41,7 @@ impl Moment {
 }
 
 /// What is gathered.
-struct Found<'a> {
+struct MotionExtremes<'a> {
     slider: &'a SpringBlock,
     excess: f64,
     /// Work of what was replaced: the size of what the excess is a difference of.
@@ -53,7 +53,7 @@ struct Found<'a> {
     control: [f64; 2],
 }
 
-impl Found<'_> {
+impl MotionExtremes<'_> {
     fn take(&mut self, v: [f64; 2], control: [f64; 2]) {
         self.v = [self.v[0].min(v[0]), self.v[1].max(v[1])];
         self.control = [self.control[0].min(control[0]), self.control[1].max(control[1])];
@@ -271,11 +271,18 @@ fn again<'a>(
     t_f: f64,
     delta_t: f64,
     best: &Extremal,
-) -> Option<Found<'a>> {
+) -> Option<MotionExtremes<'a>> {
     let law = slider.law;
     let none = [f64::INFINITY, f64::NEG_INFINITY];
-    let mut found =
-        Found { slider, excess: 0.0, replaced: 0.0, vague: 0.0, v: none, friction_min: f64::INFINITY, control: none };
+    let mut found = MotionExtremes {
+        slider,
+        excess: 0.0,
+        replaced: 0.0,
+        vague: 0.0,
+        v: none,
+        friction_min: f64::INFINITY,
+        control: none,
+    };
     let floor = best.time_at_floor;
     let held = |t: f64| Moment { q: [0.0; 3], y: (1.0 - (1.0 - 1.0 / problem.v_i) * (-t).exp()).ln(), work: 0.0 };
     let worked = |from: f64, to: f64| super::extremal::floor(law, held(from).y.exp(), to - from);

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
 use crate::common::{files, run, sweep, write_batch};
-use slipsweep::dataset::{Folder, Look, State};
+use slipsweep::dataset::{CheckDepth, Folder, State};
 use slipsweep::sweep::{Plan, Sweep};
 
 const AXES: &str = "t_f = { linspace = [0.02, 0.049, 30] }\na = 0.03\nb = 0.05\nv_i = 3.0\nv_f = 100.0\nalpha_2 = [0.0, 0.1]\n\
@@ -36,7 +36,7 @@ fn rewrite(path: &Path, bytes: &[u8]) {
     fs::write(path, bytes).expect("is writable");
 }
 
-fn part_of(sweep: &Sweep, out: &Path, look: Look) -> State {
+fn part_of(sweep: &Sweep, out: &Path, look: CheckDepth) -> State {
     Folder::new(out, "test").state(&Plan::new(sweep).manifest(sweep), "optimal", 0, look)
 }
 
@@ -47,7 +47,7 @@ fn a_flipped_bit_is_found_wherever_it_is() {
     run(&sweep, folder.path(), 1);
     let path = Folder::new(folder.path(), "test").part("optimal", 0);
     let good = fs::read(&path).expect("is there");
-    let sound = part_of(&sweep, folder.path(), Look::Whole);
+    let sound = part_of(&sweep, folder.path(), CheckDepth::Whole);
     assert!(matches!(&sound, State::There { statistics } if statistics.status[0] == 30), "{sound:?}");
     let mut next = numbers();
     // The last bytes are the checksum, the schema, and what Parquet ends with.
@@ -56,10 +56,10 @@ fn a_flipped_bit_is_found_wherever_it_is() {
         let mut bad = good.clone();
         bad[byte] ^= 1 << next(8);
         rewrite(&path, &bad);
-        let state = part_of(&sweep, folder.path(), Look::Whole);
+        let state = part_of(&sweep, folder.path(), CheckDepth::Whole);
         assert!(matches!(state, State::Damaged { .. }), "byte {byte} of {}: {state:?}", good.len());
         // A look at the footer may miss it, but neither fails nor takes part in it.
-        let _ = part_of(&sweep, folder.path(), Look::Footer);
+        let _ = part_of(&sweep, folder.path(), CheckDepth::Footer);
     }
 }
 
@@ -72,7 +72,7 @@ fn a_part_that_is_cut_is_found_by_any_look() {
     let good = fs::read(&path).expect("is there");
     for length in 0..good.len() {
         rewrite(&path, &good[..length]);
-        for look in [Look::Footer, Look::Whole] {
+        for look in [CheckDepth::Footer, CheckDepth::Whole] {
             let state = part_of(&sweep, folder.path(), look);
             assert!(matches!(state, State::Damaged { .. }), "{length} of {}: {state:?}", good.len());
         }
@@ -167,7 +167,7 @@ fn foreign_parts_are_left_alone() {
     // A Parquet file of somebody else is foreign, not damaged.
     let x: arrow_array::ArrayRef = std::sync::Arc::new(arrow_array::Float64Array::from(vec![1.0]));
     write_batch(&path, &arrow_array::RecordBatch::try_from_iter([("x", x)]).expect("is a table"));
-    for look in [Look::Footer, Look::Whole] {
+    for look in [CheckDepth::Footer, CheckDepth::Whole] {
         let state = part_of(&sweep, folder.path(), look);
         assert!(matches!(state, State::Foreign { what: "program", .. }), "{state:?}");
     }
@@ -220,7 +220,7 @@ fn regress_what_is_no_file_is_never_waited_for() {
             expected: "a part that slipsweep wrote".to_owned(),
             found: found.to_owned(),
         };
-        for look in [Look::Footer, Look::Whole] {
+        for look in [CheckDepth::Footer, CheckDepth::Whole] {
             assert_eq!(part_of(&sweep, folder.path(), look), expected, "{}", place.display());
         }
     };
@@ -262,7 +262,7 @@ fn regress_what_is_no_file_is_never_waited_for() {
         fs::remove_file(&manifest).expect("is there");
         fs::write(&manifest, reported).expect("is writable");
     }
-    assert_eq!(part_of(&sweep, folder.path(), Look::Whole), State::Missing);
+    assert_eq!(part_of(&sweep, folder.path(), CheckDepth::Whole), State::Missing);
     run(&sweep, folder.path(), 1);
     assert_eq!(fs::read(&path).expect("is there"), good);
 }

@@ -8,7 +8,7 @@ use std::sync::Barrier;
 use crate::common::{MATERIAL, files, run, sweep};
 use crate::extent::quick_or_long;
 use sha2::Digest;
-use slipsweep::dataset::{Company, DatasetError, Folder, Manifest, frame};
+use slipsweep::dataset::{Concurrency, DatasetError, Folder, Manifest, frame};
 use slipsweep::sweep::{self, Plan, RunError, Shard, Sweep, TableOutcome};
 use slipsweep::table::Signal;
 
@@ -174,7 +174,7 @@ fn another_build_is_refused() {
         let expected = format!("{theirs}, of this program");
         *theirs = "other".to_owned();
         let out = folder.path().join(what);
-        Folder::new(&out, "test").open(&other, Company::Alone).expect("is writable");
+        Folder::new(&out, "test").open(&other, Concurrency::Alone).expect("is writable");
         let before = files(&out);
         let reported = refusal(&sweep, &out);
         let message =
@@ -225,10 +225,10 @@ fn a_run_whose_dataset_is_taken_away_stops_there() {
         Plan::new(&sweep).manifest(&sweep)
     });
     let place = Folder::new(folder.path(), "test");
-    let session = place.open(&first, Company::Alone).expect("is writable");
+    let session = place.open(&first, Concurrency::Alone).expect("is writable");
     session.write_part("optimal", 0, b"whole").expect("is writable");
     fs::remove_dir_all(place.path()).expect("is there");
-    let other = place.open(&second, Company::Alone).expect("is another folder");
+    let other = place.open(&second, Concurrency::Alone).expect("is another folder");
     let stopped = session.write_part("optimal", 0, b"mixed").expect_err("is another dataset");
     assert_eq!(
         stopped.to_string(),
@@ -254,8 +254,8 @@ fn the_second_run_on_a_dataset_says_that_the_first_one_is_at_work() {
     // Whether each of them is alone; only Linux lists them.
     let runs = || place.runs().iter().map(|holder| holder.is_alone).collect::<Vec<_>>();
     let listed = |runs: &[bool]| if cfg!(target_os = "linux") { runs.to_vec() } else { Vec::new() };
-    let first = open(Company::Alone).expect("is free");
-    for company in [Company::Alone, Company::Shards] {
+    let first = open(Concurrency::Alone).expect("is free");
+    for company in [Concurrency::Alone, Concurrency::Shards] {
         let reported = open(company).expect_err("is taken").to_string();
         let process =
             if cfg!(target_os = "linux") { format!(" (process {})", std::process::id()) } else { String::new() };
@@ -273,11 +273,12 @@ fn the_second_run_on_a_dataset_says_that_the_first_one_is_at_work() {
     assert!(!shown.contains("to finish it:") || !cfg!(target_os = "linux"), "{shown}");
     drop(first);
     assert_eq!(runs(), listed(&[]));
-    let shards = [open(Company::Shards).expect("is free"), open(Company::Shards).expect("shards run side by side")];
+    let shards =
+        [open(Concurrency::Shards).expect("is free"), open(Concurrency::Shards).expect("shards run side by side")];
     assert_eq!(runs(), listed(&[false; 2]));
-    assert!(matches!(open(Company::Alone), Err(DatasetError::Busy { .. })));
+    assert!(matches!(open(Concurrency::Alone), Err(DatasetError::Busy { .. })));
     drop(shards);
-    open(Company::Alone).expect("is free");
+    open(Concurrency::Alone).expect("is free");
 }
 
 #[test]

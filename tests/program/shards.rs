@@ -5,7 +5,7 @@ use std::path::Path;
 use std::process::{Command, Output};
 
 use crate::common::{files, run, sweep};
-use slipsweep::dataset::{Company, Folder};
+use slipsweep::dataset::{Concurrency, Folder};
 use slipsweep::sweep::{self, Plan, Shard, TableOutcome, shards_with};
 use slipsweep::table::Signal;
 
@@ -270,7 +270,7 @@ fn regress_parts_that_are_missing_cost_nothing() {
     let [table] = plan.tables.as_slice() else { panic!("one table") };
     assert_eq!((table.rows, table.rows_of(table.parts - 1).end), (u64::MAX, u64::MAX));
     Folder::new(&folder.path().join("results"), "test")
-        .open(&plan.manifest(&sweep), Company::Alone)
+        .open(&plan.manifest(&sweep), Concurrency::Alone)
         .expect("is writable");
     let output = slipsweep(folder.path(), &["status", "results/test"]);
     assert_eq!(output.status.code(), Some(2));

@@ -5,7 +5,7 @@ use std::fs;
 use std::path::Path;
 use std::sync::atomic::AtomicU64;
 
-use slipsweep::dataset::{Cell, Folder, Look, Row, Survey, TableStatistics, frame};
+use slipsweep::dataset::{Cell, CheckDepth, Folder, Row, Survey, TableStatistics, frame};
 use slipsweep::grid::Point;
 use slipsweep::protocol::Status;
 use slipsweep::sweep::Plan;
@@ -126,7 +126,7 @@ fn compare(name: &str, statistics: &TableStatistics, rows: &[Row]) {
 
 fn survey(out: &Path, sweep: &slipsweep::sweep::Sweep) -> Survey {
     let manifest = Plan::new(sweep).manifest(sweep);
-    Survey::new(&Folder::new(out, &sweep.name), &manifest, Look::Footer, &AtomicU64::new(0))
+    Survey::new(&Folder::new(out, &sweep.name), &manifest, CheckDepth::Footer, &AtomicU64::new(0))
 }
 
 #[test]
@@ -179,7 +179,7 @@ fn digests_add_up_in_any_order() {
     let parts: Vec<TableStatistics> = (0..2)
         .map(|part| {
             let manifest = Plan::new(&sweep).manifest(&sweep);
-            match at.state(&manifest, "gap", part, Look::Whole) {
+            match at.state(&manifest, "gap", part, CheckDepth::Whole) {
                 slipsweep::dataset::State::There { statistics } => *statistics,
                 state => panic!("{state:?}"),
             }

@@ -59,13 +59,13 @@ pub struct Integrator<'a, Y, const N: usize, const S: usize> {
     y: [f64; N],
     /// Length proposed for the next step.
     h: f64,
-    last: Option<Last<N, S>>,
+    last: Option<LastStep<N, S>>,
     cost: IntegratorStats,
 }
 
 /// The last step, with its error estimate relative to what was allowed.
 #[derive(Debug, Clone, Copy)]
-struct Last<const N: usize, const S: usize> {
+struct LastStep<const N: usize, const S: usize> {
     dense_output: DenseOutput<N, S>,
     error: f64,
 }
@@ -192,7 +192,7 @@ impl<'a, Y: System<N>, const N: usize, const S: usize> Integrator<'a, Y, N, S> {
                 self.pass(h);
             }
             self.y = dense_output.end;
-            self.last = Some(Last { dense_output, error });
+            self.last = Some(LastStep { dense_output, error });
             self.cost.steps += 1;
             return Ok(dense_output);
         }
@@ -250,7 +250,7 @@ impl<'a, Y: System<N>, const N: usize, const S: usize> Integrator<'a, Y, N, S> {
     /// Changes at the nodes as the last step's polynomial foresees them.
     #[inline(always)]
     fn guess(&self, h: f64) -> [[f64; S]; N] {
-        let Some(Last { dense_output, .. }) = &self.last else { return [[0.0; S]; N] };
+        let Some(LastStep { dense_output, .. }) = &self.last else { return [[0.0; S]; N] };
         let fraction = h / dense_output.h;
         std::array::from_fn(|r| {
             let end = dense_output.end[r] - dense_output.start[r];
@@ -478,9 +478,9 @@ mod tests {
     }
 
     /// `y' = e^y`, which is infinite at `t = e^-y(0)`.
-    struct Burst;
+    struct FiniteTimeBlowUp;
 
-    impl System<1> for Burst {
+    impl System<1> for FiniteTimeBlowUp {
         fn linearise<const L: usize>(&self, points: &Points<1, L>) -> Linearised<1, L> {
             let rate = points.y[0].map(exp);
             let mut at = Linearised { residual: [rate], mass: [[1.0; L]], jacobian: [[rate]] };
@@ -494,7 +494,7 @@ mod tests {
     #[test]
     fn a_solution_that_ends_reports_where() {
         let accuracy = Accuracy { tolerance: 1e-10, scale: [1.0] };
-        let mut integrator = Integrator::new(&Burst, radau_iia_9(), accuracy, 0.0, [0.0], 0.1);
+        let mut integrator = Integrator::new(&FiniteTimeBlowUp, radau_iia_9(), accuracy, 0.0, [0.0], 0.1);
         let failure = loop {
             if let Err(failure) = integrator.step(2.0) {
                 break failure;

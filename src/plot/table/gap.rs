@@ -4,7 +4,7 @@ use super::cells::AxisCells;
 use super::choice::Shape;
 use super::groups::Groups;
 use super::lines;
-use super::map::{self, Mapped};
+use super::map::{self, MapFigure};
 use super::survey::Survey;
 use super::{Scene, Source};
 use crate::model::Units;
@@ -26,7 +26,7 @@ pub fn draw(scene: &Scene<'_>, shape: &Shape) -> Result<Figure, PlotError> {
         Shape::Lines(plan) => return Ok(lines::lines(scene.survey, plan)?.figure),
         Shape::Map(plan) => plan,
     };
-    let Mapped { mut figure, groups, least, cells } = map::map(scene.survey, plan)?;
+    let MapFigure { mut figure, groups, least, cells } = map::map(scene.survey, plan)?;
     if plan.x != ALPHAS[0] || plan.y != ALPHAS[1] {
         return Ok(figure);
     }

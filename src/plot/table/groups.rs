@@ -119,7 +119,7 @@ pub struct Groups {
     pub all: usize,
     /// How many are not shown.
     left_out: usize,
-    makes: Makes,
+    makes: GroupRole,
     /// Where two axes are crossed, the titles of the rows and of the columns of panels, in markup: the groups fill the rows.
     pub crossed: Option<[Vec<String>; 2]>,
     /// The values, in markup, at which further axes are held where two are crossed.
@@ -129,7 +129,7 @@ pub struct Groups {
 
 /// The part of a figure that shows a group.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Makes {
+pub enum GroupRole {
     /// A panel.
     Panels,
     /// A line in each panel; groups of a family that does not depend on the bound on friction make one.
@@ -140,18 +140,18 @@ impl Groups {
     /// The groups of the rows of `survey`, of which each makes a panel over the `drawn` axes, and a sentence on axes that only change along.
     pub fn of_panels(survey: &Survey, drawn: &[&str]) -> Result<(Groups, Option<String>), PlotError> {
         let (further, along) = further(survey, drawn)?;
-        Ok((Groups::new(survey, &further, Makes::Panels)?, along))
+        Ok((Groups::new(survey, &further, GroupRole::Panels)?, along))
     }
 
     /// The groups of the rows of `survey` over `axes`, some of them, evenly chosen, where there are more than a figure shows; one group of
     /// all rows if there are too many to choose from. Two axes that vary independently make rows and columns of panels, also for pairs
     /// without rows.
-    pub fn new(survey: &Survey, axes: &[&str], makes: Makes) -> Result<Groups, PlotError> {
+    pub fn new(survey: &Survey, axes: &[&str], makes: GroupRole) -> Result<Groups, PlotError> {
         let found = keys(survey, axes, makes)?;
         if found.len() > MAX_GROUPS {
             return Ok(Groups::of(Vec::new(), vec![Group { values: Vec::new(), name: String::new() }], 1, makes));
         }
-        let most = if makes == Makes::Panels { MAX_PANELS } else { MAX_SERIES };
+        let most = if makes == GroupRole::Panels { MAX_PANELS } else { MAX_SERIES };
         let varying = varying(&found);
         let shown = choice(&found, most, makes).into_iter().map(|place| {
             let named =
@@ -161,7 +161,7 @@ impl Groups {
         });
         let axes = axes.iter().map(|&axis| axis.to_owned()).collect();
         let mut groups = Groups::of(axes, shown.collect(), found.len(), makes);
-        if makes == Makes::Panels {
+        if makes == GroupRole::Panels {
             groups.cross(survey, &found);
         }
         if groups.crossed.is_none() {
@@ -171,7 +171,7 @@ impl Groups {
     }
 
     /// Some groups of `all`, which are not crossed.
-    fn of(axes: Vec<String>, shown: Vec<Group>, all: usize, makes: Makes) -> Groups {
+    fn of(axes: Vec<String>, shown: Vec<Group>, all: usize, makes: GroupRole) -> Groups {
         let (places, left_out) = (places_of(&shown), all - shown.len());
         Groups { axes, shown, all, left_out, makes, crossed: None, held: Vec::new(), places }
     }
@@ -294,17 +294,18 @@ impl Groups {
     /// A note about omitted panels.
     pub fn note(&self) -> Option<String> {
         (self.left_out > 0).then(|| {
-            let what = if self.makes == Makes::Panels { "panels" } else { "lines" };
+            let what = if self.makes == GroupRole::Panels { "panels" } else { "lines" };
             let (shown, all) = (self.all - self.left_out, self.all);
             format!("{shown} of {all} {what} ({}); choose others with --where", self.axes.join(", "))
         })
     }
 }
 
-impl Makes {
+impl GroupRole {
     /// Makes the bound on friction NaN for a family that does not depend on it, where such rows are one line.
     fn merge(self, axes: &[impl AsRef<str>], values: &mut [f64]) {
-        let place = |axis: Quantity| axes.iter().position(|name| self == Makes::Lines && name.as_ref() == axis.name());
+        let place =
+            |axis: Quantity| axes.iter().position(|name| self == GroupRole::Lines && name.as_ref() == axis.name());
         let (Some(family), Some(bound)) = (place(Quantity::Family), place(Quantity::FrictionBound)) else { return };
         if !FAMILIES.get(values[family] as usize).is_some_and(|family| family.heeds_tau_ceiling()) {
             values[bound] = f64::NAN;
@@ -313,7 +314,7 @@ impl Makes {
 }
 
 /// The different values of `axes` in ascending order, those that are alike once; more than `MAX_GROUPS` if there are too many.
-fn keys(survey: &Survey, axes: &[&str], makes: Makes) -> Result<Vec<Vec<f64>>, PlotError> {
+fn keys(survey: &Survey, axes: &[&str], makes: GroupRole) -> Result<Vec<Vec<f64>>, PlotError> {
     let mut found: HashMap<Vec<u64>, Vec<f64>> = HashMap::new();
     let mut last: Vec<f64> = Vec::new();
     survey.each_while(axes, |cells| {
@@ -341,8 +342,8 @@ fn varying(found: &[Vec<f64>]) -> Vec<usize> {
 }
 
 /// The places of the groups that are shown, at most `most`: first merged lines.
-fn choice(found: &[Vec<f64>], most: usize, makes: Makes) -> Vec<usize> {
-    let is_kept = |place: &usize| makes == Makes::Lines && found[*place].iter().any(|value| value.is_nan());
+fn choice(found: &[Vec<f64>], most: usize, makes: GroupRole) -> Vec<usize> {
+    let is_kept = |place: &usize| makes == GroupRole::Lines && found[*place].iter().any(|value| value.is_nan());
     let (mut places, others): (Vec<usize>, Vec<usize>) = (0..found.len()).partition(is_kept);
     places.truncate(most);
     let room = most - places.len();

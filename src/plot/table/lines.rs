@@ -1,7 +1,7 @@
 //! Lines: columns over an axis, a panel for each column and a line for each group of the further axes.
 
 use super::cells::AxisCells;
-use super::groups::{self, Groups, Makes};
+use super::groups::{self, GroupRole, Groups};
 use super::survey::Survey;
 use crate::plot::colour;
 use crate::plot::figure::{Axis, Entry, Figure, Key, Layer, MAX_MARKED_POINTS, Panel};
@@ -38,7 +38,7 @@ pub struct Plan {
 
 /// Lines before they are drawn.
 #[derive(Debug)]
-pub struct Lined {
+pub struct LineFigure {
     /// The figure.
     pub figure: Figure,
     /// The group of each line.
@@ -79,7 +79,7 @@ struct Graph {
 }
 
 /// Draws the lines.
-pub fn lines(survey: &Survey, plan: &Plan) -> Result<Lined, PlotError> {
+pub fn lines(survey: &Survey, plan: &Plan) -> Result<LineFigure, PlotError> {
     let mut rows = Rows::read(survey, plan)?;
     let no_value =
         rows.groups.retain(&mut rows.lines, |line| line.ranges.iter().flatten().any(|(low, _)| !low.is_nan()));
@@ -118,7 +118,7 @@ pub fn lines(survey: &Survey, plan: &Plan) -> Result<Lined, PlotError> {
         panels: drawn.into_iter().map(|graph| rows.draw(graph, &leaders)).collect(),
         ..Figure::default()
     };
-    Ok(Lined { figure, groups: rows.groups, leaders, x })
+    Ok(LineFigure { figure, groups: rows.groups, leaders, x })
 }
 
 /// Whether a panel shows the gaps of families, whose logarithm is drawn: those of steps that have not arrived are negative, the others
@@ -134,7 +134,7 @@ impl Rows {
         let (mut further, along) = groups::further(survey, &[&plan.x])?;
         let are_scattered = groups::is_scattered(survey, &plan.x, &further)?;
         further.sort_by_key(|name| Some(*name) != plan.series.as_deref());
-        let groups = Groups::new(survey, &further, Makes::Lines)?;
+        let groups = Groups::new(survey, &further, GroupRole::Lines)?;
         let is_named = are_scattered && survey.rows <= MAX_NAMED_ROWS;
         let labels = if is_named { survey.label_columns() } else { Vec::new() };
         let cells = AxisCells::new(axis, MAX_PLACES);

@@ -45,7 +45,7 @@ pub struct Plan {
 
 /// A map before it is drawn: its figure, and what further layers need to know.
 #[derive(Debug)]
-pub struct Mapped {
+pub struct MapFigure {
     /// The figure.
     pub figure: Figure,
     /// The group of each panel.
@@ -57,7 +57,7 @@ pub struct Mapped {
 }
 
 /// The cells of one panel.
-struct Sheet {
+struct PanelCells {
     value: Vec<f64>,
     /// Place of the status plus one; 0 without a row.
     status: Vec<u8>,
@@ -81,12 +81,12 @@ struct Shading<'a> {
 }
 
 /// Draws the map.
-pub fn map(survey: &Survey, plan: &Plan) -> Result<Mapped, PlotError> {
+pub fn map(survey: &Survey, plan: &Plan) -> Result<MapFigure, PlotError> {
     let (mut groups, along) = Groups::of_panels(survey, &[&plan.x, &plan.y])?;
     let raster = Raster::new(survey, plan, &groups)?;
     let mut sheets = raster.read(survey, plan, &groups)?;
     // A group in which nothing has a value makes no panel.
-    let has_value = |sheet: &Sheet| sheet.value.iter().any(|value| !value.is_nan());
+    let has_value = |sheet: &PanelCells| sheet.value.iter().any(|value| !value.is_nan());
     let is_full = groups.crossed.is_some() || !sheets.iter().any(has_value);
     let no_value = groups.retain(&mut sheets, |sheet| is_full || has_value(sheet));
     let shading = Shading::new(survey, &plan.value, &sheets)?;
@@ -105,7 +105,7 @@ pub fn map(survey: &Survey, plan: &Plan) -> Result<Mapped, PlotError> {
     figure.colours = shading.colours;
     figure.notes.extend(along.into_iter().chain(no_value).chain(raster.note(plan)));
     let least = sheets.iter().map(|sheet| sheet.least).collect();
-    Ok(Mapped { figure, groups, least, cells: raster.cells })
+    Ok(MapFigure { figure, groups, least, cells: raster.cells })
 }
 
 impl Raster {
@@ -132,11 +132,12 @@ impl Raster {
     }
 
     /// The cells or dots of each panel.
-    fn read(&self, survey: &Survey, plan: &Plan, groups: &Groups) -> Result<Vec<Sheet>, PlotError> {
+    fn read(&self, survey: &Survey, plan: &Plan, groups: &Groups) -> Result<Vec<PanelCells>, PlotError> {
         let [columns, rows] = self.cells.each_ref().map(AxisCells::len);
         let count = if self.are_dots { 0 } else { columns * rows };
-        let empty = |_| Sheet { value: vec![f64::NAN; count], status: vec![0; count], dots: Vec::new(), least: None };
-        let mut sheets: Vec<Sheet> = groups.shown.iter().map(empty).collect();
+        let empty =
+            |_| PanelCells { value: vec![f64::NAN; count], status: vec![0; count], dots: Vec::new(), least: None };
+        let mut sheets: Vec<PanelCells> = groups.shown.iter().map(empty).collect();
         let is_named = self.are_dots && survey.rows <= MAX_NAMED_ROWS;
         let labels = if is_named { survey.label_columns() } else { Vec::new() };
         let axes: Vec<&str> = groups.axes.iter().map(String::as_str).collect();
@@ -171,7 +172,7 @@ impl Raster {
     }
 
     /// The dots of a panel and their names, or its cells on a hatched background.
-    fn layers(&self, sheet: &Sheet, shading: &Shading<'_>) -> Vec<Layer> {
+    fn layers(&self, sheet: &PanelCells, shading: &Shading<'_>) -> Vec<Layer> {
         if self.are_dots {
             let dot = |((at, _), &value): (&((f64, f64), String), &f64)| {
                 let shape = if shading.words.is_empty() { 0 } else { shading.shade(value) };
@@ -199,7 +200,7 @@ impl Raster {
 }
 
 impl Shading<'_> {
-    fn new<'a>(survey: &Survey, column: &'a str, sheets: &[Sheet]) -> Result<Shading<'a>, PlotError> {
+    fn new<'a>(survey: &Survey, column: &'a str, sheets: &[PanelCells]) -> Result<Shading<'a>, PlotError> {
         let words = survey.words(column);
         if !words.is_empty() {
             return Ok(Shading { column, words, colours: None });
@@ -239,7 +240,7 @@ impl Shading<'_> {
     }
 
     /// Entries for the words that occur, and for cells or dots without a value.
-    fn legend(&self, sheets: &[Sheet], are_dots: bool) -> Vec<Entry> {
+    fn legend(&self, sheets: &[PanelCells], are_dots: bool) -> Vec<Entry> {
         let has =
             |wanted: &dyn Fn(f64) -> bool| sheets.iter().any(|sheet| sheet.value.iter().any(|value| wanted(*value)));
         let words = self.words.iter().enumerate().map(|(place, word)| (place as f64, word));
@@ -276,7 +277,7 @@ fn is_scattered(rows: u64, axes: [&Values; 2]) -> bool {
 }
 
 /// What a hatched region is, from the status of its rows.
-fn nothing(sheets: &[Sheet]) -> String {
+fn nothing(sheets: &[PanelCells]) -> String {
     let mut seen = [false; Status::ALL.len() + 1];
     for sheet in sheets {
         for (value, &status) in sheet.value.iter().zip(&sheet.status) {
@@ -308,7 +309,7 @@ fn pixels(cells: &[AxisCells; 2], colour: impl Fn(usize) -> Option<[u8; 3]>) -> 
     image(sizes[0], &pixels)
 }
 
-fn hover(cells: &[AxisCells; 2], sheet: &Sheet, words: &[String], column: &str) -> Hover {
+fn hover(cells: &[AxisCells; 2], sheet: &PanelCells, words: &[String], column: &str) -> Hover {
     let mut all: Vec<String> = vec!["no row".to_owned()];
     all.extend(Status::ALL.iter().map(|status| status.name().to_owned()));
     let mut word = sheet.status.clone();

@@ -2,7 +2,7 @@
 
 use super::choice::Shape;
 use super::groups::Groups;
-use super::map::{self, Mapped};
+use super::map::{self, MapFigure};
 use super::{Scene, lines, plain};
 use crate::model::{Law, Transition};
 use crate::plot::canvas::Stroke;
@@ -68,7 +68,7 @@ pub fn draw(scene: &Scene<'_>, shape: &Shape) -> Result<Figure, PlotError> {
 
 /// A map of the strategy, with the durations at which it changes.
 fn strategies(scene: &Scene<'_>, plan: &map::Plan) -> Result<Figure, PlotError> {
-    let Mapped { mut figure, groups, cells, .. } = map::map(scene.survey, plan)?;
+    let MapFigure { mut figure, groups, cells, .. } = map::map(scene.survey, plan)?;
     let styles = [
         ("t_cross", Stroke::solid("#000", 0.9)),
         ("t_floor", Stroke { dashes: &[3.0, 1.6], ..Stroke::solid("#000", 0.9) }),

@@ -2,7 +2,7 @@
 
 use super::choice::Shape;
 use super::groups::Groups;
-use super::map::{self, Mapped};
+use super::map::{self, MapFigure};
 use super::{Scene, plain};
 use crate::model::Law;
 use crate::plot::PlotError;
@@ -15,7 +15,7 @@ const CURVE_STEPS: usize = 400;
 
 pub fn draw(scene: &Scene<'_>, shape: &Shape) -> Result<Figure, PlotError> {
     let Shape::Map(plan) = shape else { return plain(scene, shape) };
-    let Mapped { mut figure, groups, cells, .. } = map::map(scene.survey, plan)?;
+    let MapFigure { mut figure, groups, cells, .. } = map::map(scene.survey, plan)?;
     let mut velocities: [&str; 2] = [&plan.x, &plan.y];
     velocities.sort_unstable();
     if velocities != ["k", "v_f"] {

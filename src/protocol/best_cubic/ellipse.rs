@@ -5,13 +5,13 @@
 //! is the next. All that counts is on which side of a cut the place is, so the method finds a minimum inside the set, on
 //! its border and in its corners alike, to as many digits as the gradient has.
 
-use super::plane::{Place, Plane, moved};
+use super::plane::{Coefficients, Plane, moved};
 use crate::protocol::SolverStats;
 
 /// An ellipse: the images of the unit circle under `half`, about `centre`.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Ellipse {
-    pub centre: Place,
+    pub centre: Coefficients,
     half: [[f64; 2]; 2],
 }
 
@@ -21,7 +21,7 @@ pub(super) enum Outcome {
     /// Nothing is admissible.
     Empty,
     /// Close enough to the least work: an admissible place.
-    Close(Place),
+    Close(Coefficients),
     /// Not close after as many cuts as are allowed.
     Exhausted,
 }

@@ -37,7 +37,7 @@ const SHORTER: f64 = 0.2;
 
 /// A path seen from one of its ends: polynomials in the distance from there, `x` or `1 - x`, so that nothing is lost where
 /// it is short.
-struct Side {
+struct EndPolynomials {
     /// From the end, else from the start.
     from_end: bool,
     theta: [f64; 4],
@@ -52,8 +52,8 @@ struct Side {
     margin: [f64; 4],
 }
 
-impl Side {
-    fn of(path: &Path, bounded: bool, from_end: bool) -> Side {
+impl EndPolynomials {
+    fn of(path: &Path, bounded: bool, from_end: bool) -> EndPolynomials {
         let theta = path.exact_theta();
         let (one, zero) = (DoubleDouble::new(1.0), DoubleDouble::new(0.0));
         let theta_1 = path.ends.theta_1;
@@ -66,7 +66,7 @@ impl Side {
             let [c0, c1, c2, c3] = cubic.about(if from_end { 1.0 } else { 0.0 });
             if from_end { [c0, -c1, c2, -c3] } else { [c0, c1, c2, c3] }
         };
-        let mut side = Side {
+        let mut side = EndPolynomials {
             from_end,
             theta: about(&theta),
             rest: about(&rest),
@@ -92,7 +92,7 @@ struct Excess<'a> {
 
 impl Excess<'_> {
     /// The density at a distance from one side, and whether the optimum would hold there.
-    fn judge(&mut self, side: &Side, distance: f64) -> Option<(f64, bool)> {
+    fn judge(&mut self, side: &EndPolynomials, distance: f64) -> Option<(f64, bool)> {
         let at = |[c0, c1, c2, c3]: [f64; 4]| c0 + distance * (c1 + distance * (c2 + distance * c3));
         let time_left = self.t_f * if side.from_end { distance } else { 1.0 - distance };
         let (theta, rest, drop, margin) = (at(side.theta), at(side.rest), at(side.drop), at(side.margin));
@@ -110,7 +110,7 @@ impl Excess<'_> {
     }
 
     /// Where in its half of the way an optimum that holds leaves the bound, by bisection; `None` if it does so elsewhere.
-    fn kink(&mut self, side: &Side) -> Option<Option<f64>> {
+    fn kink(&mut self, side: &EndPolynomials) -> Option<Option<f64>> {
         let (mut held, mut free) = if side.from_end { (HALF, 0.0) } else { (0.0, HALF) };
         // With no time left nothing holds.
         if !self.judge(side, held)?.1 || (!side.from_end && self.judge(side, free)?.1) {
@@ -142,7 +142,7 @@ pub(super) fn over_optimum(
     let t_f = path.ends.t_f;
     let mut excess = Excess { transition, t_f, bounded, stats };
     let mut panels = Vec::new();
-    let sides = [false, true].map(|from_end| Side::of(path, bounded, from_end));
+    let sides = [false, true].map(|from_end| EndPolynomials::of(path, bounded, from_end));
     for side in &sides {
         let mut places = layers(side, t_f);
         // A hold at the start may be shorter than the distance of the first node from it; later, halves of a panel may agree
@@ -169,7 +169,7 @@ pub(super) fn over_optimum(
 
 /// Ends of panels that get shorter towards the end of a side as far as theta or the velocity may change there: by the slope
 /// of theta, and in the time in which contacts are renewed.
-fn layers(side: &Side, t_f: f64) -> Vec<f64> {
+fn layers(side: &EndPolynomials, t_f: f64) -> Vec<f64> {
     let [theta, slopes @ ..] = side.theta;
     let thin = theta / (theta + t_f + slopes.iter().map(|slope| slope.abs()).sum::<f64>());
     let mut places = vec![0.0, HALF];

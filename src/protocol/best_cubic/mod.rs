@@ -16,7 +16,7 @@ use super::{Solved, SolverStats, Status, optimal};
 use crate::model::Transition;
 use crate::numerics::elementary::ln;
 use ellipse::{Ellipse, Outcome, Until};
-use plane::{Bound, Place, Plane};
+use plane::{Bound, Coefficients, Plane};
 
 /// The best cubic shortcut of one transition in one time.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -104,13 +104,13 @@ pub fn solve(transition: &Transition, t_f: f64, bounded: bool, rtol: f64) -> Sol
 }
 
 /// The place of least work, and whether the velocity touches its least value there.
-struct Least {
-    place: Place,
+struct Minimum {
+    place: Coefficients,
     touches: bool,
 }
 
 /// Close in on the place of least work, coarsely and then, if it is not inside the set, to the end.
-fn least(rough: &Plane, plane: &Plane, a: f64, stats: &mut SolverStats) -> Result<Least, Status> {
+fn least(rough: &Plane, plane: &Plane, a: f64, stats: &mut SolverStats) -> Result<Minimum, Status> {
     let mut ellipse = Ellipse::around(rough).ok_or(Status::Infeasible)?;
     let start = match ellipse.close_in(rough, Until::Work(CLOSE * a.min(1.0)), stats) {
         Outcome::Empty => return Err(Status::Infeasible),
@@ -118,12 +118,12 @@ fn least(rough: &Plane, plane: &Plane, a: f64, stats: &mut SolverStats) -> Resul
         Outcome::Exhausted => return Err(Status::NotConverged),
     };
     if let Some(place) = newton::descend(plane, a, start, stats) {
-        return Ok(Least { place, touches: false });
+        return Ok(Minimum { place, touches: false });
     }
     let Outcome::Close(place) = ellipse.close_in(plane, Until::Rounding, stats) else {
         return Err(Status::NotConverged);
     };
-    let mut least = Least { place, touches: false };
+    let mut least = Minimum { place, touches: false };
     for condition in plane.conditions(place) {
         if condition.value <= NEAR * ellipse.span(condition.along).0 {
             match condition.of {

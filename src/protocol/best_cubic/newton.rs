@@ -1,6 +1,6 @@
 //! Newton's method from a place close to that of least work, inside the admissible set.
 
-use super::plane::{Place, Plane, moved};
+use super::plane::{Coefficients, Plane, moved};
 use crate::protocol::SolverStats;
 use crate::protocol::cubic::WorkDerivatives;
 
@@ -42,7 +42,7 @@ impl Newton {
 }
 
 /// Newton's method with halved steps. `None` where the descent runs into the border of the admissible set.
-pub(super) fn descend(plane: &Plane, a: f64, start: Place, stats: &mut SolverStats) -> Option<Place> {
+pub(super) fn descend(plane: &Plane, a: f64, start: Coefficients, stats: &mut SolverStats) -> Option<Coefficients> {
     let mut place = start;
     let mut here = plane.work_derivatives(place, stats);
     let mut before = f64::INFINITY;

@@ -8,7 +8,7 @@ use crate::protocol::cubic::{Basis, Landscape, Path, WorkDerivatives};
 
 /// Two coefficients of theta, those of [`Basis`], to 32 digits: near the border what is admissible may be thinner than
 /// the rounding of a double.
-pub(super) type Place = [DoubleDouble; 2];
+pub(super) type Coefficients = [DoubleDouble; 2];
 
 /// Shortcuts of one landscape that are no slower than a velocity, and whose theta stays above a floor.
 pub(super) struct Plane<'a> {
@@ -49,7 +49,7 @@ impl<'a> Plane<'a> {
     }
 
     /// The straight line between the ends.
-    pub fn line(&self) -> Place {
+    pub fn line(&self) -> Coefficients {
         let rise = self.landscape.ends().rise;
         [if self.basis == Basis::End { -rise } else { rise }, DoubleDouble::new(0.0)]
     }
@@ -63,7 +63,7 @@ impl<'a> Plane<'a> {
     }
 
     /// `a_2` and `a_3`.
-    pub fn coefficients(&self, [y_1, y_2]: Place) -> Place {
+    pub fn coefficients(&self, [y_1, y_2]: Coefficients) -> Coefficients {
         match self.basis {
             Basis::Start => [y_1, y_2],
             Basis::End => {
@@ -75,19 +75,19 @@ impl<'a> Plane<'a> {
     }
 
     /// The shortcut at a place.
-    pub fn path(&self, place: Place) -> Path<'a> {
+    pub fn path(&self, place: Coefficients) -> Path<'a> {
         let [a_2, a_3] = self.coefficients(place);
         self.landscape.path(a_2, a_3)
     }
 
     /// Work, gradient and Hessian at an admissible place.
-    pub fn work_derivatives(&self, place: Place, stats: &mut SolverStats) -> WorkDerivatives {
+    pub fn work_derivatives(&self, place: Coefficients, stats: &mut SolverStats) -> WorkDerivatives {
         self.landscape.work_derivatives(&self.path(place), self.basis, stats)
     }
 
     /// What must not be negative: theta above its floor and velocity above its least, where each is least, and the
     /// velocity at both ends.
-    pub fn conditions(&self, place: Place) -> [Condition; 4] {
+    pub fn conditions(&self, place: Coefficients) -> [Condition; 4] {
         let path = self.path(place);
         let mut theta = path.exact_theta();
         theta.c[0] = theta.c[0] - DoubleDouble::new(self.floor);
@@ -105,7 +105,7 @@ impl<'a> Plane<'a> {
     }
 
     /// Whether a place is admissible.
-    pub fn admits(&self, place: Place) -> bool {
+    pub fn admits(&self, place: Coefficients) -> bool {
         self.conditions(place).iter().all(Condition::holds)
     }
 }
@@ -121,6 +121,6 @@ impl Condition {
 }
 
 /// A place moved by a step.
-pub(super) fn moved(place: Place, step: [f64; 2]) -> Place {
+pub(super) fn moved(place: Coefficients, step: [f64; 2]) -> Coefficients {
     [place[0] + DoubleDouble::new(step[0]), place[1] + DoubleDouble::new(step[1])]
 }

@@ -5,8 +5,8 @@ use std::cell::Cell;
 use multiversion::multiversion;
 
 use super::Landscape;
-use super::bundle::{Bundle, Prepared, Space, prepare};
 use super::cells::Cells;
+use super::panel_batch::{NodeBuffer, PanelBatch, Prepared, prepare};
 use super::plan::{Block, Plan};
 use super::rules::NODE_STEP;
 use crate::numerics::gauss::primitive;
@@ -33,8 +33,8 @@ const ALL: usize = BINS + READY;
 
 /// A bundle, the places of its shortcuts, and the bin that it comes from once it is ready.
 #[derive(Debug, Clone, Copy)]
-struct Load {
-    bundle: Bundle,
+struct PendingBatch {
+    panel_batch: PanelBatch,
     indices: [usize; LANES],
     count: usize,
     bin: usize,
@@ -45,13 +45,13 @@ struct Load {
 /// All bins.
 #[derive(Debug, Clone)]
 pub(super) struct Bins {
-    loads: [Load; ALL],
+    loads: [PendingBatch; ALL],
     /// The load that each bin fills, then those that are ready, then empty ones.
     order: [usize; ALL],
     /// How many are ready.
     ready: usize,
     prepared: [Prepared; READY],
-    space: Space,
+    space: NodeBuffer,
     /// Plans of cells of the last landscape.
     pub cells: Cells,
 }
@@ -73,14 +73,14 @@ impl Bins {
     }
 
     fn new() -> Bins {
-        let load = Load { bundle: Bundle::EMPTY, indices: [0; LANES], count: 0, bin: 0, whole: false };
+        let load = PendingBatch { panel_batch: PanelBatch::EMPTY, indices: [0; LANES], count: 0, bin: 0, whole: false };
         let order = std::array::from_fn(|i| i);
         Bins {
             loads: [load; ALL],
             order,
             ready: 0,
             prepared: [Prepared::EMPTY; READY],
-            space: Space::EMPTY,
+            space: NodeBuffer::EMPTY,
             cells: Cells::EMPTY,
         }
     }
@@ -97,13 +97,13 @@ impl Bins {
         work: &mut [f64],
     ) {
         let bin = plan.bin[lane] as usize;
-        let Load { bundle, indices, count, .. } = &mut self.loads[self.order[bin]];
+        let PendingBatch { panel_batch, indices, count, .. } = &mut self.loads[self.order[bin]];
         let last = *count % LANES;
-        (bundle.a_2[last], bundle.a_3[last]) = (panel[0], panel[1]);
-        (bundle.low[last], bundle.high[last]) = (panel[2], panel[3]);
-        (bundle.side[last], bundle.gap[last]) = (plan.side[lane], plan.gap[lane]);
-        bundle.squarings[last] = plan.squarings[lane];
-        (bundle.from[last], bundle.to[last]) = (plan.from[lane], plan.to[lane]);
+        (panel_batch.a_2[last], panel_batch.a_3[last]) = (panel[0], panel[1]);
+        (panel_batch.low[last], panel_batch.high[last]) = (panel[2], panel[3]);
+        (panel_batch.side[last], panel_batch.gap[last]) = (plan.side[lane], plan.gap[lane]);
+        panel_batch.squarings[last] = plan.squarings[lane];
+        (panel_batch.from[last], panel_batch.to[last]) = (plan.from[lane], plan.to[lane]);
         indices[last] = index;
         *count = last + 1;
         if *count == LANES {
@@ -123,7 +123,7 @@ impl Bins {
         work: &mut [f64],
     ) {
         let load = &mut self.loads[self.order[BINS + self.ready]];
-        fill(&mut load.bundle, plan, first, a_2, a_3);
+        fill(&mut load.panel_batch, plan, first, a_2, a_3);
         load.indices.copy_from_slice(indices);
         (load.count, load.bin, load.whole) = (LANES, plan.bin[first] as usize, true);
         self.ready += 1;
@@ -157,10 +157,10 @@ impl Bins {
     fn sum(&mut self, of: &Landscape, work: &mut [f64]) {
         let ready = &self.order[BINS..BINS + std::mem::take(&mut self.ready)];
         for (&load, prepared) in ready.iter().zip(&mut self.prepared) {
-            prepare(&self.loads[load].bundle, &of.ends, &of.friction, prepared);
+            prepare(&self.loads[load].panel_batch, &of.ends, &of.friction, prepared);
         }
         for (&load, prepared) in ready.iter().zip(&self.prepared) {
-            let Load { indices, count, bin, whole, .. } = &mut self.loads[load];
+            let PendingBatch { indices, count, bin, whole, .. } = &mut self.loads[load];
             let works = prepared.works(primitive(nodes_of(*bin) as usize / 2), &mut self.space);
             let (count, first) = (std::mem::take(count), indices[0]);
             if *whole && indices.iter().enumerate().all(|(lane, &i)| i == first + lane) {
@@ -179,14 +179,14 @@ impl Bins {
     "x86_64+avx+avx2+bmi1+bmi2+avx512f+avx512bw+avx512cd+avx512dq+avx512vl",
     "x86_64+avx+avx2+bmi1+bmi2"
 ))]
-fn fill(bundle: &mut Bundle, plan: &Plan, first: usize, a_2: &Block, a_3: &Block) {
+fn fill(panel_batch: &mut PanelBatch, plan: &Plan, first: usize, a_2: &Block, a_3: &Block) {
     let lanes = first..first + LANES;
-    bundle.a_2.copy_from_slice(&a_2[lanes.clone()]);
-    bundle.a_3.copy_from_slice(&a_3[lanes.clone()]);
-    (bundle.low, bundle.high) = ([0.0; LANES], [1.0; LANES]);
-    bundle.side.copy_from_slice(&plan.side[lanes.clone()]);
-    bundle.gap.copy_from_slice(&plan.gap[lanes.clone()]);
-    bundle.squarings.copy_from_slice(&plan.squarings[lanes.clone()]);
-    bundle.from.copy_from_slice(&plan.from[lanes.clone()]);
-    bundle.to.copy_from_slice(&plan.to[lanes]);
+    panel_batch.a_2.copy_from_slice(&a_2[lanes.clone()]);
+    panel_batch.a_3.copy_from_slice(&a_3[lanes.clone()]);
+    (panel_batch.low, panel_batch.high) = ([0.0; LANES], [1.0; LANES]);
+    panel_batch.side.copy_from_slice(&plan.side[lanes.clone()]);
+    panel_batch.gap.copy_from_slice(&plan.gap[lanes.clone()]);
+    panel_batch.squarings.copy_from_slice(&plan.squarings[lanes.clone()]);
+    panel_batch.from.copy_from_slice(&plan.from[lanes.clone()]);
+    panel_batch.to.copy_from_slice(&plan.to[lanes]);
 }

@@ -36,7 +36,7 @@ pub(super) struct Frame {
 /// The plan of one cell.
 #[derive(Debug, Clone, Copy)]
 struct Cell {
-    place: Place,
+    place: CellKey,
     /// The age of its frame.
     age: u64,
     /// ln rho in units of that for which [`NODE_STEP`] nodes are enough, in powers of the distances from the middle: 1, `u`,
@@ -53,7 +53,7 @@ struct Cell {
 }
 
 /// Which cell: bits of the coordinates of its middle.
-type Place = [u64; 2];
+type CellKey = [u64; 2];
 
 /// Cells that are kept. Chosen: those of two or three lines of a map.
 const SLOTS: usize = 64;
@@ -127,12 +127,12 @@ impl Cells {
 
     /// Where a cell is kept.
     #[inline(always)]
-    fn slot([i, j]: Place) -> u32 {
+    fn slot([i, j]: CellKey) -> u32 {
         i.wrapping_mul(37).wrapping_add(j) as u32 % SLOTS as u32
     }
 
     #[inline(always)]
-    fn holds(&self, slot: u32, place: Place) -> bool {
+    fn holds(&self, slot: u32, place: CellKey) -> bool {
         let cell = &self.of[slot as usize];
         cell.place == place && cell.age == self.age
     }
@@ -140,7 +140,7 @@ impl Cells {
     /// Plans shortcuts, all feasible, from their cells.
     pub fn plan(&mut self, frame: &Frame, a_2: &Block, a_3: &Block, plan: &mut Plan) {
         let located = locate(frame.scale, a_2, a_3);
-        let (mut runs, mut count) = ([Run { from: 0, slot: 0 }; BLOCK], 0);
+        let (mut runs, mut count) = ([LaneRun { from: 0, slot: 0 }; BLOCK], 0);
         let (mut missing, mut lost) = ([[0; 2]; BLOCK], 0);
         // The cell before, and the one before the last of those that are missing.
         let (mut last, mut before) = (located.place(0), located.place(0));
@@ -150,7 +150,7 @@ impl Cells {
             starts &= starts - 1;
             let place = located.place(from as usize);
             let slot = Cells::slot(place);
-            runs[count] = Run { from, slot };
+            runs[count] = LaneRun { from, slot };
             count += 1;
             if !self.holds(slot, place) {
                 missing[lost] = place;
@@ -196,22 +196,22 @@ impl Cells {
 
 /// Neighbouring lanes of one cell, up to the next run.
 #[derive(Clone, Copy)]
-struct Run {
+struct LaneRun {
     from: u32,
     slot: u32,
 }
 
 /// The cells of shortcuts, and the distances from their middles.
-struct Located {
+struct CellOffsets {
     places: [[u64; BLOCK]; 2],
     local: [Block; 2],
     /// The lanes whose cell is not that of the lane before.
     starts: u32,
 }
 
-impl Located {
+impl CellOffsets {
     #[inline(always)]
-    fn place(&self, lane: usize) -> Place {
+    fn place(&self, lane: usize) -> CellKey {
         [self.places[0][lane], self.places[1][lane]]
     }
 }
@@ -220,8 +220,8 @@ impl Located {
     "x86_64+avx+avx2+bmi1+bmi2+avx512f+avx512bw+avx512cd+avx512dq+avx512vl",
     "x86_64+avx+avx2+bmi1+bmi2"
 ))]
-fn locate(scale: f64, a_2: &Block, a_3: &Block) -> Located {
-    let mut located = Located { places: [[0; BLOCK]; 2], local: [[0.0; BLOCK]; 2], starts: 1 };
+fn locate(scale: f64, a_2: &Block, a_3: &Block) -> CellOffsets {
+    let mut located = CellOffsets { places: [[0; BLOCK]; 2], local: [[0.0; BLOCK]; 2], starts: 1 };
     for ((places, local), a) in located.places.iter_mut().zip(&mut located.local).zip([a_2, a_3]) {
         for i in 0..BLOCK {
             let x = a[i] * scale;
@@ -262,7 +262,7 @@ fn bin(pace: f64, least: f64) -> u32 {
     "x86_64+avx+avx2+bmi1+bmi2+avx512f+avx512bw+avx512cd+avx512dq+avx512vl",
     "x86_64+avx+avx2+bmi1+bmi2"
 ))]
-fn assemble(cells: &[Cell; SLOTS], runs: &[Run], located: &Located, plan: &mut Plan) {
+fn assemble(cells: &[Cell; SLOTS], runs: &[LaneRun], located: &CellOffsets, plan: &mut Plan) {
     let from = |run: usize| runs.get(run).map_or(BLOCK, |run| run.from as usize);
     let cell = |run: usize| &cells[runs[run].slot as usize % SLOTS];
     let mut run = 0;
@@ -334,7 +334,7 @@ fn lowest(values: &[f32; BLOCK]) -> [f32; TOGETHER] {
     "x86_64+avx+avx2+bmi1+bmi2+avx512f+avx512bw+avx512cd+avx512dq+avx512vl",
     "x86_64+avx+avx2+bmi1+bmi2"
 ))]
-fn chart(frame: &Frame, cells: &[Place; TOGETHER]) -> [Cell; TOGETHER] {
+fn chart(frame: &Frame, cells: &[CellKey; TOGETHER]) -> [Cell; TOGETHER] {
     let Frame { ends, accuracy, scale } = frame;
     let middles = [0, 1].map(|k| std::array::from_fn(|c| f64::from_bits(cells[c][k]) - ONES));
     let (mut a_2, mut a_3) = (spread(middles[0]), spread(middles[1]));

@@ -1,6 +1,6 @@
 //! Whether friction falls below 0 on a shortcut.
 //!
-//! `tau = 1 + a ln(n/t_f) + (b - a) ln theta`. Least values of `n` and theta rule that out for most (`Floors`). Both
+//! `tau = 1 + a ln(n/t_f) + (b - a) ln theta`. Least values of `n` and theta rule that out for most (`FrictionBounds`). Both
 //! are linear in the coefficients, so for `b >= a` friction at every `x` is concave in them: what is not below 0 at both
 //! ends of a line is so nowhere on it. The rest is looked at one by one: the places where friction is stationary are
 //! roots of a polynomial of degree four.
@@ -16,7 +16,7 @@ use crate::protocol::Status;
 
 /// Values of `n` and theta above which friction is positive.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Floors {
+pub(super) struct FrictionBounds {
     pub n: f64,
     pub theta: f64,
 }
@@ -24,8 +24,8 @@ pub(super) struct Floors {
 /// What either logarithm may take of the friction of 1. Derived: a half, less what rounding costs.
 const HALF: f64 = 0.499;
 
-impl Floors {
-    pub fn new(law: Law, ends: &Ends) -> Floors {
+impl FrictionBounds {
+    pub fn new(law: Law, ends: &Ends) -> FrictionBounds {
         let Law { a, b } = law;
         let theta = if b > a {
             exp(-HALF / (b - a))
@@ -35,7 +35,7 @@ impl Floors {
         } else {
             f64::INFINITY
         };
-        Floors { n: ends.t_f * exp(-HALF / a), theta }
+        FrictionBounds { n: ends.t_f * exp(-HALF / a), theta }
     }
 
     /// Which of eight feasible shortcuts the floors do not settle, a bit for each.
@@ -66,7 +66,7 @@ impl Floors {
     "x86_64+avx+avx2+bmi1+bmi2+avx512f+avx512bw+avx512cd+avx512dq+avx512vl",
     "x86_64+avx+avx2+bmi1+bmi2"
 ))]
-fn bounds(floors: &Floors, ends: &Ends, a_2: &Lanes, a_3: &Lanes) -> Lanes {
+fn bounds(floors: &FrictionBounds, ends: &Ends, a_2: &Lanes, a_3: &Lanes) -> Lanes {
     let mut sure = [0.0; LANES];
     for i in 0..LANES {
         let path = Path::new(ends, a_2[i], a_3[i]);
@@ -80,16 +80,16 @@ fn bounds(floors: &Floors, ends: &Ends, a_2: &Lanes, a_3: &Lanes) -> Lanes {
 
 /// Shortcuts that are left open: consecutive ones, on a line in the plane or not.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Open {
+pub(super) struct UndecidedShortcuts {
     pub first: usize,
     pub count: usize,
     pub line: bool,
 }
 
-impl Open {
+impl UndecidedShortcuts {
     /// Gives those whose friction falls below 0 their status; `path` is the shortcut at a place.
     pub fn decide<'a>(&self, law: Law, path: impl Fn(usize) -> Path<'a>, status: &mut [Status]) {
-        let Open { first, count, line } = *self;
+        let UndecidedShortcuts { first, count, line } = *self;
         let is_negative = |i: usize| path(i).friction_min(law) < 0.0;
         if line && law.b >= law.a && !is_negative(first) && !is_negative(first + count - 1) {
             return;

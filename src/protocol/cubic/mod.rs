@@ -5,11 +5,11 @@
 //! (`rules`).
 
 mod bins;
-mod bundle;
 mod cells;
 mod friction;
 mod kernel;
 mod motion;
+mod panel_batch;
 mod path;
 mod plan;
 mod queue;
@@ -25,10 +25,10 @@ use crate::numerics::elementary::ln;
 use crate::numerics::gauss::rule;
 use crate::numerics::lanes::LANES;
 use bins::Bins;
-use bundle::Friction;
 use cells::Frame;
-use friction::{Floors, Open};
+use friction::{FrictionBounds, UndecidedShortcuts};
 use kernel::Slice;
+use panel_batch::Friction;
 pub(super) use path::{Ends, Path, rise};
 use queue::Queue;
 use rules::{Accuracy, Panel, Zeros, choose};
@@ -43,7 +43,7 @@ use works::Works;
 pub struct Landscape {
     law: Law,
     friction: Friction,
-    floors: Floors,
+    floors: FrictionBounds,
     ends: Ends,
     ln_t_f: f64,
     frame: Frame,
@@ -71,7 +71,7 @@ impl Landscape {
         Landscape {
             law: transition.law,
             friction: Friction::new(transition.law, &ends),
-            floors: Floors::new(transition.law, &ends),
+            floors: FrictionBounds::new(transition.law, &ends),
             ends,
             ln_t_f: ln(t_f),
             frame: Frame::new(&ends, &accuracy),
@@ -188,7 +188,7 @@ struct Evaluation<'a> {
     open: Queue<SEARCH>,
     works: Works<'a>,
     /// Shortcuts whose friction may be negative.
-    doubtful: Vec<Open>,
+    doubtful: Vec<UndecidedShortcuts>,
 }
 
 impl Evaluation<'_> {
@@ -200,7 +200,7 @@ impl Evaluation<'_> {
             return;
         }
         if !sound {
-            self.doubtful.push(Open { first, count: SPAN, line: true });
+            self.doubtful.push(UndecidedShortcuts { first, count: SPAN, line: true });
         }
         if first < self.v_min.len() {
             self.velocities_of_span(first, a_2, a_3);
@@ -223,7 +223,7 @@ impl Evaluation<'_> {
         }
         let unsure = self.of.floors.open(ends, &a_2_lanes, &a_3_lanes, &found);
         let unsure = block.clone().enumerate().filter(|(lane, _)| unsure & (1 << lane) != 0);
-        self.doubtful.extend(unsure.map(|(_, first)| Open { first, count: 1, line: false }));
+        self.doubtful.extend(unsure.map(|(_, first)| UndecidedShortcuts { first, count: 1, line: false }));
         if first < self.v_min.len() {
             let mut least = [0.0; LANES];
             let left = end_velocities(ends, &a_2_lanes, &a_3_lanes, &found, &mut least);

@@ -7,7 +7,7 @@
 
 use multiversion::multiversion;
 
-use super::friction::Floors;
+use super::friction::FrictionBounds;
 use super::path::{Ends, MAX_STEPS, Path};
 use crate::numerics::cubic::Cubic;
 use crate::numerics::lanes::{LANES, Lanes};
@@ -33,7 +33,7 @@ pub(super) struct Verdict {
 ///
 /// What is positive at both ends of a span is positive on all of it, and so is what is negative at both ends for the
 /// same `x`.
-pub(super) fn settle(ends: &Ends, floors: &Floors, a_2: &Stretch, a_3: &Stretch) -> [Option<Verdict>; SPANS] {
+pub(super) fn settle(ends: &Ends, floors: &FrictionBounds, a_2: &Stretch, a_3: &Stretch) -> [Option<Verdict>; SPANS] {
     let (mut first_2, mut first_3) = ([0.0; LANES], [0.0; LANES]);
     for span in 0..SPANS {
         for (lane, place) in [(span, span * SPAN), (span + SPANS, (span + 1) * SPAN - 1)] {
@@ -84,7 +84,7 @@ fn is_along(moving: &[f64], fixed: &[f64]) -> bool {
     "x86_64+avx+avx2+bmi1+bmi2+avx512f+avx512bw+avx512cd+avx512dq+avx512vl",
     "x86_64+avx+avx2+bmi1+bmi2"
 ))]
-fn verdicts(ends: &Ends, floors: &Floors, a_2: &Lanes, a_3: &Lanes) -> [Option<Verdict>; SPANS] {
+fn verdicts(ends: &Ends, floors: &FrictionBounds, a_2: &Lanes, a_3: &Lanes) -> [Option<Verdict>; SPANS] {
     // Where each of the three has its least value, and whether that is positive, or negative at the other end too.
     let (mut places, mut positive, mut negative) = ([[0.0; LANES]; 3], [[false; LANES]; 3], [[false; LANES]; 3]);
     // And whether the first two are above the values that friction needs.

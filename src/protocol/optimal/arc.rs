@@ -283,7 +283,7 @@ impl Arc {
     }
 
     /// The arc cut into equal pieces, in each of which few nodes yield the time from its ends to any place in it.
-    pub fn pieces(&self) -> Pieces {
+    pub fn pieces(&self) -> EqualSteps {
         let (start, length, count, slice) = match self.chart {
             Chart::Turning { theta_h, ln_theta_h, x_start, x_end, x_squares } => {
                 let (line, slice) = self.turning_line(theta_h, ln_theta_h, x_start, x_end, x_squares);
@@ -294,7 +294,7 @@ impl Arc {
                 (line.start, line.length, line.pieces(), Slice::Direct(slice))
             }
         };
-        let mut pieces = Pieces { start, length, count, slice };
+        let mut pieces = EqualSteps { start, length, count, slice };
         // As in `sums`, more of them where friction falls below b - a.
         let (mut time, friction_min) = pieces.whole();
         while friction_min <= self.law.b - self.law.a && pieces.count < MOST_PIECES {
@@ -351,7 +351,7 @@ impl<const N: usize> Line<N> {
 }
 
 /// An arc in equal pieces of its chart's coordinate.
-pub(super) struct Pieces {
+pub(super) struct EqualSteps {
     start: f64,
     /// From the start to the end, signed.
     pub length: f64,
@@ -366,7 +366,7 @@ enum Slice {
 }
 
 /// A place on an arc.
-pub(super) struct Place {
+pub(super) struct ArcPoint {
     pub theta: f64,
     pub ln_theta: f64,
     pub ln_u: f64,
@@ -381,7 +381,7 @@ const MOST_PIECES: u32 = 1024;
 /// Relative accuracy of the time within a piece.
 const PIECE_TOLERANCE: f64 = 1e-15;
 
-impl Pieces {
+impl EqualSteps {
     /// Time from one place to another of the same piece; places run from 0 at the start of the arc to 1 at its end.
     pub fn time(&self, from: f64, to: f64) -> f64 {
         self.sums(from, to).time
@@ -404,8 +404,8 @@ impl Pieces {
         }
     }
 
-    /// What is where, `place` as in [`Pieces::time`].
-    pub fn at(&self, place: f64) -> Place {
+    /// What is where, `place` as in [`EqualSteps::time`].
+    pub fn at(&self, place: f64) -> ArcPoint {
         let along = self.start + place * self.length;
         match &self.slice {
             Slice::Turning(slice) => {
@@ -414,12 +414,12 @@ impl Pieces {
                 let x2 = x * x;
                 let w = x * omega(&slice.law, slice.c_h, x2);
                 let (theta, ln_theta) = (slice.theta_h / (1.0 + x2), slice.ln_theta_h - ln_1p(x2));
-                Place { theta, ln_theta, ln_u: turning(w).ln_u }
+                ArcPoint { theta, ln_theta, ln_u: turning(w).ln_u }
             }
             Slice::Direct(slice) => {
                 let grow = exp(along);
                 let w = slice.sign * (2.0 * direct_e(&slice.law, slice.phi_a, slice.friction_a, along, grow)).sqrt();
-                Place { theta: slice.theta_a * grow, ln_theta: slice.ln_theta_a + along, ln_u: turning(w).ln_u }
+                ArcPoint { theta: slice.theta_a * grow, ln_theta: slice.ln_theta_a + along, ln_u: turning(w).ln_u }
             }
         }
     }

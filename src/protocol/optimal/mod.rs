@@ -20,7 +20,7 @@ use extremal::Problem;
 use lifetime::Lifetime;
 
 pub(super) use motion::Optimal as Route;
-pub(super) use route::{Site, Span, lag_at_bound};
+pub(super) use route::{PathPoint, PathSegment, lag_at_bound};
 
 /// How the optimal protocol starts.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]

@@ -1,6 +1,6 @@
 //! The optimal protocol over time: the hold, then the arc along the coordinate of its chart.
 
-use super::arc::{Arc, Pieces};
+use super::arc::{Arc, EqualSteps};
 use super::extremal::{Extremal, Problem};
 use super::lifetime::Lifetime;
 use crate::model::Law;
@@ -153,7 +153,7 @@ impl Floor {
 
 /// The arc with its time.
 pub(super) struct Timed {
-    pub pieces: Pieces,
+    pub pieces: EqualSteps,
     /// The conserved `C`.
     pub c: f64,
     /// When it begins.

@@ -10,7 +10,7 @@ use crate::protocol::control::{Extent, Jet, SpringBlock, Tolerance};
 
 /// A place on the protocol.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Site {
+pub enum PathPoint {
     /// On the hold, after this time.
     Held(f64),
     /// On the arc, from 0 at its start to 1 at its end.
@@ -19,7 +19,7 @@ pub enum Site {
 
 /// What happens between two places.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Span {
+pub struct PathSegment {
     /// Duration.
     pub time: f64,
     /// `int theta v dt`, the time less the growth of theta.
@@ -35,37 +35,37 @@ impl Optimal {
     }
 
     /// The place just after the start.
-    pub fn first(&self) -> Site {
-        if self.arc.is_some() && self.floor.time == 0.0 { Site::Moving(0.0) } else { Site::Held(0.0) }
+    pub fn first(&self) -> PathPoint {
+        if self.arc.is_some() && self.floor.time == 0.0 { PathPoint::Moving(0.0) } else { PathPoint::Held(0.0) }
     }
 
     /// The place just before the end.
-    pub fn last(&self) -> Site {
-        if self.arc.is_some() { Site::Moving(1.0) } else { Site::Held(self.t_f) }
+    pub fn last(&self) -> PathPoint {
+        if self.arc.is_some() { PathPoint::Moving(1.0) } else { PathPoint::Held(self.t_f) }
     }
 
     /// The place at a time after the start.
-    pub fn after(&self, time: f64) -> Site {
+    pub fn after(&self, time: f64) -> PathPoint {
         match &self.arc {
-            Some(arc) if time >= arc.start => Site::Moving(arc.place_after(time - arc.start)),
-            _ => Site::Held(time),
+            Some(arc) if time >= arc.start => PathPoint::Moving(arc.place_after(time - arc.start)),
+            _ => PathPoint::Held(time),
         }
     }
 
     /// The place at a time before the end.
-    pub fn before(&self, time: f64) -> Site {
+    pub fn before(&self, time: f64) -> PathPoint {
         match &self.arc {
-            Some(arc) if time <= arc.left[0] => Site::Moving(arc.place_before(time)),
-            _ => Site::Held(self.t_f - time),
+            Some(arc) if time <= arc.left[0] => PathPoint::Moving(arc.place_before(time)),
+            _ => PathPoint::Held(self.t_f - time),
         }
     }
 
     /// Velocity with its derivatives, and theta.
-    pub fn jet(&self, site: Site) -> Jet {
+    pub fn jet(&self, site: PathPoint) -> Jet {
         let (arc, place) = match (site, &self.arc) {
-            (Site::Moving(place), Some(arc)) => (arc, place),
-            (Site::Moving(_), None) => return self.held(self.t_f),
-            (Site::Held(time), _) => return self.held(time),
+            (PathPoint::Moving(place), Some(arc)) => (arc, place),
+            (PathPoint::Moving(_), None) => return self.held(self.t_f),
+            (PathPoint::Held(time), _) => return self.held(time),
         };
         let Law { a, b } = self.law;
         let here = arc.pieces.at(place);
@@ -91,45 +91,45 @@ impl Optimal {
     }
 
     /// When a place is reached.
-    pub fn time(&self, site: Site) -> f64 {
+    pub fn time(&self, site: PathPoint) -> f64 {
         match (site, &self.arc) {
-            (Site::Moving(place), Some(arc)) => arc.time(place),
-            (Site::Moving(_), None) => self.t_f,
-            (Site::Held(time), _) => time,
+            (PathPoint::Moving(place), Some(arc)) => arc.time(place),
+            (PathPoint::Moving(_), None) => self.t_f,
+            (PathPoint::Held(time), _) => time,
         }
     }
 
     /// Places between two, with them, between which the protocol is smooth and shows no detail much narrower.
-    pub fn landmarks(&self, from: Site, to: Site) -> Vec<Site> {
+    pub fn landmarks(&self, from: PathPoint, to: PathPoint) -> Vec<PathPoint> {
         let mut sites = vec![from];
-        if let Site::Held(start) = from {
-            let end = if let Site::Held(end) = to { end } else { self.floor.time };
+        if let PathPoint::Held(start) = from {
+            let end = if let PathPoint::Held(end) = to { end } else { self.floor.time };
             // Theta changes over its first value, and then over 1.
             let mut time = start;
             while time < end && sites.len() < MOST_MARKS {
                 time = (time + 0.5 * self.floor.from.aged(time).theta).min(end);
-                sites.push(Site::Held(time));
+                sites.push(PathPoint::Held(time));
             }
         }
-        if let (Site::Moving(end), Some(arc)) = (to, &self.arc) {
-            let start = if let Site::Moving(start) = from { start } else { 0.0 };
-            if let Site::Held(_) = from {
-                sites.push(Site::Moving(0.0));
+        if let (PathPoint::Moving(end), Some(arc)) = (to, &self.arc) {
+            let start = if let PathPoint::Moving(start) = from { start } else { 0.0 };
+            if let PathPoint::Held(_) = from {
+                sites.push(PathPoint::Moving(0.0));
             }
-            sites.extend(arc.parts(start, end).map(|(_, to)| Site::Moving(to)));
+            sites.extend(arc.parts(start, end).map(|(_, to)| PathPoint::Moving(to)));
         }
         sites
     }
 
     /// Least friction between two places: at one of them, or in between if it falls below 0 there.
-    pub fn friction_min(&self, from: Site, to: Site) -> f64 {
+    pub fn friction_min(&self, from: PathPoint, to: PathPoint) -> f64 {
         let mut least = f64::INFINITY;
-        if let Site::Held(start) = from {
+        if let PathPoint::Held(start) = from {
             // It rises all the way.
             least = 1.0 + self.law.b * self.floor.from.aged(start).ln;
         }
-        if let (Site::Moving(end), Some(arc)) = (to, &self.arc) {
-            let start = if let Site::Moving(start) = from { start } else { 0.0 };
+        if let (PathPoint::Moving(end), Some(arc)) = (to, &self.arc) {
+            let start = if let PathPoint::Moving(start) = from { start } else { 0.0 };
             let state = |place| {
                 let here = arc.pieces.at(place);
                 (here.theta, here.ln_u)
@@ -140,17 +140,17 @@ impl Optimal {
     }
 
     /// What happens from one place to a later one.
-    pub fn span(&self, from: Site, to: Site) -> Span {
-        let mut span = Span { time: 0.0, lag: 0.0, work: 0.0 };
-        if let Site::Held(start) = from {
-            let end = if let Site::Held(end) = to { end } else { self.floor.time };
+    pub fn span(&self, from: PathPoint, to: PathPoint) -> PathSegment {
+        let mut span = PathSegment { time: 0.0, lag: 0.0, work: 0.0 };
+        if let PathPoint::Held(start) = from {
+            let end = if let PathPoint::Held(end) = to { end } else { self.floor.time };
             let (now, time) = (self.floor.from.aged(start), end - start);
             span.time += time;
             span.lag += lag_at_bound(now.theta, time);
             span.work += floor::work(&self.law, now, time);
         }
-        if let (Site::Moving(end), Some(arc)) = (to, &self.arc) {
-            let start = if let Site::Moving(start) = from { start } else { 0.0 };
+        if let (PathPoint::Moving(end), Some(arc)) = (to, &self.arc) {
+            let start = if let PathPoint::Moving(start) = from { start } else { 0.0 };
             for (from, to) in arc.parts(start, end) {
                 let sums = arc.pieces.sums(from, to);
                 span.time += sums.time;
@@ -162,17 +162,17 @@ impl Optimal {
     }
 
     /// Takes the range of `v_c` between two places into `extent`, turns good to `rtol`.
-    pub fn control(&self, slider: &SpringBlock, from: Site, to: Site, rtol: f64, extent: &mut Extent) {
-        if let Site::Held(start) = from {
+    pub fn control(&self, slider: &SpringBlock, from: PathPoint, to: PathPoint, rtol: f64, extent: &mut Extent) {
+        if let PathPoint::Held(start) = from {
             // v_c = 1 + (b/k) theta'/theta falls all the way.
-            let end = if let Site::Held(end) = to { end } else { self.floor.time };
+            let end = if let PathPoint::Held(end) = to { end } else { self.floor.time };
             extent.add(slider.control(&self.held(start)));
             extent.add(slider.control(&self.held(end)));
         }
-        let (Site::Moving(end), Some(arc)) = (to, &self.arc) else { return };
-        let start = if let Site::Moving(start) = from { start } else { 0.0 };
+        let (PathPoint::Moving(end), Some(arc)) = (to, &self.arc) else { return };
+        let start = if let PathPoint::Moving(start) = from { start } else { 0.0 };
         let moment_at = |place| {
-            let jet = self.jet(Site::Moving(place));
+            let jet = self.jet(PathPoint::Moving(place));
             let bend = -(jet.rate * jet.v[0] + jet.theta * jet.v[1]);
             [slider.control(&jet), slider.control_rate(&jet, bend)]
         };

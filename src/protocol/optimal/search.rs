@@ -237,7 +237,7 @@ const HALVINGS: u32 = 30;
 struct Probed {
     extremal: Extremal,
     sums: Sums,
-    piece: Piece,
+    piece: SmoothInterval,
     value: f64,
 }
 
@@ -248,7 +248,7 @@ struct Family {
 
 /// Where the time depends smoothly on the parameter.
 #[derive(Clone, Copy, PartialEq)]
-struct Piece {
+struct SmoothInterval {
     /// Beyond `q_hold`.
     beyond: bool,
     /// Beyond `q = 0`.
@@ -257,9 +257,9 @@ struct Piece {
 }
 
 impl Family {
-    fn piece(&self, p: f64, time_at_floor: f64) -> Piece {
+    fn piece(&self, p: f64, time_at_floor: f64) -> SmoothInterval {
         let q_hold = self.q_hold.unwrap_or(0.0);
-        Piece { beyond: p > 0.0, turned: p + q_hold > 0.0, held: time_at_floor > 0.0 }
+        SmoothInterval { beyond: p > 0.0, turned: p + q_hold > 0.0, held: time_at_floor > 0.0 }
     }
 }
 

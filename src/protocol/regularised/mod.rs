@@ -10,7 +10,7 @@ mod motion;
 mod piece;
 
 use super::control::Extent;
-use super::optimal::{Route, Site, route};
+use super::optimal::{PathPoint, Route, route};
 use super::{Motion, Solved, SolverStats, SpringBlock, Status};
 use crate::model::Transition;
 use motion::Smooth;
@@ -76,7 +76,7 @@ pub fn motion(
 /// A part of the regularised optimum.
 enum Part {
     /// The optimum between two places.
-    Kept(Site, Site),
+    Kept(PathPoint, PathPoint),
     /// A smooth piece.
     Replaced(Piece),
 }
@@ -176,7 +176,7 @@ impl<F: FnMut(Part)> Sum<F> {
         self.replace(route, (route.first(), End::outer(v_i)), (leaving, at(leaving)), stats)?;
         let mut from = leaving;
         if let Some(corner) = route.corner().filter(|&corner| corner > delta_t && corner < t_f - delta_t) {
-            let start = Site::Held((corner - 0.5 * delta_t).max(delta_t));
+            let start = PathPoint::Held((corner - 0.5 * delta_t).max(delta_t));
             let end =
                 if corner + 0.5 * delta_t < t_f - delta_t { route.after(corner + 0.5 * delta_t) } else { arriving };
             self.keep(route, from, start);
@@ -188,7 +188,7 @@ impl<F: FnMut(Part)> Sum<F> {
     }
 
     /// Leaves the optimum as it is between two places.
-    fn keep(&mut self, route: &Route, from: Site, to: Site) {
+    fn keep(&mut self, route: &Route, from: PathPoint, to: PathPoint) {
         // Where two pieces meet, rounding alone may lie between them.
         if route.time(to) - route.time(from) <= 4.0 * f64::EPSILON * route.duration() {
             return;
@@ -202,8 +202,8 @@ impl<F: FnMut(Part)> Sum<F> {
     fn replace(
         &mut self,
         route: &Route,
-        (from, start): (Site, End),
-        (to, end): (Site, End),
+        (from, start): (PathPoint, End),
+        (to, end): (PathPoint, End),
         stats: &mut SolverStats,
     ) -> Result<(), Status> {
         let span = route.span(from, to);

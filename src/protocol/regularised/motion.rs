@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use super::Part;
-use crate::protocol::optimal::{Route, Site};
+use crate::protocol::optimal::{PathPoint, Route};
 use crate::protocol::profile::{Hermite, Resolution};
 use crate::protocol::{Jet, Moment, Motion, SpringBlock};
 
@@ -17,7 +17,7 @@ pub(super) struct Smooth {
 /// A part of the motion that is smooth.
 enum Stretch {
     /// The optimum between two places on the hold or on the arc.
-    Kept(Site, Site),
+    Kept(PathPoint, PathPoint),
     /// A panel of a piece, from one value of the piece's parameter to another; the piece begins at this time.
     Replaced { piece: Arc<Resolution<Hermite>>, begin: f64, from: f64, to: f64 },
 }
@@ -80,8 +80,8 @@ impl Motion for Smooth {
         match &self.stretches[k] {
             Stretch::Kept(from, to) => {
                 let site = match (*from, *to) {
-                    (Site::Held(from), Site::Held(to)) => Site::Held(mix(from, to, u)),
-                    (Site::Moving(from), Site::Moving(to)) => Site::Moving(mix(from, to, u)),
+                    (PathPoint::Held(from), PathPoint::Held(to)) => PathPoint::Held(mix(from, to, u)),
+                    (PathPoint::Moving(from), PathPoint::Moving(to)) => PathPoint::Moving(mix(from, to, u)),
                     (_, to) => to,
                 };
                 self.moment(self.route.time(site), &self.route.jet(site))

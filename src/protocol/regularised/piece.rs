@@ -14,7 +14,7 @@
 use crate::model::Law;
 use crate::numerics::elementary::{ln, ln_1p};
 use crate::protocol::control::{Extent, Tolerance};
-use crate::protocol::optimal::{Span, lag_at_bound};
+use crate::protocol::optimal::{PathSegment, lag_at_bound};
 use crate::protocol::profile::{Curve, Hermite, Problem, Resolution, Start, pass, reach};
 use crate::protocol::{Jet, SolverStats, SpringBlock, Status};
 
@@ -76,7 +76,7 @@ impl Piece {
     pub fn new(
         slider: &SpringBlock,
         (start, end): (&End, &End),
-        optimum: &Span,
+        optimum: &PathSegment,
         rtol: f64,
         stats: &mut SolverStats,
     ) -> Result<Piece, Status> {
@@ -93,7 +93,7 @@ impl Piece {
         floor: f64,
         slider: &SpringBlock,
         (start, end): (&End, &End),
-        &Span { time, lag, .. }: &Span,
+        &PathSegment { time, lag, .. }: &PathSegment,
         rtol: f64,
         stats: &mut SolverStats,
     ) -> Result<Piece, Status> {

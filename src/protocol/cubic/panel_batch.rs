@@ -17,7 +17,7 @@ use crate::numerics::lanes::{LANES, Lanes, Vector, least};
 /// Panels of eight shortcuts that share a number of nodes, each with its map `delta = side (gap - s^(2^squarings))` of
 /// the distance from an end of the panel.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Bundle {
+pub(super) struct PanelBatch {
     pub a_2: Lanes,
     pub a_3: Lanes,
     /// Bounds of the panel, of which one is an end of `[0, 1]`.
@@ -62,17 +62,17 @@ const MIN_WEAKENING: f64 = 1e-30;
 
 /// Room for the values at the nodes: sums and differences of those on both sides of the middle.
 #[derive(Debug, Clone)]
-pub(super) struct Space {
+pub(super) struct NodeBuffer {
     v_even: [Vector; MOST_HALF],
     v_odd: [Vector; MOST_HALF],
     g_even: [Vector; MOST_HALF],
     g_odd: [Vector; MOST_HALF],
 }
 
-impl Space {
-    pub const EMPTY: Space = {
+impl NodeBuffer {
+    pub const EMPTY: NodeBuffer = {
         let none = [Vector::splat(0.0); MOST_HALF];
-        Space { v_even: none, v_odd: none, g_even: none, g_odd: none }
+        NodeBuffer { v_even: none, v_odd: none, g_even: none, g_odd: none }
     };
 }
 
@@ -130,11 +130,11 @@ impl Prepared {
     };
 }
 
-impl Bundle {
+impl PanelBatch {
     /// Lanes without a shortcut.
-    pub const EMPTY: Bundle = {
+    pub const EMPTY: PanelBatch = {
         let none = [0.0; LANES];
-        Bundle {
+        PanelBatch {
             a_2: none,
             a_3: none,
             low: none,
@@ -151,7 +151,7 @@ impl Bundle {
 impl Prepared {
     /// The works, of which those of empty lanes have no meaning.
     #[inline(always)]
-    pub fn works(&self, rule: &Primitive, space: &mut Space) -> Lanes {
+    pub fn works(&self, rule: &Primitive, space: &mut NodeBuffer) -> Lanes {
         match self.kernel {
             Kernel::Squares => squares(self, rule, space),
             Kernel::Square => square(self, rule, space),
@@ -166,10 +166,10 @@ impl Prepared {
     "x86_64+avx+avx2+bmi1+bmi2+avx512f+avx512bw+avx512cd+avx512dq+avx512vl",
     "x86_64+avx+avx2+bmi1+bmi2"
 ))]
-pub(super) fn prepare(bundle: &Bundle, ends: &Ends, friction: &Friction, prepared: &mut Prepared) {
-    let [a_2, a_3, low, high] = [bundle.a_2, bundle.a_3, bundle.low, bundle.high].map(Vector);
-    let [side, gap, squarings] = [bundle.side, bundle.gap, bundle.squarings].map(Vector);
-    let [from, to] = [bundle.from, bundle.to].map(Vector);
+pub(super) fn prepare(panel_batch: &PanelBatch, ends: &Ends, friction: &Friction, prepared: &mut Prepared) {
+    let [a_2, a_3, low, high] = [panel_batch.a_2, panel_batch.a_3, panel_batch.low, panel_batch.high].map(Vector);
+    let [side, gap, squarings] = [panel_batch.side, panel_batch.gap, panel_batch.squarings].map(Vector);
+    let [from, to] = [panel_batch.from, panel_batch.to].map(Vector);
     let (t_f, rise) = (ends.t_f, ends.rise.high);
     let [none, unit] = [0.0, 1.0].map(Vector::splat);
     // The polynomials are expanded about the end that the map grows from, of a part about that of `[0, 1]`.
@@ -242,7 +242,7 @@ macro_rules! kernels {
             "x86_64+avx+avx2+bmi1+bmi2+avx512f+avx512bw+avx512cd+avx512dq+avx512vl",
             "x86_64+avx+avx2+bmi1+bmi2"
         ))]
-        fn $name(prepared: &Prepared, rule: &Primitive, space: &mut Space) -> Lanes {
+        fn $name(prepared: &Prepared, rule: &Primitive, space: &mut NodeBuffer) -> Lanes {
             sum::<$most, $same>(prepared, rule, space)
         }
     )*};
@@ -261,8 +261,8 @@ kernels! {
 
 /// The works where no map squares more than `SQUARINGS` times, and all as often as that if they are the `SAME`.
 #[inline(always)]
-fn sum<const SQUARINGS: u32, const SAME: bool>(prepared: &Prepared, rule: &Primitive, space: &mut Space) -> Lanes {
-    let Space { v_even, v_odd, g_even, g_odd } = space;
+fn sum<const SQUARINGS: u32, const SAME: bool>(prepared: &Prepared, rule: &Primitive, space: &mut NodeBuffer) -> Lanes {
+    let NodeBuffer { v_even, v_odd, g_even, g_odd } = space;
     let Prepared { theta, n, slope, drive, tau, gap, squarings, middle, half, unit, scale, .. } = *prepared;
     let count = rule.x.len().min(MOST_HALF);
     let mut mean = Vector::splat(0.0);
