@@ -16,6 +16,7 @@ mod grid;
 mod identity;
 mod init;
 mod labels;
+mod names;
 mod output;
 mod plot;
 mod properties;

@@ -35,6 +35,10 @@ impl Key {
     pub fn new(table: &str, column: &str, regime: &str) -> Key {
         Key { table: table.to_owned(), column: column.to_owned(), regime: regime.to_owned() }
     }
+
+    pub fn table(&self) -> &str {
+        &self.table
+    }
 }
 
 impl Display for Key {

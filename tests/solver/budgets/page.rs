@@ -31,10 +31,10 @@ pub fn write(ledger: &Ledger, points: &Points) {
     fs::write(path(), filled(&text, ledger, points)).expect("is writable");
 }
 
-/// The page with every block between `<!-- BEGIN budgets of TABLE -->` and `<!-- END -->` written again.
+/// The page with the block of every measured table, between `<!-- BEGIN budgets of TABLE -->` and `<!-- END -->`, from the budgets.
 fn filled(text: &str, ledger: &Ledger, points: &Points) -> String {
     let mut text = text.to_owned();
-    for known in &KNOWN {
+    for known in KNOWN.iter().filter(|known| points.keys().any(|(table, _)| *table == known.table)) {
         let begin = format!("<!-- BEGIN budgets of {} -->\n", known.table);
         let (before, rest) = text.split_once(&begin).unwrap_or_else(|| panic!("no {begin}in docs/accuracy.md"));
         let (_, after) = rest.split_once("<!-- END -->").expect("every block has an end");

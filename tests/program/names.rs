@@ -1,0 +1,98 @@
+//! The names of the contract: old ones are gone.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+/// The list of old names, relative to the repository.
+const LIST: &str = "tests/program/old_names.txt";
+
+/// The history, which may use every name.
+const HISTORY: &str = "CHANGELOG.md";
+
+/// A name that a version before had.
+#[derive(Debug)]
+struct OldName<'a> {
+    name: &'a str,
+    replacement: &'a str,
+    /// Files that may have it.
+    allowed: Vec<&'a str>,
+}
+
+impl<'a> OldName<'a> {
+    /// The entry of a line of the list.
+    fn parse(line: &'a str) -> OldName<'a> {
+        let (name, rest) = line.split_once(" -> ").unwrap_or_else(|| panic!("{LIST}: `{line}` is not OLD -> NEW"));
+        let (replacement, allowed) = rest.split_once(": ").unwrap_or((rest, ""));
+        OldName { name, replacement, allowed: allowed.split_whitespace().collect() }
+    }
+
+    /// The lines of `text` that have the name, from 1.
+    fn lines(&self, text: &str) -> Vec<usize> {
+        text.lines().zip(1..).filter(|(line, _)| self.is_in(line)).map(|(_, number)| number).collect()
+    }
+
+    fn is_in(&self, line: &str) -> bool {
+        line.match_indices(self.name).any(|(start, found)| {
+            let (before, after) = (&line[..start], &line[start + found.len()..]);
+            let starts = !found.starts_with(is_of_identifier) || !before.ends_with(is_of_identifier);
+            starts && (!found.ends_with(is_of_identifier) || !after.starts_with(is_of_identifier))
+        })
+    }
+}
+
+fn is_of_identifier(letter: char) -> bool {
+    letter.is_alphanumeric() || letter == '_'
+}
+
+/// The tracked files, relative to the repository; those of a source package without `git`.
+fn tracked() -> Vec<PathBuf> {
+    let repository = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let listed = Command::new("git").args(["ls-files", "-z"]).current_dir(repository).output().expect("git runs");
+    assert!(listed.status.success(), "{}", String::from_utf8_lossy(&listed.stderr));
+    let listed = String::from_utf8(listed.stdout).expect("names are text");
+    // A file that is deleted and not committed yet is still listed.
+    listed.split_terminator('\0').map(PathBuf::from).filter(|path| repository.join(path).is_file()).collect()
+}
+
+#[test]
+fn old_names_are_gone() {
+    let repository = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let list = fs::read_to_string(repository.join(LIST)).expect("is readable");
+    let entries = list.lines().filter(|line| !line.is_empty() && !line.starts_with('#'));
+    let old: Vec<OldName<'_>> = entries.map(OldName::parse).collect();
+    assert!(old.len() >= 20, "{old:?}");
+    let mut found = Vec::new();
+    // Seeds of the fuzzer are specs of any kind.
+    for path in tracked().iter().filter(|path| !path.starts_with("fuzz/corpus")) {
+        let name = path.to_string_lossy();
+        if [LIST, HISTORY].contains(&&*name) {
+            continue;
+        }
+        // Of files that are no text, the name alone.
+        let text = String::from_utf8(fs::read(repository.join(path)).expect("is readable")).unwrap_or_default();
+        for old in old.iter().filter(|old| !old.allowed.contains(&&*name)) {
+            let line = |number: usize| format!("{name}:{number}: {} is now {}", old.name, old.replacement);
+            found.extend(old.lines(&text).into_iter().map(line));
+            if old.is_in(&name) {
+                found.push(format!("{name}: {} is now {}", old.name, old.replacement));
+            }
+        }
+    }
+    assert!(found.is_empty(), "{} old names:\n{}", found.len(), found.join("\n"));
+    let idle = old.iter().flat_map(|old| old.allowed.iter().map(move |file| (old, *file)));
+    let idle =
+        idle.filter(|(old, file)| old.lines(&fs::read_to_string(repository.join(file)).unwrap_or_default()).is_empty());
+    let idle: Vec<String> = idle.map(|(old, file)| format!("{file} has no `{}`", old.name)).collect();
+    assert!(idle.is_empty(), "{LIST}: allowances that nothing needs:\n{}", idle.join("\n"));
+}
+
+/// The rule for whole identifiers can fail.
+#[test]
+fn a_name_is_a_whole_identifier_and_a_quoted_one_as_it_stands() {
+    let is_in = |name: &str, line: &str| OldName { name, replacement: "", allowed: Vec::new() }.is_in(line);
+    assert!(is_in("swift", "[tables.swift]") && is_in("swift", "src/protocol/swift/mod.rs"));
+    assert!(!is_in("swift", "swift_friction") && !is_in("swift", "swiftly"));
+    assert!(is_in("tables.best", "[tables.best]") && !is_in("tables.best", "[tables.best_cubic]"));
+    assert!(is_in("`hold`", "the strategy `hold`.") && !is_in("`hold`", "hold"));
+}
