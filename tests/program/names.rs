@@ -45,7 +45,7 @@ fn is_of_identifier(letter: char) -> bool {
     letter.is_alphanumeric() || letter == '_'
 }
 
-/// The tracked files, relative to the repository; those of a source package without `git`.
+/// The tracked files, relative to the repository.
 fn tracked() -> Vec<PathBuf> {
     let repository = Path::new(env!("CARGO_MANIFEST_DIR"));
     let listed = Command::new("git").args(["ls-files", "-z"]).current_dir(repository).output().expect("git runs");
