@@ -451,3 +451,21 @@ fn single_materials_are_symbols_of_their_outcome() {
     assert_eq!(svg.matches("<circle").count(), 3);
     assert!(!svg.contains("<image") && !words.contains("no row"), "{words}");
 }
+
+/// Lines over an axis are named by the labels of their points, also on request.
+#[test]
+fn regress_a_label_as_colour_names_lines() {
+    let folder = tempfile::tempdir().expect("is writable");
+    let folder = folder.path();
+    fs::write(folder.join("points.csv"), "material,a,b\ngranite,0.01,0.015\nquartz,0.02,0.03\n").expect("is writable");
+    let spec = "name = \"labels\"\npoints = \"points.csv\"\n[axes]\nt_f = [0.02, 0.05, 0.1]\nv_i = 3.0\nv_f = 100.0\n\
+                [tables.optimal]\n";
+    fs::write(folder.join("labels.toml"), spec).expect("is writable");
+    shown(folder, &["run", "labels.toml", "--quiet"]);
+    let lines = ["plot", "results/labels", "--table", "optimal", "--x", "t_f", "--y", "work", "--out", "lines.svg"];
+    shown(folder, &lines);
+    let plain = read(folder, "lines.svg");
+    shown(folder, &[&lines[..], &["--color", "material"]].concat());
+    let words = words(&plain);
+    assert!(read(folder, "lines.svg") == plain && words.contains("granite") && words.contains("quartz"), "{words}");
+}

@@ -47,6 +47,9 @@ pub fn choose(survey: &Survey, defaults: &Defaults, request: &Request) -> Result
         let x = x.filter(|x| x != y).ok_or_else(|| choice.one_row())?;
         return choice.map(x, y.to_owned());
     }
+    // Lines are named by their labels, with or without a request.
+    let is_label = |name: &&str| y.is_some() && survey.labels.iter().any(|(label, _)| label == name);
+    let colour = colour.filter(|colour| !is_label(colour));
     let wants_map = colour.filter(|colour| !is_axis(colour));
     let wants_lines = y.is_some() || colour.is_some_and(|colour| is_axis(&colour));
     if !wants_lines && let Some((x, y)) = choice.two_axes(wants_map.is_some())? {
