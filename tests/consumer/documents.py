@@ -78,7 +78,7 @@ def run_page(page, variables, write):
             if code not in printed:
                 if not write:
                     sys.exit(f"{name}: this output is not printed:\n{code}\nprinted:\n{printed}")
-                text = text.replace(f"```text\n{code}```", f"```text\n{output}```")
+                text = text.replace(f"```text\n{code}```", f"```text\n{output}```", 1)
                 page.write_text(text)
                 print(f"{name}: output replaced")
         for picture in re.findall(r"\]\((?:\.\./)*(?:docs/)?pictures/([\w.-]+)\)", text):
