@@ -28,7 +28,7 @@ pub struct Arguments {
     /// Processors of a task
     #[arg(long, value_name = "K", default_value_t = 1, value_parser = clap::value_parser!(u64).range(1..=1024))]
     cpus: u64,
-    /// Least minutes of work of a task, as predicted
+    /// Least predicted work of a task, in minutes
     #[arg(long, value_name = "M", default_value_t = 5.0, value_parser = minutes)]
     minutes: f64,
 }

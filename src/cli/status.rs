@@ -17,7 +17,7 @@ use crate::sweep::{Plan, Sweep, shards_with};
 pub struct Arguments {
     /// Folder of the dataset, such as results/NAME
     dataset: PathBuf,
-    /// Check every bit of every part, not its footer alone
+    /// Check every bit of every part, instead of its footer
     #[arg(long)]
     check: bool,
 }

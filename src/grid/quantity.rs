@@ -249,7 +249,7 @@ mod tests {
 
     #[test]
     fn texts_of_ranges_name_their_ends() {
-        let book = include_str!("../../docs/specs.md");
+        let book = include_str!("../../docs/spec.md");
         for quantity in Quantity::ALL.into_iter().filter(|quantity| quantity.words().is_empty()) {
             let domain = quantity.domain();
             let (least, is_excluded) = domain.least();

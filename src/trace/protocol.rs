@@ -198,7 +198,7 @@ fn optimum(case: &Case, bounded: bool, rtol: f64) -> Result<TracedPath, Absence>
     };
     let parameters = vec![
         Parameter::new("hamiltonian", value.hamiltonian, "mu_0 sigma v_0", "dW*/dt_f"),
-        Parameter::new("time_at_floor", value.time_at_floor, "l/v_0", "time spent on the bound v = 1"),
+        Parameter::new("time_at_floor", value.time_at_floor, "l/v_0", "time spent on the velocity floor v = 1"),
     ];
     Ok(TracedPath { motion, status: solved.status, work: value.work, parameters })
 }

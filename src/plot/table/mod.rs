@@ -31,7 +31,7 @@ pub struct Request {
     pub x: Option<String>,
     /// Vertical axis, or the column of lines.
     pub y: Option<String>,
-    /// Column of a map's colours, or the axis that distinguishes lines.
+    /// Colour column of a map, or the axis that distinguishes lines.
     pub colour: Option<String>,
 }
 
@@ -161,7 +161,7 @@ const KINDS: [Kind; 12] = [
     },
     Kind {
         table: "step_response",
-        title: "What becomes of the response to a step",
+        title: "Outcome of the step response",
         defaults: Defaults {
             classes: &["outcome", "stick_slip"],
             value: &["v_peak", "cycle_peak", "outcome"],
