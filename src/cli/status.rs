@@ -79,7 +79,7 @@ fn counts(survey: &Survey) -> String {
     words::aligned(&lines, 2)
 }
 
-/// What is wrong, one by one.
+/// The damaged and foreign parts.
 fn faults(folder: &Folder, survey: &Survey) -> String {
     let tables = || survey.tables.iter();
     let missing = tables().filter(|table| !table.missing.is_empty()).map(|table| {
