@@ -20,7 +20,7 @@ pub fn shown(text: &str, most: usize) -> Cow<'_, str> {
     shown.into()
 }
 
-/// What others call some of our names: their words, in lower case, after ours.
+/// Synonyms of our names in other tools, in lower case.
 const SYNONYMS: [(&str, &[&str]); 13] = [
     ("threads", &["jobs", "j", "cores", "workers", "cpus", "processes", "parallel"]),
     ("out", &["output", "output_dir", "outdir", "dir", "dest", "to"]),
@@ -58,7 +58,7 @@ pub fn nearest<'a>(name: &str, known: impl IntoIterator<Item = &'a str>) -> Opti
     near.min_by_key(|(distance, _)| *distance).map(|(_, candidate)| candidate)
 }
 
-/// What to do about `name`, which is none of `known`.
+/// The help for `name`, which is not in `known`.
 #[cfg(any(feature = "plot", feature = "query"))]
 pub fn hint<'a>(name: &str, known: impl IntoIterator<Item = &'a str>) -> String {
     match nearest(name, known) {

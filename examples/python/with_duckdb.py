@@ -30,6 +30,6 @@ for b, v_f, t_cross, first in database.execute(crossover).fetchall():
     print(f"crossover: b={b} v_f={v_f:.6g} t_cross={t_cross:.6f} first={first:.6f}")
 
 # Which material falls into stick-slip: the stiffest spring that does, at each final velocity.
-stiffest = "SELECT v_f, count(*), max(k) FROM step WHERE stick_slip GROUP BY v_f ORDER BY v_f"
+stiffest = "SELECT v_f, count(*), max(k) FROM step_response WHERE stick_slip GROUP BY v_f ORDER BY v_f"
 for v_f, springs, k in database.execute(stiffest).fetchall():
     print(f"stick-slip: v_f={v_f:.6g} springs={springs} stiffest={k:.6g}")

@@ -19,7 +19,7 @@ use crate::sweep::{check_name, schema};
 pub struct Arguments {
     /// Name of the dataset; the spec is written to NAME.toml
     name: PathBuf,
-    /// What to ask
+    /// The question of the spec
     #[arg(long, value_enum, default_value_t = Question::Landscape)]
     question: Question,
 }
@@ -29,9 +29,9 @@ pub struct Arguments {
 enum Question {
     /// How close do cubic shortcuts come to the protocol of least work?
     Landscape,
-    /// From which duration on does the best protocol slow down first, and wait?
+    /// From which duration on does the optimal protocol slow down first?
     Crossover,
-    /// Which shortcut costs least for which duration, under a bound on friction?
+    /// Which shortcut costs least at each duration, under a friction ceiling?
     Families,
     /// On which spring does sliding end in stick-slip?
     StickSlip,

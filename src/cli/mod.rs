@@ -79,40 +79,40 @@ struct Arguments {
 
 #[derive(Debug, Subcommand)]
 enum Command {
-    /// Write a commented spec to start from
+    /// Write a commented spec
     Init(init::Arguments),
-    /// Compute the tables of a spec; a run that was stopped goes on where it was
+    /// Compute the tables of a spec, or continue a stopped run
     Run(run::Arguments),
-    /// Say what a spec would compute, and estimate time and size
+    /// Count the rows of a spec, and estimate time and size
     Plan(plan::Arguments),
-    /// Show one protocol over time: v, theta, friction
+    /// Show one protocol over time: v, theta, tau
     Trace(trace::Arguments),
-    /// Say what is in a dataset: rows by status, ranges of the columns, least gaps
+    /// Summarise a dataset: rows by status, ranges of the columns, least gaps
     Summary(summary::Arguments),
     /// Show the first rows of a table
     Head(head::Arguments),
-    /// Ask a dataset a question in SQL
+    /// Answer a question in SQL
     Query(query::Arguments),
     /// Report complete, missing, damaged and foreign parts of a dataset
     Status(status::Arguments),
-    /// Write the job script of a sweep in fractions, for a scheduler, and say what to submit
+    /// Write the job script of a sharded sweep, and print the command that submits it
     Shards(shards::Arguments),
-    /// Draw a picture as SVG, PNG or PDF
+    /// Draw pictures of a dataset or of traces, as SVG, PNG or PDF
     Plot(plot::Arguments),
-    /// Write a page of HTML with the pictures and the summary of a dataset
+    /// Write an HTML page with the pictures and the summary of a dataset
     Report(report::Arguments),
-    /// Solve a sample of the rows of a dataset again by an independent method, and compare
+    /// Solve a sample of rows by an independent method, and report the differences
     Verify(verify::Arguments),
     /// List all tables or one, with columns and units
     Tables(tables::Arguments),
-    /// Print the JSON Schema of a spec, with which editors complete and check specs
+    /// Print the JSON Schema of a spec, for completion and checks in editors
     #[command(after_help = "Example:
   slipsweep schema > slipsweep.schema.json
 
 With `#:schema ./slipsweep.schema.json` as its first line, a spec in its folder is completed and checked by editors that
 use taplo, such as VS Code with Even Better TOML. `slipsweep init` writes both.")]
     Schema,
-    /// Print what makes a shell complete commands and flags
+    /// Print the completion script of a shell
     Completions(completions::Arguments),
     /// Print the manual page of the program or of a command
     Man(man::Arguments),

@@ -20,10 +20,10 @@ pub trait Format: ValueEnum + Copy + PartialEq + Send + Sync + 'static {
 /// The arguments that say where and how.
 #[derive(Debug, clap::Args)]
 pub struct Output<F: Format> {
-    /// How to write it; by default what the name of the file ends in, or a table
+    /// Output format [default: by the ending of the file, else table]
     #[arg(long)]
     format: Option<F>,
-    /// Where to write it; - is standard output
+    /// Output file; - is standard output
     #[arg(short, long, value_name = "FILE", default_value = "-", hide_default_value = true)]
     pub out: PathBuf,
 }

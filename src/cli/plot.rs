@@ -18,12 +18,12 @@ use crate::sweep::units_of;
   slipsweep plot results/landscape --format png --out pictures
   slipsweep plot results/landscape --table gap --where t_f=0.02 --out gap.pdf
   slipsweep plot results/crossover --table crossover --x v_f --y b --color t_floor --where v_i=1.1
-  slipsweep plot optimal.csv best.csv --out protocols.png")]
+  slipsweep plot optimal.csv best_cubic.csv --out protocols.png")]
 pub struct Arguments {
-    /// Folder of a dataset, such as results/NAME, or traces that `slipsweep trace` wrote (.csv, .parquet)
+    /// Folder of a dataset, such as results/NAME, or traces of `slipsweep trace` (.csv, .parquet)
     #[arg(required = true, value_name = "DATASET|TRACE")]
     sources: Vec<PathBuf>,
-    /// The table; by default each of the dataset has its picture
+    /// The table [default: every table, a picture each]
     #[arg(long, value_name = "NAME")]
     table: Option<String>,
     /// Rows to show, such as "a=0.03, v_f>=10"
@@ -32,19 +32,19 @@ pub struct Arguments {
     /// Horizontal axis
     #[arg(long, value_name = "AXIS")]
     x: Option<String>,
-    /// Vertical axis of a map, or the column that lines show
+    /// Vertical axis of a map, or the column of lines
     #[arg(long, value_name = "AXIS|COLUMN")]
     y: Option<String>,
-    /// Column of a map's colours, or the axis that distinguishes lines
+    /// Colour column of a map, or the axis that distinguishes lines
     #[arg(long, visible_alias = "colour", value_name = "COLUMN|AXIS")]
     color: Option<String>,
-    /// A file, whose ending determines the format (.svg, .png, .pdf), or a folder [default: here, by the name of the dataset and the table]
+    /// A file that ends in .svg, .png or .pdf, or a folder [default: NAME-TABLE.svg]
     #[arg(short, long, value_name = "FILE|DIR")]
     out: Option<PathBuf>,
     /// Format of the pictures in a folder [default: svg]
     #[arg(long, value_name = "FORMAT", value_enum)]
     format: Option<Format>,
-    /// Width in millimetres: 89 for one column of a journal, 183 for two [default: what the panels need]
+    /// Width in millimetres: 89 for one column of a journal, 183 for two [default: by the number of panels]
     #[arg(long, value_name = "MM", value_parser = width)]
     width: Option<f64>,
     /// Pixels to the inch of a .png

@@ -29,11 +29,11 @@ use crate::query::{self, Answer, AnswerError, Tables};
 #[command(after_help = "Examples:
   slipsweep query results/granite \"SELECT t_f, min(gap), max(gap) FROM gap GROUP BY t_f ORDER BY t_f\"
   slipsweep query results/granite \"SELECT status, count(*) FROM gap GROUP BY status\"
-  slipsweep query results/granite \"SELECT * FROM best_cubic WHERE status = 'ok'\" --out best.csv")]
+  slipsweep query results/granite \"SELECT * FROM best_cubic WHERE status = 'ok'\" --out best_cubic.csv")]
 pub struct Arguments {
     /// Folder of the dataset, such as results/NAME; or a Parquet or CSV file, which is a table under its own name
     dataset: PathBuf,
-    /// The question in SQL, in quotes; every table of the dataset has its name
+    /// One SELECT in quotes; the tables of the dataset have their names
     sql: String,
     #[command(flatten)]
     output: Output<Format>,

@@ -18,7 +18,7 @@ use crate::sweep::{Sweep, estimate, units_of};
 pub struct Arguments {
     /// Folder of the dataset, such as results/NAME
     dataset: PathBuf,
-    /// Where to write it [default: the name of the dataset, -report.html]
+    /// Output file [default: NAME-report.html]
     #[arg(short, long, value_name = "FILE")]
     out: Option<PathBuf>,
 }

@@ -22,21 +22,21 @@ use crate::table::{Kind, RunStats, Signal};
   slipsweep run granite.toml
   slipsweep run granite.toml --out /scratch/results --threads 8 --quiet")]
 pub struct Arguments {
-    /// The sweep spec, a TOML file; or the folder of a dataset that is to be finished
+    /// The sweep spec, a TOML file; or the folder of an incomplete dataset
     spec: PathBuf,
-    /// Folder in which the dataset's folder is made [default: results, or where the dataset is]
+    /// Folder of the dataset folder [default: results, or that of the dataset]
     #[arg(short, long, value_name = "DIR")]
     out: Option<PathBuf>,
-    /// Threads to use, at most 1024; one a processor by default
+    /// Number of threads, at most 1024 [default: one for each processor]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
     threads: Option<u16>,
     /// Compute only shard I of N, counted from 0; all shards may run at the same time
     #[arg(long, value_name = "I/N")]
     shard: Option<Shard>,
-    /// Exit with code 75, not 2, after a failure that another try may fix: schedulers then put the job back into the queue
+    /// Exit with code 75 instead of 2 after a temporary failure, so that a scheduler requeues the job
     #[arg(long)]
     requeue: bool,
-    /// Say nothing but errors
+    /// Print errors only
     #[arg(long)]
     quiet: bool,
     /// Fail with exit code 3 if any row is not_converged
@@ -248,12 +248,12 @@ fn is_passing(error: &io::Error) -> bool {
 fn account(outcome: &Outcome, seconds: f64) -> String {
     let rows: u64 = outcome.tables.iter().map(|table| table.rows).sum();
     if rows == 0 {
-        return "nothing to compute: every part was there\n".to_owned();
+        return "nothing to compute: every part exists\n".to_owned();
     }
     let RunStats { optima, landscapes, best, shortcuts, crossovers, simulations, steps, quadratures, nodes } =
         outcome.work;
     let (all, rate) = (words::things(rows, "row"), words::count((rows as f64 / seconds) as u64));
-    let mut text = format!("{all} in {}: {rate} rows a second, Parquet on disk included\n", words::duration(seconds));
+    let mut text = format!("{all} in {}: {rate} rows a second, with writing\n", words::duration(seconds));
     let spent: Vec<String> = [
         (optima, "optimal protocol"),
         (landscapes, "landscape"),
@@ -261,7 +261,7 @@ fn account(outcome: &Outcome, seconds: f64) -> String {
         (shortcuts, "family shortcut"),
         (crossovers, "transition"),
         (simulations, "simulation"),
-        (steps, "step_response"),
+        (steps, "step"),
         (quadratures, "quadrature"),
         (nodes, "node"),
     ]

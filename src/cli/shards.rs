@@ -28,7 +28,7 @@ pub struct Arguments {
     /// Processors of a task
     #[arg(long, value_name = "K", default_value_t = 1, value_parser = clap::value_parser!(u64).range(1..=1024))]
     cpus: u64,
-    /// Least minutes of work of a task, as predicted
+    /// Least predicted work of a task, in minutes
     #[arg(long, value_name = "M", default_value_t = 5.0, value_parser = minutes)]
     minutes: f64,
 }
@@ -47,7 +47,7 @@ pub enum Engine {
     Hyperqueue,
 }
 
-/// What precedes the number of shards in a job script.
+/// The prefix of the number of shards in a job script.
 const SHARDS: &str = "# shards: ";
 
 impl Engine {
@@ -151,7 +151,7 @@ pub fn shards(arguments: &Arguments) -> Result<(), Failure> {
     say(&said)
 }
 
-/// How many tasks there are, and why they are fewer than requested.
+/// The number of tasks, and why it is less than requested.
 fn tasks(arguments: &Arguments, parts: u64, seconds: f64) -> (u64, Option<String>) {
     let worth = match arguments.minutes {
         0.0 => Shard::MAX_COUNT,
@@ -212,7 +212,7 @@ fn slurm_config(key: &str) -> Option<String> {
     })
 }
 
-/// What goes into a job script; paths as words of the shell.
+/// The values of a job script; paths are quoted for the shell.
 struct Job<'a> {
     name: &'a str,
     program: String,

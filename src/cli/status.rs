@@ -17,7 +17,7 @@ use crate::sweep::{Plan, Sweep, shards_with};
 pub struct Arguments {
     /// Folder of the dataset, such as results/NAME
     dataset: PathBuf,
-    /// Check every bit of every part, not its footer alone
+    /// Check every bit of every part, instead of its footer
     #[arg(long)]
     check: bool,
 }
@@ -79,7 +79,7 @@ fn counts(survey: &Survey) -> String {
     words::aligned(&lines, 2)
 }
 
-/// What is wrong, one by one.
+/// The damaged and foreign parts.
 fn faults(folder: &Folder, survey: &Survey) -> String {
     let tables = || survey.tables.iter();
     let missing = tables().filter(|table| !table.missing.is_empty()).map(|table| {

@@ -44,7 +44,7 @@ pub struct Arguments {
     /// Conditions that one row of the table meets, such as "t_f=0.02, v_f=100"
     #[arg(long = "where", value_name = "CONDITION", requires = "table")]
     conditions: Vec<String>,
-    /// Duration, in l/v_0; with a row of `step_response` how much of the response to show, in the units of the dataset
+    /// Duration, in l/v_0; for a row of `step_response` the shown duration, in the units of the dataset
     #[arg(long, value_name = "T", value_parser = |text: &str| legal(text, Quantity::Time.domain()))]
     t_f: Option<f64>,
     /// Direct effect of the velocity on friction, in mu_0
@@ -59,7 +59,7 @@ pub struct Arguments {
     /// Velocity after the protocol, in v_0
     #[arg(long, value_name = "V", value_parser = |text: &str| legal(text, Quantity::FinalVelocity.domain()))]
     v_f: Option<f64>,
-    /// Bound on friction, in mu_0 sigma (bounded_friction)
+    /// Friction ceiling, in mu_0 sigma (bounded_friction)
     #[arg(long, value_name = "M", value_parser = |text: &str| legal(text, Quantity::FrictionBound.domain()))]
     tau_ceiling: Option<f64>,
     /// Coefficient of t in theta, in units of 1/t_f as in the table `best_cubic` (gap)

@@ -13,10 +13,10 @@ use signal_hook::consts::{SIGINT, SIGTERM};
 use super::words;
 use crate::table::{Phase, Signal};
 
-/// How often work is looked at. Chosen: Ctrl-C and the progress seem to answer at once.
+/// The polling interval of progress. Chosen: Ctrl-C seems to answer at once.
 const LOOK: Duration = Duration::from_millis(50);
 
-/// How often a line is written where there is no terminal. Chosen: a log of a day then has less than 10,000.
+/// The interval of progress lines without a terminal. Chosen: a log of a day has less than 10,000 lines.
 const LINE: Duration = Duration::from_secs(10);
 
 /// Time after which a terminal says what is going on. Chosen: nobody waits longer than a second without knowing for what.
@@ -41,9 +41,9 @@ pub fn watched<T>(signal: &Signal, rows: u64, quiet: bool, work: impl FnOnce() -
 
 /// Something that takes its time, and writes nothing.
 pub struct Wait<'a> {
-    /// What goes on, such as "reading the footers of the parts".
+    /// The current phase, such as "reading the footers of the parts".
     pub doing: &'a str,
-    /// How far it is: things done, all of them, and what one is.
+    /// The progress: done, total, and the name of the things.
     pub done: Option<(&'a AtomicU64, u64, &'a str)>,
     /// Whether nothing is to be shown.
     pub quiet: bool,
@@ -177,7 +177,7 @@ struct ProgressDisplay {
     bar: Option<ProgressBar>,
     /// When a line was written last.
     last: Instant,
-    /// What the run is doing.
+    /// The current phase.
     phase: Phase,
     /// Since when.
     since: Instant,

@@ -117,7 +117,7 @@ impl Columns {
 
 #[cfg(test)]
 mod tests {
-    //! What a reader sees.
+    //! Labels as shown.
 
     use super::*;
 

@@ -17,9 +17,9 @@ const ATTEMPTS: u32 = 3;
 /// A step that failed, and why.
 #[derive(Debug)]
 pub struct Unwritten {
-    /// What was tried.
+    /// The attempted action.
     pub action: &'static str,
-    /// Why not.
+    /// The cause.
     pub source: io::Error,
 }
 
@@ -58,7 +58,7 @@ fn write_by(path: &Path, bytes: &[u8], place: impl Fn(&Path, &Path) -> io::Resul
     }
 }
 
-/// The same with whatever `fill` writes.
+/// Writes a file durably; `fill` writes the content.
 #[cfg(feature = "cli")]
 pub fn write_with<E: From<io::Error>>(path: &Path, fill: impl FnOnce(&mut File) -> Result<(), E>) -> Result<(), E> {
     publish(path, fill, |temporary, path| fs::rename(temporary, path), |_, source| source.into())
@@ -102,7 +102,7 @@ fn create(folder: &Path, name: &str) -> io::Result<(PathBuf, File)> {
     }
 }
 
-/// How the name of a temporary file ends.
+/// The suffix of a temporary file.
 const SUFFIX: &str = ".tmp";
 
 /// The name of this machine, as far as it may be part of a file's name.
@@ -199,7 +199,7 @@ fn sync_folder(_folder: &Path) -> io::Result<()> {
 
 #[cfg(test)]
 mod tests {
-    //! Which temporary files are swept away, and what happens to a process whose file was.
+    //! Removal of temporary files, and the processes that own them.
 
     use super::*;
 

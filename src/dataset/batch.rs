@@ -62,7 +62,7 @@ fn labels(words: &[&str], places: &[f64]) -> Result<ArrayRef, ArrowError> {
     Ok(Arc::new(DictionaryArray::<Int32Type>::try_new(keys, words)?))
 }
 
-/// What a cell holds: NaN is nothing.
+/// The number of a cell; `None` for NaN.
 fn some(cell: f64) -> Option<f64> {
     (!cell.is_nan()).then_some(cell)
 }

@@ -18,10 +18,10 @@ const HEAD: &str = "slipsweep.head_sha256";
 /// The key of the checksum of the file.
 const FILE: &str = "slipsweep.sha256";
 
-/// What stands in the place of a checksum while it is computed: as long as one in hexadecimal digits.
+/// The placeholder of a checksum during its computation, as long as its hexadecimal digits.
 const BLANK: &str = "0000000000000000000000000000000000000000000000000000000000000000";
 
-/// What Thrift's compact protocol writes between key and value: the next field, a string, and its length.
+/// The bytes of Thrift's compact protocol between key and value: the next field, a string, and its length.
 const BETWEEN: [u8; 2] = [0x18, BLANK.len() as u8];
 
 /// Bytes after the footer: its length and `PAR1`.
@@ -93,7 +93,7 @@ fn head(file: &impl ChunkReader, metadata: &ParquetMetaData) -> Result<String> {
     Ok(digits(hash))
 }
 
-/// Where the checksum of a key stands: at its last occurrence, since the text of a spec before it may hold anything.
+/// The offset of the checksum of a key: its last occurrence, since the spec before it may contain anything.
 fn place(bytes: &[u8], key: &str) -> Option<usize> {
     let key_at = bytes.windows(key.len()).rposition(|window| window == key.as_bytes())?;
     let place = key_at + key.len() + BETWEEN.len();

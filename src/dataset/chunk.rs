@@ -30,7 +30,7 @@ pub struct Chunk {
     pub dictionary: Option<(Vec<u8>, u32)>,
     /// The data page: levels and encoded values.
     pub data: Vec<u8>,
-    /// How the values are encoded.
+    /// The encoding of the values.
     pub encoding: Encoding,
     /// Least and greatest value and number of nulls.
     pub statistics: Statistics,

@@ -11,10 +11,10 @@ use super::footer::Footer;
 use super::manifest::{Manifest, ManifestTable};
 use super::state::{self, CheckDepth, OpenPart, State};
 
-/// What to do about a dataset in the place of another one.
+/// The help for a dataset in the place of another one.
 const WAYS_OUT: &str = "change `name` in the spec, or write elsewhere with --out DIR, or remove the dataset";
 
-/// What can go wrong with the files of a dataset.
+/// The errors of the files of a dataset.
 #[derive(Debug, thiserror::Error)]
 pub enum DatasetError {
     /// The folder holds a dataset of another spec, or that another program computed.
@@ -26,9 +26,9 @@ pub enum DatasetError {
         folder: String,
         /// `version` or `numerics revision`.
         what: &'static str,
-        /// What this run has.
+        /// The value of this run.
         expected: String,
-        /// What the folder has.
+        /// The value of the folder.
         found: String,
     },
     /// The folder holds a dataset of another spec.
@@ -38,9 +38,9 @@ pub enum DatasetError {
         folder: String,
         /// The table that differs.
         table: String,
-        /// What this spec has: the hash of the table, or the key that differs.
+        /// The value of this spec: the hash of the table, or the differing key.
         expected: String,
-        /// What the folder has.
+        /// The value of the folder.
         found: String,
         /// The text of the spec in the folder.
         spec: String,
@@ -58,7 +58,7 @@ pub enum DatasetError {
         expected: String,
         /// The tables of the dataset.
         found: String,
-        /// Those that the spec lacks.
+        /// The tables that the spec lacks.
         missing: Vec<String>,
     },
     /// Another run is at work.
@@ -79,7 +79,7 @@ pub enum DatasetError {
     Taken {
         /// The folder.
         folder: String,
-        /// What happened.
+        /// The event.
         what: &'static str,
     },
     /// The folder holds something else.
@@ -101,9 +101,9 @@ pub enum DatasetError {
         path: String,
         /// In what it differs.
         what: &'static str,
-        /// What the part has.
+        /// The expected value of the part.
         expected: String,
-        /// What the file has.
+        /// The value of the file.
         found: String,
     },
     /// A part is broken.
@@ -137,9 +137,9 @@ pub enum DatasetError {
     Io {
         /// The file or folder.
         path: String,
-        /// What was tried.
+        /// The attempted action.
         action: &'static str,
-        /// Why not.
+        /// The cause.
         source: io::Error,
     },
     /// A sample of a table could not be encoded.
@@ -150,7 +150,7 @@ pub enum DatasetError {
     Encode {
         /// The part.
         path: String,
-        /// Why not.
+        /// The cause.
         source: parquet::errors::ParquetError,
     },
 }
@@ -179,17 +179,17 @@ impl Folder {
         Folder { path: path.to_owned() }
     }
 
-    /// Where it is.
+    /// Its place.
     pub fn path(&self) -> &Path {
         &self.path
     }
 
-    /// Where a part is or will be.
+    /// The path of a part.
     pub fn part(&self, table: &str, part: u64) -> PathBuf {
         self.path.join(table).join(format!("part-{part:06}.parquet"))
     }
 
-    /// Where the manifest is or will be.
+    /// The path of the manifest.
     pub fn manifest_path(&self) -> PathBuf {
         self.path.join("manifest.json")
     }
@@ -286,7 +286,7 @@ impl Folder {
         parts
     }
 
-    /// What is in the place of a part of the dataset of `manifest`.
+    /// The state of a part of the dataset of `manifest`.
     pub fn state(&self, manifest: &Manifest, table: &str, part: u64, look: CheckDepth) -> State {
         state::state(&self.part(table, part), manifest, table, part, look)
     }
@@ -316,7 +316,7 @@ impl Folder {
         Ok((paths, missing))
     }
 
-    /// What is wrong with the file in the place of a part.
+    /// The error of a file in the place of a part.
     pub fn fault(&self, path: &Path, state: State) -> DatasetError {
         let (path, dataset) = (path.display().to_string(), self.path.display().to_string());
         match state {
@@ -359,7 +359,7 @@ impl Folder {
     }
 }
 
-/// What is `wanted` of what is in a folder, in the order of names; nothing if it cannot be read.
+/// The `wanted` entries of a folder, by name; empty if it cannot be read.
 fn sorted(folder: &Path, wanted: impl Fn(&Path) -> bool) -> Vec<PathBuf> {
     let entries = fs::read_dir(folder).into_iter().flatten().flatten();
     let mut paths: Vec<PathBuf> = entries.map(|entry| entry.path()).filter(|path| wanted(path)).collect();

@@ -1,4 +1,4 @@
-//! What a part says of itself: key-value metadata in its footer.
+//! The footer of a part: key-value metadata.
 
 use std::collections::BTreeMap;
 use std::ops::Range;
@@ -31,7 +31,7 @@ pub struct Footer {
     pub rows: Range<u64>,
 }
 
-/// What all keys begin with.
+/// The prefix of all keys.
 pub const PREFIX: &str = "slipsweep.";
 
 const NAME: &str = "slipsweep.name";
@@ -62,7 +62,7 @@ impl Footer {
         }
     }
 
-    /// As Parquet metadata, with the digest of the rows, and the places of the checksums last.
+    /// The footer as Parquet metadata, with the statistics of the rows; the checksums come last.
     pub fn entries(&self, statistics: &TableStatistics) -> Vec<KeyValue> {
         let counts: BTreeMap<&str, u64> = Status::ALL.map(Status::name).into_iter().zip(statistics.status).collect();
         let counts = serde_json::to_string(&counts).unwrap_or_default();

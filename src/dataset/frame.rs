@@ -29,7 +29,7 @@ pub struct Heading {
     pub name: String,
     /// Its unit; empty for words and flags.
     pub unit: String,
-    /// What it means.
+    /// Its meaning.
     pub doc: String,
     /// Whether it holds numbers; else words, or flags as `yes` and `no`.
     pub is_number: bool,
@@ -126,7 +126,7 @@ impl Frame {
     }
 }
 
-/// Why columns cannot be read.
+/// The error of reading columns.
 #[derive(Debug, thiserror::Error)]
 pub enum FrameError {
     /// A file is damaged or is no Parquet.
@@ -134,12 +134,12 @@ pub enum FrameError {
     File {
         /// The file.
         path: String,
-        /// Why not.
+        /// The cause.
         reason: String,
     },
 }
 
-/// Why a part of a table cannot be read.
+/// The error of reading a part.
 #[derive(Debug, thiserror::Error)]
 pub enum ReadError {
     /// A part is damaged, or belongs to another dataset.
@@ -212,10 +212,10 @@ pub fn row(path: &Path, row: usize) -> Result<Row, FrameError> {
     if frame.height == 1 { Ok(frame.row(0)) } else { Err(wrong(path, format!("it has no row {row}"))) }
 }
 
-/// Which rows of a file are read.
+/// The selection of rows of a file.
 enum Rows<'a> {
     All,
-    /// Those of some row groups.
+    /// Some row groups.
     Of(Keep<'a>),
     /// The one with this number.
     One(usize),

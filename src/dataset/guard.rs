@@ -13,7 +13,7 @@ pub fn is_guarded() -> bool {
     GUARDED.get()
 }
 
-/// What `read` returns; `None` if it panics.
+/// The result of `read`; `None` if it panics.
 pub fn guarded<T>(read: impl FnOnce() -> T) -> Option<T> {
     GUARDED.set(true);
     // What a panic leaves half done is gone with it.

@@ -25,7 +25,7 @@ pub struct Layout {
     pub schema: SchemaRef,
     /// The units of the values.
     pub units: Units,
-    /// What a simpler theory says of one of the columns.
+    /// The prediction of a simpler theory for a column.
     pub prediction: Option<Prediction>,
 }
 

@@ -58,7 +58,7 @@ pub struct Manifest {
     pub tables: Vec<ManifestTable>,
     /// The text of the spec; empty if the manifest is lost and the parts do not have it.
     pub spec: String,
-    /// Why this is not what the file says but what the parts say.
+    /// The reason why the manifest comes from the parts.
     #[serde(skip)]
     pub rebuilt: Option<String>,
 }

@@ -1,4 +1,4 @@
-//! What a Parquet file says that it holds, checked before its reader takes memory for it: a few bytes can claim gigabytes.
+//! Limits on the metadata of a Parquet file, checked before its reader allocates: a few bytes can claim gigabytes.
 //!
 //! Footers and page headers are structs of Thrift's compact protocol. They are walked without knowing all of their fields:
 //! no list may be longer than the bytes that are left, and of the numbers only those count that memory is taken by. The
@@ -26,7 +26,7 @@ const MOST_VALUES: i64 = 1 << 22;
 /// Most groups of rows, since their number has 16 bits.
 const MOST_GROUPS: i64 = i16::MAX as i64;
 
-/// What a Parquet file says of itself, checked: a few bytes can stand for any number of rows. Words are read as codes, from any writer.
+/// The checked metadata of a Parquet file. Words are read as codes, from any writer.
 ///
 /// Type hints of Arrow or pandas are ignored: the type of a column is that of Parquet.
 pub(crate) fn coded(file: &File) -> Result<ArrowReaderMetadata, ParquetError> {
@@ -71,7 +71,7 @@ pub fn check_pages(file: &impl ChunkReader, metadata: &ParquetMetaData) -> Resul
     page_headers(file, metadata, |_| {})
 }
 
-/// The same; gives `visit` the header of each page.
+/// Checks the pages, and passes the header of each to `visit`.
 pub fn page_headers(
     file: &impl ChunkReader,
     metadata: &ParquetMetaData,
@@ -134,7 +134,7 @@ fn walk(bytes: &[u8], kind_of: fn(&[i16]) -> Option<Kind>, visit: &mut dyn FnMut
     Some(walker.at)
 }
 
-/// What a field is read as.
+/// The kind of a field.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Kind {
     Flag,
@@ -309,7 +309,7 @@ impl Walker<'_> {
 
 #[cfg(test)]
 mod tests {
-    //! What no writer writes, byte by byte; files as they are written stand in `tests/bad_specs` and `fuzz/corpus`.
+    //! Malformed footers, byte by byte; whole files are in `tests/bad_specs` and `fuzz/corpus`.
 
     use super::*;
     use bytes::Bytes;

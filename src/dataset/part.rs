@@ -22,7 +22,7 @@ use crate::table::{ColumnBuffer, Kind};
 /// Rows of a row group: what a reader skips by the statistics of a column.
 const ROWS_PER_GROUP: usize = 1 << 16;
 
-/// What a row of a landscape takes about, so that the buffer of a part seldom grows.
+/// Typical bytes of a row of a landscape: the initial buffer of a part.
 const BYTES_PER_ROW: usize = 9;
 
 /// Strength of compression; see docs/performance.md.

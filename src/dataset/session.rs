@@ -38,7 +38,7 @@ pub enum Concurrency {
     Shards,
 }
 
-/// What changes when a file is replaced: length, time and, where there is one, the number of the file.
+/// The version of a file: length, time and file number.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 struct FileVersion(u64, Option<SystemTime>, u64);
 
@@ -152,12 +152,12 @@ impl Folder {
     }
 }
 
-/// What a manifest needs.
+/// The required action on a manifest.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum ManifestAction {
-    /// It is in place.
+    /// The manifest is in place.
     Keep,
-    /// It gets tables, or is damaged.
+    /// The manifest is rewritten: new tables, or damage.
     Replace,
     /// There is none.
     Create,

@@ -13,7 +13,7 @@ use super::manifest::{Manifest, ManifestTable};
 use super::metadata_limits::check_footer;
 use super::statistics::TableStatistics;
 
-/// How closely a part is looked at.
+/// The depth of a check.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum CheckDepth {
     /// Its footer: finds a part that is cut short and one of another origin.
@@ -22,23 +22,23 @@ pub enum CheckDepth {
     Whole,
 }
 
-/// What is found in the place of a part.
+/// The state of a part.
 #[derive(Debug, Clone, PartialEq)]
 pub enum State {
     /// Nothing.
     Missing,
     /// The part.
     There {
-        /// What its rows contain.
+        /// The statistics of its rows.
         statistics: Box<TableStatistics>,
     },
     /// Something that was not made from this spec by this version; it may be of use to somebody.
     Foreign {
-        /// What it differs in.
+        /// The differing property.
         what: &'static str,
-        /// What the part has.
+        /// The expected value of the part.
         expected: String,
-        /// What the file has.
+        /// The value of the file.
         found: String,
     },
     /// A part that is broken, of no use to anybody.
@@ -51,15 +51,15 @@ pub enum State {
 /// A part that was opened, and is the one that should be there.
 #[derive(Debug)]
 pub struct OpenPart {
-    /// Where it is.
+    /// Its place.
     pub path: PathBuf,
     /// The file.
     pub file: File,
     /// Its Parquet footer.
     pub metadata: Arc<ParquetMetaData>,
-    /// What it says of itself.
+    /// Its footer.
     pub footer: Footer,
-    /// What its rows contain.
+    /// The statistics of its rows.
     pub statistics: TableStatistics,
 }
 
@@ -101,7 +101,7 @@ pub fn open_part(path: &Path, manifest: &Manifest, table: &str, part: u64) -> Re
     Ok(Some(OpenPart { path: path.to_owned(), file, metadata: metadata.into(), footer, statistics }))
 }
 
-/// What the footer of a part says, if it is as it was written.
+/// The footer of a part, if it is intact.
 pub fn footer_of(path: &Path) -> Option<Footer> {
     let file = open(path).ok()??;
     let metadata = metadata(&file).ok()?;
@@ -147,7 +147,7 @@ fn unreadable(error: &io::Error) -> String {
     format!("it cannot be read: {error}")
 }
 
-/// What no slipsweep made.
+/// The state of a file of another program.
 fn stranger(found: &str) -> State {
     State::Foreign { what: "program", expected: "a part that slipsweep wrote".to_owned(), found: found.to_owned() }
 }
@@ -166,7 +166,7 @@ fn entries(metadata: &ParquetMetaData) -> Vec<KeyValue> {
     metadata.file_metadata().key_value_metadata().cloned().unwrap_or_default()
 }
 
-/// What a file says of itself, if that is what the part that should be there says.
+/// The footer of a file, if it matches the expected part.
 fn belongs(
     entries: &[KeyValue],
     manifest: &Manifest,

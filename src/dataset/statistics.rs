@@ -23,7 +23,7 @@ pub const FEW: usize = 12;
 /// The column whose least values are looked for.
 const GAP: &str = "gap";
 
-/// What some rows of a table contain.
+/// The statistics of some rows of a table.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct TableStatistics {
     /// Rows by status, in the order of [`Status::ALL`]. A footer has an entry of its own for them.
@@ -38,11 +38,11 @@ pub struct TableStatistics {
     /// The labels: each word that occurs, and its rows; `None` if there are more than [`FEW`] words.
     #[serde(default)]
     pub labels: Vec<(String, Option<Counts>)>,
-    /// Where a simpler theory predicts a column of words: what it predicts, what was found, and in how many rows.
+    /// Counts of predicted and found words, for a column with a prediction.
     pub predicted: Vec<(String, String, u64)>,
     /// All rows in their order, if the table has few.
     pub rows: Option<Vec<Row>>,
-    /// Where the gap is least.
+    /// The rows of least gap.
     least: LeastGaps,
 }
 
@@ -225,7 +225,7 @@ fn labelled(runs: &[(Option<&str>, usize)]) -> Option<Counts> {
     Some(counts)
 }
 
-/// How many `cells`, places in `words`, hold which word.
+/// The counts of words among `cells`, which are indices into `words`.
 fn counts(words: &[&str], cells: &[f64]) -> Counts {
     let mut counts = vec![0_u64; words.len()];
     for cell in cells.iter().filter(|cell| !cell.is_nan()) {

@@ -11,7 +11,7 @@ use super::manifest::Manifest;
 use super::state::{CheckDepth, State};
 use super::statistics::TableStatistics;
 
-/// What was found in the folder of a dataset.
+/// The survey of a dataset folder.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Survey {
     /// Its tables, in the order of the manifest.
@@ -22,7 +22,7 @@ pub struct Survey {
     pub others: Vec<PathBuf>,
 }
 
-/// What was found of a table.
+/// The survey of a table.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TableSurvey {
     /// Its name.
@@ -39,7 +39,7 @@ pub struct TableSurvey {
     pub damaged: Vec<(u64, String)>,
     /// Parts whose place is taken by something else: in what it differs, what was expected and what was found.
     pub foreign: Vec<(u64, [String; 3])>,
-    /// What the parts that are there contain.
+    /// The statistics of the existing parts.
     pub statistics: TableStatistics,
 }
 

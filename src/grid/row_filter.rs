@@ -205,7 +205,7 @@ fn last_below(count: u64, holds: impl Fn(u64) -> bool) -> u64 {
 /// A wrong value, and its point as axis values.
 pub type Wrong = (f64, Vec<(Quantity, f64)>);
 
-/// The first kept point of `block` with a wrong value of `quantity`, if any. `None` beyond [`MAX_COMBINATIONS`].
+/// The first kept point of `block` with a wrong value of `quantity`, if any. `None` beyond `MAX_COMBINATIONS`.
 pub fn first_wrong(block: &Block, quantity: Quantity, wrong: impl Fn(f64) -> bool + Sync) -> Option<Option<Wrong>> {
     let mut reads = vec![quantity];
     reads.extend(block.condition.iter().flat_map(Expression::reads));

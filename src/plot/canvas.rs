@@ -10,7 +10,7 @@ pub const MILLIMETRE: f64 = 72.0 / 25.4;
 /// Distance of the lines of a hatched area, along its edges, in points. Chosen: single lines are seen in print.
 const HATCH_STEP: f64 = 3.2;
 
-/// How a line is drawn.
+/// A line style.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Stroke {
     /// Colour.
@@ -28,14 +28,14 @@ impl Stroke {
     }
 }
 
-/// Where a text is relative to its place.
+/// The anchor of a text.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Anchor {
-    /// It starts there.
+    /// The text starts at its place.
     Start,
     /// Its middle is there.
     Middle,
-    /// It ends there.
+    /// The text ends at its place.
     End,
 }
 
@@ -59,12 +59,12 @@ impl Area {
     }
 }
 
-/// How words are set.
+/// A text style.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Text<'a> {
     /// Height of the letters, in points.
     pub size: f64,
-    /// Where the words are relative to their place.
+    /// The anchor of the words.
     pub anchor: Anchor,
     /// Whether they are turned by a quarter to the left.
     pub upwards: bool,
@@ -180,7 +180,7 @@ impl Canvas {
         ));
     }
 
-    /// What `draw` draws, as far as it is inside `area`.
+    /// Draws `draw`, clipped to `area`.
     pub fn clipped(&mut self, area: Area, draw: impl FnOnce(&mut Canvas)) {
         self.clips += 1;
         let (id, rect) = (self.clips, area.attributes());

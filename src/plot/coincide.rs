@@ -1,4 +1,4 @@
-//! Which curves lie on each other in print: they are drawn once.
+//! Coinciding curves, which are drawn once.
 
 /// Distance, as a fraction of the panel, up to which two curves are one. The width of a line: 1.1 points in a panel 100 points high.
 const MAX_DISTANCE: f64 = 0.01;

@@ -1,4 +1,4 @@
-//! Why a picture cannot be drawn.
+//! The error of a picture.
 
 use crate::dataset::ReadError;
 use crate::dataset::frame::FrameError;
@@ -8,7 +8,7 @@ fn hint(name: &str, found: &[String]) -> String {
     names::hint(name, found.iter().map(String::as_str))
 }
 
-/// Why a picture cannot be drawn.
+/// The error of a picture.
 #[derive(Debug, thiserror::Error)]
 pub enum PlotError {
     /// A file cannot be opened.
@@ -16,7 +16,7 @@ pub enum PlotError {
     Read {
         /// The file.
         path: String,
-        /// What the system says.
+        /// The error of the system.
         reason: String,
     },
     /// A cell of a CSV file.
@@ -30,7 +30,7 @@ pub enum PlotError {
         line: usize,
         /// The found names.
         found: String,
-        /// What should be.
+        /// The expectation.
         expected: String,
     },
     /// A file is no trace.

@@ -10,7 +10,7 @@ use svg2pdf::{ConversionOptions, PageOptions};
 use super::error::PlotError;
 use super::label::FONTS;
 
-/// How a picture is written.
+/// The format of a picture.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
 pub enum Format {
@@ -39,7 +39,7 @@ impl Format {
         }
     }
 
-    /// What names of files of this format end in.
+    /// The file ending.
     pub fn ending(self) -> &'static str {
         match self {
             Format::Svg => "svg",

@@ -52,16 +52,16 @@ const KEY_WIDTH: f64 = 20.0;
 /// Points of a curve from which on they are not marked. Chosen: their marks touch.
 pub const MAX_MARKED_POINTS: usize = 50;
 
-/// How the words of figures, and those of notes, are set.
+/// Text styles of figures and of notes.
 const LABEL: Text<'static> = Text { size: SIZE, anchor: Anchor::Start, upwards: false, colour: "#000" };
 const NOTE: Text<'static> = Text { size: NOTE_SIZE, anchor: Anchor::Start, upwards: false, colour: "#444" };
 
 /// A figure.
 #[derive(Debug, Clone, Default)]
 pub struct Figure {
-    /// What it shows, in markup.
+    /// The title, in markup.
     pub title: String,
-    /// What is the same all over it, in markup.
+    /// The common values, in markup.
     pub subtitle: String,
     /// The panels, row after row.
     pub panels: Vec<Panel>,
@@ -71,20 +71,20 @@ pub struct Figure {
     pub rows: Vec<String>,
     /// Height of a panel relative to its width.
     pub aspect: f64,
-    /// What is explained.
+    /// The legend.
     pub legend: Vec<Entry>,
     /// The colours of maps.
     pub colours: Option<Colours>,
     /// Remarks below, in markup.
     pub notes: Vec<String>,
-    /// What its reader need not know but its maker: which panels are left out.
+    /// Notes for the terminal, such as omitted panels.
     pub remarks: Vec<String>,
 }
 
 /// Colours for numbers.
 #[derive(Debug, Clone)]
 pub struct Colours {
-    /// What the numbers are, in markup.
+    /// The name of the numbers, in markup.
     pub label: String,
     /// Their range; the darkest colour is at its start.
     pub scale: Scale,
@@ -110,11 +110,11 @@ pub struct Axis {
     pub column: String,
     /// Unit of its column.
     pub unit: String,
-    /// What it spans.
+    /// The range.
     pub scale: Scale,
 }
 
-/// What is drawn between axes; places are values of the axes unless they are said to be fractions.
+/// A layer between axes. Positions are axis values, unless stated as fractions.
 #[derive(Debug, Clone)]
 pub enum Layer {
     /// The background where a map has no data: hatched.
@@ -144,9 +144,9 @@ pub enum Layer {
 /// An image over the panel, with what its pixels stand for.
 #[derive(Debug, Clone)]
 pub struct Map {
-    /// As PNG, its first row at the top; it fills the panel.
+    /// The PNG image of the whole panel, first row at the top.
     pub png: Vec<u8>,
-    /// What is shown where the pointer is, if the picture is in a page.
+    /// The values under the pointer, for pages.
     pub hover: Option<Hover>,
 }
 
@@ -196,7 +196,7 @@ pub struct Entry {
     pub text: String,
 }
 
-/// What a legend explains.
+/// An entry of a legend.
 #[derive(Debug, Clone)]
 pub enum Key {
     /// A line.
@@ -247,7 +247,7 @@ pub struct SvgFigure {
 /// A map with values in a picture.
 #[derive(Debug, Clone)]
 pub struct HoverMap {
-    /// Where it is.
+    /// Its place.
     pub area: Area,
     /// Its horizontal axis.
     pub x: Axis,
@@ -265,7 +265,7 @@ struct Plan {
     y_label: bool,
 }
 
-/// Where panels of one size stand: the room around them in each column and row.
+/// The layout of panels of one size: margins of each column and row.
 struct Layout {
     plans: Vec<Plan>,
     lefts: Vec<f64>,
@@ -422,7 +422,7 @@ fn widest(ticks: &Ticks) -> f64 {
 }
 
 impl Ticks {
-    /// How far labels hang over an end of an axis about `length` long, from which they are a fraction `away` of it.
+    /// The overhang of labels beyond an axis of about `length`, at a fraction `away` of it.
     fn beyond(&self, length: f64, away: impl Fn(f64) -> f64) -> f64 {
         let half = |label: &Option<String>| 0.5 * TICK_SIZE * label.as_deref().map_or(0.0, label::width);
         let over = self.ticks.iter().map(|tick| half(&tick.label) - away(tick.fraction).max(0.0) * length);
@@ -526,7 +526,7 @@ impl Panel {
         }
     }
 
-    /// Where a point is on the sheet.
+    /// The position of a point on the page.
     fn place(&self, area: Area, (x, y): (f64, f64)) -> (f64, f64) {
         (area.x + area.width * self.x.scale.fraction(x), area.y + area.height * (1.0 - self.y.scale.fraction(y)))
     }

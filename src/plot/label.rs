@@ -247,7 +247,7 @@ pub fn wrapped(markup: &str, most: f64) -> Vec<String> {
 
 #[cfg(test)]
 mod tests {
-    //! What a reader sees.
+    //! Labels as shown.
 
     use super::*;
 

@@ -84,7 +84,7 @@ impl Scale {
         Scale { low: self.low - room, high: self.high + room, log: false }
     }
 
-    /// Where `value` is, 0 at the start and 1 at the end; NaN where the scale does not reach.
+    /// The fraction of `value` along the scale; NaN beyond the scale.
     pub fn fraction(&self, value: f64) -> f64 {
         if self.log {
             if value > 0.0 { (value / self.low).ln() / (self.high / self.low).ln() } else { f64::NAN }

@@ -33,13 +33,13 @@ const UNIT_OF_BOUND: &str = "v_0";
 /// A trace read back.
 #[derive(Debug, Clone)]
 pub struct TraceFile {
-    /// What it is called in a legend, in markup.
+    /// Its name in a legend, in markup.
     pub name: String,
     /// Its parameters, by name.
     pub parameters: Vec<(String, f64)>,
     /// Its columns.
     pub columns: Vec<Column>,
-    /// How many equally spaced points were requested, if any were.
+    /// The requested number of equally spaced points, if any.
     pub points: Option<usize>,
 }
 
@@ -207,7 +207,7 @@ fn unit_in(traces: &[TraceFile], name: &str) -> String {
     traces.iter().find_map(|trace| Some(trace.column(name)?.unit.clone())).unwrap_or_default()
 }
 
-/// That the courses agree on the units of what is shown.
+/// Checks that the traces agree in units.
 fn one_unit(traces: &[TraceFile]) -> Result<(), PlotError> {
     for name in SHOWN.into_iter().flatten().chain(&["t"]) {
         let first = unit_in(traces, name);

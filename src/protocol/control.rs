@@ -34,7 +34,7 @@ impl SpringBlock {
         1.0 + self.law.a * ln(jet.v[0]) + self.law.b * ln(jet.theta)
     }
 
-    /// What the spring pulls with, `k s = tau + m v'`.
+    /// The spring force `k s = tau + m v'`.
     pub fn pull(&self, jet: &Jet) -> f64 {
         self.friction(jet) + self.m * jet.v[1]
     }
@@ -73,7 +73,7 @@ pub(super) struct Extent {
     pub high: f64,
 }
 
-/// How good a turn has to be.
+/// The tolerance of a turning point.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum Tolerance {
     /// In units of the value there, of whose logarithm the slopes are.

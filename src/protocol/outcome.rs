@@ -1,6 +1,6 @@
 //! The outcome of a solve is data: a status beside the numbers, and the work that was spent on them.
 
-/// What became of a row. The order is the order in summaries.
+/// The outcome of a row. The order is that of summaries.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 #[repr(u8)]
 pub enum Status {
@@ -86,7 +86,7 @@ impl std::ops::AddAssign for SolverStats {
 /// A status, the numbers where there are any, and the effort.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Solved<T> {
-    /// What became of it.
+    /// The status.
     pub status: Status,
     /// The numbers; `None` wherever the status is `Infeasible` or `NotConverged`.
     pub value: Option<T>,

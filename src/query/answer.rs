@@ -40,7 +40,7 @@ pub struct Answer {
     streaming: Option<(Files, StreamPlan)>,
 }
 
-/// How an answer is written to a file.
+/// The format of an answer in a file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Format {
     /// Names of the columns and then a line a row; nothing where there is no value.
@@ -51,13 +51,13 @@ pub enum Format {
     Parquet,
 }
 
-/// Why an answer did not reach its reader.
+/// The error of an answer.
 #[derive(Debug, thiserror::Error)]
 pub enum AnswerError {
-    /// It was not found to its end.
+    /// The query failed.
     #[error("the query failed: {0}")]
     Failed(PolarsError),
-    /// It could not be written.
+    /// The answer cannot be written.
     #[error(transparent)]
     Write(#[from] io::Error),
 }
@@ -177,7 +177,7 @@ fn whole(frame: LazyFrame) -> PolarsResult<DataFrame> {
     guarded(|| frame.collect()).unwrap_or_else(|| Err(unsupported()))
 }
 
-/// What a panic of polars is reported as.
+/// The error for a panic of polars.
 fn unsupported() -> PolarsError {
     PolarsError::ComputeError("polars does not support it".into())
 }
@@ -199,7 +199,7 @@ fn at_once() -> usize {
     4 * rayon::current_num_threads()
 }
 
-/// What each of `files` gives, in their order.
+/// The results of `files`, in their order.
 fn ask(files: &[Files], streaming: &StreamPlan) -> PolarsResult<Vec<DataFrame>> {
     let answer = |files: &Files| match &streaming.groups {
         Some(groups) => files.groups(groups),
@@ -360,7 +360,7 @@ fn json_number(number: f64) -> serde_json::Value {
     if number.is_finite() { number.into() } else { number.to_string().into() }
 }
 
-/// That no column of a piece holds lists, which a format does not.
+/// Checks that no column holds lists, which the format lacks.
 fn without_lists(piece: &DataFrame, format: &str) -> PolarsResult<()> {
     let Some(list) = piece.columns().iter().find(|column| column.dtype().is_nested()) else { return Ok(()) };
     let (name, format) = (list.name(), format);

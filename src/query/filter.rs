@@ -14,7 +14,7 @@ use sqlparser::ast::{BinaryOperator, Expr, UnaryOperator, Value, ValueWithSpan};
 
 use crate::dataset::label;
 
-/// What a row obeys: a comparison of a column with a constant, which null never obeys.
+/// The condition of a row: a comparison of a column with a constant. Null never obeys it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Condition {
     /// The column.
@@ -302,7 +302,7 @@ pub struct Top {
     pub descending: bool,
     /// Whether null comes last.
     pub nulls_last: bool,
-    /// How many rows.
+    /// The number of rows.
     pub most: usize,
     /// Whether nothing orders rows that are equal in this column but their place.
     pub alone: bool,
@@ -368,7 +368,7 @@ impl Top {
 
 #[cfg(test)]
 mod tests {
-    //! Which rows are kept.
+    //! Rows that a condition keeps.
 
     use std::sync::Arc;
 

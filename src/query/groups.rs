@@ -20,9 +20,9 @@ use super::filter::{Condition, kept};
 /// An aggregate of a group.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Measure {
-    /// How many rows it has.
+    /// Its number of rows.
     Rows,
-    /// How many values a column has.
+    /// The number of values of a column.
     Count(String),
     /// The sum of a column.
     Sum(String),
@@ -42,7 +42,7 @@ impl Measure {
     }
 }
 
-/// What values of a key are.
+/// The values of a key.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Kind {
     /// Doubles.
@@ -54,7 +54,7 @@ pub enum Kind {
 }
 
 impl Kind {
-    /// That of a column.
+    /// The column.
     pub fn of(name: &str, schema: &Schema) -> Option<Kind> {
         match schema.get(name)? {
             DataType::Float64 => Some(Kind::Number),
@@ -67,7 +67,7 @@ impl Kind {
 /// A question for groups.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Groups {
-    /// What rows obey.
+    /// The condition of rows.
     pub conditions: Vec<Condition>,
     /// The columns whose values make the groups.
     pub keys: Vec<(String, Kind)>,
@@ -114,7 +114,7 @@ fn bits(number: f64) -> u64 {
 #[derive(Default)]
 struct Key {
     places: HashMap<Value, u32>,
-    /// The same for numbers, which are many.
+    /// The key of numbers, which are many.
     numbers: HashMap<u64, u32>,
     values: Vec<Value>,
 }
@@ -184,7 +184,7 @@ pub struct Counting<'a> {
     keys: Vec<Key>,
     /// The groups of the first keys, by those of one key less and the place of the value of the next.
     pairs: Vec<IndexSet<(u32, u32)>>,
-    /// How many groups there are.
+    /// The number of groups.
     count: usize,
     tallies: Vec<Vec<Tally>>,
 }

@@ -32,7 +32,7 @@ pub struct Tables {
     pub sources: Vec<Source>,
 }
 
-/// Why there is no answer.
+/// The error of a query.
 #[derive(Debug, thiserror::Error)]
 pub enum QueryError {
     /// The path leads to nothing that could be asked.
@@ -40,21 +40,21 @@ pub enum QueryError {
     Path {
         /// The path.
         path: String,
-        /// What is wrong with it.
+        /// The fault.
         found: String,
-        /// What would be right.
+        /// The expected input.
         expected: &'static str,
-        /// What to do.
+        /// The help.
         help: &'static str,
     },
     /// The question makes no sense, or none for these tables.
     #[error("{found}\n  expected: a SELECT from these tables:{tables}\n  help: {help}")]
     Sql {
-        /// What is wrong with it.
+        /// The fault.
         found: String,
         /// The tables and their columns, a line each.
         tables: String,
-        /// What to do.
+        /// The help.
         help: String,
     },
     /// A part is damaged, or belongs to another dataset.
@@ -67,7 +67,7 @@ pub enum QueryError {
     Read {
         /// The file or folder.
         path: String,
-        /// Why not.
+        /// The cause.
         source: PolarsError,
     },
 }
@@ -147,7 +147,7 @@ impl Tables {
         Some(self.explain(sql, &answered?.err()?))
     }
 
-    /// What is wrong with a question.
+    /// The fault of a question.
     fn explain(&self, sql: &str, error: &PolarsError) -> QueryError {
         let text = error.to_string();
         // The first line says it, before lists of names and query plans.

@@ -24,7 +24,7 @@ pub struct Question {
     pub units: Vec<(String, String)>,
 }
 
-/// What is wrong with a question, and what to do.
+/// The fault of a question, and its help.
 pub struct Fault {
     pub found: String,
     pub help: String,
@@ -66,7 +66,7 @@ const TEXT: [&str; 26] = [
     "upper",
 ];
 
-/// What helps with most questions.
+/// The help of most questions.
 pub const CORRECT: &str =
     "correct the query; text goes in 'single quotes', names with odd characters in \"double\" ones";
 

@@ -35,9 +35,9 @@ use crate::dataset::{check_footer, check_pages, guarded, label};
 pub struct Files {
     paths: Vec<PathBuf>,
     schema: SchemaRef,
-    /// What rows obey; all others are left out.
+    /// The condition of rows; others are skipped.
     conditions: Vec<Condition>,
-    /// Which of those come first; others may be left out.
+    /// The order of rows, of which only the first are needed.
     top: Option<Top>,
 }
 
@@ -58,7 +58,7 @@ impl Files {
         &self.schema
     }
 
-    /// Those rows alone that obey `conditions`, and of each part those alone that may be among the first.
+    /// Rows that obey `conditions`, and of each part those that may be among the first.
     pub fn only(mut self, conditions: Vec<Condition>, top: Option<Top>) -> Files {
         (self.conditions, self.top) = (conditions, top);
         self
@@ -207,7 +207,7 @@ pub fn append(rows: &mut DataFrame, more: DataFrame) -> PolarsResult<()> {
     Ok(())
 }
 
-/// What errors of files say.
+/// The messages of file errors.
 const UNREADABLE: &str = "cannot be read as Parquet";
 
 fn unreadable(path: &Path, error: &ParquetError) -> PolarsError {

@@ -24,7 +24,7 @@ pub struct Source {
     pub units: Vec<String>,
     /// The files that it consists of.
     pub paths: Vec<PathBuf>,
-    /// How many files the dataset lacks.
+    /// The number of missing files.
     pub missing: u64,
     /// All rows, as the dataset counts them; unknown of a single file.
     pub rows: Option<u64>,
@@ -36,7 +36,7 @@ pub struct Source {
     pub(super) frame: LazyFrame,
 }
 
-/// What can be asked.
+/// The tables of a query.
 const EXPECTED: &str = "the folder of a dataset, such as results/NAME, or a Parquet or CSV file";
 
 /// The tables in `path`.
@@ -165,7 +165,7 @@ fn csv(path: &Path) -> PolarsResult<DataFrame> {
     CsvReader::new(Cursor::new(bytes)).with_options(options).finish()
 }
 
-/// What a Parquet file says of itself.
+/// The metadata of a Parquet file.
 #[derive(Default)]
 struct Header {
     /// The table that it is a part of.

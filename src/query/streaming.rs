@@ -17,23 +17,23 @@ use super::groups::{Groups, Kind, Measure};
 use super::question::{cast, if_else_null, name};
 use super::walk::{Visit, walk};
 
-/// How a question is answered piece by piece.
+/// The plan of a question that is answered part by part.
 pub struct StreamPlan {
     /// The table.
     pub table: String,
     /// The query that each piece of the table answers.
     pub partial: String,
-    /// The same where it needs no more than counts, sums and extremes of columns.
+    /// The plan of counts, sums and extremes of columns.
     pub groups: Option<Groups>,
-    /// What all rows obey, where `WHERE` is no more than that.
+    /// The condition of all rows, if `WHERE` is a plain condition.
     pub conditions: Vec<Condition>,
-    /// Which rows of a piece come first, where one column of numbers decides.
+    /// The order of rows by one column of numbers.
     pub top: Option<Top>,
-    /// What makes the same of several such answers, together the table [`PARTS`]; where there is none, they are rows.
+    /// The query that merges partial answers in the table [`PARTS`]; `None` concatenates rows.
     pub merge: Option<String>,
-    /// What makes the answer of those, the table [`PARTS`].
+    /// The query that makes the answer from the table [`PARTS`].
     pub finish: Option<String>,
-    /// How the rows are ordered by the columns `__k0`, `__k1`, ...
+    /// The order of rows by the columns `__k0`, `__k1`, ...
     pub keys: Vec<Key>,
     /// Rows to leave out at the start.
     pub offset: usize,
@@ -104,7 +104,7 @@ const SCALAR: [&str; 44] = [
 /// Functions of groups that can be put together.
 const AGGREGATE: [&str; 6] = ["avg", "count", "max", "mean", "min", "sum"];
 
-/// How to answer `query` piece by piece; `None` where all of it has to be there at once.
+/// The part-by-part plan of `query`; `None` if it needs all rows at once.
 pub fn streaming(query: &Query, sources: &[Source]) -> Option<StreamPlan> {
     let SetExpr::Select(select) = query.body.as_ref() else { return None };
     if !is_bare(query) || !is_simple(select) {
@@ -307,7 +307,7 @@ struct TableQuestion<'a> {
 }
 
 impl TableQuestion<'_> {
-    /// Which rows of a piece may be among the first `most`, if the first of `keys` is a column of numbers.
+    /// The rows of a part that may be among the first `most`, if the first of `keys` is a column of numbers.
     fn top(&self, keys: &[Key], most: usize, schema: &Schema) -> Option<Top> {
         let (Expr::Identifier(column), Key { descending, nulls_last }) = (self.ordered.first()?, *keys.first()?) else {
             return None;
@@ -397,7 +397,7 @@ struct AggregateExtractor<'a> {
     keys: &'a [Expr],
     /// Aggregates of a piece, each with the function that merges them.
     partial: Vec<(String, &'static str)>,
-    /// The same of columns, where it is that.
+    /// The column form, if it has one.
     measures: Vec<Option<Measure>>,
 }
 
@@ -481,11 +481,11 @@ fn is_one_of(names: &[&str], function: &Function) -> bool {
     names.contains(&function.name.to_string().to_lowercase().as_str())
 }
 
-/// Which functions a question calls.
+/// The functions that a question calls.
 #[derive(Default)]
 struct Functions {
     aggregates: bool,
-    /// Those that need all rows at once, or are not known.
+    /// Functions that need all rows at once, or are unknown.
     others: bool,
 }
 

@@ -4,7 +4,7 @@ use std::ops::ControlFlow;
 
 use sqlparser::ast::{Expr, Query, Select, TableFactor, VisitMut, VisitorMut};
 
-/// What is done at the parts of a question; `Break` ends the walk.
+/// The visitor of the parts of a question; `Break` ends the walk.
 pub trait Visit {
     /// Before the parts of a query.
     fn query(&mut self, _: &mut Query) -> ControlFlow<()> {

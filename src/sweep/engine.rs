@@ -207,7 +207,7 @@ const QUEUE_PARTS: usize = WRITERS + 1;
 /// it passes that row.
 ///
 /// One part more than there are threads is in progress, so that no thread waits for the end of a part. `take` may hold three more. Large parts
-/// on many threads are limited by [`MAX_BUFFER_BYTES`].
+/// on many threads are limited by `MAX_BUFFER_BYTES`.
 pub fn compute(
     pool: &ThreadPool,
     table: &dyn Table,

@@ -155,7 +155,7 @@ impl Signal {
         self.kept.fetch_add(rows, Ordering::Relaxed);
     }
 
-    /// What the run is doing.
+    /// The current phase.
     pub fn phase(&self) -> Phase {
         match self.phase.load(Ordering::Relaxed) {
             phase if phase == Phase::Checking as u8 => Phase::Checking,

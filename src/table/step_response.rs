@@ -40,7 +40,7 @@ const FIELDS: [Field<Row>; 11] = [
         Column::number(
             "v_trough",
             "v_0",
-            "least velocity from when v = v_f is first met on, at most v_f; 0 below the range of doubles, null if undecided or \
+            "least velocity after v first reaches v_f, at most v_f; 0 if it underflows; null if undecided or \
          not known to rtol",
         ),
         |row| row.of_solution(|response| response.v_trough),
@@ -49,8 +49,8 @@ const FIELDS: [Field<Row>; 11] = [
         Column::number(
             "t_peak",
             "l/v_0",
-            "time of v_peak, good to rtol of itself over the overshoot v_peak/v_f - 1; null where the peak is only approached, \
-         if undecided and if not known to that",
+            "time of v_peak, to a relative rtol over the overshoot v_peak/v_f - 1; null if the peak is only approached, \
+         if undecided, or if not known to that accuracy",
         ),
         |row| row.of_solution(|response| number(response.t_peak)),
     ),

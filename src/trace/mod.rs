@@ -34,7 +34,7 @@ pub const COLUMNS: [Column; 6] = [
 /// Relative difference of velocities, up to which they do not jump. Chosen: above the rounding of every motion.
 const JUMP_RTOL: f64 = 1e-9;
 
-/// Which times are shown.
+/// The times of a trace.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Times {
     /// The fewest between which straight lines are good to [`RANGE_RTOL`] of the range of every column, and to [`VALUE_RTOL`] of velocities and
@@ -79,7 +79,7 @@ impl Trace {
         Some(Trace { moments, v_min, v_max })
     }
 
-    /// The same trace, given in the units of the model, in `units`.
+    /// This trace, converted from the units of the model to `units`.
     pub fn in_units(mut self, units: &Units) -> Trace {
         let size = |column: usize| units.size(unit(column));
         for moment in &mut self.moments {
@@ -123,7 +123,7 @@ pub fn unit(column: usize) -> &'static str {
     }
 }
 
-/// What is before the start and after the end: the contact lifetime does not jump, the velocity may.
+/// The steady states before the start and after the end: theta is continuous, the velocity may jump.
 fn around(motion: &dyn Motion, transition: &Transition) -> [Moment; 2] {
     let (first, last) = (motion.at(0.0), motion.at(1.0));
     let Law { a, b } = transition.law;

@@ -83,7 +83,7 @@ pub fn names() -> impl Iterator<Item = (&'static str, &'static str)> {
 
 /// A protocol that exists: how it moves, and its numbers.
 pub struct TracedPath {
-    /// How it moves.
+    /// The motion.
     pub motion: Box<dyn Motion>,
     /// `Ok`, `BelowBound` or `Unproven`.
     pub status: Status,
@@ -100,7 +100,7 @@ pub struct Parameter {
     pub name: &'static str,
     /// Its value, in the unit of the model.
     pub value: f64,
-    /// That unit.
+    /// The unit.
     pub unit: &'static str,
     /// Its meaning in one line.
     pub doc: &'static str,
@@ -117,7 +117,7 @@ fn bound(bounded: &bool) -> &'static str {
     if *bounded { "v >= 1" } else { "v > 0" }
 }
 
-/// Why there is no protocol.
+/// The reason for a missing protocol.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 pub enum Absence {
     /// The family's reason.
@@ -167,7 +167,7 @@ impl From<Obstacle> for Absence {
 }
 
 impl Protocol {
-    /// What it is, in one line.
+    /// The meaning, in one line.
     pub fn doc(&self, name: &str) -> &'static str {
         match self {
             Protocol::StepResponse { .. } => {
@@ -198,7 +198,7 @@ fn optimum(case: &Case, bounded: bool, rtol: f64) -> Result<TracedPath, Absence>
     };
     let parameters = vec![
         Parameter::new("hamiltonian", value.hamiltonian, "mu_0 sigma v_0", "dW*/dt_f"),
-        Parameter::new("time_at_floor", value.time_at_floor, "l/v_0", "time spent on the bound v = 1"),
+        Parameter::new("time_at_floor", value.time_at_floor, "l/v_0", "time spent on the velocity floor v = 1"),
     ];
     Ok(TracedPath { motion, status: solved.status, work: value.work, parameters })
 }

@@ -12,7 +12,7 @@ use crate::table::STATUS;
 pub const TABLES: [&str; 8] =
     ["optimal", "gap", "gap_min", "best_cubic", "shortcut", "step_response", "compliant", "regularised"];
 
-/// Why a row has no path.
+/// The reason for a missing path.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum Pathless {
     /// A row of this table stands for no protocol, or for many.

@@ -1,4 +1,4 @@
-//! Where to look at a motion: the fewest moments between which straight lines are good, or moments equally spaced.
+//! The sampling of a motion: the fewest points for linear interpolation, or equally spaced points.
 
 use crate::numerics::root::crossing;
 use crate::protocol::{Moment, Motion};
@@ -7,7 +7,7 @@ use crate::protocol::{Moment, Motion};
 /// picture shows.
 pub const RANGE_RTOL: f64 = 1e-4;
 
-/// The same relative to a velocity or a contact lifetime itself. Chosen: logarithmic axes show it over decades.
+/// Interpolation error relative to `v` or `theta`. Chosen: smooth on logarithmic axes.
 pub const VALUE_RTOL: f64 = 0.01;
 
 /// Columns for which that holds: the velocity and the contact lifetime.
@@ -42,7 +42,7 @@ pub struct Samples {
     tolerance: Tolerance,
 }
 
-/// How far straight lines may be from a motion.
+/// The tolerance of linear interpolation.
 #[derive(Debug, Clone, Copy)]
 struct Tolerance {
     /// By the range of each column.
@@ -52,7 +52,7 @@ struct Tolerance {
 }
 
 impl Tolerance {
-    /// What is allowed in a column where its value is `value`.
+    /// The tolerance of a column at `value`.
     fn at(&self, column: usize, value: f64) -> f64 {
         if column >= POSITIVE_COLUMNS {
             return self.range[column];
@@ -117,7 +117,7 @@ impl Samples {
         Some(Samples { samples, tolerance })
     }
 
-    /// As few of the moments as straight lines between them allow.
+    /// The fewest samples within the tolerance.
     pub fn fewest(&self) -> Vec<Moment> {
         let samples = &self.samples;
         let mut rows = vec![samples[0].moment];

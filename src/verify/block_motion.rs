@@ -40,12 +40,12 @@ pub struct BlockState {
     slaved: bool,
 }
 
-/// What is seen on the way.
+/// An event.
 #[derive(Debug, Clone, Copy)]
 pub enum Event {
     /// The velocity turns, at a maximum or a minimum.
     Turn { here: BlockState, top: bool },
-    /// It passes through a level.
+    /// The motion crosses a level.
     Pass { here: BlockState, level: f64, up: bool },
 }
 
@@ -76,7 +76,7 @@ impl Block {
         [slow[0], slow[1], (p - x - self.ratio * y) / (self.mu * x.exp())]
     }
 
-    /// Where `x` follows to, and how fast that moves.
+    /// The slow manifold of `x`, and its rate.
     fn followed(&self, p: f64, y: f64) -> (f64, f64) {
         let rest = p - self.ratio * y;
         let mut x = rest;
@@ -112,7 +112,7 @@ impl Block {
         (8.0 * (at(1.0) - at(-1.0)) - (at(2.0) - at(-2.0))) / (12.0 * step)
     }
 
-    /// How long a turn is about as fast as an error of the velocity's slope, in units of the slopes that it is made of.
+    /// Relative error of the slope of the velocity at a turn.
     pub fn flatness(&self, turn: &BlockState) -> Option<f64> {
         let later = self.advance(turn, 0.1 * LEG)?;
         let bend = (self.speed(&later) - self.speed(turn)) / (later.t - turn.t);
@@ -229,7 +229,7 @@ impl Block {
         Some(())
     }
 
-    /// Where on a leg something vanishes that differs in sign at both places: Illinois method.
+    /// The zero of a function on a leg with a change of sign: Illinois method.
     fn place(
         &self,
         here: &BlockState,

@@ -106,7 +106,7 @@ struct Along<'a> {
     least: f64,
     /// Greatest pull of the spring, in units of `a`.
     pull: f64,
-    /// What the greatest control would stretch the spring by, in the same units.
+    /// The greatest extension of the spring, in the same units.
     reach: f64,
 }
 

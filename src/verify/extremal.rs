@@ -57,7 +57,7 @@ pub fn energy(law: Law, c: f64, theta: f64) -> f64 {
     (1.0 + (law.b - law.a) * theta.ln() + c * theta) / law.a
 }
 
-/// Where `z` gives way to `ln theta` as the variable: the turn, at `z = 0`, is behind.
+/// The value of `z` beyond the turn at which the variable changes to `ln theta`.
 const TURNED: f64 = 0.2;
 
 /// From `theta` at `z_0`, after a hold of `time_at_floor`, until `theta` is `1/v_f`, falling or rising.
@@ -201,7 +201,7 @@ enum Member {
     Start(f64),
     /// `z` at the end of a deceleration.
     End(f64),
-    /// How long it holds before theta falls.
+    /// The time at the floor before theta falls.
     Held(f64),
 }
 

@@ -7,7 +7,7 @@ use crate::model::Transition;
 /// Pieces in which a protocol is integrated, and between which its extremes are looked for.
 const PIECES: usize = 256;
 
-/// What the formula of a protocol gives over `x = t/t_f`.
+/// The formula of a protocol over `x = t/t_f`.
 pub enum Formula {
     /// The velocity.
     Velocity(Box<dyn Fn(f64) -> f64>),

@@ -1,4 +1,4 @@
-//! What becomes of a block after a step, from following it cycle by cycle, and from the cycle that closes.
+//! The long-term behaviour of a block after a step: following cycle by cycle, and the closed cycle.
 
 use super::block_motion::{Block, BlockState, Event};
 
@@ -23,7 +23,7 @@ pub struct Cycle {
     pub period: f64,
     pub high: f64,
     pub low: f64,
-    /// What is left of a small distance from it after a cycle.
+    /// The Floquet multiplier of the cycle.
     pub fraction: f64,
     /// `ln p` and `y` on the section.
     section: [f64; 2],
@@ -156,7 +156,7 @@ struct Watch {
     simulation: Simulation,
     /// The last entry into the band and the speed there; none outside.
     since: Option<(f64, f64)>,
-    /// How close a turn came to an edge of the band.
+    /// The least distance of a turn from an edge of the band.
     edge: f64,
 }
 

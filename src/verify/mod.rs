@@ -58,7 +58,7 @@ pub struct Worst {
     pub column: &'static str,
     /// In units of rtol.
     pub difference: f64,
-    /// What the independent route has.
+    /// The value of the independent route.
     pub expected: String,
     /// Number of the row.
     pub number: u64,
@@ -66,7 +66,7 @@ pub struct Worst {
     pub row: Row,
 }
 
-/// Why a dataset cannot be audited.
+/// The error of an audit.
 #[derive(Debug, thiserror::Error)]
 #[error("{0}")]
 pub struct VerifyError(String);

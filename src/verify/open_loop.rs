@@ -9,7 +9,7 @@ use crate::protocol::SpringBlock;
 /// A small error in `(ln v, ln theta, k s/a)`, column by column.
 type Matrix = [[f64; 3]; 3];
 
-/// How errors grow.
+/// The growth of errors.
 #[derive(Debug, Clone, Copy)]
 pub struct Growth {
     /// Greatest factor from the start to the end.

@@ -50,7 +50,7 @@ const CLASSES: [(&str, f64); 11] = [
     ("from_10", 10.0),
 ];
 
-/// What is known of a landscape once all of it was seen.
+/// The reduction of a landscape.
 #[derive(Default)]
 struct Reduced {
     status: [u64; Status::ALL.len()],
@@ -156,7 +156,7 @@ fn shortcut(sweep: &Sweep, row: u64, cells: &[f64], status: Status) -> Row {
     axes.chain(columns).chain([(STATUS.to_owned(), Cell::Word(status.name().to_owned()))]).collect()
 }
 
-/// Where `gap` stands among the columns of the table `gap`.
+/// The index of `gap` among the columns of the table `gap`.
 const GAP: usize = 2;
 
 impl Reduced {

@@ -40,7 +40,7 @@ impl Moment {
     }
 }
 
-/// What is gathered.
+/// The extremes so far.
 struct MotionExtremes<'a> {
     slider: &'a SpringBlock,
     excess: f64,
@@ -167,7 +167,7 @@ struct Piece {
 /// Slip at the end of the protocol after which theta follows `1/v` there.
 const FOLLOWING: f64 = 5.0;
 
-/// How far an end `rho` times as high as the mean is stretched.
+/// The stretching of an end `rho` times as high as the mean.
 fn stretch(rho: f64) -> f64 {
     if rho > 1.0 { (4.0 * (rho * (1.0 + 10.0 * rho.ln()).powf(-1.0 / 3.0) - 1.0)).max(0.0) } else { 0.0 }
 }

@@ -95,7 +95,7 @@ pub fn check(row: &Row, context: &Context) -> Verdict {
     verdict
 }
 
-/// How close to 0, relative to what it is made of, a number leaves open on which side of 0 it is.
+/// Relative distance from 0 below which the sign of a number is unknown.
 const UNSURE: f64 = 1e-11;
 
 /// Which bound leaves the family without a member, from the extreme protocols of the family integrated: `None` where

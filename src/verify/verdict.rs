@@ -1,10 +1,10 @@
-//! What a check finds in a row: differences, and what it could not check.
+//! The verdict of a check: differences, and skipped checks.
 
 use crate::dataset::{Cell, Row};
 use crate::model::{Law, Transition};
 use crate::table::STATUS;
 
-/// What a check needs to know of the sweep.
+/// The context of a check: properties of the sweep.
 #[derive(Debug, Clone, Copy)]
 pub struct Context {
     pub bounded: bool,
@@ -12,11 +12,11 @@ pub struct Context {
     pub relative: [bool; 2],
 }
 
-/// What a check found in one row.
+/// The verdict on one row.
 #[derive(Debug, Default)]
 pub struct Verdict {
     pub differences: Vec<Difference>,
-    /// Why something could not be checked.
+    /// The reason for a skipped check.
     pub unchecked: Vec<&'static str>,
 }
 
@@ -26,7 +26,7 @@ pub struct Difference {
     pub column: &'static str,
     /// Relative difference; infinite where only one route has a number.
     pub size: f64,
-    /// What the independent route has, in words.
+    /// The value of the independent route, as text.
     pub expected: String,
 }
 

@@ -1,6 +1,6 @@
 """Runs what the book shows: the commands, specs and Python of every page, the examples, and the notebook as a fresh clone opens it.
 
-Usage: documents.py FOLDER [--write] [PAGE ...]
+Usage: documents.py [--write] FOLDER [PAGE ...]
 
 FOLDER holds the program `slipsweep`. Without pages, all of them run, then the examples and the notebook. The blocks of a page run in
 order, in an empty folder of the page's own:
@@ -8,7 +8,9 @@ order, in an empty folder of the page's own:
 - `toml` that begins with `name = "NAME"` is saved as NAME.toml before the first command;
 - `sh` and `python` run;
 - `text` must occur in their standard output;
-- a picture `pictures/NAME.svg` must be a file that they wrote, byte for byte; `--write` copies it to docs/pictures instead.
+- a picture `pictures/NAME.svg` must be a file that they wrote, byte for byte.
+
+`--write` copies the pictures to docs/pictures instead, and replaces a `text` block that is not printed by the whole output of the block before it.
 """
 
 import argparse
@@ -45,7 +47,6 @@ def run(command, folder, variables):
     return done.stdout
 
 
-
 def blocks_of(text):
     """The language and code of every block, in order."""
     return re.findall(r"^```(\w+)\n(.*?)^```$", text, re.MULTILINE | re.DOTALL)
@@ -63,15 +64,23 @@ def run_page(page, variables, write):
         if page.name == "README.md" and page.parent == REPOSITORY:
             # The first of its two commands, which also builds the program.
             run(["slipsweep", "run", str(REPOSITORY / "sweeps/landscape.toml")], folder, variables)
-        printed = ""
+        printed, output = "", ""
+        stale = []
         for language, code in blocks_of(text):
             if language in ("sh", "python"):
                 command = ["bash", "-euo", "pipefail", "-c"] if language == "sh" else [sys.executable, "-c"]
-                printed += run([*command, code], folder, variables)
+                output = run([*command, code], folder, variables)
+                printed += output
                 count += 1
-        for language, code in blocks_of(text):
-            if language == "text" and code not in printed:
-                sys.exit(f"{name}: this output is not printed:\n{code}\nprinted:\n{printed}")
+            elif language == "text":
+                stale.append((code, output))
+        for code, output in stale:
+            if code not in printed:
+                if not write:
+                    sys.exit(f"{name}: this output is not printed:\n{code}\nprinted:\n{printed}")
+                text = text.replace(f"```text\n{code}```", f"```text\n{output}```", 1)
+                page.write_text(text)
+                print(f"{name}: output replaced")
         for picture in re.findall(r"\]\((?:\.\./)*(?:docs/)?pictures/([\w.-]+)\)", text):
             made = Path(folder) / picture
             if not made.is_file():

@@ -50,7 +50,7 @@ fn a_table_names_its_columns_and_units() {
     let head = "optimal: least work of friction of all protocols; v may jump at both ends\n  \
                 at t_f = 0.02, a = 0.03, b = 0.05, v_i = 3, v_f = 100\n  \
                 hamiltonian = 2.59678653: dW*/dt_f\n  \
-                time_at_floor = 0: time spent on the bound v = 1\n  \
+                time_at_floor = 0: time spent on the velocity floor v = 1\n  \
                 work = 3.80811142, v_min = 19.9230141, v_max = 3392.16787\n  \
                 status ok\n  \
                 117 rows; straight lines between them are good to 0.0001 of the range of a column, and to 0.01 of v and theta\n\n  \

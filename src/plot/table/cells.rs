@@ -60,7 +60,7 @@ impl AxisCells {
         AxisCells { middles, scale, even, exact, firsts }
     }
 
-    /// How many there are.
+    /// Their number.
     pub fn len(&self) -> usize {
         self.middles.len()
     }

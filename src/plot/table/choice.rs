@@ -1,4 +1,4 @@
-//! Which axes and columns a picture shows: what varies in the table, unless the user says otherwise.
+//! The choice of axes and columns: varying axes by default, or the request.
 
 use super::Request;
 use super::lines;
@@ -6,7 +6,7 @@ use super::map;
 use super::survey::{Survey, Values};
 use crate::plot::PlotError;
 
-/// What a picture of a table shows by itself.
+/// The defaults of a picture.
 #[derive(Debug, Clone, Copy)]
 pub struct Defaults {
     /// Horizontal axes, the one that is preferred first.
@@ -67,7 +67,7 @@ pub fn choose(survey: &Survey, defaults: &Defaults, request: &Request) -> Result
     Ok(Shape::Lines(lines::Plan { x, y, series }))
 }
 
-/// What a choice depends on.
+/// The inputs of a choice.
 struct Choice<'a> {
     survey: &'a Survey,
     defaults: &'a Defaults,

@@ -3,7 +3,7 @@
 use crate::dataset::frame::Cells;
 use crate::plot::PlotError;
 
-/// How a cell relates to a value.
+/// The relation of a cell to a value.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Relation {
     Equal,
@@ -56,7 +56,7 @@ impl Condition {
         Ok(Condition { column: column.to_owned(), relation, value: value.to_owned() })
     }
 
-    /// It as it may be typed.
+    /// The text of the condition.
     pub fn shown(&self) -> String {
         self.shown_with(&self.value)
     }
@@ -96,7 +96,7 @@ impl Condition {
         (self.relation == Relation::Equal).then_some(self.value.as_str())
     }
 
-    /// The same with another number, as it may be typed on a command line.
+    /// The text of the condition with another number.
     pub fn typed(&self, value: Option<f64>) -> String {
         let value = value.map_or_else(|| self.value.clone(), |value| format!("{value:?}"));
         self.shown_with(value.strip_suffix(".0").unwrap_or(&value)).replace(' ', "")

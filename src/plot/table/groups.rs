@@ -1,4 +1,4 @@
-//! What is left of a table once the axes of a panel are chosen: the values of the further axes, each of which makes a panel or a line.
+//! The groups of a table: values of the axes beyond those of a panel. Each group makes a panel or a line.
 
 use std::cmp::Ordering;
 use std::collections::{HashMap, HashSet};
@@ -58,7 +58,7 @@ pub struct Gridded {
 }
 
 impl Gridded {
-    /// Those of a spec; none of one that is damaged.
+    /// The grid axes of a spec; empty for a damaged spec.
     pub fn of(spec: &str) -> Gridded {
         let mut gridded = Gridded::default();
         let Ok(spec) = spec.parse::<toml::Table>() else { return gridded };
@@ -104,7 +104,7 @@ impl Gridded {
 pub struct Group {
     /// The values, in the order of the axes.
     pub values: Vec<f64>,
-    /// They in words, in markup: only of axes that vary.
+    /// The values in markup, for axes that vary.
     pub name: String,
 }
 
@@ -113,11 +113,11 @@ pub struct Group {
 pub struct Groups {
     /// The axes.
     pub axes: Vec<String>,
-    /// Those that are shown.
+    /// The shown groups.
     pub shown: Vec<Group>,
-    /// How many there are in all.
+    /// The total number.
     pub all: usize,
-    /// How many are not shown.
+    /// The number of omitted ones.
     left_out: usize,
     makes: GroupRole,
     /// Where two axes are crossed, the titles of the rows and of the columns of panels, in markup: the groups fill the rows.

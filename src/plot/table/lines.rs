@@ -25,7 +25,7 @@ const ASPECTS: [f64; 2] = [0.7, 0.45];
 /// Room beyond the first and the last point, as a fraction of the axes. Chosen: no mark touches the frame.
 const ROOM: [f64; 2] = [0.02, 0.06];
 
-/// What lines show.
+/// The plan of lines.
 #[derive(Debug, Clone)]
 pub struct Plan {
     /// Column of the horizontal axis.

@@ -32,7 +32,7 @@ const DOT_ROOM: f64 = 0.04;
 /// Pixels along an axis of a panel whose cells are not equally wide. Chosen: more than its cells.
 const PIXELS: usize = 1024;
 
-/// What a map shows.
+/// The plan of a map.
 #[derive(Debug, Clone)]
 pub struct Plan {
     /// Column of the horizontal axis.
@@ -276,7 +276,7 @@ fn is_scattered(rows: u64, axes: [&Values; 2]) -> bool {
     rows <= (MAX_SCATTERED_RATIO * most) as u64 && rows < (most * least) as u64
 }
 
-/// What a hatched region is, from the status of its rows.
+/// The name of a hatched region, from the status of its rows.
 fn nothing(sheets: &[PanelCells]) -> String {
     let mut seen = [false; Status::ALL.len() + 1];
     for sheet in sheets {

@@ -22,7 +22,7 @@ use choice::{Defaults, Shape};
 pub use condition::Condition;
 use survey::Survey;
 
-/// What is requested.
+/// The request.
 #[derive(Debug, Clone, Default)]
 pub struct Request {
     /// Rows that are shown.
@@ -31,7 +31,7 @@ pub struct Request {
     pub x: Option<String>,
     /// Vertical axis, or the column of lines.
     pub y: Option<String>,
-    /// Column of a map's colours, or the axis that distinguishes lines.
+    /// Colour column of a map, or the axis that distinguishes lines.
     pub colour: Option<String>,
 }
 
@@ -45,22 +45,22 @@ pub struct Source {
     units: Units,
 }
 
-/// What a picture of a table is made of.
+/// The kind of a picture.
 struct Kind {
     table: &'static str,
     title: &'static str,
     defaults: Defaults,
-    /// What the picture adds to lines or a map.
+    /// The additional layers of lines or a map.
     draw: fn(&Scene<'_>, &Shape) -> Result<Figure, PlotError>,
 }
 
-/// What a picture is drawn from.
+/// The source of a picture.
 struct Scene<'a> {
     source: &'a Source,
     survey: &'a Survey,
 }
 
-/// What pictures of the protocol of least work, or nearly so, have in common.
+/// Defaults of pictures of optimal protocols and best shortcuts.
 const OVER_TIME: Defaults = Defaults {
     x: &["t_f", "v_f", "v_i", "b", "a"],
     y: &["v_f", "v_i", "b", "a"],
@@ -72,7 +72,7 @@ const OVER_TIME: Defaults = Defaults {
     scatters: false,
 };
 
-/// What phase diagrams have in common.
+/// Defaults of phase diagrams.
 const ON_A_SPRING: Defaults = Defaults {
     x: &["v_f", "k", "m", "b", "a"],
     y: &["k", "v_i", "m", "b"],
@@ -161,7 +161,7 @@ const KINDS: [Kind; 12] = [
     },
     Kind {
         table: "step_response",
-        title: "What becomes of the response to a step",
+        title: "Outcome of the step response",
         defaults: Defaults {
             classes: &["outcome", "stick_slip"],
             value: &["v_peak", "cycle_peak", "outcome"],
@@ -264,7 +264,7 @@ fn plain(scene: &Scene<'_>, shape: &Shape) -> Result<Figure, PlotError> {
     }
 }
 
-/// What is the same in all rows.
+/// The values common to all rows.
 fn fixed(survey: &Survey, drawn: &[String]) -> String {
     let mut words = Vec::new();
     for axis in survey.axes.iter().filter(|axis| !drawn.contains(&axis.name)) {
@@ -291,7 +291,7 @@ impl Scene<'_> {
         }
     }
 
-    /// What a unit of the model of a quantity is in the units of the dataset.
+    /// The factor of a quantity from the units of the model to those of the dataset.
     fn size(&self, name: &str) -> f64 {
         Quantity::from_name(name).map_or(1.0, |quantity| self.source.units.size(quantity.unit(Scale::Model)))
     }

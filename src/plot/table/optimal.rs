@@ -16,7 +16,7 @@ const MARKED: [&str; 5] = ["t_cheapest", "t_cross", "t_floor", "t_min", "t_turn"
 /// Lines, above which they are not marked. Chosen: more marks hide the curves.
 const MAX_MARKED_LINES: usize = 3;
 
-/// What a transition depends on.
+/// The axes of a transition.
 const AXES: [&str; 4] = ["a", "b", "v_i", "v_f"];
 
 /// Steps along a curve of durations. Chosen: no corner is seen in print.

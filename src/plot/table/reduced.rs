@@ -93,7 +93,7 @@ pub fn histogram(survey: &Survey) -> Result<(Figure, Vec<String>), PlotError> {
     Ok((figure, Vec::new()))
 }
 
-/// Where the classes begin and end: a decade each, also the first and the last, which are open.
+/// The edges of the classes: a decade each, including the open first and last ones.
 fn edges() -> Vec<(f64, f64)> {
     let inner = HISTOGRAM_EDGES;
     let starts = [inner[0] / 10.0].into_iter().chain(inner);
@@ -114,7 +114,7 @@ pub fn quantiles(survey: &Survey) -> Result<(Figure, Vec<String>), PlotError> {
     }
 }
 
-/// What is drawn over an axis: the values of each column, one for each place of the axis; none of a column that was not written.
+/// The values of each column along an axis; empty for a column that was not written.
 struct Quantiles<'a> {
     cells: &'a AxisCells,
     columns: &'a [(&'a str, f64)],

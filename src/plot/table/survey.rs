@@ -1,4 +1,4 @@
-//! What is in a table: its columns, the values of its axes, and its rows, one after the other under conditions.
+//! The content of a table: columns, axis values and selected rows.
 
 use std::borrow::Cow;
 use std::cmp::Ordering;
@@ -99,7 +99,7 @@ pub struct Survey {
     pub missing: u64,
     /// Its labels: text columns that came with the points, and their words.
     pub labels: Vec<(String, Vec<String>)>,
-    /// Which of the axes make up the grid.
+    /// The axes of the grid.
     pub gridded: Gridded,
     parts: Vec<PathBuf>,
     conditions: Vec<Condition>,

@@ -15,7 +15,7 @@ pub(super) struct Ellipse {
     half: [[f64; 2]; 2],
 }
 
-/// What a round of cuts has come to.
+/// The result of a round of cuts.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum Outcome {
     /// Nothing is admissible.
@@ -26,7 +26,7 @@ pub(super) enum Outcome {
     Exhausted,
 }
 
-/// How close is close enough.
+/// The tolerance.
 #[derive(Debug, Clone, Copy)]
 pub(super) enum Until {
     /// The work changes by no more than this fraction in the ellipse.

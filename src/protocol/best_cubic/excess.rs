@@ -48,7 +48,7 @@ struct EndPolynomials {
     n: [f64; 4],
     /// `t_f theta (v - 1)`, whose digits count where the bound presses.
     surplus: [f64; 4],
-    /// That of [`optimal::Position`].
+    /// The [`optimal::Position`].
     margin: [f64; 4],
 }
 
@@ -109,7 +109,7 @@ impl Excess<'_> {
         Some((law.a * dearer + pressed, best.pressure > 0.0))
     }
 
-    /// Where in its half of the way an optimum that holds leaves the bound, by bisection; `None` if it does so elsewhere.
+    /// The point in its half of the path at which an optimum leaves the floor, by bisection; `None` if it is elsewhere.
     fn kink(&mut self, side: &EndPolynomials) -> Option<Option<f64>> {
         let (mut held, mut free) = if side.from_end { (HALF, 0.0) } else { (0.0, HALF) };
         // With no time left nothing holds.
@@ -128,7 +128,7 @@ impl Excess<'_> {
     }
 }
 
-/// Where both sides meet.
+/// The meeting point of both halves.
 const HALF: f64 = 0.5;
 
 /// `W_s - W*` of a shortcut that costs `work`; `None` where the optimal feedback is not to be had on the way.

@@ -26,7 +26,7 @@ pub(super) struct Condition {
     pub of: Bound,
 }
 
-/// What a condition keeps.
+/// The admissible set of a condition.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Bound {
     /// theta above its floor.
@@ -85,7 +85,7 @@ impl<'a> Plane<'a> {
         self.landscape.work_derivatives(&self.path(place), self.basis, stats)
     }
 
-    /// What must not be negative: theta above its floor and velocity above its least, where each is least, and the
+    /// The conditions: theta above its floor and velocity above its least value, at their minima, and the
     /// velocity at both ends.
     pub fn conditions(&self, place: Coefficients) -> [Condition; 4] {
         let path = self.path(place);

@@ -48,7 +48,7 @@ pub(super) struct Bins {
     loads: [PendingBatch; ALL],
     /// The load that each bin fills, then those that are ready, then empty ones.
     order: [usize; ALL],
-    /// How many are ready.
+    /// The number of ready shortcuts.
     ready: usize,
     prepared: [Prepared; READY],
     space: NodeBuffer,

@@ -19,12 +19,12 @@ use crate::numerics::lanes::{LANES, Vector};
 #[derive(Debug, Clone)]
 pub(super) struct Cells {
     frame: Option<Frame>,
-    /// Which frames the cells are of.
+    /// The frames of the cells.
     age: u64,
     of: [Cell; SLOTS],
 }
 
-/// What cells follow from.
+/// The inputs of cells.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Frame {
     ends: Ends,
@@ -42,7 +42,7 @@ struct Cell {
     /// ln rho in units of that for which [`NODE_STEP`] nodes are enough, in powers of the distances from the middle: 1, `u`,
     /// `v` and `u v`.
     pace: [f64; 4],
-    /// Where ln rho is no more than that a shortcut needs a plan of its own; 0 if all of a cell do.
+    /// The value of ln rho below which a shortcut needs its own plan; 0 if all of a cell do.
     least: f64,
     side: f64,
     gap: f64,
@@ -52,7 +52,7 @@ struct Cell {
     to: f64,
 }
 
-/// Which cell: bits of the coordinates of its middle.
+/// The key of a cell: the bits of its centre.
 type CellKey = [u64; 2];
 
 /// Cells that are kept. Chosen: those of two or three lines of a map.
@@ -125,7 +125,7 @@ impl Cells {
         }
     }
 
-    /// Where a cell is kept.
+    /// The slot of a cell.
     #[inline(always)]
     fn slot([i, j]: CellKey) -> u32 {
         i.wrapping_mul(37).wrapping_add(j) as u32 % SLOTS as u32
@@ -418,7 +418,7 @@ fn interpolated([mm, mp, pm, pp, m_low, m_high, low_m, high_m]: [f64; SAMPLES.le
 struct Centres {
     /// Beyond which end: +1 the upper, -1 the lower.
     side: [f32; TOGETHER],
-    /// How far beyond it.
+    /// The distance beyond it.
     gap: [f32; TOGETHER],
     /// Whether all samples of a cell need the same end.
     common: [bool; TOGETHER],
@@ -447,7 +447,7 @@ impl Centres {
     }
 }
 
-/// What the map `r ± s^2` does for the samples of each cell.
+/// The map `r ± s^2` for the samples of each cell.
 struct Squared {
     /// Their focal sums.
     focal: [f32; BLOCK],

@@ -21,7 +21,7 @@ pub(super) struct FrictionBounds {
     pub theta: f64,
 }
 
-/// What either logarithm may take of the friction of 1. Derived: a half, less what rounding costs.
+/// The greatest decrease of friction by either logarithm. Derived: a half, less rounding.
 const HALF: f64 = 0.499;
 
 impl FrictionBounds {
@@ -38,7 +38,7 @@ impl FrictionBounds {
         FrictionBounds { n: ends.t_f * exp(-HALF / a), theta }
     }
 
-    /// Which of eight feasible shortcuts the floors do not settle, a bit for each.
+    /// A bit mask of the feasible shortcuts that the bounds do not decide.
     pub fn open(&self, ends: &Ends, a_2: &Lanes, a_3: &Lanes, status: &[Status; LANES]) -> u32 {
         let mut open = 0;
         for (i, &sure) in self.sure(ends, a_2, a_3).iter().enumerate() {

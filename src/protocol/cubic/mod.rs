@@ -100,7 +100,7 @@ impl Landscape {
 
     /// Evaluates the shortcuts `(a_2[i], a_3[i])`, given scaled: `alpha_2 t_f` and `alpha_3 t_f^2`.
     ///
-    /// As many as the shortest of `a_2`, `a_3` and `out.status` holds.
+    /// The number of shortcuts is the least length of `a_2`, `a_3` and `out.status`.
     pub fn evaluate(&self, a_2: &[f64], a_3: &[f64], out: LandscapeBuffers<'_>) -> SolverStats {
         let LandscapeBuffers { work, v_min, status } = out;
         let count = a_2.len().min(a_3.len()).min(status.len());

@@ -23,7 +23,7 @@ pub(super) struct PanelBatch {
     /// Bounds of the panel, of which one is an end of `[0, 1]`.
     pub low: Lanes,
     pub high: Lanes,
-    /// Which end the map grows from: +1 the upper, -1 the lower.
+    /// The end from which the map grows: +1 the upper, -1 the lower.
     pub side: Lanes,
     /// Distance of the centre of the map beyond that end.
     pub gap: Lanes,
@@ -34,7 +34,7 @@ pub(super) struct PanelBatch {
     pub to: Lanes,
 }
 
-/// What the shortcuts of a landscape fraction of friction.
+/// The friction data common to the shortcuts of a landscape.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Friction {
     a: f64,
@@ -100,7 +100,7 @@ pub(super) struct Prepared {
     kernel: Kernel,
 }
 
-/// What sums a bundle: by its least and its largest power.
+/// The kernel of a batch, by its least and largest power.
 #[derive(Debug, Clone, Copy)]
 enum Kernel {
     Squares,
@@ -249,11 +249,11 @@ macro_rules! kernels {
 }
 
 kernels! {
-    /// Where all maps take one root.
+    /// All maps take one square root.
     squares = 1, true;
-    /// Where none takes more than one.
+    /// No map takes more than one square root.
     square = 1, false;
-    /// Where none takes more than two.
+    /// No map takes more than two square roots.
     fourth = 2, false;
     /// For all maps.
     eighth = 3, false;

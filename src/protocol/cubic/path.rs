@@ -40,7 +40,7 @@ pub(in crate::protocol) struct Path<'a> {
     pub ends: &'a Ends,
     a_2: f64,
     a_3: f64,
-    /// What the coefficients are beyond their doubles.
+    /// The low words of the coefficients.
     low: [f64; 2],
     /// `theta` in powers of `x`.
     theta: Cubic,
@@ -70,7 +70,7 @@ impl<'a> Path<'a> {
         path
     }
 
-    /// What rounding may cost `A_4`, a small difference where `A_2 + A_3` is close to the rise.
+    /// The rounding error of `A_4`, a small difference if `A_2 + A_3` is close to the rise.
     #[inline(always)]
     pub fn slack(&self) -> f64 {
         f64::EPSILON * (self.ends.rise.high.abs() + self.a_2.abs() + self.a_3.abs())

@@ -1,7 +1,7 @@
 //! One panel for each of many shortcuts at a time: the zeros and the power map that suits most of a landscape, without a
 //! branch that a lane treats as another one.
 //!
-//! The same estimate as in [`rules`](super::rules), restricted to what is cheap: the straight rule, and the maps `x = r
+//! The estimate of [`rules`](super::rules), restricted to cheap maps: the straight rule, and the maps `x = r
 //! ± s^2`, `s^4`, `s^8` about the shadow of the most hindering zero on the real axis beyond the nearer end. Where that
 //! needs many nodes, the interval is cut in two, and where that does not help either, `rules` looks further.
 
@@ -67,7 +67,7 @@ pub(super) const MIN_GAP: f64 = 1e-10;
 /// Zeros that may be complex, each followed by its conjugate or by another real one; all others are real.
 pub(super) const PAIRS: [usize; 2] = [1, 3];
 
-/// What a doubtful zero of n counts. Chosen: more than all of theta.
+/// The weight of a doubtful zero of n. Chosen: more than all zeros of theta.
 const DOUBT_OF_N: f32 = 8.0;
 
 /// Whether zeros are computed to few digits; what these leave open is left to the next plan.
@@ -79,7 +79,7 @@ const fn is_coarse<T: Real>() -> bool {
 /// digits of all zeros. Measured (`tests/solver/stress/landscape.rs`).
 const THETA_RANGE: (f64, f64) = (1e-4, 3e3);
 
-/// The same of those of n.
+/// The zeros of n.
 const N_RANGE: (f64, f64) = (1e-10, 1e10);
 
 /// Square of the distance of two zeros of theta, relative to their distance from the end, at least. Derived: single precision has lost
@@ -327,7 +327,7 @@ fn panels<T: Real, const SQUARINGS: u32>(
 }
 /// The powers of maps.
 struct Powers {
-    /// As log2.
+    /// In log2.
     squarings: [f32; BLOCK],
     /// 1 where a larger power might save nodes.
     short: [f32; BLOCK],
@@ -388,7 +388,7 @@ fn powers<T: Real, const SQUARINGS: u32>(
     Powers { squarings, short }
 }
 
-/// How many of the falling limits each focal sum misses.
+/// The number of descending limits that each focal sum misses.
 #[inline(always)]
 fn bins(limits: &[f32; BINS], focal: &[f32; BLOCK]) -> [f32; BLOCK] {
     let mut bin = [0.0f32; BLOCK];

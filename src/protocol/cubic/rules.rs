@@ -1,4 +1,4 @@
-//! Which quadrature a shortcut needs: chosen from the zeros of theta and of `1 - theta'` before the first node is
+//! The quadrature of a shortcut, chosen from the zeros of theta and of `1 - theta'` before the first node is
 //! spent.
 //!
 //! The integrand of the work has poles where `theta = 0` and logarithms where `theta = 0` or `theta' = 1`. On an
@@ -25,7 +25,7 @@ pub(super) enum Map {
     /// `delta = side (gap - s^(2^squarings))`: about a zero at `centre + side gap` beyond the end `centre`, `side =
     /// ±1`.
     Power {
-        /// Which end: +1 the upper, -1 the lower.
+        /// The end: +1 the upper, -1 the lower.
         side: f64,
         /// Distance of the zero from the end.
         gap: f64,
@@ -156,7 +156,7 @@ pub(super) struct Zeros {
 /// Zeros of theta and of `1 - theta'`: three and two.
 pub(super) const ZEROS: usize = 5;
 
-/// Those of theta, which come first.
+/// The zeros of theta, which come first.
 pub(super) const THETA_ZEROS: usize = 3;
 
 /// Distance of a zero, at most. Chosen: none farther away counts.
@@ -174,7 +174,7 @@ pub(super) fn zeros(path: &Path) -> cubic::Zeros<ZEROS> {
     zeros
 }
 
-/// The same for several shortcuts side by side, given about the end; those near the start are not yet [`polished`].
+/// The zeros of several shortcuts, about the end; those near the start are not yet [`polished`].
 #[inline(always)]
 pub(super) fn rough_zeros<T: Real>(theta: [T; 4], n: [T; 3]) -> cubic::Zeros<ZEROS, T> {
     let (q, r) = (cubic_zeros(theta), quadratic_zeros(n));
@@ -391,7 +391,7 @@ fn hindrance(zeros: &Zeros, low: f64, high: f64) -> usize {
     (1..LANES).fold(0, |best, i| if sums[i] < sums[best] { i } else { best })
 }
 
-/// Where a panel is best cut: below the most hindering zero if that lies inside, else in the middle.
+/// The best cut of a panel: below the nearest zero if that lies inside, else in the middle.
 #[inline(always)]
 pub(super) fn cut(low: f64, high: f64, shadow: f64) -> f64 {
     let edge = 0.05 * (high - low);

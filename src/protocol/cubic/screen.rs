@@ -20,7 +20,7 @@ pub(super) const SPAN: usize = 32;
 /// Spans that are looked at together: two ends each.
 pub(super) const SPANS: usize = LANES / 2;
 
-/// What the ends of a span settle.
+/// The decision at the ends of a span.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Verdict {
     pub status: Status,
@@ -31,7 +31,7 @@ pub(super) struct Verdict {
 /// The one status of all shortcuts of each of consecutive spans; `None` where they differ or rounding leaves doubt, and
 /// where a span is not part of a line along one of the coordinates, between its first and its last place.
 ///
-/// What is positive at both ends of a span is positive on all of it, and so is what is negative at both ends for the
+/// Signs at both ends of a span hold on the whole span, for a polynomial that is positive at both, and for one that is negative at both for the
 /// same `x`.
 pub(super) fn settle(ends: &Ends, floors: &FrictionBounds, a_2: &Stretch, a_3: &Stretch) -> [Option<Verdict>; SPANS] {
     let (mut first_2, mut first_3) = ([0.0; LANES], [0.0; LANES]);
@@ -258,7 +258,7 @@ pub(super) fn end_velocities(
     ending(ends, a_2, a_3, status, v_min)
 }
 
-/// The same of a span with one status.
+/// The results of a span with one status.
 #[multiversion(targets(
     "x86_64+avx+avx2+bmi1+bmi2+avx512f+avx512bw+avx512cd+avx512dq+avx512vl",
     "x86_64+avx+avx2+bmi1+bmi2"

@@ -34,7 +34,7 @@ pub(in crate::protocol) struct WorkDerivatives {
 /// Two coefficients that determine a cubic theta between its ends.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(in crate::protocol) enum Basis {
-    /// Those of `x` and `x^2`.
+    /// The coefficients of `x` and `x^2`.
     Start,
     /// Those of `1 - x` and `(1 - x)^2`: where theta falls to far less, it has all but a triple zero at the end, and the
     /// coefficients in `x` are large numbers whose difference counts.
@@ -42,7 +42,7 @@ pub(in crate::protocol) enum Basis {
 }
 
 impl Basis {
-    /// How theta and `n` change with the two, at `x` and at a distance of `rest` from 1.
+    /// The derivatives of theta and `n` with respect to both, at `x`, a distance `rest` from 1.
     pub fn changes(self, x: f64, rest: f64) -> ([f64; 2], [f64; 2]) {
         match self {
             Basis::Start => ([x * rest * (1.0 + x), x * x * rest], [3.0 * x * x - 1.0, x * (3.0 * x - 2.0)]),

@@ -56,7 +56,7 @@ pub(super) struct Arc {
     pub chart: Chart,
 }
 
-/// What one quadrature yields.
+/// The result of one quadrature.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Sums {
     /// Duration of the arc.
@@ -171,7 +171,7 @@ impl Arc {
         }
     }
 
-    /// What is at a coordinate of the chart.
+    /// The integrands at a coordinate of the chart.
     fn edge(&self, at: f64) -> Option<Turning> {
         let w = match self.chart {
             Chart::Turning { ln_theta_h, .. } => at * omega(&self.law, self.friction_at_turn(ln_theta_h), at * at),
@@ -319,7 +319,7 @@ struct Line<const N: usize> {
 }
 
 impl<const N: usize> Line<N> {
-    /// How many pieces of few nodes.
+    /// The number of pieces with few nodes.
     fn pieces(&self) -> u32 {
         self.cut(PIECE_NODES as f64, MOST_PIECES, PIECE_TOLERANCE).0
     }
@@ -355,7 +355,7 @@ pub(super) struct EqualSteps {
     start: f64,
     /// From the start to the end, signed.
     pub length: f64,
-    /// How many.
+    /// The number.
     pub count: u32,
     slice: Slice,
 }
@@ -404,7 +404,7 @@ impl EqualSteps {
         }
     }
 
-    /// What is where, `place` as in [`EqualSteps::time`].
+    /// The point at `place`, as in [`EqualSteps::time`].
     pub fn at(&self, place: f64) -> ArcPoint {
         let along = self.start + place * self.length;
         match &self.slice {
@@ -528,7 +528,7 @@ fn zero_below(slope: f64, friction_a: f64, c: f64, low: f64) -> f64 {
     low - distance.max(CLOSEST)
 }
 
-/// The same in the turning chart, as `X`, whose greatest square on the arc is `grow - 1`; `None` where it is far.
+/// The singularity in the turning chart, as `X`, with greatest square `grow - 1` on the arc; `None` if it is far.
 ///
 /// With `x = ln(theta_h/theta)` it is where `x = k (1 - e^-x)`, `k = c_h/slope`.
 fn last_zero(slope: f64, c_h: f64, grow: f64) -> Option<f64> {
@@ -616,7 +616,7 @@ struct Tally {
     friction_min: Lanes,
 }
 
-/// What `N` nodes, a multiple of the lanes, add to a [`Tally`].
+/// The contribution of `N` nodes, a multiple of the lanes, to a [`Tally`].
 struct Terms<const N: usize> {
     time: [f64; N],
     lag: [f64; N],

@@ -36,7 +36,7 @@ pub struct CrossoverTimes {
     pub work_at_t_turn: Option<f64>,
 }
 
-/// Which of the columns are requested; the others are not computed.
+/// The requested columns; others are not computed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Wanted {
     /// `t_cross` or `work_at_t_cross`.

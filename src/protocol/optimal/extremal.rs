@@ -22,7 +22,7 @@ use crate::numerics::elementary::{exp, exp_m1, ln, ln_1p};
 use crate::numerics::root::Probe;
 use crate::numerics::turning::Turning;
 
-/// What is to be joined: two contact lifetimes, and whether `v >= 1`.
+/// The optimal-control problem: two states, and whether `v >= 1`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Problem {
     pub law: Law,
@@ -53,7 +53,7 @@ pub(super) struct Extremal {
     /// `ln u` at the start and at the end of the arc.
     pub start: f64,
     pub end: f64,
-    /// How the time follows the parameter.
+    /// The time as a function of the parameter.
     rate: Rate,
 }
 
@@ -70,10 +70,10 @@ enum Rate {
     OneWay { gain: f64 },
 }
 
-/// How an arc of a rising problem starts.
+/// The start of an arc of a rising problem.
 struct Leaving {
     time_at_floor: f64,
-    /// What is to be added to the arc's lag.
+    /// The term added to the lag of the arc.
     late: f64,
     /// `ln(theta_s/theta_1)`.
     d: f64,
@@ -98,7 +98,7 @@ impl Problem {
         }
     }
 
-    /// What the growth of theta at rest takes beyond `t_min`, free of cancellation; at most 0.
+    /// The growth of theta at rest beyond `t_min`, without cancellation; at most 0.
     pub fn rest_beyond(&self) -> f64 {
         if !(self.rises() && self.bounded) {
             return 0.0;

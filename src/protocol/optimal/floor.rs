@@ -44,7 +44,7 @@ pub(super) fn c_leaving(law: &Law, theta: f64, ln_theta: f64) -> f64 {
     law.a - (1.0 + law.a + law.b * ln_theta) / theta
 }
 
-/// Where an arc with a given `C` leaves the bound, relative to a reference `theta_r`: `ln(theta_c/theta_r)`.
+/// The state at which an arc with a given `C` leaves the floor, relative to `theta_r`: `ln(theta_c/theta_r)`.
 ///
 /// `kappa` is `theta_r (C - C_leaving(theta_r))`, so that nothing cancels where the arc leaves near the reference. The
 /// equation is `(A - kappa)(e^d - 1) - b d - kappa = 0` with `A = 1 + a + b ln theta_r`, convex and rising at the root

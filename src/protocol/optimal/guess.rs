@@ -10,11 +10,11 @@ use crate::numerics::gauss::rule;
 use crate::numerics::lanes::{LANES, Lanes};
 use crate::numerics::turning::{rough_excess, turning};
 
-/// Where a search starts.
+/// The start of a search.
 pub(super) struct Guess {
     /// The parameter, counted from `q_hold`.
     pub p: f64,
-    /// How far the time is expected to be off, relative.
+    /// The expected relative error of the time.
     pub error: f64,
 }
 
@@ -91,7 +91,7 @@ struct Falling {
 /// Between neighbouring values of `ln u(0+)` that are tried.
 const SPACING: f64 = 0.6;
 
-/// How far they go below the one that seems right: the line comes out high more often than low.
+/// The offset below the predicted value, which is more often too high.
 const LOWER: f64 = 2.7;
 
 /// Least of them.

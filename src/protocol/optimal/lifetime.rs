@@ -14,7 +14,7 @@ pub(super) struct Lifetime {
 }
 
 impl Lifetime {
-    /// That of steady sliding at `v`, `1/v`.
+    /// The state of steady sliding at `v`, `1/v`.
     pub fn steady(v: f64) -> Lifetime {
         Lifetime::with(1.0 / v, (v - 1.0) / v)
     }
@@ -30,7 +30,7 @@ impl Lifetime {
         -self.rest * exp_m1(-time)
     }
 
-    /// What it has become after `time` at `v = 1`.
+    /// The state after `time` at `v = 1`.
     pub fn aged(&self, time: f64) -> Lifetime {
         Lifetime::with(self.theta + self.growth(time), self.rest * exp(-time))
     }

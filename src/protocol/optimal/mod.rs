@@ -22,7 +22,7 @@ use lifetime::Lifetime;
 pub(super) use motion::Optimal as Route;
 pub(super) use route::{PathPoint, PathSegment, lag_at_bound};
 
-/// How the optimal protocol starts.
+/// The start of the optimal protocol.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 #[repr(u8)]
 pub enum Strategy {
@@ -63,7 +63,7 @@ pub struct Optimum {
     pub hamiltonian: f64,
     /// Largest contact lifetime on the way.
     pub theta_max: f64,
-    /// How it starts.
+    /// The start.
     pub strategy: Strategy,
 }
 
@@ -80,7 +80,7 @@ pub fn solve(transition: &Transition, t_f: f64, bounded: bool, rtol: f64) -> Sol
     search::solve(&problem, t_f, rtol)
 }
 
-/// The same protocol, and its motion wherever it has numbers.
+/// The optimal protocol and its motion.
 ///
 /// Time is good to `rtol`, or 1e-12 if that is less, of `t_f`; on the arc also of what is left of it. `v`, `theta` and
 /// `friction` belong to the extremal to a few units in the last place. The costate `beta` is the one of the Hamiltonian
@@ -97,7 +97,7 @@ pub fn motion(
     (solved, route.map(|route| Box::new(route) as Box<dyn Motion>))
 }
 
-/// The same protocol, and the route that it takes.
+/// The optimal protocol and its path.
 pub(super) fn route(transition: &Transition, t_f: f64, bounded: bool, rtol: f64) -> (Solved<Optimum>, Option<Route>) {
     let Some(problem) = Problem::of(transition, bounded).filter(|_| t_f > 0.0 && t_f.is_finite()) else {
         return (Solved { status: Status::Infeasible, value: None, stats: SolverStats::default() }, None);
@@ -115,18 +115,18 @@ pub fn shortest_time(transition: &Transition, bounded: bool) -> Option<f64> {
     Some(Problem::of(transition, bounded)?.t_min())
 }
 
-/// What the optimal protocol would do now.
+/// The optimal feedback: velocity and multipliers.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Feedback {
     /// Its velocity, which may be too small for a number.
     pub v: f64,
     /// Its logarithm.
     pub ln_v: f64,
-    /// How hard the bound is pressed: the derivative of the cost rate with respect to `v` there, 0 off the bound.
+    /// The multiplier of the floor: the derivative of the cost rate with respect to `v`; 0 above the floor.
     pub pressure: f64,
 }
 
-/// Where an optimal protocol may start: on the way to steady sliding.
+/// The start of an optimal protocol, on a path to steady sliding.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Position {
     /// The contact lifetime.

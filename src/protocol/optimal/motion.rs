@@ -18,7 +18,7 @@ pub struct Optimal {
     pub(super) arc: Option<Timed>,
 }
 
-/// How far rounding may take a velocity off the bound.
+/// The rounding error of a velocity at the floor, relative.
 const ROUNDING: f64 = 1e-9;
 
 impl Optimal {
@@ -163,7 +163,7 @@ pub(super) struct Timed {
     pub gone: Vec<f64>,
     /// Time from the start of each piece to the end of the arc, and 0.
     pub left: Vec<f64>,
-    /// What the times of the pieces are to be multiplied with so that they add up.
+    /// The factor that makes the times of the steps add up.
     scale: f64,
     /// When the pieces begin whose times count from the end.
     middle: f64,

@@ -17,7 +17,7 @@ pub enum PathPoint {
     Moving(f64),
 }
 
-/// What happens between two places.
+/// The work, time and slip between two points.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PathSegment {
     /// Duration.
@@ -139,7 +139,7 @@ impl Optimal {
         least
     }
 
-    /// What happens from one place to a later one.
+    /// The work, time and slip from one point to a later one.
     pub fn span(&self, from: PathPoint, to: PathPoint) -> PathSegment {
         let mut span = PathSegment { time: 0.0, lag: 0.0, work: 0.0 };
         if let PathPoint::Held(start) = from {
@@ -237,7 +237,7 @@ pub fn lag_at_bound(theta: f64, time: f64) -> f64 {
 /// Most landmarks of a hold: beyond, nothing changes any more.
 const MOST_MARKS: usize = 100;
 
-/// Where in `[0, most]` a rising function that is 0 at 0 takes a value, by secants of its logarithm inside a bracket.
+/// The argument in `[0, most]` at which a rising function with f(0) = 0 takes a value: bracketed secants of its logarithm.
 fn inverse(value: f64, most: f64, f: impl Fn(f64) -> f64) -> f64 {
     let (mut low, mut high) = (0.0, most);
     let mut last = (most, f(most));

@@ -39,7 +39,7 @@ const NEAR: f64 = 1e-5;
 /// How far from the seam, in the scaled start of the arc or in `ln v(0+)`, a protocol without time at the floor is near it.
 const SEAM: f64 = 1e-3;
 
-/// How far rounding may take a velocity off the bound.
+/// The rounding error of a velocity at the floor, relative.
 const ROUNDING: f64 = 1e-9;
 
 /// Tightest tolerance of a quadrature.
@@ -50,7 +50,7 @@ pub(super) fn solve(problem: &Problem, t_f: f64, rtol: f64) -> Solved<Optimum> {
     find(problem, t_f, rtol).0
 }
 
-/// The same, with the extremal; `None` where there is no solution, or no arc after the floor.
+/// The solution and its extremal; `None` without a solution, or without an arc after the floor.
 pub(super) fn find(problem: &Problem, t_f: f64, rtol: f64) -> (Solved<Optimum>, Option<Extremal>) {
     let beyond = t_f - problem.t_min();
     find_beyond(problem, Time { whole: t_f, beyond, doubt: 2.0 * f64::EPSILON * t_f / beyond }, rtol)
@@ -61,11 +61,11 @@ pub(super) fn find(problem: &Problem, t_f: f64, rtol: f64) -> (Solved<Optimum>, 
 pub(super) struct Time {
     pub whole: f64,
     pub beyond: f64,
-    /// What rounding leaves open of `beyond`, relative.
+    /// The relative rounding error of `beyond`.
     pub doubt: f64,
 }
 
-/// The same, where the time beyond the least may be known better than as a difference.
+/// The solution for a time beyond the least, given without cancellation.
 pub(super) fn find_beyond(problem: &Problem, time: Time, rtol: f64) -> (Solved<Optimum>, Option<Extremal>) {
     let Time { whole: t_f, beyond, doubt } = time;
     let mut stats = SolverStats::default();
@@ -246,7 +246,7 @@ struct Family {
     q_hold: Option<f64>,
 }
 
-/// Where the time depends smoothly on the parameter.
+/// An interval of the parameter in which the time is smooth.
 #[derive(Clone, Copy, PartialEq)]
 struct SmoothInterval {
     /// Beyond `q_hold`.
@@ -263,7 +263,7 @@ impl Family {
     }
 }
 
-/// How good probes have to be.
+/// The tolerance of probes.
 struct Accuracy {
     /// A value this small (relative) needs no further probe: the Newton step from there leaves an error of the order of
     /// its square.
