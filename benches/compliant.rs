@@ -38,7 +38,7 @@ fn main() {
             black_box(open_loop_error(&path(), rtol));
         });
         for samples in [100.0, 1000.0] {
-            let held = |path: &compliant::Path| held_error(path, TIME / samples, rtol);
+            let held = |path: &compliant::CompliantPath| held_error(path, TIME / samples, rtol);
             report(&format!("  sampling_error, {samples} samples"), steps(held(&here).steps), &|| {
                 black_box(held(&path()));
             });
@@ -64,7 +64,7 @@ fn statuses() {
             let slider =
                 SpringBlock { law, k: if k > 1e3 { f64::INFINITY } else { k }, m: if m > 1e-3 { 0.0 } else { m } };
             let (v_i, v_f) = (1.0 + random(1e-9, 1e9), 1.0 + random(1e-9, 1e9));
-            let t_min = Transition { law, v_i, v_f }.least_time();
+            let t_min = Transition { law, v_i, v_f }.min_duration();
             let t_f = t_min + random(1e-9, 1e9) / v_i.max(v_f);
             let found = compliant::solve(&slider, (v_i, v_f), t_f, 1e-10);
             let regular = regularised::solve(&slider, (v_i, v_f), t_f, t_f * random(1e-6, 0.5), true, 1e-10);

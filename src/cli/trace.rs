@@ -302,7 +302,7 @@ impl Arguments {
             "gap" => &[Quantity::Alpha2, Quantity::Alpha3],
             "step_response" | "compliant" => &[Quantity::Stiffness, Quantity::Mass],
             "regularised" => &[Quantity::Stiffness, Quantity::Mass, Quantity::Smoothing],
-            _ if shortcut::find(name).is_some_and(|family| family.heeds_tau_ceiling()) => &[Quantity::FrictionBound],
+            _ if shortcut::find(name).is_some_and(|family| family.uses_tau_ceiling()) => &[Quantity::FrictionBound],
             _ => &[],
         };
         for (quantity, given) in self.given().into_iter().filter(|(quantity, _)| !NEEDED.contains(quantity)) {

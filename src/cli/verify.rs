@@ -78,8 +78,9 @@ fn summary(audit: &Audit) -> String {
             })
             .collect();
         let (column, difference, expected) = (worst.column, units(worst.difference), &worst.expected);
+        let note = if audit.is_converted { " (dimensionless)" } else { "" };
         text.push_str(&format!(
-            "  row {}: {column} differs by {difference} rtol, the check has {expected}\n    {}\n",
+            "  row {}: {column} differs by {difference} rtol, the check has {expected}{note}\n    {}\n",
             worst.number,
             cells.join(", ")
         ));

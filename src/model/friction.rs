@@ -2,14 +2,14 @@
 
 use crate::numerics::elementary::ln_1p;
 
-/// Rate-and-state friction in scaled units: `tau = 1 + a ln v + b ln theta`, `theta' = 1 - theta v`.
+/// Dieterich-Ruina friction with ageing in scaled units: `tau = 1 + a ln v + b ln theta`, `theta' = 1 - theta v`.
 ///
-/// Lengths are in units of `l`, velocities in `v_0`, stresses in `mu_0 sigma`.
+/// Lengths are in units of `l`, velocities in `v_0`, stresses in `mu_0 sigma` (Dieterich 1979, Ruina 1983).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Law {
-    /// Direct effect of the velocity, `a > 0` (dimensionless, `a_SI / mu_0`).
+    /// Direct effect, `a > 0` (dimensionless, `a_SI / mu_0`).
     pub a: f64,
-    /// Effect of the contact lifetime, `b >= 0` (dimensionless, `b_SI / mu_0`).
+    /// Evolution effect, `b >= 0` (dimensionless, `b_SI / mu_0`).
     pub b: f64,
 }
 
@@ -25,20 +25,19 @@ pub struct Transition {
 }
 
 impl Transition {
-    /// Least duration of any protocol with `v >= 1`, `t_min`: 0 unless it slows down, then the time in which contacts
-    /// age from `1/v_i` to `1/v_f` at `v = 1`.
-    pub fn least_time(&self) -> f64 {
+    /// Least duration `t_min` of a protocol with `v >= 1`, in `l/v_0`: the ageing time of a deceleration, 0 otherwise.
+    pub fn min_duration(&self) -> f64 {
         self.ageing_time().max(0.0)
     }
 
-    /// The time in which contacts age from `1/v_i` to `1/v_f` at `v = 1`; negative for an acceleration.
+    /// Time in which contacts age from `1/v_i` to `1/v_f` at `v = 1`, in `l/v_0`; negative for an acceleration.
     pub fn ageing_time(&self) -> f64 {
         let &Transition { v_i, v_f, .. } = self;
         if v_i < v_f {
-            // The shares of both, of which the first may be as small as rounding.
+            // The first factor may be as small as rounding.
             return -ln_1p((v_f - v_i) / v_f / (v_i - 1.0));
         }
-        // In the steps in which the optimum's hold takes it, so that both are the same double.
+        // The operations of the optimum's hold, so that both are the same double.
         let (fall, rest) = ((v_i - v_f) / v_i, (v_f - 1.0) / v_f);
         ln_1p(fall * (1.0 / v_f) / rest)
     }

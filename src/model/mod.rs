@@ -1,4 +1,4 @@
-//! The physics in scaled units: the friction law and the change of velocity that is asked of it; and what the units are.
+//! The physics in scaled units: the friction law, the transition between steady states, and the units.
 
 mod friction;
 mod units;

@@ -1,32 +1,32 @@
-//! The scales of the model, and what its units are in SI.
+//! The scales of the model, and its units in SI.
 
 /// The four scales that make the model dimensionless.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Scales {
     /// Friction coefficient at the velocity `v_0`, `mu_0 > 0`.
     pub mu_0: f64,
-    /// Length over which contacts are renewed, in m.
+    /// Critical slip distance `D_c`, in m.
     pub l: f64,
-    /// Velocity from which on the friction law holds, in m/s.
+    /// Velocity above which the friction law holds, in m/s.
     pub v_0: f64,
-    /// Normal load `sigma` on the interface, in Pa.
+    /// Normal stress `sigma` on the interface, in Pa.
     pub normal_stress: f64,
 }
 
-/// In which units values are given and reported.
+/// The units in which values are given and reported.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub enum Units {
-    /// Those of the model: velocities in `v_0`, lengths in `l`, stresses in `mu_0 sigma`.
+    /// Units of the model: velocities in `v_0`, lengths in `l`, stresses in `mu_0 sigma`.
     #[default]
     Scaled,
-    /// SI, for these scales. Masses, stiffnesses and work are per area of the interface.
+    /// SI units for these scales. Masses, stiffnesses and work are per area of the interface.
     Si(Scales),
 }
 
-/// How large a unit of the model is.
+/// Size of a unit of the model in SI.
 type Size = fn(&Scales) -> f64;
 
-/// Every unit of the model that a column may have, and the same in SI.
+/// Every unit of the model that a column may have, its SI unit and its size.
 const UNITS: [(&str, &str, Size); 13] = [
     ("1", "1", |_| 1.0),
     ("mu_0", "1", |s| s.mu_0),
@@ -38,15 +38,15 @@ const UNITS: [(&str, &str, Size); 13] = [
     ("mu_0 sigma l", "J/m^2", |s| s.mu_0 * s.normal_stress * s.l),
     ("mu_0 sigma v_0", "W/m^2", |s| s.mu_0 * s.normal_stress * s.v_0),
     ("mu_0 sigma l/v_0^2", "kg/m^2", |s| s.mu_0 * s.normal_stress * s.l / (s.v_0 * s.v_0)),
-    // A coefficient that is told relative to the duration stays so, contact lifetimes in units of l/v_0.
+    // A coefficient relative to the duration stays so; contact lifetimes are in l/v_0.
     ("1/t_f", "1/t_f", |_| 1.0),
     ("1/t_f^2", "1/t_f^2", |_| 1.0),
-    // Which of the two it is differs from row to row: the table converts it.
+    // The unit differs from row to row: the table converts it.
     ("1; (v_0/l)^2 for bounded_velocity", "1; 1/s^2 for bounded_velocity", |_| 1.0),
 ];
 
 impl Units {
-    /// The value in these units of what is 1 in `unit`, a unit of the model.
+    /// Size of `unit`, a unit of the model, in these units.
     pub fn size(&self, unit: &str) -> f64 {
         match self {
             Units::Scaled => 1.0,
@@ -54,7 +54,7 @@ impl Units {
         }
     }
 
-    /// What these units call `unit`, a unit of the model.
+    /// Name in these units of `unit`, a unit of the model.
     pub fn name(&self, unit: &'static str) -> &'static str {
         match self {
             Units::Scaled => unit,
@@ -62,7 +62,7 @@ impl Units {
         }
     }
 
-    /// `value`, given in these units, in `unit`.
+    /// Converts `value` from these units to `unit`, a unit of the model.
     pub fn scaled(&self, unit: &str, value: f64) -> f64 {
         value / self.size(unit)
     }
@@ -72,7 +72,7 @@ fn known(unit: &str) -> Option<&'static (&'static str, &'static str, Size)> {
     UNITS.iter().find(|(name, ..)| *name == unit)
 }
 
-/// Whether `unit` can be told in SI; words have none.
+/// Whether `unit` is a unit of the model, or empty for words.
 pub fn is_known(unit: &str) -> bool {
     unit.is_empty() || known(unit).is_some()
 }

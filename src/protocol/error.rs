@@ -1,7 +1,7 @@
-//! How far a work may be off: told by a second solve, as fine as there is.
+//! Error bounds of works, from a second solve at the tightest tolerance.
 //!
-//! Quadratures converge geometrically, so what they leave is the distance from a finer one but for a small share of it,
-//! and rounding is a few units in the last place of what the work is made of.
+//! Quadratures converge geometrically, so their error is the distance from a finer one but for a small fraction of it.
+//! Rounding is a few units in the last place of the terms of the work.
 
 use crate::model::{Law, Transition};
 use crate::numerics::elementary::ln;
@@ -9,40 +9,40 @@ use crate::protocol::optimal::{self, Optimum};
 use crate::protocol::shortcut::{Case, Family, Shortcut};
 use crate::protocol::{Solved, SolverStats, Status};
 
-/// The accuracy of the second solve, the finest that solvers tell from rounding.
+/// Relative tolerance of the second solve: the tightest that solvers resolve from rounding.
 pub const FINEST: f64 = 1e-15;
 
-/// What a solve to [`FINEST`] leaves beside rounding is at most this share of its distance from a coarser one.
+/// Error of a solve to [`FINEST`] without rounding, fraction of its distance from a coarser one, at most. Chosen.
 const LEFT_BY_FINEST: f64 = 0.25;
 
-/// Rounding of a sum of some hundred positive terms, each good to a few units in the last place.
+/// Relative rounding of a sum of some hundred positive terms, each good to a few units in the last place.
 const ROUNDING: f64 = 20.0 * f64::EPSILON;
 
-/// Bound of the error of a number that is `found`, and `finest` by a solve to [`FINEST`]; `scale` is the size of what
-/// it is a sum of.
+/// Error bound of the number `found`, where a solve to [`FINEST`] gives `finest`; `scale` is the size of its terms.
 pub fn bound(found: f64, finest: f64, scale: f64) -> f64 {
     (1.0 + LEFT_BY_FINEST) * (found - finest).abs() + ROUNDING * scale.abs()
 }
 
-/// Bound of the error of the work of a free cubic shortcut of least velocity `v_min` in time `t_f`: its sum without
-/// logarithms is rounded twice as much, and slow sliding and a long theta may take friction to 0 and below, which leaves
-/// less than its terms along the way.
+/// Error bound of the work of a free cubic shortcut of least velocity `v_min` in time `t_f`.
+///
+/// Its sum without logarithms is rounded twice as much. Slow sliding and a long theta may take friction below 0, so that
+/// the work is less than its terms.
 pub fn of_shortcut(transition: &Transition, t_f: f64, v_min: f64, work: f64, finest: f64) -> f64 {
     let Transition { law: Law { a, b }, v_i, v_f } = *transition;
     let terms = 1.0 + a * (-ln(v_min)).max(0.0) + b * ln(v_i.max(v_f));
     bound(work, finest, 2.0 * terms * work.abs().max(v_min * t_f))
 }
 
-/// Bound of the error of a gap `found`, and `finest` by a solve to [`FINEST`], that is a difference of two sums of
-/// about the size `replaced`.
+/// Error bound of the gap `found`, where a solve to [`FINEST`] gives `finest`: a difference of two sums of about the
+/// size `replaced`.
 pub fn of_excess(found: f64, finest: f64, replaced: f64) -> f64 {
     bound(found, finest, found.abs() + 0.5 * replaced.abs())
 }
 
-/// Bound of the error of the work of `optimum`, found by [`optimal::solve`] with the same arguments; `None` where there
-/// is no finer one.
+/// Error bound of the work of `optimum`, found by [`optimal::solve`] with these arguments; `None` where the second solve
+/// fails.
 ///
-/// A work that is a small difference is as sensitive to `t_f` as `dW*/dt_f` says, so that rounding of times counts.
+/// The sensitivity to `t_f` is `dW*/dt_f`, so that rounding of times counts where the work is a small difference.
 pub fn of_optimum(transition: &Transition, t_f: f64, bounded: bool, optimum: &Optimum) -> (Option<f64>, SolverStats) {
     let Solved { status, value, stats } = optimal::solve(transition, t_f, bounded, FINEST);
     let finest = value.filter(|_| status != Status::NotConverged);
@@ -50,16 +50,15 @@ pub fn of_optimum(transition: &Transition, t_f: f64, bounded: bool, optimum: &Op
     (finest.map(|finest| bound(optimum.work, finest.work, scale)), stats)
 }
 
-/// Bound of the error of the work of a `member` of a family, found with the same case; `None` where there is no finer
-/// one.
+/// Error bound of the work of a `member` of a family, found for this case; `None` where the second solve fails.
 ///
-/// A third one, given a little more time, tells what rounding of the time makes of a member that has hardly any to
-/// spare. Where friction is bounded, theta and `v` are powers `e^((tau - 1)/a)`, whose exponent is rounded; the factor by which
-/// velocities far apart raise that was measured.
+/// A third solve with a little more time measures the effect of rounding of the time, which counts near `t_min`. Where
+/// friction is bounded, theta and `v` are powers `e^((tau - 1)/a)`, whose exponent is rounded. The factor for velocities
+/// far apart is measured.
 pub fn of_member(family: &dyn Family, case: &Case, member: &Shortcut, stats: &mut SolverStats) -> Option<f64> {
     let finest = family.solve(case, FINEST, stats).ok()?;
     let Transition { law: Law { a, b }, v_i, v_f } = case.transition;
-    let (exponent, delay) = if family.heeds_tau_ceiling() {
+    let (exponent, delay) = if family.uses_tau_ceiling() {
         (0.05 * (0.25 * ln(v_f / v_i)).powi(4).max(1.0) * (case.tau_ceiling.abs() + b) / a, 1.5 * ROUNDING)
     } else {
         (0.0, 0.5 * ROUNDING)
@@ -69,7 +68,7 @@ pub fn of_member(family: &dyn Family, case: &Case, member: &Shortcut, stats: &mu
     Some(late + bound(member.work, finest.work, (1.0 + exponent) * member.work))
 }
 
-/// Bound of the error of the gap `(work - least)/least` of two works with errors.
+/// Error bound of the gap `(work - least)/least` of two works with errors.
 pub fn of_gap((work, error): (f64, f64), (least, error_least): (f64, f64)) -> f64 {
     (error + (work / least).abs() * error_least) / least.abs() + f64::EPSILON * (work / least).abs().max(1.0)
 }

@@ -1,6 +1,6 @@
-//! A protocol over time: what a trace shows and a check integrates again.
+//! A protocol over time: traces show it, and `verify` integrates it independently.
 
-/// A moment of a protocol, in scaled units.
+/// State of a protocol at one time, in scaled units.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Moment {
     /// Time since the start, `0 <= t <= t_f`.
@@ -17,7 +17,7 @@ pub struct Moment {
     pub beta: Option<f64>,
 }
 
-/// A protocol that can be asked where it is: a curve over a parameter `s` from 0 to 1, along which time never falls.
+/// A protocol as a curve over a parameter `s` from 0 to 1, along which time never falls.
 ///
 /// The parameter stretches layers that are thin in time. `at(0.0)` is just after the jump at the start, `at(1.0)` just
 /// before the jump at the end.
@@ -25,14 +25,13 @@ pub trait Motion: Sync {
     /// Duration `t_f`.
     fn duration(&self) -> f64;
 
-    /// Values of `s`, ascending from 0 to 1, between which the curve is smooth and shows no detail much narrower than
-    /// the piece.
+    /// Values of `s`, ascending from 0 to 1, between which the curve is smooth on the scale of the interval.
     fn landmarks(&self) -> Vec<f64>;
 
-    /// The moment at `s`, clamped to `[0, 1]`.
+    /// State at `s`, clamped to `[0, 1]`.
     fn at(&self, s: f64) -> Moment;
 
-    /// Whether steady sliding at the final velocity follows; not where a motion is looked at up to some time only.
+    /// Whether steady sliding at the final velocity follows; false for a motion that is cut off at some time.
     fn arrives(&self) -> bool {
         true
     }

@@ -1,10 +1,10 @@
-//! The outcome of a solve is data: a status beside the numbers, and the work that was spent on them.
+//! The outcome of a solve as data: a status, the numbers, and the solver statistics.
 
-/// The outcome of a row. The order is that of summaries.
+/// Status of a row. The order is the order in summaries.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 #[repr(u8)]
 pub enum Status {
-    /// Every number is good to the requested tolerance.
+    /// Every number meets the requested tolerance.
     Ok,
     /// Computed, but `0 < v < 1` somewhere: outside the range of the friction law.
     BelowBound,
@@ -14,7 +14,7 @@ pub enum Status {
     NegativeFriction,
     /// `tau <= max(0, b - a)` somewhere on the optimal path, where the extremal need not be unique.
     Unproven,
-    /// A defect of ours: the solver could not certify its answer.
+    /// A defect of the program: the solver could not certify its answer.
     NotConverged,
 }
 
@@ -29,7 +29,7 @@ impl Status {
         Status::NotConverged,
     ];
 
-    /// The name that is written into tables.
+    /// Name in tables.
     pub fn name(self) -> &'static str {
         match self {
             Status::Ok => "ok",
@@ -41,10 +41,10 @@ impl Status {
         }
     }
 
-    /// The status of a path with this least friction, which would have status `self` otherwise.
+    /// Status of a path with this least friction and status `self` otherwise.
     ///
-    /// Negative friction rules out more than a low velocity or an optimum that need not be unique. A path without
-    /// numbers has no friction.
+    /// Negative friction takes precedence over a low velocity and over an optimum that need not be unique. A path
+    /// without numbers has no friction.
     pub fn with_friction(self, least: f64) -> Status {
         match self {
             Status::Ok | Status::BelowBound | Status::Unproven if least < 0.0 => Status::NegativeFriction,
@@ -52,10 +52,10 @@ impl Status {
         }
     }
 
-    /// The status of a row that compares a path of status `self` with the optimum of this status.
+    /// Status of a row that compares a path of status `self` with the optimum of this status.
     ///
-    /// An optimum that need not be the least leaves the row in doubt, and so does one whose own friction is negative;
-    /// negative friction on the path itself is the stronger statement.
+    /// The row is unproven where the optimum need not be the least or has negative friction. Negative friction on the
+    /// path itself takes precedence.
     pub fn compared_with(self, optimum: Status) -> Status {
         match (self, optimum) {
             (Status::Infeasible | Status::NotConverged, _) => self,
@@ -67,12 +67,12 @@ impl Status {
     }
 }
 
-/// Work spent on a solve; exact and the same on every machine.
+/// Statistics of a solve; exact and the same on every machine.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct SolverStats {
-    /// Quadratures evaluated.
+    /// Number of quadratures.
     pub quadratures: u32,
-    /// Quadrature nodes evaluated, all quadratures together.
+    /// Number of quadrature nodes, all quadratures together.
     pub nodes: u32,
 }
 
@@ -83,13 +83,13 @@ impl std::ops::AddAssign for SolverStats {
     }
 }
 
-/// A status, the numbers where there are any, and the effort.
+/// Result of a solve: status, numbers and statistics.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Solved<T> {
     /// The status.
     pub status: Status,
     /// The numbers; `None` wherever the status is `Infeasible` or `NotConverged`.
     pub value: Option<T>,
-    /// Work spent.
+    /// Solver statistics.
     pub stats: SolverStats,
 }

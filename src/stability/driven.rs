@@ -12,9 +12,9 @@
 use crate::model::Law;
 use crate::numerics::elementary::{exp, exp_m1, ln};
 use crate::numerics::stiff::{Accuracy, Integrator, Linearised, Points, System, radau_iia_9};
-use crate::protocol::compliant::Path;
+use crate::protocol::compliant::CompliantPath;
 use crate::protocol::{Motion, SpringBlock};
-use crate::stability::Followed;
+use crate::stability::OpenLoopResult;
 
 /// Samples of one simulation, at most. Chosen: each takes some steps, and a row shall not take minutes.
 const MAX_SAMPLES: f64 = 1e5;
@@ -22,40 +22,40 @@ const MAX_SAMPLES: f64 = 1e5;
 /// Distance from the target at `t_f`, the Euclidean norm in `(ln v, ln theta, k s/a)`, if `v_c` is told continuously:
 /// what `rtol` and the rounding of the protocol leave, amplified from wherever they arise. None where the simulation does
 /// not get there.
-pub fn open_loop_error(path: &Path, rtol: f64) -> Followed {
-    let v_f = path.jet(path.pieces() - 1, 1.0).v[0];
+pub fn open_loop_error(path: &CompliantPath, rtol: f64) -> OpenLoopResult {
+    let v_f = path.jet(path.panels() - 1, 1.0).v[0];
     if path.slider.k == f64::INFINITY {
-        let theta = path.jet(path.pieces() - 1, 1.0).theta;
-        return Followed { number: Some(distance(&path.slider.law, [0.0, ln(theta * v_f)])), steps: 0 };
+        let theta = path.jet(path.panels() - 1, 1.0).theta;
+        return OpenLoopResult { number: Some(distance(&path.slider.law, [0.0, ln(theta * v_f)])), steps: 0 };
     }
     let driven = Driven::new(path, Control::Continuous(path));
     let mut budget = MAX_STEPS;
     let end = driven.follow(driven.start(path), (0.0, 1.0), FIRST_STEP, rtol, &mut budget);
-    Followed { number: end.map(|(state, _)| driven.distance(&state)), steps: MAX_STEPS - budget }
+    OpenLoopResult { number: end.map(|(state, _)| driven.distance(&state)), steps: MAX_STEPS - budget }
 }
 
 /// Distance from the target at `t_f`, as in [`open_loop_error`], if `v_c` is sampled at `0`, `dt`, `2 dt`, … and each sample
 /// is held until the next. None where that takes more than 100,000 or the simulation does not get there,
 /// most often because a held `v_c` stops the block or lets it run away.
-pub fn held_error(path: &Path, dt: f64, rtol: f64) -> Followed {
+pub fn held_error(path: &CompliantPath, dt: f64, rtol: f64) -> OpenLoopResult {
     let t_f = path.duration();
     let samples = (t_f / dt).ceil().max(1.0);
     if samples.is_nan() || samples > MAX_SAMPLES {
-        return Followed { number: None, steps: 0 };
+        return OpenLoopResult { number: None, steps: 0 };
     }
     let (slider, count) = (&path.slider, samples as u32);
     let sample = |i: u32| slider.control(&path.at_time(f64::from(i) * dt));
     // In units of t_f.
     let time = |i: u32| if i == count { 1.0 } else { f64::from(i) * (dt / t_f) };
     if slider.k == f64::INFINITY {
-        let v_f = path.jet(path.pieces() - 1, 1.0).v[0];
+        let v_f = path.jet(path.panels() - 1, 1.0).v[0];
         let (mut theta, mut v) = (path.jet(0, 0.0).theta, v_f);
         for i in 0..count {
             v = sample(i);
             let aged = -exp_m1(-t_f * (time(i + 1) - time(i)) * v);
             theta += (1.0 / v - theta) * aged;
         }
-        return Followed { number: Some(distance(&slider.law, [ln(v / v_f), ln(theta * v_f)])), steps: 0 };
+        return OpenLoopResult { number: Some(distance(&slider.law, [ln(v / v_f), ln(theta * v_f)])), steps: 0 };
     }
     let mut driven = Driven::new(path, Control::Held(0.0));
     let mut budget = MAX_STEPS;
@@ -65,7 +65,7 @@ pub fn held_error(path: &Path, dt: f64, rtol: f64) -> Followed {
         driven.control = Control::Held(sample(i));
         here = driven.follow(state, (time(i), time(i + 1)), h, rtol, &mut budget);
     }
-    Followed { number: here.map(|(state, _)| driven.distance(&state)), steps: MAX_STEPS - budget }
+    OpenLoopResult { number: here.map(|(state, _)| driven.distance(&state)), steps: MAX_STEPS - budget }
 }
 
 /// First step, in units of `t_f`. Chosen: it is shortened as needed.
@@ -81,7 +81,7 @@ const X: usize = 2;
 
 /// What the end of the spring is told.
 enum Control<'a> {
-    Continuous(&'a Path),
+    Continuous(&'a CompliantPath),
     Held(f64),
 }
 
@@ -94,13 +94,13 @@ struct Driven<'a> {
 }
 
 impl<'a> Driven<'a> {
-    fn new(path: &Path, control: Control<'a>) -> Driven<'a> {
-        let v_f = path.jet(path.pieces() - 1, 1.0).v[0];
+    fn new(path: &CompliantPath, control: Control<'a>) -> Driven<'a> {
+        let v_f = path.jet(path.panels() - 1, 1.0).v[0];
         Driven { slider: path.slider, t_f: path.duration(), v_f, control }
     }
 
     /// Steady sliding at the initial velocity.
-    fn start(&self, path: &Path) -> [f64; 3] {
+    fn start(&self, path: &CompliantPath) -> [f64; 3] {
         let Law { a, b } = self.slider.law;
         let x = ln(path.jet(0, 0.0).v[0] / self.v_f);
         [(a - b) * x, -x, x]

@@ -1,6 +1,6 @@
 //! The Hopf point at the critical stiffness: whether small limit cycles live on its unstable side or on its stable one.
 //!
-//! The first Lyapunov coefficient of the slider at `k = k_c` is elementary (docs/theory.md, "The Hopf point"). With `mu =
+//! The first Lyapunov coefficient of the slider at `k = k_c` is elementary (docs/derivations.md, "The Hopf point"). With `mu =
 //! m v^2/a` and `omega^2 = (b - a)/a`, in units of `l/v` for time and of `ln v` for the amplitude,
 //!
 //! ```text

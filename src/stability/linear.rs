@@ -6,7 +6,7 @@
 //! M x^3 + (M + a) x^2 + (k + a - b) x + k = 0,    M = m v^2,
 //! ```
 //!
-//! so only `a`, `b`, `k` and `M` matter (docs/theory.md, "Stability of steady sliding"). The Routh-Hurwitz determinant `H = a k -
+//! so only `a`, `b`, `k` and `M` matter (docs/derivations.md, "Stability of steady sliding"). The Routh-Hurwitz determinant `H = a k -
 //! (b - a)(M + a)` decides stability; it is formed with 32 digits, and so is everything that is small where it is small.
 
 use crate::model::Law;

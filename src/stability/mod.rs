@@ -13,7 +13,7 @@ pub use sensitivity::amplification;
 
 /// What following a protocol open loop yields.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Followed {
+pub struct OpenLoopResult {
     /// The number asked for; `None` where there is none.
     pub number: Option<f64>,
     /// Steps of the integration.

@@ -16,9 +16,9 @@ use nalgebra::{DMatrix, DVectorView, Matrix3};
 
 use crate::numerics::elementary::exp;
 use crate::numerics::radau::{NODES, Radau, radau};
-use crate::protocol::compliant::Path;
+use crate::protocol::compliant::CompliantPath;
 use crate::protocol::{Jet, SpringBlock};
-use crate::stability::Followed;
+use crate::stability::OpenLoopResult;
 
 /// Largest factor by which a small error of the state at the start has grown at the end, both measured by the Euclidean
 /// norm of `(ln v, ln theta, k s/a)`, good to `rtol`, or fewer digits where it is far below 1: the largest singular
@@ -26,18 +26,18 @@ use crate::stability::Followed;
 /// others alone, so that the limits `m -> 0` and `k -> inf` are reached.
 ///
 /// 0 below 1e-30. None where that takes more than 3,000 steps, the flow swinging too often, and beyond the range of doubles.
-pub fn amplification(path: &Path, rtol: f64) -> Followed {
+pub fn amplification(path: &CompliantPath, rtol: f64) -> OpenLoopResult {
     let mut steps = 0;
     let number = growth(path, rtol, &mut steps).filter(|growth| growth.is_finite());
     let number = number.map(|growth| if growth < MIN_AMPLIFICATION { 0.0 } else { growth });
-    Followed { number, steps }
+    OpenLoopResult { number, steps }
 }
 
 /// Amplification, factor, that is given, at least: about the square of the rounding of a double. Every step leaves rounding in the
 /// flow, which decays at the slowest rate from there on: a solution in high precision finds an error of 47 % at 1e-138.
 const MIN_AMPLIFICATION: f64 = 1e-30;
 
-fn growth(path: &Path, rtol: f64, steps: &mut u32) -> Option<f64> {
+fn growth(path: &CompliantPath, rtol: f64, steps: &mut u32) -> Option<f64> {
     let rule = radau();
     let slider = &path.slider;
     let ratio = slider.law.b / slider.law.a;
@@ -48,24 +48,24 @@ fn growth(path: &Path, rtol: f64, steps: &mut u32) -> Option<f64> {
     let mut flow = DMatrix::identity(states, states);
     let mut h = first(slider, &path.jet(0, 0.0));
     let tolerance = (1e-3 * rtol).max(1e-15);
-    for piece in 0..path.pieces() {
-        let span = path.span(piece);
+    for panel in 0..path.panels() {
+        let duration = path.panel_duration(panel);
         let mut from = 0.0;
         while from < 1.0 {
             if *steps == MAX_STEPS {
                 return None;
             }
             *steps += 1;
-            let to = if from + 1.0001 * h / span >= 1.0 { 1.0 } else { from + h / span };
-            let (next, error) = step(path, piece, (from, to), &flow, rule)?;
+            let to = if from + 1.0001 * h / duration >= 1.0 { 1.0 } else { from + h / duration };
+            let (next, error) = step(path, panel, (from, to), &flow, rule)?;
             // What the end lacks is of a higher order than what the nodes lack.
             let error = error * error.sqrt();
             let change = 0.8 * sixteenth((tolerance / error.max(1e-30)).min(1e16));
             if error > tolerance {
-                h = (to - from) * span * change.clamp(0.2, 0.8);
+                h = (to - from) * duration * change.clamp(0.2, 0.8);
             } else {
                 flow = next;
-                h = ((to - from) * span * change.clamp(0.5, 4.0)).max(if to == 1.0 { h } else { 0.0 });
+                h = ((to - from) * duration * change.clamp(0.5, 4.0)).max(if to == 1.0 { h } else { 0.0 });
                 from = to;
             }
         }
@@ -85,12 +85,12 @@ fn growth(path: &Path, rtol: f64, steps: &mut u32) -> Option<f64> {
 const MAX_STEPS: u32 = 3_000;
 
 /// `exp(-int dt/theta)`, by which an error of `ln theta` decays under a given velocity.
-fn decay(path: &Path, rule: &Radau) -> f64 {
-    let exponent = |piece| {
-        let sum: f64 = rule.u.iter().zip(&rule.w).map(|(&u, w)| w / path.jet(piece, u).theta).sum();
-        path.span(piece) * sum
+fn decay(path: &CompliantPath, rule: &Radau) -> f64 {
+    let exponent = |panel| {
+        let sum: f64 = rule.u.iter().zip(&rule.w).map(|(&u, w)| w / path.jet(panel, u).theta).sum();
+        path.panel_duration(panel) * sum
     };
-    exp(-(0..path.pieces()).map(exponent).sum::<f64>())
+    exp(-(0..path.panels()).map(exponent).sum::<f64>())
 }
 
 /// A first step: what the rates at the start allow.
@@ -105,18 +105,18 @@ fn sixteenth(x: f64) -> f64 {
     x.sqrt().sqrt().sqrt().sqrt()
 }
 
-/// The flow after a step over a part of a piece, and the share of it that the nodes do not resolve.
+/// The flow after a step over a part of a panel, and the share of it that the nodes do not resolve.
 fn step(
-    path: &Path,
-    piece: usize,
+    path: &CompliantPath,
+    panel: usize,
     (from, to): (f64, f64),
     flow: &DMatrix<f64>,
     rule: &Radau,
 ) -> Option<(DMatrix<f64>, f64)> {
     let n = flow.nrows();
-    let h = (to - from) * path.span(piece);
+    let h = (to - from) * path.panel_duration(panel);
     let rates: [Matrix3<f64>; NODES] =
-        std::array::from_fn(|j| h * rates(&path.slider, &path.jet(piece, from * rule.rest[j] + to * rule.u[j])));
+        std::array::from_fn(|j| h * rates(&path.slider, &path.jet(panel, from * rule.rest[j] + to * rule.u[j])));
     // X(u_j) - sum_k A_jk M_k X(u_k) = X(0).
     let mut matrix = DMatrix::identity(NODES * n, NODES * n);
     let mut values = DMatrix::zeros(NODES * n, n);

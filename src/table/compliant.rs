@@ -10,7 +10,7 @@ use super::{
 use crate::grid::{Point, Quantity};
 use crate::protocol::compliant::{self, Compliant as Member};
 use crate::protocol::{Solved, SpringBlock, error};
-use crate::stability::{Followed, amplification, held_error, open_loop_error};
+use crate::stability::{OpenLoopResult, amplification, held_error, open_loop_error};
 
 /// A row.
 struct Row {
@@ -122,7 +122,7 @@ fn compute(job: &Job<'_>, range: Range<u64>, buffer: &mut ColumnBuffer) -> Resul
 }
 
 /// The number that a simulation gives; its statistics are added.
-fn value_of(followed: Followed, work: &mut RunStats) -> Option<f64> {
+fn value_of(followed: OpenLoopResult, work: &mut RunStats) -> Option<f64> {
     *work +=
         RunStats { simulations: u64::from(followed.steps > 0), steps: followed.steps.into(), ..RunStats::default() };
     followed.number

@@ -329,7 +329,7 @@ fn buffer(buffer: &mut Vec<f64>, length: usize) -> &mut [f64] {
 
 fn prepare(job: &Job<'_>, group: &Group, point: &Point, work: &mut RunStats) -> Prepared {
     let (transition, t_f) = (transition(point), point[Quantity::Time]);
-    if job.bounded && t_f < transition.least_time() {
+    if job.bounded && t_f < transition.min_duration() {
         return Prepared { landscape: None, finest: None, optimum: None, error_optimal: f64::NAN };
     }
     work.landscapes += 1;

@@ -147,7 +147,7 @@ impl MemberCache {
     fn get(&self, job: &Job<'_>, tuple: u64, point: &Point, work: &mut RunStats) -> Solution {
         let number = point[Quantity::Family] as usize;
         let Some(&family) = FAMILIES.get(number) else { return Err(Obstacle::Domain) };
-        if family.heeds_tau_ceiling() {
+        if family.uses_tau_ceiling() {
             return solve(job, family, point, work);
         }
         self.0.get((tuple, number), || solve(job, family, point, work))
@@ -157,7 +157,7 @@ impl MemberCache {
 fn solve(job: &Job<'_>, family: &dyn Family, point: &Point, work: &mut RunStats) -> Solution {
     let case =
         Case { transition: transition(point), t_f: point[Quantity::Time], tau_ceiling: point[Quantity::FrictionBound] };
-    let t_min = case.transition.least_time();
+    let t_min = case.transition.min_duration();
     if job.bounded && case.t_f < t_min {
         return Err(Obstacle::Time { t_min });
     }

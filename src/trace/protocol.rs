@@ -268,7 +268,7 @@ fn smooth(case: &Case, k: f64, m: f64, rtol: f64) -> Result<TracedPath, Absence>
     let Case { transition: Transition { law, v_i, v_f }, t_f, .. } = *case;
     let slider = SpringBlock { law, k, m };
     let solved = compliant::solve(&slider, (v_i, v_f), t_f, rtol);
-    let t_min = case.transition.least_time();
+    let t_min = case.transition.min_duration();
     let (Some(value), Ok(path)) = (solved.value, compliant::path(&slider, (v_i, v_f), t_f, rtol)) else {
         return Err(match solved.status {
             Status::Infeasible if t_f <= t_min => Absence::Time { t_f, t_min, bounded: true },
@@ -301,7 +301,7 @@ fn member(family: &dyn Family, case: &Case, rtol: f64) -> Result<TracedPath, Abs
     let shortcut = family.solve(case, rtol, &mut SolverStats::default())?;
     let motion = family.motion(case, rtol)?;
     // A step takes any time, but where no protocol arrives it is not counted either.
-    let late = case.t_f < case.transition.least_time();
+    let late = case.t_f < case.transition.min_duration();
     let status = if late { Status::Infeasible } else { shortcut.status() };
     let alpha = shortcut.alpha.into_iter().zip(family.alpha());
     let mut parameters: Vec<_> = alpha.map(|(alpha, doc)| Parameter::new("alpha", alpha, "1", doc)).collect();

@@ -1,6 +1,6 @@
 //! `compliant`: the smooth shortcut integrated over time, its control velocity looked at on the way.
 
-use super::extremal::{least_time, solve};
+use super::extremal::{min_duration, solve};
 use super::formula_path::{Formula, FormulaPath, State, arriving};
 use super::open_loop::{ControlledProtocol, growth, is_stiff};
 use super::verdict::{Context, Verdict, number, transition, word};
@@ -43,7 +43,7 @@ pub fn check(row: &Row, context: &Context, rtol: f64) -> Verdict {
         return Verdict::unchecked("an axis is missing");
     };
     let mut verdict = Verdict::default();
-    let infeasible = t_f <= least_time(&problem);
+    let infeasible = t_f <= min_duration(&problem);
     verdict.status(row, infeasible);
     if infeasible || word(row, STATUS) == Some("infeasible") {
         return verdict;

@@ -1,6 +1,6 @@
 //! `crossover`: the extremals of the defining initial or final conditions, integrated until theta arrives.
 
-use super::extremal::{Extremal, branch, floor, from_end, from_start, least_time};
+use super::extremal::{Extremal, branch, floor, from_end, from_start, min_duration};
 use super::verdict::NEGATIVE;
 use super::{Context, Verdict, transition, word};
 use crate::dataset::Row;
@@ -50,7 +50,7 @@ pub fn check(row: &Row, context: &Context) -> Verdict {
             };
             pair(["t_turn", "work_at_t_turn"], turn, mean);
         }
-        let t_min = least_time(&problem);
+        let t_min = min_duration(&problem);
         let bounded = context.bounded;
         verdict.compare(row, "t_min", bounded.then_some(t_min), (t_min == 0.0).then_some(1.0));
         let work = bounded.then(|| floor(problem.law, 1.0 / problem.v_i, t_min)).flatten();

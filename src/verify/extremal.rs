@@ -129,7 +129,7 @@ fn arc(
 }
 
 /// Shortest duration with `v >= 1`: a hold from `1/v_i` to `1/v_f`.
-pub fn least_time(problem: &Transition) -> f64 {
+pub fn min_duration(problem: &Transition) -> f64 {
     ((problem.v_i - problem.v_f).max(0.0) / (problem.v_i * (problem.v_f - 1.0))).ln_1p()
 }
 
@@ -237,7 +237,7 @@ fn find_held(problem: &Transition, t_f: f64) -> Option<(Extremal, Member)> {
 /// The optimum of this duration, and which member it is.
 fn find(problem: &Transition, t_f: f64, bounded: bool) -> Option<(Extremal, Member)> {
     let accelerates = problem.v_f > problem.v_i;
-    if bounded && t_f > LONG + least_time(problem) {
+    if bounded && t_f > LONG + min_duration(problem) {
         return find_held(problem, t_f);
     }
     let member = |p: f64| if accelerates { Member::Start(p) } else { Member::End(p) };

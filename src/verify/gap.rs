@@ -1,6 +1,6 @@
 //! `gap`: the work of the row's cubic, integrated over time; `W*` by integration of the extremal.
 
-use super::extremal::{least_time, solve};
+use super::extremal::{min_duration, solve};
 use super::route::integrate;
 use super::{Context, Verdict, number, transition, word};
 use crate::dataset::Row;
@@ -23,7 +23,7 @@ pub fn check(row: &Row, context: &Context) -> Verdict {
     if slack.abs() < 1e-9 {
         return Verdict::unchecked("within 1e-9 of the border of feasibility");
     }
-    let infeasible = slack <= 0.0 || context.bounded && t_f < least_time(&problem);
+    let infeasible = slack <= 0.0 || context.bounded && t_f < min_duration(&problem);
     verdict.status(row, infeasible);
     if infeasible || word(row, STATUS) == Some("infeasible") {
         return verdict;

@@ -94,14 +94,14 @@ pub fn coefficient(Law { a, b }: Law, mass: f64) -> Option<f64> {
 /// Size of the coefficient, in units of `a/mass`, below which its sign is a matter of rounding.
 const VAGUE: f64 = 1e-13;
 
-/// Compares `lyapunov`; the forms have `1/mass` in them.
+/// Compares the first Lyapunov coefficient; the forms have `1/mass` in them.
 pub fn compare_coefficient(verdict: &mut Verdict, row: &Row, law: Law, mass: f64, rtol: f64) {
     let expected = coefficient(law, mass);
     let noise = 1e-14 * law.a / mass / rtol;
     verdict.compare(row, "first_lyapunov_coefficient", expected, expected.map(|l| l.abs() + noise));
 }
 
-/// Compares `hopf`.
+/// Compares the type of the Hopf point.
 pub fn compare_kind(verdict: &mut Verdict, row: &Row, law: Law, mass: f64) {
     match coefficient(law, mass) {
         Some(l) if l.abs() < VAGUE * law.a / mass => verdict.miss("Hopf points between the two kinds"),

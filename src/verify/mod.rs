@@ -25,6 +25,7 @@ use std::path::Path;
 
 use crate::dataset::{Folder, Manifest, ManifestTable, Row, frame};
 use crate::grid::{Quantity, Scale};
+use crate::model::Units;
 use crate::sweep::{self, AxisSpec, Spec};
 use crate::table;
 #[cfg(feature = "cli")]
@@ -41,6 +42,8 @@ pub struct Audit {
     pub table: String,
     /// Accuracy promised.
     pub rtol: f64,
+    /// Whether the shown rows are dimensionless, unlike those of the dataset.
+    pub is_converted: bool,
     /// Rows of the sample.
     pub rows: usize,
     /// Differences of each column in units of rtol, ascending.
@@ -94,6 +97,7 @@ pub fn verify(path: &Path, manifest: &Manifest, sample: u64, seed: u64) -> Resul
         let mut audit = Audit {
             table: table.name.clone(),
             rtol,
+            is_converted: !is_reduced && units != Units::Scaled,
             rows: rows.len(),
             columns: Vec::new(),
             worst: Vec::new(),

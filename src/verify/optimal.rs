@@ -1,6 +1,6 @@
 //! `optimal`: the extremal of the row's duration, found again with the integrator.
 
-use super::extremal::{Extremal, branch, energy, least_time, solve_with};
+use super::extremal::{Extremal, branch, energy, min_duration, solve_with};
 use super::{Context, Verdict, number, transition, word};
 use crate::dataset::Row;
 use crate::model::Transition;
@@ -14,7 +14,7 @@ pub fn check(row: &Row, context: &Context) -> Verdict {
         return Verdict::unchecked("an axis is missing");
     };
     let mut verdict = Verdict::default();
-    let infeasible = context.bounded && t_f < least_time(&problem);
+    let infeasible = context.bounded && t_f < min_duration(&problem);
     verdict.status(row, infeasible);
     if infeasible || word(row, STATUS) == Some("infeasible") {
         return verdict;

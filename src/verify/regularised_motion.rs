@@ -1,6 +1,6 @@
 //! `regularised`: its pieces built again between moments of the optimum that a library integrates, and followed.
 
-use super::extremal::{Extremal, least_time, solve};
+use super::extremal::{Extremal, min_duration, solve};
 use super::formula_path::{Formula, FormulaPath, State};
 use super::gap::golden;
 use super::route::integrate;
@@ -340,7 +340,7 @@ pub fn check(row: &Row, context: &Context, rtol: f64) -> Verdict {
         return Verdict::unchecked("an axis is missing");
     };
     let mut verdict = Verdict::default();
-    let overlaps = 2.0 * delta_t > t_f || context.bounded && t_f < least_time(&problem);
+    let overlaps = 2.0 * delta_t > t_f || context.bounded && t_f < min_duration(&problem);
     let infeasible = word(row, STATUS) == Some("infeasible");
     if infeasible && !overlaps && !context.bounded {
         verdict.miss("optima that all but stand still");

@@ -7,7 +7,7 @@ use nalgebra::Matrix3;
 use ode_solvers::dop_shared::OutputType;
 use ode_solvers::{Dop853, SVector, System};
 use slipsweep::model::Law;
-use slipsweep::protocol::compliant::{self, Compliant, Path};
+use slipsweep::protocol::compliant::{self, Compliant, CompliantPath};
 use slipsweep::protocol::{SpringBlock, Status};
 use slipsweep::stability::{amplification, held_error, open_loop_error};
 
@@ -25,7 +25,7 @@ fn solve((slider, velocities, t_f): (SpringBlock, (f64, f64), f64), rtol: f64) -
     solved.value.expect("has a member")
 }
 
-fn path((slider, velocities, t_f): (SpringBlock, (f64, f64), f64)) -> Path {
+fn path((slider, velocities, t_f): (SpringBlock, (f64, f64), f64)) -> CompliantPath {
     compliant::path(&slider, velocities, t_f, 1e-12).expect("has a member")
 }
 

@@ -33,7 +33,7 @@ fn draw(random: &mut Random) -> (Transition, f64) {
     let law = Law { a, b: a * random.between(0.05, 6.0) };
     let (v_i, v_f) = (1.0 + random.between(1e-2, 1e4), 1.0 + random.between(1e-2, 1e4));
     let transition = Transition { law, v_i, v_f };
-    let t_f = transition.least_time().max(0.0) * 1.001 + random.between(1e-2, 1e2) / v_i.max(v_f);
+    let t_f = transition.min_duration().max(0.0) * 1.001 + random.between(1e-2, 1e2) / v_i.max(v_f);
     (transition, t_f)
 }
 

@@ -121,7 +121,7 @@ fn regress_the_least_time_keeps_its_digits_near_the_bound() {
     for (v_i, v_f) in [(1.0011, 1.001), (1.5, 1.001), (1e6, 1.001), (1.001 + 1e-9, 1.001)] {
         let transition = Transition { law: Law { a: 0.03, b: 0.05 }, v_i, v_f };
         let t_min = times(&transition).t_min.expect("exists");
-        assert!(relative(t_min, transition.least_time()) < 1e-15, "{t_min} for {transition:?}");
+        assert!(relative(t_min, transition.min_duration()) < 1e-15, "{t_min} for {transition:?}");
     }
 }
 
@@ -287,7 +287,7 @@ fn regress_decelerations_just_above_the_least_time() {
 fn regress_one_least_time_for_all_tables() {
     for (v_i, v_f) in [(1.0001151707395581, 1.0001054074709168), (8910.897712043236, 166.2593871255176), (100.0, 3.0)] {
         let transition = Transition { law: PAPER.law, v_i, v_f };
-        assert_eq!(times(&transition).t_min, Some(transition.least_time()));
+        assert_eq!(times(&transition).t_min, Some(transition.min_duration()));
     }
 }
 

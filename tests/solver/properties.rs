@@ -58,7 +58,7 @@ fn slowed() -> impl Strategy<Value = Transition> {
 
 /// A time that is feasible, and a matter of the transition.
 fn time(transition: &Transition, fraction: f64) -> f64 {
-    transition.least_time().max(0.0) * (1.0 + fraction) + fraction / transition.v_i
+    transition.min_duration().max(0.0) * (1.0 + fraction) + fraction / transition.v_i
 }
 
 /// The optimum where it is one of the model, else nothing to be said about.

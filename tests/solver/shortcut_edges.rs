@@ -105,7 +105,7 @@ fn edge_time_of_the_hold_and_near_nothing_more() {
     for (v_i, v_f) in [(100.0, 3.0), (1e8, 1.001), (1e8, 1e7), (1.01, 1.001), (3.000003, 3.0)] {
         for b in [0.03, 0.05] {
             let law = Law { a: 0.04, b };
-            let t_min = Transition { law, v_i, v_f }.least_time();
+            let t_min = Transition { law, v_i, v_f }.min_duration();
             let case = case(law, v_i, v_f, t_min * (1.0 + 1e-12));
             for family in FAMILIES {
                 match (family.name(), examine(family, &case)) {

@@ -29,7 +29,7 @@ fn motion(family: &str, case: &Case) -> Box<dyn Motion> {
 const FAMILIES: [&str; 3] = ["step", "cubic", "bounded_velocity"];
 
 /// `ln(v_f/v_i) + ln((v_i - 1)/(v_f - 1))`.
-fn least_time(v_i: f64, v_f: f64) -> f64 {
+fn min_duration(v_i: f64, v_f: f64) -> f64 {
     ((v_i - v_f) / (v_i * (v_f - 1.0))).ln_1p()
 }
 
@@ -67,7 +67,7 @@ fn is_good_to_rtol(family: &str, rows: &[&Row]) {
             let shortcut = solved.unwrap_or_else(|obstacle| panic!("{row:?}: {obstacle}"));
             assert_eq!(shortcut.status().name(), row.text("status"), "{row:?}");
             // t_min is known to a few eps of itself, so alpha near it is known to that fraction of t_f - t_min.
-            let t_min = least_time(v_i, v_f);
+            let t_min = min_duration(v_i, v_f);
             let has_least = family == "bounded_velocity";
             let near = if has_least { 2.0 * f64::EPSILON * t_min.abs() / (t_f - t_min) } else { 0.0 };
             // 1 + (a ln v + b ln theta), of which the second may be large and negative.
@@ -274,7 +274,7 @@ fn reference_the_motion_of_the_step_relaxes() {
 
 #[test]
 fn paper_least_time_of_the_deceleration_is_0_39() {
-    let t_min = least_time(100.0, 3.0);
+    let t_min = min_duration(100.0, 3.0);
     assert!((t_min - 0.39).abs() < 0.01);
     let Err(Obstacle::Time { t_min: found }) = solve("bounded_velocity", &case(PAPER, 100.0, 3.0, 0.39), 1e-10) else {
         panic!("0.39 is too short");
@@ -308,8 +308,8 @@ fn regress_a_cubic_that_dips_below_one_is_returned_and_says_so() {
 fn regress_just_above_the_least_time_v_is_one_but_for_thin_layers() {
     for (v_i, v_f) in [(100.0, 3.0), (1e8, 1.001), (1e8, 1e7), (1.01, 1.001), (3.000003, 3.0)] {
         // The double of the library.
-        let t_min = case(PAPER, v_i, v_f, 1.0).transition.least_time();
-        assert!(relative(t_min, least_time(v_i, v_f)) < 4.0 * f64::EPSILON, "{v_i} {v_f}: {t_min}");
+        let t_min = case(PAPER, v_i, v_f, 1.0).transition.min_duration();
+        assert!(relative(t_min, min_duration(v_i, v_f)) < 4.0 * f64::EPSILON, "{v_i} {v_f}: {t_min}");
         let t_f = t_min * (1.0 + 1e-12);
         let spare = t_f - t_min;
         let shortcut = solve("bounded_velocity", &case(PAPER, v_i, v_f, t_f), 1e-10).expect("has a member");
@@ -375,7 +375,7 @@ fn regress_every_corner_of_the_range_is_solved() {
         for v_f in velocities {
             for fraction in [1e-9, 1e-6, 1e-3, 0.1, 1.0, 10.0, 1e3, 1e6] {
                 for ratio in [0.0, 1.0, 50.0] {
-                    for t_f in [fraction / v_f, least_time(v_i, v_f).max(0.0) * (1.0 + fraction)] {
+                    for t_f in [fraction / v_f, min_duration(v_i, v_f).max(0.0) * (1.0 + fraction)] {
                         let case = case(Law { a: 1e-4, b: 1e-4 * ratio }, v_i, v_f, t_f);
                         for rtol in [1e-6, 1e-10, 1e-13] {
                             match solve("bounded_velocity", &case, rtol) {

@@ -1,7 +1,7 @@
 //! The work of a shortcut above the optimum, without subtracting two works.
 //!
 //! With the value function `V(theta, t)` of the optimal control problem, `W_s - W*` is the integral along the shortcut
-//! of what its velocity costs more than the optimal feedback `v~` would there (docs/theory.md, "The gap without
+//! of what its velocity costs more than the optimal feedback `v~` would there (docs/derivations.md, "The gap without
 //! cancellation"):
 //!
 //! ```text

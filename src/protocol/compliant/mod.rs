@@ -1,4 +1,4 @@
-//! The smooth shortcut: `v`, `v'` and `v''` continuous at both ends, so that a spring of finite stiffness can drive it.
+//! The compliant shortcut: `v`, `v'` and `v''` continuous at both ends, so that a spring of finite stiffness can drive it.
 //!
 //! With `x = t/t_f`, `v = 1 + exp f` and
 //!
@@ -7,27 +7,29 @@
 //! ```
 //!
 //! `v' = v'' = 0` at both ends. Theta at the end falls strictly with `alpha`, from its value for `v = 1`: there is one
-//! member if `t_f` is above `t_min`, and none otherwise. Neither `alpha` nor the work depends on the spring; the
-//! control `v_c = v + (tau' + m v'')/k` does.
+//! member if `t_f` is above `t_min`, and none otherwise. The control velocity `v_c = v + (tau' + m v'')/k` depends on
+//! the spring; `alpha` and the work do not.
 //!
-//! Conditioning. Near `t_min` the layers at both ends have the width `(-alpha)^(-1/3)`: a relative error of `t_f` comes
-//! out `3 t_f/(t_f - t_min)` times as large in `alpha`. For long times `alpha` tends to `10 L`, for which `v''' = 0` at
-//! the end.
+//! Conditioning. Near `t_min` the layers at both ends have the width `(-alpha)^(-1/3)`, and the condition number of
+//! `alpha` in `t_f` is `3 t_f/(t_f - t_min)`. For long times `alpha` tends to `10 L`, for which `v''' = 0` at the end.
 
 mod path;
 
-use super::control::{Extent, Tolerance};
-use super::profile::{Curve, Hermite, Problem, Resolved, Side, Start, pass, reach};
+use super::control::{Tolerance, ValueRange};
+use super::profile::{
+    ArrivalProblem, Hermite, InitialState, ProtocolEnd, ResolvedPanel, VelocityCurve, integrate_theta, panel_variation,
+};
 use super::{Solved, SolverStats, SpringBlock, Status};
 use crate::model::Transition;
 use crate::numerics::elementary::{ln, ln_1p};
 
-pub use path::Path;
+pub use path::CompliantPath;
 
-/// A member, every number to the requested relative accuracy; those of `v_c` to that of the greater of the two.
+/// Compliant shortcut. Every number has the requested relative accuracy; both extremes of `v_c` are relative to the
+/// greater one.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Compliant {
-    /// The coefficient of the shortcut (dimensionless).
+    /// Coefficient of the bump (dimensionless).
     pub alpha: f64,
     /// Work of friction, `int tau v dt`.
     pub work: f64,
@@ -41,18 +43,18 @@ pub struct Compliant {
     pub control_max: f64,
 }
 
-/// Solves for the member of a transition from `v_i` to `v_f` under `slider.law` within `t_f`.
+/// Solves for the shortcut from `v_i` to `v_f` under `slider.law` within `t_f`.
 ///
 /// `Infeasible` where `t_f` is not above `t_min`, or where an argument is outside its domain (`a > 0`, `b >= 0`, `v_i,
 /// v_f > 1`, `t_f > 0`, `m >= 0`, all finite; `k > 0`). `NegativeFriction` where `tau < 0` somewhere.
 pub fn solve(slider: &SpringBlock, (v_i, v_f): (f64, f64), t_f: f64, rtol: f64) -> Solved<Compliant> {
     let mut stats = SolverStats::default();
-    let mut range = Range { work: 0.0, friction_min: f64::INFINITY, control: Extent::NONE };
+    let mut totals = Totals { work: 0.0, friction_min: f64::INFINITY, control: ValueRange::NONE };
     let followed = follow(slider, (v_i, v_f), t_f, rtol, &mut stats, |curve, panel| {
-        let (work, friction_min) = panel.sum(&slider.law, curve);
-        range.work += work;
-        range.friction_min = range.friction_min.min(friction_min);
-        panel.range(curve, Tolerance::OfRange(rtol), &mut range.control, |jet, bend| {
+        let (work, friction_min) = panel.work_and_least_friction(&slider.law, curve);
+        totals.work += work;
+        totals.friction_min = totals.friction_min.min(friction_min);
+        panel.range(curve, Tolerance::OfRange(rtol), &mut totals.control, |jet, bend| {
             [slider.control(jet), slider.control_rate(jet, bend)]
         });
     });
@@ -60,74 +62,85 @@ pub fn solve(slider: &SpringBlock, (v_i, v_f): (f64, f64), t_f: f64, rtol: f64) 
         Ok(curve) => curve,
         Err(status) => return Solved { status, value: None, stats },
     };
-    let turn = curve.exponent.turn().map_or(v_i, |x| 1.0 + curve.surplus(Side::Start, x));
-    let (v_min, v_max) = (v_i.min(v_f).min(turn), v_i.max(v_f).max(turn));
+    let extremum = curve.exponent.extremum().map_or(v_i, |x| 1.0 + curve.above_floor(ProtocolEnd::Start, x));
+    let (v_min, v_max) = (v_i.min(v_f).min(extremum), v_i.max(v_f).max(extremum));
     if slider.k == f64::INFINITY {
-        range.control = Extent { low: v_min, high: v_max };
+        totals.control = ValueRange { low: v_min, high: v_max };
     }
     let value = Compliant {
-        // 0 without a sign.
+        // No negative zero.
         alpha: 0.0 - curve.exponent.c,
-        work: range.work,
+        work: totals.work,
         v_min,
         v_max,
-        control_min: range.control.low,
-        control_max: range.control.high,
+        control_min: totals.control.low,
+        control_max: totals.control.high,
     };
     let numbers = [value.work, value.v_max, value.control_min, value.control_max];
     if numbers.iter().all(|number| number.is_finite()) {
-        Solved { status: Status::Ok.with_friction(range.friction_min), value: Some(value), stats }
+        Solved { status: Status::Ok.with_friction(totals.friction_min), value: Some(value), stats }
     } else {
         Solved { status: Status::NotConverged, value: None, stats }
     }
 }
 
-/// The member over time; `Err` with the status that [`solve`] has where there is none.
-pub fn path(slider: &SpringBlock, (v_i, v_f): (f64, f64), t_f: f64, rtol: f64) -> Result<Path, Status> {
+/// The shortcut over time.
+///
+/// # Errors
+///
+/// The status of [`solve`] where there is no shortcut.
+pub fn path(slider: &SpringBlock, (v_i, v_f): (f64, f64), t_f: f64, rtol: f64) -> Result<CompliantPath, Status> {
     let mut panels = Vec::new();
     let mut stats = SolverStats::default();
     let curve = follow(slider, (v_i, v_f), t_f, rtol, &mut stats, |_, panel| panels.push(*panel))?;
-    Ok(Path::new(*slider, curve, panels))
+    Ok(CompliantPath::new(*slider, curve, panels))
 }
 
-/// What is gathered along the way.
-struct Range {
+/// Sums and extremes along the shortcut.
+struct Totals {
     work: f64,
     friction_min: f64,
-    control: Extent,
+    control: ValueRange,
 }
 
-/// Finds the member and passes along it, and sees whether theta arrives: that the root is one is shown by another route
-/// than found it.
+/// Finds the shortcut, integrates theta along it, and checks that theta arrives: a test of the root by an independent
+/// route.
 fn follow(
     slider: &SpringBlock,
     (v_i, v_f): (f64, f64),
     t_f: f64,
     rtol: f64,
     stats: &mut SolverStats,
-    mut visit: impl FnMut(&Curve<Hermite>, &Resolved),
-) -> Result<Curve<Hermite>, Status> {
+    mut visit: impl FnMut(&VelocityCurve<Hermite>, &ResolvedPanel),
+) -> Result<VelocityCurve<Hermite>, Status> {
     let curve = member(slider, (v_i, v_f), t_f, rtol, stats)?;
-    let theta =
-        pass(&curve, Start::steady(v_i, false), rtol, INTERPOLATION * reach(rtol), stats, |panel| visit(&curve, panel));
+    let theta = integrate_theta(
+        &curve,
+        InitialState::steady(v_i, false),
+        rtol,
+        INTERPOLATION * panel_variation(rtol),
+        stats,
+        |panel| visit(&curve, panel),
+    );
     let arrives = theta.is_some_and(|theta| (theta * v_f - 1.0).abs() <= 10.0 * rtol + ROUNDING);
     if arrives { Ok(curve) } else { Err(Status::NotConverged) }
 }
 
-/// Theta and its rate are interpolated, which takes more nodes than a quadrature.
+/// Variation of the exponent over a panel, fraction of that of a quadrature. Chosen: interpolation of theta and its rate
+/// takes more nodes.
 const INTERPOLATION: f64 = 0.45;
 
-/// What rounding may cost of theta at the end.
+/// Relative rounding error of theta at the end, at most. Chosen.
 const ROUNDING: f64 = 1e-12;
 
-/// The velocity of the member.
+/// Velocity of the shortcut.
 fn member(
     slider: &SpringBlock,
     (v_i, v_f): (f64, f64),
     t_f: f64,
     rtol: f64,
     stats: &mut SolverStats,
-) -> Result<Curve<Hermite>, Status> {
+) -> Result<VelocityCurve<Hermite>, Status> {
     let &SpringBlock { law, k, m } = slider;
     let sound = law.a > 0.0 && law.b >= 0.0 && t_f > 0.0 && v_i > 1.0 && v_f > 1.0 && k > 0.0 && m >= 0.0;
     if !sound || ![law.a, law.b, t_f, v_i, v_f, m].iter().all(|x| x.is_finite()) {
@@ -141,21 +154,22 @@ fn member(
     let (w_i, w_f) = (v_i - 1.0, v_f - 1.0);
     let ratio = (v_f - v_i) / w_i;
     let rise = if ratio > -0.5 { ln_1p(ratio) } else { ln(w_f / w_i) };
-    let curve = Curve::new(1.0, w_f, t_f, Hermite::flat(rise));
+    let curve = VelocityCurve::new(1.0, w_f, t_f, Hermite::flat(rise));
     if v_i == v_f {
         return Ok(curve);
     }
-    let (spare, tight) = (t_f - t_min, t_f < 2.0 * t_min);
-    let problem = Problem::steady(v_i, v_f, curve, spare, tight);
-    // Close to t_min, two layers whose slip is what there is to spare.
+    let (spare, near_t_min) = (t_f - t_min, t_f < 2.0 * t_min);
+    let problem = ArrivalProblem::steady(v_i, v_f, curve, spare, near_t_min);
+    // Near t_min, two layers whose slip is the spare time.
     let layers = 1.8 * t_f / spare;
-    let start = if tight { layers * layers * layers } else { guess(w_i, w_f, rise, t_f, problem.required) };
-    let c = problem.solve(start, rtol, reach(rtol), stats);
+    let start = if near_t_min { layers * layers * layers } else { guess(w_i, w_f, rise, t_f, problem.required) };
+    let c = problem.solve(start, rtol, panel_variation(rtol), stats);
     c.map(|c| curve.with(c)).ok_or(Status::NotConverged)
 }
 
-/// A start for the search: a bump of area `required`, by Laplace's method, about the middle, where `x^3 (1 - x)^3` is
-/// 1/64 with the curvature -3/8 and the quintic has the slope `15/8 L`; a long protocol takes `-10 L`.
+/// Initial guess of `c`: a bump of area `required` about the middle, by Laplace's method; `-10 L` for a long protocol.
+///
+/// In the middle `x^3 (1 - x)^3` is 1/64 with the curvature -3/8, and the quintic has the slope `15/8 L`.
 fn guess(w_i: f64, w_f: f64, rise: f64, t_f: f64, required: f64) -> f64 {
     let excess = ln(required / (t_f * (w_i * w_f).sqrt()));
     let height = |y: f64| (excess + 0.5 * ln(12.0 * y / std::f64::consts::PI) - 0.0732 * rise * rise / y).max(0.5);

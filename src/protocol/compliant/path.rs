@@ -1,48 +1,48 @@
-//! A member over time, with the control that drives it.
+//! The compliant shortcut over time, with the control velocity that drives it.
 
-use crate::protocol::profile::{Curve, Hermite, Resolution, Resolved};
+use crate::protocol::profile::{Hermite, ResolvedPanel, ResolvedProfile, VelocityCurve};
 use crate::protocol::{Jet, Moment, Motion, SpringBlock};
 
-/// The shortcut in pieces that follow each other in time, in each of which it is smooth on the scale of the piece.
-pub struct Path {
-    /// The block and spring that it drives.
+/// The shortcut in consecutive panels; it is smooth on the scale of a panel.
+pub struct CompliantPath {
+    /// The block on its spring.
     pub slider: SpringBlock,
-    resolution: Resolution<Hermite>,
-    /// When each piece begins, and the end.
+    resolution: ResolvedProfile<Hermite>,
+    /// Times at which panels begin, and the end.
     times: Vec<f64>,
 }
 
-impl Path {
-    pub(super) fn new(slider: SpringBlock, curve: Curve<Hermite>, panels: Vec<Resolved>) -> Path {
-        let mut times: Vec<f64> = panels.iter().map(|panel| curve.t_f * panel.place(0.0).0).collect();
+impl CompliantPath {
+    pub(super) fn new(slider: SpringBlock, curve: VelocityCurve<Hermite>, panels: Vec<ResolvedPanel>) -> CompliantPath {
+        let mut times: Vec<f64> = panels.iter().map(|panel| curve.t_f * panel.x_and_z(0.0).0).collect();
         times.push(curve.t_f);
-        Path { slider, resolution: Resolution { law: slider.law, curve, panels }, times }
+        CompliantPath { slider, resolution: ResolvedProfile { law: slider.law, curve, panels }, times }
     }
 
-    /// Number of pieces.
-    pub fn pieces(&self) -> usize {
+    /// Number of panels.
+    pub fn panels(&self) -> usize {
         self.resolution.panels.len()
     }
 
-    /// Duration of a piece.
-    pub fn span(&self, piece: usize) -> f64 {
-        self.resolution.panels[piece].duration(&self.resolution.curve)
+    /// Duration of a panel, in `l/v_0`.
+    pub fn panel_duration(&self, panel: usize) -> f64 {
+        self.resolution.panels[panel].duration(&self.resolution.curve)
     }
 
-    /// The moment at a share `u` of a piece, from 0 to 1.
-    pub fn jet(&self, piece: usize, u: f64) -> Jet {
-        self.resolution.panels[piece].jet(&self.resolution.curve, u)
+    /// State at the fraction `u` of a panel.
+    pub fn jet(&self, panel: usize, u: f64) -> Jet {
+        self.resolution.panels[panel].jet(&self.resolution.curve, u)
     }
 
-    /// The moment at a time, clamped to `[0, t_f]`.
+    /// State at a time, clamped to `[0, t_f]`.
     pub fn at_time(&self, t: f64) -> Jet {
-        let piece = self.times.partition_point(|&start| start <= t).clamp(1, self.pieces()) - 1;
-        let u = (t - self.times[piece]) / self.span(piece);
-        self.jet(piece, u.clamp(0.0, 1.0))
+        let panel = self.times.partition_point(|&start| start <= t).clamp(1, self.panels()) - 1;
+        let u = (t - self.times[panel]) / self.panel_duration(panel);
+        self.jet(panel, u.clamp(0.0, 1.0))
     }
 }
 
-impl Motion for Path {
+impl Motion for CompliantPath {
     fn duration(&self) -> f64 {
         self.resolution.duration()
     }
@@ -52,9 +52,9 @@ impl Motion for Path {
     }
 
     fn at(&self, s: f64) -> Moment {
-        let along = s.clamp(0.0, 1.0) * self.pieces() as f64;
-        let piece = (along as usize).min(self.pieces() - 1);
-        let v_c = self.slider.control(&self.jet(piece, along - piece as f64));
+        let along = s.clamp(0.0, 1.0) * self.panels() as f64;
+        let panel = (along as usize).min(self.panels() - 1);
+        let v_c = self.slider.control(&self.jet(panel, along - panel as f64));
         Moment { v_c: Some(v_c), ..self.resolution.at(s) }
     }
 }

@@ -1,7 +1,7 @@
 //! A regular arc of an extremal, and its quadrature: time, work and the derivative of time.
 //!
 //! Along an arc `C = a v + beta` is constant and `u = theta v` obeys `u - 1 - ln u = E(theta)` with `E = [1 + (b - a)
-//! ln theta + C theta]/a`, so `theta' = 1 - U(w)`, `w^2 = 2 E` (docs/theory.md, "The optimum is a quadrature"). Two
+//! ln theta + C theta]/a`, so `theta' = 1 - U(w)`, `w^2 = 2 E` (docs/derivations.md, "The optimum is a quadrature"). Two
 //! charts cover every arc without cancellation; both refer `E` to a point where it is known:
 //!
 //! - the **turning chart** `theta = theta_h/(1 + X^2)`, `X < 0` while theta rises and `X > 0` while it falls, is
@@ -80,7 +80,7 @@ pub(super) struct Sums {
 /// them if it falls below 0 there.
 ///
 /// With `tau = 1 + a ln u + (b - a) ln theta = a (u - 1) - C theta` the rate `theta tau' = tau + a - b u` vanishes where
-/// `theta = (a - b) u/C`. There equation (2) of docs/theory.md is `u - 1 - ln u = [1 + a - b + (b - a) ln((a - b)/C)]/b`,
+/// `theta = (a - b) u/C`. There equation (2) of docs/derivations.md is `u - 1 - ln u = [1 + a - b + (b - a) ln((a - b)/C)]/b`,
 /// and `tau = b u - a` is a minimum for `(u - 1)(b - a) < 0`: while theta rises for `b > a`, while it falls for `b < a`.
 pub(super) fn least_friction(law: &Law, c: f64, ends: [(f64, f64); 2]) -> f64 {
     let Law { a, b } = *law;

@@ -56,7 +56,7 @@ pub struct Wanted {
 /// All special times of a transition, to relative accuracy `rtol`; `bounded` says whether `v >= 1` is imposed (`t_min`
 /// and the window without hold do not exist otherwise).
 ///
-/// Each is one quadrature, no search over `t_f` (docs/theory.md, "Crossover times"). The status is `Unproven` where
+/// Each is one quadrature, no search over `t_f` (docs/derivations.md, "Crossover times"). The status is `Unproven` where
 /// friction falls to `max(0, b - a)` on one of the paths, `NegativeFriction` where it falls below 0, `Infeasible` outside the domain of the law, `NotConverged`
 /// where a quadrature failed.
 pub fn solve(

@@ -1,7 +1,7 @@
 //! The one-parameter family of extremals between two contact lifetimes, ordered so that the total time is monotone in
 //! the parameter.
 //!
-//! The parameter `q` is 0 where the turning point sits at the end of larger theta (docs/theory.md, "One parameter for
+//! The parameter `q` is 0 where the turning point sits at the end of larger theta (docs/derivations.md, "One parameter for
 //! every case"):
 //!
 //! - falling problems (`theta_0 >= theta_1`): `q > 0` is `ln u(0+)`, theta falls at once; `q < 0` is the scaled start

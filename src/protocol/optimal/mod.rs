@@ -1,7 +1,7 @@
 //! The optimal protocol: least work of friction from `(v_i, 1/v_i)` to `(v_f, 1/v_f)` in time `t_f`.
 //!
-//! It is a quadrature and one scalar root (docs/theory.md): a regular `arc` along which `C` is conserved, under the
-//! bound `v >= 1` after a `hold`; the family of such `extremal`s has one parameter, in which the time is monotone.
+//! It is a quadrature and one scalar root (docs/derivations.md): a regular `arc` along which `C` is conserved, under the
+//! bound `v >= 1` after time at the `floor`; the family of such `extremal`s has one parameter, in which the time is monotone.
 
 mod arc;
 pub mod crossover;

@@ -6,7 +6,7 @@ use super::motion::{Optimal, Timed};
 use crate::model::Law;
 use crate::numerics::elementary::{exp, exp_m1, ln};
 use crate::numerics::radau::radau;
-use crate::protocol::control::{Extent, Jet, SpringBlock, Tolerance};
+use crate::protocol::control::{Jet, SpringBlock, Tolerance, ValueRange};
 
 /// A place on the protocol.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -162,7 +162,7 @@ impl Optimal {
     }
 
     /// Takes the range of `v_c` between two places into `extent`, turns good to `rtol`.
-    pub fn control(&self, slider: &SpringBlock, from: PathPoint, to: PathPoint, rtol: f64, extent: &mut Extent) {
+    pub fn control(&self, slider: &SpringBlock, from: PathPoint, to: PathPoint, rtol: f64, extent: &mut ValueRange) {
         if let PathPoint::Held(start) = from {
             // v_c = 1 + (b/k) theta'/theta falls all the way.
             let end = if let PathPoint::Held(end) = to { end } else { self.floor.time };
@@ -187,7 +187,8 @@ impl Optimal {
                     let pace = arc.pieces.time(before.0, after.0) / (after.0 - before.0);
                     let along = |place, [value, slope]: [f64; 2]| (place, [value, pace * slope]);
                     let (first, last) = (along(before.0, before.1), along(after.0, after.1));
-                    extent.turn(first, last, Tolerance::OfRange(rtol), |place| along(place, moment_at(place)).1);
+                    extent
+                        .add_interval(first, last, Tolerance::OfRange(rtol), |place| along(place, moment_at(place)).1);
                 }
                 before = after;
             }

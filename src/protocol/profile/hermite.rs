@@ -1,13 +1,13 @@
-//! The exponent that meets value, slope and curvature at both ends, with one term more that meets nothing.
+//! Exponent with given value, slope and curvature at both ends, and a free bump.
 //!
-//! `f = Q(x) + rise S(xi) - c x^3 (1 - x)^3`: the quintic `Q` has the slopes and curvatures and no rise, `S = 10 xi^3 -
-//! 15 xi^4 + 6 xi^5` the rise alone. It runs over the stretched place `xi = (1 + p) x/(1 + p x + q z)`, `z = 1 - x`:
-//! with `p > 0` the start is opened, with `q > 0` the end.
+//! `f = Q(x) + rise S(xi) - c x^3 (1 - x)^3`. The quintic `Q` has the slopes and curvatures and no rise; `S = 10 xi^3 -
+//! 15 xi^4 + 6 xi^5` has the rise alone. The stretched variable is `xi = (1 + p) x/(1 + p x + q z)`, `z = 1 - x`:
+//! `p > 0` stretches the start, `q > 0` the end.
 
 use super::Exponent;
-use super::curve::{Panel, Side, Stretches};
+use super::curve::{Panel, PanelRanges, ProtocolEnd};
 
-/// The exponent.
+/// The Hermite exponent.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Hermite {
     /// `f(1) - f(0)`.
@@ -22,16 +22,16 @@ pub struct Hermite {
     pub c: f64,
 }
 
-/// `x^3 (1 - x)^3` in powers of `x`, or of `1 - x`, from the first on.
+/// Coefficients of `x^3 (1 - x)^3` in powers of `x`, or of `1 - x`, from the first on.
 const BUMP: [f64; 6] = [0.0, 0.0, 1.0, -3.0, 3.0, -1.0];
 
-/// `S` in powers of `xi`, from the first on; that of `1 - xi` is 1 less it.
+/// Coefficients of `S` in powers of `xi`, from the first on; `S(1 - xi) = 1 - S(xi)`.
 const STEP: [f64; 6] = [0.0, 0.0, 10.0, -15.0, 6.0, 0.0];
 
-/// Steps after which Newton's method, which runs down a convex polynomial of degree six, is close enough.
-const MOST_STEPS: u32 = 100;
+/// Newton steps on a convex polynomial of degree six, at most. Chosen: it converges from one side.
+const MAX_STEPS: u32 = 100;
 
-/// The stretched place and its derivatives in `x`.
+/// The stretched variable `xi` and its derivatives in `x`.
 struct Stretched {
     xi: f64,
     /// `1 - xi`.
@@ -42,7 +42,7 @@ struct Stretched {
 }
 
 impl Hermite {
-    /// Between ends of no slope and no curvature, nothing stretched.
+    /// Exponent without slopes and curvatures at the ends, not stretched.
     pub fn flat(rise: f64) -> Hermite {
         Hermite { rise, start: [0.0; 2], end: [0.0; 2], stretch: [0.0; 2], c: 0.0 }
     }
@@ -50,20 +50,20 @@ impl Hermite {
     #[inline(always)]
     fn stretched(&self, x: f64, z: f64) -> Stretched {
         let [p, q] = self.stretch;
-        let share = 1.0 / (1.0 + p * x + q * z);
-        let d1 = (1.0 + p) * (1.0 + q) * share * share;
-        let bend = (p - q) * share;
+        let inverse = 1.0 / (1.0 + p * x + q * z);
+        let d1 = (1.0 + p) * (1.0 + q) * inverse * inverse;
+        let bend = (p - q) * inverse;
         Stretched {
-            xi: (1.0 + p) * x * share,
-            zeta: (1.0 + q) * z * share,
+            xi: (1.0 + p) * x * inverse,
+            zeta: (1.0 + q) * z * inverse,
             d1,
             d2: -2.0 * d1 * bend,
             d3: 6.0 * d1 * bend * bend,
         }
     }
 
-    /// Coefficients about a place, from the first power of the distance on, measured away from the nearer end: of what
-    /// is not stretched, and of what is; and the signs of the two directions.
+    /// Taylor coefficients from the first power on, in the distance away from the nearer end: of `Q` with the bump in
+    /// `x`, of `rise S` in `xi`, and the signs of the two directions.
     fn about(&self, x: f64, z: f64, at: &Stretched) -> ([f64; 6], [f64; 6], [f64; 2]) {
         let ([p, q], [s, t]) = if x <= z {
             (self.start, self.end)
@@ -85,7 +85,7 @@ impl Hermite {
         (shifted(&plain, x.min(z)), shifted(&step, at.xi.min(at.zeta)), signs)
     }
 
-    /// The first three derivatives.
+    /// The first three derivatives in `x`.
     pub fn derivatives(&self, x: f64, z: f64) -> [f64; 3] {
         let at = self.stretched(x, z);
         let (plain, step, signs) = self.about(x, z, &at);
@@ -98,14 +98,14 @@ impl Hermite {
         ]
     }
 
-    /// `x` of the only turn inside, for [`Hermite::flat`] ends.
-    pub fn turn(&self) -> Option<f64> {
+    /// `x` of the only extremum inside, for [`Hermite::flat`] ends.
+    pub fn extremum(&self) -> Option<f64> {
         let x = 0.5 - 5.0 * self.rise / self.c;
         (x > 0.0 && x < 1.0).then_some(x)
     }
 }
 
-/// A polynomial about another place, without its constant term (Taylor's shift by Horner's scheme).
+/// Coefficients of a polynomial about `d`, without the constant term (Taylor shift by Horner's scheme).
 fn shifted(powers: &[f64; 6], d: f64) -> [f64; 6] {
     let mut t = [0.0, powers[0], powers[1], powers[2], powers[3], powers[4], powers[5]];
     for k in 0..6 {
@@ -142,15 +142,15 @@ impl Exponent for Hermite {
     }
 
     #[inline(always)]
-    fn lean(x: f64, z: f64) -> f64 {
+    fn sensitivity(x: f64, z: f64) -> f64 {
         let xz = x * z;
         xz * xz * xz
     }
 
-    fn stride(&self, x: f64, z: f64, variation: f64) -> f64 {
+    fn distance_of_variation(&self, x: f64, z: f64, variation: f64) -> f64 {
         let at = self.stretched(x, z);
         let (mut t, step, _) = self.about(x, z, &at);
-        // Along a distance up to this one xi changes by no more than twice its slope times the distance.
+        // Over at most this distance xi changes by no more than twice its slope times the distance.
         let bend = (at.d2 / at.d1).abs();
         let mut h = 1.0;
         if bend > 0.0 {
@@ -163,10 +163,10 @@ impl Exponent for Hermite {
         } else {
             t.iter_mut().zip(&step).for_each(|(t, step)| *t = (*t + step).abs());
         }
-        for _ in 0..MOST_STEPS {
+        for _ in 0..MAX_STEPS {
             let (value, slope) =
                 t.iter().rev().fold((0.0, 0.0), |(value, slope), t| (t + h * value, value + h * slope));
-            // Without its constant term the polynomial is h times that.
+            // The polynomial without constant term is h times this value.
             let (value, slope) = (h * value, value + h * slope);
             if value <= 1.01 * variation {
                 break;
@@ -181,22 +181,22 @@ impl Exponent for Hermite {
         self.c.abs() + self.rise.abs() + ends
     }
 
-    fn unit(&self) -> f64 {
-        // The bump is 1/64 high.
+    fn parameter_scale(&self) -> f64 {
+        // The height of the bump is 1/64.
         if self.c < 0.0 { self.size().min(16.0) } else { self.size() }
     }
 
-    fn settle(ratio: f64) -> f64 {
+    fn newton_step(ratio: f64) -> f64 {
         (1.0 - 1.0 / (ratio * ratio * ratio)) / 3.0
     }
 
-    fn dips(&self) -> bool {
+    fn has_minimum(&self) -> bool {
         false
     }
 
-    fn stretches(&self, _level: f64, _depth: f64) -> Stretches {
+    fn panel_ranges(&self, _level: f64, _depth: f64) -> PanelRanges {
         let half = |side| Panel { side, from: 0.0, to: 0.5 };
-        let empty = Panel { side: Side::End, from: 0.5, to: 0.5 };
-        Stretches { panels: [half(Side::Start), empty, empty, half(Side::End).reversed()] }
+        let empty = Panel { side: ProtocolEnd::End, from: 0.5, to: 0.5 };
+        PanelRanges { panels: [half(ProtocolEnd::Start), empty, empty, half(ProtocolEnd::End).reversed()] }
     }
 }

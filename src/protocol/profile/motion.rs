@@ -1,22 +1,22 @@
 //! A member over time.
 
 use super::Exponent;
-use super::curve::Curve;
-use super::passage::{Resolved, friction_at};
+use super::curve::VelocityCurve;
+use super::theta::{ResolvedPanel, friction_at};
 use crate::model::Law;
 use crate::numerics::elementary::exp;
 use crate::protocol::{Moment, Motion};
 
-/// Panels of equal length in the parameter `s`, each with theta at its nodes.
-pub struct Resolution<E> {
+/// Member as a motion: panels of equal length in the parameter `s`, each with theta at its nodes.
+pub struct ResolvedProfile<E> {
     pub law: Law,
-    pub curve: Curve<E>,
-    pub panels: Vec<Resolved>,
+    pub curve: VelocityCurve<E>,
+    pub panels: Vec<ResolvedPanel>,
 }
 
-impl<E> Resolution<E> {
-    /// The panel at `s`, and the share of it.
-    pub fn place(&self, s: f64) -> (&Resolved, f64) {
+impl<E> ResolvedProfile<E> {
+    /// Panel at `s`, and the fraction of it.
+    pub fn panel_at(&self, s: f64) -> (&ResolvedPanel, f64) {
         let count = self.panels.len();
         let along = s.clamp(0.0, 1.0) * count as f64;
         let k = (along as usize).min(count - 1);
@@ -24,7 +24,7 @@ impl<E> Resolution<E> {
     }
 }
 
-impl<E: Exponent> Motion for Resolution<E> {
+impl<E: Exponent> Motion for ResolvedProfile<E> {
     fn duration(&self) -> f64 {
         self.curve.t_f
     }
@@ -35,8 +35,8 @@ impl<E: Exponent> Motion for Resolution<E> {
     }
 
     fn at(&self, s: f64) -> Moment {
-        let (panel, u) = self.place(s);
-        let (x, z) = panel.place(u);
+        let (panel, u) = self.panel_at(s);
+        let (x, z) = panel.x_and_z(u);
         let theta = panel.theta(u);
         let v = self.curve.floor + self.curve.w_f * exp(self.curve.exponent.value(x, z));
         Moment { t: self.curve.t_f * x, v, theta, friction: friction_at(&self.law, v, theta), v_c: None, beta: None }

@@ -1,23 +1,22 @@
 //! The optimal protocol with its jumps replaced by smooth pieces, so that a spring of finite stiffness can drive it.
 //!
-//! The optimum jumps at both ends, and after a hold it leaves the bound with a corner. Each of these would take an
-//! infinite control velocity. In pieces of length `delta_t` at both ends, and in one about the end of a hold, the
-//! velocity is replaced by one that meets value, slope and curvature of the optimum (0 at the ends of the protocol) and
-//! brings theta to where the optimum has it. So the optimum between the pieces is untouched (docs/theory.md,
-//! "Smooth pieces").
+//! The optimum jumps at both ends, and after a hold it leaves the bound with a corner. Each of these takes an infinite
+//! control velocity. Smooth pieces of length `delta_t` replace the velocity at both ends and about the end of a hold. A
+//! piece meets value, slope and curvature of the optimum (0 at the ends of the protocol) and brings theta to its value on
+//! the optimum. The optimum between the pieces is unchanged (docs/derivations.md).
 
 mod motion;
-mod piece;
+mod smooth_piece;
 
-use super::control::Extent;
+use super::control::ValueRange;
 use super::optimal::{PathPoint, Route, route};
 use super::{Motion, Solved, SolverStats, SpringBlock, Status};
 use crate::model::Transition;
-use motion::Smooth;
-use piece::{End, Piece};
+use motion::RegularisedMotion;
+use smooth_piece::{PieceEnd, SmoothPiece};
 
-/// The regularised optimum, every number to the requested relative accuracy; those of `v_c` to that of the greater of
-/// the two.
+/// Regularised optimum. Every number has the requested relative accuracy; both extremes of `v_c` are relative to the
+/// greater one.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Regularised {
     /// Work of friction, `int tau v dt`.
@@ -26,7 +25,7 @@ pub struct Regularised {
     pub work_optimal: f64,
     /// `(work - W*)/W*`, from the pieces alone: it keeps its digits where they are short.
     pub gap: f64,
-    /// Work of friction over the pieces alone: the gap is what it differs by from the optimum's over the same time.
+    /// Work of friction over the pieces alone.
     pub replaced: f64,
     /// Least velocity.
     pub v_min: f64,
@@ -41,12 +40,11 @@ pub struct Regularised {
 /// Regularises the optimum of a transition from `v_i` to `v_f` under `slider.law` within `t_f`, with `v >= 1` where
 /// `bounded`, by pieces of length `delta_t`.
 ///
-/// `Infeasible` where there is no optimum, where the pieces overlap (`2 delta_t > t_f`), or where an argument is
-/// outside its domain (`delta_t > 0`, `k > 0`, `m >= 0`), or where the protocol all but stands still: without the bound
-/// a deceleration jumps down by about `e^(1/a)`; pieces are drawn down to 1e-12 of the velocity at the end, and down to
-/// 1e-100. `BelowBound` where a piece dips below `v = 1`: next to a hold
-/// each must, since theta there is as large as `v >= 1` allows. `NegativeFriction` where `tau < 0` on the way;
-/// `Unproven` where the optimum need not be the only one.
+/// `Infeasible` where there is no optimum, where the pieces overlap (`2 delta_t > t_f`), where an argument is outside its
+/// domain (`delta_t > 0`, `k > 0`, `m >= 0`), or where the velocity falls below 1e-12 of that at the end or below 1e-100:
+/// without the bound a deceleration jumps down by about `e^(1/a)`. `BelowBound` where a piece falls below `v = 1`; near a
+/// hold each piece does, since theta there is as large as `v >= 1` allows. `NegativeFriction` where `tau < 0` somewhere;
+/// `Unproven` where the optimum need not be unique.
 pub fn solve(
     slider: &SpringBlock,
     (v_i, v_f): (f64, f64),
@@ -58,7 +56,7 @@ pub fn solve(
     assemble(slider, (v_i, v_f), t_f, delta_t, bounded, rtol, |_| ()).0
 }
 
-/// The same, and its motion wherever it has numbers.
+/// Regularises the optimum as [`solve`] does, and returns its motion as well wherever it has numbers.
 pub fn motion(
     slider: &SpringBlock,
     (v_i, v_f): (f64, f64),
@@ -67,21 +65,23 @@ pub fn motion(
     bounded: bool,
     rtol: f64,
 ) -> (Solved<Regularised>, Option<Box<dyn Motion>>) {
-    let mut parts = Vec::new();
-    let (solved, route) = assemble(slider, (v_i, v_f), t_f, delta_t, bounded, rtol, |part| parts.push(part));
-    let smooth = route.filter(|_| solved.value.is_some()).and_then(|route| Smooth::new(*slider, route, parts, rtol));
+    let mut segments = Vec::new();
+    let (solved, route) = assemble(slider, (v_i, v_f), t_f, delta_t, bounded, rtol, |segment| segments.push(segment));
+    let smooth = route
+        .filter(|_| solved.value.is_some())
+        .and_then(|route| RegularisedMotion::new(*slider, route, segments, rtol));
     (solved, smooth.map(|smooth| Box::new(smooth) as Box<dyn Motion>))
 }
 
-/// A part of the regularised optimum.
-enum Part {
-    /// The optimum between two places.
+/// Segment of the regularised optimum.
+enum RegularisedSegment {
+    /// The optimum between two points.
     Kept(PathPoint, PathPoint),
     /// A smooth piece.
-    Replaced(Piece),
+    Replaced(SmoothPiece),
 }
 
-/// Solves, and hands over the parts in the order of time.
+/// Solves, and hands the segments to `visit` in the order of time.
 fn assemble(
     slider: &SpringBlock,
     (v_i, v_f): (f64, f64),
@@ -89,7 +89,7 @@ fn assemble(
     delta_t: f64,
     bounded: bool,
     rtol: f64,
-    visit: impl FnMut(Part),
+    visit: impl FnMut(RegularisedSegment),
 ) -> (Solved<Regularised>, Option<Route>) {
     let none = |status, stats| (Solved { status, value: None, stats }, None);
     let sound = delta_t > 0.0 && 2.0 * delta_t <= t_f && slider.k > 0.0 && slider.m >= 0.0 && slider.m.is_finite();
@@ -99,15 +99,15 @@ fn assemble(
     let (solved, route) = route(&Transition { law: slider.law, v_i, v_f }, t_f, bounded, rtol);
     let mut stats = solved.stats;
     let (Some(optimum), Some(route)) = (solved.value, route) else { return none(solved.status, stats) };
-    let mut sum = Sum {
+    let mut sum = Assembly {
         slider: *slider,
         rtol,
         visit,
         excess: 0.0,
         replaced: 0.0,
         friction_min: f64::INFINITY,
-        v: Extent::NONE,
-        control: Extent::NONE,
+        v: ValueRange::NONE,
+        control: ValueRange::NONE,
     };
     if let Err(status) = sum.gather(&route, (v_i, v_f), (delta_t, t_f), &mut stats) {
         // Where the optimum need not be unique, it need not be exact enough for pieces either.
@@ -142,14 +142,14 @@ fn is_doubtful(status: Status) -> bool {
     matches!(status, Status::Unproven | Status::NegativeFriction)
 }
 
-/// Velocities below this one count as none.
-const STANDSTILL: f64 = 1e-100;
+/// Velocity of a piece, in `v_0`, at least. Chosen: far above the underflow of doubles.
+const MIN_VELOCITY: f64 = 1e-100;
 
-/// What is gathered along the way.
-struct Sum<F> {
+/// Sums and extremes along the protocol.
+struct Assembly<F> {
     slider: SpringBlock,
     rtol: f64,
-    /// Takes the parts.
+    /// Takes the segments.
     visit: F,
     /// Work beyond that of the optimum.
     excess: f64,
@@ -157,12 +157,12 @@ struct Sum<F> {
     replaced: f64,
     /// Least friction.
     friction_min: f64,
-    v: Extent,
-    control: Extent,
+    v: ValueRange,
+    control: ValueRange,
 }
 
-impl<F: FnMut(Part)> Sum<F> {
-    /// The pieces and what lies between them, in the order of time; `Err` with the status where a piece has no
+impl<F: FnMut(RegularisedSegment)> Assembly<F> {
+    /// Adds the pieces and the optimum between them in the order of time; `Err` with the status of a piece without
     /// numbers.
     fn gather(
         &mut self,
@@ -172,8 +172,8 @@ impl<F: FnMut(Part)> Sum<F> {
         stats: &mut SolverStats,
     ) -> Result<(), Status> {
         let (leaving, arriving) = (route.after(delta_t), route.before(delta_t));
-        let at = |site| End::inner(&route.jet(site));
-        self.replace(route, (route.first(), End::outer(v_i)), (leaving, at(leaving)), stats)?;
+        let at = |site| PieceEnd::inner(&route.jet(site));
+        self.replace(route, (route.first(), PieceEnd::outer(v_i)), (leaving, at(leaving)), stats)?;
         let mut from = leaving;
         if let Some(corner) = route.corner().filter(|&corner| corner > delta_t && corner < t_f - delta_t) {
             let start = PathPoint::Held((corner - 0.5 * delta_t).max(delta_t));
@@ -184,10 +184,10 @@ impl<F: FnMut(Part)> Sum<F> {
             from = end;
         }
         self.keep(route, from, arriving);
-        self.replace(route, (arriving, at(arriving)), (route.last(), End::outer(v_f)), stats)
+        self.replace(route, (arriving, at(arriving)), (route.last(), PieceEnd::outer(v_f)), stats)
     }
 
-    /// Leaves the optimum as it is between two places.
+    /// Adds the unchanged optimum between two points.
     fn keep(&mut self, route: &Route, from: PathPoint, to: PathPoint) {
         // Where two pieces meet, rounding alone may lie between them.
         if route.time(to) - route.time(from) <= 4.0 * f64::EPSILON * route.duration() {
@@ -195,20 +195,20 @@ impl<F: FnMut(Part)> Sum<F> {
         }
         self.friction_min = self.friction_min.min(route.friction_min(from, to));
         route.control(&self.slider, from, to, self.rtol, &mut self.control);
-        (self.visit)(Part::Kept(from, to));
+        (self.visit)(RegularisedSegment::Kept(from, to));
     }
 
-    /// Replaces the optimum between two places by a smooth piece.
+    /// Replaces the optimum between two points by a smooth piece.
     fn replace(
         &mut self,
         route: &Route,
-        (from, start): (PathPoint, End),
-        (to, end): (PathPoint, End),
+        (from, start): (PathPoint, PieceEnd),
+        (to, end): (PathPoint, PieceEnd),
         stats: &mut SolverStats,
     ) -> Result<(), Status> {
         let span = route.span(from, to);
-        let piece = Piece::new(&self.slider, (&start, &end), &span, self.rtol, stats)?;
-        if piece.v.low < STANDSTILL {
+        let piece = SmoothPiece::new(&self.slider, (&start, &end), &span, self.rtol, stats)?;
+        if piece.v.low < MIN_VELOCITY {
             return Err(Status::Infeasible);
         }
         self.excess += piece.work - span.work;
@@ -218,7 +218,7 @@ impl<F: FnMut(Part)> Sum<F> {
         self.v.add(piece.v.high);
         self.control.add(piece.control.low);
         self.control.add(piece.control.high);
-        (self.visit)(Part::Replaced(piece));
+        (self.visit)(RegularisedSegment::Replaced(piece));
         Ok(())
     }
 }

@@ -1,43 +1,48 @@
-//! The regularised optimum over time: its parts one after the other.
+//! The regularised optimum over time.
 
 use std::sync::Arc;
 
-use super::Part;
+use super::RegularisedSegment;
 use crate::protocol::optimal::{PathPoint, Route};
-use crate::protocol::profile::{Hermite, Resolution};
+use crate::protocol::profile::{Hermite, ResolvedProfile};
 use crate::protocol::{Jet, Moment, Motion, SpringBlock};
 
-/// The motion: every stretch takes as much of the parameter as the next.
-pub(super) struct Smooth {
+/// Regularised optimum as a motion: intervals of equal length in the parameter.
+pub(super) struct RegularisedMotion {
     slider: SpringBlock,
     route: Route,
-    stretches: Vec<Stretch>,
+    panel_ranges: Vec<MotionInterval>,
 }
 
-/// A part of the motion that is smooth.
-enum Stretch {
-    /// The optimum between two places on the hold or on the arc.
+/// Interval on which the motion is smooth.
+enum MotionInterval {
+    /// The optimum between two points of the hold or of the arc.
     Kept(PathPoint, PathPoint),
-    /// A panel of a piece, from one value of the piece's parameter to another; the piece begins at this time.
-    Replaced { piece: Arc<Resolution<Hermite>>, begin: f64, from: f64, to: f64 },
+    /// A range of the parameter of a smooth piece that begins at this time.
+    Replaced { piece: Arc<ResolvedProfile<Hermite>>, begin: f64, from: f64, to: f64 },
 }
 
-impl Smooth {
-    /// The motion of these parts; `None` where numbers leave the range of a double.
-    pub fn new(slider: SpringBlock, route: Route, parts: Vec<Part>, rtol: f64) -> Option<Smooth> {
-        let mut stretches = Vec::new();
+impl RegularisedMotion {
+    /// The motion of these segments; `None` where numbers leave the range of a double.
+    pub fn new(
+        slider: SpringBlock,
+        route: Route,
+        segments: Vec<RegularisedSegment>,
+        rtol: f64,
+    ) -> Option<RegularisedMotion> {
+        let mut panel_ranges = Vec::new();
         let mut time = 0.0;
-        for part in parts {
-            match part {
-                Part::Kept(from, to) => {
+        for segment in segments {
+            match segment {
+                RegularisedSegment::Kept(from, to) => {
                     let sites = route.landmarks(from, to);
-                    stretches.extend(sites.windows(2).map(|pair| Stretch::Kept(pair[0], pair[1])));
+                    panel_ranges.extend(sites.windows(2).map(|pair| MotionInterval::Kept(pair[0], pair[1])));
                     time = route.time(to);
                 }
-                Part::Replaced(piece) => {
+                RegularisedSegment::Replaced(piece) => {
                     let piece = Arc::new(piece.resolve(slider.law, rtol)?);
                     let marks = piece.landmarks();
-                    stretches.extend(marks.windows(2).map(|pair| Stretch::Replaced {
+                    panel_ranges.extend(marks.windows(2).map(|pair| MotionInterval::Replaced {
                         piece: piece.clone(),
                         begin: time,
                         from: pair[0],
@@ -47,7 +52,7 @@ impl Smooth {
                 }
             }
         }
-        Some(Smooth { slider, route, stretches })
+        Some(RegularisedMotion { slider, route, panel_ranges })
     }
 
     fn moment(&self, t: f64, jet: &Jet) -> Moment {
@@ -62,23 +67,23 @@ impl Smooth {
     }
 }
 
-impl Motion for Smooth {
+impl Motion for RegularisedMotion {
     fn duration(&self) -> f64 {
         self.route.duration()
     }
 
     fn landmarks(&self) -> Vec<f64> {
-        let count = self.stretches.len();
+        let count = self.panel_ranges.len();
         (0..=count).map(|k| k as f64 / count as f64).collect()
     }
 
     fn at(&self, s: f64) -> Moment {
-        let count = self.stretches.len();
+        let count = self.panel_ranges.len();
         let along = s.clamp(0.0, 1.0) * count as f64;
         let k = (along as usize).min(count - 1);
         let (u, mix) = (along - k as f64, |from: f64, to: f64, u: f64| from * (1.0 - u) + to * u);
-        match &self.stretches[k] {
-            Stretch::Kept(from, to) => {
+        match &self.panel_ranges[k] {
+            MotionInterval::Kept(from, to) => {
                 let site = match (*from, *to) {
                     (PathPoint::Held(from), PathPoint::Held(to)) => PathPoint::Held(mix(from, to, u)),
                     (PathPoint::Moving(from), PathPoint::Moving(to)) => PathPoint::Moving(mix(from, to, u)),
@@ -86,10 +91,10 @@ impl Motion for Smooth {
                 };
                 self.moment(self.route.time(site), &self.route.jet(site))
             }
-            Stretch::Replaced { piece, begin, from, to } => {
+            MotionInterval::Replaced { piece, begin, from, to } => {
                 let s = mix(*from, *to, u);
-                let (panel, share) = piece.place(s);
-                self.moment(begin + piece.at(s).t, &panel.jet(&piece.curve, share))
+                let (panel, u) = piece.panel_at(s);
+                self.moment(begin + piece.at(s).t, &panel.jet(&piece.curve, u))
             }
         }
     }

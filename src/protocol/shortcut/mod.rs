@@ -130,7 +130,7 @@ pub trait Family: Sync {
     fn alpha(&self) -> Option<&'static str>;
 
     /// Whether it heeds `tau_ceiling`.
-    fn heeds_tau_ceiling(&self) -> bool {
+    fn uses_tau_ceiling(&self) -> bool {
         false
     }
 

@@ -73,7 +73,7 @@ pub(super) const VANISHING: f64 = -1000.0;
 /// `Undecided`, or in doubt in the numbers that change.
 pub fn follow(slider: &ScaledBlock, linear: Linear, x: f64, rtol: f64) -> Simulation {
     if slider.inertia == 0.0 && slider.b > slider.a && !linear.stable {
-        // Below the critical stiffness the potential of theory.md grows without bound; at it nothing changes.
+        // Below the critical stiffness the potential of docs/derivations.md grows without bound; at it nothing changes.
         let long_term = if slider.is_critical() { LongTermBehaviour::Undecided } else { LongTermBehaviour::Ends };
         return Simulation { long_term, high: None, low: None, t: 0.0, steps: 0, doubts: Doubts::default() };
     }

@@ -2,7 +2,7 @@
 
 use super::Known;
 use super::case::{self, Case, Route};
-use super::optimal::{least_time, least_work, transition};
+use super::optimal::{least_work, min_duration, transition};
 use super::sweeps::Grid;
 use crate::friction::of_cubic;
 use crate::reference::{self, Row};
@@ -33,7 +33,7 @@ fn point(row: &Row, border: bool) -> Option<Case> {
     let case = Case::of(row, &super::optimal::AXES);
     let axes = [("alpha_2", row.number("a_2")), ("alpha_3", row.number("a_3"))];
     let case = Case { axes: case.axes.into_iter().chain(Case::at(axes).axes).collect(), ..case };
-    let late = t_f < least_time(transition.v_i, transition.v_f);
+    let late = t_f < min_duration(transition.v_i, transition.v_f);
     if late || row.text("status") == "infeasible" {
         let numbers = ["work", "work_optimal", "gap", "v_min", "work_error", "gap_error"];
         let case = case.within("infeasible").nulls(&numbers, Route::Reference);

@@ -42,7 +42,7 @@ pub fn transition(row: &Row) -> Transition {
 }
 
 /// The least time under the bound.
-pub fn least_time(v_i: f64, v_f: f64) -> f64 {
+pub fn min_duration(v_i: f64, v_f: f64) -> f64 {
     ((v_i - v_f) / (v_i * (v_f - 1.0))).ln_1p()
 }
 
@@ -63,7 +63,7 @@ fn regime(row: &Row) -> &'static str {
         _ if row.text("regime") == "v_near_1" => "v near 1",
         _ if row.text("regime").starts_with("near_") => "special times",
         _ if v_f < v_i && !bounded => "no bound down",
-        _ if v_f < v_i && row.number("t_f") < 1.01 * least_time(v_i, v_f) => "near t_min",
+        _ if v_f < v_i && row.number("t_f") < 1.01 * min_duration(v_i, v_f) => "near t_min",
         _ if v_f < v_i => "deceleration",
         _ if !bounded => "no bound",
         "speed_up" => "speeds up",
@@ -93,7 +93,7 @@ fn cases() -> Vec<Case> {
         if cases.last().is_some_and(|case| case.regime == "near t_min") {
             let Transition { v_i, v_f, .. } = transition(&row);
             let mut case = Case::of(&row, &AXES).within("infeasible");
-            case.axes[0].1 = Value::Number(least_time(v_i, v_f) * (1.0 - 1e-12));
+            case.axes[0].1 = Value::Number(min_duration(v_i, v_f) * (1.0 - 1e-12));
             let case = case.nulls(&numbers, Route::Formula).nulls(&["strategy"], Route::Formula);
             cases.push(case.word("status", "infeasible", Route::Formula));
         }

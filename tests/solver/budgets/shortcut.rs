@@ -4,7 +4,7 @@ use slipsweep::model::Transition;
 
 use super::Known;
 use super::case::{self, Case, Route, Truth, Value};
-use super::optimal::{AXES, least_time, least_work, transition};
+use super::optimal::{AXES, least_work, min_duration, transition};
 use super::sweeps::Grid;
 use crate::friction::of_cubic;
 use crate::reference::{self, Row};
@@ -35,7 +35,7 @@ fn cases() -> Vec<Case> {
     let velocity = velocity.iter().map(|row| {
         let family = families.into_iter().find(|family| *family == row.text("family")).expect("is a family");
         let Transition { v_i, v_f, .. } = transition(row);
-        let near = family == "bounded_velocity" && v_f < v_i && row.number("t_f") < 1.01 * least_time(v_i, v_f);
+        let near = family == "bounded_velocity" && v_f < v_i && row.number("t_f") < 1.01 * min_duration(v_i, v_f);
         let case = point(row, family, f64::INFINITY, if near { "near t_min" } else { family });
         match row.text("status") {
             "infeasible" => case,
@@ -60,7 +60,7 @@ fn cases() -> Vec<Case> {
 
 fn point(row: &Row, family: &'static str, tau_ceiling: f64, regime: &'static str) -> Case {
     let (transition, t_f) = (transition(row), row.number("t_f"));
-    let late = t_f < least_time(transition.v_i, transition.v_f);
+    let late = t_f < min_duration(transition.v_i, transition.v_f);
     // Without the bound on v the families are what they are also in less than t_min.
     let mut case = Case { bounded: !late, ..Case::of(row, &AXES) };
     case.axes.push(("family", Value::Word(family)));

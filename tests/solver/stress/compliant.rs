@@ -45,7 +45,7 @@ fn every_compliant_is_right_or_says_so() {
         let solved = compliant::solve(&slider, (v_i, v_f), t_f, rtol);
         row.status(solved.status);
         let transition = Transition { law: slider.law, v_i, v_f };
-        row.fact("exists if there is time", solved.value.is_some() == (t_f > transition.least_time()));
+        row.fact("exists if there is time", solved.value.is_some() == (t_f > transition.min_duration()));
         row.at_most("few nodes", f64::from(solved.stats.nodes), f64::from(MOST_NODES));
         let Some(rough) = solved.value else { return };
         let Compliant { alpha, work, v_min, v_max, control_min, control_max } = rough;

@@ -56,7 +56,7 @@ impl Family for BoundedFriction {
         Some("alpha_3 in tau = tau_ceiling - (tau_ceiling - tau_i) R^x exp[alpha_3 x (1 - x)], x = t/t_f")
     }
 
-    fn heeds_tau_ceiling(&self) -> bool {
+    fn uses_tau_ceiling(&self) -> bool {
         true
     }
 

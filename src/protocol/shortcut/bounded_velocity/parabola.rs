@@ -1,8 +1,8 @@
-//! The exponent of `bounded_velocity`: a parabola, `f = -z (L + c x)`.
+//! Exponent of `bounded_velocity`: the parabola `f = -z (L + c x)`.
 
-use crate::protocol::profile::{Exponent, Panel, Side, Stretches};
+use crate::protocol::profile::{Exponent, Panel, PanelRanges, ProtocolEnd};
 
-/// The parabola.
+/// The parabolic exponent.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Parabola {
     /// `L = ln((v_f - 1)/(v_i - 1))`.
@@ -12,7 +12,7 @@ pub(super) struct Parabola {
 }
 
 impl Parabola {
-    /// `x` of the vertex, if it lies inside.
+    /// `x` of the vertex; `None` if it lies outside `(0, 1)`.
     pub fn vertex(&self) -> Option<f64> {
         let x = 0.5 - 0.5 * self.l / self.c;
         (x > 0.0 && x < 1.0).then_some(x)
@@ -35,11 +35,11 @@ impl Exponent for Parabola {
     }
 
     #[inline(always)]
-    fn lean(x: f64, z: f64) -> f64 {
+    fn sensitivity(x: f64, z: f64) -> f64 {
         x * z
     }
 
-    fn stride(&self, x: f64, z: f64, variation: f64) -> f64 {
+    fn distance_of_variation(&self, x: f64, z: f64, variation: f64) -> f64 {
         let slope = self.slope(x, z);
         2.0 * variation / (slope.abs() + (slope * slope + 4.0 * self.c.abs() * variation).sqrt())
     }
@@ -48,23 +48,23 @@ impl Exponent for Parabola {
         self.c.abs() + self.l.abs()
     }
 
-    fn unit(&self) -> f64 {
+    fn parameter_scale(&self) -> f64 {
         if self.c < 0.0 { self.size().min(1.0) } else { self.size() }
     }
 
-    fn settle(ratio: f64) -> f64 {
+    fn newton_step(ratio: f64) -> f64 {
         1.0 - 1.0 / ratio
     }
 
-    fn dips(&self) -> bool {
+    fn has_minimum(&self) -> bool {
         self.c > 0.0
     }
 
-    /// They meet at the bottom of a deep dip, else in the middle; what is quiet is a stretch of its own.
-    fn stretches(&self, level: f64, depth: f64) -> Stretches {
+    /// The ranges meet at the bottom of a deep minimum, else in the middle; a negligible part is a range of its own.
+    fn panel_ranges(&self, level: f64, depth: f64) -> PanelRanges {
         let bottom = self.vertex().filter(|x| self.c > 0.0 && (0.25..=0.75).contains(x));
         let x = bottom.unwrap_or(0.5);
-        let quiet = self.c > 0.0 && level + self.value(x, 1.0 - x) < depth;
+        let is_negligible = self.c > 0.0 && level + self.value(x, 1.0 - x) < depth;
         let crossing = |rise: f64, slope: f64, end: f64| {
             // Nearer root of e0 + slope d + c d^2 = depth, written without cancellation; slope < 0.
             let fall = end - depth;
@@ -74,14 +74,14 @@ impl Exponent for Parabola {
         let whole =
             |side, meeting| [Panel { side, from: 0.0, to: meeting }, Panel { side, from: meeting, to: meeting }];
         let parts = |side, meeting: f64, slope: f64, end: f64| {
-            if !quiet {
+            if !is_negligible {
                 return whole(side, meeting);
             }
             let d = crossing(meeting, slope, end);
             [Panel { side, from: 0.0, to: d }, Panel { side, from: d, to: meeting }]
         };
-        let [first, second] = parts(Side::Start, x, self.l - self.c, level + self.value(0.0, 1.0));
-        let [fourth, third] = parts(Side::End, 1.0 - x, -(self.l + self.c), level);
-        Stretches { panels: [first, second, third.reversed(), fourth.reversed()] }
+        let [first, second] = parts(ProtocolEnd::Start, x, self.l - self.c, level + self.value(0.0, 1.0));
+        let [fourth, third] = parts(ProtocolEnd::End, 1.0 - x, -(self.l + self.c), level);
+        PanelRanges { panels: [first, second, third.reversed(), fourth.reversed()] }
     }
 }

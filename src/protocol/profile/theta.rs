@@ -1,0 +1,411 @@
+//! Theta along a member, panel by panel in the order of time, with work and the range of friction.
+//!
+//! `theta' = 1 - theta v` contracts forwards. Where the slip of a panel is small, theta has a closed form with positive
+//! terms. Where the slip is large, theta follows `1/v` and does not depend on its start: Radau collocation gives
+//! `theta'` at the nodes.
+
+use multiversion::multiversion;
+
+use super::Exponent;
+use super::arrival::total;
+use super::curve::{MAX_PANELS, Panel, ProtocolEnd, VelocityCurve, x_and_z, x_and_z_at_nodes};
+use crate::model::Law;
+use crate::numerics::elementary::{exp, exp_m1, ln};
+use crate::numerics::radau::{NODES, Nodes, Radau, radau};
+use crate::protocol::SolverStats;
+
+/// Panel with `v` and theta at its start and at its nodes.
+#[derive(Debug, Clone, Copy)]
+pub struct ResolvedPanel {
+    pub panel: Panel,
+    v_start: f64,
+    theta_start: f64,
+    theta: Nodes,
+    /// `theta'` at the start and at the nodes, accurate where it is small compared with 1.
+    rate_start: f64,
+    rate: Nodes,
+    v: Nodes,
+}
+
+/// Work and range of friction along a member.
+#[derive(Debug, Clone, Copy)]
+pub struct WorkAndFriction {
+    pub work: f64,
+    pub friction_max: f64,
+    /// Least friction, as [`ResolvedPanel::work_and_least_friction`] defines it.
+    pub friction_min: f64,
+}
+
+/// State at the start of an integration.
+#[derive(Debug, Clone, Copy)]
+pub struct InitialState {
+    /// Velocity.
+    pub v: f64,
+    /// Contact lifetime.
+    pub theta: f64,
+    /// `theta'`, accurate where it is small compared with 1.
+    pub rate: f64,
+    /// Whether the distance of theta from the slow solution is the [`lag`] of the velocity there.
+    pub slow: bool,
+}
+
+impl InitialState {
+    /// Steady sliding at `v`.
+    pub fn steady(v: f64, slow: bool) -> InitialState {
+        InitialState { v, theta: 1.0 / v, rate: 0.0, slow }
+    }
+}
+
+/// Integrates theta along the curve, hands every panel to `visit`, and returns theta at the end; `None` where numbers
+/// leave the range of a double.
+pub fn integrate_theta<E: Exponent>(
+    curve: &VelocityCurve<E>,
+    start: InitialState,
+    rtol: f64,
+    panel_variation: f64,
+    stats: &mut SolverStats,
+    mut visit: impl FnMut(&ResolvedPanel),
+) -> Option<f64> {
+    let rule = radau();
+    let InitialState { mut v, mut theta, mut rate, slow } = start;
+    // Slip since theta last left the slow solution (at the start, or where v changes too fast), and its relative distance.
+    let (mut slip, mut off) = (0.0, if slow { lag(curve, ProtocolEnd::Start, 0.0, v) } else { 1.0 });
+    let mut count = 0;
+    stats.quadratures += 1;
+    for range in curve.panel_ranges().forward() {
+        let mut d = range.from;
+        while d != range.to {
+            let mut panel = curve.panel(&range, d, panel_variation);
+            if lag(curve, range.side, d, v) > MAX_LAG {
+                (slip, off) = (0.0, 1.0);
+            }
+            let forgotten = slip >= ln(off.clamp(rtol, 1.0) / rtol) + 3.0;
+            let last = curve.last(&panel);
+            let stiff = forgotten && curve.stiffness(&panel, v, last) > panel_variation;
+            panel = if stiff {
+                curve.panel(&range, d, STIFF_VARIATION * panel_variation)
+            } else {
+                // Since theta' <= 1, a zero of theta lies at least theta back in time: ln theta is smooth on that scale.
+                curve.limit_slip(panel, v, last, panel_variation).shortened(panel_variation * theta / curve.t_f)
+            };
+            if panel.to == d || panel.to.is_nan() || count == MAX_PANELS {
+                return None;
+            }
+            count += 1;
+            stats.nodes += NODES as u32;
+            let (resolved, slipped) = resolve(curve, panel, [v, theta, rate], stiff, rule);
+            visit(&resolved);
+            v = resolved.v[NODES - 1];
+            theta = resolved.theta[NODES - 1];
+            rate = resolved.rate[NODES - 1];
+            slip += slipped;
+            d = panel.to;
+        }
+    }
+    Some(theta)
+}
+
+/// Relative change of `v` in the relaxation time of theta: the relative distance of theta from `1/v` on the slow solution.
+fn lag<E: Exponent>(curve: &VelocityCurve<E>, side: ProtocolEnd, d: f64, v: f64) -> f64 {
+    let (x, z) = x_and_z(side, d);
+    curve.exponent.slope(x, z).abs() * (v - curve.floor) / (v * v * curve.t_f)
+}
+
+/// Lag at which theta stays on the slow solution, at most. Chosen: the deviation is exponentially small in the inverse lag.
+const MAX_LAG: f64 = 0.02;
+
+/// Variation of the exponent over a panel with collocation, fraction of that with a closed form. Chosen.
+const STIFF_VARIATION: f64 = 0.6;
+
+/// `theta'` below which `1 - theta v` loses a digit or more.
+const MAX_CANCELLING_RATE: f64 = 0.1;
+
+#[multiversion(targets(
+    "x86_64+avx+avx2+bmi1+bmi2+avx512f+avx512bw+avx512cd+avx512dq+avx512vl",
+    "x86_64+avx+avx2+bmi1+bmi2"
+))]
+fn resolve<E: Exponent>(
+    curve: &VelocityCurve<E>,
+    panel: Panel,
+    start: [f64; 3],
+    stiff: bool,
+    rule: &Radau,
+) -> (ResolvedPanel, f64) {
+    let [v_start, theta_start, rate_start] = start;
+    let (x, z) = x_and_z_at_nodes(&panel, rule);
+    let (w, _) = curve.above_floor_at_nodes(&x, &z);
+    let h = curve.t_f * (panel.to - panel.from).abs();
+    let v = w.map(|w| curve.floor + w);
+    let slip = rule.integrals(&v).map(|slip| h * slip);
+    let (mut theta, mut rate) = ([0.0; NODES], [0.0; NODES]);
+    if stiff {
+        // v - v_start, with full relative accuracy where it is small.
+        let level = |x: f64, z: f64| curve.exponent.value(x, z);
+        let (x_0, z_0) = x_and_z(panel.side, panel.from);
+        let before = level(x_0, z_0);
+        let w_start = curve.w_f * exp(before);
+        let mut gained = [0.0; NODES];
+        for j in 0..NODES {
+            let change = level(x[j], z[j]) - before;
+            gained[j] = if change.abs() < 1.0 { w_start * exp_m1(change) } else { w[j] - w_start };
+        }
+        rate = collocate(rule, h, &v, &gained, v_start, rate_start);
+        for j in 0..NODES {
+            theta[j] = (1.0 - rate[j]) / v[j];
+        }
+    } else {
+        let mut growth = [0.0; NODES];
+        for j in 0..NODES {
+            growth[j] = exp(slip[j]);
+        }
+        let gained = rule.integrals(&growth);
+        for j in 0..NODES {
+            theta[j] = (theta_start + h * gained[j]) / growth[j];
+            rate[j] = 1.0 - theta[j] * v[j];
+        }
+        // Near steady sliding that difference cancels: theta'' = -v theta' - v' theta keeps its digits.
+        if rate.iter().fold(rate_start.abs(), |most, rate| most.max(rate.abs())) < MAX_CANCELLING_RATE {
+            let length = (panel.to - panel.from).abs();
+            let mut loss = [0.0; NODES];
+            for j in 0..NODES {
+                loss[j] = growth[j] * theta[j] * w[j] * length * curve.exponent.slope(x[j], z[j]);
+            }
+            let lost = rule.integrals(&loss);
+            for j in 0..NODES {
+                rate[j] = (rate_start - lost[j]) / growth[j];
+            }
+        }
+    }
+    (ResolvedPanel { panel, v_start, theta_start, theta, rate_start, rate, v }, slip[NODES - 1])
+}
+
+/// `theta'` at the nodes of a panel of length `h`, from `rate/v + h A rate = 1/v - theta_start` divided by `h`. With
+/// `gained = v - v_start` the right side keeps its digits for small changes.
+#[inline(always)]
+fn collocate(rule: &Radau, h: f64, v: &Nodes, gained: &Nodes, v_start: f64, rate_start: f64) -> Nodes {
+    let (mut rows, mut right) = ([[0.0; NODES]; NODES], [0.0; NODES]);
+    for (j, row) in rows.iter_mut().enumerate() {
+        for (entry, column) in row.iter_mut().zip(&rule.columns) {
+            *entry = column[j];
+        }
+        row[j] += 1.0 / (h * v[j]);
+        right[j] = (rate_start - gained[j] / v[j]) / (h * v_start);
+    }
+    for k in 0..NODES {
+        let mut best = k;
+        for j in k + 1..NODES {
+            if rows[j][k].abs() > rows[best][k].abs() {
+                best = j;
+            }
+        }
+        rows.swap(k, best);
+        right.swap(k, best);
+        let pivot = rows[k];
+        let inverse = 1.0 / pivot[k];
+        for j in k + 1..NODES {
+            let factor = rows[j][k] * inverse;
+            for i in 0..NODES {
+                rows[j][i] -= factor * pivot[i];
+            }
+            right[j] -= factor * right[k];
+        }
+    }
+    for k in (0..NODES).rev() {
+        right[k] /= rows[k][k];
+        for j in 0..k {
+            right[j] -= rows[j][k] * right[k];
+        }
+    }
+    right
+}
+
+impl ResolvedPanel {
+    /// Duration of the panel.
+    pub fn duration<E: Exponent>(&self, curve: &VelocityCurve<E>) -> f64 {
+        curve.t_f * (self.panel.to - self.panel.from).abs()
+    }
+
+    /// `x` and `z` at the fraction `u` of the panel.
+    #[inline(always)]
+    pub fn x_and_z(&self, u: f64) -> (f64, f64) {
+        x_and_z(self.panel.side, self.panel.from * (1.0 - u) + self.panel.to * u)
+    }
+
+    /// Theta at the fraction `u` of the panel.
+    pub fn theta(&self, u: f64) -> f64 {
+        radau().interpolate(self.theta_start, &self.theta, u)
+    }
+
+    /// `theta'` at the fraction `u` of the panel.
+    pub fn rate(&self, u: f64) -> f64 {
+        radau().interpolate(self.rate_start, &self.rate, u)
+    }
+
+    /// `theta''` at the start and at the nodes of a panel of this duration, as slopes of the interpolated `theta'`. The
+    /// terms of `-theta' v - theta v'` cancel where theta follows `1/v`.
+    pub fn theta_seconds(&self, duration: f64) -> (f64, Nodes) {
+        let rule = radau();
+        let gained = self.rate.map(|rate| rate - self.rate_start);
+        (rule.slope_at_0(&gained) / duration, rule.slopes(&gained).map(|slope| slope / duration))
+    }
+
+    /// The nodes, as fractions of the panel, with theta and `theta'`.
+    pub fn nodes(&self) -> impl Iterator<Item = (f64, f64, f64)> {
+        radau().u.into_iter().zip(self.theta).zip(self.rate).map(|((u, theta), rate)| (u, theta, rate))
+    }
+
+    /// Work of friction on the panel, and the least friction on it: at the start or a node, or between two of them if
+    /// friction falls below 0 only there.
+    pub fn work_and_least_friction<E: Exponent>(&self, law: &Law, curve: &VelocityCurve<E>) -> (f64, f64) {
+        let (friction, slope, power) = frictions(law, curve, self, radau());
+        let first = self.sample_at_start(law, curve);
+        (self.duration(curve) * power, self.least_friction(law, curve, first, &friction, &slope))
+    }
+
+    /// Friction at the start.
+    fn sample_at_start<E: Exponent>(&self, law: &Law, curve: &VelocityCurve<E>) -> Sample {
+        let friction = friction_at(law, self.v_start, self.theta_start);
+        Sample { u: 0.0, friction, slope: self.slope(law, curve, 0.0, self.v_start, self.theta_start, self.rate_start) }
+    }
+
+    /// Least friction, from its samples at the start and at the nodes.
+    fn least_friction<E: Exponent>(
+        &self,
+        law: &Law,
+        curve: &VelocityCurve<E>,
+        mut before: Sample,
+        friction: &Nodes,
+        slope: &Nodes,
+    ) -> f64 {
+        let mut least = friction.iter().copied().fold(before.friction, f64::min);
+        for j in 0..NODES {
+            let after = Sample { u: radau().u[j], friction: friction[j], slope: slope[j] };
+            // The tangent bounds a minimum in between.
+            if least >= 0.0
+                && before.slope < 0.0
+                && after.slope > 0.0
+                && before.friction + before.slope * (after.u - before.u) < 0.0
+            {
+                least = least.min(self.extreme_friction(law, curve, SIGN_RTOL, before, after, -1.0));
+            }
+            before = after;
+        }
+        least
+    }
+
+    /// Adds the work of the panel, and extends the range of friction; the greatest friction is good to `rtol`.
+    pub fn add_to<E: Exponent>(&self, law: &Law, curve: &VelocityCurve<E>, rtol: f64, totals: &mut WorkAndFriction) {
+        let rule = radau();
+        let (friction, slope, power) = frictions(law, curve, self, rule);
+        totals.work += self.duration(curve) * power;
+        let mut before = self.sample_at_start(law, curve);
+        totals.friction_min = totals.friction_min.min(self.least_friction(law, curve, before, &friction, &slope));
+        totals.friction_max = totals.friction_max.max(before.friction);
+        for j in 0..NODES {
+            let after = Sample { u: rule.u[j], friction: friction[j], slope: slope[j] };
+            totals.friction_max = totals.friction_max.max(after.friction);
+            // The tangent bounds a maximum in between.
+            if before.slope > 0.0
+                && after.slope < 0.0
+                && before.friction + before.slope * (after.u - before.u) > totals.friction_max
+            {
+                let greatest = self.extreme_friction(law, curve, rtol, before, after, 1.0);
+                totals.friction_max = totals.friction_max.max(greatest);
+            }
+            before = after;
+        }
+    }
+
+    /// Slope of friction, `dtau/du = a v'/v + b theta'/theta`.
+    #[inline(always)]
+    fn slope<E: Exponent>(&self, law: &Law, curve: &VelocityCurve<E>, u: f64, v: f64, theta: f64, rate: f64) -> f64 {
+        let (x, z) = self.x_and_z(u);
+        let length = (self.panel.to - self.panel.from).abs();
+        length * (law.a * curve.exponent.slope(x, z) * (1.0 - curve.floor / v) + law.b * curve.t_f * rate / theta)
+    }
+
+    /// Greatest friction (`sign` 1) between two samples where it first rises and then falls, or least friction (`sign`
+    /// -1) where it first falls and then rises: the root of `tau'` by the Illinois method.
+    fn extreme_friction<E: Exponent>(
+        &self,
+        law: &Law,
+        curve: &VelocityCurve<E>,
+        rtol: f64,
+        mut low: Sample,
+        mut high: Sample,
+        sign: f64,
+    ) -> f64 {
+        let mut extreme = sign * (sign * low.friction).max(sign * high.friction);
+        let (mut slope_low, mut slope_high) = (low.slope, high.slope);
+        let mut last = 0.0;
+        for _ in 0..MAX_STEPS {
+            let u = low.u + (high.u - low.u) * (slope_low / (slope_low - slope_high));
+            let theta = self.theta(u);
+            let rate = self.rate(u);
+            let (x, z) = self.x_and_z(u);
+            let v = curve.floor + curve.w_f * exp(curve.exponent.value(x, z));
+            let slope = self.slope(law, curve, u, v, theta, rate);
+            let friction = friction_at(law, v, theta);
+            extreme = sign * (sign * extreme).max(sign * friction);
+            // The extremum differs from this value by less than the slope over the bracket.
+            if slope.abs() * (high.u - low.u) <= 0.1 * rtol * friction.abs() {
+                break;
+            }
+            let sample = Sample { u, friction, slope };
+            if sign * slope > 0.0 {
+                (low, slope_low) = (sample, slope);
+                slope_high *= if last > 0.0 { 0.5 } else { 1.0 };
+                last = 1.0;
+            } else {
+                (high, slope_high) = (sample, slope);
+                slope_low *= if last < 0.0 { 0.5 } else { 1.0 };
+                last = -1.0;
+            }
+        }
+        extreme
+    }
+}
+
+/// Relative tolerance of a least friction of which only the sign counts. Chosen: the sign is certain.
+const SIGN_RTOL: f64 = 0.1;
+
+/// Friction at a fraction of a panel, and its slope there.
+#[derive(Debug, Clone, Copy)]
+struct Sample {
+    u: f64,
+    friction: f64,
+    /// `dtau/du`.
+    slope: f64,
+}
+
+/// Steps of the Illinois method, at most. Chosen: more than a bracket between two nodes takes.
+const MAX_STEPS: u32 = 60;
+
+/// Friction `tau = 1 + a ln v + b ln theta`.
+#[inline(always)]
+pub fn friction_at(law: &Law, v: f64, theta: f64) -> f64 {
+    1.0 + law.a * ln(v) + law.b * ln(theta)
+}
+
+/// Friction and its slope at the nodes, and `int tau v du`.
+#[multiversion(targets(
+    "x86_64+avx+avx2+bmi1+bmi2+avx512f+avx512bw+avx512cd+avx512dq+avx512vl",
+    "x86_64+avx+avx2+bmi1+bmi2"
+))]
+fn frictions<E: Exponent>(
+    law: &Law,
+    curve: &VelocityCurve<E>,
+    resolved: &ResolvedPanel,
+    rule: &Radau,
+) -> (Nodes, Nodes, f64) {
+    let ResolvedPanel { v, theta, rate, .. } = resolved;
+    let (mut tau, mut slope, mut power) = ([0.0; NODES], [0.0; NODES], [0.0; NODES]);
+    for j in 0..NODES {
+        tau[j] = friction_at(law, v[j], theta[j]);
+        power[j] = rule.w[j] * tau[j] * v[j];
+    }
+    for j in 0..NODES {
+        slope[j] = resolved.slope(law, curve, rule.u[j], v[j], theta[j], rate[j]);
+    }
+    (tau, slope, total(&power))
+}
