@@ -64,7 +64,7 @@ pub fn init(arguments: &Arguments) -> Result<(), Failure> {
     check_name(&name).map_err(|error| refused(format!("`{given}`: {}", error.found), error.expected, error.help))?;
     if !(folder.as_os_str().is_empty() || folder.is_dir()) {
         let found = format!("`{given}`: there is no folder `{}`", folder.display());
-        let expected = format!("a name such as {name}, or one in a folder that is there");
+        let expected = format!("a name such as {name}, or one in an existing folder");
         return Err(refused(found, expected, format!("slipsweep init {name}")));
     }
     let text = format!("#:schema ./{SCHEMA}\n{}", arguments.question.spec().replace("NAME", &name));
@@ -72,11 +72,11 @@ pub fn init(arguments: &Arguments) -> Result<(), Failure> {
     // The spec as it would be written is no other one.
     let found = file::open(&path).and_then(io::read_to_string);
     if path.exists() && !found.is_ok_and(|found| found == text) {
-        let found = format!("{}: is there already", path.display());
+        let found = format!("{}: exists already", path.display());
         return Err(refused(found, "a new name", "choose another name, or remove the file"));
     }
     let write = |path: &Path, text: &str| {
-        let help = "choose a folder that is there and can be written to";
+        let help = "choose an existing folder with write permission";
         let written = to_file(path, |file| file.write_all(text.as_bytes()));
         written.map_err(|error: io::Error| {
             Failure::failed(format!("{}: cannot write: {error}\n  help: {help}", path.display()))

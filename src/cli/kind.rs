@@ -104,9 +104,9 @@ impl Kind {
             Kind::Table => ("the folder of a table", name(above(path), "dataset")),
             Kind::Part => ("a part of a table", name(above(path).and_then(|table| above(&table)), "dataset")),
             Kind::Manifest => ("the manifest of a dataset", name(above(path), "folder")),
-            Kind::Folder => ("a folder without a manifest.json", ours()),
+            Kind::Folder => ("a folder without a dataset", ours()),
             Kind::Spec => {
-                ("a spec", format!("`slipsweep run {shown}` computes its dataset, {}: name that", results(path)))
+                ("a spec", format!("`slipsweep run {shown}` computes the dataset {}; name that folder", results(path)))
             }
             Kind::Trace => ("a trace", format!("`slipsweep plot {shown}` draws it")),
             Kind::Rows => {

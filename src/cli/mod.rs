@@ -65,12 +65,12 @@ const AGAIN: u8 = 75;
 
 Exit codes:
   0    done
-  1    the spec or the arguments are wrong
-  2    the command failed
-  3    `run --strict` met a row that is not_converged, or `verify` an error
-  75   `run --requeue` met a failure that may pass by itself
-  130  stopped by Ctrl-C (SIGINT); what is finished is kept
-  143  stopped by SIGTERM; what is finished is kept"
+  1    the spec or the arguments are wrong, or the dataset does not fit on the disk
+  2    the command failed, or the dataset of `status` is incomplete
+  3    `run --strict` found a row that is not_converged, or `verify` found a difference beyond 10 rtol
+  75   a temporary failure, with `run --requeue`
+  130  stopped by Ctrl-C (SIGINT); finished parts are kept
+  143  stopped by SIGTERM; finished parts are kept"
 )]
 struct Arguments {
     #[command(subcommand)]
@@ -266,7 +266,11 @@ fn dataset(path: &Path) -> Result<(Folder, Manifest), Failure> {
             note(&folder, &manifest);
             Ok((folder, manifest))
         }
-        None => Err(wrong(format!("{}: not a dataset", path.display()))),
+        None => Err(refused(
+            format!("{}: not a dataset", path.display()),
+            "a folder with a manifest.json, or with at least one part",
+            "name a folder that `slipsweep run` wrote",
+        )),
     }
 }
 
@@ -274,7 +278,7 @@ fn dataset(path: &Path) -> Result<(Folder, Manifest), Failure> {
 fn note(folder: &Folder, manifest: &Manifest) {
     if let Some(why) = &manifest.rebuilt {
         let path = folder.manifest_path();
-        let text = "the parts give its contents; `slipsweep run` writes it again";
+        let text = "rebuilt from the footers of the parts; `slipsweep run` rewrites it";
         let _ = writeln!(io::stderr(), "note: {} is {why}; {text}", path.display());
     }
 }

@@ -48,11 +48,16 @@ impl<F: Format> Output<F> {
                     .enumerate()
                     .filter(|(place, (_, format))| F::ENDINGS[..*place].iter().all(|(_, other)| other != format));
                 let usual: Vec<String> = usual.map(|(_, (ending, _))| format!(".{ending}")).collect();
-                return Err(wrong(format!("{name} ends in none of {}: add --format", usual.join(", "))));
+                return Err(wrong(format!(
+                    "--out {name}: the ending is none of {}\n  help: add --format",
+                    usual.join(", ")
+                )));
             }
         };
         if format == F::PARQUET && self.is_stdout() && io::stdout().is_terminal() {
-            return Err(wrong("Parquet is not for a terminal: name a file with --out, or pipe it on"));
+            return Err(wrong(
+                "Parquet is not written to a terminal\n  help: name a file with --out, or pipe the output",
+            ));
         }
         Ok(format)
     }

@@ -16,7 +16,7 @@ use crate::sweep::{Estimates, Plan, Sweep, estimate};
 pub struct Arguments {
     /// The sweep spec, a TOML file
     spec: PathBuf,
-    /// Folder in which the dataset's folder would be made, to compare the size with the room on its disk
+    /// Folder of the dataset folder, whose free disk space is compared with the size
     #[arg(long, value_name = "DIR", default_value = "results")]
     out: PathBuf,
 }
@@ -46,7 +46,7 @@ pub fn plan(arguments: &Arguments) -> Result<(), Failure> {
 /// What to say of a dataset of `bytes` that is to go to `folder`, whose disk has `free` bytes.
 pub fn too_large(folder: &Path, bytes: f64, free: f64) -> String {
     format!(
-        "{}: about {} to write, but {} free on the disk\n  help: write less, with `reduce` or fewer `columns`, or elsewhere, with --out DIR",
+        "{}: about {} to write, but {} free on the disk\n  help: write less, with `reduce` or fewer `columns`, or write elsewhere with --out DIR",
         folder.display(),
         words::bytes(bytes),
         words::bytes(free),
@@ -58,7 +58,7 @@ pub fn in_words(sweep: &Sweep, estimates: &Estimates, reading: f64) -> String {
     let plan = Plan::new(sweep);
     let threads = available_parallelism().map_or(1, |threads| threads.get());
     let has_condition = sweep.grid.blocks.iter().any(|block| block.condition.is_some());
-    let header = ["table", "rows", "left out by where", "parts", "size", "time on one thread"];
+    let header = ["table", "rows", "dropped by where", "parts", "size", "time on one thread"];
     let mut rows = vec![header.map(str::to_owned).to_vec()];
     for ((table, dropped), estimate) in plan.tables.iter().zip(&plan.dropped).zip(&estimates.tables) {
         rows.push(vec![

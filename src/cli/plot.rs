@@ -47,7 +47,7 @@ pub struct Arguments {
     /// Width in millimetres: 89 for one column of a journal, 183 for two [default: by the number of panels]
     #[arg(long, value_name = "MM", value_parser = width)]
     width: Option<f64>,
-    /// Pixels to the inch of a .png
+    /// Pixels per inch of a .png
     #[arg(long, value_name = "N", default_value = "300", value_parser = dpi)]
     dpi: f64,
 }
@@ -84,7 +84,7 @@ pub fn plot(arguments: &Arguments) -> Result<(), Failure> {
         sources => {
             for source in sources {
                 if source.is_dir() && sources.len() > 1 {
-                    let found = format!("{}: a folder with other arguments", source.display());
+                    let found = format!("{}: a dataset together with other arguments", source.display());
                     return Err(refused(found, "one dataset, or traces", "draw them one after the other"));
                 }
                 kind::expect(source, &[Kind::Dataset, Kind::Trace])?;
@@ -129,7 +129,7 @@ impl Arguments {
             None => source.tables(),
         };
         if tables.len() > 1
-            && let Some(flag) = self.given(("--out with the name of a file", place.file.is_some()))
+            && let Some(flag) = self.given(("--out FILE", place.file.is_some()))
         {
             let tables = tables.join(", ");
             return Err(wrong(format!(

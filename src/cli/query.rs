@@ -64,10 +64,10 @@ impl output::Format for Format {
     const PARQUET: Format = Format::Parquet;
 }
 
-/// The environment variable of the process that answers.
+/// The environment variable of the query process.
 const INSIDE: &str = "SLIPSWEEP_ANSWERS";
 
-/// Time between two looks at the process that answers. Chosen: a short query does not wait longer than that for its end.
+/// Time between two looks at the query process. Chosen: a short query does not wait longer than that for its end.
 const POLL: Duration = Duration::from_millis(5);
 
 /// Bytes of the stack on which a question is read and planned. Chosen: a term takes some kilobytes of it, and a question has thousands at most.
@@ -80,7 +80,7 @@ pub fn query(arguments: &Arguments) -> Result<(), Failure> {
     }
     arguments.output.format()?;
     if arguments.output.is_stdout() {
-        // Of a closed one the process that answers would not know.
+        // Of a closed one the query process would not know.
         drop(stdout()?);
     } else {
         keep_datasets(&arguments.output.out)?;
@@ -141,7 +141,7 @@ fn apart(arguments: &Arguments) -> Result<(), Failure> {
     // What goes on is said on a terminal until the answer begins, which a terminal therefore gets through this process.
     let shown = io::stderr().is_terminal();
     let is_copied = shown && arguments.output.is_stdout() && io::stdout().is_terminal();
-    let mut child = child(is_copied).map_err(|error| cannot_start("the process that answers", error))?;
+    let mut child = child(is_copied).map_err(|error| cannot_start("the query process", error))?;
     let mut said = child.stderr.take();
     let listen = move || said.as_mut().and_then(|said| io::read_to_string(said).ok()).unwrap_or_default();
     let listener = match thread::Builder::new().spawn(listen) {
@@ -149,7 +149,7 @@ fn apart(arguments: &Arguments) -> Result<(), Failure> {
         Err(error) => {
             let _ = child.kill();
             let _ = child.wait();
-            return Err(cannot_start("the process that answers", error));
+            return Err(cannot_start("the query process", error));
         }
     };
     let line = Arc::new(Mutex::new(Line { bar: None, is_over: !shown }));
@@ -182,7 +182,7 @@ fn apart(arguments: &Arguments) -> Result<(), Failure> {
 }
 
 fn cannot_start(what: &str, error: io::Error) -> Failure {
-    let help = "raise the number of processes allowed (ulimit -u), or end others";
+    let help = "raise the limit on processes (ulimit -u), or end other processes";
     Failure::failed(format!("cannot start {what}: {error}\n  help: {help}"))
 }
 
@@ -252,10 +252,10 @@ fn reason(status: ExitStatus, said: &str) -> String {
             .to_owned();
     }
     if said.contains("overflowed its stack") {
-        return "the query is too long\n  help: ask in several queries".to_owned();
+        return "the query is too long\n  help: split it into several queries".to_owned();
     }
     let said = said.lines().next().unwrap_or_default();
-    format!("the query failed ({status}): {said}\n  help: ask in another way")
+    format!("the query failed ({status}): {said}\n  help: rewrite the query")
 }
 
 /// Removes what a process that was ended left of the file `out`.
@@ -286,11 +286,11 @@ fn inside(arguments: &Arguments) -> Result<(), Failure> {
         let work = || panic::catch_unwind(AssertUnwindSafe(|| answer(arguments)));
         let thread = thread::Builder::new().stack_size(STACK_BYTES).spawn_scoped(scope, work).map_err(no_thread)?;
         let done = thread.join().and_then(|done| done);
-        let unsupported = |_| Err(Failure::failed("the query failed: it is not supported\n  help: ask in another way"));
+        let unsupported = |_| Err(Failure::failed("the query failed: it is not supported\n  help: rewrite the query"));
         done.unwrap_or_else(unsupported).map_err(|mut failure| {
             if let Some(panic) = panicked.lock().ok().and_then(|mut first| first.take()) {
                 let line = panic.lines().next().unwrap_or_default();
-                failure.message.push_str(&format!("\n  note: polars gave up: {line}"));
+                failure.message.push_str(&format!("\n  note: polars failed: {line}"));
             }
             failure
         })
@@ -330,7 +330,7 @@ fn answer(arguments: &Arguments) -> Result<(), Failure> {
         // That the answer is incomplete is worth saying, but not worth failing if it cannot be said.
         let _ = writeln!(
             io::stderr(),
-            "note: `{}` lacks {} of {}, which `slipsweep run` makes",
+            "note: `{}` lacks {} of {}, which `slipsweep run` computes",
             source.name,
             words::count(missing),
             words::things(all, "part")
@@ -356,7 +356,7 @@ fn answer(arguments: &Arguments) -> Result<(), Failure> {
 fn failure(tables: &Tables, arguments: &Arguments, error: AnswerError) -> Failure {
     let other = || match &error {
         AnswerError::Failed(cause) if !query::is_unreadable(cause) => {
-            Failure::failed(format!("{error}\n  help: ask in another way"))
+            Failure::failed(format!("{error}\n  help: rewrite the query"))
         }
         _ => unreadable(&arguments.dataset, &error),
     };
@@ -367,9 +367,9 @@ fn failure(tables: &Tables, arguments: &Arguments, error: AnswerError) -> Failur
 pub(super) fn unreadable(dataset: &Path, error: &AnswerError) -> Failure {
     let path = dataset.display();
     let help = if dataset.join("manifest.json").exists() {
-        format!("`slipsweep status {path} --check` names damaged files, and the next run makes them again")
+        format!("`slipsweep status {path} --check` names damaged files, and the next run recomputes them")
     } else {
-        "make the file again".to_owned()
+        "write the file again".to_owned()
     };
     Failure::failed(format!("{path}: {error}\n  help: {help}"))
 }

@@ -115,10 +115,10 @@ fn report(
         }
         if done.kept > 0 {
             let (kept, all) = (words::count(done.kept), words::things(all, "part"));
-            text.push_str(&format!("  {kept} of {all} kept from before\n"));
+            text.push_str(&format!("  {kept} of {all} kept\n"));
         }
         if done.damaged > 0 {
-            text.push_str(&format!("  {} made again\n", words::things(done.damaged, "damaged part")));
+            text.push_str(&format!("  {} recomputed\n", words::things(done.damaged, "damaged part")));
         }
         if shard.is_none() {
             text.push('\n');
@@ -176,16 +176,20 @@ fn subject(arguments: &Arguments) -> Result<(Sweep, Folder), Failure> {
     let found = folder.manifest().map_err(Failure::failed)?;
     let Some(manifest) = found else {
         let found = format!("{}: neither a spec nor a dataset", path.display());
-        return Err(refused(found, "a TOML file, or a folder that `slipsweep run` wrote", "check the path"));
+        return Err(refused(
+            found,
+            "a spec, such as NAME.toml, or the folder of a dataset, such as results/NAME",
+            "check the path",
+        ));
     };
     if manifest.spec.is_empty() {
-        let message = "its manifest is lost and its parts do not carry the spec";
-        return Err(wrong(format!("{}: {message}\n  help: run the spec that it was made from", path.display())));
+        let message = "the manifest is missing, and the parts do not contain the spec";
+        return Err(wrong(format!("{}: {message}\n  help: run the spec file of this dataset", path.display())));
     }
     let sweep = Sweep::parse_at(&manifest.spec, &path.join("manifest.json")).map_err(|error| {
         let out = path.parent().filter(|out| !out.as_os_str().is_empty()).unwrap_or(Path::new(".")).display();
-        let what = format!("{}: the spec in it does not do without the files that it names", path.display());
-        let help = format!("run the file that it was made from: slipsweep run SPEC --out {out}");
+        let what = format!("{}: its spec refers to files that are not in the dataset", path.display());
+        let help = format!("run the spec file: slipsweep run SPEC --out {out}");
         wrong(format!("{what}\n  found: {error}\n  help: {help}"))
     })?;
     let folder = arguments.out.as_deref().map_or(folder, |out| Folder::new(out, &sweep.name));
@@ -196,7 +200,7 @@ fn explain(error: RunError, caught: Option<i32>, arguments: &Arguments, (there, 
     match error {
         RunError::Stopped(_) => {
             let (there, all) = (words::count(there), words::things(all, "part"));
-            let message = format!("stopped; {there} of {all} finished: the same command goes on from there");
+            let message = format!("stopped; {there} of {all} finished; the same command continues");
             Failure { code: caught.and_then(|number| u8::try_from(128 + number).ok()).unwrap_or(FAILED), message }
         }
         RunError::Dataset(
@@ -253,7 +257,7 @@ fn account(outcome: &Outcome, seconds: f64) -> String {
     let RunStats { optima, landscapes, best, shortcuts, crossovers, simulations, steps, quadratures, nodes } =
         outcome.work;
     let (all, rate) = (words::things(rows, "row"), words::count((rows as f64 / seconds) as u64));
-    let mut text = format!("{all} in {}: {rate} rows a second, with writing\n", words::duration(seconds));
+    let mut text = format!("{all} in {}: {rate} rows per second, writing included\n", words::duration(seconds));
     let spent: Vec<String> = [
         (optima, "optimal protocol"),
         (landscapes, "landscape"),

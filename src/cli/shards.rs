@@ -118,8 +118,8 @@ pub fn shards(arguments: &Arguments) -> Result<(), Failure> {
     let script = engine.script(folder.path());
     check_path(engine, &out)?;
     fs::create_dir_all(&arguments.out).map_err(|error| refused(&arguments.out, "create the folder", &error))?;
-    let program =
-        std::env::current_exe().map_err(|error| Failure::failed(format!("where is this program? {error}")))?;
+    let program = std::env::current_exe()
+        .map_err(|error| Failure::failed(format!("cannot find the path of the running program: {error}")))?;
     let job = Job {
         name: &sweep.name,
         program: quoted(&program),
@@ -136,18 +136,18 @@ pub fn shards(arguments: &Arguments) -> Result<(), Failure> {
 
     let (rows, parts, work) = (words::things(rows, "row"), words::things(parts, "part"), words::duration(seconds));
     let (tasks, cpus) = (words::things(shards, "task"), words::things(arguments.cpus, "processor"));
-    let mut said = format!("{}: {rows} in {parts}, about {work} of one processor\n", sweep.name);
-    let _ = writeln!(said, "{tasks} of about {} on {cpus} each", words::duration(each));
+    let mut said = format!("{}: {rows} in {parts}, about {work} on one processor\n", sweep.name);
+    let _ = writeln!(said, "{tasks}, each about {} on {cpus}", words::duration(each));
     if let Some(reason) = fewer {
         let _ = writeln!(said, "fewer than the {} requested: {reason}", words::count(arguments.shards));
     }
     if engine == Engine::Slurm
         && slurm_config("RequeueExit").is_some_and(|codes| !codes.split(',').any(|code| code == "75"))
     {
-        said.push_str("RequeueExit of this Slurm does not have 75: a task that meets a passing failure is to be submitted again\n");
+        said.push_str("RequeueExit of this Slurm lacks 75: submit tasks with a temporary failure again by hand\n");
     }
-    let _ = writeln!(said, "written: {}\nsubmit it with\n  {}", script.display(), engine.submit(&script, None));
-    let _ = writeln!(said, "what is missing then:\n  slipsweep status {}", quoted(folder.path()));
+    let _ = writeln!(said, "written: {}\nsubmit with\n  {}", script.display(), engine.submit(&script, None));
+    let _ = writeln!(said, "then list missing parts with\n  slipsweep status {}", quoted(folder.path()));
     say(&said)
 }
 
@@ -158,7 +158,7 @@ fn tasks(arguments: &Arguments, parts: u64, seconds: f64) -> (u64, Option<String
         minutes => (seconds / (60.0 * minutes * arguments.cpus as f64)) as u64,
     };
     let bounds = [
-        (parts, "there are no more parts".to_owned()),
+        (parts, "the sweep has only so many parts".to_owned()),
         (arguments.engine.most_tasks(), "MaxArraySize of Slurm allows no more tasks in an array".to_owned()),
         (worth.max(1), format!("more of them would have less than {} minutes of work each", arguments.minutes)),
     ];
@@ -190,7 +190,9 @@ fn absolute(path: &Path) -> Result<PathBuf, Failure> {
     let absolute = std::path::absolute(path).map_err(|error| wrong(error.to_string()))?;
     match absolute.to_str() {
         Some(text) if !text.chars().any(char::is_control) => Ok(absolute),
-        _ => Err(wrong("not a path that can stand in a script\n  help: use letters that UTF-8 can write".to_owned())),
+        _ => Err(wrong(
+            "not a path for a script: it is not UTF-8, or has control characters\n  help: rename it".to_owned(),
+        )),
     }
 }
 
@@ -235,8 +237,9 @@ impl Job<'_> {
         let minutes = (10.0 + 3.0 * self.each / 60.0).ceil();
         // Slurm takes % for a pattern.
         let log = self.log.display().to_string().replace('%', "%%").replace('"', "\\\"");
-        let task =
-            format!("# A task is about {about} of work. It may be killed, repeated or run twice at a time at no harm.");
+        let task = format!(
+            "# A task is about {about} of work. It may be killed, repeated, or run twice at the same time without harm."
+        );
         let (head, again, number) = match engine {
             Engine::Slurm => (
                 format!(
@@ -256,7 +259,7 @@ impl Job<'_> {
         format!(
             "#!/bin/bash\n{head}{SHARDS}{shards}\n{task}\n{again}\
              exec {program} run {spec} --out {out} --shard \"{number}/{shards}\" --threads {cpus}{flag}\n\
-             # What is missing: {program} status {dataset}\n"
+             # Missing parts: {program} status {dataset}\n"
         )
     }
 }

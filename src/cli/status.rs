@@ -38,12 +38,13 @@ pub fn status(arguments: &Arguments) -> Result<(), Failure> {
         summary::survey(&folder, &manifest, if arguments.check { CheckDepth::Whole } else { CheckDepth::Footer });
     let mut text = format!("{}: {}, made by slipsweep {}\n", path.display(), manifest.name, manifest.build.version);
     if let Some(why) = &manifest.rebuilt {
-        let _ = writeln!(text, "manifest.json is {why}; the parts give its contents, and a run writes it again");
+        let _ =
+            writeln!(text, "manifest.json is {why}; rebuilt from the footers of the parts; the next run rewrites it");
     }
     text.push_str(&counts(&survey));
     text.push_str(&faults(&folder, &survey));
     if survey.is_complete() {
-        text.push_str(if arguments.check { "complete, every bit as written\n" } else { "complete\n" });
+        text.push_str(if arguments.check { "complete; all checksums match\n" } else { "complete\n" });
         return say(&text);
     }
     let runs = folder.runs();
@@ -57,7 +58,7 @@ pub fn status(arguments: &Arguments) -> Result<(), Failure> {
     say(&text)?;
     let (all, there) =
         survey.tables.iter().fold((0, 0), |(all, there), table| (all + table.parts, there + table.there));
-    let message = format!("incomplete: {} of {} there", words::count(there), words::things(all, "part"));
+    let message = format!("incomplete: {} of {} are present", words::count(there), words::things(all, "part"));
     Err(Failure { code: FAILED, message })
 }
 
@@ -98,13 +99,13 @@ fn faults(folder: &Folder, survey: &Survey) -> String {
     let shown = |paths: &[PathBuf]| -> Vec<String> { paths.iter().map(|path| path.display().to_string()).collect() };
     let lists: [(&str, Vec<String>); 5] = [
         ("missing parts:", missing.collect()),
-        ("damaged; the next run makes them again:", damaged.collect()),
-        ("foreign; a run leaves them alone and fails:", foreign.collect()),
+        ("damaged parts (the next run recomputes them):", damaged.collect()),
+        ("foreign files in the place of parts (a run leaves them alone and fails):", foreign.collect()),
         (
-            "temporary files of runs that are under way or were killed; a run removes those of the dead:",
+            "temporary files of running or killed processes (the next run removes those of killed ones):",
             shown(&survey.temporary),
         ),
-        ("other files, which nobody minds:", shown(&survey.others)),
+        ("other files (ignored):", shown(&survey.others)),
     ];
     let mut text = String::new();
     for (title, lines) in lists.iter().filter(|(_, lines)| !lines.is_empty()) {
@@ -121,7 +122,7 @@ fn faults(folder: &Folder, survey: &Survey) -> String {
 
 /// The commands that would finish the dataset.
 fn remedy(path: &Path, manifest: &Manifest, survey: &Survey) -> String {
-    let mut text = "to finish it:\n".to_owned();
+    let mut text = "to finish the dataset:\n".to_owned();
     for table in &survey.tables {
         for (part, _) in &table.foreign {
             let place = Folder::at(path).part(&table.name, *part);
@@ -142,16 +143,14 @@ fn remedy(path: &Path, manifest: &Manifest, survey: &Survey) -> String {
     let (Some(sweep), Some(plan), true) = (sweep, plan, is_same) else {
         let out = quoted(path.parent().filter(|out| !out.as_os_str().is_empty()).unwrap_or(Path::new(".")));
         let _ = writeln!(text, "  slipsweep run SPEC --out {out}");
-        text.push_str(
-            "where SPEC is the file that it was made from: it refers to other files, so its text alone does not do\n",
-        );
+        text.push_str("SPEC is the spec file of this dataset: it refers to files that are not in the dataset\n");
         return text;
     };
     let _ = writeln!(text, "  slipsweep run {}", quoted(path));
     for (count, submit) in scripts(path) {
         let wanted = |table: usize, part| survey.tables.get(table).is_some_and(|table| !table.has(part));
         let Ok(shards) = shards_with(&sweep, &plan, count, wanted) else { continue };
-        let _ = writeln!(text, "or as tasks, {} of {count}:\n  {}", shards.len(), submit(&shards));
+        let _ = writeln!(text, "or as tasks, {} of {count} shards:\n  {}", shards.len(), submit(&shards));
     }
     text
 }

@@ -31,7 +31,7 @@ pub fn summary(arguments: &Arguments) -> Result<(), Failure> {
         let missing = table.parts - table.there;
         if missing > 0 {
             let (missing, all) = (words::count(missing), words::things(table.parts, "part"));
-            text.push_str(&format!("  {missing} of {all} not there yet: `slipsweep run` makes what is missing\n"));
+            text.push_str(&format!("  {missing} of {all} missing: `slipsweep run` computes them\n"));
         }
     }
     say(&text)
@@ -43,7 +43,7 @@ pub fn survey(folder: &Folder, manifest: &Manifest, look: CheckDepth) -> Survey 
     let there = manifest.tables.iter().map(|table| folder.parts_there(table).len() as u64).sum();
     let doing = match look {
         CheckDepth::Footer => "reading the footers",
-        CheckDepth::Whole => "checking the parts that are there",
+        CheckDepth::Whole => "checking existing parts",
     };
     let wait = Wait { done: Some((&looked, there, "part")), ..Wait::new(doing) };
     waiting(&wait, || Survey::new(folder, manifest, look, &looked))

@@ -47,10 +47,10 @@ pub struct Arguments {
     /// Duration, in l/v_0; for a row of `step_response` the shown duration, in the units of the dataset
     #[arg(long, value_name = "T", value_parser = |text: &str| legal(text, Quantity::Time.domain()))]
     t_f: Option<f64>,
-    /// Direct effect of the velocity on friction, in mu_0
+    /// Direct effect: coefficient of ln v in friction, in mu_0
     #[arg(long, value_name = "A", value_parser = |text: &str| legal(text, Quantity::A.domain()))]
     a: Option<f64>,
-    /// Effect of the contact lifetime on friction, in mu_0
+    /// Evolution effect: coefficient of ln theta in friction, in mu_0
     #[arg(long, value_name = "B", value_parser = |text: &str| legal(text, Quantity::B.domain()))]
     b: Option<f64>,
     /// Velocity before the protocol, in v_0
@@ -77,13 +77,13 @@ pub struct Arguments {
     /// Length of the smooth pieces, in l/v_0 (regularised)
     #[arg(long, value_name = "D", value_parser = |text: &str| legal(text, Quantity::Smoothing.domain()))]
     delta_t: Option<f64>,
-    /// Without the bound v >= 1 (optimal, best_cubic, regularised)
+    /// Without the velocity floor v >= 1 (optimal, best_cubic, regularised)
     #[arg(long)]
     unbounded: bool,
     /// Relative accuracy of the solution [default: 1e-10, or that of the table]
     #[arg(long, value_name = "R", value_parser = |text: &str| legal(text, RTOL))]
     rtol: Option<f64>,
-    /// So many equally spaced times instead of the fewest that show every detail
+    /// Number of equally spaced times [default: the fewest that show every detail]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(2..=10_000_000))]
     points: Option<u32>,
     #[command(flatten)]
@@ -93,7 +93,7 @@ pub struct Arguments {
 /// How a trace is written.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 enum Format {
-    /// Aligned columns of nine digits under a few words (.txt)
+    /// A header and aligned columns of nine digits (.txt)
     Table,
     /// All digits (.csv)
     Csv,
@@ -189,7 +189,7 @@ pub fn trace(arguments: &Arguments) -> Result<(), Failure> {
         request.protocol.path(&request.case, request.rtol).map_err(|absence| absent(&request.name, absence))?;
     let times = arguments.points.map_or(Times::Fewest, |count| Times::Spaced(count as usize));
     let Some(trace) = Trace::of(&*path.motion, &request.case.transition, times) else {
-        return Err(Failure::failed("the protocol shows more detail than can be resolved"));
+        return Err(Failure::failed("the protocol has more detail than a trace can resolve"));
     };
     let least = trace.moments.iter().map(|moment| moment.friction).fold(f64::INFINITY, f64::min);
     path.status = path.status.with_friction(least);
@@ -254,7 +254,7 @@ impl Arguments {
         if Path::new(&self.subject).is_dir() {
             let (folder, expected) = (&self.subject, "a protocol, or a dataset with a table and a row");
             let help = format!("slipsweep trace {folder} optimal --row 0");
-            return Err(refused(format!("{folder}: a folder, without a table"), expected, help));
+            return Err(refused(format!("{folder}: a dataset without a table"), expected, help));
         }
         let name = self.subject.as_str();
         self.check(name)?;
@@ -326,7 +326,9 @@ impl Arguments {
         let given = self.given().into_iter().find(|(quantity, given)| given.is_some() && is_own(*quantity));
         let given = given.map(|(quantity, _)| flag(quantity)).or(self.unbounded.then(|| "--unbounded".to_owned()));
         if let Some(flag) = given {
-            return Err(wrong(format!("{flag}: the row of a dataset has its own\n  help: leave {flag} out")));
+            return Err(wrong(format!(
+                "{flag}: not for a row of a dataset, which has its own parameters\n  help: remove {flag}"
+            )));
         }
         let path = Path::new(&self.subject);
         let (folder, manifest) = dataset(path)?;
@@ -401,7 +403,7 @@ fn row_at(path: &Path, folder: &Folder, table: &ManifestTable, row: u64) -> Resu
     let part = row / table.rows_per_part.max(1);
     let file = folder.part(&table.name, part);
     if !file.is_file() {
-        let (file, help) = (file.display(), "run the sweep again, which makes only what is missing");
+        let (file, help) = (file.display(), "run the sweep again; it computes only missing parts");
         return Err(wrong(format!("{file}: row {row} is in a part that is missing\n  help: {help}")));
     }
     let place = usize::try_from(row - table.rows_of(part).start).map_err(Failure::failed)?;
@@ -507,7 +509,7 @@ fn header(arguments: &Arguments, request: &TraceRequest, path: &TracedPath, trac
     let all = |numbers: &[Named]| numbers.iter().map(Named::words).collect::<Vec<_>>().join(", ");
     let mut text = format!("{}: {}\n  at {}", request.name, request.protocol.doc(&request.name), all(&request.numbers));
     if request.bounded == Some(false) {
-        text.push_str(", without the bound v >= 1");
+        text.push_str(", without the velocity floor v >= 1");
     }
     text.push('\n');
     if let Some(Origin { dataset, table, row }) = &request.origin {

@@ -65,7 +65,7 @@ pub fn waiting<T>(wait: &Wait<'_>, work: impl FnOnce() -> T) -> T {
         if let Some(number) = caught {
             line.iter().for_each(ProgressBar::finish_and_clear);
             // Where nobody listens, nothing is lost.
-            let _ = writeln!(stderr(), "stopped while {}; nothing is changed", wait.doing);
+            let _ = writeln!(stderr(), "stopped while {}; nothing has changed", wait.doing);
             process::exit(128 + number);
         }
         if !wait.quiet && start.elapsed() > SILENCE && stderr().is_terminal() {
@@ -225,13 +225,13 @@ impl ProgressDisplay {
         match self.phase {
             Phase::Checking => {
                 let (kept, all) = (words::count(kept), words::things(self.rows, "row"));
-                format!("checking the parts that are there: {kept} of {all}")
+                format!("checking existing parts: {kept} of {all}")
             }
             Phase::Computing => {
                 let rate = done as f64 / self.since.elapsed().as_secs_f64().max(LOOK.as_secs_f64());
                 let to_do = self.rows.saturating_sub(done + kept);
                 let left = if done == 0 { "?".to_owned() } else { words::duration(to_do as f64 / rate) };
-                format!("{} a second, {left} left", words::count(rate as u64))
+                format!("{} per second, {left} left", words::count(rate as u64))
             }
             Phase::Writing => "writing the last parts".to_owned(),
         }

@@ -63,7 +63,7 @@ pub enum DatasetError {
     },
     /// Another run is at work.
     #[error(
-        "{folder}: another run is at work here{process}\n  help: wait for its end, `slipsweep status {folder}` shows what is finished; only \
+        "{folder}: another run is writing this dataset{process}\n  help: wait for its end (`slipsweep status {folder}` shows its progress); only \
          shards (--shard I/N) run side by side"
     )]
     Busy {
@@ -74,7 +74,7 @@ pub enum DatasetError {
     },
     /// Somebody changed the dataset while this run was at work.
     #[error(
-        "{folder}: {what} while this run was at work; it stopped there\n  help: run the same command again, which keeps what is finished"
+        "{folder}: {what} during this run, which stopped\n  help: run the same command again; it keeps finished parts"
     )]
     Taken {
         /// The folder.
@@ -84,7 +84,7 @@ pub enum DatasetError {
     },
     /// The folder holds something else.
     #[error(
-        "{folder}: not a dataset, but not empty either\n  expected: an empty folder, or one with a manifest.json\n  help: change \
+        "{folder}: neither a dataset nor empty\n  expected: an empty folder, or one with a manifest.json\n  help: change \
          `name` in the spec, or write elsewhere with --out DIR"
     )]
     Occupied {
@@ -108,7 +108,7 @@ pub enum DatasetError {
     },
     /// A part is broken.
     #[error(
-        "{path}: the part is damaged: {why}\n  help: `slipsweep run {dataset}` recomputes it and keeps all sound parts"
+        "{path}: the part is damaged: {why}\n  help: `slipsweep run {dataset}` recomputes it and keeps all intact parts"
     )]
     DamagedPart {
         /// The file.
@@ -120,7 +120,7 @@ pub enum DatasetError {
     },
     /// The manifest is damaged, and no part says what it said.
     #[error(
-        "{path}: damaged, or not of this version of slipsweep: {why}\n  help: run the spec of the dataset, which writes it again if no part \
+        "{path}: damaged, or of another version of slipsweep: {why}\n  help: run the spec of the dataset, which rewrites it if no part \
          is there; else {WAYS_OUT}"
     )]
     Manifest {
@@ -131,7 +131,7 @@ pub enum DatasetError {
     },
     /// The system refused.
     #[error(
-        "{path}: cannot {action}: {source}\n  help: fix that, then run the same command again, which keeps what is finished; or write \
+        "{path}: cannot {action}: {source}\n  help: solve this and run the same command again, which keeps finished parts; or write \
          elsewhere with --out DIR"
     )]
     Io {

@@ -146,7 +146,7 @@ pub enum ReadError {
     #[error(transparent)]
     Part(#[from] DatasetError),
     /// A part turns out to be damaged when it is read.
-    #[error("{0}\n  help: run the sweep again, which recomputes damaged parts and keeps all others")]
+    #[error("{0}\n  help: run the sweep again; it recomputes damaged parts alone")]
     Frame(#[from] FrameError),
 }
 

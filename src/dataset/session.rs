@@ -144,7 +144,7 @@ impl Folder {
                 }
             }
         }
-        Err(self.taken("manifest.json comes and goes"))
+        Err(self.taken("manifest.json appeared and disappeared"))
     }
 
     fn taken(&self, what: &'static str) -> DatasetError {

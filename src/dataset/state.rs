@@ -92,7 +92,7 @@ pub fn open_part(path: &Path, manifest: &Manifest, table: &str, part: u64) -> Re
     match checksum::is_head_intact(&file, &metadata) {
         Ok(Some(true)) => {}
         Ok(None) if Footer::from_entries(&entries).is_none() => {
-            return Err(stranger("a Parquet file without its marks"));
+            return Err(stranger("a Parquet file that slipsweep did not write"));
         }
         Ok(_) => return damaged("the checksum of its footer and page headers does not match"),
         Err(error) => return damaged(&error.to_string()),
@@ -177,7 +177,7 @@ fn belongs(
         Err(State::Foreign { what, expected: expected.to_owned(), found: found.to_owned() })
     };
     let (Some(found), Some(statistics)) = (Footer::from_entries(entries), Footer::statistics(entries)) else {
-        return Err(stranger("a Parquet file without its marks"));
+        return Err(stranger("a Parquet file that slipsweep did not write"));
     };
     let planned = manifest.table(table);
     let rows = planned.map(|planned| planned.rows_of(part));

@@ -126,7 +126,7 @@ impl Quantity {
             Quantity::InitialVelocity => ["v_i", "v_0", "velocity of the initial steady state"],
             Quantity::FinalVelocity => ["v_f", "v_0", "velocity of the final steady state"],
             Quantity::Family => ["family", "", "family of shortcuts"],
-            Quantity::FrictionBound => ["tau_ceiling", "mu_0 sigma", "bound on friction, which bounded_friction heeds"],
+            Quantity::FrictionBound => ["tau_ceiling", "mu_0 sigma", "friction ceiling of bounded_friction"],
             Quantity::Alpha2 => ["alpha_2", "1", "coefficient of t in theta of the cubic shortcut"],
             Quantity::Alpha3 => ["alpha_3", "v_0/l", "coefficient of t^2 in theta of the cubic shortcut"],
             Quantity::Stiffness => ["k", "mu_0 sigma/l", "stiffness of the spring"],

@@ -21,7 +21,7 @@ pub enum PlotError {
     },
     /// A cell of a CSV file.
     #[error(
-        "{path}, line {line}: found {found}\n  expected: {expected}\n  help: a trace is what `slipsweep trace … --out FILE.csv` writes"
+        "{path}, line {line}: found {found}\n  expected: {expected}\n  help: `slipsweep trace … --out FILE.csv` writes traces"
     )]
     Cell {
         /// The file.
@@ -35,7 +35,7 @@ pub enum PlotError {
     },
     /// A file is no trace.
     #[error(
-        "{path}: not a trace: it has no column `{missing}`\n  found: {}\n  help: a trace is what `slipsweep trace … --out FILE` writes; \
+        "{path}: not a trace: it has no column `{missing}`\n  found: {}\n  help: `slipsweep trace … --out FILE` writes traces; \
          of a dataset, name the folder",
         .found.join(", ")
     )]
@@ -56,7 +56,7 @@ pub enum PlotError {
         most: usize,
     },
     /// There is nothing to draw.
-    #[error("nothing to draw: no number in what was requested")]
+    #[error("nothing to draw: the requested columns hold no numbers")]
     Nothing,
     /// No table of that name.
     #[error("the dataset has no table `{name}`\n  found: {}\n  help: {}", .found.join(", "), hint(.name, .found))]
@@ -89,7 +89,7 @@ pub enum PlotError {
         text: String,
     },
     /// No row fulfils the conditions.
-    #[error("--where {text}: no row of the table `{table}` is left\n  found: {found}\n  help: {help}")]
+    #[error("--where {text}: no row of the table `{table}` meets this\n  found: {found}\n  help: {help}")]
     NoRows {
         /// The table.
         table: String,
@@ -101,15 +101,13 @@ pub enum PlotError {
         help: String,
     },
     /// All rows are missing.
-    #[error(
-        "the table `{table}` has no rows yet: none of its parts is there\n  help: `slipsweep run` of its spec makes them"
-    )]
+    #[error("the table `{table}` has no rows yet\n  help: compute them with `slipsweep run`")]
     Empty {
         /// The table.
         table: String,
     },
     /// Every axis has one value only.
-    #[error("the table `{table}` has a single row left, which makes no picture\n  help: `slipsweep head` shows rows")]
+    #[error("the table `{table}` has a single matching row, which makes no picture\n  help: `slipsweep head` shows it")]
     OneRow {
         /// The table.
         table: String,
@@ -146,7 +144,7 @@ pub enum PlotError {
     #[error("cannot convert the picture: {0}\n  help: write it as .svg")]
     Convert(String),
     /// More pixels than can be held.
-    #[error("a picture of {width} x {height} pixels is too large\n  help: request fewer with --dpi")]
+    #[error("a picture of {width} x {height} pixels is too large\n  help: lower --dpi")]
     Size {
         /// Width in pixels.
         width: f64,

@@ -62,7 +62,7 @@ pub enum QueryError {
     Part(Box<DatasetError>),
     /// A file cannot be read.
     #[error(
-        "{path}: cannot read: {source}\n  help: if a run wrote it, delete it and run the sweep again, which makes only what is missing"
+        "{path}: cannot read: {source}\n  help: if a run wrote it, run the sweep again; it recomputes damaged parts"
     )]
     Read {
         /// The file or folder.
@@ -71,6 +71,9 @@ pub enum QueryError {
         source: PolarsError,
     },
 }
+
+/// Greatest length of an error of polars in a message, in characters. Chosen: two lines.
+const MAX_ERROR_CHARS: usize = 200;
 
 impl QueryError {
     /// Whether the path or the question is wrong, rather than the files or the machine.
@@ -117,7 +120,7 @@ impl Tables {
             Ok((frame, schema))
         };
         let (frame, schema) = guarded(planned)
-            .unwrap_or_else(|| Err(PolarsError::ComputeError("the query is not supported".into())))
+            .unwrap_or_else(|| Err(PolarsError::ComputeError("the engine does not support this query".into())))
             .map_err(|error| self.explain(sql, &error))?;
         let columns: Vec<String> = schema.iter_names().map(ToString::to_string).collect();
         let unit = |name: &String| {
@@ -152,6 +155,8 @@ impl Tables {
         let text = error.to_string();
         // The first line says it, before lists of names and query plans.
         let line = text.lines().next().unwrap_or_default().trim_end_matches(':');
+        let line = crate::names::shown(line, MAX_ERROR_CHARS);
+        let line = &*line;
         if line.contains("unable to find column") {
             let name = line.split('"').nth(1).unwrap_or_default();
             let columns = || self.sources.iter().flat_map(|source| &source.columns).map(String::as_str);

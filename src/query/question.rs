@@ -68,26 +68,25 @@ const TEXT: [&str; 26] = [
 
 /// The help of most questions.
 pub const CORRECT: &str =
-    "correct the query; text goes in 'single quotes', names with odd characters in \"double\" ones";
+    "correct the query; text goes in 'single quotes', names with special characters in \"double\" ones";
 
 impl Question {
     /// The question `sql` to the tables `sources`.
     pub fn parse(sql: &str, sources: &[Source]) -> Result<Question, Fault> {
         let statements = Parser::parse_sql(&GenericDialect {}, sql).map_err(|error| match error {
-            ParserError::RecursionLimitExceeded => Fault::new("too many parentheses inside each other", "simplify it"),
+            ParserError::RecursionLimitExceeded => {
+                Fault::new("parentheses are nested too deeply", "simplify the query")
+            }
             ParserError::TokenizerError(text) | ParserError::ParserError(text) => {
                 Fault::new(format!("not SQL: {text}"), CORRECT)
             }
         })?;
-        let [statement] =
-            <[Statement; 1]>::try_from(statements).map_err(|_| Fault::new("not one statement", "write one SELECT"))?;
+        let [statement] = <[Statement; 1]>::try_from(statements)
+            .map_err(|_| Fault::new("several statements, or none", "write one SELECT"))?;
         let Statement::Query(mut query) = statement else {
             let words = statement.to_string();
             let first = words.split_whitespace().next().unwrap_or_default().to_uppercase();
-            return Err(Fault::new(
-                format!("{first} is not a question: `query` reads and never writes"),
-                "write one SELECT",
-            ));
+            return Err(Fault::new(format!("{first} is refused: `query` reads and never writes"), "write one SELECT"));
         };
         let mut check = Check { sources, tables: HashSet::new(), fault: None };
         walk(query.as_mut(), &mut check);
@@ -129,7 +128,7 @@ impl Visit for Check<'_> {
         }
         match query.body.as_ref() {
             SetExpr::Insert(_) | SetExpr::Update(_) | SetExpr::Delete(_) | SetExpr::Merge(_) => {
-                self.refuse(Fault::new("not a question: `query` reads and never writes", "write one SELECT"))
+                self.refuse(Fault::new("refused: `query` reads and never writes", "write one SELECT"))
             }
             _ => ControlFlow::Continue(()),
         }

@@ -79,7 +79,7 @@ pub fn open(path: &Path) -> Result<Vec<Source>, QueryError> {
             }
         }
         if sources.is_empty() {
-            return Err(wrong("no part of any table is there yet", "let `slipsweep run` compute some first"));
+            return Err(wrong("the dataset has no parts yet", "compute them with `slipsweep run`"));
         }
         return Ok(sources);
     }
@@ -158,7 +158,7 @@ fn csv(path: &Path) -> PolarsResult<DataFrame> {
         }
     }
     if let Some(line) = opened {
-        return Err(PolarsError::ComputeError(format!("line {line}: a quote opens and never closes").into()));
+        return Err(PolarsError::ComputeError(format!("line {line}: a quote is not closed").into()));
     }
     let format = CsvParseOptions::default().with_comment_prefix(Some("#"));
     let options = CsvReadOptions::default().with_infer_schema_length(None).with_parse_options(format);

@@ -138,7 +138,12 @@ impl AxisDraft<'_> {
             return refuse(key, format!("both {one} and {other}"), "one of them", "remove one of the two");
         }
         if form.seed.is_some() && form.sobol.is_none() && form.lhs.is_none() {
-            return refuse(format!("{key}.seed"), "a seed of nothing", "sobol or lhs in the same axis", "remove it");
+            return refuse(
+                format!("{key}.seed"),
+                "a seed without a sampled design",
+                "sobol or lhs in the same axis",
+                "remove it",
+            );
         }
         match form {
             AxisForm { linspace: Some(numbers), .. } => self.range(false, numbers),
@@ -174,7 +179,7 @@ impl AxisDraft<'_> {
         if !(2.0..9_007_199_254_740_992.0).contains(&count) || count.fract() != 0.0 {
             let help = match count {
                 1.0 => "for one value write the number itself",
-                _ if count.fract() != 0.0 => "the third number is how many values there are, not their distance",
+                _ if count.fract() != 0.0 => "the third number is the count of values, not their distance",
                 _ => "choose a count in the range",
             };
             let found = format!("{count} is not a count of values");
@@ -198,7 +203,7 @@ impl AxisDraft<'_> {
             false => ((last - first).abs() / steps, 1.0, Values::Linspace { first, last, count }),
         };
         if spacing < least * (largest.next_up() - largest) {
-            let found = format!("{count} values from {first:?} to {last:?}, closer to each other than numbers are");
+            let found = format!("{count} values from {first:?} to {last:?}, closer than adjacent doubles");
             let expected = "values that differ from each other";
             return refuse(format!("{key}[2]"), found, expected, "take fewer values, or a list");
         }
@@ -206,7 +211,7 @@ impl AxisDraft<'_> {
         for value in [1, count - 2].map(|index| values.at(index)) {
             if let Err(legal) = self.legal(value) {
                 let found = format!("a value of the range, {value:?}, is out of range");
-                let help = "begin with the least number but 0, or take fewer values";
+                let help = "begin with the least legal number above 0, or take fewer values";
                 return refuse(key.as_str(), found, legal, help);
             }
         }

@@ -244,7 +244,7 @@ impl BlockDraft<'_> {
                     if let Err(legal) = legal(units, *quantity, axis.scale, value) {
                         let key = format!("{prefix}axes.{}.{}", quantity.name(), design.name());
                         let found = format!("a value of the sample, {value:?}, is out of range");
-                        return refuse(key, found, legal, "begin with the least number but 0");
+                        return refuse(key, found, legal, "begin with the least legal number above 0");
                     }
                 }
                 Ok(Axis { quantity: *quantity, scale: axis.scale, values: Values::List(values) })
@@ -300,7 +300,7 @@ impl BlockDraft<'_> {
                     place.iter().map(|(axis, value)| format!("{} = {value:?}", axis.name())).collect();
                 let place = if place.is_empty() { String::new() } else { format!(" at {}", place.join(", ")) };
                 let legal = legal(units, quantity, scale, value).err().unwrap_or_default();
-                let help = "correct the expression, or leave such points out with `where`";
+                let help = "correct the expression, or drop such points with `where`";
                 refuse(key, format!("`{text}` is {value:?}{place}"), legal, help)
             }
             None => Err(too_many(key)),
@@ -320,8 +320,8 @@ fn values(count: u64) -> String {
 /// The fault of an expression or condition that takes too long to evaluate.
 pub fn too_many(key: String) -> SpecError {
     let help = "take fewer values on these axes, or split them over several [[block]]s or specs";
-    let found = "more than 2^30 combinations of the axes that it reads";
-    SpecError::new(key, found, "at most 2^30, which take seconds", help)
+    let found = "more than 2^30 combinations of the axes in the condition";
+    SpecError::new(key, found, "at most 2^30 combinations", help)
 }
 
 /// A fault of an expression at `key`.

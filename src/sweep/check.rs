@@ -340,7 +340,7 @@ fn request(draft: TableDraft, grid: &Grid, prefixes: &[String]) -> Result<Reques
         TooMany::Combinations(block) => too_many(format!("{}where", prefixes[block])),
     })?;
     if let Some(empty) = row_index.stretches().iter().position(|stretch| stretch.rows() == 0) {
-        let help = "correct the condition, or the axes that it reads";
+        let help = "correct the condition, or the axes in it";
         let key = format!("{}where", prefixes[empty]);
         return refuse(key, "matches no points", "a condition that some point meets", help);
     }
@@ -364,12 +364,12 @@ fn reduced(table: &'static dyn Table, key: &str, reduce: Option<&str>) -> Result
 /// The rows of `landscape`, contiguous for each row of `reduced`: its further axes vary fastest.
 fn members(landscape: &dyn Table, reduced: &dyn Table, key: &str, grid: &Grid) -> Result<RowIndex, SpecError> {
     let wrong = |found: &str, help: &str| {
-        let expected = "one grid, in which alpha_2 and alpha_3 are axes of their own that nothing else depends on";
+        let expected = "one grid in which alpha_2 and alpha_3 are independent axes";
         SpecError::new(format!("{key}.reduce"), found, expected, help)
     };
     let fast: Vec<Quantity> = landscape.axes().iter().copied().filter(|axis| !reduced.axes().contains(axis)).collect();
     let [block] = grid.blocks.as_slice() else {
-        return Err(wrong("a grid of several blocks", "write one spec a block"));
+        return Err(wrong("a grid of several blocks", "write one spec per block"));
     };
     let is_fast = |factor: &Factor| factor.holds_any(&fast);
     if block.factors.iter().any(|factor| is_fast(factor) && factor.axes.len() > 1)
@@ -381,13 +381,13 @@ fn members(landscape: &dyn Table, reduced: &dyn Table, key: &str, grid: &Grid) -
     if expressions.flat_map(|expression| expression.reads()).any(|axis| fast.contains(&axis)) {
         return Err(wrong(
             "another axis or `where` depends on alpha_2 or alpha_3",
-            "leave that out, or filter the full table",
+            "remove that dependence, or filter the full table",
         ));
     }
     let (last, first): (Vec<Factor>, Vec<Factor>) = block.factors.iter().cloned().partition(is_fast);
     let each = last.iter().map(Factor::len).fold(1, u64::saturating_mul);
     if reduced.name() == "gap_quantiles" && each > table::MAX_SORTED {
-        let found = format!("quantiles of {each} shortcuts of each transition and time");
+        let found = format!("quantiles of {each} shortcuts for each transition and duration");
         let expected = format!("at most {}, which are sorted in memory", table::MAX_SORTED);
         let help = "take fewer values of alpha_2 and alpha_3, or reduce to \"min\" or \"histogram\"";
         return refuse(format!("{key}.reduce"), found, expected, help);
@@ -419,7 +419,7 @@ fn projection(table: &dyn Table, key: &str, names: Option<&[String]>, faults: &m
     let key = format!("{key}.columns");
     if indices.is_empty() && !faults.concern(&key) {
         let expected = format!("at least one of {}", known.join(", "));
-        let help = "name columns, or remove `columns` to have the usual ones";
+        let help = "name columns, or remove `columns` for the default ones";
         faults.push(SpecError::new(key, "no column is requested", expected, help));
     }
     Projection::new(indices)

@@ -69,9 +69,9 @@ pub enum RunError {
     #[error(transparent)]
     Parts(#[from] TooManyParts),
     /// A row panicked; all other parts are complete.
-    #[error("{defect}\n  help: this is a defect of slipsweep, please report it; {}", match others {
+    #[error("{defect}\n  help: this is a bug in slipsweep: please report it; {}", match others {
         0 => "all other parts are finished".to_owned(),
-        _ => format!("{others} more parts have such a row, all others are finished"),
+        _ => format!("{others} more parts have such a row; all others are finished"),
     })]
     Defect {
         /// The first such row.

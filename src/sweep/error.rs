@@ -146,7 +146,7 @@ impl fmt::Display for SpecError {
             write!(f, "\nerror: {other}")?;
         }
         if !rest.is_empty() {
-            f.write_str("\nerror: there are more; correct these first")?;
+            f.write_str("\nerror: more errors follow; correct these first")?;
         }
         Ok(())
     }

@@ -195,7 +195,11 @@ fn unclosed(place: &Line<'_>, cell: &str) -> SpecError {
 
 fn unsound(path: &Path, error: &dyn Display) -> SpecError {
     let found = format!("cannot read {}: {error}", path.display());
-    fault(found, "a Parquet file, uncompressed or with Snappy or Zstandard", "write it so, or as CSV")
+    fault(
+        found,
+        "a Parquet file, uncompressed or with Snappy or Zstandard",
+        "write it in one of these forms, or as CSV",
+    )
 }
 
 /// Reads Parquet: numbers, or text for axes of words and for labels.

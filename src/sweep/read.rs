@@ -189,7 +189,7 @@ impl<T: Read> Read for Vec<T> {
         let items = match entry.value {
             DeValue::Array(items) => items.iter().enumerate(),
             DeValue::Table(_) if entry.key == "block" => {
-                let (expected, help) = ("[[block]], as often as there are blocks", "write two brackets");
+                let (expected, help) = ("[[block]], one for each block", "write two brackets: [[block]]");
                 entry.fault(SpecError::new("block", "one [block]", expected, help), faults);
                 return None;
             }

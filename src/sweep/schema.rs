@@ -46,7 +46,7 @@ fn keys(description: &str, properties: Value) -> Value {
 
 /// The keys that may also stand in a block.
 fn grid() -> Map<String, Value> {
-    let points = "A CSV or Parquet file, relative to the spec: one row a point; its columns are axes that vary together, and labels of text";
+    let points = "A CSV or Parquet file, relative to the spec: one row per point; its columns are axes that vary together, and labels of text";
     let names = json!({ "enum": Quantity::ALL.map(Quantity::name) });
     let zip = json!({ "type": "array", "minItems": 2, "uniqueItems": true, "items": names });
     let zips = "Axes of equal length that advance together, such as [[\"a\", \"b\"]]";
@@ -77,9 +77,9 @@ fn own() -> Value {
             "description": "Units of the values",
         },
         "mu_0": scale("Friction coefficient at v_0, for SI units"),
-        "l": scale("Length over which contacts are renewed in m, for SI units"),
-        "v_0": scale("Velocity from which on the friction law holds in m/s, for SI units"),
-        "normal_stress": scale("Normal load in Pa, for SI units"),
+        "l": scale("Critical slip distance in m, for SI units"),
+        "v_0": scale("Reference velocity in m/s, above which the friction law holds, for SI units"),
+        "normal_stress": scale("Normal stress in Pa, for SI units"),
     });
     let named: Map<String, Value> =
         table::ALL.map(|table| (table.name().to_owned(), table_of(table))).into_iter().collect();
@@ -92,9 +92,9 @@ fn own() -> Value {
             "maxLength": MAX_NAME_BYTES,
             "description": "Name of the dataset, which goes to results/NAME",
         },
-        "description": { "type": "string", "description": "What the sweep is for" },
-        "model": keys("What is modelled", model),
-        "accuracy": keys("How accurate the numbers are", json!({ "rtol": rtol(Some(1e-10)) })),
+        "description": { "type": "string", "description": "Purpose of the sweep" },
+        "model": keys("The model", model),
+        "accuracy": keys("Accuracy of the numbers", json!({ "rtol": rtol(Some(1e-10)) })),
         "tables": tables,
     })
 }
@@ -252,7 +252,7 @@ fn table_of(table: &dyn Table) -> Value {
     if !reductions.is_empty() {
         let words: Vec<&str> = reductions.iter().map(|(word, _)| *word).collect();
         let description =
-            "Write this of each transition and time, not its rows; `columns` are then those of the reduced table";
+            "Write one row for each transition and duration; `columns` are then those of the reduced table";
         known["properties"]["reduce"] = json!({ "enum": words, "description": description });
     }
     known

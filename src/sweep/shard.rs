@@ -13,7 +13,7 @@ use super::plan::Plan;
 /// The error of a sweep with too many parts for shards: every shard counts all parts, and lists a folder with as many files.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[error(
-    "{parts} parts are too many for shards\n  expected: at most {}\n  help: write several specs, each with some of the values of an axis",
+    "{parts} parts are too many for shards\n  expected: at most {}\n  help: divide an axis over several specs",
     Shard::MAX_PARTS
 )]
 pub struct TooManyParts {

@@ -21,7 +21,12 @@ pub fn units(model: &ModelSpec) -> Result<Units, SpecError> {
             None => Ok(Units::Scaled),
             Some((name, ..)) => {
                 let (key, help) = (format!("model.{name}"), "add `units = \"si\"` and give SI values, or remove it");
-                refuse(key, "a scale of a dimensionless sweep", "&", help)
+                refuse(
+                    key,
+                    "a scale in a sweep with scaled units",
+                    "units = \"si\", which needs mu_0, l, v_0 and normal_stress",
+                    help,
+                )
             }
         },
         "si" => {
@@ -95,7 +100,7 @@ pub fn doubt(prefix: &str, units: &Units, axis: &Axis) -> Option<SpecError> {
     (greatest > MAX_PLAUSIBLE_VELOCITY).then(|| {
         let (key, expected) =
             (format!("{prefix}axes.{}", axis.quantity.name()), "velocities in m/s, as `units = \"si\"` says");
-        SpecError::new(key, format!("{greatest:?} m/s is faster than anything slides"), expected, PROBABLY_SCALED)
+        SpecError::new(key, format!("{greatest:?} m/s is unphysically fast"), expected, PROBABLY_SCALED)
     })
 }
 

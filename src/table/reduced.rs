@@ -89,10 +89,10 @@ const QUANTILE_COLUMNS: &[Column] = &[
     COUNT,
     Column::number("gap_min", "1", "least gap"),
     Column::number("gap_q05", "1", "least gap that at least 5 % of the shortcuts do not exceed"),
-    Column::number("gap_q25", "1", "the same of 25 %"),
-    Column::number("gap_q50", "1", "the same of 50 %"),
-    Column::number("gap_q75", "1", "the same of 75 %"),
-    Column::number("gap_q95", "1", "the same of 95 %"),
+    Column::number("gap_q25", "1", "least gap that at least 25 % of the shortcuts do not exceed"),
+    Column::number("gap_q50", "1", "least gap that at least 50 % of the shortcuts do not exceed"),
+    Column::number("gap_q75", "1", "least gap that at least 75 % of the shortcuts do not exceed"),
+    Column::number("gap_q95", "1", "least gap that at least 95 % of the shortcuts do not exceed"),
     Column::number("gap_max", "1", "greatest gap"),
 ];
 

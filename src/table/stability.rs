@@ -25,7 +25,7 @@ const FIELDS: [Field<Row>; 10] = [
         Column::number(
             "k_od",
             "mu_0 sigma/l",
-            "overdamped critical stiffness b - a; not positive: stable at any stiffness",
+            "overdamped critical stiffness b - a; if not positive, steady sliding is stable at any stiffness",
         ),
         |row| row.law.b - row.law.a,
     ),

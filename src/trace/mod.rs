@@ -23,7 +23,7 @@ pub const COLUMNS: [Column; 6] = [
     Column::number("v", "v_0", "velocity"),
     Column::number("theta", "l/v_0", "contact lifetime"),
     Column::number("tau", "mu_0 sigma", "friction 1 + a ln v + b ln theta"),
-    Column::number("v_c", "v_0", "control velocity, with which the far end of the spring moves"),
+    Column::number("v_c", "v_0", "control velocity of the load point"),
     Column::number(
         "beta",
         "mu_0 sigma v_0",

@@ -74,7 +74,7 @@ pub fn names() -> impl Iterator<Item = (&'static str, &'static str)> {
         ("gap", "theta a cubic in time with alpha_2 and alpha_3 given; v may jump at both ends"),
     ];
     let elastic = [
-        ("step_response", "a block on a spring whose far end jumps to v_f at once; with its v_c"),
+        ("step_response", "a block on a spring whose load point jumps to v_f at once; with its v_c"),
         ("compliant", "v, v' and v'' continuous, so that an elastic spring can drive it; with its v_c"),
         ("regularised", "the optimal protocol, its jumps made smooth in pieces of length delta_t; with its v_c"),
     ];
@@ -140,16 +140,18 @@ pub enum Absence {
         bounded: bool,
     },
     /// The least work of all cubic shortcuts is approached at the border `v = 0`, not attained.
-    #[error("the least work is only approached, as v falls to 0 somewhere; with the bound v >= 1 it is attained")]
+    #[error(
+        "no protocol attains the least work without the velocity floor: v falls to 0 somewhere\n  help: remove --unbounded"
+    )]
     Border,
     /// The smooth pieces do not fit.
-    #[error("two pieces of length delta_t must fit into t_f, and v stay well above 0 in them")]
+    #[error("delta_t is too long: two pieces must fit into t_f, and v must stay well above 0 in them")]
     Pieces,
     /// The velocity becomes infinite, or oscillates too often to be shown.
     #[error("before t_f the velocity becomes infinite, or there are more oscillations than can be shown")]
     Response,
     /// Friction is so low somewhere that the extremal need not be unique, and none was found.
-    #[error("friction is too low: where tau <= max(0, b - a) there need not be an optimum, and none was found")]
+    #[error("friction is too low: where tau <= max(0, b - a) an optimum is not guaranteed, and none was found")]
     Unproven,
 }
 

@@ -33,7 +33,7 @@ pub fn check(row: &Row, context: &Context) -> Verdict {
     verdict.friction(row, cubic.friction_min());
     match work {
         Some(work) => verdict.compare(row, "work", Some(work), None),
-        None => verdict.miss("the integrator did not get there"),
+        None => verdict.miss("the independent integrator failed"),
     }
     match solve(&problem, t_f, context.bounded) {
         Some(optimum) => {
@@ -43,7 +43,7 @@ pub fn check(row: &Row, context: &Context) -> Verdict {
                 verdict.compare(row, "gap", Some((work - optimum.work) / optimum.work), Some(1.0));
             }
         }
-        None => verdict.miss("the integrator did not get there"),
+        None => verdict.miss("the independent integrator failed"),
     }
     verdict
 }

@@ -120,9 +120,7 @@ pub fn verify(path: &Path, manifest: &Manifest, sample: u64, seed: u64) -> Resul
             audit.add(number, row, verdict);
         }
         if missing > 0 {
-            audit
-                .unchecked
-                .push(("their part is missing; running the sweep again makes only what is missing", missing));
+            audit.unchecked.push(("their part is missing; `slipsweep run` computes it", missing));
         }
         audit.columns.iter_mut().for_each(|(_, differences)| differences.sort_by(f64::total_cmp));
         audit.worst.sort_by(|a, b| b.difference.total_cmp(&a.difference).then(a.number.cmp(&b.number)));

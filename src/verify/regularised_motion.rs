@@ -343,7 +343,7 @@ pub fn check(row: &Row, context: &Context, rtol: f64) -> Verdict {
     let overlaps = 2.0 * delta_t > t_f || context.bounded && t_f < min_duration(&problem);
     let infeasible = word(row, STATUS) == Some("infeasible");
     if infeasible && !overlaps && !context.bounded {
-        verdict.miss("optima that all but stand still");
+        verdict.miss("optima that nearly come to rest");
         return verdict;
     }
     if overlaps || infeasible {

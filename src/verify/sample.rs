@@ -56,7 +56,7 @@ pub fn rows(folder: &Folder, table: &ManifestTable, count: u64, seed: u64) -> Re
 fn read(path: &Path, rows: &[u64], expected: u64) -> Result<Vec<Row>, String> {
     let frame = frame::read_all(path).map_err(|error| error.to_string())?;
     if frame.height as u64 != expected {
-        return Err(format!("{}: {} rows, the manifest says {expected}", path.display(), frame.height));
+        return Err(format!("{}: {} rows; the manifest lists {expected}", path.display(), frame.height));
     }
     Ok(rows.iter().map(|&row| frame.row(row as usize)).collect())
 }

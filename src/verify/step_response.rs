@@ -95,7 +95,7 @@ pub fn check(row: &Row, _: &Context, rtol: f64) -> Verdict {
                 let scale = time.max(0.1 * block_time(&block)) + 1.0 / speed;
                 verdict.compare_number(row, "settling_time", time / v_f, scale / v_f);
             } else {
-                verdict.miss("settling times that a hair decides");
+                verdict.miss("settling times that depend on rounding");
             }
             ["period", "cycle_peak", "cycle_trough"].iter().for_each(|column| verdict.compare(row, column, None, None));
         }

@@ -78,14 +78,14 @@ fn missing_parts_are_reported() {
     let lost = folder.path().join("results/test/gap/part-000001.parquet");
     fs::remove_file(&lost).expect("was there");
     let summary = printed(folder.path(), &["summary", "results/test"]);
-    assert!(summary.contains("  1 of 2 parts not there yet: `slipsweep run` makes what is missing\n"), "{summary}");
+    assert!(summary.contains("  1 of 2 parts missing: `slipsweep run` computes them\n"), "{summary}");
     let head = printed(folder.path(), &["head", "results/test", "gap", "-n", "0"]);
     assert!(
         head.starts_with("gap: 482,403 rows, each the work of a cubic shortcut") && head.contains("; 1 part missing\n")
     );
     let output = slipsweep(folder.path(), &["query", "results/test", "SELECT count(*) AS n FROM gap"]);
     assert_eq!(String::from_utf8_lossy(&output.stdout), "n\n262144\n");
-    let note = "note: `gap` lacks 1 of 2 parts, which `slipsweep run` makes\n";
+    let note = "note: `gap` lacks 1 of 2 parts, which `slipsweep run` computes\n";
     assert_eq!((output.status.code(), String::from_utf8_lossy(&output.stderr).as_ref()), (Some(0), note));
 }
 
@@ -170,7 +170,7 @@ fn wrong_questions_are_answered_with_the_known_names() {
     let tables = "  expected: a SELECT from these tables:\n    \
                   optimal: t_f, a, b, v_i, v_f, work, v_start, v_end, time_at_floor, hamiltonian, theta_max, strategy, status\n    \
                   best_cubic: t_f, a, b, v_i, v_f, alpha_2, alpha_3, work, work_optimal, gap, v_min, status\n";
-    let correct = "correct the query; text goes in 'single quotes', names with odd characters in \"double\" ones";
+    let correct = "correct the query; text goes in 'single quotes', names with special characters in \"double\" ones";
     for (question, found, help) in [
         ("SELECT worck FROM best_cubic", "no column `worck`", "did you mean `work`?"),
         ("SELECT temperature FROM best_cubic", "no column `temperature`", "choose one of these"),
@@ -182,7 +182,7 @@ fn wrong_questions_are_answered_with_the_known_names() {
         ),
         ("SELECT frobnicate(gap) FROM best_cubic", "unsupported function 'frobnicate'", correct),
         ("", "not one statement", "write one SELECT"),
-        ("DROP TABLE best_cubic", "DROP is not a question: `query` reads and never writes", "write one SELECT"),
+        ("DROP TABLE best_cubic", "DROP is refused: `query` reads and never writes", "write one SELECT"),
     ] {
         let expected = (1, format!("error: {found}\n{tables}  help: {help}\n"));
         assert_eq!(refused(folder.path(), &["query", "results/test", question]), expected, "{question}");
@@ -223,12 +223,12 @@ fn wrong_paths_and_names() {
     let message =
         "error: results/test: no table `optima`\n  expected: optimal, best_cubic\n  help: did you mean `optimal`?\n";
     assert_eq!(refused(folder.path(), &["head", "results/test", "optima"]), (1, message.to_owned()));
-    let message = "error: x.pdf ends in none of .csv, .jsonl, .parquet, .txt: add --format\n";
+    let message = "error: x.pdf : the ending is none of .csv, .jsonl, .parquet, .txt: add --format\n";
     assert_eq!(
         refused(folder.path(), &["query", "results/test", "SELECT 1", "--out", "x.pdf"]),
         (1, message.to_owned())
     );
-    let message = "error: empty: a folder without a manifest.json, not a dataset\n  expected: the folder of a dataset, such as \
+    let message = "error: empty: a folder without a dataset, not a dataset\n  expected: the folder of a dataset, such as \
                    results/NAME\n  help: name a folder that `slipsweep run` wrote\n";
     assert_eq!(refused(folder.path(), &["summary", "empty"]), (1, message.to_owned()));
 }
@@ -515,7 +515,7 @@ fn answers_have_units_and_files_that_are_half_are_refused() {
     assert_eq!(lines.len(), 5);
     fs::write(folder.path().join("half.csv"), "# made by hand\nname,x\n\"a,1\nb,2\n").expect("is writable");
     let (code, message) = refused(folder.path(), &["query", "half.csv", "SELECT * FROM half"]);
-    assert!(code == 2 && message.contains("line 3: a quote opens and never closes"), "{message}");
+    assert!(code == 2 && message.contains("line 3: a quote is not closed"), "{message}");
     fs::write(folder.path().join("dates.csv"), "# made by hand\nday,x\n2024-02-30,1\n2024-03-01,2\n")
         .expect("is writable");
     let answer = printed(folder.path(), &["query", "dates.csv", "SELECT sum(x) AS x FROM dates", "--format", "csv"]);

@@ -45,7 +45,7 @@ fn a_spec_that_cannot_be_read() {
     let folder = tempfile::tempdir().expect("is writable");
     let output = slipsweep(&["run", "nowhere.toml"], folder.path());
     let message = "error: nowhere.toml: cannot read: No such file or directory (os error 2)\n  expected: a readable TOML file\n  \
-                   help: check the path\n";
+                   help: check the path"\n";
     assert_eq!(String::from_utf8_lossy(&output.stderr), message);
     assert_eq!(output.status.code(), Some(1));
     fs::write(folder.path().join("granite.toml"), "").expect("is writable");
@@ -94,7 +94,7 @@ fn doubtful_velocities() {
                 v_i = 3.0\nv_f = { geomspace = [10.0, 1e7, 3] }\n[tables.crossover]\n";
     fs::write(folder.path().join("fast.toml"), spec).expect("is writable");
     let output = slipsweep(&["plan", "fast.toml"], folder.path());
-    let warning = "warning: fast.toml:12: axes.v_f: 10000000.0 m/s is faster than anything slides\n  expected: velocities in m/s, as \
+    let warning = "warning: fast.toml:12: axes.v_f: 10000000.0 m/s is unphysically fast\n  expected: velocities in m/s, as \
                    `units = \"si\"` says\n  help: if these are in units of v_0, multiply them by v_0, or remove `units` and the scales \
                    from [model]\n";
     assert_eq!(String::from_utf8_lossy(&output.stderr), warning);
@@ -124,7 +124,7 @@ fn a_place_that_belongs_to_something_else() {
     fs::write(folder.path().join("results/good/notes.txt"), "mine").expect("is writable");
     fs::write(folder.path().join("good.toml"), GOOD).expect("is writable");
     let output = slipsweep(&["run", "good.toml"], folder.path());
-    let message = "error: results/good: not a dataset, but not empty either\n  expected: an empty folder, or one with a manifest.json\n  \
+    let message = "error: results/good: neither a dataset nor empty\n  expected: an empty folder, or one with a manifest.json\n  \
                    help: change `name` in the spec, or write elsewhere with --out DIR\n";
     assert_eq!(String::from_utf8_lossy(&output.stderr), message);
     assert_eq!(output.status.code(), Some(1));

@@ -43,7 +43,7 @@ fn run_reports_the_answers_of_a_physicist() {
     }
     let again = slipsweep(folder.path()).args(["run", "spec.toml"]).output().expect("runs");
     let text = String::from_utf8_lossy(&again.stdout);
-    assert!(text.contains("  2 of 2 parts kept from before\n"), "{text}");
+    assert!(text.contains("  2 of 2 parts kept\n"), "{text}");
     assert!(text.contains("nothing to compute: every part exists\n"), "{text}");
     let quiet = slipsweep(folder.path()).args(["run", "spec.toml", "--quiet", "--strict"]).output().expect("runs");
     assert_eq!((quiet.status.code(), quiet.stdout.len(), quiet.stderr.len()), (Some(0), 0, 0));
@@ -158,7 +158,7 @@ fn interrupt(folder: &Path, out: &str, signal: &str, code: i32, whole: &Path) ->
     let (all, some) = (files(whole), files(&broken));
     let parts = |files: &std::collections::BTreeMap<_, _>| files.len() - 1;
     let message =
-        format!("stopped; {} of {} parts finished: the same command goes on from there\n", parts(&some), parts(&all));
+        format!("stopped; {} of {} parts finished; the same command continues\n", parts(&some), parts(&all));
     // A machine so busy that the run took ten seconds has lines of progress first.
     let said = String::from_utf8_lossy(&output.stderr);
     assert!(said.ends_with(&message), "{said}");
@@ -228,7 +228,7 @@ fn a_command_that_reads_can_be_stopped() {
         let reported = String::from_utf8_lossy(&output.stderr);
         assert_eq!(
             (output.status.code(), reported.as_ref()),
-            (Some(code), "stopped while reading the spec; nothing is changed\n")
+            (Some(code), "stopped while reading the spec; nothing has changed\n")
         );
     }
 }
@@ -259,7 +259,7 @@ fn a_dataset_that_cannot_fit_is_refused() {
     let (found, help) = message.split_once("\n  help: ").expect("has help");
     assert!(found.starts_with("error: results/test: about ") && found.contains("PB to write, but "), "{message}");
     assert!(found.ends_with(" free on the disk"), "{message}");
-    assert_eq!(help, "write less, with `reduce` or fewer `columns`, or elsewhere, with --out DIR\n");
+    assert_eq!(help, "write less, with `reduce` or fewer `columns`, or write elsewhere with --out DIR\n");
     assert!(!folder.path().join("results").exists());
     let output = slipsweep(folder.path()).args(["plan", "spec.toml"]).output().expect("runs");
     let text = String::from_utf8_lossy(&output.stdout);

@@ -125,7 +125,7 @@ fn a_damaged_part_is_reported_and_keeps_no_other_table_from_its_picture() {
             assert_eq!(code, Some(2), "{reported}");
             assert!(reported.contains("test/gap/part-000000.parquet: ") && reported.contains(cause), "{reported}");
             assert!(
-                reported.contains("\n  help: `slipsweep run test` recomputes it and keeps all sound parts"),
+                reported.contains("\n  help: `slipsweep run test` recomputes it and keeps all intact parts"),
                 "{reported}"
             );
         }
@@ -162,7 +162,7 @@ fn foreign_parts_are_left_alone() {
     assert_eq!(fs::read(&path).expect("is there"), foreign);
     let output = slipsweep(folder.path()).args(["status", "test"]).output().expect("runs");
     let text = String::from_utf8_lossy(&output.stdout).into_owned();
-    assert!(text.contains("to finish it:\n  mv test/optimal/part-000000.parquet test/optimal/part-000000.parquet.foreign\n  slipsweep run test\n"), "{text}");
+    assert!(text.contains("to finish the dataset:\n  mv test/optimal/part-000000.parquet test/optimal/part-000000.parquet.foreign\n  slipsweep run test\n"), "{text}");
 
     // A Parquet file of somebody else is foreign, not damaged.
     let x: arrow_array::ArrayRef = std::sync::Arc::new(arrow_array::Float64Array::from(vec![1.0]));
@@ -193,7 +193,7 @@ fn a_panic_names_the_row_and_the_other_parts_are_kept() {
         let reported = format!("error: {table}: row {row} panicked: requested by SLIPSWEEP_PANIC\n  at {axes}");
         assert!(message.contains(&reported), "{message}");
         assert!(
-            message.contains("help: this is a defect of slipsweep, please report it; ") && message.contains(others)
+            message.contains("help: this is a bug in slipsweep: please report it; ") && message.contains(others)
         );
         // The usual message, which has the line of the source, comes once.
         assert_eq!(message.matches("panicked at src/table/failpoint.rs:").count(), 1, "{message}");

@@ -261,7 +261,7 @@ fn the_second_run_on_a_dataset_says_that_the_first_one_is_at_work() {
             if cfg!(target_os = "linux") { format!(" (process {})", std::process::id()) } else { String::new() };
         assert!(
             reported
-                .starts_with(&format!("{}: another run is at work here{process}\n  help: ", place.path().display())),
+                .starts_with(&format!("{}: another run is writing this dataset{process}\n  help: ", place.path().display())),
             "{reported}"
         );
     }
@@ -270,7 +270,7 @@ fn the_second_run_on_a_dataset_says_that_the_first_one_is_at_work() {
         Command::new(env!("CARGO_BIN_EXE_slipsweep")).arg("status").arg(place.path()).output().expect("starts");
     let shown = String::from_utf8_lossy(&status.stdout);
     assert!(shown.contains("a run is writing this dataset (process ") || !cfg!(target_os = "linux"), "{shown}");
-    assert!(!shown.contains("to finish it:") || !cfg!(target_os = "linux"), "{shown}");
+    assert!(!shown.contains("to finish the dataset:") || !cfg!(target_os = "linux"), "{shown}");
     drop(first);
     assert_eq!(runs(), listed(&[]));
     let shards =

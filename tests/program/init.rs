@@ -65,7 +65,7 @@ fn existing_files_are_not_overwritten() {
     fs::write(folder.path().join("slipsweep.schema.json"), "of another version").expect("is writable");
     for name in ["mine", "mine.toml"] {
         let output = slipsweep(folder.path(), &["init", name]);
-        let message = "error: mine.toml: is there already\n  expected: a new name\n  help: choose another name, or remove the file\n";
+        let message = "error: mine.toml: exists already\n  expected: a new name\n  help: choose another name, or remove the file\n";
         assert_eq!((output.status.code(), String::from_utf8_lossy(&output.stderr).as_ref()), (Some(1), message));
     }
     assert_eq!(fs::read_to_string(folder.path().join("mine.toml")).expect("is there"), "mine");

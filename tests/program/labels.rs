@@ -43,7 +43,7 @@ fn labels_follow_the_axes_in_every_table_and_change_no_number() {
     run(&sweep(folder.path(), CASES, &spec()), &folder.path().join("with"), 2);
     let plain = "a,b\n0.03,0.05\n0.03,0.04\n0.02,0.05\n0.03,0.05\n";
     run(&sweep(folder.path(), plain, &spec()), &folder.path().join("without"), 2);
-    // Points that differ in nothing but their label, or in nothing at all, have rows of their own.
+    // Points that differ in nothing but their label, or in empty, have rows of their own.
     let materials = ["granite", "gabbro, wet", "\"dry\" granite", "granite"];
     let samples = ["g1", "", "g3", "g1"];
     for (table, axes, each) in [("optimal", 5, 2), ("crossover", 4, 1), ("stability", 6, 2)] {

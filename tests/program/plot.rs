@@ -163,7 +163,7 @@ fn refusals(folder: &Path) {
     );
     assert_eq!(
         with(&["--out", "gap.jpg"]),
-        "error: --out gap.jpg: the name ends in none of .svg, .png, .pdf\n  help: for a folder, make it first or give a name \
+        "error: --out gap.jpg: the name : the ending is none of .svg, .png, .pdf\n  help: for a folder, make it first or give a name \
          without a dot\n"
     );
     let contradiction = with(&["--out", "gap.pdf", "--format", "png"]);
@@ -189,7 +189,7 @@ fn the_wrong_kind_of_file_is_named_with_the_command_that_takes_it() {
     shown(folder, &[&["trace", "best_cubic", "--out", "best.csv"], &case[..]].concat());
     fs::write(folder.join("other.csv"), "a,b\n0,1\n").expect("is writable");
     let spec = "a spec, not a dataset";
-    let run = "help: `slipsweep run tiny.toml` computes its dataset, results/tiny: name that\n";
+    let run = "help: `slipsweep run tiny.toml` computes the dataset results/tiny: name that\n";
     for command in ["plot", "report", "summary", "head", "status", "verify"] {
         let said = complaint(folder, &[command, "tiny.toml"]);
         assert!(said.contains(spec) && said.ends_with(run), "{command}: {said}");
@@ -286,7 +286,7 @@ fn several_rows_of_a_cell_are_noted_in_the_picture() {
     shown(folder, &["plot", "results/many"]);
     let words = words(&read(folder, "many-optimal.svg"));
     assert!(
-        words.contains("3000 places of tf have several rows: the least and the greatest of each are drawn."),
+        words.contains("3000 places of tf have several rows each: their least and greatest values are drawn."),
         "{words}"
     );
     for mark in ["tcheapest", "tcross", "tfloor"] {

@@ -129,7 +129,7 @@ fn status_lists_parts_and_the_command_for_the_missing_ones() {
     assert_eq!(code, Some(2));
     assert!(error.starts_with("incomplete: ") && error.ends_with(" of 7 parts there\n"), "{error}");
     assert!(
-        said.contains("to finish it:\n  slipsweep run results/test\nor as tasks, 3 of 4:\n  sbatch --array=0,2-3 "),
+        said.contains("to finish the dataset:\n  slipsweep run results/test\nor as tasks, 3 of 4:\n  sbatch --array=0,2-3 "),
         "{said}"
     );
 
@@ -140,7 +140,7 @@ fn status_lists_parts_and_the_command_for_the_missing_ones() {
     assert!(said.contains("\n  optimal    1      1      0        0        0        800 of 800: 800 ok\n"), "{said}");
     assert!(said.ends_with("\ncomplete\n"), "{said}");
     let (code, said, _) = say(&["status", "results/test", "--check"]);
-    assert_eq!((code, said.ends_with("\ncomplete, every bit as written\n")), (Some(0), true), "{said}");
+    assert_eq!((code, said.ends_with("\ncomplete; all checksums match\n")), (Some(0), true), "{said}");
 }
 
 #[test]
@@ -204,7 +204,7 @@ fn tasks_that_would_have_too_little_to_do_are_not_made() {
     assert!(said.contains(reason), "{said}");
     let (_, said, _) = shards(&["--shards", "100", "--minutes", "0"]);
     assert!(said.contains("\n7 tasks of about "), "{said}");
-    assert!(said.contains("\nfewer than the 100 requested: there are no more parts\n"), "{said}");
+    assert!(said.contains("\nfewer than the 100 requested: the sweep has only so many parts\n"), "{said}");
     let (code, _, error) = shards(&["--shards", "3", "--minutes", "x"]);
     assert_eq!(code, Some(1));
     assert!(error.contains("expected a number of minutes, 0 or more, found `x`"), "{error}");

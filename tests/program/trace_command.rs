@@ -180,7 +180,7 @@ fn wrong_arguments_get_one_clear_message() {
         ),
         (&[&["optimal", "--points", "1"], UP], "error: invalid value '1' for '--points <N>': 1 is not in 2..=10000000"),
         (&[&["optimum"], UP], "error: invalid value 'optimum' for '<PROTOCOL|DATASET>'"),
-        (&[&["optimal", "--out", "x.dat"], UP], "error: x.dat ends in none of .csv, .parquet, .txt: add --format"),
+        (&[&["optimal", "--out", "x.dat"], UP], "error: x.dat : the ending is none of .csv, .parquet, .txt: add --format"),
     ];
     for (arguments, expected) in cases {
         assert_eq!(complaint(arguments), (Some(1), expected.to_owned()));
@@ -410,7 +410,7 @@ fn a_row_without_a_path_says_why() {
         String::from_utf8(output.stderr).expect("is text")
     };
     let cases: [(&[&str], &str); 10] = [
-        (&[], "error: results/rows: a folder, without a table\n"),
+        (&[], "error: results/rows: a dataset without a table\n"),
         (&["optimal"], "error: results/rows: which row of `optimal`?\n  expected: --row N, from 0 to 3, or --where"),
         (&["optimal", "--row", "4"], "error: results/rows: no row 4 in `optimal`\n  expected: a row from 0 to 3\n"),
         (

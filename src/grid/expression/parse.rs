@@ -141,8 +141,8 @@ fn read(text: &str, axes: &[Quantity], points: Option<&Factor>) -> Result<(Expre
 fn syntax(line: &str, error: ParserError) -> Fault {
     let message = match error {
         ParserError::RecursionLimitExceeded => {
-            let found = "parentheses too deep inside each other";
-            return Fault::new(None, found, "a flatter expression", "take parentheses away");
+            let found = "parentheses nested too deeply";
+            return Fault::new(None, found, "fewer nested parentheses", "remove parentheses");
         }
         ParserError::TokenizerError(message) | ParserError::ParserError(message) => message,
     };
@@ -151,7 +151,7 @@ fn syntax(line: &str, error: ParserError) -> Fault {
     let said = said.replace("Expected: ", "expected ").replace("found: ", "found ");
     let (found, position) = if said.ends_with("EOF") {
         let end = line.chars().count() as u64 + 1;
-        (if line.trim().is_empty() { "nothing at all" } else { "it ends too early" }.to_owned(), Some(end))
+        (if line.trim().is_empty() { "empty" } else { "the expression ends too early" }.to_owned(), Some(end))
     } else {
         (said, position)
     };
@@ -269,7 +269,7 @@ impl Compiler<'_> {
         }
         let quantity = self.axis(&name.value, expression)?;
         match quantity.words().first() {
-            Some(word) => Err(wordy(format!("`{}` stands for words", quantity.name()), &quantity.name(), word)),
+            Some(word) => Err(wordy(format!("`{}` is an axis of words", quantity.name()), &quantity.name(), word)),
             None => Ok(Op::Axis(quantity)),
         }
     }
@@ -315,7 +315,7 @@ impl Compiler<'_> {
         let meant = nearest(&word.value, words.iter().copied()).unwrap_or(words[0]);
         let known: Vec<String> = words.iter().map(|word| format!("'{word}'")).collect();
         let help = format!("text goes in single quotes: `{} = '{meant}'`", quantity.name());
-        Some(Fault::new(position(other), format!("`{other}` is no word"), known.join(", "), help))
+        Some(Fault::new(position(other), format!("`{other}` is not a word"), known.join(", "), help))
     }
 
     /// The equality of two numbers, or of an axis of words or a label with a word.
@@ -411,7 +411,7 @@ impl Compiler<'_> {
     fn call(&mut self, name: &str, arguments: &[&Expr], whole: &Expr) -> Result<Kind, Fault> {
         let wrong = |count: &str| {
             let found = format!("`{name}` of {} numbers", arguments.len());
-            Fault::new(position(whole), found, format!("`{name}` of {count}"), "correct the numbers in parentheses")
+            Fault::new(position(whole), found, format!("`{name}` of {count}"), "correct the arguments")
         };
         if let Some((_, function)) = UNARY.iter().find(|(known, _)| *known == name) {
             let [argument] = arguments else { return Err(wrong("one number")) };
@@ -450,13 +450,13 @@ fn position(expression: &Expr) -> Option<u64> {
 }
 
 /// The help for unsupported syntax.
-const REMOVE: &str = "remove it, or write it with what is listed";
+const REMOVE: &str = "remove it, or use the listed elements";
 
 /// The fault of SQL syntax that is not supported here.
 fn foreign(expression: &Expr) -> Fault {
     let help = match expression {
         _ if word(expression).is_some() => "compare an axis of words with it, as in `family = 'step'`",
-        Expr::Identifier(_) => "names stand without quotes; text goes in single quotes, as in `family = 'step'`",
+        Expr::Identifier(_) => "names have no quotes; text goes in single quotes, as in `family = 'step'`",
         _ => REMOVE,
     };
     Fault::new(position(expression), format!("`{expression}`"), GRAMMAR, help)

@@ -101,8 +101,9 @@ pub fn lines(survey: &Survey, plan: &Plan) -> Result<LineFigure, PlotError> {
     notes.extend(rows.along.take().into_iter().chain(no_value));
     if !rows.cells.exact {
         let (count, name) = (rows.cells.len(), label::name(&plan.x));
-        notes
-            .push(format!("{count} places of {name} have several rows: the least and the greatest of each are drawn."));
+        notes.push(format!(
+            "{count} values of {name} have several rows each: their least and greatest values are drawn."
+        ));
     }
     let leaves_out = |panel| is_gap_of_families(survey, plan, panel) && rows.values(panel).any(|value| value <= 0.0);
     if (0..plan.y.len()).any(leaves_out) {

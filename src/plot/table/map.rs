@@ -194,7 +194,7 @@ impl Raster {
         let shared: Vec<String> =
             shared.map(|(name, cells)| format!("{} cells of {}", cells.len(), label::name(name))).collect();
         (!shared.is_empty()).then(|| {
-            format!("Several rows fall into one place of {}: it shows the least of them.", shared.join(" and "))
+            format!("Several rows fall into one cell ({}); the cell shows the least value.", shared.join(" and "))
         })
     }
 }
