@@ -4,7 +4,7 @@
 //! route. A budget fails where an error is larger, where ten times less would do, and where a column has none; the
 //! tables of `docs/accuracy.md` are those of the file. `SLIPSWEEP_BUDGETS=write` rewrites both: budgets that hold
 //! and are tight stay as they are, others become about three times the measured error. `SLIPSWEEP_BUDGETS=TABLE` measures
-//! one table alone.
+//! one table alone, `SLIPSWEEP_BUDGETS="write TABLE"` also writes its budgets.
 
 mod best_cubic;
 mod case;
@@ -58,18 +58,21 @@ static KNOWN: [Known; 12] = [
     regularised::KNOWN,
 ];
 
-/// The tables to measure: all, or the one that `SLIPSWEEP_BUDGETS` names.
-fn chosen(request: Option<&str>) -> Vec<&'static Known> {
-    let table = request.filter(|word| *word != "write");
-    let chosen: Vec<&Known> = KNOWN.iter().filter(|known| table.is_none_or(|name| known.table == name)).collect();
-    assert!(!chosen.is_empty(), "SLIPSWEEP_BUDGETS={}: neither `write` nor a table", request.unwrap_or_default());
-    chosen
+/// The request in `SLIPSWEEP_BUDGETS`: whether to write, and the tables to measure, all or one.
+fn request() -> (bool, Vec<&'static Known>) {
+    let request = std::env::var("SLIPSWEEP_BUDGETS").unwrap_or_default();
+    let (writes, table) = match request.strip_prefix("write") {
+        Some(table) => (true, table.trim_start()),
+        None => (false, request.as_str()),
+    };
+    let chosen: Vec<&Known> = KNOWN.iter().filter(|known| table.is_empty() || known.table == table).collect();
+    assert!(!chosen.is_empty(), "SLIPSWEEP_BUDGETS={request}: expected `write`, a table, or `write TABLE`");
+    (writes, chosen)
 }
 
 #[test]
 fn every_column_keeps_its_budget_and_needs_it() {
-    let request = std::env::var("SLIPSWEEP_BUDGETS").ok();
-    let chosen = chosen(request.as_deref());
+    let (writes, chosen) = request();
     let cases: Vec<Vec<Case>> = chosen.iter().map(|known| legal_cases(known)).collect();
     let mut points = BTreeMap::new();
     for (known, cases) in chosen.iter().zip(&cases) {
@@ -84,9 +87,12 @@ fn every_column_keeps_its_budget_and_needs_it() {
     let all = |ledger: &Ledger, propose: bool| -> BTreeMap<Key, Found> {
         chosen.iter().zip(&cases).flat_map(|(known, cases)| measure(known, cases, ledger, propose)).collect()
     };
+    let is_chosen = |table: &str| chosen.iter().any(|known| known.table == table);
     let mut ledger = Ledger::read();
-    if request.as_deref() == Some("write") {
-        ledger = ledger.renewed(&all(&ledger, true));
+    if writes {
+        let mut renewed = ledger.renewed(&all(&ledger, true));
+        renewed.0.extend(ledger.0.into_iter().filter(|(key, _)| !is_chosen(key.table())));
+        ledger = renewed;
         ledger.write();
         page::write(&ledger, &points);
     }
@@ -99,7 +105,6 @@ fn every_column_keeps_its_budget_and_needs_it() {
             Some(budget) => faults.extend(budget.faults(found).into_iter().map(|fault| format!("{key}: {fault}"))),
         }
     }
-    let is_chosen = |table: &str| chosen.iter().any(|known| known.table == table);
     let idle = ledger.0.keys().filter(|key| is_chosen(key.table()) && !measured.contains_key(*key));
     faults.extend(idle.map(|key| format!("{key} has a budget, but nothing is known of it")));
     let is_known = |table: &str| KNOWN.iter().any(|known| known.table == table);

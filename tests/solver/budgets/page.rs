@@ -25,17 +25,32 @@ pub fn check(ledger: &Ledger, points: &Points) {
     assert!(right, "docs/accuracy.md shows other budgets: `SLIPSWEEP_BUDGETS=write cargo test --test solver budgets`");
 }
 
-/// Makes the page show these budgets.
+/// Makes the page show these budgets; a table without a block gets one at the end.
 pub fn write(ledger: &Ledger, points: &Points) {
-    let text = fs::read_to_string(path()).expect("is readable");
+    let mut text = fs::read_to_string(path()).expect("is readable");
+    for known in measured(points) {
+        if !text.contains(&begin(known)) {
+            write!(text, "\n### {}\n\n{}<!-- END -->\n", known.table, begin(known)).expect("is text");
+        }
+    }
     fs::write(path(), filled(&text, ledger, points)).expect("is writable");
+}
+
+/// The tables with points.
+fn measured(points: &Points) -> impl Iterator<Item = &'static Known> {
+    KNOWN.iter().filter(|known| points.keys().any(|(table, _)| *table == known.table))
+}
+
+/// The line before the block of a table.
+fn begin(known: &Known) -> String {
+    format!("<!-- BEGIN budgets of {} -->\n", known.table)
 }
 
 /// The page with the block of every measured table, between `<!-- BEGIN budgets of TABLE -->` and `<!-- END -->`, from the budgets.
 fn filled(text: &str, ledger: &Ledger, points: &Points) -> String {
     let mut text = text.to_owned();
-    for known in KNOWN.iter().filter(|known| points.keys().any(|(table, _)| *table == known.table)) {
-        let begin = format!("<!-- BEGIN budgets of {} -->\n", known.table);
+    for known in measured(points) {
+        let begin = begin(known);
         let (before, rest) = text.split_once(&begin).unwrap_or_else(|| panic!("no {begin}in docs/accuracy.md"));
         let (_, after) = rest.split_once("<!-- END -->").expect("every block has an end");
         text = format!("{before}{begin}\n{}\n<!-- END -->{after}", block(known, ledger, points));
