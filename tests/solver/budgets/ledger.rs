@@ -126,7 +126,7 @@ const COMMENT: &str = "\
 # rtol: in units of the accuracy requested. ulp: in units of the last place at the tightest accuracy, 1e-13. 0 is exact.
 # Of work_error and gap_error both are the true error over the bound.
 # conditioned: what four units in the last place of each input do is taken off first. truth: how it is known.
-# docs/accuracy.md shows and explains them; tests/solver/budgets holds the tables to them.
+# docs/accuracy-appendix.md shows and explains them; tests/solver/budgets holds the tables to them.
 ";
 
 impl Ledger {

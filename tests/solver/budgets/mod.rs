@@ -2,7 +2,7 @@
 //!
 //! Each table is computed as a sweep computes it, on fixed points of each regime whose numbers are known by another
 //! route. A budget fails where an error is larger, where ten times less would do, and where a column has none; the
-//! tables of `docs/accuracy.md` are those of the file. `SLIPSWEEP_BUDGETS=write` rewrites both: budgets that hold
+//! tables of `docs/accuracy-appendix.md` are those of the file. `SLIPSWEEP_BUDGETS=write` rewrites both: budgets that hold
 //! and are tight stay as they are, others become about three times the measured error. `SLIPSWEEP_BUDGETS=TABLE` measures
 //! one table alone, `SLIPSWEEP_BUDGETS="write TABLE"` also writes its budgets.
 
