@@ -45,7 +45,7 @@ fn a_spec_that_cannot_be_read() {
     let folder = tempfile::tempdir().expect("is writable");
     let output = slipsweep(&["run", "nowhere.toml"], folder.path());
     let message = "error: nowhere.toml: cannot read: No such file or directory (os error 2)\n  expected: a readable TOML file\n  \
-                   help: check the path"\n";
+                   help: check the path\n";
     assert_eq!(String::from_utf8_lossy(&output.stderr), message);
     assert_eq!(output.status.code(), Some(1));
     fs::write(folder.path().join("granite.toml"), "").expect("is writable");

@@ -157,8 +157,7 @@ fn interrupt(folder: &Path, out: &str, signal: &str, code: i32, whole: &Path) ->
     assert_eq!(output.status.code(), Some(code));
     let (all, some) = (files(whole), files(&broken));
     let parts = |files: &std::collections::BTreeMap<_, _>| files.len() - 1;
-    let message =
-        format!("stopped; {} of {} parts finished; the same command continues\n", parts(&some), parts(&all));
+    let message = format!("stopped; {} of {} parts finished; the same command continues\n", parts(&some), parts(&all));
     // A machine so busy that the run took ten seconds has lines of progress first.
     let said = String::from_utf8_lossy(&output.stderr);
     assert!(said.ends_with(&message), "{said}");

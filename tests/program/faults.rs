@@ -192,9 +192,7 @@ fn a_panic_names_the_row_and_the_other_parts_are_kept() {
         assert_eq!(code, Some(2), "{message}");
         let reported = format!("error: {table}: row {row} panicked: requested by SLIPSWEEP_PANIC\n  at {axes}");
         assert!(message.contains(&reported), "{message}");
-        assert!(
-            message.contains("help: this is a bug in slipsweep: please report it; ") && message.contains(others)
-        );
+        assert!(message.contains("help: this is a bug in slipsweep: please report it; ") && message.contains(others));
         // The usual message, which has the line of the source, comes once.
         assert_eq!(message.matches("panicked at src/table/failpoint.rs:").count(), 1, "{message}");
         let there = files(&folder.path().join(&out).join("test"));

@@ -260,8 +260,10 @@ fn the_second_run_on_a_dataset_says_that_the_first_one_is_at_work() {
         let process =
             if cfg!(target_os = "linux") { format!(" (process {})", std::process::id()) } else { String::new() };
         assert!(
-            reported
-                .starts_with(&format!("{}: another run is writing this dataset{process}\n  help: ", place.path().display())),
+            reported.starts_with(&format!(
+                "{}: another run is writing this dataset{process}\n  help: ",
+                place.path().display()
+            )),
             "{reported}"
         );
     }

@@ -129,7 +129,9 @@ fn status_lists_parts_and_the_command_for_the_missing_ones() {
     assert_eq!(code, Some(2));
     assert!(error.starts_with("incomplete: ") && error.ends_with(" of 7 parts there\n"), "{error}");
     assert!(
-        said.contains("to finish the dataset:\n  slipsweep run results/test\nor as tasks, 3 of 4:\n  sbatch --array=0,2-3 "),
+        said.contains(
+            "to finish the dataset:\n  slipsweep run results/test\nor as tasks, 3 of 4:\n  sbatch --array=0,2-3 "
+        ),
         "{said}"
     );
 

@@ -180,7 +180,10 @@ fn wrong_arguments_get_one_clear_message() {
         ),
         (&[&["optimal", "--points", "1"], UP], "error: invalid value '1' for '--points <N>': 1 is not in 2..=10000000"),
         (&[&["optimum"], UP], "error: invalid value 'optimum' for '<PROTOCOL|DATASET>'"),
-        (&[&["optimal", "--out", "x.dat"], UP], "error: x.dat : the ending is none of .csv, .parquet, .txt: add --format"),
+        (
+            &[&["optimal", "--out", "x.dat"], UP],
+            "error: x.dat : the ending is none of .csv, .parquet, .txt: add --format",
+        ),
     ];
     for (arguments, expected) in cases {
         assert_eq!(complaint(arguments), (Some(1), expected.to_owned()));
