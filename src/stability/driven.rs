@@ -59,13 +59,13 @@ pub fn held_error(path: &CompliantPath, dt: f64, rtol: f64) -> OpenLoopResult {
     }
     let mut driven = Driven::new(path, Control::Held(0.0));
     let mut budget = MAX_STEPS;
-    let mut here = Some((driven.start(path), FIRST_STEP));
+    let mut state_and_step = Some((driven.start(path), FIRST_STEP));
     for i in 0..count {
-        let Some((state, h)) = here else { break };
+        let Some((state, h)) = state_and_step else { break };
         driven.control = Control::Held(sample(i));
-        here = driven.follow(state, (time(i), time(i + 1)), h, rtol, &mut budget);
+        state_and_step = driven.follow(state, (time(i), time(i + 1)), h, rtol, &mut budget);
     }
-    OpenLoopResult { number: here.map(|(state, _)| driven.distance(&state)), steps: MAX_STEPS - budget }
+    OpenLoopResult { number: state_and_step.map(|(state, _)| driven.distance(&state)), steps: MAX_STEPS - budget }
 }
 
 /// First step, in units of `t_f`. Chosen: it is shortened as needed.
@@ -150,13 +150,13 @@ impl System<3> for Driven<'_> {
         let unit = self.t_f * self.v_f;
         for i in 0..L {
             let (v, ageing) = (unit * exp(x[i]), unit * exp(-y[i]));
-            let told = match self.control {
+            let v_c = match self.control {
                 Control::Continuous(path) => self.slider.control(&path.at_time(self.t_f * points.t[i])),
-                Control::Held(told) => told,
+                Control::Held(v_c) => v_c,
             };
             let mass = m * v / (self.t_f * self.t_f);
             at.mass[X][i] = mass;
-            at.residual[Z][i] = k * (self.t_f * told - v) - z_slope[i];
+            at.residual[Z][i] = k * (self.t_f * v_c - v) - z_slope[i];
             at.residual[Y][i] = (ageing - v) - y_slope[i];
             at.residual[X][i] = (z[i] - a * x[i] - b * y[i]) - mass * x_slope[i];
             at.jacobian[Z][X][i] = -k * v;

@@ -80,11 +80,11 @@ mod tests {
         let p = Vector3::new(i / (omega * mass), one * (b / mass) / (i * omega - one), one);
         assert!((jacobian * q - q * (i * omega)).norm() < 1e-9 * q.norm() * jacobian.norm());
         assert!((jacobian.transpose() * p + p * (i * omega)).norm() < 1e-9 * p.norm() * jacobian.norm());
-        let mirrored = q.map(|x| x.conj());
+        let conjugate = q.map(|x| x.conj());
         let solve = |matrix: Matrix3<C>, v: Vector3<C>| matrix.lu().solve(&v).expect("is regular");
-        let still = solve(jacobian, second(&q, &mirrored));
+        let still = solve(jacobian, second(&q, &conjugate));
         let double = solve(Matrix3::from_diagonal_element(i * (2.0 * omega)) - jacobian, second(&q, &q));
-        let sum = third(&q, &q, &mirrored) - second(&q, &still) * (one * 2.0) + second(&mirrored, &double);
+        let sum = third(&q, &q, &conjugate) - second(&q, &still) * (one * 2.0) + second(&conjugate, &double);
         (p.dotc(&sum) / p.dotc(&q)).re / (2.0 * omega)
     }
 
@@ -106,7 +106,7 @@ mod tests {
     }
 
     /// Change of `ln A` over a small cycle at the critical stiffness, divided by `(pi/2) A^2`; the contact lifetime has relaxed for some cycles.
-    fn followed(law: Law, inertia: f64, z: f64) -> f64 {
+    fn simulated_growth(law: Law, inertia: f64, z: f64) -> f64 {
         let Law { a, b } = law;
         let slider = ScaledBlock { a, b, inertia, k: (b - a) * (1.0 + inertia / a) };
         let mut orbit = Orbit::new(&slider, [z, 0.0, 0.0], 1e-13);
@@ -117,7 +117,7 @@ mod tests {
         }
         let cycle = orbit.cycle(false, &mut budget).expect("goes on");
         let change = (cycle.end[Z] / before).ln();
-        let [low, high] = cycle.extrema.map(|seen| orbit.polished(seen.expect("oscillates")).x);
+        let [low, high] = cycle.extrema.map(|seen| orbit.refined(seen.expect("oscillates")).x);
         let amplitude = 0.5 * (high - low);
         change / (0.5 * std::f64::consts::PI * amplitude * amplitude)
     }
@@ -135,7 +135,8 @@ mod tests {
             let law = Law { a, b: ratio * a };
             let expected = lyapunov_coefficient(law, inertia).expect("has a critical stiffness");
             // The section is not exactly where the phase is the same: an error of the order of the amplitude.
-            let [twice, once] = [2e-2, 1e-2].map(|share| followed(law, inertia, share * (ratio - 1.0) * (a + inertia)));
+            let [twice, once] =
+                [2e-2, 1e-2].map(|fraction| simulated_growth(law, inertia, fraction * (ratio - 1.0) * (a + inertia)));
             let found = 2.0 * once - twice;
             assert!((found / expected - 1.0).abs() < 5e-4, "{law:?} {inertia}: {found} {expected}");
         }
@@ -146,8 +147,8 @@ mod tests {
         for square in [1e-6, 0.5, 1.0, 30.0_f64] {
             let law = Law { a: 0.01, b: 0.01 * (1.0 + square) };
             let mu = 1.0 / (3.0 + 2.0 * (4.0 + (law.b - law.a) / law.a).sqrt());
-            for (share, kind) in [(1.0 - 1e-9, Hopf::Subcritical), (1.0 + 1e-9, Hopf::Supercritical)] {
-                assert_eq!(Hopf::of(law, share * mu * law.a / 4.0, 2.0), Some(kind), "{square}");
+            for (fraction, kind) in [(1.0 - 1e-9, Hopf::Subcritical), (1.0 + 1e-9, Hopf::Supercritical)] {
+                assert_eq!(Hopf::of(law, fraction * mu * law.a / 4.0, 2.0), Some(kind), "{square}");
             }
         }
         assert_eq!(Hopf::of(Law { a: 0.01, b: 0.01 }, 1.0, 1.0), None);
@@ -160,16 +161,16 @@ mod tests {
         let law = Law { a: 0.005, b: 0.01 };
         for v_f in [2.5e6, 3.2e6, 1e7] {
             let m = 2.5e-16;
-            let at = |share: f64| {
+            let at = |fraction: f64| {
                 let critical = SteadySliding::new(law, 1.0, m, v_f).critical_stiffness();
-                let k = critical * (1.0 - share);
+                let k = critical * (1.0 - fraction);
                 let growth = SteadySliding::new(law, k, m, v_f).eigenvalues().expect("is elastic").growth_rate / v_f;
                 let omega = ((law.b - law.a) / law.a).sqrt();
                 let coefficient = lyapunov_coefficient(law, m * v_f * v_f).expect("has a Hopf point");
                 let predicted = 2.0 * (-growth / (omega * coefficient)).sqrt();
                 let transition = Transition { law, v_i: 0.99 * v_f, v_f };
                 let (_, response) = Step { transition, k, m }.respond(1e-8);
-                let response = response.expect("is followed");
+                let response = response.expect("is simulated_growth");
                 assert_eq!(response.outcome, Outcome::LimitCycle);
                 let cycle = response.cycle.expect("is a cycle");
                 0.5 * (cycle.v_peak / cycle.v_trough).ln() / predicted - 1.0

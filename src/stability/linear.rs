@@ -88,10 +88,10 @@ impl SteadySliding {
         let root = self.real_root();
         let real = -root / self.inertia;
         let [growth, frequency, decay] = match self.pair(root) {
-            Pair::Complex { growth, frequency } => [growth, frequency, real],
+            RemainingEigenvalues::Complex { growth, frequency } => [growth, frequency, real],
             // The one that was found is the least or the greatest of three.
-            Pair::Real { low, high } if real < low => [high, 0.0, real],
-            Pair::Real { low, high } => [high.max(real), 0.0, low],
+            RemainingEigenvalues::Real { low, high } if real < low => [high, 0.0, real],
+            RemainingEigenvalues::Real { low, high } => [high.max(real), 0.0, low],
         };
         Some(Eigenvalues {
             growth_rate: self.v * growth,
@@ -114,7 +114,7 @@ pub fn critical_velocity(law: Law, k: f64, m: f64) -> Option<f64> {
 }
 
 /// Two eigenvalues beside a real one, scaled.
-enum Pair {
+enum RemainingEigenvalues {
     Complex { growth: f64, frequency: f64 },
     Real { low: f64, high: f64 },
 }
@@ -182,7 +182,7 @@ impl SteadySliding {
     }
 
     /// The two eigenvalues beside the real one: roots of `x^2 + P x + Q`.
-    fn pair(&self, r: f64) -> Pair {
+    fn pair(&self, r: f64) -> RemainingEigenvalues {
         let SteadySliding { k, inertia, sum, c, hurwitz, .. } = *self;
         let q = k / r;
         // Two ways to the same P: the one whose terms are smaller loses fewer digits.
@@ -208,12 +208,12 @@ impl SteadySliding {
         }
         if squares < 0.0 {
             // 0 without a sign at the critical stiffness.
-            return Pair::Complex { growth: 0.0 - half, frequency: (-squares).sqrt() };
+            return RemainingEigenvalues::Complex { growth: 0.0 - half, frequency: (-squares).sqrt() };
         }
         // The product tells the smaller one.
         let larger = -(half + squares.sqrt().copysign(half));
         let smaller = q / larger;
-        Pair::Real { low: larger.min(smaller), high: larger.max(smaller) }
+        RemainingEigenvalues::Real { low: larger.min(smaller), high: larger.max(smaller) }
     }
 }
 
@@ -306,12 +306,13 @@ mod tests {
             let (k, m) = (log_uniform(&mut state, 1e-3, 10.0), log_uniform(&mut state, 1e-3, 10.0));
             let (sum, c) = (m + law.a, k + law.a - law.b);
             let companion = Matrix3::new(-sum / m, -c / m, -k / m, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0);
-            let judged = companion.complex_eigenvalues();
+            let expected_roots = companion.complex_eigenvalues();
             let eigenvalues = SteadySliding::new(law, k, m, 1.0).eigenvalues().expect("is elastic");
             for (re, im) in scaled(&eigenvalues, 1.0) {
-                let near = judged.iter().map(|root| (root.re - re).hypot(root.im - im)).fold(f64::INFINITY, f64::min);
+                let near =
+                    expected_roots.iter().map(|root| (root.re - re).hypot(root.im - im)).fold(f64::INFINITY, f64::min);
                 // A double root is known to half the digits only.
-                assert!(near <= 1e-7 * re.hypot(im), "{law:?} {k} {m} {eigenvalues:?} {judged:?}");
+                assert!(near <= 1e-7 * re.hypot(im), "{law:?} {k} {m} {eigenvalues:?} {expected_roots:?}");
             }
         }
     }
@@ -326,18 +327,20 @@ mod tests {
             let inertia = DoubleDouble::product(v, v) * DoubleDouble::new(m);
             let weakening = DoubleDouble::sum(law.b, -law.a);
             let critical = weakening * (DoubleDouble::new(1.0) + inertia / DoubleDouble::new(law.a));
-            for share in [-1e-12, 1e-12, -1e-9, 1e-6] {
-                let k = critical.high + share * critical.high;
+            for fraction in [-1e-12, 1e-12, -1e-9, 1e-6] {
+                let k = critical.high + fraction * critical.high;
                 let stable = (DoubleDouble::new(k) - critical).high > 0.0;
                 let sliding = SteadySliding::new(law, k, m, v);
-                assert_eq!(sliding.is_stable(), stable, "{law:?} {m} {v} {share}");
+                assert_eq!(sliding.is_stable(), stable, "{law:?} {m} {v} {fraction}");
                 let eigenvalues = sliding.eigenvalues().expect("is elastic");
                 assert_eq!(eigenvalues.growth_rate < 0.0, stable);
                 // To first order sigma = -H/(2 S), with H = a (k - k_c) at 32 digits.
                 let h = (DoubleDouble::new(law.a) * (DoubleDouble::new(k) - critical)).high;
                 let (sum, c) = (inertia.high + law.a, k - weakening.high);
                 let expected = -0.5 * v * h / (sum * sum + c * inertia.high);
-                assert!((eigenvalues.growth_rate / expected - 1.0).abs() <= 1e-4 * (1.0 + 10.0 * share.abs() / 1e-6));
+                assert!(
+                    (eigenvalues.growth_rate / expected - 1.0).abs() <= 1e-4 * (1.0 + 10.0 * fraction.abs() / 1e-6)
+                );
             }
         }
     }
@@ -369,8 +372,8 @@ mod tests {
     fn velocities_beyond_the_critical_one_are_unstable() {
         let law = Law { a: 0.005, b: 0.01 };
         let critical = critical_velocity(law, 7.5e-3, 2.5e-16).expect("exists");
-        for (share, stable) in [(1.0 - 1e-12, true), (1.0 + 1e-12, false)] {
-            assert_eq!(SteadySliding::new(law, 7.5e-3, 2.5e-16, share * critical).is_stable(), stable);
+        for (fraction, stable) in [(1.0 - 1e-12, true), (1.0 + 1e-12, false)] {
+            assert_eq!(SteadySliding::new(law, 7.5e-3, 2.5e-16, fraction * critical).is_stable(), stable);
         }
         assert_eq!(critical_velocity(law, 7.5e-3, 0.0), None);
         assert_eq!(critical_velocity(law, 0.004, 1.0), None);

@@ -46,7 +46,7 @@ fn growth(path: &CompliantPath, rtol: f64, steps: &mut u32) -> Option<f64> {
     }
     let states = if slider.m > 0.0 { 3 } else { 2 };
     let mut flow = DMatrix::identity(states, states);
-    let mut h = first(slider, &path.jet(0, 0.0));
+    let mut h = first_step(slider, &path.jet(0, 0.0));
     let tolerance = (1e-3 * rtol).max(1e-15);
     for panel in 0..path.panels() {
         let duration = path.panel_duration(panel);
@@ -77,8 +77,12 @@ fn growth(path: &CompliantPath, rtol: f64, steps: &mut u32) -> Option<f64> {
         flow.set_row(2, &velocity);
     }
     // Without squares of what is large.
-    let size = flow.amax();
-    Some(if size == 0.0 || !size.is_finite() { size } else { size * (flow / size).singular_values().max() })
+    let largest = flow.amax();
+    Some(if largest == 0.0 || !largest.is_finite() {
+        largest
+    } else {
+        largest * (flow / largest).singular_values().max()
+    })
 }
 
 /// Steps of a flow, at most. Chosen: those of some thousand swings.
@@ -94,7 +98,7 @@ fn decay(path: &CompliantPath, rule: &Radau) -> f64 {
 }
 
 /// A first step: what the rates at the start allow.
-fn first(slider: &SpringBlock, jet: &Jet) -> f64 {
+fn first_step(slider: &SpringBlock, jet: &Jet) -> f64 {
     let v = jet.v[0];
     let swing = if slider.m > 0.0 { (slider.k / slider.m).sqrt().min(slider.law.a / slider.m / v) } else { 0.0 };
     1.0 / (swing + v * (1.0 + slider.k / slider.law.a) + 1.0 / jet.theta)
@@ -133,10 +137,10 @@ fn step(
     let next = values.rows((NODES - 1) * n, n).into_owned();
     let mut error = 0.0f64;
     for column in 0..n {
-        let size = length(&flow.column(column)).max(length(&next.column(column)));
+        let largest = length(&flow.column(column)).max(length(&next.column(column)));
         for i in 0..n {
             let change = |j: usize| (0..n).map(|c| rates[j][(i, c)] * values[(j * n + c, column)]).sum();
-            error = error.max(rule.unresolved(&std::array::from_fn(change)) / size);
+            error = error.max(rule.unresolved(&std::array::from_fn(change)) / largest);
         }
     }
     error.is_finite().then_some((next, error))
@@ -159,6 +163,6 @@ fn rates(slider: &SpringBlock, jet: &Jet) -> Matrix3<f64> {
 
 /// The Euclidean norm, without squares of what is large.
 fn length(column: &DVectorView<'_, f64>) -> f64 {
-    let size = column.amax();
-    if size == 0.0 || !size.is_finite() { size } else { size * (column / size).norm() }
+    let largest = column.amax();
+    if largest == 0.0 || !largest.is_finite() { largest } else { largest * (column / largest).norm() }
 }

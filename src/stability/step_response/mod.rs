@@ -1,15 +1,15 @@
 //! The response of a block on a spring to a step of the control velocity: `v_c` jumps from `v_i` to `v_f` and stays
 //! there.
 //!
-//! In the scaled variables of `slider.rs` only `a`, `b`, `k`, `m v_f^2` and `v_i/v_f` enter. The response is
-//! integrated (`run.rs`, `orbit.rs`) until its end is decided (`long_term.rs`), cycles that hardly change are skipped
+//! In the scaled variables of `scaled_block.rs` only `a`, `b`, `k`, `m v_f^2` and `v_i/v_f` enter. The response is
+//! integrated (`integration.rs`, `orbit.rs`) until its end is decided (`long_term.rs`), cycles that hardly change are skipped
 //! (`envelope.rs`), and all is repeated at finer steps until the numbers agree (`simulation.rs`).
 
 mod envelope;
+mod integration;
 mod long_term;
 mod motion;
 mod orbit;
-mod run;
 mod scaled_block;
 mod series;
 mod simulation;
@@ -19,12 +19,12 @@ use crate::numerics::elementary::{exp, ln};
 use crate::protocol::Status;
 use crate::stability::SteadySliding;
 
-pub use long_term::Linear;
-pub use motion::Swing;
-pub use orbit::{Cycle, Extremum, Orbit, SETTLED, Seen, Stop};
-pub use run::{Leg, Run, step_to};
+pub use integration::{Integration, IntegrationStep, step_to};
+pub use long_term::LinearStability;
+pub use motion::StepResponseMotion;
+pub use orbit::{Cycle, Extremum, Orbit, RoughExtremum, SETTLED, StopReason};
 pub use scaled_block::{ScaledBlock, State, Z};
-pub use simulation::{Doubts, LongTermBehaviour, Simulation, follow};
+pub use simulation::{LongTermBehaviour, Simulation, UnresolvedNumbers, follow};
 
 /// A step of the control velocity.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -68,7 +68,7 @@ pub struct Response {
     /// Time after which `|v/v_f - 1|` stays below [`SETTLED`], in `l/v_0`; `None` also if in doubt.
     pub settling_time: Option<f64>,
     /// The limit cycle.
-    pub cycle: Option<Sustained>,
+    pub cycle: Option<LimitCycle>,
     /// Time up to which it was followed, in `l/v_0`.
     pub t_end: f64,
     /// Steps of the integrator.
@@ -77,7 +77,7 @@ pub struct Response {
 
 /// A limit cycle.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Sustained {
+pub struct LimitCycle {
     /// Its duration, in `l/v_0`.
     pub period: f64,
     /// Its greatest velocity, in `v_0`.
@@ -140,8 +140,8 @@ impl Scaled {
     }
 
     /// Small motions about steady sliding at the final velocity.
-    fn linear(&self) -> Linear {
-        Linear::of(&self.slider)
+    fn linear(&self) -> LinearStability {
+        LinearStability::of(&self.slider)
     }
 
     /// The same numbers as bits, to tell equal ones by.
@@ -172,29 +172,29 @@ impl Response {
         let (outcome, settling_time, cycle) = match simulation.long_term {
             LongTermBehaviour::Settled { time } => (
                 Outcome::Settled,
-                Some(time / v_f).filter(|time| !simulation.doubts.settling_time && time.is_finite()),
+                Some(time / v_f).filter(|time| !simulation.unresolved.settling_time && time.is_finite()),
                 None,
             ),
             LongTermBehaviour::Cycle { period, high, low } => (Outcome::LimitCycle, None, Some((period, high, low))),
             LongTermBehaviour::Undecided => (Outcome::Undecided, None, None),
-            LongTermBehaviour::Ends => return None,
+            LongTermBehaviour::BlowUp => return None,
         };
         let [low, high] = simulation.range();
         // What comes after the last step may go further.
         let decided = outcome != Outcome::Undecided;
         let known = |velocity: f64, known: bool| if known { velocity } else { f64::NAN };
-        let doubts = simulation.doubts;
-        let peak = simulation.peak(rtol).filter(|peak| decided && !doubts.t_peak && !peak.t.is_nan());
+        let unresolved = simulation.unresolved;
+        let peak = simulation.peak(rtol).filter(|peak| decided && !unresolved.t_peak && !peak.t.is_nan());
         Some(Response {
             outcome,
             v_peak: known(velocity(high), decided),
-            v_trough: known(velocity(low), decided && !doubts.trough),
+            v_trough: known(velocity(low), decided && !unresolved.trough),
             t_peak: peak.map(|peak| peak.t / v_f),
             settling_time,
-            cycle: cycle.map(|(period, high, low)| Sustained {
+            cycle: cycle.map(|(period, high, low)| LimitCycle {
                 period: period / v_f,
                 v_peak: velocity(high),
-                v_trough: known(velocity(low), !doubts.cycle_trough),
+                v_trough: known(velocity(low), !unresolved.cycle_trough),
             }),
             t_end: simulation.t / v_f,
             steps: simulation.steps,
@@ -202,12 +202,12 @@ impl Response {
     }
 }
 
-impl Linear {
+impl LinearStability {
     /// Of steady sliding at `v_f`.
-    fn of(slider: &ScaledBlock) -> Linear {
+    fn of(slider: &ScaledBlock) -> LinearStability {
         let law = Law { a: slider.a, b: slider.b };
         let sliding = SteadySliding::new(law, slider.k, slider.inertia, 1.0);
-        let mut linear = Linear { stable: sliding.is_stable(), growth: None };
+        let mut linear = LinearStability { stable: sliding.is_stable(), growth: None };
         if let Some(eigenvalues) = sliding.eigenvalues().filter(|eigenvalues| eigenvalues.frequency > 0.0) {
             let period = 2.0 * std::f64::consts::PI / eigenvalues.frequency;
             linear.growth = Some(eigenvalues.growth_rate * period);

@@ -24,7 +24,7 @@ pub const X: usize = 2;
 pub type State = [f64; 3];
 
 /// A place on the section `v = v_f`, crossed upwards: the logarithm of the force about which the block swings, and `y`.
-pub type Place = [f64; 2];
+pub type SectionPoint = [f64; 2];
 
 /// Change of a logarithm, at most, that an arrest of no duration leaves out. Chosen: below the tightest tolerance.
 const NEGLIGIBLE: f64 = 1e-14;
@@ -54,19 +54,19 @@ impl ScaledBlock {
     }
 
     /// The state on the section `v = v_f` at a place.
-    pub fn state(&self, [w, y]: Place) -> State {
+    pub fn state(&self, [w, y]: SectionPoint) -> State {
         let pull = exp(w);
-        if self.inertia > 0.0 { [pull + self.frozen() * y, y, 0.0] } else { [pull, pull / self.b, 0.0] }
+        if self.inertia > 0.0 { [pull + self.theta_coefficient() * y, y, 0.0] } else { [pull, pull / self.b, 0.0] }
     }
 
     /// The place of a state on the section; NaN where rounding at rest has led to it.
-    pub fn place(&self, &[z, y, _]: &State) -> Place {
-        let pull = z - self.frozen() * y;
+    pub fn section_point(&self, &[z, y, _]: &State) -> SectionPoint {
+        let pull = z - self.theta_coefficient() * y;
         [if pull > 0.0 { ln(pull) } else { f64::NAN }, y]
     }
 
     /// Share of `ln theta` in the force about which the block swings: `b` where it swings faster than contacts age.
-    fn frozen(&self) -> f64 {
+    fn theta_coefficient(&self) -> f64 {
         let swings = self.k * self.inertia > self.a * self.a && self.k > self.inertia;
         if swings { self.b } else { 0.0 }
     }

@@ -1,6 +1,6 @@
 //! A response as a Taylor series in time.
 //!
-//! With `v = e^x` and `w = e^-y` the equations of `slider.rs` are
+//! With `v = e^x` and `w = e^-y` the equations of `scaled_block.rs` are
 //!
 //! ```text
 //! z' = k (1 - v),    y' = w - v,    M v' = z - a x - b y,    v' = v x',    w' = -w y',
@@ -22,7 +22,7 @@ impl ScaledBlock {
     /// of doubles.
     #[inline(always)]
     pub fn series(&self, &[z, y, x]: &State, rates: &Rates, unit: f64) -> Powers {
-        let (share, inverse) = (unit / self.inertia, 1.0 / rates.v);
+        let (factor, inverse) = (unit / self.inertia, 1.0 / rates.v);
         let (mut v, mut w) = ([rates.v; TERMS], [rates.ageing; TERMS]);
         // Coefficients of x' and y'.
         let (mut x_slope, mut y_slope) = ([0.0; TERMS], [0.0; TERMS]);
@@ -30,7 +30,7 @@ impl ScaledBlock {
         let mut force = z - self.a * x - self.b * y;
         let (mut stretching, mut growth) = (-self.k * rates.excess, rates.growth);
         for n in 0..TERMS {
-            let v_slope = share * force;
+            let v_slope = factor * force;
             y_slope[n] = unit * growth;
             let (mut known, mut w_slope) = (0.0, w[0] * y_slope[n]);
             for j in 0..n {

@@ -190,9 +190,9 @@ fn member(
     let is_close = spare < SPARE_TIME_FRACTION * path.time_per_w(0.0).min(t_f);
     // From a standstill theta grows, and errors decay forwards.
     let measured = if accelerates { path } else { path.towards(true) };
-    let level = path.with_residual(Residual::LnTheta);
-    let meeting = path.towards(true).with_residual(Residual::TwoSidedSlip { spare });
-    let all = [measured, measured.reversed(), level, level.reversed(), meeting];
+    let by_theta = path.with_residual(Residual::LnTheta);
+    let two_sided = path.towards(true).with_residual(Residual::TwoSidedSlip { spare });
+    let all = [measured, measured.reversed(), by_theta, by_theta.reversed(), two_sided];
     // The loss of digits in a standstill grows with the ratio of the velocities, and b/a times where theta runs away.
     let far = log_ratio > MIN_LN_RATIO || log_ratio * law.b > MIN_LN_THETA_RATIO * law.a;
     let standstill = !accelerates && far && t_f - spare > STANDSTILL_FRACTION * t_f;
@@ -205,12 +205,12 @@ fn member(
     let order = order.iter().filter(|&&place| !(accelerates && place == 4));
     let mut start = None;
     // Rounding of the time, at the greater velocity.
-    let ln_r_rounding = 100.0 * f64::EPSILON * t_f * v_i.max(v_f);
-    let (little, most) = (LOW_NOISE.max(rtol), MAX_NOISE.max(rtol).max(ln_r_rounding));
+    let time_rounding = 100.0 * f64::EPSILON * t_f * v_i.max(v_f);
+    let (low_noise, max_noise) = (LOW_NOISE.max(rtol), MAX_NOISE.max(rtol).max(time_rounding));
     // Where errors grow for every residual, a fine pass may arrive where a rough pass fails.
     let fine = rtol.min(FINE_RTOL);
-    for (strict, most_noise, rtol) in
-        [(true, little, rtol), (true, most, rtol), (false, most, rtol), (false, most, fine)]
+    for (strict, max_noise, rtol) in
+        [(true, low_noise, rtol), (true, max_noise, rtol), (false, max_noise, rtol), (false, max_noise, fine)]
     {
         for path in order.clone().map(|&place| all[place]) {
             let Some((alpha, errors)) = rough_alpha(&path, start, strict, stats) else { continue };
@@ -218,7 +218,7 @@ fn member(
             if strict && errors > MAX_ERROR_GROWTH {
                 continue;
             }
-            if let Some(found) = refine(path.with(alpha), (rtol, most_noise), strict, stats, &mut visit) {
+            if let Some(found) = refine(path.with(alpha), (rtol, max_noise), strict, stats, &mut visit) {
                 return Ok(found);
             }
         }
@@ -250,7 +250,7 @@ fn search_far_out_again(path: &FrictionPath, start: f64, strict: bool, stats: &m
 /// Refines a path to the one that arrives; `None` where this fails.
 fn refine(
     mut path: FrictionPath,
-    (rtol, most_noise): (f64, f64),
+    (rtol, max_noise): (f64, f64),
     strict: bool,
     stats: &mut SolverStats,
     visit: &mut impl FnMut(&FrictionPath, Option<&Panel>),
@@ -282,7 +282,7 @@ fn refine(
         let spent = step.abs() <= ROUNDING * rounding && step.abs() >= 0.5 * before
             || path.alpha + step == path.alpha
             || neighbours && !strict;
-        if end.noise * f64::EPSILON > most_noise {
+        if end.noise * f64::EPSILON > max_noise {
             return None;
         }
         // Slips that add up to the spare time are known to its rounding. Theta at the end may determine alpha better. The

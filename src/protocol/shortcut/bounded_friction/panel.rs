@@ -105,7 +105,7 @@ pub(super) fn collocate(
     let mut before = f64::INFINITY;
     for _ in 0..MAX_STEPS {
         let (mut rate, mut speed, mut slope, mut push) = ([0.0; NODES], [0.0; NODES], [0.0; NODES], [0.0; NODES]);
-        let mut ln_r_rounding = [0.0; NODES];
+        let mut z_rounding = [0.0; NODES];
         for j in 0..NODES {
             // theta v = e^z: the rate is a small difference where theta follows the velocity.
             let (inverse, excess) = (exp(-w[j]), exp_m1(scaled_friction[j] + kappa * w[j]));
@@ -115,7 +115,7 @@ pub(super) fn collocate(
             slope[j] = scale * inverse * (excess - kappa * (1.0 + excess));
             push[j] = -scale * v * friction_sensitivity[j];
             // Where theta relaxes, only the last rounding errors of the scaled friction count.
-            ln_r_rounding[j] = speed[j] * (doubt[j] + (kappa * w[j]).abs()) / (1.0 + slope[j].abs());
+            z_rounding[j] = speed[j] * (doubt[j] + (kappa * w[j]).abs()) / (1.0 + slope[j].abs());
         }
         let sums = rule.integrals(&rate);
         let mut rest = [0.0; NODES];
@@ -160,8 +160,8 @@ pub(super) fn collocate(
             if before.is_finite() { change / before } else { (1.0 + kappa.abs()) * change + QUADRATURE_FRACTION };
         let left = change * gain.min(1.0);
         let largest = w.iter().fold(start.abs(), |most, w| most.max(w.abs()));
-        let blurred: f64 = ln_r_rounding.iter().zip(&rule.w).map(|(ln_r_rounding, w)| ln_r_rounding * w).sum();
-        let noise = largest + blurred;
+        let total_z_rounding: f64 = z_rounding.iter().zip(&rule.w).map(|(z_rounding, w)| z_rounding * w).sum();
+        let noise = largest + total_z_rounding;
         let stalled = change <= MAX_ROUNDINGS * f64::EPSILON * noise && change >= 0.25 * before;
         before = change;
         if left <= tolerance || left <= f64::EPSILON * noise || stalled {

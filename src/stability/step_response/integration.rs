@@ -1,4 +1,4 @@
-//! Integration along a response: by Taylor series where nothing is stiff, by Radau IIA where something is.
+//! Integration along a response: by Taylor series where nothing is implicit_from, by Radau IIA where something is.
 //!
 //! A slip is not stiff: its velocity changes at the rate at which friction damps it. A series of order 16 is then about
 //! as long as an implicit step and costs a fifth of it. In the stick phase friction damps `v` thousands of times faster
@@ -17,23 +17,23 @@ pub const STAGES: usize = 5;
 /// One step, with dense output.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[expect(clippy::large_enum_variant, reason = "both kinds are as frequent, and live on the stack")]
-pub enum Leg {
+pub enum IntegrationStep {
     /// By Radau IIA: good to order 9 at its end, to order 5 between.
-    Stiff(DenseOutput<3, STAGES>),
+    Implicit(DenseOutput<3, STAGES>),
     /// By a Taylor series: good everywhere.
-    Mild(DenseOutput<3, TERMS>),
+    Taylor(DenseOutput<3, TERMS>),
 }
 
 /// An integration along a response.
 #[derive(Debug, Clone)]
-pub struct Run<'a> {
+pub struct Integration<'a> {
     slider: &'a ScaledBlock,
     integrator: Integrator<'a, ScaledBlock, 3, STAGES>,
     accuracy: Accuracy<3>,
     /// Length of a series in units of the fastest motion from which on steps are implicit.
-    stiff: f64,
+    implicit_from: f64,
     /// Whether steps are series.
-    mild: bool,
+    uses_series: bool,
     series: u32,
 }
 
@@ -66,7 +66,7 @@ const IMPLICIT_ERROR: f64 = 0.03;
 
 impl ScaledBlock {
     /// An integration from `state`, with errors of a step below `tolerance` in `x`, `y` and `z/force`.
-    pub fn run(&self, state: State, h: f64, tolerance: f64) -> Run<'_> {
+    pub fn run(&self, state: State, h: f64, tolerance: f64) -> Integration<'_> {
         let accuracy = Accuracy { tolerance, scale: [self.force(), 1.0, 1.0] };
         let implicit = Accuracy { tolerance: IMPLICIT_ERROR * tolerance, ..accuracy };
         let mut integrator = Integrator::new(self, radau_iia_9(), implicit, 0.0, state, h);
@@ -76,12 +76,12 @@ impl ScaledBlock {
         // A series stays this short where nothing happens: rounding errors of the force enter its terms over factorials.
         let order = TERMS as f64;
         let rounding = exp((ln(tolerance / f64::EPSILON) + libm::lgamma(order + 1.0)) / order);
-        let stiff = IMPLICIT_FROM.min(0.7 * rounding);
-        Run { slider: self, integrator, accuracy, stiff, mild: true, series: 0 }
+        let implicit_from = IMPLICIT_FROM.min(0.7 * rounding);
+        Integration { slider: self, integrator, accuracy, implicit_from, uses_series: true, series: 0 }
     }
 }
 
-impl Run<'_> {
+impl Integration<'_> {
     /// Time reached.
     pub fn t(&self) -> f64 {
         self.integrator.t()
@@ -103,10 +103,10 @@ impl Run<'_> {
     }
 
     #[inline(always)]
-    fn step(&mut self, limit: f64) -> Result<Leg, Failure> {
+    fn step(&mut self, limit: f64) -> Result<IntegrationStep, Failure> {
         match self.expand(limit) {
-            Some(piece) => Ok(Leg::Mild(piece)),
-            None => self.integrator.step(limit).map(Leg::Stiff),
+            Some(step) => Ok(IntegrationStep::Taylor(step)),
+            None => self.integrator.step(limit).map(IntegrationStep::Implicit),
         }
     }
 
@@ -118,43 +118,43 @@ impl Run<'_> {
         let fast = slider.fast(rates.v, rates.ageing);
         // False for numbers out of range.
         let short = fast * self.integrator.proposal() < SERIES_BELOW;
-        if !self.mild && !short {
+        if !self.uses_series && !short {
             return None;
         }
         let unit = 1.0 / fast;
         let powers = slider.series(&state, &rates, unit);
         let reach = reach(&powers, &self.accuracy.scale, self.accuracy.tolerance);
-        self.mild = reach < self.stiff;
-        if !self.mild {
+        self.uses_series = reach < self.implicit_from;
+        if !self.uses_series {
             return None;
         }
         let h = reach.min(MAX_REACH) * unit;
-        let mut whole = h.min(self.integrator.left(limit));
+        let mut length = h.min(self.integrator.left(limit));
         let over = |h: f64| DenseOutput::from_powers(self.t(), h, state, stretched(&powers, h / unit));
-        let mut piece = over(whole);
+        let mut step = over(length);
         for _ in 0..MAX_CUTS {
-            let change = (piece.end[Y] - state[Y]).abs();
+            let change = (step.end[Y] - state[Y]).abs();
             if change <= MAX_CHANGE {
                 break;
             }
-            whole *= 0.9 * MAX_CHANGE / change;
-            piece = over(whole);
+            length *= 0.9 * MAX_CHANGE / change;
+            step = over(length);
         }
-        let advances = piece.end.iter().all(|end| end.is_finite()) && self.integrator.leap(whole, piece.end, h);
-        self.mild = advances;
+        let advances = step.end.iter().all(|end| end.is_finite()) && self.integrator.leap(length, step.end, h);
+        self.uses_series = advances;
         self.series += u32::from(advances);
-        advances.then_some(piece)
+        advances.then_some(step)
     }
 }
 
 /// Coefficients in powers of a time that is `share` times as long.
 #[inline(always)]
-fn stretched(powers: &Powers, share: f64) -> Powers {
+fn stretched(powers: &Powers, factor: f64) -> Powers {
     let mut scaled = *powers;
     let mut power = 1.0;
     let [z, y, x] = &mut scaled;
     for ((z, y), x) in z.iter_mut().zip(y).zip(x) {
-        power *= share;
+        power *= factor;
         [z, y, x].into_iter().for_each(|coefficient| *coefficient *= power);
     }
     scaled
@@ -165,32 +165,32 @@ fn stretched(powers: &Powers, share: f64) -> Powers {
     "x86_64+avx+avx2+bmi1+bmi2+avx512f+avx512bw+avx512cd+avx512dq+avx512vl",
     "x86_64+avx+avx2+bmi1+bmi2"
 ))]
-pub fn step_to(run: &mut Run<'_>, limit: f64) -> Result<Leg, Failure> {
+pub fn step_to(run: &mut Integration<'_>, limit: f64) -> Result<IntegrationStep, Failure> {
     run.step(limit)
 }
 
 /// The part of a step between two shares of it, as good as a step: an implicit one is taken again. `None` if that fails.
-pub fn between(run: &mut Run<'_>, leg: &Leg, from: f64, to: f64) -> Option<Leg> {
-    match leg {
-        Leg::Stiff(piece) => run.integrator.between(piece, from, to).map(Leg::Stiff),
-        Leg::Mild(piece) => Some(Leg::Mild(piece.between(from, to))),
+pub fn substep(run: &mut Integration<'_>, step: &IntegrationStep, from: f64, to: f64) -> Option<IntegrationStep> {
+    match step {
+        IntegrationStep::Implicit(step) => run.integrator.between(step, from, to).map(IntegrationStep::Implicit),
+        IntegrationStep::Taylor(step) => Some(IntegrationStep::Taylor(step.between(from, to))),
     }
 }
 
-impl Leg {
+impl IntegrationStep {
     /// Time at its start.
     pub fn t(&self) -> f64 {
         match self {
-            Leg::Stiff(piece) => piece.t,
-            Leg::Mild(piece) => piece.t,
+            IntegrationStep::Implicit(step) => step.t,
+            IntegrationStep::Taylor(step) => step.t,
         }
     }
 
     /// Duration.
     pub fn h(&self) -> f64 {
         match self {
-            Leg::Stiff(piece) => piece.h,
-            Leg::Mild(piece) => piece.h,
+            IntegrationStep::Implicit(step) => step.h,
+            IntegrationStep::Taylor(step) => step.h,
         }
     }
 
@@ -202,32 +202,32 @@ impl Leg {
     /// State at its start.
     pub fn start(&self) -> &State {
         match self {
-            Leg::Stiff(piece) => &piece.start,
-            Leg::Mild(piece) => &piece.start,
+            IntegrationStep::Implicit(step) => &step.start,
+            IntegrationStep::Taylor(step) => &step.start,
         }
     }
 
     /// State at its end.
     pub fn end(&self) -> &State {
         match self {
-            Leg::Stiff(piece) => &piece.end,
-            Leg::Mild(piece) => &piece.end,
+            IntegrationStep::Implicit(step) => &step.end,
+            IntegrationStep::Taylor(step) => &step.end,
         }
     }
 
     /// Variable `r` at the share `u` of it.
     pub fn value(&self, r: usize, u: f64) -> f64 {
         match self {
-            Leg::Stiff(piece) => piece.value(r, u),
-            Leg::Mild(piece) => piece.value(r, u),
+            IntegrationStep::Implicit(step) => step.value(r, u),
+            IntegrationStep::Taylor(step) => step.value(r, u),
         }
     }
 
     /// Time derivative of variable `r` there.
     pub fn slope(&self, r: usize, u: f64) -> f64 {
         match self {
-            Leg::Stiff(piece) => piece.slope(r, u),
-            Leg::Mild(piece) => piece.slope(r, u),
+            IntegrationStep::Implicit(step) => step.slope(r, u),
+            IntegrationStep::Taylor(step) => step.slope(r, u),
         }
     }
 }
@@ -250,13 +250,13 @@ mod tests {
 
     #[test]
     fn order_of_a_series_is_its_number_of_terms() {
-        let piece = |state: &State, h: f64| {
+        let step = |state: &State, h: f64| {
             let powers = SLIDER.series(state, &Rates::of(state[Y], state[X]), h);
             DenseOutput::from_powers(0.0, h, *state, powers)
         };
-        let exact = |h: f64| (0..64).fold(NEAR, |state, _| piece(&state, h / 64.0).end);
+        let exact = |h: f64| (0..64).fold(NEAR, |state, _| step(&state, h / 64.0).end);
         let error = |h: f64| {
-            let (found, expected) = (piece(&NEAR, h).end, exact(h));
+            let (found, expected) = (step(&NEAR, h).end, exact(h));
             (0..3).map(|r| (found[r] - expected[r]).abs()).fold(0.0, f64::max)
         };
         // What a single step leaves is of one order more.
@@ -282,9 +282,9 @@ mod tests {
             if let Some(arrested) = slider.arrest(run.y()) {
                 run.jump(arrested, slider.first_step(&arrested));
             }
-            let leg = step_to(&mut run, t_end).expect("goes on");
-            let places: Vec<f64> = (0..=8).map(|i| leg.value(X, f64::from(i) / 8.0)).collect();
-            rises += places.windows(2).filter(|pair| pair[0] < 0.0 && pair[1] >= 0.0).count();
+            let step = step_to(&mut run, t_end).expect("goes on");
+            let values: Vec<f64> = (0..=8).map(|i| step.value(X, f64::from(i) / 8.0)).collect();
+            rises += values.windows(2).filter(|pair| pair[0] < 0.0 && pair[1] >= 0.0).count();
         }
         let (series, cost) = run.cost();
         (*run.y(), rises, series, cost)
