@@ -1,6 +1,6 @@
-//! The Hopf point at the critical stiffness: whether small limit cycles live on its unstable side or on its stable one.
+//! The Hopf point at the critical stiffness: supercritical or subcritical.
 //!
-//! The first Lyapunov coefficient of the slider at `k = k_c` is elementary (docs/theory.md, "The Hopf point"). With `mu =
+//! The first Lyapunov coefficient of the block at `k = k_c` is elementary (docs/derivations.md). With `mu =
 //! m v^2/a` and `omega^2 = (b - a)/a`, in units of `l/v` for time and of `ln v` for the amplitude,
 //!
 //! ```text
@@ -10,32 +10,32 @@
 
 use crate::model::Law;
 
-/// On which side of the critical stiffness small limit cycles live.
+/// Side of the critical stiffness on which small limit cycles exist.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Hopf {
-    /// Below it, and attracting: beyond the point the block oscillates little at first.
+    /// Below it, attracting: oscillations grow continuously from 0 beyond the Hopf point.
     Supercritical,
-    /// Above it, and repelling: they bound the disturbances that die out, and larger ones end in stick-slip.
+    /// Above it, repelling: larger disturbances of stable sliding lead to stick-slip.
     Subcritical,
 }
 
 impl Hopf {
-    /// The words that are written into tables, in the order of the kinds.
+    /// Names in tables, in the order of the variants.
     pub const NAMES: [&'static str; 2] = ["supercritical", "subcritical"];
 
-    /// The kind of the Hopf point of steady sliding at `v > 0` of a mass `m >= 0`. `None` where there is none (`b <= a`), or
-    /// where it is degenerate: without mass.
+    /// Kind of the Hopf point of steady sliding at `v > 0` of a mass `m >= 0`; `None` for `b <= a` (no Hopf point) and
+    /// for `m = 0` (degenerate).
     pub fn of(law: Law, m: f64, v: f64) -> Option<Hopf> {
         let coefficient = lyapunov_coefficient(law, m * v * v)?;
         Some(if coefficient < 0.0 { Hopf::Supercritical } else { Hopf::Subcritical })
     }
 }
 
-/// The first Lyapunov coefficient `l_1` at the critical stiffness of a block of scaled mass `M = m v^2`; `None` as in
+/// First Lyapunov coefficient `l_1` at the critical stiffness of a block of scaled mass `M = m v^2`; `None` as in
 /// [`Hopf::of`].
 ///
-/// There, `ln A` of a small oscillation `A cos(omega t)` of `ln v` changes by `(pi/2) l_1 A^2` a cycle; next to it the
-/// amplitude of limit cycles is `2 sqrt(-sigma/(omega l_1))`, `sigma` the growth rate.
+/// There, `ln A` of a small oscillation `A cos(omega t)` of `ln v` changes by `(pi/2) l_1 A^2` a cycle. Near it the
+/// amplitude of limit cycles is `2 sqrt(-sigma/(omega l_1))`, with the growth rate `sigma`.
 pub fn lyapunov_coefficient(law: Law, inertia: f64) -> Option<f64> {
     let mu = inertia / law.a;
     let square = (law.b - law.a) / law.a;
@@ -50,7 +50,7 @@ pub fn lyapunov_coefficient(law: Law, inertia: f64) -> Option<f64> {
 
 #[cfg(test)]
 mod tests {
-    //! The coefficient against Kuznetsov's formula, and the amplitude of limit cycles that it predicts against simulations.
+    //! The coefficient compared with Kuznetsov's formula, and the predicted amplitude of limit cycles with simulations.
 
     use nalgebra::{Complex, Matrix3, Vector3};
 
@@ -89,7 +89,7 @@ mod tests {
     }
 
     #[test]
-    fn coefficient_is_that_of_the_multilinear_forms() {
+    fn coefficient_equals_that_of_the_multilinear_forms() {
         for a in [0.005, 0.05] {
             for ratio in [1.001, 1.5, 2.0, 10.0] {
                 let law = Law { a, b: ratio * a };
@@ -105,7 +105,7 @@ mod tests {
         }
     }
 
-    /// Change of `ln A` over a small cycle at the critical stiffness, divided by `(pi/2) A^2`; the contact lifetime has relaxed for some cycles.
+    /// Change of `ln A` over a small cycle at the critical stiffness, divided by `(pi/2) A^2`, after some cycles.
     fn simulated_growth(law: Law, inertia: f64, z: f64) -> f64 {
         let Law { a, b } = law;
         let slider = ScaledBlock { a, b, inertia, k: (b - a) * (1.0 + inertia / a) };
@@ -123,7 +123,7 @@ mod tests {
     }
 
     #[test]
-    fn small_cycles_change_as_foreseen() {
+    fn small_cycles_change_as_predicted() {
         for (a, ratio, inertia) in [
             (0.005, 2.0, 0.00256),
             (0.005, 2.0, 0.02),
@@ -134,7 +134,7 @@ mod tests {
         ] {
             let law = Law { a, b: ratio * a };
             let expected = lyapunov_coefficient(law, inertia).expect("has a critical stiffness");
-            // The section is not exactly where the phase is the same: an error of the order of the amplitude.
+            // The phase at the section varies: an error of the order of the amplitude.
             let [twice, once] =
                 [2e-2, 1e-2].map(|fraction| simulated_growth(law, inertia, fraction * (ratio - 1.0) * (a + inertia)));
             let found = 2.0 * once - twice;
@@ -143,7 +143,7 @@ mod tests {
     }
 
     #[test]
-    fn kind_changes_at_its_mass() {
+    fn kind_changes_at_the_critical_mass() {
         for square in [1e-6, 0.5, 1.0, 30.0_f64] {
             let law = Law { a: 0.01, b: 0.01 * (1.0 + square) };
             let mu = 1.0 / (3.0 + 2.0 * (4.0 + (law.b - law.a) / law.a).sqrt());
@@ -157,7 +157,7 @@ mod tests {
     }
 
     #[test]
-    fn simulated_limit_cycles_have_the_amplitude_that_it_predicts() {
+    fn simulated_limit_cycles_have_the_predicted_amplitude() {
         let law = Law { a: 0.005, b: 0.01 };
         for v_f in [2.5e6, 3.2e6, 1e7] {
             let m = 2.5e-16;

@@ -1,16 +1,16 @@
-//! Cycles that hardly change: the return map of the section `v = v_f`, its fixed points, and leaps over many of its steps.
+//! Envelope following: the return map of the section `v = v_f`, its fixed points, and steps over many cycles.
 //!
-//! With `q = (ln z, y)` on the section, the map is `q -> q + g(q)`. Its fixed points are the limit cycles; Newton's method
-//! finds one, and its Floquet multipliers, the eigenvalues of `1 + dg/dq`, tell whether it attracts.
+//! With `q = (ln z, y)` on the section, the return map is `q -> q + g(q)`. Its fixed points are the limit cycles. Newton's
+//! method finds them; their Floquet multipliers, the eigenvalues of `1 + dg/dq`, decide whether they attract.
 //!
-//! A leap over `n` cycles (multirevolution collocation; Calvo, Jay, Montijano and Rández, Appl. Numer. Math. 51, 2004) is a
-//! polynomial `p(j)` in the number of cycles with
+//! An envelope step over `n` cycles (multirevolution collocation; Calvo, Jay, Montijano and Rández, Appl. Numer. Math. 51,
+//! 2004) is a polynomial `p(j)` in the number of cycles with
 //!
 //! ```text
 //! p(j_i + 1/2) - p(j_i - 1/2) = g(p(j_i - 1/2)),    j_i = c_i n,
 //! ```
 //!
-//! `c_i` the nodes of Radau IIA. It is implicit, so a contact lifetime that relaxes in a few cycles limits no leap.
+//! `c_i` the nodes of Radau IIA. It is implicit, so relaxation of theta in a few cycles does not limit its length.
 
 use nalgebra::{Matrix2, SMatrix, SVector, Vector2};
 
@@ -21,78 +21,80 @@ use crate::numerics::elementary::{exp, ln, ln_1p};
 use crate::numerics::root::crossing;
 use crate::numerics::stiff::radau_iia_9;
 
-/// A cycle from the section to itself.
+/// One step of the return map.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct MapStep {
     pub from: SectionPoint,
-    /// `g`.
+    /// Change of the section point, `g`.
     pub change: SectionPoint,
     pub period: f64,
-    /// `ln(v/v_f)` at its slowest and fastest.
+    /// Least and greatest `ln(v/v_f)`.
     pub range: [f64; 2],
-    /// Error of its steps.
+    /// Error of the integration steps.
     pub tolerance: f64,
 }
 
-/// A fixed point of the return map.
+/// Fixed point of the return map.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct FixedPoint {
     pub map_step: MapStep,
-    /// Whether places near it come to it from one side, so that none overshoots.
+    /// Whether nearby points approach it from one side, without overshoot.
     pub monotone: bool,
-    /// How far the response was from it when it was found.
+    /// Distance of the response from it in the first iteration.
     pub first_distance: f64,
 }
 
-/// What leaps led to.
+/// Result of envelope following.
 pub(super) enum EnvelopeResult {
-    /// The response comes to this limit cycle.
+    /// The response converges to this limit cycle.
     Cycle(FixedPoint),
-    /// It is here after some time; cycles change fast, or come into the band of settled velocities.
+    /// Section point after some time, where cycles change fast, or enter the band of settled velocities.
     At { section_point: SectionPoint, time: f64 },
-    /// Cycles have to be followed one by one.
+    /// Cycles do not change slowly.
     NotSlow,
 }
 
-/// Stages of a leap, and the numbers of its system.
+/// Stages of an envelope step, and unknowns of its system.
 const S: usize = 5;
 const SYSTEM: usize = 2 * S;
 
-/// Width of a limit cycle, in `ln v`, at least. Chosen: ten times the motion that rounding of the force makes in the physical domain.
+/// Width of a limit cycle, in `ln v`, at least. Chosen: ten times the motion by rounding of the force in the physical
+/// domain.
 const MIN_CYCLE: f64 = 1e-7;
 
-/// Error of the slowest moment of a limit cycle, in units of `rtol`, at most; beyond it the moment is unknown. Chosen: two runs then
-/// still agree on it.
+/// Error of the least velocity of a limit cycle, in units of `rtol`, at most; above it the velocity is unknown. Chosen: two
+/// runs still agree.
 const TROUGH_ERROR: f64 = 0.3;
 
-/// Difference of places for the derivative of the map: the power 1/3 of the error of a lap at rtol 1e-6.
+/// Difference of section points for the derivative of the map. Derived: the power 1/3 of the error of a cycle at `rtol`
+/// 1e-6.
 pub(super) const DIFFERENCE_STEP: f64 = 1e-3;
 
-/// Least error of a step. Its rounding, 50 units in the last place.
+/// Error of a step, at least. Derived: its rounding, 50 units in the last place.
 pub(super) const MIN_STEP_ERROR: f64 = 1e-14;
 
-/// Distance in `q` within which the map is nearly linear. Chosen: Newton's method then gains a digit a step.
+/// Distance in `q` within which the map is nearly linear. Chosen: Newton's method gains a digit a step there.
 const NEWTON_RADIUS: f64 = 0.1;
 
-/// Cycles that a leap skips, at least. Chosen: it takes about as many laps.
+/// Cycles of an envelope step, at least. Chosen: it integrates about as many.
 const MIN_SKIPPED: f64 = 20.0;
 
-/// Iterations of Newton's method, at most. Chosen: it takes four to eight.
+/// Newton iterations, at most. Chosen: four to eight are typical.
 const MAX_ITERATIONS: u32 = 16;
 
-/// Steps of a lap, at most. Chosen: ten times those of a deep slip at the tightest tolerance.
+/// Integration steps of a cycle, at most. Chosen: ten times those of a deep slip at the tightest tolerance.
 const MAX_CYCLE_STEPS: u32 = 3000;
 
-/// Factor by which the least error of a step grows where steps only follow rounding. Chosen: one try then is enough.
+/// Factor of the least error of a step where steps resolve rounding only. Chosen: one increase suffices.
 const COARSENING: f64 = 1e3;
 
-/// Tries of a leap, at most. Chosen: each is a quarter to a fifth as long as the last.
+/// Attempts of an envelope step, at most. Chosen: each is a quarter to a fifth as long as the last.
 const MAX_TRIES: u32 = 3;
 
-/// Leaps of a response, at most. Chosen: each grows by up to four, so that more belong to no response that is decided.
+/// Envelope steps of a response, at most. Chosen: each grows by a factor of up to four; more decide no response.
 const MAX_ENVELOPE_STEPS: u32 = 200;
 
-/// Change of `q` in a leap, at most. Chosen: its derivative is that at the start.
+/// Change of `q` in an envelope step, at most. Chosen: its Jacobian is that at the start.
 const MAX_ENVELOPE_CHANGE: f64 = 2.0;
 
 struct EnvelopeStep {
@@ -101,18 +103,18 @@ struct EnvelopeStep {
     map_steps: [MapStep; S],
 }
 
-/// The polynomials that are 1 at one node and 0 at the others and at 0, at `u`.
+/// Values at `u` of the polynomials that are 1 at one node and 0 at the others and at 0.
 fn basis(u: f64) -> [f64; S] {
     let powers = &radau_iia_9().powers;
     std::array::from_fn(|j| (0..S).rev().fold(0.0, |sum, k| (sum + powers[k][j]) * u))
 }
 
-/// A place with `y` relative to `e^w`, which small motions keep, in units of that at the start of a leap.
+/// Section point with `y` relative to `e^w`, which small motions conserve, in units of `e^w` at the start.
 fn relative([w, y]: SectionPoint, start: &MapStep) -> SectionPoint {
     [w, y * exp(start.from[0] - w)]
 }
 
-/// The place that is so.
+/// Section point of relative coordinates.
 fn absolute([w, y]: SectionPoint, start: &MapStep) -> SectionPoint {
     [w, y * exp(w - start.from[0])]
 }
@@ -125,30 +127,30 @@ fn dot(weights: &[f64; S], values: &[f64; S]) -> f64 {
     weights.iter().zip(values).map(|(weight, value)| weight * value).sum()
 }
 
-/// `x` with `matrix x = right`; `None` where the matrix is singular.
+/// Solution `x` of `matrix x = right`; `None` where the matrix is singular.
 fn solve(matrix: Matrix2<f64>, right: SectionPoint) -> Option<SectionPoint> {
     matrix.lu().solve(&Vector2::from(right)).map(Into::into)
 }
 
 impl MapStep {
-    /// Its change relative to `e^w`.
+    /// Change relative to `e^w`.
     fn relative(&self, start: &MapStep) -> SectionPoint {
         let [from, to] = [self.from, sum(self.from, self.change)].map(|section_point| relative(section_point, start));
         [self.change[0], to[1] - from[1]]
     }
 
-    /// How large the motion is, in `ln v`.
+    /// Size of the motion, in `ln v`, at most 1.
     pub fn size(&self) -> f64 {
         size(self.range)
     }
 
-    /// Size of a change of place, as one of `ln v` relative to the motion.
+    /// Size of a change of the section point, in `ln v` relative to the motion.
     pub fn distance(&self, change: SectionPoint) -> f64 {
         distance(change, self.size())
     }
 }
 
-/// Of a motion between two velocities, at most 1.
+/// Size of a motion between two velocities, in `ln v`, at most 1.
 pub(super) fn size([low, high]: [f64; 2]) -> f64 {
     (high - low).min(1.0)
 }
@@ -158,7 +160,7 @@ pub(super) fn distance([w, y]: SectionPoint, size: f64) -> f64 {
 }
 
 impl Follower<'_> {
-    /// The cycle from a place.
+    /// Integrates the cycle from a section point.
     pub(super) fn map_step(&mut self, from: SectionPoint, tolerance: f64) -> Result<MapStep, StopReason> {
         let mut orbit = Orbit::new(self.slider, self.slider.state(from), tolerance);
         let mut budget = self.budget.min(MAX_CYCLE_STEPS);
@@ -166,7 +168,7 @@ impl Follower<'_> {
         let cycle = orbit.cycle(false, &mut budget);
         self.budget -= before - budget;
         if cycle == Err(StopReason::StepLimit) && self.budget > 0 {
-            // Steps as fine as these only follow rounding.
+            // Steps at this tolerance resolve rounding only.
             self.finest *= COARSENING;
             return Err(StopReason::BelowStepError);
         }
@@ -180,7 +182,7 @@ impl Follower<'_> {
         Ok(MapStep { from, change, period: cycle.period, range, tolerance })
     }
 
-    /// Derivative of `g` at the start of a lap, with `y` relative to `e^w`: nudging `w` then moves along small motions.
+    /// Derivative of `g` at the start of a cycle, with `y` relative to `e^w`: changes of `w` are along small motions.
     fn derivative(&mut self, map_step: &MapStep) -> Result<Matrix2<f64>, StopReason> {
         let nudges = [[DIFFERENCE_STEP, 0.0], [0.0, DIFFERENCE_STEP * map_step.size()]];
         let change_here = map_step.relative(map_step);
@@ -193,7 +195,7 @@ impl Follower<'_> {
         Ok(slopes)
     }
 
-    /// Goes on in leaps from a place where a cycle between these velocities changes `q` by this distance.
+    /// Takes envelope steps from a section point where a cycle between these velocities changes `q` by this distance.
     pub(super) fn follow_envelope(
         &mut self,
         section_point: SectionPoint,
@@ -243,25 +245,25 @@ impl Follower<'_> {
         Ok(EnvelopeResult::NotSlow)
     }
 
-    /// Error of the steps of a lap between these velocities of which a change is to be known to a part of `rtol`.
+    /// Error of the integration steps of a cycle between these velocities whose change has the relative accuracy `rtol`.
     fn map_tolerance(&self, range: [f64; 2], change: f64) -> f64 {
-        // Rounding is that of the largest logarithm.
+        // Rounding of the largest logarithm.
         let finest = self.finest * (range[1] - range[0]).max(1.0);
         size(range) * (0.01 * self.rtol * change).clamp(finest, self.tolerance.max(finest))
     }
 
-    /// The attracting fixed point next to a lap.
+    /// Attracting fixed point near a cycle.
     fn fixed_point(&mut self, map_step: &MapStep, jacobian: Matrix2<f64>) -> Result<Option<FixedPoint>, StopReason> {
         let (mut map_step, mut jacobian, mut first_distance) = (*map_step, jacobian, f64::NAN);
         let mut before = NEWTON_RADIUS;
-        // Whether steps are the finest, since the slowest moment magnifies their errors.
+        // Whether the tolerance is the tightest, since the least velocity magnifies errors.
         let mut is_exact = false;
         for _ in 0..MAX_ITERATIONS {
             let Some(step) = solve(jacobian, map_step.relative(&map_step).map(|change| -change)) else {
                 return Ok(None);
             };
             let distance = map_step.distance(step);
-            // What errors of steps leave, and what rounding does where it stops the method.
+            // Distance from errors of steps, and from rounding where it stops the method.
             let amplification = distance / map_step.distance(map_step.change);
             let noise = 10.0 * map_step.tolerance / map_step.size() * amplification;
             let tolerance = self.map_tolerance(map_step.range, if is_exact { 0.0 } else { 1.0 / amplification });
@@ -276,7 +278,7 @@ impl Follower<'_> {
             let trough = map_step.range[0];
             map_step = self.map_step(absolute(sum(map_step.from, step), &map_step), tolerance)?;
             if ends || stops {
-                // A part of the last change is left, and so is what errors of steps make of it.
+                // Error from a fraction of the last change, and from errors of steps.
                 let left = (map_step.range[0] - trough).abs() * (0.01 + 0.1 * noise / distance);
                 if left > TROUGH_ERROR * self.requested_rtol && !is_exact {
                     is_exact = true;
@@ -301,8 +303,8 @@ impl Follower<'_> {
         Ok(None)
     }
 
-    /// A leap from the start of a lap, of about `cycles`, which become those proposed for the next one; `None` if it is not worth
-    /// it.
+    /// Envelope step of about `cycles` from the start of a cycle, and its number of cycles; `None` if it is too short. Sets
+    /// `cycles` to the proposal for the next step.
     fn envelope_step(
         &mut self,
         map_step: &MapStep,
@@ -317,7 +319,7 @@ impl Follower<'_> {
             }
             let n = cycles.floor();
             let envelope_step = self.stages(map_step, jacobian, n)?;
-            // Newton's method may converge in a third of it.
+            // Newton's method may converge for a third of the cycles.
             let error = envelope_step
                 .as_ref()
                 .and_then(|envelope_step| envelope_step.error(map_step, jacobian, n))
@@ -330,7 +332,7 @@ impl Follower<'_> {
         Ok(None)
     }
 
-    /// Newton's method for the changes at the nodes, with the derivative at the start; `None` if it fails.
+    /// Solves for the changes at the nodes by Newton's method with the Jacobian at the start; `None` if it fails.
     fn stages(
         &mut self,
         map_step: &MapStep,
@@ -359,7 +361,7 @@ impl Follower<'_> {
             for i in 0..S {
                 let section_point =
                     absolute(sum(map_step.from, [0, 1].map(|r| dot(&before[i], &envelope_step.change[r]))), map_step);
-                // At first all begin where the leap does.
+                // In the first iteration all cycles start at the start of the envelope step.
                 if !steps.is_empty() {
                     envelope_step.map_steps[i] = self.map_step(section_point, map_step.tolerance)?;
                 }
@@ -395,7 +397,7 @@ impl Follower<'_> {
     }
 }
 
-/// `slopes[i][j]`: change over a cycle at node `i` of the polynomial of node `j`.
+/// Matrix `slopes[i][j]`: change of the polynomial of node `j` over a cycle at node `i`.
 fn slopes(n: f64) -> [[f64; S]; S] {
     let half = 0.5 / n;
     radau_iia_9().nodes.map(|u| {
@@ -404,31 +406,31 @@ fn slopes(n: f64) -> [[f64; S]; S] {
     })
 }
 
-/// Whether a fixed point with this derivative of `g`, known up to `error`, attracts, and if so, whether places come to it from
-/// one side.
+/// Whether nearby points approach a fixed point with this derivative of `g` from one side; `None` if it does not attract,
+/// for an error of the derivative up to `error`.
 fn multiplier(derivative: Matrix2<f64>, error: f64) -> Option<bool> {
     let [[ww, yw], [wy, yy]]: [[f64; 2]; 2] = derivative.into();
-    // Of 1 + dg/dq.
+    // Half the trace and the determinant of 1 + dg/dq.
     let (half, product) = (1.0 + 0.5 * (ww + yy), (1.0 + ww) * (1.0 + yy) - wy * yw);
     let square = 0.25 * (ww - yy) * (ww - yy) + wy * yw;
     if square < 0.0 {
         return (product < 1.0 - error).then_some(false);
     }
     let root = square.sqrt();
-    // 1 less the greater one, without a difference of numbers close to 1.
+    // 1 minus the greater multiplier, without cancellation.
     let left = -0.5 * (ww + yy) - root;
     (left > error && half - root > -1.0).then_some(half + root > 0.5 && half - root > -0.5)
 }
 
 impl MapStep {
-    /// How far it goes beyond the band of settled velocities, in powers of e; negative within.
+    /// `ln` of the range of a cycle relative to the band of settled velocities; negative within.
     pub fn ln_excess(&self) -> f64 {
         ln_1p(excess(self.range))
     }
 }
 
 impl EnvelopeStep {
-    /// The place at a share of it.
+    /// Section point at the fraction `u` of the envelope step.
     fn section_point(&self, map_step: &MapStep, u: f64) -> SectionPoint {
         let basis = basis(u);
         absolute(sum(map_step.from, [0, 1].map(|r| dot(&basis, &self.change[r]))), map_step)
@@ -441,7 +443,7 @@ impl EnvelopeStep {
         times.map_or(f64::NAN, |times| SVector::from(basis(j / n)).dot(&times))
     }
 
-    /// Its error: the defect of the first cycle, which is no node, as for a step of Radau IIA.
+    /// Error estimate: the defect of the first cycle, which is not a node, as for a step of Radau IIA.
     fn error(&self, map_step: &MapStep, jacobian: Matrix2<f64>, n: f64) -> Option<f64> {
         let first = basis(1.0 / n);
         let change = map_step.relative(map_step);
@@ -450,10 +452,10 @@ impl EnvelopeStep {
         solve(Matrix2::from_diagonal_element(rate) - jacobian, defect).map(|error| map_step.distance(error))
     }
 
-    /// A section soon before the last cycle that leaves the band of settled velocities, and its time.
+    /// Section point shortly before the last cycle that leaves the band of settled velocities, and its time.
     fn before_last_excess(&self, map_step: &MapStep, n: f64) -> (SectionPoint, f64) {
         let ends = self.map_steps.map(|end| end.ln_excess() - map_step.ln_excess());
-        // These cycles begin half a cycle before their nodes.
+        // These cycles start half a cycle before their nodes.
         let ln_excess = |u: f64| map_step.ln_excess() + dot(&basis(u), &ends);
         let u = crossing(ln_excess, [0.0, 1.0], [map_step.ln_excess(), map_step.ln_excess() + ends[S - 1]], 1e-6);
         let j = ((u * n).floor() - 2.0).max(0.0);

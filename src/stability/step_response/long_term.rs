@@ -1,6 +1,6 @@
-//! The end of a response: steady sliding, a limit cycle, or nothing that could be decided.
+//! Long-term behaviour of a response: steady sliding, a limit cycle, or undecided.
 //!
-//! Cycles are followed one by one while they change fast; where they change slowly, `envelope.rs` leaps over many.
+//! Fast-changing cycles are integrated one by one; `envelope.rs` skips slowly changing cycles.
 
 use super::envelope::{DIFFERENCE_STEP, EnvelopeResult, FixedPoint, MIN_STEP_ERROR, MapStep, distance, size};
 use super::orbit::{BAND, Cycle, Extremum, Orbit, RoughExtremum, StopReason};
@@ -11,52 +11,52 @@ use crate::numerics::elementary::{exp, ln};
 /// Small motions about steady sliding.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LinearStability {
-    /// Whether they die out.
+    /// Whether they decay.
     pub stable: bool,
-    /// Change of `ln z` over a cycle, if they oscillate.
+    /// Growth of `ln z` over a cycle; `None` if they do not oscillate.
     pub growth: Option<f64>,
 }
 
-/// Steps of one run, at most. Chosen: some ten times those of a response that leaps decide.
+/// Steps of one run, at most. Chosen: some ten times those of a response that envelope following decides.
 pub(super) const MAX_STEPS: u32 = 100_000;
 
-/// Error of a step, fraction of the error that a run may leave. Chosen: the errors of the thirty-odd steps of a slip add up.
+/// Error of a step, fraction of the error of a run. Chosen: the errors of the thirty-odd steps of a slip add up.
 const STEP_ERROR: f64 = 0.03;
 
 /// Error of `ln(v/v_f)` at an extremum of the dense output, at most. Measured at the loosest tolerance.
 const DENSE_OUTPUT_ERROR: f64 = 1e-2;
 
-/// Error estimate of a step, fraction of the motion, at most. Chosen: an estimate as large as the motion lets steps grow until
-/// they damp what grows.
+/// Error estimate of a step, fraction of the motion, at most. Chosen: an estimate as large as the motion allows steps that
+/// damp a growing motion.
 const ERROR_OF_MOTION: f64 = 1e-3;
 
-/// Change of a cycle, relative, below which a leap is tried. Chosen: its inverse is about the number of laps that a leap takes.
+/// Relative change of a cycle below which an envelope step is tried. Chosen: its inverse is about the number of cycles that
+/// an envelope step integrates.
 const MAX_SLOW_CHANGE: f64 = 0.03;
 
-/// Ratio of consecutive changes, at most, of cycles that are followed to their limit. Chosen: they come to 1e-6 of it within 270
-/// cycles.
+/// Ratio of consecutive changes, at most, of cycles that are integrated to their limit. Chosen: 270 cycles to 1e-6 of it.
 const MAX_RATIO: f64 = 0.95;
 
 /// Ratio of consecutive changes below which the last one alone counts. Chosen: errors of steps may have made the one before.
 const SMALL_RATIO: f64 = 0.02;
 
-/// Ratios of consecutive changes at a nearly constant rate. Chosen: a leap that the next cycle refuses costs little.
+/// Ratios of consecutive changes at a nearly constant rate. Chosen: a failed envelope step costs little.
 const CONSTANT_RATE: std::ops::Range<f64> = 0.5..2.0;
 
-/// Cycles between two tries to leap, and within the tolerance before changes count as errors of steps. Chosen: fewer cost less than
-/// a try.
+/// Cycles between two attempts of an envelope step, and cycles within the tolerance after which changes count as errors of
+/// steps. Chosen: fewer cost less than an attempt.
 const MIN_CYCLES: u32 = 10;
 
-/// Ratio of the last to the first of a row of falling changes, at most. Chosen: errors of steps differ by less.
+/// Ratio of the last to the first of a sequence of falling changes, at most. Chosen: errors of steps differ by less.
 const MAX_FALL_RATIO: f64 = 0.01;
 
 /// Distance from the limit cycle, in units of `rtol`. Chosen: the error of a step, [`STEP_ERROR`].
 const LIMIT_ERROR: f64 = 0.03;
 
-/// Difference of `ln v` within which two peaks are equal, in units of `rtol`: the accuracy of the second run of a course.
+/// Difference of `ln v` within which two peaks are equal, in units of `rtol`: the accuracy of the second run.
 const PEAK_TIE: f64 = 0.3;
 
-/// Follows the response from `e^x v_f` once, with steps whose errors are to leave this `share` of `rtol` of its numbers.
+/// Runs the response from `e^x v_f` once; the errors of its steps add up to `error_fraction` of `rtol`.
 pub(super) fn follow_once(
     slider: &ScaledBlock,
     linear: LinearStability,
@@ -82,7 +82,7 @@ pub(super) fn follow_once(
     Simulation { long_term, high, low, t, steps: MAX_STEPS - budget, unresolved }
 }
 
-/// Error of a step that leaves this share of `rtol`; those of the first two runs always differ.
+/// Error of a step in a run to `error_fraction` of `rtol`; the first two runs always differ in it.
 pub(super) fn step_error(rtol: f64, error_fraction: f64) -> f64 {
     (STEP_ERROR * error_fraction * rtol).max(MIN_STEP_ERROR * (error_fraction / 0.3).max(1.0))
 }
@@ -90,7 +90,7 @@ pub(super) fn step_error(rtol: f64, error_fraction: f64) -> f64 {
 pub(super) struct Follower<'a> {
     pub slider: &'a ScaledBlock,
     pub linear: LinearStability,
-    /// Accuracy that the numbers are asked for with, and that of this run.
+    /// Requested accuracy, and that of this run.
     pub requested_rtol: f64,
     pub rtol: f64,
     /// Error of a step.
@@ -98,29 +98,29 @@ pub(super) struct Follower<'a> {
     /// Least error of a step relative to the motion.
     pub finest: f64,
     pub budget: u32,
-    /// Slowest and fastest moment so far.
+    /// Minimum and maximum of the velocity so far.
     extrema: [Option<Extremum>; 2],
-    /// Whether another moment was as fast as the fastest.
+    /// Whether two peaks are equal within [`PEAK_TIE`].
     is_peak_ambiguous: bool,
     t: f64,
 }
 
-/// A response under way: an orbit that may have begun after others.
+/// Segment of a response: an orbit, with its start time.
 struct OrbitSegment<'a> {
     orbit: Orbit<'a>,
     /// Time before the orbit.
     offset: f64,
-    /// Since when the orbit has been settled if it began so; NaN if that was not seen.
+    /// Settling time of an orbit that starts settled; NaN if unknown.
     settled_since: f64,
-    /// Error of its steps.
+    /// Error of a step.
     tolerance: f64,
-    /// Where the last cycle ended.
+    /// End of the last cycle.
     section_point: Option<SectionPoint>,
     convergence: CycleConvergence,
 }
 
 impl OrbitSegment<'_> {
-    /// When it settled; `None` outside the band.
+    /// Settling time so far; `None` outside the band.
     fn settled_at(&mut self) -> Option<f64> {
         let time = self.orbit.settled_at()?;
         Some(if time == 0.0 { self.settled_since } else { self.offset + time })
@@ -130,10 +130,10 @@ impl OrbitSegment<'_> {
 impl<'a> Follower<'a> {
     fn run(&mut self, start: State) -> Result<LongTermBehaviour, StopReason> {
         let mut segment = self.segment(start, start[X].abs(), 0.0, 0.0);
-        // Cycles so far, and after how many to try the next leap.
+        // Cycles so far, and the number of cycles at the next attempt of an envelope step.
         let (mut count, mut next_attempt) = (0, 0);
         loop {
-            // Follow one cycle.
+            // Integrate one cycle.
             let cycle = match self.cycle(&mut segment) {
                 Err(StopReason::AtRest) => {
                     return segment
@@ -153,7 +153,7 @@ impl<'a> Follower<'a> {
             {
                 return Ok(LongTermBehaviour::Settled { time });
             }
-            // A limit cycle? Small cycles may only have stopped to change fast: Newton's method finds those.
+            // A limit cycle? Newton's method finds small cycles, whose changes may only have become slow.
             if size >= 1.0
                 && self.is_driven()
                 && segment.convergence.has_arrived(self.requested_rtol)
@@ -162,7 +162,7 @@ impl<'a> Follower<'a> {
                 let [low, high] = cycle.exact_range(&mut segment.orbit);
                 return Ok(LongTermBehaviour::Cycle { period: cycle.period, high, low });
             }
-            // Leap over cycles that hardly change.
+            // Skip cycles that hardly change.
             let end = segment.offset + cycle.t;
             if (segment.convergence.is_slow() || segment.convergence.change < self.rtol) && count >= next_attempt {
                 next_attempt = 2 * count + MIN_CYCLES;
@@ -188,7 +188,7 @@ impl<'a> Follower<'a> {
                     Err(stop) => return Err(stop),
                 }
             }
-            // Steps as fine as the motion asks for.
+            // Adapt the tolerance to the motion.
             let requested_rtol = self.step_error(size);
             if (!self.linear.stable && requested_rtol < 0.1 * segment.tolerance)
                 || requested_rtol > 100.0 * segment.tolerance
@@ -203,7 +203,7 @@ impl<'a> Follower<'a> {
         }
     }
 
-    /// The next cycle; its extrema are kept.
+    /// Integrates the next cycle and records its extrema.
     fn cycle(&mut self, segment: &mut OrbitSegment<'_>) -> Result<Cycle, StopReason> {
         let cycle = segment.orbit.cycle(self.linear.stable, &mut self.budget);
         self.t = segment.offset + segment.orbit.t();
@@ -212,7 +212,7 @@ impl<'a> Follower<'a> {
         cycle
     }
 
-    /// A cycle compared with where it began; `None` for the first one, and for rounding at rest.
+    /// Return-map step of a cycle; `None` for the first one, and for rounding at rest.
     fn map_step_of(&self, segment: &mut OrbitSegment<'_>, cycle: &Cycle) -> Option<MapStep> {
         let section_point = self.slider.section_point(&cycle.end);
         let from = segment.section_point.replace(section_point)?;
@@ -223,12 +223,12 @@ impl<'a> Follower<'a> {
         change[0].is_finite().then_some(map_step)
     }
 
-    /// Whether there may be a limit cycle: friction weakens with velocity, and inertia limits what grows.
+    /// Whether a limit cycle may exist: friction is velocity-weakening, and inertia limits growth.
     pub(super) fn is_driven(&self) -> bool {
         self.slider.b > self.slider.a && self.slider.inertia > 0.0
     }
 
-    /// A way on from a state, with a motion of this size.
+    /// Segment from a state, for a motion of this size.
     fn segment(&self, state: State, size: f64, offset: f64, settled_since: f64) -> OrbitSegment<'a> {
         let tolerance = self.step_error(size);
         let orbit = Orbit::new(self.slider, state, tolerance);
@@ -242,41 +242,41 @@ impl<'a> Follower<'a> {
         }
     }
 
-    /// Whether a cycle that begins beside this one comes to it: that one changes little does not show that.
+    /// Whether this cycle attracts a neighbouring cycle: a small change does not show this.
     fn attracts(&mut self, map_step: &MapStep) -> Result<bool, StopReason> {
         let neighbour = self.map_step([map_step.from[0] + DIFFERENCE_STEP, map_step.from[1]], map_step.tolerance)?;
         Ok((1.0 + (neighbour.change[0] - map_step.change[0]) / DIFFERENCE_STEP).abs() < MAX_RATIO)
     }
 
-    /// Error of a step in a motion of this size.
+    /// Error of a step for a motion of this size.
     fn step_error(&self, size: f64) -> f64 {
         let visible_error = exp(ln(ERROR_OF_MOTION * size) / 0.6);
         self.tolerance.min(visible_error).max(self.finest * size.min(1.0))
     }
 
-    /// Whether a cycle stays in the band of settled velocities, about sliding that is stable, so that it may die out.
+    /// Whether a cycle stays in the band of settled velocities about stable sliding, so that it may decay.
     fn may_decay(&self, map_step: &MapStep) -> bool {
         self.linear.stable && excess(map_step.range) < 0.0 && map_step.from[1].abs() < 0.1
     }
 
-    /// Whether it shrinks beyond the errors of its steps, and so do all smaller ones: the change of `ln z` in small cycles is
-    /// `growth + c A^2` of the amplitude `A`.
+    /// Whether a cycle shrinks by more than the errors of its steps, and so do all smaller ones. The change of `ln z` in
+    /// small cycles is `growth + c A^2` of the amplitude `A`.
     pub(super) fn decays(&self, map_step: &MapStep) -> bool {
         let shrinks = map_step.change[0] < -1e3 * map_step.tolerance / map_step.size();
         self.may_decay(map_step) && shrinks && self.linear.growth.is_none_or(|growth| growth < 0.0)
     }
 
-    /// The same with the finest steps.
+    /// Whether a cycle decays, at the tightest tolerance.
     fn decays_at_finest_steps(&mut self, map_step: &MapStep) -> Result<bool, StopReason> {
         match self.map_step(map_step.from, self.finest * map_step.size()) {
             Ok(fine) => Ok(self.decays(&fine)),
-            // Steps that only follow rounding: the next cycle tries coarser ones.
+            // Steps resolve rounding only: the next cycle has a looser tolerance.
             Err(StopReason::BelowStepError) => Ok(false),
             Err(stop) => Err(stop),
         }
     }
 
-    /// Keeps the extrema of a cycle if they are further out than those before.
+    /// Records the extrema of a cycle if they exceed those before.
     fn note_extrema(&mut self, segment: &mut OrbitSegment<'_>, extrema: [Option<RoughExtremum>; 2]) {
         for (i, sign) in [(0, -1.0), (1, 1.0)] {
             let (Some(seen), kept) = (extrema[i], self.extrema[i]) else { continue };
@@ -293,7 +293,7 @@ impl<'a> Follower<'a> {
         }
     }
 
-    /// The same for a cycle whose time is not known.
+    /// Records the extrema of a cycle at an unknown time.
     pub(super) fn note_range(&mut self, range: [f64; 2]) {
         for (i, sign) in [(0, -1.0), (1, 1.0)] {
             if self.extrema[i].is_none_or(|kept| sign * range[i] > sign * kept.x + PEAK_TIE * self.rtol) {
@@ -303,19 +303,19 @@ impl<'a> Follower<'a> {
     }
 }
 
-/// How fast cycles come to each other.
+/// Convergence of consecutive cycles.
 #[derive(Debug, Clone, Copy)]
 struct CycleConvergence {
-    /// The last change of the section.
+    /// Last change of the section point.
     change: f64,
-    /// Shares that a change left of the one before, the last two.
+    /// Last two ratios of consecutive changes.
     ratios: [f64; 2],
-    /// The change from which on all have become less.
+    /// First of the falling changes.
     first_change: f64,
-    /// The slowest moment, and its change.
+    /// Least velocity, in `ln(v/v_f)`, and its change.
     low: f64,
     low_change: f64,
-    /// Cycles that changed less than a part of `rtol`.
+    /// Number of cycles with changes below a fraction of `rtol`.
     small_changes: u32,
 }
 
@@ -334,8 +334,8 @@ impl Default for CycleConvergence {
 }
 
 impl CycleConvergence {
-    /// Takes in the change of the section over a cycle, and its slowest moment. Rises of a change below `rtol` may be
-    /// errors of steps.
+    /// Updates with the change of the section point over a cycle, and its least velocity. Rising changes below `rtol` may
+    /// be errors of steps.
     fn update(&mut self, change: f64, low: f64, rtol: f64) {
         let ratio = change / self.change;
         if ratio < MAX_RATIO {
@@ -347,9 +347,11 @@ impl CycleConvergence {
         (self.low, self.low_change) = (low, (low - self.low).abs());
     }
 
-    /// Whether all changes to come, a geometric series, are less than a part of `rtol`, and so are those of the slowest moment,
-    /// which may magnify them. A row of changes from far away shows that they are no errors of steps; where those are all that
-    /// is left, the series has no ratio, and changes as small as that have lasted.
+    /// Whether the sum of all future changes, a geometric series, is below a fraction of `rtol`, and so for the least
+    /// velocity, which may magnify them.
+    ///
+    /// A sequence of falling changes distinguishes convergence from errors of steps. Changes that remain small for many
+    /// cycles are errors of steps at the limit.
     fn has_arrived(&mut self, rtol: f64) -> bool {
         let [ratio, before] = self.ratios;
         let largest = if ratio < SMALL_RATIO { ratio } else { ratio.max(before) };
@@ -362,33 +364,33 @@ impl CycleConvergence {
         (converges && (low_change < LIMIT_ERROR * rtol || self.low < UNDERFLOW_LN_V)) || self.small_changes > MIN_CYCLES
     }
 
-    /// Whether cycles change little, and the next one will change about as much.
+    /// Whether cycles change slowly, at a nearly constant rate.
     fn is_slow(&self) -> bool {
         self.change < MAX_SLOW_CHANGE && self.ratios.iter().all(|ratio| CONSTANT_RATE.contains(ratio))
     }
 }
 
 impl Cycle {
-    /// `ln(v/v_f)` at its slowest and fastest, as they were seen.
+    /// Least and greatest `ln(v/v_f)`, to the accuracy of the dense output.
     fn range(&self) -> [f64; 2] {
         self.extrema.map(|extremum| extremum.map_or(0.0, |seen| seen.rough.x))
     }
 
-    /// The same to the order of the method.
+    /// Least and greatest `ln(v/v_f)`, to the order of the method.
     fn exact_range(&self, orbit: &mut Orbit<'_>) -> [f64; 2] {
         self.extrema.map(|extremum| extremum.map_or(0.0, |seen| orbit.refined(seen).x))
     }
 }
 
 impl MapStep {
-    /// The limit cycle that it is.
+    /// Limit cycle of a fixed point.
     fn limit(&self) -> LongTermBehaviour {
         let [low, high] = self.range;
         LongTermBehaviour::Cycle { period: self.period, high, low }
     }
 }
 
-/// How far a cycle goes beyond the band of settled velocities, relative to it; negative within.
+/// Excess of a cycle over the band of settled velocities, relative to the band; negative within.
 pub(super) fn excess([low, high]: [f64; 2]) -> f64 {
     (high / BAND[1]).max(low / BAND[0]) - 1.0
 }

@@ -8,10 +8,10 @@ use crate::numerics::elementary::{exp, ln};
 use crate::numerics::gauss;
 use crate::protocol::{Moment, Motion};
 
-/// Stretches of a traced response, at most. Chosen: beyond a quarter of a million a picture shows nothing, and memory counts.
+/// Intervals of a traced response, at most. Chosen: a limit of memory, far beyond the resolution of a picture.
 const MAX_STRETCHES: usize = 1 << 18;
 
-/// Gauss nodes for the work of one stretch. Chosen: of the order of a step, 16.
+/// Gauss nodes for the work of one interval. Chosen: their order is that of a step, 16.
 const NODES: usize = 8;
 
 /// The response to a step, up to some time.
@@ -23,7 +23,7 @@ pub struct StepResponseMotion {
     intervals: Vec<MotionInterval>,
 }
 
-/// A stretch of a response.
+/// Interval of a response.
 #[derive(Debug, Clone, Copy)]
 #[expect(clippy::large_enum_variant, reason = "arrests are few")]
 enum MotionInterval {
@@ -34,7 +34,7 @@ enum MotionInterval {
 }
 
 impl MotionInterval {
-    /// Time, in `l/v_f`, and state at a share of it.
+    /// Time, in `l/v_f`, and state at the fraction `u` of the interval.
     fn at(&self, u: f64) -> (f64, State) {
         match self {
             MotionInterval::Step(step) => (step.time(u), std::array::from_fn(|r| step.value(r, u))),
@@ -44,8 +44,9 @@ impl MotionInterval {
 }
 
 impl Step {
-    /// The response up to time `t_f`, in `l/v_0`, with errors of a step below `0.03 rtol`. `None` for a rigid spring, for
-    /// `v_i = v_f`, where the velocity becomes infinite before, and where the response swings too often to be shown.
+    /// Response up to the time `t_f`, in `l/v_0`, with errors of a step below `0.03 rtol`.
+    ///
+    /// `None` for a rigid spring, for `v_i = v_f`, where the velocity becomes infinite, and for too many oscillations.
     pub fn motion(&self, t_f: f64, rtol: f64) -> Option<StepResponseMotion> {
         let Transition { law, v_i, v_f } = self.transition;
         let x = ln(v_i / v_f);
@@ -72,7 +73,7 @@ impl Step {
 }
 
 impl StepResponseMotion {
-    /// Work of friction up to the end, `int tau v dt`.
+    /// Work of friction up to the end, `int tau v dt`, in scaled units.
     pub fn work(&self) -> f64 {
         let rule = gauss::rule(NODES);
         let step_work = |step: &IntegrationStep| {
@@ -87,7 +88,7 @@ impl StepResponseMotion {
         works.sum()
     }
 
-    /// Least velocity at the nodes and the ends of all stretches, in `v_0`.
+    /// Least velocity at the nodes and the ends of all intervals, in `v_0`.
     pub fn least_velocity(&self) -> f64 {
         let rule = gauss::rule(NODES);
         let fractions = || rule.x.iter().map(|x| 0.5 * (1.0 + x)).chain([0.0, 1.0]);

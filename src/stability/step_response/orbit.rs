@@ -1,4 +1,4 @@
-//! Following a response cycle by cycle: extrema, and the section `v = v_f` crossed upwards.
+//! A response cycle by cycle: extrema, and upward crossings of the section `v = v_f`.
 
 use std::collections::VecDeque;
 
@@ -7,70 +7,70 @@ use super::scaled_block::{ScaledBlock, State, X, Y, Z};
 use crate::numerics::root::crossing;
 use crate::numerics::stiff::radau_iia_9;
 
-/// A velocity and when it was.
+/// Extremum of the velocity.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Extremum {
-    /// `ln(v/v_f)`.
+    /// Value of `ln(v/v_f)`.
     pub x: f64,
     /// Time since the start of the orbit, in `l/v_f`.
     pub t: f64,
 }
 
-/// What happened between two upward crossings of `v = v_f`; the first cycle begins where `v = v_f` is first met.
+/// Cycle between two upward crossings of `v = v_f`; the first cycle begins where `v = v_f` is first reached.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Cycle {
-    /// State at its end, on the section: `x = 0`.
+    /// State at the end, on the section: `x = 0`.
     pub end: State,
-    /// Time at its end, since the start of the orbit.
+    /// Time at the end, since the start of the orbit, in `l/v_f`.
     pub t: f64,
-    /// Duration.
+    /// Duration, in `l/v_f`.
     pub period: f64,
-    /// Slowest and fastest moment; `None` if the first cycle has none.
+    /// Minimum and maximum of the velocity; `None` if the first cycle has none.
     pub extrema: [Option<RoughExtremum>; 2],
 }
 
-/// Why an orbit is followed no further.
+/// Reason why the integration of an orbit stops.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum StopReason {
-    /// The state is as close to steady sliding as errors of steps tell.
+    /// The distance from steady sliding is that of the errors of steps.
     AtRest,
-    /// No step is short enough.
+    /// No step is short enough: the velocity becomes infinite.
     BlowUp,
-    /// The work allowed is used up.
+    /// The step limit is reached.
     StepLimit,
-    /// The motion is too small to be told from the errors of its steps.
+    /// The motion is smaller than the errors of its steps.
     BelowStepError,
 }
 
-/// Distance from steady sliding, in `ln v`, within which motions are linear to ten digits: their squares.
+/// Distance from steady sliding, in `ln v`, within which motions are linear. Derived: its square is 1e-10.
 const LINEAR_RADIUS: f64 = 1e-5;
 
-/// Distance from rest, in errors of a step, that counts as rest. Chosen: errors of three steps may add up before they decay.
+/// Distance from steady sliding that counts as rest, in errors of a step. Chosen: errors of three steps may add up.
 const REST_DISTANCE: f64 = 3.0;
 
-/// Settled means `|v/v_f - 1|` below this, for good.
+/// Half width of the band of settled velocities, in `|v/v_f - 1|`. Chosen.
 pub const SETTLED: f64 = 0.01;
 
-/// `ln(1 - SETTLED)` and `ln(1 + SETTLED)`.
+/// Band of settled velocities: `ln(1 - SETTLED)` and `ln(1 + SETTLED)`.
 pub const BAND: [f64; 2] = [-0.01005033585350144, 0.009950330853168083];
 
-/// Fractions of a step, before and after, within which an extremum is looked for again. Chosen: the dense output, of order 5, is
-/// nearer at every tolerance.
+/// Half widths of the windows of both refinements of an extremum, fractions of a step. Chosen: the error of the dense
+/// output, of order 5, is smaller at every tolerance.
 const POLISH_WINDOW: [f64; 2] = [0.125, 0.125];
 
-/// A response under way.
+/// Integration of a response, with its cycles.
 #[derive(Debug)]
 pub struct Orbit<'a> {
     slider: &'a ScaledBlock,
     run: Integration<'a>,
-    /// Distance from steady sliding within which it rests.
+    /// Distance from steady sliding that counts as rest.
     rest_distance: f64,
-    /// Time from the last section to the start of the last step: the time since the start has too few digits for short cycles
-    /// after a long rest.
+    /// Time from the last section to the start of the last step: for short cycles after a long rest, the total time has too
+    /// few digits.
     elapsed: f64,
-    /// Whether `v = v_f` has been met.
+    /// Whether `v = v_f` has been reached.
     met: bool,
-    /// Cycles that ended in the last step and were not given out yet: one step can cross the section several times.
+    /// Cycles that ended in the last step and are not yet returned: one step can cross the section several times.
     closed: VecDeque<Cycle>,
     /// Slope of `x` at the end of the last step.
     slope: f64,
@@ -80,12 +80,12 @@ pub struct Orbit<'a> {
     entry: Option<BandEntry>,
 }
 
-/// An extremum as it was seen, good to the order of the dense output.
+/// Extremum to the accuracy of the dense output.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct RoughExtremum {
-    /// Where and when, about.
+    /// The extremum.
     pub rough: Extremum,
-    /// The step and the share of it; `None` at an arrest.
+    /// The step and the fraction of it; `None` at an arrest.
     position: Option<(IntegrationStep, f64)>,
 }
 
@@ -96,7 +96,7 @@ struct BandEntry {
 }
 
 impl<'a> Orbit<'a> {
-    /// Starts at `state`.
+    /// Orbit from `state`, with errors of a step below `tolerance`.
     pub fn new(slider: &'a ScaledBlock, state: State, tolerance: f64) -> Orbit<'a> {
         Orbit {
             slider,
@@ -117,7 +117,11 @@ impl<'a> Orbit<'a> {
         self.run.t()
     }
 
-    /// Follows up to the next section. An orbit that `may_rest` ends where it is quiet. Steps come off the `budget`.
+    /// Integrates to the next section; each step takes 1 off the `budget`.
+    ///
+    /// # Errors
+    ///
+    /// The reason why the orbit does not reach the section; `AtRest` only if it `may_rest`.
     pub fn cycle(&mut self, may_rest: bool, budget: &mut u32) -> Result<Cycle, StopReason> {
         loop {
             if let Some(cycle) = self.closed.pop_front() {
@@ -150,19 +154,19 @@ impl<'a> Orbit<'a> {
     fn is_at_rest(&self) -> bool {
         let [z, y, x] = *self.run.y();
         let ScaledBlock { a, b, inertia, k } = *self.slider;
-        // Friction turns a share b/a of ln theta into ln v, and a soft spring moves masses of M and a by its energy.
+        // Friction converts ln theta to ln v by b/a, and the energy of a soft spring moves masses of M and a.
         let force = a.min((k * (inertia + a)).sqrt());
         x.abs() < self.rest_distance
             && y.abs() * a.max(b) < self.rest_distance * a
             && z.abs() < self.rest_distance * force
     }
 
-    /// Looks through a step, from node to node, for what happens in it.
+    /// Finds extrema and crossings within a step, from node to node.
     fn scan(&mut self, step: &IntegrationStep) {
         let mut u0 = 0.0;
         let (mut x0, mut slope0) = (step.start()[X], step.slope(X, 0.0));
         if self.slope * slope0 < 0.0 {
-            // Between two steps: the slope of their polynomials jumps a little.
+            // Between two steps, whose polynomials differ slightly in slope.
             self.note_extremum(self.slope, RoughExtremum { rough: Extremum { x: x0, t: step.t() }, position: None });
         }
         for u1 in radau_iia_9().nodes {
@@ -182,8 +186,8 @@ impl<'a> Orbit<'a> {
         self.slope = slope0;
     }
 
-    /// Notes an extremum after a rise or a fall, if `v = v_f` has been met and it is further out than `v_f` and the one
-    /// before: at rest rounding makes extrema as well.
+    /// Records an extremum after a rise or a fall, if `v = v_f` has been reached and the extremum exceeds `v_f` and the one
+    /// before: at rest, rounding makes extrema too.
     fn note_extremum(&mut self, slope: f64, seen: RoughExtremum) {
         let (kept, sign) = if slope > 0.0 { (&mut self.high, 1.0) } else { (&mut self.low, -1.0) };
         let out = sign * seen.rough.x;
@@ -192,7 +196,7 @@ impl<'a> Orbit<'a> {
         }
     }
 
-    /// Looks through a piece in which the velocity only rises or only falls.
+    /// Finds crossings within a range of a step in which the velocity is monotone.
     fn scan_monotone(&mut self, step: &IntegrationStep, u: [f64; 2], x: [f64; 2]) {
         let at = |level: f64| crossing(|u| step.value(X, u) - level, u, [x[0] - level, x[1] - level], 1e-9);
         let (rises, falls) = (x[0] < 0.0 && x[1] >= 0.0, x[0] > 0.0 && x[1] <= 0.0);
@@ -210,18 +214,18 @@ impl<'a> Orbit<'a> {
         }
     }
 
-    /// The cycle that ends at the section, at about the share `u` of a step.
+    /// The cycle that ends at the section, near the fraction `u` of a step.
     fn end_cycle(&mut self, step: &IntegrationStep, u: f64) -> Cycle {
         let (end, t, refined_step) = self.locate(step, u, 0.0);
         let time = refined_step.map_or(u * step.h(), |refined_step| refined_step.h());
         let cycle =
             Cycle { end: [end[Z], end[Y], 0.0], t, period: self.elapsed + time, extrema: [self.low, self.high] };
-        // The whole step will be added.
+        // The caller adds the whole step.
         self.elapsed = -time;
         cycle
     }
 
-    /// State and time where `x` is `level`, near the share `u` of a step, to the order of the method.
+    /// State and time where `x` is `level`, near the fraction `u` of a step, to the order of the method.
     fn locate(&mut self, step: &IntegrationStep, u: f64, level: f64) -> (State, f64, Option<IntegrationStep>) {
         let mut u = u;
         let mut best = (std::array::from_fn(|r| step.value(r, u)), step.time(u), None);
@@ -237,7 +241,7 @@ impl<'a> Orbit<'a> {
         best
     }
 
-    /// An extremum, integrated again about where it was seen, on ever shorter steps.
+    /// Refines an extremum by integration over ever shorter steps about it.
     pub fn refined(&mut self, RoughExtremum { rough, position }: RoughExtremum) -> Extremum {
         let Some((mut step, mut u)) = position else { return rough };
         for window in POLISH_WINDOW {
@@ -254,20 +258,20 @@ impl<'a> Orbit<'a> {
             .map_or(rough, |refined_step| Extremum { x: refined_step.end()[X], t: refined_step.time(1.0) })
     }
 
-    /// The slowest and the fastest moment since the last section, if there was one.
+    /// Minimum and maximum of the velocity since the last section, if there are any.
     pub fn extrema(&self) -> [Option<RoughExtremum>; 2] {
         [self.low, self.high]
     }
 
-    /// When the velocity last came into the band of settled velocities; `None` if it is outside.
+    /// Time of the last entry into the band of settled velocities; `None` outside the band.
     pub fn settled_at(&mut self) -> Option<f64> {
         let BandEntry { edge, position } = self.entry?;
         Some(position.map_or(0.0, |(step, u)| self.locate(&step, u, edge).1))
     }
 }
 
-/// How close to steady sliding a motion rests whose steps have errors below `tolerance`: what is left of it is linear, and
-/// of the size of these errors.
+/// Distance from steady sliding that counts as rest, for errors of a step below `tolerance`: the motion is linear, and of
+/// the size of these errors.
 pub(super) fn rest_distance(tolerance: f64) -> f64 {
     LINEAR_RADIUS.min(REST_DISTANCE * tolerance)
 }
