@@ -137,7 +137,7 @@ pub fn shards(arguments: &Arguments) -> Result<(), Failure> {
     let (rows, parts, work) = (words::things(rows, "row"), words::things(parts, "part"), words::duration(seconds));
     let (tasks, cpus) = (words::things(shards, "task"), words::things(arguments.cpus, "processor"));
     let mut said = format!("{}: {rows} in {parts}, about {work} on one processor\n", sweep.name);
-    let _ = writeln!(said, "{tasks}, each about {} on {cpus}", words::duration(each));
+    let _ = writeln!(said, "{tasks} of about {} on {cpus} each", words::duration(each));
     if let Some(reason) = fewer {
         let _ = writeln!(said, "fewer than the {} requested: {reason}", words::count(arguments.shards));
     }

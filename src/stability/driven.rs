@@ -1,4 +1,4 @@
-//! The loop closed: the block simulated under the control of a shortcut, told continuously or sampled and held.
+//! Open-loop simulation of the block under the control velocity of a shortcut, continuous or sampled and held.
 //!
 //! With time in units of `t_f`, `x = ln(v/v_f)`, `y = ln(theta v_f)` and `z = k s - tau_ss(v_f)` the equations of
 //! motion are
@@ -7,7 +7,7 @@
 //! z' = t_f k (v_c - v),    y' = t_f (1/theta - v),    (m v/t_f) x' = z - a x - b y,
 //! ```
 //!
-//! and the target is 0. Without mass the last one is a constraint. A rigid spring hands `v_c` to the block.
+//! and the target is 0. Without mass the last equation is a constraint. With a rigid spring, `v = v_c`.
 
 use crate::model::Law;
 use crate::numerics::elementary::{exp, exp_m1, ln};
@@ -16,12 +16,13 @@ use crate::protocol::compliant::CompliantPath;
 use crate::protocol::{Motion, SpringBlock};
 use crate::stability::OpenLoopResult;
 
-/// Samples of one simulation, at most. Chosen: each takes some steps, and a row shall not take minutes.
+/// Samples of one simulation, at most. Chosen: each takes some steps; more would take minutes a row.
 const MAX_SAMPLES: f64 = 1e5;
 
-/// Distance from the target at `t_f`, the Euclidean norm in `(ln v, ln theta, k s/a)`, if `v_c` is told continuously:
-/// what `rtol` and the rounding of the protocol leave, amplified from wherever they arise. None where the simulation does
-/// not get there.
+/// Distance from the target at `t_f` under continuous `v_c`: the Euclidean norm in `(ln v, ln theta, k s/a)`.
+///
+/// Its sources are `rtol` and the rounding of the protocol, amplified along the path. `None` where the simulation does not
+/// reach `t_f`.
 pub fn open_loop_error(path: &CompliantPath, rtol: f64) -> OpenLoopResult {
     let v_f = path.jet(path.panels() - 1, 1.0).v[0];
     if path.slider.k == f64::INFINITY {
@@ -34,9 +35,10 @@ pub fn open_loop_error(path: &CompliantPath, rtol: f64) -> OpenLoopResult {
     OpenLoopResult { number: end.map(|(state, _)| driven.distance(&state)), steps: MAX_STEPS - budget }
 }
 
-/// Distance from the target at `t_f`, as in [`open_loop_error`], if `v_c` is sampled at `0`, `dt`, `2 dt`, … and each sample
-/// is held until the next. None where that takes more than 100,000 or the simulation does not get there,
-/// most often because a held `v_c` stops the block or lets it run away.
+/// Distance from the target at `t_f`, as in [`open_loop_error`], if `v_c` is sampled at `0`, `dt`, `2 dt`, … and held.
+///
+/// `None` for more than 100,000 samples, and where the simulation does not reach `t_f`, most often because a held `v_c`
+/// stops the block or makes it unstable.
 pub fn held_error(path: &CompliantPath, dt: f64, rtol: f64) -> OpenLoopResult {
     let t_f = path.duration();
     let samples = (t_f / dt).ceil().max(1.0);
@@ -59,27 +61,27 @@ pub fn held_error(path: &CompliantPath, dt: f64, rtol: f64) -> OpenLoopResult {
     }
     let mut driven = Driven::new(path, Control::Held(0.0));
     let mut budget = MAX_STEPS;
-    let mut here = Some((driven.start(path), FIRST_STEP));
+    let mut state_and_step = Some((driven.start(path), FIRST_STEP));
     for i in 0..count {
-        let Some((state, h)) = here else { break };
+        let Some((state, h)) = state_and_step else { break };
         driven.control = Control::Held(sample(i));
-        here = driven.follow(state, (time(i), time(i + 1)), h, rtol, &mut budget);
+        state_and_step = driven.follow(state, (time(i), time(i + 1)), h, rtol, &mut budget);
     }
-    OpenLoopResult { number: here.map(|(state, _)| driven.distance(&state)), steps: MAX_STEPS - budget }
+    OpenLoopResult { number: state_and_step.map(|(state, _)| driven.distance(&state)), steps: MAX_STEPS - budget }
 }
 
-/// First step, in units of `t_f`. Chosen: it is shortened as needed.
+/// First step, in units of `t_f`. Chosen: step-size control shortens it.
 const FIRST_STEP: f64 = 1e-3;
 
 /// Steps of one simulation, at most. Chosen: two for each sample.
 const MAX_STEPS: u32 = 200_000;
 
-/// Places of the variables, in the order in which they are eliminated.
+/// Indices of the variables, in the order of elimination.
 const Z: usize = 0;
 const Y: usize = 1;
 const X: usize = 2;
 
-/// What the end of the spring is told.
+/// Control velocity at the load point.
 enum Control<'a> {
     Continuous(&'a CompliantPath),
     Held(f64),
@@ -106,8 +108,8 @@ impl<'a> Driven<'a> {
         [(a - b) * x, -x, x]
     }
 
-    /// The state at the end of a time, and the step that was foreseen for what follows; `None` where the simulation
-    /// ends before, or the budget of steps.
+    /// State at the end of a time interval, and the proposed next step; `None` where the integration fails, or the budget
+    /// of steps is spent.
     fn follow(
         &self,
         state: [f64; 3],
@@ -131,10 +133,10 @@ impl<'a> Driven<'a> {
     }
 }
 
-/// Error of a step, fraction of the accuracy. Chosen: a hundred steps of the same sign add up to it.
+/// Error of a step, fraction of `rtol`. Chosen: the errors of a hundred steps may add up.
 const STEP_ERROR: f64 = 0.01;
 
-/// Distance where the spring is rigid and pulls with the friction alone.
+/// Distance from the target for a rigid spring, whose force is friction alone.
 fn distance(law: &Law, [x, y]: [f64; 2]) -> f64 {
     let force = x + law.b / law.a * y;
     (x * x + y * y + force * force).sqrt()
@@ -150,13 +152,13 @@ impl System<3> for Driven<'_> {
         let unit = self.t_f * self.v_f;
         for i in 0..L {
             let (v, ageing) = (unit * exp(x[i]), unit * exp(-y[i]));
-            let told = match self.control {
+            let v_c = match self.control {
                 Control::Continuous(path) => self.slider.control(&path.at_time(self.t_f * points.t[i])),
-                Control::Held(told) => told,
+                Control::Held(v_c) => v_c,
             };
             let mass = m * v / (self.t_f * self.t_f);
             at.mass[X][i] = mass;
-            at.residual[Z][i] = k * (self.t_f * told - v) - z_slope[i];
+            at.residual[Z][i] = k * (self.t_f * v_c - v) - z_slope[i];
             at.residual[Y][i] = (ageing - v) - y_slope[i];
             at.residual[X][i] = (z[i] - a * x[i] - b * y[i]) - mass * x_slope[i];
             at.jacobian[Z][X][i] = -k * v;

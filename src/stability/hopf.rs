@@ -1,6 +1,6 @@
-//! The Hopf point at the critical stiffness: whether small limit cycles live on its unstable side or on its stable one.
+//! The Hopf point at the critical stiffness: supercritical or subcritical.
 //!
-//! The first Lyapunov coefficient of the slider at `k = k_c` is elementary (docs/derivations.md, "The Hopf point"). With `mu =
+//! The first Lyapunov coefficient of the block at `k = k_c` is elementary (docs/derivations.md). With `mu =
 //! m v^2/a` and `omega^2 = (b - a)/a`, in units of `l/v` for time and of `ln v` for the amplitude,
 //!
 //! ```text
@@ -10,32 +10,32 @@
 
 use crate::model::Law;
 
-/// On which side of the critical stiffness small limit cycles live.
+/// Side of the critical stiffness on which small limit cycles exist.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Hopf {
-    /// Below it, and attracting: beyond the point the block oscillates little at first.
+    /// Below it, attracting: oscillations grow continuously from 0 beyond the Hopf point.
     Supercritical,
-    /// Above it, and repelling: they bound the disturbances that die out, and larger ones end in stick-slip.
+    /// Above it, repelling: larger disturbances of stable sliding lead to stick-slip.
     Subcritical,
 }
 
 impl Hopf {
-    /// The words that are written into tables, in the order of the kinds.
+    /// Names in tables, in the order of the variants.
     pub const NAMES: [&'static str; 2] = ["supercritical", "subcritical"];
 
-    /// The kind of the Hopf point of steady sliding at `v > 0` of a mass `m >= 0`. `None` where there is none (`b <= a`), or
-    /// where it is degenerate: without mass.
+    /// Kind of the Hopf point of steady sliding at `v > 0` of a mass `m >= 0`; `None` for `b <= a` (no Hopf point) and
+    /// for `m = 0` (degenerate).
     pub fn of(law: Law, m: f64, v: f64) -> Option<Hopf> {
         let coefficient = lyapunov_coefficient(law, m * v * v)?;
         Some(if coefficient < 0.0 { Hopf::Supercritical } else { Hopf::Subcritical })
     }
 }
 
-/// The first Lyapunov coefficient `l_1` at the critical stiffness of a block of scaled mass `M = m v^2`; `None` as in
+/// First Lyapunov coefficient `l_1` at the critical stiffness of a block of scaled mass `M = m v^2`; `None` as in
 /// [`Hopf::of`].
 ///
-/// There, `ln A` of a small oscillation `A cos(omega t)` of `ln v` changes by `(pi/2) l_1 A^2` a cycle; next to it the
-/// amplitude of limit cycles is `2 sqrt(-sigma/(omega l_1))`, `sigma` the growth rate.
+/// There, `ln A` of a small oscillation `A cos(omega t)` of `ln v` changes by `(pi/2) l_1 A^2` a cycle. Near it the
+/// amplitude of limit cycles is `2 sqrt(-sigma/(omega l_1))`, with the growth rate `sigma`.
 pub fn lyapunov_coefficient(law: Law, inertia: f64) -> Option<f64> {
     let mu = inertia / law.a;
     let square = (law.b - law.a) / law.a;
@@ -50,7 +50,7 @@ pub fn lyapunov_coefficient(law: Law, inertia: f64) -> Option<f64> {
 
 #[cfg(test)]
 mod tests {
-    //! The coefficient against Kuznetsov's formula, and the amplitude of limit cycles that it predicts against simulations.
+    //! The coefficient compared with Kuznetsov's formula, and the predicted amplitude of limit cycles with simulations.
 
     use nalgebra::{Complex, Matrix3, Vector3};
 
@@ -80,16 +80,16 @@ mod tests {
         let p = Vector3::new(i / (omega * mass), one * (b / mass) / (i * omega - one), one);
         assert!((jacobian * q - q * (i * omega)).norm() < 1e-9 * q.norm() * jacobian.norm());
         assert!((jacobian.transpose() * p + p * (i * omega)).norm() < 1e-9 * p.norm() * jacobian.norm());
-        let mirrored = q.map(|x| x.conj());
+        let conjugate = q.map(|x| x.conj());
         let solve = |matrix: Matrix3<C>, v: Vector3<C>| matrix.lu().solve(&v).expect("is regular");
-        let still = solve(jacobian, second(&q, &mirrored));
+        let still = solve(jacobian, second(&q, &conjugate));
         let double = solve(Matrix3::from_diagonal_element(i * (2.0 * omega)) - jacobian, second(&q, &q));
-        let sum = third(&q, &q, &mirrored) - second(&q, &still) * (one * 2.0) + second(&mirrored, &double);
+        let sum = third(&q, &q, &conjugate) - second(&q, &still) * (one * 2.0) + second(&conjugate, &double);
         (p.dotc(&sum) / p.dotc(&q)).re / (2.0 * omega)
     }
 
     #[test]
-    fn coefficient_is_that_of_the_multilinear_forms() {
+    fn coefficient_equals_that_of_the_multilinear_forms() {
         for a in [0.005, 0.05] {
             for ratio in [1.001, 1.5, 2.0, 10.0] {
                 let law = Law { a, b: ratio * a };
@@ -105,8 +105,8 @@ mod tests {
         }
     }
 
-    /// Change of `ln A` over a small cycle at the critical stiffness, divided by `(pi/2) A^2`; the contact lifetime has relaxed for some cycles.
-    fn followed(law: Law, inertia: f64, z: f64) -> f64 {
+    /// Change of `ln A` over a small cycle at the critical stiffness, divided by `(pi/2) A^2`, after some cycles.
+    fn simulated_growth(law: Law, inertia: f64, z: f64) -> f64 {
         let Law { a, b } = law;
         let slider = ScaledBlock { a, b, inertia, k: (b - a) * (1.0 + inertia / a) };
         let mut orbit = Orbit::new(&slider, [z, 0.0, 0.0], 1e-13);
@@ -117,13 +117,13 @@ mod tests {
         }
         let cycle = orbit.cycle(false, &mut budget).expect("goes on");
         let change = (cycle.end[Z] / before).ln();
-        let [low, high] = cycle.extrema.map(|seen| orbit.polished(seen.expect("oscillates")).x);
+        let [low, high] = cycle.extrema.map(|seen| orbit.refined(seen.expect("oscillates")).x);
         let amplitude = 0.5 * (high - low);
         change / (0.5 * std::f64::consts::PI * amplitude * amplitude)
     }
 
     #[test]
-    fn small_cycles_change_as_foreseen() {
+    fn small_cycles_change_as_predicted() {
         for (a, ratio, inertia) in [
             (0.005, 2.0, 0.00256),
             (0.005, 2.0, 0.02),
@@ -134,20 +134,21 @@ mod tests {
         ] {
             let law = Law { a, b: ratio * a };
             let expected = lyapunov_coefficient(law, inertia).expect("has a critical stiffness");
-            // The section is not exactly where the phase is the same: an error of the order of the amplitude.
-            let [twice, once] = [2e-2, 1e-2].map(|share| followed(law, inertia, share * (ratio - 1.0) * (a + inertia)));
+            // The phase at the section varies: an error of the order of the amplitude.
+            let [twice, once] =
+                [2e-2, 1e-2].map(|fraction| simulated_growth(law, inertia, fraction * (ratio - 1.0) * (a + inertia)));
             let found = 2.0 * once - twice;
             assert!((found / expected - 1.0).abs() < 5e-4, "{law:?} {inertia}: {found} {expected}");
         }
     }
 
     #[test]
-    fn kind_changes_at_its_mass() {
+    fn kind_changes_at_the_critical_mass() {
         for square in [1e-6, 0.5, 1.0, 30.0_f64] {
             let law = Law { a: 0.01, b: 0.01 * (1.0 + square) };
             let mu = 1.0 / (3.0 + 2.0 * (4.0 + (law.b - law.a) / law.a).sqrt());
-            for (share, kind) in [(1.0 - 1e-9, Hopf::Subcritical), (1.0 + 1e-9, Hopf::Supercritical)] {
-                assert_eq!(Hopf::of(law, share * mu * law.a / 4.0, 2.0), Some(kind), "{square}");
+            for (fraction, kind) in [(1.0 - 1e-9, Hopf::Subcritical), (1.0 + 1e-9, Hopf::Supercritical)] {
+                assert_eq!(Hopf::of(law, fraction * mu * law.a / 4.0, 2.0), Some(kind), "{square}");
             }
         }
         assert_eq!(Hopf::of(Law { a: 0.01, b: 0.01 }, 1.0, 1.0), None);
@@ -156,20 +157,20 @@ mod tests {
     }
 
     #[test]
-    fn simulated_limit_cycles_have_the_amplitude_that_it_predicts() {
+    fn simulated_limit_cycles_have_the_predicted_amplitude() {
         let law = Law { a: 0.005, b: 0.01 };
         for v_f in [2.5e6, 3.2e6, 1e7] {
             let m = 2.5e-16;
-            let at = |share: f64| {
+            let at = |fraction: f64| {
                 let critical = SteadySliding::new(law, 1.0, m, v_f).critical_stiffness();
-                let k = critical * (1.0 - share);
+                let k = critical * (1.0 - fraction);
                 let growth = SteadySliding::new(law, k, m, v_f).eigenvalues().expect("is elastic").growth_rate / v_f;
                 let omega = ((law.b - law.a) / law.a).sqrt();
                 let coefficient = lyapunov_coefficient(law, m * v_f * v_f).expect("has a Hopf point");
                 let predicted = 2.0 * (-growth / (omega * coefficient)).sqrt();
                 let transition = Transition { law, v_i: 0.99 * v_f, v_f };
                 let (_, response) = Step { transition, k, m }.respond(1e-8);
-                let response = response.expect("is followed");
+                let response = response.expect("is simulated_growth");
                 assert_eq!(response.outcome, Outcome::LimitCycle);
                 let cycle = response.cycle.expect("is a cycle");
                 0.5 * (cycle.v_peak / cycle.v_trough).ln() / predicted - 1.0

@@ -6,8 +6,8 @@
 //! M x^3 + (M + a) x^2 + (k + a - b) x + k = 0,    M = m v^2,
 //! ```
 //!
-//! so only `a`, `b`, `k` and `M` matter (docs/derivations.md, "Stability of steady sliding"). The Routh-Hurwitz determinant `H = a k -
-//! (b - a)(M + a)` decides stability; it is formed with 32 digits, and so is everything that is small where it is small.
+//! so they depend on `a`, `b`, `k` and `M` only (docs/derivations.md; Rice and Ruina 1983). The sign of the Routh-Hurwitz
+//! determinant `H = a k - (b - a)(M + a)` decides stability. Small differences are formed in double-double.
 
 use crate::model::Law;
 use crate::numerics::double_double::DoubleDouble;
@@ -19,11 +19,11 @@ pub struct SteadySliding {
     k: f64,
     m: f64,
     v: f64,
-    /// `m v^2`.
+    /// Scaled mass `M = m v^2`.
     inertia: f64,
-    /// `m v^2 + a`.
+    /// Coefficient `M + a`.
     sum: f64,
-    /// `k + a - b`.
+    /// Coefficient `k + a - b`.
     c: f64,
     /// Routh-Hurwitz determinant.
     hurwitz: f64,
@@ -36,13 +36,12 @@ pub struct Eigenvalues {
     pub growth_rate: f64,
     /// Imaginary part of the complex pair; 0 if all are real.
     pub frequency: f64,
-    /// The real eigenvalue apart from the pair, the least if all are real; `None` for `m = 0`, where it is gone to
-    /// minus infinity.
+    /// Real eigenvalue apart from the pair, the least if all are real; `None` for `m = 0`, where it is minus infinity.
     pub decay_rate: Option<f64>,
 }
 
-/// Square of half the distance of two eigenvalues, fraction of their product, below which it is formed in double-double. Chosen: half
-/// of the digits of the distance are left there.
+/// Square of half the distance of two eigenvalues, fraction of their product, below which it is formed in double-double.
+/// Chosen.
 const CLOSE_PAIR: f64 = 1e-3;
 
 /// Difference, fraction of its terms, below which it is formed in double-double. Chosen: three bits are lost there.
@@ -52,7 +51,7 @@ impl SteadySliding {
     /// Steady sliding at velocity `v > 0`, on a spring of stiffness `k > 0` (infinite: rigid), of a mass `m >= 0`.
     pub fn new(law: Law, k: f64, m: f64, v: f64) -> SteadySliding {
         let weakening = law.b - law.a;
-        // Of a mass -0 the decay would have the wrong sign.
+        // A mass of -0 would give the decay rate the wrong sign.
         let m = m + 0.0;
         let inertia = m * v * v;
         let sum = inertia + law.a;
@@ -80,7 +79,7 @@ impl SteadySliding {
         !self.k.is_finite() || self.hurwitz > 0.0
     }
 
-    /// The eigenvalues; `None` for a rigid spring, which leaves no block to swing.
+    /// The eigenvalues; `None` for a rigid spring, under which the block does not oscillate.
     pub fn eigenvalues(&self) -> Option<Eigenvalues> {
         if !self.k.is_finite() {
             return None;
@@ -88,10 +87,10 @@ impl SteadySliding {
         let root = self.real_root();
         let real = -root / self.inertia;
         let [growth, frequency, decay] = match self.pair(root) {
-            Pair::Complex { growth, frequency } => [growth, frequency, real],
-            // The one that was found is the least or the greatest of three.
-            Pair::Real { low, high } if real < low => [high, 0.0, real],
-            Pair::Real { low, high } => [high.max(real), 0.0, low],
+            RemainingEigenvalues::Complex { growth, frequency } => [growth, frequency, real],
+            // The root found is the least or the greatest of three.
+            RemainingEigenvalues::Real { low, high } if real < low => [high, 0.0, real],
+            RemainingEigenvalues::Real { low, high } => [high.max(real), 0.0, low],
         };
         Some(Eigenvalues {
             growth_rate: self.v * growth,
@@ -101,7 +100,7 @@ impl SteadySliding {
     }
 }
 
-/// Velocity beyond which steady sliding is unstable, `sqrt(a (k/(b - a) - 1)/m)`; `None` where there is none: it is
+/// Critical velocity `sqrt(a (k/(b - a) - 1)/m)`, in `v_0`, above which steady sliding is unstable; `None` where it is
 /// stable at every velocity, or at none.
 pub fn critical_velocity(law: Law, k: f64, m: f64) -> Option<f64> {
     let weakening = law.b - law.a;
@@ -113,8 +112,8 @@ pub fn critical_velocity(law: Law, k: f64, m: f64) -> Option<f64> {
     (weakening > 0.0 && spare > 0.0 && velocity.is_finite()).then_some(velocity)
 }
 
-/// Two eigenvalues beside a real one, scaled.
-enum Pair {
+/// The two eigenvalues apart from a real one, scaled.
+enum RemainingEigenvalues {
     Complex { growth: f64, frequency: f64 },
     Real { low: f64, high: f64 },
 }
@@ -125,7 +124,7 @@ const MAX_STEPS: usize = 100;
 impl SteadySliding {
     /// `R = -M x` of a real root `x`, the largest `R` or the only one: a root of `R^3 - (M + a) R^2 + c M R - k M^2`.
     ///
-    /// The sign at the inflection point tells from which side Newton's method runs to a root without a turn.
+    /// The sign at the inflection point decides from which side Newton's method converges monotonically.
     fn real_root(&self) -> f64 {
         let SteadySliding { k, inertia, sum, c, hurwitz, .. } = *self;
         let value = |r: f64| ((r - sum) * r + c * inertia) * r - k * inertia * inertia;
@@ -142,7 +141,7 @@ impl SteadySliding {
         for _ in 0..MAX_STEPS {
             let step = value(r) / slope(r);
             let next = r - step;
-            // Steps go one way until rounding turns one.
+            // Steps keep their direction until rounding reverses one.
             if !(next.is_finite() && if from_above { next < r } else { next > r }) {
                 break;
             }
@@ -155,7 +154,7 @@ impl SteadySliding {
         r
     }
 
-    /// An upper bound of the sum of the two other eigenvalues where it is positive: `q` in `M^2 q^3 + 2 M (M + a) q^2 + S
+    /// Upper bound of the sum of the two other eigenvalues where it is positive: `q` in `M^2 q^3 + 2 M (M + a) q^2 + S
     /// q = |H|`, `S = (M + a)^2 + c M`, without the first term.
     fn growth_bound(&self) -> f64 {
         let SteadySliding { inertia, sum, c, hurwitz, .. } = *self;
@@ -167,8 +166,8 @@ impl SteadySliding {
         (-slope + (slope * slope - 4.0 * square * hurwitz).sqrt()) / (2.0 * square)
     }
 
-    /// `P^2/4 - Q` with 32 digits: next to a double root it is a small difference. `P` follows from the sum of the
-    /// eigenvalues, or else from their products in pairs.
+    /// `P^2/4 - Q` in double-double: near a double root it is a small difference. `P` follows from the sum of the
+    /// eigenvalues, or from their products in pairs.
     fn discriminant(&self, r: f64, by_sum: bool) -> f64 {
         let double = DoubleDouble::new;
         let (k, inertia) = (double(self.k), DoubleDouble::product(self.v, self.v) * double(self.m));
@@ -181,11 +180,11 @@ impl SteadySliding {
         (half * half - k / x).high
     }
 
-    /// The two eigenvalues beside the real one: roots of `x^2 + P x + Q`.
-    fn pair(&self, r: f64) -> Pair {
+    /// The two eigenvalues apart from the real one: roots of `x^2 + P x + Q`.
+    fn pair(&self, r: f64) -> RemainingEigenvalues {
         let SteadySliding { k, inertia, sum, c, hurwitz, .. } = *self;
         let q = k / r;
-        // Two ways to the same P: the one whose terms are smaller loses fewer digits.
+        // Two formulas for P: smaller terms lose fewer digits.
         let (first, second) = (sum / inertia, c.abs().max(inertia * q) / r);
         let by_sum = first < second;
         let mut p = if by_sum { (sum - r) / inertia } else { (c - inertia * q) / r };
@@ -207,13 +206,13 @@ impl SteadySliding {
             squares = self.discriminant(r, by_sum);
         }
         if squares < 0.0 {
-            // 0 without a sign at the critical stiffness.
-            return Pair::Complex { growth: 0.0 - half, frequency: (-squares).sqrt() };
+            // No negative zero at the critical stiffness.
+            return RemainingEigenvalues::Complex { growth: 0.0 - half, frequency: (-squares).sqrt() };
         }
-        // The product tells the smaller one.
+        // The smaller root follows from the product.
         let larger = -(half + squares.sqrt().copysign(half));
         let smaller = q / larger;
-        Pair::Real { low: larger.min(smaller), high: larger.max(smaller) }
+        RemainingEigenvalues::Real { low: larger.min(smaller), high: larger.max(smaller) }
     }
 }
 
@@ -306,12 +305,13 @@ mod tests {
             let (k, m) = (log_uniform(&mut state, 1e-3, 10.0), log_uniform(&mut state, 1e-3, 10.0));
             let (sum, c) = (m + law.a, k + law.a - law.b);
             let companion = Matrix3::new(-sum / m, -c / m, -k / m, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0);
-            let judged = companion.complex_eigenvalues();
+            let expected_roots = companion.complex_eigenvalues();
             let eigenvalues = SteadySliding::new(law, k, m, 1.0).eigenvalues().expect("is elastic");
             for (re, im) in scaled(&eigenvalues, 1.0) {
-                let near = judged.iter().map(|root| (root.re - re).hypot(root.im - im)).fold(f64::INFINITY, f64::min);
+                let near =
+                    expected_roots.iter().map(|root| (root.re - re).hypot(root.im - im)).fold(f64::INFINITY, f64::min);
                 // A double root is known to half the digits only.
-                assert!(near <= 1e-7 * re.hypot(im), "{law:?} {k} {m} {eigenvalues:?} {judged:?}");
+                assert!(near <= 1e-7 * re.hypot(im), "{law:?} {k} {m} {eigenvalues:?} {expected_roots:?}");
             }
         }
     }
@@ -326,18 +326,20 @@ mod tests {
             let inertia = DoubleDouble::product(v, v) * DoubleDouble::new(m);
             let weakening = DoubleDouble::sum(law.b, -law.a);
             let critical = weakening * (DoubleDouble::new(1.0) + inertia / DoubleDouble::new(law.a));
-            for share in [-1e-12, 1e-12, -1e-9, 1e-6] {
-                let k = critical.high + share * critical.high;
+            for fraction in [-1e-12, 1e-12, -1e-9, 1e-6] {
+                let k = critical.high + fraction * critical.high;
                 let stable = (DoubleDouble::new(k) - critical).high > 0.0;
                 let sliding = SteadySliding::new(law, k, m, v);
-                assert_eq!(sliding.is_stable(), stable, "{law:?} {m} {v} {share}");
+                assert_eq!(sliding.is_stable(), stable, "{law:?} {m} {v} {fraction}");
                 let eigenvalues = sliding.eigenvalues().expect("is elastic");
                 assert_eq!(eigenvalues.growth_rate < 0.0, stable);
                 // To first order sigma = -H/(2 S), with H = a (k - k_c) at 32 digits.
                 let h = (DoubleDouble::new(law.a) * (DoubleDouble::new(k) - critical)).high;
                 let (sum, c) = (inertia.high + law.a, k - weakening.high);
                 let expected = -0.5 * v * h / (sum * sum + c * inertia.high);
-                assert!((eigenvalues.growth_rate / expected - 1.0).abs() <= 1e-4 * (1.0 + 10.0 * share.abs() / 1e-6));
+                assert!(
+                    (eigenvalues.growth_rate / expected - 1.0).abs() <= 1e-4 * (1.0 + 10.0 * fraction.abs() / 1e-6)
+                );
             }
         }
     }
@@ -369,8 +371,8 @@ mod tests {
     fn velocities_beyond_the_critical_one_are_unstable() {
         let law = Law { a: 0.005, b: 0.01 };
         let critical = critical_velocity(law, 7.5e-3, 2.5e-16).expect("exists");
-        for (share, stable) in [(1.0 - 1e-12, true), (1.0 + 1e-12, false)] {
-            assert_eq!(SteadySliding::new(law, 7.5e-3, 2.5e-16, share * critical).is_stable(), stable);
+        for (fraction, stable) in [(1.0 - 1e-12, true), (1.0 + 1e-12, false)] {
+            assert_eq!(SteadySliding::new(law, 7.5e-3, 2.5e-16, fraction * critical).is_stable(), stable);
         }
         assert_eq!(critical_velocity(law, 7.5e-3, 0.0), None);
         assert_eq!(critical_velocity(law, 0.004, 1.0), None);

@@ -1,4 +1,4 @@
-//! Finite stiffness: whether steady sliding of a block on a spring is stable.
+//! A block on a spring of finite stiffness: stability of steady sliding, response to a velocity step, open-loop errors.
 
 mod driven;
 mod hopf;
@@ -11,11 +11,11 @@ pub use hopf::{Hopf, lyapunov_coefficient};
 pub use linear::{Eigenvalues, SteadySliding, critical_velocity};
 pub use sensitivity::amplification;
 
-/// What following a protocol open loop yields.
+/// Result of following a protocol open loop.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct OpenLoopResult {
-    /// The number asked for; `None` where there is none.
+    /// The requested number; `None` where there is none.
     pub number: Option<f64>,
-    /// Steps of the integration.
+    /// Number of steps of the integration.
     pub steps: u32,
 }

@@ -1,16 +1,15 @@
-//! How much a small error grows over a shortcut that runs open loop: the fundamental matrix of the linearised flow.
+//! Amplification of a small error over an open-loop shortcut: the fundamental matrix of the linearised flow.
 //!
-//! A shortcut is told to the spring as `v_c(t)`, so an error of the state obeys the equations of motion linearised
-//! about the protocol. In the scaled variables `q = ln v`, `y = ln theta` and `p = k s/a`, in each of which 1 is a
-//! change of the velocity by a factor of e,
+//! The load point follows `v_c(t)`, so an error of the state obeys the equations of motion linearised about the protocol.
+//! In the scaled variables `q = ln v`, `y = ln theta` and `p = k s/a`, in which 1 is a change by a factor of e,
 //!
 //! ```text
 //! dq' = kappa (dp - dq - (b/a) dy) - (v'/v) dq,    dy' = -dy/theta - v dq,    dp' = -(k/a) v dq,    kappa = a/(m v).
 //! ```
 //!
-//! Without mass `dq = dp - (b/a) dy` follows the other two. With a rigid spring `dq = 0` and `dp = (b/a) dy`, which
-//! leaves `dy' = -dy/theta`. The decay rate `kappa` spans many decades: collocation at the Radau nodes damps what is
-//! fast and follows what is slow.
+//! Without mass `dq = dp - (b/a) dy` follows the other two. With a rigid spring `dq = 0`, `dp = (b/a) dy` and
+//! `dy' = -dy/theta`. The decay rate `kappa` spans many decades: collocation at the Radau nodes damps fast modes and
+//! resolves slow ones.
 
 use nalgebra::{DMatrix, DVectorView, Matrix3};
 
@@ -20,12 +19,11 @@ use crate::protocol::compliant::CompliantPath;
 use crate::protocol::{Jet, SpringBlock};
 use crate::stability::OpenLoopResult;
 
-/// Largest factor by which a small error of the state at the start has grown at the end, both measured by the Euclidean
-/// norm of `(ln v, ln theta, k s/a)`, good to `rtol`, or fewer digits where it is far below 1: the largest singular
-/// value of the fundamental matrix. Where some of the three follow the others, the error at the start is one of those
-/// others alone, so that the limits `m -> 0` and `k -> inf` are reached.
+/// Amplification of a small error of the state from start to end: the largest singular value of the fundamental matrix.
 ///
-/// 0 below 1e-30. None where that takes more than 3,000 steps, the flow swinging too often, and beyond the range of doubles.
+/// The norm is the Euclidean norm of `(ln v, ln theta, k s/a)`. The accuracy is `rtol`, or fewer digits far below 1. Where
+/// some of the three variables follow the others, the initial error is in the others alone, which gives the limits
+/// `m -> 0` and `k -> inf`. 0 below 1e-30. `None` for more than 3,000 steps, and beyond the range of doubles.
 pub fn amplification(path: &CompliantPath, rtol: f64) -> OpenLoopResult {
     let mut steps = 0;
     let number = growth(path, rtol, &mut steps).filter(|growth| growth.is_finite());
@@ -33,8 +31,8 @@ pub fn amplification(path: &CompliantPath, rtol: f64) -> OpenLoopResult {
     OpenLoopResult { number, steps }
 }
 
-/// Amplification, factor, that is given, at least: about the square of the rounding of a double. Every step leaves rounding in the
-/// flow, which decays at the slowest rate from there on: a solution in high precision finds an error of 47 % at 1e-138.
+/// Amplification below which 0 is returned. Chosen: about the square of the rounding of a double. Rounding of a step decays
+/// at the slowest rate; measured against high precision, it makes an error of 47 % at 1e-138.
 const MIN_AMPLIFICATION: f64 = 1e-30;
 
 fn growth(path: &CompliantPath, rtol: f64, steps: &mut u32) -> Option<f64> {
@@ -46,7 +44,7 @@ fn growth(path: &CompliantPath, rtol: f64, steps: &mut u32) -> Option<f64> {
     }
     let states = if slider.m > 0.0 { 3 } else { 2 };
     let mut flow = DMatrix::identity(states, states);
-    let mut h = first(slider, &path.jet(0, 0.0));
+    let mut h = first_step(slider, &path.jet(0, 0.0));
     let tolerance = (1e-3 * rtol).max(1e-15);
     for panel in 0..path.panels() {
         let duration = path.panel_duration(panel);
@@ -58,7 +56,7 @@ fn growth(path: &CompliantPath, rtol: f64, steps: &mut u32) -> Option<f64> {
             *steps += 1;
             let to = if from + 1.0001 * h / duration >= 1.0 { 1.0 } else { from + h / duration };
             let (next, error) = step(path, panel, (from, to), &flow, rule)?;
-            // What the end lacks is of a higher order than what the nodes lack.
+            // The order of the error at the end is higher than that at the nodes.
             let error = error * error.sqrt();
             let change = 0.8 * sixteenth((tolerance / error.max(1e-30)).min(1e16));
             if error > tolerance {
@@ -71,20 +69,24 @@ fn growth(path: &CompliantPath, rtol: f64, steps: &mut u32) -> Option<f64> {
         }
     }
     if states == 2 {
-        // ln v follows.
+        // Row of ln v.
         let velocity = flow.row(1) - ratio * flow.row(0);
         flow = flow.insert_row(2, 0.0);
         flow.set_row(2, &velocity);
     }
-    // Without squares of what is large.
-    let size = flow.amax();
-    Some(if size == 0.0 || !size.is_finite() { size } else { size * (flow / size).singular_values().max() })
+    // Scaled, so that no square overflows.
+    let largest = flow.amax();
+    Some(if largest == 0.0 || !largest.is_finite() {
+        largest
+    } else {
+        largest * (flow / largest).singular_values().max()
+    })
 }
 
-/// Steps of a flow, at most. Chosen: those of some thousand swings.
+/// Steps of the linearised flow, at most. Chosen: enough for some thousand oscillations.
 const MAX_STEPS: u32 = 3_000;
 
-/// `exp(-int dt/theta)`, by which an error of `ln theta` decays under a given velocity.
+/// Decay of an error of `ln theta` under a given velocity, `exp(-int dt/theta)`.
 fn decay(path: &CompliantPath, rule: &Radau) -> f64 {
     let exponent = |panel| {
         let sum: f64 = rule.u.iter().zip(&rule.w).map(|(&u, w)| w / path.jet(panel, u).theta).sum();
@@ -93,19 +95,19 @@ fn decay(path: &CompliantPath, rule: &Radau) -> f64 {
     exp(-(0..path.panels()).map(exponent).sum::<f64>())
 }
 
-/// A first step: what the rates at the start allow.
-fn first(slider: &SpringBlock, jet: &Jet) -> f64 {
+/// First step, from the rates at the start, in `l/v_0`.
+fn first_step(slider: &SpringBlock, jet: &Jet) -> f64 {
     let v = jet.v[0];
     let swing = if slider.m > 0.0 { (slider.k / slider.m).sqrt().min(slider.law.a / slider.m / v) } else { 0.0 };
     1.0 / (swing + v * (1.0 + slider.k / slider.law.a) + 1.0 / jet.theta)
 }
 
-/// The root by which a step follows from an error.
+/// Sixteenth root: the change of a step for a change of its error.
 fn sixteenth(x: f64) -> f64 {
     x.sqrt().sqrt().sqrt().sqrt()
 }
 
-/// The flow after a step over a part of a panel, and the share of it that the nodes do not resolve.
+/// Flow after a step within a panel, and the relative error estimate of the nodes.
 fn step(
     path: &CompliantPath,
     panel: usize,
@@ -133,16 +135,16 @@ fn step(
     let next = values.rows((NODES - 1) * n, n).into_owned();
     let mut error = 0.0f64;
     for column in 0..n {
-        let size = length(&flow.column(column)).max(length(&next.column(column)));
+        let largest = length(&flow.column(column)).max(length(&next.column(column)));
         for i in 0..n {
             let change = |j: usize| (0..n).map(|c| rates[j][(i, c)] * values[(j * n + c, column)]).sum();
-            error = error.max(rule.unresolved(&std::array::from_fn(change)) / size);
+            error = error.max(rule.unresolved(&std::array::from_fn(change)) / largest);
         }
     }
     error.is_finite().then_some((next, error))
 }
 
-/// The linearised flow.
+/// Matrix of the linearised equations.
 fn rates(slider: &SpringBlock, jet: &Jet) -> Matrix3<f64> {
     let ratio = slider.law.b / slider.law.a;
     let v = jet.v[0];
@@ -157,8 +159,8 @@ fn rates(slider: &SpringBlock, jet: &Jet) -> Matrix3<f64> {
     }
 }
 
-/// The Euclidean norm, without squares of what is large.
+/// Euclidean norm, scaled against overflow.
 fn length(column: &DVectorView<'_, f64>) -> f64 {
-    let size = column.amax();
-    if size == 0.0 || !size.is_finite() { size } else { size * (column / size).norm() }
+    let largest = column.amax();
+    if largest == 0.0 || !largest.is_finite() { largest } else { largest * (column / largest).norm() }
 }

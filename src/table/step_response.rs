@@ -9,7 +9,7 @@ use super::{
 };
 use crate::grid::Quantity;
 use crate::model::Law;
-use crate::stability::step_response::{self, Outcome, Response, Simulation, Sustained};
+use crate::stability::step_response::{self, LimitCycle, Outcome, Response, Simulation};
 use crate::stability::{SteadySliding, lyapunov_coefficient};
 
 /// One row for each transition, stiffness and mass.
@@ -26,7 +26,7 @@ impl Row {
         self.response.as_ref().map_or(f64::NAN, number)
     }
 
-    fn cycle(&self, number: impl Fn(&Sustained) -> f64) -> f64 {
+    fn cycle(&self, number: impl Fn(&LimitCycle) -> f64) -> f64 {
         self.of_solution(|response| response.cycle.as_ref().map_or(f64::NAN, &number))
     }
 }

@@ -181,7 +181,7 @@ fn wrong_questions_are_answered_with_the_known_names() {
             correct,
         ),
         ("SELECT frobnicate(gap) FROM best_cubic", "unsupported function 'frobnicate'", correct),
-        ("", "not one statement", "write one SELECT"),
+        ("", "several statements, or none", "write one SELECT"),
         ("DROP TABLE best_cubic", "DROP is refused: `query` reads and never writes", "write one SELECT"),
     ] {
         let expected = (1, format!("error: {found}\n{tables}  help: {help}\n"));
@@ -223,7 +223,7 @@ fn wrong_paths_and_names() {
     let message =
         "error: results/test: no table `optima`\n  expected: optimal, best_cubic\n  help: did you mean `optimal`?\n";
     assert_eq!(refused(folder.path(), &["head", "results/test", "optima"]), (1, message.to_owned()));
-    let message = "error: x.pdf : the ending is none of .csv, .jsonl, .parquet, .txt: add --format\n";
+    let message = "error: --out x.pdf: the ending is none of .csv, .jsonl, .parquet, .txt\n  help: add --format\n";
     assert_eq!(
         refused(folder.path(), &["query", "results/test", "SELECT 1", "--out", "x.pdf"]),
         (1, message.to_owned())

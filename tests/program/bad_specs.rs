@@ -111,8 +111,8 @@ fn a_place_that_cannot_be_written() {
     fs::write(folder.path().join("good.toml"), GOOD).expect("is writable");
     fs::write(folder.path().join("file"), "").expect("is writable");
     let output = slipsweep(&["run", "good.toml", "--out", "file"], folder.path());
-    let message = "error: file/good/manifest.json: cannot read: Not a directory (os error 20)\n  help: fix that, then run the same \
-                   command again, which keeps what is finished; or write elsewhere with --out DIR\n";
+    let message = "error: file/good/manifest.json: cannot read: Not a directory (os error 20)\n  help: solve this and run the same \
+                   command again, which keeps finished parts; or write elsewhere with --out DIR\n";
     assert_eq!(String::from_utf8_lossy(&output.stderr), message);
     assert_eq!(output.status.code(), Some(2));
 }

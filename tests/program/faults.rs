@@ -93,9 +93,9 @@ fn damaged_and_missing_parts_are_made_again() {
     fs::remove_file(place.part("crossover", 0)).expect("is there");
 
     let output = slipsweep(folder.path()).args(["status", "test"]).output().expect("runs");
-    assert_eq!(said(&output), (Some(2), "incomplete: 2 of 4 parts there\n".to_owned()));
+    assert_eq!(said(&output), (Some(2), "incomplete: 2 of 4 parts are present\n".to_owned()));
     let output = slipsweep(folder.path()).args(["status", "test", "--check"]).output().expect("runs");
-    assert_eq!(said(&output), (Some(2), "incomplete: 1 of 4 parts there\n".to_owned()));
+    assert_eq!(said(&output), (Some(2), "incomplete: 1 of 4 parts are present\n".to_owned()));
     let text = String::from_utf8_lossy(&output.stdout).into_owned();
     assert!(text.contains("  test/gap/part-000000.parquet: its checksum does not match its bytes\n"), "{text}");
     assert!(text.contains("  test/optimal/part-000000.parquet: it is cut short or not Parquet: "), "{text}");
@@ -266,5 +266,5 @@ fn regress_what_is_no_file_is_never_waited_for() {
 }
 
 /// What `status` says of a manifest that is no file.
-const UNREADABLE: &str = "test/manifest.json: cannot read: it is not a file\n  help: fix that, then run the same command again, which keeps \
+const UNREADABLE: &str = "test/manifest.json: cannot read: it is not a file\n  help: solve this, then run the same command again, which keeps \
                           what is finished; or write elsewhere with --out DIR\n";

@@ -233,8 +233,8 @@ fn a_run_whose_dataset_is_taken_away_stops_there() {
     assert_eq!(
         stopped.to_string(),
         format!(
-            "{}: manifest.json was replaced by another one while this run was at work; it stopped there\n  help: run the same command \
-             again, which keeps what is finished",
+            "{}: manifest.json was replaced by another one during this run, which stopped\n  help: run the same command \
+             again; it keeps finished parts",
             place.path().display()
         )
     );

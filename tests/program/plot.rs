@@ -147,7 +147,7 @@ fn refusals(folder: &Path) {
     let with = |more: &[&str]| complaint(folder, &[&gap, more].concat());
     assert_eq!(
         with(&["--where", "t_f=0.03"]),
-        "error: --where t_f = 0.03: no row of the table `gap` is left\n  found: t_f = 0.02, 0.037\n  help: the \
+        "error: --where t_f = 0.03: no row of the table `gap` meets this\n  found: t_f = 0.02, 0.037\n  help: the \
          nearest rows have --where \"t_f=0.037\"\n"
     );
     let near = with(&["--where", "t_f=0.0200001, b=0.05"]);
@@ -189,7 +189,7 @@ fn the_wrong_kind_of_file_is_named_with_the_command_that_takes_it() {
     shown(folder, &[&["trace", "best_cubic", "--out", "best.csv"], &case[..]].concat());
     fs::write(folder.join("other.csv"), "a,b\n0,1\n").expect("is writable");
     let spec = "a spec, not a dataset";
-    let run = "help: `slipsweep run tiny.toml` computes the dataset results/tiny: name that\n";
+    let run = "help: `slipsweep run tiny.toml` computes the dataset results/tiny; name that folder\n";
     for command in ["plot", "report", "summary", "head", "status", "verify"] {
         let said = complaint(folder, &[command, "tiny.toml"]);
         assert!(said.contains(spec) && said.ends_with(run), "{command}: {said}");

@@ -180,10 +180,7 @@ fn wrong_arguments_get_one_clear_message() {
         ),
         (&[&["optimal", "--points", "1"], UP], "error: invalid value '1' for '--points <N>': 1 is not in 2..=10000000"),
         (&[&["optimum"], UP], "error: invalid value 'optimum' for '<PROTOCOL|DATASET>'"),
-        (
-            &[&["optimal", "--out", "x.dat"], UP],
-            "error: x.dat : the ending is none of .csv, .parquet, .txt: add --format",
-        ),
+        (&[&["optimal", "--out", "x.dat"], UP], "error: --out x.dat: the ending is none of .csv, .parquet, .txt"),
     ];
     for (arguments, expected) in cases {
         assert_eq!(complaint(arguments), (Some(1), expected.to_owned()));
@@ -428,7 +425,10 @@ fn a_row_without_a_path_says_why() {
         (&["optimal", "--where", "t_g=7"], "error: --where: `optimal` has no column `t_g`\n"),
         (&["optimol", "--row", "1"], "error: results/rows: no table `optimol`\n"),
         (&["crossover", "--row", "0"], "error: a row of table `crossover` has no path over time\n"),
-        (&["optimal", "--row", "0", "--a", "0.1"], "error: --a: the row of a dataset has its own\n"),
+        (
+            &["optimal", "--row", "0", "--a", "0.1"],
+            "error: --a: not for a row of a dataset, which has its own parameters\n",
+        ),
     ];
     for (arguments, expected) in cases {
         let found = complaint(arguments);

@@ -7,7 +7,7 @@ use slipsweep::model::{Law, Transition};
 use slipsweep::protocol::Status;
 use slipsweep::stability::SteadySliding;
 use slipsweep::stability::lyapunov_coefficient;
-use slipsweep::stability::step_response::{Orbit, Outcome, Response, Step, Sustained};
+use slipsweep::stability::step_response::{LimitCycle, Orbit, Outcome, Response, Step};
 
 const PAPER: Law = Law { a: 0.005, b: 0.01 };
 const V_F: f64 = 3.2e6;
@@ -62,7 +62,7 @@ fn reference_first_peaks() {
             let peak = loop {
                 let cycle = orbit.cycle(false, &mut budget).expect("goes on");
                 if let [_, Some(high)] = cycle.extrema {
-                    break orbit.polished(high);
+                    break orbit.refined(high);
                 }
             };
             let (x, t) = (row.number("v_peak").ln(), row.number("t_peak"));
@@ -486,7 +486,7 @@ fn every_outcome_of_a_random_sample_is_decided() {
 
 /// Asserts that what both of two responses determine agrees to `rtol`, and counts it.
 fn compare(step: &Step, both: [Response; 2], rtol: f64, compared: &mut [usize; 6]) {
-    let cycle = |of: fn(Sustained) -> f64| both.map(|response| response.cycle.map_or(f64::NAN, of));
+    let cycle = |of: fn(LimitCycle) -> f64| both.map(|response| response.cycle.map_or(f64::NAN, of));
     let time = |of: fn(&Response) -> Option<f64>| both.map(|response| of(&response).unwrap_or(f64::NAN));
     let flat = 1.0 / (both[1].v_peak / step.transition.v_f - 1.0).min(1.0);
     let numbers = [

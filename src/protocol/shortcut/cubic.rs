@@ -1,4 +1,4 @@
-//! `cubic`: theta is the cubic in time along which v is continuous at both ends.
+//! `cubic`: theta is the cubic in time for which `v` is continuous at both ends.
 //!
 //! With `x = t/t_f`, `z = 1 - x` and `rise = 1/v_f - 1/v_i`: `theta = 1/v_i + rise (3 x^2 - 2 x^3)` and `n = t_f (1 -
 //! theta') = t_f - 6 rise x z`, so `v = n/(t_f theta)`. It is the shortcut `alpha_2 = 0`, `alpha_3 t_f^2 = 3 rise` of
@@ -13,7 +13,7 @@ use crate::numerics::polynomial::roots_between;
 use crate::protocol::cubic::{Landscape, LandscapeBuffers, rise};
 use crate::protocol::{Moment, Motion, SolverStats, Status};
 
-/// The family.
+/// The family `cubic`.
 pub struct Cubic;
 
 impl Family for Cubic {
@@ -52,18 +52,18 @@ impl Family for Cubic {
 
     fn motion(&self, case: &Case, _rtol: f64) -> Result<Box<dyn Motion>, Obstacle> {
         let curve = Curve::new(case)?;
-        Ok(Box::new(Trace { curve, stops: curve.stops() }))
+        Ok(Box::new(CubicMotion { curve, breakpoints: curve.breakpoints() }))
     }
 }
 
-/// The end from which a place is measured.
+/// End of the protocol from which a distance is measured.
 #[derive(Debug, Clone, Copy, PartialEq)]
-enum Side {
+enum ProtocolEnd {
     Start,
     End,
 }
 
-/// The one member.
+/// The only member of the family.
 #[derive(Debug, Clone, Copy)]
 struct Curve {
     law: Law,
@@ -93,10 +93,10 @@ impl Curve {
         Ok(Curve { law, t_f, v_i, v_f, theta_i: 1.0 / v_i, theta_f: 1.0 / v_f, rise: rise.high, waist })
     }
 
-    /// Work from the landscape, of which this is one point.
+    /// Work from the landscape: one point of it.
     fn work(&self, case: &Case, rtol: f64, stats: &mut SolverStats) -> Result<f64, Obstacle> {
         if self.v_i == self.v_f {
-            return Ok(self.friction(Side::Start, 0.0) * self.v_i * self.t_f);
+            return Ok(self.friction(ProtocolEnd::Start, 0.0) * self.v_i * self.t_f);
         }
         let (mut work, mut status) = ([0.0], [Status::Infeasible]);
         let spent = Landscape::new(&case.transition, self.t_f, rtol).evaluate(
@@ -109,16 +109,16 @@ impl Curve {
         if status[0] == Status::Infeasible { Err(Obstacle::Velocity) } else { Ok(work[0]) }
     }
 
-    fn theta(&self, side: Side, d: f64) -> f64 {
+    fn theta(&self, side: ProtocolEnd, d: f64) -> f64 {
         match side {
-            Side::Start => self.theta_i + self.rise * d * d * (3.0 - 2.0 * d),
-            Side::End => self.theta_f - self.rise * d * d * (3.0 - 2.0 * d),
+            ProtocolEnd::Start => self.theta_i + self.rise * d * d * (3.0 - 2.0 * d),
+            ProtocolEnd::End => self.theta_f - self.rise * d * d * (3.0 - 2.0 * d),
         }
     }
 
-    fn velocity(&self, side: Side, d: f64) -> f64 {
+    fn velocity(&self, side: ProtocolEnd, d: f64) -> f64 {
         if d == 0.0 || self.rise == 0.0 {
-            return if side == Side::Start { self.v_i } else { self.v_f };
+            return if side == ProtocolEnd::Start { self.v_i } else { self.v_f };
         }
         let n = if self.rise > 0.0 {
             let y = 0.5 - d;
@@ -129,73 +129,72 @@ impl Curve {
         n / (self.t_f * self.theta(side, d))
     }
 
-    fn friction(&self, side: Side, d: f64) -> f64 {
+    fn friction(&self, side: ProtocolEnd, d: f64) -> f64 {
         1.0 + self.law.a * ln(self.velocity(side, d)) + self.law.b * ln(self.theta(side, d))
     }
 
-    /// The ends and the places between them where `p ln n + q ln theta` is stationary: where `-p (1 - 2 x) theta + q x
-    /// z n = 0`.
-    fn extrema(&self, p: f64, q: f64) -> Vec<(Side, f64)> {
+    /// The ends and the stationary points of `p ln n + q ln theta`, which are roots of `-p (1 - 2 x) theta + q x z n`.
+    fn extrema(&self, p: f64, q: f64) -> Vec<(ProtocolEnd, f64)> {
         let Curve { t_f, rise, .. } = *self;
         let mut places = Vec::with_capacity(8);
-        for (side, start) in [(Side::Start, -p * self.theta_i), (Side::End, p * self.theta_f)] {
+        for (side, start) in [(ProtocolEnd::Start, -p * self.theta_i), (ProtocolEnd::End, p * self.theta_f)] {
             let mixed = rise * (2.0 * p + 3.0 * q);
             let square = -3.0 * p * rise - q * t_f - 6.0 * q * rise;
             let c = [start, q * t_f - 2.0 * start, square, 4.0 * mixed, -2.0 * mixed];
             places.push((side, 0.0));
             places.extend(roots_between(&c, 0.0, 0.5).into_iter().map(|d| (side, d)));
         }
-        places.push((Side::Start, 0.5));
+        places.push((ProtocolEnd::Start, 0.5));
         places
     }
 
-    /// The places between which nothing is much narrower than their distance, in the order of time: they double from
-    /// the ends, on the scales on which `n` and theta leave their end values.
-    fn stops(&self) -> Vec<(Side, f64)> {
+    /// Breakpoints in the order of time; the curve is smooth on the scale of their distance. Distances double from the
+    /// ends, from the scales on which `n` and theta leave their end values.
+    fn breakpoints(&self) -> Vec<(ProtocolEnd, f64)> {
         let steepest = 6.0 * self.rise.abs();
         let doubling = |theta: f64| {
-            let grain = (2.0 * theta / steepest).sqrt().min(self.t_f / steepest).min(COARSEST);
+            let grain = (2.0 * theta / steepest).sqrt().min(self.t_f / steepest).min(MAX_FIRST_DISTANCE);
             std::iter::successors(Some(grain), |d| Some(2.0 * d)).take_while(|&d| d < 0.4)
         };
-        let mut stops = vec![(Side::Start, 0.0)];
-        stops.extend(doubling(self.theta_i).map(|d| (Side::Start, d)));
-        stops.push((Side::Start, 0.5));
-        let mut last: Vec<_> = doubling(self.theta_f).map(|d| (Side::End, d)).collect();
+        let mut breakpoints = vec![(ProtocolEnd::Start, 0.0)];
+        breakpoints.extend(doubling(self.theta_i).map(|d| (ProtocolEnd::Start, d)));
+        breakpoints.push((ProtocolEnd::Start, 0.5));
+        let mut last: Vec<_> = doubling(self.theta_f).map(|d| (ProtocolEnd::End, d)).collect();
         last.reverse();
-        stops.extend(last);
-        stops.push((Side::End, 0.0));
-        stops
+        breakpoints.extend(last);
+        breakpoints.push((ProtocolEnd::End, 0.0));
+        breakpoints
     }
 }
 
-/// Distance from the ends of the first stops, at most.
-const COARSEST: f64 = 0.125;
+/// Distance of the first breakpoint from an end, in units of `t_f`, at most. Chosen.
+const MAX_FIRST_DISTANCE: f64 = 0.125;
 
-/// The motion: pieces of equal length in the parameter `s` between the stops.
-struct Trace {
+/// The member as a motion: the breakpoints are equidistant in the parameter `s`.
+struct CubicMotion {
     curve: Curve,
-    stops: Vec<(Side, f64)>,
+    breakpoints: Vec<(ProtocolEnd, f64)>,
 }
 
-impl Motion for Trace {
+impl Motion for CubicMotion {
     fn duration(&self) -> f64 {
         self.curve.t_f
     }
 
     fn landmarks(&self) -> Vec<f64> {
-        let pieces = self.stops.len() - 1;
+        let pieces = self.breakpoints.len() - 1;
         (0..=pieces).map(|k| k as f64 / pieces as f64).collect()
     }
 
     fn at(&self, s: f64) -> Moment {
-        let pieces = self.stops.len() - 1;
+        let pieces = self.breakpoints.len() - 1;
         let along = s.clamp(0.0, 1.0) * pieces as f64;
         let k = (along as usize).min(pieces - 1);
-        let ((_, from), (side, to)) = (self.stops[k], self.stops[k + 1]);
-        // The middle is a stop from the start, and as far from the end.
-        let share = along - k as f64;
-        let d = from * (1.0 - share) + to * share;
-        let x = if side == Side::Start { d } else { 1.0 - d };
+        let ((_, from), (side, to)) = (self.breakpoints[k], self.breakpoints[k + 1]);
+        // The middle is a breakpoint at equal distance from both ends.
+        let fraction = along - k as f64;
+        let d = from * (1.0 - fraction) + to * fraction;
+        let x = if side == ProtocolEnd::Start { d } else { 1.0 - d };
         Moment {
             t: self.curve.t_f * x,
             v: self.curve.velocity(side, d),

@@ -1,4 +1,4 @@
-//! The shortcut families of the rigid limit: one file each, and a line in [`FAMILIES`].
+//! The shortcut families of the rigid limit, one file each; [`FAMILIES`] lists them.
 //!
 //! All but `step` lead from steady sliding at `v_i` to steady sliding at `v_f` within `t_f`.
 
@@ -12,50 +12,50 @@ use std::fmt;
 use super::{Motion, SolverStats, Status};
 use crate::model::Transition;
 
-/// What a family is asked for.
+/// Transition, duration and bound that a member of a family solves.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Case {
-    /// From where to where.
+    /// Initial and final velocity, and the friction law.
     pub transition: Transition,
     /// Duration, `t_f > 0`.
     pub t_f: f64,
-    /// Bound on friction `tau_M`; only `bounded_friction` heeds it.
+    /// Bound on friction `tau_M`, in `mu_0 sigma`; only `bounded_friction` uses it.
     pub tau_ceiling: f64,
 }
 
-/// A member of a family that solves a [`Case`], every number to the requested relative accuracy.
+/// Member of a family that solves a [`Case`]. Every number has the requested relative accuracy.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Shortcut {
-    /// The parameter of the family; `None` for a family without.
+    /// Parameter of the family; `None` for a family without parameter.
     pub alpha: Option<f64>,
     /// Work of friction, `int tau v dt`.
     pub work: f64,
-    /// Least velocity on the open interval `(0, t_f)`, that is, without what lies before and after a jump.
+    /// Least velocity on the open interval `(0, t_f)`, without the values before and after a jump.
     pub v_min: f64,
     /// Greatest velocity there.
     pub v_max: f64,
     /// Greatest friction there.
     pub friction_max: f64,
-    /// Least friction there, or a lower bound of it that is not below 0.
+    /// Least friction there, or a nonnegative lower bound of it.
     pub friction_min: f64,
-    /// Relative distance from the target at `t_f`, `theta(t_f) v_f - 1`; 0 for a family that arrives.
+    /// Relative deviation of theta from the target at `t_f`, `theta(t_f) v_f - 1`; 0 for a family that arrives.
     pub miss: f64,
 }
 
 impl Shortcut {
-    /// `Ok`, or `BelowBound` or `NegativeFriction` where it leaves the range of the friction law.
+    /// Status `Ok`, or `BelowBound` or `NegativeFriction` outside the range of the friction law.
     pub fn status(&self) -> Status {
         let status = if self.v_min < 1.0 { Status::BelowBound } else { Status::Ok };
         status.with_friction(self.friction_min)
     }
 }
 
-/// Why a family has no member for a case, or none that could be certified.
+/// Reason why a family has no certified member for a case.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Obstacle {
     /// An argument outside its domain: `a > 0`, `b >= 0`, `t_f > 0`, `v_i, v_f >= 1`, all finite.
     Domain,
-    /// No protocol with `v >= 1` is fast enough: `t_f` is not above `t_min`.
+    /// `t_f` is not above `t_min`: no protocol with `v >= 1` is fast enough.
     Time {
         /// The least duration under `v >= 1`.
         t_min: f64,
@@ -69,17 +69,17 @@ pub enum Obstacle {
         /// The greater friction of the two ends.
         friction: f64,
     },
-    /// Even friction at `tau_ceiling` throughout does not get there in this time.
+    /// Friction at `tau_ceiling` throughout does not arrive within `t_f`.
     Friction,
-    /// A defect of ours: the answer could not be certified.
+    /// A defect of the program: the answer could not be certified.
     NotConverged,
 }
 
 impl Obstacle {
-    /// Every name, in the order of [`Obstacle::code`].
+    /// Names, in the order of [`Obstacle::code`].
     pub const NAMES: [&'static str; 5] = ["domain", "time", "velocity", "friction", "not_converged"];
 
-    /// Which bound it is: an index into [`Obstacle::NAMES`].
+    /// Index of the violated bound in [`Obstacle::NAMES`].
     pub fn code(self) -> usize {
         match self {
             Obstacle::Domain => 0,
@@ -111,25 +111,25 @@ impl fmt::Display for Obstacle {
                 write!(f, "tau_ceiling must be above the friction of both ends, {friction}")
             }
             Obstacle::Friction => {
-                f.write_str("tau_ceiling is too low for this time: not even tau = tau_ceiling gets there")
+                f.write_str("tau_ceiling is too low for this time: tau = tau_ceiling throughout does not arrive")
             }
-            Obstacle::NotConverged => f.write_str("the solver could not certify its answer (a defect of ours)"),
+            Obstacle::NotConverged => f.write_str("the solver could not certify its answer (a defect of slipsweep)"),
         }
     }
 }
 
 /// A family of shortcuts.
 pub trait Family: Sync {
-    /// Its name in specs and tables.
+    /// Name in specs and tables.
     fn name(&self) -> &'static str;
 
-    /// What it is, in one line.
+    /// Description in one line.
     fn doc(&self) -> &'static str;
 
-    /// What its parameter is, in one line; `None` for a family without.
+    /// Definition of the parameter in one line; `None` for a family without parameter.
     fn alpha(&self) -> Option<&'static str>;
 
-    /// Whether it heeds `tau_ceiling`.
+    /// Whether `tau_ceiling` bounds the friction of the family.
     fn uses_tau_ceiling(&self) -> bool {
         false
     }
@@ -139,14 +139,22 @@ pub trait Family: Sync {
         true
     }
 
-    /// The member that solves `case`, every number good to `rtol`; adds to `stats`.
+    /// Member that solves `case`, every number to the relative tolerance `rtol`; adds to `stats`.
+    ///
+    /// # Errors
+    ///
+    /// The [`Obstacle`] where the family has no certified member.
     fn solve(&self, case: &Case, rtol: f64, stats: &mut SolverStats) -> Result<Shortcut, Obstacle>;
 
-    /// The motion of that member.
+    /// Motion of that member.
+    ///
+    /// # Errors
+    ///
+    /// The [`Obstacle`] where the family has no certified member.
     fn motion(&self, case: &Case, rtol: f64) -> Result<Box<dyn Motion>, Obstacle>;
 }
 
-/// Every family, in the order in which they are listed.
+/// All families, in the order in which they are listed.
 pub const FAMILIES: [&dyn Family; 4] =
     [&step::Step, &cubic::Cubic, &bounded_velocity::BoundedVelocity, &bounded_friction::BoundedFriction];
 

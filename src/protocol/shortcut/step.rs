@@ -1,7 +1,7 @@
 //! `step`: the velocity jumps to `v_f` and stays there.
 //!
-//! With `p = v_f t` and `k = v_f/v_i - 1` the contact lifetime is `theta = (1 + k e^-p)/v_f`, so all numbers are in
-//! closed form; the work holds `int ln(1 + k e^-p) dp`, a difference of two dilogarithms.
+//! With `p = v_f t` and `k = v_f/v_i - 1` the contact lifetime is `theta = (1 + k e^-p)/v_f`, so all numbers have a
+//! closed form. The work contains `int ln(1 + k e^-p) dp`, a difference of two dilogarithms.
 
 use super::{Case, Family, Obstacle, Shortcut};
 use crate::model::Law;
@@ -10,7 +10,7 @@ use crate::numerics::elementary::{exp, exp_m1, ln, ln_1p};
 use crate::numerics::gauss::rule;
 use crate::protocol::{Moment, Motion, SolverStats};
 
-/// The family.
+/// The family `step`.
 pub struct Step;
 
 impl Family for Step {
@@ -35,7 +35,7 @@ impl Family for Step {
         stats.quadratures += 1;
         let end = v_f * t_f;
         let steady = 1.0 + (law.a - law.b) * ln(v_f);
-        // Theta falls or rises all the way.
+        // Theta is monotone.
         let ratios = [decay.ln_at(0.0), decay.ln_at(end)];
         Ok(Shortcut {
             alpha: None,
@@ -53,7 +53,7 @@ impl Family for Step {
     }
 }
 
-/// The motion: theta relaxes at constant velocity.
+/// The member as a motion: theta relaxes at constant velocity.
 #[derive(Debug, Clone, Copy)]
 struct Relaxation {
     law: Law,
@@ -72,20 +72,20 @@ impl Relaxation {
         Ok(Relaxation { law, v_f, t_f, decay: Decay { k: (v_f - v_i) / v_i, ratio: v_f / v_i } })
     }
 
-    /// The finest detail in `p`: theta grows from nothing within the ratio of the velocities.
-    fn grain(&self) -> f64 {
+    /// Finest scale in `p`: theta grows within the ratio of the velocities.
+    fn finest_scale(&self) -> f64 {
         self.decay.ratio.min(1.0)
     }
 
-    /// `p` at `s`; geometric from the grain on.
+    /// `p` at `s`; geometric beyond the finest scale.
     fn stretched(&self, s: f64) -> f64 {
-        let grain = self.grain();
-        grain * exp_m1(s * ln_1p(self.v_f * self.t_f / grain))
+        let finest_scale = self.finest_scale();
+        finest_scale * exp_m1(s * ln_1p(self.v_f * self.t_f / finest_scale))
     }
 }
 
-/// Where `e^-p` has vanished beside 1.
-const SETTLED: f64 = 37.0;
+/// `p` at which `e^-p` is below the rounding of 1. Derived: `37 > 53 ln 2`.
+const RELAXED_P: f64 = 37.0;
 
 impl Motion for Relaxation {
     fn duration(&self) -> f64 {
@@ -93,14 +93,14 @@ impl Motion for Relaxation {
     }
 
     fn landmarks(&self) -> Vec<f64> {
-        let (end, grain) = (self.v_f * self.t_f, self.grain());
-        let settled = SETTLED + ln_1p(self.decay.k.max(0.0));
+        let (end, finest_scale) = (self.v_f * self.t_f, self.finest_scale());
+        let relaxed = RELAXED_P + ln_1p(self.decay.k.max(0.0));
         let mut places = vec![0.0];
-        let mut p = grain;
-        while p < 0.9 * end && places.len() < MOST_LANDMARKS {
-            places.push(ln_1p(p / grain) / ln_1p(end / grain));
-            // Doubling, but never more than one unit as long as theta relaxes.
-            p += if p < settled { p.min(1.0) } else { p };
+        let mut p = finest_scale;
+        while p < 0.9 * end && places.len() < MAX_LANDMARKS {
+            places.push(ln_1p(p / finest_scale) / ln_1p(end / finest_scale));
+            // Steps double, but are at most 1 while theta relaxes.
+            p += if p < relaxed { p.min(1.0) } else { p };
         }
         places.push(1.0);
         places
@@ -122,10 +122,10 @@ impl Motion for Relaxation {
     }
 }
 
-/// More landmarks than a time of 1e300 takes.
-const MOST_LANDMARKS: usize = 1200;
+/// Landmarks, at most. Chosen: more than a time of 1e300 takes.
+const MAX_LANDMARKS: usize = 1200;
 
-/// `1 + k e^-p`, where `k = ratio - 1 > -1`.
+/// Relaxation of theta, `1 + k e^-p`, where `k = ratio - 1 > -1`.
 #[derive(Debug, Clone, Copy)]
 struct Decay {
     k: f64,
@@ -133,19 +133,19 @@ struct Decay {
 }
 
 impl Decay {
-    /// `1 + k e^-p`, without cancellation.
+    /// Value `1 + k e^-p`, without cancellation.
     fn at(&self, p: f64) -> f64 {
         // ratio e^-p + (1 - e^-p): both terms positive.
         self.ratio * exp(-p) - exp_m1(-p)
     }
 
-    /// `ln(1 + k e^-p)`, also where it is near 0.
+    /// `ln(1 + k e^-p)`, accurate near 0.
     fn ln_at(&self, p: f64) -> f64 {
         let change = self.k * exp(-p);
         if change > -0.5 { ln_1p(change) } else { ln(self.at(p)) }
     }
 
-    /// `int_0^end ln(1 + k e^-p) dp = Li_2(-k e^-end) - Li_2(-k)`, to a few units in the last place.
+    /// Integral `int_0^end ln(1 + k e^-p) dp = Li_2(-k e^-end) - Li_2(-k)`, to a few units in the last place.
     fn integral(&self, end: f64) -> f64 {
         let Decay { k, ratio } = *self;
         // Distance of the singularity 1 + k e^-p = 0 from the start; it is complex for k > 0.
@@ -156,8 +156,8 @@ impl Decay {
         } else {
             -ln(-k)
         };
-        if end <= gap.min(SHORT) {
-            // The dilogarithms would cancel. The singularity is at least a length away: 5.8^-32 is left.
+        if end <= gap.min(MAX_GAUSS_P) {
+            // The dilogarithms would cancel. The singularity is at least `end` away: the error is 5.8^-32.
             let rule = rule(16);
             let weigh = |(x, w): (&f64, &f64)| w * self.ln_at(0.5 * end * (1.0 + x));
             0.5 * end * rule.x.iter().zip(&rule.w).map(weigh).sum::<f64>()
@@ -171,5 +171,5 @@ impl Decay {
     }
 }
 
-/// Below it Gauss' rule takes the whole integral.
-const SHORT: f64 = 2.0;
+/// `p` at the end below which a Gauss rule gives the whole integral. Chosen.
+const MAX_GAUSS_P: f64 = 2.0;

@@ -1,123 +1,125 @@
-//! Cycles that hardly change: the return map of the section `v = v_f`, its fixed points, and leaps over many of its steps.
+//! Envelope following: the return map of the section `v = v_f`, its fixed points, and steps over many cycles.
 //!
-//! With `q = (ln z, y)` on the section, the map is `q -> q + g(q)`. Its fixed points are the limit cycles; Newton's method
-//! finds one, and its Floquet multipliers, the eigenvalues of `1 + dg/dq`, tell whether it attracts.
+//! With `q = (ln z, y)` on the section, the return map is `q -> q + g(q)`. Its fixed points are the limit cycles. Newton's
+//! method finds them; their Floquet multipliers, the eigenvalues of `1 + dg/dq`, decide whether they attract.
 //!
-//! A leap over `n` cycles (multirevolution collocation; Calvo, Jay, Montijano and Rández, Appl. Numer. Math. 51, 2004) is a
-//! polynomial `p(j)` in the number of cycles with
+//! An envelope step over `n` cycles (multirevolution collocation; Calvo, Jay, Montijano and Rández, Appl. Numer. Math. 51,
+//! 2004) is a polynomial `p(j)` in the number of cycles with
 //!
 //! ```text
 //! p(j_i + 1/2) - p(j_i - 1/2) = g(p(j_i - 1/2)),    j_i = c_i n,
 //! ```
 //!
-//! `c_i` the nodes of Radau IIA. It is implicit, so a contact lifetime that relaxes in a few cycles limits no leap.
+//! `c_i` the nodes of Radau IIA. It is implicit, so relaxation of theta in a few cycles does not limit its length.
 
 use nalgebra::{Matrix2, SMatrix, SVector, Vector2};
 
 use super::long_term::{Follower, excess};
-use super::orbit::{Orbit, Stop};
-use super::scaled_block::Place;
+use super::orbit::{Orbit, StopReason};
+use super::scaled_block::SectionPoint;
 use crate::numerics::elementary::{exp, ln, ln_1p};
 use crate::numerics::root::crossing;
 use crate::numerics::stiff::radau_iia_9;
 
-/// A cycle from the section to itself.
+/// One step of the return map.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Lap {
-    pub from: Place,
-    /// `g`.
-    pub change: Place,
+pub(super) struct MapStep {
+    pub from: SectionPoint,
+    /// Change of the section point, `g`.
+    pub change: SectionPoint,
     pub period: f64,
-    /// `ln(v/v_f)` at its slowest and fastest.
+    /// Least and greatest `ln(v/v_f)`.
     pub range: [f64; 2],
-    /// Error of its steps.
+    /// Error of the integration steps.
     pub tolerance: f64,
 }
 
-/// A fixed point of the return map.
+/// Fixed point of the return map.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Fixed {
-    pub lap: Lap,
-    /// Whether places near it come to it from one side, so that none overshoots.
+pub(super) struct FixedPoint {
+    pub map_step: MapStep,
+    /// Whether nearby points approach it from one side, without overshoot.
     pub monotone: bool,
-    /// How far the response was from it when it was found.
-    pub missed: f64,
+    /// Distance of the response from it in the first iteration.
+    pub first_distance: f64,
 }
 
-/// What leaps led to.
-pub(super) enum Leapt {
-    /// The response comes to this limit cycle.
-    Cycle(Fixed),
-    /// It is here after some time; cycles change fast, or come into the band of settled velocities.
-    At { place: Place, time: f64 },
-    /// Cycles have to be followed one by one.
-    Nowhere,
+/// Result of envelope following.
+pub(super) enum EnvelopeResult {
+    /// The response converges to this limit cycle.
+    Cycle(FixedPoint),
+    /// Section point after some time, where cycles change fast, or enter the band of settled velocities.
+    At { section_point: SectionPoint, time: f64 },
+    /// Cycles do not change slowly.
+    NotSlow,
 }
 
-/// Stages of a leap, and the numbers of its system.
+/// Stages of an envelope step, and unknowns of its system.
 const S: usize = 5;
 const SYSTEM: usize = 2 * S;
 
-/// Width of a limit cycle, in `ln v`, at least. Chosen: ten times the motion that rounding of the force makes in the physical domain.
+/// Width of a limit cycle, in `ln v`, at least. Chosen: ten times the motion by rounding of the force in the physical
+/// domain.
 const MIN_CYCLE: f64 = 1e-7;
 
-/// Error of the slowest moment of a limit cycle, in units of `rtol`, at most; beyond it the moment is unknown. Chosen: two runs then
-/// still agree on it.
+/// Error of the least velocity of a limit cycle, in units of `rtol`, at most; above it the velocity is unknown. Chosen: two
+/// runs still agree.
 const TROUGH_ERROR: f64 = 0.3;
 
-/// Difference of places for the derivative of the map: the power 1/3 of the error of a lap at rtol 1e-6.
-pub(super) const NUDGE: f64 = 1e-3;
+/// Difference of section points for the derivative of the map. Derived: the power 1/3 of the error of a cycle at `rtol`
+/// 1e-6.
+pub(super) const DIFFERENCE_STEP: f64 = 1e-3;
 
-/// Least error of a step. Its rounding, 50 units in the last place.
-pub(super) const FINEST: f64 = 1e-14;
+/// Error of a step, at least. Derived: its rounding, 50 units in the last place.
+pub(super) const MIN_STEP_ERROR: f64 = 1e-14;
 
-/// Distance in `q` within which the map is nearly linear. Chosen: Newton's method then gains a digit a step.
-const LINEAR: f64 = 0.1;
+/// Distance in `q` within which the map is nearly linear. Chosen: Newton's method gains a digit a step there.
+const NEWTON_RADIUS: f64 = 0.1;
 
-/// Cycles that a leap skips, at least. Chosen: it takes about as many laps.
+/// Cycles of an envelope step, at least. Chosen: it integrates about as many.
 const MIN_SKIPPED: f64 = 20.0;
 
-/// Iterations of Newton's method, at most. Chosen: it takes four to eight.
+/// Newton iterations, at most. Chosen: four to eight are typical.
 const MAX_ITERATIONS: u32 = 16;
 
-/// Steps of a lap, at most. Chosen: ten times those of a deep slip at the tightest tolerance.
-const MAX_LAP_STEPS: u32 = 3000;
+/// Integration steps of a cycle, at most. Chosen: ten times those of a deep slip at the tightest tolerance.
+const MAX_CYCLE_STEPS: u32 = 3000;
 
-/// Factor by which the least error of a step grows where steps only follow rounding. Chosen: one try then is enough.
+/// Factor of the least error of a step where steps resolve rounding only. Chosen: one increase suffices.
 const COARSENING: f64 = 1e3;
 
-/// Tries of a leap, at most. Chosen: each is a quarter to a fifth as long as the last.
+/// Attempts of an envelope step, at most. Chosen: each is a quarter to a fifth as long as the last.
 const MAX_TRIES: u32 = 3;
 
-/// Leaps of a response, at most. Chosen: each grows by up to four, so that more belong to no response that is decided.
-const MAX_LEAPS: u32 = 200;
+/// Envelope steps of a response, at most. Chosen: each grows by a factor of up to four; more decide no response.
+const MAX_ENVELOPE_STEPS: u32 = 200;
 
-/// Change of `q` in a leap, at most. Chosen: its derivative is that at the start.
-const MAX_LEAP: f64 = 2.0;
+/// Change of `q` in an envelope step, at most. Chosen: its Jacobian is that at the start.
+const MAX_ENVELOPE_CHANGE: f64 = 2.0;
 
-struct Leap {
+struct EnvelopeStep {
     /// Changes of `w` and of `y` relative to `e^w` at the nodes.
     change: [[f64; S]; 2],
-    laps: [Lap; S],
+    map_steps: [MapStep; S],
 }
 
-/// The polynomials that are 1 at one node and 0 at the others and at 0, at `u`.
+/// Values at `u` of the polynomials that are 1 at one node and 0 at the others and at 0.
 fn basis(u: f64) -> [f64; S] {
     let powers = &radau_iia_9().powers;
     std::array::from_fn(|j| (0..S).rev().fold(0.0, |sum, k| (sum + powers[k][j]) * u))
 }
 
-/// A place with `y` relative to `e^w`, which small motions keep, in units of that at the start of a leap.
-fn relative([w, y]: Place, start: &Lap) -> Place {
+/// Section point with `y` relative to `e^w`, which small motions conserve, in units of `e^w` at the start.
+fn relative([w, y]: SectionPoint, start: &MapStep) -> SectionPoint {
     [w, y * exp(start.from[0] - w)]
 }
 
-/// The place that is so.
-fn absolute([w, y]: Place, start: &Lap) -> Place {
+/// Section point of relative coordinates.
+fn absolute([w, y]: SectionPoint, start: &MapStep) -> SectionPoint {
     [w, y * exp(w - start.from[0])]
 }
 
-fn sum([w, y]: Place, [by_w, by_y]: Place) -> Place {
+fn sum([w, y]: SectionPoint, [by_w, by_y]: SectionPoint) -> SectionPoint {
     [w + by_w, y + by_y]
 }
 
@@ -125,165 +127,190 @@ fn dot(weights: &[f64; S], values: &[f64; S]) -> f64 {
     weights.iter().zip(values).map(|(weight, value)| weight * value).sum()
 }
 
-/// `x` with `matrix x = right`; `None` where the matrix is singular.
-fn solve(matrix: Matrix2<f64>, right: Place) -> Option<Place> {
+/// Solution `x` of `matrix x = right`; `None` where the matrix is singular.
+fn solve(matrix: Matrix2<f64>, right: SectionPoint) -> Option<SectionPoint> {
     matrix.lu().solve(&Vector2::from(right)).map(Into::into)
 }
 
-impl Lap {
-    /// Its change relative to `e^w`.
-    fn relative(&self, start: &Lap) -> Place {
-        let [from, to] = [self.from, sum(self.from, self.change)].map(|place| relative(place, start));
+impl MapStep {
+    /// Change relative to `e^w`.
+    fn relative(&self, start: &MapStep) -> SectionPoint {
+        let [from, to] = [self.from, sum(self.from, self.change)].map(|section_point| relative(section_point, start));
         [self.change[0], to[1] - from[1]]
     }
 
-    /// How large the motion is, in `ln v`.
+    /// Size of the motion, in `ln v`, at most 1.
     pub fn size(&self) -> f64 {
         size(self.range)
     }
 
-    /// Size of a change of place, as one of `ln v` relative to the motion.
-    pub fn distance(&self, change: Place) -> f64 {
+    /// Size of a change of the section point, in `ln v` relative to the motion.
+    pub fn distance(&self, change: SectionPoint) -> f64 {
         distance(change, self.size())
     }
 }
 
-/// Of a motion between two velocities, at most 1.
+/// Size of a motion between two velocities, in `ln v`, at most 1.
 pub(super) fn size([low, high]: [f64; 2]) -> f64 {
     (high - low).min(1.0)
 }
 
-pub(super) fn distance([w, y]: Place, size: f64) -> f64 {
+pub(super) fn distance([w, y]: SectionPoint, size: f64) -> f64 {
     w.abs().max(y.abs() / size)
 }
 
 impl Follower<'_> {
-    /// The cycle from a place.
-    pub(super) fn lap(&mut self, from: Place, tolerance: f64) -> Result<Lap, Stop> {
+    /// Integrates the cycle from a section point.
+    pub(super) fn map_step(&mut self, from: SectionPoint, tolerance: f64) -> Result<MapStep, StopReason> {
         let mut orbit = Orbit::new(self.slider, self.slider.state(from), tolerance);
-        let mut budget = self.budget.min(MAX_LAP_STEPS);
+        let mut budget = self.budget.min(MAX_CYCLE_STEPS);
         let before = budget;
         let cycle = orbit.cycle(false, &mut budget);
         self.budget -= before - budget;
-        if cycle == Err(Stop::Budget) && self.budget > 0 {
-            // Steps as fine as these only follow rounding.
+        if cycle == Err(StopReason::StepLimit) && self.budget > 0 {
+            // Steps at this tolerance resolve rounding only.
             self.finest *= COARSENING;
-            return Err(Stop::Faint);
+            return Err(StopReason::BelowStepError);
         }
         let cycle = cycle?;
-        let range = cycle.extrema.map(|seen| seen.map_or(0.0, |seen| orbit.polished(seen).x));
-        let end = self.slider.place(&cycle.end);
+        let range = cycle.extrema.map(|seen| seen.map_or(0.0, |seen| orbit.refined(seen).x));
+        let end = self.slider.section_point(&cycle.end);
         let change = [end[0] - from[0], end[1] - from[1]];
         if change[0].is_nan() {
-            return Err(Stop::Faint);
+            return Err(StopReason::BelowStepError);
         }
-        Ok(Lap { from, change, period: cycle.period, range, tolerance })
+        Ok(MapStep { from, change, period: cycle.period, range, tolerance })
     }
 
-    /// Derivative of `g` at the start of a lap, with `y` relative to `e^w`: nudging `w` then moves along small motions.
-    fn derivative(&mut self, lap: &Lap) -> Result<Matrix2<f64>, Stop> {
-        let nudges = [[NUDGE, 0.0], [0.0, NUDGE * lap.size()]];
-        let here = lap.relative(lap);
+    /// Derivative of `g` at the start of a cycle, with `y` relative to `e^w`: changes of `w` are along small motions.
+    fn derivative(&mut self, map_step: &MapStep) -> Result<Matrix2<f64>, StopReason> {
+        let nudges = [[DIFFERENCE_STEP, 0.0], [0.0, DIFFERENCE_STEP * map_step.size()]];
+        let change_here = map_step.relative(map_step);
         let mut slopes = Matrix2::zeros();
         for (c, nudge) in nudges.into_iter().enumerate() {
-            let moved = self.lap(absolute(sum(lap.from, nudge), lap), lap.tolerance)?.relative(lap);
-            (0..2).for_each(|r| slopes[(r, c)] = (moved[r] - here[r]) / nudge[c]);
+            let largest_step =
+                self.map_step(absolute(sum(map_step.from, nudge), map_step), map_step.tolerance)?.relative(map_step);
+            (0..2).for_each(|r| slopes[(r, c)] = (largest_step[r] - change_here[r]) / nudge[c]);
         }
         Ok(slopes)
     }
 
-    /// Goes on in leaps from a place where a cycle between these velocities changes `q` by this distance.
-    pub(super) fn leap_on(&mut self, place: Place, range: [f64; 2], change: f64) -> Result<Leapt, Stop> {
-        let tolerance = self.lap_tolerance(range, change);
-        let mut lap = self.lap(place, tolerance)?;
+    /// Takes envelope steps from a section point where a cycle between these velocities changes `q` by this distance.
+    pub(super) fn follow_envelope(
+        &mut self,
+        section_point: SectionPoint,
+        range: [f64; 2],
+        change: f64,
+    ) -> Result<EnvelopeResult, StopReason> {
+        let tolerance = self.map_tolerance(range, change);
+        let mut map_step = self.map_step(section_point, tolerance)?;
         let (mut time, mut cycles) = (0.0, 0.0);
-        for _ in 0..MAX_LEAPS {
-            let speed = lap.distance(lap.change);
-            let tolerance = self.lap_tolerance(lap.range, speed);
-            if tolerance < 0.3 * lap.tolerance {
-                lap = self.lap(lap.from, tolerance)?;
+        for _ in 0..MAX_ENVELOPE_STEPS {
+            let speed = map_step.distance(map_step.change);
+            let tolerance = self.map_tolerance(map_step.range, speed);
+            if tolerance < 0.3 * map_step.tolerance {
+                map_step = self.map_step(map_step.from, tolerance)?;
             }
-            let jacobian = self.derivative(&lap)?;
-            if let Some(fixed) = self.fixed(&lap, jacobian)? {
-                let comes = fixed.monotone || fixed.missed < self.asked;
-                return Ok(if comes { Leapt::Cycle(fixed) } else { Leapt::At { place: lap.from, time } });
+            let jacobian = self.derivative(&map_step)?;
+            if let Some(fixed_point) = self.fixed_point(&map_step, jacobian)? {
+                let is_reached = fixed_point.monotone || fixed_point.first_distance < self.requested_rtol;
+                return Ok(if is_reached {
+                    EnvelopeResult::Cycle(fixed_point)
+                } else {
+                    EnvelopeResult::At { section_point: map_step.from, time }
+                });
             }
-            if self.dies_out(&lap) {
-                return Ok(Leapt::At { place: lap.from, time });
+            if self.decays(&map_step) {
+                return Ok(EnvelopeResult::At { section_point: map_step.from, time });
             }
-            cycles = if cycles > 0.0 { cycles } else { (3.0 * LINEAR / speed).max(1.5 * MIN_SKIPPED) };
-            let next = self.leap(&lap, jacobian, &mut cycles)?;
-            let Some((leap, n)) = next else {
-                return Ok(if time > 0.0 { Leapt::At { place: lap.from, time } } else { Leapt::Nowhere });
+            cycles = if cycles > 0.0 { cycles } else { (3.0 * NEWTON_RADIUS / speed).max(1.5 * MIN_SKIPPED) };
+            let next = self.envelope_step(&map_step, jacobian, &mut cycles)?;
+            let Some((envelope_step, n)) = next else {
+                return Ok(if time > 0.0 {
+                    EnvelopeResult::At { section_point: map_step.from, time }
+                } else {
+                    EnvelopeResult::NotSlow
+                });
             };
-            let end = leap.laps[S - 1];
-            if self.linear.stable && lap.beyond() > 0.0 && end.beyond() < 0.0 {
-                let (place, part) = leap.last_beyond(&lap, n);
-                return Ok(Leapt::At { place, time: time + part });
+            let end = envelope_step.map_steps[S - 1];
+            if self.linear.stable && map_step.ln_excess() > 0.0 && end.ln_excess() < 0.0 {
+                let (section_point, elapsed) = envelope_step.before_last_excess(&map_step, n);
+                return Ok(EnvelopeResult::At { section_point, time: time + elapsed });
             }
-            time += leap.time(n, n);
-            self.note_unseen(end.range);
-            let place = leap.place(&lap, 1.0);
-            lap = self.lap(place, end.tolerance)?;
+            time += envelope_step.time(n, n);
+            self.note_range(end.range);
+            let section_point = envelope_step.section_point(&map_step, 1.0);
+            map_step = self.map_step(section_point, end.tolerance)?;
         }
-        Ok(Leapt::Nowhere)
+        Ok(EnvelopeResult::NotSlow)
     }
 
-    /// Error of the steps of a lap between these velocities of which a change is to be known to a part of `rtol`.
-    fn lap_tolerance(&self, range: [f64; 2], change: f64) -> f64 {
-        // Rounding is that of the largest logarithm.
+    /// Error of the integration steps of a cycle between these velocities whose change has the relative accuracy `rtol`.
+    fn map_tolerance(&self, range: [f64; 2], change: f64) -> f64 {
+        // Rounding of the largest logarithm.
         let finest = self.finest * (range[1] - range[0]).max(1.0);
         size(range) * (0.01 * self.rtol * change).clamp(finest, self.tolerance.max(finest))
     }
 
-    /// The attracting fixed point next to a lap.
-    fn fixed(&mut self, lap: &Lap, jacobian: Matrix2<f64>) -> Result<Option<Fixed>, Stop> {
-        let (mut lap, mut jacobian, mut missed) = (*lap, jacobian, f64::NAN);
-        let mut before = LINEAR;
-        // Whether steps are the finest, since the slowest moment magnifies their errors.
+    /// Attracting fixed point near a cycle.
+    fn fixed_point(&mut self, map_step: &MapStep, jacobian: Matrix2<f64>) -> Result<Option<FixedPoint>, StopReason> {
+        let (mut map_step, mut jacobian, mut first_distance) = (*map_step, jacobian, f64::NAN);
+        let mut before = NEWTON_RADIUS;
+        // Whether the tolerance is the tightest, since the least velocity magnifies errors.
         let mut is_exact = false;
         for _ in 0..MAX_ITERATIONS {
-            let Some(step) = solve(jacobian, lap.relative(&lap).map(|change| -change)) else { return Ok(None) };
-            let distance = lap.distance(step);
-            // What errors of steps leave, and what rounding does where it stops the method.
-            let slack = distance / lap.distance(lap.change);
-            let noise = 10.0 * lap.tolerance / lap.size() * slack;
-            let tolerance = self.lap_tolerance(lap.range, if is_exact { 0.0 } else { 1.0 / slack });
-            let fine = lap.tolerance <= 2.0 * tolerance;
+            let Some(step) = solve(jacobian, map_step.relative(&map_step).map(|change| -change)) else {
+                return Ok(None);
+            };
+            let distance = map_step.distance(step);
+            // Distance from errors of steps, and from rounding where it stops the method.
+            let amplification = distance / map_step.distance(map_step.change);
+            let noise = 10.0 * map_step.tolerance / map_step.size() * amplification;
+            let tolerance = self.map_tolerance(map_step.range, if is_exact { 0.0 } else { 1.0 / amplification });
+            let fine = map_step.tolerance <= 2.0 * tolerance;
             let ends = distance < 0.01 * self.rtol || (fine && distance < 3.0 * noise);
-            let stops = fine && distance > before && distance < LINEAR * self.asked;
+            let stops = fine && distance > before && distance < NEWTON_RADIUS * self.requested_rtol;
             // False for NaN.
             if !(distance < before || ends || stops) {
                 return Ok(None);
             }
-            missed = if missed.is_nan() { distance } else { missed };
-            let trough = lap.range[0];
-            lap = self.lap(absolute(sum(lap.from, step), &lap), tolerance)?;
+            first_distance = if first_distance.is_nan() { distance } else { first_distance };
+            let trough = map_step.range[0];
+            map_step = self.map_step(absolute(sum(map_step.from, step), &map_step), tolerance)?;
             if ends || stops {
-                // A part of the last change is left, and so is what errors of steps make of it.
-                let left = (lap.range[0] - trough).abs() * (0.01 + 0.1 * noise / distance);
-                if left > TROUGH_ERROR * self.asked && !is_exact {
+                // Error from a fraction of the last change, and from errors of steps.
+                let left = (map_step.range[0] - trough).abs() * (0.01 + 0.1 * noise / distance);
+                if left > TROUGH_ERROR * self.requested_rtol && !is_exact {
                     is_exact = true;
-                    lap = self.lap(lap.from, self.lap_tolerance(lap.range, 0.0))?;
-                    before = LINEAR;
+                    map_step = self.map_step(map_step.from, self.map_tolerance(map_step.range, 0.0))?;
+                    before = NEWTON_RADIUS;
                     continue;
                 }
-                if left > TROUGH_ERROR * self.asked {
-                    lap.range[0] = f64::NAN;
+                if left > TROUGH_ERROR * self.requested_rtol {
+                    map_step.range[0] = f64::NAN;
                 }
-                let sure = noise < LINEAR && lap.size() > MIN_CYCLE && self.is_driven();
-                let monotone = multiplier(jacobian, 10.0 * lap.tolerance / (lap.size() * NUDGE));
-                return Ok(monotone.filter(|_| sure).map(|monotone| Fixed { lap, monotone, missed }));
+                let is_certain = noise < NEWTON_RADIUS && map_step.size() > MIN_CYCLE && self.is_driven();
+                let monotone = multiplier(jacobian, 10.0 * map_step.tolerance / (map_step.size() * DIFFERENCE_STEP));
+                return Ok(monotone.filter(|_| is_certain).map(|monotone| FixedPoint {
+                    map_step,
+                    monotone,
+                    first_distance,
+                }));
             }
             before = if fine { 0.5 * distance } else { before };
-            jacobian = self.derivative(&lap)?;
+            jacobian = self.derivative(&map_step)?;
         }
         Ok(None)
     }
 
-    /// A leap from the start of a lap, of about `cycles`, which become those proposed for the next one; `None` if it is not worth
-    /// it.
-    fn leap(&mut self, lap: &Lap, jacobian: Matrix2<f64>, cycles: &mut f64) -> Result<Option<(Leap, f64)>, Stop> {
+    /// Envelope step of about `cycles` from the start of a cycle, and its number of cycles; `None` if it is too short. Sets
+    /// `cycles` to the proposal for the next step.
+    fn envelope_step(
+        &mut self,
+        map_step: &MapStep,
+        jacobian: Matrix2<f64>,
+        cycles: &mut f64,
+    ) -> Result<Option<(EnvelopeStep, f64)>, StopReason> {
         // The estimate is of order S, the error of order 2 S - 1.
         let allowed = exp(0.6 * ln(self.tolerance.max(self.finest)));
         for _ in 0..MAX_TRIES {
@@ -291,20 +318,27 @@ impl Follower<'_> {
                 break;
             }
             let n = cycles.floor();
-            let leap = self.stages(lap, jacobian, n)?;
-            // Newton's method may converge in a third of it.
-            let error =
-                leap.as_ref().and_then(|leap| leap.error(lap, jacobian, n)).map_or(400.0, |error| error / allowed);
+            let envelope_step = self.stages(map_step, jacobian, n)?;
+            // Newton's method may converge for a third of the cycles.
+            let error = envelope_step
+                .as_ref()
+                .and_then(|envelope_step| envelope_step.error(map_step, jacobian, n))
+                .map_or(400.0, |error| error / allowed);
             *cycles = n * (0.9 * exp(-ln(error.max(1e-10)) / (S + 1) as f64)).clamp(0.2, 4.0);
-            if let Some(leap) = leap.filter(|_| error < 1.0) {
-                return Ok(Some((leap, n)));
+            if let Some(envelope_step) = envelope_step.filter(|_| error < 1.0) {
+                return Ok(Some((envelope_step, n)));
             }
         }
         Ok(None)
     }
 
-    /// Newton's method for the changes at the nodes, with the derivative at the start; `None` if it fails.
-    fn stages(&mut self, lap: &Lap, jacobian: Matrix2<f64>, n: f64) -> Result<Option<Leap>, Stop> {
+    /// Solves for the changes at the nodes by Newton's method with the Jacobian at the start; `None` if it fails.
+    fn stages(
+        &mut self,
+        map_step: &MapStep,
+        jacobian: Matrix2<f64>,
+        n: f64,
+    ) -> Result<Option<EnvelopeStep>, StopReason> {
         let nodes = radau_iia_9().nodes;
         let before = nodes.map(|u| basis(u - 0.5 / n));
         let slopes = slopes(n);
@@ -316,23 +350,24 @@ impl Follower<'_> {
             }
         }
         let matrix = matrix.lu();
-        let mut leap = Leap { change: [[0.0; S]; 2], laps: [*lap; S] };
-        let enough = (0.1 * self.tolerance.max(self.finest)).max(n * lap.tolerance / lap.size());
-        let weights = SVector::<f64, SYSTEM>::from_fn(|i, _| if i < S { 1.0 } else { lap.size().powi(-2) });
+        let mut envelope_step = EnvelopeStep { change: [[0.0; S]; 2], map_steps: [*map_step; S] };
+        let tolerance = (0.1 * self.tolerance.max(self.finest)).max(n * map_step.tolerance / map_step.size());
+        let weights = SVector::<f64, SYSTEM>::from_fn(|i, _| if i < S { 1.0 } else { map_step.size().powi(-2) });
         let weighed = |p: &SVector<f64, SYSTEM>, q: &SVector<f64, SYSTEM>| weights.component_mul(p).dot(q);
         let mut steps: Vec<SVector<f64, SYSTEM>> = Vec::new();
         let mut last = f64::INFINITY;
         for _ in 0..MAX_ITERATIONS {
             let mut step = SVector::<f64, SYSTEM>::zeros();
             for i in 0..S {
-                let place = absolute(sum(lap.from, [0, 1].map(|r| dot(&before[i], &leap.change[r]))), lap);
-                // At first all begin where the leap does.
+                let section_point =
+                    absolute(sum(map_step.from, [0, 1].map(|r| dot(&before[i], &envelope_step.change[r]))), map_step);
+                // In the first iteration all cycles start at the start of the envelope step.
                 if !steps.is_empty() {
-                    leap.laps[i] = self.lap(place, lap.tolerance)?;
+                    envelope_step.map_steps[i] = self.map_step(section_point, map_step.tolerance)?;
                 }
-                let change = leap.laps[i].relative(lap);
+                let change = envelope_step.map_steps[i].relative(map_step);
                 for r in 0..2 {
-                    step[r * S + i] = change[r] - dot(&slopes[i], &leap.change[r]);
+                    step[r * S + i] = change[r] - dot(&slopes[i], &envelope_step.change[r]);
                 }
             }
             if !matrix.solve_mut(&mut step) {
@@ -340,29 +375,29 @@ impl Follower<'_> {
             }
             // Broyden's update (Kelley, Iterative Methods for Linear and Nonlinear Equations, section 7.3).
             for pair in steps.windows(2) {
-                let share = weighed(&pair[0], &step) / weighed(&pair[0], &pair[0]);
-                step += share * pair[1];
+                let factor = weighed(&pair[0], &step) / weighed(&pair[0], &pair[0]);
+                step += factor * pair[1];
             }
             if let Some(last) = steps.last() {
                 step /= 1.0 - weighed(last, &step) / weighed(last, last);
             }
-            (0..SYSTEM).for_each(|i| leap.change[i / S][i % S] += step[i]);
-            let moved = (0..S).map(|i| lap.distance([step[i], step[S + i]])).fold(0.0, f64::max);
-            let rate = moved / last;
-            if !steps.is_empty() && rate < 0.5 && moved * rate < enough {
-                return Ok(Some(leap));
+            (0..SYSTEM).for_each(|i| envelope_step.change[i / S][i % S] += step[i]);
+            let largest_step = (0..S).map(|i| map_step.distance([step[i], step[S + i]])).fold(0.0, f64::max);
+            let rate = largest_step / last;
+            if !steps.is_empty() && rate < 0.5 && largest_step * rate < tolerance {
+                return Ok(Some(envelope_step));
             }
-            if !(moved < 0.7 * last && moved < MAX_LEAP) {
+            if !(largest_step < 0.7 * last && largest_step < MAX_ENVELOPE_CHANGE) {
                 return Ok(None);
             }
-            last = moved;
+            last = largest_step;
             steps.push(step);
         }
         Ok(None)
     }
 }
 
-/// `slopes[i][j]`: change over a cycle at node `i` of the polynomial of node `j`.
+/// Matrix `slopes[i][j]`: change of the polynomial of node `j` over a cycle at node `i`.
 fn slopes(n: f64) -> [[f64; S]; S] {
     let half = 0.5 / n;
     radau_iia_9().nodes.map(|u| {
@@ -371,59 +406,59 @@ fn slopes(n: f64) -> [[f64; S]; S] {
     })
 }
 
-/// Whether a fixed point with this derivative of `g`, known up to `error`, attracts, and if so, whether places come to it from
-/// one side.
+/// Whether nearby points approach a fixed point with this derivative of `g` from one side; `None` if it does not attract,
+/// for an error of the derivative up to `error`.
 fn multiplier(derivative: Matrix2<f64>, error: f64) -> Option<bool> {
     let [[ww, yw], [wy, yy]]: [[f64; 2]; 2] = derivative.into();
-    // Of 1 + dg/dq.
+    // Half the trace and the determinant of 1 + dg/dq.
     let (half, product) = (1.0 + 0.5 * (ww + yy), (1.0 + ww) * (1.0 + yy) - wy * yw);
     let square = 0.25 * (ww - yy) * (ww - yy) + wy * yw;
     if square < 0.0 {
         return (product < 1.0 - error).then_some(false);
     }
     let root = square.sqrt();
-    // 1 less the greater one, without a difference of numbers close to 1.
+    // 1 minus the greater multiplier, without cancellation.
     let left = -0.5 * (ww + yy) - root;
     (left > error && half - root > -1.0).then_some(half + root > 0.5 && half - root > -0.5)
 }
 
-impl Lap {
-    /// How far it goes beyond the band of settled velocities, in powers of e; negative within.
-    pub fn beyond(&self) -> f64 {
+impl MapStep {
+    /// `ln` of the range of a cycle relative to the band of settled velocities; negative within.
+    pub fn ln_excess(&self) -> f64 {
         ln_1p(excess(self.range))
     }
 }
 
-impl Leap {
-    /// The place at a share of it.
-    fn place(&self, lap: &Lap, u: f64) -> Place {
+impl EnvelopeStep {
+    /// Section point at the fraction `u` of the envelope step.
+    fn section_point(&self, map_step: &MapStep, u: f64) -> SectionPoint {
         let basis = basis(u);
-        absolute(sum(lap.from, [0, 1].map(|r| dot(&basis, &self.change[r]))), lap)
+        absolute(sum(map_step.from, [0, 1].map(|r| dot(&basis, &self.change[r]))), map_step)
     }
 
     /// Time of the first `j` of its `n` cycles.
     fn time(&self, n: f64, j: f64) -> f64 {
         let matrix = SMatrix::<f64, S, S>::from(slopes(n)).transpose();
-        let times = matrix.lu().solve(&SVector::from(self.laps.map(|lap| lap.period)));
+        let times = matrix.lu().solve(&SVector::from(self.map_steps.map(|map_step| map_step.period)));
         times.map_or(f64::NAN, |times| SVector::from(basis(j / n)).dot(&times))
     }
 
-    /// Its error: the defect of the first cycle, which is no node, as for a step of Radau IIA.
-    fn error(&self, lap: &Lap, jacobian: Matrix2<f64>, n: f64) -> Option<f64> {
+    /// Error estimate: the defect of the first cycle, which is not a node, as for a step of Radau IIA.
+    fn error(&self, map_step: &MapStep, jacobian: Matrix2<f64>, n: f64) -> Option<f64> {
         let first = basis(1.0 / n);
-        let change = lap.relative(lap);
+        let change = map_step.relative(map_step);
         let defect = [0, 1].map(|r| change[r] - dot(&first, &self.change[r]));
         let rate = (S + 1) as f64 / n;
-        solve(Matrix2::from_diagonal_element(rate) - jacobian, defect).map(|error| lap.distance(error))
+        solve(Matrix2::from_diagonal_element(rate) - jacobian, defect).map(|error| map_step.distance(error))
     }
 
-    /// A section soon before the last cycle that leaves the band of settled velocities, and its time.
-    fn last_beyond(&self, lap: &Lap, n: f64) -> (Place, f64) {
-        let ends = self.laps.map(|end| end.beyond() - lap.beyond());
-        // These cycles begin half a cycle before their nodes.
-        let beyond = |u: f64| lap.beyond() + dot(&basis(u), &ends);
-        let u = crossing(beyond, [0.0, 1.0], [lap.beyond(), lap.beyond() + ends[S - 1]], 1e-6);
+    /// Section point shortly before the last cycle that leaves the band of settled velocities, and its time.
+    fn before_last_excess(&self, map_step: &MapStep, n: f64) -> (SectionPoint, f64) {
+        let ends = self.map_steps.map(|end| end.ln_excess() - map_step.ln_excess());
+        // These cycles start half a cycle before their nodes.
+        let ln_excess = |u: f64| map_step.ln_excess() + dot(&basis(u), &ends);
+        let u = crossing(ln_excess, [0.0, 1.0], [map_step.ln_excess(), map_step.ln_excess() + ends[S - 1]], 1e-6);
         let j = ((u * n).floor() - 2.0).max(0.0);
-        (self.place(lap, j / n), self.time(n, j))
+        (self.section_point(map_step, j / n), self.time(n, j))
     }
 }

@@ -1,15 +1,14 @@
-//! The response of a block on a spring to a step of the control velocity: `v_c` jumps from `v_i` to `v_f` and stays
-//! there.
+//! Response of a block on a spring to a velocity step: `v_c` jumps from `v_i` to `v_f` and stays there.
 //!
-//! In the scaled variables of `slider.rs` only `a`, `b`, `k`, `m v_f^2` and `v_i/v_f` enter. The response is
-//! integrated (`run.rs`, `orbit.rs`) until its end is decided (`long_term.rs`), cycles that hardly change are skipped
-//! (`envelope.rs`), and all is repeated at finer steps until the numbers agree (`simulation.rs`).
+//! In the scaled variables of `scaled_block.rs` the response depends on `a`, `b`, `k`, `m v_f^2` and `v_i/v_f` only. It is
+//! integrated (`integration.rs`, `orbit.rs`) until its long-term behaviour is decided (`long_term.rs`). Envelope following
+//! skips cycles that hardly change (`envelope.rs`). Finer steps repeat all until the numbers agree (`simulation.rs`).
 
 mod envelope;
+mod integration;
 mod long_term;
 mod motion;
 mod orbit;
-mod run;
 mod scaled_block;
 mod series;
 mod simulation;
@@ -19,70 +18,70 @@ use crate::numerics::elementary::{exp, ln};
 use crate::protocol::Status;
 use crate::stability::SteadySliding;
 
-pub use long_term::Linear;
-pub use motion::Swing;
-pub use orbit::{Cycle, Extremum, Orbit, SETTLED, Seen, Stop};
-pub use run::{Leg, Run, step_to};
+pub use integration::{Integration, IntegrationStep, step_to};
+pub use long_term::LinearStability;
+pub use motion::StepResponseMotion;
+pub use orbit::{Cycle, Extremum, Orbit, RoughExtremum, SETTLED, StopReason};
 pub use scaled_block::{ScaledBlock, State, Z};
-pub use simulation::{Doubts, LongTermBehaviour, Simulation, follow};
+pub use simulation::{LongTermBehaviour, Simulation, UnresolvedNumbers, follow};
 
 /// A step of the control velocity.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Step {
     /// The friction law and both velocities.
     pub transition: Transition,
-    /// Stiffness of the spring, `k > 0`; infinite for a rigid one.
+    /// Stiffness of the spring, `k > 0`; infinite for a rigid spring.
     pub k: f64,
     /// Mass of the block, `m >= 0`.
     pub m: f64,
 }
 
-/// The end of a response.
+/// Long-term behaviour of a response.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Outcome {
     /// Steady sliding at `v_f`.
     Settled,
     /// A limit cycle: stick-slip, or a small sustained oscillation.
     LimitCycle,
-    /// None that could be decided with the work allowed.
+    /// Undecided within the step limit.
     Undecided,
 }
 
 impl Outcome {
-    /// The words that are written into tables, in the order of the outcomes.
+    /// Names in tables, in the order of the variants.
     pub const NAMES: [&'static str; 3] = ["settled", "limit_cycle", "undecided"];
 }
 
-/// What a response does.
+/// Numbers of a response.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Response {
-    /// Its end.
+    /// Long-term behaviour.
     pub outcome: Outcome,
-    /// Greatest velocity from when `v = v_f` is first met on, at least `v_f`, in `v_0`; NaN if undecided.
+    /// Greatest velocity after `v = v_f` is first reached, at least `v_f`, in `v_0`; NaN if undecided.
     pub v_peak: f64,
-    /// Least velocity from when `v = v_f` is first met on, at most `v_f`, in `v_0`; 0 below the range of doubles, NaN
-    /// if undecided or in doubt.
+    /// Least velocity after `v = v_f` is first reached, at most `v_f`, in `v_0`; 0 below the range of doubles, NaN if
+    /// undecided or unresolved.
     pub v_trough: f64,
-    /// Time of the greatest velocity, in `l/v_0`; `None` if it is only approached, undecided or in doubt.
+    /// Time of the greatest velocity, in `l/v_0`; `None` if it is only approached, undecided or unresolved.
     pub t_peak: Option<f64>,
-    /// Time after which `|v/v_f - 1|` stays below [`SETTLED`], in `l/v_0`; `None` also if in doubt.
+    /// Time after which `|v/v_f - 1|` stays below [`SETTLED`], in `l/v_0`; `None` if not settled or unresolved.
     pub settling_time: Option<f64>,
-    /// The limit cycle.
-    pub cycle: Option<Sustained>,
-    /// Time up to which it was followed, in `l/v_0`.
+    /// The limit cycle, if the response reaches one.
+    pub cycle: Option<LimitCycle>,
+    /// Simulated time, in `l/v_0`.
     pub t_end: f64,
-    /// Steps of the integrator.
+    /// Number of steps of the integrator.
     pub steps: u32,
 }
 
 /// A limit cycle.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Sustained {
-    /// Its duration, in `l/v_0`.
+pub struct LimitCycle {
+    /// Period, in `l/v_0`.
     pub period: f64,
-    /// Its greatest velocity, in `v_0`.
+    /// Greatest velocity, in `v_0`.
     pub v_peak: f64,
-    /// Its least velocity, in `v_0`; NaN if in doubt.
+    /// Least velocity, in `v_0`; NaN if unresolved.
     pub v_trough: f64,
 }
 
@@ -92,22 +91,23 @@ impl Step {
         self.m * self.transition.v_f * self.transition.v_f
     }
 
-    /// What the response depends on; `None` where it takes no time: for a rigid spring, and from `v_f` to `v_f`.
+    /// Scaled step; `None` where the response takes no time: for a rigid spring, and for `v_i = v_f`.
     pub fn scaled(&self) -> Option<Scaled> {
         let Transition { law, v_i, v_f } = self.transition;
         let slider = ScaledBlock { a: law.a, b: law.b, inertia: self.inertia(), k: self.k };
         (self.k.is_finite() && v_i != v_f).then_some(Scaled { slider, ratio: v_i / v_f })
     }
 
-    /// The response, with numbers good to `rtol`.
+    /// Status and response, with numbers to the relative tolerance `rtol`.
     pub fn respond(&self, rtol: f64) -> (Status, Option<Response>) {
         let simulation = self.scaled().map(|scaled| scaled.follow(rtol));
         self.from_simulation(simulation.as_ref(), rtol)
     }
 
-    /// The same from the course of [`Step::scaled`], which other steps may share: `BelowBound` where the velocity falls
-    /// below 1, `Infeasible` where it becomes infinite in finite time, as it does without mass below the critical
-    /// stiffness.
+    /// Status and response from the simulation of [`Step::scaled`], which other steps may share.
+    ///
+    /// `BelowBound` where the velocity falls below 1, `Infeasible` where it becomes infinite in finite time, as it does
+    /// without mass below the critical stiffness.
     pub fn from_simulation(&self, simulation: Option<&Simulation>, rtol: f64) -> (Status, Option<Response>) {
         let Transition { v_i, v_f, .. } = self.transition;
         let lowest = simulation.and_then(|simulation| simulation.low).map_or(v_f, |low| v_f * exp(low.x)).min(v_i);
@@ -124,27 +124,27 @@ impl Step {
     }
 }
 
-/// The numbers that the response to a step depends on in scaled variables: steps that share them share its course.
+/// Parameters of the response in scaled variables; steps with equal parameters have the same simulation.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Scaled {
     /// The block on its spring.
     pub slider: ScaledBlock,
-    /// `v_i/v_f`.
+    /// Ratio `v_i/v_f`.
     pub ratio: f64,
 }
 
 impl Scaled {
-    /// The response, followed to its end.
+    /// Simulates the response until its long-term behaviour is decided.
     pub fn follow(&self, rtol: f64) -> Simulation {
         follow(&self.slider, self.linear(), ln(self.ratio), rtol)
     }
 
-    /// Small motions about steady sliding at the final velocity.
-    fn linear(&self) -> Linear {
-        Linear::of(&self.slider)
+    /// Linear stability of steady sliding at the final velocity.
+    fn linear(&self) -> LinearStability {
+        LinearStability::of(&self.slider)
     }
 
-    /// The same numbers as bits, to tell equal ones by.
+    /// Parameters as bits: the key of the memo.
     pub fn key(&self) -> [u64; 5] {
         let ScaledBlock { a, b, inertia, k } = self.slider;
         [a, b, inertia, k, self.ratio].map(f64::to_bits)
@@ -152,7 +152,7 @@ impl Scaled {
 }
 
 impl Response {
-    /// The velocity is `v_f` from the start.
+    /// Response with the velocity `v_f` from the start.
     fn at_once(v_f: f64) -> Response {
         Response {
             outcome: Outcome::Settled,
@@ -166,35 +166,35 @@ impl Response {
         }
     }
 
-    /// In the units of the model; `None` for one that ends.
+    /// Response in the units of the model; `None` where the velocity becomes infinite.
     fn new(simulation: &Simulation, v_f: f64, rtol: f64) -> Option<Response> {
         let velocity = |x: f64| v_f * exp(x);
         let (outcome, settling_time, cycle) = match simulation.long_term {
             LongTermBehaviour::Settled { time } => (
                 Outcome::Settled,
-                Some(time / v_f).filter(|time| !simulation.doubts.settling_time && time.is_finite()),
+                Some(time / v_f).filter(|time| !simulation.unresolved.settling_time && time.is_finite()),
                 None,
             ),
             LongTermBehaviour::Cycle { period, high, low } => (Outcome::LimitCycle, None, Some((period, high, low))),
             LongTermBehaviour::Undecided => (Outcome::Undecided, None, None),
-            LongTermBehaviour::Ends => return None,
+            LongTermBehaviour::BlowUp => return None,
         };
         let [low, high] = simulation.range();
-        // What comes after the last step may go further.
+        // An undecided response may leave this range later.
         let decided = outcome != Outcome::Undecided;
         let known = |velocity: f64, known: bool| if known { velocity } else { f64::NAN };
-        let doubts = simulation.doubts;
-        let peak = simulation.peak(rtol).filter(|peak| decided && !doubts.t_peak && !peak.t.is_nan());
+        let unresolved = simulation.unresolved;
+        let peak = simulation.peak(rtol).filter(|peak| decided && !unresolved.t_peak && !peak.t.is_nan());
         Some(Response {
             outcome,
             v_peak: known(velocity(high), decided),
-            v_trough: known(velocity(low), decided && !doubts.trough),
+            v_trough: known(velocity(low), decided && !unresolved.trough),
             t_peak: peak.map(|peak| peak.t / v_f),
             settling_time,
-            cycle: cycle.map(|(period, high, low)| Sustained {
+            cycle: cycle.map(|(period, high, low)| LimitCycle {
                 period: period / v_f,
                 v_peak: velocity(high),
-                v_trough: known(velocity(low), !doubts.cycle_trough),
+                v_trough: known(velocity(low), !unresolved.cycle_trough),
             }),
             t_end: simulation.t / v_f,
             steps: simulation.steps,
@@ -202,12 +202,12 @@ impl Response {
     }
 }
 
-impl Linear {
-    /// Of steady sliding at `v_f`.
-    fn of(slider: &ScaledBlock) -> Linear {
+impl LinearStability {
+    /// Linear stability of steady sliding at `v_f`.
+    fn of(slider: &ScaledBlock) -> LinearStability {
         let law = Law { a: slider.a, b: slider.b };
         let sliding = SteadySliding::new(law, slider.k, slider.inertia, 1.0);
-        let mut linear = Linear { stable: sliding.is_stable(), growth: None };
+        let mut linear = LinearStability { stable: sliding.is_stable(), growth: None };
         if let Some(eigenvalues) = sliding.eigenvalues().filter(|eigenvalues| eigenvalues.frequency > 0.0) {
             let period = 2.0 * std::f64::consts::PI / eigenvalues.frequency;
             linear.growth = Some(eigenvalues.growth_rate * period);

@@ -1,52 +1,53 @@
 //! A response over time.
 
 use super::Step;
-use super::run::{Leg, step_to};
+use super::integration::{IntegrationStep, step_to};
 use super::scaled_block::{ScaledBlock, State, X, Y};
 use crate::model::{Law, Transition};
 use crate::numerics::elementary::{exp, ln};
 use crate::numerics::gauss;
 use crate::protocol::{Moment, Motion};
 
-/// Stretches of a traced response, at most. Chosen: beyond a quarter of a million a picture shows nothing, and memory counts.
+/// Intervals of a traced response, at most. Chosen: a limit of memory, far beyond the resolution of a picture.
 const MAX_STRETCHES: usize = 1 << 18;
 
-/// Gauss nodes for the work of one stretch. Chosen: of the order of a step, 16.
+/// Gauss nodes for the work of one interval. Chosen: their order is that of a step, 16.
 const NODES: usize = 8;
 
 /// The response to a step, up to some time.
 #[derive(Debug, Clone)]
-pub struct Swing {
+pub struct StepResponseMotion {
     law: Law,
     v_f: f64,
     t_f: f64,
-    stretches: Vec<Stretch>,
+    intervals: Vec<MotionInterval>,
 }
 
-/// A stretch of a response.
+/// Interval of a response.
 #[derive(Debug, Clone, Copy)]
 #[expect(clippy::large_enum_variant, reason = "arrests are few")]
-enum Stretch {
+enum MotionInterval {
     /// A step of the integrator.
-    Leg(Leg),
+    Step(IntegrationStep),
     /// An arrest that takes no time.
     Arrest { t: f64, from: State, to: State },
 }
 
-impl Stretch {
-    /// Time, in `l/v_f`, and state at a share of it.
+impl MotionInterval {
+    /// Time, in `l/v_f`, and state at the fraction `u` of the interval.
     fn at(&self, u: f64) -> (f64, State) {
         match self {
-            Stretch::Leg(leg) => (leg.time(u), std::array::from_fn(|r| leg.value(r, u))),
-            Stretch::Arrest { t, from, to } => (*t, std::array::from_fn(|r| from[r] + u * (to[r] - from[r]))),
+            MotionInterval::Step(step) => (step.time(u), std::array::from_fn(|r| step.value(r, u))),
+            MotionInterval::Arrest { t, from, to } => (*t, std::array::from_fn(|r| from[r] + u * (to[r] - from[r]))),
         }
     }
 }
 
 impl Step {
-    /// The response up to time `t_f`, in `l/v_0`, with errors of a step below `0.03 rtol`. `None` for a rigid spring, for
-    /// `v_i = v_f`, where the velocity becomes infinite before, and where the response swings too often to be shown.
-    pub fn motion(&self, t_f: f64, rtol: f64) -> Option<Swing> {
+    /// Response up to the time `t_f`, in `l/v_0`, with errors of a step below `0.03 rtol`.
+    ///
+    /// `None` for a rigid spring, for `v_i = v_f`, where the velocity becomes infinite, and for too many oscillations.
+    pub fn motion(&self, t_f: f64, rtol: f64) -> Option<StepResponseMotion> {
         let Transition { law, v_i, v_f } = self.transition;
         let x = ln(v_i / v_f);
         if !self.k.is_finite() || x == 0.0 {
@@ -55,44 +56,45 @@ impl Step {
         let slider = ScaledBlock { a: law.a, b: law.b, inertia: self.m * v_f * v_f, k: self.k };
         let start = slider.steady(x);
         let mut run = slider.run(start, slider.first_step(&start), 0.03 * rtol);
-        let mut stretches = Vec::new();
+        let mut intervals = Vec::new();
         let end = t_f * v_f;
         while run.t() < end {
             if let Some(arrested) = slider.arrest(run.y()) {
-                stretches.push(Stretch::Arrest { t: run.t(), from: *run.y(), to: arrested });
+                intervals.push(MotionInterval::Arrest { t: run.t(), from: *run.y(), to: arrested });
                 run.jump(arrested, slider.first_step(&arrested));
             }
-            stretches.push(Stretch::Leg(step_to(&mut run, end).ok()?));
-            if stretches.len() > MAX_STRETCHES {
+            intervals.push(MotionInterval::Step(step_to(&mut run, end).ok()?));
+            if intervals.len() > MAX_STRETCHES {
                 return None;
             }
         }
-        Some(Swing { law, v_f, t_f, stretches })
+        Some(StepResponseMotion { law, v_f, t_f, intervals })
     }
 }
 
-impl Swing {
-    /// Work of friction up to the end, `int tau v dt`.
+impl StepResponseMotion {
+    /// Work of friction up to the end, `int tau v dt`, in scaled units.
     pub fn work(&self) -> f64 {
         let rule = gauss::rule(NODES);
-        let leg_work = |leg: &Leg| {
-            let at = |x: f64| self.moment(Stretch::Leg(*leg).at(0.5 * (1.0 + x)));
+        let step_work = |step: &IntegrationStep| {
+            let at = |x: f64| self.moment(MotionInterval::Step(*step).at(0.5 * (1.0 + x)));
             let power: f64 = rule.x.iter().zip(&rule.w).map(|(&x, w)| w * at(x).friction * at(x).v).sum();
-            0.5 * leg.h() / self.v_f * power
+            0.5 * step.h() / self.v_f * power
         };
-        let legs = self.stretches.iter().filter_map(|stretch| match stretch {
-            Stretch::Leg(leg) => Some(leg_work(leg)),
-            Stretch::Arrest { .. } => None,
+        let works = self.intervals.iter().filter_map(|stretch| match stretch {
+            MotionInterval::Step(step) => Some(step_work(step)),
+            MotionInterval::Arrest { .. } => None,
         });
-        legs.sum()
+        works.sum()
     }
 
-    /// Least velocity at the nodes and the ends of all stretches, in `v_0`.
+    /// Least velocity at the nodes and the ends of all intervals, in `v_0`.
     pub fn least_velocity(&self) -> f64 {
         let rule = gauss::rule(NODES);
-        let places = || rule.x.iter().map(|x| 0.5 * (1.0 + x)).chain([0.0, 1.0]);
-        let least = |stretch: &Stretch| places().map(|u| self.moment(stretch.at(u)).v).fold(f64::INFINITY, f64::min);
-        self.stretches.iter().map(least).fold(f64::INFINITY, f64::min)
+        let fractions = || rule.x.iter().map(|x| 0.5 * (1.0 + x)).chain([0.0, 1.0]);
+        let least =
+            |stretch: &MotionInterval| fractions().map(|u| self.moment(stretch.at(u)).v).fold(f64::INFINITY, f64::min);
+        self.intervals.iter().map(least).fold(f64::INFINITY, f64::min)
     }
 
     fn moment(&self, (t, state): (f64, State)) -> Moment {
@@ -108,21 +110,21 @@ impl Swing {
     }
 }
 
-impl Motion for Swing {
+impl Motion for StepResponseMotion {
     fn duration(&self) -> f64 {
         self.t_f
     }
 
     fn landmarks(&self) -> Vec<f64> {
-        let count = self.stretches.len();
+        let count = self.intervals.len();
         (0..=count).map(|k| k as f64 / count as f64).collect()
     }
 
     fn at(&self, s: f64) -> Moment {
-        let count = self.stretches.len();
+        let count = self.intervals.len();
         let along = s.clamp(0.0, 1.0) * count as f64;
-        let place = (along as usize).min(count - 1);
-        self.moment(self.stretches[place].at(along - place as f64))
+        let index = (along as usize).min(count - 1);
+        self.moment(self.intervals[index].at(along - index as f64))
     }
 
     fn arrives(&self) -> bool {

@@ -7,34 +7,33 @@
 //! z' = k (1 - e^x),    y' = e^-y - e^x,    M e^x x' = z - a x - b y,
 //! ```
 //!
-//! with steady sliding at 0. They stay regular for `M = 0`, where the last one is a constraint, and no velocity is too
-//! low for them.
+//! with steady sliding at 0. They are regular for `M = 0`, where the last equation is a constraint, and at every velocity.
 
 use crate::numerics::elementary::{exp, exp_and_m1, ln};
 use crate::numerics::stiff::{Linearised, Points, System};
 
-/// Place of the scaled force in a [`State`].
+/// Index of the scaled force in a [`State`].
 pub const Z: usize = 0;
-/// Place of the logarithm of the contact lifetime.
+/// Index of the logarithm of the contact lifetime.
 pub const Y: usize = 1;
-/// Place of the logarithm of the velocity.
+/// Index of the logarithm of the velocity.
 pub const X: usize = 2;
 
-/// `[z, y, x]`, in the order in which they are eliminated.
+/// State `[z, y, x]`, in the order of elimination.
 pub type State = [f64; 3];
 
-/// A place on the section `v = v_f`, crossed upwards: the logarithm of the force about which the block swings, and `y`.
-pub type Place = [f64; 2];
+/// Point of the section `v = v_f`, crossed upwards: the logarithm of the force about which the block oscillates, and `y`.
+pub type SectionPoint = [f64; 2];
 
-/// Change of a logarithm, at most, that an arrest of no duration leaves out. Chosen: below the tightest tolerance.
+/// Change of a logarithm during an arrest that counts as instantaneous, at most. Chosen: below the tightest tolerance.
 const NEGLIGIBLE: f64 = 1e-14;
 
-/// The four numbers that the response to a step depends on, beside where it starts.
+/// The block on its spring: the four parameters of the scaled equations.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ScaledBlock {
     /// Direct effect `a > 0`.
     pub a: f64,
-    /// Effect of the contact lifetime `b >= 0`.
+    /// Evolution effect `b >= 0`.
     pub b: f64,
     /// Scaled mass `M = m v_f^2 >= 0`.
     pub inertia: f64,
@@ -43,7 +42,7 @@ pub struct ScaledBlock {
 }
 
 impl ScaledBlock {
-    /// Steady sliding at `e^x v_f`, held there until now by the spring.
+    /// State of steady sliding at `e^x v_f`.
     pub fn steady(&self, x: f64) -> State {
         [(self.a - self.b) * x, -x, x]
     }
@@ -53,29 +52,29 @@ impl ScaledBlock {
         self.k == self.b - self.a && self.b - self.k == self.a
     }
 
-    /// The state on the section `v = v_f` at a place.
-    pub fn state(&self, [w, y]: Place) -> State {
+    /// State at a point of the section `v = v_f`.
+    pub fn state(&self, [w, y]: SectionPoint) -> State {
         let pull = exp(w);
-        if self.inertia > 0.0 { [pull + self.frozen() * y, y, 0.0] } else { [pull, pull / self.b, 0.0] }
+        if self.inertia > 0.0 { [pull + self.theta_coefficient() * y, y, 0.0] } else { [pull, pull / self.b, 0.0] }
     }
 
-    /// The place of a state on the section; NaN where rounding at rest has led to it.
-    pub fn place(&self, &[z, y, _]: &State) -> Place {
-        let pull = z - self.frozen() * y;
+    /// Section point of a state with `v = v_f`; NaN for a state that is rounding at rest.
+    pub fn section_point(&self, &[z, y, _]: &State) -> SectionPoint {
+        let pull = z - self.theta_coefficient() * y;
         [if pull > 0.0 { ln(pull) } else { f64::NAN }, y]
     }
 
-    /// Share of `ln theta` in the force about which the block swings: `b` where it swings faster than contacts age.
-    fn frozen(&self) -> f64 {
+    /// Coefficient of `ln theta` in the force about which the block oscillates: `b` for oscillations faster than ageing.
+    fn theta_coefficient(&self) -> f64 {
         let swings = self.k * self.inertia > self.a * self.a && self.k > self.inertia;
         if swings { self.b } else { 0.0 }
     }
 
-    /// The state after an arrest that takes no time, if one is under way.
+    /// State after an instantaneous arrest; `None` if there is none.
     ///
-    /// Where the spring holds the block back, the velocity falls faster than exponentially to where friction carries
-    /// the spring's force, `a x = z - b y`, which may be thousands of decades below. It gets there within `M e^x/(a x
-    /// + b y - z)`; once nothing else changes by more than `NEGLIGIBLE` in this time, the rest of the way is left out.
+    /// Where the spring holds the block back, the velocity falls faster than exponentially to the balance of friction and
+    /// spring force, `a x = z - b y`, which may be thousands of decades below. This takes at most `M e^x/(a x + b y - z)`.
+    /// The arrest is instantaneous once no other variable changes by more than `NEGLIGIBLE` in this time.
     pub fn arrest(&self, &[z, y, x]: &State) -> Option<State> {
         let resting = (z - self.b * y) / self.a;
         let pull = self.a * (x - resting);
@@ -84,40 +83,40 @@ impl ScaledBlock {
         (x > resting + 1.0 && time * rate < NEGLIGIBLE).then_some([z, y, resting])
     }
 
-    /// A step so short that little changes in it.
+    /// First step, in which the state changes little.
     pub fn first_step(&self, &[_, y, x]: &State) -> f64 {
         let v = exp(x);
         1e-3 / (self.k * (1.0 - v).abs() / self.a + v + exp(-y))
     }
 
-    /// Size of the force that counts: what moves `ln v` by 1 at rest, more where inertia rules.
+    /// Scale of the force: the change that changes `ln v` by 1 at rest, or more where inertia dominates.
     pub fn force(&self) -> f64 {
         (self.a * self.a.max((self.k * self.inertia).sqrt())).sqrt()
     }
 
-    /// Rate of the fastest motion that there may be at `v` and `ageing = e^-y`: damping by friction, swinging on the
-    /// spring, or ageing.
+    /// Upper bound of the rate of the fastest motion at `v` and `ageing = e^-y`: damping by friction, oscillation on the
+    /// spring, and ageing.
     pub fn fast(&self, v: f64, ageing: f64) -> f64 {
         let (damping, swinging) = (self.a / (self.inertia * v), (self.k / self.inertia).sqrt());
         damping.max(swinging) + ageing
     }
 }
 
-/// What the equations are made of, at a state: relative to their size also near steady sliding, where they vanish.
+/// Terms of the equations at a state, with full relative accuracy near steady sliding, where they vanish.
 #[derive(Debug, Clone, Copy)]
 pub struct Rates {
-    /// `v = e^x`.
+    /// Velocity `v = e^x`.
     pub v: f64,
-    /// `v - 1`.
+    /// Excess velocity `v - 1`.
     pub excess: f64,
-    /// `e^-y`.
+    /// Ageing rate `e^-y`.
     pub ageing: f64,
-    /// `y' = e^-y - v`.
+    /// Slope `y' = e^-y - v`.
     pub growth: f64,
 }
 
 impl Rates {
-    /// At `y` and `x`.
+    /// Rates at `y` and `x`.
     #[inline(always)]
     pub fn of(y: f64, x: f64) -> Rates {
         let ((v, excess), (ageing, surplus)) = (exp_and_m1(x), exp_and_m1(-y));

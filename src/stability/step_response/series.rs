@@ -1,28 +1,27 @@
-//! A response as a Taylor series in time.
+//! Taylor series of a response in time.
 //!
-//! With `v = e^x` and `w = e^-y` the equations of `slider.rs` are
+//! With `v = e^x` and `w = e^-y` the equations of `scaled_block.rs` are
 //!
 //! ```text
 //! z' = k (1 - v),    y' = w - v,    M v' = z - a x - b y,    v' = v x',    w' = -w y',
 //! ```
 //!
-//! products of two series at most, so each coefficient follows from those before it.
+//! which contain products of two series at most, so each coefficient follows from those before it.
 
 use super::scaled_block::{Rates, ScaledBlock, State, X, Y, Z};
 use crate::numerics::elementary::{exp, ln};
 
-/// Terms: the order of a step.
+/// Number of terms: the order of a step.
 pub const TERMS: usize = 16;
 
-/// Coefficients of `u … u^TERMS` of the changes of `[z, y, x]`.
+/// Coefficients of `u, …, u^TERMS` of the changes of `[z, y, x]`.
 pub type Powers = [[f64; TERMS]; 3];
 
 impl ScaledBlock {
-    /// The series about `state`, with its rates, in powers of the time in `unit`s, which keeps coefficients in the range
-    /// of doubles.
+    /// Series about `state` in powers of the time in units of `unit`, which keeps coefficients in the range of doubles.
     #[inline(always)]
     pub fn series(&self, &[z, y, x]: &State, rates: &Rates, unit: f64) -> Powers {
-        let (share, inverse) = (unit / self.inertia, 1.0 / rates.v);
+        let (factor, inverse) = (unit / self.inertia, 1.0 / rates.v);
         let (mut v, mut w) = ([rates.v; TERMS], [rates.ageing; TERMS]);
         // Coefficients of x' and y'.
         let (mut x_slope, mut y_slope) = ([0.0; TERMS], [0.0; TERMS]);
@@ -30,7 +29,7 @@ impl ScaledBlock {
         let mut force = z - self.a * x - self.b * y;
         let (mut stretching, mut growth) = (-self.k * rates.excess, rates.growth);
         for n in 0..TERMS {
-            let v_slope = share * force;
+            let v_slope = factor * force;
             y_slope[n] = unit * growth;
             let (mut known, mut w_slope) = (0.0, w[0] * y_slope[n]);
             for j in 0..n {
@@ -52,7 +51,7 @@ impl ScaledBlock {
     }
 }
 
-/// How far a series reaches, in its unit: its last two terms are below `tolerance` there, in units of `scale`.
+/// Time, in the unit of the series, at which its last two terms are `tolerance` in units of `scale`.
 #[inline(always)]
 pub fn reach(powers: &Powers, scale: &State, tolerance: f64) -> f64 {
     let size = |n: usize| (0..3).map(|r| powers[r][n].abs() / scale[r]).fold(f64::MIN_POSITIVE, f64::max);

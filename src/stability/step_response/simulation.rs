@@ -1,11 +1,11 @@
-//! A response followed to its end at finer and finer steps, until none of its numbers changes.
+//! Simulation of a response at ever tighter tolerances, until its numbers agree.
 
-use super::long_term::{Linear, MAX_STEPS, follow_once, step_error};
+use super::long_term::{LinearStability, MAX_STEPS, follow_once, step_error};
 use super::orbit::Extremum;
 use super::scaled_block::ScaledBlock;
 use crate::numerics::elementary::exp;
 
-/// The end of a response.
+/// Long-term behaviour of a response.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum LongTermBehaviour {
     /// Steady sliding.
@@ -15,67 +15,77 @@ pub enum LongTermBehaviour {
     },
     /// A limit cycle.
     Cycle {
-        /// Its duration, in `l/v_f`.
+        /// Period, in `l/v_f`.
         period: f64,
-        /// `ln(v/v_f)` at its fastest.
+        /// Greatest `ln(v/v_f)`.
         high: f64,
-        /// `ln(v/v_f)` at its slowest.
+        /// Least `ln(v/v_f)`.
         low: f64,
     },
-    /// None that could be decided with the work allowed.
+    /// Undecided within the step limit.
     Undecided,
     /// The velocity becomes infinite in finite time, which takes a mass of 0 and `k < b - a`.
-    Ends,
+    BlowUp,
 }
 
-/// A response that was followed to its end.
+/// Simulated response.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Simulation {
-    /// Its end.
+    /// Long-term behaviour.
     pub long_term: LongTermBehaviour,
-    /// Its fastest moment since `v = v_f` was first met, if there was one; its time is NaN if unknown.
+    /// Maximum of the velocity after `v = v_f` is first reached, if there is one; its time is NaN if unknown.
     pub high: Option<Extremum>,
-    /// Its slowest.
+    /// Minimum of the velocity after `v = v_f` is first reached, if there is one.
     pub low: Option<Extremum>,
-    /// Time up to which it was followed, in `l/v_f`.
+    /// Simulated time, in `l/v_f`.
     pub t: f64,
-    /// Steps taken.
+    /// Number of steps.
     pub steps: u32,
-    /// Numbers that two accuracies do not agree on.
-    pub doubts: Doubts,
+    /// Numbers that differ between two accuracies.
+    pub unresolved: UnresolvedNumbers,
 }
 
-/// Numbers of a course that steps cannot be made fine enough for: a velocity that falls over many decades magnifies every
-/// error, and so does the last of thousands of swings that just leaves the band of settled velocities.
+/// Numbers that no step size resolves.
+///
+/// A velocity that falls over many decades magnifies every error. So does the last of thousands of oscillations that just
+/// leaves the band of settled velocities.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub struct Doubts {
+pub struct UnresolvedNumbers {
     /// The least velocity.
     pub trough: bool,
     /// The least velocity on the limit cycle.
     pub cycle_trough: bool,
     /// The time of the greatest velocity.
     pub t_peak: bool,
-    /// The time after which it is settled.
+    /// The settling time.
     pub settling_time: bool,
 }
 
-/// Accuracies of the runs, in units of `rtol`. A change by `rtol` from one run to the next leaves an error of a tenth of that.
+/// Accuracies of the runs, in units of `rtol`. Derived: a change by `rtol` between two runs leaves a tenth of it as error.
 const ACCURACIES: [f64; 4] = [3.0, 0.3, 0.03, 0.003];
 
-/// Least change of a logarithm between two runs that tells them apart. Rounding of a state of size 1 in 1e4 steps.
-pub(super) const ROUNDED: f64 = 1e-11;
+/// Difference of a logarithm between two runs, at least. Derived: rounding of a state of size 1 in 1e4 steps.
+pub(super) const MIN_DIFFERENCE: f64 = 1e-11;
 
-/// `ln(v/v_f)` whose velocity is 0 in doubles, whatever its unit.
-pub(super) const VANISHING: f64 = -1000.0;
+/// `ln(v/v_f)` below which the velocity is 0 in doubles, in any unit.
+pub(super) const UNDERFLOW_LN_V: f64 = -1000.0;
 
-/// Follows the response that starts from steady sliding at `e^x v_f`, `x` not 0, with numbers good to `rtol`: at finer and
-/// finer steps, until nothing changes by more than that from one run to the next. Where that does not happen it is
-/// `Undecided`, or in doubt in the numbers that change.
-pub fn follow(slider: &ScaledBlock, linear: Linear, x: f64, rtol: f64) -> Simulation {
+/// Simulates the response from steady sliding at `e^x v_f`, `x` not 0, with numbers to `rtol`.
+///
+/// Runs at ever tighter tolerances end where no number changes by more than `rtol`. Otherwise the response is `Undecided`,
+/// or the numbers that change are unresolved.
+pub fn follow(slider: &ScaledBlock, linear: LinearStability, x: f64, rtol: f64) -> Simulation {
     if slider.inertia == 0.0 && slider.b > slider.a && !linear.stable {
-        // Below the critical stiffness the potential of docs/derivations.md grows without bound; at it nothing changes.
-        let long_term = if slider.is_critical() { LongTermBehaviour::Undecided } else { LongTermBehaviour::Ends };
-        return Simulation { long_term, high: None, low: None, t: 0.0, steps: 0, doubts: Doubts::default() };
+        // Below the critical stiffness the potential (docs/derivations.md) has no lower bound; at it, it is constant.
+        let long_term = if slider.is_critical() { LongTermBehaviour::Undecided } else { LongTermBehaviour::BlowUp };
+        return Simulation {
+            long_term,
+            high: None,
+            low: None,
+            t: 0.0,
+            steps: 0,
+            unresolved: UnresolvedNumbers::default(),
+        };
     }
     if !is_checked(slider, x) {
         return Simulation {
@@ -84,53 +94,55 @@ pub fn follow(slider: &ScaledBlock, linear: Linear, x: f64, rtol: f64) -> Simula
             low: None,
             t: 0.0,
             steps: 0,
-            doubts: Doubts::default(),
+            unresolved: UnresolvedNumbers::default(),
         };
     }
     let mut simulation = follow_once(slider, linear, x, rtol, ACCURACIES[0]);
     let mut known = false;
-    for shares in ACCURACIES.windows(2) {
-        let [coarse, fine] = [shares[0], shares[1]].map(|share| step_error(rtol, share));
-        // Finer steps would be more, and the same steps lead to the same.
+    for fractions in ACCURACIES.windows(2) {
+        let [coarse, fine] = [fractions[0], fractions[1]].map(|fraction| step_error(rtol, fraction));
+        // A finer run would exceed the step limit, or have equal steps.
         if (simulation.long_term == LongTermBehaviour::Undecided && simulation.steps >= MAX_STEPS)
             || fine > 0.5 * coarse
         {
             break;
         }
-        let finer = follow_once(slider, linear, x, rtol, shares[1]);
-        let doubts = simulation.compared(&finer, rtol.max(ROUNDED));
-        simulation = Simulation { steps: simulation.steps + finer.steps, doubts: doubts.unwrap_or_default(), ..finer };
-        // A number that is still in doubt at a third run seldom becomes clear.
-        if doubts.is_some_and(|doubts| known || doubts == Doubts::default()) {
+        let finer = follow_once(slider, linear, x, rtol, fractions[1]);
+        let unresolved = simulation.compared(&finer, rtol.max(MIN_DIFFERENCE));
+        simulation =
+            Simulation { steps: simulation.steps + finer.steps, unresolved: unresolved.unwrap_or_default(), ..finer };
+        // A number that is unresolved at a third run seldom becomes resolved.
+        if unresolved.is_some_and(|unresolved| known || unresolved == UnresolvedNumbers::default()) {
             return simulation;
         }
-        known = doubts.is_some();
+        known = unresolved.is_some();
     }
     if known { simulation } else { Simulation { long_term: LongTermBehaviour::Undecided, ..simulation } }
 }
 
-/// How far beyond the physical domain responses are followed, a factor of each bound. Chosen: the random sample of
-/// `tests/solver/stress/step.rs` checks numbers up to there.
-const BEYOND: f64 = 1e6;
+/// Factor of each bound of the physical domain up to which responses are simulated. Chosen: the random sample of
+/// `tests/solver/stress/step_response.rs` checks numbers up to there.
+const DOMAIN_MARGIN: f64 = 1e6;
 
-/// Whether a response lies in the physical domain of docs/accuracy.md, or not far from it.
+/// Whether a response lies within [`DOMAIN_MARGIN`] of the physical domain of docs/accuracy.md.
 fn is_checked(slider: &ScaledBlock, x: f64) -> bool {
-    let near = |value: f64, [least, greatest]: [f64; 2]| (least / BEYOND..=greatest * BEYOND).contains(&value);
+    let near =
+        |value: f64, [least, greatest]: [f64; 2]| (least / DOMAIN_MARGIN..=greatest * DOMAIN_MARGIN).contains(&value);
     near(slider.a, [1e-3, 0.3])
-        && slider.b <= BEYOND * 20.0 * slider.a
+        && slider.b <= DOMAIN_MARGIN * 20.0 * slider.a
         && near(slider.k / slider.a, [1e-4, 1e5])
         && (slider.inertia == 0.0 || near(slider.inertia / slider.a, [1e-8, 1e4]))
         && near(exp(x), [1e-6, 1e6])
 }
 
 impl Simulation {
-    /// Fastest moment on the way, if it is one: what is only approached is not.
+    /// Greatest velocity of the transient; `None` if the greatest velocity is only approached.
     pub fn peak(&self, rtol: f64) -> Option<Extremum> {
         let last = if let LongTermBehaviour::Cycle { high, .. } = self.long_term { high } else { 0.0 };
         self.high.filter(|high| high.x > last + rtol)
     }
 
-    /// `ln(v/v_f)` at its slowest and fastest, the end included.
+    /// Least and greatest `ln(v/v_f)`, the long-term behaviour included.
     pub fn range(&self) -> [f64; 2] {
         let [low, high] =
             if let LongTermBehaviour::Cycle { high, low, .. } = self.long_term { [low, high] } else { [0.0; 2] };
@@ -138,37 +150,37 @@ impl Simulation {
         [low.min(reached(self.low)), high.max(reached(self.high))]
     }
 
-    /// Which of its numbers differ by more than `rtol` from those of another; `None` if the end or the peak does.
-    fn compared(&self, other: &Simulation, rtol: f64) -> Option<Doubts> {
+    /// Numbers that differ by more than `rtol` from those of another; `None` if the long-term behaviour or the peak differs.
+    fn compared(&self, other: &Simulation, rtol: f64) -> Option<UnresolvedNumbers> {
         let near = |x: f64, y: f64| (x - y).abs() <= rtol;
         let alike = |x: f64, y: f64| near(x / y, 1.0) || x == y;
-        let slow = |x: f64, y: f64| near(x, y) || (x < VANISHING && y < VANISHING);
-        let mut doubts = other.doubts;
+        let slow = |x: f64, y: f64| near(x, y) || (x < UNDERFLOW_LN_V && y < UNDERFLOW_LN_V);
+        let mut unresolved = other.unresolved;
         let ends = match (self.long_term, other.long_term) {
             (LongTermBehaviour::Settled { time }, LongTermBehaviour::Settled { time: other }) => {
-                doubts.settling_time |= !alike(time, other);
+                unresolved.settling_time |= !alike(time, other);
                 true
             }
             (
                 LongTermBehaviour::Cycle { period, high, low },
                 LongTermBehaviour::Cycle { period: other, high: top, low: bottom },
             ) => {
-                doubts.cycle_trough |= !slow(low, bottom);
+                unresolved.cycle_trough |= !slow(low, bottom);
                 alike(period, other) && near(high, top)
             }
-            (LongTermBehaviour::Undecided, LongTermBehaviour::Undecided) => return Some(doubts),
+            (LongTermBehaviour::Undecided, LongTermBehaviour::Undecided) => return Some(unresolved),
             _ => false,
         };
         let ([low, high], [bottom, top]) = (self.range(), other.range());
-        // That of the cycle may be the least of all.
-        doubts.trough = !slow(low, bottom) || (doubts.cycle_trough && bottom > VANISHING);
-        // The flatter a peak, the less is known of when it was. On the way to a cycle all but as high moments are many.
+        // The trough of the cycle may be the least velocity of all.
+        unresolved.trough = !slow(low, bottom) || (unresolved.cycle_trough && bottom > UNDERFLOW_LN_V);
+        // The flatter a peak, the less accurate its time. Many peaks on the way to a cycle are almost as high.
         let simultaneous = |peak: Extremum, exact: Extremum| (peak.t / exact.t - 1.0).abs() <= rtol / exact.x.min(1.0);
-        doubts.t_peak |= match (self.peak(rtol), other.peak(rtol)) {
+        unresolved.t_peak |= match (self.peak(rtol), other.peak(rtol)) {
             (None, None) => false,
             (Some(peak), Some(other)) => !simultaneous(peak, other),
             _ => true,
         };
-        (ends && near(high, top)).then_some(doubts)
+        (ends && near(high, top)).then_some(unresolved)
     }
 }

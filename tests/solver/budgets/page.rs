@@ -22,7 +22,10 @@ fn path() -> PathBuf {
 pub fn check(ledger: &Ledger, points: &Points) {
     let text = fs::read_to_string(path()).expect("is readable");
     let right = filled(&text, ledger, points) == text;
-    assert!(right, "docs/accuracy-appendix.md shows other budgets: `SLIPSWEEP_BUDGETS=write cargo test --test solver budgets`");
+    assert!(
+        right,
+        "docs/accuracy-appendix.md shows other budgets: `SLIPSWEEP_BUDGETS=write cargo test --test solver budgets`"
+    );
 }
 
 /// Makes the page show these budgets; a table without a block gets one at the end.
@@ -51,7 +54,8 @@ fn filled(text: &str, ledger: &Ledger, points: &Points) -> String {
     let mut text = text.to_owned();
     for known in measured(points) {
         let begin = begin(known);
-        let (before, rest) = text.split_once(&begin).unwrap_or_else(|| panic!("no {begin}in docs/accuracy-appendix.md"));
+        let (before, rest) =
+            text.split_once(&begin).unwrap_or_else(|| panic!("no {begin}in docs/accuracy-appendix.md"));
         let (_, after) = rest.split_once("<!-- END -->").expect("every block has an end");
         text = format!("{before}{begin}\n{}\n<!-- END -->{after}", block(known, ledger, points));
     }

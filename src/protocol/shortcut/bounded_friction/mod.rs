@@ -1,18 +1,18 @@
 //! `bounded_friction`: `tau < tau_M` by construction.
 //!
 //! `tau = tau_M - (tau_M - tau_i) R^x e^(alpha_3 x (1 - x))` with `x = t/t_f` and `R = (tau_M - tau_f)/(tau_M - tau_i)`
-//! falls strictly with `alpha_3` at every inner `x`. By comparison `theta' = 1 - theta^(1 - b/a) e^((tau - 1)/a)` makes
-//! `theta(t_f)` from `theta(0) = 1/v_i` rise strictly with `alpha_3`. Its limits are that of `tau = tau_M` throughout
-//! and that of `v = 0`, which is `1/v_i + t_f`. So there is one member if `1/v_f` lies strictly between them, none
-//! otherwise. Read backwards from `t_f`, `theta(0)` falls with `alpha_3`, and the conditions are the same.
+//! falls strictly with `alpha_3` at every inner `x`. By comparison for `theta' = 1 - theta^(1 - b/a) e^((tau - 1)/a)`,
+//! `theta(t_f)` from `theta(0) = 1/v_i` rises strictly with `alpha_3`. Its limits are its values for `tau = tau_M`
+//! throughout and for `v = 0`, the latter `1/v_i + t_f`. There is one member if `1/v_f` lies strictly between them, none
+//! otherwise. Backwards from `t_f`, `theta(0)` falls with `alpha_3`, under equal conditions.
 //!
 //! As `tau_M` grows, `alpha_3` tends to 0 and friction to a parabola in time, `tau_i + (tau_f - tau_i) x + A x (1 -
-//! x)`, which is the member for an infinite `tau_M`: there is no bound.
+//! x)`. This is the member for an infinite `tau_M`, that is, without bound.
 //!
 //! `d(theta')/d(theta) = (b/a - 1) v`: theta is integrated forwards for `b <= a` and backwards for `b > a`, as both
-//! contract. Where the time is just long enough, theta arrives whatever `alpha_3` is, but for little. Then the time to
-//! spare is compared with what takes it: the slip `int theta v dt` beyond the time of `v = 0`, and beyond that of
-//! `tau = tau_M`, with `z_M = ln(theta v)` for friction `tau_M`,
+//! contract. Where the time is just long enough, theta at the end hardly depends on `alpha_3`. Then the equation is for
+//! the spare time. Beyond the time of `v = 0` it equals the slip `int theta v dt`. Beyond the time of `tau = tau_M` it
+//! equals, with `z_M = ln(theta v)` for friction `tau_M`,
 //!
 //! ```text
 //! int [1 - e^(-(tau_M - tau)/a)]/[1 - e^(-z_M)] dt.
@@ -20,27 +20,27 @@
 //!
 //! Both are sums of positive terms and fall like `1/|alpha_3|`.
 //!
-//! Where the block stands still in between, either pass would lose in the standstill what tells its start from its end:
-//! there both ends are followed to a place in it, and the slip on both ways is compared with the time to spare.
+//! In a standstill, theta does not depend on either end. There both ends are integrated to a point in the standstill,
+//! and the slip of both is compared with the spare time.
 
-mod extent;
-mod gap;
+mod friction_margin;
 mod motion;
 mod panel;
 mod path;
+mod work_and_velocity;
 
 use super::{Case, Family, Obstacle, Shortcut};
 use crate::numerics::elementary::{exp, exp_m1, ln, ln_1p};
 use crate::numerics::gauss::rule;
 use crate::numerics::root::{Probe, newton};
 use crate::protocol::{Motion, SolverStats};
-use extent::Extent;
-use gap::gap;
-use motion::Resolution;
+use friction_margin::friction_margin;
+use motion::BoundedFrictionMotion;
 use panel::Panel;
-use path::{FrictionPath, Measure, Stop, WorkSums};
+use path::{FrictionPath, PassFailure, Residual, WorkTolerance};
+use work_and_velocity::WorkAndVelocity;
 
-/// The family.
+/// The family `bounded_friction`.
 pub struct BoundedFriction;
 
 impl Family for BoundedFriction {
@@ -61,20 +61,20 @@ impl Family for BoundedFriction {
     }
 
     fn solve(&self, case: &Case, rtol: f64, stats: &mut SolverStats) -> Result<Shortcut, Obstacle> {
-        let mut extent = None;
+        let mut totals = None;
         let path = member(case, rtol, stats, |path, panel| match panel {
-            Some(panel) => extent.get_or_insert_with(|| Extent::new(&case.transition)).add(path, panel),
-            None => extent = None,
+            Some(panel) => totals.get_or_insert_with(|| WorkAndVelocity::new(&case.transition)).add(path, panel),
+            None => totals = None,
         })?;
-        let extent = extent.unwrap_or_else(|| Extent::steady(&path, case.transition.v_i));
-        if !extent.work.is_finite() {
+        let totals = totals.unwrap_or_else(|| WorkAndVelocity::steady(&path, case.transition.v_i));
+        if !totals.work.is_finite() {
             return Err(Obstacle::NotConverged);
         }
         Ok(Shortcut {
             alpha: Some(if case.tau_ceiling == f64::INFINITY { 0.0 } else { path.alpha }),
-            work: extent.work,
-            v_min: extent.v_min,
-            v_max: extent.v_max,
+            work: totals.work,
+            v_min: totals.v_min,
+            v_max: totals.v_max,
             friction_max: path.friction_max().min(case.tau_ceiling),
             friction_min: path.friction_min(),
             miss: 0.0,
@@ -88,69 +88,68 @@ impl Family for BoundedFriction {
             None => panels.clear(),
         })?;
         if panels.is_empty() {
-            // Steady sliding: one panel tells it all.
+            // Steady sliding: one panel.
             let tolerances = (0.1 * rtol, 0.1 * rtol);
-            let work = WorkSums { accuracy: rtol, expected: 0.0 };
+            let work = WorkTolerance { accuracy: rtol, expected: 0.0 };
             let again = path.pass(tolerances, Some(work), &mut SolverStats::default(), |_, panel| panels.push(*panel));
             again.map_err(|_| Obstacle::NotConverged)?;
             path.alpha = 0.0;
         }
-        // What was integrated backwards lies behind what was integrated forwards.
+        // Panels of backward integration come after those of forward integration, in reverse order.
         let (mut panels, backward): (Vec<Panel>, Vec<Panel>) = panels.into_iter().partition(|panel| panel.forward);
         panels.extend(backward.into_iter().rev());
-        Ok(Box::new(Resolution { path, panels }))
+        Ok(Box::new(BoundedFrictionMotion { path, panels }))
     }
 }
 
-/// Stands for an infinite distance from the bound.
-const FAR: f64 = 1e100;
+/// Margin without a bound, in `mu_0 sigma`: stands for infinity.
+const UNBOUNDED_MARGIN: f64 = 1e100;
 
-/// Below this share of [`FrictionPath::worth`] the time to spare is what a course is measured by.
-const CLOSE: f64 = 0.1;
+/// Spare time, fraction of [`FrictionPath::time_per_w`], below which it is the residual. Chosen.
+const SPARE_TIME_FRACTION: f64 = 0.1;
 
-/// Share of the time that a standstill takes beyond which the ways to it are compared with the time to spare.
-const STANDSTILL: f64 = 0.1;
+/// Duration of a standstill, fraction of `t_f`, above which the residual is two-sided. Chosen.
+const STANDSTILL_FRACTION: f64 = 0.1;
 
-/// Tolerance of the first search.
-const COARSE: f64 = 1e-4;
+/// Tolerance of the passes of the first search. Chosen.
+const SEARCH_TOLERANCE: f64 = 1e-4;
 
-/// Logarithm of the ratio of the velocities beyond which they count as far apart, and `b/a` times it.
-const FAR_APART: f64 = 7.0;
-const FAR_APART_FOR_THETA: f64 = 1e3;
+/// Logarithm of the ratio of the velocities above which they count as far apart, and `b/a` times it. Chosen.
+const MIN_LN_RATIO: f64 = 7.0;
+const MIN_LN_THETA_RATIO: f64 = 1e3;
 
-/// What ends it.
-const ENOUGH: f64 = 1e-3;
+/// Relative change of `alpha_3` that ends the search. Chosen.
+const SEARCH_RTOL: f64 = 1e-3;
 
-/// Accuracy of what is not to be had at less.
-const FINE: f64 = 1e-8;
+/// Tolerance where errors grow in every direction. Chosen.
+const FINE_RTOL: f64 = 1e-8;
 
-/// Growth of errors beyond which the other direction is tried.
-const MOST_ERRORS: f64 = 1e3;
+/// Growth of errors above which the other direction is tried. Chosen.
+const MAX_ERROR_GROWTH: f64 = 1e3;
 
-/// Rounding of theta beyond which a pass counts as lost, where less is not asked for: as long as another way may have
-/// less, and then.
-const LITTLE_NOISE: f64 = 1e-11;
-const MOST_NOISE: f64 = 1e-9;
+/// Relative rounding of theta at which a pass fails, if the requested tolerance is tighter: while other residuals are
+/// left, and for the last. Chosen.
+const LOW_NOISE: f64 = 1e-11;
+const MAX_NOISE: f64 = 1e-9;
 
-/// Most passes after the first search: Newton's method needs two or three, and a dozen more where theta has all but
-/// relaxed at the end.
-const MOST_PASSES: u32 = 40;
+/// Passes after the first search, at most. Chosen: Newton's method needs two or three, and a dozen more where theta has
+/// almost relaxed at the end.
+const MAX_PASSES: u32 = 40;
 
-/// Change of some velocity by the last step beyond which rounding has left too little of a way, as long as there may be
-/// another.
-const SURE: f64 = 1e-3;
+/// Relative change of some velocity in the last step, at most, while other residuals are left. Chosen.
+const MAX_LAST_CHANGE: f64 = 1e-3;
 
-/// Tolerance of the nodes of the last pass, in units of rtol.
-const LAST: f64 = 0.1;
+/// Tolerance at the nodes of the last pass, in units of `rtol`. Chosen.
+const LAST_PASS_FRACTION: f64 = 0.1;
 
-/// Least tolerance of nodes: rounding allows no less.
-const FINEST: f64 = 1e-13;
+/// Tolerance at the nodes, at least: rounding.
+const MIN_TOLERANCE: f64 = 1e-13;
 
-/// What rounding of `w` may leave of the target.
+/// Relative error of the target from rounding of `w`, at most.
 const ROUNDING: f64 = 8.0 * f64::EPSILON;
 
-/// The course of the member that solves the case; the panels of its last pass go to `visit`, `None` when a pass begins.
-/// No panel is visited where the protocol is steady sliding.
+/// Path of the member that solves the case. `visit` receives the panels of the last pass, and `None` when a pass begins;
+/// no panel for steady sliding.
 fn member(
     case: &Case,
     rtol: f64,
@@ -163,42 +162,41 @@ fn member(
         return Err(Obstacle::Domain);
     }
     let unbounded = case.tau_ceiling == f64::INFINITY;
-    let distance = |v: f64| if unbounded { FAR } else { gap(law, case.tau_ceiling, v) };
-    let (gap_i, gap_f) = (distance(v_i), distance(v_f));
-    if gap_i <= 0.0 || gap_f <= 0.0 {
-        return Err(Obstacle::FrictionAtEnds { friction: case.tau_ceiling - gap_i.min(gap_f) });
+    let distance = |v: f64| if unbounded { UNBOUNDED_MARGIN } else { friction_margin(law, case.tau_ceiling, v) };
+    let (margin_i, margin_f) = (distance(v_i), distance(v_f));
+    if margin_i <= 0.0 || margin_f <= 0.0 {
+        return Err(Obstacle::FrictionAtEnds { friction: case.tau_ceiling - margin_i.min(margin_f) });
     }
     let change = (v_i - v_f) / v_f;
     let log_ratio = if change.abs() < 0.5 { ln_1p(change) } else { ln(v_i / v_f) };
-    let share = (law.a - law.b) * log_ratio / gap_i;
-    let ln_r = if share.abs() < 0.5 { ln_1p(share) } else { ln(gap_f / gap_i) };
+    let fraction = (law.a - law.b) * log_ratio / margin_i;
+    let ln_r = if fraction.abs() < 0.5 { ln_1p(fraction) } else { ln(margin_f / margin_i) };
     if v_i == v_f {
-        return Ok(FrictionPath::new(case, (gap_i, gap_f), ln_r, log_ratio, Measure::Level));
+        return Ok(FrictionPath::new(case, (margin_i, margin_f), ln_r, log_ratio, Residual::LnTheta));
     }
-    // Time beyond that of v = 0 or that of tau = tau_M.
+    // Spare time, beyond the time of v = 0 or of tau = tau_M.
     let accelerates = v_f > v_i;
     let spare = t_f
         - if accelerates {
-            fastest(law.a, v_i, -log_ratio, (gap_i, gap_f), stats)
+            acceleration_time_at_ceiling(law.a, v_i, -log_ratio, (margin_i, margin_f), stats)
         } else {
             (v_i - v_f) / v_i * (1.0 / v_f)
         };
     if spare <= 0.0 {
         return Err(if accelerates { Obstacle::Friction } else { Obstacle::Velocity });
     }
-    let measure = if accelerates { Measure::Lag { spare } } else { Measure::Slip { spare } };
-    let path = FrictionPath::new(case, (gap_i, gap_f), ln_r, log_ratio, measure);
-    let close = spare < CLOSE * path.worth(0.0).min(t_f);
-    // From a standstill theta grows, and forgets forwards what it was.
+    let residual = if accelerates { Residual::TimeLoss { spare } } else { Residual::Slip { spare } };
+    let path = FrictionPath::new(case, (margin_i, margin_f), ln_r, log_ratio, residual);
+    let is_close = spare < SPARE_TIME_FRACTION * path.time_per_w(0.0).min(t_f);
+    // From a standstill theta grows, and errors decay forwards.
     let measured = if accelerates { path } else { path.towards(true) };
-    let level = path.measured_by(Measure::Level);
-    let meeting = path.towards(true).measured_by(Measure::Meeting { spare });
-    let all = [measured, measured.reversed(), level, level.reversed(), meeting];
-    // What a pass through a standstill loses grows like the ratio of the velocities, and where theta runs away, b/a
-    // times.
-    let far = log_ratio > FAR_APART || log_ratio * law.b > FAR_APART_FOR_THETA * law.a;
-    let standstill = !accelerates && far && t_f - spare > STANDSTILL * t_f;
-    let order: &[usize] = match (standstill, close) {
+    let by_theta = path.with_residual(Residual::LnTheta);
+    let two_sided = path.towards(true).with_residual(Residual::TwoSidedSlip { spare });
+    let all = [measured, measured.reversed(), by_theta, by_theta.reversed(), two_sided];
+    // The loss of digits in a standstill grows with the ratio of the velocities, and b/a times where theta runs away.
+    let far = log_ratio > MIN_LN_RATIO || log_ratio * law.b > MIN_LN_THETA_RATIO * law.a;
+    let standstill = !accelerates && far && t_f - spare > STANDSTILL_FRACTION * t_f;
+    let order: &[usize] = match (standstill, is_close) {
         (true, true) => &[4, 0, 1, 2, 3],
         (true, false) => &[4, 2, 3, 0, 1],
         (false, true) => &[0, 1, 2, 3, 4],
@@ -206,21 +204,21 @@ fn member(
     };
     let order = order.iter().filter(|&&place| !(accelerates && place == 4));
     let mut start = None;
-    // Rounding of the time, spent at the greater velocity, allows no better.
-    let blur = 100.0 * f64::EPSILON * t_f * v_i.max(v_f);
-    let (little, most) = (LITTLE_NOISE.max(rtol), MOST_NOISE.max(rtol).max(blur));
-    // Where errors grow on every way, a rough pass may be lost and a fine one not.
-    let fine = rtol.min(FINE);
-    for (strict, most_noise, rtol) in
-        [(true, little, rtol), (true, most, rtol), (false, most, rtol), (false, most, fine)]
+    // Rounding of the time, at the greater velocity.
+    let time_rounding = 100.0 * f64::EPSILON * t_f * v_i.max(v_f);
+    let (low_noise, max_noise) = (LOW_NOISE.max(rtol), MAX_NOISE.max(rtol).max(time_rounding));
+    // Where errors grow for every residual, a fine pass may arrive where a rough pass fails.
+    let fine = rtol.min(FINE_RTOL);
+    for (strict, max_noise, rtol) in
+        [(true, low_noise, rtol), (true, max_noise, rtol), (false, max_noise, rtol), (false, max_noise, fine)]
     {
         for path in order.clone().map(|&place| all[place]) {
-            let Some((alpha, errors)) = rough(&path, start, strict, stats) else { continue };
-            start = start.or((path.measure == Measure::Level || errors < MOST_ERRORS).then_some(alpha));
-            if strict && errors > MOST_ERRORS {
+            let Some((alpha, errors)) = rough_alpha(&path, start, strict, stats) else { continue };
+            start = start.or((path.residual == Residual::LnTheta || errors < MAX_ERROR_GROWTH).then_some(alpha));
+            if strict && errors > MAX_ERROR_GROWTH {
                 continue;
             }
-            if let Some(found) = refined(path.with(alpha), (rtol, most_noise), strict, stats, &mut visit) {
+            if let Some(found) = refine(path.with(alpha), (rtol, max_noise), strict, stats, &mut visit) {
                 return Ok(found);
             }
         }
@@ -228,83 +226,87 @@ fn member(
     Err(Obstacle::NotConverged)
 }
 
-/// `alpha_3` to [`COARSE`], and by how much errors on the way would grow.
-fn rough(path: &FrictionPath, start: Option<f64>, strict: bool, stats: &mut SolverStats) -> Option<(f64, f64)> {
-    match path.measure {
-        Measure::Level => search(path, start.unwrap_or(0.0), strict, stats),
-        Measure::Slip { spare } | Measure::Meeting { spare } => closest(path, 2.0 * path.t_f / spare, strict, stats),
-        Measure::Lag { spare } => closest(path, -2.0 * path.t_f / spare, strict, stats),
+/// `alpha_3` to [`SEARCH_TOLERANCE`], and the growth of errors.
+fn rough_alpha(path: &FrictionPath, start: Option<f64>, strict: bool, stats: &mut SolverStats) -> Option<(f64, f64)> {
+    match path.residual {
+        Residual::LnTheta => search(path, start.unwrap_or(0.0), strict, stats),
+        Residual::Slip { spare } | Residual::TwoSidedSlip { spare } => {
+            search_far_out_again(path, 2.0 * path.t_f / spare, strict, stats)
+        }
+        Residual::TimeLoss { spare } => search_far_out_again(path, -2.0 * path.t_f / spare, strict, stats),
     }
 }
 
-/// [`close`], and once more to as much as the growth of errors asks for where there is no way on which they grow less.
-fn closest(path: &FrictionPath, start: f64, strict: bool, stats: &mut SolverStats) -> Option<(f64, f64)> {
-    let (alpha, errors) = close(path, start, (COARSE, ENOUGH), stats)?;
-    if strict || errors < MOST_ERRORS {
+/// [`search_far_out`], repeated at a tighter tolerance where errors grow for the last residual.
+fn search_far_out_again(path: &FrictionPath, start: f64, strict: bool, stats: &mut SolverStats) -> Option<(f64, f64)> {
+    let (alpha, errors) = search_far_out(path, start, (SEARCH_TOLERANCE, SEARCH_RTOL), stats)?;
+    if strict || errors < MAX_ERROR_GROWTH {
         return Some((alpha, errors));
     }
-    let fine = ((COARSE / errors).max(FINEST), ENOUGH * ENOUGH);
-    close(path, alpha / path.unit(), fine, stats).or(Some((alpha, errors)))
+    let fine = ((SEARCH_TOLERANCE / errors).max(MIN_TOLERANCE), SEARCH_RTOL * SEARCH_RTOL);
+    search_far_out(path, alpha / path.alpha_scale(), fine, stats).or(Some((alpha, errors)))
 }
 
-/// The course from a rough `alpha_3` on to the one that arrives; `None` where it does not come so far.
-fn refined(
+/// Refines a path to the one that arrives; `None` where this fails.
+fn refine(
     mut path: FrictionPath,
-    (rtol, most_noise): (f64, f64),
+    (rtol, max_noise): (f64, f64),
     strict: bool,
     stats: &mut SolverStats,
     visit: &mut impl FnMut(&FrictionPath, Option<&Panel>),
 ) -> Option<FrictionPath> {
     visit(&path, None);
     let (mut last_pass, mut before, mut tolerance, mut expected) = (false, f64::INFINITY, 0.1 * rtol, 0.0);
-    for _ in 0..MOST_PASSES {
+    for _ in 0..MAX_PASSES {
         let pass = |path: &FrictionPath, panel: &Panel| {
             if last_pass {
                 visit(path, Some(panel));
             }
         };
-        // The last pass tells the work and the extremes too, which lie between the nodes.
-        let nodes = (LAST * rtol).max(FINEST);
+        // The last pass gives the work too, and the extremes, which lie between the nodes.
+        let nodes = (LAST_PASS_FRACTION * rtol).max(MIN_TOLERANCE);
         let fine = nodes * nodes.sqrt();
         let (within_pass, work) = if last_pass {
-            ((tolerance.min(fine), fine), Some(WorkSums { accuracy: nodes, expected: 0.5 * expected }))
+            ((tolerance.min(fine), fine), Some(WorkTolerance { accuracy: nodes, expected: 0.5 * expected }))
         } else {
             ((tolerance, 0.1 * rtol), None)
         };
         let end = path.pass(within_pass, work, stats, pass).ok()?;
         expected = end.work;
-        let (_, step) = path.miss(&end);
-        let scale = path.scale(&end);
-        let within = |share: f64| step.abs() <= share * scale;
-        // Rounding allows no better, once Newton's method no longer gains; that of the bound, and of alpha itself, only
-        // where no other way tells more.
+        let (_, step) = path.residual_and_step(&end);
+        let scale = path.alpha_resolution(&end);
+        let within = |fraction: f64| step.abs() <= fraction * scale;
+        // Newton's method has converged to rounding; that of the bound and of alpha counts only for the last residual.
         let neighbours = step.abs() <= f64::EPSILON * path.alpha.abs();
-        let rounding = path.rounding(&end).max(if strict { 0.0 } else { path.blur });
+        let rounding = path.rounding(&end).max(if strict { 0.0 } else { path.ln_r_rounding });
         let spent = step.abs() <= ROUNDING * rounding && step.abs() >= 0.5 * before
             || path.alpha + step == path.alpha
             || neighbours && !strict;
-        if end.noise * f64::EPSILON > most_noise {
+        if end.noise * f64::EPSILON > max_noise {
             return None;
         }
-        // Slips that add up to the time to spare are known to its rounding. Where that leaves more of alpha than is asked for,
-        // theta at the end may tell the rest. What rounding of t_f itself leaves, no way tells.
-        let vague = ROUNDING * path.lost_in_sum(&end) > 0.5 * rtol.max(LITTLE_NOISE) * scale;
-        if strict && last_pass && vague {
+        // Slips that add up to the spare time are known to its rounding. Theta at the end may determine alpha better. The
+        // rounding of t_f itself limits every residual.
+        let is_lost_in_rounding = ROUNDING * path.lost_in_sum(&end) > 0.5 * rtol.max(LOW_NOISE) * scale;
+        if strict && last_pass && is_lost_in_rounding {
             return None;
         }
         if last_pass && (within(0.5 * rtol) || spent) {
-            // Where nothing depends on alpha but by rounding, this way tells nothing.
-            return within(if strict { SURE } else { 1.0 }).then_some(path);
+            // Where this residual depends on alpha by rounding only, it fails.
+            return within(if strict { MAX_LAST_CHANGE } else { 1.0 }).then_some(path);
         }
-        // From side to side of the next double: another way to the end may tell more.
+        // Steps alternate between neighbouring doubles: another residual may be better conditioned.
         if !step.is_finite() || last_pass && neighbours {
             return None;
         }
-        // What a panel may lack for the end to be as good as the step that is to come.
-        let share = 5.0 * rtol * scale * path.precision(&end) / path.size;
-        let wanted =
-            if path.measure == Measure::Level { share } else { 0.1 * rtol * (scale / path.alpha.abs()).min(1.0) };
-        tolerance = wanted.clamp(f64::MIN_POSITIVE, 0.1 * rtol);
+        // Tolerance of a panel for which the error at the end is that of the next step.
+        let tolerance_for_end = 5.0 * rtol * scale * path.precision(&end) / path.size;
+        let next_tolerance = if path.residual == Residual::LnTheta {
+            tolerance_for_end
+        } else {
+            0.1 * rtol * (scale / path.alpha.abs()).min(1.0)
+        };
+        tolerance = next_tolerance.clamp(f64::MIN_POSITIVE, 0.1 * rtol);
         // Newton's method doubles the digits.
         last_pass = within(rtol.sqrt()) || spent;
         before = step.abs();
@@ -314,19 +316,25 @@ fn refined(
     None
 }
 
-/// The time in which an acceleration arrives with `tau = tau_M` throughout, `int e^y/(e^z - 1) dy` over `y = ln theta`.
+/// Time of an acceleration with `tau = tau_M` throughout, `int e^y/(e^z - 1) dy` over `y = ln theta`, in `l/v_0`.
 ///
-/// `z = ln(theta v)` is linear in `y` there, from `gap_i/a` to `gap_f/a`; panels double with `z`, so that the pole at
-/// `z = 0` stays away.
-fn fastest(a: f64, v_i: f64, span: f64, (gap_i, gap_f): (f64, f64), stats: &mut SolverStats) -> f64 {
+/// `z = ln(theta v)` is linear in `y`, from `margin_i/a` to `margin_f/a`. Panels double with `z`, which keeps the pole at
+/// `z = 0` at a distance.
+fn acceleration_time_at_ceiling(
+    a: f64,
+    v_i: f64,
+    span: f64,
+    (margin_i, margin_f): (f64, f64),
+    stats: &mut SolverStats,
+) -> f64 {
     let rule = rule(24);
-    let (z_i, z_f) = (gap_i / a, gap_f / a);
+    let (z_i, z_f) = (margin_i / a, margin_f / a);
     let growth = (z_f / z_i).abs().max(z_i / z_f);
     let panels = (1.5 * ln(growth) + span).ceil().clamp(1.0, 400.0);
     stats.quadratures += 1;
     let mut time = 0.0;
     for panel in 0..panels as u32 {
-        // The share of the way and z: geometric in z, or even in y where z hardly changes.
+        // Fraction of the range of y, and z: geometric in z, or uniform in y where z hardly changes.
         let place = |s: f64| {
             if growth > 2.0 {
                 let power = s * ln(z_f / z_i);
@@ -339,62 +347,63 @@ fn fastest(a: f64, v_i: f64, span: f64, (gap_i, gap_f): (f64, f64), stats: &mut 
         stats.nodes += rule.x.len() as u32;
         for (x, w) in rule.x.iter().zip(&rule.w) {
             let between = |low: f64, high: f64| low + 0.5 * (high - low) * (1.0 + x);
-            let (share, z) = (between(low.0, high.0), between(low.1, high.1));
-            time += 0.5 * (high.0 - low.0) * w * span * exp(-share * span) / v_i / exp_m1(z);
+            let (fraction, z) = (between(low.0, high.0), between(low.1, high.1));
+            time += 0.5 * (high.0 - low.0) * w * span * exp(-fraction * span) / v_i / exp_m1(z);
         }
     }
     time
 }
 
-/// `alpha_3` to [`COARSE`], from a start, and the growth of errors.
+/// `alpha_3` to [`SEARCH_TOLERANCE`] from an initial guess, and the growth of errors.
 fn search(path: &FrictionPath, start: f64, strict: bool, stats: &mut SolverStats) -> Option<(f64, f64)> {
-    let unit = path.unit();
+    let unit = path.alpha_scale();
     let (mut gave_up, mut errors) = (false, f64::INFINITY);
     let probe = |x: f64| {
         let path = path.with(unit * x);
-        let end = match path.pass((COARSE, COARSE), None, stats, |_, _| ()) {
+        let end = match path.pass((SEARCH_TOLERANCE, SEARCH_TOLERANCE), None, stats, |_, _| ()) {
             Ok(end) => end,
-            Err(Stop::Little) => return Some(Probe { value: -f64::MAX, slope: 0.0 }),
-            Err(Stop::Much) => return Some(Probe { value: f64::MAX, slope: 0.0 }),
-            Err(Stop::GaveUp) => {
+            Err(PassFailure::AlphaTooSmall) => return Some(Probe { value: -f64::MAX, slope: 0.0 }),
+            Err(PassFailure::AlphaTooLarge) => return Some(Probe { value: f64::MAX, slope: 0.0 }),
+            Err(PassFailure::NotConverged) => {
                 gave_up = true;
                 return Some(Probe { value: 0.0, slope: 0.0 });
             }
         };
         errors = end.errors;
-        let (miss, step) = path.miss(&end);
-        // In units of the change that alpha bears; a step that doubles alpha is far enough.
+        let (miss, step) = path.residual_and_step(&end);
+        // In units of alpha_scale; a step at most doubles alpha.
         let scale = 1.0 + x.abs();
-        let bounded = (step / unit).clamp(-FARTHEST * scale, FARTHEST * scale);
+        let bounded = (step / unit).clamp(-MAX_SEARCH_STEP * scale, MAX_SEARCH_STEP * scale);
         let wrong = bounded.is_nan() || (bounded < 0.0) != (miss > 0.0);
         if wrong {
             return Some(Probe { value: miss, slope: 0.0 });
         }
-        // A step that is small beside alpha may still lead beyond a theta that is about to be lost.
-        let weight = (1.0 / scale).max(FAR_OFF * miss.abs() / path.size / bounded.abs());
-        // Theta may be about to arrive whatever alpha is: what grows there vanishes beyond.
-        let weight = if strict && errors > MOST_ERRORS { weight.max(2.0 * ENOUGH / bounded.abs()) } else { weight };
+        // A step that is small compared with alpha may still pass the point where theta falls to 0.
+        let weight = (1.0 / scale).max(RESIDUAL_WEIGHT * miss.abs() / path.size / bounded.abs());
+        // Theta may arrive almost independently of alpha: the growth of errors vanishes beyond.
+        let weight =
+            if strict && errors > MAX_ERROR_GROWTH { weight.max(2.0 * SEARCH_RTOL / bounded.abs()) } else { weight };
         Some(Probe { value: -bounded * weight, slope: weight })
     };
-    let root = newton(probe, start / unit, (f64::NEG_INFINITY, f64::INFINITY), false, ENOUGH);
+    let root = newton(probe, start / unit, (f64::NEG_INFINITY, f64::INFINITY), false, SEARCH_RTOL);
     root.filter(|_| !gave_up).map(|root| (unit * root.x, errors))
 }
 
-/// What a theta at the end that is off by itself counts, beside the relative change of `alpha_3` that ends the search.
-const FAR_OFF: f64 = 0.1;
+/// Weight of a relative error of 1 of theta at the end, in the step that ends the search. Chosen.
+const RESIDUAL_WEIGHT: f64 = 0.1;
 
-/// Longest step of the search, in units of what alpha bears.
-const FARTHEST: f64 = 4.0;
+/// Step of the search, in units of [`FrictionPath::alpha_scale`], at most. Chosen.
+const MAX_SEARCH_STEP: f64 = 4.0;
 
-/// `alpha_3` to a tolerance where the time is just long enough: far out, where the layers at the ends shrink like
-/// `1/alpha_3`, from a start in units of [`FrictionPath::unit`].
-fn close(
+/// `alpha_3` to a tolerance where the time is just long enough and layers at the ends have the width `1/alpha_3`; from an
+/// initial guess in units of [`FrictionPath::alpha_scale`].
+fn search_far_out(
     path: &FrictionPath,
     start: f64,
     (tolerance, enough): (f64, f64),
     stats: &mut SolverStats,
 ) -> Option<(f64, f64)> {
-    let unit = path.unit();
+    let unit = path.alpha_scale();
     let (mut gave_up, mut errors) = (false, f64::INFINITY);
     let place = |q: f64| 0.5 * unit * (exp_m1(q) - exp_m1(-q));
     let probe = |q: f64| {
@@ -402,22 +411,22 @@ fn close(
         match path.pass((tolerance, tolerance), None, stats, |_, _| ()) {
             Ok(end) => {
                 errors = end.errors;
-                let (value, step) = path.miss(&end);
+                let (value, step) = path.residual_and_step(&end);
                 let stretch = 0.5 * unit * (exp(q) + exp(-q));
                 Some(Probe { value, slope: (-value / step * stretch).max(0.0) })
             }
-            Err(Stop::Little) => Some(Probe { value: -f64::MAX, slope: 0.0 }),
-            Err(Stop::Much) => Some(Probe { value: f64::MAX, slope: 0.0 }),
-            Err(Stop::GaveUp) => {
+            Err(PassFailure::AlphaTooSmall) => Some(Probe { value: -f64::MAX, slope: 0.0 }),
+            Err(PassFailure::AlphaTooLarge) => Some(Probe { value: f64::MAX, slope: 0.0 }),
+            Err(PassFailure::NotConverged) => {
                 gave_up = true;
                 Some(Probe { value: 0.0, slope: 0.0 })
             }
         }
     };
     let start = start.signum() * ln_1p(2.0 * start.abs());
-    let root = newton(probe, start, (-FARTHEST_OUT, FARTHEST_OUT), false, enough);
+    let root = newton(probe, start, (-MAX_LN_ALPHA, MAX_LN_ALPHA), false, enough);
     root.filter(|_| !gave_up).map(|root| (place(root.x), errors))
 }
 
-/// Logarithm of the greatest `alpha_3` in units of [`FrictionPath::unit`].
-const FARTHEST_OUT: f64 = 100.0;
+/// `ln` of `alpha_3` in units of [`FrictionPath::alpha_scale`], at most. Chosen.
+const MAX_LN_ALPHA: f64 = 100.0;

@@ -1,17 +1,17 @@
 //! A member over time.
 
 use super::panel::Panel;
-use super::path::{FrictionPath, Side};
+use super::path::{FrictionPath, PathEnd};
 use crate::numerics::elementary::exp;
 use crate::protocol::{Moment, Motion};
 
-/// Panels in the order of time, of equal length in the parameter `s`.
-pub(super) struct Resolution {
+/// Member as a motion: panels in the order of time, of equal length in the parameter `s`.
+pub(super) struct BoundedFrictionMotion {
     pub path: FrictionPath,
     pub panels: Vec<Panel>,
 }
 
-impl Motion for Resolution {
+impl Motion for BoundedFrictionMotion {
     fn duration(&self) -> f64 {
         self.path.t_f
     }
@@ -25,16 +25,16 @@ impl Motion for Resolution {
         let count = self.panels.len();
         let along = s.clamp(0.0, 1.0) * count as f64;
         let k = (along as usize).min(count - 1);
-        let (panel, share) = (&self.panels[k], along - k as f64);
+        let (panel, fraction) = (&self.panels[k], along - k as f64);
         let path = self.path.towards(panel.forward);
-        let share = if panel.forward { share } else { 1.0 - share };
-        let (side, near, (w, z)) = (panel.side, panel.place(share), panel.state(&path, share));
-        let x = if panel.forward == (side == Side::Start) { near } else { 1.0 - near };
+        let fraction = if panel.forward { fraction } else { 1.0 - fraction };
+        let (side, d, (w, z)) = (panel.side, panel.place(fraction), panel.state(&path, fraction));
+        let x = if panel.forward == (side == PathEnd::Start) { d } else { 1.0 - d };
         Moment {
             t: self.path.t_f * x,
             v: path.velocity(side, w, z),
-            theta: exp(w) / path.anchor(side).v,
-            friction: path.friction(side, near),
+            theta: exp(w) / path.end_state(side).v,
+            friction: path.friction(side, d),
             beta: None,
             v_c: None,
         }

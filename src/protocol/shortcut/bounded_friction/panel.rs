@@ -1,47 +1,47 @@
-//! One panel of a course: collocation of `w` at the Radau nodes.
+//! One panel of a path: collocation of `w` at the Radau nodes.
 
 use multiversion::multiversion;
 
-use super::path::{FrictionPath, MILD, MOST_EXPONENT, Side};
+use super::path::{FrictionPath, MAX_EXPONENT, MAX_QUADRATURE_EXPONENT, PathEnd};
 use crate::numerics::elementary::{exp, exp_m1, ln_1p};
 use crate::numerics::radau::{NODES, Nodes, Radau, radau};
 
-/// A panel with `w` at its start and nodes.
+/// Panel with `w` at its start and nodes.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Panel {
     /// Whether it was integrated forwards in time.
     pub forward: bool,
-    pub side: Side,
+    pub side: PathEnd,
     /// Distances from that end.
     pub from: f64,
     pub to: f64,
     pub start: f64,
     pub w: Nodes,
-    /// `z = ln(theta v)` at the nodes, from the slope of `w` wherever that tells it better than friction does.
+    /// `z = ln(theta v)` at the nodes, from the slope of `w` or from friction, whichever is more accurate.
     pub z: Nodes,
-    /// Whether it does at all nodes.
+    /// Whether `z` is from the slope at all nodes.
     pub follows: bool,
 }
 
-/// A panel solved.
+/// Solved panel.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Found {
+pub(super) struct SolvedPanel {
     pub panel: Panel,
-    /// Derivative of `w` by `alpha_3` at its end.
-    pub turn: f64,
-    /// Slip along it over the slip of steady sliding, `int v/v_0 dd`, and what the nodes lack of that.
-    pub slid: f64,
+    /// Derivative of `w` with respect to `alpha_3` at the end.
+    pub w_by_alpha: f64,
+    /// Slip in units of that of steady sliding, `int v/v_0 dd`, and its error estimate.
+    pub slip: f64,
     pub lack: f64,
-    /// Rounding of `w` in units of the last place of 1: its own, and that of `z` as far as the slip passes it on.
+    /// Rounding of `w` in units of the last place of 1: its own, and the propagated rounding of `z`.
     pub noise: f64,
-    /// What a change of `w` at its start becomes at its end.
+    /// Amplification of a change of `w` from the start to the end.
     pub growth: f64,
-    /// An estimate of the error at its nodes.
+    /// Error estimate of `w` at the nodes.
     pub error: f64,
 }
 
 impl Panel {
-    /// The place at a share `s` of the panel.
+    /// Distance from the near end at the fraction `s` of the panel.
     pub fn place(&self, s: f64) -> f64 {
         self.from * (1.0 - s) + self.to * s
     }
@@ -54,69 +54,68 @@ impl Panel {
     /// `w` and `z` there.
     pub fn state(&self, path: &FrictionPath, s: f64) -> (f64, f64) {
         let w = self.level(s);
-        let z = if self.follows { radau().follow(&self.z, s) } else { path.excess(self.side, self.place(s), w) };
+        let z = if self.follows { radau().follow(&self.z, s) } else { path.ln_theta_v(self.side, self.place(s), w) };
         (w, z)
     }
 }
 
-/// Most steps of Newton's method on a panel.
-const MOST_STEPS: usize = 10;
+/// Newton steps on a panel, at most.
+const MAX_STEPS: usize = 10;
 
-/// Share of the first change that quadrature may leave.
-const INEXACT: f64 = 1e-3;
+/// Error of the quadrature in the first step, fraction of the change, at most.
+const QUADRATURE_FRACTION: f64 = 1e-3;
 
-/// A change that shrinks no more below this, relative to what rounding makes of `w`, is rounding.
-const STALLED: f64 = 100.0;
+/// Change below which a step that shrinks no more is rounding, in units of the rounding of `w`. Chosen.
+const MAX_ROUNDINGS: f64 = 100.0;
 
-/// Greatest change of `w` that the guess for a panel may have.
-const FARTHEST: f64 = 20.0;
+/// Change of `w` in the initial guess of a panel, at most. Chosen.
+const MAX_GUESS_CHANGE: f64 = 20.0;
 
-/// The panel between two places of a side, from `w` and its derivative at the first, to `enough`; `None` where Newton's
-/// method does not settle.
+/// Solves the panel between two distances from an end, from `w` and its derivative at the first, to `tolerance`; `None`
+/// where Newton's method does not converge.
 ///
-/// A step of Newton's method solves `delta = R + int slope delta dd`. Where the slope integrates to little, its
-/// solution `R + int e^(S(d) - S(c)) slope R dc` needs no elimination; quadrature only makes the steps a little
-/// inexact.
+/// A Newton step solves `delta = R + int slope delta dd`. Where the integral of the slope is small, its solution
+/// `R + int e^(S(d) - S(c)) slope R dc` needs no elimination; the quadrature makes the steps slightly inexact.
 #[multiversion(targets(
     "x86_64+avx+avx2+bmi1+bmi2+avx512f+avx512bw+avx512cd+avx512dq+avx512vl",
     "x86_64+avx+avx2+bmi1+bmi2"
 ))]
 pub(super) fn collocate(
     path: &FrictionPath,
-    side: Side,
+    side: PathEnd,
     (from, to): (f64, f64),
-    [start, turn]: [f64; 2],
-    enough: f64,
+    [start, w_by_alpha]: [f64; 2],
+    tolerance: f64,
     rule: &Radau,
-) -> Option<Found> {
-    let anchor = path.anchor(side);
-    let scale = (to - from).abs() * path.pace(anchor);
+) -> Option<SolvedPanel> {
+    let end_state = path.end_state(side);
+    let scale = (to - from).abs() * path.theta_rate(end_state);
     let kappa = path.kappa;
-    let (mut drive, mut lean, mut doubt) = ([0.0; NODES], [0.0; NODES], [0.0; NODES]);
+    let (mut scaled_friction, mut friction_sensitivity, mut doubt) = ([0.0; NODES], [0.0; NODES], [0.0; NODES]);
     for j in 0..NODES {
-        let near = from * rule.rest[j] + to * rule.u[j];
-        let e = path.exponent(anchor, near);
-        drive[j] = path.drive(anchor, e);
-        let distance = anchor.gap / path.a * exp(if e < MOST_EXPONENT { e } else { MOST_EXPONENT });
-        lean[j] = -near * (1.0 - near) * distance;
-        // The drive rounds, and so does its exponent.
-        doubt[j] = drive[j].abs() + path.uncertainty(anchor, near) * distance;
+        let d = from * rule.rest[j] + to * rule.u[j];
+        let e = path.exponent(end_state, d);
+        scaled_friction[j] = path.scaled_friction(end_state, e);
+        let distance = end_state.margin / path.a * exp(if e < MAX_EXPONENT { e } else { MAX_EXPONENT });
+        friction_sensitivity[j] = -d * (1.0 - d) * distance;
+        // Rounding of the scaled friction and of its exponent.
+        doubt[j] = scaled_friction[j].abs() + path.uncertainty(end_state, d) * distance;
     }
-    let mut w = guess(path, side, from, start, scale, &drive, rule);
+    let mut w = guess(path, side, from, start, scale, &scaled_friction, rule);
     let mut before = f64::INFINITY;
-    for _ in 0..MOST_STEPS {
+    for _ in 0..MAX_STEPS {
         let (mut rate, mut speed, mut slope, mut push) = ([0.0; NODES], [0.0; NODES], [0.0; NODES], [0.0; NODES]);
-        let mut blur = [0.0; NODES];
+        let mut z_rounding = [0.0; NODES];
         for j in 0..NODES {
-            // theta v = e^z: the rate is a small difference wherever theta follows the velocity.
-            let (inverse, excess) = (exp(-w[j]), exp_m1(drive[j] + kappa * w[j]));
+            // theta v = e^z: the rate is a small difference where theta follows the velocity.
+            let (inverse, excess) = (exp(-w[j]), exp_m1(scaled_friction[j] + kappa * w[j]));
             let v = inverse * (1.0 + excess);
             rate[j] = -scale * inverse * excess;
             speed[j] = scale.abs() * v;
             slope[j] = scale * inverse * (excess - kappa * (1.0 + excess));
-            push[j] = -scale * v * lean[j];
-            // Where theta relaxes, it forgets all but the last of what rounding makes of the drive.
-            blur[j] = speed[j] * (doubt[j] + (kappa * w[j]).abs()) / (1.0 + slope[j].abs());
+            push[j] = -scale * v * friction_sensitivity[j];
+            // Where theta relaxes, only the last rounding errors of the scaled friction count.
+            z_rounding[j] = speed[j] * (doubt[j] + (kappa * w[j]).abs()) / (1.0 + slope[j].abs());
         }
         let sums = rule.integrals(&rate);
         let mut rest = [0.0; NODES];
@@ -124,8 +123,8 @@ pub(super) fn collocate(
             rest[j] = start - w[j] + sums[j];
         }
         let decay = rule.integrals(&slope);
-        let mild = decay.iter().all(|s| s.abs() <= MILD);
-        let (steps, last) = if mild {
+        let by_quadrature = decay.iter().all(|s| s.abs() <= MAX_QUADRATURE_EXPONENT);
+        let (steps, last) = if by_quadrature {
             let (mut grow, mut weighted, mut pushed) = ([0.0; NODES], [0.0; NODES], [0.0; NODES]);
             for j in 0..NODES {
                 grow[j] = exp(decay[j]);
@@ -137,10 +136,10 @@ pub(super) fn collocate(
             for j in 0..NODES {
                 steps[j] = rest[j] + grow[j] * sums[j];
             }
-            (steps, grow[NODES - 1] * (turn + rule.integrals(&pushed)[NODES - 1]))
+            (steps, grow[NODES - 1] * (w_by_alpha + rule.integrals(&pushed)[NODES - 1]))
         } else {
             let forced = rule.integrals(&push);
-            let mut right: [[f64; 2]; NODES] = std::array::from_fn(|j| [rest[j], turn + forced[j]]);
+            let mut right: [[f64; 2]; NODES] = std::array::from_fn(|j| [rest[j], w_by_alpha + forced[j]]);
             let mut matrix: [Nodes; NODES] = std::array::from_fn(|j| {
                 std::array::from_fn(|k| f64::from(u8::from(j == k)) - rule.columns[k][j] * slope[k])
             });
@@ -157,20 +156,21 @@ pub(super) fn collocate(
             return None;
         }
         // The next change, if it shrinks as this one did.
-        let gain = if before.is_finite() { change / before } else { (1.0 + kappa.abs()) * change + INEXACT };
+        let gain =
+            if before.is_finite() { change / before } else { (1.0 + kappa.abs()) * change + QUADRATURE_FRACTION };
         let left = change * gain.min(1.0);
-        let farthest = w.iter().fold(start.abs(), |most, w| most.max(w.abs()));
-        let blurred: f64 = blur.iter().zip(&rule.w).map(|(blur, w)| blur * w).sum();
-        let noise = farthest + blurred;
-        let stalled = change <= STALLED * f64::EPSILON * noise && change >= 0.25 * before;
+        let largest = w.iter().fold(start.abs(), |most, w| most.max(w.abs()));
+        let total_z_rounding: f64 = z_rounding.iter().zip(&rule.w).map(|(z_rounding, w)| z_rounding * w).sum();
+        let noise = largest + total_z_rounding;
+        let stalled = change <= MAX_ROUNDINGS * f64::EPSILON * noise && change >= 0.25 * before;
         before = change;
-        if left <= enough || left <= f64::EPSILON * noise || stalled {
+        if left <= tolerance || left <= f64::EPSILON * noise || stalled {
             let growth = exp(decay[NODES - 1]);
-            let slid: f64 = speed.iter().zip(&rule.w).map(|(v, w)| v * w).sum();
-            // What is left of them by rounding does not count.
+            let slip: f64 = speed.iter().zip(&rule.w).map(|(v, w)| v * w).sum();
+            // Without the rounding of the coefficients.
             let count = (4 * NODES) as f64;
             let error = (count * rule.unresolved(&w) - count * f64::EPSILON * noise).max(0.0);
-            let (z, follows, rounding) = excesses(&w, start, scale, kappa, (&drive, &doubt), rule);
+            let (z, follows, rounding) = excesses(&w, start, scale, kappa, (&scaled_friction, &doubt), rule);
             let mut uncertain = 0.0;
             for j in 0..NODES {
                 speed[j] = scale.abs() * exp(z[j] - w[j]);
@@ -178,23 +178,23 @@ pub(super) fn collocate(
             }
             let lack = (rule.unresolved(&speed) - count * f64::EPSILON * uncertain).max(0.0);
             let panel = Panel { forward: path.forward, side, from, to, start, w, z, follows };
-            return Some(Found { panel, turn: last, slid, lack, noise: 8.0 * noise, growth, error });
+            return Some(SolvedPanel { panel, w_by_alpha: last, slip, lack, noise: 8.0 * noise, growth, error });
         }
     }
     None
 }
 
-/// `z` at the nodes, whether it is the slope of `w` that tells all of them, and their rounding.
+/// `z` at the nodes, whether all are from the slope of `w`, and their rounding.
 ///
 /// `z = f + kappa w` is a small difference where theta follows the velocity; there `1 - e^z = theta'` is small, and the
-/// slope of `w` tells it.
+/// slope of `w` gives it.
 #[inline(always)]
 fn excesses(
     w: &Nodes,
     start: f64,
     scale: f64,
     kappa: f64,
-    (drive, doubt): (&Nodes, &Nodes),
+    (scaled_friction, doubt): (&Nodes, &Nodes),
     rule: &Radau,
 ) -> (Nodes, bool, Nodes) {
     let slopes = rule.slopes(&w.map(|w| w - start));
@@ -202,47 +202,55 @@ fn excesses(
     let (mut z, mut follows, mut rounding) = ([0.0; NODES], true, [0.0; NODES]);
     for j in 0..NODES {
         let gain = exp(w[j]) / scale;
-        let told = slopes[j] * gain;
-        let (by_friction, by_slope) = (doubt[j] + (kappa * w[j]).abs(), SLOPE_NOISE * swing * gain.abs());
-        if by_slope < by_friction && told.abs() < 0.5 {
-            (z[j], rounding[j]) = (ln_1p(-told), by_slope);
+        let rate = slopes[j] * gain;
+        let (by_friction, by_slope) = (doubt[j] + (kappa * w[j]).abs(), SLOPE_ROUNDING * swing * gain.abs());
+        if by_slope < by_friction && rate.abs() < 0.5 {
+            (z[j], rounding[j]) = (ln_1p(-rate), by_slope);
         } else {
-            (z[j], rounding[j]) = (drive[j] + kappa * w[j], by_friction);
+            (z[j], rounding[j]) = (scaled_friction[j] + kappa * w[j], by_friction);
             follows = false;
         }
     }
     (z, follows, rounding)
 }
 
-/// Rounding of the slope of a polynomial through the nodes, in units of that of its values.
-const SLOPE_NOISE: f64 = 300.0;
+/// Rounding of the slope of a polynomial through the nodes, in units of the rounding of its values.
+const SLOPE_ROUNDING: f64 = 300.0;
 
-/// Where theta relaxes it comes to follow the drive, as `ln(theta v)` hardly changes; else it hardly changes itself.
+/// Initial guess of `w`: relaxation towards constant `ln(theta v)` where theta relaxes, constant `w` elsewhere.
 #[inline(always)]
-fn guess(path: &FrictionPath, side: Side, from: f64, start: f64, scale: f64, drive: &Nodes, rule: &Radau) -> Nodes {
-    let anchor = path.anchor(side);
-    let before = path.drive(anchor, path.exponent(anchor, from));
+fn guess(
+    path: &FrictionPath,
+    side: PathEnd,
+    from: f64,
+    start: f64,
+    scale: f64,
+    scaled_friction: &Nodes,
+    rule: &Radau,
+) -> Nodes {
+    let end_state = path.end_state(side);
+    let before = path.scaled_friction(end_state, path.exponent(end_state, from));
     let excess = exp_m1(before + path.kappa * start);
     let decay = -scale * exp(-start) * (excess - path.kappa * (1.0 + excess));
-    if decay <= STILL {
+    if decay <= MIN_RELAXATION {
         return [start; NODES];
     }
-    // The slope relaxes from what it is to that of a drive that goes on evenly.
+    // The slope relaxes from its value at the start to that of a linear scaled friction.
     let slope = -scale * exp(-start) * excess;
-    let farthest = FARTHEST * path.kappa.abs();
+    let largest = MAX_GUESS_CHANGE * path.kappa.abs();
     let mut w = [0.0; NODES];
     for j in 0..NODES {
-        let followed = -(drive[j] - before).clamp(-farthest, farthest) / path.kappa;
+        let followed = -(scaled_friction[j] - before).clamp(-largest, largest) / path.kappa;
         let passed = decay * rule.u[j];
         w[j] = start + followed - (slope * rule.u[j] - followed) * exp_m1(-passed) / passed;
     }
     w
 }
 
-/// Below this theta does not relax within a panel.
-const STILL: f64 = 0.1;
+/// Relaxation exponent of a panel below which theta counts as constant. Chosen.
+const MIN_RELAXATION: f64 = 0.1;
 
-/// Gaussian elimination with row pivots, two right-hand sides.
+/// Solves by Gaussian elimination with row pivots, for two right-hand sides.
 fn solve(matrix: &mut [Nodes; NODES], right: &mut [[f64; 2]; NODES]) {
     for k in 0..NODES {
         let mut pivot = k;

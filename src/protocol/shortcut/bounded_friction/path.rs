@@ -1,4 +1,4 @@
-//! A member of the family for one `alpha_3`, and the pass along it in the direction in which theta contracts.
+//! A member of the family for one `alpha_3`, and its integration in the direction in which theta contracts.
 //!
 //! The variable is `w = ln(theta/theta_0)` with `theta_0 = 1/v_0` at the nearer end:
 //!
@@ -6,8 +6,8 @@
 //! w' = v_0 (e^-w - v/v_0),    ln(v/v_0) = f - (b/a) w,    f = (tau - tau_0)/a.
 //! ```
 //!
-//! Places are distances from the nearer end too, in units of `t_f`: so layers much thinner than the rounding of `x` are
-//! seen, and small changes keep their digits.
+//! Positions are distances `d` from the nearer end, in units of `t_f`. They resolve layers much thinner than the rounding
+//! of `x`, and small changes keep their digits.
 
 use super::panel::{Panel, collocate};
 use crate::model::Transition;
@@ -16,44 +16,43 @@ use crate::numerics::radau::{NODES, Radau, radau};
 use crate::protocol::SolverStats;
 use crate::protocol::shortcut::Case;
 
-/// The end from which a place is measured, in the direction of integration.
+/// End of the path from which a distance is measured, in the direction of integration.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Side {
+pub(super) enum PathEnd {
     Start,
     End,
 }
 
-/// What is known at an end.
+/// Quantities at an end.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Anchor {
+pub(super) struct EndState {
     /// Velocity `v_0`, which is `1/theta_0`.
     pub v: f64,
     /// Friction.
     friction: f64,
-    /// `tau_M - tau`.
-    pub gap: f64,
-    /// Slope of `ln R^x` from here inwards.
+    /// Margin `tau_M - tau`.
+    pub margin: f64,
+    /// Slope of `ln R^x` inwards.
     l: f64,
-    /// `w` where theta is that of the other end.
+    /// `w` for theta at the other end.
     other: f64,
-    /// From here on the exponent leaves a velocity that moves nothing.
-    quiet: f64,
-    /// From here on it leaves a velocity that is 0 in double precision.
-    cap: f64,
+    /// Exponent above which the slip is negligible.
+    negligible_exponent: f64,
+    /// Exponent above which the velocity is 0 in double precision.
+    underflow_exponent: f64,
 }
 
-/// What tells how far a course is from arriving.
+/// Residual of a path at its end.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) enum Measure {
+pub(super) enum Residual {
     /// `ln theta` at the end.
-    Level,
-    /// Just beyond the time of `v = 0`: the slip in contact lifetimes, `int theta v dt`, against the time to spare.
+    LnTheta,
+    /// Near the time of `v = 0`: the slip in contact lifetimes, `int theta v dt`, compared with the spare time.
     Slip { spare: f64 },
-    /// Just beyond the time of `tau = tau_M`: the time lost to lower friction against the time to spare.
-    Lag { spare: f64 },
-    /// The slip in contact lifetimes of both ways, from the start forwards and from the end backwards, to where they
-    /// meet in a standstill, against the time to spare.
-    Meeting { spare: f64 },
+    /// Near the time of `tau = tau_M`: the time lost to lower friction, compared with the spare time.
+    TimeLoss { spare: f64 },
+    /// The slip in contact lifetimes from both ends to a point in a standstill, compared with the spare time.
+    TwoSidedSlip { spare: f64 },
 }
 
 /// A member of the family for one `alpha_3`.
@@ -63,313 +62,335 @@ pub(super) struct FrictionPath {
     pub forward: bool,
     pub t_f: f64,
     pub a: f64,
-    /// `b/a`.
+    /// Ratio `b/a`.
     pub ratio: f64,
     /// `1 - b/a`.
     pub kappa: f64,
-    /// The size of `w`: its change from end to end, or 1 if that is less.
+    /// Size of `w`: the smaller of 1 and its change from end to end.
     pub size: f64,
-    /// What rounding of `tau_M` makes of `ln R`, in units of the last place of 1.
-    pub blur: f64,
-    pub measure: Measure,
+    /// Error of `ln R` from rounding of `tau_M`, in units of the last place of 1.
+    pub ln_r_rounding: f64,
+    pub residual: Residual,
     /// The ends in the direction of integration.
-    anchors: [Anchor; 2],
+    end_states: [EndState; 2],
 }
 
-/// Where a pass ended.
+/// Result of a pass at its end.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct End {
+pub(super) struct PassResult {
     /// `w`: 0 if it arrives.
     pub w: f64,
-    /// Its derivative by `alpha_3`.
-    pub turn: f64,
-    /// The greatest derivative of `ln v` by it on the way.
-    sway: f64,
-    /// What rounding on the way may have made of it, in units of the last place of 1.
+    /// Derivative of `w` with respect to `alpha_3`.
+    pub w_by_alpha: f64,
+    /// Greatest derivative of `ln v` with respect to `alpha_3` on the path.
+    max_ln_v_by_alpha: f64,
+    /// Rounding error of `w`, in units of the last place of 1.
     pub noise: f64,
-    /// What errors of 1 in every panel would have made of it.
+    /// Error of `w` for an error of 1 in every panel.
     pub errors: f64,
-    /// The integral of the measure but for [`Measure::Level`].
+    /// Integral of the residual; 0 for [`Residual::LnTheta`].
     sum: f64,
-    /// The work on the way, roughly and without regard to its sign.
+    /// Absolute work, roughly.
     pub work: f64,
 }
 
-/// What a pass has to tell the work to.
+/// Tolerance of the work of a pass.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct WorkSums {
-    /// Share of the work that quadrature may leave.
+pub(super) struct WorkTolerance {
+    /// Relative error of the quadrature, at most.
     pub accuracy: f64,
-    /// The work that is to be expected; 0 where it is not known.
+    /// Expected work; 0 where it is unknown.
     pub expected: f64,
 }
 
 /// Why a pass did not reach the end.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Stop {
-    /// Theta fell to nothing: too little of `alpha_3` for a way forwards.
-    Little,
-    /// Theta fell to nothing backwards: too much of `alpha_3`.
-    Much,
-    /// A defect of ours.
-    GaveUp,
+pub(super) enum PassFailure {
+    /// Theta fell to 0 forwards: `alpha_3` is too small.
+    AlphaTooSmall,
+    /// Theta fell to 0 backwards: `alpha_3` is too large.
+    AlphaTooLarge,
+    /// A defect of the program.
+    NotConverged,
 }
 
-/// Where `w` has fallen this far below both ends, theta counts as lost.
-const LOST: f64 = 25.0;
+/// Fall of `w` below both ends at which theta counts as 0. Chosen.
+const MAX_LN_THETA_FALL: f64 = 25.0;
 
-/// A velocity below `e^-QUIET` moves nothing within any time.
-pub(super) const QUIET: f64 = 100.0;
+/// `-ln v` above which slip is negligible within any time. Chosen.
+pub(super) const NEGLIGIBLE_LN_V: f64 = 100.0;
 
-/// A velocity below `e^-NOTHING` is 0 in double precision.
-const NOTHING: f64 = 800.0;
+/// `-ln v` above which the velocity is 0 in double precision.
+const UNDERFLOW_LN_V: f64 = 800.0;
 
-/// Where `ln[(tau_M - tau)/gap]` is below this, friction is `tau_M` to the last bit.
-const SATURATED: f64 = -45.0;
+/// Where `ln[(tau_M - tau)/margin]` is below this, friction is `tau_M` to the last bit.
+const SATURATION_EXPONENT: f64 = -45.0;
 
-/// Keeps `tau_M - tau` within the range of a double.
-pub(super) const MOST_EXPONENT: f64 = 400.0;
+/// Exponent of `tau_M - tau`, at most: it stays within the range of a double.
+pub(super) const MAX_EXPONENT: f64 = 400.0;
 
-/// Most panels of one pass: far more than a course takes that is not lost.
-const MOST_PANELS: usize = 4000;
+/// Panels of one pass, at most. Chosen: far more than a path that arrives takes.
+const MAX_PANELS: usize = 4000;
 
 impl FrictionPath {
-    pub fn new(case: &Case, gaps: (f64, f64), ln_r: f64, log_ratio: f64, measure: Measure) -> FrictionPath {
+    pub fn new(case: &Case, margins: (f64, f64), ln_r: f64, log_ratio: f64, residual: Residual) -> FrictionPath {
         let Transition { law, v_i, v_f } = case.transition;
         let ratio = law.b / law.a;
-        let anchor = |v: f64, gap: f64, l: f64, other: f64| {
-            // The exponent that leaves a velocity below this power of e.
-            let depth = |power: f64| ln_1p((power + ln(v) + ratio * (LOST + log_ratio.abs())) * law.a / gap);
+        let end_state = |v: f64, margin: f64, l: f64, other: f64| {
+            // Exponent of a velocity of e^-power.
+            let depth =
+                |power: f64| ln_1p((power + ln(v) + ratio * (MAX_LN_THETA_FALL + log_ratio.abs())) * law.a / margin);
             let friction = 1.0 + (law.a - law.b) * ln(v);
-            Anchor { v, friction, gap, l, other, quiet: depth(QUIET), cap: depth(NOTHING) }
+            EndState {
+                v,
+                friction,
+                margin,
+                l,
+                other,
+                negligible_exponent: depth(NEGLIGIBLE_LN_V),
+                underflow_exponent: depth(UNDERFLOW_LN_V),
+            }
         };
         let forward = law.b <= law.a;
-        let ends = [anchor(v_i, gaps.0, ln_r, log_ratio), anchor(v_f, gaps.1, -ln_r, -log_ratio)];
-        let anchors = if forward { ends } else { [ends[1], ends[0]] };
+        let ends = [end_state(v_i, margins.0, ln_r, log_ratio), end_state(v_f, margins.1, -ln_r, -log_ratio)];
+        let end_states = if forward { ends } else { [ends[1], ends[0]] };
         let (kappa, size) = ((law.a - law.b) / law.a, log_ratio.abs().min(1.0));
         let bound = if case.tau_ceiling.is_finite() { case.tau_ceiling.abs().max(1.0) } else { 0.0 };
-        let blur = bound / gaps.0 * ((law.a - law.b) * log_ratio).abs() / gaps.1;
-        FrictionPath { alpha: 0.0, forward, t_f: case.t_f, a: law.a, ratio, kappa, size, blur, measure, anchors }
+        let ln_r_rounding = bound / margins.0 * ((law.a - law.b) * log_ratio).abs() / margins.1;
+        FrictionPath {
+            alpha: 0.0,
+            forward,
+            t_f: case.t_f,
+            a: law.a,
+            ratio,
+            kappa,
+            size,
+            ln_r_rounding,
+            residual,
+            end_states,
+        }
     }
 
-    /// A change of `alpha_3` that counts: about a quarter of it is the change of `ln v`.
-    pub fn unit(&self) -> f64 {
-        self.a / self.anchors[0].gap.max(self.anchors[1].gap)
+    /// Scale of `alpha_3`: a change by it changes `ln v` by about a quarter.
+    pub fn alpha_scale(&self) -> f64 {
+        self.a / self.end_states[0].margin.max(self.end_states[1].margin)
     }
 
-    /// The change of `alpha_3` that changes some velocity by as much as itself, or `alpha_3` if that is less.
-    pub fn scale(&self, end: &End) -> f64 {
-        let mut greatest = end.sway.max(1.0 / self.alpha.abs());
+    /// Smaller of `alpha_3` and its change that changes some velocity by a factor of e.
+    pub fn alpha_resolution(&self, end: &PassResult) -> f64 {
+        let mut greatest = end.max_ln_v_by_alpha.max(1.0 / self.alpha.abs());
         for k in 1..8 {
-            let near = 0.125 * f64::from(k);
-            let anchor = self.anchor(Side::Start);
-            let exponent = self.exponent(anchor, near);
-            // What stands still does so as long as its velocity is not 0 in double precision.
-            if exponent > anchor.quiet && exponent < anchor.cap {
-                greatest = greatest.max(self.lean(anchor, near));
+            let d = 0.125 * f64::from(k);
+            let end_state = self.end_state(PathEnd::Start);
+            let exponent = self.exponent(end_state, d);
+            // In a standstill, unless the velocity is 0 in double precision.
+            if exponent > end_state.negligible_exponent && exponent < end_state.underflow_exponent {
+                greatest = greatest.max(self.friction_sensitivity(end_state, d));
             }
         }
         1.0 / greatest
     }
 
-    /// By how much friction falls with `alpha_3` at a place, in units of `a`.
+    /// Sensitivity of friction to `alpha_3`, `-dtau/dalpha_3`, in units of `a`.
     #[inline(always)]
-    pub fn lean(&self, anchor: &Anchor, near: f64) -> f64 {
-        anchor.gap / self.a * near * (1.0 - near) * exp(self.exponent(anchor, near).min(MOST_EXPONENT))
+    pub fn friction_sensitivity(&self, end_state: &EndState, d: f64) -> f64 {
+        end_state.margin / self.a * d * (1.0 - d) * exp(self.exponent(end_state, d).min(MAX_EXPONENT))
     }
 
-    /// The course with another `alpha_3`.
+    /// The path with another `alpha_3`.
     pub fn with(self, alpha: f64) -> FrictionPath {
         FrictionPath { alpha, ..self }
     }
 
-    /// The same course, integrated the other way.
+    /// The path integrated in the other direction.
     pub fn reversed(self) -> FrictionPath {
-        let [first, last] = self.anchors;
-        FrictionPath { forward: !self.forward, anchors: [last, first], ..self }
+        let [first, last] = self.end_states;
+        FrictionPath { forward: !self.forward, end_states: [last, first], ..self }
     }
 
-    /// The same course, integrated forwards or not.
+    /// The path integrated forwards or backwards.
     pub fn towards(self, forward: bool) -> FrictionPath {
         if self.forward == forward { self } else { self.reversed() }
     }
 
-    /// The course with another measure.
-    pub fn measured_by(self, measure: Measure) -> FrictionPath {
-        FrictionPath { measure, ..self }
+    /// The path with another residual.
+    pub fn with_residual(self, residual: Residual) -> FrictionPath {
+        FrictionPath { residual, ..self }
     }
 
-    /// What is known at an end.
+    /// Quantities at an end.
     #[inline(always)]
-    pub fn anchor(&self, side: Side) -> &Anchor {
-        &self.anchors[side as usize]
+    pub fn end_state(&self, side: PathEnd) -> &EndState {
+        &self.end_states[side as usize]
     }
 
-    /// How far the end lies beyond its target, in a form that rises with `alpha_3`, and the step of Newton's method
-    /// from here.
-    pub fn miss(&self, end: &End) -> (f64, f64) {
+    /// Residual at the end, in a form that rises with `alpha_3`, and the Newton step of `alpha_3`.
+    pub fn residual_and_step(&self, end: &PassResult) -> (f64, f64) {
         let rise = if self.forward { 1.0 } else { -1.0 };
-        match self.measure {
-            // It is `theta` that bends least: where it is about to be lost it falls to 0 on a line.
-            Measure::Level => {
+        match self.residual {
+            // Theta is the most linear: where it falls to 0, it does so on a line.
+            Residual::LnTheta => {
                 let bent = -exp_m1(-end.w.max(-3.0));
-                (rise * bent, -bent / end.turn)
+                (rise * bent, -bent / end.w_by_alpha)
             }
-            Measure::Slip { spare } | Measure::Meeting { spare } => {
-                let excess = ln(end.sum / spare);
-                (-excess, excess * end.sum / (rise * self.worth(end.w) * end.turn))
+            Residual::Slip { spare } | Residual::TwoSidedSlip { spare } => {
+                let ln_ratio = ln(end.sum / spare);
+                (-ln_ratio, ln_ratio * end.sum / (rise * self.time_per_w(end.w) * end.w_by_alpha))
             }
-            Measure::Lag { spare } => {
-                let excess = ln(end.sum / spare);
-                (excess, -excess * end.sum / (rise * self.worth(end.w) * end.turn))
-            }
-        }
-    }
-
-    /// What a change of `w` at the end is worth in time, where it is `w`.
-    pub fn worth(&self, w: f64) -> f64 {
-        let theta = exp(w) / self.anchors[1].v;
-        match self.measure {
-            Measure::Lag { .. } => theta / exp_m1(self.surplus(Side::End, w)),
-            Measure::Level | Measure::Slip { .. } => theta,
-            // The end of a meeting is in units of time.
-            Measure::Meeting { .. } => 1.0,
-        }
-    }
-
-    /// What an error of 1 in each panel may be worth of `alpha_3`, inverse.
-    pub fn precision(&self, end: &End) -> f64 {
-        end.turn.abs() / end.errors
-    }
-
-    /// The change of `alpha_3` that rounding at the end stands for.
-    pub fn rounding(&self, end: &End) -> f64 {
-        match self.measure {
-            Measure::Level => end.noise / end.turn.abs(),
-            Measure::Slip { .. } | Measure::Lag { .. } | Measure::Meeting { .. } => {
-                // One unit of the measure, and what rounding of t_f is of the time to spare.
-                let (miss, step) = self.miss(&End { sum: std::f64::consts::E * end.sum, ..*end });
-                (step / (std::f64::consts::E * miss)).abs() * (1.0 + self.t_f / end.sum)
+            Residual::TimeLoss { spare } => {
+                let ln_ratio = ln(end.sum / spare);
+                (ln_ratio, -ln_ratio * end.sum / (rise * self.time_per_w(end.w) * end.w_by_alpha))
             }
         }
     }
 
-    /// The change of `alpha_3` that rounding of a meeting's sum stands for, without that of `t_f`, which no measure escapes; 0
-    /// for the other measures.
-    pub fn lost_in_sum(&self, end: &End) -> f64 {
-        match self.measure {
-            Measure::Meeting { .. } => self.rounding(end) / (1.0 + self.t_f / end.sum),
+    /// Time that corresponds to a change of `w` by 1 at the end.
+    pub fn time_per_w(&self, w: f64) -> f64 {
+        let theta = exp(w) / self.end_states[1].v;
+        match self.residual {
+            Residual::TimeLoss { .. } => theta / exp_m1(self.ln_theta_v_at_ceiling(PathEnd::End, w)),
+            Residual::LnTheta | Residual::Slip { .. } => theta,
+            // This derivative is in units of time already.
+            Residual::TwoSidedSlip { .. } => 1.0,
+        }
+    }
+
+    /// Inverse of the error of `alpha_3` for an error of 1 in each panel.
+    pub fn precision(&self, end: &PassResult) -> f64 {
+        end.w_by_alpha.abs() / end.errors
+    }
+
+    /// Error of `alpha_3` from rounding at the end, in units of the last place of 1.
+    pub fn rounding(&self, end: &PassResult) -> f64 {
+        match self.residual {
+            Residual::LnTheta => end.noise / end.w_by_alpha.abs(),
+            Residual::Slip { .. } | Residual::TimeLoss { .. } | Residual::TwoSidedSlip { .. } => {
+                // One unit of the residual, and the rounding of t_f relative to the spare time.
+                let (residual_and_step, step) =
+                    self.residual_and_step(&PassResult { sum: std::f64::consts::E * end.sum, ..*end });
+                (step / (std::f64::consts::E * residual_and_step)).abs() * (1.0 + self.t_f / end.sum)
+            }
+        }
+    }
+
+    /// Error of `alpha_3` from rounding of a two-sided sum, without that of `t_f`, which affects every residual; 0 for the
+    /// other residuals.
+    pub fn lost_in_sum(&self, end: &PassResult) -> f64 {
+        match self.residual {
+            Residual::TwoSidedSlip { .. } => self.rounding(end) / (1.0 + self.t_f / end.sum),
             _ => 0.0,
         }
     }
 
-    /// `ln[(tau_M - tau)/gap]` with the gap of this side: where `alpha_3` is next to `-ln R`, the sum of both is exact.
+    /// `ln[(tau_M - tau)/margin]` with the margin of this end; the sum of `alpha_3` and `ln R` is exact where they cancel.
     #[inline(always)]
-    pub fn exponent(&self, anchor: &Anchor, near: f64) -> f64 {
-        near * ((anchor.l + self.alpha) - self.alpha * near)
+    pub fn exponent(&self, end_state: &EndState, d: f64) -> f64 {
+        d * ((end_state.l + self.alpha) - self.alpha * d)
     }
 
     /// Rounding of the exponent, in units of the last place of 1.
     #[inline(always)]
-    pub fn uncertainty(&self, anchor: &Anchor, near: f64) -> f64 {
-        near * ((anchor.l + self.alpha).abs() + self.alpha.abs() * near)
+    pub fn uncertainty(&self, end_state: &EndState, d: f64) -> f64 {
+        d * ((end_state.l + self.alpha).abs() + self.alpha.abs() * d)
     }
 
-    /// `f = (tau - tau_0)/a`.
+    /// Scaled friction `f = (tau - tau_0)/a`.
     #[inline(always)]
-    pub fn drive(&self, anchor: &Anchor, exponent: f64) -> f64 {
-        let e = if exponent > anchor.cap { anchor.cap } else { exponent };
-        -anchor.gap / self.a * exp_m1(e)
+    pub fn scaled_friction(&self, end_state: &EndState, exponent: f64) -> f64 {
+        let e = if exponent > end_state.underflow_exponent { end_state.underflow_exponent } else { exponent };
+        -end_state.margin / self.a * exp_m1(e)
     }
 
-    /// `tau_M - tau`, within the range of a double.
+    /// Margin `tau_M - tau`, within the range of a double.
     #[inline(always)]
-    fn distance(&self, side: Side, near: f64) -> f64 {
-        let anchor = self.anchor(side);
-        anchor.gap * exp(self.exponent(anchor, near).min(MOST_EXPONENT))
+    fn margin_at(&self, side: PathEnd, d: f64) -> f64 {
+        let end_state = self.end_state(side);
+        end_state.margin * exp(self.exponent(end_state, d).min(MAX_EXPONENT))
     }
 
-    /// Friction at a place, within the range of a double.
+    /// Friction at a distance from an end, within the range of a double.
     #[inline(always)]
-    pub fn friction(&self, side: Side, near: f64) -> f64 {
-        let anchor = self.anchor(side);
-        anchor.friction - anchor.gap * exp_m1(self.exponent(anchor, near).min(MOST_EXPONENT))
+    pub fn friction(&self, side: PathEnd, d: f64) -> f64 {
+        let end_state = self.end_state(side);
+        end_state.friction - end_state.margin * exp_m1(self.exponent(end_state, d).min(MAX_EXPONENT))
     }
 
-    /// `z = ln(theta v)` at a place with this `w`.
+    /// `z = ln(theta v)` at a distance from an end, for this `w`.
     #[inline(always)]
-    pub fn excess(&self, side: Side, near: f64, w: f64) -> f64 {
-        let anchor = self.anchor(side);
-        self.drive(anchor, self.exponent(anchor, near)) + self.kappa * w
+    pub fn ln_theta_v(&self, side: PathEnd, d: f64, w: f64) -> f64 {
+        let end_state = self.end_state(side);
+        self.scaled_friction(end_state, self.exponent(end_state, d)) + self.kappa * w
     }
 
-    /// Velocity at a place with this `w` and `z`.
+    /// Velocity for this `w` and `z`, in `v_0`.
     #[inline(always)]
-    pub fn velocity(&self, side: Side, w: f64, z: f64) -> f64 {
-        self.anchor(side).v * exp(z - w)
+    pub fn velocity(&self, side: PathEnd, w: f64, z: f64) -> f64 {
+        self.end_state(side).v * exp(z - w)
     }
 
-    /// `ln(theta v)` that friction `tau_M` would give.
+    /// `ln(theta v)` at friction `tau_M`.
     #[inline(always)]
-    fn surplus(&self, side: Side, w: f64) -> f64 {
-        self.anchor(side).gap / self.a + self.kappa * w
+    fn ln_theta_v_at_ceiling(&self, side: PathEnd, w: f64) -> f64 {
+        self.end_state(side).margin / self.a + self.kappa * w
     }
 
     /// Greatest friction: at an end, or at the vertex of the parabola.
     pub fn friction_max(&self) -> f64 {
-        let ends = self.anchors[0].friction.max(self.anchors[1].friction);
+        let ends = self.end_states[0].friction.max(self.end_states[1].friction);
         self.vertex_friction().filter(|_| self.alpha < 0.0).map_or(ends, |vertex| vertex.max(ends))
     }
 
     /// Least friction: at an end, or at the vertex of the parabola.
     pub fn friction_min(&self) -> f64 {
-        let ends = self.anchors[0].friction.min(self.anchors[1].friction);
+        let ends = self.end_states[0].friction.min(self.end_states[1].friction);
         self.vertex_friction().filter(|_| self.alpha > 0.0).map_or(ends, |vertex| vertex.min(ends))
     }
 
     /// Friction at the vertex of the parabola, where that lies between the ends.
     fn vertex_friction(&self) -> Option<f64> {
-        let vertex = 0.5 + 0.5 * self.anchors[0].l / self.alpha;
-        (vertex > 0.0 && vertex < 1.0).then(|| self.friction(Side::Start, vertex))
+        let vertex = 0.5 + 0.5 * self.end_states[0].l / self.alpha;
+        (vertex > 0.0 && vertex < 1.0).then(|| self.friction(PathEnd::Start, vertex))
     }
 
-    /// The rate of theta in units of `theta_0`, `v_0 t_f`, with the sign of the integration against time.
+    /// Rate of theta in units of `theta_0`, `v_0 t_f`; negative for backward integration.
     #[inline(always)]
-    pub fn pace(&self, anchor: &Anchor) -> f64 {
-        if self.forward { self.t_f * anchor.v } else { -self.t_f * anchor.v }
+    pub fn theta_rate(&self, end_state: &EndState) -> f64 {
+        if self.forward { self.t_f * end_state.v } else { -self.t_f * end_state.v }
     }
 
-    /// Slope of `ln v` along the integration at a place with this `w` and `z`.
-    pub fn bend(&self, side: Side, near: f64, w: f64, z: f64) -> f64 {
-        let anchor = self.anchor(side);
-        let slope = anchor.l + self.alpha * (1.0 - 2.0 * near);
-        let along = if side == Side::Start { slope } else { -slope };
-        let rate = -self.pace(anchor) * exp(-w) * exp_m1(z);
-        -self.distance(side, near) / self.a * along - self.ratio * rate
+    /// Slope of `ln v` in the direction of integration, for this `w` and `z`.
+    pub fn ln_v_slope(&self, side: PathEnd, d: f64, w: f64, z: f64) -> f64 {
+        let end_state = self.end_state(side);
+        let slope = end_state.l + self.alpha * (1.0 - 2.0 * d);
+        let along = if side == PathEnd::Start { slope } else { -slope };
+        let rate = -self.theta_rate(end_state) * exp(-w) * exp_m1(z);
+        -self.margin_at(side, d) / self.a * along - self.ratio * rate
     }
 
-    /// Passes along the course; every panel goes to `visit`. The end is good to a tolerance in units of the size of `w`,
-    /// what the end forgets to a looser one. If the pass is to tell the work as well, the velocity has to be resolved.
+    /// Integrates along the path and hands every panel to `visit`. The two tolerances, in units of the size of `w`, are
+    /// those of the end, and of all that the end does not depend on. With a tolerance of the work, panels resolve the
+    /// velocity.
     pub fn pass(
         &self,
         tolerances: (f64, f64),
-        work: Option<WorkSums>,
+        work: Option<WorkTolerance>,
         stats: &mut SolverStats,
         mut visit: impl FnMut(&FrictionPath, &Panel),
-    ) -> Result<End, Stop> {
-        if !matches!(self.measure, Measure::Meeting { .. }) {
-            return self.leg(None, tolerances, work, stats, |panel| visit(self, panel));
+    ) -> Result<PassResult, PassFailure> {
+        if !matches!(self.residual, Residual::TwoSidedSlip { .. }) {
+            return self.pass_one_way(None, tolerances, work, stats, |panel| visit(self, panel));
         }
         let other = self.reversed();
-        let (side, near) = self.deepest().ok_or(Stop::Little)?;
-        let first = self.leg(Some((side, near)), tolerances, work, stats, |panel| visit(self, panel))?;
-        let opposite = if side == Side::Start { Side::End } else { Side::Start };
-        let second = other.leg(Some((opposite, near)), tolerances, work, stats, |panel| visit(&other, panel))?;
-        let theta = |path: &FrictionPath, side, end: &End| exp(end.w) / path.anchor(side).v;
-        Ok(End {
+        let (side, d) = self.friction_minimum().ok_or(PassFailure::AlphaTooSmall)?;
+        let first = self.pass_one_way(Some((side, d)), tolerances, work, stats, |panel| visit(self, panel))?;
+        let opposite = if side == PathEnd::Start { PathEnd::End } else { PathEnd::Start };
+        let second = other.pass_one_way(Some((opposite, d)), tolerances, work, stats, |panel| visit(&other, panel))?;
+        let theta = |path: &FrictionPath, side, end: &PassResult| exp(end.w) / path.end_state(side).v;
+        Ok(PassResult {
             w: 0.0,
-            turn: theta(self, side, &first) * first.turn - theta(&other, opposite, &second) * second.turn,
-            sway: first.sway.max(second.sway),
+            w_by_alpha: theta(self, side, &first) * first.w_by_alpha
+                - theta(&other, opposite, &second) * second.w_by_alpha,
+            max_ln_v_by_alpha: first.max_ln_v_by_alpha.max(second.max_ln_v_by_alpha),
             noise: first.noise.max(second.noise),
             errors: first.errors.max(second.errors),
             sum: first.sum + second.sum,
@@ -377,282 +398,284 @@ impl FrictionPath {
         })
     }
 
-    /// What a theta that falls to nothing means.
-    fn lost(&self) -> Stop {
-        if self.forward { Stop::Little } else { Stop::Much }
+    /// Failure where theta falls to 0.
+    fn lost(&self) -> PassFailure {
+        if self.forward { PassFailure::AlphaTooSmall } else { PassFailure::AlphaTooLarge }
     }
 
-    /// Next to where friction is least on a course that comes to a standstill: panels must not meet in an extremum.
-    fn deepest(&self) -> Option<(Side, f64)> {
-        let place = |side: Side| (side, 0.5 + 0.5 * self.anchor(side).l / self.alpha);
-        let places = [place(Side::Start), place(Side::End)].into_iter();
-        let mut places = places.filter(|(_, near)| self.alpha > 0.0 && (0.0..=MIDDLE).contains(near));
-        places.next().map(|(side, near)| (side, 0.97 * near))
+    /// Position near the least friction of a path with a standstill: panels must not meet in an extremum.
+    fn friction_minimum(&self) -> Option<(PathEnd, f64)> {
+        let place = |side: PathEnd| (side, 0.5 + 0.5 * self.end_state(side).l / self.alpha);
+        let places = [place(PathEnd::Start), place(PathEnd::End)].into_iter();
+        let mut places = places.filter(|(_, d)| self.alpha > 0.0 && (0.0..=MIDPOINT).contains(d));
+        places.next().map(|(side, d)| (side, 0.97 * d))
     }
 
-    /// Passes along the course, up to a place of a side if there is one.
-    fn leg(
+    /// Integrates along the path in one direction, to the end or to a distance from an end.
+    fn pass_one_way(
         &self,
-        until: Option<(Side, f64)>,
+        until: Option<(PathEnd, f64)>,
         (tolerance, loosest): (f64, f64),
-        work: Option<WorkSums>,
+        work: Option<WorkTolerance>,
         stats: &mut SolverStats,
         mut visit: impl FnMut(&Panel),
-    ) -> Result<End, Stop> {
+    ) -> Result<PassResult, PassFailure> {
         let rule = radau();
-        let mut end = End { w: 0.0, turn: 0.0, sway: 0.0, noise: 0.0, errors: 0.0, sum: 0.0, work: 0.0 };
-        let mut h = self.thin(Side::Start);
+        let mut end = PassResult {
+            w: 0.0,
+            w_by_alpha: 0.0,
+            max_ln_v_by_alpha: 0.0,
+            noise: 0.0,
+            errors: 0.0,
+            sum: 0.0,
+            work: 0.0,
+        };
+        let mut h = self.first_panel(PathEnd::Start);
         let mut panels = 0;
-        let mut before = Side::Start;
-        // What is forgotten before the end needs not be good to more than this.
+        let mut before = PathEnd::Start;
+        // Loosest tolerance, where the end does not depend on the value.
         let loosest = self.size * tolerance.max(loosest) / (1.0 + self.ratio);
         let (tolerance, relative) = (self.size * tolerance, tolerance);
         let (damping, layer) = self.damping();
-        let last_layer = SEEN * self.thin(Side::End);
-        let settles = work.map_or(0.0, |work| self.settles(work.accuracy));
-        let grows = until.is_some() && self.kappa * self.pace(self.anchor(Side::Start)) < 0.0;
+        let last_layer = MAX_LAYERS * self.first_panel(PathEnd::End);
+        let relaxation_distance = work.map_or(0.0, |work| self.relaxation_distance(work.accuracy));
+        let grows = until.is_some() && self.kappa * self.theta_rate(self.end_state(PathEnd::Start)) < 0.0;
         stats.quadratures += 1;
-        for (side, from, to, quiet) in self.stretches(until) {
-            let anchor = self.anchor(side);
+        for (side, from, to, is_negligible) in self.intervals(until) {
+            let end_state = self.end_state(side);
             if side != before {
-                end.w += anchor.other;
+                end.w += end_state.other;
                 before = side;
             }
-            let floor = anchor.other.min(0.0) - LOST;
-            if quiet {
-                end = self.leap(side, (from, to), end, rule, work.is_some(), &mut visit)?;
+            let floor = end_state.other.min(0.0) - MAX_LN_THETA_FALL;
+            if is_negligible {
+                end = self.skip_standstill(side, (from, to), end, rule, work.is_some(), &mut visit)?;
                 continue;
             }
-            let along = if side == Side::Start { 1.0 } else { -1.0 };
-            let mut near = from;
-            while near != to {
-                let left = (to - near).abs();
-                // Several panels without elimination cost less than one with it.
-                let stiffness = self.stiffness(anchor, side, near, end.w);
-                let mild = 0.9 * MILD / stiffness.abs();
-                // What grows has to be followed: collocation would damp it.
-                let taken = if stiffness < 0.0 || h.min(left) < WORTH * mild { h.min(mild) } else { h };
-                // What the velocity does before theta follows it is next to nothing to theta.
-                let taken = if side == Side::Start && near < settles { taken.min(mild) } else { taken };
-                // Towards a layer at the end, or where theta follows the velocity up to there, panels shrink like what is
-                // left.
-                let thin = left > last_layer || (stiffness > 0.0 && left > mild);
-                let taken = if side == Side::End && to == 0.0 && thin { taken.min(GRADED * left) } else { taken };
-                let next = if 1.0001 * taken >= left { to } else { near + along * taken };
-                let length = (next - near).abs();
-                if next == near || panels == MOST_PANELS {
-                    // Theta may fall to nothing within less time than a place can tell.
-                    let falls = next == near && stiffness < 0.0 && self.forward && self.excess(side, near, end.w) > 0.0;
-                    let lost = end.w < floor + 0.75 * LOST || falls;
-                    return Err(if lost { self.lost() } else { Stop::GaveUp });
+            let along = if side == PathEnd::Start { 1.0 } else { -1.0 };
+            let mut d = from;
+            while d != to {
+                let left = (to - d).abs();
+                // Several panels without elimination cost less than one with elimination.
+                let stiffness = self.stiffness(end_state, side, d, end.w);
+                let mild = 0.9 * MAX_QUADRATURE_EXPONENT / stiffness.abs();
+                // Short panels follow a growing solution: collocation would damp it.
+                let taken = if stiffness < 0.0 || h.min(left) < ELIMINATION_COST * mild { h.min(mild) } else { h };
+                // Theta hardly shows the velocity before it follows it.
+                let taken = if side == PathEnd::Start && d < relaxation_distance { taken.min(mild) } else { taken };
+                // Panels are graded towards a layer at the end, or where theta follows the velocity up to the end.
+                let is_graded = left > last_layer || (stiffness > 0.0 && left > mild);
+                let taken = if side == PathEnd::End && to == 0.0 && is_graded {
+                    taken.min(GRADING_RATIO * left)
+                } else {
+                    taken
+                };
+                let next = if 1.0001 * taken >= left { to } else { d + along * taken };
+                let length = (next - d).abs();
+                if next == d || panels == MAX_PANELS {
+                    // Theta may fall to 0 within less than the rounding of a distance.
+                    let falls = next == d && stiffness < 0.0 && self.forward && self.ln_theta_v(side, d, end.w) > 0.0;
+                    let lost = end.w < floor + 0.75 * MAX_LN_THETA_FALL || falls;
+                    return Err(if lost { self.lost() } else { PassFailure::NotConverged });
                 }
                 panels += 1;
                 stats.nodes += NODES as u32;
                 let forgotten = match side {
                     _ if until.is_some() => 0.0,
-                    Side::Start => damping * layer - FALL - self.size,
-                    Side::End => damping.min(stiffness) * layer.min(next),
+                    PathEnd::Start => damping * layer - MAX_LN_AMPLIFICATION - self.size,
+                    PathEnd::End => damping.min(stiffness) * layer.min(next),
                 };
-                let tolerance = (tolerance * exp(forgotten.clamp(0.0, MOST_EXPONENT))).min(loosest);
+                let tolerance = (tolerance * exp(forgotten.clamp(0.0, MAX_EXPONENT))).min(loosest);
                 let enough = 0.1 * tolerance * if grows { end.w.abs().min(1.0) } else { 1.0 };
-                let Some(found) = collocate(self, side, (near, next), [end.w, end.turn], enough, rule) else {
+                let Some(found) = collocate(self, side, (d, next), [end.w, end.w_by_alpha], enough, rule) else {
                     h = 0.25 * length;
                     continue;
                 };
-                // What grows from nothing has to be good to a share of what it is.
+                // A solution that grows from 0 has a relative tolerance.
                 let seed = if grows { found.panel.w[NODES - 1].abs().min(1.0) } else { 1.0 };
                 let (size, tolerance) = (seed * self.size, seed * tolerance);
-                let (part, lack) = self.part(&found.panel, rule);
-                // What the end lacks is of the order of the square of what the nodes lack.
+                let (contribution, lack) = self.residual_contribution(&found.panel, rule);
+                // The order of the error at the end is higher than that at the nodes: the power 3/2.
                 let end_lacks = |nodes: f64| nodes * nodes.sqrt();
-                let mut excess = end_lacks(found.error / size) * size / tolerance;
-                excess = excess.max(end_lacks(lack) / relative);
-                let friction = self.friction(side, near).abs().max(self.friction(side, next).abs());
-                if let Some(WorkSums { accuracy, expected }) = work {
-                    let expected = expected.max(end.work + friction * found.slid).max(f64::MIN_POSITIVE);
-                    excess = excess.max(end_lacks(friction * found.lack / expected / accuracy));
+                let mut error_ratio = end_lacks(found.error / size) * size / tolerance;
+                error_ratio = error_ratio.max(end_lacks(lack) / relative);
+                let friction = self.friction(side, d).abs().max(self.friction(side, next).abs());
+                if let Some(WorkTolerance { accuracy, expected }) = work {
+                    let expected = expected.max(end.work + friction * found.slip).max(f64::MIN_POSITIVE);
+                    error_ratio = error_ratio.max(end_lacks(friction * found.lack / expected / accuracy));
                 }
-                let change = root_of_order(1.0 / excess.max(1e-20));
-                if excess > 1.0 {
+                let change = root_of_order(1.0 / error_ratio.max(1e-20));
+                if error_ratio > 1.0 {
                     h = length * (0.8 * change).clamp(0.2, 0.8);
                     continue;
                 }
                 visit(&found.panel);
-                end = End {
+                end = PassResult {
                     w: found.panel.w[NODES - 1],
-                    turn: found.turn,
-                    sway: end.sway.max((self.lean(anchor, next) + self.ratio * found.turn).abs()),
+                    w_by_alpha: found.w_by_alpha,
+                    max_ln_v_by_alpha: end
+                        .max_ln_v_by_alpha
+                        .max((self.friction_sensitivity(end_state, next) + self.ratio * found.w_by_alpha).abs()),
                     noise: found.noise + end.noise * found.growth,
                     errors: 1.0 + end.errors * found.growth,
-                    sum: end.sum + part,
-                    work: end.work + friction * found.slid,
+                    sum: end.sum + contribution,
+                    work: end.work + friction * found.slip,
                 };
                 if end.w < floor {
                     return Err(self.lost());
                 }
                 h = length.max(h.min(left)) * (0.8 * change).clamp(0.5, 5.0);
-                near = next;
+                d = next;
             }
         }
         Ok(end)
     }
 
-    /// Passes a stretch in which nothing moves, so that theta changes by the time alone.
-    fn leap(
+    /// Passes an interval of negligible slip, in which theta only ages.
+    fn skip_standstill(
         &self,
-        side: Side,
+        side: PathEnd,
         (from, to): (f64, f64),
-        start: End,
+        start: PassResult,
         rule: &Radau,
         shown: bool,
         visit: &mut impl FnMut(&Panel),
-    ) -> Result<End, Stop> {
-        let pace = self.pace(self.anchor(side)) * exp(-start.w);
-        let change = |near: f64| pace * (near - from).abs();
+    ) -> Result<PassResult, PassFailure> {
+        let theta_rate = self.theta_rate(self.end_state(side)) * exp(-start.w);
+        let change = |d: f64| theta_rate * (d - from).abs();
         let last = 1.0 + change(to);
         if last <= 0.0 {
             return Err(self.lost());
         }
-        let level = |near: f64| start.w + ln_1p(change(near));
-        let mut near = from;
-        while shown && near != to {
-            // Theta changes by a factor of three at most, and the last share of it in one piece.
-            let theta = 1.0 + change(near);
-            let step = theta * if self.forward { 2.0 } else { 2.0 / 3.0 } / pace.abs();
-            let next = if 1.5 * step >= (to - near).abs() { to } else { near + step * (to - from).signum() };
-            let place = |s: f64| near * (1.0 - s) + next * s;
+        let level = |d: f64| start.w + ln_1p(change(d));
+        let mut d = from;
+        while shown && d != to {
+            // Theta changes by a factor of three at most.
+            let theta = 1.0 + change(d);
+            let step = theta * if self.forward { 2.0 } else { 2.0 / 3.0 } / theta_rate.abs();
+            let next = if 1.5 * step >= (to - d).abs() { to } else { d + step * (to - from).signum() };
+            let place = |s: f64| d * (1.0 - s) + next * s;
             let w = rule.u.map(|s| level(place(s)));
-            let z = std::array::from_fn(|j| self.excess(side, place(rule.u[j]), w[j]));
-            visit(&Panel {
-                forward: self.forward,
-                side,
-                from: near,
-                to: next,
-                start: level(near),
-                w,
-                z,
-                follows: false,
-            });
-            near = next;
+            let z = std::array::from_fn(|j| self.ln_theta_v(side, place(rule.u[j]), w[j]));
+            visit(&Panel { forward: self.forward, side, from: d, to: next, start: level(d), w, z, follows: false });
+            d = next;
         }
         let noise = (start.noise + 2.0 * (last - 1.0).abs()) / last + level(to).abs();
-        let (turn, errors) = (start.turn / last, start.errors / last);
-        Ok(End { w: level(to), turn, noise, errors, ..start })
+        let (w_by_alpha, errors) = (start.w_by_alpha / last, start.errors / last);
+        Ok(PassResult { w: level(to), w_by_alpha, noise, errors, ..start })
     }
 
-    /// How fast the course forgets at a place with this `w`; negative where `w` grows as theta falls.
-    fn stiffness(&self, anchor: &Anchor, side: Side, near: f64, w: f64) -> f64 {
-        let excess = exp_m1(self.excess(side, near, w));
-        -self.pace(anchor) * exp(-w) * (excess - self.kappa * (1.0 + excess))
+    /// Rate at which errors of `w` decay; negative where they grow.
+    fn stiffness(&self, end_state: &EndState, side: PathEnd, d: f64, w: f64) -> f64 {
+        let excess = exp_m1(self.ln_theta_v(side, d, w));
+        -self.theta_rate(end_state) * exp(-w) * (excess - self.kappa * (1.0 + excess))
     }
 
-    /// How fast the course surely forgets at its end, and how far from the end it does.
+    /// Lower bound of the decay rate of errors near the end, and the distance over which it holds.
     fn damping(&self) -> (f64, f64) {
-        let anchor = self.anchor(Side::End);
-        let layer = (anchor.l.abs() + self.alpha.abs()) * (1.0 + anchor.gap / self.a);
-        (0.25 * (self.kappa * self.pace(anchor)).abs(), (1.0 / layer).min(0.25))
+        let end_state = self.end_state(PathEnd::End);
+        let layer = (end_state.l.abs() + self.alpha.abs()) * (1.0 + end_state.margin / self.a);
+        (0.25 * (self.kappa * self.theta_rate(end_state)).abs(), (1.0 / layer).min(0.25))
     }
 
-    /// How far from its start theta comes to follow the velocity to an accuracy, where the change of velocity in between
-    /// is too small for theta to show it.
-    fn settles(&self, accuracy: f64) -> f64 {
-        let anchor = self.anchor(Side::Start);
-        let rate = self.kappa * self.pace(anchor);
-        let jump = (anchor.gap / self.a * (anchor.l + self.alpha) / rate).abs();
-        // Theta changes by that over kappa.
-        let faint = jump < FAINT * self.kappa.abs().min(1.0);
+    /// Distance from the start at which theta follows the velocity to `accuracy`; 0 where the change of velocity on the
+    /// way changes theta.
+    fn relaxation_distance(&self, accuracy: f64) -> f64 {
+        let end_state = self.end_state(PathEnd::Start);
+        let rate = self.kappa * self.theta_rate(end_state);
+        let jump = (end_state.margin / self.a * (end_state.l + self.alpha) / rate).abs();
+        // The change of ln theta is the jump over kappa.
+        let faint = jump < MAX_UNRESOLVED_CHANGE * self.kappa.abs().min(1.0);
         if rate > 0.0 && jump > accuracy && faint { ln(jump / accuracy) / rate } else { 0.0 }
     }
 
-    /// The part of a panel in the integral of the measure, and what its nodes lack of it.
-    fn part(&self, panel: &Panel, rule: &Radau) -> (f64, f64) {
-        let spare = match self.measure {
-            Measure::Level => return (0.0, 0.0),
-            Measure::Slip { spare } | Measure::Lag { spare } | Measure::Meeting { spare } => spare,
+    /// Integral of the residual over a panel, and its error estimate in units of the spare time.
+    fn residual_contribution(&self, panel: &Panel, rule: &Radau) -> (f64, f64) {
+        let spare = match self.residual {
+            Residual::LnTheta => return (0.0, 0.0),
+            Residual::Slip { spare } | Residual::TimeLoss { spare } | Residual::TwoSidedSlip { spare } => spare,
         };
         let scale = self.t_f * (panel.to - panel.from).abs();
         let mut values = [0.0; NODES];
         for ((value, &node), &w) in values.iter_mut().zip(&rule.u).zip(&panel.w) {
-            let near = panel.place(node);
+            let d = panel.place(node);
             *value = scale
-                * if matches!(self.measure, Measure::Lag { .. }) {
-                    exp_m1(-self.distance(panel.side, near) / self.a) / exp_m1(-self.surplus(panel.side, w))
+                * if matches!(self.residual, Residual::TimeLoss { .. }) {
+                    exp_m1(-self.margin_at(panel.side, d) / self.a) / exp_m1(-self.ln_theta_v_at_ceiling(panel.side, w))
                 } else {
-                    exp(self.excess(panel.side, near, w))
+                    exp(self.ln_theta_v(panel.side, d, w))
                 };
         }
-        let part = values.iter().zip(&rule.w).map(|(value, w)| value * w).sum();
-        (part, rule.unresolved(&values) / spare)
+        let contribution = values.iter().zip(&rule.w).map(|(value, w)| value * w).sum();
+        (contribution, rule.unresolved(&values) / spare)
     }
 
-    /// Stretches in the direction of integration, with whether nothing moves there: from the start to the middle and
-    /// from there to the end, each cut where the velocity vanishes or friction saturates; no farther than a place of a
-    /// side.
-    fn stretches(&self, until: Option<(Side, f64)>) -> impl Iterator<Item = (Side, f64, f64, bool)> {
-        let (start, end) = (self.cuts(Side::Start), self.cuts(Side::End));
+    /// Intervals in the direction of integration, with whether slip is negligible there: from the start to the middle and
+    /// from there to the end. They are divided where the velocity vanishes or friction saturates, and clipped at `until`.
+    fn intervals(&self, until: Option<(PathEnd, f64)>) -> impl Iterator<Item = (PathEnd, f64, f64, bool)> {
+        let (start, end) = (self.negligible_range(PathEnd::Start), self.negligible_range(PathEnd::End));
         let all = [
-            (Side::Start, 0.0, start.0, false),
-            (Side::Start, start.0, start.1, self.alpha > 0.0),
-            (Side::Start, start.1, MIDDLE, false),
-            (Side::End, MIDDLE, end.1, false),
-            (Side::End, end.1, end.0, self.alpha > 0.0),
-            (Side::End, end.0, 0.0, false),
+            (PathEnd::Start, 0.0, start.0, false),
+            (PathEnd::Start, start.0, start.1, self.alpha > 0.0),
+            (PathEnd::Start, start.1, MIDPOINT, false),
+            (PathEnd::End, MIDPOINT, end.1, false),
+            (PathEnd::End, end.1, end.0, self.alpha > 0.0),
+            (PathEnd::End, end.0, 0.0, false),
         ];
-        let clipped = move |(side, from, to, quiet): (Side, f64, f64, bool)| match until {
-            Some((last, near)) if last == side && side == Side::Start => (side, from.min(near), to.min(near), quiet),
-            Some((last, near)) if last == side => (side, from.max(near), to.max(near), quiet),
-            Some((Side::Start, _)) => (side, to, to, quiet),
-            _ => (side, from, to, quiet),
+        let clipped = move |(side, from, to, is_negligible): (PathEnd, f64, f64, bool)| match until {
+            Some((last, d)) if last == side && side == PathEnd::Start => (side, from.min(d), to.min(d), is_negligible),
+            Some((last, d)) if last == side => (side, from.max(d), to.max(d), is_negligible),
+            Some((PathEnd::Start, _)) => (side, to, to, is_negligible),
+            _ => (side, from, to, is_negligible),
         };
         all.into_iter().map(clipped).filter(|(_, from, to, _)| from != to)
     }
 
-    /// From where to where on a side the velocity vanishes or friction saturates.
-    fn cuts(&self, side: Side) -> (f64, f64) {
-        let anchor = self.anchor(side);
-        let level = if self.alpha > 0.0 { anchor.quiet } else { SATURATED };
+    /// Distances from an end between which the velocity vanishes or friction saturates.
+    fn negligible_range(&self, side: PathEnd) -> (f64, f64) {
+        let end_state = self.end_state(side);
+        let level = if self.alpha > 0.0 { end_state.negligible_exponent } else { SATURATION_EXPONENT };
         // The roots of near (l + alpha (1 - near)) = level, written without cancellation.
-        let slope = anchor.l + self.alpha;
+        let slope = end_state.l + self.alpha;
         let square = slope * slope - 4.0 * self.alpha * level;
         if square <= 0.0 || slope * level <= 0.0 {
-            return (MIDDLE, MIDDLE);
+            return (MIDPOINT, MIDPOINT);
         }
         let sum = slope + slope.signum() * square.sqrt();
-        let (near, far) = (2.0 * level / sum, 0.5 * (sum / self.alpha).abs());
-        (near.min(MIDDLE), far.min(MIDDLE))
+        let (d, far) = (2.0 * level / sum, 0.5 * (sum / self.alpha).abs());
+        (d.min(MIDPOINT), far.min(MIDPOINT))
     }
 
-    /// A panel at an end: what the exponent and the rate of theta allow.
-    fn thin(&self, side: Side) -> f64 {
-        let anchor = self.anchor(side);
-        let layer = (anchor.l.abs() + self.alpha.abs()) * (1.0 + anchor.gap / self.a);
-        (2.0 / (layer + self.t_f * anchor.v + 1.0)).min(1.0)
+    /// Length of a panel at an end, from the exponent and the rate of theta.
+    fn first_panel(&self, side: PathEnd) -> f64 {
+        let end_state = self.end_state(side);
+        let layer = (end_state.l.abs() + self.alpha.abs()) * (1.0 + end_state.margin / self.a);
+        (2.0 / (layer + self.t_f * end_state.v + 1.0)).min(1.0)
     }
 }
 
-/// The place that is as far from either end.
-const MIDDLE: f64 = 0.5;
+/// Distance of the middle from either end.
+const MIDPOINT: f64 = 0.5;
 
-/// A relative change of velocity that theta may not show.
-const FAINT: f64 = 0.01;
+/// Relative change of velocity that theta does not resolve, at most. Chosen.
+const MAX_UNRESOLVED_CHANGE: f64 = 0.01;
 
-/// What theta falls on the way before it is lost makes of an error.
-const FALL: f64 = LOST + 30.0;
+/// Logarithm of the amplification of an error by a fall of theta, at most.
+const MAX_LN_AMPLIFICATION: f64 = MAX_LN_THETA_FALL + 30.0;
 
-/// How many times as long as a layer at its end a panel may be.
-const SEEN: f64 = 20.0;
+/// Length of a panel in units of a layer at its end, at most. Chosen.
+const MAX_LAYERS: f64 = 20.0;
 
-/// Share of what is left that a panel takes towards a layer.
-const GRADED: f64 = 0.8;
+/// Length of a panel towards a layer, fraction of the remaining distance. Chosen.
+const GRADING_RATIO: f64 = 0.8;
 
-/// Exponents of a panel that quadrature at its nodes resolves.
-pub(super) const MILD: f64 = 6.0;
+/// Exponent over a panel that quadrature at its nodes resolves, at most. Chosen.
+pub(super) const MAX_QUADRATURE_EXPONENT: f64 = 6.0;
 
-/// How many times as dear a panel with elimination is.
-const WORTH: f64 = 4.0;
+/// Cost of a panel with elimination, in units of one without.
+const ELIMINATION_COST: f64 = 4.0;
 
-/// By how much a panel may grow for its error to grow as much: near enough to the root of the order, the sixteenth with
-/// half of it once more.
+/// Growth of a panel for a growth `x` of its error: `x^(3/32)`, close to the root of the order.
 fn root_of_order(x: f64) -> f64 {
     let sixteenth = x.sqrt().sqrt().sqrt().sqrt();
     sixteenth * sixteenth.sqrt()

@@ -1,4 +1,4 @@
-//! The distance of steady friction from its bound, `tau_M - 1 - (a - b) ln v`, to all its digits where it is small.
+//! The margin of steady friction below its bound, `tau_M - 1 - (a - b) ln v`, with full relative accuracy.
 
 use crate::model::Law;
 use crate::numerics::double_double::DoubleDouble;
@@ -7,21 +7,21 @@ use crate::numerics::elementary::ln;
 /// `ln 2` less its nearest double.
 const LN_2_REST: f64 = 2.3190468138462996e-17;
 
-/// Below this share of its terms the distance is formed with 32 digits.
-const CANCELLED: f64 = 0.1;
+/// Margin, fraction of its terms, below which it is formed in double-double. Chosen: one digit is lost there.
+const CANCELLATION: f64 = 0.1;
 
-/// The distance for steady sliding at `v >= 1`.
-pub(super) fn gap(law: Law, tau_ceiling: f64, v: f64) -> f64 {
-    let room = tau_ceiling - 1.0;
-    let plain = room - (law.a - law.b) * ln(v);
-    if plain.abs() > CANCELLED * room.abs().max(1.0) {
+/// Margin of steady sliding at `v >= 1`, in `mu_0 sigma`.
+pub(super) fn friction_margin(law: Law, tau_ceiling: f64, v: f64) -> f64 {
+    let scale = tau_ceiling - 1.0;
+    let plain = scale - (law.a - law.b) * ln(v);
+    if plain.abs() > CANCELLATION * scale.abs().max(1.0) {
         return plain;
     }
     let slope = DoubleDouble::sum(law.a, -law.b);
     (DoubleDouble::sum(tau_ceiling, -1.0) - slope * logarithm(v)).high
 }
 
-/// `ln v`: `k ln 2 + 2 atanh s`, `s = (m - 1)/(m + 1)`, for `v = 2^k m`.
+/// `ln v` in double-double: `k ln 2 + 2 atanh s`, `s = (m - 1)/(m + 1)`, for `v = 2^k m`.
 fn logarithm(v: f64) -> DoubleDouble {
     let (mut m, mut k) = libm::frexp(v);
     if m < std::f64::consts::FRAC_1_SQRT_2 {

@@ -1,8 +1,8 @@
-//! Integration along a response: by Taylor series where nothing is stiff, by Radau IIA where something is.
+//! Integration along a response: Taylor series where the equations are not stiff, Radau IIA where they are.
 //!
-//! A slip is not stiff: its velocity changes at the rate at which friction damps it. A series of order 16 is then about
-//! as long as an implicit step and costs a fifth of it. In the stick phase friction damps `v` thousands of times faster
-//! than anything changes, which only an implicit method steps over.
+//! A slip is not stiff: its velocity changes at the rate of damping by friction. A series of order 16 is then about as long
+//! as an implicit step and costs a fifth of it. In the stick phase friction damps `v` thousands of times faster than the
+//! state changes, which takes an implicit method.
 
 use multiversion::multiversion;
 
@@ -14,103 +14,102 @@ use crate::numerics::stiff::{Accuracy, DenseOutput, Failure, Integrator, Integra
 /// Stages of an implicit step: order 9.
 pub const STAGES: usize = 5;
 
-/// One step, with dense output.
+/// Integration step with dense output.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[expect(clippy::large_enum_variant, reason = "both kinds are as frequent, and live on the stack")]
-pub enum Leg {
+pub enum IntegrationStep {
     /// By Radau IIA: good to order 9 at its end, to order 5 between.
-    Stiff(DenseOutput<3, STAGES>),
+    Implicit(DenseOutput<3, STAGES>),
     /// By a Taylor series: good everywhere.
-    Mild(DenseOutput<3, TERMS>),
+    Taylor(DenseOutput<3, TERMS>),
 }
 
-/// An integration along a response.
+/// Integration along a response.
 #[derive(Debug, Clone)]
-pub struct Run<'a> {
+pub struct Integration<'a> {
     slider: &'a ScaledBlock,
     integrator: Integrator<'a, ScaledBlock, 3, STAGES>,
     accuracy: Accuracy<3>,
-    /// Length of a series in units of the fastest motion from which on steps are implicit.
-    stiff: f64,
+    /// Length of a series, in units of the fastest motion, above which steps are implicit.
+    implicit_from: f64,
     /// Whether steps are series.
-    mild: bool,
+    uses_series: bool,
     series: u32,
 }
 
-/// Length of a series, in units of the fastest motion, at most. Chosen: about the stability interval of a series of order 16 (Hairer
-/// and Wanner, Solving Ordinary Differential Equations II, section IV.2); beyond it errors grow.
+/// Length of a series, in units of the fastest motion, at most. Chosen: about the stability interval of a series of order
+/// 16 (Hairer and Wanner, Solving Ordinary Differential Equations II, section IV.2).
 const MAX_REACH: f64 = 5.0;
 
-/// Change of `ln theta` in a series, at most. Chosen: beyond it terms of `1/theta` below the rounding of the others grow before they
-/// vanish.
+/// Change of `ln theta` in a series, at most. Chosen: beyond it terms of `1/theta` below the rounding of the others grow.
 const MAX_CHANGE: f64 = 6.0;
 
-/// Times that a series is cut for that, at most. Chosen: where the velocity falls, the first cut is too little.
+/// Reductions of a series for [`MAX_CHANGE`], at most. Chosen: where the velocity falls, the first one is too small.
 const MAX_CUTS: u32 = 6;
 
-/// Length of a step, in units of the fastest motion, from which on steps are implicit. Measured: either kind costs as much there
-/// (`cargo bench --bench step`).
+/// Length of a step, in units of the fastest motion, above which steps are implicit. Measured: both kinds cost as much
+/// there (`cargo bench --bench step_response`).
 const IMPLICIT_FROM: f64 = 15.0;
 
-/// Length of a step, in the same unit, below which implicit steps become series again. Chosen: less than [`IMPLICIT_FROM`], so that
-/// steps do not alternate.
+/// Length of a step, in units of the fastest motion, below which implicit steps become series. Chosen: less than
+/// [`IMPLICIT_FROM`], so that the kinds do not alternate.
 const SERIES_BELOW: f64 = 10.0;
 
-/// Duration of a slip of a light block on a soft spring, fraction of the rest before it, at least. Chosen: far below any of the
-/// physical domain.
+/// Duration of a slip of a light block on a soft spring, fraction of the rest before it, at least. Chosen: far below those
+/// of the physical domain.
 const SHORTEST_SLIP: f64 = 1e-120;
 
-/// Error of an implicit step, fraction of the tolerance. Chosen: an error of the contact lifetime in a stick phase becomes one of the
+/// Error of an implicit step, fraction of the tolerance. Chosen: an error of theta in a stick phase becomes an error of the
 /// time of the next slip, and accuracy costs least there.
 const IMPLICIT_ERROR: f64 = 0.03;
 
 impl ScaledBlock {
-    /// An integration from `state`, with errors of a step below `tolerance` in `x`, `y` and `z/force`.
-    pub fn run(&self, state: State, h: f64, tolerance: f64) -> Run<'_> {
+    /// Integration from `state`, with errors of a step below `tolerance` in `x`, `y` and `z/force`.
+    pub fn run(&self, state: State, h: f64, tolerance: f64) -> Integration<'_> {
         let accuracy = Accuracy { tolerance, scale: [self.force(), 1.0, 1.0] };
         let implicit = Accuracy { tolerance: IMPLICIT_ERROR * tolerance, ..accuracy };
         let mut integrator = Integrator::new(self, radau_iia_9(), implicit, 0.0, state, h);
         if self.inertia > 0.0 || self.k > self.b - self.a {
             integrator.may_step(SHORTEST_SLIP);
         }
-        // A series stays this short where nothing happens: rounding errors of the force enter its terms over factorials.
+        // Near rest a series is this short: rounding errors of the force enter its terms over factorials.
         let order = TERMS as f64;
         let rounding = exp((ln(tolerance / f64::EPSILON) + libm::lgamma(order + 1.0)) / order);
-        let stiff = IMPLICIT_FROM.min(0.7 * rounding);
-        Run { slider: self, integrator, accuracy, stiff, mild: true, series: 0 }
+        let implicit_from = IMPLICIT_FROM.min(0.7 * rounding);
+        Integration { slider: self, integrator, accuracy, implicit_from, uses_series: true, series: 0 }
     }
 }
 
-impl Run<'_> {
+impl Integration<'_> {
     /// Time reached.
     pub fn t(&self) -> f64 {
         self.integrator.t()
     }
 
-    /// State there.
+    /// State at the time reached.
     pub fn y(&self) -> &State {
         self.integrator.y()
     }
 
-    /// Goes on from another state, with a first step of about `h`.
+    /// Continues from another state, with a first step of about `h`.
     pub fn jump(&mut self, state: State, h: f64) {
         self.integrator.jump(state, h);
     }
 
-    /// Series so far, and what implicit steps have cost.
+    /// Number of series, and statistics of the implicit steps.
     pub fn cost(&self) -> (u32, IntegratorStats) {
         (self.series, self.integrator.cost())
     }
 
     #[inline(always)]
-    fn step(&mut self, limit: f64) -> Result<Leg, Failure> {
+    fn step(&mut self, limit: f64) -> Result<IntegrationStep, Failure> {
         match self.expand(limit) {
-            Some(piece) => Ok(Leg::Mild(piece)),
-            None => self.integrator.step(limit).map(Leg::Stiff),
+            Some(step) => Ok(IntegrationStep::Taylor(step)),
+            None => self.integrator.step(limit).map(IntegrationStep::Implicit),
         }
     }
 
-    /// A step by a series; `None` where something is stiff.
+    /// Step by a series; `None` where the equations are stiff.
     #[inline(always)]
     fn expand(&mut self, limit: f64) -> Option<DenseOutput<3, TERMS>> {
         let (slider, state) = (self.slider, *self.integrator.y());
@@ -118,83 +117,87 @@ impl Run<'_> {
         let fast = slider.fast(rates.v, rates.ageing);
         // False for numbers out of range.
         let short = fast * self.integrator.proposal() < SERIES_BELOW;
-        if !self.mild && !short {
+        if !self.uses_series && !short {
             return None;
         }
         let unit = 1.0 / fast;
         let powers = slider.series(&state, &rates, unit);
         let reach = reach(&powers, &self.accuracy.scale, self.accuracy.tolerance);
-        self.mild = reach < self.stiff;
-        if !self.mild {
+        self.uses_series = reach < self.implicit_from;
+        if !self.uses_series {
             return None;
         }
         let h = reach.min(MAX_REACH) * unit;
-        let mut whole = h.min(self.integrator.left(limit));
+        let mut length = h.min(self.integrator.left(limit));
         let over = |h: f64| DenseOutput::from_powers(self.t(), h, state, stretched(&powers, h / unit));
-        let mut piece = over(whole);
+        let mut step = over(length);
         for _ in 0..MAX_CUTS {
-            let change = (piece.end[Y] - state[Y]).abs();
+            let change = (step.end[Y] - state[Y]).abs();
             if change <= MAX_CHANGE {
                 break;
             }
-            whole *= 0.9 * MAX_CHANGE / change;
-            piece = over(whole);
+            length *= 0.9 * MAX_CHANGE / change;
+            step = over(length);
         }
-        let advances = piece.end.iter().all(|end| end.is_finite()) && self.integrator.leap(whole, piece.end, h);
-        self.mild = advances;
+        let advances = step.end.iter().all(|end| end.is_finite()) && self.integrator.leap(length, step.end, h);
+        self.uses_series = advances;
         self.series += u32::from(advances);
-        advances.then_some(piece)
+        advances.then_some(step)
     }
 }
 
-/// Coefficients in powers of a time that is `share` times as long.
+/// Coefficients in powers of a time unit that is `factor` times as long.
 #[inline(always)]
-fn stretched(powers: &Powers, share: f64) -> Powers {
+fn stretched(powers: &Powers, factor: f64) -> Powers {
     let mut scaled = *powers;
     let mut power = 1.0;
     let [z, y, x] = &mut scaled;
     for ((z, y), x) in z.iter_mut().zip(y).zip(x) {
-        power *= share;
+        power *= factor;
         [z, y, x].into_iter().for_each(|coefficient| *coefficient *= power);
     }
     scaled
 }
 
-/// One step, which ends at `limit` at the latest.
+/// Takes one step, which ends at `limit` at the latest.
+///
+/// # Errors
+///
+/// The failure of the implicit step.
 #[multiversion(targets(
     "x86_64+avx+avx2+bmi1+bmi2+avx512f+avx512bw+avx512cd+avx512dq+avx512vl",
     "x86_64+avx+avx2+bmi1+bmi2"
 ))]
-pub fn step_to(run: &mut Run<'_>, limit: f64) -> Result<Leg, Failure> {
+pub fn step_to(run: &mut Integration<'_>, limit: f64) -> Result<IntegrationStep, Failure> {
     run.step(limit)
 }
 
-/// The part of a step between two shares of it, as good as a step: an implicit one is taken again. `None` if that fails.
-pub fn between(run: &mut Run<'_>, leg: &Leg, from: f64, to: f64) -> Option<Leg> {
-    match leg {
-        Leg::Stiff(piece) => run.integrator.between(piece, from, to).map(Leg::Stiff),
-        Leg::Mild(piece) => Some(Leg::Mild(piece.between(from, to))),
+/// Substep between two fractions of a step, to the accuracy of a step: an implicit step is repeated. `None` if it fails.
+pub fn substep(run: &mut Integration<'_>, step: &IntegrationStep, from: f64, to: f64) -> Option<IntegrationStep> {
+    match step {
+        IntegrationStep::Implicit(step) => run.integrator.between(step, from, to).map(IntegrationStep::Implicit),
+        IntegrationStep::Taylor(step) => Some(IntegrationStep::Taylor(step.between(from, to))),
     }
 }
 
-impl Leg {
+impl IntegrationStep {
     /// Time at its start.
     pub fn t(&self) -> f64 {
         match self {
-            Leg::Stiff(piece) => piece.t,
-            Leg::Mild(piece) => piece.t,
+            IntegrationStep::Implicit(step) => step.t,
+            IntegrationStep::Taylor(step) => step.t,
         }
     }
 
     /// Duration.
     pub fn h(&self) -> f64 {
         match self {
-            Leg::Stiff(piece) => piece.h,
-            Leg::Mild(piece) => piece.h,
+            IntegrationStep::Implicit(step) => step.h,
+            IntegrationStep::Taylor(step) => step.h,
         }
     }
 
-    /// Time at the share `u` of it.
+    /// Time at the fraction `u` of the step.
     pub fn time(&self, u: f64) -> f64 {
         self.t() + u * self.h()
     }
@@ -202,39 +205,39 @@ impl Leg {
     /// State at its start.
     pub fn start(&self) -> &State {
         match self {
-            Leg::Stiff(piece) => &piece.start,
-            Leg::Mild(piece) => &piece.start,
+            IntegrationStep::Implicit(step) => &step.start,
+            IntegrationStep::Taylor(step) => &step.start,
         }
     }
 
     /// State at its end.
     pub fn end(&self) -> &State {
         match self {
-            Leg::Stiff(piece) => &piece.end,
-            Leg::Mild(piece) => &piece.end,
+            IntegrationStep::Implicit(step) => &step.end,
+            IntegrationStep::Taylor(step) => &step.end,
         }
     }
 
-    /// Variable `r` at the share `u` of it.
+    /// Variable `r` at the fraction `u` of the step.
     pub fn value(&self, r: usize, u: f64) -> f64 {
         match self {
-            Leg::Stiff(piece) => piece.value(r, u),
-            Leg::Mild(piece) => piece.value(r, u),
+            IntegrationStep::Implicit(step) => step.value(r, u),
+            IntegrationStep::Taylor(step) => step.value(r, u),
         }
     }
 
-    /// Time derivative of variable `r` there.
+    /// Time derivative of variable `r` at the fraction `u` of the step.
     pub fn slope(&self, r: usize, u: f64) -> f64 {
         match self {
-            Leg::Stiff(piece) => piece.slope(r, u),
-            Leg::Mild(piece) => piece.slope(r, u),
+            IntegrationStep::Implicit(step) => step.slope(r, u),
+            IntegrationStep::Taylor(step) => step.slope(r, u),
         }
     }
 }
 
 #[cfg(test)]
 mod tests {
-    //! Order, the error got for the error asked, and the work, exactly.
+    //! Order, obtained compared with requested error, and exact step counts.
 
     use super::super::scaled_block::Z;
     use super::*;
@@ -250,19 +253,19 @@ mod tests {
 
     #[test]
     fn order_of_a_series_is_its_number_of_terms() {
-        let piece = |state: &State, h: f64| {
+        let step = |state: &State, h: f64| {
             let powers = SLIDER.series(state, &Rates::of(state[Y], state[X]), h);
             DenseOutput::from_powers(0.0, h, *state, powers)
         };
-        let exact = |h: f64| (0..64).fold(NEAR, |state, _| piece(&state, h / 64.0).end);
+        let exact = |h: f64| (0..64).fold(NEAR, |state, _| step(&state, h / 64.0).end);
         let error = |h: f64| {
-            let (found, expected) = (piece(&NEAR, h).end, exact(h));
+            let (found, expected) = (step(&NEAR, h).end, exact(h));
             (0..3).map(|r| (found[r] - expected[r]).abs()).fold(0.0, f64::max)
         };
-        // What a single step leaves is of one order more.
+        // The local error is of one order more.
         let order = libm::log2(error(0.7) / error(0.35)) - 1.0;
         assert!((order - TERMS as f64).abs() < 0.3, "{order}");
-        // The first terms are the equations themselves.
+        // The first terms are the right-hand sides.
         let [z, y, x] = SLIP;
         let (v, ageing) = (exp(x), exp(-y));
         let powers = SLIDER.series(&SLIP, &Rates::of(y, x), 1.0);
@@ -272,7 +275,7 @@ mod tests {
         }
     }
 
-    /// The end of a response, how often it has risen through `v_f`, and the work.
+    /// State at the end of a response, its upward crossings of `v_f`, and its step counts.
     fn follow(k: f64, t_end: f64, tolerance: f64) -> (State, usize, u32, IntegratorStats) {
         let slider = ScaledBlock { k, ..SLIDER };
         let start = slider.steady(-32.0_f64.ln());
@@ -282,16 +285,16 @@ mod tests {
             if let Some(arrested) = slider.arrest(run.y()) {
                 run.jump(arrested, slider.first_step(&arrested));
             }
-            let leg = step_to(&mut run, t_end).expect("goes on");
-            let places: Vec<f64> = (0..=8).map(|i| leg.value(X, f64::from(i) / 8.0)).collect();
-            rises += places.windows(2).filter(|pair| pair[0] < 0.0 && pair[1] >= 0.0).count();
+            let step = step_to(&mut run, t_end).expect("goes on");
+            let values: Vec<f64> = (0..=8).map(|i| step.value(X, f64::from(i) / 8.0)).collect();
+            rises += values.windows(2).filter(|pair| pair[0] < 0.0 && pair[1] >= 0.0).count();
         }
         let (series, cost) = run.cost();
         (*run.y(), rises, series, cost)
     }
 
-    /// The published response over 50 periods and deep stick-slip over 50 peaks: the cases of `benches/peers`, with the states
-    /// at the end that its `reference.c` prints, and by how much the second lets errors grow.
+    /// The published response over 50 periods and deep stick-slip over 50 peaks: the cases of `benches/peers`, with the final
+    /// states of its `reference.c`, and the amplification of errors.
     const CASES: [(f64, f64, State, usize, f64); 2] = [
         (
             7.5e-3,
@@ -304,7 +307,7 @@ mod tests {
     ];
 
     #[test]
-    fn reference_error_got_is_the_error_asked_times_what_the_motion_makes_of_it() {
+    fn reference_error_is_the_requested_error_times_the_amplification() {
         for (k, t_end, end, expected, growth) in CASES {
             for digits in 3..=13 {
                 let tolerance = libm::pow(10.0, -f64::from(digits));
@@ -319,7 +322,7 @@ mod tests {
     }
 
     #[test]
-    fn work_is_known_exactly() {
+    fn step_counts_are_exact() {
         let work = CASES.map(|(k, t_end, ..)| follow(k, t_end, 1e-6));
         let [(.., paper, paper_implicit), (.., deep, deep_implicit)] = work;
         assert_eq!(
