@@ -585,8 +585,8 @@ impl FrictionPath {
         let rate = self.kappa * self.theta_rate(end_state);
         let jump = (end_state.margin / self.a * (end_state.l + self.alpha) / rate).abs();
         // The change of ln theta is the jump over kappa.
-        let faint = jump < MAX_UNRESOLVED_CHANGE * self.kappa.abs().min(1.0);
-        if rate > 0.0 && jump > accuracy && faint { ln(jump / accuracy) / rate } else { 0.0 }
+        let small = jump < MAX_UNRESOLVED_CHANGE * self.kappa.abs().min(1.0);
+        if rate > 0.0 && jump > accuracy && small { ln(jump / accuracy) / rate } else { 0.0 }
     }
 
     /// Integral of the residual over a panel, and its error estimate in units of the spare time.
