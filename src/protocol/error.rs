@@ -10,17 +10,17 @@ use crate::protocol::shortcut::{Case, Family, Shortcut};
 use crate::protocol::{Solved, SolverStats, Status};
 
 /// Relative tolerance of the second solve: the tightest that solvers resolve from rounding.
-pub const FINEST: f64 = 1e-15;
+pub const TIGHTEST_RTOL: f64 = 1e-15;
 
-/// Error of a solve to [`FINEST`] without rounding, fraction of its distance from a coarser one, at most. Chosen.
-const LEFT_BY_FINEST: f64 = 0.25;
+/// Error of a solve to [`TIGHTEST_RTOL`] without rounding, fraction of its distance from a coarser one, at most. Chosen.
+const ERROR_OF_TIGHTEST: f64 = 0.25;
 
 /// Relative rounding of a sum of some hundred positive terms, each good to a few units in the last place.
 const ROUNDING: f64 = 20.0 * f64::EPSILON;
 
-/// Error bound of the number `found`, where a solve to [`FINEST`] gives `finest`; `scale` is the size of its terms.
+/// Error bound of the number `found`, where a solve to [`TIGHTEST_RTOL`] gives `finest`; `scale` is the size of its terms.
 pub fn bound(found: f64, finest: f64, scale: f64) -> f64 {
-    (1.0 + LEFT_BY_FINEST) * (found - finest).abs() + ROUNDING * scale.abs()
+    (1.0 + ERROR_OF_TIGHTEST) * (found - finest).abs() + ROUNDING * scale.abs()
 }
 
 /// Error bound of the work of a free cubic shortcut of least velocity `v_min` in time `t_f`.
@@ -33,7 +33,7 @@ pub fn of_shortcut(transition: &Transition, t_f: f64, v_min: f64, work: f64, fin
     bound(work, finest, 2.0 * terms * work.abs().max(v_min * t_f))
 }
 
-/// Error bound of the gap `found`, where a solve to [`FINEST`] gives `finest`: a difference of two sums of about the
+/// Error bound of the gap `found`, where a solve to [`TIGHTEST_RTOL`] gives `finest`: a difference of two sums of about the
 /// size `replaced`.
 pub fn of_excess(found: f64, finest: f64, replaced: f64) -> f64 {
     bound(found, finest, found.abs() + 0.5 * replaced.abs())
@@ -44,7 +44,7 @@ pub fn of_excess(found: f64, finest: f64, replaced: f64) -> f64 {
 ///
 /// The sensitivity to `t_f` is `dW*/dt_f`, so that rounding of times counts where the work is a small difference.
 pub fn of_optimum(transition: &Transition, t_f: f64, bounded: bool, optimum: &Optimum) -> (Option<f64>, SolverStats) {
-    let Solved { status, value, stats } = optimal::solve(transition, t_f, bounded, FINEST);
+    let Solved { status, value, stats } = optimal::solve(transition, t_f, bounded, TIGHTEST_RTOL);
     let finest = value.filter(|_| status != Status::NotConverged);
     let scale = optimum.work.abs() + 0.25 * (optimum.hamiltonian * t_f).abs();
     (finest.map(|finest| bound(optimum.work, finest.work, scale)), stats)
@@ -56,7 +56,7 @@ pub fn of_optimum(transition: &Transition, t_f: f64, bounded: bool, optimum: &Op
 /// friction is bounded, theta and `v` are powers `e^((tau - 1)/a)`, whose exponent is rounded. The factor for velocities
 /// far apart is measured.
 pub fn of_member(family: &dyn Family, case: &Case, member: &Shortcut, stats: &mut SolverStats) -> Option<f64> {
-    let finest = family.solve(case, FINEST, stats).ok()?;
+    let finest = family.solve(case, TIGHTEST_RTOL, stats).ok()?;
     let Transition { law: Law { a, b }, v_i, v_f } = case.transition;
     let (exponent, delay) = if family.uses_tau_ceiling() {
         (0.05 * (0.25 * ln(v_f / v_i)).powi(4).max(1.0) * (case.tau_ceiling.abs() + b) / a, 1.5 * ROUNDING)
@@ -64,7 +64,7 @@ pub fn of_member(family: &dyn Family, case: &Case, member: &Shortcut, stats: &mu
         (0.0, 0.5 * ROUNDING)
     };
     let later = Case { t_f: case.t_f * (1.0 + delay), ..*case };
-    let late = (family.solve(&later, FINEST, stats).ok()?.work - finest.work).abs();
+    let late = (family.solve(&later, TIGHTEST_RTOL, stats).ok()?.work - finest.work).abs();
     Some(late + bound(member.work, finest.work, (1.0 + exponent) * member.work))
 }
 

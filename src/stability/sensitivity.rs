@@ -98,8 +98,8 @@ fn decay(path: &CompliantPath, rule: &Radau) -> f64 {
 /// First step, from the rates at the start, in `l/v_0`.
 fn first_step(slider: &SpringBlock, jet: &Jet) -> f64 {
     let v = jet.v[0];
-    let swing = if slider.m > 0.0 { (slider.k / slider.m).sqrt().min(slider.law.a / slider.m / v) } else { 0.0 };
-    1.0 / (swing + v * (1.0 + slider.k / slider.law.a) + 1.0 / jet.theta)
+    let fastest = if slider.m > 0.0 { (slider.k / slider.m).sqrt().min(slider.law.a / slider.m / v) } else { 0.0 };
+    1.0 / (fastest + v * (1.0 + slider.k / slider.law.a) + 1.0 / jet.theta)
 }
 
 /// Sixteenth root: the change of a step for a change of its error.

@@ -78,7 +78,7 @@ fn compute(job: &Job<'_>, range: Range<u64>, buffer: &mut ColumnBuffer) -> Resul
         let solved = solve(job.rtol);
         let mut stats = solved.stats;
         let row = solved.value.map(|best| {
-            let finest = job.projection.has(WORK_ERROR).then(|| solve(error::FINEST));
+            let finest = job.projection.has(WORK_ERROR).then(|| solve(error::TIGHTEST_RTOL));
             stats += finest.map_or_else(SolverStats::default, |finest| finest.stats);
             let finest = finest.and_then(|finest| finest.value);
             Row {

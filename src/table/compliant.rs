@@ -154,7 +154,7 @@ impl MemberCache {
             let amplification = path.and_then(|path| value_of(amplification(&path, job.rtol), work));
             let work_error =
                 solved.value.filter(|_| job.projection.has_any([WORK_ERROR, GAP_ERROR])).and_then(|member| {
-                    let finest = compliant::solve(&slider, velocities, t_f, error::FINEST);
+                    let finest = compliant::solve(&slider, velocities, t_f, error::TIGHTEST_RTOL);
                     *work += RunStats::from(finest.stats);
                     Some(error::bound(member.work, finest.value?.work, member.work))
                 });

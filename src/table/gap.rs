@@ -343,7 +343,8 @@ fn prepare(job: &Job<'_>, group: &Group, point: &Point, work: &mut RunStats) -> 
         (solved.status, solved.value.map(|optimum| optimum.work))
     });
     let landscape = |rtol| Landscape::new(&transition, t_f, rtol);
-    let finest = job.projection.has_any([WORK_ERROR, GAP_ERROR]).then(|| (landscape(error::FINEST), transition, t_f));
+    let finest =
+        job.projection.has_any([WORK_ERROR, GAP_ERROR]).then(|| (landscape(error::TIGHTEST_RTOL), transition, t_f));
     Prepared { landscape: Some(landscape(job.rtol)), finest, optimum, error_optimal }
 }
 

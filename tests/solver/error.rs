@@ -71,7 +71,7 @@ fn work_errors_of_random_shortcuts_are_bounded_and_within_rtol() {
         let transition = random.transition();
         let t_f = random.duration(&transition, true);
         let place = coefficients(random, &transition, t_f);
-        let (finest, _, status) = work(&transition, t_f, error::FINEST, place);
+        let (finest, _, status) = work(&transition, t_f, error::TIGHTEST_RTOL, place);
         if status == Status::Infeasible {
             continue;
         }
@@ -192,14 +192,22 @@ fn reference_work_errors_of_smooth_and_best_shortcuts_are_bounded() {
         let slider = SpringBlock { law, k: row.number("k"), m: row.number("m") };
         let solve = |rtol| Some(compliant::solve(&slider, (v_i, v_f), row.number("t_f"), rtol).value?.work);
         let found = solve(rtol)?;
-        Some(Claim { found, bound: error::bound(found, solve(error::FINEST)?, found), truth: row.number("work") })
+        Some(Claim {
+            found,
+            bound: error::bound(found, solve(error::TIGHTEST_RTOL)?, found),
+            truth: row.number("work"),
+        })
     });
     claims("best_cubic", &[1e-10, 1e-12], |row, rtol| {
         let solve = |rtol| {
             Some(best_cubic::solve(&transition(row), row.number("t_f"), row.text("bounded") == "1", rtol).value?.work)
         };
         let found = solve(rtol)?;
-        Some(Claim { found, bound: error::bound(found, solve(error::FINEST)?, found), truth: row.number("work") })
+        Some(Claim {
+            found,
+            bound: error::bound(found, solve(error::TIGHTEST_RTOL)?, found),
+            truth: row.number("work"),
+        })
     });
 }
 

@@ -306,7 +306,7 @@ fn again(case: &Case, delta_t: f64, floors: [f64; 2]) -> Found {
 /// that.
 fn error_bounds(case: &Case, delta_t: f64, (least, excess): (f64, f64)) -> u32 {
     let at = |rtol| solve(case, delta_t, rtol).value.expect("exists");
-    let finest = at(error::FINEST);
+    let finest = at(error::TIGHTEST_RTOL);
     let mut reported = 0;
     for rtol in [1e-2, 1e-3, 1e-4, 1e-5] {
         let found = at(rtol);

@@ -136,16 +136,16 @@ impl Curve {
     /// The ends and the stationary points of `p ln n + q ln theta`, which are roots of `-p (1 - 2 x) theta + q x z n`.
     fn extrema(&self, p: f64, q: f64) -> Vec<(ProtocolEnd, f64)> {
         let Curve { t_f, rise, .. } = *self;
-        let mut places = Vec::with_capacity(8);
+        let mut points = Vec::with_capacity(8);
         for (side, start) in [(ProtocolEnd::Start, -p * self.theta_i), (ProtocolEnd::End, p * self.theta_f)] {
             let mixed = rise * (2.0 * p + 3.0 * q);
             let square = -3.0 * p * rise - q * t_f - 6.0 * q * rise;
             let c = [start, q * t_f - 2.0 * start, square, 4.0 * mixed, -2.0 * mixed];
-            places.push((side, 0.0));
-            places.extend(roots_between(&c, 0.0, 0.5).into_iter().map(|d| (side, d)));
+            points.push((side, 0.0));
+            points.extend(roots_between(&c, 0.0, 0.5).into_iter().map(|d| (side, d)));
         }
-        places.push((ProtocolEnd::Start, 0.5));
-        places
+        points.push((ProtocolEnd::Start, 0.5));
+        points
     }
 
     /// Breakpoints in the order of time; the curve is smooth on the scale of their distance. Distances double from the

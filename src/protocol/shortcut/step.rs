@@ -95,15 +95,15 @@ impl Motion for Relaxation {
     fn landmarks(&self) -> Vec<f64> {
         let (end, finest_scale) = (self.v_f * self.t_f, self.finest_scale());
         let relaxed = RELAXED_P + ln_1p(self.decay.k.max(0.0));
-        let mut places = vec![0.0];
+        let mut landmarks = vec![0.0];
         let mut p = finest_scale;
-        while p < 0.9 * end && places.len() < MAX_LANDMARKS {
-            places.push(ln_1p(p / finest_scale) / ln_1p(end / finest_scale));
+        while p < 0.9 * end && landmarks.len() < MAX_LANDMARKS {
+            landmarks.push(ln_1p(p / finest_scale) / ln_1p(end / finest_scale));
             // Steps double, but are at most 1 while theta relaxes.
             p += if p < relaxed { p.min(1.0) } else { p };
         }
-        places.push(1.0);
-        places
+        landmarks.push(1.0);
+        landmarks
     }
 
     fn at(&self, s: f64) -> Moment {

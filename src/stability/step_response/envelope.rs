@@ -169,7 +169,7 @@ impl Follower<'_> {
         self.budget -= before - budget;
         if cycle == Err(StopReason::StepLimit) && self.budget > 0 {
             // Steps at this tolerance resolve rounding only.
-            self.finest *= COARSENING;
+            self.min_step_error *= COARSENING;
             return Err(StopReason::BelowStepError);
         }
         let cycle = cycle?;
@@ -248,8 +248,8 @@ impl Follower<'_> {
     /// Error of the integration steps of a cycle between these velocities whose change has the relative accuracy `rtol`.
     fn map_tolerance(&self, range: [f64; 2], change: f64) -> f64 {
         // Rounding of the largest logarithm.
-        let finest = self.finest * (range[1] - range[0]).max(1.0);
-        size(range) * (0.01 * self.rtol * change).clamp(finest, self.tolerance.max(finest))
+        let min_step_error = self.min_step_error * (range[1] - range[0]).max(1.0);
+        size(range) * (0.01 * self.rtol * change).clamp(min_step_error, self.tolerance.max(min_step_error))
     }
 
     /// Attracting fixed point near a cycle.
@@ -312,7 +312,7 @@ impl Follower<'_> {
         cycles: &mut f64,
     ) -> Result<Option<(EnvelopeStep, f64)>, StopReason> {
         // The estimate is of order S, the error of order 2 S - 1.
-        let allowed = exp(0.6 * ln(self.tolerance.max(self.finest)));
+        let allowed = exp(0.6 * ln(self.tolerance.max(self.min_step_error)));
         for _ in 0..MAX_TRIES {
             if *cycles < MIN_SKIPPED {
                 break;
@@ -351,7 +351,7 @@ impl Follower<'_> {
         }
         let matrix = matrix.lu();
         let mut envelope_step = EnvelopeStep { change: [[0.0; S]; 2], map_steps: [*map_step; S] };
-        let tolerance = (0.1 * self.tolerance.max(self.finest)).max(n * map_step.tolerance / map_step.size());
+        let tolerance = (0.1 * self.tolerance.max(self.min_step_error)).max(n * map_step.tolerance / map_step.size());
         let weights = SVector::<f64, SYSTEM>::from_fn(|i, _| if i < S { 1.0 } else { map_step.size().powi(-2) });
         let weighed = |p: &SVector<f64, SYSTEM>, q: &SVector<f64, SYSTEM>| weights.component_mul(p).dot(q);
         let mut steps: Vec<SVector<f64, SYSTEM>> = Vec::new();

@@ -70,7 +70,7 @@ pub(super) fn follow_once(
         requested_rtol: rtol.max(MIN_DIFFERENCE),
         rtol: error_fraction * rtol,
         tolerance: step_error(rtol, error_fraction),
-        finest: MIN_STEP_ERROR * (error_fraction / 0.3).max(1.0),
+        min_step_error: MIN_STEP_ERROR * (error_fraction / 0.3).max(1.0),
         budget: MAX_STEPS,
         extrema: [None; 2],
         is_peak_ambiguous: false,
@@ -96,7 +96,7 @@ pub(super) struct Follower<'a> {
     /// Error of a step.
     pub tolerance: f64,
     /// Least error of a step relative to the motion.
-    pub finest: f64,
+    pub min_step_error: f64,
     pub budget: u32,
     /// Minimum and maximum of the velocity so far.
     extrema: [Option<Extremum>; 2],
@@ -251,7 +251,7 @@ impl<'a> Follower<'a> {
     /// Error of a step for a motion of this size.
     fn step_error(&self, size: f64) -> f64 {
         let visible_error = exp(ln(ERROR_OF_MOTION * size) / 0.6);
-        self.tolerance.min(visible_error).max(self.finest * size.min(1.0))
+        self.tolerance.min(visible_error).max(self.min_step_error * size.min(1.0))
     }
 
     /// Whether a cycle stays in the band of settled velocities about stable sliding, so that it may decay.
@@ -268,7 +268,7 @@ impl<'a> Follower<'a> {
 
     /// Whether a cycle decays, at the tightest tolerance.
     fn decays_at_finest_steps(&mut self, map_step: &MapStep) -> Result<bool, StopReason> {
-        match self.map_step(map_step.from, self.finest * map_step.size()) {
+        match self.map_step(map_step.from, self.min_step_error * map_step.size()) {
             Ok(fine) => Ok(self.decays(&fine)),
             // Steps resolve rounding only: the next cycle has a looser tolerance.
             Err(StopReason::BelowStepError) => Ok(false),

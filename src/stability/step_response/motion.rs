@@ -81,7 +81,7 @@ impl StepResponseMotion {
             let power: f64 = rule.x.iter().zip(&rule.w).map(|(&x, w)| w * at(x).friction * at(x).v).sum();
             0.5 * step.h() / self.v_f * power
         };
-        let works = self.intervals.iter().filter_map(|stretch| match stretch {
+        let works = self.intervals.iter().filter_map(|interval| match interval {
             MotionInterval::Step(step) => Some(step_work(step)),
             MotionInterval::Arrest { .. } => None,
         });
@@ -92,8 +92,9 @@ impl StepResponseMotion {
     pub fn least_velocity(&self) -> f64 {
         let rule = gauss::rule(NODES);
         let fractions = || rule.x.iter().map(|x| 0.5 * (1.0 + x)).chain([0.0, 1.0]);
-        let least =
-            |stretch: &MotionInterval| fractions().map(|u| self.moment(stretch.at(u)).v).fold(f64::INFINITY, f64::min);
+        let least = |interval: &MotionInterval| {
+            fractions().map(|u| self.moment(interval.at(u)).v).fold(f64::INFINITY, f64::min)
+        };
         self.intervals.iter().map(least).fold(f64::INFINITY, f64::min)
     }
 

@@ -66,8 +66,8 @@ impl ScaledBlock {
 
     /// Coefficient of `ln theta` in the force about which the block oscillates: `b` for oscillations faster than ageing.
     fn theta_coefficient(&self) -> f64 {
-        let swings = self.k * self.inertia > self.a * self.a && self.k > self.inertia;
-        if swings { self.b } else { 0.0 }
+        let is_fast = self.k * self.inertia > self.a * self.a && self.k > self.inertia;
+        if is_fast { self.b } else { 0.0 }
     }
 
     /// State after an instantaneous arrest; `None` if there is none.

@@ -202,7 +202,7 @@ fn member(
         (false, true) => &[0, 1, 2, 3, 4],
         (false, false) => &[2, 3, 4, 0, 1],
     };
-    let order = order.iter().filter(|&&place| !(accelerates && place == 4));
+    let order = order.iter().filter(|&&index| !(accelerates && index == 4));
     let mut start = None;
     // Rounding of the time, at the greater velocity.
     let time_rounding = 100.0 * f64::EPSILON * t_f * v_i.max(v_f);
@@ -212,7 +212,7 @@ fn member(
     for (strict, max_noise, rtol) in
         [(true, low_noise, rtol), (true, max_noise, rtol), (false, max_noise, rtol), (false, max_noise, fine)]
     {
-        for path in order.clone().map(|&place| all[place]) {
+        for path in order.clone().map(|&index| all[index]) {
             let Some((alpha, errors)) = rough_alpha(&path, start, strict, stats) else { continue };
             start = start.or((path.residual == Residual::LnTheta || errors < MAX_ERROR_GROWTH).then_some(alpha));
             if strict && errors > MAX_ERROR_GROWTH {
@@ -335,7 +335,7 @@ fn acceleration_time_at_ceiling(
     let mut time = 0.0;
     for panel in 0..panels as u32 {
         // Fraction of the range of y, and z: geometric in z, or uniform in y where z hardly changes.
-        let place = |s: f64| {
+        let fraction_and_z = |s: f64| {
             if growth > 2.0 {
                 let power = s * ln(z_f / z_i);
                 (z_i * (exp_m1(power) / (z_f - z_i)), z_i * exp(power))
@@ -343,7 +343,7 @@ fn acceleration_time_at_ceiling(
                 (s, z_i + s * (z_f - z_i))
             }
         };
-        let (low, high) = (place(f64::from(panel) / panels), place(f64::from(panel + 1) / panels));
+        let (low, high) = (fraction_and_z(f64::from(panel) / panels), fraction_and_z(f64::from(panel + 1) / panels));
         stats.nodes += rule.x.len() as u32;
         for (x, w) in rule.x.iter().zip(&rule.w) {
             let between = |low: f64, high: f64| low + 0.5 * (high - low) * (1.0 + x);
@@ -356,10 +356,10 @@ fn acceleration_time_at_ceiling(
 
 /// `alpha_3` to [`SEARCH_TOLERANCE`] from an initial guess, and the growth of errors.
 fn search(path: &FrictionPath, start: f64, strict: bool, stats: &mut SolverStats) -> Option<(f64, f64)> {
-    let unit = path.alpha_scale();
+    let alpha_scale = path.alpha_scale();
     let (mut gave_up, mut errors) = (false, f64::INFINITY);
     let probe = |x: f64| {
-        let path = path.with(unit * x);
+        let path = path.with(alpha_scale * x);
         let end = match path.pass((SEARCH_TOLERANCE, SEARCH_TOLERANCE), None, stats, |_, _| ()) {
             Ok(end) => end,
             Err(PassFailure::AlphaTooSmall) => return Some(Probe { value: -f64::MAX, slope: 0.0 }),
@@ -373,7 +373,7 @@ fn search(path: &FrictionPath, start: f64, strict: bool, stats: &mut SolverStats
         let (miss, step) = path.residual_and_step(&end);
         // In units of alpha_scale; a step at most doubles alpha.
         let scale = 1.0 + x.abs();
-        let bounded = (step / unit).clamp(-MAX_SEARCH_STEP * scale, MAX_SEARCH_STEP * scale);
+        let bounded = (step / alpha_scale).clamp(-MAX_SEARCH_STEP * scale, MAX_SEARCH_STEP * scale);
         let wrong = bounded.is_nan() || (bounded < 0.0) != (miss > 0.0);
         if wrong {
             return Some(Probe { value: miss, slope: 0.0 });
@@ -385,8 +385,8 @@ fn search(path: &FrictionPath, start: f64, strict: bool, stats: &mut SolverStats
             if strict && errors > MAX_ERROR_GROWTH { weight.max(2.0 * SEARCH_RTOL / bounded.abs()) } else { weight };
         Some(Probe { value: -bounded * weight, slope: weight })
     };
-    let root = newton(probe, start / unit, (f64::NEG_INFINITY, f64::INFINITY), false, SEARCH_RTOL);
-    root.filter(|_| !gave_up).map(|root| (unit * root.x, errors))
+    let root = newton(probe, start / alpha_scale, (f64::NEG_INFINITY, f64::INFINITY), false, SEARCH_RTOL);
+    root.filter(|_| !gave_up).map(|root| (alpha_scale * root.x, errors))
 }
 
 /// Weight of a relative error of 1 of theta at the end, in the step that ends the search. Chosen.
@@ -403,17 +403,17 @@ fn search_far_out(
     (tolerance, enough): (f64, f64),
     stats: &mut SolverStats,
 ) -> Option<(f64, f64)> {
-    let unit = path.alpha_scale();
+    let alpha_scale = path.alpha_scale();
     let (mut gave_up, mut errors) = (false, f64::INFINITY);
-    let place = |q: f64| 0.5 * unit * (exp_m1(q) - exp_m1(-q));
+    let alpha_at = |q: f64| 0.5 * alpha_scale * (exp_m1(q) - exp_m1(-q));
     let probe = |q: f64| {
-        let path = path.with(place(q));
+        let path = path.with(alpha_at(q));
         match path.pass((tolerance, tolerance), None, stats, |_, _| ()) {
             Ok(end) => {
                 errors = end.errors;
                 let (value, step) = path.residual_and_step(&end);
-                let stretch = 0.5 * unit * (exp(q) + exp(-q));
-                Some(Probe { value, slope: (-value / step * stretch).max(0.0) })
+                let alpha_by_q = 0.5 * alpha_scale * (exp(q) + exp(-q));
+                Some(Probe { value, slope: (-value / step * alpha_by_q).max(0.0) })
             }
             Err(PassFailure::AlphaTooSmall) => Some(Probe { value: -f64::MAX, slope: 0.0 }),
             Err(PassFailure::AlphaTooLarge) => Some(Probe { value: f64::MAX, slope: 0.0 }),
@@ -425,7 +425,7 @@ fn search_far_out(
     };
     let start = start.signum() * ln_1p(2.0 * start.abs());
     let root = newton(probe, start, (-MAX_LN_ALPHA, MAX_LN_ALPHA), false, enough);
-    root.filter(|_| !gave_up).map(|root| (place(root.x), errors))
+    root.filter(|_| !gave_up).map(|root| (alpha_at(root.x), errors))
 }
 
 /// `ln` of `alpha_3` in units of [`FrictionPath::alpha_scale`], at most. Chosen.

@@ -28,7 +28,7 @@ impl Motion for BoundedFrictionMotion {
         let (panel, fraction) = (&self.panels[k], along - k as f64);
         let path = self.path.towards(panel.forward);
         let fraction = if panel.forward { fraction } else { 1.0 - fraction };
-        let (side, d, (w, z)) = (panel.side, panel.place(fraction), panel.state(&path, fraction));
+        let (side, d, (w, z)) = (panel.side, panel.distance(fraction), panel.state(&path, fraction));
         let x = if panel.forward == (side == PathEnd::Start) { d } else { 1.0 - d };
         Moment {
             t: self.path.t_f * x,

@@ -42,7 +42,7 @@ pub(super) struct SolvedPanel {
 
 impl Panel {
     /// Distance from the near end at the fraction `s` of the panel.
-    pub fn place(&self, s: f64) -> f64 {
+    pub fn distance(&self, s: f64) -> f64 {
         self.from * (1.0 - s) + self.to * s
     }
 
@@ -54,7 +54,7 @@ impl Panel {
     /// `w` and `z` there.
     pub fn state(&self, path: &FrictionPath, s: f64) -> (f64, f64) {
         let w = self.level(s);
-        let z = if self.follows { radau().follow(&self.z, s) } else { path.ln_theta_v(self.side, self.place(s), w) };
+        let z = if self.follows { radau().follow(&self.z, s) } else { path.ln_theta_v(self.side, self.distance(s), w) };
         (w, z)
     }
 }
@@ -198,12 +198,12 @@ fn excesses(
     rule: &Radau,
 ) -> (Nodes, bool, Nodes) {
     let slopes = rule.slopes(&w.map(|w| w - start));
-    let swing = w.iter().fold(0.0f64, |most, w| most.max((w - start).abs()));
+    let amplitude = w.iter().fold(0.0f64, |most, w| most.max((w - start).abs()));
     let (mut z, mut follows, mut rounding) = ([0.0; NODES], true, [0.0; NODES]);
     for j in 0..NODES {
         let gain = exp(w[j]) / scale;
         let rate = slopes[j] * gain;
-        let (by_friction, by_slope) = (doubt[j] + (kappa * w[j]).abs(), SLOPE_ROUNDING * swing * gain.abs());
+        let (by_friction, by_slope) = (doubt[j] + (kappa * w[j]).abs(), SLOPE_ROUNDING * amplitude * gain.abs());
         if by_slope < by_friction && rate.abs() < 0.5 {
             (z[j], rounding[j]) = (ln_1p(-rate), by_slope);
         } else {

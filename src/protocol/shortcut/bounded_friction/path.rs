@@ -68,7 +68,7 @@ pub(super) struct FrictionPath {
     pub kappa: f64,
     /// Size of `w`: the smaller of 1 and its change from end to end.
     pub size: f64,
-    /// Error of `ln R` from rounding of `tau_M`, in units of the last place of 1.
+    /// Error of `ln R` from rounding of `tau_M`, in units of the last position of 1.
     pub ln_r_rounding: f64,
     pub residual: Residual,
     /// The ends in the direction of integration.
@@ -84,7 +84,7 @@ pub(super) struct PassResult {
     pub w_by_alpha: f64,
     /// Greatest derivative of `ln v` with respect to `alpha_3` on the path.
     max_ln_v_by_alpha: f64,
-    /// Rounding error of `w`, in units of the last place of 1.
+    /// Rounding error of `w`, in units of the last position of 1.
     pub noise: f64,
     /// Error of `w` for an error of 1 in every panel.
     pub errors: f64,
@@ -260,7 +260,7 @@ impl FrictionPath {
         end.w_by_alpha.abs() / end.errors
     }
 
-    /// Error of `alpha_3` from rounding at the end, in units of the last place of 1.
+    /// Error of `alpha_3` from rounding at the end, in units of the last position of 1.
     pub fn rounding(&self, end: &PassResult) -> f64 {
         match self.residual {
             Residual::LnTheta => end.noise / end.w_by_alpha.abs(),
@@ -288,7 +288,7 @@ impl FrictionPath {
         d * ((end_state.l + self.alpha) - self.alpha * d)
     }
 
-    /// Rounding of the exponent, in units of the last place of 1.
+    /// Rounding of the exponent, in units of the last position of 1.
     #[inline(always)]
     pub fn uncertainty(&self, end_state: &EndState, d: f64) -> f64 {
         d * ((end_state.l + self.alpha).abs() + self.alpha.abs() * d)
@@ -405,10 +405,10 @@ impl FrictionPath {
 
     /// Position near the least friction of a path with a standstill: panels must not meet in an extremum.
     fn friction_minimum(&self) -> Option<(PathEnd, f64)> {
-        let place = |side: PathEnd| (side, 0.5 + 0.5 * self.end_state(side).l / self.alpha);
-        let places = [place(PathEnd::Start), place(PathEnd::End)].into_iter();
-        let mut places = places.filter(|(_, d)| self.alpha > 0.0 && (0.0..=MIDPOINT).contains(d));
-        places.next().map(|(side, d)| (side, 0.97 * d))
+        let position = |side: PathEnd| (side, 0.5 + 0.5 * self.end_state(side).l / self.alpha);
+        let positions = [position(PathEnd::Start), position(PathEnd::End)].into_iter();
+        let mut positions = positions.filter(|(_, d)| self.alpha > 0.0 && (0.0..=MIDPOINT).contains(d));
+        positions.next().map(|(side, d)| (side, 0.97 * d))
     }
 
     /// Integrates along the path in one direction, to the end or to a distance from an end.
@@ -554,9 +554,9 @@ impl FrictionPath {
             let theta = 1.0 + change(d);
             let step = theta * if self.forward { 2.0 } else { 2.0 / 3.0 } / theta_rate.abs();
             let next = if 1.5 * step >= (to - d).abs() { to } else { d + step * (to - from).signum() };
-            let place = |s: f64| d * (1.0 - s) + next * s;
-            let w = rule.u.map(|s| level(place(s)));
-            let z = std::array::from_fn(|j| self.ln_theta_v(side, place(rule.u[j]), w[j]));
+            let position = |s: f64| d * (1.0 - s) + next * s;
+            let w = rule.u.map(|s| level(position(s)));
+            let z = std::array::from_fn(|j| self.ln_theta_v(side, position(rule.u[j]), w[j]));
             visit(&Panel { forward: self.forward, side, from: d, to: next, start: level(d), w, z, follows: false });
             d = next;
         }
@@ -585,8 +585,8 @@ impl FrictionPath {
         let rate = self.kappa * self.theta_rate(end_state);
         let jump = (end_state.margin / self.a * (end_state.l + self.alpha) / rate).abs();
         // The change of ln theta is the jump over kappa.
-        let small = jump < MAX_UNRESOLVED_CHANGE * self.kappa.abs().min(1.0);
-        if rate > 0.0 && jump > accuracy && small { ln(jump / accuracy) / rate } else { 0.0 }
+        let is_unresolved = jump < MAX_UNRESOLVED_CHANGE * self.kappa.abs().min(1.0);
+        if rate > 0.0 && jump > accuracy && is_unresolved { ln(jump / accuracy) / rate } else { 0.0 }
     }
 
     /// Integral of the residual over a panel, and its error estimate in units of the spare time.
@@ -598,7 +598,7 @@ impl FrictionPath {
         let scale = self.t_f * (panel.to - panel.from).abs();
         let mut values = [0.0; NODES];
         for ((value, &node), &w) in values.iter_mut().zip(&rule.u).zip(&panel.w) {
-            let d = panel.place(node);
+            let d = panel.distance(node);
             *value = scale
                 * if matches!(self.residual, Residual::TimeLoss { .. }) {
                     exp_m1(-self.margin_at(panel.side, d) / self.a) / exp_m1(-self.ln_theta_v_at_ceiling(panel.side, w))

@@ -40,7 +40,7 @@ impl WorkAndVelocity {
             self.add_velocity(v);
         }
         for j in 0..NODES {
-            let (d, w, z) = (panel.place(rule.u[j]), panel.w[j], panel.z[j]);
+            let (d, w, z) = (panel.distance(rule.u[j]), panel.w[j], panel.z[j]);
             sum += rule.w[j] * path.friction(panel.side, d) * path.velocity(panel.side, w, z);
             let ln_v_slope = path.ln_v_slope(panel.side, d, w, z);
             if (ln_v_slope > 0.0) != (bend_before > 0.0) {
@@ -57,7 +57,7 @@ impl WorkAndVelocity {
         for _ in 0..MAX_HALVINGS {
             let middle = 0.5 * (low + high);
             let (w, z) = panel.state(path, middle);
-            if (path.ln_v_slope(panel.side, panel.place(middle), w, z) > 0.0) == rising {
+            if (path.ln_v_slope(panel.side, panel.distance(middle), w, z) > 0.0) == rising {
                 low = middle;
             } else {
                 high = middle;
