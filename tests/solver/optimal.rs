@@ -68,7 +68,7 @@ fn reference_optimal_protocols_are_good_to_the_last_digits_that_t_f_allows() {
                 assert!(error <= budget, "{name} at rtol {rtol}: {found} off by {error:.1e} > {budget:.1e} in {row:?}");
             }
             let floor = (value.time_at_floor - row.number("time_at_floor")).abs();
-            let short = row.text("regime") == "short_hold";
+            let short = row.text("regime") == "short_floor";
             // A short hold is what is left of t_f: rounding of t_f, and of as long a time before it.
             let hold_budget = if short {
                 2.0 * rtol * row.number("time_at_floor") + 16.0 * f64::EPSILON * t_f

@@ -11,8 +11,8 @@ pub const KNOWN: Known = Known {
     grid: Grid::Points,
     regimes: &[
         ("inside", "the best shortcut touches no bound"),
-        ("touching", "it touches v = 1 on the way"),
-        ("infeasible", "less time than t_min"),
+        ("touching", "the best shortcut touches v = 1 between its ends"),
+        ("infeasible", "a duration below t_min"),
     ],
     cases,
 };
@@ -26,7 +26,7 @@ fn cases() -> Vec<Case> {
         let case = point(&row).within("inside").reference(&row, &["v_min"]);
         case.word("status", status, Route::Reference)
     });
-    let touching = reference::table("best_cubic_cubic_touching").into_iter().map(|row| {
+    let touching = reference::table("best_cubic_touching").into_iter().map(|row| {
         let case = point(&row).within("touching").knows("v_min", Truth::Exact(1.0), Route::Reference);
         case.word("status", "ok", Route::Reference)
     });

@@ -10,11 +10,11 @@ pub const KNOWN: Known = Known {
     table: "compliant",
     grid: Grid::Points,
     regimes: &[
-        ("with mass", "a block of some mass on a spring"),
+        ("with mass", "m > 0 on a spring"),
         ("no mass", "m = 0"),
         ("rigid", "k = inf"),
         ("sampled", "the control velocity is held for dt"),
-        ("infeasible", "less time than t_min"),
+        ("infeasible", "a duration below t_min"),
     ],
     cases,
 };

@@ -11,10 +11,10 @@ pub const KNOWN: Known = Known {
     table: "crossover",
     grid: Grid::Points,
     regimes: &[
-        ("acceleration", "velocities apart from each other and from 1"),
+        ("acceleration", "velocities away from each other and from 1"),
         ("deceleration", "the same, downwards"),
         ("v near 1", "the lower velocity within 0.1 of v = 1"),
-        ("v_f near v_i", "velocities within 0.1 of each other, relatively"),
+        ("v_f near v_i", "velocities within a relative 0.1 of each other"),
     ],
     cases,
 };

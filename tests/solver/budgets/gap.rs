@@ -11,10 +11,10 @@ pub const KNOWN: Known = Known {
     table: "gap",
     grid: Grid::Shortcuts,
     regimes: &[
-        ("v >= 1", "shortcuts of the paper's landscapes and random ones that stay above v = 1"),
-        ("below v = 1", "the same that fall below v = 1"),
-        ("near the border", "shortcuts in 1e-3 to 1e-12 of the way to where theta or v is 0"),
-        ("infeasible", "theta or v at or below 0, or less time than t_min"),
+        ("v >= 1", "shortcuts of the paper's landscapes and random ones, above v = 1 throughout"),
+        ("below v = 1", "the same, below v = 1 somewhere"),
+        ("near the border", "shortcuts at a relative 1e-3 to 1e-12 from the border, where theta or v is 0"),
+        ("infeasible", "theta or v not positive somewhere, or durations below t_min"),
     ],
     cases,
 };

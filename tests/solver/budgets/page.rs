@@ -62,6 +62,15 @@ fn filled(text: &str, ledger: &Ledger, points: &Points) -> String {
     text
 }
 
+/// What an error is measured against, as the page explains it.
+fn description(route: Route) -> &'static str {
+    match route {
+        Route::Judge => "double-double",
+        Route::Law => "invariant",
+        Route::Reference | Route::Formula | Route::TrueError => route.name(),
+    }
+}
+
 /// The regimes of a table, and its budgets: a line a column.
 fn block(known: &Known, ledger: &Ledger, points: &Points) -> String {
     let mut text = String::new();
@@ -70,7 +79,7 @@ fn block(known: &Known, ledger: &Ledger, points: &Points) -> String {
         writeln!(text, "- *{regime}*: {meaning}; {count} point{}", if count == 1 { "" } else { "s" }).expect("is text");
     }
     let names = known.regimes.iter().map(|(regime, _)| format!(" {regime} |")).collect::<String>();
-    writeln!(text, "\n| column |{names} truth |\n| --- |{} --- |", " --- |".repeat(known.regimes.len()))
+    writeln!(text, "\n| column |{names} compared with |\n| --- |{} --- |", " --- |".repeat(known.regimes.len()))
         .expect("is text");
     let table = table::find(known.table).expect("is a table");
     for column in table.columns().iter().map(|column| column.name).chain([STATUS]) {
@@ -82,18 +91,19 @@ fn block(known: &Known, ledger: &Ledger, points: &Points) -> String {
                 continue;
             };
             routes.extend(&budget.routes);
-            let mark = if budget.conditioned { " †" } else { "" };
             if (budget.rtols, budget.ulps) == (0.0, 0.0) {
                 cells += " exact |";
             } else if budget.routes == [Route::TrueError] {
-                write!(cells, " {} of it |", budget.rtols.max(budget.ulps)).expect("is text");
+                write!(cells, " {} bound |", budget.rtols.max(budget.ulps)).expect("is text");
             } else {
-                write!(cells, " {} / {}{mark} |", number(budget.rtols), number(budget.ulps)).expect("is text");
+                let (rtols, ulps) = (number(budget.rtols), number(budget.ulps));
+                let inputs = if budget.conditioned { "<br>+ inputs" } else { "" };
+                write!(cells, " {rtols} rtol<br>{ulps} ulp{inputs} |").expect("is text");
             }
         }
         routes.sort();
         routes.dedup();
-        let routes = routes.iter().map(|route| route.name()).collect::<Vec<_>>().join(", ");
+        let routes = routes.into_iter().map(description).collect::<Vec<_>>().join(", ");
         writeln!(text, "| `{column}` |{cells} {routes} |").expect("is text");
     }
     text

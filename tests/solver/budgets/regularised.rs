@@ -10,10 +10,10 @@ pub const KNOWN: Known = Known {
     table: "regularised",
     grid: Grid::Points,
     regimes: &[
-        ("off the bound", "accelerations that stay above v = 1"),
-        ("floor", "accelerations with a hold, so that pieces dip below v = 1"),
-        ("no bound", "accelerations that may fall below v = 1"),
-        ("infeasible", "pieces that overlap, or less time than t_min"),
+        ("off the bound", "accelerations above v = 1 throughout"),
+        ("floor", "accelerations with time at the floor, whose pieces dip below v = 1"),
+        ("no bound", "accelerations with velocity_bound = false"),
+        ("infeasible", "pieces that overlap, or durations below t_min"),
     ],
     cases,
 };
@@ -35,7 +35,7 @@ fn cases() -> Vec<Case> {
 fn point(row: &Row) -> Case {
     let bounded = row.text("bounded") == "1";
     let axes = AXES.into_iter().chain(["k", "m", "delta_t"]).map(|axis| (axis, row.number(axis)));
-    let regime = match row.text("floor") {
+    let regime = match row.text("hold") {
         "1" => "floor",
         _ if bounded => "off the bound",
         _ => "no bound",

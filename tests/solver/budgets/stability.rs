@@ -12,9 +12,9 @@ pub const KNOWN: Known = Known {
     grid: Grid::Points,
     regimes: &[
         ("b <= a", "no critical stiffness"),
-        ("above k_c", "stiffer than critical at v_f, by more than a hundredth"),
-        ("below k_c", "softer, by more than a hundredth"),
-        ("near k_c", "within a hundredth of the critical stiffness at v_f, down to 1e-13"),
+        ("above k_c", "more than 1 % stiffer than critical at v_f"),
+        ("below k_c", "more than 1 % softer than critical at v_f"),
+        ("near k_c", "within 1 % of the critical stiffness at v_f, down to a relative 1e-13"),
         ("no mass", "m = 0"),
         ("rigid", "k = inf"),
         ("Hopf point", "the first Lyapunov coefficient from its definition"),

@@ -10,10 +10,10 @@ pub const KNOWN: Known = Known {
     table: "step_response",
     grid: Grid::Points,
     regimes: &[
-        ("settled", "responses that come to rest"),
+        ("settled", "responses that settle"),
         ("limit cycle", "responses that end on a limit cycle"),
-        ("at once", "a rigid spring, or no change of velocity"),
-        ("infeasible", "without mass on a spring softer than b - a"),
+        ("at once", "responses that settle at time 0: a rigid spring, or no change of velocity"),
+        ("infeasible", "no mass, on a spring softer than b - a"),
         ("Hopf point", "the first Lyapunov coefficient from its definition"),
     ],
     cases,
