@@ -25,8 +25,7 @@ pub struct Session {
     planned: Manifest,
     /// The manifest's file when it was last compared.
     seen: Mutex<Option<FileVersion>>,
-    /// Unlocked when it is closed.
-    _lock: Option<File>,
+    _lock: Option<Lock>,
 }
 
 /// Whether a run allows concurrent runs.
@@ -192,8 +191,22 @@ impl Session {
     }
 }
 
+/// A lock on a folder, released when it is dropped.
+///
+/// Closing the file is not enough: a child process that another thread starts has a copy of the file until it executes
+/// its program.
+#[derive(Debug)]
+struct Lock(File);
+
+impl Drop for Lock {
+    fn drop(&mut self) {
+        // A failure leaves the lock to the end of the process.
+        let _ = self.0.unlock();
+    }
+}
+
 /// The lock of a run on the folder of its dataset; none where folders cannot be locked.
-fn lock(folder: &Path, company: Concurrency) -> Result<Option<File>, DatasetError> {
+fn lock(folder: &Path, company: Concurrency) -> Result<Option<Lock>, DatasetError> {
     let Ok(file) = File::open(folder) else { return Ok(None) };
     let locked = match company {
         Concurrency::Alone => file.try_lock(),
@@ -205,7 +218,7 @@ fn lock(folder: &Path, company: Concurrency) -> Result<Option<File>, DatasetErro
                 holders(&file).first().map_or_else(String::new, |holder| format!(" (process {})", holder.process));
             Err(DatasetError::Busy { folder: folder.display().to_string(), process })
         }
-        _ => Ok(Some(file)),
+        _ => Ok(Some(Lock(file))),
     }
 }
 

@@ -266,5 +266,5 @@ fn regress_what_is_no_file_is_never_waited_for() {
 }
 
 /// What `status` says of a manifest that is no file.
-const UNREADABLE: &str = "test/manifest.json: cannot read: it is not a file\n  help: solve this, then run the same command again, which keeps \
-                          what is finished; or write elsewhere with --out DIR\n";
+const UNREADABLE: &str = "test/manifest.json: cannot read: it is not a file\n  help: solve this and run the same command again, which keeps \
+                          finished parts; or write elsewhere with --out DIR\n";

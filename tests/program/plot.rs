@@ -163,7 +163,7 @@ fn refusals(folder: &Path) {
     );
     assert_eq!(
         with(&["--out", "gap.jpg"]),
-        "error: --out gap.jpg: the name : the ending is none of .svg, .png, .pdf\n  help: for a folder, make it first or give a name \
+        "error: --out gap.jpg: the name ends in none of .svg, .png, .pdf\n  help: for a folder, make it first or give a name \
          without a dot\n"
     );
     let contradiction = with(&["--out", "gap.pdf", "--format", "png"]);
@@ -266,8 +266,8 @@ fn traces_are_drawn_over_each_other() {
     fs::write(folder.join("bad.csv"), "t,v\n0,1\n1,x\n").expect("is writable");
     assert_eq!(
         complaint(folder, &["plot", "bad.csv"]),
-        "error: bad.csv, line 3: found `x`\n  expected: a number or nothing\n  help: a trace is what `slipsweep trace … --out \
-         FILE.csv` writes\n"
+        "error: bad.csv, line 3: found `x`\n  expected: a number or nothing\n  help: `slipsweep trace … --out \
+         FILE.csv` writes traces\n"
     );
     assert!(
         complaint(folder, &["plot", "best.csv", "--table", "gap"])
@@ -286,7 +286,7 @@ fn several_rows_of_a_cell_are_noted_in_the_picture() {
     shown(folder, &["plot", "results/many"]);
     let words = words(&read(folder, "many-optimal.svg"));
     assert!(
-        words.contains("3000 places of tf have several rows each: their least and greatest values are drawn."),
+        words.contains("3000 values of tf have several rows each: their least and greatest values are drawn."),
         "{words}"
     );
     for mark in ["tcheapest", "tcross", "tfloor"] {

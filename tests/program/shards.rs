@@ -297,8 +297,8 @@ fn regress_more_parts_than_can_be_shared_out_are_refused() {
         assert_eq!(output.status.code(), Some(1));
         assert_eq!(
             text(&output.stderr),
-            "error: 281474976710656 parts are too many for shards\n  expected: at most 8388608\n  help: write several specs, each \
-             with some of the values of an axis\n"
+            "error: 281474976710656 parts are too many for shards\n  expected: at most 8388608\n  help: divide an axis over several \
+             specs\n"
         );
     }
     assert!(!folder.path().join("results").exists());

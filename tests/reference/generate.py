@@ -54,7 +54,7 @@ class Unphysical(Exception):
 
 
 class Endless(Exception):
-    """A hold that never leaves the bound."""
+    """An arc on the floor that never leaves the bound."""
 
 
 class Extremal:
@@ -172,8 +172,8 @@ class Problem:
     def leaving(self, theta):
         return self.a - (1 + self.a + self.b * log(theta)) / theta
 
-    def hold(self, time):
-        """Contact lifetime after a hold, and its work (by quadrature)."""
+    def floor(self, time):
+        """Contact lifetime after a time on the floor, and its work (by quadrature)."""
         theta = lambda t: 1 - (1 - self.theta_0) * exp(-t)
         cuts = [mpf(0), time]
         near = self.theta_0
@@ -182,12 +182,12 @@ class Problem:
             near *= 20
         return theta(time), time + self.b * quad(lambda t: log(theta(t)), sorted(cuts))
 
-    # Each family member: (C, hold time, extremal).
+    # Each family member: (C, time on the floor, extremal).
     def by_start(self, z_0):
         c = self.c_of(z_0, self.theta_0)
         return c, mpf(0), Extremal(self.a, self.b, c, self.theta_0, self.theta_1, z_0 < 0, False)
 
-    def by_hold(self, t_1):
+    def by_floor(self, t_1):
         theta = 1 - (1 - self.theta_0) * exp(-t_1)
         c = self.leaving(theta)
         return c, t_1, Extremal(self.a, self.b, c, theta, self.theta_1, True, False)
@@ -237,16 +237,16 @@ def solve(problem, t_f):
 
     if problem.v_f >= problem.v_i:
         if problem.bounded and total(problem.by_start, -log(problem.v_i)) < t_f:
-            make, low, high = problem.by_hold, mpf(0), t_f
+            make, low, high = problem.by_floor, mpf(0), t_f
         else:
             make, low, high = problem.by_start, -log(problem.v_i) if problem.bounded else mpf(-1), mpf(1)
             while total(make, high) > t_f:
                 high *= 2
             while not problem.bounded and total(make, low) < t_f:
                 low *= mpf("1.3")
-    elif problem.bounded and total(problem.by_hold, problem.least_time()) < t_f:
+    elif problem.bounded and total(problem.by_floor, problem.least_time()) < t_f:
         # Long enough to leave the bound beyond theta_1.
-        make, low, high = problem.by_hold, problem.least_time(), t_f
+        make, low, high = problem.by_floor, problem.least_time(), t_f
     else:
         make, low, high = problem.by_end, -log(problem.v_f) if problem.bounded else mpf(-1), mpf("0.5")
         while total(make, high) < t_f:
@@ -285,11 +285,11 @@ def solve(problem, t_f):
 def optimal_row(a, b, v_i, v_f, t_f, bounded):
     problem = Problem(a, b, v_i, v_f, bounded)
     (c, t_1, arc), make, x = solve(problem, t_f)
-    held_work = problem.hold(t_1)[1] if t_1 else mpf(0)
-    work = held_work + arc.work
+    floor_work = problem.floor(t_1)[1] if t_1 else mpf(0)
+    work = floor_work + arc.work
     theta_s = 1 - (1 - problem.theta_0) * exp(-t_1) if t_1 else problem.theta_0
     z_end = ln_u(arc.g(problem.theta_1) / problem.a, -1 if (make == problem.by_end and x < 0) else 1)
-    rising = make == problem.by_hold or (make == problem.by_start and x < 0) or make == problem.by_end
+    rising = make == problem.by_floor or (make == problem.by_start and x < 0) or make == problem.by_end
     z_start = ln_u(arc.g(theta_s) / problem.a, -1 if rising else 1)
     lowest = min([arc.lowest] + ([1 + problem.b * log(problem.theta_0)] if t_1 else []))
     if lowest <= max(mpf(0), problem.b - problem.a):
@@ -297,7 +297,7 @@ def optimal_row(a, b, v_i, v_f, t_f, bounded):
     # The Hamiltonian as the derivative of the work, by a difference along the family.
     step = mpf(10) ** -16 * max(abs(x), mpf(10) ** -3)
     c_2, t_2, arc_2 = make(x + step)
-    work_2 = (problem.hold(t_2)[1] if t_2 else mpf(0)) + arc_2.work
+    work_2 = (problem.floor(t_2)[1] if t_2 else mpf(0)) + arc_2.work
     slope = (work_2 - work) / (t_2 + arc_2.time - t_1 - arc.time)
     assert abs(slope + c) < mpf(10) ** -10 * abs(c) + mpf(10) ** -10, (slope, c)
     v_start = mpf(1) if t_1 else exp(z_start) * problem.v_i
@@ -337,15 +337,15 @@ def crossover_row(a, b, v_i, v_f):
         c, t_1, arc = member
         if arc.lowest <= low:
             raise Unphysical
-        return t_1 + arc.time, arc.work + (p.hold(t_1)[1] if t_1 else 0)
+        return t_1 + arc.time, arc.work + (p.floor(t_1)[1] if t_1 else 0)
 
     if v_f > v_i:
         if min(tau(p.theta_0), tau(p.theta_1), 1 + p.b * log(p.theta_0)) <= low:
             raise Unphysical
         t_cross, w_cross = measure(p.by_start(mpf(0)))
-        t_floor, w_hold = measure(p.by_start(log(p.theta_0)))
+        t_floor, w_floor = measure(p.by_start(log(p.theta_0)))
         t_cheap, w_cheap = measure(p.by_start(ln_u(tau(p.theta_0) / p.a, 1)))
-        return [t_cross, t_floor, t_cheap, None, None, None, None, w_cross, w_hold, w_cheap, None, None]
+        return [t_cross, t_floor, t_cheap, None, None, None, None, w_cross, w_floor, w_cheap, None, None]
     t_min = p.least_time()
     if min(tau(p.theta_1), 1 + p.b * log(p.theta_0)) <= low:
         raise Unphysical
@@ -356,7 +356,7 @@ def crossover_row(a, b, v_i, v_f):
         c = p.leaving(p.theta_0)
         z = [ln_u((1 + (p.b - p.a) * log(p.theta_1) + c * p.theta_1) / p.a, side) for side in (-1, 1)]
         free = [Extremal(p.a, p.b, c, p.theta_0, p.theta_1, True, side < 0).time for side in (-1, 1)]
-    return [None, None, None, t_min, t_turn, *free, None, None, None, p.hold(t_min)[1], w_turn]
+    return [None, None, None, t_min, t_turn, *free, None, None, None, p.floor(t_min)[1], w_turn]
 
 
 def crossover_rows():
@@ -376,7 +376,7 @@ def crossover_rows():
 
 
 def short_floor_cases():
-    """Accelerations just after t_floor, where the hold is a small fraction of t_f."""
+    """Accelerations just after t_floor, where the time on the floor is a small fraction of t_f."""
     precision(DIGITS)
     cases = []
     for a, b, v_i, v_f in (

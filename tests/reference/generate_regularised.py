@@ -3,7 +3,7 @@
 
     venv/bin/python generate_regularised.py          # minutes; needs mpmath and gmpy2
 
-The optimum's ends and its hold are those of generate.py, by quadrature at 40 digits. From there the extremal is a power series about the start of each
+The optimum's ends and its time on the floor are those of generate.py, by quadrature at 40 digits. From there the extremal is a power series about the start of each
 step in the paper's equations, forwards in the first half of what is kept, backwards in the second. A piece is one too: the exponent with its stretched
 step, v by the recurrence of the exponential, theta, the logarithms, work and control velocity by theirs, order 36 in arithmetic of 50 digits. The
 parameter of a piece is a root by bracketing in theta. Ranges are those of 16 places a step, the best of them improved by golden sections.
@@ -92,8 +92,8 @@ class Case:
     def __init__(self, a, b, v_i, v_f, t_f, k, m, delta_t, bounded):
         self.a, self.b, self.v_i, self.v_f, self.t_f, self.k, self.m, self.delta_t = (mpfr(x) for x in (a, b, v_i, v_f, t_f, k, m, delta_t))
         generate.precision(generate.DIGITS)
-        work, v_start, v_end, hold, _, _, _ = generate.optimal_row(a, b, v_i, v_f, t_f, bounded)
-        self.work, self.v_start, self.v_end, self.hold = (mpfr(nstr(x, 38)) for x in (work, v_start, v_end, hold))
+        work, v_start, v_end, floor, _, _, _ = generate.optimal_row(a, b, v_i, v_f, t_f, bounded)
+        self.work, self.v_start, self.v_end, self.floor = (mpfr(nstr(x, 38)) for x in (work, v_start, v_end, floor))
         self.v, self.control, self.excess = Range(), Range(), mpfr(0)
 
     def steer(self, v, ln_v, ln_theta, unit):
@@ -133,7 +133,7 @@ class Case:
                 visit(vs, self.steer(vs, qs, ys, mpfr(1)), h)
             q, y, rest = at(qs, h), at(ys, h), (mpfr(0) if h == rest else rest - h)
 
-    def hold_work(self, start, end):
+    def floor_work(self, start, end):
         """int (1 + b ln theta) dt on v = 1, by series in time."""
         t, work = start, mpfr(0)
         while t < end:
@@ -147,25 +147,25 @@ class Case:
         return work
 
     def state(self, t):
-        """v with two derivatives and theta on the optimum, and its work from there to the end of the hold or to the nearer end."""
-        if t <= self.hold:
+        """v with two derivatives and theta on the optimum, and its work from there to the end of the arc on the floor or to the nearer end."""
+        if t <= self.floor:
             return [mpfr(1), mpfr(0), mpfr(0), self.held(t)]
-        if t < self.t_f / 2 or t - self.hold < self.t_f - t:
-            return self.arc(*self.leaving(), t - self.hold)[0]
+        if t < self.t_f / 2 or t - self.floor < self.t_f - t:
+            return self.arc(*self.leaving(), t - self.floor)[0]
         return self.arc(self.v_end, 1 / self.v_f, t - self.t_f)[0]
 
     def leaving(self):
         """v and theta where the extremal begins."""
-        return (mpfr(1), self.held(self.hold)) if self.hold > 0 else (self.v_start, 1 / self.v_i)
+        return (mpfr(1), self.held(self.floor)) if self.floor > 0 else (self.v_start, 1 / self.v_i)
 
     def work_until(self, t):
         """Work of the optimum from the start."""
-        if t <= self.hold:
-            return self.hold_work(mpfr(0), t)
+        if t <= self.floor:
+            return self.floor_work(mpfr(0), t)
         if t == self.t_f:
             return self.work
-        if t < self.t_f / 2 or t - self.hold < self.t_f - t:
-            return self.hold_work(mpfr(0), self.hold) + self.arc(*self.leaving(), t - self.hold)[1]
+        if t < self.t_f / 2 or t - self.floor < self.t_f - t:
+            return self.floor_work(mpfr(0), self.floor) + self.arc(*self.leaving(), t - self.floor)[1]
         return self.work + self.arc(self.v_end, 1 / self.v_f, t - self.t_f)[1]
 
     def replace(self, start, end):
@@ -181,13 +181,13 @@ class Case:
         if end <= start:
             return
         take = lambda v, control, h: (self.v.take(v, h), self.control.take(control, h))
-        for t in (start, min(end, self.hold)):
-            if t <= self.hold and start < self.hold:
+        for t in (start, min(end, self.floor)):
+            if t <= self.floor and start < self.floor:
                 theta = self.held(t)
                 self.v.take([mpfr(1)], mpfr(1))
                 if not self.k.is_infinite():
                     self.control.take([1 + self.b * (1 / theta - 1) / self.k], mpfr(1))
-        first = max(start, self.hold)
+        first = max(start, self.floor)
         if first >= end:
             return
         middle = (first + end) / 2
@@ -197,7 +197,7 @@ class Case:
         self.arc(v, theta, middle - end, take)
 
     def solve(self):
-        d, corner = self.delta_t, self.hold
+        d, corner = self.delta_t, self.floor
         self.replace(mpfr(0), d)
         start = d
         if d < corner < self.t_f - d:
@@ -338,10 +338,10 @@ if __name__ == "__main__":
     for *numbers, bounded in cases():
         case = Case(*numbers, bool(bounded))
         found = case.solve()
-        rows.append([repr(x) for x in numbers] + [bounded, int(case.hold > 0)] + ["{0:.25g}".format(x) for x in found])
+        rows.append([repr(x) for x in numbers] + [bounded, int(case.floor > 0)] + ["{0:.25g}".format(x) for x in found])
         print(*rows[-1], flush=True)
     with open("regularised.csv", "w", newline="") as file:
         file.write("# made by generate_regularised.py, Taylor series of order 36 at 50 digits\n")
         out = csv.writer(file, lineterminator="\n")
-        out.writerow("a,b,v_i,v_f,t_f,k,m,delta_t,bounded,hold,work,work_optimal,gap,v_min,v_max,v_c_min,v_c_max".split(","))
+        out.writerow("a,b,v_i,v_f,t_f,k,m,delta_t,bounded,floor,work,work_optimal,gap,v_min,v_max,v_c_min,v_c_max".split(","))
         out.writerows(rows)

@@ -5,7 +5,7 @@
     venv/bin/python generate_stress.py points.txt
 
 The formulas are those of generate.py, at 80 digits: between velocities and times twenty decades apart half of them cancel. A point is left out
-where the optimum is not physical, where there is none, where a hold lasts longer than the digits distinguish theta from 1, and where the quadrature
+where the optimum is not physical, where there is none, where the time on the floor lasts longer than the digits distinguish theta from 1, and where the quadrature
 does not reach the digits that its own checks need, or takes more than a minute (a quarter of that for
 bounded_friction); what is left out is counted. Members of bounded_friction are Taylor series as in generate_shortcut_friction.py.
 """

@@ -35,7 +35,7 @@ fn cases() -> Vec<Case> {
 fn point(row: &Row) -> Case {
     let bounded = row.text("bounded") == "1";
     let axes = AXES.into_iter().chain(["k", "m", "delta_t"]).map(|axis| (axis, row.number(axis)));
-    let regime = match row.text("hold") {
+    let regime = match row.text("floor") {
         "1" => "floor",
         _ if bounded => "off the bound",
         _ => "no bound",
