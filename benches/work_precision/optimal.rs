@@ -21,7 +21,7 @@ pub fn subjects(tolerances: &[f64]) -> [Subject; 2] {
     let (easy, hard) = reference::table("optimal").into_iter().enumerate().partition(|(_, row)| is_regular(row));
     [
         subject("accelerations that stay off the bound", easy, tolerances),
-        subject("holds, decelerations, unbounded", hard, tolerances),
+        subject("on the floor, decelerations, unbounded", hard, tolerances),
     ]
 }
 

@@ -10,6 +10,8 @@ order, in an empty folder of the page's own:
 - `text` must occur in their standard output;
 - a picture `pictures/NAME.svg` must be a file that they wrote, byte for byte.
 
+A page without commands shows measurements, which `benches/document` writes with their pictures.
+
 `--write` copies the pictures to docs/pictures instead, and replaces a `text` block that is not printed by the whole output of the block before it.
 """
 
@@ -74,8 +76,9 @@ def run_page(page, variables, write):
                 count += 1
             elif language == "text":
                 stale.append((code, output))
-        # A page without commands shows output of other commands.
-        for code, output in stale if count else []:
+        if not count:
+            return 0
+        for code, output in stale:
             if code not in printed:
                 if not write:
                     sys.exit(f"{name}: this output is not printed:\n{code}\nprinted:\n{printed}")
