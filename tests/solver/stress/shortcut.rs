@@ -57,8 +57,10 @@ fn examine(name: &str, points: u64, draw: fn(&mut Random) -> Point) {
         sound(&rough, row);
         promises(name, case, &rough, row);
         let fine = solve(family, case, FINE);
-        row.fact("exists at 1e-12", fine.is_ok());
         let Transition { law: Law { a, b }, v_i, v_f } = case.transition;
+        // Outside the physical domain, a path may be too ill-conditioned at one tolerance and not at another.
+        let honest = !is_physical(case) && matches!(fine, Err(Obstacle::NotConverged));
+        row.fact("exists at 1e-12", fine.is_ok() || honest);
         // Within some units in the last place of 1, v - 1 has the digits of no more than that.
         let Some(fine) = fine.ok().filter(|_| v_i.min(v_f) - 1.0 > 1e-14) else { return };
         // Friction is a sum of terms of this size.
@@ -102,6 +104,15 @@ fn allowed(family: &dyn Family, case: &Case, found: f64, noise: f64, number: imp
     });
     let change = |case: &Case| solve(family, case, FINE).map_or(0.0, |found| (number(&found) - 1.0).abs());
     noise + 8.0 * compared_with.iter().map(change).sum::<f64>()
+}
+
+/// Whether a case lies in the physical domain of docs/spec.md, where every member must be found.
+fn is_physical(&Case { transition: Transition { law: Law { a, b }, v_i, v_f }, t_f, .. }: &Case) -> bool {
+    let apart = |x: f64, y: f64, least: f64| x == y || (x - y).abs() > least * y;
+    let law = (1e-3..=0.3).contains(&a) && b <= 0.5_f64.min(20.0 * a) && apart(b, a, 1e-3);
+    let velocity = |v: f64| (1.001..=1e10).contains(&v);
+    let slip = t_f * v_i.max(v_f);
+    law && velocity(v_i) && velocity(v_f) && apart(v_i, v_f, 1e-6) && t_f <= 1e4 && (1e-3..=1e7).contains(&slip)
 }
 
 /// Where a family must have a member, and where it cannot.
