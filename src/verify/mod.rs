@@ -1,18 +1,15 @@
 //! A dataset audited: a sample of its rows solved again by a route that shares nothing with the solvers that made it.
 
 mod best_cubic;
-mod block_motion;
 mod compliant;
 mod crossover;
-mod extremal;
-mod formula_path;
 mod gap;
 mod hopf;
-mod long_term;
+mod motion;
 mod open_loop;
 mod optimal;
 mod reduced;
-mod regularised_motion;
+mod regularised;
 mod route;
 mod sample;
 mod shortcut;
@@ -106,12 +103,12 @@ pub fn verify(path: &Path, manifest: &Manifest, sample: u64, seed: u64) -> Resul
         for (number, row) in rows {
             let verdict = match table.name.as_str() {
                 "gap" => gap::check(&row, &context),
-                "optimal" => optimal::check(&row, &context),
+                "optimal" => optimal::check(&row, &context, rtol),
                 "crossover" => crossover::check(&row, &context),
                 "best_cubic" => best_cubic::check(&row, &context, rtol),
-                "shortcut" => shortcut::check(&row, &context),
+                "shortcut" => shortcut::check(&row, &context, rtol),
                 "compliant" => compliant::check(&row, &context, rtol),
-                "regularised" => regularised_motion::check(&row, &context, rtol),
+                "regularised" => regularised::check(&row, &context, rtol),
                 "step_response" => step_response::check(&row, &context, rtol),
                 "stability" => stability::check(&row, &context),
                 _ if is_reduced => reduced::check(&row, &units, &spec, &context),
