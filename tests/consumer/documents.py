@@ -135,7 +135,7 @@ def main():
         return
     assert count >= 10, count
     with tempfile.TemporaryDirectory() as folder:
-        for language, code in blocks_of((REPOSITORY / "examples/README.md").read_text()):
+        for language, code in blocks_of((REPOSITORY / "docs/examples.md").read_text()):
             if language == "sh":
                 run(["bash", "-euo", "pipefail", "-c", code], folder, variables)
         scripts = sorted(EXAMPLES.glob("with_*.py"))
