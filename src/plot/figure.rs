@@ -688,7 +688,7 @@ fn draw_contour(canvas: &mut Canvas, lines: &[Vec<(f64, f64)>], stroke: &Stroke)
     canvas.lines(lines, stroke);
 }
 
-/// Draws the name of a row beside its mark, on the side with space.
+/// Draws the name of a row near its mark, on the side with space.
 fn draw_name(canvas: &mut Canvas, area: Area, (x, y): (f64, f64), name: &str) {
     let wide = NOTE_SIZE * label::width(name) + 4.0;
     let (place, anchor) =
