@@ -6,7 +6,7 @@ use super::optimal::{compare, min_duration};
 use super::verdict::{Context, Verdict, number, transition, word};
 use crate::dataset::{Cell, Row};
 use crate::model::Transition;
-use crate::protocol::{SpringBlock, compliant};
+use crate::protocol::{Moment, SpringBlock, compliant};
 use crate::table::STATUS;
 
 /// `ln(v - 1)` over `x = t/t_f`, as the sum of the powers from 0 to 6.
@@ -61,7 +61,7 @@ pub fn check(row: &Row, context: &Context, rtol: f64) -> Verdict {
     verdict.compare(row, "alpha", Some(alpha), Some(alpha.abs() + noise / rtol));
     let alpha = number(row, "alpha").unwrap_or(alpha);
     let exponent = Exponent::new(&problem, alpha);
-    let off = |at: &crate::protocol::Moment| (exponent.moment(at.t / t_f, t_f)[0] / at.v - 1.0).abs();
+    let off = |at: &Moment| (exponent.moment(at.t / t_f, t_f)[0] / at.v - 1.0).abs();
     let formula = followed.samples.iter().map(|(_, at)| off(at)).fold(0.0, f64::max);
     let arrival = (followed.end().theta * v_f - 1.0).abs();
     verdict.push("motion", followed.equation + arrival + formula);

@@ -1,4 +1,4 @@
-//! A dataset audited: a sample of its rows solved again by a route that shares nothing with the solvers that made it.
+//! A dataset audited: a sample of its rows checked by the equations that their protocols obey, or solved by a second route.
 
 mod best_cubic;
 mod compliant;

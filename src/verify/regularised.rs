@@ -4,8 +4,22 @@ use super::motion::Followed;
 use super::optimal::{certify, min_duration};
 use super::verdict::{Context, Verdict, number, transition, word};
 use crate::dataset::Row;
-use crate::protocol::{SpringBlock, regularised};
+use crate::protocol::{Moment, SpringBlock, regularised};
 use crate::table::STATUS;
+
+/// How far the protocol is from the optimum of this `C`, on the floor up to `corner`, where no piece may replace it.
+fn drift(followed: &Followed, a: f64, (c, corner): (f64, f64), [delta_t, t_f]: [f64; 2]) -> f64 {
+    let drift = |at: &Moment| {
+        if at.t < corner {
+            return (at.v - 1.0).abs();
+        }
+        let (kinetic, press) = (a * at.v, (at.friction + a) / at.theta);
+        (kinetic - press - c).abs() / (kinetic.abs() + press.abs())
+    };
+    let moments = followed.samples.iter().map(|(_, at)| at);
+    let kept = moments.filter(|at| at.t > delta_t && at.t < t_f - delta_t);
+    kept.filter(|at| corner == 0.0 || (at.t - corner).abs() > delta_t).map(drift).fold(0.0, f64::max)
+}
 
 pub fn check(row: &Row, context: &Context, rtol: f64) -> Verdict {
     let numbers = ["t_f", "k", "m", "delta_t"].map(|name| number(row, name));
@@ -36,21 +50,9 @@ pub fn check(row: &Row, context: &Context, rtol: f64) -> Verdict {
     };
     let Some(optimum) = certify(&mut verdict, &problem, t_f, context.bounded) else { return verdict };
     let followed = Followed::new(motion, &slider);
-    let corner = if context.bounded { optimum.motion.time_at_floor() } else { 0.0 };
-    let kept = followed.samples.iter().map(|(_, at)| at).filter(|at| {
-        let at_corner = corner > 0.0 && (at.t - corner).abs() <= delta_t;
-        at.t > delta_t * (1.0 + rtol) && at.t < t_f - delta_t * (1.0 + rtol) && !at_corner
-    });
-    let a = problem.law.a;
-    let drift = |at: &crate::protocol::Moment| match at.t < corner {
-        true => (at.v - 1.0).abs(),
-        false => {
-            let (kinetic, press) = (a * at.v, (at.friction + a) / at.theta);
-            (kinetic - press - optimum.c).abs() / (kinetic.abs() + press.abs())
-        }
-    };
-    let drift = kept.map(drift).fold(0.0, f64::max);
     let arrival = (followed.end().theta * problem.v_f - 1.0).abs();
+    let corner = if context.bounded { optimum.motion.time_at_floor() } else { 0.0 };
+    let drift = drift(&followed, problem.law.a, (optimum.c, corner), [delta_t * (1.0 + rtol), t_f]);
     verdict.push("motion", followed.equation + arrival + drift);
     verdict.push("control", followed.control);
     verdict.compare(row, "work_optimal", Some(optimum.work), None);

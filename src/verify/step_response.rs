@@ -22,6 +22,9 @@ const MORE_CYCLES: f64 = 30.0;
 /// Intervals of a response that is followed.
 const MOST_INTERVALS: usize = 10_000;
 
+/// Distance of two successive cycles, in rtol, from which they determine no limit cycle.
+const MOST_VAGUE: f64 = 1e3;
+
 /// An extremum or a crossing.
 #[derive(Debug, Clone, Copy)]
 struct Event {
@@ -108,9 +111,7 @@ pub fn check(row: &Row, _: &Context, rtol: f64) -> Verdict {
         verdict.compare_word(row, "stick_slip", "no");
         ["v_peak", "v_trough"].iter().for_each(|column| verdict.compare(row, column, Some(v_f), None));
         verdict.compare(row, "settling_time", Some(0.0), Some(1.0));
-        ["t_peak", "period", "cycle_peak", "cycle_trough"]
-            .iter()
-            .for_each(|column| verdict.compare(row, column, None, None));
+        CYCLE.iter().chain(&["t_peak"]).for_each(|column| verdict.compare(row, column, None, None));
         return verdict;
     }
     // Without mass, a spring softer than b - a lets the velocity become infinite.
@@ -119,77 +120,94 @@ pub fn check(row: &Row, _: &Context, rtol: f64) -> Verdict {
     if infinite || word(row, STATUS) == Some("infeasible") {
         return verdict;
     }
-    let step = Step { transition: problem, k, m };
-    let Some(response) = step.respond(rtol).1.filter(|response| response.outcome != Outcome::Undecided) else {
-        verdict.miss("undecided responses");
-        return verdict;
-    };
+    match follow(&mut verdict, Step { transition: problem, k, m }, rtol) {
+        Ok(followed) => compare(&mut verdict, row, &problem, (k, m), &followed, rtol),
+        Err(reason) => verdict.miss(reason),
+    }
+    verdict
+}
+
+/// The columns of a limit cycle.
+const CYCLE: [&str; 3] = ["period", "cycle_peak", "cycle_trough"];
+
+/// The traced response, with its errors as differences; the reason where there is none.
+fn follow(verdict: &mut Verdict, step: Step, rtol: f64) -> Result<Followed, &'static str> {
+    let response = step.respond(rtol).1.filter(|response| response.outcome != Outcome::Undecided);
+    let response = response.ok_or("undecided responses")?;
     let more = response.cycle.map_or(0.0, |cycle| MORE_CYCLES * cycle.period);
     // The slope of the velocity, which determines the time of the peak, has fewer digits than the velocity.
-    let motion =
-        step.motion(response.t_end + more, 0.01 * rtol).filter(|motion| motion.landmarks().len() <= MOST_INTERVALS);
-    let Some(motion) = motion else {
-        verdict.miss("responses of more than 10,000 steps");
-        return verdict;
-    };
+    let motion = step.motion(response.t_end + more, 0.01 * rtol);
+    let motion = motion.filter(|motion| motion.landmarks().len() <= MOST_INTERVALS);
+    let motion = motion.ok_or("responses of more than 10,000 steps")?;
+    let Step { transition: Transition { law, .. }, k, m } = step;
     let followed = Followed::new(Box::new(motion), &SpringBlock { law, k, m });
     verdict.push("motion", followed.equation);
     verdict.push("control", followed.control);
-    let events = Events::of(&followed, v_f);
-    let greatest = |events: &[Event]| events.iter().copied().reduce(|x, y| if y.v > x.v { y } else { x });
-    let least = |events: &[Event]| events.iter().map(|event| event.v).fold(v_f, f64::min);
-    let top = greatest(&events.tops).filter(|top| top.v > v_f);
-    let (peak, trough) = (top.map_or(v_f, |top| top.v), least(&events.bottoms));
+    Ok(followed)
+}
+
+/// Greatest and least velocity of these extremes, `v_f` without any.
+fn range(events: &Events, v_f: f64, (from, to): (f64, f64)) -> [Event; 2] {
+    let within = |events: &[Event], sign: f64| {
+        let inside = events.iter().filter(|event| event.t > from && event.t < to);
+        inside.fold(
+            Event { t: f64::NAN, v: v_f },
+            |best, event| if sign * event.v > sign * best.v { *event } else { best },
+        )
+    };
+    [within(&events.tops, 1.0), within(&events.bottoms, -1.0)]
+}
+
+/// Compares the numbers of a response with its trace.
+fn compare(
+    verdict: &mut Verdict,
+    row: &Row,
+    &Transition { law, v_i, v_f }: &Transition,
+    (k, m): (f64, f64),
+    followed: &Followed,
+    rtol: f64,
+) {
+    let events = Events::of(followed, v_f);
+    let [peak, trough] = range(&events, v_f, (0.0, f64::INFINITY));
     // How much an error of the spring's force moves ln v where it follows.
     let felt = (k / law.a * (m * v_f * v_f / law.a)).sqrt().max(1.0).sqrt();
-    let lowest = trough.min(v_i);
+    let lowest = trough.v.min(v_i);
     if lowest.ln().abs() > 100.0 * felt * rtol {
         verdict.compare_word(row, STATUS, if lowest < 1.0 { "below_bound" } else { "ok" });
     }
-    verdict.compare(row, "v_peak", Some(peak), None);
-    verdict.compare_number(row, "v_trough", trough, felt * trough);
-    if let Some(top) = top.filter(|top| top.v / v_f - 1.0 > NONE) {
-        verdict.compare_number(row, "t_peak", top.t, (top.t + 1.0 / v_f) / (top.v / v_f - 1.0).min(1.0));
+    verdict.compare(row, "v_peak", Some(peak.v), None);
+    verdict.compare_number(row, "v_trough", trough.v, felt * trough.v);
+    let overshoot = peak.v / v_f - 1.0;
+    if overshoot > NONE {
+        verdict.compare_number(row, "t_peak", peak.t, (peak.t + 1.0 / v_f) / overshoot.min(1.0));
     }
     // Steady sliding that is unstable is left.
-    let stable = SteadySliding::new(law, k, m, v_f).is_stable();
-    let ends = if stable { events.settled } else { None };
-    let cycles = ["period", "cycle_peak", "cycle_trough"];
-    let (outcome, stick_slip) = if ends.is_some() { ("settled", "no") } else { ("limit_cycle", "yes") };
-    verdict.compare_word(row, "outcome", outcome);
-    verdict.compare_word(row, "stick_slip", stick_slip);
-    match (ends, events.rises.as_slice()) {
-        (Some((entry, speed)), _) => {
-            if events.margin > HAIR * rtol {
-                let scale = entry.t.max(0.1 / (v_f * (1.0 + k / law.a))) + 1.0 / speed;
-                verdict.compare_number(row, "settling_time", entry.t, scale);
-            } else {
-                verdict.miss("settling times that depend on rounding");
-            }
-            cycles.iter().for_each(|column| verdict.compare(row, column, None, None));
+    let settled = events.settled.filter(|_| SteadySliding::new(law, k, m, v_f).is_stable());
+    verdict.compare_word(row, "outcome", if settled.is_some() { "settled" } else { "limit_cycle" });
+    verdict.compare_word(row, "stick_slip", if settled.is_some() { "no" } else { "yes" });
+    if let Some((entry, speed)) = settled {
+        if events.margin > HAIR * rtol {
+            let scale = entry.t.max(0.1 / (v_f * (1.0 + k / law.a))) + 1.0 / speed;
+            verdict.compare_number(row, "settling_time", entry.t, scale);
+        } else {
+            verdict.miss("settling times that depend on rounding");
         }
-        (None, [.., first, second, third]) => {
-            verdict.compare(row, "settling_time", None, None);
-            let within = |events: &[Event], from: &Event, to: &Event| -> Vec<Event> {
-                events.iter().copied().filter(|event| event.t > from.t && event.t < to.t).collect()
-            };
-            let range = |from: &Event, to: &Event| {
-                let top = greatest(&within(&events.tops, from, to)).map_or(v_f, |top| top.v);
-                [top, least(&within(&events.bottoms, from, to))]
-            };
-            let (before, [top, bottom]) = (range(first, second), range(second, third));
-            // What the last cycle is from the limit cycle.
-            let apart = ((third.t - second.t) / (second.t - first.t) - 1.0).abs() + (top / before[0] - 1.0).abs();
-            let vague = 1.0 + apart / rtol;
-            if vague > 1e3 {
-                verdict.miss("cycles that are approached slowly");
-                return verdict;
-            }
-            verdict.compare(row, "period", Some(third.t - second.t), Some(vague * (third.t - second.t)));
-            verdict.compare(row, "cycle_peak", Some(top), Some(vague * top));
-            verdict.compare_number(row, "cycle_trough", bottom, vague * felt * bottom);
-        }
-        _ => verdict.miss("cycles that are approached slowly"),
+        return CYCLE.iter().for_each(|column| verdict.compare(row, column, None, None));
     }
-    verdict
+    verdict.compare(row, "settling_time", None, None);
+    let [.., first, second, third] = events.rises.as_slice() else {
+        return verdict.miss("cycles that are approached slowly");
+    };
+    let before = range(&events, v_f, (first.t, second.t));
+    let [top, bottom] = range(&events, v_f, (second.t, third.t)).map(|event| event.v);
+    let period = third.t - second.t;
+    // The last cycle is about this far from the limit cycle.
+    let apart = (period / (second.t - first.t) - 1.0).abs() + (top / before[0].v - 1.0).abs();
+    let vague = 1.0 + apart / rtol;
+    if vague > MOST_VAGUE {
+        return verdict.miss("cycles that are approached slowly");
+    }
+    verdict.compare(row, "period", Some(period), Some(vague * period));
+    verdict.compare(row, "cycle_peak", Some(top), Some(vague * top));
+    verdict.compare_number(row, "cycle_trough", bottom, vague * felt * bottom);
 }
