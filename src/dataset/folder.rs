@@ -16,143 +16,69 @@ const WAYS_OUT: &str = "change `name` in the spec, or write elsewhere with --out
 
 /// The errors of the files of a dataset.
 #[derive(Debug, thiserror::Error)]
+#[allow(missing_docs)]
 pub enum DatasetError {
     /// The folder holds a dataset of another spec, or that another program computed.
     #[error(
         "{folder}: holds a dataset of another {what}\n  expected: {expected}\n  found: {found}\n  help: {WAYS_OUT}"
     )]
-    Foreign {
-        /// The folder.
-        folder: String,
-        /// `version` or `numerics revision`.
-        what: &'static str,
-        /// The value of this run.
-        expected: String,
-        /// The value of the folder.
-        found: String,
-    },
+    Foreign { folder: String, what: &'static str, expected: String, found: String },
     /// The folder holds a dataset of another spec.
     #[error("{folder}: holds a dataset of another spec\n  expected: {expected}\n  found: {found}\n  help: {WAYS_OUT}")]
-    OtherSpec {
-        /// The folder.
-        folder: String,
-        /// The table that differs.
-        table: String,
-        /// The value of this spec: the hash of the table, or the differing key.
-        expected: String,
-        /// The value of the folder.
-        found: String,
-        /// The text of the spec in the folder.
-        spec: String,
-    },
+    OtherSpec { folder: String, table: String, expected: String, found: String, spec: String },
     /// The folder holds tables that the spec lacks, and lacks some that the spec has.
     #[error(
         "{folder}: the spec and the dataset each have a table that the other lacks\n  expected: {expected}\n  found: {found}\n  help: add \
          [tables.{}] to the spec, which keeps its rows and computes yours; or {WAYS_OUT}",
         missing.join("] and [tables.")
     )]
-    OtherTables {
-        /// The folder.
-        folder: String,
-        /// The tables of the spec.
-        expected: String,
-        /// The tables of the dataset.
-        found: String,
-        /// The tables that the spec lacks.
-        missing: Vec<String>,
-    },
+    OtherTables { folder: String, expected: String, found: String, missing: Vec<String> },
     /// Another run is at work.
     #[error(
         "{folder}: another run is writing this dataset{process}\n  help: wait for its end (`slipsweep status {folder}` shows its progress); only \
          shards (--shard I/N) run side by side"
     )]
-    Busy {
-        /// The folder.
-        folder: String,
-        /// The process, in brackets, if it is known.
-        process: String,
-    },
+    Busy { folder: String, process: String },
     /// Somebody changed the dataset while this run was at work.
     #[error(
         "{folder}: {what} during this run, which stopped\n  help: run the same command again; it keeps finished parts"
     )]
-    Taken {
-        /// The folder.
-        folder: String,
-        /// The event.
-        what: &'static str,
-    },
+    Taken { folder: String, what: &'static str },
     /// The folder holds something else.
     #[error(
         "{folder}: neither a dataset nor empty\n  expected: an empty folder, or one with a manifest.json\n  help: change \
          `name` in the spec, or write elsewhere with --out DIR"
     )]
-    Occupied {
-        /// The folder.
-        folder: String,
-    },
+    Occupied { folder: String },
     /// A file in the place of a part was not made by this sweep.
     #[error(
         "{path}: belongs to another {what}\n  expected: {expected}\n  found: {found}\n  help: move the file away; `slipsweep run` then \
          computes the part and keeps all others"
     )]
-    ForeignPart {
-        /// The file.
-        path: String,
-        /// In what it differs.
-        what: &'static str,
-        /// The expected value of the part.
-        expected: String,
-        /// The value of the file.
-        found: String,
-    },
+    ForeignPart { path: String, what: &'static str, expected: String, found: String },
     /// A part is broken.
     #[error(
         "{path}: the part is damaged: {why}\n  help: `slipsweep run {dataset}` recomputes it and keeps all intact parts"
     )]
-    DamagedPart {
-        /// The file.
-        path: String,
-        /// In what way.
-        why: String,
-        /// The folder of the dataset.
-        dataset: String,
-    },
+    DamagedPart { path: String, why: String, dataset: String },
     /// The manifest is damaged, and no part says what it said.
     #[error(
         "{path}: damaged, or of another version of slipsweep: {why}\n  help: run the spec of the dataset, which rewrites it if no part \
          is there; else {WAYS_OUT}"
     )]
-    Manifest {
-        /// The file.
-        path: String,
-        /// In what way.
-        why: String,
-    },
+    Manifest { path: String, why: String },
     /// The system refused.
     #[error(
         "{path}: cannot {action}: {source}\n  help: solve this and run the same command again, which keeps finished parts; or write \
          elsewhere with --out DIR"
     )]
-    Io {
-        /// The file or folder.
-        path: String,
-        /// The attempted action.
-        action: &'static str,
-        /// The cause.
-        source: io::Error,
-    },
+    Io { path: String, action: &'static str, source: io::Error },
     /// A sample of a table could not be encoded.
     #[error("cannot encode a sample: {0}")]
     Sample(parquet::errors::ParquetError),
     /// A part could not be encoded.
     #[error("{path}: cannot encode: {source}")]
-    Encode {
-        /// The part.
-        path: String,
-        /// The cause.
-        source: parquet::errors::ParquetError,
-    },
+    Encode { path: String, source: parquet::errors::ParquetError },
 }
 
 impl DatasetError {

@@ -5,12 +5,12 @@ use std::io::{self, Read};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use parquet::file::metadata::{KeyValue, ParquetMetaData, ParquetMetaDataReader};
+use parquet::file::metadata::{KeyValue, ParquetMetaData};
 
 use super::checksum;
 use super::footer::{Footer, PREFIX};
 use super::manifest::{Manifest, ManifestTable};
-use super::metadata_limits::check_footer;
+use super::metadata_limits;
 use super::statistics::TableStatistics;
 
 /// The depth of a check.
@@ -24,28 +24,16 @@ pub enum CheckDepth {
 
 /// The state of a part.
 #[derive(Debug, Clone, PartialEq)]
+#[allow(missing_docs)]
 pub enum State {
     /// Nothing.
     Missing,
     /// The part.
-    There {
-        /// The statistics of its rows.
-        statistics: Box<TableStatistics>,
-    },
+    There { statistics: Box<TableStatistics> },
     /// Something that was not made from this spec by this version; it may be of use to somebody.
-    Foreign {
-        /// The differing property.
-        what: &'static str,
-        /// The expected value of the part.
-        expected: String,
-        /// The value of the file.
-        found: String,
-    },
+    Foreign { what: &'static str, expected: String, found: String },
     /// A part that is broken, of no use to anybody.
-    Damaged {
-        /// In what way.
-        why: String,
-    },
+    Damaged { why: String },
 }
 
 /// A part that was opened, and is the one that should be there.
@@ -157,9 +145,7 @@ fn damaged<T>(why: &str) -> Result<T, State> {
 }
 
 fn metadata<R: parquet::file::reader::ChunkReader>(file: &R) -> Result<ParquetMetaData, State> {
-    check_footer(file)
-        .and_then(|()| ParquetMetaDataReader::new().parse_and_finish(file))
-        .or_else(|error| damaged(&format!("it is cut short or not Parquet: {error}")))
+    metadata_limits::footer(file).or_else(|error| damaged(&format!("it is cut short or not Parquet: {error}")))
 }
 
 fn entries(metadata: &ParquetMetaData) -> Vec<KeyValue> {

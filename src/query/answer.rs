@@ -5,17 +5,14 @@ use std::sync::{Arc, Mutex};
 
 use arrow_array::builder::StringDictionaryBuilder;
 use arrow_array::types::Int32Type;
-use arrow_array::{
-    ArrayRef, BooleanArray, Date32Array, Float64Array, Int64Array, RecordBatch, StringArray, TimestampMicrosecondArray,
-};
-use arrow_schema::{DataType as ArrowType, Schema as ArrowSchema, SchemaRef, TimeUnit};
+use arrow_array::{ArrayRef, BooleanArray, Float64Array, Int64Array, RecordBatch, StringArray};
+use arrow_schema::{DataType as ArrowType, Schema as ArrowSchema, SchemaRef};
 use parquet::arrow::ArrowWriter;
 use parquet::basic::Compression;
 use parquet::errors::ParquetError;
 use parquet::file::properties::WriterProperties;
 use polars::prelude::{
     AnyValue, Column, DataFrame, DataType, IntoLazy, LazyFrame, PolarsError, PolarsResult, Series, SortMultipleOptions,
-    TimeUnit as PolarsTimeUnit,
 };
 use polars_io::SerWriter;
 use polars_io::prelude::CsvWriter;
@@ -377,8 +374,6 @@ fn arrow_schema(piece: &DataFrame, units: &[String]) -> SchemaRef {
             kind if kind.is_float() => ArrowType::Float64,
             kind if kind.is_integer() => ArrowType::Int64,
             DataType::Boolean => ArrowType::Boolean,
-            DataType::Date => ArrowType::Date32,
-            DataType::Datetime(..) => ArrowType::Timestamp(TimeUnit::Microsecond, None),
             kind if kind.is_categorical() => label(),
             _ => ArrowType::Utf8,
         };
@@ -396,12 +391,6 @@ fn batch(piece: &DataFrame, schema: &SchemaRef) -> Result<RecordBatch, AnswerErr
             ArrowType::Float64 => Arc::new(series.cast(&DataType::Float64)?.f64()?.iter().collect::<Float64Array>()),
             ArrowType::Int64 => Arc::new(series.strict_cast(&DataType::Int64)?.i64()?.iter().collect::<Int64Array>()),
             ArrowType::Boolean => Arc::new(series.bool()?.iter().collect::<BooleanArray>()),
-            ArrowType::Date32 => Arc::new(series.cast(&DataType::Int32)?.i32()?.iter().collect::<Date32Array>()),
-            ArrowType::Timestamp(..) => {
-                let ticks = series.cast(&DataType::Datetime(PolarsTimeUnit::Microseconds, None))?;
-                let ticks = ticks.cast(&DataType::Int64)?;
-                Arc::new(ticks.i64()?.iter().collect::<TimestampMicrosecondArray>())
-            }
             ArrowType::Dictionary(..) => {
                 let text = series.cast(&DataType::String)?;
                 let mut words = StringDictionaryBuilder::<Int32Type>::new();

@@ -50,18 +50,14 @@ pub struct TableOutcome {
 
 /// The error of a run.
 #[derive(Debug, thiserror::Error)]
+#[allow(missing_docs)]
 pub enum RunError {
     /// The dataset cannot be written.
     #[error(transparent)]
     Dataset(#[from] DatasetError),
     /// The threads cannot be started.
     #[error("cannot start {threads} threads: {source}\n  help: use fewer with --threads N")]
-    Threads {
-        /// Their number.
-        threads: usize,
-        /// The error of the system.
-        source: rayon::ThreadPoolBuildError,
-    },
+    Threads { threads: usize, source: rayon::ThreadPoolBuildError },
     /// A writer thread cannot be started.
     #[error("cannot start the thread that writes: {0}\n  help: allow the process more memory or more threads")]
     Writer(std::io::Error),
@@ -73,12 +69,7 @@ pub enum RunError {
         0 => "all other parts are finished".to_owned(),
         _ => format!("{others} more parts have such a row; all others are finished"),
     })]
-    Defect {
-        /// The first such row.
-        defect: Defect,
-        /// The number of further parts with such a row.
-        others: usize,
-    },
+    Defect { defect: Defect, others: usize },
     /// The run was stopped on request.
     #[error(transparent)]
     Stopped(#[from] Stopped),
