@@ -9,7 +9,7 @@ use rayon::prelude::*;
 use super::atomic::{self, Unwritten};
 use super::footer::Footer;
 use super::manifest::{Manifest, ManifestTable};
-use super::state::{self, CheckDepth, OpenPart, State};
+use super::state::{self, CheckDepth, State};
 
 /// The help for a dataset in the place of another one.
 const WAYS_OUT: &str = "change `name` in the spec, or write elsewhere with --out DIR, or remove the dataset";
@@ -217,25 +217,22 @@ impl Folder {
         state::state(&self.part(table, part), manifest, table, part, look)
     }
 
-    /// Opens a part of the dataset of `manifest`; `None` if it is not there. What is opened is the part that should be there, and its footer is
-    /// as it was written; its pages have checksums, which are verified when they are read. Every reader of a dataset opens its parts here.
-    ///
-    /// # Errors
-    ///
-    /// If the part is damaged, or does not belong to the dataset.
-    pub fn open_part(&self, manifest: &Manifest, table: &str, part: u64) -> Result<Option<OpenPart>, DatasetError> {
-        let path = self.part(table, part);
-        state::open_part(&path, manifest, table, part).map_err(|state| self.fault(&path, state))
-    }
-
-    /// The paths of the parts of `table` that are there, in order, each of which [`Folder::open_part`] opens; and how many are missing.
+    /// The paths of the parts of `table` that are there, in order, and how many are missing. The footer of each is as it was written; its
+    /// pages have checksums, which are verified when they are read. Every reader of a dataset opens its parts here.
     ///
     /// # Errors
     ///
     /// If a part is damaged, or does not belong to the dataset.
     pub fn verified(&self, manifest: &Manifest, table: &ManifestTable) -> Result<(Vec<PathBuf>, u64), DatasetError> {
         let there = self.parts_there(table);
-        let open = |part: u64| Ok(self.open_part(manifest, &table.name, part)?.map(|part| part.path));
+        let open = |part: u64| {
+            let path = self.part(&table.name, part);
+            match self.state(manifest, &table.name, part, CheckDepth::Footer) {
+                State::There { .. } => Ok(Some(path)),
+                State::Missing => Ok(None),
+                fault => Err(self.fault(&path, fault)),
+            }
+        };
         let opened: Result<Vec<Option<PathBuf>>, DatasetError> = there.into_par_iter().map(open).collect();
         let paths: Vec<PathBuf> = opened?.into_iter().flatten().collect();
         let missing = table.parts - paths.len() as u64;

@@ -2,8 +2,7 @@
 
 use std::fs::{self, File};
 use std::io::{self, Read};
-use std::path::{Path, PathBuf};
-use std::sync::Arc;
+use std::path::Path;
 
 use parquet::file::metadata::{KeyValue, ParquetMetaData};
 
@@ -36,65 +35,41 @@ pub enum State {
     Damaged { why: String },
 }
 
-/// A part that was opened, and is the one that should be there.
-#[derive(Debug)]
-pub struct OpenPart {
-    /// Its place.
-    pub path: PathBuf,
-    /// The file.
-    pub file: File,
-    /// Its Parquet footer.
-    pub metadata: Arc<ParquetMetaData>,
-    /// Its footer.
-    pub footer: Footer,
-    /// The statistics of its rows.
-    pub statistics: TableStatistics,
-}
-
 /// Looks at the file in the place of a part, number `part` of `table` in the dataset of `manifest`, which is written in `path`.
 pub fn state(path: &Path, manifest: &Manifest, table: &str, part: u64, look: CheckDepth) -> State {
     let found = match look {
-        CheckDepth::Footer => open_part(path, manifest, table, part).map(|part| part.map(|part| part.statistics)),
-        CheckDepth::Whole => whole(path).and_then(|entries| {
-            entries
-                .map(|entries| belongs(&entries, manifest, table, part).map(|(_, statistics)| statistics))
-                .transpose()
-        }),
+        CheckDepth::Footer => sealed_entries(path),
+        CheckDepth::Whole => whole(path),
     };
-    match found {
+    let statistics = found.and_then(|entries| match entries {
+        Some(entries) => belongs(&entries, manifest, table, part).map(Some),
+        None => Ok(None),
+    });
+    match statistics {
         Ok(Some(statistics)) => State::There { statistics: Box::new(statistics) },
         Ok(None) => State::Missing,
         Err(state) => state,
     }
 }
 
-/// Opens the file in the place of a part if it is the part that should be there; `None` if there is none.
-///
-/// # Errors
-///
-/// [`State::Foreign`] or [`State::Damaged`].
-pub fn open_part(path: &Path, manifest: &Manifest, table: &str, part: u64) -> Result<Option<OpenPart>, State> {
+/// The entries of the footer of a file, if footer and page headers are as they were written; `None` if there is no file.
+fn sealed_entries(path: &Path) -> Result<Option<Vec<KeyValue>>, State> {
     let Some(file) = open(path)? else { return Ok(None) };
     let metadata = metadata(&file)?;
     let entries = entries(&metadata);
     match checksum::is_head_intact(&file, &metadata) {
-        Ok(Some(true)) => {}
+        Ok(Some(true)) => Ok(Some(entries)),
         Ok(None) if Footer::from_entries(&entries).is_none() => {
-            return Err(stranger("a Parquet file that slipsweep did not write"));
+            Err(stranger("a Parquet file that slipsweep did not write"))
         }
-        Ok(_) => return damaged("the checksum of its footer and page headers does not match"),
-        Err(error) => return damaged(&error.to_string()),
+        Ok(_) => damaged("the checksum of its footer and page headers does not match"),
+        Err(error) => damaged(&error.to_string()),
     }
-    let (footer, statistics) = belongs(&entries, manifest, table, part)?;
-    Ok(Some(OpenPart { path: path.to_owned(), file, metadata: metadata.into(), footer, statistics }))
 }
 
 /// The footer of a part, if it is intact.
 pub fn footer_of(path: &Path) -> Option<Footer> {
-    let file = open(path).ok()??;
-    let metadata = metadata(&file).ok()?;
-    let sound = checksum::is_head_intact(&file, &metadata).ok()??;
-    if sound { Footer::from_entries(&entries(&metadata)) } else { None }
+    Footer::from_entries(&sealed_entries(path).ok()??)
 }
 
 /// The file in `path`. What is no file is not opened: a named pipe would wait for somebody who writes, a device might never end.
@@ -152,13 +127,8 @@ fn entries(metadata: &ParquetMetaData) -> Vec<KeyValue> {
     metadata.file_metadata().key_value_metadata().cloned().unwrap_or_default()
 }
 
-/// The footer of a file, if it matches the expected part.
-fn belongs(
-    entries: &[KeyValue],
-    manifest: &Manifest,
-    table: &str,
-    part: u64,
-) -> Result<(Footer, TableStatistics), State> {
+/// The statistics in the footer of a file, if it is that of the expected part.
+fn belongs(entries: &[KeyValue], manifest: &Manifest, table: &str, part: u64) -> Result<TableStatistics, State> {
     let foreign = |what, expected: &str, found: &str| {
         Err(State::Foreign { what, expected: expected.to_owned(), found: found.to_owned() })
     };
@@ -185,6 +155,6 @@ fn belongs(
         let show = |rows: &std::ops::Range<u64>| format!("rows {} to {}", rows.start, rows.end);
         foreign("place in the table", &rows.as_ref().map(show).unwrap_or_default(), &show(&found.rows))
     } else {
-        Ok((found, statistics))
+        Ok(statistics)
     }
 }

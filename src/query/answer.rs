@@ -1,7 +1,7 @@
 //! An answer: its columns, and its rows a piece at a time.
 
 use std::io::{self, Write};
-use std::sync::{Arc, Mutex};
+use std::sync::Arc;
 
 use arrow_array::builder::StringDictionaryBuilder;
 use arrow_array::types::Int32Type;
@@ -130,24 +130,23 @@ impl Answer {
             Format::Parquet => {
                 let units = self.units.clone();
                 let properties = WriterProperties::builder().set_compression(Compression::SNAPPY).build();
-                let written = Bytes::default();
-                let mut writer: Option<(SchemaRef, ArrowWriter<Bytes>)> = None;
+                let mut writer: Option<(SchemaRef, ArrowWriter<Vec<u8>>)> = None;
                 self.find(&mut |piece| {
                     if writer.is_none() {
                         without_lists(piece, "a Parquet answer")?;
                         let schema = arrow_schema(piece, &units);
-                        let made = ArrowWriter::try_new(written.clone(), schema.clone(), Some(properties.clone()))?;
+                        let made = ArrowWriter::try_new(Vec::new(), schema.clone(), Some(properties.clone()))?;
                         writer = Some((schema, made));
                     }
                     if let Some((schema, writer)) = &mut writer {
                         writer.write(&batch(piece, schema)?)?;
+                        out.write_all(&std::mem::take(writer.inner_mut()))?;
                     }
-                    Ok(out.write_all(&written.take())?)
+                    Ok(())
                 })?;
                 if let Some((_, writer)) = writer {
-                    writer.close()?;
+                    out.write_all(&writer.into_inner()?)?;
                 }
-                out.write_all(&written.take())?;
             }
         }
         Ok(out.flush()?)
@@ -277,28 +276,6 @@ fn ordered(rows: DataFrame, keys: &[Key], offset: usize, limit: Option<usize>) -
         frame.collect()?
     };
     Ok(rows.slice(i64::try_from(offset).unwrap_or(i64::MAX), limit.unwrap_or(usize::MAX)))
-}
-
-/// Bytes on their way from a writer to where they belong.
-#[derive(Clone, Default)]
-struct Bytes(Arc<Mutex<Vec<u8>>>);
-
-impl Bytes {
-    fn take(&self) -> Vec<u8> {
-        self.0.lock().map(|mut bytes| std::mem::take(&mut *bytes)).unwrap_or_default()
-    }
-}
-
-impl Write for Bytes {
-    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
-        let mut kept = self.0.lock().map_err(|_| io::ErrorKind::Other)?;
-        kept.extend_from_slice(bytes);
-        Ok(bytes.len())
-    }
-
-    fn flush(&mut self) -> io::Result<()> {
-        Ok(())
-    }
 }
 
 /// The cells of a column.

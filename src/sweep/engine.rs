@@ -376,10 +376,7 @@ impl<'a> TableRun<'a> {
             }
             State::Missing => Ok(Found::Nothing),
             State::Damaged { .. } => Ok(Found::Damaged),
-            State::Foreign { what, expected, found } => {
-                let path = folder.part(&self.table.name, number).display().to_string();
-                Err(DatasetError::ForeignPart { path, what, expected, found }.into())
-            }
+            foreign => Err(folder.fault(&folder.part(&self.table.name, number), foreign).into()),
         }
     }
 

@@ -139,16 +139,8 @@ fn compute(
     let tuples = members.tuples(OPTIMUM_AXES);
     // Progress counts rows of this table, not of the landscape.
     let sizes: Vec<f64> = gap::COLUMNS.iter().map(|column| column.size(job.grid)).collect();
-    let landscape = Job {
-        rows: members,
-        tuples,
-        projection: &projection,
-        sizes: &sizes,
-        signal: &signal,
-        members: None,
-        repeated_rows: None,
-        ..*job
-    };
+    let landscape =
+        Job { rows: members, tuples, projection: &projection, sizes: &sizes, signal: &signal, members: None, ..*job };
     let mut all = RunStats::default();
     // One after another: all threads work on one landscape, so a part holds one landscape in memory.
     for (place, row) in rows.enumerate() {
