@@ -1,4 +1,4 @@
-//! The kind of a path. A command that gets the wrong kind names the command that takes it.
+//! What a path is: a command that gets something else than it takes says which command takes it.
 
 use std::fs::{self, File};
 use std::io::{self, Read};
@@ -16,7 +16,7 @@ const MAX_START_BYTES: u64 = 1 << 20;
 /// Names of datasets that a message lists. Chosen: they fit a line.
 const MAX_NAMED_DATASETS: usize = 4;
 
-/// The kind of a path.
+/// What a path is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Kind {
     /// The folder of a dataset.
@@ -43,14 +43,14 @@ pub enum Kind {
     Picture,
     /// Another file.
     File,
-    /// A device or a named pipe.
+    /// What is read once, by who knows what is to come.
     Device,
     /// Nothing.
     Nothing,
 }
 
 impl Kind {
-    /// The kind of `path`.
+    /// What `path` is.
     pub fn of(path: &Path) -> Kind {
         let ending = path.extension().and_then(|ending| ending.to_str()).unwrap_or_default().to_lowercase();
         if path.is_dir() {
@@ -58,7 +58,7 @@ impl Kind {
                 () if path.join(MANIFEST).exists() => Kind::Dataset,
                 () if above(path).is_some_and(|above| above.join(MANIFEST).exists()) => Kind::Table,
                 () if !datasets(path).is_empty() => Kind::Datasets,
-                // The footers of parts replace a lost manifest.
+                // Its parts say what a lost manifest said.
                 () if matches!(Folder::at(path).manifest(), Ok(Some(_))) => Kind::Dataset,
                 () => Kind::Folder,
             };
@@ -81,7 +81,7 @@ impl Kind {
         }
     }
 
-    /// The expectation of an argument of this kind.
+    /// What is expected of an argument of this kind.
     fn expected(self) -> &'static str {
         match self {
             Kind::Spec => "a spec, such as NAME.toml",
@@ -90,7 +90,7 @@ impl Kind {
         }
     }
 
-    /// Its name, and the help for `path` of this kind.
+    /// It in words, and what may be done with it, which is in `path`.
     fn words(self, path: &Path) -> (&'static str, String) {
         let shown = path.display();
         let name = |path: Option<PathBuf>, what: &str| {
@@ -122,7 +122,7 @@ impl Kind {
     }
 }
 
-/// Checks that `path` is one of `kinds`.
+/// That `path` is one of `kinds`.
 pub fn expect(path: &Path, kinds: &[Kind]) -> Result<(), Failure> {
     let found = Kind::of(path);
     if kinds.contains(&found) {
@@ -138,7 +138,7 @@ pub fn expect(path: &Path, kinds: &[Kind]) -> Result<(), Failure> {
     Err(refused(format!("{}: {what}", path.display()), expected.join(", or "), help))
 }
 
-/// Checks that `path` may be a spec; the reader of specs reports other faults.
+/// That `path` may be a spec: the reader of specs says what else is wrong.
 pub fn expect_spec(path: &Path) -> Result<(), Failure> {
     match Kind::of(path) {
         Kind::Spec | Kind::File | Kind::Folder | Kind::Device | Kind::Nothing => Ok(()),
@@ -146,7 +146,7 @@ pub fn expect_spec(path: &Path) -> Result<(), Failure> {
     }
 }
 
-/// Checks that `path` may have rows; the reader of datasets or of files of rows reports other faults.
+/// That `path` is not something that has no rows: the reader of datasets, or of files of rows, says what else is wrong.
 pub fn expect_rows(path: &Path) -> Result<(), Failure> {
     match Kind::of(path) {
         Kind::Spec | Kind::Manifest | Kind::Datasets | Kind::Page | Kind::Picture => expect(path, &[Kind::Dataset]),

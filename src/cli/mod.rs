@@ -118,7 +118,7 @@ use taplo, such as VS Code with Even Better TOML. `slipsweep init` writes both."
     Man(man::Arguments),
 }
 
-/// The failure of a command: its message and exit code.
+/// A command that did not do its work: what to say, and the exit code.
 struct Failure {
     code: u8,
     message: String,
@@ -145,11 +145,12 @@ impl From<QueryError> for Failure {
 /// Whether standard output was closed when the process began.
 static STDOUT_IS_CLOSED: AtomicBool = AtomicBool::new(false);
 
-/// Performs the command in the arguments of the process. An answer that standard output does not take is a failure.
+/// Reads the arguments of the process and does what they say; an answer that standard output cannot take, closed as it may be from the
+/// start, is a failure.
 pub fn main(stdout_is_closed: bool) -> ExitCode {
     STDOUT_IS_CLOSED.store(stdout_is_closed, Ordering::Relaxed);
     report_first_panic();
-    // A file beyond the limit of its user then fails to be written, instead of ending the process.
+    // A file that grows beyond the limit of its user is then a write that fails, not the end of the process.
     #[cfg(unix)]
     let _ = signal_hook::flag::register(signal_hook::consts::SIGXFSZ, Arc::new(AtomicBool::new(false)));
     let arguments = match Arguments::try_parse() {
@@ -178,7 +179,7 @@ fn no_table(place: &str, name: &str, names: &[&str]) -> Failure {
     refused(format!("{place}no table `{name}`"), names.join(", "), hint(name, names.iter().copied()))
 }
 
-/// Performs a command.
+/// Does what the arguments say.
 fn perform(arguments: Arguments) -> Result<(), Failure> {
     match arguments.command {
         Command::Init(arguments) => init::init(&arguments),
@@ -211,7 +212,7 @@ fn ended(done: Result<(), Failure>) -> ExitCode {
     }
 }
 
-/// `error` with the nearest option or command.
+/// `error` with the option or command that was meant, which may have another name than the one given.
 fn suggested(mut error: clap::Error) -> clap::Error {
     let (invalid, suggestion) = match error.kind() {
         ErrorKind::UnknownArgument => (ContextKind::InvalidArg, ContextKind::SuggestedArg),
@@ -236,7 +237,7 @@ fn suggested(mut error: clap::Error) -> clap::Error {
     error
 }
 
-/// The checked spec in `path`; its warnings are printed.
+/// The spec in `path`, checked; what is doubtful about it is said.
 fn load(path: &Path) -> Result<Sweep, Failure> {
     kind::expect_spec(path)?;
     let sweep = waiting(&Wait::new("reading the spec"), || Sweep::load(path))?;
@@ -251,7 +252,7 @@ fn wrong(message: impl Display) -> Failure {
     Failure { code: WRONG, message: format!("error: {message}") }
 }
 
-/// The failure of a wrong request, with the expected input and help.
+/// The same with what is right and what to do.
 fn refused(found: impl Display, expected: impl Display, help: impl Display) -> Failure {
     wrong(format!("{found}\n  expected: {expected}\n  help: {help}"))
 }
@@ -273,7 +274,7 @@ fn dataset(path: &Path) -> Result<(Folder, Manifest), Failure> {
     }
 }
 
-/// Notes on standard error that a manifest was rebuilt.
+/// Says on standard error that a manifest is not what its file says.
 fn note(folder: &Folder, manifest: &Manifest) {
     if let Some(why) = &manifest.rebuilt {
         let path = folder.manifest_path();
@@ -282,7 +283,7 @@ fn note(folder: &Folder, manifest: &Manifest) {
     }
 }
 
-/// Notes the same for the dataset in `path`, if any.
+/// Says the same of the dataset in `path`, if there is one.
 fn note_at(path: &Path) {
     let folder = Folder::at(path);
     if let (true, Ok(Some(manifest))) = (path.is_dir(), folder.manifest()) {
@@ -312,7 +313,7 @@ fn put(bytes: &[u8]) -> Result<(), Failure> {
     written(stdout.write_all(bytes).and_then(|()| stdout.flush()))
 }
 
-/// Standard output for answers. The writer flushes it, and passes the result to [`written`].
+/// Standard output, which takes every answer. Who writes to it flushes it, and hands the result to [`written`].
 fn stdout() -> Result<BufWriter<StdoutLock<'static>>, Failure> {
     if STDOUT_IS_CLOSED.load(Ordering::Relaxed) {
         return Err(Failure::failed("cannot write to standard output: it is closed"));
@@ -320,7 +321,7 @@ fn stdout() -> Result<BufWriter<StdoutLock<'static>>, Failure> {
     Ok(BufWriter::new(io::stdout().lock()))
 }
 
-/// The result of writing to standard output; a reader that stops early is no failure.
+/// Whether standard output took an answer; that a reader has had enough is no failure.
 fn written(result: io::Result<()>) -> Result<(), Failure> {
     match result {
         Err(error) if error.kind() != io::ErrorKind::BrokenPipe => {
@@ -330,12 +331,12 @@ fn written(result: io::Result<()>) -> Result<(), Failure> {
     }
 }
 
-/// Fills a file, whole or not at all; a device or a named pipe is written to directly.
+/// Fills a file, whole or not at all; what is no plain file (a device, a named pipe) is written to as it is.
 fn to_file<E: From<io::Error>>(path: &Path, fill: impl FnOnce(&mut dyn Write) -> Result<(), E>) -> Result<(), E> {
     match fs::canonicalize(path) {
         Ok(real) if fs::metadata(&real)?.is_file() => atomic::write_with(&real, |file| fill(file)),
         Ok(real) => fill(&mut OpenOptions::new().write(true).open(real)?),
-        // A bare name is in the current folder.
+        // The folder of a bare name is the one we are in.
         Err(_) => atomic::write_with(&Path::new(".").join(path), |file| fill(file)),
     }
 }

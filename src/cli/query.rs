@@ -80,7 +80,7 @@ pub fn query(arguments: &Arguments) -> Result<(), Failure> {
     }
     arguments.output.format()?;
     if arguments.output.is_stdout() {
-        // The query process does not notice a closed standard output.
+        // Of a closed one the query process would not know.
         drop(stdout()?);
     } else {
         keep_datasets(&arguments.output.out)?;
@@ -106,7 +106,7 @@ fn real(out: &Path) -> (PathBuf, PathBuf) {
 /// Refuses to write where a part or the manifest of a dataset is.
 fn keep_datasets(out: &Path) -> Result<(), Failure> {
     let (real, folder) = real(out);
-    // Parts without a manifest still belong to a dataset.
+    // A lost manifest does not make its parts anybody's.
     let is_dataset =
         |folder: &Path| folder.join("manifest.json").exists() || matches!(Folder::at(folder).manifest(), Ok(Some(_)));
     let name = real.file_name().unwrap_or_default().to_string_lossy();
@@ -121,7 +121,7 @@ fn keep_datasets(out: &Path) -> Result<(), Failure> {
     Ok(())
 }
 
-/// Starts this program as the query process. Its messages come through a pipe, and so does its answer if it is copied.
+/// This program once more, to answer the question; what it says, and its answer if that is copied, comes through pipes.
 fn child(is_copied: bool) -> io::Result<Child> {
     let mut command = Command::new(env::current_exe()?);
     command.args(env::args_os().skip(1)).env(INSIDE, "1").stdin(Stdio::piped()).stderr(Stdio::piped());
@@ -131,14 +131,14 @@ fn child(is_copied: bool) -> io::Result<Child> {
     command.spawn()
 }
 
-/// Answers a question in a separate process.
+/// Answers a question in a process of its own.
 fn apart(arguments: &Arguments) -> Result<(), Failure> {
     let signal = Arc::new(AtomicUsize::new(0));
     for number in [SIGINT, SIGTERM] {
-        // A signal without a handler keeps its usual effect.
+        // Where a signal cannot be listened to, it keeps its usual effect.
         let _ = signal_hook::flag::register_usize(number, signal.clone(), number as usize);
     }
-    // A terminal shows a progress line until the answer begins, so this process copies the answer.
+    // What goes on is said on a terminal until the answer begins, which a terminal therefore gets through this process.
     let shown = io::stderr().is_terminal();
     let is_copied = shown && arguments.output.is_stdout() && io::stdout().is_terminal();
     let mut child = child(is_copied).map_err(|error| cannot_start("the query process", error))?;
@@ -186,10 +186,10 @@ fn cannot_start(what: &str, error: io::Error) -> Failure {
     Failure::failed(format!("cannot start {what}: {error}\n  help: {help}"))
 }
 
-/// The progress line of a terminal.
+/// The line that says on a terminal what goes on.
 struct Line {
     bar: Option<ProgressBar>,
-    /// Whether the line is not needed any more.
+    /// Whether nothing is to be said any more.
     is_over: bool,
 }
 
@@ -200,7 +200,7 @@ impl Line {
     }
 }
 
-/// Copies an answer to standard output; its first byte replaces the progress line.
+/// Copies an answer to standard output, from its first byte on in place of the line that says what goes on.
 fn copy(mut answer: ChildStdout, line: &Mutex<Line>) {
     let mut bytes = vec![0; 1 << 16];
     while let Ok(count @ 1..) = answer.read(&mut bytes) {
@@ -215,7 +215,7 @@ fn copy(mut answer: ChildStdout, line: &Mutex<Line>) {
     }
 }
 
-/// Waits for the end of a process, or ends it on a signal; a terminal shows a progress line after a second.
+/// Waits for the end of a process, or ends it if a signal comes; a terminal says after a second what goes on.
 fn wait(child: &mut Child, signal: &AtomicUsize, line: &Mutex<Line>) -> io::Result<ExitStatus> {
     let start = Instant::now();
     let ended = loop {
@@ -240,13 +240,13 @@ fn wait(child: &mut Child, signal: &AtomicUsize, line: &Mutex<Line>) -> io::Resu
     ended
 }
 
-/// The reason why the query process failed.
+/// Why a process that answered ended before its time.
 fn reason(status: ExitStatus, said: &str) -> String {
     #[cfg(unix)]
     let signal = std::os::unix::process::ExitStatusExt::signal(&status);
     #[cfg(not(unix))]
     let signal: Option<i32> = None;
-    // A machine without free memory sends SIGKILL.
+    // SIGKILL is what a machine sends that has no memory left.
     if said.contains("memory allocation of") || signal == Some(9) {
         return "the query needs more memory than is free\n  help: request fewer columns, a WHERE, a LIMIT; or join on a column"
             .to_owned();
@@ -258,12 +258,12 @@ fn reason(status: ExitStatus, said: &str) -> String {
     format!("the query failed ({status}): {said}\n  help: rewrite the query")
 }
 
-/// Removes the temporary file of a killed process for `out`.
+/// Removes what a process that was ended left of the file `out`.
 fn sweep(out: &Path) {
     atomic::sweep(&real(out).1, SystemTime::now());
 }
 
-/// Answers a question in this process, which ends when the process that started it does.
+/// Answers a question in this process, which ends with its answer, or with the process that started it.
 fn inside(arguments: &Arguments) -> Result<(), Failure> {
     let no_thread = |error| cannot_start("a thread", error);
     limit_memory();
@@ -277,7 +277,7 @@ fn inside(arguments: &Arguments) -> Result<(), Failure> {
     }));
     rayon::ThreadPoolBuilder::new().build_global().map_err(|error| no_thread(io::Error::other(error)))?;
     let watch = || {
-        // Standard input closes when the other process ends.
+        // Ends when the other process does.
         let _ = io::stdin().read(&mut [0]);
         std::process::exit(2);
     };
@@ -297,7 +297,7 @@ fn inside(arguments: &Arguments) -> Result<(), Failure> {
     })
 }
 
-/// Limits this process to the free memory, so that a query beyond it fails instead of slowing the machine down.
+/// Lets this process have the memory that is free, so that too large a question fails instead of slowing the machine down.
 #[cfg(target_os = "linux")]
 fn limit_memory() {
     use rustix::process::{Resource, Rlimit, getrlimit, setrlimit};
@@ -311,7 +311,7 @@ fn limit_memory() {
     let most = (free + taken) * 1024;
     let Rlimit { current, maximum } = getrlimit(Resource::As);
     let most = current.map_or(most, |current| current.min(most));
-    // Without a limit the machine ends the query if necessary.
+    // A query that has no limit is one that the machine ends if need be.
     let _ = setrlimit(Resource::As, Rlimit { current: Some(most), maximum });
 }
 
@@ -327,7 +327,7 @@ fn answer(arguments: &Arguments) -> Result<(), Failure> {
     let answer = tables.ask(&arguments.sql)?;
     for source in tables.sources.iter().filter(|source| source.missing > 0) {
         let (missing, all) = (source.missing, source.missing + source.paths.len() as u64);
-        // A note that cannot be written is no failure.
+        // That the answer is incomplete is worth saying, but not worth failing if it cannot be said.
         let _ = writeln!(
             io::stderr(),
             "note: `{}` lacks {} of {}, which `slipsweep run` computes",
@@ -352,7 +352,7 @@ fn answer(arguments: &Arguments) -> Result<(), Failure> {
     say(&format!("written to {path}\n"))
 }
 
-/// The failure of a query: a wrong question, or unreadable files.
+/// A question that cannot be answered, or files that cannot be read to the end.
 fn failure(tables: &Tables, arguments: &Arguments, error: AnswerError) -> Failure {
     let other = || match &error {
         AnswerError::Failed(cause) if !query::is_unreadable(cause) => {
@@ -363,7 +363,7 @@ fn failure(tables: &Tables, arguments: &Arguments, error: AnswerError) -> Failur
     tables.fault(&arguments.sql).map_or_else(other, Failure::from)
 }
 
-/// The failure of tables that cannot be read to the end, probably because a file is damaged.
+/// Tables that cannot be read to the end, for all that is known by a file that is damaged.
 pub(super) fn unreadable(dataset: &Path, error: &AnswerError) -> Failure {
     let path = dataset.display();
     let help = if dataset.join("manifest.json").exists() {

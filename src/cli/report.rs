@@ -1,4 +1,4 @@
-//! `slipsweep report DATASET`: a dataset as one page of HTML, without network.
+//! `slipsweep report DATASET`: one page of HTML with what is in a dataset, without network.
 
 use std::path::{Path, PathBuf};
 
@@ -28,7 +28,7 @@ pub fn report(arguments: &Arguments) -> Result<(), Failure> {
     let (folder, manifest) = dataset(&arguments.dataset)?;
     let path = arguments.out.clone().unwrap_or_else(|| PathBuf::from(format!("{}-report.html", manifest.name)));
     let mut page = Page::new(&format!("Dataset {}", manifest.name));
-    // The user's description comes first.
+    // What the user says of it comes first.
     let spec: Option<toml::Table> = manifest.spec.parse().ok();
     if let Some(description) = spec.as_ref().and_then(|spec| spec.get("description")?.as_str()) {
         page.words(description);
@@ -58,14 +58,14 @@ fn pictures(page: &mut Page, source: Source) -> Result<(), Failure> {
                 figure.remarks.iter().for_each(|remark| page.words(&format!("{table}: {remark} of `slipsweep plot`.")));
             }
             Err(error @ PlotError::Part(_)) => return Err(error.into()),
-            // Its help concerns `plot`.
+            // Its help is for who draws one picture.
             Err(error) => page.words(error.to_string().lines().next().unwrap_or_default()),
         }
     }
     Ok(())
 }
 
-/// The rows of each table by status.
+/// How many rows of each table have which status.
 fn statuses(page: &mut Page, tables: &[TableSurvey]) {
     page.heading("Rows and statuses");
     let used: Vec<usize> = (0..Status::ALL.len())
@@ -84,7 +84,7 @@ fn statuses(page: &mut Page, tables: &[TableSurvey]) {
     page.table(&names, &rows);
 }
 
-/// The summaries of the tables.
+/// What `summary` says.
 fn summaries(page: &mut Page, tables: &[TableSurvey]) {
     page.heading("Summary");
     for table in tables {
@@ -104,7 +104,7 @@ fn summaries(page: &mut Page, tables: &[TableSurvey]) {
     }
 }
 
-/// The plan of the spec of the dataset in `folder`.
+/// What `plan` says of the spec of the dataset in `folder`.
 fn plan_of(page: &mut Page, spec: &str, folder: &Path) -> Result<(), Failure> {
     page.heading("Plan");
     match Sweep::parse_at(spec, &folder.join("manifest.json")) {

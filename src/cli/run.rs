@@ -1,4 +1,4 @@
-//! `slipsweep run SPEC`: computes the missing parts of a dataset, or of a shard, and reports its contents.
+//! `slipsweep run SPEC`: computes what is missing of a dataset, or of a shard of it, and says what is in it.
 
 use std::io;
 use std::ops::Range;
@@ -44,7 +44,7 @@ pub struct Arguments {
     strict: bool,
 }
 
-/// Runs a spec: reads and plans it, solves, encodes and publishes the missing parts, and reports the contents.
+/// Runs a spec: reads and plans it, solves, encodes and publishes the parts that are missing, and says what they contain.
 pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let start = Instant::now();
     let (sweep, folder) = subject(arguments)?;
@@ -68,7 +68,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     Ok(())
 }
 
-/// Computes the missing `parts` of each table, with progress.
+/// Makes the `parts` of each table that are missing, and shows how far it is.
 fn solve(
     arguments: &Arguments,
     sweep: &Sweep,
@@ -93,7 +93,7 @@ fn solve(
     })
 }
 
-/// The report: contents of the tables, work since `start`, and next commands.
+/// What the tables contain, what was done since `start`, and what to do next.
 fn report(
     sweep: &Sweep,
     plan: &Plan,
@@ -156,7 +156,7 @@ fn check_room(sweep: &Sweep, plan: &Plan, shards: &[Vec<Range<u64>>], folder: &F
     if most.sum::<f64>() < free {
         return Ok(());
     }
-    // Only a dataset that might not fit is worth a sample.
+    // What is far too much, or might be, is worth a sample.
     let sizes = sweep::sizes(sweep).map_err(Failure::failed)?;
     let bytes = (sizes.iter().zip(&plan.tables).zip(missing))
         .map(|((size, table), missing)| size * missing as f64 / table.parts as f64)
@@ -164,7 +164,7 @@ fn check_room(sweep: &Sweep, plan: &Plan, shards: &[Vec<Range<u64>>], folder: &F
     if bytes < free { Ok(()) } else { Err(wrong(too_large(folder.path(), bytes, free))) }
 }
 
-/// The sweep and its folder, from a spec or from a dataset, which holds its spec.
+/// The sweep and where it goes: from a spec, or from a dataset, which holds the text of its own.
 fn subject(arguments: &Arguments) -> Result<(Sweep, Folder), Failure> {
     let path = &arguments.spec;
     if !path.is_dir() {
@@ -248,7 +248,7 @@ fn is_passing(error: &io::Error) -> bool {
         )
 }
 
-/// The cost of the run.
+/// What the run spent.
 fn account(outcome: &Outcome, seconds: f64) -> String {
     let rows: u64 = outcome.tables.iter().map(|table| table.rows).sum();
     if rows == 0 {

@@ -1,4 +1,4 @@
-//! `slipsweep summary DATASET`: the contents of a dataset, as `run` reports them at its end. They come from the footers of the parts.
+//! `slipsweep summary DATASET`: what is in a dataset, as `run` reports it at its end. It stands in the footers of the parts.
 
 use std::path::PathBuf;
 use std::sync::atomic::AtomicU64;
@@ -37,7 +37,7 @@ pub fn summary(arguments: &Arguments) -> Result<(), Failure> {
     say(&text)
 }
 
-/// Surveys a dataset, with a progress line if it takes long.
+/// Surveys a dataset, and says so if it takes long.
 pub fn survey(folder: &Folder, manifest: &Manifest, look: CheckDepth) -> Survey {
     let looked = AtomicU64::new(0);
     let there = manifest.tables.iter().map(|table| folder.parts_there(table).len() as u64).sum();
@@ -49,7 +49,7 @@ pub fn survey(folder: &Folder, manifest: &Manifest, look: CheckDepth) -> Survey 
     waiting(&wait, || Survey::new(folder, manifest, look, &looked))
 }
 
-/// The survey of a dataset without damaged or foreign parts.
+/// What is in a dataset of which every part that is there is sound.
 pub fn contents(folder: &Folder, manifest: &Manifest) -> Result<Survey, Failure> {
     let survey = survey(folder, manifest, CheckDepth::Footer);
     for (table, planned) in survey.tables.iter().zip(&manifest.tables) {
@@ -60,7 +60,7 @@ pub fn contents(folder: &Folder, manifest: &Manifest) -> Result<Survey, Failure>
     Ok(survey)
 }
 
-/// A piece of a summary, for a text or a page.
+/// A piece of what is said of a table, which stands in a text or on a page.
 pub enum SummaryBlock {
     /// A line, this far indented.
     Line(usize, String),
@@ -81,7 +81,7 @@ pub fn statistics(name: &str, rows: u64, statistics: &TableStatistics) -> String
     lines.collect()
 }
 
-/// The summary of a table of `rows` rows.
+/// What is said of a table of `rows` rows.
 pub fn blocks(name: &str, rows: u64, statistics: &TableStatistics) -> Vec<SummaryBlock> {
     let counts: Vec<String> = Status::ALL
         .iter()

@@ -147,7 +147,7 @@ fn legal(text: &str, domain: Domain) -> Result<f64, String> {
     }
 }
 
-/// A protocol to trace.
+/// What is to be traced, however it was named.
 struct TraceRequest {
     /// The name of the protocol.
     name: String,
@@ -222,7 +222,7 @@ fn has_bound(protocol: &str) -> bool {
     matches!(protocol, "optimal" | "best_cubic" | "regularised")
 }
 
-/// The quantities of every protocol.
+/// What every protocol needs.
 const NEEDED: [Quantity; 5] =
     [Quantity::Time, Quantity::A, Quantity::B, Quantity::InitialVelocity, Quantity::FinalVelocity];
 
@@ -291,7 +291,7 @@ impl Arguments {
         })
     }
 
-    /// Checks that exactly the numbers of the protocol `name` are given.
+    /// That the numbers that the protocol `name` needs are given, and no others.
     fn check(&self, name: &str) -> Result<(), Failure> {
         let missing = self.given().into_iter().filter(|(quantity, given)| given.is_none() && NEEDED.contains(quantity));
         let missing: Vec<String> = missing.map(|(quantity, _)| flag(quantity)).collect();
@@ -496,7 +496,7 @@ fn parameters(request: &TraceRequest, path: &TracedPath) -> Vec<(Named, &'static
     path.parameters.iter().map(named).collect()
 }
 
-/// The results of a trace.
+/// What comes out.
 fn results(request: &TraceRequest, path: &TracedPath, trace: &Trace) -> [Named; 3] {
     // The trace is in the units of the request.
     let velocity = |name, value| Named::new(name, value, si_name(&request.units, "v_0"));
@@ -504,7 +504,7 @@ fn results(request: &TraceRequest, path: &TracedPath, trace: &Trace) -> [Named; 
     [work, velocity("v_min", trace.v_min), velocity("v_max", trace.v_max)]
 }
 
-/// The description of a protocol in a few lines.
+/// What the protocol is, in a few lines.
 fn header(arguments: &Arguments, request: &TraceRequest, path: &TracedPath, trace: &Trace) -> String {
     let all = |numbers: &[Named]| numbers.iter().map(Named::words).collect::<Vec<_>>().join(", ");
     let mut text = format!("{}: {}\n  at {}", request.name, request.protocol.doc(&request.name), all(&request.numbers));
@@ -567,7 +567,7 @@ fn table(trace: &Trace, units: &Units) -> String {
     words::aligned(&lines, 2)
 }
 
-/// The metadata of a file.
+/// What a file says of itself.
 fn facts(arguments: &Arguments, request: &TraceRequest, path: &TracedPath, trace: &Trace) -> Vec<(String, String)> {
     let mut facts = vec![("protocol", request.name.clone())];
     let (parameters, results) = (parameters(request, path), results(request, path, trace));

@@ -39,7 +39,7 @@ pub fn watched<T>(signal: &Signal, rows: u64, quiet: bool, work: impl FnOnce() -
     (result, signals().caught())
 }
 
-/// A wait for work that writes nothing.
+/// Something that takes its time, and writes nothing.
 pub struct Wait<'a> {
     /// The current phase, such as "reading the footers of the parts".
     pub doing: &'a str,
@@ -50,20 +50,21 @@ pub struct Wait<'a> {
 }
 
 impl<'a> Wait<'a> {
-    /// A wait without known progress.
+    /// The wait for something of which nobody knows how far it is.
     pub fn new(doing: &'a str) -> Wait<'a> {
         Wait { doing, done: None, quiet: false }
     }
 }
 
-/// Does `work`, with a progress line on a terminal after a second. Ctrl-C and SIGTERM end the process with a message. Waits are not nested.
+/// Does `work`, and says on a terminal what goes on if it takes longer than a second. Ctrl-C and SIGTERM end the process, which says what
+/// is safe. One wait never holds another.
 pub fn waiting<T>(wait: &Wait<'_>, work: impl FnOnce() -> T) -> T {
     let start = Instant::now();
     let mut line: Option<ProgressBar> = None;
     let look = |caught: Option<i32>| {
         if let Some(number) = caught {
             line.iter().for_each(ProgressBar::finish_and_clear);
-            // A message without a reader is lost.
+            // Where nobody listens, nothing is lost.
             let _ = writeln!(stderr(), "stopped while {}; nothing has changed", wait.doing);
             process::exit(128 + number);
         }
@@ -82,7 +83,7 @@ pub fn waiting<T>(wait: &Wait<'_>, work: impl FnOnce() -> T) -> T {
     result
 }
 
-/// Does `work` while another thread calls `look` from time to time, with the caught signal.
+/// Does `work` while another thread looks at it from time to time, with the signal that came if one did.
 fn while_looking<T>(mut look: impl FnMut(Option<i32>) + Send, work: impl FnOnce() -> T) -> T {
     let signals = signals();
     signals.idle.store(false, Ordering::Release);
@@ -94,9 +95,9 @@ fn while_looking<T>(mut look: impl FnMut(Option<i32>) + Send, work: impl FnOnce(
                 std::thread::park_timeout(LOOK);
             }
         };
-        // Without a thread nobody watches.
+        // Where no thread can be had, nobody watches.
         let watcher = std::thread::Builder::new().spawn_scoped(scope, watch).ok();
-        // On a panic of the work too, since the scope waits for the watcher.
+        // Also if the work panics: the scope waits for the watcher.
         let _end = End { finished: &finished, signals, watcher: watcher.as_ref().map(|watcher| watcher.thread()) };
         work()
     })
@@ -117,9 +118,9 @@ impl Drop for End<'_> {
     }
 }
 
-/// The signals that the process handles since the first watched work.
+/// The signals that the process listens to, from the first thing on that is watched.
 struct Signals {
-    /// The caught signal; 0 for none.
+    /// The one that came; 0 if none did.
     caught: Arc<AtomicUsize>,
     /// Whether nothing is watched: then a signal ends the process.
     idle: Arc<AtomicBool>,

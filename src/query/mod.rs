@@ -1,8 +1,8 @@
 //! Questions to tables on disk, in SQL: the tables of a dataset, or a single file, as they lie in their folder.
 //!
-//! `question` checks a query and translates it to polars' dialect; `streaming` splits it into partial queries where possible, so that memory
-//! does not grow with the table; `scan` reads columns and row groups, `filter` drops rows and `groups` counts them; `answer` writes the result.
-//! Only the opened tables are read.
+//! `question` checks a question and spells it as polars reads it; `streaming` splits it, where that can be done, so that memory holds what
+//! is kept and not the table; `scan` reads of the files what is needed, `filter` drops rows and `groups` counts them on the way, and `answer` writes what comes out. Nothing is read but the tables
+//! that were opened.
 
 mod answer;
 mod filter;
@@ -118,8 +118,8 @@ impl Tables {
         Question::parse(sql, &self.sources).map_err(|Fault { found, help }| self.refuse(found, &help))
     }
 
-    /// The fault of a question that failed while it was answered: one that fails on the first rows too, such as the sum of words. `None` if the
-    /// files are at fault.
+    /// What is wrong with a question that failed while it was answered: what fails on the first rows alone too, such as the sum of words,
+    /// is no fault of the files. `None` if it is not the question.
     pub fn fault(&self, sql: &str) -> Option<QueryError> {
         let question = self.parse(sql).ok()?;
         let mut first = Vec::new();
@@ -133,7 +133,7 @@ impl Tables {
     /// The fault of a question.
     fn explain(&self, sql: &str, error: &PolarsError) -> QueryError {
         let text = error.to_string();
-        // Lists of names and query plans follow the first line.
+        // The first line says it, before lists of names and query plans.
         let line = text.lines().next().unwrap_or_default().trim_end_matches(':');
         let line = crate::names::shown(line, MAX_ERROR_CHARS);
         let line = &*line;

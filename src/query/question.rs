@@ -81,7 +81,7 @@ impl Question {
     }
 }
 
-/// Finds the parts of a question that are refused.
+/// Finds what a question may not ask.
 struct Check<'a> {
     sources: &'a [Source],
     /// Names that the question itself gives to tables.
@@ -234,7 +234,7 @@ impl Visit for Names {
         let mut taken: HashSet<String> = HashSet::new();
         for item in &mut select.projection {
             let (expression, name) = match item {
-                // Several columns, with names of their own.
+                // It stands for several columns, which have their names.
                 SelectItem::UnnamedExpr(Expr::Function(function))
                     if function.name.to_string().eq_ignore_ascii_case("columns") =>
                 {
@@ -457,7 +457,7 @@ impl PolarsDialect {
     }
 }
 
-/// The sum of standard SQL: null without values, where polars gives 0.
+/// A sum as standard SQL has it: null of no values, of which polars makes 0.
 fn sum(function: &Function) -> Option<Expr> {
     let FunctionArguments::List(list) = &function.args else { return None };
     let is_plain = function.over.is_none()

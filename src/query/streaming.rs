@@ -1,4 +1,4 @@
-//! Questions to one table that are answered piece by piece, so that memory does not grow with the table.
+//! Questions to one table that can be answered piece by piece, so that memory holds what is kept and not the table.
 //!
 //! Rows that are chosen one by one come as they are read; of `ORDER BY ... LIMIT` each piece gives its first rows; of `GROUP BY` each piece
 //! gives its groups, with sums, counts, least and greatest values that are then put together.
@@ -442,7 +442,7 @@ struct Functions {
     others: bool,
 }
 
-/// Removes the name of the table from columns, and finds functions that need all rows at once.
+/// Takes the name of the table off columns, and finds what needs all rows at once.
 struct ColumnSimplifier<'a> {
     table: &'a str,
     alias: &'a str,
