@@ -1,7 +1,7 @@
-//! Files that are there whole or not at all.
+//! Atomic file writes: a file is complete or absent.
 //!
-//! The bytes go to a name of their own, are synced, and the name is changed; then the folder is synced. A process that is killed in between
-//! leaves a temporary file behind, which [`sweep`] removes.
+//! The bytes are written to a temporary file, synced and renamed; then the folder is synced. A process that is killed in between leaves the
+//! temporary file, which [`sweep`] removes.
 
 use std::fs::{self, File, TryLockError};
 use std::io::{self, Write};
@@ -28,14 +28,14 @@ impl Unwritten {
     }
 }
 
-/// Writes `bytes` to `path` so that at no time, not even after a power cut, an incomplete file bears the name.
+/// Writes `bytes` to `path`. An incomplete file never has this name, even after a power cut.
 pub fn write(path: &Path, bytes: &[u8]) -> Result<(), Unwritten> {
     let temporary = filled(path, bytes)?;
     temporary.persist(path).map_err(|error| Unwritten::at(RENAME)(error.error))?;
     sync_folder(folder_of(path)).map_err(Unwritten::at("sync the folder"))
 }
 
-/// Writes `bytes` to `path` in the same way, but never over another file: `false` if there is one.
+/// Writes `bytes` to `path` in the same way, but never replaces a file: returns `false` if there is one.
 pub fn write_new(path: &Path, bytes: &[u8]) -> Result<bool, Unwritten> {
     match filled(path, bytes)?.persist_noclobber(path) {
         Err(error) if path.exists() => drop(error),
@@ -60,7 +60,7 @@ const RENAME: &str = "rename the temporary file";
 /// A temporary file for `path` with these bytes, on the disk.
 fn filled(path: &Path, bytes: &[u8]) -> Result<NamedTempFile, Unwritten> {
     let mut temporary = create(path).map_err(Unwritten::at("create"))?;
-    temporary.write_all(bytes).map_err(Unwritten::at("write"))?;
+    temporary.as_file_mut().write_all(bytes).map_err(Unwritten::at("write"))?;
     temporary.as_file().sync_all().map_err(Unwritten::at("sync"))?;
     Ok(temporary)
 }
@@ -75,12 +75,10 @@ fn folder_of(path: &Path) -> &Path {
 fn create(path: &Path) -> io::Result<NamedTempFile> {
     let prefix = format!(".{}.", path.file_name().unwrap_or_default().to_string_lossy());
     let suffix = format!("@{}{SUFFIX}", machine());
-    let mut builder = tempfile::Builder::new();
-    builder.prefix(&prefix).suffix(&suffix);
-    // The rights that a user gives new files, not those of a secret.
-    #[cfg(unix)]
-    builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
-    let temporary = builder.tempfile_in(folder_of(path))?;
+    let temporary = tempfile::Builder::new()
+        .prefix(&prefix)
+        .suffix(&suffix)
+        .make_in(folder_of(path), |path| File::create_new(path))?;
     // Without locks the age of the file decides.
     let _ = temporary.as_file().try_lock();
     Ok(temporary)
@@ -89,7 +87,7 @@ fn create(path: &Path) -> io::Result<NamedTempFile> {
 /// The suffix of a temporary file.
 const SUFFIX: &str = ".tmp";
 
-/// The name of this machine, as far as it may be part of a file's name.
+/// The name of this machine, restricted to legal characters of file names.
 fn machine() -> String {
     let name = fs::read_to_string("/proc/sys/kernel/hostname").unwrap_or_default();
     let name: String =
@@ -97,21 +95,21 @@ fn machine() -> String {
     if name.is_empty() { "localhost".to_owned() } else { name }
 }
 
-/// Whether a file of this name is a temporary one of ours.
+/// Whether `name` is the name of a temporary file of slipsweep.
 pub fn is_temporary(name: &str) -> bool {
     name.starts_with('.') && name.ends_with(SUFFIX) && name.contains('@')
 }
 
-/// Removes the temporary files in `folder` whose processes are gone. `now` is the time by the clock of the file system.
+/// Removes the temporary files of ended processes in `folder`. `now` is the time by the clock of the file system.
 ///
-/// A process holds a lock on its temporary file as long as it runs. Locks may not reach other machines, so a file of another machine
-/// counts as abandoned only when it is old. That something cannot be removed is no failure: such files do no harm.
+/// A process holds a lock on its temporary file as long as it runs. Locks may not reach other machines, so a file of another machine counts as
+/// abandoned only when it is old. Files that cannot be removed are ignored, since they are harmless.
 pub fn sweep(folder: &Path, now: SystemTime) {
     let ours = format!("@{}{SUFFIX}", machine());
     for entry in fs::read_dir(folder).into_iter().flatten().flatten() {
         let name = entry.file_name();
         let name = name.to_string_lossy();
-        // Opening a named pipe would wait for somebody who writes.
+        // Opening a named pipe would wait for a writer.
         if !is_temporary(&name) || !entry.file_type().is_ok_and(|kind| kind.is_file()) {
             continue;
         }
@@ -135,7 +133,7 @@ fn is_old(entry: &fs::DirEntry, now: SystemTime) -> bool {
     written.is_ok_and(|written| now.duration_since(written).is_ok_and(|age| age > ABANDONED))
 }
 
-/// The folder itself, or the nearest above it that is there: what is written there goes to the same disk.
+/// The nearest existing folder at or above `folder`, which is on the same disk.
 pub fn nearest_folder(folder: &Path) -> PathBuf {
     let absolute = std::path::absolute(folder).unwrap_or_else(|_| folder.to_owned());
     let there = absolute.ancestors().find(|folder| folder.is_dir());
@@ -148,13 +146,13 @@ pub fn time(folder: &Path, bytes: usize) -> io::Result<Duration> {
     let content = vec![0; bytes];
     let start = Instant::now();
     let mut temporary = create(&folder.join("plan"))?;
-    temporary.write_all(&content)?;
+    temporary.as_file_mut().write_all(&content)?;
     temporary.as_file().sync_all()?;
     sync_folder(&folder)?;
     Ok(start.elapsed())
 }
 
-/// Creates `folder` and those above it that are missing, each durably.
+/// Creates `folder` and its missing parents, each durably.
 pub fn create_folder(folder: &Path) -> io::Result<()> {
     if folder.is_dir() {
         return Ok(());
@@ -175,7 +173,7 @@ fn sync_folder(folder: &Path) -> io::Result<()> {
     File::open(folder)?.sync_all()
 }
 
-/// Elsewhere a folder cannot be opened as a file, and renaming is durable without it.
+/// On other systems a folder cannot be opened as a file, and renaming is durable without a sync.
 #[cfg(not(unix))]
 fn sync_folder(_folder: &Path) -> io::Result<()> {
     Ok(())

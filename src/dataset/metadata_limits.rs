@@ -1,7 +1,8 @@
 //! Limits on the metadata of a Parquet file, checked before its reader allocates: a few bytes can claim gigabytes.
 //!
-//! Footers and page headers are structs of Thrift's compact protocol. They are walked without knowledge of their fields: no list is longer than
-//! the bytes that are left, and the numbers that determine an allocation have limits.
+//! Footers and page headers are structs of Thrift's compact protocol. The walk does not need to know all of their fields: no list may be longer
+//! than the remaining bytes, and only numbers that determine an allocation are checked. The reader expects the field types of the Parquet format
+//! whatever the file states, so both must agree.
 
 use std::fs::File;
 use std::sync::Arc;
@@ -15,13 +16,13 @@ use parquet::file::reader::ChunkReader;
 use super::guard::guarded;
 use super::layout::label;
 
-/// Most bytes of a footer.
+/// Greatest size of a footer, in bytes.
 const MOST_OF_FOOTER: usize = 1 << 24;
-/// Most bytes of a page header.
+/// Greatest size of a page header, in bytes.
 const MOST_OF_HEADER: usize = 1 << 16;
-/// Most bytes of a page, decompressed: four million doubles and more.
+/// Greatest size of a decompressed page, in bytes: more than four million doubles.
 const MOST_OF_PAGE: i64 = 40 << 20;
-/// Most values of a page or of a dictionary.
+/// Greatest number of values of a page or of a dictionary.
 const MOST_VALUES: i64 = 1 << 22;
 /// The checked metadata of a Parquet file. Words are read as codes, from any writer.
 ///
@@ -66,7 +67,7 @@ pub fn check_footer(file: &impl ChunkReader) -> Result<(), ParquetError> {
     end.ok_or_else(|| damaged("footer")).and(limits)
 }
 
-/// Whether no page takes more than memory has, and none is encoded so that its length is known only when it is decoded.
+/// Checks that no page exceeds the limits, and that the decoded length of every page is known in advance.
 pub fn check_pages(file: &impl ChunkReader, metadata: &ParquetMetaData) -> Result<(), ParquetError> {
     page_headers(file, metadata, |_| {})
 }
@@ -85,7 +86,7 @@ pub fn page_headers(
         let end = at.checked_add(length).filter(|&end| end <= file.len()).ok_or_else(|| damaged("list of columns"))?;
         while at < end {
             let left = usize::try_from(end - at).unwrap_or(usize::MAX).min(MOST_OF_HEADER);
-            // Headers are short, but for those with long words as least and greatest values.
+            // Headers are short, except if the least and greatest values are long words.
             let mut bytes = file.get_bytes(at, left.min(256))?;
             let mut page = check_page(&bytes)?;
             if page.is_none() {
@@ -100,7 +101,7 @@ pub fn page_headers(
     Ok(())
 }
 
-/// The bytes of a header, and from its start to the end of its page; `None` if the header goes on beyond `bytes`.
+/// The length of a header, and of header and page together; `None` if the header extends beyond `bytes`.
 fn check_page(bytes: &[u8]) -> Result<Option<(usize, u64)>, ParquetError> {
     let (mut compressed, mut limits) = (None, Ok(()));
     let header = walk(bytes, &mut |path, value| match path {
@@ -157,7 +158,7 @@ impl Walker<'_> {
         (at <= self.bytes.len()).then_some(())
     }
 
-    /// Seven bits a byte, the lowest first.
+    /// A variable-length integer: groups of seven bits, the lowest first.
     fn varint(&mut self) -> Option<u64> {
         let mut value = 0;
         for shift in (0..64).step_by(7) {
@@ -170,7 +171,7 @@ impl Walker<'_> {
         None
     }
 
-    /// Signs are in the lowest bit.
+    /// A signed integer, with the sign in the lowest bit.
     fn whole(&mut self) -> Option<i64> {
         let value = self.varint()?;
         Some((value >> 1) as i64 ^ -((value & 1) as i64))
@@ -218,7 +219,7 @@ impl Walker<'_> {
                     15 => self.varint()?,
                     count => count.into(),
                 };
-                // An element has a byte or more.
+                // An element has at least one byte.
                 let left = (self.bytes.len() - self.at) as u64;
                 let count = (count <= left).then_some(count)?;
                 (self.visit)(&self.path, count as i64);
@@ -255,7 +256,7 @@ mod tests {
         assert!(
             footer(&[0x29, 0x1c, 0x55, 0xd0, 0x0f, 0, 0]).ends_with("a node of 1000 children, where 1 are possible")
         );
-        // A list of lists; structs in structs; a list and a text longer than what is left; no end.
+        // A list of lists; nested structs; a list and a text longer than the remaining bytes; a missing end.
         let deep = [0x1c; 20];
         for damaged in [&[0x19, 0x19, 0x05, 0, 0][..], &deep, &[0x19, 0xf5, 0x7f, 0], &[0x18, 0x7f, 0], &[0x15]] {
             assert!(footer(damaged).ends_with("its footer is damaged"), "{damaged:x?}");
@@ -274,7 +275,7 @@ mod tests {
             let error = check_page(&header(20, 2, 2 * encoding)).expect_err("is refused");
             assert!(error.to_string().ends_with("words are encoded as differences"));
         }
-        // A text of 300 bytes goes on beyond the first 256.
+        // A text of 300 bytes extends beyond the first 256.
         let long = [&header(20, 2, 0)[..12], &[0x18, 0xac, 0x02], &[b'v'; 300], &[0]].concat();
         assert_eq!(check_page(&long[..256]).expect("claims little"), None);
         assert_eq!(check_page(&long).expect("claims little"), Some((316, 316 + 10)));

@@ -1,4 +1,4 @@
-//! Whether a file is the part that should be there.
+//! The state of a part: whether its file is the expected one and intact.
 
 use std::fs::{self, File};
 use std::io::{self, Read};
@@ -15,7 +15,7 @@ use super::statistics::TableStatistics;
 /// The depth of a check.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum CheckDepth {
-    /// Its footer: finds a part that is cut short and one of another origin.
+    /// The footer only: detects truncated and foreign parts.
     Footer,
     /// Every bit, by the checksum.
     Whole,
@@ -25,17 +25,17 @@ pub enum CheckDepth {
 #[derive(Debug, Clone, PartialEq)]
 #[allow(missing_docs)]
 pub enum State {
-    /// Nothing.
+    /// No file.
     Missing,
-    /// The part.
+    /// The expected part.
     There { statistics: Box<TableStatistics> },
-    /// Something that was not made from this spec by this version; it may be of use to somebody.
+    /// A file of another spec or version, which may be valuable and is never replaced.
     Foreign { what: &'static str, expected: String, found: String },
-    /// A part that is broken, of no use to anybody.
+    /// A damaged part, which a run replaces.
     Damaged { why: String },
 }
 
-/// Looks at the file in the place of a part, number `part` of `table` in the dataset of `manifest`, which is written in `path`.
+/// The state of part number `part` of `table` in the dataset of `manifest`, whose file is `path`.
 pub fn state(path: &Path, manifest: &Manifest, table: &str, part: u64, look: CheckDepth) -> State {
     let found = match look {
         CheckDepth::Footer => sealed_entries(path),
@@ -72,7 +72,7 @@ pub fn footer_of(path: &Path) -> Option<Footer> {
     Footer::from_entries(&sealed_entries(path).ok()??)
 }
 
-/// The file in `path`. What is no file is not opened: a named pipe would wait for somebody who writes, a device might never end.
+/// Opens the file in `path`. Only plain files are opened: a named pipe would wait for a writer, and a device might never end.
 fn open(path: &Path) -> Result<Option<File>, State> {
     let opened = fs::metadata(path).and_then(|metadata| match metadata.file_type() {
         kind if kind.is_file() => File::open(path).map(Ok),
@@ -97,7 +97,7 @@ fn whole(path: &Path) -> Result<Option<Vec<KeyValue>>, State> {
     match checksum::is_intact(&bytes) {
         Some(true) => metadata(&bytes).map(|metadata| Some(entries(&metadata))),
         Some(false) => damaged("its checksum does not match its bytes"),
-        // Either the checksum is broken, or the file is somebody else's.
+        // Either the checksum is damaged, or the file is foreign.
         None => match metadata(&bytes).map(|metadata| entries(&metadata)) {
             Ok(entries) if !entries.iter().any(|entry| entry.key.starts_with(PREFIX)) => Ok(Some(entries)),
             Ok(_) => damaged("it has no checksum"),

@@ -20,7 +20,7 @@ pub enum PlotError {
         "{path}, line {line}: found {found}\n  expected: {expected}\n  help: `slipsweep trace … --out FILE.csv` writes traces"
     )]
     Cell { path: String, line: usize, found: String, expected: String },
-    /// A file is no trace.
+    /// A file is not a trace.
     #[error(
         "{path}: not a trace: it has no column `{missing}`\n  found: {}\n  help: `slipsweep trace … --out FILE` writes traces; \
          of a dataset, name the folder",
@@ -33,10 +33,10 @@ pub enum PlotError {
     /// There is nothing to draw.
     #[error("nothing to draw: the requested columns hold no numbers")]
     Nothing,
-    /// No table of that name.
+    /// The dataset has no table of this name.
     #[error("the dataset has no table `{name}`\n  found: {}\n  help: {}", .found.join(", "), hint(.name, .found))]
     NoTable { name: String, found: Vec<String> },
-    /// No column of that name.
+    /// The table has no column of this name.
     #[error("{argument}: the table `{table}` has no {what} `{name}`\n  found: {}\n  help: {}", .found.join(", "), hint(.name, .found))]
     NoColumn { argument: String, table: String, what: &'static str, name: String, found: Vec<String> },
     /// A condition that cannot be read.
@@ -44,13 +44,13 @@ pub enum PlotError {
         "--where {text}: not a condition\n  expected: COLUMN=VALUE, or <, >, <=, >= or != between them\n  help: such as --where \"a=0.03\""
     )]
     Condition { text: String },
-    /// No row fulfils the conditions.
+    /// No row meets the conditions.
     #[error("--where {text}: no row of the table `{table}` meets this\n  found: {found}\n  help: {help}")]
     NoRows { table: String, text: String, found: String, help: String },
-    /// All rows are missing.
+    /// The table has no rows.
     #[error("the table `{table}` has no rows yet\n  help: compute them with `slipsweep run`")]
     Empty { table: String },
-    /// Every axis has one value only.
+    /// Every axis has a single value.
     #[error("the table `{table}` has a single matching row, which makes no picture\n  help: `slipsweep head` shows it")]
     OneRow { table: String },
     /// A map needs two axes.
@@ -65,16 +65,16 @@ pub enum PlotError {
          trace both in the same units", .units[0], .units[1]
     )]
     Units { column: String, units: [String; 2] },
-    /// A trace in Parquet.
+    /// A Parquet trace cannot be read.
     #[error("{0}\n  help: delete the file and trace it again")]
     Trace(FrameError),
-    /// A part of a table.
+    /// A part of a table cannot be read.
     #[error(transparent)]
     Part(#[from] ReadError),
-    /// The converter does not understand the picture.
+    /// The picture cannot be converted.
     #[error("cannot convert the picture: {0}\n  help: write it as .svg")]
     Convert(String),
-    /// More pixels than can be held.
+    /// The picture has too many pixels.
     #[error("a picture of {width} x {height} pixels is too large\n  help: lower --dpi")]
     Size { width: f64, height: f64 },
 }

@@ -1,7 +1,7 @@
-//! Groups of rows with their counts, sums, least and greatest numbers, straight from the columns of a file.
+//! Groups of rows with counts, sums, least and greatest numbers, computed from the columns of a file directly.
 //!
-//! Most queries over many rows are of this kind. polars, which is not optimised in the release build, would answer them several times
-//! slower than Python polars; `benches/query/run` compares, and `an_answer_in_pieces_is_the_answer_at_once` checks one route by the other.
+//! Most queries over many rows are of this kind. polars, which is not optimised in the release build, would be several times slower than Python
+//! polars (`benches/query/run`). The test `an_answer_in_pieces_is_the_answer_at_once` compares both implementations.
 
 use arrow_array::cast::AsArray;
 use arrow_array::types::{Float64Type, Int32Type};
@@ -39,7 +39,7 @@ impl Measure {
     }
 }
 
-/// The values of a key.
+/// The type of a key.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Kind {
     /// Doubles.
@@ -51,7 +51,7 @@ pub enum Kind {
 }
 
 impl Kind {
-    /// The column.
+    /// The type of the column `name`.
     pub fn of(name: &str, schema: &Schema) -> Option<Kind> {
         match schema.get(name)? {
             DataType::Float64 => Some(Kind::Number),
@@ -61,19 +61,19 @@ impl Kind {
     }
 }
 
-/// A question for groups.
+/// A query for groups.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Groups {
     /// The condition of rows.
     pub conditions: Vec<Condition>,
-    /// The columns whose values make the groups.
+    /// The key columns of the groups.
     pub keys: Vec<(String, Kind)>,
     /// The aggregates of each group.
     pub measures: Vec<Measure>,
 }
 
 impl Groups {
-    /// Whether what is measured is of types that are counted here.
+    /// Whether the types of all aggregated columns are supported.
     pub fn fits(&self, schema: &Schema) -> bool {
         self.measures.iter().all(|measure| match measure {
             Measure::Rows => true,
@@ -82,7 +82,7 @@ impl Groups {
         })
     }
 
-    /// The columns that are read.
+    /// The columns to read.
     pub fn columns(&self) -> Vec<String> {
         let measured = self.measures.iter().filter_map(|measure| measure.column().map(str::to_owned));
         let mut names: Vec<String> = self.keys.iter().map(|(name, _)| name.clone()).chain(measured).collect();
@@ -119,7 +119,7 @@ fn codes(array: &dyn Array, rows: &[u32], words: &mut IndexSet<String>) -> Vec<u
     rows.map(|row| keys.key(row).and_then(|key| known.get(key)).copied().unwrap_or(MISSING)).collect()
 }
 
-/// Groups that are being counted.
+/// Groups during aggregation.
 pub struct Counting<'a> {
     groups: &'a Groups,
     /// The words of each key.
@@ -138,7 +138,7 @@ struct Tally {
 }
 
 impl<'a> Counting<'a> {
-    /// No rows yet.
+    /// An aggregation without rows.
     pub fn new(groups: &'a Groups) -> Counting<'a> {
         let keys = groups.keys.len();
         let mut counting = Counting {
@@ -162,7 +162,7 @@ impl<'a> Counting<'a> {
         }
     }
 
-    /// Counts the rows of a batch.
+    /// Adds the rows of a batch.
     pub fn add(&mut self, batch: &RecordBatch) {
         let kept = kept(&self.groups.conditions, batch);
         let rows: Vec<u32> = (0..).zip(&kept).filter(|(_, kept)| **kept).map(|(row, _)| row).collect();
@@ -272,7 +272,7 @@ impl<'a> Counting<'a> {
     }
 }
 
-/// Keeps of each group the number that is `better` than others; NaN is better than none.
+/// Keeps the number that is `better` in each group; NaN is better than no number.
 fn tally(cells: impl Iterator<Item = (usize, f64)>, tallies: &mut [Tally], better: impl Fn(f64, f64) -> bool) {
     for (id, number) in cells {
         let tally = &mut tallies[id];
