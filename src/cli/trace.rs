@@ -60,7 +60,7 @@ pub struct Arguments {
     #[arg(long, value_name = "V", value_parser = |text: &str| legal(text, Quantity::FinalVelocity.domain()))]
     v_f: Option<f64>,
     /// Friction ceiling, in mu_0 sigma (bounded_friction)
-    #[arg(long, value_name = "M", value_parser = |text: &str| legal(text, Quantity::FrictionBound.domain()))]
+    #[arg(long, value_name = "M", value_parser = |text: &str| legal(text, Quantity::FrictionCeiling.domain()))]
     tau_ceiling: Option<f64>,
     /// Coefficient of t in theta, in units of 1/t_f as in the table `best_cubic` (gap)
     #[arg(long, value_name = "X", value_parser = |text: &str| legal(text, Quantity::Alpha2.domain()))]
@@ -240,7 +240,7 @@ impl Arguments {
             (Quantity::B, self.b),
             (Quantity::InitialVelocity, self.v_i),
             (Quantity::FinalVelocity, self.v_f),
-            (Quantity::FrictionBound, self.tau_ceiling),
+            (Quantity::FrictionCeiling, self.tau_ceiling),
             (Quantity::Alpha2, self.alpha_2),
             (Quantity::Alpha3, self.alpha_3),
             (Quantity::Stiffness, self.k),
@@ -281,7 +281,7 @@ impl Arguments {
             case: Case {
                 transition: Transition { law: Law { a, b }, v_i, v_f },
                 t_f,
-                tau_ceiling: point[Quantity::FrictionBound],
+                tau_ceiling: point[Quantity::FrictionCeiling],
             },
             numbers: numbers.filter_map(|(quantity, given)| Some(Named::new(quantity.name(), given?, ""))).collect(),
             bounded: has_bound(name).then_some(bounded),
@@ -302,7 +302,7 @@ impl Arguments {
             "gap" => &[Quantity::Alpha2, Quantity::Alpha3],
             "step_response" | "compliant" => &[Quantity::Stiffness, Quantity::Mass],
             "regularised" => &[Quantity::Stiffness, Quantity::Mass, Quantity::Smoothing],
-            _ if shortcut::find(name).is_some_and(|family| family.uses_tau_ceiling()) => &[Quantity::FrictionBound],
+            _ if shortcut::find(name).is_some_and(|family| family.uses_tau_ceiling()) => &[Quantity::FrictionCeiling],
             _ => &[],
         };
         for (quantity, given) in self.given().into_iter().filter(|(quantity, _)| !NEEDED.contains(quantity)) {

@@ -3,7 +3,7 @@
 use std::ops::Range;
 
 use super::memo::Memo;
-use super::optimum_cache::{self, Comparison, transition};
+use super::optimum_cache::{self, Comparison, transition, without_ceilings};
 use super::{
     Column, ColumnBuffer, Definition, Field, Job, Projection, RunStats, Stopped, columns, number, place, rows,
 };
@@ -101,7 +101,8 @@ fn compute(job: &Job<'_>, range: Range<u64>, buffer: &mut ColumnBuffer) -> Resul
         let mut least = Comparison::NONE;
         if needs_optimum(job.projection) {
             let bounded = job.projection.has(GAP_ERROR);
-            least = optimum_cache::compare(job, (tuple, point), (member.work, work_error), bounded, &mut work);
+            let works = (member.work, work_error);
+            least = optimum_cache::compare(job, (tuple, point), &without_ceilings(job), works, bounded, &mut work);
             status = status.compared_with(least.optimum);
         }
         let (slider, t_f, dt) = (slider(point), point[Quantity::Time], point[Quantity::Sampling]);

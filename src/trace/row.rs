@@ -67,7 +67,7 @@ pub fn protocol_of(
     };
     let t_f = if table == "step_response" { t_f.ok_or(Pathless::Duration)? } else { number(Quantity::Time)? };
     let family = word("family").and_then(shortcut::find);
-    let tau_ceiling = number(Quantity::FrictionBound).unwrap_or(f64::INFINITY);
+    let tau_ceiling = number(Quantity::FrictionCeiling).unwrap_or(f64::INFINITY);
     let case = Case { transition, t_f, tau_ceiling };
     let [k, m] = [Quantity::Stiffness, Quantity::Mass].map(number);
     let protocol = match (table, family) {

@@ -1,0 +1,247 @@
+//! Optimal protocols under a floor and ceilings by integration along `ln theta`: the free minimiser, clamped, with one `C`
+//! (docs/derivations.md, equation 6).
+
+use super::extremal::branch;
+use super::route::integrate;
+use crate::model::Law;
+
+/// The way from one state variable to steady sliding at another, under bounds.
+#[derive(Debug, Clone, Copy)]
+pub struct Way {
+    pub law: Law,
+    /// State variable at the start.
+    pub from: f64,
+    /// State variable at the end.
+    pub to: f64,
+    /// Whether `v >= 1`.
+    pub floor: bool,
+    /// Velocity ceiling, or infinity.
+    pub v_ceiling: f64,
+    /// Friction ceiling, or infinity.
+    pub tau_ceiling: f64,
+}
+
+/// Integrals along a protocol, and its ends.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Totals {
+    pub time: f64,
+    pub work: f64,
+    pub time_at_floor: f64,
+    pub time_at_v_ceiling: f64,
+    pub time_at_tau_ceiling: f64,
+    /// Integrals of the multipliers of the two ceilings.
+    pub pressure: [f64; 2],
+    /// Derivatives of the work with respect to `a` and `b`.
+    pub by_law: [f64; 2],
+    /// `W + C t` of a protocol that is off by a little.
+    pub varied: f64,
+    pub v_start: f64,
+    pub v_end: f64,
+    pub theta_max: f64,
+    pub friction: [f64; 2],
+    /// Derivatives of the work with respect to theta at the start and at the end.
+    pub costate: [f64; 2],
+    /// `dW*/dt_f` with the opposite sign.
+    pub c: f64,
+}
+
+/// A monotone leg: `ln theta` at its ends.
+#[derive(Debug, Clone, Copy)]
+struct Leg {
+    start: f64,
+    end: f64,
+    /// `ln theta` at the turn at one of its ends, if any.
+    turn: Option<f64>,
+}
+
+/// Relative distance of a velocity from a bound that is rounding.
+const ON_BOUND: f64 = 1e-12;
+
+/// Relative change of `z` of the protocols that try to beat the optimum.
+const VARIATION: f64 = 1e-3;
+
+/// The integrated quantities, and the variable itself.
+const SUMS: usize = 11;
+
+impl Way {
+    fn steady_friction(&self, l: f64) -> f64 {
+        1.0 + (self.law.b - self.law.a) * l
+    }
+
+    /// The greatest `z = ln(theta v)` under both ceilings.
+    pub fn cap(&self, l: f64) -> f64 {
+        (self.v_ceiling.ln() + l).min((self.tau_ceiling - self.steady_friction(l)) / self.law.a)
+    }
+
+    /// The time from start to end on the ceilings throughout; infinite if theta cannot move so everywhere.
+    pub fn time_on_ceilings(&self) -> f64 {
+        let (start, end) = (self.from.ln(), self.to.ln());
+        let sign = if end < start { 1.0 } else { -1.0 };
+        if [start, end].into_iter().any(|l| sign * self.cap(l) <= 0.0) {
+            return f64::INFINITY;
+        }
+        let slope = |y: &[f64; 2]| [1.0, -y[0].exp() / self.cap(y[0]).exp_m1()];
+        integrate(slope, [start, 0.0], (start, end)).map_or(f64::INFINITY, |y| y[1])
+    }
+
+    /// `e^z - 1 - z` of the free minimiser, relative to the turn if there is one.
+    fn energy(&self, l: f64, c: f64, turn: Option<f64>) -> f64 {
+        let Law { a, b } = self.law;
+        match turn {
+            Some(turn) => ((b - a) * (l - turn) - self.steady_friction(turn) * (l - turn).exp_m1()) / a,
+            None => (self.steady_friction(l) + c * l.exp()) / a,
+        }
+    }
+
+    /// The clamped minimiser at `ln theta = l`, off by the fraction `off`.
+    fn clamped(&self, l: f64, energy: f64, falls: bool, off: f64) -> f64 {
+        let free = branch(energy.max(0.0), falls).unwrap_or(0.0) * (1.0 + off);
+        let lifted = if self.floor && !falls { free.max(l) } else { free };
+        lifted.min(self.cap(l))
+    }
+
+    /// `ln theta` at the turn of the protocol of `c`, above both ends.
+    fn turn(&self, c: f64) -> Option<f64> {
+        let g = |l: f64| self.steady_friction(l) + c * l.exp();
+        let mut low = self.from.max(self.to).ln();
+        let mut high = low;
+        let mut step = 1e-3;
+        while g(high) > 0.0 {
+            (low, high, step) = (high, high + step, 2.0 * step);
+            if high > 50.0 {
+                return None;
+            }
+        }
+        for _ in 0..200 {
+            let middle = 0.5 * (low + high);
+            if g(middle) > 0.0 { low = middle } else { high = middle }
+        }
+        Some(low)
+    }
+
+    /// The totals of the protocol of `c` that turns if `turns`; `None` if it is no protocol.
+    pub fn totals(&self, c: f64, turns: bool) -> Option<Totals> {
+        let (start, end) = (self.from.ln(), self.to.ln());
+        let legs = if turns {
+            let turn = self.turn(c)?;
+            vec![Leg { start, end: turn, turn: Some(turn) }, Leg { start: turn, end, turn: Some(turn) }]
+        } else {
+            vec![Leg { start, end, turn: None }]
+        };
+        let mut all = Totals { friction: [f64::INFINITY, f64::NEG_INFINITY], c, ..Totals::default() };
+        all.theta_max = legs.iter().map(|leg| leg.start.max(leg.end)).fold(f64::NEG_INFINITY, f64::max).exp();
+        for leg in &legs {
+            self.add(leg, &mut all)?;
+        }
+        let (first, last) = (legs[0], legs[legs.len() - 1]);
+        let at = |leg: &Leg, l: f64| self.clamped(l, self.energy(l, c, leg.turn), leg.end < leg.start, 0.0);
+        let ends = [(&first, start), (&last, end)].map(|(leg, l)| (at(leg, l), l));
+        [all.v_start, all.v_end] = ends.map(|(z, l)| (z - l).exp());
+        all.costate = ends.map(|(z, l)| {
+            let friction = self.steady_friction(l) + self.law.a * z;
+            (friction * (z - l).exp() + c) / z.exp_m1()
+        });
+        Some(all)
+    }
+
+    /// Adds the integrals of a leg.
+    fn add(&self, leg: &Leg, all: &mut Totals) -> Option<()> {
+        let c = all.c;
+        let falls = leg.end < leg.start;
+        let rates = |l: f64| self.rates(l, self.energy(l, c, leg.turn), falls, c);
+        let sums = match leg.turn {
+            // theta = theta_h/(1 + X^2): the integrand is regular at the turn.
+            Some(turn) => {
+                let far = (turn - leg.start.min(leg.end)).exp_m1().sqrt();
+                let slope = |y: &[f64; SUMS]| {
+                    let x = y[0].max(1e-9 * far);
+                    let rates = rates(turn - (x * x).ln_1p());
+                    let mut slope = rates.map(|rate| rate * 2.0 * x / (1.0 + x * x));
+                    slope[0] = 1.0;
+                    slope
+                };
+                integrate(slope, [0.0; SUMS], (0.0, far))?
+            }
+            None => {
+                let (low, high) = (leg.start.min(leg.end), leg.start.max(leg.end));
+                let mut from = [0.0; SUMS];
+                from[0] = low;
+                integrate(|y: &[f64; SUMS]| rates(y[0]), from, (low, high))?
+            }
+        };
+        let [_, time, work, floor, at_v, at_tau, by_v, by_tau, by_a, by_b, varied] = sums;
+        all.time += time;
+        all.work += work;
+        all.time_at_floor += floor;
+        all.time_at_v_ceiling += at_v;
+        all.time_at_tau_ceiling += at_tau;
+        all.pressure = [all.pressure[0] + by_v, all.pressure[1] + by_tau];
+        all.by_law = [all.by_law[0] + by_a, all.by_law[1] + by_b];
+        all.varied += varied;
+        for place in 0..=PLACES {
+            let l = leg.start + (leg.end - leg.start) * f64::from(place) / f64::from(PLACES);
+            let z = self.clamped(l, self.energy(l, c, leg.turn), falls, 0.0);
+            let friction = self.steady_friction(l) + self.law.a * z;
+            all.friction = [all.friction[0].min(friction), all.friction[1].max(friction)];
+        }
+        Some(())
+    }
+
+    /// The derivatives of the sums with respect to `ln theta`, counted as positive.
+    fn rates(&self, l: f64, energy: f64, falls: bool, c: f64) -> [f64; SUMS] {
+        let Law { a, .. } = self.law;
+        let z = self.clamped(l, energy, falls, 0.0);
+        let (v, slope) = ((z - l).exp(), z.exp_m1());
+        let dt = l.exp() / slope.abs();
+        let friction = self.steady_friction(l) + a * z;
+        let on = |bound: f64| if (z - bound).abs() <= ON_BOUND * (1.0 + bound.abs()) { 1.0 } else { 0.0 };
+        let free = branch(energy.max(0.0), falls).unwrap_or(0.0);
+        let caps = [self.v_ceiling.ln() + l, (self.tau_ceiling - self.steady_friction(l)) / a];
+        let is_capped = z < free;
+        let [at_v, at_tau] = caps.map(|cap| if is_capped && z == cap { 1.0 } else { 0.0 });
+        let at_floor = if self.floor && !falls { on(l) } else { 0.0 };
+        let pressure = (energy - (slope - z)) / slope;
+        let (nu, lambda) = (at_v * a * pressure, at_tau * v * pressure);
+        let varied = self.clamped(l, energy, falls, if falls { -VARIATION } else { VARIATION });
+        let (v_varied, dt_varied) = ((varied - l).exp(), l.exp() / varied.exp_m1().abs());
+        let cost = (self.steady_friction(l) + a * varied) * v_varied + c;
+        [
+            1.0,
+            dt,
+            friction * v * dt,
+            at_floor * dt,
+            at_v * dt,
+            at_tau * dt,
+            nu * dt,
+            lambda * dt,
+            (v + lambda) * v.ln() * dt,
+            (v + lambda) * l * dt,
+            cost * dt_varied,
+        ]
+    }
+
+    /// The protocol of duration `t_f`, by Newton's method from `c`.
+    pub fn solve(&self, t_f: f64, c: f64, turns: bool) -> Option<Totals> {
+        let mut here = self.totals(c, turns)?;
+        for _ in 0..NEWTON_STEPS {
+            let residual = here.time - t_f;
+            if residual.abs() <= 1e-13 * t_f {
+                break;
+            }
+            let step = 1e-6 * here.c.abs().max(1.0);
+            let slope = (self.totals(here.c + step, turns)?.time - here.time) / step;
+            let next = self.totals(here.c - residual / slope, turns)?;
+            if (next.time - t_f).abs() >= residual.abs() {
+                break;
+            }
+            here = next;
+        }
+        ((here.time - t_f).abs() <= 1e-9 * t_f).then_some(here)
+    }
+}
+
+/// Places on a leg at which friction is looked at.
+const PLACES: u32 = 4000;
+
+/// Steps of Newton's method: the row's own `C` is within a few of them.
+const NEWTON_STEPS: u32 = 6;
