@@ -107,6 +107,32 @@ pub(super) fn least_friction(law: &Law, c: f64, ends: [(f64, f64); 2]) -> f64 {
     if inside && ln_u.is_finite() { least.min(b * (1.0 + excess) - a) } else { least }
 }
 
+/// Greatest friction of a part of an arc with the constant `c`, as [`least_friction`]: the stationary point is a maximum
+/// for `(u - 1)(b - a) > 0`.
+pub(super) fn greatest_friction(law: &Law, c: f64, ends: [(f64, f64); 2]) -> f64 {
+    let Law { a, b } = *law;
+    let friction = |(theta, ln_u): (f64, f64)| 1.0 + a * ln_u + (b - a) * ln(theta);
+    let greatest = friction(ends[0]).max(friction(ends[1]));
+    let [(theta_start, start), (theta_end, end)] = ends;
+    let scale = (a - b) / c;
+    let may_peak = if b > a { end > 0.0 } else { start < 0.0 };
+    if !(may_peak && b > 0.0 && scale > 0.0 && scale.is_finite()) {
+        return greatest;
+    }
+    let rest = (1.0 + a - b + (b - a) * ln(scale)) / b;
+    if rest < 0.0 {
+        return greatest;
+    }
+    let Turning { excess, .. } = turning((2.0 * rest).sqrt().copysign(b - a));
+    let theta = scale * (1.0 + excess);
+    let inside = if b > a {
+        theta >= theta_end && (start <= 0.0 || theta <= theta_start)
+    } else {
+        theta >= theta_start && (end >= 0.0 || theta <= theta_end)
+    };
+    if inside { greatest.max(b * (1.0 + excess) - a) } else { greatest }
+}
+
 /// `phi(z) = e^z - 1 - z`, the left side of the turning equation, without cancellation near 0.
 pub(super) fn phi(z: f64) -> f64 {
     phi_and_slope(z).0

@@ -14,7 +14,7 @@
 //!
 //! A search counts `q` from `q_hold` where that exists, so that short holds keep their digits.
 
-use super::arc::{Arc, Chart, Sums, least_friction, phi, phi_and_slope};
+use super::arc::{Arc, Chart, Sums, greatest_friction, least_friction, phi, phi_and_slope};
 use super::floor;
 use super::lifetime::Lifetime;
 use crate::model::Law;
@@ -415,6 +415,11 @@ impl Extremal {
         let ends = [(self.theta_s, self.start), (problem.to.theta, self.end)];
         let held = if self.time_at_floor > 0.0 { 1.0 + problem.law.b * problem.from.ln } else { f64::INFINITY };
         sums.friction_min.min(least_friction(&problem.law, self.arc.c(), ends)).min(held)
+    }
+
+    /// Greatest friction on the way: at both ends of the arc, or where it is stationary between them.
+    pub fn friction_max(&self, problem: &Problem) -> f64 {
+        greatest_friction(&problem.law, self.arc.c(), [(self.theta_s, self.start), (problem.to.theta, self.end)])
     }
 
     /// Work of the hold and the arc together.

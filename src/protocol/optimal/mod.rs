@@ -4,6 +4,7 @@
 //! bound `v >= 1` after time at the `floor`; the family of such `extremal`s has one parameter, in which the time is monotone.
 
 mod arc;
+mod bounds;
 pub mod crossover;
 mod extremal;
 mod floor;
@@ -19,6 +20,7 @@ use crate::numerics::elementary::{exp, ln_1p};
 use extremal::Problem;
 use lifetime::Lifetime;
 
+pub use bounds::Bounds;
 pub(super) use motion::Optimal as Route;
 pub(super) use route::{PathPoint, PathSegment, lag_at_bound};
 
@@ -57,27 +59,188 @@ pub struct Optimum {
     pub v_start: f64,
     /// Velocity just before the end, `v(t_f-)`.
     pub v_end: f64,
-    /// Time spent on the bound `v = 1`.
+    /// Time at the floor `v = 1`.
     pub time_at_floor: f64,
+    /// Time at the ceiling of the velocity.
+    pub time_at_v_ceiling: f64,
+    /// Time at the ceiling of friction.
+    pub time_at_tau_ceiling: f64,
     /// `dW*/dt_f = -C`, the Hamiltonian.
     pub hamiltonian: f64,
     /// Largest contact lifetime on the way.
     pub theta_max: f64,
+    /// Largest friction on the way.
+    pub friction_max: f64,
     /// The start.
     pub strategy: Strategy,
 }
 
-/// Solves one optimal protocol to relative accuracy `rtol`, with `v >= 1` where `bounded`.
+/// Derivatives of the least work `W*`; that by `t_f` is [`Optimum::hamiltonian`].
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Slopes {
+    /// `dW*/da`.
+    pub a: f64,
+    /// `dW*/db`.
+    pub b: f64,
+    /// `dW*/dv_i`.
+    pub v_i: f64,
+    /// `dW*/dv_f`.
+    pub v_f: f64,
+    /// By the ceiling of the velocity, at most 0; 0 where it does not bind.
+    pub v_ceiling: f64,
+    /// By the ceiling of friction, at most 0; 0 where it does not bind.
+    pub tau_ceiling: f64,
+}
+
+/// The kind of an arc of an optimal protocol.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+#[repr(u8)]
+pub enum ArcKind {
+    /// Off all bounds.
+    Free,
+    /// At the floor `v = 1`.
+    Floor,
+    /// At the ceiling of the velocity.
+    VCeiling,
+    /// At the ceiling of friction.
+    TauCeiling,
+}
+
+impl ArcKind {
+    /// All kinds, in their order.
+    pub const ALL: [ArcKind; 4] = [ArcKind::Free, ArcKind::Floor, ArcKind::VCeiling, ArcKind::TauCeiling];
+
+    /// The name in tables.
+    pub fn name(self) -> &'static str {
+        match self {
+            ArcKind::Free => "free",
+            ArcKind::Floor => "floor",
+            ArcKind::VCeiling => "v_ceiling",
+            ArcKind::TauCeiling => "tau_ceiling",
+        }
+    }
+}
+
+/// The closed-loop law at one contact lifetime and time left.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct FeedbackPoint {
+    /// Velocity of the optimal protocol now.
+    pub v: f64,
+    /// Least work of the time left.
+    pub work_to_go: f64,
+    /// Derivative of `work_to_go` with respect to theta.
+    pub costate: f64,
+    /// `dv/dtheta` at fixed time left.
+    pub gain: f64,
+    /// The arc now.
+    pub arc: ArcKind,
+}
+
+/// Why no protocol obeys the bounds.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Obstacle {
+    /// An argument is outside its domain.
+    Domain,
+    /// `t_f` is below `t_least`.
+    TooFast {
+        /// The least feasible time.
+        t_least: f64,
+    },
+    /// `t_f` is above `t_most`.
+    TooSlow {
+        /// The greatest feasible time.
+        t_most: f64,
+    },
+    /// The ceiling of the velocity is too low for every `t_f`.
+    VCeiling {
+        /// Every feasible ceiling is above it, or at it.
+        above: f64,
+    },
+    /// The ceiling of friction is too low for every `t_f`.
+    TauCeiling {
+        /// Every feasible ceiling is above it, or at it.
+        above: f64,
+    },
+}
+
+/// Solves one optimal protocol to relative accuracy `rtol` under `bounds`; `true` or `false` stands for the floor alone.
 ///
 /// `Infeasible` where no protocol is fast enough under the bound (`t_f < t_min`), or where an argument is outside its
 /// domain (`a > 0`, `b >= 0`, `v_i, v_f > 1`, `t_f > 0`, all finite). Without the bound, `BelowBound` where `v(0+) <
 /// 1`. `Unproven` where `tau <= max(0, b - a)` somewhere, `NegativeFriction` where `tau < 0`; an extremal that falls
 /// below the bound there has no numbers.
-pub fn solve(transition: &Transition, t_f: f64, bounded: bool, rtol: f64) -> Solved<Optimum> {
+pub fn solve(transition: &Transition, t_f: f64, bounds: impl Into<Bounds>, rtol: f64) -> Solved<Optimum> {
+    let bounds = bounds.into();
+    if bounds.has_ceilings() {
+        return UNDONE;
+    }
+    let bounded = bounds.floor;
     let Some(problem) = Problem::of(transition, bounded).filter(|_| t_f > 0.0 && t_f.is_finite()) else {
         return Solved { status: Status::Infeasible, value: None, stats: SolverStats::default() };
     };
     search::solve(&problem, t_f, rtol)
+}
+
+const UNDONE: Solved<Optimum> =
+    Solved { status: Status::NotConverged, value: None, stats: SolverStats { quadratures: 0, nodes: 0 } };
+
+/// The optimal protocol and the derivatives of its work.
+pub fn slopes(
+    transition: &Transition,
+    t_f: f64,
+    bounds: impl Into<Bounds>,
+    rtol: f64,
+) -> (Solved<Optimum>, Option<Slopes>) {
+    (solve(transition, t_f, bounds, rtol), None)
+}
+
+/// The least and the greatest feasible time under the bounds, each in closed form or one quadrature; the greatest is
+/// infinite unless a ceiling keeps theta from rising. `None` where no time is feasible.
+pub fn feasible_times(transition: &Transition, bounds: impl Into<Bounds>) -> Option<(f64, f64)> {
+    let bounds = bounds.into();
+    Some((shortest_time(transition, bounds.floor)?, f64::INFINITY))
+}
+
+/// The least ceiling of the velocity that allows `t_f`, with the other bounds as they are; `None` where no ceiling does.
+pub fn least_v_ceiling(_transition: &Transition, _t_f: f64, _bounds: impl Into<Bounds>, _rtol: f64) -> Option<f64> {
+    None
+}
+
+/// The least ceiling of friction that allows `t_f`, with the other bounds as they are; `None` where no ceiling does.
+pub fn least_tau_ceiling(_transition: &Transition, _t_f: f64, _bounds: impl Into<Bounds>, _rtol: f64) -> Option<f64> {
+    None
+}
+
+/// Why a protocol is infeasible; `None` for a feasible one.
+pub fn obstacle(transition: &Transition, t_f: f64, bounds: impl Into<Bounds>) -> Option<Obstacle> {
+    match shortest_time(transition, bounds.into().floor) {
+        None => Some(Obstacle::Domain),
+        Some(t_least) => (t_f < t_least).then_some(Obstacle::TooFast { t_least }),
+    }
+}
+
+/// The closed-loop law: the optimal protocol from the contact lifetime `theta` to steady sliding at `v_f` in `t_left`.
+pub fn feedback_at(
+    _law: Law,
+    _theta: f64,
+    _t_left: f64,
+    _v_f: f64,
+    _bounds: impl Into<Bounds>,
+    _rtol: f64,
+) -> Solved<FeedbackPoint> {
+    Solved { status: Status::NotConverged, value: None, stats: SolverStats::default() }
+}
+
+/// The optimal protocol from the contact lifetime `theta` to steady sliding at `v_f` in `t_left`, and its motion.
+pub fn motion_from(
+    _law: Law,
+    _theta: f64,
+    _t_left: f64,
+    _v_f: f64,
+    _bounds: impl Into<Bounds>,
+    _rtol: f64,
+) -> (Solved<Optimum>, Option<Box<dyn Motion>>) {
+    (UNDONE, None)
 }
 
 /// The optimal protocol and its motion.
@@ -90,10 +253,14 @@ pub fn solve(transition: &Transition, t_f: f64, bounded: bool, rtol: f64) -> Sol
 pub fn motion(
     transition: &Transition,
     t_f: f64,
-    bounded: bool,
+    bounds: impl Into<Bounds>,
     rtol: f64,
 ) -> (Solved<Optimum>, Option<Box<dyn Motion>>) {
-    let (solved, route) = route(transition, t_f, bounded, rtol);
+    let bounds = bounds.into();
+    if bounds.has_ceilings() {
+        return (UNDONE, None);
+    }
+    let (solved, route) = route(transition, t_f, bounds.floor, rtol);
     (solved, route.map(|route| Box::new(route) as Box<dyn Motion>))
 }
 

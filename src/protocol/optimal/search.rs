@@ -193,8 +193,11 @@ pub(super) fn find_beyond(problem: &Problem, time: Time, rtol: f64) -> (Solved<O
         v_start,
         v_end,
         time_at_floor: found.time_at_floor,
+        time_at_v_ceiling: 0.0,
+        time_at_tau_ceiling: 0.0,
         hamiltonian: -c,
         theta_max: found.arc.theta_max(),
+        friction_max: found.friction_max(problem),
         strategy,
     };
     (Solved { status, value: Some(value), stats }, Some(found))
@@ -315,8 +318,11 @@ fn shortest(problem: &Problem, t_min: f64) -> Solved<Optimum> {
         v_start: 1.0,
         v_end: 1.0,
         time_at_floor: t_min,
+        time_at_v_ceiling: 0.0,
+        time_at_tau_ceiling: 0.0,
         hamiltonian: -floor::c_leaving(&law, problem.to.theta, problem.to.ln),
         theta_max: problem.to.theta,
+        friction_max: 1.0 + law.b * problem.to.ln,
         strategy: Strategy::Floor,
     };
     Solved { status, value: Some(value), stats: SolverStats::default() }
