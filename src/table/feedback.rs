@@ -51,7 +51,8 @@ pub static FEEDBACK: Definition = Definition {
 fn compute(job: &Job<'_>, range: Range<u64>, buffer: &mut ColumnBuffer) -> Result<RunStats, Stopped> {
     rows::each(job, range, 64, buffer, &FIELDS, |_, point| {
         let law = Law { a: point[Quantity::A], b: point[Quantity::B] };
-        let [theta, t_left, v_f] = [Quantity::Theta, Quantity::TimeLeft, Quantity::FinalVelocity].map(|axis| point[axis]);
+        let [theta, t_left, v_f] =
+            [Quantity::Theta, Quantity::TimeLeft, Quantity::FinalVelocity].map(|axis| point[axis]);
         let solved = optimal::feedback_at(law, theta, t_left, v_f, with_ceilings(job, point), job.rtol);
         (solved.status, solved.value, RunStats { own_optima: 1, ..RunStats::from(solved.stats) })
     })

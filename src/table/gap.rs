@@ -338,7 +338,7 @@ fn prepare(job: &Job<'_>, group: &Group, point: &Point, work: &mut RunStats) -> 
         let (solved, spent) = job.optimum_cache.get(group.tuple, point);
         *work += spent;
         if let Some(optimum) = solved.value.filter(|_| job.projection.has(GAP_ERROR)) {
-            error_optimal = work_error(job, point, &without_ceilings(job), &optimum, work);
+            error_optimal = work_error(point, &without_ceilings(job), &optimum, work);
         }
         (solved.status, solved.value.map(|optimum| optimum.work))
     });

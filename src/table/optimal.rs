@@ -186,7 +186,7 @@ fn compute(job: &Job<'_>, range: Range<u64>, buffer: &mut ColumnBuffer) -> Resul
         };
         let mut row = Row { optimum: solved.value, slopes, ..least(job, point, &bounds, &solved) };
         if let Some(optimum) = row.optimum.filter(|_| job.projection.has(WORK_ERROR)) {
-            row.work_error = work_error(job, point, &bounds, &optimum, &mut work);
+            row.work_error = work_error(point, &bounds, &optimum, &mut work);
         }
         (solved.status, Some(row), work)
     })
@@ -198,16 +198,12 @@ fn least(job: &Job<'_>, point: &Point, bounds: &Bounds, solved: &Solved<Optimum>
     let wanted = |column: usize| job.projection.has(column).then_some(());
     let is_infeasible = solved.status == Status::Infeasible;
     Row {
-        t_least: wanted(T_LEAST)
-            .and_then(|()| optimal::feasible_times(&transition, bounds))
-            .map(|(least, _)| least),
+        t_least: wanted(T_LEAST).and_then(|()| optimal::feasible_times(&transition, bounds)).map(|(least, _)| least),
         v_ceiling_least: wanted(V_CEILING_LEAST)
             .and_then(|()| optimal::least_v_ceiling(&transition, t_f, bounds, rtol)),
         tau_ceiling_least: wanted(TAU_CEILING_LEAST)
             .and_then(|()| optimal::least_tau_ceiling(&transition, t_f, bounds, rtol)),
-        obstacle: wanted(BOUND)
-            .filter(|()| is_infeasible)
-            .and_then(|()| optimal::obstacle(&transition, t_f, bounds)),
+        obstacle: wanted(BOUND).filter(|()| is_infeasible).and_then(|()| optimal::obstacle(&transition, t_f, bounds)),
         ..Row::default()
     }
 }

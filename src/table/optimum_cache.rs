@@ -42,12 +42,7 @@ pub fn slopes(job: &Job<'_>, point: &Point, bounds: &Bounds, work: &mut RunStats
 
 /// The optimal protocol of `point` under `bounds`: from the cache if there is no ceiling, since the tables share those. `point` has tuple
 /// number `tuple`. Adds the solver statistics to `work`.
-pub fn optimum(
-    job: &Job<'_>,
-    (tuple, point): (u64, &Point),
-    bounds: &Bounds,
-    work: &mut RunStats,
-) -> Solved<Optimum> {
+pub fn optimum(job: &Job<'_>, (tuple, point): (u64, &Point), bounds: &Bounds, work: &mut RunStats) -> Solved<Optimum> {
     if !bounds.has_ceilings() {
         let (solved, spent) = job.optimum_cache.get(tuple, point);
         *work += spent;
@@ -59,7 +54,7 @@ pub fn optimum(
 }
 
 /// Error bound of the optimal work at `point`, from a second solve; NaN if that finds no optimum. Adds the solver statistics to `work`.
-pub fn work_error(job: &Job<'_>, point: &Point, bounds: &Bounds, optimum: &Optimum, work: &mut RunStats) -> f64 {
+pub fn work_error(point: &Point, bounds: &Bounds, optimum: &Optimum, work: &mut RunStats) -> f64 {
     let (bound, stats) = error::of_optimum(&transition(point), point[Quantity::Time], bounds, optimum);
     *work += RunStats { optima: 1, ..RunStats::from(stats) };
     bound.unwrap_or(f64::NAN)
@@ -96,7 +91,7 @@ pub fn compare(
     let status = if optimum.status == Status::Infeasible { Status::Ok } else { optimum.status };
     let Some(least) = optimum.value else { return Comparison { optimum: status, ..Comparison::NONE } };
     let gap_error = if wanted {
-        error::of_gap((work_s, error), (least.work, work_error(job, row.1, bounds, &least, work)))
+        error::of_gap((work_s, error), (least.work, work_error(row.1, bounds, &least, work)))
     } else {
         f64::NAN
     };

@@ -171,8 +171,11 @@ impl MemberCache {
 }
 
 fn solve(job: &Job<'_>, family: &dyn Family, point: &Point, work: &mut RunStats) -> Solution {
-    let case =
-        Case { transition: transition(point), t_f: point[Quantity::Time], tau_ceiling: point[Quantity::FrictionCeiling] };
+    let case = Case {
+        transition: transition(point),
+        t_f: point[Quantity::Time],
+        tau_ceiling: point[Quantity::FrictionCeiling],
+    };
     let t_min = case.transition.min_duration();
     if job.bounded && case.t_f < t_min {
         return Err(Obstacle::Time { t_min });

@@ -106,9 +106,8 @@ pub(super) fn open_loop(
             let rates = radau().slopes(&std::array::from_fn(|j| moments[j].t - t));
             let powers: Nodes = std::array::from_fn(|j| moments[j].v * rates[j]);
             let slips = radau().integrals(&powers);
-            let costs = std::array::from_fn(|j| {
-                b * ln_1p(difference * exp(-(slip + slips[j])) / moments[j].theta) * powers[j]
-            });
+            let costs =
+                std::array::from_fn(|j| b * ln_1p(difference * exp(-(slip + slips[j])) / moments[j].theta) * powers[j]);
             excess += radau().integrals(&costs)[NODES - 1];
             pieces.push(Piece { start, length, slip, slips });
             slip += slips[NODES - 1];

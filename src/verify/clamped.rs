@@ -3,7 +3,7 @@
 
 use super::extremal::branch;
 use super::route::integrate;
-use crate::model::Law;
+use crate::model::{Law, Transition};
 
 /// The way from one state variable to steady sliding at another, under bounds.
 #[derive(Debug, Clone, Copy)]
@@ -41,6 +41,8 @@ pub struct Totals {
     pub friction: [f64; 2],
     /// Derivatives of the work with respect to theta at the start and at the end.
     pub costate: [f64; 2],
+    /// Whether the start is on the friction ceiling.
+    pub on_friction_ceiling: bool,
     /// `dW*/dt_f` with the opposite sign.
     pub c: f64,
 }
@@ -57,6 +59,9 @@ struct Leg {
 /// Relative distance of a velocity from a bound that is rounding.
 const ON_BOUND: f64 = 1e-12;
 
+/// Relative distance from a border of what is feasible below which rounding decides.
+const UNSURE: f64 = 1e-11;
+
 /// Relative change of `z` of the protocols that try to beat the optimum.
 const VARIATION: f64 = 1e-3;
 
@@ -64,6 +69,12 @@ const VARIATION: f64 = 1e-3;
 const SUMS: usize = 11;
 
 impl Way {
+    /// The way of a transition, with ceilings of velocity and friction.
+    pub fn of(problem: &Transition, floor: bool, [v_ceiling, tau_ceiling]: [f64; 2]) -> Way {
+        let Transition { law, v_i, v_f } = *problem;
+        Way { law, from: 1.0 / v_i, to: 1.0 / v_f, floor, v_ceiling, tau_ceiling }
+    }
+
     fn steady_friction(&self, l: f64) -> f64 {
         1.0 + (self.law.b - self.law.a) * l
     }
@@ -73,15 +84,42 @@ impl Way {
         (self.v_ceiling.ln() + l).min((self.tau_ceiling - self.steady_friction(l)) / self.law.a)
     }
 
-    /// The time from start to end on the ceilings throughout; infinite if theta cannot move so everywhere.
-    pub fn time_on_ceilings(&self) -> f64 {
+    /// Whether the ceilings leave steady sliding at the end, and nothing above its theta.
+    pub fn sits(&self) -> bool {
+        self.to >= self.from && self.cap(self.to.ln()) == 0.0
+    }
+
+    /// Whether there is a protocol of duration `t_f`; `None` where rounding decides.
+    pub fn feasible(&self, t_f: f64) -> Option<bool> {
         let (start, end) = (self.from.ln(), self.to.ln());
-        let sign = if end < start { 1.0 } else { -1.0 };
-        if [start, end].into_iter().any(|l| sign * self.cap(l) <= 0.0) {
-            return f64::INFINITY;
+        let (caps, clear) = ([start, end].map(|l| self.cap(l)), |room: f64, size: f64| {
+            (room.abs() > UNSURE * size).then_some(room > 0.0)
+        });
+        if self.to == self.from {
+            return Some(caps[1] >= 0.0);
         }
-        let slope = |y: &[f64; 2]| [1.0, -y[0].exp() / self.cap(y[0]).exp_m1()];
-        integrate(slope, [start, 0.0], (start, end)).map_or(f64::INFINITY, |y| y[1])
+        let on_ceilings = || {
+            let slope = |y: &[f64; 2]| [1.0, -y[0].exp() / self.cap(y[0]).exp_m1()];
+            integrate(slope, [start, 0.0], (start, end)).map(|y| y[1])
+        };
+        if self.to < self.from {
+            if caps.into_iter().any(|cap| cap <= 0.0) {
+                return Some(false);
+            }
+            return clear(t_f - on_ceilings()?, t_f);
+        }
+        let (aged, slow) = if self.floor {
+            (((self.to - self.from) / (1.0 - self.to)).ln_1p(), 1.0 + self.law.b * end)
+        } else {
+            (self.to - self.from, f64::NEG_INFINITY)
+        };
+        if !clear(t_f - aged, t_f)? || !clear(self.tau_ceiling - slow, 1.0)? {
+            return Some(false);
+        }
+        // Above theta_1 theta can wait or turn; below it only where the ceilings leave steady sliding.
+        let waits =
+            (0..=PLACES).any(|place| self.cap(start + (end - start) * f64::from(place) / f64::from(PLACES)) > 0.0);
+        if caps[1] >= 0.0 || waits { Some(true) } else { clear(on_ceilings()? - t_f, t_f) }
     }
 
     /// `e^z - 1 - z` of the free minimiser, relative to the turn if there is one.
@@ -136,6 +174,8 @@ impl Way {
         let (first, last) = (legs[0], legs[legs.len() - 1]);
         let at = |leg: &Leg, l: f64| self.clamped(l, self.energy(l, c, leg.turn), leg.end < leg.start, 0.0);
         let ends = [(&first, start), (&last, end)].map(|(leg, l)| (at(leg, l), l));
+        let (z, l) = ends[0];
+        all.on_friction_ceiling = z == (self.tau_ceiling - self.steady_friction(l)) / self.law.a;
         [all.v_start, all.v_end] = ends.map(|(z, l)| (z - l).exp());
         all.costate = ends.map(|(z, l)| {
             let friction = self.steady_friction(l) + self.law.a * z;
