@@ -111,8 +111,7 @@ const FIELDS: [Field<Row>; 22] = [
         Column::new(
             "bound",
             Kind::Label(OBSTACLES),
-            "the bound that makes the row infeasible: too_fast t_f < t_least, too_slow t_f too long above v_ceiling < v_f or \
-             a low tau_ceiling, v_ceiling or tau_ceiling too low for any t_f",
+            "the bound that makes the row infeasible; too_fast: t_f < t_least, too_slow: theta cannot wait so long",
         )
         .optional(),
         |row| number(row.obstacle.map(|obstacle| code(obstacle) as f64)),
