@@ -126,14 +126,20 @@ impl Way {
     fn energy(&self, l: f64, c: f64, turn: Option<f64>) -> f64 {
         let Law { a, b } = self.law;
         match turn {
-            Some(turn) => ((b - a) * (l - turn) - self.steady_friction(turn) * (l - turn).exp_m1()) / a,
+            Some(turn) => self.energy_beyond(turn, l - turn),
             None => (self.steady_friction(l) + c * l.exp()) / a,
         }
     }
 
+    /// The same at `ln theta = turn + beyond`, without cancellation near the turn.
+    fn energy_beyond(&self, turn: f64, beyond: f64) -> f64 {
+        let Law { a, b } = self.law;
+        ((b - a) * beyond - self.steady_friction(turn) * beyond.exp_m1()) / a
+    }
+
     /// The clamped minimiser at `ln theta = l`, off by the fraction `off`.
     fn clamped(&self, l: f64, energy: f64, falls: bool, off: f64) -> f64 {
-        let free = branch(energy.max(0.0), falls).unwrap_or(0.0) * (1.0 + off);
+        let free = free(energy, falls) * (1.0 + off);
         let lifted = if self.floor && !falls { free.max(l) } else { free };
         lifted.min(self.cap(l))
     }
@@ -188,14 +194,14 @@ impl Way {
     fn add(&self, leg: &Leg, all: &mut Totals) -> Option<()> {
         let c = all.c;
         let falls = leg.end < leg.start;
-        let rates = |l: f64| self.rates(l, self.energy(l, c, leg.turn), falls, c);
         let sums = match leg.turn {
             // theta = theta_h/(1 + X^2): the integrand is regular at the turn.
             Some(turn) => {
                 let far = (turn - leg.start.min(leg.end)).exp_m1().sqrt();
                 let slope = |y: &[f64; SUMS]| {
                     let x = y[0].max(1e-9 * far);
-                    let rates = rates(turn - (x * x).ln_1p());
+                    let beyond = -(x * x).ln_1p();
+                    let rates = self.rates(turn + beyond, self.energy_beyond(turn, beyond), falls, c);
                     let mut slope = rates.map(|rate| rate * 2.0 * x / (1.0 + x * x));
                     slope[0] = 1.0;
                     slope
@@ -206,7 +212,7 @@ impl Way {
                 let (low, high) = (leg.start.min(leg.end), leg.start.max(leg.end));
                 let mut from = [0.0; SUMS];
                 from[0] = low;
-                integrate(|y: &[f64; SUMS]| rates(y[0]), from, (low, high))?
+                integrate(|y: &[f64; SUMS]| self.rates(y[0], self.energy(y[0], c, None), falls, c), from, (low, high))?
             }
         };
         let [_, time, work, floor, at_v, at_tau, by_v, by_tau, by_a, by_b, varied] = sums;
@@ -235,7 +241,7 @@ impl Way {
         let dt = l.exp() / slope.abs();
         let friction = self.steady_friction(l) + a * z;
         let on = |bound: f64| if (z - bound).abs() <= ON_BOUND * (1.0 + bound.abs()) { 1.0 } else { 0.0 };
-        let free = branch(energy.max(0.0), falls).unwrap_or(0.0);
+        let free = free(energy, falls);
         let caps = [self.v_ceiling.ln() + l, (self.tau_ceiling - self.steady_friction(l)) / a];
         let is_capped = z < free;
         let [at_v, at_tau] = caps.map(|cap| if is_capped && z == cap { 1.0 } else { 0.0 });
@@ -280,8 +286,48 @@ impl Way {
     }
 }
 
+/// The free minimiser `z`; near a turn the first terms of its series in `w`, where `e^z - 1 - z = w^2/2`.
+fn free(energy: f64, falls: bool) -> f64 {
+    if energy >= SMALL_ENERGY {
+        return branch(energy, falls).unwrap_or(0.0);
+    }
+    let root = (2.0 * energy.max(0.0)).sqrt();
+    let w = if falls { root } else { -root };
+    w * (1.0 - w / 6.0 * (1.0 - w / 6.0 * (1.0 - w * 2.0 / 15.0)))
+}
+
+/// Energy below which the next term of the series, `w^5/4320`, is a rounding.
+const SMALL_ENERGY: f64 = 1e-7;
+
 /// Places on a leg at which friction is looked at.
 const PLACES: u32 = 4000;
 
 /// Steps of Newton's method: the row's own `C` is within a few of them.
 const NEWTON_STEPS: u32 = 6;
+
+#[cfg(test)]
+mod tests {
+    //! Protocols of known `C`, with work by a 40-digit quadrature of another program.
+
+    use super::*;
+
+    #[test]
+    fn reference_totals_of_a_known_c() {
+        let paper = Law { a: 0.03, b: 0.05 };
+        let way = |law, v_i: f64, v_f: f64, ceilings| Way::of(&Transition { law, v_i, v_f }, true, ceilings);
+        let none = f64::INFINITY;
+        let cases = [
+            (way(paper, 3.0, 100.0, [1000.0, none]), -2.55860702801, false, 0.02, 3.82172461194),
+            (way(paper, 3.0, 100.0, [none, 1.05]), -2.30742868597, false, 0.02, 3.80883954761),
+            (way(paper, 3.0, 100.0, [400.0, 1.04]), -2.79363404017, true, 0.08, 4.09134444436),
+            (way(paper, 100.0, 3.0, [4.5, none]), -2.28801277001, true, 0.7, 1.15046557999),
+            (way(paper, 100.0, 3.0, [none, 0.965]), -3.52153861668, false, 0.5, 0.695391959139),
+            (way(Law { a: 0.05, b: 0.02 }, 3.0, 100.0, [none, 1.36]), 117.191032104, false, 0.0012, 4.74738331205),
+        ];
+        for (way, c, turns, t_f, work) in cases {
+            let found = way.totals(c, turns).expect("the integrator gets there");
+            assert!((found.time / t_f - 1.0).abs() < 1e-9, "{way:?}: {}", found.time);
+            assert!((found.work / work - 1.0).abs() < 1e-9, "{way:?}: {}", found.work);
+        }
+    }
+}
