@@ -124,7 +124,7 @@ impl Way {
 
     /// `e^z - 1 - z` of the free minimiser, relative to the turn if there is one.
     fn energy(&self, l: f64, c: f64, turn: Option<f64>) -> f64 {
-        let Law { a, b } = self.law;
+        let Law { a, .. } = self.law;
         match turn {
             Some(turn) => self.energy_beyond(turn, l - turn),
             None => (self.steady_friction(l) + c * l.exp()) / a,
