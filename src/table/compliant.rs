@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use super::column::fields;
 use super::memo::Memo;
-use super::optimum_cache::{self, Comparison, transition};
+use super::optimum_cache::{self, Comparison, transition, without_ceilings};
 use super::{ColumnBuffer, Definition, Job, Projection, RunStats, Stopped, number, place, rows};
 use crate::grid::{Point, Quantity};
 use crate::protocol::compliant::{self, Compliant as Member};
@@ -93,7 +93,8 @@ fn compute(job: &Job<'_>, range: Range<u64>, buffer: &mut ColumnBuffer) -> Resul
         let mut least = Comparison::NONE;
         if needs_optimum(job.projection) {
             let bounded = job.projection.has(GAP_ERROR);
-            least = optimum_cache::compare(job, (tuple, point), (member.work, work_error), bounded, &mut work);
+            let works = (member.work, work_error);
+            least = optimum_cache::compare(job, (tuple, point), &without_ceilings(job), works, bounded, &mut work);
             status = status.compared_with(least.optimum);
         }
         let (slider, t_f, dt) = (slider(point), point[Quantity::Time], point[Quantity::Sampling]);

@@ -6,6 +6,7 @@ mod column_buffer;
 mod compliant;
 mod crossover;
 mod failpoint;
+mod feedback;
 mod gap;
 mod memo;
 mod optimal;
@@ -133,10 +134,11 @@ pub struct Prediction {
 }
 
 /// Every table, in the order of listings. A new table needs a file and a line here.
-pub const ALL: [&dyn Table; 9] = [
+pub const ALL: [&dyn Table; 10] = [
     &gap::GAP,
     &best_cubic::BEST_CUBIC,
     &optimal::OPTIMAL,
+    &feedback::FEEDBACK,
     &crossover::CROSSOVER,
     &shortcut::SHORTCUT,
     &stability::STABILITY,
