@@ -1,8 +1,10 @@
 //! A dataset audited: a sample of its rows checked by the equations that their protocols obey, or solved by a second route.
 
 mod best_cubic;
+mod clamped;
 mod compliant;
 mod crossover;
+mod feedback;
 mod gap;
 mod hopf;
 mod motion;
@@ -104,6 +106,7 @@ pub fn verify(path: &Path, manifest: &Manifest, sample: u64, seed: u64) -> Resul
             let verdict = match table.name.as_str() {
                 "gap" => gap::check(&row, &context),
                 "optimal" => optimal::check(&row, &context, rtol),
+                "feedback" => feedback::check(&row, &context),
                 "crossover" => crossover::check(&row, &context),
                 "best_cubic" => best_cubic::check(&row, &context, rtol),
                 "shortcut" => shortcut::check(&row, &context, rtol),
