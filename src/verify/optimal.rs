@@ -47,7 +47,8 @@ pub fn certify(verdict: &mut Verdict, problem: &Transition, t_f: f64, bounds: im
     let mut conserved: Vec<(f64, f64)> = Vec::new();
     let proven = matches!(solved.status, Status::Ok | Status::BelowBound);
     let mut wrong = 0.0f64;
-    let near = |value: f64, ceiling: f64| (value - ceiling).abs() <= AT_CEILING * (1.0 + ceiling.abs());
+    let near =
+        |value: f64, ceiling: f64| ceiling.is_finite() && (value - ceiling).abs() <= AT_CEILING * (1.0 + ceiling.abs());
     for &(_, Moment { v, theta, friction, beta, .. }) in &motion.samples {
         let press = friction + law.a;
         let at_floor = bounds.floor && v == 1.0;
