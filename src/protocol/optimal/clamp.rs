@@ -5,7 +5,7 @@
 
 use super::ArcKind;
 use super::arc::{Arc, Chart, Sums, phi, phi_and_slope};
-use super::ceiling::{CeilingArc, CeilingSums, Ceilings};
+use super::ceiling::{CeilingArc, Ceilings};
 use super::extremal::{Extremal, FreeSums, Problem};
 use super::lifetime::Lifetime;
 use crate::model::Law;
@@ -104,10 +104,12 @@ impl Fall {
             } else {
                 value / (phi_slope - energy_slope)
             };
-            if step.abs() <= RESOLUTION * d {
+            let next = d - step;
+            // Newton's method squares the relative error.
+            if step.abs() <= STEP * d {
+                d = next.max(from).min(to);
                 break;
             }
-            let next = d - step;
             d = if next > from && next < to { next } else { 0.5 * (from + to) };
         }
         breaks.add(d);
@@ -117,8 +119,8 @@ impl Fall {
 /// More steps than Newton's method takes.
 const MOST_STEPS: u32 = 100;
 
-/// Relative resolution of a depth.
-const RESOLUTION: f64 = 4e-16;
+/// Relative step after which the next one is rounding.
+const STEP: f64 = 1e-9;
 
 /// Depths at which pieces end, in any order.
 struct Breaks {
@@ -204,7 +206,7 @@ pub(super) struct Path {
 pub(super) struct PathSums {
     /// Time at the floor and all pieces.
     pub time: f64,
-    /// Without the time at the floor.
+    /// Of the free pieces.
     pub work: f64,
     /// Derivative of the time with respect to the parameter of the family.
     pub rate: f64,
@@ -341,17 +343,23 @@ impl Path {
                     free.at_end |= at[1];
                     free.swing += swing;
                 }
-                Piece::Ceiling { arc, .. } => {
-                    let CeilingSums { time, work, nodes, .. } = arc.sums(None);
-                    found.time += time;
-                    found.work += work;
-                    found.nodes += nodes;
-                }
+                Piece::Ceiling { arc, .. } => found.time += arc.time(),
             }
         }
         let rate = self.extremal.rate_of(&free);
         found.rate = self.rate.unwrap_or(rate);
         (found.time.is_finite() && found.work.is_finite()).then_some(found)
+    }
+
+    /// Work on the ceilings, and the nodes that it takes.
+    pub fn ceiling_work(&self) -> (f64, u32) {
+        self.pieces().fold((0.0, 0), |(work, nodes), piece| match piece {
+            Piece::Free { .. } => (work, nodes),
+            Piece::Ceiling { arc, .. } => {
+                let sums = arc.sums(None);
+                (work + sums.work, nodes + sums.nodes)
+            }
+        })
     }
 
     /// Times on the ceilings of the velocity and of friction.

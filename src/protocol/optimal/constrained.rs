@@ -87,10 +87,10 @@ impl Constrained {
 /// Solves `problem` in `time` under the ceilings.
 pub(super) fn find(problem: &Problem, ceilings: &Ceilings, time: Time, rtol: f64) -> Constrained {
     let (free, member) = search::find_beyond(problem, time, rtol);
-    if let Some(optimum) = free.value
-        && optimum.v_start.max(optimum.v_end) <= ceilings.v
-        && optimum.friction_max <= ceilings.tau
-    {
+    let none = ceilings.v == f64::INFINITY && ceilings.tau == f64::INFINITY;
+    let obeys =
+        |optimum: Optimum| optimum.v_start.max(optimum.v_end) <= ceilings.v && optimum.friction_max <= ceilings.tau;
+    if none || free.value.is_some_and(obeys) {
         let path = member.map(|member| {
             let mut path = Path::new(member.extremal);
             path.push(whole(problem, &member.extremal));
@@ -105,9 +105,13 @@ pub(super) fn find(problem: &Problem, ceilings: &Ceilings, time: Time, rtol: f64
     let t_f = time.whole;
     match feasible(problem, ceilings) {
         Feasible::Never(_) => Constrained::without_numbers(Status::Infeasible, stats),
-        Feasible::Sitting(_) => sitting(problem, ceilings, t_f, rtol, stats),
         Feasible::Times(least, most) if t_f < least || t_f > most => {
             Constrained::without_numbers(Status::Infeasible, stats)
+        }
+        Feasible::Sitting(_) => sitting(problem, ceilings, t_f, rtol, stats),
+        // Without ceilings an extremal falls below the floor: friction is too low for the family to be ordered.
+        _ if free.value.is_none() && free.status == Status::Unproven => {
+            Constrained::without_numbers(Status::Unproven, stats)
         }
         Feasible::Times(least, most) => {
             let search = Search { problem, ceilings, t_f, least, most, rtol, stats };
@@ -369,8 +373,10 @@ impl Search<'_> {
             return Constrained::without_numbers(status, stats);
         };
         let (c_probed, c) = (probed.extremal.arc.c(), path.extremal.arc.c());
-        let work = floor::work(&problem.law, problem.from, probed.extremal.time_at_floor) + sums.work
-            - 0.5 * (c_probed + c) * (t_f - sums.time);
+        let (ceiling_work, nodes) = probed.ceiling_work();
+        self.stats.nodes += nodes;
+        let held_work = floor::work(&problem.law, problem.from, probed.extremal.time_at_floor);
+        let work = held_work + sums.work + ceiling_work - 0.5 * (c_probed + c) * (t_f - sums.time);
         let solved = self.read(&path, work, sums.friction_min);
         Constrained { solved, path: solved.value.map(|_| path), sitting: 0.0 }
     }
