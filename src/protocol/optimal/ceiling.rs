@@ -5,7 +5,7 @@
 
 use multiversion::multiversion;
 
-use super::clamp::Gap;
+use super::clamp::{Depth, Gap};
 use super::lifetime::Lifetime;
 use super::{ArcKind, Bounds};
 use crate::model::Law;
@@ -118,8 +118,8 @@ pub(super) struct CeilingSums {
     pub time: f64,
     /// Work of friction.
     pub work: f64,
-    /// Slip, `int v dt`.
-    pub slip: f64,
+    /// `int v ln v dt`.
+    pub creep: f64,
     /// `int v ln theta dt`.
     pub state: f64,
     /// Integral of the multiplier.
@@ -133,8 +133,7 @@ pub(super) struct CeilingSums {
 
 /// Place and weight of a node on a ceiling.
 struct CeilingNode {
-    /// `ln(theta_hi/theta)`.
-    depth: f64,
+    depth: Depth,
     z: f64,
     /// Its weight in time.
     dt: f64,
@@ -149,6 +148,11 @@ impl CeilingArc {
     /// `d ln u/d ln theta`.
     pub fn rise(&self) -> f64 {
         if self.kind == ArcKind::VCeiling { 1.0 } else { self.ceilings.kappa }
+    }
+
+    /// The end of greater or of smaller theta.
+    pub fn end(&self, high: bool) -> Depth {
+        if high { Depth { below: 0.0, above: self.length } } else { Depth { below: self.length, above: 0.0 } }
     }
 
     /// Duration.
@@ -184,7 +188,8 @@ impl CeilingArc {
             let (x_lo, v) = (exp_m1(self.z_lo), self.ceilings.v);
             chart.nodes(|s, weight| {
                 let z = ln_1p(x_lo * exp(s));
-                node(&CeilingNode { depth: self.z_hi - z, z, dt: weight.abs() / v });
+                let depth = Depth { below: self.z_hi - z, above: z - self.z_lo };
+                node(&CeilingNode { depth, z, dt: weight.abs() / v });
             });
             return 0.0;
         }
@@ -192,29 +197,30 @@ impl CeilingArc {
         for chart in line.charts(self) {
             chart.nodes(|at, weight| {
                 let (s, size, scale) = line.place(chart.near, at);
-                let depth = if line.high_first { s } else { self.length - s };
-                let z = line.sign * size;
-                node(&CeilingNode { depth, z, dt: self.theta_hi * exp(-depth) * weight * scale / exp_m1(z).abs() });
+                let (near, far) = (s, self.length - s);
+                let (below, above) = if line.high_first { (near, far) } else { (far, near) };
+                let (depth, z) = (Depth { below, above }, line.sign * size);
+                node(&CeilingNode { depth, z, dt: self.theta_hi * exp(-below) * weight * scale / exp_m1(z).abs() });
             });
         }
         line.lingered
     }
 
-    /// Time, work and slip; the prices as well if `G` is given.
+    /// Time, work and its parts; the prices as well if `G` is given.
     pub fn sums(&self, gap: Option<&Gap>) -> CeilingSums {
         let ln_theta_hi = ln(self.theta_hi);
         let Law { a, b } = self.ceilings.law;
         let mut sums = CeilingSums::default();
         let of_v = self.kind == ArcKind::VCeiling;
         let lingered = self.visit(|&CeilingNode { depth, z, dt }| {
-            let ln_theta = ln_theta_hi - depth;
+            let ln_theta = ln_theta_hi - depth.below;
             let (u, excess) = exp_and_m1(z);
             let v = if of_v { self.ceilings.v } else { u * exp(-ln_theta) };
             let ln_v = z - ln_theta;
             let friction = if of_v { 1.0 + a * ln_v + b * ln_theta } else { self.ceilings.tau };
             sums.time += dt;
-            sums.slip += v * dt;
             sums.work += friction * v * dt;
+            sums.creep += v * ln_v * dt;
             sums.state += v * ln_theta * dt;
             sums.nodes += 1;
             if let Some(gap) = gap {
@@ -227,12 +233,12 @@ impl CeilingArc {
         });
         if lingered > 0.0 {
             // Steady sliding on the ceiling, at one lifetime, where G/(u - 1) has a limit.
-            let depth = if self.z_hi.abs() <= self.z_lo.abs() { 0.0 } else { self.length };
-            let ln_theta = ln_theta_hi - depth;
+            let depth = self.end(self.z_hi.abs() <= self.z_lo.abs());
+            let ln_theta = ln_theta_hi - depth.below;
             let slip = lingered * exp(-ln_theta);
             sums.time += lingered;
-            sums.slip += slip;
             sums.work += self.ceilings.tau * slip;
+            sums.creep -= ln_theta * slip;
             sums.state += ln_theta * slip;
             if let Some(gap) = gap {
                 let price = (b - a + gap.pull(depth)) / (a * self.ceilings.kappa) * slip;

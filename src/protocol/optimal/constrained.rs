@@ -319,10 +319,10 @@ impl Search<'_> {
         let room = beyond.min(left);
         let doubt = 4.0 * f64::EPSILON * t_f / room;
         let accuracy = Accuracy::new(rtol, doubt, problem.law.a);
-        let tolerance = (accuracy.exact * (room / t_f).min(1.0)).max(FINEST);
+        let mut tolerance = (accuracy.exact * (room / t_f).min(1.0)).max(FINEST);
         let sign = if interval.rises { 1.0 } else { -1.0 };
         let mut stats = self.stats;
-        let mut probe = |p: f64| {
+        let mut probe = |p: f64, tolerance: f64| {
             let path = member(p)?;
             let sums = path.sums(tolerance)?;
             stats.quadratures += 1;
@@ -342,23 +342,30 @@ impl Search<'_> {
             };
             Some((path, sums, probe))
         };
-        let enough = ENOUGH + doubt;
+        let mut enough = ENOUGH + doubt;
         let (mut start, mut outcome) = (interval.start, None);
         for _ in 0..MOST_SEARCHES {
             let root = newton_in_pieces(
-                |p| probe(p).map(|(path, _, probe)| (probe, path.signature())),
+                |p| probe(p, tolerance).map(|(path, _, probe)| (probe, path.signature())),
                 start,
                 interval.bracket,
                 interval.rises,
                 enough,
                 accuracy.least.sqrt().min(enough),
             );
-            outcome = root.and_then(|(root, _)| Some((root.x, probe(root.x)?)));
-            match &outcome {
-                // Its step was good, and so is the next.
-                Some((_, (_, _, last))) if last.value.abs() <= 10.0 * enough => break,
-                Some((x, _)) => start = *x,
-                None => break,
+            outcome = root.and_then(|(root, _)| Some((root.x, probe(root.x, tolerance)?)));
+            let Some((x, (path, _, last))) = &outcome else { break };
+            start = *x;
+            // Short arcs on a ceiling change much with the parameter, those at a peak of friction by the square root.
+            let (of_v, of_tau) = path.times();
+            let share = ((of_v + of_tau) / t_f).powi(2);
+            let finer = (tolerance * share).max(FINEST);
+            let good = last.value * last.value <= (SHORT_ENOUGH * rtol * share).max(doubt * doubt);
+            if share >= SHORT && last.value.abs() <= 10.0 * enough || good && finer >= tolerance {
+                break;
+            }
+            if share < SHORT && share > 0.0 {
+                (tolerance, enough) = (finer.min(tolerance), (SHORT_ENOUGH * rtol * share).sqrt().max(doubt));
             }
         }
         let found = outcome.filter(|(_, (_, _, last))| last.value.abs() <= JUMP.max(10.0 * enough));
@@ -451,6 +458,12 @@ fn lifetime(ln_theta: f64) -> Lifetime {
 
 /// A relative difference of times from which Newton's method leaves rounding in two steps.
 const ENOUGH: f64 = 1e-4;
+
+/// Square of the fraction of the time that short arcs on a ceiling take, at most.
+const SHORT: f64 = 0.01;
+
+/// Square of the value that a search for them may leave, in units of the accuracy.
+const SHORT_ENOUGH: f64 = 0.01;
 
 /// Searches until the last step is as good as its slope promises.
 const MOST_SEARCHES: u32 = 4;
