@@ -47,11 +47,13 @@ impl Plan {
 impl Sweep {
     /// The job of one of its tables.
     pub fn job<'a>(&'a self, request: &'a Request, optimum_cache: &'a OptimumCache, signal: &'a Signal) -> Job<'a> {
+        let (tuples, axes) = (request.row_index.tuples(OPTIMUM_AXES), request.table.axes());
+        let rows = if axes == OPTIMUM_AXES { tuples.clone() } else { request.row_index.tuples(axes) };
         Job {
             grid: &self.grid,
             rows: &request.row_index,
-            tuples: request.row_index.tuples(OPTIMUM_AXES),
-            repeated_rows: RepeatedRows::among(&request.row_index, request.table.axes()),
+            tuples,
+            repeated_rows: RepeatedRows::among(rows),
             members: request.members.as_ref(),
             projection: &request.projection,
             sizes: &request.sizes,

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use super::column_buffer::RunStats;
 use super::memo::Memo;
-use crate::grid::{Quantity, RowIndex, Tuples};
+use crate::grid::Tuples;
 use crate::protocol::Status;
 
 /// The memo of a table that has several rows with equal values on all axes.
@@ -19,9 +19,8 @@ impl RepeatedRows {
     /// Greatest number of different rows in the memo; larger tables compute every row.
     const MAX_CACHED: u64 = 1 << 18;
 
-    /// The memo of a table over `axes`; `None` if no row repeats.
-    pub fn among(rows: &RowIndex, axes: &[Quantity]) -> Option<RepeatedRows> {
-        let tuples = rows.tuples(axes);
+    /// The memo of a table whose rows have these tuples of axis values; `None` if no row repeats.
+    pub fn among(tuples: Tuples) -> Option<RepeatedRows> {
         let worthwhile = tuples.repeat() && tuples.span() <= Self::MAX_CACHED;
         worthwhile.then(|| RepeatedRows { tuples, rows: Memo::default() })
     }

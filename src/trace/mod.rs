@@ -15,7 +15,7 @@ pub use protocol::{Absence, Parameter, Protocol, TracedPath, names};
 #[cfg(feature = "read")]
 pub use row::{Pathless, TABLES, protocol_of};
 pub use sample::{RANGE_RTOL, VALUE_RTOL};
-pub use write::{csv, parquet};
+pub use write::{csv, parquet, record_batch};
 
 /// The columns of a trace; `v_c` only where the spring is elastic, `beta` only where the protocol is an extremal.
 pub const COLUMNS: [Column; 6] = [
