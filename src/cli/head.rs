@@ -17,9 +17,9 @@ use crate::table;
 pub struct Arguments {
     /// Folder of the dataset, such as results/NAME; or a Parquet or CSV file
     dataset: PathBuf,
-    /// The table; all by default
+    /// Table; all by default
     table: Option<String>,
-    /// Rows to show
+    /// Number of rows
     #[arg(short = 'n', long, value_name = "N", default_value_t = 10)]
     rows: u32,
 }
@@ -35,7 +35,7 @@ struct Head {
     missing: u64,
 }
 
-/// Shows the first rows of one table or of all.
+/// Prints the first rows of one table or of all tables.
 pub fn head(arguments: &Arguments) -> Result<(), Failure> {
     kind::expect_rows(&arguments.dataset)?;
     super::note_at(&arguments.dataset);
@@ -79,6 +79,9 @@ fn heads(arguments: &Arguments) -> Result<Vec<Head>, Failure> {
         let mut rows: Vec<Vec<String>> = Vec::new();
         for path in &paths {
             let wanted = arguments.rows as usize - rows.len();
+            if wanted == 0 {
+                break;
+            }
             let frame = frame::first(path, wanted).map_err(Failure::failed)?;
             rows.extend((0..frame.height).map(|row| frame.row(row).iter().map(|(_, cell)| summary::shown(cell)).collect()));
         }

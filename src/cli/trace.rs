@@ -33,7 +33,7 @@ use crate::verify::scale;
   slipsweep trace results/NAME gap --where \"t_f=0.02, alpha_2=-0.12, alpha_3=-0.066\" --out row.csv"
 )]
 pub struct Arguments {
-    /// The protocol, or the folder of a dataset
+    /// Protocol, or folder of a dataset
     #[arg(value_name = "PROTOCOL|DATASET", value_parser = Subject)]
     subject: String,
     /// Table of the dataset
@@ -90,7 +90,7 @@ pub struct Arguments {
     output: Output<Format>,
 }
 
-/// How a trace is written.
+/// Format of a trace.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 enum Format {
     /// A header and aligned columns of nine digits (.txt)
@@ -138,7 +138,7 @@ impl TypedValueParser for Subject {
     }
 }
 
-/// The number that `text` stands for, if it is in `domain`.
+/// Parses a number in `domain`.
 fn legal(text: &str, domain: Domain) -> Result<f64, String> {
     match text.parse() {
         Ok(value) if domain.contains(value) => Ok(value),
@@ -147,24 +147,24 @@ fn legal(text: &str, domain: Domain) -> Result<f64, String> {
     }
 }
 
-/// What is to be traced, however it was named.
+/// The protocol to trace, from flags or from a row.
 struct TraceRequest {
     /// The name of the protocol.
     name: String,
     protocol: Protocol,
-    /// In the units of the model.
+    /// Parameters in scaled units.
     case: Case,
-    /// The numbers of the protocol, as they were given.
+    /// Parameters of the protocol as given.
     numbers: Vec<Named>,
-    /// Whether `v >= 1`, where that matters.
+    /// Whether `v >= 1`; `None` if the bound has no effect.
     bounded: Option<bool>,
     rtol: f64,
     units: Units,
-    /// Dataset, table and row that it is from.
+    /// Dataset, table and row of the protocol.
     origin: Option<Origin>,
 }
 
-/// A number with its unit where that is SI.
+/// A number with its unit in SI, if any.
 struct Named {
     name: String,
     value: f64,
@@ -250,7 +250,7 @@ fn absent(protocol: &str, absence: Absence) -> Failure {
     Failure { code, message: format!("error: no `{protocol}` protocol: {absence}") }
 }
 
-/// Relative accuracy of a protocol that is no row of a table: that of a spec which names none.
+/// Relative accuracy without a row of a table: the default of a spec.
 const DEFAULT_RTOL: f64 = 1e-10;
 
 /// Whether the bound `v >= 1` matters to a protocol.
@@ -258,7 +258,7 @@ fn has_bound(protocol: &str) -> bool {
     matches!(protocol, "optimal" | "best_cubic" | "regularised")
 }
 
-/// What every protocol needs.
+/// Parameters of every protocol.
 const NEEDED: [Quantity; 5] =
     [Quantity::Time, Quantity::A, Quantity::B, Quantity::InitialVelocity, Quantity::FinalVelocity];
 
@@ -327,7 +327,7 @@ impl Arguments {
         })
     }
 
-    /// That the numbers that the protocol `name` needs are given, and no others.
+    /// Checks that exactly the parameters of the protocol `name` are given.
     fn check(&self, name: &str) -> Result<(), Failure> {
         let missing = self.given().into_iter().filter(|(quantity, given)| given.is_none() && NEEDED.contains(quantity));
         let missing: Vec<String> = missing.map(|(quantity, _)| flag(quantity)).collect();
@@ -419,8 +419,7 @@ impl Arguments {
     }
 }
 
-/// The axes of a row that are finite numbers, with their units where those are SI; the coefficients of a cubic are among its
-/// parameters.
+/// The axes of a row that are finite numbers, with SI units if any. The coefficients of a cubic are parameters instead.
 fn axes_of(row: &Row, units: &Units) -> Vec<Named> {
     let axis = |(name, cell): &(String, Cell)| {
         let quantity = Quantity::from_name(name).filter(|quantity| !quantity.has_scale())?;
@@ -430,7 +429,7 @@ fn axes_of(row: &Row, units: &Units) -> Vec<Named> {
     row.iter().filter_map(axis).collect()
 }
 
-/// The part of a row of a table, and the row.
+/// Reads a row of a table from its part.
 fn row_at(path: &Path, folder: &Folder, table: &ManifestTable, row: u64) -> Result<(std::path::PathBuf, Row), Failure> {
     if row >= table.rows {
         let (path, last) = (path.display(), table.rows.saturating_sub(1));
@@ -447,10 +446,10 @@ fn row_at(path: &Path, folder: &Folder, table: &ManifestTable, row: u64) -> Resu
     Ok((file, row))
 }
 
-/// Rows that a message names. Chosen: they fit a line.
+/// Greatest number of rows that a message names. Chosen: they fit on a line.
 const MAX_NAMED_ROWS: usize = 5;
 
-/// The one row of a table that meets all conditions; of the parts only the columns of the conditions are read.
+/// The only row of a table that meets all conditions. Reads only the columns of the conditions.
 fn the_row(path: &Path, folder: &Folder, table: &ManifestTable, conditions: &[String]) -> Result<u64, Failure> {
     let mut all = Vec::new();
     for text in conditions {
@@ -499,7 +498,7 @@ fn the_row(path: &Path, folder: &Folder, table: &ManifestTable, conditions: &[St
     }
 }
 
-/// The name of a unit where that is SI.
+/// The name of a unit in SI, else empty.
 fn si_name(units: &Units, unit: &'static str) -> &'static str {
     if *units == Units::Scaled { "" } else { units.name(unit) }
 }
@@ -509,7 +508,7 @@ impl Named {
         Named { name: name.to_owned(), value, unit: if unit == "1" { "" } else { unit } }
     }
 
-    /// `value` in the units of the model, as a number in `units`.
+    /// Converts the scaled `value` to `units`.
     fn scaled(name: &str, value: f64, unit: &'static str, units: &Units) -> Named {
         Named::new(name, value * units.size(unit), si_name(units, unit))
     }
@@ -522,7 +521,7 @@ impl Named {
 /// The parameters of a protocol in the units of the request, each with its meaning.
 fn parameters(request: &TraceRequest, path: &TracedPath) -> Vec<(Named, &'static str)> {
     let named = |parameter: &Parameter| {
-        // The one parameter of a family that has a dimension.
+        // The only parameter of a family with a unit.
         if parameter.name == "alpha" && request.name == "bounded_velocity" && request.units != Units::Scaled {
             let rate = request.units.size("v_0/l");
             return (Named::new(parameter.name, parameter.value * rate * rate, "1/s^2"), parameter.doc);
@@ -532,15 +531,15 @@ fn parameters(request: &TraceRequest, path: &TracedPath) -> Vec<(Named, &'static
     path.parameters.iter().map(named).collect()
 }
 
-/// What comes out.
+/// The results.
 fn results(request: &TraceRequest, path: &TracedPath, trace: &Trace) -> [Named; 3] {
-    // The trace is in the units of the request.
+    // The trace has the units of the request.
     let velocity = |name, value| Named::new(name, value, si_name(&request.units, "v_0"));
     let work = Named::scaled("work", path.work, "mu_0 sigma l", &request.units);
     [work, velocity("v_min", trace.v_min), velocity("v_max", trace.v_max)]
 }
 
-/// What the protocol is, in a few lines.
+/// The description of the protocol, in a few lines.
 fn header(arguments: &Arguments, request: &TraceRequest, path: &TracedPath, trace: &Trace) -> String {
     let all = |numbers: &[Named]| numbers.iter().map(Named::words).collect::<Vec<_>>().join(", ");
     let mut text = format!("{}: {}\n  at {}", request.name, request.protocol.doc(&request.name), all(&request.numbers));
@@ -580,7 +579,7 @@ fn status(status: Status) -> String {
     format!("{}{meaning}", status.name())
 }
 
-/// The columns with their units, aligned. Times that nine digits do not distinguish are shown with all of theirs.
+/// The aligned columns with their units. Times that nine digits do not distinguish have all digits.
 fn table(trace: &Trace, units: &Units) -> String {
     let nine: Vec<String> = trace.moments.iter().map(|moment| words::number(moment.t)).collect();
     let pairs = trace.moments.windows(2).zip(nine.windows(2));
@@ -603,7 +602,7 @@ fn table(trace: &Trace, units: &Units) -> String {
     words::aligned(&lines, 2)
 }
 
-/// What a file says of itself.
+/// The metadata of a file.
 fn facts(arguments: &Arguments, request: &TraceRequest, path: &TracedPath, trace: &Trace) -> Vec<(String, String)> {
     let mut facts = vec![("protocol", request.name.clone())];
     let (parameters, results) = (parameters(request, path), results(request, path, trace));

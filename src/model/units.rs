@@ -38,7 +38,7 @@ const UNITS: [(&str, &str, Size); 13] = [
     ("mu_0 sigma l", "J/m^2", |s| s.mu_0 * s.normal_stress * s.l),
     ("mu_0 sigma v_0", "W/m^2", |s| s.mu_0 * s.normal_stress * s.v_0),
     ("mu_0 sigma l/v_0^2", "kg/m^2", |s| s.mu_0 * s.normal_stress * s.l / (s.v_0 * s.v_0)),
-    // A coefficient relative to the duration stays so; contact lifetimes are in l/v_0.
+    // A coefficient relative to the duration has the same value in both systems, since theta is in l/v_0.
     ("1/t_f", "1/t_f", |_| 1.0),
     ("1/t_f^2", "1/t_f^2", |_| 1.0),
     // The unit differs from row to row: the table converts it.

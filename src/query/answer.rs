@@ -1,4 +1,4 @@
-//! An answer: its columns, and its rows a piece at a time.
+//! The answer to a query: its columns, and its rows piece by piece.
 
 use std::io::{self, Write};
 use std::sync::{Arc, Mutex};
@@ -26,13 +26,13 @@ use super::scan::{Files, append};
 use super::streaming::{Key, PARTS, StreamPlan};
 use crate::dataset::{Cell, field, guarded, label};
 
-/// Rows that are handed over at a time. Chosen: few enough that a reader sees the first ones soon.
+/// Rows of a piece. Chosen: few enough that a reader sees the first ones soon.
 const PIECE: usize = 1 << 14;
 
 /// Rows of partial answers that are merged before more are computed. Chosen: ten columns of 2^22 doubles are 336 MB.
 const MOST_PARTIAL: usize = 1 << 22;
 
-/// An answer that is found while it is read.
+/// An answer, computed while it is read.
 pub struct Answer {
     columns: Vec<String>,
     units: Vec<String>,
@@ -43,9 +43,9 @@ pub struct Answer {
 /// The format of an answer in a file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Format {
-    /// Names of the columns and then a line a row; nothing where there is no value.
+    /// A line with the names of the columns, then a line for each row; a missing value is empty.
     Csv,
-    /// A JSON object a line; null where there is no value.
+    /// A JSON object for each row, on a line; a missing value is null.
     JsonLines,
     /// Parquet.
     Parquet,
@@ -80,7 +80,7 @@ impl From<ParquetError> for AnswerError {
 type Take<'a> = &'a mut dyn FnMut(&DataFrame) -> Result<(), AnswerError>;
 
 impl Answer {
-    /// The answer that `frame` will give, with `columns` in these `units`; or `streaming` of files.
+    /// The answer from `frame`, with `columns` in these `units`; or from `streaming` of files.
     pub(super) fn new(
         frame: LazyFrame,
         columns: Vec<String>,
@@ -95,16 +95,16 @@ impl Answer {
         self.columns.clone()
     }
 
-    /// The units of its columns, empty where none is known.
+    /// The units of its columns; empty if unknown.
     pub fn units(&self) -> Vec<String> {
         self.units.clone()
     }
 
-    /// Hands its rows to `take`, some thousands at a time.
+    /// Passes its rows to `take`, some thousands at a time.
     ///
     /// # Errors
     ///
-    /// If it cannot be found, or `take` fails.
+    /// If the answer cannot be computed, or `take` fails.
     pub fn rows(self, mut take: impl FnMut(Vec<Vec<Cell>>) -> io::Result<()>) -> Result<(), AnswerError> {
         self.find(&mut |piece| {
             let columns: Vec<Vec<Cell>> = piece.columns().iter().map(cells).collect();
@@ -114,11 +114,11 @@ impl Answer {
         })
     }
 
-    /// Writes it to `out`.
+    /// Writes the answer to `out`.
     ///
     /// # Errors
     ///
-    /// If it cannot be found or written.
+    /// If the answer cannot be computed or written.
     pub fn write(self, format: Format, out: &mut dyn Write) -> Result<(), AnswerError> {
         let mut first = true;
         match format {
@@ -156,7 +156,7 @@ impl Answer {
         Ok(out.flush()?)
     }
 
-    /// Finds the answer on all threads and hands it over piece by piece, at least one even if there is no row.
+    /// Computes the answer on all threads and passes it on piece by piece: at least one piece, even without rows.
     fn find(self, take: Take) -> Result<(), AnswerError> {
         let Answer { frame, streaming, .. } = self;
         match streaming {
@@ -165,7 +165,7 @@ impl Answer {
             }
             Some((files, streaming)) => match guarded(|| combine(&files, &streaming)) {
                 Some(Ok(found)) => hand(&found, take),
-                // What cannot be merged may be answered in one piece; if not, that error is the one to report.
+                // An answer that cannot be merged may be computed in one piece; if that fails, its error is reported.
                 _ => hand(&whole(frame)?, take),
             },
             None => hand(&whole(frame)?, take),
@@ -182,7 +182,7 @@ fn unsupported() -> PolarsError {
     PolarsError::ComputeError("polars does not support it".into())
 }
 
-/// Hands `found` over, some rows at a time.
+/// Passes `found` on, piece by piece.
 fn hand(found: &DataFrame, take: Take) -> Result<(), AnswerError> {
     let mut start = 0;
     loop {
@@ -194,7 +194,7 @@ fn hand(found: &DataFrame, take: Take) -> Result<(), AnswerError> {
     }
 }
 
-/// Pieces that are answered at a time. Chosen: several for each thread, so that none waits long for another.
+/// Number of pieces in progress. Chosen: several for each thread, so that no thread waits long for another.
 fn at_once() -> usize {
     4 * rayon::current_num_threads()
 }
@@ -212,7 +212,7 @@ fn ask(files: &[Files], streaming: &StreamPlan) -> PolarsResult<Vec<DataFrame>> 
     files.par_iter().map(answer).collect()
 }
 
-/// Hands rows over as they are read.
+/// Passes rows on as they are read.
 fn stream(files: &Files, streaming: &StreamPlan, take: Take) -> Result<(), AnswerError> {
     let mut skip = streaming.offset;
     let mut left = streaming.limit;
@@ -234,7 +234,7 @@ fn stream(files: &Files, streaming: &StreamPlan, take: Take) -> Result<(), Answe
     Ok(())
 }
 
-/// The answer, put together from those of pieces.
+/// The answer, merged from partial answers.
 fn combine(files: &Files, streaming: &StreamPlan) -> PolarsResult<DataFrame> {
     let most = streaming.limit.map(|limit| limit.saturating_add(streaming.offset));
     let mut parts = DataFrame::default();
@@ -262,7 +262,7 @@ fn merged(parts: DataFrame, streaming: &StreamPlan, most: Option<usize>) -> Pola
     }
 }
 
-/// `rows` ordered by their columns `__k0`, ..., at most `limit` of them after the first `offset`.
+/// `rows` in the order of their columns `__k0`, ...: at most `limit` rows after the first `offset`.
 fn ordered(rows: DataFrame, keys: &[Key], offset: usize, limit: Option<usize>) -> PolarsResult<DataFrame> {
     let rows = if keys.is_empty() {
         rows
@@ -282,7 +282,7 @@ fn ordered(rows: DataFrame, keys: &[Key], offset: usize, limit: Option<usize>) -
     Ok(rows.slice(i64::try_from(offset).unwrap_or(i64::MAX), limit.unwrap_or(usize::MAX)))
 }
 
-/// Bytes on their way from a writer to where they belong.
+/// A buffer between a writer and its destination.
 #[derive(Clone, Default)]
 struct Bytes(Arc<Mutex<Vec<u8>>>);
 
@@ -355,12 +355,12 @@ fn json(value: &AnyValue) -> serde_json::Value {
     }
 }
 
-/// A number; JSON has words for the others alone: "inf", "-inf", "NaN".
+/// A number as JSON; numbers that are not finite become words: "inf", "-inf", "NaN".
 fn json_number(number: f64) -> serde_json::Value {
     if number.is_finite() { number.into() } else { number.to_string().into() }
 }
 
-/// Checks that no column holds lists, which the format lacks.
+/// Checks that no column contains lists, which the format does not support.
 fn without_lists(piece: &DataFrame, format: &str) -> PolarsResult<()> {
     let Some(list) = piece.columns().iter().find(|column| column.dtype().is_nested()) else { return Ok(()) };
     let (name, format) = (list.name(), format);
@@ -369,7 +369,7 @@ fn without_lists(piece: &DataFrame, format: &str) -> PolarsResult<()> {
     ))
 }
 
-/// The columns of a piece as they are written to Parquet, with their units.
+/// The Parquet schema of a piece, with units.
 fn arrow_schema(piece: &DataFrame, units: &[String]) -> SchemaRef {
     let columns = piece.columns().iter().zip(units.iter().map(String::as_str).chain(std::iter::repeat("")));
     let fields = columns.map(|(column, unit)| {
@@ -387,7 +387,7 @@ fn arrow_schema(piece: &DataFrame, units: &[String]) -> SchemaRef {
     Arc::new(ArrowSchema::new(fields.collect::<Vec<_>>()))
 }
 
-/// A piece as it is written to Parquet.
+/// A piece as a record batch for Parquet.
 fn batch(piece: &DataFrame, schema: &SchemaRef) -> Result<RecordBatch, AnswerError> {
     let mut arrays: Vec<ArrayRef> = Vec::new();
     for (column, field) in piece.columns().iter().zip(schema.fields()) {

@@ -1,7 +1,7 @@
-//! Groups of rows with their counts, sums, least and greatest numbers, straight from the columns of a file.
+//! Groups of rows with counts, sums, least and greatest numbers, computed from the columns of a file directly.
 //!
-//! Most queries over many rows are of this kind. polars, which is not optimised in the release build, would answer them several times
-//! slower than Python polars; `benches/query/run` compares, and `an_answer_in_pieces_is_the_answer_at_once` checks one route by the other.
+//! Most queries over many rows are of this kind. polars, which is not optimised in the release build, would be several times slower than Python
+//! polars (`benches/query/run`). The test `an_answer_in_pieces_is_the_answer_at_once` compares both implementations.
 
 use std::collections::HashMap;
 use std::collections::hash_map::Entry;
@@ -42,7 +42,7 @@ impl Measure {
     }
 }
 
-/// The values of a key.
+/// The type of a key.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Kind {
     /// Doubles.
@@ -64,19 +64,19 @@ impl Kind {
     }
 }
 
-/// A question for groups.
+/// A query for groups.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Groups {
     /// The condition of rows.
     pub conditions: Vec<Condition>,
-    /// The columns whose values make the groups.
+    /// The key columns of the groups.
     pub keys: Vec<(String, Kind)>,
     /// The aggregates of each group.
     pub measures: Vec<Measure>,
 }
 
 impl Groups {
-    /// Whether what is measured is of types that are counted here.
+    /// Whether the types of all aggregated columns are supported.
     pub fn fits(&self, schema: &Schema) -> bool {
         self.measures.iter().all(|measure| match measure {
             Measure::Rows => true,
@@ -85,7 +85,7 @@ impl Groups {
         })
     }
 
-    /// The columns that are read.
+    /// The columns to read.
     pub fn columns(&self) -> Vec<String> {
         let measured = self.measures.iter().filter_map(|measure| measure.column().map(str::to_owned));
         let mut names: Vec<String> = self.keys.iter().map(|(name, _)| name.clone()).chain(measured).collect();
@@ -96,11 +96,11 @@ impl Groups {
     }
 }
 
-/// A value that makes a group.
+/// The value of a key.
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
 enum Value {
     Missing,
-    /// The bits of a number; zero has one sign and NaN one pattern.
+    /// The bits of a number, with one zero and one NaN.
     Number(u64),
     Flag(bool),
     Word(String),
@@ -110,11 +110,11 @@ fn bits(number: f64) -> u64 {
     if number.is_nan() { f64::NAN.to_bits() } else { (number + 0.0).to_bits() }
 }
 
-/// The values of one key so far.
+/// The distinct values of a key so far.
 #[derive(Default)]
 struct Key {
     places: HashMap<Value, u32>,
-    /// The key of numbers, which are many.
+    /// The values of a numeric key, which may be many.
     numbers: HashMap<u64, u32>,
     values: Vec<Value>,
 }
@@ -138,10 +138,10 @@ impl Key {
         })
     }
 
-    /// The places of the values of `rows`.
+    /// The indices of the values of `rows`.
     fn places(&mut self, array: &dyn Array, rows: &[u32]) -> Vec<u32> {
         if let Some(numbers) = array.as_primitive_opt::<Float64Type>() {
-            // Axes change rarely from row to row.
+            // Axes rarely change from row to row.
             let mut last: Option<(u64, u32)> = None;
             let missing = if array.null_count() > 0 { Some(self.place(Value::Missing)) } else { None };
             let place = |&row: &u32| {
@@ -178,11 +178,11 @@ impl Key {
     }
 }
 
-/// Groups that are being counted.
+/// Groups during aggregation.
 pub struct Counting<'a> {
     groups: &'a Groups,
     keys: Vec<Key>,
-    /// The groups of the first keys, by those of one key less and the place of the value of the next.
+    /// The groups of the first keys, by the group of one key fewer and the index of the next key's value.
     pairs: Vec<IndexSet<(u32, u32)>>,
     /// The number of groups.
     count: usize,
@@ -196,7 +196,7 @@ struct Tally {
 }
 
 impl<'a> Counting<'a> {
-    /// No rows yet.
+    /// An aggregation without rows.
     pub fn new(groups: &'a Groups) -> Counting<'a> {
         let keys = groups.keys.len();
         let mut counting = Counting {
@@ -220,7 +220,7 @@ impl<'a> Counting<'a> {
         }
     }
 
-    /// Counts the rows of a batch.
+    /// Adds the rows of a batch.
     pub fn add(&mut self, batch: &RecordBatch) {
         let kept = kept(&self.groups.conditions, batch);
         let rows: Vec<u32> = (0..).zip(&kept).filter(|(_, kept)| **kept).map(|(row, _)| row).collect();
@@ -326,7 +326,7 @@ impl<'a> Counting<'a> {
         DataFrame::new(height, columns)
     }
 
-    /// The places of the values of each key, group by group.
+    /// The indices of the values of each key, for all groups.
     fn places(&self) -> Vec<Vec<u32>> {
         let mut places = vec![vec![0; self.count]; self.keys.len()];
         for group in 0..self.count {
@@ -341,7 +341,7 @@ impl<'a> Counting<'a> {
     }
 }
 
-/// Keeps of each group the number that is `better` than others; NaN is better than none.
+/// Keeps the number that is `better` in each group; NaN is better than no number.
 fn tally(cells: impl Iterator<Item = (usize, f64)>, tallies: &mut [Tally], better: impl Fn(f64, f64) -> bool) {
     for (id, number) in cells {
         let tally = &mut tallies[id];

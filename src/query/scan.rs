@@ -1,4 +1,4 @@
-//! Parquet files as a table of polars: only the columns and the row groups that a question needs are read, on all threads.
+//! Parquet files as a table of polars. Only the needed columns and row groups are read, on all threads.
 
 use std::any::Any;
 use std::fs::File;
@@ -30,19 +30,19 @@ use super::filter::{Condition, Top, kept, of_predicate};
 use super::groups::{Counting, Groups};
 use crate::dataset::{check_footer, check_pages, guarded, label};
 
-/// The rows of Parquet files of the same columns, one file after another.
+/// The rows of Parquet files with equal columns, one file after another.
 #[derive(Clone)]
 pub struct Files {
     paths: Vec<PathBuf>,
     schema: SchemaRef,
     /// The condition of rows; others are skipped.
     conditions: Vec<Condition>,
-    /// The order of rows, of which only the first are needed.
+    /// The order of rows, if only the first are needed.
     top: Option<Top>,
 }
 
 impl Files {
-    /// The table in the files of `paths`, whose columns are those of the first.
+    /// The table in the files of `paths`, with the columns of the first file.
     pub fn new(paths: Vec<PathBuf>) -> PolarsResult<Files> {
         let mut schema = Schema::default();
         if let Some(first) = paths.first() {
@@ -58,7 +58,7 @@ impl Files {
         &self.schema
     }
 
-    /// Rows that obey `conditions`, and of each part those that may be among the first.
+    /// Restricts the table to rows that match `conditions`, and in each part to rows that may be among the first.
     pub fn only(mut self, conditions: Vec<Condition>, top: Option<Top>) -> Files {
         (self.conditions, self.top) = (conditions, top);
         self
@@ -87,13 +87,13 @@ impl Files {
         fields.map(|(name, _)| name.to_string()).collect()
     }
 
-    /// The table as polars plans with it.
+    /// The table as a lazy frame of polars.
     pub fn frame(&self) -> PolarsResult<LazyFrame> {
         let options = ScanArgsAnonymous { schema: Some(self.schema.clone()), ..ScanArgsAnonymous::default() };
         LazyFrame::anonymous_scan(Arc::new(self.clone()), options)
     }
 
-    /// Each file as a table of its own.
+    /// Each file as a separate table.
     pub fn streaming(&self) -> Vec<Files> {
         self.paths.iter().map(|path| Files { paths: vec![path.clone()], ..self.clone() }).collect()
     }
@@ -117,8 +117,7 @@ impl Files {
     }
 }
 
-/// A predicate without what polars adds to it for a top-k: bounds that it learns as it goes, which need not be applied, and which an
-/// expression can only display.
+/// A predicate without the dynamic bounds that polars adds for a top-k. They are optional, and an expression can only display them.
 fn without_hints(predicate: &Expr) -> PolarsResult<Option<Expr>> {
     if !predicate.into_iter().any(|part| matches!(part, Expr::Display { .. })) {
         return Ok(Some(predicate.clone()));
@@ -195,7 +194,7 @@ impl AnonymousScan for Files {
     }
 }
 
-/// Adds `more` rows.
+/// Appends `more` rows.
 pub fn append(rows: &mut DataFrame, more: DataFrame) -> PolarsResult<()> {
     if rows.height() == 0 && (more.height() > 0 || rows.columns().is_empty()) {
         *rows = more;
@@ -207,19 +206,19 @@ pub fn append(rows: &mut DataFrame, more: DataFrame) -> PolarsResult<()> {
     Ok(())
 }
 
-/// The messages of file errors.
+/// The message for a file that cannot be read.
 const UNREADABLE: &str = "cannot be read as Parquet";
 
 fn unreadable(path: &Path, error: &ParquetError) -> PolarsError {
     PolarsError::ComputeError(format!("{}: {UNREADABLE}: {error}", path.display()).into())
 }
 
-/// Whether a file is at fault, rather than the question.
+/// Whether a file is at fault, rather than the query.
 pub fn is_unreadable(error: &PolarsError) -> bool {
     error.to_string().contains(UNREADABLE)
 }
 
-/// A Parquet file, and its columns as they are read: words are dictionaries where they are so in a dataset, else text.
+/// Opens a Parquet file. Words are read as dictionaries in a dataset, else as text.
 fn open(path: &Path) -> Result<(File, ArrowReaderMetadata), ParquetError> {
     let file = File::open(path)?;
     check_footer(&file)?;
@@ -236,8 +235,8 @@ fn open(path: &Path) -> Result<(File, ArrowReaderMetadata), ParquetError> {
     Ok((file, metadata))
 }
 
-/// Hands over the columns `names` of a file, which are to be those of `schema`, a row group at a time, as far as it may hold rows that obey `conditions`, until `take`, which
-/// returns how many rows it took, has `most`.
+/// Passes the columns `names` of a file, with the types of `schema`, to `take`, one row group at a time. Skips row groups without rows that
+/// match `conditions`. Ends when `take`, which returns the number of kept rows, has `most`.
 fn batches(
     path: &Path,
     (names, schema): (&[String], &Schema),
@@ -255,7 +254,7 @@ fn batches(
             return Err(ParquetError::General(format!("column `{name}` {found}, unlike in the first file")));
         }
     }
-    // Statistics of other writers leave NaN out, which polars counts as the greatest number.
+    // Statistics of other writers exclude NaN, which is the greatest number in polars.
     let is_ours = is_ours(&metadata);
     let allows = |group: &RowGroupMetaData| !is_ours || conditions.iter().all(|condition| condition.allows(group));
     let mask = ProjectionMask::columns(metadata.parquet_schema(), names.iter().map(String::as_str));
@@ -306,7 +305,7 @@ impl Files {
         read.extend(self.top.iter().map(|top| top.column.clone()));
         read.sort();
         read.dedup();
-        // Where rows are left out, as many more have to be read.
+        // A filter drops rows, so more have to be read.
         let most = most.filter(|_| conditions.is_empty() && self.top.is_none());
         let mut frame: Option<DataFrame> = None;
         batches(path, (&read, &self.schema), &conditions, most, &mut |batch| {
@@ -364,7 +363,7 @@ fn columns(batch: &RecordBatch, names: &[PlSmallStr]) -> Result<DataFrame, Parqu
     DataFrame::new(batch.num_rows(), columns?).map_err(foreign)
 }
 
-/// The type of a column in polars; `None` of one that is not read.
+/// The type of a column in polars; `None` for an unsupported type.
 fn kind(kind: &ArrowType) -> Option<DataType> {
     Some(match kind {
         ArrowType::Float64 => DataType::Float64,

@@ -1,4 +1,4 @@
-//! A table on disk that can be asked.
+//! A table on disk that can be queried.
 
 use std::fs::{self, File};
 use std::io::Cursor;
@@ -14,19 +14,19 @@ use super::scan::Files;
 use super::{Answer, QueryError};
 use crate::dataset::Folder;
 
-/// A table and where it comes from.
+/// A table and its files.
 pub struct Source {
-    /// Its name in questions.
+    /// Its name in queries.
     pub name: String,
     /// The names of its columns.
     pub columns: Vec<String>,
-    /// The units of its columns, empty where none is known.
+    /// The units of its columns; empty if unknown.
     pub units: Vec<String>,
     /// The files that it consists of.
     pub paths: Vec<PathBuf>,
     /// The number of missing files.
     pub missing: u64,
-    /// All rows, as the dataset counts them; unknown of a single file.
+    /// The number of rows according to the dataset; `None` for a single file.
     pub rows: Option<u64>,
     /// Its columns of words that repeat.
     pub(super) words: Vec<String>,
@@ -48,7 +48,7 @@ pub fn open(path: &Path) -> Result<Vec<Source>, QueryError> {
         help,
     };
     if path.is_dir() {
-        // The folder of a table of a dataset is that table, checked as the dataset is.
+        // The folder of a table belongs to its dataset, and is checked like it.
         if let (Some(above), Some(name)) = (folder_above(path), path.file_name())
             && let Ok(Some(_)) = Folder::at(&above).manifest()
         {
@@ -99,7 +99,7 @@ pub fn open(path: &Path) -> Result<Vec<Source>, QueryError> {
 }
 
 impl Source {
-    /// A table of Parquet files of the same columns; parts of a dataset know its name better than their folder does.
+    /// A table of Parquet files with equal columns. Its name comes from the parts if they belong to a dataset, else from the folder.
     fn parquet(
         path: &Path,
         name: String,
@@ -119,7 +119,7 @@ impl Source {
         Ok(Source { name, columns, units, paths, missing, rows, words: files.words(), files: Some(files), frame })
     }
 
-    /// The table in a CSV file, numbers where all of a column are numbers; lines that begin with # are comments.
+    /// The table in a CSV file. A column is numeric if all its cells are numbers; lines that begin with # are comments.
     fn csv(path: &Path) -> Result<Source, QueryError> {
         let failed = |source| QueryError::Read { path: path.display().to_string(), source };
         let frame = csv(path).map_err(failed)?;
@@ -194,7 +194,7 @@ impl Header {
     }
 }
 
-/// The folder that a folder is in.
+/// The parent folder of a folder.
 fn folder_above(path: &Path) -> Option<PathBuf> {
     Some(fs::canonicalize(path).ok()?.parent()?.to_owned())
 }
@@ -211,7 +211,7 @@ fn parts(folder: &Path) -> Vec<PathBuf> {
     files
 }
 
-/// The name of a file or folder as a word that needs no quotes in SQL.
+/// The name of a file or folder as an identifier that needs no quotes in SQL.
 fn name_of(path: &Path) -> String {
     let real = fs::canonicalize(path);
     let stem = real.as_deref().unwrap_or(path).file_stem().unwrap_or_default().to_string_lossy().into_owned();

@@ -24,7 +24,7 @@ const FIRST_RANGES: u64 = 16;
 /// Greatest number of ranges in a sample, whose costs are kept in memory.
 const MAX_RANGES: u64 = 1 << 14;
 
-/// Greatest time of the sample of a table with expensive rows, in seconds. Chosen: the patience of a user of `plan`.
+/// Greatest time of the sample of a table with expensive rows, in seconds. Chosen: acceptable for a user of `plan`.
 const MAX_SAMPLE_SECONDS: f64 = 5.0;
 
 /// Greatest cost of a row, in units of the mean cost of its table. Chosen: rows of `step_response` differ by three orders of magnitude.

@@ -6,15 +6,15 @@ use crate::protocol::shortcut::{self, Case, FAMILIES, Family, Obstacle};
 use crate::protocol::{Motion, SolverStats, SpringBlock, Status, best_cubic, compliant, optimal, regularised};
 use crate::stability::step_response::Step;
 
-/// A protocol, and the spring that drives it where that is elastic.
+/// A protocol, with its spring if that is elastic.
 #[derive(Clone, Copy)]
 pub enum Protocol {
-    /// The protocol of least work, with `v >= 1` where `bounded`.
+    /// The protocol of least work, with `v >= 1` if `bounded`.
     Optimal {
         /// Whether `v >= 1`.
         bounded: bool,
     },
-    /// The cubic shortcut of least work, with `v >= 1` where `bounded`.
+    /// The cubic shortcut of least work, with `v >= 1` if `bounded`.
     BestCubic {
         /// Whether `v >= 1`.
         bounded: bool,
@@ -42,7 +42,7 @@ pub enum Protocol {
         /// Mass of the block.
         m: f64,
     },
-    /// The optimal protocol with its jumps made smooth, on a spring.
+    /// The optimal protocol with smooth pieces instead of jumps, on a spring.
     Regularised {
         /// Stiffness of the spring.
         k: f64,
@@ -56,8 +56,8 @@ pub enum Protocol {
 }
 
 impl Protocol {
-    /// The response of a block on a spring to a step of the control velocity. A rigid spring, or no change of velocity, takes the
-    /// block along at once.
+    /// The response of a block on a spring to a step of the control velocity. With a rigid spring, or without a change of velocity, the block
+    /// follows the load point at once.
     pub fn step_response(k: f64, m: f64, changes: bool) -> Protocol {
         match shortcut::find("step") {
             Some(step) if k == f64::INFINITY || !changes => Protocol::Family(step),
@@ -66,7 +66,7 @@ impl Protocol {
     }
 }
 
-/// Names and meanings of all protocols: first those that are no family, then [`FAMILIES`], then those on a spring.
+/// Names and meanings of all protocols: first optima and landscape points, then [`FAMILIES`], then protocols on a spring.
 pub fn names() -> impl Iterator<Item = (&'static str, &'static str)> {
     let others = [
         ("optimal", "least work of friction of all protocols; v may jump at both ends"),
@@ -81,7 +81,7 @@ pub fn names() -> impl Iterator<Item = (&'static str, &'static str)> {
     others.into_iter().chain(FAMILIES.into_iter().map(|family| (family.name(), family.doc()))).chain(elastic)
 }
 
-/// A protocol that exists: how it moves, and its numbers.
+/// The path of a protocol: its motion and its numbers.
 pub struct TracedPath {
     /// The motion.
     pub motion: Box<dyn Motion>,
@@ -98,7 +98,7 @@ pub struct TracedPath {
 pub struct Parameter {
     /// Its name.
     pub name: &'static str,
-    /// Its value, in the unit of the model.
+    /// Its value, in scaled units.
     pub value: f64,
     /// The unit.
     pub unit: &'static str,
@@ -120,10 +120,10 @@ fn bound(bounded: &bool) -> &'static str {
 /// The reason for a missing protocol.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 pub enum Absence {
-    /// The family's reason.
+    /// The reason given by the family.
     #[error("{0}")]
     Obstacle(Obstacle),
-    /// No protocol is that fast.
+    /// No protocol is that short.
     #[error("t_f = {t_f} is too short for {}: the least is t_min = {t_min}", bound(.bounded))]
     Time {
         /// The requested duration.
@@ -147,7 +147,7 @@ pub enum Absence {
     /// The smooth pieces do not fit.
     #[error("delta_t is too long: two pieces must fit into t_f, and v must stay well above 0 in them")]
     Pieces,
-    /// The velocity becomes infinite, or oscillates too often to be shown.
+    /// The velocity becomes infinite, or has too many oscillations to show.
     #[error("before t_f the velocity becomes infinite, or there are more oscillations than can be shown")]
     Response,
     /// Friction is so low somewhere that the extremal need not be unique, and none was found.
@@ -156,7 +156,7 @@ pub enum Absence {
 }
 
 impl Absence {
-    /// Whether it is a defect of ours.
+    /// Whether the cause is a defect of slipsweep.
     pub fn is_defect(self) -> bool {
         self == Absence::Obstacle(Obstacle::NotConverged)
     }
@@ -179,7 +179,7 @@ impl Protocol {
         }
     }
 
-    /// The protocol that solves `case`, its numbers good to `rtol`.
+    /// The path of the protocol for `case`, with a relative error of `rtol`.
     pub fn path(&self, case: &Case, rtol: f64) -> Result<TracedPath, Absence> {
         match *self {
             Protocol::Optimal { bounded } => optimum(case, bounded, rtol),
@@ -217,7 +217,7 @@ fn without_optimum(case: &Case, bounded: bool, status: Status) -> Absence {
 fn least_cubic(case: &Case, bounded: bool, rtol: f64) -> Result<TracedPath, Absence> {
     let solved = best_cubic::solve(&case.transition, case.t_f, bounded, rtol);
     let Some(value) = solved.value else {
-        // Where there is no optimum there is no shortcut either.
+        // Without an optimum there is no shortcut either.
         let optimum = optimal::solve(&case.transition, case.t_f, bounded, rtol);
         return Err(match (optimum.value, solved.status) {
             (None, _) => without_optimum(case, bounded, optimum.status),
@@ -302,7 +302,7 @@ fn pieced(case: &Case, (k, m): (f64, f64), delta_t: f64, bounded: bool, rtol: f6
 fn member(family: &dyn Family, case: &Case, rtol: f64) -> Result<TracedPath, Absence> {
     let shortcut = family.solve(case, rtol, &mut SolverStats::default())?;
     let motion = family.motion(case, rtol)?;
-    // A step takes any time, but where no protocol arrives it is not counted either.
+    // A step has no least duration, but it counts as infeasible where every other protocol is.
     let late = case.t_f < case.transition.min_duration();
     let status = if late { Status::Infeasible } else { shortcut.status() };
     let alpha = shortcut.alpha.into_iter().zip(family.alpha());

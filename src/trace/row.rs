@@ -15,22 +15,22 @@ pub const TABLES: [&str; 8] =
 /// The reason for a missing path.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum Pathless {
-    /// A row of this table stands for no protocol, or for many.
+    /// A row of this table describes no protocol, or many.
     #[error("a row of table `{0}` has no path over time\n  expected: a table of {list}", list = TABLES.join(", "))]
     Table(String),
-    /// Its status says that there is none.
+    /// According to its status there is no path.
     #[error("{0}")]
     Status(&'static str),
-    /// A number that determines the protocol was not written.
+    /// The row lacks a number that determines the protocol.
     #[error("it has no `{0}`, which the protocol needs")]
     Missing(&'static str),
-    /// The response to a step goes on and on.
+    /// The response to a step has no end.
     #[error("the response to a step has no duration of its own\n  help: add --t-f T, in the units of the dataset")]
     Duration,
 }
 
-/// The name, the protocol and the case of a row of `table` in the units of the model. `relative` says which of `alpha_2`,
-/// `alpha_3` are given relative to the duration, `t_f` is how long the response to a step is shown.
+/// The name, the protocol and the case of a row of `table` in scaled units. `relative` states which of `alpha_2` and `alpha_3` are relative to
+/// the duration; `t_f` is the time span of a step response.
 ///
 /// # Errors
 /// If the row has no path.

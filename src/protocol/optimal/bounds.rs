@@ -32,6 +32,11 @@ impl Bounds {
         Bounds::new(self.floor)
     }
 
+    /// Whether both ceilings are numbers, and that of the velocity positive.
+    pub(super) fn is_valid(&self) -> bool {
+        self.v_ceiling > 0.0 && !self.tau_ceiling.is_nan()
+    }
+
     /// Whether a ceiling is finite.
     pub const fn has_ceilings(&self) -> bool {
         self.v_ceiling != f64::INFINITY || self.tau_ceiling != f64::INFINITY

@@ -62,12 +62,23 @@ pub(super) struct Extremal {
 enum Rate {
     /// `gain (I + inner) + outer`, on the part of the family that a hold parametrises.
     Floor { gain: f64, inner: f64, outer: f64 },
-    /// `gain (I + inner) + outer`.
-    Turning { gain: f64, inner: f64, outer: f64 },
+    /// `gain (I + inner) + outer`; where theta falls at once, also `one_way` times the swing.
+    Turning { gain: f64, inner: f64, outer: f64, one_way: f64 },
     /// `gain` times the sensitivity of the direct chart.
     Direct { gain: f64 },
     /// `gain` times the swing, for arcs on which theta goes one way.
     OneWay { gain: f64 },
+}
+
+/// Sums over all free pieces.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub(super) struct FreeSums {
+    /// Of the sensitivity of the chart.
+    pub sensitivity: f64,
+    /// Of `theta/(u - 1)` at their ends less that at their starts; 0 at the start of the extremal.
+    pub ends: f64,
+    /// Of the swing.
+    pub swing: f64,
 }
 
 /// The start of an arc of a rising problem.
@@ -194,7 +205,7 @@ impl Problem {
         let one = |x_end: f64| {
             let (theta_h, ln_theta_h) = (self.from.theta * (1.0 + xi), ln_theta + ln_1p(xi));
             let arc = Arc { law, chart: Chart::Turning { theta_h, ln_theta_h, x_start: -xi.sqrt(), x_end, x_squares } };
-            let rate = Rate::Turning { gain: 0.0, inner: 0.0, outer: 0.0 };
+            let rate = Rate::Turning { gain: 0.0, inner: 0.0, outer: 0.0, one_way: 0.0 };
             self.without_hold(arc, ln_theta, arc.end()?.ln_u, rate)
         };
         if x > 0.0 { Some([one(-x)?, one(x)?]) } else { None }
@@ -279,6 +290,7 @@ impl Problem {
                     gain: swing * excess_0,
                     inner: self.to.theta / end.excess,
                     outer: -self.from.theta * swing,
+                    one_way: -excess_0 / self.from.theta,
                 }
             };
             return self.without_hold(arc, z_0, end.ln_u, rate);
@@ -305,13 +317,13 @@ impl Problem {
             gain: layer * 2.0 * x_start / grow,
             inner: if end.excess == 0.0 { 0.0 } else { self.to.theta / end.excess },
             outer: -layer * edge(&law, theta_h, ln_theta_h, x_start, &start),
+            one_way: 0.0,
         };
         self.without_hold(arc, start.ln_u, end.ln_u, rate)
     }
 
     /// Rising problem, `q < 0`: `ln u(t_f-)`, stretched under the bound.
     fn rising_to_the_end(&self, q: f64) -> Option<Extremal> {
-        let law = self.law;
         let reach = -self.to.ln;
         // ln v(t_f-), and ln u(t_f-).
         let (eta, z_1, stretch) = if self.bounded {
@@ -320,6 +332,13 @@ impl Problem {
         } else {
             (q + reach, q, 1.0)
         };
+        self.arriving(z_1, eta, stretch)
+    }
+
+    /// Rising problem: the member whose `ln u(t_f-)` is `z_1`, with `eta = ln v(t_f-)` and the derivative `stretch` of
+    /// `z_1` with respect to the parameter.
+    pub fn arriving(&self, z_1: f64, eta: f64, stretch: f64) -> Option<Extremal> {
+        let law = self.law;
         let (phi_1, excess_1) = phi_and_slope(z_1);
         let excess = law.a * phi_1;
         let friction_a = self.friction_a();
@@ -344,6 +363,7 @@ impl Problem {
                     gain: stretch * swing * excess_1,
                     inner: -theta_s / start.excess,
                     outer: stretch * self.to.theta * swing,
+                    one_way: 0.0,
                 }
             };
             return Some(Extremal { time_at_floor, theta_s, late, lags: true, arc, start: start.ln_u, end: z_1, rate });
@@ -382,7 +402,26 @@ impl Problem {
             gain: layer * 2.0 * x_end / (1.0 + x2),
             inner: -theta_s / start.excess,
             outer: layer * edge(&law, theta_h, ln_theta_h, x_end, &end),
+            one_way: 0.0,
         };
+        Some(Extremal { time_at_floor, theta_s, late, lags: true, arc, start: start.ln_u, end: end.ln_u, rate })
+    }
+
+    /// The member that turns at the lifetime `turn`, `depth = ln(turn/theta_1)`, where theta rises first; the parameter is
+    /// `ln theta_h` times `gain`.
+    pub fn turning_at(&self, turn: Lifetime, depth: f64, gain: f64) -> Option<Extremal> {
+        let law = self.law;
+        let below = Problem { to: turn, fall: self.from.theta / turn.theta - 1.0, ..*self };
+        let Leaving { time_at_floor, late, d } = below.leaving(-law.a * phi(turn.ln));
+        let theta_s = if time_at_floor > 0.0 { turn.theta * exp(d) } else { self.from.theta };
+        let (grown, shrunk) = (exp_m1(-d), exp_m1(depth));
+        let (x_start, x_end) = (-grown.sqrt(), shrunk.sqrt());
+        let chart =
+            Chart::Turning { theta_h: turn.theta, ln_theta_h: turn.ln, x_start, x_end, x_squares: shrunk - grown };
+        let arc = Arc { law, chart };
+        let (start, end) = (arc.start()?, arc.end()?);
+        let inner = self.to.theta / end.excess - theta_s / start.excess;
+        let rate = Rate::Turning { gain, inner, outer: 0.0, one_way: 0.0 };
         Some(Extremal { time_at_floor, theta_s, late, lags: true, arc, start: start.ln_u, end: end.ln_u, rate })
     }
 
@@ -437,17 +476,38 @@ impl Extremal {
         self.late + if self.lags { sums.lag } else { sums.time }
     }
 
+    /// Makes the time depend on the parameter by the swing alone.
+    pub fn one_way(&mut self, gain: f64) {
+        self.rate = Rate::OneWay { gain };
+    }
+
+    /// The term of the end in the derivative of the time.
+    pub fn inner(&self) -> f64 {
+        match self.rate {
+            Rate::Floor { inner, .. } | Rate::Turning { inner, .. } => inner,
+            Rate::Direct { .. } | Rate::OneWay { .. } => 0.0,
+        }
+    }
+
+    /// Derivative of the total time with respect to the parameter; `starts_free` says whether the first free piece is the
+    /// start of the extremal.
+    pub fn rate_of(&self, free: &FreeSums, starts_free: bool) -> f64 {
+        match self.rate {
+            Rate::Turning { one_way, .. } if !starts_free => one_way * free.swing,
+            Rate::Floor { gain, outer, .. } | Rate::Turning { gain, outer, .. } => {
+                gain * (free.sensitivity + free.ends) + outer
+            }
+            Rate::Direct { gain } => gain * free.sensitivity,
+            Rate::OneWay { gain } => gain * free.swing,
+        }
+    }
+
     /// How far the time (beyond the least) is from the one wanted, as a rising function of the parameter: the logarithm
     /// of their ratio, or their relative difference where a hold makes time linear in the parameter.
     pub fn probe(&self, problem: &Problem, sums: &Sums, beyond: f64) -> Probe {
         let time = self.time_beyond(sums);
-        let rate = match self.rate {
-            Rate::Floor { gain, inner, outer } | Rate::Turning { gain, inner, outer } => {
-                gain * (sums.sensitivity + inner) + outer
-            }
-            Rate::Direct { gain } => gain * sums.sensitivity,
-            Rate::OneWay { gain } => gain * sums.swing,
-        };
+        let free = FreeSums { sensitivity: sums.sensitivity, ends: self.inner(), swing: sums.swing };
+        let rate = self.rate_of(&free, true);
         let (value, slope) = if let Rate::Floor { .. } = self.rate {
             (time / beyond - 1.0, rate / beyond)
         } else if time > 0.0 {

@@ -5,6 +5,9 @@
 
 mod arc;
 mod bounds;
+mod ceiling;
+mod clamp;
+mod constrained;
 pub mod crossover;
 mod extremal;
 mod floor;
@@ -17,8 +20,10 @@ mod search;
 use super::{Motion, Solved, SolverStats, Status};
 use crate::model::{Law, Transition};
 use crate::numerics::elementary::{exp, ln_1p};
+use ceiling::Ceilings;
 use extremal::Problem;
 use lifetime::Lifetime;
+use search::Time;
 
 pub use bounds::Bounds;
 pub(super) use motion::Optimal as Route;
@@ -171,15 +176,17 @@ pub enum Obstacle {
 /// below the bound there has no numbers.
 pub fn solve(transition: &Transition, t_f: f64, bounds: impl Into<Bounds>, rtol: f64) -> Solved<Optimum> {
     let bounds = bounds.into();
-    if bounds.has_ceilings() {
-        return UNDONE;
+    let problem = Problem::of(transition, bounds.floor).filter(|_| t_f > 0.0 && t_f.is_finite());
+    let (Some(problem), true) = (problem, bounds.is_valid()) else { return INFEASIBLE };
+    if !bounds.has_ceilings() {
+        return search::solve(&problem, t_f, rtol);
     }
-    let bounded = bounds.floor;
-    let Some(problem) = Problem::of(transition, bounded).filter(|_| t_f > 0.0 && t_f.is_finite()) else {
-        return Solved { status: Status::Infeasible, value: None, stats: SolverStats::default() };
-    };
-    search::solve(&problem, t_f, rtol)
+    let ceilings = Ceilings::new(transition.law, problem.to, transition.v_f, &bounds);
+    constrained::find(&problem, &ceilings, Time::since(&problem, t_f), rtol).solved
 }
+
+const INFEASIBLE: Solved<Optimum> =
+    Solved { status: Status::Infeasible, value: None, stats: SolverStats { quadratures: 0, nodes: 0 } };
 
 const UNDONE: Solved<Optimum> =
     Solved { status: Status::NotConverged, value: None, stats: SolverStats { quadratures: 0, nodes: 0 } };
@@ -269,8 +276,8 @@ pub(super) fn route(transition: &Transition, t_f: f64, bounded: bool, rtol: f64)
     let Some(problem) = Problem::of(transition, bounded).filter(|_| t_f > 0.0 && t_f.is_finite()) else {
         return (Solved { status: Status::Infeasible, value: None, stats: SolverStats::default() }, None);
     };
-    let (solved, extremal) = search::find(&problem, t_f, rtol.min(MOTION_RTOL));
-    let route = solved.value.map(|_| Route::new(&problem, t_f, extremal));
+    let (solved, member) = search::find(&problem, t_f, rtol.min(MOTION_RTOL));
+    let route = solved.value.map(|_| Route::new(&problem, t_f, member.map(|member| member.extremal)));
     (solved, route)
 }
 
@@ -340,7 +347,7 @@ pub(super) fn feedback(
     let rounding = ROUNDINGS * f64::EPSILON * size;
     let beyond = if bounded && beyond <= rounding { 0.0 } else { beyond };
     let time = search::Time { whole: time_left, beyond, doubt: rounding / beyond };
-    let (solved, extremal) = search::find_beyond(&problem, time, rtol);
+    let (solved, member) = search::find_beyond(&problem, time, rtol);
     *stats += solved.stats;
     let optimum = solved.value?;
     let pressure = if optimum.strategy == Strategy::Floor {
@@ -356,8 +363,8 @@ pub(super) fn feedback(
     } else {
         0.0
     };
-    let ln_v = match extremal {
-        Some(extremal) if optimum.strategy != Strategy::Floor => extremal.start - from.ln,
+    let ln_v = match member {
+        Some(member) if optimum.strategy != Strategy::Floor => member.extremal.start - from.ln,
         _ => 0.0,
     };
     Some(Feedback { v: optimum.v_start, ln_v, pressure })

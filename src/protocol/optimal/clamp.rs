@@ -1,0 +1,490 @@
+//! A free extremal, clamped at the ceilings: the pieces of the optimal protocol, all with the same `C`.
+//!
+//! Where theta falls the optimum is `z = ln u = min(z_free, z_cap)`. It is on a ceiling where `G = a [phi(z_cap) - E]` is
+//! negative, so the pieces end at the zeros of `G`, which has one stationary point at most, and where the ceilings cross.
+
+use super::ArcKind;
+use super::arc::{Arc, Chart, Sums, phi, phi_and_slope};
+use super::ceiling::{CeilingArc, CeilingSums, Ceilings};
+use super::extremal::{Extremal, FreeSums, Problem};
+use super::lifetime::Lifetime;
+use crate::model::Law;
+use crate::numerics::elementary::{exp, exp_m1, ln, ln_1p};
+
+/// The part of an extremal on which theta falls to `theta_1`, as a function of the depth `d = ln(theta_top/theta)`.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Fall {
+    law: Law,
+    pub theta_top: f64,
+    pub ln_theta_top: f64,
+    /// `a E` at the top; 0 where theta turns there.
+    excess: f64,
+    /// Friction at the top with `u = 1`.
+    friction: f64,
+    /// The depth of `theta_1`.
+    pub depth: f64,
+    /// `ln u` at the top on the ceiling of the velocity and of friction.
+    z_v: f64,
+    z_tau: f64,
+    kappa: f64,
+}
+
+impl Fall {
+    /// `a E` and its derivative with respect to the depth.
+    fn energy(&self, d: f64) -> (f64, f64) {
+        let Law { a, b } = self.law;
+        let shrunk = exp_m1(-d);
+        let theta = 1.0 + shrunk;
+        let value = self.excess * theta - (b - a) * d - self.friction * shrunk;
+        (value, (self.friction - self.excess) * theta - (b - a))
+    }
+
+    /// `ln u` on a ceiling.
+    pub fn cap(&self, kind: ArcKind, d: f64) -> f64 {
+        if kind == ArcKind::VCeiling { self.z_v - d } else { self.z_tau - self.kappa * d }
+    }
+
+    /// `G = a [phi(z_cap) - E]` and its derivative with respect to the depth.
+    fn gap(&self, kind: ArcKind, d: f64) -> (f64, f64) {
+        let (energy, rate) = self.energy(d);
+        let (phi, slope) = phi_and_slope(self.cap(kind, d));
+        let fall = if kind == ArcKind::VCeiling { 1.0 } else { self.kappa };
+        (self.law.a * phi - energy, -self.law.a * slope * fall - rate)
+    }
+
+    /// The depth at which `G` of friction is stationary.
+    fn stationary(&self) -> f64 {
+        let Law { a, b } = self.law;
+        let ratio = (self.excess - self.friction) / (a * self.kappa);
+        if ratio > 0.0 && b > 0.0 { a / b * (ln(ratio) - self.z_tau) } else { f64::NAN }
+    }
+
+    /// The depth beyond which the velocity binds before friction.
+    fn crossing(&self, ceilings: &Ceilings) -> f64 {
+        self.depth - ceilings.crossing()
+    }
+
+    /// Adds the zeros of `G` between two depths.
+    fn zeros(&self, kind: ArcKind, from: f64, to: f64, breaks: &mut Breaks) {
+        if from >= to {
+            return;
+        }
+        let stationary = if kind == ArcKind::TauCeiling { self.stationary() } else { f64::NAN };
+        if stationary > from && stationary < to {
+            self.zero(kind, from, stationary, breaks);
+            self.zero(kind, stationary, to, breaks);
+        } else {
+            self.zero(kind, from, to, breaks);
+        }
+    }
+
+    /// Adds the zero of a monotone `G` between two depths, if there is one.
+    fn zero(&self, kind: ArcKind, mut from: f64, mut to: f64, breaks: &mut Breaks) {
+        let (start, end) = (self.gap(kind, from).0, self.gap(kind, to).0);
+        if (start < 0.0) == (end < 0.0) {
+            return;
+        }
+        // G is convex or concave in theta between them: from the end where it bends away Newton's method is monotone.
+        let mut d = if start.abs() < end.abs() { from } else { to };
+        for _ in 0..MOST_STEPS {
+            let (value, slope) = self.gap(kind, d);
+            if (value < 0.0) == (start < 0.0) {
+                from = d
+            } else {
+                to = d
+            }
+            let next = d - value / slope;
+            let next = if next > from && next < to { next } else { 0.5 * (from + to) };
+            let step = (next - d).abs();
+            d = next;
+            if step <= RESOLUTION * d {
+                break;
+            }
+        }
+        breaks.add(d);
+    }
+}
+
+/// More steps than Newton's method takes.
+const MOST_STEPS: u32 = 100;
+
+/// Relative resolution of a depth.
+const RESOLUTION: f64 = 4e-16;
+
+/// Depths at which pieces end, in any order.
+struct Breaks {
+    depths: [f64; Path::MOST_PIECES],
+    count: usize,
+}
+
+impl Breaks {
+    fn add(&mut self, depth: f64) {
+        if self.count < self.depths.len() {
+            self.depths[self.count] = depth;
+            self.count += 1;
+        }
+    }
+}
+
+/// A piece of a clamped extremal.
+#[derive(Debug, Clone, Copy)]
+pub(super) enum Piece {
+    /// A part of the free extremal.
+    Free {
+        arc: Arc,
+        /// `d time/d ln theta` where it starts and ends, at fixed time of its place: `theta/(u - 1)`; 0 at an end of the
+        /// extremal.
+        before: f64,
+        after: f64,
+        /// `(theta, ln u)` at both ends.
+        ends: [(f64, f64); 2],
+    },
+    /// A part on a ceiling.
+    Ceiling {
+        arc: CeilingArc,
+        /// `a E` at its end of greater theta, and `C theta` there.
+        excess: f64,
+        pull: f64,
+    },
+}
+
+/// A clamped extremal after its time at the floor.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Path {
+    pub extremal: Extremal,
+    pieces: [Option<Piece>; Path::MOST_PIECES],
+    count: usize,
+    /// Derivative of the time with respect to the parameter where quadratures do not resolve it.
+    rate: Option<f64>,
+}
+
+/// What a quadrature along a path finds.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct PathSums {
+    /// Time at the floor and all pieces.
+    pub time: f64,
+    /// Without the time at the floor.
+    pub work: f64,
+    /// Derivative of the time with respect to the parameter of the family.
+    pub rate: f64,
+    pub friction_min: f64,
+    pub nodes: u32,
+}
+
+impl Path {
+    /// Rising, free, friction, free, friction, velocity, and one to spare.
+    pub const MOST_PIECES: usize = 8;
+
+    /// A path without pieces.
+    pub fn new(extremal: Extremal) -> Path {
+        Path { extremal, pieces: [None; Path::MOST_PIECES], count: 0, rate: None }
+    }
+
+    /// The pieces in their order.
+    pub fn pieces(&self) -> impl Iterator<Item = &Piece> {
+        self.pieces.iter().flatten()
+    }
+
+    pub fn push(&mut self, piece: Piece) {
+        if self.count < self.pieces.len() {
+            self.pieces[self.count] = Some(piece);
+            self.count += 1;
+        }
+    }
+
+    /// The kinds of all pieces as one number.
+    pub fn signature(&self) -> u32 {
+        let code = |piece: &Piece| match piece {
+            Piece::Free { .. } => 1,
+            Piece::Ceiling { arc, .. } => 1 + arc.kind as u32,
+        };
+        let floor = u32::from(self.extremal.time_at_floor > 0.0);
+        self.pieces().fold(floor, |sum, piece| 4 * sum + code(piece))
+    }
+
+    /// The extremal at `problem`, clamped; `None` where theta could not fall from the top.
+    pub fn clamped(problem: &Problem, ceilings: &Ceilings, extremal: Extremal) -> Option<Path> {
+        let Some(fall) = falling_part(problem, ceilings, &extremal) else {
+            let mut path = Path::new(extremal);
+            path.push(whole(problem, &extremal));
+            return Some(path);
+        };
+        if fall.z_v.min(fall.z_tau) <= 0.0 {
+            return None;
+        }
+        Some(Path::along(problem, ceilings, extremal, &fall))
+    }
+
+    /// The extremal with its falling part clamped.
+    pub fn along(problem: &Problem, ceilings: &Ceilings, extremal: Extremal, fall: &Fall) -> Path {
+        let mut breaks = Breaks { depths: [f64::INFINITY; Path::MOST_PIECES], count: 0 };
+        let across = fall.crossing(ceilings).clamp(0.0, fall.depth);
+        if ceilings.tau.is_finite() {
+            fall.zeros(ArcKind::TauCeiling, 0.0, across, &mut breaks);
+        }
+        if ceilings.v.is_finite() {
+            fall.zeros(ArcKind::VCeiling, across, fall.depth, &mut breaks);
+        }
+        if across > 0.0 && across < fall.depth {
+            breaks.add(across);
+        }
+        breaks.add(fall.depth);
+        let depths = &mut breaks.depths[..breaks.count];
+        depths.sort_unstable_by(f64::total_cmp);
+        let mut path = Path::new(extremal);
+        let mut from = 0.0;
+        let mut free_from = None;
+        for &to in depths.iter().filter(|&&to| to > 0.0) {
+            if to <= from {
+                continue;
+            }
+            let kind = if to <= across { ArcKind::TauCeiling } else { ArcKind::VCeiling };
+            let capped = fall.gap(kind, 0.5 * (from + to)).0 < 0.0;
+            if capped {
+                if let Some(start) = free_from.take() {
+                    path.push(part(problem, &extremal, fall, start, from));
+                }
+                path.push(ceiling_part(ceilings, fall, kind, from, to));
+            } else {
+                free_from = free_from.or(Some(from));
+            }
+            from = to;
+        }
+        if let Some(start) = free_from {
+            path.push(part(problem, &extremal, fall, start, fall.depth));
+        }
+        path
+    }
+
+    /// Quadrature of all pieces to relative accuracy `tolerance`.
+    pub fn sums(&self, tolerance: f64) -> Option<PathSums> {
+        let mut found =
+            PathSums { time: self.extremal.time_at_floor, work: 0.0, rate: 0.0, friction_min: f64::INFINITY, nodes: 0 };
+        let mut free = FreeSums::default();
+        let mut starts_free = false;
+        for (i, piece) in self.pieces().enumerate() {
+            match piece {
+                Piece::Free { arc, before, after, .. } => {
+                    let sums = arc.sums(tolerance)?;
+                    let Sums { time, work, sensitivity, swing, friction_min, nodes, .. } = sums;
+                    found.time += time;
+                    found.work += work;
+                    found.friction_min = found.friction_min.min(friction_min);
+                    found.nodes += nodes;
+                    free.sensitivity += sensitivity;
+                    free.ends += after - before;
+                    free.swing += swing;
+                    starts_free |= i == 0;
+                }
+                Piece::Ceiling { arc, .. } => {
+                    let CeilingSums { time, work, nodes, .. } = arc.sums(ln(arc.theta_hi), None);
+                    found.time += time;
+                    found.work += work;
+                    found.nodes += nodes;
+                }
+            }
+        }
+        let rate = self.extremal.rate_of(&free, starts_free);
+        found.rate = self.rate.unwrap_or(rate);
+        (found.time.is_finite() && found.work.is_finite()).then_some(found)
+    }
+
+    /// Times on the ceilings of the velocity and of friction.
+    pub fn times(&self) -> (f64, f64) {
+        let mut times = (0.0, 0.0);
+        for piece in self.pieces() {
+            if let Piece::Ceiling { arc, .. } = piece {
+                let time = if arc.kind == ArcKind::VCeiling { &mut times.0 } else { &mut times.1 };
+                *time += arc.time();
+            }
+        }
+        times
+    }
+
+    /// `(ln theta, ln u)` at the start of the first piece and at the end of the last one.
+    pub fn first_and_last(&self) -> Option<[(f64, f64); 2]> {
+        let first = self.pieces().next()?.ends()[0];
+        let last = self.pieces().last()?.ends()[1];
+        Some([first, last])
+    }
+}
+
+impl Piece {
+    /// `(theta, ln u)` at both ends.
+    pub fn ends(&self) -> [(f64, f64); 2] {
+        match self {
+            Piece::Free { ends, .. } => *ends,
+            Piece::Ceiling { arc, .. } => {
+                let (high, low) = ((arc.theta_hi, arc.z_hi), (arc.theta_hi * exp(-arc.length), arc.z_lo));
+                if arc.z_hi + arc.z_lo > 0.0 { [high, low] } else { [low, high] }
+            }
+        }
+    }
+}
+
+/// The part of an extremal on which theta falls; `None` if it rises to the end.
+fn falling_part(problem: &Problem, ceilings: &Ceilings, extremal: &Extremal) -> Option<Fall> {
+    let law = problem.law;
+    let (theta_top, ln_theta_top, excess, depth) = match extremal.arc.chart {
+        Chart::Turning { x_end, .. } if x_end <= 0.0 => return None,
+        Chart::Turning { theta_h, ln_theta_h, x_start, x_end, .. } if x_start <= 0.0 => {
+            (theta_h, ln_theta_h, 0.0, ln_1p(x_end * x_end))
+        }
+        Chart::Direct { y_end: 0.0, .. } => return None,
+        _ => (problem.from.theta, problem.from.ln, law.a * phi(extremal.start), ln_1p(problem.fall)),
+    };
+    Some(Fall {
+        law,
+        theta_top,
+        ln_theta_top,
+        excess,
+        friction: 1.0 + (law.b - law.a) * ln_theta_top,
+        depth,
+        z_v: ceilings.z_v + depth,
+        z_tau: ceilings.z_tau + ceilings.kappa * depth,
+        kappa: ceilings.kappa,
+    })
+}
+
+/// A free extremal as one piece.
+pub(super) fn whole(problem: &Problem, extremal: &Extremal) -> Piece {
+    let ends = [(extremal.theta_s, extremal.start), (problem.to.theta, extremal.end)];
+    Piece::Free { arc: extremal.arc, before: 0.0, after: extremal.inner(), ends }
+}
+
+/// The free part of an extremal between two depths; from the start if the first is 0.
+fn part(problem: &Problem, extremal: &Extremal, fall: &Fall, from: f64, to: f64) -> Piece {
+    let law = problem.law;
+    let (first, last) = (from == 0.0, to == fall.depth);
+    if first && last {
+        return whole(problem, extremal);
+    }
+    let chart = match extremal.arc.chart {
+        Chart::Turning { theta_h, ln_theta_h, x_start, x_end, .. } => {
+            // 1 + X^2 = theta_h/theta.
+            let top = if x_start <= 0.0 { 0.0 } else { x_start * x_start };
+            let place = |d: f64| (top + (1.0 + top) * exp_m1(d)).sqrt();
+            let begin = if first { x_start } else { place(from) };
+            let end = if last { x_end } else { place(to) };
+            let squares = (1.0 + top) * exp(from) * exp_m1(to - from);
+            let x_squares = if first && x_start <= 0.0 { squares - x_start * x_start } else { squares };
+            Chart::Turning { theta_h, ln_theta_h, x_start: begin, x_end: end, x_squares }
+        }
+        Chart::Direct { theta_a, z_a, friction_a, .. } => {
+            Chart::Direct { theta_a, z_a, friction_a, y_start: -from, y_end: -to }
+        }
+    };
+    let switch = |d: f64| {
+        let kind = binding(fall, d);
+        let z = fall.cap(kind, d);
+        (fall.theta_top * exp(-d), z)
+    };
+    let start = if first { (extremal.theta_s, extremal.start) } else { switch(from) };
+    let end = if last { (problem.to.theta, extremal.end) } else { switch(to) };
+    let swing = |(theta, z): (f64, f64)| theta / exp_m1(z);
+    Piece::Free {
+        arc: Arc { law, chart },
+        before: if first { 0.0 } else { swing(start) },
+        after: if last { extremal.inner() } else { swing(end) },
+        ends: [start, end],
+    }
+}
+
+/// The lower ceiling.
+fn binding(fall: &Fall, d: f64) -> ArcKind {
+    let of_v = fall.cap(ArcKind::VCeiling, d) < fall.cap(ArcKind::TauCeiling, d);
+    if of_v { ArcKind::VCeiling } else { ArcKind::TauCeiling }
+}
+
+fn ceiling_part(ceilings: &Ceilings, fall: &Fall, kind: ArcKind, from: f64, to: f64) -> Piece {
+    let theta_hi = fall.theta_top * exp(-from);
+    // At theta_1 the ceilings are known best.
+    let z_lo = if to == fall.depth { ceilings.cap_of(kind, 0.0) } else { fall.cap(kind, to) };
+    let arc = ceilings.arc(kind, theta_hi, to - from, fall.cap(kind, from), z_lo);
+    let (excess, _) = fall.energy(from);
+    Piece::Ceiling { arc, excess, pull: (fall.excess - fall.friction) * exp(-from) }
+}
+
+impl Piece {
+    pub fn kind(&self) -> ArcKind {
+        match self {
+            Piece::Free { .. } => ArcKind::Free,
+            Piece::Ceiling { arc, .. } => arc.kind,
+        }
+    }
+}
+
+impl Path {
+    /// An extremal that turns at `theta_c e^-delta`, the lifetime of steady sliding on the ceiling of friction being
+    /// `theta_c`, clamped. `delta` may be too small for a number.
+    pub fn lingering(problem: &Problem, ceilings: &Ceilings, extremal: Extremal, ln_delta: f64) -> Option<Path> {
+        let mut fall = falling_part(problem, ceilings, &extremal)?;
+        let slope = -ceilings.kappa;
+        fall.z_tau = slope * exp(ln_delta);
+        let mut path = Path::along(problem, ceilings, extremal, &fall);
+        if ln_delta < LN_TINY {
+            path.rate = Some(-fall.theta_top / slope);
+            let first = path.pieces.iter_mut().flatten().find_map(|piece| match piece {
+                Piece::Ceiling { arc, .. } => Some(arc),
+                Piece::Free { .. } => None,
+            });
+            if let Some(arc) = first {
+                (arc.z_hi, arc.ln_z) = (fall.z_tau, ln(slope) + ln_delta);
+            }
+        }
+        Some(path)
+    }
+
+    /// An extremal of a rising problem that meets a ceiling at `theta_1 e^-way`, where `ln u = z` and its slope over `ln
+    /// theta` is `rise`, and stays there. `pace` is the derivative of `way` with respect to the parameter.
+    pub fn rising(problem: &Problem, ceilings: &Ceilings, switch: Switch) -> Option<Path> {
+        let Switch { way, z, ln_z, rise, pace } = switch;
+        let (law, to) = (problem.law, &problem.to);
+        let theta = Lifetime::with(to.theta * exp(-way), to.rest - to.theta * exp_m1(-way));
+        let fall = exp_m1(way + ln_1p(problem.fall));
+        if fall >= 0.0 {
+            return None;
+        }
+        let sub = Problem { to: theta, fall, ..*problem };
+        let mut extremal = sub.arriving(z, z - theta.ln, 1.0)?;
+        // C = [a phi(z) - tau_ss]/theta along the ceiling.
+        let c = extremal.arc.c();
+        let steepness = (law.a * exp_m1(z) * rise - (law.b - law.a)) / theta.theta - c;
+        extremal.one_way(pace * steepness / law.a);
+        let mut path = Path::new(extremal);
+        path.push(whole(&sub, &extremal));
+        if let Some(ln_z) = ln_z {
+            let mut arc = ceilings.arc(ArcKind::TauCeiling, to.theta, way, ceilings.z_tau, z);
+            arc.ln_z = ln_z;
+            path.push(Piece::Ceiling { arc, excess: 0.0, pull: 0.0 });
+            if z > -CLOSE {
+                path.rate = Some(pace * theta.theta / exp_m1(-z));
+            }
+        } else {
+            for arc in ceilings.arcs(to.theta, 0.0, -way) {
+                path.push(Piece::Ceiling { arc, excess: 0.0, pull: 0.0 });
+            }
+        }
+        Some(path)
+    }
+}
+
+/// Where theta, rising, meets a ceiling.
+pub(super) struct Switch {
+    /// `ln(theta_1/theta)`.
+    pub way: f64,
+    /// `ln u`.
+    pub z: f64,
+    /// Logarithm of its absolute value, if that may be too small for a number.
+    pub ln_z: Option<f64>,
+    /// Derivative of `ln u` on the ceiling with respect to `ln theta`.
+    pub rise: f64,
+    /// Derivative of `way` with respect to the parameter.
+    pub pace: f64,
+}
+
+/// `ln delta` below which squares of `delta` are no numbers.
+const LN_TINY: f64 = -300.0;
+
+/// `|ln u|` below which the time of a free arc that ends there hardly changes with it.
+const CLOSE: f64 = 0.02;
