@@ -1,6 +1,6 @@
 """The package against the engine alone, and against what one would write in Python instead.
 
-Usage: compare.py ENGINE WHEEL. ENGINE is the example `engine` of this crate, WHEEL the installed wheel. `run` beside it makes both.
+Usage: compare.py ENGINE WHEEL. ENGINE is the example `engine` of this crate, WHEEL the installed wheel. `python/benches/run` makes both.
 """
 
 import subprocess

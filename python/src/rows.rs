@@ -38,7 +38,7 @@ impl Buffer {
     }
 }
 
-/// Computed rows before anybody asks for Arrow.
+/// Computed rows before a request for Arrow.
 struct Computed {
     sweep: Arc<Sweep>,
     request: usize,

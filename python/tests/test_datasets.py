@@ -86,7 +86,7 @@ WRONG = {
     "axis": ({"axes": {**PAPER, "v_g": 3.0}}, "v_g"),
     "value": ({"axes": {**PAPER, "v_i": 0.5}}, "axes.v_i: 0.5 is out of range"),
     "table": ({"tables": {"optimum": {}}}, "tables.optimum: unknown table `optimum`"),
-    "key": ({"tabels": {}}, "tabels: unknown key `tabels`"),
+    "key": ({"table_s": {}}, "table_s: unknown key `table_s`"),
     "type": ({"axes": {**PAPER, "v_i": True}}, "axes.v_i: found boolean `true`"),
 }
 

@@ -154,7 +154,7 @@ def test_failed_rows_have_a_status():
         (dict(grid=dict(bogus=[1.0])), "grid: unknown axis `bogus`"),
         (dict(grid=dict(t_f=[[1.0, 2.0]]), t_f=None), "grid: t_f has the shape (1, 2)"),
         (dict(rtol=1.0), "rtol: 1.0 is out of range\n  expected: 1e-13 <= rtol <= 1e-2"),
-        (dict(columns=["wrok"]), "unknown column `wrok`"),
+        (dict(columns=["work_"]), "unknown column `work_`"),
         (dict(units="SI"), "model.units: unknown unit system \"SI\""),
         (dict(units="si"), "model.units: \"si\" without `mu_0`"),
     ],

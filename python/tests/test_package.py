@@ -15,7 +15,7 @@ def test_the_import_brings_no_library_but_numpy():
     assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout == "[]\n"
 
 
-def test_all_is_what_there_is():
+def test_all_names_exist():
     assert all(hasattr(ss, name) for name in ss.__all__) and "optimal" in ss.__all__
 
 

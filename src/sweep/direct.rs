@@ -121,8 +121,8 @@ impl Sweep {
         }
         buffer.resize(rows);
         // Rows of a table over the axes of the optimum have an optimum each.
-        let shares = request.table.axes() != OPTIMUM_AXES && request.table.needs_optimum(&request.projection);
-        let optima = if shares { request.row_index.tuples(OPTIMUM_AXES).span() } else { 0 };
+        let is_common = request.table.axes() != OPTIMUM_AXES && request.table.needs_optimum(&request.projection);
+        let optima = if is_common { request.row_index.tuples(OPTIMUM_AXES).span() } else { 0 };
         let optimum_cache = OptimumCache::new(optima, self.bounded, request.rtol);
         let job = self.job(request, &optimum_cache, signal);
         request.table.compute(&job, 0..request.rows, &mut buffer)?;
