@@ -105,7 +105,7 @@ def _values(flat: npt.NDArray[Any]) -> object:
 def _array(name: str, value: object) -> npt.NDArray[Any]:
     """Doubles, or words as objects."""
     if isinstance(value, np.ma.MaskedArray):
-        value = value.astype(float).filled(np.nan)
+        value = np.ma.filled(value.astype(float), np.nan)
     array = np.asarray(value)
     kind = array.dtype.kind
     if kind == "f" and array.dtype == np.float64:

@@ -4,7 +4,6 @@ import html
 import os
 import warnings
 from collections.abc import Iterator, Mapping
-from functools import cached_property
 from typing import TYPE_CHECKING
 
 from . import _core
@@ -26,6 +25,7 @@ class DatasetTable(Columns):
 
     def __init__(self, dataset: "Dataset", name: str, doc: str) -> None:
         self.dataset, self.name, self.doc = dataset, name, doc
+        self.__rows: _core.Rows | None = None
 
     @property
     def paths(self) -> list[str]:
@@ -35,9 +35,11 @@ class DatasetTable(Columns):
             warnings.warn(f"{self.name}: {missing} parts are missing; running the spec computes them", stacklevel=2)
         return [os.fspath(path) for path in paths]
 
-    @cached_property
-    def _rows(self) -> _core.Rows:  # type: ignore[override]
-        return self.dataset._dataset.rows(self.name)
+    @property
+    def _rows(self) -> _core.Rows:
+        if self.__rows is None:
+            self.__rows = self.dataset._dataset.rows(self.name)
+        return self.__rows
 
     @property
     def shape(self) -> tuple[int, ...]:  # type: ignore[override]

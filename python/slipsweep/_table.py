@@ -113,7 +113,8 @@ class Columns:
         places = _array(buffer, np.int32, len(self))
         if words == ["False", "True"]:
             return places.astype(bool) if (places >= 0).all() else np.array([False, True, None])[places]
-        return np.array([*words, None], dtype=object)[places]
+        cells: npt.NDArray[Any] = np.array([*words, None], dtype=object)[places]
+        return cells
 
     def __arrow_c_schema__(self) -> object:
         return self._rows.__arrow_c_schema__()
@@ -189,7 +190,7 @@ class Columns:
 
 def _array(buffer: _core.Buffer, kind: type[Any], length: int) -> npt.NDArray[Any]:
     # NumPy refuses an empty buffer.
-    return np.frombuffer(buffer, dtype=kind) if length else np.empty(0, dtype=kind)
+    return np.frombuffer(memoryview(buffer), dtype=kind) if length else np.empty(0, dtype=kind)
 
 
 def _shown(cell: Any) -> str:

@@ -2,7 +2,7 @@
 
 import json
 import os
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 import numpy as np
@@ -40,6 +40,6 @@ def _value(value: object) -> str:
         return json.dumps(os.fspath(value), ensure_ascii=False).replace("\x7f", "\\u007f")
     if isinstance(value, Mapping):
         return "{ " + ", ".join(f"{_key(key)} = {_value(one)}" for key, one in value.items()) + " }"
-    if hasattr(value, "__iter__"):
+    if isinstance(value, Iterable):
         return "[" + ", ".join(_value(one) for one in value) + "]"
     raise ValueError(f"{value!r} has no place in a spec\n  expected: numbers, strings, lists and dicts\n  help: convert it")

@@ -29,6 +29,7 @@ def dataset(rows: "Columns") -> "xr.Dataset":
     shape = tuple(len(steps[name][0]) for name in varying)
     order = _order([steps[name][1] for name in varying], shape, len(rows))
     coordinates: dict[str, Any]
+    data: dict[str, Any]
     if order is None:
         coordinates = {name: ("row", cells[name], attributes[name]) for name in varying} | scalars
         data = {name: ("row", cells[name], attributes[name]) for name in results}
