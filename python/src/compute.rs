@@ -1,9 +1,10 @@
 //! A table over arguments of a function.
 
+use std::ffi::CString;
 use std::sync::Arc;
 
 use pyo3::buffer::PyBuffer;
-use pyo3::exceptions::PyValueError;
+use pyo3::exceptions::{PyUserWarning, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::{PyFloat, PyInt, PyList, PyString};
 use slipsweep::grid::{Quantity, Scale};
@@ -17,6 +18,9 @@ use crate::threads::{Interrupted, interruptible, stopper};
 /// Cost up to which a row is computed on the thread of the caller, in nanoseconds. Chosen: twice the time that it takes to wake another thread and
 /// to be woken by it.
 const MAX_INLINE_NS: u64 = 50_000;
+
+/// Levels of the stack from here to the caller of a function of a table.
+const CALLER: i32 = 3;
 
 /// Model and units: the keys of `[model]` in a spec.
 type Model = (bool, String, Option<f64>, Option<f64>, Option<f64>, Option<f64>);
@@ -47,6 +51,10 @@ pub fn compute(
         columns: columns.as_deref(),
     };
     let sweep = Arc::new(Sweep::direct(direct).map_err(|error| error::spec(&error))?);
+    for warning in &sweep.warnings {
+        let text = CString::new(warning.to_string()).map_err(error::defect)?;
+        PyErr::warn(py, &py.get_type::<PyUserWarning>(), &text, CALLER)?;
+    }
     rows(py, sweep, 0)
 }
 

@@ -47,7 +47,8 @@ fn axis(py: Python<'_>, quantity: Quantity) -> PyResult<Bound<'_, PyDict>> {
 fn column<'py>(py: Python<'py>, column: &Column) -> PyResult<Bound<'py, PyDict>> {
     let (unit, words, kind) = match column.kind {
         Kind::Number(unit) => (Units::Scaled.name(unit), Vec::new(), "number"),
-        Kind::Quantity(quantity) => (quantity.unit(Scale::Model), Vec::new(), "number"),
+        // As in a call: relative to the duration where the table has no such axis.
+        Kind::Quantity(quantity) => (quantity.unit(Scale::Duration), Vec::new(), "number"),
         Kind::Label(words) => ("", words.to_vec(), "word"),
         Kind::Flag => ("", Vec::new(), "flag"),
     };

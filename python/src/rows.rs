@@ -1,6 +1,6 @@
 //! Rows of a table in memory: Arrow by the PyCapsule interface, and the buffers of its columns.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, OnceLock};
 
 use arrow_array::cast::AsArray;
@@ -20,6 +20,7 @@ use slipsweep::table::ColumnBuffer;
 
 use crate::dataset::{PlotArguments, svg};
 use crate::error::{self, defect};
+use crate::threads::on_pool;
 
 /// The values of a column: bytes that NumPy reads without a copy.
 #[pyclass(frozen, module = "slipsweep._core")]
@@ -171,14 +172,21 @@ impl Rows {
     }
 
     /// The picture of computed rows, drawn from a dataset in `folder`, which is empty and temporary.
-    fn plot(&self, folder: PathBuf, arguments: PlotArguments) -> PyResult<String> {
+    fn plot(&self, py: Python<'_>, folder: PathBuf, arguments: PlotArguments) -> PyResult<String> {
+        on_pool(py, || self.drawn(&folder, &arguments))?
+    }
+}
+
+impl Rows {
+    /// The picture of computed rows, from a dataset that is written to `folder`.
+    fn drawn(&self, folder: &Path, arguments: &PlotArguments) -> PyResult<String> {
         let computed = self.computed.as_ref().ok_or_else(|| PyValueError::new_err("these rows have no picture"))?;
         let (sweep, request) = (&computed.sweep, &computed.sweep.requests[computed.request]);
         let buffer = column_buffer(self.batch()?, request.projection.indices().len())?;
         let mut manifest = Plan::new(sweep).manifest(sweep);
         manifest.spec = format!("[model]\nvelocity_bound = {}\n", sweep.bounded);
         manifest.tables.retain(|table| table.name == request.table.name());
-        let folder = Folder::new(&folder, "rows");
+        let folder = Folder::new(folder, "rows");
         let session = folder.open(&manifest, Concurrency::Alone).map_err(|error| error::dataset(&error))?;
         let layout = Layout::new(request.table, &request.projection, &sweep.grid);
         let name = request.table.name();
@@ -193,7 +201,7 @@ impl Rows {
                 session.write_part(name, part, &bytes).map_err(|error| error::dataset(&error))?;
             }
         }
-        svg(&Source::new(folder.clone(), manifest, sweep.grid.units), name, &arguments)
+        svg(&Source::new(folder.clone(), manifest, sweep.grid.units), name, arguments)
     }
 }
 

@@ -146,7 +146,8 @@ def test_traces_are_those_of_the_command(tmp_path, dataset):
     assert trace.columns == read.columns == ["t", "v", "theta", "tau", "beta"]
     for name in read.columns:
         assert same(trace[name], read[name].to_numpy())
-    assert trace.facts["work"] == ss.optimal(**PAPER)["work"] and trace.facts["status"] == "ok"
+    assert f"# work = {trace.facts['work']!r}\n" in (tmp_path / "optimal.csv").read_text()
+    assert trace.facts["work"] == pytest.approx(ss.optimal(**PAPER)["work"], rel=1e-10) and trace.facts["status"] == "ok"
     command("plot", "optimal.csv", "--out", "optimal.svg", cwd=tmp_path)
     assert trace.plot() == trace._repr_html_() == (tmp_path / "optimal.svg").read_text()
     both = trace.plot(ss.trace("best_cubic", **PAPER))

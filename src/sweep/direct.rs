@@ -66,6 +66,16 @@ pub enum RowsError {
     },
 }
 
+/// Bytes of rows that are not compared with the memory of the machine. Chosen: every machine has them.
+const MAX_UNCHECKED_BYTES: u64 = 1 << 28;
+
+/// Bytes of memory that the system would give without swapping; `None` if it does not say.
+fn available_bytes() -> Option<u64> {
+    let text = std::fs::read_to_string("/proc/meminfo").ok()?;
+    let line = text.lines().find_map(|line| line.strip_prefix("MemAvailable:"))?;
+    Some(1024 * line.trim().strip_suffix("kB")?.trim().parse::<u64>().ok()?)
+}
+
 impl Sweep {
     /// The sweep of one table over values in memory.
     ///
@@ -113,7 +123,10 @@ impl Sweep {
     pub fn rows(&self, request: &Request, signal: &Signal) -> Result<ColumnBuffer, RowsError> {
         let mut buffer = ColumnBuffer::new(request.projection.indices().len());
         let rows = usize::try_from(request.rows).unwrap_or(usize::MAX);
-        if buffer.columns.iter_mut().any(|column| column.try_reserve_exact(rows).is_err()) {
+        let cells = 1 + buffer.columns.len() as u64 + request.table.axes().len() as u64;
+        let bytes = request.rows.saturating_mul(8 * cells);
+        let fits = bytes <= MAX_UNCHECKED_BYTES || available_bytes().is_none_or(|available| bytes <= available);
+        if !fits || buffer.columns.iter_mut().any(|column| column.try_reserve_exact(rows).is_err()) {
             return Err(RowsError::Memory { rows: request.rows });
         }
         if rows == 0 {
