@@ -44,7 +44,9 @@ pub fn compute(
     let direct = Direct {
         table,
         points: given(Quantity::ALL.into_iter().filter(|axis| table.axes().contains(axis)).zip(&values))?,
-        grid: given(grid.iter().map(|(name, value)| Ok((known_axis(name)?, value))).collect::<PyResult<Vec<_>>>()?.into_iter())?,
+        grid: given(
+            grid.iter().map(|(name, value)| Ok((known_axis(name)?, value))).collect::<PyResult<Vec<_>>>()?.into_iter(),
+        )?,
         scale: if is_relative { Scale::Duration } else { Scale::Model },
         model: model.map_or_else(ModelSpec::default, model_of),
         rtol,
@@ -79,8 +81,9 @@ fn model_of((velocity_bound, units, mu_0, l, v_0, normal_stress): Model) -> Mode
 /// The axis of a product.
 fn known_axis(name: &str) -> PyResult<Quantity> {
     let known = Quantity::ALL.map(Quantity::name).join(", ");
-    Quantity::from_name(name)
-        .ok_or_else(|| PyValueError::new_err(format!("grid: unknown axis `{name}`\n  expected: {known}\n  help: correct the name")))
+    Quantity::from_name(name).ok_or_else(|| {
+        PyValueError::new_err(format!("grid: unknown axis `{name}`\n  expected: {known}\n  help: correct the name"))
+    })
 }
 
 fn given<'a, 'py: 'a>(values: impl Iterator<Item = (Quantity, &'a Bound<'py, PyAny>)>) -> PyResult<Given> {
@@ -113,5 +116,10 @@ fn numbers(quantity: Quantity, value: &Bound<'_, PyAny>) -> PyResult<Vec<f64>> {
 /// The fault of a number for a word.
 fn wrong(quantity: Quantity, found: &str) -> slipsweep::sweep::SpecError {
     let words = quantity.words().join(", ");
-    slipsweep::sweep::SpecError::new(quantity.name(), format!("found {found}"), format!("one of {words}"), "write a word")
+    slipsweep::sweep::SpecError::new(
+        quantity.name(),
+        format!("found {found}"),
+        format!("one of {words}"),
+        "write a word",
+    )
 }

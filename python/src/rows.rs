@@ -120,7 +120,10 @@ impl Rows {
         let columns = request.table.columns();
         let place = request.projection.indices().iter().position(|&index| {
             columns[index].name == name
-                && matches!(columns[index].kind, slipsweep::table::Kind::Number(_) | slipsweep::table::Kind::Quantity(_))
+                && matches!(
+                    columns[index].kind,
+                    slipsweep::table::Kind::Number(_) | slipsweep::table::Kind::Quantity(_)
+                )
         });
         // An axis of the same name comes first.
         let is_axis = request.table.axes().iter().any(|axis| axis.name() == name);

@@ -83,7 +83,9 @@ fn heads(arguments: &Arguments) -> Result<Vec<Head>, Failure> {
                 break;
             }
             let frame = frame::first(path, wanted).map_err(Failure::failed)?;
-            rows.extend((0..frame.height).map(|row| frame.row(row).iter().map(|(_, cell)| summary::shown(cell)).collect()));
+            rows.extend(
+                (0..frame.height).map(|row| frame.row(row).iter().map(|(_, cell)| summary::shown(cell)).collect()),
+            );
         }
         let (names, units) = headings.into_iter().map(|heading| (heading.name, heading.unit)).unzip();
         let lines = under(names, units, rows);

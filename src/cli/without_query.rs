@@ -13,6 +13,8 @@ pub struct Arguments {
 /// Refuses a question.
 pub fn query(arguments: &Arguments) -> Result<(), Failure> {
     let dataset = arguments.rest.first().map_or("results/NAME", String::as_str);
-    let help = format!("in Python: slipsweep.open({dataset:?})[\"TABLE\"].scan() is a polars LazyFrame; or read the files with DuckDB");
+    let help = format!(
+        "in Python: slipsweep.open({dataset:?})[\"TABLE\"].scan() is a polars LazyFrame; or read the files with DuckDB"
+    );
     Err(refused("`query` is not in the Python package", "the program that `cargo install slipsweep` builds", help))
 }

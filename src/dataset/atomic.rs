@@ -1,20 +1,20 @@
-//! Files that are there whole or not at all.
+//! Atomic file writes: a file is complete or absent.
 //!
-//! The bytes go to a name of their own, are synced, and the name is changed; then the folder is synced. A process that is killed in between
-//! leaves a temporary file behind, which [`sweep`] removes.
+//! The bytes are written to a temporary file, synced and renamed; then the folder is synced. A process that is killed in between leaves the
+//! temporary file, which [`sweep`] removes.
 
 use std::fs::{self, File, TryLockError};
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant, SystemTime};
 
-/// Age from which a temporary file of another machine is treated as abandoned, by the clock of the file system. Writing one takes seconds.
+/// Age from which a temporary file of another machine counts as abandoned, by the clock of the file system. Chosen: a write takes seconds.
 const ABANDONED: Duration = Duration::from_secs(24 * 60 * 60);
 
-/// Times that a file is written if its temporary file vanishes, which happens where a machine takes a living process for dead.
+/// Attempts to write a file whose temporary file vanishes, which happens if another machine treats a running process as dead.
 const ATTEMPTS: u32 = 3;
 
-/// A step that failed, and why.
+/// A failed step of a write.
 #[derive(Debug)]
 pub struct Unwritten {
     /// The attempted action.
@@ -23,16 +23,16 @@ pub struct Unwritten {
     pub source: io::Error,
 }
 
-/// Writes `bytes` to `path` so that at no time, not even after a power cut, an incomplete file bears the name.
+/// Writes `bytes` to `path`. An incomplete file never has this name, even after a power cut.
 pub fn write(path: &Path, bytes: &[u8]) -> Result<(), Unwritten> {
     write_by(path, bytes, |temporary, path| fs::rename(temporary, path))
 }
 
-/// Writes `bytes` to `path` in the same way, but never over another file: `false` if there is one.
+/// Writes `bytes` to `path` in the same way, but never replaces a file: returns `false` if there is one.
 pub fn write_new(path: &Path, bytes: &[u8]) -> Result<bool, Unwritten> {
     let link = |temporary: &Path, path: &Path| match fs::hard_link(temporary, path) {
         Ok(()) => fs::remove_file(temporary),
-        // Some file systems have no links.
+        // Some file systems have no hard links.
         Err(error) if error.kind() != io::ErrorKind::AlreadyExists && !path.exists() => fs::rename(temporary, path),
         Err(error) => Err(error),
     };
@@ -76,20 +76,20 @@ fn publish<E>(
         return Err(failed("write", io::Error::new(io::ErrorKind::InvalidInput, "not the path of a file")));
     };
     let (temporary, mut file) = create(folder, &name.to_string_lossy()).map_err(|error| failed("create", error))?;
-    // A lock shows processes of this machine that the file has an owner. Without locks its age decides.
+    // A lock marks the file as in use for other processes of this machine. Without locks its age decides.
     let _ = file.try_lock();
     let written = fill(&mut file)
         .and_then(|()| file.sync_all().map_err(|error| failed("sync", error)))
         .and_then(|()| place(&temporary, path).map_err(|error| failed(RENAME, error)))
         .and_then(|()| sync_folder(folder).map_err(|error| failed("sync the folder", error)));
     if written.is_err() {
-        // The first error is the one to report; a leftover bears a dot and does no harm.
+        // The first error is reported; a remaining temporary file is harmless.
         let _ = fs::remove_file(&temporary);
     }
     written
 }
 
-/// Creates a temporary file for `name` that no other process has: its name holds machine, process and, if necessary, a number.
+/// Creates a unique temporary file for `name`: its name contains machine, process and, if necessary, a number.
 fn create(folder: &Path, name: &str) -> io::Result<(PathBuf, File)> {
     let (machine, process) = (machine(), std::process::id());
     let mut number = 0_u32;
@@ -105,7 +105,7 @@ fn create(folder: &Path, name: &str) -> io::Result<(PathBuf, File)> {
 /// The suffix of a temporary file.
 const SUFFIX: &str = ".tmp";
 
-/// The name of this machine, as far as it may be part of a file's name.
+/// The name of this machine, restricted to legal characters of file names.
 fn machine() -> String {
     let name = fs::read_to_string("/proc/sys/kernel/hostname").unwrap_or_default();
     let name: String =
@@ -113,21 +113,21 @@ fn machine() -> String {
     if name.is_empty() { "localhost".to_owned() } else { name }
 }
 
-/// Whether a file of this name is a temporary one of ours.
+/// Whether `name` is the name of a temporary file of slipsweep.
 pub fn is_temporary(name: &str) -> bool {
     name.starts_with('.') && name.ends_with(SUFFIX) && name.contains('@')
 }
 
-/// Removes the temporary files in `folder` whose processes are gone. `now` is the time by the clock of the file system.
+/// Removes the temporary files of ended processes in `folder`. `now` is the time by the clock of the file system.
 ///
-/// A process holds a lock on its temporary file as long as it runs. Locks may not reach other machines, so a file of another machine
-/// counts as abandoned only when it is old. That something cannot be removed is no failure: such files do no harm.
+/// A process holds a lock on its temporary file as long as it runs. Locks may not reach other machines, so a file of another machine counts as
+/// abandoned only when it is old. Files that cannot be removed are ignored, since they are harmless.
 pub fn sweep(folder: &Path, now: SystemTime) {
     let ours = format!("@{}{SUFFIX}", machine());
     for entry in fs::read_dir(folder).into_iter().flatten().flatten() {
         let name = entry.file_name();
         let name = name.to_string_lossy();
-        // Opening a named pipe would wait for somebody who writes.
+        // Opening a named pipe would wait for a writer.
         if !is_temporary(&name) || !entry.file_type().is_ok_and(|kind| kind.is_file()) {
             continue;
         }
@@ -151,7 +151,7 @@ fn is_old(entry: &fs::DirEntry, now: SystemTime) -> bool {
     written.is_ok_and(|written| now.duration_since(written).is_ok_and(|age| age > ABANDONED))
 }
 
-/// The folder itself, or the nearest above it that is there: what is written there goes to the same disk.
+/// The nearest existing folder at or above `folder`, which is on the same disk.
 pub fn nearest_folder(folder: &Path) -> PathBuf {
     let absolute = std::path::absolute(folder).unwrap_or_else(|_| folder.to_owned());
     let there = absolute.ancestors().find(|folder| folder.is_dir());
@@ -170,7 +170,7 @@ pub fn time(folder: &Path, bytes: usize) -> io::Result<Duration> {
     written.map(|()| time)
 }
 
-/// Creates `folder` and those above it that are missing, each durably.
+/// Creates `folder` and its missing parents, each durably.
 pub fn create_folder(folder: &Path) -> io::Result<()> {
     if folder.is_dir() {
         return Ok(());
@@ -191,7 +191,7 @@ fn sync_folder(folder: &Path) -> io::Result<()> {
     File::open(folder)?.sync_all()
 }
 
-/// Elsewhere a folder cannot be opened as a file, and renaming is durable without it.
+/// On other systems a folder cannot be opened as a file, and renaming is durable without a sync.
 #[cfg(not(unix))]
 fn sync_folder(_folder: &Path) -> io::Result<()> {
     Ok(())

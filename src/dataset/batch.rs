@@ -13,8 +13,8 @@ use crate::grid::RowIndex;
 use crate::protocol::Status;
 use crate::table::{ColumnBuffer, Kind};
 
-/// The cells of `buffer`, which are the rows `rows` of a table, with the columns and types that a part on disk has. Numbers are not copied; a
-/// missing one is null, and NaN below that.
+/// The rows `rows` of a table, whose cells are in `buffer`, with the columns and types of a part on disk. Numbers are not copied; a missing one
+/// is null, and NaN below that.
 ///
 /// # Errors
 ///
@@ -62,7 +62,7 @@ fn numbers(cells: Vec<f64>) -> Float64Array {
     Float64Array::new(cells.into(), nulls)
 }
 
-/// Words by their places.
+/// A dictionary array of words from their indices.
 fn labels(words: &[&str], places: &[f64]) -> Result<ArrayRef, ArrowError> {
     let keys: Int32Array = places.iter().map(|&place| Some(some(place)? as i32)).collect();
     let words = Arc::new(StringArray::from(words.to_vec()));

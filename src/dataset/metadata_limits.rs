@@ -1,8 +1,8 @@
 //! Limits on the metadata of a Parquet file, checked before its reader allocates: a few bytes can claim gigabytes.
 //!
-//! Footers and page headers are structs of Thrift's compact protocol. They are walked without knowing all of their fields:
-//! no list may be longer than the bytes that are left, and of the numbers only those count that memory is taken by. The
-//! reader takes the fields of a footer for what Parquet says that they are, whatever the file says, so the two must agree.
+//! Footers and page headers are structs of Thrift's compact protocol. The walk does not need to know all of their fields: no list may be longer
+//! than the remaining bytes, and only numbers that determine an allocation are checked. The reader expects the field types of the Parquet format
+//! whatever the file states, so both must agree.
 
 use std::fs::File;
 use std::sync::Arc;
@@ -15,15 +15,15 @@ use parquet::file::reader::ChunkReader;
 
 use super::layout::label;
 
-/// Most bytes of a footer.
+/// Greatest size of a footer, in bytes.
 const MOST_OF_FOOTER: usize = 1 << 24;
-/// Most bytes of a page header.
+/// Greatest size of a page header, in bytes.
 const MOST_OF_HEADER: usize = 1 << 16;
-/// Most bytes of a page, decompressed: four million doubles and more.
+/// Greatest size of a decompressed page, in bytes: more than four million doubles.
 const MOST_OF_PAGE: i64 = 40 << 20;
-/// Most values of a page or of a dictionary.
+/// Greatest number of values of a page or of a dictionary.
 const MOST_VALUES: i64 = 1 << 22;
-/// Most groups of rows, since their number has 16 bits.
+/// Greatest number of row groups, which has 16 bits.
 const MOST_GROUPS: i64 = i16::MAX as i64;
 
 /// The checked metadata of a Parquet file. Words are read as codes, from any writer.
@@ -42,7 +42,7 @@ pub(crate) fn coded(file: &File) -> Result<ArrowReaderMetadata, ParquetError> {
     ArrowReaderMetadata::try_new(plain.metadata().clone(), options)
 }
 
-/// Whether the lists of the footer, if there is one, are as long as they say.
+/// Checks that the lists of the footer, if any, are as long as stated.
 pub fn check_footer(file: &impl ChunkReader) -> Result<(), ParquetError> {
     const TRAILER: u64 = 8;
     let Some(before) = file.len().checked_sub(TRAILER) else { return Ok(()) };
@@ -66,7 +66,7 @@ pub fn check_footer(file: &impl ChunkReader) -> Result<(), ParquetError> {
     end.ok_or_else(|| damaged("footer")).and(metadata_limits)
 }
 
-/// Whether no page takes more than memory has, and none is encoded so that its length is known only when it is decoded.
+/// Checks that no page exceeds the limits, and that the decoded length of every page is known in advance.
 pub fn check_pages(file: &impl ChunkReader, metadata: &ParquetMetaData) -> Result<(), ParquetError> {
     page_headers(file, metadata, |_| {})
 }
@@ -85,7 +85,7 @@ pub fn page_headers(
         let end = at.checked_add(length).filter(|&end| end <= file.len()).ok_or_else(|| damaged("list of columns"))?;
         while at < end {
             let left = usize::try_from(end - at).unwrap_or(usize::MAX).min(MOST_OF_HEADER);
-            // Headers are short, but for those with long words as least and greatest values.
+            // Headers are short, except if the least and greatest values are long words.
             let mut bytes = file.get_bytes(at, left.min(256))?;
             let mut page = check_page(&bytes)?;
             if page.is_none() {
@@ -100,7 +100,7 @@ pub fn page_headers(
     Ok(())
 }
 
-/// The bytes of a header, and from its start to the end of its page; `None` if the header goes on beyond `bytes`.
+/// The length of a header, and of header and page together; `None` if the header extends beyond `bytes`.
 fn check_page(bytes: &[u8]) -> Result<Option<(usize, u64)>, ParquetError> {
     let (mut compressed, mut metadata_limits) = (None, Ok(()));
     let header = walk(bytes, |_| None, &mut |path, value| match path {
@@ -125,9 +125,8 @@ fn damaged(what: &str) -> ParquetError {
     ParquetError::General(format!("its {what} is damaged"))
 }
 
-/// Walks the struct that `bytes` begin with and passes every integer in it to `visit`, and the length of every
-/// list, each with the numbers of the fields that lead there. Returns the length of the struct; `None` if it is damaged
-/// or goes on beyond `bytes`, or if a field is of another kind than `kind_of` says.
+/// Walks the struct at the start of `bytes`. Passes every integer and the length of every list to `visit`, each with its path of field numbers.
+/// Returns the length of the struct; `None` if it is damaged or extends beyond `bytes`, or if a field has another kind than `kind_of` returns.
 fn walk(bytes: &[u8], kind_of: fn(&[i16]) -> Option<Kind>, visit: &mut dyn FnMut(&[i16], i64)) -> Option<usize> {
     let mut walker = Walker { bytes, at: 0, path: Vec::new(), kind_of, visit };
     walker.fields()?;
@@ -142,12 +141,12 @@ enum Kind {
     Whole,
     Text,
     Struct,
-    /// Of values of one kind.
+    /// A list of values of one kind.
     List(&'static Kind),
 }
 
 impl Kind {
-    /// Whether Thrift's number of a type stands for it.
+    /// Whether this is the Thrift number of the type.
     fn is(self, number: u8) -> bool {
         match self {
             Kind::Flag => matches!(number, 1 | 2),
@@ -160,7 +159,7 @@ impl Kind {
     }
 }
 
-/// The kind of a field of `FileMetaData` (parquet.thrift of Apache Parquet 2.11); `None` for those that the reader skips.
+/// The kind of a field of `FileMetaData` (parquet.thrift of Apache Parquet 2.11); `None` for fields that the reader skips.
 fn kind_in_footer(path: &[i16]) -> Option<Kind> {
     use Kind::{Byte, Flag, List, Struct, Text, Whole};
     Some(match path {
@@ -200,7 +199,7 @@ fn kind_in_footer(path: &[i16]) -> Option<Kind> {
     })
 }
 
-/// Most structs in one another; Parquet has six.
+/// Greatest nesting depth of structs; Parquet has six.
 const DEEPEST: usize = 16;
 
 struct Walker<'a> {
@@ -224,7 +223,7 @@ impl Walker<'_> {
         (at <= self.bytes.len()).then_some(())
     }
 
-    /// Seven bits a byte, the lowest first.
+    /// A variable-length integer: groups of seven bits, the lowest first.
     fn varint(&mut self) -> Option<u64> {
         let mut value = 0;
         for shift in (0..64).step_by(7) {
@@ -237,7 +236,7 @@ impl Walker<'_> {
         None
     }
 
-    /// Signs are in the lowest bit.
+    /// A signed integer, with the sign in the lowest bit.
     fn whole(&mut self) -> Option<i64> {
         let value = self.varint()?;
         Some((value >> 1) as i64 ^ -((value & 1) as i64))
@@ -261,7 +260,7 @@ impl Walker<'_> {
             if (self.kind_of)(&self.path).is_some_and(|kind| !kind.is(head & 0xf)) {
                 return None;
             }
-            // The type of a field is its value where that is true or false.
+            // The type of a boolean field is its value.
             if !matches!(head & 0xf, 1 | 2) {
                 self.value(head & 0xf)?;
             }
@@ -288,7 +287,7 @@ impl Walker<'_> {
                     15 => self.varint()?,
                     count => count.into(),
                 };
-                // An element has a byte or more.
+                // An element has at least one byte.
                 let left = (self.bytes.len() - self.at) as u64;
                 let count = (count <= left).then_some(count)?;
                 (self.visit)(&self.path, count as i64);
@@ -334,9 +333,9 @@ mod tests {
         assert!(
             footer(&[0x29, 0x1c, 0x55, 0xd0, 0x0f, 0, 0]).ends_with("a node of 1000 children, where 1 are possible")
         );
-        // A list of lists; structs in structs; a list and a text longer than what is left; no end.
+        // A list of lists; nested structs; a list and a text longer than the remaining bytes; a missing end.
         let deep = [0x1c; 20];
-        // A flag where the reader takes a whole number; texts where it takes structs.
+        // A flag where the reader expects an integer; texts where it expects structs.
         for damaged in [&[0x29, 0x1c, 0x32, 0, 0][..], &[0x29, 0x18, 0x01, b'x', 0]] {
             assert!(footer(damaged).ends_with("its footer is damaged"), "{damaged:x?}");
         }
@@ -357,7 +356,7 @@ mod tests {
             let error = check_page(&header(20, 2, 2 * encoding)).expect_err("is refused");
             assert!(error.to_string().ends_with("words are encoded as differences"));
         }
-        // A text of 300 bytes goes on beyond the first 256.
+        // A text of 300 bytes extends beyond the first 256.
         let long = [&header(20, 2, 0)[..12], &[0x18, 0xac, 0x02], &[b'v'; 300], &[0]].concat();
         assert_eq!(check_page(&long[..256]).expect("claims little"), None);
         assert_eq!(check_page(&long).expect("claims little"), Some((316, 316 + 10)));

@@ -1,4 +1,4 @@
-//! Whether a file is the part that should be there.
+//! The state of a part: whether its file is the expected one and intact.
 
 use std::fs::{self, File};
 use std::io::{self, Read};
@@ -16,7 +16,7 @@ use super::statistics::TableStatistics;
 /// The depth of a check.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum CheckDepth {
-    /// Its footer: finds a part that is cut short and one of another origin.
+    /// The footer only: detects truncated and foreign parts.
     Footer,
     /// Every bit, by the checksum.
     Whole,
@@ -25,14 +25,14 @@ pub enum CheckDepth {
 /// The state of a part.
 #[derive(Debug, Clone, PartialEq)]
 pub enum State {
-    /// Nothing.
+    /// No file.
     Missing,
-    /// The part.
+    /// The expected part.
     There {
         /// The statistics of its rows.
         statistics: Box<TableStatistics>,
     },
-    /// Something that was not made from this spec by this version; it may be of use to somebody.
+    /// A file of another spec or version, which may be valuable and is never replaced.
     Foreign {
         /// The differing property.
         what: &'static str,
@@ -41,29 +41,29 @@ pub enum State {
         /// The value of the file.
         found: String,
     },
-    /// A part that is broken, of no use to anybody.
+    /// A damaged part, which a run replaces.
     Damaged {
-        /// In what way.
+        /// The kind of damage.
         why: String,
     },
 }
 
-/// A part that was opened, and is the one that should be there.
+/// An open part, verified to be the expected one.
 #[derive(Debug)]
 pub struct OpenPart {
-    /// Its place.
+    /// Its path.
     pub path: PathBuf,
     /// The file.
     pub file: File,
     /// Its Parquet footer.
     pub metadata: Arc<ParquetMetaData>,
-    /// Its footer.
+    /// Its footer entries.
     pub footer: Footer,
     /// The statistics of its rows.
     pub statistics: TableStatistics,
 }
 
-/// Looks at the file in the place of a part, number `part` of `table` in the dataset of `manifest`, which is written in `path`.
+/// The state of part number `part` of `table` in the dataset of `manifest`, whose file is `path`.
 pub fn state(path: &Path, manifest: &Manifest, table: &str, part: u64, look: CheckDepth) -> State {
     let found = match look {
         CheckDepth::Footer => open_part(path, manifest, table, part).map(|part| part.map(|part| part.statistics)),
@@ -80,7 +80,7 @@ pub fn state(path: &Path, manifest: &Manifest, table: &str, part: u64, look: Che
     }
 }
 
-/// Opens the file in the place of a part if it is the part that should be there; `None` if there is none.
+/// Opens a part if its file is the expected one; `None` if there is no file.
 ///
 /// # Errors
 ///
@@ -109,7 +109,7 @@ pub fn footer_of(path: &Path) -> Option<Footer> {
     if sound { Footer::from_entries(&entries(&metadata)) } else { None }
 }
 
-/// The file in `path`. What is no file is not opened: a named pipe would wait for somebody who writes, a device might never end.
+/// Opens the file in `path`. Only plain files are opened: a named pipe would wait for a writer, and a device might never end.
 fn open(path: &Path) -> Result<Option<File>, State> {
     let opened = fs::metadata(path).and_then(|metadata| match metadata.file_type() {
         kind if kind.is_file() => File::open(path).map(Ok),
@@ -134,7 +134,7 @@ fn whole(path: &Path) -> Result<Option<Vec<KeyValue>>, State> {
     match checksum::is_intact(&bytes) {
         Some(true) => metadata(&bytes).map(|metadata| Some(entries(&metadata))),
         Some(false) => damaged("its checksum does not match its bytes"),
-        // Either the checksum is broken, or the file is somebody else's.
+        // Either the checksum is damaged, or the file is foreign.
         None => match metadata(&bytes).map(|metadata| entries(&metadata)) {
             Ok(entries) if !entries.iter().any(|entry| entry.key.starts_with(PREFIX)) => Ok(Some(entries)),
             Ok(_) => damaged("it has no checksum"),

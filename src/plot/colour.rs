@@ -1,9 +1,9 @@
-//! Colours for colour-blind readers and for print in grey: a map for numbers, and styles for series.
+//! Colours for colour-blind readers and for greyscale print: a map for numbers, and styles for series.
 
 use super::canvas::Stroke;
 
-/// The colour map viridis by S. van der Walt and N. Smith (released into the public domain, CC0), every eighth of its 256 colours and the
-/// last; its lightness grows evenly, so that it also reads in grey.
+/// The colour map viridis by S. van der Walt and N. Smith (released into the public domain, CC0), every eighth of its 256 colours and the last.
+/// Its lightness increases evenly, so that it is readable in grey.
 const VIRIDIS: [[u8; 3]; 33] = [
     [68, 1, 84],
     [71, 13, 96],
@@ -52,19 +52,19 @@ pub fn viridis(fraction: f64) -> [u8; 3] {
     })
 }
 
-/// A colour as SVG has it.
+/// A colour in SVG notation.
 pub fn hex([red, green, blue]: [u8; 3]) -> String {
     format!("#{red:02x}{green:02x}{blue:02x}")
 }
 
-/// Colours of series, after M. Okabe and K. Ito, "Color universal design" (2008), the darkest first.
+/// Colours of series (M. Okabe and K. Ito, "Color universal design", 2008), the darkest first.
 const SERIES: [&str; 7] = ["#000000", "#0072b2", "#d55e00", "#009e73", "#cc79a7", "#56b4e9", "#e69f00"];
 
-/// Dashes of series, so that lines differ without colours too.
+/// Dashes of series, so that lines also differ without colours.
 const DASHES: [&[f64]; 7] =
     [&[], &[5.0, 1.8], &[1.2, 1.4], &[6.0, 1.5, 1.2, 1.5], &[2.6, 1.4], &[8.0, 2.0], &[6.0, 1.4, 1.2, 1.4, 1.2, 1.4]];
 
-/// Series of a panel: each has a colour and a dash of its own.
+/// Greatest number of series of a panel, each with its own colour and dash.
 pub const MAX_SERIES: usize = SERIES.len();
 
 /// The line of series number `place`.
@@ -72,7 +72,7 @@ pub fn series(place: usize) -> Stroke {
     Stroke { colour: SERIES[place % SERIES.len()].to_owned(), width: 1.1, dashes: DASHES[place % DASHES.len()] }
 }
 
-/// The fill of class number `place`: light to dark, so that they differ in grey.
+/// The fill of class number `place`, from light to dark, so that classes differ in grey.
 pub fn class(place: usize) -> [u8; 3] {
     [[0xd7, 0xe8, 0xf5], [0x2a, 0x5f, 0x9e], [0xf2, 0xc4, 0x5a], [0x8c, 0x2d, 0x19], [0x66, 0x66, 0x66]][place % 5]
 }

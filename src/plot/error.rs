@@ -33,7 +33,7 @@ pub enum PlotError {
         /// The expectation.
         expected: String,
     },
-    /// A file is no trace.
+    /// A file is not a trace.
     #[error(
         "{path}: not a trace: it has no column `{missing}`\n  found: {}\n  help: `slipsweep trace … --out FILE` writes traces; \
          of a dataset, name the folder",
@@ -50,23 +50,23 @@ pub enum PlotError {
     /// More traces than can be distinguished.
     #[error("{found} traces are too many for one picture\n  expected: at most {most}")]
     TooManyTraces {
-        /// So many were given.
+        /// The given number.
         found: usize,
-        /// So many fit.
+        /// The greatest number.
         most: usize,
     },
     /// There is nothing to draw.
     #[error("nothing to draw: the requested columns hold no numbers")]
     Nothing,
-    /// No table of that name.
+    /// The dataset has no table of this name.
     #[error("the dataset has no table `{name}`\n  found: {}\n  help: {}", .found.join(", "), hint(.name, .found))]
     NoTable {
         /// The name.
         name: String,
-        /// The tables that there are.
+        /// The tables of the dataset.
         found: Vec<String>,
     },
-    /// No column of that name.
+    /// The table has no column of this name.
     #[error("{argument}: the table `{table}` has no {what} `{name}`\n  found: {}\n  help: {}", .found.join(", "), hint(.name, .found))]
     NoColumn {
         /// The argument that names it.
@@ -88,25 +88,25 @@ pub enum PlotError {
         /// The condition.
         text: String,
     },
-    /// No row fulfils the conditions.
+    /// No row meets the conditions.
     #[error("--where {text}: no row of the table `{table}` meets this\n  found: {found}\n  help: {help}")]
     NoRows {
         /// The table.
         table: String,
         /// The conditions.
         text: String,
-        /// The values that there are.
+        /// The existing values.
         found: String,
-        /// The nearest of them.
+        /// The nearest existing value.
         help: String,
     },
-    /// All rows are missing.
+    /// The table has no rows.
     #[error("the table `{table}` has no rows yet\n  help: compute them with `slipsweep run`")]
     Empty {
         /// The table.
         table: String,
     },
-    /// Every axis has one value only.
+    /// Every axis has a single value.
     #[error("the table `{table}` has a single matching row, which makes no picture\n  help: `slipsweep head` shows it")]
     OneRow {
         /// The table.
@@ -134,16 +134,16 @@ pub enum PlotError {
         /// Two of its units.
         units: [String; 2],
     },
-    /// A trace in Parquet.
+    /// A Parquet trace cannot be read.
     #[error("{0}\n  help: delete the file and trace it again")]
     Trace(FrameError),
-    /// A part of a table.
+    /// A part of a table cannot be read.
     #[error(transparent)]
     Part(#[from] ReadError),
-    /// The converter does not understand the picture.
+    /// The picture cannot be converted.
     #[error("cannot convert the picture: {0}\n  help: write it as .svg")]
     Convert(String),
-    /// More pixels than can be held.
+    /// The picture has too many pixels.
     #[error("a picture of {width} x {height} pixels is too large\n  help: lower --dpi")]
     Size {
         /// Width in pixels.

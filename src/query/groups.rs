@@ -54,7 +54,7 @@ pub enum Kind {
 }
 
 impl Kind {
-    /// The column.
+    /// The type of the column `name`.
     pub fn of(name: &str, schema: &Schema) -> Option<Kind> {
         match schema.get(name)? {
             DataType::Float64 => Some(Kind::Number),

@@ -178,7 +178,8 @@ impl Direct<'_> {
         let is_missing = |axis: &&Quantity| axis.default().is_empty() && !given().any(|(given, _)| given == *axis);
         let missing: Vec<&str> = takes.iter().filter(is_missing).map(|axis| axis.name()).collect();
         if !missing.is_empty() {
-            let (found, help) = (format!("`{name}` needs {}", missing.join(", ")), format!("add {}=...", missing.join("=..., ")));
+            let (found, help) =
+                (format!("`{name}` needs {}", missing.join(", ")), format!("add {}=...", missing.join("=..., ")));
             faults.push(SpecError::new("", found, format!("axes {names}"), help));
         }
     }
@@ -196,7 +197,8 @@ impl Direct<'_> {
 
     /// The factors: points that vary together, constants, axes of the grid, defaults.
     fn block(mut self) -> Block {
-        let axis = |scale: Scale, quantity: Quantity, values: Vec<f64>| Axis { quantity, scale, values: Values::List(values) };
+        let axis =
+            |scale: Scale, quantity: Quantity, values: Vec<f64>| Axis { quantity, scale, values: Values::List(values) };
         let (points, grid) = (std::mem::take(&mut self.points), std::mem::take(&mut self.grid));
         let (constants, together): (Given, Given) = points.into_iter().partition(|(_, values)| values.len() == 1);
         let together: Vec<Axis> =

@@ -134,7 +134,7 @@ pub struct Prediction {
     pub word: fn(&Point) -> &'static str,
 }
 
-/// Every table, in the order of listings. A new table is a file and a line here.
+/// Every table, in the order of listings. A new table needs a file and a line here.
 pub const ALL: [&dyn Table; 9] = [
     &gap::GAP,
     &best_cubic::BEST_CUBIC,

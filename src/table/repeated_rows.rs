@@ -1,4 +1,4 @@
-//! The memo of repeated rows: a row that a spec requests several times is computed once a run.
+//! The memo of repeated rows: a row that a spec requests several times is computed once in a run.
 
 use std::sync::Arc;
 

@@ -29,7 +29,7 @@ pub fn each<R>(
         .repeated_rows
         .as_ref()
         .map(|repeated_rows| (repeated_rows, view.tuples(&repeated_rows.tuples, rows.clone())));
-    // Axis values are read once a step, not once a row.
+    // Axis values are read once for each step, not for each row.
     let axes: Vec<Steps> = Quantity::ALL
         .into_iter()
         .filter_map(|quantity| {

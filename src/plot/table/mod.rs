@@ -1,4 +1,4 @@
-//! Pictures of tables: which axes and columns a picture of each table shows, and what is marked in it.
+//! Pictures of tables: the axes, columns and marks of each table.
 
 mod cells;
 mod choice;
@@ -25,7 +25,7 @@ use survey::Survey;
 /// The request.
 #[derive(Debug, Clone, Default)]
 pub struct Request {
-    /// Rows that are shown.
+    /// Conditions on the shown rows.
     pub conditions: Vec<Condition>,
     /// Horizontal axis.
     pub x: Option<String>,
@@ -84,11 +84,11 @@ const ON_A_SPRING: Defaults = Defaults {
     scatters: true,
 };
 
-/// A picture that is drawn in a way of its own.
+/// Defaults of a picture with its own drawing code.
 const ALONE: Defaults =
     Defaults { x: &["t_f", "v_f", "v_i", "b", "a"], y: &[], least_map: usize::MAX, lines: &["shortcuts"], ..OVER_TIME };
 
-/// A picture for each table. A new one is a line here, and a file if it marks something of its own.
+/// The picture of each table. A new table needs an entry here, and a file if it has special marks.
 const KINDS: [Kind; 12] = [
     Kind {
         table: "gap",
@@ -222,7 +222,7 @@ impl Source {
         Source { manifest, folder, bounded: bound.unwrap_or(true), units }
     }
 
-    /// Names of the tables of which there are pictures.
+    /// Names of the tables with a picture.
     pub fn tables(&self) -> Vec<String> {
         let known = |name: &str| KINDS.iter().any(|kind| kind.table == name);
         self.manifest.tables.iter().map(|table| table.name.clone()).filter(|name| known(name)).collect()
@@ -256,7 +256,7 @@ impl Source {
     }
 }
 
-/// Lines or a map, and nothing else.
+/// Lines or a map without further layers.
 fn plain(scene: &Scene<'_>, shape: &Shape) -> Result<Figure, PlotError> {
     match shape {
         Shape::Map(plan) => Ok(map::map(scene.survey, plan)?.figure),
@@ -280,7 +280,7 @@ fn fixed(survey: &Survey, drawn: &[String]) -> String {
 }
 
 impl Scene<'_> {
-    /// The value of a quantity in all rows of a group: that of the group, or the only one there is.
+    /// The value of a quantity in all rows of a group: from the group, or the only value of the table.
     fn value(&self, groups: &groups::Groups, group: usize, name: &str) -> Option<f64> {
         if let Some(place) = groups.axes.iter().position(|axis| axis == name) {
             return groups.shown.get(group)?.values.get(place).copied();
@@ -291,12 +291,12 @@ impl Scene<'_> {
         }
     }
 
-    /// The factor of a quantity from the units of the model to those of the dataset.
+    /// The factor of a quantity from scaled units to those of the dataset.
     fn size(&self, name: &str) -> f64 {
         Quantity::from_name(name).map_or(1.0, |quantity| self.source.units.size(quantity.unit(Scale::Model)))
     }
 
-    /// The value of a quantity in the scaled units of the model, in which the library computes.
+    /// The value of a quantity in scaled units.
     fn scaled(&self, groups: &groups::Groups, group: usize, name: &str) -> Option<f64> {
         let unit = Quantity::from_name(name)?.unit(Scale::Model);
         Some(self.source.units.scaled(unit, self.value(groups, group, name)?))

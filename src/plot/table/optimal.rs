@@ -10,16 +10,16 @@ use crate::plot::figure::{Entry, Figure, Key, Layer};
 use crate::plot::{PlotError, colour, label};
 use crate::protocol::optimal::crossover::{self, CrossoverTimes, Wanted};
 
-/// The durations that are marked.
+/// The marked durations.
 const MARKED: [&str; 5] = ["t_cheapest", "t_cross", "t_floor", "t_min", "t_turn"];
 
-/// Lines, above which they are not marked. Chosen: more marks hide the curves.
+/// Greatest number of lines with marks. Chosen: more marks hide the curves.
 const MAX_MARKED_LINES: usize = 3;
 
 /// The axes of a transition.
 const AXES: [&str; 4] = ["a", "b", "v_i", "v_f"];
 
-/// Steps along a curve of durations. Chosen: no corner is seen in print.
+/// Steps along a curve of durations. Chosen: no corner is visible in print.
 const CURVE_STEPS: usize = 120;
 
 /// Relative tolerance of a mark. Chosen: finer than a picture shows.
@@ -42,14 +42,14 @@ pub fn draw(scene: &Scene<'_>, shape: &Shape) -> Result<Figure, PlotError> {
     let lined = lines::lines(scene.survey, plan)?;
     let mut figure = lined.figure;
     let count = lined.groups.shown.len();
-    // This work is the least one.
+    // The work of this table is the least work.
     for panel in figure.panels.iter_mut().filter(|panel| panel.y.column == "work") {
         panel.y.column = "work_optimal".to_owned();
     }
     if plan.x != "t_f" || count > MAX_MARKED_LINES {
         return Ok(figure);
     }
-    // Of lines that coincide one is drawn.
+    // Of coinciding lines, one is drawn.
     for group in (0..count).filter(|&group| lined.leaders[group] == group) {
         let times = times(scene, &lined.groups, group);
         let colour = if count == 1 { "#555".to_owned() } else { colour::series(group).colour };
@@ -57,7 +57,7 @@ pub fn draw(scene: &Scene<'_>, shape: &Shape) -> Result<Figure, PlotError> {
             let Some(time) = time.filter(|time| (lined.x.low..=lined.x.high).contains(time)) else { continue };
             let stroke = Stroke { colour: colour.clone(), width: 0.5, dashes: &[2.0, 1.5] };
             for (place, panel) in figure.panels.iter_mut().enumerate() {
-                // One panel says what the marks are.
+                // The first panel labels the marks.
                 let words = if place == 0 { label::name(name) } else { String::new() };
                 panel.layers.push(Layer::Vertical(time, words, stroke.clone()));
             }
@@ -73,7 +73,7 @@ fn strategies(scene: &Scene<'_>, plan: &map::Plan) -> Result<Figure, PlotError> 
         ("t_cross", Stroke::solid("#000", 0.9)),
         ("t_floor", Stroke { dashes: &[3.0, 1.6], ..Stroke::solid("#000", 0.9) }),
     ];
-    // The place of the duration among the axes, and what the other axis is.
+    // The index of the duration among the axes, and the other axis.
     let (time, other) = match (plan.x.as_str(), plan.y.as_str()) {
         ("t_f", other) => (0, other),
         (other, "t_f") => (1, other),

@@ -10,7 +10,7 @@ use crate::plot::canvas::Stroke;
 use crate::plot::figure::{Entry, Figure, Key, Layer};
 use crate::stability::SteadySliding;
 
-/// Steps along the curve. Chosen: no corner is seen in print.
+/// Steps along the curve. Chosen: no corner is visible in print.
 const CURVE_STEPS: usize = 400;
 
 pub fn draw(scene: &Scene<'_>, shape: &Shape) -> Result<Figure, PlotError> {

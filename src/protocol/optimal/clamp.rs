@@ -16,7 +16,6 @@ use crate::numerics::elementary::{exp, exp_m1, ln, ln_1p};
 pub(super) struct Fall {
     law: Law,
     pub theta_top: f64,
-    pub ln_theta_top: f64,
     /// `a E` at the top; 0 where theta turns there.
     excess: f64,
     /// Friction at the top with `u = 1`.
@@ -44,12 +43,17 @@ impl Fall {
         if kind == ArcKind::VCeiling { self.z_v - d } else { self.z_tau - self.kappa * d }
     }
 
-    /// `G = a [phi(z_cap) - E]` and its derivative with respect to the depth.
-    fn gap(&self, kind: ArcKind, d: f64) -> (f64, f64) {
-        let (energy, rate) = self.energy(d);
+    /// `a phi(z_cap)` and `a E` with their derivatives with respect to the depth.
+    fn parts(&self, kind: ArcKind, d: f64) -> [(f64, f64); 2] {
         let (phi, slope) = phi_and_slope(self.cap(kind, d));
         let fall = if kind == ArcKind::VCeiling { 1.0 } else { self.kappa };
-        (self.law.a * phi - energy, -self.law.a * slope * fall - rate)
+        [(self.law.a * phi, -self.law.a * slope * fall), self.energy(d)]
+    }
+
+    /// `G = a [phi(z_cap) - E]`.
+    fn gap(&self, kind: ArcKind, d: f64) -> f64 {
+        let [(phi, _), (energy, _)] = self.parts(kind, d);
+        phi - energy
     }
 
     /// The depth at which `G` of friction is stationary.
@@ -80,26 +84,31 @@ impl Fall {
 
     /// Adds the zero of a monotone `G` between two depths, if there is one.
     fn zero(&self, kind: ArcKind, mut from: f64, mut to: f64, breaks: &mut Breaks) {
-        let (start, end) = (self.gap(kind, from).0, self.gap(kind, to).0);
+        let (start, end) = (self.gap(kind, from), self.gap(kind, to));
         if (start < 0.0) == (end < 0.0) {
             return;
         }
         // G is convex or concave in theta between them: from the end where it bends away Newton's method is monotone.
         let mut d = if start.abs() < end.abs() { from } else { to };
         for _ in 0..MOST_STEPS {
-            let (value, slope) = self.gap(kind, d);
+            let [(phi, phi_slope), (energy, energy_slope)] = self.parts(kind, d);
+            let value = phi - energy;
             if (value < 0.0) == (start < 0.0) {
                 from = d
             } else {
                 to = d
             }
-            let next = d - value / slope;
-            let next = if next > from && next < to { next } else { 0.5 * (from + to) };
-            let step = (next - d).abs();
-            d = next;
-            if step <= RESOLUTION * d {
+            // phi may be an exponential that is far from its zero.
+            let step = if phi > 2.0 * energy && energy > 0.0 {
+                ln(phi / energy) / (phi_slope / phi - energy_slope / energy)
+            } else {
+                value / (phi_slope - energy_slope)
+            };
+            if step.abs() <= RESOLUTION * d {
                 break;
             }
+            let next = d - step;
+            d = if next > from && next < to { next } else { 0.5 * (from + to) };
         }
         breaks.add(d);
     }
@@ -132,20 +141,52 @@ pub(super) enum Piece {
     /// A part of the free extremal.
     Free {
         arc: Arc,
-        /// `d time/d ln theta` where it starts and ends, at fixed time of its place: `theta/(u - 1)`; 0 at an end of the
-        /// extremal.
-        before: f64,
-        after: f64,
+        /// What its ends add to the sensitivity: `theta/(u - 1)` at a switch, or a term of the extremal.
+        turned: f64,
+        /// Whether it starts or ends where the extremal does.
+        at: [bool; 2],
         /// `(theta, ln u)` at both ends.
         ends: [(f64, f64); 2],
     },
     /// A part on a ceiling.
-    Ceiling {
-        arc: CeilingArc,
-        /// `a E` at its end of greater theta, and `C theta` there.
-        excess: f64,
-        pull: f64,
-    },
+    Ceiling { arc: CeilingArc, gap: Gap },
+}
+
+/// `G = a [phi(z_cap) - E]` along an arc on a ceiling, from its value at one place: where a free arc begins it is 0, and
+/// nothing cancels.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Gap {
+    a: f64,
+    b: f64,
+    /// `d ln u/d ln theta`.
+    rise: f64,
+    /// The depth below the end of greater theta, the value, `u` and `C theta` there.
+    at: f64,
+    value: f64,
+    u: f64,
+    pull: f64,
+}
+
+impl Gap {
+    /// Refers to the depth at which the value is known.
+    fn refer(&mut self, arc: &CeilingArc, depth: f64, value: f64) {
+        self.pull = self.pull(depth);
+        self.u = exp(if depth == arc.length { arc.z_lo } else { arc.z_hi - self.rise * depth });
+        (self.at, self.value) = (depth, value);
+    }
+
+    /// `C theta` at a depth below the end of greater theta.
+    pub fn pull(&self, depth: f64) -> f64 {
+        self.pull * exp(self.at - depth)
+    }
+
+    /// The value at a depth below the end of greater theta.
+    pub fn value(&self, depth: f64) -> f64 {
+        let y = self.at - depth;
+        let of_v = self.rise == 1.0;
+        let (grown, bend) = if of_v { (exp_m1(y), self.b * y) } else { (exp_m1(self.rise * y), 0.0) };
+        self.value + self.a * self.u * grown - self.pull * exp_m1(y) - bend
+    }
 }
 
 /// A clamped extremal after its time at the floor.
@@ -218,7 +259,7 @@ impl Path {
     /// The extremal with its falling part clamped.
     pub fn along(problem: &Problem, ceilings: &Ceilings, extremal: Extremal, fall: &Fall) -> Path {
         let mut breaks = Breaks { depths: [f64::INFINITY; Path::MOST_PIECES], count: 0 };
-        let across = fall.crossing(ceilings).clamp(0.0, fall.depth);
+        let across = fall.crossing(ceilings).max(0.0).min(fall.depth);
         if ceilings.tau.is_finite() {
             fall.zeros(ArcKind::TauCeiling, 0.0, across, &mut breaks);
         }
@@ -233,13 +274,15 @@ impl Path {
         depths.sort_unstable_by(f64::total_cmp);
         let mut path = Path::new(extremal);
         let mut from = 0.0;
-        let mut free_from = None;
+        // What rises to the turn is free.
+        let turns = fall.excess == 0.0;
+        let mut free_from = turns.then_some(0.0);
         for &to in depths.iter().filter(|&&to| to > 0.0) {
             if to <= from {
                 continue;
             }
             let kind = if to <= across { ArcKind::TauCeiling } else { ArcKind::VCeiling };
-            let capped = fall.gap(kind, 0.5 * (from + to)).0 < 0.0;
+            let capped = fall.gap(kind, 0.5 * (from + to)) < 0.0;
             if capped {
                 if let Some(start) = free_from.take() {
                     path.push(part(problem, &extremal, fall, start, from));
@@ -253,7 +296,29 @@ impl Path {
         if let Some(start) = free_from {
             path.push(part(problem, &extremal, fall, start, fall.depth));
         }
+        path.refer_to_switches();
         path
+    }
+
+    /// Refers `G` of each arc on a ceiling to where it is 0, at a free arc next to it, or to the arc that it continues.
+    fn refer_to_switches(&mut self) {
+        let mut known = [false; Path::MOST_PIECES];
+        for at_end in [false, true] {
+            let mut neighbour: Option<Option<f64>> = None;
+            for step in 0..self.count {
+                let i = if at_end { self.count - 1 - step } else { step };
+                let Some(Piece::Ceiling { arc, gap }) = &mut self.pieces[i] else {
+                    neighbour = Some(Some(0.0));
+                    continue;
+                };
+                let (near, far) = if arc.falls() == at_end { (arc.length, 0.0) } else { (0.0, arc.length) };
+                if let (false, Some(Some(value))) = (known[i], neighbour) {
+                    gap.refer(arc, near, value);
+                    known[i] = true;
+                }
+                neighbour = Some(known[i].then(|| gap.value(far)));
+            }
+        }
     }
 
     /// Quadrature of all pieces to relative accuracy `tolerance`.
@@ -261,10 +326,9 @@ impl Path {
         let mut found =
             PathSums { time: self.extremal.time_at_floor, work: 0.0, rate: 0.0, friction_min: f64::INFINITY, nodes: 0 };
         let mut free = FreeSums::default();
-        let mut starts_free = false;
-        for (i, piece) in self.pieces().enumerate() {
+        for piece in self.pieces() {
             match piece {
-                Piece::Free { arc, before, after, .. } => {
+                Piece::Free { arc, turned, at, .. } => {
                     let sums = arc.sums(tolerance)?;
                     let Sums { time, work, sensitivity, swing, friction_min, nodes, .. } = sums;
                     found.time += time;
@@ -272,19 +336,20 @@ impl Path {
                     found.friction_min = found.friction_min.min(friction_min);
                     found.nodes += nodes;
                     free.sensitivity += sensitivity;
-                    free.ends += after - before;
+                    free.ends += turned;
+                    free.at_start |= at[0];
+                    free.at_end |= at[1];
                     free.swing += swing;
-                    starts_free |= i == 0;
                 }
                 Piece::Ceiling { arc, .. } => {
-                    let CeilingSums { time, work, nodes, .. } = arc.sums(ln(arc.theta_hi), None);
+                    let CeilingSums { time, work, nodes, .. } = arc.sums(None);
                     found.time += time;
                     found.work += work;
                     found.nodes += nodes;
                 }
             }
         }
-        let rate = self.extremal.rate_of(&free, starts_free);
+        let rate = self.extremal.rate_of(&free);
         found.rate = self.rate.unwrap_or(rate);
         (found.time.is_finite() && found.work.is_finite()).then_some(found)
     }
@@ -300,13 +365,6 @@ impl Path {
         }
         times
     }
-
-    /// `(ln theta, ln u)` at the start of the first piece and at the end of the last one.
-    pub fn first_and_last(&self) -> Option<[(f64, f64); 2]> {
-        let first = self.pieces().next()?.ends()[0];
-        let last = self.pieces().last()?.ends()[1];
-        Some([first, last])
-    }
 }
 
 impl Piece {
@@ -316,7 +374,7 @@ impl Piece {
             Piece::Free { ends, .. } => *ends,
             Piece::Ceiling { arc, .. } => {
                 let (high, low) = ((arc.theta_hi, arc.z_hi), (arc.theta_hi * exp(-arc.length), arc.z_lo));
-                if arc.z_hi + arc.z_lo > 0.0 { [high, low] } else { [low, high] }
+                if arc.falls() { [high, low] } else { [low, high] }
             }
         }
     }
@@ -336,7 +394,6 @@ fn falling_part(problem: &Problem, ceilings: &Ceilings, extremal: &Extremal) -> 
     Some(Fall {
         law,
         theta_top,
-        ln_theta_top,
         excess,
         friction: 1.0 + (law.b - law.a) * ln_theta_top,
         depth,
@@ -349,7 +406,8 @@ fn falling_part(problem: &Problem, ceilings: &Ceilings, extremal: &Extremal) -> 
 /// A free extremal as one piece.
 pub(super) fn whole(problem: &Problem, extremal: &Extremal) -> Piece {
     let ends = [(extremal.theta_s, extremal.start), (problem.to.theta, extremal.end)];
-    Piece::Free { arc: extremal.arc, before: 0.0, after: extremal.inner(), ends }
+    let [start, end] = extremal.end_terms();
+    Piece::Free { arc: extremal.arc, turned: start + end, at: [true, true], ends }
 }
 
 /// The free part of an extremal between two depths; from the start if the first is 0.
@@ -382,12 +440,9 @@ fn part(problem: &Problem, extremal: &Extremal, fall: &Fall, from: f64, to: f64)
     let start = if first { (extremal.theta_s, extremal.start) } else { switch(from) };
     let end = if last { (problem.to.theta, extremal.end) } else { switch(to) };
     let swing = |(theta, z): (f64, f64)| theta / exp_m1(z);
-    Piece::Free {
-        arc: Arc { law, chart },
-        before: if first { 0.0 } else { swing(start) },
-        after: if last { extremal.inner() } else { swing(end) },
-        ends: [start, end],
-    }
+    let [at_start, at_end] = extremal.end_terms();
+    let turned = if last { at_end } else { swing(end) } + if first { at_start } else { -swing(start) };
+    Piece::Free { arc: Arc { law, chart }, turned, at: [first, last], ends: [start, end] }
 }
 
 /// The lower ceiling.
@@ -396,13 +451,21 @@ fn binding(fall: &Fall, d: f64) -> ArcKind {
     if of_v { ArcKind::VCeiling } else { ArcKind::TauCeiling }
 }
 
+/// An arc on a ceiling, with `G` from its end of greater theta.
 fn ceiling_part(ceilings: &Ceilings, fall: &Fall, kind: ArcKind, from: f64, to: f64) -> Piece {
     let theta_hi = fall.theta_top * exp(-from);
     // At theta_1 the ceilings are known best.
     let z_lo = if to == fall.depth { ceilings.cap_of(kind, 0.0) } else { fall.cap(kind, to) };
     let arc = ceilings.arc(kind, theta_hi, to - from, fall.cap(kind, from), z_lo);
-    let (excess, _) = fall.energy(from);
-    Piece::Ceiling { arc, excess, pull: (fall.excess - fall.friction) * exp(-from) }
+    let pull = (fall.excess - fall.friction) * exp(-from);
+    let gap = gap_of(fall.law, &arc, pull, fall.gap(kind, from));
+    Piece::Ceiling { arc, gap }
+}
+
+/// `G` of an arc from its `value` at the end of greater theta, where `C theta` is `pull`.
+fn gap_of(law: Law, arc: &CeilingArc, pull: f64, value: f64) -> Gap {
+    let rise = arc.rise();
+    Gap { a: law.a, b: law.b, rise, at: 0.0, value, u: exp(arc.z_hi), pull }
 }
 
 impl Piece {
@@ -438,33 +501,36 @@ impl Path {
     /// An extremal of a rising problem that meets a ceiling at `theta_1 e^-way`, where `ln u = z` and its slope over `ln
     /// theta` is `rise`, and stays there. `pace` is the derivative of `way` with respect to the parameter.
     pub fn rising(problem: &Problem, ceilings: &Ceilings, switch: Switch) -> Option<Path> {
-        let Switch { way, z, ln_z, rise, pace } = switch;
+        let Switch { way, z, ln_z, rise, pace_over_z } = switch;
         let (law, to) = (problem.law, &problem.to);
         let theta = Lifetime::with(to.theta * exp(-way), to.rest - to.theta * exp_m1(-way));
         let fall = exp_m1(way + ln_1p(problem.fall));
-        if fall >= 0.0 {
+        if fall >= 0.0 || way < 0.0 {
             return None;
         }
         let sub = Problem { to: theta, fall, ..*problem };
         let mut extremal = sub.arriving(z, z - theta.ln, 1.0)?;
-        // C = [a phi(z) - tau_ss]/theta along the ceiling.
+        // C = [a phi(z) - tau_ss]/theta along the ceiling, and its derivative with respect to ln theta.
         let c = extremal.arc.c();
         let steepness = (law.a * exp_m1(z) * rise - (law.b - law.a)) / theta.theta - c;
-        extremal.one_way(pace * steepness / law.a);
+        extremal.follow_c(z, pace_over_z * steepness);
         let mut path = Path::new(extremal);
         path.push(whole(&sub, &extremal));
+        let pull = c * theta.theta;
+        let mut add = |arc: CeilingArc| {
+            let gap = gap_of(law, &arc, pull * (arc.theta_hi / theta.theta), 0.0);
+            path.push(Piece::Ceiling { arc, gap });
+        };
         if let Some(ln_z) = ln_z {
             let mut arc = ceilings.arc(ArcKind::TauCeiling, to.theta, way, ceilings.z_tau, z);
             arc.ln_z = ln_z;
-            path.push(Piece::Ceiling { arc, excess: 0.0, pull: 0.0 });
-            if z > -CLOSE {
-                path.rate = Some(pace * theta.theta / exp_m1(-z));
-            }
+            add(arc);
         } else {
-            for arc in ceilings.arcs(to.theta, 0.0, -way) {
-                path.push(Piece::Ceiling { arc, excess: 0.0, pull: 0.0 });
-            }
+            // In time theta rises.
+            let [high, low] = ceilings.arcs(to.theta, 0.0, -way);
+            low.into_iter().chain(high).for_each(add);
         }
+        path.refer_to_switches();
         Some(path)
     }
 }
@@ -479,12 +545,74 @@ pub(super) struct Switch {
     pub ln_z: Option<f64>,
     /// Derivative of `ln u` on the ceiling with respect to `ln theta`.
     pub rise: f64,
-    /// Derivative of `way` with respect to the parameter.
-    pub pace: f64,
+    /// Derivative of `way` with respect to the parameter, over `-z`.
+    pub pace_over_z: f64,
 }
 
 /// `ln delta` below which squares of `delta` are no numbers.
 const LN_TINY: f64 = -300.0;
 
-/// `|ln u|` below which the time of a free arc that ends there hardly changes with it.
-const CLOSE: f64 = 0.02;
+#[cfg(test)]
+mod tests {
+    //! The analytic derivative of the time against differences of it, on every part of the clamped family.
+
+    use super::super::Bounds;
+    use super::*;
+
+    #[test]
+    fn rate_is_the_derivative_of_the_time_on_every_part_of_the_clamped_family() {
+        let laws = [(0.03, 0.05), (0.03, 0.03), (0.05, 0.01), (0.1, 0.0), (0.002, 0.02)];
+        let transitions = [(3.0, 100.0), (100.0, 3.0), (3.0, 3.0), (1.01, 40.0), (40.0, 1.01), (1e5, 1.001e5)];
+        let ceilings = [
+            (1.2, f64::INFINITY),
+            (20.0, f64::INFINITY),
+            (f64::INFINITY, 1e-3),
+            (f64::INFINITY, 0.05),
+            (3.0, 0.05),
+            (300.0, 0.02),
+        ];
+        let mut seen = 0;
+        for (a, b) in laws {
+            for (v_i, v_f) in transitions {
+                for (times, above) in ceilings {
+                    for floor in [true, false] {
+                        let law = Law { a, b };
+                        let steady = |v: f64| 1.0 + (a - b) * f64::ln(v);
+                        let bounds =
+                            Bounds { floor, v_ceiling: times * v_f, tau_ceiling: steady(v_i).max(steady(v_f)) + above };
+                        let (from, to) = (Lifetime::steady(v_i), Lifetime::steady(v_f));
+                        let problem = Problem { law, from, to, fall: (v_f - v_i) / v_i, bounded: floor };
+                        let ceilings = Ceilings::new(law, to, v_f, &bounds);
+                        let q_hold = problem.q_hold();
+                        for i in -30..=30 {
+                            let q = 0.2501 * f64::from(i);
+                            let step = 1e-5;
+                            let at = |q: f64| {
+                                let path = Path::clamped(&problem, &ceilings, problem.extremal(q, q_hold)?)?;
+                                Some((path.sums(1e-14)?, path.signature()))
+                            };
+                            let (Some(before), Some(here), Some(after)) = (at(q - step), at(q), at(q + step)) else {
+                                continue;
+                            };
+                            if before.1 != after.1 || here.1 < 4 || here.0.time < 1e-9 {
+                                continue;
+                            }
+                            if q.abs() < 2.0 * step || q_hold.is_some_and(|h| (q + h).abs() < 2.0 * step) {
+                                continue;
+                            }
+                            let difference = (after.0.time - before.0.time) / (2.0 * step);
+                            let error = (difference - here.0.rate).abs() / here.0.rate.abs().max(1e-3 * here.0.time);
+                            seen += 1;
+                            assert!(
+                                error <= 1e-4,
+                                "{a} {b} {v_i} -> {v_f} {bounds:?} q {q}: rate {} difference {difference}",
+                                here.0.rate
+                            );
+                        }
+                    }
+                }
+            }
+        }
+        assert!(seen > 10_000, "{seen}");
+    }
+}
