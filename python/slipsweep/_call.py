@@ -57,7 +57,7 @@ def call(
         raise ValueError(f'unit: unknown unit "{unit}"\n  expected: "1/t_f" or "1"\n  help: correct the unit, or remove it')
     if isinstance(columns, str):
         columns = [columns]
-    rows = compute(name, values, product, unit == "1/t_f", columns, rtol, None if model == _DEFAULT_MODEL else model)
+    rows = compute(name, values, product, (unit == "1/t_f", columns, rtol, None if model == _DEFAULT_MODEL else model))
     return Table(rows, name, shape)
 
 

@@ -76,10 +76,7 @@ def compute(
     name: str,
     values: Sequence[object],
     grid: list[tuple[str, object]],
-    is_relative: bool,
-    columns: Sequence[str] | None,
-    rtol: float | None,
-    model: _Model | None,
+    options: tuple[bool, Sequence[str] | None, float | None, _Model | None],
 ) -> Rows: ...
 def main(arguments: list[str], stdout_is_closed: bool) -> int: ...
 def picture(svg: str, path: _Path, dpi: float) -> bytes: ...

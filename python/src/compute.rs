@@ -25,18 +25,17 @@ const CALLER: i32 = 3;
 /// Model and units: the keys of `[model]` in a spec.
 type Model = (bool, String, Option<f64>, Option<f64>, Option<f64>, Option<f64>);
 
+/// Whether coefficients are relative to the duration; the columns, the accuracy, model and units.
+type Options = (bool, Option<Vec<String>>, Option<f64>, Option<Model>);
+
 /// A table and its rows. `values` has those of each axis of the table, `None` for the default; `grid` those of the axes of a product.
 #[pyfunction]
-#[pyo3(signature = (name, values, grid, is_relative, columns, rtol, model))]
 pub fn compute(
     py: Python<'_>,
     name: &str,
     values: Vec<Bound<'_, PyAny>>,
     grid: Vec<(String, Bound<'_, PyAny>)>,
-    is_relative: bool,
-    columns: Option<Vec<String>>,
-    rtol: Option<f64>,
-    model: Option<Model>,
+    (is_relative, columns, rtol, model): Options,
 ) -> PyResult<Rows> {
     let known = || table::ALL.iter().map(|table| table.name().to_owned()).collect::<Vec<_>>();
     let table = table::ALL.into_iter().find(|table| table.name() == name);

@@ -6,7 +6,7 @@ use std::sync::{Arc, Mutex, OnceLock};
 use arrow_array::cast::AsArray;
 use arrow_array::types::{Float64Type, Int32Type};
 use arrow_array::{Array, ArrayRef, Float64Array, RecordBatch, StructArray};
-use arrow_schema::{ArrowError, DataType, Field};
+use arrow_schema::{ArrowError, DataType};
 use pyo3::exceptions::PyValueError;
 use pyo3::ffi;
 use pyo3::prelude::*;
@@ -38,6 +38,9 @@ impl Buffer {
         if filled == 0 { Ok(()) } else { Err(PyErr::fetch(slf.py())) }
     }
 }
+
+/// Name, unit, meaning and type of a column, and whether cells may be missing.
+type Field = (String, String, String, &'static str, bool);
 
 /// Computed rows before a request for Arrow.
 struct Computed {
@@ -96,8 +99,8 @@ impl Rows {
         self.length
     }
 
-    /// Name, unit, meaning and type of every column, and whether cells may be missing.
-    fn fields(&self) -> PyResult<Vec<(String, String, String, &'static str, bool)>> {
+    /// Every column.
+    fn fields(&self) -> PyResult<Vec<Field>> {
         let schema = self.batch()?.schema();
         let fields = schema.fields().iter().map(|field| {
             let entry = |key: &str| field.metadata().get(key).cloned().unwrap_or_default();
@@ -164,7 +167,7 @@ impl Rows {
         requested_schema: Option<Bound<'py, PyCapsule>>,
     ) -> PyResult<Bound<'py, PyCapsule>> {
         let rows = StructArray::from(self.batch()?.clone());
-        let field = Field::new_struct("", rows.fields().clone(), false);
+        let field = arrow_schema::Field::new_struct("", rows.fields().clone(), false);
         let batches: [Result<ArrayRef, ArrowError>; 1] = [Ok(Arc::new(rows))];
         let reader = ArrayIterator::new(batches, Arc::new(field));
         Ok(pyo3_arrow::ffi::to_stream_pycapsule(py, Box::new(reader), requested_schema)?)
