@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Any
 
 from ._core import tables
-from ._tables import docstring, has_scale
+from ._documentation import docstring, has_scale
 
 HEAD = '''"""A function for each table. Written by `python -m slipsweep._stubs`."""
 
@@ -60,4 +60,5 @@ def main() -> None:
         sys.exit(f"{path}: not current\n  help: python -m slipsweep._stubs")
 
 
-main()
+if __name__ == "__main__":
+    main()
