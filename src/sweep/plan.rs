@@ -2,7 +2,7 @@
 
 use super::check::{Request, Sweep};
 use crate::dataset::{Build, Manifest, ManifestTable};
-use crate::table::{Job, OPTIMUM_AXES, OptimumCache, RepeatedRows, Signal};
+use crate::table::{Job, OPTIMUM_AXES, OptimumCache, Signal};
 
 /// The plan of a sweep.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -47,13 +47,10 @@ impl Plan {
 impl Sweep {
     /// The job of one of its tables.
     pub fn job<'a>(&'a self, request: &'a Request, optimum_cache: &'a OptimumCache, signal: &'a Signal) -> Job<'a> {
-        let (tuples, axes) = (request.row_index.tuples(OPTIMUM_AXES), request.table.axes());
-        let rows = if axes == OPTIMUM_AXES { tuples.clone() } else { request.row_index.tuples(axes) };
         Job {
             grid: &self.grid,
             rows: &request.row_index,
-            tuples,
-            repeated_rows: RepeatedRows::among(rows),
+            tuples: request.row_index.tuples(OPTIMUM_AXES),
             members: request.members.as_ref(),
             projection: &request.projection,
             sizes: &request.sizes,
