@@ -301,7 +301,7 @@ def checked_by_the_theory():
 
 def limits():
     """Near the least times, the least ceilings, the onsets of ceilings and of the hold, and where theta can only just turn."""
-    for start, t_f in ((PAPER, 0.02), (PAPER, 0.08), ((0.05, 0.02, 3.0, 100.0), 0.02), ((0.04, 0.04, 20.0, 35.0), 0.03), ((0.01, 0.0, 5.0, 5e3), 0.1)):
+    for start, t_f in ((PAPER, 0.02), (PAPER, 0.08), ((0.05, 0.02, 3.0, 100.0), 0.02), ((0.04, 0.04, 20.0, 35.0), 0.03), ((0.01, 0.0, 5.0, 5e3), 1e-3)):
         for which, place in (("v_ceiling", 6), ("tau_ceiling", 7)):
             case = [*start, t_f, 1, INF, INF]
             peak = free_peaks(case)[place - 6]
