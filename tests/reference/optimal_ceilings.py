@@ -2,7 +2,7 @@
 """Optimal protocols under ceilings of velocity and friction, to 25 digits: writes optimal_ceilings.csv.
 
     python3 -m venv venv && venv/bin/pip install gmpy2
-    venv/bin/python optimal_ceilings.py                 # or some of theory, limits, random
+    venv/bin/python optimal_ceilings.py                 # or some of theory, structures, limits, random
 
 The problem is solved by ceilings.py at 54 digits. Each row is checked before it is written: the time to 1e-34 of `t_f - t_least`; time and
 work by another substitution to 1e-36; the Hamiltonian against the derivative of the work along the family, and every slope against a
@@ -93,7 +93,7 @@ def least_ceiling(make, t_f, which):
         q = make(**{which: INF})
         steady = [q.tau_ss(q.l_0), q.tau_ss(q.l_1)]
         if q.l_1 < q.l_0:
-            return (1 / q.theta_1 if one else max(steady)) + exp(x)
+            return (1 + exp(x)) / q.theta_1 if one else max(steady) + exp(x)
         if one:
             # The least velocity that is steady sliding where the other ceiling allows to stop.
             allowed = [l for l in (q.l_0, q.l_1, *q.zero_of_caps()) if q.l_0 <= l <= q.l_1 and (not q.caps(l) or q.cap(l)[0] >= -mpfr(10) ** -25)]
@@ -105,9 +105,9 @@ def least_ceiling(make, t_f, which):
         needed = ceilinged_time(make(**{which: value(x)}))
         return log(needed / t_f) if needed < INF else mpfr(10)
 
-    # Within 1e-26 of a ceiling that takes for ever it is that ceiling, to the digits that are printed.
-    if f(mpfr(-60)) < 0:
-        return value(mpfr(-60))
+    # Within 1e-22 of a ceiling that takes for ever it is that ceiling, to twice the digits of a double.
+    if f(mpfr(-50)) < 0:
+        return value(mpfr(-50))
     bits = gmpy2.get_context().precision
     precision(ROUGH)
     low = high = mpfr(-3)
@@ -360,6 +360,28 @@ def limits():
         yield "lingers", (*SLOW, t_f, 1, INF, 0.965)
 
 
+def structures():
+    """Sequences of arcs that random points seldom have."""
+    yield "structure", (0.05, 0.02, 3.0, 1e4, 0.0012941309247107252, 1, INF, 1.3763102111592858)
+    yield "structure", (0.05, 0.02, 3.0, 1e4, 0.0031, 1, 2e4, 1.3263102111592857)
+    yield "structure", (0.1, 0.08, 3.0, 1e4, 0.013382512430302489, 1, INF, 1.3842068074395237)
+    yield "structure", (0.2, 0.05, 3.0, 100.0, 0.008085775811857467, 1, INF, 2.090775527898214)
+    yield "structure", (0.2, 0.05, 3.0, 1e4, 0.0020708338167306317, 1, 2e5, 2.481551055796428)
+    yield "structure", (0.2, 0.05, 3.0, 1e4, 0.0011681964113972032, 0, INF, 2.581551055796428)
+    yield "structure", (*PAPER, 0.02, 1, 1500.0, 1.05)
+    yield "structure", (*PAPER, 0.03, 1, 800.0, 1.045)
+    yield "structure", (*PAPER, 0.08, 0, 1000.0, 1.05)
+    yield "structure", (*PAPER, 0.05, 0, INF, 1.05)
+    yield "structure", (*SLOW, 0.5, 1, 2.7, 0.965)
+    yield "structure", (*SLOW, 0.6, 0, 4.0, 0.99)
+    yield "structure", (0.05, 0.02, 100.0, 3.0, 0.5, 1, 2.5, 1.02)
+    yield "structure", (0.05, 0.03, 100.0, 3.0, 0.6, 0, 4.0, INF)
+    yield "structure", (0.05, 0.03, 3.0, 30.0, 0.3, 0, INF, 1.09)
+    yield "structure", (0.02, 0.02, 40.0, 5.0, 0.45, 1, 4.5, 0.995)
+    yield "structure", (0.02, 0.02, 40.0, 5.0, 0.45, 1, 7.0, 1.008)
+    yield "structure", (0.03, 0.0, 40.0, 5.0, 0.4, 1, INF, 1.03)
+
+
 def random_cases(seed, count):
     """Random transitions with ceilings between the least feasible one and the peak of the free optimum."""
     rng = random.Random(seed)
@@ -389,7 +411,7 @@ def give_up(*_):
     raise ArithmeticError("25 seconds are over")
 
 
-SOURCES = {"theory": checked_by_the_theory, "limits": limits, "random": lambda: random_cases(1, 160)}
+SOURCES = {"theory": checked_by_the_theory, "structures": structures, "limits": limits, "random": lambda: random_cases(1, 160)}
 
 
 def main(sources):
