@@ -243,7 +243,7 @@ struct TableSampler<'a> {
     request: &'a Request,
     job: Job<'a>,
     layout: Layout,
-    /// Seconds of an optimal protocol that tables share, which are counted apart.
+    /// Seconds of an optimal protocol of several tables, which are counted apart.
     optimum: f64,
     began: Instant,
     /// Seconds for the samples.
