@@ -1,14 +1,14 @@
-//! Files that somebody names. Only plain files are opened: a named pipe would wait for somebody who writes, a device might never end.
+//! Opens plain files that a user names. Named pipes, which wait for a writer, and devices, which may never end, are refused.
 
 use std::fs::{self, File};
 use std::io;
 use std::path::Path;
 
-/// The file in `path`, for reading.
+/// Opens the file in `path` for reading.
 ///
 /// # Errors
 ///
-/// [`io::ErrorKind::InvalidInput`] if it is no plain file; and what the system says.
+/// [`io::ErrorKind::InvalidInput`] for anything but a plain file, and errors of the operating system.
 pub fn open(path: &Path) -> io::Result<File> {
     let kind = fs::metadata(path)?.file_type();
     let found = match kind {

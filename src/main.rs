@@ -1,15 +1,15 @@
-//! The command line of `slipsweep`; everything it does is in the library.
+//! The command line of `slipsweep`. The library contains everything else.
 
 use std::process::ExitCode;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-/// Parts take and give back some megabytes each. The system's allocator returns them to the kernel every time, which then costs a
-/// fifth of a run in page faults.
+/// Each part allocates and frees some megabytes. The allocator of the system returns them to the kernel each time, and page faults then cost a
+/// fifth of a run.
 #[global_allocator]
 static ALLOCATOR: mimalloc::MiMalloc = mimalloc::MiMalloc;
 
-/// Whether standard output was closed when the process began. Before `main`, the standard library opens `/dev/null` in its place, where an
-/// answer would be lost without an error; so this is found out before.
+/// Whether standard output was closed when the process began. Before `main`, the standard library opens `/dev/null` in its place, which would
+/// swallow an answer without an error. So this flag is set before.
 static STDOUT_IS_CLOSED: AtomicBool = AtomicBool::new(false);
 
 #[cfg(any(target_os = "linux", target_os = "macos"))]
@@ -17,7 +17,7 @@ static STDOUT_IS_CLOSED: AtomicBool = AtomicBool::new(false);
 mod early {
     use super::{Ordering, STDOUT_IS_CLOSED};
 
-    /// Called by the loader, before the standard library has begun.
+    /// Called by the loader before the start of the standard library.
     #[used]
     #[cfg_attr(target_os = "linux", unsafe(link_section = ".init_array"))]
     #[cfg_attr(target_os = "macos", unsafe(link_section = "__DATA,__mod_init_func"))]

@@ -1,11 +1,11 @@
-//! Names that somebody misspelt.
+//! Suggestions for misspelt names.
 
 use std::borrow::Cow;
 
-/// Bytes of a name for which a suggestion is looked for, at most: three times those of the longest name that there is.
+/// Greatest length of a name with a suggestion, in bytes. Chosen: three times the longest valid name.
 const MAX_NAME_BYTES: usize = 64;
 
-/// A text that somebody else wrote, for a message: its first `most` characters, and none that a terminal would obey.
+/// The first `most` characters of a foreign text, without control characters, for a message.
 pub fn shown(text: &str, most: usize) -> Cow<'_, str> {
     let is_plain = |text: &str| !text.contains(|c: char| c.is_control() && c != '\n');
     let start = text.char_indices().nth(most).map_or(text, |(end, _)| &text[..end]);
@@ -20,7 +20,7 @@ pub fn shown(text: &str, most: usize) -> Cow<'_, str> {
     shown.into()
 }
 
-/// Synonyms of our names in other tools, in lower case.
+/// Names of our quantities and columns in other tools, in lower case.
 const SYNONYMS: [(&str, &[&str]); 13] = [
     ("threads", &["jobs", "j", "cores", "workers", "cpus", "processes", "parallel"]),
     ("out", &["output", "output_dir", "outdir", "dir", "dest", "to"]),
@@ -37,12 +37,12 @@ const SYNONYMS: [(&str, &[&str]); 13] = [
     ("m", &["mass"]),
 ];
 
-/// Characters of a name at most of which the first has to be right: one letter away from `sin` are `min` and `bin`.
+/// Greatest length of a name whose first letter must be correct, in characters: `min` and `bin` are one letter away from `sin`.
 const MAX_SHORT_CHARS: usize = 4;
 
-/// The name among `known`, all in lower case, that `name` was most likely meant to be: one that means the same, or a similar one.
+/// The most likely intended name among `known`, all in lower case: a synonym of `name`, or a similar name.
 ///
-/// None of a name of more than [`MAX_NAME_BYTES`] bytes: comparing two takes memory in proportion to the product of their lengths.
+/// `None` for names of more than [`MAX_NAME_BYTES`] bytes, since a comparison needs memory in proportion to the product of both lengths.
 pub fn nearest<'a>(name: &str, known: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
     if name.len() > MAX_NAME_BYTES {
         return None;
@@ -69,7 +69,7 @@ pub fn hint<'a>(name: &str, known: impl IntoIterator<Item = &'a str>) -> String 
 
 #[cfg(test)]
 mod tests {
-    //! Suggestions are near or not made.
+    //! A suggestion is close to the misspelt name, or absent.
 
     use super::{nearest, shown};
 

@@ -1,4 +1,4 @@
-"""Three questions, answered with xarray. Usage: with_xarray.py RESULTS, the folder with the datasets of examples/README.md."""
+"""Three questions, answered with xarray. Usage: with_xarray.py RESULTS, the folder with the datasets of docs/examples.md."""
 
 import sys
 from pathlib import Path

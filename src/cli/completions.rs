@@ -1,4 +1,4 @@
-//! `slipsweep completions SHELL`: what makes a shell complete commands and flags.
+//! `slipsweep completions SHELL`: the completion script of a shell.
 
 use clap::CommandFactory;
 use clap_complete::Shell;
@@ -12,7 +12,7 @@ use super::{Failure, put};
   slipsweep completions zsh > ~/.zfunc/_slipsweep
   slipsweep completions fish > ~/.config/fish/completions/slipsweep.fish")]
 pub struct Arguments {
-    /// The shell
+    /// Shell
     shell: Shell,
 }
 

@@ -15,14 +15,14 @@ use crate::table;
 pub struct Arguments {
     /// Folder of the dataset, such as results/NAME; or a Parquet or CSV file
     dataset: PathBuf,
-    /// The table; all by default
+    /// Table; all by default
     table: Option<String>,
-    /// Rows to show
+    /// Number of rows
     #[arg(short = 'n', long, value_name = "N", default_value_t = 10)]
     rows: u32,
 }
 
-/// Shows the first rows of one table or of all.
+/// Prints the first rows of one table or of all tables.
 pub fn head(arguments: &Arguments) -> Result<(), Failure> {
     kind::expect_rows(&arguments.dataset)?;
     super::note_at(&arguments.dataset);
@@ -38,7 +38,7 @@ pub fn head(arguments: &Arguments) -> Result<(), Failure> {
     say(&texts.join("\n"))
 }
 
-/// A line on the table, then names, units and rows.
+/// A title, then names, units and rows.
 fn first(source: &Source, arguments: &Arguments) -> Result<String, Failure> {
     let mut lines = vec![source.columns.clone()];
     if source.units.iter().any(|unit| !unit.is_empty()) {

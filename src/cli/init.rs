@@ -1,4 +1,4 @@
-//! `slipsweep init NAME`: a commented spec to start from, that runs as it is.
+//! `slipsweep init NAME`: a commented spec that runs unchanged.
 
 use std::io;
 use std::path::{Path, PathBuf};
@@ -19,7 +19,7 @@ use crate::sweep::{check_name, schema};
 pub struct Arguments {
     /// Name of the dataset; the spec is written to NAME.toml
     name: PathBuf,
-    /// The question of the spec
+    /// Question that the spec answers
     #[arg(long, value_enum, default_value_t = Question::Landscape)]
     question: Question,
 }
@@ -38,7 +38,7 @@ enum Question {
 }
 
 impl Question {
-    /// The spec, in which NAME stands for the name.
+    /// The spec, with NAME in place of the name.
     fn spec(self) -> &'static str {
         match self {
             Question::Landscape => include_str!("init/landscape.toml"),
@@ -49,7 +49,7 @@ impl Question {
     }
 }
 
-/// The file with which editors complete and check specs.
+/// The file of the JSON Schema, for completion and checks in editors.
 const SCHEMA: &str = "slipsweep.schema.json";
 
 /// Writes a spec and its JSON Schema.
@@ -69,7 +69,7 @@ pub fn init(arguments: &Arguments) -> Result<(), Failure> {
     }
     let text = format!("#:schema ./{SCHEMA}\n{}", arguments.question.spec().replace("NAME", &name));
     let path = folder.join(format!("{name}.toml"));
-    // The spec as it would be written is no other one.
+    // A spec that equals the new one is no conflict.
     let found = file::open(&path).and_then(io::read_to_string);
     if path.exists() && !found.is_ok_and(|found| found == text) {
         let found = format!("{}: exists already", path.display());
@@ -84,7 +84,7 @@ pub fn init(arguments: &Arguments) -> Result<(), Failure> {
     };
     let schema_path = folder.join(SCHEMA);
     let schema = format!("{:#}\n", schema());
-    // One of another version would complain of what this version can do.
+    // A schema of another version would report valid keys of this version as errors.
     if !file::open(&schema_path).and_then(io::read_to_string).is_ok_and(|found| found == schema) {
         write(&schema_path, &schema)?;
     }

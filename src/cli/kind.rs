@@ -1,4 +1,4 @@
-//! What a path is: a command that gets something else than it takes says which command takes it.
+//! The kind of a path. If an argument has the wrong kind, the message names the command that accepts it.
 
 use std::fs::{self, File};
 use std::io::{self, Read};
@@ -10,18 +10,18 @@ use crate::dataset::Folder;
 /// The file that makes a folder a dataset.
 pub const MANIFEST: &str = "manifest.json";
 
-/// Bytes at the start of a file that are looked at. Chosen: all of a spec that one writes by hand.
+/// Bytes at the start of a file that are inspected. Chosen: the whole of a handwritten spec.
 const MAX_START_BYTES: u64 = 1 << 20;
 
-/// Names of datasets that a message lists. Chosen: they fit a line.
+/// Greatest number of datasets that a message lists. Chosen: they fit on a line.
 const MAX_NAMED_DATASETS: usize = 4;
 
-/// What a path is.
+/// The kind of a path.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Kind {
     /// The folder of a dataset.
     Dataset,
-    /// A folder with datasets in it, such as `results`.
+    /// A folder that contains datasets, such as `results`.
     Datasets,
     /// The folder of a table of a dataset.
     Table,
@@ -37,20 +37,20 @@ pub enum Kind {
     Trace,
     /// Another file of rows, CSV or Parquet.
     Rows,
-    /// A page that `report` wrote, or another.
+    /// An HTML page, such as one by `report`.
     Page,
-    /// A picture that `plot` wrote, or another.
+    /// A picture, such as one by `plot`.
     Picture,
     /// Another file.
     File,
-    /// What is read once, by who knows what is to come.
+    /// A device or a named pipe, which can be read only once.
     Device,
     /// Nothing.
     Nothing,
 }
 
 impl Kind {
-    /// What `path` is.
+    /// The kind of `path`.
     pub fn of(path: &Path) -> Kind {
         let ending = path.extension().and_then(|ending| ending.to_str()).unwrap_or_default().to_lowercase();
         if path.is_dir() {
@@ -58,7 +58,7 @@ impl Kind {
                 () if path.join(MANIFEST).exists() => Kind::Dataset,
                 () if above(path).is_some_and(|above| above.join(MANIFEST).exists()) => Kind::Table,
                 () if !datasets(path).is_empty() => Kind::Datasets,
-                // Its parts say what a lost manifest said.
+                // The parts replace a lost manifest.
                 () if matches!(Folder::at(path).manifest(), Ok(Some(_))) => Kind::Dataset,
                 () => Kind::Folder,
             };
@@ -81,7 +81,7 @@ impl Kind {
         }
     }
 
-    /// What is expected of an argument of this kind.
+    /// The expected argument, in words.
     fn expected(self) -> &'static str {
         match self {
             Kind::Spec => "a spec, such as NAME.toml",
@@ -90,7 +90,7 @@ impl Kind {
         }
     }
 
-    /// It in words, and what may be done with it, which is in `path`.
+    /// The kind in words, and the help for a `path` of this kind.
     fn words(self, path: &Path) -> (&'static str, String) {
         let shown = path.display();
         let name = |path: Option<PathBuf>, what: &str| {
@@ -122,7 +122,7 @@ impl Kind {
     }
 }
 
-/// That `path` is one of `kinds`.
+/// Checks that `path` is one of `kinds`.
 pub fn expect(path: &Path, kinds: &[Kind]) -> Result<(), Failure> {
     if kinds.contains(&Kind::of(path)) { Ok(()) } else { Err(unexpected(path, kinds)) }
 }
@@ -140,7 +140,7 @@ pub fn unexpected(path: &Path, kinds: &[Kind]) -> Failure {
     refused(format!("{}: {what}", path.display()), expected.join(", or "), help)
 }
 
-/// That `path` may be a spec: the reader of specs says what else is wrong.
+/// Checks that `path` may be a spec; the reader of specs reports other errors.
 pub fn expect_spec(path: &Path) -> Result<(), Failure> {
     match Kind::of(path) {
         Kind::Spec | Kind::File | Kind::Folder | Kind::Device | Kind::Nothing => Ok(()),
@@ -148,7 +148,7 @@ pub fn expect_spec(path: &Path) -> Result<(), Failure> {
     }
 }
 
-/// That `path` is not something that has no rows: the reader of datasets, or of files of rows, says what else is wrong.
+/// Checks that `path` may contain rows; the readers of datasets and of files report other errors.
 pub fn expect_rows(path: &Path) -> Result<(), Failure> {
     match Kind::of(path) {
         Kind::Spec | Kind::Manifest | Kind::Datasets | Kind::Page | Kind::Picture => expect(path, &[Kind::Dataset]),
@@ -156,11 +156,11 @@ pub fn expect_rows(path: &Path) -> Result<(), Failure> {
     }
 }
 
-/// The folder that a path is in.
+/// The parent folder of a path.
 fn above(path: &Path) -> Option<PathBuf> {
     let real = fs::canonicalize(path).ok()?;
     let real = real.parent()?.to_owned();
-    // As it was typed, if that names it.
+    // As typed, if that path leads to the folder.
     let typed = path.parent().filter(|typed| fs::canonicalize(typed).is_ok_and(|typed| typed == real));
     Some(typed.map_or(real.clone(), Path::to_owned))
 }
@@ -184,7 +184,7 @@ fn rows(is_trace: bool) -> Kind {
     if is_trace { Kind::Trace } else { Kind::Rows }
 }
 
-/// Whether a CSV has a time and a velocity, after the lines that say what it is.
+/// Whether a CSV has columns of time and velocity, after its comment lines.
 fn is_trace(text: &str) -> bool {
     let names = text.lines().find(|line| !line.starts_with('#')).unwrap_or_default();
     let has = |name| names.split(',').any(|column| column.trim() == name);
@@ -197,13 +197,13 @@ fn has_columns_of_trace(path: &Path) -> bool {
     has("t") && has("v")
 }
 
-/// Whether a text without the ending of a spec is one.
+/// Whether a text is a spec although the name of its file does not end like one.
 fn is_spec(text: &[u8]) -> bool {
     let table: Option<toml::Table> = std::str::from_utf8(text).ok().and_then(|text| text.parse().ok());
     table.is_some_and(|table| ["axes", "tables", "block"].iter().any(|key| table.contains_key(*key)))
 }
 
-/// The dataset that a spec makes by default.
+/// The default dataset of a spec.
 fn results(spec: &Path) -> String {
     let text = start(spec).ok().and_then(|text| String::from_utf8(text).ok());
     let table: Option<toml::Table> = text.and_then(|text| text.parse().ok());

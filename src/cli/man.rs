@@ -12,7 +12,7 @@ use crate::names::hint;
   slipsweep man | man -l -
   slipsweep man run > ~/.local/share/man/man1/slipsweep-run.1")]
 pub struct Arguments {
-    /// The command; the program itself by default
+    /// Command; the program itself by default
     command: Option<String>,
 }
 
@@ -33,6 +33,6 @@ pub fn man(arguments: &Arguments) -> Result<(), Failure> {
     };
     let mut page = Vec::new();
     Man::new(command).render(&mut page).map_err(Failure::failed)?;
-    // What stands after the options of a command are its examples.
+    // The text after the options of a command contains its examples.
     put(String::from_utf8_lossy(&page).replace(".SH EXTRA", ".SH EXAMPLES").as_bytes())
 }

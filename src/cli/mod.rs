@@ -1,4 +1,4 @@
-//! The commands: arguments in, a call of the library, words out.
+//! The commands: each reads its arguments, calls the library and prints the result.
 
 mod completions;
 mod head;
@@ -42,13 +42,13 @@ use crate::sweep::{SpecError, Sweep, schema};
 
 use kind::Kind;
 
-/// The spec or the arguments are wrong.
+/// Exit code if the spec or the arguments are wrong.
 const WRONG: u8 = 1;
-/// The run failed.
+/// Exit code if the command failed.
 const FAILED: u8 = 2;
-/// `--strict`, and some row is `not_converged`.
+/// Exit code with `--strict` if some row is `not_converged`.
 const NOT_STRICT: u8 = 3;
-/// `--requeue`, and another try may fix what failed (EX_TEMPFAIL of sysexits.h).
+/// Exit code with `--requeue` for a temporary failure (EX_TEMPFAIL of sysexits.h).
 const AGAIN: u8 = 75;
 
 /// Exact parameter sweeps over the control of rate-and-state friction.
@@ -118,7 +118,7 @@ use taplo, such as VS Code with Even Better TOML. `slipsweep init` writes both."
     Man(man::Arguments),
 }
 
-/// A command that did not do its work: what to say, and the exit code.
+/// The failure of a command: its message and its exit code.
 struct Failure {
     code: u8,
     message: String,
@@ -145,12 +145,12 @@ impl From<QueryError> for Failure {
 /// Whether standard output was closed when the process began.
 static STDOUT_IS_CLOSED: AtomicBool = AtomicBool::new(false);
 
-/// Reads the arguments of the process and does what they say; an answer that standard output cannot take, closed as it may be from the
-/// start, is a failure.
+/// Runs the command in the arguments of the process. It fails if standard output does not accept the answer, for example because it was closed
+/// from the start.
 pub fn main(stdout_is_closed: bool) -> ExitCode {
     STDOUT_IS_CLOSED.store(stdout_is_closed, Ordering::Relaxed);
     report_first_panic();
-    // A file that grows beyond the limit of its user is then a write that fails, not the end of the process.
+    // Without this signal, a file that exceeds the user's limit fails to write instead of ending the process.
     #[cfg(unix)]
     let _ = signal_hook::flag::register(signal_hook::consts::SIGXFSZ, Arc::new(AtomicBool::new(false)));
     let arguments = match Arguments::try_parse() {
@@ -159,7 +159,7 @@ pub fn main(stdout_is_closed: bool) -> ExitCode {
             let error = suggested(error);
             let printed = error.print();
             if error.use_stderr() {
-                // Nothing can be done if the terminal is gone.
+                // A lost terminal is ignored.
                 return WRONG.into();
             }
             return ended(stdout().and_then(|mut stdout| written(printed.and_then(|()| stdout.flush()))));
@@ -168,18 +168,18 @@ pub fn main(stdout_is_closed: bool) -> ExitCode {
     ended(perform(arguments))
 }
 
-/// Writes a file, whole or not at all.
+/// Writes a file completely or not at all.
 fn write_file(path: &Path, bytes: &[u8]) -> Result<(), Failure> {
     to_file(path, |file| file.write_all(bytes))
         .map_err(|error| Failure::failed(format!("cannot write {}: {error}", path.display())))
 }
 
-/// A table that is not among `names`; the message begins with `place`.
+/// The failure for a table that is not among `names`; the message begins with `place`.
 fn no_table(place: &str, name: &str, names: &[&str]) -> Failure {
     refused(format!("{place}no table `{name}`"), names.join(", "), hint(name, names.iter().copied()))
 }
 
-/// Does what the arguments say.
+/// Runs the command of the arguments.
 fn perform(arguments: Arguments) -> Result<(), Failure> {
     match arguments.command {
         Command::Init(arguments) => init::init(&arguments),
@@ -201,7 +201,7 @@ fn perform(arguments: Arguments) -> Result<(), Failure> {
     }
 }
 
-/// The exit code of a command, whose failure is reported.
+/// Reports the failure of a command, if any, and returns the exit code.
 fn ended(done: Result<(), Failure>) -> ExitCode {
     match done {
         Ok(()) => ExitCode::SUCCESS,
@@ -212,7 +212,7 @@ fn ended(done: Result<(), Failure>) -> ExitCode {
     }
 }
 
-/// `error` with the option or command that was meant, which may have another name than the one given.
+/// `error` with a suggestion of the intended option or command.
 fn suggested(mut error: clap::Error) -> clap::Error {
     let (invalid, suggestion) = match error.kind() {
         ErrorKind::UnknownArgument => (ContextKind::InvalidArg, ContextKind::SuggestedArg),
@@ -220,7 +220,7 @@ fn suggested(mut error: clap::Error) -> clap::Error {
         _ => return error,
     };
     let Some(ContextValue::String(given)) = error.get(invalid) else { return error };
-    // As columns are written.
+    // In the spelling of columns.
     let given = given.trim_start_matches('-').replace('-', "_");
     let program = Arguments::command();
     let meant = if invalid == ContextKind::InvalidSubcommand {
@@ -237,7 +237,7 @@ fn suggested(mut error: clap::Error) -> clap::Error {
     error
 }
 
-/// The spec in `path`, checked; what is doubtful about it is said.
+/// Reads and checks the spec in `path`; prints warnings.
 fn load(path: &Path) -> Result<Sweep, Failure> {
     kind::expect_spec(path)?;
     let sweep = waiting(&Wait::new("reading the spec"), || Sweep::load(path))?;
@@ -247,17 +247,17 @@ fn load(path: &Path) -> Result<Sweep, Failure> {
     Ok(sweep)
 }
 
-/// The failure of a wrong request.
+/// The failure for a wrong request.
 fn wrong(message: impl Display) -> Failure {
     Failure { code: WRONG, message: format!("error: {message}") }
 }
 
-/// The same with what is right and what to do.
+/// The failure for a wrong request, with the expected value and a line of help.
 fn refused(found: impl Display, expected: impl Display, help: impl Display) -> Failure {
     wrong(format!("{found}\n  expected: {expected}\n  help: {help}"))
 }
 
-/// The dataset in `path`, which must be one.
+/// Opens the dataset in `path`.
 fn dataset(path: &Path) -> Result<(Folder, Manifest), Failure> {
     kind::expect(path, &[Kind::Dataset])?;
     let folder = Folder::at(path);
@@ -274,7 +274,7 @@ fn dataset(path: &Path) -> Result<(Folder, Manifest), Failure> {
     }
 }
 
-/// Says on standard error that a manifest is not what its file says.
+/// Prints a note on standard error if the manifest was reconstructed from the parts.
 fn note(folder: &Folder, manifest: &Manifest) {
     if let Some(why) = &manifest.rebuilt {
         let path = folder.manifest_path();
@@ -283,7 +283,7 @@ fn note(folder: &Folder, manifest: &Manifest) {
     }
 }
 
-/// Says the same of the dataset in `path`, if there is one.
+/// Prints this note for the dataset in `path`, if any.
 fn note_at(path: &Path) {
     let folder = Folder::at(path);
     if let (true, Ok(Some(manifest))) = (path.is_dir(), folder.manifest()) {
@@ -291,8 +291,8 @@ fn note_at(path: &Path) {
     }
 }
 
-/// Reports only the first panic of the process: the engine provokes others when it searches the faulty row. Panics of a reader
-/// of damaged files are reported as faults of the file.
+/// Reports only the first panic of the process: the engine provokes others while it searches for the faulty row. Panics of a reader of damaged
+/// files are reported as errors of the file.
 fn report_first_panic() {
     let (usual, known) = (panic::take_hook(), AtomicBool::new(false));
     panic::set_hook(Box::new(move |panic| {
@@ -307,13 +307,13 @@ fn say(text: &str) -> Result<(), Failure> {
     put(text.as_bytes())
 }
 
-/// The same for bytes.
+/// Writes `bytes` to standard output.
 fn put(bytes: &[u8]) -> Result<(), Failure> {
     let mut stdout = stdout()?;
     written(stdout.write_all(bytes).and_then(|()| stdout.flush()))
 }
 
-/// Standard output, which takes every answer. Who writes to it flushes it, and hands the result to [`written`].
+/// Standard output, for answers. The caller flushes it and passes the result to [`written`].
 fn stdout() -> Result<BufWriter<StdoutLock<'static>>, Failure> {
     if STDOUT_IS_CLOSED.load(Ordering::Relaxed) {
         return Err(Failure::failed("cannot write to standard output: it is closed"));
@@ -321,7 +321,7 @@ fn stdout() -> Result<BufWriter<StdoutLock<'static>>, Failure> {
     Ok(BufWriter::new(io::stdout().lock()))
 }
 
-/// Whether standard output took an answer; that a reader has had enough is no failure.
+/// The result of writing to standard output; a reader that stops early is no failure.
 fn written(result: io::Result<()>) -> Result<(), Failure> {
     match result {
         Err(error) if error.kind() != io::ErrorKind::BrokenPipe => {
@@ -331,12 +331,12 @@ fn written(result: io::Result<()>) -> Result<(), Failure> {
     }
 }
 
-/// Fills a file, whole or not at all; what is no plain file (a device, a named pipe) is written to as it is.
+/// Writes a file completely or not at all; devices and named pipes are written directly.
 fn to_file<E: From<io::Error>>(path: &Path, fill: impl FnOnce(&mut dyn Write) -> Result<(), E>) -> Result<(), E> {
     match fs::canonicalize(path) {
         Ok(real) if fs::metadata(&real)?.is_file() => atomic::write_with(&real, |file| fill(file)),
         Ok(real) => fill(&mut OpenOptions::new().write(true).open(real)?),
-        // The folder of a bare name is the one we are in.
+        // A bare name belongs to the current folder.
         Err(_) => atomic::write_with(&Path::new(".").join(path), |file| fill(file)),
     }
 }

@@ -1,4 +1,4 @@
-//! Where an answer goes, standard output or a file, and in which format: the one requested, or what the name of the file ends in.
+//! Destination and format of an answer: standard output or a file, in the requested format or that of the file's ending.
 
 use std::io::{self, IsTerminal};
 use std::path::PathBuf;
@@ -7,17 +7,17 @@ use clap::ValueEnum;
 
 use super::{Failure, wrong};
 
-/// A way to write an answer.
+/// A format of answers.
 pub trait Format: ValueEnum + Copy + PartialEq + Send + Sync + 'static {
-    /// The formats by the endings of files; of two for one format, the first is the usual one.
+    /// The formats with the endings of their files; the first ending of a format is the usual one.
     const ENDINGS: &'static [(&'static str, Self)];
-    /// Words for a terminal.
+    /// Text for a terminal.
     const TABLE: Self;
-    /// Bytes that are not for a terminal.
+    /// A binary format, which is not printed on a terminal.
     const PARQUET: Self;
 }
 
-/// The arguments that say where and how.
+/// Arguments for destination and format.
 #[derive(Debug, clap::Args)]
 pub struct Output<F: Format> {
     /// Output format [default: by the ending of the file, else table]
@@ -29,12 +29,12 @@ pub struct Output<F: Format> {
 }
 
 impl<F: Format> Output<F> {
-    /// Whether it goes to standard output.
+    /// Whether the answer goes to standard output.
     pub fn is_stdout(&self) -> bool {
         self.out.as_os_str() == "-"
     }
 
-    /// The format that the arguments come to.
+    /// The format that the arguments select.
     pub fn format(&self) -> Result<F, Failure> {
         let ending = self.out.extension().map(|ending| ending.to_string_lossy().to_lowercase());
         let known = ending.and_then(|ending| F::ENDINGS.iter().find(|(known, _)| *known == ending));

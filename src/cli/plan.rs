@@ -43,7 +43,7 @@ pub fn plan(arguments: &Arguments) -> Result<(), Failure> {
     say(&text)
 }
 
-/// What to say of a dataset of `bytes` that is to go to `folder`, whose disk has `free` bytes.
+/// The message for a dataset of `bytes` that does not fit on the disk of `folder` with `free` bytes.
 pub fn too_large(folder: &Path, bytes: f64, free: f64) -> String {
     format!(
         "{}: about {} to write, but {} free on the disk\n  help: write less, with `reduce` or fewer `columns`, or write elsewhere with --out DIR",
@@ -53,7 +53,7 @@ pub fn too_large(folder: &Path, bytes: f64, free: f64) -> String {
     )
 }
 
-/// The rows of each table, and what they cost in a run that reads the spec in `reading` seconds.
+/// The rows of each table and their estimated cost; reading the spec takes `reading` seconds.
 pub fn in_words(sweep: &Sweep, estimates: &Estimates, reading: f64) -> String {
     let plan = Plan::new(sweep);
     let threads = available_parallelism().map_or(1, |threads| threads.get());

@@ -70,7 +70,7 @@ fn in_range(text: &str, least: f64, most: f64) -> Result<f64, String> {
 
 impl From<PlotError> for Failure {
     fn from(error: PlotError) -> Failure {
-        // A damaged file is not a fault of the arguments.
+        // A damaged file is not an error of the arguments.
         let code = if matches!(error, PlotError::Part(_) | PlotError::Trace(_)) { FAILED } else { WRONG };
         Failure { code, message: format!("error: {error}") }
     }
@@ -94,9 +94,9 @@ pub fn plot(arguments: &Arguments) -> Result<(), Failure> {
     }
 }
 
-/// Where pictures go.
+/// Destination of pictures.
 struct OutputTarget {
-    /// The only file, if that was named.
+    /// The file, if one was named.
     file: Option<PathBuf>,
     folder: PathBuf,
     format: Format,
@@ -141,7 +141,7 @@ impl Arguments {
             let drawing = format!("drawing {table}");
             let drawn = waiting(&Wait::new(&drawing), || source.figure(table, &request)).map_err(Failure::from);
             let figure = match drawn {
-                // One table that makes no picture does not keep the others from theirs.
+                // A table without a picture does not prevent the pictures of other tables.
                 Err(failure) if tables.len() > 1 && failure.code == FAILED => {
                     damage = damage.or(Some(failure));
                     continue;
@@ -158,7 +158,7 @@ impl Arguments {
         damage.map_or(Ok(()), Err)
     }
 
-    /// The first argument that is given of `first` and those that concern one table.
+    /// The first given argument among `first` and the arguments that apply to one table.
     fn given(&self, first: (&'static str, bool)) -> Option<&'static str> {
         let [x, y, color] = [&self.x, &self.y, &self.color].map(Option::is_some);
         let all = [first, ("--where", !self.conditions.is_empty()), ("--x", x), ("--y", y), ("--color", color)];
@@ -173,7 +173,7 @@ impl Arguments {
         Ok(Request { conditions, x: self.x.clone(), y: self.y.clone(), colour: self.color.clone() })
     }
 
-    /// Where it is to be written, and how.
+    /// Destination and format of the pictures.
     fn place(&self) -> Result<OutputTarget, Failure> {
         let format = self.format.unwrap_or(Format::Svg);
         let Some(out) = &self.out else { return Ok(OutputTarget { file: None, folder: PathBuf::new(), format }) };
@@ -193,7 +193,7 @@ impl Arguments {
         }
     }
 
-    /// Writes a figure where it is to go, which it returns.
+    /// Writes a figure and returns its path.
     fn write(&self, figure: &Figure, stem: &str, place: &OutputTarget) -> Result<PathBuf, Failure> {
         let path = match &place.file {
             Some(file) => file.clone(),
@@ -212,7 +212,7 @@ impl Arguments {
     }
 }
 
-/// A note about omitted panels.
+/// The note on omitted panels.
 fn remarks(figure: &Figure) -> String {
     figure.remarks.iter().map(|remark| format!("  {remark}\n")).collect()
 }

@@ -1,7 +1,7 @@
-//! `slipsweep query DATASET "SELECT …"`: a question in SQL, and the answer as a table, CSV, JSON lines or Parquet.
+//! `slipsweep query DATASET "SELECT …"`: a query in SQL, with the answer as a table, CSV, JSON lines or Parquet.
 //!
-//! A process of its own answers each question, so that one that is too large (a product of tables that no memory holds, an expression too deep
-//! for any stack) ends in one message, and leaves no file behind.
+//! A separate process answers each query. So a query that is too large (a product of tables that exceeds the memory, an expression too deep for
+//! the stack) ends with one message and leaves no file behind.
 
 use std::env;
 use std::fs;
@@ -39,7 +39,7 @@ pub struct Arguments {
     output: Output<Format>,
 }
 
-/// How an answer is written.
+/// Format of an answer.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 enum Format {
     /// Aligned columns of nine digits (.txt)
@@ -64,23 +64,23 @@ impl output::Format for Format {
     const PARQUET: Format = Format::Parquet;
 }
 
-/// The environment variable of the query process.
+/// Environment variable of the query process.
 const INSIDE: &str = "SLIPSWEEP_ANSWERS";
 
-/// Time between two looks at the query process. Chosen: a short query does not wait longer than that for its end.
+/// Polling interval of the query process. Chosen: it delays a short query by at most this time.
 const POLL: Duration = Duration::from_millis(5);
 
-/// Bytes of the stack on which a question is read and planned. Chosen: a term takes some kilobytes of it, and a question has thousands at most.
+/// Stack for parsing and planning a query, in bytes. Chosen: a term takes some kilobytes, and a query has thousands at most.
 const STACK_BYTES: usize = 256 << 20;
 
-/// Answers a question.
+/// Answers a query.
 pub fn query(arguments: &Arguments) -> Result<(), Failure> {
     if env::var_os(INSIDE).is_some() {
         return inside(arguments);
     }
     arguments.output.format()?;
     if arguments.output.is_stdout() {
-        // Of a closed one the query process would not know.
+        // The query process could not detect a closed standard output.
         drop(stdout()?);
     } else {
         keep_datasets(&arguments.output.out)?;
@@ -95,7 +95,7 @@ pub fn query(arguments: &Arguments) -> Result<(), Failure> {
     apart(arguments)
 }
 
-/// A file that is named, or what it links to, and its folder.
+/// The resolved path of a file, and its folder.
 fn real(out: &Path) -> (PathBuf, PathBuf) {
     let real = fs::canonicalize(out).unwrap_or_else(|_| out.to_owned());
     let folder = real.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
@@ -103,10 +103,10 @@ fn real(out: &Path) -> (PathBuf, PathBuf) {
     (real, folder)
 }
 
-/// Refuses to write where a part or the manifest of a dataset is.
+/// Refuses to replace a part or the manifest of a dataset.
 fn keep_datasets(out: &Path) -> Result<(), Failure> {
     let (real, folder) = real(out);
-    // A lost manifest does not make its parts anybody's.
+    // Parts are protected even if the manifest is lost.
     let is_dataset =
         |folder: &Path| folder.join("manifest.json").exists() || matches!(Folder::at(folder).manifest(), Ok(Some(_)));
     let name = real.file_name().unwrap_or_default().to_string_lossy();
@@ -121,7 +121,7 @@ fn keep_datasets(out: &Path) -> Result<(), Failure> {
     Ok(())
 }
 
-/// This program once more, to answer the question; what it says, and its answer if that is copied, comes through pipes.
+/// Starts this program again as the query process. Pipes carry its messages, and its answer if `is_copied`.
 fn child(is_copied: bool) -> io::Result<Child> {
     let mut command = Command::new(env::current_exe()?);
     command.args(env::args_os().skip(1)).env(INSIDE, "1").stdin(Stdio::piped()).stderr(Stdio::piped());
@@ -131,14 +131,14 @@ fn child(is_copied: bool) -> io::Result<Child> {
     command.spawn()
 }
 
-/// Answers a question in a process of its own.
+/// Answers a query in a separate process.
 fn apart(arguments: &Arguments) -> Result<(), Failure> {
     let signal = Arc::new(AtomicUsize::new(0));
     for number in [SIGINT, SIGTERM] {
-        // Where a signal cannot be listened to, it keeps its usual effect.
+        // A signal without a handler keeps its usual effect.
         let _ = signal_hook::flag::register_usize(number, signal.clone(), number as usize);
     }
-    // What goes on is said on a terminal until the answer begins, which a terminal therefore gets through this process.
+    // A terminal shows the progress until the answer begins, so the answer to a terminal passes through this process.
     let shown = io::stderr().is_terminal();
     let is_copied = shown && arguments.output.is_stdout() && io::stdout().is_terminal();
     let mut child = child(is_copied).map_err(|error| cannot_start("the query process", error))?;
@@ -186,10 +186,10 @@ fn cannot_start(what: &str, error: io::Error) -> Failure {
     Failure::failed(format!("cannot start {what}: {error}\n  help: {help}"))
 }
 
-/// The line that says on a terminal what goes on.
+/// The progress line on a terminal.
 struct Line {
     bar: Option<ProgressBar>,
-    /// Whether nothing is to be said any more.
+    /// Whether the progress line is over.
     is_over: bool,
 }
 
@@ -200,7 +200,7 @@ impl Line {
     }
 }
 
-/// Copies an answer to standard output, from its first byte on in place of the line that says what goes on.
+/// Copies an answer to standard output; its first byte replaces the progress line.
 fn copy(mut answer: ChildStdout, line: &Mutex<Line>) {
     let mut bytes = vec![0; 1 << 16];
     while let Ok(count @ 1..) = answer.read(&mut bytes) {
@@ -209,13 +209,13 @@ fn copy(mut answer: ChildStdout, line: &Mutex<Line>) {
         }
         let mut out = io::stdout();
         if out.write_all(&bytes[..count]).and_then(|()| out.flush()).is_err() {
-            // The process that answers notices.
+            // The query process notices the closed pipe.
             return;
         }
     }
 }
 
-/// Waits for the end of a process, or ends it if a signal comes; a terminal says after a second what goes on.
+/// Waits for the end of a process, or ends it after a signal; a terminal shows the progress after a second.
 fn wait(child: &mut Child, signal: &AtomicUsize, line: &Mutex<Line>) -> io::Result<ExitStatus> {
     let start = Instant::now();
     let ended = loop {
@@ -240,13 +240,13 @@ fn wait(child: &mut Child, signal: &AtomicUsize, line: &Mutex<Line>) -> io::Resu
     ended
 }
 
-/// Why a process that answered ended before its time.
+/// The reason why the query process ended early.
 fn reason(status: ExitStatus, said: &str) -> String {
     #[cfg(unix)]
     let signal = std::os::unix::process::ExitStatusExt::signal(&status);
     #[cfg(not(unix))]
     let signal: Option<i32> = None;
-    // SIGKILL is what a machine sends that has no memory left.
+    // A machine without free memory sends SIGKILL.
     if said.contains("memory allocation of") || signal == Some(9) {
         return "the query needs more memory than is free\n  help: request fewer columns, a WHERE, a LIMIT; or join on a column"
             .to_owned();
@@ -258,16 +258,16 @@ fn reason(status: ExitStatus, said: &str) -> String {
     format!("the query failed ({status}): {said}\n  help: rewrite the query")
 }
 
-/// Removes what a process that was ended left of the file `out`.
+/// Removes the temporary files that an ended process left for `out`.
 fn sweep(out: &Path) {
     atomic::sweep(&real(out).1, SystemTime::now());
 }
 
-/// Answers a question in this process, which ends with its answer, or with the process that started it.
+/// Answers a query in this process, which ends after its answer, or when the process that started it ends.
 fn inside(arguments: &Arguments) -> Result<(), Failure> {
     let no_thread = |error| cannot_start("a thread", error);
     limit_memory();
-    // A panic is reported by the message of the query.
+    // The message of the query reports a panic.
     let panicked: Arc<Mutex<Option<String>>> = Arc::default();
     let noted = panicked.clone();
     panic::set_hook(Box::new(move |panic| {
@@ -277,7 +277,7 @@ fn inside(arguments: &Arguments) -> Result<(), Failure> {
     }));
     rayon::ThreadPoolBuilder::new().build_global().map_err(|error| no_thread(io::Error::other(error)))?;
     let watch = || {
-        // Ends when the other process does.
+        // Returns when the other process ends.
         let _ = io::stdin().read(&mut [0]);
         std::process::exit(2);
     };
@@ -297,7 +297,7 @@ fn inside(arguments: &Arguments) -> Result<(), Failure> {
     })
 }
 
-/// Lets this process have the memory that is free, so that too large a question fails instead of slowing the machine down.
+/// Limits this process to the free memory, so that a query that is too large fails instead of slowing the machine down.
 #[cfg(target_os = "linux")]
 fn limit_memory() {
     use rustix::process::{Resource, Rlimit, getrlimit, setrlimit};
@@ -311,14 +311,14 @@ fn limit_memory() {
     let most = (free + taken) * 1024;
     let Rlimit { current, maximum } = getrlimit(Resource::As);
     let most = current.map_or(most, |current| current.min(most));
-    // A query that has no limit is one that the machine ends if need be.
+    // Without the limit, the machine ends the process if necessary.
     let _ = setrlimit(Resource::As, Rlimit { current: Some(most), maximum });
 }
 
 #[cfg(not(target_os = "linux"))]
 fn limit_memory() {}
 
-/// Answers a question.
+/// Answers a query.
 fn answer(arguments: &Arguments) -> Result<(), Failure> {
     let format = arguments.output.format()?;
     kind::expect_rows(&arguments.dataset)?;
@@ -327,7 +327,7 @@ fn answer(arguments: &Arguments) -> Result<(), Failure> {
     let answer = tables.ask(&arguments.sql)?;
     for source in tables.sources.iter().filter(|source| source.missing > 0) {
         let (missing, all) = (source.missing, source.missing + source.paths.len() as u64);
-        // That the answer is incomplete is worth saying, but not worth failing if it cannot be said.
+        // A note that cannot be printed is no failure.
         let _ = writeln!(
             io::stderr(),
             "note: `{}` lacks {} of {}, which `slipsweep run` computes",
@@ -352,7 +352,7 @@ fn answer(arguments: &Arguments) -> Result<(), Failure> {
     say(&format!("written to {path}\n"))
 }
 
-/// A question that cannot be answered, or files that cannot be read to the end.
+/// The failure of a query, or of files that cannot be read to the end.
 fn failure(tables: &Tables, arguments: &Arguments, error: AnswerError) -> Failure {
     let other = || match &error {
         AnswerError::Failed(cause) if !query::is_unreadable(cause) => {
@@ -363,7 +363,7 @@ fn failure(tables: &Tables, arguments: &Arguments, error: AnswerError) -> Failur
     tables.fault(&arguments.sql).map_or_else(other, Failure::from)
 }
 
-/// Tables that cannot be read to the end, for all that is known by a file that is damaged.
+/// The failure for tables that cannot be read to the end, usually because of a damaged file.
 pub(super) fn unreadable(dataset: &Path, error: &AnswerError) -> Failure {
     let path = dataset.display();
     let help = if dataset.join("manifest.json").exists() {
@@ -384,7 +384,7 @@ fn write(answer: Answer, format: Format, out: &mut dyn Write) -> Result<(), Answ
     answer.write(format, out)
 }
 
-/// Aligned columns under their names and, where they are known, their units.
+/// Writes aligned columns under their names and, if known, their units.
 fn table(answer: Answer, out: &mut dyn Write) -> Result<(), AnswerError> {
     let mut columns = words::Columns::default();
     let mut lines = vec![answer.columns()];

@@ -1,4 +1,4 @@
-//! `slipsweep report DATASET`: one page of HTML with what is in a dataset, without network.
+//! `slipsweep report DATASET`: one HTML page with pictures and summary of a dataset, usable without a network.
 
 use std::path::{Path, PathBuf};
 
@@ -28,7 +28,7 @@ pub fn report(arguments: &Arguments) -> Result<(), Failure> {
     let (folder, manifest) = dataset(&arguments.dataset)?;
     let path = arguments.out.clone().unwrap_or_else(|| PathBuf::from(format!("{}-report.html", manifest.name)));
     let mut page = Page::new(&format!("Dataset {}", manifest.name));
-    // What the user says of it comes first.
+    // The description by the user comes first.
     let spec: Option<toml::Table> = manifest.spec.parse().ok();
     if let Some(description) = spec.as_ref().and_then(|spec| spec.get("description")?.as_str()) {
         page.words(description);
@@ -58,14 +58,14 @@ fn pictures(page: &mut Page, source: Source) -> Result<(), Failure> {
                 figure.remarks.iter().for_each(|remark| page.words(&format!("{table}: {remark} of `slipsweep plot`.")));
             }
             Err(error @ PlotError::Part(_)) => return Err(error.into()),
-            // Its help is for who draws one picture.
+            // The help of the message concerns single pictures.
             Err(error) => page.words(error.to_string().lines().next().unwrap_or_default()),
         }
     }
     Ok(())
 }
 
-/// How many rows of each table have which status.
+/// The numbers of rows by status, for each table.
 fn statuses(page: &mut Page, tables: &[TableSurvey]) {
     page.heading("Rows and statuses");
     let used: Vec<usize> = (0..Status::ALL.len())
@@ -84,7 +84,7 @@ fn statuses(page: &mut Page, tables: &[TableSurvey]) {
     page.table(&names, &rows);
 }
 
-/// What `summary` says.
+/// The summary.
 fn summaries(page: &mut Page, tables: &[TableSurvey]) {
     page.heading("Summary");
     for table in tables {
@@ -104,7 +104,7 @@ fn summaries(page: &mut Page, tables: &[TableSurvey]) {
     }
 }
 
-/// What `plan` says of the spec of the dataset in `folder`.
+/// The plan of the spec of the dataset in `folder`.
 fn plan_of(page: &mut Page, spec: &str, folder: &Path) -> Result<(), Failure> {
     page.heading("Plan");
     match Sweep::parse_at(spec, &folder.join("manifest.json")) {
@@ -113,7 +113,7 @@ fn plan_of(page: &mut Page, spec: &str, folder: &Path) -> Result<(), Failure> {
             let estimates = waiting(&sample, || estimate(&sweep, folder)).map_err(Failure::failed)?;
             page.verbatim(&plan::in_words(&sweep, &estimates, 0.0));
         }
-        // Points files are not in the dataset.
+        // The dataset does not contain points files.
         Err(error) => page.words(&format!("It cannot be recomputed from the dataset alone: {}", error.found)),
     }
     Ok(())

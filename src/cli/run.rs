@@ -1,4 +1,4 @@
-//! `slipsweep run SPEC`: computes what is missing of a dataset, or of a shard of it, and says what is in it.
+//! `slipsweep run SPEC`: computes the missing parts of a dataset or of one shard, and summarises it.
 
 use std::io;
 use std::ops::Range;
@@ -45,7 +45,7 @@ pub struct Arguments {
     strict: bool,
 }
 
-/// Runs a spec: reads and plans it, solves, encodes and publishes the parts that are missing, and says what they contain.
+/// Runs a spec: reads and plans it, computes, encodes and publishes the missing parts, and summarises the tables.
 pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let start = Instant::now();
     let (sweep, folder) = subject(arguments)?;
@@ -69,7 +69,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     Ok(())
 }
 
-/// Makes the `parts` of each table that are missing, and shows how far it is.
+/// Computes the missing `parts` of each table, and shows the progress.
 fn solve(
     arguments: &Arguments,
     sweep: &Sweep,
@@ -94,7 +94,7 @@ fn solve(
     })
 }
 
-/// What the tables contain, what was done since `start`, and what to do next.
+/// The report: contents of the tables, work since `start`, and next commands.
 fn report(
     sweep: &Sweep,
     plan: &Plan,
@@ -133,13 +133,14 @@ fn report(
     text
 }
 
-/// Bytes of a cell on disk at most, long labels apart: twice those of a double, the longest of all.
+/// Greatest size of a cell on disk, without long labels, in bytes: twice that of a double, the longest type.
 const MAX_CELL_BYTES: f64 = 16.0;
 
-/// Bytes of a part besides its rows and the spec at most: five times the longest of all tables, `compliant`, whose part of one row has 12,207.
+/// Greatest size of a part without its rows and the spec, in bytes: five times that of `compliant`, the longest of all tables, whose part of one
+/// row has 12,207.
 const MAX_FOOTER_BYTES: f64 = 65536.0;
 
-/// Whether the parts among `shards`, those of each table, that are missing have room on the disk.
+/// Checks that the missing parts of `shards`, given for each table, fit on the disk.
 fn check_room(sweep: &Sweep, plan: &Plan, shards: &[Vec<Range<u64>>], folder: &Folder) -> Result<(), Failure> {
     let Ok(free) = fs4::available_space(nearest_folder(folder.path())) else { return Ok(()) };
     let free = free as f64;
@@ -157,7 +158,7 @@ fn check_room(sweep: &Sweep, plan: &Plan, shards: &[Vec<Range<u64>>], folder: &F
     if most.sum::<f64>() < free {
         return Ok(());
     }
-    // What is far too much, or might be, is worth a sample.
+    // If the upper bound does not fit, a sample estimates the size.
     let sizes = sweep::sizes(sweep).map_err(Failure::failed)?;
     let bytes = (sizes.iter().zip(&plan.tables).zip(missing))
         .map(|((size, table), missing)| size * missing as f64 / table.parts as f64)
@@ -165,7 +166,7 @@ fn check_room(sweep: &Sweep, plan: &Plan, shards: &[Vec<Range<u64>>], folder: &F
     if bytes < free { Ok(()) } else { Err(wrong(too_large(folder.path(), bytes, free))) }
 }
 
-/// The sweep and where it goes: from a spec, or from a dataset, which holds the text of its own.
+/// The sweep and its folder, from a spec or from a dataset, which contains its spec.
 fn subject(arguments: &Arguments) -> Result<(Sweep, Folder), Failure> {
     let path = &arguments.spec;
     if !path.is_dir() {
@@ -213,7 +214,7 @@ fn explain(error: RunError, caught: Option<i32>, arguments: &Arguments, (there, 
     }
 }
 
-/// Whether another try may succeed.
+/// Whether another attempt may succeed.
 fn may_pass(error: &RunError) -> bool {
     match error {
         RunError::Dataset(DatasetError::Busy { .. } | DatasetError::Taken { .. }) => true,
@@ -222,9 +223,9 @@ fn may_pass(error: &RunError) -> bool {
     }
 }
 
-/// Whether a failure may pass by itself: of a disk, a network or a server, not of room or rights.
+/// Whether a failure may be temporary: of a disk, a network or a server, but not of free space or permissions.
 fn is_passing(error: &io::Error) -> bool {
-    /// "Input/output error", which has no kind of its own.
+    /// "Input/output error", for which `io::ErrorKind` has no variant.
     const EIO: i32 = 5;
     use io::ErrorKind as Kind;
     error.raw_os_error() == Some(EIO)
@@ -245,18 +246,28 @@ fn is_passing(error: &io::Error) -> bool {
         )
 }
 
-/// What the run spent.
+/// The work of the run, in words.
 fn account(outcome: &Outcome, seconds: f64) -> String {
     let rows: u64 = outcome.tables.iter().map(|table| table.rows).sum();
     if rows == 0 {
         return "nothing to compute: every part exists\n".to_owned();
     }
-    let RunStats { optima, landscapes, best, shortcuts, crossovers, simulations, steps, quadratures, nodes } =
-        outcome.work;
+    let RunStats {
+        optima,
+        own_optima,
+        landscapes,
+        best,
+        shortcuts,
+        crossovers,
+        simulations,
+        steps,
+        quadratures,
+        nodes,
+    } = outcome.work;
     let (all, rate) = (words::things(rows, "row"), words::count((rows as f64 / seconds) as u64));
     let mut text = format!("{all} in {}: {rate} rows per second, writing included\n", words::duration(seconds));
     let spent: Vec<String> = [
-        (optima, "optimal protocol"),
+        (optima + own_optima, "optimal protocol"),
         (landscapes, "landscape"),
         (best, "best shortcut"),
         (shortcuts, "family shortcut"),
@@ -276,7 +287,7 @@ fn account(outcome: &Outcome, seconds: f64) -> String {
     text
 }
 
-/// The commands that look at the dataset of `sweep` in `path`.
+/// Commands that inspect the dataset of `sweep` in `path`.
 fn next_commands(sweep: &Sweep, path: &Path) -> String {
     let path = quoted(path);
     let mut text = "next:\n".to_owned();
@@ -287,8 +298,7 @@ fn next_commands(sweep: &Sweep, path: &Path) -> String {
     text
 }
 
-/// A question that makes sense for a table: its least gap, work or crossover time, or how many rows have which word, over the axis that varies
-/// slowest.
+/// A useful query for a table: its least gap, work or crossover time, or the number of rows by word, grouped by the slowest axis.
 fn question(request: &Request) -> String {
     let table = request.table;
     let columns = || request.projection.indices().iter().map(|&index| &table.columns()[index]);

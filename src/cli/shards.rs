@@ -1,4 +1,4 @@
-//! `slipsweep shards SPEC`: a sweep in shards, as an array job of a scheduler.
+//! `slipsweep shards SPEC`: the array job of a scheduler that runs a sweep in shards.
 
 use std::fmt::Write as _;
 use std::fs;
@@ -16,7 +16,7 @@ use crate::sweep::{Plan, Shard, check_parts, estimate};
 pub struct Arguments {
     /// The sweep spec, a TOML file
     spec: PathBuf,
-    /// The scheduler
+    /// Scheduler
     #[arg(long, value_enum)]
     engine: Engine,
     /// Greatest number of shards; fewer if a task would have too little work
@@ -79,7 +79,7 @@ impl Engine {
         }
     }
 
-    /// Most tasks of an array. Slurm bounds the number of a task, by default to 1000.
+    /// Greatest number of tasks of an array. Slurm limits the index of a task, by default to 1000.
     fn most_tasks(self) -> u64 {
         match self {
             Engine::Slurm => slurm_config("MaxArraySize").and_then(|size| size.parse().ok()).unwrap_or(1001).max(1),
@@ -88,7 +88,7 @@ impl Engine {
     }
 }
 
-/// The job scripts of `dataset`: number of shards, and the command that submits some of them.
+/// The job scripts of `dataset`: for each, the number of shards and the command that submits some of them.
 pub fn scripts(dataset: &Path) -> Vec<(u64, impl Fn(&[u64]) -> String)> {
     let scripts = Engine::ALL.into_iter().filter_map(|engine| {
         let path = engine.script(dataset);
@@ -100,7 +100,7 @@ pub fn scripts(dataset: &Path) -> Vec<(u64, impl Fn(&[u64]) -> String)> {
     scripts.collect()
 }
 
-/// Writes the job script and says what to submit.
+/// Writes the job script and prints the command that submits it.
 pub fn shards(arguments: &Arguments) -> Result<(), Failure> {
     let sweep = load(&arguments.spec)?;
     let plan = Plan::new(&sweep);
@@ -151,7 +151,7 @@ pub fn shards(arguments: &Arguments) -> Result<(), Failure> {
     say(&said)
 }
 
-/// The number of tasks, and why it is less than requested.
+/// The number of tasks, and the reason if it is less than requested.
 fn tasks(arguments: &Arguments, parts: u64, seconds: f64) -> (u64, Option<String>) {
     let worth = match arguments.minutes {
         0.0 => Shard::MAX_COUNT,
@@ -167,8 +167,8 @@ fn tasks(arguments: &Arguments, parts: u64, seconds: f64) -> (u64, Option<String
     (tasks, reason.map(|(_, reason)| reason))
 }
 
-/// That the scheduler can write logs below a folder: Slurm removes backslashes from the path of a log, and reads two of them as an order to
-/// leave its patterns alone.
+/// Checks that the scheduler can write logs below a folder: Slurm removes backslashes from the path of a log, and two of them disable its
+/// patterns.
 fn check_path(engine: Engine, out: &Path) -> Result<(), Failure> {
     if engine == Engine::Slurm && out.to_string_lossy().contains('\\') {
         return Err(wrong(format!(
@@ -184,7 +184,7 @@ fn refused(path: &Path, action: &str, error: &std::io::Error) -> Failure {
     Failure::failed(format!("{}: cannot {action}: {error}\n  help: write elsewhere with --out DIR", path.display()))
 }
 
-/// The path as it is from anywhere. One that is not Unicode cannot stand in a script.
+/// The absolute path; refused if it is not Unicode, since a script cannot contain it.
 fn absolute(path: &Path) -> Result<PathBuf, Failure> {
     let wrong = |why: String| wrong(format!("{}: {why}", path.display()));
     let absolute = std::path::absolute(path).map_err(|error| wrong(error.to_string()))?;
@@ -196,14 +196,14 @@ fn absolute(path: &Path) -> Result<PathBuf, Failure> {
     }
 }
 
-/// A path as a word of the shell.
+/// A path, quoted for the shell.
 pub fn quoted(path: &Path) -> String {
     let text = path.display().to_string();
     let plain = |c: char| c.is_ascii_alphanumeric() || "/._-+=@%,:".contains(c);
     if !text.is_empty() && text.chars().all(plain) { text } else { format!("'{}'", text.replace('\'', "'\\''")) }
 }
 
-/// An entry of the configuration of the Slurm that this machine belongs to, if it does.
+/// An entry of the Slurm configuration of this machine, if it has Slurm.
 fn slurm_config(key: &str) -> Option<String> {
     let output =
         Command::new("scontrol").args(["show", "config"]).output().ok().filter(|output| output.status.success())?;
@@ -224,18 +224,18 @@ struct Job<'a> {
     log: PathBuf,
     shards: u64,
     cpus: u64,
-    /// Seconds of a task, as predicted.
+    /// Predicted time of a task, in s.
     each: f64,
 }
 
 impl Job<'_> {
-    /// The script, whose head is that of a scheduler, as is the number of a task.
+    /// The script for a scheduler.
     fn script(&self, engine: Engine) -> String {
         let Job { name, program, spec, out, dataset, shards, cpus, .. } = self;
         let (last, about) = (shards - 1, words::duration(self.each));
-        // Predictions are from a small sample, and not all machines are as fast.
+        // Predictions come from a small sample, and other machines may be slower.
         let minutes = (10.0 + 3.0 * self.each / 60.0).ceil();
-        // Slurm takes % for a pattern.
+        // Slurm interprets % as a pattern.
         let log = self.log.display().to_string().replace('%', "%%").replace('"', "\\\"");
         let task = format!(
             "# A task is about {about} of work. It may be killed, repeated, or run twice at the same time without harm."

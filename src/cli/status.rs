@@ -22,7 +22,7 @@ pub struct Arguments {
     check: bool,
 }
 
-/// Parts and files of each kind that are listed one by one. Chosen: five kinds fit a screen.
+/// Greatest number of listed parts or files of each kind. Chosen: five kinds fit on a screen.
 const MAX_LISTED: usize = 10;
 
 /// Reports the parts of a dataset.

@@ -1,4 +1,4 @@
-//! `slipsweep summary DATASET`: what is in a dataset, as `run` reports it at its end. It stands in the footers of the parts.
+//! `slipsweep summary DATASET`: the summary that `run` prints at its end, from the footers of the parts.
 
 use std::path::PathBuf;
 use std::sync::atomic::AtomicU64;
@@ -37,7 +37,7 @@ pub fn summary(arguments: &Arguments) -> Result<(), Failure> {
     say(&text)
 }
 
-/// Surveys a dataset, and says so if it takes long.
+/// Surveys a dataset, and shows the progress if it takes long.
 pub fn survey(folder: &Folder, manifest: &Manifest, look: CheckDepth) -> Survey {
     let looked = AtomicU64::new(0);
     let there = manifest.tables.iter().map(|table| folder.parts_there(table).len() as u64).sum();
@@ -49,23 +49,22 @@ pub fn survey(folder: &Folder, manifest: &Manifest, look: CheckDepth) -> Survey 
     waiting(&wait, || Survey::new(folder, manifest, look, &looked))
 }
 
-/// What is in a dataset of which every part that is there is sound.
+/// The contents of a dataset without damaged parts.
 pub fn contents(folder: &Folder, manifest: &Manifest) -> Result<Survey, Failure> {
     let survey = survey(folder, manifest, CheckDepth::Footer);
-    for table in &survey.tables {
-        let parts = table.damaged.iter().map(|(part, _)| *part).chain(table.foreign.iter().map(|(part, _)| *part));
-        for part in parts {
-            folder.open_part(manifest, &table.name, part).map_err(Failure::failed)?;
+    for (table, planned) in survey.tables.iter().zip(&manifest.tables) {
+        if !(table.damaged.is_empty() && table.foreign.is_empty()) {
+            folder.verified(manifest, planned).map_err(Failure::failed)?;
         }
     }
     Ok(survey)
 }
 
-/// A piece of what is said of a table, which stands in a text or on a page.
+/// An element of the summary of a table, for text or HTML.
 pub enum SummaryBlock {
-    /// A line, this far indented.
+    /// A line with an indentation.
     Line(usize, String),
-    /// Names, units (empty where there are none) and rows, this far indented.
+    /// A table with indentation, names, units (empty if unknown) and rows.
     Table(usize, Vec<String>, Vec<String>, Vec<Vec<String>>),
 }
 
@@ -82,7 +81,7 @@ pub fn statistics(name: &str, rows: u64, statistics: &TableStatistics) -> String
     lines.collect()
 }
 
-/// What is said of a table of `rows` rows.
+/// The summary of a table of `rows` rows.
 pub fn blocks(name: &str, rows: u64, statistics: &TableStatistics) -> Vec<SummaryBlock> {
     let counts: Vec<String> = Status::ALL
         .iter()
@@ -97,7 +96,7 @@ pub fn blocks(name: &str, rows: u64, statistics: &TableStatistics) -> Vec<Summar
         None => {
             let least: Vec<&StatisticsRow> = statistics.least().collect();
             if !least.is_empty() {
-                // A family may hold protocols that miss the final state, with any work.
+                // Protocols of a family may miss the final state, with any work.
                 let arriving = if name == "shortcut" { " and arrive" } else { "" };
                 blocks.push(SummaryBlock::Line(2, format!("least gap among the rows that are ok{arriving}:")));
                 blocks.extend(listing(statistics, &least));
@@ -153,7 +152,7 @@ fn predicted(name: &str, statistics: &TableStatistics) -> Vec<SummaryBlock> {
     blocks
 }
 
-/// Rows under names and units; axes that do not vary stand above, columns without any value are left out.
+/// Rows under names and units. Constant axes are listed above; columns without any value are omitted.
 fn listing(statistics: &TableStatistics, rows: &[&StatisticsRow]) -> Vec<SummaryBlock> {
     let Some(first) = rows.first() else { return Vec::new() };
     let is_axis = |name: &str| Quantity::from_name(name).is_some();
@@ -162,7 +161,7 @@ fn listing(statistics: &TableStatistics, rows: &[&StatisticsRow]) -> Vec<Summary
     let mut results_begin = false;
     for (place, (name, unit)) in statistics.columns.iter().enumerate() {
         let cell = first.cell(place);
-        // `best_cubic` has result columns of the same names as axes: axes end where they stop coming in the order of quantities.
+        // `best_cubic` has result columns with names of axes: the axes end where the order of quantities ends.
         results_begin |= !is_axis(name);
         let varies = rows.iter().any(|row| row.cell(place) != cell);
         let missing = rows.iter().all(|row| *row.cell(place) == Cell::Missing);
@@ -180,7 +179,7 @@ fn listing(statistics: &TableStatistics, rows: &[&StatisticsRow]) -> Vec<Summary
     at.into_iter().chain([SummaryBlock::Table(4, names, units, rows)]).collect()
 }
 
-/// A cell as a reader sees it.
+/// A cell as text.
 pub fn shown(cell: &Cell) -> String {
     match cell {
         Cell::Missing => "-".to_owned(),

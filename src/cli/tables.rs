@@ -10,7 +10,7 @@ use crate::table::{self, Kind, STATUS, STATUS_DOC, Table};
   slipsweep tables | less
   slipsweep tables gap")]
 pub struct Arguments {
-    /// The table; all by default
+    /// Table; all by default
     table: Option<String>,
 }
 
@@ -28,7 +28,7 @@ pub fn tables(arguments: &Arguments) -> Result<(), Failure> {
     say(&texts.join("\n"))
 }
 
-/// A line on a table, then its columns with units and meanings.
+/// The title of a table, then its columns with units and meanings.
 fn text(table: &dyn Table) -> String {
     let no_axes = Grid::default();
     let mut rows: Vec<Vec<String>> = Vec::new();

@@ -1,4 +1,4 @@
-//! `slipsweep verify DATASET`: a sample of rows solved again by an independent method.
+//! `slipsweep verify DATASET`: a sample of rows, solved by an independent method.
 
 use std::path::PathBuf;
 
@@ -22,7 +22,7 @@ pub struct Arguments {
     seed: u64,
 }
 
-/// Audits a dataset.
+/// Verifies a dataset.
 pub fn verify(arguments: &Arguments) -> Result<(), Failure> {
     let path = &arguments.dataset;
     let (_, manifest) = dataset(path)?;
@@ -43,7 +43,7 @@ pub fn verify(arguments: &Arguments) -> Result<(), Failure> {
     Ok(())
 }
 
-/// Columns whose worst row is shown where none fails.
+/// Number of columns whose worst row is shown if none fails.
 const FEWEST: usize = 2;
 
 /// A difference in units of rtol.
@@ -65,7 +65,7 @@ fn summary(audit: &Audit) -> String {
         lines.insert(0, ["difference/rtol", "rows", "median", "99 %", "greatest"].map(str::to_owned).to_vec());
         text.push_str(&words::aligned(&lines, 2));
     }
-    // Every column that fails, or else the ones that come closest to it.
+    // Every failing column, or else the columns with the greatest differences.
     let failing = audit.worst.iter().filter(|worst| worst.difference > LIMIT).count();
     for worst in audit.worst.iter().take(failing.max(FEWEST)) {
         let cells: Vec<String> = worst

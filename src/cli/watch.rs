@@ -19,13 +19,13 @@ const LOOK: Duration = Duration::from_millis(50);
 /// The interval of progress lines without a terminal. Chosen: a log of a day has less than 10,000 lines.
 const LINE: Duration = Duration::from_secs(10);
 
-/// Time after which a terminal says what is going on. Chosen: nobody waits longer than a second without knowing for what.
+/// Time after which a terminal shows the progress. Chosen: a user should not wait longer than a second without a message.
 pub const SILENCE: Duration = Duration::from_secs(1);
 
-/// Does `work`, and meanwhile shows progress towards `rows` rows unless `quiet`, and passes Ctrl-C and SIGTERM on to `signal`.
+/// Runs `work`. Meanwhile it shows the progress towards `rows` rows unless `quiet`, and passes Ctrl-C and SIGTERM on to `signal`.
 ///
-/// Returns what `work` returns, and which signal came, if one did. A second one ends the process at once, and so does one that
-/// comes when `work` is done.
+/// Returns the result of `work`, and the signal received, if any. A second signal ends the process at once, and so does a signal after the end
+/// of `work`.
 pub fn watched<T>(signal: &Signal, rows: u64, quiet: bool, work: impl FnOnce() -> T) -> (T, Option<i32>) {
     let mut show = ProgressDisplay::new(rows, quiet);
     let look = |caught: Option<i32>| {
@@ -39,32 +39,32 @@ pub fn watched<T>(signal: &Signal, rows: u64, quiet: bool, work: impl FnOnce() -
     (result, signals().caught())
 }
 
-/// Something that takes its time, and writes nothing.
+/// A long operation that writes nothing.
 pub struct Wait<'a> {
     /// The current phase, such as "reading the footers of the parts".
     pub doing: &'a str,
     /// The progress: done, total, and the name of the things.
     pub done: Option<(&'a AtomicU64, u64, &'a str)>,
-    /// Whether nothing is to be shown.
+    /// Whether nothing is shown.
     pub quiet: bool,
 }
 
 impl<'a> Wait<'a> {
-    /// The wait for something of which nobody knows how far it is.
+    /// A wait without a known progress.
     pub fn new(doing: &'a str) -> Wait<'a> {
         Wait { doing, done: None, quiet: false }
     }
 }
 
-/// Does `work`, and says on a terminal what goes on if it takes longer than a second. Ctrl-C and SIGTERM end the process, which says what
-/// is safe. One wait never holds another.
+/// Runs `work`, and shows its phase on a terminal after a second. Ctrl-C and SIGTERM end the process with a message that nothing has changed.
+/// Waits must not be nested.
 pub fn waiting<T>(wait: &Wait<'_>, work: impl FnOnce() -> T) -> T {
     let start = Instant::now();
     let mut line: Option<ProgressBar> = None;
     let look = |caught: Option<i32>| {
         if let Some(number) = caught {
             line.iter().for_each(ProgressBar::finish_and_clear);
-            // Where nobody listens, nothing is lost.
+            // A message that cannot be written is ignored.
             let _ = writeln!(stderr(), "stopped while {}; nothing has changed", wait.doing);
             process::exit(128 + number);
         }
@@ -83,7 +83,7 @@ pub fn waiting<T>(wait: &Wait<'_>, work: impl FnOnce() -> T) -> T {
     result
 }
 
-/// Does `work` while another thread looks at it from time to time, with the signal that came if one did.
+/// Runs `work` while another thread calls `look` at intervals, with the signal received, if any.
 fn while_looking<T>(mut look: impl FnMut(Option<i32>) + Send, work: impl FnOnce() -> T) -> T {
     let signals = signals();
     signals.idle.store(false, Ordering::Release);
@@ -95,9 +95,9 @@ fn while_looking<T>(mut look: impl FnMut(Option<i32>) + Send, work: impl FnOnce(
                 std::thread::park_timeout(LOOK);
             }
         };
-        // Where no thread can be had, nobody watches.
+        // Without a second thread, there is no progress.
         let watcher = std::thread::Builder::new().spawn_scoped(scope, watch).ok();
-        // Also if the work panics: the scope waits for the watcher.
+        // Ends the watcher also if the work panics, since the scope waits for it.
         let _end = End { finished: &finished, signals, watcher: watcher.as_ref().map(|watcher| watcher.thread()) };
         work()
     })
@@ -118,11 +118,11 @@ impl Drop for End<'_> {
     }
 }
 
-/// The signals that the process listens to, from the first thing on that is watched.
+/// The signal handlers of the process, installed at the first watched operation.
 struct Signals {
-    /// The one that came; 0 if none did.
+    /// The signal received, else 0.
     caught: Arc<AtomicUsize>,
-    /// Whether nothing is watched: then a signal ends the process.
+    /// Whether no operation is watched: then a signal ends the process.
     idle: Arc<AtomicBool>,
 }
 
@@ -137,14 +137,14 @@ fn signals() -> &'static Signals {
     SIGNALS.get_or_init(|| {
         let signals = Signals { caught: Arc::default(), idle: Arc::default() };
         for number in [SIGINT, SIGTERM] {
-            // Where a signal cannot be listened to, it keeps its usual effect.
+            // A signal without a handler keeps its usual effect.
             let _ = listen(number, &signals);
         }
         signals
     })
 }
 
-/// Notes `number` when it comes, and ends the process when it comes again or while nothing is watched.
+/// Records the signal `number`, and ends the process if it comes again or while no operation is watched.
 fn listen(number: i32, signals: &Signals) -> std::io::Result<()> {
     let again = Arc::new(AtomicBool::new(false));
     // Handlers run in the order in which they are registered: the first time `again` is still false.
@@ -155,7 +155,7 @@ fn listen(number: i32, signals: &Signals) -> std::io::Result<()> {
     Ok(())
 }
 
-/// A line on a terminal that shows its message, or with `rows` a bar before it.
+/// A progress line on a terminal: a message, after a bar if `rows` is not 0.
 pub fn text_line(rows: u64) -> ProgressBar {
     let bar = ProgressBar::with_draw_target(Some(rows), ProgressDrawTarget::stderr_with_hz(10));
     set_style(&bar, rows > 0);
@@ -169,17 +169,17 @@ fn set_style(bar: &ProgressBar, has_bar: bool) {
     }
 }
 
-/// The progress of a run: a bar on a terminal, else a line from time to time.
+/// The progress of a run: a bar on a terminal, else a line at intervals.
 struct ProgressDisplay {
     /// All rows.
     rows: u64,
     quiet: bool,
     bar: Option<ProgressBar>,
-    /// When a line was written last.
+    /// Time of the last line.
     last: Instant,
     /// The current phase.
     phase: Phase,
-    /// Since when.
+    /// Start of the phase.
     since: Instant,
 }
 
@@ -213,7 +213,7 @@ impl ProgressDisplay {
             None if !self.quiet && self.last.elapsed() >= LINE => {
                 self.last = Instant::now();
                 let rows = format!("{} of {} rows, ", words::count(done), words::count(self.rows));
-                // Progress that cannot be shown is not worth a failure.
+                // A progress line that cannot be written is no failure.
                 let _ = writeln!(stderr(), "{}{}", if is_computing { &rows } else { "" }, self.text(signal));
             }
             _ => {}

@@ -1,4 +1,4 @@
-//! Numbers, amounts and tables as words.
+//! Numbers, amounts and tables as text.
 
 use indicatif::HumanCount;
 
@@ -18,7 +18,7 @@ pub fn number(value: f64) -> String {
     }
 }
 
-/// Without zeros at the end of the decimals.
+/// Removes trailing zeros of the decimals.
 fn trimmed(digits: &str) -> &str {
     if digits.contains('.') { digits.trim_end_matches('0').trim_end_matches('.') } else { digits }
 }
@@ -57,7 +57,7 @@ pub fn duration(seconds: f64) -> String {
     }
 }
 
-/// Three significant digits of something between 0 and 1000, or all digits before the point.
+/// Three significant digits of a number between 0 and 1000, or all digits before the point.
 fn short(value: f64) -> String {
     let decimals = if value < 9.995 { 2 } else { usize::from(value < 99.95) };
     trimmed(&format!("{value:.decimals$}")).to_owned()
@@ -85,7 +85,7 @@ pub fn aligned(rows: &[Vec<String>], indent: usize) -> String {
     Columns::default().lines(rows, indent)
 }
 
-/// Columns that stay aligned while lines come block by block: a later block makes them wider at most.
+/// Columns that stay aligned while lines come block by block; a later block can only widen them.
 #[derive(Debug, Default)]
 pub struct Columns {
     widths: Vec<usize>,
@@ -105,7 +105,7 @@ impl Columns {
             let mut line = " ".repeat(indent);
             for (cell, width) in row.iter().zip(&self.widths) {
                 line.push_str(cell);
-                // The widths of formats end at 65,535.
+                // Format widths are at most 65,535.
                 line.push_str(&" ".repeat(width - cell.chars().count() + 2));
             }
             text.push_str(line.trim_end());
@@ -117,7 +117,7 @@ impl Columns {
 
 #[cfg(test)]
 mod tests {
-    //! Labels as shown.
+    //! Formatted numbers.
 
     use super::*;
 

@@ -1,18 +1,17 @@
-//! Files that are there whole or not at all.
+//! Atomic file writes: a file is complete or absent.
 //!
-//! The bytes go to a name of their own, are synced, and the name is changed; then the folder is synced. A process that is killed in between
-//! leaves a temporary file behind, which [`sweep`] removes.
+//! The bytes are written to a temporary file, synced and renamed; then the folder is synced. A process that is killed in between leaves the
+//! temporary file, which [`sweep`] removes.
 
 use std::fs::{self, File, TryLockError};
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant, SystemTime};
 
+use tempfile::NamedTempFile;
+
 /// Age from which a temporary file of another machine is treated as abandoned, by the clock of the file system. Writing one takes seconds.
 const ABANDONED: Duration = Duration::from_secs(24 * 60 * 60);
-
-/// Times that a file is written if its temporary file vanishes, which happens where a machine takes a living process for dead.
-const ATTEMPTS: u32 = 3;
 
 /// A step that failed, and why.
 #[derive(Debug)]
@@ -23,89 +22,72 @@ pub struct Unwritten {
     pub source: io::Error,
 }
 
-/// Writes `bytes` to `path` so that at no time, not even after a power cut, an incomplete file bears the name.
+impl Unwritten {
+    fn at(action: &'static str) -> impl Fn(io::Error) -> Unwritten {
+        move |source| Unwritten { action, source }
+    }
+}
+
+/// Writes `bytes` to `path`. An incomplete file never has this name, even after a power cut.
 pub fn write(path: &Path, bytes: &[u8]) -> Result<(), Unwritten> {
-    write_by(path, bytes, |temporary, path| fs::rename(temporary, path))
+    let temporary = filled(path, bytes)?;
+    temporary.persist(path).map_err(|error| Unwritten::at(RENAME)(error.error))?;
+    sync_folder(folder_of(path)).map_err(Unwritten::at("sync the folder"))
 }
 
-/// Writes `bytes` to `path` in the same way, but never over another file: `false` if there is one.
+/// Writes `bytes` to `path` in the same way, but never replaces a file: returns `false` if there is one.
 pub fn write_new(path: &Path, bytes: &[u8]) -> Result<bool, Unwritten> {
-    let link = |temporary: &Path, path: &Path| match fs::hard_link(temporary, path) {
-        Ok(()) => fs::remove_file(temporary),
-        // Some file systems have no links.
-        Err(error) if error.kind() != io::ErrorKind::AlreadyExists && !path.exists() => fs::rename(temporary, path),
-        Err(error) => Err(error),
-    };
-    match write_by(path, bytes, link) {
-        Err(Unwritten { action: RENAME, .. }) if path.exists() => Ok(false),
-        written => written.map(|()| true),
+    match filled(path, bytes)?.persist_noclobber(path) {
+        Err(error) if path.exists() => drop(error),
+        Err(error) => return Err(Unwritten::at(RENAME)(error.error)),
+        Ok(_) => return sync_folder(folder_of(path)).map(|()| true).map_err(Unwritten::at("sync the folder")),
     }
-}
-
-fn write_by(path: &Path, bytes: &[u8], place: impl Fn(&Path, &Path) -> io::Result<()>) -> Result<(), Unwritten> {
-    let failed = |action, source| Unwritten { action, source };
-    let fill = |file: &mut File| file.write_all(bytes).map_err(|source| failed("write", source));
-    let mut attempt = 1;
-    loop {
-        match publish(path, fill, &place, failed) {
-            Err(Unwritten { action: RENAME, source })
-                if source.kind() == io::ErrorKind::NotFound && attempt < ATTEMPTS =>
-            {
-                attempt += 1;
-            }
-            done => return done,
-        }
-    }
+    Ok(false)
 }
 
 /// Writes a file durably; `fill` writes the content.
 #[cfg(feature = "cli")]
 pub fn write_with<E: From<io::Error>>(path: &Path, fill: impl FnOnce(&mut File) -> Result<(), E>) -> Result<(), E> {
-    publish(path, fill, |temporary, path| fs::rename(temporary, path), |_, source| source.into())
+    let mut temporary = create(path)?;
+    fill(temporary.as_file_mut())?;
+    temporary.as_file().sync_all()?;
+    temporary.persist(path).map_err(|error| error.error)?;
+    Ok(sync_folder(folder_of(path))?)
 }
 
 const RENAME: &str = "rename the temporary file";
 
-fn publish<E>(
-    path: &Path,
-    fill: impl FnOnce(&mut File) -> Result<(), E>,
-    place: impl Fn(&Path, &Path) -> io::Result<()>,
-    failed: impl Fn(&'static str, io::Error) -> E,
-) -> Result<(), E> {
-    let (Some(folder), Some(name)) = (path.parent(), path.file_name()) else {
-        return Err(failed("write", io::Error::new(io::ErrorKind::InvalidInput, "not the path of a file")));
-    };
-    let (temporary, mut file) = create(folder, &name.to_string_lossy()).map_err(|error| failed("create", error))?;
-    // A lock shows processes of this machine that the file has an owner. Without locks its age decides.
-    let _ = file.try_lock();
-    let written = fill(&mut file)
-        .and_then(|()| file.sync_all().map_err(|error| failed("sync", error)))
-        .and_then(|()| place(&temporary, path).map_err(|error| failed(RENAME, error)))
-        .and_then(|()| sync_folder(folder).map_err(|error| failed("sync the folder", error)));
-    if written.is_err() {
-        // The first error is the one to report; a leftover bears a dot and does no harm.
-        let _ = fs::remove_file(&temporary);
-    }
-    written
+/// A temporary file for `path` with these bytes, on the disk.
+fn filled(path: &Path, bytes: &[u8]) -> Result<NamedTempFile, Unwritten> {
+    let mut temporary = create(path).map_err(Unwritten::at("create"))?;
+    temporary.as_file_mut().write_all(bytes).map_err(Unwritten::at("write"))?;
+    temporary.as_file().sync_all().map_err(Unwritten::at("sync"))?;
+    Ok(temporary)
 }
 
-/// Creates a temporary file for `name` that no other process has: its name holds machine, process and, if necessary, a number.
-fn create(folder: &Path, name: &str) -> io::Result<(PathBuf, File)> {
-    let (machine, process) = (machine(), std::process::id());
-    let mut number = 0_u32;
-    loop {
-        let temporary = folder.join(format!(".{name}.{process}-{number}@{machine}{SUFFIX}"));
-        match File::create_new(&temporary) {
-            Err(error) if error.kind() == io::ErrorKind::AlreadyExists && number < u32::MAX => number += 1,
-            created => return created.map(|file| (temporary, file)),
-        }
-    }
+/// The folder of a file.
+fn folder_of(path: &Path) -> &Path {
+    path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."))
+}
+
+/// Creates a temporary file for `path` in its folder, which is removed unless it is renamed. Its name holds the machine; its lock shows
+/// processes of this machine that it has an owner.
+fn create(path: &Path) -> io::Result<NamedTempFile> {
+    let prefix = format!(".{}.", path.file_name().unwrap_or_default().to_string_lossy());
+    let suffix = format!("@{}{SUFFIX}", machine());
+    let temporary = tempfile::Builder::new()
+        .prefix(&prefix)
+        .suffix(&suffix)
+        .make_in(folder_of(path), |path| File::create_new(path))?;
+    // Without locks the age of the file decides.
+    let _ = temporary.as_file().try_lock();
+    Ok(temporary)
 }
 
 /// The suffix of a temporary file.
 const SUFFIX: &str = ".tmp";
 
-/// The name of this machine, as far as it may be part of a file's name.
+/// The name of this machine, restricted to legal characters of file names.
 fn machine() -> String {
     let name = fs::read_to_string("/proc/sys/kernel/hostname").unwrap_or_default();
     let name: String =
@@ -113,21 +95,21 @@ fn machine() -> String {
     if name.is_empty() { "localhost".to_owned() } else { name }
 }
 
-/// Whether a file of this name is a temporary one of ours.
+/// Whether `name` is the name of a temporary file of slipsweep.
 pub fn is_temporary(name: &str) -> bool {
     name.starts_with('.') && name.ends_with(SUFFIX) && name.contains('@')
 }
 
-/// Removes the temporary files in `folder` whose processes are gone. `now` is the time by the clock of the file system.
+/// Removes the temporary files of ended processes in `folder`. `now` is the time by the clock of the file system.
 ///
-/// A process holds a lock on its temporary file as long as it runs. Locks may not reach other machines, so a file of another machine
-/// counts as abandoned only when it is old. That something cannot be removed is no failure: such files do no harm.
+/// A process holds a lock on its temporary file as long as it runs. Locks may not reach other machines, so a file of another machine counts as
+/// abandoned only when it is old. Files that cannot be removed are ignored, since they are harmless.
 pub fn sweep(folder: &Path, now: SystemTime) {
     let ours = format!("@{}{SUFFIX}", machine());
     for entry in fs::read_dir(folder).into_iter().flatten().flatten() {
         let name = entry.file_name();
         let name = name.to_string_lossy();
-        // Opening a named pipe would wait for somebody who writes.
+        // Opening a named pipe would wait for a writer.
         if !is_temporary(&name) || !entry.file_type().is_ok_and(|kind| kind.is_file()) {
             continue;
         }
@@ -151,7 +133,7 @@ fn is_old(entry: &fs::DirEntry, now: SystemTime) -> bool {
     written.is_ok_and(|written| now.duration_since(written).is_ok_and(|age| age > ABANDONED))
 }
 
-/// The folder itself, or the nearest above it that is there: what is written there goes to the same disk.
+/// The nearest existing folder at or above `folder`, which is on the same disk.
 pub fn nearest_folder(folder: &Path) -> PathBuf {
     let absolute = std::path::absolute(folder).unwrap_or_else(|_| folder.to_owned());
     let there = absolute.ancestors().find(|folder| folder.is_dir());
@@ -163,19 +145,19 @@ pub fn time(folder: &Path, bytes: usize) -> io::Result<Duration> {
     let folder = nearest_folder(folder);
     let content = vec![0; bytes];
     let start = Instant::now();
-    let (temporary, mut file) = create(&folder, "plan")?;
-    let written = file.write_all(&content).and_then(|()| file.sync_all()).and_then(|()| sync_folder(&folder));
-    let time = start.elapsed();
-    fs::remove_file(&temporary)?;
-    written.map(|()| time)
+    let mut temporary = create(&folder.join("plan"))?;
+    temporary.as_file_mut().write_all(&content)?;
+    temporary.as_file().sync_all()?;
+    sync_folder(&folder)?;
+    Ok(start.elapsed())
 }
 
-/// Creates `folder` and those above it that are missing, each durably.
+/// Creates `folder` and its missing parents, each durably.
 pub fn create_folder(folder: &Path) -> io::Result<()> {
     if folder.is_dir() {
         return Ok(());
     }
-    let above = folder.parent().filter(|above| !above.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let above = folder_of(folder);
     if above != Path::new(".") {
         create_folder(above)?;
     }
@@ -191,7 +173,7 @@ fn sync_folder(folder: &Path) -> io::Result<()> {
     File::open(folder)?.sync_all()
 }
 
-/// Elsewhere a folder cannot be opened as a file, and renaming is durable without it.
+/// On other systems a folder cannot be opened as a file, and renaming is durable without a sync.
 #[cfg(not(unix))]
 fn sync_folder(_folder: &Path) -> io::Result<()> {
     Ok(())
@@ -215,30 +197,32 @@ mod tests {
     fn files_of_the_dead_are_swept_and_those_of_the_living_stay() {
         let folder = tempfile::tempdir().expect("is writable");
         let now = SystemTime::now();
-        let (dead, _) = create(folder.path(), "dead").expect("is writable");
-        let (living, file) = create(folder.path(), "living").expect("is writable");
-        file.lock().expect("can be locked");
+        let dead = create(&folder.path().join("dead")).expect("is writable").into_temp_path();
+        let living = create(&folder.path().join("living")).expect("is writable");
         let foreign = folder.path().join(".part-000000.parquet.1-0@elsewhere.tmp");
         fs::write(&foreign, "").expect("is writable");
         fs::write(folder.path().join(".mine.tmp"), "").expect("is writable");
         let shown = |path: &Path| path.file_name().expect("has a name").to_string_lossy().into_owned();
         sweep(folder.path(), now);
         assert!(!dead.exists());
-        assert_eq!(names(folder.path()), [shown(&living), ".mine.tmp".to_owned(), shown(&foreign)]);
+        assert_eq!(names(folder.path()), [shown(living.path()), ".mine.tmp".to_owned(), shown(&foreign)]);
         sweep(folder.path(), now + ABANDONED + Duration::from_secs(60));
-        assert_eq!(names(folder.path()), [shown(&living), ".mine.tmp".to_owned()]);
-        drop(file);
-        sweep(folder.path(), now);
+        assert_eq!(names(folder.path()), [shown(living.path()), ".mine.tmp".to_owned()]);
+        drop(living);
         assert_eq!(names(folder.path()), [".mine.tmp"]);
     }
 
     #[test]
-    fn names_that_are_taken_are_left_alone() {
+    fn a_new_file_replaces_no_other() {
         let folder = tempfile::tempdir().expect("is writable");
-        let (first, mut file) = create(folder.path(), "x").expect("is writable");
-        file.write_all(b"first").expect("is writable");
-        write(&folder.path().join("x"), b"second").expect("is writable");
-        assert_eq!(fs::read(first).expect("is readable"), b"first");
-        assert_eq!(fs::read(folder.path().join("x")).expect("is readable"), b"second");
+        let path = folder.path().join("x");
+        assert!(write_new(&path, b"first").expect("is writable"));
+        assert!(!write_new(&path, b"second").expect("is writable"));
+        assert_eq!(fs::read(&path).expect("is readable"), b"first");
+        write(&path, b"third").expect("is writable");
+        assert_eq!(
+            (fs::read(&path).expect("is readable"), names(folder.path())),
+            (b"third".to_vec(), vec!["x".to_owned()])
+        );
     }
 }

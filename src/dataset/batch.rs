@@ -12,7 +12,7 @@ use crate::grid::RowIndex;
 use crate::protocol::Status;
 use crate::table::{ColumnBuffer, Kind};
 
-/// The cells of `buffer`, which are the rows `rows` of a table, with the columns and types that a part on disk has.
+/// The rows `rows` of a table, whose cells are in `buffer`, with the columns and types of a part on disk.
 ///
 /// # Errors
 ///
@@ -55,7 +55,7 @@ pub fn batch(
     RecordBatch::try_new(layout.schema.clone(), columns)
 }
 
-/// Words by their places.
+/// A dictionary array of words from their indices.
 fn labels(words: &[&str], places: &[f64]) -> Result<ArrayRef, ArrowError> {
     let keys: Int32Array = places.iter().map(|&place| Some(some(place)? as i32)).collect();
     let words = Arc::new(StringArray::from(words.to_vec()));

@@ -1,4 +1,4 @@
-//! A cell of a table, as a reader sees it and as a footer keeps it.
+//! A cell of a table, for display and for footers.
 
 use std::borrow::Cow;
 
@@ -7,7 +7,7 @@ use arrow_array::types::{Float64Type, Int32Type};
 use arrow_array::{Array, RecordBatch};
 use serde::{Deserialize, Serialize};
 
-/// A cell. In JSON it is `null`, a number as text (so that every bit of it stays, and infinity can be written), or a list of one word.
+/// A cell. In JSON it is `null`, a number as text (which preserves every bit and infinity), or a list of one word.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(untagged)]
 pub enum Cell {
@@ -20,7 +20,7 @@ pub enum Cell {
 }
 
 impl Cell {
-    /// Whether two cells hold the same, zeros of different sign apart.
+    /// Whether two cells are equal; zeros of different sign differ.
     pub fn is_same(&self, other: &Cell) -> bool {
         match (self, other) {
             (Cell::Number(one), Cell::Number(other)) => one.to_bits() == other.to_bits(),
@@ -28,7 +28,7 @@ impl Cell {
         }
     }
 
-    /// The number in it.
+    /// The number of the cell, if it is one.
     pub fn number(&self) -> Option<f64> {
         if let Cell::Number(number) = self { Some(*number) } else { None }
     }
@@ -52,17 +52,17 @@ pub fn first_row(batch: &RecordBatch) -> Vec<Cell> {
     batch.columns().iter().map(|array| cell(array).unwrap_or(Cell::Missing)).collect()
 }
 
-/// A number as text: the shortest one that is read as the same double.
+/// A number as text: the shortest text that determines the double.
 pub mod exact {
     use super::{Cow, Deserialize};
     use serde::{Deserializer, Serializer, de::Error};
 
-    /// Writes it.
+    /// Serialises a number.
     pub fn serialize<S: Serializer>(number: &f64, serializer: S) -> Result<S::Ok, S::Error> {
         serializer.collect_str(&format_args!("{number:?}"))
     }
 
-    /// Reads it.
+    /// Deserialises a number.
     pub fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<f64, D::Error> {
         Cow::<str>::deserialize(deserializer)?.parse().map_err(D::Error::custom)
     }

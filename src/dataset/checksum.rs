@@ -1,8 +1,8 @@
-//! The checksums of a part, kept in its own footer.
+//! The checksums of a part, stored in its footer.
 //!
-//! One is the SHA-256 of all bytes of the file: anyone can check the file, and no bit of it, including the footer, can change
-//! unnoticed. The other is that of the footer and of the headers of the pages, which is checked whenever a part is opened. What is in the pages
-//! has checksums of its own (CRC-32), checked whenever a page is read. Checksums count as zeros where they are computed.
+//! One is the SHA-256 of all bytes of the file, including the footer, so that every changed bit is found. The other is the SHA-256 of the footer
+//! and of the page headers, which is checked when a part is opened. The contents of pages have their own checksums (CRC-32), checked when a page
+//! is read. During the computation, the checksums themselves count as zeros.
 
 use bytes::Bytes;
 use parquet::errors::{ParquetError, Result};
@@ -21,18 +21,18 @@ const FILE: &str = "slipsweep.sha256";
 /// The placeholder of a checksum during its computation, as long as its hexadecimal digits.
 const BLANK: &str = "0000000000000000000000000000000000000000000000000000000000000000";
 
-/// The bytes of Thrift's compact protocol between key and value: the next field, a string, and its length.
+/// Bytes of Thrift's compact protocol between key and value: the header of the next field, a string, and its length.
 const BETWEEN: [u8; 2] = [0x18, BLANK.len() as u8];
 
 /// Bytes after the footer: its length and `PAR1`.
 const TRAILER: u64 = 8;
 
-/// The entries that a footer needs to be sealed; the last of its entries.
+/// The entries of a footer that hold the checksums; they must be its last entries.
 pub fn entries() -> [KeyValue; 2] {
     [HEAD, FILE].map(|key| KeyValue::new(key.to_owned(), BLANK.to_owned()))
 }
 
-/// A finished file whose footer has the [`entries`], with its checksums.
+/// Inserts the checksums into a file whose footer has the [`entries`].
 pub fn sealed(bytes: Vec<u8>) -> Result<Vec<u8>> {
     let bytes = Bytes::from(bytes);
     let metadata = ParquetMetaDataReader::new().parse_and_finish(&bytes)?;
@@ -49,13 +49,13 @@ pub fn sealed(bytes: Vec<u8>) -> Result<Vec<u8>> {
     Ok(bytes)
 }
 
-/// Whether the bytes of a file are those that were sealed; `None` if they bear no seal.
+/// Whether the bytes of a file match its checksum; `None` without a checksum.
 pub fn is_intact(bytes: &[u8]) -> Option<bool> {
     let place = place(bytes, FILE)?;
     Some(bytes[place..place + BLANK.len()] == *whole(bytes, place).as_bytes())
 }
 
-/// Whether footer and page headers of a file are those that were sealed; `None` if they bear no seal.
+/// Whether footer and page headers of a file match their checksum; `None` without a checksum.
 ///
 /// # Errors
 ///
@@ -63,7 +63,7 @@ pub fn is_intact(bytes: &[u8]) -> Option<bool> {
 pub fn is_head_intact(file: &impl ChunkReader, metadata: &ParquetMetaData) -> Result<Option<bool>> {
     let entries = metadata.file_metadata().key_value_metadata().into_iter().flatten();
     let Some(sealed) = entries.filter(|entry| entry.key == HEAD).find_map(|entry| entry.value.as_ref()) else {
-        // One flipped bit may hide the entries of a footer, whose bytes still have them.
+        // A flipped bit may hide the entries of a footer, although its bytes still contain them.
         let footer = footer(file)?;
         return Ok([HEAD, FILE].iter().any(|key| place(&footer, key).is_some()).then_some(false));
     };
@@ -101,7 +101,7 @@ fn place(bytes: &[u8], key: &str) -> Option<usize> {
     found.then_some(place)
 }
 
-/// The checksum of a file whose checksum stands at `place`.
+/// The checksum of a file that stores it at `place`.
 fn whole(bytes: &[u8], place: usize) -> String {
     let hash = Sha256::new().chain_update(&bytes[..place]).chain_update(BLANK);
     digits(hash.chain_update(&bytes[place + BLANK.len()..]))

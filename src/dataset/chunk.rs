@@ -1,8 +1,8 @@
-//! A column chunk made here, page by page, and spliced into a Parquet file.
+//! A column chunk, encoded here page by page and appended to a Parquet file.
 //!
-//! The writer of the `parquet` crate takes values one by one; here the runs of an axis, of the rows that have a value and of
-//! values that repeat are known, so that most of its work need not be done. It also writes no checksums of pages. A landscape that is
-//! computed and encoded takes 2.2 times as long with it (`cargo bench --bench pipeline -- writers`).
+//! The writer of the `parquet` crate processes values one by one and writes no checksums of pages. Here the runs of axes, of missing numbers and
+//! of repeated values are known, which avoids most of this work. With the writer of the crate, computing and encoding a landscape takes 2.2
+//! times as long (`cargo bench --bench pipeline -- writers`).
 
 use bytes::Bytes;
 use parquet::basic::{Compression, Encoding, ZstdLevel};
@@ -16,27 +16,27 @@ use zstd::bulk::Compressor;
 use super::part::ZSTD_LEVEL;
 use super::rle;
 
-/// Runs of equal codes: a code, and for how many rows.
+/// Runs of equal codes: code and number of rows.
 pub type Runs = Vec<(u32, usize)>;
 
-/// Pages of fewer bytes are not compressed: it would cost more than it saves.
+/// Least size of a compressed page, in bytes: smaller pages cost more time than they save space.
 const WORTH_COMPRESSING: usize = 1 << 12;
 
 /// A column chunk of one data page.
 pub struct Chunk {
     /// Rows, with and without a value.
     pub rows: usize,
-    /// The dictionary: its values in Parquet's plain encoding, and how many.
+    /// The dictionary: its values in Parquet's plain encoding, and their number.
     pub dictionary: Option<(Vec<u8>, u32)>,
     /// The data page: levels and encoded values.
     pub data: Vec<u8>,
     /// The encoding of the values.
     pub encoding: Encoding,
-    /// Least and greatest value and number of nulls.
+    /// Least value, greatest value and number of nulls.
     pub statistics: Statistics,
 }
 
-/// Begins a data page of up to `size` bytes with the levels of a column with nulls: which rows have a value (1) and which have none (0).
+/// A new data page of up to `size` bytes, beginning with the definition levels of a column with nulls: 1 for a value, 0 for null.
 pub fn page(present: Option<&Runs>, size: usize) -> Vec<u8> {
     let Some(present) = present else { return Vec::with_capacity(size) };
     let levels = rle::encode(present.iter().copied(), 1);
@@ -47,7 +47,7 @@ pub fn page(present: Option<&Runs>, size: usize) -> Vec<u8> {
 }
 
 impl Chunk {
-    /// The bytes of the chunk and what the file has to know of them.
+    /// The bytes of the chunk, and its metadata for the file.
     pub fn encode(self, column: ColumnDescPtr, zstd: &mut Compressor<'_>) -> Result<(Bytes, ColumnCloseResult)> {
         let raw = self.data.len() + self.dictionary.as_ref().map_or(0, |(plain, _)| plain.len());
         let compression = if raw < WORTH_COMPRESSING {
@@ -98,13 +98,13 @@ impl Chunk {
 
 /// The kind of a page.
 enum Kind {
-    /// Values in plain encoding.
+    /// Dictionary values in plain encoding.
     Dictionary,
     /// Levels and encoded values.
     Data(Encoding),
 }
 
-/// Adds a page with its header, which has the checksum of its bytes; returns its size before compression, header included.
+/// Appends a page and its header, which contains the checksum of the page; returns the size before compression, including the header.
 ///
 /// The header is the struct `PageHeader` of <https://github.com/apache/parquet-format/blob/master/src/main/thrift/parquet.thrift> in Thrift's
 /// compact protocol: the `parquet` crate writes none with a checksum.
@@ -123,14 +123,14 @@ fn add_page(
         Kind::Data(encoding) => (0, encoding as i32),
     };
     let start = file.len();
-    // Type, both sizes, and the checksum, whose bits are those of a signed number.
+    // Type, both sizes, and the checksum as a signed number.
     for field in [tag, size_as(size)?, size_as(content.len())?, crc32fast::hash(&content).cast_signed()] {
         add_field(file, field);
     }
     let (field, rest) = match kind {
-        // Field 7, and whether the dictionary is sorted, which is false.
+        // Field 7, with the flag that the dictionary is not sorted.
         Kind::Dictionary => (0x3c, &[][..]),
-        // Field 5, and the encodings of both levels.
+        // Field 5, with the encodings of both levels.
         Kind::Data(_) => (0x1c, &[Encoding::RLE as i32; 2][..]),
     };
     file.push(field);
@@ -146,7 +146,7 @@ fn add_page(
     Ok(header + size)
 }
 
-/// The next field of a struct: a number of 32 bits, signs in the lowest bit, seven bits a byte, the lowest first.
+/// Appends the next field of a struct: a 32-bit number with the sign in the lowest bit, in groups of seven bits, the lowest first.
 fn add_field(file: &mut Vec<u8>, value: i32) {
     file.push(0x15);
     let mut left = (value << 1 ^ value >> 31).cast_unsigned();

@@ -1,7 +1,6 @@
-//! Column chunks of few different values: a dictionary, and the runs of its codes.
+//! Column chunks with few distinct values: a dictionary, and runs of its codes.
 //!
-//! The axes of a product are runs of known length, so their codes need no hashing of every cell: that makes seven axis columns
-//! cost less than one column of numbers.
+//! The axes of a product have runs of known length, so cells need no hashing. Seven axis columns therefore cost less than one column of numbers.
 
 use std::collections::HashMap;
 
@@ -12,7 +11,7 @@ use super::chunk::{Chunk, Runs, page};
 use super::numbers::double_statistics;
 use super::rle;
 
-/// Numbers by the runs of their places in `values`, which may hold a number twice.
+/// A chunk of numbers from runs of indices into `values`, which may contain duplicates.
 pub fn numbers(values: &[f64], runs: impl Iterator<Item = (usize, usize)>, present: Option<&Runs>) -> Chunk {
     let mut distinct: Vec<f64> = Vec::new();
     let mut codes: HashMap<u64, u32> = HashMap::new();
@@ -32,7 +31,7 @@ pub fn numbers(values: &[f64], runs: impl Iterator<Item = (usize, usize)>, prese
     chunk(plain, distinct.len(), runs, present, |nulls| double_statistics(least.zip(greatest), nulls))
 }
 
-/// Words by the runs of their indices.
+/// A chunk of words from runs of their indices.
 pub fn words(words: &[&str], runs: &Runs, present: Option<&Runs>) -> Chunk {
     let mut plain = Vec::new();
     for word in words {

@@ -1,4 +1,4 @@
-//! Column chunks of flags: a bit each, in Parquet's plain encoding.
+//! Column chunks of flags: one bit each, in Parquet's plain encoding.
 
 use parquet::basic::Encoding;
 use parquet::file::statistics::Statistics;
@@ -6,7 +6,7 @@ use parquet::file::statistics::Statistics;
 use super::chunk::{Chunk, page};
 use super::numbers::presence;
 
-/// The chunk of `cells`: 1, 0, or NaN where there is none.
+/// The chunk of `cells`: 1, 0, or NaN for a missing value.
 pub fn chunk(cells: &[f64]) -> Chunk {
     let present = presence(cells);
     let flags: Vec<bool> = cells.iter().filter(|cell| !cell.is_nan()).map(|&cell| cell != 0.0).collect();

@@ -9,150 +9,76 @@ use rayon::prelude::*;
 use super::atomic::{self, Unwritten};
 use super::footer::Footer;
 use super::manifest::{Manifest, ManifestTable};
-use super::state::{self, CheckDepth, OpenPart, State};
+use super::state::{self, CheckDepth, State};
 
-/// The help for a dataset in the place of another one.
+/// The help if the folder contains another dataset.
 const WAYS_OUT: &str = "change `name` in the spec, or write elsewhere with --out DIR, or remove the dataset";
 
 /// The errors of the files of a dataset.
 #[derive(Debug, thiserror::Error)]
+#[allow(missing_docs)]
 pub enum DatasetError {
-    /// The folder holds a dataset of another spec, or that another program computed.
+    /// The folder contains a dataset of another version or revision of the program.
     #[error(
         "{folder}: holds a dataset of another {what}\n  expected: {expected}\n  found: {found}\n  help: {WAYS_OUT}"
     )]
-    Foreign {
-        /// The folder.
-        folder: String,
-        /// `version` or `numerics revision`.
-        what: &'static str,
-        /// The value of this run.
-        expected: String,
-        /// The value of the folder.
-        found: String,
-    },
-    /// The folder holds a dataset of another spec.
+    Foreign { folder: String, what: &'static str, expected: String, found: String },
+    /// The folder contains a dataset of another spec.
     #[error("{folder}: holds a dataset of another spec\n  expected: {expected}\n  found: {found}\n  help: {WAYS_OUT}")]
-    OtherSpec {
-        /// The folder.
-        folder: String,
-        /// The table that differs.
-        table: String,
-        /// The value of this spec: the hash of the table, or the differing key.
-        expected: String,
-        /// The value of the folder.
-        found: String,
-        /// The text of the spec in the folder.
-        spec: String,
-    },
-    /// The folder holds tables that the spec lacks, and lacks some that the spec has.
+    OtherSpec { folder: String, table: String, expected: String, found: String, spec: String },
+    /// The folder contains tables that the spec lacks, and lacks tables of the spec.
     #[error(
         "{folder}: the spec and the dataset each have a table that the other lacks\n  expected: {expected}\n  found: {found}\n  help: add \
          [tables.{}] to the spec, which keeps its rows and computes yours; or {WAYS_OUT}",
         missing.join("] and [tables.")
     )]
-    OtherTables {
-        /// The folder.
-        folder: String,
-        /// The tables of the spec.
-        expected: String,
-        /// The tables of the dataset.
-        found: String,
-        /// The tables that the spec lacks.
-        missing: Vec<String>,
-    },
-    /// Another run is at work.
+    OtherTables { folder: String, expected: String, found: String, missing: Vec<String> },
+    /// Another run writes the dataset.
     #[error(
         "{folder}: another run is writing this dataset{process}\n  help: wait for its end (`slipsweep status {folder}` shows its progress); only \
          shards (--shard I/N) run side by side"
     )]
-    Busy {
-        /// The folder.
-        folder: String,
-        /// The process, in brackets, if it is known.
-        process: String,
-    },
-    /// Somebody changed the dataset while this run was at work.
+    Busy { folder: String, process: String },
+    /// The dataset was changed during this run.
     #[error(
         "{folder}: {what} during this run, which stopped\n  help: run the same command again; it keeps finished parts"
     )]
-    Taken {
-        /// The folder.
-        folder: String,
-        /// The event.
-        what: &'static str,
-    },
-    /// The folder holds something else.
+    Taken { folder: String, what: &'static str },
+    /// The folder contains no dataset, but other files.
     #[error(
         "{folder}: neither a dataset nor empty\n  expected: an empty folder, or one with a manifest.json\n  help: change \
          `name` in the spec, or write elsewhere with --out DIR"
     )]
-    Occupied {
-        /// The folder.
-        folder: String,
-    },
-    /// A file in the place of a part was not made by this sweep.
+    Occupied { folder: String },
+    /// A file with the name of a part does not belong to this sweep.
     #[error(
         "{path}: belongs to another {what}\n  expected: {expected}\n  found: {found}\n  help: move the file away; `slipsweep run` then \
          computes the part and keeps all others"
     )]
-    ForeignPart {
-        /// The file.
-        path: String,
-        /// In what it differs.
-        what: &'static str,
-        /// The expected value of the part.
-        expected: String,
-        /// The value of the file.
-        found: String,
-    },
-    /// A part is broken.
+    ForeignPart { path: String, what: &'static str, expected: String, found: String },
+    /// A part is damaged.
     #[error(
         "{path}: the part is damaged: {why}\n  help: `slipsweep run {dataset}` recomputes it and keeps all intact parts"
     )]
-    DamagedPart {
-        /// The file.
-        path: String,
-        /// In what way.
-        why: String,
-        /// The folder of the dataset.
-        dataset: String,
-    },
-    /// The manifest is damaged, and no part says what it said.
+    DamagedPart { path: String, why: String, dataset: String },
+    /// The manifest is damaged, and no part can replace it.
     #[error(
         "{path}: damaged, or of another version of slipsweep: {why}\n  help: run the spec of the dataset, which rewrites it if no part \
          is there; else {WAYS_OUT}"
     )]
-    Manifest {
-        /// The file.
-        path: String,
-        /// In what way.
-        why: String,
-    },
-    /// The system refused.
+    Manifest { path: String, why: String },
+    /// An error of the operating system.
     #[error(
         "{path}: cannot {action}: {source}\n  help: solve this and run the same command again, which keeps finished parts; or write \
          elsewhere with --out DIR"
     )]
-    Io {
-        /// The file or folder.
-        path: String,
-        /// The attempted action.
-        action: &'static str,
-        /// The cause.
-        source: io::Error,
-    },
+    Io { path: String, action: &'static str, source: io::Error },
     /// A sample of a table could not be encoded.
     #[error("cannot encode a sample: {0}")]
     Sample(parquet::errors::ParquetError),
     /// A part could not be encoded.
     #[error("{path}: cannot encode: {source}")]
-    Encode {
-        /// The part.
-        path: String,
-        /// The cause.
-        source: parquet::errors::ParquetError,
-    },
+    Encode { path: String, source: parquet::errors::ParquetError },
 }
 
 impl DatasetError {
@@ -169,7 +95,7 @@ pub struct Folder {
 }
 
 impl Folder {
-    /// The folder of the dataset `name` in `out`; nothing is touched yet.
+    /// The folder of the dataset `name` in `out`; nothing is created yet.
     pub fn new(out: &Path, name: &str) -> Folder {
         Folder { path: out.join(name) }
     }
@@ -179,7 +105,7 @@ impl Folder {
         Folder { path: path.to_owned() }
     }
 
-    /// Its place.
+    /// Its path.
     pub fn path(&self) -> &Path {
         &self.path
     }
@@ -194,11 +120,11 @@ impl Folder {
         self.path.join("manifest.json")
     }
 
-    /// The manifest, if there is one; as the parts say it, where its file is missing or damaged.
+    /// The manifest, if any; reconstructed from the parts if its file is missing or damaged.
     ///
     /// # Errors
     ///
-    /// If it cannot be read, or is damaged and no part is there.
+    /// If it cannot be read, or if it is damaged and there are no parts.
     pub fn manifest(&self) -> Result<Option<Manifest>, DatasetError> {
         let why = match self.read_manifest() {
             Ok(Some(manifest)) => return Ok(Some(manifest)),
@@ -212,11 +138,11 @@ impl Folder {
         Ok(self.manifest_of_parts().map(|manifest| Manifest { rebuilt: Some(why), ..manifest }))
     }
 
-    /// The manifest as its file says it; `None` if there is no file.
+    /// The manifest from its file; `None` if there is no file.
     pub(super) fn read_manifest(&self) -> Result<Option<Manifest>, DatasetError> {
         let path = self.manifest_path();
         let read = fs::metadata(&path).and_then(|metadata| {
-            // Reading a named pipe would wait for somebody who writes, and a device might never end.
+            // Reading a named pipe would wait for a writer, and a device might never end.
             if metadata.is_file() { fs::read(&path) } else { Err(io::Error::other("it is not a file")) }
         });
         match read {
@@ -228,20 +154,20 @@ impl Folder {
         }
     }
 
-    /// The manifest as the parts say it, if there is a part that can be read: of the tables, those that have parts were planned last.
+    /// The manifest reconstructed from the parts, if any part can be read.
     pub(super) fn manifest_of_parts(&self) -> Option<Manifest> {
         let first = |table: PathBuf| sorted(&table, is_part).into_iter().find_map(|part| state::footer_of(&part));
         let footers = sorted(&self.path, Path::is_dir).into_iter().filter_map(first);
-        // Tables are only ever added.
+        // Tables are only added, so the manifest with the most tables is the last one.
         footers.map(Footer::manifest).reduce(|most, next| if next.covers(&most) { next } else { most })
     }
 
-    /// Whether there is something with the name of a part.
+    /// Whether any file has the name of a part.
     pub(super) fn has_parts(&self) -> bool {
         sorted(&self.path, Path::is_dir).iter().any(|table| !sorted(table, is_part).is_empty())
     }
 
-    /// Whether a run of `expected` may work on the dataset of `found`.
+    /// Checks that a run of `expected` may write to the dataset of `found`.
     pub(super) fn compare(&self, expected: &Manifest, found: &Manifest) -> Result<(), DatasetError> {
         let folder = self.path.display().to_string();
         let (here, there) = (&expected.build, &found.build);
@@ -277,8 +203,7 @@ impl Folder {
         Ok(())
     }
 
-    /// The numbers of the parts of `table` in whose place there is something, ascending. One listing of the folder suffices, so that parts
-    /// that are missing cost nothing, however many.
+    /// The numbers of the parts of `table` for which a file exists, ascending. Lists the folder once, so that missing parts cost nothing.
     pub fn parts_there(&self, table: &ManifestTable) -> Vec<u64> {
         let entries = fs::read_dir(self.path.join(&table.name)).into_iter().flatten().flatten();
         let mut parts: Vec<u64> = entries.filter_map(|entry| self.part_at(table, &entry.path())).collect();
@@ -286,37 +211,33 @@ impl Folder {
         parts
     }
 
-    /// The state of a part of the dataset of `manifest`.
+    /// The state of a part in the dataset of `manifest`.
     pub fn state(&self, manifest: &Manifest, table: &str, part: u64, look: CheckDepth) -> State {
         state::state(&self.part(table, part), manifest, table, part, look)
     }
 
-    /// Opens a part of the dataset of `manifest`; `None` if it is not there. What is opened is the part that should be there, and its footer is
-    /// as it was written; its pages have checksums, which are verified when they are read. Every reader of a dataset opens its parts here.
-    ///
-    /// # Errors
-    ///
-    /// If the part is damaged, or does not belong to the dataset.
-    pub fn open_part(&self, manifest: &Manifest, table: &str, part: u64) -> Result<Option<OpenPart>, DatasetError> {
-        let path = self.part(table, part);
-        state::open_part(&path, manifest, table, part).map_err(|state| self.fault(&path, state))
-    }
-
-    /// The paths of the parts of `table` that are there, in order, each of which [`Folder::open_part`] opens; and how many are missing.
+    /// The paths of the present parts of `table` in order, and the number of missing parts. The footer of each part is verified here, its pages when they are read.
     ///
     /// # Errors
     ///
     /// If a part is damaged, or does not belong to the dataset.
     pub fn verified(&self, manifest: &Manifest, table: &ManifestTable) -> Result<(Vec<PathBuf>, u64), DatasetError> {
         let there = self.parts_there(table);
-        let open = |part: u64| Ok(self.open_part(manifest, &table.name, part)?.map(|part| part.path));
+        let open = |part: u64| {
+            let path = self.part(&table.name, part);
+            match self.state(manifest, &table.name, part, CheckDepth::Footer) {
+                State::There { .. } => Ok(Some(path)),
+                State::Missing => Ok(None),
+                fault => Err(self.fault(&path, fault)),
+            }
+        };
         let opened: Result<Vec<Option<PathBuf>>, DatasetError> = there.into_par_iter().map(open).collect();
         let paths: Vec<PathBuf> = opened?.into_iter().flatten().collect();
         let missing = table.parts - paths.len() as u64;
         Ok((paths, missing))
     }
 
-    /// The error of a file in the place of a part.
+    /// The error for a damaged or foreign file with the name of a part.
     pub fn fault(&self, path: &Path, state: State) -> DatasetError {
         let (path, dataset) = (path.display().to_string(), self.path.display().to_string());
         match state {
@@ -328,13 +249,13 @@ impl Folder {
         }
     }
 
-    /// Writes a part, whole or not at all.
+    /// Writes a part atomically.
     pub fn write_part(&self, table: &str, part: u64, bytes: &[u8]) -> Result<(), DatasetError> {
         let path = self.part(table, part);
         atomic::write(&path, bytes).map_err(|error| unwritten(&path, error))
     }
 
-    /// Files below the folder that are no part of the dataset of `manifest`, and whether they are temporary files of a run.
+    /// Files below the folder that do not belong to the dataset of `manifest`, and whether they are temporary files of a run.
     pub fn strays(&self, manifest: &Manifest) -> Vec<(PathBuf, bool)> {
         let mut strays = Vec::new();
         for path in sorted(&self.path, |_| true) {
@@ -351,7 +272,7 @@ impl Folder {
         strays.into_iter().map(|path| (is_temporary(&path), path)).map(|(temporary, path)| (path, temporary)).collect()
     }
 
-    /// The number of the part of `table` whose place `path` is.
+    /// The number of the part of `table` with this `path`.
     fn part_at(&self, table: &ManifestTable, path: &Path) -> Option<u64> {
         let name = path.file_name()?.to_string_lossy();
         let part = name.strip_prefix("part-")?.strip_suffix(".parquet")?.parse().ok()?;

@@ -10,11 +10,11 @@ use super::manifest::{Build, Manifest, ManifestTable};
 use super::statistics::TableStatistics;
 use crate::protocol::Status;
 
-/// Most bytes of a spec that each part carries: a fortieth of a part of 2^18 rows of a landscape. Of a longer spec the manifest has the one copy,
-/// to which the hash of the table leads.
+/// Greatest size of a spec in the footer of a part, in bytes: a fortieth of a part of 2^18 landscape rows. Only the manifest contains a longer
+/// spec; the hash of the table identifies it.
 const MAX_SPEC_BYTES: usize = 1 << 16;
 
-/// The origin of a part. Any part describes the whole dataset.
+/// The origin of a part. Every part describes the whole dataset.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Footer {
     /// The name of the dataset.
@@ -62,7 +62,7 @@ impl Footer {
         }
     }
 
-    /// The footer as Parquet metadata, with the statistics of the rows; the checksums come last.
+    /// The footer as Parquet metadata, with the statistics of the rows. The entries of the checksums follow.
     pub fn entries(&self, statistics: &TableStatistics) -> Vec<KeyValue> {
         let counts: BTreeMap<&str, u64> = Status::ALL.map(Status::name).into_iter().zip(statistics.status).collect();
         let counts = serde_json::to_string(&counts).unwrap_or_default();
@@ -84,7 +84,7 @@ impl Footer {
         entries.chain(checksum::entries()).collect()
     }
 
-    /// From Parquet metadata, `None` if anything is missing.
+    /// Reads the footer from Parquet metadata; `None` if an entry is missing.
     pub fn from_entries(entries: &[KeyValue]) -> Option<Footer> {
         let get = |key: &str| entries.iter().find(|entry| entry.key == key)?.value.clone();
         Some(Footer {
@@ -97,7 +97,7 @@ impl Footer {
         })
     }
 
-    /// The digest of the rows of the part, from its Parquet metadata.
+    /// The statistics of the rows of the part, from its Parquet metadata.
     pub fn statistics(entries: &[KeyValue]) -> Option<TableStatistics> {
         let get = |key: &str| entries.iter().find(|entry| entry.key == key)?.value.as_deref();
         let counts: BTreeMap<String, u64> = serde_json::from_str(get(STATUS)?).ok()?;
@@ -107,12 +107,12 @@ impl Footer {
         Some(statistics)
     }
 
-    /// Its table, as the dataset has it.
+    /// Its table in the manifest of the dataset.
     pub fn planned(&self) -> Option<&ManifestTable> {
         self.tables.iter().find(|table| table.name == self.table)
     }
 
-    /// The manifest of the dataset that the part belongs to.
+    /// The manifest of the dataset of the part.
     pub fn manifest(self) -> Manifest {
         let spec = self.spec.unwrap_or_default();
         Manifest { name: self.name, build: self.build, tables: self.tables, spec, rebuilt: None }

@@ -1,4 +1,4 @@
-//! Columns of a table, read part by part: the memory does not grow with the table.
+//! Columns of a table, read part by part, so that memory does not grow with the table.
 
 use std::path::Path;
 
@@ -9,17 +9,17 @@ use arrow_schema::DataType;
 use parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
 use parquet::arrow::{ProjectionMask, parquet_to_arrow_schema};
 use parquet::errors::ParquetError;
-use parquet::file::metadata::{ParquetMetaDataReader, RowGroupMetaData};
+use parquet::file::metadata::RowGroupMetaData;
 use parquet::file::statistics::Statistics;
 
 use super::cell::Cell;
 use super::folder::DatasetError;
 use super::guard::guarded;
 use super::layout::label;
-use super::metadata_limits::{check_footer, coded};
+use super::metadata_limits::{self, coded};
 use crate::file;
 
-/// Rows that are decoded together.
+/// Rows decoded in one batch.
 const ROWS_AT_ONCE: usize = 1 << 14;
 
 /// Name, unit and meaning of a column of a file.
@@ -31,33 +31,33 @@ pub struct Heading {
     pub unit: String,
     /// Its meaning.
     pub doc: String,
-    /// Whether it holds numbers; else words, or flags as `yes` and `no`.
+    /// Whether it contains numbers; otherwise words, or flags as `yes` and `no`.
     pub is_number: bool,
 }
 
 /// The cells of a column.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Cells {
-    /// Numbers, NaN where there is none.
+    /// Numbers; NaN for null.
     Numbers(Vec<f64>),
-    /// Places in a list of words; `None` where there is none.
+    /// Indices into a list of words; `None` for null.
     Words(Vec<Option<u32>>, Vec<String>),
 }
 
 /// Some columns of some rows.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Frame {
-    /// Rows.
+    /// Number of rows.
     pub height: usize,
-    /// The columns requested, in that order, each with its name.
+    /// The requested columns in order, each with its name.
     pub columns: Vec<(String, Cells)>,
 }
 
-/// One row: the names of its cells and what is in them.
+/// One row: names and values of its cells.
 pub type Row = Vec<(String, Cell)>;
 
 impl Cells {
-    /// No cells of a column of this type; `None` of one that no table has.
+    /// An empty column of this type; `None` for a type that no table has.
     fn none(kind: &DataType) -> Option<Cells> {
         match kind {
             DataType::Float64 => Some(Cells::Numbers(Vec::new())),
@@ -67,7 +67,7 @@ impl Cells {
         }
     }
 
-    /// Adds those of an array of the same type.
+    /// Appends an array of the same type.
     fn extend(&mut self, array: &dyn Array) {
         match self {
             Cells::Numbers(numbers) => {
@@ -83,7 +83,7 @@ impl Cells {
                 } else if let Some(array) = array.as_dictionary_opt::<Int32Type>()
                     && let Some(values) = array.values().as_string_opt::<i32>()
                 {
-                    // The places of its words among those of the column.
+                    // The indices of the words of the array among the words of the column.
                     let here: Vec<u32> = values.iter().map(|word| place(words, word.unwrap_or_default())).collect();
                     let cell = |key: i32| here.get(usize::try_from(key).ok()?).copied();
                     places.extend(array.keys().iter().map(|key| cell(key?)));
@@ -105,7 +105,7 @@ impl Cells {
     }
 }
 
-/// The place of a word, which is added if it is new.
+/// The index of a word, which is added if it is new.
 fn place(words: &mut Vec<String>, word: &str) -> u32 {
     let found = words.iter().position(|known| known == word);
     found.unwrap_or_else(|| {
@@ -128,15 +128,11 @@ impl Frame {
 
 /// The error of reading columns.
 #[derive(Debug, thiserror::Error)]
+#[allow(missing_docs)]
 pub enum FrameError {
-    /// A file is damaged or is no Parquet.
+    /// A file is damaged or not a Parquet file.
     #[error("{path}: cannot be read as Parquet: {reason}")]
-    File {
-        /// The file.
-        path: String,
-        /// The cause.
-        reason: String,
-    },
+    File { path: String, reason: String },
 }
 
 /// The error of reading a part.
@@ -145,7 +141,7 @@ pub enum ReadError {
     /// A part is damaged, or belongs to another dataset.
     #[error(transparent)]
     Part(#[from] DatasetError),
-    /// A part turns out to be damaged when it is read.
+    /// A part is found to be damaged during reading.
     #[error("{0}\n  help: run the sweep again; it recomputes damaged parts alone")]
     Frame(#[from] FrameError),
 }
@@ -160,8 +156,7 @@ pub type Facts = Vec<(String, String)>;
 /// The columns of a Parquet file, and the entries of its footer.
 pub fn headings(path: &Path) -> Result<(Vec<Heading>, Facts), FrameError> {
     let file = file::open(path).map_err(|error| wrong(path, error))?;
-    let metadata = check_footer(&file).and_then(|()| ParquetMetaDataReader::new().parse_and_finish(&file));
-    let metadata = metadata.map_err(|error| wrong(path, error))?;
+    let metadata = metadata_limits::footer(&file).map_err(|error| wrong(path, error))?;
     let footer = metadata.file_metadata();
     let schema = parquet_to_arrow_schema(footer.schema_descr(), footer.key_value_metadata())
         .map_err(|error| wrong(path, error))?;
@@ -180,11 +175,10 @@ pub fn read(path: &Path, names: &[&str]) -> Result<Frame, FrameError> {
     open(path, Some(names), Rows::All)
 }
 
-/// Whether a row group may hold a row that is wanted, by the least and the greatest number of its columns; a column without numbers has
-/// none.
+/// Decides from the least and the greatest number of each column whether to read a row group; a column without numbers has none.
 pub type Keep<'a> = &'a dyn Fn(&dyn Fn(&str) -> Option<(f64, f64)>) -> bool;
 
-/// The columns `names` of those row groups of a Parquet file that `keep` says may hold a row that is wanted.
+/// The columns `names` of the row groups of a Parquet file that `keep` selects.
 pub fn read_where(path: &Path, names: &[&str], keep: Keep<'_>) -> Result<Frame, FrameError> {
     open(path, Some(names), Rows::Of(keep))
 }
@@ -217,11 +211,11 @@ enum Rows<'a> {
     All,
     /// Some row groups.
     Of(Keep<'a>),
-    /// The one with this number.
+    /// The row with this number.
     One(usize),
 }
 
-/// Some columns, or all, of some rows.
+/// Reads some or all columns of the selected rows.
 fn open(path: &Path, names: Option<&[&str]>, rows: Rows<'_>) -> Result<Frame, FrameError> {
     let read = || -> Result<Frame, ParquetError> {
         let file = file::open(path)?;

@@ -1,4 +1,4 @@
-//! Parquet whose bytes may be damaged: what its reader did not think of is a fault of the file like any other.
+//! Reading of possibly damaged Parquet files: a panic of the reader is reported as damage of the file.
 
 use std::cell::Cell;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -7,7 +7,7 @@ thread_local! {
     static GUARDED: Cell<bool> = const { Cell::new(false) };
 }
 
-/// Whether a panic of this thread is one that becomes a fault of a file, so that it is not reported.
+/// Whether a panic of this thread is converted to an error of a file, and therefore not printed.
 #[cfg(feature = "cli")]
 pub fn is_guarded() -> bool {
     GUARDED.get()
@@ -16,7 +16,7 @@ pub fn is_guarded() -> bool {
 /// The result of `read`; `None` if it panics.
 pub fn guarded<T>(read: impl FnOnce() -> T) -> Option<T> {
     GUARDED.set(true);
-    // What a panic leaves half done is gone with it.
+    // The state left by a panic is dropped.
     let done = catch_unwind(AssertUnwindSafe(read));
     GUARDED.set(false);
     done.ok()

@@ -17,15 +17,15 @@ const LABEL_DOC: &str = "label of the row's point, from the file of `points`";
 pub struct Layout {
     /// The axes.
     pub axes: Vec<Quantity>,
-    /// The names of the labels, in the order in which the grid has them.
+    /// The names of the labels, in the order of the grid.
     pub labels: Vec<String>,
     /// The selected columns.
     pub columns: Vec<Column>,
-    /// All of them as Arrow fields.
+    /// All columns as Arrow fields.
     pub schema: SchemaRef,
     /// The units of the values.
     pub units: Units,
-    /// The prediction of a simpler theory for a column.
+    /// The prediction for a column by a simpler theory.
     pub prediction: Option<Prediction>,
 }
 
@@ -61,7 +61,7 @@ impl Layout {
     }
 }
 
-/// The type of words: places in a dictionary.
+/// The Arrow type of words: a dictionary.
 pub fn label() -> DataType {
     DataType::Dictionary(Box::new(DataType::Int32), Box::new(DataType::Utf8))
 }

@@ -1,16 +1,16 @@
-//! The manifest of a dataset: its tables, each with the hash of what it follows from, and the text of the spec.
+//! The manifest of a dataset: its tables, each with the hash of its inputs, and the text of the spec.
 
 use std::ops::Range;
 
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
-/// The program that computes a dataset: programs of different builds never share one.
+/// The build of the program that computes a dataset. Different builds never write to the same dataset.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Build {
     /// Its version.
     pub version: String,
-    /// Its numerics revision: a hash of the sources that numbers follow from, which differ between commits of one version.
+    /// Its numerics revision: a hash of the sources that determine numbers, which may differ between commits of one version.
     pub revision: String,
 }
 
@@ -26,26 +26,26 @@ impl Build {
 pub struct ManifestTable {
     /// Its name, also of its folder.
     pub name: String,
-    /// SHA-256 of all that its rows follow from: grid, model, columns and accuracy. Comments, spacing and description do not enter it, nor do
-    /// other tables.
+    /// SHA-256 of all inputs of its rows: grid, model, columns and accuracy. It does not depend on comments, spacing, description or other
+    /// tables.
     pub hash: String,
-    /// All its rows.
+    /// Number of rows.
     pub rows: u64,
-    /// Its parts.
+    /// Number of parts.
     pub parts: u64,
     /// Rows of every part but the last, which may have fewer.
     pub rows_per_part: u64,
 }
 
 impl ManifestTable {
-    /// The rows of part number `part`; none if there is no such part, whatever a manifest claims.
+    /// The rows of part number `part`; empty if there is no such part, for any contents of a manifest.
     pub fn rows_of(&self, part: u64) -> Range<u64> {
         let start = part.saturating_mul(self.rows_per_part).min(self.rows);
         start..start.saturating_add(self.rows_per_part).min(self.rows)
     }
 }
 
-/// `manifest.json`: what the finished dataset consists of. It is there before the first part, and follows from the spec as well as from the
+/// `manifest.json`: the contents of the complete dataset. It is written before the first part, and can be derived from the spec or from the
 /// parts.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Manifest {
@@ -56,7 +56,7 @@ pub struct Manifest {
     pub build: Build,
     /// The tables, in the order of the spec.
     pub tables: Vec<ManifestTable>,
-    /// The text of the spec; empty if the manifest is lost and the parts do not have it.
+    /// The text of the spec; empty if the manifest is lost and the parts do not contain it.
     pub spec: String,
     /// The reason why the manifest comes from the parts.
     #[serde(skip)]
@@ -69,12 +69,12 @@ impl Manifest {
         self.tables.iter().find(|table| table.name == name)
     }
 
-    /// Whether it has all tables of `other`, the same in everything, by the same program.
+    /// Whether it contains all tables of `other`, with equal entries and the same build.
     pub fn covers(&self, other: &Manifest) -> bool {
         self.build == other.build && other.tables.iter().all(|table| self.table(&table.name) == Some(table))
     }
 
-    /// The bytes of the file: the same for the same manifest. The last entry is the SHA-256 of the text without it.
+    /// The bytes of the file, which depend on the manifest alone. The last entry is the SHA-256 of the other text.
     pub(super) fn to_bytes(&self) -> serde_json::Result<Vec<u8>> {
         let mut text = serde_json::to_vec_pretty(self)?;
         let checksum: String = Sha256::digest(&text).iter().map(|byte| format!("{byte:02x}")).collect();
@@ -83,11 +83,11 @@ impl Manifest {
         Ok(text)
     }
 
-    /// Reads the bytes of the file; every changed bit is found, since only the bytes as they were written are accepted.
+    /// Reads the bytes of the file. Every changed bit is found, since only exactly the written bytes are accepted.
     ///
     /// # Errors
     ///
-    /// In what way they are damaged.
+    /// The kind of damage.
     pub(super) fn from_bytes(bytes: &[u8]) -> Result<Manifest, String> {
         let manifest: Manifest = serde_json::from_slice(bytes).map_err(|error| error.to_string())?;
         match manifest.to_bytes() {

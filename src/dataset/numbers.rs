@@ -1,7 +1,7 @@
-//! Column chunks of numbers, most of which differ: byte stream split, the first bytes of all numbers, then the second ones, …
+//! Column chunks of mostly distinct numbers: byte stream split, that is, the first bytes of all numbers, then the second bytes, …
 //!
-//! Format: <https://parquet.apache.org/docs/file-format/data-pages/encodings/#BYTESTREAMSPLIT>. Of a smooth column the
-//! last two streams, sign, exponent and the head of the mantissa, compress well.
+//! Format: <https://parquet.apache.org/docs/file-format/data-pages/encodings/#BYTESTREAMSPLIT>. In a smooth column, the last two streams (sign,
+//! exponent and leading mantissa bits) compress well.
 
 use multiversion::multiversion;
 use parquet::basic::Encoding;
@@ -10,10 +10,10 @@ use parquet::file::statistics::Statistics;
 use super::chunk::{Chunk, Runs, page};
 use super::dictionary;
 
-/// Numbers that are split at a time: they stay in the first cache while all eight streams are written.
+/// Numbers split in one block. Chosen: they stay in the first-level cache while all eight streams are written.
 const BLOCK: usize = 512;
 
-/// Rows that have a number (1) and rows that have none (0), as runs.
+/// Runs of rows with a number (1) and without one (0).
 pub fn presence(cells: &[f64]) -> Runs {
     let mut runs: Runs = Vec::new();
     let mut push = |code: u32, length: usize| match runs.last_mut() {
@@ -34,7 +34,7 @@ pub fn presence(cells: &[f64]) -> Runs {
     runs
 }
 
-/// A bit a cell: 1 where there is a number.
+/// One bit for each cell: 1 for a number.
 fn present_mask(block: &[f64]) -> u64 {
     block.iter().enumerate().fold(0, |mask, (i, cell)| mask | u64::from(!cell.is_nan()) << i)
 }
@@ -66,11 +66,10 @@ pub fn chunk(cells: &[f64], present: &Runs) -> Chunk {
     }
 }
 
-/// Numbers as they follow each other, and the runs of their places.
+/// Distinct consecutive numbers, and runs of their indices.
 type Repeated = (Vec<f64>, Vec<(usize, usize)>);
 
-/// Numbers that repeat for long, such as the optimal work along a landscape; `None` for a column that is better written
-/// number by number.
+/// Numbers with long runs, such as the optimal work along a landscape; `None` for a column without them.
 fn repeating(values: &[f64]) -> Option<Repeated> {
     let changes_allowed = values.len().div_ceil(16);
     let mut distinct = vec![*values.first()?];
@@ -119,7 +118,7 @@ fn split(values: &[f64], streams: &mut [u8]) -> Option<(f64, f64)> {
 
 /// Statistics of a column of doubles: `range` is its least and greatest value.
 pub fn double_statistics(range: Option<(f64, f64)>, nulls: u64) -> Statistics {
-    // Readers may compare zeros of either sign as equal: the format requests the outer one.
+    // Readers may treat zeros of both signs as equal, so the format requires -0 as least and +0 as greatest value.
     let least = range.map(|(least, _)| if least == 0.0 { -0.0 } else { least });
     let greatest = range.map(|(_, greatest)| if greatest == 0.0 { 0.0 } else { greatest });
     Statistics::double(least, greatest, None, Some(nulls), false)
@@ -127,7 +126,7 @@ pub fn double_statistics(range: Option<(f64, f64)>, nulls: u64) -> Statistics {
 
 #[cfg(test)]
 mod tests {
-    //! Runs, streams and ranges against the plainest code that could be right.
+    //! Runs, streams and ranges against straightforward implementations.
 
     use super::*;
 

@@ -1,4 +1,4 @@
-//! One part: a range of rows as the bytes of a Parquet file.
+//! A part: a range of rows as the bytes of a Parquet file.
 
 use std::sync::Arc;
 
@@ -19,16 +19,16 @@ use crate::grid::RowIndex;
 use crate::protocol::Status;
 use crate::table::{ColumnBuffer, Kind};
 
-/// Rows of a row group: what a reader skips by the statistics of a column.
+/// Rows of a row group, the unit that a reader skips by the statistics of a column.
 const ROWS_PER_GROUP: usize = 1 << 16;
 
-/// Typical bytes of a row of a landscape: the initial buffer of a part.
+/// Typical size of a landscape row, in bytes, for the initial buffer of a part.
 const BYTES_PER_ROW: usize = 9;
 
-/// Strength of compression; see docs/performance.md.
+/// Compression level; see docs/performance-internals.md.
 pub const ZSTD_LEVEL: i32 = 1;
 
-/// The bytes of a part, the same on every machine, with their checksums; and the digest of its rows, which they hold.
+/// The bytes of a part with their checksums, equal on every machine; and the statistics of its rows, which the bytes contain.
 pub fn encode(
     layout: &Layout,
     row_index: &RowIndex,
@@ -85,7 +85,7 @@ pub fn encode(
     Ok((checksum::sealed(file.into_inner()?)?, statistics))
 }
 
-/// A row group in the making, and the columns that it still lacks.
+/// A row group under construction, and its remaining columns.
 struct Group<'a, 'z, Next> {
     writer: SerializedRowGroupWriter<'a, Vec<u8>>,
     next: Next,
@@ -99,18 +99,19 @@ impl<Next: FnMut() -> Option<ColumnDescPtr>> Group<'_, '_, Next> {
         self.writer.append_column(&bytes, close)
     }
 
-    /// Numbers, NaN where there is none.
+    /// Appends a column of numbers; NaN is null.
     fn numbers(&mut self, cells: &[f64]) -> Result<()> {
         self.splice(numbers::chunk(cells, &numbers::presence(cells)))
     }
 
-    /// Indices of `words`, NaN where there is none.
+    /// Appends a column of words, as indices; NaN is null.
     fn labels(&mut self, words: &[&str], cells: &[f64]) -> Result<()> {
         let codes = merge(cells.iter().filter(|cell| !cell.is_nan()).map(|&cell| (cell as u32, 1)));
         self.splice(dictionary::words(words, &codes, Some(&numbers::presence(cells))))
     }
 
-    /// Runs of words, `None` where rows have none. The dictionary has only the words that occur here: a file of points may have millions.
+    /// Appends a column of labels, as runs of words; `None` is null. The dictionary contains only the words of this row group, since a file of
+    /// points may have millions.
     fn label(&mut self, runs: &[(Option<&str>, usize)]) -> Result<()> {
         let words: IndexSet<&str> = runs.iter().filter_map(|(word, _)| *word).collect();
         let code = |word: &str| words.get_index_of(word).map(|place| place as u32);
@@ -126,7 +127,7 @@ impl<Next: FnMut() -> Option<ColumnDescPtr>> Group<'_, '_, Next> {
     }
 }
 
-/// Runs of equal codes, each as long as it can be.
+/// Merges adjacent runs of equal codes.
 fn merge(codes: impl Iterator<Item = (u32, usize)>) -> Runs {
     let mut runs: Runs = Vec::new();
     for (code, rows) in codes {

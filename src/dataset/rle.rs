@@ -1,4 +1,4 @@
-//! Parquet's hybrid of run lengths and bit packing, from runs that are known already.
+//! Parquet's hybrid encoding of run lengths and bit packing, from known runs.
 //!
 //! Format: <https://parquet.apache.org/docs/file-format/data-pages/encodings/#RLE>.
 
@@ -6,7 +6,7 @@
 pub fn encode(runs: impl IntoIterator<Item = (u32, usize)>, bit_width: u8) -> Vec<u8> {
     let mut encoder = Encoder { bytes: Vec::new(), literals: Vec::new(), bit_width };
     for (value, mut length) in runs {
-        // Bit-packed values come in groups of eight: the run fills up the last one.
+        // Bit-packed values come in groups of eight; the run completes the last group.
         let fill = length.min((8 - encoder.literals.len() % 8) % 8);
         encoder.literals.extend(std::iter::repeat_n(value, fill));
         length -= fill;
@@ -70,7 +70,7 @@ impl Encoder {
 
 #[cfg(test)]
 mod tests {
-    //! A straightforward decoder, written from the format's description, gives back what went in.
+    //! A straightforward decoder, written from the description of the format, recovers the input.
 
     use super::*;
 

@@ -1,6 +1,6 @@
-//! A run at work on a dataset: it publishes its manifest so that it replaces no other, and compares the one in place before each part.
+//! A run that writes to a dataset. It publishes its manifest without replacing another one, and compares the current manifest before each part.
 //!
-//! The lock is a courtesy to users alone. That no two specs mix follows from the manifest: the first one in place stays.
+//! The lock only gives an early message. The manifest guarantees that two specs never mix: the first one stays.
 
 use std::fs::{self, File, TryLockError};
 use std::io;
@@ -12,18 +12,18 @@ use super::atomic;
 use super::folder::{DatasetError, Folder, failed, unwritten};
 use super::manifest::Manifest;
 
-/// Times that a manifest is published where another one comes and goes.
+/// Attempts to publish a manifest while another one appears and disappears.
 const ATTEMPTS: usize = 4;
 
-/// A run at work on a dataset.
+/// A run that writes to a dataset.
 #[derive(Debug)]
 pub struct Session {
     folder: Folder,
-    /// The manifest in place.
+    /// The current manifest.
     pub manifest: Manifest,
     /// The tables of this run.
     planned: Manifest,
-    /// The manifest's file when it was last compared.
+    /// The version of the manifest's file at the last comparison.
     seen: Mutex<Option<FileVersion>>,
     _lock: Option<Lock>,
 }
@@ -31,9 +31,9 @@ pub struct Session {
 /// Whether a run allows concurrent runs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Concurrency {
-    /// A run of the whole sweep is alone.
+    /// A run of the whole sweep, which excludes other runs.
     Alone,
-    /// Shards run side by side, one shard twice after a requeue.
+    /// A shard; shards run at the same time, even the same shard after a requeue.
     Shards,
 }
 
@@ -53,12 +53,11 @@ impl FileVersion {
 }
 
 impl Folder {
-    /// Makes the folder ready for the parts of `planned`. A dataset in it that has the same tables and others is left as it is; one that lacks
-    /// some of the tables gets them.
+    /// Prepares the folder for the parts of `planned`. An existing dataset with these tables stays unchanged; missing tables are added to it.
     ///
     /// # Errors
     ///
-    /// If the folder belongs to something else, or another run is at work in it.
+    /// If the folder contains something else, or another run writes to it.
     pub fn open(&self, planned: &Manifest, company: Concurrency) -> Result<Session, DatasetError> {
         self.settle(planned)?;
         let create =
@@ -79,7 +78,7 @@ impl Folder {
         Ok(session)
     }
 
-    /// The manifest that the folder should have for `planned`, and what is to be done for it.
+    /// The manifest that the folder needs for `planned`, and the required action.
     fn settle(&self, planned: &Manifest) -> Result<(Manifest, ManifestAction), DatasetError> {
         let (found, step) = match self.read_manifest() {
             Ok(Some(found)) => (Some(found), ManifestAction::Keep),
@@ -87,7 +86,7 @@ impl Folder {
                 let occupied = fs::read_dir(self.path()).is_ok_and(|entries| {
                     entries.flatten().any(|entry| !entry.file_name().to_string_lossy().starts_with('.'))
                 });
-                // Another run may have published its manifest, the first file with a name, a moment ago.
+                // Another run may just have published its manifest, which is its first file.
                 match self.read_manifest() {
                     Ok(None) if !occupied => (None, ManifestAction::Create),
                     Ok(None) => match self.manifest_of_parts() {
@@ -98,7 +97,7 @@ impl Folder {
                 }
             }
             Err(error @ DatasetError::Manifest { .. }) => match self.manifest_of_parts() {
-                // Nobody can say what the parts belong to.
+                // The origin of the parts is unknown.
                 None if self.has_parts() => return Err(error),
                 found => (found, ManifestAction::Replace),
             },
@@ -118,7 +117,7 @@ impl Folder {
         Ok((settled, step))
     }
 
-    /// Puts the manifest for `planned` in its place, and returns it.
+    /// Publishes the manifest for `planned`, and returns it.
     fn publish(&self, planned: &Manifest) -> Result<Manifest, DatasetError> {
         let path = self.manifest_path();
         for _ in 0..ATTEMPTS {
@@ -154,26 +153,26 @@ impl Folder {
 /// The required action on a manifest.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum ManifestAction {
-    /// The manifest is in place.
+    /// The manifest is up to date.
     Keep,
     /// The manifest is rewritten: new tables, or damage.
     Replace,
-    /// There is none.
+    /// There is no manifest.
     Create,
 }
 
 impl Session {
-    /// Writes a part, whole or not at all, if the dataset is still that of this run.
+    /// Writes a part atomically if the dataset still belongs to this run.
     pub fn write_part(&self, table: &str, part: u64, bytes: &[u8]) -> Result<(), DatasetError> {
         self.check()?;
         self.folder.write_part(table, part, bytes)
     }
 
-    /// Compares the manifest in place with that of this run, if its file has changed.
+    /// Compares the current manifest with that of this run, if its file has changed.
     ///
     /// # Errors
     ///
-    /// If it is not there any more, or is another one.
+    /// If it has been removed or replaced.
     pub fn check(&self) -> Result<(), DatasetError> {
         let stamp = FileVersion::of(&self.folder.manifest_path()).ok();
         let mut seen = self.seen.lock().unwrap_or_else(PoisonError::into_inner);
@@ -200,12 +199,12 @@ struct Lock(File);
 
 impl Drop for Lock {
     fn drop(&mut self) {
-        // A failure leaves the lock to the end of the process.
+        // After a failure the lock lasts until the end of the process.
         let _ = self.0.unlock();
     }
 }
 
-/// The lock of a run on the folder of its dataset; none where folders cannot be locked.
+/// The lock of a run on the folder of its dataset; `None` if folders cannot be locked.
 fn lock(folder: &Path, company: Concurrency) -> Result<Option<Lock>, DatasetError> {
     let Ok(file) = File::open(folder) else { return Ok(None) };
     let locked = match company {
@@ -232,13 +231,13 @@ pub struct Holder {
 }
 
 impl Folder {
-    /// The runs of this machine that are writing the dataset, as far as the system lists them. Takes no lock.
+    /// The runs of this machine that write to the dataset, if the system lists them. Acquires no lock.
     pub fn runs(&self) -> Vec<Holder> {
         File::open(self.path()).map_or_else(|_| Vec::new(), |file| holders(&file))
     }
 }
 
-/// The processes that hold a lock on `file`, as Linux lists them: `1: FLOCK  ADVISORY  WRITE 4711 08:01:131075 0 EOF`.
+/// The processes with a lock on `file`, from the list of Linux: `1: FLOCK  ADVISORY  WRITE 4711 08:01:131075 0 EOF`.
 fn holders(file: &File) -> Vec<Holder> {
     #[cfg(unix)]
     let number = file.metadata().map(|metadata| std::os::unix::fs::MetadataExt::ino(&metadata));

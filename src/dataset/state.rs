@@ -1,22 +1,21 @@
-//! Whether a file is the part that should be there.
+//! The state of a part: whether its file is the expected one and intact.
 
 use std::fs::{self, File};
 use std::io::{self, Read};
-use std::path::{Path, PathBuf};
-use std::sync::Arc;
+use std::path::Path;
 
-use parquet::file::metadata::{KeyValue, ParquetMetaData, ParquetMetaDataReader};
+use parquet::file::metadata::{KeyValue, ParquetMetaData};
 
 use super::checksum;
 use super::footer::{Footer, PREFIX};
 use super::manifest::{Manifest, ManifestTable};
-use super::metadata_limits::check_footer;
+use super::metadata_limits;
 use super::statistics::TableStatistics;
 
 /// The depth of a check.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum CheckDepth {
-    /// Its footer: finds a part that is cut short and one of another origin.
+    /// The footer only: detects truncated and foreign parts.
     Footer,
     /// Every bit, by the checksum.
     Whole,
@@ -24,92 +23,56 @@ pub enum CheckDepth {
 
 /// The state of a part.
 #[derive(Debug, Clone, PartialEq)]
+#[allow(missing_docs)]
 pub enum State {
-    /// Nothing.
+    /// No file.
     Missing,
-    /// The part.
-    There {
-        /// The statistics of its rows.
-        statistics: Box<TableStatistics>,
-    },
-    /// Something that was not made from this spec by this version; it may be of use to somebody.
-    Foreign {
-        /// The differing property.
-        what: &'static str,
-        /// The expected value of the part.
-        expected: String,
-        /// The value of the file.
-        found: String,
-    },
-    /// A part that is broken, of no use to anybody.
-    Damaged {
-        /// In what way.
-        why: String,
-    },
+    /// The expected part.
+    There { statistics: Box<TableStatistics> },
+    /// A file of another spec or version, which may be valuable and is never replaced.
+    Foreign { what: &'static str, expected: String, found: String },
+    /// A damaged part, which a run replaces.
+    Damaged { why: String },
 }
 
-/// A part that was opened, and is the one that should be there.
-#[derive(Debug)]
-pub struct OpenPart {
-    /// Its place.
-    pub path: PathBuf,
-    /// The file.
-    pub file: File,
-    /// Its Parquet footer.
-    pub metadata: Arc<ParquetMetaData>,
-    /// Its footer.
-    pub footer: Footer,
-    /// The statistics of its rows.
-    pub statistics: TableStatistics,
-}
-
-/// Looks at the file in the place of a part, number `part` of `table` in the dataset of `manifest`, which is written in `path`.
+/// The state of part number `part` of `table` in the dataset of `manifest`, whose file is `path`.
 pub fn state(path: &Path, manifest: &Manifest, table: &str, part: u64, look: CheckDepth) -> State {
     let found = match look {
-        CheckDepth::Footer => open_part(path, manifest, table, part).map(|part| part.map(|part| part.statistics)),
-        CheckDepth::Whole => whole(path).and_then(|entries| {
-            entries
-                .map(|entries| belongs(&entries, manifest, table, part).map(|(_, statistics)| statistics))
-                .transpose()
-        }),
+        CheckDepth::Footer => sealed_entries(path),
+        CheckDepth::Whole => whole(path),
     };
-    match found {
+    let statistics = found.and_then(|entries| match entries {
+        Some(entries) => belongs(&entries, manifest, table, part).map(Some),
+        None => Ok(None),
+    });
+    match statistics {
         Ok(Some(statistics)) => State::There { statistics: Box::new(statistics) },
         Ok(None) => State::Missing,
         Err(state) => state,
     }
 }
 
-/// Opens the file in the place of a part if it is the part that should be there; `None` if there is none.
-///
-/// # Errors
-///
-/// [`State::Foreign`] or [`State::Damaged`].
-pub fn open_part(path: &Path, manifest: &Manifest, table: &str, part: u64) -> Result<Option<OpenPart>, State> {
+/// The entries of the footer of a file, if footer and page headers are as they were written; `None` if there is no file.
+fn sealed_entries(path: &Path) -> Result<Option<Vec<KeyValue>>, State> {
     let Some(file) = open(path)? else { return Ok(None) };
     let metadata = metadata(&file)?;
     let entries = entries(&metadata);
     match checksum::is_head_intact(&file, &metadata) {
-        Ok(Some(true)) => {}
+        Ok(Some(true)) => Ok(Some(entries)),
         Ok(None) if Footer::from_entries(&entries).is_none() => {
-            return Err(stranger("a Parquet file that slipsweep did not write"));
+            Err(stranger("a Parquet file that slipsweep did not write"))
         }
-        Ok(_) => return damaged("the checksum of its footer and page headers does not match"),
-        Err(error) => return damaged(&error.to_string()),
+        Ok(_) => damaged("the checksum of its footer and page headers does not match"),
+        Err(error) => damaged(&error.to_string()),
     }
-    let (footer, statistics) = belongs(&entries, manifest, table, part)?;
-    Ok(Some(OpenPart { path: path.to_owned(), file, metadata: metadata.into(), footer, statistics }))
 }
 
 /// The footer of a part, if it is intact.
 pub fn footer_of(path: &Path) -> Option<Footer> {
-    let file = open(path).ok()??;
-    let metadata = metadata(&file).ok()?;
-    let sound = checksum::is_head_intact(&file, &metadata).ok()??;
-    if sound { Footer::from_entries(&entries(&metadata)) } else { None }
+    Footer::from_entries(&sealed_entries(path).ok()??)
 }
 
-/// The file in `path`. What is no file is not opened: a named pipe would wait for somebody who writes, a device might never end.
+/// Opens the file in `path`. Only plain files are opened: a named pipe would wait for a writer, and a device might never end.
 fn open(path: &Path) -> Result<Option<File>, State> {
     let opened = fs::metadata(path).and_then(|metadata| match metadata.file_type() {
         kind if kind.is_file() => File::open(path).map(Ok),
@@ -134,7 +97,7 @@ fn whole(path: &Path) -> Result<Option<Vec<KeyValue>>, State> {
     match checksum::is_intact(&bytes) {
         Some(true) => metadata(&bytes).map(|metadata| Some(entries(&metadata))),
         Some(false) => damaged("its checksum does not match its bytes"),
-        // Either the checksum is broken, or the file is somebody else's.
+        // Either the checksum is damaged, or the file is foreign.
         None => match metadata(&bytes).map(|metadata| entries(&metadata)) {
             Ok(entries) if !entries.iter().any(|entry| entry.key.starts_with(PREFIX)) => Ok(Some(entries)),
             Ok(_) => damaged("it has no checksum"),
@@ -157,22 +120,15 @@ fn damaged<T>(why: &str) -> Result<T, State> {
 }
 
 fn metadata<R: parquet::file::reader::ChunkReader>(file: &R) -> Result<ParquetMetaData, State> {
-    check_footer(file)
-        .and_then(|()| ParquetMetaDataReader::new().parse_and_finish(file))
-        .or_else(|error| damaged(&format!("it is cut short or not Parquet: {error}")))
+    metadata_limits::footer(file).or_else(|error| damaged(&format!("it is cut short or not Parquet: {error}")))
 }
 
 fn entries(metadata: &ParquetMetaData) -> Vec<KeyValue> {
     metadata.file_metadata().key_value_metadata().cloned().unwrap_or_default()
 }
 
-/// The footer of a file, if it matches the expected part.
-fn belongs(
-    entries: &[KeyValue],
-    manifest: &Manifest,
-    table: &str,
-    part: u64,
-) -> Result<(Footer, TableStatistics), State> {
+/// The statistics in the footer of a file, if it is that of the expected part.
+fn belongs(entries: &[KeyValue], manifest: &Manifest, table: &str, part: u64) -> Result<TableStatistics, State> {
     let foreign = |what, expected: &str, found: &str| {
         Err(State::Foreign { what, expected: expected.to_owned(), found: found.to_owned() })
     };
@@ -199,6 +155,6 @@ fn belongs(
         let show = |rows: &std::ops::Range<u64>| format!("rows {} to {}", rows.start, rows.end);
         foreign("place in the table", &rows.as_ref().map(show).unwrap_or_default(), &show(&found.rows))
     } else {
-        Ok((found, statistics))
+        Ok(statistics)
     }
 }

@@ -1,7 +1,7 @@
-//! A table in a few numbers: how many rows of which status, ranges, and where a quantity is least.
+//! Statistics of a table: rows by status, ranges of columns, and rows of least gap.
 //!
-//! The digest of a part is made when it is encoded, and kept in its footer. Digests add up: in any order, those of the parts give that of the
-//! table, so that nobody reads the rows of a table for its summary.
+//! The statistics of a part are computed when it is encoded, and stored in its footer. Merged in any order, they give the statistics of the
+//! table, so that a summary reads no rows.
 
 use std::ops;
 
@@ -17,25 +17,25 @@ use crate::protocol::Status;
 use crate::protocol::shortcut::FAMILIES;
 use crate::table::{ColumnBuffer, Kind, OPTIMUM_AXES};
 
-/// Tables of at most this many rows are kept whole, and least values are distinguished for at most this many transitions.
+/// Greatest number of rows of a table whose rows are all kept, and of transitions with separate least gaps.
 pub const FEW: usize = 12;
 
-/// The column whose least values are looked for.
+/// The column whose least values are recorded.
 const GAP: &str = "gap";
 
 /// The statistics of some rows of a table.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct TableStatistics {
-    /// Rows by status, in the order of [`Status::ALL`]. A footer has an entry of its own for them.
+    /// Rows by status, in the order of [`Status::ALL`]. A footer has a separate entry for them.
     #[serde(skip)]
     pub status: StatusCounts,
-    /// All columns of the table: name and unit, which is empty for words.
+    /// All columns of the table: name and unit, empty for words.
     pub columns: Vec<(String, String)>,
     /// The columns of numbers after the axes.
     pub ranges: Vec<Range>,
-    /// The columns of words after the axes: each word that occurs, and its rows.
+    /// The columns of words after the axes: each word and its number of rows.
     pub words: Vec<(String, Counts)>,
-    /// The labels: each word that occurs, and its rows; `None` if there are more than [`FEW`] words.
+    /// The labels: each word and its number of rows; `None` for more than [`FEW`] words.
     #[serde(default)]
     pub labels: Vec<(String, Option<Counts>)>,
     /// Counts of predicted and found words, for a column with a prediction.
@@ -46,7 +46,7 @@ pub struct TableStatistics {
     least: LeastGaps,
 }
 
-/// Words and how many rows have each, in the order of words.
+/// Words and their numbers of rows, in the order of words.
 pub type Counts = Vec<(String, u64)>;
 
 /// The values of a column.
@@ -54,12 +54,12 @@ pub type Counts = Vec<(String, u64)>;
 pub struct Range {
     /// Its name.
     pub column: String,
-    /// Rows that have a value.
+    /// Number of rows with a value.
     pub count: u64,
-    /// The least.
+    /// The least value.
     #[serde(with = "exact")]
     pub least: f64,
-    /// The greatest.
+    /// The greatest value.
     #[serde(with = "exact")]
     pub greatest: f64,
 }
@@ -69,33 +69,33 @@ pub struct Range {
 pub struct Row {
     /// Its number in the table.
     pub number: u64,
-    /// Its cells, one a column.
+    /// Its cells, one for each column.
     pub cells: Vec<Cell>,
 }
 
-/// The rows of least gap with status `ok`, of protocols that arrive.
+/// The rows of least gap with status `ok`, of protocols that reach the final state.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 struct LeastGaps {
-    /// Whether there are too many transitions to distinguish them: then the least of all is the only one here.
+    /// Whether there are too many transitions for separate least gaps: then only the least of all is recorded.
     many: bool,
-    /// One a transition and time, in the order of their first rows.
+    /// One for each transition and duration, in the order of their first rows.
     each: Vec<LeastGapRow>,
 }
 
 /// A row of least gap.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 struct LeastGapRow {
-    /// The first row of its transition and time that has status `ok`.
+    /// The first row of its transition and duration with status `ok`.
     first: u64,
     row: Row,
 }
 
 impl TableStatistics {
-    /// The digest of `rows`, whose cells are in `buffer`.
+    /// The statistics of `rows`, whose cells are in `buffer`.
     ///
     /// # Errors
     ///
-    /// A sheet that does not fit the layout.
+    /// If the buffer does not fit the layout.
     pub fn of(
         layout: &Layout,
         row_index: &RowIndex,
@@ -134,7 +134,7 @@ impl TableStatistics {
         Ok(statistics)
     }
 
-    /// The digest of the rows of both. The order does not matter, nor how many are merged at a time.
+    /// The statistics of both sets of rows. The order and grouping of merges do not matter.
     pub fn merge(mut self, other: TableStatistics) -> TableStatistics {
         if self.columns.is_empty() {
             return other;
@@ -168,7 +168,8 @@ impl TableStatistics {
         self
     }
 
-    /// The row of least gap with status `ok`, of a protocol that arrives, of each transition and time; the least of all if those are many.
+    /// The row of least gap of each transition and duration, with status `ok` and of a protocol that reaches the final state; only the least of
+    /// all if there are many.
     pub fn least(&self) -> impl Iterator<Item = &Row> {
         self.least.each.iter().map(|candidate| &candidate.row)
     }
@@ -188,7 +189,7 @@ impl Row {
 
 impl Range {
     fn of(column: &str, cells: &[f64]) -> Range {
-        /// Values that are compared side by side, so that the compiler can use vector instructions.
+        /// Values compared side by side, so that the compiler uses vector instructions.
         const LANES: usize = 8;
         let (mut count, mut least, mut greatest) = (0, [f64::INFINITY; LANES], [f64::NEG_INFINITY; LANES]);
         for chunk in cells.chunks(LANES) {
@@ -213,7 +214,7 @@ fn add(counts: &mut Counts, word: &str, rows: u64) {
     }
 }
 
-/// The words of a label in these runs, and how many rows have each; `None` if they are not few.
+/// The words of a label in these runs and their numbers of rows; `None` if there are more than [`FEW`].
 fn labelled(runs: &[(Option<&str>, usize)]) -> Option<Counts> {
     let mut counts = Counts::new();
     for (word, rows) in runs.iter().filter_map(|(word, rows)| Some(((*word)?, *rows))) {
@@ -239,7 +240,7 @@ fn counts(words: &[&str], cells: &[f64]) -> Counts {
     counts
 }
 
-/// Counts `rows` in which `predicted` was predicted and `found` was found.
+/// Adds `rows` rows with the prediction `predicted` and the result `found`.
 fn count(counts: &mut Vec<(String, String, u64)>, predicted: &str, found: &str, rows: u64) {
     match counts.binary_search_by(|(p, f, _)| (p.as_str(), f.as_str()).cmp(&(predicted, found))) {
         Ok(place) => counts[place].2 += rows,
@@ -283,7 +284,7 @@ fn is_key(name: &str, has_family: bool) -> bool {
     name != axis.name() && (name == Quantity::Family.name() || OPTIMUM_AXES.iter().any(|axis| axis.name() == name))
 }
 
-/// The first row of `stretch` with status `ok`, and the one of least gap.
+/// The first row of `stretch` with status `ok`, and the row of least gap.
 fn least_in(stretch: ops::Range<usize>, gaps: &[f64], status: &[Status]) -> Option<(usize, usize)> {
     let mut rows = stretch.filter(|&row| status[row] == Status::Ok && !gaps[row].is_nan());
     let first = rows.next()?;
@@ -293,8 +294,8 @@ fn least_in(stretch: ops::Range<usize>, gaps: &[f64], status: &[Status]) -> Opti
 /// The key of a transition, its first row with status `ok` and its row of least gap.
 type LeastGapRows = (Vec<f64>, usize, usize);
 
-/// Whether there are many transitions; and of each, or of all if they are many, the first row with status `ok` and the row of least gap, as
-/// places in `buffer`.
+/// Whether there are many transitions; and for each, or for all if there are many, the first row with status `ok` and the row of least gap, as
+/// indices in `buffer`.
 fn least(
     layout: &Layout,
     view: &View<'_>,
@@ -306,7 +307,7 @@ fn least(
     let has_family = layout.axes.contains(&Quantity::Family);
     let keys = layout.axes.iter().filter(|axis| is_key(axis.name(), has_family));
     let keys: Vec<_> = keys.filter_map(|axis| Some((*axis, view.runs(*axis, rows.clone())?))).collect();
-    // The runs of every key that are not over yet: its value, and the place at which it ends.
+    // The current run of every key: its value and its end.
     let mut runs: Vec<_> = keys.iter().map(|(_, runs)| (runs.over(rows.clone()), f64::NAN, 0)).collect();
     let family = keys.iter().position(|(axis, _)| *axis == Quantity::Family);
     let (mut many, mut found) = (false, Vec::<LeastGapRows>::new());
@@ -349,13 +350,13 @@ fn least(
         }
     }
     if many {
-        // Where they are not distinguished, the first row is that of the least gap.
+        // Without distinction, the first row is the row of least gap.
         found.iter_mut().for_each(|(_, first, least)| *first = *least);
     }
     (many, found.into_iter().map(|(_, first, least)| (first, least)).collect())
 }
 
-/// Row number `number` of the table, the cells of which are at `place` in `buffer`.
+/// Row number `number` of the table, whose cells are at index `place` of `buffer`.
 fn row(
     layout: &Layout,
     row_index: &RowIndex,
@@ -373,7 +374,7 @@ impl LeastGaps {
         let place = |name: &str| columns.iter().position(|(column, _)| column == name);
         let Some(gap) = place(GAP) else { return self };
         let value = |row: &Row| row.cell(gap).number().unwrap_or(f64::INFINITY);
-        // Of equal gaps, that of the first row.
+        // Of equal gaps, the first row counts.
         let is_less = |one: &Row, other: &Row| {
             value(one) < value(other) || (value(one) == value(other) && one.number < other.number)
         };

@@ -1,4 +1,4 @@
-//! A survey of a dataset: which parts are there, and what is in the place of the others.
+//! A survey of a dataset: present, missing, damaged and foreign parts.
 
 use std::ops::Range;
 use std::path::PathBuf;
@@ -16,9 +16,9 @@ use super::statistics::TableStatistics;
 pub struct Survey {
     /// Its tables, in the order of the manifest.
     pub tables: Vec<TableSurvey>,
-    /// Temporary files of runs that were killed or are under way.
+    /// Temporary files of killed or active runs.
     pub temporary: Vec<PathBuf>,
-    /// Files that are no part of the dataset.
+    /// Files that do not belong to the dataset.
     pub others: Vec<PathBuf>,
 }
 
@@ -27,36 +27,36 @@ pub struct Survey {
 pub struct TableSurvey {
     /// Its name.
     pub name: String,
-    /// Its rows.
+    /// Number of rows.
     pub rows: u64,
-    /// Its parts.
+    /// Number of parts.
     pub parts: u64,
-    /// Parts that are there.
+    /// Number of present parts.
     pub there: u64,
-    /// Parts that are not, as ranges of their numbers.
+    /// Missing parts, as ranges of their numbers.
     pub missing: Vec<Range<u64>>,
-    /// Parts that are damaged, and in what way.
+    /// Damaged parts, with the kind of damage.
     pub damaged: Vec<(u64, String)>,
-    /// Parts whose place is taken by something else: in what it differs, what was expected and what was found.
+    /// Foreign parts: the differing property, the expected and the found value.
     pub foreign: Vec<(u64, [String; 3])>,
     /// The statistics of the existing parts.
     pub statistics: TableStatistics,
 }
 
-/// Parts that are looked at before what they contain is added up, so that the memory does not grow with the dataset.
+/// Parts inspected before their statistics are merged, so that memory does not grow with the dataset.
 const LOOKED_AT_TOGETHER: usize = 1 << 10;
 
 impl TableSurvey {
-    /// Whether part number `part` is there.
+    /// Whether part number `part` is present.
     pub fn has(&self, part: u64) -> bool {
-        // All three are in the order of parts.
+        // All three lists are in the order of parts.
         let after = self.missing.partition_point(|range| range.end <= part);
         !self.missing.get(after).is_some_and(|range| range.contains(&part))
             && self.damaged.binary_search_by_key(&part, |(damaged, _)| *damaged).is_err()
             && self.foreign.binary_search_by_key(&part, |(foreign, _)| *foreign).is_err()
     }
 
-    /// Notes parts that are missing, beyond all that were.
+    /// Records missing parts; they must follow all recorded ones.
     fn miss(&mut self, parts: Range<u64>) {
         match self.missing.last_mut() {
             _ if parts.is_empty() => {}
@@ -67,9 +67,10 @@ impl TableSurvey {
 }
 
 impl Survey {
-    /// Surveys the dataset of `manifest` in `folder`, with a look of this kind at every part, once, on all processors; `looked` counts the parts.
+    /// Surveys the dataset of `manifest` in `folder`: inspects every part to the depth `look`, on all processors; `looked` counts the inspected
+    /// parts.
     pub fn new(folder: &Folder, manifest: &Manifest, look: CheckDepth, looked: &AtomicU64) -> Survey {
-        // Where no threads can be had, this one looks alone.
+        // Without further threads, this one does all the work.
         let pool = rayon::ThreadPoolBuilder::new().build().ok();
         let tables = manifest.tables.iter().map(|table| {
             let mut survey = TableSurvey {
@@ -103,7 +104,7 @@ impl Survey {
                         survey.there += 1;
                         survey.statistics = std::mem::take(&mut survey.statistics).merge(*statistics);
                     }
-                    // It went away a moment ago.
+                    // It was just removed.
                     State::Missing => survey.miss(part..part + 1),
                     State::Damaged { why } => survey.damaged.push((part, why)),
                     State::Foreign { what, expected, found } => {
@@ -121,7 +122,7 @@ impl Survey {
         Survey { tables, temporary: paths(temporary), others: paths(others) }
     }
 
-    /// Whether every part is there.
+    /// Whether every part is present.
     pub fn is_complete(&self) -> bool {
         self.tables.iter().all(|table| table.there == table.parts)
     }

@@ -34,10 +34,10 @@ impl Transition {
     pub fn ageing_time(&self) -> f64 {
         let &Transition { v_i, v_f, .. } = self;
         if v_i < v_f {
-            // The first factor may be as small as rounding.
+            // The difference of the velocities may be as small as rounding.
             return -ln_1p((v_f - v_i) / v_f / (v_i - 1.0));
         }
-        // The operations of the optimum's hold, so that both are the same double.
+        // The same operations as for the optimum's time at the floor, so that both give the same double.
         let (fall, rest) = ((v_i - v_f) / v_i, (v_f - 1.0) / v_f);
         ln_1p(fall * (1.0 / v_f) / rest)
     }

@@ -1,4 +1,4 @@
-//! Cubic polynomials on an interval: their least value, decided without doubt about its sign, and their zeros.
+//! Cubic polynomials on an interval: the least value, with a certain sign, and the zeros.
 
 use super::double_double::DoubleDouble;
 use super::real::Real;
@@ -32,7 +32,7 @@ impl Cubic {
         lower(lower(self.c[0], self.at(1.0)), self.at(self.minimum()))
     }
 
-    /// Where on `[0, 1]` the least value is, and that value.
+    /// The position of the least value on `[0, 1]`, and this value.
     #[inline(always)]
     pub fn lowest(&self) -> (f64, f64) {
         let inside = self.minimum();
@@ -84,13 +84,13 @@ impl ExactCubic {
         c0 + x * (c1 + x * (c2 + x * c3))
     }
 
-    /// The stationary minimum if it lies inside `(0, 1)`, else 0; from coefficients right to the last bit of a double.
+    /// The stationary minimum if it lies inside `(0, 1)`, else 0. The coefficients are accurate to the last bit of a double.
     pub fn minimum(&self) -> f64 {
         Cubic { c: self.c.map(|c| c.high) }.minimum()
     }
 
-    /// Whether the cubic is above 0 (`strict`) or at least 0 everywhere on `[0, 1]`. The place of its minimum in double
-    /// is good enough, since the value there depends on the square of its error.
+    /// Whether the cubic is above 0 (`strict`) or at least 0 everywhere on `[0, 1]`. The position of the minimum in double precision suffices,
+    /// since the value there depends on the square of its error.
     pub fn is_positive(&self, strict: bool) -> bool {
         [0.0, 1.0, self.minimum()].iter().all(|&x| {
             let value = self.at(x).high;
@@ -98,11 +98,11 @@ impl ExactCubic {
         })
     }
 
-    /// The zeros, one of a conjugate pair and its mate alike: real parts with digits enough for distances from anywhere, and
-    /// the distances from the real axis, at least 0. Those that are infinite come out as no numbers or very large.
+    /// The zeros as real part and distance from the real axis; both zeros of a conjugate pair have the same entry. Real parts have enough digits
+    /// for differences with any point. Infinite zeros are NaN or very large.
     pub fn zeros(&self) -> [(DoubleDouble, f64); 3] {
         let rough = cubic_zeros(self.c.map(|c| c.high));
-        // The real one farthest from the others, in proportion, is a simple one; what is left is a quadratic.
+        // The real zero farthest from the others, relatively, is simple. Division by it leaves a quadratic.
         let apart = |k: usize| {
             let distance = |j: usize| (rough.re[j] - rough.re[k]).hypot(rough.im[j]) / rough.re[k].abs();
             let others = (0..3).filter(|&j| j != k).map(distance).fold(f64::INFINITY, f64::min);
@@ -139,7 +139,7 @@ impl ExactCubic {
     }
 }
 
-/// A simple real zero near `x`, by Newton's method.
+/// The simple real zero near `x`, by Newton's method.
 fn refined([c0, c1, c2, c3]: [DoubleDouble; 4], x: f64) -> DoubleDouble {
     let mut x = DoubleDouble::new(x);
     let mut last = f64::INFINITY;
@@ -147,7 +147,7 @@ fn refined([c0, c1, c2, c3]: [DoubleDouble; 4], x: f64) -> DoubleDouble {
         let value = c0 + x * (c1 + x * (c2 + x * c3));
         let slope = c1.high + x.high * (2.0 * c2.high + 3.0 * x.high * c3.high);
         let step = value.high / slope;
-        // Steps shrink until they are rounding.
+        // Steps shrink down to rounding.
         if step.is_nan() || step.abs() >= last {
             break;
         }
@@ -157,10 +157,10 @@ fn refined([c0, c1, c2, c3]: [DoubleDouble; 4], x: f64) -> DoubleDouble {
     x
 }
 
-/// More steps than halving the error each time would take.
+/// Greatest number of steps. Chosen: more than bisection would need.
 const MOST_STEPS: u32 = 120;
 
-/// As [`ExactCubic::zeros`], of `c + b x + a x^2`.
+/// The zeros of `c + b x + a x^2`, in the form of [`ExactCubic::zeros`].
 pub fn exact_quadratic_zeros([c, b, a]: [DoubleDouble; 3]) -> [(DoubleDouble, f64); 2] {
     let half = DoubleDouble::new(-0.5) * b;
     let discriminant = half * half - a * c;
@@ -184,14 +184,13 @@ pub struct Zeros<const N: usize, T = f64> {
     pub im: [T; N],
 }
 
-/// `cos(acos(c)/3)` on `0 <= c <= 1` in powers of `c`: Chebyshev interpolant, good to 5e-6; one Newton step follows.
+/// `cos(acos(c)/3)` on `0 <= c <= 1` in powers of `c`: Chebyshev interpolant with an error of 5e-6; one Newton step follows.
 const TRISECTION: [f64; 5] =
     [0.8660304320226909, 0.1664117217875963, -0.04592193313076373, 0.01751218857520906, -0.004035398716654312];
 
 /// The zeros of `d[0] + d[1] s + d[2] s^2 + d[3] s^3` with `d[0] > 0`, without branches, to a few digits.
 ///
-/// Found as reciprocals, so that a vanishing leading coefficient only sends a zero to infinity: it comes out very large
-/// or infinite.
+/// The reciprocals are computed, so that a vanishing leading coefficient gives a very large or infinite zero.
 #[inline(always)]
 pub fn cubic_zeros<T: Real>(d: [T; 4]) -> Zeros<3, T> {
     let [zero, half, one, two, three, four, twelve, a_third] = [0.0, 0.5, 1.0, 2.0, 3.0, 4.0, 12.0, THIRD].map(T::of);
@@ -204,8 +203,8 @@ pub fn cubic_zeros<T: Real>(d: [T; 4]) -> Zeros<3, T> {
     let size = big_r.abs();
     let excess = size * size - big_q * big_q * big_q;
     let single = excess > zero;
-    // One real zero: Cardano, in the form whose terms all have one sign. Three: Viete, the one of largest distance from
-    // the mean. Both are fractions of fractions, so that one lane divides for the one it needs.
+    // One real zero: Cardano's formula, in the form whose terms have equal signs. Three real zeros: Viète's formula for the zero farthest from
+    // the mean. Both are nested fractions, so that each lane divides only once.
     let cube = size + (if single { excess } else { zero }).sqrt() + T::TINY;
     let s = cube.cube_root();
     let root = (if big_q > zero { big_q } else { zero }).sqrt() + T::TINY;
@@ -220,8 +219,7 @@ pub fn cubic_zeros<T: Real>(d: [T; 4]) -> Zeros<3, T> {
     let u = if big_r > zero { -u } else { u };
     let y = u - third;
     let inverse = one / y;
-    // The quadratic that is left, y^2 - 2 mean y + product: divided from the low end for a large zero, from the high
-    // end for a small one.
+    // The remaining quadratic, y^2 - 2 mean y + product: divided from the low end for a large zero, from the high end for a small one.
     let large = (y * y * y).abs() > r.abs();
     let rest = three * third + y;
     let product = if large { -r * inverse } else { q + y * rest };
@@ -239,8 +237,7 @@ pub fn cubic_zeros<T: Real>(d: [T; 4]) -> Zeros<3, T> {
     }
 }
 
-/// The zeros of `c + b x + a x^2`, without branches and without cancellation; those at infinity come out very large,
-/// infinite or NaN.
+/// The zeros of `c + b x + a x^2`, without branches and without cancellation; zeros at infinity are very large, infinite or NaN.
 #[inline(always)]
 pub fn quadratic_zeros<T: Real>([c, b, a]: [T; 3]) -> Zeros<2, T> {
     let zero = T::of(0.0);

@@ -17,9 +17,8 @@ const BERNOULLI: [f64; 9] = [
 
 /// `Li_2(x) = -int_0^x ln(1 - y)/y dy` for `x <= 1`, to a few units in the last place.
 ///
-/// From -1 to one half a series in `-ln(1 - x)`; above it Euler's reflection, `Li_2(x) + Li_2(1 - x)` equals
-/// `pi^2/6 - ln x ln(1 - x)`; below -1 the inversion, `Li_2(x) + Li_2(1/x)` equals `-pi^2/6 - ln(-x)^2/2` (DLMF 25.12.4
-/// and 25.12.6).
+/// From -1 to one half it is a series in `-ln(1 - x)`; above, Euler's reflection, `Li_2(x) + Li_2(1 - x)` equals `pi^2/6 - ln x ln(1 - x)`;
+/// below -1 the inversion, `Li_2(x) + Li_2(1/x)` equals `-pi^2/6 - ln(-x)^2/2` (DLMF 25.12.4 and 25.12.6).
 pub fn dilogarithm(x: f64) -> f64 {
     if x < -1.0 {
         let l = ln(-x);

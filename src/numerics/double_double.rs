@@ -1,5 +1,4 @@
-//! Double-double arithmetic: an unevaluated sum of two doubles, about 32 digits, for the few places that need the last
-//! bit.
+//! Double-double arithmetic: an unevaluated sum of two doubles, about 32 digits, for the few operations that need the last bit.
 //!
 //! Error-free transformations after Dekker (Numer. Math. 18, 224, 1971) and Knuth (TAOCP 2, 4.2.2), without fused
 //! multiply-add.
@@ -11,7 +10,7 @@ use std::ops::{Add, Div, Mul, Neg, Sub};
 pub struct DoubleDouble {
     /// The nearest double.
     pub high: f64,
-    /// What it lacks.
+    /// The remainder.
     pub low: f64,
 }
 
@@ -36,7 +35,7 @@ impl DoubleDouble {
         DoubleDouble { high, low: ((x1 * y1 - high) + x1 * y2 + x2 * y1) + x2 * y2 }
     }
 
-    /// The square root of what is not negative.
+    /// The square root of a number that is not negative.
     pub fn sqrt(self) -> Self {
         let root = Self::new(self.high.sqrt());
         if self.high > 0.0 { root + (self - root * root) / (root + root) } else { Self::new(0.0) }

@@ -58,14 +58,14 @@ pub fn ln_1p(x: f64) -> f64 {
 #[inline(always)]
 pub fn ln_grown(x: f64, inverse: f64) -> f64 {
     let sum = 1.0 + x;
-    // What the sum lost, exactly (two-sum), relative to it.
+    // The exact rounding error of the sum (two-sum), relative to the sum.
     let carried = sum - 1.0;
     let lost = (1.0 - (sum - carried)) + (x - carried);
     let (exponent, mantissa) = split(sum);
     assemble(exponent, mantissa - 1.0, lost * inverse)
 }
 
-/// Natural logarithm of a positive normal number to 1e-4: enough for a number of nodes.
+/// Natural logarithm of a positive normal number with an error of 1e-4: sufficient to count nodes.
 #[inline(always)]
 pub fn rough_ln(x: f64) -> f64 {
     let (exponent, mantissa) = split(x);
@@ -79,17 +79,17 @@ pub fn exp(x: f64) -> f64 {
     exp_and_m1(x).0
 }
 
-/// `e^x` as [`exp`] and `e^x - 1` as exact as [`exp_m1`], in little more time than one of them.
+/// `e^x` and `e^x - 1` with the accuracy of [`exp`] and [`exp_m1`], in little more time than one of them.
 #[inline(always)]
 pub fn exp_and_m1(x: f64) -> (f64, f64) {
     let x = clamp(x, -760.0, 720.0);
     let (turns, high, low) = reduce(x);
     let r = high - low;
     let value = high + (r * r * polynomial(&EXP, r) - low);
-    // Two factors, because 2^k itself may leave the range.
+    // Two factors, since 2^k itself may overflow or underflow.
     let half = (0.5 * turns + ROUND) - ROUND;
     let exp = (1.0 + value) * power_of_two(half) * power_of_two(turns - half);
-    // Within a factor of 2 of 1 the power is 1/2, 1 or 2, and exact; beyond, the difference loses nothing.
+    // Within a factor of 2 of 1 the power is 1/2, 1 or 2, and exact; beyond, the difference does not cancel.
     let near = x > -0.6 && x < 0.6;
     let power = power_of_two(if near { turns } else { 0.0 });
     (exp, if near { power * value + (power - 1.0) } else { exp - 1.0 })
@@ -103,7 +103,7 @@ pub fn exp_m1(x: f64) -> f64 {
     let (turns, high, low) = reduce(x);
     let r = high - low;
     let value = high + (r * r * polynomial(&EXP, r) - low);
-    // 2^k (value + 1) - 1, with half the power first so that e^709 stays finite on the way.
+    // 2^k (value + 1) - 1, with half the power first, so that no intermediate value overflows.
     let half_power = power_of_two(clamp(turns, -100.0, 1024.0) - 1.0);
     let result = 2.0 * (half_power * value + (half_power - 0.5));
     if turns > 1024.0 { f64::INFINITY } else { result }
@@ -150,12 +150,12 @@ fn clamp(x: f64, low: f64, high: f64) -> f64 {
     if x > high { high } else { x }
 }
 
-/// `c[0] + c[1] x + c[2] x^2 + …`, of two terms or more; even and odd powers apart, which halves
-/// the chain of dependent operations.
+/// `c[0] + c[1] x + c[2] x^2 + …`, with at least two terms. Even and odd powers are summed separately, which halves the chain of dependent
+/// operations.
 #[inline(always)]
 pub(crate) fn polynomial<const N: usize>(c: &[f64; N], x: f64) -> f64 {
     let square = x * x;
-    // The last power of either kind.
+    // The highest even and odd power.
     let (mut even, mut odd) = if N % 2 == 1 { (c[N - 1], c[N - 2]) } else { (c[N - 2], c[N - 1]) };
     for i in (0..N - 2).rev() {
         if i % 2 == 0 {

@@ -4,7 +4,7 @@ use std::sync::OnceLock;
 
 use super::double_double::DoubleDouble;
 
-/// Largest rule that is kept.
+/// Nodes of the largest rule.
 pub const MOST_NODES: usize = 512;
 
 /// Nodes and weights: `int_-1^1 f dx = sum w f(x)`, exact for polynomials of degree `2n - 1`.
@@ -16,15 +16,14 @@ pub struct Rule {
     pub w: Vec<f64>,
 }
 
-/// The rule with `n` nodes, made at its first use; `n` is taken into `1 ..= MOST_NODES`.
+/// The rule with `n` nodes, computed at its first use; `n` is clamped to `1 ..= MOST_NODES`.
 pub fn rule(n: usize) -> &'static Rule {
     static RULES: [OnceLock<Rule>; MOST_NODES] = [const { OnceLock::new() }; MOST_NODES];
     let n = n.clamp(1, MOST_NODES);
     RULES[n - 1].get_or_init(|| make(n))
 }
 
-/// Newton's method from Tricomi's estimate, the last step in double-double, so that rounding it gives the nearest
-/// doubles.
+/// Newton's method from Tricomi's estimate. The last step uses double-double, so that the rounded nodes are the nearest doubles.
 fn make(n: usize) -> Rule {
     let (mut x, mut w) = (vec![0.0; n], vec![0.0; n]);
     for i in 0..n.div_ceil(2) {
@@ -41,7 +40,7 @@ fn make(n: usize) -> Rule {
         let (p, derivative) = legendre(n, t);
         let step = -(p / derivative);
         let node = t + step;
-        // P'' from Legendre's equation carries P' to the new node.
+        // P'' from Legendre's equation extrapolates P' to the new node.
         let count = DoubleDouble::new((n * (n + 1)) as f64);
         let second = (DoubleDouble::new(2.0) * t * derivative - count * p) / (one - t * t);
         let slope = derivative + step * second;
@@ -68,29 +67,28 @@ fn legendre(n: usize, x: DoubleDouble) -> (DoubleDouble, DoubleDouble) {
     (p, derivative)
 }
 
-/// A Gauss rule of an even number of nodes with what it takes to integrate a product of a function and a primitive of
-/// another one.
+/// A Gauss rule with an even number of nodes, and the matrix that integrates the product of a function and the primitive of another one.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Primitive {
     /// Positive nodes, rising.
     pub x: Vec<f64>,
     /// Their weights.
     pub w: Vec<f64>,
-    /// The matrix of the form, row by row, filled up with zeros to a multiple of [`ROWS`].
+    /// The matrix of the bilinear form, row by row, padded with zeros to a multiple of [`ROWS`].
     pub matrix: Vec<f64>,
 }
 
-/// Rows of the matrix that are taken together.
+/// Rows of the matrix that are processed together.
 pub const ROWS: usize = 2;
 
-/// The rule with `2 half` nodes, made at its first use.
+/// The rule with `2 half` nodes, computed at its first use.
 pub fn primitive(half: usize) -> &'static Primitive {
     static RULES: [OnceLock<Primitive>; MOST_HALF] = [const { OnceLock::new() }; MOST_HALF];
     let half = half.clamp(1, MOST_HALF);
     RULES[half - 1].get_or_init(|| make_primitive(half))
 }
 
-/// Largest half of a rule with a primitive.
+/// Greatest `half` of a rule with a primitive.
 pub const MOST_HALF: usize = 40;
 
 fn make_primitive(half: usize) -> Primitive {

@@ -1,12 +1,12 @@
-//! Eight numbers side by side: the unit in which kernels work, whatever the width of the machine's vectors.
+//! Eight numbers side by side: the unit of all kernels, for any vector width of the machine.
 //!
-//! Loops over [`LANES`] are unrolled into vector instructions by the compiler. Sums run lane by lane and are folded in
-//! one fixed order, so a result has the same bits at every vector width.
+//! Loops over [`LANES`] are unrolled into vector instructions by the compiler. Sums run lane by lane and are added in one fixed order, so a
+//! result has the same bits at every vector width.
 
-/// Lanes of a kernel.
+/// Number of lanes of a kernel.
 pub const LANES: usize = 8;
 
-/// One value a lane.
+/// One value per lane.
 pub type Lanes = [f64; LANES];
 
 /// The sum of all lanes, pairwise and in a fixed order.
@@ -29,7 +29,7 @@ pub fn least(values: &Lanes) -> f64 {
 pub struct Vector(pub Lanes);
 
 impl Vector {
-    /// The same in every lane.
+    /// A vector with `value` in every lane.
     #[inline(always)]
     pub const fn splat(value: f64) -> Vector {
         Vector([value; LANES])

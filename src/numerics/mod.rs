@@ -1,4 +1,4 @@
-//! Numerical tools that know no friction.
+//! Numerical methods, independent of friction.
 
 pub mod cubic;
 pub mod dilogarithm;

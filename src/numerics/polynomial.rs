@@ -1,12 +1,11 @@
-//! The real roots of a polynomial on an interval, all of them: bracketed between the roots of its derivative.
+//! All real roots of a polynomial on an interval, each bracketed between roots of its derivative.
 
-/// `c[0] + c[1] x + c[2] x^2 + …` at `x`, and its slope there.
+/// The value of `c[0] + c[1] x + c[2] x^2 + …` at `x`, and its slope.
 pub fn value_and_slope(c: &[f64], x: f64) -> (f64, f64) {
     c.iter().rev().fold((0.0, 0.0), |(value, slope), &c| (value * x + c, slope * x + value))
 }
 
-/// The places in `(low, high)` where the polynomial changes sign, rising, each to the last digits that its value
-/// allows.
+/// The sign changes of the polynomial in `(low, high)` in ascending order, each as accurate as rounding of the polynomial allows.
 pub fn roots_between(c: &[f64], low: f64, high: f64) -> Vec<f64> {
     if c.len() < 2 {
         return Vec::new();
@@ -18,7 +17,7 @@ pub fn roots_between(c: &[f64], low: f64, high: f64) -> Vec<f64> {
     ends.windows(2).filter_map(|piece| root_of_monotone(c, piece[0], piece[1])).collect()
 }
 
-/// Newton's method inside a bracket, which a step that leaves it halves.
+/// Newton's method inside a bracket. A step that leaves the bracket is replaced by a bisection.
 fn root_of_monotone(c: &[f64], mut low: f64, mut high: f64) -> Option<f64> {
     let (first, last) = (value_and_slope(c, low).0, value_and_slope(c, high).0);
     if !((first < 0.0 && last > 0.0) || (first > 0.0 && last < 0.0)) {
@@ -42,5 +41,5 @@ fn root_of_monotone(c: &[f64], mut low: f64, mut high: f64) -> Option<f64> {
     Some(x)
 }
 
-/// More steps than halving from 1 down to 1e-16 and a few of Newton's take.
+/// Greatest number of steps. Chosen: more than bisection from 1 down to 1e-16 and some Newton steps need.
 const MOST_STEPS: u32 = 100;

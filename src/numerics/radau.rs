@@ -7,16 +7,16 @@ use std::sync::OnceLock;
 
 use super::double_double::DoubleDouble;
 
-/// Nodes: two vectors of eight.
+/// Number of nodes. Chosen: two vectors of eight.
 pub const NODES: usize = 16;
 
-/// One value a node.
+/// One value per node.
 pub type Nodes = [f64; NODES];
 
 /// Nodes, weights and the matrix of integration.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Radau {
-    /// Nodes `u`, rising, the last one 1.
+    /// Nodes `u`, ascending, the last one 1.
     pub u: Nodes,
     /// `1 - u`, each to the last bit, the last one 0.
     pub rest: Nodes,
@@ -24,12 +24,12 @@ pub struct Radau {
     pub w: Nodes,
     /// `columns[k][j] = int_0^u[j]` of the polynomial of degree `NODES - 1` that is 1 at `u[k]` and 0 at the others.
     pub columns: [Nodes; NODES],
-    /// Barycentric weights of the nodes and, last, of the added place 0.
+    /// Barycentric weights of the nodes and, last, of the additional node 0.
     barycentric: [f64; NODES + 1],
     /// `slopes[k][j]`: the slope at node `j` of the polynomial of degree `NODES` that is 1 at `u[k]` and 0 at the others
     /// and at 0.
     slopes: [Nodes; NODES],
-    /// The slope at 0 of the same polynomials.
+    /// The slopes of these polynomials at 0.
     slopes_at_0: Nodes,
     /// Weights of the two highest Legendre coefficients that the nodes determine.
     highest: [Nodes; 2],
@@ -53,8 +53,7 @@ impl Radau {
         self.slopes_at_0.iter().zip(f).map(|(slope, f)| slope * f).sum()
     }
 
-    /// What the nodes do not resolve of the integral of `f`: the size of its two highest coefficients in Legendre
-    /// polynomials, integrated.
+    /// An estimate of the quadrature error of `f`: the integrated magnitude of its two highest Legendre coefficients.
     pub fn unresolved(&self, f: &Nodes) -> f64 {
         let coefficient = |weights: &Nodes| weights.iter().zip(f).map(|(w, f)| w * f).sum::<f64>().abs();
         (coefficient(&self.highest[0]) + coefficient(&self.highest[1])) / (4 * NODES) as f64
@@ -79,7 +78,7 @@ impl Radau {
         (above + fraction * start) / (below + fraction)
     }
 
-    /// The polynomial through `f` at the nodes alone, at `u`.
+    /// The polynomial through `f` at the nodes, without a value at 0, at `u`.
     pub fn follow(&self, f: &Nodes, u: f64) -> f64 {
         let (mut above, mut below) = (0.0, 0.0);
         for ((&node, &value), &weight) in self.u.iter().zip(f).zip(&self.barycentric) {
@@ -87,7 +86,7 @@ impl Radau {
             if distance == 0.0 {
                 return value;
             }
-            // The weights are those of the nodes and 0.
+            // The weights include the node 0.
             let fraction = weight * node / distance;
             above += fraction * value;
             below += fraction;
@@ -96,7 +95,7 @@ impl Radau {
     }
 }
 
-/// The columns of a matrix, each times the value of its node.
+/// The sum of the columns of a matrix, each times the value of its node.
 #[inline(always)]
 fn combined(columns: &[Nodes; NODES], f: &Nodes) -> Nodes {
     let mut sum = [0.0; NODES];
@@ -108,13 +107,13 @@ fn combined(columns: &[Nodes; NODES], f: &Nodes) -> Nodes {
     sum
 }
 
-/// The rule, made at its first use.
+/// The rule, computed at its first use.
 pub fn radau() -> &'static Radau {
     static RADAU: OnceLock<Radau> = OnceLock::new();
     RADAU.get_or_init(make)
 }
 
-/// The nodes of the method with `S` stages on `[0, 1]`, rising: Newton's method on `P_S - P_(S-1)` in double-double.
+/// The nodes of the method with `S` stages on `[0, 1]`, ascending: Newton's method on `P_S - P_(S-1)` in double-double.
 pub(super) fn nodes<const S: usize>() -> [DoubleDouble; S] {
     let (one, half) = (DoubleDouble::new(1.0), DoubleDouble::new(0.5));
     let count = DoubleDouble::new(S as f64);
@@ -182,7 +181,7 @@ fn make() -> Radau {
         }
     }
     for j in 0..NODES {
-        // The slope of a constant is 0: that determines the diagonal, with the place 0 in the sum.
+        // The slope of a constant is 0. This determines the diagonal; the sum includes the node 0.
         let entry = |k: usize| rule.barycentric[k] / rule.barycentric[j] / (places[j] - places[k]);
         let others: Vec<f64> = (0..=NODES).map(|k| if k == j { 0.0 } else { entry(k) }).collect();
         for k in 0..NODES {
@@ -205,7 +204,7 @@ fn legendre(x: DoubleDouble) -> [DoubleDouble; NODES + 1] {
     p
 }
 
-/// `P_m` from the two before it (DLMF 18.9.1).
+/// `P_m` from the two preceding polynomials (DLMF 18.9.1).
 fn next(m: usize, x: DoubleDouble, last: DoubleDouble, before: DoubleDouble) -> DoubleDouble {
     let k = m as f64;
     (DoubleDouble::new(2.0 * k - 1.0) * x * last - DoubleDouble::new(k - 1.0) * before) / DoubleDouble::new(k)

@@ -1,5 +1,4 @@
-//! Numbers of either precision, for estimates: single precision has twice the lanes, and roots and quotients at a third
-//! of the price.
+//! Real numbers of single or double precision, for estimates. Single precision has twice the lanes, and roots and quotients cost a third.
 
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
@@ -13,16 +12,16 @@ pub trait Real:
     + Div<Output = Self>
     + Neg<Output = Self>
 {
-    /// The smallest normal number: added to a divisor it keeps 0/0 away.
+    /// The smallest normal number: added to a divisor, it prevents 0/0.
     const TINY: Self;
 
     /// The nearest number.
     fn of(x: f64) -> Self;
 
-    /// The same number in double precision.
+    /// The number in double precision.
     fn wide(self) -> f64;
 
-    /// The same number in single precision, or the nearest.
+    /// The nearest number in single precision.
     fn narrow(self) -> f32;
 
     /// The absolute value.
@@ -34,7 +33,7 @@ pub trait Real:
     /// The cube root of a positive normal number with a relative error of 5 %, from its bits.
     fn rough_cube_root(self) -> Self;
 
-    /// The cube root of a positive normal number, to the last bits, as long as its square and cube are in range.
+    /// The cube root of a positive normal number, accurate to the last bits if its square and cube do not overflow.
     #[inline(always)]
     fn cube_root(self) -> Self {
         // Halley's method triples the digits: 5e-2, 1e-4, 1e-12.

@@ -1,4 +1,4 @@
-//! A bracketed root finder that always ends: Newton's method inside a bracket that only ever shrinks.
+//! A bracketed root finder that always terminates: Newton's method inside a shrinking bracket.
 
 /// The value and the slope of a function at one point.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -9,31 +9,29 @@ pub struct Probe {
     pub slope: f64,
 }
 
-/// Where a search ended.
+/// Result of a search.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Root {
     /// Best argument: one Newton step beyond the last probe.
     pub x: f64,
     /// Argument of the last probe.
     pub probed: f64,
-    /// What the last probe returned.
+    /// Result of the last probe.
     pub probe: Probe,
 }
 
-/// Most probes of one search. Newton's method takes four to eight; a bisection of any bracket of doubles takes fewer
-/// than this.
+/// Greatest number of probes. Newton's method takes four to eight; a bisection of any bracket of doubles takes fewer than this.
 const MOST_PROBES: u32 = 200;
 
-/// Most growth of a step to a side that nothing bounds.
+/// Greatest growth factor of a step towards an unbounded side.
 const MOST_GROWTH: f64 = 8.0;
 
-/// Finds the root of a rising function inside `(low, high)`, either of which may be infinite, from `start`.
+/// Finds the root of an increasing function inside `(low, high)`, from `start`. Both bounds may be infinite.
 ///
-/// `probe(x)` returns `None` where the function is not defined; such points count as lying beyond the root on the side
-/// named by `undefined_above`. The search ends with the first probe whose absolute value is at most `enough`: the
-/// Newton step from there, whose error is of the order of `enough^2`, is taken unprobed. It also ends where the bracket
-/// has closed to neighbouring doubles with a change of sign between them: rounding of the function allows no better. It
-/// returns `None` if the bracket is empty or closes on a place without a change of sign.
+/// `probe(x)` returns `None` where the function is not defined; such points count as above the root if `undefined_above`, else as below it. The
+/// search ends with the first probe whose absolute value is at most `enough`. One more Newton step, with an error of the order of `enough^2`,
+/// gives the result. The search also ends if a change of sign is bracketed by neighbouring doubles, the limit set by rounding. It returns `None`
+/// if the bracket is empty or shrinks to a point without a change of sign.
 pub fn newton(
     mut probe: impl FnMut(f64) -> Option<Probe>,
     start: f64,
@@ -41,7 +39,7 @@ pub fn newton(
     undefined_above: bool,
     enough: f64,
 ) -> Option<Root> {
-    // No two probes share a piece.
+    // Every probe has its own piece.
     let mut count = 0u32;
     let probe = |x| {
         count += 1;
@@ -50,11 +48,10 @@ pub fn newton(
     newton_in_pieces(probe, start, bracket, undefined_above, enough, 0.0).map(|(root, _)| root)
 }
 
-/// [`newton`] for a function that is smooth in pieces: `probe` also names the piece, and so does the result for the
-/// last probe.
+/// [`newton`] for a piecewise smooth function: `probe` also returns the piece, and the result contains the piece of the last probe.
 ///
-/// Where the last two probes lie in one piece, the change of the slope between them corrects the step, which leaves an
-/// error of third order: the search also ends where that is at most `least`.
+/// If the last two probes lie in one piece, the change of the slope between them corrects the step, which leaves an error of third order. The
+/// search also ends if this error is at most `least`.
 pub fn newton_in_pieces<Piece: Copy + PartialEq>(
     mut probe: impl FnMut(f64) -> Option<(Probe, Piece)>,
     start: f64,
@@ -100,8 +97,8 @@ pub fn newton_in_pieces<Piece: Copy + PartialEq>(
                 f64::NAN
             }
         };
-        // A step that leaves the bracket, or that does not shrink, gives way to a bisection; from side to side of the root, by
-        // a quarter in two steps. Where nothing bounds the side that it leads to, it may grow.
+        // A step that leaves the bracket is replaced by a bisection, and so are two alternating steps that do not shrink by a quarter. Towards
+        // an unbounded side, steps may grow.
         let [last_step, step_before] = last_steps;
         let open = if step > 0.0 { !above && high.is_infinite() } else { !below && low.is_infinite() };
         let step = if open && step.abs() >= last_step {
@@ -121,20 +118,20 @@ pub fn newton_in_pieces<Piece: Copy + PartialEq>(
     None
 }
 
-/// The step to the root of the inverse function with the slope at the last probe, and its change since the one before;
-/// and the order of what it leaves, in units of the value.
+/// The step to the root of the inverse function, from the slope at the last probe and its change since the previous probe; and the order of the
+/// remaining error, in units of the value.
 fn corrected(last: &Probe, before: &Probe) -> Option<(f64, f64)> {
     let (pace, pace_before) = (1.0 / last.slope, 1.0 / before.slope);
     let bend = (pace - pace_before) / (last.value - before.value);
     let correction = 0.5 * bend * last.value / pace;
-    // No more than a correction: far from the root the slope need not change evenly.
+    // Only small corrections are accepted: far from the root the slope may change irregularly.
     let sound = pace > 0.0 && pace_before > 0.0 && correction.abs() <= 0.3;
     let values = last.value.abs() + before.value.abs();
     let left = last.value.abs() * last.value.abs().max(correction.abs()) * values.min(1.0);
     sound.then(|| (-last.value * pace * (1.0 - correction), left))
 }
 
-/// A point well inside `(low, high)`: the middle, or a step outwards that doubles where one side is infinite.
+/// A point well inside `(low, high)`: the middle, or a doubling step outwards if one side is infinite.
 fn middle(low: f64, high: f64) -> f64 {
     match (low.is_finite(), high.is_finite()) {
         (true, true) => 0.5 * (low + high),
@@ -144,8 +141,8 @@ fn middle(low: f64, high: f64) -> f64 {
     }
 }
 
-/// A zero of a continuous function between two places where its values differ in sign, to `resolution`: the Illinois
-/// method (Dowell and Jarratt, BIT 11, 168, 1971).
+/// A zero of a continuous function between two points with values of opposite signs, to within `resolution`, by the Illinois method (Dowell and
+/// Jarratt, BIT 11, 168, 1971).
 pub fn crossing(
     mut f: impl FnMut(f64) -> f64,
     [mut x0, mut x1]: [f64; 2],

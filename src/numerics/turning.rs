@@ -5,8 +5,7 @@
 //! 0` for `w <= 0` and `k = -1` for `w >= 0`. It is the velocity of a particle that falls back from a turning point,
 //! hence the name. Its nearest singularities are at `w = 2 sqrt(pi) e^(±3 pi i/4)`.
 //!
-//! Three formulas cover the line. Each lane of a vector takes the one of its own argument, so a result never depends on
-//! its neighbours.
+//! Three formulas cover the real line. Each lane of a vector uses the formula of its own argument, so a result never depends on its neighbours.
 
 use super::elementary::{exp, ln, polynomial};
 
@@ -34,8 +33,8 @@ const LN_U_OVER_W: [f64; 19] = [
     1.2288955865958112e-12,
 ];
 
-/// `U / x` for `w <= -1`, with `x = exp(-1 - w^2/2)`, in powers of `s = 1 - sqrt(1 - e x)`: the square root moves the
-/// branch point at `w = 0` out of the way, so degree 14 leaves 1e-17. Made by `tests/reference/coefficients.py`.
+/// `U / x` for `w <= -1`, with `x = exp(-1 - w^2/2)`, in powers of `s = 1 - sqrt(1 - e x)`: the square root removes the branch point at `w = 0`,
+/// so degree 14 has an error of 1e-17. Made by `tests/reference/coefficients.py`.
 const U_OVER_X: [f64; 15] = [
     1.0,
     0.7357588823428842,
@@ -54,8 +53,8 @@ const U_OVER_X: [f64; 15] = [
     0.0008663289439595966,
 ];
 
-/// `ln U` for `w >= 1` in powers of `w/(w + 11)`: interpolated where that is at most 0.4; beyond, the error falls
-/// behind `U` itself. Made by `tests/reference/coefficients.py`.
+/// `ln U` for `w >= 1` in powers of `w/(w + 11)`: interpolated where this is at most 0.4; beyond, the error is negligible compared with `U`.
+/// Made by `tests/reference/coefficients.py`.
 const LN_U_FAR: [f64; 4] = [0.005525334715095086, 10.884780968207572, -8.4436137582789, 6.8186052209486885];
 
 /// The turning function at one argument.
@@ -92,13 +91,13 @@ pub struct Turnings<const N: usize> {
     pub u: [f64; N],
     /// `U - 1`.
     pub excess: [f64; N],
-    /// `(U - 1)/w` as a fraction `over/under`, so that a division by it is the only one.
+    /// Numerator of `(U - 1)/w = over/under`, so that a division by this slope is the only division.
     pub over: [f64; N],
-    /// See `over`.
+    /// Denominator of `(U - 1)/w`.
     pub under: [f64; N],
 }
 
-/// [`turning`] of several arguments at once, with the same bits as one by one.
+/// [`turning`] for several arguments at once, with identical bits.
 #[inline(always)]
 pub fn turning_lanes<const N: usize>(w: &[f64; N]) -> Turnings<N> {
     let (mut rises, mut falls, mut turns) = (false, false, false);
@@ -138,13 +137,13 @@ pub fn turning_lanes<const N: usize>(w: &[f64; N]) -> Turnings<N> {
     found
 }
 
-/// On both sides of the seam at 1: both formulas, each on an argument in its range, then a choice.
+/// On both sides of the border at 1: evaluates both formulas, each on an argument in its range, and selects one.
 #[inline(always)]
 fn near_or_falling(w: f64) -> Lane {
     choose(w < 1.0, near(if w < 1.0 { w } else { 0.5 }), falling(if w < 1.0 { 1.0 } else { w }))
 }
 
-/// All three formulas, then a choice.
+/// Evaluates all three formulas and selects one.
 #[inline(always)]
 fn any(w: f64) -> Lane {
     let rises = w <= -1.0;
@@ -168,7 +167,7 @@ struct Lane {
     under: f64,
 }
 
-/// The one or the other, without a branch.
+/// Selects one of two values without a branch.
 #[inline(always)]
 fn choose(first: bool, one: Lane, other: Lane) -> Lane {
     Lane {
@@ -199,8 +198,8 @@ fn rising(w: f64) -> Lane {
     Lane { ln_u: u - (1.0 + e), u, excess: u - 1.0, over: u - 1.0, under: w }
 }
 
-/// `w >= 1`, theta falls. A guess that is within 1.3e-4 everywhere, and what it lacks by the reversed series of
-/// `U - 1 - ln U` about it: one logarithm in all.
+/// `w >= 1`, theta falls. A guess with an error below 1.3e-4, corrected by the reversed series of `U - 1 - ln U` about it, with one logarithm in
+/// total.
 #[inline(always)]
 fn falling(w: f64) -> Lane {
     let e = 0.5 * w * w;

@@ -1,13 +1,13 @@
-//! A sheet of SVG: shapes and text, in points from its upper left corner.
+//! An SVG canvas: shapes and text, in points from the upper left corner.
 
 use std::fmt::Write;
 
 use super::label::{self, FAMILIES, SCRIPT_SIZE, SUBSCRIPT_DROP, SUPERSCRIPT_RISE};
 
-/// Points of a millimetre.
+/// Points per millimetre.
 pub const MILLIMETRE: f64 = 72.0 / 25.4;
 
-/// Distance of the lines of a hatched area, along its edges, in points. Chosen: single lines are seen in print.
+/// Distance of the lines of a hatched area, along its edges, in points. Chosen: single lines are visible in print.
 const HATCH_STEP: f64 = 3.2;
 
 /// A line style.
@@ -31,11 +31,11 @@ impl Stroke {
 /// The anchor of a text.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Anchor {
-    /// The text starts at its place.
+    /// The text starts at the position.
     Start,
-    /// Its middle is there.
+    /// The text is centred at the position.
     Middle,
-    /// The text ends at its place.
+    /// The text ends at the position.
     End,
 }
 
@@ -66,13 +66,13 @@ pub struct Text<'a> {
     pub size: f64,
     /// The anchor of the words.
     pub anchor: Anchor,
-    /// Whether they are turned by a quarter to the left.
+    /// Whether the text is rotated by a quarter turn to the left.
     pub upwards: bool,
     /// Colour.
     pub colour: &'a str,
 }
 
-/// The sheet.
+/// The canvas.
 #[derive(Debug, Default)]
 pub struct Canvas {
     body: String,
@@ -86,14 +86,14 @@ fn at(value: f64) -> String {
     if text == "-0" { "0".to_owned() } else { text.to_owned() }
 }
 
-/// The path through points.
+/// The SVG path through points.
 fn path(points: &[(f64, f64)]) -> String {
     let step =
         |(place, &(x, y)): (usize, &(f64, f64))| format!("{}{} {}", if place == 0 { 'M' } else { 'L' }, at(x), at(y));
     points.iter().enumerate().map(step).collect()
 }
 
-/// Text that is safe inside XML.
+/// Text escaped for XML.
 pub fn escaped(text: &str) -> String {
     text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
 }
@@ -120,7 +120,7 @@ impl Canvas {
         self.push(format_args!("<path d=\"M{} {}L{} {}\" {style}/>", at(from.0), at(from.1), at(to.0), at(to.1)));
     }
 
-    /// Lines through points, each list its own line.
+    /// Lines through points, one for each list.
     pub fn lines(&mut self, lines: &[Vec<(f64, f64)>], stroke: &Stroke) {
         let path: String = lines.iter().filter(|line| line.len() > 1).map(|line| path(line)).collect();
         if !path.is_empty() {
@@ -189,10 +189,10 @@ impl Canvas {
         self.push(format_args!("</g>"));
     }
 
-    /// A text in markup on the line through `place`.
+    /// A text in markup with its baseline through `place`.
     pub fn text(&mut self, place: (f64, f64), markup: &str, style: &Text<'_>) {
         let Text { size, anchor, upwards, colour } = *style;
-        // Anchors are computed from the metrics of the font: a viewer need not agree on how spans of several styles are anchored.
+        // Anchors are computed from the metrics of the font, since viewers differ in how they anchor spans of several styles.
         let width = size * label::width(markup);
         let shift = match anchor {
             Anchor::Start => 0.0,
@@ -236,7 +236,7 @@ impl Canvas {
         ));
     }
 
-    /// The whole picture, of a size in points.
+    /// The whole picture as SVG, with its size in points.
     pub fn svg(&self, width: f64, height: f64, title: &str) -> String {
         format!(
             "<svg xmlns=\"http://www.w3.org/2000/svg\" xmlns:xlink=\"http://www.w3.org/1999/xlink\" width=\"{}mm\" height=\"{}mm\" \

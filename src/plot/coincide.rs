@@ -1,18 +1,18 @@
-//! Coinciding curves, which are drawn once.
+//! Detection of coinciding curves, which are drawn once.
 
-/// Distance, as a fraction of the panel, up to which two curves are one. The width of a line: 1.1 points in a panel 100 points high.
+/// Distance up to which two curves coincide, as a fraction of the panel. Chosen: the width of a line, 1.1 points in a panel 100 points high.
 const MAX_DISTANCE: f64 = 0.01;
 
-/// Points of a curve whose distance from another is computed. Chosen: closer ones are not distinguished in print.
+/// Greatest number of points of a curve that are compared. Chosen: closer points are not distinguishable in print.
 const MAX_POINTS: usize = 400;
 
-/// Whether two curves with values at the same places coincide, in fractions of the panel.
+/// Whether two curves with values at equal positions coincide, in fractions of the panel.
 pub fn at_places(first: &[(f64, f64)], second: &[(f64, f64)]) -> bool {
     let near = |(a, b): (&(f64, f64), &(f64, f64))| a.1.is_nan() && b.1.is_nan() || (a.1 - b.1).abs() <= MAX_DISTANCE;
     first.len() == second.len() && first.iter().zip(second).all(near)
 }
 
-/// Whether two curves coincide whatever their points are, in fractions of the panel: each point of one is near the other.
+/// Whether two curves with any points coincide, in fractions of the panel: each point of one is near the other.
 pub fn anywhere(first: &[(f64, f64)], second: &[(f64, f64)]) -> bool {
     is_near(first, second) && is_near(second, first)
 }
@@ -23,7 +23,7 @@ fn is_near(points: &[(f64, f64)], line: &[(f64, f64)]) -> bool {
     some.all(|point| line.windows(2).any(|pair| distance(*point, pair[0], pair[1]) <= MAX_DISTANCE))
 }
 
-/// The distance of a point from a line between two others; NaN if any has no place.
+/// The distance of a point from the segment between two others; NaN if a coordinate is NaN.
 fn distance((x, y): (f64, f64), from: (f64, f64), to: (f64, f64)) -> f64 {
     let (along, up) = (to.0 - from.0, to.1 - from.1);
     let length = along * along + up * up;
@@ -32,7 +32,7 @@ fn distance((x, y): (f64, f64), from: (f64, f64), to: (f64, f64)) -> f64 {
     (x - from.0 - fraction * along).hypot(y - from.1 - fraction * up)
 }
 
-/// For each of `count` curves the first that it coincides with, itself if there is none before.
+/// For each of `count` curves, the first curve with which it coincides; itself if there is none before.
 pub fn leaders(count: usize, mut coincide: impl FnMut(usize, usize) -> bool) -> Vec<usize> {
     let mut leaders: Vec<usize> = Vec::with_capacity(count);
     for curve in 0..count {

@@ -1,8 +1,8 @@
-//! Lines along which a field over a grid has a given value (marching squares).
+//! Contour lines of a field over a grid (marching squares).
 
 use std::collections::BTreeMap;
 
-/// A field over a grid of `columns` by `rows`, row after row; NaN where there is none.
+/// A field over a grid of `columns` by `rows`, row by row; NaN for a missing value.
 #[derive(Debug, Clone, Copy)]
 pub struct Field<'a> {
     /// Values of a row.
@@ -16,10 +16,10 @@ pub struct Field<'a> {
 /// An edge of the grid: its first corner, and whether it leads to the next row.
 type Edge = (usize, bool);
 
-/// The edges that pieces of lines lead to from each edge.
+/// The edges to which line segments lead from each edge.
 type Segments = BTreeMap<Edge, Vec<Edge>>;
 
-/// The lines `field = level`, in units of columns and rows. Cells with a corner without value have none.
+/// The lines `field = level`, in units of columns and rows. Cells with a missing corner have no lines.
 pub fn contour(field: Field<'_>, level: f64) -> Vec<Vec<(f64, f64)>> {
     let Field { columns, rows, values } = field;
     if columns < 2 || rows < 2 || values.len() < columns * rows {
@@ -42,7 +42,7 @@ pub fn contour(field: Field<'_>, level: f64) -> Vec<Vec<(f64, f64)>> {
     joined(pieces).into_iter().map(|line| line.into_iter().map(place).collect()).collect()
 }
 
-/// The pieces of lines through the cell whose first corner is `corner`, from edge to edge.
+/// The line segments through the cell whose first corner is `corner`, from edge to edge.
 fn crossings(corner: usize, columns: usize, height: impl Fn(usize) -> f64) -> Vec<(Edge, Edge)> {
     let heights = [corner, corner + 1, corner + columns + 1, corner + columns].map(height);
     if heights.iter().any(|height| height.is_nan()) {
@@ -62,7 +62,7 @@ fn crossings(corner: usize, columns: usize, height: impl Fn(usize) -> f64) -> Ve
     }
 }
 
-/// The pieces joined to lines: open lines start where only one piece does, what is left are rings.
+/// Joins segments to lines: first open lines, from edges with one segment, then closed lines.
 fn joined(mut pieces: Segments) -> Vec<Vec<Edge>> {
     let starts: Vec<Edge> = pieces.iter().filter(|(_, to)| to.len() == 1).map(|(edge, _)| *edge).collect();
     let all: Vec<Edge> = pieces.keys().copied().collect();

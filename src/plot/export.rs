@@ -1,4 +1,4 @@
-//! A picture as SVG, PNG or PDF. Text in the PNG and the PDF is set in the embedded fonts: nothing depends on those of the machine.
+//! A picture as SVG, PNG or PDF. PNG and PDF use the embedded fonts, so that they do not depend on the fonts of the machine.
 
 use std::path::Path;
 use std::sync::Arc;
@@ -22,14 +22,14 @@ pub enum Format {
     Pdf,
 }
 
-/// Pixels of a picture, above which it is not written: 64 million. Chosen: they take 256 MB.
+/// Greatest number of pixels of a picture: 64 million. Chosen: they take 256 MB.
 const MAX_PIXELS: f64 = 6.4e7;
 
-/// Pixels of CSS to the inch, the unit of lengths in an SVG (CSS Values and Units, section 6.2).
+/// CSS pixels per inch, the unit of lengths in an SVG (CSS Values and Units, section 6.2).
 const CSS_DPI: f64 = 96.0;
 
 impl Format {
-    /// The format that the name of a file ends in.
+    /// The format of a file name, by its ending.
     pub fn of(path: &Path) -> Option<Format> {
         match path.extension()?.to_str()?.to_lowercase().as_str() {
             "svg" => Some(Format::Svg),
@@ -48,7 +48,7 @@ impl Format {
         }
     }
 
-    /// The picture `svg` in this format; pixels with `dpi` to the inch.
+    /// The picture `svg` in this format; pixels with `dpi` per inch.
     pub fn encode(self, svg: &str, dpi: f64) -> Result<Vec<u8>, PlotError> {
         match self {
             Format::Svg => Ok(svg.as_bytes().to_vec()),
@@ -87,7 +87,7 @@ fn png(tree: &usvg::Tree, dpi: f64) -> Result<Vec<u8>, PlotError> {
     pixels.encode_png().map_err(|error| PlotError::Convert(error.to_string()))
 }
 
-/// Pixels as a PNG, row after row from the top: a colour, or nothing where it is transparent. `None` without pixels.
+/// Pixels as a PNG, row by row from the top: a colour, or `None` for transparent. `None` without pixels.
 pub fn image(columns: usize, pixels: &[Option<[u8; 3]>]) -> Option<Vec<u8>> {
     let rows = pixels.len().checked_div(columns)?;
     let mut image = Pixmap::new(u32::try_from(columns).ok()?, u32::try_from(rows).ok()?)?;

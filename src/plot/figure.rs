@@ -1,4 +1,4 @@
-//! A figure: panels with axes and layers, a legend, a colour bar and a few words, set out on a sheet of given width.
+//! A figure of given width: panels with axes and layers, a legend, a colour bar and text.
 
 use super::canvas::{Anchor, Area, Canvas, MILLIMETRE, Stroke, Text};
 use super::colour::{hex, viridis};
@@ -12,44 +12,44 @@ const SIZE: f64 = 7.5;
 /// Height of the numbers at ticks, in points. Chosen: a little below the labels of axes.
 const TICK_SIZE: f64 = 7.0;
 
-/// Height of the letters of notes, in points. Chosen: the least that is readable in print.
+/// Height of the letters of notes, in points. Chosen: the smallest readable size in print.
 const NOTE_SIZE: f64 = 6.2;
 
 /// Length of a tick with a number, in points; others have 0.6 of it. Chosen: a third of its number.
 const TICK_LENGTH: f64 = 2.6;
 
-/// Space between the figure and the edge of the sheet, in points. Chosen: it separates the figure from the text around it.
+/// Space between the figure and the edge of the picture, in points. Chosen: it separates the figure from the surrounding text.
 const MARGIN: f64 = 5.0;
 
 /// Width of the lines of frames and ticks, in points. Chosen: half a curve's.
 const FRAME_WIDTH: f64 = 0.6;
 
-/// Space between the line of a title and the frame below, in points. Chosen: it holds the letters below the line.
+/// Space between the baseline of a title and the frame below, in points. Chosen: it holds descenders.
 const TITLE_SPACE: f64 = 5.0;
 
 /// Space of the titles of rows of panels, in points: a line and its distance from the frame.
 const ROW_TITLE_WIDTH: f64 = SIZE + 6.0;
 
-/// Length of the line from the end of a vertical line to its words, in points. Chosen: words may move aside by several letters.
+/// Length of the leader from the end of a vertical line to its label, in points. Chosen: labels may move aside by several letters.
 const LEADER_LENGTH: f64 = 5.0;
 
-/// Space between words at vertical lines, in points. Chosen: two spaces between words.
+/// Space between labels of vertical lines, in points. Chosen: the width of two spaces.
 const WORD_SPACE: f64 = 5.0;
 
-/// Height of leaders and words above a panel, in points.
+/// Height of leaders and labels above a panel, in points.
 const WORDS_HEIGHT: f64 = LEADER_LENGTH + 2.5 + NOTE_SIZE;
 
-/// Space between a map and its colour bar, and the width of the bar, in points. Chosen: as wide as a letter is high.
+/// Space between a map and its colour bar, and width of the bar, in points. Chosen: the bar is as wide as a letter is high.
 const BAR_SPACE: f64 = 6.0;
 const BAR_WIDTH: f64 = 8.0;
 
-/// Colours of a colour bar. Chosen: steps are not seen.
+/// Number of colours of a colour bar. Chosen: steps are invisible.
 const BAR_STEPS: usize = 128;
 
-/// Width of an entry of the legend before its words, in points. Chosen: a dash and its space are seen in it.
+/// Width of the sample of a legend entry, in points. Chosen: it shows a dash and a space.
 const KEY_WIDTH: f64 = 20.0;
 
-/// Points of a curve from which on they are not marked. Chosen: their marks touch.
+/// Number of points of a curve above which they have no marks. Chosen: more marks would touch.
 pub const MAX_MARKED_POINTS: usize = 50;
 
 /// Text styles of figures and of notes.
@@ -65,9 +65,9 @@ pub struct Figure {
     pub subtitle: String,
     /// The panels, row after row.
     pub panels: Vec<Panel>,
-    /// Panels side by side.
+    /// Number of panels side by side.
     pub columns: usize,
-    /// What is the same in each row of panels, in markup, where their titles are those of the columns; empty where panels have their own.
+    /// The titles of the rows of panels, in markup, if panels are crossed; else empty.
     pub rows: Vec<String>,
     /// Height of a panel relative to its width.
     pub aspect: f64,
@@ -75,7 +75,7 @@ pub struct Figure {
     pub legend: Vec<Entry>,
     /// The colours of maps.
     pub colours: Option<Colours>,
-    /// Remarks below, in markup.
+    /// Notes below the panels, in markup.
     pub notes: Vec<String>,
     /// Notes for the terminal, such as omitted panels.
     pub remarks: Vec<String>,
@@ -86,11 +86,11 @@ pub struct Figure {
 pub struct Colours {
     /// The name of the numbers, in markup.
     pub label: String,
-    /// Their range; the darkest colour is at its start.
+    /// Their scale; the darkest colour is at its start.
     pub scale: Scale,
 }
 
-/// A pair of axes and what is between them.
+/// A panel: a pair of axes and the layers between them.
 #[derive(Debug, Clone)]
 pub struct Panel {
     /// Its distinguishing text, in markup.
@@ -99,7 +99,7 @@ pub struct Panel {
     pub x: Axis,
     /// The vertical axis.
     pub y: Axis,
-    /// From back to front.
+    /// The layers, from back to front.
     pub layers: Vec<Layer>,
 }
 
@@ -123,11 +123,11 @@ pub enum Layer {
     Map(Map),
     /// A line through points.
     Line(Vec<(f64, f64)>, Stroke),
-    /// Lines that are seen on any colour: dark, with a light rim.
+    /// Lines that are visible on any colour: dark, with a light rim.
     Contour(Vec<Vec<(f64, f64)>>, Stroke),
-    /// Between two curves, each point with its least and greatest value: filled.
+    /// A filled band between two curves: each point has a least and a greatest value.
     Band(Vec<(f64, f64, f64)>, [u8; 3]),
-    /// Bars from zero: where each begins and ends, and its height.
+    /// Bars from zero: start, end and height of each.
     Bars(Vec<(f64, f64, f64)>, [u8; 3]),
     /// Small marks at points.
     Marks(Vec<((f64, f64), Symbol)>),
@@ -135,18 +135,18 @@ pub enum Layer {
     Names(Vec<((f64, f64), String)>),
     /// A star.
     Star((f64, f64)),
-    /// A vertical line with words above its upper end, in markup.
+    /// A vertical line with a label above its upper end, in markup.
     Vertical(f64, String, Stroke),
     /// A horizontal line.
     Level(f64, Stroke),
 }
 
-/// An image over the panel, with what its pixels stand for.
+/// An image over the panel, with the values of its pixels.
 #[derive(Debug, Clone)]
 pub struct Map {
     /// The PNG image of the whole panel, first row at the top.
     pub png: Vec<u8>,
-    /// The values under the pointer, for pages.
+    /// The values under the pointer, for HTML pages.
     pub hover: Option<Hover>,
 }
 
@@ -157,11 +157,11 @@ pub struct Hover {
     pub x: Vec<f64>,
     /// Values of the vertical axis.
     pub y: Vec<f64>,
-    /// The value of each cell, row after row from the least `y`; NaN where there is none.
+    /// The value of each cell, row by row from the least `y`; NaN for a missing value.
     pub values: Vec<f64>,
     /// Words for some cells.
     pub words: Vec<String>,
-    /// The word of each cell, if there is one.
+    /// The index of the word of each cell, if any.
     pub word: Vec<u8>,
     /// Name of the column.
     pub column: String,
@@ -192,7 +192,7 @@ impl Hover {
 pub struct Entry {
     /// The sample of a legend entry.
     pub key: Key,
-    /// The words, in markup.
+    /// The text, in markup.
     pub text: String,
 }
 
@@ -224,7 +224,7 @@ impl Key {
 }
 
 impl Entry {
-    /// Entries for several curves, one for each that is drawn in place of all that it leads.
+    /// Entries for several curves: one for each group of coinciding curves.
     pub fn of_series(names: &[impl AsRef<str>], leaders: &[usize], key: impl Fn(usize) -> Key) -> Vec<Entry> {
         let drawn = (0..names.len()).filter(|&place| leaders[place] == place && names.len() > 1);
         let entry = |place| {
@@ -235,19 +235,19 @@ impl Entry {
     }
 }
 
-/// A figure as SVG, and where its maps are.
+/// A figure as SVG, with the positions of its maps.
 #[derive(Debug, Clone)]
 pub struct SvgFigure {
     /// The picture.
     pub svg: String,
-    /// Maps with values, and where they are in the picture.
+    /// Maps with values, and their positions in the picture.
     pub hovers: Vec<HoverMap>,
 }
 
 /// A map with values in a picture.
 #[derive(Debug, Clone)]
 pub struct HoverMap {
-    /// Its place.
+    /// Its position.
     pub area: Area,
     /// Its horizontal axis.
     pub x: Axis,
@@ -299,7 +299,7 @@ impl Figure {
         SvgFigure { svg: canvas.svg(width, height, &label::plain(&self.title)), hovers }
     }
 
-    /// Draws the legend below `top`; returns the place below it.
+    /// Draws the legend below `top`; returns its lower edge.
     fn draw_legend(&self, canvas: &mut Canvas, top: f64, inner: f64) -> f64 {
         let (mut x, mut y) = (MARGIN, top + SIZE);
         for entry in &self.legend {
@@ -315,16 +315,16 @@ impl Figure {
         y + 4.0
     }
 
-    /// Whether logarithmic ticks are powers of ten: in all panels if in one.
+    /// Whether logarithmic ticks are powers of ten, in all panels alike.
     fn as_powers(&self) -> bool {
         let axes = self.panels.iter().flat_map(|panel| [panel.x.scale, panel.y.scale]);
         axes.chain(self.colours.iter().map(|colours| colours.scale)).any(|scale| scale.needs_powers())
     }
 
-    /// Sets the panels out on `inner` points.
+    /// The layout of the panels in a width of `inner` points.
     fn layout(&self, inner: f64, as_powers: bool) -> Layout {
         let columns = self.columns.clamp(1, self.panels.len().max(1));
-        // A first guess of a panel's width decides how many ticks it has, and so how much room their labels take.
+        // A first guess of a panel's width determines the number of ticks, and so the space for their labels.
         let guess = inner / columns as f64 - 40.0;
         let plan = |(place, panel): (usize, &Panel)| Plan {
             x: panel.x.scale.ticks(fitting(guess, if panel.x.scale.log { 27.0 } else { 30.0 }), as_powers),
@@ -338,7 +338,7 @@ impl Figure {
         let mut belows = vec![0.0_f64; self.panels.len().div_ceil(columns)];
         for (place, plan) in plans.iter().enumerate() {
             let (row, column) = (place / columns, place % columns);
-            // The first and the last label of the horizontal axis may hang over.
+            // The first and the last label of the horizontal axis may extend beyond the panel.
             let before = plan.x.beyond(guess, |fraction| fraction);
             let after = plan.x.beyond(guess, |fraction| 1.0 - fraction);
             let left = if plan.y_label { TICK_LENGTH + 2.0 + widest(&plan.y) + 3.0 + SIZE + 3.0 } else { 5.0 };
@@ -358,7 +358,7 @@ impl Figure {
         Layout { plans, lefts, rights, aboves, belows, width, height: (width * self.aspect).max(20.0) }
     }
 
-    /// Draws the panels and the colour bar; returns the place below them, and the maps.
+    /// Draws the panels and the colour bar; returns their lower edge, and the maps.
     fn draw_panels(&self, canvas: &mut Canvas, top: f64, inner: f64, as_powers: bool) -> (f64, Vec<HoverMap>) {
         let layout = self.layout(inner, as_powers);
         let Layout { width, height, .. } = layout;
@@ -397,7 +397,7 @@ impl Figure {
     }
 }
 
-/// Draws a paragraph of lines of at most `width` points, `space` between them, below `top`; returns the place below it.
+/// Draws a paragraph below `top`, with lines of at most `width` points and `space` between them; returns its lower edge.
 fn paragraph(canvas: &mut Canvas, markup: &str, style: &Text<'_>, top: f64, (width, space): (f64, f64)) -> f64 {
     let mut y = top;
     for line in wrapped(markup, style.size, width) {
@@ -411,7 +411,7 @@ fn wrapped(markup: &str, size: f64, width: f64) -> Vec<String> {
     if markup.is_empty() { Vec::new() } else { label::wrapped(markup, width / size) }
 }
 
-/// About how many labels fit on `length` points, if each takes `each`.
+/// The approximate number of labels of `each` points that fit on `length` points.
 fn fitting(length: f64, each: f64) -> usize {
     ((length / each) as usize).clamp(2, 9)
 }
@@ -422,7 +422,7 @@ fn widest(ticks: &Ticks) -> f64 {
 }
 
 impl Ticks {
-    /// The overhang of labels beyond an axis of about `length`, at a fraction `away` of it.
+    /// The overhang of labels beyond an axis of about `length`, at the fraction `away` of it.
     fn beyond(&self, length: f64, away: impl Fn(f64) -> f64) -> f64 {
         let half = |label: &Option<String>| 0.5 * TICK_SIZE * label.as_deref().map_or(0.0, label::width);
         let over = self.ticks.iter().map(|tick| half(&tick.label) - away(tick.fraction).max(0.0) * length);
@@ -501,10 +501,10 @@ impl Key {
 }
 
 impl Panel {
-    /// Draws the panel; the label of its vertical axis is at the outer edge of the room to the left, `left` wide.
+    /// Draws the panel. The label of its vertical axis is at the outer edge of the left margin, which is `left` wide.
     fn draw(&self, canvas: &mut Canvas, area: Area, plan: &Plan, left: f64) {
         canvas.clipped(area, |canvas| self.layers.iter().for_each(|layer| self.fill(canvas, area, layer)));
-        // Marks on the frame are not to be cut.
+        // Marks on the frame are not clipped.
         canvas.frame(area, &Stroke::solid("#000", FRAME_WIDTH));
         self.layers.iter().for_each(|layer| self.mark(canvas, area, layer));
         self.draw_words_above(canvas, area);
@@ -531,7 +531,7 @@ impl Panel {
         (area.x + area.width * self.x.scale.fraction(x), area.y + area.height * (1.0 - self.y.scale.fraction(y)))
     }
 
-    /// Draws what is cut at the frame: areas and lines.
+    /// Draws areas and lines, which are clipped at the frame.
     fn fill(&self, canvas: &mut Canvas, area: Area, layer: &Layer) {
         let place = |point| self.place(area, point);
         let pieces = |line: &Vec<(f64, f64)>| pieces(line.iter().map(|point| place(*point)));
@@ -569,7 +569,7 @@ impl Panel {
         }
     }
 
-    /// Draws the marks of points inside, whole.
+    /// Draws the marks of points inside, without clipping.
     fn mark(&self, canvas: &mut Canvas, area: Area, layer: &Layer) {
         let inside = |&(x, y): &(f64, f64)| {
             let is_inside = |fraction: f64| (-1e-9..=1.0 + 1e-9).contains(&fraction);
@@ -594,7 +594,7 @@ impl Panel {
         }
     }
 
-    /// The vertical lines inside that have words: each with its place, as a fraction of the panel, its words and its stroke.
+    /// The vertical lines inside with a label: position as a fraction of the panel, label and stroke.
     fn words(&self) -> impl Iterator<Item = (f64, &str, &Stroke)> {
         self.layers.iter().filter_map(|layer| {
             let Layer::Vertical(x, words, stroke) = layer else { return None };
@@ -607,7 +607,7 @@ impl Panel {
         self.words().next().is_some()
     }
 
-    /// Draws the words at vertical lines: above the panel, as near to their lines as they do not run over each other.
+    /// Draws the labels of vertical lines above the panel, as close to their lines as possible without overlap.
     fn draw_words_above(&self, canvas: &mut Canvas, area: Area) {
         let marks = self.words().map(|(fraction, words, stroke)| (area.x + area.width * fraction, words, stroke));
         let mut marks: Vec<(f64, &str, &Stroke)> = marks.collect();
@@ -629,10 +629,10 @@ impl Axis {
     }
 }
 
-/// Places for words of which each has a wish and a width, in the order of their wishes: such that they do not overlap, stay between
-/// `low` and `high` if there is room, and are as near to their wishes as that allows.
+/// Positions of labels with a desired position and a width, in ascending order. Labels do not overlap, stay between `low` and `high` if there is
+/// space, and are as close to their desired positions as possible.
 fn apart(wishes: &[(f64, f64)], low: f64, high: f64) -> Vec<f64> {
-    // Words that touch move as one block, whose place is the mean of what its words wish.
+    // Touching labels move as one block at the mean of their desired positions.
     struct Block {
         wish: f64,
         width: f64,
@@ -650,7 +650,7 @@ fn apart(wishes: &[(f64, f64)], low: f64, high: f64) -> Vec<f64> {
                 blocks.push(before);
                 break;
             }
-            // The middle of a block that grows at its end is the place of its words, shifted by their own offset.
+            // A block that grows at its end keeps the offsets of its labels.
             let shift = |block: &Block, by: f64| block.wish + by * block.words as f64;
             let wish = shift(&before, 0.5 * last.width) + shift(&last, -0.5 * before.width);
             last = Block { wish, width: before.width + last.width, words: before.words + last.words };
@@ -669,7 +669,7 @@ fn apart(wishes: &[(f64, f64)], low: f64, high: f64) -> Vec<f64> {
     places
 }
 
-/// A line in pieces, where points without a place cut it.
+/// The pieces of a line, cut at points with NaN.
 fn pieces(points: impl Iterator<Item = (f64, f64)>) -> Vec<Vec<(f64, f64)>> {
     let mut pieces = vec![Vec::new()];
     for point in points {
@@ -682,13 +682,13 @@ fn pieces(points: impl Iterator<Item = (f64, f64)>) -> Vec<Vec<(f64, f64)>> {
     pieces
 }
 
-/// Draws lines that are seen on any colour.
+/// Draws lines that are visible on any colour.
 fn draw_contour(canvas: &mut Canvas, lines: &[Vec<(f64, f64)>], stroke: &Stroke) {
     canvas.lines(lines, &Stroke::solid("#fff", stroke.width + 1.2));
     canvas.lines(lines, stroke);
 }
 
-/// Draws the name of a row near its mark, on the side where it stays inside.
+/// Draws the name of a row near its mark, on the side with space.
 fn draw_name(canvas: &mut Canvas, area: Area, (x, y): (f64, f64), name: &str) {
     let wide = NOTE_SIZE * label::width(name) + 4.0;
     let (place, anchor) =
@@ -697,13 +697,13 @@ fn draw_name(canvas: &mut Canvas, area: Area, (x, y): (f64, f64), name: &str) {
     canvas.text((place, line), name, &Text { anchor, colour: "#333", ..NOTE });
 }
 
-/// Draws a star clear of the frame: near it, the star stands inside and a line leads to its place.
+/// Draws a star clear of the frame: near the frame it is moved inside, and a line leads to its position.
 fn draw_clear_star(canvas: &mut Canvas, area: Area, (x, y): (f64, f64)) {
     let room = STAR_RADIUS + 1.4;
     let inside = |value: f64, start: f64, length: f64| value.min(start + length - room).max(start + room);
     let mut place = (inside(x, area.x, area.width), inside(y, area.y, area.height));
     if place != (x, y) {
-        // Farther in, so that the line is seen.
+        // Farther inside, so that the line is visible.
         let away = (place.0 - x).hypot(place.1 - y);
         let farther = |here: f64, from: f64| here + 1.5 * (here - from) / away * STAR_RADIUS;
         place = (farther(place.0, x), farther(place.1, y));

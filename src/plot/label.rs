@@ -1,29 +1,29 @@
-//! Words in pictures: a small markup for symbols, the symbols of columns and units, and how wide a text is.
+//! Text in pictures: a small markup for symbols, the symbols of columns and units, and the width of a text.
 //!
-//! `*…*` is italic, `_{…}` below and `^{…}` above the line, as in `*t*_{f} (*l*/*v*_{0})`; `∗` is an asterisk, and all else stands for
-//! itself.
+//! `*…*` is italic, `_{…}` below and `^{…}` above the line, as in `*t*_{f} (*l*/*v*_{0})`; `∗` is an asterisk, and all other characters are
+//! literal.
 
 use std::sync::OnceLock;
 
 use ttf_parser::Face;
 
-/// The fonts of every picture, upright and italic: Arimo, as wide as Arial, Helvetica and Liberation Sans, one of which a viewer of an
-/// SVG has. Their licence is in the same folder.
+/// The fonts of every picture, upright and italic: Arimo has the widths of Arial, Helvetica and Liberation Sans, one of which every SVG viewer
+/// has. Their licence is in the same folder.
 pub const FONTS: [&[u8]; 2] = [include_bytes!("fonts/arimo-Regular.ttf"), include_bytes!("fonts/arimo-Italic.ttf")];
 
 /// The families of a text, in the order of preference.
 pub const FAMILIES: &str = "Arimo, Arial, 'Liberation Sans', Helvetica, sans-serif";
 
-/// Size of letters above or below the line, relative to those on it. Chosen: as TeX sets them at this size.
+/// Size of subscripts and superscripts, relative to other letters. Chosen: as in TeX at this size.
 pub const SCRIPT_SIZE: f64 = 0.72;
 
-/// Distance of superscripts above the line, relative to the size of letters. Chosen: their tops are those of capitals.
+/// Rise of superscripts, relative to the size of letters. Chosen: their tops align with capitals.
 pub const SUPERSCRIPT_RISE: f64 = 0.38;
 
-/// Distance of subscripts below the line, relative to the size of letters. Chosen: they stay clear of the next line.
+/// Drop of subscripts, relative to the size of letters. Chosen: they stay clear of the next line.
 pub const SUBSCRIPT_DROP: f64 = 0.2;
 
-/// Some letters in one style.
+/// A run of letters in one style.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct TextRun {
     /// The letters.
@@ -57,7 +57,7 @@ pub fn spans(markup: &str) -> Vec<TextRun> {
     spans
 }
 
-/// A text of the user's, in which signs of markup mean nothing.
+/// A user's text with escaped markup.
 pub fn literal(text: &str) -> String {
     text.chars().map(|letter| if letter.is_control() || "*_^{}".contains(letter) { ' ' } else { letter }).collect()
 }
@@ -83,7 +83,7 @@ pub fn plain(markup: &str) -> String {
     spans(markup).into_iter().map(|span| span.text).collect()
 }
 
-/// The symbol of a quantity, a column or a unit, in markup: an italic letter, with what follows the first `_` below the line.
+/// The symbol of a quantity, a column or a unit, in markup: an italic letter, with the text after the first `_` as subscript.
 fn symbol(name: &str) -> Option<String> {
     let known = match name {
         "dt" => "d*t*",
@@ -102,6 +102,14 @@ fn symbol(name: &str) -> Option<String> {
         "hamiltonian" => "d*W*∗/d*t*_{f}",
         "t_free_in" => "*t*_{free in}",
         "t_free_out" => "*t*_{free out}",
+        "costate" => "∂*W*/∂*θ*",
+        "gain" => "∂*v*/∂*θ*",
+        "dwork_da" => "∂*W*∗/∂*a*",
+        "dwork_db" => "∂*W*∗/∂*b*",
+        "dwork_dv_i" => "∂*W*∗/∂*v*_{i}",
+        "dwork_dv_f" => "∂*W*∗/∂*v*_{f}",
+        "dwork_dv_ceiling" => "∂*W*∗/∂*v*_{ceiling}",
+        "dwork_dtau_ceiling" => "∂*W*∗/∂*τ*_{ceiling}",
         "k_c_i" => "*k*_{c}(*v*_{i})",
         "k_c_f" => "*k*_{c}(*v*_{f})",
         "stiffness_ratio" => "*k t*_{f}^{2}/*m*",
@@ -132,7 +140,7 @@ pub fn name(column: &str) -> String {
     symbol(column).unwrap_or_else(|| column.replace('_', " "))
 }
 
-/// The symbols that units of the model are made of. In SI, letters are upright and `m` is a metre.
+/// The symbols in scaled units. In SI units, letters are upright and `m` is a metre.
 const SCALES: [&str; 5] = ["mu_0", "sigma", "l", "v_0", "t_f"];
 
 fn scale(word: &str) -> String {
@@ -148,9 +156,9 @@ pub fn equation(column: &str, value: &str, of: &str) -> String {
     }
 }
 
-/// A unit in markup; nothing for a pure number.
+/// A unit in markup; empty for a pure number.
 pub fn unit(unit: &str) -> String {
-    // Units of columns may go on after a semicolon for special cases.
+    // The unit of a column may continue after a semicolon for special cases.
     let unit = unit.split(';').next().unwrap_or("").trim();
     if unit == "1" {
         return String::new();
@@ -167,7 +175,7 @@ pub fn unit(unit: &str) -> String {
     unit.split_inclusive(between).map(typeset).collect()
 }
 
-/// The label of an axis: name and unit, and the power of ten that its numbers leave out.
+/// The label of an axis: name, unit and the common power of ten of its numbers.
 pub fn axis(column: &str, of: &str, power: i32) -> String {
     let scale = if power == 0 { String::new() } else { format!("10^{{{}}}", signed(power)) };
     let inside = match (scale.is_empty(), unit(of)) {
@@ -189,12 +197,12 @@ pub fn signed(value: i32) -> String {
     if value < 0 { format!("−{}", value.unsigned_abs()) } else { value.to_string() }
 }
 
-/// A number to five digits, in markup: as a decimal from 0.001 to 99999, as ticks are.
+/// A number to five digits, in markup; as a decimal from 0.001 to 99999, like ticks.
 pub fn number(value: f64) -> String {
     number_among(value, &[])
 }
 
-/// A number in the format that all of `others` have: with a power of ten if one of them needs it.
+/// A number in the common format of `others`: with a power of ten if one of them needs it.
 pub fn number_among(value: f64, others: &[f64]) -> String {
     let needs_power = |other: &f64| other.is_finite() && *other != 0.0 && !(1e-3..99_999.5).contains(&other.abs());
     let as_powers = others.iter().any(needs_power);
@@ -222,15 +230,15 @@ pub fn number_among(value: f64, others: &[f64]) -> String {
     }
 }
 
-/// Without zeros at the end of the decimals.
+/// Removes trailing zeros of the decimals.
 fn trimmed(digits: &str) -> &str {
     if digits.contains('.') { digits.trim_end_matches('0').trim_end_matches('.') } else { digits }
 }
 
-/// Cuts a text in markup into lines of at most `most` (in units of the font size), between words, but not near a sign of equality.
+/// Breaks a text in markup into lines of at most `most` (in units of the font size), at spaces, but not around an equality sign.
 pub fn wrapped(markup: &str, most: f64) -> Vec<String> {
     let mut lines: Vec<String> = Vec::new();
-    // Spaces within equations, while the text is cut.
+    // Spaces within equations are protected during line breaking.
     let markup = markup.replace(" = ", "\u{a0}=\u{a0}");
     for word in markup.split(' ') {
         let word = &word.replace('\u{a0}', " ");
@@ -247,7 +255,7 @@ pub fn wrapped(markup: &str, most: f64) -> Vec<String> {
 
 #[cfg(test)]
 mod tests {
-    //! Labels as shown.
+    //! Labels in their final form.
 
     use super::*;
 

@@ -1,4 +1,4 @@
-//! Pictures of traces and tables: a figure is set out, drawn as SVG, and written as SVG, PNG or PDF.
+//! Pictures of traces and tables: a figure is laid out, drawn as SVG, and written as SVG, PNG or PDF.
 
 mod canvas;
 mod coincide;
@@ -23,8 +23,8 @@ pub use page::Page;
 pub use scale::Scale;
 pub use symbol::Symbol;
 
-/// Width of a picture in one column, in millimetres. That of Nature's journals.
+/// Width of a picture in one column, in millimetres, as in Nature's journals.
 pub const COLUMN: f64 = 89.0;
 
-/// Width of a picture over two columns, in millimetres. That of Nature's journals.
+/// Width of a picture over two columns, in millimetres, as in Nature's journals.
 pub const PAGE: f64 = 183.0;

@@ -1,4 +1,4 @@
-//! A page of HTML that holds everything it shows: sections, pictures whose maps show their values, sortable tables.
+//! A self-contained HTML page: sections, pictures whose maps show their values, sortable tables.
 
 use super::canvas::escaped;
 use super::figure::{Axis, Hover, HoverMap, SvgFigure};
@@ -6,8 +6,7 @@ use super::figure::{Axis, Hover, HoverMap, SvgFigure};
 const STYLE: &str = include_str!("page/style.css");
 const SCRIPT: &str = include_str!("page/script.js");
 
-/// Values of the maps of a picture that go into the page: of finer maps every second cell along both axes, or every third. Chosen: a few
-/// megabytes of text.
+/// Greatest number of map values of a picture in the page; finer maps are thinned along both axes. Chosen: a few megabytes of text.
 const MAX_CELLS: usize = 500_000;
 
 /// A page under construction.
@@ -34,7 +33,7 @@ impl Page {
         self.body.push_str(&format!("<p>{}</p>\n", escaped(text)));
     }
 
-    /// Text as it is, such as a spec.
+    /// Preformatted text, such as a spec.
     pub fn verbatim(&mut self, text: &str) {
         self.body.push_str(&format!("<pre>{}</pre>\n", escaped(text)));
     }
@@ -57,7 +56,7 @@ impl Page {
     pub fn picture(&mut self, drawn: &SvgFigure) {
         self.pictures += 1;
         let place = self.pictures;
-        // The names of clip paths hold in the whole page.
+        // The names of clip paths must be unique in the page.
         let svg = drawn
             .svg
             .replace("id=\"clip", &format!("id=\"p{place}-clip"))

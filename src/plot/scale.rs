@@ -1,17 +1,18 @@
-//! Scales of axes and colours: linear or logarithmic, their ticks, and when a logarithm shows more.
+//! Scales of axes and colours: linear or logarithmic, their ticks, and the choice between them.
 
 use super::label;
 
-/// Ratio of the greatest to the least value, from which on a logarithm is used. Chosen: a decade and a half.
+/// Ratio of the greatest to the least value from which the scale is logarithmic. Chosen: a decade and a half.
 pub const LOG_RATIO: f64 = 30.0;
 
-/// The same ratio of the values above zero where others are zero, which a logarithm cannot show. Chosen: many decades are worth their loss.
+/// Ratio of the positive values from which the scale is logarithmic although other values are zero and are not drawn. Chosen: many decades
+/// matter more.
 const LOG_RATIO_WITH_ZERO: f64 = 1e9;
 
-/// Size, relative to the greatest value, below which values may be zeros: a few thousand roundings of 1.1e-16 each.
+/// Size, relative to the greatest value, below which values may be rounded zeros: a few thousand roundings of 1.1e-16.
 const ROUNDING_RTOL: f64 = 1e-12;
 
-/// Decades without a value that part such zeros from values. Chosen: neighbouring points of a curve are closer.
+/// Number of empty decades between such zeros and other values. Chosen: neighbouring points of a curve are closer.
 const EMPTY_DECADES: usize = 6;
 
 /// A range of values, and whether it is shown logarithmically.
@@ -21,31 +22,30 @@ pub struct Scale {
     pub low: f64,
     /// The value at the end.
     pub high: f64,
-    /// Whether equal ratios are equally far apart.
+    /// Whether the scale is logarithmic.
     pub log: bool,
 }
 
 /// A mark of a scale.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Tick {
-    /// Where it is, 0 at the start of the scale and 1 at the end.
+    /// Its position: 0 at the start of the scale, 1 at the end.
     pub fraction: f64,
-    /// Its text in markup; none for a small mark.
+    /// Its text in markup; `None` for a small tick.
     pub label: Option<String>,
 }
 
 /// The ticks of a scale.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Ticks {
-    /// In ascending order.
+    /// The ticks in ascending order.
     pub ticks: Vec<Tick>,
-    /// The power of ten by which the labels are to be multiplied.
+    /// The common power of ten of the labels.
     pub power: i32,
 }
 
 impl Scale {
-    /// The scale of `values`, logarithmic where they are positive and span a large ratio; zeros made of rounding errors do not stretch
-    /// it. `None` without any.
+    /// The scale of `values`: logarithmic if they are positive and span a large ratio. Rounded zeros do not extend it. `None` without values.
     pub fn of(values: impl IntoIterator<Item = f64>) -> Option<Scale> {
         let finite: Vec<f64> = values.into_iter().filter(|value| value.is_finite()).collect();
         let span = |values: &mut dyn Iterator<Item = f64>| {
@@ -65,7 +65,7 @@ impl Scale {
         Some(if high / least >= ratio { Scale { low: least, high, log: true } } else { linear })
     }
 
-    /// With a little room at both ends; a single value gets some around it.
+    /// The scale with some space at both ends, also around a single value.
     pub fn with_room(self, fraction: f64) -> Scale {
         if self.log {
             let room = (self.high / self.low).ln().max(1e-3) * fraction;
@@ -102,7 +102,7 @@ impl Scale {
         }
     }
 
-    /// About `count` labelled ticks; those of a logarithm as powers of ten if `as_powers`, else as decimals.
+    /// About `count` labelled ticks; logarithmic ticks are powers of ten if `as_powers`, else decimals.
     pub fn ticks(&self, count: usize, as_powers: bool) -> Ticks {
         if self.log { self.powers(count, as_powers) } else { self.steps(count) }
     }
@@ -176,9 +176,9 @@ impl Scale {
     }
 }
 
-/// The greatest of the values that are zeros made of rounding errors; 0 without any.
+/// The greatest of the values that are rounded zeros; 0 if there are none.
 fn rounding(values: &[f64], high: f64) -> f64 {
-    // Decades below the greatest value, of which doubles have fewer than 640.
+    // Decades below the greatest value; doubles have fewer than 640.
     let decade = |value: f64| (high.log10() - value.log10()).floor().clamp(0.0, 639.0) as usize;
     let mut used = [false; 640];
     values.iter().filter(|value| **value > 0.0).for_each(|value| used[decade(*value)] = true);
@@ -193,7 +193,7 @@ fn rounding(values: &[f64], high: f64) -> f64 {
     0.0
 }
 
-/// Whether values in ascending order are better shown by their logarithms: equal ratios, or a large one.
+/// Whether ascending values are better shown on a logarithmic scale: their ratios are equal, or their range is large.
 pub fn is_logarithmic(values: &[f64]) -> bool {
     let (Some(&low), Some(&high)) = (values.first(), values.last()) else { return false };
     if low <= 0.0 || values.len() < 2 {
@@ -213,7 +213,7 @@ pub fn is_logarithmic(values: &[f64]) -> bool {
             return high / low > 3.0;
         }
     }
-    // Of uneven values, such as samples, half are to be left of the middle.
+    // For uneven values, such as samples, about half should be left of the middle.
     let scale = |log| Scale { low, high, log };
     let off = |log: bool| (scale(log).fraction(values[values.len() / 2]) - 0.5).abs();
     high / low >= LOG_RATIO && (values.len() < 4 || off(true) <= off(false))
@@ -221,7 +221,7 @@ pub fn is_logarithmic(values: &[f64]) -> bool {
 
 #[cfg(test)]
 mod tests {
-    //! Ticks as a reader sees them.
+    //! Ticks in their final form.
 
     use super::*;
 
@@ -248,7 +248,7 @@ mod tests {
         assert_eq!(labels(scale(1e-7, 1.0), 4), ["10^{−6}", "10^{−4}", "10^{−2}", "10^{0}"]);
         assert_eq!(labels(scale(0.01, 10.0), 4), ["0.01", "0.1", "1", "10"]);
         assert_eq!(labels(scale(3.0, 7.0), 4), ["3", "4", "5", "6", "7"]);
-        // One format a scale: no 0.01 near a power of ten.
+        // One format for each scale: no 0.01 together with powers of ten.
         assert_eq!(labels(scale(1e-3, 1e3), 7), ["0.001", "0.01", "0.1", "1", "10", "100", "1000"]);
         assert_eq!(labels(scale(1e-4, 1.0), 5), ["10^{−4}", "10^{−3}", "10^{−2}", "10^{−1}", "10^{0}"]);
     }
@@ -257,12 +257,12 @@ mod tests {
     fn zeros_made_of_rounding_errors_do_not_stretch_a_logarithm() {
         let log = |low, high| Some(Scale { low, high, log: true });
         assert_eq!(Scale::of([1e-14, 3e-16, 0.02, 0.5, 3.0]), log(0.02, 3.0));
-        // Without them there is no need of a logarithm.
+        // Without these zeros the scale is linear.
         assert_eq!(Scale::of([1e-14, 1.0, 3.0]), Some(Scale { low: 1e-14, high: 3.0, log: false }));
-        // A curve that comes down step by step is no zero, and neither is a small number near one that is not much greater.
+        // A curve that decreases step by step is not zero, and neither is a small number near a similar one.
         assert_eq!(Scale::of([1.0, 1e-5, 1e-10, 1e-15]), log(1e-15, 1.0));
         assert_eq!(Scale::of([1.0, 1e-8]), log(1e-8, 1.0));
-        // Zeros near values of a few decades need none, near many they do.
+        // With zeros, values over a few decades have a linear scale, values over many decades a logarithmic one.
         assert_eq!(Scale::of([0.0, 1e-3, 1.0, 10.0]), Some(Scale { low: 0.0, high: 10.0, log: false }));
         assert_eq!(Scale::of([0.0, 1e-10, 1e-4, 1.0]), log(1e-10, 1.0));
     }

@@ -8,7 +8,7 @@ use super::colour::{self, hex};
 /// Radius of a symbol, in points. Chosen: twice the width of a curve on each side of it.
 const RADIUS: f64 = 2.0;
 
-/// Radius of a star, to its points and between them, in points. Chosen: it stands out among symbols.
+/// Outer radius of a star, in points. Chosen: it stands out among symbols.
 pub const STAR_RADIUS: f64 = 4.6;
 const INNER_STAR_RADIUS: f64 = 1.9;
 
@@ -35,7 +35,7 @@ impl Symbol {
         }
     }
 
-    /// Draws it around a place.
+    /// Draws the symbol around a position.
     pub fn draw(&self, canvas: &mut Canvas, (x, y): (f64, f64)) {
         let r = RADIUS;
         let corners: &[(f64, f64)] = match self.shape % 4 {

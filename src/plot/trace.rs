@@ -1,4 +1,4 @@
-//! Traces as the paper has its protocols: velocity, contact lifetime and friction over time, several of them over each other.
+//! Pictures of traces: velocity, state variable and friction over time, for several traces together.
 
 use std::collections::BTreeSet;
 use std::path::Path;
@@ -17,20 +17,19 @@ use crate::model::{Scales, Units};
 use crate::table::Kind;
 use crate::trace::COLUMNS;
 
-/// Points of a line, above which it is thinned. Chosen: four to a dot of a wide picture in print.
+/// Greatest number of points of a line; longer lines are thinned. Chosen: four points per dot of a wide picture in print.
 const MAX_POINTS: usize = 8000;
 
 /// Ratio of height to width of a panel. Chosen: three of them make a square.
 const ASPECT: f64 = 0.42;
 
-/// What a trace may hold besides the time, and what a picture shows of it, a panel each: the velocity of the block and that of the control
-/// are compared in one.
+/// The columns of each panel. The velocity of the block and the control velocity are in one panel.
 const SHOWN: [&[&str]; 3] = [&["v", "v_c"], &["theta"], &["tau"]];
 
-/// Unit of axes on which the least velocity of the model is 1.
+/// Unit of velocity axes in which the velocity floor is 1.
 const UNIT_OF_BOUND: &str = "v_0";
 
-/// A trace read back.
+/// A trace read from a file.
 #[derive(Debug, Clone)]
 pub struct TraceFile {
     /// Its name in a legend, in markup.
@@ -50,7 +49,7 @@ pub struct Column {
     pub name: String,
     /// Its unit.
     pub unit: String,
-    /// Its cells, NaN where there is none.
+    /// Its cells; NaN for null.
     pub cells: Vec<f64>,
 }
 
@@ -67,9 +66,24 @@ pub fn read(path: &Path) -> Result<TraceFile, PlotError> {
     }
     let fact = |name: &str| facts.iter().find(|(key, _)| key == &format!("slipsweep.{name}")).map(|(_, value)| value);
     let number = |name: &&str| Some(((*name).to_owned(), fact(name)?.parse().ok()?));
-    let parameters = ["t_f", "a", "b", "v_i", "v_f", "tau_ceiling", "alpha_2", "alpha_3", "k", "m", "delta_t"]
-        .iter()
-        .filter_map(number);
+    let parameters = [
+        "t_f",
+        "a",
+        "b",
+        "v_i",
+        "v_f",
+        "theta",
+        "t_left",
+        "v_ceiling",
+        "tau_ceiling",
+        "alpha_2",
+        "alpha_3",
+        "k",
+        "m",
+        "delta_t",
+    ]
+    .iter()
+    .filter_map(number);
     let name = label::literal(&fact("protocol").map_or(stem, Clone::clone));
     let points = fact("points").and_then(|points| points.parse().ok());
     Ok(TraceFile { name, parameters: parameters.collect(), columns, points })
@@ -87,8 +101,7 @@ fn parquet(path: &Path) -> Result<(Vec<Column>, Facts), PlotError> {
     Ok((headings.iter().zip(frame.columns).filter_map(column).collect(), facts))
 }
 
-/// The columns of a CSV, and what its comments `# key = value` say; without a comment on units they are those of the
-/// model.
+/// The columns of a CSV, and its comments `# key = value`. Without a comment on units, the units are scaled.
 fn csv(path: &Path, shown: &str) -> Result<(Vec<Column>, Facts), PlotError> {
     let text = file::open(path)
         .and_then(std::io::read_to_string)
@@ -130,7 +143,7 @@ fn csv(path: &Path, shown: &str) -> Result<(Vec<Column>, Facts), PlotError> {
     Ok((columns, facts))
 }
 
-/// The unit of a column of the model.
+/// The scaled unit of a column.
 fn unit(name: &str) -> &'static str {
     match COLUMNS.iter().find(|column| column.name == name).map(|column| column.kind) {
         Some(Kind::Number(unit)) => unit,
@@ -154,14 +167,14 @@ impl TraceFile {
     }
 }
 
-/// A curve of a panel: the number of its trace, that of its column, and its points.
+/// A curve of a panel: numbers of its trace and column, and its points.
 struct Curve {
     trace: usize,
     rank: usize,
     points: Vec<(f64, f64)>,
 }
 
-/// The figure of traces: a panel for each column that any of them has.
+/// The figure of traces, with a panel for each group of columns with values.
 pub fn figure(traces: &[TraceFile]) -> Result<Figure, PlotError> {
     if traces.len() > MAX_SERIES {
         return Err(PlotError::TooManyTraces { found: traces.len(), most: MAX_SERIES });
@@ -197,12 +210,12 @@ pub fn figure(traces: &[TraceFile]) -> Result<Figure, PlotError> {
     Ok(Figure { title, subtitle, panels, columns: 1, aspect: ASPECT, legend, ..Figure::default() })
 }
 
-/// The cells of a column in all courses.
+/// The cells of a column in all traces.
 fn cells(traces: &[TraceFile], name: &str) -> impl Iterator<Item = f64> {
     traces.iter().filter_map(|trace| trace.column(name)).flat_map(|column| column.cells.iter().copied())
 }
 
-/// The unit of a column, which is the same in all courses.
+/// The common unit of a column in all traces.
 fn unit_in(traces: &[TraceFile], name: &str) -> String {
     traces.iter().find_map(|trace| Some(trace.column(name)?.unit.clone())).unwrap_or_default()
 }
@@ -220,9 +233,9 @@ fn one_unit(traces: &[TraceFile]) -> Result<(), PlotError> {
     Ok(())
 }
 
-/// For each course the first one that it lies on in all panels.
+/// For each trace, the first trace with which it coincides in all panels.
 fn leaders(count: usize, panels: &[(Panel, Vec<Curve>)]) -> Vec<usize> {
-    // The curves of a course in fractions of the panel, each with its column.
+    // The curves of a trace in fractions of the panel, each with its column.
     let curves = |(panel, curves): &(Panel, Vec<Curve>), trace: usize| -> Vec<(usize, Vec<(f64, f64)>)> {
         let fraction = |(x, y): &(f64, f64)| (panel.x.scale.fraction(*x), panel.y.scale.fraction(*y));
         let own = curves.iter().filter(|curve| curve.trace == trace);
@@ -239,7 +252,7 @@ fn leaders(count: usize, panels: &[(Panel, Vec<Curve>)]) -> Vec<usize> {
     })
 }
 
-/// The panel with the curves of the courses that lead.
+/// The panel with the curves of the leading traces.
 fn draw(mut panel: Panel, curves: Vec<Curve>, traces: &[TraceFile], leaders: &[usize]) -> Panel {
     for Curve { trace, rank, points } in curves.into_iter().filter(|curve| leaders[curve.trace] == curve.trace) {
         let stroke = if rank == 0 { colour::series(trace) } else { control(trace) };
@@ -251,7 +264,7 @@ fn draw(mut panel: Panel, curves: Vec<Curve>, traces: &[TraceFile], leaders: &[u
     panel
 }
 
-/// The parameters that all courses with parameters have in common: they are said once.
+/// The common parameters of all traces with parameters, which are stated once.
 fn common(traces: &[TraceFile]) -> Vec<&(String, f64)> {
     let mut known = traces.iter().map(|trace| &trace.parameters).filter(|parameters| !parameters.is_empty());
     let first = known.next().into_iter().flatten();
@@ -287,7 +300,7 @@ fn legend(traces: &[TraceFile], leaders: &[usize], common: &[&(String, f64)]) ->
     legend
 }
 
-/// The line of the control velocity of a course: thinner than that of the block.
+/// The line of the control velocity of a trace, thinner than that of the block.
 fn control(place: usize) -> Stroke {
     Stroke { width: 0.5, ..colour::series(place) }
 }
@@ -295,12 +308,12 @@ fn control(place: usize) -> Stroke {
 /// The unit of a parameter of a trace whose times are in `time`.
 fn unit_of(parameter: &str, time: &str) -> &'static str {
     let of = Quantity::from_name(parameter).map_or("1", |quantity| quantity.unit(grid::Scale::Duration));
-    // Names of units in SI do not depend on the scales.
+    // Names of SI units do not depend on the scales.
     let scales = Scales { mu_0: 1.0, l: 1.0, v_0: 1.0, normal_stress: 1.0 };
     if time == "s" { Units::Si(scales).name(of) } else { of }
 }
 
-/// The first, least, greatest and last point of each stretch of time, where there are more points than a picture shows.
+/// The first, least, greatest and last point of each time interval, if there are more points than a picture shows.
 fn thinned(points: Vec<(f64, f64)>) -> Vec<(f64, f64)> {
     if points.len() <= MAX_POINTS {
         return points;
@@ -317,7 +330,7 @@ fn thinned(points: Vec<(f64, f64)>) -> Vec<(f64, f64)> {
 
 #[cfg(test)]
 mod tests {
-    //! Thinning keeps what is seen.
+    //! Thinning preserves the visible curve.
 
     use super::*;
 

@@ -1,60 +1,62 @@
 //! Error bounds of works, from a second solve at the tightest tolerance.
 //!
-//! Quadratures converge geometrically, so their error is the distance from a finer one but for a small fraction of it.
-//! Rounding is a few units in the last place of the terms of the work.
+//! Quadratures converge geometrically, so their error is the distance from a finer one, up to a small fraction. Rounding is a few units in the
+//! last place of the terms of the work.
 
 use crate::model::{Law, Transition};
 use crate::numerics::elementary::ln;
-use crate::protocol::optimal::{self, Optimum};
+use crate::protocol::optimal::{self, Bounds, Optimum};
 use crate::protocol::shortcut::{Case, Family, Shortcut};
 use crate::protocol::{Solved, SolverStats, Status};
 
-/// Relative tolerance of the second solve: the tightest that solvers resolve from rounding.
+/// Relative tolerance of the second solve: the tightest above rounding.
 pub const TIGHTEST_RTOL: f64 = 1e-15;
 
-/// Error of a solve to [`TIGHTEST_RTOL`] without rounding, fraction of its distance from a coarser one, at most. Chosen.
+/// Greatest error of a solve to [`TIGHTEST_RTOL`] without rounding, as a fraction of its distance from a coarser one. Chosen.
 const ERROR_OF_TIGHTEST: f64 = 0.25;
 
-/// Relative rounding of a sum of some hundred positive terms, each good to a few units in the last place.
+/// Relative rounding error of a sum of some hundred positive terms, each accurate to a few units in the last place.
 const ROUNDING: f64 = 20.0 * f64::EPSILON;
 
-/// Error bound of the number `found`, where a solve to [`TIGHTEST_RTOL`] gives `finest`; `scale` is the size of its terms.
+/// Error bound of the number `found`, if a solve to [`TIGHTEST_RTOL`] gives `finest`; `scale` is the size of its terms.
 pub fn bound(found: f64, finest: f64, scale: f64) -> f64 {
     (1.0 + ERROR_OF_TIGHTEST) * (found - finest).abs() + ROUNDING * scale.abs()
 }
 
 /// Error bound of the work of a free cubic shortcut of least velocity `v_min` in time `t_f`.
 ///
-/// Its sum without logarithms is rounded twice as much. Slow sliding and a long theta may take friction below 0, so that
-/// the work is less than its terms.
+/// Its sum without logarithms has twice the rounding. In slow sliding with large theta friction may be negative, so that the work is smaller
+/// than its terms.
 pub fn of_shortcut(transition: &Transition, t_f: f64, v_min: f64, work: f64, finest: f64) -> f64 {
     let Transition { law: Law { a, b }, v_i, v_f } = *transition;
     let terms = 1.0 + a * (-ln(v_min)).max(0.0) + b * ln(v_i.max(v_f));
     bound(work, finest, 2.0 * terms * work.abs().max(v_min * t_f))
 }
 
-/// Error bound of the gap `found`, where a solve to [`TIGHTEST_RTOL`] gives `finest`: a difference of two sums of about the
-/// size `replaced`.
+/// Error bound of the gap `found`, if a solve to [`TIGHTEST_RTOL`] gives `finest`: a difference of two sums of about the size `replaced`.
 pub fn of_excess(found: f64, finest: f64, replaced: f64) -> f64 {
     bound(found, finest, found.abs() + 0.5 * replaced.abs())
 }
 
-/// Error bound of the work of `optimum`, found by [`optimal::solve`] with these arguments; `None` where the second solve
-/// fails.
+/// Error bound of the work of `optimum`, found by [`optimal::solve`] with these arguments; `None` if the second solve fails.
 ///
-/// The sensitivity to `t_f` is `dW*/dt_f`, so that rounding of times counts where the work is a small difference.
-pub fn of_optimum(transition: &Transition, t_f: f64, bounded: bool, optimum: &Optimum) -> (Option<f64>, SolverStats) {
-    let Solved { status, value, stats } = optimal::solve(transition, t_f, bounded, TIGHTEST_RTOL);
+/// The sensitivity to `t_f` is `dW*/dt_f`, so that the rounding of times matters if the work is a small difference.
+pub fn of_optimum(
+    transition: &Transition,
+    t_f: f64,
+    bounds: impl Into<Bounds>,
+    optimum: &Optimum,
+) -> (Option<f64>, SolverStats) {
+    let Solved { status, value, stats } = optimal::solve(transition, t_f, bounds, TIGHTEST_RTOL);
     let finest = value.filter(|_| status != Status::NotConverged);
     let scale = optimum.work.abs() + 0.25 * (optimum.hamiltonian * t_f).abs();
     (finest.map(|finest| bound(optimum.work, finest.work, scale)), stats)
 }
 
-/// Error bound of the work of a `member` of a family, found for this case; `None` where the second solve fails.
+/// Error bound of the work of a `member` of a family, found for this case; `None` if the second solve fails.
 ///
-/// A third solve with a little more time measures the effect of rounding of the time, which counts near `t_min`. Where
-/// friction is bounded, theta and `v` are powers `e^((tau - 1)/a)`, whose exponent is rounded. The factor for velocities
-/// far apart is measured.
+/// A third solve with a slightly longer duration measures the effect of its rounding, which matters near `t_min`. With bounded friction, theta
+/// and `v` are powers `e^((tau - 1)/a)` with a rounded exponent. The factor for very different velocities is measured.
 pub fn of_member(family: &dyn Family, case: &Case, member: &Shortcut, stats: &mut SolverStats) -> Option<f64> {
     let finest = family.solve(case, TIGHTEST_RTOL, stats).ok()?;
     let Transition { law: Law { a, b }, v_i, v_f } = case.transition;

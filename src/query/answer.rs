@@ -1,21 +1,18 @@
-//! An answer: its columns, and its rows a piece at a time.
+//! The answer to a query: its columns, and its rows piece by piece.
 
 use std::io::{self, Write};
-use std::sync::{Arc, Mutex};
+use std::sync::Arc;
 
 use arrow_array::builder::StringDictionaryBuilder;
 use arrow_array::types::Int32Type;
-use arrow_array::{
-    ArrayRef, BooleanArray, Date32Array, Float64Array, Int64Array, RecordBatch, StringArray, TimestampMicrosecondArray,
-};
-use arrow_schema::{DataType as ArrowType, Schema as ArrowSchema, SchemaRef, TimeUnit};
+use arrow_array::{ArrayRef, BooleanArray, Float64Array, Int64Array, RecordBatch, StringArray};
+use arrow_schema::{DataType as ArrowType, Schema as ArrowSchema, SchemaRef};
 use parquet::arrow::ArrowWriter;
 use parquet::basic::Compression;
 use parquet::errors::ParquetError;
 use parquet::file::properties::WriterProperties;
 use polars::prelude::{
     AnyValue, Column, DataFrame, DataType, IntoLazy, LazyFrame, PolarsError, PolarsResult, Series, SortMultipleOptions,
-    TimeUnit as PolarsTimeUnit,
 };
 use polars_io::SerWriter;
 use polars_io::prelude::CsvWriter;
@@ -26,13 +23,13 @@ use super::scan::{Files, append};
 use super::streaming::{Key, PARTS, StreamPlan};
 use crate::dataset::{Cell, field, guarded, label};
 
-/// Rows that are handed over at a time. Chosen: few enough that a reader sees the first ones soon.
+/// Rows of a piece. Chosen: few enough that a reader sees the first ones soon.
 const PIECE: usize = 1 << 14;
 
 /// Rows of partial answers that are merged before more are computed. Chosen: ten columns of 2^22 doubles are 336 MB.
 const MOST_PARTIAL: usize = 1 << 22;
 
-/// An answer that is found while it is read.
+/// An answer, computed while it is read.
 pub struct Answer {
     columns: Vec<String>,
     units: Vec<String>,
@@ -43,9 +40,9 @@ pub struct Answer {
 /// The format of an answer in a file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Format {
-    /// Names of the columns and then a line a row; nothing where there is no value.
+    /// A line with the names of the columns, then a line for each row; a missing value is empty.
     Csv,
-    /// A JSON object a line; null where there is no value.
+    /// A JSON object for each row, on a line; a missing value is null.
     JsonLines,
     /// Parquet.
     Parquet,
@@ -80,7 +77,7 @@ impl From<ParquetError> for AnswerError {
 type Take<'a> = &'a mut dyn FnMut(&DataFrame) -> Result<(), AnswerError>;
 
 impl Answer {
-    /// The answer that `frame` will give, with `columns` in these `units`; or `streaming` of files.
+    /// The answer from `frame`, with `columns` in these `units`; or from `streaming` of files.
     pub(super) fn new(
         frame: LazyFrame,
         columns: Vec<String>,
@@ -95,16 +92,16 @@ impl Answer {
         self.columns.clone()
     }
 
-    /// The units of its columns, empty where none is known.
+    /// The units of its columns; empty if unknown.
     pub fn units(&self) -> Vec<String> {
         self.units.clone()
     }
 
-    /// Hands its rows to `take`, some thousands at a time.
+    /// Passes its rows to `take`, some thousands at a time.
     ///
     /// # Errors
     ///
-    /// If it cannot be found, or `take` fails.
+    /// If the answer cannot be computed, or `take` fails.
     pub fn rows(self, mut take: impl FnMut(Vec<Vec<Cell>>) -> io::Result<()>) -> Result<(), AnswerError> {
         self.find(&mut |piece| {
             let columns: Vec<Vec<Cell>> = piece.columns().iter().map(cells).collect();
@@ -114,11 +111,11 @@ impl Answer {
         })
     }
 
-    /// Writes it to `out`.
+    /// Writes the answer to `out`.
     ///
     /// # Errors
     ///
-    /// If it cannot be found or written.
+    /// If the answer cannot be computed or written.
     pub fn write(self, format: Format, out: &mut dyn Write) -> Result<(), AnswerError> {
         let mut first = true;
         match format {
@@ -133,30 +130,29 @@ impl Answer {
             Format::Parquet => {
                 let units = self.units.clone();
                 let properties = WriterProperties::builder().set_compression(Compression::SNAPPY).build();
-                let written = Bytes::default();
-                let mut writer: Option<(SchemaRef, ArrowWriter<Bytes>)> = None;
+                let mut writer: Option<(SchemaRef, ArrowWriter<Vec<u8>>)> = None;
                 self.find(&mut |piece| {
                     if writer.is_none() {
                         without_lists(piece, "a Parquet answer")?;
                         let schema = arrow_schema(piece, &units);
-                        let made = ArrowWriter::try_new(written.clone(), schema.clone(), Some(properties.clone()))?;
+                        let made = ArrowWriter::try_new(Vec::new(), schema.clone(), Some(properties.clone()))?;
                         writer = Some((schema, made));
                     }
                     if let Some((schema, writer)) = &mut writer {
                         writer.write(&batch(piece, schema)?)?;
+                        out.write_all(&std::mem::take(writer.inner_mut()))?;
                     }
-                    Ok(out.write_all(&written.take())?)
+                    Ok(())
                 })?;
                 if let Some((_, writer)) = writer {
-                    writer.close()?;
+                    out.write_all(&writer.into_inner()?)?;
                 }
-                out.write_all(&written.take())?;
             }
         }
         Ok(out.flush()?)
     }
 
-    /// Finds the answer on all threads and hands it over piece by piece, at least one even if there is no row.
+    /// Computes the answer on all threads and passes it on piece by piece: at least one piece, even without rows.
     fn find(self, take: Take) -> Result<(), AnswerError> {
         let Answer { frame, streaming, .. } = self;
         match streaming {
@@ -165,7 +161,7 @@ impl Answer {
             }
             Some((files, streaming)) => match guarded(|| combine(&files, &streaming)) {
                 Some(Ok(found)) => hand(&found, take),
-                // What cannot be merged may be answered in one piece; if not, that error is the one to report.
+                // An answer that cannot be merged may be computed in one piece; if that fails, its error is reported.
                 _ => hand(&whole(frame)?, take),
             },
             None => hand(&whole(frame)?, take),
@@ -182,7 +178,7 @@ fn unsupported() -> PolarsError {
     PolarsError::ComputeError("polars does not support it".into())
 }
 
-/// Hands `found` over, some rows at a time.
+/// Passes `found` on, piece by piece.
 fn hand(found: &DataFrame, take: Take) -> Result<(), AnswerError> {
     let mut start = 0;
     loop {
@@ -194,7 +190,7 @@ fn hand(found: &DataFrame, take: Take) -> Result<(), AnswerError> {
     }
 }
 
-/// Pieces that are answered at a time. Chosen: several for each thread, so that none waits long for another.
+/// Number of pieces in progress. Chosen: several for each thread, so that no thread waits long for another.
 fn at_once() -> usize {
     4 * rayon::current_num_threads()
 }
@@ -212,7 +208,7 @@ fn ask(files: &[Files], streaming: &StreamPlan) -> PolarsResult<Vec<DataFrame>> 
     files.par_iter().map(answer).collect()
 }
 
-/// Hands rows over as they are read.
+/// Passes rows on as they are read.
 fn stream(files: &Files, streaming: &StreamPlan, take: Take) -> Result<(), AnswerError> {
     let mut skip = streaming.offset;
     let mut left = streaming.limit;
@@ -234,7 +230,7 @@ fn stream(files: &Files, streaming: &StreamPlan, take: Take) -> Result<(), Answe
     Ok(())
 }
 
-/// The answer, put together from those of pieces.
+/// The answer, merged from partial answers.
 fn combine(files: &Files, streaming: &StreamPlan) -> PolarsResult<DataFrame> {
     let most = streaming.limit.map(|limit| limit.saturating_add(streaming.offset));
     let mut parts = DataFrame::default();
@@ -262,7 +258,7 @@ fn merged(parts: DataFrame, streaming: &StreamPlan, most: Option<usize>) -> Pola
     }
 }
 
-/// `rows` ordered by their columns `__k0`, ..., at most `limit` of them after the first `offset`.
+/// `rows` in the order of their columns `__k0`, ...: at most `limit` rows after the first `offset`.
 fn ordered(rows: DataFrame, keys: &[Key], offset: usize, limit: Option<usize>) -> PolarsResult<DataFrame> {
     let rows = if keys.is_empty() {
         rows
@@ -280,28 +276,6 @@ fn ordered(rows: DataFrame, keys: &[Key], offset: usize, limit: Option<usize>) -
         frame.collect()?
     };
     Ok(rows.slice(i64::try_from(offset).unwrap_or(i64::MAX), limit.unwrap_or(usize::MAX)))
-}
-
-/// Bytes on their way from a writer to where they belong.
-#[derive(Clone, Default)]
-struct Bytes(Arc<Mutex<Vec<u8>>>);
-
-impl Bytes {
-    fn take(&self) -> Vec<u8> {
-        self.0.lock().map(|mut bytes| std::mem::take(&mut *bytes)).unwrap_or_default()
-    }
-}
-
-impl Write for Bytes {
-    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
-        let mut kept = self.0.lock().map_err(|_| io::ErrorKind::Other)?;
-        kept.extend_from_slice(bytes);
-        Ok(bytes.len())
-    }
-
-    fn flush(&mut self) -> io::Result<()> {
-        Ok(())
-    }
 }
 
 /// The cells of a column.
@@ -355,12 +329,12 @@ fn json(value: &AnyValue) -> serde_json::Value {
     }
 }
 
-/// A number; JSON has words for the others alone: "inf", "-inf", "NaN".
+/// A number as JSON; numbers that are not finite become words: "inf", "-inf", "NaN".
 fn json_number(number: f64) -> serde_json::Value {
     if number.is_finite() { number.into() } else { number.to_string().into() }
 }
 
-/// Checks that no column holds lists, which the format lacks.
+/// Checks that no column contains lists, which the format does not support.
 fn without_lists(piece: &DataFrame, format: &str) -> PolarsResult<()> {
     let Some(list) = piece.columns().iter().find(|column| column.dtype().is_nested()) else { return Ok(()) };
     let (name, format) = (list.name(), format);
@@ -369,7 +343,7 @@ fn without_lists(piece: &DataFrame, format: &str) -> PolarsResult<()> {
     ))
 }
 
-/// The columns of a piece as they are written to Parquet, with their units.
+/// The Parquet schema of a piece, with units.
 fn arrow_schema(piece: &DataFrame, units: &[String]) -> SchemaRef {
     let columns = piece.columns().iter().zip(units.iter().map(String::as_str).chain(std::iter::repeat("")));
     let fields = columns.map(|(column, unit)| {
@@ -377,8 +351,6 @@ fn arrow_schema(piece: &DataFrame, units: &[String]) -> SchemaRef {
             kind if kind.is_float() => ArrowType::Float64,
             kind if kind.is_integer() => ArrowType::Int64,
             DataType::Boolean => ArrowType::Boolean,
-            DataType::Date => ArrowType::Date32,
-            DataType::Datetime(..) => ArrowType::Timestamp(TimeUnit::Microsecond, None),
             kind if kind.is_categorical() => label(),
             _ => ArrowType::Utf8,
         };
@@ -387,7 +359,7 @@ fn arrow_schema(piece: &DataFrame, units: &[String]) -> SchemaRef {
     Arc::new(ArrowSchema::new(fields.collect::<Vec<_>>()))
 }
 
-/// A piece as it is written to Parquet.
+/// A piece as a record batch for Parquet.
 fn batch(piece: &DataFrame, schema: &SchemaRef) -> Result<RecordBatch, AnswerError> {
     let mut arrays: Vec<ArrayRef> = Vec::new();
     for (column, field) in piece.columns().iter().zip(schema.fields()) {
@@ -396,12 +368,6 @@ fn batch(piece: &DataFrame, schema: &SchemaRef) -> Result<RecordBatch, AnswerErr
             ArrowType::Float64 => Arc::new(series.cast(&DataType::Float64)?.f64()?.iter().collect::<Float64Array>()),
             ArrowType::Int64 => Arc::new(series.strict_cast(&DataType::Int64)?.i64()?.iter().collect::<Int64Array>()),
             ArrowType::Boolean => Arc::new(series.bool()?.iter().collect::<BooleanArray>()),
-            ArrowType::Date32 => Arc::new(series.cast(&DataType::Int32)?.i32()?.iter().collect::<Date32Array>()),
-            ArrowType::Timestamp(..) => {
-                let ticks = series.cast(&DataType::Datetime(PolarsTimeUnit::Microseconds, None))?;
-                let ticks = ticks.cast(&DataType::Int64)?;
-                Arc::new(ticks.i64()?.iter().collect::<TimestampMicrosecondArray>())
-            }
             ArrowType::Dictionary(..) => {
                 let text = series.cast(&DataType::String)?;
                 let mut words = StringDictionaryBuilder::<Int32Type>::new();

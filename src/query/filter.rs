@@ -1,5 +1,4 @@
-//! Conditions on rows that need no more than a look at one column: row groups that cannot hold such rows are not read, and rows that do not
-//! obey are dropped before polars sees them.
+//! Predicates on one column: row groups without matching rows are not read, and other rows are dropped before polars receives them.
 
 use arrow_array::cast::AsArray;
 use arrow_array::types::{Float64Type, Int32Type};
@@ -14,7 +13,7 @@ use sqlparser::ast::{BinaryOperator, Expr, UnaryOperator, Value, ValueWithSpan};
 
 use crate::dataset::label;
 
-/// The condition of a row: a comparison of a column with a constant. Null never obeys it.
+/// A predicate: the comparison of a column with a constant. Null never matches.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Condition {
     /// The column.
@@ -26,7 +25,7 @@ pub struct Condition {
 enum Test {
     Number(Comparison, f64),
     Word(Comparison, String),
-    /// Whether a word is like a pattern of SQL, or unlike it.
+    /// Whether a word matches a pattern of `LIKE`, or of `NOT LIKE`.
     Like(String, bool),
 }
 
@@ -51,7 +50,7 @@ impl Comparison {
         }
     }
 
-    /// Whether something between `least` and `most` may compare so with `bound`.
+    /// Whether the comparison with `bound` may hold for some value between `least` and `most`.
     fn allows<T: PartialOrd + ?Sized>(self, least: &T, most: &T, bound: &T) -> bool {
         match self {
             Comparison::Less => least < bound,
@@ -64,7 +63,7 @@ impl Comparison {
     }
 }
 
-/// Conditions that every row obeys which `predicate` keeps: comparisons that are joined by AND.
+/// Conditions that hold for every row kept by `predicate`: its comparisons joined by AND.
 pub fn of_predicate(predicate: &PolarsExpr) -> Vec<Condition> {
     let PolarsExpr::BinaryExpr { left, op, right } = predicate else { return Vec::new() };
     let comparison = match op {
@@ -117,7 +116,7 @@ fn constant_of(expression: &PolarsExpr) -> Option<Constant> {
     }
 }
 
-/// The conditions that a `WHERE` on a table with these columns comes to; `None` if it is more than that.
+/// The conditions that are equivalent to a `WHERE` on a table with these columns; `None` if it contains more.
 pub fn of_where(condition: Option<&Expr>, schema: &Schema) -> Option<Vec<Condition>> {
     let mut conditions = Vec::new();
     if let Some(condition) = condition {
@@ -200,7 +199,7 @@ fn literal(expression: &Expr) -> Option<Constant> {
 }
 
 impl Condition {
-    /// Whether a group of rows may hold one that obeys, for all that its statistics say.
+    /// Whether a row group may contain a matching row, according to its statistics.
     pub fn allows(&self, group: &RowGroupMetaData) -> bool {
         let chunk = group.columns().iter().find(|chunk| chunk.column_path().string() == self.column);
         let Some(statistics) = chunk.and_then(|chunk| chunk.statistics()) else { return true };
@@ -217,14 +216,14 @@ impl Condition {
         }
     }
 
-    /// Takes the rows of a batch out of `kept` that do not obey; all others stay where the column is of another type.
+    /// Removes the rows of a batch that do not match from `kept`. A column of another type removes none.
     pub fn mark(&self, batch: &RecordBatch, kept: &mut [bool]) {
         let Some(array) = batch.column_by_name(&self.column) else { return };
         match (&self.test, array.data_type()) {
             (Test::Number(comparison, bound), ArrowType::Float64) => {
                 let numbers = array.as_primitive::<Float64Type>().values();
                 let bound = *bound;
-                // As in polars, which is written here without branches: NaN is the greatest number.
+                // Without branches, and as in polars: NaN is the greatest number.
                 match comparison {
                     Comparison::Less => each(kept, numbers, |number| number < bound),
                     Comparison::AtMost => each(kept, numbers, |number| number <= bound),
@@ -260,11 +259,11 @@ fn each<T: Copy>(kept: &mut [bool], values: &[T], obeys: impl Fn(T) -> bool) {
     kept.iter_mut().zip(values).for_each(|(kept, &value)| *kept &= obeys(value));
 }
 
-/// Whether a word is like a pattern of SQL: % is any text, _ any character.
+/// Whether a word matches a pattern of `LIKE`: % is any text, _ any character.
 fn like(word: &str, pattern: &str) -> bool {
     let (word, pattern): (Vec<char>, Vec<char>) = (word.chars().collect(), pattern.chars().collect());
     let (mut letter, mut sign) = (0, 0);
-    // The last % met, and where the text after what it stands for begins: a % takes as little as it can.
+    // The last %, and the end of the text that it matches: a % matches as little as possible.
     let mut last: Option<(usize, usize)> = None;
     while letter < word.len() {
         match pattern.get(sign) {
@@ -286,89 +285,69 @@ fn like(word: &str, pattern: &str) -> bool {
     pattern[sign..].iter().all(|sign| *sign == '%')
 }
 
-/// The rows of a batch that obey all conditions.
+/// The rows of a batch that match all conditions.
 pub fn kept(conditions: &[Condition], batch: &RecordBatch) -> Vec<bool> {
     let mut kept = vec![true; batch.num_rows()];
     conditions.iter().for_each(|condition| condition.mark(batch, &mut kept));
     kept
 }
 
-/// The first rows in the order of a column of numbers.
+/// The first rows in the order of a numeric column.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Top {
     /// The column.
     pub column: String,
-    /// Whether the greatest come first.
+    /// Whether the order is descending.
     pub descending: bool,
-    /// Whether null comes last.
+    /// Whether nulls come last.
     pub nulls_last: bool,
     /// The number of rows.
     pub most: usize,
-    /// Whether nothing orders rows that are equal in this column but their place.
+    /// Whether rows that are equal in this column stay in the order of the table.
     pub alone: bool,
 }
 
 impl Top {
-    /// Takes rows out of `kept` that cannot be among the first.
+    /// Removes rows that cannot be among the first from `kept`.
     pub fn mark(&self, batch: &RecordBatch, kept: &mut [bool]) {
         let Some(array) = batch.column_by_name(&self.column) else { return };
         let Some(array) = array.as_primitive_opt::<Float64Type>() else { return };
-        let sign = if self.descending { -1.0 } else { 1.0 };
-        // Ascending; NaN, the greatest number, at its end.
-        let rank = |row: usize| {
-            let number = array.value(row);
-            match (number.is_nan(), self.descending) {
-                (true, false) => f64::INFINITY,
-                (true, true) => f64::NEG_INFINITY,
-                (false, _) => sign * number,
-            }
+        // Keys in the order of the rows. NaN is the greatest number.
+        let key = |row: usize| match (array.is_null(row), self.nulls_last) {
+            (true, true) => i64::MAX,
+            (true, false) => i64::MIN,
+            (false, _) if self.descending => -in_order(array.value(row)),
+            (false, _) => in_order(array.value(row)),
         };
-        let rows = || (0..kept.len()).filter(|&row| kept[row]);
-        let nulls = rows().filter(|&row| array.is_null(row)).count();
-        let mut ranks: Vec<f64> = rows().filter(|&row| array.is_valid(row)).map(rank).collect();
-        // Nulls come before or after all numbers.
-        let (most_nulls, most) = match self.nulls_last {
-            true => (self.most.saturating_sub(ranks.len()), self.most),
-            false => (self.most, self.most.saturating_sub(nulls)),
-        };
-        let all_nulls = if self.alone {
-            most_nulls
-        } else if most_nulls > 0 {
-            usize::MAX
-        } else {
-            0
-        };
-        let last = match most.checked_sub(1) {
-            Some(place) if place < ranks.len() => Some(*ranks.select_nth_unstable_by(place, f64::total_cmp).1),
-            Some(_) => Some(f64::INFINITY),
-            None => None,
-        };
-        let before = last.map_or(0, |last| ranks.iter().filter(|&&rank| rank < last).count());
-        let mut ties = if self.alone { most.saturating_sub(before) } else { usize::MAX };
-        let mut nulls = all_nulls;
+        let Some(last) = self.most.checked_sub(1) else { return kept.fill(false) };
+        let mut keys: Vec<i64> = (0..kept.len()).filter(|&row| kept[row]).map(key).collect();
+        if last >= keys.len() {
+            return;
+        }
+        let last = *keys.select_nth_unstable(last).1;
+        let before = keys.iter().filter(|key| **key < last).count();
+        let mut ties = if self.alone { self.most - before } else { usize::MAX };
         for (row, kept) in kept.iter_mut().enumerate().filter(|(_, kept)| **kept) {
-            let left = match (array.is_null(row), last) {
-                (true, _) => &mut nulls,
-                (false, None) => {
-                    *kept = false;
-                    continue;
-                }
-                (false, Some(last)) if rank(row) < last => continue,
-                (false, Some(last)) if rank(row) == last => &mut ties,
-                (false, Some(_)) => {
-                    *kept = false;
-                    continue;
-                }
-            };
-            *kept = *left > 0;
-            *left = left.saturating_sub(1);
+            let key = key(row);
+            *kept = key < last || key == last && ties > 0;
+            ties -= usize::from(key == last && ties > 0);
         }
     }
 }
 
+/// An integer in the order of numbers, of which zero has one sign and NaN is the greatest.
+fn in_order(number: f64) -> i64 {
+    if number.is_nan() {
+        return i64::MAX - 1;
+    }
+    let bits = (number + 0.0).to_bits().cast_signed();
+    // Those of negative numbers fall.
+    if bits < 0 { -(bits & i64::MAX) } else { bits }
+}
+
 #[cfg(test)]
 mod tests {
-    //! Rows that a condition keeps.
+    //! Rows that match a condition.
 
     use std::sync::Arc;
 

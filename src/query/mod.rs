@@ -1,8 +1,8 @@
-//! Questions to tables on disk, in SQL: the tables of a dataset, or a single file, as they lie in their folder.
+//! SQL queries on the tables of a dataset, or on a single file.
 //!
-//! `question` checks a question and spells it as polars reads it; `streaming` splits it, where that can be done, so that memory holds what
-//! is kept and not the table; `scan` reads of the files what is needed, `filter` drops rows and `groups` counts them on the way, and `answer` writes what comes out. Nothing is read but the tables
-//! that were opened.
+//! `question` checks a query and translates it into the dialect of polars. `streaming` splits it into parts if possible, so that the table need
+//! not fit into memory. `scan` reads the needed columns and row groups, `filter` drops rows, `groups` aggregates them, and `answer` writes the
+//! result. Only the opened tables are read.
 
 mod answer;
 mod filter;
@@ -26,7 +26,7 @@ use question::{CORRECT, Fault, Question};
 pub use scan::is_unreadable;
 pub use source::Source;
 
-/// Tables that can be asked.
+/// Tables that can be queried.
 pub struct Tables {
     /// The tables, in the order of the dataset.
     pub sources: Vec<Source>,
@@ -34,29 +34,14 @@ pub struct Tables {
 
 /// The error of a query.
 #[derive(Debug, thiserror::Error)]
+#[allow(missing_docs)]
 pub enum QueryError {
-    /// The path leads to nothing that could be asked.
+    /// The path leads to no table.
     #[error("{path}: {found}\n  expected: {expected}\n  help: {help}")]
-    Path {
-        /// The path.
-        path: String,
-        /// The fault.
-        found: String,
-        /// The expected input.
-        expected: &'static str,
-        /// The help.
-        help: &'static str,
-    },
-    /// The question makes no sense, or none for these tables.
+    Path { path: String, found: String, expected: &'static str, help: &'static str },
+    /// The query is not valid for these tables.
     #[error("{found}\n  expected: a SELECT from these tables:{tables}\n  help: {help}")]
-    Sql {
-        /// The fault.
-        found: String,
-        /// The tables and their columns, a line each.
-        tables: String,
-        /// The help.
-        help: String,
-    },
+    Sql { found: String, tables: String, help: String },
     /// A part is damaged, or belongs to another dataset.
     #[error(transparent)]
     Part(Box<DatasetError>),
@@ -64,25 +49,20 @@ pub enum QueryError {
     #[error(
         "{path}: cannot read: {source}\n  help: if a run wrote it, run the sweep again; it recomputes damaged parts"
     )]
-    Read {
-        /// The file or folder.
-        path: String,
-        /// The cause.
-        source: PolarsError,
-    },
+    Read { path: String, source: PolarsError },
 }
 
 /// Greatest length of an error of polars in a message, in characters. Chosen: two lines.
 const MAX_ERROR_CHARS: usize = 200;
 
 impl QueryError {
-    /// Whether the path or the question is wrong, rather than the files or the machine.
+    /// Whether the path or the query is wrong, rather than the files or the machine.
     pub fn is_wrong(&self) -> bool {
         matches!(self, QueryError::Path { .. } | QueryError::Sql { .. })
     }
 }
 
-/// The plan of `sql` about `tables`, each with its name.
+/// The plan of the query `sql` on named `tables`.
 fn plan<'a>(tables: impl IntoIterator<Item = (&'a str, LazyFrame)>, sql: &str) -> PolarsResult<LazyFrame> {
     let mut context = SQLContext::new();
     for (name, frame) in tables {
@@ -92,11 +72,11 @@ fn plan<'a>(tables: impl IntoIterator<Item = (&'a str, LazyFrame)>, sql: &str) -
 }
 
 impl Tables {
-    /// The tables of the dataset in `path`; or of a folder of Parquet files, or a Parquet or CSV file, one table under its name.
+    /// Opens the tables of the dataset in `path`. A folder of Parquet files, or a Parquet or CSV file, is one table under its name.
     ///
     /// # Errors
     ///
-    /// If there is no table, or a file of it cannot be read.
+    /// If there is no table, or if one of its files cannot be read.
     pub fn open(path: &Path) -> Result<Tables, QueryError> {
         source::open(path).map(|sources| Tables { sources })
     }
@@ -106,11 +86,11 @@ impl Tables {
         self.sources.iter().find(|source| source.name == name)
     }
 
-    /// The answer to a question in SQL, which is found when it is read.
+    /// The answer to a SQL query, computed when it is read.
     ///
     /// # Errors
     ///
-    /// If it is not one SELECT from these tables.
+    /// If the query is not one SELECT from these tables.
     pub fn ask(&self, sql: &str) -> Result<Answer, QueryError> {
         let question = self.parse(sql)?;
         let planned = || -> PolarsResult<(LazyFrame, std::sync::Arc<Schema>)> {
@@ -138,8 +118,8 @@ impl Tables {
         Question::parse(sql, &self.sources).map_err(|Fault { found, help }| self.refuse(found, &help))
     }
 
-    /// What is wrong with a question that failed while it was answered: what fails on the first rows alone too, such as the sum of words,
-    /// is no fault of the files. `None` if it is not the question.
+    /// The fault of a query that failed during its computation. A query that also fails on the first rows alone, such as a sum of words, is at
+    /// fault; otherwise the result is `None`.
     pub fn fault(&self, sql: &str) -> Option<QueryError> {
         let question = self.parse(sql).ok()?;
         let mut first = Vec::new();
@@ -150,10 +130,10 @@ impl Tables {
         Some(self.explain(sql, &answered?.err()?))
     }
 
-    /// The fault of a question.
+    /// The fault of a query.
     fn explain(&self, sql: &str, error: &PolarsError) -> QueryError {
         let text = error.to_string();
-        // The first line says it, before lists of names and query plans.
+        // The first line contains the reason; lists of names and query plans follow.
         let line = text.lines().next().unwrap_or_default().trim_end_matches(':');
         let line = crate::names::shown(line, MAX_ERROR_CHARS);
         let line = &*line;

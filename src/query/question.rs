@@ -1,4 +1,4 @@
-//! A question: one SELECT from the tables that are there, checked, and spelt as polars reads it.
+//! A query: one SELECT from the tables of the dataset, checked and translated into the dialect of polars.
 
 use std::collections::HashSet;
 use std::ops::ControlFlow;
@@ -16,15 +16,15 @@ use super::Source;
 use super::walk::{Visit, walk};
 use crate::names::hint;
 
-/// A question that can be answered.
+/// A valid query.
 pub struct Question {
-    /// It, as polars reads it.
+    /// The query in the dialect of polars.
     pub query: Box<Query>,
-    /// The units of its columns by their names, as far as they are known.
+    /// The known units of its columns, by name.
     pub units: Vec<(String, String)>,
 }
 
-/// The fault of a question, and its help.
+/// The fault of a query, and its help.
 pub struct Fault {
     pub found: String,
     pub help: String,
@@ -37,41 +37,21 @@ impl Fault {
 }
 
 /// Functions of text. In polars they take text alone; functions of numbers take text too, and return nulls for it.
-const TEXT: [&str; 26] = [
-    "array_agg",
-    "bit_length",
-    "concat",
-    "concat_ws",
-    "ends_with",
-    "greatest",
-    "initcap",
-    "least",
-    "left",
-    "length",
-    "lower",
-    "ltrim",
-    "max",
-    "min",
-    "octet_length",
-    "regexp_like",
-    "replace",
-    "reverse",
-    "right",
-    "rtrim",
-    "split_part",
-    "starts_with",
-    "string_agg",
-    "strpos",
-    "substr",
-    "upper",
-];
+const TEXT: &str = "array_agg bit_length concat concat_ws ends_with greatest initcap least left length lower ltrim max min octet_length \
+    regexp_like replace reverse right rtrim split_part starts_with string_agg strpos substr upper";
 
-/// The help of most questions.
+/// Whether a function has one of these names.
+pub fn is_one_of(names: &str, function: &Function) -> bool {
+    let called = function.name.to_string().to_lowercase();
+    names.split(' ').any(|name| name == called)
+}
+
+/// The help for most queries.
 pub const CORRECT: &str =
     "correct the query; text goes in 'single quotes', names with special characters in \"double\" ones";
 
 impl Question {
-    /// The question `sql` to the tables `sources`.
+    /// Parses and checks the query `sql` on the tables `sources`.
     pub fn parse(sql: &str, sources: &[Source]) -> Result<Question, Fault> {
         let statements = Parser::parse_sql(&GenericDialect {}, sql).map_err(|error| match error {
             ParserError::RecursionLimitExceeded => {
@@ -101,10 +81,10 @@ impl Question {
     }
 }
 
-/// Finds what a question may not ask.
+/// The visitor that finds unsupported parts of a query.
 struct Check<'a> {
     sources: &'a [Source],
-    /// Names that the question itself gives to tables.
+    /// Names of tables that the query defines itself.
     tables: HashSet<String>,
     fault: Option<Fault>,
 }
@@ -120,7 +100,7 @@ impl Visit for Check<'_> {
     fn query(&mut self, query: &mut Query) -> ControlFlow<()> {
         for table in query.with.iter().flat_map(|with| &with.cte_tables) {
             let name = &table.alias.name.value;
-            // polars would read the table of the dataset.
+            // polars would use the table of the dataset instead.
             if self.sources.iter().any(|source| source.name == *name) {
                 return self.refuse(Fault::new(format!("WITH {name}: a table has this name"), "choose another name"));
             }
@@ -136,9 +116,8 @@ impl Visit for Check<'_> {
 
     fn before(&mut self, expression: &mut Expr) -> ControlFlow<()> {
         let Expr::Function(function) = &*expression else { return ControlFlow::Continue(()) };
-        let called = function.name.to_string().to_lowercase();
         let argument = first_argument(function).filter(|argument| is_constant(argument));
-        if argument.is_some() && AGGREGATES.contains(&called.as_str()) {
+        if argument.is_some() && is_one_of(AGGREGATES, function) {
             return self.refuse(Fault::new(
                 format!("`{expression}`: no column in it"),
                 "count(*) counts rows; name a column for other aggregates",
@@ -151,7 +130,7 @@ impl Visit for Check<'_> {
         let joins = select.from.iter().flat_map(|from| &from.joins);
         let condition = joins.filter_map(|join| outer_condition(&join.join_operator));
         if let Some(condition) = condition.into_iter().find(|condition| !is_equalities(condition)) {
-            // polars would apply the rest to the joined rows, and lose those without a match.
+            // polars would apply the other conditions to the joined rows, and lose rows without a match.
             return self.refuse(Fault::new(
                 format!("ON {condition}: an outer join compares columns with columns by ="),
                 "filter in a subquery: FROM a LEFT JOIN (SELECT * FROM b WHERE ...) AS b ON a.x = b.x",
@@ -196,22 +175,9 @@ impl Visit for Check<'_> {
 }
 
 /// Aggregates that polars applies to a constant as if it were one row.
-const AGGREGATES: [&str; 12] = [
-    "avg",
-    "max",
-    "mean",
-    "median",
-    "min",
-    "quantile_cont",
-    "quantile_disc",
-    "stddev",
-    "stdev",
-    "sum",
-    "var",
-    "variance",
-];
+const AGGREGATES: &str = "avg max mean median min quantile_cont quantile_disc stddev stdev sum var variance";
 
-/// The condition of a join that keeps rows without a match, or compares with those.
+/// The condition of a join that keeps or selects rows without a match.
 fn outer_condition(join: &JoinOperator) -> Option<&Expr> {
     match join {
         JoinOperator::Left(constraint)
@@ -232,7 +198,7 @@ fn outer_condition(join: &JoinOperator) -> Option<&Expr> {
     }
 }
 
-/// Whether a condition compares columns with columns by =, and nothing else.
+/// Whether a condition contains only comparisons of columns with columns by `=`.
 fn is_equalities(condition: &Expr) -> bool {
     let is_column = |side: &Expr| matches!(side, Expr::Identifier(_) | Expr::CompoundIdentifier(_));
     match condition {
@@ -243,7 +209,7 @@ fn is_equalities(condition: &Expr) -> bool {
     }
 }
 
-/// Whether no column enters an expression.
+/// Whether an expression contains no column.
 fn is_constant(expression: &Expr) -> bool {
     struct Columns;
     impl Visit for Columns {
@@ -259,7 +225,7 @@ fn is_constant(expression: &Expr) -> bool {
     walk(&mut expression.clone(), &mut Columns)
 }
 
-/// Gives the columns of every SELECT their names, and lets ORDER BY use them.
+/// The visitor that names the columns of every SELECT, also for use in ORDER BY.
 struct Names;
 
 impl Visit for Names {
@@ -268,7 +234,7 @@ impl Visit for Names {
         let mut taken: HashSet<String> = HashSet::new();
         for item in &mut select.projection {
             let (expression, name) = match item {
-                // It stands for several columns, which have their names.
+                // It stands for several columns, which have names already.
                 SelectItem::UnnamedExpr(Expr::Function(function))
                     if function.name.to_string().eq_ignore_ascii_case("columns") =>
                 {
@@ -309,7 +275,7 @@ impl Visit for Names {
     }
 }
 
-/// The name of a column that has none, as DuckDB gives it; `count(*)` is `count`.
+/// The name of a column without `AS`, as in DuckDB; `count(*)` is `count`.
 pub fn name(expression: &Expr) -> String {
     match expression {
         Expr::Identifier(name) => name.value.clone(),
@@ -343,7 +309,7 @@ pub fn name(expression: &Expr) -> String {
     }
 }
 
-/// The units of the columns that a question gives, by name.
+/// The units of the columns of a query, by name.
 fn units(query: &Query, sources: &[Source]) -> Vec<(String, String)> {
     let mut units = Vec::new();
     let mut body = query.body.as_ref();
@@ -375,7 +341,7 @@ fn column_unit(name: &str, sources: &[Source]) -> String {
     }
 }
 
-/// The unit of an expression that has that of one column.
+/// The unit of an expression that has the unit of one column.
 fn unit(expression: &Expr, sources: &[Source]) -> String {
     match expression {
         Expr::Identifier(name) => column_unit(&name.value, sources),
@@ -387,23 +353,9 @@ fn unit(expression: &Expr, sources: &[Source]) -> String {
             unit(inner, sources)
         }
         Expr::Function(function) => {
-            const KEEP: [&str; 12] = [
-                "min",
-                "max",
-                "avg",
-                "mean",
-                "sum",
-                "median",
-                "first",
-                "last",
-                "abs",
-                "quantile_cont",
-                "quantile_disc",
-                "stddev",
-            ];
-            let called = function.name.to_string().to_lowercase();
+            const KEEP: &str = "min max avg mean sum median first last abs quantile_cont quantile_disc stddev";
             match first_argument(function) {
-                Some(inner) if KEEP.contains(&called.as_str()) => unit(inner, sources),
+                Some(inner) if is_one_of(KEEP, function) => unit(inner, sources),
                 _ => String::new(),
             }
         }
@@ -419,9 +371,9 @@ fn first_argument(function: &Function) -> Option<&Expr> {
     }
 }
 
-/// Spells a question as polars reads it.
+/// The visitor that translates a query into the dialect of polars.
 struct PolarsDialect {
-    /// Columns of words, which are categories in polars: functions take them as text.
+    /// Columns of words, which are categories in polars; functions need them as text.
     words: HashSet<String>,
 }
 
@@ -481,7 +433,7 @@ impl PolarsDialect {
     fn function(&self, function: &mut Function) {
         let called = function.name.to_string().to_lowercase();
         let FunctionArguments::List(list) = &mut function.args else { return };
-        // A constant is there in every row.
+        // A constant has a value in every row.
         if let ("count", [FunctionArg::Unnamed(FunctionArgExpr::Expr(argument))]) = (called.as_str(), &mut *list.args)
             && list.duplicate_treatment.is_none()
             && is_constant(argument)
@@ -490,11 +442,11 @@ impl PolarsDialect {
             list.args = vec![FunctionArg::Unnamed(FunctionArgExpr::Wildcard)];
             return;
         }
-        // As in DuckDB and PostgreSQL, the logarithm of one number has the base 10.
+        // As in DuckDB and PostgreSQL, `log` of one number has base 10.
         if called == "log" && list.args.len() == 1 {
             function.name = ObjectName::from(vec![Ident::new("log10")]);
         }
-        if !TEXT.contains(&called.as_str()) {
+        if !TEXT.split(' ').any(|name| name == called) {
             return;
         }
         for argument in &mut list.args {
@@ -505,7 +457,7 @@ impl PolarsDialect {
     }
 }
 
-/// A sum as standard SQL has it: null of no values, of which polars makes 0.
+/// The sum as in standard SQL: null for no values, where polars returns 0.
 fn sum(function: &Function) -> Option<Expr> {
     let FunctionArguments::List(list) = &function.args else { return None };
     let is_plain = function.over.is_none()
@@ -533,7 +485,7 @@ pub fn if_else_null(condition: Expr, result: Expr) -> Expr {
     }
 }
 
-/// Takes the brackets off the numbers of a list, and makes all of them decimals if one is: polars wants one type.
+/// Removes parentheses around the numbers of a list, and makes all of them decimals if one is: polars needs one type.
 fn numbers_alike(list: &mut [Expr]) {
     for item in list.iter_mut() {
         while let Expr::Nested(inner) = item {
@@ -555,11 +507,11 @@ fn numbers_alike(list: &mut [Expr]) {
     }
 }
 
-/// A number with an exponent, without one; others as they are.
+/// A number without an exponent; other numbers are unchanged.
 fn plain(digits: &str) -> String {
     let value: Option<f64> = digits.parse().ok().filter(|value: &f64| value.is_finite());
     match value.filter(|_| digits.contains(['e', 'E'])) {
-        // Without a point it would be a whole number, of at most 64 bits.
+        // Without a decimal point it would be an integer of at most 64 bits.
         Some(value) if value.fract() == 0.0 => format!("{value}.0"),
         Some(value) => format!("{value}"),
         None => digits.to_owned(),

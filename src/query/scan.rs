@@ -1,4 +1,4 @@
-//! Parquet files as a table of polars: only the columns and the row groups that a question needs are read, on all threads.
+//! Parquet files as a table of polars. Only the needed columns and row groups are read, on all threads.
 
 use std::any::Any;
 use std::fs::File;
@@ -7,12 +7,11 @@ use std::sync::Arc;
 
 use arrow_array::cast::AsArray;
 use arrow_array::types::{
-    ArrowPrimitiveType, Date32Type, Float32Type, Float64Type, Int8Type, Int16Type, Int32Type, Int64Type,
-    TimestampMicrosecondType, TimestampMillisecondType, TimestampNanosecondType, TimestampSecondType, UInt8Type,
-    UInt16Type, UInt32Type, UInt64Type,
+    ArrowPrimitiveType, Float32Type, Float64Type, Int8Type, Int16Type, Int32Type, Int64Type, UInt8Type, UInt16Type,
+    UInt32Type, UInt64Type,
 };
 use arrow_array::{Array, BooleanArray, RecordBatch, RecordBatchOptions};
-use arrow_schema::{DataType as ArrowType, FieldRef, Fields, Schema as ArrowSchema, TimeUnit as ArrowTimeUnit};
+use arrow_schema::{DataType as ArrowType, FieldRef, Fields, Schema as ArrowSchema};
 use arrow_select::filter::filter_record_batch;
 use parquet::arrow::ProjectionMask;
 use parquet::arrow::arrow_reader::{ArrowReaderMetadata, ArrowReaderOptions, ParquetRecordBatchReaderBuilder};
@@ -22,7 +21,7 @@ use polars::lazy::dsl::{Expr, Operator};
 use polars::prelude::{
     AnonymousScan, AnonymousScanArgs, BooleanChunked, Categories, ChunkedArray, Column, DataFrame, DataType, IdxCa,
     IntoLazy, IntoSeries, LazyFrame, NamedFrom, PlSmallStr, PolarsError, PolarsNumericType, PolarsResult,
-    ScanArgsAnonymous, Schema, SchemaRef, Series, StringChunked, TimeUnit,
+    ScanArgsAnonymous, Schema, SchemaRef, Series, StringChunked,
 };
 use rayon::prelude::*;
 
@@ -30,23 +29,23 @@ use super::filter::{Condition, Top, kept, of_predicate};
 use super::groups::{Counting, Groups};
 use crate::dataset::{check_footer, check_pages, guarded, label};
 
-/// The rows of Parquet files of the same columns, one file after another.
+/// The rows of Parquet files with equal columns, one file after another.
 #[derive(Clone)]
 pub struct Files {
     paths: Vec<PathBuf>,
     schema: SchemaRef,
     /// The condition of rows; others are skipped.
     conditions: Vec<Condition>,
-    /// The order of rows, of which only the first are needed.
+    /// The order of rows, if only the first are needed.
     top: Option<Top>,
 }
 
 impl Files {
-    /// The table in the files of `paths`, whose columns are those of the first.
+    /// The table in the files of `paths`, with the columns of the first file.
     pub fn new(paths: Vec<PathBuf>) -> PolarsResult<Files> {
         let mut schema = Schema::default();
         if let Some(first) = paths.first() {
-            for field in open(first).map_err(|error| unreadable(first, &error))?.1.schema().fields() {
+            for field in sound(first, || open(first))?.1.schema().fields() {
                 schema.insert(PlSmallStr::from_str(field.name()), kind(field.data_type()).unwrap_or(DataType::Null));
             }
         }
@@ -58,7 +57,7 @@ impl Files {
         &self.schema
     }
 
-    /// Rows that obey `conditions`, and of each part those that may be among the first.
+    /// Restricts the table to rows that match `conditions`, and in each part to rows that may be among the first.
     pub fn only(mut self, conditions: Vec<Condition>, top: Option<Top>) -> Files {
         (self.conditions, self.top) = (conditions, top);
         self
@@ -69,14 +68,12 @@ impl Files {
         let mut counting = Counting::new(groups);
         let names = groups.columns();
         for path in &self.paths {
-            let count = || {
+            sound(path, || {
                 batches(path, (&names, &self.schema), &groups.conditions, None, &mut |batch| {
                     counting.add(&batch);
                     Ok(batch.num_rows())
                 })
-            };
-            let done = guarded(count).unwrap_or_else(|| Err(ParquetError::General("it is damaged".to_owned())));
-            done.map_err(|error| unreadable(path, &error))?;
+            })?;
         }
         counting.frame()
     }
@@ -87,15 +84,21 @@ impl Files {
         fields.map(|(name, _)| name.to_string()).collect()
     }
 
-    /// The table as polars plans with it.
+    /// The table as a lazy frame of polars.
     pub fn frame(&self) -> PolarsResult<LazyFrame> {
         let options = ScanArgsAnonymous { schema: Some(self.schema.clone()), ..ScanArgsAnonymous::default() };
         LazyFrame::anonymous_scan(Arc::new(self.clone()), options)
     }
 
-    /// Each file as a table of its own.
+    /// Each file as a separate table.
     pub fn streaming(&self) -> Vec<Files> {
         self.paths.iter().map(|path| Files { paths: vec![path.clone()], ..self.clone() }).collect()
+    }
+
+    /// The columns `names` without rows.
+    fn empty(&self, names: &[PlSmallStr]) -> PolarsResult<DataFrame> {
+        let kind = |name| self.schema.get(name).cloned().unwrap_or(DataType::Null);
+        DataFrame::new(0, names.iter().map(|name| Column::new_empty(name.clone(), &kind(name))).collect())
     }
 
     /// The rows of one file that `predicate` keeps, at most the first `most` of the file.
@@ -107,9 +110,7 @@ impl Files {
         most: Option<usize>,
     ) -> PolarsResult<DataFrame> {
         let predicate = predicate.map(without_hints).transpose()?.flatten();
-        let rows = || self.decode(path, names, predicate.as_ref(), most);
-        let frame = guarded(rows).unwrap_or_else(|| Err(ParquetError::General("it is damaged".to_owned())));
-        let frame = frame.map_err(|error| unreadable(path, &error))?;
+        let frame = sound(path, || self.decode(path, names, predicate.as_ref(), most))?;
         match predicate {
             Some(predicate) => frame.lazy().filter(predicate).collect(),
             None => Ok(frame),
@@ -117,8 +118,7 @@ impl Files {
     }
 }
 
-/// A predicate without what polars adds to it for a top-k: bounds that it learns as it goes, which need not be applied, and which an
-/// expression can only display.
+/// A predicate without the dynamic bounds that polars adds for a top-k. They are optional, and an expression can only display them.
 fn without_hints(predicate: &Expr) -> PolarsResult<Option<Expr>> {
     if !predicate.into_iter().any(|part| matches!(part, Expr::Display { .. })) {
         return Ok(Some(predicate.clone()));
@@ -159,16 +159,9 @@ impl AnonymousScan for Files {
             None => self.schema.iter_names().cloned().collect(),
         };
         let predicate = options.predicate.as_ref();
-        let empty = || {
-            let columns = names.iter().map(|name| {
-                let kind = self.schema.get(name).cloned().unwrap_or(DataType::Null);
-                Column::new_empty(name.clone(), &kind)
-            });
-            DataFrame::new(0, columns.collect())
-        };
-        let mut rows = match (options.n_rows, predicate) {
+        let mut rows = self.empty(&names)?;
+        match (options.n_rows, predicate) {
             (Some(most), None) => {
-                let mut rows = empty()?;
                 for path in &self.paths {
                     if rows.height() >= most {
                         break;
@@ -176,26 +169,18 @@ impl AnonymousScan for Files {
                     let part = self.read(path, &names, None, Some(most - rows.height()))?;
                     append(&mut rows, part)?;
                 }
-                rows
             }
             _ => {
-                let parts: PolarsResult<Vec<DataFrame>> =
-                    self.paths.par_iter().map(|path| self.read(path, &names, predicate, None)).collect();
-                let mut rows = empty()?;
-                for part in parts? {
-                    append(&mut rows, part)?;
-                }
-                rows
+                let read = |path: &PathBuf| self.read(path, &names, predicate, None);
+                let parts = self.paths.par_iter().map(read).collect::<PolarsResult<Vec<DataFrame>>>()?;
+                parts.into_iter().try_for_each(|part| append(&mut rows, part))?;
             }
-        };
-        if let Some(most) = options.n_rows {
-            rows = rows.head(Some(most));
         }
-        Ok(rows)
+        Ok(rows.slice(0, options.n_rows.unwrap_or(usize::MAX)))
     }
 }
 
-/// Adds `more` rows.
+/// Appends `more` rows.
 pub fn append(rows: &mut DataFrame, more: DataFrame) -> PolarsResult<()> {
     if rows.height() == 0 && (more.height() > 0 || rows.columns().is_empty()) {
         *rows = more;
@@ -207,11 +192,17 @@ pub fn append(rows: &mut DataFrame, more: DataFrame) -> PolarsResult<()> {
     Ok(())
 }
 
-/// The messages of file errors.
+/// The message for a file that cannot be read.
 const UNREADABLE: &str = "cannot be read as Parquet";
 
 fn unreadable(path: &Path, error: &ParquetError) -> PolarsError {
     PolarsError::ComputeError(format!("{}: {UNREADABLE}: {error}", path.display()).into())
+}
+
+/// The result of reading a file; a panic of the reader is a fault of the file.
+fn sound<T>(path: &Path, read: impl FnOnce() -> Result<T, ParquetError>) -> PolarsResult<T> {
+    let read = guarded(read).unwrap_or_else(|| Err(ParquetError::General("it is damaged".to_owned())));
+    read.map_err(|error| unreadable(path, &error))
 }
 
 /// Whether a file is at fault, rather than the question.
@@ -219,7 +210,7 @@ pub fn is_unreadable(error: &PolarsError) -> bool {
     error.to_string().contains(UNREADABLE)
 }
 
-/// A Parquet file, and its columns as they are read: words are dictionaries where they are so in a dataset, else text.
+/// Opens a Parquet file. Words are read as dictionaries in a dataset, else as text.
 fn open(path: &Path) -> Result<(File, ArrowReaderMetadata), ParquetError> {
     let file = File::open(path)?;
     check_footer(&file)?;
@@ -236,8 +227,8 @@ fn open(path: &Path) -> Result<(File, ArrowReaderMetadata), ParquetError> {
     Ok((file, metadata))
 }
 
-/// Hands over the columns `names` of a file, which are to be those of `schema`, a row group at a time, as far as it may hold rows that obey `conditions`, until `take`, which
-/// returns how many rows it took, has `most`.
+/// Passes the columns `names` of a file, with the types of `schema`, to `take`, one row group at a time. Skips row groups without rows that
+/// match `conditions`. Ends when `take`, which returns the number of kept rows, has `most`.
 fn batches(
     path: &Path,
     (names, schema): (&[String], &Schema),
@@ -255,7 +246,7 @@ fn batches(
             return Err(ParquetError::General(format!("column `{name}` {found}, unlike in the first file")));
         }
     }
-    // Statistics of other writers leave NaN out, which polars counts as the greatest number.
+    // Statistics of other writers exclude NaN, which is the greatest number in polars.
     let is_ours = is_ours(&metadata);
     let allows = |group: &RowGroupMetaData| !is_ours || conditions.iter().all(|condition| condition.allows(group));
     let mask = ProjectionMask::columns(metadata.parquet_schema(), names.iter().map(String::as_str));
@@ -306,9 +297,9 @@ impl Files {
         read.extend(self.top.iter().map(|top| top.column.clone()));
         read.sort();
         read.dedup();
-        // Where rows are left out, as many more have to be read.
+        // A filter drops rows, so more have to be read.
         let most = most.filter(|_| conditions.is_empty() && self.top.is_none());
-        let mut frame: Option<DataFrame> = None;
+        let mut frame = self.empty(names).map_err(foreign)?;
         batches(path, (&read, &self.schema), &conditions, most, &mut |batch| {
             let mut kept = kept(&conditions, &batch);
             if let Some(top) = &self.top {
@@ -318,28 +309,10 @@ impl Files {
                 true => batch,
                 false => filter_record_batch(&batch, &BooleanArray::from(kept))?,
             };
-            add(&mut frame, columns(&batch, names)?).map_err(foreign)?;
+            append(&mut frame, columns(&batch, names)?).map_err(foreign)?;
             Ok(batch.num_rows())
         })?;
-        match frame {
-            Some(frame) => Ok(frame),
-            None => {
-                let column = |name: &PlSmallStr| {
-                    Column::new_empty(name.clone(), &self.schema.get(name).cloned().unwrap_or(DataType::Null))
-                };
-                DataFrame::new(0, names.iter().map(column).collect()).map_err(foreign)
-            }
-        }
-    }
-}
-
-fn add(frame: &mut Option<DataFrame>, more: DataFrame) -> PolarsResult<()> {
-    match frame {
-        Some(frame) => append(frame, more),
-        None => {
-            *frame = Some(more);
-            Ok(())
-        }
+        Ok(frame)
     }
 }
 
@@ -364,7 +337,7 @@ fn columns(batch: &RecordBatch, names: &[PlSmallStr]) -> Result<DataFrame, Parqu
     DataFrame::new(batch.num_rows(), columns?).map_err(foreign)
 }
 
-/// The type of a column in polars; `None` of one that is not read.
+/// The type of a column in polars; `None` for an unsupported type.
 fn kind(kind: &ArrowType) -> Option<DataType> {
     Some(match kind {
         ArrowType::Float64 => DataType::Float64,
@@ -375,19 +348,9 @@ fn kind(kind: &ArrowType) -> Option<DataType> {
         ArrowType::UInt64 => DataType::UInt64,
         ArrowType::Boolean => DataType::Boolean,
         ArrowType::Utf8 | ArrowType::LargeUtf8 | ArrowType::Utf8View => DataType::String,
-        ArrowType::Date32 => DataType::Date,
-        ArrowType::Timestamp(unit, _) => DataType::Datetime(time_unit(unit), None),
         kind if *kind == label() => words_type(),
         _ => return None,
     })
-}
-
-fn time_unit(unit: &ArrowTimeUnit) -> TimeUnit {
-    match unit {
-        ArrowTimeUnit::Second | ArrowTimeUnit::Millisecond => TimeUnit::Milliseconds,
-        ArrowTimeUnit::Microsecond => TimeUnit::Microseconds,
-        ArrowTimeUnit::Nanosecond => TimeUnit::Nanoseconds,
-    }
 }
 
 /// Words that repeat.
@@ -409,24 +372,6 @@ fn series(name: &PlSmallStr, array: &dyn Array) -> Result<Series, ParquetError> 
         ArrowType::UInt16 => numbers::<UInt16Type, polars::prelude::UInt32Type>(name, array).into_series(),
         ArrowType::UInt32 => numbers::<UInt32Type, polars::prelude::UInt32Type>(name, array).into_series(),
         ArrowType::UInt64 => numbers::<UInt64Type, polars::prelude::UInt64Type>(name, array).into_series(),
-        ArrowType::Date32 => numbers::<Date32Type, polars::prelude::Int32Type>(name, array).into_date().into_series(),
-        ArrowType::Timestamp(unit, _) => {
-            let ticks = match unit {
-                ArrowTimeUnit::Second => {
-                    &numbers::<TimestampSecondType, polars::prelude::Int64Type>(name, array) * 1000_i64
-                }
-                ArrowTimeUnit::Millisecond => {
-                    numbers::<TimestampMillisecondType, polars::prelude::Int64Type>(name, array)
-                }
-                ArrowTimeUnit::Microsecond => {
-                    numbers::<TimestampMicrosecondType, polars::prelude::Int64Type>(name, array)
-                }
-                ArrowTimeUnit::Nanosecond => {
-                    numbers::<TimestampNanosecondType, polars::prelude::Int64Type>(name, array)
-                }
-            };
-            ticks.into_datetime(time_unit(unit), None).into_series()
-        }
         ArrowType::Boolean => {
             let flags: Vec<Option<bool>> = array.as_boolean().iter().collect();
             BooleanChunked::new(name, flags).into_series()

@@ -1,11 +1,9 @@
-//! A table on disk that can be asked.
+//! A table on disk that can be queried.
 
-use std::fs::{self, File};
+use std::fs;
 use std::io::Cursor;
 use std::path::{Path, PathBuf};
 
-use parquet::arrow::parquet_to_arrow_schema;
-use parquet::file::reader::{FileReader, SerializedFileReader};
 use polars::prelude::{DataFrame, IntoLazy, LazyFrame, PolarsError, PolarsResult};
 use polars_io::SerReader;
 use polars_io::prelude::{CsvParseOptions, CsvReadOptions, CsvReader};
@@ -13,20 +11,21 @@ use polars_io::prelude::{CsvParseOptions, CsvReadOptions, CsvReader};
 use super::scan::Files;
 use super::{Answer, QueryError};
 use crate::dataset::Folder;
+use crate::dataset::frame::{self, FrameError};
 
-/// A table and where it comes from.
+/// A table and its files.
 pub struct Source {
-    /// Its name in questions.
+    /// Its name in queries.
     pub name: String,
     /// The names of its columns.
     pub columns: Vec<String>,
-    /// The units of its columns, empty where none is known.
+    /// The units of its columns; empty if unknown.
     pub units: Vec<String>,
     /// The files that it consists of.
     pub paths: Vec<PathBuf>,
     /// The number of missing files.
     pub missing: u64,
-    /// All rows, as the dataset counts them; unknown of a single file.
+    /// The number of rows according to the dataset; `None` for a single file.
     pub rows: Option<u64>,
     /// Its columns of words that repeat.
     pub(super) words: Vec<String>,
@@ -48,7 +47,7 @@ pub fn open(path: &Path) -> Result<Vec<Source>, QueryError> {
         help,
     };
     if path.is_dir() {
-        // The folder of a table of a dataset is that table, checked as the dataset is.
+        // The folder of a table belongs to its dataset, and is checked like it.
         if let (Some(above), Some(name)) = (folder_above(path), path.file_name())
             && let Ok(Some(_)) = Folder::at(&above).manifest()
         {
@@ -99,7 +98,7 @@ pub fn open(path: &Path) -> Result<Vec<Source>, QueryError> {
 }
 
 impl Source {
-    /// A table of Parquet files of the same columns; parts of a dataset know its name better than their folder does.
+    /// A table of Parquet files with equal columns. Its name comes from the parts if they belong to a dataset, else from the folder.
     fn parquet(
         path: &Path,
         name: String,
@@ -108,18 +107,17 @@ impl Source {
         rows: Option<u64>,
     ) -> Result<Source, QueryError> {
         let failed = |path: &Path, source| QueryError::Read { path: path.display().to_string(), source };
-        let header = match paths.first() {
-            Some(first) => Header::read(first).map_err(|source| failed(first, source))?,
-            None => Header::default(),
-        };
+        let first = paths.first().map_or(path, PathBuf::as_path);
+        let (headings, facts) = frame::headings(first)
+            .map_err(|FrameError::File { reason, .. }| failed(first, PolarsError::ComputeError(reason.into())))?;
         let files = Files::new(paths.clone()).map_err(|source| failed(path, source))?;
         let frame = files.frame().map_err(|source| failed(path, source))?;
-        let Header { table, columns, units } = header;
-        let name = table.unwrap_or(name);
+        let name = facts.into_iter().find(|(key, _)| key == "slipsweep.table").map_or(name, |(_, table)| table);
+        let (columns, units) = headings.into_iter().map(|heading| (heading.name, heading.unit)).unzip();
         Ok(Source { name, columns, units, paths, missing, rows, words: files.words(), files: Some(files), frame })
     }
 
-    /// The table in a CSV file, numbers where all of a column are numbers; lines that begin with # are comments.
+    /// The table in a CSV file. A column is numeric if all its cells are numbers; lines that begin with # are comments.
     fn csv(path: &Path) -> Result<Source, QueryError> {
         let failed = |source| QueryError::Read { path: path.display().to_string(), source };
         let frame = csv(path).map_err(failed)?;
@@ -165,35 +163,6 @@ fn csv(path: &Path) -> PolarsResult<DataFrame> {
     CsvReader::new(Cursor::new(bytes)).with_options(options).finish()
 }
 
-/// The metadata of a Parquet file.
-#[derive(Default)]
-struct Header {
-    /// The table that it is a part of.
-    table: Option<String>,
-    columns: Vec<String>,
-    units: Vec<String>,
-}
-
-impl Header {
-    fn read(path: &Path) -> PolarsResult<Header> {
-        let foreign = |error: parquet::errors::ParquetError| PolarsError::ComputeError(error.to_string().into());
-        let reader = SerializedFileReader::new(File::open(path)?).map_err(foreign)?;
-        let metadata = reader.metadata().file_metadata();
-        let entries = metadata.key_value_metadata();
-        let schema = parquet_to_arrow_schema(metadata.schema_descr(), entries).map_err(foreign)?;
-        let fields = || schema.fields().iter();
-        Ok(Header {
-            table: entries
-                .into_iter()
-                .flatten()
-                .find(|entry| entry.key == "slipsweep.table")
-                .and_then(|entry| entry.value.clone()),
-            columns: fields().map(|field| field.name().clone()).collect(),
-            units: fields().map(|field| field.metadata().get("unit").cloned().unwrap_or_default()).collect(),
-        })
-    }
-}
-
 /// The folder that a folder is in.
 fn folder_above(path: &Path) -> Option<PathBuf> {
     Some(fs::canonicalize(path).ok()?.parent()?.to_owned())
@@ -211,7 +180,7 @@ fn parts(folder: &Path) -> Vec<PathBuf> {
     files
 }
 
-/// The name of a file or folder as a word that needs no quotes in SQL.
+/// The name of a file or folder as an identifier that needs no quotes in SQL.
 fn name_of(path: &Path) -> String {
     let real = fs::canonicalize(path);
     let stem = real.as_deref().unwrap_or(path).file_stem().unwrap_or_default().to_string_lossy().into_owned();

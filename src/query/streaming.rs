@@ -1,7 +1,7 @@
-//! Questions to one table that can be answered piece by piece, so that memory holds what is kept and not the table.
+//! Queries on one table that can be computed part by part, so that the table need not fit into memory.
 //!
-//! Rows that are chosen one by one come as they are read; of `ORDER BY ... LIMIT` each piece gives its first rows; of `GROUP BY` each piece
-//! gives its groups, with sums, counts, least and greatest values that are then put together.
+//! Filtered rows are passed on as they are read. For `ORDER BY ... LIMIT` each part returns its first rows. For `GROUP BY` each part returns its
+//! groups with sums, counts, least and greatest values, which are then merged.
 
 use std::ops::ControlFlow;
 
@@ -14,14 +14,14 @@ use sqlparser::ast::{
 use super::Source;
 use super::filter::{Condition, Top, of_where};
 use super::groups::{Groups, Kind, Measure};
-use super::question::{cast, if_else_null, name};
+use super::question::{cast, if_else_null, is_one_of, name};
 use super::walk::{Visit, walk};
 
-/// The plan of a question that is answered part by part.
+/// The plan of a query that is computed part by part.
 pub struct StreamPlan {
     /// The table.
     pub table: String,
-    /// The query that each piece of the table answers.
+    /// The query on each part.
     pub partial: String,
     /// The plan of counts, sums and extremes of columns.
     pub groups: Option<Groups>,
@@ -31,19 +31,19 @@ pub struct StreamPlan {
     pub top: Option<Top>,
     /// The query that merges partial answers in the table [`PARTS`]; `None` concatenates rows.
     pub merge: Option<String>,
-    /// The query that makes the answer from the table [`PARTS`].
+    /// The query that computes the answer from the table [`PARTS`].
     pub finish: Option<String>,
     /// The order of rows by the columns `__k0`, `__k1`, ...
     pub keys: Vec<Key>,
-    /// Rows to leave out at the start.
+    /// Rows to skip at the start.
     pub offset: usize,
-    /// Rows to give at most.
+    /// Greatest number of rows.
     pub limit: Option<usize>,
     /// The columns of the answer.
     pub names: Vec<String>,
 }
 
-/// The direction of a column that rows are ordered by.
+/// The direction of a sort key.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Key {
     pub descending: bool,
@@ -54,55 +54,12 @@ pub struct Key {
 pub const PARTS: &str = "__parts";
 
 /// Functions of the row alone.
-const SCALAR: [&str; 44] = [
-    "abs",
-    "acos",
-    "asin",
-    "atan",
-    "atan2",
-    "cbrt",
-    "ceil",
-    "ceiling",
-    "coalesce",
-    "concat",
-    "cos",
-    "degrees",
-    "ends_with",
-    "exp",
-    "floor",
-    "greatest",
-    "if",
-    "ifnull",
-    "least",
-    "left",
-    "length",
-    "ln",
-    "log",
-    "log10",
-    "log1p",
-    "log2",
-    "lower",
-    "mod",
-    "nullif",
-    "octet_length",
-    "pi",
-    "pow",
-    "power",
-    "radians",
-    "replace",
-    "right",
-    "round",
-    "sign",
-    "sin",
-    "sqrt",
-    "starts_with",
-    "strpos",
-    "tan",
-    "upper",
-];
+const SCALAR: &str = "abs acos asin atan atan2 cbrt ceil ceiling coalesce concat cos degrees ends_with exp floor greatest if ifnull least \
+    left length ln log log10 log1p log2 lower mod nullif octet_length pi pow power radians replace right round sign sin sqrt starts_with \
+    strpos tan upper";
 
 /// Functions of groups that can be put together.
-const AGGREGATE: [&str; 6] = ["avg", "count", "max", "mean", "min", "sum"];
+const AGGREGATE: &str = "avg count max mean min sum";
 
 /// The part-by-part plan of `query`; `None` if it needs all rows at once.
 pub fn streaming(query: &Query, sources: &[Source]) -> Option<StreamPlan> {
@@ -110,7 +67,7 @@ pub fn streaming(query: &Query, sources: &[Source]) -> Option<StreamPlan> {
     if !is_bare(query) || !is_simple(select) {
         return None;
     }
-    // One table, and no function that needs all its rows.
+    // One table, without a function that needs all its rows.
     let (source, alias) = table_of(select, sources)?;
     let mut select = select.as_ref().clone();
     let mut order = query.order_by.clone();
@@ -164,14 +121,14 @@ pub fn streaming(query: &Query, sources: &[Source]) -> Option<StreamPlan> {
     Some(streaming)
 }
 
-/// The groups, if counting columns is enough to find them.
+/// The aggregation of columns, if it suffices for the groups.
 fn counted((keys, measures): GroupedColumns, conditions: Vec<Condition>, schema: &Schema) -> Option<Groups> {
     let kinds = keys.into_iter().map(|key| Some((key.clone(), Kind::of(&key, schema)?)));
     let groups = Groups { conditions, keys: kinds.collect::<Option<_>>()?, measures };
     groups.fits(schema).then_some(groups)
 }
 
-/// Whether a query has nothing but a body, ORDER BY, LIMIT and OFFSET.
+/// Whether a query consists only of a body, ORDER BY, LIMIT and OFFSET.
 fn is_bare(query: &Query) -> bool {
     query.with.is_none()
         && query.fetch.is_none()
@@ -182,7 +139,7 @@ fn is_bare(query: &Query) -> bool {
         && query.pipe_operators.is_empty()
 }
 
-/// The only table of a SELECT, and its name there.
+/// The only table of a SELECT, and its alias.
 fn table_of<'a>(select: &Select, sources: &'a [Source]) -> Option<(&'a Source, String)> {
     let [from] = select.from.as_slice() else { return None };
     let TableFactor::Table { name, alias, args: None, sample: None, version: None, .. } = &from.relation else {
@@ -193,14 +150,14 @@ fn table_of<'a>(select: &Select, sources: &'a [Source]) -> Option<(&'a Source, S
     }
     let table = &name.0.last()?.as_ident()?.value;
     let source = sources.iter().find(|source| source.name == *table)?;
-    // Names that begin so are those of columns of partial answers.
+    // This prefix is reserved for columns of partial answers.
     if source.columns.iter().any(|column| column.starts_with("__")) {
         return None;
     }
     Some((source, alias.as_ref().map_or(table, |alias| &alias.name.value).clone()))
 }
 
-/// The expressions that rows are ordered by, and their directions.
+/// The sort keys and their directions.
 fn order_of(kind: Option<OrderByKind>, items: &[(String, Expr)]) -> Option<(Vec<Expr>, Vec<Key>)> {
     let keys = match kind {
         None => Vec::new(),
@@ -213,14 +170,14 @@ fn order_of(kind: Option<OrderByKind>, items: &[(String, Expr)]) -> Option<(Vec<
             return None;
         }
         let descending = !key.options.asc.unwrap_or(true);
-        // As in PostgreSQL: null is the greatest.
+        // As in PostgreSQL: null is the greatest value.
         directions.push(Key { descending, nulls_last: !key.options.nulls_first.unwrap_or(descending) });
         ordered.push(item(&key.expr, items).unwrap_or(key.expr));
     }
     Some((ordered, directions))
 }
 
-/// Whether a SELECT has nothing but items, one table, WHERE, GROUP BY and HAVING.
+/// Whether a SELECT consists only of items, one table, WHERE, GROUP BY and HAVING.
 fn is_simple(select: &Select) -> bool {
     matches!(select.distinct, None | Some(Distinct::All))
         && select.top.is_none()
@@ -261,7 +218,7 @@ fn quoted(name: &str) -> Expr {
     Expr::Identifier(Ident::with_quote('"', name))
 }
 
-/// The item that `ORDER BY` or `GROUP BY` names, by its name or its place.
+/// The item that `ORDER BY` or `GROUP BY` refers to by name or position.
 fn item(expression: &Expr, items: &[(String, Expr)]) -> Option<Expr> {
     let found = match expression {
         Expr::Identifier(name) => items.iter().find(|(known, _)| *known == name.value),
@@ -273,7 +230,7 @@ fn item(expression: &Expr, items: &[(String, Expr)]) -> Option<Expr> {
     found.map(|(_, expression)| expression.clone())
 }
 
-/// The numbers of `LIMIT` and `OFFSET`; `None` if they are no plain numbers.
+/// The numbers of `LIMIT` and `OFFSET`; `None` if they are not literals.
 fn limits(query: &Query) -> Option<(Option<usize>, usize)> {
     let number = |expression: &Expr| match expression {
         Expr::Value(ValueWithSpan { value: Value::Number(digits, _), .. }) => digits.parse::<usize>().ok(),
@@ -296,7 +253,7 @@ fn limits(query: &Query) -> Option<(Option<usize>, usize)> {
     }
 }
 
-/// A question to one table.
+/// A query on one table.
 struct TableQuestion<'a> {
     table: String,
     source: &'a Source,
@@ -317,7 +274,7 @@ impl TableQuestion<'_> {
         is_number.then_some(Top { column, descending, nulls_last, most, alone: keys.len() == 1 })
     }
 
-    /// The query of a piece for its rows, at most `most`.
+    /// The query for at most `most` rows of a part.
     fn rows(&self, most: Option<usize>) -> String {
         let items = self.items.iter().map(|(name, expression)| aliased(expression, name));
         let keys = self.ordered.iter().enumerate().map(|(place, key)| aliased(key, &format!("__k{place}")));
@@ -333,7 +290,7 @@ impl TableQuestion<'_> {
         sql
     }
 
-    /// The query of a piece for its groups, the one that merges such answers, and the one that makes the final answer of them.
+    /// The queries for the groups of a part, for merging them, and for the final answer.
     fn groups(&self, groups: Vec<Expr>) -> Option<(String, String, String, Option<GroupedColumns>)> {
         let mut keys = Vec::new();
         for group in groups {
@@ -381,7 +338,7 @@ impl TableQuestion<'_> {
     }
 }
 
-/// The columns that make groups, and the aggregates.
+/// The key columns of the groups, and the aggregates.
 type GroupedColumns = (Vec<String>, Vec<Measure>);
 
 fn aliased(expression: &Expr, name: &str) -> String {
@@ -392,17 +349,17 @@ fn joined(parts: impl Iterator<Item = String>) -> String {
     parts.collect::<Vec<_>>().join(", ")
 }
 
-/// Takes the groups and their sums, counts and extremes out of expressions.
+/// Extracts the groups and their sums, counts and extremes from expressions.
 struct AggregateExtractor<'a> {
     keys: &'a [Expr],
-    /// Aggregates of a piece, each with the function that merges them.
+    /// Aggregates of a part, each with the function that merges it.
     partial: Vec<(String, &'static str)>,
-    /// The column form, if it has one.
+    /// The aggregates of columns, if they have this form.
     measures: Vec<Option<Measure>>,
 }
 
 impl AggregateExtractor<'_> {
-    /// `expression` of the columns of partial answers; `None` if it has others.
+    /// `expression` in terms of the columns of partial answers; `None` if it contains other columns.
     fn lifted(&mut self, expression: &Expr) -> Option<Expr> {
         let mut expression = expression.clone();
         walk(&mut expression, self).then_some(expression)
@@ -446,7 +403,7 @@ impl AggregateExtractor<'_> {
                     op: BinaryOperator::Divide,
                     right: Box::new(right),
                 };
-                // Nothing has no mean, rather than 0/0.
+                // The mean of no values is null, not 0/0.
                 let zero = Expr::value(Value::Number("0.0".to_owned(), false));
                 let left = Box::new(count.clone());
                 let some = Expr::BinaryOp { left, op: BinaryOperator::Gt, right: Box::new(zero) };
@@ -465,7 +422,7 @@ impl Visit for AggregateExtractor<'_> {
         match expression {
             Expr::Identifier(name) if name.value.starts_with("__") => ControlFlow::Continue(()),
             Expr::Identifier(_) => ControlFlow::Break(()),
-            Expr::Function(function) if is_one_of(&AGGREGATE, function) => match self.aggregate(function) {
+            Expr::Function(function) if is_one_of(AGGREGATE, function) => match self.aggregate(function) {
                 Some(column) => {
                     *expression = column;
                     ControlFlow::Continue(())
@@ -477,19 +434,15 @@ impl Visit for AggregateExtractor<'_> {
     }
 }
 
-fn is_one_of(names: &[&str], function: &Function) -> bool {
-    names.contains(&function.name.to_string().to_lowercase().as_str())
-}
-
 /// The functions that a question calls.
 #[derive(Default)]
 struct Functions {
     aggregates: bool,
-    /// Functions that need all rows at once, or are unknown.
+    /// Whether it calls functions that need all rows at once, or unknown functions.
     others: bool,
 }
 
-/// Takes the name of the table off columns, and finds what needs all rows at once.
+/// Removes the name of the table from columns, and finds expressions that need all rows at once.
 struct ColumnSimplifier<'a> {
     table: &'a str,
     alias: &'a str,
@@ -518,9 +471,9 @@ impl Visit for ColumnSimplifier<'_> {
                     FunctionArguments::List(list) => list.duplicate_treatment.is_none() && list.clauses.is_empty(),
                     _ => false,
                 };
-                let aggregate = is_one_of(&AGGREGATE, function);
+                let aggregate = is_one_of(AGGREGATE, function);
                 self.functions.aggregates |= aggregate;
-                self.functions.others |= !bare || !list || !aggregate && !is_one_of(&SCALAR, function);
+                self.functions.others |= !bare || !list || !aggregate && !is_one_of(SCALAR, function);
             }
             _ => {}
         }

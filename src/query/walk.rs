@@ -1,32 +1,33 @@
-//! The walk through the parts of a question, common to all visitors: each visitor of sqlparser's would be code of its own for all of SQL.
+//! The walk through a query, common to all visitors. With the generic visitors of sqlparser, each visitor would have its own copy of the code
+//! for all of SQL.
 
 use std::ops::ControlFlow;
 
 use sqlparser::ast::{Expr, Query, Select, TableFactor, VisitMut, VisitorMut};
 
-/// The visitor of the parts of a question; `Break` ends the walk.
+/// A visitor of the parts of a query; `Break` ends the walk.
 pub trait Visit {
-    /// Before the parts of a query.
+    /// Called before the parts of a query.
     fn query(&mut self, _: &mut Query) -> ControlFlow<()> {
         ControlFlow::Continue(())
     }
 
-    /// Before the parts of a SELECT.
+    /// Called before the parts of a SELECT.
     fn select(&mut self, _: &mut Select) -> ControlFlow<()> {
         ControlFlow::Continue(())
     }
 
-    /// Before the parts of what FROM and JOIN name.
+    /// Called before the parts of a table in FROM or JOIN.
     fn table(&mut self, _: &mut TableFactor) -> ControlFlow<()> {
         ControlFlow::Continue(())
     }
 
-    /// Before the parts of an expression.
+    /// Called before the parts of an expression.
     fn before(&mut self, _: &mut Expr) -> ControlFlow<()> {
         ControlFlow::Continue(())
     }
 
-    /// After the parts of an expression.
+    /// Called after the parts of an expression.
     fn after(&mut self, _: &mut Expr) -> ControlFlow<()> {
         ControlFlow::Continue(())
     }
@@ -58,7 +59,7 @@ impl VisitorMut for Walk<'_> {
     }
 }
 
-/// Leads a visitor through a part of a question; whether it got to the end.
+/// Leads a visitor through a part of a query, and returns whether it reached the end.
 pub fn walk(part: &mut impl VisitMut, visitor: &mut dyn Visit) -> bool {
     VisitMut::visit(part, &mut Walk(visitor)).is_continue()
 }

@@ -1,6 +1,6 @@
 //! The JSON Schema of a spec, for editors and validators: axes, units, ranges, tables and columns from their definitions.
 //!
-//! It refuses faults of single keys. Faults of several keys, or of a file, are left to the check.
+//! It detects faults of single keys. The check finds faults of several keys or of a file.
 
 use std::collections::BTreeSet;
 
@@ -11,7 +11,7 @@ use crate::grid::{Design, Domain, Quantity, RTOL, Scale};
 use crate::model::{Scales, Units};
 use crate::table::{self, STATUS, Table};
 
-/// The schema, in draft 7, which editors know.
+/// The schema, in draft 7, which editors support.
 pub fn schema() -> Value {
     // The values of the scales do not matter here.
     let si = Units::Si(Scales { mu_0: 1.0, l: 1.0, v_0: 1.0, normal_stress: 1.0 });
@@ -44,7 +44,7 @@ fn keys(description: &str, properties: Value) -> Value {
     json!({ "type": "object", "additionalProperties": false, "description": description, "properties": properties })
 }
 
-/// The keys that may also stand in a block.
+/// The keys that are also legal in a block.
 fn grid() -> Map<String, Value> {
     let points = "A CSV or Parquet file, relative to the spec: one row per point; its columns are axes that vary together, and labels of text";
     let names = json!({ "enum": Quantity::ALL.map(Quantity::name) });

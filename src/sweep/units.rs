@@ -1,4 +1,4 @@
-//! `[model] units`: whether a sweep is given in scaled units or in SI, and which values are legal in them.
+//! `[model] units`: scaled or SI units, and the legal values in these units.
 
 use super::error::{SpecError, refuse};
 use super::spec::{ModelSpec, Spec};
@@ -53,11 +53,11 @@ pub fn units(model: &ModelSpec) -> Result<Units, SpecError> {
     }
 }
 
-/// Whether `value`, in `units`, is one that `quantity` can have; if not, what is.
+/// Checks that `value`, in `units`, is legal for `quantity`; the error is the legal range.
 pub fn legal(units: &Units, quantity: Quantity, scale: Scale, value: f64) -> Result<(), String> {
     let (domain, unit) = (quantity.domain(), quantity.unit(scale));
     let scaled = units.scaled(unit, value);
-    // A number that leaves the range of doubles on the way would mean something else.
+    // A number that overflows or underflows in the conversion would change its meaning.
     let survives = value.is_finite() == scaled.is_finite() && (value == 0.0) == (scaled == 0.0);
     if domain.contains(scaled) && survives {
         return Ok(());
@@ -68,11 +68,11 @@ pub fn legal(units: &Units, quantity: Quantity, scale: Scale, value: f64) -> Res
     })
 }
 
-/// What to do about velocities that look scaled in a spec in SI.
+/// The help for velocities that look scaled in a spec with SI units.
 const PROBABLY_SCALED: &str =
     "if these are in units of v_0, multiply them by v_0, or remove `units` and the scales from [model]";
 
-/// What to do about a value that `quantity` cannot have. Velocities out of range are often a matter of units.
+/// The help for an illegal value of `quantity`. Velocities out of range often have the wrong unit.
 pub fn help(units: &Units, quantity: Quantity, value: f64) -> &'static str {
     let is_velocity = matches!(quantity, Quantity::InitialVelocity | Quantity::FinalVelocity);
     let scaled = units.scaled("v_0", value);
@@ -85,10 +85,10 @@ pub fn help(units: &Units, quantity: Quantity, value: f64) -> &'static str {
     }
 }
 
-/// A velocity in m/s above which SI values are likely to be scaled ones: a hundred times that of seismic waves, 1e4 m/s.
+/// Velocity in m/s above which SI values are probably scaled values. Chosen: a hundred times the velocity of seismic waves, 1e4 m/s.
 const MAX_PLAUSIBLE_VELOCITY: f64 = 1e6;
 
-/// The doubt whether `axis`, whose key begins with `prefix`, is in SI units, if there is one.
+/// The warning that `axis`, whose key begins with `prefix`, is probably not in SI units, if so.
 pub fn doubt(prefix: &str, units: &Units, axis: &Axis) -> Option<SpecError> {
     if *units == Units::Scaled || !matches!(axis.quantity, Quantity::InitialVelocity | Quantity::FinalVelocity) {
         return None;
@@ -104,7 +104,7 @@ pub fn doubt(prefix: &str, units: &Units, axis: &Axis) -> Option<SpecError> {
     })
 }
 
-/// The units of the dataset that was made from the spec `text`.
+/// The units of a dataset with the spec `text`.
 pub fn units_of(text: &str) -> Result<Units, SpecError> {
     units(&Spec::parse(text)?.model)
 }

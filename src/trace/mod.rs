@@ -1,5 +1,6 @@
-//! A protocol over time: which one, its moments, and how they are written.
+//! A protocol over time: its selection, its moments and their output.
 
+mod disturbed;
 mod protocol;
 #[cfg(feature = "read")]
 mod row;
@@ -11,13 +12,14 @@ use crate::numerics::elementary::ln;
 use crate::protocol::{Moment, Motion};
 use crate::table::{Column, Kind};
 
-pub use protocol::{Absence, Parameter, Protocol, TracedPath, names};
+pub use disturbed::{Disturbance, Rest};
+pub use protocol::{Absence, Disturbed, Parameter, Protocol, TracedPath, names};
 #[cfg(feature = "read")]
 pub use row::{Pathless, TABLES, protocol_of};
 pub use sample::{RANGE_RTOL, VALUE_RTOL};
 pub use write::{csv, parquet};
 
-/// The columns of a trace; `v_c` only where the spring is elastic, `beta` only where the protocol is an extremal.
+/// The columns of a trace; `v_c` only for an elastic spring, `beta` only for an extremal.
 pub const COLUMNS: [Column; 6] = [
     Column::number("t", "l/v_0", "time since the start; the same twice where the velocity jumps"),
     Column::number("v", "v_0", "velocity"),
@@ -31,23 +33,23 @@ pub const COLUMNS: [Column; 6] = [
     ),
 ];
 
-/// Relative difference of velocities, up to which they do not jump. Chosen: above the rounding of every motion.
+/// Relative difference of velocities up to which they do not count as a jump. Chosen: above the rounding of every motion.
 const JUMP_RTOL: f64 = 1e-9;
 
 /// The times of a trace.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Times {
-    /// The fewest between which straight lines are good to [`RANGE_RTOL`] of the range of every column, and to [`VALUE_RTOL`] of velocities and
-    /// contact lifetimes themselves (those below `1e-12` of the greatest aside).
+    /// The fewest times at which straight lines have errors below [`RANGE_RTOL`] of the range of every column, and below a relative
+    /// [`VALUE_RTOL`] of velocity and theta, except below `1e-12` of their greatest values.
     Fewest,
-    /// So many, at least 2, equally spaced from 0 to `t_f`.
+    /// A number of equally spaced times from 0 to `t_f`, at least 2.
     Spaced(usize),
 }
 
-/// The moments of a protocol, with the steady states that it leads from and to.
+/// The moments of a protocol, with the steady states before and after it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Trace {
-    /// In the order of time, from 0 to `t_f`; two at the same time where the velocity jumps.
+    /// The moments in the order of time, from 0 to `t_f`; at a jump of the velocity, two have the same time.
     pub moments: Vec<Moment>,
     /// Least velocity on the open interval `(0, t_f)`.
     pub v_min: f64,
@@ -56,8 +58,7 @@ pub struct Trace {
 }
 
 impl Trace {
-    /// Traces `motion`, which leads through `transition`; `None` if it has a moment that is no number, or shows more
-    /// detail than can be resolved.
+    /// Traces `motion`, a protocol of `transition`; `None` if a moment is NaN, or if the motion has more detail than can be resolved.
     pub fn of(motion: &dyn Motion, transition: &Transition, times: Times) -> Option<Trace> {
         let [before, after] = around(motion, transition);
         let samples = sample::Samples::of(motion, &[before, after])?;
@@ -70,13 +71,20 @@ impl Trace {
         let jumps = |here: &Moment, steady: &Moment| {
             apart(here.v, steady.v) || here.v_c.is_some_and(|v_c| apart(v_c, steady.v))
         };
-        if moments.first().is_some_and(|first| jumps(first, &before)) {
+        if motion.departs() && moments.first().is_some_and(|first| jumps(first, &before)) {
             moments.insert(0, before);
         }
         if motion.arrives() && moments.last().is_some_and(|last| jumps(last, &after)) {
             moments.push(after);
         }
         Some(Trace { moments, v_min, v_max })
+    }
+
+    /// This trace, and `rest` after it.
+    pub fn then(mut self, rest: Trace) -> Trace {
+        let start = self.moments.last().map_or(0.0, |last| last.t);
+        self.moments.extend(rest.moments.into_iter().map(|moment| Moment { t: start + moment.t, ..moment }));
+        Trace { v_min: self.v_min.min(rest.v_min), v_max: self.v_max.max(rest.v_max), ..self }
     }
 
     /// This trace, converted from the units of the model to `units`.
@@ -96,13 +104,13 @@ impl Trace {
         self
     }
 
-    /// The columns that the trace has, by their places in [`COLUMNS`].
+    /// The columns of the trace, as indices of [`COLUMNS`].
     pub fn columns(&self) -> Vec<usize> {
         let is_there = |&column: &usize| self.moments.iter().any(|moment| Trace::value(moment, column).is_some());
         (0..COLUMNS.len()).filter(is_there).collect()
     }
 
-    /// The value of a column at a moment, by its place in [`COLUMNS`]; `None` where there is none.
+    /// The value of a column, given by its index in [`COLUMNS`], at a moment; `None` if it does not exist.
     pub fn value(moment: &Moment, column: usize) -> Option<f64> {
         match column {
             0 => Some(moment.t),
@@ -115,7 +123,7 @@ impl Trace {
     }
 }
 
-/// The unit of a column, by its place in [`COLUMNS`], in the model.
+/// The scaled unit of a column, given by its index in [`COLUMNS`].
 pub fn unit(column: usize) -> &'static str {
     match COLUMNS[column].kind {
         Kind::Number(unit) => unit,

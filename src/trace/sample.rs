@@ -3,39 +3,38 @@
 use crate::numerics::root::crossing;
 use crate::protocol::{Moment, Motion};
 
-/// Distance of a straight line between neighbouring moments from the motion, relative to the range of the column. Chosen: less than a
-/// picture shows.
+/// Error of linear interpolation between neighbouring moments, relative to the range of the column. Chosen: invisible in a picture.
 pub const RANGE_RTOL: f64 = 1e-4;
 
 /// Interpolation error relative to `v` or `theta`. Chosen: smooth on logarithmic axes.
 pub const VALUE_RTOL: f64 = 0.01;
 
-/// Columns for which that holds: the velocity and the contact lifetime.
+/// Number of columns with this tolerance: velocity and theta.
 const POSITIVE_COLUMNS: usize = 2;
 
-/// Fraction of both that the samples use. Chosen: between samples is left the rest.
+/// Fraction of both tolerances at the samples. Chosen: the rest is a margin between samples.
 const SAMPLES_FRACTION: f64 = 0.98;
 
-/// Change relative to the greatest value of a column that is rounding: a few thousand roundings of 1.1e-16 each.
+/// Change, relative to the greatest value of a column, that counts as rounding: a few thousand roundings of 1.1e-16.
 const ROUNDING_RTOL: f64 = 1e-12;
 
-/// Difference of times relative to the later one, up to which they are one: eight roundings.
+/// Relative difference of times up to which they are equal: eight roundings.
 const SAME_TIME_RTOL: f64 = 8.0 * f64::EPSILON;
 
-/// Steps of a piece of the motion: a chord is compared with the motion at all places between them. Chosen: halves keep their samples.
+/// Steps of an interval of the motion; a chord is compared with the motion between them. Chosen: half an interval keeps its samples.
 const STEPS: usize = 8;
 
-/// Moments, above which a motion cannot be resolved. Chosen: a few hundred megabytes.
+/// Greatest number of moments; a motion with more cannot be resolved. Chosen: a few hundred megabytes.
 const MAX_MOMENTS: usize = 1 << 21;
 
-/// A moment and its place on the curve.
+/// A moment and its position on the curve.
 #[derive(Debug, Clone, Copy)]
 struct Sample {
     s: f64,
     moment: Moment,
 }
 
-/// The samples of a motion, more than are shown.
+/// The samples of a motion, of which a trace shows some.
 #[derive(Debug)]
 pub struct Samples {
     samples: Vec<Sample>,
@@ -45,9 +44,9 @@ pub struct Samples {
 /// The tolerance of linear interpolation.
 #[derive(Debug, Clone, Copy)]
 struct Tolerance {
-    /// By the range of each column.
+    /// Absolute tolerance of each column, from its range.
     range: [f64; COLUMNS],
-    /// Below this a change is rounding, in each column.
+    /// Change of each column that counts as rounding.
     noise: [f64; COLUMNS],
 }
 
@@ -69,9 +68,8 @@ fn columns(moment: &Moment) -> [Option<f64>; COLUMNS] {
 }
 
 impl Samples {
-    /// Halves the pieces between the landmarks of `motion` until straight lines are good. `steady` are the states
-    /// before and after: they count in the range of a column. `None` if the motion has a moment that is no number, or
-    /// cannot be resolved.
+    /// Halves the intervals between the landmarks of `motion` until linear interpolation is within the tolerance. The states `steady` before and
+    /// after count in the range of a column. `None` if a moment is NaN, or if the motion cannot be resolved.
     pub fn of(motion: &dyn Motion, steady: &[Moment]) -> Option<Samples> {
         let landmarks = motion.landmarks();
         let mut pieces = Vec::with_capacity(landmarks.len());
@@ -84,7 +82,7 @@ impl Samples {
         }
         let tolerance = tolerance(pieces.iter().flatten().map(|sample| &sample.moment).chain(steady));
         let mut samples: Vec<Sample> = vec![*pieces.first()?.first()?];
-        // The next piece is the last of the list.
+        // The next interval is the last of the list.
         pieces.reverse();
         while let Some(piece) = pieces.pop() {
             let (first, last) = (piece[0], piece[STEPS]);
@@ -106,7 +104,7 @@ impl Samples {
             let halves = (halve(&piece[..=STEPS / 2])?, halve(&piece[STEPS / 2..])?);
             pieces.extend([halves.1, halves.0]);
         }
-        // Rounding may take a time back by some units in the last place.
+        // Rounding may decrease a time by some units in the last place.
         let mut latest = 0.0_f64;
         for sample in &mut samples {
             latest = latest.max(sample.moment.t).min(motion.duration());
@@ -130,7 +128,7 @@ impl Samples {
                 next += 1;
             }
             let moment = samples[next].moment;
-            // Of moments that time does not distinguish the last one stands, which leads on.
+            // Of moments with equal times the last one is kept.
             if rows.len() > 1 && rows[rows.len() - 1].t == moment.t {
                 rows.pop();
             }
@@ -140,12 +138,12 @@ impl Samples {
         rows
     }
 
-    /// Least and greatest velocity of the motion.
+    /// The least and the greatest velocity of the motion.
     pub fn velocities(&self, motion: &dyn Motion) -> (f64, f64) {
         (-self.greatest(|s| -motion.at(s).v, |moment| -moment.v), self.greatest(|s| motion.at(s).v, |moment| moment.v))
     }
 
-    /// The greatest value: golden section between the neighbours of the greatest sample.
+    /// The greatest value, by golden section between the neighbours of the greatest sample.
     fn greatest(&self, value: impl Fn(f64) -> f64, of: impl Fn(&Moment) -> f64) -> f64 {
         let order = |i: &usize, j: &usize| of(&self.samples[*i].moment).total_cmp(&of(&self.samples[*j].moment));
         let top = (0..self.samples.len()).max_by(order).unwrap_or(0);
@@ -173,7 +171,7 @@ impl Samples {
 /// Ratio of a golden section, `(sqrt 5 - 1)/2`.
 const GOLDEN: f64 = 0.618_033_988_749_894_9;
 
-/// Golden sections of an interval, which shrinks by `1e-8`: a smooth maximum is flat within rounding there.
+/// Number of golden sections, which shrink an interval by `1e-8`: a smooth maximum is flat within rounding there.
 const SECTIONS: u32 = 40;
 
 /// The moments at `count >= 2` equally spaced times from 0 to `t_f`. `None` as for [`Samples::of`].
@@ -187,14 +185,22 @@ pub fn spaced(motion: &dyn Motion, count: usize) -> Option<Vec<Moment>> {
         let t = t_f * (i as f64 / (count - 1) as f64);
         let after = marks.partition_point(|mark| mark.moment.t <= t).clamp(1, marks.len() - 1);
         let found = meet(motion, t, &marks[after - 1], &marks[after])?;
-        rows.push(Moment { t, ..found });
+        rows.push(Moment { t, ..found.moment });
     }
     rows.push(Moment { t: t_f, ..last.moment });
     Some(rows)
 }
 
+/// The place and the moment of `motion` at time `t`. `None` as for [`Samples::of`].
+pub fn at_time(motion: &dyn Motion, t: f64) -> Option<(f64, Moment)> {
+    let marks: Vec<Sample> = motion.landmarks().into_iter().map(|s| look(motion, s)).collect::<Option<_>>()?;
+    let after = marks.partition_point(|mark| mark.moment.t <= t).clamp(1, marks.len().max(2) - 1);
+    let found = meet(motion, t, marks.get(after - 1)?, marks.get(after)?)?;
+    Some((found.s, found.moment))
+}
+
 /// The moment at time `t` between two samples. `None` as for [`Samples::of`].
-fn meet(motion: &dyn Motion, t: f64, low: &Sample, high: &Sample) -> Option<Moment> {
+fn meet(motion: &dyn Motion, t: f64, low: &Sample, high: &Sample) -> Option<Sample> {
     let off = |sample: &Sample| sample.moment.t - t;
     let ends = [off(low), off(high)];
     let mut nearest = if -ends[0] < ends[1] { *low } else { *high };
@@ -210,7 +216,7 @@ fn meet(motion: &dyn Motion, t: f64, low: &Sample, high: &Sample) -> Option<Mome
         if off(&sample).abs() <= f64::EPSILON * t { 0.0 } else { off(&sample) }
     };
     crossing(distance, [low.s, high.s], ends, f64::EPSILON * high.s);
-    is_number.then_some(nearest.moment)
+    is_number.then_some(nearest)
 }
 
 fn look(motion: &dyn Motion, s: f64) -> Option<Sample> {
@@ -233,7 +239,7 @@ fn tolerance<'a>(moments: impl Iterator<Item = &'a Moment>) -> Tolerance {
     Tolerance { range, noise }
 }
 
-/// Whether no step of a piece takes most of its time, so that there are places to look at between its ends.
+/// Whether no step takes most of the time of an interval, so that points between its ends can be compared.
 fn is_even(piece: &[Sample]) -> bool {
     let time = |from: &Sample, to: &Sample| to.moment.t - from.moment.t;
     let whole = time(&piece[0], &piece[STEPS]);

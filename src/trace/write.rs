@@ -14,9 +14,8 @@ use super::{COLUMNS, Trace, unit};
 use crate::dataset::field;
 use crate::model::Units;
 
-/// Comments with the version, `facts` and the units of the columns, a line `# key = value` each; then a line with the
-/// names of the columns, and one a moment: every number in the fewest digits that read back the same, and nothing where
-/// there is none. The trace is in `units`.
+/// CSV with comments `# key = value`: version, `facts` and units of the columns. Then follow the names of the columns and a line for each
+/// moment. Numbers have the fewest digits that determine them; missing numbers are empty. The trace is in `units`.
 pub fn csv(trace: &Trace, units: &Units, facts: &[(String, String)], version: &str) -> String {
     let columns = trace.columns();
     let of_columns: Vec<&str> = columns.iter().map(|&column| units.name(unit(column))).collect();
@@ -39,8 +38,8 @@ pub fn csv(trace: &Trace, units: &Units, facts: &[(String, String)], version: &s
     text
 }
 
-/// A Parquet file: units and meanings in the metadata of the fields, `facts` and the version in that of the file. The
-/// same bytes on every machine. The trace is in `units`.
+/// A Parquet file with units and meanings in the metadata of the fields, and `facts` and version in the metadata of the file. Its bytes are
+/// equal on every machine. The trace is in `units`.
 ///
 /// # Errors
 /// If the file cannot be encoded.
@@ -69,7 +68,7 @@ pub fn parquet(trace: &Trace, units: &Units, facts: &[(String, String)], version
     file.into_inner()
 }
 
-/// Whether a column, by its place, may have no value: the costate before and after the protocol.
+/// Whether the column with this index may lack a value: the costate before and after the protocol.
 fn is_partial(column: usize) -> bool {
     column + 1 == COLUMNS.len()
 }

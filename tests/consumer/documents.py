@@ -125,7 +125,7 @@ def main():
     parser.add_argument("program", type=lambda text: Path(text).resolve(), metavar="FOLDER")
     parser.add_argument("--write", action="store_true", help="copy the pictures to docs/pictures instead of comparing them")
     parser.add_argument("pages", nargs="*", metavar="PAGE", type=lambda text: Path(text).resolve())
-    arguments = parser.parse_args()
+    arguments = parser.parse_intermixed_args()
     variables = environment(arguments.program)
 
     pages = arguments.pages or [REPOSITORY / "README.md", *sorted((REPOSITORY / "docs").rglob("*.md"))]
@@ -135,7 +135,7 @@ def main():
         return
     assert count >= 10, count
     with tempfile.TemporaryDirectory() as folder:
-        for language, code in blocks_of((REPOSITORY / "examples/README.md").read_text()):
+        for language, code in blocks_of((REPOSITORY / "docs/examples.md").read_text()):
             if language == "sh":
                 run(["bash", "-euo", "pipefail", "-c", code], folder, variables)
         scripts = sorted(EXAMPLES.glob("with_*.py"))

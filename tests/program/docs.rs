@@ -17,9 +17,7 @@ fn repository() -> PathBuf {
 /// The documents of the repository, relative to it.
 fn documents() -> Vec<PathBuf> {
     let mut found: Vec<PathBuf> =
-        ["README.md", "CONTRIBUTING.md", "CHANGELOG.md", "examples/README.md", "results/paper/README.md"]
-            .map(PathBuf::from)
-            .into();
+        ["README.md", "CONTRIBUTING.md", "CHANGELOG.md", "examples/README.md"].map(PathBuf::from).into();
     found.extend(pages());
     found.sort();
     found

@@ -1,7 +1,7 @@
-//! The linear system of a Newton step: one block of `S x S` a pair of variables, eliminated variable by variable.
+//! The linear system of a Newton step: one block of `S x S` for each pair of variables, eliminated variable by variable.
 //!
-//! The equations couple stages only through the slopes, so blocks off the diagonal start out diagonal or empty: a chain
-//! of three variables costs little more than two small inversions.
+//! The equations couple the stages only through the slopes, so off-diagonal blocks are diagonal or empty at first. A chain of three variables
+//! costs little more than two small inversions.
 
 #![expect(clippy::needless_range_loop, reason = "matrices are written with the indices of their formulas")]
 
@@ -15,11 +15,11 @@ pub(super) type Square<const S: usize> = [[f64; S]; S];
 pub(super) struct Factors<const N: usize, const S: usize> {
     /// Inverses of the pivot blocks.
     pivots: [Square<S>; N],
-    /// Below the diagonal the multipliers, above it the blocks themselves.
+    /// Below the diagonal: the multipliers; above it: the blocks.
     others: [[Block<S>; N]; N],
 }
 
-/// A block off the diagonal.
+/// An off-diagonal block.
 #[derive(Debug, Clone, Copy)]
 enum Block<const S: usize> {
     Empty,
@@ -28,7 +28,7 @@ enum Block<const S: usize> {
 }
 
 impl<const N: usize, const S: usize> Factors<N, S> {
-    /// `None` where a pivot block is singular or not finite.
+    /// Factorises the matrix; `None` if a pivot block is singular or not finite.
     #[inline(always)]
     pub(super) fn new(rule: &Collocation<S>, h: f64, at: &Linearised<N, S>) -> Option<Self> {
         let mut pivots = [[[0.0; S]; S]; N];
@@ -183,7 +183,7 @@ fn product<const S: usize>(left: &Square<S>, right: &Square<S>) -> Square<S> {
     result
 }
 
-/// Gauss-Jordan elimination with row exchanges; `None` where the matrix is singular or not finite.
+/// The inverse by Gauss-Jordan elimination with row exchanges; `None` if the matrix is singular or not finite.
 #[inline(always)]
 pub(super) fn inverse<const S: usize>(mut left: Square<S>) -> Option<Square<S>> {
     let mut right: Square<S> = std::array::from_fn(|i| std::array::from_fn(|j| if i == j { 1.0 } else { 0.0 }));

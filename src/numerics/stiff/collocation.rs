@@ -1,7 +1,7 @@
 //! Coefficients of Radau IIA collocation with `S` stages: nodes, differentiation, integration, the polynomial's powers.
 //!
-//! The nodes are the zeros of `P_S - P_(S-1)` on `[0, 1]`, the last one 1 (Hairer and Wanner, Solving Ordinary
-//! Differential Equations II, section IV.5). Everything is derived from them in double-double and rounded once.
+//! The nodes are the zeros of `P_S - P_(S-1)` on `[0, 1]`, the last one 1 (Hairer and Wanner, Solving Ordinary Differential Equations II,
+//! section IV.5). All other coefficients are computed from them in double-double and rounded once.
 
 use std::sync::OnceLock;
 
@@ -11,7 +11,7 @@ use crate::numerics::radau;
 /// The method with `S` stages: order `2 S - 1`, stiffly accurate, L-stable.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Collocation<const S: usize> {
-    /// Nodes `c`, rising, the last one 1.
+    /// Nodes `c`, ascending, the last one 1.
     pub nodes: [f64; S],
     /// `differentiation[i][j]`: slope at node `i` of the polynomial of degree `S` that is 1 at node `j` and 0 at the
     /// others and at 0. The inverse of [`Collocation::integration`].
@@ -65,7 +65,7 @@ fn make<const S: usize>() -> Collocation<S> {
             powers[k][j] = coefficients[k];
         }
     }
-    // Slopes at the nodes from differences of nodes, which lose nothing.
+    // Slopes at the nodes from differences of nodes, which are exact.
     let zero = DoubleDouble::new(0.0);
     let place = |i: usize| if i < S { c[i] } else { zero };
     let weight = |i: usize| (0..=S).filter(|&k| k != i).fold(one, |product, k| product * (place(i) - place(k)));
@@ -98,7 +98,7 @@ fn make<const S: usize>() -> Collocation<S> {
 
 #[cfg(test)]
 mod tests {
-    //! The conditions that define the coefficients, to the last bits.
+    //! The coefficients satisfy their defining conditions to the last bits.
 
     use super::*;
 

@@ -2,9 +2,9 @@
 
 use super::collocation::Collocation;
 
-/// The solution over one step, a polynomial of degree `S`: it meets the equations at the `S` nodes.
+/// The solution over one step: a polynomial of degree `S` that satisfies the equations at the `S` nodes.
 ///
-/// At the end it is good to the order of the method, `2 S - 1`; between, to order `S`.
+/// At the end its order is that of the method, `2 S - 1`; in between it is `S`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct DenseOutput<const N: usize, const S: usize> {
     /// Time at its start.
@@ -42,11 +42,11 @@ impl<const N: usize, const S: usize> DenseOutput<N, S> {
         dense_output
     }
 
-    /// The same polynomial between two fractions of the step.
+    /// The part of the polynomial between two fractions of the step, as a step of its own.
     pub fn between(&self, from: f64, to: f64) -> Self {
         let mut powers = self.powers;
         for row in &mut powers {
-            // Horner's scheme, again and again, gives the powers of `u - from`; the one of degree 0 is not kept.
+            // Repeated Horner schemes give the coefficients of the powers of `u - from`; the constant is dropped.
             for pass in 0..S {
                 for k in (pass.saturating_sub(1)..S - 1).rev() {
                     row[k] += from * row[k + 1];

@@ -1,4 +1,4 @@
-//! Steps, their error, and how long the next one may be.
+//! The integrator: steps, error estimates and step-size control.
 
 #![expect(clippy::needless_range_loop, reason = "matrices are written with the indices of their formulas")]
 
@@ -9,40 +9,40 @@ use super::{Points, System};
 use crate::numerics::double_double::DoubleDouble;
 use crate::numerics::elementary::{exp, ln};
 
-/// How exact an integration is to be.
+/// Accuracy of an integration.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Accuracy<const N: usize> {
-    /// Error that a step may add, in units of `scale`: `1e-13` to `1e-2`.
+    /// Greatest error of a step, in units of `scale`: `1e-13` to `1e-2`.
     pub tolerance: f64,
-    /// What counts as an error of size 1 in each variable; positive.
+    /// The change of each variable that is an error of 1; positive.
     pub scale: [f64; N],
 }
 
-/// What an integration has cost; exact and the same on every machine.
+/// Statistics of an integration; equal on every machine.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct IntegratorStats {
-    /// Steps taken.
+    /// Accepted steps.
     pub steps: u32,
-    /// Steps given up, for their error or for Newton's method.
+    /// Steps rejected for their error or because Newton's method failed.
     pub rejected: u32,
-    /// Evaluations of the equations: at all stages at once, or at the start for the error.
+    /// Evaluations of the equations: at all stages at once, or at the start for the error estimate.
     pub evaluations: u32,
     /// Factorisations.
     pub factorisations: u32,
 }
 
-/// Why an integration cannot go on.
+/// The failure of an integration.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 pub enum Failure {
-    /// No step is short enough: the solution ends here, most often because it becomes infinite.
+    /// No step is short enough: the solution ends here, usually because it becomes infinite.
     #[error("the solution ends at t = {t}: no step is short enough")]
     Ends {
-        /// Where.
+        /// The time.
         t: f64,
     },
 }
 
-/// An integration under way: Radau IIA with `S` stages, order `2 S - 1`, over `N` variables.
+/// An integration in progress: Radau IIA with `S` stages, order `2 S - 1`, over `N` variables.
 #[derive(Debug, Clone)]
 pub struct Integrator<'a, Y, const N: usize, const S: usize> {
     system: &'a Y,
@@ -50,11 +50,11 @@ pub struct Integrator<'a, Y, const N: usize, const S: usize> {
     accuracy: Accuracy<N>,
     /// Greatest error estimate of a step, in units of `scale`.
     allowed: f64,
-    /// With 32 digits, so that short steps add up after a long rest.
+    /// The time with 32 digits, so that short steps add up after a long rest.
     t: DoubleDouble,
-    /// Time beyond it that its digits do not show.
+    /// Remaining time below the last digit of `t`.
     rest: f64,
-    /// Fraction of the time before it that a step is at least.
+    /// Shortest step, as a fraction of the time before it.
     shortest: f64,
     y: [f64; N],
     /// Length proposed for the next step.
@@ -63,30 +63,30 @@ pub struct Integrator<'a, Y, const N: usize, const S: usize> {
     cost: IntegratorStats,
 }
 
-/// The last step, with its error estimate relative to what was allowed.
+/// The last step, with its error estimate relative to the allowed error.
 #[derive(Debug, Clone, Copy)]
 struct LastStep<const N: usize, const S: usize> {
     dense_output: DenseOutput<N, S>,
     error: f64,
 }
 
-/// Least error of a tolerance, relative to the variables: 32 units in the last place.
+/// Least tolerated error, relative to the variables: 32 units in the last place.
 const ROUNDING: f64 = 32.0 * f64::EPSILON;
 
-/// Fraction of the time before it that a step is at least, unless it [may be shorter](Integrator::may_step): 32 digits.
+/// Shortest step, as a fraction of the time before it, unless it [may be shorter](Integrator::may_step): 32 digits.
 const SHORTEST: f64 = 6e-33;
 
-/// Newton iterations before a step is given up.
+/// Newton iterations before a step is rejected.
 const MOST_ITERATIONS: u32 = 12;
 
-/// Fraction of the tolerance that is left to Newton's method.
+/// Fraction of the tolerance that is allowed as residual of Newton's method.
 const NEWTON_TOLERANCE_FRACTION: f64 = 0.01;
 
-/// The matrix is recomputed where an iteration leaves more than this fraction of the error.
+/// Convergence rate of Newton's method above which the matrix is recomputed.
 const SLOW: f64 = 0.1;
 
 impl<'a, Y: System<N>, const N: usize, const S: usize> Integrator<'a, Y, N, S> {
-    /// Starts at `y(t)`, which meets the constraints, with a first step of about `h > 0`.
+    /// An integrator that starts at `y(t)`, which satisfies the constraints, with a first step of about `h > 0`.
     pub fn new(
         system: &'a Y,
         rule: &'static Collocation<S>,
@@ -102,8 +102,7 @@ impl<'a, Y: System<N>, const N: usize, const S: usize> Integrator<'a, Y, N, S> {
         Integrator { system, rule, accuracy, allowed, t, rest: 0.0, shortest: SHORTEST, y, h, last: None, cost }
     }
 
-    /// Lets a step be as short as this fraction of the time before it: where variables become infinite after all, it takes so
-    /// much longer to see.
+    /// Allows steps down to this fraction of the time before them. A solution that becomes infinite then takes more steps to detect.
     pub fn may_step(&mut self, fraction: f64) {
         self.shortest = fraction;
     }
@@ -118,17 +117,17 @@ impl<'a, Y: System<N>, const N: usize, const S: usize> Integrator<'a, Y, N, S> {
         &self.y
     }
 
-    /// Length proposed for the next step: a first step for an integration that takes over from here.
+    /// Length proposed for the next step, also for a new integration that continues from here.
     pub fn proposal(&self) -> f64 {
         self.h
     }
 
-    /// What it has cost so far.
+    /// The statistics so far.
     pub fn cost(&self) -> IntegratorStats {
         self.cost
     }
 
-    /// Goes on from other variables, which meet the constraints, at the same time; with a first step of about `h > 0`.
+    /// Continues from other variables at the same time, which satisfy the constraints, with a first step of about `h > 0`.
     pub fn jump(&mut self, y: [f64; N], h: f64) {
         (self.y, self.h, self.last) = (y, h, None);
     }
@@ -138,8 +137,8 @@ impl<'a, Y: System<N>, const N: usize, const S: usize> Integrator<'a, Y, N, S> {
         (DoubleDouble::new(limit) - self.t).high
     }
 
-    /// Goes on from the variables `y`, to which something else has led in the time `h`; with a first step of about
-    /// `next > 0`. Whether `h` is long enough for that.
+    /// Continues from the variables `y` at a time later by `h`, found by other means, with a first step of about `next > 0`. Returns whether `h`
+    /// is long enough to be represented.
     pub fn leap(&mut self, h: f64, y: [f64; N], next: f64) -> bool {
         let advances = h > self.shortest * self.t.high;
         if advances {
@@ -149,7 +148,7 @@ impl<'a, Y: System<N>, const N: usize, const S: usize> Integrator<'a, Y, N, S> {
         advances
     }
 
-    /// Time goes on.
+    /// Advances the time.
     #[inline(always)]
     fn pass(&mut self, h: f64) {
         let t = self.t + DoubleDouble::new(self.rest + h);
@@ -157,7 +156,7 @@ impl<'a, Y: System<N>, const N: usize, const S: usize> Integrator<'a, Y, N, S> {
         self.t = t;
     }
 
-    /// One step, which ends at `limit` at the latest (and then exactly there).
+    /// Takes one step, which ends at `limit` at the latest, and then exactly there.
     #[inline(always)]
     pub fn step(&mut self, limit: f64) -> Result<DenseOutput<N, S>, Failure> {
         loop {
@@ -198,22 +197,22 @@ impl<'a, Y: System<N>, const N: usize, const S: usize> Integrator<'a, Y, N, S> {
         }
     }
 
-    /// The first part of a step that was taken, up to the fraction `u` of it: a step of its own, so its end has the order
-    /// of the method. `None` if Newton's method fails.
+    /// Integrates the first part of an accepted step again, up to the fraction `u`, so that its end has the order of the method. `None` if
+    /// Newton's method fails.
     #[inline(always)]
     pub fn part(&mut self, dense_output: &DenseOutput<N, S>, u: f64) -> Option<DenseOutput<N, S>> {
         self.leg(dense_output, (dense_output.t, dense_output.start), 0.0, u)
     }
 
-    /// A middle part of a step that was taken, between the fractions `from` and `to`, as a step of its own: shorter, so
-    /// its polynomial is closer to the solution. `None` if Newton's method fails.
+    /// Integrates the part of an accepted step between the fractions `from` and `to` again: the step is shorter, so its polynomial is closer to
+    /// the solution. `None` if Newton's method fails.
     #[inline(always)]
     pub fn between(&mut self, dense_output: &DenseOutput<N, S>, from: f64, to: f64) -> Option<DenseOutput<N, S>> {
         let start = if from > 0.0 { self.part(dense_output, from)?.end } else { dense_output.start };
         self.leg(dense_output, (dense_output.t + from * dense_output.h, start), from, to)
     }
 
-    /// A step from `(t, y)`, which is at the fraction `from` of a piece, to the fraction `to`.
+    /// A step from `(t, y)`, at the fraction `from` of a step, to the fraction `to`.
     #[inline(always)]
     fn leg(
         &mut self,
@@ -231,7 +230,7 @@ impl<'a, Y: System<N>, const N: usize, const S: usize> Integrator<'a, Y, N, S> {
         Some(DenseOutput::new(self.rule, t, h, y, &solved.change))
     }
 
-    /// How much longer the next step may be: the predictive controller (Gustafsson, ACM TOMS 20, 496, 1994).
+    /// Factor of the next step's length: the predictive controller (Gustafsson, ACM TOMS 20, 496, 1994).
     #[inline(always)]
     fn factor(&self, h: f64, error: f64, iterations: u32) -> f64 {
         let order = (S + 1) as f64;
@@ -247,7 +246,7 @@ impl<'a, Y: System<N>, const N: usize, const S: usize> Integrator<'a, Y, N, S> {
         }
     }
 
-    /// Changes at the nodes as the last step's polynomial foresees them.
+    /// Changes at the nodes, extrapolated from the polynomial of the last step.
     #[inline(always)]
     fn guess(&self, h: f64) -> [[f64; S]; N] {
         let Some(LastStep { dense_output, .. }) = &self.last else { return [[0.0; S]; N] };
@@ -258,7 +257,7 @@ impl<'a, Y: System<N>, const N: usize, const S: usize> Integrator<'a, Y, N, S> {
         })
     }
 
-    /// What counts as an error of size 1: `scale`, or more where the tolerance is below the rounding of the variable.
+    /// The change that is an error of 1: `scale`, or more if the tolerance is below the rounding of the variable.
     #[inline(always)]
     fn units(&self, y: &[f64; N]) -> [f64; N] {
         let rounding = ROUNDING / self.accuracy.tolerance;
@@ -306,7 +305,7 @@ impl<'a, Y: System<N>, const N: usize, const S: usize> Integrator<'a, Y, N, S> {
             if rate >= 2.0 {
                 return None;
             }
-            // An equation changes with its variables at a rate of order 1 in their scales, or it will show.
+            // The rate is at most of order 1 for variables in their scales; otherwise the second iteration detects it.
             let foreseen = if iterations == 1 { size } else { rate };
             factors = (foreseen <= SLOW).then_some(matrix);
             before = size;
@@ -334,11 +333,11 @@ impl<'a, Y: System<N>, const N: usize, const S: usize> Integrator<'a, Y, N, S> {
         points
     }
 
-    /// Error estimate of a step: the polynomial meets the equations at the nodes, but not at the start. Its defect
-    /// there goes through `(mass/(gamma h) - J)^-1`, which damps what is stiff (Hairer and Wanner, section IV.8).
+    /// Error estimate of a step: the polynomial meets the equations at the nodes, but not at the start. Its defect there is multiplied by
+    /// `(mass/(gamma h) - J)^-1`, which damps stiff components (Hairer and Wanner, section IV.8).
     #[inline(always)]
     fn error(&mut self, h: f64, change: &[[f64; S]; N]) -> Option<f64> {
-        // About the inverse of the real eigenvalue of the method's inverse matrix.
+        // Approximately the inverse of the real eigenvalue of the inverse of the method's matrix.
         let gamma = 1.0 / (S + 1) as f64;
         let mut points = Points { t: [self.t.high], y: [[0.0]; N], slope: [[0.0]; N] };
         for r in 0..N {
@@ -372,7 +371,7 @@ impl<'a, Y: System<N>, const N: usize, const S: usize> Integrator<'a, Y, N, S> {
     }
 }
 
-/// Changes at the nodes, and the iterations that they took.
+/// Changes at the nodes, and the number of iterations.
 #[derive(Debug, Clone, Copy)]
 struct Solved<const N: usize, const S: usize> {
     change: [[f64; S]; N],
@@ -381,7 +380,7 @@ struct Solved<const N: usize, const S: usize> {
 
 #[cfg(test)]
 mod tests {
-    //! Order, stiffness, constraints, the error got for the error asked, and the work, exactly.
+    //! Order, stiffness, constraints, error against tolerance, and exact statistics.
 
     use super::*;
     use crate::numerics::stiff::{Linearised, radau_iia_5, radau_iia_9, radau_iia_13};

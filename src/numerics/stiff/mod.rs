@@ -1,8 +1,7 @@
-//! Stiff initial value problems of a few variables: Radau IIA collocation of order 5, 9 or 13, on the stack.
+//! Stiff initial value problems of a few variables: Radau IIA collocation of order 5, 9 or 13, without memory allocation.
 //!
-//! A [`System`] is a set of equations `mass y' = f(t, y)`, masses of 0 allowed (constraints of index 1), that gives its
-//! residual and its Jacobian at several points at once. An [`Integrator`] takes steps along a solution; each is a
-//! [`DenseOutput`], the collocation polynomial.
+//! A [`System`] is a set of equations `mass y' = f(t, y)`; a mass of 0 makes a constraint of index 1. It returns its residual and its Jacobian
+//! at several points at once. An [`Integrator`] takes steps along a solution; each is a [`DenseOutput`], the collocation polynomial.
 //!
 //! ```
 //! use slipsweep::numerics::elementary::exp;
@@ -32,16 +31,15 @@
 //! # Ok::<(), slipsweep::numerics::stiff::Failure>(())
 //! ```
 //!
-//! Where the equations jump (a control that is sampled and held), end a step there, and go on with a new integrator
-//! whose first step is the old one's [`Integrator::proposal`]. Where a number is needed inside a step to the order of
-//! the method, as for an event, [`Integrator::part`] integrates again up to there.
+//! If the equations jump (a control that is sampled and held), end a step there, and continue with a new integrator whose first step is
+//! [`Integrator::proposal`] of the old one. To evaluate a number inside a step with the order of the method, as for an event, integrate again up
+//! to it with [`Integrator::part`].
 //!
 //! # Method
 //!
-//! The stages are solved by Newton's method with the Jacobian of every stage at its own place, so long steps through
-//! strong nonlinearities converge; the matrix is eliminated variable by variable ([`System`] says in which order),
-//! which costs about as much as one iteration of the usual frozen and diagonalised form. The last step's polynomial,
-//! continued, is the first guess.
+//! Newton's method solves for the stages. It evaluates the Jacobian at every stage, so long steps through strong nonlinearities converge. The
+//! matrix is eliminated variable by variable, in the order of [`System`], which costs about as much as one iteration of the usual frozen and
+//! diagonalised form. The extrapolated polynomial of the last step is the first guess.
 
 mod blocks;
 mod collocation;

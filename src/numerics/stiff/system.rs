@@ -1,13 +1,12 @@
-//! The equations that are integrated: implicit, with one equation a variable.
+//! The system of equations: implicit, with one equation for each variable.
 
-/// Equations `mass(t, y) y' = f(t, y)` with one mass a variable: the residual `r(t, y, y') = f - mass y'` vanishes
-/// along a solution. A mass may be 0, which makes its equation a constraint (index 1: solvable for its variable).
+/// Equations `mass(t, y) y' = f(t, y)` with one mass for each variable: the residual `r(t, y, y') = f - mass y'` vanishes along a solution. A
+/// mass may be 0, which makes its equation a constraint (index 1: solvable for its variable).
 ///
-/// Variables should be chosen so that one absolute tolerance each makes sense: logarithms of what spans decades. They
-/// are eliminated in their order: first those whose equation does not contain them, then those that are damped, last
-/// those that the others depend on most.
+/// Choose variables with meaningful absolute tolerances: logarithms of quantities that span decades. The order of the variables is the order of
+/// elimination: first those whose equation does not contain them, then damped ones, last those on which the others depend most.
 pub trait System<const N: usize> {
-    /// Residual, masses and Jacobian at `L` points at once. A result that is not finite makes the step shorter.
+    /// Residual, masses and Jacobian at `L` points at once. If a result is not finite, the integrator shortens the step.
     fn linearise<const L: usize>(&self, points: &Points<N, L>) -> Linearised<N, L>;
 }
 

@@ -1,4 +1,4 @@
-//! An axis cut into cells: one for each of its values while those are few, else one for several that follow each other.
+//! The cells of an axis in a map: one for each value if these are few, else one for several consecutive values.
 
 use super::survey::Values;
 use crate::plot::scale::{LOG_RATIO, Scale, is_logarithmic};
@@ -6,15 +6,15 @@ use crate::plot::scale::{LOG_RATIO, Scale, is_logarithmic};
 /// The cells of an axis.
 #[derive(Debug, Clone, PartialEq)]
 pub struct AxisCells {
-    /// Their middles, ascending: the values themselves where each has a cell.
+    /// Their centres, ascending: the values themselves if each has a cell.
     pub middles: Vec<f64>,
-    /// From the edge of the first to the edge of the last.
+    /// The scale from the edge of the first cell to the edge of the last.
     pub scale: Scale,
-    /// Whether they are equally wide.
+    /// Whether the cells are equally wide.
     pub even: bool,
     /// Whether each value has a cell of its own.
     pub exact: bool,
-    /// The least value of each cell; empty where all values are too many to be known, and cells are equal stretches.
+    /// The least value of each cell; empty if the values are too many to keep, and cells are equal intervals.
     firsts: Vec<f64>,
 }
 
@@ -34,7 +34,7 @@ impl AxisCells {
             let scale = span.with_room(0.0);
             return AxisCells { middles: values.clone(), scale, even: true, exact: true, firsts: values.clone() };
         }
-        // Cells of equally many values: none is empty, whatever the ratio of values to cells.
+        // Cells with equal numbers of values, so that none is empty.
         let together = values.len().div_ceil(most);
         let firsts: Vec<f64> = values.chunks(together).map(|chunk| chunk[0]).collect();
         let exact = together == 1;
@@ -42,30 +42,30 @@ impl AxisCells {
             .iter()
             .enumerate()
             .all(|(place, &value)| (span.fraction(value) * last as f64 - place as f64).abs() < 0.02);
-        // A value or what is between two of them, by its place.
+        // A value, or a point between two values, by its index.
         let at = |place: f64| span.value(place / last as f64);
         if even {
             let middle = |cell: usize| at((cell * together) as f64 + 0.5 * (together - 1) as f64);
             let middles = if exact { values.clone() } else { (0..firsts.len()).map(middle).collect() };
-            // Half a step beyond the first value and the last cell, which may lack some values.
+            // Half a step beyond the first value and the last cell, which may have fewer values.
             let scale = Scale { low: at(-0.5), high: at((firsts.len() * together) as f64 - 0.5), log };
             return AxisCells { middles, scale, even, exact, firsts };
         }
         let middles: Vec<f64> = values.chunks(together).map(|chunk| chunk[chunk.len() / 2]).collect();
         let fractions: Vec<f64> = middles.iter().map(|&middle| span.fraction(middle)).collect();
-        // Half a cell beyond the first and the last middle.
+        // Half a cell beyond the first and the last centre.
         let beyond = |edge: usize, inner: usize| span.value(1.5 * fractions[edge] - 0.5 * fractions[inner]);
         let end = fractions.len() - 1;
         let scale = Scale { low: beyond(0, 1), high: beyond(end, end - 1), log };
         AxisCells { middles, scale, even, exact, firsts }
     }
 
-    /// Their number.
+    /// Number of cells.
     pub fn len(&self) -> usize {
         self.middles.len()
     }
 
-    /// From the first middle to the last.
+    /// The scale from the first centre to the last.
     pub fn ends(&self) -> Scale {
         Scale { low: self.middles[0], high: self.middles[self.len() - 1], log: self.scale.log }
     }
@@ -86,7 +86,7 @@ impl AxisCells {
         (-1e-12..=1.0 + 1e-12).contains(&fraction).then(|| (place.max(0.0) as usize).min(self.len() - 1))
     }
 
-    /// The cell whose middle is nearest to a fraction of the scale.
+    /// The cell whose centre is nearest to a fraction of the scale.
     pub fn nearest(&self, fraction: f64) -> usize {
         let value = self.scale.value(fraction);
         let after = self.middles.partition_point(|&middle| middle < value);

@@ -1,4 +1,4 @@
-//! The choice of axes and columns: varying axes by default, or the request.
+//! The choice of axes and columns: from the request, else from the varying axes.
 
 use super::Request;
 use super::lines;
@@ -9,21 +9,21 @@ use crate::plot::PlotError;
 /// The defaults of a picture.
 #[derive(Debug, Clone, Copy)]
 pub struct Defaults {
-    /// Horizontal axes, the one that is preferred first.
+    /// Horizontal axes, in the order of preference.
     pub x: &'static [&'static str],
     /// Vertical axes of a map.
     pub y: &'static [&'static str],
-    /// Columns of words that colour a map where they vary.
+    /// Columns of words that colour a map if they vary.
     pub classes: &'static [&'static str],
-    /// Columns of the colours of a map otherwise: the first that has a value.
+    /// Columns that colour a map otherwise: the first one with a value.
     pub value: &'static [&'static str],
-    /// Columns of lines, a panel each.
+    /// Columns of lines, one panel each.
     pub lines: &'static [&'static str],
-    /// Axes whose values are distinguished by lines.
+    /// Axes whose values have separate lines.
     pub series: &'static [&'static str],
-    /// Values of both axes from which on a map is drawn.
+    /// Least number of values of both axes for a map.
     pub least_map: usize,
-    /// Whether single points of a plane, such as materials, make a map however few they are: lines between them mean nothing.
+    /// Whether scattered points, such as materials, always make a map, since lines between them have no meaning.
     pub scatters: bool,
 }
 
@@ -41,7 +41,7 @@ pub fn choose(survey: &Survey, defaults: &Defaults, request: &Request) -> Result
     let choice = Choice::new(survey, defaults, request)?;
     let (x, y, colour) = (request.x.as_deref(), request.y.as_deref(), request.colour.as_deref());
     let is_axis = |name: &&str| survey.axis(name).is_some();
-    // Two axes, or a column of colours, request a map; another column for lines.
+    // Two axes, or a column of colours, select a map; another column selects lines.
     if let Some(y) = y.filter(is_axis) {
         let x = x.map(str::to_owned).or_else(|| choice.find(defaults.x, Some(y), 2)).or_else(|| choice.longest());
         let x = x.filter(|x| x != y).ok_or_else(|| choice.one_row())?;
@@ -76,7 +76,7 @@ struct Choice<'a> {
 }
 
 impl<'a> Choice<'a> {
-    /// A choice for a request whose columns are all there.
+    /// A choice for a request whose columns all exist.
     fn new(survey: &'a Survey, defaults: &'a Defaults, request: &'a Request) -> Result<Choice<'a>, PlotError> {
         if let Some(x) = &request.x {
             survey.check("--x", "axis", x)?;
@@ -89,7 +89,7 @@ impl<'a> Choice<'a> {
         Ok(Choice { survey, defaults, request, varying: survey.axes.iter().filter(|axis| axis.varies()).collect() })
     }
 
-    /// The first of `names` that has `least` values or more, but for `not`.
+    /// The first of `names`, except `not`, with at least `least` values.
     fn find(&self, names: &[&str], not: Option<&str>, least: usize) -> Option<String> {
         let fits = |axis: &&&Values| Some(axis.name.as_str()) != not && (axis.values.len() >= least || axis.many);
         let named = |name: &&str| self.varying.iter().filter(fits).find(|axis| axis.name == *name);
@@ -106,7 +106,7 @@ impl<'a> Choice<'a> {
         PlotError::OneRow { table: self.survey.table.clone() }
     }
 
-    /// The axes of a map, if there are two that are long enough.
+    /// The axes of a map, if two are long enough.
     fn two_axes(&self, wants_map: bool) -> Result<Option<(String, String)>, PlotError> {
         let Choice { survey, defaults, varying, .. } = self;
         let longest = varying.iter().map(|axis| axis.values.len()).max().unwrap_or(0);
@@ -114,8 +114,7 @@ impl<'a> Choice<'a> {
         let least = if wants_map || is_scattered { 2 } else { defaults.least_map };
         let first = self.request.x.clone().or_else(|| self.find(defaults.x, None, least));
         let Some(first) = first.filter(|_| least < usize::MAX) else { return Ok(None) };
-        // An axis that only changes along with the first would make a map of a single line.
-        // One of the grid comes before one that is computed from others.
+        // An axis that changes only with the first one would make a map of a single line. Grid axes are preferred to computed ones.
         let others = [defaults.y, defaults.x].concat();
         let (gridded, computed): (Vec<&str>, Vec<&str>) = others.into_iter().partition(|name| survey.gridded.has(name));
         for second in [gridded, computed].concat() {
@@ -133,7 +132,7 @@ impl<'a> Choice<'a> {
         Ok(Shape::Map(map::Plan { x, y, value }))
     }
 
-    /// The column of the colours: of words that vary, or the first in which any row has a value.
+    /// The colour column: varying words, or the first column with a value.
     fn value(&self) -> Result<String, PlotError> {
         let Choice { survey, defaults, .. } = self;
         for class in defaults.classes.iter().filter(|class| survey.has(class)) {

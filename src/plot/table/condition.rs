@@ -14,7 +14,7 @@ enum Relation {
     AtLeast,
 }
 
-/// The signs of relations; those of two characters first, since they start like others.
+/// The signs of relations; signs of two characters come first, since they begin like others.
 const SIGNS: [(&str, Relation); 7] = [
     ("<=", Relation::AtMost),
     (">=", Relation::AtLeast),
@@ -25,7 +25,7 @@ const SIGNS: [(&str, Relation); 7] = [
     (">", Relation::Greater),
 ];
 
-/// Relative difference below which numbers are equal. Chosen: nine typed digits find a number.
+/// Relative difference below which numbers are equal. Chosen: nine typed digits identify a number.
 const EQUAL_RTOL: f64 = 1e-9;
 
 /// A condition on a column.
@@ -38,14 +38,14 @@ pub struct Condition {
 }
 
 impl Condition {
-    /// The conditions in `text`, with commas or `and` between them.
+    /// The conditions in `text`, separated by commas or `and`.
     pub fn all(text: &str) -> Result<Vec<Condition>, PlotError> {
         text.split(',').flat_map(|part| part.split(" and ")).map(Condition::one).collect()
     }
 
     fn one(text: &str) -> Result<Condition, PlotError> {
         let wrong = || PlotError::Condition { text: text.trim().to_owned() };
-        // The sign that comes first, and of those at the same place the longest.
+        // The first sign; of several at one position, the longest.
         let found = SIGNS.iter().filter_map(|(sign, relation)| Some((text.find(sign)?, sign.len(), *relation)));
         let (place, length, relation) =
             found.min_by_key(|(place, length, _)| (*place, 2 - *length)).ok_or_else(wrong)?;
@@ -61,7 +61,7 @@ impl Condition {
         self.shown_with(&self.value)
     }
 
-    /// Whether a number fulfils it; where there is none, it never does.
+    /// Whether a number meets the condition; NaN never does.
     pub fn holds(&self, cell: f64) -> bool {
         let Ok(value) = self.value.parse::<f64>() else { return false };
         let equal = cell == value || (cell - value).abs() <= EQUAL_RTOL * cell.abs().max(value.abs());
@@ -75,7 +75,7 @@ impl Condition {
         }
     }
 
-    /// Whether a number from `low` to `high` may fulfil it.
+    /// Whether a number from `low` to `high` may meet the condition.
     pub fn may_hold(&self, low: f64, high: f64) -> bool {
         let Ok(value) = self.value.parse::<f64>() else { return false };
         match self.relation {
@@ -86,12 +86,12 @@ impl Condition {
         }
     }
 
-    /// The number that a column is to be equal to.
+    /// The number in an equality.
     pub fn wanted(&self) -> Option<f64> {
         (self.relation == Relation::Equal).then(|| self.value.parse().ok()).flatten()
     }
 
-    /// The word that a column is to be equal to.
+    /// The word in an equality.
     pub fn word(&self) -> Option<&str> {
         (self.relation == Relation::Equal).then_some(self.value.as_str())
     }
@@ -107,7 +107,7 @@ impl Condition {
         format!("{} {sign} {value}", self.column)
     }
 
-    /// Whether the cell of a row fulfils it.
+    /// Whether the cell of a row meets the condition.
     pub fn holds_in(&self, cells: &Cells, row: usize) -> bool {
         match cells {
             Cells::Numbers(numbers) => self.holds(numbers[row]),
@@ -115,7 +115,7 @@ impl Condition {
         }
     }
 
-    /// Whether a word fulfils it.
+    /// Whether a word meets the condition.
     pub fn holds_word(&self, word: Option<&str>) -> bool {
         match self.relation {
             Relation::Equal => word == Some(self.value.as_str()),
@@ -127,7 +127,7 @@ impl Condition {
 
 #[cfg(test)]
 mod tests {
-    //! Conditions as they are typed.
+    //! Conditions as typed by a user.
 
     use super::*;
 

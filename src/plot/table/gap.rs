@@ -1,4 +1,4 @@
-//! The landscape of the work gap: where v falls below 1, and the best shortcut.
+//! The landscape of the work gap, with the line `v_min = 1` and the best shortcut.
 
 use super::cells::AxisCells;
 use super::choice::Shape;
@@ -18,7 +18,7 @@ use crate::table::OPTIMUM_AXES;
 /// The axes of the landscape.
 const ALPHAS: [&str; 2] = ["alpha_2", "alpha_3"];
 
-/// Steps of the grid on which the line `v = 1` is found, along both axes. Chosen: finer than the dots of print.
+/// Steps of the grid for the line `v = 1`, along both axes. Chosen: finer than the dots of a printer.
 const STEPS: usize = 300;
 
 pub fn draw(scene: &Scene<'_>, shape: &Shape) -> Result<Figure, PlotError> {
@@ -60,20 +60,19 @@ fn bound_in_words(scene: &Scene<'_>, meets_zero: bool) -> String {
     format!("*v*_{{min}} = {bound}{zero}")
 }
 
-/// A border of shortcuts.
+/// The border of the shortcuts with `v >= 1`.
 struct Border {
     lines: Vec<Vec<(f64, f64)>>,
-    /// Whether a piece of it is where `theta` becomes 0.
+    /// Whether `theta` becomes 0 on a piece of it.
     meets_zero: bool,
 }
 
-/// The border of the shortcuts of which the least velocity is 1 or more, and whether a piece of it is where `theta` becomes 0 instead, as it
-/// does far from the optimum. Its border with what is infeasible is often nearer than a cell, so it is found from the cubic itself: where
-/// `theta > 0`, `v >= 1` says that `1 - theta' - theta >= 0`.
+/// The border of the shortcuts with `v >= 1`, and whether `theta` becomes 0 on a piece of it, as it does far from the optimum. The border of
+/// feasibility is often closer than a cell, so the line is computed from the cubic: for `theta > 0`, `v >= 1` means `1 - theta' - theta >= 0`.
 fn bound(scene: &Scene<'_>, groups: &Groups, panel: usize, cells: &[AxisCells; 2]) -> Option<Border> {
     let value = |name| scene.scaled(groups, panel, name);
     let (t_f, start, end) = (value("t_f")?, 1.0 / value("v_i")?, 1.0 / value("v_f")?);
-    // Coefficients in units of 1/t_f and 1/t_f^2 do not depend on it.
+    // Coefficients in units of 1/t_f and 1/t_f^2 do not depend on `t_f`.
     let unit = |alpha: &str, power: f64| if scene.survey.unit(alpha).starts_with("1/t_f") { 1.0 } else { power };
     let rate = scene.source.units.size("v_0/l");
     let (unit_2, unit_3) = (unit(ALPHAS[0], t_f), unit(ALPHAS[1], t_f * t_f / rate));
@@ -90,7 +89,7 @@ fn bound(scene: &Scene<'_>, groups: &Groups, panel: usize, cells: &[AxisCells; 2
             let excess =
                 Cubic { c: std::array::from_fn(|i| if i == 0 { t_f } else { 0.0 } - slope[i] - t_f * theta.c[i]) };
             let (theta, excess) = (theta.least(), excess.least());
-            // In units in which both are of the order of 1.
+            // Both terms in units of the order of 1.
             margin.push((excess / t_f).min(theta / start.min(end)));
             is_zero.push(theta <= 0.0 && excess >= 0.0);
         }

@@ -1,4 +1,4 @@
-//! The groups of a table: values of the axes beyond those of a panel. Each group makes a panel or a line.
+//! The groups of a table: combinations of the axes that are not drawn in a panel. Each group makes a panel or a line.
 
 use std::cmp::Ordering;
 use std::collections::{HashMap, HashSet};
@@ -9,17 +9,17 @@ use crate::plot::colour::MAX_SERIES;
 use crate::plot::{Figure, PlotError, label};
 use crate::protocol::shortcut::FAMILIES;
 
-/// Groups, above which all rows are one group. Chosen: far more than a picture shows.
+/// Greatest number of groups; with more, all rows are one group. Chosen: far more than a picture shows.
 const MAX_GROUPS: usize = 4096;
 
-/// Panels of a figure. Chosen: three rows of three are readable on a page.
+/// Greatest number of panels of a figure. Chosen: three rows of three are readable on a page.
 const MAX_PANELS: usize = 9;
 
-/// Panels in a row, or in a column, of a figure that crosses two axes. Chosen: narrower panels have no room for labels.
+/// Greatest number of panels in a row or column of a figure with two crossed axes. Chosen: narrower panels have no space for labels.
 const MAX_CROSSED_PANELS: usize = 4;
 
-/// The axes that vary besides those that are drawn and distinguish rows, and a sentence on those that only change along. An axis of the
-/// grid always distinguishes them, whichever rows are left of it.
+/// The varying axes that are not drawn and that distinguish rows, and a note on axes that change only with them. A grid axis always
+/// distinguishes rows.
 pub fn further<'a>(survey: &'a Survey, drawn: &[&str]) -> Result<(Vec<&'a str>, Option<String>), PlotError> {
     let others =
         survey.axes.iter().filter(|axis| (axis.varies() || axis.infinite) && !drawn.contains(&axis.name.as_str()));
@@ -38,8 +38,7 @@ pub fn further<'a>(survey: &'a Survey, drawn: &[&str]) -> Result<(Vec<&'a str>, 
     Ok((further, note))
 }
 
-/// Whether the rows are single points over `x`, such as materials of which each has its own values of several axes: an axis that changes
-/// along with `x` neither rises nor falls with it.
+/// Whether the rows are scattered points over `x`, such as materials: an axis that changes with `x` is not monotone in it.
 pub fn is_scattered(survey: &Survey, x: &str, further: &[&str]) -> Result<bool, PlotError> {
     for axis in survey.axes.iter().filter(|axis| axis.varies() && axis.name != x && axis.words.is_empty()) {
         if !further.contains(&axis.name.as_str()) && !survey.follows(&axis.name, x)? {
@@ -49,7 +48,7 @@ pub fn is_scattered(survey: &Survey, x: &str, further: &[&str]) -> Result<bool, 
     Ok(false)
 }
 
-/// The axes of a spec that are lists or ranges, which multiply; axes that are zipped, or computed from each other, are one.
+/// The grid axes of a spec: lists and ranges. Zipped and computed axes count as one.
 #[derive(Debug, Clone, Default)]
 pub struct Gridded {
     axes: Vec<String>,
@@ -90,7 +89,7 @@ impl Gridded {
         self.axes.iter().any(|axis| axis == name)
     }
 
-    /// Whether an axis varies freely of those that are drawn.
+    /// Whether an axis varies independently of the drawn ones.
     fn is_free(&self, name: &str, drawn: &[&str]) -> bool {
         let is_tied = |tied: &Vec<String>| {
             tied.iter().any(|axis| axis == name) && tied.iter().any(|axis| drawn.contains(&axis.as_str()))
@@ -99,12 +98,12 @@ impl Gridded {
     }
 }
 
-/// The rows of the same values of some axes.
+/// The rows with equal values of some axes.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Group {
     /// The values, in the order of the axes.
     pub values: Vec<f64>,
-    /// The values in markup, for axes that vary.
+    /// The values of varying axes, in markup.
     pub name: String,
 }
 
@@ -120,32 +119,31 @@ pub struct Groups {
     /// The number of omitted ones.
     left_out: usize,
     makes: GroupRole,
-    /// Where two axes are crossed, the titles of the rows and of the columns of panels, in markup: the groups fill the rows.
+    /// The titles of the rows and columns of panels, in markup, if two axes are crossed; the groups fill the rows.
     pub crossed: Option<[Vec<String>; 2]>,
-    /// The values, in markup, at which further axes are held where two are crossed.
+    /// The fixed values of further axes, in markup, if two axes are crossed.
     pub held: Vec<String>,
     places: HashMap<Vec<u64>, usize>,
 }
 
-/// The part of a figure that shows a group.
+/// The role of a group in a figure.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum GroupRole {
     /// A panel.
     Panels,
-    /// A line in each panel; groups of a family that does not depend on the bound on friction make one.
+    /// A line in each panel. Groups that differ only in the friction ceiling are one for a family that does not depend on it.
     Lines,
 }
 
 impl Groups {
-    /// The groups of the rows of `survey`, of which each makes a panel over the `drawn` axes, and a sentence on axes that only change along.
+    /// The groups of the rows of `survey` as panels over the `drawn` axes, and a note on axes that change only with others.
     pub fn of_panels(survey: &Survey, drawn: &[&str]) -> Result<(Groups, Option<String>), PlotError> {
         let (further, along) = further(survey, drawn)?;
         Ok((Groups::new(survey, &further, GroupRole::Panels)?, along))
     }
 
-    /// The groups of the rows of `survey` over `axes`, some of them, evenly chosen, where there are more than a figure shows; one group of
-    /// all rows if there are too many to choose from. Two axes that vary independently make rows and columns of panels, also for pairs
-    /// without rows.
+    /// The groups of the rows of `survey` over `axes`. If a figure cannot show all of them, an even selection; beyond `MAX_GROUPS`, one group of
+    /// all rows. Two independent axes make rows and columns of panels, also for pairs without rows.
     pub fn new(survey: &Survey, axes: &[&str], makes: GroupRole) -> Result<Groups, PlotError> {
         let found = keys(survey, axes, makes)?;
         if found.len() > MAX_GROUPS {
@@ -170,13 +168,13 @@ impl Groups {
         Ok(groups)
     }
 
-    /// Some groups of `all`, which are not crossed.
+    /// The `shown` groups of `all`, without crossed axes.
     fn of(axes: Vec<String>, shown: Vec<Group>, all: usize, makes: GroupRole) -> Groups {
         let (places, left_out) = (places_of(&shown), all - shown.len());
         Groups { axes, shown, all, left_out, makes, crossed: None, held: Vec::new(), places }
     }
 
-    /// Names the groups by their labels, if each has one of its own.
+    /// Names the groups by their labels, if each has a unique label.
     fn label(&mut self, survey: &Survey) -> Result<(), PlotError> {
         if survey.labels.is_empty() || self.shown.len() < 2 {
             return Ok(());
@@ -200,7 +198,7 @@ impl Groups {
         Ok(())
     }
 
-    /// Crosses two axes: of more that vary the last two, where the others have their first values.
+    /// Crosses the last two varying axes, at the first values of the others.
     fn cross(&mut self, survey: &Survey, found: &[Vec<f64>]) {
         let varying = varying(found);
         let [.., first, second] = varying.as_slice() else { return };
@@ -219,14 +217,14 @@ impl Groups {
             values
         };
         let [rows, columns] = crossed.map(values);
-        // Axes that advance together have fewer pairs than a row and a column of a table take.
+        // Axes that advance together have too few pairs for rows and columns.
         if rows.len() < 2 || columns.len() < 2 || found_here.len() < rows.len() + columns.len() {
             return;
         }
         let some = |values: &[f64], most: usize| -> Vec<f64> {
             chosen(values.len(), most).into_iter().map(|place| values[place]).collect()
         };
-        // A square of panels, or what the shorter axis leaves to the other.
+        // A square of panels, or more along one axis if the other is short.
         let side = |mine: usize, other: usize| {
             let square = MAX_PANELS.isqrt();
             mine.min(if other < square { (MAX_PANELS / other).min(MAX_CROSSED_PANELS) } else { square })
@@ -254,7 +252,7 @@ impl Groups {
         self.places.get(&bits(&values)).copied()
     }
 
-    /// Drops the groups whose item is not kept, with it, and returns a sentence on them.
+    /// Drops groups whose items are not kept, and returns a note on them.
     pub fn retain<T>(&mut self, items: &mut Vec<T>, is_kept: impl Fn(&T) -> bool) -> Option<String> {
         let pairs = std::mem::take(&mut self.shown).into_iter().zip(std::mem::take(items));
         let (kept, dropped): (Vec<_>, Vec<_>) = pairs.partition(|(_, item)| is_kept(item));
@@ -265,7 +263,7 @@ impl Groups {
         (!names.is_empty()).then(|| format!("No value for {}.", names.join("; ")))
     }
 
-    /// A figure without panels yet, of which each group makes one; `aspect` is that of a single panel.
+    /// A figure without panels, to which each group adds one; `aspect` applies to a single panel.
     pub fn figure(&self, aspect: f64) -> Figure {
         let [rows, columns] = self.crossed.clone().unwrap_or_default();
         Figure {
@@ -283,7 +281,7 @@ impl Groups {
         }
     }
 
-    /// The title of a panel: where axes are crossed that of its column.
+    /// The title of a panel; the title of its column if axes are crossed.
     pub fn title(&self, place: usize) -> String {
         match &self.crossed {
             Some([_, columns]) => columns.get(place).cloned().unwrap_or_default(),
@@ -302,18 +300,18 @@ impl Groups {
 }
 
 impl GroupRole {
-    /// Makes the bound on friction NaN for a family that does not depend on it, where such rows are one line.
+    /// Sets the friction ceiling to NaN for a family that does not depend on it, so that its rows are one line.
     fn merge(self, axes: &[impl AsRef<str>], values: &mut [f64]) {
         let place =
             |axis: Quantity| axes.iter().position(|name| self == GroupRole::Lines && name.as_ref() == axis.name());
-        let (Some(family), Some(bound)) = (place(Quantity::Family), place(Quantity::FrictionBound)) else { return };
+        let (Some(family), Some(bound)) = (place(Quantity::Family), place(Quantity::FrictionCeiling)) else { return };
         if !FAMILIES.get(values[family] as usize).is_some_and(|family| family.uses_tau_ceiling()) {
             values[bound] = f64::NAN;
         }
     }
 }
 
-/// The different values of `axes` in ascending order, those that are alike once; more than `MAX_GROUPS` if there are too many.
+/// The distinct values of `axes` in ascending order; more than `MAX_GROUPS` if there are too many.
 fn keys(survey: &Survey, axes: &[&str], makes: GroupRole) -> Result<Vec<Vec<f64>>, PlotError> {
     let mut found: HashMap<Vec<u64>, Vec<f64>> = HashMap::new();
     let mut last: Vec<f64> = Vec::new();
@@ -326,7 +324,7 @@ fn keys(survey: &Survey, axes: &[&str], makes: GroupRole) -> Result<Vec<Vec<f64>
         let mut cells = cells.to_vec();
         makes.merge(axes, &mut cells);
         found.entry(bits(&cells)).or_insert(cells);
-        // Without axes there is one group, however many rows.
+        // Without axes there is one group.
         !axes.is_empty() && found.len() <= MAX_GROUPS
     })?;
     let mut found: Vec<Vec<f64>> = found.into_values().collect();
@@ -335,20 +333,20 @@ fn keys(survey: &Survey, axes: &[&str], makes: GroupRole) -> Result<Vec<Vec<f64>
     Ok(found)
 }
 
-/// The axes that vary in groups.
+/// The axes that vary between groups.
 fn varying(found: &[Vec<f64>]) -> Vec<usize> {
     let axes = found.first().map_or(0, Vec::len);
     (0..axes).filter(|&axis| found.iter().any(|group| group[axis] != found[0][axis])).collect()
 }
 
-/// The places of the groups that are shown, at most `most`: first merged lines.
+/// The indices of the shown groups, at most `most`: first merged lines.
 fn choice(found: &[Vec<f64>], most: usize, makes: GroupRole) -> Vec<usize> {
     let is_kept = |place: &usize| makes == GroupRole::Lines && found[*place].iter().any(|value| value.is_nan());
     let (mut places, others): (Vec<usize>, Vec<usize>) = (0..found.len()).partition(is_kept);
     places.truncate(most);
     let room = most - places.len();
     if varying(found).len() > 2 {
-        // Neighbours in the order of the grid differ in one axis, and compare.
+        // Neighbours in the order of the grid differ in one axis, and are comparable.
         places.extend(others.into_iter().take(room));
     } else {
         places.extend(chosen(others.len(), room).into_iter().map(|place| others[place]));
@@ -361,7 +359,7 @@ fn places_of(groups: &[Group]) -> HashMap<Vec<u64>, usize> {
     groups.iter().enumerate().map(|(place, group)| (bits(&group.values), place)).collect()
 }
 
-/// `most` of `all` places, the first and the last among them, evenly spread.
+/// `most` of `all` indices, evenly spread, including the first and the last.
 fn chosen(all: usize, most: usize) -> Vec<usize> {
     if all <= most {
         return (0..all).collect();
@@ -371,7 +369,7 @@ fn chosen(all: usize, most: usize) -> Vec<usize> {
 
 #[cfg(test)]
 mod tests {
-    //! An even choice.
+    //! An even selection.
 
     use super::*;
 

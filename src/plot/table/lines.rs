@@ -9,20 +9,20 @@ use crate::plot::scale::Scale;
 use crate::plot::symbol::Symbol;
 use crate::plot::{PlotError, coincide, label};
 
-/// Places along a line, above which rows share them. Chosen: more are not seen in print.
+/// Greatest number of positions along a line; with more rows, several fall on one position. Chosen: more are invisible in print.
 const MAX_PLACES: usize = 4096;
 
 /// Greatest number of rows with names at their points. Chosen: more names overlap.
 pub const MAX_NAMED_ROWS: u64 = 60;
 
-/// Range of a column relative to its greatest value, below which it is one value. Chosen: the range is rounding.
+/// Range of a column, relative to its greatest value, below which it is constant. Chosen: the range is rounding.
 const CONSTANT_RTOL: f64 = 1e-9;
 
-/// Ratio of height to width of a panel, alone and of several above each other. Chosen: curves rise by about 45 degrees, and all panels fit on
-/// a page.
+/// Ratio of height to width of a single panel, and of several above each other. Chosen: curves rise by about 45 degrees, and all panels fit on a
+/// page.
 const ASPECTS: [f64; 2] = [0.7, 0.45];
 
-/// Room beyond the first and the last point, as a fraction of the axes. Chosen: no mark touches the frame.
+/// Space beyond the first and the last point, as a fraction of the axes. Chosen: no mark touches the frame.
 const ROOM: [f64; 2] = [0.02, 0.06];
 
 /// The plan of lines.
@@ -32,7 +32,7 @@ pub struct Plan {
     pub x: String,
     /// Columns of the panels, from the top.
     pub y: Vec<String>,
-    /// The axis whose values are distinguished first.
+    /// The axis that distinguishes lines first.
     pub series: Option<String>,
 }
 
@@ -43,7 +43,7 @@ pub struct LineFigure {
     pub figure: Figure,
     /// The group of each line.
     pub groups: Groups,
-    /// For each line the first one that it coincides with, which is drawn.
+    /// For each line, the first line with which it coincides; only that one is drawn.
     pub leaders: Vec<usize>,
     /// The range of the horizontal axis.
     pub x: Scale,
@@ -54,17 +54,17 @@ struct Rows {
     groups: Groups,
     cells: AxisCells,
     lines: Vec<Line>,
-    /// Whether there is nothing between rows, such as those of several materials.
+    /// Whether rows are scattered points, such as materials, without lines between them.
     are_scattered: bool,
-    /// A sentence on axes that only change along.
+    /// A note on axes that change only with others.
     along: Option<String>,
 }
 
 /// The rows of a group.
 struct Line {
-    /// For each panel the least and the greatest value of each place.
+    /// For each panel, the least and the greatest value of each position.
     ranges: Vec<Vec<(f64, f64)>>,
-    /// The name of each place; empty where rows are not named.
+    /// The name of each position; empty if rows have no names.
     names: Vec<String>,
 }
 
@@ -85,7 +85,7 @@ pub fn lines(survey: &Survey, plan: &Plan) -> Result<LineFigure, PlotError> {
         rows.groups.retain(&mut rows.lines, |line| line.ranges.iter().flatten().any(|(low, _)| !low.is_nan()));
     let x = rows.cells.ends().with_room(ROOM[0]);
     let graphs = (0..plan.y.len()).filter_map(|panel| rows.graph(survey, plan, panel, x));
-    // A column that is the same everywhere is stated, not drawn, unless there is nothing else.
+    // A constant column is stated instead of drawn, unless all columns are constant.
     let (mut stated, mut drawn): (Vec<Graph>, Vec<Graph>) = graphs.partition(|graph| graph.constant.is_some());
     if drawn.is_empty() {
         drawn = std::mem::take(&mut stated);
@@ -122,8 +122,8 @@ pub fn lines(survey: &Survey, plan: &Plan) -> Result<LineFigure, PlotError> {
     Ok(LineFigure { figure, groups: rows.groups, leaders, x })
 }
 
-/// Whether a panel shows the gaps of families, whose logarithm is drawn: those of steps that have not arrived are negative, the others
-/// span decades.
+/// Whether a panel shows the gaps of families, which have a logarithmic scale: gaps of steps that do not reach the final state are negative, the
+/// others span decades.
 fn is_gap_of_families(survey: &Survey, plan: &Plan, panel: usize) -> bool {
     survey.table == "shortcut" && plan.y[panel] == "gap"
 }
@@ -175,7 +175,7 @@ impl Rows {
             true => Scale { log: true, ..Scale::of(self.values(panel).filter(|value| *value > 0.0))? },
             false => Scale::of(self.values(panel))?,
         };
-        // What is zero throughout is never below zero.
+        // A column of zeros needs no negative range.
         let scale = if scale.low == 0.0 && scale.high == 0.0 { Scale { high: 1.0, ..scale } } else { scale };
         let axis = |column: &String, scale| Axis { column: column.clone(), unit: survey.unit(column), scale };
         let (x, y) = (axis(&plan.x, x), axis(&plan.y[panel], scale.with_room(ROOM[1])));
@@ -187,7 +187,7 @@ impl Rows {
         })
     }
 
-    /// The points of a curve: of places with several values the least and the greatest.
+    /// The points of a curve; at positions with several values, the least and the greatest.
     fn curve(&self, ranges: &[(f64, f64)]) -> Vec<(f64, f64)> {
         let mut points = Vec::with_capacity(ranges.len());
         for (&middle, &(low, high)) in self.cells.middles.iter().zip(ranges) {
@@ -199,7 +199,7 @@ impl Rows {
         points
     }
 
-    /// For each line the first one that it coincides with in all panels.
+    /// For each line, the first line with which it coincides in all panels.
     fn leaders(&self, graphs: &[Graph]) -> Vec<usize> {
         let fraction = |graph: &Graph, line: usize| -> Vec<(f64, f64)> {
             graph.curves[line].iter().map(|&(x, y)| (x, graph.panel.y.scale.fraction(y))).collect()
@@ -254,7 +254,7 @@ impl Graph {
     }
 }
 
-/// The value that all of these are, if they are one.
+/// The common value, if all values are equal.
 fn constant(values: impl Iterator<Item = f64>) -> Option<f64> {
     let (low, high) = values.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), v| (low.min(v), high.max(v)));
     (high - low <= CONSTANT_RTOL * low.abs().max(high.abs())).then_some(low)

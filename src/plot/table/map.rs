@@ -1,9 +1,10 @@
-//! Maps: a column as colours over two axes, a panel for each group of the further ones.
+//! Maps: a column as colours over two axes, with a panel for each group of the further axes.
 
 use super::cells::AxisCells;
 use super::groups::Groups;
 use super::lines::MAX_NAMED_ROWS;
 use super::survey::{Survey, Values};
+use crate::plot::canvas::Stroke;
 use crate::plot::colour::{class, viridis};
 use crate::plot::export::image;
 use crate::plot::figure::{Axis, Colours, Entry, Figure, Hover, Key, Layer, Map, Panel};
@@ -13,23 +14,23 @@ use crate::plot::{PlotError, label};
 use crate::protocol::Status;
 use crate::table::STATUS;
 
-/// Cells of an axis of a single panel, and of one of several. Chosen: finer ones are not seen in print.
+/// Greatest number of cells along an axis of a single panel, and of one of several panels. Chosen: finer cells are invisible in print.
 const MAX_CELLS: usize = 720;
 const MAX_CELLS_OF_SEVERAL: usize = 480;
 
-/// Fraction of a map that rows fill, below which it is sparse. Chosen: half of what a condition such as `v_f > v_i` leaves of a grid.
+/// Filled fraction below which a map is sparse. Chosen: half of the fraction that a condition such as `v_f > v_i` leaves of a grid.
 const SPARSE_FILL: f64 = 0.25;
 
-/// Ratio of rows to the values of the longer axis, up to which rows are single points, such as materials. Chosen: no grid has fewer.
+/// Ratio of rows to the values of the longer axis up to which rows are scattered points, such as materials. Chosen: no grid has fewer rows.
 const MAX_SCATTERED_RATIO: usize = 2;
 
-/// Dots of a panel, above which several share a cell. Chosen: more cover each other.
+/// Greatest number of dots of a panel; with more rows, several fall in one cell. Chosen: more dots overlap.
 const MAX_DOTS: f64 = 5000.0;
 
-/// Room beyond the first and the last dot, as a fraction of the axis. Chosen: no dot touches the frame in a panel of a third of a page.
+/// Space beyond the first and the last dot, as a fraction of the axis. Chosen: no dot touches the frame in a panel of a third of a page.
 const DOT_ROOM: f64 = 0.04;
 
-/// Pixels along an axis of a panel whose cells are not equally wide. Chosen: more than its cells.
+/// Pixels along an axis with cells of unequal width. Chosen: more than its cells.
 const PIXELS: usize = 1024;
 
 /// The plan of a map.
@@ -43,14 +44,14 @@ pub struct Plan {
     pub value: String,
 }
 
-/// A map before it is drawn: its figure, and what further layers need to know.
+/// A map before drawing: its figure, and the data for further layers.
 #[derive(Debug)]
 pub struct MapFigure {
     /// The figure.
     pub figure: Figure,
     /// The group of each panel.
     pub groups: Groups,
-    /// For each panel the cell of the least value with status `ok`.
+    /// For each panel, the cell of the least value with status `ok`.
     pub least: Vec<Option<(f64, f64, f64)>>,
     /// The cells of both axes.
     pub cells: [AxisCells; 2],
@@ -59,25 +60,56 @@ pub struct MapFigure {
 /// The cells of one panel.
 struct PanelCells {
     value: Vec<f64>,
-    /// Place of the status plus one; 0 without a row.
+    /// Index of the status plus one; 0 without a row.
     status: Vec<u8>,
-    /// The places of single rows, where those are drawn instead of cells, and their names.
+    /// The positions and names of scattered rows, which are drawn as dots instead of cells.
     dots: Vec<((f64, f64), String)>,
     least: Option<(f64, f64, f64)>,
 }
 
-/// The places of the rows of a panel.
+/// The raster of a panel: positions of its rows.
 struct Raster {
     cells: [AxisCells; 2],
-    /// Whether rows are dots instead of cells.
+    /// Whether rows are drawn as dots instead of cells.
     are_dots: bool,
 }
 
-/// The colours of a column: of words one for each, of numbers a scale.
+/// The colours of a column: one for each word, or a scale for numbers.
 struct Shading<'a> {
     column: &'a str,
     words: Vec<String>,
     colours: Option<Colours>,
+}
+
+impl MapFigure {
+    /// Draws a curve over each panel at `steps` places along an axis, 0 or 1: `of` returns the value of the other axis for a panel. A curve that
+    /// leaves its panel everywhere is not drawn.
+    pub fn draw_curve(
+        &mut self,
+        along: usize,
+        steps: usize,
+        (name, stroke): (&str, Stroke),
+        of: impl Fn(usize, f64) -> Option<f64>,
+    ) {
+        let mut is_drawn = false;
+        let places = |step| self.cells[along].scale.value(step as f64 / steps as f64);
+        for (place, panel) in self.figure.panels.iter_mut().enumerate() {
+            let other = if along == 0 { panel.y.scale } else { panel.x.scale };
+            let point = |at| (at, of(place, at).unwrap_or(f64::NAN));
+            let mut curve: Vec<(f64, f64)> = (0..=steps).map(places).map(point).collect();
+            if !curve.iter().any(|(_, value)| (0.0..=1.0).contains(&other.fraction(*value))) {
+                continue;
+            }
+            if along == 1 {
+                curve.iter_mut().for_each(|(x, y)| std::mem::swap(x, y));
+            }
+            panel.layers.push(Layer::Contour(vec![curve], stroke.clone()));
+            is_drawn = true;
+        }
+        if is_drawn {
+            self.figure.legend.push(Entry { key: Key::Contour(stroke), text: name.to_owned() });
+        }
+    }
 }
 
 /// Draws the map.
@@ -85,7 +117,7 @@ pub fn map(survey: &Survey, plan: &Plan) -> Result<MapFigure, PlotError> {
     let (mut groups, along) = Groups::of_panels(survey, &[&plan.x, &plan.y])?;
     let raster = Raster::new(survey, plan, &groups)?;
     let mut sheets = raster.read(survey, plan, &groups)?;
-    // A group in which nothing has a value makes no panel.
+    // A group without values makes no panel.
     let has_value = |sheet: &PanelCells| sheet.value.iter().any(|value| !value.is_nan());
     let is_full = groups.crossed.is_some() || !sheets.iter().any(has_value);
     let no_value = groups.retain(&mut sheets, |sheet| is_full || has_value(sheet));
@@ -113,7 +145,7 @@ impl Raster {
         let axis = |name| survey.axis(name).filter(|axis| !axis.values.is_empty()).ok_or(PlotError::Nothing);
         let axes = [axis(&plan.x)?, axis(&plan.y)?];
         let most = if groups.shown.len() > 1 { MAX_CELLS_OF_SEVERAL } else { MAX_CELLS };
-        // Rows at places of their own, such as those of a sampled design, are dots; of too many, several share a cell.
+        // Scattered rows, such as those of a sampled design, are dots; if there are too many, several fall in one cell.
         let per_panel = survey.rows as f64 / groups.all as f64;
         let is_sparse = SPARSE_FILL * (axes[0].values.len() * axes[1].values.len()) as f64 > per_panel
             || is_scattered(survey.rows / groups.all as u64, axes);
@@ -122,7 +154,7 @@ impl Raster {
         let cells = axes.map(|axis| {
             let mut cells = AxisCells::new(axis, most);
             if are_dots {
-                // Room for the dots at the ends.
+                // Space for the dots at the ends.
                 let (low, high) = (axis.values[0], axis.values[axis.values.len() - 1]);
                 cells.scale = Scale { low, high, log: cells.scale.log }.with_room(DOT_ROOM);
             }
@@ -159,7 +191,7 @@ impl Raster {
                 sheet.value.push(f64::NAN);
                 sheet.status.push(0);
             }
-            // A cell of several rows shows the least of them; NaN is above any number.
+            // A cell with several rows shows the least value; NaN is above any number.
             if sheet.status[cell] == 0 || found < sheet.value[cell] || sheet.value[cell].is_nan() {
                 sheet.value[cell] = found;
                 sheet.status[cell] = status.min((Status::ALL.len() - 1) as f64) as u8 + 1;
@@ -207,7 +239,7 @@ impl Shading<'_> {
         }
         let values = || sheets.iter().flat_map(|sheet| sheet.value.iter().copied());
         let all = Scale::of(values()).ok_or(PlotError::Nothing)?;
-        // A gap is never below zero but for rounding: its logarithm is shown.
+        // A gap is negative only by rounding, so it has a logarithmic scale.
         let scale = match Scale::of(values().filter(|value| *value > 0.0)) {
             Some(positive) if column == "gap" && positive.high > positive.low => Scale { log: true, ..positive },
             _ if all.high > all.low => all,
@@ -220,17 +252,17 @@ impl Shading<'_> {
         })
     }
 
-    /// Whether the column is a flag of stability: stable is shown as light as what settles, and in words.
+    /// Whether the column is a flag of stability: it has the colours of outcomes, and words.
     fn is_stability(&self) -> bool {
         self.column.starts_with("stable")
     }
 
-    /// The class of a word, given by its place.
+    /// The class of a word, given by its index.
     fn shade(&self, word: f64) -> usize {
         if self.is_stability() { 1 - (word as usize).min(1) } else { word as usize }
     }
 
-    /// The colour of a value, if it is one.
+    /// The colour of a value; `None` for NaN.
     fn colour(&self, value: f64) -> Option<[u8; 3]> {
         (!value.is_nan()).then(|| match &self.colours {
             Some(Colours { scale, .. }) if scale.log && value <= 0.0 => viridis(0.0),
@@ -267,12 +299,12 @@ impl Shading<'_> {
     }
 }
 
-/// Whether rows are single points of a plane, of which a map would be mostly blank.
+/// Whether rows are scattered points, so that a map would be mostly blank.
 fn is_scattered(rows: u64, axes: [&Values; 2]) -> bool {
     let mut sizes = axes.map(|axis| axis.values.len());
     sizes.sort_unstable();
     let [least, most] = sizes;
-    // Rows of which each pair of values has one are a grid.
+    // Rows for all pairs of values form a grid.
     rows <= (MAX_SCATTERED_RATIO * most) as u64 && rows < (most * least) as u64
 }
 
@@ -295,7 +327,7 @@ fn nothing(sheets: &[PanelCells]) -> String {
     words.join(", ")
 }
 
-/// The image of a panel: a pixel a cell where cells are equally wide, else as many as are seen.
+/// The image of a panel: one pixel for each cell if cells are equally wide, else [`PIXELS`] along the axis.
 fn pixels(cells: &[AxisCells; 2], colour: impl Fn(usize) -> Option<[u8; 3]>) -> Option<Vec<u8>> {
     let sizes = [0, 1].map(|axis| if cells[axis].even { cells[axis].len() } else { PIXELS });
     let place = |axis: usize, pixel: usize| {

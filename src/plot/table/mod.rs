@@ -1,8 +1,9 @@
-//! Pictures of tables: which axes and columns a picture of each table shows, and what is marked in it.
+//! Pictures of tables: the axes, columns and marks of each table.
 
 mod cells;
 mod choice;
 mod condition;
+mod feedback;
 mod gap;
 mod groups;
 mod lines;
@@ -25,7 +26,7 @@ use survey::Survey;
 /// The request.
 #[derive(Debug, Clone, Default)]
 pub struct Request {
-    /// Rows that are shown.
+    /// Conditions on the shown rows.
     pub conditions: Vec<Condition>,
     /// Horizontal axis.
     pub x: Option<String>,
@@ -84,12 +85,15 @@ const ON_A_SPRING: Defaults = Defaults {
     scatters: true,
 };
 
-/// A picture that is drawn in a way of its own.
+/// Axes whose infinite value means that there is no ceiling, which is not stated.
+const CEILINGS: [&str; 2] = ["v_ceiling", "tau_ceiling"];
+
+/// Defaults of a picture with its own drawing code.
 const ALONE: Defaults =
     Defaults { x: &["t_f", "v_f", "v_i", "b", "a"], y: &[], least_map: usize::MAX, lines: &["shortcuts"], ..OVER_TIME };
 
-/// A picture for each table. A new one is a line here, and a file if it marks something of its own.
-const KINDS: [Kind; 12] = [
+/// The picture of each table. A new table needs an entry here, and a file if it has special marks.
+const KINDS: [Kind; 13] = [
     Kind {
         table: "gap",
         title: "Work gap of the cubic shortcuts",
@@ -113,12 +117,28 @@ const KINDS: [Kind; 12] = [
         table: "optimal",
         title: "Optimal protocol",
         defaults: Defaults {
-            classes: &["strategy"],
+            x: &["t_f", "v_ceiling", "tau_ceiling", "v_f", "v_i", "b", "a"],
+            y: &["v_ceiling", "tau_ceiling", "v_f", "v_i", "b", "a"],
+            classes: &["binding", "strategy"],
             value: &["work"],
-            lines: &["work", "v_start", "time_at_floor"],
+            lines: &["work", "v_start", "time_at_floor", "dwork_dv_ceiling", "dwork_dtau_ceiling"],
             ..OVER_TIME
         },
         draw: optimal::draw,
+    },
+    Kind {
+        table: "feedback",
+        title: "Optimal velocity by state and time left",
+        defaults: Defaults {
+            x: &["theta", "t_left", "v_ceiling", "tau_ceiling", "v_f", "b", "a"],
+            y: &["t_left", "v_ceiling", "tau_ceiling", "v_f"],
+            classes: &["arc"],
+            value: &["v"],
+            lines: &["v", "work_to_go", "gain"],
+            series: &["t_left", "v_ceiling", "tau_ceiling"],
+            ..OVER_TIME
+        },
+        draw: feedback::draw,
     },
     Kind {
         table: "crossover",
@@ -222,7 +242,7 @@ impl Source {
         Source { manifest, folder, bounded: bound.unwrap_or(true), units }
     }
 
-    /// Names of the tables of which there are pictures.
+    /// Names of the tables with a picture.
     pub fn tables(&self) -> Vec<String> {
         let known = |name: &str| KINDS.iter().any(|kind| kind.table == name);
         self.manifest.tables.iter().map(|table| table.name.clone()).filter(|name| known(name)).collect()
@@ -256,7 +276,7 @@ impl Source {
     }
 }
 
-/// Lines or a map, and nothing else.
+/// Lines or a map without further layers.
 fn plain(scene: &Scene<'_>, shape: &Shape) -> Result<Figure, PlotError> {
     match shape {
         Shape::Map(plan) => Ok(map::map(scene.survey, plan)?.figure),
@@ -272,7 +292,9 @@ fn fixed(survey: &Survey, drawn: &[String]) -> String {
             [one] if !axis.infinite => {
                 words.push(axis.text_of(*one));
             }
-            [] if axis.infinite && axis.name != "tau_ceiling" => words.push(format!("{} = ∞", label::name(&axis.name))),
+            [] if axis.infinite && !CEILINGS.contains(&axis.name.as_str()) => {
+                words.push(format!("{} = ∞", label::name(&axis.name)))
+            }
             _ => {}
         }
     }
@@ -280,7 +302,7 @@ fn fixed(survey: &Survey, drawn: &[String]) -> String {
 }
 
 impl Scene<'_> {
-    /// The value of a quantity in all rows of a group: that of the group, or the only one there is.
+    /// The value of a quantity in all rows of a group: from the group, or the only value of the table.
     fn value(&self, groups: &groups::Groups, group: usize, name: &str) -> Option<f64> {
         if let Some(place) = groups.axes.iter().position(|axis| axis == name) {
             return groups.shown.get(group)?.values.get(place).copied();
@@ -291,12 +313,12 @@ impl Scene<'_> {
         }
     }
 
-    /// The factor of a quantity from the units of the model to those of the dataset.
+    /// The factor of a quantity from scaled units to those of the dataset.
     fn size(&self, name: &str) -> f64 {
         Quantity::from_name(name).map_or(1.0, |quantity| self.source.units.size(quantity.unit(Scale::Model)))
     }
 
-    /// The value of a quantity in the scaled units of the model, in which the library computes.
+    /// The value of a quantity in scaled units.
     fn scaled(&self, groups: &groups::Groups, group: usize, name: &str) -> Option<f64> {
         let unit = Quantity::from_name(name)?.unit(Scale::Model);
         Some(self.source.units.scaled(unit, self.value(groups, group, name)?))

@@ -1,4 +1,4 @@
-//! Landscapes that were reduced while they were computed: quantiles of the gap over an axis, and bars of a histogram.
+//! Pictures of reduced landscapes: quantiles of the gap over an axis, and histograms.
 
 use super::cells::AxisCells;
 use super::groups::Groups;
@@ -10,14 +10,14 @@ use crate::plot::symbol::Symbol;
 use crate::plot::{PlotError, colour, label};
 use crate::table::{HISTOGRAM_EDGES, REDUCED, Table};
 
-/// The horizontal axes, the one that is preferred first.
+/// The horizontal axes, in the order of preference.
 const ACROSS: [&str; 5] = ["t_f", "v_f", "v_i", "b", "a"];
 
 /// Shades of the outer and of the inner quantiles.
 const OUTER: [u8; 3] = [0xd7, 0xe8, 0xf5];
 const INNER: [u8; 3] = [0x9e, 0xc4, 0xe4];
 
-/// The columns of quantiles, and the fraction of the shortcuts that does not exceed each.
+/// The columns of quantiles, each with its fraction of shortcuts.
 const QUANTILES: [(&str, f64); 7] = [
     ("gap_min", 0.0),
     ("gap_q05", 0.05),
@@ -28,7 +28,7 @@ const QUANTILES: [(&str, f64); 7] = [
     ("gap_max", 1.0),
 ];
 
-/// The bands from back to front: between which columns, their shade and their name.
+/// The bands from back to front: lower and upper column, shade and name.
 const BANDS: [(&str, &str, [u8; 3], &str); 2] =
     [("gap_q05", "gap_q95", OUTER, "5 % to 95 % of the shortcuts"), ("gap_q25", "gap_q75", INNER, "25 % to 75 %")];
 
@@ -36,7 +36,7 @@ const BANDS: [(&str, &str, [u8; 3], &str); 2] =
 const CURVES: [(&str, &str, usize); 3] =
     [("gap_q50", "median", 0), ("gap_min", "least", 2), ("gap_max", "greatest", 1)];
 
-/// Places along an axis, above which rows share them. Chosen: more are not seen in print.
+/// Greatest number of positions along an axis; with more rows, several fall on one position. Chosen: more are invisible in print.
 const MAX_PLACES: usize = 1024;
 
 /// The columns of a reduced table, without the number of shortcuts.
@@ -46,7 +46,7 @@ fn columns(survey: &Survey) -> Vec<&'static str> {
     names.filter(|name| survey.has(name)).collect()
 }
 
-/// Bars: how many shortcuts have which gap.
+/// Histogram: numbers of shortcuts by decade of the gap.
 pub fn histogram(survey: &Survey) -> Result<(Figure, Vec<String>), PlotError> {
     let columns = columns(survey);
     let (groups, along) = Groups::of_panels(survey, &[])?;
@@ -55,7 +55,7 @@ pub fn histogram(survey: &Survey) -> Result<(Figure, Vec<String>), PlotError> {
     survey.each(&wanted, |row| {
         let (classes, key) = row.split_at(columns.len());
         let Some(group) = groups.place(key) else { return };
-        // Rows that no axis distinguishes are counted together.
+        // Rows of one group are added.
         counts[group]
             .iter_mut()
             .zip(classes)
@@ -65,7 +65,7 @@ pub fn histogram(survey: &Survey) -> Result<(Figure, Vec<String>), PlotError> {
     if columns.len() < edges.len() {
         return Err(PlotError::Nothing);
     }
-    // Classes that are empty everywhere at both ends are not drawn.
+    // Empty classes at both ends are not drawn.
     let is_used = |class: &usize| counts.iter().any(|counts| counts[*class] > 0.0);
     let Some(first) = (0..edges.len()).find(is_used) else { return Err(PlotError::Nothing) };
     let last = (0..edges.len()).rev().find(is_used).unwrap_or(first);
@@ -93,14 +93,14 @@ pub fn histogram(survey: &Survey) -> Result<(Figure, Vec<String>), PlotError> {
     Ok((figure, Vec::new()))
 }
 
-/// The edges of the classes: a decade each, including the open first and last ones.
+/// The edges of the classes: one decade each, also for the open first and last classes.
 fn edges() -> Vec<(f64, f64)> {
     let inner = HISTOGRAM_EDGES;
     let starts = [inner[0] / 10.0].into_iter().chain(inner);
     starts.zip(inner.into_iter().chain([10.0 * inner[inner.len() - 1]])).collect()
 }
 
-/// Bands: the quantiles of the gap over an axis; of a single landscape, the fraction of its shortcuts over the gap.
+/// Bands of the quantiles of the gap over an axis; for a single landscape, the fraction of its shortcuts over the gap.
 pub fn quantiles(survey: &Survey) -> Result<(Figure, Vec<String>), PlotError> {
     let varies = |name: &&&str| survey.axis(name).is_some_and(|axis| axis.values.len() > 2 || axis.many);
     let across = ACROSS

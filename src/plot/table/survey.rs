@@ -17,29 +17,30 @@ use crate::plot::{PlotError, label};
 use crate::protocol::Status;
 use crate::table::{self, Kind, STATUS};
 
-/// Distinct values of an axis, above which only its range is kept. Chosen: 25 times the cells of the finest picture, and a few megabytes.
+/// Greatest number of kept values of an axis; of more, only the range is kept. Chosen: 25 times the cells of the finest picture, and a few
+/// megabytes.
 const MAX_VALUES: usize = 100_000;
 
-/// Distinct labels of a column, above which it is not used. Chosen: more cannot be read in a picture.
+/// Greatest number of distinct labels of a column; columns with more are ignored. Chosen: more are not readable in a picture.
 const MAX_LABELS: usize = 1000;
 
-/// Values of a column, above which a message states only the least and the greatest. Chosen: two lines of a terminal.
+/// Greatest number of values that a message lists; of more, it states the least and the greatest. Chosen: two lines of a terminal.
 const MAX_LISTED_VALUES: usize = 12;
 
-/// The values of an axis in the rows that are left.
+/// The values of an axis in the selected rows.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Values {
     /// Its name.
     pub name: String,
     /// Its unit.
     pub unit: String,
-    /// In ascending order; of words, their places.
+    /// The values in ascending order; for words, their indices.
     pub values: Vec<f64>,
     /// The words, if it has words.
     pub words: Vec<String>,
-    /// Whether there are more values than are kept: these are the least and the greatest.
+    /// Whether there are too many values to keep: these are the least and the greatest.
     pub many: bool,
-    /// Whether some rows have an infinite value, which no axis shows.
+    /// Whether some rows have an infinite value, which an axis cannot show.
     pub infinite: bool,
 }
 
@@ -49,7 +50,7 @@ impl Values {
         self.values.len() > 1
     }
 
-    /// A value as a reader sees it, in markup.
+    /// A value in markup.
     pub fn shown(&self, value: f64) -> String {
         match self.words.get(value as usize) {
             Some(word) if value >= 0.0 => word.replace('_', " "),
@@ -57,13 +58,13 @@ impl Values {
         }
     }
 
-    /// Name and value, in markup, with a unit of SI; a word speaks for itself.
+    /// Name and value in markup, with a unit in SI; a word has no name.
     pub fn text_of(&self, value: f64) -> String {
         let shown = self.shown(value);
         if self.words.is_empty() { label::equation(&self.name, &shown, &self.unit) } else { shown }
     }
 
-    /// The values as they are typed: all of them while they are few, else the least and the greatest.
+    /// The values as typed by a user: all if they are few, else the least and the greatest.
     fn listed(&self) -> String {
         let infinite = self.infinite.then_some(f64::INFINITY);
         let typed: Vec<String> = self.values.iter().copied().chain(infinite).map(|value| self.typed(value)).collect();
@@ -75,7 +76,7 @@ impl Values {
         }
     }
 
-    /// A value as it is typed: one of the words, if the column has words.
+    /// A value as typed by a user: a word, if the column has words.
     fn typed(&self, value: f64) -> String {
         match self.words.get(value as usize) {
             Some(word) if value >= 0.0 => word.clone(),
@@ -93,11 +94,11 @@ pub struct Survey {
     pub headings: Vec<Heading>,
     /// Its axes.
     pub axes: Vec<Values>,
-    /// Rows that are left.
+    /// Number of selected rows.
     pub rows: u64,
-    /// Parts that are missing.
+    /// Number of missing parts.
     pub missing: u64,
-    /// Its labels: text columns that came with the points, and their words.
+    /// Its labels: text columns from the file of points, and their words.
     pub labels: Vec<(String, Vec<String>)>,
     /// The axes of the grid.
     pub gridded: Gridded,
@@ -106,7 +107,7 @@ pub struct Survey {
 }
 
 impl Survey {
-    /// Looks through the table `name` of the dataset in `folder`, as far as its parts are there.
+    /// Surveys the present parts of the table `name` of the dataset in `folder`.
     pub fn new(
         folder: &Folder,
         manifest: &Manifest,
@@ -148,7 +149,7 @@ impl Survey {
         }
     }
 
-    /// The labels and their words, unless those are too many to be distinguished in a picture.
+    /// The labels and their words, except labels with too many words for a picture.
     fn read_labels(&self) -> Result<Vec<(String, Vec<String>)>, PlotError> {
         let known = table::find(&self.table);
         let is_column =
@@ -235,7 +236,7 @@ impl Survey {
         self.axes.iter().find(|axis| axis.name == name)
     }
 
-    /// The words that a column may hold, in the order of their places.
+    /// The possible words of a column, in the order of their indices.
     pub fn words(&self, column: &str) -> Vec<String> {
         let owned = |words: &[&str]| words.iter().map(|&word| word.to_owned()).collect();
         if let Some((_, words)) = self.labels.iter().find(|(name, _)| name == column) {
@@ -255,8 +256,8 @@ impl Survey {
         }
     }
 
-    /// Calls `visit` with the cells of `columns` for each row that fulfils the conditions: numbers, and the places of words in
-    /// [`Survey::words`]; NaN where there is none.
+    /// Calls `visit` with the cells of `columns` for each row that meets the conditions: numbers, and indices of words in [`Survey::words`]; NaN
+    /// for null.
     pub fn each(&self, columns: &[&str], mut visit: impl FnMut(&[f64])) -> Result<(), PlotError> {
         self.each_while(columns, |row| {
             visit(row);
@@ -264,7 +265,7 @@ impl Survey {
         })
     }
 
-    /// Like [`Survey::each`], until `visit` returns `false`.
+    /// Calls `visit` for rows as [`Survey::each`] does, until it returns `false`.
     pub fn each_while(&self, columns: &[&str], mut visit: impl FnMut(&[f64]) -> bool) -> Result<(), PlotError> {
         let tested = self.conditions.iter().map(|condition| condition.column.as_str());
         let names: IndexSet<&str> = columns.iter().copied().chain(tested).collect();
@@ -287,7 +288,7 @@ impl Survey {
         Ok(())
     }
 
-    /// Cells as numbers: of words, their places in [`Survey::words`].
+    /// Cells as numbers; for words, their indices in [`Survey::words`].
     fn numbers<'a>(&self, column: &str, cells: &'a Cells) -> Cow<'a, [f64]> {
         match cells {
             Cells::Numbers(numbers) => Cow::Borrowed(numbers),
@@ -300,8 +301,7 @@ impl Survey {
         }
     }
 
-    /// Which of `axes` have but one value wherever those of `given` are the same: such an axis distinguishes no rows. None has, as far as
-    /// is known, if `given` have too many values.
+    /// The `axes` with a single value for each combination of `given`, which distinguish no rows. Empty if `given` have too many values.
     pub fn determined(&self, axes: &[&str], given: &[&str]) -> Result<Vec<bool>, PlotError> {
         let mut determined = vec![true; axes.len()];
         let mut known: HashMap<Vec<u64>, Vec<u64>> = HashMap::new();
@@ -338,7 +338,7 @@ impl Survey {
         Ok(follows && (in_order(Ordering::Greater) || in_order(Ordering::Less)))
     }
 
-    /// The values of columns in the rows that are left, and how many rows those are.
+    /// The values of columns in the selected rows, and the number of these rows.
     fn values(&self, names: &[&str]) -> Result<(Vec<Values>, u64), PlotError> {
         let axis = |name: &&str| Values {
             name: (*name).to_owned(),
@@ -364,7 +364,7 @@ impl Survey {
                     axis.values[0] = axis.values[0].min(value);
                     axis.values[1] = axis.values[1].max(value);
                     if distinct.len() <= MAX_VALUES {
-                        // There is one zero.
+                        // -0 counts as 0.
                         distinct.insert((value + 0.0).to_bits());
                     }
                 }
@@ -380,7 +380,7 @@ impl Survey {
         Ok((axes, rows))
     }
 
-    /// The error where the conditions leave no row: the values of their columns, and the nearest ones.
+    /// The error if no row meets the conditions: the values of their columns, and the nearest values.
     fn without_rows(mut self) -> Result<PlotError, PlotError> {
         let conditions = std::mem::take(&mut self.conditions);
         self.labels = self.read_labels()?;
@@ -388,7 +388,7 @@ impl Survey {
         names.sort_unstable();
         names.dedup();
         let (columns, _) = self.values(&names)?;
-        // A number that is only nearly that of a row may be meant.
+        // A slightly different number may be intended.
         let near = |condition: &Condition| {
             let (wanted, axis) = (condition.wanted()?, self.axis(&condition.column)?);
             let column = columns.iter().find(|column| column.name == axis.name && !column.many)?;
@@ -417,7 +417,7 @@ impl Survey {
     }
 }
 
-/// The bits of numbers as a key; there is one zero.
+/// The bits of numbers as a key, with one zero.
 pub fn bits(values: &[f64]) -> Vec<u64> {
     values.iter().map(|value| (value + 0.0).to_bits()).collect()
 }

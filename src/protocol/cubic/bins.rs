@@ -1,4 +1,4 @@
-//! Shortcuts sorted by the number of nodes that they need, eight of which are summed together.
+//! Bins of shortcuts with equal numbers of nodes, of which eight are summed side by side.
 
 use std::cell::Cell;
 
@@ -12,10 +12,10 @@ use super::rules::NODE_STEP;
 use crate::numerics::gauss::primitive;
 use crate::numerics::lanes::LANES;
 
-/// Numbers of nodes that shortcuts are sorted by: 4, 8, … 80, beyond which a panel is cut.
+/// Number of bins: 4, 8, … 80 nodes. A panel with more nodes is cut.
 pub(super) const BINS: usize = 20;
 
-/// Bin from which on a panel over all of `[0, 1]` is cut. Measured: two parts are cheaper there (`cargo bench --bench landscape`).
+/// Bin from which a panel over all of `[0, 1]` is cut. Measured: two parts are cheaper there (`cargo bench --bench landscape`).
 pub(super) const CUT_FROM: usize = 16;
 
 /// The nodes of a bin.
@@ -24,21 +24,21 @@ pub(super) fn nodes_of(bin: usize) -> u32 {
     NODE_STEP as u32 * (bin as u32 + 1)
 }
 
-/// Full bundles that are summed together. Measured: all are prepared first, so that the logarithms of one are computed while those of
-/// another one wait (`cargo bench --bench landscape`).
+/// Full bundles that are summed together. Measured: all are prepared first, so that their logarithms overlap in the pipeline of the processor
+/// (`cargo bench --bench landscape`).
 const READY: usize = 8;
 
-/// Bundles of all bins, and of those that are ready.
+/// Bundles of all bins, and full bundles.
 const ALL: usize = BINS + READY;
 
-/// A bundle, the places of its shortcuts, and the bin that it comes from once it is ready.
+/// A bundle, the indices of its shortcuts, and its bin.
 #[derive(Debug, Clone, Copy)]
 struct PendingBatch {
     panel_batch: PanelBatch,
     indices: [usize; LANES],
     count: usize,
     bin: usize,
-    /// Whether every panel is alone.
+    /// Whether every panel covers all of `[0, 1]`.
     whole: bool,
 }
 
@@ -46,9 +46,9 @@ struct PendingBatch {
 #[derive(Debug, Clone)]
 pub(super) struct Bins {
     loads: [PendingBatch; ALL],
-    /// The load that each bin fills, then those that are ready, then empty ones.
+    /// Indices of loads: the one that each bin fills, then full ones, then empty ones.
     order: [usize; ALL],
-    /// The number of ready shortcuts.
+    /// The number of full bundles.
     ready: usize,
     prepared: [Prepared; READY],
     space: NodeBuffer,
@@ -57,17 +57,17 @@ pub(super) struct Bins {
 }
 
 thread_local! {
-    /// Memory for the next call: to clear it takes longer than a few sums.
+    /// Memory for the next call, since clearing it takes longer than a few sums.
     static SPARE: Cell<Option<Box<Bins>>> = const { Cell::new(None) };
 }
 
 impl Bins {
-    /// Empty bins, in the memory of the last ones of this thread if there were any.
+    /// Empty bins, in the memory of the last bins of this thread, if any.
     pub fn take() -> Box<Bins> {
         SPARE.take().unwrap_or_else(|| Box::new(Bins::new()))
     }
 
-    /// Keeps the memory of empty bins for the next ones.
+    /// Keeps the memory of empty bins for the next call.
     pub fn keep(self: Box<Bins>) {
         SPARE.set(Some(self));
     }
@@ -85,8 +85,8 @@ impl Bins {
         }
     }
 
-    /// Puts a panel of the shortcut at `index`, given by its lane of a plan, its coordinates and bounds, into a bin; a full bin is emptied
-    /// and summed, its sums added to the works.
+    /// Adds a panel of the shortcut at `index` to its bin, given by its lane of a plan, its coordinates and bounds. A full bin is summed into
+    /// the works.
     #[inline(always)]
     pub fn add(
         &mut self,
@@ -111,8 +111,7 @@ impl Bins {
         }
     }
 
-    /// As [`Bins::add`], for eight shortcuts of one bin from lane `first` on, over all of `[0, 1]`: a bundle
-    /// of their own.
+    /// Adds eight shortcuts of one bin, from lane `first` on, over all of `[0, 1]`, as a bundle.
     #[inline(always)]
     pub fn add_all(
         &mut self,
@@ -132,7 +131,7 @@ impl Bins {
         }
     }
 
-    /// Sums what is left.
+    /// Sums the remaining bundles.
     pub fn close(&mut self, of: &Landscape, work: &mut [f64]) {
         for bin in 0..BINS {
             self.empty(of, bin, work);
@@ -140,7 +139,7 @@ impl Bins {
         self.sum(of, work);
     }
 
-    /// Exchanges the load of a bin, if there is something in it, for an empty one.
+    /// Replaces the load of a bin, if not empty, by an empty one.
     fn empty(&mut self, of: &Landscape, bin: usize, work: &mut [f64]) {
         let load = &mut self.loads[self.order[bin]];
         if load.count > 0 {
@@ -153,7 +152,7 @@ impl Bins {
         }
     }
 
-    /// Sums what is ready.
+    /// Sums the full bundles.
     fn sum(&mut self, of: &Landscape, work: &mut [f64]) {
         let ready = &self.order[BINS..BINS + std::mem::take(&mut self.ready)];
         for (&load, prepared) in ready.iter().zip(&mut self.prepared) {
@@ -174,7 +173,7 @@ impl Bins {
     }
 }
 
-/// Makes a bundle of eight planned shortcuts, those from lane `first` on, over all of `[0, 1]`.
+/// A bundle of eight planned shortcuts from lane `first` on, over all of `[0, 1]`.
 #[multiversion(targets(
     "x86_64+avx+avx2+bmi1+bmi2+avx512f+avx512bw+avx512cd+avx512dq+avx512vl",
     "x86_64+avx+avx2+bmi1+bmi2"

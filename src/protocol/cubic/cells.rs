@@ -1,10 +1,9 @@
-//! One map for all shortcuts of a cell of the plane, and how many nodes each of them needs: most plans are made for
-//! hundreds of neighbours at once.
+//! One map for all shortcuts in a cell of the plane, and the number of nodes of each: most plans serve hundreds of neighbours.
 //!
-//! The cells follow from the landscape alone, and the plan of a cell from the cell: what is found of a shortcut does
-//! not depend on its neighbours. The zeros move smoothly from one shortcut to the next, so that ln rho, which a number of
-//! nodes is in inverse proportion to, is interpolated between the corners; how far it is from that in the middle of the
-//! edges is what it may be off. A shortcut near the border of feasibility, or with many nodes, has a plan of its own.
+//! The landscape determines the cells, and a cell determines its plan, so a result never depends on neighbouring shortcuts. The zeros move
+//! smoothly from one shortcut to the next. So ln rho, to which the number of nodes is inversely proportional, is interpolated between the
+//! corners. Its deviations at the middles of the edges bound the interpolation error. A shortcut near the border of feasibility, or with many
+//! nodes, has its own plan.
 
 use multiversion::multiversion;
 
@@ -15,21 +14,21 @@ use super::rules::{Accuracy, NODE_STEP, ZEROS};
 use crate::numerics::elementary::rough_ln;
 use crate::numerics::lanes::{LANES, Vector};
 
-/// Plans of the cells of a landscape that were met last.
+/// A cache of the plans of the last used cells of a landscape.
 #[derive(Debug, Clone)]
 pub(super) struct Cells {
     frame: Option<Frame>,
-    /// The frames of the cells.
+    /// The age of the current frame.
     age: u64,
     of: [Cell; SLOTS],
 }
 
-/// The inputs of cells.
+/// The inputs that determine the cells.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Frame {
     ends: Ends,
     accuracy: Accuracy,
-    /// Cells in a unit of either coordinate.
+    /// Cells per unit of either coordinate.
     scale: f64,
 }
 
@@ -39,10 +38,10 @@ struct Cell {
     place: CellKey,
     /// The age of its frame.
     age: u64,
-    /// ln rho in units of that for which [`NODE_STEP`] nodes are enough, in powers of the distances from the middle: 1, `u`,
-    /// `v` and `u v`.
+    /// ln rho in units of the value that needs [`NODE_STEP`] nodes, as coefficients of 1, `u`, `v` and `u v` with the distances `u` and `v` from
+    /// the centre.
     pace: [f64; 4],
-    /// The value of ln rho below which a shortcut needs its own plan; 0 if all of a cell do.
+    /// The value of ln rho below which a shortcut needs its own plan; 0 if all shortcuts of the cell do.
     least: f64,
     side: f64,
     gap: f64,
@@ -55,45 +54,44 @@ struct Cell {
 /// The key of a cell: the bits of its centre.
 type CellKey = [u64; 2];
 
-/// Cells that are kept. Chosen: those of two or three lines of a map.
+/// Cells in the cache. Chosen: the cells of two or three rows of a map.
 const SLOTS: usize = 64;
 
-/// Cells that are planned together, each from as many places.
+/// Cells that are planned together, each from all its samples.
 const TOGETHER: usize = BLOCK / SAMPLES.len();
 
-/// Corners of a cell, then the middles of the edges between them.
+/// Samples of a cell: its corners, then the middles of its edges.
 const SAMPLES: [[f64; 2]; 8] =
     [[-0.5, -0.5], [-0.5, 0.5], [0.5, -0.5], [0.5, 0.5], [0.0, -0.5], [0.0, 0.5], [-0.5, 0.0], [0.5, 0.0]];
 
-/// The first of them.
+/// Number of corners among the samples.
 const CORNERS: usize = 4;
 
-/// Cells in the power of 2 below the mean of n, the scale of the feasible set. Measured: more cells cost more plans, fewer a worse map
-/// (`cargo bench --bench landscape`).
+/// Cells per power of 2 below the mean of n, the scale of the feasible set. Measured: more cells need more plans, fewer have worse maps (`cargo
+/// bench --bench landscape`).
 const CELLS: f64 = 8.0;
 
 /// `1.5 * 2^52`, whose last bit is 1: added to a number, it leaves the nearest integer.
 const ONES: f64 = 6755399441055744.0;
 
-/// Cells from the origin that are planned. Chosen: places of farther ones lose digits.
+/// Greatest distance of a planned cell from the origin, in cells. Chosen: coordinates of farther cells lose digits.
 const MAX_CELL: f64 = 1e9;
 
-/// Distance of the centre of a map beyond the end, fraction of that of the nearest zero at the samples. Chosen: no zero of the cell
-/// comes between.
+/// Distance of the centre of a map beyond the end, as a fraction of the distance of the nearest zero at the samples. Chosen: no zero of the cell
+/// comes closer.
 const GAP_FRACTION: f64 = 0.97;
 
-/// Error of the interpolated ln rho, fraction of it, at most. Measured: a plan of its own costs more nodes than that saves
-/// (`cargo bench --bench landscape`).
+/// Greatest relative error of the interpolated ln rho. Measured: an own plan costs more nodes than it saves (`cargo bench --bench landscape`).
 const MAX_SLACK: f64 = 0.12;
 
-/// The bin of a shortcut that needs a plan of its own.
+/// Bin number of a shortcut that needs its own plan.
 pub(super) const OWN: u32 = u32::MAX;
 
 impl Frame {
-    /// Of the landscape between `ends`.
+    /// The frame of the landscape between `ends`.
     pub fn new(ends: &Ends, accuracy: &Accuracy) -> Frame {
         let mean = ends.t_f - ends.rise.high;
-        // The exponent alone.
+        // The exponent of the mean only.
         let power = f64::from_bits(mean.to_bits() & 0x7FF0_0000_0000_0000);
         let scale = CELLS / power;
         Frame { ends: *ends, accuracy: accuracy.clone(), scale: if scale.is_normal() { scale } else { 1.0 } }
@@ -117,7 +115,7 @@ impl Cell {
 impl Cells {
     pub const EMPTY: Cells = Cells { frame: None, age: 0, of: [Cell::NONE; SLOTS] };
 
-    /// Forgets the cells of another frame.
+    /// Discards the cells of another frame.
     pub fn begin(&mut self, frame: &Frame) {
         if self.frame.as_ref() != Some(frame) {
             self.frame = Some(frame.clone());
@@ -137,12 +135,12 @@ impl Cells {
         cell.place == place && cell.age == self.age
     }
 
-    /// Plans shortcuts, all feasible, from their cells.
+    /// Plans feasible shortcuts from their cells.
     pub fn plan(&mut self, frame: &Frame, a_2: &Block, a_3: &Block, plan: &mut Plan) {
         let located = locate(frame.scale, a_2, a_3);
         let (mut runs, mut count) = ([LaneRun { from: 0, slot: 0 }; BLOCK], 0);
         let (mut missing, mut lost) = ([[0; 2]; BLOCK], 0);
-        // The cell before, and the one before the last of those that are missing.
+        // The previous cell, and the cell before the last missing one.
         let (mut last, mut before) = (located.place(0), located.place(0));
         let mut starts = located.starts;
         while starts != 0 {
@@ -163,7 +161,7 @@ impl Cells {
         for places in missing.chunks(TOGETHER) {
             let mut padded = [places[0]; TOGETHER];
             padded[..places.len()].copy_from_slice(places);
-            // There is room for those that the shortcuts seem to come to next.
+            // Free lanes plan the cells that probably follow.
             let last = places[places.len() - 1];
             let step = [0, 1].map(|axis| last[axis].wrapping_sub(before[axis]));
             for next in places.len()..TOGETHER {
@@ -177,7 +175,7 @@ impl Cells {
         if missing.is_empty() {
             return;
         }
-        // Of cells that are kept in the same slot there is only the last one.
+        // A slot contains only its last cell.
         for lane in 0..BLOCK {
             let place = located.place(lane);
             let slot = Cells::slot(place);
@@ -194,18 +192,18 @@ impl Cells {
     }
 }
 
-/// Neighbouring lanes of one cell, up to the next run.
+/// A run of neighbouring lanes in one cell.
 #[derive(Clone, Copy)]
 struct LaneRun {
     from: u32,
     slot: u32,
 }
 
-/// The cells of shortcuts, and the distances from their middles.
+/// The cells of shortcuts, and the distances from the cell centres.
 struct CellOffsets {
     places: [[u64; BLOCK]; 2],
     local: [Block; 2],
-    /// The lanes whose cell is not that of the lane before.
+    /// Bit mask of the lanes whose cell differs from that of the previous lane.
     starts: u32,
 }
 
@@ -252,7 +250,7 @@ impl Cell {
 /// The bin of a shortcut of a cell.
 #[inline(always)]
 fn bin(pace: f64, least: f64) -> u32 {
-    // As many steps as that are enough, rounded up; the first bin is one step.
+    // The sufficient number of steps, rounded up; the first bin is one step.
     let last = (1.0 / pace - 0.5) + ONES;
     if pace > least { last.to_bits() as u32 } else { OWN }
 }
@@ -280,7 +278,7 @@ fn assemble(cells: &[Cell; SLOTS], runs: &[LaneRun], located: &CellOffsets, plan
             }
             continue;
         }
-        // At most two cells: from where on it is the other one.
+        // The lanes have at most two cells; the border between them.
         let border = from(run + 1).min(lanes.end);
         let (one, other) = (cell(run), cell(if border < lanes.end { run + 1 } else { run }));
         let beyond = ORDER - Vector::splat((border - start) as f64);
@@ -304,10 +302,10 @@ fn assemble(cells: &[Cell; SLOTS], runs: &[LaneRun], located: &CellOffsets, plan
     }
 }
 
-/// The middles of the lanes of a vector.
+/// The centres of the lanes of a vector.
 const ORDER: Vector = Vector([0.5, 1.5, 2.5, 3.5, 4.5, 5.5, 6.5, 7.5]);
 
-/// One value a cell, given to all its places.
+/// Copies one value per cell to all its samples.
 #[inline(always)]
 fn spread<T: Copy>(of: [T; TOGETHER]) -> [T; BLOCK] {
     let mut all = [of[0]; BLOCK];
@@ -361,7 +359,7 @@ fn chart(frame: &Frame, cells: &[CellKey; TOGETHER]) -> [Cell; TOGETHER] {
     let mean = ends.t_f - ends.rise.high;
     for i in 0..BLOCK {
         let focal = if gains[i] > 0.0 { squared[i] } else { straight[i] };
-        // What errors of the zeros may cost.
+        // The margin for errors of the zeros.
         let excess = (f64::from(focal) - 2.0) * (0.5 / (1.0 + SINGLE_COST));
         let excess = if excess > 0.0 { excess } else { 0.0 };
         paces[i] = rough_ln(1.0 + excess + (excess * (2.0 + excess)).sqrt()) / accuracy.pace;
@@ -369,7 +367,7 @@ fn chart(frame: &Frame, cells: &[CellKey; TOGETHER]) -> [Cell; TOGETHER] {
     for i in 0..CORNERS * TOGETHER {
         let path = Path::new(ends, a_2[i], a_3[i]);
         let side = if gains[i] > 0.0 { f64::from(sides[i]) } else { steady };
-        // The mean of n is the least sum of its coefficients' sizes.
+        // The mean of n is a lower bound of the sum of the magnitudes of its coefficients.
         let kept = path.is_sound(side > 0.0, 0.0, -side, accuracy) & (accuracy.rounding * mean >= 3.0 * path.slack());
         lost[i] = if kept { 0.0 } else { 1.0 };
     }
@@ -397,7 +395,7 @@ fn chart(frame: &Frame, cells: &[CellKey; TOGETHER]) -> [Cell; TOGETHER] {
     })
 }
 
-/// ln rho over a cell from that at its samples; `None` where it is not smooth enough.
+/// ln rho over a cell from its samples; `None` if it is not smooth enough.
 #[inline(always)]
 fn interpolated([mm, mp, pm, pp, m_low, m_high, low_m, high_m]: [f64; SAMPLES.len()]) -> Option<[f64; 4]> {
     let off = |middle: f64, one: f64, other: f64| (middle - 0.5 * (one + other)).abs();
@@ -416,7 +414,7 @@ fn interpolated([mm, mp, pm, pp, m_low, m_high, low_m, high_m]: [f64; SAMPLES.le
 
 /// The centres of one map for each cell.
 struct Centres {
-    /// Beyond which end: +1 the upper, -1 the lower.
+    /// The end: +1 the upper, -1 the lower.
     side: [f32; TOGETHER],
     /// The distance beyond it.
     gap: [f32; TOGETHER],
@@ -425,7 +423,7 @@ struct Centres {
 }
 
 impl Centres {
-    /// As far beyond an end as the shadows of the samples allow.
+    /// The centres as far beyond an end as the projected zeros of the samples allow.
     #[inline(always)]
     fn of(shadow: &[f32; BLOCK]) -> Centres {
         let (mut above, mut below) = ([0.0f32; BLOCK], [0.0f32; BLOCK]);
@@ -449,9 +447,9 @@ impl Centres {
 
 /// The map `r ± s^2` for the samples of each cell.
 struct Squared {
-    /// Their focal sums.
+    /// The focal sums of the samples.
     focal: [f32; BLOCK],
-    /// Below 0 where the centre of the map itself is what hinders, so that a larger power might help.
+    /// Negative where the centre of the map itself limits the focal sum, so that a larger power might help.
     room: [f32; TOGETHER],
 }
 

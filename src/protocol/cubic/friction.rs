@@ -1,9 +1,9 @@
-//! Whether friction falls below 0 on a shortcut.
+//! The sign of the least friction on a shortcut.
 //!
-//! `tau = 1 + a ln(n/t_f) + (b - a) ln theta`. Least values of `n` and theta rule that out for most (`FrictionBounds`). Both
-//! are linear in the coefficients, so for `b >= a` friction at every `x` is concave in them: what is not below 0 at both
-//! ends of a line is so nowhere on it. The rest is looked at one by one: the places where friction is stationary are
-//! roots of a polynomial of degree four.
+//! `tau = 1 + a ln(n/t_f) + (b - a) ln theta`. For most shortcuts, least values of `n` and theta prove positive friction (`FrictionBounds`).
+//! Both are linear in the coefficients, so for `b >= a` friction at every `x` is concave in them: if it is not negative at both ends of a line,
+//! it is nowhere negative on the line. The remaining shortcuts are decided one by one: friction is stationary at the roots of a polynomial of
+//! degree four.
 
 use multiversion::multiversion;
 
@@ -14,7 +14,7 @@ use crate::numerics::lanes::{LANES, Lanes};
 use crate::numerics::polynomial::roots_between;
 use crate::protocol::Status;
 
-/// Values of `n` and theta above which friction is positive.
+/// Bounds of `n` and theta above which friction is positive.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct FrictionBounds {
     pub n: f64,
@@ -30,7 +30,7 @@ impl FrictionBounds {
         let theta = if b > a {
             exp(-HALF / (b - a))
         } else if (a - b) * ln(ends.theta_0.high + ends.t_f) < HALF {
-            // Theta grows by the time at the most.
+            // Theta grows at most by the duration.
             0.0
         } else {
             f64::INFINITY
@@ -49,12 +49,12 @@ impl FrictionBounds {
         open
     }
 
-    /// 1 where the coefficients in Bernstein's form are above the floors.
+    /// 1 in lanes whose coefficients in Bernstein's form are above the bounds.
     fn sure(&self, ends: &Ends, a_2: &Lanes, a_3: &Lanes) -> Lanes {
         bounds(self, ends, a_2, a_3)
     }
 
-    /// Whether the least values are above the floors.
+    /// Whether the least values are above the bounds.
     fn settle(&self, path: &Path) -> bool {
         let slack = path.slack();
         path.n().least() > self.n + path.n().doubt() + 3.0 * slack
@@ -78,7 +78,7 @@ fn bounds(floors: &FrictionBounds, ends: &Ends, a_2: &Lanes, a_3: &Lanes) -> Lan
     sure
 }
 
-/// Shortcuts that are left open: consecutive ones, on a line in the plane or not.
+/// Consecutive shortcuts that the bounds do not decide, on a line in the plane or not.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct UndecidedShortcuts {
     pub first: usize,
@@ -87,7 +87,7 @@ pub(super) struct UndecidedShortcuts {
 }
 
 impl UndecidedShortcuts {
-    /// Gives those whose friction falls below 0 their status; `path` is the shortcut at a place.
+    /// Sets the status of the shortcuts with negative friction; `path` returns the shortcut at an index.
     pub fn decide<'a>(&self, law: Law, path: impl Fn(usize) -> Path<'a>, status: &mut [Status]) {
         let UndecidedShortcuts { first, count, line } = *self;
         let is_negative = |i: usize| path(i).friction_min(law) < 0.0;
@@ -103,14 +103,14 @@ impl UndecidedShortcuts {
 }
 
 impl Path<'_> {
-    /// Least friction, or some friction below 0.
+    /// The least friction, or any negative friction on the path.
     pub fn friction_min(&self, law: Law) -> f64 {
         let friction = |x: f64| {
             let (theta, n) = self.at(x);
             if n > 0.0 && theta > 0.0 {
                 1.0 + law.a * ln(n / self.ends.t_f) + (law.b - law.a) * ln(theta)
             } else {
-                // The border of what is feasible.
+                // The border of feasibility.
                 f64::NEG_INFINITY
             }
         };
@@ -127,8 +127,7 @@ impl Path<'_> {
         least
     }
 
-    /// Where friction is stationary in the half near an end, as distances from it: `a n' theta + (b - a) n theta' =
-    /// 0`.
+    /// The stationary points of friction in the half near an end, as distances from it: roots of `a n' theta + (b - a) n theta'`.
     fn stationary(&self, law: Law, end: f64) -> Vec<f64> {
         let ([t0, t1, t2, t3], [n0, n1, n2]) = self.about(end);
         let side = if end == 0.0 { 1.0 } else { -1.0 };

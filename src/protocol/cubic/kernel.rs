@@ -1,5 +1,5 @@
-//! `tau v dt` summed over the nodes of one panel, eight at a time, with logarithms: for the few shortcuts that
-//! [`works`](super::works) cannot sum without.
+//! The sum of `tau v dt` over the nodes of one panel, eight at a time, with logarithms: for the few shortcuts that [`works`](super::works)
+//! cannot sum without them.
 
 use multiversion::multiversion;
 
@@ -58,7 +58,7 @@ impl Slice {
     }
 }
 
-/// One kernel for each map, compiled for three vector widths and chosen at run time.
+/// A kernel for each map, compiled for three vector widths and selected at run time.
 macro_rules! kernels {
     ($($(#[$doc:meta])* fn $name:ident($slice:ident $(, $argument:ident)*) = $map:expr;)*) => {$(
         $(#[$doc])*

@@ -1,8 +1,7 @@
-//! The cubic shortcuts: `theta = 1/v_i + alpha_2 t + alpha_3 t^2 + alpha_4 t^3`, `v` free to jump at both ends.
+//! The cubic shortcuts: `theta = 1/v_i + alpha_2 t + alpha_3 t^2 + alpha_4 t^3`; `v` may jump at both ends.
 //!
-//! `alpha_4` follows from `theta(t_f) = 1/v_f`. A shortcut is a `path` of two polynomials; whether it is feasible is
-//! decided from their stationary points before any quadrature is spent, and the quadrature follows from their zeros
-//! (`rules`).
+//! `alpha_4` follows from `theta(t_f) = 1/v_f`. A shortcut is a `path` of two polynomials. Their stationary points decide whether it is
+//! feasible, and their zeros determine its quadrature (`rules`).
 
 mod bins;
 mod cells;
@@ -38,7 +37,7 @@ use screen::{
 pub(super) use work_derivatives::{Basis, WorkDerivatives};
 use works::Works;
 
-/// The work landscape of one transition in one time over the plane of `(alpha_2, alpha_3)`.
+/// The work landscape of one transition and duration over the plane of `(alpha_2, alpha_3)`.
 #[derive(Debug, Clone)]
 pub struct Landscape {
     law: Law,
@@ -51,19 +50,19 @@ pub struct Landscape {
     accuracy_of_parts: Accuracy,
 }
 
-/// The results of a run of shortcuts, one element a shortcut, laid out column by column.
+/// Buffers for the results of shortcuts, column by column, with one element for each shortcut.
 #[derive(Debug)]
 pub struct LandscapeBuffers<'a> {
-    /// `W_s`; left untouched where infeasible, and everywhere if empty (not requested).
+    /// `W_s`; unchanged for infeasible shortcuts; empty if not requested.
     pub work: &'a mut [f64],
-    /// Least velocity on `[0, t_f]`; left untouched where infeasible, and everywhere if empty (not requested).
+    /// Least velocity on `[0, t_f]`; unchanged for infeasible shortcuts; empty if not requested.
     pub v_min: &'a mut [f64],
     /// `Ok`, `BelowBound`, `NegativeFriction` or `Infeasible`.
     pub status: &'a mut [Status],
 }
 
 impl Landscape {
-    /// Prepares the landscape of `transition` in time `t_f`; every work is good to relative accuracy `rtol`.
+    /// The landscape of `transition` with duration `t_f`; works have a relative error of at most `rtol`.
     pub fn new(transition: &Transition, t_f: f64, rtol: f64) -> Self {
         let tolerance = 0.5 * rtol;
         let ends = Ends::between(transition.v_i, transition.v_f, t_f, tolerance);
@@ -80,7 +79,7 @@ impl Landscape {
         }
     }
 
-    /// One shortcut, given scaled, to 32 digits.
+    /// The shortcut with these scaled coefficients of 32 digits.
     pub(super) fn path(&self, a_2: DoubleDouble, a_3: DoubleDouble) -> Path<'_> {
         Path::exact(&self.ends, a_2, a_3)
     }
@@ -90,7 +89,7 @@ impl Landscape {
         &self.ends
     }
 
-    /// The motion of one shortcut, given scaled; `None` where it is infeasible.
+    /// The motion of the shortcut with these scaled coefficients; `None` if it is infeasible.
     pub fn motion(&self, a_2: f64, a_3: f64) -> Option<Box<dyn Motion>> {
         let mut status = [Status::Infeasible];
         self.evaluate(&[a_2], &[a_3], LandscapeBuffers { work: &mut [], v_min: &mut [], status: &mut status });
@@ -98,9 +97,9 @@ impl Landscape {
         (status != [Status::Infeasible]).then(|| Box::new(motion) as Box<dyn Motion>)
     }
 
-    /// Evaluates the shortcuts `(a_2[i], a_3[i])`, given scaled: `alpha_2 t_f` and `alpha_3 t_f^2`.
+    /// Evaluates the shortcuts with the scaled coefficients `a_2[i] = alpha_2 t_f` and `a_3[i] = alpha_3 t_f^2`.
     ///
-    /// The number of shortcuts is the least length of `a_2`, `a_3` and `out.status`.
+    /// The number of shortcuts is the minimum of the lengths of `a_2`, `a_3` and `out.status`.
     pub fn evaluate(&self, a_2: &[f64], a_3: &[f64], out: LandscapeBuffers<'_>) -> SolverStats {
         let LandscapeBuffers { work, v_min, status } = out;
         let count = a_2.len().min(a_3.len()).min(status.len());
@@ -137,7 +136,7 @@ impl Landscape {
         evaluation.inner_velocities();
         let Evaluation { status, works, doubtful, .. } = evaluation;
         let stats = works.finish();
-        // Until here the status determines on which side of v = 1 a velocity is.
+        // Up to this point the status determines on which side of v = 1 a velocity is.
         for open in doubtful {
             open.decide(self.law, |i| Path::new(&self.ends, a_2[i], a_3[i]), status);
         }
@@ -159,12 +158,12 @@ impl Landscape {
         panels.iter().map(|panel| self.sum(path, panel, stats)).sum()
     }
 
-    /// The part of one panel in the work.
+    /// The contribution of one panel to the work.
     #[inline(always)]
     fn sum(&self, path: &Path, panel: &Panel, stats: &mut SolverStats) -> f64 {
         let rule = rule(panel.nodes);
         stats.nodes += rule.x.len() as u32;
-        // Where a zero is near, the digits of the small theta there count.
+        // Near a zero, the relative accuracy of the small theta matters.
         let (theta, n) = path.about(panel.centre);
         let slice = Slice {
             constant: 1.0 - self.law.a * self.ln_t_f,
@@ -179,20 +178,20 @@ impl Landscape {
     }
 }
 
-/// The shortcuts of one call, on their way from statuses over least velocities to works.
+/// The evaluation of one call: statuses, then least velocities, then works.
 struct Evaluation<'a> {
     of: &'a Landscape,
     status: &'a mut [Status],
     v_min: &'a mut [f64],
-    /// Shortcuts whose least velocity no end is sure to have.
+    /// Shortcuts whose least velocity is not certain to be at an end.
     open: Queue<SEARCH>,
     works: Works<'a>,
-    /// Shortcuts whose friction may be negative.
+    /// Shortcuts with possibly negative friction.
     doubtful: Vec<UndecidedShortcuts>,
 }
 
 impl Evaluation<'_> {
-    /// A span of shortcuts from `first` on, of one status.
+    /// Adds a span of shortcuts from `first` on, with one status.
     #[inline(always)]
     fn span(&mut self, first: usize, a_2: &[f64; SPAN], a_3: &[f64; SPAN], Verdict { status, sound }: Verdict) {
         self.status[first..first + SPAN].fill(status);
@@ -208,7 +207,7 @@ impl Evaluation<'_> {
         self.works.push_span(first, a_2, a_3);
     }
 
-    /// Up to eight shortcuts from `first` on, each with a status of its own.
+    /// Adds up to eight shortcuts from `first` on, each with its own status.
     #[inline(always)]
     fn block(&mut self, first: usize, a_2: &[f64], a_3: &[f64]) {
         let ends = &self.of.ends;
@@ -239,8 +238,7 @@ impl Evaluation<'_> {
         }
     }
 
-    /// Writes the least velocities of a span of feasible shortcuts with one status; those that no end is sure to have
-    /// are left open.
+    /// Writes the least velocities of a span of feasible shortcuts with one status; uncertain ones are queued.
     #[inline(always)]
     fn velocities_of_span(&mut self, first: usize, a_2: &[f64; SPAN], a_3: &[f64; SPAN]) {
         let (ends, status) = (&self.of.ends, self.status[first]);
@@ -262,7 +260,7 @@ impl Evaluation<'_> {
         }
     }
 
-    /// Leaves the shortcuts from `first` on that have a bit open for a search of their least velocities, if wanted.
+    /// Queues the shortcuts from `first` on that have a bit in the mask for a search of their least velocities, if requested.
     #[inline(always)]
     fn search<const N: usize>(&mut self, first: usize, mut left: u32, a_2: &[f64; N], a_3: &[f64; N]) {
         while left != 0 {
@@ -276,7 +274,7 @@ impl Evaluation<'_> {
         }
     }
 
-    /// The least velocities of feasible shortcuts, wherever they are.
+    /// Searches the least velocities of the queued shortcuts.
     fn inner_velocities(&mut self) {
         if let Some((indices, [a_2, a_3])) = self.open.take() {
             for (&i, found) in indices.iter().zip(inner_velocities(&self.of.ends, a_2, a_3)) {

@@ -15,7 +15,7 @@ pub(super) struct CubicPoint {
 }
 
 impl CubicPoint {
-    /// The shortcut with `alpha_2 t_f = a_2`, `alpha_3 t_f^2 = a_3`, which is feasible.
+    /// The motion of a feasible shortcut with `alpha_2 t_f = a_2` and `alpha_3 t_f^2 = a_3`.
     pub fn new(law: Law, ends: Ends, a_2: f64, a_3: f64) -> CubicPoint {
         CubicPoint { law, ends, a_2, a_3 }
     }
@@ -30,8 +30,8 @@ impl Motion for CubicPoint {
         self.ends.t_f
     }
 
-    /// About each zero of `theta` and of `n = t_f (1 - theta')`, near which `v = n/(t_f theta)` changes over its
-    /// distance from the real interval.
+    /// Points around each zero of `theta` and of `n = t_f (1 - theta')`; near a zero, `v = n/(t_f theta)` varies on the scale of its distance
+    /// from the real interval.
     fn landmarks(&self) -> Vec<f64> {
         let zeros = zeros(&self.path());
         let mut landmarks = vec![0.0, 1.0];
@@ -60,5 +60,5 @@ impl Motion for CubicPoint {
     }
 }
 
-/// Ratio of the distances of neighbouring landmarks from a zero. Chosen: a trace shows what lies between.
+/// Ratio of the distances of neighbouring landmarks from a zero. Chosen: a trace resolves the curve between them.
 const LANDMARK_RATIO: f64 = 8.0;

@@ -1,4 +1,4 @@
-//! The work of eight shortcuts at a time without a logarithm at a node.
+//! The works of eight shortcuts at a time, without logarithms at the nodes.
 //!
 //! `W = int tau v dt`, and `tau` is known at both ends, its derivative `tau'` rational: `tau = (tau_0 + tau_1)/2 + 1/2
 //! int sign(x - y) tau'(y) dy`. So the work is the mean of `tau_0` and `tau_1` times `int v dt`, plus a bilinear form of
@@ -14,16 +14,16 @@ use crate::numerics::elementary::ln;
 use crate::numerics::gauss::{MOST_HALF, Primitive, ROWS};
 use crate::numerics::lanes::{LANES, Lanes, Vector, least};
 
-/// Panels of eight shortcuts that share a number of nodes, each with its map `delta = side (gap - s^(2^squarings))` of
-/// the distance from an end of the panel.
+/// Panels of eight shortcuts with equal numbers of nodes, each with its map `delta = side (gap - s^(2^squarings))` of the distance from an end
+/// of the panel.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct PanelBatch {
     pub a_2: Lanes,
     pub a_3: Lanes,
-    /// Bounds of the panel, of which one is an end of `[0, 1]`.
+    /// Bounds of the panel; one of them is an end of `[0, 1]`.
     pub low: Lanes,
     pub high: Lanes,
-    /// The end from which the map grows: +1 the upper, -1 the lower.
+    /// The end at which the map begins: +1 the upper, -1 the lower.
     pub side: Lanes,
     /// Distance of the centre of the map beyond that end.
     pub gap: Lanes,
@@ -40,11 +40,11 @@ pub(super) struct Friction {
     a: f64,
     /// `b - a`.
     slope: f64,
-    /// `(b - a) t_f`, which `tau'` is summed in units of: hardly more than nothing where it is nothing.
+    /// `(b - a) t_f`, the unit of `tau'` in the sums; replaced by a tiny number if it is 0.
     drive: f64,
     /// `tau` for `n = 1` and `theta = 1`.
     constant: f64,
-    /// Sum of the logarithms of theta at both ends.
+    /// Sum of ln theta at both ends.
     ln_theta: f64,
 }
 
@@ -57,10 +57,10 @@ impl Friction {
     }
 }
 
-/// `b - a` in units of `a`, at least, in which the drive is summed. Chosen: far below the rounding of `a`.
+/// Least magnitude of `b - a` in the unit of the sums, in units of `a`. Chosen: far below the rounding of `a`.
 const MIN_WEAKENING: f64 = 1e-30;
 
-/// Room for the values at the nodes: sums and differences of those on both sides of the middle.
+/// Memory for the values at the nodes: sums and differences of values on both sides of the middle.
 #[derive(Debug, Clone)]
 pub(super) struct NodeBuffer {
     v_even: [Vector; MOST_HALF],
@@ -76,8 +76,7 @@ impl NodeBuffer {
     };
 }
 
-/// What the nodes of a bundle need: the values that do not change from one to the next. Places are given by `eta = gap -
-/// s^(2^squarings) = side delta`.
+/// The constants of a bundle for all its nodes. Positions are given by `eta = gap - s^(2^squarings) = side delta`.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Prepared {
     /// Coefficients of theta and of n in powers of `eta`.
@@ -93,14 +92,14 @@ pub(super) struct Prepared {
     squarings: Vector,
     middle: Vector,
     half: Vector,
-    /// 1, from memory like the others: the compiler would take lanes apart for a constant.
+    /// 1, loaded from memory like the others: with a constant, the compiler would split the lanes.
     unit: Vector,
     /// The constant factor of `d(eta)/dx`, `x` the node of the rule.
     scale: Vector,
     kernel: Kernel,
 }
 
-/// The kernel of a batch, by its least and largest power.
+/// The selection of a kernel for a batch, by its least and greatest power.
 #[derive(Debug, Clone, Copy)]
 enum Kernel {
     Squares,
@@ -110,7 +109,7 @@ enum Kernel {
 }
 
 impl Prepared {
-    /// Of no bundle.
+    /// The constants of an empty bundle.
     pub const EMPTY: Prepared = {
         let none = Vector::splat(0.0);
         Prepared {
@@ -131,7 +130,7 @@ impl Prepared {
 }
 
 impl PanelBatch {
-    /// Lanes without a shortcut.
+    /// A batch without shortcuts.
     pub const EMPTY: PanelBatch = {
         let none = [0.0; LANES];
         PanelBatch {
@@ -149,7 +148,7 @@ impl PanelBatch {
 }
 
 impl Prepared {
-    /// The works, of which those of empty lanes have no meaning.
+    /// The works; those of empty lanes are meaningless.
     #[inline(always)]
     pub fn works(&self, rule: &Primitive, space: &mut NodeBuffer) -> Lanes {
         match self.kernel {
@@ -172,7 +171,7 @@ pub(super) fn prepare(panel_batch: &PanelBatch, ends: &Ends, friction: &Friction
     let [from, to] = [panel_batch.from, panel_batch.to].map(Vector);
     let (t_f, rise) = (ends.t_f, ends.rise.high);
     let [none, unit] = [0.0, 1.0].map(Vector::splat);
-    // The polynomials are expanded about the end that the map grows from, of a part about that of `[0, 1]`.
+    // The polynomials are expanded about the end at which the map begins; for a part of a cut panel, about the end of `[0, 1]`.
     let centre = choose(low, unit, choose(unit - high, none - unit, side));
     let slope = 3.0 * rise - (2.0 * a_2 + a_3);
     let bend = 3.0 * rise - (3.0 * a_2 + 2.0 * a_3);
@@ -181,7 +180,7 @@ pub(super) fn prepare(panel_batch: &PanelBatch, ends: &Ends, friction: &Friction
     let (q0, q1) = (choose(centre, theta_1, theta_0), choose(centre, slope, a_2));
     let (q2, q3) = (choose(centre, bend, a_3), a_4);
     let (n0, n1, n2) = (t_f - q1, -2.0 * q2, -3.0 * q3);
-    // Both ends from there, and tau at them from the polynomials that the nodes see.
+    // Both ends of the panel, and tau there from the polynomials used at the nodes.
     let length = high - low;
     let near = choose(side, high, low) - choose(centre, unit, none);
     let far = near - side * length;
@@ -225,7 +224,7 @@ pub(super) fn prepare(panel_batch: &PanelBatch, ends: &Ends, friction: &Friction
     };
 }
 
-/// `yes` in the lanes where `sign` is above 0, `no` in the others.
+/// Selects `yes` in the lanes where `sign` is above 0, else `no`.
 #[inline(always)]
 fn choose(sign: Vector, yes: Vector, no: Vector) -> Vector {
     let mut chosen = no;
@@ -249,17 +248,17 @@ macro_rules! kernels {
 }
 
 kernels! {
-    /// All maps take one square root.
+    /// All maps need one square root.
     squares = 1, true;
-    /// No map takes more than one square root.
+    /// No map needs more than one square root.
     square = 1, false;
-    /// No map takes more than two square roots.
+    /// No map needs more than two square roots.
     fourth = 2, false;
-    /// For all maps.
+    /// Any maps.
     eighth = 3, false;
 }
 
-/// The works where no map squares more than `SQUARINGS` times, and all as often as that if they are the `SAME`.
+/// The works if no map squares more than `SQUARINGS` times, and if all square exactly that often for `SAME`.
 #[inline(always)]
 fn sum<const SQUARINGS: u32, const SAME: bool>(prepared: &Prepared, rule: &Primitive, space: &mut NodeBuffer) -> Lanes {
     let NodeBuffer { v_even, v_odd, g_even, g_odd } = space;
@@ -281,7 +280,7 @@ fn sum<const SQUARINGS: u32, const SAME: bool>(prepared: &Prepared, rule: &Primi
             let theta = theta[0] + eta * (theta[1] + eta * (theta[2] + eta * theta[3]));
             let n = n[0] + eta * (n[1] + eta * n[2]);
             let slope = slope[0] + eta * slope[1];
-            // Over theta n, of which there is one division for two nodes.
+            // Division by `theta n`: one division for two nodes.
             *v = n * n;
             *g = n + slope * theta;
             *below = theta * n;
@@ -296,7 +295,7 @@ fn sum<const SQUARINGS: u32, const SAME: bool>(prepared: &Prepared, rule: &Primi
         (g_even[j], g_odd[j]) = (g[0] + g[1], g[0] - g[1]);
         mean = mean + rule.w[j] * v_even[j];
     }
-    // The last rows of the matrix are filled up with zeros.
+    // The matrix is padded with zero rows.
     let padded = count.next_multiple_of(ROWS);
     v_odd[count..padded].fill(Vector::splat(0.0));
     g_odd[count..padded].fill(Vector::splat(0.0));

@@ -1,4 +1,4 @@
-//! One cubic shortcut: its two polynomials, whether it is feasible, and its least velocity.
+//! A cubic shortcut: its two polynomials, its feasibility and its least velocity.
 //!
 //! In `x = t/t_f`: `theta = theta_0 + A_2 x + A_3 x^2 + A_4 x^3` and `n = t_f (1 - theta') = t_f - dtheta/dx`, so `v =
 //! n/(t_f theta)`.
@@ -16,12 +16,12 @@ pub(in crate::protocol) struct Ends {
     /// `theta_1 - theta_0`.
     pub rise: DoubleDouble,
     pub t_f: f64,
-    /// Largest fraction of a velocity that rounding may cost.
+    /// Greatest relative error of a velocity by rounding.
     pub v_loss: f64,
 }
 
 impl Ends {
-    /// Between the steady states at `v_i` and `v_f`; velocities are to be good to `v_loss` (relative).
+    /// The ends of shortcuts between the steady states at `v_i` and `v_f`; velocities need a relative accuracy of `v_loss`.
     pub fn between(v_i: f64, v_f: f64, t_f: f64, v_loss: f64) -> Ends {
         let one = DoubleDouble::new(1.0);
         let (theta_0, theta_1) = (one / DoubleDouble::new(v_i), one / DoubleDouble::new(v_f));
@@ -29,12 +29,12 @@ impl Ends {
     }
 }
 
-/// `1/v_f - 1/v_i`: of two that are almost the same the difference of the inverses would have few digits left.
+/// `1/v_f - 1/v_i`, without the cancellation of nearly equal inverses.
 pub(in crate::protocol) fn rise(v_i: f64, v_f: f64) -> DoubleDouble {
     DoubleDouble::sum(v_i, -v_f) / DoubleDouble::product(v_i, v_f)
 }
 
-/// One shortcut.
+/// A shortcut.
 #[derive(Debug, Clone, Copy)]
 pub(in crate::protocol) struct Path<'a> {
     pub ends: &'a Ends,
@@ -63,7 +63,7 @@ impl<'a> Path<'a> {
         }
     }
 
-    /// The shortcut with coefficients of 32 digits, which its expansions `about` a place and what is called exact know.
+    /// The shortcut with coefficients of 32 digits, which the expansions `about` a point and the `exact` methods use.
     pub fn exact(ends: &'a Ends, a_2: DoubleDouble, a_3: DoubleDouble) -> Path<'a> {
         let mut path = Path { low: [a_2.low, a_3.low], ..Path::new(ends, a_2.high, a_3.high) };
         (path.theta.c, path.n.c) = (path.exact_theta().c.map(|c| c.high), path.exact_n().c.map(|c| c.high));
@@ -99,7 +99,7 @@ impl<'a> Path<'a> {
         ExactCubic { c: [DoubleDouble::new(self.ends.t_f) - a_2, two * a_3, three * a_4, DoubleDouble::new(0.0)] }
     }
 
-    /// The zeros of `n`, as [`ExactCubic::zeros`].
+    /// The zeros of `n`, in the form of [`ExactCubic::zeros`].
     pub(super) fn zeros_of_n(&self) -> [(DoubleDouble, f64); 2] {
         let [n0, n1, n2, _] = self.exact_n().c;
         exact_quadratic_zeros([n0, n1, n2])
@@ -137,9 +137,8 @@ impl<'a> Path<'a> {
         }
     }
 
-    /// The complex pair of zeros of theta near its least value, where that is so small that the closed form of the
-    /// zeros has no digit of their distance from the real axis: its place, its height, and how far from there the closed
-    /// form may put the two, but not the third one.
+    /// The complex pair of zeros of theta near its least value, if the closed form has no correct digit of their distance from the real axis.
+    /// Returns real part, imaginary part, and a distance within which the closed form places these two zeros, but not the third one.
     pub fn close_pair(&self) -> Option<(f64, f64, f64)> {
         let [c0, c1, c2, c3] = self.theta.c;
         let x = self.theta.minimum();
@@ -169,8 +168,7 @@ impl<'a> Path<'a> {
         (self.theta.c, [n0, n1, n2])
     }
 
-    /// Whether theta at the start or at the end is so small that an expansion about the other end costs it more than the
-    /// fraction `loss` of its digits.
+    /// Whether theta at one end is so small that an expansion about the other end has a relative error above `loss` there.
     #[inline(always)]
     pub fn is_lossy(&self, end: bool, loss: f64) -> bool {
         let [c0, c1, c2, c3] = self.theta.c;
@@ -179,8 +177,8 @@ impl<'a> Path<'a> {
         size * f64::EPSILON > loss * theta
     }
 
-    /// Whether the expansion about the end or the start keeps enough digits of theta and of n at both ends of a panel,
-    /// `near` and `far` from its centre.
+    /// Whether the expansion about an end of `[0, 1]` keeps enough digits of theta and n at both ends of a panel, at the distances `near` and
+    /// `far`.
     #[inline(always)]
     pub(super) fn is_sound(&self, about_end: bool, near: f64, far: f64, accuracy: &Accuracy) -> bool {
         let (start, end) = (self.about_start(), self.about_end());
@@ -194,9 +192,9 @@ impl<'a> Path<'a> {
         for x in [near, far] {
             let theta = q0 + x * (q1 + x * (q2 + x * q3));
             let n = n0 + x * (n1 + x * n2);
-            // The centre itself is exact.
+            // The values at the centre are exact.
             let fine = (accuracy.rounding * theta >= theta_size) & (accuracy.slight * n >= n_size);
-            // The logarithm of n at an end counts over the whole panel, and the sums multiply theta and n of two nodes.
+            // An error of ln n at an end affects the whole panel, and the sums multiply theta and n of two nodes.
             let size = theta * n;
             sound &= n >= MIN_END * (n0.abs() + n1.abs() + n2.abs());
             sound &= (fine | (x == 0.0)) & (size > 1e-120) & (size < 1e120);
@@ -204,13 +202,13 @@ impl<'a> Path<'a> {
         sound
     }
 
-    /// The coefficients of theta and of n in powers of `x - centre`, each right to the last bit.
+    /// The coefficients of theta and of n in powers of `x - centre`, each accurate to the last bit.
     pub fn about(&self, centre: f64) -> ([f64; 4], [f64; 3]) {
         let [n0, n1, n2, _] = self.exact_n().about(centre);
         (self.exact_theta().about(centre), [n0, n1, n2])
     }
 
-    /// The coefficients of `theta - theta_0` in powers of `x - centre`, each right to the last bit.
+    /// The coefficients of `theta - theta_0` in powers of `x - centre`, each accurate to the last bit.
     pub fn change_about(&self, centre: f64) -> [f64; 4] {
         let mut change = self.exact_theta();
         change.c[0] = DoubleDouble::new(0.0);
@@ -228,12 +226,12 @@ impl<'a> Path<'a> {
         above.about(centre)
     }
 
-    /// `theta` and `n` at `x`, each right to the last bit.
+    /// `theta` and `n` at `x`, each accurate to the last bit.
     pub fn at(&self, x: f64) -> (f64, f64) {
         (self.exact_theta().at(x).high, self.exact_n().at(x).high)
     }
 
-    /// Whether `n <= most theta` at `x`; decided in double-double where rounding leaves doubt.
+    /// Whether `n <= most theta` at `x`; decided in double-double if rounding matters.
     pub fn is_within(&self, x: f64, most: f64) -> bool {
         let rest = self.surplus(most);
         let (value, doubt) = (rest.at(x), rest.doubt() + (3.0 + most) * self.slack());
@@ -244,7 +242,7 @@ impl<'a> Path<'a> {
         n <= most * theta
     }
 
-    /// The least velocity of coefficients of 32 digits.
+    /// The least velocity, from coefficients of 32 digits.
     pub fn least_velocity(&self) -> f64 {
         let t_f = DoubleDouble::new(self.ends.t_f);
         let at = |x: f64| (self.exact_n().at(x) / (t_f * self.exact_theta().at(x))).high;
@@ -252,21 +250,21 @@ impl<'a> Path<'a> {
         self.exact_velocity(place)
     }
 
-    /// Velocity at both ends: the lesser, and where it is found.
+    /// The lesser velocity of both ends, and its position.
     #[inline(always)]
     pub fn v_ends(&self) -> (f64, f64) {
         let (theta_end, n_end) = self.about_end();
         let (n_start, theta_start) = (self.n.c[0], self.theta.c[0]);
-        // Ratios are compared without a division.
+        // Compares ratios without a division.
         let first = n_start * theta_end[0] < n_end[0] * theta_start;
         let (n, theta) = if first { (n_start, theta_start) } else { (n_end[0], theta_end[0]) };
         (n / (self.ends.t_f * theta), if first { 0.0 } else { 1.0 })
     }
 
-    /// The least velocity, found near `x`, from 32 digits: for where `n` or theta is so small that rounding shows.
+    /// The least velocity near `x` with 32 digits, for small `n` or theta, where rounding matters.
     ///
-    /// In double the velocity is flat within rounding, so the place is known to half the digits only. Dinkelbach's
-    /// step takes it from the stationary point of a cubic instead, which is good to all of them.
+    /// In double precision the velocity is flat within rounding, so its minimum is known to half the digits only. Dinkelbach's step uses the
+    /// stationary point of a cubic instead, which has all digits.
     pub fn exact_velocity(&self, x: f64) -> f64 {
         let t_f = DoubleDouble::new(self.ends.t_f);
         let at = |x: f64| (self.exact_n().at(x) / (t_f * self.exact_theta().at(x))).high;
@@ -282,9 +280,9 @@ impl<'a> Path<'a> {
     }
 }
 
-/// n at an end of a panel, fraction of its coefficients, that is summed without logarithms, at least. Measured: below it the rounding
-/// of `n'/n` shows (`tests/solver/stress/landscape.rs`).
+/// Least n at an end of a panel for sums without logarithms, as a fraction of its coefficients. Measured: below it the rounding of `n'/n` is
+/// visible (`tests/solver/stress/landscape.rs`).
 const MIN_END: f64 = 1e-4;
 
-/// Steps of Dinkelbach's method, at most. Chosen: the digits double with each.
+/// Greatest number of steps of Dinkelbach's method. Chosen: each step doubles the digits.
 pub(super) const MAX_STEPS: u32 = 60;

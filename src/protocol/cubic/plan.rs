@@ -1,9 +1,8 @@
-//! One panel for each of many shortcuts at a time: the zeros and the power map that suits most of a landscape, without a
-//! branch that a lane treats as another one.
+//! Plans of one panel for each of many shortcuts at a time: zeros and power maps, which suffice for most of a landscape, without branches.
 //!
-//! The estimate of [`rules`](super::rules), restricted to cheap maps: the straight rule, and the maps `x = r
-//! ± s^2`, `s^4`, `s^8` about the shadow of the most hindering zero on the real axis beyond the nearer end. Where that
-//! needs many nodes, the interval is cut in two, and where that does not help either, `rules` looks further.
+//! The estimate of [`rules`](super::rules), restricted to cheap maps: the plain rule, and the maps `x = r ± s^2`, `s^4`, `s^8` about the
+//! projection of the limiting zero onto the real axis beyond the nearer end. If that needs many nodes, the interval is cut in two. If that does
+//! not help either, `rules` plans the shortcut.
 
 use multiversion::multiversion;
 
@@ -17,11 +16,11 @@ use crate::numerics::real::Real;
 /// One panel for each shortcut.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Plan {
-    /// The bin of the number of nodes that the map needs; none from [`BINS`] on.
+    /// The bin of the number of nodes; none from [`BINS`] on.
     pub bin: [u32; BLOCK],
     /// log2 of the power.
     pub squarings: Block,
-    /// Which end of the panel the map grows from: +1 the upper, -1 the lower.
+    /// The end of the panel at which the map begins: +1 the upper, -1 the lower.
     pub side: Block,
     /// Distance of the centre of the map beyond that end.
     pub gap: Block,
@@ -35,62 +34,61 @@ pub(super) struct Plan {
 }
 
 impl Plan {
-    /// Not yet made.
+    /// An empty plan.
     pub const EMPTY: Plan = {
         let none = [0.0; BLOCK];
         Plan { bin: [0; BLOCK], squarings: none, side: none, gap: none, from: none, to: none, deeper: none, cut: none }
     };
 }
 
-/// Shortcuts that are planned together: enough to hide the latency of square roots, few enough to be filled.
+/// Shortcuts that are planned together. Chosen: enough to hide the latency of square roots, few enough to fill.
 pub(super) const BLOCK: usize = 32;
 
 /// Single precision numbers of the widest vectors.
 const WIDTH: usize = 16;
 
-/// One value a shortcut.
+/// One value for each shortcut.
 pub(super) type Block = [f64; BLOCK];
 
-/// log2 of the largest power tried.
+/// log2 of the greatest power.
 pub(super) const MOST_SQUARINGS: u32 = 3;
 
-/// Nodes that a larger power cannot save much of. Measured (`cargo bench --bench landscape`).
+/// Number of nodes of which a larger power cannot save many. Measured (`cargo bench --bench landscape`).
 pub(super) const CHEAP_NODES: usize = 32;
 
-/// Half the distance of a pair of zeros of n, at least, that is known to some digits. Derived: the root of the rounding of the
-/// discriminant, times 100.
+/// Least half distance of a pair of zeros of n that is known to some digits. Derived: the root of the rounding of the discriminant, times 100.
 const MIN_PAIR: f64 = 1e-6;
 
-/// Distance of a real zero beyond an end, at least, that has the digits which a map needs. Derived: six digits are left of it.
+/// Least distance of a real zero beyond an end with enough digits for a map. Derived: six digits remain.
 pub(super) const MIN_GAP: f64 = 1e-10;
 
-/// Zeros that may be complex, each followed by its conjugate or by another real one; all others are real.
+/// Indices of zeros that may be complex, each followed by its conjugate or by another real zero; all others are real.
 pub(super) const PAIRS: [usize; 2] = [1, 3];
 
 /// The weight of a doubtful zero of n. Chosen: more than all zeros of theta.
 const DOUBT_OF_N: f32 = 8.0;
 
-/// Whether zeros are computed to few digits; what these leave open is left to the next plan.
+/// Whether zeros have few digits; undecided shortcuts go to the next plan.
 const fn is_coarse<T: Real>() -> bool {
     size_of::<T>() < size_of::<f64>()
 }
 
-/// Sizes of the coefficients of theta, relative to theta at the end, whose powers stay in the range of single precision and keep some
-/// digits of all zeros. Measured (`tests/solver/stress/landscape.rs`).
+/// Range of the coefficients of theta, relative to theta at the end, in which single precision neither overflows nor loses all digits of a zero.
+/// Measured (`tests/solver/stress/landscape.rs`).
 const THETA_RANGE: (f64, f64) = (1e-4, 3e3);
 
-/// The zeros of n.
+/// Range of the coefficients of n, relative to n at the end, for single precision.
 const N_RANGE: (f64, f64) = (1e-10, 1e10);
 
-/// Square of the distance of two zeros of theta, relative to their distance from the end, at least. Derived: single precision has lost
-/// half of its digits of it there.
+/// Least squared distance of two zeros of theta, relative to their distance from the end. Derived: single precision loses half of its digits
+/// there.
 const MIN_PAIR_SQUARED: f64 = 1e-3;
 
-/// Errors of the focal sum beyond 2 by zeros in single precision, relative. Measured (`tests/solver/stress/landscape.rs`).
+/// Relative error of the focal sum minus 2 by zeros in single precision. Measured (`tests/solver/stress/landscape.rs`).
 pub(super) const SINGLE_COST: f64 = 0.03;
 
-/// Chooses the panels over `[0, 1]` of the shortcuts `(a_2[i], a_3[i])`, all feasible, without powers beyond the square
-/// and in single precision: `deeper` where that is not enough.
+/// Chooses the panels over `[0, 1]` of the feasible shortcuts `(a_2[i], a_3[i])` in single precision, with squares at most; `deeper` marks
+/// shortcuts that need more.
 #[multiversion(targets(
     "x86_64+avx+avx2+bmi1+bmi2+avx512f+avx512bw+avx512cd+avx512dq+avx512vl",
     "x86_64+avx+avx2+bmi1+bmi2"
@@ -99,7 +97,7 @@ pub(super) fn plan(ends: &Ends, a_2: &Block, a_3: &Block, accuracy: &Accuracy, p
     panels::<f32, 1>(ends, [a_2, a_3, &[0.0; BLOCK], &[1.0; BLOCK]], accuracy, plan);
 }
 
-/// Chooses panels over `[low[i], high[i]]`, of which one is an end of `[0, 1]`, with all powers.
+/// Chooses panels over `[low[i], high[i]]` with all powers; one bound is an end of `[0, 1]`.
 #[multiversion(targets(
     "x86_64+avx+avx2+bmi1+bmi2+avx512f+avx512bw+avx512cd+avx512dq+avx512vl",
     "x86_64+avx+avx2+bmi1+bmi2"
@@ -108,11 +106,11 @@ pub(super) fn plan_parts(ends: &Ends, parts: [&Block; 4], accuracy: &Accuracy, p
     panels::<f64, MOST_SQUARINGS>(ends, parts, accuracy, plan);
 }
 
-/// The zeros of theta and of n of each shortcut, in the closed upper half plane, a pair once.
+/// The zeros of theta and of n of each shortcut in the closed upper half plane; a conjugate pair occurs once.
 pub(super) struct Places<T> {
     pub re: [[T; BLOCK]; ZEROS],
     pub im: [[T; BLOCK]; ZEROS],
-    /// Above 0 where the zeros are not known well enough for a plan.
+    /// Above 0 where the zeros are too inaccurate for a plan.
     pub doubt: [f32; BLOCK],
 }
 
@@ -158,7 +156,7 @@ pub(super) fn places<T: Real>(ends: &Ends, a_2: &Block, a_3: &Block) -> Places<T
 }
 
 impl<T: Real> Places<T> {
-    /// Corrects the zeros that the expansion about the end gives too few digits of.
+    /// Corrects zeros for which the expansion about the end has too few digits.
     #[inline(always)]
     fn polish_near_start(&mut self, ends: &Ends, a_2: &Block, a_3: &Block) {
         let Places { re, im, doubt } = self;
@@ -182,7 +180,7 @@ impl<T: Real> Places<T> {
         }
     }
 
-    /// Doubts pairs near the real axis: the closed forms do not determine how far from it they are. That of theta is looked at
+    /// Marks pairs near the real axis as doubtful, since the closed forms do not determine their distance from it. A pair of theta is checked
     /// again.
     #[inline(always)]
     fn settle_close_pairs(&mut self, ends: &Ends, a_2: &Block, a_3: &Block) {
@@ -210,8 +208,8 @@ impl<T: Real> Places<T> {
     }
 }
 
-/// Of the zeros of each shortcut the one that hinders a straight rule over `[low[i], high[i]]` most: the square of the
-/// sum of its distances from both ends, and its shadow on the real axis.
+/// The zero of each shortcut that limits a plain rule over `[low[i], high[i]]`: the square of the sum of its distances from both ends, and its
+/// projection onto the real axis.
 #[inline(always)]
 pub(super) fn nearest<T: Real>(
     re: &[[T; BLOCK]; ZEROS],
@@ -219,8 +217,7 @@ pub(super) fn nearest<T: Real>(
     low: &Block,
     high: &Block,
 ) -> ([f32; BLOCK], [T; BLOCK]) {
-    // The most hindering zero names the end and the centre. Single precision does for what is only compared: places of
-    // zeros keep all their digits.
+    // The limiting zero determines the end and the centre. Single precision suffices for comparisons; positions of zeros keep all digits.
     let mut shadow = [T::of(0.0); BLOCK];
     let mut least = [f32::MAX; BLOCK];
     for k in 0..ZEROS {
@@ -228,7 +225,7 @@ pub(super) fn nearest<T: Real>(
             let (u, v) = ((re[k][i] - T::of(low[i])).narrow(), (re[k][i] - T::of(high[i])).narrow());
             let y = im[k][i].narrow();
             let (u_square, v_square) = (u * u + y * y, v * v + y * y);
-            // A real zero needs no root.
+            // A real zero needs no square root.
             let product = if PAIRS.contains(&k) { (u_square * v_square).sqrt() } else { (u * v).abs() };
             let square = u_square + v_square + 2.0 * product;
             let nearer = square < least[i];
@@ -239,15 +236,15 @@ pub(super) fn nearest<T: Real>(
     (least, shadow)
 }
 
-/// The root of a place given by its size and its real part, `x + iy` with positive `x`: `x`, and the square of the sum
-/// of its distances from `a` and `b`.
+/// The square root `x + iy`, with positive `x`, of a number given by modulus and real part: returns `x` and the square of the sum of its
+/// distances from `a` and `b`.
 #[inline(always)]
 pub(super) fn rooted(size: f32, real: f32, a: f32, b: f32) -> (f32, f32) {
     // |sqrt z|^2 = |z| and Re sqrt z = sqrt((|z| + Re z)/2).
     let x = (0.5 * (size + real)).sqrt();
     let u = size + a * (a - 2.0 * x);
     let v = size + b * (b - 2.0 * x);
-    // Rounding may take the square of a distance below 0.
+    // Rounding may make the square of a distance negative.
     let product = u * v;
     (x, u + v + 2.0 * (if product > 0.0 { product } else { 0.0 }).sqrt())
 }
@@ -261,7 +258,7 @@ fn panels<T: Real, const SQUARINGS: u32>(
 ) {
     let zero = T::of(0.0);
     let Places { re, im, mut doubt } = places::<T>(ends, a_2, a_3);
-    // The straight rule, and the end and the centre of a map that serves better.
+    // The plain rule, and end and centre of a possibly better map.
     let (least, shadow) = nearest(&re, &im, low, high);
     let mut focal = [0.0f32; BLOCK];
     let (mut side, mut gap) = ([zero; BLOCK], [zero; BLOCK]);
@@ -273,7 +270,7 @@ fn panels<T: Real, const SQUARINGS: u32>(
         side[i] = T::of(if upper { 1.0 } else { -1.0 });
         gap[i] = if beyond > zero { beyond } else { zero };
     }
-    // A place is its real part and its size, which is all that the distances from real ends need.
+    // Real part and modulus of a zero determine its distances from real points.
     let (mut real, mut size) = ([[0.0f32; BLOCK]; ZEROS], [[0.0f32; BLOCK]; ZEROS]);
     for k in 0..ZEROS {
         for i in 0..BLOCK {
@@ -283,12 +280,12 @@ fn panels<T: Real, const SQUARINGS: u32>(
             size[k][i] = if PAIRS.contains(&k) { (x * x + y * y).sqrt() } else { x.abs() };
         }
     }
-    // A zero beyond the end is known from 1, not from there.
+    // A zero beyond the end is given by its distance from 1.
     for i in 0..BLOCK {
         let blurred = (side[i] > zero) & (high[i] == 1.0) & (gap[i] > zero) & (gap[i] < T::of(MIN_GAP));
         doubt[i] += if blurred { DOUBT_OF_N } else { 0.0 };
     }
-    // A focal sum that is not safe from the errors of the zeros does not count in full.
+    // A focal sum is reduced by the possible error of the zeros.
     let lost = if is_coarse::<T>() { SINGLE_COST } else { 0.0 };
     let steps = accuracy.in_steps();
     let limits: [f32; BINS] = std::array::from_fn(|i| (steps[i] + lost * (steps[i] - 2.0)) as f32);
@@ -300,7 +297,7 @@ fn panels<T: Real, const SQUARINGS: u32>(
         let length = high - low;
         plan.cut[i] = cut(low, high, shadow[i].wide());
         let straight = squarings[i] == 0.0;
-        // Over all of [0, 1] a straight rule grows from the end where theta is less.
+        // Over all of [0, 1] a plain rule begins at the end with the smaller theta.
         let steady = if ends.rise.high < 0.0 { 1.0 } else { -1.0 };
         let whole = (low == 0.0) & (high == 1.0);
         let side = if straight & whole { steady } else { side[i].wide() };
@@ -325,16 +322,16 @@ fn panels<T: Real, const SQUARINGS: u32>(
         }
     }
 }
-/// The powers of maps.
+/// The powers of the maps.
 struct Powers {
-    /// In log2.
+    /// log2 of the powers.
     squarings: [f32; BLOCK],
     /// 1 where a larger power might save nodes.
     short: [f32; BLOCK],
 }
 
-/// The power of each map from the real parts and sizes of the zeros relative to its centre; `focal` grows where
-/// one helps. Powers beyond the square are tried where the sum is not `cheap`.
+/// The power of each map from the real parts and moduli of the zeros relative to its centre; increases `focal` where a power helps. Powers
+/// beyond the square are tried where the sum is not `cheap`.
 #[inline(always)]
 fn powers<T: Real, const SQUARINGS: u32>(
     [mut real, mut size]: [[[f32; BLOCK]; ZEROS]; 2],
@@ -348,7 +345,7 @@ fn powers<T: Real, const SQUARINGS: u32>(
         far[i] = gap[i] + (T::of(high[i]) - T::of(low[i]));
     }
     let mut squarings = [0.0f32; BLOCK];
-    // The focal sum that the centre of the map itself allows, mapped to 0.
+    // Upper bound of the focal sum by the centre of the map, which is mapped to 0.
     let mut ceiling = [2.0f32; BLOCK];
     for level in 1..=SQUARINGS {
         if level > 1 && focal.iter().all(|&focal| focal >= cheap) {
@@ -371,7 +368,7 @@ fn powers<T: Real, const SQUARINGS: u32>(
         }
         for i in 0..BLOCK {
             let reached = 2.0 * least[i].sqrt() / (b[i] - a[i]);
-            // The sum takes a square as it takes a straight rule, but differences from a centre far away lose digits.
+            // A square costs no more than a plain rule, but differences from a distant centre lose digits.
             let open = if level == 1 { gap[i].narrow() <= (high[i] - low[i]) as f32 } else { focal[i] < cheap };
             let better = open & (reached > focal[i]);
             focal[i] = if better { reached } else { focal[i] };
@@ -381,14 +378,14 @@ fn powers<T: Real, const SQUARINGS: u32>(
     }
     let mut short = [0.0f32; BLOCK];
     for i in 0..BLOCK {
-        // A larger power moves the interval away from the centre, but hardly from other zeros.
+        // A larger power increases the distance from the centre, but hardly from other zeros.
         let near = focal[i] - 2.0 > 0.5 * (ceiling[i] - 2.0);
         short[i] = if (focal[i] < cheap) & (squarings[i] == SQUARINGS as f32) & near { 1.0 } else { 0.0 };
     }
     Powers { squarings, short }
 }
 
-/// The number of descending limits that each focal sum misses.
+/// The number of descending limits above each focal sum.
 #[inline(always)]
 fn bins(limits: &[f32; BINS], focal: &[f32; BLOCK]) -> [f32; BLOCK] {
     let mut bin = [0.0f32; BLOCK];
@@ -404,7 +401,7 @@ fn bins(limits: &[f32; BINS], focal: &[f32; BLOCK]) -> [f32; BLOCK] {
     bin
 }
 
-/// Whether single precision is enough for estimates of the zeros of theta and n, given about the end.
+/// Whether single precision suffices for estimates of the zeros of theta and n, from their expansions about the end.
 #[inline(always)]
 fn is_tame<T: Real>([q0, q1, q2, q3]: [T; 4], [n0, n1, n2]: [T; 3]) -> bool {
     let (theta, n) = (q1.abs() + q2.abs() + q3.abs(), n0.abs() + n1.abs() + n2.abs());

@@ -1,8 +1,8 @@
-//! Shortcuts that wait until there are enough of them for all lanes.
+//! Queues of shortcuts that wait until they fill all lanes.
 
 use super::plan::{BLOCK, Block};
 
-/// Up to `N` shortcuts of a landscape.
+/// A queue of up to `N` shortcuts of a landscape.
 #[derive(Debug, Clone)]
 pub(super) struct Queue<const N: usize> {
     indices: [usize; N],
@@ -14,7 +14,7 @@ pub(super) struct Queue<const N: usize> {
 impl<const N: usize> Queue<N> {
     pub const EMPTY: Queue<N> = Queue { indices: [0; N], a_2: [0.0; N], a_3: [0.0; N], count: 0 };
 
-    /// Adds the shortcut at `index`; true once the queue is full.
+    /// Adds the shortcut at `index`; returns whether the queue is full.
     #[inline(always)]
     pub fn push(&mut self, index: usize, a_2: f64, a_3: f64) -> bool {
         let last = self.count % N;
@@ -23,8 +23,7 @@ impl<const N: usize> Queue<N> {
         self.count == N
     }
 
-    /// Takes all out: their indices, and coordinates for all lanes, the last ones given again where there are fewer
-    /// shortcuts; `None` if there are none.
+    /// Empties the queue: returns indices, and coordinates for all lanes, padded with the last shortcut; `None` if it is empty.
     pub fn take(&mut self) -> Option<(&[usize], [&[f64; N]; 2])> {
         let count = std::mem::take(&mut self.count);
         let last = count.checked_sub(1)?;
@@ -35,7 +34,7 @@ impl<const N: usize> Queue<N> {
     }
 }
 
-/// Shortcuts whose interval is to be cut in two.
+/// A queue of shortcuts whose interval is cut in two.
 #[derive(Debug, Clone)]
 pub(super) struct Cuts {
     indices: [usize; BLOCK / 2],
@@ -56,7 +55,7 @@ impl Cuts {
         count: 0,
     };
 
-    /// Adds the shortcut at `index`, cut at `at`; true once there are as many as are planned together.
+    /// Adds the shortcut at `index`, cut at `at`; returns whether the queue is full.
     pub fn push(&mut self, index: usize, [a_2, a_3]: [f64; 2], at: f64) -> bool {
         let last = self.count % (BLOCK / 2);
         self.indices[last] = index;
@@ -68,8 +67,7 @@ impl Cuts {
         self.count == BLOCK / 2
     }
 
-    /// Takes all out: their indices, and coordinates and bounds, the lower parts in the first half of the lanes; `None`
-    /// if there are none.
+    /// Empties the queue: returns indices, coordinates and bounds, with the lower parts in the first half of the lanes; `None` if it is empty.
     pub fn take(&mut self) -> Option<(&[usize], [&Block; 4])> {
         let count = std::mem::take(&mut self.count);
         (count > 0).then_some((&self.indices[..count], [&self.a_2, &self.a_3, &self.low, &self.high]))

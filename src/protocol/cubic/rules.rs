@@ -1,11 +1,9 @@
-//! The quadrature of a shortcut, chosen from the zeros of theta and of `1 - theta'` before the first node is
-//! spent.
+//! The quadrature of a shortcut, determined in advance from the zeros of theta and of `1 - theta'`.
 //!
-//! The integrand of the work has poles where `theta = 0` and logarithms where `theta = 0` or `theta' = 1`. On an
-//! interval, Gauss-Legendre converges like `rho^(-2n)`, `rho` the Bernstein ellipse through the nearest singularity.
-//! Where that is slow, a change of variable moves the singularities away: `x = r ± s^p` about a real zero `r` beyond an
-//! end (roots only, no transcendental function), or `x = c + h sinh y` over a complex pair `c ± i h`. Where neither
-//! does, the interval is cut.
+//! The integrand of the work has poles where `theta = 0` and logarithms where `theta = 0` or `theta' = 1`. On an interval, Gauss-Legendre
+//! converges like `rho^(-2n)`, `rho` the Bernstein ellipse through the nearest singularity. If that is slow, a change of variable increases the
+//! distance of the singularities: `x = r ± s^p` about a real zero `r` beyond an end (roots only, no transcendental function), or `x = c + h sinh
+//! y` near a complex pair `c ± i h`. If neither helps, the interval is cut.
 
 use multiversion::multiversion;
 
@@ -34,7 +32,7 @@ pub(super) enum Map {
     },
     /// `delta = height sinh s`.
     Sinh {
-        /// Imaginary part of the pair above `centre`.
+        /// Imaginary part of the pair at `centre`.
         height: f64,
     },
 }
@@ -52,42 +50,43 @@ pub(super) struct Panel {
     pub nodes: usize,
 }
 
-/// Nodes that are taken without looking for a better map. Measured: the search costs as much as some sixteen nodes (`cargo bench
-/// --bench landscape`).
+/// Number of nodes up to which no better map is searched. Measured: the search costs as much as about sixteen nodes (`cargo bench --bench
+/// landscape`).
 const PLAIN_NODES: usize = 32;
-/// Nodes from which the sinh map is tried. Measured: its logarithms and exponentials pay from there on (`cargo bench --bench landscape`).
+/// Number of nodes from which the sinh map is tried. Measured: its logarithms and exponentials pay off from there on (`cargo bench --bench
+/// landscape`).
 const SINH_FROM: usize = 40;
-/// Nodes beyond which a panel is cut: the last of the bins.
+/// Number of nodes above which a panel is cut: that of the last bin.
 const CUT_FROM: usize = 80;
-/// Most nodes of one panel.
+/// Greatest number of nodes of a panel.
 const MOST_NODES: usize = 256;
-/// Numbers of nodes are multiples of this: half of the lanes.
+/// Step of the number of nodes: half of the lanes.
 pub(super) const NODE_STEP: usize = 4;
-/// Cuts of a panel in a row, at most: a panel is never shorter than `2^-12` of its parent.
+/// Greatest depth of cuts: a panel is never shorter than `2^-12` of its parent.
 const MAX_DEPTH: u32 = 12;
-/// Safety of the estimate: `e^MARGIN` stands for the fraction of the residues in the integral. Measured: `tests/budgets.csv` holds the
-/// errors that are left.
+/// Safety margin of the estimate: `e^MARGIN` bounds the ratio of the residues to the integral. Measured: `tests/budgets.csv` has the remaining
+/// errors.
 const MARGIN: f64 = 3.5;
 
-/// The accuracy requested, as the focal sums (see [`focal`]) from which a number of nodes is enough.
+/// The requested accuracy, as the focal sums (see [`focal`]) from which a number of nodes suffices.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Accuracy {
-    /// Element `i` is for `(i + 1) NODE_STEP` nodes; falling.
+    /// Element `i` belongs to `(i + 1) NODE_STEP` nodes; descending.
     focal: [f64; MOST_NODES / NODE_STEP],
-    /// ln rho from which [`NODE_STEP`] nodes are enough.
+    /// ln rho from which [`NODE_STEP`] nodes suffice.
     pub pace: f64,
-    /// Largest fraction of an error in theta.
+    /// Greatest relative error of theta.
     pub rounding: f64,
-    /// Largest fraction of an error in n, whose logarithm counts; 0 where sums without logarithms lose too many digits.
+    /// Greatest relative error of n, through its logarithm; 0 if sums without logarithms lose too many digits.
     pub slight: f64,
-    /// Largest distance, under constant velocity, over which sums without logarithms keep enough digits.
+    /// Greatest slip at constant velocity for which sums without logarithms keep enough digits.
     pub longest: f64,
 }
 
-/// Accuracy of parts of a cut panel, at most. Measured: below it the residues of a close pair exceed [`MARGIN`].
+/// Loosest accuracy of the parts of a cut panel. Measured: at looser accuracies the residues of a close pair exceed [`MARGIN`].
 const LOOSEST_PARTS: f64 = 1e-5;
 
-/// The focal sums from which [`NODE_STEP`] nodes are enough for `tolerance`, twice as many, and so on.
+/// The focal sums from which [`NODE_STEP`] nodes suffice for `tolerance`, then twice as many, and so on.
 fn focal_sums(tolerance: f64) -> [f64; MOST_NODES / NODE_STEP] {
     let mut focal = [0.0; MOST_NODES / NODE_STEP];
     for (i, focal) in focal.iter_mut().enumerate() {
@@ -98,71 +97,68 @@ fn focal_sums(tolerance: f64) -> [f64; MOST_NODES / NODE_STEP] {
     focal
 }
 
-/// ln rho from which [`NODE_STEP`] nodes are enough for `tolerance`: `rho^(2 nodes) = e^digits`.
+/// ln rho from which [`NODE_STEP`] nodes suffice for `tolerance`: `rho^(2 nodes) = e^digits`.
 fn pace(tolerance: f64) -> f64 {
     0.5 * (MARGIN - ln(tolerance)) / NODE_STEP as f64
 }
 
 impl Accuracy {
-    /// For a relative accuracy `tolerance` of the work, under friction and a distance that is no more than `most`.
+    /// The accuracy for a relative `tolerance` of the work, with a slip of at most `most`.
     pub fn new(tolerance: f64, law: Law, most: f64) -> Accuracy {
         let rounding = 0.1 * tolerance;
-        // Without logarithms `tau` is as good as a difference of terms that grow like the distance.
+        // Without logarithms `tau` is a difference of terms that grow like the slip.
         let longest = rounding / ((law.b - law.a).abs() * f64::EPSILON);
-        // A pair of zeros between the ends that no cut is made for is as far from the real axis as the height of the smallest
-        // ellipse in units of half the panel, and theta there as small as its square.
+        // A pair of zeros that needs no cut is at least as far from the real axis as the height of the smallest ellipse, in units of half the
+        // panel; theta there is at least of the order of its square.
         let height = 0.5 * (MARGIN - ln(tolerance)) / CUT_FROM as f64;
         let slight = if most <= longest * (0.25 * height * height) { rounding / law.a } else { 0.0 };
         Accuracy { focal: focal_sums(tolerance), pace: pace(tolerance), rounding, slight, longest }
     }
 
-    /// For parts of a panel that is cut at a close pair of zeros, which fills what is left: at low accuracies its fraction is
-    /// larger than the margin.
+    /// The accuracy for the parts of a panel that is cut at a close pair of zeros: at low accuracies the residues of the pair exceed the margin.
     pub fn of_parts(&self, tolerance: f64) -> Accuracy {
         let tolerance = tolerance.min(LOOSEST_PARTS);
         Accuracy { focal: focal_sums(tolerance), pace: pace(tolerance), ..*self }
     }
 
-    /// The focal sum from which `nodes` are enough.
+    /// The focal sum from which `nodes` suffice.
     #[inline(always)]
     pub fn enough(&self, nodes: usize) -> f64 {
         self.focal[nodes / NODE_STEP - 1]
     }
 
-    /// The focal sums from which [`NODE_STEP`] nodes are enough, twice as many, and so on.
+    /// The focal sums from which [`NODE_STEP`] nodes suffice, then twice as many, and so on.
     #[inline(always)]
     pub fn in_steps(&self) -> &[f64] {
         &self.focal
     }
 
-    /// The nodes that a focal sum needs, of a rule for [`LANES`] nodes at a time; `MOST_NODES` where that is not
-    /// enough.
+    /// The number of nodes for a focal sum, a multiple of [`LANES`]; `MOST_NODES` if more would be needed.
     pub fn nodes(&self, focal: f64) -> usize {
         let more = self.focal.iter().position(|&enough| focal >= enough);
         more.map_or(MOST_NODES, |i| ((i + 1) * NODE_STEP).next_multiple_of(LANES))
     }
 }
 
-/// The zeros of theta and of `1 - theta'` of one shortcut, filled up to a full set of lanes with places too far away to
-/// matter.
+/// The zeros of theta and of `1 - theta'` of one shortcut, padded to all lanes with very distant points.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Zeros {
     re: Lanes,
     im: Lanes,
-    /// Real parts less 1, with all digits of a zero near the end.
+    /// Real parts minus 1, with all digits of a zero near the end.
     from_end: Lanes,
 }
 
-/// Zeros of theta and of `1 - theta'`: three and two.
+/// Number of zeros: three of theta and two of `1 - theta'`.
 pub(super) const ZEROS: usize = 5;
 
-/// The zeros of theta, which come first.
+/// Number of zeros of theta, which come first.
 pub(super) const THETA_ZEROS: usize = 3;
 
-/// Distance of a zero, at most. Chosen: none farther away counts.
+/// Greatest distance of a zero. Chosen: farther zeros have no effect.
 pub(super) const FAR: f64 = 1e9;
 
-/// Zeros of theta and of `1 - theta'`: cheaper than [`Zeros::of`], and not as good for a close pair at the start.
+/// Zeros of theta and of `1 - theta'`; cheaper than [`Zeros::of`], but less accurate for a close pair at the start.
 pub(super) fn zeros(path: &Path) -> cubic::Zeros<ZEROS> {
     let (theta, n) = path.about_end();
     let mut zeros = rough_zeros(theta, n);
@@ -174,7 +170,7 @@ pub(super) fn zeros(path: &Path) -> cubic::Zeros<ZEROS> {
     zeros
 }
 
-/// The zeros of several shortcuts, about the end; those near the start are not yet [`polished`].
+/// The zeros of several shortcuts, from the expansion about the end; zeros near the start are not yet [`polished`].
 #[inline(always)]
 pub(super) fn rough_zeros<T: Real>(theta: [T; 4], n: [T; 3]) -> cubic::Zeros<ZEROS, T> {
     let (q, r) = (cubic_zeros(theta), quadratic_zeros(n));
@@ -186,13 +182,13 @@ pub(super) fn rough_zeros<T: Real>(theta: [T; 4], n: [T; 3]) -> cubic::Zeros<ZER
     cubic::Zeros { re, im }
 }
 
-/// Whether a zero is so close to the start that the expansion about the end cost it digits that matter.
+/// Whether a zero is so close to the start that the expansion about the end loses too many digits.
 #[inline(always)]
 pub(super) fn is_near_start<T: Real>(x: T, y: T) -> bool {
     (x.abs() < T::of(0.1)) & (y < T::of(0.1))
 }
 
-/// One Newton step towards the zero of a cubic near `x + iy`; `None` where the step is no mere correction.
+/// One Newton step towards the zero of a cubic near `x + iy`; `None` if the step is too large for a correction.
 #[inline(always)]
 pub(super) fn polished<T: Real>(c: &[T; 4], x: T, y: T) -> Option<(T, T)> {
     let [c0, c1, c2, c3] = *c;
@@ -211,10 +207,10 @@ pub(super) fn polished<T: Real>(c: &[T; 4], x: T, y: T) -> Option<(T, T)> {
     small.then(|| (x - step, (y - step_i).abs()))
 }
 
-/// Correction of a zero by a Newton step, at most. Chosen: the closed forms give some digits of the farthest.
+/// Greatest relative correction of a zero by a Newton step. Chosen: the closed forms give some digits of every zero.
 const MAX_CORRECTION: f64 = 1e-3;
 
-/// `x` within `[-FAR, FAR]`; what is not a number is far away.
+/// `x` clamped to `[-FAR, FAR]`; NaN is far away.
 #[inline(always)]
 fn clamp<T: Real>(x: T) -> T {
     let far = T::of(FAR);
@@ -235,13 +231,13 @@ impl Zeros {
         zeros
     }
 
-    /// Real parts less `place`.
+    /// Real parts minus `place`.
     fn from(&self, place: f64) -> Lanes {
         if place == 1.0 { self.from_end } else { self.re.map(|re| re - place) }
     }
 }
 
-/// Distance of the third zero from a close pair, at least. Derived: the closed form is better than half of this.
+/// Least distance of the third zero from a close pair. Derived: the error of the closed form is below half of this.
 pub(super) const MIN_THIRD: f64 = 0.03;
 
 /// Appends the panels that integrate over `[low, high]`.
@@ -257,8 +253,8 @@ pub(super) fn choose(zeros: &Zeros, low: f64, high: f64, accuracy: &Accuracy, de
     }
 }
 
-/// The map with the largest Bernstein ellipse, and its focal sum. A costlier map must be clearly better: `focal - 2`
-/// goes like the inverse square of the number of nodes.
+/// The map with the largest Bernstein ellipse, and its focal sum. A more expensive map must be clearly better: `focal - 2` scales like the
+/// inverse square of the number of nodes.
 #[multiversion(targets(
     "x86_64+avx+avx2+bmi1+bmi2+avx512f+avx512bw+avx512cd+avx512dq+avx512vl",
     "x86_64+avx+avx2+bmi1+bmi2"
@@ -268,7 +264,7 @@ fn best_panel(zeros: &Zeros, low: f64, high: f64, accuracy: &Accuracy) -> (Panel
     let plain = accuracy.enough(PLAIN_NODES);
     let gaps = [real_gap(zeros, high, 1.0), real_gap(zeros, low, -1.0)];
     let (nearest, gap, other) = if gaps[0] <= gaps[1] { (1.0, gaps[0], gaps[1]) } else { (-1.0, gaps[1], gaps[0]) };
-    // A real zero this near rules the plain rule out before its ellipse is computed.
+    // A real zero this close excludes the plain rule without computing its ellipse.
     let hopeless = 2.0 + 4.0 * gap / (high - low) < plain;
     if !hopeless {
         best.1 = focal(&zeros.re, &zeros.im, low, high);
@@ -294,16 +290,15 @@ fn best_panel(zeros: &Zeros, low: f64, high: f64, accuracy: &Accuracy) -> (Panel
     best
 }
 
-/// The straight rule, expanded about the end that is nearer to the most hindering zero: the polynomials are small
-/// there.
+/// The plain rule, expanded about the end nearer to the limiting zero, where the polynomials are small.
 #[inline(always)]
 fn line(zeros: &Zeros, low: f64, high: f64) -> Panel {
     let centre = if 2.0 * zeros.re[hindrance(zeros, low, high)] > low + high { high } else { low };
     Panel { centre, map: Map::Line, from: low - centre, to: high - centre, nodes: 0 }
 }
 
-/// The least sum of the distances of the places `(re, im)` from both ends of `[from, to]`, in units of half its length:
-/// 2 on the interval itself.
+/// The focal sum: the least sum of the distances of the points `(re, im)` from both ends of `[from, to]`, in units of half its length; 2 on the
+/// interval itself.
 #[inline(always)]
 fn focal(re: &Lanes, im: &Lanes, from: f64, to: f64) -> f64 {
     2.0 * least(&distances(re, im, from, to)) / (to - from).abs()
@@ -330,8 +325,8 @@ fn real_gap(zeros: &Zeros, end: f64, side: f64) -> f64 {
     least(&gaps)
 }
 
-/// The better of a panel with its focal sum and the power maps about the real zero a `gap` beyond the upper (`side = 1`) or
-/// the lower end, which are tried as long as they gain.
+/// The better of a panel and the power maps about a real zero `gap` beyond the upper (`side = 1`) or the lower end, with focal sums. Higher
+/// powers are tried as long as they help.
 #[inline(always)]
 fn power(
     zeros: &Zeros,
@@ -345,7 +340,7 @@ fn power(
     if gap > 0.5 * length {
         return best;
     }
-    // Distances from the zero, to be rooted again and again.
+    // Distances from the zero, of which roots are taken repeatedly.
     let (mut near, mut far) = (gap, gap + length);
     let (mut re, mut im) = (zeros.from(end).map(|distance| gap - side * distance), zeros.im);
     for squarings in 1..=3 {
@@ -366,7 +361,7 @@ fn power(
     best
 }
 
-/// The better of a panel with its focal sum and the sinh map over the complex pair that hinders most.
+/// The better of a panel and the sinh map about the limiting complex pair, with focal sums.
 #[inline(always)]
 fn sinh(zeros: &Zeros, low: f64, high: f64, best: (Panel, f64)) -> (Panel, f64) {
     let hindrance = hindrance(zeros, low, high);
@@ -398,12 +393,12 @@ pub(super) fn cut(low: f64, high: f64, shadow: f64) -> f64 {
     if (shadow > low + edge) & (shadow < high - edge) { shadow } else { 0.5 * (low + high) }
 }
 
-/// The square root in the first quadrant or on its border, for `im >= 0` up to the sign of `im`.
+/// The square root in the closed first quadrant, for `im >= 0`, up to the sign of `im`.
 #[inline(always)]
 fn complex_sqrt(re: f64, im: f64) -> (f64, f64) {
     let size = (re * re + im * im).sqrt();
     let root = (0.5 * (size + re.abs())).sqrt();
-    // The smallest normal number keeps 0/0 away.
+    // The smallest normal number prevents 0/0.
     let other = 0.5 * im.abs() / (root + f64::MIN_POSITIVE);
     if re >= 0.0 { (root, other) } else { (other, root) }
 }

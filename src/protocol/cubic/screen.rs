@@ -1,9 +1,8 @@
-//! Whether shortcuts are feasible, and their least velocities, eight at a time.
+//! Statuses and least velocities of shortcuts, eight at a time.
 //!
-//! What is cheap to see is seen first. Theta, `n` and `n - t_f theta` are linear in the coordinates at every `x`, so
-//! that most spans of a line follow from their ends; then the ends of a shortcut and the coefficients in Bernstein's
-//! form settle most, and stationary points are computed only where they leave some lane in doubt. What is found of a
-//! shortcut does not depend on its neighbours, only the time does.
+//! Cheap tests come first. Theta, `n` and `n - t_f theta` are linear in the coordinates at every `x`, so the ends of a span decide most spans of
+//! a line. Then the ends of a shortcut and the coefficients in Bernstein's form decide most shortcuts; stationary points are computed only for
+//! undecided lanes. A result never depends on neighbouring shortcuts; only the time does.
 
 use multiversion::multiversion;
 
@@ -14,22 +13,22 @@ use crate::numerics::lanes::{LANES, Lanes};
 use crate::numerics::real::Real;
 use crate::protocol::Status;
 
-/// Shortcuts of a span, which its ends may settle: as many as are planned together.
+/// Shortcuts of a span, which its ends may decide; equal to the number planned together.
 pub(super) const SPAN: usize = 32;
 
-/// Spans that are looked at together: two ends each.
+/// Spans that are tested together, with two ends each.
 pub(super) const SPANS: usize = LANES / 2;
 
 /// The decision at the ends of a span.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Verdict {
     pub status: Status,
-    /// Whether friction is surely positive.
+    /// Whether friction is certainly positive.
     pub sound: bool,
 }
 
-/// The one status of all shortcuts of each of consecutive spans; `None` where they differ or rounding leaves doubt, and
-/// where a span is not part of a line along one of the coordinates, between its first and its last place.
+/// The common status of all shortcuts of each span; `None` if they differ, if rounding leaves doubt, or if a span is not on a line along one of
+/// the coordinates between its first and its last shortcut.
 ///
 /// Signs at both ends of a span hold on the whole span, for a polynomial that is positive at both, and for one that is negative at both for the
 /// same `x`.
@@ -48,10 +47,10 @@ pub(super) fn settle(ends: &Ends, floors: &FrictionBounds, a_2: &Stretch, a_3: &
     found
 }
 
-/// A coordinate of the shortcuts of all spans.
+/// One coordinate of the shortcuts of all spans.
 pub(super) type Stretch = [f64; SPAN * SPANS];
 
-/// Whether a span has one coordinate in common, and of the other none beyond its first and last place.
+/// Whether one coordinate of a span is constant, and the other stays between its first and last value.
 #[multiversion(targets(
     "x86_64+avx+avx2+bmi1+bmi2+avx512f+avx512bw+avx512cd+avx512dq+avx512vl",
     "x86_64+avx+avx2+bmi1+bmi2"
@@ -79,15 +78,15 @@ fn is_along(moving: &[f64], fixed: &[f64]) -> bool {
     beyond == [0.0; LANES]
 }
 
-/// The status of all that lies between the shortcuts of lanes `i` and `i + SPANS`.
+/// The status of all shortcuts between those of lanes `i` and `i + SPANS`.
 #[multiversion(targets(
     "x86_64+avx+avx2+bmi1+bmi2+avx512f+avx512bw+avx512cd+avx512dq+avx512vl",
     "x86_64+avx+avx2+bmi1+bmi2"
 ))]
 fn verdicts(ends: &Ends, floors: &FrictionBounds, a_2: &Lanes, a_3: &Lanes) -> [Option<Verdict>; SPANS] {
-    // Where each of the three has its least value, and whether that is positive, or negative at the other end too.
+    // The position of the least value of each polynomial, and whether it is positive, or negative at the other end, too.
     let (mut places, mut positive, mut negative) = ([[0.0; LANES]; 3], [[false; LANES]; 3], [[false; LANES]; 3]);
-    // And whether the first two are above the values that friction needs.
+    // Whether the first two are above the bounds for positive friction.
     let mut high = [[false; LANES]; 3];
     let (mut others_2, mut others_3) = ([0.0; LANES], [0.0; LANES]);
     for i in 0..LANES {
@@ -145,8 +144,8 @@ fn polynomial(ends: &Ends, a_2: f64, a_3: f64, which: usize) -> (Cubic, f64) {
 
 /// The status of eight shortcuts.
 ///
-/// It follows from the least values of theta, of `n` and of `n - t_f theta`; the few that rounding leaves in doubt are
-/// decided in double-double.
+/// It follows from the signs of the least values of theta, `n` and `n - t_f theta`; the few that rounding could change are decided in
+/// double-double.
 #[inline(always)]
 pub(super) fn screen(ends: &Ends, a_2: &Lanes, a_3: &Lanes) -> [Status; LANES] {
     let Some([n, theta, surplus]) = signs(ends, a_2, a_3) else { return [Status::Infeasible; LANES] };
@@ -163,8 +162,7 @@ pub(super) fn screen(ends: &Ends, a_2: &Lanes, a_3: &Lanes) -> [Status; LANES] {
     })
 }
 
-/// The signs of the least values of `n`, theta and `n - t_f theta`: -1, +1, or 0 where rounding leaves doubt; `None`
-/// where `n` rules all lanes out.
+/// The signs of the least values of `n`, theta and `n - t_f theta`: -1, +1, or 0 if rounding leaves doubt; `None` if `n` excludes all lanes.
 #[multiversion(targets(
     "x86_64+avx+avx2+bmi1+bmi2+avx512f+avx512bw+avx512cd+avx512dq+avx512vl",
     "x86_64+avx+avx2+bmi1+bmi2"
@@ -191,8 +189,7 @@ fn signs(ends: &Ends, a_2: &Lanes, a_3: &Lanes) -> Option<[Lanes; 3]> {
     Some([n, theta, surplus])
 }
 
-/// Sign of the least value of `c[0] + c[1] x + c[2] x^2`; `slack` is what rounding costs the coefficients beyond their
-/// own last bits.
+/// Sign of the least value of `c[0] + c[1] x + c[2] x^2`; `slack` is the error of the coefficients beyond their own rounding.
 #[inline(always)]
 fn sign_of_quadratic(quadratic: &Cubic, slack: f64) -> f64 {
     let [c0, c1, c2, _] = quadratic.c;
@@ -204,7 +201,7 @@ fn sign_of_quadratic(quadratic: &Cubic, slack: f64) -> f64 {
     sign_of(lower(lower(c0, c0 + c1 + c2), bottom), doubt)
 }
 
-/// Signs of the least values of eight cubics, each given with its slack.
+/// Signs of the least values of eight cubics, each with its slack.
 #[inline(always)]
 fn sign(cubic: &impl Fn(usize) -> (Cubic, f64)) -> Lanes {
     let mut signs = [0.0; LANES];
@@ -212,7 +209,7 @@ fn sign(cubic: &impl Fn(usize) -> (Cubic, f64)) -> Lanes {
         let (cubic, slack) = cubic(i);
         let (least, greatest) = cubic.bounds();
         let doubt = cubic.doubt() + slack;
-        // Above 0 where all coefficients are, below where an end is.
+        // Positive if all coefficients are, negative if an end is.
         *sign = if least > doubt {
             1.0
         } else if greatest < -doubt {
@@ -242,8 +239,8 @@ fn sign_of(value: f64, doubt: f64) -> f64 {
     }
 }
 
-/// Writes the least velocities of feasible shortcuts as if an end had them, and returns a bit for each where that is
-/// not certain: of eight shortcuts.
+/// Writes the lesser end velocity of eight feasible shortcuts as their least velocity, and returns a bit for each shortcut where that is not
+/// certain.
 #[multiversion(targets(
     "x86_64+avx+avx2+bmi1+bmi2+avx512f+avx512bw+avx512cd+avx512dq+avx512vl",
     "x86_64+avx+avx2+bmi1+bmi2"
@@ -258,7 +255,7 @@ pub(super) fn end_velocities(
     ending(ends, a_2, a_3, status, v_min)
 }
 
-/// The results of a span with one status.
+/// Writes the results of a span with one status.
 #[multiversion(targets(
     "x86_64+avx+avx2+bmi1+bmi2+avx512f+avx512bw+avx512cd+avx512dq+avx512vl",
     "x86_64+avx+avx2+bmi1+bmi2"
@@ -299,19 +296,19 @@ fn ending<const N: usize>(
     open.iter().fold(0, |all, bit| all | bit)
 }
 
-/// The status is exact, a least velocity is rounded: they agree on which side of the bound it is.
+/// The status is exact, but a least velocity is rounded; this function moves it to the side of the bound that the status states.
 #[inline(always)]
 pub(super) fn on_side(v_min: f64, status: Status) -> f64 {
     if status == Status::Ok { v_min.max(1.0) } else { v_min.min(1.0 - 0.5 * f64::EPSILON) }
 }
 
-/// Shortcuts whose least velocities are searched for together: enough to hide the latency of roots and quotients.
+/// Shortcuts whose least velocities are searched together. Chosen: enough to hide the latency of roots and quotients.
 pub(super) const SEARCH: usize = SPAN;
 
-/// One value of each of them.
+/// One value for each shortcut of a search.
 type Search = [f64; SEARCH];
 
-/// Least velocities of feasible shortcuts.
+/// Searches the least velocities of feasible shortcuts.
 pub(super) fn inner_velocities(ends: &Ends, a_2: &Search, a_3: &Search) -> Search {
     let [mut v_min, place, lossy] = least_velocities(ends, a_2, a_3);
     for i in (0..SEARCH).filter(|&i| lossy[i] > 0.0) {
@@ -329,9 +326,9 @@ fn least_velocities(ends: &Ends, a_2: &Search, a_3: &Search) -> [Search; 3] {
     least(ends, a_2, a_3)
 }
 
-/// Stationary places of `n/theta` by Newton's method, in single precision but for the last step; where the cubic
-/// `n - v t_f theta` with the velocity `v` there does not show that there is no lower one, [`lower`] goes on. Returns
-/// the least velocities, their places, and 1 where rounding shows; infeasible lanes hold no meaning.
+/// Stationary points of `n/theta` by Newton's method, in single precision except for the last step. If the cubic `n - v t_f theta` does not
+/// prove that the velocity `v` there is the least, [`lower`] continues. Returns the least velocities, their positions, and 1 where rounding
+/// matters; infeasible lanes are meaningless.
 #[inline(always)]
 fn least<const N: usize>(ends: &Ends, a_2: &[f64; N], a_3: &[f64; N]) -> [[f64; N]; 3] {
     let (mut v_min, mut place, mut due) = ([0.0; N], [0.0; N], [0.0; N]);
@@ -355,7 +352,7 @@ fn least<const N: usize>(ends: &Ends, a_2: &[f64; N], a_3: &[f64; N]) -> [[f64; 
             1.0
         };
         let v = n / (ends.t_f * theta);
-        // With its value and slope at x taken off, the cubic is the square of the distance times a linear function.
+        // Without its value and slope at x, the cubic is the square of the distance times a linear function.
         let [_, c1, c2, c3] = path.surplus(v * ends.t_f).c;
         let slope = c1 + x * (2.0 * c2 + 3.0 * x * c3);
         let (below, above) = (c2 + 2.0 * x * c3, c2 + c3 + 2.0 * x * c3);
@@ -379,7 +376,7 @@ fn least<const N: usize>(ends: &Ends, a_2: &[f64; N], a_3: &[f64; N]) -> [[f64; 
     [v_min, place, lossy]
 }
 
-/// Where to look for least velocities: from the least of some, a few steps of Newton's method.
+/// Guesses of the minima: a few Newton steps from the least of some samples.
 #[inline(always)]
 fn rough_places<const N: usize>(ends: &Ends, a_2: &[f64; N], a_3: &[f64; N]) -> [f32; N] {
     let t_f = ends.t_f as f32;
@@ -410,7 +407,7 @@ fn rough_places<const N: usize>(ends: &Ends, a_2: &[f64; N], a_3: &[f64; N]) -> 
     place
 }
 
-/// A step of Newton's method from `x` to a place within `[0, 1]` where `n/theta` is least.
+/// A Newton step from `x` towards the minimum of `n/theta`, within `[0, 1]`.
 #[inline(always)]
 fn nearer<T: Real>([c0, c1, c2, c3]: [T; 4], t_f: T, x: T) -> T {
     let [zero, one, two, three, six] = [0.0, 1.0, 2.0, 3.0, 6.0].map(T::of);
@@ -426,17 +423,15 @@ fn nearer<T: Real>([c0, c1, c2, c3]: [T; 4], t_f: T, x: T) -> T {
     if change < zero { within } else { x }
 }
 
-/// Newton steps in single precision. Derived: from one of five places, three give the digits that one more in double precision
-/// completes.
+/// Newton steps in single precision. Derived: from the best of five samples, three steps suffice before a last one in double precision.
 const ROUGH_STEPS: usize = 3;
 
-/// Square of the slope of `n - v t_f theta`, relative to `n` and the curvature, that shows in the velocity. Derived: its quarter is
-/// the relative change of the velocity.
+/// Squared slope of `n - v t_f theta`, relative to `n` and the curvature, that affects the velocity. Derived: a quarter of it is the relative
+/// change of the velocity.
 const SLOPE_SQUARED: f64 = 1e-15;
 
-/// `v = n/(t_f theta) >= m` where the cubic `n - m t_f theta` is not negative. The minimum of that cubic gives the
-/// next, lower `m`: Dinkelbach's method (Management Science 13, 492, 1967), which falls to the least ratio and doubles
-/// its digits with each step.
+/// The least velocity by Dinkelbach's method (Management Science 13, 492, 1967): `v = n/(t_f theta) >= m` where the cubic `n - m t_f theta` is
+/// not negative. The minimum of this cubic gives the next, lower `m`. The steps decrease to the least ratio, and each doubles the digits.
 #[inline(always)]
 fn lower<const N: usize>(
     ends: &Ends,
@@ -454,7 +449,7 @@ fn lower<const N: usize>(
             let lower = (due[i] > 0.0) & (v < v_min[i]) & (v > 0.0);
             let last = v >= (1.0 - LAST_STEP) * v_min[i];
             v_min[i] = if lower { v } else { v_min[i] };
-            // Where the velocity is lost in rounding it is looked at again.
+            // A velocity lost in rounding is computed again.
             place[i] = if lower | (v <= 0.0) { x } else { place[i] };
             due[i] = if lower & !last { 1.0 } else { 0.0 };
         }
@@ -464,10 +459,10 @@ fn lower<const N: usize>(
     }
 }
 
-/// Relative step after which the next one is within rounding. Derived: the digits double.
+/// Relative step after which the next one is within rounding. Derived: each step doubles the digits.
 const LAST_STEP: f64 = 1e-9;
 
-/// Whether rounding may cost the value of a cubic at `x` a fraction `loss` of it (or it is not a number).
+/// Whether the relative rounding error of a cubic at `x` may exceed `loss`, or its value is NaN.
 #[inline(always)]
 fn is_lossy(cubic: &Cubic, slack: f64, x: f64, loss: f64) -> bool {
     let [c0, c1, c2, c3] = cubic.c;
@@ -475,6 +470,6 @@ fn is_lossy(cubic: &Cubic, slack: f64, x: f64, loss: f64) -> bool {
     !sound
 }
 
-/// Coordinates that are feasible for no duration in use. Derived: the quadratic `n >= 0` has the mean `t_f - rise`, so its ends are
-/// at most nine times that. Squares do not overflow below it.
+/// Coordinates above which no shortcut is feasible. Derived: the quadratic `n >= 0` has the mean `t_f - rise`, so its ends are at most nine
+/// times that. Squares do not overflow below it.
 const MAX_COORDINATE: f64 = 1e100;

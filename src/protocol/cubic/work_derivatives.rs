@@ -1,4 +1,4 @@
-//! Work of one shortcut with its gradient and Hessian, all from the same nodes.
+//! Work of a shortcut with gradient and Hessian, from the same nodes.
 //!
 //! With `H(n, theta) = tau n/theta` the work is `int H dx`; theta and `n` are linear in the coefficients. A change
 //! `dtheta` that vanishes at both ends changes `n` by `-d(dtheta)/dx`, so that for a constant `K`
@@ -13,7 +13,7 @@
 //! int L dn/theta + [(b - L) n - K t_f] dtheta/theta^2 dx,    L = a ln(v/v_i) + b ln(v_i theta):
 //! ```
 //!
-//! nothing is lost where the velocity hardly changes. The Hessian follows from this form.
+//! this form does not cancel where the velocity hardly changes. The Hessian follows from it.
 
 use super::Landscape;
 use super::path::Path;
@@ -36,8 +36,8 @@ pub(in crate::protocol) struct WorkDerivatives {
 pub(in crate::protocol) enum Basis {
     /// The coefficients of `x` and `x^2`.
     Start,
-    /// Those of `1 - x` and `(1 - x)^2`: where theta falls to far less, it has all but a triple zero at the end, and the
-    /// coefficients in `x` are large numbers whose difference counts.
+    /// The coefficients of `1 - x` and `(1 - x)^2`. If theta decreases strongly, it has almost a triple zero at the end, and its coefficients in
+    /// `x` would cancel.
     End,
 }
 
@@ -78,7 +78,7 @@ impl Landscape {
             stats.nodes += panel.nodes as u32;
             panel.each_node(|delta, weight| {
                 let theta = at(&q, delta);
-                // On the border v = 0 rounding may take n below 0.
+                // On the border v = 0, rounding may make n negative.
                 let n = (n0 + delta * (n1 + delta * n2)).max(f64::MIN_POSITIVE);
                 let tau = constant + a * ln(n) + slope * ln(theta);
                 let speed = ln_of(at(&above, delta) / (t_f * theta), n / (t_f * theta) * theta_i);
@@ -107,7 +107,7 @@ impl Landscape {
     }
 }
 
-/// A cubic at a distance from where it is expanded.
+/// The value of a cubic at a distance from its expansion point.
 fn at([c0, c1, c2, c3]: &[f64; 4], delta: f64) -> f64 {
     c0 + delta * (c1 + delta * (c2 + delta * c3))
 }

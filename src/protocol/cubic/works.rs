@@ -1,4 +1,4 @@
-//! The works of many shortcuts, summed with others of equal node count.
+//! The works of many shortcuts, each summed together with others of equal node count.
 
 use super::Landscape;
 use super::bins::{BINS, Bins, CUT_FROM, nodes_of};
@@ -9,14 +9,13 @@ use super::queue::{Cuts, Queue};
 use crate::numerics::lanes::LANES;
 use crate::protocol::SolverStats;
 
-/// Works in the making. A shortcut waits for the plan of its cell, perhaps for one of its own, perhaps for one with
-/// larger powers, and then for its sum.
+/// Works in progress. A shortcut waits for the plan of its cell, possibly for its own plan or one with larger powers, and then for its sum.
 pub(super) struct Works<'a> {
     due: Queue<BLOCK>,
     planned: Planned<'a>,
 }
 
-/// Shortcuts that the plan of their cell is not enough for, and the last plans.
+/// Shortcuts that need their own plan, and the last plans.
 struct Planned<'a> {
     alone: Queue<BLOCK>,
     deep: Queue<BLOCK>,
@@ -25,7 +24,7 @@ struct Planned<'a> {
     sums: Sums<'a>,
 }
 
-/// Sums in the making: of shortcuts cut in two, which wait for a plan of their parts, and in the bins.
+/// Sums in progress: shortcuts cut in two, which wait for the plans of their parts, and shortcuts in bins.
 struct Sums<'a> {
     of: &'a Landscape,
     work: &'a mut [f64],
@@ -35,7 +34,7 @@ struct Sums<'a> {
 }
 
 impl<'a> Works<'a> {
-    /// For shortcuts of a landscape, whose works are to be written to `work`.
+    /// An empty queue for shortcuts of a landscape, whose works are written to `work`.
     pub fn new(of: &'a Landscape, work: &'a mut [f64], bins: &'a mut Bins) -> Works<'a> {
         let sums = Sums { of, work, cut: Cuts::EMPTY, bins, stats: SolverStats::default() };
         let (from_cells, own) = (Plan::EMPTY, Plan::EMPTY);
@@ -43,7 +42,7 @@ impl<'a> Works<'a> {
         Works { due: Queue::EMPTY, planned }
     }
 
-    /// Adds the feasible shortcut at `index`, if its work is wanted.
+    /// Adds the feasible shortcut at `index`, if its work is requested.
     #[inline(always)]
     pub fn push(&mut self, index: usize, a_2: f64, a_3: f64) {
         if index < self.planned.sums.work.len() && self.due.push(index, a_2, a_3) {
@@ -63,7 +62,7 @@ impl<'a> Works<'a> {
         self.planned.plan(&indices, [a_2, a_3]);
     }
 
-    /// Sums what is left.
+    /// Sums the remaining shortcuts.
     pub fn finish(mut self) -> SolverStats {
         self.plan();
         let Planned { alone, deep, own, sums, .. } = &mut self.planned;
@@ -82,7 +81,7 @@ impl<'a> Works<'a> {
 }
 
 impl Planned<'_> {
-    /// Plans shortcuts from their cells; those for which these are not enough wait for a plan of their own.
+    /// Plans shortcuts from their cells; other shortcuts wait for their own plan.
     fn plan(&mut self, indices: &[usize], [a_2, a_3]: [&Block; 2]) {
         let Planned { alone, deep, from_cells: plan, own, sums } = self;
         sums.bins.cells.plan(&sums.of.frame, a_2, a_3, plan);
@@ -105,7 +104,7 @@ impl Planned<'_> {
 }
 
 impl Sums<'_> {
-    /// Plans shortcuts by themselves.
+    /// Plans shortcuts one by one.
     fn plan(&mut self, alone: &mut Queue<BLOCK>, deep: &mut Queue<BLOCK>, made: &mut Plan) {
         let Some((indices, [a_2, a_3])) = alone.take() else { return };
         plan(&self.of.ends, a_2, a_3, &self.of.accuracy, made);
@@ -128,7 +127,7 @@ impl Sums<'_> {
         }
     }
 
-    /// Sums eight shortcuts that share a bin, those from lane `first` on, side by side.
+    /// Sums eight shortcuts of one bin, from lane `first` on, side by side.
     #[inline(always)]
     fn settle_all(&mut self, plan: &Plan, first: usize, indices: &[usize], places: [&Block; 2]) {
         self.stats.quadratures += LANES as u32;
@@ -136,7 +135,7 @@ impl Sums<'_> {
         self.bins.add_all(self.of, (plan, first), places, indices, self.work);
     }
 
-    /// Puts the shortcut at `index` where its plan says.
+    /// Adds the shortcut at `index` to the bin or queue of its plan.
     #[inline(always)]
     fn settle(&mut self, plan: &Plan, lane: usize, index: usize, place: [f64; 2]) {
         let bin = plan.bin[lane] as usize;
@@ -150,7 +149,7 @@ impl Sums<'_> {
         }
     }
 
-    /// Plans the parts of shortcuts that are cut in two. Those for which that is not enough are summed alone.
+    /// Plans the parts of shortcuts that are cut in two. Shortcuts that need more are summed alone.
     fn part(&mut self) {
         let Sums { of, work, cut, bins, stats } = self;
         let Some((indices, parts)) = cut.take() else { return };
@@ -161,7 +160,7 @@ impl Sums<'_> {
             stats.quadratures += 1;
             let lanes = [k, k + BLOCK / 2];
             let path = Path::new(&of.ends, a_2[k], a_3[k]);
-            // Where it is cut a shortcut may be at its fastest.
+            // A shortcut may be fastest at the cut.
             let near = path.is_within(if low[k] == 0.0 { high[k] } else { low[k] }, of.accuracy.longest);
             if near && lanes.iter().all(|&lane| plan.bin[lane] < BINS as u32) {
                 work[i] = 0.0;

@@ -14,7 +14,7 @@
 //!
 //! A search counts `q` from `q_hold` where that exists, so that short holds keep their digits.
 
-use super::arc::{Arc, Chart, Sums, least_friction, phi, phi_and_slope};
+use super::arc::{Arc, Chart, Sums, greatest_friction, least_friction, phi, phi_and_slope};
 use super::floor;
 use super::lifetime::Lifetime;
 use crate::model::Law;
@@ -62,12 +62,29 @@ pub(super) struct Extremal {
 enum Rate {
     /// `gain (I + inner) + outer`, on the part of the family that a hold parametrises.
     Floor { gain: f64, inner: f64, outer: f64 },
-    /// `gain (I + inner) + outer`.
-    Turning { gain: f64, inner: f64, outer: f64 },
+    /// `gain (I + inner) + outer`, where `outer` belongs to the start of the arc and `inner` to its end; where theta falls
+    /// at once, also `one_way` times the swing.
+    Turning { gain: f64, inner: f64, outer: f64, one_way: f64 },
+    /// The same with `inner` of the start and `outer` of the end.
+    Ending { gain: f64, inner: f64, outer: f64 },
     /// `gain` times the sensitivity of the direct chart.
     Direct { gain: f64 },
     /// `gain` times the swing, for arcs on which theta goes one way.
     OneWay { gain: f64 },
+}
+
+/// Sums over all free pieces.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub(super) struct FreeSums {
+    /// Of the sensitivity of the chart.
+    pub sensitivity: f64,
+    /// Of `theta/(u - 1)` at their ends less that at their starts, and of [`Extremal::end_terms`].
+    pub ends: f64,
+    /// Of the swing.
+    pub swing: f64,
+    /// Whether the start and the end of the extremal are among them.
+    pub at_start: bool,
+    pub at_end: bool,
 }
 
 /// The start of an arc of a rising problem.
@@ -138,7 +155,7 @@ impl Problem {
     }
 
     /// Friction at the start with `u = 1`, `tau_ss(v_i)` where that is steady.
-    fn friction_start(&self) -> f64 {
+    pub fn friction_start(&self) -> f64 {
         1.0 + (self.law.b - self.law.a) * self.from.ln
     }
 
@@ -194,7 +211,7 @@ impl Problem {
         let one = |x_end: f64| {
             let (theta_h, ln_theta_h) = (self.from.theta * (1.0 + xi), ln_theta + ln_1p(xi));
             let arc = Arc { law, chart: Chart::Turning { theta_h, ln_theta_h, x_start: -xi.sqrt(), x_end, x_squares } };
-            let rate = Rate::Turning { gain: 0.0, inner: 0.0, outer: 0.0 };
+            let rate = Rate::Turning { gain: 0.0, inner: 0.0, outer: 0.0, one_way: 0.0 };
             self.without_hold(arc, ln_theta, arc.end()?.ln_u, rate)
         };
         if x > 0.0 { Some([one(-x)?, one(x)?]) } else { None }
@@ -279,6 +296,7 @@ impl Problem {
                     gain: swing * excess_0,
                     inner: self.to.theta / end.excess,
                     outer: -self.from.theta * swing,
+                    one_way: -excess_0 / self.from.theta,
                 }
             };
             return self.without_hold(arc, z_0, end.ln_u, rate);
@@ -305,13 +323,13 @@ impl Problem {
             gain: layer * 2.0 * x_start / grow,
             inner: if end.excess == 0.0 { 0.0 } else { self.to.theta / end.excess },
             outer: -layer * edge(&law, theta_h, ln_theta_h, x_start, &start),
+            one_way: 0.0,
         };
         self.without_hold(arc, start.ln_u, end.ln_u, rate)
     }
 
     /// Rising problem, `q < 0`: `ln u(t_f-)`, stretched under the bound.
     fn rising_to_the_end(&self, q: f64) -> Option<Extremal> {
-        let law = self.law;
         let reach = -self.to.ln;
         // ln v(t_f-), and ln u(t_f-).
         let (eta, z_1, stretch) = if self.bounded {
@@ -320,6 +338,13 @@ impl Problem {
         } else {
             (q + reach, q, 1.0)
         };
+        self.arriving(z_1, eta, stretch)
+    }
+
+    /// Rising problem: the member whose `ln u(t_f-)` is `z_1`, with `eta = ln v(t_f-)` and the derivative `stretch` of
+    /// `z_1` with respect to the parameter.
+    pub fn arriving(&self, z_1: f64, eta: f64, stretch: f64) -> Option<Extremal> {
+        let law = self.law;
         let (phi_1, excess_1) = phi_and_slope(z_1);
         let excess = law.a * phi_1;
         let friction_a = self.friction_a();
@@ -340,7 +365,7 @@ impl Problem {
             let rate = if z_1 < -1.0 || -x_squares < xi {
                 rising
             } else {
-                Rate::Turning {
+                Rate::Ending {
                     gain: stretch * swing * excess_1,
                     inner: -theta_s / start.excess,
                     outer: stretch * self.to.theta * swing,
@@ -378,11 +403,29 @@ impl Problem {
         let x_start = -(x2 - x_squares).sqrt();
         let arc = Arc { law, chart: Chart::Turning { theta_h, ln_theta_h, x_start, x_end, x_squares } };
         let (start, end) = (arc.start()?, arc.end()?);
-        let rate = Rate::Turning {
+        let rate = Rate::Ending {
             gain: layer * 2.0 * x_end / (1.0 + x2),
             inner: -theta_s / start.excess,
             outer: layer * edge(&law, theta_h, ln_theta_h, x_end, &end),
         };
+        Some(Extremal { time_at_floor, theta_s, late, lags: true, arc, start: start.ln_u, end: end.ln_u, rate })
+    }
+
+    /// The member that turns at the lifetime `turn`, `depth = ln(turn/theta_1)`, where theta rises first; the parameter is
+    /// `ln theta_h` times `gain`.
+    pub fn turning_at(&self, turn: Lifetime, depth: f64, gain: f64) -> Option<Extremal> {
+        let law = self.law;
+        let below = Problem { to: turn, fall: self.from.theta / turn.theta - 1.0, ..*self };
+        let Leaving { time_at_floor, late, d } = below.leaving(-law.a * phi(turn.ln));
+        let theta_s = if time_at_floor > 0.0 { turn.theta * exp(d) } else { self.from.theta };
+        let (grown, shrunk) = (exp_m1(-d), exp_m1(depth));
+        let (x_start, x_end) = (-grown.sqrt(), shrunk.sqrt());
+        let chart =
+            Chart::Turning { theta_h: turn.theta, ln_theta_h: turn.ln, x_start, x_end, x_squares: shrunk - grown };
+        let arc = Arc { law, chart };
+        let (start, end) = (arc.start()?, arc.end()?);
+        let (inner, outer) = (self.to.theta / end.excess, -gain * theta_s / start.excess);
+        let rate = Rate::Turning { gain, inner, outer, one_way: 0.0 };
         Some(Extremal { time_at_floor, theta_s, late, lags: true, arc, start: start.ln_u, end: end.ln_u, rate })
     }
 
@@ -417,6 +460,11 @@ impl Extremal {
         sums.friction_min.min(least_friction(&problem.law, self.arc.c(), ends)).min(held)
     }
 
+    /// Greatest friction on the way: at both ends of the arc, or where it is stationary between them.
+    pub fn friction_max(&self, problem: &Problem) -> f64 {
+        greatest_friction(&problem.law, self.arc.c(), [(self.theta_s, self.start), (problem.to.theta, self.end)])
+    }
+
     /// Work of the hold and the arc together.
     pub fn work(&self, problem: &Problem, sums: &Sums) -> f64 {
         floor::work(&problem.law, problem.from, self.time_at_floor) + sums.work
@@ -432,17 +480,53 @@ impl Extremal {
         self.late + if self.lags { sums.lag } else { sums.time }
     }
 
+    /// Makes a parameter that of an extremal without a turn, which ends at `ln u = z`: `C` changes by `z pace` with it.
+    pub fn follow_c(&mut self, z: f64, pace: f64) {
+        let Law { a, b } = self.arc.law;
+        self.rate = match (self.arc.chart, self.rate) {
+            // d time/dC = (I + theta/(u - 1) - theta_s/(u_s - 1))/k, where C = -c_h/theta_h changes by k d ln theta_h.
+            (Chart::Turning { theta_h, ln_theta_h, x_end, x_squares, .. }, Rate::Ending { inner, .. })
+                if -x_squares > x_end * x_end =>
+            {
+                let k = (1.0 + (b - a) * ln_theta_h + a - b) / theta_h;
+                let regular = if z == 0.0 { 1.0 } else { z / exp_m1(z) };
+                let outer = theta_h / (1.0 + x_end * x_end) * regular * pace / k;
+                Rate::Ending { gain: z * pace / k, inner, outer }
+            }
+            _ => Rate::OneWay { gain: -z * pace / a },
+        };
+    }
+
+    /// What the start and the end of the arc add to the sums over free pieces.
+    pub fn end_terms(&self) -> [f64; 2] {
+        match self.rate {
+            Rate::Floor { inner, .. } | Rate::Turning { inner, .. } => [0.0, inner],
+            Rate::Ending { inner, .. } => [inner, 0.0],
+            Rate::Direct { .. } | Rate::OneWay { .. } => [0.0, 0.0],
+        }
+    }
+
+    /// Derivative of the total time with respect to the parameter.
+    pub fn rate_of(&self, free: &FreeSums) -> f64 {
+        let inside = |gain: f64| gain * (free.sensitivity + free.ends);
+        match self.rate {
+            Rate::Turning { one_way, .. } if !free.at_start && one_way != 0.0 => one_way * free.swing,
+            Rate::Floor { gain, outer, .. } | Rate::Turning { gain, outer, .. } => {
+                inside(gain) + if free.at_start { outer } else { 0.0 }
+            }
+            Rate::Ending { gain, outer, .. } => inside(gain) + if free.at_end { outer } else { 0.0 },
+            Rate::Direct { gain } => gain * free.sensitivity,
+            Rate::OneWay { gain } => gain * free.swing,
+        }
+    }
+
     /// How far the time (beyond the least) is from the one wanted, as a rising function of the parameter: the logarithm
     /// of their ratio, or their relative difference where a hold makes time linear in the parameter.
     pub fn probe(&self, problem: &Problem, sums: &Sums, beyond: f64) -> Probe {
         let time = self.time_beyond(sums);
-        let rate = match self.rate {
-            Rate::Floor { gain, inner, outer } | Rate::Turning { gain, inner, outer } => {
-                gain * (sums.sensitivity + inner) + outer
-            }
-            Rate::Direct { gain } => gain * sums.sensitivity,
-            Rate::OneWay { gain } => gain * sums.swing,
-        };
+        let [start, end] = self.end_terms();
+        let &Sums { sensitivity, swing, .. } = sums;
+        let rate = self.rate_of(&FreeSums { sensitivity, ends: start + end, swing, at_start: true, at_end: true });
         let (value, slope) = if let Rate::Floor { .. } = self.rate {
             (time / beyond - 1.0, rate / beyond)
         } else if time > 0.0 {

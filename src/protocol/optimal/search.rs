@@ -28,7 +28,7 @@ const SPENT: f64 = 4.0 * f64::EPSILON;
 
 /// A bracket that closes on a larger change of the time holds no member of this time, but a gap of the family; unless
 /// a search may end there, with a corrected step that leaves an error of third order.
-const JUMP: f64 = 1e-2;
+pub(super) const JUMP: f64 = 1e-2;
 
 /// Fraction of the whole time below which a hold is short.
 const SHORT: f64 = 0.01;
@@ -40,10 +40,10 @@ const NEAR: f64 = 1e-5;
 const SEAM: f64 = 1e-3;
 
 /// The rounding error of a velocity at the floor, relative.
-const ROUNDING: f64 = 1e-9;
+pub(super) const ROUNDING: f64 = 1e-9;
 
 /// Tightest tolerance of a quadrature.
-const FINEST: f64 = 1e-18;
+pub(super) const FINEST: f64 = 1e-18;
 
 /// Solves `problem` in time `t_f` to relative accuracy `rtol`.
 pub(super) fn solve(problem: &Problem, t_f: f64, rtol: f64) -> Solved<Optimum> {
@@ -51,9 +51,17 @@ pub(super) fn solve(problem: &Problem, t_f: f64, rtol: f64) -> Solved<Optimum> {
 }
 
 /// The solution and its extremal; `None` without a solution, or without an arc after the floor.
-pub(super) fn find(problem: &Problem, t_f: f64, rtol: f64) -> (Solved<Optimum>, Option<Extremal>) {
-    let beyond = t_f - problem.t_min();
-    find_beyond(problem, Time { whole: t_f, beyond, doubt: 2.0 * f64::EPSILON * t_f / beyond }, rtol)
+pub(super) fn find(problem: &Problem, t_f: f64, rtol: f64) -> (Solved<Optimum>, Option<Member>) {
+    find_beyond(problem, Time::since(problem, t_f), rtol)
+}
+
+/// A member of the family of extremals.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Member {
+    pub extremal: Extremal,
+    /// Its parameter, counted from `q_hold` if that is used.
+    pub p: f64,
+    pub q_hold: Option<f64>,
 }
 
 /// A time, and what of it is beyond the least one.
@@ -65,8 +73,16 @@ pub(super) struct Time {
     pub doubt: f64,
 }
 
+impl Time {
+    /// The time `t_f` of a problem.
+    pub fn since(problem: &Problem, t_f: f64) -> Time {
+        let beyond = t_f - problem.t_min();
+        Time { whole: t_f, beyond, doubt: 2.0 * f64::EPSILON * t_f / beyond }
+    }
+}
+
 /// The solution for a time beyond the least, given without cancellation.
-pub(super) fn find_beyond(problem: &Problem, time: Time, rtol: f64) -> (Solved<Optimum>, Option<Extremal>) {
+pub(super) fn find_beyond(problem: &Problem, time: Time, rtol: f64) -> (Solved<Optimum>, Option<Member>) {
     let Time { whole: t_f, beyond, doubt } = time;
     let mut stats = SolverStats::default();
     if beyond < 0.0 || beyond.is_nan() || (beyond == 0.0 && !problem.bounded) {
@@ -147,7 +163,7 @@ pub(super) fn find_beyond(problem: &Problem, time: Time, rtol: f64) -> (Solved<O
     }
     let unique_above = problem.unique_above();
     let close = JUMP.max(10.0 * accuracy.enough).max(libm::cbrt(accuracy.least));
-    let (Some((_, found)), Some(Probed { extremal: probed, sums, .. })) =
+    let (Some((p, found)), Some(Probed { extremal: probed, sums, .. })) =
         (outcome, last.filter(|last| last.value.abs() <= close))
     else {
         let doubtful = friction_min <= unique_above || problem.is_doubtful();
@@ -193,11 +209,14 @@ pub(super) fn find_beyond(problem: &Problem, time: Time, rtol: f64) -> (Solved<O
         v_start,
         v_end,
         time_at_floor: found.time_at_floor,
+        time_at_v_ceiling: 0.0,
+        time_at_tau_ceiling: 0.0,
         hamiltonian: -c,
         theta_max: found.arc.theta_max(),
+        friction_max: found.friction_max(problem),
         strategy,
     };
-    (Solved { status, value: Some(value), stats }, Some(found))
+    (Solved { status, value: Some(value), stats }, Some(Member { extremal: found, p, q_hold: family.q_hold }))
 }
 
 /// Least velocity of the arc of an extremal: at an end, or where friction rises through `b - a`.
@@ -264,18 +283,18 @@ impl Family {
 }
 
 /// The tolerance of probes.
-struct Accuracy {
+pub(super) struct Accuracy {
     /// A value this small (relative) needs no further probe: the Newton step from there leaves an error of the order of
     /// its square.
-    enough: f64,
+    pub enough: f64,
     /// An error (relative) that a corrected step may leave.
-    least: f64,
+    pub least: f64,
     /// Tolerance of the quadrature of the last probe.
-    exact: f64,
+    pub exact: f64,
 }
 
 impl Accuracy {
-    fn new(rtol: f64, doubt: f64, a: f64) -> Accuracy {
+    pub fn new(rtol: f64, doubt: f64, a: f64) -> Accuracy {
         let enough = 1e-8 + doubt;
         // C = a v + beta goes like a times the velocities.
         Accuracy { enough, least: (0.005 * rtol).max(1e-16), exact: quadrature_tolerance(rtol) / (1.0 + a) }
@@ -315,8 +334,11 @@ fn shortest(problem: &Problem, t_min: f64) -> Solved<Optimum> {
         v_start: 1.0,
         v_end: 1.0,
         time_at_floor: t_min,
+        time_at_v_ceiling: 0.0,
+        time_at_tau_ceiling: 0.0,
         hamiltonian: -floor::c_leaving(&law, problem.to.theta, problem.to.ln),
         theta_max: problem.to.theta,
+        friction_max: 1.0 + law.b * problem.to.ln,
         strategy: Strategy::Floor,
     };
     Solved { status, value: Some(value), stats: SolverStats::default() }

@@ -78,7 +78,7 @@ fn every_optimum_is_right_or_says_so() {
 
 /// What any row must be.
 fn sound(transition: &Transition, t_f: f64, bounded: bool, solved: &Solved<Optimum>, found: &Optimum, row: &mut Row) {
-    let &Optimum { work, v_start, v_end, time_at_floor, hamiltonian, theta_max, strategy } = found;
+    let &Optimum { work, v_start, v_end, time_at_floor, hamiltonian, theta_max, strategy, .. } = found;
     let numbers = [work, v_start, v_end, time_at_floor, hamiltonian, theta_max];
     row.fact("finite", numbers.iter().all(|number| number.is_finite()));
     row.fact("has a status with numbers", !matches!(solved.status, Status::Infeasible | Status::NotConverged));

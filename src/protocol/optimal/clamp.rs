@@ -1,0 +1,618 @@
+//! A free extremal, clamped at the ceilings: the pieces of the optimal protocol, all with the same `C`.
+//!
+//! Where theta falls the optimum is `z = ln u = min(z_free, z_cap)`. It is on a ceiling where `G = a [phi(z_cap) - E]` is
+//! negative, so the pieces end at the zeros of `G`, which has one stationary point at most, and where the ceilings cross.
+
+use super::ArcKind;
+use super::arc::{Arc, Chart, Sums, phi, phi_and_slope};
+use super::ceiling::{CeilingArc, CeilingSums, Ceilings};
+use super::extremal::{Extremal, FreeSums, Problem};
+use super::lifetime::Lifetime;
+use crate::model::Law;
+use crate::numerics::elementary::{exp, exp_m1, ln, ln_1p};
+
+/// The part of an extremal on which theta falls to `theta_1`, as a function of the depth `d = ln(theta_top/theta)`.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Fall {
+    law: Law,
+    pub theta_top: f64,
+    /// `a E` at the top; 0 where theta turns there.
+    excess: f64,
+    /// Friction at the top with `u = 1`.
+    friction: f64,
+    /// The depth of `theta_1`.
+    pub depth: f64,
+    /// `ln u` at the top on the ceiling of the velocity and of friction.
+    z_v: f64,
+    z_tau: f64,
+    kappa: f64,
+}
+
+impl Fall {
+    /// `a E` and its derivative with respect to the depth.
+    fn energy(&self, d: f64) -> (f64, f64) {
+        let Law { a, b } = self.law;
+        let shrunk = exp_m1(-d);
+        let theta = 1.0 + shrunk;
+        let value = self.excess * theta - (b - a) * d - self.friction * shrunk;
+        (value, (self.friction - self.excess) * theta - (b - a))
+    }
+
+    /// `ln u` on a ceiling.
+    pub fn cap(&self, kind: ArcKind, d: f64) -> f64 {
+        if kind == ArcKind::VCeiling { self.z_v - d } else { self.z_tau - self.kappa * d }
+    }
+
+    /// `a phi(z_cap)` and `a E` with their derivatives with respect to the depth.
+    fn parts(&self, kind: ArcKind, d: f64) -> [(f64, f64); 2] {
+        let (phi, slope) = phi_and_slope(self.cap(kind, d));
+        let fall = if kind == ArcKind::VCeiling { 1.0 } else { self.kappa };
+        [(self.law.a * phi, -self.law.a * slope * fall), self.energy(d)]
+    }
+
+    /// `G = a [phi(z_cap) - E]`.
+    fn gap(&self, kind: ArcKind, d: f64) -> f64 {
+        let [(phi, _), (energy, _)] = self.parts(kind, d);
+        phi - energy
+    }
+
+    /// The depth at which `G` of friction is stationary.
+    fn stationary(&self) -> f64 {
+        let Law { a, b } = self.law;
+        let ratio = (self.excess - self.friction) / (a * self.kappa);
+        if ratio > 0.0 && b > 0.0 { a / b * (ln(ratio) - self.z_tau) } else { f64::NAN }
+    }
+
+    /// The depth beyond which the velocity binds before friction.
+    fn crossing(&self, ceilings: &Ceilings) -> f64 {
+        self.depth - ceilings.crossing()
+    }
+
+    /// Adds the zeros of `G` between two depths.
+    fn zeros(&self, kind: ArcKind, from: f64, to: f64, breaks: &mut Breaks) {
+        if from >= to {
+            return;
+        }
+        let stationary = if kind == ArcKind::TauCeiling { self.stationary() } else { f64::NAN };
+        if stationary > from && stationary < to {
+            self.zero(kind, from, stationary, breaks);
+            self.zero(kind, stationary, to, breaks);
+        } else {
+            self.zero(kind, from, to, breaks);
+        }
+    }
+
+    /// Adds the zero of a monotone `G` between two depths, if there is one.
+    fn zero(&self, kind: ArcKind, mut from: f64, mut to: f64, breaks: &mut Breaks) {
+        let (start, end) = (self.gap(kind, from), self.gap(kind, to));
+        if (start < 0.0) == (end < 0.0) {
+            return;
+        }
+        // G is convex or concave in theta between them: from the end where it bends away Newton's method is monotone.
+        let mut d = if start.abs() < end.abs() { from } else { to };
+        for _ in 0..MOST_STEPS {
+            let [(phi, phi_slope), (energy, energy_slope)] = self.parts(kind, d);
+            let value = phi - energy;
+            if (value < 0.0) == (start < 0.0) {
+                from = d
+            } else {
+                to = d
+            }
+            // phi may be an exponential that is far from its zero.
+            let step = if phi > 2.0 * energy && energy > 0.0 {
+                ln(phi / energy) / (phi_slope / phi - energy_slope / energy)
+            } else {
+                value / (phi_slope - energy_slope)
+            };
+            if step.abs() <= RESOLUTION * d {
+                break;
+            }
+            let next = d - step;
+            d = if next > from && next < to { next } else { 0.5 * (from + to) };
+        }
+        breaks.add(d);
+    }
+}
+
+/// More steps than Newton's method takes.
+const MOST_STEPS: u32 = 100;
+
+/// Relative resolution of a depth.
+const RESOLUTION: f64 = 4e-16;
+
+/// Depths at which pieces end, in any order.
+struct Breaks {
+    depths: [f64; Path::MOST_PIECES],
+    count: usize,
+}
+
+impl Breaks {
+    fn add(&mut self, depth: f64) {
+        if self.count < self.depths.len() {
+            self.depths[self.count] = depth;
+            self.count += 1;
+        }
+    }
+}
+
+/// A piece of a clamped extremal.
+#[derive(Debug, Clone, Copy)]
+pub(super) enum Piece {
+    /// A part of the free extremal.
+    Free {
+        arc: Arc,
+        /// What its ends add to the sensitivity: `theta/(u - 1)` at a switch, or a term of the extremal.
+        turned: f64,
+        /// Whether it starts or ends where the extremal does.
+        at: [bool; 2],
+        /// `(theta, ln u)` at both ends.
+        ends: [(f64, f64); 2],
+    },
+    /// A part on a ceiling.
+    Ceiling { arc: CeilingArc, gap: Gap },
+}
+
+/// `G = a [phi(z_cap) - E]` along an arc on a ceiling, from its value at one place: where a free arc begins it is 0, and
+/// nothing cancels.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Gap {
+    a: f64,
+    b: f64,
+    /// `d ln u/d ln theta`.
+    rise: f64,
+    /// The depth below the end of greater theta, the value, `u` and `C theta` there.
+    at: f64,
+    value: f64,
+    u: f64,
+    pull: f64,
+}
+
+impl Gap {
+    /// Refers to the depth at which the value is known.
+    fn refer(&mut self, arc: &CeilingArc, depth: f64, value: f64) {
+        self.pull = self.pull(depth);
+        self.u = exp(if depth == arc.length { arc.z_lo } else { arc.z_hi - self.rise * depth });
+        (self.at, self.value) = (depth, value);
+    }
+
+    /// `C theta` at a depth below the end of greater theta.
+    pub fn pull(&self, depth: f64) -> f64 {
+        self.pull * exp(self.at - depth)
+    }
+
+    /// The value at a depth below the end of greater theta.
+    pub fn value(&self, depth: f64) -> f64 {
+        let y = self.at - depth;
+        let of_v = self.rise == 1.0;
+        let (grown, bend) = if of_v { (exp_m1(y), self.b * y) } else { (exp_m1(self.rise * y), 0.0) };
+        self.value + self.a * self.u * grown - self.pull * exp_m1(y) - bend
+    }
+}
+
+/// A clamped extremal after its time at the floor.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Path {
+    pub extremal: Extremal,
+    pieces: [Option<Piece>; Path::MOST_PIECES],
+    count: usize,
+    /// Derivative of the time with respect to the parameter where quadratures do not resolve it.
+    rate: Option<f64>,
+}
+
+/// What a quadrature along a path finds.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct PathSums {
+    /// Time at the floor and all pieces.
+    pub time: f64,
+    /// Without the time at the floor.
+    pub work: f64,
+    /// Derivative of the time with respect to the parameter of the family.
+    pub rate: f64,
+    pub friction_min: f64,
+    pub nodes: u32,
+}
+
+impl Path {
+    /// Rising, free, friction, free, friction, velocity, and one to spare.
+    pub const MOST_PIECES: usize = 8;
+
+    /// A path without pieces.
+    pub fn new(extremal: Extremal) -> Path {
+        Path { extremal, pieces: [None; Path::MOST_PIECES], count: 0, rate: None }
+    }
+
+    /// The pieces in their order.
+    pub fn pieces(&self) -> impl Iterator<Item = &Piece> {
+        self.pieces.iter().flatten()
+    }
+
+    pub fn push(&mut self, piece: Piece) {
+        if self.count < self.pieces.len() {
+            self.pieces[self.count] = Some(piece);
+            self.count += 1;
+        }
+    }
+
+    /// The kinds of all pieces as one number.
+    pub fn signature(&self) -> u32 {
+        let code = |piece: &Piece| match piece {
+            Piece::Free { .. } => 1,
+            Piece::Ceiling { arc, .. } => 1 + arc.kind as u32,
+        };
+        let floor = u32::from(self.extremal.time_at_floor > 0.0);
+        self.pieces().fold(floor, |sum, piece| 4 * sum + code(piece))
+    }
+
+    /// The extremal at `problem`, clamped; `None` where theta could not fall from the top.
+    pub fn clamped(problem: &Problem, ceilings: &Ceilings, extremal: Extremal) -> Option<Path> {
+        let Some(fall) = falling_part(problem, ceilings, &extremal) else {
+            let mut path = Path::new(extremal);
+            path.push(whole(problem, &extremal));
+            return Some(path);
+        };
+        if fall.z_v.min(fall.z_tau) <= 0.0 {
+            return None;
+        }
+        Some(Path::along(problem, ceilings, extremal, &fall))
+    }
+
+    /// The extremal with its falling part clamped.
+    pub fn along(problem: &Problem, ceilings: &Ceilings, extremal: Extremal, fall: &Fall) -> Path {
+        let mut breaks = Breaks { depths: [f64::INFINITY; Path::MOST_PIECES], count: 0 };
+        let across = fall.crossing(ceilings).max(0.0).min(fall.depth);
+        if ceilings.tau.is_finite() {
+            fall.zeros(ArcKind::TauCeiling, 0.0, across, &mut breaks);
+        }
+        if ceilings.v.is_finite() {
+            fall.zeros(ArcKind::VCeiling, across, fall.depth, &mut breaks);
+        }
+        if across > 0.0 && across < fall.depth {
+            breaks.add(across);
+        }
+        breaks.add(fall.depth);
+        let depths = &mut breaks.depths[..breaks.count];
+        depths.sort_unstable_by(f64::total_cmp);
+        let mut path = Path::new(extremal);
+        let mut from = 0.0;
+        // What rises to the turn is free.
+        let turns = fall.excess == 0.0;
+        let mut free_from = turns.then_some(0.0);
+        for &to in depths.iter().filter(|&&to| to > 0.0) {
+            if to <= from {
+                continue;
+            }
+            let kind = if to <= across { ArcKind::TauCeiling } else { ArcKind::VCeiling };
+            let capped = fall.gap(kind, 0.5 * (from + to)) < 0.0;
+            if capped {
+                if let Some(start) = free_from.take() {
+                    path.push(part(problem, &extremal, fall, start, from));
+                }
+                path.push(ceiling_part(ceilings, fall, kind, from, to));
+            } else {
+                free_from = free_from.or(Some(from));
+            }
+            from = to;
+        }
+        if let Some(start) = free_from {
+            path.push(part(problem, &extremal, fall, start, fall.depth));
+        }
+        path.refer_to_switches();
+        path
+    }
+
+    /// Refers `G` of each arc on a ceiling to where it is 0, at a free arc next to it, or to the arc that it continues.
+    fn refer_to_switches(&mut self) {
+        let mut known = [false; Path::MOST_PIECES];
+        for at_end in [false, true] {
+            let mut neighbour: Option<Option<f64>> = None;
+            for step in 0..self.count {
+                let i = if at_end { self.count - 1 - step } else { step };
+                let Some(Piece::Ceiling { arc, gap }) = &mut self.pieces[i] else {
+                    neighbour = Some(Some(0.0));
+                    continue;
+                };
+                let (near, far) = if arc.falls() == at_end { (arc.length, 0.0) } else { (0.0, arc.length) };
+                if let (false, Some(Some(value))) = (known[i], neighbour) {
+                    gap.refer(arc, near, value);
+                    known[i] = true;
+                }
+                neighbour = Some(known[i].then(|| gap.value(far)));
+            }
+        }
+    }
+
+    /// Quadrature of all pieces to relative accuracy `tolerance`.
+    pub fn sums(&self, tolerance: f64) -> Option<PathSums> {
+        let mut found =
+            PathSums { time: self.extremal.time_at_floor, work: 0.0, rate: 0.0, friction_min: f64::INFINITY, nodes: 0 };
+        let mut free = FreeSums::default();
+        for piece in self.pieces() {
+            match piece {
+                Piece::Free { arc, turned, at, .. } => {
+                    let sums = arc.sums(tolerance)?;
+                    let Sums { time, work, sensitivity, swing, friction_min, nodes, .. } = sums;
+                    found.time += time;
+                    found.work += work;
+                    found.friction_min = found.friction_min.min(friction_min);
+                    found.nodes += nodes;
+                    free.sensitivity += sensitivity;
+                    free.ends += turned;
+                    free.at_start |= at[0];
+                    free.at_end |= at[1];
+                    free.swing += swing;
+                }
+                Piece::Ceiling { arc, .. } => {
+                    let CeilingSums { time, work, nodes, .. } = arc.sums(None);
+                    found.time += time;
+                    found.work += work;
+                    found.nodes += nodes;
+                }
+            }
+        }
+        let rate = self.extremal.rate_of(&free);
+        found.rate = self.rate.unwrap_or(rate);
+        (found.time.is_finite() && found.work.is_finite()).then_some(found)
+    }
+
+    /// Times on the ceilings of the velocity and of friction.
+    pub fn times(&self) -> (f64, f64) {
+        let mut times = (0.0, 0.0);
+        for piece in self.pieces() {
+            if let Piece::Ceiling { arc, .. } = piece {
+                let time = if arc.kind == ArcKind::VCeiling { &mut times.0 } else { &mut times.1 };
+                *time += arc.time();
+            }
+        }
+        times
+    }
+}
+
+impl Piece {
+    /// `(theta, ln u)` at both ends.
+    pub fn ends(&self) -> [(f64, f64); 2] {
+        match self {
+            Piece::Free { ends, .. } => *ends,
+            Piece::Ceiling { arc, .. } => {
+                let (high, low) = ((arc.theta_hi, arc.z_hi), (arc.theta_hi * exp(-arc.length), arc.z_lo));
+                if arc.falls() { [high, low] } else { [low, high] }
+            }
+        }
+    }
+}
+
+/// The part of an extremal on which theta falls; `None` if it rises to the end.
+fn falling_part(problem: &Problem, ceilings: &Ceilings, extremal: &Extremal) -> Option<Fall> {
+    let law = problem.law;
+    let (theta_top, ln_theta_top, excess, depth) = match extremal.arc.chart {
+        Chart::Turning { x_end, .. } if x_end <= 0.0 => return None,
+        Chart::Turning { theta_h, ln_theta_h, x_start, x_end, .. } if x_start <= 0.0 => {
+            (theta_h, ln_theta_h, 0.0, ln_1p(x_end * x_end))
+        }
+        Chart::Direct { y_end: 0.0, .. } => return None,
+        _ => (problem.from.theta, problem.from.ln, law.a * phi(extremal.start), ln_1p(problem.fall)),
+    };
+    Some(Fall {
+        law,
+        theta_top,
+        excess,
+        friction: 1.0 + (law.b - law.a) * ln_theta_top,
+        depth,
+        z_v: ceilings.z_v + depth,
+        z_tau: ceilings.z_tau + ceilings.kappa * depth,
+        kappa: ceilings.kappa,
+    })
+}
+
+/// A free extremal as one piece.
+pub(super) fn whole(problem: &Problem, extremal: &Extremal) -> Piece {
+    let ends = [(extremal.theta_s, extremal.start), (problem.to.theta, extremal.end)];
+    let [start, end] = extremal.end_terms();
+    Piece::Free { arc: extremal.arc, turned: start + end, at: [true, true], ends }
+}
+
+/// The free part of an extremal between two depths; from the start if the first is 0.
+fn part(problem: &Problem, extremal: &Extremal, fall: &Fall, from: f64, to: f64) -> Piece {
+    let law = problem.law;
+    let (first, last) = (from == 0.0, to == fall.depth);
+    if first && last {
+        return whole(problem, extremal);
+    }
+    let chart = match extremal.arc.chart {
+        Chart::Turning { theta_h, ln_theta_h, x_start, x_end, .. } => {
+            // 1 + X^2 = theta_h/theta.
+            let top = if x_start <= 0.0 { 0.0 } else { x_start * x_start };
+            let place = |d: f64| (top + (1.0 + top) * exp_m1(d)).sqrt();
+            let begin = if first { x_start } else { place(from) };
+            let end = if last { x_end } else { place(to) };
+            let squares = (1.0 + top) * exp(from) * exp_m1(to - from);
+            let x_squares = if first && x_start <= 0.0 { squares - x_start * x_start } else { squares };
+            Chart::Turning { theta_h, ln_theta_h, x_start: begin, x_end: end, x_squares }
+        }
+        Chart::Direct { theta_a, z_a, friction_a, .. } => {
+            Chart::Direct { theta_a, z_a, friction_a, y_start: -from, y_end: -to }
+        }
+    };
+    let switch = |d: f64| {
+        let kind = binding(fall, d);
+        let z = fall.cap(kind, d);
+        (fall.theta_top * exp(-d), z)
+    };
+    let start = if first { (extremal.theta_s, extremal.start) } else { switch(from) };
+    let end = if last { (problem.to.theta, extremal.end) } else { switch(to) };
+    let swing = |(theta, z): (f64, f64)| theta / exp_m1(z);
+    let [at_start, at_end] = extremal.end_terms();
+    let turned = if last { at_end } else { swing(end) } + if first { at_start } else { -swing(start) };
+    Piece::Free { arc: Arc { law, chart }, turned, at: [first, last], ends: [start, end] }
+}
+
+/// The lower ceiling.
+fn binding(fall: &Fall, d: f64) -> ArcKind {
+    let of_v = fall.cap(ArcKind::VCeiling, d) < fall.cap(ArcKind::TauCeiling, d);
+    if of_v { ArcKind::VCeiling } else { ArcKind::TauCeiling }
+}
+
+/// An arc on a ceiling, with `G` from its end of greater theta.
+fn ceiling_part(ceilings: &Ceilings, fall: &Fall, kind: ArcKind, from: f64, to: f64) -> Piece {
+    let theta_hi = fall.theta_top * exp(-from);
+    // At theta_1 the ceilings are known best.
+    let z_lo = if to == fall.depth { ceilings.cap_of(kind, 0.0) } else { fall.cap(kind, to) };
+    let arc = ceilings.arc(kind, theta_hi, to - from, fall.cap(kind, from), z_lo);
+    let pull = (fall.excess - fall.friction) * exp(-from);
+    let gap = gap_of(fall.law, &arc, pull, fall.gap(kind, from));
+    Piece::Ceiling { arc, gap }
+}
+
+/// `G` of an arc from its `value` at the end of greater theta, where `C theta` is `pull`.
+fn gap_of(law: Law, arc: &CeilingArc, pull: f64, value: f64) -> Gap {
+    let rise = arc.rise();
+    Gap { a: law.a, b: law.b, rise, at: 0.0, value, u: exp(arc.z_hi), pull }
+}
+
+impl Piece {
+    pub fn kind(&self) -> ArcKind {
+        match self {
+            Piece::Free { .. } => ArcKind::Free,
+            Piece::Ceiling { arc, .. } => arc.kind,
+        }
+    }
+}
+
+impl Path {
+    /// An extremal that turns at `theta_c e^-delta`, the lifetime of steady sliding on the ceiling of friction being
+    /// `theta_c`, clamped. `delta` may be too small for a number.
+    pub fn lingering(problem: &Problem, ceilings: &Ceilings, extremal: Extremal, ln_delta: f64) -> Option<Path> {
+        let mut fall = falling_part(problem, ceilings, &extremal)?;
+        let slope = -ceilings.kappa;
+        fall.z_tau = slope * exp(ln_delta);
+        let mut path = Path::along(problem, ceilings, extremal, &fall);
+        if ln_delta < LN_TINY {
+            path.rate = Some(-fall.theta_top / slope);
+            let first = path.pieces.iter_mut().flatten().find_map(|piece| match piece {
+                Piece::Ceiling { arc, .. } => Some(arc),
+                Piece::Free { .. } => None,
+            });
+            if let Some(arc) = first {
+                (arc.z_hi, arc.ln_z) = (fall.z_tau, ln(slope) + ln_delta);
+            }
+        }
+        Some(path)
+    }
+
+    /// An extremal of a rising problem that meets a ceiling at `theta_1 e^-way`, where `ln u = z` and its slope over `ln
+    /// theta` is `rise`, and stays there. `pace` is the derivative of `way` with respect to the parameter.
+    pub fn rising(problem: &Problem, ceilings: &Ceilings, switch: Switch) -> Option<Path> {
+        let Switch { way, z, ln_z, rise, pace_over_z } = switch;
+        let (law, to) = (problem.law, &problem.to);
+        let theta = Lifetime::with(to.theta * exp(-way), to.rest - to.theta * exp_m1(-way));
+        let fall = exp_m1(way + ln_1p(problem.fall));
+        if fall >= 0.0 || way < 0.0 {
+            return None;
+        }
+        let sub = Problem { to: theta, fall, ..*problem };
+        let mut extremal = sub.arriving(z, z - theta.ln, 1.0)?;
+        // C = [a phi(z) - tau_ss]/theta along the ceiling, and its derivative with respect to ln theta.
+        let c = extremal.arc.c();
+        let steepness = (law.a * exp_m1(z) * rise - (law.b - law.a)) / theta.theta - c;
+        extremal.follow_c(z, pace_over_z * steepness);
+        let mut path = Path::new(extremal);
+        path.push(whole(&sub, &extremal));
+        let pull = c * theta.theta;
+        let mut add = |arc: CeilingArc| {
+            let gap = gap_of(law, &arc, pull * (arc.theta_hi / theta.theta), 0.0);
+            path.push(Piece::Ceiling { arc, gap });
+        };
+        if let Some(ln_z) = ln_z {
+            let mut arc = ceilings.arc(ArcKind::TauCeiling, to.theta, way, ceilings.z_tau, z);
+            arc.ln_z = ln_z;
+            add(arc);
+        } else {
+            // In time theta rises.
+            let [high, low] = ceilings.arcs(to.theta, 0.0, -way);
+            low.into_iter().chain(high).for_each(add);
+        }
+        path.refer_to_switches();
+        Some(path)
+    }
+}
+
+/// Where theta, rising, meets a ceiling.
+pub(super) struct Switch {
+    /// `ln(theta_1/theta)`.
+    pub way: f64,
+    /// `ln u`.
+    pub z: f64,
+    /// Logarithm of its absolute value, if that may be too small for a number.
+    pub ln_z: Option<f64>,
+    /// Derivative of `ln u` on the ceiling with respect to `ln theta`.
+    pub rise: f64,
+    /// Derivative of `way` with respect to the parameter, over `-z`.
+    pub pace_over_z: f64,
+}
+
+/// `ln delta` below which squares of `delta` are no numbers.
+const LN_TINY: f64 = -300.0;
+
+#[cfg(test)]
+mod tests {
+    //! The analytic derivative of the time against differences of it, on every part of the clamped family.
+
+    use super::super::Bounds;
+    use super::*;
+
+    #[test]
+    fn rate_is_the_derivative_of_the_time_on_every_part_of_the_clamped_family() {
+        let laws = [(0.03, 0.05), (0.03, 0.03), (0.05, 0.01), (0.1, 0.0), (0.002, 0.02)];
+        let transitions = [(3.0, 100.0), (100.0, 3.0), (3.0, 3.0), (1.01, 40.0), (40.0, 1.01), (1e5, 1.001e5)];
+        let ceilings = [
+            (1.2, f64::INFINITY),
+            (20.0, f64::INFINITY),
+            (f64::INFINITY, 1e-3),
+            (f64::INFINITY, 0.05),
+            (3.0, 0.05),
+            (300.0, 0.02),
+        ];
+        let mut seen = 0;
+        for (a, b) in laws {
+            for (v_i, v_f) in transitions {
+                for (times, above) in ceilings {
+                    for floor in [true, false] {
+                        let law = Law { a, b };
+                        let steady = |v: f64| 1.0 + (a - b) * f64::ln(v);
+                        let bounds =
+                            Bounds { floor, v_ceiling: times * v_f, tau_ceiling: steady(v_i).max(steady(v_f)) + above };
+                        let (from, to) = (Lifetime::steady(v_i), Lifetime::steady(v_f));
+                        let problem = Problem { law, from, to, fall: (v_f - v_i) / v_i, bounded: floor };
+                        let ceilings = Ceilings::new(law, to, v_f, &bounds);
+                        let q_hold = problem.q_hold();
+                        for i in -30..=30 {
+                            let q = 0.2501 * f64::from(i);
+                            let step = 1e-5;
+                            let at = |q: f64| {
+                                let path = Path::clamped(&problem, &ceilings, problem.extremal(q, q_hold)?)?;
+                                Some((path.sums(1e-14)?, path.signature()))
+                            };
+                            let (Some(before), Some(here), Some(after)) = (at(q - step), at(q), at(q + step)) else {
+                                continue;
+                            };
+                            if before.1 != after.1 || here.1 < 4 || here.0.time < 1e-9 {
+                                continue;
+                            }
+                            if q.abs() < 2.0 * step || q_hold.is_some_and(|h| (q + h).abs() < 2.0 * step) {
+                                continue;
+                            }
+                            let difference = (after.0.time - before.0.time) / (2.0 * step);
+                            let error = (difference - here.0.rate).abs() / here.0.rate.abs().max(1e-3 * here.0.time);
+                            seen += 1;
+                            assert!(
+                                error <= 1e-4,
+                                "{a} {b} {v_i} -> {v_f} {bounds:?} q {q}: rate {} difference {difference}",
+                                here.0.rate
+                            );
+                        }
+                    }
+                }
+            }
+        }
+        assert!(seen > 10_000, "{seen}");
+    }
+}

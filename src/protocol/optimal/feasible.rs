@@ -1,0 +1,145 @@
+//! What the bounds allow: the feasible times, the least ceilings, and why a protocol is infeasible.
+
+use super::ceiling::{Ceilings, ln_ratio};
+use super::constrained::{Feasible, feasible};
+use super::extremal::Problem;
+use super::{ArcKind, Bounds, Obstacle, posed};
+use crate::model::Transition;
+use crate::numerics::elementary::{exp, ln, ln_1p};
+use crate::numerics::root::crossing;
+
+/// The least and the greatest feasible time under the bounds, each in closed form or one quadrature; the greatest is
+/// infinite unless a ceiling keeps theta from rising. `None` where no time is feasible.
+pub fn feasible_times(transition: &Transition, bounds: impl Into<Bounds>) -> Option<(f64, f64)> {
+    let (problem, ceilings) = posed(transition, 1.0, &bounds.into())?;
+    match feasible(&problem, &ceilings) {
+        Feasible::Times(least, most) => Some((least, most)),
+        Feasible::Sitting(least) => Some((least, f64::INFINITY)),
+        Feasible::Never(_) => None,
+    }
+}
+
+/// Why a protocol is infeasible; `None` for a feasible one.
+pub fn obstacle(transition: &Transition, t_f: f64, bounds: impl Into<Bounds>) -> Option<Obstacle> {
+    let Some((problem, ceilings)) = posed(transition, t_f, &bounds.into()) else { return Some(Obstacle::Domain) };
+    let (t_least, t_most) = match feasible(&problem, &ceilings) {
+        Feasible::Times(least, most) => (least, most),
+        Feasible::Sitting(least) => (least, f64::INFINITY),
+        Feasible::Never(ArcKind::VCeiling) => {
+            return Some(Obstacle::VCeiling { above: lowest_v(&problem, transition) });
+        }
+        Feasible::Never(_) => return Some(Obstacle::TauCeiling { above: lowest_tau(&problem) }),
+    };
+    if t_f < t_least || (t_f == t_least && !problem.bounded && problem.rises()) {
+        Some(Obstacle::TooFast { t_least })
+    } else {
+        (t_f > t_most).then_some(Obstacle::TooSlow { t_most })
+    }
+}
+
+/// No ceiling of the velocity below this one is feasible.
+fn lowest_v(problem: &Problem, transition: &Transition) -> f64 {
+    match (problem.rises(), problem.bounded) {
+        (false, _) => transition.v_f,
+        (true, true) => 1.0,
+        (true, false) => 0.0,
+    }
+}
+
+/// No ceiling of friction below this one is feasible.
+fn lowest_tau(problem: &Problem) -> f64 {
+    match (problem.rises(), problem.bounded) {
+        (false, _) => problem.friction_a().max(problem.friction_end()),
+        (true, true) => 1.0 + problem.law.b * problem.to.ln,
+        (true, false) => f64::NEG_INFINITY,
+    }
+}
+
+/// The least ceiling of the velocity that allows `t_f`, with the other bounds as they are; `None` where no ceiling does.
+pub fn least_v_ceiling(transition: &Transition, t_f: f64, bounds: impl Into<Bounds>, rtol: f64) -> Option<f64> {
+    let (problem, ceilings) = posed(transition, t_f, &bounds.into().with_v_ceiling(f64::INFINITY))?;
+    let v_f = transition.v_f;
+    let lowest = lowest_v(&problem, transition);
+    let at = |place: f64| {
+        let distance = exp(place);
+        let v = lowest + distance;
+        let above = if lowest == v_f { distance } else { v - v_f };
+        (v, Ceilings { v, z_v: ln_ratio(v, above, v_f), ..ceilings })
+    };
+    least(&problem, t_f, &ceilings, v_f, || root(&problem, t_f, [0.0, 1.0], rtol, at))
+}
+
+/// The least ceiling of friction that allows `t_f`, with the other bounds as they are; `None` where no ceiling does.
+pub fn least_tau_ceiling(transition: &Transition, t_f: f64, bounds: impl Into<Bounds>, rtol: f64) -> Option<f64> {
+    let (problem, ceilings) = posed(transition, t_f, &bounds.into().with_tau_ceiling(f64::INFINITY))?;
+    let (a, end) = (problem.law.a, problem.friction_end());
+    let lowest = lowest_tau(&problem);
+    let steady = problem.friction_start().max(end);
+    let least = |root: &dyn Fn() -> f64| least(&problem, t_f, &ceilings, steady, root);
+    if lowest.is_finite() {
+        let at = |place: f64| {
+            let distance = exp(place);
+            (lowest + distance, Ceilings { tau: lowest + distance, z_tau: ((lowest - end) + distance) / a, ..ceilings })
+        };
+        return least(&|| root(&problem, t_f, [ln(a), 1.0], rtol, at));
+    }
+    // Without the floor nothing bounds it from below.
+    let at = |z_tau: f64| (end + a * z_tau, Ceilings { tau: end + a * z_tau, z_tau, ..ceilings });
+    least(&|| root(&problem, t_f, [0.0, 1.0], rtol * (1.0 / a).min(1.0), at))
+}
+
+/// The least ceiling, found by `root`, unless no ceiling allows `t_f`, or steady sliding on the ceiling does.
+fn least(problem: &Problem, t_f: f64, without: &Ceilings, steady: f64, root: impl FnOnce() -> f64) -> Option<f64> {
+    match feasible(problem, without) {
+        Feasible::Never(_) => None,
+        Feasible::Times(least, most) if t_f < least || t_f > most => None,
+        _ if problem.fall == 0.0 => Some(steady),
+        _ => Some(root()),
+    }
+}
+
+/// The ceiling, by a place that rises with it, on which the limit of the time is `t_f`; the search starts at a place with a
+/// step.
+fn root(
+    problem: &Problem,
+    t_f: f64,
+    [start, mut step]: [f64; 2],
+    rtol: f64,
+    at: impl Fn(f64) -> (f64, Ceilings),
+) -> f64 {
+    // Above 0 where the ceiling allows `t_f`.
+    let room = |place: f64| match feasible(problem, &at(place).1) {
+        Feasible::Times(least, _) if !problem.rises() => -ln(least.clamp(TINY, HUGE) / t_f),
+        Feasible::Times(_, most) => ln(most.clamp(TINY, HUGE) / t_f),
+        Feasible::Sitting(_) => ln(HUGE),
+        Feasible::Never(_) => ln(TINY),
+    };
+    let mut low = (start, room(start));
+    let mut high = low;
+    let first = step;
+    while high.1 < 0.0 {
+        if high.0 > FARTHEST {
+            return at(high.0).0;
+        }
+        low = high;
+        high = (high.0 + step, room(high.0 + step));
+        step *= 2.0;
+    }
+    step = first;
+    while low.1 >= 0.0 {
+        if low.0 < -FARTHEST {
+            return at(low.0).0;
+        }
+        high = low;
+        low = (low.0 - step, room(low.0 - step));
+        step *= 2.0;
+    }
+    at(crossing(room, [low.0, high.0], [low.1, high.1], 0.01 * rtol)).0
+}
+
+/// Range of times whose logarithm is taken.
+const TINY: f64 = 1e-300;
+const HUGE: f64 = 1e300;
+
+/// Greatest place that is searched.
+const FARTHEST: f64 = 600.0;
