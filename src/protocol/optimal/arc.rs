@@ -65,6 +65,10 @@ pub(super) struct Sums {
     pub lag: f64,
     /// Work of friction along it.
     pub work: f64,
+    /// Slip, `int v dt`.
+    pub slip: f64,
+    /// `int v ln theta dt`.
+    pub state: f64,
     /// Turning chart: the interior part of `d time/d ln theta_h`. Direct chart: `d time/d z_a`.
     pub sensitivity: f64,
     /// `int u theta/(1 - u)^2 dt`, from which `d time/d ln u(end)` follows without cancellation where theta goes one
@@ -472,13 +476,24 @@ fn panels<const N: usize>(line: &Line<N>, tolerance: f64, kernel: impl Fn(f64, f
     let (count, nodes) = line.cut(MOST_NODES, MOST_PANELS, tolerance);
     let rule = rule(LANES * (nodes as usize / LANES + 1));
     let half = 0.5 * length / f64::from(count);
-    let mut total =
-        Sums { time: 0.0, lag: 0.0, work: 0.0, sensitivity: 0.0, swing: 0.0, friction_min: f64::INFINITY, nodes: 0 };
+    let mut total = Sums {
+        time: 0.0,
+        lag: 0.0,
+        work: 0.0,
+        slip: 0.0,
+        state: 0.0,
+        sensitivity: 0.0,
+        swing: 0.0,
+        friction_min: f64::INFINITY,
+        nodes: 0,
+    };
     for panel in 0..count {
         let sums = kernel(start + half * f64::from(2 * panel + 1), half, rule);
         total.time += sums.time;
         total.lag += sums.lag;
         total.work += sums.work;
+        total.slip += sums.slip;
+        total.state += sums.state;
         total.sensitivity += sums.sensitivity;
         total.swing += sums.swing;
         total.friction_min = total.friction_min.min(sums.friction_min);
@@ -637,6 +652,8 @@ struct Tally {
     time: Lanes,
     lag: Lanes,
     work: Lanes,
+    slip: Lanes,
+    state: Lanes,
     sensitivity: Lanes,
     swing: Lanes,
     friction_min: Lanes,
@@ -647,6 +664,8 @@ struct Terms<const N: usize> {
     time: [f64; N],
     lag: [f64; N],
     work: [f64; N],
+    slip: [f64; N],
+    state: [f64; N],
     sensitivity: [f64; N],
     swing: [f64; N],
     friction: [f64; N],
@@ -660,6 +679,8 @@ impl Tally {
             time: zero,
             lag: zero,
             work: zero,
+            slip: zero,
+            state: zero,
             sensitivity: zero,
             swing: zero,
             friction_min: [f64::INFINITY; LANES],
@@ -673,6 +694,8 @@ impl Tally {
                 self.time[i] += terms.time[first + i];
                 self.lag[i] += terms.lag[first + i];
                 self.work[i] += terms.work[first + i];
+                self.slip[i] += terms.slip[first + i];
+                self.state[i] += terms.state[first + i];
                 self.sensitivity[i] += terms.sensitivity[first + i];
                 self.swing[i] += terms.swing[first + i];
                 let (friction, least) = (terms.friction[first + i], self.friction_min[i]);
@@ -686,7 +709,16 @@ impl<const N: usize> Terms<N> {
     #[inline(always)]
     fn new() -> Terms<N> {
         let zero = [0.0; N];
-        Terms { time: zero, lag: zero, work: zero, sensitivity: zero, swing: zero, friction: zero }
+        Terms {
+            time: zero,
+            lag: zero,
+            work: zero,
+            slip: zero,
+            state: zero,
+            sensitivity: zero,
+            swing: zero,
+            friction: zero,
+        }
     }
 }
 
@@ -709,6 +741,8 @@ fn turning_kernel(arc: &TurningSlice, middle: f64, half: f64, rule: &Rule) -> Su
         time: scale * arc.theta_h * fold(&tally.time),
         lag: scale * arc.theta_h * fold(&tally.lag),
         work: scale * fold(&tally.work),
+        slip: scale * fold(&tally.slip),
+        state: scale * fold(&tally.state),
         sensitivity: scale * arc.theta_h * fold(&tally.sensitivity),
         swing: scale * arc.theta_h * arc.theta_h * fold(&tally.swing),
         friction_min: least(&tally.friction_min),
@@ -749,7 +783,9 @@ impl TurningSlice {
             terms.friction[i] = 1.0 + a * found.ln_u[i] + (b - a) * ln_theta[i];
             terms.time[i] = g * shrink[i];
             terms.lag[i] = terms.time[i] * u;
-            terms.work[i] = g * u * terms.friction[i];
+            terms.slip[i] = g * u;
+            terms.work[i] = terms.slip[i] * terms.friction[i];
+            terms.state[i] = terms.slip[i] * ln_theta[i];
             terms.sensitivity[i] = terms.time[i] * (1.0 - bent * slope);
             terms.swing[i] = terms.time[i] * bent * inverse_x2[i];
         }
@@ -787,6 +823,8 @@ fn direct_kernel(arc: &DirectSlice, middle: f64, half: f64, rule: &Rule) -> Sums
         time: half * arc.theta_a * fold(&tally.time),
         lag: half * arc.theta_a * fold(&tally.lag),
         work: half * fold(&tally.work),
+        slip: half * fold(&tally.slip),
+        state: half * fold(&tally.state),
         sensitivity: half * arc.theta_a * arc.slope_a * sensitivity,
         swing: -half * arc.theta_a * arc.theta_a * sensitivity,
         friction_min: least(&tally.friction_min),
@@ -814,7 +852,9 @@ impl DirectSlice {
             terms.friction[i] = 1.0 + a * found.ln_u[i] + (b - a) * ln_theta[i];
             terms.time[i] = -weight[i] * grow[i] * inverse;
             terms.lag[i] = terms.time[i] * u;
-            terms.work[i] = -weight[i] * inverse * u * terms.friction[i];
+            terms.slip[i] = -weight[i] * inverse * u;
+            terms.work[i] = terms.slip[i] * terms.friction[i];
+            terms.state[i] = terms.slip[i] * ln_theta[i];
             terms.sensitivity[i] = -terms.time[i] * grow[i] * u * inverse * inverse;
         }
         tally.add(&terms);

@@ -3,6 +3,7 @@
 //! Both ceilings bound `z = ln u`: at `theta = theta_1 e^y` the velocity allows `z_v + y` and friction `z_tau + kappa y`,
 //! `kappa = 1 - b/a` (docs/derivations.md, "Ceilings").
 
+use super::clamp::Gap;
 use super::lifetime::Lifetime;
 use super::{ArcKind, Bounds};
 use crate::model::Law;
@@ -60,14 +61,13 @@ impl Ceilings {
         }
     }
 
-    /// The arcs on the ceilings between two lifetimes `theta_1 e^y`: from `y_hi`, where theta is `theta_hi`, to `y_lo`.
-    /// In the order of falling theta.
-    pub fn arcs(&self, theta_hi: f64, y_hi: f64, y_lo: f64) -> impl Iterator<Item = CeilingArc> + use<'_> {
+    /// The arcs on the ceilings between two lifetimes `theta_1 e^y`, of greater and of smaller theta: from `y_hi`, where
+    /// theta is `theta_hi`, to `y_lo`.
+    pub fn arcs(&self, theta_hi: f64, y_hi: f64, y_lo: f64) -> [Option<CeilingArc>; 2] {
         let across = self.crossing().clamp(y_lo, y_hi);
-        let parts = [(ArcKind::TauCeiling, y_hi, across), (ArcKind::VCeiling, across, y_lo)];
-        parts.into_iter().filter(|(_, from, to)| from > to).map(move |(kind, from, to)| {
+        [(ArcKind::TauCeiling, y_hi, across), (ArcKind::VCeiling, across, y_lo)].map(|(kind, from, to)| {
             let theta_hi = theta_hi * exp(from - y_hi);
-            self.arc(kind, theta_hi, from - to, self.cap_of(kind, from), self.cap_of(kind, to))
+            (from > to).then(|| self.arc(kind, theta_hi, from - to, self.cap_of(kind, from), self.cap_of(kind, to)))
         })
     }
 
@@ -127,6 +127,16 @@ pub(super) struct CeilingNode {
 }
 
 impl CeilingArc {
+    /// Whether theta falls along it.
+    pub fn falls(&self) -> bool {
+        self.z_hi + self.z_lo > 0.0
+    }
+
+    /// `d ln u/d ln theta`.
+    pub fn rise(&self) -> f64 {
+        if self.kind == ArcKind::VCeiling { 1.0 } else { self.ceilings.kappa }
+    }
+
     /// Duration.
     pub fn time(&self) -> f64 {
         match self.kind {
@@ -214,8 +224,9 @@ impl CeilingArc {
         lingered
     }
 
-    /// Time, work and slip; the prices as well if `gap` is given, `a (phi(z) - E)` as a function of the depth.
-    pub fn sums(&self, ln_theta_hi: f64, gap: Option<&dyn Fn(f64) -> f64>) -> CeilingSums {
+    /// Time, work and slip; the prices as well if `G` is given.
+    pub fn sums(&self, gap: Option<&Gap>) -> CeilingSums {
+        let ln_theta_hi = ln(self.theta_hi);
         let Law { a, b } = self.ceilings.law;
         let mut sums = CeilingSums::default();
         let of_v = self.kind == ArcKind::VCeiling;
@@ -232,19 +243,27 @@ impl CeilingArc {
             sums.nodes += 1;
             if let Some(gap) = gap {
                 // Positive: gap and u - 1 differ in sign on both kinds of leg.
-                let price = -gap(depth) / excess * if of_v { 1.0 } else { v / a } * dt;
+                let price = -gap.value(depth) / excess * if of_v { 1.0 } else { v / a } * dt;
                 sums.price += price;
                 sums.price_ln_v += price * ln_v;
                 sums.price_ln_theta += price * ln_theta;
             }
         });
         if lingered > 0.0 {
-            // Steady sliding on the ceiling, at one lifetime.
-            let theta = self.theta_hi * if self.z_hi.abs() <= self.z_lo.abs() { 1.0 } else { exp(-self.length) };
+            // Steady sliding on the ceiling, at one lifetime, where G/(u - 1) has a limit.
+            let depth = if self.z_hi.abs() <= self.z_lo.abs() { 0.0 } else { self.length };
+            let ln_theta = ln_theta_hi - depth;
+            let slip = lingered * exp(-ln_theta);
             sums.time += lingered;
-            sums.slip += lingered / theta;
-            sums.work += self.ceilings.tau * lingered / theta;
-            sums.state += ln(theta) * lingered / theta;
+            sums.slip += slip;
+            sums.work += self.ceilings.tau * slip;
+            sums.state += ln_theta * slip;
+            if let Some(gap) = gap {
+                let price = (b - a + gap.pull(depth)) / (a * self.ceilings.kappa) * slip;
+                sums.price += price;
+                sums.price_ln_v -= price * ln_theta;
+                sums.price_ln_theta += price * ln_theta;
+            }
         }
         sums
     }

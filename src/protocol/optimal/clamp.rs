@@ -16,7 +16,6 @@ use crate::numerics::elementary::{exp, exp_m1, ln, ln_1p};
 pub(super) struct Fall {
     law: Law,
     pub theta_top: f64,
-    pub ln_theta_top: f64,
     /// `a E` at the top; 0 where theta turns there.
     excess: f64,
     /// Friction at the top with `u = 1`.
@@ -140,12 +139,44 @@ pub(super) enum Piece {
         ends: [(f64, f64); 2],
     },
     /// A part on a ceiling.
-    Ceiling {
-        arc: CeilingArc,
-        /// `a E` at its end of greater theta, and `C theta` there.
-        excess: f64,
-        pull: f64,
-    },
+    Ceiling { arc: CeilingArc, gap: Gap },
+}
+
+/// `G = a [phi(z_cap) - E]` along an arc on a ceiling, from its value at one place: where a free arc begins it is 0, and
+/// nothing cancels.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Gap {
+    a: f64,
+    b: f64,
+    /// `d ln u/d ln theta`.
+    rise: f64,
+    /// The depth below the end of greater theta, the value, `u` and `C theta` there.
+    at: f64,
+    value: f64,
+    u: f64,
+    pull: f64,
+}
+
+impl Gap {
+    /// Refers to the depth at which the value is known.
+    fn refer(&mut self, arc: &CeilingArc, depth: f64, value: f64) {
+        self.pull = self.pull(depth);
+        self.u = exp(if depth == arc.length { arc.z_lo } else { arc.z_hi - self.rise * depth });
+        (self.at, self.value) = (depth, value);
+    }
+
+    /// `C theta` at a depth below the end of greater theta.
+    pub fn pull(&self, depth: f64) -> f64 {
+        self.pull * exp(self.at - depth)
+    }
+
+    /// The value at a depth below the end of greater theta.
+    pub fn value(&self, depth: f64) -> f64 {
+        let y = self.at - depth;
+        let of_v = self.rise == 1.0;
+        let (grown, bend) = if of_v { (exp_m1(y), self.b * y) } else { (exp_m1(self.rise * y), 0.0) };
+        self.value + self.a * self.u * grown - self.pull * exp_m1(y) - bend
+    }
 }
 
 /// A clamped extremal after its time at the floor.
@@ -253,7 +284,29 @@ impl Path {
         if let Some(start) = free_from {
             path.push(part(problem, &extremal, fall, start, fall.depth));
         }
+        path.refer_to_switches();
         path
+    }
+
+    /// Refers `G` of each arc on a ceiling to where it is 0, at a free arc next to it, or to the arc that it continues.
+    fn refer_to_switches(&mut self) {
+        let mut known = [false; Path::MOST_PIECES];
+        for at_end in [false, true] {
+            let mut neighbour: Option<Option<f64>> = None;
+            for step in 0..self.count {
+                let i = if at_end { self.count - 1 - step } else { step };
+                let Some(Piece::Ceiling { arc, gap }) = &mut self.pieces[i] else {
+                    neighbour = Some(Some(0.0));
+                    continue;
+                };
+                let (near, far) = if arc.falls() == at_end { (arc.length, 0.0) } else { (0.0, arc.length) };
+                if let (false, Some(Some(value))) = (known[i], neighbour) {
+                    gap.refer(arc, near, value);
+                    known[i] = true;
+                }
+                neighbour = Some(known[i].then(|| gap.value(far)));
+            }
+        }
     }
 
     /// Quadrature of all pieces to relative accuracy `tolerance`.
@@ -277,7 +330,7 @@ impl Path {
                     starts_free |= i == 0;
                 }
                 Piece::Ceiling { arc, .. } => {
-                    let CeilingSums { time, work, nodes, .. } = arc.sums(ln(arc.theta_hi), None);
+                    let CeilingSums { time, work, nodes, .. } = arc.sums(None);
                     found.time += time;
                     found.work += work;
                     found.nodes += nodes;
@@ -300,13 +353,6 @@ impl Path {
         }
         times
     }
-
-    /// `(ln theta, ln u)` at the start of the first piece and at the end of the last one.
-    pub fn first_and_last(&self) -> Option<[(f64, f64); 2]> {
-        let first = self.pieces().next()?.ends()[0];
-        let last = self.pieces().last()?.ends()[1];
-        Some([first, last])
-    }
 }
 
 impl Piece {
@@ -316,7 +362,7 @@ impl Piece {
             Piece::Free { ends, .. } => *ends,
             Piece::Ceiling { arc, .. } => {
                 let (high, low) = ((arc.theta_hi, arc.z_hi), (arc.theta_hi * exp(-arc.length), arc.z_lo));
-                if arc.z_hi + arc.z_lo > 0.0 { [high, low] } else { [low, high] }
+                if arc.falls() { [high, low] } else { [low, high] }
             }
         }
     }
@@ -336,7 +382,6 @@ fn falling_part(problem: &Problem, ceilings: &Ceilings, extremal: &Extremal) -> 
     Some(Fall {
         law,
         theta_top,
-        ln_theta_top,
         excess,
         friction: 1.0 + (law.b - law.a) * ln_theta_top,
         depth,
@@ -396,13 +441,21 @@ fn binding(fall: &Fall, d: f64) -> ArcKind {
     if of_v { ArcKind::VCeiling } else { ArcKind::TauCeiling }
 }
 
+/// An arc on a ceiling, with `G` from its end of greater theta.
 fn ceiling_part(ceilings: &Ceilings, fall: &Fall, kind: ArcKind, from: f64, to: f64) -> Piece {
     let theta_hi = fall.theta_top * exp(-from);
     // At theta_1 the ceilings are known best.
     let z_lo = if to == fall.depth { ceilings.cap_of(kind, 0.0) } else { fall.cap(kind, to) };
     let arc = ceilings.arc(kind, theta_hi, to - from, fall.cap(kind, from), z_lo);
-    let (excess, _) = fall.energy(from);
-    Piece::Ceiling { arc, excess, pull: (fall.excess - fall.friction) * exp(-from) }
+    let pull = (fall.excess - fall.friction) * exp(-from);
+    let gap = gap_of(fall.law, &arc, pull, fall.gap(kind, from).0);
+    Piece::Ceiling { arc, gap }
+}
+
+/// `G` of an arc from its `value` at the end of greater theta, where `C theta` is `pull`.
+fn gap_of(law: Law, arc: &CeilingArc, pull: f64, value: f64) -> Gap {
+    let rise = arc.rise();
+    Gap { a: law.a, b: law.b, rise, at: 0.0, value, u: exp(arc.z_hi), pull }
 }
 
 impl Piece {
@@ -453,18 +506,24 @@ impl Path {
         extremal.one_way(pace * steepness / law.a);
         let mut path = Path::new(extremal);
         path.push(whole(&sub, &extremal));
+        let pull = c * theta.theta;
+        let mut add = |arc: CeilingArc| {
+            let gap = gap_of(law, &arc, pull * (arc.theta_hi / theta.theta), 0.0);
+            path.push(Piece::Ceiling { arc, gap });
+        };
         if let Some(ln_z) = ln_z {
             let mut arc = ceilings.arc(ArcKind::TauCeiling, to.theta, way, ceilings.z_tau, z);
             arc.ln_z = ln_z;
-            path.push(Piece::Ceiling { arc, excess: 0.0, pull: 0.0 });
+            add(arc);
             if z > -CLOSE {
                 path.rate = Some(pace * theta.theta / exp_m1(-z));
             }
         } else {
-            for arc in ceilings.arcs(to.theta, 0.0, -way) {
-                path.push(Piece::Ceiling { arc, excess: 0.0, pull: 0.0 });
-            }
+            // In time theta rises.
+            let [high, low] = ceilings.arcs(to.theta, 0.0, -way);
+            low.into_iter().chain(high).for_each(add);
         }
+        path.refer_to_switches();
         Some(path)
     }
 }

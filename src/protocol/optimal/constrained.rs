@@ -59,7 +59,7 @@ pub(super) fn feasible(problem: &Problem, ceilings: &Ceilings) -> Feasible {
 
 /// Time on the ceilings between two places, the first of greater theta.
 fn time_on(ceilings: &Ceilings, theta_hi: f64, y_hi: f64, y_lo: f64) -> f64 {
-    ceilings.arcs(theta_hi, y_hi, y_lo).map(|arc| arc.time()).sum()
+    ceilings.arcs(theta_hi, y_hi, y_lo).iter().flatten().fold(0.0, |time, arc| time + arc.time())
 }
 
 /// Where steady sliding on the ceiling of friction is possible above `depth`, for a problem that ends below it: time then

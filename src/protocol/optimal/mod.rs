@@ -7,25 +7,32 @@ mod arc;
 mod bounds;
 mod ceiling;
 mod clamp;
+mod clamped_motion;
 mod constrained;
 pub mod crossover;
 mod extremal;
+mod feasible;
+mod feedback;
 mod floor;
 mod guess;
 mod lifetime;
 mod motion;
 mod route;
 mod search;
+mod slopes;
 
 use super::{Motion, Solved, SolverStats, Status};
-use crate::model::{Law, Transition};
-use crate::numerics::elementary::{exp, ln_1p};
+use crate::model::Transition;
 use ceiling::Ceilings;
+use constrained::Constrained;
 use extremal::Problem;
 use lifetime::Lifetime;
 use search::Time;
 
 pub use bounds::Bounds;
+pub use feasible::{feasible_times, least_tau_ceiling, least_v_ceiling, obstacle};
+pub(super) use feedback::{Position, feedback};
+pub use feedback::{feedback_at, motion_from};
 pub(super) use motion::Optimal as Route;
 pub(super) use route::{PathPoint, PathSegment, lag_at_bound};
 
@@ -175,79 +182,35 @@ pub enum Obstacle {
 /// 1`. `Unproven` where `tau <= max(0, b - a)` somewhere, `NegativeFriction` where `tau < 0`; an extremal that falls
 /// below the bound there has no numbers.
 pub fn solve(transition: &Transition, t_f: f64, bounds: impl Into<Bounds>, rtol: f64) -> Solved<Optimum> {
-    let bounds = bounds.into();
-    let problem = Problem::of(transition, bounds.floor).filter(|_| t_f > 0.0 && t_f.is_finite());
-    let (Some(problem), true) = (problem, bounds.is_valid()) else { return INFEASIBLE };
-    if !bounds.has_ceilings() {
-        return search::solve(&problem, t_f, rtol);
-    }
-    let ceilings = Ceilings::new(transition.law, problem.to, transition.v_f, &bounds);
+    let Some((problem, ceilings)) = posed(transition, t_f, &bounds.into()) else { return INFEASIBLE };
     constrained::find(&problem, &ceilings, Time::since(&problem, t_f), rtol).solved
 }
 
 const INFEASIBLE: Solved<Optimum> =
     Solved { status: Status::Infeasible, value: None, stats: SolverStats { quadratures: 0, nodes: 0 } };
 
-const UNDONE: Solved<Optimum> =
-    Solved { status: Status::NotConverged, value: None, stats: SolverStats { quadratures: 0, nodes: 0 } };
-
-/// The optimal protocol and the derivatives of its work.
+/// The optimal protocol and the derivatives of its work; `None` where the work has a corner: at the least time, and where
+/// the protocol ends in steady sliding on a ceiling.
 pub fn slopes(
     transition: &Transition,
     t_f: f64,
     bounds: impl Into<Bounds>,
     rtol: f64,
 ) -> (Solved<Optimum>, Option<Slopes>) {
-    (solve(transition, t_f, bounds, rtol), None)
+    let Some((problem, ceilings)) = posed(transition, t_f, &bounds.into()) else { return (INFEASIBLE, None) };
+    let Constrained { mut solved, path, sitting } =
+        constrained::find(&problem, &ceilings, Time::since(&problem, t_f), rtol);
+    let tolerance = search::quadrature_tolerance(rtol);
+    let slopes =
+        path.filter(|_| sitting == 0.0).and_then(|path| slopes::slopes(&problem, &path, tolerance, &mut solved.stats));
+    (solved, slopes)
 }
 
-/// The least and the greatest feasible time under the bounds, each in closed form or one quadrature; the greatest is
-/// infinite unless a ceiling keeps theta from rising. `None` where no time is feasible.
-pub fn feasible_times(transition: &Transition, bounds: impl Into<Bounds>) -> Option<(f64, f64)> {
-    let bounds = bounds.into();
-    Some((shortest_time(transition, bounds.floor)?, f64::INFINITY))
-}
-
-/// The least ceiling of the velocity that allows `t_f`, with the other bounds as they are; `None` where no ceiling does.
-pub fn least_v_ceiling(_transition: &Transition, _t_f: f64, _bounds: impl Into<Bounds>, _rtol: f64) -> Option<f64> {
-    None
-}
-
-/// The least ceiling of friction that allows `t_f`, with the other bounds as they are; `None` where no ceiling does.
-pub fn least_tau_ceiling(_transition: &Transition, _t_f: f64, _bounds: impl Into<Bounds>, _rtol: f64) -> Option<f64> {
-    None
-}
-
-/// Why a protocol is infeasible; `None` for a feasible one.
-pub fn obstacle(transition: &Transition, t_f: f64, bounds: impl Into<Bounds>) -> Option<Obstacle> {
-    match shortest_time(transition, bounds.into().floor) {
-        None => Some(Obstacle::Domain),
-        Some(t_least) => (t_f < t_least).then_some(Obstacle::TooFast { t_least }),
-    }
-}
-
-/// The closed-loop law: the optimal protocol from the contact lifetime `theta` to steady sliding at `v_f` in `t_left`.
-pub fn feedback_at(
-    _law: Law,
-    _theta: f64,
-    _t_left: f64,
-    _v_f: f64,
-    _bounds: impl Into<Bounds>,
-    _rtol: f64,
-) -> Solved<FeedbackPoint> {
-    Solved { status: Status::NotConverged, value: None, stats: SolverStats::default() }
-}
-
-/// The optimal protocol from the contact lifetime `theta` to steady sliding at `v_f` in `t_left`, and its motion.
-pub fn motion_from(
-    _law: Law,
-    _theta: f64,
-    _t_left: f64,
-    _v_f: f64,
-    _bounds: impl Into<Bounds>,
-    _rtol: f64,
-) -> (Solved<Optimum>, Option<Box<dyn Motion>>) {
-    (UNDONE, None)
+/// The problem and its ceilings; `None` outside the domain.
+fn posed(transition: &Transition, t_f: f64, bounds: &Bounds) -> Option<(Problem, Ceilings)> {
+    let problem = Problem::of(transition, bounds.floor)?;
+    let inside = t_f > 0.0 && t_f.is_finite() && bounds.is_valid();
+    inside.then(|| (problem, Ceilings::new(transition.law, problem.to, transition.v_f, bounds)))
 }
 
 /// The optimal protocol and its motion.
@@ -263,12 +226,25 @@ pub fn motion(
     bounds: impl Into<Bounds>,
     rtol: f64,
 ) -> (Solved<Optimum>, Option<Box<dyn Motion>>) {
-    let bounds = bounds.into();
-    if bounds.has_ceilings() {
-        return (UNDONE, None);
-    }
-    let (solved, route) = route(transition, t_f, bounds.floor, rtol);
-    (solved, route.map(|route| Box::new(route) as Box<dyn Motion>))
+    let Some((problem, ceilings)) = posed(transition, t_f, &bounds.into()) else { return (INFEASIBLE, None) };
+    motion_of(&problem, &ceilings, t_f, rtol)
+}
+
+fn motion_of(
+    problem: &Problem,
+    ceilings: &Ceilings,
+    t_f: f64,
+    rtol: f64,
+) -> (Solved<Optimum>, Option<Box<dyn Motion>>) {
+    let Constrained { solved, path, sitting } =
+        constrained::find(problem, ceilings, Time::since(problem, t_f), rtol.min(MOTION_RTOL));
+    let Some(optimum) = solved.value else { return (solved, None) };
+    let capped = optimum.time_at_v_ceiling + optimum.time_at_tau_ceiling > 0.0;
+    let motion: Box<dyn Motion> = match path {
+        _ if capped => Box::new(clamped_motion::Clamped::new(problem, ceilings, t_f, path.as_ref(), sitting)),
+        _ => Box::new(Route::new(problem, t_f, path.map(|path| path.extremal))),
+    };
+    (solved, Some(motion))
 }
 
 /// The optimal protocol and its path.
@@ -287,102 +263,6 @@ const MOTION_RTOL: f64 = 1e-12;
 /// The least time in which there is a protocol with `v >= 1`, or `v > 0` without the bound; 0 for an acceleration.
 pub fn shortest_time(transition: &Transition, bounded: bool) -> Option<f64> {
     Some(Problem::of(transition, bounded)?.t_min())
-}
-
-/// The optimal feedback: velocity and multipliers.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Feedback {
-    /// Its velocity, which may be too small for a number.
-    pub v: f64,
-    /// Its logarithm.
-    pub ln_v: f64,
-    /// The multiplier of the floor: the derivative of the cost rate with respect to `v`; 0 above the floor.
-    pub pressure: f64,
-}
-
-/// The start of an optimal protocol, on a path to steady sliding.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Position {
-    /// The contact lifetime.
-    pub theta: f64,
-    /// 1 less that.
-    pub rest: f64,
-    /// By how much the contact lifetime is above that of steady sliding at the end.
-    pub drop: f64,
-    pub time_left: f64,
-    /// `drop`, and the time that is left by how much contacts age at first: times `1 - theta_1` under the bound. For a
-    /// rise it is a small difference of the two.
-    pub margin: f64,
-}
-
-/// Optimal feedback: what the optimal protocol does now, on the way to steady sliding at `v_f`. `None` where no protocol
-/// arrives in time, or where the solver could not certify its answer.
-pub(super) fn feedback(
-    law: Law,
-    v_f: f64,
-    position: Position,
-    bounded: bool,
-    rtol: f64,
-    stats: &mut SolverStats,
-) -> Option<Feedback> {
-    let to = Lifetime::steady(v_f);
-    let Position { theta, rest, drop, time_left, margin } = position;
-    // A change that no velocity shows, and none of theta.
-    let unseen = drop.abs() <= f64::EPSILON * time_left.min(theta).min(rest);
-    let drop = if unseen { 0.0 } else { drop };
-    let from = Lifetime::with(theta, rest);
-    let problem = Problem { law, from, to, fall: drop / to.theta, bounded };
-    // The least time of a rise is -drop, or, under the bound, ln(1 - drop/(1 - theta_1)).
-    let aged = -drop / to.rest;
-    let (beyond, size) = if drop >= 0.0 {
-        (time_left, time_left)
-    } else if !bounded {
-        (margin, margin)
-    } else if aged < 0.5 {
-        let parts = [margin / to.rest, above_ln_1p(aged)];
-        (parts[0] + parts[1], parts[0].abs() + parts[1] - problem.rest_beyond())
-    } else {
-        (time_left - problem.t_min(), time_left)
-    };
-    let rounding = ROUNDINGS * f64::EPSILON * size;
-    let beyond = if bounded && beyond <= rounding { 0.0 } else { beyond };
-    let time = search::Time { whole: time_left, beyond, doubt: rounding / beyond };
-    let (solved, member) = search::find_beyond(&problem, time, rtol);
-    *stats += solved.stats;
-    let optimum = solved.value?;
-    let pressure = if optimum.strategy == Strategy::Floor {
-        // On the bound -C = friction + V_theta (1 - theta), with the C of the arc that leaves it at theta_c, where 1 -
-        // theta_c = (1 - theta) e^-t: nothing cancels near theta = 1.
-        let held = optimum.time_at_floor;
-        let released = from.aged(held);
-        let grown = ln_1p(from.growth(held) / from.theta);
-        let leaving = (1.0 + law.a + law.b * released.ln) * exp(-held) / released.theta;
-        let friction = 1.0 + law.b * from.ln;
-        let v_theta = leaving + law.b * grown / from.rest;
-        (friction + law.a - v_theta * from.theta).max(0.0)
-    } else {
-        0.0
-    };
-    let ln_v = match member {
-        Some(member) if optimum.strategy != Strategy::Floor => member.extremal.start - from.ln,
-        _ => 0.0,
-    };
-    Some(Feedback { v: optimum.v_start, ln_v, pressure })
-}
-
-/// Roundings of what the time beyond the least one is a difference of.
-const ROUNDINGS: f64 = 64.0;
-
-/// `x - ln(1 + x)` for `0 <= x < 0.5`, without cancellation.
-fn above_ln_1p(x: f64) -> f64 {
-    // ln(1 + x) = 2 artanh s with s = x/(2 + x), and x - 2 s = s x.
-    let s = x / (2.0 + x);
-    let (square, mut power, mut sum) = (s * s, s, 0.0);
-    for k in 1..16 {
-        power *= square;
-        sum += power / f64::from(2 * k + 1);
-    }
-    s * x - 2.0 * sum
 }
 
 impl Problem {

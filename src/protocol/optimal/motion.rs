@@ -27,13 +27,7 @@ impl Optimal {
         let (theta_s, time_at_floor) =
             extremal.map_or((problem.to.theta, t_f), |found| (found.theta_s, found.time_at_floor));
         let arc = extremal.map(|found| Timed::new(&found.arc, time_at_floor, t_f));
-        let floor = Floor {
-            law: problem.law,
-            from: problem.from,
-            theta_s,
-            time: arc.as_ref().map_or(t_f, |arc| arc.start),
-            beta_s: -(1.0 + problem.law.a + problem.law.b * ln(theta_s)) / theta_s,
-        };
+        let floor = Floor::new(problem, theta_s, arc.as_ref().map_or(t_f, |arc| arc.start));
         let (held, moving) = (floor.length(), arc.as_ref().map_or(0.0, |arc| arc.pieces.length.abs()));
         let fraction = if arc.is_none() { 1.0 } else { held / (held + moving) };
         Optimal { law: problem.law, t_f, bounded: problem.bounded, floor, fraction, arc }
@@ -101,9 +95,20 @@ pub(super) struct Floor {
 }
 
 impl Floor {
+    /// The hold of `problem` that takes `time`, until the contact lifetime is `theta_s`.
+    pub fn new(problem: &Problem, theta_s: f64, time: f64) -> Floor {
+        let beta_s = -(1.0 + problem.law.a + problem.law.b * ln(theta_s)) / theta_s;
+        Floor { law: problem.law, from: problem.from, theta_s, time, beta_s }
+    }
+
+    /// The costate at the start.
+    pub fn costate_at_start(&self) -> f64 {
+        self.costate(self.from.ln, self.from.rest, self.time)
+    }
+
     /// Length of its coordinate. `ln theta` changes over its first value at the start, and theta and the costate over 1 at
     /// both ends: the logarithm of the time from either end, in these units, opens them.
-    fn length(&self) -> f64 {
+    pub fn length(&self) -> f64 {
         self.first() + ln_1p(0.5 * self.time)
     }
 
@@ -113,7 +118,7 @@ impl Floor {
     }
 
     /// The moment at `place`, from 0 at the start to 1 at the end.
-    fn at(&self, place: f64) -> Moment {
+    pub fn at(&self, place: f64) -> Moment {
         let along = self.length() * place;
         // The time gone and the time left.
         let (gone, left) = if along < self.first() {
@@ -171,6 +176,16 @@ pub(super) struct Timed {
 
 impl Timed {
     fn new(arc: &Arc, time_at_floor: f64, t_f: f64) -> Timed {
+        Timed::ending(arc, t_f, |total| if time_at_floor > 0.0 { (t_f - total).max(0.0) } else { 0.0 })
+    }
+
+    /// The arc from `start` to `end`.
+    pub fn between(arc: &Arc, start: f64, end: f64) -> Timed {
+        Timed::ending(arc, end, |_| start)
+    }
+
+    /// The arc until `t_f`, from a time that depends on how long it takes.
+    fn ending(arc: &Arc, t_f: f64, start: impl Fn(f64) -> f64) -> Timed {
         let pieces = arc.pieces();
         let edge = |piece: usize| piece as f64 / f64::from(pieces.count);
         let times: Vec<f64> = (0..pieces.count as usize).map(|i| pieces.time(edge(i), edge(i + 1))).collect();
@@ -188,7 +203,8 @@ impl Timed {
         left.reverse();
         let total = left[0];
         // Rounding of the search goes to the hold, if there is one.
-        let (start, scale) = if time_at_floor > 0.0 { ((t_f - total).max(0.0), 1.0) } else { (0.0, t_f / total) };
+        let start = start(total);
+        let scale = (t_f - start) / total;
         let middle = gone.iter().skip(1).zip(&left).find(|(gone, left)| gone > left).map_or(0.0, |(_, &left)| left);
         Timed { pieces, c: arc.c(), start, t_f, gone, left, scale, middle: t_f - scale * middle }
     }
@@ -202,7 +218,7 @@ impl Timed {
         // Rounding must not let the time run backwards where one piece or one way of counting gives way to the next.
         if self.gone[piece + 1] <= self.left[piece] {
             let gone = (self.gone[piece] + self.pieces.time(from, place)).min(self.gone[piece + 1]);
-            (self.start + self.scale * gone).min(self.middle).max(0.0)
+            (self.start + self.scale * gone).min(self.middle).max(self.start)
         } else {
             let left = (self.left[piece + 1] + self.pieces.time(place, to)).min(self.left[piece]);
             (self.t_f - self.scale * left).max(self.middle).min(self.t_f)

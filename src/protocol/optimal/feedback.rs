@@ -1,0 +1,192 @@
+//! The closed-loop law: what the optimal protocol does now, from the contact lifetime and the time that is left.
+
+use super::ceiling::Ceilings;
+use super::constrained::{self, Constrained};
+use super::extremal::Problem;
+use super::lifetime::Lifetime;
+use super::search::{self, Time};
+use super::{ArcKind, Bounds, FeedbackPoint, INFEASIBLE, Optimum, Strategy, slopes};
+use crate::model::Law;
+use crate::numerics::double_double::DoubleDouble;
+use crate::numerics::elementary::{exp, ln_1p};
+use crate::protocol::{Motion, Solved, SolverStats, Status};
+
+/// The closed-loop law: the optimal protocol from the contact lifetime `theta` to steady sliding at `v_f` in `t_left`.
+///
+/// `Infeasible` where no protocol arrives in time under the bounds, and outside the domain: `theta > 0`, below 1 with the
+/// floor.
+pub fn feedback_at(
+    law: Law,
+    theta: f64,
+    t_left: f64,
+    v_f: f64,
+    bounds: impl Into<Bounds>,
+    rtol: f64,
+) -> Solved<FeedbackPoint> {
+    let failed = |status, stats| Solved { status, value: None, stats };
+    let bounds = bounds.into();
+    let Some(problem) = posed(law, theta, t_left, v_f, &bounds) else {
+        return failed(Status::Infeasible, SolverStats::default());
+    };
+    let ceilings = Ceilings::new(law, problem.to, v_f, &bounds);
+    let Constrained { solved, path, sitting } =
+        constrained::find(&problem, &ceilings, Time::since(&problem, t_left), rtol);
+    let Solved { status, value, stats } = solved;
+    let Some(optimum) = value else { return failed(status, stats) };
+    let tolerance = search::quadrature_tolerance(rtol);
+    let point = match &path {
+        Some(path) => {
+            let kind = path.pieces().next().map_or(ArcKind::Free, |piece| piece.kind());
+            let arc = if optimum.time_at_floor > 0.0 { ArcKind::Floor } else { kind };
+            // What the optimum does now does not depend on a time that it then waits.
+            let gain =
+                if sitting > 0.0 { waiting_gain(&problem, path) } else { slopes::gain(&problem, path, tolerance) };
+            slopes::costate(&problem, path).zip(gain).map(|(costate, gain)| (costate, gain, arc))
+        }
+        None if sitting > 0.0 => {
+            let arc = if ceilings.z_v == 0.0 { ArcKind::VCeiling } else { ArcKind::TauCeiling };
+            Some(((problem.friction_end() + law.a) / theta, 0.0, arc))
+        }
+        // The floor to the end: with less theta no protocol arrives.
+        None => None,
+    };
+    let Some((costate, gain, arc)) = point else { return failed(Status::Infeasible, stats) };
+    let value = FeedbackPoint { v: optimum.v_start, work_to_go: optimum.work, costate, gain, arc };
+    Solved { status, value: Some(value), stats }
+}
+
+/// The gain before a wait at the end: `C` is that of the turn, whatever theta.
+fn waiting_gain(problem: &Problem, path: &super::clamp::Path) -> Option<f64> {
+    if path.extremal.time_at_floor > 0.0 {
+        return Some(0.0);
+    }
+    let Law { a, b } = problem.law;
+    let (theta, z) = path.pieces().next()?.ends()[0];
+    let friction = 1.0 + a * z + (b - a) * crate::numerics::elementary::ln(theta);
+    let excess = crate::numerics::elementary::exp_m1(z);
+    Some(-exp(z) / theta / excess * (friction - b + a) / (a * theta))
+}
+
+/// The problem from `theta` to steady sliding at `v_f`; `None` outside the domain.
+fn posed(law: Law, theta: f64, t_left: f64, v_f: f64, bounds: &Bounds) -> Option<Problem> {
+    let numbers = [law.a, law.b, theta, t_left, v_f].iter().all(|x| x.is_finite());
+    let inside = law.a > 0.0 && law.b >= 0.0 && theta > 0.0 && t_left > 0.0 && v_f > 1.0;
+    let young = theta < 1.0 || !bounds.floor;
+    (numbers && inside && young && bounds.is_valid()).then(|| Problem {
+        law,
+        from: Lifetime::with(theta, 1.0 - theta),
+        to: Lifetime::steady(v_f),
+        fall: (DoubleDouble::product(theta, v_f) + DoubleDouble::new(-1.0)).high,
+        bounded: bounds.floor,
+    })
+}
+
+/// The optimal protocol from the contact lifetime `theta` to steady sliding at `v_f` in `t_left`, and its motion.
+pub fn motion_from(
+    law: Law,
+    theta: f64,
+    t_left: f64,
+    v_f: f64,
+    bounds: impl Into<Bounds>,
+    rtol: f64,
+) -> (Solved<Optimum>, Option<Box<dyn Motion>>) {
+    let bounds = bounds.into();
+    let Some(problem) = posed(law, theta, t_left, v_f, &bounds) else { return (INFEASIBLE, None) };
+    super::motion_of(&problem, &Ceilings::new(law, problem.to, v_f, &bounds), t_left, rtol)
+}
+
+/// The optimal feedback: velocity and multipliers.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Feedback {
+    /// Its velocity, which may be too small for a number.
+    pub v: f64,
+    /// Its logarithm.
+    pub ln_v: f64,
+    /// The multiplier of the floor: the derivative of the cost rate with respect to `v`; 0 above the floor.
+    pub pressure: f64,
+}
+
+/// The start of an optimal protocol, on a path to steady sliding.
+#[derive(Debug, Clone, Copy)]
+pub struct Position {
+    /// The contact lifetime.
+    pub theta: f64,
+    /// 1 less that.
+    pub rest: f64,
+    /// By how much the contact lifetime is above that of steady sliding at the end.
+    pub drop: f64,
+    pub time_left: f64,
+    /// `drop`, and the time that is left by how much contacts age at first: times `1 - theta_1` under the bound. For a
+    /// rise it is a small difference of the two.
+    pub margin: f64,
+}
+
+/// Optimal feedback: what the optimal protocol does now, on the way to steady sliding at `v_f`. `None` where no protocol
+/// arrives in time, or where the solver could not certify its answer.
+pub fn feedback(
+    law: Law,
+    v_f: f64,
+    position: Position,
+    bounded: bool,
+    rtol: f64,
+    stats: &mut SolverStats,
+) -> Option<Feedback> {
+    let to = Lifetime::steady(v_f);
+    let Position { theta, rest, drop, time_left, margin } = position;
+    // A change that no velocity shows, and none of theta.
+    let unseen = drop.abs() <= f64::EPSILON * time_left.min(theta).min(rest);
+    let drop = if unseen { 0.0 } else { drop };
+    let from = Lifetime::with(theta, rest);
+    let problem = Problem { law, from, to, fall: drop / to.theta, bounded };
+    // The least time of a rise is -drop, or, under the bound, ln(1 - drop/(1 - theta_1)).
+    let aged = -drop / to.rest;
+    let (beyond, size) = if drop >= 0.0 {
+        (time_left, time_left)
+    } else if !bounded {
+        (margin, margin)
+    } else if aged < 0.5 {
+        let parts = [margin / to.rest, above_ln_1p(aged)];
+        (parts[0] + parts[1], parts[0].abs() + parts[1] - problem.rest_beyond())
+    } else {
+        (time_left - problem.t_min(), time_left)
+    };
+    let rounding = ROUNDINGS * f64::EPSILON * size;
+    let beyond = if bounded && beyond <= rounding { 0.0 } else { beyond };
+    let time = search::Time { whole: time_left, beyond, doubt: rounding / beyond };
+    let (solved, member) = search::find_beyond(&problem, time, rtol);
+    *stats += solved.stats;
+    let optimum = solved.value?;
+    let pressure = if optimum.strategy == Strategy::Floor {
+        // On the bound -C = friction + V_theta (1 - theta), with the C of the arc that leaves it at theta_c, where 1 -
+        // theta_c = (1 - theta) e^-t: nothing cancels near theta = 1.
+        let held = optimum.time_at_floor;
+        let released = from.aged(held);
+        let grown = ln_1p(from.growth(held) / from.theta);
+        let leaving = (1.0 + law.a + law.b * released.ln) * exp(-held) / released.theta;
+        let friction = 1.0 + law.b * from.ln;
+        let v_theta = leaving + law.b * grown / from.rest;
+        (friction + law.a - v_theta * from.theta).max(0.0)
+    } else {
+        0.0
+    };
+    let ln_v = match member {
+        Some(member) if optimum.strategy != Strategy::Floor => member.extremal.start - from.ln,
+        _ => 0.0,
+    };
+    Some(Feedback { v: optimum.v_start, ln_v, pressure })
+}
+
+/// Roundings of what the time beyond the least one is a difference of.
+const ROUNDINGS: f64 = 64.0;
+
+/// `x - ln(1 + x)` for `0 <= x < 0.5`, without cancellation.
+fn above_ln_1p(x: f64) -> f64 {
+    // ln(1 + x) = 2 artanh s with s = x/(2 + x), and x - 2 s = s x.
+    let s = x / (2.0 + x);
+    let (square, mut power, mut sum) = (s * s, s, 0.0);
+    for k in 1..16 {
+        power *= square;
+        sum += power / f64::from(2 * k + 1);
+    }
+    s * x - 2.0 * sum
+}

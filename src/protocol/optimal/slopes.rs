@@ -1,0 +1,115 @@
+//! Derivatives of the least work along a path (envelope theorem), the costate and the gain of the feedback law.
+
+use super::arc::{Chart, omega};
+use super::clamp::{Path, Piece};
+use super::extremal::Problem;
+use super::{ArcKind, Slopes, floor, motion};
+use crate::model::Law;
+use crate::numerics::elementary::{exp, exp_m1, ln};
+use crate::numerics::turning::turning;
+use crate::protocol::SolverStats;
+
+/// The derivatives of the work of `path`, whose quadratures are good to `tolerance`.
+pub(super) fn slopes(problem: &Problem, path: &Path, tolerance: f64, stats: &mut SolverStats) -> Option<Slopes> {
+    let Law { a, b } = problem.law;
+    let held = path.extremal.time_at_floor;
+    // At the floor ln v = 0, and the work is that of b = 1.
+    let aged = floor::work(&Law { a, b: 1.0 }, problem.from, held) - held;
+    let mut slopes = Slopes { a: 0.0, b: aged, v_i: 0.0, v_f: 0.0, v_ceiling: 0.0, tau_ceiling: 0.0 };
+    for piece in path.pieces() {
+        match piece {
+            Piece::Free { arc, .. } => {
+                let sums = arc.sums(tolerance)?;
+                stats.quadratures += 1;
+                stats.nodes += sums.nodes;
+                slopes.a += (sums.work - sums.slip - b * sums.state) / a;
+                slopes.b += sums.state;
+            }
+            Piece::Ceiling { arc, gap } => {
+                let sums = arc.sums(Some(gap));
+                stats.nodes += sums.nodes;
+                slopes.a += (sums.work - sums.slip - b * sums.state) / a;
+                slopes.b += sums.state;
+                if arc.kind == ArcKind::VCeiling {
+                    slopes.v_ceiling -= sums.price;
+                } else {
+                    slopes.tau_ceiling -= sums.price;
+                    slopes.a += sums.price_ln_v;
+                    slopes.b += sums.price_ln_theta;
+                }
+            }
+        }
+    }
+    let (theta_i, theta_f) = (problem.from.theta, problem.to.theta);
+    slopes.v_i = -costate(problem, path)? * theta_i * theta_i;
+    let last = path.pieces().last()?;
+    slopes.v_f = pressure(problem.law, last, true) * theta_f * theta_f;
+    Some(slopes)
+}
+
+/// Derivative of the work with respect to theta at the start.
+pub(super) fn costate(problem: &Problem, path: &Path) -> Option<f64> {
+    let held = path.extremal.time_at_floor;
+    if held > 0.0 {
+        return Some(-motion::Floor::new(problem, path.extremal.theta_s, held).costate_at_start());
+    }
+    Some(pressure(problem.law, path.pieces().next()?, false))
+}
+
+/// `(tau v + C)/(u - 1) = [tau + a - G/(u - 1)]/theta` at the start or at the end of a piece.
+fn pressure(law: Law, piece: &Piece, at_end: bool) -> f64 {
+    let (theta, z) = piece.ends()[usize::from(at_end)];
+    let friction = 1.0 + law.a * z + (law.b - law.a) * ln(theta);
+    let pressed = match piece {
+        Piece::Free { .. } => 0.0,
+        Piece::Ceiling { arc, gap } => {
+            let depth = if arc.falls() == at_end { arc.length } else { 0.0 };
+            gap.value(depth) / exp_m1(z)
+        }
+    };
+    (friction + law.a - pressed) / theta
+}
+
+/// `dv/dtheta` at the start, for a fixed time left.
+pub(super) fn gain(problem: &Problem, path: &Path, tolerance: f64) -> Option<f64> {
+    let Law { a, b } = problem.law;
+    if path.extremal.time_at_floor > 0.0 {
+        return Some(0.0);
+    }
+    let first = path.pieces().next()?;
+    let (theta, z) = first.ends()[0];
+    let v = exp(z) / theta;
+    match first.kind() {
+        ArcKind::VCeiling => return Some(0.0),
+        ArcKind::TauCeiling => return Some(-b * v / (a * theta)),
+        _ => {}
+    }
+    let (mut at_fixed_x, mut swing) = (0.0, 0.0);
+    for (i, piece) in path.pieces().enumerate() {
+        if let Piece::Free { arc, ends, .. } = piece {
+            let sums = arc.sums(tolerance)?;
+            let edge = |(theta, z): (f64, f64)| theta / exp_m1(z);
+            at_fixed_x += sums.sensitivity + edge(ends[1]) - if i == 0 { 0.0 } else { edge(ends[0]) };
+            swing += sums.swing;
+        }
+    }
+    let friction = 1.0 + a * z + (b - a) * ln(theta);
+    match path.extremal.arc.chart {
+        Chart::Turning { theta_h, ln_theta_h, x_start, x_end, x_squares }
+            if x_start * x_end <= 0.0 || x_squares.abs() > x_start.abs().min(x_end.abs()).powi(2) =>
+        {
+            // C of the turning point changes by k d ln theta_h; X/(u - 1) is regular at the turn.
+            let c_h = 1.0 + (b - a) * ln_theta_h;
+            let k = (c_h + a - b) / theta_h;
+            let omega = omega(&problem.law, c_h, x_start * x_start);
+            let turned = x_start / (omega * turning(x_start * omega).slope);
+            let inner = k * k / (exp_m1(z) * k - theta * k / at_fixed_x);
+            Some(-v / a * (a / theta + (a - b) * turned / theta_h + inner))
+        }
+        _ => {
+            let excess = exp_m1(z);
+            let by_c = -swing / a;
+            Some(-v / excess * ((friction - b + a) / (a * theta) + theta / (a * excess * by_c)))
+        }
+    }
+}
