@@ -53,10 +53,8 @@ fn first(source: &Source, arguments: &Arguments) -> Result<String, Failure> {
         .map_err(|error| unreadable(&arguments.dataset, &error))?;
     let mut text = source.name.clone();
     if let Some(rows) = source.rows {
-        text.push_str(&format!(": {}", words::things(rows, "row")));
-        if let Some(table) = table::find(&source.name) {
-            text.push_str(&format!(", each {}", table.doc()));
-        }
+        let meaning = table::find(&source.name).map(|table| format!("{}; ", table.doc())).unwrap_or_default();
+        text.push_str(&format!(": {meaning}{}", words::things(rows, "row")));
         if source.missing > 0 {
             text.push_str(&format!("; {} missing", words::things(source.missing, "part")));
         }

@@ -91,7 +91,7 @@ pub fn init(arguments: &Arguments) -> Result<(), Failure> {
     write(&path, &text)?;
     let path = path.display();
     say(&format!(
-        "{path}: a commented spec, and {SCHEMA}, with which editors complete and check it\n\
+        "written: {path}, a commented spec, and {SCHEMA}, its schema for editors\n\
          next:\n  slipsweep plan {path}\n  slipsweep run {path}\n"
     ))
 }

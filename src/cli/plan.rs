@@ -80,7 +80,7 @@ pub fn in_words(sweep: &Sweep, estimates: &Estimates, reading: f64) -> String {
     }
     let seconds = reading + estimates.elapsed(threads);
     text.push_str(&format!(
-        "in all: about {} on disk, {} on {}\n",
+        "total: about {} on disk, {} on {}\n",
         words::bytes(estimates.bytes()),
         if seconds < SHORT_SECONDS {
             "less than 0.3 s".to_owned()

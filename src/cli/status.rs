@@ -64,8 +64,9 @@ pub fn status(arguments: &Arguments) -> Result<(), Failure> {
 
 /// Parts and rows, table by table.
 fn counts(survey: &Survey) -> String {
-    let mut lines =
-        vec![["table", "parts", "there", "missing", "damaged", "foreign", "rows there"].map(str::to_owned).to_vec()];
+    let mut lines = vec![
+        ["table", "parts", "present", "missing", "damaged", "foreign", "rows present"].map(str::to_owned).to_vec(),
+    ];
     for table in &survey.tables {
         let missing = table.missing.iter().map(|range| range.end - range.start).sum();
         let (damaged, foreign) = (table.damaged.len() as u64, table.foreign.len() as u64);

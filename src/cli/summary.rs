@@ -98,8 +98,8 @@ pub fn blocks(name: &str, rows: u64, statistics: &TableStatistics) -> Vec<Summar
             let least: Vec<&StatisticsRow> = statistics.least().collect();
             if !least.is_empty() {
                 // Protocols of a family may miss the final state, with any work.
-                let arriving = if name == "shortcut" { " and arrive" } else { "" };
-                blocks.push(SummaryBlock::Line(2, format!("least gap among the rows that are ok{arriving}:")));
+                let arriving = if name == "shortcut" { " that reach the final state" } else { "" };
+                blocks.push(SummaryBlock::Line(2, format!("least gap of the rows with status ok{arriving}:")));
                 blocks.extend(listing(statistics, &least));
             }
             blocks.extend(ranges(statistics));

@@ -520,9 +520,7 @@ fn header(arguments: &Arguments, request: &TraceRequest, path: &TracedPath, trac
     text.push_str(&format!("  {}\n  status {}\n", all(&results(request, path, trace)), status(path.status)));
     let rows = words::things(trace.moments.len() as u64, "row");
     match arguments.points {
-        Some(_) => {
-            text.push_str(&format!("  {rows}: equally spaced times, and the states on the other side of a jump\n"))
-        }
+        Some(_) => text.push_str(&format!("  {rows}: equally spaced times, and the states before and after jumps\n")),
         None => {
             let (range, value) = (words::number(RANGE_RTOL), words::number(VALUE_RTOL));
             let lines = format!("straight lines between them are good to {range} of the range of a column");

@@ -43,13 +43,13 @@ const FIELDS: [Field<Row>; 7] = [
         Column::number(
             "gap",
             "1",
-            "(W_s - W*)/W*, computed without cancellation: good to a relative 1e-7, or to 1e-20",
+            "(W_s - W*)/W*, computed without cancellation; relative error up to 1e-7, or absolute error up to 1e-20",
         ),
         |row| row.best.gap,
     ),
     Field::new(Column::number("v_min", "v_0", "least velocity of the best shortcut"), |row| row.best.v_min),
     Field::new(
-        Column::number("work_error", "mu_0 sigma l", "bound of the error of work, by a second search").optional(),
+        Column::number("work_error", "mu_0 sigma l", "error bound of work, by a second search").optional(),
         |row| row.work_error,
     ),
 ];

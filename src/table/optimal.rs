@@ -35,7 +35,7 @@ const FIELDS: [Field<Row>; 8] = [
         |row| f64::from(row.optimum.strategy as u8),
     ),
     Field::new(
-        Column::number("work_error", "mu_0 sigma l", "bound of the error of work, by a second solve").optional(),
+        Column::number("work_error", "mu_0 sigma l", "error bound of work, by a second solve").optional(),
         |row| row.work_error,
     ),
 ];

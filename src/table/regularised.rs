@@ -20,21 +20,25 @@ const FIELDS: [Field<Row>; 9] = [
     Field::new(Column::number("work_optimal", "mu_0 sigma l", "least work of friction W* of any protocol"), |row| {
         row.found.work_optimal
     }),
-    Field::new(Column::number("gap", "1", "(work - W*)/W*, good to a relative rtol"), |row| row.found.gap),
+    Field::new(Column::number("gap", "1", "(work - W*)/W*; relative error up to rtol"), |row| row.found.gap),
     Field::new(Column::number("v_min", "v_0", "least velocity of the block; fewer digits far below 1"), |row| {
         row.found.v_min
     }),
     Field::new(Column::number("v_max", "v_0", "greatest velocity of the block"), |row| row.found.v_max),
     Field::new(
-        Column::number("v_c_min", "v_0", "least control velocity; both good to rtol of the greater of the two"),
+        Column::number(
+            "v_c_min",
+            "v_0",
+            "least control velocity; errors of both extremes are relative to the greater one",
+        ),
         |row| row.found.control_min,
     ),
     Field::new(Column::number("v_c_max", "v_0", "greatest control velocity"), |row| row.found.control_max),
     Field::new(
-        Column::number("work_error", "mu_0 sigma l", "bound of the error of work, by a second solve").optional(),
+        Column::number("work_error", "mu_0 sigma l", "error bound of work, by a second solve").optional(),
         |row| row.work_error,
     ),
-    Field::new(Column::number("gap_error", "1", "bound of the error of gap, by a second solve").optional(), |row| {
+    Field::new(Column::number("gap_error", "1", "error bound of gap, by a second solve").optional(), |row| {
         row.gap_error
     }),
 ];

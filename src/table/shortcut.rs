@@ -43,7 +43,11 @@ const FIELDS: [Field<Row>; 11] = [
         row.least.work
     }),
     Field::new(
-        Column::number("gap", "1", "(W_s - W*)/W*, good to rtol of 1 + gap; negative for a step that does not arrive"),
+        Column::number(
+            "gap",
+            "1",
+            "(W_s - W*)/W*; error up to rtol (1 + gap); may be negative for a step, which does not reach the final state",
+        ),
         |row| row.least.gap,
     ),
     Field::new(Column::number("v_min", "v_0", "least velocity between the ends; 0 if it underflows"), |row| {
@@ -56,8 +60,12 @@ const FIELDS: [Field<Row>; 11] = [
         row.of_solution(|member| member.friction_max)
     }),
     Field::new(
-        Column::number("terminal_error", "1", "theta(t_f) v_f - 1, the miss of a step; 0 for the other families")
-            .optional(),
+        Column::number(
+            "terminal_error",
+            "1",
+            "theta(t_f) v_f - 1, the relative distance of a step from its target; 0 for the other families",
+        )
+        .optional(),
         |row| row.of_solution(|member| member.miss),
     ),
     Field::new(
@@ -65,11 +73,11 @@ const FIELDS: [Field<Row>; 11] = [
         |row| number(row.obstacle.map(|obstacle| obstacle.code() as f64)),
     ),
     Field::new(
-        Column::number("work_error", "mu_0 sigma l", "bound of the error of work, by a second solve").optional(),
+        Column::number("work_error", "mu_0 sigma l", "error bound of work, by a second solve").optional(),
         |row| row.work_error,
     ),
     Field::new(
-        Column::number("gap_error", "1", "bound of the error of gap, by a second solve of both works").optional(),
+        Column::number("gap_error", "1", "error bound of gap, by a second solve of both works").optional(),
         |row| row.least.gap_error,
     ),
 ];

@@ -49,8 +49,8 @@ const FIELDS: [Field<Row>; 11] = [
         Column::number(
             "t_peak",
             "l/v_0",
-            "time of v_peak, to a relative rtol over the overshoot v_peak/v_f - 1; null if the peak is only approached, \
-         if undecided, or if not known to that accuracy",
+            "time of v_peak; relative error up to rtol divided by the overshoot v_peak/v_f - 1; null if the peak is only \
+         approached, if undecided, or if not known to that accuracy",
         ),
         |row| row.of_solution(|response| number(response.t_peak)),
     ),
@@ -99,7 +99,7 @@ const FIELDS: [Field<Row>; 11] = [
             "first_lyapunov_coefficient",
             "1",
             "first Lyapunov coefficient at the critical stiffness for this mass and v_f: negative if the Hopf point is \
-         supercritical, positive if a limit cycle may be met above it; null for b <= a and for m = 0",
+         supercritical, positive if it is subcritical; null for b <= a and for m = 0",
         )
         .optional(),
         |row| number(row.lyapunov),

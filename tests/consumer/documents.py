@@ -7,7 +7,7 @@ order, in an empty folder of the page's own:
 
 - `toml` that begins with `name = "NAME"` is saved as NAME.toml before the first command;
 - `sh` and `python` run;
-- `text` must occur in their standard output;
+- `text` must occur in their standard output, and `output` with other numbers: those of times, sizes and differences;
 - a picture `pictures/NAME.svg` must be a file that they wrote, byte for byte.
 
 A page without commands shows measurements, which `benches/document` writes with their pictures.
@@ -54,6 +54,11 @@ def blocks_of(text):
     return re.findall(r"^```(\w+)\n(.*?)^```$", text, re.MULTILINE | re.DOTALL)
 
 
+def masked(text):
+    """A text without its numbers, units of time and size, and spacing."""
+    return re.sub(r"\s+", " ", re.sub(r"[\d.,]*\d(e-?\d+)?( ?(ns|µs|ms|s|min|h|kB|MB|GB|TB)\b)?", "#", text)).strip()
+
+
 def run_page(page, variables, write):
     """Runs the blocks of a page and checks its output and pictures; returns how many blocks ran."""
     text = page.read_text()
@@ -76,6 +81,10 @@ def run_page(page, variables, write):
                 count += 1
             elif language == "text":
                 stale.append((code, output))
+            elif language == "output":
+                for line in code.splitlines():
+                    if line != "[...]" and masked(line) not in {masked(other) for other in printed.splitlines()}:
+                        sys.exit(f"{name}: no line like this is printed:\n{line}\nprinted:\n{printed}")
         if not count:
             return 0
         for code, output in stale:

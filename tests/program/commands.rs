@@ -30,7 +30,7 @@ fn run_reports_the_answers_of_a_physicist() {
     let text = String::from_utf8_lossy(&output.stdout);
     for line in [
         "gap: 482,403 rows (",
-        "  least gap among the rows that are ok:\n  at a = 0.03 mu_0, b = 0.05 mu_0, v_i = 3 v_0, v_f = 100 v_0\n",
+        "  least gap of the rows with status ok:\n  at a = 0.03 mu_0, b = 0.05 mu_0, v_i = 3 v_0, v_f = 100 v_0\n",
         "best_cubic: 3 rows (3 ok)",
         "optimal: 3 rows (3 ok)",
         "crossover: 1 row (1 ok)",
