@@ -99,7 +99,7 @@ impl Kind {
         };
         let ours = || "name a folder that `slipsweep run` wrote".to_owned();
         match self {
-            Kind::Dataset => ("a dataset", format!("`slipsweep summary {shown}` says what it contains")),
+            Kind::Dataset => ("a dataset", format!("`slipsweep summary {shown}` shows its contents")),
             Kind::Datasets => ("a folder of datasets", format!("name one of them: {}", datasets(path).join(", "))),
             Kind::Table => ("the folder of a table", name(above(path), "dataset")),
             Kind::Part => ("a part of a table", name(above(path).and_then(|table| above(&table)), "dataset")),

@@ -81,7 +81,7 @@ pub fn help(units: &Units, quantity: Quantity, value: f64) -> &'static str {
         Units::Scaled if scaled >= 1.0 => "choose values in the range",
         Units::Si(_) if scaled > 1.0 => PROBABLY_SCALED,
         Units::Scaled => "velocities are in units of v_0; for m/s, add `units = \"si\"` and the scales to [model]",
-        Units::Si(_) => "velocities are in m/s, as `units = \"si\"` says, and above v_0; or lower v_0",
+        Units::Si(_) => "with `units = \"si\"`, velocities are in m/s; choose one above v_0, or lower v_0",
     }
 }
 
@@ -99,7 +99,7 @@ pub fn doubt(prefix: &str, units: &Units, axis: &Axis) -> Option<SpecError> {
     };
     (greatest > MAX_PLAUSIBLE_VELOCITY).then(|| {
         let (key, expected) =
-            (format!("{prefix}axes.{}", axis.quantity.name()), "velocities in m/s, as `units = \"si\"` says");
+            (format!("{prefix}axes.{}", axis.quantity.name()), "velocities in m/s, because of `units = \"si\"`");
         SpecError::new(key, format!("{greatest:?} m/s is unphysically fast"), expected, PROBABLY_SCALED)
     })
 }

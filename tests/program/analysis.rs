@@ -130,7 +130,7 @@ fn queries_answer_in_every_format() {
     assert_eq!(json, "{\"t_f\":0.02,\"gap\":null,\"status\":\"infeasible\"}\n");
     let nothing = printed(folder.path(), &["query", "results/test", "SELECT t_f, gap FROM gap LIMIT 0"]);
     assert_eq!(nothing, "t_f    gap\nl/v_0  1\n");
-    // A file says by its name what it holds, and can be asked again.
+    // The ending of a file selects its format, and the file can be queried again.
     for (file, table) in [("least.parquet", &with_units), ("least.csv", &without)] {
         let arguments = ["query", "results/test", least, "--out", file];
         assert_eq!(printed(folder.path(), &arguments), format!("written to {file}\n"));

@@ -187,7 +187,7 @@ fn regress_no_command_loses_its_answer() {
         let output = shell.output().expect("runs");
         (output.status.code(), String::from_utf8_lossy(&output.stderr).into_owned())
     };
-    // What says nothing loses nothing.
+    // A command without output loses nothing.
     assert_eq!(sh(&["run", "spec.toml", "--quiet"], ">&-"), (Some(0), String::new()));
     let commands: [&[&str]; 7] = [
         &["verify", "results/test"],
@@ -207,7 +207,7 @@ fn regress_no_command_loses_its_answer() {
     }
 }
 
-/// A command that only reads ends at once, and says that nothing is changed.
+/// A command that only reads ends at once, and reports that nothing has changed.
 #[cfg(unix)]
 #[test]
 fn a_command_that_reads_can_be_stopped() {
@@ -282,8 +282,8 @@ fn blocks_are_no_rows_to_a_plan() {
     fs::write(folder.path().join("spec.toml"), spec).expect("is writable");
     let output = slipsweep(folder.path()).args(["plan", "spec.toml"]).output().expect("runs");
     let text = String::from_utf8_lossy(&output.stdout);
-    let total = text.lines().find_map(|line| line.strip_prefix("in all: ")).expect("says");
-    let time = total.split("on disk, ").nth(1).expect("says");
+    let total = text.lines().find_map(|line| line.strip_prefix("total: ")).expect("is printed");
+    let time = total.split("on disk, ").nth(1).expect("is printed");
     assert!(time.contains(" s on "), "{total}");
 }
 

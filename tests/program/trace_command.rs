@@ -144,7 +144,7 @@ fn coefficients_are_scaled_with_the_duration() {
 }
 
 #[test]
-fn what_does_not_exist_says_which_bound() {
+fn what_does_not_exist_states_which_bound() {
     let t_min = "0.3954147722546";
     for name in ["optimal", "best_cubic", "bounded_velocity", "compliant"] {
         let (code, text) = complaint(&[&[name], DOWN]);
@@ -401,7 +401,7 @@ fn a_row_over_time_is_the_protocol_of_its_numbers() {
 }
 
 #[test]
-fn a_row_without_a_path_says_why() {
+fn a_row_without_a_path_states_why() {
     let folder = tempfile::tempdir().expect("is writable");
     dataset(folder.path());
     let complaint = |arguments: &[&str]| {

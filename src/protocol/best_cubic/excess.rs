@@ -131,7 +131,7 @@ impl Excess<'_> {
 /// The meeting point of both halves.
 const HALF: f64 = 0.5;
 
-/// `W_s - W*` of a shortcut that costs `work`; `None` where the optimal feedback is not to be had on the way.
+/// `W_s - W*` of a shortcut that costs `work`; `None` where the optimal feedback is not available along it.
 pub(super) fn over_optimum(
     transition: &Transition,
     path: &Path,

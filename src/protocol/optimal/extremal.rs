@@ -489,7 +489,7 @@ impl Extremal {
         }
     }
 
-    /// Derivative of the total time with respect to the parameter; `starts_free` says whether the first free piece is the
+    /// Derivative of the total time with respect to the parameter; `starts_free` states whether the first free piece is the
     /// start of the extremal.
     pub fn rate_of(&self, free: &FreeSums, starts_free: bool) -> f64 {
         match self.rate {

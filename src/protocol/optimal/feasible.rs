@@ -99,8 +99,8 @@ struct Least<'a> {
 }
 
 impl Least<'_> {
-    /// The distance, up to `most`, from a ceiling that takes for ever at which the limit of the time is `t_f`; the time
-    /// falls with the distance.
+    /// Distance, up to `most`, from a ceiling of infinite time at which the limit of the time is `t_f`; the time falls with
+    /// the distance.
     fn distance(&self, most: f64, ceilings: impl Fn(f64) -> Ceilings) -> f64 {
         let beyond = |ln_distance: f64| {
             let time = match feasible(self.problem, &ceilings(exp(ln_distance))) {
