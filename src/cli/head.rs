@@ -23,6 +23,10 @@ pub struct Arguments {
 }
 
 /// Prints the first rows of one table or of all tables.
+///
+/// # Errors
+///
+/// A path without tables, or a part that cannot be read.
 pub fn head(arguments: &Arguments) -> Result<(), Failure> {
     kind::expect_rows(&arguments.dataset)?;
     super::note_at(&arguments.dataset);

@@ -53,6 +53,10 @@ impl Question {
 const SCHEMA: &str = "slipsweep.schema.json";
 
 /// Writes a spec and its JSON Schema.
+///
+/// # Errors
+///
+/// An illegal name, an existing file, or a file that cannot be written.
 pub fn init(arguments: &Arguments) -> Result<(), Failure> {
     let given = arguments.name.display();
     let bare = match arguments.name.extension() {

@@ -123,6 +123,10 @@ impl Kind {
 }
 
 /// Checks that `path` is one of `kinds`.
+///
+/// # Errors
+///
+/// What the path is instead.
 pub fn expect(path: &Path, kinds: &[Kind]) -> Result<(), Failure> {
     let found = Kind::of(path);
     if kinds.contains(&found) {
@@ -139,6 +143,10 @@ pub fn expect(path: &Path, kinds: &[Kind]) -> Result<(), Failure> {
 }
 
 /// Checks that `path` may be a spec; the reader of specs reports other errors.
+///
+/// # Errors
+///
+/// What the path is instead.
 pub fn expect_spec(path: &Path) -> Result<(), Failure> {
     match Kind::of(path) {
         Kind::Spec | Kind::File | Kind::Folder | Kind::Device | Kind::Nothing => Ok(()),
@@ -147,6 +155,10 @@ pub fn expect_spec(path: &Path) -> Result<(), Failure> {
 }
 
 /// Checks that `path` may contain rows; the readers of datasets and of files report other errors.
+///
+/// # Errors
+///
+/// What the path is instead.
 pub fn expect_rows(path: &Path) -> Result<(), Failure> {
     match Kind::of(path) {
         Kind::Spec | Kind::Manifest | Kind::Datasets | Kind::Page | Kind::Picture => expect(path, &[Kind::Dataset]),

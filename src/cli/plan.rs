@@ -26,6 +26,10 @@ pub struct Arguments {
 const SHORT_SECONDS: f64 = 0.2;
 
 /// Prints the plan of a spec.
+///
+/// # Errors
+///
+/// A spec that is wrong.
 pub fn plan(arguments: &Arguments) -> Result<(), Failure> {
     let start = Instant::now();
     let sweep = load(&arguments.spec)?;

@@ -77,6 +77,10 @@ impl From<PlotError> for Failure {
 }
 
 /// Draws the requested pictures.
+///
+/// # Errors
+///
+/// A source that cannot be drawn, or a file that cannot be written.
 pub fn plot(arguments: &Arguments) -> Result<(), Failure> {
     let place = arguments.place()?;
     match arguments.sources.as_slice() {

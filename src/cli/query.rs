@@ -74,6 +74,10 @@ const POLL: Duration = Duration::from_millis(5);
 const STACK_BYTES: usize = 256 << 20;
 
 /// Answers a query.
+///
+/// # Errors
+///
+/// A query that is wrong, or tables that cannot be read.
 pub fn query(arguments: &Arguments) -> Result<(), Failure> {
     if env::var_os(INSIDE).is_some() {
         return inside(arguments);

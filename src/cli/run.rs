@@ -45,6 +45,10 @@ pub struct Arguments {
 }
 
 /// Runs a spec: reads and plans it, computes, encodes and publishes the missing parts, and summarises the tables.
+///
+/// # Errors
+///
+/// A spec that is wrong, an interrupted run, failed rows, or, with `--strict`, rows that are not `ok`.
 pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let start = Instant::now();
     let (sweep, folder) = subject(arguments)?;

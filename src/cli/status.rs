@@ -26,6 +26,10 @@ pub struct Arguments {
 const MAX_LISTED: usize = 10;
 
 /// Reports the parts of a dataset.
+///
+/// # Errors
+///
+/// A path that is not a dataset, or damaged parts.
 pub fn status(arguments: &Arguments) -> Result<(), Failure> {
     let path = &arguments.dataset;
     kind::expect_rows(path)?;

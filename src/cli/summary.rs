@@ -20,6 +20,10 @@ pub struct Arguments {
 }
 
 /// Prints the summary of a dataset.
+///
+/// # Errors
+///
+/// A path that is not a dataset, or damaged parts.
 pub fn summary(arguments: &Arguments) -> Result<(), Failure> {
     let (folder, manifest) = dataset(&arguments.dataset)?;
     let mut text = String::new();
@@ -50,6 +54,10 @@ pub fn survey(folder: &Folder, manifest: &Manifest, look: CheckDepth) -> Survey 
 }
 
 /// The contents of a dataset without damaged parts.
+///
+/// # Errors
+///
+/// Damaged parts, or parts of another sweep.
 pub fn contents(folder: &Folder, manifest: &Manifest) -> Result<Survey, Failure> {
     let survey = survey(folder, manifest, CheckDepth::Footer);
     for table in &survey.tables {

@@ -15,6 +15,10 @@ pub struct Arguments {
 }
 
 /// Prints one table or all.
+///
+/// # Errors
+///
+/// An unknown table.
 pub fn tables(arguments: &Arguments) -> Result<(), Failure> {
     let all: Vec<&dyn Table> = table::ALL.into_iter().chain(table::REDUCED.map(|(_, table)| table)).collect();
     let chosen = match &arguments.table {

@@ -179,6 +179,10 @@ struct Origin {
 }
 
 /// Traces a protocol.
+///
+/// # Errors
+///
+/// Illegal parameters, a protocol that does not exist, or a file that cannot be written.
 pub fn trace(arguments: &Arguments) -> Result<(), Failure> {
     let (format, output) = (arguments.output.format()?, &arguments.output);
     let request = match &arguments.table {

@@ -23,6 +23,10 @@ pub struct Arguments {
 }
 
 /// Verifies a dataset.
+///
+/// # Errors
+///
+/// A path that is not a dataset, a dataset that cannot be read, or rows that are wrong.
 pub fn verify(arguments: &Arguments) -> Result<(), Failure> {
     let path = &arguments.dataset;
     let (_, manifest) = dataset(path)?;

@@ -24,11 +24,19 @@ pub struct Unwritten {
 }
 
 /// Writes `bytes` to `path`. An incomplete file never has this name, even after a power cut.
+///
+/// # Errors
+///
+/// A file that cannot be written.
 pub fn write(path: &Path, bytes: &[u8]) -> Result<(), Unwritten> {
     write_by(path, bytes, |temporary, path| fs::rename(temporary, path))
 }
 
 /// Writes `bytes` to `path` in the same way, but never replaces a file: returns `false` if there is one.
+///
+/// # Errors
+///
+/// A file that cannot be written.
 pub fn write_new(path: &Path, bytes: &[u8]) -> Result<bool, Unwritten> {
     let link = |temporary: &Path, path: &Path| match fs::hard_link(temporary, path) {
         Ok(()) => fs::remove_file(temporary),
@@ -59,6 +67,10 @@ fn write_by(path: &Path, bytes: &[u8], place: impl Fn(&Path, &Path) -> io::Resul
 }
 
 /// Writes a file durably; `fill` writes the content.
+///
+/// # Errors
+///
+/// The error of `fill`, or of the file system.
 #[cfg(feature = "cli")]
 pub fn write_with<E: From<io::Error>>(path: &Path, fill: impl FnOnce(&mut File) -> Result<(), E>) -> Result<(), E> {
     publish(path, fill, |temporary, path| fs::rename(temporary, path), |_, source| source.into())
@@ -159,6 +171,10 @@ pub fn nearest_folder(folder: &Path) -> PathBuf {
 }
 
 /// Seconds to write a file of `bytes` bytes into `folder`. The file is removed again.
+///
+/// # Errors
+///
+/// A file that cannot be written.
 pub fn time(folder: &Path, bytes: usize) -> io::Result<Duration> {
     let folder = nearest_folder(folder);
     let content = vec![0; bytes];
@@ -171,6 +187,10 @@ pub fn time(folder: &Path, bytes: usize) -> io::Result<Duration> {
 }
 
 /// Creates `folder` and its missing parents, each durably.
+///
+/// # Errors
+///
+/// A folder that cannot be created.
 pub fn create_folder(folder: &Path) -> io::Result<()> {
     if folder.is_dir() {
         return Ok(());

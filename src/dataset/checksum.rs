@@ -33,6 +33,10 @@ pub fn entries() -> [KeyValue; 2] {
 }
 
 /// Inserts the checksums into a file whose footer has the [`entries`].
+///
+/// # Errors
+///
+/// Bytes that are not a Parquet file with the [`entries`].
 pub fn sealed(bytes: Vec<u8>) -> Result<Vec<u8>> {
     let bytes = Bytes::from(bytes);
     let metadata = ParquetMetaDataReader::new().parse_and_finish(&bytes)?;

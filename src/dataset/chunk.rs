@@ -48,6 +48,10 @@ pub fn page(present: Option<&Runs>, size: usize) -> Vec<u8> {
 
 impl Chunk {
     /// The bytes of the chunk, and its metadata for the file.
+    ///
+    /// # Errors
+    ///
+    /// The error of the compressor or of the encoder.
     pub fn encode(self, column: ColumnDescPtr, zstd: &mut Compressor<'_>) -> Result<(Bytes, ColumnCloseResult)> {
         let raw = self.data.len() + self.dictionary.as_ref().map_or(0, |(plain, _)| plain.len());
         let compression = if raw < WORTH_COMPRESSING {

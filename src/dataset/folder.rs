@@ -328,6 +328,10 @@ impl Folder {
     }
 
     /// Writes a part atomically.
+    ///
+    /// # Errors
+    ///
+    /// A file that cannot be written.
     pub fn write_part(&self, table: &str, part: u64, bytes: &[u8]) -> Result<(), DatasetError> {
         let path = self.part(table, part);
         atomic::write(&path, bytes).map_err(|error| unwritten(&path, error))

@@ -43,6 +43,10 @@ pub(crate) fn coded(file: &File) -> Result<ArrowReaderMetadata, ParquetError> {
 }
 
 /// Checks that the lists of the footer, if any, are as long as stated.
+///
+/// # Errors
+///
+/// A footer that is damaged or too large.
 pub fn check_footer(file: &impl ChunkReader) -> Result<(), ParquetError> {
     const TRAILER: u64 = 8;
     let Some(before) = file.len().checked_sub(TRAILER) else { return Ok(()) };
@@ -67,11 +71,19 @@ pub fn check_footer(file: &impl ChunkReader) -> Result<(), ParquetError> {
 }
 
 /// Checks that no page exceeds the limits, and that the decoded length of every page is known in advance.
+///
+/// # Errors
+///
+/// A header of a page that is damaged or too large.
 pub fn check_pages(file: &impl ChunkReader, metadata: &ParquetMetaData) -> Result<(), ParquetError> {
     page_headers(file, metadata, |_| {})
 }
 
 /// Checks the pages, and passes the header of each to `visit`.
+///
+/// # Errors
+///
+/// A header of a page that is damaged or too large.
 pub fn page_headers(
     file: &impl ChunkReader,
     metadata: &ParquetMetaData,

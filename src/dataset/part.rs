@@ -29,6 +29,10 @@ const BYTES_PER_ROW: usize = 9;
 pub const ZSTD_LEVEL: i32 = 1;
 
 /// The bytes of a part with their checksums, equal on every machine; and the statistics of its rows, which the bytes contain.
+///
+/// # Errors
+///
+/// The error of the encoder.
 pub fn encode(
     layout: &Layout,
     row_index: &RowIndex,

@@ -9,6 +9,10 @@ use crate::model::{Scales, Units};
 pub const UNIT_KEYS: [&str; 5] = ["units", "mu_0", "l", "v_0", "normal_stress"];
 
 /// The units of `model`.
+///
+/// # Errors
+///
+/// An unknown unit system, or a scale that is missing, illegal or unphysical.
 pub fn units(model: &ModelSpec) -> Result<Units, SpecError> {
     let scales = [
         ("mu_0", model.mu_0, "1"),
@@ -54,6 +58,10 @@ pub fn units(model: &ModelSpec) -> Result<Units, SpecError> {
 }
 
 /// Checks that `value`, in `units`, is legal for `quantity`; the error is the legal range.
+///
+/// # Errors
+///
+/// The legal range, in `units`.
 pub fn legal(units: &Units, quantity: Quantity, scale: Scale, value: f64) -> Result<(), String> {
     let (domain, unit) = (quantity.domain(), quantity.unit(scale));
     let scaled = units.scaled(unit, value);
@@ -105,6 +113,10 @@ pub fn doubt(prefix: &str, units: &Units, axis: &Axis) -> Option<SpecError> {
 }
 
 /// The units of a dataset with the spec `text`.
+///
+/// # Errors
+///
+/// A text that is not a spec, or illegal scales.
 pub fn units_of(text: &str) -> Result<Units, SpecError> {
     units(&Spec::parse(text)?.model)
 }

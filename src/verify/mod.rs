@@ -75,6 +75,10 @@ pub struct Worst {
 pub struct VerifyError(String);
 
 /// Audits `sample` rows of every table of the dataset in `path`.
+///
+/// # Errors
+///
+/// A manifest without a valid spec, or a part that cannot be read.
 pub fn verify(path: &Path, manifest: &Manifest, sample: u64, seed: u64) -> Result<Vec<Audit>, VerifyError> {
     let spec = Spec::parse(&manifest.spec)
         .map_err(|error| VerifyError(format!("the spec in the manifest cannot be read: {error}")))?;

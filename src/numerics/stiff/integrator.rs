@@ -169,6 +169,10 @@ impl<'a, Y: System<N>, const N: usize, const S: usize> Integrator<'a, Y, N, S> {
     }
 
     /// Takes one step, which ends at `limit` at the latest, and then exactly there.
+    ///
+    /// # Errors
+    ///
+    /// The reason why no step is accurate.
     #[inline(always)]
     pub fn step(&mut self, limit: f64) -> Result<DenseOutput<N, S>, Failure> {
         loop {
