@@ -18,7 +18,7 @@ import pyarrow.parquet as pq
 import xarray as xr
 
 # The quantities that can be axes, in the order of their columns.
-AXES = ["t_f", "a", "b", "v_i", "v_f", "family", "tau_ceiling", "alpha_2", "alpha_3", "k", "m", "dt", "delta_t"]
+AXES = ["t_f", "theta", "t_left", "a", "b", "v_i", "v_f", "family", "v_ceiling", "tau_ceiling", "alpha_2", "alpha_3", "k", "m", "dt", "delta_t"]
 
 
 # The program that a clone of the repository builds.

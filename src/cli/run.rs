@@ -259,12 +259,22 @@ fn account(outcome: &Outcome, seconds: f64) -> String {
     if rows == 0 {
         return "nothing to compute: every part exists\n".to_owned();
     }
-    let RunStats { optima, landscapes, best, shortcuts, crossovers, simulations, steps, quadratures, nodes } =
-        outcome.work;
+    let RunStats {
+        optima,
+        own_optima,
+        landscapes,
+        best,
+        shortcuts,
+        crossovers,
+        simulations,
+        steps,
+        quadratures,
+        nodes,
+    } = outcome.work;
     let (all, rate) = (words::things(rows, "row"), words::count((rows as f64 / seconds) as u64));
     let mut text = format!("{all} in {}: {rate} rows per second, writing included\n", words::duration(seconds));
     let spent: Vec<String> = [
-        (optima, "optimal protocol"),
+        (optima + own_optima, "optimal protocol"),
         (landscapes, "landscape"),
         (best, "best shortcut"),
         (shortcuts, "family shortcut"),

@@ -13,12 +13,14 @@ use crate::grid::{Domain, Point, Quantity, RTOL, Scale};
 use crate::model::{Law, Transition, Units};
 use crate::names::hint;
 use crate::plot::table::Condition;
-use crate::protocol::Status;
+use crate::protocol::optimal::Bounds;
 use crate::protocol::shortcut::{self, Case};
+use crate::protocol::{Motion, Status};
 use crate::sweep::{Spec, units};
 use crate::table;
 use crate::trace::{
-    self, Absence, COLUMNS, Parameter, Pathless, Protocol, RANGE_RTOL, Times, Trace, TracedPath, VALUE_RTOL,
+    self, Absence, COLUMNS, Disturbance, Disturbed, Parameter, Pathless, Protocol, RANGE_RTOL, Times, Trace,
+    TracedPath, VALUE_RTOL,
 };
 use crate::verify::scale;
 
@@ -28,6 +30,9 @@ use crate::verify::scale;
     allow_negative_numbers = true,
     after_help = "Examples:
   slipsweep trace optimal --t-f 0.02 --a 0.03 --b 0.05 --v-i 3 --v-f 100
+  slipsweep trace optimal --v-ceiling 300 --t-f 0.02 --a 0.03 --b 0.05 --v-i 3 --v-f 100 --out capped.csv
+  slipsweep trace optimal --from theta=0.3,t_left=0.015 --a 0.03 --b 0.05 --v-f 100
+  slipsweep trace optimal --disturb \"theta=+10% at 0.25\" --t-f 0.02 --a 0.03 --b 0.05 --v-i 3 --v-f 100
   slipsweep trace gap --alpha-2 -0.12 --alpha-3 -0.066 --t-f 0.02 --a 0.03 --b 0.05 --v-i 3 --v-f 100 --out cubic.csv
   slipsweep trace results/NAME optimal --row 17
   slipsweep trace results/NAME gap --where \"t_f=0.02, alpha_2=-0.12, alpha_3=-0.066\" --out row.csv"
@@ -59,9 +64,21 @@ pub struct Arguments {
     /// Velocity after the protocol, in v_0
     #[arg(long, value_name = "V", value_parser = |text: &str| legal(text, Quantity::FinalVelocity.domain()))]
     v_f: Option<f64>,
-    /// Friction ceiling, in mu_0 sigma (bounded_friction)
-    #[arg(long, value_name = "M", value_parser = |text: &str| legal(text, Quantity::FrictionBound.domain()))]
+    /// Velocity ceiling, in v_0 (optimal)
+    #[arg(long, value_name = "V", value_parser = |text: &str| legal(text, Quantity::VelocityCeiling.domain()))]
+    v_ceiling: Option<f64>,
+    /// Friction ceiling, in mu_0 sigma (optimal, bounded_friction)
+    #[arg(long, value_name = "M", value_parser = |text: &str| legal(text, Quantity::FrictionCeiling.domain()))]
     tau_ceiling: Option<f64>,
+    /// State and time left from which the protocol starts, as theta=0.3,t_left=0.015, instead of --v-i and --t-f (optimal)
+    #[arg(long, value_name = "STATE", value_parser = state, conflicts_with_all = ["v_i", "t_f", "table"])]
+    from: Option<State>,
+    /// Sudden change of theta at a fraction of the duration, as "theta=+10% at 0.25"; compares open and closed loop (optimal)
+    #[arg(long, value_name = "CHANGE", value_parser = disturbance, conflicts_with_all = ["from", "points", "table"])]
+    disturb: Option<Disturbance>,
+    /// The protocol after the disturbance: with the optimal velocity of the disturbed state, or with the velocity as planned
+    #[arg(long = "loop", value_name = "LOOP", default_value = "closed", requires = "disturb")]
+    feedback: Loop,
     /// Coefficient of t in theta, in units of 1/t_f as in the table `best_cubic` (gap)
     #[arg(long, value_name = "X", value_parser = |text: &str| legal(text, Quantity::Alpha2.domain()))]
     alpha_2: Option<f64>,
@@ -106,6 +123,60 @@ impl output::Format for Format {
         &[("csv", Format::Csv), ("parquet", Format::Parquet), ("txt", Format::Table)];
     const TABLE: Format = Format::Table;
     const PARQUET: Format = Format::Parquet;
+}
+
+/// The protocol that is shown after a disturbance.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum Loop {
+    /// The optimal velocity of the disturbed state
+    Closed,
+    /// The velocity as planned
+    Open,
+}
+
+/// The start of a protocol on the way.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct State {
+    theta: f64,
+    t_left: f64,
+}
+
+/// Reads `theta=0.3,t_left=0.015`.
+fn state(text: &str) -> Result<State, String> {
+    let expected = || "expected theta=THETA,t_left=TIME".to_owned();
+    let mut values = [None; 2];
+    for part in text.split(',') {
+        let (name, value) = part.split_once('=').ok_or_else(expected)?;
+        let quantities = [Quantity::Theta, Quantity::TimeLeft];
+        let place = quantities.iter().position(|quantity| quantity.name() == name.trim()).ok_or_else(expected)?;
+        let value = legal(value.trim(), quantities[place].domain()).map_err(|error| format!("{name}: {error}"))?;
+        if values[place].replace(value).is_some() {
+            return Err(format!("{name} occurs twice"));
+        }
+    }
+    let [Some(theta), Some(t_left)] = values else { return Err(expected()) };
+    Ok(State { theta, t_left })
+}
+
+/// Reads `theta=+10% at 0.25`.
+fn disturbance(text: &str) -> Result<Disturbance, String> {
+    let expected =
+        || "expected \"theta=+10% at 0.25\": a change in per cent, and a fraction of the duration".to_owned();
+    let (change, at) = text.split_once(" at ").ok_or_else(expected)?;
+    let (name, change) = change.split_once('=').ok_or_else(expected)?;
+    let percent = change.trim().strip_suffix('%').ok_or_else(expected)?.trim();
+    let percent: f64 = percent.parse().map_err(|_| expected())?;
+    let at: f64 = at.trim().parse().map_err(|_| expected())?;
+    if name.trim() != Quantity::Theta.name() {
+        return Err(expected());
+    }
+    if !(percent > -100.0 && percent <= 1e6) {
+        return Err("expected a change above -100 %, at most 1e6 %".to_owned());
+    }
+    if !(at > 0.0 && at < 1.0) {
+        return Err("expected a fraction of the duration between 0 and 1".to_owned());
+    }
+    Ok(Disturbance { change: percent / 100.0, at })
 }
 
 /// Reads the name of a protocol, or the path of a folder.
@@ -189,17 +260,16 @@ pub fn trace(arguments: &Arguments) -> Result<(), Failure> {
         Some(table) => arguments.row_of(table)?,
         None => arguments.request()?,
     };
-    let mut path =
-        request.protocol.path(&request.case, request.rtol).map_err(|absence| absent(&request.name, absence))?;
-    let times = arguments.points.map_or(Times::Fewest, |count| Times::Spaced(count as usize));
-    let Some(trace) = Trace::of(&*path.motion, &request.case.transition, times) else {
-        return Err(Failure::failed("the protocol has more detail than a trace can resolve"));
-    };
+    let (mut path, trace, effects) = arguments.traced(&request)?;
     let least = trace.moments.iter().map(|moment| moment.friction).fold(f64::INFINITY, f64::min);
     path.status = path.status.with_friction(least);
     let trace = trace.in_units(&request.units);
-    let header = header(arguments, &request, &path, &trace);
-    let facts = facts(arguments, &request, &path, &trace);
+    let mut header = header(arguments, &request, &path, &trace);
+    let mut facts = facts(arguments, &request, &path, &trace);
+    if let Some(effects) = effects {
+        header.push_str(&effects.text());
+        facts.extend(effects.facts());
+    }
     let version = env!("CARGO_PKG_VERSION");
     let bytes = match format {
         Format::Table => format!("{header}\n{}", table(&trace, &request.units)).into_bytes(),
@@ -223,12 +293,15 @@ const DEFAULT_RTOL: f64 = 1e-10;
 
 /// Whether the bound `v >= 1` matters to a protocol.
 fn has_bound(protocol: &str) -> bool {
-    matches!(protocol, "optimal" | "best_cubic" | "regularised")
+    matches!(protocol, "optimal" | "feedback" | "best_cubic" | "regularised")
 }
 
 /// Parameters of every protocol.
 const NEEDED: [Quantity; 5] =
     [Quantity::Time, Quantity::A, Quantity::B, Quantity::InitialVelocity, Quantity::FinalVelocity];
+
+/// What a protocol needs that starts from a state.
+const NEEDED_FROM_STATE: [Quantity; 3] = [Quantity::A, Quantity::B, Quantity::FinalVelocity];
 
 /// The flag that gives a quantity.
 fn flag(quantity: Quantity) -> String {
@@ -237,14 +310,17 @@ fn flag(quantity: Quantity) -> String {
 
 impl Arguments {
     /// The numbers of a protocol.
-    fn given(&self) -> [(Quantity, Option<f64>); 11] {
+    fn given(&self) -> [(Quantity, Option<f64>); 14] {
         [
             (Quantity::Time, self.t_f),
+            (Quantity::Theta, self.from.map(|state| state.theta)),
+            (Quantity::TimeLeft, self.from.map(|state| state.t_left)),
             (Quantity::A, self.a),
             (Quantity::B, self.b),
             (Quantity::InitialVelocity, self.v_i),
             (Quantity::FinalVelocity, self.v_f),
-            (Quantity::FrictionBound, self.tau_ceiling),
+            (Quantity::VelocityCeiling, self.v_ceiling),
+            (Quantity::FrictionCeiling, self.tau_ceiling),
             (Quantity::Alpha2, self.alpha_2),
             (Quantity::Alpha3, self.alpha_3),
             (Quantity::Stiffness, self.k),
@@ -268,8 +344,14 @@ impl Arguments {
         }
         let [t_f, a, b, v_i, v_f] = NEEDED.map(|quantity| point[quantity]);
         let (k, m, bounded) = (point[Quantity::Stiffness], point[Quantity::Mass], !self.unbounded);
+        let [v_ceiling, tau_ceiling] = [Quantity::VelocityCeiling, Quantity::FrictionCeiling].map(|axis| point[axis]);
+        let bounds = Bounds { floor: bounded, v_ceiling, tau_ceiling };
+        let (v_i, t_f) = self.from.map_or((v_i, t_f), |state| (1.0 / state.theta, state.t_left));
         let protocol = match (name, shortcut::find(name)) {
-            ("optimal", _) => Protocol::Optimal { bounded },
+            ("optimal", _) => match self.from {
+                Some(State { theta, .. }) => Protocol::OptimalFrom { theta, bounds },
+                None => Protocol::Optimal { bounds },
+            },
             ("best_cubic", _) => Protocol::BestCubic { bounded },
             ("compliant", _) => Protocol::Compliant { k, m },
             ("regularised", _) => Protocol::Regularised { k, m, delta_t: point[Quantity::Smoothing], bounded },
@@ -282,11 +364,7 @@ impl Arguments {
         Ok(TraceRequest {
             name: name.to_owned(),
             protocol,
-            case: Case {
-                transition: Transition { law: Law { a, b }, v_i, v_f },
-                t_f,
-                tau_ceiling: point[Quantity::FrictionBound],
-            },
+            case: Case { transition: Transition { law: Law { a, b }, v_i, v_f }, t_f, tau_ceiling },
             numbers: numbers.filter_map(|(quantity, given)| Some(Named::new(quantity.name(), given?, ""))).collect(),
             bounded: has_bound(name).then_some(bounded),
             rtol: self.rtol.unwrap_or(DEFAULT_RTOL),
@@ -295,18 +373,54 @@ impl Arguments {
         })
     }
 
+    /// The protocol, its trace, and what a disturbance does to it if one is requested.
+    fn traced(&self, request: &TraceRequest) -> Result<(TracedPath, Trace, Option<Effects>), Failure> {
+        let absent = |absence| absent(&request.name, absence);
+        let times = self.points.map_or(Times::Fewest, |count| Times::Spaced(count as usize));
+        let of = |motion: &dyn Motion| {
+            let trace = Trace::of(motion, &request.case.transition, times);
+            trace.ok_or_else(|| Failure::failed("the protocol has more detail than a trace can resolve"))
+        };
+        let Some((disturbance, Protocol::Optimal { bounds })) = self.disturb.zip(Some(request.protocol)) else {
+            let path = request.protocol.path(&request.case, request.rtol).map_err(absent)?;
+            let trace = of(&*path.motion)?;
+            return Ok((path, trace, None));
+        };
+        let found = Disturbed::new(&request.case, &bounds, &disturbance, request.rtol).map_err(absent)?;
+        let rest = if self.feedback == Loop::Open { &found.open } else { &found.closed };
+        let trace = of(&*found.head)?.then(of(&*rest.motion)?);
+        let effects = Effects {
+            disturbance,
+            t: found.t,
+            shown: self.feedback,
+            open: (found.open.work - found.planned.work, found.open.terminal_error),
+            closed: (found.closed.work - found.planned.work, found.closed.terminal_error),
+        };
+        Ok((TracedPath { work: rest.work, ..found.planned }, trace, Some(effects)))
+    }
+
     /// Checks that exactly the parameters of the protocol `name` are given.
     fn check(&self, name: &str) -> Result<(), Failure> {
-        let missing = self.given().into_iter().filter(|(quantity, given)| given.is_none() && NEEDED.contains(quantity));
+        let needed: &[Quantity] = if self.from.is_some() { &NEEDED_FROM_STATE } else { &NEEDED };
+        let missing = self.given().into_iter().filter(|(quantity, given)| given.is_none() && needed.contains(quantity));
         let missing: Vec<String> = missing.map(|(quantity, _)| flag(quantity)).collect();
         if !missing.is_empty() {
             return Err(wrong(format!("`{name}` needs {}", missing.join(", "))));
         }
+        for (is_given, flag) in [(self.from.is_some(), "--from"), (self.disturb.is_some(), "--disturb")] {
+            if is_given && name != "optimal" {
+                return Err(wrong(format!("`{name}` takes no {flag}")));
+            }
+        }
         let heeded: &[Quantity] = match name {
+            "optimal" if self.from.is_some() => {
+                &[Quantity::Theta, Quantity::TimeLeft, Quantity::VelocityCeiling, Quantity::FrictionCeiling]
+            }
+            "optimal" => &[Quantity::VelocityCeiling, Quantity::FrictionCeiling],
             "gap" => &[Quantity::Alpha2, Quantity::Alpha3],
             "step_response" | "compliant" => &[Quantity::Stiffness, Quantity::Mass],
             "regularised" => &[Quantity::Stiffness, Quantity::Mass, Quantity::Smoothing],
-            _ if shortcut::find(name).is_some_and(|family| family.uses_tau_ceiling()) => &[Quantity::FrictionBound],
+            _ if shortcut::find(name).is_some_and(|family| family.uses_tau_ceiling()) => &[Quantity::FrictionCeiling],
             _ => &[],
         };
         for (quantity, given) in self.given().into_iter().filter(|(quantity, _)| !NEEDED.contains(quantity)) {
@@ -463,6 +577,43 @@ fn the_row(path: &Path, folder: &Folder, table: &ManifestTable, conditions: &[St
             let found = format!("{what}\n  found: rows {}{more}", shown.join(", "));
             Err(refused(found, "one row", format!("--row {}", several[0])))
         }
+    }
+}
+
+/// What a disturbance does to a protocol: the work beyond the planned one and the terminal error, by loop.
+struct Effects {
+    disturbance: Disturbance,
+    t: f64,
+    shown: Loop,
+    open: (f64, f64),
+    closed: (f64, f64),
+}
+
+impl Effects {
+    fn text(&self) -> String {
+        let change = words::number(100.0 * self.disturbance.change);
+        let sign = if self.disturbance.change > 0.0 { "+" } else { "" };
+        let line = |name: &str, (extra, error): (f64, f64)| {
+            format!("    {name}: work {:+.6}, terminal_error {}\n", extra, words::number(error))
+        };
+        let shown = if self.shown == Loop::Open { "open" } else { "closed" };
+        format!(
+            "  disturbed: theta {sign}{change} % at t = {}; more work than planned, and theta(t_f) v_f - 1\n{}{}  shown: {shown} loop\n",
+            words::number(self.t),
+            line("open loop, v(t) as planned", self.open),
+            line("closed loop, v(theta, t_left)", self.closed),
+        )
+    }
+
+    fn facts(&self) -> Vec<(String, String)> {
+        let shown = if self.shown == Loop::Open { "open" } else { "closed" };
+        [
+            ("disturbed_theta", format!("{:?}", self.disturbance.change)),
+            ("disturbed_at", format!("{:?}", self.t)),
+            ("loop", shown.to_owned()),
+        ]
+        .map(|(key, value)| (key.to_owned(), value))
+        .to_vec()
     }
 }
 

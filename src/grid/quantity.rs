@@ -10,6 +10,10 @@ use crate::protocol::shortcut::FAMILIES;
 pub enum Quantity {
     /// Duration of the protocol.
     Time,
+    /// State variable now.
+    Theta,
+    /// Time left.
+    TimeLeft,
     /// Direct effect.
     A,
     /// Evolution effect.
@@ -20,8 +24,10 @@ pub enum Quantity {
     FinalVelocity,
     /// Family of shortcuts.
     Family,
+    /// Velocity ceiling.
+    VelocityCeiling,
     /// Friction ceiling.
-    FrictionBound,
+    FrictionCeiling,
     /// Linear coefficient of the cubic shortcut.
     Alpha2,
     /// Quadratic coefficient of the cubic shortcut.
@@ -96,14 +102,17 @@ pub enum Scale {
 
 impl Quantity {
     /// Every quantity; axis columns come in this order.
-    pub const ALL: [Quantity; 13] = [
+    pub const ALL: [Quantity; 16] = [
         Quantity::Time,
+        Quantity::Theta,
+        Quantity::TimeLeft,
         Quantity::A,
         Quantity::B,
         Quantity::InitialVelocity,
         Quantity::FinalVelocity,
         Quantity::Family,
-        Quantity::FrictionBound,
+        Quantity::VelocityCeiling,
+        Quantity::FrictionCeiling,
         Quantity::Alpha2,
         Quantity::Alpha3,
         Quantity::Stiffness,
@@ -121,12 +130,15 @@ impl Quantity {
     fn definition(self) -> [&'static str; 3] {
         match self {
             Quantity::Time => ["t_f", "l/v_0", "duration of the protocol"],
+            Quantity::Theta => ["theta", "l/v_0", "state variable now, on the way to steady sliding at v_f"],
+            Quantity::TimeLeft => ["t_left", "l/v_0", "time left of the protocol"],
             Quantity::A => ["a", "mu_0", "direct effect: coefficient of ln v in friction"],
             Quantity::B => ["b", "mu_0", "evolution effect: coefficient of ln theta in friction"],
             Quantity::InitialVelocity => ["v_i", "v_0", "velocity of the initial steady state"],
             Quantity::FinalVelocity => ["v_f", "v_0", "velocity of the final steady state"],
             Quantity::Family => ["family", "", "family of shortcuts"],
-            Quantity::FrictionBound => ["tau_ceiling", "mu_0 sigma", "friction ceiling of bounded_friction"],
+            Quantity::VelocityCeiling => ["v_ceiling", "v_0", "velocity ceiling between the ends; inf: none"],
+            Quantity::FrictionCeiling => ["tau_ceiling", "mu_0 sigma", "friction ceiling between the ends; inf: none"],
             Quantity::Alpha2 => ["alpha_2", "1", "coefficient of t in theta of the cubic shortcut"],
             Quantity::Alpha3 => ["alpha_3", "v_0/l", "coefficient of t^2 in theta of the cubic shortcut"],
             Quantity::Stiffness => ["k", "mu_0 sigma/l", "stiffness of the spring"],
@@ -184,14 +196,19 @@ impl Quantity {
         let velocity = |text| Domain { least_excluded: true, ..Domain::new(text, 1.0, 1e12) };
         match self {
             Quantity::Time => Domain::new("1e-20 <= t_f <= 1e20", 1e-20, 1e20),
+            Quantity::Theta => Domain::new("1e-20 <= theta <= 1e20", 1e-20, 1e20),
+            Quantity::TimeLeft => Domain::new("1e-20 <= t_left <= 1e20", 1e-20, 1e20),
             Quantity::A => Domain::new("1e-6 <= a <= 10", 1e-6, 10.0),
             Quantity::B => Domain::new("0 <= b <= 10", 0.0, 10.0),
             Quantity::InitialVelocity => velocity("1 < v_i <= 1e12"),
             Quantity::FinalVelocity => velocity("1 < v_f <= 1e12"),
             Quantity::Family => Domain::new("a family", 0.0, (FAMILIES.len() - 1) as f64),
-            Quantity::FrictionBound => Domain {
+            Quantity::VelocityCeiling => {
+                Domain { apart: Some(f64::INFINITY), ..velocity("1 < v_ceiling <= 1e12, or inf: no ceiling") }
+            }
+            Quantity::FrictionCeiling => Domain {
                 apart: Some(f64::INFINITY),
-                ..Domain::new("1e-20 <= tau_ceiling <= 1e20, or inf: no bound", 1e-20, 1e20)
+                ..Domain::new("1e-20 <= tau_ceiling <= 1e20, or inf: no ceiling", 1e-20, 1e20)
             },
             Quantity::Alpha2 => Domain::new("-1e100 <= alpha_2 <= 1e100", -1e100, 1e100),
             Quantity::Alpha3 => Domain::new("-1e100 <= alpha_3 <= 1e100", -1e100, 1e100),
@@ -210,7 +227,7 @@ impl Quantity {
     pub fn default(self) -> Vec<f64> {
         match self {
             Quantity::Family => (0..FAMILIES.len()).map(|place| place as f64).collect(),
-            Quantity::Stiffness | Quantity::FrictionBound => vec![f64::INFINITY],
+            Quantity::Stiffness | Quantity::VelocityCeiling | Quantity::FrictionCeiling => vec![f64::INFINITY],
             Quantity::Mass | Quantity::Sampling => vec![0.0],
             _ => Vec::new(),
         }

@@ -27,7 +27,7 @@ pub enum Units {
 type Size = fn(&Scales) -> f64;
 
 /// Every unit of the model that a column may have, its SI unit and its size.
-const UNITS: [(&str, &str, Size); 13] = [
+const UNITS: [(&str, &str, Size); 17] = [
     ("1", "1", |_| 1.0),
     ("mu_0", "1", |s| s.mu_0),
     ("l/v_0", "s", |s| s.l / s.v_0),
@@ -38,6 +38,11 @@ const UNITS: [(&str, &str, Size); 13] = [
     ("mu_0 sigma l", "J/m^2", |s| s.mu_0 * s.normal_stress * s.l),
     ("mu_0 sigma v_0", "W/m^2", |s| s.mu_0 * s.normal_stress * s.v_0),
     ("mu_0 sigma l/v_0^2", "kg/m^2", |s| s.mu_0 * s.normal_stress * s.l / (s.v_0 * s.v_0)),
+    // Derivatives of work with respect to a and b, velocities and friction, and of velocity with respect to theta.
+    ("sigma l", "J/m^2", |s| s.normal_stress * s.l),
+    ("mu_0 sigma l/v_0", "J s/m^3", |s| s.mu_0 * s.normal_stress * s.l / s.v_0),
+    ("l", "m", |s| s.l),
+    ("v_0^2/l", "m/s^2", |s| s.v_0 * s.v_0 / s.l),
     // A coefficient relative to the duration has the same value in both systems, since theta is in l/v_0.
     ("1/t_f", "1/t_f", |_| 1.0),
     ("1/t_f^2", "1/t_f^2", |_| 1.0),

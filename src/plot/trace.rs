@@ -70,9 +70,24 @@ pub fn read(path: &Path) -> Result<TraceFile, PlotError> {
     }
     let fact = |name: &str| facts.iter().find(|(key, _)| key == &format!("slipsweep.{name}")).map(|(_, value)| value);
     let number = |name: &&str| Some(((*name).to_owned(), fact(name)?.parse().ok()?));
-    let parameters = ["t_f", "a", "b", "v_i", "v_f", "tau_ceiling", "alpha_2", "alpha_3", "k", "m", "delta_t"]
-        .iter()
-        .filter_map(number);
+    let parameters = [
+        "t_f",
+        "a",
+        "b",
+        "v_i",
+        "v_f",
+        "theta",
+        "t_left",
+        "v_ceiling",
+        "tau_ceiling",
+        "alpha_2",
+        "alpha_3",
+        "k",
+        "m",
+        "delta_t",
+    ]
+    .iter()
+    .filter_map(number);
     let name = label::literal(&fact("protocol").map_or(stem, Clone::clone));
     let points = fact("points").and_then(|points| points.parse().ok());
     Ok(TraceFile { name, parameters: parameters.collect(), columns, points })

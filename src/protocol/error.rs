@@ -5,7 +5,7 @@
 
 use crate::model::{Law, Transition};
 use crate::numerics::elementary::ln;
-use crate::protocol::optimal::{self, Optimum};
+use crate::protocol::optimal::{self, Bounds, Optimum};
 use crate::protocol::shortcut::{Case, Family, Shortcut};
 use crate::protocol::{Solved, SolverStats, Status};
 
@@ -41,8 +41,13 @@ pub fn of_excess(found: f64, finest: f64, replaced: f64) -> f64 {
 /// Error bound of the work of `optimum`, found by [`optimal::solve`] with these arguments; `None` if the second solve fails.
 ///
 /// The sensitivity to `t_f` is `dW*/dt_f`, so that the rounding of times matters if the work is a small difference.
-pub fn of_optimum(transition: &Transition, t_f: f64, bounded: bool, optimum: &Optimum) -> (Option<f64>, SolverStats) {
-    let Solved { status, value, stats } = optimal::solve(transition, t_f, bounded, TIGHTEST_RTOL);
+pub fn of_optimum(
+    transition: &Transition,
+    t_f: f64,
+    bounds: impl Into<Bounds>,
+    optimum: &Optimum,
+) -> (Option<f64>, SolverStats) {
+    let Solved { status, value, stats } = optimal::solve(transition, t_f, bounds, TIGHTEST_RTOL);
     let finest = value.filter(|_| status != Status::NotConverged);
     let scale = optimum.work.abs() + 0.25 * (optimum.hamiltonian * t_f).abs();
     (finest.map(|finest| bound(optimum.work, finest.work, scale)), stats)

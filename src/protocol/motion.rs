@@ -31,6 +31,11 @@ pub trait Motion: Sync {
     /// State at `s`, clamped to `[0, 1]`.
     fn at(&self, s: f64) -> Moment;
 
+    /// Whether steady sliding at the initial velocity precedes; false for a motion that starts from some state.
+    fn departs(&self) -> bool {
+        true
+    }
+
     /// Whether steady sliding at the final velocity follows; false for a motion that is cut off at some time.
     fn arrives(&self) -> bool {
         true

@@ -57,7 +57,7 @@ pub fn read(path: &Path, units: &Units) -> Result<Factor, SpecError> {
     Ok(factor)
 }
 
-/// Greatest number of points. Chosen: the values of all 13 quantities take 400 MiB of memory.
+/// Greatest number of points. Chosen: the values of all 16 quantities take 512 MiB of memory.
 const MAX_POINTS: usize = 1 << 22;
 
 /// Greatest size of a file, in bytes: 64 for each of [`MAX_POINTS`].

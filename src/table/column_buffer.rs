@@ -67,6 +67,8 @@ impl Projection {
 pub struct RunStats {
     /// Optimal protocols solved for `W*`.
     pub optima: u64,
+    /// Optimal protocols solved for one row alone: under ceilings, with slopes, or from a state on the way.
+    pub own_optima: u64,
     /// Landscapes prepared.
     pub landscapes: u64,
     /// Best shortcuts searched.
@@ -88,6 +90,7 @@ pub struct RunStats {
 impl std::ops::AddAssign for RunStats {
     fn add_assign(&mut self, other: RunStats) {
         self.optima += other.optima;
+        self.own_optima += other.own_optima;
         self.landscapes += other.landscapes;
         self.best += other.best;
         self.shortcuts += other.shortcuts;

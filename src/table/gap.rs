@@ -9,7 +9,7 @@ use std::sync::OnceLock;
 use rayon::prelude::*;
 
 use super::failpoint;
-use super::optimum_cache::{transition, work_error};
+use super::optimum_cache::{transition, without_ceilings, work_error};
 use super::{Column, ColumnBuffer, Definition, Job, Projection, RunStats, Stopped};
 use crate::grid::{Point, Quantity, Runs, Scale, View};
 use crate::model::Transition;
@@ -337,7 +337,7 @@ fn prepare(job: &Job<'_>, group: &Group, point: &Point, work: &mut RunStats) -> 
         let (solved, spent) = job.optimum_cache.get(group.tuple, point);
         *work += spent;
         if let Some(optimum) = solved.value.filter(|_| job.projection.has(GAP_ERROR)) {
-            error_optimal = work_error(job, point, &optimum, work);
+            error_optimal = work_error(point, &without_ceilings(job), &optimum, work);
         }
         (solved.status, solved.value.map(|optimum| optimum.work))
     });

@@ -1,30 +1,76 @@
-//! `optimal`: the protocol of least work.
+//! `optimal`: the protocol of least work, under ceilings of velocity and friction if there are any.
 
 use std::ops::Range;
 
-use super::optimum_cache::{OPTIMUM_AXES, work_error};
-use super::{Column, ColumnBuffer, Definition, Field, Job, Kind, RunStats, Stopped, columns, place, rows};
-use crate::protocol::optimal::Optimum;
+use super::optimum_cache::{self, transition, with_ceilings, work_error};
+use super::{Column, ColumnBuffer, Definition, Field, Job, Kind, RunStats, Stopped, columns, number, place, rows};
+use crate::grid::{Point, Quantity};
+use crate::protocol::optimal::{self, Bounds, Obstacle, Optimum, Slopes};
+use crate::protocol::{Solved, Status};
 
 /// The words of `strategy`, in the order of [`Strategy::ALL`](crate::protocol::optimal::Strategy::ALL).
 const STRATEGIES: &[&str] = &["speed_up", "slow_down", "floor"];
 
-/// A row.
+/// The words of `binding`.
+const BINDING: &[&str] = &["none", "v_ceiling", "tau_ceiling", "both"];
+
+/// The words of `bound`.
+const OBSTACLES: &[&str] = &["domain", "too_fast", "too_slow", "v_ceiling", "tau_ceiling"];
+
+/// A row. An infeasible one has no optimum, but least feasible numbers and the reason.
+#[derive(Default)]
 struct Row {
-    optimum: Optimum,
+    optimum: Option<Optimum>,
+    slopes: Option<Slopes>,
     work_error: f64,
+    t_least: Option<f64>,
+    v_ceiling_least: Option<f64>,
+    tau_ceiling_least: Option<f64>,
+    obstacle: Option<Obstacle>,
 }
 
-const FIELDS: [Field<Row>; 8] = [
-    Field::new(Column::number("work", "mu_0 sigma l", "least work of friction W*"), |row| row.optimum.work),
-    Field::new(Column::number("v_start", "v_0", "velocity just after the start, v(0+)"), |row| row.optimum.v_start),
-    Field::new(Column::number("v_end", "v_0", "velocity just before the end, v(t_f-)"), |row| row.optimum.v_end),
-    Field::new(Column::number("time_at_floor", "l/v_0", "time spent on the velocity floor v = 1"), |row| {
-        row.optimum.time_at_floor
+impl Row {
+    fn of_optimum(&self, cell: impl Fn(&Optimum) -> f64) -> f64 {
+        self.optimum.as_ref().map_or(f64::NAN, cell)
+    }
+
+    fn slope(&self, cell: impl Fn(&Slopes) -> f64) -> f64 {
+        self.slopes.as_ref().map_or(f64::NAN, cell)
+    }
+}
+
+const WORK: &str = "mu_0 sigma l";
+const TIME: &str = "l/v_0";
+const FRICTION: &str = "mu_0 sigma";
+/// Unit of the derivatives by `a` and `b`.
+const WORK_PER_COEFFICIENT: &str = "sigma l";
+/// Unit of the derivatives by velocities.
+const WORK_PER_VELOCITY: &str = "mu_0 sigma l/v_0";
+/// Unit of the derivative by friction.
+const WORK_PER_FRICTION: &str = "l";
+
+const FIELDS: [Field<Row>; 22] = [
+    Field::new(Column::number("work", WORK, "least work of friction W*"), |row| row.of_optimum(|found| found.work)),
+    Field::new(Column::number("v_start", "v_0", "velocity just after the start, v(0+)"), |row| {
+        row.of_optimum(|found| found.v_start)
     }),
-    Field::new(Column::number("hamiltonian", "mu_0 sigma v_0", "dW*/dt_f"), |row| row.optimum.hamiltonian),
-    Field::new(Column::number("theta_max", "l/v_0", "greatest state variable theta on the path"), |row| {
-        row.optimum.theta_max
+    Field::new(Column::number("v_end", "v_0", "velocity just before the end, v(t_f-)"), |row| {
+        row.of_optimum(|found| found.v_end)
+    }),
+    Field::new(Column::number("time_at_floor", TIME, "time spent on the velocity floor v = 1"), |row| {
+        row.of_optimum(|found| found.time_at_floor)
+    }),
+    Field::new(Column::number("time_at_v_ceiling", TIME, "time spent on the velocity ceiling"), |row| {
+        row.of_optimum(|found| found.time_at_v_ceiling)
+    }),
+    Field::new(Column::number("time_at_tau_ceiling", TIME, "time spent on the friction ceiling"), |row| {
+        row.of_optimum(|found| found.time_at_tau_ceiling)
+    }),
+    Field::new(Column::number("hamiltonian", "mu_0 sigma v_0", "dW*/dt_f"), |row| {
+        row.of_optimum(|found| found.hamiltonian)
+    }),
+    Field::new(Column::number("theta_max", TIME, "greatest state variable theta on the path"), |row| {
+        row.of_optimum(|found| found.theta_max)
     }),
     Field::new(
         Column::new(
@@ -32,22 +78,94 @@ const FIELDS: [Field<Row>; 8] = [
             Kind::Label(STRATEGIES),
             "start of the protocol: speed_up v(0+) > v_i, slow_down 1 < v(0+) <= v_i, floor v(0+) = 1",
         ),
-        |row| f64::from(row.optimum.strategy as u8),
+        |row| row.of_optimum(|found| f64::from(found.strategy as u8)),
+    ),
+    Field::new(Column::number("work_error", WORK, "error bound of work, by a second solve").optional(), |row| {
+        if row.optimum.is_some() { row.work_error } else { f64::NAN }
+    }),
+    Field::new(Column::number("friction_max", FRICTION, "greatest friction between the ends").optional(), |row| {
+        row.of_optimum(|found| found.friction_max)
+    }),
+    Field::new(
+        Column::new("binding", Kind::Label(BINDING), "the ceilings on which the protocol spends time").optional(),
+        |row| {
+            row.of_optimum(|found| {
+                f64::from(u8::from(found.time_at_v_ceiling > 0.0) + 2 * u8::from(found.time_at_tau_ceiling > 0.0))
+            })
+        },
     ),
     Field::new(
-        Column::number("work_error", "mu_0 sigma l", "error bound of work, by a second solve").optional(),
-        |row| row.work_error,
+        Column::number("t_least", TIME, "least feasible duration under the floor and the ceilings").optional(),
+        |row| number(row.t_least),
+    ),
+    Field::new(
+        Column::number("v_ceiling_least", "v_0", "least feasible velocity ceiling for t_f and tau_ceiling").optional(),
+        |row| number(row.v_ceiling_least),
+    ),
+    Field::new(
+        Column::number("tau_ceiling_least", FRICTION, "least feasible friction ceiling for t_f and v_ceiling")
+            .optional(),
+        |row| number(row.tau_ceiling_least),
+    ),
+    Field::new(
+        Column::new(
+            "bound",
+            Kind::Label(OBSTACLES),
+            "the bound that makes the row infeasible; too_fast: t_f < t_least, too_slow: theta cannot wait so long",
+        )
+        .optional(),
+        |row| number(row.obstacle.map(|obstacle| code(obstacle) as f64)),
+    ),
+    Field::new(
+        Column::number("dwork_da", WORK_PER_COEFFICIENT, "derivative of work with respect to a").optional(),
+        |row| row.slope(|slopes| slopes.a),
+    ),
+    Field::new(
+        Column::number("dwork_db", WORK_PER_COEFFICIENT, "derivative of work with respect to b").optional(),
+        |row| row.slope(|slopes| slopes.b),
+    ),
+    Field::new(
+        Column::number("dwork_dv_i", WORK_PER_VELOCITY, "derivative of work with respect to v_i").optional(),
+        |row| row.slope(|slopes| slopes.v_i),
+    ),
+    Field::new(
+        Column::number("dwork_dv_f", WORK_PER_VELOCITY, "derivative of work with respect to v_f").optional(),
+        |row| row.slope(|slopes| slopes.v_f),
+    ),
+    Field::new(
+        Column::number("dwork_dv_ceiling", WORK_PER_VELOCITY, "shadow price of v_ceiling; 0 if it does not bind")
+            .optional(),
+        |row| row.slope(|slopes| slopes.v_ceiling),
+    ),
+    Field::new(
+        Column::number("dwork_dtau_ceiling", WORK_PER_FRICTION, "shadow price of tau_ceiling; 0 if it does not bind")
+            .optional(),
+        |row| row.slope(|slopes| slopes.tau_ceiling),
     ),
 ];
 
-const COLUMNS: [Column; 8] = columns(&FIELDS);
+const COLUMNS: [Column; 22] = columns(&FIELDS);
 const WORK_ERROR: usize = place(&COLUMNS, "work_error");
+const T_LEAST: usize = place(&COLUMNS, "t_least");
+const V_CEILING_LEAST: usize = place(&COLUMNS, "v_ceiling_least");
+const TAU_CEILING_LEAST: usize = place(&COLUMNS, "tau_ceiling_least");
+const BOUND: usize = place(&COLUMNS, "bound");
+/// The slopes are the last columns.
+const FIRST_SLOPE: usize = place(&COLUMNS, "dwork_da");
 
-/// One row for each transition and duration.
+/// One row for each transition, duration and pair of ceilings.
 pub static OPTIMAL: Definition = Definition {
     name: "optimal",
     doc: "the protocol of least work",
-    axes: OPTIMUM_AXES,
+    axes: &[
+        Quantity::Time,
+        Quantity::A,
+        Quantity::B,
+        Quantity::InitialVelocity,
+        Quantity::FinalVelocity,
+        Quantity::VelocityCeiling,
+        Quantity::FrictionCeiling,
+    ],
     columns: &COLUMNS,
     rows_per_part: 1 << 16,
     cost: 2_500,
@@ -56,15 +174,48 @@ pub static OPTIMAL: Definition = Definition {
 };
 
 fn compute(job: &Job<'_>, range: Range<u64>, buffer: &mut ColumnBuffer) -> Result<RunStats, Stopped> {
+    let wants_slopes = job.projection.has_any(FIRST_SLOPE..COLUMNS.len());
     rows::each(job, range, 64, buffer, &FIELDS, |tuple, point| {
-        let (solved, mut work) = job.optimum_cache.get(tuple, point);
-        let row = solved.value.map(|optimum| {
-            let wanted = job.projection.has(WORK_ERROR);
-            let work_error = if wanted { work_error(job, point, &optimum, &mut work) } else { f64::NAN };
-            Row { optimum, work_error }
-        });
-        (solved.status, row, work)
+        let mut work = RunStats::default();
+        let bounds = with_ceilings(job, point);
+        let (solved, slopes) = if wants_slopes {
+            optimum_cache::slopes(job, point, &bounds, &mut work)
+        } else {
+            (optimum_cache::optimum(job, (tuple, point), &bounds, &mut work), None)
+        };
+        let mut row = Row { optimum: solved.value, slopes, ..least(job, point, &bounds, &solved) };
+        if let Some(optimum) = row.optimum.filter(|_| job.projection.has(WORK_ERROR)) {
+            row.work_error = work_error(point, &bounds, &optimum, &mut work);
+        }
+        (solved.status, Some(row), work)
     })
+}
+
+/// The least feasible numbers that are requested, and the reason of an infeasible row.
+fn least(job: &Job<'_>, point: &Point, bounds: &Bounds, solved: &Solved<Optimum>) -> Row {
+    let (transition, t_f, rtol) = (transition(point), point[Quantity::Time], job.rtol);
+    let wanted = |column: usize| job.projection.has(column).then_some(());
+    let is_infeasible = solved.status == Status::Infeasible;
+    Row {
+        t_least: wanted(T_LEAST).and_then(|()| optimal::feasible_times(&transition, bounds)).map(|(least, _)| least),
+        v_ceiling_least: wanted(V_CEILING_LEAST)
+            .and_then(|()| optimal::least_v_ceiling(&transition, t_f, bounds, rtol)),
+        tau_ceiling_least: wanted(TAU_CEILING_LEAST)
+            .and_then(|()| optimal::least_tau_ceiling(&transition, t_f, bounds, rtol)),
+        obstacle: wanted(BOUND).filter(|()| is_infeasible).and_then(|()| optimal::obstacle(&transition, t_f, bounds)),
+        ..Row::default()
+    }
+}
+
+/// The place of a reason among [`OBSTACLES`].
+fn code(obstacle: Obstacle) -> usize {
+    match obstacle {
+        Obstacle::Domain => 0,
+        Obstacle::TooFast { .. } => 1,
+        Obstacle::TooSlow { .. } => 2,
+        Obstacle::VCeiling { .. } => 3,
+        Obstacle::TauCeiling { .. } => 4,
+    }
 }
 
 #[cfg(test)]

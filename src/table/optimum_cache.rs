@@ -6,7 +6,7 @@ use super::memo::Memo;
 use super::{Job, RunStats};
 use crate::grid::{Point, Quantity};
 use crate::model::{Law, Transition};
-use crate::protocol::optimal::{self, Optimum};
+use crate::protocol::optimal::{self, Bounds, Optimum, Slopes};
 use crate::protocol::{Solved, Status, error};
 
 /// The axes of the optimal protocol.
@@ -22,9 +22,40 @@ pub fn transition(point: &Point) -> Transition {
     }
 }
 
+/// The bounds of a row without ceilings.
+pub fn without_ceilings(job: &Job<'_>) -> Bounds {
+    Bounds::new(job.bounded)
+}
+
+/// The bounds of a row of a table with the axes `v_ceiling` and `tau_ceiling`.
+pub fn with_ceilings(job: &Job<'_>, point: &Point) -> Bounds {
+    let [v_ceiling, tau_ceiling] = [Quantity::VelocityCeiling, Quantity::FrictionCeiling].map(|axis| point[axis]);
+    Bounds { floor: job.bounded, v_ceiling, tau_ceiling }
+}
+
+/// The optimal protocol of `point` under `bounds`, and the slopes of its work. Adds the solver statistics to `work`.
+pub fn slopes(job: &Job<'_>, point: &Point, bounds: &Bounds, work: &mut RunStats) -> (Solved<Optimum>, Option<Slopes>) {
+    let (solved, slopes) = optimal::slopes(&transition(point), point[Quantity::Time], bounds, job.rtol);
+    *work += RunStats { own_optima: 1, ..RunStats::from(solved.stats) };
+    (solved, slopes)
+}
+
+/// The optimal protocol of `point` under `bounds`: from the cache if there is no ceiling, since the tables share those. `point` has tuple
+/// number `tuple`. Adds the solver statistics to `work`.
+pub fn optimum(job: &Job<'_>, (tuple, point): (u64, &Point), bounds: &Bounds, work: &mut RunStats) -> Solved<Optimum> {
+    if !bounds.has_ceilings() {
+        let (solved, spent) = job.optimum_cache.get(tuple, point);
+        *work += spent;
+        return solved;
+    }
+    let solved = optimal::solve(&transition(point), point[Quantity::Time], bounds, job.rtol);
+    *work += RunStats { own_optima: 1, ..RunStats::from(solved.stats) };
+    solved
+}
+
 /// Error bound of the optimal work at `point`, from a second solve; NaN if that finds no optimum. Adds the solver statistics to `work`.
-pub fn work_error(job: &Job<'_>, point: &Point, optimum: &Optimum, work: &mut RunStats) -> f64 {
-    let (bound, stats) = error::of_optimum(&transition(point), point[Quantity::Time], job.bounded, optimum);
+pub fn work_error(point: &Point, bounds: &Bounds, optimum: &Optimum, work: &mut RunStats) -> f64 {
+    let (bound, stats) = error::of_optimum(&transition(point), point[Quantity::Time], bounds, optimum);
     *work += RunStats { optima: 1, ..RunStats::from(stats) };
     bound.unwrap_or(f64::NAN)
 }
@@ -46,21 +77,21 @@ impl Comparison {
     pub const NONE: Comparison = Comparison { work: f64::NAN, gap: f64::NAN, gap_error: f64::NAN, optimum: Status::Ok };
 }
 
-/// Compares a work and its error bound with the least work of the tuple of `point`. `bounded` requests the error bound of the gap. Adds
-/// the solver statistics to `work`.
+/// Compares a work and its error bound with the least work of the tuple of `point` under `bounds`. `wanted` requests the error bound of
+/// the gap. Adds the solver statistics to `work`.
 pub fn compare(
     job: &Job<'_>,
-    (tuple, point): (u64, &Point),
+    row: (u64, &Point),
+    bounds: &Bounds,
     (work_s, error): (f64, f64),
-    bounded: bool,
+    wanted: bool,
     work: &mut RunStats,
 ) -> Comparison {
-    let (optimum, spent) = job.optimum_cache.get(tuple, point);
-    *work += spent;
+    let optimum = optimum(job, row, bounds, work);
     let status = if optimum.status == Status::Infeasible { Status::Ok } else { optimum.status };
     let Some(least) = optimum.value else { return Comparison { optimum: status, ..Comparison::NONE } };
-    let gap_error = if bounded {
-        error::of_gap((work_s, error), (least.work, work_error(job, point, &least, work)))
+    let gap_error = if wanted {
+        error::of_gap((work_s, error), (least.work, work_error(row.1, bounds, &least, work)))
     } else {
         f64::NAN
     };

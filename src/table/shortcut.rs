@@ -3,11 +3,12 @@
 use std::ops::Range;
 
 use super::memo::Memo;
-use super::optimum_cache::{self, Comparison, transition};
+use super::optimum_cache::{self, Comparison, transition, without_ceilings};
 use super::{
     Column, ColumnBuffer, Definition, Field, Job, Kind, Projection, RunStats, Stopped, columns, number, place, rows,
 };
 use crate::grid::{Point, Quantity};
+use crate::protocol::optimal::Bounds;
 use crate::protocol::shortcut::{Case, FAMILIES, Family, Obstacle, Shortcut as Member};
 use crate::protocol::{SolverStats, error};
 
@@ -39,9 +40,14 @@ const FIELDS: [Field<Row>; 11] = [
     Field::new(Column::number("work", "mu_0 sigma l", "work of friction W_s"), |row| {
         row.of_solution(|member| member.work)
     }),
-    Field::new(Column::number("work_optimal", "mu_0 sigma l", "least work of friction W* of any protocol"), |row| {
-        row.least.work
-    }),
+    Field::new(
+        Column::number(
+            "work_optimal",
+            "mu_0 sigma l",
+            "least work of friction W* of any protocol; for bounded_friction under its tau_ceiling",
+        ),
+        |row| row.least.work,
+    ),
     Field::new(
         Column::number(
             "gap",
@@ -99,7 +105,7 @@ pub static SHORTCUT: Definition = Definition {
         Quantity::InitialVelocity,
         Quantity::FinalVelocity,
         Quantity::Family,
-        Quantity::FrictionBound,
+        Quantity::FrictionCeiling,
     ],
     columns: &COLUMNS,
     rows_per_part: 1 << 14,
@@ -131,7 +137,9 @@ fn compute(job: &Job<'_>, range: Range<u64>, buffer: &mut ColumnBuffer) -> Resul
         let mut status = member.status();
         if needs_optimum(job.projection) {
             let bounded = job.projection.has(GAP_ERROR);
-            row.least = optimum_cache::compare(job, (tuple, point), (member.work, row.work_error), bounded, &mut work);
+            let bounds = bounds(job, point);
+            let works = (member.work, row.work_error);
+            row.least = optimum_cache::compare(job, (tuple, point), &bounds, works, bounded, &mut work);
             status = status.compared_with(row.least.optimum);
         }
         let family = FAMILIES.get(point[Quantity::Family] as usize);
@@ -141,6 +149,14 @@ fn compute(job: &Job<'_>, range: Range<u64>, buffer: &mut ColumnBuffer) -> Resul
         row.member = Some(member);
         (status, Some(row), work)
     })
+}
+
+/// The bounds of the optimum with which the member of a family is compared: its own friction ceiling, or none.
+fn bounds(job: &Job<'_>, point: &Point) -> Bounds {
+    let free = without_ceilings(job);
+    let family = FAMILIES.get(point[Quantity::Family] as usize);
+    let is_capped = family.is_some_and(|family| family.uses_tau_ceiling());
+    if is_capped { free.with_tau_ceiling(point[Quantity::FrictionCeiling]) } else { free }
 }
 
 /// A member, and the error bound of its work if requested.
@@ -163,8 +179,11 @@ impl MemberCache {
 }
 
 fn solve(job: &Job<'_>, family: &dyn Family, point: &Point, work: &mut RunStats) -> Solution {
-    let case =
-        Case { transition: transition(point), t_f: point[Quantity::Time], tau_ceiling: point[Quantity::FrictionBound] };
+    let case = Case {
+        transition: transition(point),
+        t_f: point[Quantity::Time],
+        tau_ceiling: point[Quantity::FrictionCeiling],
+    };
     let t_min = case.transition.min_duration();
     if job.bounded && case.t_f < t_min {
         return Err(Obstacle::Time { t_min });

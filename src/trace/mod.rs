@@ -1,5 +1,6 @@
 //! A protocol over time: its selection, its moments and their output.
 
+mod disturbed;
 mod protocol;
 #[cfg(feature = "read")]
 mod row;
@@ -11,7 +12,8 @@ use crate::numerics::elementary::ln;
 use crate::protocol::{Moment, Motion};
 use crate::table::{Column, Kind};
 
-pub use protocol::{Absence, Parameter, Protocol, TracedPath, names};
+pub use disturbed::{Disturbance, Rest};
+pub use protocol::{Absence, Disturbed, Parameter, Protocol, TracedPath, names};
 #[cfg(feature = "read")]
 pub use row::{Pathless, TABLES, protocol_of};
 pub use sample::{RANGE_RTOL, VALUE_RTOL};
@@ -69,13 +71,20 @@ impl Trace {
         let jumps = |here: &Moment, steady: &Moment| {
             apart(here.v, steady.v) || here.v_c.is_some_and(|v_c| apart(v_c, steady.v))
         };
-        if moments.first().is_some_and(|first| jumps(first, &before)) {
+        if motion.departs() && moments.first().is_some_and(|first| jumps(first, &before)) {
             moments.insert(0, before);
         }
         if motion.arrives() && moments.last().is_some_and(|last| jumps(last, &after)) {
             moments.push(after);
         }
         Some(Trace { moments, v_min, v_max })
+    }
+
+    /// This trace, and `rest` after it.
+    pub fn then(mut self, rest: Trace) -> Trace {
+        let start = self.moments.last().map_or(0.0, |last| last.t);
+        self.moments.extend(rest.moments.into_iter().map(|moment| Moment { t: start + moment.t, ..moment }));
+        Trace { v_min: self.v_min.min(rest.v_min), v_max: self.v_max.max(rest.v_max), ..self }
     }
 
     /// This trace, converted from the units of the model to `units`.

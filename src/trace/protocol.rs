@@ -1,58 +1,34 @@
 //! The protocols that can be traced, by name, and their parameters.
 
+use super::disturbed::{self, Disturbance, Rest};
 use crate::model::Transition;
 use crate::protocol::cubic::{Landscape, LandscapeBuffers};
+use crate::protocol::optimal::{self, Bounds, Optimum};
 use crate::protocol::shortcut::{self, Case, FAMILIES, Family, Obstacle};
-use crate::protocol::{Motion, SolverStats, SpringBlock, Status, best_cubic, compliant, optimal, regularised};
+use crate::protocol::{Moment, Motion, SolverStats, SpringBlock, Status, best_cubic, compliant, regularised};
 use crate::stability::step_response::Step;
 
 /// A protocol, with its spring if that is elastic.
 #[derive(Clone, Copy)]
+#[allow(missing_docs)]
 pub enum Protocol {
-    /// The protocol of least work, with `v >= 1` if `bounded`.
-    Optimal {
-        /// Whether `v >= 1`.
-        bounded: bool,
-    },
+    /// The protocol of least work under these bounds.
+    Optimal { bounds: Bounds },
+    /// The rest of a protocol of least work, from a state on the way: the transition of its case starts at `v_i = 1/theta`, its `t_f` is the
+    /// time left.
+    OptimalFrom { theta: f64, bounds: Bounds },
     /// The cubic shortcut of least work, with `v >= 1` if `bounded`.
-    BestCubic {
-        /// Whether `v >= 1`.
-        bounded: bool,
-    },
+    BestCubic { bounded: bool },
     /// A point of the landscape, scaled: `alpha_2 t_f` and `alpha_3 t_f^2`.
-    CubicPoint {
-        /// `alpha_2 t_f`.
-        a_2: f64,
-        /// `alpha_3 t_f^2`.
-        a_3: f64,
-    },
+    CubicPoint { a_2: f64, a_3: f64 },
     /// The member of a family.
     Family(&'static dyn Family),
     /// The response of a block on a spring to a step of the control velocity.
-    StepResponse {
-        /// Stiffness of the spring.
-        k: f64,
-        /// Mass of the block.
-        m: f64,
-    },
+    StepResponse { k: f64, m: f64 },
     /// The smooth shortcut on a spring.
-    Compliant {
-        /// Stiffness of the spring.
-        k: f64,
-        /// Mass of the block.
-        m: f64,
-    },
+    Compliant { k: f64, m: f64 },
     /// The optimal protocol with smooth pieces instead of jumps, on a spring.
-    Regularised {
-        /// Stiffness of the spring.
-        k: f64,
-        /// Mass of the block.
-        m: f64,
-        /// Length of the smooth pieces.
-        delta_t: f64,
-        /// Whether the optimum keeps `v >= 1`.
-        bounded: bool,
-    },
+    Regularised { k: f64, m: f64, delta_t: f64, bounded: bool },
 }
 
 impl Protocol {
@@ -117,28 +93,40 @@ fn bound(bounded: &bool) -> &'static str {
     if *bounded { "v >= 1" } else { "v > 0" }
 }
 
+/// The bound that leaves no protocol of duration `t_f`.
+fn of_ceiling(obstacle: &optimal::Obstacle, t_f: f64) -> String {
+    match obstacle {
+        optimal::Obstacle::Domain => Obstacle::Domain.to_string(),
+        optimal::Obstacle::TooFast { t_least } => {
+            format!("t_f = {t_f} is too short under these ceilings: the least is {t_least}")
+        }
+        optimal::Obstacle::TooSlow { t_most } => {
+            format!("t_f = {t_f} is too long under these ceilings: the greatest is {t_most}")
+        }
+        optimal::Obstacle::VCeiling { above } => format!("v_ceiling must be above {above}"),
+        optimal::Obstacle::TauCeiling { above } => format!("tau_ceiling must be above {above}"),
+    }
+}
+
 /// The reason for a missing protocol.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+#[allow(missing_docs)]
 pub enum Absence {
     /// The reason given by the family.
     #[error("{0}")]
     Obstacle(Obstacle),
     /// No protocol is that short.
     #[error("t_f = {t_f} is too short for {}: the least is t_min = {t_min}", bound(.bounded))]
-    Time {
-        /// The requested duration.
-        t_f: f64,
-        /// The least duration.
-        t_min: f64,
-        /// Whether `v >= 1`, else `v > 0`.
-        bounded: bool,
-    },
+    Time { t_f: f64, t_min: f64, bounded: bool },
+    /// A ceiling leaves no protocol.
+    #[error("{}", of_ceiling(.obstacle, *.t_f))]
+    Ceiling { obstacle: optimal::Obstacle, t_f: f64 },
+    /// The state cannot arrive.
+    #[error("no protocol arrives from this theta in the time t_left under these bounds")]
+    State,
     /// No cubic shortcut keeps `v >= 1` (`bounded`) or `v > 0` in this time.
     #[error("no cubic shortcut keeps {} in this time", bound(.bounded))]
-    Cubic {
-        /// Whether `v >= 1`, else `v > 0`.
-        bounded: bool,
-    },
+    Cubic { bounded: bool },
     /// The least work of all cubic shortcuts is approached at the border `v = 0`, not attained.
     #[error(
         "no protocol attains the least work without the velocity floor: v falls to 0 somewhere\n  help: remove --unbounded"
@@ -186,7 +174,8 @@ impl Protocol {
     /// The reason why the protocol does not exist.
     pub fn path(&self, case: &Case, rtol: f64) -> Result<TracedPath, Absence> {
         match *self {
-            Protocol::Optimal { bounded } => optimum(case, bounded, rtol),
+            Protocol::Optimal { bounds } => optimum(case, &bounds, rtol),
+            Protocol::OptimalFrom { theta, bounds } => rest(case, theta, &bounds, rtol),
             Protocol::BestCubic { bounded } => least_cubic(case, bounded, rtol),
             Protocol::CubicPoint { a_2, a_3 } => gap(case, a_2, a_3, rtol),
             Protocol::Family(family) => member(family, case, rtol),
@@ -197,19 +186,114 @@ impl Protocol {
     }
 }
 
-fn optimum(case: &Case, bounded: bool, rtol: f64) -> Result<TracedPath, Absence> {
-    let (solved, motion) = optimal::motion(&case.transition, case.t_f, bounded, rtol);
+fn optimum(case: &Case, bounds: &Bounds, rtol: f64) -> Result<TracedPath, Absence> {
+    let (solved, motion) = optimal::motion(&case.transition, case.t_f, bounds, rtol);
     let (Some(value), Some(motion)) = (solved.value, motion) else {
-        return Err(without_optimum(case, bounded, solved.status));
+        return Err(without_optimum(case, bounds, solved.status));
     };
-    let parameters = vec![
+    Ok(TracedPath { motion, status: solved.status, work: value.work, parameters: of_optimum(&value, bounds) })
+}
+
+/// The numbers of an optimal protocol that a trace lists.
+fn of_optimum(value: &Optimum, bounds: &Bounds) -> Vec<Parameter> {
+    let time = |name, value, doc| Parameter::new(name, value, "l/v_0", doc);
+    let mut parameters = vec![
         Parameter::new("hamiltonian", value.hamiltonian, "mu_0 sigma v_0", "dW*/dt_f"),
-        Parameter::new("time_at_floor", value.time_at_floor, "l/v_0", "time spent on the velocity floor v = 1"),
+        time("time_at_floor", value.time_at_floor, "time spent on the velocity floor v = 1"),
     ];
+    if bounds.v_ceiling.is_finite() {
+        parameters.push(time("time_at_v_ceiling", value.time_at_v_ceiling, "time spent on the velocity ceiling"));
+    }
+    if bounds.tau_ceiling.is_finite() {
+        parameters.push(time("time_at_tau_ceiling", value.time_at_tau_ceiling, "time spent on the friction ceiling"));
+    }
+    parameters
+}
+
+/// A motion that starts from a state on the way, not from steady sliding.
+struct FromState(Box<dyn Motion>);
+
+impl Motion for FromState {
+    fn duration(&self) -> f64 {
+        self.0.duration()
+    }
+
+    fn landmarks(&self) -> Vec<f64> {
+        self.0.landmarks()
+    }
+
+    fn at(&self, s: f64) -> Moment {
+        self.0.at(s)
+    }
+
+    fn departs(&self) -> bool {
+        false
+    }
+}
+
+/// The rest of an optimal protocol from the state `theta`, in the time `case.t_f`.
+fn rest(case: &Case, theta: f64, bounds: &Bounds, rtol: f64) -> Result<TracedPath, Absence> {
+    let Transition { law, v_f, .. } = case.transition;
+    let (solved, motion) = optimal::motion_from(law, theta, case.t_f, v_f, bounds, rtol);
+    let (Some(value), Some(motion)) = (solved.value, motion) else {
+        return Err(match solved.status {
+            Status::Infeasible => Absence::State,
+            Status::Unproven => Absence::Unproven,
+            _ => Obstacle::NotConverged.into(),
+        });
+    };
+    let (motion, parameters) = (Box::new(FromState(motion)), of_optimum(&value, bounds));
     Ok(TracedPath { motion, status: solved.status, work: value.work, parameters })
 }
 
-fn without_optimum(case: &Case, bounded: bool, status: Status) -> Absence {
+/// A protocol of least work whose state variable is disturbed on the way.
+pub struct Disturbed {
+    /// The protocol up to the disturbance.
+    pub head: Box<dyn Motion>,
+    /// Time of the disturbance.
+    pub t: f64,
+    /// The protocol as planned.
+    pub planned: TracedPath,
+    /// Its rest with the velocity as planned. Its work is that of the whole protocol.
+    pub open: Rest,
+    /// Its rest with the optimal velocity of the disturbed state. Its work is that of the whole protocol.
+    pub closed: Rest,
+}
+
+impl Disturbed {
+    /// The protocol of least work for `case` under `bounds`, with `disturbance`.
+    ///
+    /// # Errors
+    /// If there is no such protocol, or if the disturbed state cannot arrive in the time left.
+    pub fn new(case: &Case, bounds: &Bounds, disturbance: &Disturbance, rtol: f64) -> Result<Disturbed, Absence> {
+        let rtol = rtol.min(DISTURBED_RTOL);
+        let motion = || Ok::<_, Absence>(optimum(case, bounds, rtol)?.motion);
+        let planned = optimum(case, bounds, rtol)?;
+        let place = disturbed::place(&*planned.motion, disturbance).ok_or(Obstacle::NotConverged)?;
+        let moment = place.1;
+        let left = case.t_f - moment.t;
+        let go = |theta: f64| rest(&Case { t_f: left, ..*case }, theta, bounds, rtol);
+        let undisturbed = go(moment.theta)?.work;
+        let closed = go(moment.theta * (1.0 + disturbance.change))?;
+        let work = planned.work - undisturbed + closed.work;
+        let open = disturbed::open_loop(motion()?, place, planned.work, disturbance.change, &case.transition);
+        let head = Box::new(disturbed::Head::new(motion()?, place));
+        let closed = Rest { motion: closed.motion, work, terminal_error: 0.0 };
+        Ok(Disturbed { head, t: moment.t, planned, open, closed })
+    }
+}
+
+/// Accuracy of a disturbed protocol: its works are compared.
+const DISTURBED_RTOL: f64 = 1e-12;
+
+fn without_optimum(case: &Case, bounds: &Bounds, status: Status) -> Absence {
+    let bounded = bounds.floor;
+    if status == Status::Infeasible
+        && bounds.has_ceilings()
+        && let Some(obstacle) = optimal::obstacle(&case.transition, case.t_f, bounds)
+    {
+        return Absence::Ceiling { obstacle, t_f: case.t_f };
+    }
     match (status, optimal::shortest_time(&case.transition, bounded)) {
         (Status::Unproven, _) => Absence::Unproven,
         (Status::Infeasible, Some(t_min)) if case.t_f <= t_min => Absence::Time { t_f: case.t_f, t_min, bounded },
@@ -224,7 +308,7 @@ fn least_cubic(case: &Case, bounded: bool, rtol: f64) -> Result<TracedPath, Abse
         // Without an optimum there is no shortcut either.
         let optimum = optimal::solve(&case.transition, case.t_f, bounded, rtol);
         return Err(match (optimum.value, solved.status) {
-            (None, _) => without_optimum(case, bounded, optimum.status),
+            (None, _) => without_optimum(case, &Bounds::new(bounded), optimum.status),
             (_, Status::Infeasible) => Absence::Cubic { bounded },
             (_, Status::Unproven) => Absence::Unproven,
             _ => Obstacle::NotConverged.into(),
@@ -293,7 +377,7 @@ fn pieced(case: &Case, (k, m): (f64, f64), delta_t: f64, bounded: bool, rtol: f6
     let (Some(value), Some(motion)) = (solved.value, motion) else {
         let optimum = optimal::solve(&case.transition, t_f, bounded, rtol);
         return Err(match solved.status {
-            _ if optimum.value.is_none() => without_optimum(case, bounded, optimum.status),
+            _ if optimum.value.is_none() => without_optimum(case, &Bounds::new(bounded), optimum.status),
             Status::Infeasible => Absence::Pieces,
             _ => Obstacle::NotConverged.into(),
         });

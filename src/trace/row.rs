@@ -5,12 +5,13 @@ use crate::dataset::{Cell, Row};
 use crate::grid::Quantity;
 use crate::model::{Law, Transition};
 use crate::protocol::Status;
+use crate::protocol::optimal::Bounds;
 use crate::protocol::shortcut::{self, Case};
 use crate::table::STATUS;
 
 /// Tables whose rows have a path over time.
-pub const TABLES: [&str; 8] =
-    ["optimal", "gap", "gap_min", "best_cubic", "shortcut", "step_response", "compliant", "regularised"];
+pub const TABLES: [&str; 9] =
+    ["optimal", "feedback", "gap", "gap_min", "best_cubic", "shortcut", "step_response", "compliant", "regularised"];
 
 /// The reason for a missing path.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -62,16 +63,35 @@ pub fn protocol_of(
     };
     let transition = Transition {
         law: Law { a: number(Quantity::A)?, b: number(Quantity::B)? },
-        v_i: number(Quantity::InitialVelocity)?,
+        v_i: if table == "feedback" { 1.0 / number(Quantity::Theta)? } else { number(Quantity::InitialVelocity)? },
         v_f: number(Quantity::FinalVelocity)?,
     };
-    let t_f = if table == "step_response" { t_f.ok_or(Pathless::Duration)? } else { number(Quantity::Time)? };
+    let t_f = match table {
+        "step_response" => t_f.ok_or(Pathless::Duration)?,
+        "feedback" => number(Quantity::TimeLeft)?,
+        _ => number(Quantity::Time)?,
+    };
     let family = word("family").and_then(shortcut::find);
-    let tau_ceiling = number(Quantity::FrictionBound).unwrap_or(f64::INFINITY);
+    let tau_ceiling = number(Quantity::FrictionCeiling).unwrap_or(f64::INFINITY);
     let case = Case { transition, t_f, tau_ceiling };
     let [k, m] = [Quantity::Stiffness, Quantity::Mass].map(number);
     let protocol = match (table, family) {
-        ("optimal", _) => Protocol::Optimal { bounded },
+        ("optimal", _) => Protocol::Optimal {
+            bounds: Bounds {
+                floor: bounded,
+                // Tables of earlier versions have no such axis.
+                v_ceiling: number(Quantity::VelocityCeiling).unwrap_or(f64::INFINITY),
+                tau_ceiling,
+            },
+        },
+        ("feedback", _) => Protocol::OptimalFrom {
+            theta: number(Quantity::Theta)?,
+            bounds: Bounds {
+                floor: bounded,
+                v_ceiling: number(Quantity::VelocityCeiling)?,
+                tau_ceiling: number(Quantity::FrictionCeiling)?,
+            },
+        },
         ("best_cubic", _) => Protocol::BestCubic { bounded },
         ("gap" | "gap_min", _) => {
             let scaled =
@@ -89,6 +109,7 @@ pub fn protocol_of(
     };
     let name = match protocol {
         Protocol::CubicPoint { .. } => "gap",
+        Protocol::OptimalFrom { .. } => "optimal",
         Protocol::Family(family) => family.name(),
         _ => table,
     };

@@ -185,14 +185,22 @@ pub fn spaced(motion: &dyn Motion, count: usize) -> Option<Vec<Moment>> {
         let t = t_f * (i as f64 / (count - 1) as f64);
         let after = marks.partition_point(|mark| mark.moment.t <= t).clamp(1, marks.len() - 1);
         let found = meet(motion, t, &marks[after - 1], &marks[after])?;
-        rows.push(Moment { t, ..found });
+        rows.push(Moment { t, ..found.moment });
     }
     rows.push(Moment { t: t_f, ..last.moment });
     Some(rows)
 }
 
+/// The place and the moment of `motion` at time `t`. `None` as for [`Samples::of`].
+pub fn at_time(motion: &dyn Motion, t: f64) -> Option<(f64, Moment)> {
+    let marks: Vec<Sample> = motion.landmarks().into_iter().map(|s| look(motion, s)).collect::<Option<_>>()?;
+    let after = marks.partition_point(|mark| mark.moment.t <= t).clamp(1, marks.len().max(2) - 1);
+    let found = meet(motion, t, marks.get(after - 1)?, marks.get(after)?)?;
+    Some((found.s, found.moment))
+}
+
 /// The moment at time `t` between two samples. `None` as for [`Samples::of`].
-fn meet(motion: &dyn Motion, t: f64, low: &Sample, high: &Sample) -> Option<Moment> {
+fn meet(motion: &dyn Motion, t: f64, low: &Sample, high: &Sample) -> Option<Sample> {
     let off = |sample: &Sample| sample.moment.t - t;
     let ends = [off(low), off(high)];
     let mut nearest = if -ends[0] < ends[1] { *low } else { *high };
@@ -208,7 +216,7 @@ fn meet(motion: &dyn Motion, t: f64, low: &Sample, high: &Sample) -> Option<Mome
         if off(&sample).abs() <= f64::EPSILON * t { 0.0 } else { off(&sample) }
     };
     crossing(distance, [low.s, high.s], ends, f64::EPSILON * high.s);
-    is_number.then_some(nearest.moment)
+    is_number.then_some(nearest)
 }
 
 fn look(motion: &dyn Motion, s: f64) -> Option<Sample> {

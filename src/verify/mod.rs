@@ -2,9 +2,11 @@
 
 mod best_cubic;
 mod block_motion;
+mod clamped;
 mod compliant;
 mod crossover;
 mod extremal;
+mod feedback;
 mod formula_path;
 mod gap;
 mod hopf;
@@ -111,6 +113,7 @@ pub fn verify(path: &Path, manifest: &Manifest, sample: u64, seed: u64) -> Resul
             let verdict = match table.name.as_str() {
                 "gap" => gap::check(&row, &context),
                 "optimal" => optimal::check(&row, &context),
+                "feedback" => feedback::check(&row, &context),
                 "crossover" => crossover::check(&row, &context),
                 "best_cubic" => best_cubic::check(&row, &context, rtol),
                 "shortcut" => shortcut::check(&row, &context),

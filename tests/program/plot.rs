@@ -170,7 +170,7 @@ fn refusals(folder: &Path) {
     assert!(contradiction.starts_with("error: --out gap.pdf: the ending contradicts --format\n"), "{contradiction}");
     assert_eq!(
         complaint(folder, &["plot", "results/small", "--table", "gop"]),
-        "error: the dataset has no table `gop`\n  found: gap, best_cubic, optimal, crossover, shortcut, stability, step_response, compliant, \
+        "error: the dataset has no table `gop`\n  found: gap, best_cubic, optimal, feedback, crossover, shortcut, stability, step_response, compliant, \
          regularised\n  help: did you mean `gap`?\n"
     );
     let many = complaint(folder, &["plot", "results/small", "--x", "t_f"]);

@@ -32,7 +32,7 @@ fn optimum(transition: Transition, t_f: f64) -> Optimum {
 
 /// Rows of the optimum between the jumps.
 fn optimum_inside(transition: Transition, t_f: f64) -> Vec<Moment> {
-    let simulation = Protocol::Optimal { bounded: true }
+    let simulation = Protocol::Optimal { bounds: true.into() }
         .path(&case(transition, t_f), 1e-12)
         .unwrap_or_else(|absence| panic!("{transition:?} {t_f}: {absence}"));
     let trace = Trace::of(&*simulation.motion, &transition, Times::Fewest).expect("can be resolved");

@@ -21,7 +21,7 @@ fn path(protocol: Protocol, case: Case) -> TracedPath {
 }
 
 fn optimum(transition: Transition, t_f: f64) -> TracedPath {
-    path(Protocol::Optimal { bounded: true }, case(transition, t_f))
+    path(Protocol::Optimal { bounds: true.into() }, case(transition, t_f))
 }
 
 fn fewest(path: &TracedPath, transition: Transition) -> Trace {
@@ -297,7 +297,7 @@ fn rows_are_few() {
     let step = Protocol::Family(shortcut::find("step").expect("exists"));
     let cubic = Protocol::Family(shortcut::find("cubic").expect("exists"));
     let best = Protocol::BestCubic { bounded: true };
-    let optimal = Protocol::Optimal { bounded: true };
+    let optimal = Protocol::Optimal { bounds: true.into() };
     let known = [
         (optimal, PAPER, 0.02, 117),
         (optimal, PAPER, 0.037, 134),
@@ -426,7 +426,7 @@ fn what_does_not_exist_states_which_bound() {
         Ok(_) => panic!("{transition:?} {t_f} exists"),
         Err(absence) => absence,
     };
-    let optimal = |bounded| Protocol::Optimal { bounded };
+    let optimal = |floor: bool| Protocol::Optimal { bounds: floor.into() };
     let Absence::Time { t_min, bounded: true, .. } = absent(optimal(true), BACK, 0.39) else { panic!("too short") };
     assert!(relative(t_min, 0.395414772254663) < 1e-14);
     let free = absent(optimal(false), BACK, 0.3);

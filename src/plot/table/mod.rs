@@ -3,6 +3,7 @@
 mod cells;
 mod choice;
 mod condition;
+mod feedback;
 mod gap;
 mod groups;
 mod lines;
@@ -84,12 +85,15 @@ const ON_A_SPRING: Defaults = Defaults {
     scatters: true,
 };
 
+/// Axes whose infinite value means that there is no ceiling, which is not stated.
+const CEILINGS: [&str; 2] = ["v_ceiling", "tau_ceiling"];
+
 /// Defaults of a picture with its own drawing code.
 const ALONE: Defaults =
     Defaults { x: &["t_f", "v_f", "v_i", "b", "a"], y: &[], least_map: usize::MAX, lines: &["shortcuts"], ..OVER_TIME };
 
 /// The picture of each table. A new table needs an entry here, and a file if it has special marks.
-const KINDS: [Kind; 12] = [
+const KINDS: [Kind; 13] = [
     Kind {
         table: "gap",
         title: "Work gap of the cubic shortcuts",
@@ -113,12 +117,28 @@ const KINDS: [Kind; 12] = [
         table: "optimal",
         title: "Optimal protocol",
         defaults: Defaults {
-            classes: &["strategy"],
+            x: &["t_f", "v_ceiling", "tau_ceiling", "v_f", "v_i", "b", "a"],
+            y: &["v_ceiling", "tau_ceiling", "v_f", "v_i", "b", "a"],
+            classes: &["binding", "strategy"],
             value: &["work"],
-            lines: &["work", "v_start", "time_at_floor"],
+            lines: &["work", "v_start", "time_at_floor", "dwork_dv_ceiling", "dwork_dtau_ceiling"],
             ..OVER_TIME
         },
         draw: optimal::draw,
+    },
+    Kind {
+        table: "feedback",
+        title: "Optimal velocity by state and time left",
+        defaults: Defaults {
+            x: &["theta", "t_left", "v_ceiling", "tau_ceiling", "v_f", "b", "a"],
+            y: &["t_left", "v_ceiling", "tau_ceiling", "v_f"],
+            classes: &["arc"],
+            value: &["v"],
+            lines: &["v", "work_to_go", "gain"],
+            series: &["t_left", "v_ceiling", "tau_ceiling"],
+            ..OVER_TIME
+        },
+        draw: feedback::draw,
     },
     Kind {
         table: "crossover",
@@ -276,7 +296,9 @@ fn fixed(survey: &Survey, drawn: &[String]) -> String {
             [one] if !axis.infinite => {
                 words.push(axis.text_of(*one));
             }
-            [] if axis.infinite && axis.name != "tau_ceiling" => words.push(format!("{} = ∞", label::name(&axis.name))),
+            [] if axis.infinite && !CEILINGS.contains(&axis.name.as_str()) => {
+                words.push(format!("{} = ∞", label::name(&axis.name)))
+            }
             _ => {}
         }
     }

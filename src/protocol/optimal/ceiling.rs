@@ -34,7 +34,7 @@ impl Ceilings {
             law,
             v,
             tau,
-            z_v: if v.is_finite() { ln_1p((v - v_f) / v_f) } else { f64::INFINITY },
+            z_v: ln_ratio(v, v - v_f, v_f),
             z_tau: ((tau - 1.0) - (law.b - law.a) * to.ln) / law.a,
             kappa: (law.a - law.b) / law.a,
         }
@@ -64,7 +64,7 @@ impl Ceilings {
     /// The arcs on the ceilings between two lifetimes `theta_1 e^y`, of greater and of smaller theta: from `y_hi`, where
     /// theta is `theta_hi`, to `y_lo`.
     pub fn arcs(&self, theta_hi: f64, y_hi: f64, y_lo: f64) -> [Option<CeilingArc>; 2] {
-        let across = self.crossing().clamp(y_lo, y_hi);
+        let across = self.crossing().max(y_lo).min(y_hi);
         [(ArcKind::TauCeiling, y_hi, across), (ArcKind::VCeiling, across, y_lo)].map(|(kind, from, to)| {
             let theta_hi = theta_hi * exp(from - y_hi);
             (from > to).then(|| self.arc(kind, theta_hi, from - to, self.cap_of(kind, from), self.cap_of(kind, to)))
@@ -75,6 +75,17 @@ impl Ceilings {
     pub fn arc(&self, kind: ArcKind, theta_hi: f64, length: f64, z_hi: f64, z_lo: f64) -> CeilingArc {
         let ln_z = ln(z_hi.abs().min(z_lo.abs()));
         CeilingArc { ceilings: *self, kind, theta_hi, length, z_hi, z_lo, ln_z }
+    }
+}
+
+/// `ln(v/v_f)` from the difference of both.
+pub(super) fn ln_ratio(v: f64, above: f64, v_f: f64) -> f64 {
+    if v == f64::INFINITY {
+        f64::INFINITY
+    } else if v < 0.5 * v_f {
+        ln(v / v_f)
+    } else {
+        ln_1p(above / v_f)
     }
 }
 

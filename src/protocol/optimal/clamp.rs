@@ -43,12 +43,17 @@ impl Fall {
         if kind == ArcKind::VCeiling { self.z_v - d } else { self.z_tau - self.kappa * d }
     }
 
-    /// `G = a [phi(z_cap) - E]` and its derivative with respect to the depth.
-    fn gap(&self, kind: ArcKind, d: f64) -> (f64, f64) {
-        let (energy, rate) = self.energy(d);
+    /// `a phi(z_cap)` and `a E` with their derivatives with respect to the depth.
+    fn parts(&self, kind: ArcKind, d: f64) -> [(f64, f64); 2] {
         let (phi, slope) = phi_and_slope(self.cap(kind, d));
         let fall = if kind == ArcKind::VCeiling { 1.0 } else { self.kappa };
-        (self.law.a * phi - energy, -self.law.a * slope * fall - rate)
+        [(self.law.a * phi, -self.law.a * slope * fall), self.energy(d)]
+    }
+
+    /// `G = a [phi(z_cap) - E]`.
+    fn gap(&self, kind: ArcKind, d: f64) -> f64 {
+        let [(phi, _), (energy, _)] = self.parts(kind, d);
+        phi - energy
     }
 
     /// The depth at which `G` of friction is stationary.
@@ -79,26 +84,31 @@ impl Fall {
 
     /// Adds the zero of a monotone `G` between two depths, if there is one.
     fn zero(&self, kind: ArcKind, mut from: f64, mut to: f64, breaks: &mut Breaks) {
-        let (start, end) = (self.gap(kind, from).0, self.gap(kind, to).0);
+        let (start, end) = (self.gap(kind, from), self.gap(kind, to));
         if (start < 0.0) == (end < 0.0) {
             return;
         }
         // G is convex or concave in theta between them: from the end where it bends away Newton's method is monotone.
         let mut d = if start.abs() < end.abs() { from } else { to };
         for _ in 0..MOST_STEPS {
-            let (value, slope) = self.gap(kind, d);
+            let [(phi, phi_slope), (energy, energy_slope)] = self.parts(kind, d);
+            let value = phi - energy;
             if (value < 0.0) == (start < 0.0) {
                 from = d
             } else {
                 to = d
             }
-            let next = d - value / slope;
-            let next = if next > from && next < to { next } else { 0.5 * (from + to) };
-            let step = (next - d).abs();
-            d = next;
-            if step <= RESOLUTION * d {
+            // phi may be an exponential that is far from its zero.
+            let step = if phi > 2.0 * energy && energy > 0.0 {
+                ln(phi / energy) / (phi_slope / phi - energy_slope / energy)
+            } else {
+                value / (phi_slope - energy_slope)
+            };
+            if step.abs() <= RESOLUTION * d {
                 break;
             }
+            let next = d - step;
+            d = if next > from && next < to { next } else { 0.5 * (from + to) };
         }
         breaks.add(d);
     }
@@ -131,10 +141,10 @@ pub(super) enum Piece {
     /// A part of the free extremal.
     Free {
         arc: Arc,
-        /// `d time/d ln theta` where it starts and ends, at fixed time of its place: `theta/(u - 1)`; 0 at an end of the
-        /// extremal.
-        before: f64,
-        after: f64,
+        /// What its ends add to the sensitivity: `theta/(u - 1)` at a switch, or a term of the extremal.
+        turned: f64,
+        /// Whether it starts or ends where the extremal does.
+        at: [bool; 2],
         /// `(theta, ln u)` at both ends.
         ends: [(f64, f64); 2],
     },
@@ -249,7 +259,7 @@ impl Path {
     /// The extremal with its falling part clamped.
     pub fn along(problem: &Problem, ceilings: &Ceilings, extremal: Extremal, fall: &Fall) -> Path {
         let mut breaks = Breaks { depths: [f64::INFINITY; Path::MOST_PIECES], count: 0 };
-        let across = fall.crossing(ceilings).clamp(0.0, fall.depth);
+        let across = fall.crossing(ceilings).max(0.0).min(fall.depth);
         if ceilings.tau.is_finite() {
             fall.zeros(ArcKind::TauCeiling, 0.0, across, &mut breaks);
         }
@@ -264,13 +274,15 @@ impl Path {
         depths.sort_unstable_by(f64::total_cmp);
         let mut path = Path::new(extremal);
         let mut from = 0.0;
-        let mut free_from = None;
+        // What rises to the turn is free.
+        let turns = fall.excess == 0.0;
+        let mut free_from = turns.then_some(0.0);
         for &to in depths.iter().filter(|&&to| to > 0.0) {
             if to <= from {
                 continue;
             }
             let kind = if to <= across { ArcKind::TauCeiling } else { ArcKind::VCeiling };
-            let capped = fall.gap(kind, 0.5 * (from + to)).0 < 0.0;
+            let capped = fall.gap(kind, 0.5 * (from + to)) < 0.0;
             if capped {
                 if let Some(start) = free_from.take() {
                     path.push(part(problem, &extremal, fall, start, from));
@@ -314,10 +326,9 @@ impl Path {
         let mut found =
             PathSums { time: self.extremal.time_at_floor, work: 0.0, rate: 0.0, friction_min: f64::INFINITY, nodes: 0 };
         let mut free = FreeSums::default();
-        let mut starts_free = false;
-        for (i, piece) in self.pieces().enumerate() {
+        for piece in self.pieces() {
             match piece {
-                Piece::Free { arc, before, after, .. } => {
+                Piece::Free { arc, turned, at, .. } => {
                     let sums = arc.sums(tolerance)?;
                     let Sums { time, work, sensitivity, swing, friction_min, nodes, .. } = sums;
                     found.time += time;
@@ -325,9 +336,10 @@ impl Path {
                     found.friction_min = found.friction_min.min(friction_min);
                     found.nodes += nodes;
                     free.sensitivity += sensitivity;
-                    free.ends += after - before;
+                    free.ends += turned;
+                    free.at_start |= at[0];
+                    free.at_end |= at[1];
                     free.swing += swing;
-                    starts_free |= i == 0;
                 }
                 Piece::Ceiling { arc, .. } => {
                     let CeilingSums { time, work, nodes, .. } = arc.sums(None);
@@ -337,7 +349,7 @@ impl Path {
                 }
             }
         }
-        let rate = self.extremal.rate_of(&free, starts_free);
+        let rate = self.extremal.rate_of(&free);
         found.rate = self.rate.unwrap_or(rate);
         (found.time.is_finite() && found.work.is_finite()).then_some(found)
     }
@@ -394,7 +406,8 @@ fn falling_part(problem: &Problem, ceilings: &Ceilings, extremal: &Extremal) -> 
 /// A free extremal as one piece.
 pub(super) fn whole(problem: &Problem, extremal: &Extremal) -> Piece {
     let ends = [(extremal.theta_s, extremal.start), (problem.to.theta, extremal.end)];
-    Piece::Free { arc: extremal.arc, before: 0.0, after: extremal.inner(), ends }
+    let [start, end] = extremal.end_terms();
+    Piece::Free { arc: extremal.arc, turned: start + end, at: [true, true], ends }
 }
 
 /// The free part of an extremal between two depths; from the start if the first is 0.
@@ -427,12 +440,9 @@ fn part(problem: &Problem, extremal: &Extremal, fall: &Fall, from: f64, to: f64)
     let start = if first { (extremal.theta_s, extremal.start) } else { switch(from) };
     let end = if last { (problem.to.theta, extremal.end) } else { switch(to) };
     let swing = |(theta, z): (f64, f64)| theta / exp_m1(z);
-    Piece::Free {
-        arc: Arc { law, chart },
-        before: if first { 0.0 } else { swing(start) },
-        after: if last { extremal.inner() } else { swing(end) },
-        ends: [start, end],
-    }
+    let [at_start, at_end] = extremal.end_terms();
+    let turned = if last { at_end } else { swing(end) } + if first { at_start } else { -swing(start) };
+    Piece::Free { arc: Arc { law, chart }, turned, at: [first, last], ends: [start, end] }
 }
 
 /// The lower ceiling.
@@ -448,7 +458,7 @@ fn ceiling_part(ceilings: &Ceilings, fall: &Fall, kind: ArcKind, from: f64, to: 
     let z_lo = if to == fall.depth { ceilings.cap_of(kind, 0.0) } else { fall.cap(kind, to) };
     let arc = ceilings.arc(kind, theta_hi, to - from, fall.cap(kind, from), z_lo);
     let pull = (fall.excess - fall.friction) * exp(-from);
-    let gap = gap_of(fall.law, &arc, pull, fall.gap(kind, from).0);
+    let gap = gap_of(fall.law, &arc, pull, fall.gap(kind, from));
     Piece::Ceiling { arc, gap }
 }
 
@@ -491,19 +501,19 @@ impl Path {
     /// An extremal of a rising problem that meets a ceiling at `theta_1 e^-way`, where `ln u = z` and its slope over `ln
     /// theta` is `rise`, and stays there. `pace` is the derivative of `way` with respect to the parameter.
     pub fn rising(problem: &Problem, ceilings: &Ceilings, switch: Switch) -> Option<Path> {
-        let Switch { way, z, ln_z, rise, pace } = switch;
+        let Switch { way, z, ln_z, rise, pace_over_z } = switch;
         let (law, to) = (problem.law, &problem.to);
         let theta = Lifetime::with(to.theta * exp(-way), to.rest - to.theta * exp_m1(-way));
         let fall = exp_m1(way + ln_1p(problem.fall));
-        if fall >= 0.0 {
+        if fall >= 0.0 || way < 0.0 {
             return None;
         }
         let sub = Problem { to: theta, fall, ..*problem };
         let mut extremal = sub.arriving(z, z - theta.ln, 1.0)?;
-        // C = [a phi(z) - tau_ss]/theta along the ceiling.
+        // C = [a phi(z) - tau_ss]/theta along the ceiling, and its derivative with respect to ln theta.
         let c = extremal.arc.c();
         let steepness = (law.a * exp_m1(z) * rise - (law.b - law.a)) / theta.theta - c;
-        extremal.one_way(pace * steepness / law.a);
+        extremal.follow_c(z, pace_over_z * steepness);
         let mut path = Path::new(extremal);
         path.push(whole(&sub, &extremal));
         let pull = c * theta.theta;
@@ -515,9 +525,6 @@ impl Path {
             let mut arc = ceilings.arc(ArcKind::TauCeiling, to.theta, way, ceilings.z_tau, z);
             arc.ln_z = ln_z;
             add(arc);
-            if z > -CLOSE {
-                path.rate = Some(pace * theta.theta / exp_m1(-z));
-            }
         } else {
             // In time theta rises.
             let [high, low] = ceilings.arcs(to.theta, 0.0, -way);
@@ -538,12 +545,74 @@ pub(super) struct Switch {
     pub ln_z: Option<f64>,
     /// Derivative of `ln u` on the ceiling with respect to `ln theta`.
     pub rise: f64,
-    /// Derivative of `way` with respect to the parameter.
-    pub pace: f64,
+    /// Derivative of `way` with respect to the parameter, over `-z`.
+    pub pace_over_z: f64,
 }
 
 /// `ln delta` below which squares of `delta` are no numbers.
 const LN_TINY: f64 = -300.0;
 
-/// `|ln u|` below which the time of a free arc that ends there hardly changes with it.
-const CLOSE: f64 = 0.02;
+#[cfg(test)]
+mod tests {
+    //! The analytic derivative of the time against differences of it, on every part of the clamped family.
+
+    use super::super::Bounds;
+    use super::*;
+
+    #[test]
+    fn rate_is_the_derivative_of_the_time_on_every_part_of_the_clamped_family() {
+        let laws = [(0.03, 0.05), (0.03, 0.03), (0.05, 0.01), (0.1, 0.0), (0.002, 0.02)];
+        let transitions = [(3.0, 100.0), (100.0, 3.0), (3.0, 3.0), (1.01, 40.0), (40.0, 1.01), (1e5, 1.001e5)];
+        let ceilings = [
+            (1.2, f64::INFINITY),
+            (20.0, f64::INFINITY),
+            (f64::INFINITY, 1e-3),
+            (f64::INFINITY, 0.05),
+            (3.0, 0.05),
+            (300.0, 0.02),
+        ];
+        let mut seen = 0;
+        for (a, b) in laws {
+            for (v_i, v_f) in transitions {
+                for (times, above) in ceilings {
+                    for floor in [true, false] {
+                        let law = Law { a, b };
+                        let steady = |v: f64| 1.0 + (a - b) * f64::ln(v);
+                        let bounds =
+                            Bounds { floor, v_ceiling: times * v_f, tau_ceiling: steady(v_i).max(steady(v_f)) + above };
+                        let (from, to) = (Lifetime::steady(v_i), Lifetime::steady(v_f));
+                        let problem = Problem { law, from, to, fall: (v_f - v_i) / v_i, bounded: floor };
+                        let ceilings = Ceilings::new(law, to, v_f, &bounds);
+                        let q_hold = problem.q_hold();
+                        for i in -30..=30 {
+                            let q = 0.2501 * f64::from(i);
+                            let step = 1e-5;
+                            let at = |q: f64| {
+                                let path = Path::clamped(&problem, &ceilings, problem.extremal(q, q_hold)?)?;
+                                Some((path.sums(1e-14)?, path.signature()))
+                            };
+                            let (Some(before), Some(here), Some(after)) = (at(q - step), at(q), at(q + step)) else {
+                                continue;
+                            };
+                            if before.1 != after.1 || here.1 < 4 || here.0.time < 1e-9 {
+                                continue;
+                            }
+                            if q.abs() < 2.0 * step || q_hold.is_some_and(|h| (q + h).abs() < 2.0 * step) {
+                                continue;
+                            }
+                            let difference = (after.0.time - before.0.time) / (2.0 * step);
+                            let error = (difference - here.0.rate).abs() / here.0.rate.abs().max(1e-3 * here.0.time);
+                            seen += 1;
+                            assert!(
+                                error <= 1e-4,
+                                "{a} {b} {v_i} -> {v_f} {bounds:?} q {q}: rate {} difference {difference}",
+                                here.0.rate
+                            );
+                        }
+                    }
+                }
+            }
+        }
+        assert!(seen > 10_000, "{seen}");
+    }
+}

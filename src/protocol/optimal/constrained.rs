@@ -292,7 +292,7 @@ impl Search<'_> {
                 let z = ceilings.z_tau * exp(-s);
                 let way = (ceilings.z_tau * exp_m1(-s) / slope).min(-y);
                 let ln_z = Some(ln(-ceilings.z_tau) - s);
-                Path::rising(problem, ceilings, Switch { way, z, ln_z, rise: ceilings.kappa, pace: -z / slope })
+                Path::rising(problem, ceilings, Switch { way, z, ln_z, rise: ceilings.kappa, pace_over_z: 1.0 / slope })
             };
             let interval = Interval { start: 1.0, bracket: (0.0, f64::INFINITY), rises: true };
             return self.search(member, interval);
@@ -301,7 +301,7 @@ impl Search<'_> {
             let of_v = -way < ceilings.crossing();
             let (kind, rise) = if of_v { (ArcKind::VCeiling, 1.0) } else { (ArcKind::TauCeiling, ceilings.kappa) };
             let z = ceilings.cap_of(kind, -way);
-            Path::rising(problem, ceilings, Switch { way, z, ln_z: None, rise, pace: 1.0 })
+            Path::rising(problem, ceilings, Switch { way, z, ln_z: None, rise, pace_over_z: -1.0 / z })
         };
         let interval = Interval { start: 0.5 * whole_way, bracket: (0.0, whole_way), rises: true };
         self.search(member, interval)
@@ -317,40 +317,54 @@ impl Search<'_> {
         let accuracy = Accuracy::new(rtol, doubt, problem.law.a);
         let tolerance = (accuracy.exact * (room / t_f).min(1.0)).max(FINEST);
         let sign = if interval.rises { 1.0 } else { -1.0 };
-        let mut last: Option<(Path, PathSums, f64)> = None;
         let mut stats = self.stats;
-        let root = newton_in_pieces(
-            |p| {
-                let path = member(p)?;
-                let sums = path.sums(tolerance)?;
-                stats.quadratures += 1;
-                stats.nodes += sums.nodes;
-                let time = sums.time;
-                let probe = if time <= least {
-                    Probe { value: -sign * f64::MAX, slope: 0.0 }
-                } else if time >= most {
-                    Probe { value: sign * f64::MAX, slope: 0.0 }
-                } else {
-                    let (mut value, mut slope) = (ln((time - least) / beyond), sums.rate / (time - least));
-                    if most.is_finite() {
-                        value -= ln((most - time) / left);
-                        slope += sums.rate / (most - time);
-                    }
-                    Probe { value: sign * value, slope: sign * slope }
-                };
-                last = Some((path, sums, probe.value));
-                Some((probe, path.signature()))
-            },
-            interval.start,
-            interval.bracket,
-            interval.rises,
-            accuracy.enough,
-            accuracy.least,
-        );
+        let mut probe = |p: f64| {
+            let path = member(p)?;
+            let sums = path.sums(tolerance)?;
+            stats.quadratures += 1;
+            stats.nodes += sums.nodes;
+            let time = sums.time;
+            let probe = if time <= least {
+                Probe { value: -sign * f64::MAX, slope: 0.0 }
+            } else if time >= most {
+                Probe { value: sign * f64::MAX, slope: 0.0 }
+            } else {
+                let (mut value, mut slope) = (ln((time - least) / beyond), sums.rate / (time - least));
+                if most.is_finite() {
+                    value -= ln((most - time) / left);
+                    slope += sums.rate / (most - time);
+                }
+                Probe { value: sign * value, slope: sign * slope }
+            };
+            Some((path, sums, probe))
+        };
+        let enough = ENOUGH + doubt;
+        let (mut start, mut outcome) = (interval.start, None);
+        for _ in 0..MOST_SEARCHES {
+            let root = newton_in_pieces(
+                |p| probe(p).map(|(path, _, probe)| (probe, path.signature())),
+                start,
+                interval.bracket,
+                interval.rises,
+                enough,
+                accuracy.least.sqrt().min(enough),
+            );
+            outcome = root.and_then(|(root, _)| Some((root.x, probe(root.x)?)));
+            match &outcome {
+                // Its step was good, and so is the next.
+                Some((_, (_, _, last))) if last.value.abs() <= 10.0 * enough => break,
+                Some((x, _)) => start = *x,
+                None => break,
+            }
+        }
+        let found = outcome.filter(|(_, (_, _, last))| last.value.abs() <= JUMP.max(10.0 * enough));
+        let found = found.and_then(|(x, (path, sums, last))| {
+            let step = if last.slope > 0.0 { last.value / last.slope } else { 0.0 };
+            let (low, high) = interval.bracket;
+            Some((path, sums, member((x - step).max(low).min(high))?))
+        });
         self.stats = stats;
-        let found = root.and_then(|(root, _)| member(root.x));
-        let close = JUMP.max(10.0 * accuracy.enough);
-        let (Some(path), Some((probed, sums, _))) = (found, last.filter(|last| last.2.abs() <= close)) else {
+        let Some((probed, sums, path)) = found else {
             let status = if problem.is_doubtful() { Status::Unproven } else { Status::NotConverged };
             return Constrained::without_numbers(status, stats);
         };
@@ -381,6 +395,13 @@ impl Search<'_> {
             if problem.bounded && !below { (v_start.max(1.0), v_end.max(1.0)) } else { (v_start, v_end) };
         let (time_at_v_ceiling, time_at_tau_ceiling) = path.times();
         let friction = path.friction(&law, friction_min);
+        // A ceiling that hardly binds is met to the accuracy of the search.
+        if v_end > ceilings.v * (1.0 + ROUNDING_AT_CEILING)
+            || friction.greatest > ceilings.tau + ROUNDING_AT_CEILING * (law.a + ceilings.tau.abs())
+        {
+            return Solved { status: Status::NotConverged, value: None, stats };
+        }
+        let v_end = v_end.min(ceilings.v);
         let held_at = if held { 1.0 + law.b * problem.from.ln } else { f64::INFINITY };
         let (friction_min, proven_by) = (friction.least.min(held_at), friction.least_steady.min(held_at));
         let strategy = if held {
@@ -410,7 +431,7 @@ impl Search<'_> {
             time_at_tau_ceiling,
             hamiltonian: -extremal.arc.c(),
             theta_max: extremal.arc.theta_max().max(problem.to.theta),
-            friction_max: friction.greatest,
+            friction_max: friction.greatest.min(ceilings.tau),
             strategy,
         };
         Solved { status: status.with_friction(friction_min), value: Some(value), stats }
@@ -421,6 +442,15 @@ impl Search<'_> {
 fn lifetime(ln_theta: f64) -> Lifetime {
     Lifetime { theta: exp(ln_theta), rest: -exp_m1(ln_theta), ln: ln_theta }
 }
+
+/// A relative difference of times from which Newton's method leaves rounding in two steps.
+const ENOUGH: f64 = 1e-4;
+
+/// Searches until the last step is as good as its slope promises.
+const MOST_SEARCHES: u32 = 4;
+
+/// Relative excess over a ceiling that is an error of the search.
+const ROUNDING_AT_CEILING: f64 = 1e-7;
 
 /// Widens a bracket beyond its rounding.
 const MARGIN: f64 = 1e-6;

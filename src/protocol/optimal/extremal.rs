@@ -62,8 +62,11 @@ pub(super) struct Extremal {
 enum Rate {
     /// `gain (I + inner) + outer`, on the part of the family that a hold parametrises.
     Floor { gain: f64, inner: f64, outer: f64 },
-    /// `gain (I + inner) + outer`; where theta falls at once, also `one_way` times the swing.
+    /// `gain (I + inner) + outer`, where `outer` belongs to the start of the arc and `inner` to its end; where theta falls
+    /// at once, also `one_way` times the swing.
     Turning { gain: f64, inner: f64, outer: f64, one_way: f64 },
+    /// The same with `inner` of the start and `outer` of the end.
+    Ending { gain: f64, inner: f64, outer: f64 },
     /// `gain` times the sensitivity of the direct chart.
     Direct { gain: f64 },
     /// `gain` times the swing, for arcs on which theta goes one way.
@@ -75,10 +78,13 @@ enum Rate {
 pub(super) struct FreeSums {
     /// Of the sensitivity of the chart.
     pub sensitivity: f64,
-    /// Of `theta/(u - 1)` at their ends less that at their starts; 0 at the start of the extremal.
+    /// Of `theta/(u - 1)` at their ends less that at their starts, and of [`Extremal::end_terms`].
     pub ends: f64,
     /// Of the swing.
     pub swing: f64,
+    /// Whether the start and the end of the extremal are among them.
+    pub at_start: bool,
+    pub at_end: bool,
 }
 
 /// The start of an arc of a rising problem.
@@ -149,7 +155,7 @@ impl Problem {
     }
 
     /// Friction at the start with `u = 1`, `tau_ss(v_i)` where that is steady.
-    fn friction_start(&self) -> f64 {
+    pub fn friction_start(&self) -> f64 {
         1.0 + (self.law.b - self.law.a) * self.from.ln
     }
 
@@ -359,11 +365,10 @@ impl Problem {
             let rate = if z_1 < -1.0 || -x_squares < xi {
                 rising
             } else {
-                Rate::Turning {
+                Rate::Ending {
                     gain: stretch * swing * excess_1,
                     inner: -theta_s / start.excess,
                     outer: stretch * self.to.theta * swing,
-                    one_way: 0.0,
                 }
             };
             return Some(Extremal { time_at_floor, theta_s, late, lags: true, arc, start: start.ln_u, end: z_1, rate });
@@ -398,11 +403,10 @@ impl Problem {
         let x_start = -(x2 - x_squares).sqrt();
         let arc = Arc { law, chart: Chart::Turning { theta_h, ln_theta_h, x_start, x_end, x_squares } };
         let (start, end) = (arc.start()?, arc.end()?);
-        let rate = Rate::Turning {
+        let rate = Rate::Ending {
             gain: layer * 2.0 * x_end / (1.0 + x2),
             inner: -theta_s / start.excess,
             outer: layer * edge(&law, theta_h, ln_theta_h, x_end, &end),
-            one_way: 0.0,
         };
         Some(Extremal { time_at_floor, theta_s, late, lags: true, arc, start: start.ln_u, end: end.ln_u, rate })
     }
@@ -420,8 +424,8 @@ impl Problem {
             Chart::Turning { theta_h: turn.theta, ln_theta_h: turn.ln, x_start, x_end, x_squares: shrunk - grown };
         let arc = Arc { law, chart };
         let (start, end) = (arc.start()?, arc.end()?);
-        let inner = self.to.theta / end.excess - theta_s / start.excess;
-        let rate = Rate::Turning { gain, inner, outer: 0.0, one_way: 0.0 };
+        let (inner, outer) = (self.to.theta / end.excess, -gain * theta_s / start.excess);
+        let rate = Rate::Turning { gain, inner, outer, one_way: 0.0 };
         Some(Extremal { time_at_floor, theta_s, late, lags: true, arc, start: start.ln_u, end: end.ln_u, rate })
     }
 
@@ -476,27 +480,41 @@ impl Extremal {
         self.late + if self.lags { sums.lag } else { sums.time }
     }
 
-    /// Makes the time depend on the parameter by the swing alone.
-    pub fn one_way(&mut self, gain: f64) {
-        self.rate = Rate::OneWay { gain };
+    /// Makes a parameter that of an extremal without a turn, which ends at `ln u = z`: `C` changes by `z pace` with it.
+    pub fn follow_c(&mut self, z: f64, pace: f64) {
+        let Law { a, b } = self.arc.law;
+        self.rate = match (self.arc.chart, self.rate) {
+            // d time/dC = (I + theta/(u - 1) - theta_s/(u_s - 1))/k, where C = -c_h/theta_h changes by k d ln theta_h.
+            (Chart::Turning { theta_h, ln_theta_h, x_end, x_squares, .. }, Rate::Ending { inner, .. })
+                if -x_squares > x_end * x_end =>
+            {
+                let k = (1.0 + (b - a) * ln_theta_h + a - b) / theta_h;
+                let regular = if z == 0.0 { 1.0 } else { z / exp_m1(z) };
+                let outer = theta_h / (1.0 + x_end * x_end) * regular * pace / k;
+                Rate::Ending { gain: z * pace / k, inner, outer }
+            }
+            _ => Rate::OneWay { gain: -z * pace / a },
+        };
     }
 
-    /// The term of the end in the derivative of the time.
-    pub fn inner(&self) -> f64 {
+    /// What the start and the end of the arc add to the sums over free pieces.
+    pub fn end_terms(&self) -> [f64; 2] {
         match self.rate {
-            Rate::Floor { inner, .. } | Rate::Turning { inner, .. } => inner,
-            Rate::Direct { .. } | Rate::OneWay { .. } => 0.0,
+            Rate::Floor { inner, .. } | Rate::Turning { inner, .. } => [0.0, inner],
+            Rate::Ending { inner, .. } => [inner, 0.0],
+            Rate::Direct { .. } | Rate::OneWay { .. } => [0.0, 0.0],
         }
     }
 
-    /// Derivative of the total time with respect to the parameter; `starts_free` states whether the first free piece is the
-    /// start of the extremal.
-    pub fn rate_of(&self, free: &FreeSums, starts_free: bool) -> f64 {
+    /// Derivative of the total time with respect to the parameter.
+    pub fn rate_of(&self, free: &FreeSums) -> f64 {
+        let inside = |gain: f64| gain * (free.sensitivity + free.ends);
         match self.rate {
-            Rate::Turning { one_way, .. } if !starts_free => one_way * free.swing,
+            Rate::Turning { one_way, .. } if !free.at_start && one_way != 0.0 => one_way * free.swing,
             Rate::Floor { gain, outer, .. } | Rate::Turning { gain, outer, .. } => {
-                gain * (free.sensitivity + free.ends) + outer
+                inside(gain) + if free.at_start { outer } else { 0.0 }
             }
+            Rate::Ending { gain, outer, .. } => inside(gain) + if free.at_end { outer } else { 0.0 },
             Rate::Direct { gain } => gain * free.sensitivity,
             Rate::OneWay { gain } => gain * free.swing,
         }
@@ -506,8 +524,9 @@ impl Extremal {
     /// of their ratio, or their relative difference where a hold makes time linear in the parameter.
     pub fn probe(&self, problem: &Problem, sums: &Sums, beyond: f64) -> Probe {
         let time = self.time_beyond(sums);
-        let free = FreeSums { sensitivity: sums.sensitivity, ends: self.inner(), swing: sums.swing };
-        let rate = self.rate_of(&free, true);
+        let [start, end] = self.end_terms();
+        let &Sums { sensitivity, swing, .. } = sums;
+        let rate = self.rate_of(&FreeSums { sensitivity, ends: start + end, swing, at_start: true, at_end: true });
         let (value, slope) = if let Rate::Floor { .. } = self.rate {
             (time / beyond - 1.0, rate / beyond)
         } else if time > 0.0 {

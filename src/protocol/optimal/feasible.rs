@@ -1,6 +1,6 @@
 //! What the bounds allow: the feasible times, the least ceilings, and why a protocol is infeasible.
 
-use super::ceiling::Ceilings;
+use super::ceiling::{Ceilings, ln_ratio};
 use super::constrained::{Feasible, feasible};
 use super::extremal::Problem;
 use super::{ArcKind, Bounds, Obstacle, posed};
@@ -59,94 +59,87 @@ fn lowest_tau(problem: &Problem) -> f64 {
 pub fn least_v_ceiling(transition: &Transition, t_f: f64, bounds: impl Into<Bounds>, rtol: f64) -> Option<f64> {
     let (problem, ceilings) = posed(transition, t_f, &bounds.into().with_v_ceiling(f64::INFINITY))?;
     let v_f = transition.v_f;
-    // A ceiling by its distance from v_f.
-    let above = |distance: f64| Ceilings { v: v_f + distance, z_v: ln_1p(distance / v_f), ..ceilings };
     let lowest = lowest_v(&problem, transition);
-    let search = Least { problem: &problem, t_f, rtol };
-    match feasible(&problem, &ceilings) {
-        Feasible::Never(_) => None,
-        Feasible::Times(least, most) if t_f < least || t_f > most => None,
-        _ if problem.fall == 0.0 => Some(v_f),
-        _ if problem.rises() => Some(v_f - search.distance(v_f - lowest, |distance| above(-distance))),
-        _ => Some(v_f + search.distance(f64::INFINITY, above)),
-    }
+    let at = |place: f64| {
+        let distance = exp(place);
+        let v = lowest + distance;
+        let above = if lowest == v_f { distance } else { v - v_f };
+        (v, Ceilings { v, z_v: ln_ratio(v, above, v_f), ..ceilings })
+    };
+    least(&problem, t_f, &ceilings, v_f, || root(&problem, t_f, [0.0, 1.0], rtol, at))
 }
 
 /// The least ceiling of friction that allows `t_f`, with the other bounds as they are; `None` where no ceiling does.
 pub fn least_tau_ceiling(transition: &Transition, t_f: f64, bounds: impl Into<Bounds>, rtol: f64) -> Option<f64> {
     let (problem, ceilings) = posed(transition, t_f, &bounds.into().with_tau_ceiling(f64::INFINITY))?;
-    let [start, end] = [&problem.from, &problem.to].map(|at| 1.0 + (problem.law.b - problem.law.a) * at.ln);
-    let edge = if problem.rises() { start.min(end) } else { start.max(end) };
-    // A ceiling by its distance from the friction of steady sliding.
-    let above =
-        |distance: f64| Ceilings { tau: edge + distance, z_tau: ((edge - end) + distance) / problem.law.a, ..ceilings };
+    let (a, end) = (problem.law.a, problem.friction_end());
     let lowest = lowest_tau(&problem);
-    let search = Least { problem: &problem, t_f, rtol };
-    match feasible(&problem, &ceilings) {
+    let steady = problem.friction_start().max(end);
+    let least = |root: &dyn Fn() -> f64| least(&problem, t_f, &ceilings, steady, root);
+    if lowest.is_finite() {
+        let at = |place: f64| {
+            let distance = exp(place);
+            (lowest + distance, Ceilings { tau: lowest + distance, z_tau: ((lowest - end) + distance) / a, ..ceilings })
+        };
+        return least(&|| root(&problem, t_f, [ln(a), 1.0], rtol, at));
+    }
+    // Without the floor nothing bounds it from below.
+    let at = |z_tau: f64| (end + a * z_tau, Ceilings { tau: end + a * z_tau, z_tau, ..ceilings });
+    least(&|| root(&problem, t_f, [0.0, 1.0], rtol * (1.0 / a).min(1.0), at))
+}
+
+/// The least ceiling, found by `root`, unless no ceiling allows `t_f`, or steady sliding on the ceiling does.
+fn least(problem: &Problem, t_f: f64, without: &Ceilings, steady: f64, root: impl FnOnce() -> f64) -> Option<f64> {
+    match feasible(problem, without) {
         Feasible::Never(_) => None,
         Feasible::Times(least, most) if t_f < least || t_f > most => None,
-        _ if problem.fall == 0.0 => Some(edge),
-        _ if problem.rises() => Some(edge - search.distance(edge - lowest, |distance| above(-distance))),
-        _ => Some(edge + search.distance(f64::INFINITY, above)),
+        _ if problem.fall == 0.0 => Some(steady),
+        _ => Some(root()),
     }
 }
 
-/// The search for the least ceiling.
-struct Least<'a> {
-    problem: &'a Problem,
+/// The ceiling, by a place that rises with it, on which the limit of the time is `t_f`; the search starts at a place with a
+/// step.
+fn root(
+    problem: &Problem,
     t_f: f64,
+    [start, mut step]: [f64; 2],
     rtol: f64,
-}
-
-impl Least<'_> {
-    /// Distance, up to `most`, from a ceiling of infinite time at which the limit of the time is `t_f`; the time falls with
-    /// the distance.
-    fn distance(&self, most: f64, ceilings: impl Fn(f64) -> Ceilings) -> f64 {
-        let beyond = |ln_distance: f64| {
-            let time = match feasible(self.problem, &ceilings(exp(ln_distance))) {
-                Feasible::Times(least, most) => {
-                    if self.problem.rises() {
-                        most
-                    } else {
-                        least
-                    }
-                }
-                Feasible::Sitting(_) => f64::INFINITY,
-                Feasible::Never(_) => 0.0,
-            };
-            ln(time.clamp(TINY, HUGE) / self.t_f)
-        };
-        if most <= 0.0 {
-            return most;
+    at: impl Fn(f64) -> (f64, Ceilings),
+) -> f64 {
+    // Above 0 where the ceiling allows `t_f`.
+    let room = |place: f64| match feasible(problem, &at(place).1) {
+        Feasible::Times(least, _) if !problem.rises() => -ln(least.clamp(TINY, HUGE) / t_f),
+        Feasible::Times(_, most) => ln(most.clamp(TINY, HUGE) / t_f),
+        Feasible::Sitting(_) => ln(HUGE),
+        Feasible::Never(_) => ln(TINY),
+    };
+    let mut low = (start, room(start));
+    let mut high = low;
+    let first = step;
+    while high.1 < 0.0 {
+        if high.0 > FARTHEST {
+            return at(high.0).0;
         }
-        let mut high = if most.is_finite() { ln(most) } else { 0.0 };
-        let mut at_high = beyond(high);
-        let mut step = 1.0;
-        while most.is_infinite() && at_high > 0.0 && high < FARTHEST {
-            (high, step) = (high + step, 2.0 * step);
-            at_high = beyond(high);
-        }
-        if at_high >= 0.0 {
-            return exp(high);
-        }
-        let (mut low, mut at_low) = (high - 1.0, beyond(high - 1.0));
-        step = 1.0;
-        while at_low < 0.0 {
-            if low < NEAREST {
-                return 0.0;
-            }
-            (high, at_high) = (low, at_low);
-            (low, step) = (low - step, 2.0 * step);
-            at_low = beyond(low);
-        }
-        exp(crossing(beyond, [high, low], [at_high, at_low], 0.01 * self.rtol))
+        low = high;
+        high = (high.0 + step, room(high.0 + step));
+        step *= 2.0;
     }
+    step = first;
+    while low.1 >= 0.0 {
+        if low.0 < -FARTHEST {
+            return at(low.0).0;
+        }
+        high = low;
+        low = (low.0 - step, room(low.0 - step));
+        step *= 2.0;
+    }
+    at(crossing(room, [low.0, high.0], [low.1, high.1], 0.01 * rtol)).0
 }
 
 /// Range of times whose logarithm is taken.
 const TINY: f64 = 1e-300;
 const HUGE: f64 = 1e300;
 
-/// Logarithms of the greatest and the least distance.
+/// Greatest place that is searched.
 const FARTHEST: f64 = 600.0;
-const NEAREST: f64 = -700.0;

@@ -1,0 +1,73 @@
+//! `feedback`: what the optimal protocol does now, from the state variable and the time left.
+
+use std::ops::Range;
+
+use super::optimum_cache::with_ceilings;
+use super::{Column, ColumnBuffer, Definition, Field, Job, Kind, RunStats, Stopped, columns, rows};
+use crate::grid::Quantity;
+use crate::model::Law;
+use crate::protocol::optimal::{self, FeedbackPoint};
+
+/// The words of `arc`, in the order of [`ArcKind::ALL`](crate::protocol::optimal::ArcKind::ALL).
+const ARCS: &[&str] = &["free", "floor", "v_ceiling", "tau_ceiling"];
+
+const FIELDS: [Field<FeedbackPoint>; 5] = [
+    Field::new(Column::number("v", "v_0", "velocity of the optimal protocol now"), |point| point.v),
+    Field::new(Column::number("work_to_go", "mu_0 sigma l", "least work of friction in the time left"), |point| {
+        point.work_to_go
+    }),
+    Field::new(Column::number("costate", "mu_0 sigma v_0", "d work_to_go/d theta; -beta of a trace"), |point| {
+        point.costate
+    }),
+    Field::new(Column::number("gain", "v_0^2/l", "dv/dtheta at fixed t_left"), |point| point.gain),
+    Field::new(
+        Column::new("arc", Kind::Label(ARCS), "the bound on which the protocol is now, or free if on none"),
+        |point| f64::from(point.arc as u8),
+    ),
+];
+
+const COLUMNS: [Column; 5] = columns(&FIELDS);
+
+/// One row for each state and time left, target and pair of ceilings.
+pub static FEEDBACK: Definition = Definition {
+    name: "feedback",
+    doc: "the optimal velocity now, by the state variable and the time left",
+    axes: &[
+        Quantity::Theta,
+        Quantity::TimeLeft,
+        Quantity::A,
+        Quantity::B,
+        Quantity::FinalVelocity,
+        Quantity::VelocityCeiling,
+        Quantity::FrictionCeiling,
+    ],
+    columns: &COLUMNS,
+    rows_per_part: 1 << 16,
+    cost: 3_000,
+    needs_optimum: |_| false,
+    compute,
+};
+
+fn compute(job: &Job<'_>, range: Range<u64>, buffer: &mut ColumnBuffer) -> Result<RunStats, Stopped> {
+    rows::each(job, range, 64, buffer, &FIELDS, |_, point| {
+        let law = Law { a: point[Quantity::A], b: point[Quantity::B] };
+        let [theta, t_left, v_f] =
+            [Quantity::Theta, Quantity::TimeLeft, Quantity::FinalVelocity].map(|axis| point[axis]);
+        let solved = optimal::feedback_at(law, theta, t_left, v_f, with_ceilings(job, point), job.rtol);
+        (solved.status, solved.value, RunStats { own_optima: 1, ..RunStats::from(solved.stats) })
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    //! The words of the column are those of its type.
+
+    use super::*;
+    use crate::protocol::optimal::ArcKind;
+
+    #[test]
+    fn arcs_are_named_alike() {
+        assert_eq!(ArcKind::ALL.map(ArcKind::name), ARCS);
+        assert_eq!(ArcKind::ALL.map(|arc| arc as usize), [0, 1, 2, 3]);
+    }
+}
