@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
 use super::shards::{quoted, scripts};
-use super::{FAILED, Failure, kind, refused, say, summary, words};
+use super::{EXIT_FAILURE, Failure, kind, refused, say, summary, words};
 use crate::dataset::{Build, CheckDepth, Folder, Manifest, Survey};
 use crate::protocol::Status;
 use crate::sweep::{Plan, Sweep, shards_with};
@@ -63,7 +63,7 @@ pub fn status(arguments: &Arguments) -> Result<(), Failure> {
     let (all, there) =
         survey.tables.iter().fold((0, 0), |(all, there), table| (all + table.parts, there + table.there));
     let message = format!("incomplete: {} of {} are present", words::count(there), words::things(all, "part"));
-    Err(Failure { code: FAILED, message })
+    Err(Failure { code: EXIT_FAILURE, message })
 }
 
 /// Parts and rows, table by table.

@@ -5,7 +5,9 @@ use std::sync::atomic::AtomicU64;
 
 use super::watch::{Wait, waiting};
 use super::{Failure, dataset, say, words};
-use crate::dataset::{Cell, CheckDepth, Counts, FEW, Folder, Manifest, StatisticsRow, Survey, TableStatistics};
+use crate::dataset::{
+    Cell, CheckDepth, Counts, Folder, MAX_KEPT_ROWS, Manifest, StatisticsRow, Survey, TableStatistics,
+};
 use crate::grid::Quantity;
 use crate::protocol::Status;
 use crate::table::{self, STATUS};
@@ -117,7 +119,7 @@ pub fn blocks(name: &str, rows: u64, statistics: &TableStatistics) -> Vec<Summar
             };
             blocks.extend(statistics.labels.iter().map(|(label, counts)| match counts {
                 Some(counts) => counted(label, counts),
-                None => SummaryBlock::Line(2, format!("{label}: more than {FEW} different labels")),
+                None => SummaryBlock::Line(2, format!("{label}: more than {MAX_KEPT_ROWS} different labels")),
             }));
             blocks.extend(statistics.words.iter().map(|(column, counts)| counted(column, counts)));
         }

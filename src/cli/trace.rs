@@ -7,7 +7,7 @@ use clap::ValueEnum;
 use clap::builder::{PossibleValue, PossibleValuesParser, StringValueParser, TypedValueParser};
 
 use super::output::{self, Output};
-use super::{FAILED, Failure, WRONG, dataset, no_table, put, refused, say, words, write_file, wrong};
+use super::{EXIT_FAILURE, EXIT_REQUEST, Failure, dataset, no_table, put, refused, say, words, write_file, wrong};
 use crate::dataset::{Cell, Folder, ManifestTable, Row, frame};
 use crate::grid::{Domain, Point, Quantity, RTOL, Scale};
 use crate::model::{Law, Transition, Units};
@@ -284,7 +284,7 @@ pub fn trace(arguments: &Arguments) -> Result<(), Failure> {
 }
 
 fn absent(protocol: &str, absence: Absence) -> Failure {
-    let code = if absence.is_defect() { FAILED } else { WRONG };
+    let code = if absence.is_defect() { EXIT_FAILURE } else { EXIT_REQUEST };
     Failure { code, message: format!("error: no `{protocol}` protocol: {absence}") }
 }
 
@@ -678,8 +678,8 @@ fn header(arguments: &Arguments, request: &TraceRequest, path: &TracedPath, trac
         Some(_) => text.push_str(&format!("  {rows}: equally spaced times, and the states before and after jumps\n")),
         None => {
             let (range, value) = (words::number(RANGE_RTOL), words::number(VALUE_RTOL));
-            let lines = format!("straight lines between them are good to {range} of the range of a column");
-            text.push_str(&format!("  {rows}; {lines}, and to {value} of v and theta\n"));
+            let lines = format!("linear interpolation errs by up to {range} of the range of a column");
+            text.push_str(&format!("  {rows}; {lines}, and by up to {value} of v and theta\n"));
         }
     }
     text

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use super::watch::{Wait, waiting};
-use super::{Failure, NOT_STRICT, dataset, say, words};
+use super::{EXIT_NOT_CONVERGED, Failure, dataset, say, words};
 use crate::dataset::Cell;
 use crate::verify::{Audit, LIMIT, verify as audit};
 
@@ -42,7 +42,7 @@ pub fn verify(arguments: &Arguments) -> Result<(), Failure> {
              deleted and the sweep run",
             words::things(errors as u64, "number")
         );
-        return Err(Failure { code: NOT_STRICT, message });
+        return Err(Failure { code: EXIT_NOT_CONVERGED, message });
     }
     Ok(())
 }

@@ -11,7 +11,7 @@ use std::time::{Duration, Instant, SystemTime};
 use tempfile::NamedTempFile;
 
 /// Age from which a temporary file of another machine is treated as abandoned, by the clock of the file system. Writing one takes seconds.
-const ABANDONED: Duration = Duration::from_secs(24 * 60 * 60);
+const MAX_TEMPORARY_AGE: Duration = Duration::from_secs(24 * 60 * 60);
 
 /// A step that failed, and why.
 #[derive(Debug)]
@@ -142,7 +142,7 @@ pub fn sweep(folder: &Path, now: SystemTime) {
 
 fn is_old(entry: &fs::DirEntry, now: SystemTime) -> bool {
     let written = entry.metadata().and_then(|metadata| metadata.modified());
-    written.is_ok_and(|written| now.duration_since(written).is_ok_and(|age| age > ABANDONED))
+    written.is_ok_and(|written| now.duration_since(written).is_ok_and(|age| age > MAX_TEMPORARY_AGE))
 }
 
 /// The nearest existing folder at or above `folder`, which is on the same disk.
@@ -226,7 +226,7 @@ mod tests {
         sweep(folder.path(), now);
         assert!(!dead.exists());
         assert_eq!(names(folder.path()), [shown(living.path()), ".mine.tmp".to_owned(), shown(&foreign)]);
-        sweep(folder.path(), now + ABANDONED + Duration::from_secs(60));
+        sweep(folder.path(), now + MAX_TEMPORARY_AGE + Duration::from_secs(60));
         assert_eq!(names(folder.path()), [shown(living.path()), ".mine.tmp".to_owned()]);
         drop(living);
         assert_eq!(names(folder.path()), [".mine.tmp"]);

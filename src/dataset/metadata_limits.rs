@@ -151,8 +151,8 @@ fn walk(bytes: &[u8], visit: &mut dyn FnMut(&[i16], i64)) -> Option<usize> {
     Some(walker.at)
 }
 
-/// Most structs in one another; Parquet has six.
-const DEEPEST: usize = 16;
+/// Greatest depth of nested structs; Parquet has six.
+const MAX_NESTED_STRUCTS: usize = 16;
 
 struct Walker<'a> {
     bytes: &'a [u8],
@@ -194,7 +194,7 @@ impl Walker<'_> {
     }
 
     fn fields(&mut self) -> Option<()> {
-        if self.path.len() >= DEEPEST {
+        if self.path.len() >= MAX_NESTED_STRUCTS {
             return None;
         }
         let mut field = 0_i16;

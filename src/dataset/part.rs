@@ -86,7 +86,7 @@ pub fn encode(
         group.status(&buffer.status[range])?;
         group.writer.close()?;
     }
-    Ok((checksum::sealed(file.into_inner()?)?, statistics))
+    Ok((checksum::with_checksums(file.into_inner()?)?, statistics))
 }
 
 /// A row group under construction, and its remaining columns.

@@ -1,4 +1,4 @@
-//! A block on its spring after a step of the control velocity, followed by the library's explicit integrator.
+//! A block on its spring after a step of the control velocity, integrated with the explicit integrator of a library.
 //!
 //! With `x = ln(v/v_f)`, `y = ln(theta v_f)`, `p = (k s - tau_ss(v_f))/a`, times in `l/v_f` and `mu = m v_f^2/a`
 //!
@@ -23,20 +23,20 @@ pub struct Block {
     pub ratio: f64,
     /// `m v_f^2/a`.
     pub mu: f64,
-    /// Ratio of rates below which `x` follows: its third power is an error.
+    /// Ratio of rates below which `x` is quasi-static; the error is its third power.
     pub fast: f64,
     /// Slopes evaluated so far.
     pub work: Cell<u64>,
 }
 
-/// A moment.
+/// The state at one time.
 #[derive(Debug, Clone, Copy)]
 pub struct BlockState {
     pub p: f64,
     pub y: f64,
     pub x: f64,
     pub t: f64,
-    /// Whether `x` follows.
+    /// Whether `x` is quasi-static.
     slaved: bool,
 }
 
@@ -49,16 +49,16 @@ pub enum Event {
     Pass { here: BlockState, level: f64, up: bool },
 }
 
-/// Way of one leg: no variable changes by more.
+/// Greatest change of any variable along one leg.
 const LEG: f64 = 0.5;
 
 /// Slopes evaluated for one block.
 const MOST_WORK: u64 = 10_000_000;
 
-/// Distance from where it would follow to at which `x` may be taken to follow, and ratio of rates at which it gets there
+/// Distance from its quasi-static value within which `x` counts as quasi-static, and ratio of rates below which it relaxes
 /// at once.
-const CLOSE: f64 = 1e-10;
-const AT_ONCE: f64 = 1e-13;
+const FOLLOWING_DISTANCE: f64 = 1e-10;
+const FOLLOWING_RATE_RATIO: f64 = 1e-13;
 
 impl Block {
     /// Steady sliding at `e^x v_f`.
@@ -81,7 +81,7 @@ impl Block {
         let rest = p - self.ratio * y;
         let mut x = rest;
         let mut speed = 0.0;
-        // Without mass the first is exact; each next one gains an order.
+        // Without mass the first value is exact; each iteration gains an order.
         for _ in 0..8 {
             let (v, ageing) = (x.exp(), (-y).exp());
             let first = -self.pull * x.exp_m1() - self.ratio * (ageing - v);
@@ -105,7 +105,7 @@ impl Block {
         if self.mu == 0.0 {
             return speed;
         }
-        // As exact as x itself: its derivative along the way of p and y.
+        // The derivative along the motion of p and y, as accurate as x.
         let way = [-self.pull * x.exp_m1(), (-here.y).exp() - x.exp()];
         let step = 1e-3 / (way[0].abs() + way[1].abs());
         let at = |fraction: f64| self.followed(here.p + fraction * step * way[0], here.y + fraction * step * way[1]).0;
@@ -120,18 +120,18 @@ impl Block {
         Some((slopes[0].abs() + slopes[1].abs()) / bend.abs())
     }
 
-    /// Rates at which the others change over that at which `x` follows.
+    /// Rate of change of the other variables over the relaxation rate of `x`.
     fn ratio_of_rates(&self, here: &BlockState) -> f64 {
         let v = here.x.exp();
         self.mu * v * ((self.pull + self.ratio) * (1.0 + v) + (1.0 + self.ratio) * (-here.y).exp())
     }
 
-    /// The fastest swing of small motions, which no leg may overlook.
+    /// The fastest oscillation of small amplitude, which bounds the length of a leg.
     fn block_motion(&self) -> f64 {
         1.0 + (self.pull / self.mu).sqrt().min(self.pull)
     }
 
-    /// The moment a way further; `None` if the integrator gives up, or too much work is done.
+    /// The state after the change `way` of the variables; `None` if the integrator fails or needs too many evaluations.
     fn advance(&self, here: &BlockState, way: f64) -> Option<BlockState> {
         if self.work.get() > MOST_WORK {
             return None;
@@ -159,7 +159,7 @@ impl Block {
         Some(BlockState { p, y, x, t: here.t + t, slaved: false })
     }
 
-    /// Whether `x` follows from here on.
+    /// The state, with `x` quasi-static if it may be from here on.
     fn settle(&self, here: BlockState) -> BlockState {
         if self.mu == 0.0 {
             return here;
@@ -169,11 +169,11 @@ impl Block {
             return BlockState { slaved: fast < 2.0 * self.fast, ..here };
         }
         let x = self.followed(here.p, here.y).0;
-        let follows = fast < AT_ONCE || (fast < self.fast && (here.x - x).abs() < CLOSE);
+        let follows = fast < FOLLOWING_RATE_RATIO || (fast < self.fast && (here.x - x).abs() < FOLLOWING_DISTANCE);
         if follows { BlockState { x, slaved: true, ..here } } else { here }
     }
 
-    /// Way of the next leg: as long as it takes `x` to come closer to where it will follow, or some time of its relaxation.
+    /// Length of the next leg: up to the distance from the quasi-static value, or some relaxation times of `x`.
     fn length(&self, here: &BlockState) -> f64 {
         let fast = self.ratio_of_rates(here);
         if here.slaved || fast >= self.fast {
@@ -182,12 +182,12 @@ impl Block {
         (0.7 * (here.x - self.followed(here.p, here.y).0).abs()).max(3.0 * fast).min(LEG)
     }
 
-    /// A leg further, with what is seen of these levels, in ascending order, on the way.
+    /// One leg, and the crossings of `levels`, which ascend, along it.
     pub fn leg(&self, here: BlockState, levels: &[f64]) -> Option<(BlockState, Vec<Event>)> {
         let before = here;
         let here = self.settle(here);
         let rising = self.speed(&here) > 0.0;
-        // An arrest in no time passes levels too.
+        // An instantaneous arrest crosses levels, too.
         let fallen = levels.iter().rev().filter(|level| **level < before.x && **level >= here.x);
         let mut events: Vec<Event> =
             fallen.map(|&level| Event::Pass { here: BlockState { x: level, ..here }, level, up: false }).collect();
@@ -209,7 +209,7 @@ impl Block {
         Some((end, events))
     }
 
-    /// The levels met between two places of a leg between which the velocity only rises or only falls.
+    /// The levels crossed between two places of a leg between which the velocity is monotone.
     fn passes(
         &self,
         here: &BlockState,

@@ -1,4 +1,4 @@
-//! `compliant`: the smooth shortcut integrated over time, its control velocity looked at on the way.
+//! `compliant`: the smooth shortcut integrated over time, with the extremes of its control velocity.
 
 use super::extremal::{min_duration, solve};
 use super::formula_path::{Formula, FormulaPath, State, arriving};
@@ -88,8 +88,8 @@ pub fn check(row: &Row, context: &Context, rtol: f64) -> Verdict {
         control,
     };
     let least = states.iter().map(|y| here.velocity(y)).fold(f64::INFINITY, f64::min);
-    // What the spring pulls with, in units of a, and what it would under the greatest control alone: rounding of the one, and
-    // an error of the other, are felt in proportion.
+    // The pull of the spring in units of a, and its pull under the greatest control alone: rounding errors are proportional to the former,
+    // errors of the control to the latter.
     let pull = |y: &State| (here.friction(y) + m * exponent.moment(y[2], t_f)[1]).abs() / problem.law.a;
     let pull = states.iter().map(pull).fold(0.0, f64::max);
     let reach = if k.is_finite() { k / problem.law.a * t_f * low.abs().max(high.abs()) } else { 0.0 };
@@ -98,7 +98,7 @@ pub fn check(row: &Row, context: &Context, rtol: f64) -> Verdict {
     verdict
 }
 
-/// A protocol on its way.
+/// Extremes along a protocol.
 struct Along<'a> {
     formula_path: &'a FormulaPath,
     states: &'a [State],
@@ -110,11 +110,11 @@ struct Along<'a> {
     reach: f64,
 }
 
-/// More samples than a check follows.
+/// Number of samples beyond which the row is not checked.
 const MOST_SAMPLES: f64 = 3000.0;
 
 /// Amplifications below this have fewer digits.
-const FORGOTTEN: f64 = 1e-2;
+const MIN_AMPLIFICATION: f64 = 1e-2;
 
 /// The columns of open-loop control.
 fn open_loop<V, C>(verdict: &mut Verdict, row: &Row, protocol: &ControlledProtocol<V, C>, along: &Along<'_>, rtol: f64)
@@ -145,8 +145,8 @@ where
         return;
     };
     let noise = 1e-11 * growth.most / rtol;
-    verdict.compare_number(row, "amplification", growth.whole, growth.whole.max(FORGOTTEN).max(noise));
-    // An error of the control, good to rtol, has grown at the end from anywhere on the way.
+    verdict.compare_number(row, "amplification", growth.whole, growth.whole.max(MIN_AMPLIFICATION).max(noise));
+    // An error of the control of size rtol, at any time, has grown at the end.
     let felt = (1.0 + along.reach + 1e-14 / rtol * along.pull) * (1.0 + growth.most);
     let mut compare = |column: &'static str, dt: Option<f64>, scale: f64| match protocol.miss(dt) {
         Some(expected) => verdict.compare_number(row, column, expected, scale.max(expected)),
@@ -162,9 +162,9 @@ where
     }
 }
 
-/// The parameter for which theta arrives; `None` where that does not determine it.
+/// The parameter for which theta arrives; `None` if theta does not determine it.
 fn member(problem: &Transition, formula_path: impl Fn(f64) -> FormulaPath) -> Option<f64> {
-    const CLOSE: f64 = 1e-10;
+    const ARRIVAL_DISTANCE: f64 = 1e-10;
     let miss = |alpha: f64| {
         let formula_path = formula_path(alpha);
         Some(formula_path.states()?.last()?[0] - formula_path.target())
@@ -172,13 +172,13 @@ fn member(problem: &Transition, formula_path: impl Fn(f64) -> FormulaPath) -> Op
     // Theta at the end falls as alpha rises.
     let rise = ((problem.v_f - 1.0) / (problem.v_i - 1.0)).ln().abs().max(1.0);
     let (mut low, mut high) = (-rise, rise);
-    while miss(low)? < CLOSE {
+    while miss(low)? < ARRIVAL_DISTANCE {
         low *= 2.0;
         if low < -1e9 {
             return None;
         }
     }
-    while miss(high)? > -CLOSE {
+    while miss(high)? > -ARRIVAL_DISTANCE {
         high *= 2.0;
         if high > 1e9 {
             return None;

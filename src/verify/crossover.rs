@@ -38,7 +38,7 @@ pub fn check(row: &Row, context: &Context) -> Verdict {
     if !accelerates {
         let turn = tau_f > b - a;
         if problem.v_f < problem.v_i {
-            // At the very turn rounding decides whether there is an end at all: the mean of two neighbours is off by z^2.
+            // At the turn itself rounding decides whether there is an end; the error of the mean of two neighbours is z^2.
             let near = [-1e-6, 1e-6].map(|z| from_end(&problem, z, context.bounded, None));
             let mean = match near {
                 [Some(before), Some(after)] => Some(Extremal {
@@ -59,7 +59,7 @@ pub fn check(row: &Row, context: &Context) -> Verdict {
     let window = if accelerates || !context.bounded { None } else { window(&problem) };
     match window {
         Some([Some(rising), Some(falling)]) => {
-            // Without a change of velocity the window starts at once.
+            // Without a change of velocity the window starts at t_f = 0.
             let starts_at_once = problem.v_i == problem.v_f;
             let rising = if starts_at_once { 0.0 } else { rising.time };
             verdict.compare(row, "t_free_in", Some(rising), starts_at_once.then_some(1.0));

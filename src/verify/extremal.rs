@@ -15,7 +15,7 @@ pub struct Extremal {
     pub v_end: f64,
     pub time_at_floor: f64,
     pub c: f64,
-    /// Largest contact lifetime.
+    /// Greatest state variable theta.
     pub theta_max: f64,
     /// Work of the same protocol varied as requested; `None` where that is not admissible.
     pub varied: Option<f64>,
@@ -28,7 +28,7 @@ pub struct Variation {
     pub k: f64,
     /// When it ends: the duration of the protocol.
     pub t_f: f64,
-    /// Whether it has to keep `v >= 1`.
+    /// Whether `v >= 1` is imposed.
     pub bounded: bool,
 }
 
@@ -58,7 +58,7 @@ pub fn energy(law: Law, c: f64, theta: f64) -> f64 {
 }
 
 /// The value of `z` beyond the turn at which the variable changes to `ln theta`.
-const TURNED: f64 = 0.2;
+const LN_THETA_MIN_Z: f64 = 0.2;
 
 /// From `theta` at `z_0`, after a hold of `time_at_floor`, until `theta` is `1/v_f`, falling or rising.
 fn arc(
@@ -104,13 +104,13 @@ fn arc(
     };
     let held = floor(law, 1.0 / problem.v_i, time_at_floor)?;
     let start = [theta.ln(), time_at_floor, held, z_0, held];
-    let y = if falling && z_1 > TURNED {
-        let turned = if z_0 < TURNED { integrate(by_z, start, (z_0, TURNED))? } else { start };
+    let y = if falling && z_1 > LN_THETA_MIN_Z {
+        let turned = if z_0 < LN_THETA_MIN_Z { integrate(by_z, start, (z_0, LN_THETA_MIN_Z))? } else { start };
         integrate(by_theta, turned, (turned[0], end))?
     } else {
         let near = integrate(by_z, start, (z_0, z_1))?;
         let rate = by_z(&near);
-        // What rounding of z_1 leaves is a step too short for the integrator.
+        // The step that remains by rounding of z_1 is too short for the integrator.
         let step = if rate[0].abs() > 1e-3 { (end - near[0]) / rate[0] } else { 0.0 };
         std::array::from_fn(|i| near[i] + rate[i] * step)
     };
@@ -143,7 +143,7 @@ fn held(v_i: f64, time: f64) -> f64 {
     1.0 - (1.0 - 1.0 / v_i) * (-time).exp()
 }
 
-/// Acceleration: by `z` at the start, and below `-ln v_i`, under the bound, by how long it holds.
+/// Acceleration: by `z` at the start; below `-ln v_i`, under the bound, by the time at the floor.
 pub fn from_start(problem: &Transition, q: f64, bounded: bool, variation: Option<&Variation>) -> Option<Extremal> {
     let spare = -(q + problem.v_i.ln());
     if bounded && spare > 0.0 {
@@ -178,8 +178,8 @@ pub fn from_end(problem: &Transition, z: f64, bounded: bool, variation: Option<&
     }
 }
 
-/// Stands for the logarithm of an infinite time.
-const ENDLESS: f64 = 1e3;
+/// Logarithm of a time that counts as infinite.
+const LN_INFINITE_TIME: f64 = 1e3;
 
 /// The optimum of this duration, and the works of admissible variations of it.
 pub fn solve_with(problem: &Transition, t_f: f64, bounded: bool, sizes: &[f64]) -> Option<(Extremal, Vec<f64>)> {
@@ -216,10 +216,10 @@ fn at(problem: &Transition, member: Member, bounded: bool, variation: Option<&Va
     }
 }
 
-/// A hold that takes this long brings theta so close to 1 that the end does not determine it any more.
-const LONG: f64 = 12.0;
+/// Time at the floor beyond which theta is so close to 1 that the end no longer determines it.
+const MAX_TIME_AT_FLOOR: f64 = 12.0;
 
-/// The optimum of a long duration: what comes after the hold hardly depends on it.
+/// The optimum of a long duration: the path after the floor hardly depends on the duration.
 fn find_held(problem: &Transition, t_f: f64) -> Option<(Extremal, Member)> {
     let mut floor = t_f;
     for _ in 0..50 {
@@ -237,18 +237,18 @@ fn find_held(problem: &Transition, t_f: f64) -> Option<(Extremal, Member)> {
 /// The optimum of this duration, and which member it is.
 fn find(problem: &Transition, t_f: f64, bounded: bool) -> Option<(Extremal, Member)> {
     let accelerates = problem.v_f > problem.v_i;
-    if bounded && t_f > LONG + min_duration(problem) {
+    if bounded && t_f > MAX_TIME_AT_FLOOR + min_duration(problem) {
         return find_held(problem, t_f);
     }
     let member = |p: f64| if accelerates { Member::Start(p) } else { Member::End(p) };
     let at = |p: f64| at(problem, member(p), bounded, None);
-    // Towards long times a deceleration has a last parameter, at which the hold never ends.
+    // A deceleration has a last parameter, at which the time at the floor is infinite.
     let excess = |p: f64| match at(p) {
         Some(extremal) => Some((extremal.time / t_f).ln()),
-        None if !accelerates && p > 0.0 => Some(ENDLESS),
+        None if !accelerates && p > 0.0 => Some(LN_INFINITE_TIME),
         None => None,
     };
-    // At the very turn rounding decides whether there is an end at all.
+    // At the turn itself rounding decides whether there is an end.
     let first = if accelerates { 0.0 } else { 1e-3 };
     let (mut low, mut high) = (first, first);
     let (mut f_low, mut f_high) = (excess(first)?, excess(first)?);
@@ -272,7 +272,7 @@ fn find(problem: &Transition, t_f: f64, bounded: bool) -> Option<(Extremal, Memb
         let even = 0.5 * (low + high);
         let p = if f_high >= 1.0 { even } else { low - f_low * (high - low) / (f_high - f_low) };
         let Some(extremal) = at(p) else {
-            (high, f_high) = (p, ENDLESS);
+            (high, f_high) = (p, LN_INFINITE_TIME);
             continue;
         };
         let f = (extremal.time / t_f).ln();
@@ -280,7 +280,7 @@ fn find(problem: &Transition, t_f: f64, bounded: bool) -> Option<(Extremal, Memb
             return Some((extremal, member(p)));
         }
         if high - low <= 1e-15 * (1.0 + p.abs()) {
-            // As close as the parameter goes, if that is close.
+            // The parameter has no closer double: accepted if the error is small.
             return (f.abs() <= 1e-9).then_some((extremal, member(p)));
         }
         if f > 0.0 {

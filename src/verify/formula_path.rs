@@ -4,7 +4,7 @@ use super::gap::golden;
 use super::route::integrate;
 use crate::model::Transition;
 
-/// Pieces in which a protocol is integrated, and between which its extremes are looked for.
+/// Number of pieces in which a protocol is integrated, and in which extremes are searched.
 const PIECES: usize = 256;
 
 /// The formula of a protocol over `x = t/t_f`.
@@ -15,7 +15,7 @@ pub enum Formula {
     Friction(Box<dyn Fn(f64) -> f64>),
 }
 
-/// A protocol on its way: `ln theta`, work, place.
+/// State of a protocol: `ln theta`, work, fraction of the time.
 pub type State = [f64; 3];
 
 /// A protocol between two steady states.
@@ -53,7 +53,7 @@ impl FormulaPath {
         integrate(slope, y, (0.0, length))
     }
 
-    /// The states between the pieces, in the direction of integration; `None` if the integrator does not get there.
+    /// The states between the pieces, in the direction of integration; `None` if the integrator fails.
     pub fn states(&self) -> Option<Vec<State>> {
         let (v, x) = if self.backward { (self.problem.v_f, 1.0) } else { (self.problem.v_i, 0.0) };
         let mut states = vec![[-v.ln(), 0.0, x]];
@@ -82,16 +82,16 @@ impl FormulaPath {
     }
 }
 
-/// The parameter that would bring theta to the target, from the distance by which one of `alpha` misses it and from how
-/// far a slightly different one gets; `formula_path(alpha)` makes a protocol.
+/// The parameter that brings theta to the target, by a secant from `alpha`, at which theta ends at `end`, and a parameter close to it;
+/// `formula_path(alpha)` makes a protocol.
 pub fn arriving(alpha: f64, end: f64, target: f64, formula_path: impl Fn(f64) -> FormulaPath) -> f64 {
-    const NUDGE: f64 = 1e-6;
-    // What the integrator leaves: a long protocol forgets its parameter, which then cannot be distinguished from where it ends.
-    const NOISE: f64 = 3e-11;
-    if (end - target).abs() <= NOISE {
+    const ALPHA_STEP: f64 = 1e-6;
+    // Error of the integrator: the end of a long protocol does not depend on its parameter.
+    const INTEGRATOR_RTOL: f64 = 3e-11;
+    if (end - target).abs() <= INTEGRATOR_RTOL {
         return alpha;
     }
-    let moved = formula_path(alpha * (1.0 + NUDGE)).states().and_then(|states| Some(states.last()?[0] - end));
-    let fraction = moved.map_or(f64::INFINITY, |moved| NUDGE * (end - target) / moved);
+    let moved = formula_path(alpha * (1.0 + ALPHA_STEP)).states().and_then(|states| Some(states.last()?[0] - end));
+    let fraction = moved.map_or(f64::INFINITY, |moved| ALPHA_STEP * (end - target) / moved);
     alpha * (1.0 - fraction)
 }

@@ -1,4 +1,4 @@
-//! The long-term behaviour of a block after a step: following cycle by cycle, and the closed cycle.
+//! The long-term behaviour of a block after a step: integration cycle by cycle, and the closed cycle.
 
 use super::block_motion::{Block, BlockState, Event};
 
@@ -13,7 +13,7 @@ pub struct Extremum {
     /// `ln(v/v_f)`.
     pub x: f64,
     pub t: f64,
-    /// Over how long it cannot be distinguished from its neighbours.
+    /// Time over which it cannot be distinguished from its neighbours.
     pub flatness: f64,
 }
 
@@ -29,10 +29,10 @@ pub struct Cycle {
     section: [f64; 2],
 }
 
-/// The end that was found.
+/// The long-term behaviour.
 #[derive(Debug, Clone, Copy)]
 pub enum LongTermBehaviour {
-    /// Since when it is settled, how fast `ln v` changed then, and how close an earlier turn came to the edge of the band.
+    /// Time since which it is settled, rate of change of `ln v` then, and least distance of an earlier turn from the edge of the band.
     Settled {
         time: f64,
         speed: f64,
@@ -43,41 +43,41 @@ pub enum LongTermBehaviour {
     Infinite,
 }
 
-/// A response as far as it was followed.
+/// A response as far as it was integrated.
 #[derive(Debug, Clone, Copy)]
 pub struct Simulation {
     pub long_term: Result<LongTermBehaviour, &'static str>,
-    /// Extremes since `v = v_f` was first met.
+    /// Extremes since `v` first reached `v_f`.
     pub high: Option<Extremum>,
     pub low: Option<Extremum>,
-    /// When it was left.
+    /// Time at which integration ended.
     pub t: f64,
 }
 
 /// Legs of one cycle.
 const MOST_LEGS: u32 = 5_000;
 
-/// Velocities beyond `e^this v_f` without mass count as infinite.
-const ENDLESS: f64 = 60.0;
+/// `ln(v/v_f)` beyond which the velocity of a block without mass counts as infinite.
+const MAX_LN_VELOCITY_RATIO: f64 = 60.0;
 
-/// Within this distance from steady sliding that is stable nothing happens any more, nor within a fraction of what is to be reported.
-const QUIET: f64 = 1e-5;
-const UNTOLD: f64 = 0.1;
+/// Distance from stable steady sliding within which a response has settled, and the same as a fraction of `rtol`.
+const SETTLED_DISTANCE: f64 = 1e-5;
+const SETTLED_RTOLS: f64 = 0.1;
 
-/// Swings within this fraction of the band stay in it.
-const INSIDE: f64 = 0.3;
+/// Fraction of the band of settled velocities in which a response stays once it is there.
+const BAND_FRACTION: f64 = 0.3;
 
-/// A section this close to that of the limit cycle, in `ln p` and `y`, has come to it; as many cycles may be left, and
-/// closer ones that come to it slowly come to it from one side.
-const ARRIVED: f64 = 1e-7;
-const MOST_LEFT: usize = 60;
-const SLOW: f64 = 0.8;
+/// Distance from the section of the limit cycle, in `ln p` and `y`, within which a response has reached it; greatest number of
+/// cycles left; and ratio of successive distances above which a response approaches it from one side.
+const CYCLE_DISTANCE: f64 = 1e-7;
+const MAX_CYCLES_LEFT: usize = 60;
+const MAX_CONVERGENCE_RATIO: f64 = 0.8;
 
 const TOO_LONG: &str = "responses too long or too stiff for an explicit integrator";
 
 /// Follows the response from `e^x v_f` to its end, whose numbers are to be known to `rtol`.
 pub fn follow(block: &Block, stable: bool, x: f64, rtol: f64) -> Simulation {
-    let quiet = QUIET.min(UNTOLD * rtol);
+    let quiet = SETTLED_DISTANCE.min(SETTLED_RTOLS * rtol);
     let mut watch = Watch {
         simulation: Simulation { long_term: Err(TOO_LONG), high: None, low: None, t: 0.0 },
         since: None,
@@ -99,7 +99,7 @@ pub fn follow(block: &Block, stable: bool, x: f64, rtol: f64) -> Simulation {
         let Some((end, events)) = block.leg(here, &levels) else { return watch.simulation };
         here = end;
         watch.simulation.t = here.t;
-        if block.mu == 0.0 && here.x > ENDLESS {
+        if block.mu == 0.0 && here.x > MAX_LN_VELOCITY_RATIO {
             watch.simulation.long_term = Ok(LongTermBehaviour::Infinite);
             return watch.simulation;
         }
@@ -121,7 +121,7 @@ pub fn follow(block: &Block, stable: bool, x: f64, rtol: f64) -> Simulation {
                     if up {
                         sections.push(here);
                         let range = high - low;
-                        let small = high < INSIDE * edges[1] && low > INSIDE * edges[0];
+                        let small = high < BAND_FRACTION * edges[1] && low > BAND_FRACTION * edges[0];
                         if stable && sections.len() > 1 && small && range < last_range {
                             return watch.settled();
                         }
@@ -130,10 +130,13 @@ pub fn follow(block: &Block, stable: bool, x: f64, rtol: f64) -> Simulation {
                             next_try *= 2;
                             found = limit(block, &sections).map(|cycle| (cycle, sections.len()));
                         }
-                        // What comes before may go further than the limit cycle.
+                        // Earlier extremes may exceed those of the limit cycle.
                         if let Some((cycle, since)) = found {
                             let far = (here.p.ln() - cycle.section[0]).hypot(here.y - cycle.section[1]);
-                            if far < ARRIVED || cycle.fraction > SLOW || sections.len() > since + MOST_LEFT {
+                            if far < CYCLE_DISTANCE
+                                || cycle.fraction > MAX_CONVERGENCE_RATIO
+                                || sections.len() > since + MAX_CYCLES_LEFT
+                            {
                                 watch.simulation.long_term = Ok(LongTermBehaviour::Cycle(cycle));
                                 return watch.simulation;
                             }
@@ -169,11 +172,11 @@ impl Watch {
     }
 }
 
-/// From one section to the next: where it is met, how long that takes, and the extremes on the way.
+/// From one section to the next: place, duration, and extremes between.
 fn cycle(block: &Block, p: f64, y: f64) -> Option<(BlockState, f64, f64)> {
     let mut here = block.section(p, y);
     let (mut high, mut low) = (0.0f64, 0.0f64);
-    // The section that it starts from may be met by rounding.
+    // Rounding may report the section from which it starts.
     let mut left = false;
     for _ in 0..MOST_LEGS {
         let (end, events) = block.leg(here, &[0.0])?;
@@ -192,19 +195,18 @@ fn cycle(block: &Block, p: f64, y: f64) -> Option<(BlockState, f64, f64)> {
     None
 }
 
-/// A relative change of the section for its derivatives.
-const NUDGE: f64 = 1e-5;
+/// Relative step of the section for numerical derivatives.
+const SECTION_STEP: f64 = 1e-5;
 
-/// Steps of Newton's method, and the longest of them.
+/// Greatest number of steps of Newton's method, and the longest step.
 const MOST_STEPS: u32 = 12;
-const LONGEST: f64 = 0.5;
+const MAX_NEWTON_STEP: f64 = 0.5;
 
-/// The cycle that closes near the last of these sections, if they come to it: Newton's method for the section, in `ln p` and
-/// `y`.
+/// The closed cycle near the last of these sections, if they converge to it: Newton's method for the section, in `ln p` and `y`.
 fn limit(block: &Block, sections: &[BlockState]) -> Option<Cycle> {
     let [.., before, last] = sections else { return None };
     let motion = (last.p / before.p).ln();
-    if motion.is_nan() || motion.abs() > LONGEST {
+    if motion.is_nan() || motion.abs() > MAX_NEWTON_STEP {
         return None;
     }
     let (mut ln_p, mut y) = (last.p.ln(), last.y);
@@ -214,8 +216,9 @@ fn limit(block: &Block, sections: &[BlockState]) -> Option<Cycle> {
     };
     for _ in 0..MOST_STEPS {
         let (to, period, high, low) = map(ln_p, y)?;
-        let [by_p, by_y] = [map(ln_p + NUDGE, y)?.0, map(ln_p, y + NUDGE)?.0];
-        let [[pp, yp], [py, yy]] = [by_p, by_y].map(|moved| [(moved[0] - to[0]) / NUDGE, (moved[1] - to[1]) / NUDGE]);
+        let [by_p, by_y] = [map(ln_p + SECTION_STEP, y)?.0, map(ln_p, y + SECTION_STEP)?.0];
+        let [[pp, yp], [py, yy]] =
+            [by_p, by_y].map(|moved| [(moved[0] - to[0]) / SECTION_STEP, (moved[1] - to[1]) / SECTION_STEP]);
         let miss = [to[0] - ln_p, to[1] - y];
         let determinant = (1.0 - pp) * (1.0 - yy) - py * yp;
         let step =
@@ -224,7 +227,7 @@ fn limit(block: &Block, sections: &[BlockState]) -> Option<Cycle> {
         if !size.is_finite() {
             return None;
         }
-        let fraction = (LONGEST / size).min(1.0);
+        let fraction = (MAX_NEWTON_STEP / size).min(1.0);
         (ln_p, y) = (ln_p + fraction * step[0], y + fraction * step[1]);
         if size < 1e-9 {
             // The greater multiplier.

@@ -1,4 +1,4 @@
-//! A dataset audited: a sample of its rows solved again by a route that shares nothing with the solvers that made it.
+//! Audit of a dataset: a sample of its rows is solved by methods that share nothing with the solvers.
 
 mod best_cubic;
 mod block_motion;
@@ -42,7 +42,7 @@ pub const LIMIT: f64 = 10.0;
 pub struct Audit {
     /// Its name.
     pub table: String,
-    /// Accuracy promised.
+    /// The `rtol` of the table.
     pub rtol: f64,
     /// Whether the shown rows are dimensionless, unlike those of the dataset.
     pub is_converted: bool,

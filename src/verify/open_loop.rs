@@ -14,16 +14,16 @@ type Matrix = [[f64; 3]; 3];
 pub struct Growth {
     /// Greatest factor from the start to the end.
     pub whole: f64,
-    /// Greatest factor from anywhere on the way to the end.
+    /// Greatest factor from any time to the end.
     pub most: f64,
 }
 
-/// Time over which a block forgets its velocity, as a fraction of the protocol, below which an explicit integrator is no use.
-const STIFF: f64 = 1e-4;
+/// Relaxation time of the velocity, as a fraction of the protocol, below which an explicit integrator takes too many steps.
+const MIN_RELAXATION_FRACTION: f64 = 1e-4;
 
 /// Whether an explicit integrator cannot follow the block at its greatest velocity.
 pub fn is_stiff(slider: &SpringBlock, least: f64, t_f: f64) -> bool {
-    slider.m > 0.0 && slider.m * least / slider.law.a < STIFF * t_f
+    slider.m > 0.0 && slider.m * least / slider.law.a < MIN_RELAXATION_FRACTION * t_f
 }
 
 /// The growth of errors over a protocol of which `states` are known, `velocity(x)` at a fraction `x` of the time.
@@ -35,7 +35,7 @@ pub fn growth(
 ) -> Option<Growth> {
     let SpringBlock { law, k, m } = *slider;
     let (t_f, ratio) = (formula_path.t_f, law.b / law.a);
-    // By piece: the errors at its end for unit errors at its start. What follows from the others is not an error of its own.
+    // For each piece, the errors at its end for unit errors at its start.
     let piece = |pair: &[State]| {
         let (from, to) = (pair[0][2], pair[1][2]);
         let v = |x: f64| velocity(x);
@@ -77,7 +77,7 @@ pub fn growth(
         }
         Some(columns)
     };
-    // What an error that is there at the end amounts to.
+    // Propagation from the end, where an error is itself.
     let mut after: Matrix = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
     if k == f64::INFINITY {
         after = [[0.0; 3], [0.0, 1.0, ratio], [0.0; 3]];
@@ -94,7 +94,7 @@ pub fn growth(
     (whole.is_finite() && most.is_finite()).then_some(Growth { whole, most })
 }
 
-/// The largest singular value, from the largest eigenvalue of the product with the transpose: powers of it.
+/// The largest singular value, from powers of the product with the transpose, whose largest eigenvalue is its square.
 fn norm(matrix: &Matrix) -> f64 {
     let size = matrix.iter().flatten().fold(0.0f64, |size, x| size.max(x.abs()));
     if size == 0.0 || !size.is_finite() {
@@ -125,13 +125,13 @@ pub struct ControlledProtocol<V, C> {
     pub t_f: f64,
     /// Its velocity.
     pub velocity: V,
-    /// The control from the fraction of the time and `ln theta` of the protocol.
+    /// The control as a function of the fraction of the time and `ln theta`.
     pub control: C,
 }
 
 impl<V: Fn(f64) -> f64, C: Fn(f64, f64) -> f64> ControlledProtocol<V, C> {
-    /// Distance from the target at the end, in `(ln v, ln theta, k s/a)`, of a block that starts in steady sliding, under
-    /// the control continuous, or sampled every `dt` and held.
+    /// Distance from the target at the end, in `(ln v, ln theta, k s/a)`, of a block that starts in steady sliding, if the control is
+    /// continuous, or sampled every `dt` and held.
     pub fn miss(&self, dt: Option<f64>) -> Option<f64> {
         let &ControlledProtocol { slider: SpringBlock { law, k, m }, v_i, v_f, t_f, .. } = self;
         let (ratio, pull) = (law.b / law.a, k / law.a);

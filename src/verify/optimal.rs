@@ -1,4 +1,4 @@
-//! `optimal`: the extremal of the row's duration, found again with the integrator.
+//! `optimal`: the extremal of the row's duration, by an integrator.
 
 use super::clamped::Way;
 use super::extremal::{Extremal, branch, energy, min_duration, solve_with};
@@ -7,7 +7,7 @@ use crate::dataset::Row;
 use crate::model::Transition;
 use crate::table::STATUS;
 
-/// Relative sizes of the variations that try to beat the optimum.
+/// Relative sizes of the variations that are compared with the optimum.
 const SIZES: [f64; 4] = [-1e-2, 1e-2, -1e-4, 1e-4];
 
 pub fn check(row: &Row, context: &Context) -> Verdict {
@@ -49,8 +49,8 @@ pub fn check(row: &Row, context: &Context) -> Verdict {
     verdict
 }
 
-/// Time at the floor after which the conserved `C` no longer determines the rest.
-const LONG: f64 = 12.0;
+/// Time at the floor beyond which the conserved `C` no longer determines the rest of the path.
+const MAX_TIME_AT_FLOOR: f64 = 12.0;
 
 /// A row under ceilings: the protocol of the row's own `C` and the next steps of Newton's method, integrated.
 fn under_ceilings(row: &Row, way: &Way, t_f: f64) -> Verdict {
@@ -67,7 +67,7 @@ fn under_ceilings(row: &Row, way: &Way, t_f: f64) -> Verdict {
         }
         return verdict;
     };
-    if way.sits() || number(row, "time_at_floor").is_some_and(|time| time > LONG) {
+    if way.sits() || number(row, "time_at_floor").is_some_and(|time| time > MAX_TIME_AT_FLOOR) {
         verdict.miss("C does not determine it: it waits at the floor for long, or slides steadily at v_f");
         return verdict;
     }
@@ -100,13 +100,13 @@ fn under_ceilings(row: &Row, way: &Way, t_f: f64) -> Verdict {
     ] {
         verdict.compare(row, column, Some(expected), (expected == 0.0).then_some(1.0));
     }
-    // No admissible variation may cost less, time at its price.
+    // No admissible variation may cost less, with time at its price.
     let cost = found.work + found.c * found.time;
     verdict.push("beaten", ((cost - found.varied) / size).max(0.0));
     verdict
 }
 
-/// Places on either leg at which friction is looked at.
+/// Places on either leg at which friction is evaluated.
 const PLACES: u32 = 4000;
 
 /// Least friction: on the hold it rises; on the arc `u - 1 - ln u` follows from theta, rising and then falling.

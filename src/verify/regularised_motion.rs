@@ -1,4 +1,4 @@
-//! `regularised`: its pieces built again between moments of the optimum that a library integrates, and followed.
+//! `regularised`: its pieces constructed between states of the optimum and integrated with a library.
 
 use super::extremal::{Extremal, min_duration, solve};
 use super::formula_path::{Formula, FormulaPath, State};
@@ -10,7 +10,7 @@ use crate::model::{Law, Transition};
 use crate::protocol::SpringBlock;
 use crate::table::STATUS;
 
-/// A moment of the optimum: `ln v` with two derivatives in time, `ln theta`, and work done.
+/// State of the optimum at one time: `ln v` with two derivatives in time, `ln theta`, and work done.
 #[derive(Debug, Clone, Copy)]
 struct Moment {
     q: [f64; 3],
@@ -40,11 +40,11 @@ impl Moment {
     }
 }
 
-/// The extremes so far.
+/// Sums and extremes along the motion.
 struct MotionExtremes<'a> {
     slider: &'a SpringBlock,
     excess: f64,
-    /// Work of what was replaced: the size of what the excess is a difference of.
+    /// Work of the replaced segments: the scale of the rounding error of the excess.
     replaced: f64,
     /// `theta` over what of it a piece takes, `int theta v dt`: where that is little, its rounding limits the piece.
     vague: f64,
@@ -64,7 +64,7 @@ impl MotionExtremes<'_> {
         v + (law.a * v1 / v + law.b * ((-y).exp() - v) + m * v2) / k
     }
 
-    /// The optimum over a time from a moment on its arc, forwards or backwards: where that leads.
+    /// Follows the optimum for a time from a state on its arc, forwards or backwards; returns the final state.
     fn keep(&mut self, from: Moment, time: f64) -> Option<Moment> {
         const LEGS: usize = 64;
         let mut moments = vec![from];
@@ -89,7 +89,7 @@ impl MotionExtremes<'_> {
         moments.pop()
     }
 
-    /// A piece between two moments `time` apart in place of `work`; `outer` determines which are ends of the protocol.
+    /// A piece between two states `time` apart that replaces a segment with `work`; `outer` states which of them are ends of the protocol.
     fn replace(&mut self, ends: [Moment; 2], outer: [bool; 2], time: f64, work: f64) -> Option<()> {
         let mut piece = Piece::new(self.slider.law, 0.0, ends, outer, time)?;
         let off_bound = ends.iter().all(|end| end.q[0] > 0.0);
@@ -108,7 +108,7 @@ impl MotionExtremes<'_> {
     }
 }
 
-/// The moment on an arc a time later, or earlier.
+/// The state on an arc after a time, or before.
 fn further(law: Law, from: &Moment, time: f64) -> Option<Moment> {
     let slope = |s: &[f64; 3]| {
         let at = Moment::moving(law, s[0], s[1], 0.0);
@@ -157,7 +157,7 @@ impl Exponent {
     }
 }
 
-/// A piece, followed.
+/// An integrated piece.
 struct Piece {
     exponent: Exponent,
     formula_path: FormulaPath,
@@ -165,7 +165,7 @@ struct Piece {
 }
 
 /// Slip at the end of the protocol after which theta follows `1/v` there.
-const FOLLOWING: f64 = 5.0;
+const MIN_END_SLIP: f64 = 5.0;
 
 /// The stretching of an end `rho` times as high as the mean.
 fn stretch(rho: f64) -> f64 {
@@ -179,7 +179,7 @@ impl Piece {
         let mean = (time - growth) / (time * (theta[0] * theta[1]).sqrt()) - floor;
         let v = ends.map(|end| end.velocity());
         let mut stretches = [0, 1].map(|i| if outer[i] { stretch((v[i][0] - floor) / mean) } else { 0.0 });
-        if v[1][0] * time > FOLLOWING * (1.0 + stretches[1]) {
+        if v[1][0] * time > MIN_END_SLIP * (1.0 + stretches[1]) {
             stretches[1] = 0.0;
         }
         // Slope and curvature of ln(v - floor) over the fraction of the time.
@@ -213,7 +213,7 @@ impl Piece {
             let states = formula_path.states()?;
             Some(Piece { exponent, formula_path, states })
         };
-        // Theta falls as the bump rises: beyond what can be followed it is none.
+        // Theta falls as the bump rises; a protocol that cannot be integrated counts as theta = 0.
         let miss = |bump: f64| {
             let end = follow(bump).and_then(|piece| Some(piece.states.last()?[0] - ends[1].y));
             end.filter(|miss| miss.is_finite()).unwrap_or(-1e3)
@@ -238,7 +238,7 @@ impl Piece {
         follow(0.5 * (low + high))
     }
 
-    /// The range of `f(ln theta, v)`, looked for in equal parts of the stretched place, which opens the layers at the ends.
+    /// The range of `f(ln theta, v)`, searched in equal parts of the stretched place, which resolves the layers at the ends.
     fn range(&self, f: impl Fn(f64, [f64; 3]) -> f64) -> [f64; 2] {
         let [p, q] = self.exponent.stretch;
         let at = |s: f64| {
@@ -261,7 +261,7 @@ impl Piece {
     }
 }
 
-/// Places at which a piece is looked at before an extreme is refined.
+/// Places at which a piece is evaluated before an extreme is refined.
 const PLACES: f64 = 600.0;
 
 /// All of it.
@@ -319,7 +319,7 @@ fn again<'a>(
     }
     let middle = 0.5 * (t_f - delta_t - gone);
     if middle > 0.0 {
-        // From both ends: each way small errors grow.
+        // From both ends, since errors grow in either direction.
         found.keep(from, middle)?;
         found.keep(arriving, -middle)?;
     }
@@ -327,11 +327,10 @@ fn again<'a>(
     Some(found)
 }
 
-/// Where theta is this many times what a piece takes of it, the eleven digits that the integrator has of theta leave fewer than
-/// six of the piece.
-const MOST_VAGUE: f64 = 1e5;
+/// Ratio of theta to its change in a piece beyond which the eleven digits of the integrator leave fewer than six of the change.
+const MAX_THETA_RATIO: f64 = 1e5;
 
-/// Below this, `v(0+)` hardly counts in the time that determines it.
+/// Velocity below which `v(0+)` is poorly determined by the duration.
 const MIN_START_VELOCITY: f64 = 0.1;
 
 pub fn check(row: &Row, context: &Context, rtol: f64) -> Verdict {
@@ -365,7 +364,7 @@ pub fn check(row: &Row, context: &Context, rtol: f64) -> Verdict {
         return verdict;
     };
     verdict.compare(row, "work", Some(best.work + found.excess), None);
-    // A difference of works that are each known to about 1e-12.
+    // The relative error of both works is about 1e-12.
     let gap = found.excess / best.work;
     verdict.compare(row, "gap", Some(gap), Some(gap.abs() + 1e-11 * found.replaced / best.work / rtol));
     verdict.compare(row, "v_max", Some(found.v[1]), None);
@@ -373,7 +372,7 @@ pub fn check(row: &Row, context: &Context, rtol: f64) -> Verdict {
         verdict.miss("ranges of pieces that lead to a near standstill");
         return verdict;
     }
-    if found.vague > MOST_VAGUE {
+    if found.vague > MAX_THETA_RATIO {
         verdict.miss("ranges of pieces that take too little of theta to be distinguished from it");
         return verdict;
     }

@@ -10,14 +10,14 @@ use crate::dataset::Row;
 use crate::model::Transition;
 use crate::table::STATUS;
 
-/// Greatest distance of the end from the target, in `ln theta`, of a protocol that was followed.
+/// Greatest distance of the end from the target, in `ln theta`, of an integrated protocol.
 const MAX_END_ERROR: f64 = 1e-9;
 
-/// A relative change of alpha that is rounding.
-const MOVED: f64 = 1e-9;
+/// Relative change of alpha by rounding.
+const ALPHA_ROUNDING_RTOL: f64 = 1e-9;
 
-/// `ln(v_f/v_i)` beyond which theta, as the difference of numbers of the size of its greatest value, has too few digits.
-const FAR: f64 = 11.5;
+/// `ln(v_f/v_i)` beyond which theta has too few digits: it is a difference of numbers as large as its greatest value.
+const MAX_LN_VELOCITY_RATIO: f64 = 11.5;
 
 pub fn check(row: &Row, context: &Context) -> Verdict {
     let (Some(problem), Some(t_f), Some(family)) = (transition(row), number(row, "t_f"), word(row, "family")) else {
@@ -61,15 +61,15 @@ pub fn check(row: &Row, context: &Context) -> Verdict {
         Some(alpha) if alpha != 0.0 => {
             let arriving = arriving(alpha, end[0], target, formula_path);
             let doubtful = (end[0] - target).abs() > MAX_END_ERROR;
-            let determines = arriving.is_finite() && (arriving - alpha).abs() > MOVED * alpha.abs();
+            let determines = arriving.is_finite() && (arriving - alpha).abs() > ALPHA_ROUNDING_RTOL * alpha.abs();
             if doubtful && !determines {
-                // A change of its last digits moves the end: as a double alpha does not determine the protocol.
+                // A change of its last digits moves the end: a double is too coarse for alpha.
                 verdict.miss("alpha has too few digits to follow the protocol again");
                 return verdict;
             }
             verdict.compare(row, "alpha", Some(arriving), None);
         }
-        _ if (problem.v_f / problem.v_i).ln().abs() > FAR => {
+        _ if (problem.v_f / problem.v_i).ln().abs() > MAX_LN_VELOCITY_RATIO => {
             verdict.miss("velocities too far apart for the formula in doubles");
             return verdict;
         }
@@ -96,10 +96,9 @@ pub fn check(row: &Row, context: &Context) -> Verdict {
 }
 
 /// Relative distance from 0 below which the sign of a number is unknown.
-const UNSURE: f64 = 1e-11;
+const SIGN_RTOL: f64 = 1e-11;
 
-/// Which bound leaves the family without a member, from the extreme protocols of the family integrated: `None` where
-/// that is too close to call.
+/// Which bound leaves the family without a member, from the extreme protocols of the family by integration; `None` where rounding decides.
 fn obstacle(
     problem: &Transition,
     t_f: f64,
@@ -109,11 +108,11 @@ fn obstacle(
 ) -> Option<Option<&'static str>> {
     let Transition { law, v_i, v_f } = *problem;
     let settle = |bound: &'static str, room: f64, size: f64| match room / size {
-        room if room > UNSURE => Some(None),
-        room if room < -UNSURE => Some(Some(bound)),
+        room if room > SIGN_RTOL => Some(None),
+        room if room < -SIGN_RTOL => Some(Some(bound)),
         _ => None,
     };
-    // Along v = 1 theta ages most; it ends beyond its target if there is time to spare.
+    // Along v = 1 theta rises most; it ends beyond its target if the time is long enough.
     let aged = integrate(|y: &[f64; 1]| [1.0 - y[0]], [1.0 / v_i], (0.0, t_f))?[0];
     let spare = settle("time", aged * v_f - 1.0, 1.0);
     if bounded && v_f < v_i && spare != Some(None) {
@@ -140,7 +139,7 @@ fn obstacle(
                     let least = integrate(time, [-v_i.ln(), 0.0], (0.0, fall))?[1];
                     settle("friction", t_f - least, t_f)
                 }
-                // With v = 0 throughout, theta ages by the time.
+                // With v = 0 throughout, theta rises by the time.
                 Some(None) if v_f < v_i => settle("velocity", t_f - (1.0 / v_f - 1.0 / v_i), t_f),
                 decided => decided,
             }

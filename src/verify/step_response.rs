@@ -1,4 +1,4 @@
-//! `step_response`: the block on its spring followed again, by an explicit integrator in other variables.
+//! `step_response`: the block on its spring, with an explicit integrator in other variables.
 
 use std::cell::Cell;
 
@@ -10,14 +10,14 @@ use crate::dataset::Row;
 use crate::stability::SteadySliding;
 use crate::table::STATUS;
 
-/// A step of less than this about unstable sliding comes too late to be followed.
+/// Relative size of a step from unstable steady sliding below which the growth takes too long to integrate.
 const MIN_AMPLITUDE: f64 = 1e-4;
 
-/// A turn this many rtol from the edge of the band of settled velocities may or may not leave it.
-const HAIR: f64 = 10.0;
+/// Distance from the edge of the band of settled velocities, in rtol, within which a turn may or may not leave the band.
+const EDGE_RTOLS: f64 = 10.0;
 
-/// An overshoot below this has no time of its own.
-const NONE: f64 = 1e-3;
+/// Relative overshoot below which its time is not determined.
+const MIN_OVERSHOOT: f64 = 1e-3;
 
 pub fn check(row: &Row, _: &Context, rtol: f64) -> Verdict {
     let (Some(problem), Some(k), Some(m)) = (transition(row), number(row, "k"), number(row, "m")) else {
@@ -40,7 +40,7 @@ pub fn check(row: &Row, _: &Context, rtol: f64) -> Verdict {
         return verdict;
     }
     let stable = SteadySliding::new(law, k, m, v_f).is_stable();
-    // Steady sliding that is unstable is left.
+    // A response does not settle at unstable steady sliding.
     if !stable && word(row, "outcome") == Some("settled") {
         verdict.compare_word(row, "outcome", "limit_cycle");
     }
@@ -67,12 +67,12 @@ pub fn check(row: &Row, _: &Context, rtol: f64) -> Verdict {
         return verdict;
     }
     let velocity = |x: f64| v_f * x.exp();
-    // How much an error of the spring's force moves ln v where it follows.
+    // Effect of an error of the spring force on a quasi-static ln v.
     let felt = (block.pull * block.mu).sqrt().max(1.0).sqrt();
     let high = simulation.high.map_or(0.0, |high| high.x.max(0.0));
     let low = simulation.low.map_or(0.0, |low| low.x.min(0.0));
     let peak_time = |verdict: &mut Verdict| {
-        let Some(top) = simulation.high.filter(|top| top.x > NONE) else { return };
+        let Some(top) = simulation.high.filter(|top| top.x > MIN_OVERSHOOT) else { return };
         let scale = (top.t / top.x.exp_m1().min(1.0)).max(top.flatness);
         verdict.compare_number(row, "t_peak", top.t / v_f, scale / v_f);
     };
@@ -82,7 +82,7 @@ pub fn check(row: &Row, _: &Context, rtol: f64) -> Verdict {
             verdict.compare_word(row, STATUS, if lowest < 1.0 { "below_bound" } else { "ok" });
         }
     };
-    // What is not known to rtol is null.
+    // Numbers with errors above rtol are null.
     match simulation.long_term {
         Ok(LongTermBehaviour::Settled { time, speed, margin }) => {
             compare_status(&mut verdict, low);
@@ -91,7 +91,7 @@ pub fn check(row: &Row, _: &Context, rtol: f64) -> Verdict {
             verdict.compare(row, "v_peak", Some(velocity(high)), None);
             verdict.compare_number(row, "v_trough", velocity(low), felt * velocity(low));
             peak_time(&mut verdict);
-            if margin > HAIR * rtol {
+            if margin > EDGE_RTOLS * rtol {
                 let scale = time.max(0.1 * block_time(&block)) + 1.0 / speed;
                 verdict.compare_number(row, "settling_time", time / v_f, scale / v_f);
             } else {
@@ -102,7 +102,7 @@ pub fn check(row: &Row, _: &Context, rtol: f64) -> Verdict {
         Ok(LongTermBehaviour::Cycle(cycle)) => {
             verdict.compare_word(row, "outcome", "limit_cycle");
             verdict.compare_word(row, "stick_slip", "yes");
-            // A cycle that hardly attracts hardly determines where it is.
+            // A weakly attracting cycle is determined less accurately.
             let vague = (1e-10 / (1.0 - cycle.fraction) / rtol).max(1.0);
             let (top, bottom) = (high.max(cycle.high), low.min(cycle.low));
             compare_status(&mut verdict, bottom);
@@ -120,7 +120,7 @@ pub fn check(row: &Row, _: &Context, rtol: f64) -> Verdict {
         Ok(LongTermBehaviour::Infinite) => {}
         Err(reason) => {
             verdict.miss(reason);
-            // What happens before it was left does not depend on the end.
+            // Earlier events do not depend on the end.
             if number(row, "t_peak").is_some_and(|t| t * v_f < simulation.t) {
                 verdict.compare(row, "v_peak", Some(velocity(high)), None);
                 peak_time(&mut verdict);
@@ -130,7 +130,7 @@ pub fn check(row: &Row, _: &Context, rtol: f64) -> Verdict {
     verdict
 }
 
-/// The time of one swing or of one relaxation, whichever is shorter, in `l/v_f`.
+/// The period of small oscillations or the relaxation time, whichever is shorter, in `l/v_f`.
 fn block_time(block: &Block) -> f64 {
     1.0 / (1.0 + block.pull)
 }

@@ -10,6 +10,8 @@ order, in an empty folder of the page's own:
 - `text` must occur in their standard output, and `output` with other numbers: those of times, sizes and differences;
 - a picture `pictures/NAME.svg` must be a file that they wrote, byte for byte.
 
+The sweeps of the README run first, and print its numbers.
+
 A page without commands shows measurements, which `benches/document` writes with their pictures.
 
 `--write` copies the pictures to docs/pictures instead, and replaces a `text` block that is not printed by the whole output of the block before it.
@@ -59,6 +61,16 @@ def masked(text):
     return re.sub(r"\s+", " ", re.sub(r"[\d.,]*\d(e-?\d+)?( ?(ns|µs|ms|s|min|h|kB|MB|GB|TB)\b)?", "#", text)).strip()
 
 
+def run_bullets(text, folder, variables):
+    """Runs the sweep of every bullet of the README, which prints the numbers of the bullet, except times."""
+    for bullet in re.findall(r"^- .*(?:\n  .*)*", text, re.MULTILINE):
+        sweep = re.search(r"`slipsweep run (sweeps/\w+\.toml)`", bullet)[1]
+        printed = run(["slipsweep", "run", str(REPOSITORY / sweep)], folder, variables)
+        for number in re.findall(r"\d[\d,.]*\d(?:e-?\d+)?", re.sub(r"`[^`]*`| in [\d.]+ s\b", "", bullet)):
+            if not re.search(rf"(?<![\d,.]){re.escape(number)}(?![\d,])", printed):
+                sys.exit(f"README.md: {sweep} does not print {number}:\n{printed}")
+
+
 def run_page(page, variables, write):
     """Runs the blocks of a page and checks its output and pictures; returns how many blocks ran."""
     text = page.read_text()
@@ -69,8 +81,7 @@ def run_page(page, variables, write):
             if language == "toml" and (named := re.match(r'name = "([\w-]+)"', code)):
                 (Path(folder) / f"{named[1]}.toml").write_text(code)
         if page.name == "README.md" and page.parent == REPOSITORY:
-            # The first of its two commands, which also builds the program.
-            run(["slipsweep", "run", str(REPOSITORY / "sweeps/landscape.toml")], folder, variables)
+            run_bullets(text, folder, variables)
         printed, output = "", ""
         stale = []
         for language, code in blocks_of(text):

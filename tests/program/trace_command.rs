@@ -53,7 +53,7 @@ fn a_table_names_its_columns_and_units() {
                 time_at_floor = 0: time spent on the velocity floor v = 1\n  \
                 work = 3.80811142, v_min = 19.9230141, v_max = 3392.16787\n  \
                 status ok\n  \
-                117 rows; straight lines between them are good to 0.0001 of the range of a column, and to 0.01 of v and theta\n\n  \
+                117 rows; linear interpolation errs by up to 0.0001 of the range of a column, and by up to 0.01 of v and theta\n\n  \
                 t               v           theta         tau          beta\n  \
                 l/v_0           v_0         l/v_0         mu_0 sigma   mu_0 sigma v_0\n  \
                 0               3           0.333333333   0.978027754  -\n  \

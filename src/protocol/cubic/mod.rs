@@ -116,13 +116,13 @@ impl Landscape {
             doubtful: Vec::new(),
         };
         for start in (0..count).step_by(SPAN_SHORTCUTS * BATCH_SPANS) {
-            let stretch = start..(start + SPAN_SHORTCUTS * BATCH_SPANS).min(count);
-            let settled = match (a_2[stretch.clone()].try_into(), a_3[stretch.clone()].try_into()) {
+            let group = start..(start + SPAN_SHORTCUTS * BATCH_SPANS).min(count);
+            let settled = match (a_2[group.clone()].try_into(), a_3[group.clone()].try_into()) {
                 (Ok(a_2), Ok(a_3)) => settle(&self.ends, &self.floors, a_2, a_3),
                 _ => [None; BATCH_SPANS],
             };
-            for (first, common) in stretch.clone().step_by(SPAN_SHORTCUTS).zip(settled) {
-                let span = first..(first + SPAN_SHORTCUTS).min(stretch.end);
+            for (first, common) in group.clone().step_by(SPAN_SHORTCUTS).zip(settled) {
+                let span = first..(first + SPAN_SHORTCUTS).min(group.end);
                 match (common, a_2[span.clone()].try_into(), a_3[span.clone()].try_into()) {
                     (Some(common), Ok(a_2), Ok(a_3)) => evaluation.span(first, a_2, a_3, common),
                     _ => {

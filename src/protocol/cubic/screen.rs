@@ -35,8 +35,8 @@ pub(super) struct Verdict {
 pub(super) fn settle(
     ends: &Ends,
     floors: &FrictionBounds,
-    a_2: &Stretch,
-    a_3: &Stretch,
+    a_2: &SpanCoordinate,
+    a_3: &SpanCoordinate,
 ) -> [Option<Verdict>; BATCH_SPANS] {
     let (mut first_2, mut first_3) = ([0.0; LANES], [0.0; LANES]);
     for span in 0..BATCH_SPANS {
@@ -53,14 +53,14 @@ pub(super) fn settle(
 }
 
 /// One coordinate of the shortcuts of all spans.
-pub(super) type Stretch = [f64; SPAN_SHORTCUTS * BATCH_SPANS];
+pub(super) type SpanCoordinate = [f64; SPAN_SHORTCUTS * BATCH_SPANS];
 
 /// Whether one coordinate of a span is constant, and the other stays between its first and last value.
 #[multiversion(targets(
     "x86_64+avx+avx2+bmi1+bmi2+avx512f+avx512bw+avx512cd+avx512dq+avx512vl",
     "x86_64+avx+avx2+bmi1+bmi2"
 ))]
-fn straight(a_2: &Stretch, a_3: &Stretch) -> [bool; BATCH_SPANS] {
+fn straight(a_2: &SpanCoordinate, a_3: &SpanCoordinate) -> [bool; BATCH_SPANS] {
     let mut straight = [false; BATCH_SPANS];
     for ((straight, a_2), a_3) in
         straight.iter_mut().zip(a_2.chunks_exact(SPAN_SHORTCUTS)).zip(a_3.chunks_exact(SPAN_SHORTCUTS))
