@@ -5,10 +5,11 @@ use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
+use super::kind::{self, Kind as PathKind};
 use super::plan::too_large;
 use super::shards::quoted;
 use super::watch::{Wait, waiting, watched};
-use super::{EXIT_FAILURE, EXIT_NOT_CONVERGED, EXIT_TEMPFAIL, Failure, load, refused, say, summary, words, wrong};
+use super::{EXIT_FAILURE, EXIT_NOT_CONVERGED, EXIT_TEMPFAIL, Failure, load, say, summary, words, wrong};
 use crate::dataset::atomic::nearest_folder;
 use crate::dataset::{DatasetError, Folder};
 use crate::grid::Quantity;
@@ -173,6 +174,7 @@ fn check_room(sweep: &Sweep, plan: &Plan, shards: &[Vec<Range<u64>>], folder: &F
 fn subject(arguments: &Arguments) -> Result<(Sweep, Folder), Failure> {
     let path = &arguments.spec;
     if !path.is_dir() {
+        kind::expect_spec(path)?;
         let sweep = if arguments.quiet { Sweep::load(path)? } else { load(path)? };
         let folder = Folder::new(arguments.out.as_deref().unwrap_or(Path::new("results")), &sweep.name);
         return Ok((sweep, folder));
@@ -180,12 +182,7 @@ fn subject(arguments: &Arguments) -> Result<(Sweep, Folder), Failure> {
     let folder = Folder::at(path);
     let found = folder.manifest().map_err(Failure::failed)?;
     let Some(manifest) = found else {
-        let found = format!("{}: neither a spec nor a dataset", path.display());
-        return Err(refused(
-            found,
-            "a spec, such as NAME.toml, or the folder of a dataset, such as results/NAME",
-            "check the path",
-        ));
+        return Err(kind::unexpected(path, &[PathKind::Spec, PathKind::Dataset]));
     };
     if manifest.spec.is_empty() {
         let message = "the manifest is missing, and the parts do not contain the spec";
@@ -301,7 +298,9 @@ fn next_commands(sweep: &Sweep, path: &Path) -> String {
     let path = quoted(path);
     let mut text = "next:\n".to_owned();
     text.push_str(&format!("  slipsweep head {path}\n  slipsweep plot {path}\n"));
-    if let Some(question) = sweep.requests.iter().map(question).next() {
+    // A build without SQL does not suggest it.
+    let question = sweep.requests.iter().map(question).next().filter(|_| cfg!(feature = "query"));
+    if let Some(question) = question {
         text.push_str(&format!("  slipsweep query {path} \"{question}\"\n"));
     }
     text

@@ -6,6 +6,7 @@ use std::path::Path;
 use clap::ValueEnum;
 use clap::builder::{PossibleValue, PossibleValuesParser, StringValueParser, TypedValueParser};
 
+use super::kind::{self, Kind};
 use super::output::{self, Output};
 use super::{EXIT_FAILURE, EXIT_REQUEST, Failure, dataset, no_table, put, refused, say, words, write_file, wrong};
 use crate::dataset::{Cell, Folder, ManifestTable, Row, frame};
@@ -179,7 +180,7 @@ fn disturbance(text: &str) -> Result<Disturbance, String> {
     Ok(Disturbance { change: percent / 100.0, at })
 }
 
-/// Reads the name of a protocol, or the path of a folder.
+/// Reads the name of a protocol, or a path.
 #[derive(Debug, Clone)]
 struct Subject;
 
@@ -198,7 +199,7 @@ impl TypedValueParser for Subject {
         value: &std::ffi::OsStr,
     ) -> Result<String, clap::Error> {
         let path = Path::new(value);
-        if path.components().count() > 1 || path.is_dir() {
+        if path.components().count() > 1 || path.extension().is_some() || path.exists() {
             return StringValueParser::new().parse_ref(command, argument, value);
         }
         PossibleValuesParser::new(protocols()).parse_ref(command, argument, value)
@@ -256,6 +257,52 @@ struct Origin {
 /// Illegal parameters, a protocol that does not exist, or a file that cannot be written.
 pub fn trace(arguments: &Arguments) -> Result<(), Failure> {
     let (format, output) = (arguments.output.format()?, &arguments.output);
+    let Traced { header, trace, units, facts } = solved(arguments)?;
+    let version = env!("CARGO_PKG_VERSION");
+    let bytes = match format {
+        Format::Table => format!("{header}\n{}", table(&trace, &units)).into_bytes(),
+        Format::Csv => trace::csv(&trace, &units, &facts, version).into_bytes(),
+        Format::Parquet => trace::parquet(&trace, &units, &facts, version).map_err(Failure::failed)?,
+    };
+    if output.is_stdout() {
+        return put(&bytes);
+    }
+    write_file(&output.out, &bytes)?;
+    say(&format!("{header}written to {}\n", output.out.display()))
+}
+
+/// A protocol over time, and its description.
+pub struct Traced {
+    /// Protocol, parameters, work and status in a few lines.
+    pub header: String,
+    /// The moments, in `units`.
+    pub trace: Trace,
+    /// The units of the trace.
+    pub units: Units,
+    /// The same as `header`, as keys and values.
+    pub facts: Vec<(String, String)>,
+}
+
+/// Traces the protocol that the arguments of `slipsweep trace` name.
+///
+/// # Errors
+///
+/// The failure that the command reports.
+pub fn traced(arguments: &[String]) -> Result<Traced, Failure> {
+    /// The command.
+    #[derive(clap::Parser)]
+    #[command(name = "trace")]
+    struct Command {
+        #[command(flatten)]
+        arguments: Arguments,
+    }
+    let name = "trace".to_owned();
+    let command = <Command as clap::Parser>::try_parse_from(std::iter::once(&name).chain(arguments));
+    let command = command.map_err(|error| Failure { code: EXIT_REQUEST, message: error.to_string() })?;
+    solved(&command.arguments)
+}
+
+fn solved(arguments: &Arguments) -> Result<Traced, Failure> {
     let request = match &arguments.table {
         Some(table) => arguments.row_of(table)?,
         None => arguments.request()?,
@@ -270,17 +317,7 @@ pub fn trace(arguments: &Arguments) -> Result<(), Failure> {
         header.push_str(&effects.text());
         facts.extend(effects.facts());
     }
-    let version = env!("CARGO_PKG_VERSION");
-    let bytes = match format {
-        Format::Table => format!("{header}\n{}", table(&trace, &request.units)).into_bytes(),
-        Format::Csv => trace::csv(&trace, &request.units, &facts, version).into_bytes(),
-        Format::Parquet => trace::parquet(&trace, &request.units, &facts, version).map_err(Failure::failed)?,
-    };
-    if output.is_stdout() {
-        return put(&bytes);
-    }
-    write_file(&output.out, &bytes)?;
-    say(&format!("{header}written to {}\n", output.out.display()))
+    Ok(Traced { header, trace, units: request.units, facts })
 }
 
 fn absent(protocol: &str, absence: Absence) -> Failure {
@@ -331,7 +368,8 @@ impl Arguments {
 
     /// The protocol that the arguments name.
     fn request(&self) -> Result<TraceRequest, Failure> {
-        if Path::new(&self.subject).is_dir() {
+        if trace::names().all(|(name, _)| name != self.subject) {
+            kind::expect(Path::new(&self.subject), &[Kind::Dataset])?;
             let (folder, expected) = (&self.subject, "a protocol, or a dataset with a table and a row");
             let help = format!("slipsweep trace {folder} optimal --row 0");
             return Err(refused(format!("{folder}: a dataset without a table"), expected, help));

@@ -1,7 +1,6 @@
 //! Optimal protocols under a floor and ceilings by integration along `ln theta`: the free minimiser, clamped, with one `C`
 //! (docs/derivations.md, equation 6).
 
-use super::extremal::branch;
 use super::route::integrate;
 use crate::model::{Law, Transition};
 
@@ -62,7 +61,7 @@ const BOUND_RTOL: f64 = 1e-12;
 /// Relative distance from the border of the feasible region below which rounding decides.
 const BORDER_RTOL: f64 = 1e-11;
 
-/// Relative change of `z` of the protocols that are compared with the optimum.
+/// Relative change of `z` of the protocols that try to beat the optimum.
 const VARIATION: f64 = 1e-3;
 
 /// The integrated quantities, and the variable itself.
@@ -131,7 +130,7 @@ impl Way {
         }
     }
 
-    /// The energy at `ln theta = turn + beyond`, without cancellation near the turn.
+    /// The same at `ln theta = turn + beyond`, without cancellation near the turn.
     fn energy_beyond(&self, turn: f64, beyond: f64) -> f64 {
         let Law { a, b } = self.law;
         ((b - a) * beyond - self.steady_friction(turn) * beyond.exp_m1()) / a
@@ -299,11 +298,31 @@ fn free(energy: f64, falls: bool) -> f64 {
 /// Energy below which the next term of the series, `w^5/4320`, is a rounding.
 const SMALL_ENERGY: f64 = 1e-7;
 
-/// Places on a leg at which friction is evaluated.
+/// Places on a leg at which friction is looked at.
 const PLACES: u32 = 4000;
 
-/// Steps of Newton's method, which starts at the `C` of the row.
+/// Steps of Newton's method: the row's own `C` is within a few of them.
 const NEWTON_STEPS: u32 = 6;
+
+/// The root of `e^z - 1 - z = h` above or below 0.
+fn branch(h: f64, above: bool) -> Option<f64> {
+    if h.is_nan() || h < 0.0 {
+        return None;
+    }
+    let mut z = if above { (1.0 + h + (2.0 * h).sqrt()).ln() } else { -h - (2.0 * h).sqrt() };
+    for _ in 0..100 {
+        let slope = z.exp_m1();
+        if slope == 0.0 {
+            break;
+        }
+        let step = (slope - z - h) / slope;
+        z -= step;
+        if step.abs() <= 1e-15 * z.abs() {
+            break;
+        }
+    }
+    Some(z)
+}
 
 #[cfg(test)]
 mod tests {

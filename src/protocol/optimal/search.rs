@@ -28,7 +28,7 @@ const SPENT: f64 = 4.0 * f64::EPSILON;
 
 /// A bracket that closes on a larger change of the time holds no member of this time, but a gap of the family; unless
 /// a search may end there, with a corrected step that leaves an error of third order.
-pub(super) const JUMP: f64 = 1e-2;
+const JUMP: f64 = 1e-2;
 
 /// Fraction of the whole time below which a hold is short.
 const SHORT: f64 = 0.01;
@@ -44,11 +44,6 @@ pub(super) const ROUNDING: f64 = 1e-9;
 
 /// Tightest tolerance of a quadrature.
 pub(super) const FINEST: f64 = 1e-18;
-
-/// Solves `problem` in time `t_f` to relative accuracy `rtol`.
-pub(super) fn solve(problem: &Problem, t_f: f64, rtol: f64) -> Solved<Optimum> {
-    find(problem, t_f, rtol).0
-}
 
 /// The solution and its extremal; `None` without a solution, or without an arc after the floor.
 pub(super) fn find(problem: &Problem, t_f: f64, rtol: f64) -> (Solved<Optimum>, Option<Member>) {
