@@ -105,7 +105,7 @@ def least_ceiling(make, t_f, which):
         needed = ceilinged_time(make(**{which: value(x)}))
         return log(needed / t_f) if needed < INF else mpfr(10)
 
-    # Within 1e-22 of a ceiling that takes for ever it is that ceiling, to twice the digits of a double.
+    # Within 1e-22 of a ceiling of infinite time it counts as that ceiling, to twice the digits of a double.
     if f(mpfr(-50)) < 0:
         return value(mpfr(-50))
     bits = gmpy2.get_context().precision
