@@ -222,7 +222,7 @@ pub fn compute(
                         Ok(RunStats::default())
                     }
                 };
-                // The receiver lives as long as the scope.
+                // The receiver exists as long as the scope.
                 let _ = give_back.send(buffer);
                 let mut result = locked(result);
                 *result = result.and_then(|work| computed.map(|more| [work, more].into_iter().sum()));
@@ -455,11 +455,11 @@ impl Failures {
 }
 
 /// The content of `mutex`, including a poisoned one.
-fn locked<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+pub(super) fn locked<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 /// The owned content of `mutex`, including a poisoned one.
-fn content<T>(mutex: Mutex<T>) -> T {
+pub(super) fn content<T>(mutex: Mutex<T>) -> T {
     mutex.into_inner().unwrap_or_else(PoisonError::into_inner)
 }
