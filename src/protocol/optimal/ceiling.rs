@@ -230,10 +230,7 @@ impl CeilingArc {
             sums.creep -= ln_theta * slip;
             sums.state += ln_theta * slip;
             if let Some(gap) = gap {
-                // G is 0 where the arc begins, and linear in |z| from there: G/(u - 1) is its limit less that start.
-                let start = -exp_m1(self.ln_z - LN_TINY) / self.rise().abs();
-                let rate = (b - a + gap.pull(depth)) / (a * self.ceilings.kappa);
-                let price = if of_v { 0.0 } else { rate * (slip - start) };
+                let price = if of_v { 0.0 } else { (b - a + gap.pull(depth)) / (a * self.ceilings.kappa) * slip };
                 sums.price += price;
                 sums.price_ln_v -= price * ln_theta;
                 sums.price_ln_theta += price * ln_theta;
