@@ -26,6 +26,10 @@ pub struct Arguments {
 const SHORT_SECONDS: f64 = 0.2;
 
 /// Prints the plan of a spec.
+///
+/// # Errors
+///
+/// A spec that is wrong.
 pub fn plan(arguments: &Arguments) -> Result<(), Failure> {
     let start = Instant::now();
     let sweep = load(&arguments.spec)?;
@@ -74,13 +78,14 @@ pub fn in_words(sweep: &Sweep, estimates: &Estimates, reading: f64) -> String {
         rows.iter_mut().for_each(|row| drop(row.remove(2)));
     }
     let mut text = words::aligned(&rows, 2);
-    if plan.optima > 0 {
+    // More than can be kept are solved where they are needed, and their time is that of the tables.
+    if plan.optima > 0 && estimates.shared > 0.0 {
         let (solves, time) = (words::things(plan.optima, "optimal protocol"), words::duration(estimates.shared));
         text.push_str(&format!("shared: {solves} solved once each, {time} on one thread\n"));
     }
     let seconds = reading + estimates.elapsed(threads);
     text.push_str(&format!(
-        "in all: about {} on disk, {} on {}\n",
+        "total: about {} on disk, {} on {}\n",
         words::bytes(estimates.bytes()),
         if seconds < SHORT_SECONDS {
             "less than 0.3 s".to_owned()

@@ -5,10 +5,11 @@ use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
+use super::kind::{self, Kind as PathKind};
 use super::plan::too_large;
 use super::shards::quoted;
 use super::watch::{Wait, waiting, watched};
-use super::{AGAIN, FAILED, Failure, NOT_STRICT, load, refused, say, summary, words, wrong};
+use super::{EXIT_FAILURE, EXIT_NOT_CONVERGED, EXIT_TEMPFAIL, Failure, load, say, summary, words, wrong};
 use crate::dataset::atomic::nearest_folder;
 use crate::dataset::{DatasetError, Folder};
 use crate::grid::Quantity;
@@ -45,6 +46,10 @@ pub struct Arguments {
 }
 
 /// Runs a spec: reads and plans it, computes, encodes and publishes the missing parts, and summarises the tables.
+///
+/// # Errors
+///
+/// A spec that is wrong, an interrupted run, failed rows, or, with `--strict`, rows that are not `ok`.
 pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let start = Instant::now();
     let (sweep, folder) = subject(arguments)?;
@@ -63,7 +68,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
         outcome.statistics.iter().map(|statistics| statistics.status[Status::NotConverged as usize]).sum();
     if arguments.strict && defects > 0 {
         let message = format!("error: {} not_converged", words::things(defects, "row"));
-        return Err(Failure { code: NOT_STRICT, message });
+        return Err(Failure { code: EXIT_NOT_CONVERGED, message });
     }
     Ok(())
 }
@@ -169,6 +174,7 @@ fn check_room(sweep: &Sweep, plan: &Plan, shards: &[Vec<Range<u64>>], folder: &F
 fn subject(arguments: &Arguments) -> Result<(Sweep, Folder), Failure> {
     let path = &arguments.spec;
     if !path.is_dir() {
+        kind::expect_spec(path)?;
         let sweep = if arguments.quiet { Sweep::load(path)? } else { load(path)? };
         let folder = Folder::new(arguments.out.as_deref().unwrap_or(Path::new("results")), &sweep.name);
         return Ok((sweep, folder));
@@ -176,12 +182,7 @@ fn subject(arguments: &Arguments) -> Result<(Sweep, Folder), Failure> {
     let folder = Folder::at(path);
     let found = folder.manifest().map_err(Failure::failed)?;
     let Some(manifest) = found else {
-        let found = format!("{}: neither a spec nor a dataset", path.display());
-        return Err(refused(
-            found,
-            "a spec, such as NAME.toml, or the folder of a dataset, such as results/NAME",
-            "check the path",
-        ));
+        return Err(kind::unexpected(path, &[PathKind::Spec, PathKind::Dataset]));
     };
     if manifest.spec.is_empty() {
         let message = "the manifest is missing, and the parts do not contain the spec";
@@ -202,7 +203,7 @@ fn explain(error: RunError, caught: Option<i32>, arguments: &Arguments, (there, 
         RunError::Stopped(_) => {
             let (there, all) = (words::count(there), words::things(all, "part"));
             let message = format!("stopped; {there} of {all} finished; the same command continues");
-            Failure { code: caught.and_then(|number| u8::try_from(128 + number).ok()).unwrap_or(FAILED), message }
+            Failure { code: caught.and_then(|number| u8::try_from(128 + number).ok()).unwrap_or(EXIT_FAILURE), message }
         }
         RunError::Dataset(
             DatasetError::Foreign { .. }
@@ -212,7 +213,9 @@ fn explain(error: RunError, caught: Option<i32>, arguments: &Arguments, (there, 
             | DatasetError::Occupied { .. },
         ) => wrong(error),
         RunError::Threads { .. } if arguments.threads.is_some() => wrong(error),
-        _ if arguments.requeue && may_pass(&error) => Failure { code: AGAIN, message: format!("error: {error}") },
+        _ if arguments.requeue && may_pass(&error) => {
+            Failure { code: EXIT_TEMPFAIL, message: format!("error: {error}") }
+        }
         _ => Failure::failed(error),
     }
 }

@@ -2,7 +2,7 @@
 """Optimal protocols under ceilings of velocity and friction, to 25 digits: writes optimal_ceilings.csv.
 
     python3 -m venv venv && venv/bin/pip install gmpy2
-    venv/bin/python optimal_ceilings.py
+    venv/bin/python optimal_ceilings.py                 # or some of theory, structures, limits, random
 
 The problem is solved by ceilings.py at 54 digits. Each row is checked before it is written: the time to 1e-34 of `t_f - t_least`; time and
 work by another substitution to 1e-36; the Hamiltonian against the derivative of the work along the family, and every slope against a
@@ -67,7 +67,7 @@ def greatest_friction(path):
 
 
 def ceilinged_time(p):
-    """Time of a motion on the ceilings alone; infinite if it takes for ever."""
+    """Time of a motion on the ceilings alone; infinite if it never ends."""
     inner = []
     if p.v_ceiling is not None and p.tau_ceiling is not None and p.b > 0:
         inner = [(p.tau_ceiling - 1 - p.a * log(p.v_ceiling)) / p.b]
@@ -89,11 +89,11 @@ def least_ceiling(make, t_f, which):
         return 1 + p.b * p.l_1
 
     def value(x):
-        """Exponential distance from the ceiling that takes for ever (an acceleration) or allows any time."""
+        """Exponential distance from the ceiling of infinite time (an acceleration) or allows any time."""
         q = make(**{which: INF})
         steady = [q.tau_ss(q.l_0), q.tau_ss(q.l_1)]
         if q.l_1 < q.l_0:
-            return (1 / q.theta_1 if one else max(steady)) + exp(x)
+            return (1 + exp(x)) / q.theta_1 if one else max(steady) + exp(x)
         if one:
             # The least velocity that is steady sliding where the other ceiling allows to stop.
             allowed = [l for l in (q.l_0, q.l_1, *q.zero_of_caps()) if q.l_0 <= l <= q.l_1 and (not q.caps(l) or q.cap(l)[0] >= -mpfr(10) ** -25)]
@@ -105,16 +105,17 @@ def least_ceiling(make, t_f, which):
         needed = ceilinged_time(make(**{which: value(x)}))
         return log(needed / t_f) if needed < INF else mpfr(10)
 
+    # Within 1e-22 of a ceiling of infinite time it counts as that ceiling, to twice the digits of a double.
+    if f(mpfr(-50)) < 0:
+        return value(mpfr(-50))
     bits = gmpy2.get_context().precision
     precision(ROUGH)
     low = high = mpfr(-3)
     while f(low) < 0:
         low -= 4
-        if low < -3000:
-            raise ArithmeticError("no bracket")
     while f(high) > 0:
         high += 2
-    for _ in range(24):
+    for _ in range(50):
         middle = (low + high) / 2
         low, high = (middle, high) if f(middle) > 0 else (low, middle)
     precision(bits)
@@ -255,9 +256,9 @@ def least_of(case, which):
     return float(least_ceiling(maker(a, b, v_i, v_f, bounded, v_ceiling, tau_ceiling), mpfr(t_f), which))
 
 
-def between(low, high, share):
-    """A value above low, near it for a small share."""
-    return low + (high - low) * share
+def between(low, high, fraction):
+    """A value above low, near it for a small fraction."""
+    return low + (high - low) * fraction
 
 
 def transitions(rng):
@@ -300,23 +301,23 @@ def checked_by_the_theory():
 
 def limits():
     """Near the least times, the least ceilings, the onsets of ceilings and of the hold, and where theta can only just turn."""
-    for start, t_f in ((PAPER, 0.02), (PAPER, 0.08), ((0.05, 0.02, 3.0, 100.0), 0.02), ((0.04, 0.04, 20.0, 35.0), 0.03), ((0.01, 0.0, 5.0, 5e3), 0.1)):
+    for start, t_f in ((PAPER, 0.02), (PAPER, 0.08), ((0.05, 0.02, 3.0, 100.0), 0.02), ((0.04, 0.04, 20.0, 35.0), 0.03), ((0.01, 0.0, 5.0, 5e3), 1e-3)):
         for which, place in (("v_ceiling", 6), ("tau_ceiling", 7)):
             case = [*start, t_f, 1, INF, INF]
             peak = free_peaks(case)[place - 6]
             least = least_of(case, which)
-            for share in (1e-3, 1e-6, 1e-9):
-                case[place] = least * (1 + share)
+            for fraction in (1e-3, 1e-6, 1e-9):
+                case[place] = least * (1 + fraction)
                 yield "near_least_ceiling", tuple(case)
-            for share in (1e-2, 1e-5, 1e-8):
-                case[place] = peak * (1 - share)
+            for fraction in (1e-2, 1e-5, 1e-8):
+                case[place] = peak * (1 - fraction)
                 yield "weak_ceiling", tuple(case)
             case[place] = between(least, peak, 0.3)
             make = maker(*case[:4], 1, case[6], case[7])
             precision(ROUGH)
             t_least = float(make().least_time())
-            for share in (1e-2, 1e-5, 1e-8):
-                case[4] = t_least * (1 + share)
+            for fraction in (1e-2, 1e-5, 1e-8):
+                case[4] = t_least * (1 + fraction)
                 yield "near_t_least", tuple(case)
     for start in (SLOW, (0.05, 0.02, 100.0, 3.0), (0.02, 0.02, 40.0, 5.0), (0.03, 0.0, 1e4, 2.0)):
         v_i, v_f = start[2:]
@@ -324,12 +325,12 @@ def limits():
         for which, place in (("v_ceiling", 6), ("tau_ceiling", 7)):
             case = [*start, 1.3 * t_min, 1, INF, INF]
             least = least_of(case, which)
-            for share in (1e-3, 1e-6, 1e-9):
-                case[place] = least * (1 + share)
+            for fraction in (1e-3, 1e-6, 1e-9):
+                case[place] = least * (1 + fraction)
                 yield "near_t_most", tuple(case)
             case[place] = least * (1 + 1e-2)
-            for share in (1e-3, 1e-6):
-                case[4] = t_min * (1 + share)
+            for fraction in (1e-3, 1e-6):
+                case[4] = t_min * (1 + fraction)
                 yield "near_t_min", tuple(case)
         for excess in (1e-2, 1e-5, 1e-8, -1e-3, -1e-6):
             yield "v_ceiling_near_v_f", (*start, 1.2 * t_min, 1, v_f * (1 + excess), INF)
@@ -350,13 +351,35 @@ def limits():
             turn -= (p.c_at(turn) - c) * exp(turn) / (p.tau_ss(turn) - (p.b - p.a))
         t_floor = float(Path(p, c, turn).time)
         for time, word in ((t_cross, "near_t_cross"), (t_floor, "near_t_floor")):
-            for share in (-1e-4, 1e-4, 1e-8):
-                yield word, (*PAPER, time * (1 + share), 1, v_ceiling, tau_ceiling)
+            for fraction in (-1e-4, 1e-4, 1e-8):
+                yield word, (*PAPER, time * (1 + fraction), 1, v_ceiling, tau_ceiling)
     # An acceleration under a ceiling below 1 turns only below theta_c.
     for t_f in (0.5, 2.0, 6.0):
         yield "lingers", (0.03, 0.05, 30.0, 100.0, t_f, 1, INF, 0.96)
     for t_f in (0.6, 1.0, 3.0):
         yield "lingers", (*SLOW, t_f, 1, INF, 0.965)
+
+
+def structures():
+    """Sequences of arcs that random points seldom have."""
+    yield "structure", (0.05, 0.02, 3.0, 1e4, 0.0012941309247107252, 1, INF, 1.3763102111592858)
+    yield "structure", (0.05, 0.02, 3.0, 1e4, 0.0031, 1, 2e4, 1.3263102111592857)
+    yield "structure", (0.1, 0.08, 3.0, 1e4, 0.013382512430302489, 1, INF, 1.3842068074395237)
+    yield "structure", (0.2, 0.05, 3.0, 100.0, 0.008085775811857467, 1, INF, 2.090775527898214)
+    yield "structure", (0.2, 0.05, 3.0, 1e4, 0.0020708338167306317, 1, 2e5, 2.481551055796428)
+    yield "structure", (0.2, 0.05, 3.0, 1e4, 0.0011681964113972032, 0, INF, 2.581551055796428)
+    yield "structure", (*PAPER, 0.02, 1, 1500.0, 1.05)
+    yield "structure", (*PAPER, 0.03, 1, 800.0, 1.045)
+    yield "structure", (*PAPER, 0.08, 0, 1000.0, 1.05)
+    yield "structure", (*PAPER, 0.05, 0, INF, 1.05)
+    yield "structure", (*SLOW, 0.5, 1, 2.7, 0.965)
+    yield "structure", (*SLOW, 0.6, 0, 4.0, 0.99)
+    yield "structure", (0.05, 0.02, 100.0, 3.0, 0.5, 1, 2.5, 1.02)
+    yield "structure", (0.05, 0.03, 100.0, 3.0, 0.6, 0, 4.0, INF)
+    yield "structure", (0.05, 0.03, 3.0, 30.0, 0.3, 0, INF, 1.09)
+    yield "structure", (0.02, 0.02, 40.0, 5.0, 0.45, 1, 4.5, 0.995)
+    yield "structure", (0.02, 0.02, 40.0, 5.0, 0.45, 1, 7.0, 1.008)
+    yield "structure", (0.03, 0.0, 40.0, 5.0, 0.4, 1, INF, 1.03)
 
 
 def random_cases(seed, count):
@@ -370,13 +393,13 @@ def random_cases(seed, count):
             v_peak, tau_peak, _ = free_peaks(case)
             case = list(case)
             kind = rng.choice(["v", "tau", "tau", "both", "both"])
-            share = lambda: rng.choice([rng.uniform(0.02, 0.98), log_uniform(rng, 1e-3, 1), 1 - log_uniform(rng, 1e-3, 1)])
+            fraction = lambda: rng.choice([rng.uniform(0.02, 0.98), log_uniform(rng, 1e-3, 1), 1 - log_uniform(rng, 1e-3, 1)])
             if kind in ("v", "both"):
                 low = least_of(case, "v_ceiling")
-                case[6] = low * (max(v_peak, 1.5 * low) / low) ** share()
+                case[6] = low * (max(v_peak, 1.5 * low) / low) ** fraction()
             if kind in ("tau", "both"):
                 low = least_of(case, "tau_ceiling")
-                case[7] = between(low, max(tau_peak, low + 0.05 * case[0]), share())
+                case[7] = between(low, max(tau_peak, low + 0.05 * case[0]), fraction())
         except (Infeasible, Unphysical, AssertionError, ZeroDivisionError, ArithmeticError, OverflowError):
             continue
         seen += 1
@@ -388,7 +411,10 @@ def give_up(*_):
     raise ArithmeticError("25 seconds are over")
 
 
-def main(count):
+SOURCES = {"theory": checked_by_the_theory, "structures": structures, "limits": limits, "random": lambda: random_cases(1, 160)}
+
+
+def main(sources):
     signal.signal(signal.SIGVTALRM, give_up)
     start = time.time()
     with open("optimal_ceilings.csv", "w", newline="") as file:
@@ -396,8 +422,8 @@ def main(count):
         out = csv.writer(file, lineterminator="\n")
         out.writerow(["regime", *AXES, *COLUMNS])
         rows = 0
-        for source in (checked_by_the_theory(), limits(), random_cases(1, count)):
-            for kind, case in source:
+        for source in sources:
+            for kind, case in SOURCES[source]():
                 signal.setitimer(signal.ITIMER_VIRTUAL, 25)
                 try:
                     row = row_of(case)
@@ -412,4 +438,4 @@ def main(count):
 
 
 if __name__ == "__main__":
-    main(int(sys.argv[1]) if len(sys.argv) > 1 else 160)
+    main(sys.argv[1:] or SOURCES)
