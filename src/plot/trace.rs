@@ -84,7 +84,8 @@ pub fn read(path: &Path) -> Result<TraceFile, PlotError> {
     ]
     .iter()
     .filter_map(number);
-    let name = label::literal(&fact("protocol").map_or(stem, Clone::clone));
+    let after = fact("loop").map_or(String::new(), |which| format!(", {which} loop"));
+    let name = label::literal(&format!("{}{after}", fact("protocol").map_or(stem, Clone::clone)));
     let points = fact("points").and_then(|points| points.parse().ok());
     Ok(TraceFile { name, parameters: parameters.collect(), columns, points })
 }
