@@ -52,10 +52,9 @@ pub fn survey(folder: &Folder, manifest: &Manifest, look: CheckDepth) -> Survey 
 /// The contents of a dataset without damaged parts.
 pub fn contents(folder: &Folder, manifest: &Manifest) -> Result<Survey, Failure> {
     let survey = survey(folder, manifest, CheckDepth::Footer);
-    for table in &survey.tables {
-        let parts = table.damaged.iter().map(|(part, _)| *part).chain(table.foreign.iter().map(|(part, _)| *part));
-        for part in parts {
-            folder.open_part(manifest, &table.name, part).map_err(Failure::failed)?;
+    for (table, planned) in survey.tables.iter().zip(&manifest.tables) {
+        if !(table.damaged.is_empty() && table.foreign.is_empty()) {
+            folder.verified(manifest, planned).map_err(Failure::failed)?;
         }
     }
     Ok(survey)

@@ -8,13 +8,12 @@ use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant, SystemTime};
 
-/// Age from which a temporary file of another machine counts as abandoned, by the clock of the file system. Chosen: a write takes seconds.
+use tempfile::NamedTempFile;
+
+/// Age from which a temporary file of another machine is treated as abandoned, by the clock of the file system. Writing one takes seconds.
 const ABANDONED: Duration = Duration::from_secs(24 * 60 * 60);
 
-/// Attempts to write a file whose temporary file vanishes, which happens if another machine treats a running process as dead.
-const ATTEMPTS: u32 = 3;
-
-/// A failed step of a write.
+/// A step that failed, and why.
 #[derive(Debug)]
 pub struct Unwritten {
     /// The attempted action.
@@ -23,83 +22,66 @@ pub struct Unwritten {
     pub source: io::Error,
 }
 
+impl Unwritten {
+    fn at(action: &'static str) -> impl Fn(io::Error) -> Unwritten {
+        move |source| Unwritten { action, source }
+    }
+}
+
 /// Writes `bytes` to `path`. An incomplete file never has this name, even after a power cut.
 pub fn write(path: &Path, bytes: &[u8]) -> Result<(), Unwritten> {
-    write_by(path, bytes, |temporary, path| fs::rename(temporary, path))
+    let temporary = filled(path, bytes)?;
+    temporary.persist(path).map_err(|error| Unwritten::at(RENAME)(error.error))?;
+    sync_folder(folder_of(path)).map_err(Unwritten::at("sync the folder"))
 }
 
 /// Writes `bytes` to `path` in the same way, but never replaces a file: returns `false` if there is one.
 pub fn write_new(path: &Path, bytes: &[u8]) -> Result<bool, Unwritten> {
-    let link = |temporary: &Path, path: &Path| match fs::hard_link(temporary, path) {
-        Ok(()) => fs::remove_file(temporary),
-        // Some file systems have no hard links.
-        Err(error) if error.kind() != io::ErrorKind::AlreadyExists && !path.exists() => fs::rename(temporary, path),
-        Err(error) => Err(error),
-    };
-    match write_by(path, bytes, link) {
-        Err(Unwritten { action: RENAME, .. }) if path.exists() => Ok(false),
-        written => written.map(|()| true),
+    match filled(path, bytes)?.persist_noclobber(path) {
+        Err(error) if path.exists() => drop(error),
+        Err(error) => return Err(Unwritten::at(RENAME)(error.error)),
+        Ok(_) => return sync_folder(folder_of(path)).map(|()| true).map_err(Unwritten::at("sync the folder")),
     }
-}
-
-fn write_by(path: &Path, bytes: &[u8], place: impl Fn(&Path, &Path) -> io::Result<()>) -> Result<(), Unwritten> {
-    let failed = |action, source| Unwritten { action, source };
-    let fill = |file: &mut File| file.write_all(bytes).map_err(|source| failed("write", source));
-    let mut attempt = 1;
-    loop {
-        match publish(path, fill, &place, failed) {
-            Err(Unwritten { action: RENAME, source })
-                if source.kind() == io::ErrorKind::NotFound && attempt < ATTEMPTS =>
-            {
-                attempt += 1;
-            }
-            done => return done,
-        }
-    }
+    Ok(false)
 }
 
 /// Writes a file durably; `fill` writes the content.
 #[cfg(feature = "cli")]
 pub fn write_with<E: From<io::Error>>(path: &Path, fill: impl FnOnce(&mut File) -> Result<(), E>) -> Result<(), E> {
-    publish(path, fill, |temporary, path| fs::rename(temporary, path), |_, source| source.into())
+    let mut temporary = create(path)?;
+    fill(temporary.as_file_mut())?;
+    temporary.as_file().sync_all()?;
+    temporary.persist(path).map_err(|error| error.error)?;
+    Ok(sync_folder(folder_of(path))?)
 }
 
 const RENAME: &str = "rename the temporary file";
 
-fn publish<E>(
-    path: &Path,
-    fill: impl FnOnce(&mut File) -> Result<(), E>,
-    place: impl Fn(&Path, &Path) -> io::Result<()>,
-    failed: impl Fn(&'static str, io::Error) -> E,
-) -> Result<(), E> {
-    let (Some(folder), Some(name)) = (path.parent(), path.file_name()) else {
-        return Err(failed("write", io::Error::new(io::ErrorKind::InvalidInput, "not the path of a file")));
-    };
-    let (temporary, mut file) = create(folder, &name.to_string_lossy()).map_err(|error| failed("create", error))?;
-    // A lock marks the file as in use for other processes of this machine. Without locks its age decides.
-    let _ = file.try_lock();
-    let written = fill(&mut file)
-        .and_then(|()| file.sync_all().map_err(|error| failed("sync", error)))
-        .and_then(|()| place(&temporary, path).map_err(|error| failed(RENAME, error)))
-        .and_then(|()| sync_folder(folder).map_err(|error| failed("sync the folder", error)));
-    if written.is_err() {
-        // The first error is reported; a remaining temporary file is harmless.
-        let _ = fs::remove_file(&temporary);
-    }
-    written
+/// A temporary file for `path` with these bytes, on the disk.
+fn filled(path: &Path, bytes: &[u8]) -> Result<NamedTempFile, Unwritten> {
+    let mut temporary = create(path).map_err(Unwritten::at("create"))?;
+    temporary.as_file_mut().write_all(bytes).map_err(Unwritten::at("write"))?;
+    temporary.as_file().sync_all().map_err(Unwritten::at("sync"))?;
+    Ok(temporary)
 }
 
-/// Creates a unique temporary file for `name`: its name contains machine, process and, if necessary, a number.
-fn create(folder: &Path, name: &str) -> io::Result<(PathBuf, File)> {
-    let (machine, process) = (machine(), std::process::id());
-    let mut number = 0_u32;
-    loop {
-        let temporary = folder.join(format!(".{name}.{process}-{number}@{machine}{SUFFIX}"));
-        match File::create_new(&temporary) {
-            Err(error) if error.kind() == io::ErrorKind::AlreadyExists && number < u32::MAX => number += 1,
-            created => return created.map(|file| (temporary, file)),
-        }
-    }
+/// The folder of a file.
+fn folder_of(path: &Path) -> &Path {
+    path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."))
+}
+
+/// Creates a temporary file for `path` in its folder, which is removed unless it is renamed. Its name holds the machine; its lock shows
+/// processes of this machine that it has an owner.
+fn create(path: &Path) -> io::Result<NamedTempFile> {
+    let prefix = format!(".{}.", path.file_name().unwrap_or_default().to_string_lossy());
+    let suffix = format!("@{}{SUFFIX}", machine());
+    let temporary = tempfile::Builder::new()
+        .prefix(&prefix)
+        .suffix(&suffix)
+        .make_in(folder_of(path), |path| File::create_new(path))?;
+    // Without locks the age of the file decides.
+    let _ = temporary.as_file().try_lock();
+    Ok(temporary)
 }
 
 /// The suffix of a temporary file.
@@ -163,11 +145,11 @@ pub fn time(folder: &Path, bytes: usize) -> io::Result<Duration> {
     let folder = nearest_folder(folder);
     let content = vec![0; bytes];
     let start = Instant::now();
-    let (temporary, mut file) = create(&folder, "plan")?;
-    let written = file.write_all(&content).and_then(|()| file.sync_all()).and_then(|()| sync_folder(&folder));
-    let time = start.elapsed();
-    fs::remove_file(&temporary)?;
-    written.map(|()| time)
+    let mut temporary = create(&folder.join("plan"))?;
+    temporary.as_file_mut().write_all(&content)?;
+    temporary.as_file().sync_all()?;
+    sync_folder(&folder)?;
+    Ok(start.elapsed())
 }
 
 /// Creates `folder` and its missing parents, each durably.
@@ -175,7 +157,7 @@ pub fn create_folder(folder: &Path) -> io::Result<()> {
     if folder.is_dir() {
         return Ok(());
     }
-    let above = folder.parent().filter(|above| !above.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let above = folder_of(folder);
     if above != Path::new(".") {
         create_folder(above)?;
     }
@@ -215,30 +197,32 @@ mod tests {
     fn files_of_the_dead_are_swept_and_those_of_the_living_stay() {
         let folder = tempfile::tempdir().expect("is writable");
         let now = SystemTime::now();
-        let (dead, _) = create(folder.path(), "dead").expect("is writable");
-        let (living, file) = create(folder.path(), "living").expect("is writable");
-        file.lock().expect("can be locked");
+        let dead = create(&folder.path().join("dead")).expect("is writable").into_temp_path();
+        let living = create(&folder.path().join("living")).expect("is writable");
         let foreign = folder.path().join(".part-000000.parquet.1-0@elsewhere.tmp");
         fs::write(&foreign, "").expect("is writable");
         fs::write(folder.path().join(".mine.tmp"), "").expect("is writable");
         let shown = |path: &Path| path.file_name().expect("has a name").to_string_lossy().into_owned();
         sweep(folder.path(), now);
         assert!(!dead.exists());
-        assert_eq!(names(folder.path()), [shown(&living), ".mine.tmp".to_owned(), shown(&foreign)]);
+        assert_eq!(names(folder.path()), [shown(living.path()), ".mine.tmp".to_owned(), shown(&foreign)]);
         sweep(folder.path(), now + ABANDONED + Duration::from_secs(60));
-        assert_eq!(names(folder.path()), [shown(&living), ".mine.tmp".to_owned()]);
-        drop(file);
-        sweep(folder.path(), now);
+        assert_eq!(names(folder.path()), [shown(living.path()), ".mine.tmp".to_owned()]);
+        drop(living);
         assert_eq!(names(folder.path()), [".mine.tmp"]);
     }
 
     #[test]
-    fn names_that_are_taken_are_left_alone() {
+    fn a_new_file_replaces_no_other() {
         let folder = tempfile::tempdir().expect("is writable");
-        let (first, mut file) = create(folder.path(), "x").expect("is writable");
-        file.write_all(b"first").expect("is writable");
-        write(&folder.path().join("x"), b"second").expect("is writable");
-        assert_eq!(fs::read(first).expect("is readable"), b"first");
-        assert_eq!(fs::read(folder.path().join("x")).expect("is readable"), b"second");
+        let path = folder.path().join("x");
+        assert!(write_new(&path, b"first").expect("is writable"));
+        assert!(!write_new(&path, b"second").expect("is writable"));
+        assert_eq!(fs::read(&path).expect("is readable"), b"first");
+        write(&path, b"third").expect("is writable");
+        assert_eq!(
+            (fs::read(&path).expect("is readable"), names(folder.path())),
+            (b"third".to_vec(), vec!["x".to_owned()])
+        );
     }
 }

@@ -9,150 +9,76 @@ use rayon::prelude::*;
 use super::atomic::{self, Unwritten};
 use super::footer::Footer;
 use super::manifest::{Manifest, ManifestTable};
-use super::state::{self, CheckDepth, OpenPart, State};
+use super::state::{self, CheckDepth, State};
 
 /// The help if the folder contains another dataset.
 const WAYS_OUT: &str = "change `name` in the spec, or write elsewhere with --out DIR, or remove the dataset";
 
 /// The errors of the files of a dataset.
 #[derive(Debug, thiserror::Error)]
+#[allow(missing_docs)]
 pub enum DatasetError {
     /// The folder contains a dataset of another version or revision of the program.
     #[error(
         "{folder}: holds a dataset of another {what}\n  expected: {expected}\n  found: {found}\n  help: {WAYS_OUT}"
     )]
-    Foreign {
-        /// The folder.
-        folder: String,
-        /// `version` or `numerics revision`.
-        what: &'static str,
-        /// The value of this run.
-        expected: String,
-        /// The value of the folder.
-        found: String,
-    },
+    Foreign { folder: String, what: &'static str, expected: String, found: String },
     /// The folder contains a dataset of another spec.
     #[error("{folder}: holds a dataset of another spec\n  expected: {expected}\n  found: {found}\n  help: {WAYS_OUT}")]
-    OtherSpec {
-        /// The folder.
-        folder: String,
-        /// The table that differs.
-        table: String,
-        /// The value of this spec: the hash of the table, or the differing key.
-        expected: String,
-        /// The value of the folder.
-        found: String,
-        /// The text of the spec in the folder.
-        spec: String,
-    },
+    OtherSpec { folder: String, table: String, expected: String, found: String, spec: String },
     /// The folder contains tables that the spec lacks, and lacks tables of the spec.
     #[error(
         "{folder}: the spec and the dataset each have a table that the other lacks\n  expected: {expected}\n  found: {found}\n  help: add \
          [tables.{}] to the spec, which keeps its rows and computes yours; or {WAYS_OUT}",
         missing.join("] and [tables.")
     )]
-    OtherTables {
-        /// The folder.
-        folder: String,
-        /// The tables of the spec.
-        expected: String,
-        /// The tables of the dataset.
-        found: String,
-        /// The tables that the spec lacks.
-        missing: Vec<String>,
-    },
+    OtherTables { folder: String, expected: String, found: String, missing: Vec<String> },
     /// Another run writes the dataset.
     #[error(
         "{folder}: another run is writing this dataset{process}\n  help: wait for its end (`slipsweep status {folder}` shows its progress); only \
          shards (--shard I/N) run side by side"
     )]
-    Busy {
-        /// The folder.
-        folder: String,
-        /// The process in parentheses, if known.
-        process: String,
-    },
+    Busy { folder: String, process: String },
     /// The dataset was changed during this run.
     #[error(
         "{folder}: {what} during this run, which stopped\n  help: run the same command again; it keeps finished parts"
     )]
-    Taken {
-        /// The folder.
-        folder: String,
-        /// The event.
-        what: &'static str,
-    },
+    Taken { folder: String, what: &'static str },
     /// The folder contains no dataset, but other files.
     #[error(
         "{folder}: neither a dataset nor empty\n  expected: an empty folder, or one with a manifest.json\n  help: change \
          `name` in the spec, or write elsewhere with --out DIR"
     )]
-    Occupied {
-        /// The folder.
-        folder: String,
-    },
+    Occupied { folder: String },
     /// A file with the name of a part does not belong to this sweep.
     #[error(
         "{path}: belongs to another {what}\n  expected: {expected}\n  found: {found}\n  help: move the file away; `slipsweep run` then \
          computes the part and keeps all others"
     )]
-    ForeignPart {
-        /// The file.
-        path: String,
-        /// The differing property.
-        what: &'static str,
-        /// The expected value of the part.
-        expected: String,
-        /// The value of the file.
-        found: String,
-    },
+    ForeignPart { path: String, what: &'static str, expected: String, found: String },
     /// A part is damaged.
     #[error(
         "{path}: the part is damaged: {why}\n  help: `slipsweep run {dataset}` recomputes it and keeps all intact parts"
     )]
-    DamagedPart {
-        /// The file.
-        path: String,
-        /// The kind of damage.
-        why: String,
-        /// The folder of the dataset.
-        dataset: String,
-    },
+    DamagedPart { path: String, why: String, dataset: String },
     /// The manifest is damaged, and no part can replace it.
     #[error(
         "{path}: damaged, or of another version of slipsweep: {why}\n  help: run the spec of the dataset, which rewrites it if no part \
          is there; else {WAYS_OUT}"
     )]
-    Manifest {
-        /// The file.
-        path: String,
-        /// The kind of damage.
-        why: String,
-    },
+    Manifest { path: String, why: String },
     /// An error of the operating system.
     #[error(
         "{path}: cannot {action}: {source}\n  help: solve this and run the same command again, which keeps finished parts; or write \
          elsewhere with --out DIR"
     )]
-    Io {
-        /// The file or folder.
-        path: String,
-        /// The attempted action.
-        action: &'static str,
-        /// The cause.
-        source: io::Error,
-    },
+    Io { path: String, action: &'static str, source: io::Error },
     /// A sample of a table could not be encoded.
     #[error("cannot encode a sample: {0}")]
     Sample(parquet::errors::ParquetError),
     /// A part could not be encoded.
     #[error("{path}: cannot encode: {source}")]
-    Encode {
-        /// The part.
-        path: String,
-        /// The cause.
-        source: parquet::errors::ParquetError,
-    },
+    Encode { path: String, source: parquet::errors::ParquetError },
 }
 
 impl DatasetError {
@@ -290,25 +216,21 @@ impl Folder {
         state::state(&self.part(table, part), manifest, table, part, look)
     }
 
-    /// Opens a part of the dataset of `manifest`; `None` if it is missing. Verifies that it is the expected part and that its footer is intact;
-    /// checksums of pages are verified when they are read. Every reader of a dataset opens its parts here.
-    ///
-    /// # Errors
-    ///
-    /// If the part is damaged, or does not belong to the dataset.
-    pub fn open_part(&self, manifest: &Manifest, table: &str, part: u64) -> Result<Option<OpenPart>, DatasetError> {
-        let path = self.part(table, part);
-        state::open_part(&path, manifest, table, part).map_err(|state| self.fault(&path, state))
-    }
-
-    /// The paths of the present parts of `table` in order, each verified by [`Folder::open_part`], and the number of missing parts.
+    /// The paths of the present parts of `table` in order, and the number of missing parts. The footer of each part is verified here, its pages when they are read.
     ///
     /// # Errors
     ///
     /// If a part is damaged, or does not belong to the dataset.
     pub fn verified(&self, manifest: &Manifest, table: &ManifestTable) -> Result<(Vec<PathBuf>, u64), DatasetError> {
         let there = self.parts_there(table);
-        let open = |part: u64| Ok(self.open_part(manifest, &table.name, part)?.map(|part| part.path));
+        let open = |part: u64| {
+            let path = self.part(&table.name, part);
+            match self.state(manifest, &table.name, part, CheckDepth::Footer) {
+                State::There { .. } => Ok(Some(path)),
+                State::Missing => Ok(None),
+                fault => Err(self.fault(&path, fault)),
+            }
+        };
         let opened: Result<Vec<Option<PathBuf>>, DatasetError> = there.into_par_iter().map(open).collect();
         let paths: Vec<PathBuf> = opened?.into_iter().flatten().collect();
         let missing = table.parts - paths.len() as u64;

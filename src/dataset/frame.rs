@@ -9,14 +9,14 @@ use arrow_schema::DataType;
 use parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
 use parquet::arrow::{ProjectionMask, parquet_to_arrow_schema};
 use parquet::errors::ParquetError;
-use parquet::file::metadata::{ParquetMetaDataReader, RowGroupMetaData};
+use parquet::file::metadata::RowGroupMetaData;
 use parquet::file::statistics::Statistics;
 
 use super::cell::Cell;
 use super::folder::DatasetError;
 use super::guard::guarded;
 use super::layout::label;
-use super::metadata_limits::{check_footer, coded};
+use super::metadata_limits::{self, coded};
 use crate::file;
 
 /// Rows decoded in one batch.
@@ -128,15 +128,11 @@ impl Frame {
 
 /// The error of reading columns.
 #[derive(Debug, thiserror::Error)]
+#[allow(missing_docs)]
 pub enum FrameError {
     /// A file is damaged or not a Parquet file.
     #[error("{path}: cannot be read as Parquet: {reason}")]
-    File {
-        /// The file.
-        path: String,
-        /// The cause.
-        reason: String,
-    },
+    File { path: String, reason: String },
 }
 
 /// The error of reading a part.
@@ -160,8 +156,7 @@ pub type Facts = Vec<(String, String)>;
 /// The columns of a Parquet file, and the entries of its footer.
 pub fn headings(path: &Path) -> Result<(Vec<Heading>, Facts), FrameError> {
     let file = file::open(path).map_err(|error| wrong(path, error))?;
-    let metadata = check_footer(&file).and_then(|()| ParquetMetaDataReader::new().parse_and_finish(&file));
-    let metadata = metadata.map_err(|error| wrong(path, error))?;
+    let metadata = metadata_limits::footer(&file).map_err(|error| wrong(path, error))?;
     let footer = metadata.file_metadata();
     let schema = parquet_to_arrow_schema(footer.schema_descr(), footer.key_value_metadata())
         .map_err(|error| wrong(path, error))?;

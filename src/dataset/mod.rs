@@ -41,7 +41,7 @@ pub(crate) use metadata_limits::coded;
 pub(crate) use metadata_limits::{check_footer, check_pages};
 pub use part::encode;
 pub use session::{Concurrency, Holder, Session};
-pub use state::{CheckDepth, OpenPart, State};
+pub use state::{CheckDepth, State};
 pub use statistics::{Counts, FEW, Row as StatisticsRow, TableStatistics};
 #[cfg(feature = "read")]
 pub use survey::{Survey, TableSurvey};

@@ -2,15 +2,14 @@
 
 use std::fs::{self, File};
 use std::io::{self, Read};
-use std::path::{Path, PathBuf};
-use std::sync::Arc;
+use std::path::Path;
 
-use parquet::file::metadata::{KeyValue, ParquetMetaData, ParquetMetaDataReader};
+use parquet::file::metadata::{KeyValue, ParquetMetaData};
 
 use super::checksum;
 use super::footer::{Footer, PREFIX};
 use super::manifest::{Manifest, ManifestTable};
-use super::metadata_limits::check_footer;
+use super::metadata_limits;
 use super::statistics::TableStatistics;
 
 /// The depth of a check.
@@ -24,89 +23,53 @@ pub enum CheckDepth {
 
 /// The state of a part.
 #[derive(Debug, Clone, PartialEq)]
+#[allow(missing_docs)]
 pub enum State {
     /// No file.
     Missing,
     /// The expected part.
-    There {
-        /// The statistics of its rows.
-        statistics: Box<TableStatistics>,
-    },
+    There { statistics: Box<TableStatistics> },
     /// A file of another spec or version, which may be valuable and is never replaced.
-    Foreign {
-        /// The differing property.
-        what: &'static str,
-        /// The expected value of the part.
-        expected: String,
-        /// The value of the file.
-        found: String,
-    },
+    Foreign { what: &'static str, expected: String, found: String },
     /// A damaged part, which a run replaces.
-    Damaged {
-        /// The kind of damage.
-        why: String,
-    },
-}
-
-/// An open part, verified to be the expected one.
-#[derive(Debug)]
-pub struct OpenPart {
-    /// Its path.
-    pub path: PathBuf,
-    /// The file.
-    pub file: File,
-    /// Its Parquet footer.
-    pub metadata: Arc<ParquetMetaData>,
-    /// Its footer entries.
-    pub footer: Footer,
-    /// The statistics of its rows.
-    pub statistics: TableStatistics,
+    Damaged { why: String },
 }
 
 /// The state of part number `part` of `table` in the dataset of `manifest`, whose file is `path`.
 pub fn state(path: &Path, manifest: &Manifest, table: &str, part: u64, look: CheckDepth) -> State {
     let found = match look {
-        CheckDepth::Footer => open_part(path, manifest, table, part).map(|part| part.map(|part| part.statistics)),
-        CheckDepth::Whole => whole(path).and_then(|entries| {
-            entries
-                .map(|entries| belongs(&entries, manifest, table, part).map(|(_, statistics)| statistics))
-                .transpose()
-        }),
+        CheckDepth::Footer => sealed_entries(path),
+        CheckDepth::Whole => whole(path),
     };
-    match found {
+    let statistics = found.and_then(|entries| match entries {
+        Some(entries) => belongs(&entries, manifest, table, part).map(Some),
+        None => Ok(None),
+    });
+    match statistics {
         Ok(Some(statistics)) => State::There { statistics: Box::new(statistics) },
         Ok(None) => State::Missing,
         Err(state) => state,
     }
 }
 
-/// Opens a part if its file is the expected one; `None` if there is no file.
-///
-/// # Errors
-///
-/// [`State::Foreign`] or [`State::Damaged`].
-pub fn open_part(path: &Path, manifest: &Manifest, table: &str, part: u64) -> Result<Option<OpenPart>, State> {
+/// The entries of the footer of a file, if footer and page headers are as they were written; `None` if there is no file.
+fn sealed_entries(path: &Path) -> Result<Option<Vec<KeyValue>>, State> {
     let Some(file) = open(path)? else { return Ok(None) };
     let metadata = metadata(&file)?;
     let entries = entries(&metadata);
     match checksum::is_head_intact(&file, &metadata) {
-        Ok(Some(true)) => {}
+        Ok(Some(true)) => Ok(Some(entries)),
         Ok(None) if Footer::from_entries(&entries).is_none() => {
-            return Err(stranger("a Parquet file that slipsweep did not write"));
+            Err(stranger("a Parquet file that slipsweep did not write"))
         }
-        Ok(_) => return damaged("the checksum of its footer and page headers does not match"),
-        Err(error) => return damaged(&error.to_string()),
+        Ok(_) => damaged("the checksum of its footer and page headers does not match"),
+        Err(error) => damaged(&error.to_string()),
     }
-    let (footer, statistics) = belongs(&entries, manifest, table, part)?;
-    Ok(Some(OpenPart { path: path.to_owned(), file, metadata: metadata.into(), footer, statistics }))
 }
 
 /// The footer of a part, if it is intact.
 pub fn footer_of(path: &Path) -> Option<Footer> {
-    let file = open(path).ok()??;
-    let metadata = metadata(&file).ok()?;
-    let sound = checksum::is_head_intact(&file, &metadata).ok()??;
-    if sound { Footer::from_entries(&entries(&metadata)) } else { None }
+    Footer::from_entries(&sealed_entries(path).ok()??)
 }
 
 /// Opens the file in `path`. Only plain files are opened: a named pipe would wait for a writer, and a device might never end.
@@ -157,22 +120,15 @@ fn damaged<T>(why: &str) -> Result<T, State> {
 }
 
 fn metadata<R: parquet::file::reader::ChunkReader>(file: &R) -> Result<ParquetMetaData, State> {
-    check_footer(file)
-        .and_then(|()| ParquetMetaDataReader::new().parse_and_finish(file))
-        .or_else(|error| damaged(&format!("it is cut short or not Parquet: {error}")))
+    metadata_limits::footer(file).or_else(|error| damaged(&format!("it is cut short or not Parquet: {error}")))
 }
 
 fn entries(metadata: &ParquetMetaData) -> Vec<KeyValue> {
     metadata.file_metadata().key_value_metadata().cloned().unwrap_or_default()
 }
 
-/// The footer of a file, if it matches the expected part.
-fn belongs(
-    entries: &[KeyValue],
-    manifest: &Manifest,
-    table: &str,
-    part: u64,
-) -> Result<(Footer, TableStatistics), State> {
+/// The statistics in the footer of a file, if it is that of the expected part.
+fn belongs(entries: &[KeyValue], manifest: &Manifest, table: &str, part: u64) -> Result<TableStatistics, State> {
     let foreign = |what, expected: &str, found: &str| {
         Err(State::Foreign { what, expected: expected.to_owned(), found: found.to_owned() })
     };
@@ -199,6 +155,6 @@ fn belongs(
         let show = |rows: &std::ops::Range<u64>| format!("rows {} to {}", rows.start, rows.end);
         foreign("place in the table", &rows.as_ref().map(show).unwrap_or_default(), &show(&found.rows))
     } else {
-        Ok((found, statistics))
+        Ok(statistics)
     }
 }

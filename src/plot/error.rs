@@ -10,130 +10,61 @@ fn hint(name: &str, found: &[String]) -> String {
 
 /// The error of a picture.
 #[derive(Debug, thiserror::Error)]
+#[allow(missing_docs)]
 pub enum PlotError {
     /// A file cannot be opened.
     #[error("{path}: cannot be read: {reason}")]
-    Read {
-        /// The file.
-        path: String,
-        /// The error of the system.
-        reason: String,
-    },
+    Read { path: String, reason: String },
     /// A cell of a CSV file.
     #[error(
         "{path}, line {line}: found {found}\n  expected: {expected}\n  help: `slipsweep trace … --out FILE.csv` writes traces"
     )]
-    Cell {
-        /// The file.
-        path: String,
-        /// The line, from 1.
-        line: usize,
-        /// The found names.
-        found: String,
-        /// The expectation.
-        expected: String,
-    },
+    Cell { path: String, line: usize, found: String, expected: String },
     /// A file is not a trace.
     #[error(
         "{path}: not a trace: it has no column `{missing}`\n  found: {}\n  help: `slipsweep trace … --out FILE` writes traces; \
          of a dataset, name the folder",
         .found.join(", ")
     )]
-    NoTrace {
-        /// The file.
-        path: String,
-        /// The column.
-        missing: &'static str,
-        /// The columns that it has.
-        found: Vec<String>,
-    },
+    NoTrace { path: String, missing: &'static str, found: Vec<String> },
     /// More traces than can be distinguished.
     #[error("{found} traces are too many for one picture\n  expected: at most {most}")]
-    TooManyTraces {
-        /// The given number.
-        found: usize,
-        /// The greatest number.
-        most: usize,
-    },
+    TooManyTraces { found: usize, most: usize },
     /// There is nothing to draw.
     #[error("nothing to draw: the requested columns hold no numbers")]
     Nothing,
     /// The dataset has no table of this name.
     #[error("the dataset has no table `{name}`\n  found: {}\n  help: {}", .found.join(", "), hint(.name, .found))]
-    NoTable {
-        /// The name.
-        name: String,
-        /// The tables of the dataset.
-        found: Vec<String>,
-    },
+    NoTable { name: String, found: Vec<String> },
     /// The table has no column of this name.
     #[error("{argument}: the table `{table}` has no {what} `{name}`\n  found: {}\n  help: {}", .found.join(", "), hint(.name, .found))]
-    NoColumn {
-        /// The argument that names it.
-        argument: String,
-        /// The table.
-        table: String,
-        /// `axis` or `column`.
-        what: &'static str,
-        /// The name.
-        name: String,
-        /// The known names.
-        found: Vec<String>,
-    },
+    NoColumn { argument: String, table: String, what: &'static str, name: String, found: Vec<String> },
     /// A condition that cannot be read.
     #[error(
         "--where {text}: not a condition\n  expected: COLUMN=VALUE, or <, >, <=, >= or != between them\n  help: such as --where \"a=0.03\""
     )]
-    Condition {
-        /// The condition.
-        text: String,
-    },
+    Condition { text: String },
     /// No row meets the conditions.
     #[error("--where {text}: no row of the table `{table}` meets this\n  found: {found}\n  help: {help}")]
-    NoRows {
-        /// The table.
-        table: String,
-        /// The conditions.
-        text: String,
-        /// The existing values.
-        found: String,
-        /// The nearest existing value.
-        help: String,
-    },
+    NoRows { table: String, text: String, found: String, help: String },
     /// The table has no rows.
     #[error("the table `{table}` has no rows yet\n  help: compute them with `slipsweep run`")]
-    Empty {
-        /// The table.
-        table: String,
-    },
+    Empty { table: String },
     /// Every axis has a single value.
     #[error("the table `{table}` has a single matching row, which makes no picture\n  help: `slipsweep head` shows it")]
-    OneRow {
-        /// The table.
-        table: String,
-    },
+    OneRow { table: String },
     /// A map needs two axes.
     #[error(
         "--color {column}: a map needs two axes of several values, which the table `{table}` does not have\n  help: \
              --y {column} draws lines"
     )]
-    NoMap {
-        /// The table.
-        table: String,
-        /// The column.
-        column: String,
-    },
+    NoMap { table: String, column: String },
     /// Traces in different units.
     #[error(
         "the traces differ in the unit of `{column}`\n  found: {} and {}\n  expected: the same units\n  help: draw them one by one, or \
          trace both in the same units", .units[0], .units[1]
     )]
-    Units {
-        /// The column.
-        column: String,
-        /// Two of its units.
-        units: [String; 2],
-    },
+    Units { column: String, units: [String; 2] },
     /// A Parquet trace cannot be read.
     #[error("{0}\n  help: delete the file and trace it again")]
     Trace(FrameError),
@@ -145,10 +76,5 @@ pub enum PlotError {
     Convert(String),
     /// The picture has too many pixels.
     #[error("a picture of {width} x {height} pixels is too large\n  help: lower --dpi")]
-    Size {
-        /// Width in pixels.
-        width: f64,
-        /// Height in pixels.
-        height: f64,
-    },
+    Size { width: f64, height: f64 },
 }

@@ -1,21 +1,18 @@
 //! The answer to a query: its columns, and its rows piece by piece.
 
 use std::io::{self, Write};
-use std::sync::{Arc, Mutex};
+use std::sync::Arc;
 
 use arrow_array::builder::StringDictionaryBuilder;
 use arrow_array::types::Int32Type;
-use arrow_array::{
-    ArrayRef, BooleanArray, Date32Array, Float64Array, Int64Array, RecordBatch, StringArray, TimestampMicrosecondArray,
-};
-use arrow_schema::{DataType as ArrowType, Schema as ArrowSchema, SchemaRef, TimeUnit};
+use arrow_array::{ArrayRef, BooleanArray, Float64Array, Int64Array, RecordBatch, StringArray};
+use arrow_schema::{DataType as ArrowType, Schema as ArrowSchema, SchemaRef};
 use parquet::arrow::ArrowWriter;
 use parquet::basic::Compression;
 use parquet::errors::ParquetError;
 use parquet::file::properties::WriterProperties;
 use polars::prelude::{
     AnyValue, Column, DataFrame, DataType, IntoLazy, LazyFrame, PolarsError, PolarsResult, Series, SortMultipleOptions,
-    TimeUnit as PolarsTimeUnit,
 };
 use polars_io::SerWriter;
 use polars_io::prelude::CsvWriter;
@@ -133,24 +130,23 @@ impl Answer {
             Format::Parquet => {
                 let units = self.units.clone();
                 let properties = WriterProperties::builder().set_compression(Compression::SNAPPY).build();
-                let written = Bytes::default();
-                let mut writer: Option<(SchemaRef, ArrowWriter<Bytes>)> = None;
+                let mut writer: Option<(SchemaRef, ArrowWriter<Vec<u8>>)> = None;
                 self.find(&mut |piece| {
                     if writer.is_none() {
                         without_lists(piece, "a Parquet answer")?;
                         let schema = arrow_schema(piece, &units);
-                        let made = ArrowWriter::try_new(written.clone(), schema.clone(), Some(properties.clone()))?;
+                        let made = ArrowWriter::try_new(Vec::new(), schema.clone(), Some(properties.clone()))?;
                         writer = Some((schema, made));
                     }
                     if let Some((schema, writer)) = &mut writer {
                         writer.write(&batch(piece, schema)?)?;
+                        out.write_all(&std::mem::take(writer.inner_mut()))?;
                     }
-                    Ok(out.write_all(&written.take())?)
+                    Ok(())
                 })?;
                 if let Some((_, writer)) = writer {
-                    writer.close()?;
+                    out.write_all(&writer.into_inner()?)?;
                 }
-                out.write_all(&written.take())?;
             }
         }
         Ok(out.flush()?)
@@ -282,28 +278,6 @@ fn ordered(rows: DataFrame, keys: &[Key], offset: usize, limit: Option<usize>) -
     Ok(rows.slice(i64::try_from(offset).unwrap_or(i64::MAX), limit.unwrap_or(usize::MAX)))
 }
 
-/// A buffer between a writer and its destination.
-#[derive(Clone, Default)]
-struct Bytes(Arc<Mutex<Vec<u8>>>);
-
-impl Bytes {
-    fn take(&self) -> Vec<u8> {
-        self.0.lock().map(|mut bytes| std::mem::take(&mut *bytes)).unwrap_or_default()
-    }
-}
-
-impl Write for Bytes {
-    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
-        let mut kept = self.0.lock().map_err(|_| io::ErrorKind::Other)?;
-        kept.extend_from_slice(bytes);
-        Ok(bytes.len())
-    }
-
-    fn flush(&mut self) -> io::Result<()> {
-        Ok(())
-    }
-}
-
 /// The cells of a column.
 fn cells(column: &Column) -> Vec<Cell> {
     let series = column.as_materialized_series().rechunk();
@@ -377,8 +351,6 @@ fn arrow_schema(piece: &DataFrame, units: &[String]) -> SchemaRef {
             kind if kind.is_float() => ArrowType::Float64,
             kind if kind.is_integer() => ArrowType::Int64,
             DataType::Boolean => ArrowType::Boolean,
-            DataType::Date => ArrowType::Date32,
-            DataType::Datetime(..) => ArrowType::Timestamp(TimeUnit::Microsecond, None),
             kind if kind.is_categorical() => label(),
             _ => ArrowType::Utf8,
         };
@@ -396,12 +368,6 @@ fn batch(piece: &DataFrame, schema: &SchemaRef) -> Result<RecordBatch, AnswerErr
             ArrowType::Float64 => Arc::new(series.cast(&DataType::Float64)?.f64()?.iter().collect::<Float64Array>()),
             ArrowType::Int64 => Arc::new(series.strict_cast(&DataType::Int64)?.i64()?.iter().collect::<Int64Array>()),
             ArrowType::Boolean => Arc::new(series.bool()?.iter().collect::<BooleanArray>()),
-            ArrowType::Date32 => Arc::new(series.cast(&DataType::Int32)?.i32()?.iter().collect::<Date32Array>()),
-            ArrowType::Timestamp(..) => {
-                let ticks = series.cast(&DataType::Datetime(PolarsTimeUnit::Microseconds, None))?;
-                let ticks = ticks.cast(&DataType::Int64)?;
-                Arc::new(ticks.i64()?.iter().collect::<TimestampMicrosecondArray>())
-            }
             ArrowType::Dictionary(..) => {
                 let text = series.cast(&DataType::String)?;
                 let mut words = StringDictionaryBuilder::<Int32Type>::new();

@@ -312,57 +312,37 @@ impl Top {
     pub fn mark(&self, batch: &RecordBatch, kept: &mut [bool]) {
         let Some(array) = batch.column_by_name(&self.column) else { return };
         let Some(array) = array.as_primitive_opt::<Float64Type>() else { return };
-        let sign = if self.descending { -1.0 } else { 1.0 };
-        // Ascending; NaN is the greatest number.
-        let rank = |row: usize| {
-            let number = array.value(row);
-            match (number.is_nan(), self.descending) {
-                (true, false) => f64::INFINITY,
-                (true, true) => f64::NEG_INFINITY,
-                (false, _) => sign * number,
-            }
+        // Keys in the order of the rows. NaN is the greatest number.
+        let key = |row: usize| match (array.is_null(row), self.nulls_last) {
+            (true, true) => i64::MAX,
+            (true, false) => i64::MIN,
+            (false, _) if self.descending => -in_order(array.value(row)),
+            (false, _) => in_order(array.value(row)),
         };
-        let rows = || (0..kept.len()).filter(|&row| kept[row]);
-        let nulls = rows().filter(|&row| array.is_null(row)).count();
-        let mut ranks: Vec<f64> = rows().filter(|&row| array.is_valid(row)).map(rank).collect();
-        // Nulls come before or after all numbers.
-        let (most_nulls, most) = match self.nulls_last {
-            true => (self.most.saturating_sub(ranks.len()), self.most),
-            false => (self.most, self.most.saturating_sub(nulls)),
-        };
-        let all_nulls = if self.alone {
-            most_nulls
-        } else if most_nulls > 0 {
-            usize::MAX
-        } else {
-            0
-        };
-        let last = match most.checked_sub(1) {
-            Some(place) if place < ranks.len() => Some(*ranks.select_nth_unstable_by(place, f64::total_cmp).1),
-            Some(_) => Some(f64::INFINITY),
-            None => None,
-        };
-        let before = last.map_or(0, |last| ranks.iter().filter(|&&rank| rank < last).count());
-        let mut ties = if self.alone { most.saturating_sub(before) } else { usize::MAX };
-        let mut nulls = all_nulls;
+        let Some(last) = self.most.checked_sub(1) else { return kept.fill(false) };
+        let mut keys: Vec<i64> = (0..kept.len()).filter(|&row| kept[row]).map(key).collect();
+        if last >= keys.len() {
+            return;
+        }
+        let last = *keys.select_nth_unstable(last).1;
+        let before = keys.iter().filter(|key| **key < last).count();
+        let mut ties = if self.alone { self.most - before } else { usize::MAX };
         for (row, kept) in kept.iter_mut().enumerate().filter(|(_, kept)| **kept) {
-            let left = match (array.is_null(row), last) {
-                (true, _) => &mut nulls,
-                (false, None) => {
-                    *kept = false;
-                    continue;
-                }
-                (false, Some(last)) if rank(row) < last => continue,
-                (false, Some(last)) if rank(row) == last => &mut ties,
-                (false, Some(_)) => {
-                    *kept = false;
-                    continue;
-                }
-            };
-            *kept = *left > 0;
-            *left = left.saturating_sub(1);
+            let key = key(row);
+            *kept = key < last || key == last && ties > 0;
+            ties -= usize::from(key == last && ties > 0);
         }
     }
+}
+
+/// An integer in the order of numbers, of which zero has one sign and NaN is the greatest.
+fn in_order(number: f64) -> i64 {
+    if number.is_nan() {
+        return i64::MAX - 1;
+    }
+    let bits = (number + 0.0).to_bits().cast_signed();
+    // Those of negative numbers fall.
+    if bits < 0 { -(bits & i64::MAX) } else { bits }
 }
 
 #[cfg(test)]

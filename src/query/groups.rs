@@ -3,9 +3,6 @@
 //! Most queries over many rows are of this kind. polars, which is not optimised in the release build, would be several times slower than Python
 //! polars (`benches/query/run`). The test `an_answer_in_pieces_is_the_answer_at_once` compares both implementations.
 
-use std::collections::HashMap;
-use std::collections::hash_map::Entry;
-
 use arrow_array::cast::AsArray;
 use arrow_array::types::{Float64Type, Int32Type};
 use arrow_array::{Array, RecordBatch};
@@ -96,94 +93,39 @@ impl Groups {
     }
 }
 
-/// The value of a key.
-#[derive(Debug, Clone, PartialEq, Eq, Hash)]
-enum Value {
-    Missing,
-    /// The bits of a number, with one zero and one NaN.
-    Number(u64),
-    Flag(bool),
-    Word(String),
-}
+/// The code of a missing value: the bits of a NaN that no number has after [`bits`].
+const MISSING: u64 = u64::MAX;
 
+/// The bits of a number as the code of its value; zero has one sign and NaN one pattern.
 fn bits(number: f64) -> u64 {
     if number.is_nan() { f64::NAN.to_bits() } else { (number + 0.0).to_bits() }
 }
 
-/// The distinct values of a key so far.
-#[derive(Default)]
-struct Key {
-    places: HashMap<Value, u32>,
-    /// The values of a numeric key, which may be many.
-    numbers: HashMap<u64, u32>,
-    values: Vec<Value>,
-}
-
-impl Key {
-    fn place(&mut self, value: Value) -> u32 {
-        match self.places.entry(value) {
-            Entry::Occupied(known) => *known.get(),
-            Entry::Vacant(new) => {
-                let place = self.values.len() as u32;
-                self.values.push(new.key().clone());
-                *new.insert(place)
-            }
-        }
+/// The codes of the values of `rows`: the bits of a number, 0 or 1 of a flag, the place of a word among `words`.
+fn codes(array: &dyn Array, rows: &[u32], words: &mut IndexSet<String>) -> Vec<u64> {
+    let rows = rows.iter().map(|&row| row as usize);
+    if let Some(numbers) = array.as_primitive_opt::<Float64Type>() {
+        return match array.null_count() {
+            0 => rows.map(|row| bits(numbers.value(row))).collect(),
+            _ => rows.map(|row| if array.is_null(row) { MISSING } else { bits(numbers.value(row)) }).collect(),
+        };
     }
-
-    fn number(&mut self, bits: u64) -> u32 {
-        *self.numbers.entry(bits).or_insert_with(|| {
-            self.values.push(Value::Number(bits));
-            self.values.len() as u32 - 1
-        })
+    if let Some(flags) = array.as_boolean_opt() {
+        return rows.map(|row| if flags.is_null(row) { MISSING } else { u64::from(flags.value(row)) }).collect();
     }
-
-    /// The indices of the values of `rows`.
-    fn places(&mut self, array: &dyn Array, rows: &[u32]) -> Vec<u32> {
-        if let Some(numbers) = array.as_primitive_opt::<Float64Type>() {
-            // Axes rarely change from row to row.
-            let mut last: Option<(u64, u32)> = None;
-            let missing = if array.null_count() > 0 { Some(self.place(Value::Missing)) } else { None };
-            let place = |&row: &u32| {
-                if let (Some(missing), true) = (missing, array.is_null(row as usize)) {
-                    return missing;
-                }
-                let bits = bits(numbers.value(row as usize));
-                match last {
-                    Some((known, place)) if known == bits => place,
-                    _ => {
-                        let place = self.number(bits);
-                        last = Some((bits, place));
-                        place
-                    }
-                }
-            };
-            return rows.iter().map(place).collect();
-        }
-        let missing = self.place(Value::Missing);
-        if let Some(flags) = array.as_boolean_opt() {
-            let both = [false, true].map(|flag| self.place(Value::Flag(flag)));
-            let place = |&row: &u32| match flags.is_null(row as usize) {
-                true => missing,
-                false => both[usize::from(flags.value(row as usize))],
-            };
-            return rows.iter().map(place).collect();
-        }
-        let codes = array.as_dictionary::<Int32Type>();
-        let words = codes.values().as_string::<i32>();
-        let known: Vec<u32> =
-            words.iter().map(|word| word.map_or(missing, |word| self.place(Value::Word(word.to_owned())))).collect();
-        let place = |&row: &u32| codes.key(row as usize).and_then(|key| known.get(key)).copied().unwrap_or(missing);
-        rows.iter().map(place).collect()
-    }
+    let keys = array.as_dictionary::<Int32Type>();
+    let words = keys.values().as_string::<i32>().iter().map(|word| Some(words.insert_full(word?.to_owned()).0 as u64));
+    let known: Vec<u64> = words.map(|place| place.unwrap_or(MISSING)).collect();
+    rows.map(|row| keys.key(row).and_then(|key| known.get(key)).copied().unwrap_or(MISSING)).collect()
 }
 
 /// Groups during aggregation.
 pub struct Counting<'a> {
     groups: &'a Groups,
-    keys: Vec<Key>,
-    /// The groups of the first keys, by the group of one key fewer and the index of the next key's value.
-    pairs: Vec<IndexSet<(u32, u32)>>,
+    /// The words of each key.
+    words: Vec<IndexSet<String>>,
+    /// The groups of the first keys, by those of one key less and the code of the value of the next.
+    pairs: Vec<IndexSet<(u32, u64)>>,
     /// The number of groups.
     count: usize,
     tallies: Vec<Vec<Tally>>,
@@ -201,7 +143,7 @@ impl<'a> Counting<'a> {
         let keys = groups.keys.len();
         let mut counting = Counting {
             groups,
-            keys: (0..keys).map(|_| Key::default()).collect(),
+            words: vec![IndexSet::new(); keys],
             pairs: vec![IndexSet::new(); keys],
             count: 0,
             tallies: vec![Vec::new(); groups.measures.len()],
@@ -255,11 +197,12 @@ impl<'a> Counting<'a> {
         let mut ids: Vec<u32> = vec![0; rows.len()];
         for (index, (name, _)) in self.groups.keys.iter().enumerate() {
             let Some(array) = batch.column_by_name(name) else { continue };
-            let places = self.keys[index].places(array.as_ref(), rows);
+            let codes = codes(array.as_ref(), rows, &mut self.words[index]);
             let pairs = &mut self.pairs[index];
-            let mut last: Option<((u32, u32), u32)> = None;
-            for (id, place) in ids.iter_mut().zip(places) {
-                let pair = (*id, place);
+            // Axes change rarely from row to row.
+            let mut last: Option<((u32, u64), u32)> = None;
+            for (id, code) in ids.iter_mut().zip(codes) {
+                let pair = (*id, code);
                 *id = match last {
                     Some((known, group)) if known == pair => group,
                     _ => {
@@ -280,31 +223,19 @@ impl<'a> Counting<'a> {
     pub fn frame(self) -> PolarsResult<DataFrame> {
         let height = self.count;
         let mut columns: Vec<Column> = Vec::new();
-        let places = self.places();
-        for (index, (key, places)) in self.keys.iter().zip(&places).enumerate() {
+        for ((index, (_, kind)), codes) in self.groups.keys.iter().enumerate().zip(self.codes()) {
             let name = format!("__g{index}").into();
-            let values = || places.iter().map(|&place| key.values.get(place as usize));
-            columns.push(match self.groups.keys[index].1 {
+            let values = codes.into_iter().map(|code| (code != MISSING).then_some(code));
+            columns.push(match kind {
                 Kind::Word => {
-                    let word = |value: Option<&'_ Value>| match value {
-                        Some(Value::Word(word)) => Some(word.clone()),
-                        _ => None,
-                    };
-                    StringChunked::from_iter_options(name, values().map(word)).into_column()
+                    let word = |code: u64| self.words[index].get_index(code as usize);
+                    StringChunked::from_iter_options(name, values.map(|code| word(code?))).into_column()
                 }
                 Kind::Number => {
-                    let number = |value: Option<&Value>| match value {
-                        Some(Value::Number(bits)) => Some(f64::from_bits(*bits)),
-                        _ => None,
-                    };
-                    Float64Chunked::from_iter_options(name, values().map(number)).into_column()
+                    Float64Chunked::from_iter_options(name, values.map(|code| code.map(f64::from_bits))).into_column()
                 }
                 Kind::Flag => {
-                    let flag = |value: Option<&Value>| match value {
-                        Some(Value::Flag(flag)) => Some(*flag),
-                        _ => None,
-                    };
-                    BooleanChunked::from_iter_options(name, values().map(flag)).into_column()
+                    BooleanChunked::from_iter_options(name, values.map(|code| code.map(|code| code != 0))).into_column()
                 }
             });
         }
@@ -326,18 +257,18 @@ impl<'a> Counting<'a> {
         DataFrame::new(height, columns)
     }
 
-    /// The indices of the values of each key, for all groups.
-    fn places(&self) -> Vec<Vec<u32>> {
-        let mut places = vec![vec![0; self.count]; self.keys.len()];
+    /// The codes of the values of each key, group by group.
+    fn codes(&self) -> Vec<Vec<u64>> {
+        let mut codes = vec![vec![0; self.count]; self.pairs.len()];
         for group in 0..self.count {
             let mut id = group as u32;
-            for (pairs, places) in self.pairs.iter().zip(&mut places).rev() {
-                if let Some(&(rest, place)) = pairs.get_index(id as usize) {
-                    (places[group], id) = (place, rest);
+            for (pairs, codes) in self.pairs.iter().zip(&mut codes).rev() {
+                if let Some(&(rest, code)) = pairs.get_index(id as usize) {
+                    (codes[group], id) = (code, rest);
                 }
             }
         }
-        places
+        codes
     }
 }
 

@@ -34,29 +34,14 @@ pub struct Tables {
 
 /// The error of a query.
 #[derive(Debug, thiserror::Error)]
+#[allow(missing_docs)]
 pub enum QueryError {
     /// The path leads to no table.
     #[error("{path}: {found}\n  expected: {expected}\n  help: {help}")]
-    Path {
-        /// The path.
-        path: String,
-        /// The fault.
-        found: String,
-        /// The expected input.
-        expected: &'static str,
-        /// The help.
-        help: &'static str,
-    },
+    Path { path: String, found: String, expected: &'static str, help: &'static str },
     /// The query is not valid for these tables.
     #[error("{found}\n  expected: a SELECT from these tables:{tables}\n  help: {help}")]
-    Sql {
-        /// The fault.
-        found: String,
-        /// The tables and their columns, one line for each table.
-        tables: String,
-        /// The help.
-        help: String,
-    },
+    Sql { found: String, tables: String, help: String },
     /// A part is damaged, or belongs to another dataset.
     #[error(transparent)]
     Part(Box<DatasetError>),
@@ -64,12 +49,7 @@ pub enum QueryError {
     #[error(
         "{path}: cannot read: {source}\n  help: if a run wrote it, run the sweep again; it recomputes damaged parts"
     )]
-    Read {
-        /// The file or folder.
-        path: String,
-        /// The cause.
-        source: PolarsError,
-    },
+    Read { path: String, source: PolarsError },
 }
 
 /// Greatest length of an error of polars in a message, in characters. Chosen: two lines.

@@ -36,35 +36,15 @@ impl Fault {
     }
 }
 
-/// Functions of text. In polars they accept only text, while functions of numbers also accept text and return nulls.
-const TEXT: [&str; 26] = [
-    "array_agg",
-    "bit_length",
-    "concat",
-    "concat_ws",
-    "ends_with",
-    "greatest",
-    "initcap",
-    "least",
-    "left",
-    "length",
-    "lower",
-    "ltrim",
-    "max",
-    "min",
-    "octet_length",
-    "regexp_like",
-    "replace",
-    "reverse",
-    "right",
-    "rtrim",
-    "split_part",
-    "starts_with",
-    "string_agg",
-    "strpos",
-    "substr",
-    "upper",
-];
+/// Functions of text. In polars they take text alone; functions of numbers take text too, and return nulls for it.
+const TEXT: &str = "array_agg bit_length concat concat_ws ends_with greatest initcap least left length lower ltrim max min octet_length \
+    regexp_like replace reverse right rtrim split_part starts_with string_agg strpos substr upper";
+
+/// Whether a function has one of these names.
+pub fn is_one_of(names: &str, function: &Function) -> bool {
+    let called = function.name.to_string().to_lowercase();
+    names.split(' ').any(|name| name == called)
+}
 
 /// The help for most queries.
 pub const CORRECT: &str =
@@ -136,9 +116,8 @@ impl Visit for Check<'_> {
 
     fn before(&mut self, expression: &mut Expr) -> ControlFlow<()> {
         let Expr::Function(function) = &*expression else { return ControlFlow::Continue(()) };
-        let called = function.name.to_string().to_lowercase();
         let argument = first_argument(function).filter(|argument| is_constant(argument));
-        if argument.is_some() && AGGREGATES.contains(&called.as_str()) {
+        if argument.is_some() && is_one_of(AGGREGATES, function) {
             return self.refuse(Fault::new(
                 format!("`{expression}`: no column in it"),
                 "count(*) counts rows; name a column for other aggregates",
@@ -195,21 +174,8 @@ impl Visit for Check<'_> {
     }
 }
 
-/// Aggregates that polars evaluates on a constant as if it were one row.
-const AGGREGATES: [&str; 12] = [
-    "avg",
-    "max",
-    "mean",
-    "median",
-    "min",
-    "quantile_cont",
-    "quantile_disc",
-    "stddev",
-    "stdev",
-    "sum",
-    "var",
-    "variance",
-];
+/// Aggregates that polars applies to a constant as if it were one row.
+const AGGREGATES: &str = "avg max mean median min quantile_cont quantile_disc stddev stdev sum var variance";
 
 /// The condition of a join that keeps or selects rows without a match.
 fn outer_condition(join: &JoinOperator) -> Option<&Expr> {
@@ -387,23 +353,9 @@ fn unit(expression: &Expr, sources: &[Source]) -> String {
             unit(inner, sources)
         }
         Expr::Function(function) => {
-            const KEEP: [&str; 12] = [
-                "min",
-                "max",
-                "avg",
-                "mean",
-                "sum",
-                "median",
-                "first",
-                "last",
-                "abs",
-                "quantile_cont",
-                "quantile_disc",
-                "stddev",
-            ];
-            let called = function.name.to_string().to_lowercase();
+            const KEEP: &str = "min max avg mean sum median first last abs quantile_cont quantile_disc stddev";
             match first_argument(function) {
-                Some(inner) if KEEP.contains(&called.as_str()) => unit(inner, sources),
+                Some(inner) if is_one_of(KEEP, function) => unit(inner, sources),
                 _ => String::new(),
             }
         }
@@ -494,7 +446,7 @@ impl PolarsDialect {
         if called == "log" && list.args.len() == 1 {
             function.name = ObjectName::from(vec![Ident::new("log10")]);
         }
-        if !TEXT.contains(&called.as_str()) {
+        if !TEXT.split(' ').any(|name| name == called) {
             return;
         }
         for argument in &mut list.args {

@@ -7,12 +7,11 @@ use std::sync::Arc;
 
 use arrow_array::cast::AsArray;
 use arrow_array::types::{
-    ArrowPrimitiveType, Date32Type, Float32Type, Float64Type, Int8Type, Int16Type, Int32Type, Int64Type,
-    TimestampMicrosecondType, TimestampMillisecondType, TimestampNanosecondType, TimestampSecondType, UInt8Type,
-    UInt16Type, UInt32Type, UInt64Type,
+    ArrowPrimitiveType, Float32Type, Float64Type, Int8Type, Int16Type, Int32Type, Int64Type, UInt8Type, UInt16Type,
+    UInt32Type, UInt64Type,
 };
 use arrow_array::{Array, BooleanArray, RecordBatch, RecordBatchOptions};
-use arrow_schema::{DataType as ArrowType, FieldRef, Fields, Schema as ArrowSchema, TimeUnit as ArrowTimeUnit};
+use arrow_schema::{DataType as ArrowType, FieldRef, Fields, Schema as ArrowSchema};
 use arrow_select::filter::filter_record_batch;
 use parquet::arrow::ProjectionMask;
 use parquet::arrow::arrow_reader::{ArrowReaderMetadata, ArrowReaderOptions, ParquetRecordBatchReaderBuilder};
@@ -22,7 +21,7 @@ use polars::lazy::dsl::{Expr, Operator};
 use polars::prelude::{
     AnonymousScan, AnonymousScanArgs, BooleanChunked, Categories, ChunkedArray, Column, DataFrame, DataType, IdxCa,
     IntoLazy, IntoSeries, LazyFrame, NamedFrom, PlSmallStr, PolarsError, PolarsNumericType, PolarsResult,
-    ScanArgsAnonymous, Schema, SchemaRef, Series, StringChunked, TimeUnit,
+    ScanArgsAnonymous, Schema, SchemaRef, Series, StringChunked,
 };
 use rayon::prelude::*;
 
@@ -46,7 +45,7 @@ impl Files {
     pub fn new(paths: Vec<PathBuf>) -> PolarsResult<Files> {
         let mut schema = Schema::default();
         if let Some(first) = paths.first() {
-            for field in open(first).map_err(|error| unreadable(first, &error))?.1.schema().fields() {
+            for field in sound(first, || open(first))?.1.schema().fields() {
                 schema.insert(PlSmallStr::from_str(field.name()), kind(field.data_type()).unwrap_or(DataType::Null));
             }
         }
@@ -69,14 +68,12 @@ impl Files {
         let mut counting = Counting::new(groups);
         let names = groups.columns();
         for path in &self.paths {
-            let count = || {
+            sound(path, || {
                 batches(path, (&names, &self.schema), &groups.conditions, None, &mut |batch| {
                     counting.add(&batch);
                     Ok(batch.num_rows())
                 })
-            };
-            let done = guarded(count).unwrap_or_else(|| Err(ParquetError::General("it is damaged".to_owned())));
-            done.map_err(|error| unreadable(path, &error))?;
+            })?;
         }
         counting.frame()
     }
@@ -98,6 +95,12 @@ impl Files {
         self.paths.iter().map(|path| Files { paths: vec![path.clone()], ..self.clone() }).collect()
     }
 
+    /// The columns `names` without rows.
+    fn empty(&self, names: &[PlSmallStr]) -> PolarsResult<DataFrame> {
+        let kind = |name| self.schema.get(name).cloned().unwrap_or(DataType::Null);
+        DataFrame::new(0, names.iter().map(|name| Column::new_empty(name.clone(), &kind(name))).collect())
+    }
+
     /// The rows of one file that `predicate` keeps, at most the first `most` of the file.
     fn read(
         &self,
@@ -107,9 +110,7 @@ impl Files {
         most: Option<usize>,
     ) -> PolarsResult<DataFrame> {
         let predicate = predicate.map(without_hints).transpose()?.flatten();
-        let rows = || self.decode(path, names, predicate.as_ref(), most);
-        let frame = guarded(rows).unwrap_or_else(|| Err(ParquetError::General("it is damaged".to_owned())));
-        let frame = frame.map_err(|error| unreadable(path, &error))?;
+        let frame = sound(path, || self.decode(path, names, predicate.as_ref(), most))?;
         match predicate {
             Some(predicate) => frame.lazy().filter(predicate).collect(),
             None => Ok(frame),
@@ -158,16 +159,9 @@ impl AnonymousScan for Files {
             None => self.schema.iter_names().cloned().collect(),
         };
         let predicate = options.predicate.as_ref();
-        let empty = || {
-            let columns = names.iter().map(|name| {
-                let kind = self.schema.get(name).cloned().unwrap_or(DataType::Null);
-                Column::new_empty(name.clone(), &kind)
-            });
-            DataFrame::new(0, columns.collect())
-        };
-        let mut rows = match (options.n_rows, predicate) {
+        let mut rows = self.empty(&names)?;
+        match (options.n_rows, predicate) {
             (Some(most), None) => {
-                let mut rows = empty()?;
                 for path in &self.paths {
                     if rows.height() >= most {
                         break;
@@ -175,22 +169,14 @@ impl AnonymousScan for Files {
                     let part = self.read(path, &names, None, Some(most - rows.height()))?;
                     append(&mut rows, part)?;
                 }
-                rows
             }
             _ => {
-                let parts: PolarsResult<Vec<DataFrame>> =
-                    self.paths.par_iter().map(|path| self.read(path, &names, predicate, None)).collect();
-                let mut rows = empty()?;
-                for part in parts? {
-                    append(&mut rows, part)?;
-                }
-                rows
+                let read = |path: &PathBuf| self.read(path, &names, predicate, None);
+                let parts = self.paths.par_iter().map(read).collect::<PolarsResult<Vec<DataFrame>>>()?;
+                parts.into_iter().try_for_each(|part| append(&mut rows, part))?;
             }
-        };
-        if let Some(most) = options.n_rows {
-            rows = rows.head(Some(most));
         }
-        Ok(rows)
+        Ok(rows.slice(0, options.n_rows.unwrap_or(usize::MAX)))
     }
 }
 
@@ -213,7 +199,13 @@ fn unreadable(path: &Path, error: &ParquetError) -> PolarsError {
     PolarsError::ComputeError(format!("{}: {UNREADABLE}: {error}", path.display()).into())
 }
 
-/// Whether a file is at fault, rather than the query.
+/// The result of reading a file; a panic of the reader is a fault of the file.
+fn sound<T>(path: &Path, read: impl FnOnce() -> Result<T, ParquetError>) -> PolarsResult<T> {
+    let read = guarded(read).unwrap_or_else(|| Err(ParquetError::General("it is damaged".to_owned())));
+    read.map_err(|error| unreadable(path, &error))
+}
+
+/// Whether a file is at fault, rather than the question.
 pub fn is_unreadable(error: &PolarsError) -> bool {
     error.to_string().contains(UNREADABLE)
 }
@@ -307,7 +299,7 @@ impl Files {
         read.dedup();
         // A filter drops rows, so more have to be read.
         let most = most.filter(|_| conditions.is_empty() && self.top.is_none());
-        let mut frame: Option<DataFrame> = None;
+        let mut frame = self.empty(names).map_err(foreign)?;
         batches(path, (&read, &self.schema), &conditions, most, &mut |batch| {
             let mut kept = kept(&conditions, &batch);
             if let Some(top) = &self.top {
@@ -317,28 +309,10 @@ impl Files {
                 true => batch,
                 false => filter_record_batch(&batch, &BooleanArray::from(kept))?,
             };
-            add(&mut frame, columns(&batch, names)?).map_err(foreign)?;
+            append(&mut frame, columns(&batch, names)?).map_err(foreign)?;
             Ok(batch.num_rows())
         })?;
-        match frame {
-            Some(frame) => Ok(frame),
-            None => {
-                let column = |name: &PlSmallStr| {
-                    Column::new_empty(name.clone(), &self.schema.get(name).cloned().unwrap_or(DataType::Null))
-                };
-                DataFrame::new(0, names.iter().map(column).collect()).map_err(foreign)
-            }
-        }
-    }
-}
-
-fn add(frame: &mut Option<DataFrame>, more: DataFrame) -> PolarsResult<()> {
-    match frame {
-        Some(frame) => append(frame, more),
-        None => {
-            *frame = Some(more);
-            Ok(())
-        }
+        Ok(frame)
     }
 }
 
@@ -374,19 +348,9 @@ fn kind(kind: &ArrowType) -> Option<DataType> {
         ArrowType::UInt64 => DataType::UInt64,
         ArrowType::Boolean => DataType::Boolean,
         ArrowType::Utf8 | ArrowType::LargeUtf8 | ArrowType::Utf8View => DataType::String,
-        ArrowType::Date32 => DataType::Date,
-        ArrowType::Timestamp(unit, _) => DataType::Datetime(time_unit(unit), None),
         kind if *kind == label() => words_type(),
         _ => return None,
     })
-}
-
-fn time_unit(unit: &ArrowTimeUnit) -> TimeUnit {
-    match unit {
-        ArrowTimeUnit::Second | ArrowTimeUnit::Millisecond => TimeUnit::Milliseconds,
-        ArrowTimeUnit::Microsecond => TimeUnit::Microseconds,
-        ArrowTimeUnit::Nanosecond => TimeUnit::Nanoseconds,
-    }
 }
 
 /// Words that repeat.
@@ -408,24 +372,6 @@ fn series(name: &PlSmallStr, array: &dyn Array) -> Result<Series, ParquetError> 
         ArrowType::UInt16 => numbers::<UInt16Type, polars::prelude::UInt32Type>(name, array).into_series(),
         ArrowType::UInt32 => numbers::<UInt32Type, polars::prelude::UInt32Type>(name, array).into_series(),
         ArrowType::UInt64 => numbers::<UInt64Type, polars::prelude::UInt64Type>(name, array).into_series(),
-        ArrowType::Date32 => numbers::<Date32Type, polars::prelude::Int32Type>(name, array).into_date().into_series(),
-        ArrowType::Timestamp(unit, _) => {
-            let ticks = match unit {
-                ArrowTimeUnit::Second => {
-                    &numbers::<TimestampSecondType, polars::prelude::Int64Type>(name, array) * 1000_i64
-                }
-                ArrowTimeUnit::Millisecond => {
-                    numbers::<TimestampMillisecondType, polars::prelude::Int64Type>(name, array)
-                }
-                ArrowTimeUnit::Microsecond => {
-                    numbers::<TimestampMicrosecondType, polars::prelude::Int64Type>(name, array)
-                }
-                ArrowTimeUnit::Nanosecond => {
-                    numbers::<TimestampNanosecondType, polars::prelude::Int64Type>(name, array)
-                }
-            };
-            ticks.into_datetime(time_unit(unit), None).into_series()
-        }
         ArrowType::Boolean => {
             let flags: Vec<Option<bool>> = array.as_boolean().iter().collect();
             BooleanChunked::new(name, flags).into_series()

@@ -1,11 +1,9 @@
 //! A table on disk that can be queried.
 
-use std::fs::{self, File};
+use std::fs;
 use std::io::Cursor;
 use std::path::{Path, PathBuf};
 
-use parquet::arrow::parquet_to_arrow_schema;
-use parquet::file::reader::{FileReader, SerializedFileReader};
 use polars::prelude::{DataFrame, IntoLazy, LazyFrame, PolarsError, PolarsResult};
 use polars_io::SerReader;
 use polars_io::prelude::{CsvParseOptions, CsvReadOptions, CsvReader};
@@ -13,6 +11,7 @@ use polars_io::prelude::{CsvParseOptions, CsvReadOptions, CsvReader};
 use super::scan::Files;
 use super::{Answer, QueryError};
 use crate::dataset::Folder;
+use crate::dataset::frame::{self, FrameError};
 
 /// A table and its files.
 pub struct Source {
@@ -108,14 +107,13 @@ impl Source {
         rows: Option<u64>,
     ) -> Result<Source, QueryError> {
         let failed = |path: &Path, source| QueryError::Read { path: path.display().to_string(), source };
-        let header = match paths.first() {
-            Some(first) => Header::read(first).map_err(|source| failed(first, source))?,
-            None => Header::default(),
-        };
+        let first = paths.first().map_or(path, PathBuf::as_path);
+        let (headings, facts) = frame::headings(first)
+            .map_err(|FrameError::File { reason, .. }| failed(first, PolarsError::ComputeError(reason.into())))?;
         let files = Files::new(paths.clone()).map_err(|source| failed(path, source))?;
         let frame = files.frame().map_err(|source| failed(path, source))?;
-        let Header { table, columns, units } = header;
-        let name = table.unwrap_or(name);
+        let name = facts.into_iter().find(|(key, _)| key == "slipsweep.table").map_or(name, |(_, table)| table);
+        let (columns, units) = headings.into_iter().map(|heading| (heading.name, heading.unit)).unzip();
         Ok(Source { name, columns, units, paths, missing, rows, words: files.words(), files: Some(files), frame })
     }
 
@@ -165,36 +163,7 @@ fn csv(path: &Path) -> PolarsResult<DataFrame> {
     CsvReader::new(Cursor::new(bytes)).with_options(options).finish()
 }
 
-/// The metadata of a Parquet file.
-#[derive(Default)]
-struct Header {
-    /// The table that it is a part of.
-    table: Option<String>,
-    columns: Vec<String>,
-    units: Vec<String>,
-}
-
-impl Header {
-    fn read(path: &Path) -> PolarsResult<Header> {
-        let foreign = |error: parquet::errors::ParquetError| PolarsError::ComputeError(error.to_string().into());
-        let reader = SerializedFileReader::new(File::open(path)?).map_err(foreign)?;
-        let metadata = reader.metadata().file_metadata();
-        let entries = metadata.key_value_metadata();
-        let schema = parquet_to_arrow_schema(metadata.schema_descr(), entries).map_err(foreign)?;
-        let fields = || schema.fields().iter();
-        Ok(Header {
-            table: entries
-                .into_iter()
-                .flatten()
-                .find(|entry| entry.key == "slipsweep.table")
-                .and_then(|entry| entry.value.clone()),
-            columns: fields().map(|field| field.name().clone()).collect(),
-            units: fields().map(|field| field.metadata().get("unit").cloned().unwrap_or_default()).collect(),
-        })
-    }
-}
-
-/// The parent folder of a folder.
+/// The folder that a folder is in.
 fn folder_above(path: &Path) -> Option<PathBuf> {
     Some(fs::canonicalize(path).ok()?.parent()?.to_owned())
 }

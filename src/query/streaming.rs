@@ -14,7 +14,7 @@ use sqlparser::ast::{
 use super::Source;
 use super::filter::{Condition, Top, of_where};
 use super::groups::{Groups, Kind, Measure};
-use super::question::{cast, if_else_null, name};
+use super::question::{cast, if_else_null, is_one_of, name};
 use super::walk::{Visit, walk};
 
 /// The plan of a query that is computed part by part.
@@ -53,56 +53,13 @@ pub struct Key {
 /// The name of the partial answers as a table.
 pub const PARTS: &str = "__parts";
 
-/// Functions of a single row.
-const SCALAR: [&str; 44] = [
-    "abs",
-    "acos",
-    "asin",
-    "atan",
-    "atan2",
-    "cbrt",
-    "ceil",
-    "ceiling",
-    "coalesce",
-    "concat",
-    "cos",
-    "degrees",
-    "ends_with",
-    "exp",
-    "floor",
-    "greatest",
-    "if",
-    "ifnull",
-    "least",
-    "left",
-    "length",
-    "ln",
-    "log",
-    "log10",
-    "log1p",
-    "log2",
-    "lower",
-    "mod",
-    "nullif",
-    "octet_length",
-    "pi",
-    "pow",
-    "power",
-    "radians",
-    "replace",
-    "right",
-    "round",
-    "sign",
-    "sin",
-    "sqrt",
-    "starts_with",
-    "strpos",
-    "tan",
-    "upper",
-];
+/// Functions of the row alone.
+const SCALAR: &str = "abs acos asin atan atan2 cbrt ceil ceiling coalesce concat cos degrees ends_with exp floor greatest if ifnull least \
+    left length ln log log10 log1p log2 lower mod nullif octet_length pi pow power radians replace right round sign sin sqrt starts_with \
+    strpos tan upper";
 
-/// Functions of groups that can be merged.
-const AGGREGATE: [&str; 6] = ["avg", "count", "max", "mean", "min", "sum"];
+/// Functions of groups that can be put together.
+const AGGREGATE: &str = "avg count max mean min sum";
 
 /// The part-by-part plan of `query`; `None` if it needs all rows at once.
 pub fn streaming(query: &Query, sources: &[Source]) -> Option<StreamPlan> {
@@ -465,7 +422,7 @@ impl Visit for AggregateExtractor<'_> {
         match expression {
             Expr::Identifier(name) if name.value.starts_with("__") => ControlFlow::Continue(()),
             Expr::Identifier(_) => ControlFlow::Break(()),
-            Expr::Function(function) if is_one_of(&AGGREGATE, function) => match self.aggregate(function) {
+            Expr::Function(function) if is_one_of(AGGREGATE, function) => match self.aggregate(function) {
                 Some(column) => {
                     *expression = column;
                     ControlFlow::Continue(())
@@ -477,11 +434,7 @@ impl Visit for AggregateExtractor<'_> {
     }
 }
 
-fn is_one_of(names: &[&str], function: &Function) -> bool {
-    names.contains(&function.name.to_string().to_lowercase().as_str())
-}
-
-/// The functions that a query calls.
+/// The functions that a question calls.
 #[derive(Default)]
 struct Functions {
     aggregates: bool,
@@ -518,9 +471,9 @@ impl Visit for ColumnSimplifier<'_> {
                     FunctionArguments::List(list) => list.duplicate_treatment.is_none() && list.clauses.is_empty(),
                     _ => false,
                 };
-                let aggregate = is_one_of(&AGGREGATE, function);
+                let aggregate = is_one_of(AGGREGATE, function);
                 self.functions.aggregates |= aggregate;
-                self.functions.others |= !bare || !list || !aggregate && !is_one_of(&SCALAR, function);
+                self.functions.others |= !bare || !list || !aggregate && !is_one_of(SCALAR, function);
             }
             _ => {}
         }

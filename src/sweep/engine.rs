@@ -1,13 +1,11 @@
 //! The engine: computes the parts that are missing or damaged, encodes and writes them.
 //!
-//! All idle compute threads share a part. Writer threads publish it while the next parts are computed. A part is encoded by a writer if one
-//! is idle, else by a compute thread. The written bytes do not depend on this distribution.
+//! All idle compute threads share a part. One of them encodes it, and writer threads publish it while the next parts are computed.
 
 use std::fmt;
-use std::ops::{Deref, Range};
+use std::ops::Range;
 use std::panic::{AssertUnwindSafe, catch_unwind};
-use std::sync::atomic::{AtomicUsize, Ordering};
-use std::sync::mpsc::{Receiver, Sender, SyncSender, channel, sync_channel};
+use std::sync::mpsc::{Receiver, SyncSender, channel, sync_channel};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::thread::{self, Scope};
 
@@ -50,18 +48,14 @@ pub struct TableOutcome {
 
 /// The error of a run.
 #[derive(Debug, thiserror::Error)]
+#[allow(missing_docs)]
 pub enum RunError {
     /// The dataset cannot be written.
     #[error(transparent)]
     Dataset(#[from] DatasetError),
     /// The threads cannot be started.
     #[error("cannot start {threads} threads: {source}\n  help: use fewer with --threads N")]
-    Threads {
-        /// Their number.
-        threads: usize,
-        /// The error of the system.
-        source: rayon::ThreadPoolBuildError,
-    },
+    Threads { threads: usize, source: rayon::ThreadPoolBuildError },
     /// A writer thread cannot be started.
     #[error("cannot start the thread that writes: {0}\n  help: allow the process more memory or more threads")]
     Writer(std::io::Error),
@@ -73,12 +67,7 @@ pub enum RunError {
         0 => "all other parts are finished".to_owned(),
         _ => format!("{others} more parts have such a row; all others are finished"),
     })]
-    Defect {
-        /// The first such row.
-        defect: Defect,
-        /// The number of further parts with such a row.
-        others: usize,
-    },
+    Defect { defect: Defect, others: usize },
     /// The run was stopped on request.
     #[error(transparent)]
     Stopped(#[from] Stopped),
@@ -141,14 +130,7 @@ fn run_in(
     let session = folder.open(&plan.manifest(sweep), company).map_err(|error| sweep.explain(error))?;
     let pool = pool(threads)?;
     let optimum_cache = sweep.optimum_cache();
-    let run = Run {
-        folder,
-        session: &session,
-        pool: &pool,
-        signal,
-        queued: AtomicUsize::new(0),
-        failures: Failures::default(),
-    };
+    let run = Run { folder, session: &session, pool: &pool, signal, failures: Failures::default() };
     let table_runs: Vec<TableRun<'_>> = (sweep.requests.iter().zip(&plan.tables))
         .zip(&optimum_cache)
         .map(|((request, table), optimum_cache)| TableRun {
@@ -197,30 +179,26 @@ pub fn pool(threads: usize) -> Result<ThreadPool, RunError> {
 /// many threads.
 const MAX_BUFFER_BYTES: u64 = 1 << 27;
 
-/// Writer threads. Chosen: while one waits for the disk, the other encodes.
+/// Writer threads. Chosen: while one waits for the disk, the other writes.
 pub(super) const WRITERS: usize = 2;
-
-/// Parts in the queue of the writers, including those in progress. With fewer the writers idle.
-const QUEUE_PARTS: usize = WRITERS + 1;
 
 /// Computes the parts `numbers` of a table, and passes number and buffer of each to `take` in any order. For a part with a row that panics
 /// it passes that row.
 ///
-/// One part more than there are threads is in progress, so that no thread waits for the end of a part. `take` may hold three more. Large parts
-/// on many threads are limited by `MAX_BUFFER_BYTES`.
+/// One part more than there are threads is in progress, so that no thread waits for the end of a part. Large parts on many threads are limited
+/// by `MAX_BUFFER_BYTES`.
 pub fn compute(
     pool: &ThreadPool,
     table: &dyn Table,
     job: &Job<'_>,
     parts: &ManifestTable,
     numbers: impl Iterator<Item = u64>,
-    take: impl Fn(u64, Result<FilledBuffer, Defect>) + Sync,
+    take: impl Fn(u64, Result<&ColumnBuffer, Defect>) + Sync,
 ) -> Result<RunStats, Stopped> {
     let (give_back, free) = channel();
     let columns = job.projection.indices().len();
     let size = parts.rows_per_part.min(parts.rows).saturating_mul(8 * columns as u64 + 1);
-    let buffers =
-        (pool.current_num_threads() as u64 + 1 + QUEUE_PARTS as u64).min((MAX_BUFFER_BYTES / size.max(1)).max(2));
+    let buffers = (pool.current_num_threads() as u64 + 1).min((MAX_BUFFER_BYTES / size.max(1)).max(2));
     for _ in 0..buffers {
         let _ = give_back.send(ColumnBuffer::new(columns));
     }
@@ -228,22 +206,24 @@ pub fn compute(
     pool.in_place_scope(|scope| {
         for number in numbers {
             // Never fails: every buffer is returned.
-            let Ok(buffer) = free.recv() else { break };
+            let Ok(mut buffer) = free.recv() else { break };
             if locked(&result).is_err() {
                 break;
             }
-            let (mut filled, result, take) = (FilledBuffer { buffer, give_back: give_back.clone() }, &result, &take);
+            let (give_back, result, take) = (give_back.clone(), &result, &take);
             scope.spawn(move |_| {
                 let rows = parts.rows_of(number);
-                let computed = match attempt(table, job, rows.clone(), &mut filled.buffer) {
-                    Ok(computed) => computed.and_then(|work| job.signal.check().map(|()| work)).inspect(|_| {
-                        take(number, Ok(filled));
-                    }),
+                let computed = match attempt(table, job, rows.clone(), &mut buffer) {
+                    Ok(computed) => computed
+                        .and_then(|work| job.signal.check().map(|()| work))
+                        .inspect(|_| take(number, Ok(&buffer))),
                     Err(message) => {
                         take(number, Err(culprit(table, job, rows, message)));
                         Ok(RunStats::default())
                     }
                 };
+                // The receiver lives as long as the scope.
+                let _ = give_back.send(buffer);
                 let mut result = locked(result);
                 *result = result.and_then(|work| computed.map(|more| [work, more].into_iter().sum()));
             });
@@ -292,8 +272,6 @@ struct Run<'a> {
     session: &'a Session,
     pool: &'a ThreadPool,
     signal: &'a Signal,
-    /// Parts in the queue of the writers.
-    queued: AtomicUsize,
     failures: Failures,
 }
 
@@ -302,14 +280,13 @@ impl Run<'_> {
     fn start_writers<'scope, 'a: 'scope>(
         &'scope self,
         scope: &'scope Scope<'scope, '_>,
-        parts: Receiver<QueuedPart<'a>>,
+        parts: Receiver<EncodedPart<'a>>,
     ) -> Result<(), RunError> {
         let parts = Arc::new(Mutex::new(parts));
         let next = move || locked(&parts).recv();
         let write = move || {
             while let Ok(part) = next() {
                 self.failures.keep(part.publish());
-                self.queued.fetch_sub(1, Ordering::Relaxed);
             }
         };
         for write in std::iter::repeat_n(write, WRITERS) {
@@ -348,17 +325,20 @@ impl<'a> TableRun<'a> {
         &'a self,
         shard_parts: &[Range<u64>],
         intact: &[u64],
-        to_writers: &SyncSender<QueuedPart<'a>>,
+        to_writers: &SyncSender<EncodedPart<'a>>,
     ) -> Result<(TableOutcome, RunStats), RunError> {
         let Run { pool, signal, failures, .. } = self.run;
         let mut done = TableOutcome { kept: intact.len() as u64, ..TableOutcome::default() };
         let missing = shard_parts.iter().cloned().flatten().filter(|number| intact.binary_search(number).is_err());
         let missing = missing.filter(|&number| self.is_missing(number, &mut done));
         let wanted = missing.take_while(|_| failures.is_empty() && signal.check().is_ok());
-        let take = |number, buffer: Result<FilledBuffer, Defect>| match buffer {
-            Ok(buffer) => self.queue(number, buffer, to_writers),
-            Err(defect) => locked(&failures.defects).push(defect),
-        };
+        let take =
+            |number, buffer: Result<&ColumnBuffer, Defect>| match buffer.map(|buffer| self.encode(number, buffer)) {
+                // The receiver exists as long as a sender.
+                Ok(Ok(bytes)) => _ = to_writers.send(EncodedPart { table_run: self, number, bytes }),
+                Ok(Err(error)) => failures.keep(Err(error)),
+                Err(defect) => locked(&failures.defects).push(defect),
+            };
         let work = compute(pool, self.definition, &self.job, self.table, wanted, take)?;
         signal.check()?;
         Ok((done, work))
@@ -384,25 +364,6 @@ impl<'a> TableRun<'a> {
         true
     }
 
-    /// Passes a part to the writers, encoded if all of them are busy.
-    fn queue(&'a self, number: u64, buffer: FilledBuffer, to_writers: &SyncSender<QueuedPart<'a>>) {
-        let Run { queued, failures, .. } = self.run;
-        let take = |parts: usize| (parts < QUEUE_PARTS).then_some(parts + 1);
-        let content = if queued.fetch_update(Ordering::Relaxed, Ordering::Relaxed, take).is_ok() {
-            PartContent::ColumnBuffer(buffer)
-        } else {
-            match self.encode(number, &buffer) {
-                Ok(bytes) => {
-                    queued.fetch_add(1, Ordering::Relaxed);
-                    PartContent::Bytes(bytes)
-                }
-                Err(error) => return failures.keep(Err(error)),
-            }
-        };
-        // The receiver exists as long as a sender.
-        let _ = to_writers.send(QueuedPart { table_run: self, number, content });
-    }
-
     /// The state of a part on disk; an intact one is counted.
     fn look(&self, number: u64) -> Result<Found, RunError> {
         let Run { folder, session, signal, .. } = self.run;
@@ -415,10 +376,7 @@ impl<'a> TableRun<'a> {
             }
             State::Missing => Ok(Found::Nothing),
             State::Damaged { .. } => Ok(Found::Damaged),
-            State::Foreign { what, expected, found } => {
-                let path = folder.part(&self.table.name, number).display().to_string();
-                Err(DatasetError::ForeignPart { path, what, expected, found }.into())
-            }
+            foreign => Err(folder.fault(&folder.part(&self.table.name, number), foreign).into()),
         }
     }
 
@@ -439,60 +397,29 @@ impl<'a> TableRun<'a> {
     }
 }
 
-/// A part in the queue of the writers.
+/// The content of the place of a part.
 #[derive(PartialEq)]
 enum Found {
-    /// The encoded part.
+    /// The part, with every bit as it was written.
     Sound,
     Damaged,
     Nothing,
 }
 
-/// A computed part before publication.
-struct QueuedPart<'a> {
+/// A part before publication.
+struct EncodedPart<'a> {
     table_run: &'a TableRun<'a>,
     number: u64,
-    content: PartContent,
+    bytes: Vec<u8>,
 }
 
-impl QueuedPart<'_> {
-    /// Encodes the part if necessary, and writes it.
+impl EncodedPart<'_> {
+    /// Writes the part.
     fn publish(self) -> Result<(), RunError> {
-        let QueuedPart { table_run, number, content } = self;
+        let EncodedPart { table_run, number, bytes } = self;
         // A stopped run does not write queued parts.
         table_run.run.signal.check()?;
-        let bytes = match content {
-            PartContent::Bytes(bytes) => bytes,
-            PartContent::ColumnBuffer(buffer) => table_run.encode(number, &buffer)?,
-        };
         Ok(table_run.run.session.write_part(&table_run.table.name, number, &bytes)?)
-    }
-}
-
-/// The content of a queued part.
-enum PartContent {
-    ColumnBuffer(FilledBuffer),
-    Bytes(Vec<u8>),
-}
-
-/// The buffer of a part, returned to the pool when dropped.
-pub struct FilledBuffer {
-    buffer: ColumnBuffer,
-    give_back: Sender<ColumnBuffer>,
-}
-
-impl Deref for FilledBuffer {
-    type Target = ColumnBuffer;
-
-    fn deref(&self) -> &ColumnBuffer {
-        &self.buffer
-    }
-}
-
-impl Drop for FilledBuffer {
-    fn drop(&mut self) {
-        // The pool is gone once all parts are computed.
-        let _ = self.give_back.send(std::mem::replace(&mut self.buffer, ColumnBuffer::new(0)));
     }
 }
 

@@ -2,7 +2,7 @@
 
 use super::check::{Request, Sweep};
 use crate::dataset::{Build, Manifest, ManifestTable};
-use crate::table::{Job, OPTIMUM_AXES, OptimumCache, RepeatedRows, Signal};
+use crate::table::{Job, OPTIMUM_AXES, OptimumCache, Signal};
 
 /// The plan of a sweep.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -51,7 +51,6 @@ impl Sweep {
             grid: &self.grid,
             rows: &request.row_index,
             tuples: request.row_index.tuples(OPTIMUM_AXES),
-            repeated_rows: RepeatedRows::among(&request.row_index, request.table.axes()),
             members: request.members.as_ref(),
             projection: &request.projection,
             sizes: &request.sizes,

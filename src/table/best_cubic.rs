@@ -2,8 +2,9 @@
 
 use std::ops::Range;
 
+use super::column::fields;
 use super::optimum_cache::{OPTIMUM_AXES, transition};
-use super::{Column, ColumnBuffer, Definition, Field, Job, Kind, RunStats, Stopped, columns, place, rows};
+use super::{ColumnBuffer, Definition, Job, Kind, RunStats, Stopped, place, rows};
 use crate::grid::{Quantity, Scale};
 use crate::protocol::{SolverStats, best_cubic, error};
 
@@ -16,45 +17,18 @@ struct Row {
     work_error: f64,
 }
 
-const FIELDS: [Field<Row>; 7] = [
-    Field::new(
-        Column::new(
-            "alpha_2",
-            Kind::Quantity(Quantity::Alpha2),
-            "coefficient of t in theta; in the unit of alpha_2 in the spec, 1/t_f by default",
-        ),
-        |row| row.alpha_2,
-    ),
-    Field::new(
-        Column::new(
-            "alpha_3",
-            Kind::Quantity(Quantity::Alpha3),
-            "coefficient of t^2 in theta; in the unit of alpha_3 in the spec, 1/t_f^2 by default",
-        ),
-        |row| row.alpha_3,
-    ),
-    Field::new(Column::number("work", "mu_0 sigma l", "work of friction W_s of the best shortcut"), |row| {
-        row.best.work
-    }),
-    Field::new(Column::number("work_optimal", "mu_0 sigma l", "least work of friction W* of any protocol"), |row| {
-        row.best.work_optimal
-    }),
-    Field::new(
-        Column::number(
-            "gap",
-            "1",
-            "(W_s - W*)/W*, computed without cancellation: good to a relative 1e-7, or to 1e-20",
-        ),
-        |row| row.best.gap,
-    ),
-    Field::new(Column::number("v_min", "v_0", "least velocity of the best shortcut"), |row| row.best.v_min),
-    Field::new(
-        Column::number("work_error", "mu_0 sigma l", "bound of the error of work, by a second search").optional(),
-        |row| row.work_error,
-    ),
-];
+fields! { Row:
+    alpha_2 (Kind::Quantity(Quantity::Alpha2)) "coefficient of t in theta; in the unit of alpha_2 in the spec, 1/t_f by default"
+        => |row| row.alpha_2;
+    alpha_3 (Kind::Quantity(Quantity::Alpha3)) "coefficient of t^2 in theta; in the unit of alpha_3 in the spec, 1/t_f^2 by default"
+        => |row| row.alpha_3;
+    work "mu_0 sigma l" "work of friction W_s of the best shortcut" => |row| row.best.work;
+    work_optimal "mu_0 sigma l" "least work of friction W* of any protocol" => |row| row.best.work_optimal;
+    gap "1" "(W_s - W*)/W*, computed without cancellation: good to a relative 1e-7, or to 1e-20" => |row| row.best.gap;
+    v_min "v_0" "least velocity of the best shortcut" => |row| row.best.v_min;
+    work_error "mu_0 sigma l" "bound of the error of work, by a second search", optional => |row| row.work_error;
+}
 
-const COLUMNS: [Column; 7] = columns(&FIELDS);
 const WORK_ERROR: usize = place(&COLUMNS, "work_error");
 
 /// One row for each transition and duration.
@@ -72,7 +46,7 @@ pub static BEST_CUBIC: Definition = Definition {
 fn compute(job: &Job<'_>, range: Range<u64>, buffer: &mut ColumnBuffer) -> Result<RunStats, Stopped> {
     let natural = |quantity| job.grid.scale(quantity) == Some(Scale::Model);
     let (natural_2, natural_3) = (natural(Quantity::Alpha2), natural(Quantity::Alpha3));
-    rows::each(job, range, 1, buffer, &FIELDS, |_, point| {
+    rows::each(job, range, 1, buffer, FIELDS, |_, point| {
         let t_f = point[Quantity::Time];
         let solve = |rtol| best_cubic::solve(&transition(point), t_f, job.bounded, rtol);
         let solved = solve(job.rtol);

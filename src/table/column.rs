@@ -79,8 +79,30 @@ impl<R> Field<R> {
     }
 }
 
+/// Defines the fields of a table and its columns: for each field the name, the unit or `(kind)`, the meaning, `optional` if it is written
+/// only if a spec names it, and the cell of a row.
+macro_rules! fields {
+    ($row:ty: $($name:ident $kind:tt $doc:literal $(, $optional:ident)? => $cell:expr;)+) => {
+        const FIELDS: &[$crate::table::Field<$row>] = &[$($crate::table::Field {
+            column: $crate::table::Column {
+                name: stringify!($name),
+                kind: $crate::table::column::fields!(@kind $kind),
+                doc: $doc,
+                optional: $crate::table::column::fields!(@flag $($optional)?),
+            },
+            cell: $cell,
+        }),+];
+        const COLUMNS: [$crate::table::Column; FIELDS.len()] = $crate::table::columns(FIELDS);
+    };
+    (@kind ($kind:expr)) => { $kind };
+    (@kind $unit:literal) => { $crate::table::Kind::Number($unit) };
+    (@flag) => { false };
+    (@flag optional) => { true };
+}
+pub(super) use fields;
+
 /// The columns of these fields.
-pub const fn columns<R, const N: usize>(fields: &[Field<R>; N]) -> [Column; N] {
+pub const fn columns<R, const N: usize>(fields: &[Field<R>]) -> [Column; N] {
     let mut columns = [fields[0].column; N];
     let mut place = 0;
     while place < N {

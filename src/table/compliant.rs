@@ -2,11 +2,10 @@
 
 use std::ops::Range;
 
+use super::column::fields;
 use super::memo::Memo;
 use super::optimum_cache::{self, Comparison, transition, without_ceilings};
-use super::{
-    Column, ColumnBuffer, Definition, Field, Job, Projection, RunStats, Stopped, columns, number, place, rows,
-};
+use super::{ColumnBuffer, Definition, Job, Projection, RunStats, Stopped, number, place, rows};
 use crate::grid::{Point, Quantity};
 use crate::protocol::compliant::{self, Compliant as Member};
 use crate::protocol::{Solved, SpringBlock, error};
@@ -24,40 +23,33 @@ struct Row {
     work_error: f64,
 }
 
-const FIELDS: [Field<Row>; 14] = [
-    Field::new(Column::number("alpha", "1", "coefficient of x^3 (1 - x)^3 in ln(v - 1), x = t/t_f"), |row| row.member.alpha),
-    Field::new(Column::number("work", "mu_0 sigma l", "work of friction W_s"), |row| row.member.work),
-    Field::new(Column::number("work_optimal", "mu_0 sigma l", "least work of friction W* of any protocol"), |row| row.least.work),
-    Field::new(Column::number("gap", "1", "(W_s - W*)/W*, good to rtol of 1 + gap"), |row| row.least.gap),
-    Field::new(Column::number("v_min", "v_0", "least velocity of the block"), |row| row.member.v_min),
-    Field::new(Column::number("v_max", "v_0", "greatest velocity of the block"), |row| row.member.v_max),
-    Field::new(Column::number("v_c_min", "v_0", "least control velocity; both good to rtol of the greater of the two"), |row| row.member.control_min),
-    Field::new(Column::number("v_c_max", "v_0", "greatest control velocity"), |row| row.member.control_max),
-    Field::new(Column::number(
-        "amplification",
-        "1",
-        "greatest factor by which a small error grows from start to end, in the norm of (ln v, ln theta, k s/a); 0 \
-         below 1e-30, where only rounding is left of the error; null beyond 3000 steps of its integration and beyond the range of doubles",
-    ), |row| number(row.amplification)),
-    Field::new(Column::number(
-        "sampling_error",
-        "1",
-        "distance from the target in that norm if v_c is sampled every dt and held, to rtol of 1; null for dt = 0, \
-         beyond 100000 samples, and where the motion does not last",
-    ), |row| number(row.sampling_error)),
-    Field::new(Column::number("stiffness_ratio", "1", "k t_f^2/m: a large one makes the spring rigid; inf for m = 0"), |row| if row.slider.m > 0.0 { row.slider.k * row.t_f * row.t_f / row.slider.m } else { f64::INFINITY }),
-    Field::new(Column::number(
-        "open_loop_error",
-        "1",
-        "distance from the target in that norm if v_c is simulated as it is, at rtol: what that and rounding leave, \
-         amplified; null where the motion does not last",
-    )
-    .optional(), |row| number(row.open_loop_error)),
-    Field::new(Column::number("work_error", "mu_0 sigma l", "bound of the error of work, by a second solve").optional(), |row| row.work_error),
-    Field::new(Column::number("gap_error", "1", "bound of the error of gap, by a second solve of both works").optional(), |row| row.least.gap_error),
-];
+fields! { Row:
+    alpha "1" "coefficient of x^3 (1 - x)^3 in ln(v - 1), x = t/t_f" => |row| row.member.alpha;
+    work "mu_0 sigma l" "work of friction W_s" => |row| row.member.work;
+    work_optimal "mu_0 sigma l" "least work of friction W* of any protocol" => |row| row.least.work;
+    gap "1" "(W_s - W*)/W*, good to rtol of 1 + gap" => |row| row.least.gap;
+    v_min "v_0" "least velocity of the block" => |row| row.member.v_min;
+    v_max "v_0" "greatest velocity of the block" => |row| row.member.v_max;
+    v_c_min "v_0" "least control velocity; both good to rtol of the greater of the two" => |row| row.member.control_min;
+    v_c_max "v_0" "greatest control velocity" => |row| row.member.control_max;
+    amplification "1"
+        "greatest factor by which a small error grows from start to end, in the norm of (ln v, ln theta, k s/a); 0 below 1e-30, \
+         where only rounding is left of the error; null beyond 3000 steps of its integration and beyond the range of doubles"
+        => |row| number(row.amplification);
+    sampling_error "1"
+        "distance from the target in that norm if v_c is sampled every dt and held, to rtol of 1; null for dt = 0, beyond \
+         100000 samples, and where the motion does not last"
+        => |row| number(row.sampling_error);
+    stiffness_ratio "1" "k t_f^2/m: a large one makes the spring rigid; inf for m = 0"
+        => |row| if row.slider.m > 0.0 { row.slider.k * row.t_f * row.t_f / row.slider.m } else { f64::INFINITY };
+    open_loop_error "1"
+        "distance from the target in that norm if v_c is simulated as it is, at rtol: what that and rounding leave, amplified; \
+         null where the motion does not last", optional
+        => |row| number(row.open_loop_error);
+    work_error "mu_0 sigma l" "bound of the error of work, by a second solve", optional => |row| row.work_error;
+    gap_error "1" "bound of the error of gap, by a second solve of both works", optional => |row| row.least.gap_error;
+}
 
-const COLUMNS: [Column; 14] = columns(&FIELDS);
 const WORK_OPTIMAL: usize = place(&COLUMNS, "work_optimal");
 const GAP: usize = place(&COLUMNS, "gap");
 const AMPLIFICATION: usize = place(&COLUMNS, "amplification");
@@ -93,7 +85,7 @@ fn needs_optimum(projection: &Projection) -> bool {
 
 fn compute(job: &Job<'_>, range: Range<u64>, buffer: &mut ColumnBuffer) -> Result<RunStats, Stopped> {
     let members = MemberCache::default();
-    rows::each(job, range, 4, buffer, &FIELDS, |tuple, point| {
+    rows::each(job, range, 4, buffer, FIELDS, |tuple, point| {
         let mut work = RunStats::default();
         let Solution { solved, amplification, work_error } = members.get(job, tuple, point, &mut work);
         let Some(member) = solved.value else { return (solved.status, None, work) };

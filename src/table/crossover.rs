@@ -2,46 +2,29 @@
 
 use std::ops::Range;
 
+use super::column::fields;
 use super::optimum_cache::transition;
-use super::{Column, ColumnBuffer, Definition, Field, Job, RunStats, Stopped, columns, number, place, rows};
+use super::{ColumnBuffer, Definition, Job, RunStats, Stopped, number, place, rows};
 use crate::grid::Quantity;
 use crate::protocol::optimal::crossover::{self, CrossoverTimes, Wanted};
 
-const TIME: &str = "l/v_0";
-const WORK: &str = "mu_0 sigma l";
-
-const FIELDS: [Field<CrossoverTimes>; 12] = [
-    Field::new(Column::number("t_cross", TIME, "acceleration: duration at which v(0+) = v_i"), |times| {
-        number(times.t_cross)
-    }),
-    Field::new(Column::number("t_floor", TIME, "acceleration: duration at which v(0+) reaches the floor 1"), |times| {
-        number(times.t_floor)
-    }),
-    Field::new(Column::number("t_cheapest", TIME, "acceleration: duration of least W*"), |times| {
-        number(times.t_cheapest)
-    }),
-    Field::new(Column::number("t_min", TIME, "deceleration: shortest possible duration"), |times| number(times.t_min)),
-    Field::new(Column::number("t_turn", TIME, "deceleration: duration at which v(t_f-) = v_f"), |times| {
-        number(times.t_turn)
-    }),
-    Field::new(
-        Column::number("t_free_in", TIME, "deceleration: start of the window of durations that never reach the floor"),
-        |times| number(times.t_free_in),
-    ),
-    Field::new(
-        Column::number("t_free_out", TIME, "deceleration: end of the window of durations that never reach the floor"),
-        |times| number(times.t_free_out),
-    ),
-    Field::new(Column::number("work_at_t_cross", WORK, "W* at t_cross"), |times| number(times.work_at_t_cross)),
-    Field::new(Column::number("work_at_t_floor", WORK, "W* at t_floor"), |times| number(times.work_at_t_floor)),
-    Field::new(Column::number("work_at_t_cheapest", WORK, "W* at t_cheapest"), |times| {
-        number(times.work_at_t_cheapest)
-    }),
-    Field::new(Column::number("work_at_t_min", WORK, "W* at t_min"), |times| number(times.work_at_t_min)),
-    Field::new(Column::number("work_at_t_turn", WORK, "W* at t_turn"), |times| number(times.work_at_t_turn)),
-];
-
-const COLUMNS: [Column; 12] = columns(&FIELDS);
+fields! { CrossoverTimes:
+    t_cross "l/v_0" "acceleration: duration at which v(0+) = v_i" => |times| number(times.t_cross);
+    t_floor "l/v_0" "acceleration: duration at which v(0+) reaches the floor 1"
+        => |times| number(times.t_floor);
+    t_cheapest "l/v_0" "acceleration: duration of least W*" => |times| number(times.t_cheapest);
+    t_min "l/v_0" "deceleration: shortest possible duration" => |times| number(times.t_min);
+    t_turn "l/v_0" "deceleration: duration at which v(t_f-) = v_f" => |times| number(times.t_turn);
+    t_free_in "l/v_0" "deceleration: start of the window of durations that never reach the floor"
+        => |times| number(times.t_free_in);
+    t_free_out "l/v_0" "deceleration: end of the window of durations that never reach the floor"
+        => |times| number(times.t_free_out);
+    work_at_t_cross "mu_0 sigma l" "W* at t_cross" => |times| number(times.work_at_t_cross);
+    work_at_t_floor "mu_0 sigma l" "W* at t_floor" => |times| number(times.work_at_t_floor);
+    work_at_t_cheapest "mu_0 sigma l" "W* at t_cheapest" => |times| number(times.work_at_t_cheapest);
+    work_at_t_min "mu_0 sigma l" "W* at t_min" => |times| number(times.work_at_t_min);
+    work_at_t_turn "mu_0 sigma l" "W* at t_turn" => |times| number(times.work_at_t_turn);
+}
 
 /// One row for each transition.
 pub static CROSSOVER: Definition = Definition {
@@ -65,7 +48,7 @@ fn compute(job: &Job<'_>, range: Range<u64>, buffer: &mut ColumnBuffer) -> Resul
         turn: wanted(["t_turn", "work_at_t_turn"]),
         free: wanted(["t_free_in", "t_free_out"]),
     };
-    rows::each(job, range, 64, buffer, &FIELDS, |_, point| {
+    rows::each(job, range, 64, buffer, FIELDS, |_, point| {
         let (status, times, stats) = crossover::solve(&transition(point), job.bounded, job.rtol, wanted);
         (status, Some(times), RunStats { crossovers: 1, ..RunStats::from(stats) })
     })

@@ -2,8 +2,9 @@
 
 use std::ops::Range;
 
+use super::column::fields;
 use super::optimum_cache::with_ceilings;
-use super::{Column, ColumnBuffer, Definition, Field, Job, Kind, RunStats, Stopped, columns, rows};
+use super::{ColumnBuffer, Definition, Job, Kind, RunStats, Stopped, rows};
 use crate::grid::Quantity;
 use crate::model::Law;
 use crate::protocol::optimal::{self, FeedbackPoint};
@@ -11,22 +12,14 @@ use crate::protocol::optimal::{self, FeedbackPoint};
 /// The words of `arc`, in the order of [`ArcKind::ALL`](crate::protocol::optimal::ArcKind::ALL).
 const ARCS: &[&str] = &["free", "floor", "v_ceiling", "tau_ceiling"];
 
-const FIELDS: [Field<FeedbackPoint>; 5] = [
-    Field::new(Column::number("v", "v_0", "velocity of the optimal protocol now"), |point| point.v),
-    Field::new(Column::number("work_to_go", "mu_0 sigma l", "least work of friction in the time left"), |point| {
-        point.work_to_go
-    }),
-    Field::new(Column::number("costate", "mu_0 sigma v_0", "d work_to_go/d theta; -beta of a trace"), |point| {
-        point.costate
-    }),
-    Field::new(Column::number("gain", "v_0^2/l", "dv/dtheta at fixed t_left"), |point| point.gain),
-    Field::new(
-        Column::new("arc", Kind::Label(ARCS), "the bound on which the protocol is now, or free if on none"),
-        |point| f64::from(point.arc as u8),
-    ),
-];
-
-const COLUMNS: [Column; 5] = columns(&FIELDS);
+fields! { FeedbackPoint:
+    v "v_0" "velocity of the optimal protocol now" => |point| point.v;
+    work_to_go "mu_0 sigma l" "least work of friction in the time left" => |point| point.work_to_go;
+    costate "mu_0 sigma v_0" "d work_to_go/d theta; -beta of a trace" => |point| point.costate;
+    gain "v_0^2/l" "dv/dtheta at fixed t_left" => |point| point.gain;
+    arc (Kind::Label(ARCS)) "the bound on which the protocol is now, or free if on none"
+        => |point| f64::from(point.arc as u8);
+}
 
 /// One row for each state and time left, target and pair of ceilings.
 pub static FEEDBACK: Definition = Definition {
@@ -49,7 +42,7 @@ pub static FEEDBACK: Definition = Definition {
 };
 
 fn compute(job: &Job<'_>, range: Range<u64>, buffer: &mut ColumnBuffer) -> Result<RunStats, Stopped> {
-    rows::each(job, range, 64, buffer, &FIELDS, |_, point| {
+    rows::each(job, range, 64, buffer, FIELDS, |_, point| {
         let law = Law { a: point[Quantity::A], b: point[Quantity::B] };
         let [theta, t_left, v_f] =
             [Quantity::Theta, Quantity::TimeLeft, Quantity::FinalVelocity].map(|axis| point[axis]);

@@ -13,7 +13,6 @@ mod optimal;
 mod optimum_cache;
 mod reduced;
 mod regularised;
-mod repeated_rows;
 mod rows;
 mod shortcut;
 mod stability;
@@ -29,7 +28,6 @@ pub use optimum_cache::{OPTIMUM_AXES, OptimumCache};
 #[cfg(feature = "plot")]
 pub(crate) use reduced::EDGES as HISTOGRAM_EDGES;
 pub use reduced::MAX_SORTED;
-pub use repeated_rows::RepeatedRows;
 
 /// A table: the axes of its rows, its columns and its computation.
 pub trait Table: Sync {
@@ -167,8 +165,6 @@ pub struct Job<'a> {
     pub rows: &'a RowIndex,
     /// The different optimal problems among its rows.
     pub tuples: Tuples,
-    /// The memo of repeated rows, if any row repeats.
-    pub repeated_rows: Option<RepeatedRows>,
     /// The landscape rows of a reduced table, contiguous for each of its rows.
     pub members: Option<&'a RowIndex>,
     /// The projected columns.

@@ -2,8 +2,9 @@
 
 use std::ops::Range;
 
+use super::column::fields;
 use super::optimum_cache::{self, transition, with_ceilings, work_error};
-use super::{Column, ColumnBuffer, Definition, Field, Job, Kind, RunStats, Stopped, columns, number, place, rows};
+use super::{ColumnBuffer, Definition, Job, Kind, RunStats, Stopped, number, place, rows};
 use crate::grid::{Point, Quantity};
 use crate::protocol::optimal::{self, Bounds, Obstacle, Optimum, Slopes};
 use crate::protocol::{Solved, Status};
@@ -39,112 +40,45 @@ impl Row {
     }
 }
 
-const WORK: &str = "mu_0 sigma l";
-const TIME: &str = "l/v_0";
-const FRICTION: &str = "mu_0 sigma";
-/// Unit of the derivatives by `a` and `b`.
-const WORK_PER_COEFFICIENT: &str = "sigma l";
-/// Unit of the derivatives by velocities.
-const WORK_PER_VELOCITY: &str = "mu_0 sigma l/v_0";
-/// Unit of the derivative by friction.
-const WORK_PER_FRICTION: &str = "l";
+fields! { Row:
+    work "mu_0 sigma l" "least work of friction W*" => |row| row.of_optimum(|found| found.work);
+    v_start "v_0" "velocity just after the start, v(0+)" => |row| row.of_optimum(|found| found.v_start);
+    v_end "v_0" "velocity just before the end, v(t_f-)" => |row| row.of_optimum(|found| found.v_end);
+    time_at_floor "l/v_0" "time spent on the velocity floor v = 1" => |row| row.of_optimum(|found| found.time_at_floor);
+    time_at_v_ceiling "l/v_0" "time spent on the velocity ceiling"
+        => |row| row.of_optimum(|found| found.time_at_v_ceiling);
+    time_at_tau_ceiling "l/v_0" "time spent on the friction ceiling"
+        => |row| row.of_optimum(|found| found.time_at_tau_ceiling);
+    hamiltonian "mu_0 sigma v_0" "dW*/dt_f" => |row| row.of_optimum(|found| found.hamiltonian);
+    theta_max "l/v_0" "greatest state variable theta on the path" => |row| row.of_optimum(|found| found.theta_max);
+    strategy (Kind::Label(STRATEGIES)) "start of the protocol: speed_up v(0+) > v_i, slow_down 1 < v(0+) <= v_i, floor v(0+) = 1"
+        => |row| row.of_optimum(|found| f64::from(found.strategy as u8));
+    work_error "mu_0 sigma l" "bound of the error of work, by a second solve", optional
+        => |row| if row.optimum.is_some() { row.work_error } else { f64::NAN };
+    friction_max "mu_0 sigma" "greatest friction between the ends", optional
+        => |row| row.of_optimum(|found| found.friction_max);
+    binding (Kind::Label(BINDING)) "the ceilings on which the protocol spends time", optional
+        => |row| row.of_optimum(|found| f64::from(u8::from(found.time_at_v_ceiling > 0.0) + 2 * u8::from(found.time_at_tau_ceiling > 0.0)));
+    t_least "l/v_0" "least feasible duration under the floor and the ceilings", optional => |row| number(row.t_least);
+    v_ceiling_least "v_0" "least feasible velocity ceiling for t_f and tau_ceiling", optional
+        => |row| number(row.v_ceiling_least);
+    tau_ceiling_least "mu_0 sigma" "least feasible friction ceiling for t_f and v_ceiling", optional
+        => |row| number(row.tau_ceiling_least);
+    bound (Kind::Label(OBSTACLES))
+        "the bound that makes the row infeasible; too_fast: t_f < t_least, too_slow: theta cannot wait so long", optional
+        => |row| number(row.obstacle.map(|obstacle| code(obstacle) as f64));
+    dwork_da "sigma l" "derivative of work with respect to a", optional => |row| row.slope(|slopes| slopes.a);
+    dwork_db "sigma l" "derivative of work with respect to b", optional => |row| row.slope(|slopes| slopes.b);
+    dwork_dv_i "mu_0 sigma l/v_0" "derivative of work with respect to v_i", optional
+        => |row| row.slope(|slopes| slopes.v_i);
+    dwork_dv_f "mu_0 sigma l/v_0" "derivative of work with respect to v_f", optional
+        => |row| row.slope(|slopes| slopes.v_f);
+    dwork_dv_ceiling "mu_0 sigma l/v_0" "shadow price of v_ceiling; 0 if it does not bind", optional
+        => |row| row.slope(|slopes| slopes.v_ceiling);
+    dwork_dtau_ceiling "l" "shadow price of tau_ceiling; 0 if it does not bind", optional
+        => |row| row.slope(|slopes| slopes.tau_ceiling);
+}
 
-const FIELDS: [Field<Row>; 22] = [
-    Field::new(Column::number("work", WORK, "least work of friction W*"), |row| row.of_optimum(|found| found.work)),
-    Field::new(Column::number("v_start", "v_0", "velocity just after the start, v(0+)"), |row| {
-        row.of_optimum(|found| found.v_start)
-    }),
-    Field::new(Column::number("v_end", "v_0", "velocity just before the end, v(t_f-)"), |row| {
-        row.of_optimum(|found| found.v_end)
-    }),
-    Field::new(Column::number("time_at_floor", TIME, "time spent on the velocity floor v = 1"), |row| {
-        row.of_optimum(|found| found.time_at_floor)
-    }),
-    Field::new(Column::number("time_at_v_ceiling", TIME, "time spent on the velocity ceiling"), |row| {
-        row.of_optimum(|found| found.time_at_v_ceiling)
-    }),
-    Field::new(Column::number("time_at_tau_ceiling", TIME, "time spent on the friction ceiling"), |row| {
-        row.of_optimum(|found| found.time_at_tau_ceiling)
-    }),
-    Field::new(Column::number("hamiltonian", "mu_0 sigma v_0", "dW*/dt_f"), |row| {
-        row.of_optimum(|found| found.hamiltonian)
-    }),
-    Field::new(Column::number("theta_max", TIME, "greatest state variable theta on the path"), |row| {
-        row.of_optimum(|found| found.theta_max)
-    }),
-    Field::new(
-        Column::new(
-            "strategy",
-            Kind::Label(STRATEGIES),
-            "start of the protocol: speed_up v(0+) > v_i, slow_down 1 < v(0+) <= v_i, floor v(0+) = 1",
-        ),
-        |row| row.of_optimum(|found| f64::from(found.strategy as u8)),
-    ),
-    Field::new(Column::number("work_error", WORK, "bound of the error of work, by a second solve").optional(), |row| {
-        if row.optimum.is_some() { row.work_error } else { f64::NAN }
-    }),
-    Field::new(Column::number("friction_max", FRICTION, "greatest friction between the ends").optional(), |row| {
-        row.of_optimum(|found| found.friction_max)
-    }),
-    Field::new(
-        Column::new("binding", Kind::Label(BINDING), "the ceilings on which the protocol spends time").optional(),
-        |row| {
-            row.of_optimum(|found| {
-                f64::from(u8::from(found.time_at_v_ceiling > 0.0) + 2 * u8::from(found.time_at_tau_ceiling > 0.0))
-            })
-        },
-    ),
-    Field::new(
-        Column::number("t_least", TIME, "least feasible duration under the floor and the ceilings").optional(),
-        |row| number(row.t_least),
-    ),
-    Field::new(
-        Column::number("v_ceiling_least", "v_0", "least feasible velocity ceiling for t_f and tau_ceiling").optional(),
-        |row| number(row.v_ceiling_least),
-    ),
-    Field::new(
-        Column::number("tau_ceiling_least", FRICTION, "least feasible friction ceiling for t_f and v_ceiling")
-            .optional(),
-        |row| number(row.tau_ceiling_least),
-    ),
-    Field::new(
-        Column::new(
-            "bound",
-            Kind::Label(OBSTACLES),
-            "the bound that makes the row infeasible; too_fast: t_f < t_least, too_slow: theta cannot wait so long",
-        )
-        .optional(),
-        |row| number(row.obstacle.map(|obstacle| code(obstacle) as f64)),
-    ),
-    Field::new(
-        Column::number("dwork_da", WORK_PER_COEFFICIENT, "derivative of work with respect to a").optional(),
-        |row| row.slope(|slopes| slopes.a),
-    ),
-    Field::new(
-        Column::number("dwork_db", WORK_PER_COEFFICIENT, "derivative of work with respect to b").optional(),
-        |row| row.slope(|slopes| slopes.b),
-    ),
-    Field::new(
-        Column::number("dwork_dv_i", WORK_PER_VELOCITY, "derivative of work with respect to v_i").optional(),
-        |row| row.slope(|slopes| slopes.v_i),
-    ),
-    Field::new(
-        Column::number("dwork_dv_f", WORK_PER_VELOCITY, "derivative of work with respect to v_f").optional(),
-        |row| row.slope(|slopes| slopes.v_f),
-    ),
-    Field::new(
-        Column::number("dwork_dv_ceiling", WORK_PER_VELOCITY, "shadow price of v_ceiling; 0 if it does not bind")
-            .optional(),
-        |row| row.slope(|slopes| slopes.v_ceiling),
-    ),
-    Field::new(
-        Column::number("dwork_dtau_ceiling", WORK_PER_FRICTION, "shadow price of tau_ceiling; 0 if it does not bind")
-            .optional(),
-        |row| row.slope(|slopes| slopes.tau_ceiling),
-    ),
-];
-
-const COLUMNS: [Column; 22] = columns(&FIELDS);
 const WORK_ERROR: usize = place(&COLUMNS, "work_error");
 const T_LEAST: usize = place(&COLUMNS, "t_least");
 const V_CEILING_LEAST: usize = place(&COLUMNS, "v_ceiling_least");
@@ -175,7 +109,7 @@ pub static OPTIMAL: Definition = Definition {
 
 fn compute(job: &Job<'_>, range: Range<u64>, buffer: &mut ColumnBuffer) -> Result<RunStats, Stopped> {
     let wants_slopes = job.projection.has_any(FIRST_SLOPE..COLUMNS.len());
-    rows::each(job, range, 64, buffer, &FIELDS, |tuple, point| {
+    rows::each(job, range, 64, buffer, FIELDS, |tuple, point| {
         let mut work = RunStats::default();
         let bounds = with_ceilings(job, point);
         let (solved, slopes) = if wants_slopes {

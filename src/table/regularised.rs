@@ -2,8 +2,9 @@
 
 use std::ops::Range;
 
+use super::column::fields;
 use super::compliant::{slider, velocities};
-use super::{Column, ColumnBuffer, Definition, Field, Job, RunStats, Stopped, columns, place, rows};
+use super::{ColumnBuffer, Definition, Job, RunStats, Stopped, place, rows};
 use crate::grid::Quantity;
 use crate::protocol::regularised::{self, Regularised as Found};
 use crate::protocol::{SolverStats, error};
@@ -15,31 +16,18 @@ struct Row {
     gap_error: f64,
 }
 
-const FIELDS: [Field<Row>; 9] = [
-    Field::new(Column::number("work", "mu_0 sigma l", "work of friction"), |row| row.found.work),
-    Field::new(Column::number("work_optimal", "mu_0 sigma l", "least work of friction W* of any protocol"), |row| {
-        row.found.work_optimal
-    }),
-    Field::new(Column::number("gap", "1", "(work - W*)/W*, good to a relative rtol"), |row| row.found.gap),
-    Field::new(Column::number("v_min", "v_0", "least velocity of the block; fewer digits far below 1"), |row| {
-        row.found.v_min
-    }),
-    Field::new(Column::number("v_max", "v_0", "greatest velocity of the block"), |row| row.found.v_max),
-    Field::new(
-        Column::number("v_c_min", "v_0", "least control velocity; both good to rtol of the greater of the two"),
-        |row| row.found.control_min,
-    ),
-    Field::new(Column::number("v_c_max", "v_0", "greatest control velocity"), |row| row.found.control_max),
-    Field::new(
-        Column::number("work_error", "mu_0 sigma l", "bound of the error of work, by a second solve").optional(),
-        |row| row.work_error,
-    ),
-    Field::new(Column::number("gap_error", "1", "bound of the error of gap, by a second solve").optional(), |row| {
-        row.gap_error
-    }),
-];
+fields! { Row:
+    work "mu_0 sigma l" "work of friction" => |row| row.found.work;
+    work_optimal "mu_0 sigma l" "least work of friction W* of any protocol" => |row| row.found.work_optimal;
+    gap "1" "(work - W*)/W*, good to a relative rtol" => |row| row.found.gap;
+    v_min "v_0" "least velocity of the block; fewer digits far below 1" => |row| row.found.v_min;
+    v_max "v_0" "greatest velocity of the block" => |row| row.found.v_max;
+    v_c_min "v_0" "least control velocity; both good to rtol of the greater of the two" => |row| row.found.control_min;
+    v_c_max "v_0" "greatest control velocity" => |row| row.found.control_max;
+    work_error "mu_0 sigma l" "bound of the error of work, by a second solve", optional => |row| row.work_error;
+    gap_error "1" "bound of the error of gap, by a second solve", optional => |row| row.gap_error;
+}
 
-const COLUMNS: [Column; 9] = columns(&FIELDS);
 const WORK_ERROR: usize = place(&COLUMNS, "work_error");
 const GAP_ERROR: usize = place(&COLUMNS, "gap_error");
 
@@ -65,7 +53,7 @@ pub static REGULARISED: Definition = Definition {
 };
 
 fn compute(job: &Job<'_>, range: Range<u64>, buffer: &mut ColumnBuffer) -> Result<RunStats, Stopped> {
-    rows::each(job, range, 16, buffer, &FIELDS, |_, point| {
+    rows::each(job, range, 16, buffer, FIELDS, |_, point| {
         let (t_f, delta_t) = (point[Quantity::Time], point[Quantity::Smoothing]);
         let solve = |rtol| regularised::solve(&slider(point), velocities(point), t_f, delta_t, job.bounded, rtol);
         let solved = solve(job.rtol);

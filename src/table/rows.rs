@@ -5,7 +5,7 @@ use std::ops::Range;
 use rayon::prelude::*;
 
 use super::failpoint;
-use super::{ColumnBuffer, Field, Job, RepeatedRows, RunStats, Stopped};
+use super::{ColumnBuffer, Field, Job, RunStats, Stopped};
 use crate::grid::{Point, Quantity, Runs};
 use crate::protocol::Status;
 
@@ -25,11 +25,7 @@ pub fn each<R>(
 ) -> Result<RunStats, Stopped> {
     let view = job.rows.view(rows.clone());
     let tuples = view.tuples(&job.tuples, rows.clone());
-    let repeated_rows = job
-        .repeated_rows
-        .as_ref()
-        .map(|repeated_rows| (repeated_rows, view.tuples(&repeated_rows.tuples, rows.clone())));
-    // Axis values are read once for each step, not for each row.
+    // Axis values are read once a step, not once a row.
     let axes: Vec<Steps> = Quantity::ALL
         .into_iter()
         .filter_map(|quantity| {
@@ -51,7 +47,6 @@ pub fn each<R>(
     let works = chunks.into_par_iter().with_max_len(1).map(|chunk| {
         job.signal.check()?;
         let count = chunk.status.len() as u64;
-        let known = repeated_rows.as_ref().map(|(repeated_rows, tuples)| (*repeated_rows, tuples.as_slice()));
         let fill = |tuple: u64, point: &Point, cells: &mut [f64]| {
             let (status, values, work) = row(tuple, point);
             for (cell, &index) in cells.iter_mut().zip(job.projection.indices()) {
@@ -59,7 +54,7 @@ pub fn each<R>(
             }
             (status, work)
         };
-        let work = chunk.compute(job, &axes, &tuples, known, &fill);
+        let work = chunk.compute(job, &axes, &tuples, &fill);
         job.signal.advance(count);
         Ok(work)
     });
@@ -90,7 +85,6 @@ impl Chunk<'_> {
         job: &Job<'_>,
         axes: &[Steps],
         tuples: &[Numbered],
-        repeated_rows: Option<(&RepeatedRows, &[Numbered])>,
         fill: &impl Fn(u64, &Point, &mut [f64]) -> (Status, RunStats),
     ) -> RunStats {
         let count = self.status.len();
@@ -116,14 +110,7 @@ impl Chunk<'_> {
                 point[*quantity] = values[place];
             }
             failpoint::panic_at(std::iter::once(at));
-            let compute = |cells: &mut [f64]| fill(tuples[tuple].0, &point, cells);
-            let (status, spent) = match repeated_rows {
-                None => compute(&mut cells),
-                Some((repeated_rows, numbers)) => {
-                    let number = numbers[numbers.partition_point(|(_, rows)| rows.end <= at)].0;
-                    repeated_rows.get(number, &mut cells, compute)
-                }
-            };
+            let (status, spent) = fill(tuples[tuple].0, &point, &mut cells);
             self.status[place] = status;
             for ((column, cell), size) in self.columns.iter_mut().zip(&cells).zip(job.sizes) {
                 column[place] = cell * size;

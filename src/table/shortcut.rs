@@ -2,11 +2,10 @@
 
 use std::ops::Range;
 
+use super::column::fields;
 use super::memo::Memo;
 use super::optimum_cache::{self, Comparison, transition, without_ceilings};
-use super::{
-    Column, ColumnBuffer, Definition, Field, Job, Kind, Projection, RunStats, Stopped, columns, number, place, rows,
-};
+use super::{ColumnBuffer, Definition, Job, Kind, Projection, RunStats, Stopped, number, place, rows};
 use crate::grid::{Point, Quantity};
 use crate::protocol::optimal::Bounds;
 use crate::protocol::shortcut::{Case, FAMILIES, Family, Obstacle, Shortcut as Member};
@@ -28,59 +27,26 @@ impl Row {
     }
 }
 
-const FIELDS: [Field<Row>; 11] = [
-    Field::new(
-        Column::number(
-            "alpha",
-            "1; (v_0/l)^2 for bounded_velocity",
-            "parameter of the family (alpha_3 in the paper); null for step and cubic, 0 for tau_ceiling = inf",
-        ),
-        |row| row.of_solution(|member| number(member.alpha)) * row.alpha_unit,
-    ),
-    Field::new(Column::number("work", "mu_0 sigma l", "work of friction W_s"), |row| {
-        row.of_solution(|member| member.work)
-    }),
-    Field::new(
-        Column::number(
-            "work_optimal",
-            "mu_0 sigma l",
-            "least work of friction W* of any protocol; for bounded_friction under its tau_ceiling",
-        ),
-        |row| row.least.work,
-    ),
-    Field::new(
-        Column::number("gap", "1", "(W_s - W*)/W*, good to rtol of 1 + gap; negative for a step that does not arrive"),
-        |row| row.least.gap,
-    ),
-    Field::new(Column::number("v_min", "v_0", "least velocity between the ends; 0 if it underflows"), |row| {
-        row.of_solution(|member| member.v_min)
-    }),
-    Field::new(Column::number("v_max", "v_0", "greatest velocity between the ends"), |row| {
-        row.of_solution(|member| member.v_max)
-    }),
-    Field::new(Column::number("friction_max", "mu_0 sigma", "greatest friction between the ends"), |row| {
-        row.of_solution(|member| member.friction_max)
-    }),
-    Field::new(
-        Column::number("terminal_error", "1", "theta(t_f) v_f - 1, the miss of a step; 0 for the other families")
-            .optional(),
-        |row| row.of_solution(|member| member.miss),
-    ),
-    Field::new(
-        Column::new("bound", Kind::Label(&Obstacle::NAMES), "the bound that makes the row infeasible").optional(),
-        |row| number(row.obstacle.map(|obstacle| obstacle.code() as f64)),
-    ),
-    Field::new(
-        Column::number("work_error", "mu_0 sigma l", "bound of the error of work, by a second solve").optional(),
-        |row| row.work_error,
-    ),
-    Field::new(
-        Column::number("gap_error", "1", "bound of the error of gap, by a second solve of both works").optional(),
-        |row| row.least.gap_error,
-    ),
-];
+fields! { Row:
+    alpha "1; (v_0/l)^2 for bounded_velocity"
+        "parameter of the family (alpha_3 in the paper); null for step and cubic, 0 for tau_ceiling = inf"
+        => |row| row.of_solution(|member| number(member.alpha)) * row.alpha_unit;
+    work "mu_0 sigma l" "work of friction W_s" => |row| row.of_solution(|member| member.work);
+    work_optimal "mu_0 sigma l" "least work of friction W* of any protocol; for bounded_friction under its tau_ceiling"
+        => |row| row.least.work;
+    gap "1" "(W_s - W*)/W*, good to rtol of 1 + gap; negative for a step that does not arrive" => |row| row.least.gap;
+    v_min "v_0" "least velocity between the ends; 0 if it underflows" => |row| row.of_solution(|member| member.v_min);
+    v_max "v_0" "greatest velocity between the ends" => |row| row.of_solution(|member| member.v_max);
+    friction_max "mu_0 sigma" "greatest friction between the ends"
+        => |row| row.of_solution(|member| member.friction_max);
+    terminal_error "1" "theta(t_f) v_f - 1, the miss of a step; 0 for the other families", optional
+        => |row| row.of_solution(|member| member.miss);
+    bound (Kind::Label(&Obstacle::NAMES)) "the bound that makes the row infeasible", optional
+        => |row| number(row.obstacle.map(|obstacle| obstacle.code() as f64));
+    work_error "mu_0 sigma l" "bound of the error of work, by a second solve", optional => |row| row.work_error;
+    gap_error "1" "bound of the error of gap, by a second solve of both works", optional => |row| row.least.gap_error;
+}
 
-const COLUMNS: [Column; 11] = columns(&FIELDS);
 const WORK_OPTIMAL: usize = place(&COLUMNS, "work_optimal");
 const GAP: usize = place(&COLUMNS, "gap");
 const WORK_ERROR: usize = place(&COLUMNS, "work_error");
@@ -112,7 +78,7 @@ fn needs_optimum(projection: &Projection) -> bool {
 
 fn compute(job: &Job<'_>, range: Range<u64>, buffer: &mut ColumnBuffer) -> Result<RunStats, Stopped> {
     let members = MemberCache::default();
-    rows::each(job, range, 16, buffer, &FIELDS, |tuple, point| {
+    rows::each(job, range, 16, buffer, FIELDS, |tuple, point| {
         let mut work = RunStats::default();
         let mut row =
             Row { member: None, obstacle: None, alpha_unit: 1.0, work_error: f64::NAN, least: Comparison::NONE };

@@ -2,11 +2,10 @@
 
 use std::ops::Range;
 
+use super::column::fields;
 use super::memo::Memo;
 use super::optimum_cache::transition;
-use super::{
-    Column, ColumnBuffer, Field, Job, Kind, Prediction, Projection, RunStats, Stopped, Table, columns, number, rows,
-};
+use super::{Column, ColumnBuffer, Job, Kind, Prediction, Projection, RunStats, Stopped, Table, number, rows};
 use crate::grid::Quantity;
 use crate::model::Law;
 use crate::stability::step_response::{self, LimitCycle, Outcome, Response, Simulation};
@@ -31,82 +30,33 @@ impl Row {
     }
 }
 
-const FIELDS: [Field<Row>; 11] = [
-    Field::new(
-        Column::number("v_peak", "v_0", "greatest velocity after v first reaches v_f, at least v_f; null if undecided"),
-        |row| row.of_solution(|response| response.v_peak),
-    ),
-    Field::new(
-        Column::number(
-            "v_trough",
-            "v_0",
-            "least velocity after v first reaches v_f, at most v_f; 0 if it underflows; null if undecided or \
-         not known to rtol",
-        ),
-        |row| row.of_solution(|response| response.v_trough),
-    ),
-    Field::new(
-        Column::number(
-            "t_peak",
-            "l/v_0",
-            "time of v_peak, to a relative rtol over the overshoot v_peak/v_f - 1; null if the peak is only approached, \
-         if undecided, or if not known to that accuracy",
-        ),
-        |row| row.of_solution(|response| number(response.t_peak)),
-    ),
-    Field::new(Column::new("outcome", Kind::Label(&Outcome::NAMES), "long-term behaviour of the response"), |row| {
-        row.of_solution(|response| f64::from(response.outcome as u8))
-    }),
-    Field::new(
-        Column::new("stick_slip", Kind::Flag, "whether the oscillation is sustained; null if undecided"),
-        |row| {
-            row.of_solution(|response| match response.outcome {
-                Outcome::Settled => 0.0,
-                Outcome::LimitCycle => 1.0,
-                Outcome::Undecided => f64::NAN,
-            })
-        },
-    ),
-    Field::new(
-        Column::number(
-            "settling_time",
-            "l/v_0",
-            "time after which v stays within 1 % of v_f; null unless settled, or if not known to rtol",
-        ),
-        |row| row.of_solution(|response| number(response.settling_time)),
-    ),
-    Field::new(Column::number("period", "l/v_0", "duration of the limit cycle; null without one"), |row| {
-        row.cycle(|cycle| cycle.period)
-    }),
-    Field::new(
-        Column::number("cycle_peak", "v_0", "greatest velocity on the limit cycle; null without one").optional(),
-        |row| row.cycle(|cycle| cycle.v_peak),
-    ),
-    Field::new(
-        Column::number(
-            "cycle_trough",
-            "v_0",
-            "least velocity on the limit cycle; null without one, or if not known to rtol",
-        )
-        .optional(),
-        |row| row.cycle(|cycle| cycle.v_trough),
-    ),
-    Field::new(Column::number("t_end", "l/v_0", "time up to which the response was integrated").optional(), |row| {
-        row.of_solution(|response| response.t_end)
-    }),
-    Field::new(
-        Column::number(
-            "first_lyapunov_coefficient",
-            "1",
-            "first Lyapunov coefficient at the critical stiffness for this mass and v_f: negative if the Hopf point is \
-         supercritical, positive if a limit cycle may be met above it; null for b <= a and for m = 0",
-        )
-        .optional(),
-        |row| number(row.lyapunov),
-    ),
-];
-
-const COLUMNS: [Column; 11] = columns(&FIELDS);
+fields! { Row:
+    v_peak "v_0" "greatest velocity after v first reaches v_f, at least v_f; null if undecided"
+        => |row| row.of_solution(|response| response.v_peak);
+    v_trough "v_0" "least velocity after v first reaches v_f, at most v_f; 0 if it underflows; null if undecided or not known to rtol"
+        => |row| row.of_solution(|response| response.v_trough);
+    t_peak "l/v_0"
+        "time of v_peak, to a relative rtol over the overshoot v_peak/v_f - 1; null if the peak is only approached, if \
+         undecided, or if not known to that accuracy"
+        => |row| row.of_solution(|response| number(response.t_peak));
+    outcome (Kind::Label(&Outcome::NAMES)) "long-term behaviour of the response"
+        => |row| row.of_solution(|response| f64::from(response.outcome as u8));
+    stick_slip (Kind::Flag) "whether the oscillation is sustained; null if undecided"
+        => |row| row.of_solution(|response| [0.0, 1.0, f64::NAN][response.outcome as usize]);
+    settling_time "l/v_0" "time after which v stays within 1 % of v_f; null unless settled, or if not known to rtol"
+        => |row| row.of_solution(|response| number(response.settling_time));
+    period "l/v_0" "duration of the limit cycle; null without one" => |row| row.cycle(|cycle| cycle.period);
+    cycle_peak "v_0" "greatest velocity on the limit cycle; null without one", optional
+        => |row| row.cycle(|cycle| cycle.v_peak);
+    cycle_trough "v_0" "least velocity on the limit cycle; null without one, or if not known to rtol", optional
+        => |row| row.cycle(|cycle| cycle.v_trough);
+    t_end "l/v_0" "time up to which the response was integrated", optional
+        => |row| row.of_solution(|response| response.t_end);
+    first_lyapunov_coefficient "1"
+        "first Lyapunov coefficient at the critical stiffness for this mass and v_f: negative if the Hopf point is \
+         supercritical, positive if a limit cycle may be met above it; null for b <= a and for m = 0", optional
+        => |row| number(row.lyapunov);
+}
 
 impl Table for StepResponse {
     fn name(&self) -> &'static str {
@@ -171,7 +121,7 @@ impl Table for StepResponse {
 
     fn compute(&self, job: &Job<'_>, range: Range<u64>, buffer: &mut ColumnBuffer) -> Result<RunStats, Stopped> {
         let simulations = Memo::<[u64; 5], Simulation>::default();
-        rows::each(job, range, 4, buffer, &FIELDS, |_, point| {
+        rows::each(job, range, 4, buffer, FIELDS, |_, point| {
             let step = step_response::Step {
                 transition: transition(point),
                 k: point[Quantity::Stiffness],

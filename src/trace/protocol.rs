@@ -10,59 +10,25 @@ use crate::stability::step_response::Step;
 
 /// A protocol, with its spring if that is elastic.
 #[derive(Clone, Copy)]
+#[allow(missing_docs)]
 pub enum Protocol {
     /// The protocol of least work under these bounds.
-    Optimal {
-        /// Its bounds.
-        bounds: Bounds,
-    },
+    Optimal { bounds: Bounds },
     /// The rest of a protocol of least work, from a state on the way: the transition of its case starts at `v_i = 1/theta`, its `t_f` is the
     /// time left.
-    OptimalFrom {
-        /// The state variable.
-        theta: f64,
-        /// Its bounds.
-        bounds: Bounds,
-    },
+    OptimalFrom { theta: f64, bounds: Bounds },
     /// The cubic shortcut of least work, with `v >= 1` if `bounded`.
-    BestCubic {
-        /// Whether `v >= 1`.
-        bounded: bool,
-    },
+    BestCubic { bounded: bool },
     /// A point of the landscape, scaled: `alpha_2 t_f` and `alpha_3 t_f^2`.
-    CubicPoint {
-        /// `alpha_2 t_f`.
-        a_2: f64,
-        /// `alpha_3 t_f^2`.
-        a_3: f64,
-    },
+    CubicPoint { a_2: f64, a_3: f64 },
     /// The member of a family.
     Family(&'static dyn Family),
     /// The response of a block on a spring to a step of the control velocity.
-    StepResponse {
-        /// Stiffness of the spring.
-        k: f64,
-        /// Mass of the block.
-        m: f64,
-    },
+    StepResponse { k: f64, m: f64 },
     /// The smooth shortcut on a spring.
-    Compliant {
-        /// Stiffness of the spring.
-        k: f64,
-        /// Mass of the block.
-        m: f64,
-    },
+    Compliant { k: f64, m: f64 },
     /// The optimal protocol with smooth pieces instead of jumps, on a spring.
-    Regularised {
-        /// Stiffness of the spring.
-        k: f64,
-        /// Mass of the block.
-        m: f64,
-        /// Length of the smooth pieces.
-        delta_t: f64,
-        /// Whether the optimum keeps `v >= 1`.
-        bounded: bool,
-    },
+    Regularised { k: f64, m: f64, delta_t: f64, bounded: bool },
 }
 
 impl Protocol {
@@ -144,37 +110,23 @@ fn of_ceiling(obstacle: &optimal::Obstacle, t_f: f64) -> String {
 
 /// The reason for a missing protocol.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+#[allow(missing_docs)]
 pub enum Absence {
     /// The reason given by the family.
     #[error("{0}")]
     Obstacle(Obstacle),
     /// No protocol is that short.
     #[error("t_f = {t_f} is too short for {}: the least is t_min = {t_min}", bound(.bounded))]
-    Time {
-        /// The requested duration.
-        t_f: f64,
-        /// The least duration.
-        t_min: f64,
-        /// Whether `v >= 1`, else `v > 0`.
-        bounded: bool,
-    },
+    Time { t_f: f64, t_min: f64, bounded: bool },
     /// A ceiling leaves no protocol.
     #[error("{}", of_ceiling(.obstacle, *.t_f))]
-    Ceiling {
-        /// Which one.
-        obstacle: optimal::Obstacle,
-        /// The requested duration.
-        t_f: f64,
-    },
+    Ceiling { obstacle: optimal::Obstacle, t_f: f64 },
     /// The state cannot arrive.
     #[error("no protocol arrives from this theta in the time t_left under these bounds")]
     State,
     /// No cubic shortcut keeps `v >= 1` (`bounded`) or `v > 0` in this time.
     #[error("no cubic shortcut keeps {} in this time", bound(.bounded))]
-    Cubic {
-        /// Whether `v >= 1`, else `v > 0`.
-        bounded: bool,
-    },
+    Cubic { bounded: bool },
     /// The least work of all cubic shortcuts is approached at the border `v = 0`, not attained.
     #[error(
         "no protocol attains the least work without the velocity floor: v falls to 0 somewhere\n  help: remove --unbounded"

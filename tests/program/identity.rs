@@ -7,8 +7,9 @@ use std::sync::Barrier;
 
 use crate::common::{MATERIAL, files, run, sweep};
 use crate::extent::quick_or_long;
+use parquet::file::metadata::{ParquetMetaData, ParquetMetaDataReader};
 use sha2::Digest;
-use slipsweep::dataset::{Concurrency, DatasetError, Folder, Manifest, frame};
+use slipsweep::dataset::{Concurrency, DatasetError, Folder, Footer, Manifest, frame};
 use slipsweep::sweep::{self, Plan, RunError, Shard, Sweep, TableOutcome};
 use slipsweep::table::Signal;
 
@@ -21,6 +22,11 @@ const TWO_PARTS: &str = "t_f = [0.02, 0.037]\nalpha_2 = { linspace = [-0.5, 0.5,
 fn refusal(sweep: &Sweep, out: &Path) -> String {
     let refused = sweep::run(sweep, &Folder::new(out, "test"), 1, &Signal::default());
     refused.expect_err("is refused").to_string()
+}
+
+fn metadata(part: &Path) -> ParquetMetaData {
+    let file = fs::File::open(part).expect("is there");
+    ParquetMetaDataReader::new().parse_and_finish(&file).expect("is Parquet")
 }
 
 fn manifest(out: &Path) -> Manifest {
@@ -329,7 +335,7 @@ fn a_manifest_that_contradicts_its_parts_is_refused() {
     fs::write(place.manifest_path(), format!("{body},\n  \"sha256\": \"{checksum}\"\n}}\n")).expect("is writable");
     let found = manifest(folder.path());
     assert_eq!((found.tables[0].parts, &found.rebuilt), (1, &None));
-    let refused = place.open_part(&found, "gap", 0).expect_err("is refused");
+    let refused = place.verified(&found, &found.tables[0]).expect_err("is refused");
     assert!(matches!(refused, DatasetError::ForeignPart { what: "plan", .. }), "{refused}");
     // A run corrects it.
     run(&sweep, folder.path(), 2);
@@ -364,7 +370,7 @@ fn no_flipped_bit_of_a_part_is_read() {
     let path = place.part("optimal", 0);
     let good = fs::read(&path).expect("is there");
     let sound = frame::read_all(&path).expect("reads");
-    let pages = place.open_part(&manifest, "optimal", 0).expect("is sound").expect("is there").metadata;
+    let pages = metadata(&path);
     let pages: i64 = pages.row_group(0).columns().iter().map(|column| column.compressed_size()).sum();
     let mut harmless = 0;
     // All bits, or one of each byte of the pages and of every eighth one of the footer.
@@ -374,9 +380,9 @@ fn no_flipped_bit_of_a_part_is_read() {
         let mut bad = good.clone();
         bad[bit / 8] ^= 1 << (bit % 8);
         fs::write(&path, bad).expect("is writable");
-        match place.open_part(&manifest, "optimal", 0) {
+        match place.verified(&manifest, &manifest.tables[0]) {
             Err(DatasetError::DamagedPart { .. }) => continue,
-            opened => assert!(opened.is_ok_and(|part| part.is_some()), "bit {bit}"),
+            opened => assert!(opened.is_ok_and(|(_, missing)| missing == 0), "bit {bit}"),
         }
         if let Ok(read) = frame::read_all(&path) {
             assert_eq!(read, sound, "bit {bit} of byte {}", bit / 8);
@@ -401,7 +407,9 @@ fn parts_carry_the_hash_of_their_table_and_a_long_spec_is_in_the_manifest_alone(
         let manifest = manifest(&out);
         assert_eq!((&manifest.spec, manifest.tables[0].hash.len()), (&text, 64));
         let place = Folder::new(&out, "test");
-        let footer = place.open_part(&manifest, "optimal", 0).expect("is sound").expect("is there").footer;
+        let metadata = metadata(&place.part("optimal", 0));
+        let entries = metadata.file_metadata().key_value_metadata().expect("is there");
+        let footer = Footer::from_entries(entries).expect("is sound");
         assert_eq!(footer.planned(), manifest.table("optimal"));
         let size = fs::metadata(place.part("optimal", 0)).expect("is there").len();
         footers.push((footer.spec.is_some(), size < 1 << 15));

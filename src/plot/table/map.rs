@@ -4,6 +4,7 @@ use super::cells::AxisCells;
 use super::groups::Groups;
 use super::lines::MAX_NAMED_ROWS;
 use super::survey::{Survey, Values};
+use crate::plot::canvas::Stroke;
 use crate::plot::colour::{class, viridis};
 use crate::plot::export::image;
 use crate::plot::figure::{Axis, Colours, Entry, Figure, Hover, Key, Layer, Map, Panel};
@@ -78,6 +79,37 @@ struct Shading<'a> {
     column: &'a str,
     words: Vec<String>,
     colours: Option<Colours>,
+}
+
+impl MapFigure {
+    /// Draws a curve over each panel at `steps` places along an axis, 0 or 1: `of` returns the value of the other axis for a panel. A curve that
+    /// leaves its panel everywhere is not drawn.
+    pub fn draw_curve(
+        &mut self,
+        along: usize,
+        steps: usize,
+        (name, stroke): (&str, Stroke),
+        of: impl Fn(usize, f64) -> Option<f64>,
+    ) {
+        let mut is_drawn = false;
+        let places = |step| self.cells[along].scale.value(step as f64 / steps as f64);
+        for (place, panel) in self.figure.panels.iter_mut().enumerate() {
+            let other = if along == 0 { panel.y.scale } else { panel.x.scale };
+            let point = |at| (at, of(place, at).unwrap_or(f64::NAN));
+            let mut curve: Vec<(f64, f64)> = (0..=steps).map(places).map(point).collect();
+            if !curve.iter().any(|(_, value)| (0.0..=1.0).contains(&other.fraction(*value))) {
+                continue;
+            }
+            if along == 1 {
+                curve.iter_mut().for_each(|(x, y)| std::mem::swap(x, y));
+            }
+            panel.layers.push(Layer::Contour(vec![curve], stroke.clone()));
+            is_drawn = true;
+        }
+        if is_drawn {
+            self.figure.legend.push(Entry { key: Key::Contour(stroke), text: name.to_owned() });
+        }
+    }
 }
 
 /// Draws the map.

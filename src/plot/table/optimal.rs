@@ -137,51 +137,38 @@ fn binding(scene: &Scene<'_>, plan: &map::Plan) -> Result<Figure, PlotError> {
 
 /// A map of the strategy, with the durations at which it changes.
 fn strategies(scene: &Scene<'_>, plan: &map::Plan) -> Result<Figure, PlotError> {
-    let MapFigure { mut figure, groups, cells, .. } = map::map(scene.survey, plan)?;
-    let styles = [
-        ("t_cross", Stroke::solid("#000", 0.9)),
-        ("t_floor", Stroke { dashes: &[3.0, 1.6], ..Stroke::solid("#000", 0.9) }),
-    ];
-    // The index of the duration among the axes, and the other axis.
+    let mut map = map::map(scene.survey, plan)?;
+    // The place of the duration among the axes, and what the other axis is.
     let (time, other) = match (plan.x.as_str(), plan.y.as_str()) {
         ("t_f", other) => (0, other),
         (other, "t_f") => (1, other),
-        _ => return Ok(figure),
+        _ => return Ok(map.figure),
     };
-    let Some(place) = AXES.iter().position(|axis| *axis == other) else { return Ok(figure) };
+    if !AXES.contains(&other) {
+        return Ok(map.figure);
+    }
     let (unit, unit_of_time) = (scene.size(other), scene.source.units.size("l/v_0"));
-    let wanted = Wanted { cross: true, floor: true, cheapest: false, min: false, turn: false, free: false };
-    let mut is_drawn = [false; 2];
-    for (group, panel) in figure.panels.iter_mut().enumerate() {
-        let value = |&axis: &&str| if axis == other { Some(0.0) } else { scene.scaled(&groups, group, axis) };
-        let Some(mut values) = AXES.iter().map(value).collect::<Option<Vec<f64>>>() else { continue };
-        let mut curves = [Vec::new(), Vec::new()];
-        for step in 0..=CURVE_STEPS {
-            let at = cells[1 - time].scale.value(step as f64 / CURVE_STEPS as f64);
-            values[place] = at / unit;
+    let none = Wanted { cross: false, floor: false, cheapest: false, min: false, turn: false, free: false };
+    type Curve = (&'static str, Wanted, fn(&CrossoverTimes) -> Option<f64>, &'static [f64]);
+    let curves: [Curve; 2] = [
+        ("t_cross", Wanted { cross: true, ..none }, |times| times.t_cross, &[]),
+        ("t_floor", Wanted { floor: true, ..none }, |times| times.t_floor, &[3.0, 1.6]),
+    ];
+    let groups = map.groups.clone();
+    for (name, wanted, duration, dashes) in curves {
+        let duration = |panel: usize, at: f64| {
+            let value = |axis: &&str| if *axis == other { Some(at / unit) } else { scene.scaled(&groups, panel, axis) };
+            let values = AXES.iter().map(value).collect::<Option<Vec<f64>>>()?;
             let is_legal = matches!(
                 values[..], [a, b, v_i, v_f] if a > 0.0 && b >= 0.0 && v_i > 1.0 && v_f > 1.0 && v_i != v_f
             );
-            let times = is_legal.then(|| solved(scene, &values, wanted)).flatten();
-            let found = times.map_or([None; 2], |times| [times.t_cross, times.t_floor]);
-            for (curve, found) in curves.iter_mut().zip(found) {
-                let found = found.map_or(f64::NAN, |found| found * unit_of_time);
-                curve.push(if time == 0 { (found, at) } else { (at, found) });
-            }
-        }
-        for ((curve, (_, stroke)), is_drawn) in curves.into_iter().zip(&styles).zip(&mut is_drawn) {
-            let scale = if time == 0 { panel.x.scale } else { panel.y.scale };
-            let of = |&(x, y): &(f64, f64)| scale.fraction(if time == 0 { x } else { y });
-            if curve.iter().any(|point| (0.0..=1.0).contains(&of(point))) {
-                *is_drawn = true;
-                panel.layers.push(Layer::Contour(vec![curve], stroke.clone()));
-            }
-        }
+            let times = is_legal.then(|| solved(scene, &values, wanted)).flatten()?;
+            Some(duration(&times)? * unit_of_time)
+        };
+        let stroke = Stroke { dashes, ..Stroke::solid("#000", 0.9) };
+        map.draw_curve(1 - time, CURVE_STEPS, (&label::name(name), stroke), duration);
     }
-    for ((name, stroke), _) in styles.into_iter().zip(is_drawn).filter(|(_, is_drawn)| *is_drawn) {
-        figure.legend.push(Entry { key: Key::Contour(stroke), text: label::name(name) });
-    }
-    Ok(figure)
+    Ok(map.figure)
 }
 
 /// The durations of a line, by the names of [`MARKED`]: those without ceilings.
