@@ -65,8 +65,8 @@ pub(super) struct Sums {
     pub lag: f64,
     /// Work of friction along it.
     pub work: f64,
-    /// Slip, `int v dt`.
-    pub slip: f64,
+    /// `int v ln v dt`.
+    pub creep: f64,
     /// `int v ln theta dt`.
     pub state: f64,
     /// Turning chart: the interior part of `d time/d ln theta_h`. Direct chart: `d time/d z_a`.
@@ -480,7 +480,7 @@ fn panels<const N: usize>(line: &Line<N>, tolerance: f64, kernel: impl Fn(f64, f
         time: 0.0,
         lag: 0.0,
         work: 0.0,
-        slip: 0.0,
+        creep: 0.0,
         state: 0.0,
         sensitivity: 0.0,
         swing: 0.0,
@@ -492,7 +492,7 @@ fn panels<const N: usize>(line: &Line<N>, tolerance: f64, kernel: impl Fn(f64, f
         total.time += sums.time;
         total.lag += sums.lag;
         total.work += sums.work;
-        total.slip += sums.slip;
+        total.creep += sums.creep;
         total.state += sums.state;
         total.sensitivity += sums.sensitivity;
         total.swing += sums.swing;
@@ -652,7 +652,7 @@ struct Tally {
     time: Lanes,
     lag: Lanes,
     work: Lanes,
-    slip: Lanes,
+    creep: Lanes,
     state: Lanes,
     sensitivity: Lanes,
     swing: Lanes,
@@ -664,7 +664,7 @@ struct Terms<const N: usize> {
     time: [f64; N],
     lag: [f64; N],
     work: [f64; N],
-    slip: [f64; N],
+    creep: [f64; N],
     state: [f64; N],
     sensitivity: [f64; N],
     swing: [f64; N],
@@ -679,7 +679,7 @@ impl Tally {
             time: zero,
             lag: zero,
             work: zero,
-            slip: zero,
+            creep: zero,
             state: zero,
             sensitivity: zero,
             swing: zero,
@@ -694,7 +694,7 @@ impl Tally {
                 self.time[i] += terms.time[first + i];
                 self.lag[i] += terms.lag[first + i];
                 self.work[i] += terms.work[first + i];
-                self.slip[i] += terms.slip[first + i];
+                self.creep[i] += terms.creep[first + i];
                 self.state[i] += terms.state[first + i];
                 self.sensitivity[i] += terms.sensitivity[first + i];
                 self.swing[i] += terms.swing[first + i];
@@ -713,7 +713,7 @@ impl<const N: usize> Terms<N> {
             time: zero,
             lag: zero,
             work: zero,
-            slip: zero,
+            creep: zero,
             state: zero,
             sensitivity: zero,
             swing: zero,
@@ -741,7 +741,7 @@ fn turning_kernel(arc: &TurningSlice, middle: f64, half: f64, rule: &Rule) -> Su
         time: scale * arc.theta_h * fold(&tally.time),
         lag: scale * arc.theta_h * fold(&tally.lag),
         work: scale * fold(&tally.work),
-        slip: scale * fold(&tally.slip),
+        creep: scale * fold(&tally.creep),
         state: scale * fold(&tally.state),
         sensitivity: scale * arc.theta_h * fold(&tally.sensitivity),
         swing: scale * arc.theta_h * arc.theta_h * fold(&tally.swing),
@@ -783,9 +783,10 @@ impl TurningSlice {
             terms.friction[i] = 1.0 + a * found.ln_u[i] + (b - a) * ln_theta[i];
             terms.time[i] = g * shrink[i];
             terms.lag[i] = terms.time[i] * u;
-            terms.slip[i] = g * u;
-            terms.work[i] = terms.slip[i] * terms.friction[i];
-            terms.state[i] = terms.slip[i] * ln_theta[i];
+            let slip = g * u;
+            terms.work[i] = slip * terms.friction[i];
+            terms.creep[i] = slip * (found.ln_u[i] - ln_theta[i]);
+            terms.state[i] = slip * ln_theta[i];
             terms.sensitivity[i] = terms.time[i] * (1.0 - bent * slope);
             terms.swing[i] = terms.time[i] * bent * inverse_x2[i];
         }
@@ -823,7 +824,7 @@ fn direct_kernel(arc: &DirectSlice, middle: f64, half: f64, rule: &Rule) -> Sums
         time: half * arc.theta_a * fold(&tally.time),
         lag: half * arc.theta_a * fold(&tally.lag),
         work: half * fold(&tally.work),
-        slip: half * fold(&tally.slip),
+        creep: half * fold(&tally.creep),
         state: half * fold(&tally.state),
         sensitivity: half * arc.theta_a * arc.slope_a * sensitivity,
         swing: -half * arc.theta_a * arc.theta_a * sensitivity,
@@ -852,9 +853,10 @@ impl DirectSlice {
             terms.friction[i] = 1.0 + a * found.ln_u[i] + (b - a) * ln_theta[i];
             terms.time[i] = -weight[i] * grow[i] * inverse;
             terms.lag[i] = terms.time[i] * u;
-            terms.slip[i] = -weight[i] * inverse * u;
-            terms.work[i] = terms.slip[i] * terms.friction[i];
-            terms.state[i] = terms.slip[i] * ln_theta[i];
+            let slip = -weight[i] * inverse * u;
+            terms.work[i] = slip * terms.friction[i];
+            terms.creep[i] = slip * (found.ln_u[i] - ln_theta[i]);
+            terms.state[i] = slip * ln_theta[i];
             terms.sensitivity[i] = -terms.time[i] * grow[i] * u * inverse * inverse;
         }
         tally.add(&terms);

@@ -3,12 +3,15 @@
 //! Both ceilings bound `z = ln u`: at `theta = theta_1 e^y` the velocity allows `z_v + y` and friction `z_tau + kappa y`,
 //! `kappa = 1 - b/a` (docs/derivations.md, "Ceilings").
 
-use super::clamp::Gap;
+use multiversion::multiversion;
+
+use super::clamp::{Depth, Gap};
 use super::lifetime::Lifetime;
 use super::{ArcKind, Bounds};
 use crate::model::Law;
 use crate::numerics::elementary::{exp, exp_and_m1, exp_m1, ln, ln_1p};
-use crate::numerics::gauss::rule;
+use crate::numerics::gauss::{Rule, rule};
+use crate::numerics::lanes::{LANES, fold};
 
 /// The ceilings of a problem that ends in steady sliding.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -107,7 +110,7 @@ pub(super) struct CeilingArc {
 }
 
 /// Nodes of a panel on a ceiling.
-pub(super) const NODES: usize = 16;
+const NODES: usize = 16;
 
 /// Integrals over time along an arc on a ceiling.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -115,8 +118,8 @@ pub(super) struct CeilingSums {
     pub time: f64,
     /// Work of friction.
     pub work: f64,
-    /// Slip, `int v dt`.
-    pub slip: f64,
+    /// `int v ln v dt`.
+    pub creep: f64,
     /// `int v ln theta dt`.
     pub state: f64,
     /// Integral of the multiplier.
@@ -129,12 +132,11 @@ pub(super) struct CeilingSums {
 }
 
 /// Place and weight of a node on a ceiling.
-pub(super) struct CeilingNode {
-    /// `ln(theta_hi/theta)`.
-    pub depth: f64,
-    pub z: f64,
+struct CeilingNode {
+    depth: Depth,
+    z: f64,
     /// Its weight in time.
-    pub dt: f64,
+    dt: f64,
 }
 
 impl CeilingArc {
@@ -148,6 +150,11 @@ impl CeilingArc {
         if self.kind == ArcKind::VCeiling { 1.0 } else { self.ceilings.kappa }
     }
 
+    /// The end of greater or of smaller theta.
+    pub fn end(&self, high: bool) -> Depth {
+        if high { Depth { below: 0.0, above: self.length } } else { Depth { below: self.length, above: 0.0 } }
+    }
+
     /// Duration.
     pub fn time(&self) -> f64 {
         match self.kind {
@@ -157,9 +164,12 @@ impl CeilingArc {
                 theta_lo * exp_m1(self.length) / exp_m1(self.z_hi).abs()
             }
             _ => {
-                let mut time = 0.0;
-                let lingered = self.linger(|node| time += node.dt);
-                time + lingered
+                let line = FrictionLine::of(self);
+                let mut time = line.lingered;
+                for chart in line.charts(self) {
+                    chart.panels(|middle, half, rule| time += line.time(&chart, middle, half, rule));
+                }
+                time
             }
         }
     }
@@ -170,86 +180,47 @@ impl CeilingArc {
         ln_1p(u * exp_m1(self.length) / x)
     }
 
-    /// Visits the nodes of the arc.
-    pub fn visit(&self, mut node: impl FnMut(&CeilingNode)) -> f64 {
-        match self.kind {
-            ArcKind::VCeiling => {
-                self.visit_v(&mut node);
-                0.0
-            }
-            _ => self.linger(node),
-        }
-    }
-
-    /// On the ceiling of the velocity: in `ln x`, `x = u - 1`, whose singularities are `pi` off the real axis.
-    fn visit_v(&self, node: &mut impl FnMut(&CeilingNode)) {
-        let length = self.length_v();
-        let x_lo = exp_m1(self.z_lo);
-        let v = self.ceilings.v;
-        panels(0.0, length, PANEL_V, |s, weight| {
-            let z = ln_1p(x_lo * exp(s));
-            node(&CeilingNode { depth: self.z_hi - z, z, dt: weight.abs() / v });
-        });
-    }
-
-    /// On the ceiling of friction, in two charts: `ln |z|` near `u = 1`, `ln theta` beyond. Returns what time is spent
-    /// closer to `u = 1` than that shows.
-    fn linger(&self, mut node: impl FnMut(&CeilingNode)) -> f64 {
-        let slope = self.ceilings.kappa.abs();
-        // s counts ln theta from the end where |z| is least.
-        let high_first = self.z_hi.abs() <= self.z_lo.abs();
-        let sign = 1f64.copysign(if self.z_hi == 0.0 { self.z_lo } else { self.z_hi });
-        let least = if high_first { self.z_hi.abs() } else { self.z_lo.abs() };
-        let mut visit = |s: f64, size: f64, weight: f64| {
-            let depth = if high_first { s } else { self.length - s };
-            let z = sign * size;
-            let theta = self.theta_hi * exp(-depth);
-            node(&CeilingNode { depth, z, dt: theta * weight / exp_m1(z).abs() });
-        };
-        if slope == 0.0 {
-            panels(0.0, self.length, 1.0, |s, weight| visit(s, least, weight));
+    /// Visits the nodes of the arc; returns the time without nodes.
+    fn visit(&self, mut node: impl FnMut(&CeilingNode)) -> f64 {
+        if self.kind == ArcKind::VCeiling {
+            // In ln x, x = u - 1, whose singularities are pi off the real axis.
+            let chart = Chart { near: false, from: 0.0, to: self.length_v(), longest: PANEL_V };
+            let (x_lo, v) = (exp_m1(self.z_lo), self.ceilings.v);
+            chart.nodes(|s, weight| {
+                let z = ln_1p(x_lo * exp(s));
+                let depth = Depth { below: self.z_hi - z, above: z - self.z_lo };
+                node(&CeilingNode { depth, z, dt: weight.abs() / v });
+            });
             return 0.0;
         }
-        let near = slope.min(1.0);
-        let mut start = 0.0;
-        let mut lingered = 0.0;
-        if self.ln_z < ln(0.5 * near) {
-            let greatest = (least + slope * self.length).min(near);
-            let from = self.ln_z.max(LN_TINY);
-            if self.ln_z < from {
-                let theta = if high_first { self.theta_hi } else { self.theta_hi * exp(-self.length) };
-                lingered = theta / slope * (from - self.ln_z);
-            }
-            panels(from, ln(greatest), PANEL_NEAR, |zeta, weight| {
-                let size = exp(zeta);
-                visit(((size - least) / slope).max(0.0), size, weight * size / slope);
+        let line = FrictionLine::of(self);
+        for chart in line.charts(self) {
+            chart.nodes(|at, weight| {
+                let (s, size, scale) = line.place(chart.near, at);
+                let (near, far) = (s, self.length - s);
+                let (below, above) = if line.high_first { (near, far) } else { (far, near) };
+                let (depth, z) = (Depth { below, above }, line.sign * size);
+                node(&CeilingNode { depth, z, dt: self.theta_hi * exp(-below) * weight * scale / exp_m1(z).abs() });
             });
-            start = (greatest - least) / slope;
         }
-        let panel = 2.0 * (1.0 / slope).min(1.0).min((least + slope * start) / slope);
-        // What is this much farther from u = 1 takes no time, where theta falls on the way there.
-        let end = if high_first && sign > 0.0 { self.length.min(start + NOTHING / slope) } else { self.length };
-        if end > start {
-            panels(start, end, panel, |s, weight| visit(s, least + slope * s, weight));
-        }
-        lingered
+        line.lingered
     }
 
-    /// Time, work and slip; the prices as well if `G` is given.
+    /// Time, work and its parts; the prices as well if `G` is given.
     pub fn sums(&self, gap: Option<&Gap>) -> CeilingSums {
         let ln_theta_hi = ln(self.theta_hi);
         let Law { a, b } = self.ceilings.law;
         let mut sums = CeilingSums::default();
         let of_v = self.kind == ArcKind::VCeiling;
         let lingered = self.visit(|&CeilingNode { depth, z, dt }| {
-            let ln_theta = ln_theta_hi - depth;
+            let ln_theta = ln_theta_hi - depth.below;
             let (u, excess) = exp_and_m1(z);
             let v = if of_v { self.ceilings.v } else { u * exp(-ln_theta) };
             let ln_v = z - ln_theta;
             let friction = if of_v { 1.0 + a * ln_v + b * ln_theta } else { self.ceilings.tau };
             sums.time += dt;
-            sums.slip += v * dt;
             sums.work += friction * v * dt;
+            sums.creep += v * ln_v * dt;
             sums.state += v * ln_theta * dt;
             sums.nodes += 1;
             if let Some(gap) = gap {
@@ -262,12 +233,12 @@ impl CeilingArc {
         });
         if lingered > 0.0 {
             // Steady sliding on the ceiling, at one lifetime, where G/(u - 1) has a limit.
-            let depth = if self.z_hi.abs() <= self.z_lo.abs() { 0.0 } else { self.length };
-            let ln_theta = ln_theta_hi - depth;
+            let depth = self.end(self.z_hi.abs() <= self.z_lo.abs());
+            let ln_theta = ln_theta_hi - depth.below;
             let slip = lingered * exp(-ln_theta);
             sums.time += lingered;
-            sums.slip += slip;
             sums.work += self.ceilings.tau * slip;
+            sums.creep -= ln_theta * slip;
             sums.state += ln_theta * slip;
             if let Some(gap) = gap {
                 let price = (b - a + gap.pull(depth)) / (a * self.ceilings.kappa) * slip;
@@ -277,6 +248,144 @@ impl CeilingArc {
             }
         }
         sums
+    }
+}
+
+/// An arc on the ceiling of friction as a line in `s`, `ln theta` from the end where `|z|` is least.
+struct FrictionLine {
+    theta_hi: f64,
+    length: f64,
+    /// Whether `|z|` is least at the end of greater theta.
+    high_first: bool,
+    /// Sign of `z`, its least absolute value and the slope of that.
+    sign: f64,
+    least: f64,
+    slope: f64,
+    /// Time closer to `u = 1` than nodes show.
+    lingered: f64,
+}
+
+/// A part of a line with its coordinate.
+#[derive(Clone, Copy)]
+struct Chart {
+    /// The coordinate is `ln |z|`, for the neighbourhood of `u = 1`, or `s`.
+    near: bool,
+    from: f64,
+    to: f64,
+    /// Longest panel.
+    longest: f64,
+}
+
+impl FrictionLine {
+    fn of(arc: &CeilingArc) -> FrictionLine {
+        let high_first = arc.z_hi.abs() <= arc.z_lo.abs();
+        let slope = arc.ceilings.kappa.abs();
+        let lingered = if arc.ln_z < LN_TINY && slope > 0.0 {
+            let theta = arc.theta_hi * if high_first { 1.0 } else { exp(-arc.length) };
+            theta / slope * (LN_TINY - arc.ln_z)
+        } else {
+            0.0
+        };
+        FrictionLine {
+            theta_hi: arc.theta_hi,
+            length: arc.length,
+            high_first,
+            sign: 1f64.copysign(arc.z_hi + arc.z_lo),
+            least: arc.z_hi.abs().min(arc.z_lo.abs()),
+            slope,
+            lingered,
+        }
+    }
+
+    /// Both charts; either may be empty.
+    fn charts(&self, arc: &CeilingArc) -> [Chart; 2] {
+        let (slope, least) = (self.slope, self.least);
+        if slope == 0.0 {
+            let all = Chart { near: false, from: 0.0, to: self.length, longest: 1.0 };
+            return [Chart { to: 0.0, ..all }, all];
+        }
+        let near = slope.min(1.0);
+        let (mut from, mut to, mut start) = (0.0, 0.0, 0.0);
+        if arc.ln_z < ln(0.5 * near) {
+            let greatest = (least + slope * self.length).min(near);
+            (from, to) = (arc.ln_z.max(LN_TINY), ln(greatest));
+            start = (greatest - least) / slope;
+        }
+        let longest = PANEL_FAR * (1.0 / slope).min(1.0).min((least + slope * start) / slope);
+        // What is this much farther from u = 1 takes no time, where theta falls on the way there.
+        let falls = self.high_first && self.sign > 0.0;
+        let end = if falls { self.length.min(start + NOTHING / slope) } else { self.length };
+        [
+            Chart { near: true, from, to, longest: PANEL_NEAR },
+            Chart { near: false, from: start, to: end.max(start), longest },
+        ]
+    }
+
+    /// `s`, `|z|` and `ds` over the change of the coordinate.
+    #[inline(always)]
+    fn place(&self, near: bool, at: f64) -> (f64, f64, f64) {
+        if near {
+            let size = exp(at);
+            let s = (size - self.least) / self.slope;
+            (if s > 0.0 { s } else { 0.0 }, size, size / self.slope)
+        } else {
+            (at, self.least + self.slope * at, 1.0)
+        }
+    }
+
+    /// Time on a panel.
+    fn time(&self, chart: &Chart, middle: f64, half: f64, rule: &Rule) -> f64 {
+        match (rule.x.first_chunk(), rule.w.first_chunk()) {
+            (Some(x), Some(w)) => half * self.theta_hi * friction_time(self, chart.near, [middle, half], x, w),
+            _ => f64::NAN,
+        }
+    }
+}
+
+/// `int e^-depth/|e^z - 1| ds` over a panel of the middle and half length given.
+#[multiversion(targets(
+    "x86_64+avx+avx2+bmi1+bmi2+avx512f+avx512bw+avx512cd+avx512dq+avx512vl",
+    "x86_64+avx+avx2+bmi1+bmi2"
+))]
+fn friction_time(line: &FrictionLine, near: bool, [middle, half]: [f64; 2], x: &[f64; NODES], w: &[f64; NODES]) -> f64 {
+    let (mut depth, mut size, mut scale) = ([0.0; NODES], [0.0; NODES], [0.0; NODES]);
+    for i in 0..NODES {
+        let (s, at, stretch) = line.place(near, middle + half * x[i]);
+        depth[i] = if line.high_first { s } else { line.length - s };
+        (size[i], scale[i]) = (at, stretch);
+    }
+    let mut sum = [0.0; LANES];
+    for first in (0..NODES).step_by(LANES) {
+        for lane in 0..LANES {
+            let i = first + lane;
+            let excess = exp_m1(line.sign * size[i]);
+            sum[lane] += w[i] * scale[i] * exp(-depth[i]) / if excess < 0.0 { -excess } else { excess };
+        }
+    }
+    fold(&sum)
+}
+
+impl Chart {
+    /// Equal panels by middle and half length.
+    fn panels(&self, mut panel: impl FnMut(f64, f64, &Rule)) {
+        if self.from == self.to {
+            return;
+        }
+        let count = ((self.to - self.from).abs() / self.longest).ceil().max(1.0);
+        let half = 0.5 * (self.to - self.from) / count;
+        let rule = rule(NODES);
+        for i in 0..count as u32 {
+            panel(self.from + half * f64::from(2 * i + 1), half, rule);
+        }
+    }
+
+    /// Nodes and weights.
+    fn nodes(&self, mut node: impl FnMut(f64, f64)) {
+        self.panels(|middle, half, rule| {
+            for (x, w) in rule.x.iter().zip(&rule.w) {
+                node(middle + half * x, half * w);
+            }
+        });
     }
 }
 
@@ -292,15 +401,5 @@ const PANEL_V: f64 = 4.0;
 /// Longest panel in `ln |z|`: the singularities at `ln 2 pi + pi i/2` leave `4^-32`.
 const PANEL_NEAR: f64 = 3.0;
 
-/// Gauss rules on equal panels, none longer than `longest`.
-fn panels(from: f64, to: f64, longest: f64, mut node: impl FnMut(f64, f64)) {
-    let count = ((to - from).abs() / longest).ceil().max(1.0);
-    let half = 0.5 * (to - from) / count;
-    let rule = rule(NODES);
-    for panel in 0..count as u32 {
-        let middle = from + half * f64::from(2 * panel + 1);
-        for (x, w) in rule.x.iter().zip(&rule.w) {
-            node(middle + half * x, half * w);
-        }
-    }
-}
+/// Longest panel in `ln theta`, in units of the distance from `u = 1` and of the change of `z` by 1: `3^-32` is left.
+const PANEL_FAR: f64 = 3.0;

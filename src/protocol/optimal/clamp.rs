@@ -5,7 +5,7 @@
 
 use super::ArcKind;
 use super::arc::{Arc, Chart, Sums, phi, phi_and_slope};
-use super::ceiling::{CeilingArc, CeilingSums, Ceilings};
+use super::ceiling::{CeilingArc, Ceilings};
 use super::extremal::{Extremal, FreeSums, Problem};
 use super::lifetime::Lifetime;
 use crate::model::Law;
@@ -104,10 +104,12 @@ impl Fall {
             } else {
                 value / (phi_slope - energy_slope)
             };
-            if step.abs() <= RESOLUTION * d {
+            let next = d - step;
+            // Newton's method squares the relative error.
+            if step.abs() <= STEP * d {
+                d = next.max(from).min(to);
                 break;
             }
-            let next = d - step;
             d = if next > from && next < to { next } else { 0.5 * (from + to) };
         }
         breaks.add(d);
@@ -117,8 +119,8 @@ impl Fall {
 /// More steps than Newton's method takes.
 const MOST_STEPS: u32 = 100;
 
-/// Relative resolution of a depth.
-const RESOLUTION: f64 = 4e-16;
+/// Relative step after which the next one is rounding.
+const STEP: f64 = 1e-9;
 
 /// Depths at which pieces end, in any order.
 struct Breaks {
@@ -160,29 +162,45 @@ pub(super) struct Gap {
     b: f64,
     /// `d ln u/d ln theta`.
     rise: f64,
-    /// The depth below the end of greater theta, the value, `u` and `C theta` there.
-    at: f64,
+    /// Whether it counts from the end of greater theta, or from the other.
+    from_high: bool,
+    /// The value, `u` and `C theta` there.
     value: f64,
     u: f64,
     pull: f64,
 }
 
+/// A place on an arc by `ln theta` below its end of greater theta, and above the other: near an end only one of them has
+/// its digits.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Depth {
+    pub below: f64,
+    pub above: f64,
+}
+
 impl Gap {
-    /// Refers to the depth at which the value is known.
-    fn refer(&mut self, arc: &CeilingArc, depth: f64, value: f64) {
-        self.pull = self.pull(depth);
-        self.u = exp(if depth == arc.length { arc.z_lo } else { arc.z_hi - self.rise * depth });
-        (self.at, self.value) = (depth, value);
+    /// Refers to an end at which the value is known.
+    fn refer(&mut self, arc: &CeilingArc, to_high: bool, value: f64) {
+        if self.from_high != to_high {
+            self.pull *= exp(if to_high { arc.length } else { -arc.length });
+        }
+        self.u = exp(if to_high { arc.z_hi } else { arc.z_lo });
+        (self.from_high, self.value) = (to_high, value);
     }
 
-    /// `C theta` at a depth below the end of greater theta.
-    pub fn pull(&self, depth: f64) -> f64 {
-        self.pull * exp(self.at - depth)
+    /// `ln theta` from the end that it counts from.
+    fn way(&self, depth: Depth) -> f64 {
+        if self.from_high { -depth.below } else { depth.above }
     }
 
-    /// The value at a depth below the end of greater theta.
-    pub fn value(&self, depth: f64) -> f64 {
-        let y = self.at - depth;
+    /// `C theta`.
+    pub fn pull(&self, depth: Depth) -> f64 {
+        self.pull * exp(self.way(depth))
+    }
+
+    /// The value.
+    pub fn value(&self, depth: Depth) -> f64 {
+        let y = self.way(depth);
         let of_v = self.rise == 1.0;
         let (grown, bend) = if of_v { (exp_m1(y), self.b * y) } else { (exp_m1(self.rise * y), 0.0) };
         self.value + self.a * self.u * grown - self.pull * exp_m1(y) - bend
@@ -204,7 +222,7 @@ pub(super) struct Path {
 pub(super) struct PathSums {
     /// Time at the floor and all pieces.
     pub time: f64,
-    /// Without the time at the floor.
+    /// Of the free pieces.
     pub work: f64,
     /// Derivative of the time with respect to the parameter of the family.
     pub rate: f64,
@@ -311,9 +329,9 @@ impl Path {
                     neighbour = Some(Some(0.0));
                     continue;
                 };
-                let (near, far) = if arc.falls() == at_end { (arc.length, 0.0) } else { (0.0, arc.length) };
+                let (near_high, far) = (arc.falls() != at_end, arc.end(arc.falls() == at_end));
                 if let (false, Some(Some(value))) = (known[i], neighbour) {
-                    gap.refer(arc, near, value);
+                    gap.refer(arc, near_high, value);
                     known[i] = true;
                 }
                 neighbour = Some(known[i].then(|| gap.value(far)));
@@ -341,17 +359,23 @@ impl Path {
                     free.at_end |= at[1];
                     free.swing += swing;
                 }
-                Piece::Ceiling { arc, .. } => {
-                    let CeilingSums { time, work, nodes, .. } = arc.sums(None);
-                    found.time += time;
-                    found.work += work;
-                    found.nodes += nodes;
-                }
+                Piece::Ceiling { arc, .. } => found.time += arc.time(),
             }
         }
         let rate = self.extremal.rate_of(&free);
         found.rate = self.rate.unwrap_or(rate);
         (found.time.is_finite() && found.work.is_finite()).then_some(found)
+    }
+
+    /// Work on the ceilings, and the nodes that it takes.
+    pub fn ceiling_work(&self) -> (f64, u32) {
+        self.pieces().fold((0.0, 0), |(work, nodes), piece| match piece {
+            Piece::Free { .. } => (work, nodes),
+            Piece::Ceiling { arc, .. } => {
+                let sums = arc.sums(None);
+                (work + sums.work, nodes + sums.nodes)
+            }
+        })
     }
 
     /// Times on the ceilings of the velocity and of friction.
@@ -465,7 +489,7 @@ fn ceiling_part(ceilings: &Ceilings, fall: &Fall, kind: ArcKind, from: f64, to: 
 /// `G` of an arc from its `value` at the end of greater theta, where `C theta` is `pull`.
 fn gap_of(law: Law, arc: &CeilingArc, pull: f64, value: f64) -> Gap {
     let rise = arc.rise();
-    Gap { a: law.a, b: law.b, rise, at: 0.0, value, u: exp(arc.z_hi), pull }
+    Gap { a: law.a, b: law.b, rise, from_high: true, value, u: exp(arc.z_hi), pull }
 }
 
 impl Piece {

@@ -2,7 +2,7 @@
 
 use super::ArcKind;
 use super::ceiling::{CeilingArc, Ceilings};
-use super::clamp::{Gap, Path, Piece};
+use super::clamp::{Depth, Gap, Path, Piece};
 use super::extremal::Problem;
 use super::motion::{Floor, Timed};
 use crate::model::Law;
@@ -138,8 +138,9 @@ impl TimedCeiling {
         } else {
             (self.end - left).max(self.start + 0.5 * all)
         };
-        let (depth, z) = if arc.falls() { (before.length, after.z_hi) } else { (after.length, after.z_lo) };
-        let theta = arc.theta_hi * exp(-depth);
+        let (high, low) = if arc.falls() { (before, after) } else { (after, before) };
+        let (depth, z) = (Depth { below: high.length, above: low.length }, high.z_lo);
+        let theta = arc.theta_hi * exp(-depth.below);
         let of_v = arc.kind == ArcKind::VCeiling;
         let friction = if of_v { 1.0 + a * ln(ceilings.v) + b * ln(theta) } else { ceilings.tau };
         let pressed = if z == 0.0 { 0.0 } else { self.gap.value(depth) / exp_m1(z) };

@@ -87,10 +87,10 @@ impl Constrained {
 /// Solves `problem` in `time` under the ceilings.
 pub(super) fn find(problem: &Problem, ceilings: &Ceilings, time: Time, rtol: f64) -> Constrained {
     let (free, member) = search::find_beyond(problem, time, rtol);
-    if let Some(optimum) = free.value
-        && optimum.v_start.max(optimum.v_end) <= ceilings.v
-        && optimum.friction_max <= ceilings.tau
-    {
+    let none = ceilings.v == f64::INFINITY && ceilings.tau == f64::INFINITY;
+    let obeys =
+        |optimum: Optimum| optimum.v_start.max(optimum.v_end) <= ceilings.v && optimum.friction_max <= ceilings.tau;
+    if none || free.value.is_some_and(obeys) {
         let path = member.map(|member| {
             let mut path = Path::new(member.extremal);
             path.push(whole(problem, &member.extremal));
@@ -105,9 +105,13 @@ pub(super) fn find(problem: &Problem, ceilings: &Ceilings, time: Time, rtol: f64
     let t_f = time.whole;
     match feasible(problem, ceilings) {
         Feasible::Never(_) => Constrained::without_numbers(Status::Infeasible, stats),
-        Feasible::Sitting(_) => sitting(problem, ceilings, t_f, rtol, stats),
         Feasible::Times(least, most) if t_f < least || t_f > most => {
             Constrained::without_numbers(Status::Infeasible, stats)
+        }
+        Feasible::Sitting(_) => sitting(problem, ceilings, t_f, rtol, stats),
+        // Without ceilings an extremal falls below the floor: friction is too low for the family to be ordered.
+        _ if free.value.is_none() && free.status == Status::Unproven => {
+            Constrained::without_numbers(Status::Unproven, stats)
         }
         Feasible::Times(least, most) => {
             let search = Search { problem, ceilings, t_f, least, most, rtol, stats };
@@ -315,10 +319,10 @@ impl Search<'_> {
         let room = beyond.min(left);
         let doubt = 4.0 * f64::EPSILON * t_f / room;
         let accuracy = Accuracy::new(rtol, doubt, problem.law.a);
-        let tolerance = (accuracy.exact * (room / t_f).min(1.0)).max(FINEST);
+        let mut tolerance = (accuracy.exact * (room / t_f).min(1.0)).max(FINEST);
         let sign = if interval.rises { 1.0 } else { -1.0 };
         let mut stats = self.stats;
-        let mut probe = |p: f64| {
+        let mut probe = |p: f64, tolerance: f64| {
             let path = member(p)?;
             let sums = path.sums(tolerance)?;
             stats.quadratures += 1;
@@ -338,23 +342,30 @@ impl Search<'_> {
             };
             Some((path, sums, probe))
         };
-        let enough = ENOUGH + doubt;
+        let mut enough = ENOUGH + doubt;
         let (mut start, mut outcome) = (interval.start, None);
         for _ in 0..MOST_SEARCHES {
             let root = newton_in_pieces(
-                |p| probe(p).map(|(path, _, probe)| (probe, path.signature())),
+                |p| probe(p, tolerance).map(|(path, _, probe)| (probe, path.signature())),
                 start,
                 interval.bracket,
                 interval.rises,
                 enough,
                 accuracy.least.sqrt().min(enough),
             );
-            outcome = root.and_then(|(root, _)| Some((root.x, probe(root.x)?)));
-            match &outcome {
-                // Its step was good, and so is the next.
-                Some((_, (_, _, last))) if last.value.abs() <= 10.0 * enough => break,
-                Some((x, _)) => start = *x,
-                None => break,
+            outcome = root.and_then(|(root, _)| Some((root.x, probe(root.x, tolerance)?)));
+            let Some((x, (path, _, last))) = &outcome else { break };
+            start = *x;
+            // Short arcs on a ceiling change much with the parameter, those at a peak of friction by the square root.
+            let (of_v, of_tau) = path.times();
+            let share = ((of_v + of_tau) / t_f).powi(2);
+            let finer = (tolerance * share).max(FINEST);
+            let good = last.value * last.value <= (SHORT_ENOUGH * rtol * share).max(doubt * doubt);
+            if share >= SHORT && last.value.abs() <= 10.0 * enough || good && finer >= tolerance {
+                break;
+            }
+            if share < SHORT && share > 0.0 {
+                (tolerance, enough) = (finer.min(tolerance), (SHORT_ENOUGH * rtol * share).sqrt().max(doubt));
             }
         }
         let found = outcome.filter(|(_, (_, _, last))| last.value.abs() <= JUMP.max(10.0 * enough));
@@ -369,8 +380,10 @@ impl Search<'_> {
             return Constrained::without_numbers(status, stats);
         };
         let (c_probed, c) = (probed.extremal.arc.c(), path.extremal.arc.c());
-        let work = floor::work(&problem.law, problem.from, probed.extremal.time_at_floor) + sums.work
-            - 0.5 * (c_probed + c) * (t_f - sums.time);
+        let (ceiling_work, nodes) = probed.ceiling_work();
+        self.stats.nodes += nodes;
+        let held_work = floor::work(&problem.law, problem.from, probed.extremal.time_at_floor);
+        let work = held_work + sums.work + ceiling_work - 0.5 * (c_probed + c) * (t_f - sums.time);
         let solved = self.read(&path, work, sums.friction_min);
         Constrained { solved, path: solved.value.map(|_| path), sitting: 0.0 }
     }
@@ -445,6 +458,12 @@ fn lifetime(ln_theta: f64) -> Lifetime {
 
 /// A relative difference of times from which Newton's method leaves rounding in two steps.
 const ENOUGH: f64 = 1e-4;
+
+/// Square of the fraction of the time that short arcs on a ceiling take, at most.
+const SHORT: f64 = 0.01;
+
+/// Square of the value that a search for them may leave, in units of the accuracy.
+const SHORT_ENOUGH: f64 = 0.01;
 
 /// Searches until the last step is as good as its slope promises.
 const MOST_SEARCHES: u32 = 4;

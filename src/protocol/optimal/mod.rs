@@ -189,8 +189,8 @@ pub fn solve(transition: &Transition, t_f: f64, bounds: impl Into<Bounds>, rtol:
 const INFEASIBLE: Solved<Optimum> =
     Solved { status: Status::Infeasible, value: None, stats: SolverStats { quadratures: 0, nodes: 0 } };
 
-/// The optimal protocol and the derivatives of its work; `None` where the work has a corner: at the least time, and where
-/// the protocol ends in steady sliding on a ceiling.
+/// The optimal protocol and the derivatives of its work; `None` at the least time of a deceleration. Where the protocol ends
+/// in steady sliding on a ceiling the work has a corner: those by the ceiling and by `v_f` are NaN.
 pub fn slopes(
     transition: &Transition,
     t_f: f64,
@@ -201,8 +201,10 @@ pub fn slopes(
     let Constrained { mut solved, path, sitting } =
         constrained::find(&problem, &ceilings, Time::since(&problem, t_f), rtol);
     let tolerance = search::quadrature_tolerance(rtol);
-    let slopes =
-        path.filter(|_| sitting == 0.0).and_then(|path| slopes::slopes(&problem, &path, tolerance, &mut solved.stats));
+    let of_friction = solved.value.is_some_and(|optimum| sitting > 0.0 && optimum.time_at_tau_ceiling > 0.0);
+    let slopes = path
+        .filter(|_| !of_friction)
+        .and_then(|path| slopes::slopes(&problem, &path, sitting, tolerance, &mut solved.stats));
     (solved, slopes)
 }
 

@@ -45,11 +45,6 @@ pub(super) const ROUNDING: f64 = 1e-9;
 /// Tightest tolerance of a quadrature.
 pub(super) const FINEST: f64 = 1e-18;
 
-/// Solves `problem` in time `t_f` to relative accuracy `rtol`.
-pub(super) fn solve(problem: &Problem, t_f: f64, rtol: f64) -> Solved<Optimum> {
-    find(problem, t_f, rtol).0
-}
-
 /// The solution and its extremal; `None` without a solution, or without an arc after the floor.
 pub(super) fn find(problem: &Problem, t_f: f64, rtol: f64) -> (Solved<Optimum>, Option<Member>) {
     find_beyond(problem, Time::since(problem, t_f), rtol)

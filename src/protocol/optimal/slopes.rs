@@ -9,12 +9,17 @@ use crate::numerics::elementary::{exp, exp_m1, ln};
 use crate::numerics::turning::turning;
 use crate::protocol::SolverStats;
 
-/// The derivatives of the work of `path`, whose quadratures are good to `tolerance`.
-pub(super) fn slopes(problem: &Problem, path: &Path, tolerance: f64, stats: &mut SolverStats) -> Option<Slopes> {
-    let Law { a, b } = problem.law;
+/// The derivatives of the work of `path`, then steady sliding for the time `sitting`; quadratures are good to `tolerance`.
+pub(super) fn slopes(
+    problem: &Problem,
+    path: &Path,
+    sitting: f64,
+    tolerance: f64,
+    stats: &mut SolverStats,
+) -> Option<Slopes> {
     let held = path.extremal.time_at_floor;
     // At the floor ln v = 0, and the work is that of b = 1.
-    let aged = floor::work(&Law { a, b: 1.0 }, problem.from, held) - held;
+    let aged = floor::work(&Law { b: 1.0, ..problem.law }, problem.from, held) - held;
     let mut slopes = Slopes { a: 0.0, b: aged, v_i: 0.0, v_f: 0.0, v_ceiling: 0.0, tau_ceiling: 0.0 };
     for piece in path.pieces() {
         match piece {
@@ -22,13 +27,13 @@ pub(super) fn slopes(problem: &Problem, path: &Path, tolerance: f64, stats: &mut
                 let sums = arc.sums(tolerance)?;
                 stats.quadratures += 1;
                 stats.nodes += sums.nodes;
-                slopes.a += (sums.work - sums.slip - b * sums.state) / a;
+                slopes.a += sums.creep;
                 slopes.b += sums.state;
             }
             Piece::Ceiling { arc, gap } => {
                 let sums = arc.sums(Some(gap));
                 stats.nodes += sums.nodes;
-                slopes.a += (sums.work - sums.slip - b * sums.state) / a;
+                slopes.a += sums.creep;
                 slopes.b += sums.state;
                 if arc.kind == ArcKind::VCeiling {
                     slopes.v_ceiling -= sums.price;
@@ -44,6 +49,12 @@ pub(super) fn slopes(problem: &Problem, path: &Path, tolerance: f64, stats: &mut
     slopes.v_i = -costate(problem, path)? * theta_i * theta_i;
     let last = path.pieces().last()?;
     slopes.v_f = pressure(problem.law, last, true) * theta_f * theta_f;
+    if sitting > 0.0 {
+        let slip = sitting / theta_f;
+        slopes.a -= slip * problem.to.ln;
+        slopes.b += slip * problem.to.ln;
+        (slopes.v_f, slopes.v_ceiling) = (f64::NAN, f64::NAN);
+    }
     Some(slopes)
 }
 
@@ -62,10 +73,7 @@ fn pressure(law: Law, piece: &Piece, at_end: bool) -> f64 {
     let friction = 1.0 + law.a * z + (law.b - law.a) * ln(theta);
     let pressed = match piece {
         Piece::Free { .. } => 0.0,
-        Piece::Ceiling { arc, gap } => {
-            let depth = if arc.falls() == at_end { arc.length } else { 0.0 };
-            gap.value(depth) / exp_m1(z)
-        }
+        Piece::Ceiling { arc, gap } => gap.value(arc.end(arc.falls() != at_end)) / exp_m1(z),
     };
     (friction + law.a - pressed) / theta
 }
