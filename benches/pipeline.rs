@@ -245,7 +245,7 @@ fn ours(layout: &Layout, row_index: &RowIndex, buffer: &ColumnBuffer, footer: &F
 
 /// `ArrowWriter` with the encodings and the compression of the program: no digest, and no checksums, which it cannot write.
 fn arrow(layout: &Layout, row_index: &RowIndex, buffer: &ColumnBuffer, footer: &Footer) -> Option<Vec<u8>> {
-    let batch = dataset::batch(layout, row_index, footer.rows.clone(), buffer).ok()?;
+    let batch = dataset::batch(layout, row_index, footer.rows.clone(), buffer.clone()).ok()?;
     let mut properties = WriterProperties::builder()
         .set_compression(Compression::ZSTD(ZstdLevel::try_new(1).ok()?))
         .set_statistics_enabled(EnabledStatistics::Chunk)

@@ -2,8 +2,10 @@
 
 use std::path::PathBuf;
 
+#[cfg(feature = "query")]
 use super::query::unreadable;
 use super::{Failure, kind, no_table, say, summary, words};
+#[cfg(feature = "query")]
 use crate::query::{Source, Tables};
 use crate::table;
 
@@ -22,46 +24,104 @@ pub struct Arguments {
     rows: u32,
 }
 
+/// The first rows of a table.
+struct Head {
+    name: String,
+    /// Names, units if there are any, and rows.
+    lines: Vec<Vec<String>>,
+    /// All rows, where they are counted.
+    rows: Option<u64>,
+    /// Missing parts.
+    missing: u64,
+}
+
 /// Prints the first rows of one table or of all tables.
 pub fn head(arguments: &Arguments) -> Result<(), Failure> {
     kind::expect_rows(&arguments.dataset)?;
     super::note_at(&arguments.dataset);
-    let tables = Tables::open(&arguments.dataset)?;
-    let chosen: Vec<&Source> = match &arguments.table {
-        None => tables.sources.iter().collect(),
-        Some(name) => vec![tables.find(name).ok_or_else(|| {
-            let names: Vec<&str> = tables.sources.iter().map(|source| source.name.as_str()).collect();
-            no_table(&format!("{}: ", arguments.dataset.display()), name, &names)
-        })?],
-    };
-    let texts: Vec<String> = chosen.into_iter().map(|source| first(source, arguments)).collect::<Result<_, _>>()?;
+    let texts: Vec<String> = heads(arguments)?.iter().map(Head::text).collect();
     say(&texts.join("\n"))
 }
 
-/// A title, then names, units and rows.
-fn first(source: &Source, arguments: &Arguments) -> Result<String, Failure> {
-    let mut lines = vec![source.columns.clone()];
-    if source.units.iter().any(|unit| !unit.is_empty()) {
-        lines.push(source.units.clone());
-    }
-    source
-        .first(arguments.rows)?
-        .rows(|piece| {
-            lines.extend(piece.iter().map(|row| row.iter().map(summary::shown).collect()));
-            Ok(())
-        })
-        .map_err(|error| unreadable(&arguments.dataset, &error))?;
-    let mut text = source.name.clone();
-    if let Some(rows) = source.rows {
-        text.push_str(&format!(": {}", words::things(rows, "row")));
-        if let Some(table) = table::find(&source.name) {
-            text.push_str(&format!(", each {}", table.doc()));
+/// The first rows of one table or of all, of a dataset or of a file.
+#[cfg(feature = "query")]
+fn heads(arguments: &Arguments) -> Result<Vec<Head>, Failure> {
+    let tables = Tables::open(&arguments.dataset)?;
+    let names: Vec<&str> = tables.sources.iter().map(|source| source.name.as_str()).collect();
+    let first = |source: &Source| {
+        let mut rows = Vec::new();
+        source
+            .first(arguments.rows)?
+            .rows(|piece| {
+                rows.extend(piece.iter().map(|row| row.iter().map(summary::shown).collect()));
+                Ok(())
+            })
+            .map_err(|error| unreadable(&arguments.dataset, &error))?;
+        let lines = under(source.columns.clone(), source.units.clone(), rows);
+        Ok(Head { name: source.name.clone(), lines, rows: source.rows, missing: source.missing })
+    };
+    chosen(arguments, &names)?.into_iter().map(|place| first(&tables.sources[place])).collect()
+}
+
+/// The first rows of one table of a dataset or of all.
+#[cfg(not(feature = "query"))]
+fn heads(arguments: &Arguments) -> Result<Vec<Head>, Failure> {
+    use crate::dataset::frame;
+
+    let (folder, manifest) = super::dataset(&arguments.dataset)?;
+    let names: Vec<&str> = manifest.tables.iter().map(|table| table.name.as_str()).collect();
+    let mut heads = Vec::new();
+    for place in chosen(arguments, &names)? {
+        let table = &manifest.tables[place];
+        let (paths, missing) = folder.verified(&manifest, table).map_err(Failure::failed)?;
+        let Some(first) = paths.first() else { continue };
+        let headings = frame::headings(first).map_err(Failure::failed)?.0;
+        let mut rows: Vec<Vec<String>> = Vec::new();
+        for path in &paths {
+            let wanted = arguments.rows as usize - rows.len();
+            if wanted == 0 {
+                break;
+            }
+            let frame = frame::first(path, wanted).map_err(Failure::failed)?;
+            rows.extend(
+                (0..frame.height).map(|row| frame.row(row).iter().map(|(_, cell)| summary::shown(cell)).collect()),
+            );
         }
-        if source.missing > 0 {
-            text.push_str(&format!("; {} missing", words::things(source.missing, "part")));
-        }
+        let (names, units) = headings.into_iter().map(|heading| (heading.name, heading.unit)).unzip();
+        let lines = under(names, units, rows);
+        heads.push(Head { name: table.name.clone(), lines, rows: Some(table.rows), missing });
     }
-    text.push('\n');
-    text.push_str(&words::aligned(&lines, 2));
-    Ok(text)
+    Ok(heads)
+}
+
+/// The places of the requested tables among `names`.
+fn chosen(arguments: &Arguments, names: &[&str]) -> Result<Vec<usize>, Failure> {
+    let Some(name) = &arguments.table else { return Ok((0..names.len()).collect()) };
+    let place = names.iter().position(|known| known == name);
+    place.map(|place| vec![place]).ok_or_else(|| no_table(&format!("{}: ", arguments.dataset.display()), name, names))
+}
+
+/// Rows under their names and, if there are any, units.
+fn under(names: Vec<String>, units: Vec<String>, rows: Vec<Vec<String>>) -> Vec<Vec<String>> {
+    let units = Some(units).filter(|units| units.iter().any(|unit| !unit.is_empty()));
+    std::iter::once(names).chain(units).chain(rows).collect()
+}
+
+impl Head {
+    /// A line on the table, then names, units and rows.
+    fn text(&self) -> String {
+        let mut text = self.name.clone();
+        if let Some(rows) = self.rows {
+            text.push_str(&format!(": {}", words::things(rows, "row")));
+            if let Some(table) = table::find(&self.name) {
+                text.push_str(&format!(", each {}", table.doc()));
+            }
+            if self.missing > 0 {
+                text.push_str(&format!("; {} missing", words::things(self.missing, "part")));
+            }
+        }
+        text.push('\n');
+        text.push_str(&words::aligned(&self.lines, 2));
+        text
+    }
 }

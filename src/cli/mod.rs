@@ -8,6 +8,10 @@ mod man;
 mod output;
 mod plan;
 mod plot;
+#[cfg(feature = "query")]
+mod query;
+#[cfg(not(feature = "query"))]
+#[path = "without_query.rs"]
 mod query;
 mod report;
 mod run;
@@ -21,6 +25,7 @@ mod watch;
 mod words;
 
 use std::env;
+use std::ffi::OsString;
 use std::fmt::Display;
 use std::fs::{self, OpenOptions};
 use std::io::{self, BufWriter, StdoutLock, Write};
@@ -37,6 +42,7 @@ use clap::{CommandFactory, Parser, Subcommand};
 use self::watch::{Wait, waiting};
 use crate::dataset::{Folder, Manifest, atomic};
 use crate::names::{hint, nearest};
+#[cfg(feature = "query")]
 use crate::query::QueryError;
 use crate::sweep::{SpecError, Sweep, schema};
 
@@ -92,6 +98,7 @@ enum Command {
     /// Show the first rows of a table
     Head(head::Arguments),
     /// Answer a question in SQL
+    #[cfg_attr(not(feature = "query"), command(hide = true))]
     Query(query::Arguments),
     /// Report complete, missing, damaged and foreign parts of a dataset
     Status(status::Arguments),
@@ -119,9 +126,20 @@ use taplo, such as VS Code with Even Better TOML. `slipsweep init` writes both."
 }
 
 /// The failure of a command: its message and its exit code.
-struct Failure {
-    code: u8,
-    message: String,
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Failure {
+    /// The exit code.
+    pub code: u8,
+    /// The message, from `error: ` on.
+    pub message: String,
+}
+
+/// What commands print, for other interfaces.
+pub mod text {
+    pub use super::plan::in_words as plan;
+    pub use super::summary::statistics as summary;
+    pub use super::trace::{Traced, traced};
+    pub use super::verify::summary as audit;
 }
 
 impl Failure {
@@ -136,6 +154,7 @@ impl From<SpecError> for Failure {
     }
 }
 
+#[cfg(feature = "query")]
 impl From<QueryError> for Failure {
     fn from(error: QueryError) -> Failure {
         Failure { code: if error.is_wrong() { WRONG } else { FAILED }, message: format!("error: {error}") }
@@ -148,19 +167,24 @@ static STDOUT_IS_CLOSED: AtomicBool = AtomicBool::new(false);
 /// Runs the command in the arguments of the process. It fails if standard output does not accept the answer, for example because it was closed
 /// from the start.
 pub fn main(stdout_is_closed: bool) -> ExitCode {
+    main_of(env::args_os(), stdout_is_closed).into()
+}
+
+/// Does what the arguments of a process say, the first of which is its name. Returns the exit code.
+pub fn main_of(arguments: impl Iterator<Item = OsString>, stdout_is_closed: bool) -> u8 {
     STDOUT_IS_CLOSED.store(stdout_is_closed, Ordering::Relaxed);
     report_first_panic();
     // Without this signal, a file that exceeds the user's limit fails to write instead of ending the process.
     #[cfg(unix)]
     let _ = signal_hook::flag::register(signal_hook::consts::SIGXFSZ, Arc::new(AtomicBool::new(false)));
-    let arguments = match Arguments::try_parse() {
+    let arguments = match Arguments::try_parse_from(arguments) {
         Ok(arguments) => arguments,
         Err(error) => {
             let error = suggested(error);
             let printed = error.print();
             if error.use_stderr() {
                 // A lost terminal is ignored.
-                return WRONG.into();
+                return WRONG;
             }
             return ended(stdout().and_then(|mut stdout| written(printed.and_then(|()| stdout.flush()))));
         }
@@ -202,12 +226,12 @@ fn perform(arguments: Arguments) -> Result<(), Failure> {
 }
 
 /// Reports the failure of a command, if any, and returns the exit code.
-fn ended(done: Result<(), Failure>) -> ExitCode {
+fn ended(done: Result<(), Failure>) -> u8 {
     match done {
-        Ok(()) => ExitCode::SUCCESS,
+        Ok(()) => 0,
         Err(failure) => {
             let _ = writeln!(io::stderr(), "{}", failure.message);
-            failure.code.into()
+            failure.code
         }
     }
 }
@@ -258,7 +282,11 @@ fn refused(found: impl Display, expected: impl Display, help: impl Display) -> F
 }
 
 /// Opens the dataset in `path`.
-fn dataset(path: &Path) -> Result<(Folder, Manifest), Failure> {
+///
+/// # Errors
+///
+/// The failure that a command reports.
+pub fn dataset(path: &Path) -> Result<(Folder, Manifest), Failure> {
     kind::expect(path, &[Kind::Dataset])?;
     let folder = Folder::at(path);
     match folder.manifest().map_err(Failure::failed)? {

@@ -295,7 +295,9 @@ fn next_commands(sweep: &Sweep, path: &Path) -> String {
     let path = quoted(path);
     let mut text = "next:\n".to_owned();
     text.push_str(&format!("  slipsweep head {path}\n  slipsweep plot {path}\n"));
-    if let Some(question) = sweep.requests.iter().map(question).next() {
+    // A build without SQL does not suggest it.
+    let question = sweep.requests.iter().map(question).next().filter(|_| cfg!(feature = "query"));
+    if let Some(question) = question {
         text.push_str(&format!("  slipsweep query {path} \"{question}\"\n"));
     }
     text

@@ -258,6 +258,52 @@ struct Origin {
 /// Traces a protocol.
 pub fn trace(arguments: &Arguments) -> Result<(), Failure> {
     let (format, output) = (arguments.output.format()?, &arguments.output);
+    let Traced { header, trace, units, facts } = solved(arguments)?;
+    let version = env!("CARGO_PKG_VERSION");
+    let bytes = match format {
+        Format::Table => format!("{header}\n{}", table(&trace, &units)).into_bytes(),
+        Format::Csv => trace::csv(&trace, &units, &facts, version).into_bytes(),
+        Format::Parquet => trace::parquet(&trace, &units, &facts, version).map_err(Failure::failed)?,
+    };
+    if output.is_stdout() {
+        return put(&bytes);
+    }
+    write_file(&output.out, &bytes)?;
+    say(&format!("{header}written to {}\n", output.out.display()))
+}
+
+/// A protocol over time, and its description.
+pub struct Traced {
+    /// Protocol, parameters, work and status in a few lines.
+    pub header: String,
+    /// The moments, in `units`.
+    pub trace: Trace,
+    /// The units of the trace.
+    pub units: Units,
+    /// The same as `header`, as keys and values.
+    pub facts: Vec<(String, String)>,
+}
+
+/// Traces the protocol that the arguments of `slipsweep trace` name.
+///
+/// # Errors
+///
+/// The failure that the command reports.
+pub fn traced(arguments: &[String]) -> Result<Traced, Failure> {
+    /// The command.
+    #[derive(clap::Parser)]
+    #[command(name = "trace")]
+    struct Command {
+        #[command(flatten)]
+        arguments: Arguments,
+    }
+    let name = "trace".to_owned();
+    let command = <Command as clap::Parser>::try_parse_from(std::iter::once(&name).chain(arguments));
+    let command = command.map_err(|error| Failure { code: WRONG, message: error.to_string() })?;
+    solved(&command.arguments)
+}
+
+fn solved(arguments: &Arguments) -> Result<Traced, Failure> {
     let request = match &arguments.table {
         Some(table) => arguments.row_of(table)?,
         None => arguments.request()?,
@@ -272,17 +318,7 @@ pub fn trace(arguments: &Arguments) -> Result<(), Failure> {
         header.push_str(&effects.text());
         facts.extend(effects.facts());
     }
-    let version = env!("CARGO_PKG_VERSION");
-    let bytes = match format {
-        Format::Table => format!("{header}\n{}", table(&trace, &request.units)).into_bytes(),
-        Format::Csv => trace::csv(&trace, &request.units, &facts, version).into_bytes(),
-        Format::Parquet => trace::parquet(&trace, &request.units, &facts, version).map_err(Failure::failed)?,
-    };
-    if output.is_stdout() {
-        return put(&bytes);
-    }
-    write_file(&output.out, &bytes)?;
-    say(&format!("{header}written to {}\n", output.out.display()))
+    Ok(Traced { header, trace, units: request.units, facts })
 }
 
 fn absent(protocol: &str, absence: Absence) -> Failure {

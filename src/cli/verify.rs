@@ -51,7 +51,8 @@ fn units(value: f64) -> String {
     if value < 1e5 { format!("{value:.3}") } else { format!("{value:.1e}") }
 }
 
-fn summary(audit: &Audit) -> String {
+/// The audit of one table in a few lines.
+pub fn summary(audit: &Audit) -> String {
     let mut text =
         format!("{}: {} sampled, rtol {:e}\n", audit.table, words::things(audit.rows as u64, "row"), audit.rtol);
     let mut lines = Vec::new();

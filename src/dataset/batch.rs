@@ -5,6 +5,7 @@ use std::sync::Arc;
 
 use arrow_array::types::Int32Type;
 use arrow_array::{ArrayRef, BooleanArray, DictionaryArray, Float64Array, Int32Array, RecordBatch, StringArray};
+use arrow_buffer::NullBuffer;
 use arrow_schema::ArrowError;
 
 use super::layout::Layout;
@@ -12,7 +13,8 @@ use crate::grid::RowIndex;
 use crate::protocol::Status;
 use crate::table::{ColumnBuffer, Kind};
 
-/// The rows `rows` of a table, whose cells are in `buffer`, with the columns and types of a part on disk.
+/// The rows `rows` of a table, whose cells are in `buffer`, with the columns and types of a part on disk. Numbers are not copied; a missing one
+/// is null, and NaN below that.
 ///
 /// # Errors
 ///
@@ -21,7 +23,7 @@ pub fn batch(
     layout: &Layout,
     row_index: &RowIndex,
     rows: Range<u64>,
-    buffer: &ColumnBuffer,
+    buffer: ColumnBuffer,
 ) -> Result<RecordBatch, ArrowError> {
     let view = row_index.view(rows.clone());
     let mut columns: Vec<ArrayRef> = Vec::with_capacity(layout.schema.fields().len());
@@ -41,18 +43,23 @@ pub fn batch(
         let cells = runs.iter().flat_map(|(word, length)| std::iter::repeat_n(*word, *length));
         columns.push(Arc::new(cells.collect::<DictionaryArray<Int32Type>>()));
     }
-    for (column, cells) in layout.columns.iter().zip(&buffer.columns) {
+    for (column, cells) in layout.columns.iter().zip(buffer.columns) {
         columns.push(match column.kind {
-            Kind::Number(_) | Kind::Quantity(_) => {
-                Arc::new(cells.iter().map(|&cell| some(cell)).collect::<Float64Array>())
-            }
-            Kind::Label(words) => labels(words, cells)?,
+            Kind::Number(_) | Kind::Quantity(_) => Arc::new(numbers(cells)),
+            Kind::Label(words) => labels(words, &cells)?,
             Kind::Flag => Arc::new(cells.iter().map(|&cell| Some(some(cell)? != 0.0)).collect::<BooleanArray>()),
         });
     }
     let status: Vec<f64> = buffer.status.iter().map(|&status| f64::from(status as u8)).collect();
     columns.push(labels(&Status::ALL.map(Status::name), &status)?);
     RecordBatch::try_new(layout.schema.clone(), columns)
+}
+
+/// Numbers, null where there is none.
+fn numbers(cells: Vec<f64>) -> Float64Array {
+    let are_all = cells.iter().all(|cell| !cell.is_nan());
+    let nulls = (!are_all).then(|| NullBuffer::from_iter(cells.iter().map(|cell| !cell.is_nan())));
+    Float64Array::new(cells.into(), nulls)
 }
 
 /// A dictionary array of words from their indices.

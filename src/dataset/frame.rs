@@ -206,9 +206,19 @@ pub fn row(path: &Path, row: usize) -> Result<Row, FrameError> {
     if frame.height == 1 { Ok(frame.row(0)) } else { Err(wrong(path, format!("it has no row {row}"))) }
 }
 
+/// All columns of the first `count` rows of a Parquet file.
+///
+/// # Errors
+/// If the file cannot be read.
+pub fn first(path: &Path, count: usize) -> Result<Frame, FrameError> {
+    open(path, None, Rows::First(count))
+}
+
 /// The selection of rows of a file.
 enum Rows<'a> {
     All,
+    /// So many from the first on.
+    First(usize),
     /// Some row groups.
     Of(Keep<'a>),
     /// The row with this number.
@@ -228,6 +238,7 @@ fn open(path: &Path, names: Option<&[&str]>, rows: Rows<'_>) -> Result<Frame, Fr
         }
         match rows {
             Rows::All => {}
+            Rows::First(count) => builder = builder.with_limit(count),
             Rows::One(row) => builder = builder.with_offset(row).with_limit(1),
             Rows::Of(keep) => {
                 let groups = builder.metadata().row_groups().iter().enumerate();

@@ -366,7 +366,7 @@ fn row(
 ) -> Result<Row, ArrowError> {
     let columns = buffer.columns.iter().map(|column| vec![column[place]]).collect();
     let single = ColumnBuffer { columns, status: vec![buffer.status[place]] };
-    Ok(Row { number, cells: first_row(&batch(layout, row_index, number..number + 1, &single)?) })
+    Ok(Row { number, cells: first_row(&batch(layout, row_index, number..number + 1, single)?) })
 }
 
 impl LeastGaps {

@@ -1,6 +1,7 @@
 //! A block: independent factors, computed axes, and a condition on its points. Rows of its product are numbers in mixed radix.
 
-use std::collections::HashMap;
+use hashbrown::HashTable;
+use hashbrown::hash_table::Entry;
 
 use super::axis::{Axis, Values};
 use super::expression::Expression;
@@ -58,17 +59,38 @@ impl Factor {
         if used.is_empty() || !used.iter().all(|axis| matches!(axis.values, Values::List(_))) {
             return (self.len(), None);
         }
-        let mut seen: HashMap<Vec<u64>, u32> = HashMap::new();
+        if used.iter().any(|axis| is_monotone(&axis.values)) {
+            return (self.len(), None);
+        }
+        // -0 is another way to write 0.
+        let bits = |axis: &Axis, step: u32| (axis.values.at(step.into()) + 0.0).to_bits();
+        let hash = |step: u32| used.iter().fold(0, |hash, axis| mixed(hash ^ bits(axis, step)));
+        let mut seen: HashTable<(u32, u32)> = HashTable::with_capacity(self.len() as usize);
         let mut class_of = Vec::with_capacity(self.len() as usize);
-        for step in 0..self.len() {
-            // -0 is another way to write 0.
-            let tuple: Vec<u64> = used.iter().map(|axis| (axis.values.at(step) + 0.0).to_bits()).collect();
+        for step in 0..self.len() as u32 {
+            let is_same = |&(other, _): &(u32, u32)| used.iter().all(|axis| bits(axis, other) == bits(axis, step));
             let next = seen.len() as u32;
-            class_of.push(*seen.entry(tuple).or_insert(next));
+            class_of.push(match seen.entry(hash(step), is_same, |&(other, _)| hash(other)) {
+                Entry::Occupied(known) => known.get().1,
+                Entry::Vacant(free) => free.insert((step, next)).get().1,
+            });
         }
         let distinct = seen.len() as u64;
         if distinct == self.len() { (distinct, None) } else { (distinct, Some(class_of)) }
     }
+}
+
+/// Whether each value is greater than the one before, or each is less.
+fn is_monotone(values: &Values) -> bool {
+    let Values::List(list) = values else { return true };
+    list.windows(2).all(|pair| pair[0] < pair[1]) || list.windows(2).all(|pair| pair[0] > pair[1])
+}
+
+/// A hash of `bits`: the finaliser of SplitMix64 (Steele, Lea and Flood 2014, doi:10.1145/2714064.2660195).
+fn mixed(bits: u64) -> u64 {
+    let bits = (bits ^ (bits >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+    let bits = (bits ^ (bits >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+    bits ^ (bits >> 31)
 }
 
 /// An axis whose value at a point is computed from other axes of its block.

@@ -15,7 +15,7 @@ use crate::file;
 use crate::grid::{self, Quantity};
 use crate::model::{Scales, Units};
 use crate::table::Kind;
-use crate::trace::COLUMNS;
+use crate::trace::{self, COLUMNS, Trace};
 
 /// Greatest number of points of a line; longer lines are thinned. Chosen: four points per dot of a wide picture in print.
 const MAX_POINTS: usize = 8000;
@@ -64,30 +64,49 @@ pub fn read(path: &Path) -> Result<TraceFile, PlotError> {
         let found = columns.into_iter().map(|column| column.name).collect();
         return Err(PlotError::NoTrace { path: shown, missing, found });
     }
-    let fact = |name: &str| facts.iter().find(|(key, _)| key == &format!("slipsweep.{name}")).map(|(_, value)| value);
-    let number = |name: &&str| Some(((*name).to_owned(), fact(name)?.parse().ok()?));
-    let parameters = [
-        "t_f",
-        "a",
-        "b",
-        "v_i",
-        "v_f",
-        "theta",
-        "t_left",
-        "v_ceiling",
-        "tau_ceiling",
-        "alpha_2",
-        "alpha_3",
-        "k",
-        "m",
-        "delta_t",
-    ]
-    .iter()
-    .filter_map(number);
-    let after = fact("loop").map_or(String::new(), |which| format!(", {which} loop"));
-    let name = label::literal(&format!("{}{after}", fact("protocol").map_or(stem, Clone::clone)));
-    let points = fact("points").and_then(|points| points.parse().ok());
-    Ok(TraceFile { name, parameters: parameters.collect(), columns, points })
+    Ok(TraceFile::new(columns, &facts, stem))
+}
+
+impl TraceFile {
+    /// A trace in memory, with its `facts`.
+    pub fn of(trace: &Trace, units: &Units, facts: &[(String, String)]) -> TraceFile {
+        let column = |place: usize| Column {
+            name: COLUMNS[place].name.to_owned(),
+            unit: units.name(trace::unit(place)).to_owned(),
+            cells: trace.moments.iter().map(|moment| Trace::value(moment, place).unwrap_or(f64::NAN)).collect(),
+        };
+        let facts: Facts = facts.iter().map(|(key, value)| (format!("slipsweep.{key}"), value.clone())).collect();
+        TraceFile::new(trace.columns().into_iter().map(column).collect(), &facts, "trace".to_owned())
+    }
+
+    /// The trace of these columns and facts, named `stem` if no fact names it.
+    fn new(columns: Vec<Column>, facts: &Facts, stem: String) -> TraceFile {
+        let fact =
+            |name: &str| facts.iter().find(|(key, _)| key == &format!("slipsweep.{name}")).map(|(_, value)| value);
+        let number = |name: &&str| Some(((*name).to_owned(), fact(name)?.parse().ok()?));
+        let parameters = [
+            "t_f",
+            "a",
+            "b",
+            "v_i",
+            "v_f",
+            "theta",
+            "t_left",
+            "v_ceiling",
+            "tau_ceiling",
+            "alpha_2",
+            "alpha_3",
+            "k",
+            "m",
+            "delta_t",
+        ]
+        .iter()
+        .filter_map(number);
+        let after = fact("loop").map_or(String::new(), |which| format!(", {which} loop"));
+        let name = label::literal(&format!("{}{after}", fact("protocol").map_or(stem, Clone::clone)));
+        let points = fact("points").and_then(|points| points.parse().ok());
+        TraceFile { name, parameters: parameters.collect(), columns, points }
+    }
 }
 
 fn parquet(path: &Path) -> Result<(Vec<Column>, Facts), PlotError> {

@@ -60,6 +60,6 @@ impl Iterator for Batches<'_> {
         buffer.resize((rows.end - rows.start) as usize);
         // The signal is private, so nothing stops the computation.
         self.request.table.compute(&job, rows.clone(), &mut buffer).ok()?;
-        Some(batch(&self.layout, job.rows, rows, &buffer))
+        Some(batch(&self.layout, job.rows, rows, buffer))
     }
 }

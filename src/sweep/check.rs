@@ -261,7 +261,7 @@ fn blocks(spec: &Spec, units: Option<&Units>, folder: &Path, faults: &mut Faults
     blocks
 }
 
-fn check_rtol(key: &str, rtol: f64) -> Result<(), SpecError> {
+pub(super) fn check_rtol(key: &str, rtol: f64) -> Result<(), SpecError> {
     if RTOL.contains(rtol) {
         return Ok(());
     }
@@ -398,7 +398,7 @@ fn members(landscape: &dyn Table, reduced: &dyn Table, key: &str, grid: &Grid) -
 }
 
 /// The columns with these names, or the default ones.
-fn projection(table: &dyn Table, key: &str, names: Option<&[String]>, faults: &mut Faults) -> Projection {
+pub(super) fn projection(table: &dyn Table, key: &str, names: Option<&[String]>, faults: &mut Faults) -> Projection {
     let known: Vec<&str> = table.columns().iter().map(|column| column.name).collect();
     let Some(names) = names else {
         return Projection::usual(table.columns());

@@ -222,7 +222,7 @@ pub fn compute(
                         Ok(RunStats::default())
                     }
                 };
-                // The receiver lives as long as the scope.
+                // The receiver exists as long as the scope.
                 let _ = give_back.send(buffer);
                 let mut result = locked(result);
                 *result = result.and_then(|work| computed.map(|more| [work, more].into_iter().sum()));

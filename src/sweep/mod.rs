@@ -4,6 +4,7 @@ mod axis;
 mod batches;
 mod block;
 mod check;
+mod direct;
 mod engine;
 mod error;
 mod estimate;
@@ -20,6 +21,7 @@ pub use batches::Batches;
 #[cfg(feature = "cli")]
 pub(crate) use check::check_name;
 pub use check::{Request, Sweep};
+pub use direct::{Direct, Given, RowsError, word};
 pub use engine::{Defect, Outcome, RunError, TableOutcome, compute, pool, run, run_shard};
 pub use error::SpecError;
 pub use estimate::{Estimate, Estimates, estimate, sizes};

@@ -31,12 +31,7 @@ pub struct Column {
 impl Column {
     /// A column of numbers in `unit`.
     pub const fn number(name: &'static str, unit: &'static str, doc: &'static str) -> Column {
-        Column::new(name, Kind::Number(unit), doc)
-    }
-
-    /// A column of this kind.
-    pub const fn new(name: &'static str, kind: Kind, doc: &'static str) -> Column {
-        Column { name, kind, doc, optional: false }
+        Column { name, kind: Kind::Number(unit), doc, optional: false }
     }
 
     /// This column, written only if a spec names it.
@@ -70,13 +65,6 @@ pub struct Field<R> {
     pub column: Column,
     /// The cell in the units of the model: a number, NaN for none; the index of a word; 1 or 0 for a flag.
     pub cell: fn(&R) -> f64,
-}
-
-impl<R> Field<R> {
-    /// A column and its cell.
-    pub const fn new(column: Column, cell: fn(&R) -> f64) -> Field<R> {
-        Field { column, cell }
-    }
 }
 
 /// Defines the fields of a table and its columns: for each field the name, the unit or `(kind)`, the meaning, `optional` if it is written

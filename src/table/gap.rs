@@ -6,10 +6,9 @@
 use std::ops::Range;
 use std::sync::OnceLock;
 
-use rayon::prelude::*;
-
 use super::failpoint;
 use super::optimum_cache::{transition, without_ceilings, work_error};
+use super::rows::on_all_threads;
 use super::{Column, ColumnBuffer, Definition, Job, Projection, RunStats, Stopped};
 use crate::grid::{Point, Quantity, Runs, Scale, View};
 use crate::model::Transition;
@@ -63,25 +62,20 @@ pub(super) fn compute(job: &Job<'_>, rows: Range<u64>, buffer: &mut ColumnBuffer
     let view = job.rows.view(rows.clone());
     let (groups, order) = groups(&view, job, &rows);
     let coefficients = Coefficients::new(job, view, &rows, order.as_deref());
-    let works = chunks(&groups, buffer, job.projection)
-        .into_par_iter()
-        // The cost of chunks varies widely, so threads take them one by one.
-        .with_max_len(1)
-        .map(|chunk| {
-            job.signal.check()?;
-            let length = chunk.cells.status.len() as u64;
-            let work = evaluate(job, &groups, &coefficients, chunk);
-            job.signal.advance(length);
-            Ok(work)
-        })
-        .collect::<Result<Vec<RunStats>, Stopped>>()?;
+    let work = on_all_threads(chunks(&groups, buffer, job.projection), |chunk| {
+        job.signal.check()?;
+        let length = chunk.cells.status.len() as u64;
+        let work = evaluate(job, &groups, &coefficients, chunk);
+        job.signal.advance(length);
+        Ok(work)
+    })?;
     if let Some(order) = order {
         scatter(buffer, &order);
     }
     for (column, size) in buffer.columns.iter_mut().zip(job.sizes).filter(|(_, size)| **size != 1.0) {
         column.iter_mut().for_each(|cell| *cell *= size);
     }
-    Ok(works.into_iter().sum())
+    Ok(work)
 }
 
 /// Rows of one transition and duration, contiguous in the order of computation.

@@ -44,7 +44,7 @@ pub fn each<R>(
             status,
         })
         .collect();
-    let works = chunks.into_par_iter().with_max_len(1).map(|chunk| {
+    on_all_threads(chunks, |chunk| {
         job.signal.check()?;
         let count = chunk.status.len() as u64;
         let fill = |tuple: u64, point: &Point, cells: &mut [f64]| {
@@ -57,7 +57,19 @@ pub fn each<R>(
         let work = chunk.compute(job, &axes, &tuples, &fill);
         job.signal.advance(count);
         Ok(work)
-    });
+    })
+}
+
+/// Computes `chunks` on all threads, which take them one by one: their cost varies widely. A single chunk stays on this thread, since waking
+/// another takes longer than a row.
+pub(super) fn on_all_threads<C: Send>(
+    chunks: Vec<C>,
+    compute: impl Fn(C) -> Result<RunStats, Stopped> + Sync + Send,
+) -> Result<RunStats, Stopped> {
+    if chunks.len() <= 1 {
+        return chunks.into_iter().map(compute).sum();
+    }
+    let works = chunks.into_par_iter().with_max_len(1).map(compute);
     Ok(works.collect::<Result<Vec<RunStats>, Stopped>>()?.into_iter().sum())
 }
 

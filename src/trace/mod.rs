@@ -17,7 +17,7 @@ pub use protocol::{Absence, Disturbed, Parameter, Protocol, TracedPath, names};
 #[cfg(feature = "read")]
 pub use row::{Pathless, TABLES, protocol_of};
 pub use sample::{RANGE_RTOL, VALUE_RTOL};
-pub use write::{csv, parquet};
+pub use write::{csv, parquet, record_batch};
 
 /// The columns of a trace; `v_c` only for an elastic spring, `beta` only for an extremal.
 pub const COLUMNS: [Column; 6] = [

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use arrow_array::{ArrayRef, Float64Array, RecordBatch};
-use arrow_schema::{DataType, Schema};
+use arrow_schema::{ArrowError, DataType, Schema};
 use parquet::arrow::ArrowWriter;
 use parquet::basic::{Compression, ZstdLevel};
 use parquet::errors::Result;
@@ -44,12 +44,7 @@ pub fn csv(trace: &Trace, units: &Units, facts: &[(String, String)], version: &s
 /// # Errors
 /// If the file cannot be encoded.
 pub fn parquet(trace: &Trace, units: &Units, facts: &[(String, String)], version: &str) -> Result<Vec<u8>> {
-    let columns = trace.columns();
-    let fields = columns.iter().map(|&place| {
-        let column = &COLUMNS[place];
-        field(column.name, DataType::Float64, is_partial(place), units.name(unit(place)), column.doc)
-    });
-    let schema = Arc::new(Schema::new(fields.collect::<Vec<_>>()));
+    let rows = record_batch(trace, units)?;
     let entry = |key: &str, value: &str| KeyValue::new(format!("slipsweep.{key}"), value.to_owned());
     let mut entries = vec![entry("version", version)];
     entries.extend(facts.iter().map(|(key, value)| entry(key, value)));
@@ -59,13 +54,26 @@ pub fn parquet(trace: &Trace, units: &Units, facts: &[(String, String)], version
         .set_compression(Compression::ZSTD(ZstdLevel::default()))
         .set_dictionary_enabled(false)
         .build();
+    let mut file = ArrowWriter::try_new(Vec::new(), rows.schema(), Some(properties))?;
+    file.write(&rows)?;
+    file.into_inner()
+}
+
+/// An Arrow record batch: units and meanings in the metadata of the fields. The trace is in `units`.
+///
+/// # Errors
+/// If the columns do not fit each other.
+pub fn record_batch(trace: &Trace, units: &Units) -> std::result::Result<RecordBatch, ArrowError> {
+    let columns = trace.columns();
+    let fields = columns.iter().map(|&place| {
+        let column = &COLUMNS[place];
+        field(column.name, DataType::Float64, is_partial(place), units.name(unit(place)), column.doc)
+    });
+    let schema = Arc::new(Schema::new(fields.collect::<Vec<_>>()));
     let cells = |&column: &usize| -> ArrayRef {
         Arc::new(trace.moments.iter().map(|moment| Trace::value(moment, column)).collect::<Float64Array>())
     };
-    let rows = RecordBatch::try_new(schema.clone(), columns.iter().map(cells).collect())?;
-    let mut file = ArrowWriter::try_new(Vec::new(), schema, Some(properties))?;
-    file.write(&rows)?;
-    file.into_inner()
+    RecordBatch::try_new(schema, columns.iter().map(cells).collect())
 }
 
 /// Whether the column with this index may lack a value: the costate before and after the protocol.

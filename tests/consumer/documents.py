@@ -2,7 +2,7 @@
 
 Usage: documents.py [--write] FOLDER [PAGE ...]
 
-FOLDER holds the program `slipsweep`. Without pages, all of them run, then the examples and the notebook. The blocks of a page run in
+FOLDER holds the program `slipsweep`; the Python package is installed. Without pages, all of them run, then the examples and the notebook. The blocks of a page run in
 order, in an empty folder of the page's own:
 
 - `toml` that begins with `name = "NAME"` is saved as NAME.toml before the first command;
@@ -33,12 +33,8 @@ PICTURES = REPOSITORY / "docs/pictures"
 
 
 def environment(folder):
-    """The environment of a command: the program on the path, the examples importable."""
-    return os.environ | {
-        "PATH": os.pathsep.join([str(folder), os.environ["PATH"]]),
-        "PYTHONPATH": str(EXAMPLES),
-        "MPLBACKEND": "Agg",
-    }
+    """The environment of a command: the program on the path."""
+    return os.environ | {"PATH": os.pathsep.join([str(folder), os.environ["PATH"]]), "MPLBACKEND": "Agg"}
 
 
 def run(command, folder, variables):
@@ -97,8 +93,8 @@ def run_page(page, variables, write):
     return count
 
 
-def run_notebook(clone, program):
-    """Executes the notebook in the files of a clone, with the program in target/release and not on the path; returns its number of cells."""
+def run_notebook(clone):
+    """Executes the notebook in the files of a clone, without the program on the path; returns its number of cells."""
     listed = subprocess.run(
         ["git", "ls-files", "-z", "--cached", "--others", "--exclude-standard", "examples"],
         cwd=REPOSITORY, capture_output=True, text=True, check=True,
@@ -106,14 +102,11 @@ def run_notebook(clone, program):
     for name in listed.stdout.split("\0")[:-1]:
         (clone / name).parent.mkdir(parents=True, exist_ok=True)
         shutil.copy(REPOSITORY / name, clone / name)
-    (clone / "target/release").mkdir(parents=True)
-    shutil.copy(program / "slipsweep", clone / "target/release")
     path = clone / EXAMPLES.relative_to(REPOSITORY) / "first_look.ipynb"
     cells = nbformat.read(path, as_version=4)
     folders = [folder for folder in os.environ["PATH"].split(os.pathsep) if not (Path(folder) / "slipsweep").exists()]
-    variables = {key: value for key, value in os.environ.items() if key != "PYTHONPATH"}
     client = NotebookClient(cells, timeout=600, resources={"metadata": {"path": str(path.parent)}})
-    client.execute(env=variables | {"PATH": os.pathsep.join(folders), "PYTHONWARNINGS": "error::DeprecationWarning:__main__"})
+    client.execute(env=os.environ | {"PATH": os.pathsep.join(folders), "PYTHONWARNINGS": "error::DeprecationWarning:__main__"})
     code = [cell for cell in cells.cells if cell.cell_type == "code"]
     pictures = [output for cell in code for output in cell.outputs if "image/png" in output.get("data", {})]
     assert len(pictures) == 3, len(pictures)
@@ -145,7 +138,7 @@ def main():
         for question in ["landscape", "crossover", "stick-slip"]:
             assert f"{question}: " in answer, answer
     with tempfile.TemporaryDirectory() as folder:
-        cells = run_notebook(Path(folder), arguments.program)
+        cells = run_notebook(Path(folder))
     print(f"{len(answers)} examples that agree, a notebook of {cells} cells")
 
 

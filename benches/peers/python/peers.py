@@ -197,4 +197,5 @@ def main():
             print(f"{subject.__name__}: {time.time() - start:.0f} s", flush=True)
 
 
-main()
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,5 @@
+"""`python -m slipsweep` is the command `slipsweep`."""
+
+from ._command import main
+
+main()

@@ -1,0 +1,120 @@
+//! A checked spec, its plan and its run.
+
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::time::Instant;
+
+use pyo3::prelude::*;
+use slipsweep::cli::text;
+use slipsweep::dataset::Folder;
+use slipsweep::sweep::{self, Plan, SpecError, estimate};
+use slipsweep::table::{Phase, Signal};
+
+use crate::compute;
+use crate::error;
+use crate::rows::Rows;
+use crate::threads::{Interrupted, interruptible, stopper};
+
+/// A checked spec.
+#[pyclass(frozen, module = "slipsweep._core")]
+pub struct Sweep(Arc<sweep::Sweep>);
+
+/// A fault of a spec that no file holds: its lines are not those of anything that the caller wrote.
+fn without_lines(mut fault: SpecError) -> SpecError {
+    fault.line = None;
+    fault.others.iter_mut().for_each(|other| other.line = None);
+    fault
+}
+
+#[pymethods]
+impl Sweep {
+    /// The spec in a TOML file.
+    #[staticmethod]
+    fn load(path: PathBuf) -> PyResult<Sweep> {
+        let sweep = sweep::Sweep::load(&path).map_err(|fault| error::spec(&fault))?;
+        Ok(Sweep(Arc::new(sweep)))
+    }
+
+    /// The spec in `text`, made from a dict; its files are relative to `folder`.
+    #[staticmethod]
+    fn parse(text: &str, folder: PathBuf) -> PyResult<Sweep> {
+        let sweep = sweep::Sweep::parse(text, &folder).map_err(|fault| error::spec(&without_lines(fault)))?;
+        Ok(Sweep(Arc::new(sweep)))
+    }
+
+    #[getter]
+    fn name(&self) -> &str {
+        &self.0.name
+    }
+
+    #[getter]
+    fn description(&self) -> &str {
+        &self.0.description
+    }
+
+    #[getter]
+    fn text(&self) -> &str {
+        &self.0.text
+    }
+
+    #[getter]
+    fn warnings(&self) -> Vec<String> {
+        self.0.warnings.iter().map(ToString::to_string).collect()
+    }
+
+    /// Name and rows of every table.
+    #[getter]
+    fn tables(&self) -> Vec<(&'static str, u64)> {
+        self.0.requests.iter().map(|request| (request.table.name(), request.rows)).collect()
+    }
+
+    /// What `slipsweep plan` prints, from a sample written below `out`.
+    fn plan(&self, py: Python<'_>, out: PathBuf) -> PyResult<String> {
+        let sweep = self.0.clone();
+        let work = move || {
+            let start = Instant::now();
+            estimate(&sweep, &out).map(|estimates| {
+                let _ = start;
+                format!("{}\n{}", sweep.name, text::plan(&sweep, &estimates, 0.0))
+            })
+        };
+        interruptible(py, Interrupted::Left, || (), |_| Ok(()), work)?.map_err(|error| error::run(&error))
+    }
+
+    /// The rows of a table in memory.
+    fn rows(&self, py: Python<'_>, table: &str) -> PyResult<Rows> {
+        let known: Vec<String> = self.tables().into_iter().map(|(name, _)| name.to_owned()).collect();
+        let request = known.iter().position(|name| name == table);
+        let request = request.ok_or_else(|| error::missing("table", table, &known))?;
+        compute::rows(py, self.0.clone(), request)
+    }
+
+    /// Computes what is missing of the dataset in `out`, and calls `progress` with the phase, the rows done and all rows. Returns the folder.
+    fn run(&self, py: Python<'_>, out: PathBuf, threads: usize, progress: Option<Py<PyAny>>) -> PyResult<PathBuf> {
+        let folder = Folder::new(&out, &self.0.name);
+        let path = folder.path().to_owned();
+        let rows = self.0.requests.iter().map(|request| request.rows).fold(0_u64, u64::saturating_add);
+        let signal = Arc::new(Signal::default());
+        let (sweep, its) = (self.0.clone(), signal.clone());
+        let work = move || sweep::run(&sweep, &folder, threads, &its);
+        let look = |py: Python<'_>| match &progress {
+            Some(progress) => {
+                let phase = match signal.phase() {
+                    Phase::Checking => "checking",
+                    Phase::Computing => "computing",
+                    Phase::Writing => "writing",
+                };
+                progress.call1(py, (phase, signal.rows() + signal.kept(), rows)).map(drop)
+            }
+            None => Ok(()),
+        };
+        let done = interruptible(py, Interrupted::Awaited, stopper(&signal), look, work)?;
+        done.map(|_| path).map_err(|error| error::run(&error))
+    }
+
+    /// Rows that a run would compute or keep.
+    #[getter]
+    fn row_count(&self) -> u64 {
+        Plan::new(&self.0).tables.iter().map(|table| table.rows).fold(0, u64::saturating_add)
+    }
+}
