@@ -102,6 +102,7 @@ fn machine() -> String {
 
 fn subjects(tolerances: &[f64]) -> Vec<Subject> {
     let mut subjects = Vec::from(optimal::subjects(tolerances));
+    subjects.push(optimal::under_ceilings(tolerances));
     subjects.extend(landscape::subjects(tolerances));
     subjects.push(crossover::subject(tolerances));
     subjects.extend(shortcut::subjects(tolerances));
@@ -119,6 +120,7 @@ fn is_drawn(subject: &Subject) -> bool {
 fn words(name: &str) -> &str {
     match name {
         "optimal" => "Optimal solve",
+        "ceilings" => "Optimal solve under ceilings",
         "landscape" => "Landscape point",
         "crossover" => "Crossover time",
         "bounded_friction" => "Shortcut of bounded friction",

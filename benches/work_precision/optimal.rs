@@ -4,7 +4,7 @@ use std::rc::Rc;
 
 use slipsweep::model::{Law, Transition};
 use slipsweep::numerics::root::crossing;
-use slipsweep::protocol::optimal::solve;
+use slipsweep::protocol::optimal::{Bounds, solve};
 
 use super::integrate::dop853;
 use super::measure::{Answer, Kind, Method, Subject, Truth, relative};
@@ -25,6 +25,31 @@ pub fn subjects(tolerances: &[f64]) -> [Subject; 2] {
     ]
 }
 
+/// Optima under ceilings of velocity and friction: ours; direct collocation is among the peers.
+pub fn under_ceilings(tolerances: &[f64]) -> Subject {
+    let rows = reference::table("optimal_ceilings");
+    let truths = rows.iter().map(|row| truth(row, row.number("t_least"))).collect();
+    let case = |row: &Row| {
+        let bounds = Bounds::new(row.text("bounded") == "1");
+        let bounds = bounds.with_v_ceiling(row.number("v_ceiling")).with_tau_ceiling(row.number("tau_ceiling"));
+        (transition(row), row.number("t_f"), bounds)
+    };
+    let cases: Rc<Vec<(Transition, f64, Bounds)>> = Rc::new(rows.iter().map(case).collect());
+    let ours = Method::each("ours", Kind::Ours, tolerances, &cases, |(transition, t_f, bounds), rtol| {
+        let optimum = solve(transition, *t_f, bounds, rtol).value?;
+        Some([optimum.work, optimum.v_start])
+    });
+    Subject {
+        name: "ceilings",
+        cases: "every sequence of arcs, near least ceilings and least times",
+        error: "relative error of the work",
+        truths,
+        rows: (0..rows.len()).collect(),
+        judge: relative,
+        methods: vec![ours],
+    }
+}
+
 /// Whether the paper's own equations hold all along: nothing but the extremal, and `v >= 1` on it.
 fn is_regular(row: &Row) -> bool {
     row.number("v_f") > row.number("v_i") && row.text("bounded") == "1" && row.text("strategy") != "floor"
@@ -37,7 +62,7 @@ pub fn transition(row: &Row) -> Transition {
 
 fn subject(cases: &'static str, rows: Vec<(usize, Row)>, tolerances: &[f64]) -> Subject {
     let (places, rows): (Vec<usize>, Vec<Row>) = rows.into_iter().unzip();
-    let truths = rows.iter().map(truth).collect();
+    let truths = rows.iter().map(|row| truth(row, least_time(row))).collect();
     let solved =
         |row: &Row| Case { transition: transition(row), t_f: row.number("t_f"), bounded: row.text("bounded") == "1" };
     let rows = Rc::new(rows.iter().map(solved).collect());
@@ -59,16 +84,20 @@ fn subject(cases: &'static str, rows: Vec<(usize, Row)>, tolerances: &[f64]) -> 
     }
 }
 
-fn truth(row: &Row) -> Truth {
+/// The least time by its formula.
+fn least_time(row: &Row) -> f64 {
     let Transition { v_i, v_f, .. } = transition(row);
+    match (v_f < v_i, row.text("bounded") == "1") {
+        (false, _) => 0.0,
+        (true, true) => ((v_i - v_f) / (v_i * (v_f - 1.0))).ln_1p(),
+        (true, false) => 1.0 / v_f - 1.0 / v_i,
+    }
+}
+
+fn truth(row: &Row, least: f64) -> Truth {
     let (t_f, bounded) = (row.number("t_f"), row.text("bounded") == "1");
     // What is beyond the least time is known no better than t_f itself.
-    let beyond = match (v_f < v_i, bounded) {
-        (false, _) => t_f,
-        (true, true) => t_f - ((v_i - v_f) / (v_i * (v_f - 1.0))).ln_1p(),
-        (true, false) => t_f - (1.0 / v_f - 1.0 / v_i),
-    };
-    let doubt = 8.0 * f64::EPSILON + 4.0 * f64::EPSILON * t_f / beyond;
+    let doubt = 8.0 * f64::EPSILON + 4.0 * f64::EPSILON * t_f / (t_f - least);
     // Without the bound v(0+) may be as small as e^(-1/a): its tenth is not requested.
     let v_start = if bounded { row.number("v_start") } else { f64::NAN };
     Truth { answer: [row.number("work"), v_start], doubt }

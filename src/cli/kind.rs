@@ -124,10 +124,12 @@ impl Kind {
 
 /// Checks that `path` is one of `kinds`.
 pub fn expect(path: &Path, kinds: &[Kind]) -> Result<(), Failure> {
+    if kinds.contains(&Kind::of(path)) { Ok(()) } else { Err(unexpected(path, kinds)) }
+}
+
+/// The failure of a `path` that is none of `kinds`.
+pub fn unexpected(path: &Path, kinds: &[Kind]) -> Failure {
     let found = Kind::of(path);
-    if kinds.contains(&found) {
-        return Ok(());
-    }
     let not: Vec<&str> = kinds.iter().map(|kind| kind.words(path).0).collect();
     let expected: Vec<&str> = kinds.iter().map(|kind| kind.expected()).collect();
     let (mut what, help) = found.words(path);
@@ -135,7 +137,7 @@ pub fn expect(path: &Path, kinds: &[Kind]) -> Result<(), Failure> {
     if !matches!(found, Kind::Nothing | Kind::Device) {
         what = &not;
     }
-    Err(refused(format!("{}: {what}", path.display()), expected.join(", or "), help))
+    refused(format!("{}: {what}", path.display()), expected.join(", or "), help)
 }
 
 /// Checks that `path` may be a spec; the reader of specs reports other errors.

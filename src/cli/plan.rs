@@ -74,7 +74,8 @@ pub fn in_words(sweep: &Sweep, estimates: &Estimates, reading: f64) -> String {
         rows.iter_mut().for_each(|row| drop(row.remove(2)));
     }
     let mut text = words::aligned(&rows, 2);
-    if plan.optima > 0 {
+    // More than can be kept are solved where they are needed, and their time is that of the tables.
+    if plan.optima > 0 && estimates.shared > 0.0 {
         let (solves, time) = (words::things(plan.optima, "optimal protocol"), words::duration(estimates.shared));
         text.push_str(&format!("shared: {solves} solved once each, {time} on one thread\n"));
     }

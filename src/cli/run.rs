@@ -5,10 +5,11 @@ use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
+use super::kind::{self, Kind as PathKind};
 use super::plan::too_large;
 use super::shards::quoted;
 use super::watch::{Wait, waiting, watched};
-use super::{AGAIN, FAILED, Failure, NOT_STRICT, load, refused, say, summary, words, wrong};
+use super::{AGAIN, FAILED, Failure, NOT_STRICT, load, say, summary, words, wrong};
 use crate::dataset::atomic::nearest_folder;
 use crate::dataset::{DatasetError, Folder};
 use crate::grid::Quantity;
@@ -169,6 +170,7 @@ fn check_room(sweep: &Sweep, plan: &Plan, shards: &[Vec<Range<u64>>], folder: &F
 fn subject(arguments: &Arguments) -> Result<(Sweep, Folder), Failure> {
     let path = &arguments.spec;
     if !path.is_dir() {
+        kind::expect_spec(path)?;
         let sweep = if arguments.quiet { Sweep::load(path)? } else { load(path)? };
         let folder = Folder::new(arguments.out.as_deref().unwrap_or(Path::new("results")), &sweep.name);
         return Ok((sweep, folder));
@@ -176,12 +178,7 @@ fn subject(arguments: &Arguments) -> Result<(Sweep, Folder), Failure> {
     let folder = Folder::at(path);
     let found = folder.manifest().map_err(Failure::failed)?;
     let Some(manifest) = found else {
-        let found = format!("{}: neither a spec nor a dataset", path.display());
-        return Err(refused(
-            found,
-            "a spec, such as NAME.toml, or the folder of a dataset, such as results/NAME",
-            "check the path",
-        ));
+        return Err(kind::unexpected(path, &[PathKind::Spec, PathKind::Dataset]));
     };
     if manifest.spec.is_empty() {
         let message = "the manifest is missing, and the parts do not contain the spec";

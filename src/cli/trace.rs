@@ -6,6 +6,7 @@ use std::path::Path;
 use clap::ValueEnum;
 use clap::builder::{PossibleValue, PossibleValuesParser, StringValueParser, TypedValueParser};
 
+use super::kind::{self, Kind};
 use super::output::{self, Output};
 use super::{FAILED, Failure, WRONG, dataset, no_table, put, refused, say, words, write_file, wrong};
 use crate::dataset::{Cell, Folder, ManifestTable, Row, frame};
@@ -185,7 +186,7 @@ fn disturbance(text: &str) -> Result<Disturbance, String> {
     Ok(Disturbance { change: percent / 100.0, at })
 }
 
-/// Reads the name of a protocol, or the path of a folder.
+/// Reads the name of a protocol, or a path.
 #[derive(Debug, Clone)]
 struct Subject;
 
@@ -204,7 +205,7 @@ impl TypedValueParser for Subject {
         value: &std::ffi::OsStr,
     ) -> Result<String, clap::Error> {
         let path = Path::new(value);
-        if path.components().count() > 1 || path.is_dir() {
+        if path.components().count() > 1 || path.extension().is_some() || path.exists() {
             return StringValueParser::new().parse_ref(command, argument, value);
         }
         PossibleValuesParser::new(protocols()).parse_ref(command, argument, value)
@@ -369,7 +370,8 @@ impl Arguments {
 
     /// The protocol that the arguments name.
     fn request(&self) -> Result<TraceRequest, Failure> {
-        if Path::new(&self.subject).is_dir() {
+        if trace::names().all(|(name, _)| name != self.subject) {
+            kind::expect(Path::new(&self.subject), &[Kind::Dataset])?;
             let (folder, expected) = (&self.subject, "a protocol, or a dataset with a table and a row");
             let help = format!("slipsweep trace {folder} optimal --row 0");
             return Err(refused(format!("{folder}: a dataset without a table"), expected, help));

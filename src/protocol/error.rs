@@ -61,7 +61,9 @@ pub fn of_member(family: &dyn Family, case: &Case, member: &Shortcut, stats: &mu
     let finest = family.solve(case, TIGHTEST_RTOL, stats).ok()?;
     let Transition { law: Law { a, b }, v_i, v_f } = case.transition;
     let (exponent, delay) = if family.uses_tau_ceiling() {
-        (0.05 * (0.25 * ln(v_f / v_i)).powi(4).max(1.0) * (case.tau_ceiling.abs() + b) / a, 1.5 * ROUNDING)
+        // Without a ceiling, tau itself is what is rounded.
+        let tau = if case.tau_ceiling.is_finite() { case.tau_ceiling } else { member.friction_max };
+        (0.05 * (0.25 * ln(v_f / v_i)).powi(4).max(1.0) * (tau.abs() + b) / a, 1.5 * ROUNDING)
     } else {
         (0.0, 0.5 * ROUNDING)
     };

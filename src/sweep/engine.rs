@@ -455,11 +455,11 @@ impl Failures {
 }
 
 /// The content of `mutex`, including a poisoned one.
-fn locked<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+pub(super) fn locked<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 /// The owned content of `mutex`, including a poisoned one.
-fn content<T>(mutex: Mutex<T>) -> T {
+pub(super) fn content<T>(mutex: Mutex<T>) -> T {
     mutex.into_inner().unwrap_or_else(PoisonError::into_inner)
 }

@@ -1,34 +1,41 @@
 //! The cost of a sweep, estimated from samples that are computed, encoded and written like parts.
 
-use std::iter::Sum;
 use std::ops::Range;
 use std::path::Path;
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::{Duration, Instant};
 
 use rayon::ThreadPool;
 use rayon::prelude::*;
 
 use super::check::{Request, Sweep};
-use super::engine::{RunError, WRITERS, pool};
+use super::engine::{RunError, WRITERS, content, locked, pool};
 use super::plan::Plan;
 use crate::dataset::{DatasetError, Footer, Layout, Manifest, atomic, encode};
 use crate::grid::Point;
 use crate::table::{ColumnBuffer, Job, OptimumCache, Signal};
 
-/// Time for all samples of a sweep. Chosen: `plan` answers within two seconds.
+/// Time for all samples of a sweep. Chosen: `plan` answers within two seconds where rows cost about the same.
 const SAMPLE_TIME: Duration = Duration::from_millis(1500);
 
-/// Ranges of rows in the first sample. Chosen: several threads are busy.
-const FIRST_RANGES: u64 = 16;
+/// Greatest number of optimal protocols in a sample, whose points are kept in memory.
+const MAX_OPTIMA: u64 = 1 << 14;
 
-/// Greatest number of ranges in a sample, whose costs are kept in memory.
-const MAX_RANGES: u64 = 1 << 14;
-
-/// Greatest time of the sample of a table with expensive rows, in seconds. Chosen: acceptable for a user of `plan`.
+/// Time of samples, in seconds, after which none is extended because its rows differ. Chosen: the patience of a user of `plan`.
 const MAX_SAMPLE_SECONDS: f64 = 5.0;
+
+/// Relative standard error at which a sample is large enough. Chosen: two of them, and a machine whose speed varies by a fifth, stay within 30 %.
+const MAX_STANDARD_ERROR: f64 = 0.05;
+
+/// Ranges of rows below which their scatter is unknown. Chosen.
+const MIN_RANGES: u64 = 16;
 
 /// Greatest cost of a row, in units of the mean cost of its table. Chosen: rows of `step_response` differ by three orders of magnitude.
 const MAX_COST_RATIO: f64 = 1000.0;
+
+/// Greatest fraction of the cost of a range that does not grow with its rows. Chosen: a third of the error that is allowed.
+const MAX_FIXED_FRACTION: f64 = 0.1;
 
 /// The estimated cost of a table.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -82,7 +89,7 @@ impl Estimates {
 /// Threads that cannot be started, and cells that cannot be encoded.
 pub fn estimate(sweep: &Sweep, folder: &Path) -> Result<Estimates, RunError> {
     let (plan, pool) = (Plan::new(sweep), pool(0)?);
-    let sampler = Sampler { sweep, plan: &plan, manifest: plan.manifest(sweep), pool: &pool };
+    let sampler = Sampler::new(sweep, &plan, &pool, MAX_SAMPLE_SECONDS);
     let samples = sweep.requests.len() as u32 + u32::from(plan.optima > 0);
     let budget = SAMPLE_TIME.as_secs_f64() / f64::from(samples);
     let optimum = sampler.optimum(budget);
@@ -106,7 +113,7 @@ pub fn estimate(sweep: &Sweep, folder: &Path) -> Result<Estimates, RunError> {
 /// Those of [`estimate`].
 pub fn sizes(sweep: &Sweep) -> Result<Vec<f64>, RunError> {
     let (plan, pool) = (Plan::new(sweep), pool(0)?);
-    let sampler = Sampler { sweep, plan: &plan, manifest: plan.manifest(sweep), pool: &pool };
+    let sampler = Sampler::new(sweep, &plan, &pool, 0.0);
     let budget = 0.2 * SAMPLE_TIME.as_secs_f64() / sweep.requests.len() as f64;
     let optima = sweep.optimum_cache();
     let tables =
@@ -114,22 +121,45 @@ pub fn sizes(sweep: &Sweep) -> Result<Vec<f64>, RunError> {
     tables.map(|table| table.map(|table| table.bytes)).collect()
 }
 
-/// The cost of a sample.
+/// The cost of ranges of one length.
 #[derive(Debug, Clone, Copy, Default)]
 struct Sample {
+    ranges: u64,
     rows: u64,
     /// Seconds of the threads that computed and encoded the ranges, without waiting.
     seconds: f64,
+    /// The sum of the squared seconds of each range.
+    squares: f64,
     bytes: u64,
 }
 
-impl Sum for Sample {
-    fn sum<I: Iterator<Item = Sample>>(samples: I) -> Sample {
-        samples.fold(Sample::default(), |sum, one| Sample {
-            rows: sum.rows + one.rows,
-            seconds: sum.seconds + one.seconds,
-            bytes: sum.bytes + one.bytes,
-        })
+impl Sample {
+    fn add(&mut self, rows: u64, seconds: f64, bytes: usize) {
+        self.ranges += 1;
+        self.rows += rows;
+        self.seconds += seconds;
+        self.squares += seconds * seconds;
+        self.bytes += bytes as u64;
+    }
+
+    /// Seconds of a range, bytes and rows, on average.
+    fn mean(&self) -> [f64; 3] {
+        [self.seconds, self.bytes as f64, self.rows as f64].map(|all| all / self.ranges as f64)
+    }
+
+    fn seconds_of_row(&self) -> f64 {
+        self.seconds / self.rows as f64
+    }
+
+    /// The relative standard error of the seconds of a row of a table of `rows` rows; infinite for too few ranges.
+    fn standard_error(&self, rows: u64) -> f64 {
+        if self.ranges < MIN_RANGES.min(rows) {
+            return f64::INFINITY;
+        }
+        let (count, mean) = (self.ranges as f64, self.mean()[0]);
+        let variance = (self.squares / count - mean * mean).max(0.0) / (count - 1.0).max(1.0);
+        let unseen = 1.0 - (self.rows as f64 / rows as f64).min(1.0);
+        (variance * unseen).sqrt() / mean
     }
 }
 
@@ -158,86 +188,29 @@ struct Sampler<'a> {
     plan: &'a Plan,
     manifest: Manifest,
     pool: &'a ThreadPool,
+    began: Instant,
+    /// Seconds after which no sample is extended because its rows differ.
+    patience: f64,
 }
 
-impl Sampler<'_> {
-    /// The cost of a table if a shared optimal protocol costs `optimum`, from samples that take about `budget`.
-    fn table(&self, request: &Request, optima: &OptimumCache, optimum: f64, budget: f64) -> Result<Estimate, RunError> {
-        let signal = Signal::default();
-        let job = self.sweep.job(request, optima, &signal);
-        let sample = |length, places, limit| self.mean(request, &job, optimum, (length, places, limit));
-        let began = Instant::now();
-        let left = || budget - began.elapsed().as_secs_f64();
-        // Expensive rows leave time for few ranges.
-        let threads = self.pool.current_num_threads();
-        let mut places = threads as u64;
-        let mut one = sample(1, places, f64::INFINITY)?;
-        if left() > 0.8 * budget {
-            places = FIRST_RANGES;
-            one = sample(1, places, f64::INFINITY)?;
-        }
-        let longest = request.table.rows_per_part().min(request.rows / places);
-        let (mut seconds, mut bytes) = (LinearCost { range: 0.0, row: one[0] }, LinearCost { range: one[1], row: 0.0 });
-        let (mut length, mut long) = (1, one);
-        // Ranges grow until the rows, not the fixed cost of a range, take most of the time. A single row may overestimate the cost a
-        // thousandfold.
-        while length < longest {
-            let is_flat = length == 1 || long[0] < 2.0 * one[0];
-            let row = (MAX_COST_RATIO * 1e-9 * request.table.cost() as f64).min(long[0] / length as f64);
-            let next = (long[0] + 3.0 * length as f64 * row) * places as f64 / threads as f64;
-            let is_bearable = began.elapsed().as_secs_f64() + next < MAX_SAMPLE_SECONDS;
-            if left() < 0.6 * budget && !(is_flat && is_bearable) {
-                break;
-            }
-            length = (4 * length).min(longest);
-            long = sample(length, places, f64::INFINITY)?;
-            seconds = LinearCost::through((one[2], one[0]), (long[2], long[0]));
-            bytes = LinearCost::through((one[2], one[1]), (long[2], long[1]));
-            if seconds.range < 0.1 * long[0] && left() < 0.8 * budget {
-                break;
-            }
-        }
-        // The remaining time goes into further ranges, since rows differ.
-        if left() > 0.1 * budget {
-            let all = sample(length, MAX_RANGES.min(request.rows / length), left())?;
-            seconds.row = ((all[0] - seconds.range) / all[2]).max(0.0);
-            if length > 1 {
-                bytes.row = ((all[1] - bytes.range) / all[2]).max(0.0);
-            }
-        }
-        let parts = request.rows.div_ceil(request.table.rows_per_part());
-        Ok(Estimate { seconds: seconds.of(parts, request.rows), bytes: bytes.of(parts, request.rows) })
+impl<'a> Sampler<'a> {
+    fn new(sweep: &'a Sweep, plan: &'a Plan, pool: &'a ThreadPool, patience: f64) -> Sampler<'a> {
+        Sampler { sweep, plan, manifest: plan.manifest(sweep), pool, began: Instant::now(), patience }
     }
 
-    /// Seconds of one thread, bytes and rows of a range of a table, on the mean of `places` ranges of `length` rows, or as many as are begun within `limit`
-    /// seconds.
-    fn mean(
-        &self,
-        request: &Request,
-        job: &Job<'_>,
-        optimum: f64,
-        (length, places, limit): (u64, u64, f64),
-    ) -> Result<[f64; 3], RunError> {
-        let layout = Layout::new(request.table, &request.projection, &self.sweep.grid);
-        let compute = |rows: Range<u64>| -> Result<Sample, RunError> {
-            let start = Instant::now();
-            let mut buffer = ColumnBuffer::new(request.projection.indices().len());
-            buffer.resize((rows.end - rows.start) as usize);
-            let work = request.table.compute(job, rows.clone(), &mut buffer)?;
-            let footer = Footer::new(&self.manifest, request.table.name(), rows.clone());
-            let (bytes, _) = encode(&layout, job.rows, &buffer, &footer).map_err(DatasetError::Sample)?;
-            let optima = if optimum > 0.0 { work.optima } else { 0 };
-            let seconds = start.elapsed().as_secs_f64() - optima as f64 * optimum;
-            Ok(Sample { rows: rows.end - rows.start, seconds: seconds.max(0.0), bytes: bytes.len() as u64 })
+    /// The cost of a table if a shared optimal protocol costs `optimum`, from samples that take about `budget` seconds, more if rows differ.
+    fn table(&self, request: &Request, optima: &OptimumCache, optimum: f64, budget: f64) -> Result<Estimate, RunError> {
+        let signal = Signal::default();
+        let table = TableSampler {
+            sampler: self,
+            request,
+            job: self.sweep.job(request, optima, &signal),
+            layout: Layout::new(request.table, &request.projection, &self.sweep.grid),
+            optimum,
+            began: Instant::now(),
+            budget,
         };
-        let start = Instant::now();
-        let ranges = (0..places as usize).into_par_iter().with_max_len(1).filter_map(|place| {
-            let is_late = start.elapsed().as_secs_f64() > limit && place > 0;
-            (!is_late).then(|| compute(place_of(request.rows, place as u64, length)))
-        });
-        let taken = self.pool.install(|| ranges.collect::<Result<Vec<_>, _>>())?;
-        let sum: Sample = taken.iter().copied().sum();
-        Ok([sum.seconds, sum.bytes as f64, sum.rows as f64].map(|all| all / taken.len() as f64))
+        table.estimate()
     }
 
     /// Seconds of one thread for an optimal protocol shared by tables; 0 if there is none.
@@ -248,20 +221,150 @@ impl Sampler<'_> {
         };
         // A cache without capacity: every request is solved.
         let optima = OptimumCache::new(u64::MAX, self.sweep.bounded, self.sweep.optimum_rtol());
-        let (began, mut places) = (Instant::now(), rows.rows().min(FIRST_RANGES));
+        let (began, mut places) = (Instant::now(), rows.rows().min(MIN_RANGES));
         loop {
             let starts = (0..places).map(|place| place_of(rows.rows(), place, 1).start);
             let points: Vec<Point> = starts.map(|row| self.sweep.grid.scaled(&rows.point(row))).collect();
             let start = Instant::now();
             self.pool.install(|| points.par_iter().for_each(|point| _ = optima.get(0, point)));
             let each = start.elapsed().as_secs_f64() * self.pool.current_num_threads() as f64 / places as f64;
-            let most = rows.rows().min(MAX_RANGES);
+            let most = rows.rows().min(MAX_OPTIMA);
             if places == most || began.elapsed().as_secs_f64() > 0.2 * budget {
                 return each;
             }
             places = (8 * places).min(most);
         }
     }
+}
+
+/// Samples one table.
+struct TableSampler<'a> {
+    sampler: &'a Sampler<'a>,
+    request: &'a Request,
+    job: Job<'a>,
+    layout: Layout,
+    /// Seconds of an optimal protocol of several tables, which are counted apart.
+    optimum: f64,
+    began: Instant,
+    /// Seconds for the samples.
+    budget: f64,
+}
+
+impl TableSampler<'_> {
+    fn estimate(&self) -> Result<Estimate, RunError> {
+        let rows = self.request.rows;
+        let samples = self.lengths()?;
+        let ([.., (longest, long)], Some((_, one))) = (samples.as_slice(), samples.first()) else {
+            return Ok(Estimate { seconds: 0.0, bytes: 0.0 });
+        };
+        let ([time, size, of_one], [long_time, long_size, of_long]) = (one.mean(), long.mean());
+        let (mut seconds, mut bytes) = (LinearCost { range: 0.0, row: time }, LinearCost { range: size, row: 0.0 });
+        if *longest > 1 {
+            seconds = LinearCost::through((of_one, time), (of_long, long_time));
+            bytes = LinearCost::through((of_one, size), (of_long, long_size));
+        }
+        let (length, sample) = shortest(&samples).unwrap_or((*longest, *long));
+        let all = self.extended(sample, length, rows / length, |sample| {
+            let is_late = self.sampler.began.elapsed().as_secs_f64() > self.sampler.patience;
+            self.elapsed() > self.budget && (is_late || sample.standard_error(rows) < MAX_STANDARD_ERROR)
+        })?;
+        let [all_time, all_size, of_all] = all.mean();
+        if length < *longest {
+            seconds = LinearCost { range: 0.0, row: all_time / of_all };
+        } else {
+            seconds.row = ((all_time - seconds.range) / of_all).max(0.0);
+            if length > 1 {
+                bytes.row = ((all_size - bytes.range) / of_all).max(0.0);
+            }
+        }
+        let parts = rows.div_ceil(self.request.table.rows_per_part());
+        Ok(Estimate { seconds: seconds.of(parts, rows), bytes: bytes.of(parts, rows) })
+    }
+
+    /// Samples of ranges of 1, 4, 16 and more rows, which begin at the same rows. Ranges grow until the rows, not the fixed cost of a range, take
+    /// most of the time. A single row may overestimate the cost a thousandfold.
+    fn lengths(&self) -> Result<Vec<(u64, Sample)>, RunError> {
+        let Request { table, rows, .. } = self.request;
+        let threads = self.sampler.pool.current_num_threads() as u64;
+        // Expensive rows leave time for few ranges.
+        let few = self.extended(Sample::default(), 1, threads.min(*rows), |_| false)?;
+        let is_cheap = self.elapsed() < 0.02 * self.budget;
+        let places = if is_cheap { MIN_RANGES.max(threads) } else { threads }.min(*rows);
+        let one = self.extended(few, 1, places, |_| false)?;
+        let longest = table.rows_per_part().min(rows / places);
+        let (mut length, mut last, mut samples) = (1, one, vec![(1, one)]);
+        while length < longest {
+            let [time, ..] = last.mean();
+            let row = (MAX_COST_RATIO * 1e-9 * table.cost() as f64).min(time / length as f64);
+            let next = (time + 3.0 * length as f64 * row) * places as f64 / threads as f64;
+            let is_fixed = length == 1 || time < 2.0 * one.mean()[0];
+            if self.elapsed() + next > if is_fixed { MAX_SAMPLE_SECONDS } else { 0.5 * self.budget } {
+                break;
+            }
+            length = (4 * length).min(longest);
+            last = self.extended(Sample::default(), length, places, |_| false)?;
+            samples.push((length, last));
+            let [[time, _, of_one], [long_time, _, of_long]] = [one.mean(), last.mean()];
+            let fixed = LinearCost::through((of_one, time), (of_long, long_time)).range;
+            if fixed < MAX_FIXED_FRACTION * long_time && self.elapsed() > 0.2 * self.budget {
+                break;
+            }
+        }
+        Ok(samples)
+    }
+
+    fn elapsed(&self) -> f64 {
+        self.began.elapsed().as_secs_f64()
+    }
+
+    /// `sample` with further ranges of `length` rows, up to `most` or until it is enough. Each thread takes the next range.
+    fn extended(
+        &self,
+        sample: Sample,
+        length: u64,
+        most: u64,
+        is_enough: impl Fn(&Sample) -> bool + Sync,
+    ) -> Result<Sample, RunError> {
+        let (next, result) = (AtomicU64::new(sample.ranges), Mutex::new(Ok(sample)));
+        self.sampler.pool.broadcast(|_| {
+            loop {
+                let place = next.fetch_add(1, Ordering::Relaxed);
+                let is_over = locked(&result).as_ref().map_or(true, |sample| sample.ranges > 0 && is_enough(sample));
+                if place >= most || is_over {
+                    break;
+                }
+                let computed = self.range(place_of(self.request.rows, place, length));
+                let mut result = locked(&result);
+                match (computed, result.as_mut()) {
+                    (Ok((rows, seconds, bytes)), Ok(sample)) => sample.add(rows, seconds, bytes),
+                    (Err(error), Ok(_)) => *result = Err(error),
+                    (_, Err(_)) => {}
+                }
+            }
+        });
+        content(result)
+    }
+
+    /// Rows, seconds of this thread and bytes of a range that is computed and encoded.
+    fn range(&self, rows: Range<u64>) -> Result<(u64, f64, usize), RunError> {
+        let TableSampler { request, job, optimum, .. } = self;
+        let start = Instant::now();
+        let mut buffer = ColumnBuffer::new(request.projection.indices().len());
+        buffer.resize((rows.end - rows.start) as usize);
+        let work = request.table.compute(job, rows.clone(), &mut buffer)?;
+        let footer = Footer::new(&self.sampler.manifest, request.table.name(), rows.clone());
+        let (bytes, _) = encode(&self.layout, job.rows, &buffer, &footer).map_err(DatasetError::Sample)?;
+        let optima = if *optimum > 0.0 { work.optima } else { 0 };
+        let seconds = start.elapsed().as_secs_f64() - optima as f64 * optimum;
+        Ok((rows.end - rows.start, seconds.max(0.0), bytes.len()))
+    }
+}
+
+/// The shortest ranges whose time goes into their rows: as many rows from fewer places would say less, since neighbours cost about the same.
+fn shortest(samples: &[(u64, Sample)]) -> Option<(u64, Sample)> {
+    let least = samples.iter().map(|(_, sample)| sample.seconds_of_row()).fold(f64::INFINITY, f64::min);
+    let is_of_rows = |(_, sample): &&(u64, Sample)| sample.seconds_of_row() <= (1.0 + MAX_FIXED_FRACTION) * least;
+    samples.iter().find(is_of_rows).copied()
 }
 
 /// Range number `place` of a sample, which has `length` of the `rows`: any consecutive ranges lie nearly evenly among them.
@@ -272,4 +375,53 @@ fn place_of(rows: u64, place: u64, length: u64) -> Range<u64> {
     let length = length.min(rows);
     let start = ((u128::from(part) * u128::from(rows - length + 1)) >> 64) as u64;
     start..start + length
+}
+
+#[cfg(test)]
+mod tests {
+    //! Which ranges are sampled, and how well they determine a cost.
+
+    use super::*;
+
+    /// A sample of 16 ranges of `length` rows, each range with these seconds for itself and for each of its rows.
+    fn sample(length: u64, range: f64, row: impl Fn(u64) -> f64) -> (u64, Sample) {
+        let mut sample = Sample::default();
+        (0..16).for_each(|place| sample.add(length, range + row(place) * length as f64, 100));
+        (length, sample)
+    }
+
+    #[test]
+    fn ranges_are_as_short_as_their_fixed_cost_allows() {
+        let chosen = |range: f64, row: f64| {
+            let samples = [1, 4, 16, 64].map(|length| sample(length, range, |_| row));
+            shortest(&samples).expect("has samples").0
+        };
+        assert_eq!(chosen(0.0, 1e-3), 1);
+        assert_eq!(chosen(2e-5, 1e-3), 1);
+        assert_eq!(chosen(4e-4, 1e-3), 4);
+        assert_eq!(chosen(1.0, 1e-6), 64);
+    }
+
+    #[test]
+    fn a_standard_error_is_that_of_the_mean() {
+        assert_eq!(sample(1, 0.0, |_| 1e-3).1.standard_error(1_000_000), 0.0);
+        // Half of the rows cost nothing: the relative deviation is 1, that of the mean 1/sqrt(15) for the sample's own variance.
+        let (_, uneven) = sample(1, 0.0, |place| (place % 2) as f64);
+        assert!((uneven.standard_error(u64::MAX) - 1.0 / 15f64.sqrt()).abs() < 1e-12);
+        // A sample of all rows has no error, one of too few ranges any.
+        assert_eq!(uneven.standard_error(16), 0.0);
+        let mut few = Sample::default();
+        (0..15).for_each(|_| few.add(1, 1.0, 100));
+        assert_eq!(few.standard_error(1000), f64::INFINITY);
+    }
+
+    #[test]
+    fn places_lie_evenly_among_the_rows() {
+        for (rows, length) in [(40_000, 1), (40_000, 16), (2116, 4)] {
+            let mut starts: Vec<u64> = (0..100).map(|place| place_of(rows, place, length).start).collect();
+            starts.sort_unstable();
+            let widest = starts.windows(2).map(|pair| pair[1] - pair[0]).max().expect("has pairs");
+            assert!(widest <= 3 * rows / 100, "{rows} {length}: {widest}");
+        }
+    }
 }

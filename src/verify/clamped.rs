@@ -1,7 +1,6 @@
 //! Optimal protocols under a floor and ceilings by integration along `ln theta`: the free minimiser, clamped, with one `C`
 //! (docs/derivations.md, equation 6).
 
-use super::extremal::branch;
 use super::route::integrate;
 use crate::model::{Law, Transition};
 
@@ -304,6 +303,26 @@ const PLACES: u32 = 4000;
 
 /// Most steps of Newton's method, which needs a few from the `C` of a row.
 const NEWTON_STEPS: u32 = 20;
+
+/// The root of `e^z - 1 - z = h` above or below 0.
+fn branch(h: f64, above: bool) -> Option<f64> {
+    if h.is_nan() || h < 0.0 {
+        return None;
+    }
+    let mut z = if above { (1.0 + h + (2.0 * h).sqrt()).ln() } else { -h - (2.0 * h).sqrt() };
+    for _ in 0..100 {
+        let slope = z.exp_m1();
+        if slope == 0.0 {
+            break;
+        }
+        let step = (slope - z - h) / slope;
+        z -= step;
+        if step.abs() <= 1e-15 * z.abs() {
+            break;
+        }
+    }
+    Some(z)
+}
 
 #[cfg(test)]
 mod tests {

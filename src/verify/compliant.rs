@@ -1,12 +1,12 @@
-//! `compliant`: the smooth shortcut integrated over time, its control velocity looked at on the way.
+//! `compliant`: the traced shortcut obeys the equations and its formula, arrives, and its control moves the spring; open loop again.
 
-use super::extremal::{min_duration, solve};
-use super::formula_path::{Formula, FormulaPath, State, arriving};
-use super::open_loop::{ControlledProtocol, growth, is_stiff};
+use super::motion::Followed;
+use super::open_loop::ControlledProtocol;
+use super::optimal::{compare, min_duration};
 use super::verdict::{Context, Verdict, number, transition, word};
 use crate::dataset::{Cell, Row};
 use crate::model::Transition;
-use crate::protocol::SpringBlock;
+use crate::protocol::{Moment, SpringBlock, compliant};
 use crate::table::STATUS;
 
 /// `ln(v - 1)` over `x = t/t_f`, as the sum of the powers from 0 to 6.
@@ -20,18 +20,9 @@ impl Exponent {
         Exponent([start, 0.0, 0.0, 10.0 * l + alpha, -15.0 * l - 3.0 * alpha, 6.0 * l + 3.0 * alpha, -alpha])
     }
 
-    /// Value, slope and curvature.
-    fn at(&self, x: f64) -> [f64; 3] {
-        self.0.iter().rev().fold([0.0; 3], |[f, g, h], c| [f * x + c, g * x + f, h * x + 2.0 * g])
-    }
-
-    fn velocity(&self, x: f64) -> f64 {
-        1.0 + self.at(x)[0].exp()
-    }
-
     /// Velocity and its first two derivatives in time.
     fn moment(&self, x: f64, t_f: f64) -> [f64; 3] {
-        let [f, g, h] = self.at(x);
+        let [f, g, h] = self.0.iter().rev().fold([0.0; 3], |[f, g, h], c| [f * x + c, g * x + f, h * x + 2.0 * g]);
         let w = f.exp();
         [1.0 + w, w * g / t_f, w * (h + g * g) / (t_f * t_f)]
     }
@@ -48,66 +39,55 @@ pub fn check(row: &Row, context: &Context, rtol: f64) -> Verdict {
     if infeasible || word(row, STATUS) == Some("infeasible") {
         return verdict;
     }
-    verdict.demand(row, "alpha");
-    let formula_path = |alpha: f64| {
-        let exponent = Exponent::new(&problem, alpha);
-        let formula = Formula::Velocity(Box::new(move |x| exponent.velocity(x)));
-        FormulaPath { problem, t_f, formula, backward: false }
-    };
-    let Some(alpha) = number(row, "alpha").or_else(|| member(&problem, formula_path)) else {
-        verdict.miss("alpha was not written, and theta at the end does not determine it");
+    let Transition { law, v_i, v_f } = problem;
+    let slider = SpringBlock { law, k, m };
+    let Ok(path) = compliant::path(&slider, (v_i, v_f), t_f, rtol) else {
+        verdict.push("motion", f64::INFINITY);
         return verdict;
     };
-    let here = formula_path(alpha);
-    let Some(states) = here.states() else { return Verdict::unchecked("the integrator did not get there") };
-    let Some(&[ln_theta, work, _]) = states.last() else { return verdict };
-    let arriving = if alpha == 0.0 { 0.0 } else { arriving(alpha, ln_theta, here.target(), formula_path) };
-    verdict.compare(row, "alpha", Some(arriving), None);
-    verdict.compare(row, "work", Some(work), None);
-    verdict.compare(row, "v_min", Some(here.least(&states, |y| here.velocity(y))), None);
-    verdict.compare(row, "v_max", Some(-here.least(&states, |y| -here.velocity(y))), None);
-    verdict.friction(row, here.least(&states, |y| here.friction(y)));
-    let slider = SpringBlock { law: problem.law, k, m };
+    let followed = Followed::new(Box::new(path), &slider);
+    let plain = Exponent::new(&problem, 0.0);
+    // alpha from one moment, and its rounding.
+    let coefficient = |(t, v): (f64, f64)| {
+        let x = t / t_f;
+        let bump = (x * (1.0 - x)).powi(3);
+        let noise = 8.0 * f64::EPSILON * (v / (v - 1.0) + 10.0 * (v_f - 1.0).ln().abs() + (v_i - 1.0).ln().abs());
+        (((v - 1.0) / (plain.moment(x, t_f)[0] - 1.0)).ln() / bump, noise / bump)
+    };
+    let all = followed.samples.iter().map(|(_, at)| coefficient((at.t, at.v)));
+    let determined = all.filter(|(alpha, noise)| alpha.is_finite() && noise.is_finite());
+    let Some((alpha, noise)) = determined.min_by(|x, y| x.1.total_cmp(&y.1)) else { return verdict };
+    verdict.demand(row, "alpha");
+    verdict.compare(row, "alpha", Some(alpha), Some(alpha.abs() + noise / rtol));
+    let alpha = number(row, "alpha").unwrap_or(alpha);
     let exponent = Exponent::new(&problem, alpha);
+    let off = |at: &Moment| (exponent.moment(at.t / t_f, t_f)[0] / at.v - 1.0).abs();
+    let formula = followed.samples.iter().map(|(_, at)| off(at)).fold(0.0, f64::max);
+    let arrival = (followed.end().theta * v_f - 1.0).abs();
+    verdict.push("motion", followed.equation + arrival + formula);
+    verdict.push("control", followed.control);
+    verdict.compare(row, "work", Some(followed.work), None);
+    let v = [followed.least(|at| at.v), followed.greatest(|at| at.v)];
+    verdict.compare(row, "v_min", Some(v[0]), None);
+    verdict.compare(row, "v_max", Some(v[1]), None);
+    verdict.friction(row, followed.least(|at| at.friction));
+    let range = followed.control_range();
+    let size = range[0].abs().max(range[1].abs());
+    verdict.compare(row, "v_c_min", Some(range[0]), Some(size));
+    verdict.compare(row, "v_c_max", Some(range[1]), Some(size));
+    verdict.compare(row, "stiffness_ratio", Some(if m > 0.0 { k * t_f * t_f / m } else { f64::INFINITY }), None);
     let control = |x: f64, ln_theta: f64| {
         let [v, v1, v2] = exponent.moment(x, t_f);
-        v + (problem.law.a * v1 / v + problem.law.b * ((-ln_theta).exp() - v) + m * v2) / k
+        v + (law.a * v1 / v + law.b * ((-ln_theta).exp() - v) + m * v2) / k
     };
-    let low = here.least(&states, |y| control(y[2], y[0]));
-    let high = -here.least(&states, |y| -control(y[2], y[0]));
-    let size = Some(low.abs().max(high.abs()));
-    verdict.compare(row, "v_c_min", Some(low), size);
-    verdict.compare(row, "v_c_max", Some(high), size);
-    verdict.compare(row, "stiffness_ratio", Some(if m > 0.0 { k * t_f * t_f / m } else { f64::INFINITY }), None);
-    let protocol = ControlledProtocol {
-        slider,
-        v_i: problem.v_i,
-        v_f: problem.v_f,
-        t_f,
-        velocity: |x| exponent.velocity(x),
-        control,
-    };
-    let least = states.iter().map(|y| here.velocity(y)).fold(f64::INFINITY, f64::min);
-    // What the spring pulls with, in units of a, and what it would under the greatest control alone: rounding of the one, and
-    // an error of the other, are felt in proportion.
-    let pull = |y: &State| (here.friction(y) + m * exponent.moment(y[2], t_f)[1]).abs() / problem.law.a;
-    let pull = states.iter().map(pull).fold(0.0, f64::max);
-    let reach = if k.is_finite() { k / problem.law.a * t_f * low.abs().max(high.abs()) } else { 0.0 };
-    open_loop(&mut verdict, row, &protocol, &Along { formula_path: &here, states: &states, least, pull, reach }, rtol);
-    compare_optimum(&mut verdict, row, &problem, t_f, context);
+    let velocity = |x: f64| exponent.moment(x, t_f)[0];
+    let protocol = ControlledProtocol { slider, v_i, v_f, t_f, velocity, control };
+    // What the spring would pull with under the greatest control alone, and what it pulls with, in units of a: an error of the
+    // one, and rounding of the other, are felt in proportion.
+    let reach = if k.is_finite() { k / law.a * t_f * size } else { 0.0 };
+    open_loop(&mut verdict, row, &protocol, (v[0], 1.0 + reach + 1e-14 / rtol * followed.force), rtol);
+    compare(&mut verdict, row, (&problem, t_f), Some(followed.work), context.bounded);
     verdict
-}
-
-/// A protocol on its way.
-struct Along<'a> {
-    formula_path: &'a FormulaPath,
-    states: &'a [State],
-    /// Least velocity.
-    least: f64,
-    /// Greatest pull of the spring, in units of `a`.
-    pull: f64,
-    /// The greatest extension of the spring, in the same units.
-    reach: f64,
 }
 
 /// More samples than a check follows.
@@ -116,9 +96,16 @@ const MOST_SAMPLES: f64 = 3000.0;
 /// Amplifications below this have fewer digits.
 const FORGOTTEN: f64 = 1e-2;
 
-/// The columns of open-loop control.
-fn open_loop<V, C>(verdict: &mut Verdict, row: &Row, protocol: &ControlledProtocol<V, C>, along: &Along<'_>, rtol: f64)
-where
+const TOO_STIFF: &str = "motions too stiff for an explicit integrator";
+
+/// The columns of open-loop control of a protocol of this `least` velocity; `felt` is what an error of it amounts to at once.
+fn open_loop<V, C>(
+    verdict: &mut Verdict,
+    row: &Row,
+    protocol: &ControlledProtocol<V, C>,
+    (least, felt): (f64, f64),
+    rtol: f64,
+) where
     V: Fn(f64) -> f64,
     C: Fn(f64, f64) -> f64,
 {
@@ -127,77 +114,32 @@ where
         verdict.compare(row, "sampling_error", None, None);
     }
     let columns = ["amplification", "sampling_error", "open_loop_error"];
-    let [grown, held, closed] = columns.map(|column| number(row, column));
     if row.iter().any(|(name, cell)| {
         *cell == Cell::Missing && (name != "sampling_error" || dt > 0.0) && columns.contains(&name.as_str())
     }) {
         verdict.miss("numbers of a motion that was given up");
     }
+    let [grown, held, closed] = columns.map(|column| number(row, column));
     if grown.or(held).or(closed).is_none() {
         return;
     }
-    if is_stiff(&protocol.slider, along.least, protocol.t_f) {
-        verdict.miss("motions too stiff for an explicit integrator");
-        return;
-    }
-    let Some(growth) = growth(&protocol.slider, along.formula_path, along.states, &protocol.velocity) else {
-        verdict.miss("motions too stiff for an explicit integrator");
-        return;
+    let Some(growth) = (!protocol.is_stiff(least)).then(|| protocol.growth()).flatten() else {
+        return verdict.miss(TOO_STIFF);
     };
     let noise = 1e-11 * growth.most / rtol;
     verdict.compare_number(row, "amplification", growth.whole, growth.whole.max(FORGOTTEN).max(noise));
     // An error of the control, good to rtol, has grown at the end from anywhere on the way.
-    let felt = (1.0 + along.reach + 1e-14 / rtol * along.pull) * (1.0 + growth.most);
-    let mut compare = |column: &'static str, dt: Option<f64>, scale: f64| match protocol.miss(dt) {
-        Some(expected) => verdict.compare_number(row, column, expected, scale.max(expected)),
-        None => verdict.miss("motions too stiff for an explicit integrator"),
+    let felt = felt * (1.0 + growth.most);
+    let mut compare = |column: &'static str, dt: Option<f64>| match protocol.miss(dt) {
+        Some(expected) => verdict.compare_number(row, column, expected, felt.max(expected)),
+        None => verdict.miss(TOO_STIFF),
     };
     if closed.is_some() {
-        compare("open_loop_error", None, felt);
+        compare("open_loop_error", None);
     }
     if held.is_some() && protocol.t_f / dt <= MOST_SAMPLES {
-        compare("sampling_error", Some(dt), felt);
+        compare("sampling_error", Some(dt));
     } else if held.is_some() {
         verdict.miss("controls sampled more than 3000 times");
-    }
-}
-
-/// The parameter for which theta arrives; `None` where that does not determine it.
-fn member(problem: &Transition, formula_path: impl Fn(f64) -> FormulaPath) -> Option<f64> {
-    const CLOSE: f64 = 1e-10;
-    let miss = |alpha: f64| {
-        let formula_path = formula_path(alpha);
-        Some(formula_path.states()?.last()?[0] - formula_path.target())
-    };
-    // Theta at the end falls as alpha rises.
-    let rise = ((problem.v_f - 1.0) / (problem.v_i - 1.0)).ln().abs().max(1.0);
-    let (mut low, mut high) = (-rise, rise);
-    while miss(low)? < CLOSE {
-        low *= 2.0;
-        if low < -1e9 {
-            return None;
-        }
-    }
-    while miss(high)? > -CLOSE {
-        high *= 2.0;
-        if high > 1e9 {
-            return None;
-        }
-    }
-    for _ in 0..70 {
-        let middle = 0.5 * (low + high);
-        if miss(middle)? > 0.0 { low = middle } else { high = middle }
-    }
-    Some(0.5 * (low + high))
-}
-
-fn compare_optimum(verdict: &mut Verdict, row: &Row, problem: &Transition, t_f: f64, context: &Context) {
-    let Some(optimum) = solve(problem, t_f, context.bounded) else {
-        verdict.miss("the integrator did not get there");
-        return;
-    };
-    verdict.compare(row, "work_optimal", Some(optimum.work), None);
-    if let Some(work) = number(row, "work") {
-        verdict.compare(row, "gap", Some((work - optimum.work) / optimum.work), Some(1.0));
     }
 }

@@ -1,6 +1,7 @@
 //! `gap`: the work of the row's cubic, integrated over time; `W*` by integration of the extremal.
 
-use super::extremal::{min_duration, solve};
+use super::motion::golden;
+use super::optimal::{self, min_duration};
 use super::route::integrate;
 use super::{Context, Verdict, number, transition, word};
 use crate::dataset::Row;
@@ -35,16 +36,7 @@ pub fn check(row: &Row, context: &Context) -> Verdict {
         Some(work) => verdict.compare(row, "work", Some(work), None),
         None => verdict.miss("the independent integrator failed"),
     }
-    match solve(&problem, t_f, context.bounded) {
-        Some(optimum) => {
-            verdict.compare(row, "work_optimal", Some(optimum.work), None);
-            if let Some(work) = work {
-                // The table promises the gap relative to 1.
-                verdict.compare(row, "gap", Some((work - optimum.work) / optimum.work), Some(1.0));
-            }
-        }
-        None => verdict.miss("the independent integrator failed"),
-    }
+    optimal::compare(&mut verdict, row, (&problem, t_f), work, context.bounded);
     verdict
 }
 
@@ -100,15 +92,5 @@ fn lowest(f: &dyn Fn(f64) -> f64) -> f64 {
     let place = |i: usize| i as f64 / PLACES as f64;
     let values = (0..=PLACES).map(|i| (i, f(place(i))));
     let least = values.min_by(|a, b| a.1.total_cmp(&b.1)).map_or(0, |(i, _)| i);
-    golden(f, place(least.saturating_sub(1)), place((least + 1).min(PLACES))).min(f(place(least)))
-}
-
-/// The least value in an interval that holds one minimum.
-pub fn golden(f: &dyn Fn(f64) -> f64, mut low: f64, mut high: f64) -> f64 {
-    let fraction = 0.5 * (5.0_f64.sqrt() - 1.0);
-    for _ in 0..80 {
-        let (left, right) = (high - fraction * (high - low), low + fraction * (high - low));
-        if f(left) < f(right) { high = right } else { low = left }
-    }
-    f(0.5 * (low + high))
+    golden(f, place(least.saturating_sub(1)), place((least + 1).min(PLACES))).1.min(f(place(least)))
 }

@@ -1,20 +1,17 @@
-//! A dataset audited: a sample of its rows solved again by a route that shares nothing with the solvers that made it.
+//! A dataset audited: a sample of its rows checked by the equations that their protocols obey, or solved by a second route.
 
 mod best_cubic;
-mod block_motion;
 mod clamped;
 mod compliant;
 mod crossover;
-mod extremal;
 mod feedback;
-mod formula_path;
 mod gap;
 mod hopf;
-mod long_term;
+mod motion;
 mod open_loop;
 mod optimal;
 mod reduced;
-mod regularised_motion;
+mod regularised;
 mod route;
 mod sample;
 mod shortcut;
@@ -108,13 +105,13 @@ pub fn verify(path: &Path, manifest: &Manifest, sample: u64, seed: u64) -> Resul
         for (number, row) in rows {
             let verdict = match table.name.as_str() {
                 "gap" => gap::check(&row, &context),
-                "optimal" => optimal::check(&row, &context),
+                "optimal" => optimal::check(&row, &context, rtol),
                 "feedback" => feedback::check(&row, &context),
                 "crossover" => crossover::check(&row, &context),
                 "best_cubic" => best_cubic::check(&row, &context, rtol),
-                "shortcut" => shortcut::check(&row, &context),
+                "shortcut" => shortcut::check(&row, &context, rtol),
                 "compliant" => compliant::check(&row, &context, rtol),
-                "regularised" => regularised_motion::check(&row, &context, rtol),
+                "regularised" => regularised::check(&row, &context, rtol),
                 "step_response" => step_response::check(&row, &context, rtol),
                 "stability" => stability::check(&row, &context),
                 _ if is_reduced => reduced::check(&row, &units, &spec, &context),

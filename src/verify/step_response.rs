@@ -1,30 +1,107 @@
-//! `step_response`: the block on its spring followed again, by an explicit integrator in other variables.
+//! `step_response`: the traced response obeys the equations; its extremes, its settling and its cycles are read off the trace.
 
-use std::cell::Cell;
-
-use super::block_motion::Block;
 use super::hopf;
-use super::long_term::{LongTermBehaviour, follow};
+use super::motion::Followed;
 use super::verdict::{Context, Verdict, number, transition, word};
 use crate::dataset::Row;
+use crate::model::Transition;
+use crate::protocol::{Motion, SpringBlock};
 use crate::stability::SteadySliding;
+use crate::stability::step_response::{Outcome, SETTLED, Step};
 use crate::table::STATUS;
 
-/// A step of less than this about unstable sliding comes too late to be followed.
-const MIN_AMPLITUDE: f64 = 1e-4;
-
-/// A turn this many rtol from the edge of the band of settled velocities may or may not leave it.
+/// An extremum this many rtol from the edge of the band of settled velocities may or may not leave it.
 const HAIR: f64 = 10.0;
 
 /// An overshoot below this has no time of its own.
 const NONE: f64 = 1e-3;
+
+/// Cycles beyond the decision, in which a response comes to its cycle.
+const MORE_CYCLES: f64 = 30.0;
+
+/// Intervals of a response that is followed.
+const MOST_INTERVALS: usize = 10_000;
+
+/// Distance of two successive cycles, in rtol, from which they determine no limit cycle.
+const MOST_VAGUE: f64 = 1e3;
+
+/// An extremum or a crossing.
+#[derive(Debug, Clone, Copy)]
+struct Event {
+    t: f64,
+    v: f64,
+}
+
+/// The events of a response, in the order of time.
+struct Events {
+    /// Crossings of `v_f` from below.
+    rises: Vec<Event>,
+    /// Extremes since `v_f` was first crossed.
+    tops: Vec<Event>,
+    bottoms: Vec<Event>,
+    /// Since when the velocity is in the band, and its logarithmic slope then; least distance of an extremum from an edge, in `ln v`.
+    settled: Option<(Event, f64)>,
+    margin: f64,
+}
+
+impl Events {
+    fn of(followed: &Followed, v_f: f64) -> Events {
+        let samples = &followed.samples;
+        let at = |s: f64| followed.at(s);
+        let crossing = |i: usize, level: f64| {
+            let (mut low, mut high) = (samples[i].0, samples[i + 1].0);
+            let rising = samples[i + 1].1.v > level;
+            for _ in 0..60 {
+                let middle = 0.5 * (low + high);
+                if (at(middle).v > level) == rising { high = middle } else { low = middle }
+            }
+            let moment = at(high);
+            Event { t: moment.t, v: moment.v }
+        };
+        let mut events = Events { rises: vec![], tops: vec![], bottoms: vec![], settled: None, margin: f64::INFINITY };
+        let mut met = false;
+        let edges = [v_f * (1.0 - SETTLED), v_f * (1.0 + SETTLED)];
+        let inside = |v: f64| v > edges[0] && v < edges[1];
+        let (_, first) = samples[0];
+        events.settled = inside(first.v).then_some((Event { t: first.t, v: first.v }, f64::INFINITY));
+        for i in 0..samples.len() - 1 {
+            let (v, next) = (samples[i].1.v, samples[i + 1].1.v);
+            if (v < v_f) != (next < v_f) {
+                met = true;
+                if next >= v_f {
+                    events.rises.push(crossing(i, v_f));
+                }
+            }
+            if !inside(v) && inside(next) {
+                let edge = edges[usize::from(v > v_f)];
+                let entry = crossing(i, edge);
+                let speed = (next / v).ln() / (samples[i + 1].1.t - samples[i].1.t);
+                events.settled = Some((entry, speed.abs()));
+            } else if !inside(next) {
+                events.settled = None;
+            }
+            let before = if i > 0 { samples[i - 1].1.v } else { v };
+            for (sign, kept) in [(1.0, &mut events.tops), (-1.0, &mut events.bottoms)] {
+                if i > 0 && sign * (v - before) > 0.0 && sign * (next - v) <= 0.0 {
+                    let (t, v) = followed.extremum(i, sign);
+                    let edge = edges.iter().map(|edge| (v / edge).ln().abs()).fold(f64::INFINITY, f64::min);
+                    events.margin = events.margin.min(edge);
+                    if met {
+                        kept.push(Event { t, v });
+                    }
+                }
+            }
+        }
+        events
+    }
+}
 
 pub fn check(row: &Row, _: &Context, rtol: f64) -> Verdict {
     let (Some(problem), Some(k), Some(m)) = (transition(row), number(row, "k"), number(row, "m")) else {
         return Verdict::unchecked("an axis is missing");
     };
     let mut verdict = Verdict::default();
-    let (law, v_i, v_f) = (problem.law, problem.v_i, problem.v_f);
+    let Transition { law, v_i, v_f } = problem;
     hopf::compare_coefficient(&mut verdict, row, law, m * v_f * v_f, rtol);
     if number(row, "t_end").is_some() {
         verdict.miss("t_end, up to which a response was integrated");
@@ -34,103 +111,103 @@ pub fn check(row: &Row, _: &Context, rtol: f64) -> Verdict {
         verdict.compare_word(row, "stick_slip", "no");
         ["v_peak", "v_trough"].iter().for_each(|column| verdict.compare(row, column, Some(v_f), None));
         verdict.compare(row, "settling_time", Some(0.0), Some(1.0));
-        ["t_peak", "period", "cycle_peak", "cycle_trough"]
-            .iter()
-            .for_each(|column| verdict.compare(row, column, None, None));
+        CYCLE.iter().chain(&["t_peak"]).for_each(|column| verdict.compare(row, column, None, None));
         return verdict;
     }
-    let stable = SteadySliding::new(law, k, m, v_f).is_stable();
-    // Steady sliding that is unstable is left.
-    if !stable && word(row, "outcome") == Some("settled") {
-        verdict.compare_word(row, "outcome", "limit_cycle");
-    }
-    if word(row, "outcome") == Some("undecided") {
-        verdict.miss("undecided responses");
-        return verdict;
-    }
-    let start = (v_i / v_f).ln();
-    if !stable && start.abs() < MIN_AMPLITUDE {
-        verdict.miss("steps of less than 1e-4 about unstable sliding");
-        return verdict;
-    }
-    let block = Block {
-        pull: k / law.a,
-        ratio: law.b / law.a,
-        mu: m * v_f * v_f / law.a,
-        fast: (0.01 * rtol).cbrt(),
-        work: Cell::new(0),
-    };
-    let simulation = follow(&block, stable, start, rtol);
-    let infinite = matches!(simulation.long_term, Ok(LongTermBehaviour::Infinite));
+    // Without mass, a spring softer than b - a lets the velocity become infinite.
+    let infinite = m == 0.0 && k < law.b - law.a;
+    verdict.status(row, infinite);
     if infinite || word(row, STATUS) == Some("infeasible") {
-        verdict.status(row, infinite);
         return verdict;
     }
-    let velocity = |x: f64| v_f * x.exp();
-    // How much an error of the spring's force moves ln v where it follows.
-    let felt = (block.pull * block.mu).sqrt().max(1.0).sqrt();
-    let high = simulation.high.map_or(0.0, |high| high.x.max(0.0));
-    let low = simulation.low.map_or(0.0, |low| low.x.min(0.0));
-    let peak_time = |verdict: &mut Verdict| {
-        let Some(top) = simulation.high.filter(|top| top.x > NONE) else { return };
-        let scale = (top.t / top.x.exp_m1().min(1.0)).max(top.flatness);
-        verdict.compare_number(row, "t_peak", top.t / v_f, scale / v_f);
-    };
-    let compare_status = |verdict: &mut Verdict, bottom: f64| {
-        let lowest = velocity(bottom).min(v_i);
-        if lowest.ln().abs() > 100.0 * felt * rtol {
-            verdict.compare_word(row, STATUS, if lowest < 1.0 { "below_bound" } else { "ok" });
-        }
-    };
-    // What is not known to rtol is null.
-    match simulation.long_term {
-        Ok(LongTermBehaviour::Settled { time, speed, margin }) => {
-            compare_status(&mut verdict, low);
-            verdict.compare_word(row, "outcome", "settled");
-            verdict.compare_word(row, "stick_slip", "no");
-            verdict.compare(row, "v_peak", Some(velocity(high)), None);
-            verdict.compare_number(row, "v_trough", velocity(low), felt * velocity(low));
-            peak_time(&mut verdict);
-            if margin > HAIR * rtol {
-                let scale = time.max(0.1 * block_time(&block)) + 1.0 / speed;
-                verdict.compare_number(row, "settling_time", time / v_f, scale / v_f);
-            } else {
-                verdict.miss("settling times that depend on rounding");
-            }
-            ["period", "cycle_peak", "cycle_trough"].iter().for_each(|column| verdict.compare(row, column, None, None));
-        }
-        Ok(LongTermBehaviour::Cycle(cycle)) => {
-            verdict.compare_word(row, "outcome", "limit_cycle");
-            verdict.compare_word(row, "stick_slip", "yes");
-            // A cycle that hardly attracts hardly determines where it is.
-            let vague = (1e-10 / (1.0 - cycle.fraction) / rtol).max(1.0);
-            let (top, bottom) = (high.max(cycle.high), low.min(cycle.low));
-            compare_status(&mut verdict, bottom);
-            verdict.compare(row, "v_peak", Some(velocity(top)), Some(vague * velocity(top)));
-            verdict.compare_number(row, "v_trough", velocity(bottom), vague * felt * velocity(bottom));
-            if high > cycle.high + 100.0 * vague * rtol {
-                peak_time(&mut verdict);
-            }
-            verdict.compare(row, "period", Some(cycle.period / v_f), Some(vague * cycle.period / v_f));
-            verdict.compare(row, "cycle_peak", Some(velocity(cycle.high)), Some(vague * velocity(cycle.high)));
-            let trough = velocity(cycle.low);
-            verdict.compare_number(row, "cycle_trough", trough, vague * felt * trough);
-            verdict.compare(row, "settling_time", None, None);
-        }
-        Ok(LongTermBehaviour::Infinite) => {}
-        Err(reason) => {
-            verdict.miss(reason);
-            // What happens before it was left does not depend on the end.
-            if number(row, "t_peak").is_some_and(|t| t * v_f < simulation.t) {
-                verdict.compare(row, "v_peak", Some(velocity(high)), None);
-                peak_time(&mut verdict);
-            }
-        }
+    match follow(&mut verdict, Step { transition: problem, k, m }, rtol) {
+        Ok(followed) => compare(&mut verdict, row, &problem, (k, m), &followed, rtol),
+        Err(reason) => verdict.miss(reason),
     }
     verdict
 }
 
-/// The time of one swing or of one relaxation, whichever is shorter, in `l/v_f`.
-fn block_time(block: &Block) -> f64 {
-    1.0 / (1.0 + block.pull)
+/// The columns of a limit cycle.
+const CYCLE: [&str; 3] = ["period", "cycle_peak", "cycle_trough"];
+
+/// The traced response, with its errors as differences; the reason where there is none.
+fn follow(verdict: &mut Verdict, step: Step, rtol: f64) -> Result<Followed, &'static str> {
+    let response = step.respond(rtol).1.filter(|response| response.outcome != Outcome::Undecided);
+    let response = response.ok_or("undecided responses")?;
+    let more = response.cycle.map_or(0.0, |cycle| MORE_CYCLES * cycle.period);
+    // The slope of the velocity, which determines the time of the peak, has fewer digits than the velocity.
+    let motion = step.motion(response.t_end + more, 0.01 * rtol);
+    let motion = motion.filter(|motion| motion.landmarks().len() <= MOST_INTERVALS);
+    let motion = motion.ok_or("responses of more than 10,000 steps")?;
+    let Step { transition: Transition { law, .. }, k, m } = step;
+    let followed = Followed::new(Box::new(motion), &SpringBlock { law, k, m });
+    verdict.push("motion", followed.equation);
+    verdict.push("control", followed.control);
+    Ok(followed)
+}
+
+/// Greatest and least velocity of these extremes, `v_f` without any.
+fn range(events: &Events, v_f: f64, (from, to): (f64, f64)) -> [Event; 2] {
+    let within = |events: &[Event], sign: f64| {
+        let inside = events.iter().filter(|event| event.t > from && event.t < to);
+        inside.fold(
+            Event { t: f64::NAN, v: v_f },
+            |best, event| if sign * event.v > sign * best.v { *event } else { best },
+        )
+    };
+    [within(&events.tops, 1.0), within(&events.bottoms, -1.0)]
+}
+
+/// Compares the numbers of a response with its trace.
+fn compare(
+    verdict: &mut Verdict,
+    row: &Row,
+    &Transition { law, v_i, v_f }: &Transition,
+    (k, m): (f64, f64),
+    followed: &Followed,
+    rtol: f64,
+) {
+    let events = Events::of(followed, v_f);
+    let [peak, trough] = range(&events, v_f, (0.0, f64::INFINITY));
+    // How much an error of the spring's force moves ln v where it follows.
+    let felt = (k / law.a * (m * v_f * v_f / law.a)).sqrt().max(1.0).sqrt();
+    let lowest = trough.v.min(v_i);
+    if lowest.ln().abs() > 100.0 * felt * rtol {
+        verdict.compare_word(row, STATUS, if lowest < 1.0 { "below_bound" } else { "ok" });
+    }
+    verdict.compare(row, "v_peak", Some(peak.v), None);
+    verdict.compare_number(row, "v_trough", trough.v, felt * trough.v);
+    let overshoot = peak.v / v_f - 1.0;
+    if overshoot > NONE {
+        verdict.compare_number(row, "t_peak", peak.t, (peak.t + 1.0 / v_f) / overshoot.min(1.0));
+    }
+    // Steady sliding that is unstable is left.
+    let settled = events.settled.filter(|_| SteadySliding::new(law, k, m, v_f).is_stable());
+    verdict.compare_word(row, "outcome", if settled.is_some() { "settled" } else { "limit_cycle" });
+    verdict.compare_word(row, "stick_slip", if settled.is_some() { "no" } else { "yes" });
+    if let Some((entry, speed)) = settled {
+        if events.margin > HAIR * rtol {
+            let scale = entry.t.max(0.1 / (v_f * (1.0 + k / law.a))) + 1.0 / speed;
+            verdict.compare_number(row, "settling_time", entry.t, scale);
+        } else {
+            verdict.miss("settling times that depend on rounding");
+        }
+        return CYCLE.iter().for_each(|column| verdict.compare(row, column, None, None));
+    }
+    verdict.compare(row, "settling_time", None, None);
+    let [.., first, second, third] = events.rises.as_slice() else {
+        return verdict.miss("cycles that are approached slowly");
+    };
+    let before = range(&events, v_f, (first.t, second.t));
+    let [top, bottom] = range(&events, v_f, (second.t, third.t)).map(|event| event.v);
+    let period = third.t - second.t;
+    // The last cycle is about this far from the limit cycle.
+    let apart = (period / (second.t - first.t) - 1.0).abs() + (top / before[0].v - 1.0).abs();
+    let vague = 1.0 + apart / rtol;
+    if vague > MOST_VAGUE {
+        return verdict.miss("cycles that are approached slowly");
+    }
+    verdict.compare(row, "period", Some(period), Some(vague * period));
+    verdict.compare(row, "cycle_peak", Some(top), Some(vague * top));
+    verdict.compare_number(row, "cycle_trough", bottom, vague * felt * bottom);
 }

@@ -88,6 +88,15 @@ fn plan_counts_without_running() {
     assert_eq!(output.status.code(), Some(0), "{text}");
     assert!(text.contains("1,000,000,000  3,815"), "{text}");
     assert!(text.contains("shared: 1,000 optimal protocols solved once each"), "{text}");
+    // More than can be kept are not shared.
+    write_spec(
+        folder.path(),
+        &axes.replace("v_f = 100.0", "v_f = { linspace = [10.0, 100.0, 1000000] }"),
+        "[tables.gap]\n",
+    );
+    let output = slipsweep(folder.path()).args(["plan", "spec.toml"]).output().expect("runs");
+    let text = String::from_utf8_lossy(&output.stdout);
+    assert!(text.contains("1,000,000,000,000,000") && !text.contains("shared:"), "{text}");
     assert_eq!(files(folder.path()).len(), 1);
 }
 

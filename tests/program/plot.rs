@@ -212,6 +212,21 @@ fn the_wrong_kind_of_file_is_named_with_the_command_that_takes_it() {
         assert!(said.contains(&format!("\n  help: {help}")), "{said}");
     }
     assert!(complaint(folder, &["plot", "none.csv"]).starts_with("error: none.csv: there is no such file or folder\n"));
+    // A protocol is named where `trace` expects one; whatever has the look of a path is one.
+    for (path, kind, help) in [
+        ("tiny.toml", "a spec, not a dataset", "`slipsweep run tiny.toml` computes"),
+        ("best.csv", "a trace, not a dataset", "`slipsweep plot best.csv` draws it"),
+        ("results/none", "there is no such file or folder", "check the name"),
+        ("results/tiny", "a dataset without a table", "slipsweep trace results/tiny optimal --row 0"),
+    ] {
+        let said = complaint(folder, &["trace", path]);
+        assert!(said.starts_with(&format!("error: {path}: {kind}\n")), "{said}");
+        assert!(said.contains(&format!("\n  help: {help}")), "{said}");
+    }
+    for (path, kind) in [("results", "a folder of datasets"), ("results/tiny/optimal", "the folder of a table")] {
+        let said = complaint(folder, &["run", path]);
+        assert!(said.starts_with(&format!("error: {path}: {kind}, not a spec or a dataset\n")), "{said}");
+    }
 }
 
 #[test]

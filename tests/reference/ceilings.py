@@ -63,6 +63,8 @@ def panel(f, low, high, scale, depth=0):
             y = f(x)
             total = [weight * value for value in y] if total is None else [t + weight * value for t, value in zip(total, y)]
         now = [t * length / 2**level for t in total]
+        if not all(gmpy2.is_finite(n) for n in now):
+            raise ArithmeticError("quadrature")
         if last is not None and level >= 3:
             # The error of a level is about the square of that of the level before.
             error = max(abs(n - l) for n, l in zip(now, last))
@@ -513,7 +515,14 @@ def solve(make, t_f):
         family = Family(p, mpfr(t_f))
         return family, None if p.l_0 == p.l_1 else Path(p, p.c_at(p.l_1), p.l_1)
     sign = 1 if family.kind == "turn" else -1
-    f = lambda x: sign * family.miss(family.member(x))
+
+    def f(x):
+        try:
+            return sign * family.miss(family.member(x))
+        except ArithmeticError:
+            # So near a steady state that no quadrature takes the time: it is too long.
+            return mpfr(sign)
+
     low = high = mpfr(0)
     step = mpfr(1)
     f_low = f_high = f(low)

@@ -2,7 +2,7 @@
 """Optimal protocols under ceilings of velocity and friction, to 25 digits: writes optimal_ceilings.csv.
 
     python3 -m venv venv && venv/bin/pip install gmpy2
-    venv/bin/python optimal_ceilings.py
+    venv/bin/python optimal_ceilings.py                 # or some of theory, structures, limits, random
 
 The problem is solved by ceilings.py at 54 digits. Each row is checked before it is written: the time to 1e-34 of `t_f - t_least`; time and
 work by another substitution to 1e-36; the Hamiltonian against the derivative of the work along the family, and every slope against a
@@ -93,7 +93,7 @@ def least_ceiling(make, t_f, which):
         q = make(**{which: INF})
         steady = [q.tau_ss(q.l_0), q.tau_ss(q.l_1)]
         if q.l_1 < q.l_0:
-            return (1 / q.theta_1 if one else max(steady)) + exp(x)
+            return (1 + exp(x)) / q.theta_1 if one else max(steady) + exp(x)
         if one:
             # The least velocity that is steady sliding where the other ceiling allows to stop.
             allowed = [l for l in (q.l_0, q.l_1, *q.zero_of_caps()) if q.l_0 <= l <= q.l_1 and (not q.caps(l) or q.cap(l)[0] >= -mpfr(10) ** -25)]
@@ -105,16 +105,17 @@ def least_ceiling(make, t_f, which):
         needed = ceilinged_time(make(**{which: value(x)}))
         return log(needed / t_f) if needed < INF else mpfr(10)
 
+    # Within 1e-22 of a ceiling that takes for ever it is that ceiling, to twice the digits of a double.
+    if f(mpfr(-50)) < 0:
+        return value(mpfr(-50))
     bits = gmpy2.get_context().precision
     precision(ROUGH)
     low = high = mpfr(-3)
     while f(low) < 0:
         low -= 4
-        if low < -3000:
-            raise ArithmeticError("no bracket")
     while f(high) > 0:
         high += 2
-    for _ in range(24):
+    for _ in range(50):
         middle = (low + high) / 2
         low, high = (middle, high) if f(middle) > 0 else (low, middle)
     precision(bits)
@@ -300,7 +301,7 @@ def checked_by_the_theory():
 
 def limits():
     """Near the least times, the least ceilings, the onsets of ceilings and of the hold, and where theta can only just turn."""
-    for start, t_f in ((PAPER, 0.02), (PAPER, 0.08), ((0.05, 0.02, 3.0, 100.0), 0.02), ((0.04, 0.04, 20.0, 35.0), 0.03), ((0.01, 0.0, 5.0, 5e3), 0.1)):
+    for start, t_f in ((PAPER, 0.02), (PAPER, 0.08), ((0.05, 0.02, 3.0, 100.0), 0.02), ((0.04, 0.04, 20.0, 35.0), 0.03), ((0.01, 0.0, 5.0, 5e3), 1e-3)):
         for which, place in (("v_ceiling", 6), ("tau_ceiling", 7)):
             case = [*start, t_f, 1, INF, INF]
             peak = free_peaks(case)[place - 6]
@@ -359,6 +360,28 @@ def limits():
         yield "lingers", (*SLOW, t_f, 1, INF, 0.965)
 
 
+def structures():
+    """Sequences of arcs that random points seldom have."""
+    yield "structure", (0.05, 0.02, 3.0, 1e4, 0.0012941309247107252, 1, INF, 1.3763102111592858)
+    yield "structure", (0.05, 0.02, 3.0, 1e4, 0.0031, 1, 2e4, 1.3263102111592857)
+    yield "structure", (0.1, 0.08, 3.0, 1e4, 0.013382512430302489, 1, INF, 1.3842068074395237)
+    yield "structure", (0.2, 0.05, 3.0, 100.0, 0.008085775811857467, 1, INF, 2.090775527898214)
+    yield "structure", (0.2, 0.05, 3.0, 1e4, 0.0020708338167306317, 1, 2e5, 2.481551055796428)
+    yield "structure", (0.2, 0.05, 3.0, 1e4, 0.0011681964113972032, 0, INF, 2.581551055796428)
+    yield "structure", (*PAPER, 0.02, 1, 1500.0, 1.05)
+    yield "structure", (*PAPER, 0.03, 1, 800.0, 1.045)
+    yield "structure", (*PAPER, 0.08, 0, 1000.0, 1.05)
+    yield "structure", (*PAPER, 0.05, 0, INF, 1.05)
+    yield "structure", (*SLOW, 0.5, 1, 2.7, 0.965)
+    yield "structure", (*SLOW, 0.6, 0, 4.0, 0.99)
+    yield "structure", (0.05, 0.02, 100.0, 3.0, 0.5, 1, 2.5, 1.02)
+    yield "structure", (0.05, 0.03, 100.0, 3.0, 0.6, 0, 4.0, INF)
+    yield "structure", (0.05, 0.03, 3.0, 30.0, 0.3, 0, INF, 1.09)
+    yield "structure", (0.02, 0.02, 40.0, 5.0, 0.45, 1, 4.5, 0.995)
+    yield "structure", (0.02, 0.02, 40.0, 5.0, 0.45, 1, 7.0, 1.008)
+    yield "structure", (0.03, 0.0, 40.0, 5.0, 0.4, 1, INF, 1.03)
+
+
 def random_cases(seed, count):
     """Random transitions with ceilings between the least feasible one and the peak of the free optimum."""
     rng = random.Random(seed)
@@ -388,7 +411,10 @@ def give_up(*_):
     raise ArithmeticError("25 seconds are over")
 
 
-def main(count):
+SOURCES = {"theory": checked_by_the_theory, "structures": structures, "limits": limits, "random": lambda: random_cases(1, 160)}
+
+
+def main(sources):
     signal.signal(signal.SIGVTALRM, give_up)
     start = time.time()
     with open("optimal_ceilings.csv", "w", newline="") as file:
@@ -396,8 +422,8 @@ def main(count):
         out = csv.writer(file, lineterminator="\n")
         out.writerow(["regime", *AXES, *COLUMNS])
         rows = 0
-        for source in (checked_by_the_theory(), limits(), random_cases(1, count)):
-            for kind, case in source:
+        for source in sources:
+            for kind, case in SOURCES[source]():
                 signal.setitimer(signal.ITIMER_VIRTUAL, 25)
                 try:
                     row = row_of(case)
@@ -412,4 +438,4 @@ def main(count):
 
 
 if __name__ == "__main__":
-    main(int(sys.argv[1]) if len(sys.argv) > 1 else 160)
+    main(sys.argv[1:] or SOURCES)

@@ -3,6 +3,7 @@
 
 mod best_cubic;
 mod budgets;
+mod ceilings;
 mod compliant;
 mod error;
 #[path = "../extent/mod.rs"]

@@ -121,20 +121,31 @@ fn reference_every_number_of_a_slowing_block_is_good_to_rtol_and_its_error_is_bo
     }
 }
 
-/// `ln theta`, work and `x`, along the formula for tau.
+/// `ln theta`, work and `x`, along the formula for tau; without a ceiling that is a parabola in time.
+#[derive(Clone, Copy)]
 struct Sliding {
     case: Case,
     alpha: f64,
     sign: f64,
 }
 
+impl Sliding {
+    fn friction(&self, x: f64) -> f64 {
+        let Transition { law, v_i, v_f } = self.case.transition;
+        let steady = |v: f64| 1.0 + (law.a - law.b) * v.ln();
+        let (ceiling, bend) = (self.case.tau_ceiling, self.alpha * x * (1.0 - x));
+        if ceiling.is_infinite() {
+            return steady(v_i) + (steady(v_f) - steady(v_i)) * x + bend;
+        }
+        let (gap_i, gap_f) = (ceiling - steady(v_i), ceiling - steady(v_f));
+        ceiling - gap_i * (x * (gap_f / gap_i).ln() + bend).exp()
+    }
+}
+
 impl System<f64, SVector<f64, 3>> for Sliding {
     fn system(&self, _: f64, y: &SVector<f64, 3>, dy: &mut SVector<f64, 3>) {
-        let Transition { law, v_i, v_f } = self.case.transition;
-        let gap = |v: f64| self.case.tau_ceiling - 1.0 - (law.a - law.b) * v.ln();
-        let x = y[2];
-        let tau =
-            self.case.tau_ceiling - gap(v_i) * (x * (gap(v_f) / gap(v_i)).ln() + self.alpha * x * (1.0 - x)).exp();
+        let law = self.case.transition.law;
+        let tau = self.friction(y[2]);
         let v = ((tau - 1.0 - law.b * y[0]) / law.a).exp();
         dy[0] = self.sign * self.case.t_f * ((-y[0]).exp() - v);
         dy[1] = self.case.t_f * tau * v;
@@ -142,43 +153,88 @@ impl System<f64, SVector<f64, 3>> for Sliding {
     }
 }
 
+/// Distance in `ln theta` from the target, and the work, by an integrator of a library, in the direction in which theta contracts.
+fn slide(case: Case, alpha: f64) -> (f64, f64) {
+    let Transition { law, v_i, v_f } = case.transition;
+    let forward = law.b <= law.a;
+    let (first, last) = if forward { (v_i, v_f) } else { (v_f, v_i) };
+    let (x, sign) = if forward { (0.0, 1.0) } else { (1.0, -1.0) };
+    let start = SVector::<f64, 3>::new(-f64::ln(first), 0.0, x);
+    let mut stepper = Dop853::from_param(
+        Sliding { case, alpha, sign },
+        0.0,
+        1.0,
+        1.0,
+        start,
+        1e-13,
+        1e-14,
+        0.9,
+        0.0,
+        0.333,
+        6.0,
+        1.0,
+        0.0,
+        1_000_000,
+        u32::MAX,
+        OutputType::Sparse,
+    );
+    stepper.integrate().expect("integrates");
+    let end = stepper.y_out().last().expect("has an end");
+    (end[0] + last.ln(), end[1])
+}
+
+const LAWS_AND_CHANGES: [(Law, f64, f64, f64, f64); 4] = [
+    (PAPER, 3.0, 100.0, 0.05, 1.6),
+    (PAPER, 50.0, 4.0, 1.0, 2.0),
+    (Law { a: 0.05, b: 0.03 }, 3.0, 100.0, 0.05, 1.6),
+    (Law { a: 0.05, b: 0.05 }, 3.0, 10.0, 0.5, 1.6),
+];
+
 #[test]
 fn a_librarys_integrator_arrives_with_the_same_work() {
-    for (law, v_i, v_f, t_f, tau_ceiling) in [
-        (PAPER, 3.0, 100.0, 0.05, 1.6),
-        (PAPER, 50.0, 4.0, 1.0, 2.0),
-        (Law { a: 0.05, b: 0.03 }, 3.0, 100.0, 0.05, 1.6),
-        (Law { a: 0.05, b: 0.05 }, 3.0, 10.0, 0.5, 1.6),
-    ] {
+    for (law, v_i, v_f, t_f, tau_ceiling) in LAWS_AND_CHANGES {
         let case = case(law, v_i, v_f, t_f, tau_ceiling);
         let shortcut = solve(&case, 1e-11).unwrap_or_else(|o| panic!("{case:?}: {o}"));
-        let forward = law.b <= law.a;
-        let (first, last) = if forward { (v_i, v_f) } else { (v_f, v_i) };
-        let (x, sign) = if forward { (0.0, 1.0) } else { (1.0, -1.0) };
-        let sliding = Sliding { case, alpha: shortcut.alpha.expect("has a parameter"), sign };
-        let start = SVector::<f64, 3>::new(-f64::ln(first), 0.0, x);
-        let mut stepper = Dop853::from_param(
-            sliding,
-            0.0,
-            1.0,
-            1.0,
-            start,
-            1e-13,
-            1e-14,
-            0.9,
-            0.0,
-            0.333,
-            6.0,
-            1.0,
-            0.0,
-            1_000_000,
-            u32::MAX,
-            OutputType::Sparse,
-        );
-        stepper.integrate().expect("integrates");
-        let end = stepper.y_out().last().expect("has an end");
-        assert!((end[0] + last.ln()).abs() < 1e-10, "{case:?}: {}", end[0] + last.ln());
-        assert!(relative(shortcut.work, end[1]) < 1e-10, "{case:?}: {} {}", shortcut.work, end[1]);
+        let (missed, work) = slide(case, shortcut.alpha.expect("has a parameter"));
+        assert!(missed.abs() < 1e-10, "{case:?}: {missed}");
+        assert!(relative(shortcut.work, work) < 1e-10, "{case:?}: {} {work}", shortcut.work);
+    }
+}
+
+/// Without a ceiling friction is a parabola in time, whose bend is found here by regula falsi. The bound of the work's error was infinite.
+#[test]
+fn regress_without_a_ceiling_the_work_is_that_of_a_parabola_and_its_error_is_bounded() {
+    let family = find("bounded_friction").expect("is a family");
+    let brackets = [(0.2, 0.5), (-0.2, -0.05), (0.2, 0.5), (0.05, 0.13)];
+    for ((law, v_i, v_f, t_f, _), bracket) in LAWS_AND_CHANGES.into_iter().zip(brackets) {
+        let case = case(law, v_i, v_f, t_f, f64::INFINITY);
+        let shortcut = solve(&case, 1e-10).unwrap_or_else(|o| panic!("{case:?}: {o}"));
+        assert_eq!(shortcut.alpha, Some(0.0));
+        let [mut low, mut high] = [bracket.0, bracket.1].map(|bend| (bend, slide(case, bend).0));
+        assert!(low.1 * high.1 < 0.0, "{case:?}: {low:?} {high:?}");
+        let mut bend = 0.0;
+        for _ in 0..200 {
+            bend = (low.0 * high.1 - high.0 * low.1) / (high.1 - low.1);
+            let missed = slide(case, bend).0;
+            if missed.abs() < 1e-13 {
+                break;
+            }
+            // The Illinois method: an end that stays counts half.
+            if missed * high.1 < 0.0 {
+                low = high
+            } else {
+                low.1 *= 0.5
+            }
+            high = (bend, missed);
+        }
+        let work = slide(case, bend).1;
+        assert!(relative(shortcut.work, work) < 2e-11, "{case:?}: {} {work}", shortcut.work);
+        let sliding = Sliding { case, alpha: bend, sign: 1.0 };
+        let highest = (0..=1000).map(|k| sliding.friction(f64::from(k) / 1000.0)).fold(f64::NEG_INFINITY, f64::max);
+        assert!(relative(shortcut.friction_max, highest) < 1e-6, "{case:?}: {} {highest}", shortcut.friction_max);
+        let bound = error::of_member(family, &case, &shortcut, &mut SolverStats::default()).expect("has a bound");
+        let error = (shortcut.work - work).abs();
+        assert!(bound < 1e-10 * shortcut.work && error <= bound + 1e-11 * work, "{case:?}: {error:e} {bound:e}");
     }
 }
 

@@ -1,6 +1,7 @@
 """What one would write in Python instead, on the rows of tests/reference: `peers.py FILE` writes what each answered and how long it took.
 
-- the optimum: scipy's `solve_bvp` on the paper's equations, and direct collocation with CasADi and IPOPT;
+- the optimum: scipy's `solve_bvp` on the paper's equations, and direct collocation with CasADi and IPOPT,
+  without ceilings and with them;
 - the landscape: Gauss rules in numpy and in numba;
 - linear stability: eigenvalues by numpy.
 
@@ -66,8 +67,8 @@ def boundary_value(t_f, a, b, v_i, v_f, tolerance):
 
 
 def collocation(intervals, degree=5):
-    """A function of (t_f, a, b, v_i, v_f, bounded) that returns work and v(0+), by IPOPT: ln theta is a polynomial of
-    this degree on each interval, ln v is free at its Gauss points."""
+    """A function of (t_f, a, b, v_i, v_f, bounded, v_ceiling, tau_ceiling) that returns work and v(0+), by IPOPT: ln theta is a
+    polynomial of this degree on each interval, ln v is free at its Gauss points, where the bounds hold."""
     points = np.array(ca.collocation_points(degree, "legendre"))
     nodes = np.append(0.0, points)
     lagrange = [np.poly1d(np.poly(np.delete(nodes, j))) / np.prod(nodes[j] - np.delete(nodes, j)) for j in range(degree + 1)]
@@ -79,7 +80,7 @@ def collocation(intervals, degree=5):
     grid = 0.5 - 0.5 * np.cos(np.pi * np.linspace(0, 1, intervals + 1))
     t_f, a, b, y_i, y_f = parameters = [ca.SX.sym(name) for name in ("t_f", "a", "b", "y_i", "y_f")]
     levels, velocities = ca.SX.sym("y", degree, intervals), ca.SX.sym("z", degree, intervals)
-    conditions, cost, start = [], 0, y_i
+    conditions, friction, cost, start = [], [], 0, y_i
     for i in range(intervals):
         h = t_f * (grid[i + 1] - grid[i])
         values = [start] + [levels[j, i] for j in range(degree)]
@@ -87,20 +88,24 @@ def collocation(intervals, degree=5):
             y, z = levels[j, i], velocities[j, i]
             rate = sum(slopes[j, k] * values[k] for k in range(degree + 1))
             conditions.append(rate - h * (ca.exp(-y) - ca.exp(z)))
+            friction.append(1 + a * z + b * y)
             cost += h * weights[j] * ca.exp(z) * (1 + a * z + b * y)
         start = sum(ends[k] * values[k] for k in range(degree + 1))
     conditions.append(start - y_f)
-    problem = {"x": ca.vertcat(ca.vec(levels), ca.vec(velocities)), "f": cost, "g": ca.vertcat(*conditions), "p": ca.vertcat(*parameters)}
+    problem = {"x": ca.vertcat(ca.vec(levels), ca.vec(velocities)), "f": cost, "g": ca.vertcat(*conditions, *friction), "p": ca.vertcat(*parameters)}
     options = {"ipopt.print_level": 0, "print_time": 0, "ipopt.sb": "yes", "show_eval_warnings": False, "ipopt.tol": 1e-12, "ipopt.max_iter": 300}
     solver = ca.nlpsol("solver", "ipopt", problem, options)
     places = (grid[:-1, None] + np.diff(grid)[:, None] * points).ravel()
 
-    def solve(t_f, a, b, v_i, v_f, bounded):
+    def solve(t_f, a, b, v_i, v_f, bounded, v_ceiling=np.inf, tau_ceiling=np.inf):
         y_i, y_f = -np.log(v_i), -np.log(v_f)
         y = y_i + (y_f - y_i) * places
-        z = np.log(np.maximum(1.1, np.exp(-y) - (y_f - y_i) / t_f))
+        z = np.log(np.minimum(v_ceiling, np.maximum(1.1, np.exp(-y) - (y_f - y_i) / t_f)))
         low = np.append(np.full(y.size, -np.inf), np.full(z.size, 0.0 if bounded else -np.inf))
-        found = solver(x0=np.append(y, z), lbx=low, lbg=0, ubg=0, p=[t_f, a, b, y_i, y_f])
+        high = np.append(np.full(y.size, np.inf), np.full(z.size, np.log(v_ceiling)))
+        least = np.append(np.zeros(len(conditions)), np.full(z.size, -np.inf))
+        most = np.append(np.zeros(len(conditions)), np.full(z.size, tau_ceiling))
+        found = solver(x0=np.append(y, z), lbx=low, ubx=high, lbg=least, ubg=most, p=[t_f, a, b, y_i, y_f])
         if not solver.stats()["success"]:
             return np.nan, np.nan
         first = np.array(found["x"]).ravel()[y.size : y.size + degree]
@@ -120,6 +125,15 @@ def optimal(write):
         for row, case in list(enumerate(zip(*columns)))[::STRIDE]:
             ns, answer = least(1, lambda: solve(*case))
             write("optimal", "collocation (CasADi and IPOPT)", f"{intervals} intervals", "", row, ns, *answer)
+
+
+def ceilings(write):
+    columns = table("optimal_ceilings", "t_f", "a", "b", "v_i", "v_f", "bounded", "v_ceiling", "tau_ceiling")
+    for intervals in (10, 20, 40):
+        solve = collocation(intervals)
+        for row, case in list(enumerate(zip(*columns)))[::STRIDE]:
+            ns, answer = least(1, lambda: solve(*case))
+            write("ceilings", "collocation (CasADi and IPOPT)", f"{intervals} intervals", "", row, ns, *answer)
 
 
 def works(x, w, a, b, v_i, v_f, t_f, a_2, a_3):
@@ -191,7 +205,7 @@ def main():
         def write(*cells):
             out.writerow([repr(float(cell)) if isinstance(cell, np.floating) else cell for cell in cells])
 
-        for subject in (optimal, landscape, stability):
+        for subject in (optimal, ceilings, landscape, stability):
             start = time.time()
             subject(write)
             print(f"{subject.__name__}: {time.time() - start:.0f} s", flush=True)

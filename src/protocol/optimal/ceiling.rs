@@ -164,7 +164,7 @@ impl CeilingArc {
                 theta_lo * exp_m1(self.length) / exp_m1(self.z_hi).abs()
             }
             _ => {
-                let line = FrictionLine::of(self);
+                let line = CeilingLine::of(self);
                 let mut time = line.lingered;
                 for chart in line.charts(self) {
                     chart.panels(|middle, half, rule| time += line.time(&chart, middle, half, rule));
@@ -182,18 +182,7 @@ impl CeilingArc {
 
     /// Visits the nodes of the arc; returns the time without nodes.
     fn visit(&self, mut node: impl FnMut(&CeilingNode)) -> f64 {
-        if self.kind == ArcKind::VCeiling {
-            // In ln x, x = u - 1, whose singularities are pi off the real axis.
-            let chart = Chart { near: false, from: 0.0, to: self.length_v(), longest: PANEL_V };
-            let (x_lo, v) = (exp_m1(self.z_lo), self.ceilings.v);
-            chart.nodes(|s, weight| {
-                let z = ln_1p(x_lo * exp(s));
-                let depth = Depth { below: self.z_hi - z, above: z - self.z_lo };
-                node(&CeilingNode { depth, z, dt: weight.abs() / v });
-            });
-            return 0.0;
-        }
-        let line = FrictionLine::of(self);
+        let line = CeilingLine::of(self);
         for chart in line.charts(self) {
             chart.nodes(|at, weight| {
                 let (s, size, scale) = line.place(chart.near, at);
@@ -237,11 +226,11 @@ impl CeilingArc {
             let ln_theta = ln_theta_hi - depth.below;
             let slip = lingered * exp(-ln_theta);
             sums.time += lingered;
-            sums.work += self.ceilings.tau * slip;
+            sums.work += (1.0 + (b - a) * ln_theta) * slip;
             sums.creep -= ln_theta * slip;
             sums.state += ln_theta * slip;
             if let Some(gap) = gap {
-                let price = (b - a + gap.pull(depth)) / (a * self.ceilings.kappa) * slip;
+                let price = if of_v { 0.0 } else { (b - a + gap.pull(depth)) / (a * self.ceilings.kappa) * slip };
                 sums.price += price;
                 sums.price_ln_v -= price * ln_theta;
                 sums.price_ln_theta += price * ln_theta;
@@ -251,8 +240,8 @@ impl CeilingArc {
     }
 }
 
-/// An arc on the ceiling of friction as a line in `s`, `ln theta` from the end where `|z|` is least.
-struct FrictionLine {
+/// An arc on a ceiling as a line in `s`, `ln theta` from the end where `|z|` is least.
+struct CeilingLine {
     theta_hi: f64,
     length: f64,
     /// Whether `|z|` is least at the end of greater theta.
@@ -276,17 +265,17 @@ struct Chart {
     longest: f64,
 }
 
-impl FrictionLine {
-    fn of(arc: &CeilingArc) -> FrictionLine {
+impl CeilingLine {
+    fn of(arc: &CeilingArc) -> CeilingLine {
         let high_first = arc.z_hi.abs() <= arc.z_lo.abs();
-        let slope = arc.ceilings.kappa.abs();
+        let slope = arc.rise().abs();
         let lingered = if arc.ln_z < LN_TINY && slope > 0.0 {
             let theta = arc.theta_hi * if high_first { 1.0 } else { exp(-arc.length) };
             theta / slope * (LN_TINY - arc.ln_z)
         } else {
             0.0
         };
-        FrictionLine {
+        CeilingLine {
             theta_hi: arc.theta_hi,
             length: arc.length,
             high_first,
@@ -336,7 +325,7 @@ impl FrictionLine {
     /// Time on a panel.
     fn time(&self, chart: &Chart, middle: f64, half: f64, rule: &Rule) -> f64 {
         match (rule.x.first_chunk(), rule.w.first_chunk()) {
-            (Some(x), Some(w)) => half * self.theta_hi * friction_time(self, chart.near, [middle, half], x, w),
+            (Some(x), Some(w)) => half * self.theta_hi * ceiling_time(self, chart.near, [middle, half], x, w),
             _ => f64::NAN,
         }
     }
@@ -347,7 +336,7 @@ impl FrictionLine {
     "x86_64+avx+avx2+bmi1+bmi2+avx512f+avx512bw+avx512cd+avx512dq+avx512vl",
     "x86_64+avx+avx2+bmi1+bmi2"
 ))]
-fn friction_time(line: &FrictionLine, near: bool, [middle, half]: [f64; 2], x: &[f64; NODES], w: &[f64; NODES]) -> f64 {
+fn ceiling_time(line: &CeilingLine, near: bool, [middle, half]: [f64; 2], x: &[f64; NODES], w: &[f64; NODES]) -> f64 {
     let (mut depth, mut size, mut scale) = ([0.0; NODES], [0.0; NODES], [0.0; NODES]);
     for i in 0..NODES {
         let (s, at, stretch) = line.place(near, middle + half * x[i]);
@@ -394,9 +383,6 @@ const LN_TINY: f64 = -42.0;
 
 /// Fraction `e^-NOTHING` of an integral that rounding hides.
 const NOTHING: f64 = 45.0;
-
-/// Longest panel in `ln x` on the ceiling of the velocity: the singularities at `pi i` leave `3.4^-32` of 16 nodes.
-const PANEL_V: f64 = 4.0;
 
 /// Longest panel in `ln |z|`: the singularities at `ln 2 pi + pi i/2` leave `4^-32`.
 const PANEL_NEAR: f64 = 3.0;

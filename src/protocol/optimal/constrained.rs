@@ -1,12 +1,14 @@
 //! The optimum under ceilings: the free one where it obeys them, else the clamped extremal of the same family that takes
 //! the given time.
 
+use std::cell::Cell;
+
 use super::arc::{greatest_friction, least_friction, phi};
 use super::ceiling::Ceilings;
 use super::clamp::{Path, PathSums, Piece, Switch, whole};
 use super::extremal::Problem;
 use super::lifetime::Lifetime;
-use super::search::{self, Accuracy, FINEST, JUMP, Member, ROUNDING, Time};
+use super::search::{self, Accuracy, FINEST, Member, ROUNDING, Time};
 use super::{ArcKind, Optimum, Strategy, floor};
 use crate::model::Law;
 use crate::numerics::elementary::{exp, exp_m1, ln, ln_1p};
@@ -114,7 +116,8 @@ pub(super) fn find(problem: &Problem, ceilings: &Ceilings, time: Time, rtol: f64
             Constrained::without_numbers(Status::Unproven, stats)
         }
         Feasible::Times(least, most) => {
-            let search = Search { problem, ceilings, t_f, least, most, rtol, stats };
+            let (quadratures, nodes) = (Cell::new(0), Cell::new(0));
+            let search = Search { problem, ceilings, t_f, least, most, rtol, stats, quadratures, nodes };
             search.solve(member.as_ref())
         }
     }
@@ -186,6 +189,16 @@ struct Search<'a> {
     most: f64,
     rtol: f64,
     stats: SolverStats,
+    /// Of this search.
+    quadratures: Cell<u32>,
+    nodes: Cell<u32>,
+}
+
+/// What a probe found.
+struct Probed {
+    path: Path,
+    sums: PathSums,
+    probe: Probe,
 }
 
 /// An interval of a parameter, with a first guess.
@@ -314,70 +327,40 @@ impl Search<'_> {
     /// The member of a family that takes the time.
     fn search(&mut self, member: impl Fn(f64) -> Option<Path>, interval: Interval) -> Constrained {
         let Search { problem, t_f, least, most, rtol, .. } = *self;
-        let beyond = t_f - least;
-        let left = most - t_f;
-        let room = beyond.min(left);
+        let room = (t_f - least).min(most - t_f);
         let doubt = 4.0 * f64::EPSILON * t_f / room;
-        let accuracy = Accuracy::new(rtol, doubt, problem.law.a);
-        let mut tolerance = (accuracy.exact * (room / t_f).min(1.0)).max(FINEST);
-        let sign = if interval.rises { 1.0 } else { -1.0 };
-        let mut stats = self.stats;
-        let mut probe = |p: f64, tolerance: f64| {
-            let path = member(p)?;
-            let sums = path.sums(tolerance)?;
-            stats.quadratures += 1;
-            stats.nodes += sums.nodes;
-            let time = sums.time;
-            let probe = if time <= least {
-                Probe { value: -sign * f64::MAX, slope: 0.0 }
-            } else if time >= most {
-                Probe { value: sign * f64::MAX, slope: 0.0 }
-            } else {
-                let (mut value, mut slope) = (ln((time - least) / beyond), sums.rate / (time - least));
-                if most.is_finite() {
-                    value -= ln((most - time) / left);
-                    slope += sums.rate / (most - time);
-                }
-                Probe { value: sign * value, slope: sign * slope }
-            };
-            Some((path, sums, probe))
-        };
-        let mut enough = ENOUGH + doubt;
-        let (mut start, mut outcome) = (interval.start, None);
+        let exact = Accuracy::new(rtol, doubt, problem.law.a).exact * (room / t_f).min(1.0);
+        let (low, high) = interval.bracket;
+        let (mut tolerance, mut enough, mut start) = (exact.max(FINEST), ENOUGH + doubt, interval.start);
+        let mut found = None;
         for _ in 0..MOST_SEARCHES {
-            let root = newton_in_pieces(
-                |p| probe(p, tolerance).map(|(path, _, probe)| (probe, path.signature())),
-                start,
-                interval.bracket,
-                interval.rises,
-                enough,
-                accuracy.least.sqrt().min(enough),
-            );
-            outcome = root.and_then(|(root, _)| Some((root.x, probe(root.x, tolerance)?)));
-            let Some((x, (path, _, last))) = &outcome else { break };
-            start = *x;
+            let probe = |p: f64| self.probe(member(p)?, tolerance, interval.rises);
+            let probe_piece = |p: f64| probe(p).map(|probed| (probed.probe, probed.path.signature()));
+            let root = newton_in_pieces(probe_piece, start, interval.bracket, interval.rises, enough, enough * enough);
+            let Some((x, probed)) = root.and_then(|(root, _)| Some((root.x, probe(root.x)?))) else { break };
+            let Probe { value, slope } = probed.probe;
+            let step = if slope > 0.0 { value / slope } else { 0.0 };
+            let Some(path) = member((x - step).max(low).min(high)) else { break };
             // Short arcs on a ceiling change much with the parameter, those at a peak of friction by the square root.
             let (of_v, of_tau) = path.times();
-            let share = ((of_v + of_tau) / t_f).powi(2);
-            let finer = (tolerance * share).max(FINEST);
-            let good = last.value * last.value <= (SHORT_ENOUGH * rtol * share).max(doubt * doubt);
-            if share >= SHORT && last.value.abs() <= 10.0 * enough || good && finer >= tolerance {
+            let share = (((of_v + of_tau) / (SHORT * t_f)).powi(2)).clamp(f64::MIN_POSITIVE, 1.0);
+            let needed = (LEFT * rtol * share).sqrt().max(doubt);
+            let finer = (exact * share).max(FINEST);
+            // A last step must not cross a seam of the family, where the slope jumps.
+            let smooth = path.signature() == probed.path.signature() || value.abs() <= SEAM;
+            let good = value.abs() <= needed && smooth && tolerance <= finer;
+            let accepted = value * value <= rtol.max(100.0 * doubt * doubt);
+            found = accepted.then_some((probed, path));
+            if good {
                 break;
             }
-            if share < SHORT && share > 0.0 {
-                (tolerance, enough) = (finer.min(tolerance), (SHORT_ENOUGH * rtol * share).sqrt().max(doubt));
-            }
+            (tolerance, enough, start) = (finer.min(tolerance), needed.min(0.01 * enough).max(doubt), x);
         }
-        let found = outcome.filter(|(_, (_, _, last))| last.value.abs() <= JUMP.max(10.0 * enough));
-        let found = found.and_then(|(x, (path, sums, last))| {
-            let step = if last.slope > 0.0 { last.value / last.slope } else { 0.0 };
-            let (low, high) = interval.bracket;
-            Some((path, sums, member((x - step).max(low).min(high))?))
-        });
-        self.stats = stats;
-        let Some((probed, sums, path)) = found else {
+        self.stats.quadratures += self.quadratures.get();
+        self.stats.nodes += self.nodes.get();
+        let Some((Probed { path: probed, sums, .. }, path)) = found else {
             let status = if problem.is_doubtful() { Status::Unproven } else { Status::NotConverged };
-            return Constrained::without_numbers(status, stats);
+            return Constrained::without_numbers(status, self.stats);
         };
         let (c_probed, c) = (probed.extremal.arc.c(), path.extremal.arc.c());
         let (ceiling_work, nodes) = probed.ceiling_work();
@@ -386,6 +369,30 @@ impl Search<'_> {
         let work = held_work + sums.work + ceiling_work - 0.5 * (c_probed + c) * (t_f - sums.time);
         let solved = self.read(&path, work, sums.friction_min);
         Constrained { solved, path: solved.value.map(|_| path), sitting: 0.0 }
+    }
+
+    /// How far the time of a path is from the one wanted, as a rising function of the parameter: the logarithm of the ratio
+    /// of what they have beyond the least time, and of what they leave to the greatest.
+    fn probe(&self, path: Path, tolerance: f64, rises: bool) -> Option<Probed> {
+        let &Search { t_f, least, most, .. } = self;
+        let sums = path.sums(tolerance)?;
+        self.quadratures.set(self.quadratures.get() + 1);
+        self.nodes.set(self.nodes.get() + sums.nodes);
+        let sign = if rises { 1.0 } else { -1.0 };
+        let time = sums.time;
+        let probe = if time <= least {
+            Probe { value: -sign * f64::MAX, slope: 0.0 }
+        } else if time >= most {
+            Probe { value: sign * f64::MAX, slope: 0.0 }
+        } else {
+            let (mut value, mut slope) = (ln((time - least) / (t_f - least)), sums.rate / (time - least));
+            if most.is_finite() {
+                value -= ln((most - time) / (most - t_f));
+                slope += sums.rate / (most - time);
+            }
+            Probe { value: sign * value, slope: sign * slope }
+        };
+        Some(Probed { path, sums, probe })
     }
 
     /// The optimum of a path.
@@ -459,14 +466,17 @@ fn lifetime(ln_theta: f64) -> Lifetime {
 /// A relative difference of times from which Newton's method leaves rounding in two steps.
 const ENOUGH: f64 = 1e-4;
 
-/// Square of the fraction of the time that short arcs on a ceiling take, at most.
-const SHORT: f64 = 0.01;
+/// Fraction of the time below which all arcs on ceilings together are short.
+const SHORT: f64 = 0.1;
 
-/// Square of the value that a search for them may leave, in units of the accuracy.
-const SHORT_ENOUGH: f64 = 0.01;
+/// Square of the relative difference of times before the last step, in units of the accuracy: Newton's method leaves that.
+const LEFT: f64 = 0.01;
+
+/// A relative difference of times so small that a change of slope by 1e5 does not matter.
+const SEAM: f64 = 1e-13;
 
 /// Searches until the last step is as good as its slope promises.
-const MOST_SEARCHES: u32 = 4;
+const MOST_SEARCHES: u32 = 6;
 
 /// Relative excess over a ceiling that is an error of the search.
 const ROUNDING_AT_CEILING: f64 = 1e-7;

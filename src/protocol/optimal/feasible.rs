@@ -5,7 +5,7 @@ use super::constrained::{Feasible, feasible};
 use super::extremal::Problem;
 use super::{ArcKind, Bounds, Obstacle, posed};
 use crate::model::Transition;
-use crate::numerics::elementary::{exp, ln, ln_1p};
+use crate::numerics::elementary::{exp, ln};
 
 /// The least and the greatest feasible time under the bounds, each in closed form or one quadrature; the greatest is
 /// infinite unless a ceiling keeps theta from rising. `None` where no time is feasible.

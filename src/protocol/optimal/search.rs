@@ -28,7 +28,7 @@ const SPENT: f64 = 4.0 * f64::EPSILON;
 
 /// A bracket that closes on a larger change of the time holds no member of this time, but a gap of the family; unless
 /// a search may end there, with a corrected step that leaves an error of third order.
-pub(super) const JUMP: f64 = 1e-2;
+const JUMP: f64 = 1e-2;
 
 /// Fraction of the whole time below which a hold is short.
 const SHORT: f64 = 0.01;

@@ -7,6 +7,7 @@
 //! runs them by the million.
 
 mod best_cubic;
+mod ceilings;
 mod compliant;
 pub mod crossover;
 mod landscape;

@@ -1,0 +1,276 @@
+//! Optimal protocols under ceilings, their slopes, least times and least ceilings, and the feedback law: against tables to
+//! 25 digits, and against routes that share nothing with the solver.
+
+use std::collections::BTreeMap;
+
+use crate::reference::{self, Row};
+use slipsweep::model::{Law, Transition};
+use slipsweep::protocol::Status;
+use slipsweep::protocol::optimal::{
+    Bounds, feasible_times, feedback_at, least_tau_ceiling, least_v_ceiling, obstacle, slopes, solve,
+};
+
+/// The inputs of a problem, changed one by one to learn what their rounding does.
+#[derive(Debug, Clone, Copy)]
+struct Inputs {
+    /// `a`, `b`, `v_i` or `theta`, `v_f`, `t_f` or `t_left`, `v_ceiling`, `tau_ceiling`.
+    numbers: [f64; 7],
+    floor: bool,
+}
+
+impl Inputs {
+    fn of(row: &Row, start: &str, time: &str) -> Inputs {
+        let names = ["a", "b", start, "v_f", time, "v_ceiling", "tau_ceiling"];
+        Inputs { numbers: names.map(|name| row.number(name)), floor: row.text("bounded") == "1" }
+    }
+
+    fn law(&self) -> Law {
+        Law { a: self.numbers[0], b: self.numbers[1] }
+    }
+
+    fn transition(&self) -> Transition {
+        Transition { law: self.law(), v_i: self.numbers[2], v_f: self.numbers[3] }
+    }
+
+    fn time(&self) -> f64 {
+        self.numbers[4]
+    }
+
+    fn bounds(&self) -> Bounds {
+        Bounds::new(self.floor).with_v_ceiling(self.numbers[5]).with_tau_ceiling(self.numbers[6])
+    }
+}
+
+/// Units in the last place by which an input is changed: differences over many rise above rounding.
+const NUDGES: [i64; 3] = [1 << 20, 1 << 10, 1 << 5];
+
+/// Units in the last place of each input that may count as its rounding.
+const ROUNDINGS: f64 = 4.0;
+
+/// What rounding of the inputs does to each number, all inputs together.
+fn by_inputs<const N: usize>(inputs: &Inputs, find: impl Fn(&Inputs) -> Option<[f64; N]>) -> [f64; N] {
+    let mut total = [0.0; N];
+    let Some(here) = find(inputs) else { return total };
+    for (place, &number) in inputs.numbers.iter().enumerate() {
+        if number == 0.0 || !number.is_finite() {
+            continue;
+        }
+        let mut least = [f64::INFINITY; N];
+        for nudge in NUDGES {
+            for units in [nudge, -nudge] {
+                let mut other = *inputs;
+                other.numbers[place] = f64::from_bits(number.to_bits().saturating_add_signed(units));
+                let Some(there) = find(&other) else { continue };
+                for i in 0..N {
+                    least[i] = least[i].min((there[i] - here[i]).abs() / nudge as f64);
+                }
+            }
+        }
+        for (total, least) in total.iter_mut().zip(least) {
+            *total += ROUNDINGS * if least.is_finite() { least } else { 0.0 };
+        }
+    }
+    total
+}
+
+/// The greatest errors of each column in each structure, in units of what is allowed.
+#[derive(Default)]
+struct Errors {
+    worst: BTreeMap<(String, String), (f64, String)>,
+    failures: Vec<String>,
+}
+
+impl Errors {
+    fn add(&mut self, column: &str, structure: &str, fraction: f64, what: String) {
+        // NaN is a failure.
+        if !(fraction <= 1.0) {
+            self.failures.push(format!("{column} {structure} {fraction:.1e}: {what}"));
+        }
+        let entry = self.worst.entry((column.into(), structure.into())).or_insert((0.0, String::new()));
+        if !(fraction <= entry.0) {
+            *entry = (fraction, what);
+        }
+    }
+
+    /// Fails where an error is larger than is allowed; with `SLIPSWEEP_ERRORS=1` lists the greatest of each column and structure.
+    fn settle(self, table: &str) {
+        if std::env::var_os("SLIPSWEEP_ERRORS").is_some() {
+            for ((column, structure), (fraction, _)) in &self.worst {
+                println!("{table},{column},{structure},{fraction:.2e}");
+            }
+        }
+        let named = self.failures.iter().take(60).cloned().collect::<Vec<_>>().join("\n");
+        assert!(self.failures.is_empty(), "{table}: {} failures\n{named}", self.failures.len());
+    }
+}
+
+const OPTIMUM: [&str; 9] = [
+    "work",
+    "v_start",
+    "v_end",
+    "time_at_floor",
+    "time_at_v_ceiling",
+    "time_at_tau_ceiling",
+    "hamiltonian",
+    "theta_max",
+    "friction_max",
+];
+
+fn optimum(inputs: &Inputs, rtol: f64) -> Option<[f64; 9]> {
+    let found = solve(&inputs.transition(), inputs.time(), inputs.bounds(), rtol).value?;
+    Some([
+        found.work,
+        found.v_start,
+        found.v_end,
+        found.time_at_floor,
+        found.time_at_v_ceiling,
+        found.time_at_tau_ceiling,
+        found.hamiltonian,
+        found.theta_max,
+        found.friction_max,
+    ])
+}
+
+const SLOPES: [&str; 6] =
+    ["dwork_da", "dwork_db", "dwork_dv_i", "dwork_dv_f", "dwork_dv_ceiling", "dwork_dtau_ceiling"];
+
+fn derivatives(inputs: &Inputs, rtol: f64) -> Option<[f64; 6]> {
+    let found = slopes(&inputs.transition(), inputs.time(), inputs.bounds(), rtol).1?;
+    Some([found.a, found.b, found.v_i, found.v_f, found.v_ceiling, found.tau_ceiling])
+}
+
+/// The tightest accuracy that a spec may request.
+const FINE: f64 = 1e-13;
+
+const ACCURACIES: [f64; 3] = [1e-6, 1e-10, FINE];
+
+/// Compares numbers with the cells of a row, where they are not empty.
+fn compare<const N: usize>(
+    errors: &mut Errors,
+    row: &Row,
+    inputs: &Inputs,
+    columns: [&str; N],
+    find: impl Fn(&Inputs, f64) -> Option<[f64; N]>,
+) {
+    let structure = row.text("arcs").to_string();
+    let doubt = by_inputs(inputs, |inputs| find(inputs, FINE));
+    for rtol in ACCURACIES {
+        let Some(found) = find(inputs, rtol) else {
+            errors.add("status", &structure, f64::INFINITY, format!("{} no numbers at {rtol}: {inputs:?}", columns[0]));
+            continue;
+        };
+        for (i, column) in columns.into_iter().enumerate() {
+            let Some(expected) = row.optional(column) else { continue };
+            // A time is what is left of t_f.
+            let rest = if column.starts_with("time_at") { 16.0 * f64::EPSILON * inputs.time() } else { 0.0 };
+            let allowed = (2.0 * rtol + 16.0 * f64::EPSILON) * expected.abs() + doubt[i] + rest;
+            let error = (found[i] - expected).abs();
+            let fraction = if error == 0.0 { 0.0 } else { error / allowed };
+            let what = format!("at {rtol} {} for {expected} {inputs:?}", found[i]);
+            errors.add(column, &structure, fraction, what);
+        }
+    }
+}
+
+#[test]
+fn reference_optima_under_ceilings() {
+    let rows = reference::table("optimal_ceilings");
+    let mut errors = Errors::default();
+    for row in &rows {
+        let inputs = Inputs::of(row, "v_i", "t_f");
+        let solved = solve(&inputs.transition(), inputs.time(), inputs.bounds(), 1e-10);
+        let below = !inputs.floor && row.number("v_start") < 1.0;
+        let expected = if below { Status::BelowBound } else { Status::Ok };
+        errors.add(
+            "status",
+            row.text("arcs"),
+            f64::from(u8::from(solved.status != expected)) * 2.0,
+            format!("{:?} {inputs:?}", solved.status),
+        );
+        compare(&mut errors, row, &inputs, OPTIMUM, optimum);
+    }
+    errors.settle("optimal_ceilings");
+}
+
+#[test]
+fn reference_slopes_under_ceilings() {
+    let mut errors = Errors::default();
+    for row in &reference::table("optimal_ceilings") {
+        compare(&mut errors, row, &Inputs::of(row, "v_i", "t_f"), SLOPES, derivatives);
+    }
+    errors.settle("slopes");
+}
+
+#[test]
+fn reference_least_times_and_least_ceilings() {
+    let mut errors = Errors::default();
+    for row in &reference::table("optimal_ceilings") {
+        let inputs = Inputs::of(row, "v_i", "t_f");
+        assert_eq!(obstacle(&inputs.transition(), inputs.time(), inputs.bounds()), None, "{inputs:?}");
+        let columns = ["t_least", "v_ceiling_least", "tau_ceiling_least"];
+        compare(&mut errors, row, &inputs, columns, |inputs, rtol| {
+            let (transition, t_f, bounds) = (inputs.transition(), inputs.time(), inputs.bounds());
+            let t_least = feasible_times(&transition, bounds)?.0;
+            Some([
+                t_least,
+                least_v_ceiling(&transition, t_f, bounds, rtol)?,
+                least_tau_ceiling(&transition, t_f, bounds, rtol)?,
+            ])
+        });
+    }
+    errors.settle("feasible");
+}
+
+/// A ceiling a little below the least feasible one, and a time a little below the least one, are infeasible.
+#[test]
+fn reference_infeasible_just_beyond_the_limits() {
+    for row in &reference::table("optimal_ceilings") {
+        let inputs = Inputs::of(row, "v_i", "t_f");
+        let (transition, t_f, bounds) = (inputs.transition(), inputs.time(), inputs.bounds());
+        let infeasible = |t_f: f64, bounds: Bounds| {
+            let found = solve(&transition, t_f, bounds, 1e-10);
+            assert_eq!(found.status, Status::Infeasible, "{row:?} {t_f} {bounds:?}");
+            assert!(found.value.is_none() && obstacle(&transition, t_f, bounds).is_some(), "{row:?}");
+        };
+        let (v, tau) = (row.number("v_ceiling_least"), row.number("tau_ceiling_least"));
+        infeasible(t_f, bounds.with_v_ceiling(v * (1.0 - 1e-9)));
+        infeasible(t_f, bounds.with_tau_ceiling(tau - 1e-9 * tau.abs()));
+        if row.number("t_least") > 0.0 {
+            infeasible(row.number("t_least") * (1.0 - 1e-9), bounds);
+        }
+    }
+}
+
+#[test]
+fn reference_feedback() {
+    let columns = ["v", "work_to_go", "costate", "gain"];
+    let find = |inputs: &Inputs, rtol: f64| {
+        let [_, _, theta, v_f, t_left, ..] = inputs.numbers;
+        let found = feedback_at(inputs.law(), theta, t_left, v_f, inputs.bounds(), rtol).value?;
+        Some([found.v, found.work_to_go, found.costate, found.gain])
+    };
+    let mut errors = Errors::default();
+    for row in &reference::table("feedback") {
+        let inputs = Inputs::of(row, "theta", "t_left");
+        let [_, _, theta, v_f, t_left, ..] = inputs.numbers;
+        let solved = feedback_at(inputs.law(), theta, t_left, v_f, inputs.bounds(), 1e-10);
+        if row.text("status") == "infeasible" {
+            errors.add(
+                "status",
+                "infeasible",
+                if solved.status == Status::Infeasible { 0.0 } else { 2.0 },
+                format!("{inputs:?}"),
+            );
+            continue;
+        }
+        let arc = solved.value.map_or("none", |found| found.arc.name());
+        errors.add(
+            "arc",
+            row.text("arcs"),
+            if arc == row.text("arc") { 0.0 } else { 2.0 },
+            format!("{arc} {inputs:?}"),
+        );
+        compare(&mut errors, row, &inputs, columns, find);
+    }
+    errors.settle("feedback");
+}

@@ -1,0 +1,343 @@
+//! `optimal` under ceilings: random points of the physical domain, many of them near the least feasible ceilings, near the
+//! peaks of the free optimum and near steady sliding on a ceiling. Bounds are kept, times are feasible exactly where the
+//! least ceilings say so, and no admissible protocol is cheaper.
+
+use slipsweep::model::{Law, Transition};
+use slipsweep::protocol::optimal::{
+    Bounds, FeedbackPoint, Optimum, Slopes, feasible_times, feedback_at, least_tau_ceiling, least_v_ceiling, obstacle,
+    shortest_time, slopes, solve,
+};
+use slipsweep::protocol::{Solved, Status};
+
+use super::random::Random;
+use super::{POINTS, Row, sample};
+
+#[derive(Debug, Clone, Copy)]
+struct Point {
+    transition: Transition,
+    t_f: f64,
+    bounds: Bounds,
+    rtol: f64,
+    /// A fraction that chooses a variation.
+    place: f64,
+}
+
+const FINE: f64 = 1e-13;
+
+/// The physical domain of docs/domain.md.
+fn transition(random: &mut Random) -> Transition {
+    let a = random.between(1e-3, 0.3);
+    let b = match (random.uniform() * 6.0) as u32 {
+        0 => 0.0,
+        1 => a,
+        2 => a * random.between(0.05, 0.99),
+        _ => (a * random.between(1.01, 20.0)).min(0.5),
+    };
+    let b = if b != a && (b / a - 1.0).abs() < 1e-3 { a } else { b };
+    let v_i = 1.0 + random.between(1e-3, 1e10);
+    let v_f = match (random.uniform() * 10.0) as u32 {
+        0 => v_i,
+        1 => 1.0 + (v_i - 1.0) * (1.0 + random.between(1e-5, 1.0)),
+        2..=5 => v_i * random.between(1.0 + 1e-5, 1e4),
+        _ => 1.0 + (v_i - 1.0) * random.between(1e-4, 1.0),
+    };
+    Transition { law: Law { a, b }, v_i, v_f: v_f.clamp(1.001, 1e10) }
+}
+
+fn draw(random: &mut Random) -> Point {
+    let (transition, floor) = (transition(random), random.chance(0.75));
+    let fast = transition.v_i.max(transition.v_f);
+    let least = shortest_time(&transition, floor).expect("is in the domain");
+    let t_f = match random.chance(0.5) {
+        true => least + random.between(1e-3, 1e4) / fast,
+        false => least * (1.0 + random.between(1e-9, 1e2)) + random.between(1e-3, 30.0) / transition.v_f,
+    };
+    let (t_f, free) = (t_f.min(1e4), Bounds::new(floor));
+    let optimum = solve(&transition, t_f, free, FINE).value;
+    let mut bounds = free;
+    let kind = random.uniform();
+    if kind < 0.6 {
+        let peak = optimum.map_or(10.0 * fast, |found| found.v_end.max(found.v_start));
+        let low = least_v_ceiling(&transition, t_f, bounds, FINE).unwrap_or(transition.v_f);
+        bounds = bounds.with_v_ceiling(between(random, low, peak));
+    }
+    if kind > 0.3 {
+        let peak = optimum.map_or(2.0, |found| found.friction_max);
+        let low = least_tau_ceiling(&transition, t_f, bounds, FINE).unwrap_or(1.0);
+        bounds = bounds.with_tau_ceiling(between(random, low, peak));
+    }
+    Point { transition, t_f, bounds, rtol: random.between(1e-12, 1e-4), place: random.uniform() }
+}
+
+/// A ceiling between the least feasible one and the peak of the free optimum, often near one of them, seldom below.
+fn between(random: &mut Random, least: f64, peak: f64) -> f64 {
+    let width = (peak - least).abs().max(1e-6 * least.abs());
+    match (random.uniform() * 8.0) as u32 {
+        0 => least + width * random.between(1e-9, 1.0),
+        1 => least + least.abs() * random.between(2e-9, 1e-2),
+        2 => peak - width * random.between(1e-9, 1.0),
+        3 => peak + width * random.between(1e-9, 10.0),
+        4 => least - least.abs() * random.between(2e-9, 1e-2),
+        _ => least + width * random.uniform(),
+    }
+}
+
+/// The numbers of a row whose extremal is the only one.
+fn certain(solved: &Solved<Optimum>) -> Option<Optimum> {
+    solved.value.filter(|_| matches!(solved.status, Status::Ok | Status::BelowBound))
+}
+
+#[test]
+fn every_optimum_under_ceilings_is_right_or_says_so() {
+    sample("ceilings", POINTS, draw, |point, row| {
+        let &Point { ref transition, t_f, bounds, rtol, .. } = point;
+        let solved = solve(transition, t_f, bounds, rtol);
+        row.status(solved.status);
+        feasible_where_the_limits_say(point, &solved, row);
+        let Some(found) = solved.value else { return };
+        keeps_its_bounds(point, &found, row);
+        let fine = solve(transition, t_f, bounds, FINE);
+        row.fact("converged at 1e-13", fine.status != Status::NotConverged);
+        let (Some(rough), Some(fine)) = (certain(&solved), certain(&fine)) else { return };
+        let noise = noise_of_work(point);
+        row.at_most("work to rtol", (rough.work - fine.work).abs(), 2.0 * rtol * fine.work.abs() + noise);
+        ceilings_cost(point, &fine, row);
+        slopes_are_slopes(point, row);
+        starts_like_its_feedback(point, &fine, row);
+        dynamic_programming(point, &fine, row);
+        two_velocities(point, &fine, row);
+    });
+}
+
+/// What the solver and four roundings of each input may make of the work.
+fn noise_of_work(point: &Point) -> f64 {
+    let &Point { transition: Transition { law, v_i, v_f }, t_f, bounds, .. } = point;
+    let (solved, found) = slopes(&point.transition, t_f, bounds, FINE);
+    let Some(optimum) = solved.value else { return 0.0 };
+    let mut inputs = optimum.hamiltonian.abs() * t_f;
+    if let Some(slope) = found {
+        let bound = |slope: f64, ceiling: f64| if slope == 0.0 { 0.0 } else { slope * ceiling };
+        let by_velocities = (slope.v_i * v_i).abs() + (slope.v_f * v_f).abs();
+        let by_ceilings = bound(slope.v_ceiling, bounds.v_ceiling) + bound(slope.tau_ceiling, bounds.tau_ceiling);
+        inputs += (slope.a * law.a).abs() + (slope.b * law.b).abs() + by_velocities + by_ceilings.abs();
+    }
+    64.0 * FINE * optimum.work.abs() + 4.0 * f64::EPSILON * inputs
+}
+
+fn feasible_where_the_limits_say(point: &Point, solved: &Solved<Optimum>, row: &mut Row) {
+    let &Point { ref transition, t_f, bounds, .. } = point;
+    let infeasible = solved.status == Status::Infeasible;
+    row.fact("an obstacle where it is infeasible alone", obstacle(transition, t_f, bounds).is_some() == infeasible);
+    let v = least_v_ceiling(transition, t_f, bounds, FINE);
+    let tau = least_tau_ceiling(transition, t_f, bounds, FINE);
+    row.fact("least ceilings exist where it is feasible", infeasible || (v.is_some() && tau.is_some()));
+    for (ceiling, least) in [(bounds.v_ceiling, v), (bounds.tau_ceiling, tau)] {
+        let Some(least) = least.filter(|_| ceiling.is_finite()) else { continue };
+        // Off the limit by more than 1e-9.
+        if (ceiling - least).abs() > 1e-9 * least.abs() {
+            row.fact("feasible above the least ceiling alone", infeasible == (ceiling < least));
+        }
+    }
+    if let Some((least, most)) = feasible_times(transition, bounds) {
+        let inside = (least * (1.0 + 1e-9)..=most * (1.0 - 1e-9)).contains(&t_f);
+        row.fact("feasible between the limits of the time", !inside || !infeasible);
+        let outside = t_f < least * (1.0 - 1e-9) || t_f > most * (1.0 + 1e-9);
+        row.fact("infeasible beyond the limits of the time", !outside || infeasible);
+    }
+}
+
+fn keeps_its_bounds(point: &Point, found: &Optimum, row: &mut Row) {
+    let &Point { ref transition, t_f, bounds, .. } = point;
+    let times = [found.time_at_floor, found.time_at_v_ceiling, found.time_at_tau_ceiling];
+    let numbers = [found.work, found.v_start, found.v_end, found.hamiltonian, found.theta_max, found.friction_max];
+    row.fact("finite", numbers.iter().chain(&times).all(|number| number.is_finite()));
+    row.fact("times are positive", times.iter().all(|&time| time >= 0.0));
+    row.at_most("times are parts of t_f", times.iter().sum::<f64>() - t_f, 64.0 * f64::EPSILON * t_f);
+    for v in [found.v_start, found.v_end] {
+        row.fact("the floor is kept", !bounds.floor || v >= 1.0);
+        row.at_most("the ceiling of velocity is kept", v - bounds.v_ceiling, 8.0 * f64::EPSILON * v);
+        let theta = if v == found.v_start { 1.0 / transition.v_i } else { 1.0 / transition.v_f };
+        let tau = 1.0 + transition.law.a * v.ln() + transition.law.b * theta.ln();
+        row.at_most(
+            "the ceiling of friction is kept",
+            tau - bounds.tau_ceiling,
+            64.0 * f64::EPSILON * (1.0 + v.ln().abs()),
+        );
+        row.at_most("friction_max is the greatest", tau - found.friction_max, point.rtol + 64.0 * f64::EPSILON);
+    }
+    row.at_most("friction_max is below its ceiling", found.friction_max - bounds.tau_ceiling, 64.0 * f64::EPSILON);
+}
+
+/// A tighter ceiling costs work; one that does not bind costs nothing; none is the free optimum to the last bit.
+fn ceilings_cost(point: &Point, fine: &Optimum, row: &mut Row) {
+    let &Point { ref transition, t_f, bounds, place, .. } = point;
+    let noise = noise_of_work(point);
+    let plain = solve(transition, t_f, bounds.without_ceilings(), FINE);
+    if let Some(free) = certain(&plain) {
+        row.at_most("ceilings cost", free.work - fine.work, noise);
+        let binds = free.v_start.max(free.v_end) > bounds.v_ceiling || free.friction_max > bounds.tau_ceiling;
+        row.fact(
+            "no time on a ceiling that does not bind",
+            binds || fine.time_at_v_ceiling + fine.time_at_tau_ceiling == 0.0,
+        );
+        if !binds {
+            row.at_most("ceilings that do not bind", (fine.work - free.work).abs(), noise);
+        }
+    }
+    let none = solve(transition, t_f, bounds.with_v_ceiling(f64::INFINITY).with_tau_ceiling(f64::INFINITY), FINE);
+    row.fact("without ceilings the free optimum", none.value == plain.value && none.status == plain.status);
+    // Decreasing and, while theta only falls, convex.
+    let factor = 1.0 + 0.1 * place * place * place + 1e-6;
+    let raised =
+        [bounds.with_v_ceiling(bounds.v_ceiling * factor), bounds.with_tau_ceiling(bounds.tau_ceiling * factor)];
+    let twice = [
+        bounds.with_v_ceiling(bounds.v_ceiling * (2.0 * factor - 1.0)),
+        bounds.with_tau_ceiling(bounds.tau_ceiling * (2.0 * factor - 1.0)),
+    ];
+    for (raised, twice) in raised.into_iter().zip(twice) {
+        let (Some(raised), Some(twice)) =
+            (certain(&solve(transition, t_f, raised, FINE)), certain(&solve(transition, t_f, twice, FINE)))
+        else {
+            continue;
+        };
+        row.at_most("W* falls with a ceiling", raised.work - fine.work, noise);
+        let falls = 1.0 / fine.theta_max >= transition.v_i * (1.0 - 1e-12) && transition.v_f > transition.v_i;
+        if falls {
+            row.at_most("W* is convex in a ceiling", 2.0 * raised.work - fine.work - twice.work, 4.0 * noise);
+        }
+    }
+}
+
+/// Differences of the work are integrals of the slopes, by Simpson's rule, whose error is below its distance from the
+/// trapezium rule.
+fn slopes_are_slopes(point: &Point, row: &mut Row) {
+    let &Point { transition, t_f, bounds, place, .. } = point;
+    let at = |parameter: usize, step: f64| {
+        let (mut transition, mut bounds, mut t_f) = (transition, bounds, t_f);
+        let number = match parameter {
+            0 => &mut transition.law.a,
+            1 => &mut transition.law.b,
+            2 => &mut transition.v_i,
+            3 => &mut transition.v_f,
+            4 => &mut bounds.v_ceiling,
+            5 => &mut bounds.tau_ceiling,
+            _ => &mut t_f,
+        };
+        *number *= 1.0 + step;
+        let value = *number;
+        let (solved, found) = slopes(&transition, t_f, bounds, FINE);
+        let optimum = certain(&solved)?;
+        let Slopes { a, b, v_i, v_f, v_ceiling, tau_ceiling } = found?;
+        let slope = [a, b, v_i, v_f, v_ceiling, tau_ceiling, optimum.hamiltonian][parameter];
+        Some((value, optimum.work, slope))
+    };
+    let parameter = (place * 7.0) as usize;
+    let step = 1e-4;
+    let Some(values) = (0..3).map(|i| at(parameter, 0.5 * step * f64::from(i))).collect::<Option<Vec<_>>>() else {
+        return;
+    };
+    let [(x_1, w_1, s_1), (_, _, s_2), (x_3, w_3, s_3)] = values[..] else { return };
+    if !x_1.is_finite() || x_1 == 0.0 {
+        return;
+    }
+    let trapezium = 0.5 * (s_1 + s_3);
+    let simpson = (2.0 * s_2 + trapezium) / 3.0;
+    let noise = 4.0 * noise_of_work(point);
+    let bend = (simpson - trapezium).abs() + 1e-6 * (s_3 - s_1).abs() + 1e-11 * s_1.abs();
+    let names = ["dW*/da", "dW*/db", "dW*/dv_i", "dW*/dv_f", "dW*/dv_ceiling", "dW*/dtau_ceiling", "dW*/dt_f"];
+    row.at_most(names[parameter], (w_3 - w_1 - simpson * (x_3 - x_1)).abs(), noise + bend * (x_3 - x_1).abs());
+}
+
+fn feedback(point: &Point, theta: f64, t_left: f64) -> Option<FeedbackPoint> {
+    let &Point { transition: Transition { law, v_f, .. }, bounds, .. } = point;
+    let solved = feedback_at(law, theta, t_left, v_f, bounds, FINE);
+    solved.value.filter(|_| matches!(solved.status, Status::Ok | Status::BelowBound))
+}
+
+/// The law at the start is the start of the protocol.
+fn starts_like_its_feedback(point: &Point, fine: &Optimum, row: &mut Row) {
+    let theta = 1.0 / point.transition.v_i;
+    // Where 1/v_i is exact.
+    if 1.0 / theta != point.transition.v_i {
+        return;
+    }
+    let Some(found) = feedback(point, theta, point.t_f) else { return };
+    row.at_most("feedback: work", (found.work_to_go - fine.work).abs(), noise_of_work(point));
+}
+
+/// Hamilton, Jacobi and Bellman: `-dW/ds = min_v [tau v + (dW/dtheta) (1 - theta v)]` over the admissible velocities, by
+/// differences of the work alone.
+fn dynamic_programming(point: &Point, fine: &Optimum, row: &mut Row) {
+    let &Point { transition: Transition { law: Law { a, b }, v_i, v_f }, t_f, bounds, place, .. } = point;
+    let (theta_0, theta_1) = (1.0 / v_i, 1.0 / v_f);
+    // A state on the way, or somewhat beyond its ends.
+    let high = 1.2 * theta_0.max(theta_1);
+    let (low, high) = (0.8 * theta_0.min(theta_1), if bounds.floor { high.min(0.999) } else { high });
+    let theta = low * (high / low).powf(place);
+    let s = t_f * (0.2 + 0.7 * (1.0 - place));
+    let (h, k) = (1e-3 * (theta_1 - theta).abs().max(1e-2 * theta).min(theta), 1e-3 * s);
+    let w = |i: f64, j: f64| feedback(point, theta + i * h, s + j * k).map(|found| found.work_to_go);
+    let Some(here) = feedback(point, theta, s) else { return };
+    let difference = |i: f64, j: f64, step: f64| {
+        let near = w(i, j)? - w(-i, -j)?;
+        let far = w(2.0 * i, 2.0 * j)? - w(-2.0 * i, -2.0 * j)?;
+        let (rough, good) = (far / (4.0 * step), (8.0 * near - far) / (12.0 * step));
+        Some((good, (good - rough).abs() * 0.2 + 1e3 * FINE * here.work_to_go.abs() / step))
+    };
+    let (Some((w_theta, e_theta)), Some((w_s, e_s))) = (difference(1.0, 0.0, h), difference(0.0, 1.0, k)) else {
+        return;
+    };
+    row.at_most("costate is dW/dtheta", (here.costate - w_theta).abs(), e_theta + 1e-9 * here.costate.abs());
+    let free = (theta * w_theta - 1.0 - a - b * theta.ln()) / a;
+    let least = if bounds.floor { 0.0 } else { f64::NEG_INFINITY };
+    let cap = bounds.v_ceiling.ln().min((bounds.tau_ceiling - 1.0 - b * theta.ln()) / a);
+    let ln_v = free.max(least).min(cap);
+    // The minimiser is known to what theta dW/dtheta is, over a.
+    let doubtful = theta * e_theta / a + 1e-9;
+    if here.v < 1e-280 {
+        return;
+    }
+    row.at_most("v is the minimiser", (here.v.ln() - ln_v).abs(), doubtful + 1e-9);
+    let v = ln_v.exp();
+    let hamiltonian = (1.0 + a * ln_v + b * theta.ln()) * v + w_theta * (1.0 - theta * v);
+    let allowed = e_s + e_theta * (1.0 + theta * v) + 1e-9 * (hamiltonian.abs() + v + fine.hamiltonian.abs());
+    row.at_most("Hamilton, Jacobi and Bellman", (w_s - hamiltonian).abs(), allowed);
+}
+
+/// One velocity, then another that arrives: where both are admissible the work is no less.
+fn two_velocities(point: &Point, fine: &Optimum, row: &mut Row) {
+    let &Point { transition: Transition { law: Law { a, b }, v_i, v_f }, t_f, bounds, place, .. } = point;
+    let low = if bounds.floor { 1.0 } else { 0.1 };
+    let high = bounds.v_ceiling.min(1e3 * fine.v_end.max(fine.v_start));
+    let first = low * (high / low).powf(place);
+    let t_1 = t_f * (0.1 + 0.8 * (place * 97.0).fract());
+    let after = |theta: f64, v: f64, t: f64| 1.0 / v + (theta - 1.0 / v) * (-v * t).exp();
+    let (start, end, t_2) = (1.0 / v_i, 1.0 / v_f, t_f - t_1);
+    let middle = after(start, first, t_1);
+    // The second velocity, in which theta at the end falls.
+    let (mut below, mut above) = (low, high);
+    if !((after(middle, below, t_2) - end) * (after(middle, above, t_2) - end) < 0.0) {
+        return;
+    }
+    for _ in 0..80 {
+        let v = (below * above).sqrt();
+        if after(middle, v, t_2) > end { below = v } else { above = v }
+    }
+    let second = above;
+    let friction = |theta: f64, v: f64| 1.0 + a * v.ln() + b * theta.ln();
+    let thetas = [(start, first), (middle, first), (middle, second), (end, second)];
+    // Where friction is too low nothing bounds the work from below: the optimum is one of the protocols above that.
+    let lowest = (b - a).max(0.0);
+    if thetas.iter().any(|&(theta, v)| friction(theta, v) > bounds.tau_ceiling || friction(theta, v) <= lowest) {
+        return;
+    }
+    let work = |theta: f64, v: f64, t: f64| {
+        // Simpson's rule over 400 intervals of the relaxing theta, graded towards the start.
+        let n = 400;
+        let density = |x: f64| 3.0 * x * x * friction(after(theta, v, t * x * x * x), v) * v;
+        let inner: f64 = (1..n).map(|i| f64::from(2 + 2 * (i % 2)) * density(f64::from(i) / f64::from(n))).sum();
+        t * (density(0.0) + inner + density(1.0)) / (3.0 * f64::from(n))
+    };
+    let total = work(start, first, t_1) + work(middle, second, t_2);
+    row.at_most("two velocities are no cheaper", fine.work - total, 1e-6 * fine.work.abs());
+}
