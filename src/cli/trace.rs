@@ -8,7 +8,7 @@ use clap::builder::{PossibleValue, PossibleValuesParser, StringValueParser, Type
 
 use super::kind::{self, Kind};
 use super::output::{self, Output};
-use super::{FAILED, Failure, WRONG, dataset, no_table, put, refused, say, words, write_file, wrong};
+use super::{EXIT_FAILURE, EXIT_REQUEST, Failure, dataset, no_table, put, refused, say, words, write_file, wrong};
 use crate::dataset::{Cell, Folder, ManifestTable, Row, frame};
 use crate::grid::{Domain, Point, Quantity, RTOL, Scale};
 use crate::model::{Law, Transition, Units};
@@ -257,6 +257,10 @@ struct Origin {
 }
 
 /// Traces a protocol.
+///
+/// # Errors
+///
+/// Illegal parameters, a protocol that does not exist, or a file that cannot be written.
 pub fn trace(arguments: &Arguments) -> Result<(), Failure> {
     let (format, output) = (arguments.output.format()?, &arguments.output);
     let Traced { header, trace, units, facts } = solved(arguments)?;
@@ -300,7 +304,7 @@ pub fn traced(arguments: &[String]) -> Result<Traced, Failure> {
     }
     let name = "trace".to_owned();
     let command = <Command as clap::Parser>::try_parse_from(std::iter::once(&name).chain(arguments));
-    let command = command.map_err(|error| Failure { code: WRONG, message: error.to_string() })?;
+    let command = command.map_err(|error| Failure { code: EXIT_REQUEST, message: error.to_string() })?;
     solved(&command.arguments)
 }
 
@@ -323,7 +327,7 @@ fn solved(arguments: &Arguments) -> Result<Traced, Failure> {
 }
 
 fn absent(protocol: &str, absence: Absence) -> Failure {
-    let code = if absence.is_defect() { FAILED } else { WRONG };
+    let code = if absence.is_defect() { EXIT_FAILURE } else { EXIT_REQUEST };
     Failure { code, message: format!("error: no `{protocol}` protocol: {absence}") }
 }
 
@@ -715,13 +719,11 @@ fn header(arguments: &Arguments, request: &TraceRequest, path: &TracedPath, trac
     text.push_str(&format!("  {}\n  status {}\n", all(&results(request, path, trace)), status(path.status)));
     let rows = words::things(trace.moments.len() as u64, "row");
     match arguments.points {
-        Some(_) => {
-            text.push_str(&format!("  {rows}: equally spaced times, and the states on the other side of a jump\n"))
-        }
+        Some(_) => text.push_str(&format!("  {rows}: equally spaced times, and the states before and after jumps\n")),
         None => {
             let (range, value) = (words::number(RANGE_RTOL), words::number(VALUE_RTOL));
-            let lines = format!("straight lines between them are good to {range} of the range of a column");
-            text.push_str(&format!("  {rows}; {lines}, and to {value} of v and theta\n"));
+            let lines = format!("linear interpolation errs by up to {range} of the range of a column");
+            text.push_str(&format!("  {rows}; {lines}, and by up to {value} of v and theta\n"));
         }
     }
     text

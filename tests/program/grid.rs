@@ -451,7 +451,7 @@ fn expressions_mean_what_they_say() {
 const SI: &str = "[model]\nunits = \"si\"\nmu_0 = 0.5\nl = 0.00000095367431640625\nv_0 = 0.000000000931322574615478515625\n\
                   normal_stress = 1048576.0\n";
 
-/// The same point in SI and scaled units.
+/// Specs of one point in SI and in scaled units.
 fn both(folder: &Path) -> [std::path::PathBuf; 2] {
     let (mu_0, l, v_0, sigma): (f64, f64, f64, f64) = (0.5, 2.0_f64.powi(-20), 2.0_f64.powi(-30), 2.0_f64.powi(20));
     let axes = |one: f64, time: f64, v: f64, stress: f64, stiffness: f64, mass: f64, rate: f64| {

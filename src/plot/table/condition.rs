@@ -39,6 +39,10 @@ pub struct Condition {
 
 impl Condition {
     /// The conditions in `text`, separated by commas or `and`.
+    ///
+    /// # Errors
+    ///
+    /// A condition without a column, a comparison and a value.
     pub fn all(text: &str) -> Result<Vec<Condition>, PlotError> {
         text.split(',').flat_map(|part| part.split(" and ")).map(Condition::one).collect()
     }

@@ -343,9 +343,9 @@ impl Search<'_> {
             let Some(path) = member((x - step).max(low).min(high)) else { break };
             // Short arcs on a ceiling change much with the parameter, those at a peak of friction by the square root.
             let (of_v, of_tau) = path.times();
-            let share = (((of_v + of_tau) / (SHORT * t_f)).powi(2)).clamp(f64::MIN_POSITIVE, 1.0);
-            let needed = (LEFT * rtol * share).sqrt().max(doubt);
-            let finer = (exact * share).max(FINEST);
+            let fraction = (((of_v + of_tau) / (SHORT * t_f)).powi(2)).clamp(f64::MIN_POSITIVE, 1.0);
+            let needed = (LEFT * rtol * fraction).sqrt().max(doubt);
+            let finer = (exact * fraction).max(FINEST);
             // A last step must not cross a seam of the family, where the slope jumps.
             let smooth = path.signature() == probed.path.signature() || value.abs() <= SEAM;
             let good = value.abs() <= needed && smooth && tolerance <= finer;

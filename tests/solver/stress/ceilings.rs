@@ -88,7 +88,7 @@ fn certain(solved: &Solved<Optimum>) -> Option<Optimum> {
 }
 
 #[test]
-fn every_optimum_under_ceilings_is_right_or_says_so() {
+fn every_optimum_under_ceilings_is_right_or_states_so() {
     sample("ceilings", POINTS, draw, |point, row| {
         let &Point { ref transition, t_f, bounds, rtol, .. } = point;
         let solved = solve(transition, t_f, bounds, rtol);
