@@ -90,8 +90,13 @@ impl Constrained {
 pub(super) fn find(problem: &Problem, ceilings: &Ceilings, time: Time, rtol: f64) -> Constrained {
     let (free, member) = search::find_beyond(problem, time, rtol);
     let none = ceilings.v == f64::INFINITY && ceilings.tau == f64::INFINITY;
-    let obeys =
-        |optimum: Optimum| optimum.v_start.max(optimum.v_end) <= ceilings.v && optimum.friction_max <= ceilings.tau;
+    // The velocity rises along an arc unless friction is so low that the extremal is not proven to be the least.
+    let proven = matches!(free.status, Status::Ok | Status::BelowBound);
+    let peak = |member: Member| if proven { 0.0 } else { search::velocity_range(&member.extremal)[1] };
+    let obeys = |optimum: Optimum| {
+        let greatest = optimum.v_start.max(optimum.v_end);
+        greatest <= ceilings.v && optimum.friction_max <= ceilings.tau && member.map_or(0.0, peak) <= ceilings.v
+    };
     if none || free.value.is_some_and(obeys) {
         let path = member.map(|member| {
             let mut path = Path::new(member.extremal);
@@ -432,7 +437,8 @@ impl Search<'_> {
             Strategy::SlowDown
         };
         let doubtful = proven_by <= problem.unique_above() || (problem.bounded && below);
-        if problem.bounded && below {
+        // Where friction is low the velocity may fall along an arc: then the start is not the least, or is above the ceiling.
+        if (problem.bounded && below) || v_start > ceilings.v * (1.0 + ROUNDING_AT_CEILING) {
             return Solved { status: Status::Unproven, value: None, stats };
         }
         let status = if doubtful {
