@@ -77,8 +77,14 @@ pub struct Arguments {
     /// Sudden change of theta at a fraction of the duration, as "theta=+10% at 0.25"; compares open and closed loop (optimal)
     #[arg(long, value_name = "CHANGE", value_parser = disturbance, conflicts_with_all = ["from", "points", "table"])]
     disturb: Option<Disturbance>,
-    /// The protocol after the disturbance: with the optimal velocity of the disturbed state, or with the velocity as planned
-    #[arg(long = "loop", value_name = "LOOP", default_value = "closed", requires = "disturb")]
+    /// Protocol that is shown after the disturbance [default: closed]
+    #[arg(
+        long = "loop",
+        value_name = "LOOP",
+        default_value = "closed",
+        hide_default_value = true,
+        requires = "disturb"
+    )]
     feedback: Loop,
     /// Coefficient of t in theta, in units of 1/t_f as in the table `best_cubic` (gap)
     #[arg(long, value_name = "X", value_parser = |text: &str| legal(text, Quantity::Alpha2.domain()))]

@@ -106,7 +106,8 @@ impl TraceFile {
         ]
         .iter()
         .filter_map(number);
-        let name = label::literal(&fact("protocol").map_or(stem, Clone::clone));
+        let after = fact("loop").map_or(String::new(), |which| format!(", {which} loop"));
+        let name = label::literal(&format!("{}{after}", fact("protocol").map_or(stem, Clone::clone)));
         let points = fact("points").and_then(|points| points.parse().ok());
         TraceFile { name, parameters: parameters.collect(), columns, points }
     }

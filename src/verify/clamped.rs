@@ -275,10 +275,10 @@ impl Way {
             }
             let step = 1e-6 * here.c.abs().max(1.0);
             let slope = (self.totals(here.c + step, turns)?.time - here.time) / step;
-            let next = self.totals(here.c - residual / slope, turns)?;
-            if (next.time - t_f).abs() >= residual.abs() {
-                break;
-            }
+            // Shorter steps where a whole one leads away, or to no protocol.
+            let steps = (0..12).map(|halvings| residual / slope * 0.5_f64.powi(halvings));
+            let mut tried = steps.filter_map(|step| self.totals(here.c - step, turns));
+            let Some(next) = tried.find(|next| (next.time - t_f).abs() < residual.abs()) else { break };
             here = next;
         }
         ((here.time - t_f).abs() <= 1e-9 * t_f).then_some(here)
@@ -301,8 +301,8 @@ const SMALL_ENERGY: f64 = 1e-7;
 /// Places on a leg at which friction is looked at.
 const PLACES: u32 = 4000;
 
-/// Steps of Newton's method: the row's own `C` is within a few of them.
-const NEWTON_STEPS: u32 = 6;
+/// Most steps of Newton's method, which needs a few from the `C` of a row.
+const NEWTON_STEPS: u32 = 20;
 
 /// The root of `e^z - 1 - z = h` above or below 0.
 fn branch(h: f64, above: bool) -> Option<f64> {

@@ -60,9 +60,9 @@ fn summaries_state_units() {
     let expected = "\
 optimal: 3 rows (3 ok)
   at a = 0.03 mu_0, b = 0.05 mu_0, v_i = 3 v_0, v_f = 100 v_0
-    t_f    work          v_start     v_end       time_at_floor  hamiltonian     theta_max    strategy
-    l/v_0  mu_0 sigma l  v_0         v_0         l/v_0          mu_0 sigma v_0  l/v_0
-    0.02   3.80811142    19.9230141  3392.16787  0              2.59678653      0.333333333  speed_up
+    t_f    work          v_start     v_end       time_at_floor  time_at_v_ceiling  time_at_tau_ceiling  hamiltonian     theta_max    strategy
+    l/v_0  mu_0 sigma l  v_0         v_0         l/v_0          l/v_0              l/v_0                mu_0 sigma v_0  l/v_0
+    0.02   3.80811142    19.9230141  3392.16787  0              0                  0                    2.59678653      0.333333333  speed_up
 ";
     let summary = printed(small().path(), &["summary", "results/test"]);
     assert!(summary.starts_with(expected), "{summary}");
@@ -94,10 +94,10 @@ fn head_shows_names_units_and_rows() {
     let head = printed(folder.path(), &["head", "results/test", "optimal", "-n", "2"]);
     let expected = "\
 optimal: the protocol of least work; 3 rows
-  t_f    a     b     v_i  v_f  work          v_start     v_end       time_at_floor  hamiltonian     theta_max    strategy  status
-  l/v_0  mu_0  mu_0  v_0  v_0  mu_0 sigma l  v_0         v_0         l/v_0          mu_0 sigma v_0  l/v_0
-  0.02   0.03  0.05  3    100  3.80811142    19.9230141  3392.16787  0              2.59678653      0.333333333  speed_up  ok
-  0.037  0.03  0.05  3    100  3.85650171    3.12297925  3380.58505  0              2.93400965      0.333333333  speed_up  ok
+  t_f    a     b     v_i  v_f  v_ceiling  tau_ceiling  work          v_start     v_end       time_at_floor  time_at_v_ceiling  time_at_tau_ceiling  hamiltonian     theta_max    strategy  status
+  l/v_0  mu_0  mu_0  v_0  v_0  v_0        mu_0 sigma   mu_0 sigma l  v_0         v_0         l/v_0          l/v_0              l/v_0                mu_0 sigma v_0  l/v_0
+  0.02   0.03  0.05  3    100  inf        inf          3.80811142    19.9230141  3392.16787  0              0                  0                    2.59678653      0.333333333  speed_up  ok
+  0.037  0.03  0.05  3    100  inf        inf          3.85650171    3.12297925  3380.58505  0              0                  0                    2.93400965      0.333333333  speed_up  ok
 ";
     assert_eq!(head, expected);
     let all = printed(folder.path(), &["head", "results/test"]);
@@ -167,7 +167,7 @@ fn a_reader_that_has_had_enough_is_no_failure() {
 fn wrong_questions_are_answered_with_the_known_names() {
     let folder = small();
     let tables = "  expected: a SELECT from these tables:\n    \
-                  optimal: t_f, a, b, v_i, v_f, work, v_start, v_end, time_at_floor, hamiltonian, theta_max, strategy, status\n    \
+                  optimal: t_f, a, b, v_i, v_f, v_ceiling, tau_ceiling, work, v_start, v_end, time_at_floor, time_at_v_ceiling, time_at_tau_ceiling, hamiltonian, theta_max, strategy, status\n    \
                   best_cubic: t_f, a, b, v_i, v_f, alpha_2, alpha_3, work, work_optimal, gap, v_min, status\n";
     let correct = "correct the query; text goes in 'single quotes', names with special characters in \"double\" ones";
     for (question, found, help) in [

@@ -2,7 +2,7 @@
 
 use super::choice::Shape;
 use super::map::{self, MapFigure};
-use super::{Scene, plain};
+use super::{CEILINGS, Scene, plain};
 use crate::model::{Law, Transition};
 use crate::plot::canvas::Stroke;
 use crate::plot::figure::{Entry, Figure, Key, Layer};
@@ -52,8 +52,11 @@ pub fn draw(scene: &Scene<'_>, shape: &Shape) -> Result<Figure, PlotError> {
             }
         }
     }
+    let is_capped =
+        scene.survey.axes.iter().any(|axis| CEILINGS.contains(&axis.name.as_str()) && !axis.values.is_empty());
+    let condition = if is_capped { " without ceilings" } else { "" };
     for ((name, stroke), _) in TIMES.iter().zip(styles).zip(is_drawn).filter(|(_, is_drawn)| *is_drawn) {
-        figure.legend.push(Entry { key: Key::Contour(stroke), text: label::name(name) });
+        figure.legend.push(Entry { key: Key::Contour(stroke), text: format!("{}{condition}", label::name(name)) });
     }
     Ok(figure)
 }
