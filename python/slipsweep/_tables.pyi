@@ -6,7 +6,7 @@ from typing import Literal
 from ._table import Table
 from ._types import Grid, Values
 
-__all__ = ["gap", "best_cubic", "optimal", "crossover", "shortcut", "stability", "step_response", "compliant", "regularised"]
+__all__ = ["gap", "best_cubic", "optimal", "feedback", "crossover", "shortcut", "stability", "step_response", "compliant", "regularised"]
 
 def gap(
     *,
@@ -30,7 +30,7 @@ def gap(
 ) -> Table:
     """The work of a cubic shortcut and its gap to the optimum: a row for each point.
 
-    Arguments broadcast as in NumPy. A row that has no answer has a status that says why.
+    Arguments broadcast as in NumPy. A row that has no answer has a status that states why.
 
     Parameters
     ----------
@@ -101,7 +101,7 @@ def best_cubic(
 ) -> Table:
     """The cubic shortcut of least work, over the whole (alpha_2, alpha_3) plane: a row for each point.
 
-    Arguments broadcast as in NumPy. A row that has no answer has a status that says why.
+    Arguments broadcast as in NumPy. A row that has no answer has a status that states why.
 
     Parameters
     ----------
@@ -156,8 +156,10 @@ def optimal(
     b: Values | None = ...,
     v_i: Values | None = ...,
     v_f: Values | None = ...,
+    v_ceiling: Values | None = ...,
+    tau_ceiling: Values | None = ...,
     grid: Grid | None = None,
-    columns: Sequence[Literal["work", "v_start", "v_end", "time_at_floor", "hamiltonian", "theta_max", "strategy", "work_error"]] | None = None,
+    columns: Sequence[Literal["work", "v_start", "v_end", "time_at_floor", "time_at_v_ceiling", "time_at_tau_ceiling", "hamiltonian", "theta_max", "strategy", "work_error", "friction_max", "binding", "t_least", "v_ceiling_least", "tau_ceiling_least", "bound", "dwork_da", "dwork_db", "dwork_dv_i", "dwork_dv_f", "dwork_dv_ceiling", "dwork_dtau_ceiling"]] | None = None,
     rtol: float | None = None,
     velocity_bound: bool = True,
     units: Literal["dimensionless", "si"] = "dimensionless",
@@ -168,7 +170,7 @@ def optimal(
 ) -> Table:
     """The protocol of least work: a row for each point.
 
-    Arguments broadcast as in NumPy. A row that has no answer has a status that says why.
+    Arguments broadcast as in NumPy. A row that has no answer has a status that states why.
 
     Parameters
     ----------
@@ -182,6 +184,10 @@ def optimal(
         velocity of the initial steady state; 1 < v_i <= 1e12
     v_f : array_like, in v_0
         velocity of the final steady state; 1 < v_f <= 1e12
+    v_ceiling : array_like, in v_0, default inf
+        velocity ceiling between the ends; inf: none; 1 < v_ceiling <= 1e12, or inf: no ceiling
+    tau_ceiling : array_like, in mu_0 sigma, default inf
+        friction ceiling between the ends; inf: none; 1e-20 <= tau_ceiling <= 1e20, or inf: no ceiling
     grid : mapping of axis to values, optional
         Axes of a product, the last one fastest; they multiply the points of the other arguments.
     columns : sequence of str, optional
@@ -206,6 +212,10 @@ def optimal(
             velocity just before the end, v(t_f-)
         time_at_floor, in l/v_0
             time spent on the velocity floor v = 1
+        time_at_v_ceiling, in l/v_0
+            time spent on the velocity ceiling
+        time_at_tau_ceiling, in l/v_0
+            time spent on the friction ceiling
         hamiltonian, in mu_0 sigma v_0
             dW*/dt_f
         theta_max, in l/v_0
@@ -214,6 +224,99 @@ def optimal(
             start of the protocol: speed_up v(0+) > v_i, slow_down 1 < v(0+) <= v_i, floor v(0+) = 1
         work_error, in mu_0 sigma l (only if `columns` names it)
             bound of the error of work, by a second solve
+        friction_max, in mu_0 sigma (only if `columns` names it)
+            greatest friction between the ends
+        binding (only if `columns` names it)
+            the ceilings on which the protocol spends time
+        t_least, in l/v_0 (only if `columns` names it)
+            least feasible duration under the floor and the ceilings
+        v_ceiling_least, in v_0 (only if `columns` names it)
+            least feasible velocity ceiling for t_f and tau_ceiling
+        tau_ceiling_least, in mu_0 sigma (only if `columns` names it)
+            least feasible friction ceiling for t_f and v_ceiling
+        bound (only if `columns` names it)
+            the bound that makes the row infeasible; too_fast: t_f < t_least, too_slow: theta cannot wait so long
+        dwork_da, in sigma l (only if `columns` names it)
+            derivative of work with respect to a
+        dwork_db, in sigma l (only if `columns` names it)
+            derivative of work with respect to b
+        dwork_dv_i, in mu_0 sigma l/v_0 (only if `columns` names it)
+            derivative of work with respect to v_i
+        dwork_dv_f, in mu_0 sigma l/v_0 (only if `columns` names it)
+            derivative of work with respect to v_f
+        dwork_dv_ceiling, in mu_0 sigma l/v_0 (only if `columns` names it)
+            shadow price of v_ceiling; 0 if it does not bind
+        dwork_dtau_ceiling, in l (only if `columns` names it)
+            shadow price of tau_ceiling; 0 if it does not bind
+        status
+            outcome of the row; a number that does not exist is null
+    """
+
+def feedback(
+    *,
+    theta: Values | None = ...,
+    t_left: Values | None = ...,
+    a: Values | None = ...,
+    b: Values | None = ...,
+    v_f: Values | None = ...,
+    v_ceiling: Values | None = ...,
+    tau_ceiling: Values | None = ...,
+    grid: Grid | None = None,
+    columns: Sequence[Literal["v", "work_to_go", "costate", "gain", "arc"]] | None = None,
+    rtol: float | None = None,
+    velocity_bound: bool = True,
+    units: Literal["dimensionless", "si"] = "dimensionless",
+    mu_0: float | None = None,
+    l: float | None = None,
+    v_0: float | None = None,
+    normal_stress: float | None = None,
+) -> Table:
+    """The optimal velocity now, by the state variable and the time left: a row for each point.
+
+    Arguments broadcast as in NumPy. A row that has no answer has a status that states why.
+
+    Parameters
+    ----------
+    theta : array_like, in l/v_0
+        state variable now, on the way to steady sliding at v_f; 1e-20 <= theta <= 1e20
+    t_left : array_like, in l/v_0
+        time left of the protocol; 1e-20 <= t_left <= 1e20
+    a : array_like, in mu_0
+        direct effect: coefficient of ln v in friction; 1e-6 <= a <= 10
+    b : array_like, in mu_0
+        evolution effect: coefficient of ln theta in friction; 0 <= b <= 10
+    v_f : array_like, in v_0
+        velocity of the final steady state; 1 < v_f <= 1e12
+    v_ceiling : array_like, in v_0, default inf
+        velocity ceiling between the ends; inf: none; 1 < v_ceiling <= 1e12, or inf: no ceiling
+    tau_ceiling : array_like, in mu_0 sigma, default inf
+        friction ceiling between the ends; inf: none; 1e-20 <= tau_ceiling <= 1e20, or inf: no ceiling
+    grid : mapping of axis to values, optional
+        Axes of a product, the last one fastest; they multiply the points of the other arguments.
+    columns : sequence of str, optional
+        The columns to compute; by default all but the optional ones.
+    rtol : float, optional
+        Relative accuracy, 1e-13 <= rtol <= 1e-2; by default 1e-10.
+    velocity_bound : bool
+        Whether optimal protocols obey v >= 1.
+    units : 'dimensionless' or 'si'
+        'si' takes and gives SI values; it needs mu_0, l in m, v_0 in m/s and normal_stress in Pa.
+
+    Returns
+    -------
+    Table
+        The axes, and these columns:
+
+        v, in v_0
+            velocity of the optimal protocol now
+        work_to_go, in mu_0 sigma l
+            least work of friction in the time left
+        costate, in mu_0 sigma v_0
+            d work_to_go/d theta; -beta of a trace
+        gain, in v_0^2/l
+            dv/dtheta at fixed t_left
+        arc
+            the bound on which the protocol is now, or free if on none
         status
             outcome of the row; a number that does not exist is null
     """
@@ -236,7 +339,7 @@ def crossover(
 ) -> Table:
     """The durations at which the optimal strategy changes: a row for each point.
 
-    Arguments broadcast as in NumPy. A row that has no answer has a status that says why.
+    Arguments broadcast as in NumPy. A row that has no answer has a status that states why.
 
     Parameters
     ----------
@@ -313,7 +416,7 @@ def shortcut(
 ) -> Table:
     """The shortcut of a family: a row for each point.
 
-    Arguments broadcast as in NumPy. A row that has no answer has a status that says why.
+    Arguments broadcast as in NumPy. A row that has no answer has a status that states why.
 
     Parameters
     ----------
@@ -330,7 +433,7 @@ def shortcut(
     family : str or sequence of str
         family of shortcuts; one of step, cubic, bounded_velocity, bounded_friction; by default all
     tau_ceiling : array_like, in mu_0 sigma, default inf
-        friction ceiling of bounded_friction; 1e-20 <= tau_ceiling <= 1e20, or inf: no bound
+        friction ceiling between the ends; inf: none; 1e-20 <= tau_ceiling <= 1e20, or inf: no ceiling
     grid : mapping of axis to values, optional
         Axes of a product, the last one fastest; they multiply the points of the other arguments.
     columns : sequence of str, optional
@@ -352,7 +455,7 @@ def shortcut(
         work, in mu_0 sigma l
             work of friction W_s
         work_optimal, in mu_0 sigma l
-            least work of friction W* of any protocol
+            least work of friction W* of any protocol; for bounded_friction under its tau_ceiling
         gap, in 1
             (W_s - W*)/W*, good to rtol of 1 + gap; negative for a step that does not arrive
         v_min, in v_0
@@ -393,7 +496,7 @@ def stability(
 ) -> Table:
     """Linear stability of steady sliding at both velocities: a row for each point.
 
-    Arguments broadcast as in NumPy. A row that has no answer has a status that says why.
+    Arguments broadcast as in NumPy. A row that has no answer has a status that states why.
 
     Parameters
     ----------
@@ -469,7 +572,7 @@ def step_response(
 ) -> Table:
     """The response to an abrupt step of the control velocity: a row for each point.
 
-    Arguments broadcast as in NumPy. A row that has no answer has a status that says why.
+    Arguments broadcast as in NumPy. A row that has no answer has a status that states why.
 
     Parameters
     ----------
@@ -549,7 +652,7 @@ def compliant(
 ) -> Table:
     """The smooth shortcut at finite stiffness: a row for each point.
 
-    Arguments broadcast as in NumPy. A row that has no answer has a status that says why.
+    Arguments broadcast as in NumPy. A row that has no answer has a status that states why.
 
     Parameters
     ----------
@@ -639,7 +742,7 @@ def regularised(
 ) -> Table:
     """The optimal protocol with its jumps replaced by smooth pieces: a row for each point.
 
-    Arguments broadcast as in NumPy. A row that has no answer has a status that says why.
+    Arguments broadcast as in NumPy. A row that has no answer has a status that states why.
 
     Parameters
     ----------

@@ -35,8 +35,9 @@ pub fn compute(
     name: &str,
     values: Vec<Bound<'_, PyAny>>,
     grid: Vec<(String, Bound<'_, PyAny>)>,
-    (is_relative, columns, rtol, model): Options,
+    options: Options,
 ) -> PyResult<Rows> {
+    let (is_relative, columns, rtol, model) = options;
     let known = || table::ALL.iter().map(|table| table.name().to_owned()).collect::<Vec<_>>();
     let table = table::ALL.into_iter().find(|table| table.name() == name);
     let table = table.ok_or_else(|| error::missing("table", name, &known()))?;
