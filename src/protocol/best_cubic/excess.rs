@@ -163,7 +163,7 @@ pub(super) fn over_optimum(
     let mut sum = 0.0;
     for (side, from, to, whole) in panels {
         let mut density = |distance| Some(excess.judge(side, distance)?.0);
-        sum += refine(&mut density, from, to, whole, tolerance, 0, &mut left)?;
+        sum += refine(&mut density, (from, to), whole, tolerance, 0, &mut left)?;
     }
     Some(t_f * sum)
 }
@@ -215,8 +215,7 @@ fn panel(density: &mut impl FnMut(f64) -> Option<f64>, from: f64, to: f64) -> Op
 /// Halves a panel until its halves agree with it to `tolerance`; `None` once no panels are left.
 fn refine(
     density: &mut impl FnMut(f64) -> Option<f64>,
-    from: f64,
-    to: f64,
+    (from, to): (f64, f64),
     whole: f64,
     tolerance: f64,
     depth: u32,
@@ -228,6 +227,6 @@ fn refine(
     if (halves[0] + halves[1] - whole).abs() <= tolerance || depth >= MAX_BISECTIONS {
         return Some(halves[0] + halves[1]);
     }
-    let lower = refine(density, from, middle, halves[0], tolerance, depth + 1, left)?;
-    Some(lower + refine(density, middle, to, halves[1], tolerance, depth + 1, left)?)
+    let lower = refine(density, (from, middle), halves[0], tolerance, depth + 1, left)?;
+    Some(lower + refine(density, (middle, to), halves[1], tolerance, depth + 1, left)?)
 }

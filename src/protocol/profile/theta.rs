@@ -265,7 +265,11 @@ impl ResolvedPanel {
     /// Friction at the start.
     fn sample_at_start<E: Exponent>(&self, law: &Law, curve: &VelocityCurve<E>) -> Sample {
         let friction = friction_at(law, self.v_start, self.theta_start);
-        Sample { u: 0.0, friction, slope: self.slope(law, curve, 0.0, self.v_start, self.theta_start, self.rate_start) }
+        Sample {
+            u: 0.0,
+            friction,
+            slope: self.slope(law, curve, 0.0, [self.v_start, self.theta_start, self.rate_start]),
+        }
     }
 
     /// Least friction, from its samples at the start and at the nodes.
@@ -286,7 +290,7 @@ impl ResolvedPanel {
                 && after.slope > 0.0
                 && before.friction + before.slope * (after.u - before.u) < 0.0
             {
-                least = least.min(self.extreme_friction(law, curve, SIGN_RTOL, before, after, -1.0));
+                least = least.min(self.extreme_friction(law, curve, SIGN_RTOL, [before, after], -1.0));
             }
             before = after;
         }
@@ -309,7 +313,7 @@ impl ResolvedPanel {
                 && after.slope < 0.0
                 && before.friction + before.slope * (after.u - before.u) > totals.friction_max
             {
-                let greatest = self.extreme_friction(law, curve, rtol, before, after, 1.0);
+                let greatest = self.extreme_friction(law, curve, rtol, [before, after], 1.0);
                 totals.friction_max = totals.friction_max.max(greatest);
             }
             before = after;
@@ -318,7 +322,7 @@ impl ResolvedPanel {
 
     /// Slope of friction, `dtau/du = a v'/v + b theta'/theta`.
     #[inline(always)]
-    fn slope<E: Exponent>(&self, law: &Law, curve: &VelocityCurve<E>, u: f64, v: f64, theta: f64, rate: f64) -> f64 {
+    fn slope<E: Exponent>(&self, law: &Law, curve: &VelocityCurve<E>, u: f64, [v, theta, rate]: [f64; 3]) -> f64 {
         let (x, z) = self.x_and_z(u);
         let length = (self.panel.to - self.panel.from).abs();
         length * (law.a * curve.exponent.slope(x, z) * (1.0 - curve.floor / v) + law.b * curve.t_f * rate / theta)
@@ -331,8 +335,7 @@ impl ResolvedPanel {
         law: &Law,
         curve: &VelocityCurve<E>,
         rtol: f64,
-        mut low: Sample,
-        mut high: Sample,
+        [mut low, mut high]: [Sample; 2],
         sign: f64,
     ) -> f64 {
         let mut extreme = sign * (sign * low.friction).max(sign * high.friction);
@@ -344,7 +347,7 @@ impl ResolvedPanel {
             let rate = self.rate(u);
             let (x, z) = self.x_and_z(u);
             let v = curve.floor + curve.w_f * exp(curve.exponent.value(x, z));
-            let slope = self.slope(law, curve, u, v, theta, rate);
+            let slope = self.slope(law, curve, u, [v, theta, rate]);
             let friction = friction_at(law, v, theta);
             extreme = sign * (sign * extreme).max(sign * friction);
             // The extremum differs from this value by less than the slope over the bracket.
@@ -405,7 +408,7 @@ fn frictions<E: Exponent>(
         power[j] = rule.w[j] * tau[j] * v[j];
     }
     for j in 0..NODES {
-        slope[j] = resolved.slope(law, curve, rule.u[j], v[j], theta[j], rate[j]);
+        slope[j] = resolved.slope(law, curve, rule.u[j], [v[j], theta[j], rate[j]]);
     }
     (tau, slope, total(&power))
 }

@@ -53,7 +53,7 @@ pub fn solve(
     bounded: bool,
     rtol: f64,
 ) -> Solved<Regularised> {
-    assemble(slider, (v_i, v_f), t_f, delta_t, bounded, rtol, |_| ()).0
+    assemble(slider, (v_i, v_f), (t_f, delta_t), bounded, rtol, |_| ()).0
 }
 
 /// Regularises the optimum as [`solve`] does, and returns its motion as well wherever it has numbers.
@@ -66,7 +66,7 @@ pub fn motion(
     rtol: f64,
 ) -> (Solved<Regularised>, Option<Box<dyn Motion>>) {
     let mut segments = Vec::new();
-    let (solved, route) = assemble(slider, (v_i, v_f), t_f, delta_t, bounded, rtol, |segment| segments.push(segment));
+    let (solved, route) = assemble(slider, (v_i, v_f), (t_f, delta_t), bounded, rtol, |segment| segments.push(segment));
     let smooth = route
         .filter(|_| solved.value.is_some())
         .and_then(|route| RegularisedMotion::new(*slider, route, segments, rtol));
@@ -85,8 +85,7 @@ enum RegularisedSegment {
 fn assemble(
     slider: &SpringBlock,
     (v_i, v_f): (f64, f64),
-    t_f: f64,
-    delta_t: f64,
+    (t_f, delta_t): (f64, f64),
     bounded: bool,
     rtol: f64,
     visit: impl FnMut(RegularisedSegment),
