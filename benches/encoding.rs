@@ -1,4 +1,4 @@
-//! Encodings and compressions of the columns of a landscape: nanoseconds and bytes a row, one column alone.
+//! Encodings and compressions of the columns of a landscape: nanoseconds and bytes per row, one column alone.
 //!
 //! `cargo bench --bench encoding`. The column is the paper's landscape at t_f = 0.02, 0.037 and 0.049; the least time
 //! of five.
@@ -33,7 +33,7 @@ fn main() -> Outcome<()> {
         ("dictionary, zstd 1", None, zstd(1)?),
     ];
     let columns = columns();
-    println!("{:<26} {:>16} {:>16} {:>16}", "ns, bytes a row", "work", "gap", "v_min");
+    println!("{:<26} {:>16} {:>16} {:>16}", "ns, bytes per row", "work", "gap", "v_min");
     for (name, encoding, compression) in ways {
         let mut line = format!("{name:<26}");
         for column in &columns {
@@ -69,7 +69,7 @@ fn columns() -> [ArrayRef; 3] {
     cells.map(|cells| Arc::new(Float64Array::from(cells)) as ArrayRef)
 }
 
-/// Nanoseconds and bytes a row.
+/// Nanoseconds and bytes per row.
 fn measure(column: &ArrayRef, encoding: Option<Encoding>, compression: Compression) -> Outcome<(f64, f64)> {
     let batch = RecordBatch::try_from_iter([("column", column.clone())])?;
     let rows = batch.num_rows() as f64;

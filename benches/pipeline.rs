@@ -4,7 +4,7 @@
 //! on two threads, then in turn with the same encoded into memory and with runs that write Parquet to disk, each several
 //! times, and prints the least time of each and their ratios. The floor of a run is the larger of computing and encoding
 //! where the two overlap, and their sum on a machine of one processor (`taskset -c 0`). Two runs side by side that share nothing show the gain of a second thread. Then,
-//! on other runs: rows a second against `rtol`, with what encoding and the disk add to the computation (a run whose
+//! on other runs: rows per second against `rtol`, with what encoding and the disk add to the computation (a run whose
 //! files stay in memory distinguishes them, where there is `/dev/shm`); what `ArrowWriter` would cost; the memory of ever longer
 //! runs; and what the columns of some tables cost.
 
@@ -119,7 +119,7 @@ fn threads(folder: &Path) -> Outcome<()> {
         let written = [pipeline(&sweep, folder, 1)?, pipeline(&sweep, folder, 2)?];
         Ok([computed, compute(&sweep, 2)?, encoded, written[0], written[1]])
     })?;
-    println!("### Threads\n\n| | ns a row | million rows a second |\n| --- | --- | --- |");
+    println!("### Threads\n\n| | ns per row | million rows per second |\n| --- | --- | --- |");
     for (name, seconds) in [
         ("compute alone, 1 thread", alone[0]),
         ("compute alone, 2 threads", alone[1]),
@@ -145,7 +145,7 @@ fn accuracy(folder: &Path) -> Outcome<()> {
     let in_memory = in_memory.is_dir().then(|| in_memory.join(format!("slipsweep-pipeline-{}", std::process::id())));
     println!("\n### Accuracy\n");
     println!(
-        "| rtol | million rows a second, 1 thread | 2 threads | computing, ns a row | encoding adds | the disk adds |"
+        "| rtol | million rows per second, 1 thread | 2 threads | computing, ns per row | encoding adds | the disk adds |"
     );
     println!("| --- | --- | --- | --- | --- | --- |");
     for rtol in RTOLS {
@@ -192,7 +192,7 @@ fn peak() -> Option<f64> {
 
 /// Computation of some tables with all columns that are not optional, and with each column alone, on one thread.
 fn columns(folder: &Path) -> Outcome<()> {
-    println!("\n### Columns\n\n| table | columns | ns a row |\n| --- | --- | --- |");
+    println!("\n### Columns\n\n| table | columns | ns per row |\n| --- | --- | --- |");
     for (name, axes) in TABLES {
         let table = table::find(name).ok_or("no such table")?;
         let time = |request: &str| {
@@ -268,7 +268,7 @@ fn writers(folder: &Path) -> Outcome<()> {
     let rows = Plan::new(&sweep).tables[0].rows as f64;
     let [computed, ours, arrow] =
         least(5, || Ok([compute(&sweep, 1)?, encode(&sweep, ours)?, encode(&sweep, arrow)?]))?;
-    println!("\n### Writers\n\n| | ns a row |\n| --- | --- |");
+    println!("\n### Writers\n\n| | ns per row |\n| --- | --- |");
     println!("| compute, 1 thread | {:.1} |", 1e9 * computed / rows);
     println!("| encode by the program, digest and checksums included | {:.1} |", 1e9 * ours / rows);
     println!("| encode by `ArrowWriter`, without them | {:.1} |", 1e9 * arrow / rows);

@@ -62,7 +62,7 @@ fn main() {
     }
 }
 
-/// The same root by DOP853 at 1e-11, Newton's method with a difference quotient in the same bracketed search.
+/// The root by DOP853 at 1e-11, Newton's method with a difference quotient in the same bracketed search.
 fn shooting(cases: &[Case], contracting: bool) {
     let family = find("bounded_friction").expect("is a family");
     let (mut solved, mut feasible, mut error) = (0, 0, 0.0f64);

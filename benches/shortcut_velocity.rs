@@ -90,7 +90,7 @@ fn main() {
     }
 }
 
-/// The same root by shooting: DOP853 at `tolerance`, Newton's method with a difference quotient in the same bracketed
+/// The root by shooting: DOP853 at `tolerance`, Newton's method with a difference quotient in the same bracketed
 /// search, work as a third equation. The error is that of the work against the library's at 1e-13.
 fn shooting(cases: &[Case], tolerance: f64, ln: f64) {
     let family = find("bounded_velocity").expect("is a family");

@@ -1,4 +1,4 @@
-//! Linear stability: rows a second of the whole table in memory, on one thread.
+//! Linear stability: rows per second of the whole table in memory, on one thread.
 //!
 //! `cargo bench --bench stability` computes all columns of four million rows several times and prints the least time.
 //! The floor is twelve divisions a row, over an array and vectorised: the stiffnesses, and two roots of cubics, which
@@ -43,8 +43,8 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         least = least.min(start.elapsed().as_secs_f64());
     }
     let rows = table.rows as f64;
-    println!("stability: {:.1} ns a row, {:.2} million rows a second", 1e9 * least / rows, rows / least / 1e6);
+    println!("stability: {:.1} ns per row, {:.2} million rows per second", 1e9 * least / rows, rows / least / 1e6);
     let floor = 12.0 * support::one_vector_division();
-    println!("floor: {:.1} ns a row, of which it is {:.1}", 1e9 * floor, least / rows / floor);
+    println!("floor: {:.1} ns per row, of which it is {:.1}", 1e9 * floor, least / rows / floor);
     Ok(())
 }

@@ -1,7 +1,7 @@
 //! The step response: time of a response, of a plane of responses, and outcomes and errors over the physical domain.
 //!
 //! `cargo bench --bench step` prints all on one thread; `cargo bench --bench step -- domain 100000` prints the random points of the
-//! physical domain alone, as many as it says. Steps are exact; times are medians. The floor is the
+//! physical domain alone, with the given number of points. Steps are exact; times are medians. The floor is the
 //! arithmetic of a series at every step, 500 multiplications and as many additions, at the rate of a vectorised loop.
 
 use std::hint::black_box;

@@ -20,7 +20,7 @@ best = """
 for t_f, alpha_2, alpha_3, gap in database.execute(best).fetchall():
     print(f"landscape: t_f={t_f} alpha_2={alpha_2:.2f} alpha_3={alpha_3:.2f} gap={gap:.3e}")
 
-# Locate the crossover in t_f: what the theory says, and the first duration of the grid that does not speed up at once.
+# Locate the crossover in t_f: the theory, and the first duration of the grid that does not speed up at once.
 crossover = """
     SELECT b, v_f, any_value(t_cross), min(t_f)
     FROM crossover JOIN optimal USING (b, v_f)

@@ -19,7 +19,7 @@ best = gap.loc[gap.groupby("t_f")["gap"].idxmin()].sort_values("t_f")
 for row in best.itertuples():
     print(f"landscape: t_f={row.t_f} alpha_2={row.alpha_2:.2f} alpha_3={row.alpha_3:.2f} gap={row.gap:.3e}")
 
-# Locate the crossover in t_f: what the theory says, and the first duration of the grid that does not speed up at once.
+# Locate the crossover in t_f: the theory, and the first duration of the grid that does not speed up at once.
 optimal = table("crossover", "optimal")
 first = optimal[optimal["strategy"] != "speed_up"].groupby(["b", "v_f"], as_index=False)["t_f"].min()
 crossover = table("crossover", "crossover").merge(first.rename(columns={"t_f": "first"}), on=["b", "v_f"])

@@ -18,7 +18,7 @@ best = gap.sort("gap").group_by("t_f", maintain_order=True).first().sort("t_f").
 for row in best.iter_rows(named=True):
     print(f"landscape: t_f={row['t_f']} alpha_2={row['alpha_2']:.2f} alpha_3={row['alpha_3']:.2f} gap={row['gap']:.3e}")
 
-# Locate the crossover in t_f: what the theory says, and the first duration of the grid that does not speed up at once.
+# Locate the crossover in t_f: the theory, and the first duration of the grid that does not speed up at once.
 optimal = table("crossover", "optimal").filter(pl.col("strategy") != "speed_up")
 first = optimal.group_by("b", "v_f").agg(pl.col("t_f").min().alias("first"))
 crossover = table("crossover", "crossover").join(first, on=["b", "v_f"]).sort("b", "v_f").collect()

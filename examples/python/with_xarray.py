@@ -16,7 +16,7 @@ for t_f, best in gap.groupby("t_f"):
     alpha_2, alpha_3 = float(point["alpha_2"]), float(point["alpha_3"])
     print(f"landscape: t_f={t_f} alpha_2={alpha_2:.2f} alpha_3={alpha_3:.2f} gap={float(point):.3e}")
 
-# Locate the crossover in t_f: what the theory says, and the first duration of the grid that does not speed up at once.
+# Locate the crossover in t_f: the theory, and the first duration of the grid that does not speed up at once.
 optimal = ss.open(results / "crossover")["optimal"].to_xarray()
 crossover = ss.open(results / "crossover")["crossover"].to_xarray()
 first = optimal["t_f"].where(optimal["strategy"] != "speed_up").min("t_f")

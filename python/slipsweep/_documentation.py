@@ -24,7 +24,7 @@ def has_scale(definition: dict[str, Any]) -> bool:
 def docstring(definition: dict[str, Any]) -> str:
     """What `help` shows of the function of a table."""
     lines = [f"{definition['doc'][0].upper()}{definition['doc'][1:]}: a row for each point.", ""]
-    lines += ["Arguments broadcast as in NumPy. A row that has no answer has a status that says why.", "", "Parameters", "----------"]
+    lines += ["Arguments broadcast as in NumPy. A row that has no answer has a status that states why.", "", "Parameters", "----------"]
     for axis in definition["axes"]:
         unit = f", in {axis['unit']}" if axis["unit"] else ""
         kind = "str or sequence of str" if axis["words"] else "array_like"

@@ -30,7 +30,7 @@ def gap(
 ) -> Table:
     """The work of a cubic shortcut and its gap to the optimum: a row for each point.
 
-    Arguments broadcast as in NumPy. A row that has no answer has a status that says why.
+    Arguments broadcast as in NumPy. A row that has no answer has a status that states why.
 
     Parameters
     ----------
@@ -101,7 +101,7 @@ def best_cubic(
 ) -> Table:
     """The cubic shortcut of least work, over the whole (alpha_2, alpha_3) plane: a row for each point.
 
-    Arguments broadcast as in NumPy. A row that has no answer has a status that says why.
+    Arguments broadcast as in NumPy. A row that has no answer has a status that states why.
 
     Parameters
     ----------
@@ -170,7 +170,7 @@ def optimal(
 ) -> Table:
     """The protocol of least work: a row for each point.
 
-    Arguments broadcast as in NumPy. A row that has no answer has a status that says why.
+    Arguments broadcast as in NumPy. A row that has no answer has a status that states why.
 
     Parameters
     ----------
@@ -339,7 +339,7 @@ def crossover(
 ) -> Table:
     """The durations at which the optimal strategy changes: a row for each point.
 
-    Arguments broadcast as in NumPy. A row that has no answer has a status that says why.
+    Arguments broadcast as in NumPy. A row that has no answer has a status that states why.
 
     Parameters
     ----------
@@ -416,7 +416,7 @@ def shortcut(
 ) -> Table:
     """The shortcut of a family: a row for each point.
 
-    Arguments broadcast as in NumPy. A row that has no answer has a status that says why.
+    Arguments broadcast as in NumPy. A row that has no answer has a status that states why.
 
     Parameters
     ----------
@@ -496,7 +496,7 @@ def stability(
 ) -> Table:
     """Linear stability of steady sliding at both velocities: a row for each point.
 
-    Arguments broadcast as in NumPy. A row that has no answer has a status that says why.
+    Arguments broadcast as in NumPy. A row that has no answer has a status that states why.
 
     Parameters
     ----------
@@ -572,7 +572,7 @@ def step_response(
 ) -> Table:
     """The response to an abrupt step of the control velocity: a row for each point.
 
-    Arguments broadcast as in NumPy. A row that has no answer has a status that says why.
+    Arguments broadcast as in NumPy. A row that has no answer has a status that states why.
 
     Parameters
     ----------
@@ -652,7 +652,7 @@ def compliant(
 ) -> Table:
     """The smooth shortcut at finite stiffness: a row for each point.
 
-    Arguments broadcast as in NumPy. A row that has no answer has a status that says why.
+    Arguments broadcast as in NumPy. A row that has no answer has a status that states why.
 
     Parameters
     ----------
@@ -742,7 +742,7 @@ def regularised(
 ) -> Table:
     """The optimal protocol with its jumps replaced by smooth pieces: a row for each point.
 
-    Arguments broadcast as in NumPy. A row that has no answer has a status that says why.
+    Arguments broadcast as in NumPy. A row that has no answer has a status that states why.
 
     Parameters
     ----------

@@ -36,7 +36,7 @@ mod _core {
     #[pymodule_export]
     use super::trace::{Trace, plot_traces, trace};
 
-    /// Does what the command line says; returns the exit code.
+    /// Runs the command line; returns the exit code.
     #[pyfunction]
     fn main(py: Python<'_>, arguments: Vec<OsString>, stdout_is_closed: bool) -> u8 {
         py.detach(|| slipsweep::cli::main_of(arguments.into_iter(), stdout_is_closed))

@@ -24,7 +24,7 @@ struct Pool {
 
 static POOL: AtomicPtr<Pool> = AtomicPtr::new(ptr::null_mut());
 
-/// The pool of this process, with as many threads as there are processors, or as RAYON_NUM_THREADS says.
+/// The pool of this process, with as many threads as there are processors, or as RAYON_NUM_THREADS states.
 ///
 /// Threads do not survive a fork: a child makes a pool of its own, and leaves that of its parent alone, whose locks may be held forever.
 #[allow(unsafe_code)]

@@ -36,6 +36,10 @@ struct Head {
 }
 
 /// Prints the first rows of one table or of all tables.
+///
+/// # Errors
+///
+/// A path without tables, or a part that cannot be read.
 pub fn head(arguments: &Arguments) -> Result<(), Failure> {
     kind::expect_rows(&arguments.dataset)?;
     super::note_at(&arguments.dataset);
@@ -112,10 +116,8 @@ impl Head {
     fn text(&self) -> String {
         let mut text = self.name.clone();
         if let Some(rows) = self.rows {
-            text.push_str(&format!(": {}", words::things(rows, "row")));
-            if let Some(table) = table::find(&self.name) {
-                text.push_str(&format!(", each {}", table.doc()));
-            }
+            let meaning = table::find(&self.name).map(|table| format!("{}; ", table.doc())).unwrap_or_default();
+            text.push_str(&format!(": {meaning}{}", words::things(rows, "row")));
             if self.missing > 0 {
                 text.push_str(&format!("; {} missing", words::things(self.missing, "part")));
             }

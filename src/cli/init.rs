@@ -53,6 +53,10 @@ impl Question {
 const SCHEMA: &str = "slipsweep.schema.json";
 
 /// Writes a spec and its JSON Schema.
+///
+/// # Errors
+///
+/// An illegal name, an existing file, or a file that cannot be written.
 pub fn init(arguments: &Arguments) -> Result<(), Failure> {
     let given = arguments.name.display();
     let bare = match arguments.name.extension() {
@@ -91,7 +95,7 @@ pub fn init(arguments: &Arguments) -> Result<(), Failure> {
     write(&path, &text)?;
     let path = path.display();
     say(&format!(
-        "{path}: a commented spec, and {SCHEMA}, with which editors complete and check it\n\
+        "written: {path}, a commented spec, and {SCHEMA}, its schema for editors\n\
          next:\n  slipsweep plan {path}\n  slipsweep run {path}\n"
     ))
 }

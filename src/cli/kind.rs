@@ -99,7 +99,7 @@ impl Kind {
         };
         let ours = || "name a folder that `slipsweep run` wrote".to_owned();
         match self {
-            Kind::Dataset => ("a dataset", format!("`slipsweep summary {shown}` says what it contains")),
+            Kind::Dataset => ("a dataset", format!("`slipsweep summary {shown}` shows its contents")),
             Kind::Datasets => ("a folder of datasets", format!("name one of them: {}", datasets(path).join(", "))),
             Kind::Table => ("the folder of a table", name(above(path), "dataset")),
             Kind::Part => ("a part of a table", name(above(path).and_then(|table| above(&table)), "dataset")),
@@ -123,6 +123,10 @@ impl Kind {
 }
 
 /// Checks that `path` is one of `kinds`.
+///
+/// # Errors
+///
+/// What the path is instead.
 pub fn expect(path: &Path, kinds: &[Kind]) -> Result<(), Failure> {
     if kinds.contains(&Kind::of(path)) { Ok(()) } else { Err(unexpected(path, kinds)) }
 }
@@ -141,6 +145,10 @@ pub fn unexpected(path: &Path, kinds: &[Kind]) -> Failure {
 }
 
 /// Checks that `path` may be a spec; the reader of specs reports other errors.
+///
+/// # Errors
+///
+/// What the path is instead.
 pub fn expect_spec(path: &Path) -> Result<(), Failure> {
     match Kind::of(path) {
         Kind::Spec | Kind::File | Kind::Folder | Kind::Device | Kind::Nothing => Ok(()),
@@ -149,6 +157,10 @@ pub fn expect_spec(path: &Path) -> Result<(), Failure> {
 }
 
 /// Checks that `path` may contain rows; the readers of datasets and of files report other errors.
+///
+/// # Errors
+///
+/// What the path is instead.
 pub fn expect_rows(path: &Path) -> Result<(), Failure> {
     match Kind::of(path) {
         Kind::Spec | Kind::Manifest | Kind::Datasets | Kind::Page | Kind::Picture => expect(path, &[Kind::Dataset]),

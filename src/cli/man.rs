@@ -17,6 +17,10 @@ pub struct Arguments {
 }
 
 /// Prints a manual page.
+///
+/// # Errors
+///
+/// An unknown command.
 pub fn man(arguments: &Arguments) -> Result<(), Failure> {
     let mut program = super::Arguments::command();
     program.build();

@@ -49,13 +49,13 @@ use crate::sweep::{SpecError, Sweep, schema};
 use kind::Kind;
 
 /// Exit code if the spec or the arguments are wrong.
-const WRONG: u8 = 1;
+const EXIT_REQUEST: u8 = 1;
 /// Exit code if the command failed.
-const FAILED: u8 = 2;
+const EXIT_FAILURE: u8 = 2;
 /// Exit code with `--strict` if some row is `not_converged`.
-const NOT_STRICT: u8 = 3;
+const EXIT_NOT_CONVERGED: u8 = 3;
 /// Exit code with `--requeue` for a temporary failure (EX_TEMPFAIL of sysexits.h).
-const AGAIN: u8 = 75;
+const EXIT_TEMPFAIL: u8 = 75;
 
 /// Exact parameter sweeps over the control of rate-and-state friction.
 #[derive(Debug, Parser)]
@@ -144,20 +144,20 @@ pub mod text {
 
 impl Failure {
     fn failed(error: impl Display) -> Failure {
-        Failure { code: FAILED, message: format!("error: {error}") }
+        Failure { code: EXIT_FAILURE, message: format!("error: {error}") }
     }
 }
 
 impl From<SpecError> for Failure {
     fn from(error: SpecError) -> Failure {
-        Failure { code: WRONG, message: format!("error: {error}") }
+        Failure { code: EXIT_REQUEST, message: format!("error: {error}") }
     }
 }
 
 #[cfg(feature = "query")]
 impl From<QueryError> for Failure {
     fn from(error: QueryError) -> Failure {
-        Failure { code: if error.is_wrong() { WRONG } else { FAILED }, message: format!("error: {error}") }
+        Failure { code: if error.is_wrong() { EXIT_REQUEST } else { EXIT_FAILURE }, message: format!("error: {error}") }
     }
 }
 
@@ -184,7 +184,7 @@ pub fn main_of(arguments: impl Iterator<Item = OsString>, stdout_is_closed: bool
             let printed = error.print();
             if error.use_stderr() {
                 // A lost terminal is ignored.
-                return WRONG;
+                return EXIT_REQUEST;
             }
             return ended(stdout().and_then(|mut stdout| written(printed.and_then(|()| stdout.flush()))));
         }
@@ -273,7 +273,7 @@ fn load(path: &Path) -> Result<Sweep, Failure> {
 
 /// The failure for a wrong request.
 fn wrong(message: impl Display) -> Failure {
-    Failure { code: WRONG, message: format!("error: {message}") }
+    Failure { code: EXIT_REQUEST, message: format!("error: {message}") }
 }
 
 /// The failure for a wrong request, with the expected value and a line of help.

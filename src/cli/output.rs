@@ -35,6 +35,10 @@ impl<F: Format> Output<F> {
     }
 
     /// The format that the arguments select.
+    ///
+    /// # Errors
+    ///
+    /// A file extension that determines no format, or Parquet on a terminal.
     pub fn format(&self) -> Result<F, Failure> {
         let ending = self.out.extension().map(|ending| ending.to_string_lossy().to_lowercase());
         let known = ending.and_then(|ending| F::ENDINGS.iter().find(|(known, _)| *known == ending));

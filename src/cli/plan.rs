@@ -26,6 +26,10 @@ pub struct Arguments {
 const SHORT_SECONDS: f64 = 0.2;
 
 /// Prints the plan of a spec.
+///
+/// # Errors
+///
+/// A spec that is wrong.
 pub fn plan(arguments: &Arguments) -> Result<(), Failure> {
     let start = Instant::now();
     let sweep = load(&arguments.spec)?;
@@ -81,7 +85,7 @@ pub fn in_words(sweep: &Sweep, estimates: &Estimates, reading: f64) -> String {
     }
     let seconds = reading + estimates.elapsed(threads);
     text.push_str(&format!(
-        "in all: about {} on disk, {} on {}\n",
+        "total: about {} on disk, {} on {}\n",
         words::bytes(estimates.bytes()),
         if seconds < SHORT_SECONDS {
             "less than 0.3 s".to_owned()

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 use super::kind::{self, Kind};
 use super::watch::{Wait, waiting};
-use super::{FAILED, Failure, WRONG, dataset, refused, say, to_file, wrong};
+use super::{EXIT_FAILURE, EXIT_REQUEST, Failure, dataset, refused, say, to_file, wrong};
 use crate::plot::table::{Condition, Request, Source};
 use crate::plot::{self, COLUMN, Figure, Format, PAGE, PlotError};
 use crate::sweep::units_of;
@@ -71,12 +71,16 @@ fn in_range(text: &str, least: f64, most: f64) -> Result<f64, String> {
 impl From<PlotError> for Failure {
     fn from(error: PlotError) -> Failure {
         // A damaged file is not an error of the arguments.
-        let code = if matches!(error, PlotError::Part(_) | PlotError::Trace(_)) { FAILED } else { WRONG };
+        let code = if matches!(error, PlotError::Part(_) | PlotError::Trace(_)) { EXIT_FAILURE } else { EXIT_REQUEST };
         Failure { code, message: format!("error: {error}") }
     }
 }
 
 /// Draws the requested pictures.
+///
+/// # Errors
+///
+/// A source that cannot be drawn, or a file that cannot be written.
 pub fn plot(arguments: &Arguments) -> Result<(), Failure> {
     let place = arguments.place()?;
     match arguments.sources.as_slice() {
@@ -142,7 +146,7 @@ impl Arguments {
             let drawn = waiting(&Wait::new(&drawing), || source.figure(table, &request)).map_err(Failure::from);
             let figure = match drawn {
                 // A table without a picture does not prevent the pictures of other tables.
-                Err(failure) if tables.len() > 1 && failure.code == FAILED => {
+                Err(failure) if tables.len() > 1 && failure.code == EXIT_FAILURE => {
                     damage = damage.or(Some(failure));
                     continue;
                 }

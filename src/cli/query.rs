@@ -19,7 +19,7 @@ use indicatif::ProgressBar;
 use signal_hook::consts::{SIGINT, SIGTERM};
 
 use super::output::{self, Output};
-use super::watch::{SILENCE, text_line};
+use super::watch::{PROGRESS_DELAY, text_line};
 use super::{Failure, kind, say, stdout, summary, to_file, words, written, wrong};
 use crate::dataset::{Folder, atomic};
 use crate::query::{self, Answer, AnswerError, Tables};
@@ -68,12 +68,16 @@ impl output::Format for Format {
 const INSIDE: &str = "SLIPSWEEP_ANSWERS";
 
 /// Polling interval of the query process. Chosen: it delays a short query by at most this time.
-const POLL: Duration = Duration::from_millis(5);
+const POLL_INTERVAL: Duration = Duration::from_millis(5);
 
 /// Stack for parsing and planning a query, in bytes. Chosen: a term takes some kilobytes, and a query has thousands at most.
 const STACK_BYTES: usize = 256 << 20;
 
 /// Answers a query.
+///
+/// # Errors
+///
+/// A query that is wrong, or tables that cannot be read.
 pub fn query(arguments: &Arguments) -> Result<(), Failure> {
     if env::var_os(INSIDE).is_some() {
         return inside(arguments);
@@ -226,13 +230,13 @@ fn wait(child: &mut Child, signal: &AtomicUsize, line: &Mutex<Line>) -> io::Resu
             child.kill()?;
             break child.wait();
         }
-        if start.elapsed() > SILENCE
+        if start.elapsed() > PROGRESS_DELAY
             && let Ok(mut line) = line.lock()
             && !line.is_over
         {
             line.bar.get_or_insert_with(|| text_line(0)).set_message("answering; Ctrl-C leaves no file behind");
         }
-        thread::sleep(POLL);
+        thread::sleep(POLL_INTERVAL);
     };
     if let Ok(mut line) = line.lock() {
         line.end();

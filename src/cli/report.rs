@@ -24,6 +24,10 @@ pub struct Arguments {
 }
 
 /// Writes the page.
+///
+/// # Errors
+///
+/// A dataset that cannot be read, or a page that cannot be written.
 pub fn report(arguments: &Arguments) -> Result<(), Failure> {
     let (folder, manifest) = dataset(&arguments.dataset)?;
     let path = arguments.out.clone().unwrap_or_else(|| PathBuf::from(format!("{}-report.html", manifest.name)));

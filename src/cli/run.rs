@@ -9,7 +9,7 @@ use super::kind::{self, Kind as PathKind};
 use super::plan::too_large;
 use super::shards::quoted;
 use super::watch::{Wait, waiting, watched};
-use super::{AGAIN, FAILED, Failure, NOT_STRICT, load, say, summary, words, wrong};
+use super::{EXIT_FAILURE, EXIT_NOT_CONVERGED, EXIT_TEMPFAIL, Failure, load, say, summary, words, wrong};
 use crate::dataset::atomic::nearest_folder;
 use crate::dataset::{DatasetError, Folder};
 use crate::grid::Quantity;
@@ -46,6 +46,10 @@ pub struct Arguments {
 }
 
 /// Runs a spec: reads and plans it, computes, encodes and publishes the missing parts, and summarises the tables.
+///
+/// # Errors
+///
+/// A spec that is wrong, an interrupted run, failed rows, or, with `--strict`, rows that are not `ok`.
 pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let start = Instant::now();
     let (sweep, folder) = subject(arguments)?;
@@ -64,7 +68,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
         outcome.statistics.iter().map(|statistics| statistics.status[Status::NotConverged as usize]).sum();
     if arguments.strict && defects > 0 {
         let message = format!("error: {} not_converged", words::things(defects, "row"));
-        return Err(Failure { code: NOT_STRICT, message });
+        return Err(Failure { code: EXIT_NOT_CONVERGED, message });
     }
     Ok(())
 }
@@ -199,7 +203,7 @@ fn explain(error: RunError, caught: Option<i32>, arguments: &Arguments, (there, 
         RunError::Stopped(_) => {
             let (there, all) = (words::count(there), words::things(all, "part"));
             let message = format!("stopped; {there} of {all} finished; the same command continues");
-            Failure { code: caught.and_then(|number| u8::try_from(128 + number).ok()).unwrap_or(FAILED), message }
+            Failure { code: caught.and_then(|number| u8::try_from(128 + number).ok()).unwrap_or(EXIT_FAILURE), message }
         }
         RunError::Dataset(
             DatasetError::Foreign { .. }
@@ -209,7 +213,9 @@ fn explain(error: RunError, caught: Option<i32>, arguments: &Arguments, (there, 
             | DatasetError::Occupied { .. },
         ) => wrong(error),
         RunError::Threads { .. } if arguments.threads.is_some() => wrong(error),
-        _ if arguments.requeue && may_pass(&error) => Failure { code: AGAIN, message: format!("error: {error}") },
+        _ if arguments.requeue && may_pass(&error) => {
+            Failure { code: EXIT_TEMPFAIL, message: format!("error: {error}") }
+        }
         _ => Failure::failed(error),
     }
 }

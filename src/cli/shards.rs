@@ -101,6 +101,10 @@ pub fn scripts(dataset: &Path) -> Vec<(u64, impl Fn(&[u64]) -> String)> {
 }
 
 /// Writes the job script and prints the command that submits it.
+///
+/// # Errors
+///
+/// A spec that is wrong, too many parts, or a script that cannot be written.
 pub fn shards(arguments: &Arguments) -> Result<(), Failure> {
     let sweep = load(&arguments.spec)?;
     let plan = Plan::new(&sweep);

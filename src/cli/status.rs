@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
 use super::shards::{quoted, scripts};
-use super::{FAILED, Failure, kind, refused, say, summary, words};
+use super::{EXIT_FAILURE, Failure, kind, refused, say, summary, words};
 use crate::dataset::{Build, CheckDepth, Folder, Manifest, Survey};
 use crate::protocol::Status;
 use crate::sweep::{Plan, Sweep, shards_with};
@@ -26,6 +26,10 @@ pub struct Arguments {
 const MAX_LISTED: usize = 10;
 
 /// Reports the parts of a dataset.
+///
+/// # Errors
+///
+/// A path that is not a dataset, or damaged parts.
 pub fn status(arguments: &Arguments) -> Result<(), Failure> {
     let path = &arguments.dataset;
     kind::expect_rows(path)?;
@@ -59,13 +63,14 @@ pub fn status(arguments: &Arguments) -> Result<(), Failure> {
     let (all, there) =
         survey.tables.iter().fold((0, 0), |(all, there), table| (all + table.parts, there + table.there));
     let message = format!("incomplete: {} of {} are present", words::count(there), words::things(all, "part"));
-    Err(Failure { code: FAILED, message })
+    Err(Failure { code: EXIT_FAILURE, message })
 }
 
 /// Parts and rows, table by table.
 fn counts(survey: &Survey) -> String {
-    let mut lines =
-        vec![["table", "parts", "there", "missing", "damaged", "foreign", "rows there"].map(str::to_owned).to_vec()];
+    let mut lines = vec![
+        ["table", "parts", "present", "missing", "damaged", "foreign", "rows present"].map(str::to_owned).to_vec(),
+    ];
     for table in &survey.tables {
         let missing = table.missing.iter().map(|range| range.end - range.start).sum();
         let (damaged, foreign) = (table.damaged.len() as u64, table.foreign.len() as u64);

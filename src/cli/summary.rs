@@ -5,7 +5,9 @@ use std::sync::atomic::AtomicU64;
 
 use super::watch::{Wait, waiting};
 use super::{Failure, dataset, say, words};
-use crate::dataset::{Cell, CheckDepth, Counts, FEW, Folder, Manifest, StatisticsRow, Survey, TableStatistics};
+use crate::dataset::{
+    Cell, CheckDepth, Counts, Folder, MAX_KEPT_ROWS, Manifest, StatisticsRow, Survey, TableStatistics,
+};
 use crate::grid::Quantity;
 use crate::protocol::Status;
 use crate::table::{self, STATUS};
@@ -20,6 +22,10 @@ pub struct Arguments {
 }
 
 /// Prints the summary of a dataset.
+///
+/// # Errors
+///
+/// A path that is not a dataset, or damaged parts.
 pub fn summary(arguments: &Arguments) -> Result<(), Failure> {
     let (folder, manifest) = dataset(&arguments.dataset)?;
     let mut text = String::new();
@@ -50,6 +56,10 @@ pub fn survey(folder: &Folder, manifest: &Manifest, look: CheckDepth) -> Survey 
 }
 
 /// The contents of a dataset without damaged parts.
+///
+/// # Errors
+///
+/// Damaged parts, or parts of another sweep.
 pub fn contents(folder: &Folder, manifest: &Manifest) -> Result<Survey, Failure> {
     let survey = survey(folder, manifest, CheckDepth::Footer);
     for (table, planned) in survey.tables.iter().zip(&manifest.tables) {
@@ -97,8 +107,8 @@ pub fn blocks(name: &str, rows: u64, statistics: &TableStatistics) -> Vec<Summar
             let least: Vec<&StatisticsRow> = statistics.least().collect();
             if !least.is_empty() {
                 // Protocols of a family may miss the final state, with any work.
-                let arriving = if name == "shortcut" { " and arrive" } else { "" };
-                blocks.push(SummaryBlock::Line(2, format!("least gap among the rows that are ok{arriving}:")));
+                let arriving = if name == "shortcut" { " that reach the final state" } else { "" };
+                blocks.push(SummaryBlock::Line(2, format!("least gap of the rows with status ok{arriving}:")));
                 blocks.extend(listing(statistics, &least));
             }
             blocks.extend(ranges(statistics));
@@ -109,7 +119,7 @@ pub fn blocks(name: &str, rows: u64, statistics: &TableStatistics) -> Vec<Summar
             };
             blocks.extend(statistics.labels.iter().map(|(label, counts)| match counts {
                 Some(counts) => counted(label, counts),
-                None => SummaryBlock::Line(2, format!("{label}: more than {FEW} different labels")),
+                None => SummaryBlock::Line(2, format!("{label}: more than {MAX_KEPT_ROWS} different labels")),
             }));
             blocks.extend(statistics.words.iter().map(|(column, counts)| counted(column, counts)));
         }

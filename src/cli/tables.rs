@@ -15,6 +15,10 @@ pub struct Arguments {
 }
 
 /// Prints one table or all.
+///
+/// # Errors
+///
+/// An unknown table.
 pub fn tables(arguments: &Arguments) -> Result<(), Failure> {
     let all: Vec<&dyn Table> = table::ALL.into_iter().chain(table::REDUCED.map(|(_, table)| table)).collect();
     let chosen = match &arguments.table {
@@ -42,7 +46,7 @@ fn text(table: &dyn Table) -> String {
             Kind::Flag => "true or false",
             _ => column.unit(&no_axes),
         };
-        let note = if column.optional { " (only if a spec names it)" } else { "" };
+        let note = if column.optional { " (optional)" } else { "" };
         rows.push(vec![column.name.to_owned(), unit.to_owned(), format!("{}{note}", column.doc)]);
     }
     rows.push([STATUS, "word", STATUS_DOC].map(str::to_owned).into());

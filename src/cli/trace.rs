@@ -8,7 +8,7 @@ use clap::builder::{PossibleValue, PossibleValuesParser, StringValueParser, Type
 
 use super::kind::{self, Kind};
 use super::output::{self, Output};
-use super::{FAILED, Failure, WRONG, dataset, no_table, put, refused, say, words, write_file, wrong};
+use super::{EXIT_FAILURE, EXIT_REQUEST, Failure, dataset, no_table, put, refused, say, words, write_file, wrong};
 use crate::dataset::{Cell, Folder, ManifestTable, Row, frame};
 use crate::grid::{Domain, Point, Quantity, RTOL, Scale};
 use crate::model::{Law, Transition, Units};
@@ -77,8 +77,14 @@ pub struct Arguments {
     /// Sudden change of theta at a fraction of the duration, as "theta=+10% at 0.25"; compares open and closed loop (optimal)
     #[arg(long, value_name = "CHANGE", value_parser = disturbance, conflicts_with_all = ["from", "points", "table"])]
     disturb: Option<Disturbance>,
-    /// The protocol after the disturbance: with the optimal velocity of the disturbed state, or with the velocity as planned
-    #[arg(long = "loop", value_name = "LOOP", default_value = "closed", requires = "disturb")]
+    /// Protocol that is shown after the disturbance [default: closed]
+    #[arg(
+        long = "loop",
+        value_name = "LOOP",
+        default_value = "closed",
+        hide_default_value = true,
+        requires = "disturb"
+    )]
     feedback: Loop,
     /// Coefficient of t in theta, in units of 1/t_f as in the table `best_cubic` (gap)
     #[arg(long, value_name = "X", value_parser = |text: &str| legal(text, Quantity::Alpha2.domain()))]
@@ -251,6 +257,10 @@ struct Origin {
 }
 
 /// Traces a protocol.
+///
+/// # Errors
+///
+/// Illegal parameters, a protocol that does not exist, or a file that cannot be written.
 pub fn trace(arguments: &Arguments) -> Result<(), Failure> {
     let (format, output) = (arguments.output.format()?, &arguments.output);
     let Traced { header, trace, units, facts } = solved(arguments)?;
@@ -294,7 +304,7 @@ pub fn traced(arguments: &[String]) -> Result<Traced, Failure> {
     }
     let name = "trace".to_owned();
     let command = <Command as clap::Parser>::try_parse_from(std::iter::once(&name).chain(arguments));
-    let command = command.map_err(|error| Failure { code: WRONG, message: error.to_string() })?;
+    let command = command.map_err(|error| Failure { code: EXIT_REQUEST, message: error.to_string() })?;
     solved(&command.arguments)
 }
 
@@ -317,7 +327,7 @@ fn solved(arguments: &Arguments) -> Result<Traced, Failure> {
 }
 
 fn absent(protocol: &str, absence: Absence) -> Failure {
-    let code = if absence.is_defect() { FAILED } else { WRONG };
+    let code = if absence.is_defect() { EXIT_FAILURE } else { EXIT_REQUEST };
     Failure { code, message: format!("error: no `{protocol}` protocol: {absence}") }
 }
 
@@ -709,13 +719,11 @@ fn header(arguments: &Arguments, request: &TraceRequest, path: &TracedPath, trac
     text.push_str(&format!("  {}\n  status {}\n", all(&results(request, path, trace)), status(path.status)));
     let rows = words::things(trace.moments.len() as u64, "row");
     match arguments.points {
-        Some(_) => {
-            text.push_str(&format!("  {rows}: equally spaced times, and the states on the other side of a jump\n"))
-        }
+        Some(_) => text.push_str(&format!("  {rows}: equally spaced times, and the states before and after jumps\n")),
         None => {
             let (range, value) = (words::number(RANGE_RTOL), words::number(VALUE_RTOL));
-            let lines = format!("straight lines between them are good to {range} of the range of a column");
-            text.push_str(&format!("  {rows}; {lines}, and to {value} of v and theta\n"));
+            let lines = format!("linear interpolation errs by up to {range} of the range of a column");
+            text.push_str(&format!("  {rows}; {lines}, and by up to {value} of v and theta\n"));
         }
     }
     text

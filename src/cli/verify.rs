@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use super::watch::{Wait, waiting};
-use super::{Failure, NOT_STRICT, dataset, say, words};
+use super::{EXIT_NOT_CONVERGED, Failure, dataset, say, words};
 use crate::dataset::Cell;
 use crate::verify::{Audit, LIMIT, verify as audit};
 
@@ -23,6 +23,10 @@ pub struct Arguments {
 }
 
 /// Verifies a dataset.
+///
+/// # Errors
+///
+/// A path that is not a dataset, a dataset that cannot be read, or rows that are wrong.
 pub fn verify(arguments: &Arguments) -> Result<(), Failure> {
     let path = &arguments.dataset;
     let (_, manifest) = dataset(path)?;
@@ -38,7 +42,7 @@ pub fn verify(arguments: &Arguments) -> Result<(), Failure> {
              deleted and the sweep run",
             words::things(errors as u64, "number")
         );
-        return Err(Failure { code: NOT_STRICT, message });
+        return Err(Failure { code: EXIT_NOT_CONVERGED, message });
     }
     Ok(())
 }

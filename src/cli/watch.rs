@@ -14,13 +14,13 @@ use super::words;
 use crate::table::{Phase, Signal};
 
 /// The polling interval of progress. Chosen: Ctrl-C seems to answer at once.
-const LOOK: Duration = Duration::from_millis(50);
+const POLL_INTERVAL: Duration = Duration::from_millis(50);
 
 /// The interval of progress lines without a terminal. Chosen: a log of a day has less than 10,000 lines.
-const LINE: Duration = Duration::from_secs(10);
+const LINE_INTERVAL: Duration = Duration::from_secs(10);
 
 /// Time after which a terminal shows the progress. Chosen: a user should not wait longer than a second without a message.
-pub const SILENCE: Duration = Duration::from_secs(1);
+pub const PROGRESS_DELAY: Duration = Duration::from_secs(1);
 
 /// Runs `work`. Meanwhile it shows the progress towards `rows` rows unless `quiet`, and passes Ctrl-C and SIGTERM on to `signal`.
 ///
@@ -68,7 +68,7 @@ pub fn waiting<T>(wait: &Wait<'_>, work: impl FnOnce() -> T) -> T {
             let _ = writeln!(stderr(), "stopped while {}; nothing has changed", wait.doing);
             process::exit(128 + number);
         }
-        if !wait.quiet && start.elapsed() > SILENCE && stderr().is_terminal() {
+        if !wait.quiet && start.elapsed() > PROGRESS_DELAY && stderr().is_terminal() {
             line.get_or_insert_with(|| text_line(0)).set_message(match wait.done {
                 Some((done, all, thing)) => {
                     let (done, all) = (words::count(done.load(Ordering::Relaxed)), words::things(all, thing));
@@ -92,7 +92,7 @@ fn while_looking<T>(mut look: impl FnMut(Option<i32>) + Send, work: impl FnOnce(
         let watch = || {
             while !finished.load(Ordering::Acquire) {
                 look(signals.caught());
-                std::thread::park_timeout(LOOK);
+                std::thread::park_timeout(POLL_INTERVAL);
             }
         };
         // Without a second thread, there is no progress.
@@ -206,11 +206,11 @@ impl ProgressDisplay {
                 bar.set_position(done);
                 bar.set_message(self.text(signal));
             }
-            Some(bar) if self.since.elapsed() > SILENCE => {
+            Some(bar) if self.since.elapsed() > PROGRESS_DELAY => {
                 set_style(bar, false);
                 bar.set_message(self.text(signal));
             }
-            None if !self.quiet && self.last.elapsed() >= LINE => {
+            None if !self.quiet && self.last.elapsed() >= LINE_INTERVAL => {
                 self.last = Instant::now();
                 let rows = format!("{} of {} rows, ", words::count(done), words::count(self.rows));
                 // A progress line that cannot be written is no failure.
@@ -228,7 +228,7 @@ impl ProgressDisplay {
                 format!("checking existing parts: {kept} of {all}")
             }
             Phase::Computing => {
-                let rate = done as f64 / self.since.elapsed().as_secs_f64().max(LOOK.as_secs_f64());
+                let rate = done as f64 / self.since.elapsed().as_secs_f64().max(POLL_INTERVAL.as_secs_f64());
                 let to_do = self.rows.saturating_sub(done + kept);
                 let left = if done == 0 { "?".to_owned() } else { words::duration(to_do as f64 / rate) };
                 format!("{} per second, {left} left", words::count(rate as u64))

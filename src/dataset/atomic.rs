@@ -11,7 +11,7 @@ use std::time::{Duration, Instant, SystemTime};
 use tempfile::NamedTempFile;
 
 /// Age from which a temporary file of another machine is treated as abandoned, by the clock of the file system. Writing one takes seconds.
-const ABANDONED: Duration = Duration::from_secs(24 * 60 * 60);
+const MAX_TEMPORARY_AGE: Duration = Duration::from_secs(24 * 60 * 60);
 
 /// A step that failed, and why.
 #[derive(Debug)]
@@ -29,6 +29,10 @@ impl Unwritten {
 }
 
 /// Writes `bytes` to `path`. An incomplete file never has this name, even after a power cut.
+///
+/// # Errors
+///
+/// A file that cannot be written.
 pub fn write(path: &Path, bytes: &[u8]) -> Result<(), Unwritten> {
     let temporary = filled(path, bytes)?;
     temporary.persist(path).map_err(|error| Unwritten::at(RENAME)(error.error))?;
@@ -36,6 +40,10 @@ pub fn write(path: &Path, bytes: &[u8]) -> Result<(), Unwritten> {
 }
 
 /// Writes `bytes` to `path` in the same way, but never replaces a file: returns `false` if there is one.
+///
+/// # Errors
+///
+/// A file that cannot be written.
 pub fn write_new(path: &Path, bytes: &[u8]) -> Result<bool, Unwritten> {
     match filled(path, bytes)?.persist_noclobber(path) {
         Err(error) if path.exists() => drop(error),
@@ -46,6 +54,10 @@ pub fn write_new(path: &Path, bytes: &[u8]) -> Result<bool, Unwritten> {
 }
 
 /// Writes a file durably; `fill` writes the content.
+///
+/// # Errors
+///
+/// The error of `fill`, or of the file system.
 #[cfg(feature = "cli")]
 pub fn write_with<E: From<io::Error>>(path: &Path, fill: impl FnOnce(&mut File) -> Result<(), E>) -> Result<(), E> {
     let mut temporary = create(path)?;
@@ -130,7 +142,7 @@ pub fn sweep(folder: &Path, now: SystemTime) {
 
 fn is_old(entry: &fs::DirEntry, now: SystemTime) -> bool {
     let written = entry.metadata().and_then(|metadata| metadata.modified());
-    written.is_ok_and(|written| now.duration_since(written).is_ok_and(|age| age > ABANDONED))
+    written.is_ok_and(|written| now.duration_since(written).is_ok_and(|age| age > MAX_TEMPORARY_AGE))
 }
 
 /// The nearest existing folder at or above `folder`, which is on the same disk.
@@ -141,6 +153,10 @@ pub fn nearest_folder(folder: &Path) -> PathBuf {
 }
 
 /// Seconds to write a file of `bytes` bytes into `folder`. The file is removed again.
+///
+/// # Errors
+///
+/// A file that cannot be written.
 pub fn time(folder: &Path, bytes: usize) -> io::Result<Duration> {
     let folder = nearest_folder(folder);
     let content = vec![0; bytes];
@@ -153,6 +169,10 @@ pub fn time(folder: &Path, bytes: usize) -> io::Result<Duration> {
 }
 
 /// Creates `folder` and its missing parents, each durably.
+///
+/// # Errors
+///
+/// A folder that cannot be created.
 pub fn create_folder(folder: &Path) -> io::Result<()> {
     if folder.is_dir() {
         return Ok(());
@@ -206,7 +226,7 @@ mod tests {
         sweep(folder.path(), now);
         assert!(!dead.exists());
         assert_eq!(names(folder.path()), [shown(living.path()), ".mine.tmp".to_owned(), shown(&foreign)]);
-        sweep(folder.path(), now + ABANDONED + Duration::from_secs(60));
+        sweep(folder.path(), now + MAX_TEMPORARY_AGE + Duration::from_secs(60));
         assert_eq!(names(folder.path()), [shown(living.path()), ".mine.tmp".to_owned()]);
         drop(living);
         assert_eq!(names(folder.path()), [".mine.tmp"]);

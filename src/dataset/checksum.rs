@@ -33,7 +33,11 @@ pub fn entries() -> [KeyValue; 2] {
 }
 
 /// Inserts the checksums into a file whose footer has the [`entries`].
-pub fn sealed(bytes: Vec<u8>) -> Result<Vec<u8>> {
+///
+/// # Errors
+///
+/// Bytes that are not a Parquet file with the [`entries`].
+pub fn with_checksums(bytes: Vec<u8>) -> Result<Vec<u8>> {
     let bytes = Bytes::from(bytes);
     let metadata = ParquetMetaDataReader::new().parse_and_finish(&bytes)?;
     let head = head(&bytes, &metadata)?;
@@ -62,12 +66,12 @@ pub fn is_intact(bytes: &[u8]) -> Option<bool> {
 /// If they cannot be read.
 pub fn is_head_intact(file: &impl ChunkReader, metadata: &ParquetMetaData) -> Result<Option<bool>> {
     let entries = metadata.file_metadata().key_value_metadata().into_iter().flatten();
-    let Some(sealed) = entries.filter(|entry| entry.key == HEAD).find_map(|entry| entry.value.as_ref()) else {
+    let Some(stored) = entries.filter(|entry| entry.key == HEAD).find_map(|entry| entry.value.as_ref()) else {
         // A flipped bit may hide the entries of a footer, although its bytes still contain them.
         let footer = footer(file)?;
         return Ok([HEAD, FILE].iter().any(|key| place(&footer, key).is_some()).then_some(false));
     };
-    Ok(Some(*sealed == head(file, metadata)?))
+    Ok(Some(*stored == head(file, metadata)?))
 }
 
 /// The bytes of the footer with its length and `PAR1`.

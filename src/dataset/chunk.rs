@@ -20,7 +20,7 @@ use super::rle;
 pub type Runs = Vec<(u32, usize)>;
 
 /// Least size of a compressed page, in bytes: smaller pages cost more time than they save space.
-const WORTH_COMPRESSING: usize = 1 << 12;
+const MIN_COMPRESSED_BYTES: usize = 1 << 12;
 
 /// A column chunk of one data page.
 pub struct Chunk {
@@ -48,9 +48,13 @@ pub fn page(present: Option<&Runs>, size: usize) -> Vec<u8> {
 
 impl Chunk {
     /// The bytes of the chunk, and its metadata for the file.
+    ///
+    /// # Errors
+    ///
+    /// The error of the compressor or of the encoder.
     pub fn encode(self, column: ColumnDescPtr, zstd: &mut Compressor<'_>) -> Result<(Bytes, ColumnCloseResult)> {
         let raw = self.data.len() + self.dictionary.as_ref().map_or(0, |(plain, _)| plain.len());
-        let compression = if raw < WORTH_COMPRESSING {
+        let compression = if raw < MIN_COMPRESSED_BYTES {
             Compression::UNCOMPRESSED
         } else {
             Compression::ZSTD(ZstdLevel::try_new(ZSTD_LEVEL)?)

@@ -12,7 +12,7 @@ use super::manifest::{Manifest, ManifestTable};
 use super::state::{self, CheckDepth, State};
 
 /// The help if the folder contains another dataset.
-const WAYS_OUT: &str = "change `name` in the spec, or write elsewhere with --out DIR, or remove the dataset";
+const OTHER_SPEC_HELP: &str = "change `name` in the spec, or write elsewhere with --out DIR, or remove the dataset";
 
 /// The errors of the files of a dataset.
 #[derive(Debug, thiserror::Error)]
@@ -20,16 +20,18 @@ const WAYS_OUT: &str = "change `name` in the spec, or write elsewhere with --out
 pub enum DatasetError {
     /// The folder contains a dataset of another version or revision of the program.
     #[error(
-        "{folder}: holds a dataset of another {what}\n  expected: {expected}\n  found: {found}\n  help: {WAYS_OUT}"
+        "{folder}: holds a dataset of another {what}\n  expected: {expected}\n  found: {found}\n  help: {OTHER_SPEC_HELP}"
     )]
     Foreign { folder: String, what: &'static str, expected: String, found: String },
     /// The folder contains a dataset of another spec.
-    #[error("{folder}: holds a dataset of another spec\n  expected: {expected}\n  found: {found}\n  help: {WAYS_OUT}")]
+    #[error(
+        "{folder}: holds a dataset of another spec\n  expected: {expected}\n  found: {found}\n  help: {OTHER_SPEC_HELP}"
+    )]
     OtherSpec { folder: String, table: String, expected: String, found: String, spec: String },
     /// The folder contains tables that the spec lacks, and lacks tables of the spec.
     #[error(
         "{folder}: the spec and the dataset each have a table that the other lacks\n  expected: {expected}\n  found: {found}\n  help: add \
-         [tables.{}] to the spec, which keeps its rows and computes yours; or {WAYS_OUT}",
+         [tables.{}] to the spec, which keeps its rows and computes yours; or {OTHER_SPEC_HELP}",
         missing.join("] and [tables.")
     )]
     OtherTables { folder: String, expected: String, found: String, missing: Vec<String> },
@@ -64,7 +66,7 @@ pub enum DatasetError {
     /// The manifest is damaged, and no part can replace it.
     #[error(
         "{path}: damaged, or of another version of slipsweep: {why}\n  help: run the spec of the dataset, which rewrites it if no part \
-         is there; else {WAYS_OUT}"
+         is there; else {OTHER_SPEC_HELP}"
     )]
     Manifest { path: String, why: String },
     /// An error of the operating system.
@@ -250,6 +252,10 @@ impl Folder {
     }
 
     /// Writes a part atomically.
+    ///
+    /// # Errors
+    ///
+    /// A file that cannot be written.
     pub fn write_part(&self, table: &str, part: u64, bytes: &[u8]) -> Result<(), DatasetError> {
         let path = self.part(table, part);
         atomic::write(&path, bytes).map_err(|error| unwritten(&path, error))

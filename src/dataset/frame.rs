@@ -154,6 +154,10 @@ fn wrong(path: &Path, reason: impl std::fmt::Display) -> FrameError {
 pub type Facts = Vec<(String, String)>;
 
 /// The columns of a Parquet file, and the entries of its footer.
+///
+/// # Errors
+///
+/// A file that cannot be read.
 pub fn headings(path: &Path) -> Result<(Vec<Heading>, Facts), FrameError> {
     let file = file::open(path).map_err(|error| wrong(path, error))?;
     let metadata = metadata_limits::footer(&file).map_err(|error| wrong(path, error))?;
@@ -171,6 +175,10 @@ pub fn headings(path: &Path) -> Result<(Vec<Heading>, Facts), FrameError> {
 }
 
 /// The columns `names` of a Parquet file.
+///
+/// # Errors
+///
+/// A file that cannot be read, or a column that it does not have.
 pub fn read(path: &Path, names: &[&str]) -> Result<Frame, FrameError> {
     open(path, Some(names), Rows::All)
 }
@@ -179,11 +187,19 @@ pub fn read(path: &Path, names: &[&str]) -> Result<Frame, FrameError> {
 pub type Keep<'a> = &'a dyn Fn(&dyn Fn(&str) -> Option<(f64, f64)>) -> bool;
 
 /// The columns `names` of the row groups of a Parquet file that `keep` selects.
+///
+/// # Errors
+///
+/// A file that cannot be read, or a column that it does not have.
 pub fn read_where(path: &Path, names: &[&str], keep: Keep<'_>) -> Result<Frame, FrameError> {
     open(path, Some(names), Rows::Of(keep))
 }
 
 /// All columns of a Parquet file.
+///
+/// # Errors
+///
+/// A file that cannot be read.
 pub fn read_all(path: &Path) -> Result<Frame, FrameError> {
     open(path, None, Rows::All)
 }

@@ -41,12 +41,20 @@ pub(crate) fn coded(file: &File) -> Result<ArrowReaderMetadata, ParquetError> {
 }
 
 /// The checked footer of a Parquet file.
+///
+/// # Errors
+///
+/// A footer that is damaged or too large.
 pub fn footer(file: &impl ChunkReader) -> Result<ParquetMetaData, ParquetError> {
     check_footer(file)?;
     guarded(|| ParquetMetaDataReader::new().parse_and_finish(file)).unwrap_or_else(|| Err(damaged("footer")))
 }
 
-/// Whether the lists of the footer, if there is one, are as long as they say.
+/// Checks that the lists of the footer, if any, are as long as stated.
+///
+/// # Errors
+///
+/// A footer that is damaged or too large.
 pub fn check_footer(file: &impl ChunkReader) -> Result<(), ParquetError> {
     const TRAILER: u64 = 8;
     let Some(before) = file.len().checked_sub(TRAILER) else { return Ok(()) };
@@ -68,11 +76,19 @@ pub fn check_footer(file: &impl ChunkReader) -> Result<(), ParquetError> {
 }
 
 /// Checks that no page exceeds the limits, and that the decoded length of every page is known in advance.
+///
+/// # Errors
+///
+/// A header of a page that is damaged or too large.
 pub fn check_pages(file: &impl ChunkReader, metadata: &ParquetMetaData) -> Result<(), ParquetError> {
     page_headers(file, metadata, |_| {})
 }
 
 /// Checks the pages, and passes the header of each to `visit`.
+///
+/// # Errors
+///
+/// A header of a page that is damaged or too large.
 pub fn page_headers(
     file: &impl ChunkReader,
     metadata: &ParquetMetaData,
@@ -135,8 +151,8 @@ fn walk(bytes: &[u8], visit: &mut dyn FnMut(&[i16], i64)) -> Option<usize> {
     Some(walker.at)
 }
 
-/// Most structs in one another; Parquet has six.
-const DEEPEST: usize = 16;
+/// Greatest depth of nested structs; Parquet has six.
+const MAX_NESTED_STRUCTS: usize = 16;
 
 struct Walker<'a> {
     bytes: &'a [u8],
@@ -178,7 +194,7 @@ impl Walker<'_> {
     }
 
     fn fields(&mut self) -> Option<()> {
-        if self.path.len() >= DEEPEST {
+        if self.path.len() >= MAX_NESTED_STRUCTS {
             return None;
         }
         let mut field = 0_i16;

@@ -29,6 +29,10 @@ const BYTES_PER_ROW: usize = 9;
 pub const ZSTD_LEVEL: i32 = 1;
 
 /// The bytes of a part with their checksums, equal on every machine; and the statistics of its rows, which the bytes contain.
+///
+/// # Errors
+///
+/// The error of the encoder.
 pub fn encode(
     layout: &Layout,
     row_index: &RowIndex,
@@ -82,7 +86,7 @@ pub fn encode(
         group.status(&buffer.status[range])?;
         group.writer.close()?;
     }
-    Ok((checksum::sealed(file.into_inner()?)?, statistics))
+    Ok((checksum::with_checksums(file.into_inner()?)?, statistics))
 }
 
 /// A row group under construction, and its remaining columns.

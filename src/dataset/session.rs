@@ -163,6 +163,10 @@ enum ManifestAction {
 
 impl Session {
     /// Writes a part atomically if the dataset still belongs to this run.
+    ///
+    /// # Errors
+    ///
+    /// A file that cannot be written, or a dataset that no longer belongs to this run.
     pub fn write_part(&self, table: &str, part: u64, bytes: &[u8]) -> Result<(), DatasetError> {
         self.check()?;
         self.folder.write_part(table, part, bytes)

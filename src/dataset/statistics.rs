@@ -18,7 +18,7 @@ use crate::protocol::shortcut::FAMILIES;
 use crate::table::{ColumnBuffer, Kind, OPTIMUM_AXES};
 
 /// Greatest number of rows of a table whose rows are all kept, and of transitions with separate least gaps.
-pub const FEW: usize = 12;
+pub const MAX_KEPT_ROWS: usize = 12;
 
 /// The column whose least values are recorded.
 const GAP: &str = "gap";
@@ -35,7 +35,7 @@ pub struct TableStatistics {
     pub ranges: Vec<Range>,
     /// The columns of words after the axes: each word and its number of rows.
     pub words: Vec<(String, Counts)>,
-    /// The labels: each word and its number of rows; `None` for more than [`FEW`] words.
+    /// The labels: each word and its number of rows; `None` for more than [`MAX_KEPT_ROWS`] words.
     #[serde(default)]
     pub labels: Vec<(String, Option<Counts>)>,
     /// Counts of predicted and found words, for a column with a prediction.
@@ -123,7 +123,7 @@ impl TableStatistics {
         let whole = |places: &mut dyn Iterator<Item = usize>| -> Result<Vec<Row>, ArrowError> {
             places.map(|place| row(layout, row_index, rows.start + place as u64, buffer, place)).collect()
         };
-        if row_index.rows() <= FEW as u64 {
+        if row_index.rows() <= MAX_KEPT_ROWS as u64 {
             statistics.rows = Some(whole(&mut (0..buffer.status.len()))?);
         }
         let (many, found) = least(layout, &view, &rows, buffer);
@@ -154,7 +154,7 @@ impl TableStatistics {
         for ((_, counts), (_, others)) in self.labels.iter_mut().zip(other.labels) {
             *counts = counts.take().zip(others).and_then(|(mut counts, others)| {
                 others.into_iter().for_each(|(word, rows)| add(&mut counts, &word, rows));
-                (counts.len() <= FEW).then_some(counts)
+                (counts.len() <= MAX_KEPT_ROWS).then_some(counts)
             });
         }
         for (predicted, found, rows) in other.predicted {
@@ -214,12 +214,12 @@ fn add(counts: &mut Counts, word: &str, rows: u64) {
     }
 }
 
-/// The words of a label in these runs and their numbers of rows; `None` if there are more than [`FEW`].
+/// The words of a label in these runs and their numbers of rows; `None` if there are more than [`MAX_KEPT_ROWS`].
 fn labelled(runs: &[(Option<&str>, usize)]) -> Option<Counts> {
     let mut counts = Counts::new();
     for (word, rows) in runs.iter().filter_map(|(word, rows)| Some(((*word)?, *rows))) {
         add(&mut counts, word, rows as u64);
-        if counts.len() > FEW {
+        if counts.len() > MAX_KEPT_ROWS {
             return None;
         }
     }
@@ -341,7 +341,7 @@ fn least(
             Some(_) => {}
             None => found.push((runs.iter().map(|(_, value, _)| *value).collect(), first, least)),
         }
-        if found.len() > FEW {
+        if found.len() > MAX_KEPT_ROWS {
             many = true;
             let rank = |row: usize| (gaps[row], row);
             let less = |one: LeastGapRows, other: LeastGapRows| if rank(other.2) < rank(one.2) { other } else { one };
@@ -394,7 +394,7 @@ impl LeastGaps {
                 None => self.each.push(candidate),
             }
         }
-        self.many |= self.each.len() > FEW;
+        self.many |= self.each.len() > MAX_KEPT_ROWS;
         if self.many {
             let least =
                 self.each.into_iter().reduce(|one, other| if is_less(&other.row, &one.row) { other } else { one });

@@ -44,7 +44,7 @@ pub struct TableSurvey {
 }
 
 /// Parts inspected before their statistics are merged, so that memory does not grow with the dataset.
-const LOOKED_AT_TOGETHER: usize = 1 << 10;
+const PARTS_PER_MERGE: usize = 1 << 10;
 
 impl TableSurvey {
     /// Whether part number `part` is present.
@@ -85,7 +85,7 @@ impl Survey {
             };
             let mut next = 0;
             let there = folder.parts_there(table);
-            let states = there.chunks(LOOKED_AT_TOGETHER).flat_map(|parts| {
+            let states = there.chunks(PARTS_PER_MERGE).flat_map(|parts| {
                 let look = |part: &u64| {
                     let state = folder.state(manifest, &table.name, *part, look);
                     looked.fetch_add(1, Ordering::Relaxed);

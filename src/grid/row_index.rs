@@ -54,6 +54,10 @@ impl Grid {
     }
 
     /// The row index of a table over `quantities`.
+    ///
+    /// # Errors
+    ///
+    /// More rows than a table can have.
     pub fn project(&self, quantities: &[Quantity]) -> Result<RowIndex, TooMany> {
         let mut stretches = Vec::new();
         let (mut rows, mut raw): (u64, u64) = (0, 0);

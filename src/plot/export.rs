@@ -49,6 +49,10 @@ impl Format {
     }
 
     /// The picture `svg` in this format; pixels with `dpi` per inch.
+    ///
+    /// # Errors
+    ///
+    /// A picture that is too large for the format.
     pub fn encode(self, svg: &str, dpi: f64) -> Result<Vec<u8>, PlotError> {
         match self {
             Format::Svg => Ok(svg.as_bytes().to_vec()),

@@ -54,6 +54,10 @@ pub struct Column {
 }
 
 /// Reads a trace that `slipsweep trace` wrote as CSV or Parquet.
+///
+/// # Errors
+///
+/// A file that is not a trace.
 pub fn read(path: &Path) -> Result<TraceFile, PlotError> {
     let shown = path.display().to_string();
     let stem = path.file_stem().map_or_else(|| shown.clone(), |stem| stem.to_string_lossy().into_owned());
@@ -102,7 +106,8 @@ impl TraceFile {
         ]
         .iter()
         .filter_map(number);
-        let name = label::literal(&fact("protocol").map_or(stem, Clone::clone));
+        let after = fact("loop").map_or(String::new(), |which| format!(", {which} loop"));
+        let name = label::literal(&format!("{}{after}", fact("protocol").map_or(stem, Clone::clone)));
         let points = fact("points").and_then(|points| points.parse().ok());
         TraceFile { name, parameters: parameters.collect(), columns, points }
     }
@@ -194,6 +199,10 @@ struct Curve {
 }
 
 /// The figure of traces, with a panel for each group of columns with values.
+///
+/// # Errors
+///
+/// Too many traces, or traces without values.
 pub fn figure(traces: &[TraceFile]) -> Result<Figure, PlotError> {
     if traces.len() > MAX_SERIES {
         return Err(PlotError::TooManyTraces { found: traces.len(), most: MAX_SERIES });

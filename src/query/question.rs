@@ -52,6 +52,10 @@ pub const CORRECT: &str =
 
 impl Question {
     /// Parses and checks the query `sql` on the tables `sources`.
+    ///
+    /// # Errors
+    ///
+    /// What is wrong with the query, and how to correct it.
     pub fn parse(sql: &str, sources: &[Source]) -> Result<Question, Fault> {
         let statements = Parser::parse_sql(&GenericDialect {}, sql).map_err(|error| match error {
             ParserError::RecursionLimitExceeded => {

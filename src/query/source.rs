@@ -39,6 +39,10 @@ pub struct Source {
 const EXPECTED: &str = "the folder of a dataset, such as results/NAME, or a Parquet or CSV file";
 
 /// The tables in `path`.
+///
+/// # Errors
+///
+/// A path without tables, or a file that cannot be read.
 pub fn open(path: &Path) -> Result<Vec<Source>, QueryError> {
     let wrong = |found: &str, help| QueryError::Path {
         path: path.display().to_string(),

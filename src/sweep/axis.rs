@@ -39,6 +39,10 @@ pub struct Sampled {
 }
 
 /// Reads the axis of `quantity` at `key`.
+///
+/// # Errors
+///
+/// An axis with values that are not legal for `quantity`.
 pub fn read(quantity: Quantity, units: &Units, key: &str, spec: &AxisSpec) -> Result<Written, SpecError> {
     let words = quantity.words();
     let axis = AxisDraft { quantity, units, scale: Scale::Model, key };

@@ -217,6 +217,10 @@ impl Sweep {
 }
 
 /// Whether `name` is legal for a dataset.
+///
+/// # Errors
+///
+/// The rule that the name violates.
 pub fn check_name(name: &str) -> Result<(), SpecError> {
     let legal = |c: char| c.is_ascii_alphanumeric() || matches!(c, '-' | '_' | '.');
     if (1..=MAX_NAME_BYTES).contains(&name.len()) && name.chars().all(legal) && !name.starts_with('.') {

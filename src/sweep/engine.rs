@@ -100,6 +100,10 @@ impl fmt::Display for Defect {
 
 /// Runs `sweep` on `threads` threads (0: one for each processor) into `folder`, and keeps existing intact parts. No other run may use the
 /// folder.
+///
+/// # Errors
+///
+/// A dataset that cannot be written, threads that cannot be started, a row that panicked, or a stop on request.
 pub fn run(sweep: &Sweep, folder: &Folder, threads: usize, signal: &Signal) -> Result<Outcome, RunError> {
     run_in(sweep, folder, (Shard::WHOLE, Concurrency::Alone), threads, signal)
 }
@@ -107,6 +111,10 @@ pub fn run(sweep: &Sweep, folder: &Folder, threads: usize, signal: &Signal) -> R
 /// Runs the parts of one shard. Any number of processes may run shards of one dataset at the same time, including the same shard.
 ///
 /// Every bit of an existing part is checked. A damaged part is recomputed; a part of another sweep stays and ends the run with an error.
+///
+/// # Errors
+///
+/// Those of [`run`], too many parts for shards, or a part of another sweep.
 pub fn run_shard(
     sweep: &Sweep,
     folder: &Folder,
@@ -168,6 +176,10 @@ fn run_in(
 }
 
 /// The threads of a run.
+///
+/// # Errors
+///
+/// Threads that cannot be started.
 pub fn pool(threads: usize) -> Result<ThreadPool, RunError> {
     ThreadPoolBuilder::new().num_threads(threads).build().map_err(|source| {
         let each_processor = || thread::available_parallelism().map_or(1, |threads| threads.get());
@@ -187,6 +199,10 @@ pub(super) const WRITERS: usize = 2;
 ///
 /// One part more than there are threads is in progress, so that no thread waits for the end of a part. Large parts on many threads are limited
 /// by `MAX_BUFFER_BYTES`.
+///
+/// # Errors
+///
+/// A stop on request.
 pub fn compute(
     pool: &ThreadPool,
     table: &dyn Table,

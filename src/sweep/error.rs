@@ -155,6 +155,10 @@ impl fmt::Display for SpecError {
 impl std::error::Error for SpecError {}
 
 /// The fault at `key` as the result of a check.
+///
+/// # Errors
+///
+/// Always.
 pub fn refuse<T>(
     key: impl Into<Box<str>>,
     found: impl Into<Box<str>>,

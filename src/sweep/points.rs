@@ -23,6 +23,10 @@ use crate::protocol::Status;
 use crate::table::{self, STATUS};
 
 /// Reads the points of a CSV or Parquet file. Values are in `units`; coefficients are not relative to `t_f`.
+///
+/// # Errors
+///
+/// A file that cannot be read, an unknown column, or an illegal value.
 pub fn read(path: &Path, units: &Units) -> Result<Factor, SpecError> {
     let extension = path.extension().map(|extension| extension.to_ascii_lowercase());
     let columns = match extension.as_ref().and_then(|extension| extension.to_str()) {

@@ -99,6 +99,10 @@ pub fn contains_part(shard_parts: &[Range<u64>], part: u64) -> bool {
 }
 
 /// Checks that the parts of `plan` can be distributed over shards.
+///
+/// # Errors
+///
+/// More parts than shards can distribute.
 pub fn check_parts(plan: &Plan) -> Result<(), TooManyParts> {
     let parts = plan.tables.iter().fold(0, |parts: u64, table| parts.saturating_add(table.parts));
     if parts <= Shard::MAX_PARTS { Ok(()) } else { Err(TooManyParts { parts }) }

@@ -9,6 +9,10 @@ use crate::model::{Scales, Units};
 pub const UNIT_KEYS: [&str; 5] = ["units", "mu_0", "l", "v_0", "normal_stress"];
 
 /// The units of `model`.
+///
+/// # Errors
+///
+/// An unknown unit system, or a scale that is missing, illegal or unphysical.
 pub fn units(model: &ModelSpec) -> Result<Units, SpecError> {
     let scales = [
         ("mu_0", model.mu_0, "1"),
@@ -54,6 +58,10 @@ pub fn units(model: &ModelSpec) -> Result<Units, SpecError> {
 }
 
 /// Checks that `value`, in `units`, is legal for `quantity`; the error is the legal range.
+///
+/// # Errors
+///
+/// The legal range, in `units`.
 pub fn legal(units: &Units, quantity: Quantity, scale: Scale, value: f64) -> Result<(), String> {
     let (domain, unit) = (quantity.domain(), quantity.unit(scale));
     let scaled = units.scaled(unit, value);
@@ -81,7 +89,7 @@ pub fn help(units: &Units, quantity: Quantity, value: f64) -> &'static str {
         Units::Scaled if scaled >= 1.0 => "choose values in the range",
         Units::Si(_) if scaled > 1.0 => PROBABLY_SCALED,
         Units::Scaled => "velocities are in units of v_0; for m/s, add `units = \"si\"` and the scales to [model]",
-        Units::Si(_) => "velocities are in m/s, as `units = \"si\"` says, and above v_0; or lower v_0",
+        Units::Si(_) => "with `units = \"si\"`, velocities are in m/s; choose one above v_0, or lower v_0",
     }
 }
 
@@ -99,12 +107,16 @@ pub fn doubt(prefix: &str, units: &Units, axis: &Axis) -> Option<SpecError> {
     };
     (greatest > MAX_PLAUSIBLE_VELOCITY).then(|| {
         let (key, expected) =
-            (format!("{prefix}axes.{}", axis.quantity.name()), "velocities in m/s, as `units = \"si\"` says");
+            (format!("{prefix}axes.{}", axis.quantity.name()), "velocities in m/s, because of `units = \"si\"`");
         SpecError::new(key, format!("{greatest:?} m/s is unphysically fast"), expected, PROBABLY_SCALED)
     })
 }
 
 /// The units of a dataset with the spec `text`.
+///
+/// # Errors
+///
+/// A text that is not a spec, or illegal scales.
 pub fn units_of(text: &str) -> Result<Units, SpecError> {
     units(&Spec::parse(text)?.model)
 }

@@ -24,9 +24,9 @@ fields! { Row:
         => |row| row.alpha_3;
     work "mu_0 sigma l" "work of friction W_s of the best shortcut" => |row| row.best.work;
     work_optimal "mu_0 sigma l" "least work of friction W* of any protocol" => |row| row.best.work_optimal;
-    gap "1" "(W_s - W*)/W*, computed without cancellation: good to a relative 1e-7, or to 1e-20" => |row| row.best.gap;
+    gap "1" "(W_s - W*)/W*, computed without cancellation; relative error up to 1e-7, or absolute error up to 1e-20" => |row| row.best.gap;
     v_min "v_0" "least velocity of the best shortcut" => |row| row.best.v_min;
-    work_error "mu_0 sigma l" "bound of the error of work, by a second search", optional => |row| row.work_error;
+    work_error "mu_0 sigma l" "error bound of work, by a second search", optional => |row| row.work_error;
 }
 
 const WORK_ERROR: usize = place(&COLUMNS, "work_error");

@@ -27,27 +27,27 @@ fields! { Row:
     alpha "1" "coefficient of x^3 (1 - x)^3 in ln(v - 1), x = t/t_f" => |row| row.member.alpha;
     work "mu_0 sigma l" "work of friction W_s" => |row| row.member.work;
     work_optimal "mu_0 sigma l" "least work of friction W* of any protocol" => |row| row.least.work;
-    gap "1" "(W_s - W*)/W*, good to rtol of 1 + gap" => |row| row.least.gap;
+    gap "1" "(W_s - W*)/W*; error up to rtol (1 + gap)" => |row| row.least.gap;
     v_min "v_0" "least velocity of the block" => |row| row.member.v_min;
     v_max "v_0" "greatest velocity of the block" => |row| row.member.v_max;
-    v_c_min "v_0" "least control velocity; both good to rtol of the greater of the two" => |row| row.member.control_min;
+    v_c_min "v_0" "least control velocity; errors of both extremes are relative to the greater one" => |row| row.member.control_min;
     v_c_max "v_0" "greatest control velocity" => |row| row.member.control_max;
     amplification "1"
-        "greatest factor by which a small error grows from start to end, in the norm of (ln v, ln theta, k s/a); 0 below 1e-30, \
-         where only rounding is left of the error; null beyond 3000 steps of its integration and beyond the range of doubles"
+        "greatest factor by which a small error grows from start to end, in the norm of (ln v, ln theta, k s/a); 0 below 1e-30; \
+         null beyond 3000 integration steps and beyond the range of doubles"
         => |row| number(row.amplification);
     sampling_error "1"
-        "distance from the target in that norm if v_c is sampled every dt and held, to rtol of 1; null for dt = 0, beyond \
-         100000 samples, and where the motion does not last"
+        "distance from the final steady state in that norm if v_c is sampled every dt and held; absolute error up to rtol; null for \
+         dt = 0, beyond 100000 samples, and if the simulation does not reach t_f"
         => |row| number(row.sampling_error);
-    stiffness_ratio "1" "k t_f^2/m: a large one makes the spring rigid; inf for m = 0"
+    stiffness_ratio "1" "k t_f^2/m: the spring is nearly rigid if this is large; inf for m = 0"
         => |row| if row.slider.m > 0.0 { row.slider.k * row.t_f * row.t_f / row.slider.m } else { f64::INFINITY };
     open_loop_error "1"
-        "distance from the target in that norm if v_c is simulated as it is, at rtol: what that and rounding leave, amplified; \
-         null where the motion does not last", optional
+        "distance from the final steady state in that norm for continuous v_c: the amplified errors of rounding and of the \
+         simulation to rtol; null if the simulation does not reach t_f", optional
         => |row| number(row.open_loop_error);
-    work_error "mu_0 sigma l" "bound of the error of work, by a second solve", optional => |row| row.work_error;
-    gap_error "1" "bound of the error of gap, by a second solve of both works", optional => |row| row.least.gap_error;
+    work_error "mu_0 sigma l" "error bound of work, by a second solve", optional => |row| row.work_error;
+    gap_error "1" "error bound of gap, by a second solve of both works", optional => |row| row.least.gap_error;
 }
 
 const WORK_OPTIMAL: usize = place(&COLUMNS, "work_optimal");

@@ -24,11 +24,10 @@ const GAP_ERROR: usize = 5;
 pub(super) const COLUMNS: &[Column] = &[
     Column::number("work", "mu_0 sigma l", "work of friction W_s of the shortcut"),
     Column::number("work_optimal", "mu_0 sigma l", "least work of friction W* of any protocol"),
-    Column::number("gap", "1", "(W_s - W*)/W*, good to rtol of 1 + gap"),
+    Column::number("gap", "1", "(W_s - W*)/W*; error up to rtol (1 + gap)"),
     Column::number("v_min", "v_0", "least velocity of the shortcut"),
-    Column::number("work_error", "mu_0 sigma l", "bound of the error of work, by a second quadrature").optional(),
-    Column::number("gap_error", "1", "bound of the error of gap, by a second quadrature and a second optimum")
-        .optional(),
+    Column::number("work_error", "mu_0 sigma l", "error bound of work, by a second quadrature").optional(),
+    Column::number("gap_error", "1", "error bound of gap, by a second quadrature and a second optimum").optional(),
 ];
 
 /// Rows of a chunk. Chosen: a run stops within a fraction of a second at any accuracy.

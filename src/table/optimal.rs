@@ -53,7 +53,7 @@ fields! { Row:
     theta_max "l/v_0" "greatest state variable theta on the path" => |row| row.of_optimum(|found| found.theta_max);
     strategy (Kind::Label(STRATEGIES)) "start of the protocol: speed_up v(0+) > v_i, slow_down 1 < v(0+) <= v_i, floor v(0+) = 1"
         => |row| row.of_optimum(|found| f64::from(found.strategy as u8));
-    work_error "mu_0 sigma l" "bound of the error of work, by a second solve", optional
+    work_error "mu_0 sigma l" "error bound of work, by a second solve", optional
         => |row| if row.optimum.is_some() { row.work_error } else { f64::NAN };
     friction_max "mu_0 sigma" "greatest friction between the ends", optional
         => |row| row.of_optimum(|found| found.friction_max);

@@ -40,7 +40,7 @@ pub fn slopes(job: &Job<'_>, point: &Point, bounds: &Bounds, work: &mut RunStats
     (solved, slopes)
 }
 
-/// The optimal protocol of `point` under `bounds`: from the cache if there is no ceiling, since all tables use those. `point` has tuple
+/// The optimal protocol of `point` under `bounds`: from the cache of the tables if there is no ceiling. `point` has tuple
 /// number `tuple`. Adds the solver statistics to `work`.
 pub fn optimum(job: &Job<'_>, (tuple, point): (u64, &Point), bounds: &Bounds, work: &mut RunStats) -> Solved<Optimum> {
     if !bounds.has_ceilings() {

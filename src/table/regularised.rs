@@ -19,13 +19,13 @@ struct Row {
 fields! { Row:
     work "mu_0 sigma l" "work of friction" => |row| row.found.work;
     work_optimal "mu_0 sigma l" "least work of friction W* of any protocol" => |row| row.found.work_optimal;
-    gap "1" "(work - W*)/W*, good to a relative rtol" => |row| row.found.gap;
+    gap "1" "(work - W*)/W*; relative error up to rtol" => |row| row.found.gap;
     v_min "v_0" "least velocity of the block; fewer digits far below 1" => |row| row.found.v_min;
     v_max "v_0" "greatest velocity of the block" => |row| row.found.v_max;
-    v_c_min "v_0" "least control velocity; both good to rtol of the greater of the two" => |row| row.found.control_min;
+    v_c_min "v_0" "least control velocity; errors of both extremes are relative to the greater one" => |row| row.found.control_min;
     v_c_max "v_0" "greatest control velocity" => |row| row.found.control_max;
-    work_error "mu_0 sigma l" "bound of the error of work, by a second solve", optional => |row| row.work_error;
-    gap_error "1" "bound of the error of gap, by a second solve", optional => |row| row.gap_error;
+    work_error "mu_0 sigma l" "error bound of work, by a second solve", optional => |row| row.work_error;
+    gap_error "1" "error bound of gap, by a second solve", optional => |row| row.gap_error;
 }
 
 const WORK_ERROR: usize = place(&COLUMNS, "work_error");

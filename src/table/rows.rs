@@ -15,6 +15,10 @@ pub type Solved<R> = (Status, Option<R>, RunStats);
 /// Computes `rows` by calling `row` with the tuple number and the point of each. A row without values has missing cells.
 ///
 /// The threads take chunks of `chunk` rows.
+///
+/// # Errors
+///
+/// A stop on request.
 pub fn each<R>(
     job: &Job<'_>,
     rows: Range<u64>,

@@ -34,17 +34,18 @@ fields! { Row:
     work "mu_0 sigma l" "work of friction W_s" => |row| row.of_solution(|member| member.work);
     work_optimal "mu_0 sigma l" "least work of friction W* of any protocol; for bounded_friction under its tau_ceiling"
         => |row| row.least.work;
-    gap "1" "(W_s - W*)/W*, good to rtol of 1 + gap; negative for a step that does not arrive" => |row| row.least.gap;
+    gap "1" "(W_s - W*)/W*; error up to rtol (1 + gap); may be negative for a step, which does not reach the final state"
+        => |row| row.least.gap;
     v_min "v_0" "least velocity between the ends; 0 if it underflows" => |row| row.of_solution(|member| member.v_min);
     v_max "v_0" "greatest velocity between the ends" => |row| row.of_solution(|member| member.v_max);
     friction_max "mu_0 sigma" "greatest friction between the ends"
         => |row| row.of_solution(|member| member.friction_max);
-    terminal_error "1" "theta(t_f) v_f - 1, the miss of a step; 0 for the other families", optional
+    terminal_error "1" "theta(t_f) v_f - 1, the relative distance of a step from its target; 0 for the other families", optional
         => |row| row.of_solution(|member| member.miss);
     bound (Kind::Label(&Obstacle::NAMES)) "the bound that makes the row infeasible", optional
         => |row| number(row.obstacle.map(|obstacle| obstacle.code() as f64));
-    work_error "mu_0 sigma l" "bound of the error of work, by a second solve", optional => |row| row.work_error;
-    gap_error "1" "bound of the error of gap, by a second solve of both works", optional => |row| row.least.gap_error;
+    work_error "mu_0 sigma l" "error bound of work, by a second solve", optional => |row| row.work_error;
+    gap_error "1" "error bound of gap, by a second solve of both works", optional => |row| row.least.gap_error;
 }
 
 const WORK_OPTIMAL: usize = place(&COLUMNS, "work_optimal");

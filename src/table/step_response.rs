@@ -36,7 +36,7 @@ fields! { Row:
     v_trough "v_0" "least velocity after v first reaches v_f, at most v_f; 0 if it underflows; null if undecided or not known to rtol"
         => |row| row.of_solution(|response| response.v_trough);
     t_peak "l/v_0"
-        "time of v_peak, to a relative rtol over the overshoot v_peak/v_f - 1; null if the peak is only approached, if \
+        "time of v_peak; relative error up to rtol divided by the overshoot v_peak/v_f - 1; null if the peak is only approached, if \
          undecided, or if not known to that accuracy"
         => |row| row.of_solution(|response| number(response.t_peak));
     outcome (Kind::Label(&Outcome::NAMES)) "long-term behaviour of the response"
@@ -54,7 +54,7 @@ fields! { Row:
         => |row| row.of_solution(|response| response.t_end);
     first_lyapunov_coefficient "1"
         "first Lyapunov coefficient at the critical stiffness for this mass and v_f: negative if the Hopf point is \
-         supercritical, positive if a limit cycle may be met above it; null for b <= a and for m = 0", optional
+         supercritical, positive if it is subcritical; null for b <= a and for m = 0", optional
         => |row| number(row.lyapunov);
 }
 

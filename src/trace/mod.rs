@@ -21,7 +21,7 @@ pub use write::{csv, parquet, record_batch};
 
 /// The columns of a trace; `v_c` only for an elastic spring, `beta` only for an extremal.
 pub const COLUMNS: [Column; 6] = [
-    Column::number("t", "l/v_0", "time since the start; the same twice where the velocity jumps"),
+    Column::number("t", "l/v_0", "time since the start; equal in two rows where the velocity jumps"),
     Column::number("v", "v_0", "velocity"),
     Column::number("theta", "l/v_0", "contact lifetime"),
     Column::number("tau", "mu_0 sigma", "friction 1 + a ln v + b ln theta"),
@@ -29,7 +29,7 @@ pub const COLUMNS: [Column; 6] = [
     Column::number(
         "beta",
         "mu_0 sigma v_0",
-        "costate of theta: 1 + a + a ln v + b ln theta + beta theta = 0 off the bound; null before and after",
+        "minus the costate of theta: 1 + a + a ln v + b ln theta + beta theta = 0 above the floor; null before and after the protocol",
     ),
 ];
 

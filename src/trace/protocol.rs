@@ -168,6 +168,10 @@ impl Protocol {
     }
 
     /// The path of the protocol for `case`, with a relative error of `rtol`.
+    ///
+    /// # Errors
+    ///
+    /// The reason why the protocol does not exist.
     pub fn path(&self, case: &Case, rtol: f64) -> Result<TracedPath, Absence> {
         match *self {
             Protocol::Optimal { bounds } => optimum(case, &bounds, rtol),

@@ -1,4 +1,4 @@
-//! `best_cubic`: the work at the row's coefficients, integrated over time, and a search around them that tries to do better.
+//! `best_cubic`: the work at the row's coefficients, integrated over time, and a search for less work around them.
 
 use super::gap::Cubic;
 use super::optimal::certify;
@@ -26,13 +26,13 @@ pub fn check(row: &Row, context: &Context, rtol: f64) -> Verdict {
     let Some(work) = cubic.work() else { return Verdict::unchecked("the integrator did not get there") };
     let mut verdict = Verdict::default();
     verdict.compare(row, "work", Some(work), None);
-    // The coefficients are written to double precision: v_min has to be as close to the bound as they allow.
+    // The coefficients are stored in double precision, so v_min reaches the bound only within their rounding.
     verdict.compare(row, "v_min", Some(cubic.v_min()), None);
     verdict.friction(row, cubic.friction_min());
     if let Some(optimum) = certify(&mut verdict, &problem, t_f, context.bounded) {
         verdict.compare(row, "work_optimal", Some(optimum.work), None);
-        // Good to 1e-7 of itself, whatever rtol. The difference of two integrations determines it to 1e-12, or to what they
-        // leave of the works.
+        // The relative error is up to 1e-7 for any rtol. The difference of two integrations determines the gap to 1e-12, or to the error of the
+        // works.
         let gap = (work - optimum.work) / optimum.work;
         let written = [("work", work), ("work_optimal", optimum.work)];
         let off = written.map(|(column, found)| number(row, column).map_or(0.0, |written| (written - found).abs()));
@@ -52,7 +52,7 @@ pub fn check(row: &Row, context: &Context, rtol: f64) -> Verdict {
             }
         }
     }
-    // Differences below the rounding of an integration are none.
+    // Differences below the rounding error of an integration are ignored.
     verdict.push("beaten", if saved > rtol { saved } else { 0.0 });
     verdict
 }

@@ -55,11 +55,11 @@ struct Leg {
     turn: Option<f64>,
 }
 
-/// Relative distance of a velocity from a bound that is rounding.
-const ON_BOUND: f64 = 1e-12;
+/// Relative distance of a velocity from a bound by rounding.
+const BOUND_RTOL: f64 = 1e-12;
 
-/// Relative distance from a border of what is feasible below which rounding decides.
-const UNSURE: f64 = 1e-11;
+/// Relative distance from the border of the feasible region below which rounding decides.
+const BORDER_RTOL: f64 = 1e-11;
 
 /// Relative change of `z` of the protocols that try to beat the optimum.
 const VARIATION: f64 = 1e-3;
@@ -83,7 +83,7 @@ impl Way {
         (self.v_ceiling.ln() + l).min((self.tau_ceiling - self.steady_friction(l)) / self.law.a)
     }
 
-    /// Whether the ceilings leave steady sliding at the end, and nothing above its theta.
+    /// Whether the ceilings allow steady sliding at the end, and nothing above its theta.
     pub fn sits(&self) -> bool {
         self.to >= self.from && self.cap(self.to.ln()) == 0.0
     }
@@ -92,7 +92,7 @@ impl Way {
     pub fn feasible(&self, t_f: f64) -> Option<bool> {
         let (start, end) = (self.from.ln(), self.to.ln());
         let (caps, clear) = ([start, end].map(|l| self.cap(l)), |room: f64, size: f64| {
-            (room.abs() > UNSURE * size).then_some(room > 0.0)
+            (room.abs() > BORDER_RTOL * size).then_some(room > 0.0)
         });
         if self.to == self.from {
             return Some(caps[1] >= 0.0);
@@ -115,7 +115,7 @@ impl Way {
         if !clear(t_f - aged, t_f)? || !clear(self.tau_ceiling - slow, 1.0)? {
             return Some(false);
         }
-        // Above theta_1 theta can wait or turn; below it only where the ceilings leave steady sliding.
+        // Above theta_1 theta can wait or turn; below it only where the ceilings allow steady sliding.
         let waits =
             (0..=PLACES).any(|place| self.cap(start + (end - start) * f64::from(place) / f64::from(PLACES)) > 0.0);
         if caps[1] >= 0.0 || waits { Some(true) } else { clear(on_ceilings()? - t_f, t_f) }
@@ -239,7 +239,7 @@ impl Way {
         let (v, slope) = ((z - l).exp(), z.exp_m1());
         let dt = l.exp() / slope.abs();
         let friction = self.steady_friction(l) + a * z;
-        let on = |bound: f64| if (z - bound).abs() <= ON_BOUND * (1.0 + bound.abs()) { 1.0 } else { 0.0 };
+        let on = |bound: f64| if (z - bound).abs() <= BOUND_RTOL * (1.0 + bound.abs()) { 1.0 } else { 0.0 };
         let free = free(energy, falls);
         let caps = [self.v_ceiling.ln() + l, (self.tau_ceiling - self.steady_friction(l)) / a];
         let is_capped = z < free;
@@ -275,10 +275,10 @@ impl Way {
             }
             let step = 1e-6 * here.c.abs().max(1.0);
             let slope = (self.totals(here.c + step, turns)?.time - here.time) / step;
-            let next = self.totals(here.c - residual / slope, turns)?;
-            if (next.time - t_f).abs() >= residual.abs() {
-                break;
-            }
+            // Shorter steps where a whole one leads away, or to no protocol.
+            let steps = (0..12).map(|halvings| residual / slope * 0.5_f64.powi(halvings));
+            let mut tried = steps.filter_map(|step| self.totals(here.c - step, turns));
+            let Some(next) = tried.find(|next| (next.time - t_f).abs() < residual.abs()) else { break };
             here = next;
         }
         ((here.time - t_f).abs() <= 1e-9 * t_f).then_some(here)
@@ -301,8 +301,8 @@ const SMALL_ENERGY: f64 = 1e-7;
 /// Places on a leg at which friction is looked at.
 const PLACES: u32 = 4000;
 
-/// Steps of Newton's method: the row's own `C` is within a few of them.
-const NEWTON_STEPS: u32 = 6;
+/// Most steps of Newton's method, which needs a few from the `C` of a row.
+const NEWTON_STEPS: u32 = 20;
 
 /// The root of `e^z - 1 - z = h` above or below 0.
 fn branch(h: f64, above: bool) -> Option<f64> {

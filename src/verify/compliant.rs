@@ -94,7 +94,7 @@ pub fn check(row: &Row, context: &Context, rtol: f64) -> Verdict {
 const MOST_SAMPLES: f64 = 3000.0;
 
 /// Amplifications below this have fewer digits.
-const FORGOTTEN: f64 = 1e-2;
+const MIN_AMPLIFICATION: f64 = 1e-2;
 
 const TOO_STIFF: &str = "motions too stiff for an explicit integrator";
 
@@ -127,8 +127,8 @@ fn open_loop<V, C>(
         return verdict.miss(TOO_STIFF);
     };
     let noise = 1e-11 * growth.most / rtol;
-    verdict.compare_number(row, "amplification", growth.whole, growth.whole.max(FORGOTTEN).max(noise));
-    // An error of the control, good to rtol, has grown at the end from anywhere on the way.
+    verdict.compare_number(row, "amplification", growth.whole, growth.whole.max(MIN_AMPLIFICATION).max(noise));
+    // An error of the control of size rtol, at any time, has grown at the end.
     let felt = felt * (1.0 + growth.most);
     let mut compare = |column: &'static str, dt: Option<f64>| match protocol.miss(dt) {
         Some(expected) => verdict.compare_number(row, column, expected, felt.max(expected)),

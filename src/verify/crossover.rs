@@ -8,8 +8,8 @@ use crate::dataset::Row;
 use crate::model::Transition;
 use crate::table::STATUS;
 
-/// A relative change of a time, for the slope of its condition.
-const NUDGE: f64 = 1e-5;
+/// Relative step of a time for the slope of its condition.
+const TIME_STEP_RTOL: f64 = 1e-5;
 
 /// The conditions: a function of the optimum that is 0 at the time.
 type Condition<'a> = &'a dyn Fn(&Optimum) -> f64;
@@ -31,8 +31,12 @@ fn compare(
         return verdict.miss("a work at a time that was not written");
     };
     let mut at = |t: f64| certify(verdict, problem, t, bounded);
-    let (Some(before), Some(here), Some(after)) = (at(t * (1.0 - NUDGE)), at(t), at(t * (1.0 + NUDGE))) else { return };
-    let slope = (condition(&after) - condition(&before)) / (2.0 * NUDGE);
+    let (Some(before), Some(here), Some(after)) =
+        (at(t * (1.0 - TIME_STEP_RTOL)), at(t), at(t * (1.0 + TIME_STEP_RTOL)))
+    else {
+        return;
+    };
+    let slope = (condition(&after) - condition(&before)) / (2.0 * TIME_STEP_RTOL);
     verdict.compare(row, time, Some(t * (1.0 - condition(&here) / slope)), None);
     verdict.compare(row, work, Some(here.work), None);
 }

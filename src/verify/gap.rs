@@ -8,7 +8,7 @@ use crate::dataset::Row;
 use crate::model::{Law, Transition};
 use crate::table::STATUS;
 
-/// Places at which a velocity is looked at before its least value is refined.
+/// Places at which a velocity is evaluated before its least value is refined.
 const PLACES: usize = 2000;
 
 pub fn check(row: &Row, context: &Context) -> Verdict {
@@ -64,7 +64,7 @@ impl Cubic {
         (1.0 - (c_1 + x * (2.0 * c_2 + 3.0 * c_3 * x)) / self.t_f) / self.theta(x)
     }
 
-    /// The least of theta and `1 - theta'`: not positive where there is no such shortcut.
+    /// The least value of theta and of `1 - theta'`; not positive if there is no such shortcut.
     pub fn slack(&self) -> f64 {
         lowest(&|x| self.theta(x).min(self.velocity(x) * self.theta(x)))
     }

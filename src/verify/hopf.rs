@@ -91,8 +91,8 @@ pub fn coefficient(Law { a, b }: Law, mass: f64) -> Option<f64> {
     Some(mul(dot(&sum), inverse(dot(&q)))[0] / (2.0 * omega))
 }
 
-/// Size of the coefficient, in units of `a/mass`, below which its sign is a matter of rounding.
-const VAGUE: f64 = 1e-13;
+/// Size of the coefficient, in units of `a/mass`, below which rounding decides its sign.
+const SIGN_ROUNDING: f64 = 1e-13;
 
 /// Compares the first Lyapunov coefficient; the forms have `1/mass` in them.
 pub fn compare_coefficient(verdict: &mut Verdict, row: &Row, law: Law, mass: f64, rtol: f64) {
@@ -104,7 +104,7 @@ pub fn compare_coefficient(verdict: &mut Verdict, row: &Row, law: Law, mass: f64
 /// Compares the type of the Hopf point.
 pub fn compare_kind(verdict: &mut Verdict, row: &Row, law: Law, mass: f64) {
     match coefficient(law, mass) {
-        Some(l) if l.abs() < VAGUE * law.a / mass => verdict.miss("Hopf points between the two kinds"),
+        Some(l) if l.abs() < SIGN_ROUNDING * law.a / mass => verdict.miss("Hopf points between the two kinds"),
         Some(l) => verdict.compare_word(row, "hopf_type", if l < 0.0 { "supercritical" } else { "subcritical" }),
         None => verdict.demand_nothing(row, "hopf_type"),
     }

@@ -39,7 +39,7 @@ pub const LIMIT: f64 = 10.0;
 pub struct Audit {
     /// Its name.
     pub table: String,
-    /// Accuracy promised.
+    /// The `rtol` of the table.
     pub rtol: f64,
     /// Whether the shown rows are dimensionless, unlike those of the dataset.
     pub is_converted: bool,
@@ -74,6 +74,10 @@ pub struct Worst {
 pub struct VerifyError(String);
 
 /// Audits `sample` rows of every table of the dataset in `path`.
+///
+/// # Errors
+///
+/// A manifest without a valid spec, or a part that cannot be read.
 pub fn verify(path: &Path, manifest: &Manifest, sample: u64, seed: u64) -> Result<Vec<Audit>, VerifyError> {
     let spec = Spec::parse(&manifest.spec)
         .map_err(|error| VerifyError(format!("the spec in the manifest cannot be read: {error}")))?;

@@ -12,12 +12,12 @@ use crate::protocol::SpringBlock;
 pub struct Growth {
     /// Greatest factor from the start to the end.
     pub whole: f64,
-    /// Greatest factor from anywhere on the way to the end.
+    /// Greatest factor from any time to the end.
     pub most: f64,
 }
 
-/// Time over which a block forgets its velocity, as a fraction of the protocol, below which an explicit integrator is no use.
-const STIFF: f64 = 1e-4;
+/// Relaxation time of the velocity, as a fraction of the protocol, below which an explicit integrator takes too many steps.
+const MIN_RELAXATION_FRACTION: f64 = 1e-4;
 
 /// Pieces over which errors are followed.
 const PIECES: usize = 256;
@@ -30,7 +30,7 @@ pub struct ControlledProtocol<V, C> {
     pub t_f: f64,
     /// Its velocity.
     pub velocity: V,
-    /// The control from the fraction of the time and `ln theta` of the protocol.
+    /// The control as a function of the fraction of the time and `ln theta`.
     pub control: C,
 }
 
@@ -38,7 +38,7 @@ impl<V: Fn(f64) -> f64, C: Fn(f64, f64) -> f64> ControlledProtocol<V, C> {
     /// Whether an explicit integrator cannot follow the block at its `least` velocity.
     pub fn is_stiff(&self, least: f64) -> bool {
         let SpringBlock { law, m, .. } = self.slider;
-        m > 0.0 && m * least / law.a < STIFF * self.t_f
+        m > 0.0 && m * least / law.a < MIN_RELAXATION_FRACTION * self.t_f
     }
 
     /// `ln theta` and the error after a piece from `x` on, for an error in one variable at its start.
@@ -95,8 +95,8 @@ impl<V: Fn(f64) -> f64, C: Fn(f64, f64) -> f64> ControlledProtocol<V, C> {
         (whole.is_finite() && most.is_finite()).then_some(Growth { whole, most })
     }
 
-    /// Distance from the target at the end, in `(ln v, ln theta, k s/a)`, of a block that starts in steady sliding, under
-    /// the control continuous, or sampled every `dt` and held.
+    /// Distance from the target at the end, in `(ln v, ln theta, k s/a)`, of a block that starts in steady sliding, if the control is
+    /// continuous, or sampled every `dt` and held.
     pub fn miss(&self, dt: Option<f64>) -> Option<f64> {
         let &ControlledProtocol { slider: SpringBlock { law, k, m }, v_i, v_f, t_f, .. } = self;
         let (ratio, rigid) = (law.b / law.a, k == f64::INFINITY);

@@ -122,8 +122,8 @@ pub fn check(row: &Row, context: &Context, rtol: f64) -> Verdict {
     verdict
 }
 
-/// Time at the floor after which the conserved `C` no longer determines the rest.
-const LONG: f64 = 12.0;
+/// Time at the floor beyond which the conserved `C` no longer determines the rest of the path.
+const MAX_TIME_AT_FLOOR: f64 = 12.0;
 
 /// A row under ceilings: the protocol of the row's own `C` and the next steps of Newton's method, integrated.
 fn under_ceilings(row: &Row, way: &Way, t_f: f64) -> Verdict {
@@ -140,7 +140,7 @@ fn under_ceilings(row: &Row, way: &Way, t_f: f64) -> Verdict {
         }
         return verdict;
     };
-    if way.sits() || number(row, "time_at_floor").is_some_and(|time| time > LONG) {
+    if way.sits() || number(row, "time_at_floor").is_some_and(|time| time > MAX_TIME_AT_FLOOR) {
         verdict.miss("C does not determine it: it waits at the floor for long, or slides steadily at v_f");
         return verdict;
     }
@@ -173,7 +173,7 @@ fn under_ceilings(row: &Row, way: &Way, t_f: f64) -> Verdict {
     ] {
         verdict.compare(row, column, Some(expected), (expected == 0.0).then_some(1.0));
     }
-    // No admissible variation may cost less, time at its price.
+    // No admissible variation may cost less, with time at its price.
     let cost = found.work + found.c * found.time;
     verdict.push("beaten", ((cost - found.varied) / size).max(0.0));
     verdict

@@ -13,10 +13,10 @@ use crate::protocol::Status;
 use crate::sweep::{AxisSpec, AxisValue, BlockSpec, Spec, Sweep, TableSpec};
 use crate::table::{ColumnBuffer, OPTIMUM_AXES, STATUS, Signal};
 
-/// Shortcuts of a landscape that are held at a time.
+/// Number of shortcuts of a landscape in memory at a time.
 const PIECE: usize = 1 << 16;
 
-/// Shortcuts of a landscape that are solved by an independent route.
+/// Number of shortcuts of a landscape that are solved by an independent route.
 const SOLVED: u64 = 3;
 
 /// Whether `table` is one of these.
@@ -24,7 +24,7 @@ pub fn is_reduced(table: &str) -> bool {
     ["gap_min", "gap_quantiles", "gap_histogram"].contains(&table)
 }
 
-/// The columns of quantiles, and how many hundredths of the shortcuts each does not exceed.
+/// The columns of quantiles, and their percentages.
 const QUANTILES: [(&str, u64); 7] = [
     ("gap_min", 0),
     ("gap_q05", 5),
@@ -35,7 +35,7 @@ const QUANTILES: [(&str, u64); 7] = [
     ("gap_max", 100),
 ];
 
-/// The columns of the histogram, and where each begins.
+/// The columns of the histogram, and their lower edges.
 const CLASSES: [(&str, f64); 11] = [
     ("below_1e_8", f64::NEG_INFINITY),
     ("from_1e_8", 1e-8),
@@ -56,7 +56,7 @@ struct Reduced {
     status: [u64; Status::ALL.len()],
     /// Number and cells of the first shortcut of least gap.
     least: Option<(u64, Vec<f64>)>,
-    /// Shortcuts with a gap below the number in each column of quantiles, and with that very gap.
+    /// Numbers of shortcuts with a gap below each quantile, and with exactly that gap.
     quantiles: [[u64; 2]; QUANTILES.len()],
     classes: [u64; CLASSES.len()],
 }
@@ -83,7 +83,7 @@ pub fn check(written: &Row, units: &Units, spec: &Spec, context: &Context) -> Ve
     for start in (0..all).step_by(PIECE) {
         let rows = start..all.min(start + PIECE as u64);
         buffer.resize((rows.end - rows.start) as usize);
-        // Nobody else has the signal, so that nothing stops the computation.
+        // Nothing else has the signal, so nothing stops the computation.
         if request.table.compute(&job, rows.clone(), &mut buffer).is_err() {
             break;
         }
@@ -144,7 +144,7 @@ fn landscape(written: &Row, spec: &Spec) -> Option<Sweep> {
     Sweep::check(&alone, "", Path::new("")).ok()
 }
 
-/// Row number `row` of the landscape as `gap` would have it.
+/// Row number `row` of the landscape as a row of `gap`.
 fn shortcut(sweep: &Sweep, row: u64, cells: &[f64], status: Status) -> Row {
     let request = &sweep.requests[0];
     let point = request.row_index.point(row);
@@ -180,7 +180,7 @@ impl Reduced {
         }
     }
 
-    /// Compares the columns that were written, of whichever reduction.
+    /// Compares the written columns of the reduction.
     fn compare(&self, written: &Row, sweep: &Sweep, verdict: &mut Verdict) {
         let ok = self.status[Status::Ok as usize];
         verdict.compare(written, "shortcuts", Some(ok as f64), Some(1.0));
@@ -188,7 +188,7 @@ impl Reduced {
             if ok == 0 {
                 verdict.demand_nothing(written, column);
             } else if number(written, column).is_some() {
-                // One of the gaps, which so many shortcuts do not exceed, and no lesser one.
+                // A quantile is the least gap that so many shortcuts do not exceed.
                 let enough = 100 * (below + same) >= hundredths * ok;
                 let least = below == 0 || 100 * below < hundredths * ok;
                 verdict.push(column, if same > 0 && enough && least { 0.0 } else { f64::INFINITY });

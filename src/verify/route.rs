@@ -11,10 +11,10 @@ impl<const N: usize, F: Fn(&[f64; N]) -> [f64; N]> System<f64, SVector<f64, N>> 
     }
 }
 
-/// Most steps of one integration.
+/// Greatest number of steps of one integration.
 const MOST_STEPS: u32 = 20_000;
 
-/// `y` at `to`, from slopes that depend on `y` alone: a slope that needs the variable carries it in `y`; `None` if the integrator gives up.
+/// `y` at `to`, from slopes that depend on `y` alone, which may contain the independent variable; `None` if the integrator fails.
 pub fn integrate<const N: usize>(
     slope: impl Fn(&[f64; N]) -> [f64; N],
     y: [f64; N],

@@ -101,14 +101,14 @@ fn formula(verdict: &mut Verdict, row: &Row, case: &Case, name: &str, followed: 
 }
 
 /// Relative distance from 0 below which the sign of a number is unknown.
-const UNSURE: f64 = 1e-11;
+const SIGN_RTOL: f64 = 1e-11;
 
 /// The bound that leaves the family without a member, from the extreme protocols of the family; `None` where that is too close to call.
 fn obstacle(case: &Case, family: &str, bounded: bool) -> Option<Option<&'static str>> {
     let Case { transition: Transition { law, v_i, v_f }, t_f, tau_ceiling } = *case;
     let settle = |bound: &'static str, room: f64, size: f64| match room / size {
-        room if room > UNSURE => Some(None),
-        room if room < -UNSURE => Some(Some(bound)),
+        room if room > SIGN_RTOL => Some(None),
+        room if room < -SIGN_RTOL => Some(Some(bound)),
         _ => None,
     };
     let spare = settle("time", t_f - min_duration(&case.transition), t_f);
@@ -134,7 +134,7 @@ fn obstacle(case: &Case, family: &str, bounded: bool) -> Option<Option<&'static 
                 let least = integrate(time, [-v_i.ln(), 0.0], (0.0, (v_f / v_i).ln()))?[1];
                 settle("friction", t_f - least, t_f)
             }
-            // With v = 0 throughout, theta ages by the time.
+            // With v = 0 throughout, theta rises by the time.
             Some(None) if v_f < v_i => settle("velocity", t_f - (1.0 / v_f - 1.0 / v_i), t_f),
             decided => decided,
         },

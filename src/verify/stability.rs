@@ -28,10 +28,10 @@ fn size(x: Complex) -> f64 {
     x[0].high.hypot(x[1].high)
 }
 
-/// Most rounds of the iteration: roots that differ by many decades are distinguished by a factor a round.
+/// Greatest number of iterations: roots that differ by many decades separate by one factor in each iteration.
 const ROUNDS: u32 = 2000;
 
-/// The roots of `x^n + c[n - 1] x^(n - 1) + … + c[0]` (Weierstrass, Durand, Kerner); `None` if they do not come to rest.
+/// The roots of `x^n + c[n - 1] x^(n - 1) + … + c[0]` (Weierstrass, Durand, Kerner); `None` if the iteration does not converge.
 fn roots<const N: usize>(c: [DoubleDouble; N]) -> Option<[Complex; N]> {
     let value = |x: Complex| {
         c.iter().rev().fold(ONE, |sum, &c| {
@@ -39,7 +39,7 @@ fn roots<const N: usize>(c: [DoubleDouble; N]) -> Option<[Complex; N]> {
             [re + c, im]
         })
     };
-    // On a circle that holds them all, none of them real, no two conjugate.
+    // Start on a circle that encloses all roots, at places that are not real, no two of them conjugate.
     let bound = (0..N).map(|n| (2.0 * c[n].high.abs()).powf(1.0 / (N - n) as f64)).fold(0.0, f64::max);
     let mut found = std::array::from_fn(|n| {
         let angle = 0.4 + 2.0 * std::f64::consts::PI * n as f64 / N as f64;
@@ -108,10 +108,10 @@ pub fn check(row: &Row, _: &Context) -> Verdict {
         verdict.miss("two eigenvalues are too close to be distinguished");
         return verdict;
     };
-    // At the critical stiffness it is 0, which has no relative error.
+    // At the critical stiffness the growth rate is 0 and has no relative error.
     let modulus = growth.hypot(frequency);
     verdict.compare(row, "growth_rate", Some(v * growth), Some(v * growth.abs().max(1e-20 * modulus)));
-    // Near a double root the frequency is the root of a small difference.
+    // Near a double root the frequency is the square root of a small difference.
     verdict.compare(row, "frequency", Some(v * frequency), Some(v * modulus));
     verdict.compare(row, "decay_rate", (m > 0.0).then_some(v * decay), None);
     verdict

@@ -10,11 +10,11 @@ use crate::stability::SteadySliding;
 use crate::stability::step_response::{Outcome, SETTLED, Step};
 use crate::table::STATUS;
 
-/// An extremum this many rtol from the edge of the band of settled velocities may or may not leave it.
-const HAIR: f64 = 10.0;
+/// Distance from the edge of the band of settled velocities, in rtol, within which an extremum may or may not leave the band.
+const EDGE_RTOLS: f64 = 10.0;
 
-/// An overshoot below this has no time of its own.
-const NONE: f64 = 1e-3;
+/// Relative overshoot below which its time is not determined.
+const MIN_OVERSHOOT: f64 = 1e-3;
 
 /// Cycles beyond the decision, in which a response comes to its cycle.
 const MORE_CYCLES: f64 = 30.0;
@@ -22,8 +22,8 @@ const MORE_CYCLES: f64 = 30.0;
 /// Intervals of a response that is followed.
 const MOST_INTERVALS: usize = 10_000;
 
-/// Distance of two successive cycles, in rtol, from which they determine no limit cycle.
-const MOST_VAGUE: f64 = 1e3;
+/// Distance of two successive cycles, in rtol, beyond which they determine no limit cycle.
+const MAX_CYCLE_RTOLS: f64 = 1e3;
 
 /// An extremum or a crossing.
 #[derive(Debug, Clone, Copy)]
@@ -169,7 +169,7 @@ fn compare(
 ) {
     let events = Events::of(followed, v_f);
     let [peak, trough] = range(&events, v_f, (0.0, f64::INFINITY));
-    // How much an error of the spring's force moves ln v where it follows.
+    // Effect of an error of the spring force on a quasi-static ln v.
     let felt = (k / law.a * (m * v_f * v_f / law.a)).sqrt().max(1.0).sqrt();
     let lowest = trough.v.min(v_i);
     if lowest.ln().abs() > 100.0 * felt * rtol {
@@ -178,15 +178,15 @@ fn compare(
     verdict.compare(row, "v_peak", Some(peak.v), None);
     verdict.compare_number(row, "v_trough", trough.v, felt * trough.v);
     let overshoot = peak.v / v_f - 1.0;
-    if overshoot > NONE {
+    if overshoot > MIN_OVERSHOOT {
         verdict.compare_number(row, "t_peak", peak.t, (peak.t + 1.0 / v_f) / overshoot.min(1.0));
     }
-    // Steady sliding that is unstable is left.
+    // A response does not settle at unstable steady sliding.
     let settled = events.settled.filter(|_| SteadySliding::new(law, k, m, v_f).is_stable());
     verdict.compare_word(row, "outcome", if settled.is_some() { "settled" } else { "limit_cycle" });
     verdict.compare_word(row, "stick_slip", if settled.is_some() { "no" } else { "yes" });
     if let Some((entry, speed)) = settled {
-        if events.margin > HAIR * rtol {
+        if events.margin > EDGE_RTOLS * rtol {
             let scale = entry.t.max(0.1 / (v_f * (1.0 + k / law.a))) + 1.0 / speed;
             verdict.compare_number(row, "settling_time", entry.t, scale);
         } else {
@@ -204,7 +204,7 @@ fn compare(
     // The last cycle is about this far from the limit cycle.
     let apart = (period / (second.t - first.t) - 1.0).abs() + (top / before[0].v - 1.0).abs();
     let vague = 1.0 + apart / rtol;
-    if vague > MOST_VAGUE {
+    if vague > MAX_CYCLE_RTOLS {
         return verdict.miss("cycles that are approached slowly");
     }
     verdict.compare(row, "period", Some(period), Some(vague * period));

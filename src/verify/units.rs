@@ -1,4 +1,4 @@
-//! Rows of a dataset brought to the units of the model, in which everything is checked.
+//! Rows of a dataset in the units of the model, in which they are checked.
 
 use crate::dataset::{Cell, Row};
 use crate::grid::{Quantity, Scale};
@@ -23,7 +23,7 @@ pub fn scale(rows: &mut [(u64, Row)], table: &dyn Table, units: &Units, relative
         })
     };
     for (_, row) in rows {
-        // One family alone has a parameter with a dimension.
+        // Only one family has a parameter with a dimension.
         let is_rate =
             row.iter().any(|(name, cell)| name == "family" && *cell == Cell::Word("bounded_velocity".to_owned()));
         for (name, cell) in row {

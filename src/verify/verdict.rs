@@ -31,7 +31,7 @@ pub struct Difference {
 }
 
 impl Verdict {
-    /// Notes a relative difference that has no counterpart in the row.
+    /// Records a relative difference that has no counterpart in the row.
     pub fn push(&mut self, column: &'static str, size: f64) {
         self.differences.push(Difference { column, size, expected: "0".to_owned() });
     }
@@ -40,14 +40,14 @@ impl Verdict {
         Verdict { unchecked: vec![reason], ..Verdict::default() }
     }
 
-    /// Notes why something could not be checked.
+    /// Records the reason for a skipped check.
     pub fn miss(&mut self, reason: &'static str) {
         if !self.unchecked.contains(&reason) {
             self.unchecked.push(reason);
         }
     }
 
-    /// Compares `found`, if the column was written, in units of `scale`.
+    /// Compares the column, if written, with `expected`, in units of `scale`.
     pub fn compare(&mut self, row: &Row, column: &'static str, expected: Option<f64>, scale: Option<f64>) {
         let Some((_, cell)) = row.iter().rev().find(|(name, _)| name == column) else { return };
         let difference = match (cell, expected) {
@@ -80,14 +80,14 @@ impl Verdict {
         self.differences.push(Difference { column, size, expected: expected.to_owned() });
     }
 
-    /// Notes an error where a column that must have a number was written without.
+    /// Records an error if a column that must have a number is null.
     pub fn demand(&mut self, row: &Row, column: &'static str) {
         if row.iter().any(|(name, cell)| name == column && *cell == Cell::Missing) {
             self.differences.push(Difference { column, size: f64::INFINITY, expected: "a number".to_owned() });
         }
     }
 
-    /// Notes an error where a column that must have nothing was written with something.
+    /// Records an error if a column that must be null is not.
     pub fn demand_nothing(&mut self, row: &Row, column: &'static str) {
         if row.iter().any(|(name, cell)| name == column && *cell != Cell::Missing) {
             self.differences.push(Difference { column, size: f64::INFINITY, expected: "nothing".to_owned() });

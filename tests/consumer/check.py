@@ -49,7 +49,7 @@ def check_pandas(dataset):
     assert (frame["alpha_2"] == alpha_2).all()
     assert (frame["alpha_3"] == alpha_3).all()
     assert (frame["a"] == 0.03).all() and (frame["v_f"] == 100.0).all()
-    # A number is there exactly where the status says so, and never NaN in the file.
+    # A number exists exactly where the status requires one, and never NaN in the file.
     infeasible = frame["status"] == "infeasible"
     for column in ["work", "work_optimal", "gap", "v_min"]:
         assert (frame[column].isna() == infeasible).all()

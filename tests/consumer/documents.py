@@ -7,8 +7,10 @@ order, in an empty folder of the page's own:
 
 - `toml` that begins with `name = "NAME"` is saved as NAME.toml before the first command;
 - `sh` and `python` run;
-- `text` must occur in their standard output;
+- `text` must occur in their standard output, and `output` with other numbers: those of times, sizes and differences;
 - a picture `pictures/NAME.svg` must be a file that they wrote, byte for byte.
+
+The sweeps of the README run first, and print its numbers.
 
 A page without commands shows measurements, which `benches/document` writes with their pictures.
 
@@ -50,6 +52,21 @@ def blocks_of(text):
     return re.findall(r"^```(\w+)\n(.*?)^```$", text, re.MULTILINE | re.DOTALL)
 
 
+def masked(text):
+    """A text without its numbers, units of time and size, and spacing."""
+    return re.sub(r"\s+", " ", re.sub(r"[\d.,]*\d(e-?\d+)?( ?(ns|µs|ms|s|min|h|kB|MB|GB|TB)\b)?", "#", text)).strip()
+
+
+def run_bullets(text, folder, variables):
+    """Runs the sweep of every bullet of the README, which prints the numbers of the bullet, except times."""
+    for bullet in re.findall(r"^- .*(?:\n  .*)*", text, re.MULTILINE):
+        sweep = re.search(r"`slipsweep run (sweeps/\w+\.toml)`", bullet)[1]
+        printed = run(["slipsweep", "run", str(REPOSITORY / sweep)], folder, variables)
+        for number in re.findall(r"\d[\d,.]*\d(?:e-?\d+)?", re.sub(r"`[^`]*`| in [\d.]+ s\b", "", bullet)):
+            if not re.search(rf"(?<![\d,.]){re.escape(number)}(?![\d,])", printed):
+                sys.exit(f"README.md: {sweep} does not print {number}:\n{printed}")
+
+
 def run_page(page, variables, write):
     """Runs the blocks of a page and checks its output and pictures; returns how many blocks ran."""
     text = page.read_text()
@@ -60,8 +77,7 @@ def run_page(page, variables, write):
             if language == "toml" and (named := re.match(r'name = "([\w-]+)"', code)):
                 (Path(folder) / f"{named[1]}.toml").write_text(code)
         if page.name == "README.md" and page.parent == REPOSITORY:
-            # The first of its two commands, which also builds the program.
-            run(["slipsweep", "run", str(REPOSITORY / "sweeps/landscape.toml")], folder, variables)
+            run_bullets(text, folder, variables)
         printed, output = "", ""
         stale = []
         for language, code in blocks_of(text):
@@ -72,6 +88,10 @@ def run_page(page, variables, write):
                 count += 1
             elif language == "text":
                 stale.append((code, output))
+            elif language == "output":
+                for line in code.splitlines():
+                    if line != "[...]" and masked(line) not in {masked(other) for other in printed.splitlines()}:
+                        sys.exit(f"{name}: no line like this is printed:\n{line}\nprinted:\n{printed}")
         if not count:
             return 0
         for code, output in stale:

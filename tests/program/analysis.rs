@@ -60,9 +60,9 @@ fn summaries_state_units() {
     let expected = "\
 optimal: 3 rows (3 ok)
   at a = 0.03 mu_0, b = 0.05 mu_0, v_i = 3 v_0, v_f = 100 v_0
-    t_f    work          v_start     v_end       time_at_floor  hamiltonian     theta_max    strategy
-    l/v_0  mu_0 sigma l  v_0         v_0         l/v_0          mu_0 sigma v_0  l/v_0
-    0.02   3.80811142    19.9230141  3392.16787  0              2.59678653      0.333333333  speed_up
+    t_f    work          v_start     v_end       time_at_floor  time_at_v_ceiling  time_at_tau_ceiling  hamiltonian     theta_max    strategy
+    l/v_0  mu_0 sigma l  v_0         v_0         l/v_0          l/v_0              l/v_0                mu_0 sigma v_0  l/v_0
+    0.02   3.80811142    19.9230141  3392.16787  0              0                  0                    2.59678653      0.333333333  speed_up
 ";
     let summary = printed(small().path(), &["summary", "results/test"]);
     assert!(summary.starts_with(expected), "{summary}");
@@ -80,9 +80,8 @@ fn missing_parts_are_reported() {
     let summary = printed(folder.path(), &["summary", "results/test"]);
     assert!(summary.contains("  1 of 2 parts missing: `slipsweep run` computes them\n"), "{summary}");
     let head = printed(folder.path(), &["head", "results/test", "gap", "-n", "0"]);
-    assert!(
-        head.starts_with("gap: 482,403 rows, each the work of a cubic shortcut") && head.contains("; 1 part missing\n")
-    );
+    let title = "gap: the work of a cubic shortcut and its gap to the optimum; 482,403 rows; 1 part missing\n";
+    assert!(head.starts_with(title), "{head}");
     let output = slipsweep(folder.path(), &["query", "results/test", "SELECT count(*) AS n FROM gap"]);
     assert_eq!(String::from_utf8_lossy(&output.stdout), "n\n262144\n");
     let note = "note: `gap` lacks 1 of 2 parts, which `slipsweep run` computes\n";
@@ -94,15 +93,15 @@ fn head_shows_names_units_and_rows() {
     let folder = small();
     let head = printed(folder.path(), &["head", "results/test", "optimal", "-n", "2"]);
     let expected = "\
-optimal: 3 rows, each the protocol of least work
-  t_f    a     b     v_i  v_f  work          v_start     v_end       time_at_floor  hamiltonian     theta_max    strategy  status
-  l/v_0  mu_0  mu_0  v_0  v_0  mu_0 sigma l  v_0         v_0         l/v_0          mu_0 sigma v_0  l/v_0
-  0.02   0.03  0.05  3    100  3.80811142    19.9230141  3392.16787  0              2.59678653      0.333333333  speed_up  ok
-  0.037  0.03  0.05  3    100  3.85650171    3.12297925  3380.58505  0              2.93400965      0.333333333  speed_up  ok
+optimal: the protocol of least work; 3 rows
+  t_f    a     b     v_i  v_f  v_ceiling  tau_ceiling  work          v_start     v_end       time_at_floor  time_at_v_ceiling  time_at_tau_ceiling  hamiltonian     theta_max    strategy  status
+  l/v_0  mu_0  mu_0  v_0  v_0  v_0        mu_0 sigma   mu_0 sigma l  v_0         v_0         l/v_0          l/v_0              l/v_0                mu_0 sigma v_0  l/v_0
+  0.02   0.03  0.05  3    100  inf        inf          3.80811142    19.9230141  3392.16787  0              0                  0                    2.59678653      0.333333333  speed_up  ok
+  0.037  0.03  0.05  3    100  inf        inf          3.85650171    3.12297925  3380.58505  0              0                  0                    2.93400965      0.333333333  speed_up  ok
 ";
     assert_eq!(head, expected);
     let all = printed(folder.path(), &["head", "results/test"]);
-    assert!(all.starts_with("optimal: 3 rows") && all.contains("\n\nbest_cubic: 3 rows"), "{all}");
+    assert!(all.starts_with("optimal: the protocol") && all.contains("\n\nbest_cubic: the cubic shortcut"), "{all}");
     // A trace is a table too, with the units that its Parquet file knows and a CSV file does not.
     let arguments = "trace optimal --t-f 0.02 --a 0.03 --b 0.05 --v-i 3 --v-f 100 --out";
     for (file, second) in [("o.parquet", "  l/v_0"), ("o-1.csv", "  0 ")] {
@@ -131,7 +130,7 @@ fn queries_answer_in_every_format() {
     assert_eq!(json, "{\"t_f\":0.02,\"gap\":null,\"status\":\"infeasible\"}\n");
     let nothing = printed(folder.path(), &["query", "results/test", "SELECT t_f, gap FROM gap LIMIT 0"]);
     assert_eq!(nothing, "t_f    gap\nl/v_0  1\n");
-    // A file says by its name what it holds, and can be asked again.
+    // The ending of a file selects its format, and the file can be queried again.
     for (file, table) in [("least.parquet", &with_units), ("least.csv", &without)] {
         let arguments = ["query", "results/test", least, "--out", file];
         assert_eq!(printed(folder.path(), &arguments), format!("written to {file}\n"));
@@ -168,7 +167,7 @@ fn a_reader_that_has_had_enough_is_no_failure() {
 fn wrong_questions_are_answered_with_the_known_names() {
     let folder = small();
     let tables = "  expected: a SELECT from these tables:\n    \
-                  optimal: t_f, a, b, v_i, v_f, work, v_start, v_end, time_at_floor, hamiltonian, theta_max, strategy, status\n    \
+                  optimal: t_f, a, b, v_i, v_f, v_ceiling, tau_ceiling, work, v_start, v_end, time_at_floor, time_at_v_ceiling, time_at_tau_ceiling, hamiltonian, theta_max, strategy, status\n    \
                   best_cubic: t_f, a, b, v_i, v_f, alpha_2, alpha_3, work, work_optimal, gap, v_min, status\n";
     let correct = "correct the query; text goes in 'single quotes', names with special characters in \"double\" ones";
     for (question, found, help) in [

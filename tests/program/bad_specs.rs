@@ -94,8 +94,8 @@ fn doubtful_velocities() {
                 v_i = 3.0\nv_f = { geomspace = [10.0, 1e7, 3] }\n[tables.crossover]\n";
     fs::write(folder.path().join("fast.toml"), spec).expect("is writable");
     let output = slipsweep(&["plan", "fast.toml"], folder.path());
-    let warning = "warning: fast.toml:12: axes.v_f: 10000000.0 m/s is unphysically fast\n  expected: velocities in m/s, as \
-                   `units = \"si\"` says\n  help: if these are in units of v_0, multiply them by v_0, or remove `units` and the scales \
+    let warning = "warning: fast.toml:12: axes.v_f: 10000000.0 m/s is unphysically fast\n  expected: velocities in m/s, \
+                   because of `units = \"si\"`\n  help: if these are in units of v_0, multiply them by v_0, or remove `units` and the scales \
                    from [model]\n";
     assert_eq!(String::from_utf8_lossy(&output.stderr), warning);
     assert_eq!(output.status.code(), Some(0));

@@ -30,7 +30,7 @@ fn run_reports_the_answers_of_a_physicist() {
     let text = String::from_utf8_lossy(&output.stdout);
     for line in [
         "gap: 482,403 rows (",
-        "  least gap among the rows that are ok:\n  at a = 0.03 mu_0, b = 0.05 mu_0, v_i = 3 v_0, v_f = 100 v_0\n",
+        "  least gap of the rows with status ok:\n  at a = 0.03 mu_0, b = 0.05 mu_0, v_i = 3 v_0, v_f = 100 v_0\n",
         "best_cubic: 3 rows (3 ok)",
         "optimal: 3 rows (3 ok)",
         "crossover: 1 row (1 ok)",
@@ -196,7 +196,7 @@ fn regress_no_command_loses_its_answer() {
         let output = shell.output().expect("runs");
         (output.status.code(), String::from_utf8_lossy(&output.stderr).into_owned())
     };
-    // What says nothing loses nothing.
+    // A command without output loses nothing.
     assert_eq!(sh(&["run", "spec.toml", "--quiet"], ">&-"), (Some(0), String::new()));
     let commands: [&[&str]; 7] = [
         &["verify", "results/test"],
@@ -216,7 +216,7 @@ fn regress_no_command_loses_its_answer() {
     }
 }
 
-/// A command that only reads ends at once, and says that nothing is changed.
+/// A command that only reads ends at once, and reports that nothing has changed.
 #[cfg(unix)]
 #[test]
 fn a_command_that_reads_can_be_stopped() {
@@ -291,8 +291,8 @@ fn blocks_are_no_rows_to_a_plan() {
     fs::write(folder.path().join("spec.toml"), spec).expect("is writable");
     let output = slipsweep(folder.path()).args(["plan", "spec.toml"]).output().expect("runs");
     let text = String::from_utf8_lossy(&output.stdout);
-    let total = text.lines().find_map(|line| line.strip_prefix("in all: ")).expect("says");
-    let time = total.split("on disk, ").nth(1).expect("says");
+    let total = text.lines().find_map(|line| line.strip_prefix("total: ")).expect("is printed");
+    let time = total.split("on disk, ").nth(1).expect("is printed");
     assert!(time.contains(" s on "), "{total}");
 }
 

@@ -193,7 +193,8 @@ fn columns_are_those_of_the_contract() {
     assert_eq!(names("best_cubic"), "t_f a b v_i v_f alpha_2 alpha_3 work work_optimal gap v_min status");
     assert_eq!(
         names("optimal"),
-        "t_f a b v_i v_f work v_start v_end time_at_floor hamiltonian theta_max strategy status"
+        "t_f a b v_i v_f v_ceiling tau_ceiling work v_start v_end time_at_floor time_at_v_ceiling time_at_tau_ceiling hamiltonian \
+         theta_max strategy status"
     );
     assert_eq!(
         names("shortcut"),

@@ -164,7 +164,7 @@ fn foreign_parts_are_left_alone() {
     let text = String::from_utf8_lossy(&output.stdout).into_owned();
     assert!(text.contains("to finish the dataset:\n  mv test/optimal/part-000000.parquet test/optimal/part-000000.parquet.foreign\n  slipsweep run test\n"), "{text}");
 
-    // A Parquet file of somebody else is foreign, not damaged.
+    // A Parquet file of another program is foreign, not damaged.
     let x: arrow_array::ArrayRef = std::sync::Arc::new(arrow_array::Float64Array::from(vec![1.0]));
     write_batch(&path, &arrow_array::RecordBatch::try_from_iter([("x", x)]).expect("is a table"));
     for look in [CheckDepth::Footer, CheckDepth::Whole] {
@@ -265,6 +265,6 @@ fn regress_what_is_no_file_is_never_waited_for() {
     assert_eq!(fs::read(&path).expect("is there"), good);
 }
 
-/// What `status` says of a manifest that is no file.
+/// The report of `status` on a manifest that is not a file.
 const UNREADABLE: &str = "test/manifest.json: cannot read: it is not a file\n  help: solve this and run the same command again, which keeps \
                           finished parts; or write elsewhere with --out DIR\n";

@@ -451,18 +451,21 @@ fn expressions_mean_what_they_say() {
 const SI: &str = "[model]\nunits = \"si\"\nmu_0 = 0.5\nl = 0.00000095367431640625\nv_0 = 0.000000000931322574615478515625\n\
                   normal_stress = 1048576.0\n";
 
-/// The same point in SI and scaled units.
+/// Specs of one point in SI and in scaled units.
 fn both(folder: &Path) -> [std::path::PathBuf; 2] {
     let (mu_0, l, v_0, sigma): (f64, f64, f64, f64) = (0.5, 2.0_f64.powi(-20), 2.0_f64.powi(-30), 2.0_f64.powi(20));
     let axes = |one: f64, time: f64, v: f64, stress: f64, stiffness: f64, mass: f64, rate: f64| {
         let list = |size: f64, values: &[f64]| format!("{:?}", values.iter().map(|x| x * size).collect::<Vec<f64>>());
         format!(
-            "t_f = {}\na = {}\nb = {}\nv_i = {}\nv_f = {}\ntau_ceiling = {}\nk = [{:?}, inf]\nm = {}\ndt = {}\ndelta_t = {}\nalpha_2 = {}\nalpha_3 = {}\n",
+            "t_f = {}\na = {}\nb = {}\nv_i = {}\nv_f = {}\nv_ceiling = {}\ntheta = {}\nt_left = {}\ntau_ceiling = {}\nk = [{:?}, inf]\nm = {}\ndt = {}\ndelta_t = {}\nalpha_2 = {}\nalpha_3 = {}\n",
             list(time, &[0.02, 0.5]),
             list(one, &[0.03]),
             list(one, &[0.05]),
             list(v, &[3.0]),
             list(v, &[100.0, 2.0]),
+            list(v, &[400.0, f64::INFINITY]),
+            list(time, &[0.25]),
+            list(time, &[0.0625]),
             list(stress, &[1.6]),
             0.04 * stiffness,
             list(mass, &[1e-5]),
@@ -473,7 +476,7 @@ fn both(folder: &Path) -> [std::path::PathBuf; 2] {
         )
     };
     let tables = "[tables.gap]\n[tables.best_cubic]\n[tables.optimal]\n[tables.crossover]\n[tables.shortcut]\n[tables.stability]\n[tables.step_response]\n\
-                  [tables.compliant]\n[tables.regularised]\n";
+                  [tables.compliant]\n[tables.regularised]\n[tables.feedback]\n";
     let (stress, time) = (mu_0 * sigma, l / v_0);
     let si = axes(mu_0, time, v_0, stress, stress / l, stress * l / (v_0 * v_0), 1.0 / time);
     let scaled = axes(1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0);
@@ -500,6 +503,7 @@ fn si_and_scaled_runs_agree_to_the_last_bit() {
         "mu_0 sigma/l" => stress / l,
         "mu_0 sigma l" => stress * l,
         "mu_0 sigma v_0" => stress * v_0,
+        "v_0^2/l" => v_0 * v_0 / l,
         "mu_0 sigma l/v_0^2" => stress * l / (v_0 * v_0),
         other => panic!("no size for {other}"),
     };

@@ -124,7 +124,7 @@ fn specs_are_compared_by_meaning_and_the_first_difference_is_named() {
         (
             first.replace("[tables.optimal]", "[tables.optimal]\ncolumns = [\"work\"]"),
             "tables.optimal.columns = [\"work\"] (line 9)",
-            "tables.optimal.columns = work, v_start, v_end, time_at_floor, hamiltonian, theta_max, strategy",
+            "tables.optimal.columns = work, v_start, v_end, time_at_floor, time_at_v_ceiling, time_at_tau_ceiling, hamiltonian, theta_max, strategy",
         ),
         (
             first.replace("name = \"test\"", "name = \"test\"\nwhere = \"t_f > a\""),
@@ -251,7 +251,7 @@ fn a_run_whose_dataset_is_taken_away_stops_there() {
 }
 
 #[test]
-fn the_second_run_on_a_dataset_says_that_the_first_one_is_at_work() {
+fn the_second_run_on_a_dataset_states_that_the_first_one_is_at_work() {
     let folder = tempfile::tempdir().expect("is writable");
     let sweep = sweep(folder.path(), &format!("{TIMES}{MATERIAL}"), "[tables.optimal]\n");
     let planned = Plan::new(&sweep).manifest(&sweep);
@@ -320,7 +320,7 @@ fn every_flipped_bit_of_a_manifest_is_noticed_and_the_parts_make_up_for_it() {
     assert!(files(place.path()) == whole);
 }
 
-/// A manifest whose checksum somebody made up: the parts know better.
+/// A manifest with a forged checksum is detected by the parts.
 #[test]
 fn a_manifest_that_contradicts_its_parts_is_refused() {
     let folder = tempfile::tempdir().expect("is writable");

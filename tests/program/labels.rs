@@ -21,7 +21,7 @@ const AXES: &str = "[axes]\nt_f = [0.02, 0.037]\nv_i = 3.0\nv_f = 100.0\nk = [1e
 
 const TABLES: &str = "[tables.optimal]\n[tables.crossover]\n[tables.stability]\n";
 
-/// The sweep of these points, with the axes and tables above unless `rest` says otherwise.
+/// The sweep of these points, with the axes and tables above unless `rest` has others.
 fn sweep(folder: &Path, cases: &str, rest: &str) -> Sweep {
     fs::write(folder.join("cases.csv"), cases).expect("is writable");
     let path = folder.join("spec.toml");

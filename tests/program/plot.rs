@@ -46,7 +46,7 @@ fn shown(folder: &Path, arguments: &[&str]) -> String {
     String::from_utf8(output.stdout).expect("is text")
 }
 
-/// What a command that is refused says.
+/// The message of a refused command.
 fn complaint(folder: &Path, arguments: &[&str]) -> String {
     let output = command(folder, arguments);
     assert_eq!(output.status.code(), Some(1), "{arguments:?}");

@@ -160,7 +160,7 @@ proptest! {
         prop_assert_eq!(found, expected);
     }
 
-    /// The hash of a spec is that of what it says: neither comments, spaces and the order of keys nor the way to write a number
+    /// The hash of a spec depends on its meaning: neither comments, spaces and the order of keys nor the way to write a number
     /// change it, and any number does.
     #[test]
     fn the_hash_is_that_of_the_meaning(axes in axes(), changed in select(AXES.to_vec()), comment in "[ -~]{0,20}") {
@@ -183,7 +183,7 @@ proptest! {
         prop_assert_ne!(plain, hash(&next));
     }
 
-    /// Any bytes are points or a fault that says in a few lines where.
+    /// Any bytes are points, or a short error with its place.
     #[test]
     fn any_bytes_are_points_or_a_fault(bytes in csv()) {
         let folder = tempfile::tempdir().expect("is writable");
@@ -272,7 +272,7 @@ fn batches(text: &str, table: &str) -> Vec<RecordBatch> {
 proptest! {
     #![proptest_config(config(48))]
 
-    /// A sweep in SI units says what the same sweep in scaled units does.
+    /// A sweep in SI units has the same results as in scaled units.
     #[test]
     fn units_do_not_change_what_is_found(
         scales in (0.1..1.0, 1e-8..1e-4, 1e-10..1e-6, 1e4..1e8),

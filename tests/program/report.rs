@@ -40,7 +40,7 @@ fn the_page_holds_everything_and_opens_without_an_error() {
         "<h1>Dataset small</h1>",
         "<h2>Plan</h2>",
         "2 optimal protocols solved once each",
-        "in all: about ",
+        "total: about ",
         "Rows and statuses",
         "<td>882</td>",
         "Pictures",

@@ -139,7 +139,7 @@ fn status_lists_parts_and_the_command_for_the_missing_ones() {
     assert_eq!(code, Some(0));
     let (code, said, error) = say(&["status", "results/test"]);
     assert_eq!((code, error.as_str()), (Some(0), ""));
-    assert!(said.contains("\n  optimal    1      1      0        0        0        800 of 800: 800 ok\n"), "{said}");
+    assert!(said.contains("\n  optimal    1      1        0        0        0        800 of 800: 800 ok\n"), "{said}");
     assert!(said.ends_with("\ncomplete\n"), "{said}");
     let (code, said, _) = say(&["status", "results/test", "--check"]);
     assert_eq!((code, said.ends_with("\ncomplete; all checksums match\n")), (Some(0), true), "{said}");

@@ -53,7 +53,7 @@ fn a_table_names_its_columns_and_units() {
                 time_at_floor = 0: time spent on the velocity floor v = 1\n  \
                 work = 3.80811142, v_min = 19.9230141, v_max = 3392.16787\n  \
                 status ok\n  \
-                117 rows; straight lines between them are good to 0.0001 of the range of a column, and to 0.01 of v and theta\n\n  \
+                117 rows; linear interpolation errs by up to 0.0001 of the range of a column, and by up to 0.01 of v and theta\n\n  \
                 t               v           theta         tau          beta\n  \
                 l/v_0           v_0         l/v_0         mu_0 sigma   mu_0 sigma v_0\n  \
                 0               3           0.333333333   0.978027754  -\n  \
@@ -144,7 +144,7 @@ fn coefficients_are_scaled_with_the_duration() {
 }
 
 #[test]
-fn what_does_not_exist_says_which_bound() {
+fn what_does_not_exist_states_which_bound() {
     let t_min = "0.3954147722546";
     for name in ["optimal", "best_cubic", "bounded_velocity", "compliant"] {
         let (code, text) = complaint(&[&[name], DOWN]);
@@ -401,7 +401,7 @@ fn a_row_over_time_is_the_protocol_of_its_numbers() {
 }
 
 #[test]
-fn a_row_without_a_path_says_why() {
+fn a_row_without_a_path_states_why() {
     let folder = tempfile::tempdir().expect("is writable");
     dataset(folder.path());
     let complaint = |arguments: &[&str]| {

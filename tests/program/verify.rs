@@ -1,4 +1,4 @@
-//! `slipsweep verify`: a sound dataset passes, a planted error is found and named, and what cannot be audited says so.
+//! `slipsweep verify`: a sound dataset passes, a planted error is found and named, and unchecked rows are reported.
 
 use std::fs;
 use std::path::Path;

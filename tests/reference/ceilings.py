@@ -542,10 +542,10 @@ def solve(make, t_f):
         if step > 500:
             raise Unphysical
     for i in range(80):
-        share = f_low / (f_low - f_high)
-        if i % 3 == 2 or not (mpfr("0.001") < share < mpfr("0.999")):
-            share = min(max(share, mpfr("0.001")), mpfr("0.999")) if i % 2 else mpfr("0.5")
-        x = low + share * (high - low)
+        fraction = f_low / (f_low - f_high)
+        if i % 3 == 2 or not (mpfr("0.001") < fraction < mpfr("0.999")):
+            fraction = min(max(fraction, mpfr("0.001")), mpfr("0.999")) if i % 2 else mpfr("0.5")
+        x = low + fraction * (high - low)
         value = f(x)
         if value > 0:
             high, f_high = x, value

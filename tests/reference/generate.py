@@ -37,7 +37,7 @@ def ln_u(e, side):
 
 
 def float_ln_u(w):
-    """The same in double precision, as a start."""
+    """`ln u` in double precision, as a start."""
     e = 0.5 * w * w
     if w > 0:
         z = math.log(1 + w + e - w * w / (6 + w))

@@ -67,7 +67,7 @@ def greatest_friction(path):
 
 
 def ceilinged_time(p):
-    """Time of a motion on the ceilings alone; infinite if it takes for ever."""
+    """Time of a motion on the ceilings alone; infinite if it never ends."""
     inner = []
     if p.v_ceiling is not None and p.tau_ceiling is not None and p.b > 0:
         inner = [(p.tau_ceiling - 1 - p.a * log(p.v_ceiling)) / p.b]
@@ -89,7 +89,7 @@ def least_ceiling(make, t_f, which):
         return 1 + p.b * p.l_1
 
     def value(x):
-        """Exponential distance from the ceiling that takes for ever (an acceleration) or allows any time."""
+        """Exponential distance from the ceiling of infinite time (an acceleration) or allows any time."""
         q = make(**{which: INF})
         steady = [q.tau_ss(q.l_0), q.tau_ss(q.l_1)]
         if q.l_1 < q.l_0:
@@ -105,7 +105,7 @@ def least_ceiling(make, t_f, which):
         needed = ceilinged_time(make(**{which: value(x)}))
         return log(needed / t_f) if needed < INF else mpfr(10)
 
-    # Within 1e-22 of a ceiling that takes for ever it is that ceiling, to twice the digits of a double.
+    # Within 1e-22 of a ceiling of infinite time it counts as that ceiling, to twice the digits of a double.
     if f(mpfr(-50)) < 0:
         return value(mpfr(-50))
     bits = gmpy2.get_context().precision
@@ -256,9 +256,9 @@ def least_of(case, which):
     return float(least_ceiling(maker(a, b, v_i, v_f, bounded, v_ceiling, tau_ceiling), mpfr(t_f), which))
 
 
-def between(low, high, share):
-    """A value above low, near it for a small share."""
-    return low + (high - low) * share
+def between(low, high, fraction):
+    """A value above low, near it for a small fraction."""
+    return low + (high - low) * fraction
 
 
 def transitions(rng):
@@ -306,18 +306,18 @@ def limits():
             case = [*start, t_f, 1, INF, INF]
             peak = free_peaks(case)[place - 6]
             least = least_of(case, which)
-            for share in (1e-3, 1e-6, 1e-9):
-                case[place] = least * (1 + share)
+            for fraction in (1e-3, 1e-6, 1e-9):
+                case[place] = least * (1 + fraction)
                 yield "near_least_ceiling", tuple(case)
-            for share in (1e-2, 1e-5, 1e-8):
-                case[place] = peak * (1 - share)
+            for fraction in (1e-2, 1e-5, 1e-8):
+                case[place] = peak * (1 - fraction)
                 yield "weak_ceiling", tuple(case)
             case[place] = between(least, peak, 0.3)
             make = maker(*case[:4], 1, case[6], case[7])
             precision(ROUGH)
             t_least = float(make().least_time())
-            for share in (1e-2, 1e-5, 1e-8):
-                case[4] = t_least * (1 + share)
+            for fraction in (1e-2, 1e-5, 1e-8):
+                case[4] = t_least * (1 + fraction)
                 yield "near_t_least", tuple(case)
     for start in (SLOW, (0.05, 0.02, 100.0, 3.0), (0.02, 0.02, 40.0, 5.0), (0.03, 0.0, 1e4, 2.0)):
         v_i, v_f = start[2:]
@@ -325,12 +325,12 @@ def limits():
         for which, place in (("v_ceiling", 6), ("tau_ceiling", 7)):
             case = [*start, 1.3 * t_min, 1, INF, INF]
             least = least_of(case, which)
-            for share in (1e-3, 1e-6, 1e-9):
-                case[place] = least * (1 + share)
+            for fraction in (1e-3, 1e-6, 1e-9):
+                case[place] = least * (1 + fraction)
                 yield "near_t_most", tuple(case)
             case[place] = least * (1 + 1e-2)
-            for share in (1e-3, 1e-6):
-                case[4] = t_min * (1 + share)
+            for fraction in (1e-3, 1e-6):
+                case[4] = t_min * (1 + fraction)
                 yield "near_t_min", tuple(case)
         for excess in (1e-2, 1e-5, 1e-8, -1e-3, -1e-6):
             yield "v_ceiling_near_v_f", (*start, 1.2 * t_min, 1, v_f * (1 + excess), INF)
@@ -351,8 +351,8 @@ def limits():
             turn -= (p.c_at(turn) - c) * exp(turn) / (p.tau_ss(turn) - (p.b - p.a))
         t_floor = float(Path(p, c, turn).time)
         for time, word in ((t_cross, "near_t_cross"), (t_floor, "near_t_floor")):
-            for share in (-1e-4, 1e-4, 1e-8):
-                yield word, (*PAPER, time * (1 + share), 1, v_ceiling, tau_ceiling)
+            for fraction in (-1e-4, 1e-4, 1e-8):
+                yield word, (*PAPER, time * (1 + fraction), 1, v_ceiling, tau_ceiling)
     # An acceleration under a ceiling below 1 turns only below theta_c.
     for t_f in (0.5, 2.0, 6.0):
         yield "lingers", (0.03, 0.05, 30.0, 100.0, t_f, 1, INF, 0.96)
@@ -393,13 +393,13 @@ def random_cases(seed, count):
             v_peak, tau_peak, _ = free_peaks(case)
             case = list(case)
             kind = rng.choice(["v", "tau", "tau", "both", "both"])
-            share = lambda: rng.choice([rng.uniform(0.02, 0.98), log_uniform(rng, 1e-3, 1), 1 - log_uniform(rng, 1e-3, 1)])
+            fraction = lambda: rng.choice([rng.uniform(0.02, 0.98), log_uniform(rng, 1e-3, 1), 1 - log_uniform(rng, 1e-3, 1)])
             if kind in ("v", "both"):
                 low = least_of(case, "v_ceiling")
-                case[6] = low * (max(v_peak, 1.5 * low) / low) ** share()
+                case[6] = low * (max(v_peak, 1.5 * low) / low) ** fraction()
             if kind in ("tau", "both"):
                 low = least_of(case, "tau_ceiling")
-                case[7] = between(low, max(tau_peak, low + 0.05 * case[0]), share())
+                case[7] = between(low, max(tau_peak, low + 0.05 * case[0]), fraction())
         except (Infeasible, Unphysical, AssertionError, ZeroDivisionError, ArithmeticError, OverflowError):
             continue
         seen += 1

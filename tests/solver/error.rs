@@ -28,7 +28,7 @@ fn coefficients(random: &mut Random, transition: &Transition, t_f: f64) -> (f64,
 
 /// What was found, the bound of its error, and what is true.
 #[derive(Debug, Clone, Copy)]
-struct Claim {
+struct BoundCheck {
     found: f64,
     bound: f64,
     truth: f64,
@@ -36,17 +36,17 @@ struct Claim {
 
 /// A bound holds in 999 of 1000 rows, and in the median it is no more than a hundred times the error, or half of the
 /// last place where that is more.
-fn assert_honest(tag: &str, claims: &[Claim]) {
-    let error = |claim: &Claim| (claim.found - claim.truth).abs();
-    let broken: Vec<&Claim> =
-        claims.iter().filter(|claim| error(claim) > claim.bound || claim.bound.is_nan()).collect();
-    assert!(broken.len() * 1000 <= claims.len(), "{tag}: {} of {}, {broken:?}", broken.len(), claims.len());
-    let last_place = |claim: &Claim| 0.25 * f64::EPSILON * claim.truth.abs();
-    let mut ratios: Vec<f64> = claims.iter().map(|claim| claim.bound / error(claim).max(last_place(claim))).collect();
+fn assert_honest(tag: &str, checks: &[BoundCheck]) {
+    let error = |check: &BoundCheck| (check.found - check.truth).abs();
+    let broken: Vec<&BoundCheck> =
+        checks.iter().filter(|check| error(check) > check.bound || check.bound.is_nan()).collect();
+    assert!(broken.len() * 1000 <= checks.len(), "{tag}: {} of {}, {broken:?}", broken.len(), checks.len());
+    let last_place = |check: &BoundCheck| 0.25 * f64::EPSILON * check.truth.abs();
+    let mut ratios: Vec<f64> = checks.iter().map(|check| check.bound / error(check).max(last_place(check))).collect();
     ratios.sort_by(f64::total_cmp);
     println!(
-        "{tag}: {} claims, {} broken, median of bound over error {:.1}",
-        claims.len(),
+        "{tag}: {} checks, {} broken, median of bound over error {:.1}",
+        checks.len(),
         broken.len(),
         ratios[ratios.len() / 2]
     );
@@ -63,7 +63,7 @@ fn work(transition: &Transition, t_f: f64, rtol: f64, (a_2, a_3): (f64, f64)) ->
 
 #[test]
 fn work_errors_of_random_shortcuts_are_bounded_and_within_rtol() {
-    let mut claims: [Vec<Claim>; RTOLS.len()] = Default::default();
+    let mut checks: [Vec<BoundCheck>; RTOLS.len()] = Default::default();
     let mut unjudged = 0;
     let points = points();
     for index in 0..points {
@@ -79,16 +79,16 @@ fn work_errors_of_random_shortcuts_are_bounded_and_within_rtol() {
             unjudged += 1;
             continue;
         };
-        for (&rtol, claims) in RTOLS.iter().zip(&mut claims) {
+        for (&rtol, checks) in RTOLS.iter().zip(&mut checks) {
             let (found, v_min, _) = work(&transition, t_f, rtol, place);
             let budget = (rtol + 4.0 * f64::EPSILON) * size;
             assert!((found - truth).abs() <= budget, "{transition:?} {t_f} {place:?} {rtol}: {found} {truth}");
-            claims.push(Claim { found, bound: error::of_shortcut(&transition, t_f, v_min, found, finest), truth });
+            checks.push(BoundCheck { found, bound: error::of_shortcut(&transition, t_f, v_min, found, finest), truth });
         }
     }
-    assert!(claims[0].len() as u64 > points / 3 && unjudged < points / 8, "{} {unjudged}", claims[0].len());
-    for (rtol, claims) in RTOLS.iter().zip(&claims) {
-        assert_honest(&format!("{rtol}"), claims);
+    assert!(checks[0].len() as u64 > points / 3 && unjudged < points / 8, "{} {unjudged}", checks[0].len());
+    for (rtol, checks) in RTOLS.iter().zip(&checks) {
+        assert_honest(&format!("{rtol}"), checks);
     }
 }
 
@@ -99,7 +99,7 @@ fn least_work(transition: &Transition, t_f: f64, bounded: bool, rtol: f64) -> Op
 
 #[test]
 fn work_errors_of_random_optima_are_bounded() {
-    let mut claims: [Vec<Claim>; RTOLS.len()] = Default::default();
+    let mut checks: [Vec<BoundCheck>; RTOLS.len()] = Default::default();
     let mut unjudged = 0;
     let points = points();
     for index in 0..points {
@@ -115,20 +115,20 @@ fn work_errors_of_random_optima_are_bounded() {
             unjudged += 1;
             continue;
         }
-        for (&rtol, claims) in RTOLS.iter().zip(&mut claims) {
+        for (&rtol, checks) in RTOLS.iter().zip(&mut checks) {
             let optimum = least_work(&transition, t_f, bounded, rtol).expect("is solved as the finer one is");
             let (bound, _) = error::of_optimum(&transition, t_f, bounded, &optimum);
-            let claim = Claim { found: optimum.work, bound: bound.expect("has a bound"), truth };
+            let check = BoundCheck { found: optimum.work, bound: bound.expect("has a bound"), truth };
             // What t_f itself leaves of a work that is a small difference.
             let given = f64::EPSILON * (4.0 * truth.abs() + (optimum.hamiltonian * t_f).abs());
             let budget = rtol * truth.abs() + given;
-            assert!((claim.found - truth).abs() <= budget, "{transition:?} {t_f} {bounded} {rtol}: {claim:?}");
-            claims.push(claim);
+            assert!((check.found - truth).abs() <= budget, "{transition:?} {t_f} {bounded} {rtol}: {check:?}");
+            checks.push(check);
         }
     }
-    assert!(claims[0].len() as u64 > points / 3 && unjudged < points / 8, "{} {unjudged}", claims[0].len());
-    for (rtol, claims) in RTOLS.iter().zip(&claims) {
-        assert_honest(&format!("{rtol}"), claims);
+    assert!(checks[0].len() as u64 > points / 3 && unjudged < points / 8, "{} {unjudged}", checks[0].len());
+    for (rtol, checks) in RTOLS.iter().zip(&checks) {
+        assert_honest(&format!("{rtol}"), checks);
     }
 }
 
@@ -161,10 +161,10 @@ fn transition(row: &reference::Row) -> Transition {
     Transition { law, v_i: row.number("v_i"), v_f: row.number("v_f") }
 }
 
-/// The claims of the rows of a table, at some accuracies.
-fn claims(name: &str, rtols: &[f64], solve: impl Fn(&reference::Row, f64) -> Option<Claim>) {
+/// The checks of the rows of a table, at some accuracies.
+fn checks(name: &str, rtols: &[f64], solve: impl Fn(&reference::Row, f64) -> Option<BoundCheck>) {
     let rows = reference::table(name);
-    let found: Vec<Claim> =
+    let found: Vec<BoundCheck> =
         rtols.iter().flat_map(|&rtol| rows.iter().filter_map(|row| solve(row, rtol)).collect::<Vec<_>>()).collect();
     assert!(found.len() > rows.len(), "{name}: {}", found.len());
     assert_honest(name, &found);
@@ -173,37 +173,37 @@ fn claims(name: &str, rtols: &[f64], solve: impl Fn(&reference::Row, f64) -> Opt
 #[test]
 fn reference_work_errors_of_families_are_bounded() {
     for name in ["shortcut_velocity", "shortcut_friction"] {
-        claims(name, &RTOLS[..5], |row, rtol| {
+        checks(name, &RTOLS[..5], |row, rtol| {
             let family = if name == "shortcut_friction" { "bounded_friction" } else { row.text("family") };
             let tau_ceiling = if name == "shortcut_friction" { row.number("tau_ceiling") } else { f64::INFINITY };
             let case = Case { transition: transition(row), t_f: row.number("t_f"), tau_ceiling };
             let (family, stats) = (find(family)?, &mut SolverStats::default());
             let member = family.solve(&case, rtol, stats).ok()?;
             let bound = error::of_member(family, &case, &member, stats)?;
-            Some(Claim { found: member.work, bound, truth: row.optional("work")? })
+            Some(BoundCheck { found: member.work, bound, truth: row.optional("work")? })
         });
     }
 }
 
 #[test]
 fn reference_work_errors_of_smooth_and_best_shortcuts_are_bounded() {
-    claims("compliant", &RTOLS, |row, rtol| {
+    checks("compliant", &RTOLS, |row, rtol| {
         let Transition { law, v_i, v_f } = transition(row);
         let slider = SpringBlock { law, k: row.number("k"), m: row.number("m") };
         let solve = |rtol| Some(compliant::solve(&slider, (v_i, v_f), row.number("t_f"), rtol).value?.work);
         let found = solve(rtol)?;
-        Some(Claim {
+        Some(BoundCheck {
             found,
             bound: error::bound(found, solve(error::TIGHTEST_RTOL)?, found),
             truth: row.number("work"),
         })
     });
-    claims("best_cubic", &[1e-10, 1e-12], |row, rtol| {
+    checks("best_cubic", &[1e-10, 1e-12], |row, rtol| {
         let solve = |rtol| {
             Some(best_cubic::solve(&transition(row), row.number("t_f"), row.text("bounded") == "1", rtol).value?.work)
         };
         let found = solve(rtol)?;
-        Some(Claim {
+        Some(BoundCheck {
             found,
             bound: error::bound(found, solve(error::TIGHTEST_RTOL)?, found),
             truth: row.number("work"),

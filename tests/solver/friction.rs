@@ -1,4 +1,4 @@
-//! Friction below 0: every protocol says so, as friction sampled along its way does.
+//! Negative friction: the status of every protocol agrees with friction sampled along its path.
 
 use slipsweep::model::{Law, Transition};
 use slipsweep::protocol::cubic::{Landscape, LandscapeBuffers};

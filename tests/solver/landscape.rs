@@ -19,7 +19,7 @@ struct Plain {
     a_3: f64,
 }
 
-/// What the landscape says of it.
+/// The results of the landscape for it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Found {
     work: f64,
@@ -481,7 +481,7 @@ fn regress_shortcuts_near_standstill() {
 
 /// `v_min` is 1.000000000000001 in 60-digit arithmetic: it came out below 1 where the status is `ok`.
 #[test]
-fn regress_the_least_velocity_is_on_the_side_of_the_bound_that_the_status_says() {
+fn regress_the_least_velocity_is_on_the_side_of_the_bound_that_the_status_states() {
     let (v_i, v_f, t_f) = (1472.7956884479472, 38.08732996379844, 0.03222291732502);
     let (status, _, v_min) = shortcut(v_i, v_f, t_f, 0.02263307617866728, 8.636609700465113e-5, 1e-10);
     assert_eq!((status, v_min), (Status::Ok, 1.0));

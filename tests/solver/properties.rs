@@ -125,7 +125,7 @@ proptest! {
         }
     }
 
-    /// The strategy changes where the crossover table says.
+    /// The strategy changes at the times of the crossover table.
     #[test]
     fn strategies_change_at_the_crossover_times(transition in acceleration(), fraction in decades(1e-9, 1.0)) {
         let CrossoverTimes { t_cross: Some(cross), t_floor: Some(hold), t_cheapest: Some(cheapest), .. } = times(&transition)? else {

@@ -37,7 +37,7 @@ fn optimum(case: &Case) -> Optimum {
     optimal::solve(&transition, case.t_f, case.bounded, 1e-13).value.expect("exists")
 }
 
-/// A moment: `ln v` with two derivatives in time, and `ln theta`.
+/// State at one time: `ln v` with two derivatives in time, and `ln theta`.
 #[derive(Debug, Clone, Copy)]
 struct Moment {
     q: [f64; 3],

@@ -1,4 +1,4 @@
-//! The edges of every shortcut family: what is required of it is solved, and what does not exist says so.
+//! The edges of every shortcut family: existing members are solved, and missing ones have their obstacle.
 //!
 //! A member is judged by what it cannot miss: its motion ends on theta's balance of ageing and slip, it costs no less
 //! than the optimum, and it stays within the bound of its family.
@@ -286,7 +286,7 @@ fn edge_velocities_of_1() {
 }
 
 #[test]
-fn edge_what_leaves_the_model_says_below_bound() {
+fn edge_what_leaves_the_model_states_below_bound() {
     for (family, t_f) in [("cubic", 0.5), ("bounded_friction", 0.4)] {
         let shortcut =
             examine(find(family).expect("is a family"), &case(PAPER, 100.0, 3.0, t_f)).expect("has a member");

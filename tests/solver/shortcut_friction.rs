@@ -250,7 +250,7 @@ fn equal_ends_give_steady_sliding() {
 }
 
 #[test]
-fn what_has_no_member_says_why() {
+fn what_has_no_member_states_why() {
     let law = Law { a: 0.05, b: 0.03 };
     let ends = solve(&case(law, 3.0, 100.0, 0.1, 1.05), 1e-10).expect_err("is below tau_f");
     assert!(

@@ -298,7 +298,7 @@ fn paper_cubic_overshoots_v_f_far_in_a_short_time() {
 }
 
 #[test]
-fn regress_a_cubic_that_dips_below_one_is_returned_and_says_so() {
+fn regress_a_cubic_that_dips_below_one_is_returned_and_states_so() {
     let shortcut = solve("cubic", &case(PAPER, 100.0, 3.0, 0.5), 1e-10).expect("v stays positive");
     assert!(shortcut.v_min > 0.0 && shortcut.v_min < 1.0, "{}", shortcut.v_min);
     assert_eq!(shortcut.status(), Status::BelowBound);
@@ -342,7 +342,7 @@ fn regress_equal_velocities_are_a_constant_protocol() {
 }
 
 #[test]
-fn regress_what_does_not_exist_says_why() {
+fn regress_what_does_not_exist_states_why() {
     for family in ["step", "cubic", "bounded_velocity"] {
         let wrong = [
             case(Law { a: 0.0, b: 0.05 }, 3.0, 100.0, 0.02),

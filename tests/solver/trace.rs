@@ -421,7 +421,7 @@ fn extrema_of_the_velocity_are_those_of_the_solvers() {
 }
 
 #[test]
-fn what_does_not_exist_says_which_bound() {
+fn what_does_not_exist_states_which_bound() {
     let absent = |protocol: Protocol, transition, t_f| match protocol.path(&case(transition, t_f), 1e-10) {
         Ok(_) => panic!("{transition:?} {t_f} exists"),
         Err(absence) => absence,
@@ -434,7 +434,7 @@ fn what_does_not_exist_says_which_bound() {
     assert_eq!(absent(Protocol::BestCubic { bounded: true }, BACK, 0.3955), Absence::Cubic { bounded: true });
     let steep = Protocol::CubicPoint { a_2: 3.0, a_3: 0.0 };
     assert_eq!(absent(steep, PAPER, 0.02).to_string(), "v or theta would not stay positive");
-    // Without the bound the optimum may leave the model, and says so.
+    // Without the bound the optimum may leave the model, as its status reports.
     let below = path(optimal(false), case(PAPER, 0.06));
     assert_eq!(below.status, Status::BelowBound);
     assert!(fewest(&below, PAPER).v_min < 1.0);

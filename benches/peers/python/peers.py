@@ -150,7 +150,7 @@ def works(x, w, a, b, v_i, v_f, t_f, a_2, a_3):
 
 @numba.njit
 def compiled(x, w, a, b, v_i, v_f, t_f, a_2, a_3):
-    """The same, point by point."""
+    """The works, point by point."""
     works = np.empty_like(a)
     for i in range(a.size):
         q = 1 / v_i[i]

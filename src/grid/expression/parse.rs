@@ -78,6 +78,10 @@ const GRAMMAR: &str = "axes, numbers, + - * / ^, comparisons, and, or, not, in (
 
 impl Expression {
     /// Parses a number computed from `axes`.
+    ///
+    /// # Errors
+    ///
+    /// A text that is not a number computed from `axes`.
     pub fn number(text: &str, axes: &[Quantity]) -> Result<Expression, Fault> {
         let (expression, kind) = read(text, axes, None)?;
         if kind == Kind::Number {
@@ -88,6 +92,10 @@ impl Expression {
     }
 
     /// Parses a condition on `axes` and on the labels of `points`.
+    ///
+    /// # Errors
+    ///
+    /// A text that is not a condition on `axes` and labels.
     pub fn condition(text: &str, axes: &[Quantity], points: Option<&Factor>) -> Result<Expression, Fault> {
         let (expression, kind) = read(text, axes, points)?;
         if kind == Kind::Truth {

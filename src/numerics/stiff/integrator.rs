@@ -74,7 +74,7 @@ struct LastStep<const N: usize, const S: usize> {
 const ROUNDING: f64 = 32.0 * f64::EPSILON;
 
 /// Shortest step, as a fraction of the time before it, unless it [may be shorter](Integrator::may_step): 32 digits.
-const SHORTEST: f64 = 6e-33;
+const MIN_STEP_FRACTION: f64 = 6e-33;
 
 /// Newton iterations before a step is rejected.
 const MOST_ITERATIONS: u32 = 12;
@@ -83,7 +83,7 @@ const MOST_ITERATIONS: u32 = 12;
 const NEWTON_TOLERANCE_FRACTION: f64 = 0.01;
 
 /// Convergence rate of Newton's method above which the matrix is recomputed.
-const SLOW: f64 = 0.1;
+const MAX_CONVERGENCE_RATE: f64 = 0.1;
 
 impl<'a, Y: System<N>, const N: usize, const S: usize> Integrator<'a, Y, N, S> {
     /// An integrator that starts at `y(t)`, which satisfies the constraints, with a first step of about `h > 0`.
@@ -99,7 +99,19 @@ impl<'a, Y: System<N>, const N: usize, const S: usize> Integrator<'a, Y, N, S> {
         let fraction = (S + 1) as f64 / (2 * S) as f64;
         let allowed = exp(fraction * ln(accuracy.tolerance));
         let (t, cost) = (DoubleDouble::new(t), IntegratorStats::default());
-        Integrator { system, rule, accuracy, allowed, t, rest: 0.0, shortest: SHORTEST, y, h, last: None, cost }
+        Integrator {
+            system,
+            rule,
+            accuracy,
+            allowed,
+            t,
+            rest: 0.0,
+            shortest: MIN_STEP_FRACTION,
+            y,
+            h,
+            last: None,
+            cost,
+        }
     }
 
     /// Allows steps down to this fraction of the time before them. A solution that becomes infinite then takes more steps to detect.
@@ -157,6 +169,10 @@ impl<'a, Y: System<N>, const N: usize, const S: usize> Integrator<'a, Y, N, S> {
     }
 
     /// Takes one step, which ends at `limit` at the latest, and then exactly there.
+    ///
+    /// # Errors
+    ///
+    /// The reason why no step is accurate.
     #[inline(always)]
     pub fn step(&mut self, limit: f64) -> Result<DenseOutput<N, S>, Failure> {
         loop {
@@ -307,7 +323,7 @@ impl<'a, Y: System<N>, const N: usize, const S: usize> Integrator<'a, Y, N, S> {
             }
             // The rate is at most of order 1 for variables in their scales; otherwise the second iteration detects it.
             let foreseen = if iterations == 1 { size } else { rate };
-            factors = (foreseen <= SLOW).then_some(matrix);
+            factors = (foreseen <= MAX_CONVERGENCE_RATE).then_some(matrix);
             before = size;
         }
         None

@@ -37,6 +37,10 @@ pub enum Shape {
 }
 
 /// The shape of a picture.
+///
+/// # Errors
+///
+/// A column that the table does not have, or a combination of options without a picture.
 pub fn choose(survey: &Survey, defaults: &Defaults, request: &Request) -> Result<Shape, PlotError> {
     let choice = Choice::new(survey, defaults, request)?;
     let (x, y, colour) = (request.x.as_deref(), request.y.as_deref(), request.colour.as_deref());

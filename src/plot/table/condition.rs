@@ -39,6 +39,10 @@ pub struct Condition {
 
 impl Condition {
     /// The conditions in `text`, separated by commas or `and`.
+    ///
+    /// # Errors
+    ///
+    /// A condition without a column, a comparison and a value.
     pub fn all(text: &str) -> Result<Vec<Condition>, PlotError> {
         text.split(',').flat_map(|part| part.split(" and ")).map(Condition::one).collect()
     }
@@ -64,7 +68,9 @@ impl Condition {
     /// Whether a number meets the condition; NaN never does.
     pub fn holds(&self, cell: f64) -> bool {
         let Ok(value) = self.value.parse::<f64>() else { return false };
-        let equal = cell == value || (cell - value).abs() <= EQUAL_RTOL * cell.abs().max(value.abs());
+        // A finite number does not equal an infinite one.
+        let difference = (cell - value).abs();
+        let equal = cell == value || difference.is_finite() && difference <= EQUAL_RTOL * cell.abs().max(value.abs());
         match self.relation {
             Relation::Equal => equal,
             Relation::Unequal => !equal && !cell.is_nan(),
@@ -137,6 +143,8 @@ mod tests {
         assert_eq!(conditions.iter().map(|c| c.column.as_str()).collect::<Vec<_>>(), ["a", "v_f", "family"]);
         assert!(conditions[0].holds(0.03) && !conditions[0].holds(0.031) && !conditions[0].holds(f64::NAN));
         assert!(conditions[1].holds(10.0) && conditions[1].holds(11.0) && !conditions[1].holds(9.0));
+        let ceiling = &Condition::all("v_ceiling=inf").expect("one condition")[0];
+        assert!(ceiling.holds(f64::INFINITY) && !ceiling.holds(300.0));
         assert!(conditions[2].holds_word(Some("step")) && !conditions[2].holds_word(Some("cubic")));
     }
 

@@ -2,14 +2,14 @@
 
 use super::choice::Shape;
 use super::map::{self, MapFigure};
-use super::{Scene, plain};
+use super::{CEILINGS, Scene, plain};
 use crate::model::{Law, Transition};
 use crate::plot::canvas::Stroke;
 use crate::plot::figure::{Entry, Figure, Key, Layer};
 use crate::plot::{PlotError, label};
 use crate::protocol::optimal::crossover::{self, Wanted};
 
-/// Steps along a curve. Chosen: no corner is seen in print.
+/// Steps along a curve. Chosen: no corner is visible in print.
 const CURVE_STEPS: usize = 240;
 
 /// Relative tolerance of a curve. Chosen: finer than a picture shows.
@@ -18,6 +18,11 @@ const RTOL: f64 = 1e-6;
 /// Times from steady sliding at `v = 1/theta`: where the velocity is `1/theta` now, where it reaches the floor, and the least one.
 const TIMES: [&str; 3] = ["t_cross", "t_floor", "t_min"];
 
+/// Figure of table `feedback`: columns over an axis, or a map of the control law.
+///
+/// # Errors
+///
+/// A request that the table does not satisfy, or a part that cannot be read.
 pub fn draw(scene: &Scene<'_>, shape: &Shape) -> Result<Figure, PlotError> {
     let Shape::Map(plan) = shape else { return plain(scene, shape) };
     let MapFigure { mut figure, groups, cells, .. } = map::map(scene.survey, plan)?;
@@ -47,8 +52,11 @@ pub fn draw(scene: &Scene<'_>, shape: &Shape) -> Result<Figure, PlotError> {
             }
         }
     }
+    let is_capped =
+        scene.survey.axes.iter().any(|axis| CEILINGS.contains(&axis.name.as_str()) && !axis.values.is_empty());
+    let condition = if is_capped { " without ceilings" } else { "" };
     for ((name, stroke), _) in TIMES.iter().zip(styles).zip(is_drawn).filter(|(_, is_drawn)| *is_drawn) {
-        figure.legend.push(Entry { key: Key::Contour(stroke), text: label::name(name) });
+        figure.legend.push(Entry { key: Key::Contour(stroke), text: format!("{}{condition}", label::name(name)) });
     }
     Ok(figure)
 }

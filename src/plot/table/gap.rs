@@ -21,6 +21,11 @@ const ALPHAS: [&str; 2] = ["alpha_2", "alpha_3"];
 /// Steps of the grid for the line `v = 1`, along both axes. Chosen: finer than the dots of a printer.
 const STEPS: usize = 300;
 
+/// Figure of table `gap`: columns over an axis, or a map of the landscape.
+///
+/// # Errors
+///
+/// A request that the table does not satisfy, or a part that cannot be read.
 pub fn draw(scene: &Scene<'_>, shape: &Shape) -> Result<Figure, PlotError> {
     let plan = match shape {
         Shape::Lines(plan) => return Ok(lines::lines(scene.survey, plan)?.figure),

@@ -20,6 +20,10 @@ const MAX_CROSSED_PANELS: usize = 4;
 
 /// The varying axes that are not drawn and that distinguish rows, and a note on axes that change only with them. A grid axis always
 /// distinguishes rows.
+///
+/// # Errors
+///
+/// A part that cannot be read.
 pub fn further<'a>(survey: &'a Survey, drawn: &[&str]) -> Result<(Vec<&'a str>, Option<String>), PlotError> {
     let others =
         survey.axes.iter().filter(|axis| (axis.varies() || axis.infinite) && !drawn.contains(&axis.name.as_str()));
@@ -39,6 +43,10 @@ pub fn further<'a>(survey: &'a Survey, drawn: &[&str]) -> Result<(Vec<&'a str>, 
 }
 
 /// Whether the rows are scattered points over `x`, such as materials: an axis that changes with `x` is not monotone in it.
+///
+/// # Errors
+///
+/// A part that cannot be read.
 pub fn is_scattered(survey: &Survey, x: &str, further: &[&str]) -> Result<bool, PlotError> {
     for axis in survey.axes.iter().filter(|axis| axis.varies() && axis.name != x && axis.words.is_empty()) {
         if !further.contains(&axis.name.as_str()) && !survey.follows(&axis.name, x)? {
@@ -137,6 +145,10 @@ pub enum GroupRole {
 
 impl Groups {
     /// The groups of the rows of `survey` as panels over the `drawn` axes, and a note on axes that change only with others.
+    ///
+    /// # Errors
+    ///
+    /// A part that cannot be read.
     pub fn of_panels(survey: &Survey, drawn: &[&str]) -> Result<(Groups, Option<String>), PlotError> {
         let (further, along) = further(survey, drawn)?;
         Ok((Groups::new(survey, &further, GroupRole::Panels)?, along))
@@ -144,6 +156,10 @@ impl Groups {
 
     /// The groups of the rows of `survey` over `axes`. If a figure cannot show all of them, an even selection; beyond `MAX_GROUPS`, one group of
     /// all rows. Two independent axes make rows and columns of panels, also for pairs without rows.
+    ///
+    /// # Errors
+    ///
+    /// A part that cannot be read.
     pub fn new(survey: &Survey, axes: &[&str], makes: GroupRole) -> Result<Groups, PlotError> {
         let found = keys(survey, axes, makes)?;
         if found.len() > MAX_GROUPS {

@@ -79,6 +79,10 @@ struct Graph {
 }
 
 /// Draws the lines.
+///
+/// # Errors
+///
+/// No row with a value, or a part that cannot be read.
 pub fn lines(survey: &Survey, plan: &Plan) -> Result<LineFigure, PlotError> {
     let mut rows = Rows::read(survey, plan)?;
     let no_value =

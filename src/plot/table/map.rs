@@ -113,6 +113,10 @@ impl MapFigure {
 }
 
 /// Draws the map.
+///
+/// # Errors
+///
+/// No row with a value, or a part that cannot be read.
 pub fn map(survey: &Survey, plan: &Plan) -> Result<MapFigure, PlotError> {
     let (mut groups, along) = Groups::of_panels(survey, &[&plan.x, &plan.y])?;
     let raster = Raster::new(survey, plan, &groups)?;

@@ -249,6 +249,10 @@ impl Source {
     }
 
     /// The picture of a table.
+    ///
+    /// # Errors
+    ///
+    /// A table without rows, a request that it does not satisfy, or a part that cannot be read.
     pub fn figure(&self, table: &str, request: &Request) -> Result<Figure, PlotError> {
         let survey = Survey::new(&self.folder, &self.manifest, table, &request.conditions)?;
         let no_table = || PlotError::NoTable { name: table.to_owned(), found: self.tables() };

@@ -26,6 +26,11 @@ const CURVE_STEPS: usize = 120;
 /// Relative tolerance of a mark. Chosen: finer than a picture shows.
 const RTOL: f64 = 1e-6;
 
+/// Figure of table `optimal`: columns over an axis, or a map.
+///
+/// # Errors
+///
+/// A request that the table does not satisfy, or a part that cannot be read.
 pub fn draw(scene: &Scene<'_>, shape: &Shape) -> Result<Figure, PlotError> {
     let Shape::Lines(plan) = shape else {
         return match shape {

@@ -12,6 +12,11 @@ use crate::stability::SteadySliding;
 /// Steps along the curve. Chosen: no corner is visible in print.
 const CURVE_STEPS: usize = 400;
 
+/// Figure of a table on a spring: columns over an axis, or a map with the critical stiffness.
+///
+/// # Errors
+///
+/// A request that the table does not satisfy, or a part that cannot be read.
 pub fn draw(scene: &Scene<'_>, shape: &Shape) -> Result<Figure, PlotError> {
     let Shape::Map(plan) = shape else { return plain(scene, shape) };
     let mut map = map::map(scene.survey, plan)?;

@@ -47,6 +47,10 @@ fn columns(survey: &Survey) -> Vec<&'static str> {
 }
 
 /// Histogram: numbers of shortcuts by decade of the gap.
+///
+/// # Errors
+///
+/// A part that cannot be read.
 pub fn histogram(survey: &Survey) -> Result<(Figure, Vec<String>), PlotError> {
     let columns = columns(survey);
     let (groups, along) = Groups::of_panels(survey, &[])?;
@@ -101,6 +105,10 @@ fn edges() -> Vec<(f64, f64)> {
 }
 
 /// Bands of the quantiles of the gap over an axis; for a single landscape, the fraction of its shortcuts over the gap.
+///
+/// # Errors
+///
+/// A part that cannot be read.
 pub fn quantiles(survey: &Survey) -> Result<(Figure, Vec<String>), PlotError> {
     let varies = |name: &&&str| survey.axis(name).is_some_and(|axis| axis.values.len() > 2 || axis.many);
     let across = ACROSS

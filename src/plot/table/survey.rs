@@ -108,6 +108,10 @@ pub struct Survey {
 
 impl Survey {
     /// Surveys the present parts of the table `name` of the dataset in `folder`.
+    ///
+    /// # Errors
+    ///
+    /// A table, column or value that the dataset does not have, or a part that cannot be read.
     pub fn new(
         folder: &Folder,
         manifest: &Manifest,
@@ -258,6 +262,10 @@ impl Survey {
 
     /// Calls `visit` with the cells of `columns` for each row that meets the conditions: numbers, and indices of words in [`Survey::words`]; NaN
     /// for null.
+    ///
+    /// # Errors
+    ///
+    /// A part that cannot be read.
     pub fn each(&self, columns: &[&str], mut visit: impl FnMut(&[f64])) -> Result<(), PlotError> {
         self.each_while(columns, |row| {
             visit(row);
@@ -266,6 +274,10 @@ impl Survey {
     }
 
     /// Calls `visit` for rows as [`Survey::each`] does, until it returns `false`.
+    ///
+    /// # Errors
+    ///
+    /// A part that cannot be read.
     pub fn each_while(&self, columns: &[&str], mut visit: impl FnMut(&[f64]) -> bool) -> Result<(), PlotError> {
         let tested = self.conditions.iter().map(|condition| condition.column.as_str());
         let names: IndexSet<&str> = columns.iter().copied().chain(tested).collect();
@@ -302,6 +314,10 @@ impl Survey {
     }
 
     /// The `axes` with a single value for each combination of `given`, which distinguish no rows. Empty if `given` have too many values.
+    ///
+    /// # Errors
+    ///
+    /// A part that cannot be read.
     pub fn determined(&self, axes: &[&str], given: &[&str]) -> Result<Vec<bool>, PlotError> {
         let mut determined = vec![true; axes.len()];
         let mut known: HashMap<Vec<u64>, Vec<u64>> = HashMap::new();
@@ -324,6 +340,10 @@ impl Survey {
     }
 
     /// Whether two axes rise or fall together: each value of `x` comes with one of `y`, in order.
+    ///
+    /// # Errors
+    ///
+    /// A part that cannot be read.
     pub fn follows(&self, y: &str, x: &str) -> Result<bool, PlotError> {
         let mut known: HashMap<u64, [f64; 2]> = HashMap::new();
         let mut follows = true;

@@ -37,12 +37,12 @@ pub(super) enum Until {
 
 /// Cuts, most of which leave less than three quarters of the area.
 const MOST_CUTS: u32 = 1500;
-/// Fraction of a coefficient that its rounding is.
+/// Relative rounding error of a coefficient.
 const ROUNDING: f64 = 1e-16;
-/// Fraction of a linear function of the place that is rounding of the place.
-const DIGITS: f64 = 1e-30;
-/// Fraction of the larger coefficient that counts in the other, which may vanish.
-const SMALL: f64 = 1e-8;
+/// Relative error of a linear function of the place by rounding of the place.
+const PLACE_ROUNDING: f64 = 1e-30;
+/// Least ratio of the smaller coefficient, which may vanish, to the larger one.
+const MIN_COEFFICIENT_RATIO: f64 = 1e-8;
 
 impl Ellipse {
     /// An ellipse that holds every admissible place. The coefficients of a cubic between -1 and 1 on `[0, 1]` are bounded by
@@ -79,7 +79,7 @@ impl Ellipse {
     /// Whether it is no more than rounding.
     fn is_rounding(&self) -> bool {
         let [y_1, y_2] = self.centre.map(|y| y.high.abs());
-        let sizes = [y_1 + SMALL * y_2, y_2 + SMALL * y_1];
+        let sizes = [y_1 + MIN_COEFFICIENT_RATIO * y_2, y_2 + MIN_COEFFICIENT_RATIO * y_1];
         self.half.iter().zip(sizes).all(|(row, size)| libm::hypot(row[0], row[1]) <= ROUNDING * size)
     }
 
@@ -88,7 +88,7 @@ impl Ellipse {
     /// along the border: as short as the root of that.
     fn is_spent(&self, along: [f64; 2], span: f64) -> bool {
         let [y_1, y_2] = self.centre.map(|y| y.high.abs());
-        span <= DIGITS * (along[0].abs() * y_1 + along[1].abs() * y_2)
+        span <= PLACE_ROUNDING * (along[0].abs() * y_1 + along[1].abs() * y_2)
     }
 
     /// Cuts until the place of least work is close.

@@ -19,21 +19,21 @@ use crate::protocol::cubic::Path;
 use crate::protocol::{SolverStats, optimal};
 
 /// Relative accuracy of the integral.
-const ACCURACY: f64 = 1e-10;
-/// Error that counts for nothing, relative to the work: below it the rounding of `v - v~` shows.
-const NOTHING: f64 = 1e-20;
+const INTEGRAL_RTOL: f64 = 1e-10;
+/// Negligible error relative to the work, from the rounding of `v - v~`.
+const NEGLIGIBLE_ERROR: f64 = 1e-20;
 /// Relative accuracy of the feedback; an error in it counts quadratically until it comes near `v - v~` itself.
 const FEEDBACK: f64 = 1e-12;
 /// Nodes of a panel.
 const NODES: usize = 12;
 /// Most halvings of a panel: kinks where the feedback leaves the bound are caught this closely.
-const DEEPEST: u32 = 30;
+const MAX_BISECTIONS: u32 = 30;
 /// Most panels; smooth cases take two to eight, a kink some thirty.
 const MOST_PANELS: u32 = 1000;
-/// Fraction of the shortcut's velocity below which that of the optimum may be too small for a number.
+/// Fraction of the shortcut's velocity below which that of the optimum may underflow.
 const MIN_DENSITY: f64 = 1e-3;
-/// Panels towards an end are this much shorter, one after the other.
-const SHORTER: f64 = 0.2;
+/// Ratio of the lengths of successive panels towards an end.
+const PANEL_RATIO: f64 = 0.2;
 
 /// A path seen from one of its ends: polynomials in the distance from there, `x` or `1 - x`, so that nothing is lost where
 /// it is short.
@@ -116,7 +116,7 @@ impl Excess<'_> {
         if !self.judge(side, held)?.1 || (!side.from_end && self.judge(side, free)?.1) {
             return Some(None);
         }
-        for _ in 0..DEEPEST {
+        for _ in 0..MAX_BISECTIONS {
             let middle = 0.5 * (held + free);
             if self.judge(side, middle)?.1 {
                 held = middle;
@@ -131,7 +131,7 @@ impl Excess<'_> {
 /// The meeting point of both halves.
 const HALF: f64 = 0.5;
 
-/// `W_s - W*` of a shortcut that costs `work`; `None` where the optimal feedback is not to be had on the way.
+/// `W_s - W*` of a shortcut that costs `work`; `None` where the optimal feedback is not available along it.
 pub(super) fn over_optimum(
     transition: &Transition,
     path: &Path,
@@ -157,7 +157,8 @@ pub(super) fn over_optimum(
             panels.push((side, ends[0], ends[1], whole));
         }
     }
-    let tolerance = ACCURACY * panels.iter().map(|panel| panel.3).sum::<f64>().abs() + NOTHING * work / t_f;
+    let tolerance =
+        INTEGRAL_RTOL * panels.iter().map(|panel| panel.3).sum::<f64>().abs() + NEGLIGIBLE_ERROR * work / t_f;
     let mut left = MOST_PANELS;
     let mut sum = 0.0;
     for (side, from, to, whole) in panels {
@@ -173,10 +174,10 @@ fn layers(side: &EndPolynomials, t_f: f64) -> Vec<f64> {
     let [theta, slopes @ ..] = side.theta;
     let thin = theta / (theta + t_f + slopes.iter().map(|slope| slope.abs()).sum::<f64>());
     let mut places = vec![0.0, HALF];
-    let mut width = HALF * SHORTER;
+    let mut width = HALF * PANEL_RATIO;
     while width > thin {
         places.push(width);
-        width *= SHORTER;
+        width *= PANEL_RATIO;
     }
     places.sort_by(f64::total_cmp);
     places
@@ -224,7 +225,7 @@ fn refine(
     *left = left.checked_sub(2)?;
     let middle = 0.5 * (from + to);
     let halves = [panel(density, from, middle)?, panel(density, middle, to)?];
-    if (halves[0] + halves[1] - whole).abs() <= tolerance || depth >= DEEPEST {
+    if (halves[0] + halves[1] - whole).abs() <= tolerance || depth >= MAX_BISECTIONS {
         return Some(halves[0] + halves[1]);
     }
     let lower = refine(density, from, middle, halves[0], tolerance, depth + 1, left)?;

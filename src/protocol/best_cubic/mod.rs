@@ -43,9 +43,9 @@ const DIFFERENCE_ERROR: f64 = 1e-11;
 /// Roundings of the time beyond the least one.
 const ROUNDINGS: f64 = 8.0;
 
-/// The ellipse is small enough where the work can change by no more than this fraction in it, times `a` where that is
-/// small: all shortcuts cost the same but for their velocities, which count by `a`. Newton's method converges from there.
-const CLOSE: f64 = 1e-5;
+/// Range of the work in the ellipse, relative to the work, at which the ellipse is small enough; times `a` where that is small,
+/// since the work differs only by the velocities, multiplied by `a`. Newton's method converges from there.
+const NEWTON_WORK_RANGE: f64 = 1e-5;
 
 /// The shortcut of least work over the whole plane where `v >= 1` (`bounded`) or `v > 0`.
 ///
@@ -112,7 +112,7 @@ struct Minimum {
 /// Close in on the place of least work, coarsely and then, if it is not inside the set, to the end.
 fn least(rough: &Plane, plane: &Plane, a: f64, stats: &mut SolverStats) -> Result<Minimum, Status> {
     let mut ellipse = Ellipse::around(rough).ok_or(Status::Infeasible)?;
-    let start = match ellipse.close_in(rough, Until::Work(CLOSE * a.min(1.0)), stats) {
+    let start = match ellipse.close_in(rough, Until::Work(NEWTON_WORK_RANGE * a.min(1.0)), stats) {
         Outcome::Empty => return Err(Status::Infeasible),
         Outcome::Close(place) => place,
         Outcome::Exhausted => return Err(Status::NotConverged),
@@ -125,7 +125,7 @@ fn least(rough: &Plane, plane: &Plane, a: f64, stats: &mut SolverStats) -> Resul
     };
     let mut least = Minimum { place, touches: false };
     for condition in plane.conditions(place) {
-        if condition.value <= NEAR * ellipse.span(condition.along).0 {
+        if condition.value <= TOUCHING_SIZES * ellipse.span(condition.along).0 {
             match condition.of {
                 // Cheaper and cheaper towards friction that no optimum has.
                 Bound::Lifetime => return Err(Status::Unproven),
@@ -136,5 +136,5 @@ fn least(rough: &Plane, plane: &Plane, a: f64, stats: &mut SolverStats) -> Resul
     Ok(least)
 }
 
-/// Sizes of the ellipse within which a condition counts as touched.
-const NEAR: f64 = 16.0;
+/// Distance from a condition, in sizes of the ellipse, within which the condition counts as active.
+const TOUCHING_SIZES: f64 = 16.0;

@@ -6,11 +6,11 @@ use crate::protocol::cubic::WorkDerivatives;
 
 /// Newton steps; each is halved as often as needed.
 const MOST_STEPS: u32 = 60;
-/// A step that gains this fraction of the work, times `a` where that is small, is the last: it changes velocities by a fraction
-/// of 1e-11, and what is left by the square of that.
-const LAST: f64 = 1e-22;
-/// A fraction of the work that rounding of its gradient may seem to gain.
-const NOISE: f64 = 1e-12;
+/// Gain of the last step, relative to the work, times `a` where that is small: such a step changes velocities by a fraction of
+/// 1e-11, and the next one would change them by the square of that.
+const LAST_STEP_GAIN: f64 = 1e-22;
+/// Apparent gain by rounding of the gradient, relative to the work.
+const GAIN_ROUNDING: f64 = 1e-12;
 
 /// A step of Newton's method.
 struct Newton {
@@ -53,11 +53,11 @@ pub(super) fn descend(plane: &Plane, a: f64, start: Coefficients, stats: &mut So
         }
         let work = here.work.abs();
         // Rounding of the gradient, once Newton's method gains no more.
-        if sure && decrement <= NOISE * a.min(1.0) * work && decrement >= 0.25 * before {
+        if sure && decrement <= GAIN_ROUNDING * a.min(1.0) * work && decrement >= 0.25 * before {
             return Some(place);
         }
         before = decrement;
-        let last = sure && decrement <= LAST * a.min(1.0) * work;
+        let last = sure && decrement <= LAST_STEP_GAIN * a.min(1.0) * work;
         let mut fraction = 1.0;
         (place, here) = loop {
             let trial = moved(place, step.map(|step| fraction * step));

@@ -26,10 +26,10 @@ pub(super) fn nodes_of(bin: usize) -> u32 {
 
 /// Full bundles that are summed together. Measured: all are prepared first, so that their logarithms overlap in the pipeline of the processor
 /// (`cargo bench --bench landscape`).
-const READY: usize = 8;
+const MAX_FULL_BUNDLES: usize = 8;
 
 /// Bundles of all bins, and full bundles.
-const ALL: usize = BINS + READY;
+const LOADS: usize = BINS + MAX_FULL_BUNDLES;
 
 /// A bundle, the indices of its shortcuts, and its bin.
 #[derive(Debug, Clone, Copy)]
@@ -45,12 +45,12 @@ struct PendingBatch {
 /// All bins.
 #[derive(Debug, Clone)]
 pub(super) struct Bins {
-    loads: [PendingBatch; ALL],
+    loads: [PendingBatch; LOADS],
     /// Indices of loads: the one that each bin fills, then full ones, then empty ones.
-    order: [usize; ALL],
+    order: [usize; LOADS],
     /// The number of full bundles.
     ready: usize,
-    prepared: [Prepared; READY],
+    prepared: [Prepared; MAX_FULL_BUNDLES],
     space: NodeBuffer,
     /// Plans of cells of the last landscape.
     pub cells: Cells,
@@ -76,10 +76,10 @@ impl Bins {
         let load = PendingBatch { panel_batch: PanelBatch::EMPTY, indices: [0; LANES], count: 0, bin: 0, whole: false };
         let order = std::array::from_fn(|i| i);
         Bins {
-            loads: [load; ALL],
+            loads: [load; LOADS],
             order,
             ready: 0,
-            prepared: [Prepared::EMPTY; READY],
+            prepared: [Prepared::EMPTY; MAX_FULL_BUNDLES],
             space: NodeBuffer::EMPTY,
             cells: Cells::EMPTY,
         }
@@ -126,7 +126,7 @@ impl Bins {
         load.indices.copy_from_slice(indices);
         (load.count, load.bin, load.whole) = (LANES, plan.bin[first] as usize, true);
         self.ready += 1;
-        if self.ready == READY {
+        if self.ready == MAX_FULL_BUNDLES {
             self.sum(of, work);
         }
     }
@@ -146,7 +146,7 @@ impl Bins {
             (load.bin, load.whole) = (bin, false);
             self.order.swap(bin, BINS + self.ready);
             self.ready += 1;
-            if self.ready == READY {
+            if self.ready == MAX_FULL_BUNDLES {
                 self.sum(of, work);
             }
         }

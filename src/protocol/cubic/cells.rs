@@ -9,7 +9,9 @@ use multiversion::multiversion;
 
 use super::bins::CUT_FROM;
 use super::path::{Ends, Path};
-use super::plan::{BLOCK, Block, CHEAP_NODES, MIN_GAP, PAIRS, Places, Plan, SINGLE_COST, nearest, places, rooted};
+use super::plan::{
+    BLOCK, Block, MAX_CHEAP_NODES, MIN_GAP, PAIRS, Places, Plan, SINGLE_PRECISION_ERROR, nearest, places, rooted,
+};
 use super::rules::{Accuracy, NODE_STEP, ZEROS};
 use crate::numerics::elementary::rough_ln;
 use crate::numerics::lanes::{LANES, Vector};
@@ -20,7 +22,7 @@ pub(super) struct Cells {
     frame: Option<Frame>,
     /// The age of the current frame.
     age: u64,
-    of: [Cell; SLOTS],
+    of: [Cell; CACHED_CELLS],
 }
 
 /// The inputs that determine the cells.
@@ -55,10 +57,10 @@ struct Cell {
 type CellKey = [u64; 2];
 
 /// Cells in the cache. Chosen: the cells of two or three rows of a map.
-const SLOTS: usize = 64;
+const CACHED_CELLS: usize = 64;
 
 /// Cells that are planned together, each from all its samples.
-const TOGETHER: usize = BLOCK / SAMPLES.len();
+const CELLS_PER_PLAN: usize = BLOCK / SAMPLES.len();
 
 /// Samples of a cell: its corners, then the middles of its edges.
 const SAMPLES: [[f64; 2]; 8] =
@@ -69,10 +71,10 @@ const CORNERS: usize = 4;
 
 /// Cells per power of 2 below the mean of n, the scale of the feasible set. Measured: more cells need more plans, fewer have worse maps (`cargo
 /// bench --bench landscape`).
-const CELLS: f64 = 8.0;
+const CELLS_PER_UNIT: f64 = 8.0;
 
 /// `1.5 * 2^52`, whose last bit is 1: added to a number, it leaves the nearest integer.
-const ONES: f64 = 6755399441055744.0;
+const INTEGER_SHIFT: f64 = 6755399441055744.0;
 
 /// Greatest distance of a planned cell from the origin, in cells. Chosen: coordinates of farther cells lose digits.
 const MAX_CELL: f64 = 1e9;
@@ -82,10 +84,10 @@ const MAX_CELL: f64 = 1e9;
 const GAP_FRACTION: f64 = 0.97;
 
 /// Greatest relative error of the interpolated ln rho. Measured: an own plan costs more nodes than it saves (`cargo bench --bench landscape`).
-const MAX_SLACK: f64 = 0.12;
+const MAX_INTERPOLATION_RTOL: f64 = 0.12;
 
 /// Bin number of a shortcut that needs its own plan.
-pub(super) const OWN: u32 = u32::MAX;
+pub(super) const OWN_PLAN_BIN: u32 = u32::MAX;
 
 impl Frame {
     /// The frame of the landscape between `ends`.
@@ -93,7 +95,7 @@ impl Frame {
         let mean = ends.t_f - ends.rise.high;
         // The exponent of the mean only.
         let power = f64::from_bits(mean.to_bits() & 0x7FF0_0000_0000_0000);
-        let scale = CELLS / power;
+        let scale = CELLS_PER_UNIT / power;
         Frame { ends: *ends, accuracy: accuracy.clone(), scale: if scale.is_normal() { scale } else { 1.0 } }
     }
 }
@@ -113,7 +115,7 @@ impl Cell {
 }
 
 impl Cells {
-    pub const EMPTY: Cells = Cells { frame: None, age: 0, of: [Cell::NONE; SLOTS] };
+    pub const EMPTY: Cells = Cells { frame: None, age: 0, of: [Cell::NONE; CACHED_CELLS] };
 
     /// Discards the cells of another frame.
     pub fn begin(&mut self, frame: &Frame) {
@@ -126,7 +128,7 @@ impl Cells {
     /// The slot of a cell.
     #[inline(always)]
     fn slot([i, j]: CellKey) -> u32 {
-        i.wrapping_mul(37).wrapping_add(j) as u32 % SLOTS as u32
+        i.wrapping_mul(37).wrapping_add(j) as u32 % CACHED_CELLS as u32
     }
 
     #[inline(always)]
@@ -158,13 +160,13 @@ impl Cells {
             last = place;
         }
         let (runs, missing) = (&runs[..count], &missing[..lost]);
-        for places in missing.chunks(TOGETHER) {
-            let mut padded = [places[0]; TOGETHER];
+        for places in missing.chunks(CELLS_PER_PLAN) {
+            let mut padded = [places[0]; CELLS_PER_PLAN];
             padded[..places.len()].copy_from_slice(places);
             // Free lanes plan the cells that probably follow.
             let last = places[places.len() - 1];
             let step = [0, 1].map(|axis| last[axis].wrapping_sub(before[axis]));
-            for next in places.len()..TOGETHER {
+            for next in places.len()..CELLS_PER_PLAN {
                 padded[next] = [0, 1].map(|axis| padded[next - 1][axis].wrapping_add(step[axis]));
             }
             for cell in chart(frame, &padded) {
@@ -180,7 +182,7 @@ impl Cells {
             let place = located.place(lane);
             let slot = Cells::slot(place);
             if !self.holds(slot, place) {
-                let [cell, ..] = chart(frame, &[place; TOGETHER]);
+                let [cell, ..] = chart(frame, &[place; CELLS_PER_PLAN]);
                 self.keep(cell);
             }
             self.of[slot as usize].write(located.local[0][lane], located.local[1][lane], lane, plan);
@@ -223,9 +225,9 @@ fn locate(scale: f64, a_2: &Block, a_3: &Block) -> CellOffsets {
     for ((places, local), a) in located.places.iter_mut().zip(&mut located.local).zip([a_2, a_3]) {
         for i in 0..BLOCK {
             let x = a[i] * scale;
-            let middle = x + ONES;
+            let middle = x + INTEGER_SHIFT;
             places[i] = middle.to_bits();
-            local[i] = x - (middle - ONES);
+            local[i] = x - (middle - INTEGER_SHIFT);
         }
     }
     let [i, j] = &located.places;
@@ -251,8 +253,8 @@ impl Cell {
 #[inline(always)]
 fn bin(pace: f64, least: f64) -> u32 {
     // The sufficient number of steps, rounded up; the first bin is one step.
-    let last = (1.0 / pace - 0.5) + ONES;
-    if pace > least { last.to_bits() as u32 } else { OWN }
+    let last = (1.0 / pace - 0.5) + INTEGER_SHIFT;
+    if pace > least { last.to_bits() as u32 } else { OWN_PLAN_BIN }
 }
 
 /// Writes the plans of shortcuts of cells.
@@ -260,9 +262,9 @@ fn bin(pace: f64, least: f64) -> u32 {
     "x86_64+avx+avx2+bmi1+bmi2+avx512f+avx512bw+avx512cd+avx512dq+avx512vl",
     "x86_64+avx+avx2+bmi1+bmi2"
 ))]
-fn assemble(cells: &[Cell; SLOTS], runs: &[LaneRun], located: &CellOffsets, plan: &mut Plan) {
+fn assemble(cells: &[Cell; CACHED_CELLS], runs: &[LaneRun], located: &CellOffsets, plan: &mut Plan) {
     let from = |run: usize| runs.get(run).map_or(BLOCK, |run| run.from as usize);
-    let cell = |run: usize| &cells[runs[run].slot as usize % SLOTS];
+    let cell = |run: usize| &cells[runs[run].slot as usize % CACHED_CELLS];
     let mut run = 0;
     for start in (0..BLOCK).step_by(LANES) {
         let lanes = start..start + LANES;
@@ -307,9 +309,9 @@ const ORDER: Vector = Vector([0.5, 1.5, 2.5, 3.5, 4.5, 5.5, 6.5, 7.5]);
 
 /// Copies one value per cell to all its samples.
 #[inline(always)]
-fn spread<T: Copy>(of: [T; TOGETHER]) -> [T; BLOCK] {
+fn spread<T: Copy>(of: [T; CELLS_PER_PLAN]) -> [T; BLOCK] {
     let mut all = [of[0]; BLOCK];
-    for places in all.chunks_exact_mut(TOGETHER) {
+    for places in all.chunks_exact_mut(CELLS_PER_PLAN) {
         places.copy_from_slice(&of);
     }
     all
@@ -317,10 +319,10 @@ fn spread<T: Copy>(of: [T; TOGETHER]) -> [T; BLOCK] {
 
 /// The least value of each cell.
 #[inline(always)]
-fn lowest(values: &[f32; BLOCK]) -> [f32; TOGETHER] {
-    let mut lowest = [f32::MAX; TOGETHER];
-    for places in values.chunks_exact(TOGETHER) {
-        for c in 0..TOGETHER {
+fn lowest(values: &[f32; BLOCK]) -> [f32; CELLS_PER_PLAN] {
+    let mut lowest = [f32::MAX; CELLS_PER_PLAN];
+    for places in values.chunks_exact(CELLS_PER_PLAN) {
+        for c in 0..CELLS_PER_PLAN {
             lowest[c] = if places[c] < lowest[c] { places[c] } else { lowest[c] };
         }
     }
@@ -332,13 +334,13 @@ fn lowest(values: &[f32; BLOCK]) -> [f32; TOGETHER] {
     "x86_64+avx+avx2+bmi1+bmi2+avx512f+avx512bw+avx512cd+avx512dq+avx512vl",
     "x86_64+avx+avx2+bmi1+bmi2"
 ))]
-fn chart(frame: &Frame, cells: &[CellKey; TOGETHER]) -> [Cell; TOGETHER] {
+fn chart(frame: &Frame, cells: &[CellKey; CELLS_PER_PLAN]) -> [Cell; CELLS_PER_PLAN] {
     let Frame { ends, accuracy, scale } = frame;
-    let middles = [0, 1].map(|k| std::array::from_fn(|c| f64::from_bits(cells[c][k]) - ONES));
+    let middles = [0, 1].map(|k| std::array::from_fn(|c| f64::from_bits(cells[c][k]) - INTEGER_SHIFT));
     let (mut a_2, mut a_3) = (spread(middles[0]), spread(middles[1]));
     let size = 1.0 / scale;
     for (sample, [u, v]) in SAMPLES.into_iter().enumerate() {
-        for i in sample * TOGETHER..(sample + 1) * TOGETHER {
+        for i in sample * CELLS_PER_PLAN..(sample + 1) * CELLS_PER_PLAN {
             (a_2[i], a_3[i]) = ((a_2[i] + u) * size, (a_3[i] + v) * size);
         }
     }
@@ -349,30 +351,30 @@ fn chart(frame: &Frame, cells: &[CellKey; TOGETHER]) -> [Cell; TOGETHER] {
     }
     let centres = Centres::of(&shadow);
     let Squared { focal: squared, room } = Squared::of(&re, &im, &centres);
-    let mut gain = [0.0f32; TOGETHER];
+    let mut gain = [0.0f32; CELLS_PER_PLAN];
     for (gain, (squared, straight)) in gain.iter_mut().zip(lowest(&squared).into_iter().zip(lowest(&straight))) {
         *gain = squared - straight;
     }
     let (gains, sides) = (spread(gain), spread(centres.side));
-    let (mut paces, mut lost, mut unsure) = ([0.0; BLOCK], [0.0f32; BLOCK], [0.0f32; TOGETHER]);
+    let (mut paces, mut lost, mut unsure) = ([0.0; BLOCK], [0.0f32; BLOCK], [0.0f32; CELLS_PER_PLAN]);
     let steady = if ends.rise.high < 0.0 { 1.0 } else { -1.0 };
     let mean = ends.t_f - ends.rise.high;
     for i in 0..BLOCK {
         let focal = if gains[i] > 0.0 { squared[i] } else { straight[i] };
         // The margin for errors of the zeros.
-        let excess = (f64::from(focal) - 2.0) * (0.5 / (1.0 + SINGLE_COST));
+        let excess = (f64::from(focal) - 2.0) * (0.5 / (1.0 + SINGLE_PRECISION_ERROR));
         let excess = if excess > 0.0 { excess } else { 0.0 };
         paces[i] = rough_ln(1.0 + excess + (excess * (2.0 + excess)).sqrt()) / accuracy.pace;
     }
-    for i in 0..CORNERS * TOGETHER {
+    for i in 0..CORNERS * CELLS_PER_PLAN {
         let path = Path::new(ends, a_2[i], a_3[i]);
         let side = if gains[i] > 0.0 { f64::from(sides[i]) } else { steady };
         // The mean of n is a lower bound of the sum of the magnitudes of its coefficients.
         let kept = path.is_sound(side > 0.0, 0.0, -side, accuracy) & (accuracy.rounding * mean >= 3.0 * path.slack());
         lost[i] = if kept { 0.0 } else { 1.0 };
     }
-    for (lost, doubt) in lost.chunks_exact(TOGETHER).zip(doubt.chunks_exact(TOGETHER)) {
-        for c in 0..TOGETHER {
+    for (lost, doubt) in lost.chunks_exact(CELLS_PER_PLAN).zip(doubt.chunks_exact(CELLS_PER_PLAN)) {
+        for c in 0..CELLS_PER_PLAN {
             unsure[c] += lost[c] + doubt[c];
         }
     }
@@ -387,10 +389,10 @@ fn chart(frame: &Frame, cells: &[CellKey; TOGETHER]) -> [Cell; TOGETHER] {
         }
         let (side, gap) = (f64::from(side), f64::from(gap));
         let (from, to) = if squared { (gap.sqrt(), (1.0 + gap).sqrt()) } else { (0.0, 1.0) };
-        let most = if squared && room[c] < 0.0 { CHEAP_NODES / NODE_STEP } else { CUT_FROM };
+        let most = if squared && room[c] < 0.0 { MAX_CHEAP_NODES / NODE_STEP } else { CUT_FROM };
         let squarings = if squared { 1.0 } else { 0.0 };
         let cell = Cell { side, gap, squarings, from, to, least: 1.0 / most as f64, ..none };
-        interpolated(std::array::from_fn(|sample| paces[sample * TOGETHER + c]))
+        interpolated(std::array::from_fn(|sample| paces[sample * CELLS_PER_PLAN + c]))
             .map_or(none, |pace| Cell { pace, ..cell })
     })
 }
@@ -404,7 +406,7 @@ fn interpolated([mm, mp, pm, pp, m_low, m_high, low_m, high_m]: [f64; SAMPLES.le
     let off_v = greater(off(low_m, mm, mp), off(high_m, pm, pp));
     let slack = off_u + off_v;
     let lowest = -greater(greater(-mm, -mp), greater(-pm, -pp));
-    (slack <= MAX_SLACK * lowest).then_some([
+    (slack <= MAX_INTERPOLATION_RTOL * lowest).then_some([
         0.25 * ((mm + pp) + (mp + pm)) - slack,
         0.5 * ((pp - mm) + (pm - mp)),
         0.5 * ((pp - mm) - (pm - mp)),
@@ -415,11 +417,11 @@ fn interpolated([mm, mp, pm, pp, m_low, m_high, low_m, high_m]: [f64; SAMPLES.le
 /// The centres of one map for each cell.
 struct Centres {
     /// The end: +1 the upper, -1 the lower.
-    side: [f32; TOGETHER],
+    side: [f32; CELLS_PER_PLAN],
     /// The distance beyond it.
-    gap: [f32; TOGETHER],
+    gap: [f32; CELLS_PER_PLAN],
     /// Whether all samples of a cell need the same end.
-    common: [bool; TOGETHER],
+    common: [bool; CELLS_PER_PLAN],
 }
 
 impl Centres {
@@ -434,8 +436,9 @@ impl Centres {
             (above[i], below[i]) = if upper { (beyond, -1.0) } else { (-1.0, beyond) };
         }
         let (above, below) = (lowest(&above), lowest(&below));
-        let mut centres = Centres { side: [0.0; TOGETHER], gap: [0.0; TOGETHER], common: [false; TOGETHER] };
-        for c in 0..TOGETHER {
+        let mut centres =
+            Centres { side: [0.0; CELLS_PER_PLAN], gap: [0.0; CELLS_PER_PLAN], common: [false; CELLS_PER_PLAN] };
+        for c in 0..CELLS_PER_PLAN {
             let beyond = if above[c] >= 0.0 { above[c] } else { below[c] };
             centres.side[c] = if above[c] >= 0.0 { 1.0 } else { -1.0 };
             centres.gap[c] = GAP_FRACTION as f32 * beyond;
@@ -450,7 +453,7 @@ struct Squared {
     /// The focal sums of the samples.
     focal: [f32; BLOCK],
     /// Negative where the centre of the map itself limits the focal sum, so that a larger power might help.
-    room: [f32; TOGETHER],
+    room: [f32; CELLS_PER_PLAN],
 }
 
 impl Squared {

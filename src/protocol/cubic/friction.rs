@@ -22,20 +22,20 @@ pub(super) struct FrictionBounds {
 }
 
 /// The greatest decrease of friction by either logarithm. Derived: a half, less rounding.
-const HALF: f64 = 0.499;
+const MAX_LOGARITHM_DECREASE: f64 = 0.499;
 
 impl FrictionBounds {
     pub fn new(law: Law, ends: &Ends) -> FrictionBounds {
         let Law { a, b } = law;
         let theta = if b > a {
-            exp(-HALF / (b - a))
-        } else if (a - b) * ln(ends.theta_0.high + ends.t_f) < HALF {
+            exp(-MAX_LOGARITHM_DECREASE / (b - a))
+        } else if (a - b) * ln(ends.theta_0.high + ends.t_f) < MAX_LOGARITHM_DECREASE {
             // Theta grows at most by the duration.
             0.0
         } else {
             f64::INFINITY
         };
-        FrictionBounds { n: ends.t_f * exp(-HALF / a), theta }
+        FrictionBounds { n: ends.t_f * exp(-MAX_LOGARITHM_DECREASE / a), theta }
     }
 
     /// A bit mask of the feasible shortcuts that the bounds do not decide.

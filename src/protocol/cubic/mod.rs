@@ -32,7 +32,8 @@ pub(super) use path::{Ends, Path, rise};
 use queue::Queue;
 use rules::{Accuracy, Panel, Zeros, choose};
 use screen::{
-    SEARCH, SPAN, SPANS, Verdict, end_velocities, end_velocities_of_span, inner_velocities, on_side, screen, settle,
+    BATCH_SPANS, SEARCH_SHORTCUTS, SPAN_SHORTCUTS, Verdict, end_velocities, end_velocities_of_span, inner_velocities,
+    on_side, screen, settle,
 };
 pub(super) use work_derivatives::{Basis, WorkDerivatives};
 use works::Works;
@@ -114,14 +115,14 @@ impl Landscape {
             works: Works::new(self, &mut work[..works], &mut bins),
             doubtful: Vec::new(),
         };
-        for start in (0..count).step_by(SPAN * SPANS) {
-            let stretch = start..(start + SPAN * SPANS).min(count);
-            let settled = match (a_2[stretch.clone()].try_into(), a_3[stretch.clone()].try_into()) {
+        for start in (0..count).step_by(SPAN_SHORTCUTS * BATCH_SPANS) {
+            let group = start..(start + SPAN_SHORTCUTS * BATCH_SPANS).min(count);
+            let settled = match (a_2[group.clone()].try_into(), a_3[group.clone()].try_into()) {
                 (Ok(a_2), Ok(a_3)) => settle(&self.ends, &self.floors, a_2, a_3),
-                _ => [None; SPANS],
+                _ => [None; BATCH_SPANS],
             };
-            for (first, common) in stretch.clone().step_by(SPAN).zip(settled) {
-                let span = first..(first + SPAN).min(stretch.end);
+            for (first, common) in group.clone().step_by(SPAN_SHORTCUTS).zip(settled) {
+                let span = first..(first + SPAN_SHORTCUTS).min(group.end);
                 match (common, a_2[span.clone()].try_into(), a_3[span.clone()].try_into()) {
                     (Some(common), Ok(a_2), Ok(a_3)) => evaluation.span(first, a_2, a_3, common),
                     _ => {
@@ -184,7 +185,7 @@ struct Evaluation<'a> {
     status: &'a mut [Status],
     v_min: &'a mut [f64],
     /// Shortcuts whose least velocity is not certain to be at an end.
-    open: Queue<SEARCH>,
+    open: Queue<SEARCH_SHORTCUTS>,
     works: Works<'a>,
     /// Shortcuts with possibly negative friction.
     doubtful: Vec<UndecidedShortcuts>,
@@ -193,13 +194,19 @@ struct Evaluation<'a> {
 impl Evaluation<'_> {
     /// Adds a span of shortcuts from `first` on, with one status.
     #[inline(always)]
-    fn span(&mut self, first: usize, a_2: &[f64; SPAN], a_3: &[f64; SPAN], Verdict { status, sound }: Verdict) {
-        self.status[first..first + SPAN].fill(status);
+    fn span(
+        &mut self,
+        first: usize,
+        a_2: &[f64; SPAN_SHORTCUTS],
+        a_3: &[f64; SPAN_SHORTCUTS],
+        Verdict { status, sound }: Verdict,
+    ) {
+        self.status[first..first + SPAN_SHORTCUTS].fill(status);
         if status == Status::Infeasible {
             return;
         }
         if !sound {
-            self.doubtful.push(UndecidedShortcuts { first, count: SPAN, line: true });
+            self.doubtful.push(UndecidedShortcuts { first, count: SPAN_SHORTCUTS, line: true });
         }
         if first < self.v_min.len() {
             self.velocities_of_span(first, a_2, a_3);
@@ -240,13 +247,13 @@ impl Evaluation<'_> {
 
     /// Writes the least velocities of a span of feasible shortcuts with one status; uncertain ones are queued.
     #[inline(always)]
-    fn velocities_of_span(&mut self, first: usize, a_2: &[f64; SPAN], a_3: &[f64; SPAN]) {
+    fn velocities_of_span(&mut self, first: usize, a_2: &[f64; SPAN_SHORTCUTS], a_3: &[f64; SPAN_SHORTCUTS]) {
         let (ends, status) = (&self.of.ends, self.status[first]);
         let wanted = &mut self.v_min[first..];
         let left = match wanted.first_chunk_mut() {
             Some(wanted) => end_velocities_of_span(ends, a_2, a_3, status, wanted),
             None => {
-                let mut least = [0.0; SPAN];
+                let mut least = [0.0; SPAN_SHORTCUTS];
                 let left = end_velocities_of_span(ends, a_2, a_3, status, &mut least);
                 wanted.copy_from_slice(&least[..wanted.len()]);
                 left

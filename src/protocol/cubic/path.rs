@@ -196,7 +196,7 @@ impl<'a> Path<'a> {
             let fine = (accuracy.rounding * theta >= theta_size) & (accuracy.slight * n >= n_size);
             // An error of ln n at an end affects the whole panel, and the sums multiply theta and n of two nodes.
             let size = theta * n;
-            sound &= n >= MIN_END * (n0.abs() + n1.abs() + n2.abs());
+            sound &= n >= MIN_END_FRACTION * (n0.abs() + n1.abs() + n2.abs());
             sound &= (fine | (x == 0.0)) & (size > 1e-120) & (size < 1e120);
         }
         sound
@@ -282,7 +282,7 @@ impl<'a> Path<'a> {
 
 /// Least n at an end of a panel for sums without logarithms, as a fraction of its coefficients. Measured: below it the rounding of `n'/n` is
 /// visible (`tests/solver/stress/landscape.rs`).
-const MIN_END: f64 = 1e-4;
+const MIN_END_FRACTION: f64 = 1e-4;
 
 /// Greatest number of steps of Dinkelbach's method. Chosen: each step doubles the digits.
 pub(super) const MAX_STEPS: u32 = 60;

@@ -9,7 +9,7 @@ use multiversion::multiversion;
 use super::bins::BINS;
 use super::path::{Ends, Path};
 use super::rules::{
-    Accuracy, FAR, MIN_THIRD, NODE_STEP, THETA_ZEROS, ZEROS, cut, is_near_start, polished, rough_zeros,
+    Accuracy, MAX_ZERO_DISTANCE, MIN_THIRD, NODE_STEP, THETA_ZEROS, ZEROS, cut, is_near_start, polished, rough_zeros,
 };
 use crate::numerics::real::Real;
 
@@ -45,7 +45,7 @@ impl Plan {
 pub(super) const BLOCK: usize = 32;
 
 /// Single precision numbers of the widest vectors.
-const WIDTH: usize = 16;
+const SINGLE_LANES: usize = 16;
 
 /// One value for each shortcut.
 pub(super) type Block = [f64; BLOCK];
@@ -54,7 +54,7 @@ pub(super) type Block = [f64; BLOCK];
 pub(super) const MOST_SQUARINGS: u32 = 3;
 
 /// Number of nodes of which a larger power cannot save many. Measured (`cargo bench --bench landscape`).
-pub(super) const CHEAP_NODES: usize = 32;
+pub(super) const MAX_CHEAP_NODES: usize = 32;
 
 /// Least half distance of a pair of zeros of n that is known to some digits. Derived: the root of the rounding of the discriminant, times 100.
 const MIN_PAIR: f64 = 1e-6;
@@ -66,7 +66,7 @@ pub(super) const MIN_GAP: f64 = 1e-10;
 pub(super) const PAIRS: [usize; 2] = [1, 3];
 
 /// The weight of a doubtful zero of n. Chosen: more than all zeros of theta.
-const DOUBT_OF_N: f32 = 8.0;
+const N_DOUBT_WEIGHT: f32 = 8.0;
 
 /// Whether zeros have few digits; undecided shortcuts go to the next plan.
 const fn is_coarse<T: Real>() -> bool {
@@ -85,7 +85,7 @@ const N_RANGE: (f64, f64) = (1e-10, 1e10);
 const MIN_PAIR_SQUARED: f64 = 1e-3;
 
 /// Relative error of the focal sum minus 2 by zeros in single precision. Measured (`tests/solver/stress/landscape.rs`).
-pub(super) const SINGLE_COST: f64 = 0.03;
+pub(super) const SINGLE_PRECISION_ERROR: f64 = 0.03;
 
 /// Chooses the panels over `[0, 1]` of the feasible shortcuts `(a_2[i], a_3[i])` in single precision, with squares at most; `deeper` marks
 /// shortcuts that need more.
@@ -148,7 +148,7 @@ pub(super) fn places<T: Real>(ends: &Ends, a_2: &Block, a_3: &Block) -> Places<T
     for k in PAIRS {
         for i in 0..BLOCK {
             let (place, height) = (places.re[k + 1][i], places.im[k + 1][i]);
-            places.re[k + 1][i] = if height > zero { T::of(FAR) } else { place };
+            places.re[k + 1][i] = if height > zero { T::of(MAX_ZERO_DISTANCE) } else { place };
             places.im[k + 1][i] = zero;
         }
     }
@@ -187,14 +187,14 @@ impl<T: Real> Places<T> {
         let Places { re, im, doubt } = self;
         for k in 0..ZEROS {
             let least = T::of(if k < THETA_ZEROS || is_coarse::<T>() { MIN_THIRD } else { MIN_PAIR });
-            let weight = if k < THETA_ZEROS { 1.0 } else { DOUBT_OF_N };
+            let weight = if k < THETA_ZEROS { 1.0 } else { N_DOUBT_WEIGHT };
             for i in 0..BLOCK {
                 let close = (re[k][i] > T::of(0.0)) & (re[k][i] < T::of(1.0)) & (im[k][i] < least);
                 doubt[i] += if close { weight } else { 0.0 };
             }
         }
         for i in 0..BLOCK {
-            let of_theta = !is_coarse::<T>() && doubt[i] > 0.0 && doubt[i] < DOUBT_OF_N;
+            let of_theta = !is_coarse::<T>() && doubt[i] > 0.0 && doubt[i] < N_DOUBT_WEIGHT;
             let pair = of_theta.then(|| Path::new(ends, a_2[i], a_3[i]).close_pair()).flatten();
             if let Some((x, height, reach)) = pair {
                 for k in 0..THETA_ZEROS {
@@ -283,13 +283,13 @@ fn panels<T: Real, const SQUARINGS: u32>(
     // A zero beyond the end is given by its distance from 1.
     for i in 0..BLOCK {
         let blurred = (side[i] > zero) & (high[i] == 1.0) & (gap[i] > zero) & (gap[i] < T::of(MIN_GAP));
-        doubt[i] += if blurred { DOUBT_OF_N } else { 0.0 };
+        doubt[i] += if blurred { N_DOUBT_WEIGHT } else { 0.0 };
     }
     // A focal sum is reduced by the possible error of the zeros.
-    let lost = if is_coarse::<T>() { SINGLE_COST } else { 0.0 };
+    let lost = if is_coarse::<T>() { SINGLE_PRECISION_ERROR } else { 0.0 };
     let steps = accuracy.in_steps();
     let limits: [f32; BINS] = std::array::from_fn(|i| (steps[i] + lost * (steps[i] - 2.0)) as f32);
-    let cheap = limits[CHEAP_NODES / NODE_STEP - 1];
+    let cheap = limits[MAX_CHEAP_NODES / NODE_STEP - 1];
     let Powers { squarings, short } = powers::<T, SQUARINGS>([real, size], &gap, [low, high], cheap, &mut focal);
     let bin = bins(&limits, &focal);
     for i in 0..BLOCK {
@@ -389,10 +389,10 @@ fn powers<T: Real, const SQUARINGS: u32>(
 #[inline(always)]
 fn bins(limits: &[f32; BINS], focal: &[f32; BLOCK]) -> [f32; BLOCK] {
     let mut bin = [0.0f32; BLOCK];
-    for (bins, focals) in bin.chunks_exact_mut(WIDTH).zip(focal.chunks_exact(WIDTH)) {
-        let mut counts = [0.0f32; WIDTH];
+    for (bins, focals) in bin.chunks_exact_mut(SINGLE_LANES).zip(focal.chunks_exact(SINGLE_LANES)) {
+        let mut counts = [0.0f32; SINGLE_LANES];
         for limit in limits {
-            for i in 0..WIDTH {
+            for i in 0..SINGLE_LANES {
                 counts[i] += if focals[i] >= *limit { 0.0 } else { 1.0 };
             }
         }

@@ -52,21 +52,21 @@ pub(super) struct Panel {
 
 /// Number of nodes up to which no better map is searched. Measured: the search costs as much as about sixteen nodes (`cargo bench --bench
 /// landscape`).
-const PLAIN_NODES: usize = 32;
+const MAX_PLAIN_NODES: usize = 32;
 /// Number of nodes from which the sinh map is tried. Measured: its logarithms and exponentials pay off from there on (`cargo bench --bench
 /// landscape`).
-const SINH_FROM: usize = 40;
+const MIN_SINH_NODES: usize = 40;
 /// Number of nodes above which a panel is cut: that of the last bin.
-const CUT_FROM: usize = 80;
+const MAX_UNCUT_NODES: usize = 80;
 /// Greatest number of nodes of a panel.
 const MOST_NODES: usize = 256;
 /// Step of the number of nodes: half of the lanes.
 pub(super) const NODE_STEP: usize = 4;
 /// Greatest depth of cuts: a panel is never shorter than `2^-12` of its parent.
 const MAX_DEPTH: u32 = 12;
-/// Safety margin of the estimate: `e^MARGIN` bounds the ratio of the residues to the integral. Measured: `tests/budgets.csv` has the remaining
+/// Safety margin of the estimate: `e^LN_SAFETY_FACTOR` bounds the ratio of the residues to the integral. Measured: `tests/budgets.csv` has the remaining
 /// errors.
-const MARGIN: f64 = 3.5;
+const LN_SAFETY_FACTOR: f64 = 3.5;
 
 /// The requested accuracy, as the focal sums (see [`focal`]) from which a number of nodes suffices.
 #[derive(Debug, Clone, PartialEq)]
@@ -83,8 +83,8 @@ pub(super) struct Accuracy {
     pub longest: f64,
 }
 
-/// Loosest accuracy of the parts of a cut panel. Measured: at looser accuracies the residues of a close pair exceed [`MARGIN`].
-const LOOSEST_PARTS: f64 = 1e-5;
+/// Loosest accuracy of the parts of a cut panel. Measured: at looser accuracies the residues of a close pair exceed [`LN_SAFETY_FACTOR`].
+const MAX_PARTS_TOLERANCE: f64 = 1e-5;
 
 /// The focal sums from which [`NODE_STEP`] nodes suffice for `tolerance`, then twice as many, and so on.
 fn focal_sums(tolerance: f64) -> [f64; MOST_NODES / NODE_STEP] {
@@ -99,7 +99,7 @@ fn focal_sums(tolerance: f64) -> [f64; MOST_NODES / NODE_STEP] {
 
 /// ln rho from which [`NODE_STEP`] nodes suffice for `tolerance`: `rho^(2 nodes) = e^digits`.
 fn pace(tolerance: f64) -> f64 {
-    0.5 * (MARGIN - ln(tolerance)) / NODE_STEP as f64
+    0.5 * (LN_SAFETY_FACTOR - ln(tolerance)) / NODE_STEP as f64
 }
 
 impl Accuracy {
@@ -110,14 +110,14 @@ impl Accuracy {
         let longest = rounding / ((law.b - law.a).abs() * f64::EPSILON);
         // A pair of zeros that needs no cut is at least as far from the real axis as the height of the smallest ellipse, in units of half the
         // panel; theta there is at least of the order of its square.
-        let height = 0.5 * (MARGIN - ln(tolerance)) / CUT_FROM as f64;
+        let height = 0.5 * (LN_SAFETY_FACTOR - ln(tolerance)) / MAX_UNCUT_NODES as f64;
         let slight = if most <= longest * (0.25 * height * height) { rounding / law.a } else { 0.0 };
         Accuracy { focal: focal_sums(tolerance), pace: pace(tolerance), rounding, slight, longest }
     }
 
     /// The accuracy for the parts of a panel that is cut at a close pair of zeros: at low accuracies the residues of the pair exceed the margin.
     pub fn of_parts(&self, tolerance: f64) -> Accuracy {
-        let tolerance = tolerance.min(LOOSEST_PARTS);
+        let tolerance = tolerance.min(MAX_PARTS_TOLERANCE);
         Accuracy { focal: focal_sums(tolerance), pace: pace(tolerance), ..*self }
     }
 
@@ -156,7 +156,7 @@ pub(super) const ZEROS: usize = 5;
 pub(super) const THETA_ZEROS: usize = 3;
 
 /// Greatest distance of a zero. Chosen: farther zeros have no effect.
-pub(super) const FAR: f64 = 1e9;
+pub(super) const MAX_ZERO_DISTANCE: f64 = 1e9;
 
 /// Zeros of theta and of `1 - theta'`; cheaper than [`Zeros::of`], but less accurate for a close pair at the start.
 pub(super) fn zeros(path: &Path) -> cubic::Zeros<ZEROS> {
@@ -210,10 +210,10 @@ pub(super) fn polished<T: Real>(c: &[T; 4], x: T, y: T) -> Option<(T, T)> {
 /// Greatest relative correction of a zero by a Newton step. Chosen: the closed forms give some digits of every zero.
 const MAX_CORRECTION: f64 = 1e-3;
 
-/// `x` clamped to `[-FAR, FAR]`; NaN is far away.
+/// `x` clamped to `[-MAX_ZERO_DISTANCE, MAX_ZERO_DISTANCE]`; NaN is far away.
 #[inline(always)]
 fn clamp<T: Real>(x: T) -> T {
-    let far = T::of(FAR);
+    let far = T::of(MAX_ZERO_DISTANCE);
     let x = if x < far { x } else { far };
     if x > -far { x } else { -far }
 }
@@ -221,7 +221,8 @@ fn clamp<T: Real>(x: T) -> T {
 impl Zeros {
     /// The zeros of one shortcut.
     pub fn of(path: &Path) -> Zeros {
-        let mut zeros = Zeros { re: [FAR; LANES], im: [0.0; LANES], from_end: [FAR; LANES] };
+        let mut zeros =
+            Zeros { re: [MAX_ZERO_DISTANCE; LANES], im: [0.0; LANES], from_end: [MAX_ZERO_DISTANCE; LANES] };
         let [first, second, third] = path.exact_theta().zeros();
         let [fourth, fifth] = path.zeros_of_n();
         for (k, (re, im)) in [first, second, third, fourth, fifth].into_iter().enumerate() {
@@ -244,7 +245,7 @@ pub(super) const MIN_THIRD: f64 = 0.03;
 pub(super) fn choose(zeros: &Zeros, low: f64, high: f64, accuracy: &Accuracy, depth: u32, panels: &mut Vec<Panel>) {
     let (mut panel, focal) = best_panel(zeros, low, high, accuracy);
     panel.nodes = accuracy.nodes(focal);
-    if panel.nodes > CUT_FROM && depth < MAX_DEPTH {
+    if panel.nodes > MAX_UNCUT_NODES && depth < MAX_DEPTH {
         let cut = cut(low, high, zeros.re[hindrance(zeros, low, high)]);
         choose(zeros, low, cut, accuracy, depth + 1, panels);
         choose(zeros, cut, high, accuracy, depth + 1, panels);
@@ -261,7 +262,7 @@ pub(super) fn choose(zeros: &Zeros, low: f64, high: f64, accuracy: &Accuracy, de
 ))]
 fn best_panel(zeros: &Zeros, low: f64, high: f64, accuracy: &Accuracy) -> (Panel, f64) {
     let mut best = (line(zeros, low, high), 2.0);
-    let plain = accuracy.enough(PLAIN_NODES);
+    let plain = accuracy.enough(MAX_PLAIN_NODES);
     let gaps = [real_gap(zeros, high, 1.0), real_gap(zeros, low, -1.0)];
     let (nearest, gap, other) = if gaps[0] <= gaps[1] { (1.0, gaps[0], gaps[1]) } else { (-1.0, gaps[1], gaps[0]) };
     // A real zero this close excludes the plain rule without computing its ellipse.
@@ -284,7 +285,7 @@ fn best_panel(zeros: &Zeros, low: f64, high: f64, accuracy: &Accuracy) -> (Panel
             best = (line(zeros, low, high), straight);
         }
     }
-    if best.1 < accuracy.enough(SINH_FROM) {
+    if best.1 < accuracy.enough(MIN_SINH_NODES) {
         best = sinh(zeros, low, high, best);
     }
     best
@@ -320,7 +321,7 @@ fn distances(re: &Lanes, im: &Lanes, from: f64, to: f64) -> Lanes {
 fn real_gap(zeros: &Zeros, end: f64, side: f64) -> f64 {
     let mut gaps = zeros.from(end).map(|distance| side * distance);
     for (gap, im) in gaps.iter_mut().zip(zeros.im) {
-        *gap = if im == 0.0 && *gap > 0.0 { *gap } else { FAR };
+        *gap = if im == 0.0 && *gap > 0.0 { *gap } else { MAX_ZERO_DISTANCE };
     }
     least(&gaps)
 }

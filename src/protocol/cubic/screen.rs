@@ -14,10 +14,10 @@ use crate::numerics::real::Real;
 use crate::protocol::Status;
 
 /// Shortcuts of a span, which its ends may decide; equal to the number planned together.
-pub(super) const SPAN: usize = 32;
+pub(super) const SPAN_SHORTCUTS: usize = 32;
 
 /// Spans that are tested together, with two ends each.
-pub(super) const SPANS: usize = LANES / 2;
+pub(super) const BATCH_SPANS: usize = LANES / 2;
 
 /// The decision at the ends of a span.
 #[derive(Debug, Clone, Copy)]
@@ -32,10 +32,15 @@ pub(super) struct Verdict {
 ///
 /// Signs at both ends of a span hold on the whole span, for a polynomial that is positive at both, and for one that is negative at both for the
 /// same `x`.
-pub(super) fn settle(ends: &Ends, floors: &FrictionBounds, a_2: &Stretch, a_3: &Stretch) -> [Option<Verdict>; SPANS] {
+pub(super) fn settle(
+    ends: &Ends,
+    floors: &FrictionBounds,
+    a_2: &SpanCoordinate,
+    a_3: &SpanCoordinate,
+) -> [Option<Verdict>; BATCH_SPANS] {
     let (mut first_2, mut first_3) = ([0.0; LANES], [0.0; LANES]);
-    for span in 0..SPANS {
-        for (lane, place) in [(span, span * SPAN), (span + SPANS, (span + 1) * SPAN - 1)] {
+    for span in 0..BATCH_SPANS {
+        for (lane, place) in [(span, span * SPAN_SHORTCUTS), (span + BATCH_SPANS, (span + 1) * SPAN_SHORTCUTS - 1)] {
             (first_2[lane], first_3[lane]) = (a_2[place], a_3[place]);
         }
     }
@@ -48,17 +53,19 @@ pub(super) fn settle(ends: &Ends, floors: &FrictionBounds, a_2: &Stretch, a_3: &
 }
 
 /// One coordinate of the shortcuts of all spans.
-pub(super) type Stretch = [f64; SPAN * SPANS];
+pub(super) type SpanCoordinate = [f64; SPAN_SHORTCUTS * BATCH_SPANS];
 
 /// Whether one coordinate of a span is constant, and the other stays between its first and last value.
 #[multiversion(targets(
     "x86_64+avx+avx2+bmi1+bmi2+avx512f+avx512bw+avx512cd+avx512dq+avx512vl",
     "x86_64+avx+avx2+bmi1+bmi2"
 ))]
-fn straight(a_2: &Stretch, a_3: &Stretch) -> [bool; SPANS] {
-    let mut straight = [false; SPANS];
-    for ((straight, a_2), a_3) in straight.iter_mut().zip(a_2.chunks_exact(SPAN)).zip(a_3.chunks_exact(SPAN)) {
-        *straight = if a_2[0] == a_2[SPAN - 1] { is_along(a_3, a_2) } else { is_along(a_2, a_3) };
+fn straight(a_2: &SpanCoordinate, a_3: &SpanCoordinate) -> [bool; BATCH_SPANS] {
+    let mut straight = [false; BATCH_SPANS];
+    for ((straight, a_2), a_3) in
+        straight.iter_mut().zip(a_2.chunks_exact(SPAN_SHORTCUTS)).zip(a_3.chunks_exact(SPAN_SHORTCUTS))
+    {
+        *straight = if a_2[0] == a_2[SPAN_SHORTCUTS - 1] { is_along(a_3, a_2) } else { is_along(a_2, a_3) };
     }
     straight
 }
@@ -66,7 +73,7 @@ fn straight(a_2: &Stretch, a_3: &Stretch) -> [bool; SPANS] {
 /// Whether one coordinate stays between its ends while the other one does not change.
 #[inline(always)]
 fn is_along(moving: &[f64], fixed: &[f64]) -> bool {
-    let (first, last, same) = (moving[0], moving[SPAN - 1], fixed[0]);
+    let (first, last, same) = (moving[0], moving[SPAN_SHORTCUTS - 1], fixed[0]);
     let (low, high) = if first < last { (first, last) } else { (last, first) };
     let mut beyond = [0.0; LANES];
     for (moving, fixed) in moving.chunks_exact(LANES).zip(fixed.chunks_exact(LANES)) {
@@ -78,19 +85,19 @@ fn is_along(moving: &[f64], fixed: &[f64]) -> bool {
     beyond == [0.0; LANES]
 }
 
-/// The status of all shortcuts between those of lanes `i` and `i + SPANS`.
+/// The status of all shortcuts between those of lanes `i` and `i + BATCH_SPANS`.
 #[multiversion(targets(
     "x86_64+avx+avx2+bmi1+bmi2+avx512f+avx512bw+avx512cd+avx512dq+avx512vl",
     "x86_64+avx+avx2+bmi1+bmi2"
 ))]
-fn verdicts(ends: &Ends, floors: &FrictionBounds, a_2: &Lanes, a_3: &Lanes) -> [Option<Verdict>; SPANS] {
+fn verdicts(ends: &Ends, floors: &FrictionBounds, a_2: &Lanes, a_3: &Lanes) -> [Option<Verdict>; BATCH_SPANS] {
     // The position of the least value of each polynomial, and whether it is positive, or negative at the other end, too.
     let (mut places, mut positive, mut negative) = ([[0.0; LANES]; 3], [[false; LANES]; 3], [[false; LANES]; 3]);
     // Whether the first two are above the bounds for positive friction.
     let mut high = [[false; LANES]; 3];
     let (mut others_2, mut others_3) = ([0.0; LANES], [0.0; LANES]);
     for i in 0..LANES {
-        (others_2[i], others_3[i]) = (a_2[(i + SPANS) % LANES], a_3[(i + SPANS) % LANES]);
+        (others_2[i], others_3[i]) = (a_2[(i + BATCH_SPANS) % LANES], a_3[(i + BATCH_SPANS) % LANES]);
     }
     for (k, floor) in [floors.n, floors.theta, 0.0].into_iter().enumerate() {
         for i in 0..LANES {
@@ -107,9 +114,9 @@ fn verdicts(ends: &Ends, floors: &FrictionBounds, a_2: &Lanes, a_3: &Lanes) -> [
             negative[k][i] = (cubic.at(x) < -doubt) & (other.at(x) < -other_doubt);
         }
     }
-    let mut found = [None; SPANS];
+    let mut found = [None; BATCH_SPANS];
     for (i, found) in found.iter_mut().enumerate() {
-        let j = i + SPANS;
+        let j = i + BATCH_SPANS;
         let tame = (a_2[i].abs() + a_3[i].abs() < MAX_COORDINATE) & (a_2[j].abs() + a_3[j].abs() < MAX_COORDINATE);
         let [n, theta, surplus] = [0, 1, 2].map(|k| positive[k][i] & positive[k][j]);
         let [no_n, no_theta, no_surplus] = [0, 1, 2].map(|k| negative[k][i] | negative[k][j]);
@@ -262,12 +269,12 @@ pub(super) fn end_velocities(
 ))]
 pub(super) fn end_velocities_of_span(
     ends: &Ends,
-    a_2: &[f64; SPAN],
-    a_3: &[f64; SPAN],
+    a_2: &[f64; SPAN_SHORTCUTS],
+    a_3: &[f64; SPAN_SHORTCUTS],
     status: Status,
-    v_min: &mut [f64; SPAN],
+    v_min: &mut [f64; SPAN_SHORTCUTS],
 ) -> u32 {
-    ending(ends, a_2, a_3, &[status; SPAN], v_min)
+    ending(ends, a_2, a_3, &[status; SPAN_SHORTCUTS], v_min)
 }
 
 /// An end with `v = m` has the least velocity if the cubic `n - m t_f theta` has no coefficient below 0.
@@ -303,15 +310,15 @@ pub(super) fn on_side(v_min: f64, status: Status) -> f64 {
 }
 
 /// Shortcuts whose least velocities are searched together. Chosen: enough to hide the latency of roots and quotients.
-pub(super) const SEARCH: usize = SPAN;
+pub(super) const SEARCH_SHORTCUTS: usize = SPAN_SHORTCUTS;
 
 /// One value for each shortcut of a search.
-type Search = [f64; SEARCH];
+type Search = [f64; SEARCH_SHORTCUTS];
 
 /// Searches the least velocities of feasible shortcuts.
 pub(super) fn inner_velocities(ends: &Ends, a_2: &Search, a_3: &Search) -> Search {
     let [mut v_min, place, lossy] = least_velocities(ends, a_2, a_3);
-    for i in (0..SEARCH).filter(|&i| lossy[i] > 0.0) {
+    for i in (0..SEARCH_SHORTCUTS).filter(|&i| lossy[i] > 0.0) {
         v_min[i] = Path::new(ends, a_2[i], a_3[i]).exact_velocity(place[i]);
     }
     v_min
@@ -447,7 +454,7 @@ fn lower<const N: usize>(
             let x = path.surplus(v_min[i] * ends.t_f).minimum();
             let v = path.n().at(x) / (ends.t_f * path.theta().at(x));
             let lower = (due[i] > 0.0) & (v < v_min[i]) & (v > 0.0);
-            let last = v >= (1.0 - LAST_STEP) * v_min[i];
+            let last = v >= (1.0 - LAST_STEP_RTOL) * v_min[i];
             v_min[i] = if lower { v } else { v_min[i] };
             // A velocity lost in rounding is computed again.
             place[i] = if lower | (v <= 0.0) { x } else { place[i] };
@@ -460,7 +467,7 @@ fn lower<const N: usize>(
 }
 
 /// Relative step after which the next one is within rounding. Derived: each step doubles the digits.
-const LAST_STEP: f64 = 1e-9;
+const LAST_STEP_RTOL: f64 = 1e-9;
 
 /// Whether the relative rounding error of a cubic at `x` may exceed `loss`, or its value is NaN.
 #[inline(always)]

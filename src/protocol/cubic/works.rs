@@ -2,7 +2,7 @@
 
 use super::Landscape;
 use super::bins::{BINS, Bins, CUT_FROM, nodes_of};
-use super::cells::OWN;
+use super::cells::OWN_PLAN_BIN;
 use super::path::Path;
 use super::plan::{BLOCK, Block, Plan, plan, plan_parts};
 use super::queue::{Cuts, Queue};
@@ -88,12 +88,12 @@ impl Planned<'_> {
         for (k, indices) in indices.chunks(LANES).enumerate() {
             let first = k * LANES;
             let bin = plan.bin[first];
-            if bin != OWN && indices.len() == LANES && plan.bin[first..first + LANES] == [bin; LANES] {
+            if bin != OWN_PLAN_BIN && indices.len() == LANES && plan.bin[first..first + LANES] == [bin; LANES] {
                 sums.settle_all(plan, first, indices, [a_2, a_3]);
                 continue;
             }
             for (lane, &i) in (first..).zip(indices) {
-                if plan.bin[lane] != OWN {
+                if plan.bin[lane] != OWN_PLAN_BIN {
                     sums.settle(plan, lane, i, [a_2[lane], a_3[lane]]);
                 } else if alone.push(i, a_2[lane], a_3[lane]) {
                     sums.plan(alone, deep, own);

@@ -230,7 +230,10 @@ impl CeilingArc {
             sums.creep -= ln_theta * slip;
             sums.state += ln_theta * slip;
             if let Some(gap) = gap {
-                let price = if of_v { 0.0 } else { (b - a + gap.pull(depth)) / (a * self.ceilings.kappa) * slip };
+                // G/(u - 1) tends to its limit over one unit of ln |z|.
+                let late = exp_m1(-slip * self.rise().abs()) / self.rise().abs();
+                let limit = (b - a + gap.pull(depth)) / (a * self.ceilings.kappa);
+                let price = if of_v { 0.0 } else { limit * (slip + late) };
                 sums.price += price;
                 sums.price_ln_v -= price * ln_theta;
                 sums.price_ln_theta += price * ln_theta;

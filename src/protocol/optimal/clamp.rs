@@ -318,7 +318,7 @@ impl Path {
         path
     }
 
-    /// Refers `G` of each arc on a ceiling to where it is 0, at a free arc next to it, or to the arc that it continues.
+    /// Refers `G` of each arc on a ceiling to where it is 0, at an adjacent free arc, or to the arc that it continues.
     fn refer_to_switches(&mut self) {
         let mut known = [false; Path::MOST_PIECES];
         for at_end in [false, true] {

@@ -193,7 +193,7 @@ impl CeilingArc {
             ceilings.arc(self.kind, self.theta_hi, depth, self.z_hi, z),
             ceilings.arc(self.kind, self.theta_hi * exp(-depth), self.length - depth, z, self.z_lo),
         ];
-        // What is next to u = 1 keeps its logarithm.
+        // The end nearer to u = 1 keeps its logarithm.
         let high_first = self.z_hi.abs() <= self.z_lo.abs();
         (parts[0].ln_z, parts[1].ln_z) = if high_first { (self.ln_z, ln_z) } else { (ln_z, self.ln_z) };
         if self.falls() { parts } else { [parts[1], parts[0]] }

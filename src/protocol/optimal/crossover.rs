@@ -53,7 +53,7 @@ pub struct Wanted {
     pub free: bool,
 }
 
-/// All special times of a transition, to relative accuracy `rtol`; `bounded` says whether `v >= 1` is imposed (`t_min`
+/// All special times of a transition, to relative accuracy `rtol`; `bounded` states whether `v >= 1` is imposed (`t_min`
 /// and the window without hold do not exist otherwise).
 ///
 /// Each is one quadrature, no search over `t_f` (docs/derivations.md, "Crossover times"). The status is `Unproven` where

@@ -143,7 +143,7 @@ fn zero_of_rising(f: impl Fn(f64) -> f64, mut low: (f64, f64), mut high: (f64, f
     for step in 0.. {
         let width = high.0 - low.0;
         let secant = (high.0 - at_high * width / (at_high - at_low)).max(low.0).min(high.0);
-        // The side that has not moved is looked at from next to the zero.
+        // The side that has not moved is evaluated close to the zero.
         let x = match step % 3 {
             2 => low.0 + 0.5 * width,
             _ if secant - low.0 < resolution => low.0 + 0.5 * resolution,

@@ -187,7 +187,7 @@ pub(super) fn find_beyond(problem: &Problem, time: Time, rtol: f64) -> (Solved<O
         Strategy::SlowDown
     };
     let doubtful = friction <= unique_above || (problem.bounded && below);
-    if doubtful && problem.bounded && (below || least_velocity(&found) < 1.0 - ROUNDING) {
+    if doubtful && problem.bounded && (below || velocity_range(&found)[0] < 1.0 - ROUNDING) {
         // Where friction is this low an extremal may fall below the bound on its way: then it is no protocol under it.
         return (Solved { status: Status::Unproven, value: None, stats }, None);
     }
@@ -214,8 +214,8 @@ pub(super) fn find_beyond(problem: &Problem, time: Time, rtol: f64) -> (Solved<O
     (Solved { status, value: Some(value), stats }, Some(Member { extremal: found, p, q_hold: family.q_hold }))
 }
 
-/// Least velocity of the arc of an extremal: at an end, or where friction rises through `b - a`.
-fn least_velocity(found: &Extremal) -> f64 {
+/// Least and greatest velocity of the arc of an extremal: at an end, or where friction passes `b - a`, upwards for the least.
+pub(super) fn velocity_range(found: &Extremal) -> [f64; 2] {
     let (pieces, law) = (found.arc.pieces(), found.arc.law);
     let look = |place: f64| {
         let here = pieces.at(place);
@@ -224,21 +224,23 @@ fn least_velocity(found: &Extremal) -> f64 {
     };
     let place = |k: u32| f64::from(k) / f64::from(PLACES);
     let mut before = look(0.0);
-    let mut least = before.1;
+    let (mut least, mut greatest) = (before.1, before.1);
     for k in 1..=PLACES {
         let after = look(place(k));
-        if before.0 < 0.0 && after.0 >= 0.0 {
+        let mut seen = after.1;
+        if (before.0 < 0.0) != (after.0 < 0.0) {
             let (mut low, mut high) = (place(k - 1), place(k));
             for _ in 0..HALVINGS {
                 let middle = 0.5 * (low + high);
-                if look(middle).0 < 0.0 { low = middle } else { high = middle }
+                if (look(middle).0 < 0.0) == (before.0 < 0.0) { low = middle } else { high = middle }
             }
-            least = least.min(look(low).1);
+            seen = look(low).1;
         }
-        least = least.min(after.1);
+        least = least.min(after.1).min(seen);
+        greatest = greatest.max(after.1).max(seen);
         before = after;
     }
-    exp(least)
+    [exp(least), exp(greatest)]
 }
 
 /// Places at which an arc is looked at for its least velocity: friction rises through `b - a` once at the most.

@@ -75,6 +75,10 @@ impl PieceEnd {
 
 impl SmoothPiece {
     /// Piece from `start` to `end` that replaces a segment of the optimum; `Err` with the status where there is none.
+    ///
+    /// # Errors
+    ///
+    /// The status of a segment without such a piece.
     pub fn new(
         slider: &SpringBlock,
         (start, end): (&PieceEnd, &PieceEnd),

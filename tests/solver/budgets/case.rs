@@ -88,12 +88,12 @@ impl Case {
         Case { regime: "", bounded: true, axes, truths: Vec::new() }
     }
 
-    /// The same in a regime.
+    /// This case in a regime.
     pub fn within(self, regime: &'static str) -> Case {
         Case { regime, ..self }
     }
 
-    /// The same with one truth more.
+    /// This case with one more known value.
     pub fn knows(mut self, column: &'static str, truth: Truth, route: Route) -> Case {
         self.truths.push((column, truth, route));
         self

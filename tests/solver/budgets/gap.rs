@@ -39,7 +39,7 @@ fn point(row: &Row, border: bool) -> Option<Case> {
         let case = case.within("infeasible").nulls(&numbers, Route::Reference);
         return Some(case.word("status", "infeasible", Route::Reference));
     }
-    // Where the optimum is not certain to be one, the row says no more than that.
+    // Where the optimum is not certain to be the least, only the status is compared.
     let work_optimal = least_work(&transition, t_f, true)?;
     let work = row.number("work");
     let (status, regime) = match row.text("status") {

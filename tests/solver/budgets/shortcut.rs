@@ -84,7 +84,7 @@ fn point(row: &Row, family: &'static str, tau_ceiling: f64, regime: &'static str
                 if friction(row, family, &transition, tau_ceiling) < 0.0 { "negative_friction" } else { status };
             case::gap(case, row.number("work"), least).word("status", status, Route::Reference)
         }
-        // Where the optimum is not certain to be one, the status says so, and the rest is still what it is.
+        // Where the optimum is not certain to be the least, the status is unproven, and the other columns are compared.
         None => case,
     }
 }

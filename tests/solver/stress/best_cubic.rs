@@ -32,7 +32,7 @@ fn draw(random: &mut Random) -> Point {
 }
 
 #[test]
-fn every_best_shortcut_is_the_best_or_says_so() {
+fn every_best_shortcut_is_the_best_or_states_so() {
     sample("best_cubic", POINTS, draw, |point, row| {
         let &Point { ref transition, t_f, bounded, rtol, .. } = point;
         let solved = solve(transition, t_f, bounded, rtol);

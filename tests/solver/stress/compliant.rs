@@ -39,7 +39,7 @@ fn draw(random: &mut Random) -> Point {
 }
 
 #[test]
-fn every_compliant_is_right_or_says_so() {
+fn every_compliant_is_right_or_states_so() {
     sample("compliant", POINTS, draw, |point, row| {
         let &Point { slider, velocities: (v_i, v_f), t_f, rtol, .. } = point;
         let solved = compliant::solve(&slider, (v_i, v_f), t_f, rtol);

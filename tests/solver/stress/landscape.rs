@@ -72,7 +72,7 @@ fn evaluate(transition: &Transition, t_f: f64, rtol: f64, a_2: f64, a_3: f64) ->
 }
 
 #[test]
-fn every_shortcut_is_right_or_says_so() {
+fn every_shortcut_is_right_or_states_so() {
     sample("gap", POINTS, draw, |point, row| {
         let &Point { ref transition, t_f, a_2, a_3, rtol } = point;
         let (status, work, v_min) = evaluate(transition, t_f, rtol, a_2, a_3);
@@ -86,7 +86,7 @@ fn every_shortcut_is_right_or_says_so() {
         row.fact("v_min is positive", v_min > 0.0);
         // The status is decided in exact arithmetic; v_min is rounded.
         let beyond = if feasible == Status::Ok { 1.0 - v_min } else { v_min - 1.0 };
-        row.at_most("v_min as the status says", beyond, 4.0 * f64::EPSILON);
+        row.at_most("v_min agrees with the status", beyond, 4.0 * f64::EPSILON);
         row.fact("negative friction alone changes a status", status == feasible || status == Status::NegativeFriction);
         let (fine_status, fine, fine_v) = evaluate(transition, t_f, FINE, a_2, a_3);
         row.fact("status at every accuracy", fine_status == status);

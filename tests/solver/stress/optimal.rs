@@ -50,7 +50,7 @@ impl Doubt {
 }
 
 #[test]
-fn every_optimum_is_right_or_says_so() {
+fn every_optimum_is_right_or_states_so() {
     sample("optimal", POINTS, draw, |point, row| {
         let &Point { ref transition, t_f, bounded, rtol } = point;
         let solved = solve(transition, t_f, bounded, rtol);

@@ -42,7 +42,7 @@ fn solve(point: &Point, k: f64) -> slipsweep::protocol::Solved<Regularised> {
 }
 
 #[test]
-fn every_regularised_is_right_or_says_so() {
+fn every_regularised_is_right_or_states_so() {
     sample("regularised", POINTS, draw, |point, row| {
         let found = solve(point, point.slider.k);
         row.status(found.status);
@@ -51,9 +51,9 @@ fn every_regularised_is_right_or_says_so() {
         // A path on which the extremal need not be unique may be one that cannot be followed.
         match found.status {
             Status::Ok | Status::BelowBound | Status::NegativeFriction => {
-                row.fact("numbers as the status says", found.value.is_some())
+                row.fact("numbers agree with the status", found.value.is_some())
             }
-            Status::Infeasible => row.fact("numbers as the status says", found.value.is_none()),
+            Status::Infeasible => row.fact("numbers agree with the status", found.value.is_none()),
             Status::Unproven | Status::NotConverged => {}
         }
         let Some(value) = found.value else { return };

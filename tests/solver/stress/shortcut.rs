@@ -193,22 +193,22 @@ fn scaled(family: &dyn Family, case: &Case, fine: &Shortcut, terms: f64, row: &m
 }
 
 #[test]
-fn every_step_is_right_or_says_so() {
+fn every_step_is_right_or_states_so() {
     examine("step", POINTS, draw);
 }
 
 #[test]
-fn every_cubic_is_right_or_says_so() {
+fn every_cubic_is_right_or_states_so() {
     examine("cubic", POINTS, draw);
 }
 
 #[test]
-fn every_bounded_velocity_is_right_or_says_so() {
+fn every_bounded_velocity_is_right_or_states_so() {
     examine("bounded_velocity", POINTS, draw);
 }
 
 #[test]
-fn every_bounded_friction_is_right_or_says_so() {
+fn every_bounded_friction_is_right_or_states_so() {
     examine("bounded_friction", POINTS, draw);
 }
 

@@ -74,7 +74,7 @@ fn every_steady_sliding_is_decided_and_scales() {
         if let Some(Eigenvalues { growth_rate, frequency, decay_rate }) = eigenvalues {
             let numbers = [growth_rate, frequency, decay_rate.unwrap_or(-1.0)];
             row.fact("finite", numbers.iter().all(|number| number.is_finite()));
-            row.fact("growth as stability says", (growth_rate < 0.0) == stable);
+            row.fact("growth agrees with stability", (growth_rate < 0.0) == stable);
             row.fact("frequency and decay", frequency >= 0.0 && decay_rate.is_none_or(|rate| rate < 0.0));
             row.fact("three with mass", decay_rate.is_some() == (m > 0.0));
             if let (Some(decay), true) = (decay_rate, frequency > 0.0) {

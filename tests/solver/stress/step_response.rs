@@ -1,4 +1,4 @@
-//! `step_response`: a response ends as stability says, and scales.
+//! `step_response`: the end of a response agrees with stability, and responses scale.
 
 use slipsweep::model::Transition;
 use slipsweep::protocol::SpringBlock;

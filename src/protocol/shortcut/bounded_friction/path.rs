@@ -370,6 +370,10 @@ impl FrictionPath {
     /// Integrates along the path and hands every panel to `visit`. The two tolerances, in units of the size of `w`, are
     /// those of the end, and of all that the end does not depend on. With a tolerance of the work, panels resolve the
     /// velocity.
+    ///
+    /// # Errors
+    ///
+    /// The reason why the integration ends early.
     pub fn pass(
         &self,
         tolerances: (f64, f64),
