@@ -273,7 +273,7 @@ def feedback(
 ) -> Table:
     """The optimal velocity now, by the state variable and the time left: a row for each point.
 
-    Arguments broadcast as in NumPy. A row that has no answer has a status that says why.
+    Arguments broadcast as in NumPy. A row that has no answer has a status that states why.
 
     Parameters
     ----------

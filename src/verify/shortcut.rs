@@ -55,6 +55,9 @@ pub fn check(row: &Row, context: &Context, rtol: f64) -> Verdict {
     verdict
 }
 
+/// Distance of a moment from the bound of its family, and the size of its terms.
+type Distance<'a> = &'a dyn Fn(&Moment) -> (f64, f64);
+
 /// Compares `alpha` with that of the moment that determines it best; the greatest distance from the formula along the motion.
 fn formula(verdict: &mut Verdict, row: &Row, case: &Case, name: &str, followed: &Followed, rtol: f64) -> f64 {
     let Case { transition: Transition { law, v_i, v_f }, t_f, tau_ceiling } = *case;
@@ -63,7 +66,7 @@ fn formula(verdict: &mut Verdict, row: &Row, case: &Case, name: &str, followed: 
     let room = |v: f64| if name == "bounded_velocity" { v - 1.0 } else { tau_ceiling - steady(v) };
     let (first, last) = (room(v_i), room(v_f));
     // The logarithm of the distance from the bound over that at the start is `l x + c x (1 - x)`, `x = t/t_f`.
-    let (here, unit): (&dyn Fn(&Moment) -> (f64, f64), f64) = match name {
+    let (here, unit): (Distance<'_>, f64) = match name {
         "step" => return greatest(&|at| (at.v / v_f - 1.0).abs()),
         "cubic" => {
             let cubic = Cubic::new(&case.transition, t_f, 0.0, -3.0 * (v_f - v_i) / (v_i * v_f));

@@ -53,8 +53,9 @@ def blocks_of(text):
 
 
 def masked(text):
-    """A text without its numbers, units of time and size, and spacing."""
-    return re.sub(r"\s+", " ", re.sub(r"[\d.,]*\d(e-?\d+)?( ?(ns|µs|ms|s|min|h|kB|MB|GB|TB)\b)?", "#", text)).strip()
+    """A text without its numbers, bounds, units of time and size, and spacing."""
+    text = text.replace("less than", "about")
+    return re.sub(r"\s+", " ", re.sub(r"[\d.,]*\d(e-?\d+)?( ?(ns|µs|ms|s|min|h|d|kB|MB|GB|TB)\b)?", "#", text)).strip()
 
 
 def run_bullets(text, folder, variables):
@@ -63,7 +64,9 @@ def run_bullets(text, folder, variables):
         sweep = re.search(r"`slipsweep run (sweeps/\w+\.toml)`", bullet)[1]
         printed = run(["slipsweep", "run", str(REPOSITORY / sweep)], folder, variables)
         for number in re.findall(r"\d[\d,.]*\d(?:e-?\d+)?", re.sub(r"`[^`]*`| in [\d.]+ s\b", "", bullet)):
-            if not re.search(rf"(?<![\d,.]){re.escape(number)}(?![\d,])", printed):
+            # A number with an exponent is rounded.
+            digits = re.escape(number).replace("e", r"\d*e")
+            if not re.search(rf"(?<![\d,.]){digits}(?![\d,])", printed):
                 sys.exit(f"README.md: {sweep} does not print {number}:\n{printed}")
 
 

@@ -339,23 +339,29 @@ impl Search<'_> {
         let (mut tolerance, mut enough, mut start) = (exact.max(FINEST), ENOUGH + doubt, interval.start);
         let mut found = None;
         for _ in 0..MOST_SEARCHES {
-            let probe = |p: f64| self.probe(member(p)?, tolerance, interval.rises);
-            let probe_piece = |p: f64| probe(p).map(|probed| (probed.probe, probed.path.signature()));
+            let probe = |p: f64, tolerance: f64| self.probe(member(p)?, tolerance, interval.rises);
+            let probe_piece = |p: f64| probe(p, tolerance).map(|probed| (probed.probe, probed.path.signature()));
             let root = newton_in_pieces(probe_piece, start, interval.bracket, interval.rises, enough, enough * enough);
-            let Some((x, probed)) = root.and_then(|(root, _)| Some((root.x, probe(root.x)?))) else { break };
+            // The last probe is fine enough for most short arcs as well.
+            let last = (LAST * tolerance).max(FINEST);
+            let Some((x, probed)) = root.and_then(|(root, _)| Some((root.x, probe(root.x, last)?))) else { break };
             let Probe { value, slope } = probed.probe;
             let step = if slope > 0.0 { value / slope } else { 0.0 };
             let Some(path) = member((x - step).max(low).min(high)) else { break };
             // Short arcs on a ceiling change much with the parameter, those at a peak of friction by the square root.
             let (of_v, of_tau) = path.times();
-            let fraction = (((of_v + of_tau) / (SHORT * t_f)).powi(2)).clamp(f64::MIN_POSITIVE, 1.0);
+            let held = path.extremal.time_at_floor / (SHORT * t_f);
+            let short_hold = if held > 0.0 { held * held } else { 1.0 };
+            let fraction = ((of_v + of_tau) / (SHORT * t_f)).powi(2).min(short_hold).clamp(f64::MIN_POSITIVE, 1.0);
             let needed = (LEFT * rtol * fraction).sqrt().max(doubt);
             let finer = (exact * fraction).max(FINEST);
             // A last step must not cross a seam of the family, where the slope jumps.
             let smooth = path.signature() == probed.path.signature() || value.abs() <= SEAM;
-            let good = value.abs() <= needed && smooth && tolerance <= finer;
+            let good = value.abs() <= needed && smooth && last <= finer;
             let accepted = value * value <= rtol.max(100.0 * doubt * doubt);
-            found = accepted.then_some((probed, path));
+            if accepted {
+                found = Some((probed, path));
+            }
             if good {
                 break;
             }
@@ -474,6 +480,9 @@ const ENOUGH: f64 = 1e-4;
 
 /// Fraction of the time below which all arcs on ceilings together are short.
 const SHORT: f64 = 0.1;
+
+/// Tolerance of the last probe, in units of that of the others.
+const LAST: f64 = 0.01;
 
 /// Square of the relative difference of times before the last step, in units of the accuracy: Newton's method leaves that.
 const LEFT: f64 = 0.01;

@@ -92,12 +92,16 @@ fn every_optimum_under_ceilings_is_right_or_states_so() {
     sample("ceilings", POINTS, draw, |point, row| {
         let &Point { ref transition, t_f, bounds, rtol, .. } = point;
         let solved = solve(transition, t_f, bounds, rtol);
-        row.status(solved.status);
+        row.status = Some(solved.status);
+        row.fact("converged", solved.status != Status::NotConverged || !is_promised(point));
         feasible_where_the_limits_say(point, &solved, row);
         let Some(found) = solved.value else { return };
         keeps_its_bounds(point, &found, row);
-        let fine = solve(transition, t_f, bounds, FINE);
-        row.fact("converged at 1e-13", fine.status != Status::NotConverged);
+        // Between velocities 1e-6 apart the tightest accuracy is not always reached.
+        let fine = [FINE, 10.0 * FINE].map(|rtol| solve(transition, t_f, bounds, rtol));
+        let fine = fine.into_iter().find(|solved| solved.status != Status::NotConverged);
+        row.fact("converged at 1e-12", fine.is_some() || !is_promised(point));
+        let Some(fine) = fine else { return };
         let (Some(rough), Some(fine)) = (certain(&solved), certain(&fine)) else { return };
         let noise = noise_of_work(point);
         row.at_most("work to rtol", (rough.work - fine.work).abs(), 2.0 * rtol * fine.work.abs() + noise);
@@ -112,7 +116,8 @@ fn every_optimum_under_ceilings_is_right_or_states_so() {
 /// What the solver and four roundings of each input may make of the work.
 fn noise_of_work(point: &Point) -> f64 {
     let &Point { transition: Transition { law, v_i, v_f }, t_f, bounds, .. } = point;
-    let (solved, found) = slopes(&point.transition, t_f, bounds, FINE);
+    let both = [FINE, 10.0 * FINE].map(|rtol| slopes(&point.transition, t_f, bounds, rtol));
+    let Some((solved, found)) = both.into_iter().find(|(solved, _)| solved.value.is_some()) else { return 0.0 };
     let Some(optimum) = solved.value else { return 0.0 };
     let mut inputs = optimum.hamiltonian.abs() * t_f;
     if let Some(slope) = found {
@@ -122,6 +127,16 @@ fn noise_of_work(point: &Point) -> f64 {
         inputs += (slope.a * law.a).abs() + (slope.b * law.b).abs() + by_velocities + by_ceilings.abs();
     }
     64.0 * FINE * optimum.work.abs() + 4.0 * f64::EPSILON * inputs
+}
+
+/// Whether every row has numbers: friction is positive at the least velocity, and the time is off its limits by more than 1e-9.
+fn is_promised(point: &Point) -> bool {
+    let &Point { transition: Transition { law: Law { a, b }, v_i, v_f }, t_f, bounds, .. } = point;
+    let slowest = if bounds.floor { 1.0 } else { bounds.v_ceiling.min(1.0) };
+    let lowest = 1.0 + a * slowest.ln() - b * v_i.max(v_f).ln();
+    let limits = feasible_times(&point.transition, bounds);
+    let clear = limits.is_some_and(|(least, most)| t_f > least * (1.0 + 1e-9) && t_f < most * (1.0 - 1e-9));
+    lowest > 0.0 && clear
 }
 
 fn feasible_where_the_limits_say(point: &Point, solved: &Solved<Optimum>, row: &mut Row) {
@@ -232,7 +247,8 @@ fn slopes_are_slopes(point: &Point, row: &mut Row) {
         Some((value, optimum.work, slope))
     };
     let parameter = (place * 7.0) as usize;
-    let step = 1e-4;
+    // Far less than the motion, within which arcs change.
+    let step = 1e-4 * (t_f * transition.v_i.max(transition.v_f)).min(1.0);
     let Some(values) = (0..3).map(|i| at(parameter, 0.5 * step * f64::from(i))).collect::<Option<Vec<_>>>() else {
         return;
     };
