@@ -138,7 +138,7 @@ class Dataset(Mapping[str, DatasetTable]):
         return self[name].plot(where=where, x=x, y=y, color=color, width=width)
 
     def __repr__(self) -> str:
-        lines = [f"  {name}: {rows:,} rows, each {doc}" for name, doc, rows in self._dataset.tables]
+        lines = [f"  {name}: {doc}; {rows:,} rows" for name, doc, rows in self._dataset.tables]
         return "\n".join([f"{self.path}: dataset {self.name}, made by slipsweep {self.version}", *lines])
 
     def _repr_html_(self) -> str:

@@ -61,7 +61,7 @@ def test_summary_and_plot_are_those_of_the_command(dataset, folder, tmp_path):
         dataset.plot()
     with pytest.raises(ValueError, match="no axis|unknown|has no"):
         dataset.plot("optimal", x="bogus")
-    assert "<th>table</th>" in dataset._repr_html_() and "optimal: 6 rows" in repr(dataset)
+    assert "<th>table</th>" in dataset._repr_html_() and "optimal: the protocol of least work; 6 rows" in repr(dataset)
 
 
 def test_verify_solves_again(dataset):
@@ -174,7 +174,7 @@ def test_the_command_is_on_the_path(folder):
     version = subprocess.run([program, "--version"], capture_output=True, text=True)
     assert version.stdout == f"slipsweep {ss.__version__}\n"
     head = command("head", folder / "results/small", "optimal", "-n", 2).stdout
-    assert head.startswith("optimal: 6 rows, each the protocol of least work\n") and "mu_0 sigma l" in head
+    assert head.startswith("optimal: the protocol of least work; 6 rows\n") and "mu_0 sigma l" in head
     refused = command("query", folder / "results/small", "SELECT 1", check=False)
     assert refused.returncode == 1 and "`query` is not in the Python package" in refused.stderr
     assert "query" not in command("--help").stdout.split("Options")[0].split("Commands")[1]

@@ -350,14 +350,18 @@ impl Search<'_> {
             let Some(path) = member((x - step).max(low).min(high)) else { break };
             // Short arcs on a ceiling change much with the parameter, those at a peak of friction by the square root.
             let (of_v, of_tau) = path.times();
-            let fraction = (((of_v + of_tau) / (SHORT * t_f)).powi(2)).clamp(f64::MIN_POSITIVE, 1.0);
+            let held = path.extremal.time_at_floor / (SHORT * t_f);
+            let short_hold = if held > 0.0 { held * held } else { 1.0 };
+            let fraction = ((of_v + of_tau) / (SHORT * t_f)).powi(2).min(short_hold).clamp(f64::MIN_POSITIVE, 1.0);
             let needed = (LEFT * rtol * fraction).sqrt().max(doubt);
             let finer = (exact * fraction).max(FINEST);
             // A last step must not cross a seam of the family, where the slope jumps.
             let smooth = path.signature() == probed.path.signature() || value.abs() <= SEAM;
             let good = value.abs() <= needed && smooth && last <= finer;
             let accepted = value * value <= rtol.max(100.0 * doubt * doubt);
-            found = accepted.then_some((probed, path));
+            if accepted {
+                found = Some((probed, path));
+            }
             if good {
                 break;
             }
