@@ -59,7 +59,7 @@ fn summary_repeats_the_report_of_the_run() {
 fn summaries_state_units() {
     let expected = "\
 optimal: 3 rows (3 ok)
-  at a = 0.03 mu_0, b = 0.05 mu_0, v_i = 3 v_0, v_f = 100 v_0
+  at a = 0.03 mu_0, b = 0.05 mu_0, v_i = 3 v_0, v_f = 100 v_0, v_ceiling = inf v_0, tau_ceiling = inf mu_0 sigma
     t_f    work          v_start     v_end       time_at_floor  time_at_v_ceiling  time_at_tau_ceiling  hamiltonian     theta_max    strategy
     l/v_0  mu_0 sigma l  v_0         v_0         l/v_0          l/v_0              l/v_0                mu_0 sigma v_0  l/v_0
     0.02   3.80811142    19.9230141  3392.16787  0              0                  0                    2.59678653      0.333333333  speed_up

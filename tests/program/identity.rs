@@ -124,7 +124,7 @@ fn specs_are_compared_by_meaning_and_the_first_difference_is_named() {
         (
             first.replace("[tables.optimal]", "[tables.optimal]\ncolumns = [\"work\"]"),
             "tables.optimal.columns = [\"work\"] (line 9)",
-            "tables.optimal.columns = work, v_start, v_end, time_at_floor, time_at_v_ceiling, time_at_tau_ceiling, hamiltonian, theta_max, strategy",
+            "tables.optimal.columns = work, v_start, v_end, time_at_floor, time_at_v_ceiling, time_at_tau_ceiling, hamiltonian, theta_max,...",
         ),
         (
             first.replace("name = \"test\"", "name = \"test\"\nwhere = \"t_f > a\""),

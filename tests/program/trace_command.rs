@@ -161,9 +161,12 @@ fn what_does_not_exist_states_which_bound() {
 
 #[test]
 fn wrong_arguments_get_one_clear_message() {
-    let cases: [(&[&[&str]], &str); 10] = [
+    const FROM: &str = "error: invalid value 'theta=0.3' for '--from <STATE>': expected theta=THETA,t_left=TIME";
+    let cases: [(&[&[&str]], &str); 12] = [
         (&[&["optimal", "--t-f", "1"]], "error: `optimal` needs --a, --b, --v-i, --v-f"),
-        (&[&["optimal", "--tau-ceiling", "2"], UP], "error: `optimal` takes no --tau-ceiling"),
+        (&[&["cubic", "--tau-ceiling", "2"], UP], "error: `cubic` takes no --tau-ceiling"),
+        (&[&["cubic", "--disturb", "theta=+10% at 0.25"], UP], "error: `cubic` takes no --disturb"),
+        (&[&["optimal", "--from", "theta=0.3"], &UP[2..6], &UP[8..]], FROM),
         (&[&["cubic", "--unbounded"], UP], "error: `cubic` takes no --unbounded"),
         (&[&["gap", "--alpha-2", "0"], UP], "error: `gap` needs --alpha-3"),
         (
@@ -435,4 +438,45 @@ fn a_row_without_a_path_states_why() {
         assert!(found.starts_with(expected), "{arguments:?}: {found}");
     }
     assert!(complaint(&["step_response", "--row", "0"]).contains("has no duration of its own\n  help: add --t-f T"));
+}
+
+/// The paper's case with theta 10 % up at a quarter of the time: the closed loop arrives, for 0.103 more work.
+#[test]
+fn a_disturbance_compares_both_loops() {
+    let disturbed = |change: &str, more: &[&str]| shown(&[&["optimal", "--disturb", change], UP, more]);
+    let text = disturbed("theta=+10% at 0.25", &[]);
+    assert!(text.contains("open loop, v(t) as planned: work +0.015605, terminal_error 0.0873898599\n"), "{text}");
+    assert!(text.contains("closed loop, v(theta, t_left): work +0.102888, terminal_error 0\n"), "{text}");
+    // The shown loop ends where it says.
+    let end = |text: &str| -> f64 {
+        let last = text.lines().last().expect("has rows");
+        last.split_whitespace().nth(2).expect("has theta").parse().expect("is a number")
+    };
+    assert_eq!(end(&text), 0.01);
+    let open = disturbed("theta=+10% at 0.25", &["--loop", "open"]);
+    assert!((end(&open) / 0.01 - 1.0873898599).abs() < 1e-8, "{open}");
+    // No disturbance changes nothing.
+    let none = disturbed("theta=0% at 0.25", &[]);
+    assert!(none.contains("v(theta, t_left): work +0.000000") || none.contains("work -0.000000"), "{none}");
+}
+
+/// The rest of an optimal protocol is the optimal protocol from its state.
+#[test]
+fn a_protocol_from_a_state_is_the_rest_of_the_whole() {
+    let from = shown(&[&["optimal", "--from", "theta=0.3333333333333333,t_left=0.02"], &UP[2..6], &UP[8..]]);
+    let whole = shown(&[&["optimal"], UP]);
+    let work = |text: &str| text.lines().find(|line| line.trim_start().starts_with("work = ")).map(str::to_owned);
+    assert_eq!(work(&from), work(&whole));
+}
+
+#[test]
+fn ceilings_are_kept_or_named() {
+    let capped = shown(&[&["optimal", "--v-ceiling", "300"], UP]);
+    assert!(capped.contains("v_max = 300\n") && capped.contains("time_at_v_ceiling = 0.00890981447"), "{capped}");
+    let (code, reason) = complaint(&[&["optimal", "--v-ceiling", "150"], UP]);
+    assert_eq!(code, Some(1));
+    assert!(
+        reason.starts_with("error: no `optimal` protocol: t_f = 0.02 is too short under these ceilings"),
+        "{reason}"
+    );
 }
