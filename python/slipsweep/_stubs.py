@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Any
 
 from ._core import tables
-from ._documentation import docstring, has_scale
+from ._documentation import has_scale
 
 HEAD = '''"""A function for each table. Written by `python -m slipsweep._stubs`."""
 
@@ -26,7 +26,7 @@ OPTIONS = """    columns: Sequence[Literal[{columns}]] | None = None,
     l: float | None = None,
     v_0: float | None = None,
     normal_stress: float | None = None,
-) -> Table:
+) -> Table: ...
 """
 
 
@@ -47,8 +47,7 @@ def _function(definition: dict[str, Any]) -> str:
     if has_scale(definition):
         lines.append('    unit: Literal["1/t_f", "1"] | None = None,')
     text = "\n".join(lines) + "\n" + OPTIONS.format(columns=_quoted(definition["columns"]))
-    doc = "\n".join(f"    {line}".rstrip() for line in docstring(definition).splitlines())
-    return f'{text}    """{doc.strip()}\n    """\n'
+    return text
 
 
 def main() -> None:
