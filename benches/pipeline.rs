@@ -291,7 +291,7 @@ fn encode(sweep: &Sweep, encoder: Encoder) -> Outcome<f64> {
         let Ok(buffer) = buffer else { return };
         let start = Instant::now();
         let footer = Footer::new(&manifest, &table.name, table.rows_of(number));
-        black_box(encoder(&layout, job.rows, &buffer, &footer));
+        black_box(encoder(&layout, job.rows, buffer, &footer));
         if let Ok(mut spent) = spent.lock() {
             *spent += start.elapsed();
         }

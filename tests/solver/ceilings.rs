@@ -83,11 +83,11 @@ struct Errors {
 impl Errors {
     fn add(&mut self, column: &str, structure: &str, fraction: f64, what: String) {
         // NaN is a failure.
-        if !(fraction <= 1.0) {
+        if fraction.is_nan() || fraction > 1.0 {
             self.failures.push(format!("{column} {structure} {fraction:.1e}: {what}"));
         }
         let entry = self.worst.entry((column.into(), structure.into())).or_insert((0.0, String::new()));
-        if !(fraction <= entry.0) {
+        if fraction.is_nan() || fraction > entry.0 {
             *entry = (fraction, what);
         }
     }

@@ -348,10 +348,10 @@ fn ceiling_time(line: &CeilingLine, near: bool, [middle, half]: [f64; 2], x: &[f
     }
     let mut sum = [0.0; LANES];
     for first in (0..NODES).step_by(LANES) {
-        for lane in 0..LANES {
+        for (lane, total) in sum.iter_mut().enumerate() {
             let i = first + lane;
             let excess = exp_m1(line.sign * size[i]);
-            sum[lane] += w[i] * scale[i] * exp(-depth[i]) / if excess < 0.0 { -excess } else { excess };
+            *total += w[i] * scale[i] * exp(-depth[i]) / if excess < 0.0 { -excess } else { excess };
         }
     }
     fold(&sum)

@@ -332,7 +332,8 @@ fn two_velocities(point: &Point, fine: &Optimum, row: &mut Row) {
     let middle = after(start, first, t_1);
     // The second velocity, in which theta at the end falls.
     let (mut below, mut above) = (low, high);
-    if !((after(middle, below, t_2) - end) * (after(middle, above, t_2) - end) < 0.0) {
+    let brackets = (after(middle, below, t_2) - end) * (after(middle, above, t_2) - end) < 0.0;
+    if !brackets {
         return;
     }
     for _ in 0..80 {
