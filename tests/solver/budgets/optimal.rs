@@ -95,7 +95,8 @@ fn cases() -> Vec<Case> {
             let Transition { v_i, v_f, .. } = transition(&row);
             let mut case = Case::of(&row, &AXES).within("infeasible");
             case.axes[0].1 = Value::Number(min_duration(v_i, v_f) * (1.0 - 1e-12));
-            let case = case.nulls(&numbers, Route::Formula).nulls(&["strategy"], Route::Formula);
+            let case = case.nulls(&numbers, Route::Formula).nulls(&["strategy", "binding"], Route::Formula);
+            let case = case.word("bound", "too_fast", Route::Formula);
             cases.push(case.word("status", "infeasible", Route::Formula));
         }
     }
@@ -116,13 +117,20 @@ fn under_ceilings(row: &Row) -> Case {
     let t_f = row.number("t_f");
     let case = times.iter().fold(case, |case, &time| case.scaled(time, row.number(time), t_f, Route::Reference));
     // Where the protocol ends in steady sliding the work has a corner.
-    let case = match row.text("regime") {
-        "sitting" => case,
-        _ => case.reference(
+    let case = match row.text("arcs").ends_with("sit") {
+        true => case,
+        false => case.reference(
             row,
             &["dwork_da", "dwork_db", "dwork_dv_i", "dwork_dv_f", "dwork_dv_ceiling", "dwork_dtau_ceiling"],
         ),
     };
+    let binding = match [row.number("time_at_v_ceiling") > 0.0, row.number("time_at_tau_ceiling") > 0.0] {
+        [false, false] => "none",
+        [true, false] => "v_ceiling",
+        [false, true] => "tau_ceiling",
+        [true, true] => "both",
+    };
+    let case = case.word("binding", binding, Route::Reference).nulls(&["bound"], Route::Reference);
     let below = !bounded && row.number("v_start") < 1.0;
     case.word("status", if below { "below_bound" } else { "ok" }, Route::Reference)
 }
