@@ -249,7 +249,8 @@ mod tests {
 
     /// The factors `t_f`, `a`, `b`, `v_i`, `v_f` with the values 1, 2, 3 …, and lengths `lengths`.
     fn block(lengths: &[u64]) -> Arc<Block> {
-        let factors = lengths.iter().zip(Quantity::ALL).map(|(&length, quantity)| {
+        use Quantity::{A, B, FinalVelocity, InitialVelocity, Time};
+        let factors = lengths.iter().zip([Time, A, B, InitialVelocity, FinalVelocity]).map(|(&length, quantity)| {
             let values = Values::List((1..=length).map(|value| value as f64).collect());
             Factor { axes: vec![Axis { quantity, scale: Scale::Model, values }], labels: Vec::new() }
         });

@@ -46,7 +46,7 @@ fn labels_follow_the_axes_in_every_table_and_change_no_number() {
     // Points that differ in nothing but their label, or in empty, have rows of their own.
     let materials = ["granite", "gabbro, wet", "\"dry\" granite", "granite"];
     let samples = ["g1", "", "g3", "g1"];
-    for (table, axes, each) in [("optimal", 5, 2), ("crossover", 4, 1), ("stability", 6, 2)] {
+    for (table, axes, each) in [("optimal", 7, 2), ("crossover", 4, 1), ("stability", 6, 2)] {
         let (with, without) = ["with", "without"].map(|out| read(&folder.path().join(out), table)).into();
         let expected = |labels: [&str; 4]| labels.map(|label| vec![label.to_owned(); each]).concat();
         // t_f and k vary faster than the points.

@@ -20,6 +20,8 @@ k = { geomspace = [0.01, 0.1, 5] }
 m = 1e-9
 dt = [0.0, 0.001]
 delta_t = [1e-4, 1e-3]
+theta = { geomspace = [0.02, 0.3, 8] }
+t_left = { geomspace = [0.005, 0.05, 6] }
 [tables.gap]
 [tables.best_cubic]
 [tables.optimal]
@@ -29,6 +31,7 @@ delta_t = [1e-4, 1e-3]
 [tables.step_response]
 [tables.compliant]
 [tables.regularised]
+[tables.feedback]
 "#;
 
 fn command(folder: &Path, arguments: &[&str]) -> Output {
@@ -100,6 +103,7 @@ fn every_table_has_its_picture() {
         "step_response",
         "compliant",
         "regularised",
+        "feedback",
     ];
     assert_eq!(written, tables.map(|table| format!("{table}: written to small-{table}.svg\n")).concat());
     assert!(said.contains("\n  8 of 10 panels (t_f, v_f); choose others with --where\n"), "{said}");
@@ -170,8 +174,8 @@ fn refusals(folder: &Path) {
     assert!(contradiction.starts_with("error: --out gap.pdf: the ending contradicts --format\n"), "{contradiction}");
     assert_eq!(
         complaint(folder, &["plot", "results/small", "--table", "gop"]),
-        "error: the dataset has no table `gop`\n  found: gap, best_cubic, optimal, feedback, crossover, shortcut, stability, step_response, compliant, \
-         regularised\n  help: did you mean `gap`?\n"
+        "error: the dataset has no table `gop`\n  found: gap, best_cubic, optimal, crossover, shortcut, stability, step_response, compliant, \
+         regularised, feedback\n  help: did you mean `gap`?\n"
     );
     let many = complaint(folder, &["plot", "results/small", "--x", "t_f"]);
     assert!(many.starts_with("error: --x is for one table\n"), "{many}");
