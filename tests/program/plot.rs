@@ -404,6 +404,26 @@ fn two_axes_are_crossed_and_what_is_left_out_is_said_on_the_terminal() {
 }
 
 #[test]
+fn of_two_ceilings_that_never_meet_one_is_drawn() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let folder = folder.path();
+    let block =
+        |ceiling: &str| format!("[[block]]\n[block.axes]\nt_f = [0.01, 0.02]\n{MATERIAL}v_f = 100.0\n{ceiling}\n");
+    let [v, tau] = ["v_ceiling = { geomspace = [400.0, 5000.0, 31] }", "tau_ceiling = { linspace = [1.07, 1.1, 21] }"];
+    let spec = format!("name = \"fronts\"\n{}{}[tables.optimal]\ncolumns = [\"work\"]\n", block(v), block(tau));
+    fs::write(folder.join("spec.toml"), spec).expect("is writable");
+    shown(folder, &["run", "spec.toml", "--quiet"]);
+    let said = shown(folder, &["plot", "results/fronts", "--out", "default.svg"]);
+    let expected = "\n  rows of v_ceiling alone; draw those of tau_ceiling with --x tau_ceiling\n";
+    assert!(said.ends_with(expected), "{said}");
+    shown(folder, &["plot", "results/fronts", "--where", "tau_ceiling=inf", "--out", "selected.svg"]);
+    assert_eq!(read(folder, "default.svg"), read(folder, "selected.svg"));
+    shown(folder, &["plot", "results/fronts", "--x", "tau_ceiling", "--out", "default.svg"]);
+    shown(folder, &["plot", "results/fronts", "--where", "v_ceiling=inf", "--out", "selected.svg"]);
+    assert_eq!(read(folder, "default.svg"), read(folder, "selected.svg"));
+}
+
+#[test]
 fn few_points_are_shown_and_what_is_constant_is_said() {
     let axes = |count: u32| {
         format!(

@@ -447,7 +447,7 @@ fn a_disturbance_compares_both_loops() {
     let text = disturbed("theta=+10% at 0.25", &[]);
     assert!(text.contains("open loop, v(t) as planned: work +0.015605, terminal_error 0.0873898599\n"), "{text}");
     assert!(text.contains("closed loop, v(theta, t_left): work +0.102888, terminal_error 0\n"), "{text}");
-    // The shown loop ends where it says.
+    // The closed loop ends at theta_f.
     let end = |text: &str| -> f64 {
         let last = text.lines().last().expect("has rows");
         last.split_whitespace().nth(2).expect("has theta").parse().expect("is a number")

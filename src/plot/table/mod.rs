@@ -254,7 +254,12 @@ impl Source {
     ///
     /// A table without rows, a request that it does not satisfy, or a part that cannot be read.
     pub fn figure(&self, table: &str, request: &Request) -> Result<Figure, PlotError> {
-        let survey = Survey::new(&self.folder, &self.manifest, table, &request.conditions)?;
+        let mut survey = Survey::new(&self.folder, &self.manifest, table, &request.conditions)?;
+        let front = front(&survey, request)?;
+        if let Some(Front { hidden, .. }) = &front {
+            let conditions = [request.conditions.clone(), Condition::all(&format!("{hidden}=inf"))?].concat();
+            survey = Survey::new(&self.folder, &self.manifest, table, &conditions)?;
+        }
         let no_table = || PlotError::NoTable { name: table.to_owned(), found: self.tables() };
         let kind = KINDS.iter().find(|kind| kind.table == table).ok_or_else(no_table)?;
         let is_alone = request.x.is_none() && request.y.is_none() && request.colour.is_none();
@@ -273,11 +278,41 @@ impl Source {
         figure.title = kind.title.to_owned();
         let same = [fixed(&survey, &drawn), figure.subtitle].into_iter().filter(|words| !words.is_empty());
         figure.subtitle = same.collect::<Vec<_>>().join(", ");
+        if let Some(Front { hidden, drawn }) = front {
+            figure.remarks.push(format!("rows of {drawn} alone; draw those of {hidden} with --x {hidden}"));
+        }
         if survey.missing > 0 {
             figure.notes.push(format!("{} parts of the table are missing.", survey.missing));
         }
         Ok(figure)
     }
+}
+
+/// One of two sets of rows, each with one ceiling alone.
+struct Front {
+    /// The ceiling of the other rows.
+    hidden: &'static str,
+    drawn: &'static str,
+}
+
+/// The front to draw where both ceilings vary, but never together: that of the requested ceiling, else of the one with most values.
+fn front(survey: &Survey, request: &Request) -> Result<Option<Front>, PlotError> {
+    let [v, tau] = CEILINGS;
+    let values = |name| survey.axis(name).filter(|axis| axis.varies() && axis.infinite).map(|axis| axis.values.len());
+    let (Some(of_v), Some(of_tau)) = (values(v), values(tau)) else { return Ok(None) };
+    let requested = [&request.x, &request.y, &request.colour];
+    let draws_v = match [v, tau].map(|name| requested.iter().any(|column| column.as_deref() == Some(name))) {
+        [true, true] => return Ok(None),
+        [false, false] => of_v >= of_tau,
+        [draws_v, _] => draws_v,
+    };
+    let mut meet = false;
+    survey.each_while(&CEILINGS, |row| {
+        meet = row.iter().all(|ceiling| ceiling.is_finite());
+        !meet
+    })?;
+    let (drawn, hidden) = if draws_v { (v, tau) } else { (tau, v) };
+    Ok((!meet).then_some(Front { hidden, drawn }))
 }
 
 /// Lines or a map without further layers.
