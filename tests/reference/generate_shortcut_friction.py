@@ -9,7 +9,7 @@ contracts; alpha_3 is bracketed at few digits and finished by Newton's method wi
 velocity: zeros of the series of (ln v)'. Every member is run again with other steps, terms and digits, and written where 25 digits agree. No
 collocation. Inputs are doubles, written by repr and used exactly.
 """
-import csv, math, random, sys
+import csv, math, random, signal, sys
 from flint import arb, arb_poly, arb_series, ctx
 
 import ceilings
@@ -286,15 +286,19 @@ def least_work(case):
 
 
 def least_work_under_ceiling(case):
-    """The same under tau_ceiling, by ceilings.py; None also where its quadrature does not find all digits."""
+    """The same under tau_ceiling, by ceilings.py; None also where its quadrature does not find all digits within a minute."""
     a, b, v_i, v_f, t_f, tau_ceiling = case
     bounded = t_f > generate.Problem(a, b, v_i, v_f, True).least_time()
+    signal.signal(signal.SIGVTALRM, optimal_ceilings.give_up)
+    signal.setitimer(signal.ITIMER_VIRTUAL, 60)
     try:
         path = ceilings.solve(optimal_ceilings.maker(a, b, v_i, v_f, bounded, math.inf, tau_ceiling), t_f)[1]
         if path.lowest <= max(0, b - a):
             raise ceilings.Unphysical
         again = path.slopes()
+        signal.setitimer(signal.ITIMER_VIRTUAL, 0)
     except (ceilings.Infeasible, ceilings.Unphysical, ArithmeticError, AssertionError) as error:
+        signal.setitimer(signal.ITIMER_VIRTUAL, 0)
         print("no least work", case, repr(error), file=sys.stderr, flush=True)
         return "", int(bounded)
     # Time and work by another substitution.
