@@ -40,17 +40,31 @@ pub fn of_excess(found: f64, finest: f64, replaced: f64) -> f64 {
 
 /// Error bound of the work of `optimum`, found by [`optimal::solve`] with these arguments; `None` if the second solve fails.
 ///
-/// The sensitivity to `t_f` is `dW*/dt_f`, so that the rounding of times matters if the work is a small difference.
+/// The sensitivity to `t_f` is `dW*/dt_f`, so that the rounding of times matters if the work is a small difference. Under ceilings so does the
+/// rounding of theta at the ends: without them their difference is computed from `v_i - v_f`.
 pub fn of_optimum(
     transition: &Transition,
     t_f: f64,
     bounds: impl Into<Bounds>,
     optimum: &Optimum,
 ) -> (Option<f64>, SolverStats) {
+    let bounds = bounds.into();
     let Solved { status, value, stats } = optimal::solve(transition, t_f, bounds, TIGHTEST_RTOL);
     let finest = value.filter(|_| status != Status::NotConverged);
     let scale = optimum.work.abs() + 0.25 * (optimum.hamiltonian * t_f).abs();
-    (finest.map(|finest| bound(optimum.work, finest.work, scale)), stats)
+    let ends = if bounds.has_ceilings() { 2.0 * f64::EPSILON * of_ends(transition, optimum) } else { 0.0 };
+    (finest.map(|finest| ends + bound(optimum.work, finest.work, scale)), stats)
+}
+
+/// Sensitivity of the work to a relative change of theta at both ends: the sum of `|p| theta` with `H = tau v + p (1 - theta v)`. An end in
+/// steady sliding counts nothing: the work changes with the time spent there.
+fn of_ends(transition: &Transition, optimum: &Optimum) -> f64 {
+    let &Transition { law: Law { a, b }, v_i, v_f } = transition;
+    let of_end = |(steady, v): (f64, f64)| {
+        let tau = 1.0 + a * ln(v) - b * ln(steady);
+        ((optimum.hamiltonian - tau * v) / (steady - v)).abs()
+    };
+    [(v_i, optimum.v_start), (v_f, optimum.v_end)].map(of_end).into_iter().filter(|size| size.is_finite()).sum()
 }
 
 /// Error bound of the work of a `member` of a family, found for this case; `None` if the second solve fails.

@@ -19,7 +19,7 @@ import time
 
 from gmpy2 import exp, expm1, mpfr
 
-from ceilings import Infeasible, Path, Problem, Unphysical, solve
+from ceilings import ROUGH, Infeasible, Path, Problem, Unphysical, precision, solve
 from optimal_ceilings import INF, curvature_step, give_up, log_uniform, show, turn_of
 
 AXES = ["theta", "t_left", "a", "b", "v_f", "bounded", "v_ceiling", "tau_ceiling"]
@@ -111,6 +111,14 @@ def cases():
         steady = 1 - (b - a) * math.log(v_f)
         tau_ceiling = max(steady, 1 + (b - a) * math.log(theta)) + a * log_uniform(rng, 0.05, 5) if kind in ("tau", "both") else INF
         yield (theta, t_left, a, b, v_f, int(rng.random() < 0.7), v_ceiling, tau_ceiling)
+    # Starts at the friction ceiling: shortly after the least time, where the ceiling rises with falling theta.
+    for theta, a, b, v_f, tau_ceiling in (
+        (0.34, 0.03, 0.05, 100.0, 1.05), (0.34, 0.05, 0.02, 100.0, 1.36), (0.05, 0.05, 0.02, 100.0, 1.36), (0.34, 0.1, 0.08, 1e4, 1.384),
+    ):  # fmt: skip
+        precision(ROUGH)
+        least = float(maker(theta, a, b, v_f, 1, INF, tau_ceiling)().least_time())
+        for excess in (1e-6, 1e-3, 0.02):
+            yield (theta, least * (1 + excess), a, b, v_f, 1, INF, tau_ceiling)
 
 
 def main():

@@ -65,9 +65,9 @@ pub(super) struct Sums {
     pub lag: f64,
     /// Work of friction along it.
     pub work: f64,
-    /// `int v ln v dt`.
+    /// `int v ln v dt`, from [`Arc::sums_with_slopes`]; else 0.
     pub creep: f64,
-    /// `int v ln theta dt`.
+    /// `int v ln theta dt`, from [`Arc::sums_with_slopes`]; else 0.
     pub state: f64,
     /// Turning chart: the interior part of `d time/d ln theta_h`. Direct chart: `d time/d z_a`.
     pub sensitivity: f64,
@@ -215,12 +215,21 @@ impl Arc {
     /// Time, work and sensitivity to relative accuracy `tolerance`; `None` where the arc does not exist (`E < 0` on the
     /// way).
     pub fn sums(&self, tolerance: f64) -> Option<Sums> {
-        let mut sums = self.sums_once(tolerance)?;
+        self.refined_sums::<false>(tolerance)
+    }
+
+    /// As [`Arc::sums`], with what the derivatives of the work need.
+    pub fn sums_with_slopes(&self, tolerance: f64) -> Option<Sums> {
+        self.refined_sums::<true>(tolerance)
+    }
+
+    fn refined_sums<const SLOPES: bool>(&self, tolerance: f64) -> Option<Sums> {
+        let mut sums = self.sums_once::<SLOPES>(tolerance)?;
         // Where friction falls below b - a, E has a minimum on the way: zeros near it need more nodes than foreseen.
         let mut asked = tolerance;
         while sums.friction_min <= self.law.b - self.law.a && asked > LEAST_TOLERANCE {
             asked *= asked.min(1e-3);
-            let finer = self.sums_once(asked)?;
+            let finer = self.sums_once::<SLOPES>(asked)?;
             let change = (finer.time - sums.time).abs();
             sums = Sums {
                 nodes: sums.nodes + finer.nodes,
@@ -234,15 +243,15 @@ impl Arc {
         Some(sums)
     }
 
-    fn sums_once(&self, tolerance: f64) -> Option<Sums> {
+    fn sums_once<const SLOPES: bool>(&self, tolerance: f64) -> Option<Sums> {
         let sums = match self.chart {
             Chart::Turning { theta_h, ln_theta_h, x_start, x_end, x_squares } => {
                 let (line, slice) = self.turning_line(theta_h, ln_theta_h, x_start, x_end, x_squares);
-                panels(&line, tolerance, |middle, half, rule| turning_kernel(&slice, middle, half, rule))
+                panels(&line, tolerance, |middle, half, rule| turning_kernel::<SLOPES>(&slice, middle, half, rule))
             }
             Chart::Direct { theta_a, z_a, friction_a, y_start, y_end } => {
                 let (line, slice) = self.direct_line(theta_a, z_a, friction_a, y_start, y_end);
-                panels(&line, tolerance, |middle, half, rule| direct_kernel(&slice, middle, half, rule))
+                panels(&line, tolerance, |middle, half, rule| direct_kernel::<SLOPES>(&slice, middle, half, rule))
             }
         };
         (sums.time.is_finite() && sums.work.is_finite()).then_some(sums)
@@ -429,8 +438,8 @@ impl EqualSteps {
         let (middle, half) = (self.start + 0.5 * (from + to) * self.length, 0.5 * (to - from) * self.length);
         let rule = rule(PIECE_NODES);
         match &self.slice {
-            Slice::Turning(slice) => turning_kernel(slice, middle, half, rule),
-            Slice::Direct(slice) => direct_kernel(slice, middle, half, rule),
+            Slice::Turning(slice) => turning_kernel::<false>(slice, middle, half, rule),
+            Slice::Direct(slice) => direct_kernel::<false>(slice, middle, half, rule),
         }
     }
 
@@ -652,8 +661,8 @@ struct Tally {
     time: Lanes,
     lag: Lanes,
     work: Lanes,
-    creep: Lanes,
-    state: Lanes,
+    /// Those of `creep` and `state`.
+    slopes: [Lanes; 2],
     sensitivity: Lanes,
     swing: Lanes,
     friction_min: Lanes,
@@ -664,8 +673,6 @@ struct Terms<const N: usize> {
     time: [f64; N],
     lag: [f64; N],
     work: [f64; N],
-    creep: [f64; N],
-    state: [f64; N],
     sensitivity: [f64; N],
     swing: [f64; N],
     friction: [f64; N],
@@ -679,8 +686,7 @@ impl Tally {
             time: zero,
             lag: zero,
             work: zero,
-            creep: zero,
-            state: zero,
+            slopes: [zero; 2],
             sensitivity: zero,
             swing: zero,
             friction_min: [f64::INFINITY; LANES],
@@ -694,8 +700,6 @@ impl Tally {
                 self.time[i] += terms.time[first + i];
                 self.lag[i] += terms.lag[first + i];
                 self.work[i] += terms.work[first + i];
-                self.creep[i] += terms.creep[first + i];
-                self.state[i] += terms.state[first + i];
                 self.sensitivity[i] += terms.sensitivity[first + i];
                 self.swing[i] += terms.swing[first + i];
                 let (friction, least) = (terms.friction[first + i], self.friction_min[i]);
@@ -709,16 +713,7 @@ impl<const N: usize> Terms<N> {
     #[inline(always)]
     fn new() -> Terms<N> {
         let zero = [0.0; N];
-        Terms {
-            time: zero,
-            lag: zero,
-            work: zero,
-            creep: zero,
-            state: zero,
-            sensitivity: zero,
-            swing: zero,
-            friction: zero,
-        }
+        Terms { time: zero, lag: zero, work: zero, sensitivity: zero, swing: zero, friction: zero }
     }
 }
 
@@ -726,23 +721,23 @@ impl<const N: usize> Terms<N> {
     "x86_64+avx+avx2+bmi1+bmi2+avx512f+avx512bw+avx512cd+avx512dq+avx512vl",
     "x86_64+avx+avx2+bmi1+bmi2"
 ))]
-fn turning_kernel(arc: &TurningSlice, middle: f64, half: f64, rule: &Rule) -> Sums {
+fn turning_kernel<const SLOPES: bool>(arc: &TurningSlice, middle: f64, half: f64, rule: &Rule) -> Sums {
     let mut tally = Tally::new();
     let (x, x_last) = rule.x.as_chunks::<WIDE>();
     let (weight, weight_last) = rule.w.as_chunks::<WIDE>();
     for (x, weight) in x.iter().zip(weight) {
-        arc.add(middle, half, x, weight, &mut tally);
+        arc.add::<_, SLOPES>(middle, half, x, weight, &mut tally);
     }
     for (x, weight) in x_last.as_chunks::<LANES>().0.iter().zip(weight_last.as_chunks::<LANES>().0) {
-        arc.add(middle, half, x, weight, &mut tally);
+        arc.add::<_, SLOPES>(middle, half, x, weight, &mut tally);
     }
     let scale = 2.0 * arc.sigma * half;
     Sums {
         time: scale * arc.theta_h * fold(&tally.time),
         lag: scale * arc.theta_h * fold(&tally.lag),
         work: scale * fold(&tally.work),
-        creep: scale * fold(&tally.creep),
-        state: scale * fold(&tally.state),
+        creep: if SLOPES { scale * fold(&tally.slopes[0]) } else { 0.0 },
+        state: if SLOPES { scale * fold(&tally.slopes[1]) } else { 0.0 },
         sensitivity: scale * arc.theta_h * fold(&tally.sensitivity),
         swing: scale * arc.theta_h * arc.theta_h * fold(&tally.swing),
         friction_min: least(&tally.friction_min),
@@ -753,7 +748,14 @@ fn turning_kernel(arc: &TurningSlice, middle: f64, half: f64, rule: &Rule) -> Su
 impl TurningSlice {
     /// Adds the terms of `N` nodes, a multiple of the lanes.
     #[inline(always)]
-    fn add<const N: usize>(&self, middle: f64, half: f64, x: &[f64; N], weight: &[f64; N], tally: &mut Tally) {
+    fn add<const N: usize, const SLOPES: bool>(
+        &self,
+        middle: f64,
+        half: f64,
+        x: &[f64; N],
+        weight: &[f64; N],
+        tally: &mut Tally,
+    ) {
         let Law { a, b } = self.law;
         let (double, bend, slope) = (2.0 / a, (a - b) * (2.0 / a), (b - a) / a);
         let (mut w, mut om, mut inverse_x2) = ([0.0; N], [0.0; N], [0.0; N]);
@@ -785,8 +787,10 @@ impl TurningSlice {
             terms.lag[i] = terms.time[i] * u;
             let slip = g * u;
             terms.work[i] = slip * terms.friction[i];
-            terms.creep[i] = slip * (found.ln_u[i] - ln_theta[i]);
-            terms.state[i] = slip * ln_theta[i];
+            if SLOPES {
+                tally.slopes[0][i % LANES] += slip * (found.ln_u[i] - ln_theta[i]);
+                tally.slopes[1][i % LANES] += slip * ln_theta[i];
+            }
             terms.sensitivity[i] = terms.time[i] * (1.0 - bent * slope);
             terms.swing[i] = terms.time[i] * bent * inverse_x2[i];
         }
@@ -809,23 +813,23 @@ struct DirectSlice {
     "x86_64+avx+avx2+bmi1+bmi2+avx512f+avx512bw+avx512cd+avx512dq+avx512vl",
     "x86_64+avx+avx2+bmi1+bmi2"
 ))]
-fn direct_kernel(arc: &DirectSlice, middle: f64, half: f64, rule: &Rule) -> Sums {
+fn direct_kernel<const SLOPES: bool>(arc: &DirectSlice, middle: f64, half: f64, rule: &Rule) -> Sums {
     let mut tally = Tally::new();
     let (x, x_last) = rule.x.as_chunks::<WIDE>();
     let (weight, weight_last) = rule.w.as_chunks::<WIDE>();
     for (x, weight) in x.iter().zip(weight) {
-        arc.add(middle, half, x, weight, &mut tally);
+        arc.add::<_, SLOPES>(middle, half, x, weight, &mut tally);
     }
     for (x, weight) in x_last.as_chunks::<LANES>().0.iter().zip(weight_last.as_chunks::<LANES>().0) {
-        arc.add(middle, half, x, weight, &mut tally);
+        arc.add::<_, SLOPES>(middle, half, x, weight, &mut tally);
     }
     let sensitivity = fold(&tally.sensitivity);
     Sums {
         time: half * arc.theta_a * fold(&tally.time),
         lag: half * arc.theta_a * fold(&tally.lag),
         work: half * fold(&tally.work),
-        creep: half * fold(&tally.creep),
-        state: half * fold(&tally.state),
+        creep: if SLOPES { half * fold(&tally.slopes[0]) } else { 0.0 },
+        state: if SLOPES { half * fold(&tally.slopes[1]) } else { 0.0 },
         sensitivity: half * arc.theta_a * arc.slope_a * sensitivity,
         swing: -half * arc.theta_a * arc.theta_a * sensitivity,
         friction_min: least(&tally.friction_min),
@@ -836,7 +840,14 @@ fn direct_kernel(arc: &DirectSlice, middle: f64, half: f64, rule: &Rule) -> Sums
 impl DirectSlice {
     /// Adds the terms of `N` nodes, a multiple of the lanes.
     #[inline(always)]
-    fn add<const N: usize>(&self, middle: f64, half: f64, x: &[f64; N], weight: &[f64; N], tally: &mut Tally) {
+    fn add<const N: usize, const SLOPES: bool>(
+        &self,
+        middle: f64,
+        half: f64,
+        x: &[f64; N],
+        weight: &[f64; N],
+        tally: &mut Tally,
+    ) {
         let Law { a, b } = self.law;
         let (mut w, mut grow, mut ln_theta) = ([0.0; N], [0.0; N], [0.0; N]);
         for i in 0..N {
@@ -855,8 +866,10 @@ impl DirectSlice {
             terms.lag[i] = terms.time[i] * u;
             let slip = -weight[i] * inverse * u;
             terms.work[i] = slip * terms.friction[i];
-            terms.creep[i] = slip * (found.ln_u[i] - ln_theta[i]);
-            terms.state[i] = slip * ln_theta[i];
+            if SLOPES {
+                tally.slopes[0][i % LANES] += slip * (found.ln_u[i] - ln_theta[i]);
+                tally.slopes[1][i % LANES] += slip * ln_theta[i];
+            }
             terms.sensitivity[i] = -terms.time[i] * grow[i] * u * inverse * inverse;
         }
         tally.add(&terms);

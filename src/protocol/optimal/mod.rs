@@ -182,7 +182,11 @@ pub enum Obstacle {
 /// 1`. `Unproven` where `tau <= max(0, b - a)` somewhere, `NegativeFriction` where `tau < 0`; an extremal that falls
 /// below the bound there has no numbers.
 pub fn solve(transition: &Transition, t_f: f64, bounds: impl Into<Bounds>, rtol: f64) -> Solved<Optimum> {
-    let Some((problem, ceilings)) = posed(transition, t_f, &bounds.into()) else { return INFEASIBLE };
+    let bounds = bounds.into();
+    let Some((problem, ceilings)) = posed(transition, t_f, &bounds) else { return INFEASIBLE };
+    if !bounds.has_ceilings() {
+        return search::find(&problem, t_f, rtol).0;
+    }
     constrained::find(&problem, &ceilings, Time::since(&problem, t_f), rtol).solved
 }
 

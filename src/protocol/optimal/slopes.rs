@@ -24,7 +24,7 @@ pub(super) fn slopes(
     for piece in path.pieces() {
         match piece {
             Piece::Free { arc, .. } => {
-                let sums = arc.sums(tolerance)?;
+                let sums = arc.sums_with_slopes(tolerance)?;
                 stats.quadratures += 1;
                 stats.nodes += sums.nodes;
                 slopes.a += sums.creep;

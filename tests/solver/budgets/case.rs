@@ -136,10 +136,10 @@ impl Case {
 }
 
 /// Least work and gap of a shortcut whose `work` is known, the gap to a fraction of one more than itself.
-pub fn gap(case: Case, work: f64, work_optimal: f64) -> Case {
+pub fn gap(case: Case, work: f64, work_optimal: f64, route: Route) -> Case {
     let excess = (DoubleDouble::new(work) - DoubleDouble::new(work_optimal)) / DoubleDouble::new(work_optimal);
-    let case = case.number("work_optimal", work_optimal, Route::Judge);
-    case.scaled("gap", excess.high, 1.0 + excess.high.abs(), Route::Judge)
+    let case = case.number("work_optimal", work_optimal, route);
+    case.scaled("gap", excess.high, 1.0 + excess.high.abs(), route)
 }
 
 impl Display for Case {

@@ -74,7 +74,7 @@ fn point(row: &Row) -> Case {
     let grown = 1.0 + row.number("amplification");
     let case = case.scaled("open_loop_error", 0.0, grown, Route::Law);
     match least_work(&transition(row), t_f, true) {
-        Some(least) => case::gap(case, row.number("work"), least).word("status", "ok", Route::Reference),
+        Some(least) => case::gap(case, row.number("work"), least, Route::Judge).word("status", "ok", Route::Reference),
         None => case,
     }
 }

@@ -50,5 +50,5 @@ fn point(row: &Row, border: bool) -> Option<Case> {
     let status = if friction < 0.0 { "negative_friction" } else { status };
     let case = case.within(if border { "near the border" } else { regime });
     let case = case.reference(row, &["work", "v_min"]).word("status", status, Route::Reference);
-    Some(case::gap(case, work, work_optimal))
+    Some(case::gap(case, work, work_optimal, Route::Judge))
 }

@@ -10,6 +10,7 @@ mod best_cubic;
 mod case;
 mod compliant;
 mod crossover;
+mod feedback;
 mod gap;
 mod ledger;
 mod measure;
@@ -43,13 +44,14 @@ struct Known {
 }
 
 /// Every table and its reductions, in the order in which they are listed.
-static KNOWN: [Known; 12] = [
+static KNOWN: [Known; 13] = [
     gap::KNOWN,
     reduced::MINIMUM,
     reduced::QUANTILES,
     reduced::HISTOGRAM,
     best_cubic::KNOWN,
     optimal::KNOWN,
+    feedback::KNOWN,
     crossover::KNOWN,
     shortcut::KNOWN,
     stability::KNOWN,

@@ -27,6 +27,7 @@ pub const KNOWN: Known = Known {
         ("v near 1", "the lower velocity 1e-3 to 1e-12 above v = 1"),
         ("no bound", "accelerations with velocity_bound = false"),
         ("no bound down", "decelerations with velocity_bound = false"),
+        ("under ceilings", "ceilings of velocity and friction, every sequence of arcs, near their limits"),
         ("infeasible", "decelerations shorter than t_min"),
     ],
     cases,
@@ -94,9 +95,42 @@ fn cases() -> Vec<Case> {
             let Transition { v_i, v_f, .. } = transition(&row);
             let mut case = Case::of(&row, &AXES).within("infeasible");
             case.axes[0].1 = Value::Number(min_duration(v_i, v_f) * (1.0 - 1e-12));
-            let case = case.nulls(&numbers, Route::Formula).nulls(&["strategy"], Route::Formula);
+            let case = case.nulls(&numbers, Route::Formula).nulls(&["strategy", "binding"], Route::Formula);
+            let case = case.word("bound", "too_fast", Route::Formula);
             cases.push(case.word("status", "infeasible", Route::Formula));
         }
     }
+    let none = ["v_ceiling", "tau_ceiling"].map(|axis| (axis, Value::Number(f64::INFINITY)));
+    cases.iter_mut().for_each(|case| case.axes.extend(none));
+    cases.extend(reference::table("optimal_ceilings").iter().map(under_ceilings));
     cases
+}
+
+fn under_ceilings(row: &Row) -> Case {
+    let bounded = row.text("bounded") == "1";
+    let axes = [&AXES[..], &["v_ceiling", "tau_ceiling"]].concat();
+    let case = Case { bounded, ..Case::of(row, &axes).within("under ceilings") };
+    let numbers = ["work", "v_start", "v_end", "hamiltonian", "theta_max", "friction_max", "t_least"];
+    let case = case.reference(row, &numbers).reference(row, &["v_ceiling_least", "tau_ceiling_least"]);
+    // A time is what is left of t_f.
+    let times = ["time_at_floor", "time_at_v_ceiling", "time_at_tau_ceiling"];
+    let t_f = row.number("t_f");
+    let case = times.iter().fold(case, |case, &time| case.scaled(time, row.number(time), t_f, Route::Reference));
+    // Where the protocol ends in steady sliding the work has a corner.
+    let case = match row.text("arcs").ends_with("sit") {
+        true => case,
+        false => case.reference(
+            row,
+            &["dwork_da", "dwork_db", "dwork_dv_i", "dwork_dv_f", "dwork_dv_ceiling", "dwork_dtau_ceiling"],
+        ),
+    };
+    let binding = match [row.number("time_at_v_ceiling") > 0.0, row.number("time_at_tau_ceiling") > 0.0] {
+        [false, false] => "none",
+        [true, false] => "v_ceiling",
+        [false, true] => "tau_ceiling",
+        [true, true] => "both",
+    };
+    let case = case.word("binding", binding, Route::Reference).nulls(&["bound"], Route::Reference);
+    let below = !bounded && row.number("v_start") < 1.0;
+    case.word("status", if below { "below_bound" } else { "ok" }, Route::Reference)
 }

@@ -1,4 +1,4 @@
-//! `shortcut`: the families against tables to 25 digits, least works by the judge.
+//! `shortcut`: the families against tables to 25 digits, least works by the judge, under a friction ceiling from the table.
 
 use slipsweep::model::Transition;
 
@@ -77,12 +77,17 @@ fn point(row: &Row, family: &'static str, tau_ceiling: f64, regime: &'static str
     }
     let case = case.within(regime).reference(row, &["work", "v_min", "v_max", "friction_max"]);
     let case = case.nulls(&["bound"], Route::Reference);
-    match least_work(&transition, t_f, !late) {
-        Some(least) => {
+    // A member under a friction ceiling is compared with the optimum under the same.
+    let least = match family {
+        "bounded_friction" => row.optional("work_optimal").map(|least| (least, Route::Reference)),
+        _ => least_work(&transition, t_f, !late).map(|least| (least, Route::Judge)),
+    };
+    match least {
+        Some((least, route)) => {
             let status = if row.number("v_min") < 1.0 { "below_bound" } else { "ok" };
             let status =
                 if friction(row, family, &transition, tau_ceiling) < 0.0 { "negative_friction" } else { status };
-            case::gap(case, row.number("work"), least).word("status", status, Route::Reference)
+            case::gap(case, row.number("work"), least, route).word("status", status, Route::Reference)
         }
         // Where the optimum is not certain to be the least, the status is unproven, and the other columns are compared.
         None => case,
