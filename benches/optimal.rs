@@ -1,7 +1,8 @@
 //! One optimal solve and one crossover, in units of one scalar `f64::ln` measured in the same run, on one core.
 //!
 //! `cargo bench --bench optimal`. The cases: 2,000 random accelerations (a, b in 0.005 … 0.1, v_i in 2 … 50, v_f/v_i in
-//! 2 … 100, t_f in 0.1 … 1.2 t_cross), and all rows of `tests/reference/optimal.csv`, which hold the hard corners.
+//! 2 … 100, t_f in 0.1 … 1.2 t_cross), the same under ceilings, and all rows of `tests/reference/optimal.csv`, which hold
+//! the hard corners.
 //!
 //! The floor is one exponential (the map of the chart) and one turning function `U(w)` at every node, over an array and
 //! vectorised: no quadrature of these integrals does without them.
@@ -13,9 +14,10 @@ mod support;
 use std::hint::black_box;
 
 use cases::{Case, ONLY_CROSS, random_accelerations, reference_cases};
+use slipsweep::model::Transition;
 use slipsweep::protocol::SolverStats;
 use slipsweep::protocol::optimal::crossover;
-use slipsweep::protocol::optimal::solve;
+use slipsweep::protocol::optimal::{Bounds, least_tau_ceiling, least_v_ceiling, solve};
 use support::{least, one_ln, one_vector_exp, one_vector_turning};
 
 const ROUNDS: usize = 60;
@@ -39,19 +41,43 @@ fn main() {
             });
         }
     }
+    for (name, which) in [("v_ceiling", [true, false]), ("tau_ceiling", [false, true]), ("both", [true, true])] {
+        let cases = under_ceilings(&random, which);
+        measure(&format!("optimal, random, {name}"), 1e-10, &cases, [ln, node], |(transition, t_f, bounds)| {
+            solve(transition, *t_f, bounds, 1e-10).stats
+        });
+    }
     measure("crossover t_cross", 1e-12, &random, [ln, node], |(transition, ..)| {
         crossover::solve(transition, true, 1e-12, ONLY_CROSS).2
     });
 }
 
-fn measure(name: &str, rtol: f64, cases: &[Case], [ln, node]: [f64; 2], run: impl Fn(&Case) -> SolverStats) {
+/// Problems under ceilings of the velocity or of friction, halfway between the least feasible one and the peak without any.
+fn under_ceilings(cases: &[Case], [of_v, of_tau]: [bool; 2]) -> Vec<(Transition, f64, Bounds)> {
+    let bound = |&(transition, t_f, bounded): &Case| {
+        let free = solve(&transition, t_f, bounded, 1e-10).value?;
+        let mut bounds = Bounds::new(bounded);
+        if of_v {
+            let least = least_v_ceiling(&transition, t_f, bounds, 1e-6)?;
+            bounds = bounds.with_v_ceiling((least * free.v_end).sqrt());
+        }
+        if of_tau {
+            let least = least_tau_ceiling(&transition, t_f, bounds, 1e-6)?;
+            bounds = bounds.with_tau_ceiling(0.5 * (least + free.friction_max));
+        }
+        Some((transition, t_f, bounds))
+    };
+    cases.iter().filter_map(bound).collect()
+}
+
+fn measure<T>(name: &str, rtol: f64, cases: &[T], [ln, node]: [f64; 2], run: impl Fn(&T) -> SolverStats) {
     let (mut quadratures, mut nodes) = (0, 0);
     for case in cases {
         let stats = run(case);
         quadratures += stats.quadratures;
         nodes += stats.nodes;
     }
-    let spells: Vec<&[Case]> = cases.chunks(SPELL).collect();
+    let spells: Vec<&[T]> = cases.chunks(SPELL).collect();
     let time = least(ROUNDS, &spells, |cases| {
         for case in *cases {
             black_box(run(case));

@@ -238,12 +238,12 @@ fn compute(sweep: &Sweep, threads: usize) -> Outcome<f64> {
 /// The bytes of a part.
 type Encoder = fn(&Layout, &RowIndex, &ColumnBuffer, &Footer) -> Option<Vec<u8>>;
 
-/// The encoder of the program: with the digest and the checksums of the part and of its pages.
+/// The encoder of the program: with the statistics and the checksums of the part and of its pages.
 fn ours(layout: &Layout, row_index: &RowIndex, buffer: &ColumnBuffer, footer: &Footer) -> Option<Vec<u8>> {
     dataset::encode(layout, row_index, buffer, footer).ok().map(|(bytes, _)| bytes)
 }
 
-/// `ArrowWriter` with the encodings and the compression of the program: no digest, and no checksums, which it cannot write.
+/// `ArrowWriter` with the encodings and the compression of the program: no statistics of ours, and no checksums, which it cannot write.
 fn arrow(layout: &Layout, row_index: &RowIndex, buffer: &ColumnBuffer, footer: &Footer) -> Option<Vec<u8>> {
     let batch = dataset::batch(layout, row_index, footer.rows.clone(), buffer.clone()).ok()?;
     let mut properties = WriterProperties::builder()
@@ -270,7 +270,7 @@ fn writers(folder: &Path) -> Outcome<()> {
         least(5, || Ok([compute(&sweep, 1)?, encode(&sweep, ours)?, encode(&sweep, arrow)?]))?;
     println!("\n### Writers\n\n| | ns per row |\n| --- | --- |");
     println!("| compute, 1 thread | {:.1} |", 1e9 * computed / rows);
-    println!("| encode by the program, digest and checksums included | {:.1} |", 1e9 * ours / rows);
+    println!("| encode by the program, statistics and checksums included | {:.1} |", 1e9 * ours / rows);
     println!("| encode by `ArrowWriter`, without them | {:.1} |", 1e9 * arrow / rows);
     println!("| compute and encode, `ArrowWriter` over the program | {:.2} |", (computed + arrow) / (computed + ours));
     Ok(())

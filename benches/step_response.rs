@@ -1,13 +1,13 @@
 //! The step response: time of a response, of a plane of responses, and outcomes and errors over the physical domain.
 //!
-//! `cargo bench --bench step` prints all on one thread; `cargo bench --bench step -- domain 100000` prints the random points of the
+//! `cargo bench --bench step_response` prints all on one thread; `cargo bench --bench step_response -- domain 100000` prints the random points of the
 //! physical domain alone, with the given number of points. Steps are exact; times are medians. The floor is the
 //! arithmetic of a series at every step, 500 multiplications and as many additions, at the rate of a vectorised loop.
 
 use std::hint::black_box;
 
-use slipsweep::model::{Law, Transition};
-use slipsweep::stability::step_response::{Outcome, Response, Step};
+use slipsweep::model::{Law, StateLaw, Transition};
+use slipsweep::stability::step_response::{Outcome, Response, VelocityStep};
 
 mod support;
 
@@ -27,8 +27,8 @@ const SAMPLE: usize = 2_000;
 /// Accuracy of the random points, and of the responses that judge them.
 const RTOL: [f64; 2] = [1e-6, 1e-8];
 
-fn paper(k: f64, v_f: f64) -> Step {
-    Step { transition: Transition { law: PAPER, v_i: 1e5, v_f }, k, m: MASS }
+fn paper(k: f64, v_f: f64) -> VelocityStep {
+    VelocityStep { state_law: StateLaw::Ageing, transition: Transition { law: PAPER, v_i: 1e5, v_f }, k, m: MASS }
 }
 
 /// Multiplications and additions of a step.
@@ -62,7 +62,7 @@ fn main() {
             );
         }
     }
-    let plane: Vec<Step> = (0..PLANE * PLANE)
+    let plane: Vec<VelocityStep> = (0..PLANE * PLANE)
         .map(|i| {
             let place = |i: usize| i as f64 / (PLANE - 1) as f64;
             paper(1e-3 * 100_f64.powf(place(i / PLANE)), 1e5 * 100_f64.powf(place(i % PLANE)))
@@ -81,13 +81,13 @@ fn main() {
 fn domain(points: usize) {
     let mut state = 7;
     let mut random = |least: f64, greatest: f64| least * (greatest / least).powf(support::uniform(&mut state));
-    let steps: Vec<Step> = (0..points)
+    let steps: Vec<VelocityStep> = (0..points)
         .map(|i| {
             let a = random(1e-3, 0.3);
             let law = Law { a, b: (a * random(0.05, 20.0)).min(0.5) };
             let m = if i % 11 == 0 { 0.0 } else { a * random(1e-8, 1e4) / 1e12 };
             let transition = Transition { law, v_i: 1e6 * random(1e-6, 1e6), v_f: 1e6 };
-            Step { transition, k: a * random(1e-4, 1e5), m }
+            VelocityStep { state_law: StateLaw::Ageing, transition, k: a * random(1e-4, 1e5), m }
         })
         .collect();
     let respond = |rtol| -> Vec<Option<Response>> { steps.iter().map(|step| step.respond(rtol).1).collect() };

@@ -21,7 +21,7 @@ pub fn shown(text: &str, most: usize) -> Cow<'_, str> {
 }
 
 /// Names of our quantities and columns in other tools, in lower case.
-const SYNONYMS: [(&str, &[&str]); 13] = [
+const SYNONYMS: [(&str, &[&str]); 14] = [
     ("threads", &["jobs", "j", "cores", "workers", "cpus", "processes", "parallel"]),
     ("out", &["output", "output_dir", "outdir", "dir", "dest", "to"]),
     ("quiet", &["silent"]),
@@ -34,10 +34,11 @@ const SYNONYMS: [(&str, &[&str]); 13] = [
     ("v_0", &["v_ref", "v_star"]),
     ("t_f", &["t", "time", "duration"]),
     ("k", &["stiffness"]),
+    ("geomspace", &["logspace"]),
     ("m", &["mass"]),
 ];
 
-/// Greatest length of a name whose first letter must be correct, in characters: `min` and `bin` are one letter away from `sin`.
+/// Greatest length of a name whose first letter must be correct, in characters. Chosen: `min` and `bin` are one letter away from `sin`.
 const MAX_SHORT_CHARS: usize = 4;
 
 /// The most likely intended name among `known`, all in lower case: a synonym of `name`, or a similar name.
@@ -78,6 +79,7 @@ mod tests {
         let known = ["linspace", "geomspace", "unit", "expr"];
         assert_eq!(nearest("lnspace", known), Some("linspace"));
         assert_eq!(nearest("geospace", known), Some("geomspace"));
+        assert_eq!(nearest("logspace", known), Some("geomspace"));
         assert_eq!(nearest("unti", known), Some("unit"));
         assert_eq!(nearest("UNIT", known), Some("unit"));
         assert_eq!(nearest("temperature", known), None);

@@ -3,8 +3,8 @@
 
 use std::rc::Rc;
 
-use slipsweep::model::{Law, Transition};
-use slipsweep::stability::step_response::{Orbit, Scaled, Step};
+use slipsweep::model::{Law, StateLaw, Transition};
+use slipsweep::stability::step_response::{Orbit, ScaledStep, VelocityStep};
 
 use super::integrate::dop853;
 use super::measure::{Answer, Kind, Method, Subject, Truth};
@@ -18,7 +18,7 @@ const MOST_STEPS: u32 = 100_000;
 
 /// A step, and the time of the third upward crossing of `v = v_f`.
 struct Case {
-    scaled: Scaled,
+    scaled: ScaledStep,
     t: f64,
 }
 
@@ -34,7 +34,7 @@ pub fn subject(tolerances: &[f64]) -> Subject {
         Method::each("ours", Kind::Ours, tolerances, &cases, ours),
         Method::each("DOP853 (ode_solvers)", Kind::Other, tolerances, &cases, explicit),
     ];
-    let error = "greater of the errors of force and contact lifetime after three cycles";
+    let error = "greater of the errors of force and state variable after three cycles";
     Subject {
         name: "step",
         cases: "from overshoot to deep stick-slip",
@@ -49,7 +49,8 @@ pub fn subject(tolerances: &[f64]) -> Subject {
 fn case(row: &Row) -> Option<Case> {
     let law = Law { a: row.number("a"), b: row.number("b") };
     let transition = Transition { law, v_i: row.number("ratio"), v_f: 1.0 };
-    let scaled = Step { transition, k: row.number("k"), m: row.number("inertia") }.scaled()?;
+    let scaled = VelocityStep { state_law: StateLaw::Ageing, transition, k: row.number("k"), m: row.number("inertia") }
+        .scaled()?;
     Some(Case { scaled, t: row.number("t_3") })
 }
 
@@ -61,7 +62,7 @@ fn judge(found: &Answer, truth: &Answer) -> f64 {
 
 /// To the crossing itself, which it finds.
 fn ours(case: &Case, tolerance: f64) -> Option<Answer> {
-    let Scaled { slider, ratio } = &case.scaled;
+    let ScaledStep { slider, ratio } = &case.scaled;
     // The errors of the steps add up.
     let mut orbit = Orbit::new(slider, slider.steady(ratio.ln()), 0.05 * tolerance);
     let mut budget = MOST_STEPS;
@@ -74,7 +75,7 @@ fn ours(case: &Case, tolerance: f64) -> Option<Answer> {
 
 /// To the time of the crossing, which is an input.
 fn explicit(case: &Case, tolerance: f64) -> Option<Answer> {
-    let Scaled { slider, ratio } = &case.scaled;
+    let ScaledStep { slider, ratio } = &case.scaled;
     let (a, b, inertia, k) = (slider.a, slider.b, slider.inertia, slider.k);
     let slope = |&[z, y, x]: &[f64; 3]| {
         let v = x.exp();

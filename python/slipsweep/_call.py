@@ -10,12 +10,16 @@ import numpy.typing as npt
 from ._core import compute
 from ._table import Table
 
-_Model: TypeAlias = tuple[bool, str, float | None, float | None, float | None, float | None]
+_Model: TypeAlias = tuple[bool, str, str, float | None, float | None, float | None, float | None]
 
-_DEFAULT_MODEL: _Model = (True, "dimensionless", None, None, None, None)
+# Types of a single number or word, or of the default.
+_SCALARS = frozenset((float, int, str, np.float64, type(None)))
 
-# The axes of each table, and its axes of words with their number, whose default is all words.
+_DEFAULT_MODEL: _Model = (True, "log", "dimensionless", None, None, None, None)
+
+# The axes of each table, their defaults, and its axes of words with their number, whose default is all words.
 _AXES: dict[str, tuple[str, ...]] = {}
+_DEFAULTS: dict[str, tuple[object, ...]] = {}
 _ALL_WORDS: dict[str, list[tuple[int, str, int]]] = {}
 
 
@@ -23,6 +27,7 @@ def define(definition: Mapping[str, Any]) -> None:
     """Remembers the axes of a table."""
     axes = definition["axes"]
     _AXES[definition["name"]] = tuple(axis["name"] for axis in axes)
+    _DEFAULTS[definition["name"]] = tuple(axis["default"] for axis in axes)
     _ALL_WORDS[definition["name"]] = [
         (place, axis["name"], axis["default_count"])
         for place, axis in enumerate(axes)
@@ -42,14 +47,16 @@ def call(
     """The rows of the table `name` at these values of its axes."""
     shape: tuple[int, ...] = ()
     for value in values:
-        kind = type(value)
-        if kind is not float and kind is not int and value is not None:
+        if type(value) not in _SCALARS:
             values, shape = _broadcast(_AXES[name], values)
             break
     product: list[tuple[str, object]] = []
     if grid is not None:
         product, lengths = _product(grid)
         shape += lengths
+        # An axis of the grid takes the place of its default.
+        axes = zip(_AXES[name], values, _DEFAULTS[name])
+        values = [None if axis in grid and type(value) in _SCALARS and value == default else value for axis, value, default in axes]
     for place, axis, count in _ALL_WORDS[name]:
         if values[place] is None and (grid is None or axis not in grid):
             shape += (count,)
@@ -89,6 +96,8 @@ def _product(grid: Mapping[str, object]) -> tuple[list[tuple[str, object]], tupl
     """The values of each axis of a product, and their numbers."""
     product: list[tuple[str, object]] = []
     lengths: list[int] = []
+    if not isinstance(grid, Mapping):
+        raise ValueError(f"grid: found {type(grid).__name__}\n  expected: axes and their values\n  help: grid=dict(alpha_2=[...])")
     for name, values in grid.items():
         array = _array(name, values)
         if array.ndim > 1:

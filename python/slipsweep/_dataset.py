@@ -42,7 +42,7 @@ class DatasetTable(Columns):
         return self.__rows
 
     @property
-    def shape(self) -> tuple[int, ...]:  # type: ignore[override]
+    def shape(self) -> tuple[int, ...]:  # type: ignore[override]  # pyright: ignore[reportIncompatibleVariableOverride]
         """The number of rows."""
         return (len(self),)
 

@@ -10,6 +10,8 @@ rtol : float, optional
     Relative accuracy, 1e-13 <= rtol <= 1e-2; by default {rtol}.
 velocity_bound : bool
     Whether optimal protocols obey v >= 1.
+friction : 'log' or 'regularised'
+    Form of the direct effect; 'regularised' holds down to rest, and needs no floor.
 units : 'dimensionless' or 'si'
     'si' takes and gives SI values; it needs mu_0, l in m, v_0 in m/s and normal_stress in Pa."""
 UNIT_DOC = """unit : {units}, optional
@@ -21,6 +23,11 @@ def has_scale(definition: dict[str, Any]) -> bool:
     return any(len(axis["scales"]) > 1 for axis in definition["axes"])
 
 
+def _words(axis: dict[str, Any]) -> str:
+    default = "all" if axis["default_count"] > 1 else axis["words"][0]
+    return f"one of {', '.join(axis['words'])}; by default {default}"
+
+
 def docstring(definition: dict[str, Any]) -> str:
     """What `help` shows of the function of a table."""
     lines = [f"{definition['doc'][0].upper()}{definition['doc'][1:]}: a row for each point.", ""]
@@ -28,7 +35,7 @@ def docstring(definition: dict[str, Any]) -> str:
     for axis in definition["axes"]:
         unit = f", in {axis['unit']}" if axis["unit"] else ""
         kind = "str or sequence of str" if axis["words"] else "array_like"
-        legal = f"one of {', '.join(axis['words'])}; by default all" if axis["words"] else axis["range"]
+        legal = _words(axis) if axis["words"] else axis["range"]
         optional = f", default {axis['default']}" if axis["default"] is not None else ""
         lines += [f"{axis['name']} : {kind}{unit}{optional}", f"    {axis['doc']}; {legal}"]
     if has_scale(definition):

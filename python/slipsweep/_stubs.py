@@ -21,6 +21,7 @@ __all__ = [{names}]
 OPTIONS = """    columns: Sequence[Literal[{columns}]] | None = None,
     rtol: float | None = None,
     velocity_bound: bool = True,
+    friction: Literal["log", "regularised"] = "log",
     units: Literal["dimensionless", "si"] = "dimensionless",
     mu_0: float | None = None,
     l: float | None = None,

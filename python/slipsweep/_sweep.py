@@ -11,6 +11,9 @@ from ._progress import display
 from ._table import Table, Text
 
 Spec: TypeAlias = Mapping[str, Any] | str | os.PathLike[str]
+# Threads of a run; the limit of the command.
+MAX_THREADS = 1024
+
 Progress: TypeAlias = bool | Callable[[str, int, int], object] | None
 
 
@@ -63,14 +66,19 @@ class Sweep:
         """Computes what is missing of the dataset `out/NAME`, and opens it.
 
         Ctrl-C raises `KeyboardInterrupt` and keeps finished parts; the same call continues. `progress` is True, False or a function of the phase,
-        the rows done and all rows; by default terminals and notebooks show it.
+        the rows done and all rows; by default terminals and notebooks show it after half a second.
         """
-        shown = display(self.name, progress)
+        if threads is not None and not 1 <= threads <= MAX_THREADS:
+            raise ValueError(f"threads: {threads} is out of range\n  expected: 1 <= threads <= {MAX_THREADS}\n  help: leave it out")
+        if callable(progress):
+            return open(self._sweep.run(out, threads or 0, progress))
+        shown, is_done = display(self.name, sum(self.tables.values()), progress), False
         try:
             path = self._sweep.run(out, threads or 0, shown)
+            is_done = True
         finally:
-            if shown is not None and hasattr(shown, "close"):
-                shown.close()
+            if shown is not None:
+                shown.close(is_done)
         return open(path)
 
     def __repr__(self) -> str:

@@ -98,10 +98,12 @@ class Columns:
 
         Numbers are not copied, so they cannot be changed.
         """
+        if not isinstance(column, str):
+            raise TypeError(f"columns have names, not {type(column).__name__}: table['work'][0], or table.to_pandas().iloc[0]")
         if self.shape == ():
             only = self._rows.only(column)
             if only is not None:
-                return np.float64(only)
+                return np.float64(only) if isinstance(only, float) else only
         cells = self._flat(column).reshape(self.shape)
         return cells if self.shape else cells[()]
 
@@ -214,7 +216,8 @@ class Plain(Columns):
 class Table(Columns):
     """Rows of a table in memory.
 
-    `shape` is that of the arguments after broadcasting, then that of the grid. Rows are in C order.
+    `shape` is that of the arguments after broadcasting, then that of the grid. Rows are in C order. Worker processes can return them; `plot` works
+    where they were computed.
     """
 
     def __init__(self, rows: _core.Rows, name: str, shape: tuple[int, ...]) -> None:
@@ -225,6 +228,9 @@ class Table(Columns):
     @property
     def _rows(self) -> _core.Rows:
         return self.__rows
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return _from_bytes, (self.__rows.to_bytes(), self.name, self.shape)
 
     def plot(
         self,
@@ -238,6 +244,11 @@ class Table(Columns):
         """The picture that `slipsweep plot` draws of this table. Its options have the same names."""
         with tempfile.TemporaryDirectory() as folder:
             return Picture(self._rows.plot(folder, plot_arguments(where, x, y, color, width)))
+
+
+def _from_bytes(data: bytes, name: str, shape: tuple[int, ...]) -> Table:
+    """The table of `Table.__reduce__`."""
+    return Table(_core.Rows.from_bytes(data), name, shape)
 
 
 def plot_arguments(

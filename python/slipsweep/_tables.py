@@ -10,7 +10,8 @@ from ._table import Table
 
 # What every function takes besides the axes of its table.
 OPTIONS = (
-    "columns=None, rtol=None, velocity_bound=True, units='dimensionless', mu_0=None, l=None, v_0=None, normal_stress=None"
+    "columns=None, rtol=None, velocity_bound=True, friction='log', units='dimensionless', "
+    "mu_0=None, l=None, v_0=None, normal_stress=None"
 )
 
 
@@ -22,7 +23,7 @@ def function(definition: dict[str, Any]) -> Callable[..., Table]:
     source = (
         f"def {name}(*, {given}, grid=None{unit}, {OPTIONS}):\n"
         f"    return call({name!r}, ({', '.join(axes)},), grid, {'unit' if unit else 'None'}, columns, rtol,\n"
-        f"                (velocity_bound, units, mu_0, l, v_0, normal_stress))\n"
+        f"                (velocity_bound, friction, units, mu_0, l, v_0, normal_stress))\n"
     )
     space: dict[str, Any] = {"call": call, "inf": float("inf")}
     exec(source, space)

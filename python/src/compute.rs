@@ -13,17 +13,20 @@ use slipsweep::table::{self, Signal};
 
 use crate::error;
 use crate::rows::Rows;
-use crate::threads::{Interrupted, interruptible, stopper};
+use crate::threads::{interruptible, stopper};
 
 /// Cost up to which a row is computed on the thread of the caller, in nanoseconds. Chosen: twice the time that it takes to wake another thread and
 /// to be woken by it.
 const MAX_INLINE_NS: u64 = 50_000;
 
+/// Values of an axis up to which the thread of the caller checks them. Chosen: they take less than a millisecond.
+const MAX_INLINE_VALUES: usize = 10_000;
+
 /// Levels of the stack from here to the caller of a function of a table.
 const CALLER: i32 = 3;
 
 /// Model and units: the keys of `[model]` in a spec.
-type Model = (bool, String, Option<f64>, Option<f64>, Option<f64>, Option<f64>);
+type Model = (bool, String, String, Option<f64>, Option<f64>, Option<f64>, Option<f64>);
 
 /// Whether coefficients are relative to the duration; the columns, the accuracy, model and units.
 type Options = (bool, Option<Vec<String>>, Option<f64>, Option<Model>);
@@ -41,18 +44,18 @@ pub fn compute(
     let known = || table::ALL.iter().map(|table| table.name().to_owned()).collect::<Vec<_>>();
     let table = table::ALL.into_iter().find(|table| table.name() == name);
     let table = table.ok_or_else(|| error::missing("table", name, &known()))?;
-    let direct = Direct {
-        table,
-        points: given(Quantity::ALL.into_iter().filter(|axis| table.axes().contains(axis)).zip(&values))?,
-        grid: given(
-            grid.iter().map(|(name, value)| Ok((known_axis(name)?, value))).collect::<PyResult<Vec<_>>>()?.into_iter(),
-        )?,
-        scale: if is_relative { Scale::Duration } else { Scale::Model },
-        model: model.map_or_else(ModelSpec::default, model_of),
-        rtol,
-        columns: columns.as_deref(),
+    let points = given(Quantity::ALL.into_iter().filter(|axis| table.axes().contains(axis)).zip(&values))?;
+    let grid = grid.iter().map(|(name, value)| Ok((known_axis(name)?, value))).collect::<PyResult<Vec<_>>>()?;
+    let grid = given(grid.into_iter())?;
+    let is_short = points.iter().chain(&grid).all(|(_, values)| values.len() <= MAX_INLINE_VALUES);
+    let scale = if is_relative { Scale::Duration } else { Scale::Model };
+    let model = model.map_or_else(ModelSpec::default, model_of);
+    let checked = move || {
+        let columns = columns.as_deref();
+        Sweep::direct(Direct { table, points, grid, scale, model, rtol, columns })
     };
-    let sweep = Arc::new(Sweep::direct(direct).map_err(|error| error::spec(&error))?);
+    let sweep = if is_short { checked() } else { interruptible(py, || (), checked)? };
+    let sweep = Arc::new(sweep.map_err(|error| error::spec(&error))?);
     for warning in &sweep.warnings {
         let text = CString::new(warning.to_string()).map_err(error::defect)?;
         PyErr::warn(py, &py.get_type::<PyUserWarning>(), &text, CALLER)?;
@@ -64,18 +67,21 @@ pub fn compute(
 pub fn rows(py: Python<'_>, sweep: Arc<Sweep>, request: usize) -> PyResult<Rows> {
     let signal = Arc::new(Signal::default());
     let cheap = |request: &slipsweep::sweep::Request| request.rows <= 1 && request.table.cost() <= MAX_INLINE_NS;
-    let buffer = if cheap(&sweep.requests[request]) {
-        sweep.rows(&sweep.requests[request], &signal)
-    } else {
-        let (ours, its) = (sweep.clone(), signal.clone());
-        let work = move || ours.rows(&ours.requests[request], &its);
-        interruptible(py, Interrupted::Left, stopper(&signal), |_| Ok(()), work)?
+    if cheap(&sweep.requests[request]) {
+        let buffer = sweep.rows(&sweep.requests[request], &signal).map_err(|error| error::rows(&error))?;
+        return Ok(Rows::single(sweep, request, buffer));
+    }
+    let (ours, its) = (sweep.clone(), signal.clone());
+    let work = move || {
+        let request = &ours.requests[request];
+        ours.rows(request, &its).map(|buffer| ours.record_batch(request, buffer))
     };
-    Ok(Rows::computed(sweep, request, buffer.map_err(|error| error::rows(&error))?))
+    let batch = interruptible(py, stopper(&signal), work)?.map_err(|error| error::rows(&error))?;
+    Ok(Rows::computed(sweep, request, batch.map_err(error::defect)?))
 }
 
-fn model_of((velocity_bound, units, mu_0, l, v_0, normal_stress): Model) -> ModelSpec {
-    ModelSpec { velocity_bound, units, mu_0, l, v_0, normal_stress }
+fn model_of((velocity_bound, friction, units, mu_0, l, v_0, normal_stress): Model) -> ModelSpec {
+    ModelSpec { velocity_bound, friction, units, mu_0, l, v_0, normal_stress }
 }
 
 /// The axis of a product.

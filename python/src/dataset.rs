@@ -19,7 +19,7 @@ use slipsweep::verify::{Audit, verify};
 
 use crate::error::{self, defect};
 use crate::rows::{Rows, with_nan};
-use crate::threads::{Interrupted, interruptible, on_pool};
+use crate::threads::interruptible;
 
 /// The arguments of a picture: conditions, x, y, colour and width in millimetres.
 pub type PlotArguments = (Vec<String>, Option<String>, Option<String>, Option<String>, Option<f64>);
@@ -72,43 +72,47 @@ impl Dataset {
         self.manifest.tables.iter().map(|table| (table.name.clone(), doc(&table.name), table.rows)).collect()
     }
 
-    /// The files of a table that are there, and how many are missing.
+    /// The present files of a table, and the number of missing ones.
     fn parts(&self, py: Python<'_>, name: &str) -> PyResult<(Vec<PathBuf>, u64)> {
         let table = self.table(name)?;
-        on_pool(py, || self.folder.verified(&self.manifest, &table))?.map_err(|error| error::dataset(&error))
+        let (folder, manifest) = (self.folder.clone(), self.manifest.clone());
+        let work = move || folder.verified(&manifest, &table);
+        interruptible(py, || (), work)?.map_err(|error| error::dataset(&error))
     }
 
-    /// The rows of a table that are there.
+    /// The present rows of a table.
     fn rows(&self, py: Python<'_>, name: &str) -> PyResult<Rows> {
         let (paths, _) = self.parts(py, name)?;
-        let read = move || -> Result<Vec<RecordBatch>, String> {
+        let read = move || -> Result<Option<RecordBatch>, String> {
             let parts: Result<Vec<Vec<RecordBatch>>, String> = paths.par_iter().map(read_part).collect();
-            Ok(parts?.into_iter().flatten().collect())
+            let batches: Vec<RecordBatch> = parts?.into_iter().flatten().collect();
+            let Some(first) = batches.first() else { return Ok(None) };
+            let whole = concat_batches(&first.schema(), &batches).and_then(with_nan);
+            whole.map(Some).map_err(|error| error.to_string())
         };
-        let batches = interruptible(py, Interrupted::Left, || (), |_| Ok(()), read)?.map_err(defect)?;
-        let Some(first) = batches.first() else {
+        let rows = interruptible(py, || (), read)?.map_err(defect)?.map(Rows::read);
+        rows.ok_or_else(|| {
             let help = "run the spec: it computes what is missing";
-            return Err(PyValueError::new_err(format!("`{name}` has no rows yet\n  help: {help}")));
-        };
-        let schema = first.schema();
-        let batch = py.detach(|| concat_batches(&schema, &batches)).map_err(defect)?;
-        Ok(Rows::read(with_nan(batch)?))
+            PyValueError::new_err(format!("`{name}` has no rows yet\n  help: {help}"))
+        })
     }
 
     /// The picture of a table as SVG.
-    fn plot(&self, py: Python<'_>, name: &str, arguments: PlotArguments) -> PyResult<String> {
+    fn plot(&self, py: Python<'_>, name: String, arguments: PlotArguments) -> PyResult<String> {
         let units = units_of(&self.manifest.spec).map_err(|fault| error::spec(&fault))?;
         let source = Source::new(self.folder.clone(), self.manifest.clone(), units);
-        on_pool(py, || svg(&source, name, &arguments))?
+        interruptible(py, || (), move || svg(&source, &name, &arguments))?
     }
 
     /// What `slipsweep summary` prints.
-    fn summary(&self, py: Python<'_>) -> String {
-        py.detach(|| {
-            let survey = Survey::new(&self.folder, &self.manifest, CheckDepth::Footer, &AtomicU64::new(0));
+    fn summary(&self, py: Python<'_>) -> PyResult<String> {
+        let (folder, manifest) = (self.folder.clone(), self.manifest.clone());
+        let work = move || {
+            let survey = Survey::new(&folder, &manifest, CheckDepth::Footer, &AtomicU64::new(0));
             let tables = survey.tables.iter().map(|table| text::summary(&table.name, table.rows, &table.statistics));
             tables.collect::<Vec<_>>().join("\n")
-        })
+        };
+        interruptible(py, || (), work)
     }
 
     /// What `slipsweep verify` prints, and how many numbers differ too much.
@@ -120,7 +124,7 @@ impl Dataset {
                 (text.join("\n"), audits.iter().map(Audit::errors).sum())
             })
         };
-        interruptible(py, Interrupted::Left, || (), |_| Ok(()), work)?.map_err(defect)
+        interruptible(py, || (), work)?.map_err(defect)
     }
 }
 

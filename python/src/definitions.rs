@@ -14,7 +14,7 @@ pub fn tables(py: Python<'_>) -> PyResult<Bound<'_, PyList>> {
     PyList::new(py, tables)
 }
 
-fn definition<'py>(py: Python<'py>, table: &dyn Table) -> PyResult<Bound<'py, PyDict>> {
+fn definition<'py>(py: Python<'py>, table: &Table) -> PyResult<Bound<'py, PyDict>> {
     let axes = Quantity::ALL.into_iter().filter(|axis| table.axes().contains(axis));
     let axes: Vec<_> = axes.map(|quantity| axis(py, quantity)).collect::<PyResult<_>>()?;
     let columns: Vec<_> = table.columns().iter().map(|one| column(py, one)).collect::<PyResult<_>>()?;
@@ -29,7 +29,7 @@ fn definition<'py>(py: Python<'py>, table: &dyn Table) -> PyResult<Bound<'py, Py
 
 fn axis(py: Python<'_>, quantity: Quantity) -> PyResult<Bound<'_, PyDict>> {
     let default = match quantity.default().as_slice() {
-        [one] if quantity.words().is_empty() => Some(*one),
+        [one] if quantity.words().is_empty() && !quantity.is_tacit() => Some(*one),
         _ => None,
     };
     let dict = PyDict::new(py);
@@ -41,6 +41,7 @@ fn axis(py: Python<'_>, quantity: Quantity) -> PyResult<Bound<'_, PyDict>> {
     dict.set_item("words", quantity.words())?;
     dict.set_item("default", default)?;
     dict.set_item("default_count", quantity.default().len())?;
+    dict.set_item("is_tacit", quantity.is_tacit())?;
     Ok(dict)
 }
 

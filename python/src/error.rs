@@ -14,7 +14,10 @@ pub fn spec(error: &SpecError) -> PyErr {
 
 /// The failure of a command: exit code 1 means wrong input.
 pub fn command(failure: &Failure) -> PyErr {
-    let text = failure.message.trim_start_matches("error: ").trim_end().to_owned();
+    let text = failure.message.trim_start_matches("error: ");
+    // What follows is about the command line.
+    let end = ["\n\nUsage:", "\n\nFor more information"].iter().filter_map(|start| text.find(start)).min();
+    let text = text[..end.unwrap_or(text.len())].trim_end().to_owned();
     if failure.code == 1 { PyValueError::new_err(text) } else { PyRuntimeError::new_err(text) }
 }
 
@@ -57,9 +60,9 @@ pub fn plot(error: &PlotError) -> PyErr {
     }
 }
 
-/// A name that is not among `known`.
+/// A name that is not among `known`, in one line: Python shows a `KeyError` with escapes.
 pub fn missing(what: &str, name: &str, known: &[String]) -> PyErr {
-    PyKeyError::new_err(format!("no {what} `{name}`\n  expected: {}", known.join(", ")))
+    PyKeyError::new_err(format!("no {what} `{name}`; expected {}", known.join(", ")))
 }
 
 /// Anything that is a defect of the package or of a file.

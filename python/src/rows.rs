@@ -6,21 +6,23 @@ use std::sync::{Arc, Mutex, OnceLock};
 use arrow_array::cast::AsArray;
 use arrow_array::types::{Float64Type, Int32Type};
 use arrow_array::{Array, ArrayRef, Float64Array, RecordBatch, StructArray};
+use arrow_ipc::reader::StreamReader;
+use arrow_ipc::writer::StreamWriter;
 use arrow_schema::{ArrowError, DataType};
 use pyo3::exceptions::PyValueError;
 use pyo3::ffi;
 use pyo3::prelude::*;
-use pyo3::types::PyCapsule;
+use pyo3::types::{PyBytes, PyCapsule};
 use pyo3_arrow::ffi::ArrayIterator;
 use slipsweep::dataset::{Concurrency, Folder, Footer, Layout, encode};
 use slipsweep::plot::table::Source;
 use slipsweep::protocol::Status;
 use slipsweep::sweep::{Plan, Sweep};
-use slipsweep::table::ColumnBuffer;
+use slipsweep::table::{ColumnBuffer, Kind};
 
 use crate::dataset::{PlotArguments, svg};
 use crate::error::{self, defect};
-use crate::threads::on_pool;
+use crate::threads::interruptible;
 
 /// The values of a column: bytes that NumPy reads without a copy.
 #[pyclass(frozen, module = "slipsweep._core")]
@@ -42,7 +44,14 @@ impl Buffer {
 /// Name, unit, meaning and type of a column, and whether cells may be missing.
 type Field = (String, String, String, &'static str, bool);
 
-/// Computed rows before a request for Arrow.
+/// A number, or a word.
+#[derive(IntoPyObject)]
+pub enum Cell {
+    Number(f64),
+    Word(&'static str),
+}
+
+/// The origin of computed rows, and the numbers of a single row before a request for Arrow.
 struct Computed {
     sweep: Arc<Sweep>,
     request: usize,
@@ -59,7 +68,14 @@ pub struct Rows {
 
 impl Rows {
     /// The rows of a requested table of a sweep.
-    pub fn computed(sweep: Arc<Sweep>, request: usize, buffer: ColumnBuffer) -> Rows {
+    pub fn computed(sweep: Arc<Sweep>, request: usize, batch: RecordBatch) -> Rows {
+        let length = batch.num_rows();
+        let computed = Computed { sweep, request, buffer: Mutex::default() };
+        Rows { computed: Some(computed), batch: OnceLock::from(batch), length }
+    }
+
+    /// The columns before their conversion to Arrow, which takes as long as a single row.
+    pub fn single(sweep: Arc<Sweep>, request: usize, buffer: ColumnBuffer) -> Rows {
         let length = buffer.status.len();
         let computed = Computed { sweep, request, buffer: Mutex::new(Some(buffer)) };
         Rows { computed: Some(computed), batch: OnceLock::new(), length }
@@ -114,23 +130,26 @@ impl Rows {
         Ok(fields.collect())
     }
 
-    /// The only value of a column of numbers; `None` of another column.
-    fn only(&self, name: &str) -> PyResult<Option<f64>> {
+    /// The cell of a column of a single row; `None` where only Arrow has it.
+    fn only(&self, name: &str) -> PyResult<Option<Cell>> {
         let Some(Computed { sweep, request, buffer }) = self.computed.as_ref().filter(|_| self.length == 1) else {
             return Ok(None);
         };
-        let (buffer, request) = (buffer.lock().map_err(defect)?, &sweep.requests[*request]);
+        let buffer = buffer.lock().map_err(defect)?;
+        let Some(buffer) = buffer.as_ref() else { return Ok(None) };
+        let request = &sweep.requests[*request];
         let columns = request.table.columns();
-        let place = request.projection.indices().iter().position(|&index| {
-            columns[index].name == name
-                && matches!(
-                    columns[index].kind,
-                    slipsweep::table::Kind::Number(_) | slipsweep::table::Kind::Quantity(_)
-                )
-        });
+        let place = request.projection.indices().iter().position(|&index| columns[index].name == name);
         // An axis of the same name comes first.
-        let is_axis = request.table.axes().iter().any(|axis| axis.name() == name);
-        Ok(place.filter(|_| !is_axis).zip(buffer.as_ref()).map(|(place, buffer)| buffer.columns[place][0]))
+        let Some(place) = place.filter(|_| !request.table.axes().iter().any(|axis| axis.name() == name)) else {
+            return Ok((name == "status").then(|| Cell::Word(buffer.status[0].name())));
+        };
+        let cell = buffer.columns[place][0];
+        Ok(match columns[request.projection.indices()[place]].kind {
+            Kind::Number(_) | Kind::Quantity(_) => Some(Cell::Number(cell)),
+            Kind::Label(words) => (!cell.is_nan()).then(|| Cell::Word(words[cell as usize])),
+            Kind::Flag => None,
+        })
     }
 
     /// The values of a column of numbers, NaN where there is none; or the places of words or flags, -1 where there is none, and the words.
@@ -152,6 +171,22 @@ impl Rows {
             _ => keys.iter().map(|key| key.unwrap_or(-1)).collect::<Vec<i32>>().into(),
         };
         Ok((Buffer(places), Some(texts)))
+    }
+
+    /// The rows in the stream format of Arrow, for another process.
+    fn to_bytes<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyBytes>> {
+        let batch = self.batch()?;
+        let mut writer = StreamWriter::try_new(Vec::new(), batch.schema_ref()).map_err(defect)?;
+        writer.write(batch).map_err(defect)?;
+        Ok(PyBytes::new(py, &writer.into_inner().map_err(defect)?))
+    }
+
+    /// The rows that `to_bytes` gave.
+    #[staticmethod]
+    fn from_bytes(data: &[u8]) -> PyResult<Rows> {
+        let mut reader = StreamReader::try_new(data, None).map_err(defect)?;
+        let batch = reader.next().ok_or_else(|| defect("rows without content"))?.map_err(defect)?;
+        Ok(Rows::read(with_nan(batch).map_err(defect)?))
     }
 
     /// The first `count` rows.
@@ -179,36 +214,41 @@ impl Rows {
 
     /// The picture of computed rows, drawn from a dataset in `folder`, which is empty and temporary.
     fn plot(&self, py: Python<'_>, folder: PathBuf, arguments: PlotArguments) -> PyResult<String> {
-        on_pool(py, || self.drawn(&folder, &arguments))?
+        let computed = self.computed.as_ref().ok_or_else(|| PyValueError::new_err("these rows have no picture"))?;
+        let (sweep, request, batch) = (computed.sweep.clone(), computed.request, self.batch()?.clone());
+        interruptible(py, || (), move || drawn(&sweep, request, &batch, (&folder, &arguments)))?
     }
 }
 
-impl Rows {
-    /// The picture of computed rows, from a dataset that is written to `folder`.
-    fn drawn(&self, folder: &Path, arguments: &PlotArguments) -> PyResult<String> {
-        let computed = self.computed.as_ref().ok_or_else(|| PyValueError::new_err("these rows have no picture"))?;
-        let (sweep, request) = (&computed.sweep, &computed.sweep.requests[computed.request]);
-        let buffer = column_buffer(self.batch()?, request.projection.indices().len())?;
-        let mut manifest = Plan::new(sweep).manifest(sweep);
-        manifest.spec = format!("[model]\nvelocity_bound = {}\n", sweep.bounded);
-        manifest.tables.retain(|table| table.name == request.table.name());
-        let folder = Folder::new(folder, "rows");
-        let session = folder.open(&manifest, Concurrency::Alone).map_err(|error| error::dataset(&error))?;
-        let layout = Layout::new(request.table, &request.projection, &sweep.grid);
-        let name = request.table.name();
-        for table in &manifest.tables {
-            for part in 0..table.parts {
-                let rows = table.rows_of(part);
-                let range = rows.start as usize..rows.end as usize;
-                let columns = buffer.columns.iter().map(|column| column[range.clone()].to_vec()).collect();
-                let cells = ColumnBuffer { columns, status: buffer.status[range.clone()].to_vec() };
-                let footer = Footer::new(&session.manifest, name, rows);
-                let (bytes, _) = encode(&layout, &request.row_index, &cells, &footer).map_err(defect)?;
-                session.write_part(name, part, &bytes).map_err(|error| error::dataset(&error))?;
-            }
+/// The picture of computed rows, from a dataset that is written to the folder.
+fn drawn(
+    sweep: &Sweep,
+    request: usize,
+    batch: &RecordBatch,
+    (folder, arguments): (&Path, &PlotArguments),
+) -> PyResult<String> {
+    let request = &sweep.requests[request];
+    let buffer = column_buffer(batch, request.projection.indices().len())?;
+    let mut manifest = Plan::new(sweep).manifest(sweep);
+    let (bounded, friction) = (sweep.bounded, sweep.friction.name());
+    manifest.spec = format!("[model]\nvelocity_bound = {bounded}\nfriction = \"{friction}\"\n");
+    manifest.tables.retain(|table| table.name == request.table.name());
+    let folder = Folder::new(folder, "rows");
+    let session = folder.open(&manifest, Concurrency::Alone).map_err(|error| error::dataset(&error))?;
+    let layout = Layout::new(request.table, &request.projection, &sweep.grid);
+    let name = request.table.name();
+    for table in &manifest.tables {
+        for part in 0..table.parts {
+            let rows = table.rows_of(part);
+            let range = rows.start as usize..rows.end as usize;
+            let columns = buffer.columns.iter().map(|column| column[range.clone()].to_vec()).collect();
+            let cells = ColumnBuffer { columns, status: buffer.status[range.clone()].to_vec() };
+            let footer = Footer::new(&session.manifest, name, rows);
+            let (bytes, _) = encode(&layout, &request.row_index, &cells, &footer).map_err(defect)?;
+            session.write_part(name, part, &bytes).map_err(|error| error::dataset(&error))?;
         }
-        svg(&Source::new(folder.clone(), manifest, sweep.grid.units), name, arguments)
     }
+    svg(&Source::new(folder.clone(), manifest, sweep.grid.units), name, arguments)
 }
 
 /// The last `columns` columns before the status, and the status, as the engine has them.
@@ -230,7 +270,11 @@ fn column_buffer(batch: &RecordBatch, columns: usize) -> PyResult<ColumnBuffer> 
 }
 
 /// A batch whose missing numbers are NaN below the null, as computed ones are.
-pub fn with_nan(batch: RecordBatch) -> PyResult<RecordBatch> {
+///
+/// # Errors
+///
+/// If the columns are not those of its schema.
+pub fn with_nan(batch: RecordBatch) -> Result<RecordBatch, ArrowError> {
     let filled = batch.columns().iter().map(|array| match array.as_primitive_opt::<Float64Type>() {
         Some(numbers) if numbers.null_count() > 0 => {
             let values: Vec<f64> = numbers.iter().map(|number| number.unwrap_or(f64::NAN)).collect();
@@ -238,5 +282,5 @@ pub fn with_nan(batch: RecordBatch) -> PyResult<RecordBatch> {
         }
         _ => array.clone(),
     });
-    RecordBatch::try_new(batch.schema(), filled.collect()).map_err(defect)
+    RecordBatch::try_new(batch.schema(), filled.collect())
 }

@@ -2,7 +2,6 @@
 
 use std::path::PathBuf;
 use std::sync::Arc;
-use std::time::Instant;
 
 use pyo3::prelude::*;
 use slipsweep::cli::text;
@@ -13,7 +12,7 @@ use slipsweep::table::{Phase, Signal};
 use crate::compute;
 use crate::error;
 use crate::rows::Rows;
-use crate::threads::{Interrupted, interruptible, stopper};
+use crate::threads::{self, interruptible, stopper};
 
 /// A checked spec.
 #[pyclass(frozen, module = "slipsweep._core")]
@@ -30,16 +29,16 @@ fn without_lines(mut fault: SpecError) -> SpecError {
 impl Sweep {
     /// The spec in a TOML file.
     #[staticmethod]
-    fn load(path: PathBuf) -> PyResult<Sweep> {
-        let sweep = sweep::Sweep::load(&path).map_err(|fault| error::spec(&fault))?;
-        Ok(Sweep(Arc::new(sweep)))
+    fn load(py: Python<'_>, path: PathBuf) -> PyResult<Sweep> {
+        let sweep = interruptible(py, || (), move || sweep::Sweep::load(&path))?;
+        Ok(Sweep(Arc::new(sweep.map_err(|fault| error::spec(&fault))?)))
     }
 
     /// The spec in `text`, made from a dict; its files are relative to `folder`.
     #[staticmethod]
-    fn parse(text: &str, folder: PathBuf) -> PyResult<Sweep> {
-        let sweep = sweep::Sweep::parse(text, &folder).map_err(|fault| error::spec(&without_lines(fault)))?;
-        Ok(Sweep(Arc::new(sweep)))
+    fn parse(py: Python<'_>, text: String, folder: PathBuf) -> PyResult<Sweep> {
+        let sweep = interruptible(py, || (), move || sweep::Sweep::parse(&text, &folder))?;
+        Ok(Sweep(Arc::new(sweep.map_err(|fault| error::spec(&without_lines(fault)))?)))
     }
 
     #[getter]
@@ -72,13 +71,9 @@ impl Sweep {
     fn plan(&self, py: Python<'_>, out: PathBuf) -> PyResult<String> {
         let sweep = self.0.clone();
         let work = move || {
-            let start = Instant::now();
-            estimate(&sweep, &out).map(|estimates| {
-                let _ = start;
-                format!("{}\n{}", sweep.name, text::plan(&sweep, &estimates, 0.0))
-            })
+            estimate(&sweep, &out).map(|estimates| format!("{}\n{}", sweep.name, text::plan(&sweep, &estimates, 0.0)))
         };
-        interruptible(py, Interrupted::Left, || (), |_| Ok(()), work)?.map_err(|error| error::run(&error))
+        interruptible(py, || (), work)?.map_err(|error| error::run(&error))
     }
 
     /// The rows of a table in memory.
@@ -89,7 +84,7 @@ impl Sweep {
         compute::rows(py, self.0.clone(), request)
     }
 
-    /// Computes what is missing of the dataset in `out`, and calls `progress` with the phase, the rows done and all rows. Returns the folder.
+    /// Computes the missing parts of the dataset in `out`, and calls `progress` with the phase, the rows done and all rows. Returns the folder.
     fn run(&self, py: Python<'_>, out: PathBuf, threads: usize, progress: Option<Py<PyAny>>) -> PyResult<PathBuf> {
         let folder = Folder::new(&out, &self.0.name);
         let path = folder.path().to_owned();
@@ -108,7 +103,7 @@ impl Sweep {
             }
             None => Ok(()),
         };
-        let done = interruptible(py, Interrupted::Awaited, stopper(&signal), look, work)?;
+        let done = threads::run(py, stopper(&signal), look, work)?;
         done.map(|_| path).map_err(|error| error::run(&error))
     }
 

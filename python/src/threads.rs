@@ -1,9 +1,10 @@
 //! Threads: the pool of the process, and work that Ctrl-C interrupts.
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
-use std::sync::Mutex;
 use std::sync::atomic::{AtomicPtr, Ordering};
-use std::sync::mpsc::{RecvTimeoutError, sync_channel};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, sync_channel};
+use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::thread::JoinHandle;
 use std::time::Duration;
 use std::{process, ptr, thread};
 
@@ -15,6 +16,15 @@ use crate::error::defect;
 
 /// Time between two looks at signals. Chosen: a quarter of the 0.2 s in which Ctrl-C answers.
 const LOOK: Duration = Duration::from_millis(50);
+
+/// Time that a stopped run has to end, before it is left to end by itself. Chosen: with `LOOK`, half of the 0.2 s in which Ctrl-C answers.
+const GRACE: Duration = Duration::from_millis(50);
+
+/// Runs that were left, and their processes.
+static LEFT: Mutex<Vec<(u32, JoinHandle<()>)>> = Mutex::new(Vec::new());
+
+/// Where the result of work, or its panic, arrives.
+type Arrival<T> = Mutex<Receiver<thread::Result<T>>>;
 
 /// The pool of one process.
 struct Pool {
@@ -48,53 +58,82 @@ pub fn pool() -> PyResult<&'static ThreadPool> {
     }
 }
 
-/// What happens to work that is interrupted.
-#[derive(Clone, Copy, PartialEq, Eq)]
-pub enum Interrupted {
-    /// It ends by itself, and its result is lost.
-    Left,
-    /// Its end is awaited.
-    Awaited,
-}
-
-/// The result of `work`, which runs in the pool or, if it is `Awaited`, on a thread of its own. Python's other threads continue, `look` is called
-/// from time to time, and Ctrl-C stops `signal`.
+/// The result of `work`, which runs in the pool. Python's other threads continue; Ctrl-C calls `stop` and leaves the work, whose result is lost.
 pub fn interruptible<T: Send + 'static>(
     py: Python<'_>,
-    interrupted: Interrupted,
+    stop: impl Fn(),
+    work: impl FnOnce() -> T + Send + 'static,
+) -> PyResult<T> {
+    let (work, receive) = sent(work);
+    pool()?.spawn(work);
+    awaited(py, &receive, |py| py.check_signals()).inspect_err(|_| stop())
+}
+
+/// The result of a run, on a thread of its own that calls `look` from time to time.
+///
+/// Ctrl-C, or an error of `look`, calls `stop`. A run that does not end within `GRACE` is left: it publishes the parts that it writes, and the next run
+/// of this process waits for its end.
+pub fn run<T: Send + 'static>(
+    py: Python<'_>,
     stop: impl Fn(),
     mut look: impl FnMut(Python<'_>) -> PyResult<()>,
     work: impl FnOnce() -> T + Send + 'static,
 ) -> PyResult<T> {
+    let (work, receive) = sent(|| {
+        join_left();
+        work()
+    });
+    let thread = thread::Builder::new().spawn(work)?;
+    awaited(py, &receive, |py| py.check_signals().and_then(|()| look(py))).inspect_err(|_| {
+        stop();
+        let ended = py.detach(|| lock(&receive).recv_timeout(GRACE));
+        if matches!(ended, Err(RecvTimeoutError::Timeout)) {
+            lock(&LEFT).push((process::id(), thread));
+        }
+    })
+}
+
+/// Waits for the runs of this process that were left. Those of its parent do not exist here.
+fn join_left() {
+    for (process, thread) in std::mem::take(&mut *lock(&LEFT)) {
+        if process == process::id() {
+            // Its result is lost, and its panic with it.
+            let _ = thread.join();
+        } else {
+            std::mem::forget(thread);
+        }
+    }
+}
+
+/// Work that sends its result, or its panic, and the place where that arrives.
+fn sent<T: Send + 'static>(work: impl FnOnce() -> T + Send + 'static) -> (impl FnOnce() + Send + 'static, Arrival<T>) {
     let (send, receive) = sync_channel(1);
     let work = move || {
         // A caller that left does not receive the result.
         let _ = send.send(catch_unwind(AssertUnwindSafe(work)));
     };
-    match interrupted {
-        Interrupted::Left => pool()?.spawn(work),
-        Interrupted::Awaited => drop(thread::Builder::new().spawn(work)?),
-    }
-    let receive = Mutex::new(receive);
-    let mut error = None;
+    (work, Mutex::new(receive))
+}
+
+/// What arrives, with a call of `look` from time to time.
+fn awaited<T: Send>(
+    py: Python<'_>,
+    arrival: &Arrival<T>,
+    mut look: impl FnMut(Python<'_>) -> PyResult<()>,
+) -> PyResult<T> {
     loop {
-        let received = py.detach(|| receive.lock().map(|receive| receive.recv_timeout(LOOK)).ok());
-        match received.unwrap_or(Err(RecvTimeoutError::Disconnected)) {
-            Ok(Ok(result)) => return error.map_or(Ok(result), Err),
-            Ok(Err(panic)) => return Err(error.unwrap_or_else(|| defect(panicked(&*panic)))),
+        match py.detach(|| lock(arrival).recv_timeout(LOOK)) {
+            Ok(Ok(result)) => return Ok(result),
+            Ok(Err(panic)) => return Err(defect(panicked(&*panic))),
             Err(RecvTimeoutError::Disconnected) => return Err(defect("a thread of slipsweep ended early")),
-            Err(RecvTimeoutError::Timeout) if error.is_some() => {}
-            Err(RecvTimeoutError::Timeout) => {
-                if let Err(raised) = py.check_signals().and_then(|()| look(py)) {
-                    stop();
-                    if interrupted == Interrupted::Left {
-                        return Err(raised);
-                    }
-                    error = Some(raised);
-                }
-            }
+            Err(RecvTimeoutError::Timeout) => look(py)?,
         }
     }
+}
+
+/// The content of `mutex`, including a poisoned one.
+fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 /// The message of a panic.
@@ -102,12 +141,6 @@ fn panicked(panic: &(dyn std::any::Any + Send)) -> String {
     let text = panic.downcast_ref::<&str>().map(|text| (*text).to_owned());
     let text = text.or_else(|| panic.downcast_ref::<String>().cloned()).unwrap_or_default();
     format!("{text}\n  help: this is a bug in slipsweep: please report it")
-}
-
-/// The result of `work` in the pool of the process, where nothing interrupts it for long.
-pub fn on_pool<T: Send>(py: Python<'_>, work: impl FnOnce() -> T + Send) -> PyResult<T> {
-    let pool = pool()?;
-    Ok(py.detach(|| pool.install(work)))
 }
 
 /// A signal and how to stop it.

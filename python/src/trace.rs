@@ -8,7 +8,7 @@ use slipsweep::trace::record_batch;
 
 use crate::error::{self, defect};
 use crate::rows::Rows;
-use crate::threads::{Interrupted, interruptible};
+use crate::threads::interruptible;
 
 /// A protocol over time.
 #[pyclass(frozen, module = "slipsweep._core")]
@@ -17,7 +17,7 @@ pub struct Trace(Traced);
 /// The protocol that the arguments of `slipsweep trace` name.
 #[pyfunction]
 pub fn trace(py: Python<'_>, arguments: Vec<String>) -> PyResult<Trace> {
-    let traced = interruptible(py, Interrupted::Left, || (), |_| Ok(()), move || traced(&arguments))?;
+    let traced = interruptible(py, || (), move || traced(&arguments))?;
     traced.map(Trace).map_err(|failure| error::command(&failure))
 }
 
@@ -29,7 +29,7 @@ impl Trace {
         &self.0.header
     }
 
-    /// The same as keys and values.
+    /// Its facts as keys and values.
     #[getter]
     fn facts(&self) -> Vec<(String, String)> {
         self.0.facts.clone()
@@ -38,7 +38,7 @@ impl Trace {
     /// The moments.
     fn rows(&self) -> PyResult<Rows> {
         let batch = record_batch(&self.0.trace, &self.0.units).map_err(defect)?;
-        Ok(Rows::read(crate::rows::with_nan(batch)?))
+        Ok(Rows::read(crate::rows::with_nan(batch).map_err(defect)?))
     }
 }
 

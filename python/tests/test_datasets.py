@@ -9,11 +9,13 @@ import tomllib
 
 import numpy as np
 import polars as pl
+import pyarrow.parquet as pq
 import pytest
 from conftest import DEFINITIONS, PAPER, SPEC, command
 from test_tables import same
 
 import slipsweep as ss
+from slipsweep import _toml
 
 GRID = dict(alpha_2=np.linspace(-0.5, 0.5, 11), alpha_3=np.linspace(-0.5, 0.5, 21))
 
@@ -37,6 +39,54 @@ def test_functions_give_the_bits_of_the_command(dataset):
         in_memory = ss.Sweep(tomllib.loads(SPEC))[name]
         for column in table.columns:
             assert same(in_memory[column], read[column]), (name, column)
+
+
+# Values of every axis.
+VALUES = {
+    "t_f": [0.02, 0.037],
+    "theta": [0.1, 0.2],
+    "t_left": [0.01, 1.0],
+    "a": [0.03],
+    "b": [0.05, 0.02],
+    "v_i": [3.0],
+    "v_f": [100.0, 2.0],
+    "v_ceiling": [np.inf, 5000.0],
+    "tau_ceiling": [np.inf, 2.0],
+    "alpha_2": [-0.12, 0.0],
+    "alpha_3": [-0.066, 0.0],
+    "law_eps": [0.0, 0.5],
+    "k": [10.0, np.inf],
+    "m": [0.0, 1e-6],
+    "dt": [0.0, 1e-4],
+    "delta_t": [1e-3],
+}
+
+
+# The laws of slip and of Perrin, Rice and Zheng need a velocity ceiling and have no friction ceiling.
+CEILINGS = {"v_ceiling": [200.0, 5000.0]}
+GRIDS = [(name, CEILINGS if name in ("gap", "best_cubic") else {}) for name in DEFINITIONS if name not in ("optimal", "stability")]
+# The law is a word or an interpolation.
+GRIDS += [("stability", {"law_eps": []}), ("stability", {"law": []})]
+GRIDS += [("optimal", {"law": ["ageing"]}), ("optimal", {"v_ceiling": [200.0, 5000.0], "tau_ceiling": [np.inf]})]
+
+
+@pytest.mark.parametrize("name, changes", GRIDS)
+def test_every_column_has_the_bits_of_the_command(name, changes, tmp_path):
+    definition = DEFINITIONS[name]
+    axes = {axis["name"]: axis["words"] or VALUES[axis["name"]] for axis in definition["axes"]} | changes
+    axes = {axis: values for axis, values in axes.items() if len(values)}
+    columns = [column["name"] for column in definition["columns"]]
+    spec = {"name": "all", "axes": axes, "tables": {name: {"columns": columns}}}
+    (tmp_path / "all.toml").write_text(_toml.text(spec))
+    command("run", "all.toml", "--quiet", cwd=tmp_path)
+    read = pq.read_table(tmp_path / "results/all" / name)
+    table = getattr(ss, name)(grid=axes, columns=columns)
+    assert table.columns == read.column_names and len(table) == read.num_rows == np.prod([len(values) for values in axes.values()])
+    for column in table.columns:
+        cells = read[column].to_pandas().to_numpy(dtype=float if column in table.units else object)
+        cells = cells if column in table.units else [cell if isinstance(cell, (str, bool)) else None for cell in cells]
+        assert same(table._flat(column), cells), column
+    assert "ok" in table["status"]
 
 
 def test_tables_of_a_dataset(dataset):
@@ -92,21 +142,19 @@ WRONG = {
 
 
 @pytest.mark.parametrize("case", WRONG)
-def test_wrong_specs_have_the_message_of_the_command(case, tmp_path):
+def test_wrong_specs_have_the_message_of_the_command(case, tmp_path, monkeypatch):
     change, message = WRONG[case]
     spec = {"name": "wrong", "axes": dict(PAPER), "tables": {"optimal": {}}} | change
     with pytest.raises(ValueError) as caught:
         ss.Sweep(spec)
     assert message in str(caught.value)
-    from slipsweep import _toml
-
     (tmp_path / "wrong.toml").write_text(_toml.text(spec))
     said = command("run", "wrong.toml", cwd=tmp_path, check=False)
     assert said.returncode == 1
     # A file has lines; a dict has none.
     assert re.sub(r"wrong\.toml:\d+: ", "", said.stderr).strip() == f"error: {caught.value}"
+    monkeypatch.chdir(tmp_path)
     with pytest.raises(ValueError) as caught:
-        os.chdir(tmp_path)
         ss.Sweep("wrong.toml")
     assert said.stderr.strip() == f"error: {caught.value}"
 
@@ -131,11 +179,48 @@ def test_another_spec_in_the_same_folder_is_refused(tmp_path):
         ss.run(spec | {"axes": dict(PAPER, v_f=50.0)}, tmp_path)
 
 
+def test_traces_from_a_state_and_after_a_disturbance():
+    law = dict(a=0.03, b=0.05, v_f=100.0)
+    start = ss.feedback(**law, theta=0.3, t_left=0.015)
+    assert ss.trace("optimal", **law, theta=0.3, t_left=0.015).facts["work"] == pytest.approx(start["work_to_go"], rel=1e-9)
+    closed, opened = (ss.trace("optimal", **PAPER, disturb="theta=+10% at 0.25", loop=loop) for loop in ("closed", "open"))
+    assert closed["v"].tolist() != opened["v"].tolist()
+
+
+@pytest.mark.parametrize(
+    "call, message",
+    [
+        (lambda: ss.trace("optimum", **PAPER), 'unknown protocol "optimum"\n  expected: optimal, best_cubic'),
+        (lambda: ss.trace("optimal", **PAPER | dict(t_f=[0.02, 0.03])), "t_f: found list\n  expected: a number"),
+        (lambda: ss.trace("optimal", **PAPER, points=1), "invalid value '1' for '--points <N>': 1 is not in 2..=10000000"),
+        (lambda: ss.run({"name": "x", "axes": PAPER, "tables": {"optimal": {}}}, threads=0), "threads: 0 is out of range"),
+        (lambda: ss.run({"name": "x", "axes": PAPER, "tables": {"optimal": {}}}, threads=1025), "threads: 1025 is out of range"),
+    ],
+)
+def test_wrong_arguments(call, message, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(ValueError) as caught:
+        call()
+    assert str(caught.value).startswith(message) and "--help" not in str(caught.value)
+    with pytest.raises(TypeError, match="unexpected keyword argument 'tf'; expected t_f"):
+        ss.trace("optimal", tf=0.02)
+
+
 def test_progress_is_called(tmp_path):
     calls = []
     axes = dict(PAPER, t_f={"geomspace": [0.01, 0.1, 300_000]})
     ss.run({"name": "some", "axes": axes, "tables": {"optimal": {}}}, tmp_path, progress=lambda *call: calls.append(call))
     assert calls and all(phase in ("checking", "computing", "writing") and done <= rows == 300_000 for phase, done, rows in calls)
+
+
+def test_terminals_show_a_line_that_disappears(tmp_path, capfd):
+    axes = dict(PAPER, t_f={"geomspace": [0.01, 0.1, 300_000]})
+    spec = {"name": "some", "axes": axes, "tables": {"optimal": {}}}
+    ss.run(spec, tmp_path / "shown", progress=True)
+    lines = capfd.readouterr().err.split("\r\x1b[K")
+    assert any(re.fullmatch(r"some: \d+% of 300,000 rows", line) for line in lines) and lines[-1] == ""
+    ss.run(spec, tmp_path / "hidden", progress=False)
+    assert capfd.readouterr().err == ""
 
 
 def test_traces_are_those_of_the_command(tmp_path, dataset):

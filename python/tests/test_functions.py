@@ -12,6 +12,12 @@ from conftest import DEFINITIONS, PAPER, arguments
 import slipsweep as ss
 
 
+def shown_axes(name):
+    """The axes that a call without a law has as columns: then the tables of cubic shortcuts have no ceiling."""
+    names = [axis["name"] for axis in DEFINITIONS[name]["axes"] if not axis["is_tacit"]]
+    return [axis for axis in names if axis != "v_ceiling" or name not in ("gap", "best_cubic")]
+
+
 @pytest.mark.parametrize("name", DEFINITIONS)
 def test_every_table_has_a_function(name):
     function = getattr(ss, name)
@@ -19,7 +25,7 @@ def test_every_table_has_a_function(name):
     definition = DEFINITIONS[name]
     axes = [axis["name"] for axis in definition["axes"]]
     columns = [column["name"] for column in definition["columns"] if not column["is_optional"]]
-    assert table.columns == [*axes, *columns, "status"]
+    assert table.columns == [*shown_axes(name), *columns, "status"]
     assert list(inspect.signature(function).parameters)[: len(axes)] == axes
     for axis in definition["axes"]:
         assert axis["doc"] in function.__doc__
@@ -44,8 +50,7 @@ def test_empty_arrays_give_no_rows(name):
 def test_optional_columns_are_computed_when_named(name):
     optional = [column["name"] for column in DEFINITIONS[name]["columns"] if column["is_optional"]]
     if optional:
-        axes = [axis["name"] for axis in DEFINITIONS[name]["axes"]]
-        assert getattr(ss, name)(**arguments(name), columns=optional).columns == [*axes, *optional, "status"]
+        assert getattr(ss, name)(**arguments(name), columns=optional).columns == [*shown_axes(name), *optional, "status"]
 
 
 def test_scalars_give_scalars():
@@ -144,12 +149,13 @@ def test_failed_rows_have_a_status():
         (dict(t_f=pd.Series([0.02, None])), "t_f[1]: NaN is out of range"),
         (dict(t_f=np.ma.masked_array([0.02, 0.03], mask=[False, True])), "t_f[1]: NaN is out of range"),
         (dict(v_f=0.5), "velocities are in units of v_0; for m/s, add `units = \"si\"` and the scales to [model]"),
-        (dict(t_f=None), "`optimal` needs t_f\n  expected: axes t_f, a, b, v_i, v_f"),
+        (dict(t_f=None), "`optimal` needs t_f\n  expected: axes t_f, a, b, v_i, v_f; optional: law, v_ceiling, tau_ceiling\n"),
         (dict(t_f=[1, 2], v_f=[1, 2, 3]), "arguments of different shapes: t_f (2,), v_f (3,)"),
         (dict(t_f="fast"), "t_f: found string \"fast\"\n  expected: a number"),
         (dict(t_f=["fast", "slow"]), "t_f: found string \"fast\""),
         (dict(t_f=np.array([1j])), "t_f: found complex128\n  expected: numbers"),
         (dict(grid=dict(t_f=[1.0])), "t_f: an argument and an axis of `grid`"),
+        (dict(grid=[1.0]), "grid: found list\n  expected: axes and their values"),
         (dict(grid=dict(k=[1.0])), "k: `optimal` has no such axis"),
         (dict(grid=dict(bogus=[1.0])), "grid: unknown axis `bogus`"),
         (dict(grid=dict(t_f=[[1.0, 2.0]]), t_f=None), "grid: t_f has the shape (1, 2)"),
@@ -195,3 +201,24 @@ def test_without_the_velocity_bound():
     with_bound = ss.optimal(**PAPER | dict(t_f=0.2))
     without = ss.optimal(**PAPER | dict(t_f=0.2), velocity_bound=False)
     assert with_bound["time_at_floor"] > 0 and without["work"] < with_bound["work"]
+
+
+def test_an_axis_of_the_grid_takes_the_place_of_its_default():
+    table = ss.optimal(**PAPER, grid=dict(v_ceiling=[np.inf, 5000.0, 3000.0]))
+    assert table.shape == (3,) and table["work"][0] == ss.optimal(**PAPER)["work"] < table["work"][2]
+    with pytest.raises(ValueError, match="v_ceiling: an argument and an axis of `grid`"):
+        ss.optimal(**PAPER, v_ceiling=3000.0, grid=dict(v_ceiling=[5000.0]))
+
+
+def test_every_axis_of_words_takes_words():
+    for name, definition in DEFINITIONS.items():
+        for axis in definition["axes"]:
+            for word in axis["words"]:
+                given = arguments(name)
+                if axis["name"] == "law" and name in ("optimal", "gap", "best_cubic"):
+                    given["v_ceiling"] = 5000.0
+                one = getattr(ss, name)(**given, **{axis["name"]: word})
+                many = getattr(ss, name)(**given, **{axis["name"]: np.array([word, word])})
+                assert one[axis["name"]] == word and list(many[axis["name"]]) == [word, word]
+            if axis["is_tacit"]:
+                assert axis["name"] not in getattr(ss, name)(**arguments(name)).columns

@@ -1,5 +1,7 @@
 """Rows as NumPy, Arrow, polars, pandas, pyarrow, DuckDB and xarray."""
 
+import pickle
+
 import duckdb
 import numpy as np
 import pandas as pd
@@ -46,27 +48,48 @@ def test_arrow_outlives_the_table():
 def same(cells, expected):
     """Whether cells are equal bit by bit, missing ones included."""
     cells, expected = np.asarray(cells), np.asarray(expected)
-    if expected.dtype == float:
-        return cells.astype(float).tobytes() == expected.tobytes() or np.array_equal(cells, expected, equal_nan=True)
-    return cells.tolist() == expected.tolist()
+    if expected.dtype != float:
+        return cells.tolist() == expected.tolist()
+    missing = np.isnan(expected)
+    cells = cells.astype(float)
+    return bool((np.isnan(cells) == missing).all()) and cells[~missing].tobytes() == expected[~missing].tobytes()
 
 
-def test_round_trips(table):
-    frames = {
-        "polars": lambda name: table.to_polars()[name].to_numpy(),
-        "pandas": lambda name: table.to_pandas()[name].astype(object).where(lambda cells: cells.notna(), None).to_numpy()
-        if table[name].dtype == object
-        else table.to_pandas()[name].to_numpy(),
-        "pyarrow": lambda name: pa.table(table)[name].to_pandas().to_numpy(),
-        "duckdb": lambda name: np.array([row[0] for row in duckdb.from_arrow(pa.table(table)).select(name).fetchall()]),
-    }
-    for tool, column in frames.items():
-        for name in ["t_f", "work", "v_end", "theta_max"]:
-            cells = np.array([np.nan if cell is None else cell for cell in column(name)], dtype=float)
-            assert same(cells, table[name]), (tool, name)
-    assert table.to_polars()["status"].cast(pl.String).to_list() == table["status"].tolist()
-    assert table.to_polars()["strategy"].cast(pl.String).to_list() == table["strategy"].tolist()
-    assert [word if isinstance(word, str) else None for word in table.to_pandas()["strategy"]] == table["strategy"].tolist()
+# Springs below and above the critical stiffness without a mass: a row without an answer, and one with it.
+SPRINGS = dict(a=0.03, b=0.05, v_i=3.0, v_f=100.0, k=[0.01, 0.1], m=0.0)
+
+
+def test_same_compares_bits():
+    one = np.array([1.0, np.nan, 0.0])
+    assert same(one, one.copy()) and same([True, None], np.array([True, None]))
+    assert not same(one, [1.0, np.nan, -0.0]) and not same(one, [1.0, 0.0, 0.0]) and not same(one, [np.nextafter(1, 2), np.nan, 0.0])
+
+
+# How each tool gives back a column, missing cells as None or NaN.
+TOOLS = {
+    "polars": lambda table, name: table.to_polars()[name].to_list(),
+    "polars from the stream": lambda table, name: pl.DataFrame(table)[name].to_list(),
+    "pandas": lambda table, name: table.to_pandas()[name].tolist(),
+    "pyarrow": lambda table, name: table.to_arrow()[name].to_pylist(),
+    "duckdb": lambda rows, name: [row[0] for row in duckdb.sql(f"SELECT {name} FROM rows").fetchall()],
+    "xarray": lambda table, name: np.broadcast_to(table.to_xarray()[name].values, table.shape).ravel().tolist(),
+}
+
+
+@pytest.mark.parametrize("tool", TOOLS)
+def test_round_trips(tool):
+    """Every column: numbers, words and flags, with missing cells of each."""
+    tables = [ss.step_response(**SPRINGS), ss.optimal(t_f=[0.02, 1e-6], a=0.03, b=0.05, v_i=100.0, v_f=3.0)]
+    fields = [(table, field) for table in tables for field in table.fields]
+    missing = {field.kind for table, field in fields if any(cell is None or cell != cell for cell in table._flat(field.name))}
+    assert missing == {"number", "word", "flag"}
+    for table, field in fields:
+        cells = TOOLS[tool](table, field.name)
+        if field.kind == "number":
+            cells = [np.nan if cell is None else cell for cell in cells]
+        else:
+            cells = [cell if isinstance(cell, (str, bool)) else None for cell in cells]
+        assert same(cells, table._flat(field.name)), field.name
 
 
 def test_flags():
@@ -103,8 +126,10 @@ def test_tables_show_themselves(table):
 
 
 def test_unknown_columns_name_the_known_ones(table):
-    with pytest.raises(KeyError, match="no column `work_`.*work"):
+    with pytest.raises(KeyError, match="no column `work_`; expected t_f, .*work"):
         table["work_"]
+    with pytest.raises(TypeError, match="columns have names, not int"):
+        table[0]
     assert "work" in list(table)
 
 
@@ -129,3 +154,20 @@ def test_pandas_frames_can_be_changed(table):
     frame = table.to_pandas()
     frame.loc[0, "work"] = 1.0
     assert frame.loc[0, "work"] == 1.0 and isinstance(frame["status"].dtype, pd.CategoricalDtype)
+
+
+def test_tables_and_traces_are_pickled(table):
+    again = pickle.loads(pickle.dumps(table))
+    assert again.shape == table.shape and again.name == table.name and again.fields == table.fields
+    assert all(same(again[name], table[name]) for name in table.columns)
+    trace = ss.trace("optimal", **PAPER, points=11)
+    again = pickle.loads(pickle.dumps(trace))
+    assert again.facts == trace.facts and same(again["v"], trace["v"])
+
+
+def test_single_rows_have_the_cells_of_arrow():
+    for made in [ss.optimal(**PAPER), ss.optimal(**PAPER | dict(v_i=100.0, v_f=3.0, t_f=1e-6)), ss.stability(**SPRINGS | dict(k=1.0))]:
+        cells = {name: made[name] for name in made.columns}
+        frame = made.to_polars()
+        for name, cell in cells.items():
+            assert same([cell], np.array([np.nan if name in made.units and frame[name][0] is None else frame[name][0]])), name

@@ -29,7 +29,7 @@ pub struct Arguments {
 enum Question {
     /// How close do cubic shortcuts come to the protocol of least work?
     Landscape,
-    /// From which duration on does the optimal protocol slow down first?
+    /// Above what duration does the optimal protocol slow down first?
     Crossover,
     /// Which shortcut costs least at each duration, under a friction ceiling?
     Families,

@@ -97,7 +97,7 @@ enum Command {
     Summary(summary::Arguments),
     /// Show the first rows of a table
     Head(head::Arguments),
-    /// Answer a question in SQL
+    /// Answer a query in SQL
     #[cfg_attr(not(feature = "query"), command(hide = true))]
     Query(query::Arguments),
     /// Report complete, missing, damaged and foreign parts of a dataset
@@ -170,7 +170,7 @@ pub fn main(stdout_is_closed: bool) -> ExitCode {
     main_of(env::args_os(), stdout_is_closed).into()
 }
 
-/// Does what the arguments of a process say, the first of which is its name. Returns the exit code.
+/// Runs the command of the arguments of a process, the first of which is its name. Returns the exit code.
 pub fn main_of(arguments: impl Iterator<Item = OsString>, stdout_is_closed: bool) -> u8 {
     STDOUT_IS_CLOSED.store(stdout_is_closed, Ordering::Relaxed);
     report_first_panic();

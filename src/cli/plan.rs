@@ -16,7 +16,7 @@ use crate::sweep::{Estimates, Plan, Sweep, estimate};
 pub struct Arguments {
     /// The sweep spec, a TOML file
     spec: PathBuf,
-    /// Folder of the dataset folder, whose free disk space is compared with the size
+    /// Parent folder of the dataset, whose free disk space is compared with the size
     #[arg(long, value_name = "DIR", default_value = "results")]
     out: PathBuf,
 }

@@ -1,12 +1,11 @@
 //! `slipsweep plot DATASET|TRACE…`: pictures as SVG, PNG or PDF.
 
 use std::fs;
-use std::io;
 use std::path::{Path, PathBuf};
 
 use super::kind::{self, Kind};
 use super::watch::{Wait, waiting};
-use super::{EXIT_FAILURE, EXIT_REQUEST, Failure, dataset, refused, say, to_file, wrong};
+use super::{EXIT_FAILURE, EXIT_REQUEST, Failure, dataset, refused, say, write_file, wrong};
 use crate::plot::table::{Condition, Request, Source};
 use crate::plot::{self, COLUMN, Figure, Format, PAGE, PlotError};
 use crate::sweep::units_of;
@@ -14,7 +13,7 @@ use crate::sweep::units_of;
 /// Arguments of `plot`.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:
-  slipsweep plot results/landscape                       every table, a picture each
+  slipsweep plot results/landscape                       every table, one picture each
   slipsweep plot results/landscape --format png --out pictures
   slipsweep plot results/landscape --table gap --where t_f=0.02 --out gap.pdf
   slipsweep plot results/crossover --table crossover --x v_f --y b --color t_floor --where v_i=1.1
@@ -23,7 +22,7 @@ pub struct Arguments {
     /// Folder of a dataset, such as results/NAME, or traces of `slipsweep trace` (.csv, .parquet)
     #[arg(required = true, value_name = "DATASET|TRACE")]
     sources: Vec<PathBuf>,
-    /// The table [default: every table, a picture each]
+    /// Table to draw [default: every table, one picture each]
     #[arg(long, value_name = "NAME")]
     table: Option<String>,
     /// Rows to show, such as "a=0.03, v_f>=10"
@@ -203,15 +202,14 @@ impl Arguments {
             Some(file) => file.clone(),
             None => place.folder.join(format!("{stem}.{}", place.format.ending())),
         };
-        let failed = |error: io::Error| Failure::failed(format!("cannot write {}: {error}", path.display()));
         let width = self.width.unwrap_or(if figure.columns > 1 { PAGE } else { COLUMN });
-        let encoded =
-            waiting(&Wait::new("writing the picture"), || place.format.encode(&figure.draw(width).svg, self.dpi));
-        let bytes = encoded?;
+        let encode = || place.format.encode(&figure.draw(width).svg, self.dpi);
+        let bytes = waiting(&Wait::new("writing the picture"), encode)?;
         if let Some(folder) = path.parent() {
+            let failed = |error| Failure::failed(format!("cannot write {}: {error}", path.display()));
             fs::create_dir_all(folder).map_err(failed)?;
         }
-        to_file(&path, |file| file.write_all(&bytes)).map_err(failed)?;
+        write_file(&path, &bytes)?;
         Ok(path)
     }
 }

@@ -5,21 +5,19 @@
 
 use std::env;
 use std::fs;
-use std::io::{self, BufWriter, IsTerminal, Read, Write};
+use std::io::{self, BufWriter, Read, Write};
 use std::panic::{self, AssertUnwindSafe};
 use std::path::{Path, PathBuf};
-use std::process::{Child, ChildStdout, Command, ExitStatus, Stdio};
+use std::process::{Child, Command, ExitStatus, Stdio};
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex};
 use std::thread;
-use std::time::{Duration, Instant, SystemTime};
+use std::time::{Duration, SystemTime};
 
 use clap::ValueEnum;
-use indicatif::ProgressBar;
 use signal_hook::consts::{SIGINT, SIGTERM};
 
 use super::output::{self, Output};
-use super::watch::{PROGRESS_DELAY, text_line};
 use super::{Failure, kind, say, stdout, summary, to_file, words, written, wrong};
 use crate::dataset::{Folder, atomic};
 use crate::query::{self, Answer, AnswerError, Tables};
@@ -33,7 +31,7 @@ use crate::query::{self, Answer, AnswerError, Tables};
 pub struct Arguments {
     /// Folder of the dataset, such as results/NAME; or a Parquet or CSV file, which is a table under its own name
     dataset: PathBuf,
-    /// One SELECT in quotes; the tables of the dataset have their names
+    /// One SELECT in quotes; it refers to the tables of the dataset by name
     sql: String,
     #[command(flatten)]
     output: Output<Format>,
@@ -46,7 +44,7 @@ enum Format {
     Table,
     /// All digits (.csv)
     Csv,
-    /// A JSON object a line (.jsonl)
+    /// One JSON object per line (.jsonl)
     Jsonl,
     /// Parquet (.parquet)
     Parquet,
@@ -125,46 +123,26 @@ fn keep_datasets(out: &Path) -> Result<(), Failure> {
     Ok(())
 }
 
-/// Starts this program again as the query process. Pipes carry its messages, and its answer if `is_copied`.
-fn child(is_copied: bool) -> io::Result<Child> {
-    let mut command = Command::new(env::current_exe()?);
-    command.args(env::args_os().skip(1)).env(INSIDE, "1").stdin(Stdio::piped()).stderr(Stdio::piped());
-    if is_copied {
-        command.stdout(Stdio::piped());
-    }
-    command.spawn()
-}
-
-/// Answers a query in a separate process.
+/// Answers a query in a separate process: this program again, whose messages come through a pipe.
 fn apart(arguments: &Arguments) -> Result<(), Failure> {
     let signal = Arc::new(AtomicUsize::new(0));
     for number in [SIGINT, SIGTERM] {
         // A signal without a handler keeps its usual effect.
         let _ = signal_hook::flag::register_usize(number, signal.clone(), number as usize);
     }
-    // A terminal shows the progress until the answer begins, so the answer to a terminal passes through this process.
-    let shown = io::stderr().is_terminal();
-    let is_copied = shown && arguments.output.is_stdout() && io::stdout().is_terminal();
-    let mut child = child(is_copied).map_err(|error| cannot_start("the query process", error))?;
+    let no_process = |error| cannot_start("the query process", error);
+    let program = env::current_exe().map_err(no_process)?;
+    let mut command = Command::new(program);
+    command.args(env::args_os().skip(1)).env(INSIDE, "1").stdin(Stdio::piped()).stderr(Stdio::piped());
+    let mut child = command.spawn().map_err(no_process)?;
     let mut said = child.stderr.take();
     let listen = move || said.as_mut().and_then(|said| io::read_to_string(said).ok()).unwrap_or_default();
-    let listener = match thread::Builder::new().spawn(listen) {
-        Ok(listener) => listener,
-        Err(error) => {
-            let _ = child.kill();
-            let _ = child.wait();
-            return Err(cannot_start("the query process", error));
-        }
-    };
-    let line = Arc::new(Mutex::new(Line { bar: None, is_over: !shown }));
-    let copier = child.stdout.take().and_then(|answer| {
-        let line = line.clone();
-        thread::Builder::new().spawn(move || copy(answer, &line)).ok()
-    });
-    let ended = wait(&mut child, &signal, &line);
-    if let Some(copier) = copier {
-        let _ = copier.join();
-    }
+    let listener = thread::Builder::new().spawn(listen).map_err(|error| {
+        let _ = child.kill();
+        let _ = child.wait();
+        no_process(error)
+    })?;
+    let ended = wait(&mut child, &signal);
     let text = listener.join().unwrap_or_default();
     let number = signal.load(Ordering::Relaxed);
     if number != 0 {
@@ -190,58 +168,18 @@ fn cannot_start(what: &str, error: io::Error) -> Failure {
     Failure::failed(format!("cannot start {what}: {error}\n  help: {help}"))
 }
 
-/// The progress line on a terminal.
-struct Line {
-    bar: Option<ProgressBar>,
-    /// Whether the progress line is over.
-    is_over: bool,
-}
-
-impl Line {
-    fn end(&mut self) {
-        self.is_over = true;
-        self.bar.take().iter().for_each(ProgressBar::finish_and_clear);
-    }
-}
-
-/// Copies an answer to standard output; its first byte replaces the progress line.
-fn copy(mut answer: ChildStdout, line: &Mutex<Line>) {
-    let mut bytes = vec![0; 1 << 16];
-    while let Ok(count @ 1..) = answer.read(&mut bytes) {
-        if let Ok(mut line) = line.lock() {
-            line.end();
-        }
-        let mut out = io::stdout();
-        if out.write_all(&bytes[..count]).and_then(|()| out.flush()).is_err() {
-            // The query process notices the closed pipe.
-            return;
-        }
-    }
-}
-
-/// Waits for the end of a process, or ends it after a signal; a terminal shows the progress after a second.
-fn wait(child: &mut Child, signal: &AtomicUsize, line: &Mutex<Line>) -> io::Result<ExitStatus> {
-    let start = Instant::now();
-    let ended = loop {
+/// Waits for the end of a process, or ends it after a signal.
+fn wait(child: &mut Child, signal: &AtomicUsize) -> io::Result<ExitStatus> {
+    loop {
         if let Some(status) = child.try_wait()? {
-            break Ok(status);
+            return Ok(status);
         }
         if signal.load(Ordering::Relaxed) != 0 {
             child.kill()?;
-            break child.wait();
-        }
-        if start.elapsed() > PROGRESS_DELAY
-            && let Ok(mut line) = line.lock()
-            && !line.is_over
-        {
-            line.bar.get_or_insert_with(|| text_line(0)).set_message("answering; Ctrl-C leaves no file behind");
+            return child.wait();
         }
         thread::sleep(POLL_INTERVAL);
-    };
-    if let Ok(mut line) = line.lock() {
-        line.end();
     }
-    ended
 }
 
 /// The reason why the query process ended early.
@@ -328,7 +266,7 @@ fn answer(arguments: &Arguments) -> Result<(), Failure> {
     kind::expect_rows(&arguments.dataset)?;
     super::note_at(&arguments.dataset);
     let tables = Tables::open(&arguments.dataset)?;
-    let answer = tables.ask(&arguments.sql)?;
+    let answer = tables.query(&arguments.sql)?;
     for source in tables.sources.iter().filter(|source| source.missing > 0) {
         let (missing, all) = (source.missing, source.missing + source.paths.len() as u64);
         // A note that cannot be printed is no failure.
@@ -364,7 +302,7 @@ fn failure(tables: &Tables, arguments: &Arguments, error: AnswerError) -> Failur
         }
         _ => unreadable(&arguments.dataset, &error),
     };
-    tables.fault(&arguments.sql).map_or_else(other, Failure::from)
+    tables.diagnose(&arguments.sql).map_or_else(other, Failure::from)
 }
 
 /// The failure for tables that cannot be read to the end, usually because of a damaged file.

@@ -25,7 +25,7 @@ use crate::table::{Kind, RunStats, Signal};
 pub struct Arguments {
     /// The sweep spec, a TOML file; or the folder of an incomplete dataset
     spec: PathBuf,
-    /// Folder of the dataset folder [default: results, or that of the dataset]
+    /// Parent folder of the dataset [default: results, or that of the dataset]
     #[arg(short, long, value_name = "DIR")]
     out: Option<PathBuf>,
     /// Number of threads, at most 1024 [default: one for each processor]
@@ -140,7 +140,7 @@ fn report(
 /// Greatest size of a cell on disk, without long labels, in bytes: twice that of a double, the longest type.
 const MAX_CELL_BYTES: f64 = 16.0;
 
-/// Greatest size of a part without its rows and the spec, in bytes: five times that of `compliant`, the longest of all tables, whose part of one
+/// Greatest size of a part without its rows and the spec, in bytes. Chosen: five times that of `compliant`, the longest of all tables, whose part of one
 /// row has 12,207.
 const MAX_FOOTER_BYTES: f64 = 65536.0;
 
@@ -310,9 +310,9 @@ fn next_commands(sweep: &Sweep, path: &Path) -> String {
 fn question(request: &Request) -> String {
     let table = request.table;
     let columns = || request.projection.indices().iter().map(|&index| &table.columns()[index]);
-    let stretches = request.row_index.stretches();
+    let blocks = request.row_index.blocks();
     let varies = |axis: &&Quantity| {
-        stretches.iter().any(|stretch| stretch.axis(**axis).is_some_and(|(_, axis)| axis.values.len() > 1))
+        blocks.iter().any(|block_rows| block_rows.axis(**axis).is_some_and(|(_, axis)| axis.values.len() > 1))
     };
     let axis = table.axes().iter().find(varies).map(|axis| axis.name());
     let least = ["gap", "work", "t_cross"].into_iter().find(|name| columns().any(|column| column.name == *name));

@@ -22,7 +22,7 @@ pub struct Arguments {
     /// Greatest number of shards; fewer if a task would have too little work
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=Shard::MAX_COUNT))]
     shards: u64,
-    /// Folder of the dataset folder, on a file system common to all machines
+    /// Parent folder of the dataset, on a file system common to all machines
     #[arg(short, long, value_name = "DIR", default_value = "results")]
     out: PathBuf,
     /// Processors of a task

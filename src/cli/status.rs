@@ -6,7 +6,6 @@ use std::path::{Path, PathBuf};
 use super::shards::{quoted, scripts};
 use super::{EXIT_FAILURE, Failure, kind, refused, say, summary, words};
 use crate::dataset::{Build, CheckDepth, Folder, Manifest, Survey};
-use crate::protocol::Status;
 use crate::sweep::{Plan, Sweep, shards_with};
 
 /// Arguments of `status`.
@@ -17,7 +16,7 @@ use crate::sweep::{Plan, Sweep, shards_with};
 pub struct Arguments {
     /// Folder of the dataset, such as results/NAME
     dataset: PathBuf,
-    /// Check every bit of every part, instead of its footer
+    /// Check every bit of each part, not only its footer
     #[arg(long)]
     check: bool,
 }
@@ -74,11 +73,9 @@ fn counts(survey: &Survey) -> String {
     for table in &survey.tables {
         let missing = table.missing.iter().map(|range| range.end - range.start).sum();
         let (damaged, foreign) = (table.damaged.len() as u64, table.foreign.len() as u64);
-        let by_status = Status::ALL.iter().zip(table.statistics.status).filter(|(_, rows)| *rows > 0);
-        let by_status: Vec<String> =
-            by_status.map(|(status, rows)| format!("{} {}", words::count(rows), status.name())).collect();
         let rows = format!("{} of {}", words::count(table.statistics.status.iter().sum()), words::count(table.rows));
-        let rows = if by_status.is_empty() { rows } else { format!("{rows}: {}", by_status.join(", ")) };
+        let by_status = words::statuses(&table.statistics.status);
+        let rows = if by_status.is_empty() { rows } else { format!("{rows}: {by_status}") };
         let numbers = [table.parts, table.there, missing, damaged, foreign].map(words::count);
         lines.push([table.name.clone()].into_iter().chain(numbers).chain([rows]).collect());
     }

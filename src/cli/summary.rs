@@ -9,7 +9,6 @@ use crate::dataset::{
     Cell, CheckDepth, Counts, Folder, MAX_KEPT_ROWS, Manifest, StatisticsRow, Survey, TableStatistics,
 };
 use crate::grid::Quantity;
-use crate::protocol::Status;
 use crate::table::{self, STATUS};
 
 /// Arguments of `summary`.
@@ -93,14 +92,8 @@ pub fn statistics(name: &str, rows: u64, statistics: &TableStatistics) -> String
 
 /// The summary of a table of `rows` rows.
 pub fn blocks(name: &str, rows: u64, statistics: &TableStatistics) -> Vec<SummaryBlock> {
-    let counts: Vec<String> = Status::ALL
-        .iter()
-        .zip(statistics.status)
-        .filter(|(_, rows)| *rows > 0)
-        .map(|(status, rows)| format!("{} {}", words::count(rows), status.name()))
-        .collect();
-    let mut blocks =
-        vec![SummaryBlock::Line(0, format!("{name}: {} ({})", words::things(rows, "row"), counts.join(", ")))];
+    let counts = words::statuses(&statistics.status);
+    let mut blocks = vec![SummaryBlock::Line(0, format!("{name}: {} ({counts})", words::things(rows, "row")))];
     match &statistics.rows {
         Some(rows) => blocks.extend(listing(statistics, &rows.iter().collect::<Vec<_>>())),
         None => {
@@ -113,9 +106,8 @@ pub fn blocks(name: &str, rows: u64, statistics: &TableStatistics) -> Vec<Summar
             }
             blocks.extend(ranges(statistics));
             let counted = |column: &str, counts: &Counts| {
-                let counts: Vec<String> =
-                    counts.iter().map(|(word, rows)| format!("{} {word}", words::count(*rows))).collect();
-                SummaryBlock::Line(2, format!("{column}: {}", counts.join(", ")))
+                let counts = counts.iter().map(|(word, rows)| (word.as_str(), *rows));
+                SummaryBlock::Line(2, format!("{column}: {}", words::counts(counts)))
             };
             blocks.extend(statistics.labels.iter().map(|(label, counts)| match counts {
                 Some(counts) => counted(label, counts),

@@ -20,7 +20,7 @@ pub struct Arguments {
 ///
 /// An unknown table.
 pub fn tables(arguments: &Arguments) -> Result<(), Failure> {
-    let all: Vec<&dyn Table> = table::ALL.into_iter().chain(table::REDUCED.map(|(_, table)| table)).collect();
+    let all: Vec<&Table> = table::ALL.into_iter().chain(table::REDUCED.map(|(_, table)| table)).collect();
     let chosen = match &arguments.table {
         None => all,
         Some(name) => match all.iter().find(|table| table.name() == name) {
@@ -33,7 +33,7 @@ pub fn tables(arguments: &Arguments) -> Result<(), Failure> {
 }
 
 /// The title of a table, then its columns with units and meanings.
-fn text(table: &dyn Table) -> String {
+fn text(table: &Table) -> String {
     let no_axes = Grid::default();
     let mut rows: Vec<Vec<String>> = Vec::new();
     for axis in Quantity::ALL.into_iter().filter(|axis| table.axes().contains(axis)) {

@@ -10,14 +10,13 @@ use super::kind::{self, Kind};
 use super::output::{self, Output};
 use super::{EXIT_FAILURE, EXIT_REQUEST, Failure, dataset, no_table, put, refused, say, words, write_file, wrong};
 use crate::dataset::{Cell, Folder, ManifestTable, Row, frame};
-use crate::grid::{Domain, Point, Quantity, RTOL, Scale};
-use crate::model::{Law, Transition, Units};
+use crate::grid::{Domain, Quantity, RTOL, Scale};
+use crate::model::{Friction, StateLaw, Units};
 use crate::names::hint;
 use crate::plot::table::Condition;
-use crate::protocol::optimal::Bounds;
-use crate::protocol::shortcut::{self, Case};
+use crate::protocol::shortcut::Case;
 use crate::protocol::{Motion, Status};
-use crate::sweep::{Spec, units};
+use crate::sweep::{Spec, friction, units};
 use crate::table;
 use crate::trace::{
     self, Absence, COLUMNS, Disturbance, Disturbed, Parameter, Pathless, Protocol, RANGE_RTOL, Times, Trace,
@@ -32,6 +31,7 @@ use crate::verify::scale;
     after_help = "Examples:
   slipsweep trace optimal --t-f 0.02 --a 0.03 --b 0.05 --v-i 3 --v-f 100
   slipsweep trace optimal --v-ceiling 300 --t-f 0.02 --a 0.03 --b 0.05 --v-i 3 --v-f 100 --out capped.csv
+  slipsweep trace optimal --law slip --v-ceiling 600 --t-f 0.1 --a 0.03 --b 0.05 --v-i 4 --v-f 80
   slipsweep trace optimal --from theta=0.3,t_left=0.015 --a 0.03 --b 0.05 --v-f 100
   slipsweep trace optimal --disturb \"theta=+10% at 0.25\" --t-f 0.02 --a 0.03 --b 0.05 --v-i 3 --v-f 100
   slipsweep trace gap --alpha-2 -0.12 --alpha-3 -0.066 --t-f 0.02 --a 0.03 --b 0.05 --v-i 3 --v-f 100 --out cubic.csv
@@ -59,14 +59,17 @@ pub struct Arguments {
     /// Evolution effect: coefficient of ln theta in friction, in mu_0
     #[arg(long, value_name = "B", value_parser = |text: &str| legal(text, Quantity::B.domain()))]
     b: Option<f64>,
+    /// Evolution law of the state: ageing, slip or prz; ageing by default (optimal and best_cubic with --v-ceiling, gap, step_response)
+    #[arg(long, value_name = "LAW", value_parser = law)]
+    law: Option<StateLaw>,
     /// Velocity before the protocol, in v_0
-    #[arg(long, value_name = "V", value_parser = |text: &str| legal(text, Quantity::InitialVelocity.domain()))]
+    #[arg(long, value_name = "V", value_parser = |text: &str| velocity(text, Quantity::InitialVelocity))]
     v_i: Option<f64>,
     /// Velocity after the protocol, in v_0
-    #[arg(long, value_name = "V", value_parser = |text: &str| legal(text, Quantity::FinalVelocity.domain()))]
+    #[arg(long, value_name = "V", value_parser = |text: &str| velocity(text, Quantity::FinalVelocity))]
     v_f: Option<f64>,
     /// Velocity ceiling, in v_0 (optimal)
-    #[arg(long, value_name = "V", value_parser = |text: &str| legal(text, Quantity::VelocityCeiling.domain()))]
+    #[arg(long, value_name = "V", value_parser = |text: &str| velocity(text, Quantity::VelocityCeiling))]
     v_ceiling: Option<f64>,
     /// Friction ceiling, in mu_0 sigma (optimal, bounded_friction)
     #[arg(long, value_name = "M", value_parser = |text: &str| legal(text, Quantity::FrictionCeiling.domain()))]
@@ -74,7 +77,7 @@ pub struct Arguments {
     /// State and time left from which the protocol starts, as theta=0.3,t_left=0.015, instead of --v-i and --t-f (optimal)
     #[arg(long, value_name = "STATE", value_parser = state, conflicts_with_all = ["v_i", "t_f", "table"])]
     from: Option<State>,
-    /// Sudden change of theta at a fraction of the duration, as "theta=+10% at 0.25"; compares open and closed loop (optimal)
+    /// Sudden change of theta at a fraction of the duration, as "theta=+10% at 0.25"; compares open and closed loop; not with --points (optimal)
     #[arg(long, value_name = "CHANGE", value_parser = disturbance, conflicts_with_all = ["from", "points", "table"])]
     disturb: Option<Disturbance>,
     /// Protocol that is shown after the disturbance [default: closed]
@@ -216,6 +219,12 @@ impl TypedValueParser for Subject {
     }
 }
 
+/// Parses the word of an evolution law.
+fn law(text: &str) -> Result<StateLaw, String> {
+    let expected = || format!("expected {}", StateLaw::ALL.map(StateLaw::name).join(", "));
+    StateLaw::find(text).ok_or_else(expected)
+}
+
 /// Parses a number in `domain`.
 fn legal(text: &str, domain: Domain) -> Result<f64, String> {
     match text.parse() {
@@ -223,6 +232,13 @@ fn legal(text: &str, domain: Domain) -> Result<f64, String> {
         Ok(_) => Err(format!("expected {domain}")),
         Err(_) => Err(format!("not a number; expected {domain}")),
     }
+}
+
+/// Parses a velocity in units of `v_0`. One below 1 is probably in m/s.
+fn velocity(text: &str, quantity: Quantity) -> Result<f64, String> {
+    let is_small = text.parse().is_ok_and(|value: f64| value > 0.0 && value < 1.0);
+    let help = if is_small { "\n  help: velocities are in units of v_0; divide m/s by v_0" } else { "" };
+    legal(text, quantity.domain()).map_err(|error| format!("{error}{help}"))
 }
 
 /// The protocol to trace, from flags or from a row.
@@ -234,6 +250,8 @@ struct TraceRequest {
     case: Case,
     /// Parameters of the protocol as given.
     numbers: Vec<Named>,
+    /// The evolution law, if named.
+    law: Option<StateLaw>,
     /// Whether `v >= 1`; `None` if the bound has no effect.
     bounded: Option<bool>,
     rtol: f64,
@@ -285,7 +303,7 @@ pub struct Traced {
     pub trace: Trace,
     /// The units of the trace.
     pub units: Units,
-    /// The same as `header`, as keys and values.
+    /// The contents of `header` as keys and values.
     pub facts: Vec<(String, String)>,
 }
 
@@ -334,18 +352,6 @@ fn absent(protocol: &str, absence: Absence) -> Failure {
 /// Relative accuracy without a row of a table: the default of a spec.
 const DEFAULT_RTOL: f64 = 1e-10;
 
-/// Whether the bound `v >= 1` matters to a protocol.
-fn has_bound(protocol: &str) -> bool {
-    matches!(protocol, "optimal" | "feedback" | "best_cubic" | "regularised")
-}
-
-/// Parameters of every protocol.
-const NEEDED: [Quantity; 5] =
-    [Quantity::Time, Quantity::A, Quantity::B, Quantity::InitialVelocity, Quantity::FinalVelocity];
-
-/// What a protocol needs that starts from a state.
-const NEEDED_FROM_STATE: [Quantity; 3] = [Quantity::A, Quantity::B, Quantity::FinalVelocity];
-
 /// The flag that gives a quantity.
 fn flag(quantity: Quantity) -> String {
     format!("--{}", quantity.name().replace('_', "-"))
@@ -353,13 +359,14 @@ fn flag(quantity: Quantity) -> String {
 
 impl Arguments {
     /// The numbers of a protocol.
-    fn given(&self) -> [(Quantity, Option<f64>); 14] {
+    fn given(&self) -> [(Quantity, Option<f64>); 15] {
         [
             (Quantity::Time, self.t_f),
             (Quantity::Theta, self.from.map(|state| state.theta)),
             (Quantity::TimeLeft, self.from.map(|state| state.t_left)),
             (Quantity::A, self.a),
             (Quantity::B, self.b),
+            (Quantity::Law, self.law.map(|law| f64::from(law as u8))),
             (Quantity::InitialVelocity, self.v_i),
             (Quantity::FinalVelocity, self.v_f),
             (Quantity::VelocityCeiling, self.v_ceiling),
@@ -382,42 +389,32 @@ impl Arguments {
         }
         let name = self.subject.as_str();
         self.check(name)?;
-        let mut point = Point::default();
-        for (quantity, given) in self.given() {
-            point[quantity] = given.or(quantity.default().first().copied()).unwrap_or(f64::NAN);
-        }
-        let [t_f, a, b, v_i, v_f] = NEEDED.map(|quantity| point[quantity]);
-        let (k, m, bounded) = (point[Quantity::Stiffness], point[Quantity::Mass], !self.unbounded);
-        let [v_ceiling, tau_ceiling] = [Quantity::VelocityCeiling, Quantity::FrictionCeiling].map(|axis| point[axis]);
-        let bounds = Bounds { floor: bounded, v_ceiling, tau_ceiling };
-        let (v_i, t_f) = self.from.map_or((v_i, t_f), |state| (1.0 / state.theta, state.t_left));
-        let protocol = match (name, shortcut::find(name)) {
-            ("optimal", _) => match self.from {
-                Some(State { theta, .. }) => Protocol::OptimalFrom { theta, bounds },
-                None => Protocol::Optimal { bounds },
-            },
-            ("best_cubic", _) => Protocol::BestCubic { bounded },
-            ("compliant", _) => Protocol::Compliant { k, m },
-            ("regularised", _) => Protocol::Regularised { k, m, delta_t: point[Quantity::Smoothing], bounded },
-            ("step_response", _) => Protocol::step_response(k, m, v_i != v_f),
-            ("gap", _) => Protocol::CubicPoint { a_2: point[Quantity::Alpha2], a_3: point[Quantity::Alpha3] },
-            (_, Some(family)) => Protocol::Family(family),
-            _ => return Err(wrong(format!("no protocol is named `{name}`"))),
+        let given = self.given();
+        let number = |quantity: Quantity| {
+            let of = given.iter().find(|(known, _)| *known == quantity).and_then(|(_, given)| *given);
+            of.or(quantity.default().first().copied())
         };
-        let numbers = self.given().into_iter().filter(|(quantity, _)| !quantity.has_scale());
+        let (protocol, case) =
+            Protocol::new(if self.from.is_some() { "feedback" } else { name }, !self.unbounded, number)
+                .map_err(|quantity| wrong(format!("`{name}` needs {}", flag(quantity))))?;
+        let is_number = |quantity: Quantity| !quantity.has_scale() && quantity != Quantity::Law;
+        let numbers = given.iter().filter(|(quantity, _)| is_number(*quantity));
+        let numbers =
+            numbers.filter_map(|(quantity, given)| Some(Named::new(quantity.name(), (*given)?, ""))).collect();
         Ok(TraceRequest {
             name: name.to_owned(),
             protocol,
-            case: Case { transition: Transition { law: Law { a, b }, v_i, v_f }, t_f, tau_ceiling },
-            numbers: numbers.filter_map(|(quantity, given)| Some(Named::new(quantity.name(), given?, ""))).collect(),
-            bounded: has_bound(name).then_some(bounded),
+            case,
+            numbers,
+            law: self.law,
+            bounded: trace::has_floor(name).then_some(!self.unbounded),
             rtol: self.rtol.unwrap_or(DEFAULT_RTOL),
             units: Units::Scaled,
             origin: None,
         })
     }
 
-    /// The protocol, its trace, and what a disturbance does to it if one is requested.
+    /// The protocol, its trace, and the effects of a disturbance if one is requested.
     fn traced(&self, request: &TraceRequest) -> Result<(TracedPath, Trace, Option<Effects>), Failure> {
         let absent = |absence| absent(&request.name, absence);
         let times = self.points.map_or(Times::Fewest, |count| Times::Spaced(count as usize));
@@ -445,41 +442,67 @@ impl Arguments {
 
     /// Checks that exactly the parameters of the protocol `name` are given.
     fn check(&self, name: &str) -> Result<(), Failure> {
-        let needed: &[Quantity] = if self.from.is_some() { &NEEDED_FROM_STATE } else { &NEEDED };
-        let missing = self.given().into_iter().filter(|(quantity, given)| given.is_none() && needed.contains(quantity));
-        let missing: Vec<String> = missing.map(|(quantity, _)| flag(quantity)).collect();
-        if !missing.is_empty() {
-            return Err(wrong(format!("`{name}` needs {}", missing.join(", "))));
-        }
         for (is_given, flag) in [(self.from.is_some(), "--from"), (self.disturb.is_some(), "--disturb")] {
             if is_given && name != "optimal" {
                 return Err(wrong(format!("`{name}` takes no {flag}")));
             }
         }
-        let heeded: &[Quantity] = match name {
-            "optimal" if self.from.is_some() => {
-                &[Quantity::Theta, Quantity::TimeLeft, Quantity::VelocityCeiling, Quantity::FrictionCeiling]
+        if !self.is_ageing() {
+            let law = self.law.unwrap_or_default().name();
+            for (is_given, flag) in [
+                (self.from.is_some(), "--from"),
+                (self.disturb.is_some(), "--disturb"),
+                (self.unbounded, "--unbounded"),
+            ] {
+                if is_given {
+                    return Err(wrong(format!(
+                        "{flag} does not support the law `{law}`\n  help: remove {flag} or --law"
+                    )));
+                }
             }
-            "optimal" => &[Quantity::VelocityCeiling, Quantity::FrictionCeiling],
-            "gap" => &[Quantity::Alpha2, Quantity::Alpha3],
-            "step_response" | "compliant" => &[Quantity::Stiffness, Quantity::Mass],
-            "regularised" => &[Quantity::Stiffness, Quantity::Mass, Quantity::Smoothing],
-            _ if shortcut::find(name).is_some_and(|family| family.uses_tau_ceiling()) => &[Quantity::FrictionCeiling],
-            _ => &[],
+            if matches!(name, "optimal" | "best_cubic") && !self.v_ceiling.is_some_and(f64::is_finite) {
+                let why = "without one, faster is always better";
+                return Err(wrong(format!("the law `{law}` needs --v-ceiling: {why}\n  help: add --v-ceiling 1000")));
+            }
+        }
+        let mut heeded = trace::quantities(if self.from.is_some() { "feedback" } else { name });
+        heeded.retain(|quantity| self.is_ageing() || *quantity != Quantity::FrictionCeiling);
+        let flags = |is_listed: &dyn Fn(Quantity, bool) -> bool| -> Vec<String> {
+            let all = self.given().into_iter();
+            all.filter(|(quantity, given)| is_listed(*quantity, given.is_some()))
+                .map(|(quantity, _)| flag(quantity))
+                .collect()
         };
-        for (quantity, given) in self.given().into_iter().filter(|(quantity, _)| !NEEDED.contains(quantity)) {
-            let is_heeded = heeded.contains(&quantity);
-            if given.is_some() && !is_heeded {
-                return Err(wrong(format!("`{name}` takes no {}", flag(quantity))));
-            }
-            if given.is_none() && is_heeded && quantity.default().is_empty() {
-                return Err(wrong(format!("`{name}` needs {}", flag(quantity))));
-            }
+        let missing =
+            flags(&|quantity, is_given| !is_given && heeded.contains(&quantity) && quantity.default().is_empty());
+        let unused = flags(&|quantity, is_given| is_given && !heeded.contains(&quantity));
+        if !missing.is_empty() {
+            return Err(wrong(format!("`{name}` needs {}", missing.join(", "))));
         }
-        if self.unbounded && !has_bound(name) {
-            return Err(wrong(format!("`{name}` takes no --unbounded")));
+        let unused =
+            unused.into_iter().chain((self.unbounded && !trace::has_floor(name)).then(|| "--unbounded".to_owned()));
+        match unused.into_iter().next() {
+            Some(flag) => Err(wrong(format!("`{name}` takes no {flag}"))),
+            None => Ok(()),
         }
-        Ok(())
+    }
+
+    /// Whether the law is ageing.
+    fn is_ageing(&self) -> bool {
+        self.law.unwrap_or_default() == StateLaw::Ageing
+    }
+
+    /// The number of the row of a table.
+    fn row_number(&self, path: &Path, folder: &Folder, table: &ManifestTable) -> Result<u64, Failure> {
+        match self.row {
+            Some(row) => Ok(row),
+            None if self.conditions.is_empty() => {
+                let last = table.rows.saturating_sub(1);
+                let expected = format!("--row N, from 0 to {last}, or --where CONDITION");
+                Err(refused(format!("{}: which row of `{}`?", path.display(), table.name), expected, "add --row 0"))
+            }
+            None => the_row(path, folder, table, &self.conditions),
+        }
     }
 
     /// The protocol of a row of a table.
@@ -501,18 +524,14 @@ impl Arguments {
         if !trace::TABLES.contains(&name) {
             return Err(wrong(Pathless::Table(name.to_owned())));
         }
-        let number = match self.row {
-            Some(row) => row,
-            None if self.conditions.is_empty() => {
-                let last = listed.rows.saturating_sub(1);
-                let expected = format!("--row N, from 0 to {last}, or --where CONDITION");
-                return Err(refused(format!("{}: which row of `{name}`?", path.display()), expected, "add --row 0"));
-            }
-            None => the_row(path, &folder, listed, &self.conditions)?,
-        };
+        let number = self.row_number(path, &folder, listed)?;
         let (part, written) = row_at(path, &folder, listed, number)?;
         let spec = Spec::parse(&manifest.spec).map_err(Failure::failed)?;
         let units = units(&spec.model)?;
+        if friction(&spec.model)? == Friction::Regularised {
+            let found = format!("{}: no trace with regularised friction", path.display());
+            return Err(refused(found, "a dataset with friction = \"log\"", "compute it in a spec of its own"));
+        }
         let headings = frame::headings(&part).map_err(Failure::failed)?.0;
         let relative = [Quantity::Alpha2, Quantity::Alpha3].map(|alpha| {
             let heading = headings.iter().find(|heading| heading.name == alpha.name());
@@ -532,12 +551,17 @@ impl Arguments {
         let own = own.or(definition.and_then(|table| table.default_rtol())).unwrap_or(spec.accuracy.rtol);
         let mut numbers = axes_of(&written, &units);
         numbers.extend(self.t_f.map(|t_f| Named::new("t_f", t_f, units.name("l/v_0"))));
+        let law = written.iter().find_map(|(name, cell)| match cell {
+            Cell::Word(word) if name == Quantity::Law.name() => StateLaw::find(word),
+            _ => None,
+        });
         Ok(TraceRequest {
-            bounded: has_bound(name).then_some(bounded),
+            bounded: trace::has_floor(name).then_some(bounded),
             name: protocol_name,
             protocol,
             case,
             numbers,
+            law,
             rtol: self.rtol.unwrap_or(own),
             units,
             origin: Some(Origin { dataset: manifest.name.clone(), table: name.to_owned(), row: number }),
@@ -642,7 +666,7 @@ impl Effects {
         };
         let shown = if self.shown == Loop::Open { "open" } else { "closed" };
         format!(
-            "  disturbed: theta {sign}{change} % at t = {}; more work than planned, and theta(t_f) v_f - 1\n{}{}  shown: {shown} loop\n",
+            "  disturbed: theta {sign}{change} % at t = {}; extra work, and relative miss of the target theta\n{}{}  shown: {shown} loop\n",
             words::number(self.t),
             line("open loop, v(t) as planned", self.open),
             line("closed loop, v(theta, t_left)", self.closed),
@@ -706,6 +730,9 @@ fn results(request: &TraceRequest, path: &TracedPath, trace: &Trace) -> [Named; 
 fn header(arguments: &Arguments, request: &TraceRequest, path: &TracedPath, trace: &Trace) -> String {
     let all = |numbers: &[Named]| numbers.iter().map(Named::words).collect::<Vec<_>>().join(", ");
     let mut text = format!("{}: {}\n  at {}", request.name, request.protocol.doc(&request.name), all(&request.numbers));
+    if let Some(law) = request.law {
+        text.push_str(&format!(", law {}", law.name()));
+    }
     if request.bounded == Some(false) {
         text.push_str(", without the velocity floor v >= 1");
     }
@@ -770,6 +797,7 @@ fn facts(arguments: &Arguments, request: &TraceRequest, path: &TracedPath, trace
     let rtol = Named::new("rtol", request.rtol, "");
     let numbers = request.numbers.iter().chain([&rtol]).chain(parameters.iter().map(|(parameter, _)| parameter));
     facts.extend(numbers.chain(&results).map(|number| (number.name.as_str(), format!("{:?}", number.value))));
+    facts.extend(request.law.map(|law| ("law", law.name().to_owned())));
     facts.extend(request.bounded.map(|bounded| ("velocity_bound", bounded.to_string())));
     facts.extend(arguments.points.map(|points| ("points", points.to_string())));
     facts.push(("status", path.status.name().to_owned()));

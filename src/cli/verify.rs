@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use super::watch::{Wait, waiting};
 use super::{EXIT_NOT_CONVERGED, Failure, dataset, say, words};
 use crate::dataset::Cell;
-use crate::verify::{Audit, LIMIT, verify as audit};
+use crate::verify::{Audit, MAX_DIFFERENCE_RTOLS, verify as audit};
 
 /// Arguments of `verify`.
 #[derive(Debug, clap::Args)]
@@ -14,7 +14,7 @@ use crate::verify::{Audit, LIMIT, verify as audit};
 pub struct Arguments {
     /// Folder of the dataset, such as results/NAME
     dataset: PathBuf,
-    /// Rows to check of each table
+    /// Number of rows to check in each table
     #[arg(long, value_name = "N", default_value_t = 100, value_parser = clap::value_parser!(u64).range(1..))]
     sample: u64,
     /// Seed of the sample
@@ -38,7 +38,7 @@ pub fn verify(arguments: &Arguments) -> Result<(), Failure> {
     let errors: usize = audits.iter().map(Audit::errors).sum();
     if errors > 0 {
         let message = format!(
-            "error: {} beyond {LIMIT} rtol\n  help: the rows are listed above; a part that was changed is made again if its file is \
+            "error: {} beyond {MAX_DIFFERENCE_RTOLS} rtol\n  help: the rows are listed above; a part that was changed is made again if its file is \
              deleted and the sweep run",
             words::things(errors as u64, "number")
         );
@@ -47,8 +47,8 @@ pub fn verify(arguments: &Arguments) -> Result<(), Failure> {
     Ok(())
 }
 
-/// Number of columns whose worst row is shown if none fails.
-const FEWEST: usize = 2;
+/// Number of columns whose worst row is shown if none fails. Chosen: the answer fits a screen.
+const MIN_SHOWN_COLUMNS: usize = 2;
 
 /// A difference in units of rtol.
 fn units(value: f64) -> String {
@@ -71,8 +71,8 @@ pub fn summary(audit: &Audit) -> String {
         text.push_str(&words::aligned(&lines, 2));
     }
     // Every failing column, or else the columns with the greatest differences.
-    let failing = audit.worst.iter().filter(|worst| worst.difference > LIMIT).count();
-    for worst in audit.worst.iter().take(failing.max(FEWEST)) {
+    let failing = audit.worst.iter().filter(|worst| worst.difference > MAX_DIFFERENCE_RTOLS).count();
+    for worst in audit.worst.iter().take(failing.max(MIN_SHOWN_COLUMNS)) {
         let cells: Vec<String> = worst
             .row
             .iter()
@@ -84,11 +84,14 @@ pub fn summary(audit: &Audit) -> String {
             .collect();
         let (column, difference, expected) = (worst.column, units(worst.difference), &worst.expected);
         let note = if audit.is_converted { " (dimensionless)" } else { "" };
-        text.push_str(&format!(
-            "  row {}: {column} differs by {difference} rtol, the check has {expected}{note}\n    {}\n",
-            worst.number,
-            cells.join(", ")
-        ));
+        let (row, cells) = (worst.number, cells.join(", "));
+        text.push_str(&match worst.difference > MAX_DIFFERENCE_RTOLS {
+            true => format!("  row {row}: {column} differs by {difference} rtol, the check has {expected}{note}\n"),
+            false => {
+                format!("  greatest difference of {column}: {difference} rtol in row {row}, the check has {expected}{note}\n")
+            }
+        });
+        text.push_str(&format!("    {cells}\n"));
     }
     for (reason, rows) in &audit.unchecked {
         text.push_str(&format!("  not checked in {}: {reason}\n", words::things(*rows, "row")));

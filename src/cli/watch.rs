@@ -20,7 +20,7 @@ const POLL_INTERVAL: Duration = Duration::from_millis(50);
 const LINE_INTERVAL: Duration = Duration::from_secs(10);
 
 /// Time after which a terminal shows the progress. Chosen: a user should not wait longer than a second without a message.
-pub const PROGRESS_DELAY: Duration = Duration::from_secs(1);
+const PROGRESS_DELAY: Duration = Duration::from_secs(1);
 
 /// Runs `work`. Meanwhile it shows the progress towards `rows` rows unless `quiet`, and passes Ctrl-C and SIGTERM on to `signal`.
 ///
@@ -156,7 +156,7 @@ fn listen(number: i32, signals: &Signals) -> std::io::Result<()> {
 }
 
 /// A progress line on a terminal: a message, after a bar if `rows` is not 0.
-pub fn text_line(rows: u64) -> ProgressBar {
+fn text_line(rows: u64) -> ProgressBar {
     let bar = ProgressBar::with_draw_target(Some(rows), ProgressDrawTarget::stderr_with_hz(10));
     set_style(&bar, rows > 0);
     bar

@@ -1,4 +1,4 @@
-//! `slipsweep query` of a build without SQL, that of the Python package: names what answers questions there.
+//! `slipsweep query` of a build without SQL, that of the Python package: names the replacements.
 
 use super::{Failure, refused};
 

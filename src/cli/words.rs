@@ -2,6 +2,8 @@
 
 use indicatif::HumanCount;
 
+use crate::protocol::Status;
+
 /// `value` to nine significant digits.
 pub fn number(value: f64) -> String {
     if value == 0.0 || !value.is_finite() {
@@ -31,6 +33,17 @@ pub fn count(count: u64) -> String {
 /// `number` things, in the singular or with an s.
 pub fn things(number: u64, thing: &str) -> String {
     format!("{} {thing}{}", count(number), if number == 1 { "" } else { "s" })
+}
+
+/// Numbers of rows by word: `3 ok, 1 infeasible`.
+pub fn counts<'a>(counts: impl Iterator<Item = (&'a str, u64)>) -> String {
+    counts.map(|(word, rows)| format!("{} {word}", count(rows))).collect::<Vec<_>>().join(", ")
+}
+
+/// Numbers of rows by status, without zeros.
+pub fn statuses(rows: &[u64]) -> String {
+    let all = Status::ALL.iter().map(|status| status.name()).zip(rows.iter().copied());
+    counts(all.filter(|(_, rows)| *rows > 0))
 }
 
 /// `bytes` in a fitting unit.

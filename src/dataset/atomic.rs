@@ -10,7 +10,7 @@ use std::time::{Duration, Instant, SystemTime};
 
 use tempfile::NamedTempFile;
 
-/// Age from which a temporary file of another machine is treated as abandoned, by the clock of the file system. Writing one takes seconds.
+/// Age from which a temporary file of another machine is treated as abandoned, by the clock of the file system. Chosen: writing one takes seconds, and a day covers wrong clocks.
 const MAX_TEMPORARY_AGE: Duration = Duration::from_secs(24 * 60 * 60);
 
 /// A step that failed, and why.
@@ -87,13 +87,19 @@ fn folder_of(path: &Path) -> &Path {
 fn create(path: &Path) -> io::Result<NamedTempFile> {
     let prefix = format!(".{}.", path.file_name().unwrap_or_default().to_string_lossy());
     let suffix = format!("@{}{SUFFIX}", machine());
-    let temporary = tempfile::Builder::new()
-        .prefix(&prefix)
-        .suffix(&suffix)
-        .make_in(folder_of(path), |path| File::create_new(path))?;
-    // Without locks the age of the file decides.
-    let _ = temporary.as_file().try_lock();
-    Ok(temporary)
+    loop {
+        let temporary = tempfile::Builder::new()
+            .prefix(&prefix)
+            .suffix(&suffix)
+            .make_in(folder_of(path), |path| File::create_new(path))?;
+        match temporary.as_file().try_lock() {
+            // Another process swept it away before it was locked.
+            Err(TryLockError::WouldBlock) => {}
+            Ok(()) if !temporary.path().exists() => {}
+            // Without locks the age of the file decides.
+            _ => return Ok(temporary),
+        }
+    }
 }
 
 /// The suffix of a temporary file.
@@ -230,6 +236,24 @@ mod tests {
         assert_eq!(names(folder.path()), [shown(living.path()), ".mine.tmp".to_owned()]);
         drop(living);
         assert_eq!(names(folder.path()), [".mine.tmp"]);
+    }
+
+    /// A process that swept the folder between creation and lock removed the file of another one.
+    #[test]
+    fn regress_a_sweep_removes_no_file_that_is_being_created() {
+        let folder = tempfile::tempdir().expect("is writable");
+        let is_done = std::sync::atomic::AtomicBool::new(false);
+        std::thread::scope(|scope| {
+            scope.spawn(|| {
+                while !is_done.load(std::sync::atomic::Ordering::Relaxed) {
+                    sweep(folder.path(), SystemTime::now());
+                }
+            });
+            let path = folder.path().join("x");
+            let lost = (0..5000).filter(|_| !create(&path).expect("is writable").path().exists()).count();
+            is_done.store(true, std::sync::atomic::Ordering::Relaxed);
+            assert_eq!(lost, 0);
+        });
     }
 
     #[test]

@@ -13,23 +13,23 @@ use sha2::{Digest, Sha256};
 use super::metadata_limits::page_headers;
 
 /// The key of the checksum of footer and headers.
-const HEAD: &str = "slipsweep.head_sha256";
+const HEAD_KEY: &str = "slipsweep.head_sha256";
 
 /// The key of the checksum of the file.
-const FILE: &str = "slipsweep.sha256";
+const FILE_KEY: &str = "slipsweep.sha256";
 
 /// The placeholder of a checksum during its computation, as long as its hexadecimal digits.
 const BLANK: &str = "0000000000000000000000000000000000000000000000000000000000000000";
 
 /// Bytes of Thrift's compact protocol between key and value: the header of the next field, a string, and its length.
-const BETWEEN: [u8; 2] = [0x18, BLANK.len() as u8];
+const KEY_VALUE_SEPARATOR: [u8; 2] = [0x18, BLANK.len() as u8];
 
 /// Bytes after the footer: its length and `PAR1`.
 const TRAILER: u64 = 8;
 
 /// The entries of a footer that hold the checksums; they must be its last entries.
 pub fn entries() -> [KeyValue; 2] {
-    [HEAD, FILE].map(|key| KeyValue::new(key.to_owned(), BLANK.to_owned()))
+    [HEAD_KEY, FILE_KEY].map(|key| KeyValue::new(key.to_owned(), BLANK.to_owned()))
 }
 
 /// Inserts the checksums into a file whose footer has the [`entries`].
@@ -48,14 +48,14 @@ pub fn with_checksums(bytes: Vec<u8>) -> Result<Vec<u8>> {
         bytes[place..place + BLANK.len()].copy_from_slice(checksum.as_bytes());
         Ok::<(), ParquetError>(())
     };
-    write(HEAD, &|_, _| head.clone())?;
-    write(FILE, &whole)?;
+    write(HEAD_KEY, &|_, _| head.clone())?;
+    write(FILE_KEY, &whole)?;
     Ok(bytes)
 }
 
 /// Whether the bytes of a file match its checksum; `None` without a checksum.
 pub fn is_intact(bytes: &[u8]) -> Option<bool> {
-    let place = place(bytes, FILE)?;
+    let place = place(bytes, FILE_KEY)?;
     Some(bytes[place..place + BLANK.len()] == *whole(bytes, place).as_bytes())
 }
 
@@ -66,10 +66,10 @@ pub fn is_intact(bytes: &[u8]) -> Option<bool> {
 /// If they cannot be read.
 pub fn is_head_intact(file: &impl ChunkReader, metadata: &ParquetMetaData) -> Result<Option<bool>> {
     let entries = metadata.file_metadata().key_value_metadata().into_iter().flatten();
-    let Some(stored) = entries.filter(|entry| entry.key == HEAD).find_map(|entry| entry.value.as_ref()) else {
+    let Some(stored) = entries.filter(|entry| entry.key == HEAD_KEY).find_map(|entry| entry.value.as_ref()) else {
         // A flipped bit may hide the entries of a footer, although its bytes still contain them.
         let footer = footer(file)?;
-        return Ok([HEAD, FILE].iter().any(|key| place(&footer, key).is_some()).then_some(false));
+        return Ok([HEAD_KEY, FILE_KEY].iter().any(|key| place(&footer, key).is_some()).then_some(false));
     };
     Ok(Some(*stored == head(file, metadata)?))
 }
@@ -88,7 +88,7 @@ fn head(file: &impl ChunkReader, metadata: &ParquetMetaData) -> Result<String> {
     let mut hash = Sha256::new();
     page_headers(file, metadata, |header| hash.update(header))?;
     let mut footer = footer(file)?;
-    for key in [HEAD, FILE] {
+    for key in [HEAD_KEY, FILE_KEY] {
         if let Some(place) = place(&footer, key) {
             footer[place..place + BLANK.len()].copy_from_slice(BLANK.as_bytes());
         }
@@ -100,8 +100,8 @@ fn head(file: &impl ChunkReader, metadata: &ParquetMetaData) -> Result<String> {
 /// The offset of the checksum of a key: its last occurrence, since the spec before it may contain anything.
 fn place(bytes: &[u8], key: &str) -> Option<usize> {
     let key_at = bytes.windows(key.len()).rposition(|window| window == key.as_bytes())?;
-    let place = key_at + key.len() + BETWEEN.len();
-    let found = bytes.get(key_at + key.len()..place)? == BETWEEN && bytes.len() >= place + BLANK.len();
+    let place = key_at + key.len() + KEY_VALUE_SEPARATOR.len();
+    let found = bytes.get(key_at + key.len()..place)? == KEY_VALUE_SEPARATOR && bytes.len() >= place + BLANK.len();
     found.then_some(place)
 }
 

@@ -19,7 +19,7 @@ use super::rle;
 /// Runs of equal codes: code and number of rows.
 pub type Runs = Vec<(u32, usize)>;
 
-/// Least size of a compressed page, in bytes: smaller pages cost more time than they save space.
+/// Least size of a compressed page, in bytes. Chosen: smaller pages cost more time than they save space.
 const MIN_COMPRESSED_BYTES: usize = 1 << 12;
 
 /// A column chunk of one data page.

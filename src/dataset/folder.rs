@@ -25,12 +25,12 @@ pub enum DatasetError {
     Foreign { folder: String, what: &'static str, expected: String, found: String },
     /// The folder contains a dataset of another spec.
     #[error(
-        "{folder}: holds a dataset of another spec\n  expected: {expected}\n  found: {found}\n  help: {OTHER_SPEC_HELP}"
+        "{folder}: holds a dataset of another spec\n  in the spec: {expected}\n  in the dataset: {found}\n  help: {OTHER_SPEC_HELP}"
     )]
     OtherSpec { folder: String, table: String, expected: String, found: String, spec: String },
     /// The folder contains tables that the spec lacks, and lacks tables of the spec.
     #[error(
-        "{folder}: the spec and the dataset each have a table that the other lacks\n  expected: {expected}\n  found: {found}\n  help: add \
+        "{folder}: the spec and the dataset each have a table that the other lacks\n  in the spec: {expected}\n  in the dataset: {found}\n  help: add \
          [tables.{}] to the spec, which keeps its rows and computes yours; or {OTHER_SPEC_HELP}",
         missing.join("] and [tables.")
     )]

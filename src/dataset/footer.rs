@@ -10,7 +10,7 @@ use super::manifest::{Build, Manifest, ManifestTable};
 use super::statistics::TableStatistics;
 use crate::protocol::Status;
 
-/// Greatest size of a spec in the footer of a part, in bytes: a fortieth of a part of 2^18 landscape rows. Only the manifest contains a longer
+/// Greatest size of a spec in the footer of a part, in bytes. Chosen: a fortieth of a part of 2^18 landscape rows. Only the manifest contains a longer
 /// spec; the hash of the table identifies it.
 const MAX_SPEC_BYTES: usize = 1 << 16;
 
@@ -44,7 +44,7 @@ const HASH: &str = "slipsweep.hash";
 const ROW_START: &str = "slipsweep.row_start";
 const ROW_END: &str = "slipsweep.row_end";
 const STATUS: &str = "slipsweep.status";
-const DIGEST: &str = "slipsweep.digest";
+const STATISTICS: &str = "slipsweep.statistics";
 
 /// Rows by status, in the order of [`Status::ALL`].
 pub type StatusCounts = [u64; Status::ALL.len()];
@@ -77,7 +77,7 @@ impl Footer {
             (ROW_START, self.rows.start.to_string()),
             (ROW_END, self.rows.end.to_string()),
             (STATUS, counts),
-            (DIGEST, serde_json::to_string(statistics).unwrap_or_default()),
+            (STATISTICS, serde_json::to_string(statistics).unwrap_or_default()),
         ];
         let spec = self.spec.iter().map(|spec| (SPEC, spec.clone()));
         let entries = spec.chain(entries).map(|(key, value)| KeyValue::new(key.to_owned(), value));
@@ -102,7 +102,7 @@ impl Footer {
         let get = |key: &str| entries.iter().find(|entry| entry.key == key)?.value.as_deref();
         let counts: BTreeMap<String, u64> = serde_json::from_str(get(STATUS)?).ok()?;
         let status = Status::ALL.map(|status| counts.get(status.name()).copied().unwrap_or(0));
-        let mut statistics: TableStatistics = serde_json::from_str(get(DIGEST)?).ok()?;
+        let mut statistics: TableStatistics = serde_json::from_str(get(STATISTICS)?).ok()?;
         statistics.status = status;
         Some(statistics)
     }

@@ -19,7 +19,7 @@ use super::layout::label;
 use super::metadata_limits::{self, coded};
 use crate::file;
 
-/// Rows decoded in one batch.
+/// Rows decoded in one batch. Chosen: a batch fits the cache of a core.
 const ROWS_AT_ONCE: usize = 1 << 14;
 
 /// Name, unit and meaning of a column of a file.

@@ -7,7 +7,7 @@ use arrow_schema::{DataType, Field, Schema, SchemaRef};
 
 use crate::grid::{Grid, Quantity, Scale};
 use crate::model::Units;
-use crate::table::{Column, Kind, Prediction, Projection, STATUS, STATUS_DOC, Table};
+use crate::table::{Column, Kind, Prediction, Projection, STATUS, STATUS_DOC, Table, written};
 
 /// Meaning of a column of labels.
 const LABEL_DOC: &str = "label of the row's point, from the file of `points`";
@@ -31,9 +31,12 @@ pub struct Layout {
 
 impl Layout {
     /// The layout of `table` over `grid`, with the columns of `projection`.
-    pub fn new(table: &dyn Table, projection: &Projection, grid: &Grid) -> Layout {
-        let axes: Vec<Quantity> = Quantity::ALL.into_iter().filter(|axis| table.axes().contains(axis)).collect();
-        let columns: Vec<Column> = projection.indices().iter().map(|&index| table.columns()[index]).collect();
+    pub fn new(table: &Table, projection: &Projection, grid: &Grid) -> Layout {
+        let is_written =
+            |axis: &Quantity| table.axes().contains(axis) && (!axis.is_tacit() || grid.scale(*axis).is_some());
+        let axes: Vec<Quantity> = Quantity::ALL.into_iter().filter(is_written).collect();
+        let columns: Vec<Column> =
+            projection.indices().iter().map(|&index| written(table.columns()[index], grid)).collect();
         let mut labels: Vec<String> = Vec::new();
         for name in grid.blocks.iter().flat_map(|block| block.labels(table.axes())) {
             if !labels.iter().any(|known| known == name) {

@@ -23,6 +23,7 @@ mod state;
 mod statistics;
 #[cfg(feature = "read")]
 mod survey;
+mod thrift;
 
 pub use batch::batch;
 pub use cell::Cell;

@@ -12,7 +12,7 @@ use super::atomic;
 use super::folder::{DatasetError, Folder, failed, unwritten};
 use super::manifest::Manifest;
 
-/// Attempts to publish a manifest while another one appears and disappears.
+/// Attempts to publish a manifest while another one appears and disappears. Chosen: each attempt fails only if another process does both in between.
 const ATTEMPTS: usize = 4;
 
 /// A run that writes to a dataset.

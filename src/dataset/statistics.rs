@@ -17,7 +17,7 @@ use crate::protocol::Status;
 use crate::protocol::shortcut::FAMILIES;
 use crate::table::{ColumnBuffer, Kind, OPTIMUM_AXES};
 
-/// Greatest number of rows of a table whose rows are all kept, and of transitions with separate least gaps.
+/// Greatest number of rows of a table whose rows are all kept, and of transitions with separate least gaps. Chosen: they fit a screen.
 pub const MAX_KEPT_ROWS: usize = 12;
 
 /// The column whose least values are recorded.
@@ -189,7 +189,7 @@ impl Row {
 
 impl Range {
     fn of(column: &str, cells: &[f64]) -> Range {
-        /// Values compared side by side, so that the compiler uses vector instructions.
+        /// Values compared side by side, so that the compiler uses vector instructions. Chosen: the widest vectors.
         const LANES: usize = 8;
         let (mut count, mut least, mut greatest) = (0, [f64::INFINITY; LANES], [f64::NEG_INFINITY; LANES]);
         for chunk in cells.chunks(LANES) {

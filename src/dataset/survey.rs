@@ -43,7 +43,7 @@ pub struct TableSurvey {
     pub statistics: TableStatistics,
 }
 
-/// Parts inspected before their statistics are merged, so that memory does not grow with the dataset.
+/// Parts inspected before their statistics are merged. Chosen: memory does not grow with the dataset, and merges are rare.
 const PARTS_PER_MERGE: usize = 1 << 10;
 
 impl TableSurvey {

@@ -121,6 +121,16 @@ impl Block {
         self.factors.iter().flat_map(|factor| &factor.axes).find(|axis| axis.quantity == quantity)
     }
 
+    /// Whether a value of `quantity` may satisfy `condition`; always true for an axis that is computed from others.
+    pub fn may_be(&self, quantity: Quantity, condition: impl Fn(f64) -> bool) -> bool {
+        match self.axis(quantity).map(|axis| &axis.values) {
+            Some(Values::List(values)) => values.iter().any(|&value| condition(value)),
+            Some(range) => !range.is_empty() && (condition(range.at(0)) || condition(range.at(range.len() - 1))),
+            None if self.derived.iter().any(|derived| derived.quantity == quantity) => true,
+            None => quantity.default().into_iter().any(condition),
+        }
+    }
+
     /// The names of the labels of rows over `quantities`: those of the factors with these axes.
     pub fn labels(&self, quantities: &[Quantity]) -> impl Iterator<Item = &str> {
         let factors = self.factors_of(&self.roots(quantities)).into_iter();

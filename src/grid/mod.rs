@@ -16,5 +16,5 @@ pub use design::Design;
 pub use expression::{Expression, Fault};
 pub use quantity::{Domain, Point, Quantity, RTOL, Scale};
 pub use row_filter::first_wrong;
-pub use row_index::{Grid, RowIndex, Stretch, TooMany, Tuples};
+pub use row_index::{BlockRows, Grid, RowIndex, TooMany, Tuples};
 pub use view::{Runs, Segment, View};

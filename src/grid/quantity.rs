@@ -2,6 +2,7 @@
 
 use std::fmt;
 
+use crate::model::StateLaw;
 use crate::protocol::shortcut::FAMILIES;
 
 /// A quantity that can be an axis of a sweep.
@@ -18,6 +19,10 @@ pub enum Quantity {
     A,
     /// Evolution effect.
     B,
+    /// Evolution law of the state.
+    Law,
+    /// Interpolation between the slip law, 0, and the ageing law, 1.
+    LawEps,
     /// Initial velocity.
     InitialVelocity,
     /// Final velocity.
@@ -87,7 +92,7 @@ impl fmt::Display for Domain {
     }
 }
 
-/// Legal range of every `rtol`. Smaller values are beyond double precision, greater ones are meaningless.
+/// Legal range of every `rtol`. Chosen: rounding of long sums comes near smaller values, and greater ones leave less than two digits.
 pub const RTOL: Domain = Domain::new("1e-13 <= rtol <= 1e-2", 1e-13, 1e-2);
 
 /// The unit of a coefficient axis.
@@ -102,12 +107,14 @@ pub enum Scale {
 
 impl Quantity {
     /// Every quantity; axis columns come in this order.
-    pub const ALL: [Quantity; 16] = [
+    pub const ALL: [Quantity; 18] = [
         Quantity::Time,
         Quantity::Theta,
         Quantity::TimeLeft,
         Quantity::A,
         Quantity::B,
+        Quantity::Law,
+        Quantity::LawEps,
         Quantity::InitialVelocity,
         Quantity::FinalVelocity,
         Quantity::Family,
@@ -134,6 +141,10 @@ impl Quantity {
             Quantity::TimeLeft => ["t_left", "l/v_0", "time left of the protocol"],
             Quantity::A => ["a", "mu_0", "direct effect: coefficient of ln v in friction"],
             Quantity::B => ["b", "mu_0", "evolution effect: coefficient of ln theta in friction"],
+            Quantity::Law => ["law", "", "evolution law of the state; ageing where there is no such column"],
+            Quantity::LawEps => {
+                ["law_eps", "1", "interpolated evolution law instead of `law`: from slip, 0, to ageing, 1"]
+            }
             Quantity::InitialVelocity => ["v_i", "v_0", "velocity of the initial steady state"],
             Quantity::FinalVelocity => ["v_f", "v_0", "velocity of the final steady state"],
             Quantity::Family => ["family", "", "family of shortcuts"],
@@ -187,6 +198,7 @@ impl Quantity {
     pub fn words(self) -> Vec<&'static str> {
         match self {
             Quantity::Family => FAMILIES.iter().map(|family| family.name()).collect(),
+            Quantity::Law => StateLaw::ALL.map(StateLaw::name).into(),
             _ => Vec::new(),
         }
     }
@@ -200,6 +212,8 @@ impl Quantity {
             Quantity::TimeLeft => Domain::new("1e-20 <= t_left <= 1e20", 1e-20, 1e20),
             Quantity::A => Domain::new("1e-6 <= a <= 10", 1e-6, 10.0),
             Quantity::B => Domain::new("0 <= b <= 10", 0.0, 10.0),
+            Quantity::Law => Domain::new("a law", 0.0, (StateLaw::ALL.len() - 1) as f64),
+            Quantity::LawEps => Domain::new("0 <= law_eps <= 1", 0.0, 1.0),
             Quantity::InitialVelocity => velocity("1 < v_i <= 1e12"),
             Quantity::FinalVelocity => velocity("1 < v_f <= 1e12"),
             Quantity::Family => Domain::new("a family", 0.0, (FAMILIES.len() - 1) as f64),
@@ -213,7 +227,7 @@ impl Quantity {
             Quantity::Alpha2 => Domain::new("-1e100 <= alpha_2 <= 1e100", -1e100, 1e100),
             Quantity::Alpha3 => Domain::new("-1e100 <= alpha_3 <= 1e100", -1e100, 1e100),
             Quantity::Stiffness => {
-                Domain { apart: Some(f64::INFINITY), ..Domain::new("1e-40 <= k <= 1e40, or inf: rigid", 1e-40, 1e40) }
+                Domain { apart: Some(f64::INFINITY), ..Domain::new("1e-40 <= k <= 1e40, or inf (rigid)", 1e-40, 1e40) }
             }
             Quantity::Mass => Domain { apart: Some(0.0), ..Domain::new("1e-40 <= m <= 1e40, or 0", 1e-40, 1e40) },
             Quantity::Sampling => {
@@ -223,12 +237,18 @@ impl Quantity {
         }
     }
 
+    /// Whether a table has its column only if the grid names the axis. Without it, its quantity has the default value.
+    pub fn is_tacit(self) -> bool {
+        matches!(self, Quantity::Law | Quantity::LawEps)
+    }
+
     /// Its default values; empty if a spec must define it.
     pub fn default(self) -> Vec<f64> {
         match self {
             Quantity::Family => (0..FAMILIES.len()).map(|place| place as f64).collect(),
             Quantity::Stiffness | Quantity::VelocityCeiling | Quantity::FrictionCeiling => vec![f64::INFINITY],
-            Quantity::Mass | Quantity::Sampling => vec![0.0],
+            Quantity::LawEps => vec![1.0],
+            Quantity::Law | Quantity::Mass | Quantity::Sampling => vec![0.0],
             _ => Vec::new(),
         }
     }
@@ -241,6 +261,14 @@ pub struct Point([f64; Quantity::ALL.len()]);
 impl Default for Point {
     fn default() -> Self {
         Point([f64::NAN; Quantity::ALL.len()])
+    }
+}
+
+impl Point {
+    /// The evolution law of the state; ageing in a grid without the axis.
+    pub fn state_law(&self) -> StateLaw {
+        // The place of a word is exact; NaN becomes 0.
+        StateLaw::ALL.get(self[Quantity::Law] as usize).copied().unwrap_or_default()
     }
 }
 

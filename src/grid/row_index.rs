@@ -59,7 +59,7 @@ impl Grid {
     ///
     /// More rows than a table can have.
     pub fn project(&self, quantities: &[Quantity]) -> Result<RowIndex, TooMany> {
-        let mut stretches = Vec::new();
+        let mut blocks = Vec::new();
         let (mut rows, mut raw): (u64, u64) = (0, 0);
         for (number, block) in self.blocks.iter().enumerate() {
             let factors = block.factors_of(&block.roots(quantities));
@@ -73,24 +73,24 @@ impl Grid {
             };
             let row_filter = row_filter.filter(|row_filter| !row_filter.keeps_all()).map(Arc::new);
             let kept = row_filter.as_ref().map_or(digits.rows, |row_filter| row_filter.rows());
-            stretches.push(Stretch { block: block.clone(), digits, row_filter, first: rows, rows: kept });
+            blocks.push(BlockRows { block: block.clone(), digits, row_filter, first: rows, rows: kept });
             rows += kept;
         }
-        Ok(RowIndex { stretches, rows, dropped: raw - rows })
+        Ok(RowIndex { blocks, rows, dropped: raw - rows })
     }
 }
 
 /// The row index of a table.
 #[derive(Debug, Clone)]
 pub struct RowIndex {
-    stretches: Vec<Stretch>,
+    blocks: Vec<BlockRows>,
     rows: u64,
     dropped: u64,
 }
 
 /// The rows of one block.
 #[derive(Debug, Clone)]
-pub struct Stretch {
+pub struct BlockRows {
     /// The block.
     pub block: Arc<Block>,
     /// The digits of its rows, kept or not.
@@ -100,7 +100,7 @@ pub struct Stretch {
     rows: u64,
 }
 
-impl Stretch {
+impl BlockRows {
     /// Number of rows that are kept.
     pub fn rows(&self) -> u64 {
         self.rows
@@ -141,8 +141,8 @@ impl RowIndex {
     }
 
     /// The rows of each block.
-    pub fn stretches(&self) -> &[Stretch] {
-        &self.stretches
+    pub fn blocks(&self) -> &[BlockRows] {
+        &self.blocks
     }
 
     /// The values at `row`.
@@ -153,20 +153,20 @@ impl RowIndex {
     /// A view of consecutive rows.
     pub fn view(&self, rows: Range<u64>) -> View<'_> {
         let mut segments = Vec::new();
-        for (number, stretch) in self.stretches.iter().enumerate() {
-            let start = rows.start.clamp(stretch.first, stretch.first + stretch.rows) - stretch.first;
-            let end = rows.end.clamp(stretch.first, stretch.first + stretch.rows) - stretch.first;
+        for (number, block_rows) in self.blocks.iter().enumerate() {
+            let start = rows.start.clamp(block_rows.first, block_rows.first + block_rows.rows) - block_rows.first;
+            let end = rows.end.clamp(block_rows.first, block_rows.first + block_rows.rows) - block_rows.first;
             if start >= end {
                 continue;
             }
-            let ranges = match &stretch.row_filter {
+            let ranges = match &block_rows.row_filter {
                 Some(row_filter) => row_filter.ranges(start..end),
                 None => std::iter::once(start..end).collect(),
             };
-            let mut first = stretch.first + start;
+            let mut first = block_rows.first + start;
             for raw in ranges {
                 let length = raw.end - raw.start;
-                segments.push(Segment { stretch: number, first, raw });
+                segments.push(Segment { block: number, first, raw });
                 first += length;
             }
         }
@@ -176,11 +176,11 @@ impl RowIndex {
     /// Numbers the different tuples of `quantities` among the rows.
     pub fn tuples(&self, quantities: &[Quantity]) -> Tuples {
         let (mut parts, mut span) = (Vec::new(), 0);
-        for stretch in &self.stretches {
-            let roots = stretch.block.roots(quantities);
+        for block_rows in &self.blocks {
+            let roots = block_rows.block.roots(quantities);
             let (mut digits, mut count) = (Vec::new(), 1);
-            for digit in stretch.digits.digits.iter().rev() {
-                let factor = &stretch.block.factors[digit.factor];
+            for digit in block_rows.digits.digits.iter().rev() {
+                let factor = &block_rows.block.factors[digit.factor];
                 if factor.holds_any(&roots) {
                     let (distinct, class_of) = factor.classes(&roots);
                     digits.push(TupleDigit { digit: *digit, class_of, weight: count });
@@ -188,8 +188,8 @@ impl RowIndex {
                     count *= distinct;
                 }
             }
-            let run = digits.first().map_or(stretch.digits.rows, |fastest| fastest.digit.stride);
-            parts.push(TupleStretch { digits, first: span, run });
+            let run = digits.first().map_or(block_rows.digits.rows, |fastest| fastest.digit.stride);
+            parts.push(BlockTuples { digits, first: span, run });
             span += count;
         }
         Tuples { parts, span }
@@ -202,7 +202,7 @@ impl RowIndex {
     pub fn distinct(&self, quantities: &[Quantity], most: u64) -> u64 {
         let tuples = self.tuples(quantities);
         let repeats = tuples.repeat();
-        if self.stretches.iter().all(|stretch| stretch.row_filter.is_none()) {
+        if self.blocks.iter().all(|block_rows| block_rows.row_filter.is_none()) {
             tuples.span
         } else if repeats && self.rows <= most {
             let seen: HashSet<u64> =
@@ -223,7 +223,7 @@ struct TupleDigit {
 
 /// The tuples of one block.
 #[derive(Debug, Clone)]
-struct TupleStretch {
+struct BlockTuples {
     digits: Vec<TupleDigit>,
     /// Tuples of the blocks before.
     first: u64,
@@ -235,7 +235,7 @@ struct TupleStretch {
 /// grid that contains all the quantities.
 #[derive(Debug, Clone)]
 pub struct Tuples {
-    parts: Vec<TupleStretch>,
+    parts: Vec<BlockTuples>,
     span: u64,
 }
 
@@ -250,9 +250,9 @@ impl Tuples {
         self.parts.iter().any(|part| part.digits.iter().any(|digit| digit.class_of.is_some()))
     }
 
-    /// The tuple of product row `raw` of block `stretch`, and the first row after it that may have another tuple.
-    pub(super) fn of(&self, stretch: usize, raw: u64) -> (u64, u64) {
-        let part = &self.parts[stretch];
+    /// The tuple of product row `raw` of block `block`, and the first row after it that may have another tuple.
+    pub(super) fn of(&self, block: usize, raw: u64) -> (u64, u64) {
+        let part = &self.parts[block];
         let number = part.digits.iter().map(|TupleDigit { digit, class_of, weight }| {
             let step = digit.step(raw);
             weight * class_of.as_ref().map_or(step, |class_of| u64::from(class_of[step as usize]))

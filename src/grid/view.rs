@@ -19,7 +19,7 @@ const MAX_TABLE_STEPS: u64 = 1 << 16;
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Segment {
     /// The number of the block.
-    pub stretch: usize,
+    pub block: usize,
     /// The number of its first row in the table.
     pub first: u64,
     /// The rows of the product.
@@ -35,7 +35,7 @@ impl Segment {
     fn cut(&self, rows: &Range<u64>) -> Segment {
         let (start, end) = (rows.start.max(self.first), rows.end.min(self.end()));
         let raw = self.raw.start + (start - self.first)..self.raw.start + (end - self.first);
-        Segment { stretch: self.stretch, first: start, raw }
+        Segment { block: self.block, first: start, raw }
     }
 }
 
@@ -64,20 +64,20 @@ impl<'a> View<'a> {
     pub fn point(&self, row: u64) -> Point {
         let mut point = Point::default();
         if let Some(segment) = self.segments(row..row + 1).next() {
-            let stretch = &self.row_index.stretches()[segment.stretch];
-            let block = &stretch.block;
-            for digit in &stretch.digits.digits {
+            let block_rows = &self.row_index.blocks()[segment.block];
+            let block = &block_rows.block;
+            for digit in &block_rows.digits.digits {
                 for axis in &block.factors[digit.factor].axes {
                     point[axis.quantity] = axis.values.at(digit.step(segment.raw.start));
                 }
             }
             let made = block.derived.iter().map(|derived| derived.quantity);
-            let made: Vec<Quantity> = made.filter(|quantity| stretch.determines(*quantity)).collect();
+            let made: Vec<Quantity> = made.filter(|quantity| block_rows.determines(*quantity)).collect();
             if made.is_empty() {
                 return point;
             }
             let mut scratch = Scratch::default();
-            Sampler::new(block, &stretch.digits, &made).pick(&[segment.raw.start], &mut scratch);
+            Sampler::new(block, &block_rows.digits, &made).pick(&[segment.raw.start], &mut scratch);
             for quantity in made {
                 point[quantity] = scratch.column(quantity)[0];
             }
@@ -87,13 +87,13 @@ impl<'a> View<'a> {
 
     /// The values of `quantity` over `rows` as runs; `None` without such an axis.
     pub fn runs(&self, quantity: Quantity, rows: Range<u64>) -> Option<Runs> {
-        let stretches = self.row_index.stretches();
-        if !stretches.iter().all(|stretch| stretch.determines(quantity)) {
+        let blocks = self.row_index.blocks();
+        if !blocks.iter().all(|block_rows| block_rows.determines(quantity)) {
             return None;
         }
         let segments: Vec<Segment> = self.segments(rows.clone()).collect();
         if let [segment] = segments.as_slice()
-            && let Some((digit, axis)) = stretches[segment.stretch].axis(quantity)
+            && let Some((digit, axis)) = blocks[segment.block].axis(quantity)
         {
             let first = segment.raw.start / digit.stride;
             let steps = ((segment.raw.end - 1) / digit.stride - first + 1).min(digit.len);
@@ -102,13 +102,13 @@ impl<'a> View<'a> {
         }
         let mut runs = Listed::default();
         let (mut scratch, mut starts) = (Scratch::default(), Vec::new());
-        for group in segments.chunk_by(|one, next| one.stretch == next.stretch) {
-            let stretch = &stretches[group[0].stretch];
-            if let Some((digit, axis)) = stretch.axis(quantity) {
+        for group in segments.chunk_by(|one, next| one.block == next.block) {
+            let block_rows = &blocks[group[0].block];
+            if let Some((digit, axis)) = block_rows.axis(quantity) {
                 runs.take_steps(digit, axis, group);
                 continue;
             }
-            let sampler = Sampler::new(&stretch.block, &stretch.digits, &[quantity]);
+            let sampler = Sampler::new(&block_rows.block, &block_rows.digits, &[quantity]);
             for segment in group {
                 let stride = sampler.run().unwrap_or(u64::MAX);
                 let mut raw = segment.raw.start;
@@ -127,8 +127,8 @@ impl<'a> View<'a> {
 
     /// The words of the label `name` over `rows` as runs: word, or `None`, and number of rows.
     pub fn label(&self, name: &str, rows: Range<u64>) -> Vec<(Option<&'a str>, usize)> {
-        let labels: Vec<_> = self.row_index.stretches().iter().map(|stretch| stretch.label(name)).collect();
-        let runs = self.runs_of(rows, |stretch, raw| match labels[stretch] {
+        let labels: Vec<_> = self.row_index.blocks().iter().map(|block_rows| block_rows.label(name)).collect();
+        let runs = self.runs_of(rows, |block, raw| match labels[block] {
             Some((digit, label)) => (label.word(digit.step(raw)), digit.next(raw)),
             None => (None, u64::MAX),
         });
@@ -137,7 +137,7 @@ impl<'a> View<'a> {
 
     /// The tuples of `rows` as runs: tuple and rows.
     pub fn tuples(&self, tuples: &Tuples, rows: Range<u64>) -> Vec<(u64, Range<u64>)> {
-        self.runs_of(rows, |stretch, raw| tuples.of(stretch, raw))
+        self.runs_of(rows, |block, raw| tuples.of(block, raw))
     }
 
     /// Runs of equal values over `rows`. `of` gives the value at a product row, and the first row after it that may have another value.
@@ -146,7 +146,7 @@ impl<'a> View<'a> {
         for segment in self.segments(rows) {
             let mut raw = segment.raw.start;
             while raw < segment.raw.end {
-                let (value, next) = of(segment.stretch, raw);
+                let (value, next) = of(segment.block, raw);
                 let next = next.min(segment.raw.end);
                 let [start, end] = [raw, next].map(|raw| segment.first + (raw - segment.raw.start));
                 match runs.last_mut() {

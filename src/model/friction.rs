@@ -37,7 +37,7 @@ impl Transition {
             // The difference of the velocities may be as small as rounding.
             return -ln_1p((v_f - v_i) / v_f / (v_i - 1.0));
         }
-        // The same operations as for the optimum's time at the floor, so that both give the same double.
+        // Operations as in the optimum's time at the floor, so that both give the same double.
         let (fall, rest) = ((v_i - v_f) / v_i, (v_f - 1.0) / v_f);
         ln_1p(fall * (1.0 / v_f) / rest)
     }

@@ -143,7 +143,7 @@ impl ExactCubic {
 fn refined([c0, c1, c2, c3]: [DoubleDouble; 4], x: f64) -> DoubleDouble {
     let mut x = DoubleDouble::new(x);
     let mut last = f64::INFINITY;
-    for _ in 0..MOST_STEPS {
+    for _ in 0..MAX_STEPS {
         let value = c0 + x * (c1 + x * (c2 + x * c3));
         let slope = c1.high + x.high * (2.0 * c2.high + 3.0 * x.high * c3.high);
         let step = value.high / slope;
@@ -158,7 +158,7 @@ fn refined([c0, c1, c2, c3]: [DoubleDouble; 4], x: f64) -> DoubleDouble {
 }
 
 /// Greatest number of steps. Chosen: more than bisection would need.
-const MOST_STEPS: u32 = 120;
+const MAX_STEPS: u32 = 120;
 
 /// The zeros of `c + b x + a x^2`, in the form of [`ExactCubic::zeros`].
 pub fn exact_quadratic_zeros([c, b, a]: [DoubleDouble; 3]) -> [(DoubleDouble, f64); 2] {
@@ -205,15 +205,15 @@ pub fn cubic_zeros<T: Real>(d: [T; 4]) -> Zeros<3, T> {
     let single = excess > zero;
     // One real zero: Cardano's formula, in the form whose terms have equal signs. Three real zeros: Viète's formula for the zero farthest from
     // the mean. Both are nested fractions, so that each lane divides only once.
-    let cube = size + (if single { excess } else { zero }).sqrt() + T::TINY;
+    let cube = size + (if single { excess } else { zero }).sqrt() + T::MIN_NORMAL;
     let s = cube.cube_root();
-    let root = (if big_q > zero { big_q } else { zero }).sqrt() + T::TINY;
-    let inner = if single { big_q } else { size } / if single { s } else { root * root * root + T::TINY };
+    let root = (if big_q > zero { big_q } else { zero }).sqrt() + T::MIN_NORMAL;
+    let inner = if single { big_q } else { size } / if single { s } else { root * root * root + T::MIN_NORMAL };
     let c = if inner < one { inner } else { one };
     let [g0, g1, g2, g3, g4] = TRISECTION.map(T::of);
     let g = g0 + c * (g1 + c * (g2 + c * (g3 + c * g4)));
     let above = if single { two * size } else { (four * g * g - three) * g - c };
-    let below = if single { s * s - big_q + inner * inner + T::TINY } else { twelve * g * g - three };
+    let below = if single { s * s - big_q + inner * inner + T::MIN_NORMAL } else { twelve * g * g - three };
     let outer = above / below;
     let u = if single { outer } else { two * root * (g - outer) };
     let u = if big_r > zero { -u } else { u };
@@ -228,7 +228,7 @@ pub fn cubic_zeros<T: Real>(d: [T; 4]) -> Zeros<3, T> {
     let real = spread >= zero;
     let distance = spread.abs().sqrt();
     let farther = if mean < zero { mean - distance } else { mean + distance };
-    let norm = mean * mean + distance * distance + T::TINY;
+    let norm = mean * mean + distance * distance + T::MIN_NORMAL;
     let scale = one / if real { farther } else { norm };
     let (re, im) = (mean * scale, distance * scale);
     Zeros {

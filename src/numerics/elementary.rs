@@ -10,7 +10,7 @@ const LN_2_HIGH: f64 = f64::from_bits(0x3FE6_2E42_FEFA_3800);
 /// ln 2 less [`LN_2_HIGH`].
 const LN_2_LOW: f64 = 5.497923018708371e-14;
 
-/// `1.5 * 2^52`: added to a small number it leaves the nearest integer in the low bits.
+/// `1.5 * 2^52`: added to a small number it leaves the nearest integer in the low bits. Derived: doubles from 2^52 to 2^53 are integers.
 const ROUND: f64 = 6755399441055744.0;
 
 /// `(2 atanh s - 2 s)/s^3` in powers of `s^2`, Chebyshev interpolant on `|s| <= (sqrt 2 - 1)/(sqrt 2 + 1)`, truncation

@@ -4,8 +4,8 @@ use std::sync::OnceLock;
 
 use super::double_double::DoubleDouble;
 
-/// Nodes of the largest rule.
-pub const MOST_NODES: usize = 512;
+/// Nodes of the largest rule. Chosen: twice those of the largest panel of a landscape.
+pub const MAX_NODES: usize = 512;
 
 /// Nodes and weights: `int_-1^1 f dx = sum w f(x)`, exact for polynomials of degree `2n - 1`.
 #[derive(Debug, Clone, PartialEq)]
@@ -16,10 +16,10 @@ pub struct Rule {
     pub w: Vec<f64>,
 }
 
-/// The rule with `n` nodes, computed at its first use; `n` is clamped to `1 ..= MOST_NODES`.
+/// The rule with `n` nodes, computed at its first use; `n` is clamped to `1 ..= MAX_NODES`.
 pub fn rule(n: usize) -> &'static Rule {
-    static RULES: [OnceLock<Rule>; MOST_NODES] = [const { OnceLock::new() }; MOST_NODES];
-    let n = n.clamp(1, MOST_NODES);
+    static RULES: [OnceLock<Rule>; MAX_NODES] = [const { OnceLock::new() }; MAX_NODES];
+    let n = n.clamp(1, MAX_NODES);
     RULES[n - 1].get_or_init(|| make(n))
 }
 
@@ -78,18 +78,18 @@ pub struct Primitive {
     pub matrix: Vec<f64>,
 }
 
-/// Rows of the matrix that are processed together.
+/// Rows of the matrix that are processed together. Chosen: two accumulators hide the latency of an addition.
 pub const ROWS: usize = 2;
 
 /// The rule with `2 half` nodes, computed at its first use.
 pub fn primitive(half: usize) -> &'static Primitive {
-    static RULES: [OnceLock<Primitive>; MOST_HALF] = [const { OnceLock::new() }; MOST_HALF];
-    let half = half.clamp(1, MOST_HALF);
+    static RULES: [OnceLock<Primitive>; MAX_HALF] = [const { OnceLock::new() }; MAX_HALF];
+    let half = half.clamp(1, MAX_HALF);
     RULES[half - 1].get_or_init(|| make_primitive(half))
 }
 
-/// Greatest `half` of a rule with a primitive.
-pub const MOST_HALF: usize = 40;
+/// Greatest `half` of a rule with a primitive. Chosen: the rules of all bins, up to 80 nodes.
+pub const MAX_HALF: usize = 40;
 
 fn make_primitive(half: usize) -> Primitive {
     let n = 2 * half;

@@ -24,7 +24,7 @@ fn root_of_monotone(c: &[f64], mut low: f64, mut high: f64) -> Option<f64> {
         return None;
     }
     let mut x = 0.5 * (low + high);
-    for _ in 0..MOST_STEPS {
+    for _ in 0..MAX_STEPS {
         let (value, slope) = value_and_slope(c, x);
         if (value < 0.0) == (first < 0.0) {
             low = x;
@@ -42,4 +42,4 @@ fn root_of_monotone(c: &[f64], mut low: f64, mut high: f64) -> Option<f64> {
 }
 
 /// Greatest number of steps. Chosen: more than bisection from 1 down to 1e-16 and some Newton steps need.
-const MOST_STEPS: u32 = 100;
+const MAX_STEPS: u32 = 100;

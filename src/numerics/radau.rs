@@ -1,7 +1,7 @@
 //! The Radau rule on `[0, 1]` with a node at 1: quadrature, indefinite integrals and interpolation on the same nodes.
 //!
 //! The nodes are those of Radau IIA collocation (Hairer and Wanner, Solving Ordinary Differential Equations II, section
-//! IV.5), which damps what is stiff. The integrals from 0 to every node follow from one product with a matrix.
+//! IV.5), which damps stiff components. The integrals from 0 to every node follow from one product with a matrix.
 
 use std::sync::OnceLock;
 

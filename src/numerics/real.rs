@@ -13,7 +13,7 @@ pub trait Real:
     + Neg<Output = Self>
 {
     /// The smallest normal number: added to a divisor, it prevents 0/0.
-    const TINY: Self;
+    const MIN_NORMAL: Self;
 
     /// The nearest number.
     fn of(x: f64) -> Self;
@@ -46,7 +46,7 @@ pub trait Real:
 }
 
 impl Real for f64 {
-    const TINY: f64 = f64::MIN_POSITIVE;
+    const MIN_NORMAL: f64 = f64::MIN_POSITIVE;
 
     #[inline(always)]
     fn of(x: f64) -> f64 {
@@ -85,7 +85,7 @@ impl Real for f64 {
 }
 
 impl Real for f32 {
-    const TINY: f32 = f32::MIN_POSITIVE;
+    const MIN_NORMAL: f32 = f32::MIN_POSITIVE;
 
     #[inline(always)]
     fn of(x: f64) -> f32 {

@@ -20,11 +20,14 @@ pub struct Root {
     pub probe: Probe,
 }
 
-/// Greatest number of probes. Newton's method takes four to eight; a bisection of any bracket of doubles takes fewer than this.
-const MOST_PROBES: u32 = 200;
+/// Greatest number of probes. Chosen: Newton's method takes four to eight; a bisection of any bracket of doubles takes fewer than this.
+const MAX_PROBES: u32 = 200;
 
-/// Greatest growth factor of a step towards an unbounded side.
-const MOST_GROWTH: f64 = 8.0;
+/// Greatest growth factor of a step towards an unbounded side. Chosen: ten steps reach a billion times farther.
+const MAX_GROWTH: f64 = 8.0;
+
+/// Relative residual after which one more step of [`newton`] leaves rounding. Derived: the step squares it, to 1e-18.
+pub const LAST_STEP_RESIDUAL: f64 = 1e-9;
 
 /// Finds the root of an increasing function inside `(low, high)`, from `start`. Both bounds may be infinite.
 ///
@@ -68,7 +71,7 @@ pub fn newton_in_pieces<Piece: Copy + PartialEq>(
     let mut last: Option<(Probe, Piece)> = None;
     let mut below = false;
     let mut above = false;
-    for _ in 0..MOST_PROBES {
+    for _ in 0..MAX_PROBES {
         let p = probe(x).filter(|(p, _)| !p.value.is_nan());
         let step = match p {
             Some((p, piece)) => {
@@ -102,7 +105,7 @@ pub fn newton_in_pieces<Piece: Copy + PartialEq>(
         let [last_step, step_before] = last_steps;
         let open = if step > 0.0 { !above && high.is_infinite() } else { !below && low.is_infinite() };
         let step = if open && step.abs() >= last_step {
-            step.abs().clamp(2.0 * last_step, MOST_GROWTH * last_step).copysign(step)
+            step.abs().clamp(2.0 * last_step, MAX_GROWTH * last_step).copysign(step)
         } else {
             step
         };
@@ -149,7 +152,7 @@ pub fn crossing(
     [mut f0, mut f1]: [f64; 2],
     resolution: f64,
 ) -> f64 {
-    for _ in 0..MOST_PROBES {
+    for _ in 0..MAX_PROBES {
         if f1 == 0.0 || (x1 - x0).abs() <= resolution {
             return x1;
         }

@@ -4,7 +4,7 @@ use std::fmt::Write;
 
 use super::label::{self, FAMILIES, SCRIPT_SIZE, SUBSCRIPT_DROP, SUPERSCRIPT_RISE};
 
-/// Points per millimetre.
+/// Points per millimetre. Derived: 72 points and 25.4 mm to the inch.
 pub const MILLIMETRE: f64 = 72.0 / 25.4;
 
 /// Distance of the lines of a hatched area, along its edges, in points. Chosen: single lines are visible in print.

@@ -45,7 +45,18 @@ pub fn series(place: usize) -> Stroke {
     Stroke { colour: SERIES[place % SERIES.len()].to_owned(), width: 1.1, dashes: DASHES[place % DASHES.len()] }
 }
 
+/// Fills of classes. Chosen: as many as strategies of an optimum, none of the same grey as its neighbours.
+const CLASSES: [[u8; 3]; 7] = [
+    [0xd7, 0xe8, 0xf5],
+    [0x2a, 0x5f, 0x9e],
+    [0xf2, 0xc4, 0x5a],
+    [0x8c, 0x2d, 0x19],
+    [0x66, 0x66, 0x66],
+    [0x9f, 0xc9, 0xa0],
+    [0xc0, 0x8f, 0xc4],
+];
+
 /// The fill of class number `place`, from light to dark, so that classes differ in grey.
 pub fn class(place: usize) -> [u8; 3] {
-    [[0xd7, 0xe8, 0xf5], [0x2a, 0x5f, 0x9e], [0xf2, 0xc4, 0x5a], [0x8c, 0x2d, 0x19], [0x66, 0x66, 0x66]][place % 5]
+    CLASSES[place % CLASSES.len()]
 }

@@ -27,7 +27,7 @@ const FRAME_WIDTH: f64 = 0.6;
 /// Space between the baseline of a title and the frame below, in points. Chosen: it holds descenders.
 const TITLE_SPACE: f64 = 5.0;
 
-/// Space of the titles of rows of panels, in points: a line and its distance from the frame.
+/// Space of the titles of rows of panels, in points. Chosen: a line and its distance from the frame.
 const ROW_TITLE_WIDTH: f64 = SIZE + 6.0;
 
 /// Length of the leader from the end of a vertical line to its label, in points. Chosen: labels may move aside by several letters.
@@ -36,7 +36,7 @@ const LEADER_LENGTH: f64 = 5.0;
 /// Space between labels of vertical lines, in points. Chosen: the width of two spaces.
 const WORD_SPACE: f64 = 5.0;
 
-/// Height of leaders and labels above a panel, in points.
+/// Height of leaders and labels above a panel, in points. Derived: leader, gap and letters.
 const WORDS_HEIGHT: f64 = LEADER_LENGTH + 2.5 + NOTE_SIZE;
 
 /// Space between a map and its colour bar, and width of the bar, in points. Chosen: the bar is as wide as a letter is high.
@@ -258,7 +258,7 @@ pub struct HoverMap {
 }
 
 /// The ticks of a panel, and whether its axes are labelled.
-struct Plan {
+struct PanelTicks {
     x: Ticks,
     y: Ticks,
     x_label: bool,
@@ -267,7 +267,7 @@ struct Plan {
 
 /// The layout of panels of one size: margins of each column and row.
 struct Layout {
-    plans: Vec<Plan>,
+    ticks: Vec<PanelTicks>,
     lefts: Vec<f64>,
     rights: Vec<f64>,
     aboves: Vec<f64>,
@@ -326,25 +326,25 @@ impl Figure {
         let columns = self.columns.clamp(1, self.panels.len().max(1));
         // A first guess of a panel's width determines the number of ticks, and so the space for their labels.
         let guess = inner / columns as f64 - 40.0;
-        let plan = |(place, panel): (usize, &Panel)| Plan {
+        let ticks = |(place, panel): (usize, &Panel)| PanelTicks {
             x: panel.x.scale.ticks(fitting(guess, if panel.x.scale.log { 27.0 } else { 30.0 }), as_powers),
             y: panel.y.scale.ticks(fitting(guess * self.aspect, 17.0), as_powers),
             x_label: self.panels.get(place + columns).is_none_or(|below| below.x != panel.x),
             y_label: place.is_multiple_of(columns),
         };
-        let plans: Vec<Plan> = self.panels.iter().enumerate().map(plan).collect();
+        let ticks: Vec<PanelTicks> = self.panels.iter().enumerate().map(ticks).collect();
         let mut lefts = vec![0.0_f64; columns];
         let mut rights = vec![0.0_f64; columns];
         let mut belows = vec![0.0_f64; self.panels.len().div_ceil(columns)];
-        for (place, plan) in plans.iter().enumerate() {
+        for (place, ticks) in ticks.iter().enumerate() {
             let (row, column) = (place / columns, place % columns);
             // The first and the last label of the horizontal axis may extend beyond the panel.
-            let before = plan.x.beyond(guess, |fraction| fraction);
-            let after = plan.x.beyond(guess, |fraction| 1.0 - fraction);
-            let left = if plan.y_label { TICK_LENGTH + 2.0 + widest(&plan.y) + 3.0 + SIZE + 3.0 } else { 5.0 };
+            let before = ticks.x.beyond(guess, |fraction| fraction);
+            let after = ticks.x.beyond(guess, |fraction| 1.0 - fraction);
+            let left = if ticks.y_label { TICK_LENGTH + 2.0 + widest(&ticks.y) + 3.0 + SIZE + 3.0 } else { 5.0 };
             lefts[column] = lefts[column].max(left.max(before + 3.0));
             rights[column] = rights[column].max(after + 2.0);
-            let below = if plan.x_label { TICK_LENGTH + TICK_SIZE + 4.0 + SIZE + 6.0 } else { 2.0 };
+            let below = if ticks.x_label { TICK_LENGTH + TICK_SIZE + 4.0 + SIZE + 6.0 } else { 2.0 };
             belows[row] = belows[row].max(below);
         }
         let room: f64 = lefts.iter().sum::<f64>() + rights.iter().sum::<f64>();
@@ -355,7 +355,7 @@ impl Figure {
         let titled = |row: usize| if row == 0 || self.rows.is_empty() { above } else { 4.0 };
         let words = |row: &[Panel]| if row.iter().any(Panel::has_words_above) { WORDS_HEIGHT } else { 0.0 };
         let aboves = self.panels.chunks(columns).enumerate().map(|(row, panels)| titled(row) + words(panels)).collect();
-        Layout { plans, lefts, rights, aboves, belows, width, height: (width * self.aspect).max(20.0) }
+        Layout { ticks, lefts, rights, aboves, belows, width, height: (width * self.aspect).max(20.0) }
     }
 
     /// Draws the panels and the colour bar; returns their lower edge, and the maps.
@@ -371,7 +371,7 @@ impl Figure {
             for (column, panel) in panels.iter().enumerate() {
                 x += layout.lefts[column];
                 let area = Area { x, y, width, height };
-                panel.draw(canvas, area, &layout.plans[row * columns + column], layout.lefts[column]);
+                panel.draw(canvas, area, &layout.ticks[row * columns + column], layout.lefts[column]);
                 for layer in &panel.layers {
                     if let Layer::Map(Map { hover: Some(hover), .. }) = layer {
                         hovers.push(HoverMap { area, x: panel.x.clone(), y: panel.y.clone(), hover: hover.clone() });
@@ -502,22 +502,22 @@ impl Key {
 
 impl Panel {
     /// Draws the panel. The label of its vertical axis is at the outer edge of the left margin, which is `left` wide.
-    fn draw(&self, canvas: &mut Canvas, area: Area, plan: &Plan, left: f64) {
+    fn draw(&self, canvas: &mut Canvas, area: Area, ticks: &PanelTicks, left: f64) {
         canvas.clipped(area, |canvas| self.layers.iter().for_each(|layer| self.fill(canvas, area, layer)));
         // Marks on the frame are not clipped.
         canvas.frame(area, &Stroke::solid("#000", FRAME_WIDTH));
         self.layers.iter().for_each(|layer| self.mark(canvas, area, layer));
         self.draw_words_above(canvas, area);
-        plan.x.draw_below(canvas, area, plan.x_label);
-        plan.y.draw_side_axis(canvas, area, false, plan.y_label);
+        ticks.x.draw_below(canvas, area, ticks.x_label);
+        ticks.y.draw_side_axis(canvas, area, false, ticks.y_label);
         let middle = Text { anchor: Anchor::Middle, ..LABEL };
-        if plan.x_label {
+        if ticks.x_label {
             let place = (area.x + 0.5 * area.width, area.y + area.height + TICK_LENGTH + TICK_SIZE + 4.0 + SIZE);
-            canvas.text(place, &self.x.label(plan.x.power), &middle);
+            canvas.text(place, &self.x.label(ticks.x.power), &middle);
         }
-        if plan.y_label {
+        if ticks.y_label {
             let place = (area.x - left + SIZE + 1.0, area.y + 0.5 * area.height);
-            canvas.text(place, &self.y.label(plan.y.power), &Text { upwards: true, ..middle });
+            canvas.text(place, &self.y.label(ticks.y.power), &Text { upwards: true, ..middle });
         }
         let above = if self.has_words_above() { WORDS_HEIGHT } else { 0.0 };
         for (line, title) in wrapped(&self.title, SIZE, area.width).iter().rev().enumerate() {
@@ -633,27 +633,27 @@ impl Axis {
 /// space, and are as close to their desired positions as possible.
 fn apart(wishes: &[(f64, f64)], low: f64, high: f64) -> Vec<f64> {
     // Touching labels move as one block at the mean of their desired positions.
-    struct Block {
+    struct LabelBlock {
         wish: f64,
         width: f64,
         words: usize,
     }
-    let mut blocks: Vec<Block> = Vec::new();
-    let centre = |block: &Block| {
+    let mut blocks: Vec<LabelBlock> = Vec::new();
+    let centre = |block: &LabelBlock| {
         let half = 0.5 * block.width;
         (block.wish / block.words as f64).min(high - half).max(low + half)
     };
     for &(wish, width) in wishes {
-        let mut last = Block { wish, width, words: 1 };
+        let mut last = LabelBlock { wish, width, words: 1 };
         while let Some(before) = blocks.pop() {
             if centre(&before) + 0.5 * before.width <= centre(&last) - 0.5 * last.width {
                 blocks.push(before);
                 break;
             }
             // A block that grows at its end keeps the offsets of its labels.
-            let shift = |block: &Block, by: f64| block.wish + by * block.words as f64;
+            let shift = |block: &LabelBlock, by: f64| block.wish + by * block.words as f64;
             let wish = shift(&before, 0.5 * last.width) + shift(&last, -0.5 * before.width);
-            last = Block { wish, width: before.width + last.width, words: before.words + last.words };
+            last = LabelBlock { wish, width: before.width + last.width, words: before.words + last.words };
         }
         blocks.push(last);
     }

@@ -9,7 +9,7 @@ pub const LOG_RATIO: f64 = 30.0;
 /// matter more.
 const LOG_RATIO_WITH_ZERO: f64 = 1e9;
 
-/// Size, relative to the greatest value, below which values may be rounded zeros: a few thousand roundings of 1.1e-16.
+/// Size, relative to the greatest value, below which values may be rounded zeros. Chosen: nine thousand roundings of 1.1e-16, a hundredth of the default `rtol`.
 const ROUNDING_RTOL: f64 = 1e-12;
 
 /// Number of empty decades between such zeros and other values. Chosen: neighbouring points of a curve are closer.
@@ -213,10 +213,12 @@ pub fn is_logarithmic(values: &[f64]) -> bool {
             return high / low > 3.0;
         }
     }
-    // For uneven values, such as samples, about half should be left of the middle.
+    // For uneven values, such as samples, about half should be left of the middle. A linear axis would squeeze a quarter of
+    // values that are far below the greatest.
     let scale = |log| Scale { low, high, log };
     let off = |log: bool| (scale(log).fraction(values[values.len() / 2]) - 0.5).abs();
-    high / low >= LOG_RATIO && (values.len() < 4 || off(true) <= off(false))
+    let are_squeezed = values[values.len() / 4] * LOG_RATIO <= high;
+    high / low >= LOG_RATIO && (values.len() < 4 || are_squeezed || off(true) <= off(false))
 }
 
 #[cfg(test)]
@@ -275,5 +277,7 @@ mod tests {
         assert!(is_logarithmic(&[1.0, 100.0]));
         assert!(is_logarithmic(&[1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0]));
         assert!(!is_logarithmic(&[1.0, 20.0, 38.0, 52.0, 67.0, 83.0, 100.0]));
+        // Materials whose values span decades, half of them near the greatest.
+        assert!(is_logarithmic(&[1.0, 2.0, 3.0, 500.0, 600.0, 700.0, 1000.0]));
     }
 }

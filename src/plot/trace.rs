@@ -24,7 +24,7 @@ const MAX_POINTS: usize = 8000;
 const ASPECT: f64 = 0.42;
 
 /// The columns of each panel. The velocity of the block and the control velocity are in one panel.
-const SHOWN: [&[&str]; 3] = [&["v", "v_c"], &["theta"], &["tau"]];
+const PANEL_COLUMNS: [&[&str]; 3] = [&["v", "v_c"], &["theta"], &["tau"]];
 
 /// Unit of velocity axes in which the velocity floor is 1.
 const UNIT_OF_BOUND: &str = "v_0";
@@ -87,27 +87,15 @@ impl TraceFile {
     fn new(columns: Vec<Column>, facts: &Facts, stem: String) -> TraceFile {
         let fact =
             |name: &str| facts.iter().find(|(key, _)| key == &format!("slipsweep.{name}")).map(|(_, value)| value);
-        let number = |name: &&str| Some(((*name).to_owned(), fact(name)?.parse().ok()?));
-        let parameters = [
-            "t_f",
-            "a",
-            "b",
-            "v_i",
-            "v_f",
-            "theta",
-            "t_left",
-            "v_ceiling",
-            "tau_ceiling",
-            "alpha_2",
-            "alpha_3",
-            "k",
-            "m",
-            "delta_t",
-        ]
-        .iter()
-        .filter_map(number);
-        let after = fact("loop").map_or(String::new(), |which| format!(", {which} loop"));
-        let name = label::literal(&format!("{}{after}", fact("protocol").map_or(stem, Clone::clone)));
+        let number = |name: &str| Some((name.to_owned(), fact(name)?.parse().ok()?));
+        let parameters = Quantity::ALL.into_iter().filter(|quantity| *quantity != Quantity::Sampling);
+        let parameters = parameters.filter_map(|quantity| number(quantity.name()));
+        let after = |key: &str| fact(key).map_or(String::new(), |word| format!(", {word} {key}"));
+        let protocol = fact("protocol").map_or(stem, Clone::clone);
+        let pulses = fact("chatter_pulses")
+            .and_then(|count| count.parse::<f64>().ok())
+            .map_or(String::new(), |count| format!(", chattering shown as {count} pulses"));
+        let name = label::literal(&format!("{protocol}{}{}{pulses}", after("law"), after("loop")));
         let points = fact("points").and_then(|points| points.parse().ok());
         TraceFile { name, parameters: parameters.collect(), columns, points }
     }
@@ -211,7 +199,7 @@ pub fn figure(traces: &[TraceFile]) -> Result<Figure, PlotError> {
     let time = Scale { log: false, ..Scale::of(cells(traces, "t")).ok_or(PlotError::Nothing)? };
     let axis = |names: &[&str], scale| Axis { column: names.join(", "), unit: unit_in(traces, names[0]), scale };
     let mut panels = Vec::new();
-    for names in SHOWN {
+    for names in PANEL_COLUMNS {
         let has = |name: &&str| traces.iter().any(|trace| trace.column(name).is_some());
         let names: Vec<&str> = names.iter().copied().filter(has).collect();
         let Some(scale) = Scale::of(names.iter().flat_map(|name| cells(traces, name))) else { continue };
@@ -250,7 +238,7 @@ fn unit_in(traces: &[TraceFile], name: &str) -> String {
 
 /// Checks that the traces agree in units.
 fn one_unit(traces: &[TraceFile]) -> Result<(), PlotError> {
-    for name in SHOWN.into_iter().flatten().chain(&["t"]) {
+    for name in PANEL_COLUMNS.into_iter().flatten().chain(&["t"]) {
         let first = unit_in(traces, name);
         let mut units = traces.iter().filter_map(|trace| Some(trace.column(name)?.unit.as_str()));
         if let Some(other) = units.find(|unit| *unit != first) {

@@ -5,6 +5,7 @@
 
 use crate::model::Law;
 use crate::numerics::elementary::ln;
+use crate::numerics::root::crossing;
 
 /// A block on a spring under friction.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -22,7 +23,7 @@ pub struct SpringBlock {
 pub struct Jet {
     /// `v`, `v'`, `v''`, `v'''`.
     pub v: [f64; 4],
-    /// Contact lifetime.
+    /// State variable.
     pub theta: f64,
     /// `theta' = 1 - theta v`, accurate where it is small compared with 1.
     pub rate: f64,
@@ -82,9 +83,6 @@ pub(super) enum Tolerance {
     OfRange(f64),
 }
 
-/// Steps of the Illinois method for an extremum, at most. Chosen: more than a bracket between two nodes takes.
-const MAX_STEPS: u32 = 60;
-
 impl ValueRange {
     /// The empty range.
     pub const NONE: ValueRange = ValueRange { low: f64::INFINITY, high: f64::NEG_INFINITY };
@@ -95,42 +93,58 @@ impl ValueRange {
         self.high = self.high.max(value);
     }
 
-    /// Extends the range to the values between two nodes `(u, [value, slope])`, with an extremum where the slopes differ in
-    /// sign. `at(u)` returns value and slope; the Illinois method finds the root of the slope.
+    /// Extends the range to the values between two nodes `(u, [value, slope])`; `at(u)` returns value and slope.
+    ///
+    /// There is an extremum where the slopes differ in sign. Where they do not, there may be two: the slope is checked
+    /// where that of the cubic through both nodes bends back most.
     pub fn add_interval(
         &mut self,
-        (mut u_0, [value_0, mut slope_0]): (f64, [f64; 2]),
-        (mut u_1, [value_1, mut slope_1]): (f64, [f64; 2]),
+        first: (f64, [f64; 2]),
+        last: (f64, [f64; 2]),
         tolerance: Tolerance,
         at: impl Fn(f64) -> [f64; 2],
     ) {
+        let ((u_0, [value_0, slope_0]), (u_1, [value_1, slope_1])) = (first, last);
         self.add(value_0);
         self.add(value_1);
-        if (slope_0 > 0.0) == (slope_1 > 0.0) {
-            return;
+        if (slope_0 > 0.0) != (slope_1 > 0.0) {
+            return self.add_extremum([u_0, u_1], [slope_0, slope_1], tolerance, &at);
         }
-        let mut last = 0.0;
-        for _ in 0..MAX_STEPS {
-            let u = u_0 + (u_1 - u_0) * (slope_0 / (slope_0 - slope_1));
+        let length = u_1 - u_0;
+        let unit = if matches!(tolerance, Tolerance::OfValue(_)) { value_0 } else { 1.0 };
+        let mean = (value_1 - value_0) / (length * unit);
+        // The slope of the cubic is `slope_0 + bend s + 3 (...) s^2` over the fraction `s`.
+        let bend = 2.0 * (3.0 * mean - 2.0 * slope_0 - slope_1);
+        let s = bend / (6.0 * (2.0 * mean - slope_0 - slope_1));
+        let opposite = slope_0 + 0.5 * bend * s;
+        let matters = opposite.abs() * length > self.allowed(tolerance);
+        if s > 0.0 && s < 1.0 && matters && (opposite > 0.0) != (slope_0 > 0.0) {
+            let middle = u_0 + s * length;
+            let [value, slope] = at(middle);
+            self.add(value);
+            if (slope > 0.0) != (slope_0 > 0.0) {
+                self.add_extremum([u_0, middle], [slope_0, slope], tolerance, &at);
+                self.add_extremum([middle, u_1], [slope, slope_1], tolerance, &at);
+            }
+        }
+    }
+
+    /// Extends the range to the extremum between two places whose slopes differ in sign.
+    fn add_extremum(&mut self, ends: [f64; 2], slopes: [f64; 2], tolerance: Tolerance, at: &impl Fn(f64) -> [f64; 2]) {
+        let slope = |u: f64| {
             let [value, slope] = at(u);
             self.add(value);
-            // The extremum differs from this value by less than the slope over the bracket.
-            let allowed = match tolerance {
-                Tolerance::OfValue(rtol) => 0.1 * rtol,
-                Tolerance::OfRange(rtol) => 0.1 * rtol * self.high.abs().max(self.low.abs()),
-            };
-            if slope.abs() * (u_1 - u_0) <= allowed {
-                break;
-            }
-            if (slope > 0.0) == (slope_0 > 0.0) {
-                (u_0, slope_0) = (u, slope);
-                slope_1 *= if last > 0.0 { 0.5 } else { 1.0 };
-                last = 1.0;
-            } else {
-                (u_1, slope_1) = (u, slope);
-                slope_0 *= if last < 0.0 { 0.5 } else { 1.0 };
-                last = -1.0;
-            }
+            // The extremum differs from this value by less than the slope over the interval.
+            if slope.abs() * (ends[1] - ends[0]) <= self.allowed(tolerance) { 0.0 } else { slope }
+        };
+        crossing(slope, ends, slopes, 0.0);
+    }
+
+    /// Error of an extremum that is allowed.
+    fn allowed(&self, tolerance: Tolerance) -> f64 {
+        match tolerance {
+            Tolerance::OfValue(rtol) => 0.1 * rtol,
+            Tolerance::OfRange(rtol) => 0.1 * rtol * self.high.abs().max(self.low.abs()),
         }
     }
 }

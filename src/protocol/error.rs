@@ -9,13 +9,13 @@ use crate::protocol::optimal::{self, Bounds, Optimum};
 use crate::protocol::shortcut::{Case, Family, Shortcut};
 use crate::protocol::{Solved, SolverStats, Status};
 
-/// Relative tolerance of the second solve: the tightest above rounding.
+/// Relative tolerance of the second solve: the tightest above rounding. Chosen: nine roundings of 1.1e-16.
 pub const TIGHTEST_RTOL: f64 = 1e-15;
 
-/// Greatest error of a solve to [`TIGHTEST_RTOL`] without rounding, as a fraction of its distance from a coarser one. Chosen.
+/// Greatest error of a solve to [`TIGHTEST_RTOL`] without rounding, as a fraction of its distance from a coarser one. Measured: with it 999 of 1000 errors are within their bounds (`tests/solver/error.rs`).
 const ERROR_OF_TIGHTEST: f64 = 0.25;
 
-/// Relative rounding error of a sum of some hundred positive terms, each accurate to a few units in the last place.
+/// Relative rounding error of a sum of some hundred positive terms, each accurate to a few units in the last place. Measured: as [`ERROR_OF_TIGHTEST`].
 const ROUNDING: f64 = 20.0 * f64::EPSILON;
 
 /// Error bound of the number `found`, if a solve to [`TIGHTEST_RTOL`] gives `finest`; `scale` is the size of its terms.
@@ -75,7 +75,7 @@ pub fn of_member(family: &dyn Family, case: &Case, member: &Shortcut, stats: &mu
     let finest = family.solve(case, TIGHTEST_RTOL, stats).ok()?;
     let Transition { law: Law { a, b }, v_i, v_f } = case.transition;
     let (exponent, delay) = if family.uses_tau_ceiling() {
-        // Without a ceiling, tau itself is what is rounded.
+        // Without a ceiling tau itself is rounded.
         let tau = if case.tau_ceiling.is_finite() { case.tau_ceiling } else { member.friction_max };
         (0.05 * (0.25 * ln(v_f / v_i)).powi(4).max(1.0) * (tau.abs() + b) / a, 1.5 * ROUNDING)
     } else {

@@ -1,5 +1,6 @@
 //! Protocols that bring a block from one steady velocity to another: the optimal one and its shortcuts.
 
+pub mod arcsinh;
 pub mod best_cubic;
 pub mod compliant;
 mod control;
@@ -10,7 +11,9 @@ pub mod optimal;
 mod outcome;
 mod profile;
 pub mod regularised;
+pub mod relaxed;
 pub mod shortcut;
+pub mod smoothness;
 
 pub use control::{Jet, SpringBlock};
 pub use motion::{Moment, Motion};

@@ -7,13 +7,13 @@ pub struct Moment {
     pub t: f64,
     /// Velocity.
     pub v: f64,
-    /// Contact lifetime.
+    /// State variable.
     pub theta: f64,
     /// Friction `tau = 1 + a ln v + b ln theta`.
     pub friction: f64,
     /// Control velocity, where the spring is elastic.
     pub v_c: Option<f64>,
-    /// Costate of the contact lifetime, where the protocol is an extremal.
+    /// Costate of the state variable, where the protocol is an extremal.
     pub beta: Option<f64>,
 }
 

@@ -12,7 +12,7 @@ pub enum Status {
     Infeasible,
     /// Computed, but `tau < 0` somewhere on this path: outside any friction law.
     NegativeFriction,
-    /// `tau <= max(0, b - a)` somewhere on the optimal path, where the extremal need not be unique.
+    /// `tau <= max(0, b - a)` somewhere on the optimal path, and `tau_ss < 2 (b - a)` at an end: the extremal need not be unique.
     Unproven,
     /// A defect of the program: the solver could not certify its answer.
     NotConverged,
@@ -80,6 +80,13 @@ impl std::ops::AddAssign for SolverStats {
     fn add_assign(&mut self, other: SolverStats) {
         self.quadratures = self.quadratures.saturating_add(other.quadratures);
         self.nodes = self.nodes.saturating_add(other.nodes);
+    }
+}
+
+impl<T> Solved<T> {
+    /// The result with `convert`ed numbers.
+    pub fn map<U>(self, convert: impl FnOnce(T) -> U) -> Solved<U> {
+        Solved { status: self.status, value: self.value.map(convert), stats: self.stats }
     }
 }
 

@@ -1,4 +1,4 @@
-//! The answer to a query: its columns, and its rows piece by piece.
+//! The answer to a query: its columns, and its rows batch by batch.
 
 use std::io::{self, Write};
 use std::sync::Arc;
@@ -23,11 +23,11 @@ use super::scan::{Files, append};
 use super::streaming::{Key, PARTS, StreamPlan};
 use crate::dataset::{Cell, field, guarded, label};
 
-/// Rows of a piece. Chosen: few enough that a reader sees the first ones soon.
-const PIECE: usize = 1 << 14;
+/// Rows of a batch. Chosen: few enough that a reader sees the first ones soon.
+const BATCH_ROWS: usize = 1 << 14;
 
 /// Rows of partial answers that are merged before more are computed. Chosen: ten columns of 2^22 doubles are 336 MB.
-const MOST_PARTIAL: usize = 1 << 22;
+const MAX_PARTIAL_ROWS: usize = 1 << 22;
 
 /// An answer, computed while it is read.
 pub struct Answer {
@@ -74,7 +74,7 @@ impl From<ParquetError> for AnswerError {
     }
 }
 
-type Take<'a> = &'a mut dyn FnMut(&DataFrame) -> Result<(), AnswerError>;
+type BatchHandler<'a> = &'a mut dyn FnMut(&DataFrame) -> Result<(), AnswerError>;
 
 impl Answer {
     /// The answer from `frame`, with `columns` in these `units`; or from `streaming` of files.
@@ -103,11 +103,11 @@ impl Answer {
     ///
     /// If the answer cannot be computed, or `take` fails.
     pub fn rows(self, mut take: impl FnMut(Vec<Vec<Cell>>) -> io::Result<()>) -> Result<(), AnswerError> {
-        self.find(&mut |piece| {
-            let columns: Vec<Vec<Cell>> = piece.columns().iter().map(cells).collect();
+        self.for_each_batch(&mut |batch| {
+            let columns: Vec<Vec<Cell>> = batch.columns().iter().map(cells).collect();
             let mut columns: Vec<_> = columns.into_iter().map(Vec::into_iter).collect();
             let row = || columns.iter_mut().filter_map(Iterator::next).collect();
-            Ok(take(std::iter::repeat_with(row).take(piece.height()).collect())?)
+            Ok(take(std::iter::repeat_with(row).take(batch.height()).collect())?)
         })
     }
 
@@ -119,27 +119,27 @@ impl Answer {
     pub fn write(self, format: Format, out: &mut dyn Write) -> Result<(), AnswerError> {
         let mut first = true;
         match format {
-            Format::Csv => self.find(&mut |piece| {
+            Format::Csv => self.for_each_batch(&mut |batch| {
                 let mut bytes = Vec::new();
                 let header = std::mem::take(&mut first);
-                without_lists(piece, "CSV")?;
-                CsvWriter::new(&mut bytes).include_header(header).finish(&mut piece.clone())?;
+                without_lists(batch, "CSV")?;
+                CsvWriter::new(&mut bytes).include_header(header).finish(&mut batch.clone())?;
                 Ok(out.write_all(&bytes)?)
             })?,
-            Format::JsonLines => self.find(&mut |piece| Ok(out.write_all(json_lines(piece).as_bytes())?))?,
+            Format::JsonLines => self.for_each_batch(&mut |batch| Ok(out.write_all(json_lines(batch).as_bytes())?))?,
             Format::Parquet => {
                 let units = self.units.clone();
                 let properties = WriterProperties::builder().set_compression(Compression::SNAPPY).build();
                 let mut writer: Option<(SchemaRef, ArrowWriter<Vec<u8>>)> = None;
-                self.find(&mut |piece| {
+                self.for_each_batch(&mut |batch| {
                     if writer.is_none() {
-                        without_lists(piece, "a Parquet answer")?;
-                        let schema = arrow_schema(piece, &units);
+                        without_lists(batch, "a Parquet answer")?;
+                        let schema = arrow_schema(batch, &units);
                         let made = ArrowWriter::try_new(Vec::new(), schema.clone(), Some(properties.clone()))?;
                         writer = Some((schema, made));
                     }
                     if let Some((schema, writer)) = &mut writer {
-                        writer.write(&batch(piece, schema)?)?;
+                        writer.write(&record_batch(batch, schema)?)?;
                         out.write_all(&std::mem::take(writer.inner_mut()))?;
                     }
                     Ok(())
@@ -152,19 +152,19 @@ impl Answer {
         Ok(out.flush()?)
     }
 
-    /// Computes the answer on all threads and passes it on piece by piece: at least one piece, even without rows.
-    fn find(self, take: Take) -> Result<(), AnswerError> {
+    /// Computes the answer on all threads and passes it on batch by batch: at least one batch, even without rows.
+    fn for_each_batch(self, take: BatchHandler) -> Result<(), AnswerError> {
         let Answer { frame, streaming, .. } = self;
         match streaming {
             Some((files, streaming)) if streaming.merge.is_none() && streaming.keys.is_empty() => {
                 stream(&files, &streaming, take)
             }
             Some((files, streaming)) => match guarded(|| combine(&files, &streaming)) {
-                Some(Ok(found)) => hand(&found, take),
-                // An answer that cannot be merged may be computed in one piece; if that fails, its error is reported.
-                _ => hand(&whole(frame)?, take),
+                Some(Ok(found)) => pass_on(&found, take),
+                // An answer that cannot be merged may be computed at once; if that fails, its error is reported.
+                _ => pass_on(&whole(frame)?, take),
             },
-            None => hand(&whole(frame)?, take),
+            None => pass_on(&whole(frame)?, take),
         }
     }
 }
@@ -178,25 +178,25 @@ fn unsupported() -> PolarsError {
     PolarsError::ComputeError("polars does not support it".into())
 }
 
-/// Passes `found` on, piece by piece.
-fn hand(found: &DataFrame, take: Take) -> Result<(), AnswerError> {
+/// Passes `found` on, batch by batch.
+fn pass_on(found: &DataFrame, take: BatchHandler) -> Result<(), AnswerError> {
     let mut start = 0;
     loop {
-        take(&found.slice(start as i64, PIECE))?;
-        start += PIECE;
+        take(&found.slice(start as i64, BATCH_ROWS))?;
+        start += BATCH_ROWS;
         if start >= found.height() {
             return Ok(());
         }
     }
 }
 
-/// Number of pieces in progress. Chosen: several for each thread, so that no thread waits long for another.
+/// Number of batches in progress. Chosen: several for each thread, so that no thread waits long for another.
 fn at_once() -> usize {
     4 * rayon::current_num_threads()
 }
 
 /// The results of `files`, in their order.
-fn ask(files: &[Files], streaming: &StreamPlan) -> PolarsResult<Vec<DataFrame>> {
+fn partial_answers(files: &[Files], streaming: &StreamPlan) -> PolarsResult<Vec<DataFrame>> {
     let answer = |files: &Files| match &streaming.groups {
         Some(groups) => files.groups(groups),
         None => {
@@ -209,18 +209,18 @@ fn ask(files: &[Files], streaming: &StreamPlan) -> PolarsResult<Vec<DataFrame>> 
 }
 
 /// Passes rows on as they are read.
-fn stream(files: &Files, streaming: &StreamPlan, take: Take) -> Result<(), AnswerError> {
+fn stream(files: &Files, streaming: &StreamPlan, take: BatchHandler) -> Result<(), AnswerError> {
     let mut skip = streaming.offset;
     let mut left = streaming.limit;
     let mut first = true;
     for wave in files.streaming().chunks(at_once()) {
-        for mut found in ask(wave, streaming)? {
+        for mut found in partial_answers(wave, streaming)? {
             let skipped = skip.min(found.height());
             skip -= skipped;
             found = found.slice(skipped as i64, left.unwrap_or(usize::MAX));
             left = left.map(|left| left - found.height());
             if std::mem::take(&mut first) || found.height() > 0 {
-                hand(&found, take)?;
+                pass_on(&found, take)?;
             }
         }
         if left == Some(0) {
@@ -235,11 +235,11 @@ fn combine(files: &Files, streaming: &StreamPlan) -> PolarsResult<DataFrame> {
     let most = streaming.limit.map(|limit| limit.saturating_add(streaming.offset));
     let mut parts = DataFrame::default();
     for wave in files.streaming().chunks(at_once()) {
-        for part in ask(wave, streaming)? {
+        for part in partial_answers(wave, streaming)? {
             let part = if streaming.merge.is_some() { part } else { ordered(part, &streaming.keys, 0, most)? };
             append(&mut parts, part)?;
         }
-        if parts.height() > MOST_PARTIAL {
+        if parts.height() > MAX_PARTIAL_ROWS {
             parts = merged(parts, streaming, most)?;
         }
     }
@@ -293,8 +293,8 @@ fn cells(column: &Column) -> Vec<Cell> {
 }
 
 /// A JSON object for each row.
-fn json_lines(piece: &DataFrame) -> String {
-    let columns: Vec<(String, Series)> = piece
+fn json_lines(batch: &DataFrame) -> String {
+    let columns: Vec<(String, Series)> = batch
         .columns()
         .iter()
         .map(|column| {
@@ -304,7 +304,7 @@ fn json_lines(piece: &DataFrame) -> String {
         .collect();
     let mut cells: Vec<_> = columns.iter().map(|(name, series)| (name, series.iter())).collect();
     let mut text = String::new();
-    for _ in 0..piece.height() {
+    for _ in 0..batch.height() {
         let row: Vec<String> = cells
             .iter_mut()
             .map(|(name, cells)| format!("{name}:{}", cells.next().map_or(serde_json::Value::Null, |cell| json(&cell))))
@@ -335,17 +335,17 @@ fn json_number(number: f64) -> serde_json::Value {
 }
 
 /// Checks that no column contains lists, which the format does not support.
-fn without_lists(piece: &DataFrame, format: &str) -> PolarsResult<()> {
-    let Some(list) = piece.columns().iter().find(|column| column.dtype().is_nested()) else { return Ok(()) };
+fn without_lists(batch: &DataFrame, format: &str) -> PolarsResult<()> {
+    let Some(list) = batch.columns().iter().find(|column| column.dtype().is_nested()) else { return Ok(()) };
     let (name, format) = (list.name(), format);
     Err(PolarsError::ComputeError(
         format!("column `{name}` holds lists, which {format} does not: use --format jsonl").into(),
     ))
 }
 
-/// The Parquet schema of a piece, with units.
-fn arrow_schema(piece: &DataFrame, units: &[String]) -> SchemaRef {
-    let columns = piece.columns().iter().zip(units.iter().map(String::as_str).chain(std::iter::repeat("")));
+/// The Parquet schema of a batch, with units.
+fn arrow_schema(batch: &DataFrame, units: &[String]) -> SchemaRef {
+    let columns = batch.columns().iter().zip(units.iter().map(String::as_str).chain(std::iter::repeat("")));
     let fields = columns.map(|(column, unit)| {
         let kind = match column.dtype() {
             kind if kind.is_float() => ArrowType::Float64,
@@ -359,10 +359,10 @@ fn arrow_schema(piece: &DataFrame, units: &[String]) -> SchemaRef {
     Arc::new(ArrowSchema::new(fields.collect::<Vec<_>>()))
 }
 
-/// A piece as a record batch for Parquet.
-fn batch(piece: &DataFrame, schema: &SchemaRef) -> Result<RecordBatch, AnswerError> {
+/// A batch as a record batch for Parquet.
+fn record_batch(batch: &DataFrame, schema: &SchemaRef) -> Result<RecordBatch, AnswerError> {
     let mut arrays: Vec<ArrayRef> = Vec::new();
-    for (column, field) in piece.columns().iter().zip(schema.fields()) {
+    for (column, field) in batch.columns().iter().zip(schema.fields()) {
         let series = column.as_materialized_series();
         arrays.push(match field.data_type() {
             ArrowType::Float64 => Arc::new(series.cast(&DataType::Float64)?.f64()?.iter().collect::<Float64Array>()),

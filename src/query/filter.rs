@@ -6,10 +6,9 @@ use arrow_array::{Array, RecordBatch};
 use arrow_schema::DataType as ArrowType;
 use parquet::file::metadata::RowGroupMetaData;
 use parquet::file::statistics::Statistics;
-use polars::lazy::dsl::Expr as PolarsExpr;
-use polars::lazy::dsl::Operator;
+use polars::lazy::dsl::{Expr, Operator};
 use polars::prelude::{AnyValue, DataType, LiteralValue, Schema};
-use sqlparser::ast::{BinaryOperator, Expr, UnaryOperator, Value, ValueWithSpan};
+use polars::sql::sql_expr;
 
 use crate::dataset::label;
 
@@ -18,94 +17,61 @@ use crate::dataset::label;
 pub struct Condition {
     /// The column.
     pub column: String,
-    test: Test,
+    comparison: Operator,
+    constant: Constant,
 }
 
 #[derive(Debug, Clone, PartialEq)]
-enum Test {
-    Number(Comparison, f64),
-    Word(Comparison, String),
-    /// Whether a word matches a pattern of `LIKE`, or of `NOT LIKE`.
-    Like(String, bool),
-}
-
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Comparison {
-    Less,
-    AtMost,
-    More,
-    AtLeast,
-    Equal,
-    Unequal,
-}
-
-impl Comparison {
-    fn mirrored(self) -> Comparison {
-        match self {
-            Comparison::Less => Comparison::More,
-            Comparison::AtMost => Comparison::AtLeast,
-            Comparison::More => Comparison::Less,
-            Comparison::AtLeast => Comparison::AtMost,
-            same => same,
-        }
-    }
-
-    /// Whether the comparison with `bound` may hold for some value between `least` and `most`.
-    fn allows<T: PartialOrd + ?Sized>(self, least: &T, most: &T, bound: &T) -> bool {
-        match self {
-            Comparison::Less => least < bound,
-            Comparison::AtMost => least <= bound,
-            Comparison::More => most > bound,
-            Comparison::AtLeast => most >= bound,
-            Comparison::Equal => least <= bound && bound <= most,
-            Comparison::Unequal => true,
-        }
-    }
-}
-
-/// Conditions that hold for every row kept by `predicate`: its comparisons joined by AND.
-pub fn of_predicate(predicate: &PolarsExpr) -> Vec<Condition> {
-    let PolarsExpr::BinaryExpr { left, op, right } = predicate else { return Vec::new() };
-    let comparison = match op {
-        Operator::And | Operator::LogicalAnd => {
-            let mut both = of_predicate(left);
-            both.extend(of_predicate(right));
-            return both;
-        }
-        Operator::Lt => Comparison::Less,
-        Operator::LtEq => Comparison::AtMost,
-        Operator::Gt => Comparison::More,
-        Operator::GtEq => Comparison::AtLeast,
-        Operator::Eq => Comparison::Equal,
-        _ => return Vec::new(),
-    };
-    let (column, comparison, constant) = match (left.as_ref(), right.as_ref()) {
-        (PolarsExpr::Column(name), constant) => (name, comparison, constant),
-        (constant, PolarsExpr::Column(name)) => (name, comparison.mirrored(), constant),
-        _ => return Vec::new(),
-    };
-    let test = constant_of(constant).map(|constant| constant.compared(comparison));
-    test.into_iter().map(|test| Condition { column: column.to_string(), test }).collect()
-}
-
 enum Constant {
     Number(f64),
     Word(String),
 }
 
-impl Constant {
-    fn compared(self, comparison: Comparison) -> Test {
-        match self {
-            Constant::Number(number) => Test::Number(comparison, number),
-            Constant::Word(word) => Test::Word(comparison, word),
+/// Conditions that hold for every row kept by `predicate`: its comparisons joined by AND; and whether these are the whole predicate.
+pub fn of_predicate(predicate: &Expr) -> (Vec<Condition>, bool) {
+    let Expr::BinaryExpr { left, op, right } = predicate else { return (Vec::new(), false) };
+    if matches!(op, Operator::And | Operator::LogicalAnd) {
+        let ((mut both, is_left_whole), (more, is_right_whole)) = (of_predicate(left), of_predicate(right));
+        both.extend(more);
+        return (both, is_left_whole && is_right_whole);
+    }
+    let condition = match (left.as_ref(), right.as_ref()) {
+        (Expr::Column(column), constant) => Condition::new(column, *op, constant),
+        (constant, Expr::Column(column)) => Condition::new(column, mirrored(*op), constant),
+        _ => None,
+    };
+    let is_whole = condition.is_some();
+    (condition.into_iter().collect(), is_whole)
+}
+
+/// The conditions that are equivalent to a `WHERE` on a table with these columns; `None` if it contains more.
+pub fn of_where(condition: Option<&sqlparser::ast::Expr>, schema: &Schema) -> Option<Vec<Condition>> {
+    let Some(condition) = condition else { return Some(Vec::new()) };
+    let (conditions, is_whole) = of_predicate(&sql_expr(condition.to_string()).ok()?);
+    let fits = |condition: &Condition| match (&condition.constant, schema.get(&condition.column)) {
+        (Constant::Number(_), Some(kind)) => *kind == DataType::Float64,
+        (Constant::Word(_), Some(kind)) => {
+            matches!(condition.comparison, Operator::Eq | Operator::NotEq) && kind.is_categorical()
         }
+        (_, None) => false,
+    };
+    (is_whole && conditions.iter().all(fits)).then_some(conditions)
+}
+
+fn mirrored(comparison: Operator) -> Operator {
+    match comparison {
+        Operator::Lt => Operator::Gt,
+        Operator::LtEq => Operator::GtEq,
+        Operator::Gt => Operator::Lt,
+        Operator::GtEq => Operator::LtEq,
+        same => same,
     }
 }
 
-fn constant_of(expression: &PolarsExpr) -> Option<Constant> {
+fn constant_of(expression: &Expr) -> Option<Constant> {
     match expression {
-        PolarsExpr::Cast { expr, .. } => constant_of(expr),
-        PolarsExpr::Literal(literal @ (LiteralValue::Scalar(_) | LiteralValue::Dyn(_))) => {
+        Expr::Cast { expr, .. } => constant_of(expr),
+        Expr::Literal(literal @ (LiteralValue::Scalar(_) | LiteralValue::Dyn(_))) => {
             let value: AnyValue = literal.to_any_value()?;
             match value.get_str() {
                 Some(word) => Some(Constant::Word(word.to_owned())),
@@ -116,101 +82,39 @@ fn constant_of(expression: &PolarsExpr) -> Option<Constant> {
     }
 }
 
-/// The conditions that are equivalent to a `WHERE` on a table with these columns; `None` if it contains more.
-pub fn of_where(condition: Option<&Expr>, schema: &Schema) -> Option<Vec<Condition>> {
-    let mut conditions = Vec::new();
-    if let Some(condition) = condition {
-        collect(condition, &mut conditions)?;
-    }
-    let fits = |condition: &Condition| {
-        let kind = schema.get(&condition.column);
-        match (&condition.test, kind) {
-            (Test::Number(..), Some(DataType::Float64)) => true,
-            (Test::Word(Comparison::Equal | Comparison::Unequal, _) | Test::Like(..), Some(kind)) => {
-                kind.is_categorical()
-            }
-            _ => false,
-        }
-    };
-    conditions.iter().all(fits).then_some(conditions)
-}
-
-fn collect(condition: &Expr, conditions: &mut Vec<Condition>) -> Option<()> {
-    let mut add = |column: &Expr, comparison: Comparison, constant: &Expr| {
-        let test = literal(constant)?.compared(comparison);
-        conditions.push(Condition { column: column_of(column)?, test });
-        Some(())
-    };
-    match condition {
-        Expr::Nested(inner) => collect(inner, conditions),
-        Expr::BinaryOp { left, op: BinaryOperator::And, right } => {
-            collect(left, conditions)?;
-            collect(right, conditions)
-        }
-        Expr::BinaryOp { left, op, right } => {
-            let comparison = match op {
-                BinaryOperator::Lt => Comparison::Less,
-                BinaryOperator::LtEq => Comparison::AtMost,
-                BinaryOperator::Gt => Comparison::More,
-                BinaryOperator::GtEq => Comparison::AtLeast,
-                BinaryOperator::Eq => Comparison::Equal,
-                BinaryOperator::NotEq => Comparison::Unequal,
-                _ => return None,
-            };
-            match column_of(left) {
-                Some(_) => add(left, comparison, right),
-                None => add(right, comparison.mirrored(), left),
-            }
-        }
-        Expr::Between { expr, negated: false, low, high } => {
-            add(expr, Comparison::AtLeast, low)?;
-            add(expr, Comparison::AtMost, high)
-        }
-        Expr::Like { negated, any: false, expr, pattern, escape_char: None } => {
-            let Expr::Cast { expr, .. } = expr.as_ref() else { return None };
-            let Constant::Word(pattern) = literal(pattern)? else { return None };
-            let test = Test::Like(pattern.clone(), *negated);
-            conditions.push(Condition { column: column_of(expr)?, test });
-            (!pattern.contains('\\')).then_some(())
-        }
-        _ => None,
-    }
-}
-
-fn column_of(expression: &Expr) -> Option<String> {
-    match expression {
-        Expr::Identifier(name) => Some(name.value.clone()),
-        Expr::Nested(inner) => column_of(inner),
-        _ => None,
-    }
-}
-
-fn literal(expression: &Expr) -> Option<Constant> {
-    match expression {
-        Expr::Nested(inner) => literal(inner),
-        Expr::UnaryOp { op: UnaryOperator::Minus, expr } => match literal(expr)? {
-            Constant::Number(number) => Some(Constant::Number(-number)),
-            Constant::Word(_) => None,
-        },
-        Expr::Value(ValueWithSpan { value: Value::Number(digits, _), .. }) => digits.parse().ok().map(Constant::Number),
-        Expr::Value(ValueWithSpan { value: Value::SingleQuotedString(word), .. }) => Some(Constant::Word(word.clone())),
-        _ => None,
+/// Whether a comparison with `bound` may hold for some value between `least` and `most`.
+fn may_hold<T: PartialOrd + ?Sized>(comparison: Operator, (least, most): (&T, &T), bound: &T) -> bool {
+    match comparison {
+        Operator::Lt => least < bound,
+        Operator::LtEq => least <= bound,
+        Operator::Gt => most > bound,
+        Operator::GtEq => most >= bound,
+        Operator::Eq => least <= bound && bound <= most,
+        _ => true,
     }
 }
 
 impl Condition {
+    fn new(column: &str, comparison: Operator, constant: &Expr) -> Option<Condition> {
+        use Operator::{Eq, Gt, GtEq, Lt, LtEq, NotEq};
+        let constant = constant_of(constant).filter(|_| matches!(comparison, Lt | LtEq | Gt | GtEq | Eq | NotEq))?;
+        Some(Condition { column: column.to_owned(), comparison, constant })
+    }
+
     /// Whether a row group may contain a matching row, according to its statistics.
     pub fn allows(&self, group: &RowGroupMetaData) -> bool {
         let chunk = group.columns().iter().find(|chunk| chunk.column_path().string() == self.column);
         let Some(statistics) = chunk.and_then(|chunk| chunk.statistics()) else { return true };
-        match (&self.test, statistics) {
-            (Test::Number(comparison, bound), Statistics::Double(range)) => {
+        match (&self.constant, statistics) {
+            (Constant::Number(bound), Statistics::Double(range)) => {
                 let range = range.min_opt().zip(range.max_opt());
-                range.is_none_or(|(least, most)| comparison.allows(least, most, bound))
+                range.is_none_or(|range| may_hold(self.comparison, range, bound))
             }
-            (Test::Word(comparison, bound), Statistics::ByteArray(range)) => {
+            (Constant::Word(bound), Statistics::ByteArray(range)) => {
                 let range = range.min_opt().zip(range.max_opt());
-                range.is_none_or(|(least, most)| comparison.allows(least.data(), most.data(), bound.as_bytes()))
+                range.is_none_or(|(least, most)| {
+                    may_hold(self.comparison, (least.data(), most.data()), bound.as_bytes())
+                })
             }
             _ => true,
         }
@@ -219,33 +123,27 @@ impl Condition {
     /// Removes the rows of a batch that do not match from `kept`. A column of another type removes none.
     pub fn mark(&self, batch: &RecordBatch, kept: &mut [bool]) {
         let Some(array) = batch.column_by_name(&self.column) else { return };
-        match (&self.test, array.data_type()) {
-            (Test::Number(comparison, bound), ArrowType::Float64) => {
+        match (&self.constant, array.data_type()) {
+            (&Constant::Number(bound), ArrowType::Float64) => {
                 let numbers = array.as_primitive::<Float64Type>().values();
-                let bound = *bound;
                 // Without branches, and as in polars: NaN is the greatest number.
-                match comparison {
-                    Comparison::Less => each(kept, numbers, |number| number < bound),
-                    Comparison::AtMost => each(kept, numbers, |number| number <= bound),
-                    Comparison::More => each(kept, numbers, |number| number > bound || number.is_nan()),
-                    Comparison::AtLeast => each(kept, numbers, |number| number >= bound || number.is_nan()),
-                    Comparison::Equal => each(kept, numbers, |number| number == bound),
-                    Comparison::Unequal => each(kept, numbers, |number| number != bound),
+                match self.comparison {
+                    Operator::Lt => each(kept, numbers, |number| number < bound),
+                    Operator::LtEq => each(kept, numbers, |number| number <= bound),
+                    Operator::Gt => each(kept, numbers, |number| number > bound || number.is_nan()),
+                    Operator::GtEq => each(kept, numbers, |number| number >= bound || number.is_nan()),
+                    Operator::Eq => each(kept, numbers, |number| number == bound),
+                    _ => each(kept, numbers, |number| number != bound),
                 }
             }
-            (test, kind) if *kind == label() => {
+            (Constant::Word(bound), kind)
+                if *kind == label() && matches!(self.comparison, Operator::Eq | Operator::NotEq) =>
+            {
                 let codes = array.as_dictionary::<Int32Type>();
-                let words = codes.values().as_string::<i32>();
-                let obeys: Vec<bool> = match test {
-                    Test::Word(Comparison::Equal, bound) => words.iter().map(|word| word == Some(bound)).collect(),
-                    Test::Word(Comparison::Unequal, bound) => words.iter().map(|word| word != Some(bound)).collect(),
-                    Test::Like(pattern, negated) => {
-                        words.iter().map(|word| word.is_some_and(|word| like(word, pattern) != *negated)).collect()
-                    }
-                    _ => return,
-                };
-                let obeys = |key: &i32| usize::try_from(*key).ok().and_then(|key| obeys.get(key)).is_some_and(|x| *x);
-                each(kept, codes.keys().values(), |key| obeys(&key));
+                let is_equal = |word: Option<&str>| (word == Some(bound)) == (self.comparison == Operator::Eq);
+                let obeys: Vec<bool> = codes.values().as_string::<i32>().iter().map(is_equal).collect();
+                let obeys = |key: i32| usize::try_from(key).ok().and_then(|key| obeys.get(key)).is_some_and(|x| *x);
+                each(kept, codes.keys().values(), obeys);
             }
             _ => return,
         }
@@ -257,32 +155,6 @@ impl Condition {
 
 fn each<T: Copy>(kept: &mut [bool], values: &[T], obeys: impl Fn(T) -> bool) {
     kept.iter_mut().zip(values).for_each(|(kept, &value)| *kept &= obeys(value));
-}
-
-/// Whether a word matches a pattern of `LIKE`: % is any text, _ any character.
-fn like(word: &str, pattern: &str) -> bool {
-    let (word, pattern): (Vec<char>, Vec<char>) = (word.chars().collect(), pattern.chars().collect());
-    let (mut letter, mut sign) = (0, 0);
-    // The last %, and the end of the text that it matches: a % matches as little as possible.
-    let mut last: Option<(usize, usize)> = None;
-    while letter < word.len() {
-        match pattern.get(sign) {
-            Some('%') => {
-                last = Some((sign, letter));
-                sign += 1;
-            }
-            Some(&other) if other == '_' || other == word[letter] => {
-                letter += 1;
-                sign += 1;
-            }
-            _ => {
-                let Some((place, from)) = last else { return false };
-                last = Some((place, from + 1));
-                (sign, letter) = (place + 1, from + 1);
-            }
-        }
-    }
-    pattern[sign..].iter().all(|sign| *sign == '%')
 }
 
 /// The rows of a batch that match all conditions.
@@ -304,7 +176,7 @@ pub struct Top {
     /// The number of rows.
     pub most: usize,
     /// Whether rows that are equal in this column stay in the order of the table.
-    pub alone: bool,
+    pub is_only_key: bool,
 }
 
 impl Top {
@@ -326,7 +198,7 @@ impl Top {
         }
         let last = *keys.select_nth_unstable(last).1;
         let before = keys.iter().filter(|key| **key < last).count();
-        let mut ties = if self.alone { self.most - before } else { usize::MAX };
+        let mut ties = if self.is_only_key { self.most - before } else { usize::MAX };
         for (row, kept) in kept.iter_mut().enumerate().filter(|(_, kept)| **kept) {
             let key = key(row);
             *kept = key < last || key == last && ties > 0;
@@ -347,34 +219,13 @@ fn in_order(number: f64) -> i64 {
 
 #[cfg(test)]
 mod tests {
-    //! Rows that match a condition.
+    //! First rows.
 
     use std::sync::Arc;
 
     use arrow_array::{ArrayRef, Float64Array, RecordBatch};
 
-    use super::{Top, like};
-
-    #[test]
-    fn words_are_like_patterns() {
-        for (word, pattern, expected) in [
-            ("infeasible", "inf%", true),
-            ("ok", "inf%", false),
-            ("ok", "o_", true),
-            ("ok", "_", false),
-            ("a%b", "%b", true),
-            ("", "%", true),
-            ("µm", "_m", true),
-            ("aab", "%ab", true),
-            ("abab", "a%b", true),
-            ("abc", "a%b", false),
-            ("", "", true),
-            ("a", "", false),
-            (&"a".repeat(200), "%a%a%a%a%a%a%a%b", false),
-        ] {
-            assert_eq!(like(word, pattern), expected, "{word} {pattern}");
-        }
-    }
+    use super::Top;
 
     #[test]
     fn the_first_rows_are_kept() {
@@ -383,7 +234,7 @@ mod tests {
         let batch = RecordBatch::try_from_iter([("x", array)]).expect("is a table");
         let first = |descending, nulls_last, most, alone| {
             let mut kept = vec![true; 6];
-            Top { column: "x".to_owned(), descending, nulls_last, most, alone }.mark(&batch, &mut kept);
+            Top { column: "x".to_owned(), descending, nulls_last, most, is_only_key: alone }.mark(&batch, &mut kept);
             (0..6).filter(|&row| kept[row]).collect::<Vec<_>>()
         };
         assert_eq!(first(false, true, 1, true), [2]);

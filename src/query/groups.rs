@@ -16,7 +16,7 @@ use super::filter::{Condition, kept};
 
 /// An aggregate of a group.
 #[derive(Debug, Clone, PartialEq)]
-pub enum Measure {
+pub enum Aggregate {
     /// Its number of rows.
     Rows,
     /// The number of values of a column.
@@ -29,12 +29,14 @@ pub enum Measure {
     Greatest(String),
 }
 
-impl Measure {
+impl Aggregate {
     /// The column.
     pub fn column(&self) -> Option<&str> {
         match self {
-            Measure::Rows => None,
-            Measure::Count(name) | Measure::Sum(name) | Measure::Least(name) | Measure::Greatest(name) => Some(name),
+            Aggregate::Rows => None,
+            Aggregate::Count(name) | Aggregate::Sum(name) | Aggregate::Least(name) | Aggregate::Greatest(name) => {
+                Some(name)
+            }
         }
     }
 }
@@ -63,28 +65,28 @@ impl Kind {
 
 /// A query for groups.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Groups {
+pub struct GroupQuery {
     /// The condition of rows.
     pub conditions: Vec<Condition>,
     /// The key columns of the groups.
     pub keys: Vec<(String, Kind)>,
     /// The aggregates of each group.
-    pub measures: Vec<Measure>,
+    pub aggregates: Vec<Aggregate>,
 }
 
-impl Groups {
+impl GroupQuery {
     /// Whether the types of all aggregated columns are supported.
     pub fn fits(&self, schema: &Schema) -> bool {
-        self.measures.iter().all(|measure| match measure {
-            Measure::Rows => true,
-            Measure::Count(name) => schema.get(name).is_some(),
+        self.aggregates.iter().all(|aggregate| match aggregate {
+            Aggregate::Rows => true,
+            Aggregate::Count(name) => schema.get(name).is_some(),
             other => other.column().is_some_and(|name| Kind::of(name, schema) == Some(Kind::Number)),
         })
     }
 
     /// The columns to read.
     pub fn columns(&self) -> Vec<String> {
-        let measured = self.measures.iter().filter_map(|measure| measure.column().map(str::to_owned));
+        let measured = self.aggregates.iter().filter_map(|aggregate| aggregate.column().map(str::to_owned));
         let mut names: Vec<String> = self.keys.iter().map(|(name, _)| name.clone()).chain(measured).collect();
         names.extend(self.conditions.iter().map(|condition| condition.column.clone()));
         names.sort();
@@ -120,45 +122,45 @@ fn codes(array: &dyn Array, rows: &[u32], words: &mut IndexSet<String>) -> Vec<u
 }
 
 /// Groups during aggregation.
-pub struct Counting<'a> {
-    groups: &'a Groups,
+pub struct GroupAggregation<'a> {
+    groups: &'a GroupQuery,
     /// The words of each key.
     words: Vec<IndexSet<String>>,
     /// The groups of the first keys, by those of one key less and the code of the value of the next.
     pairs: Vec<IndexSet<(u32, u64)>>,
     /// The number of groups.
     count: usize,
-    tallies: Vec<Vec<Tally>>,
+    states: Vec<Vec<AggregateState>>,
 }
 
 #[derive(Debug, Clone, Copy)]
-struct Tally {
+struct AggregateState {
     count: i64,
     number: f64,
 }
 
-impl<'a> Counting<'a> {
+impl<'a> GroupAggregation<'a> {
     /// An aggregation without rows.
-    pub fn new(groups: &'a Groups) -> Counting<'a> {
+    pub fn new(groups: &'a GroupQuery) -> GroupAggregation<'a> {
         let keys = groups.keys.len();
-        let mut counting = Counting {
+        let mut aggregation = GroupAggregation {
             groups,
             words: vec![IndexSet::new(); keys],
             pairs: vec![IndexSet::new(); keys],
             count: 0,
-            tallies: vec![Vec::new(); groups.measures.len()],
+            states: vec![Vec::new(); groups.aggregates.len()],
         };
         if keys == 0 {
-            counting.count = 1;
-            counting.grow();
+            aggregation.count = 1;
+            aggregation.grow();
         }
-        counting
+        aggregation
     }
 
     fn grow(&mut self) {
-        for (measure, tallies) in self.groups.measures.iter().zip(&mut self.tallies) {
-            let number = if matches!(measure, Measure::Sum(_)) { 0.0 } else { f64::NAN };
-            tallies.resize(self.count, Tally { count: 0, number });
+        for (aggregate, states) in self.groups.aggregates.iter().zip(&mut self.states) {
+            let number = if matches!(aggregate, Aggregate::Sum(_)) { 0.0 } else { f64::NAN };
+            states.resize(self.count, AggregateState { count: 0, number });
         }
     }
 
@@ -168,26 +170,26 @@ impl<'a> Counting<'a> {
         let rows: Vec<u32> = (0..).zip(&kept).filter(|(_, kept)| **kept).map(|(row, _)| row).collect();
         let ids = self.ids(batch, &rows);
         self.grow();
-        for (measure, tallies) in self.groups.measures.iter().zip(&mut self.tallies) {
-            let array = measure.column().and_then(|name| batch.column_by_name(name));
+        for (aggregate, states) in self.groups.aggregates.iter().zip(&mut self.states) {
+            let array = aggregate.column().and_then(|name| batch.column_by_name(name));
             let Some(array) = array else {
-                ids.iter().for_each(|&id| tallies[id as usize].count += 1);
+                ids.iter().for_each(|&id| states[id as usize].count += 1);
                 continue;
             };
             let cells = ids.iter().zip(&rows).filter(|(_, row)| array.is_valid(**row as usize));
-            if let Measure::Count(_) = measure {
-                cells.for_each(|(&id, _)| tallies[id as usize].count += 1);
+            if let Aggregate::Count(_) = aggregate {
+                cells.for_each(|(&id, _)| states[id as usize].count += 1);
                 continue;
             }
             let numbers = array.as_primitive::<Float64Type>().values();
             let cells = cells.map(|(&id, &row)| (id as usize, numbers[row as usize]));
-            match measure {
-                Measure::Sum(_) => cells.for_each(|(id, number)| {
-                    tallies[id].count += 1;
-                    tallies[id].number += number;
+            match aggregate {
+                Aggregate::Sum(_) => cells.for_each(|(id, number)| {
+                    states[id].count += 1;
+                    states[id].number += number;
                 }),
-                Measure::Least(_) => tally(cells, tallies, |number, least| number < least),
-                _ => tally(cells, tallies, |number, greatest| number > greatest),
+                Aggregate::Least(_) => tally(cells, states, |number, least| number < least),
+                _ => tally(cells, states, |number, greatest| number > greatest),
             }
         }
     }
@@ -219,7 +221,7 @@ impl<'a> Counting<'a> {
         ids
     }
 
-    /// The groups as a table: columns `__g0`, `__g1`, ... of keys, and `__a0`, `__a1`, ... of measures.
+    /// The groups as a table: columns `__g0`, `__g1`, ... of keys, and `__a0`, `__a1`, ... of aggregates.
     pub fn frame(self) -> PolarsResult<DataFrame> {
         let height = self.count;
         let mut columns: Vec<Column> = Vec::new();
@@ -239,18 +241,18 @@ impl<'a> Counting<'a> {
                 }
             });
         }
-        for (index, (measure, tallies)) in self.groups.measures.iter().zip(&self.tallies).enumerate() {
+        for (index, (aggregate, states)) in self.groups.aggregates.iter().zip(&self.states).enumerate() {
             let name = format!("__a{index}").into();
-            columns.push(match measure {
-                Measure::Rows | Measure::Count(_) => {
-                    Int64Chunked::from_iter_values(name, tallies.iter().map(|tally| tally.count)).into_column()
+            columns.push(match aggregate {
+                Aggregate::Rows | Aggregate::Count(_) => {
+                    Int64Chunked::from_iter_values(name, states.iter().map(|tally| tally.count)).into_column()
                 }
-                Measure::Sum(_) => {
-                    Float64Chunked::from_iter_values(name, tallies.iter().map(|tally| tally.number)).into_column()
+                Aggregate::Sum(_) => {
+                    Float64Chunked::from_iter_values(name, states.iter().map(|tally| tally.number)).into_column()
                 }
                 _ => {
-                    let number = |tally: &Tally| (tally.count > 0).then_some(tally.number);
-                    Float64Chunked::from_iter_options(name, tallies.iter().map(number)).into_column()
+                    let number = |tally: &AggregateState| (tally.count > 0).then_some(tally.number);
+                    Float64Chunked::from_iter_options(name, states.iter().map(number)).into_column()
                 }
             });
         }
@@ -273,9 +275,9 @@ impl<'a> Counting<'a> {
 }
 
 /// Keeps the number that is `better` in each group; NaN is better than no number.
-fn tally(cells: impl Iterator<Item = (usize, f64)>, tallies: &mut [Tally], better: impl Fn(f64, f64) -> bool) {
+fn tally(cells: impl Iterator<Item = (usize, f64)>, states: &mut [AggregateState], better: impl Fn(f64, f64) -> bool) {
     for (id, number) in cells {
-        let tally = &mut tallies[id];
+        let tally = &mut states[id];
         if tally.number.is_nan() || better(number, tally.number) {
             tally.number = number;
         }

@@ -1,13 +1,13 @@
 //! SQL queries on the tables of a dataset, or on a single file.
 //!
-//! `question` checks a query and translates it into the dialect of polars. `streaming` splits it into parts if possible, so that the table need
-//! not fit into memory. `scan` reads the needed columns and row groups, `filter` drops rows, `groups` aggregates them, and `answer` writes the
-//! result. Only the opened tables are read.
+//! `checked_query` checks a query and translates it into the dialect of polars. `streaming` splits it into parts if possible, so that the
+//! table need not fit into memory. `scan` reads the needed columns and row groups, `filter` drops rows, `groups` aggregates them, and
+//! `answer` writes the result. Only the opened tables are read.
 
 mod answer;
+mod checked_query;
 mod filter;
 mod groups;
-mod question;
 mod scan;
 mod source;
 mod streaming;
@@ -22,7 +22,7 @@ use crate::dataset::{DatasetError, guarded};
 use crate::names::{hint, nearest};
 
 pub use answer::{Answer, AnswerError, Format};
-use question::{CORRECT, Fault, Question};
+use checked_query::{CheckedQuery, GENERAL_HELP, InvalidQuery};
 pub use scan::is_unreadable;
 pub use source::Source;
 
@@ -91,11 +91,11 @@ impl Tables {
     /// # Errors
     ///
     /// If the query is not one SELECT from these tables.
-    pub fn ask(&self, sql: &str) -> Result<Answer, QueryError> {
-        let question = self.parse(sql)?;
+    pub fn query(&self, sql: &str) -> Result<Answer, QueryError> {
+        let checked = self.parse(sql)?;
         let planned = || -> PolarsResult<(LazyFrame, std::sync::Arc<Schema>)> {
             let tables = self.sources.iter().map(|source| (source.name.as_str(), source.frame.clone()));
-            let mut frame = plan(tables, &question.query.to_string())?;
+            let mut frame = plan(tables, &checked.query.to_string())?;
             let schema = frame.collect_schema()?;
             Ok((frame, schema))
         };
@@ -104,29 +104,29 @@ impl Tables {
             .map_err(|error| self.explain(sql, &error))?;
         let columns: Vec<String> = schema.iter_names().map(ToString::to_string).collect();
         let unit = |name: &String| {
-            let known = question.units.iter().find(|(column, _)| column == name);
+            let known = checked.units.iter().find(|(column, _)| column == name);
             known.map_or_else(String::new, |(_, unit)| unit.clone())
         };
         let units = columns.iter().map(unit).collect();
         let streaming =
-            streaming::streaming(&question.query, &self.sources).filter(|streaming| streaming.names == columns);
+            streaming::streaming(&checked.query, &self.sources).filter(|streaming| streaming.names == columns);
         let streaming = streaming.and_then(|streaming| Some((self.find(&streaming.table)?.files.clone()?, streaming)));
         Ok(Answer::new(frame, columns, units, streaming))
     }
 
-    fn parse(&self, sql: &str) -> Result<Question, QueryError> {
-        Question::parse(sql, &self.sources).map_err(|Fault { found, help }| self.refuse(found, &help))
+    fn parse(&self, sql: &str) -> Result<CheckedQuery, QueryError> {
+        CheckedQuery::parse(sql, &self.sources).map_err(|InvalidQuery { found, help }| self.refuse(found, &help))
     }
 
-    /// The fault of a query that failed during its computation. A query that also fails on the first rows alone, such as a sum of words, is at
-    /// fault; otherwise the result is `None`.
-    pub fn fault(&self, sql: &str) -> Option<QueryError> {
-        let question = self.parse(sql).ok()?;
+    /// The error of a query that failed during its computation, if the query is to blame: it also fails on the first rows alone, such as a sum
+    /// of words. Otherwise `None`.
+    pub fn diagnose(&self, sql: &str) -> Option<QueryError> {
+        let checked = self.parse(sql).ok()?;
         let mut first = Vec::new();
         for source in &self.sources {
             first.push((source.name.as_str(), source.frame.clone().limit(1).collect().ok()?.lazy()));
         }
-        let answered = guarded(|| plan(first, &question.query.to_string()).and_then(LazyFrame::collect));
+        let answered = guarded(|| plan(first, &checked.query.to_string()).and_then(LazyFrame::collect));
         Some(self.explain(sql, &answered?.err()?))
     }
 
@@ -148,7 +148,7 @@ impl Tables {
             };
             return self.refuse(format!("no column `{name}`"), &help);
         }
-        self.refuse(line.to_owned(), CORRECT)
+        self.refuse(line.to_owned(), GENERAL_HELP)
     }
 
     fn refuse(&self, found: String, help: &str) -> QueryError {

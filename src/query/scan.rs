@@ -26,7 +26,7 @@ use polars::prelude::{
 use rayon::prelude::*;
 
 use super::filter::{Condition, Top, kept, of_predicate};
-use super::groups::{Counting, Groups};
+use super::groups::{GroupAggregation, GroupQuery};
 use crate::dataset::{check_footer, check_pages, guarded, label};
 
 /// The rows of Parquet files with equal columns, one file after another.
@@ -64,18 +64,18 @@ impl Files {
     }
 
     /// The groups of all rows.
-    pub fn groups(&self, groups: &Groups) -> PolarsResult<DataFrame> {
-        let mut counting = Counting::new(groups);
+    pub fn groups(&self, groups: &GroupQuery) -> PolarsResult<DataFrame> {
+        let mut aggregation = GroupAggregation::new(groups);
         let names = groups.columns();
         for path in &self.paths {
             sound(path, || {
                 batches(path, (&names, &self.schema), &groups.conditions, None, &mut |batch| {
-                    counting.add(&batch);
+                    aggregation.add(&batch);
                     Ok(batch.num_rows())
                 })
             })?;
         }
-        counting.frame()
+        aggregation.frame()
     }
 
     /// The names of its columns of words.
@@ -205,7 +205,7 @@ fn sound<T>(path: &Path, read: impl FnOnce() -> Result<T, ParquetError>) -> Pola
     read.map_err(|error| unreadable(path, &error))
 }
 
-/// Whether a file is at fault, rather than the question.
+/// Whether a file is at fault, rather than the query.
 pub fn is_unreadable(error: &PolarsError) -> bool {
     error.to_string().contains(UNREADABLE)
 }
@@ -216,7 +216,7 @@ fn open(path: &Path) -> Result<(File, ArrowReaderMetadata), ParquetError> {
     check_footer(&file)?;
     let stored = ArrowReaderMetadata::load(&file, ArrowReaderOptions::new())?;
     let read = |field: &FieldRef| match field.data_type() {
-        ArrowType::Dictionary(..) if *field.data_type() != label() => {
+        ArrowType::LargeUtf8 | ArrowType::Utf8View | ArrowType::Dictionary(..) if *field.data_type() != label() => {
             Arc::new(field.as_ref().clone().with_data_type(ArrowType::Utf8))
         }
         _ => field.clone(),
@@ -291,7 +291,7 @@ impl Files {
         most: Option<usize>,
     ) -> Result<DataFrame, ParquetError> {
         let mut conditions = self.conditions.clone();
-        conditions.extend(predicate.map(of_predicate).unwrap_or_default());
+        conditions.extend(predicate.into_iter().flat_map(|predicate| of_predicate(predicate).0));
         let mut read: Vec<String> = names.iter().map(ToString::to_string).collect();
         read.extend(conditions.iter().map(|condition| condition.column.clone()));
         read.extend(self.top.iter().map(|top| top.column.clone()));
@@ -347,7 +347,7 @@ fn kind(kind: &ArrowType) -> Option<DataType> {
         ArrowType::UInt8 | ArrowType::UInt16 | ArrowType::UInt32 => DataType::UInt32,
         ArrowType::UInt64 => DataType::UInt64,
         ArrowType::Boolean => DataType::Boolean,
-        ArrowType::Utf8 | ArrowType::LargeUtf8 | ArrowType::Utf8View => DataType::String,
+        ArrowType::Utf8 => DataType::String,
         kind if *kind == label() => words_type(),
         _ => return None,
     })
@@ -377,8 +377,6 @@ fn series(name: &PlSmallStr, array: &dyn Array) -> Result<Series, ParquetError> 
             BooleanChunked::new(name, flags).into_series()
         }
         ArrowType::Utf8 => text(name, array.as_string::<i32>().iter()),
-        ArrowType::LargeUtf8 => text(name, array.as_string::<i64>().iter()),
-        ArrowType::Utf8View => text(name, array.as_string_view().iter()),
         kind if *kind == label() => {
             let codes = array.as_dictionary::<Int32Type>();
             let known = text(PlSmallStr::EMPTY, codes.values().as_string::<i32>().iter());

@@ -7,14 +7,16 @@ use std::ops::ControlFlow;
 
 use polars::prelude::Schema;
 use sqlparser::ast::{
-    BinaryOperator, DataType, Distinct, Expr, Function, FunctionArg, FunctionArgExpr, FunctionArguments, GroupByExpr,
-    Ident, LimitClause, OrderByKind, Query, Select, SelectItem, SetExpr, TableFactor, Value, ValueWithSpan,
+    BinaryOperator, DataType, Expr, Function, FunctionArg, FunctionArgExpr, FunctionArguments, GroupByExpr, Ident,
+    LimitClause, OrderByKind, Query, Select, SelectItem, SetExpr, TableFactor, Value, ValueWithSpan,
 };
+use sqlparser::dialect::GenericDialect;
+use sqlparser::parser::Parser;
 
 use super::Source;
+use super::checked_query::{cast, if_else_null, is_one_of, name};
 use super::filter::{Condition, Top, of_where};
-use super::groups::{Groups, Kind, Measure};
-use super::question::{cast, if_else_null, is_one_of, name};
+use super::groups::{Aggregate, GroupQuery, Kind};
 use super::walk::{Visit, walk};
 
 /// The plan of a query that is computed part by part.
@@ -24,7 +26,7 @@ pub struct StreamPlan {
     /// The query on each part.
     pub partial: String,
     /// The plan of counts, sums and extremes of columns.
-    pub groups: Option<Groups>,
+    pub groups: Option<GroupQuery>,
     /// The condition of all rows, if `WHERE` is a plain condition.
     pub conditions: Vec<Condition>,
     /// The order of rows by one column of numbers.
@@ -54,17 +56,17 @@ pub struct Key {
 pub const PARTS: &str = "__parts";
 
 /// Functions of the row alone.
-const SCALAR: &str = "abs acos asin atan atan2 cbrt ceil ceiling coalesce concat cos degrees ends_with exp floor greatest if ifnull least \
+const SCALAR_FUNCTIONS: &str = "abs acos asin atan atan2 cbrt ceil ceiling coalesce concat cos degrees ends_with exp floor greatest if ifnull least \
     left length ln log log10 log1p log2 lower mod nullif octet_length pi pow power radians replace right round sign sin sqrt starts_with \
     strpos tan upper";
 
 /// Functions of groups that can be put together.
-const AGGREGATE: &str = "avg count max mean min sum";
+const MERGED_FUNCTIONS: &str = "avg count max mean min sum";
 
 /// The part-by-part plan of `query`; `None` if it needs all rows at once.
 pub fn streaming(query: &Query, sources: &[Source]) -> Option<StreamPlan> {
     let SetExpr::Select(select) = query.body.as_ref() else { return None };
-    if !is_bare(query) || !is_simple(select) {
+    if !is_plain(query, select) {
         return None;
     }
     // One table, without a function that needs all its rows.
@@ -92,9 +94,9 @@ pub fn streaming(query: &Query, sources: &[Source]) -> Option<StreamPlan> {
     let schema = source.files.as_ref()?.schema();
     let conditions = of_where(select.selection.as_ref(), schema);
     let table = source.name.clone();
-    let question = TableQuestion { table, source, items, condition: select.selection, having: select.having, ordered };
+    let table_query = TableQuery { table, source, items, condition: select.selection, having: select.having, ordered };
     let mut streaming = StreamPlan {
-        table: question.table.clone(),
+        table: table_query.table.clone(),
         partial: String::new(),
         groups: None,
         conditions: conditions.clone().unwrap_or_default(),
@@ -107,14 +109,14 @@ pub fn streaming(query: &Query, sources: &[Source]) -> Option<StreamPlan> {
         names,
     };
     if groups.is_empty() && !aggregates {
-        if question.having.is_some() || !streaming.keys.is_empty() && limit.is_none() {
+        if table_query.having.is_some() || !streaming.keys.is_empty() && limit.is_none() {
             return None;
         }
         let most = limit.map(|limit| limit.saturating_add(offset));
-        streaming.partial = question.rows(most);
-        streaming.top = conditions.and_then(|_| question.top(&streaming.keys, most?, schema));
+        streaming.partial = table_query.rows(most);
+        streaming.top = conditions.and_then(|_| table_query.top(&streaming.keys, most?, schema));
     } else {
-        let (partial, merge, finish, measured) = question.groups(groups)?;
+        let (partial, merge, finish, measured) = table_query.groups(groups)?;
         streaming.groups = conditions.and_then(|conditions| counted(measured?, conditions, schema));
         (streaming.partial, streaming.merge, streaming.finish) = (partial, Some(merge), Some(finish));
     }
@@ -122,21 +124,22 @@ pub fn streaming(query: &Query, sources: &[Source]) -> Option<StreamPlan> {
 }
 
 /// The aggregation of columns, if it suffices for the groups.
-fn counted((keys, measures): GroupedColumns, conditions: Vec<Condition>, schema: &Schema) -> Option<Groups> {
+fn counted((keys, aggregates): GroupedColumns, conditions: Vec<Condition>, schema: &Schema) -> Option<GroupQuery> {
     let kinds = keys.into_iter().map(|key| Some((key.clone(), Kind::of(&key, schema)?)));
-    let groups = Groups { conditions, keys: kinds.collect::<Option<_>>()?, measures };
+    let groups = GroupQuery { conditions, keys: kinds.collect::<Option<_>>()?, aggregates };
     groups.fits(schema).then_some(groups)
 }
 
-/// Whether a query consists only of a body, ORDER BY, LIMIT and OFFSET.
-fn is_bare(query: &Query) -> bool {
-    query.with.is_none()
-        && query.fetch.is_none()
-        && query.locks.is_empty()
-        && query.for_clause.is_none()
-        && query.settings.is_none()
-        && query.format_clause.is_none()
-        && query.pipe_operators.is_empty()
+/// Whether a query consists only of items, tables, WHERE, GROUP BY, HAVING, ORDER BY, LIMIT and OFFSET.
+fn is_plain(query: &Query, select: &Select) -> bool {
+    let bare = Parser::new(&GenericDialect {}).try_with_sql("SELECT 1").and_then(|mut parser| parser.parse_query());
+    let Ok(Query { body, .. }) = bare.as_deref() else { return false };
+    let SetExpr::Select(bare_select) = body.as_ref() else { return false };
+    let Select { projection, from, selection, group_by, having, .. } = select.clone();
+    let select = Select { projection, from, selection, group_by, having, ..bare_select.as_ref().clone() };
+    let (order_by, limit_clause) = (query.order_by.clone(), query.limit_clause.clone());
+    let body = Box::new(SetExpr::Select(Box::new(select)));
+    bare.is_ok_and(|bare| *query == Query { body, order_by, limit_clause, ..*bare })
 }
 
 /// The only table of a SELECT, and its alias.
@@ -175,24 +178,6 @@ fn order_of(kind: Option<OrderByKind>, items: &[(String, Expr)]) -> Option<(Vec<
         ordered.push(item(&key.expr, items).unwrap_or(key.expr));
     }
     Some((ordered, directions))
-}
-
-/// Whether a SELECT consists only of items, one table, WHERE, GROUP BY and HAVING.
-fn is_simple(select: &Select) -> bool {
-    matches!(select.distinct, None | Some(Distinct::All))
-        && select.top.is_none()
-        && select.exclude.is_none()
-        && select.into.is_none()
-        && select.lateral_views.is_empty()
-        && select.prewhere.is_none()
-        && select.connect_by.is_empty()
-        && select.cluster_by.is_empty()
-        && select.distribute_by.is_empty()
-        && select.sort_by.is_empty()
-        && select.named_window.is_empty()
-        && select.qualify.is_none()
-        && select.value_table_mode.is_none()
-        && select.select_modifiers.is_none()
 }
 
 /// The names and expressions of the columns of an answer.
@@ -239,22 +224,15 @@ fn limits(query: &Query) -> Option<(Option<usize>, usize)> {
     match &query.limit_clause {
         None => Some((None, 0)),
         Some(LimitClause::LimitOffset { limit, offset, limit_by }) if limit_by.is_empty() => {
-            let limit = match limit {
-                Some(limit) => Some(number(limit)?),
-                None => None,
-            };
-            let offset = match offset {
-                Some(offset) => number(&offset.value)?,
-                None => 0,
-            };
-            Some((limit, offset))
+            let limit = limit.as_ref().map(|limit| number(limit).ok_or(())).transpose().ok()?;
+            Some((limit, offset.as_ref().map_or(Some(0), |offset| number(&offset.value))?))
         }
         Some(_) => None,
     }
 }
 
 /// A query on one table.
-struct TableQuestion<'a> {
+struct TableQuery<'a> {
     table: String,
     source: &'a Source,
     items: Vec<(String, Expr)>,
@@ -263,7 +241,7 @@ struct TableQuestion<'a> {
     ordered: Vec<Expr>,
 }
 
-impl TableQuestion<'_> {
+impl TableQuery<'_> {
     /// The rows of a part that may be among the first `most`, if the first of `keys` is a column of numbers.
     fn top(&self, keys: &[Key], most: usize, schema: &Schema) -> Option<Top> {
         let (Expr::Identifier(column), Key { descending, nulls_last }) = (self.ordered.first()?, *keys.first()?) else {
@@ -271,7 +249,7 @@ impl TableQuestion<'_> {
         };
         let column = column.value.clone();
         let is_number = Kind::of(&column, schema) == Some(Kind::Number);
-        is_number.then_some(Top { column, descending, nulls_last, most, alone: keys.len() == 1 })
+        is_number.then_some(Top { column, descending, nulls_last, most, is_only_key: keys.len() == 1 })
     }
 
     /// The query for at most `most` rows of a part.
@@ -297,7 +275,7 @@ impl TableQuestion<'_> {
             let is_column = matches!(&group, Expr::Identifier(name) if self.source.columns.contains(&name.value));
             keys.push(if is_column { group } else { item(&group, &self.items).unwrap_or(group) });
         }
-        let mut lift = AggregateExtractor { keys: &keys, partial: Vec::new(), measures: Vec::new() };
+        let mut lift = AggregateExtractor { keys: &keys, partial: Vec::new(), aggregates: Vec::new() };
         let mut columns = Vec::new();
         for (name, expression) in &self.items {
             columns.push(aliased(&lift.lifted(expression)?, name));
@@ -309,8 +287,12 @@ impl TableQuestion<'_> {
             Some(having) => format!(" WHERE {}", lift.lifted(having)?),
             None => String::new(),
         };
-        let finish = format!("SELECT {} FROM {}{having}", joined(columns.into_iter()), quoted(PARTS));
         let names: Vec<String> = (0..keys.len()).map(|place| format!("__g{place}")).collect();
+        let mut finish = format!("SELECT {} FROM {}{having}", joined(columns.into_iter()), quoted(PARTS));
+        if self.ordered.is_empty() && !keys.is_empty() {
+            // Otherwise two runs would print the groups in different orders.
+            finish.push_str(&format!(" ORDER BY {}", joined(names.iter().map(|name| format!("\"{name}\"")))));
+        }
         let key_columns = keys.iter().zip(&names).map(|(key, name)| aliased(key, name));
         let parts = lift.partial.iter().enumerate().map(|(place, (sql, _))| format!("{sql} AS \"__a{place}\""));
         let merged = lift
@@ -333,13 +315,13 @@ impl TableQuestion<'_> {
             _ => None,
         };
         let measured = keys.iter().map(plain).collect::<Option<Vec<_>>>();
-        let measured = measured.zip(lift.measures.into_iter().collect::<Option<Vec<_>>>());
+        let measured = measured.zip(lift.aggregates.into_iter().collect::<Option<Vec<_>>>());
         Some((partial, merge, finish, measured))
     }
 }
 
 /// The key columns of the groups, and the aggregates.
-type GroupedColumns = (Vec<String>, Vec<Measure>);
+type GroupedColumns = (Vec<String>, Vec<Aggregate>);
 
 fn aliased(expression: &Expr, name: &str) -> String {
     format!("{expression} AS {}", quoted(name))
@@ -355,7 +337,7 @@ struct AggregateExtractor<'a> {
     /// Aggregates of a part, each with the function that merges it.
     partial: Vec<(String, &'static str)>,
     /// The aggregates of columns, if they have this form.
-    measures: Vec<Option<Measure>>,
+    aggregates: Vec<Option<Aggregate>>,
 }
 
 impl AggregateExtractor<'_> {
@@ -366,11 +348,11 @@ impl AggregateExtractor<'_> {
     }
 
     /// The column of partial answers with `sql`.
-    fn column(&mut self, sql: String, merge: &'static str, measure: Option<Measure>) -> Expr {
+    fn column(&mut self, sql: String, merge: &'static str, aggregate: Option<Aggregate>) -> Expr {
         let known = self.partial.iter().position(|(other, by)| *other == sql && *by == merge);
         let place = known.unwrap_or_else(|| {
             self.partial.push((sql, merge));
-            self.measures.push(measure);
+            self.aggregates.push(aggregate);
             self.partial.len() - 1
         });
         quoted(&format!("__a{place}"))
@@ -387,27 +369,22 @@ impl AggregateExtractor<'_> {
             [FunctionArg::Unnamed(FunctionArgExpr::Wildcard)] if called == "count" => ("*".to_owned(), None),
             _ => return None,
         };
-        let counted = if argument == "*" { Some(Measure::Rows) } else { column.clone().map(Measure::Count) };
+        let counted = if argument == "*" { Some(Aggregate::Rows) } else { column.clone().map(Aggregate::Count) };
         let count = format!("CAST(count({argument}) AS BIGINT)");
         Some(match called.as_str() {
-            "min" => self.column(format!("min({argument})"), "min", column.map(Measure::Least)),
-            "max" => self.column(format!("max({argument})"), "max", column.map(Measure::Greatest)),
-            "sum" => self.column(format!("sum({argument})"), "sum", column.map(Measure::Sum)),
+            "min" => self.column(format!("min({argument})"), "min", column.map(Aggregate::Least)),
+            "max" => self.column(format!("max({argument})"), "max", column.map(Aggregate::Greatest)),
+            "sum" => self.column(format!("sum({argument})"), "sum", column.map(Aggregate::Sum)),
             "count" => self.column(count, "sum", counted),
             _ => {
-                let sum = self.column(format!("sum(CAST({argument} AS DOUBLE))"), "sum", column.map(Measure::Sum));
+                let sum = self.column(format!("sum(CAST({argument} AS DOUBLE))"), "sum", column.map(Aggregate::Sum));
                 let count = self.column(count, "sum", counted);
                 let count = cast(count, DataType::Double(sqlparser::ast::ExactNumberInfo::None));
-                let quotient = |left: Expr, right: Expr| Expr::BinaryOp {
-                    left: Box::new(left),
-                    op: BinaryOperator::Divide,
-                    right: Box::new(right),
-                };
+                let binary = |left, op, right| Expr::BinaryOp { left: Box::new(left), op, right: Box::new(right) };
                 // The mean of no values is null, not 0/0.
                 let zero = Expr::value(Value::Number("0.0".to_owned(), false));
-                let left = Box::new(count.clone());
-                let some = Expr::BinaryOp { left, op: BinaryOperator::Gt, right: Box::new(zero) };
-                if_else_null(some, quotient(sum, count))
+                let some = binary(count.clone(), BinaryOperator::Gt, zero);
+                if_else_null(some, binary(sum, BinaryOperator::Divide, count))
             }
         })
     }
@@ -422,7 +399,7 @@ impl Visit for AggregateExtractor<'_> {
         match expression {
             Expr::Identifier(name) if name.value.starts_with("__") => ControlFlow::Continue(()),
             Expr::Identifier(_) => ControlFlow::Break(()),
-            Expr::Function(function) if is_one_of(AGGREGATE, function) => match self.aggregate(function) {
+            Expr::Function(function) if is_one_of(MERGED_FUNCTIONS, function) => match self.aggregate(function) {
                 Some(column) => {
                     *expression = column;
                     ControlFlow::Continue(())
@@ -434,7 +411,7 @@ impl Visit for AggregateExtractor<'_> {
     }
 }
 
-/// The functions that a question calls.
+/// The functions that a query calls.
 #[derive(Default)]
 struct Functions {
     aggregates: bool,
@@ -471,9 +448,9 @@ impl Visit for ColumnSimplifier<'_> {
                     FunctionArguments::List(list) => list.duplicate_treatment.is_none() && list.clauses.is_empty(),
                     _ => false,
                 };
-                let aggregate = is_one_of(AGGREGATE, function);
+                let aggregate = is_one_of(MERGED_FUNCTIONS, function);
                 self.functions.aggregates |= aggregate;
-                self.functions.others |= !bare || !list || !aggregate && !is_one_of(SCALAR, function);
+                self.functions.others |= !bare || !list || !aggregate && !is_one_of(SCALAR_FUNCTIONS, function);
             }
             _ => {}
         }

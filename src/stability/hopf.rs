@@ -4,11 +4,15 @@
 //! m v^2/a` and `omega^2 = (b - a)/a`, in units of `l/v` for time and of `ln v` for the amplitude,
 //!
 //! ```text
-//! l_1 = -mu omega [(7 + 4 omega^2) mu^2 + 6 mu - 1]
-//!       / {2 [(1 + mu)^2 + omega^2 mu^2] [(1 + mu)^2 + 4 omega^2 mu^2]}.
+//! ageing: l_1 = -mu omega [(7 + 4 omega^2) mu^2 + 6 mu - 1]/D
+//! slip:   l_1 = -mu omega (1 + omega^2) (1 + mu) (1 + 9 mu)/D
+//! law_eps = 1 - s: l_1 = -mu omega [(7 + 4 omega^2) mu^2 + 6 mu - 1 + 2 s ((1 + mu)^2 + omega^2 mu (mu + 3)) + s^2 omega^2 (1 + mu)(1 + 3 mu)]/D
+//! prz:    l_1 = -omega [18 mu^3 + 20 mu^2 + 2 mu + omega^2 (34 mu^3 + 35 mu^2 - 1) + omega^4 (10 mu^3 + 16 mu^2 + 2 mu)]
+//!               / [2 (1 + omega^2) D]
+//! D = 2 [(1 + mu)^2 + omega^2 mu^2] [(1 + mu)^2 + 4 omega^2 mu^2].
 //! ```
 
-use crate::model::Law;
+use crate::model::{Law, StateLaw};
 
 /// Side of the critical stiffness on which small limit cycles exist.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -23,11 +27,15 @@ impl Hopf {
     /// Names in tables, in the order of the variants.
     pub const NAMES: [&'static str; 2] = ["supercritical", "subcritical"];
 
-    /// Kind of the Hopf point of steady sliding at `v > 0` of a mass `m >= 0`; `None` for `b <= a` (no Hopf point) and
-    /// for `m = 0` (degenerate).
-    pub fn of(law: Law, m: f64, v: f64) -> Option<Hopf> {
-        let coefficient = lyapunov_coefficient(law, m * v * v)?;
-        Some(if coefficient < 0.0 { Hopf::Supercritical } else { Hopf::Subcritical })
+    /// Kind of the Hopf point of steady sliding at `v > 0` of a mass `m >= 0`; `None` for `b <= a` (no Hopf point) and,
+    /// except for [`StateLaw::Prz`], for `m = 0` (degenerate).
+    pub fn of(state: StateLaw, law: Law, m: f64, v: f64) -> Option<Hopf> {
+        lyapunov_coefficient(state, law, m * v * v).map(Hopf::from_coefficient)
+    }
+
+    /// Kind of a Hopf point with this first Lyapunov coefficient.
+    pub fn from_coefficient(coefficient: f64) -> Hopf {
+        if coefficient < 0.0 { Hopf::Supercritical } else { Hopf::Subcritical }
     }
 }
 
@@ -36,12 +44,63 @@ impl Hopf {
 ///
 /// There, `ln A` of a small oscillation `A cos(omega t)` of `ln v` changes by `(pi/2) l_1 A^2` a cycle. Near it the
 /// amplitude of limit cycles is `2 sqrt(-sigma/(omega l_1))`, with the growth rate `sigma`.
-pub fn lyapunov_coefficient(law: Law, inertia: f64) -> Option<f64> {
-    let mu = inertia / law.a;
-    let square = (law.b - law.a) / law.a;
-    if !(square > 0.0 && mu > 0.0 && mu.is_finite()) {
-        return None;
+pub fn lyapunov_coefficient(state: StateLaw, law: Law, inertia: f64) -> Option<f64> {
+    let point = Point::new(law, inertia).filter(|point| point.mu > 0.0 || state == StateLaw::Prz)?;
+    let Point { p, q, square, .. } = point;
+    let sum = match state {
+        StateLaw::Ageing => return ageing_coefficient(point.mu, square),
+        StateLaw::Slip => p * (1.0 + square) * (p + q) * (9.0 * p + q),
+        StateLaw::Prz => {
+            let [outer, inner, last] = [
+                (18.0 * p + 20.0 * q) * p * p + 2.0 * p * q * q,
+                (34.0 * p + 35.0 * q) * p * p - q * q * q,
+                (10.0 * p + 16.0 * q) * p * p + 2.0 * p * q * q,
+            ];
+            (outer + square * (inner + square * last)) / (2.0 * (1.0 + square))
+        }
+    };
+    Some(point.coefficient(sum))
+}
+
+/// First Lyapunov coefficient, as [`lyapunov_coefficient`], for the interpolated law `theta' = (u^s - u)/(1 - s)` with `s = 1 - eps`: slip for `eps = 0`, ageing for
+/// 1. `None` for `b <= a` and without mass.
+pub fn interpolated_lyapunov_coefficient(eps: f64, law: Law, inertia: f64) -> Option<f64> {
+    let point = Point::new(law, inertia).filter(|point| point.mu > 0.0)?;
+    let (Point { p, q, square, .. }, s) = (point, 1.0 - eps);
+    let ageing = (7.0 + 4.0 * square) * p * p + (6.0 * p - q) * q;
+    let first = 2.0 * ((p + q) * (p + q) + square * p * (p + 3.0 * q));
+    let second = square * (p + q) * (3.0 * p + q);
+    Some(point.coefficient(p * (ageing + s * (first + s * second))))
+}
+
+/// A Hopf point: `mu`, `omega^2`, and `p = mu/scale`, `q = 1/scale` for forms in which no large `mu` overflows.
+#[derive(Debug, Clone, Copy)]
+struct Point {
+    mu: f64,
+    square: f64,
+    p: f64,
+    q: f64,
+}
+
+impl Point {
+    /// That of a scaled mass; `None` for `b <= a`.
+    fn new(law: Law, inertia: f64) -> Option<Point> {
+        let (mu, square) = (inertia / law.a, (law.b - law.a) / law.a);
+        let scale = mu.max(1.0);
+        let point = Point { mu, square, p: mu / scale, q: 1.0 / scale };
+        (square > 0.0 && mu >= 0.0 && mu.is_finite()).then_some(point)
     }
+
+    /// The coefficient whose numerator over `-omega`, a cubic form of `p` and `q`, is `sum`.
+    fn coefficient(&self, sum: f64) -> f64 {
+        let Point { square, p, q, .. } = *self;
+        let pairs = ((p + q) * (p + q) + square * p * p) * ((p + q) * (p + q) + 4.0 * square * p * p);
+        -0.5 * square.sqrt() * q * sum / pairs
+    }
+}
+
+/// The coefficient of the ageing law.
+fn ageing_coefficient(mu: f64, square: f64) -> Option<f64> {
     // Both numerator and denominator over mu^4, so that no large mu overflows.
     let (inverse, sum) = (1.0 / mu, 1.0 + 1.0 / mu);
     let sign = 7.0 + 4.0 * square + (6.0 - inverse) * inverse;
@@ -55,9 +114,9 @@ mod tests {
     use nalgebra::{Complex, Matrix3, Vector3};
 
     use super::*;
-    use crate::model::Transition;
+    use crate::model::{StateLaw, Transition};
     use crate::stability::SteadySliding;
-    use crate::stability::step_response::{Orbit, Outcome, ScaledBlock, Step, Z};
+    use crate::stability::step_response::{Orbit, Outcome, ScaledBlock, VelocityStep, Z};
 
     type C = Complex<f64>;
 
@@ -94,7 +153,7 @@ mod tests {
             for ratio in [1.001, 1.5, 2.0, 10.0] {
                 let law = Law { a, b: ratio * a };
                 for mu in [1e-3, 0.05, 0.13, 0.14, 1.0, 30.0] {
-                    let found = lyapunov_coefficient(law, mu * a).expect("has a Hopf point");
+                    let found = lyapunov_coefficient(StateLaw::Ageing, law, mu * a).expect("has a Hopf point");
                     let expected = by_multilinear_forms(law, mu * a);
                     assert!(
                         (found - expected).abs() < 1e-7 * expected.abs().max(1e-3),
@@ -105,10 +164,24 @@ mod tests {
         }
     }
 
+    #[test]
+    fn interpolated_coefficient_is_that_of_slip_and_ageing_at_its_ends() {
+        for (ratio, mu) in [(1.001, 1e-3), (1.5, 0.13), (2.0, 1.0), (10.0, 1e4)] {
+            let law = Law { a: 0.01, b: 0.01 * ratio };
+            for (eps, state) in [(0.0, StateLaw::Slip), (1.0, StateLaw::Ageing)] {
+                let found = interpolated_lyapunov_coefficient(eps, law, mu * law.a).expect("has a Hopf point");
+                let expected = lyapunov_coefficient(state, law, mu * law.a).expect("has a Hopf point");
+                assert!((found / expected - 1.0).abs() < 1e-13, "{ratio} {mu} {eps}: {found} {expected}");
+            }
+        }
+        assert_eq!(interpolated_lyapunov_coefficient(0.5, Law { a: 0.01, b: 0.02 }, 0.0), None);
+        assert_eq!(interpolated_lyapunov_coefficient(0.5, Law { a: 0.01, b: 0.01 }, 1.0), None);
+    }
+
     /// Change of `ln A` over a small cycle at the critical stiffness, divided by `(pi/2) A^2`, after some cycles.
     fn simulated_growth(law: Law, inertia: f64, z: f64) -> f64 {
         let Law { a, b } = law;
-        let slider = ScaledBlock { a, b, inertia, k: (b - a) * (1.0 + inertia / a) };
+        let slider = ScaledBlock { state_law: StateLaw::Ageing, a, b, inertia, k: (b - a) * (1.0 + inertia / a) };
         let mut orbit = Orbit::new(&slider, [z, 0.0, 0.0], 1e-13);
         let mut budget = 100_000;
         let mut before = z;
@@ -133,7 +206,7 @@ mod tests {
             (0.01, 1.2, 0.5),
         ] {
             let law = Law { a, b: ratio * a };
-            let expected = lyapunov_coefficient(law, inertia).expect("has a critical stiffness");
+            let expected = lyapunov_coefficient(StateLaw::Ageing, law, inertia).expect("has a critical stiffness");
             // The phase at the section varies: an error of the order of the amplitude.
             let [twice, once] =
                 [2e-2, 1e-2].map(|fraction| simulated_growth(law, inertia, fraction * (ratio - 1.0) * (a + inertia)));
@@ -148,12 +221,12 @@ mod tests {
             let law = Law { a: 0.01, b: 0.01 * (1.0 + square) };
             let mu = 1.0 / (3.0 + 2.0 * (4.0 + (law.b - law.a) / law.a).sqrt());
             for (fraction, kind) in [(1.0 - 1e-9, Hopf::Subcritical), (1.0 + 1e-9, Hopf::Supercritical)] {
-                assert_eq!(Hopf::of(law, fraction * mu * law.a / 4.0, 2.0), Some(kind), "{square}");
+                assert_eq!(Hopf::of(StateLaw::Ageing, law, fraction * mu * law.a / 4.0, 2.0), Some(kind), "{square}");
             }
         }
-        assert_eq!(Hopf::of(Law { a: 0.01, b: 0.01 }, 1.0, 1.0), None);
-        assert_eq!(Hopf::of(Law { a: 0.01, b: 0.02 }, 0.0, 1.0), None);
-        assert_eq!(Hopf::of(Law { a: 0.01, b: 0.02 }, 1e300, 1e10), None);
+        assert_eq!(Hopf::of(StateLaw::Ageing, Law { a: 0.01, b: 0.01 }, 1.0, 1.0), None);
+        assert_eq!(Hopf::of(StateLaw::Ageing, Law { a: 0.01, b: 0.02 }, 0.0, 1.0), None);
+        assert_eq!(Hopf::of(StateLaw::Ageing, Law { a: 0.01, b: 0.02 }, 1e300, 1e10), None);
     }
 
     #[test]
@@ -166,10 +239,10 @@ mod tests {
                 let k = critical * (1.0 - fraction);
                 let growth = SteadySliding::new(law, k, m, v_f).eigenvalues().expect("is elastic").growth_rate / v_f;
                 let omega = ((law.b - law.a) / law.a).sqrt();
-                let coefficient = lyapunov_coefficient(law, m * v_f * v_f).expect("has a Hopf point");
+                let coefficient = lyapunov_coefficient(StateLaw::Ageing, law, m * v_f * v_f).expect("has a Hopf point");
                 let predicted = 2.0 * (-growth / (omega * coefficient)).sqrt();
                 let transition = Transition { law, v_i: 0.99 * v_f, v_f };
-                let (_, response) = Step { transition, k, m }.respond(1e-8);
+                let (_, response) = VelocityStep { state_law: StateLaw::Ageing, transition, k, m }.respond(1e-8);
                 let response = response.expect("is simulated_growth");
                 assert_eq!(response.outcome, Outcome::LimitCycle);
                 let cycle = response.cycle.expect("is a cycle");

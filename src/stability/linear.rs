@@ -41,7 +41,7 @@ pub struct Eigenvalues {
 }
 
 /// Square of half the distance of two eigenvalues, fraction of their product, below which it is formed in double-double.
-/// Chosen.
+/// Chosen: three digits are lost there.
 const CLOSE_PAIR: f64 = 1e-3;
 
 /// Difference, fraction of its terms, below which it is formed in double-double. Chosen: three bits are lost there.

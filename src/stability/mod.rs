@@ -1,5 +1,6 @@
 //! A block on a spring of finite stiffness: stability of steady sliding, response to a velocity step, open-loop errors.
 
+pub mod arcsinh;
 mod driven;
 mod hopf;
 mod linear;
@@ -7,7 +8,7 @@ mod sensitivity;
 pub mod step_response;
 
 pub use driven::{held_error, open_loop_error};
-pub use hopf::{Hopf, lyapunov_coefficient};
+pub use hopf::{Hopf, interpolated_lyapunov_coefficient, lyapunov_coefficient};
 pub use linear::{Eigenvalues, SteadySliding, critical_velocity};
 pub use sensitivity::amplification;
 

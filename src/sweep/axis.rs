@@ -60,7 +60,7 @@ pub fn read(quantity: Quantity, units: &Units, key: &str, spec: &AxisSpec) -> Re
         }
         AxisSpec::Form(_) if !words.is_empty() => {
             let expected = format!("one or a list of {}", quoted(&words));
-            return refuse(key, "a range", expected, "write the words as a list");
+            return refuse(key, "found a table", expected, "write the words as a list");
         }
         AxisSpec::Form(form) => return AxisDraft { scale: axis.scale_of(form)?, ..axis }.form(form),
     };

@@ -56,7 +56,8 @@ pub fn check(spec: &BlockSpec, prefix: String, units: Option<&Units>, folder: &P
     held.extend(axes.iter().map(|(quantity, _)| *quantity));
     for quantity in Quantity::ALL {
         let is_there = !are_known || faults.concern(&format!("{prefix}axes.{}", quantity.name()));
-        if !held.contains(&quantity) && (is_there || !quantity.default().is_empty()) {
+        let has_default = !quantity.default().is_empty() && !quantity.is_tacit();
+        if !held.contains(&quantity) && (is_there || has_default) {
             held.push(quantity);
         }
     }
@@ -110,7 +111,7 @@ impl BlockDraft<'_> {
             let held = factors.iter().any(|factor| factor.holds_any(&[quantity]))
                 || computed.iter().any(|(other, ..)| *other == quantity);
             let values = quantity.default();
-            if !held && !values.is_empty() {
+            if !held && !values.is_empty() && !quantity.is_tacit() {
                 let axis = Axis { quantity, scale: Scale::Model, values: Values::List(values) };
                 factors.push(Factor { axes: vec![axis], ..Factor::default() });
             }

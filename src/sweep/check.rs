@@ -7,12 +7,14 @@ use std::sync::{Arc, OnceLock};
 
 use super::block::{self, Checked, too_many};
 use super::error::{Faults, SpecError, refuse, unknown};
+use super::friction;
+use super::laws;
 use super::read;
 use super::spec::{Spec, TableSpec};
 use super::units::{UNIT_KEYS, doubt, units};
 use crate::file;
-use crate::grid::{Block, Factor, Grid, Quantity, RTOL, RowIndex, TooMany};
-use crate::model::Units;
+use crate::grid::{Axis, Block, Factor, Grid, Quantity, RTOL, RowIndex, Scale, TooMany, Values};
+use crate::model::{Friction, Units};
 use crate::names::nearest;
 use crate::table::{self, OPTIMUM_AXES, OptimumCache, Projection, STATUS, Table};
 
@@ -36,9 +38,11 @@ pub struct Sweep {
     pub grid: Grid,
     /// Whether optimal protocols obey `v >= 1`.
     pub bounded: bool,
+    /// Form of the direct effect of friction.
+    pub friction: Friction,
     /// The tables to write, in the order of the spec.
     pub requests: Vec<Request>,
-    /// Rows that cover every optimal problem of the tables; `None` if no table needs the optimum.
+    /// Rows that cover every optimal problem that is shared; `None` if there is none.
     pub optimum_rows: Option<RowIndex>,
     /// Warnings: legal input that is probably a mistake.
     pub warnings: Vec<SpecError>,
@@ -47,7 +51,7 @@ pub struct Sweep {
 /// A requested table.
 pub struct Request {
     /// The table.
-    pub table: &'static dyn Table,
+    pub table: &'static Table,
     /// Its columns.
     pub projection: Projection,
     /// Its accuracy.
@@ -141,8 +145,9 @@ impl Sweep {
         let is_any_wrong = UNIT_KEYS.iter().any(|key| faults.concern(&format!("model.{key}")));
         let units = if is_any_wrong { None } else { faults.take(units(&spec.model)) };
         faults.take(check_rtol("accuracy.rtol", spec.accuracy.rtol));
+        let friction = faults.take(friction::friction(&spec.model)).unwrap_or_default();
         let mut blocks = blocks(spec, units.as_ref(), folder, &mut faults);
-        let tables = tables(spec, &mut blocks, &mut faults);
+        let tables = tables(spec, friction, &mut blocks, &mut faults);
         faults.finish(text)?;
 
         // Every key is legal by itself.
@@ -157,14 +162,7 @@ impl Sweep {
         };
         let requests = tables.into_iter().map(|table| request(table, &grid, &prefixes).map_err(placed));
         let requests = requests.collect::<Result<Vec<Request>, _>>()?;
-        let needed = requests.iter().any(|request| request.table.needs_optimum(&request.projection));
-        // A table with these axes alone has the rows of the optimum.
-        let own = requests.iter().find(|request| request.table.axes() == OPTIMUM_AXES);
-        let optimum_rows = match own {
-            _ if !needed => None,
-            Some(request) => Some(request.row_index.clone()),
-            None => grid.project(OPTIMUM_AXES).ok(),
-        };
+        let optimum_rows = optimum_rows(&grid, &requests);
         let mut warnings = Vec::new();
         for (prefix, block) in prefixes.iter().zip(&grid.blocks) {
             let axes = block.factors.iter().flat_map(|factor| &factor.axes);
@@ -177,7 +175,8 @@ impl Sweep {
             text: text.to_owned(),
             folder: folder.to_owned(),
             grid,
-            bounded: spec.model.velocity_bound,
+            bounded: spec.model.velocity_bound && friction == Friction::Log,
+            friction,
             requests,
             optimum_rows,
             warnings,
@@ -186,33 +185,57 @@ impl Sweep {
 
     /// Relative accuracy of the shared optimal protocols: the tightest of the tables that use them.
     pub fn optimum_rtol(&self) -> f64 {
-        let users = self.requests.iter().filter(|request| request.table.needs_optimum(&request.projection));
+        let users = self.requests.iter().filter(|request| request.needs_optimum(&self.grid));
         users.map(|request| request.rtol).fold(1.0, f64::min)
     }
 
-    /// The number of different optimal problems; 0 if no table needs the optimum.
+    /// The number of different optimal problems that are shared.
     pub fn optimum_tuples(&self) -> u64 {
         self.optimum_rows.as_ref().map_or(0, |rows| rows.distinct(OPTIMUM_AXES, OptimumCache::MAX_CACHED))
     }
 
     /// An empty optimum cache for each table. Tables of one accuracy share it, so no table depends on the accuracy of another.
     pub fn optimum_cache(&self) -> Vec<Arc<OptimumCache>> {
-        let span = self.optimum_rows.as_ref().map_or(0, |rows| rows.tuples(OPTIMUM_AXES).span());
+        // Every row index numbers the tuples of all blocks alike.
+        let users = self.requests.iter().filter(|request| request.needs_optimum(&self.grid));
+        let span = users.map(|request| request.row_index.tuples(OPTIMUM_AXES).span()).max().unwrap_or(0);
         let tuples = self.optimum_tuples();
         let mut stores: Vec<(u64, Arc<OptimumCache>)> = Vec::new();
         let store = |request: &Request| {
-            if !request.table.needs_optimum(&request.projection) {
+            if !request.needs_optimum(&self.grid) {
                 return Arc::new(OptimumCache::new(0, self.bounded, request.rtol));
             }
             let key = request.rtol.to_bits();
             if let Some((_, store)) = stores.iter().find(|(known, _)| *known == key) {
                 return store.clone();
             }
-            let store = Arc::new(OptimumCache::among(tuples, span, self.bounded, request.rtol));
+            let store = Arc::new(OptimumCache::among(tuples, span, self.bounded, request.rtol).with(self.friction));
             stores.push((key, store.clone()));
             store
         };
         self.requests.iter().map(store).collect()
+    }
+}
+
+impl Request {
+    /// Whether the table needs optimal protocols that are shared.
+    pub fn needs_optimum(&self, grid: &Grid) -> bool {
+        grid.blocks.iter().any(|block| self.table.needs_optimum(&self.projection, block))
+    }
+}
+
+/// Rows that cover every optimal problem that is shared; `None` if there is none.
+fn optimum_rows(grid: &Grid, requests: &[Request]) -> Option<RowIndex> {
+    let needs = |block: &Block| requests.iter().any(|request| request.table.needs_optimum(&request.projection, block));
+    let blocks: Vec<Arc<Block>> = grid.blocks.iter().filter(|block| needs(block)).cloned().collect();
+    if blocks.is_empty() {
+        return None;
+    }
+    // A table with these axes alone has the rows of the optimum.
+    let own = requests.iter().find(|request| request.table.axes() == OPTIMUM_AXES);
+    match own.filter(|_| blocks.len() == grid.blocks.len()) {
+        Some(request) => Some(request.row_index.clone()),
+        None => Grid { blocks, units: grid.units }.project(OPTIMUM_AXES).ok(),
     }
 }
 
@@ -248,8 +271,9 @@ fn blocks(spec: &Spec, units: Option<&Units>, folder: &Path, faults: &mut Faults
         faults.push(SpecError::new(key, found, expected, "move it into the blocks that it concerns"));
     }
     let blocks = spec.block.iter().enumerate();
-    let blocks: Vec<Checked> =
+    let mut blocks: Vec<Checked> =
         blocks.map(|(number, one)| block::check(one, format!("block[{number}]."), units, folder, faults)).collect();
+    complete(&mut blocks);
     for quantity in Quantity::ALL {
         let scale = |checked: &Checked| checked.block.as_ref()?.scale(quantity);
         let mut scales = blocks.iter().enumerate().filter_map(|(number, block)| Some((number, scale(block)?)));
@@ -265,6 +289,20 @@ fn blocks(spec: &Spec, units: Option<&Units>, folder: &Path, faults: &mut Faults
     blocks
 }
 
+/// Adds the default of a tacit axis to the other blocks if one block names it: all blocks share the column.
+fn complete(blocks: &mut [Checked]) {
+    for quantity in Quantity::ALL.into_iter().filter(|quantity| quantity.is_tacit()) {
+        let (with, without): (Vec<_>, Vec<_>) = blocks
+            .iter_mut()
+            .filter_map(|checked| checked.block.as_mut())
+            .partition(|block| block.scale(quantity).is_some());
+        for block in without.into_iter().filter(|_| !with.is_empty()) {
+            let axis = Axis { quantity, scale: Scale::Model, values: Values::List(quantity.default()) };
+            block.factors.push(Factor { axes: vec![axis], ..Factor::default() });
+        }
+    }
+}
+
 pub(super) fn check_rtol(key: &str, rtol: f64) -> Result<(), SpecError> {
     if RTOL.contains(rtol) {
         return Ok(());
@@ -277,37 +315,53 @@ struct TableDraft {
     /// Its name in the spec.
     name: String,
     /// The table with the rows.
-    written: &'static dyn Table,
+    written: &'static Table,
     /// The table to write: this table or its reduction.
-    table: &'static dyn Table,
+    table: &'static Table,
     projection: Projection,
     rtol: f64,
 }
 
 /// The tables of `spec`. A missing axis is reported once.
-fn tables(spec: &Spec, blocks: &mut [Checked], faults: &mut Faults) -> Vec<TableDraft> {
+fn tables(spec: &Spec, friction: Friction, blocks: &mut [Checked], faults: &mut Faults) -> Vec<TableDraft> {
     if spec.tables.is_empty() && !faults.concern("tables") {
         let expected = format!("at least one of {}", table::ALL.map(|table| table.name()).join(", "));
         faults.push(SpecError::new("tables", "no table is requested", expected, "add a line such as [tables.optimal]"));
     }
-    spec.tables.iter().filter_map(|(name, table)| draft(name, table, spec.accuracy.rtol, blocks, faults)).collect()
+    let model = (spec.accuracy.rtol, spec.model.velocity_bound, friction);
+    spec.tables.iter().filter_map(|(name, table)| draft(name, table, model, blocks, faults)).collect()
 }
 
-fn draft(name: &str, spec: &TableSpec, rtol: f64, blocks: &mut [Checked], faults: &mut Faults) -> Option<TableDraft> {
+fn draft(
+    name: &str,
+    spec: &TableSpec,
+    (rtol, is_bounded, friction): (f64, bool, Friction),
+    blocks: &mut [Checked],
+    faults: &mut Faults,
+) -> Option<TableDraft> {
     let key = format!("tables.{name}");
     let Some(written) = table::ALL.into_iter().find(|table| table.name() == name) else {
         faults.push(unknown(key, "table", name, &table::ALL.map(|table| table.name())));
         return None;
     };
     let is_reduction_known = !faults.concern(&format!("{key}.reduce"));
+    let has_laws = blocks.iter().any(|block| block.held.contains(&Quantity::Law));
+    // A reduced table is one of ageing.
+    let written = table::over(written, has_laws && spec.reduce.is_none());
+    let table = faults.take(reduced(written, &key, spec.reduce.as_deref()));
     for block in blocks {
-        let missing: Vec<Quantity> = written.axes().iter().copied().filter(|axis| !block.held.contains(axis)).collect();
+        if let Some(grid) = &block.block {
+            faults.take(laws::check(&key, table.unwrap_or(written), grid, &block.prefix, is_bounded));
+            faults.take(friction::check(&key, written, spec.columns.as_deref(), grid, friction));
+        }
+        let is_missing = |axis: &Quantity| !axis.is_tacit() && !block.held.contains(axis);
+        let missing: Vec<Quantity> = written.axes().iter().copied().filter(is_missing).collect();
         if !missing.is_empty() {
             faults.push(lacks(&key, written, &block.prefix, &missing));
             block.held.extend(missing);
         }
     }
-    let table = faults.take(reduced(written, &key, spec.reduce.as_deref()))?;
+    let table = table?;
     let rtol = spec.rtol.or(table.default_rtol()).unwrap_or(rtol);
     if spec.rtol.is_some() {
         faults.take(check_rtol(&format!("{key}.rtol"), rtol));
@@ -318,7 +372,7 @@ fn draft(name: &str, spec: &TableSpec, rtol: f64, blocks: &mut [Checked], faults
 }
 
 /// The fault of a table that lacks axes in the block of `prefix`.
-fn lacks(key: &str, table: &dyn Table, prefix: &str, missing: &[Quantity]) -> SpecError {
+fn lacks(key: &str, table: &Table, prefix: &str, missing: &[Quantity]) -> SpecError {
     let (place, axes) = match prefix.trim_end_matches('.') {
         "" => ("the spec", "[axes]"),
         block => (block, "its [block.axes]"),
@@ -327,8 +381,20 @@ fn lacks(key: &str, table: &dyn Table, prefix: &str, missing: &[Quantity]) -> Sp
     let lines: Vec<String> = missing.iter().map(|axis| format!("`{} = ...`", axis.name())).collect();
     let noun = if missing.len() == 1 { "axis" } else { "axes" };
     let found = format!("needs the {noun} {}, which {place} does not have", names.join(", "));
-    let expected = format!("axes {}", table.axes().iter().map(|axis| axis.name()).collect::<Vec<_>>().join(", "));
-    SpecError::new(key, found, expected, format!("add {} to {axes}, or remove the table", lines.join(", ")))
+    SpecError::new(
+        key,
+        found,
+        expected_axes(table.axes()),
+        format!("add {} to {axes}, or remove the table", lines.join(", ")),
+    )
+}
+
+/// The words for the axes that a table takes.
+pub(super) fn expected_axes(axes: &[Quantity]) -> String {
+    let (required, optional): (Vec<Quantity>, Vec<Quantity>) = axes.iter().partition(|axis| axis.default().is_empty());
+    let listed = |axes: &[Quantity]| axes.iter().map(|axis| axis.name()).collect::<Vec<_>>().join(", ");
+    let optional = if optional.is_empty() { String::new() } else { format!("; optional: {}", listed(&optional)) };
+    format!("axes {}{optional}", listed(&required))
 }
 
 /// A table over its rows of `grid`, whose blocks have keys that begin with `prefixes`.
@@ -343,7 +409,7 @@ fn request(draft: TableDraft, grid: &Grid, prefixes: &[String]) -> Result<Reques
         }
         TooMany::Combinations(block) => too_many(format!("{}where", prefixes[block])),
     })?;
-    if let Some(empty) = row_index.stretches().iter().position(|stretch| stretch.rows() == 0) {
+    if let Some(empty) = row_index.blocks().iter().position(|block_rows| block_rows.rows() == 0) {
         let help = "correct the condition, or the axes in it";
         let key = format!("{}where", prefixes[empty]);
         return refuse(key, "matches no points", "a condition that some point meets", help);
@@ -353,7 +419,7 @@ fn request(draft: TableDraft, grid: &Grid, prefixes: &[String]) -> Result<Reques
 }
 
 /// The reduction of `table` that the key `reduce` names, or `table`.
-fn reduced(table: &'static dyn Table, key: &str, reduce: Option<&str>) -> Result<&'static dyn Table, SpecError> {
+fn reduced(table: &'static Table, key: &str, reduce: Option<&str>) -> Result<&'static Table, SpecError> {
     let Some(word) = reduce else { return Ok(table) };
     let key = format!("{key}.reduce");
     if table.name() != "gap" {
@@ -366,7 +432,7 @@ fn reduced(table: &'static dyn Table, key: &str, reduce: Option<&str>) -> Result
 }
 
 /// The rows of `landscape`, contiguous for each row of `reduced`: its further axes vary fastest.
-fn members(landscape: &dyn Table, reduced: &dyn Table, key: &str, grid: &Grid) -> Result<RowIndex, SpecError> {
+fn members(landscape: &Table, reduced: &Table, key: &str, grid: &Grid) -> Result<RowIndex, SpecError> {
     let wrong = |found: &str, help: &str| {
         let expected = "one grid in which alpha_2 and alpha_3 are independent axes";
         SpecError::new(format!("{key}.reduce"), found, expected, help)
@@ -402,7 +468,7 @@ fn members(landscape: &dyn Table, reduced: &dyn Table, key: &str, grid: &Grid) -
 }
 
 /// The columns with these names, or the default ones.
-pub(super) fn projection(table: &dyn Table, key: &str, names: Option<&[String]>, faults: &mut Faults) -> Projection {
+pub(super) fn projection(table: &Table, key: &str, names: Option<&[String]>, faults: &mut Faults) -> Projection {
     let known: Vec<&str> = table.columns().iter().map(|column| column.name).collect();
     let Some(names) = names else {
         return Projection::usual(table.columns());

@@ -8,12 +8,14 @@ use arrow_schema::ArrowError;
 
 use super::check::{self, Request, Sweep};
 use super::error::{Faults, SpecError, refuse, unknown};
+use super::friction;
+use super::laws;
 use super::spec::{AccuracySpec, ModelSpec};
 use super::units::{doubt, help, legal, units};
 use crate::dataset::{Layout, batch};
 use crate::grid::{Axis, Block, Factor, Grid, Quantity, Scale, Values};
-use crate::model::Units;
-use crate::table::{ColumnBuffer, OPTIMUM_AXES, OptimumCache, Signal, Stopped, Table};
+use crate::model::{Friction, Units};
+use crate::table::{self, ColumnBuffer, OPTIMUM_AXES, OptimumCache, Signal, Stopped, Table};
 
 /// The values of some axes: words are given by their indices.
 pub type Given = Vec<(Quantity, Vec<f64>)>;
@@ -21,7 +23,7 @@ pub type Given = Vec<(Quantity, Vec<f64>)>;
 /// A table and the values of its axes. Axes without values have their defaults, which vary fastest.
 pub struct Direct<'a> {
     /// The table.
-    pub table: &'static dyn Table,
+    pub table: &'static Table,
     /// Axes that vary together: each has one value, or as many as the others.
     pub points: Given,
     /// Axes that multiply the points, the last one fastest.
@@ -83,6 +85,19 @@ impl Sweep {
     ///
     /// The faults of the values, as in a spec.
     pub fn direct(direct: Direct<'_>) -> Result<Sweep, SpecError> {
+        let is_of_laws = |(axis, values): &(Quantity, Vec<f64>)| match axis {
+            Quantity::Law => true,
+            Quantity::VelocityCeiling => values[..] != [f64::INFINITY],
+            _ => false,
+        };
+        let has_laws = direct.points.iter().chain(&direct.grid).any(is_of_laws);
+        let mut direct = Direct { table: table::over(direct.table, has_laws), ..direct };
+        // The value of no ceiling is no axis of a table without ceilings.
+        let takes = |axis: &(Quantity, Vec<f64>)| {
+            axis.0 != Quantity::VelocityCeiling || direct.table.axes().contains(&Quantity::VelocityCeiling)
+        };
+        direct.points.retain(takes);
+        direct.grid.retain(takes);
         let mut faults = Faults::default();
         let units = faults.take(units(&direct.model));
         let rtol = direct.rtol.or(direct.table.default_rtol()).unwrap_or_else(|| AccuracySpec::default().rtol);
@@ -91,8 +106,12 @@ impl Sweep {
         let units = units.unwrap_or_default();
         direct.check(&units, &mut faults);
         faults.finish("")?;
-        let (table, bounded) = (direct.table, direct.model.velocity_bound);
-        let grid = Grid { blocks: vec![Arc::new(direct.block())], units };
+        let friction = friction::friction(&direct.model)?;
+        let (table, columns, has_floor) = (direct.table, direct.columns, direct.model.velocity_bound);
+        let block = direct.block();
+        laws::check("law", table, &block, "", has_floor)?;
+        friction::check("friction", table, columns, &block, friction)?;
+        let grid = Grid { blocks: vec![Arc::new(block)], units };
         let row_index = grid.project(table.axes()).or_else(|_| {
             let help = "take fewer values in `grid`";
             refuse(table.name(), "more rows than 64 bits can count", "at most 2^64 - 1 rows", help)
@@ -108,7 +127,8 @@ impl Sweep {
             text: String::new(),
             folder: PathBuf::new(),
             grid,
-            bounded,
+            bounded: has_floor && friction == Friction::Log,
+            friction,
             requests: vec![request],
             optimum_rows: None,
             warnings,
@@ -134,9 +154,9 @@ impl Sweep {
         }
         buffer.resize(rows);
         // Rows of a table over the axes of the optimum have an optimum each.
-        let is_common = request.table.axes() != OPTIMUM_AXES && request.table.needs_optimum(&request.projection);
+        let is_common = request.table.axes() != OPTIMUM_AXES && request.needs_optimum(&self.grid);
         let optima = if is_common { request.row_index.tuples(OPTIMUM_AXES).span() } else { 0 };
-        let optimum_cache = OptimumCache::new(optima, self.bounded, request.rtol);
+        let optimum_cache = OptimumCache::new(optima, self.bounded, request.rtol).with(self.friction);
         let job = self.job(request, &optimum_cache, signal);
         request.table.compute(&job, 0..request.rows, &mut buffer)?;
         Ok(buffer)
@@ -180,7 +200,7 @@ impl Direct<'_> {
         if !missing.is_empty() {
             let (found, help) =
                 (format!("`{name}` needs {}", missing.join(", ")), format!("add {}=...", missing.join("=..., ")));
-            faults.push(SpecError::new("", found, format!("axes {names}"), help));
+            faults.push(SpecError::new("", found, check::expected_axes(takes), help));
         }
     }
 
@@ -209,7 +229,7 @@ impl Direct<'_> {
             factors.push(Factor { axes: vec![axis(self.scale_of(quantity), quantity, values)], labels: Vec::new() });
         }
         for &quantity in self.table.axes() {
-            if !factors.iter().any(|factor| factor.holds_any(&[quantity])) {
+            if !quantity.is_tacit() && !factors.iter().any(|factor| factor.holds_any(&[quantity])) {
                 let axes = vec![axis(Scale::Model, quantity, quantity.default())];
                 factors.push(Factor { axes, labels: Vec::new() });
             }

@@ -205,7 +205,7 @@ pub(super) const WRITERS: usize = 2;
 /// A stop on request.
 pub fn compute(
     pool: &ThreadPool,
-    table: &dyn Table,
+    table: &Table,
     job: &Job<'_>,
     parts: &ManifestTable,
     numbers: impl Iterator<Item = u64>,
@@ -250,7 +250,7 @@ pub fn compute(
 
 /// Computes `rows` into `buffer`; the message if that panics.
 fn attempt(
-    table: &dyn Table,
+    table: &Table,
     job: &Job<'_>,
     rows: Range<u64>,
     buffer: &mut ColumnBuffer,
@@ -264,7 +264,7 @@ fn attempt(
 }
 
 /// The row among `rows` that panics with `message`, found by bisection: any rows can be computed alone.
-fn culprit(table: &dyn Table, job: &Job<'_>, mut rows: Range<u64>, mut message: String) -> Defect {
+fn culprit(table: &Table, job: &Job<'_>, mut rows: Range<u64>, mut message: String) -> Defect {
     let mut buffer = ColumnBuffer::new(job.projection.indices().len());
     while rows.end - rows.start > 1 {
         let middle = rows.start + (rows.end - rows.start) / 2;
@@ -315,7 +315,7 @@ impl Run<'_> {
 /// One table of a run.
 struct TableRun<'a> {
     run: &'a Run<'a>,
-    definition: &'a dyn Table,
+    definition: &'a Table,
     table: &'a ManifestTable,
     job: Job<'a>,
     layout: Layout,

@@ -9,7 +9,7 @@ use super::check::{Request, Sweep};
 use super::read;
 use crate::dataset::DatasetError;
 use crate::grid::{Block, Quantity};
-use crate::model::Units;
+use crate::model::{Friction, Units};
 use crate::names::shown;
 use crate::table;
 
@@ -34,6 +34,10 @@ impl Sweep {
     /// the condition.
     fn facts(&self, request: &Request, fact: &mut dyn FnMut(&str, fmt::Arguments<'_>)) {
         fact("model.velocity_bound", format_args!("{}", self.bounded));
+        // Datasets of earlier versions have the logarithm.
+        if self.friction != Friction::Log {
+            fact("model.friction", format_args!("{}", self.friction.name()));
+        }
         match &self.grid.units {
             Units::Scaled => fact("model.units", format_args!("dimensionless")),
             Units::Si(scales) => {
@@ -46,7 +50,8 @@ impl Sweep {
         }
         let name = request.table.name();
         let reduced = table::REDUCED.iter().any(|(_, table)| table.name() == name);
-        let written = if reduced { table::find("gap") } else { None }.unwrap_or(request.table);
+        let written =
+            if reduced { table::find("gap").map(|gap| table::over(gap, false)) } else { None }.unwrap_or(request.table);
         let blocks = &self.grid.blocks;
         fact("block", format_args!("{}", blocks.len()));
         for (number, block) in blocks.iter().enumerate() {
@@ -68,7 +73,7 @@ impl Sweep {
             Ok(other) => match self.difference(&other, &table) {
                 Some(difference) => [here, there] = difference,
                 None => {
-                    here = "the points that the spec refers to".to_owned();
+                    here = "the points that it refers to".to_owned();
                     there = "other contents of the same file".to_owned();
                 }
             },

@@ -8,7 +8,9 @@ mod direct;
 mod engine;
 mod error;
 mod estimate;
+mod friction;
 mod identity;
+mod laws;
 mod plan;
 mod points;
 mod read;
@@ -25,6 +27,7 @@ pub use direct::{Direct, Given, RowsError, word};
 pub use engine::{Defect, Outcome, RunError, TableOutcome, compute, pool, run, run_shard};
 pub use error::SpecError;
 pub use estimate::{Estimate, Estimates, estimate, sizes};
+pub use friction::friction;
 pub use plan::Plan;
 pub use schema::schema;
 #[cfg(feature = "cli")]

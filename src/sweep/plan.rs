@@ -55,6 +55,7 @@ impl Sweep {
             projection: &request.projection,
             sizes: &request.sizes,
             bounded: self.bounded,
+            friction: self.friction,
             rtol: request.rtol,
             optimum_cache,
             signal,

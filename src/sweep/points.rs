@@ -193,7 +193,7 @@ fn cells_of<'a>(place: &Line<'_>, line: &'a str) -> Result<Vec<Cow<'a, str>>, Sp
 }
 
 fn unclosed(place: &Line<'_>, cell: &str) -> SpecError {
-    let found = format!("{place}: `{}`, a quote that is not closed", shown(cell, MAX_NAME_CHARS));
+    let found = format!("{place}: the quote in `{}` is not closed", shown(cell, MAX_NAME_CHARS));
     fault(found, "quotes around a whole cell", "close the quote, or remove it")
 }
 
@@ -411,7 +411,8 @@ impl Display for Line<'_> {
 fn point(place: &Line<'_>, line: &str, units: &Units, columns: &mut [Column]) -> Result<(), SpecError> {
     let texts = cells_of(place, line)?;
     if texts.len() != columns.len() {
-        let found = format!("{place}: {} values under {} column names", texts.len(), columns.len());
+        let count = |n: usize, noun: &str| format!("{n} {noun}{}", if n == 1 { "" } else { "s" });
+        let found = format!("{place}: {} for {}", count(texts.len(), "value"), count(columns.len(), "column"));
         return Err(fault(found, "a value for each column", "correct the line"));
     }
     for (Column { name, cells }, cell) in columns.iter_mut().zip(texts) {

@@ -51,7 +51,11 @@ fn syntax(text: &str, error: &toml::de::Error) -> SpecError {
         SpecError::new("", format!("the key `{name}` is a duplicate"), "each key once", "remove one of the two")
     } else {
         let expected = "key = value, [table] or # comment";
-        SpecError::new("", format!("not TOML: {message}"), expected, "correct the line")
+        let help = match message.starts_with("string values must be quoted") {
+            true => "write a number without a unit, since `units` in [model] determines the units; put words in quotes",
+            false => "correct the line",
+        };
+        SpecError::new("", format!("not TOML: {message}"), expected, help)
     };
     SpecError { line: span.map(|span| line_of(text, span.start)), ..fault }
 }
@@ -190,7 +194,7 @@ impl<T: Read> Read for Vec<T> {
             DeValue::Array(items) => items.iter().enumerate(),
             DeValue::Table(_) if entry.key == "block" => {
                 let (expected, help) = ("[[block]], one for each block", "write two brackets: [[block]]");
-                entry.fault(SpecError::new("block", "one [block]", expected, help), faults);
+                entry.fault(SpecError::new("block", "`[block]` in single brackets", expected, help), faults);
                 return None;
             }
             _ => return entry.wrong("a list", faults),

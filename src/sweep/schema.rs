@@ -66,6 +66,11 @@ fn own() -> Value {
     let scale = |description: &str| json!({ "type": "number", "exclusiveMinimum": 0.0, "description": description });
     let model = json!({
         "velocity_bound": { "type": "boolean", "default": true, "description": "Whether optimal protocols obey v >= 1" },
+        "friction": {
+            "enum": ["log", "regularised"],
+            "default": "log",
+            "description": "Form of the direct effect: a logarithm, or an inverse hyperbolic sine, which holds down to rest",
+        },
         "units": {
             "anyOf": [
                 { "enum": ["dimensionless", "si"] },
@@ -132,7 +137,7 @@ fn any_case(word: &str) -> String {
 }
 
 /// The condition that a table has its axes, unless points or blocks may define them.
-fn needs(table: &dyn Table) -> Value {
+fn needs(table: &Table) -> Value {
     let axes = table.axes().iter().filter(|axis| axis.default().is_empty());
     let axes: Vec<&str> = axes.map(|axis| axis.name()).collect();
     let there = json!([
@@ -237,7 +242,7 @@ fn form(quantity: Quantity, units: &Units) -> Value {
 }
 
 /// The schema of a value of `[tables]`.
-fn table_of(table: &dyn Table) -> Value {
+fn table_of(table: &Table) -> Value {
     let reductions = if table.name() == "gap" { &table::REDUCED[..] } else { &[] };
     let reduced = reductions.iter().flat_map(|(_, table)| table.columns());
     let columns: BTreeSet<&str> =

@@ -3,7 +3,7 @@
 //! It depends on the spec and the version alone, so the processes need no communication.
 
 use std::cmp::Reverse;
-use std::collections::{BTreeSet, BinaryHeap};
+use std::collections::BTreeSet;
 use std::ops::Range;
 use std::str::FromStr;
 
@@ -63,15 +63,10 @@ impl Shard {
             return Ok(plan.tables.iter().map(|table| std::iter::once(0..table.parts).collect()).collect());
         }
         check_parts(plan)?;
-        let mut parts = vec![Vec::new(); plan.tables.len()];
-        deal(&part_groups(sweep, plan), self.count, |table, part, shard| {
-            if shard == self.index {
-                parts[table].push(part..part + 1);
-            }
-        });
-        // The last part of a table is a group of its own.
-        parts.iter_mut().for_each(|parts| parts.sort_unstable_by_key(|range| range.start));
-        Ok(parts)
+        let own =
+            |first: u64, parts: u64| (0..parts).filter(move |part| shard_of(first + part, self.count) == self.index);
+        let tables = first_numbers(sweep, plan).into_iter().zip(&plan.tables);
+        Ok(tables.map(|(first, table)| own(first, table.parts).map(|part| part..part + 1).collect()).collect())
     }
 }
 
@@ -121,60 +116,35 @@ pub fn shards_with(
 ) -> Result<Vec<u64>, TooManyParts> {
     check_parts(plan)?;
     let mut shards = BTreeSet::new();
-    deal(&part_groups(sweep, plan), count, |table, part, shard| {
-        if wanted(table, part) {
-            shards.insert(shard);
-        }
-    });
+    for (place, (first, table)) in first_numbers(sweep, plan).into_iter().zip(&plan.tables).enumerate() {
+        let parts = (0..table.parts).filter(|part| wanted(place, *part));
+        shards.extend(parts.map(|part| shard_of(first + part, count)));
+    }
     Ok(shards.into_iter().collect())
 }
 
-/// Parts of equal predicted cost: consecutive parts of one table.
-#[derive(Debug, Clone, PartialEq, Eq)]
-struct PartGroup {
-    table: usize,
-    parts: Range<u64>,
-    /// Cost of a part, in nanoseconds.
-    cost: u64,
-}
-
-/// The parts of a sweep in groups, the most expensive first. All parts of a table but the last have equal rows, and so equal predicted cost.
-fn part_groups(sweep: &Sweep, plan: &Plan) -> Vec<PartGroup> {
-    let mut part_groups = Vec::new();
-    for (index, (request, table)) in sweep.requests.iter().zip(&plan.tables).enumerate() {
-        let full = table.rows / table.rows_per_part;
-        for parts in [0..full, full..table.parts] {
-            if !parts.is_empty() {
-                let rows = table.rows_of(parts.start);
-                let cost = (rows.end - rows.start).saturating_mul(request.table.cost());
-                part_groups.push(PartGroup { table: index, parts, cost });
-            }
-        }
+/// The number of the first part of each table, if all parts are numbered from those of the greatest predicted cost on.
+fn first_numbers(sweep: &Sweep, plan: &Plan) -> Vec<u64> {
+    let cost = |place: usize| {
+        let table = &plan.tables[place];
+        table.rows.min(table.rows_per_part).saturating_mul(sweep.requests[place].table.cost())
+    };
+    let mut order: Vec<usize> = (0..plan.tables.len()).collect();
+    order.sort_by_key(|&place| Reverse(cost(place)));
+    let (mut firsts, mut next) = (vec![0; order.len()], 0);
+    for place in order {
+        firsts[place] = next;
+        next += plan.tables[place].parts;
     }
-    part_groups.sort_by_key(|group| Reverse(group.cost));
-    part_groups
+    firsts
 }
 
-/// Passes every part, by table and number, and its shard among `count` to `take`.
+/// The shard among `count` of part `number`.
 ///
-/// The parts of a group are dealt in rounds, one part to each shard. The remaining parts of all groups go, most expensive first, to the shard
-/// with least cost. No shard then exceeds the mean by more than one part. Each round begins with another shard: otherwise periodic costs along a
-/// table would meet in one shard whenever their period divides the number of shards.
-fn deal(part_groups: &[PartGroup], count: u64, mut take: impl FnMut(usize, u64, u64)) {
-    let mut loads: BinaryHeap<Reverse<(u64, u64, u64)>> =
-        (0..count).map(|shard| Reverse((0, mix(shard), shard))).collect();
-    for PartGroup { table, parts, cost } in part_groups {
-        let rounds = (parts.end - parts.start) / count;
-        for round in 0..rounds {
-            let first = mix(round ^ mix(*table as u64)) % count;
-            (0..count).for_each(|place| take(*table, parts.start + round * count + place, (first + place) % count));
-        }
-        for part in parts.start + rounds * count..parts.end {
-            let Some(Reverse((load, order, shard))) = loads.pop() else { break };
-            take(*table, part, shard);
-            loads.push(Reverse((load.saturating_add(*cost), mix(order), shard)));
-        }
-    }
+/// Parts are dealt in rounds, one part to each shard, so that the shards have equally many parts of each table, up to one. Each round begins with
+/// another shard: otherwise periodic costs along a table would meet in one shard whenever their period divides the number of shards.
+fn shard_of(number: u64, count: u64) -> u64 {
+    (mix(number / count) % count + number % count) % count
 }
 
 /// A hash of `x`: the finalizer of SplitMix64 after its increment.
@@ -187,45 +157,32 @@ fn mix(x: u64) -> u64 {
 
 #[cfg(test)]
 mod tests {
-    //! Every part is dealt once and evenly, also for periodic costs along a table.
+    //! Parts are dealt evenly, also for periodic costs along a table.
 
     use super::*;
 
-    fn part_groups() -> Vec<PartGroup> {
-        [(0, 0..700, 20), (0, 700..701, 7), (1, 0..13, 90), (2, 0..1, 4), (3, 0..60, 1)]
-            .map(|(table, parts, cost)| PartGroup { table, parts, cost })
-            .into()
-    }
-
     #[test]
-    fn every_part_is_dealt_once_and_loads_differ_by_one_part() {
-        let mut part_groups = part_groups();
-        part_groups.sort_by_key(|group| Reverse(group.cost));
-        let total: u64 = part_groups.iter().map(|group| group.cost * (group.parts.end - group.parts.start)).sum();
-        for count in (1..50).chain([64, 100, 699, 700, 775, 776, 1000]) {
-            let mut loads = vec![0; count as usize];
-            let mut dealt = std::collections::BTreeMap::new();
-            deal(&part_groups, count, |table, part, shard| {
-                let group = part_groups.iter().find(|group| group.table == table && group.parts.contains(&part));
-                loads[shard as usize] += group.expect("is of a pile").cost;
-                assert_eq!(dealt.insert((table, part), shard), None);
-            });
-            assert_eq!(dealt.len(), 701 + 13 + 1 + 60);
-            assert_eq!(loads.iter().sum::<u64>(), total);
-            let greatest = loads.iter().copied().max().unwrap_or(0);
-            assert!(greatest as f64 <= total as f64 / count as f64 + 90.0, "{count}: {greatest}");
+    fn parts_are_dealt_evenly() {
+        for count in (1..50).chain([64, 100, 699, 700, 1000]) {
+            for parts in [0..700_u64, 700..713, 713..714] {
+                let (least, most) = ((parts.end - parts.start) / count, (parts.end - parts.start).div_ceil(count));
+                let mut loads = vec![0; count as usize];
+                parts.for_each(|part| loads[shard_of(part, count) as usize] += 1);
+                // Up to one of each round that is cut by an end of the table.
+                assert!(
+                    loads.iter().all(|load| (least.saturating_sub(1)..=most + 1).contains(load)),
+                    "{count}: {loads:?}"
+                );
+            }
         }
     }
 
     #[test]
     fn costs_that_repeat_along_a_table_do_not_meet() {
-        let part_groups = [PartGroup { table: 0, parts: 0..4096, cost: 10 }];
         for count in [2_u64, 4, 8, 16] {
             // Every `count`-th part costs 100 times as much as predicted.
             let mut loads = vec![0; count as usize];
-            deal(&part_groups, count, |_, part, shard| {
-                loads[shard as usize] += if part % count == 0 { 100 } else { 1 }
-            });
+            (0..4096).for_each(|part| loads[shard_of(part, count) as usize] += if part % count == 0 { 100 } else { 1 });
             let mean = loads.iter().sum::<u64>() as f64 / count as f64;
             // As even as random; dealt in turn, one shard would have nearly all cost.
             assert!(loads.iter().all(|load| (*load as f64) < 1.6 * mean), "{count}: {loads:?}");

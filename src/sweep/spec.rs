@@ -7,6 +7,7 @@ use toml::de::DeValue;
 
 use super::error::Faults;
 use super::read::{Entry, Read, keys};
+use crate::model::Friction;
 
 /// A sweep spec.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -68,6 +69,8 @@ impl Spec {
 pub struct ModelSpec {
     /// Whether optimal protocols obey `v >= 1`.
     pub velocity_bound: bool,
+    /// Form of the direct effect of friction.
+    pub friction: String,
     /// Units of the values.
     pub units: String,
     /// Friction coefficient, for SI units.
@@ -84,6 +87,7 @@ impl Default for ModelSpec {
     fn default() -> Self {
         ModelSpec {
             velocity_bound: true,
+            friction: Friction::default().name().to_owned(),
             units: "dimensionless".to_owned(),
             mu_0: None,
             l: None,
@@ -163,7 +167,8 @@ keys! {
     }
     BlockSpec { "points": points, "zip": zip, "where": condition, "axes": axes }
     ModelSpec {
-        "velocity_bound": velocity_bound, "units": units, "mu_0": mu_0, "l": l, "v_0": v_0, "normal_stress": normal_stress
+        "velocity_bound": velocity_bound, "friction": friction, "units": units, "mu_0": mu_0, "l": l, "v_0": v_0,
+        "normal_stress": normal_stress
     }
     AccuracySpec { "rtol": rtol }
     AxisForm {

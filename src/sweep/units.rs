@@ -27,7 +27,7 @@ pub fn units(model: &ModelSpec) -> Result<Units, SpecError> {
                 let (key, help) = (format!("model.{name}"), "add `units = \"si\"` and give SI values, or remove it");
                 refuse(
                     key,
-                    "a scale in a sweep with scaled units",
+                    "a scale without `units = \"si\"`",
                     "units = \"si\", which needs mu_0, l, v_0 and normal_stress",
                     help,
                 )
@@ -70,10 +70,30 @@ pub fn legal(units: &Units, quantity: Quantity, scale: Scale, value: f64) -> Res
     if domain.contains(scaled) && survives {
         return Ok(());
     }
-    Err(match units {
-        Units::Scaled => domain.text.to_owned(),
-        Units::Si(_) => format!("{}, in units of {unit} = {:?} {}", domain.text, units.size(unit), units.name(unit)),
-    })
+    Err(range(units, quantity, unit))
+}
+
+/// The legal range of `quantity`, whose scaled unit is `unit`, in `units`, as in `1e-8 < v_f <= 10000 m/s (v_0 = 1e-8 m/s)`.
+fn range(units: &Units, quantity: Quantity, unit: &'static str) -> String {
+    let (domain, size, name) = (quantity.domain(), units.size(unit), units.name(unit));
+    if name == unit {
+        return domain.text.to_owned();
+    }
+    let short = |value: f64| {
+        let value: f64 = format!("{value:.8e}").parse().unwrap_or(value);
+        if (1e-3..1e6).contains(&value) || value == 0.0 { format!("{value}") } else { format!("{value:e}") }
+    };
+    let name = if name == "1" { String::new() } else { format!(" {name}") };
+    let (least, is_excluded) = domain.least();
+    let below = if is_excluded { "<" } else { "<=" };
+    let apart = domain.apart().map_or(String::new(), |apart| format!(", or {apart}"));
+    let interval = format!(
+        "{} {below} {} <= {}{name}{apart}",
+        short(least * size),
+        quantity.name(),
+        short(domain.greatest() * size)
+    );
+    format!("{interval} ({unit} = {}{name})", short(size))
 }
 
 /// The help for velocities that look scaled in a spec with SI units.

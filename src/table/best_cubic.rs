@@ -3,10 +3,11 @@
 use std::ops::Range;
 
 use super::column::fields;
-use super::optimum_cache::{OPTIMUM_AXES, transition};
-use super::{ColumnBuffer, Definition, Job, Kind, RunStats, Stopped, place, rows};
-use crate::grid::{Quantity, Scale};
-use crate::protocol::{SolverStats, best_cubic, error};
+use super::optimum_cache::{LAW_AXES, OPTIMUM_AXES, transition};
+use super::{ColumnBuffer, Job, Kind, RunStats, Stopped, Table, place, rows};
+use crate::grid::{Point, Quantity, Scale};
+use crate::protocol::optimal::Bounds;
+use crate::protocol::{Solved, SolverStats, best_cubic, error};
 
 /// A row.
 struct Row {
@@ -24,35 +25,54 @@ fields! { Row:
         => |row| row.alpha_3;
     work "mu_0 sigma l" "work of friction W_s of the best shortcut" => |row| row.best.work;
     work_optimal "mu_0 sigma l" "least work of friction W* of any protocol" => |row| row.best.work_optimal;
-    gap "1" "(W_s - W*)/W*, computed without cancellation; relative error up to 1e-7, or absolute error up to 1e-20" => |row| row.best.gap;
+    gap "1" "(W_s - W*)/W*, computed without cancellation; relative error up to 1e-7, or absolute error up to 1e-20; error up to 1e-11 (1 + gap) with a law other than ageing, or under a ceiling" => |row| row.best.gap;
     v_min "v_0" "least velocity of the best shortcut" => |row| row.best.v_min;
     work_error "mu_0 sigma l" "error bound of work, by a second search", optional => |row| row.work_error;
 }
 
 const WORK_ERROR: usize = place(&COLUMNS, "work_error");
 
-/// One row for each transition and duration.
-pub static BEST_CUBIC: Definition = Definition {
+/// One row for each transition and duration, under the laws of a grid with the axis `law`.
+pub static BEST_CUBIC: Table = Table { axes: LAW_AXES, compute: compute_with_laws, ..BEST_CUBIC_OF_AGEING };
+
+/// One row for each transition and duration, with ageing and without ceilings.
+pub const BEST_CUBIC_OF_AGEING: Table = Table {
     name: "best_cubic",
     doc: "the cubic shortcut of least work, over the whole (alpha_2, alpha_3) plane",
     axes: OPTIMUM_AXES,
     columns: &COLUMNS,
     rows_per_part: 1 << 10,
     cost: 1_500_000,
-    needs_optimum: |_| false,
+    needs_optimum: |_, _| false,
     compute,
 };
 
 fn compute(job: &Job<'_>, range: Range<u64>, buffer: &mut ColumnBuffer) -> Result<RunStats, Stopped> {
+    let solve = |point: &Point, rtol| best_cubic::solve(&transition(point), point[Quantity::Time], job.bounded, rtol);
+    compute_by(job, range, buffer, solve)
+}
+
+fn compute_with_laws(job: &Job<'_>, range: Range<u64>, buffer: &mut ColumnBuffer) -> Result<RunStats, Stopped> {
+    compute_by(job, range, buffer, |point, rtol| {
+        let bounds = Bounds::new(job.bounded).with_v_ceiling(point[Quantity::VelocityCeiling]);
+        best_cubic::solve_under(point.state_law(), &transition(point), point[Quantity::Time], bounds, rtol)
+    })
+}
+
+fn compute_by(
+    job: &Job<'_>,
+    range: Range<u64>,
+    buffer: &mut ColumnBuffer,
+    solve: impl Fn(&Point, f64) -> Solved<best_cubic::BestCubic> + Sync,
+) -> Result<RunStats, Stopped> {
     let natural = |quantity| job.grid.scale(quantity) == Some(Scale::Model);
     let (natural_2, natural_3) = (natural(Quantity::Alpha2), natural(Quantity::Alpha3));
     rows::each(job, range, 1, buffer, FIELDS, |_, point| {
         let t_f = point[Quantity::Time];
-        let solve = |rtol| best_cubic::solve(&transition(point), t_f, job.bounded, rtol);
-        let solved = solve(job.rtol);
+        let solved = solve(point, job.rtol);
         let mut stats = solved.stats;
         let row = solved.value.map(|best| {
-            let finest = job.projection.has(WORK_ERROR).then(|| solve(error::TIGHTEST_RTOL));
+            let finest = job.projection.has(WORK_ERROR).then(|| solve(point, error::TIGHTEST_RTOL));
             stats += finest.map_or_else(SolverStats::default, |finest| finest.stats);
             let finest = finest.and_then(|finest| finest.value);
             Row {

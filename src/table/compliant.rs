@@ -5,7 +5,8 @@ use std::ops::Range;
 use super::column::fields;
 use super::memo::Memo;
 use super::optimum_cache::{self, Comparison, transition, without_ceilings};
-use super::{ColumnBuffer, Definition, Job, Projection, RunStats, Stopped, number, place, rows};
+use super::{ColumnBuffer, Job, Projection, RunStats, Stopped, Table, number, place, rows};
+use crate::grid::Quantity::{A, B, FinalVelocity, InitialVelocity, Mass, Sampling, Stiffness, Time};
 use crate::grid::{Point, Quantity};
 use crate::protocol::compliant::{self, Compliant as Member};
 use crate::protocol::{Solved, SpringBlock, error};
@@ -33,7 +34,7 @@ fields! { Row:
     v_c_min "v_0" "least control velocity; errors of both extremes are relative to the greater one" => |row| row.member.control_min;
     v_c_max "v_0" "greatest control velocity" => |row| row.member.control_max;
     amplification "1"
-        "greatest factor by which a small error grows from start to end, in the norm of (ln v, ln theta, k s/a); 0 below 1e-30; \
+        "greatest factor by which a small error grows from start to end, in the norm of (ln v, ln theta, k s/a); 0 below 1e-12; \
          null beyond 3000 integration steps and beyond the range of doubles"
         => |row| number(row.amplification);
     sampling_error "1"
@@ -59,23 +60,14 @@ const WORK_ERROR: usize = place(&COLUMNS, "work_error");
 const GAP_ERROR: usize = place(&COLUMNS, "gap_error");
 
 /// One row for each transition, duration, stiffness, mass and sampling interval.
-pub static COMPLIANT: Definition = Definition {
+pub static COMPLIANT: Table = Table {
     name: "compliant",
     doc: "the smooth shortcut at finite stiffness",
-    axes: &[
-        Quantity::Time,
-        Quantity::A,
-        Quantity::B,
-        Quantity::InitialVelocity,
-        Quantity::FinalVelocity,
-        Quantity::Stiffness,
-        Quantity::Mass,
-        Quantity::Sampling,
-    ],
+    axes: &[Time, A, B, InitialVelocity, FinalVelocity, Stiffness, Mass, Sampling],
     columns: &COLUMNS,
     rows_per_part: 1 << 12,
     cost: 700_000,
-    needs_optimum,
+    needs_optimum: |projection, _| needs_optimum(projection),
     compute,
 };
 

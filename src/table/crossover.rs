@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use super::column::fields;
 use super::optimum_cache::transition;
-use super::{ColumnBuffer, Definition, Job, RunStats, Stopped, number, place, rows};
+use super::{ColumnBuffer, Job, RunStats, Stopped, Table, number, place, rows};
 use crate::grid::Quantity;
 use crate::protocol::optimal::crossover::{self, CrossoverTimes, Wanted};
 
@@ -27,14 +27,14 @@ fields! { CrossoverTimes:
 }
 
 /// One row for each transition.
-pub static CROSSOVER: Definition = Definition {
+pub static CROSSOVER: Table = Table {
     name: "crossover",
     doc: "the durations at which the optimal strategy changes",
     axes: &[Quantity::A, Quantity::B, Quantity::InitialVelocity, Quantity::FinalVelocity],
     columns: &COLUMNS,
     rows_per_part: 1 << 16,
     cost: 1_800,
-    needs_optimum: |_| false,
+    needs_optimum: |_, _| false,
     compute,
 };
 

@@ -4,8 +4,9 @@ use std::ops::Range;
 
 use super::column::fields;
 use super::optimum_cache::with_ceilings;
-use super::{ColumnBuffer, Definition, Job, Kind, RunStats, Stopped, rows};
+use super::{ColumnBuffer, Job, Kind, RunStats, Stopped, Table, rows};
 use crate::grid::Quantity;
+use crate::grid::Quantity::{A, B, FinalVelocity, FrictionCeiling, Theta, TimeLeft, VelocityCeiling};
 use crate::model::Law;
 use crate::protocol::optimal::{self, FeedbackPoint};
 
@@ -22,22 +23,14 @@ fields! { FeedbackPoint:
 }
 
 /// One row for each state and time left, target and pair of ceilings.
-pub static FEEDBACK: Definition = Definition {
+pub static FEEDBACK: Table = Table {
     name: "feedback",
     doc: "the optimal velocity now, by the state variable and the time left",
-    axes: &[
-        Quantity::Theta,
-        Quantity::TimeLeft,
-        Quantity::A,
-        Quantity::B,
-        Quantity::FinalVelocity,
-        Quantity::VelocityCeiling,
-        Quantity::FrictionCeiling,
-    ],
+    axes: &[Theta, TimeLeft, A, B, FinalVelocity, VelocityCeiling, FrictionCeiling],
     columns: &COLUMNS,
     rows_per_part: 1 << 16,
     cost: 3_000,
-    needs_optimum: |_| false,
+    needs_optimum: |_, _| false,
     compute,
 };
 

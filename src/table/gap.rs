@@ -7,11 +7,12 @@ use std::ops::Range;
 use std::sync::OnceLock;
 
 use super::failpoint;
-use super::optimum_cache::{transition, without_ceilings, work_error};
+use super::optimum_cache::{LAW_AXES, least_work, transition, without_ceilings, work_error};
 use super::rows::on_all_threads;
-use super::{Column, ColumnBuffer, Definition, Job, Projection, RunStats, Stopped};
+use super::{Column, ColumnBuffer, Job, Projection, RunStats, Stopped, Table};
+use crate::grid::Quantity::{A, Alpha2, Alpha3, B, FinalVelocity, InitialVelocity, Law, Time, VelocityCeiling};
 use crate::grid::{Point, Quantity, Runs, Scale, View};
-use crate::model::Transition;
+use crate::model::{Friction, Transition};
 use crate::protocol::cubic::{Landscape, LandscapeBuffers};
 use crate::protocol::{Status, error};
 
@@ -33,8 +34,16 @@ pub(super) const COLUMNS: &[Column] = &[
 /// Rows of a chunk. Chosen: a run stops within a fraction of a second at any accuracy.
 const CHUNK: usize = 1 << 13;
 
-/// One row for each shortcut.
-pub static GAP: Definition = Definition {
+/// One row for each shortcut, under the laws of a grid with the axis `law`.
+pub static GAP: Table = Table {
+    axes: &[Time, A, B, Law, InitialVelocity, FinalVelocity, VelocityCeiling, Alpha2, Alpha3],
+    needs_optimum: |_, _| false,
+    compute: compute_with_laws,
+    ..GAP_OF_AGEING
+};
+
+/// One row for each shortcut, with ageing and without ceilings.
+pub const GAP_OF_AGEING: Table = Table {
     name: "gap",
     doc: "the work of a cubic shortcut and its gap to the optimum",
     axes: &[
@@ -49,7 +58,7 @@ pub static GAP: Definition = Definition {
     columns: COLUMNS,
     rows_per_part: 1 << 18,
     cost: 100,
-    needs_optimum,
+    needs_optimum: |projection, _| needs_optimum(projection),
     compute,
 };
 
@@ -58,13 +67,29 @@ fn needs_optimum(projection: &Projection) -> bool {
 }
 
 pub(super) fn compute(job: &Job<'_>, rows: Range<u64>, buffer: &mut ColumnBuffer) -> Result<RunStats, Stopped> {
+    compute_by(job, prepare, rows, buffer)
+}
+
+fn compute_with_laws(job: &Job<'_>, rows: Range<u64>, buffer: &mut ColumnBuffer) -> Result<RunStats, Stopped> {
+    compute_by(&Job { tuples: job.rows.tuples(LAW_AXES), ..*job }, prepare_with_law, rows, buffer)
+}
+
+/// Prepares the landscape of a group from one of its points.
+type Prepare = fn(&Job<'_>, &LandscapeRows, &Point, &mut RunStats) -> PreparedLandscape;
+
+fn compute_by(
+    job: &Job<'_>,
+    prepare: Prepare,
+    rows: Range<u64>,
+    buffer: &mut ColumnBuffer,
+) -> Result<RunStats, Stopped> {
     let view = job.rows.view(rows.clone());
     let (groups, order) = groups(&view, job, &rows);
     let coefficients = Coefficients::new(job, view, &rows, order.as_deref());
     let work = on_all_threads(chunks(&groups, buffer, job.projection), |chunk| {
         job.signal.check()?;
         let length = chunk.cells.status.len() as u64;
-        let work = evaluate(job, &groups, &coefficients, chunk);
+        let work = evaluate((job, prepare), &groups, &coefficients, chunk);
         job.signal.advance(length);
         Ok(work)
     })?;
@@ -78,16 +103,16 @@ pub(super) fn compute(job: &Job<'_>, rows: Range<u64>, buffer: &mut ColumnBuffer
 }
 
 /// Rows of one transition and duration, contiguous in the order of computation.
-struct Group {
+struct LandscapeRows {
     tuple: u64,
     /// One of its rows.
     row: u64,
     /// Where its rows are in the order of computation.
     places: Range<usize>,
-    prepared: OnceLock<Prepared>,
+    prepared: OnceLock<PreparedLandscape>,
 }
 
-struct Prepared {
+struct PreparedLandscape {
     /// `None` if no protocol with `v >= 1` is fast enough: every row is infeasible.
     landscape: Option<Landscape>,
     /// The landscape at the tightest tolerance, its transition and duration, if error bounds are requested.
@@ -99,7 +124,7 @@ struct Prepared {
 }
 
 /// The groups of a part, and the row of each place in the order of computation, if the orders differ.
-fn groups(view: &View<'_>, job: &Job<'_>, rows: &Range<u64>) -> (Vec<Group>, Option<Vec<u32>>) {
+fn groups(view: &View<'_>, job: &Job<'_>, rows: &Range<u64>) -> (Vec<LandscapeRows>, Option<Vec<u32>>) {
     let mut runs = view.tuples(&job.tuples, rows.clone());
     let in_order = |runs: &[(u64, Range<u64>)]| {
         let mut tuples: Vec<u64> = runs.iter().map(|(tuple, _)| *tuple).collect();
@@ -112,13 +137,13 @@ fn groups(view: &View<'_>, job: &Job<'_>, rows: &Range<u64>) -> (Vec<Group>, Opt
         runs.sort_by_key(|(tuple, _)| *tuple);
         Some(runs.iter().flat_map(|(_, run)| run.clone()).map(|row| (row - rows.start) as u32).collect())
     };
-    let mut groups: Vec<Group> = Vec::new();
+    let mut groups: Vec<LandscapeRows> = Vec::new();
     let mut place = 0;
     for (tuple, run) in runs {
         let end = place + (run.end - run.start) as usize;
         match groups.last_mut() {
             Some(group) if group.tuple == tuple => group.places.end = end,
-            _ => groups.push(Group { tuple, row: run.start, places: place..end, prepared: OnceLock::new() }),
+            _ => groups.push(LandscapeRows { tuple, row: run.start, places: place..end, prepared: OnceLock::new() }),
         }
         place = end;
     }
@@ -176,16 +201,16 @@ impl<'a> Coefficients<'a> {
 }
 
 /// The cells of consecutive places; a column that is not requested is empty.
-struct Cells<'a> {
+struct CellSlices<'a> {
     columns: [&'a mut [f64]; COLUMNS.len()],
     status: &'a mut [Status],
 }
 
-impl<'a> Cells<'a> {
-    fn split(self, at: usize) -> (Cells<'a>, Cells<'a>) {
+impl<'a> CellSlices<'a> {
+    fn split(self, at: usize) -> (CellSlices<'a>, CellSlices<'a>) {
         let (first, second) = self.status.split_at_mut(at);
-        let mut left = Cells { columns: std::array::from_fn(|_| Default::default()), status: first };
-        let mut right = Cells { columns: std::array::from_fn(|_| Default::default()), status: second };
+        let mut left = CellSlices { columns: std::array::from_fn(|_| Default::default()), status: first };
+        let mut right = CellSlices { columns: std::array::from_fn(|_| Default::default()), status: second };
         for (i, column) in self.columns.into_iter().enumerate() {
             let middle = at.min(column.len());
             (left.columns[i], right.columns[i]) = column.split_at_mut(middle);
@@ -195,15 +220,15 @@ impl<'a> Cells<'a> {
 }
 
 /// The work unit of a thread: places of one or several groups.
-struct Chunk<'a> {
+struct RowChunk<'a> {
     first_group: usize,
     place: usize,
-    cells: Cells<'a>,
+    cells: CellSlices<'a>,
 }
 
 /// Cuts a part into chunks.
-fn chunks<'a>(groups: &[Group], buffer: &'a mut ColumnBuffer, projection: &Projection) -> Vec<Chunk<'a>> {
-    let mut rest = Cells { columns: std::array::from_fn(|_| Default::default()), status: &mut buffer.status };
+fn chunks<'a>(groups: &[LandscapeRows], buffer: &'a mut ColumnBuffer, projection: &Projection) -> Vec<RowChunk<'a>> {
+    let mut rest = CellSlices { columns: std::array::from_fn(|_| Default::default()), status: &mut buffer.status };
     for (column, &index) in buffer.columns.iter_mut().zip(projection.indices()) {
         rest.columns[index] = column;
     }
@@ -219,15 +244,20 @@ fn chunks<'a>(groups: &[Group], buffer: &'a mut ColumnBuffer, projection: &Proje
             group += 1;
         }
         let length = cells.status.len();
-        chunks.push(Chunk { first_group: group, place, cells });
+        chunks.push(RowChunk { first_group: group, place, cells });
         place += length;
     }
     chunks
 }
 
 /// Computes a chunk, group by group.
-fn evaluate(job: &Job<'_>, groups: &[Group], coefficients: &Coefficients<'_>, chunk: Chunk<'_>) -> RunStats {
-    let Chunk { first_group, mut place, mut cells } = chunk;
+fn evaluate(
+    (job, prepare): (&Job<'_>, Prepare),
+    groups: &[LandscapeRows],
+    coefficients: &Coefficients<'_>,
+    chunk: RowChunk<'_>,
+) -> RunStats {
+    let RowChunk { first_group, mut place, mut cells } = chunk;
     cells.columns.iter_mut().for_each(|column| column.fill(f64::NAN));
     let (mut a_2, mut a_3) = (Vec::with_capacity(CHUNK), Vec::with_capacity(CHUNK));
     let (mut work_buffer, mut v_min_buffer, mut error_buffer) = (Vec::new(), Vec::new(), Vec::new());
@@ -256,6 +286,10 @@ fn evaluate(job: &Job<'_>, groups: &[Group], coefficients: &Coefficients<'_>, ch
         let v_min = if v_min.is_empty() { buffer(&mut v_min_buffer, length) } else { v_min };
         let out = LandscapeBuffers { work: &mut *works, v_min: &mut *v_min, status: &mut *now.status };
         work += RunStats::from(landscape.evaluate(&a_2, &a_3, out));
+        if job.friction == Friction::Regularised {
+            let out = LandscapeBuffers { work: &mut *works, v_min: &mut *v_min, status: &mut *now.status };
+            work += RunStats::from(landscape.regularise(&a_2, &a_3, job.rtol, out));
+        }
         let errors = if work_error.is_empty() && prepared.finest.is_some() {
             buffer(&mut error_buffer, length)
         } else {
@@ -287,7 +321,7 @@ struct Compared<'a> {
 }
 
 /// Removes rows that did not converge, and compares the work with the optimum.
-fn compare(prepared: &Prepared, cells: Compared<'_>) {
+fn compare(prepared: &PreparedLandscape, cells: Compared<'_>) {
     let Compared { status, works, v_min, work_optimal, gap, errors, gap_error } = cells;
     for (i, status) in status.iter().enumerate() {
         if *status == Status::NotConverged {
@@ -320,10 +354,10 @@ fn buffer(buffer: &mut Vec<f64>, length: usize) -> &mut [f64] {
     buffer
 }
 
-fn prepare(job: &Job<'_>, group: &Group, point: &Point, work: &mut RunStats) -> Prepared {
+fn prepare(job: &Job<'_>, group: &LandscapeRows, point: &Point, work: &mut RunStats) -> PreparedLandscape {
     let (transition, t_f) = (transition(point), point[Quantity::Time]);
     if job.bounded && t_f < transition.min_duration() {
-        return Prepared { landscape: None, finest: None, optimum: None, error_optimal: f64::NAN };
+        return PreparedLandscape { landscape: None, finest: None, optimum: None, error_optimal: f64::NAN };
     }
     work.landscapes += 1;
     let mut error_optimal = f64::NAN;
@@ -338,7 +372,25 @@ fn prepare(job: &Job<'_>, group: &Group, point: &Point, work: &mut RunStats) -> 
     let landscape = |rtol| Landscape::new(&transition, t_f, rtol);
     let finest =
         job.projection.has_any([WORK_ERROR, GAP_ERROR]).then(|| (landscape(error::TIGHTEST_RTOL), transition, t_f));
-    Prepared { landscape: Some(landscape(job.rtol)), finest, optimum, error_optimal }
+    PreparedLandscape { landscape: Some(landscape(job.rtol)), finest, optimum, error_optimal }
+}
+
+/// [`prepare`] under the law and the velocity ceiling of the point.
+fn prepare_with_law(job: &Job<'_>, _: &LandscapeRows, point: &Point, work: &mut RunStats) -> PreparedLandscape {
+    let (transition, t_f, state) = (transition(point), point[Quantity::Time], point.state_law());
+    let least = least_work(job, point, job.projection.has(GAP_ERROR), work);
+    if least.status == Status::Infeasible {
+        return PreparedLandscape { landscape: None, finest: None, optimum: None, error_optimal: f64::NAN };
+    }
+    work.landscapes += 1;
+    let landscape = |rtol| Landscape::under(state, &transition, t_f, rtol);
+    let has_errors = job.projection.has_any([WORK_ERROR, GAP_ERROR]);
+    PreparedLandscape {
+        landscape: Some(landscape(job.rtol)),
+        finest: has_errors.then(|| (landscape(error::TIGHTEST_RTOL), transition, t_f)),
+        optimum: Some((least.status, least.value.map(|(work, _)| work))),
+        error_optimal: least.value.map_or(f64::NAN, |(_, error)| error),
+    }
 }
 
 /// Sorts a buffer from the order of computation into the order of rows.

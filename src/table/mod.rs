@@ -20,7 +20,8 @@ mod step_response;
 
 use std::ops::Range;
 
-use crate::grid::{Grid, Point, Quantity, RowIndex, Tuples};
+use crate::grid::{Block, Grid, Point, Quantity, RowIndex, Tuples};
+use crate::model::{Friction, StateLaw};
 
 pub use column::{Column, Field, Kind, STATUS, STATUS_DOC, columns, number, place};
 pub use column_buffer::{ColumnBuffer, Phase, Projection, RunStats, Signal, Stopped};
@@ -30,88 +31,84 @@ pub(crate) use reduced::EDGES as HISTOGRAM_EDGES;
 pub use reduced::MAX_SORTED;
 
 /// A table: the axes of its rows, its columns and its computation.
-pub trait Table: Sync {
-    /// Its name in specs, and the name of its folder.
-    fn name(&self) -> &'static str;
-
-    /// The meaning of a row, in one line.
-    fn doc(&self) -> &'static str;
-
-    /// The axes of the table, which are its first columns, in the order of [`Quantity::ALL`].
-    fn axes(&self) -> &'static [Quantity];
-
-    /// The columns after the axes, without `status`.
-    fn columns(&self) -> &'static [Column];
-
-    /// Rows of a part. A fixed number: the bytes of a part depend on the spec alone.
-    fn rows_per_part(&self) -> u64;
-
-    /// Mean cost of a row, in nanoseconds of one processor. A fixed number: the distribution of parts over shards depends on the ratios of
-    /// these costs.
-    fn cost(&self) -> u64;
-
-    /// Whether the projected columns need the optimal protocol of every row, from [`OptimumCache`].
-    fn needs_optimum(&self, projection: &Projection) -> bool;
-
-    /// Default relative accuracy of the table; `None`: that of the sweep.
-    fn default_rtol(&self) -> Option<f64> {
-        None
-    }
-
-    /// The prediction of linear theory for one of its columns, if any.
-    fn prediction(&self) -> Option<Prediction> {
-        None
-    }
-
-    /// Computes `rows` into `buffer`, which has the projected columns and this number of rows. Writes every cell.
-    ///
-    /// # Errors
-    /// [`Stopped`] if the run was stopped.
-    fn compute(&self, job: &Job<'_>, rows: Range<u64>, buffer: &mut ColumnBuffer) -> Result<RunStats, Stopped>;
-}
-
-/// A table of constant properties.
-pub struct Definition {
+pub struct Table {
     name: &'static str,
     doc: &'static str,
     axes: &'static [Quantity],
     columns: &'static [Column],
     rows_per_part: u64,
     cost: u64,
-    needs_optimum: fn(&Projection) -> bool,
+    needs_optimum: fn(&Projection, &Block) -> bool,
     compute: fn(&Job<'_>, Range<u64>, &mut ColumnBuffer) -> Result<RunStats, Stopped>,
 }
 
-impl Table for Definition {
-    fn name(&self) -> &'static str {
+impl Table {
+    /// Its name in specs, and the name of its folder.
+    pub const fn name(&self) -> &'static str {
         self.name
     }
 
-    fn doc(&self) -> &'static str {
+    /// The meaning of a row, in one line.
+    pub fn doc(&self) -> &'static str {
         self.doc
     }
 
-    fn axes(&self) -> &'static [Quantity] {
+    /// The axes of the table, which are its first columns, in the order of [`Quantity::ALL`].
+    pub fn axes(&self) -> &'static [Quantity] {
         self.axes
     }
 
-    fn columns(&self) -> &'static [Column] {
+    /// The evolution laws of the state that it knows.
+    pub fn laws(&self) -> &'static [StateLaw] {
+        if self.axes.contains(&Quantity::Law) { &StateLaw::ALL } else { &[StateLaw::Ageing] }
+    }
+
+    /// Whether a law other than ageing needs a velocity floor and ceiling, and knows no friction ceiling: the optimum is among its columns.
+    pub fn laws_need_ceiling(&self) -> bool {
+        self.axes.contains(&Quantity::Law) && self.axes.contains(&Quantity::VelocityCeiling)
+    }
+
+    /// The columns after the axes, without `status`.
+    pub fn columns(&self) -> &'static [Column] {
         self.columns
     }
 
-    fn rows_per_part(&self) -> u64 {
+    /// Rows of a part. A fixed number: the bytes of a part depend on the spec alone.
+    pub fn rows_per_part(&self) -> u64 {
         self.rows_per_part
     }
 
-    fn cost(&self) -> u64 {
+    /// Mean cost of a row, in nanoseconds of one processor. A fixed number: the distribution of parts over shards depends on the ratios of
+    /// these costs.
+    pub fn cost(&self) -> u64 {
         self.cost
     }
 
-    fn needs_optimum(&self, projection: &Projection) -> bool {
-        (self.needs_optimum)(projection)
+    /// Whether rows of `block` need an optimal protocol from [`OptimumCache`] for the projected columns.
+    pub fn needs_optimum(&self, projection: &Projection, block: &Block) -> bool {
+        (self.needs_optimum)(projection, block)
     }
 
-    fn compute(&self, job: &Job<'_>, rows: Range<u64>, buffer: &mut ColumnBuffer) -> Result<RunStats, Stopped> {
+    /// Default relative accuracy of the table; `None`: that of the sweep.
+    pub fn default_rtol(&self) -> Option<f64> {
+        self.is_simulated().then_some(step_response::DEFAULT_RTOL)
+    }
+
+    /// The prediction of linear theory for one of its columns, if any.
+    pub fn prediction(&self) -> Option<Prediction> {
+        self.is_simulated().then_some(step_response::PREDICTION)
+    }
+
+    /// Whether its rows are simulations.
+    fn is_simulated(&self) -> bool {
+        std::ptr::eq(self, &step_response::STEP_RESPONSE)
+    }
+
+    /// Computes `rows` into `buffer`, which has the projected columns and this number of rows. Writes every cell.
+    ///
+    /// # Errors
+    /// [`Stopped`] if the run was stopped.
+    pub fn compute(&self, job: &Job<'_>, rows: Range<u64>, buffer: &mut ColumnBuffer) -> Result<RunStats, Stopped> {
         (self.compute)(job, rows, buffer)
     }
 }
@@ -134,7 +131,7 @@ pub struct Prediction {
 }
 
 /// Every table, in the order of listings. A new table needs a file and a line here.
-pub const ALL: [&dyn Table; 10] = [
+pub const ALL: [&Table; 10] = [
     &gap::GAP,
     &best_cubic::BEST_CUBIC,
     &optimal::OPTIMAL,
@@ -142,18 +139,39 @@ pub const ALL: [&dyn Table; 10] = [
     &crossover::CROSSOVER,
     &shortcut::SHORTCUT,
     &stability::STABILITY,
-    &step_response::StepResponse,
+    &step_response::STEP_RESPONSE,
     &compliant::COMPLIANT,
     &regularised::REGULARISED,
 ];
 
 /// The reductions of `gap`: the word in a spec, and the table that it writes.
-pub const REDUCED: [(&str, &dyn Table); 3] =
+pub const REDUCED: [(&str, &Table); 3] =
     [("min", &reduced::MINIMUM), ("quantiles", &reduced::QUANTILES), ("histogram", &reduced::HISTOGRAM)];
 
 /// The table with this name, including those of [`REDUCED`].
-pub fn find(name: &str) -> Option<&'static dyn Table> {
+pub fn find(name: &str) -> Option<&'static Table> {
     ALL.into_iter().chain(REDUCED.map(|(_, table)| table)).find(|table| table.name() == name)
+}
+
+/// `table` over a grid: without the axis `law`, `gap` and `best_cubic` depend on neither the law nor the velocity ceiling.
+pub fn over(table: &'static Table, has_laws: bool) -> &'static Table {
+    static GAP_OF_AGEING: Table = gap::GAP_OF_AGEING;
+    static BEST_CUBIC_OF_AGEING: Table = best_cubic::BEST_CUBIC_OF_AGEING;
+    match table.name() {
+        "gap" if !has_laws => &GAP_OF_AGEING,
+        "best_cubic" if !has_laws => &BEST_CUBIC_OF_AGEING,
+        _ => table,
+    }
+}
+
+/// `column` as a table over `grid` has it: without the words of other laws than ageing if the grid has no axis `law`.
+pub fn written(column: Column, grid: &Grid) -> Column {
+    match column.kind {
+        Kind::Label(words) if std::ptr::eq(words, optimal::STRATEGIES) && grid.scale(Quantity::Law).is_none() => {
+            Column { kind: Kind::Label(optimal::STRATEGIES_OF_AGEING), ..column }
+        }
+        _ => column,
+    }
 }
 
 /// The input of [`Table::compute`].
@@ -173,6 +191,8 @@ pub struct Job<'a> {
     pub sizes: &'a [f64],
     /// Whether optimal protocols obey `v >= 1`.
     pub bounded: bool,
+    /// Form of the direct effect of friction.
+    pub friction: Friction,
     /// Relative accuracy of the table.
     pub rtol: f64,
     /// The cache of optimal protocols.

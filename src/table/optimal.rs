@@ -4,13 +4,20 @@ use std::ops::Range;
 
 use super::column::fields;
 use super::optimum_cache::{self, transition, with_ceilings, work_error};
-use super::{ColumnBuffer, Definition, Job, Kind, RunStats, Stopped, number, place, rows};
-use crate::grid::{Point, Quantity};
+use super::{ColumnBuffer, Job, Kind, Projection, RunStats, Stopped, Table, number, place, rows};
+use crate::grid::Quantity::{A, B, FinalVelocity, FrictionCeiling, InitialVelocity, Law, Time, VelocityCeiling};
+use crate::grid::{Block, Point, Quantity};
+use crate::model::{Friction, StateLaw};
 use crate::protocol::optimal::{self, Bounds, Obstacle, Optimum, Slopes};
-use crate::protocol::{Solved, Status};
+use crate::protocol::relaxed::{self, Chatter, Relaxed};
+use crate::protocol::{Solved, Status, arcsinh};
 
 /// The words of `strategy`, in the order of [`Strategy::ALL`](crate::protocol::optimal::Strategy::ALL).
-const STRATEGIES: &[&str] = &["speed_up", "slow_down", "floor"];
+pub(super) static STRATEGIES: &[&str] =
+    &["speed_up", "slow_down", "floor", "wait_jerk", "jerk_wait", "chatter", "rise"];
+
+/// Those of the ageing law.
+pub(super) static STRATEGIES_OF_AGEING: &[&str] = &["speed_up", "slow_down", "floor"];
 
 /// The words of `binding`.
 const BINDING: &[&str] = &["none", "v_ceiling", "tau_ceiling", "both"];
@@ -22,6 +29,7 @@ const OBSTACLES: &[&str] = &["domain", "too_fast", "too_slow", "v_ceiling", "tau
 #[derive(Default)]
 struct Row {
     optimum: Option<Optimum>,
+    chatter: Option<Chatter>,
     slopes: Option<Slopes>,
     work_error: f64,
     t_least: Option<f64>,
@@ -35,8 +43,12 @@ impl Row {
         self.optimum.as_ref().map_or(f64::NAN, cell)
     }
 
+    fn of_chatter(&self, cell: impl Fn(&Chatter) -> f64) -> f64 {
+        self.chatter.as_ref().map_or(f64::NAN, cell)
+    }
+
     fn slope(&self, cell: impl Fn(&Slopes) -> f64) -> f64 {
-        self.slopes.as_ref().map_or(f64::NAN, cell)
+        self.slopes.as_ref().map(cell).filter(|slope| slope.is_finite()).unwrap_or(f64::NAN)
     }
 }
 
@@ -44,14 +56,15 @@ fields! { Row:
     work "mu_0 sigma l" "least work of friction W*" => |row| row.of_optimum(|found| found.work);
     v_start "v_0" "velocity just after the start, v(0+)" => |row| row.of_optimum(|found| found.v_start);
     v_end "v_0" "velocity just before the end, v(t_f-)" => |row| row.of_optimum(|found| found.v_end);
-    time_at_floor "l/v_0" "time spent on the velocity floor v = 1" => |row| row.of_optimum(|found| found.time_at_floor);
+    time_at_floor "l/v_0" "time spent on the velocity floor v = v_0" => |row| row.of_optimum(|found| found.time_at_floor);
     time_at_v_ceiling "l/v_0" "time spent on the velocity ceiling"
         => |row| row.of_optimum(|found| found.time_at_v_ceiling);
     time_at_tau_ceiling "l/v_0" "time spent on the friction ceiling"
         => |row| row.of_optimum(|found| found.time_at_tau_ceiling);
     hamiltonian "mu_0 sigma v_0" "dW*/dt_f" => |row| row.of_optimum(|found| found.hamiltonian);
     theta_max "l/v_0" "greatest state variable theta on the path" => |row| row.of_optimum(|found| found.theta_max);
-    strategy (Kind::Label(STRATEGIES)) "start of the protocol: speed_up v(0+) > v_i, slow_down 1 < v(0+) <= v_i, floor v(0+) = 1"
+    strategy (Kind::Label(STRATEGIES)) "start of the protocol: speed_up v(0+) > v_i, slow_down 1 < v(0+) <= v_i, floor v(0+) = 1; \
+        with slip and prz wait_jerk, jerk_wait, chatter or rise, where a jerk is a jump of v to v_ceiling, not da/dt"
         => |row| row.of_optimum(|found| f64::from(found.strategy as u8));
     work_error "mu_0 sigma l" "error bound of work, by a second solve", optional
         => |row| if row.optimum.is_some() { row.work_error } else { f64::NAN };
@@ -62,11 +75,18 @@ fields! { Row:
     t_least "l/v_0" "least feasible duration under the floor and the ceilings", optional => |row| number(row.t_least);
     v_ceiling_least "v_0" "least feasible velocity ceiling for t_f and tau_ceiling", optional
         => |row| number(row.v_ceiling_least);
-    tau_ceiling_least "mu_0 sigma" "least feasible friction ceiling for t_f and v_ceiling", optional
+    tau_ceiling_least "mu_0 sigma" "least feasible friction ceiling for t_f and v_ceiling; null with slip and prz", optional
         => |row| number(row.tau_ceiling_least);
     bound (Kind::Label(OBSTACLES))
         "the bound that makes the row infeasible; too_fast: t_f < t_least, too_slow: theta cannot wait so long", optional
         => |row| number(row.obstacle.map(|obstacle| code(obstacle) as f64));
+    chatter_time "l/v_0" "time in which v alternates ever faster between both bounds; null unless strategy is chatter", optional
+        => |row| row.of_chatter(|chatter| chatter.time);
+    chatter_theta "l/v_0" "state variable theta while v alternates", optional => |row| row.of_chatter(|chatter| chatter.theta);
+    chatter_duty "1" "fraction of chatter_time on the velocity ceiling", optional
+        => |row| row.of_chatter(|chatter| chatter.duty);
+    work_bang_bang "mu_0 sigma l" "least work with one switch between both bounds; null unless strategy is chatter", optional
+        => |row| row.of_chatter(|chatter| chatter.work_bang_bang);
     dwork_da "sigma l" "derivative of work with respect to a", optional => |row| row.slope(|slopes| slopes.a);
     dwork_db "sigma l" "derivative of work with respect to b", optional => |row| row.slope(|slopes| slopes.b);
     dwork_dv_i "mu_0 sigma l/v_0" "derivative of work with respect to v_i", optional
@@ -88,28 +108,38 @@ const BOUND: usize = place(&COLUMNS, "bound");
 const FIRST_SLOPE: usize = place(&COLUMNS, "dwork_da");
 
 /// One row for each transition, duration and pair of ceilings.
-pub static OPTIMAL: Definition = Definition {
+pub static OPTIMAL: Table = Table {
     name: "optimal",
     doc: "the protocol of least work",
-    axes: &[
-        Quantity::Time,
-        Quantity::A,
-        Quantity::B,
-        Quantity::InitialVelocity,
-        Quantity::FinalVelocity,
-        Quantity::VelocityCeiling,
-        Quantity::FrictionCeiling,
-    ],
+    axes: &[Time, A, B, Law, InitialVelocity, FinalVelocity, VelocityCeiling, FrictionCeiling],
     columns: &COLUMNS,
     rows_per_part: 1 << 16,
     cost: 2_500,
-    needs_optimum: |_| true,
+    needs_optimum: |projection, block| !wants_slopes(projection) && has_uncapped(block),
     compute,
 };
 
+/// The slopes come with an optimum of their own.
+fn wants_slopes(projection: &Projection) -> bool {
+    projection.has_any(FIRST_SLOPE..COLUMNS.len())
+}
+
+/// Whether a row of `block` has the ageing law and no ceiling.
+fn has_uncapped(block: &Block) -> bool {
+    let ceilings = [Quantity::VelocityCeiling, Quantity::FrictionCeiling];
+    ceilings.into_iter().all(|ceiling| block.may_be(ceiling, f64::is_infinite))
+        && block.may_be(Quantity::Law, |law| law == f64::from(StateLaw::Ageing as u8))
+}
+
 fn compute(job: &Job<'_>, range: Range<u64>, buffer: &mut ColumnBuffer) -> Result<RunStats, Stopped> {
-    let wants_slopes = job.projection.has_any(FIRST_SLOPE..COLUMNS.len());
+    let wants_slopes = wants_slopes(job.projection);
     rows::each(job, range, 64, buffer, FIELDS, |tuple, point| {
+        if job.friction == Friction::Regularised {
+            return regularised_row(job, (tuple, point), wants_slopes);
+        }
+        if point.state_law() != StateLaw::Ageing {
+            return relaxed_row(point, wants_slopes, job.projection.has(V_CEILING_LEAST));
+        }
         let mut work = RunStats::default();
         let bounds = with_ceilings(job, point);
         let (solved, slopes) = if wants_slopes {
@@ -123,6 +153,59 @@ fn compute(job: &Job<'_>, range: Range<u64>, buffer: &mut ColumnBuffer) -> Resul
         }
         (solved.status, Some(row), work)
     })
+}
+
+/// A row with regularised friction, which knows no ceilings.
+fn regularised_row(job: &Job<'_>, (tuple, point): (u64, &Point), wants_slopes: bool) -> rows::ComputedRow<Row> {
+    let (transition, t_f) = (transition(point), point[Quantity::Time]);
+    let mut work = RunStats::default();
+    let (solved, slopes) = if wants_slopes {
+        let solved = arcsinh::solve(&transition, t_f);
+        work += RunStats { own_optima: 1, ..RunStats::from(solved.stats) };
+        (solved.map(|found| found.optimum), solved.value.map(|found| found.slopes))
+    } else {
+        (optimum_cache::optimum(job, (tuple, point), &optimum_cache::without_ceilings(job), &mut work), None)
+    };
+    let t_least = arcsinh::least_time(&transition);
+    let is_infeasible = solved.status == Status::Infeasible;
+    let row = Row {
+        optimum: solved.value,
+        slopes,
+        t_least,
+        obstacle: t_least.filter(|_| is_infeasible).map(|t_least| Obstacle::TooFast { t_least }),
+        ..Row::default()
+    };
+    (solved.status, Some(row), work)
+}
+
+/// A row of another law than ageing.
+fn relaxed_row(point: &Point, wants_slopes: bool, wants_ceiling: bool) -> rows::ComputedRow<Row> {
+    let (law, transition, t_f) = (point.state_law(), transition(point), point[Quantity::Time]);
+    let v_ceiling = point[Quantity::VelocityCeiling];
+    let solved = relaxed::solve(law, &transition, t_f, v_ceiling);
+    let t_least = relaxed::least_time(law, &transition, v_ceiling);
+    let obstacle = match (solved.status, t_least) {
+        (Status::Infeasible, Some(t_least)) => Some(Obstacle::TooFast { t_least }),
+        (Status::Infeasible, None) => Some(Obstacle::VCeiling { above: transition.v_f }),
+        // Not solved: a ceiling below both velocities, or below the start of a rise.
+        (Status::Unproven, _) if solved.value.is_none() && transition.v_i > v_ceiling => {
+            Some(Obstacle::VCeiling { above: transition.v_i })
+        }
+        _ => None,
+    };
+    let slopes = || relaxed::slopes(law, &transition, t_f, v_ceiling);
+    let v_ceiling_least = || relaxed::least_v_ceiling(law, &transition, t_f);
+    let row = Row {
+        optimum: solved.value.map(|found: Relaxed| found.optimum),
+        chatter: solved.value.and_then(|found| found.chatter),
+        work_error: solved.value.map_or(f64::NAN, |found| relaxed::work_error(&found, &transition, t_f)),
+        t_least,
+        slopes: wants_slopes.then(slopes).flatten(),
+        v_ceiling_least: wants_ceiling.then(v_ceiling_least).flatten(),
+        obstacle,
+        ..Row::default()
+    };
+    (solved.status, Some(row), RunStats { own_optima: 1, ..RunStats::from(solved.stats) })
 }
 
 /// The least feasible numbers that are requested, and the reason of an infeasible row.
@@ -162,6 +245,7 @@ mod tests {
     #[test]
     fn strategies_are_named_alike() {
         assert_eq!(Strategy::ALL.map(Strategy::name), STRATEGIES);
-        assert_eq!(Strategy::ALL.map(|strategy| strategy as usize), [0, 1, 2]);
+        assert_eq!(Strategy::ALL.map(|strategy| strategy as usize), [0, 1, 2, 3, 4, 5, 6]);
+        assert_eq!(STRATEGIES_OF_AGEING, &STRATEGIES[..3]);
     }
 }

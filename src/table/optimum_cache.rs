@@ -4,14 +4,18 @@ use std::sync::OnceLock;
 
 use super::memo::Memo;
 use super::{Job, RunStats};
+use crate::grid::Quantity::{A, B, FinalVelocity, InitialVelocity, Time, VelocityCeiling};
 use crate::grid::{Point, Quantity};
-use crate::model::{Law, Transition};
+use crate::model::{Friction, Law, StateLaw, Transition};
 use crate::protocol::optimal::{self, Bounds, Optimum, Slopes};
-use crate::protocol::{Solved, Status, error};
+use crate::protocol::{Solved, Status, arcsinh, error, relaxed};
 
 /// The axes of the optimal protocol.
 pub const OPTIMUM_AXES: &[Quantity] =
     &[Quantity::Time, Quantity::A, Quantity::B, Quantity::InitialVelocity, Quantity::FinalVelocity];
+
+/// The axes of the optimal protocol under other laws of the state.
+pub const LAW_AXES: &[Quantity] = &[Time, A, B, Quantity::Law, InitialVelocity, FinalVelocity, VelocityCeiling];
 
 /// The transition of a point that holds at least `a`, `b`, `v_i` and `v_f`.
 pub fn transition(point: &Point) -> Transition {
@@ -60,6 +64,28 @@ pub fn work_error(point: &Point, bounds: &Bounds, optimum: &Optimum, work: &mut 
     bound.unwrap_or(f64::NAN)
 }
 
+/// The least work of `point` under its law and velocity ceiling, with its error bound if `wanted`. Adds the solver statistics to `work`.
+pub fn least_work(job: &Job<'_>, point: &Point, wanted: bool, work: &mut RunStats) -> Solved<(f64, f64)> {
+    let (transition, t_f, v_ceiling) = (transition(point), point[Quantity::Time], point[Quantity::VelocityCeiling]);
+    if point.state_law() != StateLaw::Ageing {
+        let solved = relaxed::solve(point.state_law(), &transition, t_f, v_ceiling);
+        *work += RunStats { own_optima: 1, ..RunStats::from(solved.stats) };
+        let value = solved.value.map(|found| (found.optimum.work, relaxed::work_error(&found, &transition, t_f)));
+        return Solved { status: solved.status, value, stats: solved.stats };
+    }
+    if job.friction == Friction::Regularised {
+        let solved = arcsinh::solve(&transition, t_f).map(|found| (found.optimum.work, f64::NAN));
+        *work += RunStats { own_optima: 1, ..RunStats::from(solved.stats) };
+        return solved;
+    }
+    let bounds = Bounds::new(job.bounded).with_v_ceiling(v_ceiling);
+    let solved = optimal::solve(&transition, t_f, bounds, job.rtol);
+    *work += RunStats { own_optima: 1, ..RunStats::from(solved.stats) };
+    let mut error = |optimum: &Optimum| if wanted { work_error(point, &bounds, optimum, work) } else { f64::NAN };
+    let value = solved.value.map(|optimum| (optimum.work, error(&optimum)));
+    Solved { status: solved.status, value, stats: solved.stats }
+}
+
 /// The least work of any protocol, and the gap of one protocol to it.
 pub struct Comparison {
     /// The least work W*; NaN if unknown.
@@ -106,6 +132,7 @@ type Slot = OnceLock<Solved<Optimum>>;
 pub struct OptimumCache {
     slots: Slots,
     bounded: bool,
+    friction: Friction,
     rtol: f64,
 }
 
@@ -118,7 +145,7 @@ enum Slots {
 }
 
 impl OptimumCache {
-    /// Greatest number of tuples kept for a whole run (about 100 MB). Larger grids keep those of one part.
+    /// Greatest number of tuples kept for a whole run. Chosen: about 100 MB; larger grids keep those of one part.
     pub const MAX_CACHED: u64 = 1 << 20;
 
     /// A cache for `tuples` different transitions and durations, solved to `rtol`, with `v >= 1` if `bounded`.
@@ -134,14 +161,24 @@ impl OptimumCache {
             let kept = if span <= Self::MAX_CACHED { span as usize } else { 0 };
             Slots::Dense(std::iter::repeat_with(OnceLock::new).take(kept).collect())
         };
-        OptimumCache { slots, bounded, rtol }
+        OptimumCache { slots, bounded, friction: Friction::Log, rtol }
+    }
+
+    /// This cache for `friction`.
+    #[must_use]
+    pub fn with(self, friction: Friction) -> OptimumCache {
+        OptimumCache { friction, ..self }
     }
 
     /// The optimal protocol of `point`, which has tuple number `tuple`; adds the statistics of this call.
     pub fn get(&self, tuple: u64, point: &Point) -> (Solved<Optimum>, RunStats) {
         let mut work = RunStats::default();
         let mut solve = || {
-            let solved = optimal::solve(&transition(point), point[Quantity::Time], self.bounded, self.rtol);
+            let (transition, t_f) = (transition(point), point[Quantity::Time]);
+            let solved = match self.friction {
+                Friction::Log => optimal::solve(&transition, t_f, self.bounded, self.rtol),
+                Friction::Regularised => arcsinh::solve(&transition, t_f).map(|found| found.optimum),
+            };
             work = RunStats { optima: 1, ..RunStats::from(solved.stats) };
             solved
         };

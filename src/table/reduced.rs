@@ -8,7 +8,7 @@ use std::ops::Range;
 use super::column::fields;
 use super::gap;
 use super::optimum_cache::OPTIMUM_AXES;
-use super::{ColumnBuffer, Definition, Field, Job, Projection, RunStats, Signal, Stopped, number};
+use super::{ColumnBuffer, Field, Job, Projection, RunStats, Signal, Stopped, Table, number};
 use crate::grid::Quantity;
 use crate::protocol::Status;
 
@@ -31,7 +31,7 @@ mod minimum {
     }
 
     /// The shortcut of least gap.
-    pub static MINIMUM: Definition = reduced(
+    pub static MINIMUM: Table = reduced(
         "gap_min",
         "the shortcut of least gap of a landscape (reduce = \"min\" of gap)",
         &COLUMNS,
@@ -54,7 +54,7 @@ mod quantiles {
     }
 
     /// Quantiles of the gap.
-    pub static QUANTILES: Definition = reduced(
+    pub static QUANTILES: Table = reduced(
         "gap_quantiles",
         "quantiles of the gap of a landscape (reduce = \"quantiles\" of gap)",
         &COLUMNS,
@@ -81,7 +81,7 @@ mod histogram {
     }
 
     /// Numbers of shortcuts by decades of the gap.
-    pub static HISTOGRAM: Definition = reduced(
+    pub static HISTOGRAM: Table = reduced(
         "gap_histogram",
         "histogram of the gap of a landscape (reduce = \"histogram\" of gap)",
         &COLUMNS,
@@ -99,26 +99,26 @@ const fn reduced(
     doc: &'static str,
     columns: &'static [super::Column],
     compute: fn(&Job<'_>, Range<u64>, &mut ColumnBuffer) -> Result<RunStats, Stopped>,
-) -> Definition {
-    Definition {
+) -> Table {
+    Table {
         name,
         doc,
         axes: OPTIMUM_AXES,
         columns,
         rows_per_part: 1 << 8,
         cost: 16_000_000,
-        needs_optimum: |_| true,
+        needs_optimum: |_, _| true,
         compute,
     }
 }
 
-/// Rows of a landscape in memory at a time.
+/// Rows of a landscape in memory at a time. Chosen: a few megabytes.
 const BLOCK_ROWS: usize = 1 << 16;
 
-/// Greatest number of shortcuts of a row of `gap_quantiles`, whose gaps are sorted in memory.
+/// Greatest number of shortcuts of a row of `gap_quantiles`, whose gaps are sorted in memory. Chosen: 16 MB of gaps for each thread.
 pub const MAX_SORTED: u64 = 1 << 21;
 
-/// Lower edges of the classes of the histogram, without the first.
+/// Lower edges of the classes of the histogram, without the first. Chosen: decades.
 pub const EDGES: [f64; 10] = [1e-8, 1e-7, 1e-6, 1e-5, 1e-4, 1e-3, 1e-2, 1e-1, 1.0, 10.0];
 
 fn compute(

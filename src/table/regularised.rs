@@ -4,8 +4,9 @@ use std::ops::Range;
 
 use super::column::fields;
 use super::compliant::{slider, velocities};
-use super::{ColumnBuffer, Definition, Job, RunStats, Stopped, place, rows};
+use super::{ColumnBuffer, Job, RunStats, Stopped, Table, place, rows};
 use crate::grid::Quantity;
+use crate::grid::Quantity::{A, B, FinalVelocity, InitialVelocity, Mass, Smoothing, Stiffness, Time};
 use crate::protocol::regularised::{self, Regularised as Found};
 use crate::protocol::{SolverStats, error};
 
@@ -32,23 +33,14 @@ const WORK_ERROR: usize = place(&COLUMNS, "work_error");
 const GAP_ERROR: usize = place(&COLUMNS, "gap_error");
 
 /// One row for each transition, duration, stiffness, mass and length of the smooth pieces.
-pub static REGULARISED: Definition = Definition {
+pub static REGULARISED: Table = Table {
     name: "regularised",
     doc: "the optimal protocol with its jumps replaced by smooth pieces",
-    axes: &[
-        Quantity::Time,
-        Quantity::A,
-        Quantity::B,
-        Quantity::InitialVelocity,
-        Quantity::FinalVelocity,
-        Quantity::Stiffness,
-        Quantity::Mass,
-        Quantity::Smoothing,
-    ],
+    axes: &[Time, A, B, InitialVelocity, FinalVelocity, Stiffness, Mass, Smoothing],
     columns: &COLUMNS,
     rows_per_part: 1 << 14,
     cost: 50_000,
-    needs_optimum: |_| false,
+    needs_optimum: |_, _| false,
     compute,
 };
 

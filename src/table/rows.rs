@@ -10,7 +10,7 @@ use crate::grid::{Point, Quantity, Runs};
 use crate::protocol::Status;
 
 /// A computed row: its status, its values if any, and solver statistics.
-pub type Solved<R> = (Status, Option<R>, RunStats);
+pub type ComputedRow<R> = (Status, Option<R>, RunStats);
 
 /// Computes `rows` by calling `row` with the tuple number and the point of each. A row without values has missing cells.
 ///
@@ -25,7 +25,7 @@ pub fn each<R>(
     chunk: usize,
     buffer: &mut ColumnBuffer,
     fields: &[Field<R>],
-    row: impl Fn(u64, &Point) -> Solved<R> + Sync,
+    row: impl Fn(u64, &Point) -> ComputedRow<R> + Sync,
 ) -> Result<RunStats, Stopped> {
     let view = job.rows.view(rows.clone());
     let tuples = view.tuples(&job.tuples, rows.clone());
@@ -40,9 +40,9 @@ pub fn each<R>(
         .collect();
     let starts = rows.clone().step_by(chunk);
     let mut columns: Vec<_> = buffer.columns.iter_mut().map(|column| column.chunks_mut(chunk)).collect();
-    let chunks: Vec<Chunk<'_>> = starts
+    let chunks: Vec<RowChunk<'_>> = starts
         .zip(buffer.status.chunks_mut(chunk))
-        .map(|(start, status)| Chunk {
+        .map(|(start, status)| RowChunk {
             start,
             columns: columns.iter_mut().filter_map(Iterator::next).collect(),
             status,
@@ -88,14 +88,14 @@ struct Steps {
 type Numbered = (u64, Range<u64>);
 
 /// The cells of consecutive rows.
-struct Chunk<'a> {
+struct RowChunk<'a> {
     start: u64,
     /// The projected columns.
     columns: Vec<&'a mut [f64]>,
     status: &'a mut [Status],
 }
 
-impl Chunk<'_> {
+impl RowChunk<'_> {
     fn compute(
         mut self,
         job: &Job<'_>,

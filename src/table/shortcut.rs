@@ -5,8 +5,9 @@ use std::ops::Range;
 use super::column::fields;
 use super::memo::Memo;
 use super::optimum_cache::{self, Comparison, transition, without_ceilings};
-use super::{ColumnBuffer, Definition, Job, Kind, Projection, RunStats, Stopped, number, place, rows};
-use crate::grid::{Point, Quantity};
+use super::{ColumnBuffer, Job, Kind, Projection, RunStats, Stopped, Table, number, place, rows};
+use crate::grid::Quantity::{A, B, FinalVelocity, FrictionCeiling, InitialVelocity, Time};
+use crate::grid::{Block, Point, Quantity};
 use crate::protocol::optimal::Bounds;
 use crate::protocol::shortcut::{Case, FAMILIES, Family, Obstacle, Shortcut as Member};
 use crate::protocol::{SolverStats, error};
@@ -54,27 +55,25 @@ const WORK_ERROR: usize = place(&COLUMNS, "work_error");
 const GAP_ERROR: usize = place(&COLUMNS, "gap_error");
 
 /// One row for each transition, duration, family and friction ceiling.
-pub static SHORTCUT: Definition = Definition {
+pub static SHORTCUT: Table = Table {
     name: "shortcut",
     doc: "the shortcut of a family",
-    axes: &[
-        Quantity::Time,
-        Quantity::A,
-        Quantity::B,
-        Quantity::InitialVelocity,
-        Quantity::FinalVelocity,
-        Quantity::Family,
-        Quantity::FrictionCeiling,
-    ],
+    axes: &[Time, A, B, InitialVelocity, FinalVelocity, Quantity::Family, FrictionCeiling],
     columns: &COLUMNS,
     rows_per_part: 1 << 14,
     cost: 25_000,
-    needs_optimum,
+    needs_optimum: |projection, block| needs_optimum(projection) && has_uncapped(block),
     compute,
 };
 
 fn needs_optimum(projection: &Projection) -> bool {
     projection.has_any([WORK_OPTIMAL, GAP, GAP_ERROR])
+}
+
+/// Whether a row of `block` is compared with the optimum without ceilings.
+fn has_uncapped(block: &Block) -> bool {
+    let is_uncapped = |number: f64| FAMILIES.get(number as usize).is_some_and(|family| !family.uses_tau_ceiling());
+    block.may_be(Quantity::Family, is_uncapped) || block.may_be(Quantity::FrictionCeiling, f64::is_infinite)
 }
 
 fn compute(job: &Job<'_>, range: Range<u64>, buffer: &mut ColumnBuffer) -> Result<RunStats, Stopped> {

@@ -5,14 +5,10 @@ use std::ops::Range;
 use super::column::fields;
 use super::memo::Memo;
 use super::optimum_cache::transition;
-use super::{Column, ColumnBuffer, Job, Kind, Prediction, Projection, RunStats, Stopped, Table, number, rows};
-use crate::grid::Quantity;
-use crate::model::Law;
+use super::{ColumnBuffer, Job, Kind, Prediction, RunStats, Stopped, Table, number, rows};
+use crate::grid::Quantity::{A, B, FinalVelocity, InitialVelocity, Law, Mass, Stiffness};
 use crate::stability::step_response::{self, LimitCycle, Outcome, Response, Simulation};
 use crate::stability::{SteadySliding, lyapunov_coefficient};
-
-/// One row for each transition, stiffness and mass.
-pub struct StepResponse;
 
 /// A row.
 struct Row {
@@ -40,9 +36,9 @@ fields! { Row:
          undecided, or if not known to that accuracy"
         => |row| row.of_solution(|response| number(response.t_peak));
     outcome (Kind::Label(&Outcome::NAMES)) "long-term behaviour of the response"
-        => |row| row.of_solution(|response| f64::from(response.outcome as u8));
+        => |row| f64::from(row.response.as_ref().map_or(Outcome::Diverged, |response| response.outcome) as u8);
     stick_slip (Kind::Flag) "whether the oscillation is sustained; null if undecided"
-        => |row| row.of_solution(|response| [0.0, 1.0, f64::NAN][response.outcome as usize]);
+        => |row| row.of_solution(|response| [0.0, 1.0, f64::NAN, f64::NAN][response.outcome as usize]);
     settling_time "l/v_0" "time after which v stays within 1 % of v_f; null unless settled, or if not known to rtol"
         => |row| row.of_solution(|response| number(response.settling_time));
     period "l/v_0" "duration of the limit cycle; null without one" => |row| row.cycle(|cycle| cycle.period);
@@ -54,91 +50,54 @@ fields! { Row:
         => |row| row.of_solution(|response| response.t_end);
     first_lyapunov_coefficient "1"
         "first Lyapunov coefficient at the critical stiffness for this mass and v_f: negative if the Hopf point is \
-         supercritical, positive if it is subcritical; null for b <= a and for m = 0", optional
+         supercritical, positive if it is subcritical; null for b <= a, and for m = 0 except with prz", optional
         => |row| number(row.lyapunov);
 }
 
-impl Table for StepResponse {
-    fn name(&self) -> &'static str {
-        "step_response"
-    }
+/// One row for each transition, stiffness and mass.
+pub static STEP_RESPONSE: Table = Table {
+    name: "step_response",
+    doc: "the response to an abrupt step of the control velocity",
+    axes: &[A, B, Law, InitialVelocity, FinalVelocity, Stiffness, Mass],
+    columns: &COLUMNS,
+    rows_per_part: 1 << 12,
+    cost: 350_000,
+    needs_optimum: |_, _| false,
+    compute,
+};
 
-    fn doc(&self) -> &'static str {
-        "the response to an abrupt step of the control velocity"
-    }
+/// Relative accuracy by default. Chosen: each further digit of a simulation costs time.
+pub const DEFAULT_RTOL: f64 = 1e-6;
 
-    fn axes(&self) -> &'static [Quantity] {
-        &[
-            Quantity::A,
-            Quantity::B,
-            Quantity::InitialVelocity,
-            Quantity::FinalVelocity,
-            Quantity::Stiffness,
-            Quantity::Mass,
-        ]
-    }
+/// The prediction of linear stability.
+pub const PREDICTION: Prediction = Prediction {
+    column: "outcome",
+    theory: "linear stability at v_f (settled above k_c)",
+    surprise: Outcome::NAMES[Outcome::LimitCycle as usize],
+    why: "stable against small disturbances, but the step leads to a limit cycle around steady sliding",
+    axes: &[A, B, FinalVelocity, Stiffness, Mass],
+    word: |point| {
+        let sliding = SteadySliding::new(transition(point).law, point[Stiffness], point[Mass], point[FinalVelocity]);
+        Outcome::NAMES[if sliding.is_stable() { Outcome::Settled } else { Outcome::LimitCycle } as usize]
+    },
+};
 
-    fn columns(&self) -> &'static [Column] {
-        &COLUMNS
-    }
-
-    fn rows_per_part(&self) -> u64 {
-        1 << 12
-    }
-
-    fn cost(&self) -> u64 {
-        350_000
-    }
-
-    fn needs_optimum(&self, _selection: &Projection) -> bool {
-        false
-    }
-
-    /// 1e-6. Each further digit of a simulation costs time.
-    fn default_rtol(&self) -> Option<f64> {
-        Some(1e-6)
-    }
-
-    fn prediction(&self) -> Option<Prediction> {
-        Some(Prediction {
-            column: "outcome",
-            theory: "linear stability at v_f (settled above k_c)",
-            surprise: Outcome::NAMES[Outcome::LimitCycle as usize],
-            why: "stable against small disturbances, but the step leads to a limit cycle around steady sliding",
-            axes: &[Quantity::A, Quantity::B, Quantity::FinalVelocity, Quantity::Stiffness, Quantity::Mass],
-            word: |point| {
-                let law = Law { a: point[Quantity::A], b: point[Quantity::B] };
-                let (k, m) = (point[Quantity::Stiffness], point[Quantity::Mass]);
-                let outcome = if SteadySliding::new(law, k, m, point[Quantity::FinalVelocity]).is_stable() {
-                    Outcome::Settled
-                } else {
-                    Outcome::LimitCycle
-                };
-                Outcome::NAMES[outcome as usize]
-            },
-        })
-    }
-
-    fn compute(&self, job: &Job<'_>, range: Range<u64>, buffer: &mut ColumnBuffer) -> Result<RunStats, Stopped> {
-        let simulations = Memo::<[u64; 5], Simulation>::default();
-        rows::each(job, range, 4, buffer, FIELDS, |_, point| {
-            let step = step_response::Step {
-                transition: transition(point),
-                k: point[Quantity::Stiffness],
-                m: point[Quantity::Mass],
-            };
-            let mut work = RunStats::default();
-            // Steps with equal scaled numbers share one simulation.
-            let simulation = step.scaled().map(|scaled| {
-                simulations.get(scaled.key(), || {
-                    let simulation = scaled.follow(job.rtol);
-                    work = RunStats { simulations: 1, steps: simulation.steps.into(), ..RunStats::default() };
-                    simulation
-                })
-            });
-            let (status, response) = step.from_simulation(simulation.as_ref(), job.rtol);
-            let lyapunov = lyapunov_coefficient(step.transition.law, step.inertia());
-            (status, Some(Row { response, lyapunov }), work)
-        })
-    }
+fn compute(job: &Job<'_>, range: Range<u64>, buffer: &mut ColumnBuffer) -> Result<RunStats, Stopped> {
+    let simulations = Memo::<[u64; 6], Simulation>::default();
+    rows::each(job, range, 4, buffer, FIELDS, |_, point| {
+        let (state_law, transition) = (point.state_law(), transition(point));
+        let step = step_response::VelocityStep { state_law, transition, k: point[Stiffness], m: point[Mass] };
+        let mut work = RunStats::default();
+        // Steps with equal scaled numbers share one simulation.
+        let simulation = step.scaled().map(|scaled| {
+            simulations.get(scaled.key(), || {
+                let simulation = scaled.follow(job.rtol);
+                work = RunStats { simulations: 1, steps: simulation.steps.into(), ..RunStats::default() };
+                simulation
+            })
+        });
+        let (status, response) = step.from_simulation(simulation.as_ref(), job.rtol);
+        let lyapunov = lyapunov_coefficient(step.state_law, step.transition.law, step.inertia());
+        (status, Some(Row { response, lyapunov }), work)
+    })
 }

@@ -27,7 +27,7 @@ pub struct Rest {
 }
 
 /// The part of a motion up to a place `s`.
-pub(super) struct Head {
+pub(super) struct MotionStart {
     motion: Box<dyn Motion>,
     s: f64,
     t: f64,
@@ -38,13 +38,13 @@ pub(super) fn place(motion: &dyn Motion, disturbance: &Disturbance) -> Option<(f
     sample::at_time(motion, disturbance.at * motion.duration())
 }
 
-impl Head {
-    pub(super) fn new(motion: Box<dyn Motion>, (s, moment): (f64, Moment)) -> Head {
-        Head { motion, s, t: moment.t }
+impl MotionStart {
+    pub(super) fn new(motion: Box<dyn Motion>, (s, moment): (f64, Moment)) -> MotionStart {
+        MotionStart { motion, s, t: moment.t }
     }
 }
 
-impl Motion for Head {
+impl Motion for MotionStart {
     fn duration(&self) -> f64 {
         self.t
     }
@@ -64,7 +64,7 @@ impl Motion for Head {
 }
 
 /// Pieces of an interval between landmarks. Chosen: with them the open loop of the paper's protocol keeps 12 digits.
-const PIECES: u32 = 4;
+const PIECES_PER_INTERVAL: u32 = 4;
 
 /// The planned velocity after a disturbance of theta: `d theta' = -v d theta`, so the difference shrinks by `e^-slip`.
 struct OpenLoop {
@@ -73,12 +73,12 @@ struct OpenLoop {
     s: f64,
     /// The difference of theta just after the disturbance.
     difference: f64,
-    pieces: Vec<Piece>,
+    pieces: Vec<PlannedPiece>,
     b: f64,
 }
 
 /// A piece of the planned motion, by its parameter, with the slip since the disturbance.
-struct Piece {
+struct PlannedPiece {
     start: f64,
     length: f64,
     slip: f64,
@@ -98,8 +98,8 @@ pub(super) fn open_loop(
     let difference = change * first.theta;
     let (mut pieces, mut slip, mut excess) = (Vec::new(), 0.0, 0.0);
     for pair in ends.windows(2) {
-        let length = (pair[1] - pair[0]) / f64::from(PIECES);
-        for step in 0..PIECES {
+        let length = (pair[1] - pair[0]) / f64::from(PIECES_PER_INTERVAL);
+        for step in 0..PIECES_PER_INTERVAL {
             let start = pair[0] + f64::from(step) * length;
             let moments: [Moment; NODES] = std::array::from_fn(|j| planned.at(start + length * radau().u[j]));
             let t = planned.at(start).t;
@@ -109,7 +109,7 @@ pub(super) fn open_loop(
             let costs =
                 std::array::from_fn(|j| b * ln_1p(difference * exp(-(slip + slips[j])) / moments[j].theta) * powers[j]);
             excess += radau().integrals(&costs)[NODES - 1];
-            pieces.push(Piece { start, length, slip, slips });
+            pieces.push(PlannedPiece { start, length, slip, slips });
             slip += slips[NODES - 1];
         }
     }
@@ -121,7 +121,7 @@ pub(super) fn open_loop(
 impl OpenLoop {
     fn slip(&self, s: f64) -> f64 {
         let place = self.pieces.partition_point(|piece| piece.start <= s).saturating_sub(1);
-        let Some(Piece { start, length, slip, slips }) = self.pieces.get(place) else { return 0.0 };
+        let Some(PlannedPiece { start, length, slip, slips }) = self.pieces.get(place) else { return 0.0 };
         slip + radau().interpolate(0.0, slips, ((s - start) / length).clamp(0.0, 1.0))
     }
 }

@@ -13,7 +13,7 @@ use crate::protocol::{Moment, Motion};
 use crate::table::{Column, Kind};
 
 pub use disturbed::{Disturbance, Rest};
-pub use protocol::{Absence, Disturbed, Parameter, Protocol, TracedPath, names};
+pub use protocol::{Absence, Disturbed, Parameter, Protocol, TracedPath, has_floor, names, quantities};
 #[cfg(feature = "read")]
 pub use row::{Pathless, TABLES, protocol_of};
 pub use sample::{RANGE_RTOL, VALUE_RTOL};
@@ -23,7 +23,7 @@ pub use write::{csv, parquet, record_batch};
 pub const COLUMNS: [Column; 6] = [
     Column::number("t", "l/v_0", "time since the start; equal in two rows where the velocity jumps"),
     Column::number("v", "v_0", "velocity"),
-    Column::number("theta", "l/v_0", "contact lifetime"),
+    Column::number("theta", "l/v_0", "state variable"),
     Column::number("tau", "mu_0 sigma", "friction 1 + a ln v + b ln theta"),
     Column::number("v_c", "v_0", "control velocity of the load point"),
     Column::number(

@@ -1,12 +1,13 @@
 //! The protocols that can be traced, by name, and their parameters.
 
 use super::disturbed::{self, Disturbance, Rest};
-use crate::model::Transition;
+use crate::grid::Quantity;
+use crate::model::{Law, StateLaw, Transition};
 use crate::protocol::cubic::{Landscape, LandscapeBuffers};
 use crate::protocol::optimal::{self, Bounds, Optimum};
 use crate::protocol::shortcut::{self, Case, FAMILIES, Family, Obstacle};
-use crate::protocol::{Moment, Motion, SolverStats, SpringBlock, Status, best_cubic, compliant, regularised};
-use crate::stability::step_response::Step;
+use crate::protocol::{Moment, Motion, SolverStats, SpringBlock, Status, best_cubic, compliant, regularised, relaxed};
+use crate::stability::step_response::VelocityStep;
 
 /// A protocol, with its spring if that is elastic.
 #[derive(Clone, Copy)]
@@ -14,31 +15,99 @@ use crate::stability::step_response::Step;
 pub enum Protocol {
     /// The protocol of least work under these bounds.
     Optimal { bounds: Bounds },
+    /// The protocol of least work for a law other than ageing, between `v = 1` and `v_ceiling`.
+    Relaxed { law: StateLaw, v_ceiling: f64 },
     /// The rest of a protocol of least work, from a state on the way: the transition of its case starts at `v_i = 1/theta`, its `t_f` is the
     /// time left.
     OptimalFrom { theta: f64, bounds: Bounds },
-    /// The cubic shortcut of least work, with `v >= 1` if `bounded`.
-    BestCubic { bounded: bool },
+    /// The cubic shortcut of least work, with `v >= 1` under the floor of `bounds`, compared with the optimum under them.
+    BestCubic { law: StateLaw, bounds: Bounds },
     /// A point of the landscape, scaled: `alpha_2 t_f` and `alpha_3 t_f^2`.
-    CubicPoint { a_2: f64, a_3: f64 },
+    CubicPoint { law: StateLaw, a_2: f64, a_3: f64 },
     /// The member of a family.
     Family(&'static dyn Family),
     /// The response of a block on a spring to a step of the control velocity.
-    StepResponse { k: f64, m: f64 },
+    StepResponse { state_law: StateLaw, k: f64, m: f64 },
     /// The smooth shortcut on a spring.
     Compliant { k: f64, m: f64 },
     /// The optimal protocol with smooth pieces instead of jumps, on a spring.
     Regularised { k: f64, m: f64, delta_t: f64, bounded: bool },
 }
 
+/// The quantities that determine the protocol `name`: those of [`names`], and `feedback`, the rest of an optimal protocol from a state.
+pub fn quantities(name: &str) -> Vec<Quantity> {
+    let (start, own): (_, &[Quantity]) = match name {
+        "feedback" => ([Quantity::Theta, Quantity::TimeLeft], &[Quantity::VelocityCeiling, Quantity::FrictionCeiling]),
+        _ => (
+            [Quantity::Time, Quantity::InitialVelocity],
+            match name {
+                "optimal" => &[Quantity::Law, Quantity::VelocityCeiling, Quantity::FrictionCeiling],
+                "best_cubic" => &[Quantity::Law, Quantity::VelocityCeiling],
+                "gap" => &[Quantity::Law, Quantity::Alpha2, Quantity::Alpha3],
+                "step_response" => &[Quantity::Law, Quantity::Stiffness, Quantity::Mass],
+                "compliant" => &[Quantity::Stiffness, Quantity::Mass],
+                "regularised" => &[Quantity::Stiffness, Quantity::Mass, Quantity::Smoothing],
+                _ if shortcut::find(name).is_some_and(|family| family.uses_tau_ceiling()) => {
+                    &[Quantity::FrictionCeiling]
+                }
+                _ => &[],
+            },
+        ),
+    };
+    start.into_iter().chain([Quantity::A, Quantity::B, Quantity::FinalVelocity]).chain(own.iter().copied()).collect()
+}
+
+/// Whether the velocity floor has an effect on a protocol.
+pub fn has_floor(name: &str) -> bool {
+    matches!(name, "optimal" | "feedback" | "best_cubic" | "regularised")
+}
+
 impl Protocol {
-    /// The response of a block on a spring to a step of the control velocity. With a rigid spring, or without a change of velocity, the block
-    /// follows the load point at once.
-    pub fn step_response(k: f64, m: f64, changes: bool) -> Protocol {
-        match shortcut::find("step") {
-            Some(step) if k == f64::INFINITY || !changes => Protocol::Family(step),
-            _ => Protocol::StepResponse { k, m },
-        }
+    /// The protocol `name` and its case, from the scaled numbers of its [`quantities`]; the coefficients of a cubic are relative to the duration.
+    ///
+    /// # Errors
+    ///
+    /// A quantity without a number; the family, if no protocol has this name.
+    pub fn new(
+        name: &str,
+        bounded: bool,
+        number: impl Fn(Quantity) -> Option<f64>,
+    ) -> Result<(Protocol, Case), Quantity> {
+        let number = |quantity: Quantity| number(quantity).ok_or(quantity);
+        let (v_i, t_f) = match name {
+            "feedback" => (1.0 / number(Quantity::Theta)?, number(Quantity::TimeLeft)?),
+            _ => (number(Quantity::InitialVelocity)?, number(Quantity::Time)?),
+        };
+        let law = Law { a: number(Quantity::A)?, b: number(Quantity::B)? };
+        let transition = Transition { law, v_i, v_f: number(Quantity::FinalVelocity)? };
+        let [v_ceiling, tau_ceiling] = [number(Quantity::VelocityCeiling)?, number(Quantity::FrictionCeiling)?];
+        let bounds = Bounds { floor: bounded, v_ceiling, tau_ceiling };
+        let (k, m) = (number(Quantity::Stiffness)?, number(Quantity::Mass)?);
+        let state_law = StateLaw::ALL.get(number(Quantity::Law)? as usize).copied().unwrap_or_default();
+        let protocol = match (name, shortcut::find(name)) {
+            ("optimal", _) if state_law != StateLaw::Ageing => Protocol::Relaxed { law: state_law, v_ceiling },
+            ("optimal", _) => Protocol::Optimal { bounds },
+            ("feedback", _) => Protocol::OptimalFrom { theta: number(Quantity::Theta)?, bounds },
+            ("best_cubic", _) => Protocol::BestCubic { law: state_law, bounds },
+            ("gap", _) => {
+                let (a_2, a_3) = (number(Quantity::Alpha2)?, number(Quantity::Alpha3)?);
+                Protocol::CubicPoint { law: state_law, a_2, a_3 }
+            }
+            // With a rigid spring, or without a change of velocity, the block follows the load point at once, which only
+            // the ageing law has as a shortcut.
+            ("step_response", _) => {
+                let is_shortcut = k == f64::INFINITY && state_law == StateLaw::Ageing;
+                match shortcut::find("step") {
+                    Some(step) if is_shortcut || v_i == transition.v_f => Protocol::Family(step),
+                    _ => Protocol::StepResponse { state_law, k, m },
+                }
+            }
+            ("compliant", _) => Protocol::Compliant { k, m },
+            ("regularised", _) => Protocol::Regularised { k, m, delta_t: number(Quantity::Smoothing)?, bounded },
+            (_, Some(family)) => Protocol::Family(family),
+            _ => return Err(Quantity::Family),
+        };
+        Ok((protocol, Case { transition, t_f, tau_ceiling }))
     }
 }
 
@@ -93,15 +162,27 @@ fn bound(bounded: &bool) -> &'static str {
     if *bounded { "v >= 1" } else { "v > 0" }
 }
 
+/// A positive `value` with six digits, rounded up (`direction` 1) or down (-1).
+fn six_digits(value: f64, direction: f64) -> f64 {
+    let nearest = |value: f64| format!("{value:.5e}").parse().unwrap_or(value);
+    let near: f64 = nearest(value);
+    let place = 10_f64.powf(value.log10().floor() - 5.0);
+    if direction * (near - value) >= 0.0 { near } else { nearest(near + direction * place) }
+}
+
 /// The bound that leaves no protocol of duration `t_f`.
 fn of_ceiling(obstacle: &optimal::Obstacle, t_f: f64) -> String {
     match obstacle {
         optimal::Obstacle::Domain => Obstacle::Domain.to_string(),
         optimal::Obstacle::TooFast { t_least } => {
-            format!("t_f = {t_f} is too short under these ceilings: the least is {t_least}")
+            let least = six_digits(*t_least, 1.0);
+            let found = format!("t_f = {t_f} is too short under these ceilings: the least is {least}");
+            format!("{found}\n  help: raise --t-f to at least {least}, or raise the ceilings")
         }
         optimal::Obstacle::TooSlow { t_most } => {
-            format!("t_f = {t_f} is too long under these ceilings: the greatest is {t_most}")
+            let greatest = six_digits(*t_most, -1.0);
+            let found = format!("t_f = {t_f} is too long under these ceilings: the greatest is {greatest}");
+            format!("{found}\n  help: lower --t-f to at most {greatest}, or raise the ceilings")
         }
         optimal::Obstacle::VCeiling { above } => format!("v_ceiling must be above {above}"),
         optimal::Obstacle::TauCeiling { above } => format!("tau_ceiling must be above {above}"),
@@ -138,6 +219,9 @@ pub enum Absence {
     /// The velocity becomes infinite, or has too many oscillations to show.
     #[error("before t_f the velocity becomes infinite, or there are more oscillations than can be shown")]
     Response,
+    /// The spring is rigid, under another law than ageing.
+    #[error("on a rigid spring a jump is traced with the ageing law alone\n  help: give the stiffness of a spring")]
+    Rigid,
     /// Friction is so low somewhere that the extremal need not be unique, and none was found.
     #[error("friction is too low: where tau <= max(0, b - a) an optimum is not guaranteed, and none was found")]
     Unproven,
@@ -175,11 +259,12 @@ impl Protocol {
     pub fn path(&self, case: &Case, rtol: f64) -> Result<TracedPath, Absence> {
         match *self {
             Protocol::Optimal { bounds } => optimum(case, &bounds, rtol),
+            Protocol::Relaxed { law, v_ceiling } => relaxed_optimum(case, law, v_ceiling),
             Protocol::OptimalFrom { theta, bounds } => rest(case, theta, &bounds, rtol),
-            Protocol::BestCubic { bounded } => least_cubic(case, bounded, rtol),
-            Protocol::CubicPoint { a_2, a_3 } => gap(case, a_2, a_3, rtol),
+            Protocol::BestCubic { law, bounds } => least_cubic(case, law, &bounds, rtol),
+            Protocol::CubicPoint { law, a_2, a_3 } => gap(case, law, (a_2, a_3), rtol),
             Protocol::Family(family) => member(family, case, rtol),
-            Protocol::StepResponse { k, m } => response(case, k, m, rtol),
+            Protocol::StepResponse { state_law, k, m } => response(case, state_law, (k, m), rtol),
             Protocol::Compliant { k, m } => smooth(case, k, m, rtol),
             Protocol::Regularised { k, m, delta_t, bounded } => pieced(case, (k, m), delta_t, bounded, rtol),
         }
@@ -194,12 +279,46 @@ fn optimum(case: &Case, bounds: &Bounds, rtol: f64) -> Result<TracedPath, Absenc
     Ok(TracedPath { motion, status: solved.status, work: value.work, parameters: of_optimum(&value, bounds) })
 }
 
+/// The optimum of another law than ageing; pulses stand for chattering.
+fn relaxed_optimum(case: &Case, law: StateLaw, v_ceiling: f64) -> Result<TracedPath, Absence> {
+    let Case { transition, t_f, .. } = *case;
+    let (solved, motion) = relaxed::motion(law, &transition, t_f, v_ceiling);
+    let (Some(found), Some(motion)) = (solved.value, motion) else {
+        let least = relaxed::least_time(law, &transition, v_ceiling);
+        return Err(match (solved.status, least) {
+            (Status::Infeasible, Some(t_least)) => {
+                Absence::Ceiling { obstacle: optimal::Obstacle::TooFast { t_least }, t_f }
+            }
+            (Status::Infeasible, None) => {
+                Absence::Ceiling { obstacle: optimal::Obstacle::VCeiling { above: transition.v_f }, t_f }
+            }
+            (Status::Unproven, _) if transition.v_i > v_ceiling => {
+                Absence::Ceiling { obstacle: optimal::Obstacle::VCeiling { above: transition.v_i }, t_f }
+            }
+            (Status::Unproven, _) => Absence::Unproven,
+            _ => Obstacle::NotConverged.into(),
+        });
+    };
+    let bounds = Bounds::new(true).with_v_ceiling(v_ceiling);
+    let mut parameters = of_optimum(&found.optimum, &bounds);
+    if let Some(chatter) = found.chatter {
+        let rest = [
+            ("chatter_time", chatter.time, "l/v_0", "time in which v alternates ever faster"),
+            ("chatter_theta", chatter.theta, "l/v_0", "state variable theta while v alternates"),
+            ("chatter_duty", chatter.duty, "1", "fraction of chatter_time on the velocity ceiling"),
+            ("chatter_pulses", relaxed::PULSES as f64, "1", "pulses of this trace; work is the limit of ever more"),
+        ];
+        parameters.extend(rest.map(|(name, value, unit, doc)| Parameter::new(name, value, unit, doc)));
+    }
+    Ok(TracedPath { motion, status: solved.status, work: found.optimum.work, parameters })
+}
+
 /// The numbers of an optimal protocol that a trace lists.
 fn of_optimum(value: &Optimum, bounds: &Bounds) -> Vec<Parameter> {
     let time = |name, value, doc| Parameter::new(name, value, "l/v_0", doc);
     let mut parameters = vec![
         Parameter::new("hamiltonian", value.hamiltonian, "mu_0 sigma v_0", "dW*/dt_f"),
-        time("time_at_floor", value.time_at_floor, "time spent on the velocity floor v = 1"),
+        time("time_at_floor", value.time_at_floor, "time spent on the velocity floor v = v_0"),
     ];
     if bounds.v_ceiling.is_finite() {
         parameters.push(time("time_at_v_ceiling", value.time_at_v_ceiling, "time spent on the velocity ceiling"));
@@ -277,13 +396,13 @@ impl Disturbed {
         let closed = go(moment.theta * (1.0 + disturbance.change))?;
         let work = planned.work - undisturbed + closed.work;
         let open = disturbed::open_loop(motion()?, place, planned.work, disturbance.change, &case.transition);
-        let head = Box::new(disturbed::Head::new(motion()?, place));
+        let head = Box::new(disturbed::MotionStart::new(motion()?, place));
         let closed = Rest { motion: closed.motion, work, terminal_error: 0.0 };
         Ok(Disturbed { head, t: moment.t, planned, open, closed })
     }
 }
 
-/// Accuracy of a disturbed protocol: its works are compared.
+/// Accuracy of a disturbed protocol: its works are compared. Chosen: a hundredth of the default `rtol`.
 const DISTURBED_RTOL: f64 = 1e-12;
 
 fn without_optimum(case: &Case, bounds: &Bounds, status: Status) -> Absence {
@@ -302,22 +421,24 @@ fn without_optimum(case: &Case, bounds: &Bounds, status: Status) -> Absence {
     }
 }
 
-fn least_cubic(case: &Case, bounded: bool, rtol: f64) -> Result<TracedPath, Absence> {
-    let solved = best_cubic::solve(&case.transition, case.t_f, bounded, rtol);
+fn least_cubic(case: &Case, law: StateLaw, bounds: &Bounds, rtol: f64) -> Result<TracedPath, Absence> {
+    let solved = best_cubic::solve_under(law, &case.transition, case.t_f, *bounds, rtol);
     let Some(value) = solved.value else {
         // Without an optimum there is no shortcut either.
-        let optimum = optimal::solve(&case.transition, case.t_f, bounded, rtol);
-        return Err(match (optimum.value, solved.status) {
-            (None, _) => without_optimum(case, &Bounds::new(bounded), optimum.status),
-            (_, Status::Infeasible) => Absence::Cubic { bounded },
-            (_, Status::Unproven) => Absence::Unproven,
+        match law {
+            StateLaw::Ageing => optimum(case, bounds, rtol)?,
+            _ => relaxed_optimum(case, law, bounds.v_ceiling)?,
+        };
+        return Err(match solved.status {
+            Status::Infeasible => Absence::Cubic { bounded: bounds.floor },
+            Status::Unproven => Absence::Unproven,
             _ => Obstacle::NotConverged.into(),
         });
     };
     if value.v_min == 0.0 {
         return Err(Absence::Border);
     }
-    let landscape = Landscape::new(&case.transition, case.t_f, rtol);
+    let landscape = Landscape::under(law, &case.transition, case.t_f, rtol);
     let Some(motion) = landscape.motion(value.a_2, value.a_3) else {
         return Err(Absence::Border);
     };
@@ -326,8 +447,8 @@ fn least_cubic(case: &Case, bounded: bool, rtol: f64) -> Result<TracedPath, Abse
     Ok(TracedPath { motion, status: solved.status, work: value.work, parameters })
 }
 
-fn gap(case: &Case, a_2: f64, a_3: f64, rtol: f64) -> Result<TracedPath, Absence> {
-    let landscape = Landscape::new(&case.transition, case.t_f, rtol);
+fn gap(case: &Case, law: StateLaw, (a_2, a_3): (f64, f64), rtol: f64) -> Result<TracedPath, Absence> {
+    let landscape = Landscape::under(law, &case.transition, case.t_f, rtol);
     let (mut work, mut status) = ([0.0], [Status::Infeasible]);
     landscape.evaluate(&[a_2], &[a_3], LandscapeBuffers { work: &mut work, v_min: &mut [], status: &mut status });
     let motion = landscape.motion(a_2, a_3).ok_or(Obstacle::Velocity)?;
@@ -348,10 +469,15 @@ fn with_control(first: Parameter, least: f64, greatest: f64) -> Vec<Parameter> {
     vec![first, least, control("v_c_max", greatest, "greatest control velocity")]
 }
 
-fn response(case: &Case, k: f64, m: f64, rtol: f64) -> Result<TracedPath, Absence> {
-    let swing = Step { transition: case.transition, k, m }.motion(case.t_f, rtol).ok_or(Absence::Response)?;
-    let status = if swing.least_velocity() < 1.0 { Status::BelowBound } else { Status::Ok };
-    Ok(TracedPath { work: swing.work(), motion: Box::new(swing), status, parameters: Vec::new() })
+fn response(case: &Case, state_law: StateLaw, (k, m): (f64, f64), rtol: f64) -> Result<TracedPath, Absence> {
+    if k == f64::INFINITY {
+        return Err(Absence::Rigid);
+    }
+    let motion = VelocityStep { state_law, transition: case.transition, k, m }
+        .motion(case.t_f, rtol)
+        .ok_or(Absence::Response)?;
+    let status = if motion.least_velocity() < 1.0 { Status::BelowBound } else { Status::Ok };
+    Ok(TracedPath { work: motion.work(), motion: Box::new(motion), status, parameters: Vec::new() })
 }
 
 fn smooth(case: &Case, k: f64, m: f64, rtol: f64) -> Result<TracedPath, Absence> {

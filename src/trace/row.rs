@@ -3,10 +3,9 @@
 use super::Protocol;
 use crate::dataset::{Cell, Row};
 use crate::grid::Quantity;
-use crate::model::{Law, Transition};
+use crate::model::StateLaw;
 use crate::protocol::Status;
-use crate::protocol::optimal::Bounds;
-use crate::protocol::shortcut::{self, Case};
+use crate::protocol::shortcut::Case;
 use crate::table::STATUS;
 
 /// Tables whose rows have a path over time.
@@ -57,61 +56,36 @@ pub fn protocol_of(
         }
         _ => {}
     }
-    let number = |quantity: Quantity| match row.iter().find(|(known, _)| known == quantity.name()) {
-        Some((_, Cell::Number(number))) => Ok(*number),
-        _ => Err(Pathless::Missing(quantity.name())),
+    if table == "step_response" && t_f.is_none() {
+        return Err(Pathless::Duration);
+    }
+    let written = |quantity: Quantity| match row.iter().find(|(known, _)| known == quantity.name()) {
+        Some((_, Cell::Number(number))) => Some(*number),
+        _ => None,
     };
-    let transition = Transition {
-        law: Law { a: number(Quantity::A)?, b: number(Quantity::B)? },
-        v_i: if table == "feedback" { 1.0 / number(Quantity::Theta)? } else { number(Quantity::InitialVelocity)? },
-        v_f: number(Quantity::FinalVelocity)?,
+    let number = |quantity: Quantity| {
+        let time = written(Quantity::Time);
+        let value = match quantity {
+            Quantity::Time => time.or(t_f),
+            Quantity::Law => word("law").and_then(StateLaw::find).map(|law| f64::from(law as u8)),
+            Quantity::Alpha2 if !relative[0] => written(quantity).zip(time).map(|(alpha, t_f)| alpha * t_f),
+            Quantity::Alpha3 if !relative[1] => written(quantity).zip(time).map(|(alpha, t_f)| alpha * t_f * t_f),
+            _ => written(quantity),
+        };
+        // Tables of earlier versions lack some axes.
+        value.or(quantity.default().first().copied())
     };
-    let t_f = match table {
-        "step_response" => t_f.ok_or(Pathless::Duration)?,
-        "feedback" => number(Quantity::TimeLeft)?,
-        _ => number(Quantity::Time)?,
+    let name = match table {
+        "gap_min" => "gap",
+        "shortcut" => word("family").ok_or(Pathless::Missing("family"))?,
+        name => name,
     };
-    let family = word("family").and_then(shortcut::find);
-    let tau_ceiling = number(Quantity::FrictionCeiling).unwrap_or(f64::INFINITY);
-    let case = Case { transition, t_f, tau_ceiling };
-    let [k, m] = [Quantity::Stiffness, Quantity::Mass].map(number);
-    let protocol = match (table, family) {
-        ("optimal", _) => Protocol::Optimal {
-            bounds: Bounds {
-                floor: bounded,
-                // Tables of earlier versions have no such axis.
-                v_ceiling: number(Quantity::VelocityCeiling).unwrap_or(f64::INFINITY),
-                tau_ceiling,
-            },
-        },
-        ("feedback", _) => Protocol::OptimalFrom {
-            theta: number(Quantity::Theta)?,
-            bounds: Bounds {
-                floor: bounded,
-                v_ceiling: number(Quantity::VelocityCeiling)?,
-                tau_ceiling: number(Quantity::FrictionCeiling)?,
-            },
-        },
-        ("best_cubic", _) => Protocol::BestCubic { bounded },
-        ("gap" | "gap_min", _) => {
-            let scaled =
-                |alpha: Quantity, unit: f64, relative: bool| Ok(number(alpha)? * if relative { 1.0 } else { unit });
-            Protocol::CubicPoint {
-                a_2: scaled(Quantity::Alpha2, t_f, relative[0])?,
-                a_3: scaled(Quantity::Alpha3, t_f * t_f, relative[1])?,
-            }
-        }
-        ("step_response", _) => Protocol::step_response(k?, m?, transition.v_i != transition.v_f),
-        ("compliant", _) => Protocol::Compliant { k: k?, m: m? },
-        ("regularised", _) => Protocol::Regularised { k: k?, m: m?, delta_t: number(Quantity::Smoothing)?, bounded },
-        (_, Some(family)) => Protocol::Family(family),
-        _ => return Err(Pathless::Missing("family")),
-    };
+    let (protocol, case) =
+        Protocol::new(name, bounded, number).map_err(|quantity| Pathless::Missing(quantity.name()))?;
     let name = match protocol {
-        Protocol::CubicPoint { .. } => "gap",
         Protocol::OptimalFrom { .. } => "optimal",
         Protocol::Family(family) => family.name(),
-        _ => table,
+        _ => name,
     };
     Ok((name.to_owned(), protocol, case))
 }

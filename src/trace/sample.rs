@@ -15,10 +15,10 @@ const POSITIVE_COLUMNS: usize = 2;
 /// Fraction of both tolerances at the samples. Chosen: the rest is a margin between samples.
 const SAMPLES_FRACTION: f64 = 0.98;
 
-/// Change, relative to the greatest value of a column, that counts as rounding: a few thousand roundings of 1.1e-16.
+/// Change, relative to the greatest value of a column, that counts as rounding. Chosen: nine thousand roundings of 1.1e-16, a hundredth of the default `rtol`.
 const ROUNDING_RTOL: f64 = 1e-12;
 
-/// Relative difference of times up to which they are equal: eight roundings.
+/// Relative difference of times up to which they are equal. Chosen: eight units in the last place, more than a sum of a few terms loses.
 const SAME_TIME_RTOL: f64 = 8.0 * f64::EPSILON;
 
 /// Steps of an interval of the motion; a chord is compared with the motion between them. Chosen: half an interval keeps its samples.
@@ -29,7 +29,7 @@ const MAX_MOMENTS: usize = 1 << 21;
 
 /// A moment and its position on the curve.
 #[derive(Debug, Clone, Copy)]
-struct Sample {
+struct CurvePoint {
     s: f64,
     moment: Moment,
 }
@@ -37,7 +37,7 @@ struct Sample {
 /// The samples of a motion, of which a trace shows some.
 #[derive(Debug)]
 pub struct Samples {
-    samples: Vec<Sample>,
+    samples: Vec<CurvePoint>,
     tolerance: Tolerance,
 }
 
@@ -81,7 +81,7 @@ impl Samples {
             pieces.push(piece);
         }
         let tolerance = tolerance(pieces.iter().flatten().map(|sample| &sample.moment).chain(steady));
-        let mut samples: Vec<Sample> = vec![*pieces.first()?.first()?];
+        let mut samples: Vec<CurvePoint> = vec![*pieces.first()?.first()?];
         // The next interval is the last of the list.
         pieces.reverse();
         while let Some(piece) = pieces.pop() {
@@ -93,7 +93,7 @@ impl Samples {
                 }
                 continue;
             }
-            let halve = |half: &[Sample]| {
+            let halve = |half: &[CurvePoint]| {
                 let mut finer = vec![half[0]];
                 for pair in half.windows(2) {
                     finer.push(look(motion, 0.5 * (pair[0].s + pair[1].s))?);
@@ -171,13 +171,13 @@ impl Samples {
 /// Ratio of a golden section, `(sqrt 5 - 1)/2`.
 const GOLDEN: f64 = 0.618_033_988_749_894_9;
 
-/// Number of golden sections, which shrink an interval by `1e-8`: a smooth maximum is flat within rounding there.
+/// Number of golden sections, which shrink an interval by `1e-8`: a smooth maximum is flat within rounding there. Derived.
 const SECTIONS: u32 = 40;
 
 /// The moments at `count >= 2` equally spaced times from 0 to `t_f`. `None` as for [`Samples::of`].
 pub fn spaced(motion: &dyn Motion, count: usize) -> Option<Vec<Moment>> {
     let t_f = motion.duration();
-    let marks: Vec<Sample> = motion.landmarks().into_iter().map(|s| look(motion, s)).collect::<Option<_>>()?;
+    let marks: Vec<CurvePoint> = motion.landmarks().into_iter().map(|s| look(motion, s)).collect::<Option<_>>()?;
     let (first, last) = (marks.first()?, marks.last()?);
     let mut rows = Vec::with_capacity(count);
     rows.push(Moment { t: 0.0, ..first.moment });
@@ -193,15 +193,15 @@ pub fn spaced(motion: &dyn Motion, count: usize) -> Option<Vec<Moment>> {
 
 /// The place and the moment of `motion` at time `t`. `None` as for [`Samples::of`].
 pub fn at_time(motion: &dyn Motion, t: f64) -> Option<(f64, Moment)> {
-    let marks: Vec<Sample> = motion.landmarks().into_iter().map(|s| look(motion, s)).collect::<Option<_>>()?;
+    let marks: Vec<CurvePoint> = motion.landmarks().into_iter().map(|s| look(motion, s)).collect::<Option<_>>()?;
     let after = marks.partition_point(|mark| mark.moment.t <= t).clamp(1, marks.len().max(2) - 1);
     let found = meet(motion, t, marks.get(after - 1)?, marks.get(after)?)?;
     Some((found.s, found.moment))
 }
 
 /// The moment at time `t` between two samples. `None` as for [`Samples::of`].
-fn meet(motion: &dyn Motion, t: f64, low: &Sample, high: &Sample) -> Option<Sample> {
-    let off = |sample: &Sample| sample.moment.t - t;
+fn meet(motion: &dyn Motion, t: f64, low: &CurvePoint, high: &CurvePoint) -> Option<CurvePoint> {
+    let off = |sample: &CurvePoint| sample.moment.t - t;
     let ends = [off(low), off(high)];
     let mut nearest = if -ends[0] < ends[1] { *low } else { *high };
     let mut is_number = true;
@@ -219,10 +219,10 @@ fn meet(motion: &dyn Motion, t: f64, low: &Sample, high: &Sample) -> Option<Samp
     is_number.then_some(nearest)
 }
 
-fn look(motion: &dyn Motion, s: f64) -> Option<Sample> {
+fn look(motion: &dyn Motion, s: f64) -> Option<CurvePoint> {
     let moment = motion.at(s);
     let is_number = moment.t.is_finite() && columns(&moment).iter().flatten().all(|value| value.is_finite());
-    is_number.then_some(Sample { s, moment })
+    is_number.then_some(CurvePoint { s, moment })
 }
 
 fn tolerance<'a>(moments: impl Iterator<Item = &'a Moment>) -> Tolerance {
@@ -240,20 +240,20 @@ fn tolerance<'a>(moments: impl Iterator<Item = &'a Moment>) -> Tolerance {
 }
 
 /// Whether no step takes most of the time of an interval, so that points between its ends can be compared.
-fn is_even(piece: &[Sample]) -> bool {
-    let time = |from: &Sample, to: &Sample| to.moment.t - from.moment.t;
+fn is_even(piece: &[CurvePoint]) -> bool {
+    let time = |from: &CurvePoint, to: &CurvePoint| to.moment.t - from.moment.t;
     let whole = time(&piece[0], &piece[STEPS]);
     whole <= SAME_TIME_RTOL * piece[STEPS].moment.t
         || piece.windows(2).all(|pair| time(&pair[0], &pair[1]) <= 0.5 * whole)
 }
 
 /// Whether the straight line in time from `from` to `to` is within `tolerance` of the motion at all places `between`.
-fn is_straight(from: &Sample, to: &Sample, between: &[Sample], tolerance: &Tolerance) -> bool {
+fn is_straight(from: &CurvePoint, to: &CurvePoint, between: &[CurvePoint], tolerance: &Tolerance) -> bool {
     let time = to.moment.t - from.moment.t;
     if time <= SAME_TIME_RTOL * to.moment.t {
         return true;
     }
-    let values = |sample: &Sample| columns(&sample.moment).map(|value| value.unwrap_or(0.0));
+    let values = |sample: &CurvePoint| columns(&sample.moment).map(|value| value.unwrap_or(0.0));
     let (start, end) = (values(from), values(to));
     between.iter().all(|sample| {
         let fraction = (sample.moment.t - from.moment.t) / time;

@@ -67,14 +67,9 @@ pub fn check(row: &Row, context: &Context, rtol: f64) -> Verdict {
     verdict.push("motion", followed.equation + arrival + formula);
     verdict.push("control", followed.control);
     verdict.compare(row, "work", Some(followed.work), None);
-    let v = [followed.least(|at| at.v), followed.greatest(|at| at.v)];
-    verdict.compare(row, "v_min", Some(v[0]), None);
-    verdict.compare(row, "v_max", Some(v[1]), None);
+    let v = followed.compare_velocities(&mut verdict, row);
     verdict.friction(row, followed.least(|at| at.friction));
-    let range = followed.control_range();
-    let size = range[0].abs().max(range[1].abs());
-    verdict.compare(row, "v_c_min", Some(range[0]), Some(size));
-    verdict.compare(row, "v_c_max", Some(range[1]), Some(size));
+    let size = followed.compare_control(&mut verdict, row);
     verdict.compare(row, "stiffness_ratio", Some(if m > 0.0 { k * t_f * t_f / m } else { f64::INFINITY }), None);
     let control = |x: f64, ln_theta: f64| {
         let [v, v1, v2] = exponent.moment(x, t_f);
@@ -82,23 +77,23 @@ pub fn check(row: &Row, context: &Context, rtol: f64) -> Verdict {
     };
     let velocity = |x: f64| exponent.moment(x, t_f)[0];
     let protocol = ControlledProtocol { slider, v_i, v_f, t_f, velocity, control };
-    // What the spring would pull with under the greatest control alone, and what it pulls with, in units of a: an error of the
-    // one, and rounding of the other, are felt in proportion.
+    // The spring force under the greatest control alone, in units of a. Errors of the control act in proportion to it, and rounding in
+    // proportion to the greatest force of the motion.
     let reach = if k.is_finite() { k / law.a * t_f * size } else { 0.0 };
     open_loop(&mut verdict, row, &protocol, (v[0], 1.0 + reach + 1e-14 / rtol * followed.force), rtol);
     compare(&mut verdict, row, (&problem, t_f), Some(followed.work), context.bounded);
     verdict
 }
 
-/// More samples than a check follows.
-const MOST_SAMPLES: f64 = 3000.0;
+/// Number of samples from which `sampling_error` is not checked. Chosen: limits the time of a check.
+const MAX_SAMPLES: f64 = 3000.0;
 
-/// Amplifications below this have fewer digits.
+/// Amplification below which the error is absolute. Chosen: smaller ones are differences of terms of size 1.
 const MIN_AMPLIFICATION: f64 = 1e-2;
 
 const TOO_STIFF: &str = "motions too stiff for an explicit integrator";
 
-/// The columns of open-loop control of a protocol of this `least` velocity; `felt` is what an error of it amounts to at once.
+/// The columns of open-loop control of a protocol of this `least` velocity; `felt` is the effect of an error of the control at once.
 fn open_loop<V, C>(
     verdict: &mut Verdict,
     row: &Row,
@@ -128,7 +123,7 @@ fn open_loop<V, C>(
     };
     let noise = 1e-11 * growth.most / rtol;
     verdict.compare_number(row, "amplification", growth.whole, growth.whole.max(MIN_AMPLIFICATION).max(noise));
-    // An error of the control of size rtol, at any time, has grown at the end.
+    // Effect at the end of an error rtol of the control at any time.
     let felt = felt * (1.0 + growth.most);
     let mut compare = |column: &'static str, dt: Option<f64>| match protocol.miss(dt) {
         Some(expected) => verdict.compare_number(row, column, expected, felt.max(expected)),
@@ -137,7 +132,7 @@ fn open_loop<V, C>(
     if closed.is_some() {
         compare("open_loop_error", None);
     }
-    if held.is_some() && protocol.t_f / dt <= MOST_SAMPLES {
+    if held.is_some() && protocol.t_f / dt <= MAX_SAMPLES {
         compare("sampling_error", Some(dt));
     } else if held.is_some() {
         verdict.miss("controls sampled more than 3000 times");

@@ -1,48 +1,76 @@
 //! `gap`: the work of the row's cubic, integrated over time; `W*` by integration of the extremal.
 
-use super::motion::golden;
-use super::optimal::{self, min_duration};
+use super::arcsinh;
+use super::motion::{self, bisect};
+use super::optimal::{compare, compare_gap, min_duration};
+use super::relaxed;
 use super::route::integrate;
+use super::verdict::state_law;
 use super::{Context, Verdict, number, transition, word};
 use crate::dataset::Row;
-use crate::model::{Law, Transition};
+use crate::model::{Friction, Law, StateLaw, Transition};
+use crate::protocol::Status;
+use crate::protocol::optimal::Bounds;
 use crate::table::STATUS;
 
-/// Places at which a velocity is evaluated before its least value is refined.
-const PLACES: usize = 2000;
+/// Number of points at which a function is evaluated before its least value is refined. Chosen: many for each extremum of a quotient of cubics.
+const SCAN_POINTS: u32 = 2000;
 
 pub fn check(row: &Row, context: &Context) -> Verdict {
     let coefficients = [number(row, "alpha_2"), number(row, "alpha_3"), number(row, "t_f")];
     let (Some(problem), [Some(alpha_2), Some(alpha_3), Some(t_f)]) = (transition(row), coefficients) else {
         return Verdict::unchecked("an axis is missing");
     };
+    let Some(state) = state_law(row) else { return Verdict::unchecked("the law is unknown") };
     let a_2 = if context.relative[0] { alpha_2 } else { alpha_2 * t_f };
     let a_3 = if context.relative[1] { alpha_3 } else { alpha_3 * t_f * t_f };
-    let cubic = Cubic::new(&problem, t_f, a_2, a_3);
+    let form = context.friction;
+    let cubic = Cubic { form, ..Cubic::new(&problem, t_f, a_2, a_3).under(state) };
     let mut verdict = Verdict::default();
     let slack = cubic.slack();
     if slack.abs() < 1e-9 {
         return Verdict::unchecked("within 1e-9 of the border of feasibility");
     }
-    let infeasible = slack <= 0.0 || context.bounded && t_f < min_duration(&problem);
+    let v_ceiling = number(row, "v_ceiling").unwrap_or(f64::INFINITY);
+    let bounds = Bounds::new(context.bounded).with_v_ceiling(v_ceiling);
+    let has_ceiling = state == StateLaw::Ageing && v_ceiling.is_finite();
+    let optimum =
+        (state != StateLaw::Ageing).then(|| relaxed::certify(&mut verdict, &problem, state, (t_f, v_ceiling)));
+    let is_late = match &optimum {
+        Some(optimum) => optimum.status == Status::Infeasible,
+        None => context.bounded && t_f < min_duration(&problem),
+    };
+    let is_short = has_ceiling && word(row, STATUS) == Some("infeasible");
+    let infeasible = slack <= 0.0 || is_late || is_short;
     verdict.status(row, infeasible);
     if infeasible || word(row, STATUS) == Some("infeasible") {
         return verdict;
     }
     let work = cubic.work();
     verdict.compare(row, "v_min", Some(cubic.v_min()), None);
-    verdict.friction(row, cubic.friction_min());
+    if context.friction == Friction::Log {
+        verdict.friction(row, cubic.friction_min());
+    }
     match work {
         Some(work) => verdict.compare(row, "work", Some(work), None),
         None => verdict.miss("the independent integrator failed"),
     }
-    optimal::compare(&mut verdict, row, (&problem, t_f), work, context.bounded);
+    match optimum {
+        _ if context.friction == Friction::Regularised => arcsinh::compare(&mut verdict, row, &problem, t_f, work),
+        _ if has_ceiling => {
+            verdict.miss("the optimum of ageing under a velocity ceiling: the table optimal has its check")
+        }
+        Some(optimum) => compare_gap(&mut verdict, row, optimum.value, work),
+        None => compare(&mut verdict, row, (&problem, t_f), work, bounds),
+    }
     verdict
 }
 
 /// A cubic shortcut over `x = t/t_f`.
 pub struct Cubic {
+    state: StateLaw,
     law: Law,
+    form: Friction,
     t_f: f64,
     /// Coefficients of theta.
     theta: [f64; 4],
@@ -51,7 +79,13 @@ pub struct Cubic {
 impl Cubic {
     pub fn new(problem: &Transition, t_f: f64, a_2: f64, a_3: f64) -> Cubic {
         let (theta_0, theta_1) = (1.0 / problem.v_i, 1.0 / problem.v_f);
-        Cubic { law: problem.law, t_f, theta: [theta_0, a_2, a_3, theta_1 - theta_0 - a_2 - a_3] }
+        let (state, form) = (StateLaw::Ageing, Friction::Log);
+        Cubic { state, form, law: problem.law, t_f, theta: [theta_0, a_2, a_3, theta_1 - theta_0 - a_2 - a_3] }
+    }
+
+    /// This cubic under an evolution law of the state.
+    pub fn under(self, state: StateLaw) -> Cubic {
+        Cubic { state, ..self }
     }
 
     pub fn theta(&self, x: f64) -> f64 {
@@ -59,14 +93,29 @@ impl Cubic {
         c_0 + x * (c_1 + x * (c_2 + x * c_3))
     }
 
-    pub fn velocity(&self, x: f64) -> f64 {
+    fn rate(&self, x: f64) -> f64 {
         let [_, c_1, c_2, c_3] = self.theta;
-        (1.0 - (c_1 + x * (2.0 * c_2 + 3.0 * c_3 * x)) / self.t_f) / self.theta(x)
+        (c_1 + x * (2.0 * c_2 + 3.0 * c_3 * x)) / self.t_f
     }
 
-    /// The least value of theta and of `1 - theta'`; not positive if there is no such shortcut.
+    pub fn velocity(&self, x: f64) -> f64 {
+        let rate = self.rate(x);
+        let u = match self.state {
+            StateLaw::Ageing => 1.0 - rate,
+            StateLaw::Slip => product_of_slip(rate),
+            StateLaw::Prz => (1.0 - 2.0 * rate).sqrt(),
+        };
+        u / self.theta(x)
+    }
+
+    /// The least value of theta and of the distance of `theta'` from its bound; not positive if there is no such shortcut.
     pub fn slack(&self) -> f64 {
-        lowest(&|x| self.theta(x).min(self.velocity(x) * self.theta(x)))
+        let bound = match self.state {
+            StateLaw::Ageing => 1.0,
+            StateLaw::Slip => (-1.0_f64).exp(),
+            StateLaw::Prz => 0.5,
+        };
+        lowest(&|x| self.theta(x).min(bound - self.rate(x)))
     }
 
     pub fn v_min(&self) -> f64 {
@@ -74,7 +123,10 @@ impl Cubic {
     }
 
     fn friction(&self, x: f64) -> f64 {
-        1.0 + self.law.a * self.velocity(x).ln() + self.law.b * self.theta(x).ln()
+        match self.form {
+            Friction::Log => 1.0 + self.law.a * self.velocity(x).ln() + self.law.b * self.theta(x).ln(),
+            Friction::Regularised => arcsinh::tau(&self.law, self.velocity(x), self.theta(x)),
+        }
     }
 
     pub fn friction_min(&self) -> f64 {
@@ -87,10 +139,12 @@ impl Cubic {
     }
 }
 
+/// `u >= 1/e` with `-u ln u = rate`.
+fn product_of_slip(rate: f64) -> f64 {
+    bisect(-1.0, 700.0, |ln_u| -ln_u * ln_u.exp() > rate).exp()
+}
+
 /// The least value on `[0, 1]`.
 fn lowest(f: &dyn Fn(f64) -> f64) -> f64 {
-    let place = |i: usize| i as f64 / PLACES as f64;
-    let values = (0..=PLACES).map(|i| (i, f(place(i))));
-    let least = values.min_by(|a, b| a.1.total_cmp(&b.1)).map_or(0, |(i, _)| i);
-    golden(f, place(least.saturating_sub(1)), place((least + 1).min(PLACES))).1.min(f(place(least)))
+    motion::lowest(f, (0.0, 1.0), SCAN_POINTS)
 }

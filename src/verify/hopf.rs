@@ -3,109 +3,167 @@
 //! Y. A. Kuznetsov, Elements of Applied Bifurcation Theory, (5.39), for `(z, y, x)` in the scaled variables of the step
 //! response; `q` and `p` are the eigenvectors of the Jacobian and of its transpose for the eigenvalue `i omega`.
 
+use nalgebra::{Complex, Matrix3, Vector3};
+
 use super::verdict::Verdict;
 use crate::dataset::Row;
-use crate::model::Law;
+use crate::model::{Law, StateLaw};
 
-/// Real and imaginary part.
-type Complex = [f64; 2];
+type Number = Complex<f64>;
+type Vector = Vector3<Number>;
 
-type Vector = [Complex; 3];
+const ZERO: Number = Number::new(0.0, 0.0);
 
-fn add(x: Complex, y: Complex) -> Complex {
-    [x[0] + y[0], x[1] + y[1]]
+/// `y` with `matrix y = right`; NaN for a singular matrix.
+fn solve(matrix: Matrix3<Number>, right: Vector) -> Vector {
+    matrix.lu().solve(&right).unwrap_or_else(|| Vector::from_element(Number::new(f64::NAN, 0.0)))
 }
 
-fn mul(x: Complex, y: Complex) -> Complex {
-    [x[0] * y[0] - x[1] * y[1], x[0] * y[1] + x[1] * y[0]]
-}
-
-fn scale(x: Complex, factor: f64) -> Complex {
-    [factor * x[0], factor * x[1]]
-}
-
-fn conjugate(x: Complex) -> Complex {
-    [x[0], -x[1]]
-}
-
-fn inverse(x: Complex) -> Complex {
-    let square = x[0] * x[0] + x[1] * x[1];
-    [x[0] / square, -x[1] / square]
-}
-
-/// `y` with `matrix y = right`, by Gauss elimination with pivots.
-fn solve(mut matrix: [[Complex; 3]; 3], mut right: Vector) -> Vector {
-    let size = |x: Complex| x[0].hypot(x[1]);
-    for k in 0..3 {
-        let best = (k..3).max_by(|&i, &j| size(matrix[i][k]).total_cmp(&size(matrix[j][k]))).unwrap_or(k);
-        matrix.swap(k, best);
-        right.swap(k, best);
-        let pivot = inverse(matrix[k][k]);
-        for i in k + 1..3 {
-            let fraction = scale(mul(matrix[i][k], pivot), -1.0);
-            let row = matrix[k];
-            matrix[i].iter_mut().zip(row).for_each(|(x, y)| *x = add(*x, mul(fraction, y)));
-            right[i] = add(right[i], mul(fraction, right[k]));
-        }
-    }
-    for k in (0..3).rev() {
-        for j in k + 1..3 {
-            right[k] = add(right[k], scale(mul(matrix[k][j], right[j]), -1.0));
-        }
-        right[k] = mul(right[k], inverse(matrix[k][k]));
-    }
-    right
-}
-
-/// The coefficient for a scaled mass `m v^2`; `None` where there is no Hopf point.
-pub fn coefficient(Law { a, b }: Law, mass: f64) -> Option<f64> {
-    let k = (b - a) * (1.0 + mass / a);
-    let omega = ((k + a - b) / mass).sqrt();
-    if !(b > a && mass > 0.0 && k.is_finite() && omega > 0.0) {
-        return None;
-    }
-    let real = |x: f64| [x, 0.0];
-    let jacobian = [[0.0, 0.0, -k], [0.0, -1.0, -1.0], [1.0 / mass, -b / mass, -a / mass]];
-    let pull = |u: &Vector| scale(add(u[0], add(scale(u[1], -b), scale(u[2], -a))), 1.0 / mass);
-    let second = |u: &Vector, v: &Vector| {
-        let square = mul(u[2], v[2]);
-        let last = add(mul(u[2], pull(v)), mul(v[2], pull(u)));
-        [scale(square, -k), add(mul(u[1], v[1]), scale(square, -1.0)), scale(last, -1.0)]
-    };
-    let third = |u: &Vector, v: &Vector, w: &Vector| {
-        let cube = mul(u[2], mul(v[2], w[2]));
-        let pulls = [mul(mul(u[2], v[2]), pull(w)), mul(mul(u[2], w[2]), pull(v)), mul(mul(v[2], w[2]), pull(u))];
-        let first = scale(add(mul(u[1], mul(v[1], w[1])), cube), -1.0);
-        [scale(cube, -k), first, add(pulls[0], add(pulls[1], pulls[2]))]
-    };
-    let q = [[0.0, k / omega], scale(inverse([1.0, omega]), -1.0), real(1.0)];
-    let p = [[0.0, 1.0 / (omega * mass)], scale(inverse([-1.0, omega]), b / mass), real(1.0)];
-    let mirrored = q.map(conjugate);
-    let still = solve(jacobian.map(|row| row.map(real)), second(&q, &mirrored));
-    let shifted =
-        std::array::from_fn(|i| std::array::from_fn(|j| [-jacobian[i][j], if i == j { 2.0 * omega } else { 0.0 }]));
-    let double = solve(shifted, second(&q, &q));
-    let (cubic, mean, twice) = (third(&q, &q, &mirrored), second(&q, &still), second(&mirrored, &double));
-    let dot = |v: &Vector| p.iter().zip(v).fold([0.0; 2], |sum, (p, v)| add(sum, mul(conjugate(*p), *v)));
-    let sum = std::array::from_fn(|i| add(cubic[i], add(scale(mean[i], -2.0), twice[i])));
-    Some(mul(dot(&sum), inverse(dot(&q)))[0] / (2.0 * omega))
-}
-
-/// Size of the coefficient, in units of `a/mass`, below which rounding decides its sign.
+/// Size of the coefficient, in units of `a/mass`, below which rounding decides its sign. Chosen: a thousand roundings.
 const SIGN_ROUNDING: f64 = 1e-13;
 
-/// Compares the first Lyapunov coefficient; the forms have `1/mass` in them.
-pub fn compare_coefficient(verdict: &mut Verdict, row: &Row, law: Law, mass: f64, rtol: f64) {
-    let expected = coefficient(law, mass);
-    let noise = 1e-14 * law.a / mass / rtol;
-    verdict.compare(row, "first_lyapunov_coefficient", expected, expected.map(|l| l.abs() + noise));
+/// Second and third derivative of `G` at 1 (docs/derivations.md).
+fn derivatives(state: StateLaw) -> [f64; 2] {
+    match state {
+        StateLaw::Ageing => [0.0, 0.0],
+        StateLaw::Slip => [-1.0, 1.0],
+        StateLaw::Prz => [-1.0, 0.0],
+    }
 }
 
-/// Compares the type of the Hopf point.
-pub fn compare_kind(verdict: &mut Verdict, row: &Row, law: Law, mass: f64) {
-    match coefficient(law, mass) {
-        Some(l) if l.abs() < SIGN_ROUNDING * law.a / mass => verdict.miss("Hopf points between the two kinds"),
-        Some(l) => verdict.compare_word(row, "hopf_type", if l < 0.0 { "supercritical" } else { "subcritical" }),
-        None => verdict.demand_nothing(row, "hopf_type"),
+/// A Hopf point: derivatives of the evolution law, material, and scaled mass `m v^2`.
+#[derive(Debug, Clone, Copy)]
+pub struct Point {
+    evolution: [f64; 2],
+    /// Whether the coefficient is 0 without mass.
+    is_degenerate: bool,
+    law: Law,
+    mass: f64,
+}
+
+impl Point {
+    /// That of a law of the state.
+    pub fn new(state: StateLaw, law: Law, mass: f64) -> Point {
+        Point { evolution: derivatives(state), is_degenerate: state != StateLaw::Prz, law, mass }
+    }
+
+    /// That of the interpolated law.
+    pub fn interpolated(eps: f64, law: Law, mass: f64) -> Point {
+        Point { evolution: [eps - 1.0, (1.0 - eps) * (1.0 + eps)], is_degenerate: true, law, mass }
+    }
+}
+
+/// The second and third derivatives of `y' = e^-y G(e^(x + y))` along vectors `(y, x + y)`.
+fn evolution([second, third]: [f64; 2], vectors: [[Number; 2]; 3]) -> [Number; 2] {
+    let [[u, p], [v, q], [w, r]] = vectors;
+    // Derivatives of G(e^s) with respect to s.
+    let (second, third) = (second - 1.0, third + 3.0 * second - 1.0);
+    let once = u * q * r + v * p * r + w * p * q;
+    let twice = r * u * v + q * u * w + p * v * w;
+    [p * q * second + u * q + v * p, p * q * r * third - once * second - twice]
+}
+
+/// The flow at its Hopf point: frequency, Jacobian, eigenvectors, and the forms of its second and third derivatives.
+struct Forms<'a> {
+    omega: f64,
+    jacobian: Matrix3<f64>,
+    q: Vector,
+    p: Vector,
+    second: &'a dyn Fn(&Vector, &Vector) -> Vector,
+    third: &'a dyn Fn(&Vector, &Vector, &Vector) -> Vector,
+}
+
+impl Forms<'_> {
+    fn coefficient(&self) -> f64 {
+        let Forms { omega, jacobian, q, p, second, third } = self;
+        let (mirrored, jacobian) = (q.conjugate(), jacobian.map(|x| Number::new(x, 0.0)));
+        let still = solve(jacobian, second(q, &mirrored));
+        let double = solve(Matrix3::from_diagonal_element(Number::new(0.0, 2.0 * omega)) - jacobian, second(q, q));
+        let sum = third(q, q, &mirrored) - second(q, &still) * Number::new(2.0, 0.0) + second(&mirrored, &double);
+        (p.dotc(&sum) / p.dotc(q)).re / (2.0 * omega)
+    }
+}
+
+impl Point {
+    /// The coefficient; `None` where there is no Hopf point or where it is degenerate.
+    fn coefficient(&self) -> Option<f64> {
+        let Point { evolution: derivatives, is_degenerate, law: Law { a, b }, mass } = *self;
+        let k = (b - a) * (1.0 + mass / a);
+        if !(b > a && mass >= 0.0 && k.is_finite()) || (mass == 0.0 && is_degenerate) {
+            return None;
+        }
+        if mass == 0.0 {
+            return Some(self.without_mass());
+        }
+        let omega = ((k + a - b) / mass).sqrt();
+        let pull = |u: &Vector| (u[0] - u[1] * b - u[2] * a) / mass;
+        let pair = |u: &Vector| [u[1], u[1] + u[2]];
+        let second = |u: &Vector, v: &Vector| {
+            let [square, _] = evolution(derivatives, [pair(u), pair(v), [ZERO; 2]]);
+            Vector::new(u[2] * v[2] * -k, square, -(u[2] * pull(v) + v[2] * pull(u)))
+        };
+        let third = |u: &Vector, v: &Vector, w: &Vector| {
+            let pulls = u[2] * v[2] * pull(w) + u[2] * w[2] * pull(v) + v[2] * w[2] * pull(u);
+            let [_, cube] = evolution(derivatives, [pair(u), pair(v), pair(w)]);
+            Vector::new(u[2] * v[2] * w[2] * -k, cube, pulls)
+        };
+        let (one, i) = (Number::new(1.0, 0.0), Number::i());
+        let forms = Forms {
+            omega,
+            jacobian: Matrix3::new(0.0, 0.0, -k, 0.0, -1.0, -1.0, 1.0 / mass, -b / mass, -a / mass),
+            q: Vector::new(i * (k / omega), -one / (one + i * omega), one),
+            p: Vector::new(i / (omega * mass), one * (b / mass) / (i * omega - one), one),
+            second: &second,
+            third: &third,
+        };
+        Some(forms.coefficient())
+    }
+
+    /// The coefficient of a block without mass, for `(z, y)` with `x = (z - b y)/a`, and a third variable apart from them.
+    fn without_mass(&self) -> f64 {
+        let Point { evolution: derivatives, law: Law { a, b }, .. } = *self;
+        let k = b - a;
+        let omega = (k / a).sqrt();
+        let x = |u: &Vector| (u[0] - u[1] * b) / a;
+        let pair = |u: &Vector| [u[1], u[1] + x(u)];
+        let second = |u: &Vector, v: &Vector| {
+            let [square, _] = evolution(derivatives, [pair(u), pair(v), [ZERO; 2]]);
+            Vector::new(x(u) * x(v) * -k, square, ZERO)
+        };
+        let third = |u: &Vector, v: &Vector, w: &Vector| {
+            let [_, cube] = evolution(derivatives, [pair(u), pair(v), pair(w)]);
+            Vector::new(x(u) * x(v) * x(w) * -k, cube, ZERO)
+        };
+        let (one, i) = (Number::new(1.0, 0.0), Number::i());
+        let forms = Forms {
+            omega,
+            jacobian: Matrix3::new(-k / a, k * b / a, 0.0, -1.0 / a, b / a - 1.0, 0.0, 0.0, 0.0, -1.0),
+            q: Vector::new(i * (k / omega), -one / (one + i * omega), ZERO),
+            p: Vector::new(one, Number::new(-k, omega * a), ZERO),
+            second: &second,
+            third: &third,
+        };
+        forms.coefficient()
+    }
+
+    /// The unit in which rounding is counted: the forms have `1/mass` in them.
+    fn rounding(&self) -> f64 {
+        if self.mass > 0.0 { self.law.a / self.mass } else { 1.0 }
+    }
+
+    /// Compares the first Lyapunov coefficient.
+    pub fn compare_coefficient(&self, verdict: &mut Verdict, row: &Row, rtol: f64) {
+        let expected = self.coefficient();
+        let noise = 1e-14 * self.rounding() / rtol;
+        verdict.compare(row, "first_lyapunov_coefficient", expected, expected.map(|l| l.abs() + noise));
+    }
+
+    /// Compares the type of the Hopf point.
+    pub fn compare_kind(&self, verdict: &mut Verdict, row: &Row) {
+        match self.coefficient() {
+            Some(l) if l.abs() < SIGN_ROUNDING * self.rounding() => verdict.miss("Hopf points between the two kinds"),
+            Some(l) => verdict.compare_word(row, "hopf_type", if l < 0.0 { "supercritical" } else { "subcritical" }),
+            None => verdict.demand_nothing(row, "hopf_type"),
+        }
     }
 }

@@ -1,5 +1,6 @@
-//! A dataset audited: a sample of its rows checked by the equations that their protocols obey, or solved by a second route.
+//! Audit of a dataset: a sample of its rows is checked by the equations that their protocols obey, or solved by a second route.
 
+mod arcsinh;
 mod best_cubic;
 mod clamped;
 mod compliant;
@@ -12,6 +13,7 @@ mod open_loop;
 mod optimal;
 mod reduced;
 mod regularised;
+mod relaxed;
 mod route;
 mod sample;
 mod shortcut;
@@ -24,15 +26,15 @@ use std::path::Path;
 
 use crate::dataset::{Folder, Manifest, ManifestTable, Row, frame};
 use crate::grid::{Quantity, Scale};
-use crate::model::Units;
+use crate::model::{Friction, Units};
 use crate::sweep::{self, AxisSpec, Spec};
 use crate::table;
 #[cfg(feature = "cli")]
 pub(crate) use units::scale;
 use verdict::{Context, Difference, Verdict, number, transition, word};
 
-/// Differences above this many rtol are errors.
-pub const LIMIT: f64 = 10.0;
+/// Difference above which a number is an error, in units of `rtol`. Chosen: room for the errors of the second route.
+pub const MAX_DIFFERENCE_RTOLS: f64 = 10.0;
 
 /// The audit of one table.
 #[derive(Debug)]
@@ -92,7 +94,9 @@ pub fn verify(path: &Path, manifest: &Manifest, sample: u64, seed: u64) -> Resul
         let rtol = rtol.unwrap_or(spec.accuracy.rtol);
         let (mut rows, missing) = sample::rows(&folder, table, sample, seed).map_err(VerifyError)?;
         let relative = relative(&spec, &folder, table)?;
-        let context = Context { bounded: spec.model.velocity_bound, relative };
+        let friction = sweep::friction(&spec.model).map_err(|error| VerifyError(error.to_string()))?;
+        let bounded = spec.model.velocity_bound && friction == Friction::Log;
+        let context = Context { bounded, friction, relative };
         // Reduced rows are compared as they were written.
         if let Some(table) = table::find(&table.name).filter(|_| !is_reduced) {
             units::scale(&mut rows, table, &units, relative);
@@ -110,14 +114,14 @@ pub fn verify(path: &Path, manifest: &Manifest, sample: u64, seed: u64) -> Resul
             let verdict = match table.name.as_str() {
                 "gap" => gap::check(&row, &context),
                 "optimal" => optimal::check(&row, &context, rtol),
-                "feedback" => feedback::check(&row, &context),
+                "feedback" => feedback::check(&row, &context, rtol),
                 "crossover" => crossover::check(&row, &context),
                 "best_cubic" => best_cubic::check(&row, &context, rtol),
                 "shortcut" => shortcut::check(&row, &context, rtol),
                 "compliant" => compliant::check(&row, &context, rtol),
                 "regularised" => regularised::check(&row, &context, rtol),
                 "step_response" => step_response::check(&row, &context, rtol),
-                "stability" => stability::check(&row, &context),
+                "stability" => stability::check(&row, &context, rtol),
                 _ if is_reduced => reduced::check(&row, &units, &spec, &context),
                 _ => Verdict::unchecked("there is no independent route for this table"),
             };
@@ -136,7 +140,7 @@ pub fn verify(path: &Path, manifest: &Manifest, sample: u64, seed: u64) -> Resul
 /// Whether `alpha_2`, `alpha_3` of `table` are given relative to the duration.
 fn relative(spec: &Spec, folder: &Folder, table: &ManifestTable) -> Result<[bool; 2], VerifyError> {
     let has_points = spec.points.is_some() || spec.block.iter().any(|block| block.points.is_some());
-    // The content of a points file is in the parts alone.
+    // Only the parts contain the points of a file.
     let headings = match folder.parts_there(table).first() {
         Some(&part) if has_points => {
             frame::headings(&folder.part(&table.name, part)).map_err(|error| VerifyError(error.to_string()))?.0
@@ -177,8 +181,8 @@ impl Audit {
         }
     }
 
-    /// Numbers beyond [`LIMIT`].
+    /// Numbers beyond [`MAX_DIFFERENCE_RTOLS`].
     pub fn errors(&self) -> usize {
-        self.columns.iter().flat_map(|(_, all)| all).filter(|difference| **difference > LIMIT).count()
+        self.columns.iter().flat_map(|(_, all)| all).filter(|difference| **difference > MAX_DIFFERENCE_RTOLS).count()
     }
 }

@@ -1,34 +1,42 @@
-//! A traced protocol under the equations: integral identities on half of each of its intervals, which hold along no other motion.
+//! Errors of a traced protocol in the equations of motion: integral identities on half of each of its intervals, which determine the motion.
 
-use crate::model::Law;
+use super::Verdict;
+use crate::dataset::Row;
+use crate::model::{Law, StateLaw};
 use crate::numerics::radau::radau;
 use crate::protocol::{Moment, Motion, SpringBlock};
 
-/// A protocol as its trace shows it, and what the equations make of that.
+/// A traced protocol, with its work and its errors in the equations.
 pub struct Followed {
     motion: Box<dyn Motion>,
     /// Parameters and moments, in the order of time.
     pub samples: Vec<(f64, Moment)>,
     /// `int tau v dt`.
     pub work: f64,
-    /// Greatest of what theta lacks of `int 1 - theta v dt` over an interval, relative to theta, and of the errors of friction.
+    /// Greatest relative error of friction, and of theta as `int G(theta v) dt` over an interval.
     pub equation: f64,
-    /// Greatest lack of `k int v_c - v dt` in the change of the spring force `tau + m v'`, relative to what the spring passes on.
+    /// Greatest error of the change of the spring force `tau + m v'` as `k int v_c - v dt`, relative to the transmitted force.
     pub control: f64,
-    /// Greatest spring force, in units of `a`, and the extension that the control velocity gives, in the same units.
+    /// Greatest spring force, and greatest force by the control velocity alone, in units of `a`.
     pub force: f64,
     pub reach: f64,
 }
 
-/// Rounding of the slope at the end of a polynomial through sixteen values, in units of the values. Measured.
+/// Rounding of the slope at the end of a polynomial through sixteen values, in units of the values. Chosen: thirty times the sum, 640, of
+/// the weights, since the values carry errors of the solver, too.
 const SLOPE_ROUNDING: f64 = 2e4 * f64::EPSILON;
 
-/// Rounding of a time in the slopes of a polynomial through sixteen of them.
+/// Rounding of a time in the slopes of a polynomial through sixteen of them. Chosen: four roundings for each value.
 const TIME_ROUNDING: f64 = 64.0 * f64::EPSILON;
 
 impl Followed {
-    /// Follows a motion of a block on a spring, from steady sliding if the spring is elastic.
+    /// Follows a motion with ageing of a block on a spring, from steady sliding if the spring is elastic.
     pub fn new(motion: Box<dyn Motion>, slider: &SpringBlock) -> Followed {
+        Followed::under(StateLaw::Ageing, motion, slider)
+    }
+
+    /// Follows a motion under an evolution law of the state.
+    pub fn under(state_law: StateLaw, motion: Box<dyn Motion>, slider: &SpringBlock) -> Followed {
         let SpringBlock { law: Law { a, b }, k, m } = *slider;
         let rule = radau();
         let first = motion.at(0.0);
@@ -60,7 +68,7 @@ impl Followed {
                 let integral = |f: &dyn Fn(&Moment) -> f64| -> f64 {
                     at.iter().zip(&dt).zip(&rule.w).map(|((at, dt), w)| w * f(at) * dt).sum()
                 };
-                growth += integral(&|at| 1.0 - at.theta * at.v);
+                growth += integral(&|at| state_law.rate(at.theta * at.v));
                 followed.work += integral(&|at| at.friction * at.v);
                 for Moment { t, v, theta, friction, .. } in at {
                     noise = noise.max(TIME_ROUNDING * (t * (1.0 / theta).max(v) + 1.0));
@@ -122,9 +130,26 @@ impl Followed {
     }
 
     /// Least and greatest control velocity: that of the block where the spring is rigid.
-    pub fn control_range(&self) -> [f64; 2] {
+    fn control_range(&self) -> [f64; 2] {
         let control = |at: &Moment| at.v_c.unwrap_or(at.v);
         [self.least(control), self.greatest(control)]
+    }
+
+    /// Compares the least and the greatest velocity, and returns them.
+    pub fn compare_velocities(&self, verdict: &mut Verdict, row: &Row) -> [f64; 2] {
+        let v = [self.least(|at| at.v), self.greatest(|at| at.v)];
+        verdict.compare(row, "v_min", Some(v[0]), None);
+        verdict.compare(row, "v_max", Some(v[1]), None);
+        v
+    }
+
+    /// Compares the least and the greatest control velocity, and returns the greatest magnitude.
+    pub fn compare_control(&self, verdict: &mut Verdict, row: &Row) -> f64 {
+        let range = self.control_range();
+        let size = range[0].abs().max(range[1].abs());
+        verdict.compare(row, "v_c_min", Some(range[0]), Some(size));
+        verdict.compare(row, "v_c_max", Some(range[1]), Some(size));
+        size
     }
 
     /// The time up to which the velocity is exactly 1.
@@ -135,7 +160,27 @@ impl Followed {
     }
 }
 
-/// Place and value of the minimum in an interval that holds one.
+/// Bisections of a bracket. Derived: one of 1600 shrinks to rounding.
+const BISECTIONS: u32 = 70;
+
+/// The place between `low`, where `holds` is true, and `high`, where it is not, at which it changes.
+pub fn bisect(mut low: f64, mut high: f64, holds: impl Fn(f64) -> bool) -> f64 {
+    for _ in 0..BISECTIONS {
+        let middle = 0.5 * (low + high);
+        if holds(middle) { low = middle } else { high = middle }
+    }
+    0.5 * (low + high)
+}
+
+/// The least value on an interval, from `points` equal steps.
+pub fn lowest(f: &dyn Fn(f64) -> f64, (low, high): (f64, f64), points: u32) -> f64 {
+    let place = |index: u32| low + (high - low) * f64::from(index.min(points)) / f64::from(points);
+    let values = (0..=points).map(|index| (index, f(place(index))));
+    let (index, least) = values.min_by(|x, y| x.1.total_cmp(&y.1)).unwrap_or((0, f64::NAN));
+    golden(f, place(index.saturating_sub(1)), place(index + 1)).1.min(least)
+}
+
+/// Position and value of the minimum in an interval that contains one.
 pub fn golden(f: &dyn Fn(f64) -> f64, mut low: f64, mut high: f64) -> (f64, f64) {
     let fraction = 0.5 * (5.0_f64.sqrt() - 1.0);
     for _ in 0..80 {

@@ -16,11 +16,12 @@ pub struct Growth {
     pub most: f64,
 }
 
-/// Relaxation time of the velocity, as a fraction of the protocol, below which an explicit integrator takes too many steps.
+/// Relaxation time of the velocity, as a fraction of the protocol, below which the motion counts as stiff. Derived: an explicit
+/// integrator takes steps of about the relaxation time, so more than 10,000 there.
 const MIN_RELAXATION_FRACTION: f64 = 1e-4;
 
-/// Pieces over which errors are followed.
-const PIECES: usize = 256;
+/// Intervals over which errors are followed, one after another. Chosen: a growing error is restarted before it hides the others.
+const ERROR_INTERVALS: usize = 256;
 
 /// A protocol as control of the spring, over the fraction `x` of the time.
 pub struct ControlledProtocol<V, C> {
@@ -41,10 +42,10 @@ impl<V: Fn(f64) -> f64, C: Fn(f64, f64) -> f64> ControlledProtocol<V, C> {
         m > 0.0 && m * least / law.a < MIN_RELAXATION_FRACTION * self.t_f
     }
 
-    /// `ln theta` and the error after a piece from `x` on, for an error in one variable at its start.
+    /// `ln theta` and the error at the end of the interval from `x` on, for an error in one variable at its start.
     fn piece(&self, x: f64, ln_theta: f64, unit: usize) -> Option<(f64, Vector3<f64>)> {
         let SpringBlock { law, k, m } = self.slider;
-        let (t_f, length, follows) = (self.t_f, 1.0 / PIECES as f64, m == 0.0);
+        let (t_f, length, follows) = (self.t_f, 1.0 / ERROR_INTERVALS as f64, m == 0.0);
         let rigid = k == f64::INFINITY;
         // Errors of v, theta and k s/a. A rigid spring gives v, and without mass the force does.
         let slope = |y: &[f64; 5]| {
@@ -69,15 +70,15 @@ impl<V: Fn(f64) -> f64, C: Fn(f64, f64) -> f64> ControlledProtocol<V, C> {
     pub fn growth(&self) -> Option<Growth> {
         let SpringBlock { law, k, m } = self.slider;
         let (ratio, mut ln_theta) = (law.b / law.a, -self.v_i.ln());
-        // What an error of theta and of the spring's force is in all three; what follows from others is no error of its own.
+        // Errors in all three variables due to an error of theta or of the spring force. A variable that depends on others has no error of its own.
         let (last, free) = match () {
             () if k == f64::INFINITY => (Matrix3::new(0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, ratio, 0.0), 1..2),
             () if m == 0.0 => (Matrix3::new(0.0, -ratio, 1.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0), 1..3),
             () => (Matrix3::identity(), 0..3),
         };
         let mut pieces = Vec::new();
-        for index in 0..PIECES {
-            let (x, mut piece, from) = (index as f64 / PIECES as f64, Matrix3::zeros(), ln_theta);
+        for index in 0..ERROR_INTERVALS {
+            let (x, mut piece, from) = (index as f64 / ERROR_INTERVALS as f64, Matrix3::zeros(), ln_theta);
             for unit in free.clone() {
                 let (aged, error) = self.piece(x, from, unit)?;
                 piece.set_column(unit, &error);
@@ -103,10 +104,10 @@ impl<V: Fn(f64) -> f64, C: Fn(f64, f64) -> f64> ControlledProtocol<V, C> {
         // p = (k s - tau_ss(v_f))/a, y = ln(theta v_f), x = ln(v/v_f), the fraction of the time, and ln theta of the protocol.
         let start = (v_i / v_f).ln();
         let mut state = [(1.0 - ratio) * start, -start, start, 0.0, -v_i.ln()];
-        let legs = dt.map_or(1.0, |dt| (t_f / dt).ceil().max(1.0)) as u32;
-        for leg in 0..legs {
-            let at = |leg: u32| if leg == legs { 1.0 } else { dt.map_or(0.0, |dt| f64::from(leg) * dt / t_f) };
-            let held = dt.map(|_| (self.control)(at(leg), state[4]));
+        let holds = dt.map_or(1.0, |dt| (t_f / dt).ceil().max(1.0)) as u32;
+        for hold in 0..holds {
+            let at = |hold: u32| if hold == holds { 1.0 } else { dt.map_or(0.0, |dt| f64::from(hold) * dt / t_f) };
+            let held = dt.map(|_| (self.control)(at(hold), state[4]));
             let control = |x: f64, aged: f64| held.unwrap_or_else(|| (self.control)(x, aged));
             let slope = |s: &[f64; 5]| {
                 let [p, y, x, place, aged] = *s;
@@ -121,8 +122,8 @@ impl<V: Fn(f64) -> f64, C: Fn(f64, f64) -> f64> ControlledProtocol<V, C> {
                 let ageing = (-aged).exp() - (self.velocity)(place);
                 [t_f * stretch, t_f * ((-y).exp() * v_f - v), t_f * speed, 1.0, t_f * ageing]
             };
-            state[3] = at(leg);
-            state = integrate(slope, state, (0.0, at(leg + 1) - at(leg)))?;
+            state[3] = at(hold);
+            state = integrate(slope, state, (0.0, at(hold + 1) - at(hold)))?;
             let [p, y, _, place, aged] = state;
             if rigid {
                 state[2] = (control(place, aged) / v_f).ln();

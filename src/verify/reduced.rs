@@ -13,11 +13,11 @@ use crate::protocol::Status;
 use crate::sweep::{AxisSpec, AxisValue, BlockSpec, Spec, Sweep, TableSpec};
 use crate::table::{ColumnBuffer, OPTIMUM_AXES, STATUS, Signal};
 
-/// Number of shortcuts of a landscape in memory at a time.
-const PIECE: usize = 1 << 16;
+/// Number of shortcuts of a landscape in memory at a time. Chosen: a few megabytes.
+const SHORTCUTS_AT_ONCE: usize = 1 << 16;
 
-/// Number of shortcuts of a landscape that are solved by an independent route.
-const SOLVED: u64 = 3;
+/// Number of shortcuts of a landscape that are solved by an independent route. Chosen: a check takes milliseconds.
+const CHECKED_SHORTCUTS: u64 = 3;
 
 /// Whether `table` is one of these.
 pub fn is_reduced(table: &str) -> bool {
@@ -78,10 +78,11 @@ pub fn check(written: &Row, units: &Units, spec: &Spec, context: &Context) -> Ve
         |buffer: &ColumnBuffer, place: usize| buffer.columns.iter().map(|column| column[place]).collect::<Vec<f64>>();
     let all = request.rows;
     // From the middle of equal parts of the landscape.
-    let solved = (0..SOLVED).map(|part| ((2 * part + 1) as f64 / (2 * SOLVED) as f64 * all as f64) as u64);
+    let solved =
+        (0..CHECKED_SHORTCUTS).map(|part| ((2 * part + 1) as f64 / (2 * CHECKED_SHORTCUTS) as f64 * all as f64) as u64);
     let solved: Vec<u64> = solved.collect();
-    for start in (0..all).step_by(PIECE) {
-        let rows = start..all.min(start + PIECE as u64);
+    for start in (0..all).step_by(SHORTCUTS_AT_ONCE) {
+        let rows = start..all.min(start + SHORTCUTS_AT_ONCE as u64);
         buffer.resize((rows.end - rows.start) as usize);
         // Nothing else has the signal, so nothing stops the computation.
         if request.table.compute(&job, rows.clone(), &mut buffer).is_err() {

@@ -61,13 +61,8 @@ pub fn check(row: &Row, context: &Context, rtol: f64) -> Verdict {
     // A difference of works that are each known to about 1e-12.
     let scale = excess.abs() + 1e-12 / rtol * (followed.work.abs() + optimum.work.abs());
     verdict.compare(row, "gap", Some(excess / optimum.work), Some(scale / optimum.work));
-    let v = [followed.least(|at| at.v), followed.greatest(|at| at.v)];
-    verdict.compare(row, "v_min", Some(v[0]), None);
-    verdict.compare(row, "v_max", Some(v[1]), None);
-    let range = followed.control_range();
-    let size = range[0].abs().max(range[1].abs());
-    verdict.compare(row, "v_c_min", Some(range[0]), Some(size));
-    verdict.compare(row, "v_c_max", Some(range[1]), Some(size));
+    let v = followed.compare_velocities(&mut verdict, row);
+    followed.compare_control(&mut verdict, row);
     let friction_min = followed.least(|at| at.friction);
     verdict.friction(row, friction_min);
     if (v[0] - 1.0).abs() > 100.0 * rtol && friction_min > 0.0 {

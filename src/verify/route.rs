@@ -11,8 +11,8 @@ impl<const N: usize, F: Fn(&[f64; N]) -> [f64; N]> System<f64, SVector<f64, N>> 
     }
 }
 
-/// Greatest number of steps of one integration.
-const MOST_STEPS: u32 = 20_000;
+/// Greatest number of steps of one integration. Chosen: more mean a stiff motion.
+const MAX_STEPS: u32 = 20_000;
 
 /// `y` at `to`, from slopes that depend on `y` alone, which may contain the independent variable; `None` if the integrator fails.
 pub fn integrate<const N: usize>(
@@ -39,7 +39,7 @@ pub fn integrate<const N: usize>(
         6.0,
         length.abs(),
         0.0,
-        MOST_STEPS,
+        MAX_STEPS,
         u32::MAX,
         OutputType::Sparse,
     );

@@ -27,7 +27,7 @@ fn choose(rows: u64, count: u64, seed: u64) -> BTreeSet<u64> {
     chosen
 }
 
-/// The rows of the sample that are there, with their global numbers, and how many belong to parts that are missing.
+/// The present rows of the sample, with their global numbers, and the number of rows in missing parts.
 pub fn rows(folder: &Folder, table: &ManifestTable, count: u64, seed: u64) -> Result<(Vec<(u64, Row)>, u64), String> {
     let chosen = choose(table.rows, count, seed);
     let (mut found, mut missing, mut first_missing) = (Vec::new(), 0, None);

@@ -43,8 +43,7 @@ pub fn check(row: &Row, context: &Context, rtol: f64) -> Verdict {
     verdict.push("motion", followed.equation + arrival + formula + (followed.end().t / t_f - 1.0).abs());
     verdict.compare(row, "terminal_error", Some(if name == "step" { miss } else { 0.0 }), Some(1.0));
     verdict.compare(row, "work", Some(followed.work), None);
-    verdict.compare(row, "v_min", Some(followed.least(|at| at.v)), None);
-    verdict.compare(row, "v_max", Some(followed.greatest(|at| at.v)), None);
+    followed.compare_velocities(&mut verdict, row);
     let friction_max = followed.greatest(|at| at.friction);
     verdict.compare(row, "friction_max", Some(friction_max), Some(friction_max.abs().max(1.0)));
     verdict.friction(row, followed.least(|at| at.friction));
@@ -103,10 +102,11 @@ fn formula(verdict: &mut Verdict, row: &Row, case: &Case, name: &str, followed: 
     })
 }
 
-/// Relative distance from 0 below which the sign of a number is unknown.
+/// Relative distance from 0 below which the sign of a number is unknown. Chosen: a hundred times the tolerance of the integrator
+/// (`route.rs`).
 const SIGN_RTOL: f64 = 1e-11;
 
-/// The bound that leaves the family without a member, from the extreme protocols of the family; `None` where that is too close to call.
+/// The bound that leaves the family without a member, from the extreme protocols of the family; `None` where rounding decides.
 fn obstacle(case: &Case, family: &str, bounded: bool) -> Option<Option<&'static str>> {
     let Case { transition: Transition { law, v_i, v_f }, t_f, tau_ceiling } = *case;
     let settle = |bound: &'static str, room: f64, size: f64| match room / size {

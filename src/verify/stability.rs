@@ -1,8 +1,9 @@
 //! `stability`: all roots of the characteristic polynomial at once, by simultaneous iteration with 32 digits.
 
-use super::hopf;
-use super::verdict::{Context, Verdict, number, transition};
+use super::verdict::{Context, Verdict, number, state_law, transition};
+use super::{arcsinh, hopf};
 use crate::dataset::Row;
+use crate::model::{Friction, Law, Transition};
 use crate::numerics::double_double::DoubleDouble;
 
 type Complex = [DoubleDouble; 2];
@@ -28,7 +29,7 @@ fn size(x: Complex) -> f64 {
     x[0].high.hypot(x[1].high)
 }
 
-/// Greatest number of iterations: roots that differ by many decades separate by one factor in each iteration.
+/// Greatest number of iterations. Chosen: roots that differ by many decades separate by a constant factor in each iteration.
 const ROUNDS: u32 = 2000;
 
 /// The roots of `x^n + c[n - 1] x^(n - 1) + … + c[0]` (Weierstrass, Durand, Kerner); `None` if the iteration does not converge.
@@ -70,14 +71,47 @@ fn modes(mut roots: Vec<Complex>) -> [f64; 3] {
     [roots[0][0].high, frequency, roots.last().map_or(f64::NAN, |root| root[0].high)]
 }
 
-pub fn check(row: &Row, _: &Context) -> Verdict {
-    let (Some(problem), Some(k), Some(m)) = (transition(row), number(row, "k"), number(row, "m")) else {
+/// Compares the borders of smooth optima: bisections of Legendre's condition `u G''/G' <= a/(tau + a)` at one velocity.
+fn smoothness(verdict: &mut Verdict, row: &Row, problem: &Transition) {
+    let Law { a, b } = problem.law;
+    let bisected = |holds: &dyn Fn(f64) -> bool| {
+        let (mut low, mut high) = (0.0, 1.0);
+        for _ in 0..60 {
+            let middle = 0.5 * (low + high);
+            *if holds(middle) { &mut low } else { &mut high } = middle;
+        }
+        low
+    };
+    let [slow, fast] = [problem.v_i.min(problem.v_f), problem.v_i.max(problem.v_f)].map(f64::ln);
+    let steady = 1.0 + (a - b) * if b > a { slow } else { fast };
+    // At 10 times the steady velocity.
+    let (ln_u, tau) = (10.0_f64.ln(), steady + a * 10.0_f64.ln());
+    let mixture = bisected(&|slip: f64| slip * (tau + a) <= a * (1.0 + slip * ln_u));
+    verdict.compare(row, "slip_fraction_smooth", (steady > 0.0).then_some(mixture), None);
+    let tau = 1.0 - b * fast;
+    let interpolated = bisected(&|slip: f64| {
+        let power = (-(1.0 - slip) * fast).exp();
+        power > slip && slip * (1.0 - slip) * (tau + a) <= a * (power - slip)
+    });
+    verdict.compare(row, "law_eps_smooth", (tau > (b - a).max(0.0)).then_some(1.0 - interpolated), None);
+}
+
+pub fn check(row: &Row, context: &Context, rtol: f64) -> Verdict {
+    let numbers = number(row, "k").zip(number(row, "m"));
+    let (Some(problem), Some(state), Some((k, m))) = (transition(row), state_law(row), numbers) else {
         return Verdict::unchecked("an axis is missing");
     };
     let double = DoubleDouble::new;
-    let (a, b) = (double(problem.law.a), double(problem.law.b));
+    let law = |v: f64| match context.friction {
+        Friction::Log => problem.law,
+        Friction::Regularised => arcsinh::linearised(&problem.law, v),
+    };
+    let critical = |v: f64| {
+        let (a, b) = (double(law(v).a), double(law(v).b));
+        (b - a) * (double(1.0) + double(m) * double(v) * double(v) / a)
+    };
+    let (a, b) = (double(law(problem.v_f).a), double(law(problem.v_f).b));
     let weakening = b - a;
-    let critical = |v: f64| weakening * (double(1.0) + double(m) * double(v) * double(v) / a);
     let mut verdict = Verdict::default();
     verdict.compare(row, "k_od", Some(weakening.high), None);
     for (k_c, stable, v) in [("k_c_i", "stable_i", problem.v_i), ("k_c_f", "stable_f", problem.v_f)] {
@@ -86,10 +120,25 @@ pub fn check(row: &Row, _: &Context) -> Verdict {
         let is_stable = !k.is_finite() || (double(k) - critical).high > 0.0;
         verdict.compare_word(row, stable, if is_stable { "yes" } else { "no" });
     }
-    let square = (a * (double(k) / weakening - double(1.0)) / double(m)).high;
-    let exists = weakening.high > 0.0 && square > 0.0 && square.is_finite();
-    verdict.compare(row, "v_crit", exists.then(|| square.sqrt()), None);
-    hopf::compare_kind(&mut verdict, row, problem.law, m * problem.v_f * problem.v_f);
+    if context.friction == Friction::Regularised {
+        // k is critical there, and no twice as great velocity is stable.
+        if let Some(v) = number(row, "v_crit") {
+            verdict.push("v_crit", (critical(v).high / k - 1.0).abs());
+            verdict.push("v_crit", if critical(2.0 * v).high < k { f64::INFINITY } else { 0.0 });
+        }
+    } else {
+        let square = (a * (double(k) / weakening - double(1.0)) / double(m)).high;
+        let exists = weakening.high > 0.0 && square > 0.0 && square.is_finite();
+        verdict.compare(row, "v_crit", exists.then(|| square.sqrt()), None);
+        let mass = m * problem.v_f * problem.v_f;
+        let hopf = match number(row, "law_eps") {
+            Some(eps) => hopf::Point::interpolated(eps, problem.law, mass),
+            None => hopf::Point::new(state, problem.law, mass),
+        };
+        hopf.compare_kind(&mut verdict, row);
+        hopf.compare_coefficient(&mut verdict, row, rtol);
+        smoothness(&mut verdict, row, &problem);
+    }
     if !k.is_finite() {
         for column in ["growth_rate", "frequency", "decay_rate"] {
             verdict.compare(row, column, None, None);

@@ -1,28 +1,30 @@
 //! `step_response`: the traced response obeys the equations; its extremes, its settling and its cycles are read off the trace.
 
 use super::hopf;
-use super::motion::Followed;
-use super::verdict::{Context, Verdict, number, transition, word};
+use super::motion::{Followed, bisect};
+use super::route::integrate;
+use super::verdict::{Context, Verdict, number, state_law, transition, word};
 use crate::dataset::Row;
-use crate::model::Transition;
+use crate::model::{Law, StateLaw, Transition};
 use crate::protocol::{Motion, SpringBlock};
 use crate::stability::SteadySliding;
-use crate::stability::step_response::{Outcome, SETTLED, Step};
+use crate::stability::step_response::{Outcome, SETTLED, VelocityStep};
 use crate::table::STATUS;
 
-/// Distance from the edge of the band of settled velocities, in rtol, within which an extremum may or may not leave the band.
+/// Distance from the edge of the band of settled velocities, in rtol, within which it is undetermined whether an
+/// extremum leaves the band. Chosen: the limit of `verify`.
 const EDGE_RTOLS: f64 = 10.0;
 
-/// Relative overshoot below which its time is not determined.
+/// Relative overshoot below which its time is not determined. Chosen: the error of the time is `rtol` divided by the overshoot.
 const MIN_OVERSHOOT: f64 = 1e-3;
 
-/// Cycles beyond the decision, in which a response comes to its cycle.
+/// Number of cycles after the decision in which a response approaches its limit cycle. Chosen: a typical multiplier of 0.5 leaves 1e-9.
 const MORE_CYCLES: f64 = 30.0;
 
-/// Intervals of a response that is followed.
-const MOST_INTERVALS: usize = 10_000;
+/// Greatest number of intervals of a checked response. Chosen: limits the time of a check.
+const MAX_INTERVALS: usize = 10_000;
 
-/// Distance of two successive cycles, in rtol, beyond which they determine no limit cycle.
+/// Distance of two successive cycles, in rtol, beyond which they determine no limit cycle. Chosen: three digits are left at the default `rtol`.
 const MAX_CYCLE_RTOLS: f64 = 1e3;
 
 /// An extremum or a crossing.
@@ -39,7 +41,7 @@ struct Events {
     /// Extremes since `v_f` was first crossed.
     tops: Vec<Event>,
     bottoms: Vec<Event>,
-    /// Since when the velocity is in the band, and its logarithmic slope then; least distance of an extremum from an edge, in `ln v`.
+    /// Time at which the velocity enters the band for good, and its logarithmic slope there; least distance of an extremum from an edge, in `ln v`.
     settled: Option<(Event, f64)>,
     margin: f64,
 }
@@ -49,13 +51,8 @@ impl Events {
         let samples = &followed.samples;
         let at = |s: f64| followed.at(s);
         let crossing = |i: usize, level: f64| {
-            let (mut low, mut high) = (samples[i].0, samples[i + 1].0);
             let rising = samples[i + 1].1.v > level;
-            for _ in 0..60 {
-                let middle = 0.5 * (low + high);
-                if (at(middle).v > level) == rising { high = middle } else { low = middle }
-            }
-            let moment = at(high);
+            let moment = at(bisect(samples[i].0, samples[i + 1].0, |s| (at(s).v > level) != rising));
             Event { t: moment.t, v: moment.v }
         };
         let mut events = Events { rises: vec![], tops: vec![], bottoms: vec![], settled: None, margin: f64::INFINITY };
@@ -97,12 +94,14 @@ impl Events {
 }
 
 pub fn check(row: &Row, _: &Context, rtol: f64) -> Verdict {
-    let (Some(problem), Some(k), Some(m)) = (transition(row), number(row, "k"), number(row, "m")) else {
+    let numbers = number(row, "k").zip(number(row, "m"));
+    let (Some(problem), Some(state), Some((k, m))) = (transition(row), state_law(row), numbers) else {
         return Verdict::unchecked("an axis is missing");
     };
     let mut verdict = Verdict::default();
     let Transition { law, v_i, v_f } = problem;
-    hopf::compare_coefficient(&mut verdict, row, law, m * v_f * v_f, rtol);
+    let hopf = hopf::Point::new(state, law, m * v_f * v_f);
+    hopf.compare_coefficient(&mut verdict, row, rtol);
     if number(row, "t_end").is_some() {
         verdict.miss("t_end, up to which a response was integrated");
     }
@@ -114,33 +113,75 @@ pub fn check(row: &Row, _: &Context, rtol: f64) -> Verdict {
         CYCLE.iter().chain(&["t_peak"]).for_each(|column| verdict.compare(row, column, None, None));
         return verdict;
     }
-    // Without mass, a spring softer than b - a lets the velocity become infinite.
-    let infinite = m == 0.0 && k < law.b - law.a;
+    let step = VelocityStep { state_law: state, transition: problem, k, m };
+    let Some(infinite) = diverges(&step) else {
+        verdict.miss("steps without mass that an explicit integrator does not decide");
+        return verdict;
+    };
     verdict.status(row, infinite);
+    if infinite {
+        verdict.compare_word(row, "outcome", "diverged");
+    }
     if infinite || word(row, STATUS) == Some("infeasible") {
         return verdict;
     }
-    match follow(&mut verdict, Step { transition: problem, k, m }, rtol) {
+    match follow(&mut verdict, step, rtol) {
         Ok(followed) => compare(&mut verdict, row, &problem, (k, m), &followed, rtol),
         Err(reason) => verdict.miss(reason),
     }
     verdict
 }
 
+/// Pieces of unit length over which a step without mass is followed, and the distance from steady sliding at which it has settled.
+const MASSLESS_PIECES: u32 = 2000;
+const MASSLESS_REST: f64 = 1e-3;
+
+/// Whether the velocity becomes infinite: without mass, below `b - a`, and with other laws than ageing from the place on where `-G(u)/u`
+/// reaches `k/(b - a)`. `None` if unknown.
+///
+/// In `y = ln(theta v_f)` and `q = ln u` over slip, which is scaled so that no slope is large.
+fn diverges(
+    &VelocityStep { state_law, transition: Transition { law: Law { a, b }, v_i, v_f }, k, m }: &VelocityStep,
+) -> Option<bool> {
+    if m > 0.0 || b <= a {
+        return Some(false);
+    }
+    if state_law == StateLaw::Ageing || (state_law == StateLaw::Slip && k < b - a) {
+        return Some(k < b - a);
+    }
+    let growth = |q: f64| state_law.rate(q.exp()) / q.exp();
+    let slope = |&[y, q]: &[f64; 2]| {
+        let (growth, pull) = (growth(q), k * ((y - q).exp() - 1.0));
+        let scale = 1.0 / (1.0 + growth.abs() + pull.abs() / a);
+        [scale * growth, scale * (pull - (b - a) * growth) / a]
+    };
+    let mut state = [(v_f / v_i).ln(), 0.0];
+    for _ in 0..MASSLESS_PIECES {
+        state = integrate(slope, state, (0.0, 1.0))?;
+        if -growth(state[1]) >= k / (b - a) {
+            return Some(true);
+        }
+        if k > b - a && state.iter().all(|x| x.abs() < MASSLESS_REST) {
+            return Some(false);
+        }
+    }
+    None
+}
+
 /// The columns of a limit cycle.
 const CYCLE: [&str; 3] = ["period", "cycle_peak", "cycle_trough"];
 
 /// The traced response, with its errors as differences; the reason where there is none.
-fn follow(verdict: &mut Verdict, step: Step, rtol: f64) -> Result<Followed, &'static str> {
+fn follow(verdict: &mut Verdict, step: VelocityStep, rtol: f64) -> Result<Followed, &'static str> {
     let response = step.respond(rtol).1.filter(|response| response.outcome != Outcome::Undecided);
     let response = response.ok_or("undecided responses")?;
     let more = response.cycle.map_or(0.0, |cycle| MORE_CYCLES * cycle.period);
     // The slope of the velocity, which determines the time of the peak, has fewer digits than the velocity.
     let motion = step.motion(response.t_end + more, 0.01 * rtol);
-    let motion = motion.filter(|motion| motion.landmarks().len() <= MOST_INTERVALS);
+    let motion = motion.filter(|motion| motion.landmarks().len() <= MAX_INTERVALS);
     let motion = motion.ok_or("responses of more than 10,000 steps")?;
-    let Step { transition: Transition { law, .. }, k, m } = step;
-    let followed = Followed::new(Box::new(motion), &SpringBlock { law, k, m });
+    let VelocityStep { state_law, transition: Transition { law, .. }, k, m } = step;
+    let followed = Followed::under(state_law, Box::new(motion), &SpringBlock { law, k, m });
     verdict.push("motion", followed.equation);
     verdict.push("control", followed.control);
     Ok(followed)
@@ -201,7 +242,7 @@ fn compare(
     let before = range(&events, v_f, (first.t, second.t));
     let [top, bottom] = range(&events, v_f, (second.t, third.t)).map(|event| event.v);
     let period = third.t - second.t;
-    // The last cycle is about this far from the limit cycle.
+    // Approximate distance of the last cycle from the limit cycle.
     let apart = (period / (second.t - first.t) - 1.0).abs() + (top / before[0].v - 1.0).abs();
     let vague = 1.0 + apart / rtol;
     if vague > MAX_CYCLE_RTOLS {

@@ -6,7 +6,7 @@ use crate::model::Units;
 use crate::table::{Kind, Table};
 
 /// The rows of `table` in the units of the model; `relative` determines which of `alpha_2`, `alpha_3` are given relative to the duration.
-pub fn scale(rows: &mut [(u64, Row)], table: &dyn Table, units: &Units, relative: [bool; 2]) {
+pub fn scale(rows: &mut [(u64, Row)], table: &Table, units: &Units, relative: [bool; 2]) {
     let unit = |quantity: Quantity| {
         let is_relative = match quantity {
             Quantity::Alpha2 => relative[0],

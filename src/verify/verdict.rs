@@ -1,13 +1,14 @@
 //! The verdict of a check: differences, and skipped checks.
 
 use crate::dataset::{Cell, Row};
-use crate::model::{Law, Transition};
+use crate::model::{Friction, Law, StateLaw, Transition};
 use crate::table::STATUS;
 
 /// The context of a check: properties of the sweep.
 #[derive(Debug, Clone, Copy)]
 pub struct Context {
     pub bounded: bool,
+    pub friction: Friction,
     /// Whether `alpha_2`, `alpha_3` are given relative to `t_f`.
     pub relative: [bool; 2],
 }
@@ -34,6 +35,12 @@ impl Verdict {
     /// Records a relative difference that has no counterpart in the row.
     pub fn push(&mut self, column: &'static str, size: f64) {
         self.differences.push(Difference { column, size, expected: "0".to_owned() });
+    }
+
+    /// Records the greatest difference of another verdict, and its skipped checks.
+    pub fn confirm(&mut self, column: &'static str, other: Verdict) {
+        self.push(column, other.differences.iter().map(|difference| difference.size).fold(0.0, f64::max));
+        other.unchecked.into_iter().for_each(|reason| self.miss(reason));
     }
 
     pub fn unchecked(reason: &'static str) -> Verdict {
@@ -75,52 +82,49 @@ impl Verdict {
 
     pub fn compare_word(&mut self, row: &Row, column: &'static str, expected: &str) {
         let Some((_, cell)) = row.iter().find(|(name, _)| name == column) else { return };
-        let wrong = !matches!(cell, Cell::Word(found) if found == expected);
-        let size = if wrong { f64::INFINITY } else { 0.0 };
+        self.judge(column, matches!(cell, Cell::Word(found) if found == expected), expected);
+    }
+
+    /// Records an error of a column unless it `holds`, with the expectation as text.
+    pub fn judge(&mut self, column: &'static str, holds: bool, expected: &str) {
+        let size = if holds { 0.0 } else { f64::INFINITY };
         self.differences.push(Difference { column, size, expected: expected.to_owned() });
     }
 
     /// Records an error if a column that must have a number is null.
     pub fn demand(&mut self, row: &Row, column: &'static str) {
         if row.iter().any(|(name, cell)| name == column && *cell == Cell::Missing) {
-            self.differences.push(Difference { column, size: f64::INFINITY, expected: "a number".to_owned() });
+            self.judge(column, false, "a number");
         }
     }
 
     /// Records an error if a column that must be null is not.
     pub fn demand_nothing(&mut self, row: &Row, column: &'static str) {
         if row.iter().any(|(name, cell)| name == column && *cell != Cell::Missing) {
-            self.differences.push(Difference { column, size: f64::INFINITY, expected: "nothing".to_owned() });
+            self.judge(column, false, "nothing");
         }
     }
 
     /// Compares whether the status reports friction below 0 with the least friction along the path.
     pub fn friction(&mut self, row: &Row, least: f64) {
-        if least.abs() > ZERO {
+        if least.abs() > MIN_FRICTION {
             let negative = least < 0.0;
-            let wrong = word(row, STATUS).is_none_or(|status| (status == NEGATIVE) != negative);
-            let expected = if negative { NEGATIVE.to_owned() } else { format!("not {NEGATIVE}") };
-            self.differences.push(Difference {
-                column: STATUS,
-                size: if wrong { f64::INFINITY } else { 0.0 },
-                expected,
-            });
+            let holds = word(row, STATUS).is_some_and(|status| (status == NEGATIVE) == negative);
+            self.judge(STATUS, holds, if negative { NEGATIVE } else { "not negative_friction" });
         }
     }
 
     pub fn status(&mut self, row: &Row, expected: bool) {
-        let wrong = word(row, STATUS).is_none_or(|status| (status == "infeasible") != expected);
-        let size = if wrong { f64::INFINITY } else { 0.0 };
-        let expected = if expected { "infeasible" } else { "not infeasible" }.to_owned();
-        self.differences.push(Difference { column: STATUS, size, expected });
+        let holds = word(row, STATUS).is_some_and(|status| (status == "infeasible") == expected);
+        self.judge(STATUS, holds, if expected { "infeasible" } else { "not infeasible" });
     }
 }
 
 /// The status of a path with friction below 0.
 pub const NEGATIVE: &str = "negative_friction";
 
-/// Least friction, in mu_0 sigma, that an independent route distinguishes from 0: a hundred times the tolerance of its integrator.
-const ZERO: f64 = 1e-9;
+/// Least friction, in mu_0 sigma, that an independent route distinguishes from 0. Chosen: above the errors of every route.
+const MIN_FRICTION: f64 = 1e-9;
 
 pub fn number(row: &Row, column: &str) -> Option<f64> {
     match row.iter().find(|(name, _)| name == column)?.1 {
@@ -133,6 +137,14 @@ pub fn word<'a>(row: &'a Row, column: &str) -> Option<&'a str> {
     match &row.iter().find(|(name, _)| name == column)?.1 {
         Cell::Word(word) => Some(word),
         _ => None,
+    }
+}
+
+/// The evolution law of the state: ageing without such a column; `None` for an unknown word.
+pub fn state_law(row: &Row) -> Option<StateLaw> {
+    match word(row, "law") {
+        Some(word) => StateLaw::find(word),
+        None => Some(StateLaw::Ageing),
     }
 }
 

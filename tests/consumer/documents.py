@@ -35,8 +35,8 @@ PICTURES = REPOSITORY / "docs/pictures"
 
 
 def environment(folder):
-    """The environment of a command: the program on the path."""
-    return os.environ | {"PATH": os.pathsep.join([str(folder), os.environ["PATH"]]), "MPLBACKEND": "Agg"}
+    """The environment of a command: the program on the path, and the folder of this clone."""
+    return os.environ | {"REPOSITORY": str(REPOSITORY), "PATH": os.pathsep.join([str(folder), os.environ["PATH"]]), "MPLBACKEND": "Agg"}
 
 
 def run(command, folder, variables):
@@ -131,8 +131,13 @@ def run_notebook(clone):
     client = NotebookClient(cells, timeout=600, resources={"metadata": {"path": str(path.parent)}})
     client.execute(env=os.environ | {"PATH": os.pathsep.join(folders), "PYTHONWARNINGS": "error::DeprecationWarning:__main__"})
     code = [cell for cell in cells.cells if cell.cell_type == "code"]
-    pictures = [output for cell in code for output in cell.outputs if "image/png" in output.get("data", {})]
-    assert len(pictures) == 3, len(pictures)
+    shown = [(kind, str(data)) for cell in code for output in cell.outputs for kind, data in output.get("data", {}).items()]
+    pages = [data for kind, data in shown if kind == "text/html"]
+    assert sum(kind == "image/png" for kind, _ in shown) == 3, shown
+    # Three runs with a bar, a table with its units, a trace with its picture.
+    assert sum("<progress " in page and "100% of" in page for page in pages) == 3, pages
+    assert sum("<table>" in page and "<i>mu_0 sigma l</i>" in page for page in pages) == 1, pages
+    assert sum(page.startswith("<svg") for page in pages) == 1, pages
     return len(code)
 
 

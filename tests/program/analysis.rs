@@ -292,6 +292,9 @@ fn an_answer_in_pieces_is_the_answer_at_once() {
         let pieces = ask(&question.replace("{}", "gap"));
         assert_eq!(pieces, ask(&question.replace("{}", "(SELECT * FROM gap) AS all_of")), "{question}");
     }
+    // Groups come in the order of their keys.
+    let groups = "SELECT t_f, alpha_2, count(*) AS n FROM gap GROUP BY alpha_2, t_f";
+    assert_eq!(ask(groups), ask(&format!("{groups} ORDER BY alpha_2, t_f")));
     let mean = |table: &str| -> Vec<f64> {
         let question = format!("SELECT t_f, avg(gap) AS x, sum(work) AS y FROM {table} GROUP BY t_f ORDER BY t_f");
         ask(&question).split([',', '\n']).skip(3).filter_map(|cell| cell.parse().ok()).collect()

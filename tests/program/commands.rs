@@ -78,6 +78,42 @@ fn strict_fails_where_a_row_is_not_converged() {
     assert_eq!(run(&[]), (Some(0), String::new()));
 }
 
+/// Rows under ceilings, with derivatives or of another law have optima of their own.
+#[test]
+fn plan_counts_shared_optima_alone() {
+    let folder = tempfile::tempdir().expect("is writable");
+    let optima = |axes: &str, tables: &str| {
+        write_spec(folder.path(), &format!("{MATERIAL}t_f = [0.02, 0.03]\n{axes}"), tables);
+        Plan::new(&Sweep::load(&folder.path().join("spec.toml")).expect("is legal")).optima
+    };
+    let optimal = "[tables.optimal]\n";
+    let (work, gap) = ("[tables.shortcut]\ncolumns = [\"work\"]\n", "[tables.shortcut]\ncolumns = [\"gap\"]\n");
+    for (axes, tables, expected) in [
+        ("", optimal, 2),
+        ("v_ceiling = [300.0, 400.0]\n", optimal, 0),
+        ("v_ceiling = { linspace = [300.0, 400.0, 3] }\n", optimal, 0),
+        ("v_ceiling = [300.0, inf]\n", optimal, 2),
+        ("v_ceiling = [300.0, inf]\ntau_ceiling = 1.05\n", optimal, 0),
+        ("v_ceiling = { expr = \"4 * v_f\" }\n", optimal, 2),
+        ("v_ceiling = 600.0\nlaw = [\"slip\", \"prz\"]\n", optimal, 0),
+        ("", "[tables.optimal]\ncolumns = [\"work\", \"dwork_da\"]\n", 0),
+        ("", work, 0),
+        ("", gap, 2),
+        ("family = \"bounded_friction\"\ntau_ceiling = 1.6\n", gap, 0),
+        ("family = [\"bounded_friction\", \"step\"]\ntau_ceiling = 1.6\n", gap, 2),
+    ] {
+        assert_eq!(optima(axes, tables), expected, "{axes}{tables}");
+    }
+    // Each block counts by itself.
+    let block = |ceiling: &str| format!("[[block]]\n[block.axes]\n{MATERIAL}t_f = [0.02, 0.03]\n{ceiling}\n");
+    for (second, expected) in [("tau_ceiling = 1.05", 0), ("tau_ceiling = inf", 2)] {
+        let blocks = block("v_ceiling = 300.0") + &block(second);
+        fs::write(folder.path().join("spec.toml"), format!("name = \"test\"\n{blocks}{optimal}")).expect("is writable");
+        let sweep = Sweep::load(&folder.path().join("spec.toml")).expect("is legal");
+        assert_eq!(Plan::new(&sweep).optima, expected, "{second}");
+    }
+}
+
 #[test]
 fn plan_counts_without_running() {
     let folder = tempfile::tempdir().expect("is writable");

@@ -167,7 +167,7 @@ fn points_vary_together_and_slowest() {
     assert_eq!(work[..2], work[4..]);
     assert_ne!(work[..2], work[2..4]);
 
-    // The same points from Parquet, whole numbers as such, are the same grid.
+    // Points from Parquet, with whole numbers as such, give the same grid.
     let v_f: ArrayRef = Arc::new(Int64Array::from(vec![50, 100, 50]));
     let b: ArrayRef = Arc::new(Float64Array::from(vec![0.04, 0.05, 0.04]));
     let cases = RecordBatch::try_from_iter([("v_f", v_f), ("b", b)]).expect("is a table");

@@ -388,7 +388,7 @@ fn samples_fill_their_boxes_evenly() {
     }
     assert_ne!(Design::LatinHypercube.values(0, 16, 1), Design::LatinHypercube.values(0, 16, 2));
     assert_ne!(Design::Sobol.values(0, 16, 1), Design::Sobol.values(0, 16, 2));
-    // The same on every machine and with every version of the generators.
+    // Values do not depend on the machine or on the version of the generators.
     assert_eq!(Design::Sobol.values(1, 2, 5), [0.6856530904769897, 0.3123617172241211]);
     assert_eq!(Design::LatinHypercube.values(1, 2, 5), [0.26811426894908796, 0.9098618628848139]);
 }
@@ -508,9 +508,9 @@ fn si_and_scaled_runs_agree_to_the_last_bit() {
         other => panic!("no size for {other}"),
     };
     let (mut compared, grid) = (0, Grid::default());
-    for table in slipsweep::table::ALL {
+    for table in slipsweep::table::ALL.map(|table| slipsweep::table::over(table, false)) {
         let [mine, theirs] = [&si, &scaled].map(|out| read(out, table.name()));
-        let axes = Quantity::ALL.into_iter().filter(|axis| table.axes().contains(axis));
+        let axes = Quantity::ALL.into_iter().filter(|axis| table.axes().contains(axis) && !axis.is_tacit());
         let units = axes.map(|axis| (axis.name(), axis.unit(Scale::Model)));
         // `best_cubic` has its coefficients in the units of the axes, which are not relative here.
         let columns = table.columns().iter().filter(|column| !column.optional).map(|column| {

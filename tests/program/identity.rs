@@ -60,7 +60,7 @@ fn a_table_that_is_added_is_computed_into_the_same_dataset() {
     assert_eq!(
         refusal(&other, folder.path()),
         format!(
-            "{}: the spec and the dataset each have a table that the other lacks\n  expected: optimal, crossover\n  found: gap, optimal\n  \
+            "{}: the spec and the dataset each have a table that the other lacks\n  in the spec: optimal, crossover\n  in the dataset: gap, optimal\n  \
              help: add [tables.gap] to the spec, which keeps its rows and computes yours; or change `name` in the spec, or write elsewhere \
              with --out DIR, or remove the dataset",
             folder.path().join("test").display()
@@ -134,7 +134,7 @@ fn specs_are_compared_by_meaning_and_the_first_difference_is_named() {
     ] {
         let reported = refusal(&load(&other), folder.path());
         let message = format!(
-            "{}: holds a dataset of another spec\n  expected: {expected}\n  found: {found}\n  help: change `name` in the spec, or write \
+            "{}: holds a dataset of another spec\n  in the spec: {expected}\n  in the dataset: {found}\n  help: change `name` in the spec, or write \
              elsewhere with --out DIR, or remove the dataset",
             folder.path().join("test").display()
         );
@@ -148,7 +148,10 @@ fn specs_are_compared_by_meaning_and_the_first_difference_is_named() {
     let out = folder.path().join("order");
     run(&there, &out, 1);
     let reported = refusal(&here, &out);
-    assert!(reported.contains("\n  expected: axes = v_f, t_f (line 2)\n  found: axes = t_f, v_f\n"), "{reported}");
+    assert!(
+        reported.contains("\n  in the spec: axes = v_f, t_f (line 2)\n  in the dataset: axes = t_f, v_f\n"),
+        "{reported}"
+    );
 }
 
 #[test]
@@ -163,8 +166,9 @@ fn other_points_in_the_same_file_are_another_spec() {
     fs::write(&points, "t_f\n0.03\n").expect("is writable");
     let reported = refusal(&Sweep::load(&path).expect("is legal"), folder.path());
     assert!(
-        reported
-            .contains("\n  expected: the points that the spec refers to\n  found: other contents of the same file\n"),
+        reported.contains(
+            "\n  in the spec: the points that it refers to\n  in the dataset: other contents of the same file\n"
+        ),
         "{reported}"
     );
 }

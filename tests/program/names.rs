@@ -1,4 +1,4 @@
-//! The names of the contract: old ones are gone.
+//! The names of the contract: old ones are gone. The words of comments: each states what its item is.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -89,4 +89,24 @@ fn a_name_is_a_whole_identifier_and_a_quoted_one_is_literal() {
     assert!(!is_in("gop", "gop_friction") && !is_in("gop", "gops"));
     assert!(is_in("tables.gop", "[tables.gop]") && !is_in("tables.gop", "[tables.gop_cubic]"));
     assert!(is_in("`gop`", "the strategy `gop`.") && !is_in("`gop`", "gop"));
+}
+
+#[test]
+fn no_comment_begins_with_a_comparison() {
+    let repository = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let is_code = |path: &&PathBuf| {
+        path.extension().is_some_and(|end| ["rs", "py", "pyi", "toml"].iter().any(|code| end == *code))
+    };
+    let mut found = Vec::new();
+    for path in tracked().iter().filter(is_code) {
+        let text = String::from_utf8(fs::read(repository.join(path)).expect("is readable")).unwrap_or_default();
+        for (line, number) in text.lines().zip(1..) {
+            let line = line.trim_start();
+            let is_comment = ["//", "#", "\"\"\""].iter().any(|sign| line.starts_with(sign));
+            if is_comment && line.trim_start_matches(|sign: char| !sign.is_alphabetic()).starts_with("The same") {
+                found.push(format!("{}:{number}: {line}", path.display()));
+            }
+        }
+    }
+    assert!(found.is_empty(), "{}", found.join("\n"));
 }

@@ -124,7 +124,7 @@ fn every_table_has_its_picture() {
     assert!(words[0].contains("a = 0.03 μ0, b = 0.05 μ0, vi = 3 v0"), "{}", words[0]);
     assert!(words.iter().all(|words| !words.contains("--")));
     assert!(words[5].contains("kc(vf)") && words[5].contains("k (μ0 σ/l)"), "{}", words[5]);
-    // The same again is the same bytes.
+    // A second picture has the same bytes.
     shown(folder, &["plot", "results/small", "--table", "gap", "--out", "again.svg"]);
     assert_eq!(read(folder, "again.svg"), all[0]);
     refusals(folder);

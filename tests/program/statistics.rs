@@ -51,7 +51,7 @@ fn rows(folder: &Folder, table: &str, parts: u64) -> Vec<Row> {
     parts.flat_map(|frame| (0..frame.height).map(|row| frame.row(row)).collect::<Vec<_>>()).collect()
 }
 
-/// Compares a digest with the rows, one by one.
+/// Compares statistics with the rows, one by one.
 fn compare(name: &str, statistics: &TableStatistics, rows: &[Row]) {
     let table = table::find(name).expect("is a table");
     for status in Status::ALL {
@@ -171,7 +171,7 @@ fn a_survey_reads_the_footers_alone() {
 }
 
 #[test]
-fn digests_add_up_in_any_order() {
+fn statistics_add_up_in_any_order() {
     let folder = tempfile::tempdir().expect("is writable");
     let sweep = sweep(folder.path(), MANY, "[tables.gap]\n[tables.optimal]\n");
     run(&sweep, folder.path(), 2);

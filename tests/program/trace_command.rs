@@ -50,7 +50,7 @@ fn a_table_names_its_columns_and_units() {
     let head = "optimal: least work of friction of all protocols; v may jump at both ends\n  \
                 at t_f = 0.02, a = 0.03, b = 0.05, v_i = 3, v_f = 100\n  \
                 hamiltonian = 2.59678653: dW*/dt_f\n  \
-                time_at_floor = 0: time spent on the velocity floor v = 1\n  \
+                time_at_floor = 0: time spent on the velocity floor v = v_0\n  \
                 work = 3.80811142, v_min = 19.9230141, v_max = 3392.16787\n  \
                 status ok\n  \
                 117 rows; linear interpolation errs by up to 0.0001 of the range of a column, and by up to 0.01 of v and theta\n\n  \
@@ -188,6 +188,9 @@ fn wrong_arguments_get_one_clear_message() {
     for (arguments, expected) in cases {
         assert_eq!(complaint(arguments), (Some(1), expected.to_owned()));
     }
+    let in_si = trace(Path::new("."), &[&["optimal", "--v-ceiling", "1e-7"], UP]);
+    let help = "\n  help: velocities are in units of v_0; divide m/s by v_0\n";
+    assert!(String::from_utf8_lossy(&in_si.stderr).contains(help), "{in_si:?}");
 }
 
 #[test]
@@ -470,13 +473,33 @@ fn a_protocol_from_a_state_is_the_rest_of_the_whole() {
 }
 
 #[test]
+fn the_law_is_stated_if_it_is_given() {
+    let spring: &[&str] = &["--k", "0.03", "--m", "0", "--points", "2"];
+    let laws = |law: &[&str]| {
+        let text = shown(&[&["step_response"], UP, spring, law]);
+        let csv = shown(&[&["step_response"], UP, spring, law, &["--format", "csv"]]);
+        let stated = csv.lines().filter_map(|line| line.strip_prefix("# law = ")).collect::<String>();
+        (text.contains(&format!(", law {stated}\n")), stated)
+    };
+    assert_eq!(laws(&[]), (false, String::new()));
+    for law in ["ageing", "slip", "prz"] {
+        assert_eq!(laws(&["--law", law]), (true, law.to_owned()));
+    }
+    let ageing = shown(&[&["optimal"], UP, &["--law", "ageing"]]);
+    assert!(ageing.contains("v_f = 100, law ageing\n"), "{ageing}");
+}
+
+#[test]
 fn ceilings_are_kept_or_named() {
     let capped = shown(&[&["optimal", "--v-ceiling", "300"], UP]);
     assert!(capped.contains("v_max = 300\n") && capped.contains("time_at_v_ceiling = 0.00890981447"), "{capped}");
-    let (code, reason) = complaint(&[&["optimal", "--v-ceiling", "150"], UP]);
-    assert_eq!(code, Some(1));
-    assert!(
-        reason.starts_with("error: no `optimal` protocol: t_f = 0.02 is too short under these ceilings"),
-        "{reason}"
+    let refused = trace(Path::new("."), &[&["optimal", "--v-ceiling", "150"], UP]);
+    assert_eq!(refused.status.code(), Some(1));
+    // 0.030566449857803817, rounded up.
+    assert_eq!(
+        String::from_utf8_lossy(&refused.stderr),
+        "error: no `optimal` protocol: t_f = 0.02 is too short under these ceilings: the least is 0.0305665\n  \
+         help: raise --t-f to at least 0.0305665, or raise the ceilings\n"
     );
+    shown(&[&["optimal", "--v-ceiling", "150", "--t-f", "0.0305665"], &UP[2..]]);
 }

@@ -6,8 +6,8 @@ use std::process::{Command, Output};
 use std::sync::Arc;
 
 use arrow_array::cast::AsArray;
-use arrow_array::types::Float64Type;
-use arrow_array::{Float64Array, RecordBatch};
+use arrow_array::types::{Float64Type, Int32Type};
+use arrow_array::{Array, ArrayRef, DictionaryArray, Float64Array, RecordBatch, StringArray};
 
 use crate::common::{batch, run, sweep, write_batch};
 use slipsweep::dataset::Folder;
@@ -44,10 +44,42 @@ fn a_sound_dataset_passes() {
     ] {
         assert!(text(&output).contains(table), "{}", text(&output));
     }
-    // The same seed draws the same rows, another seed others.
+    // A seed determines the rows; another seed draws others.
     let sample = |seed| text(&verify(folder.path(), &["--sample", "5", "--seed", seed]));
     assert_eq!(sample("1"), sample("1"));
     assert_ne!(sample("1"), sample("2"));
+}
+
+/// Axes of landscapes under three laws: accelerations and decelerations that wait, turn, chatter and rise, and infeasible ones.
+const LAW_AXES: &str = "law = [\"ageing\", \"slip\", \"prz\"]\nt_f = [0.1, 0.4, 1.2]\na = 0.03\nb = 0.05\nv_i = [4.0, 60.0]\nv_f = [80.0, 2.5]\n\
+                        v_ceiling = 600.0\nalpha_2 = { linspace = [-0.2, 0.2, 3], unit = \"1/t_f\" }\nalpha_3 = { linspace = [-0.3, 0.3, 3], unit = \"1/t_f^2\" }\n";
+
+#[test]
+fn landscapes_of_other_laws_are_verified() {
+    let folder = tempfile::tempdir().expect("is writable");
+    run(&sweep(folder.path(), LAW_AXES, "[tables.gap]\n"), folder.path(), 2);
+    let output = verify(folder.path(), &["--sample", "1000"]);
+    assert_eq!(output.status.code(), Some(0), "{}{}", text(&output), String::from_utf8_lossy(&output.stderr));
+    assert!(text(&output).contains("gap: 324 rows"), "{}", text(&output));
+    for column in ["work", "v_min"] {
+        let folder = tempfile::tempdir().expect("is writable");
+        run(&sweep(folder.path(), LAW_AXES, "[tables.gap]\n"), folder.path(), 2);
+        corrupt(folder.path(), "gap", column);
+        let output = verify(folder.path(), &["--sample", "1000"]);
+        assert_ne!(output.status.code(), Some(0), "{column}: {}", text(&output));
+    }
+}
+
+#[test]
+fn best_cubic_shortcuts_of_other_laws_are_verified() {
+    let tables = "[tables.best_cubic]\n";
+    let folder = tempfile::tempdir().expect("is writable");
+    run(&sweep(folder.path(), LAW_AXES, tables), folder.path(), 2);
+    let output = verify(folder.path(), &["--sample", "1000"]);
+    assert_eq!(output.status.code(), Some(0), "{}{}", text(&output), String::from_utf8_lossy(&output.stderr));
+    assert!(text(&output).contains("best_cubic: 36 rows") && text(&output).contains("beaten"), "{}", text(&output));
+    corrupt(folder.path(), "best_cubic", "work");
+    assert_ne!(verify(folder.path(), &["--sample", "1000"]).status.code(), Some(0));
 }
 
 /// Changes one value of a column by 1e-7 of itself, in the first row that has one, and returns the row.
@@ -57,17 +89,38 @@ fn corrupt(folder: &Path, table: &str, column: &str) -> usize {
 
 /// Multiplies one value of a column, in the first row that has one, and returns the row.
 fn change(folder: &Path, table: &str, column: &str, factor: f64) -> usize {
+    let mut changed = 0;
+    replace(folder, table, column, |values| {
+        let mut values: Vec<Option<f64>> = values.as_primitive::<Float64Type>().iter().collect();
+        changed = values.iter().position(Option::is_some).expect("has a value");
+        values[changed] = values[changed].map(|value| value * factor);
+        Arc::new(Float64Array::from(values))
+    });
+    changed
+}
+
+/// Replaces the first word of a column by another one.
+fn reword(folder: &Path, table: &str, column: &str, word: &str) {
+    replace(folder, table, column, |values| {
+        let words = values.as_dictionary::<Int32Type>();
+        let words = words.downcast_dict::<StringArray>().expect("has words");
+        let mut words: Vec<Option<&str>> = words.into_iter().collect();
+        let row = words.iter().position(Option::is_some).expect("has a word");
+        assert_ne!(words[row], Some(word));
+        words[row] = Some(word);
+        Arc::new(words.into_iter().collect::<DictionaryArray<Int32Type>>())
+    });
+}
+
+/// Replaces a column.
+fn replace(folder: &Path, table: &str, column: &str, change: impl FnOnce(&dyn Array) -> ArrayRef) {
     let path = Folder::new(folder, "test").part(table, 0);
     let rows = batch(&path);
     // `best_cubic` has result columns of the same names as axes: none of those is used here.
     let place = rows.schema().index_of(column).expect("is there");
-    let mut values: Vec<Option<f64>> = rows.column(place).as_primitive::<Float64Type>().iter().collect();
-    let row = values.iter().position(Option::is_some).expect("has a value");
-    values[row] = values[row].map(|value| value * factor);
     let mut columns = rows.columns().to_vec();
-    columns[place] = Arc::new(Float64Array::from(values));
+    columns[place] = change(rows.column(place));
     write_batch(&path, &RecordBatch::try_new(rows.schema(), columns).expect("is a table"));
-    row
 }
 
 #[test]
@@ -248,6 +301,73 @@ fn motions_are_followed_again() {
     }
 }
 
+/// The first row waits at the floor, then is on both ceilings. Others are infeasible for each reason, sit on the ceiling, have no ceiling.
+const CEILINGS: &str = "a = 0.03\nb = 0.05\nv_i = [3.0, 100.0]\nv_f = [100.0, 3.0]\nt_f = [0.08, 0.003, 0.7]\n\
+                        v_ceiling = [400.0, 3.0, inf]\ntau_ceiling = [1.04, 0.9, inf]\n";
+
+const STATES: &str = "theta = [0.2, 0.05]\nt_left = [0.01, 0.06]\na = 0.03\nb = 0.05\nv_f = 100.0\nv_ceiling = [1000.0, inf]\n\
+                      tau_ceiling = [inf, 1.05]\n";
+
+#[test]
+fn optima_under_ceilings_are_integrated_again() {
+    // The factor of one value of each column, and other words.
+    type Numbers<'a> = &'a [(&'a str, f64)];
+    type Words<'a> = &'a [(&'a str, &'a str)];
+    const FINE: f64 = 1.0 + 1e-7;
+    let optimal: Numbers<'_> = &[
+        ("work", FINE),
+        ("v_start", FINE),
+        ("v_end", FINE),
+        ("time_at_floor", FINE),
+        ("time_at_v_ceiling", FINE),
+        ("time_at_tau_ceiling", FINE),
+        ("hamiltonian", FINE),
+        ("theta_max", FINE),
+        ("friction_max", FINE),
+        ("t_least", FINE),
+        ("v_ceiling_least", FINE),
+        ("tau_ceiling_least", FINE),
+        ("dwork_da", FINE),
+        ("dwork_db", FINE),
+        ("dwork_dv_i", FINE),
+        ("dwork_dv_f", FINE),
+        ("dwork_dv_ceiling", FINE),
+        ("dwork_dtau_ceiling", FINE),
+    ];
+    let feedback: Numbers<'_> = &[("v", FINE), ("work_to_go", FINE), ("costate", FINE), ("gain", 1.001)];
+    let words: Words<'_> = &[("strategy", "speed_up"), ("binding", "none"), ("bound", "too_slow")];
+    let names = |numbers: Numbers<'_>, words: Words<'_>| {
+        let names: Vec<String> = numbers
+            .iter()
+            .map(|(name, _)| *name)
+            .chain(words.iter().map(|(name, _)| *name))
+            .map(|name| format!("{name:?}"))
+            .collect();
+        names.join(", ")
+    };
+    let all = names(optimal, words) + ", \"work_error\"";
+    for (axes, table, columns, numbers, words) in [
+        (CEILINGS, "optimal", all, optimal, words),
+        (STATES, "feedback", names(feedback, &[("arc", "")]), feedback, &[("arc", "floor")][..]),
+    ] {
+        let folder = tempfile::tempdir().expect("is writable");
+        run(&sweep(folder.path(), axes, &format!("[tables.{table}]\ncolumns = [{columns}]\n")), folder.path(), 2);
+        let output = verify(folder.path(), &["--sample", "1000"]);
+        assert_eq!(output.status.code(), Some(0), "{}{}", text(&output), String::from_utf8_lossy(&output.stderr));
+        assert!(!text(&output).contains("integrator"), "{}", text(&output));
+        numbers.iter().for_each(|(column, factor)| _ = change(folder.path(), table, column, *factor));
+        words.iter().for_each(|(column, word)| reword(folder.path(), table, column, word));
+        let output = verify(folder.path(), &["--sample", "1000"]);
+        assert_eq!(output.status.code(), Some(3), "{table}: {}", text(&output));
+        let text = text(&output);
+        for column in numbers.iter().map(|(column, _)| column).chain(words.iter().map(|(column, _)| column)) {
+            let mut lines = text.lines().map(|line| line.split_whitespace().collect::<Vec<_>>());
+            let line = lines.find(|cells| cells.first() == Some(column)).expect("has the column");
+            assert!(line[4].parse::<f64>().is_ok_and(|greatest| greatest > 10.0), "{table}.{column}: {text}");
+        }
+    }
+}
+
 /// Two landscapes with finite gaps and one without, in odd units.
 const LANDSCAPES: &str = "alpha_3 = { linspace = [-0.5, 0.5, 41], unit = \"1/t_f^2\" }\nt_f = [2e-5, 40.0]\na = 0.003\nb = 0.005\n\
                           v_i = 3e-9\nv_f = [100e-9, 2e-9]\nalpha_2 = { linspace = [-0.5, 0.5, 43], unit = \"1/t_f\" }\n\
@@ -294,4 +414,33 @@ fn regress_coefficients_in_a_file_of_points_are_not_relative() {
     run(&Sweep::load(&spec).expect("is legal"), folder.path(), 1);
     let output = verify(folder.path(), &[]);
     assert_eq!(output.status.code(), Some(0), "{}", text(&output));
+}
+
+/// Materials with friction of many and of few `a`, long and short, both ways.
+const REGULARISED: &str = "t_f = [0.01, 0.35, 2.0]\na = [0.02, 0.2]\nb = [0.03, 0.25]\nv_i = [50.0, 3.0]\nv_f = [200.0, 4.0]\n\
+                           alpha_2 = { linspace = [-0.01, 0.01, 3], unit = \"1/t_f\" }\nalpha_3 = 0.001\nk = 0.05\nm = 1e-6\n\
+                           [model]\nfriction = \"regularised\"\n";
+
+#[test]
+fn regularised_friction_is_recomputed() {
+    let folder = tempfile::tempdir().expect("is writable");
+    run(&sweep(folder.path(), REGULARISED, "[tables.gap]\n[tables.optimal]\n[tables.stability]\n"), folder.path(), 2);
+    let output = verify(folder.path(), &["--sample", "1000"]);
+    assert_eq!(output.status.code(), Some(0), "{}{}", text(&output), String::from_utf8_lossy(&output.stderr));
+    for (table, column) in [
+        ("gap", "work"),
+        ("gap", "work_optimal"),
+        ("optimal", "work"),
+        ("optimal", "v_start"),
+        ("optimal", "hamiltonian"),
+        ("stability", "k_c_f"),
+        ("stability", "growth_rate"),
+    ] {
+        let part = Folder::new(folder.path(), "test").part(table, 0);
+        let sound = fs::read(&part).expect("is there");
+        corrupt(folder.path(), table, column);
+        let output = verify(folder.path(), &["--sample", "1000"]);
+        assert_eq!(output.status.code(), Some(3), "{table}.{column}: {}", text(&output));
+        fs::write(&part, &sound).expect("is writable");
+    }
 }

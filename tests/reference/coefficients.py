@@ -55,12 +55,20 @@ def exp_tail(r):
     return (expm1(r) - r) / r**2 if abs(r) > mpf(10) ** -20 else mpf(1) / 2
 
 
+def above_branch(s):
+    """E/(1 + p + p^2/6) with E ln E - E + 1 = p^2/2, by s with p/(p + 4) = (s + 1) 5/12."""
+    part = (s + 1) * mpf(5) / 12
+    p = 4 * part / (1 - part)
+    return exp(1 + lambertw((p * p / 2 - 1) * exp(-1), 0).real) / (1 + p + p * p / 6)
+
+
 ARRAYS = [
     ("LN_U_OVER_W", ln_u_over_w, mpf(-1), mpf(1), 18),
     ("U_OVER_X", u_over_x, mpf(0), 1 - sqrt(-expm1(-mpf(1) / 2)), 14),
     ("LN_U_FAR", ln_u_far, mpf(1) / 12, mpf(2) / 5, 3),
     ("ATANH", atanh_tail, mpf(0), ((sqrt(mpf(2)) - 1) / (sqrt(mpf(2)) + 1)) ** 2, 6),
     ("EXP", exp_tail, -log(mpf(2)) / 2, log(mpf(2)) / 2, 10),
+    ("NEAR", above_branch, mpf(-1), mpf(1), 35),
 ]
 
 for name, f, low, high, degree in ARRAYS:

@@ -286,7 +286,7 @@ def least_work(case):
 
 
 def least_work_under_ceiling(case):
-    """The same under tau_ceiling, by ceilings.py; None also where its quadrature does not find all digits within a minute."""
+    """The least work under tau_ceiling, by ceilings.py; None also where its quadrature does not find all digits within a minute."""
     a, b, v_i, v_f, t_f, tau_ceiling = case
     bounded = t_f > generate.Problem(a, b, v_i, v_f, True).least_time()
     signal.signal(signal.SIGVTALRM, optimal_ceilings.give_up)

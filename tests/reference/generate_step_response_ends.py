@@ -109,9 +109,8 @@ def turns(v, h):
 BAND = mpfr(1) / 100
 
 
-def response(a, b, inertia, k, ratio):
+def response(block, ratio):
     """Greatest and least v once v = 1 is met, time of the greatest, settling time, and the limit cycle as period and extremes."""
-    block = Block(a, b, inertia, k)
     ratio = mpfr(ratio)
     state = (ratio, 1 / ratio, (block.a - block.b) * log(ratio) / block.k)
     met, extremes, outside, sections = False, [], mpfr(0), []
@@ -170,7 +169,7 @@ if __name__ == "__main__":
     rows = []
     for a, b, v_i, v_f, k, m in CASES:
         inertia = mpfr(m) * mpfr(v_f) ** 2
-        high, low, t_peak, settled, period, cycle_high, cycle_low = response(a, b, inertia, k, mpfr(v_i) / mpfr(v_f))
+        high, low, t_peak, settled, period, cycle_high, cycle_low = response(Block(a, b, inertia, k), mpfr(v_i) / mpfr(v_f))
         v, t = mpfr(v_f), 1 / mpfr(v_f)
         numbers = [high * v, low * v, t_peak and t_peak * t, settled if settled is None else settled * t, period and period * t,
                    cycle_high and cycle_high * v, cycle_low and cycle_low * v]

@@ -140,15 +140,20 @@ def steady_for(make, t_f, family, path):
     times[on] += sat
     v_f = 1 / p.theta_1
     work = (path.work if path else 0) - sat * c
-    a, b = sat * v_f * -p.l_1, sat * v_f * p.l_1
-    v_i, friction, start, arcs = None, p.tau_ss(p.l_1), v_f, []
+    # The multiplier of the velocity rises from 0 with the rate v_f (tau + a - b + rise multiplier).
+    force, slip, rise = p.tau_ss(p.l_1) + p.a - p.b, sat * v_f, mpfr(1) if on == "v" else 1 - p.b / p.a
+    pressed = force * (gmpy2.expm1(rise * slip) / rise if rise else slip)
+    price = force / v_f * ((gmpy2.expm1(rise * slip) / rise - slip) / rise if rise else slip**2 / 2)
+    by_v, by_tau = (-price, mpfr(0)) if on == "v" else (mpfr(0), -price * v_f / p.a)
+    a, b = (slip - by_tau) * -p.l_1, (slip - by_tau) * p.l_1
+    p_1 = (p.tau_ss(p.l_1) + p.a + pressed) / p.theta_1
+    v_i, friction, start, arcs = -(p.tau_ss(p.l_1) + p.a) * p.theta_0, p.tau_ss(p.l_1), v_f, []
     if path:
         slopes = path.slopes()
         a, b, v_i = a + slopes["a"], b + slopes["b"], -slopes["p_0"] * p.theta_0**2
         friction, start, arcs = max(friction, greatest_friction(path)), exp(path.ends()[0]) / p.theta_0, path.arcs()
-    tau_slope = None
-    top = p.theta_1
-    return [work, start, v_f, times["floor"], times["v"], times["tau"], -c, top, friction, a, b, v_i, None, None, tau_slope, mpfr(0), arcs + ["sit"]]
+    by = [a, b, v_i, p_1 * p.theta_1**2, by_v, by_tau]
+    return [work, start, v_f, times["floor"], times["v"], times["tau"], -c, p.theta_1, friction, *by, mpfr(0), arcs + ["sit"]]
 
 
 def check_slope(make, path, name, found, whole):

@@ -410,3 +410,17 @@ fn regress_a_soft_spring_that_slides_steadily_is_driven_as_fast() {
     let found = solve((SpringBlock { law, k: 5.39280429386416e-32, m: 1e-30 }, (v, v), 3.953104389605138e8), 4e-3);
     assert_eq!((found.control_min, found.control_max), (v, v));
 }
+
+/// Small factors lose digits, so they are 0: those of `sweeps/compliant.toml` differed by up to 1000 rtol at 1e-25.
+#[test]
+fn amplifications_keep_their_digits_or_are_0() {
+    let law = Law { a: 0.005, b: 0.01 };
+    let amplified = |t_f: f64, k: f64, rtol: f64| {
+        amplification(&path((SpringBlock { law, k, m: 2.5e-16 }, (1e5, 3.2e6), t_f)), rtol).number.expect("is solved")
+    };
+    for (t_f, k) in [(1.5537e-5, 0.0299), (1.5537e-5, 0.0376), (1.3847e-5, 0.0474)] {
+        let (found, finer) = (amplified(t_f, k, 1e-10), amplified(t_f, k, 1e-13));
+        assert!(found > 0.0 && relative(found, finer) <= 1e-10, "{t_f} {k}: {found:e}, {finer:e}");
+    }
+    assert_eq!(amplified(3.1e-5, 0.029858, 1e-10), 0.0);
+}

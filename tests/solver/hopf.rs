@@ -1,7 +1,7 @@
 //! The kind of the Hopf point, from closed form, against limit cycles of simulated responses on both sides of it.
 
-use slipsweep::model::{Law, Transition};
-use slipsweep::stability::step_response::{Outcome, Response, Step};
+use slipsweep::model::{Law, StateLaw, Transition};
+use slipsweep::stability::step_response::{Outcome, Response, VelocityStep};
 use slipsweep::stability::{Hopf, SteadySliding};
 
 const A: f64 = 0.005;
@@ -16,7 +16,8 @@ fn sliding(ratio: f64, fraction: f64) -> (Law, f64) {
 /// The response to a step from `v_i` times the final velocity, `1 + distance` times as stiff as critical.
 fn response((law, v_f): (Law, f64), distance: f64, v_i: f64) -> Response {
     let k = (1.0 + distance) * SteadySliding::new(law, 1.0, MASS, v_f).critical_stiffness();
-    let step = Step { transition: Transition { law, v_i: v_i * v_f, v_f }, k, m: MASS };
+    let step =
+        VelocityStep { state_law: StateLaw::Ageing, transition: Transition { law, v_i: v_i * v_f, v_f }, k, m: MASS };
     step.respond(1e-6).1.expect("is followed")
 }
 
@@ -30,7 +31,7 @@ fn amplitude(response: &Response) -> f64 {
 fn supercritical_cycles_grow_from_nothing_below_the_critical_stiffness() {
     for ratio in [1.2, 2.0, 6.0] {
         let sliding = sliding(ratio, 1.25);
-        assert_eq!(Hopf::of(sliding.0, MASS, sliding.1), Some(Hopf::Supercritical));
+        assert_eq!(Hopf::of(StateLaw::Ageing, sliding.0, MASS, sliding.1), Some(Hopf::Supercritical));
         let [far, near] = [-1e-4, -1e-6].map(|distance| amplitude(&response(sliding, distance, 0.999)));
         assert!((far / near / 10.0 - 1.0).abs() < 0.05 && near < 0.03, "{ratio}: {far} {near}");
         assert_eq!(response(sliding, 1e-4, 0.999).outcome, Outcome::Settled, "{ratio}");
@@ -41,7 +42,7 @@ fn supercritical_cycles_grow_from_nothing_below_the_critical_stiffness() {
 fn subcritical_cycles_are_there_at_once_and_on_both_sides() {
     for ratio in [1.2, 2.0, 6.0] {
         let sliding = sliding(ratio, 0.8);
-        assert_eq!(Hopf::of(sliding.0, MASS, sliding.1), Some(Hopf::Subcritical));
+        assert_eq!(Hopf::of(StateLaw::Ageing, sliding.0, MASS, sliding.1), Some(Hopf::Subcritical));
         // None is small: the response jumps to one that hardly depends on the distance,
         let [far, near] = [-1e-4, -1e-6].map(|distance| amplitude(&response(sliding, distance, 0.999)));
         assert!((far / near - 1.0).abs() < 0.05 && near > 0.5, "{ratio}: {far} {near}");

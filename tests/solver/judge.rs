@@ -233,7 +233,7 @@ impl Extremal {
 
     /// Time and work while theta runs from `from` to `to`, rising (`side = -1`) or falling (1), away from its turning
     /// point.
-    fn leg(&self, from: Dd, to: Dd, side: f64) -> Option<Pair> {
+    fn arc(&self, from: Dd, to: Dd, side: f64) -> Option<Pair> {
         // In ln theta.
         let density = |y: Dd| {
             let theta = exp(y);
@@ -306,15 +306,15 @@ pub fn optimal_work(transition: &Transition, t_f: f64, optimum: &Optimum) -> Opt
     let c = (a * phi(z) - dd(1.0) - slope * ln(theta)) / theta;
     let extremal = Extremal { a, slope, c, wholes };
     let (rises, falls) = (z.high < 0.0, optimum.v_end >= v_f);
-    let legs = match (rises, falls) {
+    let arcs = match (rises, falls) {
         (true, true) => {
             let turn = extremal.turn(if end.high > theta.high { end } else { theta })?;
             plus(extremal.leg_to_turn(turn, theta, -1.0)?, extremal.leg_to_turn(turn, end, 1.0)?)
         }
-        (true, false) => extremal.leg(theta, end, -1.0)?,
-        (false, _) => extremal.leg(theta, end, 1.0)?,
+        (true, false) => extremal.arc(theta, end, -1.0)?,
+        (false, _) => extremal.arc(theta, end, 1.0)?,
     };
-    let [time, work] = plus(sums, legs);
+    let [time, work] = plus(sums, arcs);
     let late = time - dd(t_f);
     let least = work + c * late;
     (least.high.is_finite()).then(|| (least.high, (late / dd(t_f)).high.abs()))

@@ -104,7 +104,7 @@ fn regress_short_holds_keep_their_digits() {
 
 /// No extremal exists at some of these times because friction is negative; it had been called a defect of the solver.
 #[test]
-fn regress_special_times_where_friction_is_negative_are_nonphysical() {
+fn regress_special_times_where_friction_is_negative_are_unproven() {
     for (a, b, v_i, v_f) in [
         (0.04889316364714283, 0.1819872397332725, 20022.81969885003, 1.001),
         (0.08690174766765593, 0.33360220509231936, 749.0827455585322, 3.0),

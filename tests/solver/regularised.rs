@@ -601,3 +601,24 @@ fn regress_short_pieces_keep_the_digits_of_v_min() {
         assert!(relative(v_min(rtol), exact) <= rtol + 1e-10, "{rtol}: {} {exact}", v_min(rtol));
     }
 }
+
+/// Two extremes of the control velocity between two nodes, with slopes of one sign at both: `v_c_max` was 24 rtol too small.
+#[test]
+fn regress_two_extremes_between_two_nodes_are_found() {
+    let slider =
+        SpringBlock { law: Law { a: 0.009667847704338074, b: 0.0 }, k: 0.011369200743058134, m: 6.3186683515381965e-9 };
+    let solved = regularised::motion(
+        &slider,
+        (1.606403045726257, 958.2102301354813),
+        12.248931224546684,
+        0.7789704607635612,
+        true,
+        1e-10,
+    );
+    let (value, motion) = (solved.0.value.expect("has numbers"), solved.1.expect("has a motion"));
+    let marks = motion.landmarks();
+    let fine =
+        marks.windows(2).flat_map(|ends| (0..=2000).map(|i| ends[0] + (ends[1] - ends[0]) * f64::from(i) / 2000.0));
+    let found = fine.filter_map(|s| motion.at(s).v_c).fold(f64::NEG_INFINITY, f64::max);
+    assert!(value.control_max >= found * (1.0 - 2e-10), "{} {found}", value.control_max);
+}

@@ -4,13 +4,18 @@
 use crate::support::relative;
 use ode_solvers::dop_shared::OutputType;
 use ode_solvers::{Dop853, SVector, System};
-use slipsweep::model::{Law, Transition};
+use slipsweep::model::{Law, StateLaw, Transition};
+use slipsweep::protocol::optimal::Bounds;
 use slipsweep::protocol::shortcut::{self, Case};
 use slipsweep::protocol::{Moment, Motion, SolverStats, Status, optimal};
 use slipsweep::trace::{Absence, Protocol, RANGE_RTOL, Times, Trace, TracedPath};
 
 const PAPER: Transition = Transition { law: Law { a: 0.03, b: 0.05 }, v_i: 3.0, v_f: 100.0 };
 const BACK: Transition = Transition { v_i: 100.0, v_f: 3.0, ..PAPER };
+const BEST_CUBIC: Protocol = Protocol::BestCubic {
+    law: StateLaw::Ageing,
+    bounds: Bounds { floor: true, v_ceiling: f64::INFINITY, tau_ceiling: f64::INFINITY },
+};
 
 fn case(transition: Transition, t_f: f64) -> Case {
     Case { transition, t_f, tau_ceiling: 1.6 }
@@ -54,8 +59,8 @@ fn shortcuts() -> Vec<(Protocol, Case)> {
             }
         }
     }
-    cases.extend([0.02, 0.037, 0.049].map(|t_f| (Protocol::BestCubic { bounded: true }, case(PAPER, t_f))));
-    cases.push((Protocol::CubicPoint { a_2: 0.01, a_3: -0.5 }, case(PAPER, 0.02)));
+    cases.extend([0.02, 0.037, 0.049].map(|t_f| (BEST_CUBIC, case(PAPER, t_f))));
+    cases.push((Protocol::CubicPoint { law: StateLaw::Ageing, a_2: 0.01, a_3: -0.5 }, case(PAPER, 0.02)));
     cases
 }
 
@@ -296,7 +301,7 @@ fn least_rows(path: &TracedPath, transition: Transition) -> f64 {
 fn rows_are_few() {
     let step = Protocol::Family(shortcut::find("step").expect("exists"));
     let cubic = Protocol::Family(shortcut::find("cubic").expect("exists"));
-    let best = Protocol::BestCubic { bounded: true };
+    let best = BEST_CUBIC;
     let optimal = Protocol::Optimal { bounds: true.into() };
     let known = [
         (optimal, PAPER, 0.02, 117),
@@ -431,8 +436,8 @@ fn what_does_not_exist_states_which_bound() {
     assert!(relative(t_min, 0.395414772254663) < 1e-14);
     let free = absent(optimal(false), BACK, 0.3);
     assert_eq!(free.to_string(), "t_f = 0.3 is too short for v > 0: the least is t_min = 0.3233333333333333");
-    assert_eq!(absent(Protocol::BestCubic { bounded: true }, BACK, 0.3955), Absence::Cubic { bounded: true });
-    let steep = Protocol::CubicPoint { a_2: 3.0, a_3: 0.0 };
+    assert_eq!(absent(BEST_CUBIC, BACK, 0.3955), Absence::Cubic { bounded: true });
+    let steep = Protocol::CubicPoint { law: StateLaw::Ageing, a_2: 3.0, a_3: 0.0 };
     assert_eq!(absent(steep, PAPER, 0.02).to_string(), "v or theta would not stay positive");
     // Without the bound the optimum may leave the model, as its status reports.
     let below = path(optimal(false), case(PAPER, 0.06));

@@ -10,3 +10,18 @@ pub fn uniform(state: &mut u64) -> f64 {
     *state = state.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
     (*state >> 11) as f64 / (1_u64 << 53) as f64
 }
+
+/// A sequence of [`uniform`] numbers.
+pub struct Random(pub u64);
+
+impl Random {
+    /// A uniform number from 0 to 1.
+    pub fn next(&mut self) -> f64 {
+        uniform(&mut self.0)
+    }
+
+    /// A number from `low` to `high`, uniform in its logarithm.
+    pub fn between(&mut self, low: f64, high: f64) -> f64 {
+        low * (high / low).powf(self.next())
+    }
+}

@@ -1,4 +1,5 @@
-"""What one would write in Python instead, on the rows of tests/reference: `peers.py FILE` writes what each answered and how long it took.
+"""What one would write in Python instead, on the rows of tests/reference: `peers.py FILE [SUBJECT...]` writes what each answered and how long
+it took.
 
 - the optimum: scipy's `solve_bvp` on the paper's equations, and direct collocation with CasADi and IPOPT,
   without ceilings and with them;
@@ -15,7 +16,6 @@ import time
 from pathlib import Path
 
 import casadi as ca
-import numba
 import numpy as np
 from scipy.integrate import solve_bvp
 
@@ -148,9 +148,8 @@ def works(x, w, a, b, v_i, v_f, t_f, a_2, a_3):
     return np.where(feasible, work, np.nan)
 
 
-@numba.njit
-def compiled(x, w, a, b, v_i, v_f, t_f, a_2, a_3):
-    """The works, point by point."""
+def point_by_point(x, w, a, b, v_i, v_f, t_f, a_2, a_3):
+    """The works in a loop, for numba."""
     works = np.empty_like(a)
     for i in range(a.size):
         q = 1 / v_i[i]
@@ -168,6 +167,9 @@ def compiled(x, w, a, b, v_i, v_f, t_f, a_2, a_3):
 
 
 def landscape(write):
+    import numba
+
+    compiled = numba.njit(point_by_point)
     columns = table("landscape", "a", "b", "v_i", "v_f", "t_f", "a_2", "a_3")
     rows = columns[0].size
     many = [np.tile(column, COPIES) for column in columns]
@@ -205,7 +207,8 @@ def main():
         def write(*cells):
             out.writerow([repr(float(cell)) if isinstance(cell, np.floating) else cell for cell in cells])
 
-        for subject in (optimal, ceilings, landscape, stability):
+        subjects = {subject.__name__: subject for subject in (optimal, ceilings, landscape, stability)}
+        for subject in [subjects[name] for name in sys.argv[2:]] or subjects.values():
             start = time.time()
             subject(write)
             print(f"{subject.__name__}: {time.time() - start:.0f} s", flush=True)

@@ -16,12 +16,12 @@ pub(super) struct Factors<const N: usize, const S: usize> {
     /// Inverses of the pivot blocks.
     pivots: [Square<S>; N],
     /// Below the diagonal: the multipliers; above it: the blocks.
-    others: [[Block<S>; N]; N],
+    others: [[OffDiagonal<S>; N]; N],
 }
 
 /// An off-diagonal block.
 #[derive(Debug, Clone, Copy)]
-enum Block<const S: usize> {
+enum OffDiagonal<const S: usize> {
     Empty,
     Diagonal([f64; S]),
     Full(Square<S>),
@@ -32,7 +32,7 @@ impl<const N: usize, const S: usize> Factors<N, S> {
     #[inline(always)]
     pub(super) fn new(rule: &Collocation<S>, h: f64, at: &Linearised<N, S>) -> Option<Self> {
         let mut pivots = [[[0.0; S]; S]; N];
-        let mut others = [[Block::Empty; N]; N];
+        let mut others = [[OffDiagonal::Empty; N]; N];
         for r in 0..N {
             for i in 0..S {
                 let fraction = at.mass[r][i] / h;
@@ -44,7 +44,7 @@ impl<const N: usize, const S: usize> Factors<N, S> {
             for c in (0..N).filter(|&c| c != r) {
                 let coupling = &at.jacobian[r][c];
                 if coupling.iter().any(|&x| x != 0.0) {
-                    others[r][c] = Block::Diagonal(coupling.map(|x| -x));
+                    others[r][c] = OffDiagonal::Diagonal(coupling.map(|x| -x));
                 }
             }
         }
@@ -62,10 +62,10 @@ impl<const N: usize, const S: usize> Factors<N, S> {
                     } else {
                         let mut full = others[r][c].full();
                         subtract(&mut full, &change);
-                        others[r][c] = Block::Full(full);
+                        others[r][c] = OffDiagonal::Full(full);
                     }
                 }
-                others[r][p] = Block::Full(multiplier);
+                others[r][p] = OffDiagonal::Full(multiplier);
             }
         }
         Some(Factors { pivots, others })
@@ -109,18 +109,18 @@ fn integral<const N: usize, const S: usize>(
     plain.then(|| rule.integration.map(|row| row.map(|x| x * (h / mass))))
 }
 
-impl<const S: usize> Block<S> {
+impl<const S: usize> OffDiagonal<S> {
     /// `x - self y`.
     #[inline(always)]
     fn reduce(&self, x: &mut [f64; S], y: &[f64; S]) {
         match self {
-            Block::Empty => {}
-            Block::Diagonal(d) => {
+            OffDiagonal::Empty => {}
+            OffDiagonal::Diagonal(d) => {
                 for i in 0..S {
                     x[i] -= d[i] * y[i];
                 }
             }
-            Block::Full(square) => {
+            OffDiagonal::Full(square) => {
                 for i in 0..S {
                     for j in 0..S {
                         x[i] -= square[i][j] * y[j];
@@ -134,9 +134,9 @@ impl<const S: usize> Block<S> {
     #[inline(always)]
     fn times(&self, right: &Square<S>) -> Option<Square<S>> {
         match self {
-            Block::Empty => None,
-            Block::Diagonal(d) => Some(std::array::from_fn(|i| right[i].map(|x| d[i] * x))),
-            Block::Full(square) => Some(product(square, right)),
+            OffDiagonal::Empty => None,
+            OffDiagonal::Diagonal(d) => Some(std::array::from_fn(|i| right[i].map(|x| d[i] * x))),
+            OffDiagonal::Full(square) => Some(product(square, right)),
         }
     }
 
@@ -144,18 +144,18 @@ impl<const S: usize> Block<S> {
     #[inline(always)]
     fn multiplied(&self, left: &Square<S>) -> Option<Square<S>> {
         match self {
-            Block::Empty => None,
-            Block::Diagonal(d) => Some(left.map(|row| std::array::from_fn(|j| row[j] * d[j]))),
-            Block::Full(square) => Some(product(left, square)),
+            OffDiagonal::Empty => None,
+            OffDiagonal::Diagonal(d) => Some(left.map(|row| std::array::from_fn(|j| row[j] * d[j]))),
+            OffDiagonal::Full(square) => Some(product(left, square)),
         }
     }
 
     fn full(&self) -> Square<S> {
         let mut full = [[0.0; S]; S];
         match self {
-            Block::Empty => {}
-            Block::Diagonal(d) => (0..S).for_each(|i| full[i][i] = d[i]),
-            Block::Full(square) => full = *square,
+            OffDiagonal::Empty => {}
+            OffDiagonal::Diagonal(d) => (0..S).for_each(|i| full[i][i] = d[i]),
+            OffDiagonal::Full(square) => full = *square,
         }
         full
     }

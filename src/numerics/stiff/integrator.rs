@@ -70,19 +70,21 @@ struct LastStep<const N: usize, const S: usize> {
     error: f64,
 }
 
-/// Least tolerated error, relative to the variables: 32 units in the last place.
+/// Least tolerated error, relative to the variables: 32 units in the last place. Chosen: the roundings of a step.
 const ROUNDING: f64 = 32.0 * f64::EPSILON;
 
-/// Shortest step, as a fraction of the time before it, unless it [may be shorter](Integrator::may_step): 32 digits.
+/// Shortest step, as a fraction of the time before it, unless it [may be shorter](Integrator::may_step). Derived: `2^-107`, the
+/// rounding of a double-double number.
 const MIN_STEP_FRACTION: f64 = 6e-33;
 
-/// Newton iterations before a step is rejected.
-const MOST_ITERATIONS: u32 = 12;
+/// Newton iterations before a step is rejected. Chosen: at the rate of 0.1 they give twelve digits.
+const MAX_ITERATIONS: u32 = 12;
 
-/// Fraction of the tolerance that is allowed as residual of Newton's method.
+/// Fraction of the tolerance that is allowed as residual of Newton's method. Chosen: its effect on the error estimate is negligible; the default of
+/// Radau5 is of this order (Hairer and Wanner 1996, IV.8).
 const NEWTON_TOLERANCE_FRACTION: f64 = 0.01;
 
-/// Convergence rate of Newton's method above which the matrix is recomputed.
+/// Convergence rate of Newton's method above which the matrix is recomputed. Chosen: one digit for each iteration.
 const MAX_CONVERGENCE_RATE: f64 = 0.1;
 
 impl<'a, Y: System<N>, const N: usize, const S: usize> Integrator<'a, Y, N, S> {
@@ -187,7 +189,7 @@ impl<'a, Y: System<N>, const N: usize, const S: usize> Integrator<'a, Y, N, S> {
             let start = self.y;
             let solved = self.stages(self.t.high, &start, h, guess);
             let tried = solved.and_then(|solved| Some((solved, self.error(h, &solved.change)? / self.allowed)));
-            let Some((Solved { change, iterations }, error)) = tried else {
+            let Some((NodeChanges { change, iterations }, error)) = tried else {
                 self.cost.rejected += 1;
                 self.h = 0.3 * h;
                 continue;
@@ -217,7 +219,7 @@ impl<'a, Y: System<N>, const N: usize, const S: usize> Integrator<'a, Y, N, S> {
     /// Newton's method fails.
     #[inline(always)]
     pub fn part(&mut self, dense_output: &DenseOutput<N, S>, u: f64) -> Option<DenseOutput<N, S>> {
-        self.leg(dense_output, (dense_output.t, dense_output.start), 0.0, u)
+        self.substep(dense_output, (dense_output.t, dense_output.start), 0.0, u)
     }
 
     /// Integrates the part of an accepted step between the fractions `from` and `to` again: the step is shorter, so its polynomial is closer to
@@ -225,12 +227,12 @@ impl<'a, Y: System<N>, const N: usize, const S: usize> Integrator<'a, Y, N, S> {
     #[inline(always)]
     pub fn between(&mut self, dense_output: &DenseOutput<N, S>, from: f64, to: f64) -> Option<DenseOutput<N, S>> {
         let start = if from > 0.0 { self.part(dense_output, from)?.end } else { dense_output.start };
-        self.leg(dense_output, (dense_output.t + from * dense_output.h, start), from, to)
+        self.substep(dense_output, (dense_output.t + from * dense_output.h, start), from, to)
     }
 
     /// A step from `(t, y)`, at the fraction `from` of a step, to the fraction `to`.
     #[inline(always)]
-    fn leg(
+    fn substep(
         &mut self,
         dense_output: &DenseOutput<N, S>,
         (t, y): (f64, [f64; N]),
@@ -250,7 +252,7 @@ impl<'a, Y: System<N>, const N: usize, const S: usize> Integrator<'a, Y, N, S> {
     #[inline(always)]
     fn factor(&self, h: f64, error: f64, iterations: u32) -> f64 {
         let order = (S + 1) as f64;
-        let safety = 0.9 * f64::from(2 * MOST_ITERATIONS + 1) / f64::from(2 * MOST_ITERATIONS + iterations);
+        let safety = 0.9 * f64::from(2 * MAX_ITERATIONS + 1) / f64::from(2 * MAX_ITERATIONS + iterations);
         let level = ln(error.max(1e-10));
         let factor = safety * exp(-level / order);
         match &self.last {
@@ -282,12 +284,12 @@ impl<'a, Y: System<N>, const N: usize, const S: usize> Integrator<'a, Y, N, S> {
 
     /// Newton's method for the changes at the nodes; `None` if it fails.
     #[inline(always)]
-    fn stages(&mut self, t: f64, y: &[f64; N], h: f64, mut change: [[f64; S]; N]) -> Option<Solved<N, S>> {
+    fn stages(&mut self, t: f64, y: &[f64; N], h: f64, mut change: [[f64; S]; N]) -> Option<NodeChanges<N, S>> {
         let unit = self.units(y);
         let enough = NEWTON_TOLERANCE_FRACTION * self.accuracy.tolerance;
         let mut factors: Option<Factors<N, S>> = None;
         let mut before = f64::NAN;
-        for iterations in 1..=MOST_ITERATIONS {
+        for iterations in 1..=MAX_ITERATIONS {
             let at = self.system.linearise(&self.points(t, y, h, &change));
             self.cost.evaluations += 1;
             let matrix = match factors {
@@ -316,7 +318,7 @@ impl<'a, Y: System<N>, const N: usize, const S: usize> Integrator<'a, Y, N, S> {
             let converged = rate < 1.0 && size * rate / (1.0 - rate) <= enough;
             let rounded = rate >= 0.5 && size <= self.accuracy.tolerance;
             if converged || rounded || size <= 0.01 * enough {
-                return Some(Solved { change, iterations });
+                return Some(NodeChanges { change, iterations });
             }
             if rate >= 2.0 {
                 return None;
@@ -389,7 +391,7 @@ impl<'a, Y: System<N>, const N: usize, const S: usize> Integrator<'a, Y, N, S> {
 
 /// Changes at the nodes, and the number of iterations.
 #[derive(Debug, Clone, Copy)]
-struct Solved<const N: usize, const S: usize> {
+struct NodeChanges<const N: usize, const S: usize> {
     change: [[f64; S]; N],
     iterations: u32,
 }

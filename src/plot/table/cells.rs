@@ -1,6 +1,6 @@
 //! The cells of an axis in a map: one for each value if these are few, else one for several consecutive values.
 
-use super::survey::Values;
+use super::filtered::Values;
 use crate::plot::scale::{LOG_RATIO, Scale, is_logarithmic};
 
 /// The cells of an axis.

@@ -1,9 +1,9 @@
 //! The choice of axes and columns: from the request, else from the varying axes.
 
 use super::Request;
+use super::filtered::{FilteredTable, Values};
 use super::lines;
 use super::map;
-use super::survey::{Survey, Values};
 use crate::plot::PlotError;
 
 /// The defaults of a picture.
@@ -31,9 +31,9 @@ pub struct Defaults {
 #[derive(Debug, Clone)]
 pub enum Shape {
     /// Colours over two axes.
-    Map(map::Plan),
+    Map(map::MapColumns),
     /// Columns over an axis.
-    Lines(lines::Plan),
+    Lines(lines::LineColumns),
 }
 
 /// The shape of a picture.
@@ -41,10 +41,10 @@ pub enum Shape {
 /// # Errors
 ///
 /// A column that the table does not have, or a combination of options without a picture.
-pub fn choose(survey: &Survey, defaults: &Defaults, request: &Request) -> Result<Shape, PlotError> {
-    let choice = Choice::new(survey, defaults, request)?;
+pub fn choose(filtered: &FilteredTable, defaults: &Defaults, request: &Request) -> Result<Shape, PlotError> {
+    let choice = Choice::new(filtered, defaults, request)?;
     let (x, y, colour) = (request.x.as_deref(), request.y.as_deref(), request.colour.as_deref());
-    let is_axis = |name: &&str| survey.axis(name).is_some();
+    let is_axis = |name: &&str| filtered.axis(name).is_some();
     // Two axes, or a column of colours, select a map; another column selects lines.
     if let Some(y) = y.filter(is_axis) {
         let x = x.map(str::to_owned).or_else(|| choice.find(defaults.x, Some(y), 2)).or_else(|| choice.longest());
@@ -52,7 +52,7 @@ pub fn choose(survey: &Survey, defaults: &Defaults, request: &Request) -> Result
         return choice.map(x, y.to_owned());
     }
     // Lines are named by their labels, with or without a request.
-    let is_label = |name: &&str| y.is_some() && survey.labels.iter().any(|(label, _)| label == name);
+    let is_label = |name: &&str| y.is_some() && filtered.labels.iter().any(|(label, _)| label == name);
     let colour = colour.filter(|colour| !is_label(colour));
     let wants_map = colour.filter(|colour| !is_axis(colour));
     let wants_lines = y.is_some() || colour.is_some_and(|colour| is_axis(&colour));
@@ -60,20 +60,20 @@ pub fn choose(survey: &Survey, defaults: &Defaults, request: &Request) -> Result
         return choice.map(x, y);
     }
     if let Some(column) = wants_map {
-        return Err(PlotError::NoMap { table: survey.table.clone(), column: column.to_owned() });
+        return Err(PlotError::NoMap { table: filtered.table.clone(), column: column.to_owned() });
     }
     let preferred = || choice.find(defaults.x, colour, 3).or_else(|| choice.longest());
     let preferred = || preferred().or_else(|| choice.find(defaults.x, colour, 2));
     let x = x.map(str::to_owned).or_else(preferred).ok_or_else(|| choice.one_row())?;
-    let written = || defaults.lines.iter().copied().filter(|column| survey.has(column));
+    let written = || defaults.lines.iter().copied().filter(|column| filtered.has(column));
     let y = y.map_or_else(|| written().map(str::to_owned).collect(), |y| vec![y.to_owned()]);
     let series = colour.map(str::to_owned).or_else(|| choice.find(defaults.series, Some(&x), 2));
-    Ok(Shape::Lines(lines::Plan { x, y, series }))
+    Ok(Shape::Lines(lines::LineColumns { x, y, series }))
 }
 
 /// The inputs of a choice.
 struct Choice<'a> {
-    survey: &'a Survey,
+    filtered: &'a FilteredTable,
     defaults: &'a Defaults,
     request: &'a Request,
     varying: Vec<&'a Values>,
@@ -81,16 +81,16 @@ struct Choice<'a> {
 
 impl<'a> Choice<'a> {
     /// A choice for a request whose columns all exist.
-    fn new(survey: &'a Survey, defaults: &'a Defaults, request: &'a Request) -> Result<Choice<'a>, PlotError> {
+    fn new(filtered: &'a FilteredTable, defaults: &'a Defaults, request: &'a Request) -> Result<Choice<'a>, PlotError> {
         if let Some(x) = &request.x {
-            survey.check("--x", "axis", x)?;
+            filtered.check("--x", "axis", x)?;
         }
         for (argument, column) in [("--y", &request.y), ("--color", &request.colour)] {
             if let Some(column) = column {
-                survey.check(argument, "column", column)?;
+                filtered.check(argument, "column", column)?;
             }
         }
-        Ok(Choice { survey, defaults, request, varying: survey.axes.iter().filter(|axis| axis.varies()).collect() })
+        Ok(Choice { filtered, defaults, request, varying: filtered.axes.iter().filter(|axis| axis.varies()).collect() })
     }
 
     /// The first of `names`, except `not`, with at least `least` values.
@@ -107,23 +107,24 @@ impl<'a> Choice<'a> {
     }
 
     fn one_row(&self) -> PlotError {
-        PlotError::OneRow { table: self.survey.table.clone() }
+        PlotError::OneRow { table: self.filtered.table.clone() }
     }
 
     /// The axes of a map, if two are long enough.
     fn two_axes(&self, wants_map: bool) -> Result<Option<(String, String)>, PlotError> {
-        let Choice { survey, defaults, varying, .. } = self;
+        let Choice { filtered, defaults, varying, .. } = self;
         let longest = varying.iter().map(|axis| axis.values.len()).max().unwrap_or(0);
-        let is_scattered = defaults.scatters && varying.len() > 1 && survey.rows <= 2 * longest as u64;
+        let is_scattered = defaults.scatters && varying.len() > 1 && filtered.rows <= 2 * longest as u64;
         let least = if wants_map || is_scattered { 2 } else { defaults.least_map };
         let first = self.request.x.clone().or_else(|| self.find(defaults.x, None, least));
         let Some(first) = first.filter(|_| least < usize::MAX) else { return Ok(None) };
         // An axis that changes only with the first one would make a map of a single line. Grid axes are preferred to computed ones.
         let others = [defaults.y, defaults.x].concat();
-        let (gridded, computed): (Vec<&str>, Vec<&str>) = others.into_iter().partition(|name| survey.gridded.has(name));
+        let (gridded, computed): (Vec<&str>, Vec<&str>) =
+            others.into_iter().partition(|name| filtered.gridded.has(name));
         for second in [gridded, computed].concat() {
             if let Some(second) = self.find(&[second], Some(&first), least)
-                && !survey.follows(&second, &first)?
+                && !filtered.follows(&second, &first)?
             {
                 return Ok(Some((first, second)));
             }
@@ -133,15 +134,15 @@ impl<'a> Choice<'a> {
 
     fn map(&self, x: String, y: String) -> Result<Shape, PlotError> {
         let value = self.request.colour.clone().map_or_else(|| self.value(), Ok)?;
-        Ok(Shape::Map(map::Plan { x, y, value }))
+        Ok(Shape::Map(map::MapColumns { x, y, value }))
     }
 
     /// The colour column: varying words, or the first column with a value.
     fn value(&self) -> Result<String, PlotError> {
-        let Choice { survey, defaults, .. } = self;
-        for class in defaults.classes.iter().filter(|class| survey.has(class)) {
+        let Choice { filtered, defaults, .. } = self;
+        for class in defaults.classes.iter().filter(|class| filtered.has(class)) {
             let (mut seen, mut varies) = (None, false);
-            survey.each_while(&[class], |row| {
+            filtered.each_while(&[class], |row| {
                 varies |= row[0].is_finite() && seen.is_some_and(|seen| seen != row[0]);
                 seen = seen.or(Some(row[0]).filter(|place| place.is_finite()));
                 !varies
@@ -150,9 +151,9 @@ impl<'a> Choice<'a> {
                 return Ok((*class).to_owned());
             }
         }
-        let columns: Vec<&str> = defaults.value.iter().copied().filter(|column| survey.has(column)).collect();
+        let columns: Vec<&str> = defaults.value.iter().copied().filter(|column| filtered.has(column)).collect();
         let mut found = vec![false; columns.len()];
-        survey.each_while(&columns, |row| {
+        filtered.each_while(&columns, |row| {
             found.iter_mut().zip(row).for_each(|(found, cell)| *found |= cell.is_finite());
             !found.first().is_some_and(|first| *first)
         })?;

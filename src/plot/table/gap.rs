@@ -1,18 +1,17 @@
 //! The landscape of the work gap, with the line `v_min = 1` and the best shortcut.
 
 use super::cells::AxisCells;
-use super::choice::Shape;
+use super::filtered::FilteredTable;
 use super::groups::Groups;
-use super::lines;
 use super::map::{self, MapFigure};
-use super::survey::Survey;
-use super::{Scene, Source};
+use super::{Source, TableScene};
+use crate::grid::Quantity;
 use crate::model::Units;
 use crate::numerics::cubic::Cubic;
 use crate::plot::PlotError;
 use crate::plot::canvas::Stroke;
 use crate::plot::contour::{Field, contour};
-use crate::plot::figure::{Entry, Figure, Key, Layer};
+use crate::plot::figure::{Entry, Key, Layer};
 use crate::table::OPTIMUM_AXES;
 
 /// The axes of the landscape.
@@ -21,26 +20,22 @@ const ALPHAS: [&str; 2] = ["alpha_2", "alpha_3"];
 /// Steps of the grid for the line `v = 1`, along both axes. Chosen: finer than the dots of a printer.
 const STEPS: usize = 300;
 
-/// Figure of table `gap`: columns over an axis, or a map of the landscape.
+/// Adds the border and the best shortcut to a map of the landscape.
 ///
 /// # Errors
 ///
-/// A request that the table does not satisfy, or a part that cannot be read.
-pub fn draw(scene: &Scene<'_>, shape: &Shape) -> Result<Figure, PlotError> {
-    let plan = match shape {
-        Shape::Lines(plan) => return Ok(lines::lines(scene.survey, plan)?.figure),
-        Shape::Map(plan) => plan,
-    };
-    let MapFigure { mut figure, groups, least, cells } = map::map(scene.survey, plan)?;
-    if plan.x != ALPHAS[0] || plan.y != ALPHAS[1] {
-        return Ok(figure);
+/// A part that cannot be read.
+pub fn border(scene: &TableScene<'_>, plan: &map::MapColumns, map: &mut MapFigure) -> Result<(), PlotError> {
+    if scene.filtered.table != "gap" || plan.x != ALPHAS[0] || plan.y != ALPHAS[1] {
+        return Ok(());
     }
+    let MapFigure { figure, groups, least, cells } = map;
     let stroke = Stroke::solid("#000", 0.9);
-    let best = best(scene, &groups)?;
+    let best = best(scene, groups)?;
     let from_table = best.iter().any(Option::is_some);
     let (mut any_line, mut any_zero, mut any_star) = (false, false, false);
     for (place, panel) in figure.panels.iter_mut().enumerate() {
-        if let Some(Border { lines, meets_zero }) = bound(scene, &groups, place, &cells) {
+        if let Some(Border { lines, meets_zero }) = bound(scene, groups, place, cells) {
             any_line |= !lines.is_empty();
             any_zero |= meets_zero;
             panel.layers.push(Layer::Contour(lines, stroke.clone()));
@@ -56,10 +51,10 @@ pub fn draw(scene: &Scene<'_>, shape: &Shape) -> Result<Figure, PlotError> {
         let text = if from_table { "best shortcut" } else { "least gap of the grid" };
         figure.legend.push(Entry { key: Key::Star, text: text.to_owned() });
     }
-    Ok(figure)
+    Ok(())
 }
 
-fn bound_in_words(scene: &Scene<'_>, meets_zero: bool) -> String {
+fn bound_in_words(scene: &TableScene<'_>, meets_zero: bool) -> String {
     let bound = if scene.source.units == Units::Scaled { "1" } else { "*v*_{0}" };
     let zero = if meets_zero { " or *θ* = 0" } else { "" };
     format!("*v*_{{min}} = {bound}{zero}")
@@ -74,11 +69,11 @@ struct Border {
 
 /// The border of the shortcuts with `v >= 1`, and whether `theta` becomes 0 on a piece of it, as it does far from the optimum. The border of
 /// feasibility is often closer than a cell, so the line is computed from the cubic: for `theta > 0`, `v >= 1` means `1 - theta' - theta >= 0`.
-fn bound(scene: &Scene<'_>, groups: &Groups, panel: usize, cells: &[AxisCells; 2]) -> Option<Border> {
+fn bound(scene: &TableScene<'_>, groups: &Groups, panel: usize, cells: &[AxisCells; 2]) -> Option<Border> {
     let value = |name| scene.scaled(groups, panel, name);
     let (t_f, start, end) = (value("t_f")?, 1.0 / value("v_i")?, 1.0 / value("v_f")?);
     // Coefficients in units of 1/t_f and 1/t_f^2 do not depend on `t_f`.
-    let unit = |alpha: &str, power: f64| if scene.survey.unit(alpha).starts_with("1/t_f") { 1.0 } else { power };
+    let unit = |alpha: &str, power: f64| if scene.filtered.unit(alpha).starts_with("1/t_f") { 1.0 } else { power };
     let rate = scene.source.units.size("v_0/l");
     let (unit_2, unit_3) = (unit(ALPHAS[0], t_f), unit(ALPHAS[1], t_f * t_f / rate));
     let at = |cells: &AxisCells, step: usize| cells.scale.value(step as f64 / STEPS as f64);
@@ -109,24 +104,25 @@ fn bound(scene: &Scene<'_>, groups: &Groups, panel: usize, cells: &[AxisCells; 2
 }
 
 /// The best shortcut of each panel, from the table `best_cubic`, if the dataset has it.
-fn best(scene: &Scene<'_>, groups: &Groups) -> Result<Vec<Option<(f64, f64)>>, PlotError> {
+fn best(scene: &TableScene<'_>, groups: &Groups) -> Result<Vec<Option<(f64, f64)>>, PlotError> {
     let mut found = vec![None; groups.shown.len()];
     let Source { folder, manifest, .. } = scene.source;
     if manifest.table("best_cubic").is_none() {
         return Ok(found);
     }
-    let survey = match Survey::new(folder, manifest, "best_cubic", &[]) {
+    let filtered = match FilteredTable::new(folder, manifest, "best_cubic", &[]) {
         Err(PlotError::Empty { .. }) => return Ok(found),
-        survey => survey?,
+        filtered => filtered?,
     };
-    if !ALPHAS.iter().all(|alpha| survey.heading(alpha).is_some()) {
+    if !ALPHAS.iter().all(|alpha| filtered.heading(alpha).is_some()) {
         return Ok(found);
     }
-    let axes: Vec<&str> = OPTIMUM_AXES.iter().map(|axis| axis.name()).collect();
+    let mut axes: Vec<&str> = OPTIMUM_AXES.iter().map(|axis| axis.name()).collect();
+    axes.extend([Quantity::Law.name(), Quantity::VelocityCeiling.name()].iter().filter(|axis| filtered.has(axis)));
     let values: Vec<Option<Vec<f64>>> =
         (0..found.len()).map(|group| axes.iter().map(|axis| scene.value(groups, group, axis)).collect()).collect();
     let columns: Vec<&str> = axes.iter().copied().chain(ALPHAS).collect();
-    survey.each(&columns, |row| {
+    filtered.each(&columns, |row| {
         for (values, star) in values.iter().zip(&mut found) {
             let (place, alphas) = row.split_at(axes.len());
             if values.as_deref() == Some(place) && alphas.iter().all(|alpha| alpha.is_finite()) {

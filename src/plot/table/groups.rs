@@ -3,7 +3,7 @@
 use std::cmp::Ordering;
 use std::collections::{HashMap, HashSet};
 
-use super::survey::{Survey, Values, bits};
+use super::filtered::{FilteredTable, Values, bits};
 use crate::grid::Quantity;
 use crate::plot::colour::MAX_SERIES;
 use crate::plot::{Figure, PlotError, label};
@@ -24,18 +24,18 @@ const MAX_CROSSED_PANELS: usize = 4;
 /// # Errors
 ///
 /// A part that cannot be read.
-pub fn further<'a>(survey: &'a Survey, drawn: &[&str]) -> Result<(Vec<&'a str>, Option<String>), PlotError> {
+pub fn further<'a>(filtered: &'a FilteredTable, drawn: &[&str]) -> Result<(Vec<&'a str>, Option<String>), PlotError> {
     let others =
-        survey.axes.iter().filter(|axis| (axis.varies() || axis.infinite) && !drawn.contains(&axis.name.as_str()));
+        filtered.axes.iter().filter(|axis| (axis.varies() || axis.infinite) && !drawn.contains(&axis.name.as_str()));
     let others: Vec<&str> = others.map(|axis| axis.name.as_str()).collect();
-    let mut determined = survey.determined(&others, drawn)?.into_iter();
+    let mut determined = filtered.determined(&others, drawn)?.into_iter();
     let is_along = |name: &str, is_determined: bool| {
-        let gridded = survey.axis(name).is_some_and(|axis| axis.varies()) && survey.gridded.is_free(name, drawn);
+        let gridded = filtered.axis(name).is_some_and(|axis| axis.varies()) && filtered.gridded.is_free(name, drawn);
         is_determined && !gridded
     };
     let (along, further): (Vec<&str>, Vec<&str>) =
         others.into_iter().partition(|name| is_along(name, determined.next().unwrap_or(false)));
-    let along: Vec<&str> = along.into_iter().filter(|name| survey.axis(name).is_some_and(Values::varies)).collect();
+    let along: Vec<&str> = along.into_iter().filter(|name| filtered.axis(name).is_some_and(Values::varies)).collect();
     let list = |names: &[&str]| names.iter().map(|name| label::name(name)).collect::<Vec<_>>().join(" and ");
     let verb = if along.len() == 1 { "changes" } else { "change" };
     let note = (!along.is_empty()).then(|| format!("Along with {}, {} {verb}.", list(drawn), list(&along)));
@@ -47,9 +47,9 @@ pub fn further<'a>(survey: &'a Survey, drawn: &[&str]) -> Result<(Vec<&'a str>, 
 /// # Errors
 ///
 /// A part that cannot be read.
-pub fn is_scattered(survey: &Survey, x: &str, further: &[&str]) -> Result<bool, PlotError> {
-    for axis in survey.axes.iter().filter(|axis| axis.varies() && axis.name != x && axis.words.is_empty()) {
-        if !further.contains(&axis.name.as_str()) && !survey.follows(&axis.name, x)? {
+pub fn is_scattered(filtered: &FilteredTable, x: &str, further: &[&str]) -> Result<bool, PlotError> {
+    for axis in filtered.axes.iter().filter(|axis| axis.varies() && axis.name != x && axis.words.is_empty()) {
+        if !further.contains(&axis.name.as_str()) && !filtered.follows(&axis.name, x)? {
             return Ok(true);
         }
     }
@@ -144,24 +144,24 @@ pub enum GroupRole {
 }
 
 impl Groups {
-    /// The groups of the rows of `survey` as panels over the `drawn` axes, and a note on axes that change only with others.
+    /// The groups of the rows of `filtered` as panels over the `drawn` axes, and a note on axes that change only with others.
     ///
     /// # Errors
     ///
     /// A part that cannot be read.
-    pub fn of_panels(survey: &Survey, drawn: &[&str]) -> Result<(Groups, Option<String>), PlotError> {
-        let (further, along) = further(survey, drawn)?;
-        Ok((Groups::new(survey, &further, GroupRole::Panels)?, along))
+    pub fn of_panels(filtered: &FilteredTable, drawn: &[&str]) -> Result<(Groups, Option<String>), PlotError> {
+        let (further, along) = further(filtered, drawn)?;
+        Ok((Groups::new(filtered, &further, GroupRole::Panels)?, along))
     }
 
-    /// The groups of the rows of `survey` over `axes`. If a figure cannot show all of them, an even selection; beyond `MAX_GROUPS`, one group of
+    /// The groups of the rows of `filtered` over `axes`. If a figure cannot show all of them, an even selection; beyond `MAX_GROUPS`, one group of
     /// all rows. Two independent axes make rows and columns of panels, also for pairs without rows.
     ///
     /// # Errors
     ///
     /// A part that cannot be read.
-    pub fn new(survey: &Survey, axes: &[&str], makes: GroupRole) -> Result<Groups, PlotError> {
-        let found = keys(survey, axes, makes)?;
+    pub fn new(filtered: &FilteredTable, axes: &[&str], makes: GroupRole) -> Result<Groups, PlotError> {
+        let found = keys(filtered, axes, makes)?;
         if found.len() > MAX_GROUPS {
             return Ok(Groups::of(Vec::new(), vec![Group { values: Vec::new(), name: String::new() }], 1, makes));
         }
@@ -170,16 +170,16 @@ impl Groups {
         let shown = choice(&found, most, makes).into_iter().map(|place| {
             let named =
                 varying.iter().map(|&axis| (axes[axis], found[place][axis])).filter(|(_, value)| !value.is_nan());
-            let words = named.filter_map(|(name, value)| Some(survey.axis(name)?.text_of(value)));
+            let words = named.filter_map(|(name, value)| Some(filtered.axis(name)?.text_of(value)));
             Group { name: words.collect::<Vec<_>>().join(", "), values: found[place].clone() }
         });
         let axes = axes.iter().map(|&axis| axis.to_owned()).collect();
         let mut groups = Groups::of(axes, shown.collect(), found.len(), makes);
         if makes == GroupRole::Panels {
-            groups.cross(survey, &found);
+            groups.cross(filtered, &found);
         }
         if groups.crossed.is_none() {
-            groups.label(survey)?;
+            groups.label(filtered)?;
         }
         Ok(groups)
     }
@@ -191,17 +191,17 @@ impl Groups {
     }
 
     /// Names the groups by their labels, if each has a unique label.
-    fn label(&mut self, survey: &Survey) -> Result<(), PlotError> {
-        if survey.labels.is_empty() || self.shown.len() < 2 {
+    fn label(&mut self, filtered: &FilteredTable) -> Result<(), PlotError> {
+        if filtered.labels.is_empty() || self.shown.len() < 2 {
             return Ok(());
         }
-        let columns: Vec<&str> = self.axes.iter().map(String::as_str).chain(survey.label_columns()).collect();
+        let columns: Vec<&str> = self.axes.iter().map(String::as_str).chain(filtered.label_columns()).collect();
         let mut labels = vec![String::new(); self.shown.len()];
         let mut is_one = true;
-        survey.each_while(&columns, |row| {
+        filtered.each_while(&columns, |row| {
             let (group, cells) = row.split_at(self.axes.len());
             if let Some(place) = self.place(group) {
-                let label = survey.label(cells);
+                let label = filtered.label(cells);
                 is_one = !label.is_empty() && (labels[place].is_empty() || labels[place] == label);
                 labels[place] = label;
             }
@@ -215,11 +215,11 @@ impl Groups {
     }
 
     /// Crosses the last two varying axes, at the first values of the others.
-    fn cross(&mut self, survey: &Survey, found: &[Vec<f64>]) {
+    fn cross(&mut self, filtered: &FilteredTable, found: &[Vec<f64>]) {
         let varying = varying(found);
         let [.., first, second] = varying.as_slice() else { return };
         let crossed = [*first, *second];
-        let axis = |place: usize| survey.axis(&self.axes[place]);
+        let axis = |place: usize| filtered.axis(&self.axes[place]);
         let [Some(first), Some(second)] = crossed.map(axis) else { return };
         let is_held = |axis: &usize| !crossed.contains(axis);
         let found_here: Vec<&Vec<f64>> = found
@@ -328,10 +328,10 @@ impl GroupRole {
 }
 
 /// The distinct values of `axes` in ascending order; more than `MAX_GROUPS` if there are too many.
-fn keys(survey: &Survey, axes: &[&str], makes: GroupRole) -> Result<Vec<Vec<f64>>, PlotError> {
+fn keys(filtered: &FilteredTable, axes: &[&str], makes: GroupRole) -> Result<Vec<Vec<f64>>, PlotError> {
     let mut found: HashMap<Vec<u64>, Vec<f64>> = HashMap::new();
     let mut last: Vec<f64> = Vec::new();
-    survey.each_while(axes, |cells| {
+    filtered.each_while(axes, |cells| {
         if !last.is_empty() && last.iter().zip(cells).all(|(last, cell)| last.to_bits() == cell.to_bits()) {
             return true;
         }

@@ -1,8 +1,8 @@
 //! Lines: columns over an axis, a panel for each column and a line for each group of the further axes.
 
 use super::cells::AxisCells;
+use super::filtered::FilteredTable;
 use super::groups::{self, GroupRole, Groups};
-use super::survey::Survey;
 use crate::plot::colour;
 use crate::plot::figure::{Axis, Entry, Figure, Key, Layer, MAX_MARKED_POINTS, Panel};
 use crate::plot::scale::Scale;
@@ -10,7 +10,7 @@ use crate::plot::symbol::Symbol;
 use crate::plot::{PlotError, coincide, label};
 
 /// Greatest number of positions along a line; with more rows, several fall on one position. Chosen: more are invisible in print.
-const MAX_PLACES: usize = 4096;
+const MAX_POSITIONS: usize = 4096;
 
 /// Greatest number of rows with names at their points. Chosen: more names overlap.
 pub const MAX_NAMED_ROWS: u64 = 60;
@@ -23,11 +23,11 @@ const CONSTANT_RTOL: f64 = 1e-9;
 const ASPECTS: [f64; 2] = [0.7, 0.45];
 
 /// Space beyond the first and the last point, as a fraction of the axes. Chosen: no mark touches the frame.
-const ROOM: [f64; 2] = [0.02, 0.06];
+const MARK_ROOM: [f64; 2] = [0.02, 0.06];
 
 /// The plan of lines.
 #[derive(Debug, Clone)]
-pub struct Plan {
+pub struct LineColumns {
     /// Column of the horizontal axis.
     pub x: String,
     /// Columns of the panels, from the top.
@@ -83,12 +83,12 @@ struct Graph {
 /// # Errors
 ///
 /// No row with a value, or a part that cannot be read.
-pub fn lines(survey: &Survey, plan: &Plan) -> Result<LineFigure, PlotError> {
-    let mut rows = Rows::read(survey, plan)?;
+pub fn lines(filtered: &FilteredTable, plan: &LineColumns) -> Result<LineFigure, PlotError> {
+    let mut rows = Rows::read(filtered, plan)?;
     let no_value =
         rows.groups.retain(&mut rows.lines, |line| line.ranges.iter().flatten().any(|(low, _)| !low.is_nan()));
-    let x = rows.cells.ends().with_room(ROOM[0]);
-    let graphs = (0..plan.y.len()).filter_map(|panel| rows.graph(survey, plan, panel, x));
+    let x = rows.cells.ends().with_room(MARK_ROOM[0]);
+    let graphs = (0..plan.y.len()).filter_map(|panel| rows.graph(filtered, plan, panel, x));
     // A constant column is stated instead of drawn, unless all columns are constant.
     let (mut stated, mut drawn): (Vec<Graph>, Vec<Graph>) = graphs.partition(|graph| graph.constant.is_some());
     if drawn.is_empty() {
@@ -109,7 +109,7 @@ pub fn lines(survey: &Survey, plan: &Plan) -> Result<LineFigure, PlotError> {
             "{count} values of {name} have several rows each: their least and greatest values are drawn."
         ));
     }
-    let leaves_out = |panel| is_gap_of_families(survey, plan, panel) && rows.values(panel).any(|value| value <= 0.0);
+    let leaves_out = |panel| is_gap_of_families(filtered, plan, panel) && rows.values(panel).any(|value| value <= 0.0);
     if (0..plan.y.len()).any(leaves_out) {
         notes.push("Gaps below zero, of steps that have not arrived, are not drawn.".to_owned());
     }
@@ -128,21 +128,21 @@ pub fn lines(survey: &Survey, plan: &Plan) -> Result<LineFigure, PlotError> {
 
 /// Whether a panel shows the gaps of families, which have a logarithmic scale: gaps of steps that do not reach the final state are negative, the
 /// others span decades.
-fn is_gap_of_families(survey: &Survey, plan: &Plan, panel: usize) -> bool {
-    survey.table == "shortcut" && plan.y[panel] == "gap"
+fn is_gap_of_families(filtered: &FilteredTable, plan: &LineColumns, panel: usize) -> bool {
+    filtered.table == "shortcut" && plan.y[panel] == "gap"
 }
 
 impl Rows {
     /// Reads the rows of a table.
-    fn read(survey: &Survey, plan: &Plan) -> Result<Rows, PlotError> {
-        let axis = survey.axis(&plan.x).filter(|axis| !axis.values.is_empty()).ok_or(PlotError::Nothing)?;
-        let (mut further, along) = groups::further(survey, &[&plan.x])?;
-        let are_scattered = groups::is_scattered(survey, &plan.x, &further)?;
+    fn read(filtered: &FilteredTable, plan: &LineColumns) -> Result<Rows, PlotError> {
+        let axis = filtered.axis(&plan.x).filter(|axis| !axis.values.is_empty()).ok_or(PlotError::Nothing)?;
+        let (mut further, along) = groups::further(filtered, &[&plan.x])?;
+        let are_scattered = groups::is_scattered(filtered, &plan.x, &further)?;
         further.sort_by_key(|name| Some(*name) != plan.series.as_deref());
-        let groups = Groups::new(survey, &further, GroupRole::Lines)?;
-        let is_named = are_scattered && survey.rows <= MAX_NAMED_ROWS;
-        let labels = if is_named { survey.label_columns() } else { Vec::new() };
-        let cells = AxisCells::new(axis, MAX_PLACES);
+        let groups = Groups::new(filtered, &further, GroupRole::Lines)?;
+        let is_named = are_scattered && filtered.rows <= MAX_NAMED_ROWS;
+        let labels = if is_named { filtered.label_columns() } else { Vec::new() };
+        let cells = AxisCells::new(axis, MAX_POSITIONS);
         let line = |_| Line {
             ranges: vec![vec![(f64::NAN, f64::NAN); cells.len()]; plan.y.len()],
             names: vec![String::new(); if is_named { cells.len() } else { 0 }],
@@ -150,13 +150,13 @@ impl Rows {
         let mut lines: Vec<Line> = groups.shown.iter().map(line).collect();
         let columns = [&plan.x].into_iter().chain(&plan.y).chain(&groups.axes).map(String::as_str);
         let columns: Vec<&str> = columns.chain(labels).collect();
-        survey.each(&columns, |row| {
+        filtered.each(&columns, |row| {
             let (values, rest) = row[1..].split_at(plan.y.len());
             let (group, labels) = rest.split_at(groups.axes.len());
             let (Some(group), Some(place)) = (groups.place(group), cells.place(row[0])) else { return };
             let line = &mut lines[group];
             if let Some(name) = line.names.get_mut(place) {
-                *name = survey.label(labels);
+                *name = filtered.label(labels);
             }
             for (ranges, &value) in line.ranges.iter_mut().zip(values) {
                 let (low, high) = ranges[place];
@@ -173,16 +173,16 @@ impl Rows {
     }
 
     /// A panel without layers and its curves, if anything in it has a value.
-    fn graph(&self, survey: &Survey, plan: &Plan, panel: usize, x: Scale) -> Option<Graph> {
-        let is_log = is_gap_of_families(survey, plan, panel);
+    fn graph(&self, filtered: &FilteredTable, plan: &LineColumns, panel: usize, x: Scale) -> Option<Graph> {
+        let is_log = is_gap_of_families(filtered, plan, panel);
         let scale = match is_log {
             true => Scale { log: true, ..Scale::of(self.values(panel).filter(|value| *value > 0.0))? },
             false => Scale::of(self.values(panel))?,
         };
         // A column of zeros needs no negative range.
         let scale = if scale.low == 0.0 && scale.high == 0.0 { Scale { high: 1.0, ..scale } } else { scale };
-        let axis = |column: &String, scale| Axis { column: column.clone(), unit: survey.unit(column), scale };
-        let (x, y) = (axis(&plan.x, x), axis(&plan.y[panel], scale.with_room(ROOM[1])));
+        let axis = |column: &String, scale| Axis { column: column.clone(), unit: filtered.unit(column), scale };
+        let (x, y) = (axis(&plan.x, x), axis(&plan.y[panel], scale.with_room(MARK_ROOM[1])));
         Some(Graph {
             panel: Panel { title: String::new(), x, y, layers: Vec::new() },
             curves: self.lines.iter().map(|line| self.curve(&line.ranges[panel])).collect(),

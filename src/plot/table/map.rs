@@ -1,10 +1,9 @@
 //! Maps: a column as colours over two axes, with a panel for each group of the further axes.
 
 use super::cells::AxisCells;
+use super::filtered::{FilteredTable, Values};
 use super::groups::Groups;
 use super::lines::MAX_NAMED_ROWS;
-use super::survey::{Survey, Values};
-use crate::plot::canvas::Stroke;
 use crate::plot::colour::{class, viridis};
 use crate::plot::export::image;
 use crate::plot::figure::{Axis, Colours, Entry, Figure, Hover, Key, Layer, Map, Panel};
@@ -35,7 +34,7 @@ const PIXELS: usize = 1024;
 
 /// The plan of a map.
 #[derive(Debug, Clone)]
-pub struct Plan {
+pub struct MapColumns {
     /// Column of the horizontal axis.
     pub x: String,
     /// Column of the vertical axis.
@@ -81,54 +80,23 @@ struct Shading<'a> {
     colours: Option<Colours>,
 }
 
-impl MapFigure {
-    /// Draws a curve over each panel at `steps` places along an axis, 0 or 1: `of` returns the value of the other axis for a panel. A curve that
-    /// leaves its panel everywhere is not drawn.
-    pub fn draw_curve(
-        &mut self,
-        along: usize,
-        steps: usize,
-        (name, stroke): (&str, Stroke),
-        of: impl Fn(usize, f64) -> Option<f64>,
-    ) {
-        let mut is_drawn = false;
-        let places = |step| self.cells[along].scale.value(step as f64 / steps as f64);
-        for (place, panel) in self.figure.panels.iter_mut().enumerate() {
-            let other = if along == 0 { panel.y.scale } else { panel.x.scale };
-            let point = |at| (at, of(place, at).unwrap_or(f64::NAN));
-            let mut curve: Vec<(f64, f64)> = (0..=steps).map(places).map(point).collect();
-            if !curve.iter().any(|(_, value)| (0.0..=1.0).contains(&other.fraction(*value))) {
-                continue;
-            }
-            if along == 1 {
-                curve.iter_mut().for_each(|(x, y)| std::mem::swap(x, y));
-            }
-            panel.layers.push(Layer::Contour(vec![curve], stroke.clone()));
-            is_drawn = true;
-        }
-        if is_drawn {
-            self.figure.legend.push(Entry { key: Key::Contour(stroke), text: name.to_owned() });
-        }
-    }
-}
-
 /// Draws the map.
 ///
 /// # Errors
 ///
 /// No row with a value, or a part that cannot be read.
-pub fn map(survey: &Survey, plan: &Plan) -> Result<MapFigure, PlotError> {
-    let (mut groups, along) = Groups::of_panels(survey, &[&plan.x, &plan.y])?;
-    let raster = Raster::new(survey, plan, &groups)?;
-    let mut sheets = raster.read(survey, plan, &groups)?;
+pub fn map(filtered: &FilteredTable, plan: &MapColumns) -> Result<MapFigure, PlotError> {
+    let (mut groups, along) = Groups::of_panels(filtered, &[&plan.x, &plan.y])?;
+    let raster = Raster::new(filtered, plan, &groups)?;
+    let mut sheets = raster.read(filtered, plan, &groups)?;
     // A group without values makes no panel.
     let has_value = |sheet: &PanelCells| sheet.value.iter().any(|value| !value.is_nan());
     let is_full = groups.crossed.is_some() || !sheets.iter().any(has_value);
     let no_value = groups.retain(&mut sheets, |sheet| is_full || has_value(sheet));
-    let shading = Shading::new(survey, &plan.value, &sheets)?;
+    let shading = Shading::new(filtered, &plan.value, &sheets)?;
     let mut figure = groups.figure(0.8);
     let axis =
-        |name: &String, cells: &AxisCells| Axis { column: name.clone(), unit: survey.unit(name), scale: cells.scale };
+        |name: &String, cells: &AxisCells| Axis { column: name.clone(), unit: filtered.unit(name), scale: cells.scale };
     for (place, sheet) in sheets.iter().enumerate() {
         figure.panels.push(Panel {
             title: groups.title(place),
@@ -145,14 +113,14 @@ pub fn map(survey: &Survey, plan: &Plan) -> Result<MapFigure, PlotError> {
 }
 
 impl Raster {
-    fn new(survey: &Survey, plan: &Plan, groups: &Groups) -> Result<Raster, PlotError> {
-        let axis = |name| survey.axis(name).filter(|axis| !axis.values.is_empty()).ok_or(PlotError::Nothing);
+    fn new(filtered: &FilteredTable, plan: &MapColumns, groups: &Groups) -> Result<Raster, PlotError> {
+        let axis = |name| filtered.axis(name).filter(|axis| !axis.values.is_empty()).ok_or(PlotError::Nothing);
         let axes = [axis(&plan.x)?, axis(&plan.y)?];
         let most = if groups.shown.len() > 1 { MAX_CELLS_OF_SEVERAL } else { MAX_CELLS };
         // Scattered rows, such as those of a sampled design, are dots; if there are too many, several fall in one cell.
-        let per_panel = survey.rows as f64 / groups.all as f64;
+        let per_panel = filtered.rows as f64 / groups.all as f64;
         let is_sparse = SPARSE_FILL * (axes[0].values.len() * axes[1].values.len()) as f64 > per_panel
-            || is_scattered(survey.rows / groups.all as u64, axes);
+            || is_scattered(filtered.rows / groups.all as u64, axes);
         let are_dots = is_sparse && per_panel <= MAX_DOTS;
         let most = if is_sparse && !are_dots { most.min((0.5 * per_panel.sqrt()) as usize) } else { most };
         let cells = axes.map(|axis| {
@@ -168,18 +136,18 @@ impl Raster {
     }
 
     /// The cells or dots of each panel.
-    fn read(&self, survey: &Survey, plan: &Plan, groups: &Groups) -> Result<Vec<PanelCells>, PlotError> {
+    fn read(&self, filtered: &FilteredTable, plan: &MapColumns, groups: &Groups) -> Result<Vec<PanelCells>, PlotError> {
         let [columns, rows] = self.cells.each_ref().map(AxisCells::len);
         let count = if self.are_dots { 0 } else { columns * rows };
         let empty =
             |_| PanelCells { value: vec![f64::NAN; count], status: vec![0; count], dots: Vec::new(), least: None };
         let mut sheets: Vec<PanelCells> = groups.shown.iter().map(empty).collect();
-        let is_named = self.are_dots && survey.rows <= MAX_NAMED_ROWS;
-        let labels = if is_named { survey.label_columns() } else { Vec::new() };
+        let is_named = self.are_dots && filtered.rows <= MAX_NAMED_ROWS;
+        let labels = if is_named { filtered.label_columns() } else { Vec::new() };
         let axes: Vec<&str> = groups.axes.iter().map(String::as_str).collect();
         let wanted = [&[plan.x.as_str(), &plan.y, &plan.value, STATUS], &axes[..], &labels].concat();
         let ok = Status::ALL.iter().position(|status| *status == Status::Ok).unwrap_or(0) as f64;
-        survey.each(&wanted, |row| {
+        filtered.each(&wanted, |row| {
             let &[x, y, found, status, ref rest @ ..] = row else { return };
             let (key, labels) = rest.split_at(axes.len());
             let (Some(panel), Some(column), Some(line)) =
@@ -191,7 +159,7 @@ impl Raster {
             let mut cell = line * columns + column;
             if self.are_dots {
                 cell = sheet.dots.len();
-                sheet.dots.push(((x, y), survey.label(labels)));
+                sheet.dots.push(((x, y), filtered.label(labels)));
                 sheet.value.push(f64::NAN);
                 sheet.status.push(0);
             }
@@ -224,7 +192,7 @@ impl Raster {
     }
 
     /// A note about cells with several rows.
-    fn note(&self, plan: &Plan) -> Option<String> {
+    fn note(&self, plan: &MapColumns) -> Option<String> {
         let shared =
             [&plan.x, &plan.y].into_iter().zip(&self.cells).filter(|(_, cells)| !cells.exact && !self.are_dots);
         let shared: Vec<String> =
@@ -236,8 +204,8 @@ impl Raster {
 }
 
 impl Shading<'_> {
-    fn new<'a>(survey: &Survey, column: &'a str, sheets: &[PanelCells]) -> Result<Shading<'a>, PlotError> {
-        let words = survey.words(column);
+    fn new<'a>(filtered: &FilteredTable, column: &'a str, sheets: &[PanelCells]) -> Result<Shading<'a>, PlotError> {
+        let words = filtered.words(column);
         if !words.is_empty() {
             return Ok(Shading { column, words, colours: None });
         }
@@ -252,7 +220,7 @@ impl Shading<'_> {
         Ok(Shading {
             column,
             words,
-            colours: Some(Colours { label: label::axis(column, &survey.unit(column), 0), scale }),
+            colours: Some(Colours { label: label::axis(column, &filtered.unit(column), 0), scale }),
         })
     }
 

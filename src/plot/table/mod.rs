@@ -3,25 +3,23 @@
 mod cells;
 mod choice;
 mod condition;
-mod feedback;
+mod filtered;
 mod gap;
 mod groups;
 mod lines;
 mod map;
-mod optimal;
-mod phase;
+mod overlay;
 mod reduced;
-mod survey;
 
 use super::figure::Figure;
 use super::{PlotError, label};
 use crate::dataset::{Folder, Manifest};
 use crate::grid::{Quantity, Scale};
-use crate::model::Units;
+use crate::model::{Friction, Units};
 
 use choice::{Defaults, Shape};
 pub use condition::Condition;
-use survey::Survey;
+use filtered::FilteredTable;
 
 /// The request.
 #[derive(Debug, Clone, Default)]
@@ -43,26 +41,26 @@ pub struct Source {
     pub manifest: Manifest,
     folder: Folder,
     bounded: bool,
+    /// Whether the computed curves hold, which are those of logarithmic friction.
+    has_overlays: bool,
     units: Units,
 }
 
-/// The kind of a picture.
-struct Kind {
+/// The picture of a table: its title and its defaults.
+struct TablePicture {
     table: &'static str,
     title: &'static str,
     defaults: Defaults,
-    /// The additional layers of lines or a map.
-    draw: fn(&Scene<'_>, &Shape) -> Result<Figure, PlotError>,
 }
 
 /// The source of a picture.
-struct Scene<'a> {
+struct TableScene<'a> {
     source: &'a Source,
-    survey: &'a Survey,
+    filtered: &'a FilteredTable,
 }
 
 /// Defaults of pictures of optimal protocols and best shortcuts.
-const OVER_TIME: Defaults = Defaults {
+const PROTOCOL_DEFAULTS: Defaults = Defaults {
     x: &["t_f", "v_f", "v_i", "b", "a"],
     y: &["v_f", "v_i", "b", "a"],
     classes: &[],
@@ -74,7 +72,7 @@ const OVER_TIME: Defaults = Defaults {
 };
 
 /// Defaults of phase diagrams.
-const ON_A_SPRING: Defaults = Defaults {
+const SPRING_DEFAULTS: Defaults = Defaults {
     x: &["v_f", "k", "m", "b", "a"],
     y: &["k", "v_i", "m", "b"],
     classes: &[],
@@ -89,12 +87,17 @@ const ON_A_SPRING: Defaults = Defaults {
 const CEILINGS: [&str; 2] = ["v_ceiling", "tau_ceiling"];
 
 /// Defaults of a picture with its own drawing code.
-const ALONE: Defaults =
-    Defaults { x: &["t_f", "v_f", "v_i", "b", "a"], y: &[], least_map: usize::MAX, lines: &["shortcuts"], ..OVER_TIME };
+const OWN_DRAWING: Defaults = Defaults {
+    x: &["t_f", "v_f", "v_i", "b", "a"],
+    y: &[],
+    least_map: usize::MAX,
+    lines: &["shortcuts"],
+    ..PROTOCOL_DEFAULTS
+};
 
 /// The picture of each table. A new table needs an entry here, and a file if it has special marks.
-const KINDS: [Kind; 13] = [
-    Kind {
+const TABLE_PICTURES: [TablePicture; 13] = [
+    TablePicture {
         table: "gap",
         title: "Work gap of the cubic shortcuts",
         defaults: Defaults {
@@ -103,17 +106,15 @@ const KINDS: [Kind; 13] = [
             value: &["gap", "work"],
             lines: &["gap", "v_min"],
             least_map: 2,
-            ..OVER_TIME
+            ..PROTOCOL_DEFAULTS
         },
-        draw: gap::draw,
     },
-    Kind {
+    TablePicture {
         table: "best_cubic",
         title: "Best cubic shortcut",
-        defaults: Defaults { value: &["gap"], lines: &["gap", "alpha_2", "alpha_3", "v_min"], ..OVER_TIME },
-        draw: plain,
+        defaults: Defaults { value: &["gap"], lines: &["gap", "alpha_2", "alpha_3", "v_min"], ..PROTOCOL_DEFAULTS },
     },
-    Kind {
+    TablePicture {
         table: "optimal",
         title: "Optimal protocol",
         defaults: Defaults {
@@ -122,11 +123,10 @@ const KINDS: [Kind; 13] = [
             classes: &["binding", "strategy"],
             value: &["work"],
             lines: &["work", "v_start", "time_at_floor", "dwork_dv_ceiling", "dwork_dtau_ceiling"],
-            ..OVER_TIME
+            ..PROTOCOL_DEFAULTS
         },
-        draw: optimal::draw,
     },
-    Kind {
+    TablePicture {
         table: "feedback",
         title: "Optimal velocity by state and time left",
         defaults: Defaults {
@@ -136,11 +136,10 @@ const KINDS: [Kind; 13] = [
             value: &["v"],
             lines: &["v", "work_to_go", "gain"],
             series: &["t_left", "v_ceiling", "tau_ceiling"],
-            ..OVER_TIME
+            ..PROTOCOL_DEFAULTS
         },
-        draw: feedback::draw,
     },
-    Kind {
+    TablePicture {
         table: "crossover",
         title: "Durations at which the optimal strategy changes",
         defaults: Defaults {
@@ -150,11 +149,10 @@ const KINDS: [Kind; 13] = [
             lines: &["t_cheapest", "t_cross", "t_floor", "t_min", "t_turn"],
             series: &["b", "a"],
             least_map: 5,
-            ..OVER_TIME
+            ..PROTOCOL_DEFAULTS
         },
-        draw: plain,
     },
-    Kind {
+    TablePicture {
         table: "shortcut",
         title: "Families of shortcuts",
         defaults: Defaults {
@@ -164,33 +162,30 @@ const KINDS: [Kind; 13] = [
             lines: &["gap", "v_max"],
             series: &["family"],
             least_map: usize::MAX,
-            ..OVER_TIME
+            ..PROTOCOL_DEFAULTS
         },
-        draw: plain,
     },
-    Kind {
+    TablePicture {
         table: "stability",
         title: "Stability of steady sliding",
         defaults: Defaults {
             classes: &["stable_f", "hopf_type"],
             value: &["growth_rate", "k_c_f", "stable_f"],
             lines: &["growth_rate", "frequency", "k_c_f"],
-            ..ON_A_SPRING
+            ..SPRING_DEFAULTS
         },
-        draw: phase::draw,
     },
-    Kind {
+    TablePicture {
         table: "step_response",
         title: "Outcome of the step response",
         defaults: Defaults {
             classes: &["outcome", "stick_slip"],
             value: &["v_peak", "cycle_peak", "outcome"],
             lines: &["v_peak", "v_trough", "settling_time", "period"],
-            ..ON_A_SPRING
+            ..SPRING_DEFAULTS
         },
-        draw: phase::draw,
     },
-    Kind {
+    TablePicture {
         table: "compliant",
         title: "Smooth shortcut on a spring",
         defaults: Defaults {
@@ -200,11 +195,10 @@ const KINDS: [Kind; 13] = [
             lines: &["amplification", "sampling_error", "v_c_min", "v_c_max"],
             series: &["k", "dt"],
             least_map: 12,
-            ..OVER_TIME
+            ..PROTOCOL_DEFAULTS
         },
-        draw: plain,
     },
-    Kind {
+    TablePicture {
         table: "regularised",
         title: "Optimum with its jumps made smooth",
         defaults: Defaults {
@@ -214,23 +208,20 @@ const KINDS: [Kind; 13] = [
             lines: &["gap", "v_c_max", "v_c_min"],
             series: &["t_f", "k"],
             least_map: 12,
-            ..OVER_TIME
+            ..PROTOCOL_DEFAULTS
         },
-        draw: plain,
     },
-    Kind {
+    TablePicture {
         table: "gap_min",
         title: "Least work gap of the cubic shortcuts",
-        defaults: Defaults { value: &["gap"], lines: &["gap", "alpha_2", "alpha_3", "v_min"], ..OVER_TIME },
-        draw: plain,
+        defaults: Defaults { value: &["gap"], lines: &["gap", "alpha_2", "alpha_3", "v_min"], ..PROTOCOL_DEFAULTS },
     },
-    Kind {
+    TablePicture {
         table: "gap_quantiles",
         title: "Quantiles of the work gap of the cubic shortcuts",
-        defaults: ALONE,
-        draw: plain,
+        defaults: OWN_DRAWING,
     },
-    Kind { table: "gap_histogram", title: "Cubic shortcuts by their work gap", defaults: ALONE, draw: plain },
+    TablePicture { table: "gap_histogram", title: "Cubic shortcuts by their work gap", defaults: OWN_DRAWING },
 ];
 
 impl Source {
@@ -239,12 +230,14 @@ impl Source {
         let spec: Option<toml::Table> = manifest.spec.parse().ok();
         let model = spec.as_ref().and_then(|spec| spec.get("model"));
         let bound = model.and_then(|model| model.get("velocity_bound")).and_then(toml::Value::as_bool);
-        Source { manifest, folder, bounded: bound.unwrap_or(true), units }
+        let friction = model.and_then(|model| model.get("friction")).and_then(toml::Value::as_str);
+        let has_overlays = friction.is_none_or(|friction| friction == Friction::Log.name());
+        Source { manifest, folder, bounded: bound.unwrap_or(true), has_overlays, units }
     }
 
     /// Names of the tables with a picture.
     pub fn tables(&self) -> Vec<String> {
-        let known = |name: &str| KINDS.iter().any(|kind| kind.table == name);
+        let known = |name: &str| TABLE_PICTURES.iter().any(|picture| picture.table == name);
         self.manifest.tables.iter().map(|table| table.name.clone()).filter(|name| known(name)).collect()
     }
 
@@ -254,51 +247,51 @@ impl Source {
     ///
     /// A table without rows, a request that it does not satisfy, or a part that cannot be read.
     pub fn figure(&self, table: &str, request: &Request) -> Result<Figure, PlotError> {
-        let mut survey = Survey::new(&self.folder, &self.manifest, table, &request.conditions)?;
-        let front = front(&survey, request)?;
-        if let Some(Front { hidden, .. }) = &front {
+        let mut filtered = FilteredTable::new(&self.folder, &self.manifest, table, &request.conditions)?;
+        let front = front(&filtered, request)?;
+        if let Some(ParetoFront { hidden, .. }) = &front {
             let conditions = [request.conditions.clone(), Condition::all(&format!("{hidden}=inf"))?].concat();
-            survey = Survey::new(&self.folder, &self.manifest, table, &conditions)?;
+            filtered = FilteredTable::new(&self.folder, &self.manifest, table, &conditions)?;
         }
         let no_table = || PlotError::NoTable { name: table.to_owned(), found: self.tables() };
-        let kind = KINDS.iter().find(|kind| kind.table == table).ok_or_else(no_table)?;
-        let is_alone = request.x.is_none() && request.y.is_none() && request.colour.is_none();
+        let picture = TABLE_PICTURES.iter().find(|picture| picture.table == table).ok_or_else(no_table)?;
+        let is_default = request.x.is_none() && request.y.is_none() && request.colour.is_none();
         let (mut figure, drawn) = match table {
-            "gap_histogram" if is_alone => reduced::histogram(&survey)?,
-            "gap_quantiles" if is_alone => reduced::quantiles(&survey)?,
+            "gap_histogram" if is_default => reduced::histogram(&filtered)?,
+            "gap_quantiles" if is_default => reduced::quantiles(&filtered)?,
             _ => {
-                let shape = choice::choose(&survey, &kind.defaults, request)?;
+                let shape = choice::choose(&filtered, &picture.defaults, request)?;
                 let drawn = match &shape {
                     Shape::Map(plan) => vec![plan.x.clone(), plan.y.clone()],
                     Shape::Lines(plan) => vec![plan.x.clone()],
                 };
-                ((kind.draw)(&Scene { source: self, survey: &survey }, &shape)?, drawn)
+                (TableScene { source: self, filtered: &filtered }.draw(&shape)?, drawn)
             }
         };
-        figure.title = kind.title.to_owned();
-        let same = [fixed(&survey, &drawn), figure.subtitle].into_iter().filter(|words| !words.is_empty());
+        figure.title = picture.title.to_owned();
+        let same = [fixed(&filtered, &drawn), figure.subtitle].into_iter().filter(|words| !words.is_empty());
         figure.subtitle = same.collect::<Vec<_>>().join(", ");
-        if let Some(Front { hidden, drawn }) = front {
+        if let Some(ParetoFront { hidden, drawn }) = front {
             figure.remarks.push(format!("rows of {drawn} alone; draw those of {hidden} with --x {hidden}"));
         }
-        if survey.missing > 0 {
-            figure.notes.push(format!("{} parts of the table are missing.", survey.missing));
+        if filtered.missing > 0 {
+            figure.notes.push(format!("{} parts of the table are missing.", filtered.missing));
         }
         Ok(figure)
     }
 }
 
 /// One of two sets of rows, each with one ceiling alone.
-struct Front {
+struct ParetoFront {
     /// The ceiling of the other rows.
     hidden: &'static str,
     drawn: &'static str,
 }
 
 /// The front to draw where both ceilings vary, but never together: that of the requested ceiling, else of the one with most values.
-fn front(survey: &Survey, request: &Request) -> Result<Option<Front>, PlotError> {
+fn front(filtered: &FilteredTable, request: &Request) -> Result<Option<ParetoFront>, PlotError> {
     let [v, tau] = CEILINGS;
-    let values = |name| survey.axis(name).filter(|axis| axis.varies() && axis.infinite).map(|axis| axis.values.len());
+    let values = |name| filtered.axis(name).filter(|axis| axis.varies() && axis.infinite).map(|axis| axis.values.len());
     let (Some(of_v), Some(of_tau)) = (values(v), values(tau)) else { return Ok(None) };
     let requested = [&request.x, &request.y, &request.colour];
     let draws_v = match [v, tau].map(|name| requested.iter().any(|column| column.as_deref() == Some(name))) {
@@ -306,27 +299,19 @@ fn front(survey: &Survey, request: &Request) -> Result<Option<Front>, PlotError>
         [false, false] => of_v >= of_tau,
         [draws_v, _] => draws_v,
     };
-    let mut meet = false;
-    survey.each_while(&CEILINGS, |row| {
-        meet = row.iter().all(|ceiling| ceiling.is_finite());
-        !meet
+    let mut both_finite = false;
+    filtered.each_while(&CEILINGS, |row| {
+        both_finite = row.iter().all(|ceiling| ceiling.is_finite());
+        !both_finite
     })?;
     let (drawn, hidden) = if draws_v { (v, tau) } else { (tau, v) };
-    Ok((!meet).then_some(Front { hidden, drawn }))
-}
-
-/// Lines or a map without further layers.
-fn plain(scene: &Scene<'_>, shape: &Shape) -> Result<Figure, PlotError> {
-    match shape {
-        Shape::Map(plan) => Ok(map::map(scene.survey, plan)?.figure),
-        Shape::Lines(plan) => Ok(lines::lines(scene.survey, plan)?.figure),
-    }
+    Ok((!both_finite).then_some(ParetoFront { hidden, drawn }))
 }
 
 /// The values common to all rows.
-fn fixed(survey: &Survey, drawn: &[String]) -> String {
+fn fixed(filtered: &FilteredTable, drawn: &[String]) -> String {
     let mut words = Vec::new();
-    for axis in survey.axes.iter().filter(|axis| !drawn.contains(&axis.name)) {
+    for axis in filtered.axes.iter().filter(|axis| !drawn.contains(&axis.name)) {
         match axis.values.as_slice() {
             [one] if !axis.infinite => {
                 words.push(axis.text_of(*one));
@@ -340,13 +325,42 @@ fn fixed(survey: &Survey, drawn: &[String]) -> String {
     words.join(", ")
 }
 
-impl Scene<'_> {
+impl TableScene<'_> {
+    /// Lines or a map, with the layers of the table.
+    fn draw(&self, shape: &Shape) -> Result<Figure, PlotError> {
+        let mut figure = match shape {
+            Shape::Map(plan) => {
+                let mut map = map::map(self.filtered, plan)?;
+                overlay::curves(self, plan, &mut map);
+                gap::border(self, plan, &mut map)?;
+                map.figure
+            }
+            Shape::Lines(plan) => {
+                let mut lines = lines::lines(self.filtered, plan)?;
+                overlay::marks(self, plan, &mut lines);
+                lines.figure
+            }
+        };
+        // The work of this table is the least work.
+        if self.filtered.table == "optimal" {
+            let least = "work_optimal";
+            let axes = figure.panels.iter_mut().map(|panel| &mut panel.y).filter(|axis| axis.column == "work");
+            axes.for_each(|axis| axis.column = least.to_owned());
+            if let (Shape::Map(map::MapColumns { value, .. }), Some(colours)) = (shape, &mut figure.colours)
+                && value == "work"
+            {
+                colours.label = label::axis(least, &self.filtered.unit("work"), 0);
+            }
+        }
+        Ok(figure)
+    }
+
     /// The value of a quantity in all rows of a group: from the group, or the only value of the table.
     fn value(&self, groups: &groups::Groups, group: usize, name: &str) -> Option<f64> {
-        if let Some(place) = groups.axes.iter().position(|axis| axis == name) {
-            return groups.shown.get(group)?.values.get(place).copied();
+        if let Some(index) = groups.axes.iter().position(|axis| axis == name) {
+            return groups.shown.get(group)?.values.get(index).copied();
         }
-        match self.survey.axis(name)?.values.as_slice() {
+        match self.filtered.axis(name)?.values.as_slice() {
             [one] => Some(*one),
             _ => None,
         }
@@ -355,6 +369,12 @@ impl Scene<'_> {
     /// The factor of a quantity from scaled units to those of the dataset.
     fn size(&self, name: &str) -> f64 {
         Quantity::from_name(name).map_or(1.0, |quantity| self.source.units.size(quantity.unit(Scale::Model)))
+    }
+
+    /// The word of an axis of words, if the group has one.
+    fn word(&self, groups: &groups::Groups, group: usize, name: &str) -> Option<&str> {
+        let place = self.value(groups, group, name)?;
+        self.filtered.axis(name)?.words.get(place as usize).map(String::as_str)
     }
 
     /// The value of a quantity in scaled units.

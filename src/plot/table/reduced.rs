@@ -1,8 +1,8 @@
 //! Pictures of reduced landscapes: quantiles of the gap over an axis, and histograms.
 
 use super::cells::AxisCells;
+use super::filtered::FilteredTable;
 use super::groups::Groups;
-use super::survey::Survey;
 use crate::plot::canvas::Stroke;
 use crate::plot::figure::{Axis, Entry, Figure, Key, Layer, MAX_MARKED_POINTS, Panel};
 use crate::plot::scale::Scale;
@@ -11,9 +11,9 @@ use crate::plot::{PlotError, colour, label};
 use crate::table::{HISTOGRAM_EDGES, REDUCED, Table};
 
 /// The horizontal axes, in the order of preference.
-const ACROSS: [&str; 5] = ["t_f", "v_f", "v_i", "b", "a"];
+const HORIZONTAL_AXES: [&str; 5] = ["t_f", "v_f", "v_i", "b", "a"];
 
-/// Shades of the outer and of the inner quantiles.
+/// Shades of the outer and of the inner quantiles. Chosen: a light and a medium blue, as in maps of words.
 const OUTER: [u8; 3] = [0xd7, 0xe8, 0xf5];
 const INNER: [u8; 3] = [0x9e, 0xc4, 0xe4];
 
@@ -37,13 +37,13 @@ const CURVES: [(&str, &str, usize); 3] =
     [("gap_q50", "median", 0), ("gap_min", "least", 2), ("gap_max", "greatest", 1)];
 
 /// Greatest number of positions along an axis; with more rows, several fall on one position. Chosen: more are invisible in print.
-const MAX_PLACES: usize = 1024;
+const MAX_POSITIONS: usize = 1024;
 
 /// The columns of a reduced table, without the number of shortcuts.
-fn columns(survey: &Survey) -> Vec<&'static str> {
-    let table = REDUCED.iter().map(|(_, table)| *table).find(|table| table.name() == survey.table);
+fn columns(filtered: &FilteredTable) -> Vec<&'static str> {
+    let table = REDUCED.iter().map(|(_, table)| *table).find(|table| table.name() == filtered.table);
     let names = table.into_iter().flat_map(Table::columns).skip(1).map(|column| column.name);
-    names.filter(|name| survey.has(name)).collect()
+    names.filter(|name| filtered.has(name)).collect()
 }
 
 /// Histogram: numbers of shortcuts by decade of the gap.
@@ -51,12 +51,12 @@ fn columns(survey: &Survey) -> Vec<&'static str> {
 /// # Errors
 ///
 /// A part that cannot be read.
-pub fn histogram(survey: &Survey) -> Result<(Figure, Vec<String>), PlotError> {
-    let columns = columns(survey);
-    let (groups, along) = Groups::of_panels(survey, &[])?;
+pub fn histogram(filtered: &FilteredTable) -> Result<(Figure, Vec<String>), PlotError> {
+    let columns = columns(filtered);
+    let (groups, along) = Groups::of_panels(filtered, &[])?;
     let wanted: Vec<&str> = columns.iter().copied().chain(groups.axes.iter().map(String::as_str)).collect();
     let mut counts = vec![vec![0.0; columns.len()]; groups.shown.len()];
-    survey.each(&wanted, |row| {
+    filtered.each(&wanted, |row| {
         let (classes, key) = row.split_at(columns.len());
         let Some(group) = groups.place(key) else { return };
         // Rows of one group are added.
@@ -109,16 +109,16 @@ fn edges() -> Vec<(f64, f64)> {
 /// # Errors
 ///
 /// A part that cannot be read.
-pub fn quantiles(survey: &Survey) -> Result<(Figure, Vec<String>), PlotError> {
-    let varies = |name: &&&str| survey.axis(name).is_some_and(|axis| axis.values.len() > 2 || axis.many);
-    let across = ACROSS
+pub fn quantiles(filtered: &FilteredTable) -> Result<(Figure, Vec<String>), PlotError> {
+    let varies = |name: &&&str| filtered.axis(name).is_some_and(|axis| axis.values.len() > 2 || axis.many);
+    let across = HORIZONTAL_AXES
         .iter()
         .find(varies)
-        .or_else(|| ACROSS.iter().find(|name| survey.axis(name).is_some_and(|axis| axis.varies())));
-    let columns: Vec<(&str, f64)> = QUANTILES.into_iter().filter(|(name, _)| survey.has(name)).collect();
+        .or_else(|| HORIZONTAL_AXES.iter().find(|name| filtered.axis(name).is_some_and(|axis| axis.varies())));
+    let columns: Vec<(&str, f64)> = QUANTILES.into_iter().filter(|(name, _)| filtered.has(name)).collect();
     match across {
-        Some(across) => bands(survey, across, &columns),
-        None => distribution(survey, &columns),
+        Some(across) => bands(filtered, across, &columns),
+        None => distribution(filtered, &columns),
     }
 }
 
@@ -129,14 +129,14 @@ struct Quantiles<'a> {
     values: Vec<Vec<f64>>,
 }
 
-fn bands(survey: &Survey, across: &str, columns: &[(&str, f64)]) -> Result<(Figure, Vec<String>), PlotError> {
-    let (groups, along) = Groups::of_panels(survey, &[across])?;
-    let cells = AxisCells::new(survey.axis(across).ok_or(PlotError::Nothing)?, MAX_PLACES);
+fn bands(filtered: &FilteredTable, across: &str, columns: &[(&str, f64)]) -> Result<(Figure, Vec<String>), PlotError> {
+    let (groups, along) = Groups::of_panels(filtered, &[across])?;
+    let cells = AxisCells::new(filtered.axis(across).ok_or(PlotError::Nothing)?, MAX_POSITIONS);
     let empty = |_| Quantiles { cells: &cells, columns, values: vec![vec![f64::NAN; cells.len()]; columns.len()] };
     let mut quantiles: Vec<Quantiles> = groups.shown.iter().map(empty).collect();
     let names = columns.iter().map(|(name, _)| *name);
     let wanted: Vec<&str> = [across].into_iter().chain(names).chain(groups.axes.iter().map(String::as_str)).collect();
-    survey.each(&wanted, |row| {
+    filtered.each(&wanted, |row| {
         let (found, key) = row[1..].split_at(columns.len());
         let (Some(group), Some(place)) = (groups.place(key), cells.place(row[0])) else { return };
         quantiles[group].values.iter_mut().zip(found).for_each(|(column, value)| column[place] = *value);
@@ -147,7 +147,7 @@ fn bands(survey: &Survey, across: &str, columns: &[(&str, f64)]) -> Result<(Figu
     for (group, drawn) in quantiles.iter().enumerate() {
         figure.panels.push(Panel {
             title: groups.title(group),
-            x: Axis { column: across.to_owned(), unit: survey.unit(across), scale: cells.ends().with_room(0.02) },
+            x: Axis { column: across.to_owned(), unit: filtered.unit(across), scale: cells.ends().with_room(0.02) },
             y: Axis { column: "gap".to_owned(), unit: "1".to_owned(), scale: y },
             layers: drawn.layers(),
         });
@@ -195,10 +195,10 @@ impl Quantiles<'_> {
     }
 }
 
-fn distribution(survey: &Survey, columns: &[(&str, f64)]) -> Result<(Figure, Vec<String>), PlotError> {
+fn distribution(filtered: &FilteredTable, columns: &[(&str, f64)]) -> Result<(Figure, Vec<String>), PlotError> {
     let names: Vec<&str> = columns.iter().map(|(name, _)| *name).collect();
     let mut points = Vec::new();
-    survey.each(&names, |row| {
+    filtered.each(&names, |row| {
         points = row.iter().copied().zip(columns.iter().map(|(_, fraction)| 100.0 * fraction)).collect();
     })?;
     points.retain(|(gap, _): &(f64, f64)| gap.is_finite());

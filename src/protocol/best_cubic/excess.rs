@@ -1,14 +1,13 @@
 //! The work of a shortcut above the optimum, without subtracting two works.
 //!
-//! With the value function `V(theta, t)` of the optimal control problem, `W_s - W*` is the integral along the shortcut
-//! of what its velocity costs more than the optimal feedback `v~` would there (docs/derivations.md, "The gap without
-//! cancellation"):
+//! With the value function of the optimal control problem, `W_s - W*` is the integral along the shortcut of the additional cost of its
+//! velocity, compared with the optimal feedback `v~` (docs/derivations.md, "The gap without cancellation"):
 //!
 //! ```text
-//! W_s - W* = int a [v ln(v/v~) - v + v~] + lambda (v - v~) dt,    lambda >= 0, and 0 unless v~ = 1 is held by the bound.
+//! W_s - W* = int a [v ln(v/v~) - v + v~] + lambda (v - v~) dt,    lambda >= 0, and 0 unless v~ is on the floor.
 //! ```
 //!
-//! Both terms are at least 0, so the sum is good to full relative precision however small it is.
+//! Both terms are at least 0, so the sum has full relative precision, however small it is.
 
 use crate::model::Transition;
 use crate::numerics::cubic::ExactCubic;
@@ -18,25 +17,24 @@ use crate::numerics::gauss::rule;
 use crate::protocol::cubic::Path;
 use crate::protocol::{SolverStats, optimal};
 
-/// Relative accuracy of the integral.
+/// Relative accuracy of the integral. Chosen: a thousandth of the promised 1e-7.
 const INTEGRAL_RTOL: f64 = 1e-10;
-/// Negligible error relative to the work, from the rounding of `v - v~`.
+/// Negligible error relative to the work, from the rounding of `v - v~`. Derived: the promised absolute error of the gap.
 const NEGLIGIBLE_ERROR: f64 = 1e-20;
-/// Relative accuracy of the feedback; an error in it counts quadratically until it comes near `v - v~` itself.
+/// Relative accuracy of the feedback. Chosen: an error in it counts quadratically until it comes near `v - v~` itself.
 const FEEDBACK: f64 = 1e-12;
-/// Nodes of a panel.
+/// Nodes of a panel. Chosen: smooth cases need few panels.
 const NODES: usize = 12;
-/// Most halvings of a panel: kinks where the feedback leaves the bound are caught this closely.
+/// Greatest number of halvings of a panel, which locate the kinks where the feedback leaves the floor. Chosen: 2^-30 is below the promised error.
 const MAX_BISECTIONS: u32 = 30;
-/// Most panels; smooth cases take two to eight, a kink some thirty.
-const MOST_PANELS: u32 = 1000;
-/// Fraction of the shortcut's velocity below which that of the optimum may underflow.
+/// Greatest number of panels. Chosen: smooth cases take two to eight, a kink some thirty.
+const MAX_PANELS: u32 = 1000;
+/// Fraction of the shortcut's velocity below which that of the optimum may underflow. Chosen; the budgets of `best_cubic` judge it.
 const MIN_DENSITY: f64 = 1e-3;
-/// Ratio of the lengths of successive panels towards an end.
+/// Ratio of the lengths of successive panels towards an end. Chosen: a graded mesh resolves the layer with a few panels.
 const PANEL_RATIO: f64 = 0.2;
 
-/// A path seen from one of its ends: polynomials in the distance from there, `x` or `1 - x`, so that nothing is lost where
-/// it is short.
+/// A path relative to one of its ends: polynomials in the distance from it, `x` or `1 - x`, which keep their digits where it is short.
 struct EndPolynomials {
     /// From the end, else from the start.
     from_end: bool,
@@ -46,7 +44,7 @@ struct EndPolynomials {
     /// `theta - theta_1`.
     drop: [f64; 4],
     n: [f64; 4],
-    /// `t_f theta (v - 1)`, whose digits count where the bound presses.
+    /// `t_f theta (v - 1)`, which keeps its digits near the floor.
     surplus: [f64; 4],
     /// The [`optimal::Position`].
     margin: [f64; 4],
@@ -91,7 +89,7 @@ struct Excess<'a> {
 }
 
 impl Excess<'_> {
-    /// The density at a distance from one side, and whether the optimum would hold there.
+    /// The density at a distance from one side, and whether the optimum is on the floor there.
     fn judge(&mut self, side: &EndPolynomials, distance: f64) -> Option<(f64, bool)> {
         let at = |[c0, c1, c2, c3]: [f64; 4]| c0 + distance * (c1 + distance * (c2 + distance * c3));
         let time_left = self.t_f * if side.from_end { distance } else { 1.0 - distance };
@@ -112,7 +110,7 @@ impl Excess<'_> {
     /// The point in its half of the path at which an optimum leaves the floor, by bisection; `None` if it is elsewhere.
     fn kink(&mut self, side: &EndPolynomials) -> Option<Option<f64>> {
         let (mut held, mut free) = if side.from_end { (HALF, 0.0) } else { (0.0, HALF) };
-        // With no time left nothing holds.
+        // At the end no time is left for the floor.
         if !self.judge(side, held)?.1 || (!side.from_end && self.judge(side, free)?.1) {
             return Some(None);
         }
@@ -145,8 +143,7 @@ pub(super) fn over_optimum(
     let sides = [false, true].map(|from_end| EndPolynomials::of(path, bounded, from_end));
     for side in &sides {
         let mut places = layers(side, t_f);
-        // A hold at the start may be shorter than the distance of the first node from it; later, halves of a panel may agree
-        // by chance.
+        // Time at the floor may end before the first node. Elsewhere, halves of a panel may agree by chance.
         if let Some(kink) = excess.kink(side)? {
             places.push(kink);
             places.sort_by(f64::total_cmp);
@@ -159,7 +156,7 @@ pub(super) fn over_optimum(
     }
     let tolerance =
         INTEGRAL_RTOL * panels.iter().map(|panel| panel.3).sum::<f64>().abs() + NEGLIGIBLE_ERROR * work / t_f;
-    let mut left = MOST_PANELS;
+    let mut left = MAX_PANELS;
     let mut sum = 0.0;
     for (side, from, to, whole) in panels {
         let mut density = |distance| Some(excess.judge(side, distance)?.0);
@@ -168,8 +165,8 @@ pub(super) fn over_optimum(
     Some(t_f * sum)
 }
 
-/// Ends of panels that get shorter towards the end of a side as far as theta or the velocity may change there: by the slope
-/// of theta, and in the time in which contacts are renewed.
+/// Ends of panels that become shorter towards the end of a side, down to the length over which theta or the velocity changes: by the slope of
+/// theta, and by the time in which contacts are renewed.
 fn layers(side: &EndPolynomials, t_f: f64) -> Vec<f64> {
     let [theta, slopes @ ..] = side.theta;
     let thin = theta / (theta + t_f + slopes.iter().map(|slope| slope.abs()).sum::<f64>());

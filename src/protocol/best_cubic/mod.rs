@@ -2,23 +2,27 @@
 //!
 //! The admissible shortcuts form a convex set in the plane of two coefficients (`plane`): `v >= m` means that the cubic
 //! `n - m t_f theta`, linear in the coefficients, is not negative on `[0, 1]`, with `m = 1` under the bound and `m = 0`
-//! without. The ellipsoid method (`ellipse`) comes close to the least work. If that lies inside, Newton's method ends
-//! there (`newton`); on the border, where some shortcut touches `v = m`, the ellipsoid method goes on to the end. A small
+//! without. The ellipsoid method (`ellipse`) approaches the minimum. If it is inside the set, Newton's method finishes
+//! (`newton`); on the border, where the best shortcut touches `v = m`, the ellipsoid method continues down to rounding. A small
 //! gap is an integral of positive terms (`excess`).
+//!
+//! Under the other laws the set is convex too, but the work is not: samples of the whole set lead to its least value (`polar`).
 
 mod ellipse;
 mod excess;
 mod newton;
 mod plane;
+mod polar;
 
 use super::cubic::Landscape;
-use super::{Solved, SolverStats, Status, optimal};
-use crate::model::Transition;
+use super::optimal::Bounds as OptimumBounds;
+use super::{Solved, SolverStats, Status, optimal, relaxed};
+use crate::model::{StateLaw, Transition};
 use crate::numerics::elementary::ln;
-use ellipse::{Ellipse, Outcome, Until};
+use ellipse::{CutResult, Ellipse, Until};
 use plane::{Bound, Coefficients, Plane};
 
-/// The best cubic shortcut of one transition in one time.
+/// The best cubic shortcut of a transition and a duration.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct BestCubic {
     /// `alpha_2 t_f`.
@@ -29,22 +33,22 @@ pub struct BestCubic {
     pub work: f64,
     /// The optimal work `W*`.
     pub work_optimal: f64,
-    /// `(W_s - W*)/W*`, to 1e-7 of itself or 1e-20, whichever is more.
+    /// `(W_s - W*)/W*`, with a relative error up to 1e-7 or an absolute error up to 1e-20.
     pub gap: f64,
     /// Its least velocity; 1 where it touches the bound.
     pub v_min: f64,
 }
 
-/// Gap from which the difference of two works, each good to 1e-12, is good to 1e-8 of itself.
+/// Gap from which the difference of two works, each good to 1e-12, is good to 1e-8 of itself. Derived from these errors.
 const PLAIN_DIFFERENCE: f64 = 1e-4;
-/// Error of that difference, relative to the works.
+/// Error of that difference, relative to the works. Chosen: ten times the errors of the works.
 const DIFFERENCE_ERROR: f64 = 1e-11;
 
-/// Roundings of the time beyond the least one.
+/// Roundings of the time beyond the least one. Chosen: more than the few operations of the least time lose.
 const ROUNDINGS: f64 = 8.0;
 
 /// Range of the work in the ellipse, relative to the work, at which the ellipse is small enough; times `a` where that is small,
-/// since the work differs only by the velocities, multiplied by `a`. Newton's method converges from there.
+/// since the work differs only by the velocities, multiplied by `a`. Chosen: Newton's method converges from there.
 const NEWTON_WORK_RANGE: f64 = 1e-5;
 
 /// The shortcut of least work over the whole plane where `v >= 1` (`bounded`) or `v > 0`.
@@ -63,7 +67,7 @@ pub fn solve(transition: &Transition, t_f: f64, bounded: bool, rtol: f64) -> Sol
     let rough = Landscape::new(transition, t_f, (1e-7 * law.a).clamp(1e-12, 1e-7));
     let least_velocity = if bounded { 1.0 } else { 0.0 };
     let [rough, plane] = [&rough, &landscape].map(|landscape| Plane::new(landscape, law, least_velocity));
-    // Where friction is as low as that there may be no shortcut of least work, or one that costs less than the extremal.
+    // At such low friction there may be no shortcut of least work, or one that costs less than the extremal.
     let steady = |v: f64| 1.0 + (law.a - law.b) * ln(v);
     let lowest = steady(transition.v_i).min(steady(transition.v_f));
     let doubtful =
@@ -83,14 +87,12 @@ pub fn solve(transition: &Transition, t_f: f64, bounded: bool, rtol: f64) -> Sol
     let excess = if difference > PLAIN_DIFFERENCE * optimum_value.work {
         difference
     } else {
-        // Two routes to one number: they must agree as far as the coarser one goes, and as far as a rounding of t_f
-        // leaves W* alone.
+        // Two routes to one number must agree within the errors of the coarser one, and of W* by the rounding of t_f.
         let coarse = DIFFERENCE_ERROR * work + ROUNDINGS * f64::EPSILON * t_f * optimum_value.hamiltonian.abs();
         let excess = excess::over_optimum(transition, &path, work, bounded, &mut stats);
         match excess {
             Some(excess) if (excess - difference).abs() <= coarse => excess,
-            // A path may be nowhere further than a rounding from the least time: there is no feedback then, and the difference
-            // is as good as both works.
+            // A path within a rounding of the least time has no feedback; the difference then has the errors of both works.
             None if difference.abs() <= coarse => difference.max(0.0),
             _ => return unsolved(Status::NotConverged, stats),
         }
@@ -103,31 +105,104 @@ pub fn solve(transition: &Transition, t_f: f64, bounded: bool, rtol: f64) -> Sol
     Solved { status, value: Some(value), stats }
 }
 
-/// The place of least work, and whether the velocity touches its least value there.
+/// The shortcut of least work under an evolution law of the state where `v >= 1` (`bounded`), compared with the optimum under a velocity ceiling.
+///
+/// The ceiling bounds the optimum alone. Statuses are those of [`solve`]; `Infeasible` also where the ceiling leaves no protocol. Other laws
+/// than ageing always have the bound. Their `gap` is the difference of two works; that no lesser work hides between samples is numerical
+/// evidence (docs/derivations.md, "Best cubic shortcuts of other laws").
+pub fn solve_under(
+    state: StateLaw,
+    transition: &Transition,
+    t_f: f64,
+    bounds: OptimumBounds,
+    rtol: f64,
+) -> Solved<BestCubic> {
+    if state != StateLaw::Ageing {
+        return solve_nonconvex(state, transition, t_f, bounds.v_ceiling, rtol);
+    }
+    let solved = solve(transition, t_f, bounds.floor, rtol);
+    if !bounds.v_ceiling.is_finite() {
+        return solved;
+    }
+    let optimum = optimal::solve(transition, t_f, bounds, rtol.min(1e-12));
+    let stats = SolverStats { nodes: solved.stats.nodes + optimum.stats.nodes, ..solved.stats };
+    match (solved.value, optimum.value) {
+        (Some(best), Some(least)) if least.time_at_v_ceiling > 0.0 => {
+            let gap = (best.work - least.work) / least.work;
+            let value = Some(BestCubic { work_optimal: least.work, gap, ..best });
+            Solved { status: solved.status.compared_with(optimum.status), value, stats }
+        }
+        (_, None) => Solved { status: optimum.status, value: None, stats },
+        _ => Solved { stats, ..solved },
+    }
+}
+
+/// [`solve_under`] for the laws whose work is not convex.
+fn solve_nonconvex(state: StateLaw, transition: &Transition, t_f: f64, v_ceiling: f64, rtol: f64) -> Solved<BestCubic> {
+    let optimum = relaxed::solve(state, transition, t_f, v_ceiling);
+    let mut stats = optimum.stats;
+    let without = |status, stats| Solved { status, value: None, stats };
+    let Some(work_optimal) = optimum.value.map(|found| found.optimum.work) else {
+        return without(optimum.status, stats);
+    };
+    let landscape = Landscape::under(state, transition, t_f, rtol.min(1e-12));
+    let plane = Plane::new(&landscape, transition.law, 1.0);
+    let Some(mut ellipse) = Ellipse::around(&plane) else { return without(Status::Infeasible, stats) };
+    match ellipse.close_in(&plane, Until::Admissible, &mut stats) {
+        CutResult::Close(_) => {}
+        CutResult::Empty => return without(Status::Infeasible, stats),
+        CutResult::Exhausted => return without(Status::NotConverged, stats),
+    }
+    let Some(least) = polar::least(&plane, &ellipse, &mut stats) else {
+        return without(Status::NotConverged, stats);
+    };
+    // The work decreases towards friction that no optimum has.
+    if least.active.contains(&Bound::Lifetime) {
+        return without(Status::Unproven, stats);
+    }
+    let path = plane.path(least.place);
+    let [mut v_min, friction_min] = landscape.least(&path);
+    let touches = least.active.contains(&Bound::Velocity) && v_min < 1.0 + TOUCHING_VELOCITY;
+    let [a_2, a_3] = plane.coefficients(least.place).map(|a| a.high);
+    let gap = (least.work - work_optimal) / work_optimal;
+    if touches {
+        v_min = 1.0;
+    } else if least.active.contains(&Bound::Velocity) {
+        // The fastest rise of the slip law, where the velocity depends on the root of the rounding of the coefficients.
+        v_min = v_min.min(state.product(0.0) / path.at(landscape.slowest(&path)).0);
+    }
+    let status = Status::Ok.with_friction(friction_min).compared_with(optimum.status);
+    Solved { status, value: Some(BestCubic { a_2, a_3, work: least.work, work_optimal, gap, v_min }), stats }
+}
+
+/// Excess of the least velocity over 1 that is rounding where the bound is active. Chosen: far above rounding.
+const TOUCHING_VELOCITY: f64 = 1e-6;
+
+/// The point of least work, and whether the velocity touches its least value there.
 struct Minimum {
     place: Coefficients,
     touches: bool,
 }
 
-/// Close in on the place of least work, coarsely and then, if it is not inside the set, to the end.
+/// Approaches the point of least work coarsely, and then, if it is not inside the set, down to rounding.
 fn least(rough: &Plane, plane: &Plane, a: f64, stats: &mut SolverStats) -> Result<Minimum, Status> {
     let mut ellipse = Ellipse::around(rough).ok_or(Status::Infeasible)?;
     let start = match ellipse.close_in(rough, Until::Work(NEWTON_WORK_RANGE * a.min(1.0)), stats) {
-        Outcome::Empty => return Err(Status::Infeasible),
-        Outcome::Close(place) => place,
-        Outcome::Exhausted => return Err(Status::NotConverged),
+        CutResult::Empty => return Err(Status::Infeasible),
+        CutResult::Close(place) => place,
+        CutResult::Exhausted => return Err(Status::NotConverged),
     };
     if let Some(place) = newton::descend(plane, a, start, stats) {
         return Ok(Minimum { place, touches: false });
     }
-    let Outcome::Close(place) = ellipse.close_in(plane, Until::Rounding, stats) else {
+    let CutResult::Close(place) = ellipse.close_in(plane, Until::Rounding, stats) else {
         return Err(Status::NotConverged);
     };
     let mut least = Minimum { place, touches: false };
     for condition in plane.conditions(place) {
         if condition.value <= TOUCHING_SIZES * ellipse.span(condition.along).0 {
             match condition.of {
-                // Cheaper and cheaper towards friction that no optimum has.
+                // The work decreases towards friction that no optimum has.
                 Bound::Lifetime => return Err(Status::Unproven),
                 Bound::Velocity => least.touches = true,
             }
@@ -136,5 +211,5 @@ fn least(rough: &Plane, plane: &Plane, a: f64, stats: &mut SolverStats) -> Resul
     Ok(least)
 }
 
-/// Distance from a condition, in sizes of the ellipse, within which the condition counts as active.
+/// Distance from a condition, in sizes of the ellipse, within which the condition counts as active. Chosen; the budgets of `best_cubic` judge it.
 const TOUCHING_SIZES: f64 = 16.0;

@@ -1,29 +1,29 @@
-//! Newton's method from a place close to that of least work, inside the admissible set.
+//! Newton's method from a point near the minimum, inside the admissible set.
 
 use super::plane::{Coefficients, Plane, moved};
 use crate::protocol::SolverStats;
 use crate::protocol::cubic::WorkDerivatives;
 
-/// Newton steps; each is halved as often as needed.
-const MOST_STEPS: u32 = 60;
+/// Greatest number of Newton steps; each is halved as often as needed. Chosen: several times the usual number.
+const MAX_STEPS: u32 = 60;
 /// Gain of the last step, relative to the work, times `a` where that is small: such a step changes velocities by a fraction of
-/// 1e-11, and the next one would change them by the square of that.
+/// 1e-11, and the next one would change them by the square of that. Derived: the gain is of second order.
 const LAST_STEP_GAIN: f64 = 1e-22;
-/// Apparent gain by rounding of the gradient, relative to the work.
+/// Apparent gain by rounding of the gradient, relative to the work. Chosen: ten thousand roundings.
 const GAIN_ROUNDING: f64 = 1e-12;
 
 /// A step of Newton's method.
 struct Newton {
     step: [f64; 2],
-    /// Twice what it gains.
+    /// Twice its gain.
     decrement: f64,
-    /// Whether the work bends upwards, so that no shift was needed.
+    /// Whether the Hessian is positive definite without a shift.
     sure: bool,
 }
 
 impl Newton {
     fn of(WorkDerivatives { gradient, hessian: [h_11, h_12, h_22], .. }: &WorkDerivatives) -> Newton {
-        // In units in which both coordinates bend the work alike.
+        // In units in which both coordinates have the same curvature.
         let units = [h_11, h_22].map(|bend| 1.0 / bend.abs().max(f64::MIN_POSITIVE).sqrt());
         let [g_1, g_2] = [gradient[0] * units[0], gradient[1] * units[1]];
         let [h_11, h_12, h_22] = [h_11 * units[0] * units[0], h_12 * units[0] * units[1], h_22 * units[1] * units[1]];
@@ -46,13 +46,13 @@ pub(super) fn descend(plane: &Plane, a: f64, start: Coefficients, stats: &mut So
     let mut place = start;
     let mut here = plane.work_derivatives(place, stats);
     let mut before = f64::INFINITY;
-    for _ in 0..MOST_STEPS {
+    for _ in 0..MAX_STEPS {
         let Newton { step, decrement, sure } = Newton::of(&here);
         if decrement.is_nan() {
             return None;
         }
         let work = here.work.abs();
-        // Rounding of the gradient, once Newton's method gains no more.
+        // The gain is within the rounding of the gradient.
         if sure && decrement <= GAIN_ROUNDING * a.min(1.0) * work && decrement >= 0.25 * before {
             return Some(place);
         }

@@ -1,32 +1,32 @@
-//! The plane of the coefficients of a cubic, and the convex set of its admissible places.
+//! The plane of the coefficients of a cubic, and the convex set of its admissible points.
 
-use crate::model::Law;
+use crate::model::{Law, StateLaw};
 use crate::numerics::double_double::DoubleDouble;
 use crate::numerics::elementary::exp;
 use crate::protocol::SolverStats;
 use crate::protocol::cubic::{Basis, Landscape, Path, WorkDerivatives};
 
-/// Two coefficients of theta, those of [`Basis`], to 32 digits: near the border what is admissible may be thinner than
+/// Two coefficients of theta, those of [`Basis`], to 32 digits: near the border the admissible set may be thinner than
 /// the rounding of a double.
 pub(super) type Coefficients = [DoubleDouble; 2];
 
 /// Shortcuts of one landscape that are no slower than a velocity, and whose theta stays above a floor.
 pub(super) struct Plane<'a> {
-    landscape: &'a Landscape,
+    pub landscape: &'a Landscape,
     pub basis: Basis,
     least_velocity: f64,
     floor: f64,
 }
 
-/// A condition `value + along . (y - place) >= 0` on the places `y`.
+/// A constraint `value + along . (y - place) >= 0` on the points `y`.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Condition {
+pub(super) struct Constraint {
     pub value: f64,
     pub along: [f64; 2],
     pub of: Bound,
 }
 
-/// The admissible set of a condition.
+/// The admissible set of a constraint.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Bound {
     /// theta above its floor.
@@ -36,9 +36,8 @@ pub(super) enum Bound {
 }
 
 impl<'a> Plane<'a> {
-    /// The floor of theta is 0, or, for `b > a`, the place beyond which a smaller theta costs less, `1 + (b - a) ln theta =
-    /// b - a`: beyond it friction is as low as it is nowhere on a path that is an optimum. Where it is so at an end already,
-    /// the floor is half of that end's theta.
+    /// The admissible shortcuts. The floor of theta is 0, or, for `b > a`, the root of `1 + (b - a) ln theta = b - a`, below which a smaller
+    /// theta costs less: no optimum has friction this low. If an end is below the root, the floor is half of the theta of that end.
     pub fn new(landscape: &'a Landscape, law: Law, least_velocity: f64) -> Plane<'a> {
         let ends = landscape.ends();
         let floor = if law.b > law.a { exp(1.0 - 1.0 / (law.b - law.a)) } else { 0.0 };
@@ -54,7 +53,7 @@ impl<'a> Plane<'a> {
         [if self.basis == Basis::End { -rise } else { rise }, DoubleDouble::new(0.0)]
     }
 
-    /// The farthest that an admissible theta may be from the straight line: `theta' <= 1` bounds it by `t_f - (theta_1 -
+    /// The greatest distance of an admissible theta from the straight line: `theta' <= 1` bounds it by `t_f - (theta_1 -
     /// theta_0)`, and where `v >= 1`, `0 < theta < 1` does.
     pub fn reach(&self) -> f64 {
         let ends = self.landscape.ends();
@@ -74,21 +73,24 @@ impl<'a> Plane<'a> {
         }
     }
 
-    /// The shortcut at a place.
+    /// The shortcut at a point.
     pub fn path(&self, place: Coefficients) -> Path<'a> {
         let [a_2, a_3] = self.coefficients(place);
         self.landscape.path(a_2, a_3)
     }
 
-    /// Work, gradient and Hessian at an admissible place.
+    /// Work, gradient and Hessian at an admissible point.
     pub fn work_derivatives(&self, place: Coefficients, stats: &mut SolverStats) -> WorkDerivatives {
         self.landscape.work_derivatives(&self.path(place), self.basis, stats)
     }
 
     /// The conditions: theta above its floor and velocity above its least value, at their minima, and the
     /// velocity at both ends.
-    pub fn conditions(&self, place: Coefficients) -> [Condition; 4] {
+    pub fn conditions(&self, place: Coefficients) -> [Constraint; 4] {
         let path = self.path(place);
+        if self.landscape.state() != StateLaw::Ageing {
+            return self.conditions_of_law(&path);
+        }
         let mut theta = path.exact_theta();
         theta.c[0] = theta.c[0] - DoubleDouble::new(self.floor);
         let surplus = path.exact_surplus(self.least_velocity);
@@ -96,21 +98,38 @@ impl<'a> Plane<'a> {
         let velocity = |x: f64| {
             let (d_theta, d_n) = self.basis.changes(x, 1.0 - x);
             let along = [d_n[0] - scale * d_theta[0], d_n[1] - scale * d_theta[1]];
-            Condition { value: surplus.at(x).high, along, of: Bound::Velocity }
+            Constraint { value: surplus.at(x).high, along, of: Bound::Velocity }
         };
         let x = theta.minimum();
         let along = self.basis.changes(x, 1.0 - x).0;
-        let lifetime = Condition { value: theta.at(x).high, along, of: Bound::Lifetime };
+        let lifetime = Constraint { value: theta.at(x).high, along, of: Bound::Lifetime };
         [lifetime, velocity(surplus.minimum()), velocity(0.0), velocity(1.0)]
     }
 
-    /// Whether a place is admissible.
+    /// The conditions under another law than ageing, where `v >= 1` as long as the lack is at least a convex function of theta.
+    fn conditions_of_law(&self, path: &Path) -> [Constraint; 4] {
+        let (state, t_f) = (self.landscape.state(), self.landscape.ends().t_f);
+        let velocity = |x: f64| {
+            let ((theta, n), (d_theta, d_n)) = (path.at(x), self.basis.changes(x, 1.0 - x));
+            let [least, slope] = state.lack(theta);
+            let along = [0, 1].map(|i| d_n[i] / t_f - slope * d_theta[i]);
+            Constraint { value: n / t_f - least, along, of: Bound::Velocity }
+        };
+        let mut theta = path.exact_theta();
+        theta.c[0] = theta.c[0] - DoubleDouble::new(self.floor);
+        let x = theta.minimum();
+        let along = self.basis.changes(x, 1.0 - x).0;
+        let lifetime = Constraint { value: theta.at(x).high, along, of: Bound::Lifetime };
+        [lifetime, velocity(self.landscape.slowest(path)), velocity(0.0), velocity(1.0)]
+    }
+
+    /// Whether a point is admissible.
     pub fn admits(&self, place: Coefficients) -> bool {
-        self.conditions(place).iter().all(Condition::holds)
+        self.conditions(place).iter().all(Constraint::holds)
     }
 }
 
-impl Condition {
+impl Constraint {
     /// theta is positive; the least velocity may be touched.
     pub fn holds(&self) -> bool {
         match self.of {
@@ -120,7 +139,7 @@ impl Condition {
     }
 }
 
-/// A place moved by a step.
+/// A point moved by a step.
 pub(super) fn moved(place: Coefficients, step: [f64; 2]) -> Coefficients {
     [place[0] + DoubleDouble::new(step[0]), place[1] + DoubleDouble::new(step[1])]
 }

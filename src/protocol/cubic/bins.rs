@@ -5,18 +5,20 @@ use std::cell::Cell;
 use multiversion::multiversion;
 
 use super::Landscape;
-use super::cells::Cells;
+use super::cells::CellCache;
+use super::other_laws::sums;
 use super::panel_batch::{NodeBuffer, PanelBatch, Prepared, prepare};
-use super::plan::{Block, Plan};
+use super::plan::{PerShortcut, PlannedPanels};
 use super::rules::NODE_STEP;
+use crate::model::StateLaw;
 use crate::numerics::gauss::primitive;
 use crate::numerics::lanes::LANES;
 
-/// Number of bins: 4, 8, … 80 nodes. A panel with more nodes is cut.
+/// Number of bins: 4, 8, … 80 nodes. A panel with more nodes is cut. Chosen: four more than [`CUT_BIN`], for panels shorter than `[0, 1]`.
 pub(super) const BINS: usize = 20;
 
 /// Bin from which a panel over all of `[0, 1]` is cut. Measured: two parts are cheaper there (`cargo bench --bench landscape`).
-pub(super) const CUT_FROM: usize = 16;
+pub(super) const CUT_BIN: usize = 16;
 
 /// The nodes of a bin.
 #[inline(always)]
@@ -29,7 +31,7 @@ pub(super) fn nodes_of(bin: usize) -> u32 {
 const MAX_FULL_BUNDLES: usize = 8;
 
 /// Bundles of all bins, and full bundles.
-const LOADS: usize = BINS + MAX_FULL_BUNDLES;
+const MAX_BUNDLES: usize = BINS + MAX_FULL_BUNDLES;
 
 /// A bundle, the indices of its shortcuts, and its bin.
 #[derive(Debug, Clone, Copy)]
@@ -45,15 +47,15 @@ struct PendingBatch {
 /// All bins.
 #[derive(Debug, Clone)]
 pub(super) struct Bins {
-    loads: [PendingBatch; LOADS],
+    loads: [PendingBatch; MAX_BUNDLES],
     /// Indices of loads: the one that each bin fills, then full ones, then empty ones.
-    order: [usize; LOADS],
+    order: [usize; MAX_BUNDLES],
     /// The number of full bundles.
     ready: usize,
     prepared: [Prepared; MAX_FULL_BUNDLES],
     space: NodeBuffer,
     /// Plans of cells of the last landscape.
-    pub cells: Cells,
+    pub cells: CellCache,
 }
 
 thread_local! {
@@ -76,12 +78,12 @@ impl Bins {
         let load = PendingBatch { panel_batch: PanelBatch::EMPTY, indices: [0; LANES], count: 0, bin: 0, whole: false };
         let order = std::array::from_fn(|i| i);
         Bins {
-            loads: [load; LOADS],
+            loads: [load; MAX_BUNDLES],
             order,
             ready: 0,
             prepared: [Prepared::EMPTY; MAX_FULL_BUNDLES],
             space: NodeBuffer::EMPTY,
-            cells: Cells::EMPTY,
+            cells: CellCache::EMPTY,
         }
     }
 
@@ -91,7 +93,7 @@ impl Bins {
     pub fn add(
         &mut self,
         of: &Landscape,
-        (plan, lane): (&Plan, usize),
+        (plan, lane): (&PlannedPanels, usize),
         panel: [f64; 4],
         index: usize,
         work: &mut [f64],
@@ -116,8 +118,8 @@ impl Bins {
     pub fn add_all(
         &mut self,
         of: &Landscape,
-        (plan, first): (&Plan, usize),
-        [a_2, a_3]: [&Block; 2],
+        (plan, first): (&PlannedPanels, usize),
+        [a_2, a_3]: [&PerShortcut; 2],
         indices: &[usize],
         work: &mut [f64],
     ) {
@@ -160,7 +162,11 @@ impl Bins {
         }
         for (&load, prepared) in ready.iter().zip(&self.prepared) {
             let PendingBatch { indices, count, bin, whole, .. } = &mut self.loads[load];
-            let works = prepared.works(primitive(nodes_of(*bin) as usize / 2), &mut self.space);
+            let rule = primitive(nodes_of(*bin) as usize / 2);
+            let works = match of.state {
+                StateLaw::Ageing => prepared.works(rule, &mut self.space),
+                _ => sums(of, prepared, rule),
+            };
             let (count, first) = (std::mem::take(count), indices[0]);
             if *whole && indices.iter().enumerate().all(|(lane, &i)| i == first + lane) {
                 work[first..first + LANES].copy_from_slice(&works);
@@ -178,7 +184,7 @@ impl Bins {
     "x86_64+avx+avx2+bmi1+bmi2+avx512f+avx512bw+avx512cd+avx512dq+avx512vl",
     "x86_64+avx+avx2+bmi1+bmi2"
 ))]
-fn fill(panel_batch: &mut PanelBatch, plan: &Plan, first: usize, a_2: &Block, a_3: &Block) {
+fn fill(panel_batch: &mut PanelBatch, plan: &PlannedPanels, first: usize, a_2: &PerShortcut, a_3: &PerShortcut) {
     let lanes = first..first + LANES;
     panel_batch.a_2.copy_from_slice(&a_2[lanes.clone()]);
     panel_batch.a_3.copy_from_slice(&a_3[lanes.clone()]);

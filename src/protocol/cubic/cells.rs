@@ -7,36 +7,37 @@
 
 use multiversion::multiversion;
 
-use super::bins::CUT_FROM;
+use super::bins::CUT_BIN;
 use super::path::{Ends, Path};
 use super::plan::{
-    BLOCK, Block, MAX_CHEAP_NODES, MIN_GAP, PAIRS, Places, Plan, SINGLE_PRECISION_ERROR, nearest, places, rooted,
+    MAX_CHEAP_NODES, MIN_GAP, PAIRS, PLANNED_SHORTCUTS, PerShortcut, Places, PlannedPanels, SINGLE_PRECISION_ERROR,
+    nearest, places, rooted,
 };
-use super::rules::{Accuracy, NODE_STEP, ZEROS};
+use super::rules::{NODE_STEP, NodeThresholds, ZEROS};
 use crate::numerics::elementary::rough_ln;
 use crate::numerics::lanes::{LANES, Vector};
 
 /// A cache of the plans of the last used cells of a landscape.
 #[derive(Debug, Clone)]
-pub(super) struct Cells {
-    frame: Option<Frame>,
+pub(super) struct CellCache {
+    frame: Option<CellInputs>,
     /// The age of the current frame.
     age: u64,
-    of: [Cell; CACHED_CELLS],
+    of: [CellPlan; CACHED_CELLS],
 }
 
 /// The inputs that determine the cells.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Frame {
+pub(super) struct CellInputs {
     ends: Ends,
-    accuracy: Accuracy,
+    accuracy: NodeThresholds,
     /// Cells per unit of either coordinate.
     scale: f64,
 }
 
 /// The plan of one cell.
 #[derive(Debug, Clone, Copy)]
-struct Cell {
+struct CellPlan {
     place: CellKey,
     /// The age of its frame.
     age: u64,
@@ -60,7 +61,7 @@ type CellKey = [u64; 2];
 const CACHED_CELLS: usize = 64;
 
 /// Cells that are planned together, each from all its samples.
-const CELLS_PER_PLAN: usize = BLOCK / SAMPLES.len();
+const CELLS_PER_PLAN: usize = PLANNED_SHORTCUTS / SAMPLES.len();
 
 /// Samples of a cell: its corners, then the middles of its edges.
 const SAMPLES: [[f64; 2]; 8] =
@@ -73,7 +74,7 @@ const CORNERS: usize = 4;
 /// bench --bench landscape`).
 const CELLS_PER_UNIT: f64 = 8.0;
 
-/// `1.5 * 2^52`, whose last bit is 1: added to a number, it leaves the nearest integer.
+/// `1.5 * 2^52`, whose last bit is 1: added to a number, it leaves the nearest integer. Derived.
 const INTEGER_SHIFT: f64 = 6755399441055744.0;
 
 /// Greatest distance of a planned cell from the origin, in cells. Chosen: coordinates of farther cells lose digits.
@@ -89,19 +90,19 @@ const MAX_INTERPOLATION_RTOL: f64 = 0.12;
 /// Bin number of a shortcut that needs its own plan.
 pub(super) const OWN_PLAN_BIN: u32 = u32::MAX;
 
-impl Frame {
+impl CellInputs {
     /// The frame of the landscape between `ends`.
-    pub fn new(ends: &Ends, accuracy: &Accuracy) -> Frame {
+    pub fn new(ends: &Ends, accuracy: &NodeThresholds) -> CellInputs {
         let mean = ends.t_f - ends.rise.high;
         // The exponent of the mean only.
         let power = f64::from_bits(mean.to_bits() & 0x7FF0_0000_0000_0000);
         let scale = CELLS_PER_UNIT / power;
-        Frame { ends: *ends, accuracy: accuracy.clone(), scale: if scale.is_normal() { scale } else { 1.0 } }
+        CellInputs { ends: *ends, accuracy: accuracy.clone(), scale: if scale.is_normal() { scale } else { 1.0 } }
     }
 }
 
-impl Cell {
-    const NONE: Cell = Cell {
+impl CellPlan {
+    const NONE: CellPlan = CellPlan {
         place: [0; 2],
         age: 0,
         pace: [0.0; 4],
@@ -114,11 +115,11 @@ impl Cell {
     };
 }
 
-impl Cells {
-    pub const EMPTY: Cells = Cells { frame: None, age: 0, of: [Cell::NONE; CACHED_CELLS] };
+impl CellCache {
+    pub const EMPTY: CellCache = CellCache { frame: None, age: 0, of: [CellPlan::NONE; CACHED_CELLS] };
 
     /// Discards the cells of another frame.
-    pub fn begin(&mut self, frame: &Frame) {
+    pub fn begin(&mut self, frame: &CellInputs) {
         if self.frame.as_ref() != Some(frame) {
             self.frame = Some(frame.clone());
             self.age += 1;
@@ -138,10 +139,10 @@ impl Cells {
     }
 
     /// Plans feasible shortcuts from their cells.
-    pub fn plan(&mut self, frame: &Frame, a_2: &Block, a_3: &Block, plan: &mut Plan) {
+    pub fn plan(&mut self, frame: &CellInputs, a_2: &PerShortcut, a_3: &PerShortcut, plan: &mut PlannedPanels) {
         let located = locate(frame.scale, a_2, a_3);
-        let (mut runs, mut count) = ([LaneRun { from: 0, slot: 0 }; BLOCK], 0);
-        let (mut missing, mut lost) = ([[0; 2]; BLOCK], 0);
+        let (mut runs, mut count) = ([LaneRun { from: 0, slot: 0 }; PLANNED_SHORTCUTS], 0);
+        let (mut missing, mut lost) = ([[0; 2]; PLANNED_SHORTCUTS], 0);
         // The previous cell, and the cell before the last missing one.
         let (mut last, mut before) = (located.place(0), located.place(0));
         let mut starts = located.starts;
@@ -149,7 +150,7 @@ impl Cells {
             let from = starts.trailing_zeros();
             starts &= starts - 1;
             let place = located.place(from as usize);
-            let slot = Cells::slot(place);
+            let slot = CellCache::slot(place);
             runs[count] = LaneRun { from, slot };
             count += 1;
             if !self.holds(slot, place) {
@@ -178,9 +179,9 @@ impl Cells {
             return;
         }
         // A slot contains only its last cell.
-        for lane in 0..BLOCK {
+        for lane in 0..PLANNED_SHORTCUTS {
             let place = located.place(lane);
-            let slot = Cells::slot(place);
+            let slot = CellCache::slot(place);
             if !self.holds(slot, place) {
                 let [cell, ..] = chart(frame, &[place; CELLS_PER_PLAN]);
                 self.keep(cell);
@@ -189,8 +190,8 @@ impl Cells {
         }
     }
 
-    fn keep(&mut self, cell: Cell) {
-        self.of[Cells::slot(cell.place) as usize] = Cell { age: self.age, ..cell };
+    fn keep(&mut self, cell: CellPlan) {
+        self.of[CellCache::slot(cell.place) as usize] = CellPlan { age: self.age, ..cell };
     }
 }
 
@@ -203,8 +204,8 @@ struct LaneRun {
 
 /// The cells of shortcuts, and the distances from the cell centres.
 struct CellOffsets {
-    places: [[u64; BLOCK]; 2],
-    local: [Block; 2],
+    places: [[u64; PLANNED_SHORTCUTS]; 2],
+    local: [PerShortcut; 2],
     /// Bit mask of the lanes whose cell differs from that of the previous lane.
     starts: u32,
 }
@@ -220,10 +221,11 @@ impl CellOffsets {
     "x86_64+avx+avx2+bmi1+bmi2+avx512f+avx512bw+avx512cd+avx512dq+avx512vl",
     "x86_64+avx+avx2+bmi1+bmi2"
 ))]
-fn locate(scale: f64, a_2: &Block, a_3: &Block) -> CellOffsets {
-    let mut located = CellOffsets { places: [[0; BLOCK]; 2], local: [[0.0; BLOCK]; 2], starts: 1 };
+fn locate(scale: f64, a_2: &PerShortcut, a_3: &PerShortcut) -> CellOffsets {
+    let mut located =
+        CellOffsets { places: [[0; PLANNED_SHORTCUTS]; 2], local: [[0.0; PLANNED_SHORTCUTS]; 2], starts: 1 };
     for ((places, local), a) in located.places.iter_mut().zip(&mut located.local).zip([a_2, a_3]) {
-        for i in 0..BLOCK {
+        for i in 0..PLANNED_SHORTCUTS {
             let x = a[i] * scale;
             let middle = x + INTEGER_SHIFT;
             places[i] = middle.to_bits();
@@ -231,17 +233,17 @@ fn locate(scale: f64, a_2: &Block, a_3: &Block) -> CellOffsets {
         }
     }
     let [i, j] = &located.places;
-    for lane in 1..BLOCK {
+    for lane in 1..PLANNED_SHORTCUTS {
         let other = (i[lane] != i[lane - 1]) | (j[lane] != j[lane - 1]);
         located.starts |= u32::from(other) << lane;
     }
     located
 }
 
-impl Cell {
+impl CellPlan {
     /// The plan of a shortcut.
     #[inline(always)]
-    fn write(&self, u: f64, v: f64, lane: usize, plan: &mut Plan) {
+    fn write(&self, u: f64, v: f64, lane: usize, plan: &mut PlannedPanels) {
         let [p0, p1, p2, p3] = self.pace;
         plan.bin[lane] = bin(p0 + u * p1 + v * (p2 + u * p3), self.least);
         (plan.side[lane], plan.gap[lane], plan.squarings[lane]) = (self.side, self.gap, self.squarings);
@@ -262,11 +264,11 @@ fn bin(pace: f64, least: f64) -> u32 {
     "x86_64+avx+avx2+bmi1+bmi2+avx512f+avx512bw+avx512cd+avx512dq+avx512vl",
     "x86_64+avx+avx2+bmi1+bmi2"
 ))]
-fn assemble(cells: &[Cell; CACHED_CELLS], runs: &[LaneRun], located: &CellOffsets, plan: &mut Plan) {
-    let from = |run: usize| runs.get(run).map_or(BLOCK, |run| run.from as usize);
+fn assemble(cells: &[CellPlan; CACHED_CELLS], runs: &[LaneRun], located: &CellOffsets, plan: &mut PlannedPanels) {
+    let from = |run: usize| runs.get(run).map_or(PLANNED_SHORTCUTS, |run| run.from as usize);
     let cell = |run: usize| &cells[runs[run].slot as usize % CACHED_CELLS];
     let mut run = 0;
-    for start in (0..BLOCK).step_by(LANES) {
+    for start in (0..PLANNED_SHORTCUTS).step_by(LANES) {
         let lanes = start..start + LANES;
         while from(run + 1) <= start {
             run += 1;
@@ -309,8 +311,8 @@ const ORDER: Vector = Vector([0.5, 1.5, 2.5, 3.5, 4.5, 5.5, 6.5, 7.5]);
 
 /// Copies one value per cell to all its samples.
 #[inline(always)]
-fn spread<T: Copy>(of: [T; CELLS_PER_PLAN]) -> [T; BLOCK] {
-    let mut all = [of[0]; BLOCK];
+fn spread<T: Copy>(of: [T; CELLS_PER_PLAN]) -> [T; PLANNED_SHORTCUTS] {
+    let mut all = [of[0]; PLANNED_SHORTCUTS];
     for places in all.chunks_exact_mut(CELLS_PER_PLAN) {
         places.copy_from_slice(&of);
     }
@@ -319,7 +321,7 @@ fn spread<T: Copy>(of: [T; CELLS_PER_PLAN]) -> [T; BLOCK] {
 
 /// The least value of each cell.
 #[inline(always)]
-fn lowest(values: &[f32; BLOCK]) -> [f32; CELLS_PER_PLAN] {
+fn lowest(values: &[f32; PLANNED_SHORTCUTS]) -> [f32; CELLS_PER_PLAN] {
     let mut lowest = [f32::MAX; CELLS_PER_PLAN];
     for places in values.chunks_exact(CELLS_PER_PLAN) {
         for c in 0..CELLS_PER_PLAN {
@@ -334,8 +336,8 @@ fn lowest(values: &[f32; BLOCK]) -> [f32; CELLS_PER_PLAN] {
     "x86_64+avx+avx2+bmi1+bmi2+avx512f+avx512bw+avx512cd+avx512dq+avx512vl",
     "x86_64+avx+avx2+bmi1+bmi2"
 ))]
-fn chart(frame: &Frame, cells: &[CellKey; CELLS_PER_PLAN]) -> [Cell; CELLS_PER_PLAN] {
-    let Frame { ends, accuracy, scale } = frame;
+fn chart(frame: &CellInputs, cells: &[CellKey; CELLS_PER_PLAN]) -> [CellPlan; CELLS_PER_PLAN] {
+    let CellInputs { ends, accuracy, scale } = frame;
     let middles = [0, 1].map(|k| std::array::from_fn(|c| f64::from_bits(cells[c][k]) - INTEGER_SHIFT));
     let (mut a_2, mut a_3) = (spread(middles[0]), spread(middles[1]));
     let size = 1.0 / scale;
@@ -345,7 +347,7 @@ fn chart(frame: &Frame, cells: &[CellKey; CELLS_PER_PLAN]) -> [Cell; CELLS_PER_P
         }
     }
     let Places { re, im, doubt } = places::<f32>(ends, &a_2, &a_3);
-    let (mut straight, shadow) = nearest(&re, &im, &[0.0; BLOCK], &[1.0; BLOCK]);
+    let (mut straight, shadow) = nearest(&re, &im, &[0.0; PLANNED_SHORTCUTS], &[1.0; PLANNED_SHORTCUTS]);
     for straight in &mut straight {
         *straight = 2.0 * straight.sqrt();
     }
@@ -356,10 +358,11 @@ fn chart(frame: &Frame, cells: &[CellKey; CELLS_PER_PLAN]) -> [Cell; CELLS_PER_P
         *gain = squared - straight;
     }
     let (gains, sides) = (spread(gain), spread(centres.side));
-    let (mut paces, mut lost, mut unsure) = ([0.0; BLOCK], [0.0f32; BLOCK], [0.0f32; CELLS_PER_PLAN]);
+    let (mut paces, mut lost, mut unsure) =
+        ([0.0; PLANNED_SHORTCUTS], [0.0f32; PLANNED_SHORTCUTS], [0.0f32; CELLS_PER_PLAN]);
     let steady = if ends.rise.high < 0.0 { 1.0 } else { -1.0 };
     let mean = ends.t_f - ends.rise.high;
-    for i in 0..BLOCK {
+    for i in 0..PLANNED_SHORTCUTS {
         let focal = if gains[i] > 0.0 { squared[i] } else { straight[i] };
         // The margin for errors of the zeros.
         let excess = (f64::from(focal) - 2.0) * (0.5 / (1.0 + SINGLE_PRECISION_ERROR));
@@ -383,17 +386,17 @@ fn chart(frame: &Frame, cells: &[CellKey; CELLS_PER_PLAN]) -> [Cell; CELLS_PER_P
         let (side, gap) = if squared { (centres.side[c], centres.gap[c]) } else { (steady as f32, 0.0) };
         let one_map = !squared || centres.common[c] & ((gap == 0.0) | (gap >= MIN_GAP as f32)) & (gap <= 1.0);
         let meant = middles[0][c].abs() + middles[1][c].abs() < MAX_CELL;
-        let none = Cell { place: cells[c], ..Cell::NONE };
+        let none = CellPlan { place: cells[c], ..CellPlan::NONE };
         if !(unsure[c] == 0.0 && one_map && meant) {
             return none;
         }
         let (side, gap) = (f64::from(side), f64::from(gap));
         let (from, to) = if squared { (gap.sqrt(), (1.0 + gap).sqrt()) } else { (0.0, 1.0) };
-        let most = if squared && room[c] < 0.0 { MAX_CHEAP_NODES / NODE_STEP } else { CUT_FROM };
+        let most = if squared && room[c] < 0.0 { MAX_CHEAP_NODES / NODE_STEP } else { CUT_BIN };
         let squarings = if squared { 1.0 } else { 0.0 };
-        let cell = Cell { side, gap, squarings, from, to, least: 1.0 / most as f64, ..none };
+        let cell = CellPlan { side, gap, squarings, from, to, least: 1.0 / most as f64, ..none };
         interpolated(std::array::from_fn(|sample| paces[sample * CELLS_PER_PLAN + c]))
-            .map_or(none, |pace| Cell { pace, ..cell })
+            .map_or(none, |pace| CellPlan { pace, ..cell })
     })
 }
 
@@ -427,9 +430,9 @@ struct Centres {
 impl Centres {
     /// The centres as far beyond an end as the projected zeros of the samples allow.
     #[inline(always)]
-    fn of(shadow: &[f32; BLOCK]) -> Centres {
-        let (mut above, mut below) = ([0.0f32; BLOCK], [0.0f32; BLOCK]);
-        for i in 0..BLOCK {
+    fn of(shadow: &[f32; PLANNED_SHORTCUTS]) -> Centres {
+        let (mut above, mut below) = ([0.0f32; PLANNED_SHORTCUTS], [0.0f32; PLANNED_SHORTCUTS]);
+        for i in 0..PLANNED_SHORTCUTS {
             let upper = shadow[i] > 0.5;
             let beyond = if upper { shadow[i] - 1.0 } else { -shadow[i] };
             let beyond = if beyond > 0.0 { beyond } else { 0.0 };
@@ -451,22 +454,26 @@ impl Centres {
 /// The map `r ± s^2` for the samples of each cell.
 struct Squared {
     /// The focal sums of the samples.
-    focal: [f32; BLOCK],
+    focal: [f32; PLANNED_SHORTCUTS],
     /// Negative where the centre of the map itself limits the focal sum, so that a larger power might help.
     room: [f32; CELLS_PER_PLAN],
 }
 
 impl Squared {
     #[inline(always)]
-    fn of(re: &[[f32; BLOCK]; ZEROS], im: &[[f32; BLOCK]; ZEROS], centres: &Centres) -> Squared {
+    fn of(
+        re: &[[f32; PLANNED_SHORTCUTS]; ZEROS],
+        im: &[[f32; PLANNED_SHORTCUTS]; ZEROS],
+        centres: &Centres,
+    ) -> Squared {
         let (side, gap) = (spread(centres.side), spread(centres.gap));
-        let (mut near, mut far) = ([0.0f32; BLOCK], [0.0f32; BLOCK]);
-        for i in 0..BLOCK {
+        let (mut near, mut far) = ([0.0f32; PLANNED_SHORTCUTS], [0.0f32; PLANNED_SHORTCUTS]);
+        for i in 0..PLANNED_SHORTCUTS {
             (near[i], far[i]) = (gap[i].sqrt(), (1.0 + gap[i]).sqrt());
         }
-        let mut least = [f32::MAX; BLOCK];
+        let mut least = [f32::MAX; PLANNED_SHORTCUTS];
         for k in 0..ZEROS {
-            for i in 0..BLOCK {
+            for i in 0..PLANNED_SHORTCUTS {
                 let end = if side[i] > 0.0 { 1.0 - re[k][i] } else { re[k][i] };
                 let (x, y) = (gap[i] + end, im[k][i]);
                 let size = if PAIRS.contains(&k) { (x * x + y * y).sqrt() } else { x.abs() };
@@ -474,8 +481,8 @@ impl Squared {
                 least[i] = if sum < least[i] { sum } else { least[i] };
             }
         }
-        let (mut focal, mut room) = ([0.0f32; BLOCK], [0.0f32; BLOCK]);
-        for i in 0..BLOCK {
+        let (mut focal, mut room) = ([0.0f32; PLANNED_SHORTCUTS], [0.0f32; PLANNED_SHORTCUTS]);
+        for i in 0..PLANNED_SHORTCUTS {
             focal[i] = 2.0 * least[i].sqrt() / (far[i] - near[i]);
             let ceiling = 4.0 * near[i] / (far[i] - near[i]);
             room[i] = 0.5 * ceiling - (focal[i] - 2.0);

@@ -8,7 +8,7 @@
 use multiversion::multiversion;
 
 use super::path::{Ends, Path};
-use crate::model::Law;
+use crate::model::{Law, StateLaw};
 use crate::numerics::elementary::{exp, ln};
 use crate::numerics::lanes::{LANES, Lanes};
 use crate::numerics::polynomial::roots_between;
@@ -36,6 +36,20 @@ impl FrictionBounds {
             f64::INFINITY
         };
         FrictionBounds { n: ends.t_f * exp(-MAX_LOGARITHM_DECREASE / a), theta }
+    }
+
+    /// The bounds under an evolution law of the state: friction is `1 + a ln u + (b - a) ln theta`, with `u^2 = n/t_f` for the law of Perrin, Rice and
+    /// Zheng and `u >= 1/e` for the slip law.
+    pub fn under(state: StateLaw, law: Law, ends: &Ends) -> FrictionBounds {
+        match state {
+            StateLaw::Ageing => FrictionBounds::new(law, ends),
+            StateLaw::Prz => FrictionBounds::new(Law { a: 0.5 * law.a, b: law.b - 0.5 * law.a }, ends),
+            // Less than a half is lost by u.
+            StateLaw::Slip if law.a < MAX_LOGARITHM_DECREASE => {
+                FrictionBounds { n: f64::NEG_INFINITY, ..FrictionBounds::new(law, ends) }
+            }
+            StateLaw::Slip => FrictionBounds { n: f64::INFINITY, theta: f64::INFINITY },
+        }
     }
 
     /// A bit mask of the feasible shortcuts that the bounds do not decide.
@@ -128,7 +142,7 @@ impl Path<'_> {
     }
 
     /// The stationary points of friction in the half near an end, as distances from it: roots of `a n' theta + (b - a) n theta'`.
-    fn stationary(&self, law: Law, end: f64) -> Vec<f64> {
+    pub(super) fn stationary(&self, law: Law, end: f64) -> Vec<f64> {
         let ([t0, t1, t2, t3], [n0, n1, n2]) = self.about(end);
         let side = if end == 0.0 { 1.0 } else { -1.0 };
         let (theta, n) = ([t0, side * t1, t2, side * t3], [n0, side * n1, n2]);

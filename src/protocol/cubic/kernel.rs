@@ -3,7 +3,7 @@
 
 use multiversion::multiversion;
 
-use super::rules::Map;
+use super::rules::PanelMap;
 use crate::numerics::elementary::{exp, ln};
 use crate::numerics::gauss::Rule;
 use crate::numerics::lanes::{LANES, fold};
@@ -23,14 +23,14 @@ pub(super) struct Slice {
 
 impl Slice {
     /// `int tau v dt` over the panel.
-    pub fn sum(&self, map: Map, rule: &Rule) -> f64 {
+    pub fn sum(&self, map: PanelMap, rule: &Rule) -> f64 {
         self.half
             * match map {
-                Map::Line => line(self, rule),
-                Map::Power { side, gap, squarings: 1 } => square(self, side, gap, rule),
-                Map::Power { side, gap, squarings: 2 } => fourth(self, side, gap, rule),
-                Map::Power { side, gap, .. } => eighth(self, side, gap, rule),
-                Map::Sinh { height } => sinh(self, height, rule),
+                PanelMap::Line => line(self, rule),
+                PanelMap::Power { side, gap, squarings: 1 } => square(self, side, gap, rule),
+                PanelMap::Power { side, gap, squarings: 2 } => fourth(self, side, gap, rule),
+                PanelMap::Power { side, gap, .. } => eighth(self, side, gap, rule),
+                PanelMap::Sinh { height } => sinh(self, height, rule),
             }
     }
 

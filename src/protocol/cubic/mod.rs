@@ -3,11 +3,13 @@
 //! `alpha_4` follows from `theta(t_f) = 1/v_f`. A shortcut is a `path` of two polynomials. Their stationary points decide whether it is
 //! feasible, and their zeros determine its quadrature (`rules`).
 
+mod arcsinh;
 mod bins;
 mod cells;
 mod friction;
 mod kernel;
 mod motion;
+mod other_laws;
 mod panel_batch;
 mod path;
 mod plan;
@@ -18,22 +20,22 @@ mod work_derivatives;
 mod works;
 
 use super::{Motion, SolverStats, Status};
-use crate::model::{Law, Transition};
+use crate::model::{Law, StateLaw, Transition};
 use crate::numerics::double_double::DoubleDouble;
 use crate::numerics::elementary::ln;
 use crate::numerics::gauss::rule;
 use crate::numerics::lanes::LANES;
 use bins::Bins;
-use cells::Frame;
+use cells::CellInputs;
 use friction::{FrictionBounds, UndecidedShortcuts};
 use kernel::Slice;
 use panel_batch::Friction;
 pub(super) use path::{Ends, Path, rise};
 use queue::Queue;
-use rules::{Accuracy, Panel, Zeros, choose};
+use rules::{MappedPanel, NodeThresholds, Zeros, choose};
 use screen::{
-    BATCH_SPANS, SEARCH_SHORTCUTS, SPAN_SHORTCUTS, Verdict, end_velocities, end_velocities_of_span, inner_velocities,
-    on_side, screen, settle,
+    BATCH_SPANS, SEARCH_SHORTCUTS, SPAN_SHORTCUTS, SpanDecision, end_velocities, end_velocities_of_span,
+    inner_velocities, on_side, screen, settle,
 };
 pub(super) use work_derivatives::{Basis, WorkDerivatives};
 use works::Works;
@@ -42,13 +44,17 @@ use works::Works;
 #[derive(Debug, Clone)]
 pub struct Landscape {
     law: Law,
+    state: StateLaw,
     friction: Friction,
     floors: FrictionBounds,
     ends: Ends,
+    t_f: f64,
     ln_t_f: f64,
-    frame: Frame,
-    accuracy: Accuracy,
-    accuracy_of_parts: Accuracy,
+    /// Work that depends on the ends alone.
+    work_of_ends: f64,
+    frame: CellInputs,
+    accuracy: NodeThresholds,
+    accuracy_of_parts: NodeThresholds,
 }
 
 /// Buffers for the results of shortcuts, column by column, with one element for each shortcut.
@@ -65,16 +71,25 @@ pub struct LandscapeBuffers<'a> {
 impl Landscape {
     /// The landscape of `transition` with duration `t_f`; works have a relative error of at most `rtol`.
     pub fn new(transition: &Transition, t_f: f64, rtol: f64) -> Self {
+        Landscape::under(StateLaw::Ageing, transition, t_f, rtol)
+    }
+
+    /// The landscape of `transition` with duration `t_f` under an evolution law of the state; works have a relative error of at most `rtol`.
+    pub fn under(state: StateLaw, transition: &Transition, t_f: f64, rtol: f64) -> Self {
         let tolerance = 0.5 * rtol;
-        let ends = Ends::between(transition.v_i, transition.v_f, t_f, tolerance);
-        let accuracy = Accuracy::new(tolerance, transition.law, t_f * transition.v_i.max(transition.v_f));
+        let Transition { law, v_i, v_f } = *transition;
+        let ends = Ends::under(state, v_i, v_f, t_f, tolerance);
+        let accuracy = NodeThresholds::new(tolerance, law, t_f * v_i.max(v_f));
         Landscape {
-            law: transition.law,
-            friction: Friction::new(transition.law, &ends),
-            floors: FrictionBounds::new(transition.law, &ends),
+            law,
+            state,
+            friction: Friction::new(law, &ends),
+            floors: FrictionBounds::under(state, law, &ends),
             ends,
+            t_f,
             ln_t_f: ln(t_f),
-            frame: Frame::new(&ends, &accuracy),
+            work_of_ends: if state == StateLaw::Slip { law.a * ln(v_f / v_i) } else { 0.0 },
+            frame: CellInputs::new(&ends, &accuracy),
             accuracy_of_parts: accuracy.of_parts(tolerance),
             accuracy,
         }
@@ -94,7 +109,7 @@ impl Landscape {
     pub fn motion(&self, a_2: f64, a_3: f64) -> Option<Box<dyn Motion>> {
         let mut status = [Status::Infeasible];
         self.evaluate(&[a_2], &[a_3], LandscapeBuffers { work: &mut [], v_min: &mut [], status: &mut status });
-        let motion = motion::CubicPoint::new(self.law, self.ends, a_2, a_3);
+        let motion = motion::CubicPoint::new(self.clone(), [a_2, a_3]);
         (status != [Status::Infeasible]).then(|| Box::new(motion) as Box<dyn Motion>)
     }
 
@@ -102,6 +117,9 @@ impl Landscape {
     ///
     /// The number of shortcuts is the minimum of the lengths of `a_2`, `a_3` and `out.status`.
     pub fn evaluate(&self, a_2: &[f64], a_3: &[f64], out: LandscapeBuffers<'_>) -> SolverStats {
+        if self.state != StateLaw::Ageing {
+            return other_laws::evaluate(self, a_2, a_3, out);
+        }
         let LandscapeBuffers { work, v_min, status } = out;
         let count = a_2.len().min(a_3.len()).min(status.len());
         let (velocities, works) = (count.min(v_min.len()), count.min(work.len()));
@@ -145,7 +163,18 @@ impl Landscape {
         stats
     }
 
-    /// `W_s = int tau v dt`.
+    /// The evolution law of the state.
+    pub(super) fn state(&self) -> StateLaw {
+        self.state
+    }
+
+    /// The work of a feasible shortcut.
+    pub(super) fn whole_work(&self, path: &Path, stats: &mut SolverStats) -> f64 {
+        stats.quadratures += 1;
+        self.work_of_ends + self.work(path, stats)
+    }
+
+    /// `W_s = int tau v dt`, without the work of the ends.
     fn work(&self, path: &Path, stats: &mut SolverStats) -> f64 {
         let mut panels = Vec::with_capacity(8);
         let zeros = Zeros::of(path);
@@ -161,9 +190,12 @@ impl Landscape {
 
     /// The contribution of one panel to the work.
     #[inline(always)]
-    fn sum(&self, path: &Path, panel: &Panel, stats: &mut SolverStats) -> f64 {
+    fn sum(&self, path: &Path, panel: &MappedPanel, stats: &mut SolverStats) -> f64 {
         let rule = rule(panel.nodes);
         stats.nodes += rule.x.len() as u32;
+        if self.state != StateLaw::Ageing {
+            return other_laws::panel_sum(self, path, panel);
+        }
         // Near a zero, the relative accuracy of the small theta matters.
         let (theta, n) = path.about(panel.centre);
         let slice = Slice {
@@ -199,7 +231,7 @@ impl Evaluation<'_> {
         first: usize,
         a_2: &[f64; SPAN_SHORTCUTS],
         a_3: &[f64; SPAN_SHORTCUTS],
-        Verdict { status, sound }: Verdict,
+        SpanDecision { status, sound }: SpanDecision,
     ) {
         self.status[first..first + SPAN_SHORTCUTS].fill(status);
         if status == Status::Infeasible {

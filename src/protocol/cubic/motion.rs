@@ -1,33 +1,33 @@
 //! A cubic shortcut over time.
 
-use super::path::{Ends, Path};
+use super::Landscape;
+use super::path::Path;
 use super::rules::zeros;
-use crate::model::Law;
+use crate::model::StateLaw;
 use crate::numerics::elementary::ln;
 use crate::protocol::{Moment, Motion};
 
 /// The motion of one shortcut; its parameter is `x = t/t_f`.
 pub(super) struct CubicPoint {
-    law: Law,
-    ends: Ends,
-    a_2: f64,
-    a_3: f64,
+    of: Landscape,
+    /// `alpha_2 t_f` and `alpha_3 t_f^2`.
+    place: [f64; 2],
 }
 
 impl CubicPoint {
-    /// The motion of a feasible shortcut with `alpha_2 t_f = a_2` and `alpha_3 t_f^2 = a_3`.
-    pub fn new(law: Law, ends: Ends, a_2: f64, a_3: f64) -> CubicPoint {
-        CubicPoint { law, ends, a_2, a_3 }
+    /// The motion of a feasible shortcut of a landscape, with `alpha_2 t_f` and `alpha_3 t_f^2`.
+    pub fn new(of: Landscape, place: [f64; 2]) -> CubicPoint {
+        CubicPoint { of, place }
     }
 
     fn path(&self) -> Path<'_> {
-        Path::new(&self.ends, self.a_2, self.a_3)
+        Path::new(&self.of.ends, self.place[0], self.place[1])
     }
 }
 
 impl Motion for CubicPoint {
     fn duration(&self) -> f64 {
-        self.ends.t_f
+        self.of.t_f
     }
 
     /// Points around each zero of `theta` and of `n = t_f (1 - theta')`; near a zero, `v = n/(t_f theta)` varies on the scale of its distance
@@ -54,9 +54,13 @@ impl Motion for CubicPoint {
     fn at(&self, s: f64) -> Moment {
         let x = s.clamp(0.0, 1.0);
         let (theta, n) = self.path().at(x);
-        let v = n / (self.ends.t_f * theta);
-        let friction = 1.0 + self.law.a * ln(v) + self.law.b * ln(theta);
-        Moment { t: x * self.ends.t_f, v, theta, friction, v_c: None, beta: None }
+        let Landscape { law, state, t_f, .. } = self.of;
+        let v = match state {
+            StateLaw::Ageing => n / (t_f * theta),
+            _ => self.of.velocity(&self.path(), x),
+        };
+        let friction = 1.0 + law.a * ln(v) + law.b * ln(theta);
+        Moment { t: x * t_f, v, theta, friction, v_c: None, beta: None }
     }
 }
 

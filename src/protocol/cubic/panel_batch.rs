@@ -8,10 +8,10 @@
 use multiversion::multiversion;
 
 use super::path::Ends;
-use super::plan::MOST_SQUARINGS;
+use super::plan::MAX_SQUARINGS;
 use crate::model::Law;
 use crate::numerics::elementary::ln;
-use crate::numerics::gauss::{MOST_HALF, Primitive, ROWS};
+use crate::numerics::gauss::{MAX_HALF, Primitive, ROWS};
 use crate::numerics::lanes::{LANES, Lanes, Vector, least};
 
 /// Panels of eight shortcuts with equal numbers of nodes, each with its map `delta = side (gap - s^(2^squarings))` of the distance from an end
@@ -63,15 +63,15 @@ const MIN_WEAKENING: f64 = 1e-30;
 /// Memory for the values at the nodes: sums and differences of values on both sides of the middle.
 #[derive(Debug, Clone)]
 pub(super) struct NodeBuffer {
-    v_even: [Vector; MOST_HALF],
-    v_odd: [Vector; MOST_HALF],
-    g_even: [Vector; MOST_HALF],
-    g_odd: [Vector; MOST_HALF],
+    v_even: [Vector; MAX_HALF],
+    v_odd: [Vector; MAX_HALF],
+    g_even: [Vector; MAX_HALF],
+    g_odd: [Vector; MAX_HALF],
 }
 
 impl NodeBuffer {
     pub const EMPTY: NodeBuffer = {
-        let none = [Vector::splat(0.0); MOST_HALF];
+        let none = [Vector::splat(0.0); MAX_HALF];
         NodeBuffer { v_even: none, v_odd: none, g_even: none, g_odd: none }
     };
 }
@@ -80,22 +80,22 @@ impl NodeBuffer {
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Prepared {
     /// Coefficients of theta and of n in powers of `eta`.
-    theta: [Vector; 4],
-    n: [Vector; 3],
+    pub theta: [Vector; 4],
+    pub n: [Vector; 3],
     /// `a dn/d(delta)` in powers of `eta`, in units of `drive side`.
     slope: [Vector; 2],
     /// `(b - a) t_f`, times `side`.
     drive: Vector,
     /// Mean of tau at both ends.
     tau: Vector,
-    gap: Vector,
-    squarings: Vector,
-    middle: Vector,
-    half: Vector,
+    pub gap: Vector,
+    pub squarings: Vector,
+    pub middle: Vector,
+    pub half: Vector,
     /// 1, loaded from memory like the others: with a constant, the compiler would split the lanes.
-    unit: Vector,
+    pub unit: Vector,
     /// The constant factor of `d(eta)/dx`, `x` the node of the rule.
-    scale: Vector,
+    pub scale: Vector,
     kernel: Kernel,
 }
 
@@ -195,7 +195,7 @@ pub(super) fn prepare(panel_batch: &PanelBatch, ends: &Ends, friction: &Friction
     let ln_n = (n_at(near) * n_at(far)).map(ln);
     let mut factor = unit;
     let (fewest, most) = (least(&squarings.0), -least(&squarings.map(|squarings| -squarings).0));
-    for level in 1..=MOST_SQUARINGS {
+    for level in 1..=MAX_SQUARINGS {
         let more = squarings - Vector::splat(f64::from(level) - 0.5);
         factor = choose(more, factor + factor, factor);
     }
@@ -226,7 +226,7 @@ pub(super) fn prepare(panel_batch: &PanelBatch, ends: &Ends, friction: &Friction
 
 /// Selects `yes` in the lanes where `sign` is above 0, else `no`.
 #[inline(always)]
-fn choose(sign: Vector, yes: Vector, no: Vector) -> Vector {
+pub(super) fn choose(sign: Vector, yes: Vector, no: Vector) -> Vector {
     let mut chosen = no;
     for i in 0..LANES {
         chosen.0[i] = if sign.0[i] > 0.0 { yes.0[i] } else { no.0[i] };
@@ -263,7 +263,7 @@ kernels! {
 fn sum<const SQUARINGS: u32, const SAME: bool>(prepared: &Prepared, rule: &Primitive, space: &mut NodeBuffer) -> Lanes {
     let NodeBuffer { v_even, v_odd, g_even, g_odd } = space;
     let Prepared { theta, n, slope, drive, tau, gap, squarings, middle, half, unit, scale, .. } = *prepared;
-    let count = rule.x.len().min(MOST_HALF);
+    let count = rule.x.len().min(MAX_HALF);
     let mut mean = Vector::splat(0.0);
     for j in 0..count {
         let none = [Vector::splat(0.0); 2];

@@ -3,7 +3,8 @@
 //! In `x = t/t_f`: `theta = theta_0 + A_2 x + A_3 x^2 + A_4 x^3` and `n = t_f (1 - theta') = t_f - dtheta/dx`, so `v =
 //! n/(t_f theta)`.
 
-use super::rules::{Accuracy, MIN_THIRD};
+use super::rules::{MIN_THIRD, NodeThresholds};
+use crate::model::StateLaw;
 use crate::numerics::cubic::{Cubic, ExactCubic, exact_quadratic_zeros};
 use crate::numerics::double_double::DoubleDouble;
 use crate::protocol::Status;
@@ -15,7 +16,10 @@ pub(in crate::protocol) struct Ends {
     pub theta_1: DoubleDouble,
     /// `theta_1 - theta_0`.
     pub rise: DoubleDouble,
+    /// The duration times the fastest rise of theta; with ageing, the duration.
     pub t_f: f64,
+    /// The low word of `t_f`.
+    pub t_low: f64,
     /// Greatest relative error of a velocity by rounding.
     pub v_loss: f64,
 }
@@ -25,7 +29,14 @@ impl Ends {
     pub fn between(v_i: f64, v_f: f64, t_f: f64, v_loss: f64) -> Ends {
         let one = DoubleDouble::new(1.0);
         let (theta_0, theta_1) = (one / DoubleDouble::new(v_i), one / DoubleDouble::new(v_f));
-        Ends { theta_0, theta_1, rise: rise(v_i, v_f), t_f, v_loss }
+        Ends { theta_0, theta_1, rise: rise(v_i, v_f), t_f, t_low: 0.0, v_loss }
+    }
+
+    /// The ends of shortcuts under an evolution law of the state. In the time `c t_f`, with the fastest rise `c`, an ageing path has the theta of a
+    /// path under the law, and `n = c t_f (1 - theta'/c)`: feasible sets and zeros are the same.
+    pub fn under(state: StateLaw, v_i: f64, v_f: f64, t_f: f64, v_loss: f64) -> Ends {
+        let scaled = DoubleDouble::new(t_f) * state.fastest_rise();
+        Ends { t_f: scaled.high, t_low: scaled.low, ..Ends::between(v_i, v_f, t_f, v_loss) }
     }
 }
 
@@ -96,7 +107,14 @@ impl<'a> Path<'a> {
     pub fn exact_n(&self) -> ExactCubic {
         let [_, a_2, a_3, a_4] = self.exact_theta().c;
         let (two, three) = (DoubleDouble::new(-2.0), DoubleDouble::new(-3.0));
-        ExactCubic { c: [DoubleDouble::new(self.ends.t_f) - a_2, two * a_3, three * a_4, DoubleDouble::new(0.0)] }
+        ExactCubic {
+            c: [
+                DoubleDouble::sum(self.ends.t_f, self.ends.t_low) - a_2,
+                two * a_3,
+                three * a_4,
+                DoubleDouble::new(0.0),
+            ],
+        }
     }
 
     /// The zeros of `n`, in the form of [`ExactCubic::zeros`].
@@ -180,7 +198,7 @@ impl<'a> Path<'a> {
     /// Whether the expansion about an end of `[0, 1]` keeps enough digits of theta and n at both ends of a panel, at the distances `near` and
     /// `far`.
     #[inline(always)]
-    pub(super) fn is_sound(&self, about_end: bool, near: f64, far: f64, accuracy: &Accuracy) -> bool {
+    pub(super) fn is_sound(&self, about_end: bool, near: f64, far: f64, accuracy: &NodeThresholds) -> bool {
         let (start, end) = (self.about_start(), self.about_end());
         let mut sound = accuracy.slight > 0.0;
         let [q0, q1, q2, q3]: [f64; 4] = std::array::from_fn(|i| if about_end { end.0[i] } else { start.0[i] });

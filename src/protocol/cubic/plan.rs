@@ -9,49 +9,59 @@ use multiversion::multiversion;
 use super::bins::BINS;
 use super::path::{Ends, Path};
 use super::rules::{
-    Accuracy, MAX_ZERO_DISTANCE, MIN_THIRD, NODE_STEP, THETA_ZEROS, ZEROS, cut, is_near_start, polished, rough_zeros,
+    MAX_ZERO_DISTANCE, MIN_THIRD, NODE_STEP, NodeThresholds, THETA_ZEROS, ZEROS, cut, is_near_start, polished,
+    rough_zeros,
 };
 use crate::numerics::real::Real;
 
 /// One panel for each shortcut.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Plan {
+pub(super) struct PlannedPanels {
     /// The bin of the number of nodes; none from [`BINS`] on.
-    pub bin: [u32; BLOCK],
+    pub bin: [u32; PLANNED_SHORTCUTS],
     /// log2 of the power.
-    pub squarings: Block,
+    pub squarings: PerShortcut,
     /// The end of the panel at which the map begins: +1 the upper, -1 the lower.
-    pub side: Block,
+    pub side: PerShortcut,
     /// Distance of the centre of the map beyond that end.
-    pub gap: Block,
+    pub gap: PerShortcut,
     /// Bounds of the mapped variable.
-    pub from: Block,
-    pub to: Block,
+    pub from: PerShortcut,
+    pub to: PerShortcut,
     /// 1 where a larger power might save nodes.
-    pub deeper: Block,
+    pub deeper: PerShortcut,
     /// The best cut of a panel with too many nodes.
-    pub cut: Block,
+    pub cut: PerShortcut,
 }
 
-impl Plan {
+impl PlannedPanels {
     /// An empty plan.
-    pub const EMPTY: Plan = {
-        let none = [0.0; BLOCK];
-        Plan { bin: [0; BLOCK], squarings: none, side: none, gap: none, from: none, to: none, deeper: none, cut: none }
+    pub const EMPTY: PlannedPanels = {
+        let none = [0.0; PLANNED_SHORTCUTS];
+        PlannedPanels {
+            bin: [0; PLANNED_SHORTCUTS],
+            squarings: none,
+            side: none,
+            gap: none,
+            from: none,
+            to: none,
+            deeper: none,
+            cut: none,
+        }
     };
 }
 
 /// Shortcuts that are planned together. Chosen: enough to hide the latency of square roots, few enough to fill.
-pub(super) const BLOCK: usize = 32;
+pub(super) const PLANNED_SHORTCUTS: usize = 32;
 
-/// Single precision numbers of the widest vectors.
+/// Single precision numbers of the widest vectors. Derived: 512 bits.
 const SINGLE_LANES: usize = 16;
 
 /// One value for each shortcut.
-pub(super) type Block = [f64; BLOCK];
+pub(super) type PerShortcut = [f64; PLANNED_SHORTCUTS];
 
-/// log2 of the greatest power.
-pub(super) const MOST_SQUARINGS: u32 = 3;
+/// log2 of the greatest power. Chosen: the powers 2, 4 and 8 of docs/numerical-methods.md.
+pub(super) const MAX_SQUARINGS: u32 = 3;
 
 /// Number of nodes of which a larger power cannot save many. Measured (`cargo bench --bench landscape`).
 pub(super) const MAX_CHEAP_NODES: usize = 32;
@@ -77,7 +87,7 @@ const fn is_coarse<T: Real>() -> bool {
 /// Measured (`tests/solver/stress/landscape.rs`).
 const THETA_RANGE: (f64, f64) = (1e-4, 3e3);
 
-/// Range of the coefficients of n, relative to n at the end, for single precision.
+/// Range of the coefficients of n, relative to n at the end, for single precision. Chosen: cubes and squares stay within single precision.
 const N_RANGE: (f64, f64) = (1e-10, 1e10);
 
 /// Least squared distance of two zeros of theta, relative to their distance from the end. Derived: single precision loses half of its digits
@@ -93,8 +103,14 @@ pub(super) const SINGLE_PRECISION_ERROR: f64 = 0.03;
     "x86_64+avx+avx2+bmi1+bmi2+avx512f+avx512bw+avx512cd+avx512dq+avx512vl",
     "x86_64+avx+avx2+bmi1+bmi2"
 ))]
-pub(super) fn plan(ends: &Ends, a_2: &Block, a_3: &Block, accuracy: &Accuracy, plan: &mut Plan) {
-    panels::<f32, 1>(ends, [a_2, a_3, &[0.0; BLOCK], &[1.0; BLOCK]], accuracy, plan);
+pub(super) fn plan(
+    ends: &Ends,
+    a_2: &PerShortcut,
+    a_3: &PerShortcut,
+    accuracy: &NodeThresholds,
+    plan: &mut PlannedPanels,
+) {
+    panels::<f32, 1>(ends, [a_2, a_3, &[0.0; PLANNED_SHORTCUTS], &[1.0; PLANNED_SHORTCUTS]], accuracy, plan);
 }
 
 /// Chooses panels over `[low[i], high[i]]` with all powers; one bound is an end of `[0, 1]`.
@@ -102,31 +118,31 @@ pub(super) fn plan(ends: &Ends, a_2: &Block, a_3: &Block, accuracy: &Accuracy, p
     "x86_64+avx+avx2+bmi1+bmi2+avx512f+avx512bw+avx512cd+avx512dq+avx512vl",
     "x86_64+avx+avx2+bmi1+bmi2"
 ))]
-pub(super) fn plan_parts(ends: &Ends, parts: [&Block; 4], accuracy: &Accuracy, plan: &mut Plan) {
-    panels::<f64, MOST_SQUARINGS>(ends, parts, accuracy, plan);
+pub(super) fn plan_parts(ends: &Ends, parts: [&PerShortcut; 4], accuracy: &NodeThresholds, plan: &mut PlannedPanels) {
+    panels::<f64, MAX_SQUARINGS>(ends, parts, accuracy, plan);
 }
 
 /// The zeros of theta and of n of each shortcut in the closed upper half plane; a conjugate pair occurs once.
 pub(super) struct Places<T> {
-    pub re: [[T; BLOCK]; ZEROS],
-    pub im: [[T; BLOCK]; ZEROS],
+    pub re: [[T; PLANNED_SHORTCUTS]; ZEROS],
+    pub im: [[T; PLANNED_SHORTCUTS]; ZEROS],
     /// Above 0 where the zeros are too inaccurate for a plan.
-    pub doubt: [f32; BLOCK],
+    pub doubt: [f32; PLANNED_SHORTCUTS],
 }
 
 /// The zeros of the shortcuts `(a_2[i], a_3[i])`.
 #[inline(always)]
-pub(super) fn places<T: Real>(ends: &Ends, a_2: &Block, a_3: &Block) -> Places<T> {
+pub(super) fn places<T: Real>(ends: &Ends, a_2: &PerShortcut, a_3: &PerShortcut) -> Places<T> {
     let zero = T::of(0.0);
-    let [mut q0, mut q1, mut q2, mut q3, mut n0, mut n1, mut n2] = [[zero; BLOCK]; 7];
-    for i in 0..BLOCK {
+    let [mut q0, mut q1, mut q2, mut q3, mut n0, mut n1, mut n2] = [[zero; PLANNED_SHORTCUTS]; 7];
+    for i in 0..PLANNED_SHORTCUTS {
         let (theta, n) = Path::new(ends, a_2[i], a_3[i]).about_end();
         (q0[i], q1[i], q2[i], q3[i]) = (T::of(theta[0]), T::of(theta[1]), T::of(theta[2]), T::of(theta[3]));
         (n0[i], n1[i], n2[i]) = (T::of(n[0]), T::of(n[1]), T::of(n[2]));
     }
-    let (mut re, mut im) = ([[zero; BLOCK]; ZEROS], [[zero; BLOCK]; ZEROS]);
-    let mut doubt = [0.0f32; BLOCK];
-    for i in 0..BLOCK {
+    let (mut re, mut im) = ([[zero; PLANNED_SHORTCUTS]; ZEROS], [[zero; PLANNED_SHORTCUTS]; ZEROS]);
+    let mut doubt = [0.0f32; PLANNED_SHORTCUTS];
+    for i in 0..PLANNED_SHORTCUTS {
         let theta = [q0[i], q1[i], q2[i], q3[i]];
         let n = [n0[i], n1[i], n2[i]];
         let zeros = rough_zeros(theta, n);
@@ -146,7 +162,7 @@ pub(super) fn places<T: Real>(ends: &Ends, a_2: &Block, a_3: &Block) -> Places<T
     places.settle_close_pairs(ends, a_2, a_3);
     // A pair is counted once.
     for k in PAIRS {
-        for i in 0..BLOCK {
+        for i in 0..PLANNED_SHORTCUTS {
             let (place, height) = (places.re[k + 1][i], places.im[k + 1][i]);
             places.re[k + 1][i] = if height > zero { T::of(MAX_ZERO_DISTANCE) } else { place };
             places.im[k + 1][i] = zero;
@@ -158,15 +174,15 @@ pub(super) fn places<T: Real>(ends: &Ends, a_2: &Block, a_3: &Block) -> Places<T
 impl<T: Real> Places<T> {
     /// Corrects zeros for which the expansion about the end has too few digits.
     #[inline(always)]
-    fn polish_near_start(&mut self, ends: &Ends, a_2: &Block, a_3: &Block) {
+    fn polish_near_start(&mut self, ends: &Ends, a_2: &PerShortcut, a_3: &PerShortcut) {
         let Places { re, im, doubt } = self;
-        let mut close = [0.0f32; BLOCK];
+        let mut close = [0.0f32; PLANNED_SHORTCUTS];
         for k in 0..ZEROS {
-            for i in 0..BLOCK {
+            for i in 0..PLANNED_SHORTCUTS {
                 close[i] += if is_near_start(re[k][i], im[k][i]) { 1.0 } else { 0.0 };
             }
         }
-        for i in (0..BLOCK).filter(|&i| close[i] > 0.0) {
+        for i in (0..PLANNED_SHORTCUTS).filter(|&i| close[i] > 0.0) {
             for k in 0..ZEROS {
                 if is_near_start(re[k][i], im[k][i]) {
                     let (theta, [n0, n1, n2]) = Path::new(ends, a_2[i], a_3[i]).about_start();
@@ -183,17 +199,17 @@ impl<T: Real> Places<T> {
     /// Marks pairs near the real axis as doubtful, since the closed forms do not determine their distance from it. A pair of theta is checked
     /// again.
     #[inline(always)]
-    fn settle_close_pairs(&mut self, ends: &Ends, a_2: &Block, a_3: &Block) {
+    fn settle_close_pairs(&mut self, ends: &Ends, a_2: &PerShortcut, a_3: &PerShortcut) {
         let Places { re, im, doubt } = self;
         for k in 0..ZEROS {
             let least = T::of(if k < THETA_ZEROS || is_coarse::<T>() { MIN_THIRD } else { MIN_PAIR });
             let weight = if k < THETA_ZEROS { 1.0 } else { N_DOUBT_WEIGHT };
-            for i in 0..BLOCK {
+            for i in 0..PLANNED_SHORTCUTS {
                 let close = (re[k][i] > T::of(0.0)) & (re[k][i] < T::of(1.0)) & (im[k][i] < least);
                 doubt[i] += if close { weight } else { 0.0 };
             }
         }
-        for i in 0..BLOCK {
+        for i in 0..PLANNED_SHORTCUTS {
             let of_theta = !is_coarse::<T>() && doubt[i] > 0.0 && doubt[i] < N_DOUBT_WEIGHT;
             let pair = of_theta.then(|| Path::new(ends, a_2[i], a_3[i]).close_pair()).flatten();
             if let Some((x, height, reach)) = pair {
@@ -212,16 +228,16 @@ impl<T: Real> Places<T> {
 /// projection onto the real axis.
 #[inline(always)]
 pub(super) fn nearest<T: Real>(
-    re: &[[T; BLOCK]; ZEROS],
-    im: &[[T; BLOCK]; ZEROS],
-    low: &Block,
-    high: &Block,
-) -> ([f32; BLOCK], [T; BLOCK]) {
+    re: &[[T; PLANNED_SHORTCUTS]; ZEROS],
+    im: &[[T; PLANNED_SHORTCUTS]; ZEROS],
+    low: &PerShortcut,
+    high: &PerShortcut,
+) -> ([f32; PLANNED_SHORTCUTS], [T; PLANNED_SHORTCUTS]) {
     // The limiting zero determines the end and the centre. Single precision suffices for comparisons; positions of zeros keep all digits.
-    let mut shadow = [T::of(0.0); BLOCK];
-    let mut least = [f32::MAX; BLOCK];
+    let mut shadow = [T::of(0.0); PLANNED_SHORTCUTS];
+    let mut least = [f32::MAX; PLANNED_SHORTCUTS];
     for k in 0..ZEROS {
-        for i in 0..BLOCK {
+        for i in 0..PLANNED_SHORTCUTS {
             let (u, v) = ((re[k][i] - T::of(low[i])).narrow(), (re[k][i] - T::of(high[i])).narrow());
             let y = im[k][i].narrow();
             let (u_square, v_square) = (u * u + y * y, v * v + y * y);
@@ -252,17 +268,17 @@ pub(super) fn rooted(size: f32, real: f32, a: f32, b: f32) -> (f32, f32) {
 #[inline(always)]
 fn panels<T: Real, const SQUARINGS: u32>(
     ends: &Ends,
-    [a_2, a_3, low, high]: [&Block; 4],
-    accuracy: &Accuracy,
-    plan: &mut Plan,
+    [a_2, a_3, low, high]: [&PerShortcut; 4],
+    accuracy: &NodeThresholds,
+    plan: &mut PlannedPanels,
 ) {
     let zero = T::of(0.0);
     let Places { re, im, mut doubt } = places::<T>(ends, a_2, a_3);
     // The plain rule, and end and centre of a possibly better map.
     let (least, shadow) = nearest(&re, &im, low, high);
-    let mut focal = [0.0f32; BLOCK];
-    let (mut side, mut gap) = ([zero; BLOCK], [zero; BLOCK]);
-    for i in 0..BLOCK {
+    let mut focal = [0.0f32; PLANNED_SHORTCUTS];
+    let (mut side, mut gap) = ([zero; PLANNED_SHORTCUTS], [zero; PLANNED_SHORTCUTS]);
+    for i in 0..PLANNED_SHORTCUTS {
         let (low, high) = (T::of(low[i]), T::of(high[i]));
         focal[i] = 2.0 * least[i].sqrt() / (high - low).narrow();
         let upper = shadow[i] + shadow[i] > low + high;
@@ -271,9 +287,9 @@ fn panels<T: Real, const SQUARINGS: u32>(
         gap[i] = if beyond > zero { beyond } else { zero };
     }
     // Real part and modulus of a zero determine its distances from real points.
-    let (mut real, mut size) = ([[0.0f32; BLOCK]; ZEROS], [[0.0f32; BLOCK]; ZEROS]);
+    let (mut real, mut size) = ([[0.0f32; PLANNED_SHORTCUTS]; ZEROS], [[0.0f32; PLANNED_SHORTCUTS]; ZEROS]);
     for k in 0..ZEROS {
-        for i in 0..BLOCK {
+        for i in 0..PLANNED_SHORTCUTS {
             let end = if side[i] > zero { T::of(high[i]) - re[k][i] } else { re[k][i] - T::of(low[i]) };
             let (x, y) = ((gap[i] + end).narrow(), im[k][i].narrow());
             real[k][i] = x;
@@ -281,7 +297,7 @@ fn panels<T: Real, const SQUARINGS: u32>(
         }
     }
     // A zero beyond the end is given by its distance from 1.
-    for i in 0..BLOCK {
+    for i in 0..PLANNED_SHORTCUTS {
         let blurred = (side[i] > zero) & (high[i] == 1.0) & (gap[i] > zero) & (gap[i] < T::of(MIN_GAP));
         doubt[i] += if blurred { N_DOUBT_WEIGHT } else { 0.0 };
     }
@@ -292,7 +308,7 @@ fn panels<T: Real, const SQUARINGS: u32>(
     let cheap = limits[MAX_CHEAP_NODES / NODE_STEP - 1];
     let Powers { squarings, short } = powers::<T, SQUARINGS>([real, size], &gap, [low, high], cheap, &mut focal);
     let bin = bins(&limits, &focal);
-    for i in 0..BLOCK {
+    for i in 0..PLANNED_SHORTCUTS {
         let (low, high) = (low[i], high[i]);
         let length = high - low;
         plan.cut[i] = cut(low, high, shadow[i].wide());
@@ -311,7 +327,7 @@ fn panels<T: Real, const SQUARINGS: u32>(
         let sound = Path::new(ends, a_2[i], a_3[i]).is_sound(centre > 0.0, near, near - side * length, accuracy);
         plan.bin[i] = if sound & (doubt[i] == 0.0) { bin[i] as u32 } else { BINS as u32 };
     }
-    for i in 0..BLOCK {
+    for i in 0..PLANNED_SHORTCUTS {
         plan.deeper[i] = if (short[i] > 0.0) | (is_coarse::<T>() & (doubt[i] > 0.0)) { 1.0 } else { 0.0 };
     }
     for level in 1..=SQUARINGS {
@@ -325,48 +341,48 @@ fn panels<T: Real, const SQUARINGS: u32>(
 /// The powers of the maps.
 struct Powers {
     /// log2 of the powers.
-    squarings: [f32; BLOCK],
+    squarings: [f32; PLANNED_SHORTCUTS],
     /// 1 where a larger power might save nodes.
-    short: [f32; BLOCK],
+    short: [f32; PLANNED_SHORTCUTS],
 }
 
 /// The power of each map from the real parts and moduli of the zeros relative to its centre; increases `focal` where a power helps. Powers
 /// beyond the square are tried where the sum is not `cheap`.
 #[inline(always)]
 fn powers<T: Real, const SQUARINGS: u32>(
-    [mut real, mut size]: [[[f32; BLOCK]; ZEROS]; 2],
-    gap: &[T; BLOCK],
-    [low, high]: [&Block; 2],
+    [mut real, mut size]: [[[f32; PLANNED_SHORTCUTS]; ZEROS]; 2],
+    gap: &[T; PLANNED_SHORTCUTS],
+    [low, high]: [&PerShortcut; 2],
     cheap: f32,
-    focal: &mut [f32; BLOCK],
+    focal: &mut [f32; PLANNED_SHORTCUTS],
 ) -> Powers {
     let (mut near, mut far) = (*gap, *gap);
-    for i in 0..BLOCK {
+    for i in 0..PLANNED_SHORTCUTS {
         far[i] = gap[i] + (T::of(high[i]) - T::of(low[i]));
     }
-    let mut squarings = [0.0f32; BLOCK];
+    let mut squarings = [0.0f32; PLANNED_SHORTCUTS];
     // Upper bound of the focal sum by the centre of the map, which is mapped to 0.
-    let mut ceiling = [2.0f32; BLOCK];
+    let mut ceiling = [2.0f32; PLANNED_SHORTCUTS];
     for level in 1..=SQUARINGS {
         if level > 1 && focal.iter().all(|&focal| focal >= cheap) {
             break;
         }
-        let (mut a, mut b) = ([0.0f32; BLOCK], [0.0f32; BLOCK]);
-        for i in 0..BLOCK {
+        let (mut a, mut b) = ([0.0f32; PLANNED_SHORTCUTS], [0.0f32; PLANNED_SHORTCUTS]);
+        for i in 0..PLANNED_SHORTCUTS {
             near[i] = near[i].sqrt();
             far[i] = far[i].sqrt();
             (a[i], b[i]) = (near[i].narrow(), far[i].narrow());
         }
-        let mut least = [f32::MAX; BLOCK];
+        let mut least = [f32::MAX; PLANNED_SHORTCUTS];
         for k in 0..ZEROS {
-            for i in 0..BLOCK {
+            for i in 0..PLANNED_SHORTCUTS {
                 let square = size[k][i];
                 let (x, sum) = rooted(square, real[k][i], a[i], b[i]);
                 (real[k][i], size[k][i]) = (x, square.sqrt());
                 least[i] = if sum < least[i] { sum } else { least[i] };
             }
         }
-        for i in 0..BLOCK {
+        for i in 0..PLANNED_SHORTCUTS {
             let reached = 2.0 * least[i].sqrt() / (b[i] - a[i]);
             // A square costs no more than a plain rule, but differences from a distant centre lose digits.
             let open = if level == 1 { gap[i].narrow() <= (high[i] - low[i]) as f32 } else { focal[i] < cheap };
@@ -376,8 +392,8 @@ fn powers<T: Real, const SQUARINGS: u32>(
             ceiling[i] = 2.0 * (a[i] + b[i]) / (b[i] - a[i]);
         }
     }
-    let mut short = [0.0f32; BLOCK];
-    for i in 0..BLOCK {
+    let mut short = [0.0f32; PLANNED_SHORTCUTS];
+    for i in 0..PLANNED_SHORTCUTS {
         // A larger power increases the distance from the centre, but hardly from other zeros.
         let near = focal[i] - 2.0 > 0.5 * (ceiling[i] - 2.0);
         short[i] = if (focal[i] < cheap) & (squarings[i] == SQUARINGS as f32) & near { 1.0 } else { 0.0 };
@@ -387,8 +403,8 @@ fn powers<T: Real, const SQUARINGS: u32>(
 
 /// The number of descending limits above each focal sum.
 #[inline(always)]
-fn bins(limits: &[f32; BINS], focal: &[f32; BLOCK]) -> [f32; BLOCK] {
-    let mut bin = [0.0f32; BLOCK];
+fn bins(limits: &[f32; BINS], focal: &[f32; PLANNED_SHORTCUTS]) -> [f32; PLANNED_SHORTCUTS] {
+    let mut bin = [0.0f32; PLANNED_SHORTCUTS];
     for (bins, focals) in bin.chunks_exact_mut(SINGLE_LANES).zip(focal.chunks_exact(SINGLE_LANES)) {
         let mut counts = [0.0f32; SINGLE_LANES];
         for limit in limits {

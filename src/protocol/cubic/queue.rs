@@ -1,6 +1,6 @@
 //! Queues of shortcuts that wait until they fill all lanes.
 
-use super::plan::{BLOCK, Block};
+use super::plan::{PLANNED_SHORTCUTS, PerShortcut};
 
 /// A queue of up to `N` shortcuts of a landscape.
 #[derive(Debug, Clone)]
@@ -37,38 +37,38 @@ impl<const N: usize> Queue<N> {
 /// A queue of shortcuts whose interval is cut in two.
 #[derive(Debug, Clone)]
 pub(super) struct Cuts {
-    indices: [usize; BLOCK / 2],
-    a_2: Block,
-    a_3: Block,
-    low: Block,
-    high: Block,
+    indices: [usize; PLANNED_SHORTCUTS / 2],
+    a_2: PerShortcut,
+    a_3: PerShortcut,
+    low: PerShortcut,
+    high: PerShortcut,
     count: usize,
 }
 
 impl Cuts {
     pub const EMPTY: Cuts = Cuts {
-        indices: [0; BLOCK / 2],
-        a_2: [0.0; BLOCK],
-        a_3: [0.0; BLOCK],
-        low: [0.0; BLOCK],
-        high: [1.0; BLOCK],
+        indices: [0; PLANNED_SHORTCUTS / 2],
+        a_2: [0.0; PLANNED_SHORTCUTS],
+        a_3: [0.0; PLANNED_SHORTCUTS],
+        low: [0.0; PLANNED_SHORTCUTS],
+        high: [1.0; PLANNED_SHORTCUTS],
         count: 0,
     };
 
     /// Adds the shortcut at `index`, cut at `at`; returns whether the queue is full.
     pub fn push(&mut self, index: usize, [a_2, a_3]: [f64; 2], at: f64) -> bool {
-        let last = self.count % (BLOCK / 2);
+        let last = self.count % (PLANNED_SHORTCUTS / 2);
         self.indices[last] = index;
-        for lane in [last, last + BLOCK / 2] {
+        for lane in [last, last + PLANNED_SHORTCUTS / 2] {
             (self.a_2[lane], self.a_3[lane]) = (a_2, a_3);
         }
-        (self.high[last], self.low[last + BLOCK / 2]) = (at, at);
+        (self.high[last], self.low[last + PLANNED_SHORTCUTS / 2]) = (at, at);
         self.count = last + 1;
-        self.count == BLOCK / 2
+        self.count == PLANNED_SHORTCUTS / 2
     }
 
     /// Empties the queue: returns indices, coordinates and bounds, with the lower parts in the first half of the lanes; `None` if it is empty.
-    pub fn take(&mut self) -> Option<(&[usize], [&Block; 4])> {
+    pub fn take(&mut self) -> Option<(&[usize], [&PerShortcut; 4])> {
         let count = std::mem::take(&mut self.count);
         (count > 0).then_some((&self.indices[..count], [&self.a_2, &self.a_3, &self.low, &self.high]))
     }

@@ -17,7 +17,7 @@ use crate::numerics::real::Real;
 
 /// A change of variable on a panel, relative to a `centre`: `delta = x - centre`.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) enum Map {
+pub(super) enum PanelMap {
     /// `delta = s`.
     Line,
     /// `delta = side (gap - s^(2^squarings))`: about a zero at `centre + side gap` beyond the end `centre`, `side =
@@ -39,10 +39,10 @@ pub(super) enum Map {
 
 /// One panel of a quadrature.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Panel {
+pub(super) struct MappedPanel {
     /// Expansion point of the polynomials.
     pub centre: f64,
-    pub map: Map,
+    pub map: PanelMap,
     /// Bounds of the mapped variable.
     pub from: f64,
     pub to: f64,
@@ -56,13 +56,13 @@ const MAX_PLAIN_NODES: usize = 32;
 /// Number of nodes from which the sinh map is tried. Measured: its logarithms and exponentials pay off from there on (`cargo bench --bench
 /// landscape`).
 const MIN_SINH_NODES: usize = 40;
-/// Number of nodes above which a panel is cut: that of the last bin.
+/// Number of nodes above which a panel is cut: that of the last bin. Derived.
 const MAX_UNCUT_NODES: usize = 80;
-/// Greatest number of nodes of a panel.
-const MOST_NODES: usize = 256;
-/// Step of the number of nodes: half of the lanes.
+/// Greatest number of nodes of a panel. Chosen: more than any panel needs after cuts.
+const MAX_NODES: usize = 256;
+/// Step of the number of nodes. Chosen: half of the lanes; a smaller step has more bins to fill, a larger one more spare nodes.
 pub(super) const NODE_STEP: usize = 4;
-/// Greatest depth of cuts: a panel is never shorter than `2^-12` of its parent.
+/// Greatest depth of cuts: a panel is never shorter than `2^-12` of its parent. Chosen: it only ends the recursion.
 const MAX_DEPTH: u32 = 12;
 /// Safety margin of the estimate: `e^LN_SAFETY_FACTOR` bounds the ratio of the residues to the integral. Measured: `tests/budgets.csv` has the remaining
 /// errors.
@@ -70,9 +70,9 @@ const LN_SAFETY_FACTOR: f64 = 3.5;
 
 /// The requested accuracy, as the focal sums (see [`focal`]) from which a number of nodes suffices.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Accuracy {
+pub(super) struct NodeThresholds {
     /// Element `i` belongs to `(i + 1) NODE_STEP` nodes; descending.
-    focal: [f64; MOST_NODES / NODE_STEP],
+    focal: [f64; MAX_NODES / NODE_STEP],
     /// ln rho from which [`NODE_STEP`] nodes suffice.
     pub pace: f64,
     /// Greatest relative error of theta.
@@ -87,8 +87,8 @@ pub(super) struct Accuracy {
 const MAX_PARTS_TOLERANCE: f64 = 1e-5;
 
 /// The focal sums from which [`NODE_STEP`] nodes suffice for `tolerance`, then twice as many, and so on.
-fn focal_sums(tolerance: f64) -> [f64; MOST_NODES / NODE_STEP] {
-    let mut focal = [0.0; MOST_NODES / NODE_STEP];
+fn focal_sums(tolerance: f64) -> [f64; MAX_NODES / NODE_STEP] {
+    let mut focal = [0.0; MAX_NODES / NODE_STEP];
     for (i, focal) in focal.iter_mut().enumerate() {
         // rho + 1/rho.
         let ln_rho = pace(tolerance) / (i + 1) as f64;
@@ -102,9 +102,9 @@ fn pace(tolerance: f64) -> f64 {
     0.5 * (LN_SAFETY_FACTOR - ln(tolerance)) / NODE_STEP as f64
 }
 
-impl Accuracy {
+impl NodeThresholds {
     /// The accuracy for a relative `tolerance` of the work, with a slip of at most `most`.
-    pub fn new(tolerance: f64, law: Law, most: f64) -> Accuracy {
+    pub fn new(tolerance: f64, law: Law, most: f64) -> NodeThresholds {
         let rounding = 0.1 * tolerance;
         // Without logarithms `tau` is a difference of terms that grow like the slip.
         let longest = rounding / ((law.b - law.a).abs() * f64::EPSILON);
@@ -112,13 +112,13 @@ impl Accuracy {
         // panel; theta there is at least of the order of its square.
         let height = 0.5 * (LN_SAFETY_FACTOR - ln(tolerance)) / MAX_UNCUT_NODES as f64;
         let slight = if most <= longest * (0.25 * height * height) { rounding / law.a } else { 0.0 };
-        Accuracy { focal: focal_sums(tolerance), pace: pace(tolerance), rounding, slight, longest }
+        NodeThresholds { focal: focal_sums(tolerance), pace: pace(tolerance), rounding, slight, longest }
     }
 
     /// The accuracy for the parts of a panel that is cut at a close pair of zeros: at low accuracies the residues of the pair exceed the margin.
-    pub fn of_parts(&self, tolerance: f64) -> Accuracy {
+    pub fn of_parts(&self, tolerance: f64) -> NodeThresholds {
         let tolerance = tolerance.min(MAX_PARTS_TOLERANCE);
-        Accuracy { focal: focal_sums(tolerance), pace: pace(tolerance), ..*self }
+        NodeThresholds { focal: focal_sums(tolerance), pace: pace(tolerance), ..*self }
     }
 
     /// The focal sum from which `nodes` suffice.
@@ -133,10 +133,10 @@ impl Accuracy {
         &self.focal
     }
 
-    /// The number of nodes for a focal sum, a multiple of [`LANES`]; `MOST_NODES` if more would be needed.
+    /// The number of nodes for a focal sum, a multiple of [`LANES`]; `MAX_NODES` if more would be needed.
     pub fn nodes(&self, focal: f64) -> usize {
         let more = self.focal.iter().position(|&enough| focal >= enough);
-        more.map_or(MOST_NODES, |i| ((i + 1) * NODE_STEP).next_multiple_of(LANES))
+        more.map_or(MAX_NODES, |i| ((i + 1) * NODE_STEP).next_multiple_of(LANES))
     }
 }
 
@@ -199,7 +199,7 @@ pub(super) fn polished<T: Real>(c: &[T; 4], x: T, y: T) -> Option<(T, T)> {
     let (value, value_i) = (c0 + p * x - q * y * y, p + q * x);
     let (slope, slope_i) = (c1 + x * (two * c2 + three * c3 * x) - three * c3 * y * y, two * c2 + six * c3 * x);
     let (value_i, slope_i) = (value_i * y, slope_i * y);
-    let norm = slope * slope + slope_i * slope_i + T::TINY;
+    let norm = slope * slope + slope_i * slope_i + T::MIN_NORMAL;
     let scale = T::of(1.0) / norm;
     let step = (value * slope + value_i * slope_i) * scale;
     let step_i = (value_i * slope - value * slope_i) * scale;
@@ -242,7 +242,14 @@ impl Zeros {
 pub(super) const MIN_THIRD: f64 = 0.03;
 
 /// Appends the panels that integrate over `[low, high]`.
-pub(super) fn choose(zeros: &Zeros, low: f64, high: f64, accuracy: &Accuracy, depth: u32, panels: &mut Vec<Panel>) {
+pub(super) fn choose(
+    zeros: &Zeros,
+    low: f64,
+    high: f64,
+    accuracy: &NodeThresholds,
+    depth: u32,
+    panels: &mut Vec<MappedPanel>,
+) {
     let (mut panel, focal) = best_panel(zeros, low, high, accuracy);
     panel.nodes = accuracy.nodes(focal);
     if panel.nodes > MAX_UNCUT_NODES && depth < MAX_DEPTH {
@@ -260,7 +267,7 @@ pub(super) fn choose(zeros: &Zeros, low: f64, high: f64, accuracy: &Accuracy, de
     "x86_64+avx+avx2+bmi1+bmi2+avx512f+avx512bw+avx512cd+avx512dq+avx512vl",
     "x86_64+avx+avx2+bmi1+bmi2"
 ))]
-fn best_panel(zeros: &Zeros, low: f64, high: f64, accuracy: &Accuracy) -> (Panel, f64) {
+fn best_panel(zeros: &Zeros, low: f64, high: f64, accuracy: &NodeThresholds) -> (MappedPanel, f64) {
     let mut best = (line(zeros, low, high), 2.0);
     let plain = accuracy.enough(MAX_PLAIN_NODES);
     let gaps = [real_gap(zeros, high, 1.0), real_gap(zeros, low, -1.0)];
@@ -293,9 +300,9 @@ fn best_panel(zeros: &Zeros, low: f64, high: f64, accuracy: &Accuracy) -> (Panel
 
 /// The plain rule, expanded about the end nearer to the limiting zero, where the polynomials are small.
 #[inline(always)]
-fn line(zeros: &Zeros, low: f64, high: f64) -> Panel {
+fn line(zeros: &Zeros, low: f64, high: f64) -> MappedPanel {
     let centre = if 2.0 * zeros.re[hindrance(zeros, low, high)] > low + high { high } else { low };
-    Panel { centre, map: Map::Line, from: low - centre, to: high - centre, nodes: 0 }
+    MappedPanel { centre, map: PanelMap::Line, from: low - centre, to: high - centre, nodes: 0 }
 }
 
 /// The focal sum: the least sum of the distances of the points `(re, im)` from both ends of `[from, to]`, in units of half its length; 2 on the
@@ -334,8 +341,8 @@ fn power(
     [low, high]: [f64; 2],
     (side, gap): (f64, f64),
     plain: f64,
-    mut best: (Panel, f64),
-) -> (Panel, f64) {
+    mut best: (MappedPanel, f64),
+) -> (MappedPanel, f64) {
     let end = if side > 0.0 { high } else { low };
     let length = high - low;
     if gap > 0.5 * length {
@@ -354,7 +361,10 @@ fn power(
         if image - 2.0 <= 1.2 * (best.1 - 2.0) {
             break;
         }
-        best = (Panel { centre: end, map: Map::Power { side, gap, squarings }, from: near, to: far, nodes: 0 }, image);
+        best = (
+            MappedPanel { centre: end, map: PanelMap::Power { side, gap, squarings }, from: near, to: far, nodes: 0 },
+            image,
+        );
         if image >= plain {
             break;
         }
@@ -364,7 +374,7 @@ fn power(
 
 /// The better of a panel and the sinh map about the limiting complex pair, with focal sums.
 #[inline(always)]
-fn sinh(zeros: &Zeros, low: f64, high: f64, best: (Panel, f64)) -> (Panel, f64) {
+fn sinh(zeros: &Zeros, low: f64, high: f64, best: (MappedPanel, f64)) -> (MappedPanel, f64) {
     let hindrance = hindrance(zeros, low, high);
     let (centre, height) = (zeros.re[hindrance], zeros.im[hindrance]);
     if height == 0.0 {
@@ -376,7 +386,7 @@ fn sinh(zeros: &Zeros, low: f64, high: f64, best: (Panel, f64)) -> (Panel, f64) 
         (re[i], im[i]) = complex_asinh((zeros.re[i] - centre) / height, zeros.im[i] / height);
     }
     let image = focal(&re, &im, from, to);
-    let panel = Panel { centre, map: Map::Sinh { height }, from, to, nodes: 0 };
+    let panel = MappedPanel { centre, map: PanelMap::Sinh { height }, from, to, nodes: 0 };
     if image - 2.0 > 2.0 * (best.1 - 2.0) { (panel, image) } else { best }
 }
 

@@ -13,7 +13,7 @@ use crate::numerics::lanes::{LANES, Lanes};
 use crate::numerics::real::Real;
 use crate::protocol::Status;
 
-/// Shortcuts of a span, which its ends may decide; equal to the number planned together.
+/// Shortcuts of a span, which its ends may decide. Chosen: the number that is planned together.
 pub(super) const SPAN_SHORTCUTS: usize = 32;
 
 /// Spans that are tested together, with two ends each.
@@ -21,7 +21,7 @@ pub(super) const BATCH_SPANS: usize = LANES / 2;
 
 /// The decision at the ends of a span.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Verdict {
+pub(super) struct SpanDecision {
     pub status: Status,
     /// Whether friction is certainly positive.
     pub sound: bool,
@@ -37,7 +37,7 @@ pub(super) fn settle(
     floors: &FrictionBounds,
     a_2: &SpanCoordinate,
     a_3: &SpanCoordinate,
-) -> [Option<Verdict>; BATCH_SPANS] {
+) -> [Option<SpanDecision>; BATCH_SPANS] {
     let (mut first_2, mut first_3) = ([0.0; LANES], [0.0; LANES]);
     for span in 0..BATCH_SPANS {
         for (lane, place) in [(span, span * SPAN_SHORTCUTS), (span + BATCH_SPANS, (span + 1) * SPAN_SHORTCUTS - 1)] {
@@ -90,7 +90,7 @@ fn is_along(moving: &[f64], fixed: &[f64]) -> bool {
     "x86_64+avx+avx2+bmi1+bmi2+avx512f+avx512bw+avx512cd+avx512dq+avx512vl",
     "x86_64+avx+avx2+bmi1+bmi2"
 ))]
-fn verdicts(ends: &Ends, floors: &FrictionBounds, a_2: &Lanes, a_3: &Lanes) -> [Option<Verdict>; BATCH_SPANS] {
+fn verdicts(ends: &Ends, floors: &FrictionBounds, a_2: &Lanes, a_3: &Lanes) -> [Option<SpanDecision>; BATCH_SPANS] {
     // The position of the least value of each polynomial, and whether it is positive, or negative at the other end, too.
     let (mut places, mut positive, mut negative) = ([[0.0; LANES]; 3], [[false; LANES]; 3], [[false; LANES]; 3]);
     // Whether the first two are above the bounds for positive friction.
@@ -132,7 +132,7 @@ fn verdicts(ends: &Ends, floors: &FrictionBounds, a_2: &Lanes, a_3: &Lanes) -> [
         } else {
             None
         };
-        *found = status.map(|status| Verdict { status, sound });
+        *found = status.map(|status| SpanDecision { status, sound });
     }
     found
 }

@@ -17,7 +17,7 @@
 
 use super::Landscape;
 use super::path::Path;
-use super::rules::{Map, Panel, Zeros, choose};
+use super::rules::{MappedPanel, PanelMap, Zeros, choose};
 use crate::numerics::elementary::{exp, ln, ln_1p};
 use crate::numerics::gauss::rule;
 use crate::protocol::SolverStats;
@@ -116,16 +116,16 @@ fn at([c0, c1, c2, c3]: &[f64; 4], delta: f64) -> f64 {
 fn ln_of(change: f64, ratio: f64) -> f64 {
     if change.abs() < 0.5 { ln_1p(change) } else { ln(ratio) }
 }
-impl Panel {
+impl MappedPanel {
     /// Visits the distance from the centre and the weight of every node.
-    fn each_node(&self, mut visit: impl FnMut(f64, f64)) {
+    pub(super) fn each_node(&self, mut visit: impl FnMut(f64, f64)) {
         let rule = rule(self.nodes);
         let (middle, half) = (0.5 * (self.from + self.to), 0.5 * (self.to - self.from));
         for (x, w) in rule.x.iter().zip(&rule.w) {
             let s = middle + half * x;
             let (delta, jacobian) = match self.map {
-                Map::Line => (s, 1.0),
-                Map::Power { side, gap, squarings } => {
+                PanelMap::Line => (s, 1.0),
+                PanelMap::Power { side, gap, squarings } => {
                     let (mut power, mut jacobian) = (s, 1.0);
                     for _ in 0..squarings {
                         jacobian *= 2.0 * power;
@@ -133,7 +133,7 @@ impl Panel {
                     }
                     (side * (gap - power), jacobian)
                 }
-                Map::Sinh { height } => {
+                PanelMap::Sinh { height } => {
                     let q = exp(s);
                     (0.5 * height * (q - 1.0 / q), 0.5 * height * (q + 1.0 / q))
                 }

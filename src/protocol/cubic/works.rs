@@ -1,26 +1,26 @@
 //! The works of many shortcuts, each summed together with others of equal node count.
 
 use super::Landscape;
-use super::bins::{BINS, Bins, CUT_FROM, nodes_of};
+use super::bins::{BINS, Bins, CUT_BIN, nodes_of};
 use super::cells::OWN_PLAN_BIN;
 use super::path::Path;
-use super::plan::{BLOCK, Block, Plan, plan, plan_parts};
+use super::plan::{PLANNED_SHORTCUTS, PerShortcut, PlannedPanels, plan, plan_parts};
 use super::queue::{Cuts, Queue};
 use crate::numerics::lanes::LANES;
 use crate::protocol::SolverStats;
 
 /// Works in progress. A shortcut waits for the plan of its cell, possibly for its own plan or one with larger powers, and then for its sum.
 pub(super) struct Works<'a> {
-    due: Queue<BLOCK>,
+    due: Queue<PLANNED_SHORTCUTS>,
     planned: Planned<'a>,
 }
 
 /// Shortcuts that need their own plan, and the last plans.
 struct Planned<'a> {
-    alone: Queue<BLOCK>,
-    deep: Queue<BLOCK>,
-    from_cells: Plan,
-    own: Plan,
+    alone: Queue<PLANNED_SHORTCUTS>,
+    deep: Queue<PLANNED_SHORTCUTS>,
+    from_cells: PlannedPanels,
+    own: PlannedPanels,
     sums: Sums<'a>,
 }
 
@@ -37,7 +37,7 @@ impl<'a> Works<'a> {
     /// An empty queue for shortcuts of a landscape, whose works are written to `work`.
     pub fn new(of: &'a Landscape, work: &'a mut [f64], bins: &'a mut Bins) -> Works<'a> {
         let sums = Sums { of, work, cut: Cuts::EMPTY, bins, stats: SolverStats::default() };
-        let (from_cells, own) = (Plan::EMPTY, Plan::EMPTY);
+        let (from_cells, own) = (PlannedPanels::EMPTY, PlannedPanels::EMPTY);
         let planned = Planned { alone: Queue::EMPTY, deep: Queue::EMPTY, from_cells, own, sums };
         Works { due: Queue::EMPTY, planned }
     }
@@ -51,14 +51,14 @@ impl<'a> Works<'a> {
     }
 
     /// Adds the feasible shortcuts from `first` on.
-    pub fn push_span(&mut self, first: usize, a_2: &Block, a_3: &Block) {
-        if self.planned.sums.work.len() < first + BLOCK {
-            for lane in 0..BLOCK {
+    pub fn push_span(&mut self, first: usize, a_2: &PerShortcut, a_3: &PerShortcut) {
+        if self.planned.sums.work.len() < first + PLANNED_SHORTCUTS {
+            for lane in 0..PLANNED_SHORTCUTS {
                 self.push(first + lane, a_2[lane], a_3[lane]);
             }
             return;
         }
-        let indices: [usize; BLOCK] = std::array::from_fn(|lane| first + lane);
+        let indices: [usize; PLANNED_SHORTCUTS] = std::array::from_fn(|lane| first + lane);
         self.planned.plan(&indices, [a_2, a_3]);
     }
 
@@ -82,7 +82,7 @@ impl<'a> Works<'a> {
 
 impl Planned<'_> {
     /// Plans shortcuts from their cells; other shortcuts wait for their own plan.
-    fn plan(&mut self, indices: &[usize], [a_2, a_3]: [&Block; 2]) {
+    fn plan(&mut self, indices: &[usize], [a_2, a_3]: [&PerShortcut; 2]) {
         let Planned { alone, deep, from_cells: plan, own, sums } = self;
         sums.bins.cells.plan(&sums.of.frame, a_2, a_3, plan);
         for (k, indices) in indices.chunks(LANES).enumerate() {
@@ -105,7 +105,12 @@ impl Planned<'_> {
 
 impl Sums<'_> {
     /// Plans shortcuts one by one.
-    fn plan(&mut self, alone: &mut Queue<BLOCK>, deep: &mut Queue<BLOCK>, made: &mut Plan) {
+    fn plan(
+        &mut self,
+        alone: &mut Queue<PLANNED_SHORTCUTS>,
+        deep: &mut Queue<PLANNED_SHORTCUTS>,
+        made: &mut PlannedPanels,
+    ) {
         let Some((indices, [a_2, a_3])) = alone.take() else { return };
         plan(&self.of.ends, a_2, a_3, &self.of.accuracy, made);
         for (lane, &i) in indices.iter().enumerate() {
@@ -118,10 +123,15 @@ impl Sums<'_> {
     }
 
     /// Plans shortcuts with larger powers.
-    fn deepen(&mut self, deep: &mut Queue<BLOCK>) {
+    fn deepen(&mut self, deep: &mut Queue<PLANNED_SHORTCUTS>) {
         let Some((indices, [a_2, a_3])) = deep.take() else { return };
-        let mut plan = Plan::EMPTY;
-        plan_parts(&self.of.ends, [a_2, a_3, &[0.0; BLOCK], &[1.0; BLOCK]], &self.of.accuracy, &mut plan);
+        let mut plan = PlannedPanels::EMPTY;
+        plan_parts(
+            &self.of.ends,
+            [a_2, a_3, &[0.0; PLANNED_SHORTCUTS], &[1.0; PLANNED_SHORTCUTS]],
+            &self.of.accuracy,
+            &mut plan,
+        );
         for (lane, &i) in indices.iter().enumerate() {
             self.settle(&plan, lane, i, [a_2[lane], a_3[lane]]);
         }
@@ -129,7 +139,7 @@ impl Sums<'_> {
 
     /// Sums eight shortcuts of one bin, from lane `first` on, side by side.
     #[inline(always)]
-    fn settle_all(&mut self, plan: &Plan, first: usize, indices: &[usize], places: [&Block; 2]) {
+    fn settle_all(&mut self, plan: &PlannedPanels, first: usize, indices: &[usize], places: [&PerShortcut; 2]) {
         self.stats.quadratures += LANES as u32;
         self.stats.nodes += LANES as u32 * nodes_of(plan.bin[first] as usize);
         self.bins.add_all(self.of, (plan, first), places, indices, self.work);
@@ -137,9 +147,9 @@ impl Sums<'_> {
 
     /// Adds the shortcut at `index` to the bin or queue of its plan.
     #[inline(always)]
-    fn settle(&mut self, plan: &Plan, lane: usize, index: usize, place: [f64; 2]) {
+    fn settle(&mut self, plan: &PlannedPanels, lane: usize, index: usize, place: [f64; 2]) {
         let bin = plan.bin[lane] as usize;
-        if bin < CUT_FROM {
+        if bin < CUT_BIN {
             self.work[index] = 0.0;
             self.stats.quadratures += 1;
             self.stats.nodes += nodes_of(bin);
@@ -153,12 +163,12 @@ impl Sums<'_> {
     fn part(&mut self) {
         let Sums { of, work, cut, bins, stats } = self;
         let Some((indices, parts)) = cut.take() else { return };
-        let mut plan = Plan::EMPTY;
+        let mut plan = PlannedPanels::EMPTY;
         plan_parts(&of.ends, parts, &of.accuracy_of_parts, &mut plan);
         let [a_2, a_3, low, high] = parts;
         for (k, &i) in indices.iter().enumerate() {
             stats.quadratures += 1;
-            let lanes = [k, k + BLOCK / 2];
+            let lanes = [k, k + PLANNED_SHORTCUTS / 2];
             let path = Path::new(&of.ends, a_2[k], a_3[k]);
             // A shortcut may be fastest at the cut.
             let near = path.is_within(if low[k] == 0.0 { high[k] } else { low[k] }, of.accuracy.longest);

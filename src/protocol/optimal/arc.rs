@@ -23,7 +23,7 @@ use crate::numerics::turning::{Turning, turning, turning_lanes};
 pub(super) enum Chart {
     /// `theta = theta_h/(1 + X^2)` from `x_start` to `x_end`.
     Turning {
-        /// Contact lifetime at the turning point.
+        /// State variable at the turning point.
         theta_h: f64,
         /// Its logarithm.
         ln_theta_h: f64,
@@ -36,7 +36,7 @@ pub(super) enum Chart {
     },
     /// `y = ln(theta/theta_a)` from `y_start` to `y_end`, one of which is the anchor `y = 0`.
     Direct {
-        /// Contact lifetime at the anchor, the end of the arc with the larger theta.
+        /// State variable at the anchor, the end of the arc with the larger theta.
         theta_a: f64,
         /// `ln u` at the anchor.
         z_a: f64,
@@ -65,9 +65,9 @@ pub(super) struct Sums {
     pub lag: f64,
     /// Work of friction along it.
     pub work: f64,
-    /// `int v ln v dt`, from [`Arc::sums_with_slopes`]; else 0.
+    /// `int v ln v dt`, with `SLOPES`; else 0.
     pub creep: f64,
-    /// `int v ln theta dt`, from [`Arc::sums_with_slopes`]; else 0.
+    /// `int v ln theta dt`, with `SLOPES`; else 0.
     pub state: f64,
     /// Turning chart: the interior part of `d time/d ln theta_h`. Direct chart: `d time/d z_a`.
     pub sensitivity: f64,
@@ -80,61 +80,49 @@ pub(super) struct Sums {
     pub nodes: u32,
 }
 
-/// Least friction of a part of an arc with the constant `c`, from one `(theta, ln u)` to another: at its ends, or between
-/// them if it falls below 0 there.
+/// Least and greatest friction of a part of an arc with the constant `c` between two points: at one of them, or where it is
+/// stationary in between.
 ///
 /// With `tau = 1 + a ln u + (b - a) ln theta = a (u - 1) - C theta` the rate `theta tau' = tau + a - b u` vanishes where
 /// `theta = (a - b) u/C`. There equation (2) of docs/derivations.md is `u - 1 - ln u = [1 + a - b + (b - a) ln((a - b)/C)]/b`,
-/// and `tau = b u - a` is a minimum for `(u - 1)(b - a) < 0`: while theta rises for `b > a`, while it falls for `b < a`.
-pub(super) fn least_friction(law: &Law, c: f64, ends: [(f64, f64); 2]) -> f64 {
+/// and `tau = b u - a` is a minimum for `(u - 1)(b - a) < 0` and a maximum for `(u - 1)(b - a) > 0`.
+pub(super) fn friction_range(law: &Law, c: f64, [start, end]: [&ArcPoint; 2]) -> [f64; 2] {
     let Law { a, b } = *law;
-    let friction = |(theta, ln_u): (f64, f64)| 1.0 + a * ln_u + (b - a) * ln(theta);
-    let least = friction(ends[0]).min(friction(ends[1]));
-    let [(theta_start, start), (theta_end, end)] = ends;
+    let friction = |point: &ArcPoint| 1.0 + a * point.ln_u + (b - a) * point.ln_theta;
+    let rate = |point: &ArcPoint| friction(point) + a - b * exp(point.ln_u);
+    let mut range = [friction(start).min(friction(end)), friction(start).max(friction(end))];
     let scale = (a - b) / c;
-    let may_dip = if b > a { start < 0.0 } else { end > 0.0 };
-    if !(may_dip && b > 0.0 && scale > 0.0 && scale.is_finite()) {
-        return least;
+    if !(b > 0.0 && scale > 0.0 && scale.is_finite()) {
+        return range;
     }
-    let rest = (1.0 + a - b + (b - a) * ln(scale)) / b;
-    if rest < 0.0 {
-        return least;
-    }
-    let Turning { ln_u, excess, .. } = turning((2.0 * rest).sqrt().copysign(a - b));
-    let theta = scale * (1.0 + excess);
-    let inside = if b > a {
-        theta >= theta_start && (end >= 0.0 || theta <= theta_end)
+    // Where theta rises it is stationary once at the most, and where theta falls; the rate at the outer end has its sign there.
+    let (rises, falls) = (start.ln_u < 0.0, end.ln_u > 0.0);
+    let (dips, peaks) = if b > a {
+        (rises && rate(start) < 0.0, falls && rate(end) < 0.0)
     } else {
-        theta >= theta_end && (start <= 0.0 || theta <= theta_start)
+        (falls && rate(end) > 0.0, rises && rate(start) > 0.0)
     };
-    // Only then is it on the arc, and only its sign counts.
-    if inside && ln_u.is_finite() { least.min(b * (1.0 + excess) - a) } else { least }
-}
-
-/// Greatest friction of a part of an arc with the constant `c`, as [`least_friction`]: the stationary point is a maximum
-/// for `(u - 1)(b - a) > 0`.
-pub(super) fn greatest_friction(law: &Law, c: f64, ends: [(f64, f64); 2]) -> f64 {
-    let Law { a, b } = *law;
-    let friction = |(theta, ln_u): (f64, f64)| 1.0 + a * ln_u + (b - a) * ln(theta);
-    let greatest = friction(ends[0]).max(friction(ends[1]));
-    let [(theta_start, start), (theta_end, end)] = ends;
-    let scale = (a - b) / c;
-    let may_peak = if b > a { end > 0.0 } else { start < 0.0 };
-    if !(may_peak && b > 0.0 && scale > 0.0 && scale.is_finite()) {
-        return greatest;
+    let rest = if dips || peaks { (1.0 + a - b + (b - a) * ln(scale)) / b } else { f64::NAN };
+    if rest.is_nan() || rest < 0.0 {
+        return range;
     }
-    let rest = (1.0 + a - b + (b - a) * ln(scale)) / b;
-    if rest < 0.0 {
-        return greatest;
-    }
-    let Turning { excess, .. } = turning((2.0 * rest).sqrt().copysign(b - a));
-    let theta = scale * (1.0 + excess);
-    let inside = if b > a {
-        theta >= theta_end && (start <= 0.0 || theta <= theta_start)
-    } else {
-        theta >= theta_start && (end >= 0.0 || theta <= theta_end)
+    let stationary = |side: f64| {
+        let Turning { ln_u, excess, .. } = turning((2.0 * rest).sqrt().copysign(side));
+        let theta = scale * (1.0 + excess);
+        let inside = if side < 0.0 {
+            theta >= start.theta && (end.ln_u >= 0.0 || theta <= end.theta)
+        } else {
+            theta >= end.theta && (start.ln_u <= 0.0 || theta <= start.theta)
+        };
+        (inside && ln_u.is_finite()).then_some(b * (1.0 + excess) - a)
     };
-    if inside { greatest.max(b * (1.0 + excess) - a) } else { greatest }
+    if dips && let Some(least) = stationary(a - b) {
+        range[0] = range[0].min(least);
+    }
+    if peaks && let Some(greatest) = stationary(b - a) {
+        range[1] = range[1].max(greatest);
+    }
+    range
 }
 
 /// `phi(z) = e^z - 1 - z`, the left side of the turning equation, without cancellation near 0.
@@ -174,7 +162,7 @@ impl Arc {
         }
     }
 
-    /// Largest contact lifetime on the arc.
+    /// Largest state variable on the arc.
     pub fn theta_max(&self) -> f64 {
         match self.chart {
             Chart::Turning { theta_h, x_start, x_end, .. } => {
@@ -212,18 +200,9 @@ impl Arc {
         w.is_finite().then(|| turning(w))
     }
 
-    /// Time, work and sensitivity to relative accuracy `tolerance`; `None` where the arc does not exist (`E < 0` on the
-    /// way).
-    pub fn sums(&self, tolerance: f64) -> Option<Sums> {
-        self.refined_sums::<false>(tolerance)
-    }
-
-    /// As [`Arc::sums`], with what the derivatives of the work need.
-    pub fn sums_with_slopes(&self, tolerance: f64) -> Option<Sums> {
-        self.refined_sums::<true>(tolerance)
-    }
-
-    fn refined_sums<const SLOPES: bool>(&self, tolerance: f64) -> Option<Sums> {
+    /// Time, work and sensitivity to relative accuracy `tolerance`, with `SLOPES` also the sums for the derivatives of the work;
+    /// `None` where the arc does not exist (`E < 0` on the way).
+    pub fn sums<const SLOPES: bool>(&self, tolerance: f64) -> Option<Sums> {
         let mut sums = self.sums_once::<SLOPES>(tolerance)?;
         // Where friction falls below b - a, E has a minimum on the way: zeros near it need more nodes than foreseen.
         let mut asked = tolerance;
@@ -293,7 +272,7 @@ impl Arc {
         let low = if x_start + x_end > 0.0 { x_end } else { x_start };
         let below = last_zero(b - a, c_h, 1.0 + low * low)
             .map_or(f64::INFINITY, |x| asinh(x / sigma, (1.0 + x * x / (sigma * sigma)).sqrt()));
-        let singular = [(-re, im), (far_re, far_im), (-far_re, far_im), (below.min(FAR).copysign(low), 0.0)];
+        let singular = [(-re, im), (far_re, far_im), (-far_re, far_im), (below.min(NO_SINGULARITY).copysign(low), 0.0)];
         let slice = TurningSlice { law: self.law, theta_h, ln_theta_h, c_h, sigma };
         (Line { start, length, singular }, slice)
     }
@@ -336,7 +315,7 @@ impl Arc {
         let mut pieces = EqualSteps { start, length, count, slice };
         // As in `sums`, more of them where friction falls below b - a.
         let (mut time, friction_min) = pieces.whole();
-        while friction_min <= self.law.b - self.law.a && pieces.count < MOST_PIECES {
+        while friction_min <= self.law.b - self.law.a && pieces.count < MAX_PIECES {
             pieces.count *= 2;
             let (finer, _) = pieces.whole();
             let change = (finer - time).abs();
@@ -360,7 +339,7 @@ struct Line<const N: usize> {
 impl<const N: usize> Line<N> {
     /// The number of pieces with few nodes.
     fn pieces(&self) -> u32 {
-        self.cut(PIECE_NODES as f64, MOST_PIECES, PIECE_TOLERANCE).0
+        self.cut(PIECE_NODES as f64, MAX_PIECES, PIECE_TOLERANCE).0
     }
 
     /// Into how many equal panels, up to `most_panels`, to cut so that none needs more than `most` nodes, and how many
@@ -405,6 +384,7 @@ enum Slice {
 }
 
 /// A place on an arc.
+#[derive(Debug, Clone, Copy)]
 pub(super) struct ArcPoint {
     pub theta: f64,
     pub ln_theta: f64,
@@ -415,7 +395,7 @@ pub(super) struct ArcPoint {
 const PIECE_NODES: usize = 2 * LANES;
 
 /// Most pieces of an arc.
-const MOST_PIECES: u32 = 1024;
+const MAX_PIECES: u32 = 1024;
 
 /// Relative accuracy of the time within a piece.
 const PIECE_TOLERANCE: f64 = 1e-15;
@@ -470,11 +450,11 @@ const LAYERS: f64 = 1.5;
 /// The branch points of `U` in the `p` plane, `asinh(2 sqrt(pi)/LAYERS e^(i pi/4))`.
 const BRANCH: (f64, f64) = (1.556165173207204, 0.7409303559311022);
 
-/// Nodes beyond which a panel is cut in two.
-const MOST_NODES: f64 = 64.0;
+/// Nodes beyond which a panel is divided in two. Chosen: halves need about half the nodes each; the budgets of `optimal` judge the error.
+const MAX_NODES: f64 = 64.0;
 
 /// Most panels of an arc.
-const MOST_PANELS: u32 = 64;
+const MAX_PANELS: u32 = 64;
 
 /// The tolerance at which a quadrature uses the greatest numbers of panels and nodes.
 const LEAST_TOLERANCE: f64 = 1e-200;
@@ -482,7 +462,7 @@ const LEAST_TOLERANCE: f64 = 1e-200;
 /// Sums over equal panels of a line, with as many Gauss nodes as the nearest singularity needs.
 fn panels<const N: usize>(line: &Line<N>, tolerance: f64, kernel: impl Fn(f64, f64, &Rule) -> Sums) -> Sums {
     let &Line { start, length, .. } = line;
-    let (count, nodes) = line.cut(MOST_NODES, MOST_PANELS, tolerance);
+    let (count, nodes) = line.cut(MAX_NODES, MAX_PANELS, tolerance);
     let rule = rule(LANES * (nodes as usize / LANES + 1));
     let half = 0.5 * length / f64::from(count);
     let mut total = Sums {
@@ -527,8 +507,8 @@ fn nodes_needed(middle: f64, half: f64, singular: &[(f64, f64)], digits: f64) ->
     (digits + MARGIN) / (2.0 * rough_ln(rho.min(1e6)))
 }
 
-/// Stands for a singularity that is nowhere near.
-const FAR: f64 = 1e3;
+/// Distance that stands for no singularity, in half panels. Chosen: at a thousand the fewest nodes are enough.
+const NO_SINGULARITY: f64 = 1e3;
 
 /// The pair of zeros of `a E = friction_a + (b - a) y + c e^y` near the real axis, or of `a E - i shift`: a place of the
 /// upper half plane, to some tenths, and not above it. For `c <= 0` there is none near an arc.
@@ -540,7 +520,7 @@ fn zero_above(law: &Law, friction_a: f64, c: f64, shift: f64) -> (f64, f64) {
     let bend = law.a - law.b;
     // Friction is no less on the arc for b <= a, which leaves the pair beyond the anchor.
     if c <= 0.0 || (bend >= 0.0 && 2.0 * c <= friction_a) {
-        return (FAR, FRAC_PI_2);
+        return (NO_SINGULARITY, FRAC_PI_2);
     }
     let inverse = 1.0 / c;
     let (mut r, mut s) = (0.0, PI);
@@ -565,7 +545,7 @@ const MOST: f64 = 1e100;
 /// - a`.
 fn zero_below(slope: f64, friction_a: f64, c: f64, low: f64) -> f64 {
     if slope <= 0.0 {
-        return -FAR;
+        return -NO_SINGULARITY;
     }
     let friction = friction_a + slope * low;
     if friction > HIGH * slope {

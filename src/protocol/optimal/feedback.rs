@@ -3,6 +3,7 @@
 use super::ceiling::Ceilings;
 use super::constrained::{self, Constrained};
 use super::extremal::Problem;
+use super::guess::Guess;
 use super::lifetime::Lifetime;
 use super::search::{self, Time};
 use super::{ArcKind, Bounds, FeedbackPoint, INFEASIBLE, Optimum, Strategy, slopes};
@@ -40,15 +41,11 @@ pub fn feedback_at(
             let arc = if optimum.time_at_floor > 0.0 { ArcKind::Floor } else { kind };
             // What the optimum does now does not depend on a time that it then waits.
             let gain =
-                if sitting > 0.0 { waiting_gain(&problem, path) } else { slopes::gain(&problem, path, tolerance) };
+                if sitting.is_some() { waiting_gain(&problem, path) } else { slopes::gain(&problem, path, tolerance) };
             slopes::costate(&problem, path).zip(gain).map(|(costate, gain)| (costate, gain, arc))
         }
-        None if sitting > 0.0 => {
-            let arc = if ceilings.z_v == 0.0 { ArcKind::VCeiling } else { ArcKind::TauCeiling };
-            Some(((problem.friction_end() + law.a) / theta, 0.0, arc))
-        }
-        // The floor to the end: with less theta no protocol arrives.
-        None => None,
+        // Without a path it is steady sliding, or the floor to the end: with less theta no protocol arrives.
+        None => sitting.map(|sitting| ((problem.friction_end() + law.a) / theta, 0.0, sitting.kind)),
     };
     let Some((costate, gain, arc)) = point else { return failed(Status::Infeasible, stats) };
     let value = FeedbackPoint { v: optimum.v_start, work_to_go: optimum.work, costate, gain, arc };
@@ -153,7 +150,7 @@ pub fn feedback(
     let rounding = ROUNDINGS * f64::EPSILON * size;
     let beyond = if bounded && beyond <= rounding { 0.0 } else { beyond };
     let time = search::Time { whole: time_left, beyond, doubt: rounding / beyond };
-    let (solved, member) = search::find_beyond(&problem, time, rtol);
+    let (solved, member) = search::free(&problem, time, rtol, &Guess::of(&problem, time.beyond));
     *stats += solved.stats;
     let optimum = solved.value?;
     let pressure = if optimum.strategy == Strategy::Floor {
@@ -170,7 +167,7 @@ pub fn feedback(
         0.0
     };
     let ln_v = match member {
-        Some(member) if optimum.strategy != Strategy::Floor => member.extremal.start - from.ln,
+        Some((extremal, _)) if optimum.strategy != Strategy::Floor => extremal.start - from.ln,
         _ => 0.0,
     };
     Some(Feedback { v: optimum.v_start, ln_v, pressure })

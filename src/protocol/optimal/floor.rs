@@ -1,4 +1,4 @@
-//! The hold: the block slides at the bound `v = 1` while the contacts age, `theta = 1 - (1 - theta_0) e^{-t}`.
+//! The floor arc: the block slides at the bound `v = 1` while the contacts age, `theta = 1 - (1 - theta_0) e^{-t}`.
 
 use super::lifetime::Lifetime;
 use crate::model::Law;
@@ -11,12 +11,12 @@ pub(super) fn time(growth: f64, rest: f64) -> f64 {
     ln_1p(growth / rest)
 }
 
-/// Work of a hold of `time` that starts from the lifetime `from`: `time + b int ln theta dt`.
+/// Work of a floor arc of `time` that starts from the lifetime `from`: `time + b int ln theta dt`.
 pub(super) fn work(law: &Law, from: Lifetime, time: f64) -> f64 {
     if time <= 0.0 {
         return 0.0;
     }
-    // ln theta(t) has its singularity at t = ln(1 - theta_0) < 0: as long as the hold is no longer than that is away,
+    // ln theta(t) has its singularity at t = ln(1 - theta_0) < 0: as long as the floor arc is no longer than that is away,
     // few nodes do. Beyond, theta has about doubled and a difference of dilogarithms does not cancel.
     let integral = if time <= -ln_1p(-from.theta) {
         let rule = rule(16);

@@ -3,51 +3,84 @@
 use multiversion::multiversion;
 
 use super::arc::phi;
+use super::ceiling::Ceilings;
 use super::extremal::Problem;
 use crate::model::Law;
-use crate::numerics::elementary::{exp, ln, ln_1p};
+use crate::numerics::elementary::{exp, exp_m1, ln, ln_1p};
 use crate::numerics::gauss::rule;
 use crate::numerics::lanes::{LANES, Lanes};
 use crate::numerics::turning::{rough_excess, turning};
 
-/// The start of a search.
+/// A first parameter.
 pub(super) struct Guess {
-    /// The parameter, counted from `q_hold`.
+    /// The origin of the parameter.
+    pub q_floor: Option<f64>,
+    /// The parameter, counted from `q_floor`.
     pub p: f64,
     /// The expected relative error of the time.
     pub error: f64,
 }
 
-/// A first parameter for the time `beyond` the least. For `b = a` time is linear in `ln u` along an arc; that line, `v =
-/// const` for very short times, and a hold for long ones come close. Where theta falls at once, a coarse quadrature
-/// comes closer.
-pub(super) fn guess(problem: &Problem, q_hold: Option<f64>, beyond: f64) -> Guess {
-    let p = line(problem, q_hold, beyond);
-    let z_0 = p + q_hold.unwrap_or(0.0);
-    if problem.fall > 0.0 && z_0 > 0.0 {
-        let arcs = Falling {
-            law: problem.law,
-            theta_0: problem.from.theta,
-            depth: ln_1p(problem.fall),
-            friction: problem.friction_a(),
-        };
-        if let Some(z_0) = arcs.start(z_0, beyond) {
-            return Guess { p: z_0 - q_hold.unwrap_or(0.0), error: CLOSE };
+impl Guess {
+    /// For the time `beyond` the least. For `b = a` time is linear in `ln u` along an arc; that line, `v = const` for very
+    /// short times, and a floor arc for long ones come close. Where theta falls at once, a coarse quadrature comes closer.
+    pub fn of(problem: &Problem, beyond: f64) -> Guess {
+        let q_floor = problem.q_floor().filter(|&q_floor| problem.reach(beyond) >= MIN_REACH * q_floor.abs());
+        let p = line(problem, q_floor, beyond);
+        let z_0 = p + q_floor.unwrap_or(0.0);
+        if problem.fall > 0.0
+            && z_0 > 0.0
+            && let Some(z_0) = Falling::of(problem).start(&between(z_0), [beyond, 0.0], &[f64::INFINITY; LANES])
+        {
+            return Guess { q_floor, p: z_0 - q_floor.unwrap_or(0.0), error: QUADRATURE_ERROR };
         }
+        Guess { q_floor, p, error: LINE_ERROR }
     }
-    Guess { p, error: ROUGH }
 }
 
+/// Fraction of `q_floor` below which parameters are counted from 0: counted from `q_floor`, a search could not distinguish them.
+const MIN_REACH: f64 = 1e-5;
+
+/// A first parameter for the time `t_f` under ceilings, where theta falls at once and the ceilings bind: between that of the free
+/// arc and that of the arc that is on a ceiling throughout, which takes the time `least`.
+pub(super) fn capped_guess(
+    problem: &Problem,
+    ceilings: &Ceilings,
+    times: [f64; 2],
+    [free, most]: [f64; 2],
+) -> Option<f64> {
+    let arcs = Falling::of(problem);
+    let mut z = [0.0; LANES];
+    for (i, z) in z.iter_mut().enumerate() {
+        let left = 1.0 - i as f64 / LANES as f64;
+        *z = most - (most - free) * (left * left);
+    }
+    arcs.start(&z, times, &ceilings_at(ceilings, &arcs, rule(CAPPED_NODES).x.first_chunk()?))
+}
+
+/// `u - 1` at the ceilings at the nodes.
+fn ceilings_at(ceilings: &Ceilings, arcs: &Falling, x: &[f64; CAPPED_NODES]) -> [f64; CAPPED_NODES] {
+    let mut caps = [0.0; CAPPED_NODES];
+    for (cap, x) in caps.iter_mut().zip(x) {
+        let s = 0.5 * (1.0 + x);
+        *cap = exp_m1(ceilings.cap(arcs.depth * (1.0 - s * s * s)).min(MOST));
+    }
+    caps
+}
+
+/// Nodes under ceilings: an arc has a kink where one begins.
+const CAPPED_NODES: usize = 2 * LANES;
+
 /// Usual error of the line.
-const ROUGH: f64 = 0.1;
+const LINE_ERROR: f64 = 0.1;
 
 /// Usual error of the coarse quadrature.
-const CLOSE: f64 = 1e-4;
+pub(super) const QUADRATURE_ERROR: f64 = 1e-4;
 
-fn line(problem: &Problem, q_hold: Option<f64>, beyond: f64) -> f64 {
+fn line(problem: &Problem, q_floor: Option<f64>, beyond: f64) -> f64 {
     let law = problem.law;
     let friction = problem.friction_a();
-    let origin = q_hold.unwrap_or(0.0);
+    let origin = q_floor.unwrap_or(0.0);
     let held = |z_start: f64| {
         // An arc that leaves the bound at the anchor comes back to it with the same E.
         let z_end = turning((2.0 * phi(z_start)).sqrt()).ln_u;
@@ -55,7 +88,7 @@ fn line(problem: &Problem, q_hold: Option<f64>, beyond: f64) -> f64 {
     };
     if problem.rises() {
         let arc = problem.to.theta * held(problem.to.ln);
-        return match q_hold {
+        return match q_floor {
             Some(_) if beyond > arc => (beyond - arc) / problem.theta_a(),
             _ => -origin,
         };
@@ -68,8 +101,8 @@ fn line(problem: &Problem, q_hold: Option<f64>, beyond: f64) -> f64 {
         z_start.max(ln(fast) - 1.5) - origin
     } else {
         let q = -(2.0 * phi(z_start)).sqrt();
-        match q_hold {
-            Some(q_hold) if q < q_hold => {
+        match q_floor {
+            Some(q_floor) if q < q_floor => {
                 let arc = problem.from.theta * law.a * (z_end - problem.from.ln) / friction;
                 -(beyond - arc).max(0.0) / problem.theta_a()
             }
@@ -100,17 +133,28 @@ const LEAST: f64 = 0.02;
 /// Logarithm of times so long that the arc does not exist.
 const MOST: f64 = 700.0;
 
+/// Eight values of `ln u(0+)` about `near`.
+fn between(near: f64) -> Lanes {
+    let first = (near - LOWER).max(LEAST);
+    let mut z = [0.0; LANES];
+    for (i, z) in z.iter_mut().enumerate() {
+        *z = first + SPACING * i as f64;
+    }
+    z
+}
+
 impl Falling {
-    /// `ln u(0+)` for a `time`, by interpolation between eight about `near`; `None` where that one is not among them.
-    fn start(&self, near: f64, time: f64) -> Option<f64> {
-        let first = (near - LOWER).max(LEAST);
-        let mut z = [0.0; LANES];
-        for (i, z) in z.iter_mut().enumerate() {
-            *z = first + SPACING * i as f64;
-        }
-        let rule = rule(LANES);
-        let times = ln_times(self, &z, rule.x.first_chunk()?, rule.w.first_chunk()?);
-        let wanted = ln(time);
+    fn of(problem: &Problem) -> Falling {
+        let depth = ln_1p(problem.fall);
+        Falling { law: problem.law, theta_0: problem.from.theta, depth, friction: problem.friction_a() }
+    }
+
+    /// `ln u(0+)` for a `time`, by interpolation between these eight; `None` where it is not among them. `u - 1` is at most
+    /// `caps` at the nodes, which takes the time `least` where it is that all along.
+    fn start<const N: usize>(&self, z: &Lanes, [time, least]: [f64; 2], caps: &[f64; N]) -> Option<f64> {
+        let rule = rule(N);
+        let times = ln_times(self, z, rule.x.first_chunk()?, rule.w.first_chunk()?, caps);
+        let wanted = ln(time - least);
         // Times fall; four of them about the one wanted.
         let after = times.iter().position(|&time| time < wanted).filter(|&after| after > 0)?;
         let from = after.saturating_sub(2).min(LANES - 4);
@@ -127,16 +171,17 @@ impl Falling {
     }
 }
 
-/// Logarithms of the times of eight arcs with these `ln u(0+)`, to about 1e-4; at least [`MOST`] where there is no arc.
+/// Logarithms of the times of eight arcs with these `ln u(0+)`, to about 1e-4; at least [`MOST`] where there is no arc. Under
+/// ceilings, of the times beyond that on the ceilings.
 #[multiversion(targets(
     "x86_64+avx+avx2+bmi1+bmi2+avx512f+avx512bw+avx512cd+avx512dq+avx512vl",
     "x86_64+avx+avx2+bmi1+bmi2"
 ))]
-fn ln_times(arcs: &Falling, z: &Lanes, x: &Lanes, w: &Lanes) -> Lanes {
+fn ln_times<const N: usize>(arcs: &Falling, z: &Lanes, x: &[f64; N], w: &[f64; N], caps: &[f64; N]) -> Lanes {
     let Law { a, b } = arcs.law;
     let per_a = 1.0 / a;
-    let (mut grow, mut bend, mut weight) = ([0.0; LANES], [0.0; LANES], [0.0; LANES]);
-    for i in 0..LANES {
+    let (mut grow, mut bend, mut weight, mut least) = ([0.0; N], [0.0; N], [0.0; N], 0.0);
+    for i in 0..N {
         // y = ln(theta/theta_0) = -depth s^3 opens the start, where u changes fast.
         let s = 0.5 * (1.0 + x[i]);
         let y = -arcs.depth * (s * s * s);
@@ -144,20 +189,25 @@ fn ln_times(arcs: &Falling, z: &Lanes, x: &Lanes, w: &Lanes) -> Lanes {
         bend[i] = ((b - a) * y - arcs.friction * (grow[i] - 1.0)) * per_a;
         weight[i] = 1.5 * arcs.theta_0 * arcs.depth * w[i] * (s * s) * grow[i];
     }
+    for i in 0..N {
+        least += weight[i] / (caps[i] + f64::MIN_POSITIVE);
+    }
     let (mut phi, mut time, mut ln_time) = ([0.0; LANES], [0.0; LANES], [0.0; LANES]);
     for i in 0..LANES {
         phi[i] = exp(z[i]) - 1.0 - z[i];
     }
     // E = phi(z_0) grow + bend.
-    for node in 0..LANES {
+    for node in 0..N {
         for i in 0..LANES {
             let e = phi[i] * grow[node] + bend[node];
             let e = if e > 0.0 { e } else { 0.0 };
-            time[i] += weight[node] / (rough_excess((2.0 * e).sqrt(), e) + f64::MIN_POSITIVE);
+            let excess = rough_excess((2.0 * e).sqrt(), e);
+            let excess = if excess < caps[node] { excess } else { caps[node] };
+            time[i] += weight[node] / (excess + f64::MIN_POSITIVE);
         }
     }
     for i in 0..LANES {
-        ln_time[i] = ln(time[i]);
+        ln_time[i] = ln(time[i] - least);
     }
     ln_time
 }

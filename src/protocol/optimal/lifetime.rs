@@ -2,7 +2,7 @@
 
 use crate::numerics::elementary::{exp, exp_m1, ln, ln_1p};
 
-/// A contact lifetime; `theta` and `1 - theta` are each known to full relative accuracy.
+/// A value of the state variable; `theta` and `1 - theta` are each known to full relative accuracy.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Lifetime {
     /// The lifetime `theta > 0`.

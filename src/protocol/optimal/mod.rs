@@ -7,7 +7,6 @@ mod arc;
 mod bounds;
 mod ceiling;
 mod clamp;
-mod clamped_motion;
 mod constrained;
 pub mod crossover;
 mod extremal;
@@ -26,15 +25,16 @@ use crate::model::Transition;
 use ceiling::Ceilings;
 use constrained::Constrained;
 use extremal::Problem;
+use guess::Guess;
 use lifetime::Lifetime;
+use motion::OptimalMotion;
 use search::Time;
 
 pub use bounds::Bounds;
 pub use feasible::{feasible_times, least_tau_ceiling, least_v_ceiling, obstacle};
 pub(super) use feedback::{Position, feedback};
 pub use feedback::{feedback_at, motion_from};
-pub(super) use motion::Optimal as Route;
-pub(super) use route::{PathPoint, PathSegment, lag_at_bound};
+pub(super) use route::{PathPoint, PathSegment, Route, lag_at_bound};
 
 /// The start of the optimal protocol.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -46,11 +46,27 @@ pub enum Strategy {
     SlowDown,
     /// Starts on the bound `v = 1`.
     Floor,
+    /// At `v = 1`, then on the ceiling of the velocity.
+    WaitJerk,
+    /// On the ceiling of the velocity, then at `v = 1`.
+    JerkWait,
+    /// Alternates between both bounds ever faster, so that theta rests.
+    Chatter,
+    /// Off the bounds, where the state of the slip law rises faster than at `v = 1`.
+    Rise,
 }
 
 impl Strategy {
     /// All strategies, in their order.
-    pub const ALL: [Strategy; 3] = [Strategy::SpeedUp, Strategy::SlowDown, Strategy::Floor];
+    pub const ALL: [Strategy; 7] = [
+        Strategy::SpeedUp,
+        Strategy::SlowDown,
+        Strategy::Floor,
+        Strategy::WaitJerk,
+        Strategy::JerkWait,
+        Strategy::Chatter,
+        Strategy::Rise,
+    ];
 
     /// The name that is written into tables.
     pub fn name(self) -> &'static str {
@@ -58,6 +74,10 @@ impl Strategy {
             Strategy::SpeedUp => "speed_up",
             Strategy::SlowDown => "slow_down",
             Strategy::Floor => "floor",
+            Strategy::WaitJerk => "wait_jerk",
+            Strategy::JerkWait => "jerk_wait",
+            Strategy::Chatter => "chatter",
+            Strategy::Rise => "rise",
         }
     }
 }
@@ -179,22 +199,25 @@ pub enum Obstacle {
 ///
 /// `Infeasible` where no protocol is fast enough under the bound (`t_f < t_min`), or where an argument is outside its
 /// domain (`a > 0`, `b >= 0`, `v_i, v_f > 1`, `t_f > 0`, all finite). Without the bound, `BelowBound` where `v(0+) <
-/// 1`. `Unproven` where `tau <= max(0, b - a)` somewhere, `NegativeFriction` where `tau < 0`; an extremal that falls
-/// below the bound there has no numbers.
+/// 1`. `Unproven` where `tau <= max(0, b - a)` somewhere, unless `tau_ss >= 2 (b - a)` at both ends; `NegativeFriction` where
+/// `tau < 0`; an extremal that falls below the bound where it is unproven has no numbers.
 pub fn solve(transition: &Transition, t_f: f64, bounds: impl Into<Bounds>, rtol: f64) -> Solved<Optimum> {
     let bounds = bounds.into();
     let Some((problem, ceilings)) = posed(transition, t_f, &bounds) else { return INFEASIBLE };
+    let time = Time::since(&problem, t_f);
     if !bounds.has_ceilings() {
-        return search::find(&problem, t_f, rtol).0;
+        return search::free(&problem, time, rtol, &Guess::of(&problem, time.beyond)).0;
     }
-    constrained::find(&problem, &ceilings, Time::since(&problem, t_f), rtol).solved
+    constrained::find(&problem, &ceilings, time, rtol).solved
 }
 
 const INFEASIBLE: Solved<Optimum> =
     Solved { status: Status::Infeasible, value: None, stats: SolverStats { quadratures: 0, nodes: 0 } };
 
-/// The optimal protocol and the derivatives of its work; `None` at the least time of a deceleration. Where the protocol ends
-/// in steady sliding on a ceiling the work has a corner: those by the ceiling and by `v_f` are NaN.
+/// The optimal protocol and the derivatives of its work; `None` at the least time of a deceleration.
+///
+/// At the border of the feasible region they are the limits from inside. Steady sliding on both ceilings at once is a corner:
+/// all but that by `v_i` are NaN.
 pub fn slopes(
     transition: &Transition,
     t_f: f64,
@@ -205,10 +228,7 @@ pub fn slopes(
     let Constrained { mut solved, path, sitting } =
         constrained::find(&problem, &ceilings, Time::since(&problem, t_f), rtol);
     let tolerance = search::quadrature_tolerance(rtol);
-    let of_friction = solved.value.is_some_and(|optimum| sitting > 0.0 && optimum.time_at_tau_ceiling > 0.0);
-    let slopes = path
-        .filter(|_| !of_friction)
-        .and_then(|path| slopes::slopes(&problem, &path, sitting, tolerance, &mut solved.stats));
+    let slopes = slopes::slopes(&problem, path.as_ref(), sitting, tolerance, &mut solved.stats);
     (solved, slopes)
 }
 
@@ -242,15 +262,9 @@ fn motion_of(
     t_f: f64,
     rtol: f64,
 ) -> (Solved<Optimum>, Option<Box<dyn Motion>>) {
-    let Constrained { solved, path, sitting } =
-        constrained::find(problem, ceilings, Time::since(problem, t_f), rtol.min(MOTION_RTOL));
-    let Some(optimum) = solved.value else { return (solved, None) };
-    let capped = optimum.time_at_v_ceiling + optimum.time_at_tau_ceiling > 0.0;
-    let motion: Box<dyn Motion> = match path {
-        _ if capped => Box::new(clamped_motion::Clamped::new(problem, ceilings, t_f, path.as_ref(), sitting)),
-        _ => Box::new(Route::new(problem, t_f, path.map(|path| path.extremal))),
-    };
-    (solved, Some(motion))
+    let found = constrained::find(problem, ceilings, Time::since(problem, t_f), rtol.min(MOTION_RTOL));
+    let motion = found.solved.value.map(|_| OptimalMotion::new(problem, ceilings, t_f, &found));
+    (found.solved, motion.map(|motion| Box::new(motion) as Box<dyn Motion>))
 }
 
 /// The optimal protocol and its path.
@@ -258,12 +272,12 @@ pub(super) fn route(transition: &Transition, t_f: f64, bounded: bool, rtol: f64)
     let Some(problem) = Problem::of(transition, bounded).filter(|_| t_f > 0.0 && t_f.is_finite()) else {
         return (Solved { status: Status::Infeasible, value: None, stats: SolverStats::default() }, None);
     };
-    let (solved, member) = search::find(&problem, t_f, rtol.min(MOTION_RTOL));
-    let route = solved.value.map(|_| Route::new(&problem, t_f, member.map(|member| member.extremal)));
-    (solved, route)
+    let time = Time::since(&problem, t_f);
+    let (solved, member) = search::free(&problem, time, rtol.min(MOTION_RTOL), &Guess::of(&problem, time.beyond));
+    (solved, solved.value.map(|_| Route::new(&problem, t_f, member.map(|(extremal, _)| extremal))))
 }
 
-/// Accuracy of every motion: the time on the arc is what is left of `t_f` after the hold.
+/// Accuracy of every motion: the time on the arc is what is left of `t_f` after the floor arc.
 const MOTION_RTOL: f64 = 1e-12;
 
 /// The least time in which there is a protocol with `v >= 1`, or `v > 0` without the bound; 0 for an acceleration.

@@ -1,58 +1,198 @@
-//! The optimal protocol over time: the hold, then the arc along the coordinate of its chart.
+//! The optimal protocol over time: the floor, free arcs and arcs on ceilings, each along its own coordinate.
 
+use super::ArcKind;
 use super::arc::{Arc, EqualSteps};
-use super::extremal::{Extremal, Problem};
+use super::ceiling::{CeilingArc, Ceilings};
+use super::clamp::{ClampedPiece, Depth, Gap};
+use super::constrained::{Constrained, Sitting};
+use super::extremal::Problem;
 use super::lifetime::Lifetime;
+use super::search::ROUNDING;
 use crate::model::Law;
 use crate::numerics::elementary::{exp, exp_m1, ln, ln_1p};
 use crate::protocol::{Moment, Motion};
 
-/// The motion of one extremal. Its parameter `s` runs along the hold up to `fraction`, then along the arc.
-pub struct Optimal {
-    pub(super) law: Law,
-    pub(super) t_f: f64,
-    bounded: bool,
-    pub(super) floor: Floor,
-    /// The part of `s` that the hold takes.
-    fraction: f64,
-    pub(super) arc: Option<Timed>,
+/// The motion along one path.
+pub(super) struct OptimalMotion {
+    problem: Problem,
+    ceilings: Ceilings,
+    t_f: f64,
+    segments: Vec<Segment>,
+    /// The coordinate at which each segment begins, and the end.
+    edges: Vec<f64>,
 }
 
-/// The rounding error of a velocity at the floor, relative.
-const ROUNDING: f64 = 1e-9;
+enum Segment {
+    Floor(Floor),
+    Free(Timed),
+    Ceiling(TimedCeiling),
+    /// Steady sliding at the end.
+    Sitting(Sitting),
+}
 
-impl Optimal {
-    /// The motion of `extremal`, or of the hold alone, in time `t_f`.
-    pub(super) fn new(problem: &Problem, t_f: f64, extremal: Option<Extremal>) -> Optimal {
-        let (theta_s, time_at_floor) =
-            extremal.map_or((problem.to.theta, t_f), |found| (found.theta_s, found.time_at_floor));
-        let arc = extremal.map(|found| Timed::new(&found.arc, time_at_floor, t_f));
-        let floor = Floor::new(problem, theta_s, arc.as_ref().map_or(t_f, |arc| arc.start));
-        let (held, moving) = (floor.length(), arc.as_ref().map_or(0.0, |arc| arc.pieces.length.abs()));
-        let fraction = if arc.is_none() { 1.0 } else { held / (held + moving) };
-        Optimal { law: problem.law, t_f, bounded: problem.bounded, floor, fraction, arc }
+/// An arc on a ceiling with its time.
+struct TimedCeiling {
+    arc: CeilingArc,
+    gap: Gap,
+    start: f64,
+    end: f64,
+}
+
+impl OptimalMotion {
+    /// The motion of a solution in time `t_f`.
+    pub fn new(problem: &Problem, ceilings: &Ceilings, t_f: f64, found: &Constrained) -> OptimalMotion {
+        let Constrained { path, sitting, .. } = found;
+        let mut segments: Vec<Segment> = path.iter().flat_map(|path| path.pieces()).map(Segment::of).collect();
+        segments.extend(sitting.map(Segment::Sitting));
+        // Rounding of the search goes to the floor arc, if there is one.
+        let total: f64 = segments.iter().map(Segment::duration).sum();
+        let (theta_s, waits) = path.map_or((problem.to.theta, sitting.is_none()), |path| {
+            (path.extremal.theta_s, path.extremal.time_at_floor > 0.0)
+        });
+        let held = if waits { (t_f - total).max(0.0) } else { 0.0 };
+        let (mut start, mut left) = (held, segments.len());
+        for segment in &mut segments {
+            left -= 1;
+            let end = if left == 0 { t_f } else { start + segment.duration() };
+            segment.set_times(start, end);
+            start = end;
+        }
+        if held > 0.0 {
+            segments.insert(0, Segment::Floor(Floor::new(problem, theta_s, held)));
+        }
+        let mut edges = vec![0.0];
+        for segment in &segments {
+            edges.push(edges[edges.len() - 1] + segment.length());
+        }
+        OptimalMotion { problem: *problem, ceilings: *ceilings, t_f, segments, edges }
+    }
+
+    fn moment(&self, segment: &Segment, place: f64) -> Moment {
+        let Law { a, b } = self.problem.law;
+        match segment {
+            Segment::Floor(floor) => floor.at(place),
+            Segment::Free(arc) => {
+                let here = arc.pieces.at(place);
+                let v = exp(here.ln_u - here.ln_theta);
+                let on_bound = self.problem.bounded && v < 1.0 && v > 1.0 - ROUNDING;
+                let friction = 1.0 + a * here.ln_u + (b - a) * here.ln_theta;
+                Moment {
+                    t: arc.time(place),
+                    v: if on_bound { 1.0 } else { v },
+                    theta: here.theta,
+                    friction,
+                    v_c: None,
+                    // C - a v, which cancels where v is large.
+                    beta: Some(-(friction + a) / here.theta),
+                }
+            }
+            Segment::Ceiling(timed) => timed.moment(&self.ceilings, place),
+            Segment::Sitting(sitting) => {
+                let (theta, friction) = (self.problem.to.theta, self.problem.friction_end());
+                let pressed = sitting.multiplier(&self.problem, sitting.time * place).0;
+                let t = self.t_f - sitting.time * (1.0 - place);
+                let beta = Some(-(friction + a + pressed) / theta).filter(|beta| beta.is_finite());
+                Moment { t, v: 1.0 / theta, theta, friction, v_c: None, beta }
+            }
+        }
     }
 }
 
-impl Motion for Optimal {
+impl Segment {
+    /// A piece whose times are not set yet.
+    fn of(piece: &ClampedPiece) -> Segment {
+        match piece {
+            ClampedPiece::Free { arc, .. } => Segment::Free(Timed::new(arc)),
+            &ClampedPiece::Ceiling { arc, gap } => Segment::Ceiling(TimedCeiling { arc, gap, start: 0.0, end: 0.0 }),
+        }
+    }
+
+    fn duration(&self) -> f64 {
+        match self {
+            Segment::Floor(floor) => floor.time,
+            Segment::Free(arc) => arc.left[0],
+            Segment::Ceiling(timed) => timed.arc.time(),
+            Segment::Sitting(sitting) => sitting.time,
+        }
+    }
+
+    fn set_times(&mut self, start: f64, end: f64) {
+        match self {
+            Segment::Free(arc) => arc.set_times(start, end),
+            Segment::Ceiling(timed) => (timed.start, timed.end) = (start, end),
+            Segment::Floor(_) | Segment::Sitting(_) => {}
+        }
+    }
+
+    /// Length of the coordinate.
+    fn length(&self) -> f64 {
+        match self {
+            Segment::Floor(floor) => floor.length(),
+            Segment::Free(arc) => arc.pieces.length.abs(),
+            Segment::Ceiling(timed) => timed.arc.coordinates().1.abs() + timed.arc.length,
+            Segment::Sitting(_) => 1.0,
+        }
+    }
+
+    /// Lengths of parts in which the motion is smooth, and into how many each is cut.
+    fn parts(&self) -> Vec<(f64, u32)> {
+        let count = |length: f64| length.ceil().clamp(1.0, MOST_PARTS) as u32;
+        let length = self.length();
+        match self {
+            Segment::Floor(floor) => {
+                let first = floor.first();
+                vec![(first, count(first)), (length - first, count(length - first))]
+            }
+            Segment::Free(arc) => vec![(length, arc.pieces.count)],
+            Segment::Ceiling(_) => vec![(length, count(2.0 * length).max(2))],
+            Segment::Sitting(_) => vec![(length, 2)],
+        }
+    }
+}
+
+/// Most parts of a segment. Chosen: what is left after this length, `e^-500`, is below every rounding.
+const MOST_PARTS: f64 = 500.0;
+
+impl TimedCeiling {
+    fn moment(&self, ceilings: &Ceilings, place: f64) -> Moment {
+        let Law { a, b } = ceilings.law;
+        let arc = &self.arc;
+        let [before, after] = arc.cut(ceilings, place);
+        let (gone, left) = (before.time(), after.time());
+        let all = self.end - self.start;
+        let t = if gone <= left {
+            (self.start + gone).min(self.start + 0.5 * all)
+        } else {
+            (self.end - left).max(self.start + 0.5 * all)
+        };
+        let (high, low) = if arc.falls() { (before, after) } else { (after, before) };
+        let (depth, z) = (Depth { below: high.length, above: low.length }, high.z_lo);
+        let theta = arc.theta_hi * exp(-depth.below);
+        let of_v = arc.kind == ArcKind::VCeiling;
+        let friction = if of_v { 1.0 + a * ln(ceilings.v) + b * ln(theta) } else { ceilings.tau };
+        let pressed = if z == 0.0 { 0.0 } else { self.gap.value(depth) / exp_m1(z) };
+        Moment {
+            t,
+            v: if of_v { ceilings.v } else { exp(z) / theta },
+            theta,
+            friction,
+            v_c: None,
+            beta: Some(-(friction + a - pressed) / theta),
+        }
+    }
+}
+
+impl Motion for OptimalMotion {
     fn duration(&self) -> f64 {
         self.t_f
     }
 
     fn landmarks(&self) -> Vec<f64> {
-        let mut landmarks = vec![0.0];
-        if self.fraction > 0.0 {
-            let (first, length) = (self.floor.first(), self.floor.length());
-            for (from, to) in [(0.0, first), (first, length)] {
-                let pieces = (to - from).ceil().max(1.0);
-                let place = |i: u32| (from + (to - from) * f64::from(i) / pieces) / length;
-                landmarks.extend((1..=pieces as u32).map(|i| self.fraction * place(i)));
-            }
-        }
-        if let Some(arc) = &self.arc {
-            let count = arc.pieces.count;
-            landmarks
-                .extend((1..=count).map(|i| self.fraction + (1.0 - self.fraction) * f64::from(i) / f64::from(count)));
+        let all = self.edges[self.edges.len() - 1];
+        let (mut landmarks, mut from) = (vec![0.0], 0.0);
+        for (length, count) in self.segments.iter().flat_map(Segment::parts) {
+            landmarks.extend((1..=count).map(|i| (from + length * f64::from(i) / f64::from(count)) / all));
+            from += length;
         }
         if let Some(last) = landmarks.last_mut() {
             *last = 1.0;
@@ -61,30 +201,15 @@ impl Motion for Optimal {
     }
 
     fn at(&self, s: f64) -> Moment {
-        let s = s.clamp(0.0, 1.0);
-        let arc = match &self.arc {
-            Some(arc) if s >= self.fraction => arc,
-            _ => return self.floor.at(s / self.fraction),
-        };
-        let Law { a, b } = self.law;
-        let place = if s == 1.0 { 1.0 } else { ((s - self.fraction) / (1.0 - self.fraction)).min(1.0) };
-        let here = arc.pieces.at(place);
-        let v = exp(here.ln_u - here.ln_theta);
-        let on_bound = self.bounded && v < 1.0 && v > 1.0 - ROUNDING;
-        let friction = 1.0 + a * here.ln_u + (b - a) * here.ln_theta;
-        Moment {
-            t: arc.time(place),
-            v: if on_bound { 1.0 } else { v },
-            theta: here.theta,
-            friction,
-            v_c: None,
-            // C - a v, which cancels where v is large.
-            beta: Some(-(friction + a) / here.theta),
-        }
+        let along = s.clamp(0.0, 1.0) * self.edges[self.edges.len() - 1];
+        let i = self.edges.partition_point(|&edge| edge <= along).clamp(1, self.segments.len()) - 1;
+        let (from, to) = (self.edges[i], self.edges[i + 1]);
+        let place = if s >= 1.0 { 1.0 } else { ((along - from) / (to - from)).min(1.0) };
+        self.moment(&self.segments[i], place)
     }
 }
 
-/// The hold: `v = 1` until the contact lifetime is `theta_s`.
+/// The floor arc: `v = 1` until the state variable is `theta_s`.
 pub(super) struct Floor {
     pub law: Law,
     pub from: Lifetime,
@@ -95,7 +220,7 @@ pub(super) struct Floor {
 }
 
 impl Floor {
-    /// The hold of `problem` that takes `time`, until the contact lifetime is `theta_s`.
+    /// The floor arc of `problem` that takes `time`, until the state variable is `theta_s`.
     pub fn new(problem: &Problem, theta_s: f64, time: f64) -> Floor {
         let beta_s = -(1.0 + problem.law.a + problem.law.b * ln(theta_s)) / theta_s;
         Floor { law: problem.law, from: problem.from, theta_s, time, beta_s }
@@ -112,7 +237,7 @@ impl Floor {
         self.first() + ln_1p(0.5 * self.time)
     }
 
-    /// Its coordinate in the middle of the hold.
+    /// Its coordinate in the middle of the floor arc.
     fn first(&self) -> f64 {
         ln_1p(0.5 * self.time / self.from.theta)
     }
@@ -156,14 +281,14 @@ impl Floor {
     }
 }
 
-/// The arc with its time.
+/// A free arc with its time.
 pub(super) struct Timed {
     pub pieces: EqualSteps,
     /// The conserved `C`.
     pub c: f64,
-    /// When it begins.
+    /// When it begins and ends.
     pub start: f64,
-    t_f: f64,
+    end: f64,
     /// Time from the start of the arc to the start of each piece, and to the end.
     pub gone: Vec<f64>,
     /// Time from the start of each piece to the end of the arc, and 0.
@@ -175,17 +300,8 @@ pub(super) struct Timed {
 }
 
 impl Timed {
-    fn new(arc: &Arc, time_at_floor: f64, t_f: f64) -> Timed {
-        Timed::ending(arc, t_f, |total| if time_at_floor > 0.0 { (t_f - total).max(0.0) } else { 0.0 })
-    }
-
-    /// The arc from `start` to `end`.
-    pub fn between(arc: &Arc, start: f64, end: f64) -> Timed {
-        Timed::ending(arc, end, |_| start)
-    }
-
-    /// The arc until `t_f`, from a time that depends on how long it takes.
-    fn ending(arc: &Arc, t_f: f64, start: impl Fn(f64) -> f64) -> Timed {
+    /// The arc from the time 0.
+    pub fn new(arc: &Arc) -> Timed {
         let pieces = arc.pieces();
         let edge = |piece: usize| piece as f64 / f64::from(pieces.count);
         let times: Vec<f64> = (0..pieces.count as usize).map(|i| pieces.time(edge(i), edge(i + 1))).collect();
@@ -201,12 +317,17 @@ impl Timed {
         let gone = sums(&mut times.iter());
         let mut left = sums(&mut times.iter().rev());
         left.reverse();
-        let total = left[0];
-        // Rounding of the search goes to the hold, if there is one.
-        let start = start(total);
-        let scale = (t_f - start) / total;
-        let middle = gone.iter().skip(1).zip(&left).find(|(gone, left)| gone > left).map_or(0.0, |(_, &left)| left);
-        Timed { pieces, c: arc.c(), start, t_f, gone, left, scale, middle: t_f - scale * middle }
+        let mut timed = Timed { pieces, c: arc.c(), start: 0.0, end: 0.0, gone, left, scale: 1.0, middle: 0.0 };
+        timed.set_times(0.0, timed.left[0]);
+        timed
+    }
+
+    /// Moves the arc to the time from `start` to `end`.
+    pub fn set_times(&mut self, start: f64, end: f64) {
+        let nearer_end = self.gone.iter().skip(1).zip(&self.left).find(|(gone, left)| gone > left);
+        self.scale = (end - start) / self.left[0];
+        self.middle = end - self.scale * nearer_end.map_or(0.0, |(_, &left)| left);
+        (self.start, self.end) = (start, end);
     }
 
     /// Time since the start of the protocol: from the nearer end of the arc, so that the layers at both ends keep their
@@ -221,7 +342,7 @@ impl Timed {
             (self.start + self.scale * gone).min(self.middle).max(self.start)
         } else {
             let left = (self.left[piece + 1] + self.pieces.time(place, to)).min(self.left[piece]);
-            (self.t_f - self.scale * left).max(self.middle).min(self.t_f)
+            (self.end - self.scale * left).max(self.middle).min(self.end)
         }
     }
 }

@@ -1,8 +1,9 @@
 //! The optimal protocol asked at a given time: derivatives, what happens between two places, and the control it takes.
 
-use super::arc::least_friction;
+use super::arc::friction_range;
+use super::extremal::{Extremal, Problem};
 use super::floor;
-use super::motion::{Optimal, Timed};
+use super::motion::{Floor, Timed};
 use crate::model::Law;
 use crate::numerics::elementary::{exp, exp_m1, ln};
 use crate::numerics::radau::radau;
@@ -11,7 +12,7 @@ use crate::protocol::control::{Jet, SpringBlock, Tolerance, ValueRange};
 /// A place on the protocol.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum PathPoint {
-    /// On the hold, after this time.
+    /// On the floor arc, after this time.
     Held(f64),
     /// On the arc, from 0 at its start to 1 at its end.
     Moving(f64),
@@ -28,8 +29,35 @@ pub struct PathSegment {
     pub work: f64,
 }
 
-impl Optimal {
-    /// When the hold ends and the arc begins; `None` if there is only one of them.
+/// The free optimal protocol: the floor arc, then the free arc.
+pub struct Route {
+    law: Law,
+    t_f: f64,
+    floor: Floor,
+    arc: Option<Timed>,
+}
+
+impl Route {
+    /// The route along `extremal`, or along the floor arc alone, in time `t_f`.
+    pub(super) fn new(problem: &Problem, t_f: f64, extremal: Option<Extremal>) -> Route {
+        let theta_s = extremal.map_or(problem.to.theta, |found| found.theta_s);
+        let arc = extremal.map(|found| {
+            let mut arc = Timed::new(&found.arc);
+            // Rounding of the search goes to the floor arc, if there is one.
+            let start = if found.time_at_floor > 0.0 { (t_f - arc.left[0]).max(0.0) } else { 0.0 };
+            arc.set_times(start, t_f);
+            arc
+        });
+        let floor = Floor::new(problem, theta_s, arc.as_ref().map_or(t_f, |arc| arc.start));
+        Route { law: problem.law, t_f, floor, arc }
+    }
+
+    /// Duration `t_f`.
+    pub fn duration(&self) -> f64 {
+        self.t_f
+    }
+
+    /// When the floor arc ends and the free arc begins; `None` if there is only one of them.
     pub fn corner(&self) -> Option<f64> {
         self.arc.as_ref().map(|arc| arc.start).filter(|&start| start > 0.0)
     }
@@ -106,7 +134,7 @@ impl Optimal {
             let end = if let PathPoint::Held(end) = to { end } else { self.floor.time };
             // Theta changes over its first value, and then over 1.
             let mut time = start;
-            while time < end && sites.len() < MOST_MARKS {
+            while time < end && sites.len() < MAX_MARKS {
                 time = (time + 0.5 * self.floor.from.aged(time).theta).min(end);
                 sites.push(PathPoint::Held(time));
             }
@@ -130,11 +158,8 @@ impl Optimal {
         }
         if let (PathPoint::Moving(end), Some(arc)) = (to, &self.arc) {
             let start = if let PathPoint::Moving(start) = from { start } else { 0.0 };
-            let state = |place| {
-                let here = arc.pieces.at(place);
-                (here.theta, here.ln_u)
-            };
-            least = least.min(least_friction(&self.law, arc.c, [state(start), state(end)]));
+            let (first, last) = (arc.pieces.at(start), arc.pieces.at(end));
+            least = least.min(friction_range(&self.law, arc.c, [&first, &last])[0]);
         }
         least
     }
@@ -235,15 +260,15 @@ pub fn lag_at_bound(theta: f64, time: f64) -> f64 {
     idle - theta * exp_m1(-time)
 }
 
-/// Most landmarks of a hold: beyond, nothing changes any more.
-const MOST_MARKS: usize = 100;
+/// Most landmarks of a floor arc: beyond, nothing changes any more.
+const MAX_MARKS: usize = 100;
 
 /// The argument in `[0, most]` at which a rising function with f(0) = 0 takes a value: bracketed secants of its logarithm.
 fn inverse(value: f64, most: f64, f: impl Fn(f64) -> f64) -> f64 {
     let (mut low, mut high) = (0.0, most);
     let mut last = (most, f(most));
     let mut d = most * (value / last.1).clamp(0.0, 1.0);
-    for _ in 0..MOST_STEPS {
+    for _ in 0..MAX_STEPS {
         if d <= low || d >= high {
             d = 0.5 * (low + high);
         }
@@ -257,7 +282,7 @@ fn inverse(value: f64, most: f64, f: impl Fn(f64) -> f64) -> f64 {
         }
         d *= exp(ln(value / found) / order);
         // The last step leaves less than the square of what it started from; the rounding of places leaves more.
-        if (found / value - 1.0).abs() <= ENOUGH {
+        if (found / value - 1.0).abs() <= LAST_STEP_RTOL {
             break;
         }
     }
@@ -265,10 +290,10 @@ fn inverse(value: f64, most: f64, f: impl Fn(f64) -> f64) -> f64 {
 }
 
 /// A relative difference that one more step makes up for.
-const ENOUGH: f64 = 1e-8;
+const LAST_STEP_RTOL: f64 = 1e-8;
 
 /// More steps than the secants take.
-const MOST_STEPS: u32 = 60;
+const MAX_STEPS: u32 = 60;
 
 #[cfg(test)]
 mod tests {

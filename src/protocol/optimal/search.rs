@@ -1,11 +1,13 @@
 //! The search for the extremal that takes a given time, and what is read off it.
 
 use super::arc::Sums;
+use super::ceiling::Ceilings;
+use super::clamp::Path;
 use super::extremal::{Extremal, Problem};
-use super::guess::{Guess, guess};
-use super::{Optimum, Strategy, floor};
-use crate::numerics::elementary::exp;
-use crate::numerics::root::newton_in_pieces;
+use super::guess::Guess;
+use super::{ArcKind, Optimum, Strategy, floor};
+use crate::numerics::elementary::{exp, ln_1p};
+use crate::numerics::root::{Probe, newton_in_pieces};
 use crate::protocol::{Solved, SolverStats, Status};
 
 /// Tolerance of a quadrature whose results are to be good to `rtol`. Velocities at the ends change by up to some twenty
@@ -15,48 +17,213 @@ pub(super) fn quadrature_tolerance(rtol: f64) -> f64 {
 }
 
 /// Steps across the seam of the family before it counts as met.
-const MOST_CROSSINGS: u32 = 4;
+const MAX_CROSSINGS: u32 = 4;
 
-/// Most steps that make a short hold more exact.
-const MOST_REFINEMENTS: u32 = 10;
+/// Most steps that make a short floor arc more exact.
+const MAX_REFINEMENTS: u32 = 10;
 
-/// A relative change of a short hold after which the next one is rounding.
-const SETTLED: f64 = 1e-7;
+/// A relative change of a short floor arc after which the next one is rounding.
+const LAST_REFINEMENT_RTOL: f64 = 1e-7;
 
-/// A relative difference of times that is rounding.
-const SPENT: f64 = 4.0 * f64::EPSILON;
+/// A relative difference of times that is rounding. Chosen: that of a few operations.
+const TIME_ROUNDING: f64 = 4.0 * f64::EPSILON;
 
-/// A bracket that closes on a larger change of the time holds no member of this time, but a gap of the family; unless
-/// a search may end there, with a corrected step that leaves an error of third order.
-const JUMP: f64 = 1e-2;
-
-/// Fraction of the whole time below which a hold is short.
-const SHORT: f64 = 0.01;
-
-/// Fraction of `q_hold` below which parameters are counted from 0: counted from `q_hold`, a search could not distinguish them.
-const NEAR: f64 = 1e-5;
+/// Fraction of the whole time below which a floor arc is short.
+const SHORT_FLOOR_TIME: f64 = 0.01;
 
 /// How far from the seam, in the scaled start of the arc or in `ln v(0+)`, a protocol without time at the floor is near it.
-const SEAM: f64 = 1e-3;
+const SEAM_WIDTH: f64 = 1e-3;
 
-/// The rounding error of a velocity at the floor, relative.
+/// The rounding error of a velocity at the floor, relative. Chosen: `ln u` has errors of some roundings over `a`, at least 1e-3, far below this.
 pub(super) const ROUNDING: f64 = 1e-9;
 
 /// Tightest tolerance of a quadrature.
 pub(super) const FINEST: f64 = 1e-18;
 
-/// The solution and its extremal; `None` without a solution, or without an arc after the floor.
-pub(super) fn find(problem: &Problem, t_f: f64, rtol: f64) -> (Solved<Optimum>, Option<Member>) {
-    find_beyond(problem, Time::since(problem, t_f), rtol)
+/// A family of paths in one parameter, in which the time is monotone.
+pub(super) trait Family {
+    type Path: Copy;
+    /// An interval of the parameter in which the time is smooth.
+    type Piece: Copy + PartialEq;
+
+    fn problem(&self) -> &Problem;
+
+    /// Whether time rises with the parameter.
+    fn rises(&self) -> bool;
+
+    /// The path at a parameter; `None` where there is none.
+    fn path(&self, p: f64) -> Option<Self::Path>;
+
+    fn piece(&self, p: f64, path: &Self::Path) -> Self::Piece;
+
+    /// Quadrature to relative accuracy `tolerance`.
+    fn measure(&self, path: &Self::Path, tolerance: f64) -> Option<Measured>;
+
+    /// The short arc of a path whose length is not known as well as that of the whole.
+    fn short_arc(&self, p: f64, path: &Self::Path) -> Option<ShortArc>;
+
+    /// Whether the slope of the time may jump where the parameter is 0.
+    fn breaks_at_zero(&self) -> bool;
+
+    fn extremal(path: &Self::Path) -> &Extremal;
+
+    /// Work at the floor and on the ceilings, and the nodes that it takes.
+    fn bound_work(&self, path: &Self::Path) -> (f64, u32);
+
+    /// Reads a path with its pieces.
+    fn in_pieces<T>(&self, path: &Self::Path, read: impl FnOnce(&Path) -> T) -> T;
 }
 
-/// A member of the family of extremals.
+/// What one quadrature finds.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Member {
-    pub extremal: Extremal,
-    /// Its parameter, counted from `q_hold` if that is used.
+pub(super) struct Measured {
+    /// By how much the time is less than the one wanted.
+    pub lag: f64,
+    /// Work of the free arcs.
+    pub work: f64,
+    /// Least friction met at a node.
+    pub friction_min: f64,
+    pub nodes: u32,
+    /// How far the time is from the one wanted, as a rising function of the parameter.
+    pub probe: Probe,
+}
+
+/// A short arc: a small difference of two times.
+pub(super) struct ShortArc {
+    pub time: f64,
+    /// Tolerance of a quadrature that resolves it, in units of that of the whole.
+    pub fraction: f64,
+}
+
+/// Where a search starts.
+pub(super) struct Start {
     pub p: f64,
-    pub q_hold: Option<f64>,
+    pub bracket: (f64, f64),
+    /// Expected relative error of the time there.
+    pub error: f64,
+}
+
+/// A search and its statistics.
+pub(super) struct Search<'a, F: Family> {
+    family: &'a F,
+    accuracy: Accuracy,
+    /// Tolerance of the next quadrature.
+    tolerance: f64,
+    /// The last path, its piece and what was measured.
+    last: Option<(F::Path, F::Piece, Measured)>,
+    stats: SolverStats,
+    /// Least friction met at a node.
+    friction_min: f64,
+}
+
+impl<'a, F: Family> Search<'a, F> {
+    /// The optimum, whose path takes the time of which `fraction` counts, with the path and its parameter.
+    #[inline(always)]
+    pub fn solve(
+        family: &'a F,
+        ceilings: &Ceilings,
+        accuracy: Accuracy,
+        start: Start,
+        fraction: f64,
+        stats: SolverStats,
+    ) -> (Solved<Optimum>, Option<(F::Path, f64)>) {
+        let tolerance = (1e-3 * start.error).max(accuracy.exact);
+        let mut search = Search { family, accuracy, tolerance, last: None, stats, friction_min: f64::INFINITY };
+        let root = search.root(start.p, start.bracket, fraction);
+        let found = search.refined(root);
+        // A bracket that closes on a larger change of the time holds no member of this time, but a gap of the family.
+        let close = (10.0 * search.accuracy.enough).max(libm::cbrt(search.accuracy.least));
+        let last = search.last.filter(|(.., last)| last.probe.value.abs() <= close);
+        let (problem, mut stats) = (family.problem(), search.stats);
+        let failure = || failure(problem, ceilings, search.friction_min);
+        let Some(((p, path), (probed, _, measured))) = found.zip(last) else {
+            return (Solved { status: failure(), value: None, stats }, None);
+        };
+        // W* is stationary in the parameter up to C dt: the trapezium of C over the last step leaves an error of third
+        // order.
+        let c = F::extremal(&probed).arc.c() + F::extremal(&path).arc.c();
+        let (bound_work, nodes) = family.bound_work(&probed);
+        stats.nodes += nodes;
+        let work = bound_work + measured.work - 0.5 * c * measured.lag;
+        let read = family.in_pieces(&path, |path| read(problem, ceilings, path, work, measured.friction_min));
+        let (status, value) = read.unwrap_or_else(|| (failure(), None));
+        (Solved { status, value, stats }, Some((path, p)))
+    }
+
+    #[inline(always)]
+    fn probe(&mut self, p: f64, fraction: f64) -> Option<(Probe, F::Piece)> {
+        let path = self.family.path(p)?;
+        let piece = self.family.piece(p, &path);
+        let before = self.last.as_ref().filter(|(_, before, _)| *before == piece).map(|(.., last)| last.probe.value);
+        let accuracy = &self.accuracy;
+        let measured = loop {
+            let measured = self.family.measure(&path, (self.tolerance * fraction).max(FINEST))?;
+            self.stats.quadratures += 1;
+            self.stats.nodes += measured.nodes;
+            let value = measured.probe.value;
+            // A value within the error of its quadrature determines nothing, not even its sign.
+            let doubtful = self.tolerance > accuracy.exact
+                && (value.abs() <= 30.0 * self.tolerance || accuracy.may_end(value, before));
+            let next = accuracy.next(value, before);
+            self.tolerance = if doubtful { next.min(1e-3 * self.tolerance).max(accuracy.exact) } else { next };
+            if !doubtful {
+                break measured;
+            }
+        };
+        self.friction_min = self.friction_min.min(measured.friction_min);
+        self.last = Some((path, piece, measured));
+        Some((measured.probe, piece))
+    }
+
+    #[inline(always)]
+    fn root(&mut self, mut start: f64, bracket: (f64, f64), fraction: f64) -> Option<(f64, F::Path)> {
+        let (family, enough, least) = (self.family, self.accuracy.enough, self.accuracy.least);
+        let mut outcome = None;
+        for _ in 0..MAX_CROSSINGS {
+            let root = newton_in_pieces(|p| self.probe(p, fraction), start, bracket, family.rises(), enough, least);
+            // Rounding may step to an end of the bracket, where no member need exist.
+            let member = |x| family.path(x).map(|path| (x, path));
+            let found = root.and_then(|(root, piece)| {
+                let (x, path) = member(root.x).or_else(|| member(root.probed))?;
+                Some((x, path, piece))
+            });
+            outcome = found.map(|(x, path, _)| (x, path));
+            // The slope jumps at a seam of the family: a last step across it is taken again from the other side.
+            match found {
+                Some((x, path, piece)) if family.piece(x, &path) != piece => start = x,
+                _ => break,
+            }
+        }
+        outcome
+    }
+
+    /// More steps, as fine as a short arc asks.
+    #[inline(always)]
+    fn refined(&mut self, mut outcome: Option<(f64, F::Path)>) -> Option<(f64, F::Path)> {
+        let family = self.family;
+        for _ in 0..MAX_REFINEMENTS {
+            let (x, path) = outcome.as_mut()?;
+            let Some(before) = family.short_arc(*x, path) else { break };
+            let Some((last, piece)) = self.probe(*x, before.fraction).filter(|(last, _)| last.slope > 0.0) else {
+                break;
+            };
+            let finer = *x - last.value / last.slope;
+            // The slope may be 1e5 times as large on the other side of the start of a floor arc: a step ends there, and goes on
+            // with that side's own.
+            let crosses = family.breaks_at_zero() && finer * x.signum() < 0.0;
+            let finer = if crosses { f64::MIN_POSITIVE.copysign(finer) } else { finer };
+            let Some(next) = family.path(finer) else { break };
+            (*x, *path) = (finer, next);
+            let after = family.short_arc(finer, &next).map_or(before.time, |arc| arc.time);
+            // An arc that such a step changes is not yet known to the square of that change.
+            let settled =
+                (after - before.time).abs() <= LAST_REFINEMENT_RTOL * before.time || last.value.abs() <= TIME_ROUNDING;
+            if family.piece(finer, &next) == piece && last.value.abs() <= self.accuracy.enough && settled && !crosses {
+                break;
+            }
+        }
+        outcome
+    }
 }
 
 /// A time, and what of it is beyond the least one.
@@ -76,206 +243,221 @@ impl Time {
     }
 }
 
-/// The solution for a time beyond the least, given without cancellation.
-pub(super) fn find_beyond(problem: &Problem, time: Time, rtol: f64) -> (Solved<Optimum>, Option<Member>) {
+/// The optimum without ceilings, with its extremal and parameter; without them where it is the floor arc alone.
+pub(super) fn free(
+    problem: &Problem,
+    time: Time,
+    rtol: f64,
+    guess: &Guess,
+) -> (Solved<Optimum>, Option<(Extremal, f64)>) {
     let Time { whole: t_f, beyond, doubt } = time;
-    let mut stats = SolverStats::default();
+    let stats = SolverStats::default();
     if beyond < 0.0 || beyond.is_nan() || (beyond == 0.0 && !problem.bounded) {
         return (Solved { status: Status::Infeasible, value: None, stats }, None);
     }
     if beyond == 0.0 {
         return (shortest(problem, problem.t_min()), None);
     }
-    let family = Family { q_hold: problem.q_hold().filter(|&q_hold| problem.reach(beyond) >= NEAR * q_hold.abs()) };
-    let accuracy = Accuracy::new(rtol, doubt, problem.law.a);
-    let Guess { p: mut start, error } = guess(problem, family.q_hold, beyond);
-    let mut tolerance = (1e-3 * error).max(accuracy.exact);
-    let mut last: Option<Probed> = None;
-    let mut friction_min = f64::INFINITY;
-    let mut probe = |p, fraction: f64| {
-        let extremal = problem.extremal(p, family.q_hold)?;
-        let piece = family.piece(p, extremal.time_at_floor);
-        let before = last.as_ref().filter(|last| last.piece == piece).map(|last| last.value);
-        let (sums, probe) = loop {
-            let sums = extremal.arc.sums((tolerance * fraction).max(FINEST))?;
-            stats.quadratures += 1;
-            stats.nodes += sums.nodes;
-            let probe = extremal.probe(problem, &sums, beyond);
-            // A value within the error of its quadrature determines nothing, not even its sign.
-            let doubtful = tolerance > accuracy.exact
-                && (probe.value.abs() <= 30.0 * tolerance || accuracy.may_end(probe.value, before));
-            let next = accuracy.next(probe.value, before);
-            tolerance = if doubtful { next.min(1e-3 * tolerance).max(accuracy.exact) } else { next };
-            if !doubtful {
-                break (sums, probe);
-            }
-        };
-        friction_min = friction_min.min(sums.friction_min);
-        last = Some(Probed { extremal, sums, piece, value: probe.value });
-        Some((probe, piece))
-    };
+    let &Guess { q_floor, p, error } = guess;
+    let family = Extremals { problem, q_floor, t_f, beyond };
+    let start = Start { p, bracket: problem.bracket(q_floor, beyond), error };
     // What counts is the time beyond the least, which may be a small fraction of the whole.
-    let fraction = beyond / t_f;
-    let bracket = problem.bracket(family.q_hold, beyond);
-    let mut outcome = None;
-    for _ in 0..MOST_CROSSINGS {
-        let root =
-            newton_in_pieces(|p| probe(p, fraction), start, bracket, problem.rises(), accuracy.enough, accuracy.least);
-        let found = root.and_then(|(root, piece)| Some((root.x, problem.extremal(root.x, family.q_hold)?, piece)));
-        outcome = found.map(|(x, found, _)| (x, found));
-        // The slope jumps where a hold begins: a last step across such a seam is taken again from the other side.
-        match found {
-            Some((x, found, piece)) if family.piece(x, found.time_at_floor) != piece => start = x,
-            _ => break,
-        }
-    }
-    // A short hold is a small difference of two times: more steps, as fine as the hold asks. Near the seam a protocol
-    // without a hold may be one with a hold of less than the error.
-    for _ in 0..MOST_REFINEMENTS {
-        let Some((x, found)) = &mut outcome else { break };
-        let held = found.time_at_floor > 0.0;
-        let compared_with = if problem.rises() { found.start - problem.from.ln } else { *x };
-        let seam = family.q_hold.filter(|_| !held && compared_with < SEAM);
-        let fraction = match seam {
-            Some(_) => 0.0,
-            None if held && found.time_at_floor < SHORT * t_f => found.time_at_floor / t_f,
-            None => break,
-        };
-        let Some((last, _)) = probe(*x, fraction).filter(|(last, _)| last.slope > 0.0) else { break };
-        let finer = *x - last.value / last.slope;
-        // The slope may be 1e5 times as large on the other side of the start of a hold: a step ends there, and goes on
-        // with that side's own.
-        let crosses = family.q_hold.is_some() && finer * x.signum() < 0.0;
-        let finer = if crosses { f64::MIN_POSITIVE.copysign(finer) } else { finer };
-        let Some(extremal) = problem.extremal(finer, family.q_hold) else { break };
-        let before = found.time_at_floor;
-        (*x, *found) = (finer, extremal);
-        // A hold that such a step changes is not yet known to the square of that change.
-        let settled = (found.time_at_floor - before).abs() <= SETTLED * before || last.value.abs() <= SPENT;
-        if held == (found.time_at_floor > 0.0) && last.value.abs() <= accuracy.enough && settled && !crosses {
-            break;
-        }
-    }
-    let unique_above = problem.unique_above();
-    let close = JUMP.max(10.0 * accuracy.enough).max(libm::cbrt(accuracy.least));
-    let (Some((p, found)), Some(Probed { extremal: probed, sums, .. })) =
-        (outcome, last.filter(|last| last.value.abs() <= close))
-    else {
-        let doubtful = friction_min <= unique_above || problem.is_doubtful();
-        let status = if doubtful { Status::Unproven } else { Status::NotConverged };
-        return (Solved { status, value: None, stats }, None);
-    };
+    let accuracy = Accuracy::new(rtol, doubt, problem.law.a);
+    Search::solve(&family, &Ceilings::none(problem.law), accuracy, start, beyond / t_f, stats)
+}
 
-    // W* is stationary in the parameter up to C dt: the trapezium of C over the last step leaves an error of third
-    // order.
-    let (c_probed, c) = (probed.arc.c(), found.arc.c());
-    let lag = beyond - probed.time_beyond(&sums);
-    let work = probed.work(problem, &sums) - 0.5 * (c_probed + c) * lag;
-    let held = found.time_at_floor > 0.0;
-    let v_start = if held { 1.0 } else { exp(found.start) / problem.from.theta };
-    // Just off the bound, rounding may take v(0+) below it; further below there is no protocol on the bound at all.
-    let below = v_start < 1.0 - ROUNDING;
-    let v_start = if problem.bounded && !below { v_start.max(1.0) } else { v_start };
-    let v_end = exp(found.end) / problem.to.theta;
-    let v_end = if problem.bounded && v_end > 1.0 - ROUNDING { v_end.max(1.0) } else { v_end };
-    let friction = found.friction_min(problem, &sums);
-    let strategy = if held {
-        Strategy::Floor
-    } else if v_start * problem.from.theta > 1.0 {
-        Strategy::SpeedUp
-    } else {
-        Strategy::SlowDown
-    };
-    let doubtful = friction <= unique_above || (problem.bounded && below);
-    if doubtful && problem.bounded && (below || velocity_range(&found)[0] < 1.0 - ROUNDING) {
-        // Where friction is this low an extremal may fall below the bound on its way: then it is no protocol under it.
-        return (Solved { status: Status::Unproven, value: None, stats }, None);
+/// The status of a search without a solution: a defect, unless no protocol has friction at both ends that proves its
+/// extremal the only one, or friction was too low for that on the way.
+fn failure(problem: &Problem, ceilings: &Ceilings, met: f64) -> Status {
+    let under_ceilings = |steady: f64, y: f64| steady + problem.law.a * ceilings.cap(y);
+    let start = under_ceilings(problem.friction_start(), ln_1p(problem.fall));
+    let least = start.min(under_ceilings(problem.friction_end(), 0.0)).min(met);
+    let doubtful = problem.is_doubtful() || least <= problem.unique_above();
+    if doubtful { Status::Unproven } else { Status::NotConverged }
+}
+
+/// The optimum of a path, without one where that is no protocol under the bounds; `None` where the search failed.
+#[inline(always)]
+pub(super) fn read(
+    problem: &Problem,
+    ceilings: &Ceilings,
+    path: &Path,
+    work: f64,
+    met: f64,
+) -> Option<(Status, Option<Optimum>)> {
+    let Extremal { time_at_floor, ref arc, .. } = path.extremal;
+    let (first, last) = path.pieces().next().zip(path.pieces().last())?;
+    let velocity =
+        |(theta, z): (f64, f64), kind: ArcKind| if kind == ArcKind::VCeiling { ceilings.v } else { exp(z) / theta };
+    let held = time_at_floor > 0.0;
+    let v_start = if held { 1.0 } else { velocity(first.ends()[0], first.kind()) };
+    let v_end = velocity(last.ends()[1], last.kind());
+    let friction = path.friction(problem, met);
+    // A ceiling that hardly binds is met to the accuracy of the search.
+    let most = ceilings.v * (1.0 + ROUNDING_AT_CEILING);
+    let most_tau = ceilings.tau + ROUNDING_AT_CEILING * (problem.law.a + ceilings.tau.abs());
+    if v_end > most || friction.greatest > most_tau {
+        return None;
     }
+    // Just off the bound, rounding may take a velocity below it; further below there is no protocol on the bound at all.
+    let below = problem.bounded && v_start.min(v_end) < 1.0 - ROUNDING;
+    let doubtful = below || (friction.least_steady <= problem.unique_above() && !is_proven(problem, &path.extremal));
+    let (of_v, of_tau) = path.times();
+    // Where friction is this low the velocity may fall along an arc: below the floor, or from above the ceiling.
+    let dips = || problem.bounded && of_v + of_tau == 0.0 && velocity_range(&path.extremal)[0] < 1.0 - ROUNDING;
+    if below || v_start > if doubtful { ceilings.v } else { most } || (doubtful && dips()) {
+        return Some((Status::Unproven, None));
+    }
+    let least = if problem.bounded { 1.0 } else { 0.0 };
+    let (v_start, v_end) = (v_start.max(least).min(ceilings.v), v_end.max(least).min(ceilings.v));
     let status = if doubtful {
         Status::Unproven
-    } else if v_start < 1.0 && !problem.bounded {
+    } else if v_start.min(v_end) < 1.0 {
         Status::BelowBound
     } else {
         Status::Ok
     };
-    let status = status.with_friction(friction);
-    let value = Optimum {
+    let optimum = Optimum {
         work,
         v_start,
         v_end,
-        time_at_floor: found.time_at_floor,
-        time_at_v_ceiling: 0.0,
-        time_at_tau_ceiling: 0.0,
-        hamiltonian: -c,
-        theta_max: found.arc.theta_max(),
-        friction_max: found.friction_max(problem),
-        strategy,
+        time_at_floor,
+        time_at_v_ceiling: of_v,
+        time_at_tau_ceiling: of_tau,
+        hamiltonian: -arc.c(),
+        theta_max: arc.theta_max().max(problem.to.theta),
+        friction_max: friction.greatest.min(ceilings.tau),
+        strategy: if held {
+            Strategy::Floor
+        } else if v_start * problem.from.theta > 1.0 {
+            Strategy::SpeedUp
+        } else {
+            Strategy::SlowDown
+        },
     };
-    (Solved { status, value: Some(value), stats }, Some(Member { extremal: found, p, q_hold: family.q_hold }))
+    Some((status.with_friction(friction.least), Some(optimum)))
 }
 
-/// Least and greatest velocity of the arc of an extremal: at an end, or where friction passes `b - a`, upwards for the least.
+/// Relative excess over a ceiling that is an error of the search. Chosen: far above the errors of a search that succeeds.
+const ROUNDING_AT_CEILING: f64 = 1e-7;
+
+/// Whether an extremal is proved to be the only one, however low friction falls on it: for `b > a`, where `tau_ss >= 2 (b - a)`
+/// at both ends and it obeys the floor (docs/derivations.md, "Unique: monotone time").
+pub(super) fn is_proven(problem: &Problem, found: &Extremal) -> bool {
+    let least = 2.0 * problem.unique_above();
+    if least <= 0.0 || problem.friction_start().min(problem.friction_end()) < least {
+        return false;
+    }
+    if !problem.bounded {
+        true
+    } else if found.time_at_floor > 0.0 {
+        // Where friction at v = 1 falls as theta rises, a free arc may come before the floor.
+        found.arc.c() >= floor::c_leaving(&problem.law, problem.from.theta, problem.from.ln)
+    } else {
+        velocity_range(found)[0] >= 1.0 - ROUNDING
+    }
+}
+
+/// Least and greatest velocity of the arc of an extremal: at an end, or where friction passes `b - a`. There `theta tau' = b (1 -
+/// u)`, so that it passes upwards at most once before the turn, and downwards at most once after it.
 pub(super) fn velocity_range(found: &Extremal) -> [f64; 2] {
     let (pieces, law) = (found.arc.pieces(), found.arc.law);
+    // Friction above b - a, and ln v.
     let look = |place: f64| {
         let here = pieces.at(place);
-        let friction = 1.0 + law.a * here.ln_u + (law.b - law.a) * here.ln_theta;
-        (friction - (law.b - law.a), here.ln_u - here.ln_theta)
+        (1.0 + law.a * here.ln_u + (law.b - law.a) * (here.ln_theta - 1.0), here.ln_u - here.ln_theta)
     };
-    let place = |k: u32| f64::from(k) / f64::from(PLACES);
-    let mut before = look(0.0);
-    let (mut least, mut greatest) = (before.1, before.1);
-    for k in 1..=PLACES {
-        let after = look(place(k));
-        let mut seen = after.1;
-        if (before.0 < 0.0) != (after.0 < 0.0) {
-            let (mut low, mut high) = (place(k - 1), place(k));
-            for _ in 0..HALVINGS {
-                let middle = 0.5 * (low + high);
-                if (look(middle).0 < 0.0) == (before.0 < 0.0) { low = middle } else { high = middle }
-            }
-            seen = look(low).1;
+    let bisect = |[mut low, mut high]: [f64; 2], is_low: &dyn Fn(f64) -> bool| {
+        for _ in 0..HALVINGS {
+            let middle = 0.5 * (low + high);
+            if is_low(middle) { low = middle } else { high = middle }
         }
-        least = least.min(after.1).min(seen);
-        greatest = greatest.max(after.1).max(seen);
-        before = after;
-    }
-    [exp(least), exp(greatest)]
+        low
+    };
+    let turn = bisect([0.0, 1.0], &|place| pieces.at(place).ln_u < 0.0);
+    let flat = [[0.0, turn], [turn, 1.0]].map(|leg| {
+        let sign = look(leg[0]).0 < 0.0;
+        look(bisect(leg, &|place| (look(place).0 < 0.0) == sign)).1
+    });
+    let ln_v = [look(0.0).1, look(1.0).1, flat[0], flat[1]];
+    [f64::INFINITY, f64::NEG_INFINITY]
+        .map(|from| ln_v.iter().fold(from, |range, &v| if from > 0.0 { range.min(v) } else { range.max(v) }))
+        .map(exp)
 }
 
-/// Places at which an arc is looked at for its least velocity: friction rises through `b - a` once at the most.
-const PLACES: u32 = 64;
+/// Halvings that find a place where the velocity is flat: half of the digits of a place are enough.
+const HALVINGS: u32 = 36;
 
-/// Halvings of what lies between two of them: the velocity is flat there, so half of the digits of a place are enough.
-const HALVINGS: u32 = 30;
-
-/// The last probe of a search.
-struct Probed {
-    extremal: Extremal,
-    sums: Sums,
-    piece: SmoothInterval,
-    value: f64,
-}
-
-/// The family in its parameter `p`, which counts from `q_hold`.
-struct Family {
-    q_hold: Option<f64>,
+/// The extremals of a problem; the parameter counts from `q_floor`.
+struct Extremals<'a> {
+    problem: &'a Problem,
+    q_floor: Option<f64>,
+    t_f: f64,
+    beyond: f64,
 }
 
 /// An interval of the parameter in which the time is smooth.
 #[derive(Clone, Copy, PartialEq)]
 struct SmoothInterval {
-    /// Beyond `q_hold`.
+    /// Beyond `q_floor`.
     beyond: bool,
     /// Beyond `q = 0`.
     turned: bool,
     held: bool,
 }
 
-impl Family {
-    fn piece(&self, p: f64, time_at_floor: f64) -> SmoothInterval {
-        let q_hold = self.q_hold.unwrap_or(0.0);
-        SmoothInterval { beyond: p > 0.0, turned: p + q_hold > 0.0, held: time_at_floor > 0.0 }
+impl Family for Extremals<'_> {
+    type Path = Extremal;
+    type Piece = SmoothInterval;
+
+    fn problem(&self) -> &Problem {
+        self.problem
+    }
+
+    fn rises(&self) -> bool {
+        self.problem.rises()
+    }
+
+    fn path(&self, p: f64) -> Option<Extremal> {
+        self.problem.extremal(p, self.q_floor)
+    }
+
+    fn piece(&self, p: f64, path: &Extremal) -> SmoothInterval {
+        let q_floor = self.q_floor.unwrap_or(0.0);
+        SmoothInterval { beyond: p > 0.0, turned: p + q_floor > 0.0, held: path.time_at_floor > 0.0 }
+    }
+
+    fn measure(&self, path: &Extremal, tolerance: f64) -> Option<Measured> {
+        let sums = path.arc.sums::<false>(tolerance)?;
+        let Sums { work, friction_min, nodes, .. } = sums;
+        let probe = path.probe(self.problem, &sums, self.beyond);
+        Some(Measured { lag: self.beyond - path.time_beyond(&sums), work, friction_min, nodes, probe })
+    }
+
+    /// A short floor arc. Near the seam a protocol without a floor arc may be one with a floor arc of less than the error.
+    fn short_arc(&self, p: f64, path: &Extremal) -> Option<ShortArc> {
+        let time = path.time_at_floor;
+        if time > 0.0 {
+            return (time < SHORT_FLOOR_TIME * self.t_f).then(|| ShortArc { time, fraction: time / self.t_f });
+        }
+        let start = if self.rises() { path.start - self.problem.from.ln } else { p };
+        (self.q_floor.is_some() && start < SEAM_WIDTH).then_some(ShortArc { time, fraction: 0.0 })
+    }
+
+    fn breaks_at_zero(&self) -> bool {
+        self.q_floor.is_some()
+    }
+
+    fn extremal(path: &Extremal) -> &Extremal {
+        path
+    }
+
+    fn bound_work(&self, path: &Extremal) -> (f64, u32) {
+        (floor::work(&self.problem.law, self.problem.from, path.time_at_floor), 0)
+    }
+
+    fn in_pieces<T>(&self, path: &Extremal, read: impl FnOnce(&Path) -> T) -> T {
+        read(&Path::of(self.problem, *path))
     }
 }
 
@@ -320,23 +502,36 @@ impl Accuracy {
 /// Largest tolerance of a probe.
 const COARSEST: f64 = 1e-4;
 
-/// `t_f = t_min`: the hold alone.
+/// `t_f = t_min`: the floor arc alone.
 fn shortest(problem: &Problem, t_min: f64) -> Solved<Optimum> {
     let law = problem.law;
-    let friction = 1.0 + law.b * problem.from.ln;
-    let status = if friction <= problem.unique_above() { Status::Unproven } else { Status::Ok };
-    let status = status.with_friction(friction);
-    let value = Optimum {
-        work: floor::work(&law, problem.from, t_min),
-        v_start: 1.0,
-        v_end: 1.0,
-        time_at_floor: t_min,
+    let (work, c) = (floor::work(&law, problem.from, t_min), floor::c_leaving(&law, problem.to.theta, problem.to.ln));
+    let friction = [problem.from, problem.to].map(|at| 1.0 + law.b * at.ln);
+    let (status, mut optimum) = without_arcs(problem, 1.0, work, c, friction);
+    (optimum.time_at_floor, optimum.strategy) = (t_min, Strategy::Floor);
+    Solved { status, value: Some(optimum), stats: SolverStats::default() }
+}
+
+/// A protocol of constant velocity, with the work, `C`, and the least and the greatest friction given.
+pub(super) fn without_arcs(
+    problem: &Problem,
+    v: f64,
+    work: f64,
+    c: f64,
+    [least, greatest]: [f64; 2],
+) -> (Status, Optimum) {
+    let status = if least <= problem.unique_above() { Status::Unproven } else { Status::Ok };
+    let optimum = Optimum {
+        work,
+        v_start: v,
+        v_end: v,
+        time_at_floor: 0.0,
         time_at_v_ceiling: 0.0,
         time_at_tau_ceiling: 0.0,
-        hamiltonian: -floor::c_leaving(&law, problem.to.theta, problem.to.ln),
+        hamiltonian: -c,
         theta_max: problem.to.theta,
-        friction_max: 1.0 + law.b * problem.to.ln,
-        strategy: Strategy::Floor,
+        friction_max: greatest,
+        strategy: Strategy::SlowDown,
     };
-    Solved { status, value: Some(value), stats: SolverStats::default() }
+    (status.with_friction(least), optimum)
 }

@@ -1,37 +1,68 @@
 //! Derivatives of the least work along a path (envelope theorem), the costate and the gain of the feedback law.
 
 use super::arc::{Chart, omega};
-use super::clamp::{Path, Piece};
+use super::clamp::{ClampedPiece, Path};
+use super::constrained::Sitting;
 use super::extremal::Problem;
+use super::lifetime::Lifetime;
 use super::{ArcKind, Slopes, floor, motion};
 use crate::model::Law;
 use crate::numerics::elementary::{exp, exp_m1, ln};
 use crate::numerics::turning::turning;
 use crate::protocol::SolverStats;
 
-/// The derivatives of the work of `path`, then steady sliding for the time `sitting`; quadratures are good to `tolerance`.
+/// The derivatives of the work of `path`, then of steady sliding; quadratures are good to `tolerance`.
 pub(super) fn slopes(
     problem: &Problem,
-    path: &Path,
-    sitting: f64,
+    path: Option<&Path>,
+    sitting: Option<Sitting>,
     tolerance: f64,
     stats: &mut SolverStats,
 ) -> Option<Slopes> {
+    let mut slopes = match path {
+        Some(path) => along(problem, path, tolerance, stats)?,
+        // Steady sliding all the time.
+        None => {
+            let v_i = -(problem.friction_end() + problem.law.a) * problem.from.theta;
+            sitting.map(|_| Slopes { a: 0.0, b: 0.0, v_i, v_f: 0.0, v_ceiling: 0.0, tau_ceiling: 0.0 })?
+        }
+    };
+    if let Some(sitting) = sitting {
+        let Lifetime { theta, ln, .. } = problem.to;
+        let (pressed, price) = sitting.multiplier(problem, sitting.time);
+        let mut slip = sitting.time / theta;
+        slopes.v_f = theta * (problem.friction_end() + problem.law.a + pressed);
+        if sitting.kind == ArcKind::VCeiling && !price.is_nan() {
+            slopes.v_ceiling = -price;
+        } else {
+            let price = price / (problem.law.a * theta);
+            slip += price;
+            slopes.tau_ceiling = -price;
+        }
+        (slopes.a, slopes.b) = (slopes.a - slip * ln, slopes.b + slip * ln);
+        if price.is_nan() {
+            slopes.v_ceiling = f64::NAN;
+        }
+    }
+    Some(slopes)
+}
+
+fn along(problem: &Problem, path: &Path, tolerance: f64, stats: &mut SolverStats) -> Option<Slopes> {
     let held = path.extremal.time_at_floor;
     // At the floor ln v = 0, and the work is that of b = 1.
     let aged = floor::work(&Law { b: 1.0, ..problem.law }, problem.from, held) - held;
     let mut slopes = Slopes { a: 0.0, b: aged, v_i: 0.0, v_f: 0.0, v_ceiling: 0.0, tau_ceiling: 0.0 };
     for piece in path.pieces() {
         match piece {
-            Piece::Free { arc, .. } => {
-                let sums = arc.sums_with_slopes(tolerance)?;
+            ClampedPiece::Free { arc, .. } => {
+                let sums = arc.sums::<true>(tolerance)?;
                 stats.quadratures += 1;
                 stats.nodes += sums.nodes;
                 slopes.a += sums.creep;
                 slopes.b += sums.state;
             }
-            Piece::Ceiling { arc, gap } => {
-                let sums = arc.sums(Some(gap));
+            ClampedPiece::Ceiling { arc, gap } => {
+                let sums = arc.sums(gap);
                 stats.nodes += sums.nodes;
                 slopes.a += sums.creep;
                 slopes.b += sums.state;
@@ -49,12 +80,6 @@ pub(super) fn slopes(
     slopes.v_i = -costate(problem, path)? * theta_i * theta_i;
     let last = path.pieces().last()?;
     slopes.v_f = pressure(problem.law, last, true) * theta_f * theta_f;
-    if sitting > 0.0 {
-        let slip = sitting / theta_f;
-        slopes.a -= slip * problem.to.ln;
-        slopes.b += slip * problem.to.ln;
-        (slopes.v_f, slopes.v_ceiling) = (f64::NAN, f64::NAN);
-    }
     Some(slopes)
 }
 
@@ -68,12 +93,12 @@ pub(super) fn costate(problem: &Problem, path: &Path) -> Option<f64> {
 }
 
 /// `(tau v + C)/(u - 1) = [tau + a - G/(u - 1)]/theta` at the start or at the end of a piece.
-fn pressure(law: Law, piece: &Piece, at_end: bool) -> f64 {
+fn pressure(law: Law, piece: &ClampedPiece, at_end: bool) -> f64 {
     let (theta, z) = piece.ends()[usize::from(at_end)];
     let friction = 1.0 + law.a * z + (law.b - law.a) * ln(theta);
     let pressed = match piece {
-        Piece::Free { .. } => 0.0,
-        Piece::Ceiling { arc, gap } => gap.value(arc.end(arc.falls() != at_end)) / exp_m1(z),
+        ClampedPiece::Free { .. } => 0.0,
+        ClampedPiece::Ceiling { arc, gap } => gap.value(arc.end(arc.falls() != at_end)) / exp_m1(z),
     };
     (friction + law.a - pressed) / theta
 }
@@ -94,8 +119,8 @@ pub(super) fn gain(problem: &Problem, path: &Path, tolerance: f64) -> Option<f64
     }
     let (mut at_fixed_x, mut swing) = (0.0, 0.0);
     for (i, piece) in path.pieces().enumerate() {
-        if let Piece::Free { arc, ends, .. } = piece {
-            let sums = arc.sums(tolerance)?;
+        if let ClampedPiece::Free { arc, ends, .. } = piece {
+            let sums = arc.sums::<false>(tolerance)?;
             let edge = |(theta, z): (f64, f64)| theta / exp_m1(z);
             at_fixed_x += sums.sensitivity + edge(ends[1]) - if i == 0 { 0.0 } else { edge(ends[0]) };
             swing += sums.swing;

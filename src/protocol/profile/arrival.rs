@@ -20,7 +20,7 @@
 use multiversion::multiversion;
 
 use super::Exponent;
-use super::curve::{MAX_PANELS, Panel, VelocityCurve, x_and_z_at_nodes};
+use super::curve::{CurvePanel, MAX_PANELS, VelocityCurve, x_and_z_at_nodes};
 use crate::numerics::elementary::{exp, exp_m1, ln, ln_1p};
 use crate::numerics::radau::{NODES, Nodes, Radau, radau};
 use crate::numerics::root::{Probe, newton};
@@ -36,7 +36,7 @@ pub struct ArrivalProblem<E> {
     fall: f64,
     /// `1/theta_1 - v_1`.
     pull: f64,
-    /// `ln(theta_b/theta_1)` at the end, with `theta_b` the contact lifetime for `v = floor` throughout: positive.
+    /// `ln(theta_b/theta_1)` at the end, with `theta_b` the state variable for `v = floor` throughout: positive.
     pub required: f64,
     /// Upper bound of the integral without `e^-R`.
     max_integral: f64,
@@ -81,7 +81,7 @@ impl<E: Exponent> ArrivalProblem<E> {
     }
 
     /// From `theta_0` to `theta_1`: `fall = theta_0/theta_1 - 1`, `pull = 1/theta_1 - v_1`, and `spare = theta_b -
-    /// theta_1` with `theta_b` the contact lifetime at the end for `v = floor` throughout.
+    /// theta_1` with `theta_b` the state variable at the end for `v = floor` throughout.
     pub fn between(
         [theta_0, theta_1]: [f64; 2],
         fall: f64,
@@ -104,7 +104,7 @@ impl<E: Exponent> ArrivalProblem<E> {
         }
     }
 
-    /// Contact lifetime `theta_b` after a time.
+    /// State variable `theta_b` after a time.
     #[inline(always)]
     fn aged(&self, time: f64) -> f64 {
         self.theta_0 + if self.curve.floor > 0.0 { -self.rest_0 * exp_m1(-time) } else { time }
@@ -192,7 +192,7 @@ impl<E: Exponent> ArrivalProblem<E> {
     fn add<const BY_LOSS: bool>(
         &self,
         curve: &VelocityCurve<E>,
-        panel: &Panel,
+        panel: &CurvePanel,
         rule: &Radau,
         sums: &mut BackwardIntegrals,
     ) {
@@ -231,7 +231,7 @@ impl<E: Exponent> ArrivalProblem<E> {
 /// Theta at the end, fraction of `theta_1` or of `theta_b`, at least. Chosen: six digits are lost there.
 const MIN_THETA_FRACTION: f64 = 1e-6;
 
-/// Bound of the remaining integral that ends the integration, in units of the tolerance. Chosen.
+/// Bound of the remaining integral that ends the integration, in units of the tolerance. Chosen: a thousandth of it does not count among the other errors.
 const NEGLIGIBLE_REST: f64 = 1e-3;
 
 /// Remaining slip, at most. Derived: `theta(t_f) >= e^-R/v_i` is above 1e-308.
@@ -258,7 +258,7 @@ pub(super) fn total(values: &Nodes) -> f64 {
 fn add_by_loss<E: Exponent>(
     problem: &ArrivalProblem<E>,
     curve: &VelocityCurve<E>,
-    panel: &Panel,
+    panel: &CurvePanel,
     rule: &Radau,
     sums: &mut BackwardIntegrals,
 ) {
@@ -272,7 +272,7 @@ fn add_by_loss<E: Exponent>(
 fn add_by_miss<E: Exponent>(
     problem: &ArrivalProblem<E>,
     curve: &VelocityCurve<E>,
-    panel: &Panel,
+    panel: &CurvePanel,
     rule: &Radau,
     sums: &mut BackwardIntegrals,
 ) {

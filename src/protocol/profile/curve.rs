@@ -32,7 +32,7 @@ pub enum ProtocolEnd {
 
 /// Quadrature panel: a range of distances from an end, in the order of integration.
 #[derive(Debug, Clone, Copy)]
-pub struct Panel {
+pub struct CurvePanel {
     pub side: ProtocolEnd,
     pub from: f64,
     pub to: f64,
@@ -108,15 +108,15 @@ impl<E: Exponent> VelocityCurve<E> {
 
     /// Next panel of a range, from `d` on, over which the exponent varies by `panel_variation`, or by more where
     /// `v - floor` is so small that its relative error does not count.
-    pub fn panel(&self, range: &Panel, d: f64, panel_variation: f64) -> Panel {
-        let Panel { side, to, .. } = *range;
+    pub fn panel(&self, range: &CurvePanel, d: f64, panel_variation: f64) -> CurvePanel {
+        let CurvePanel { side, to, .. } = *range;
         let (x, z) = x_and_z(side, d);
         let e = self.level(x, z) - self.reference_level();
         if e < -NEGLIGIBLE_LEVEL + 1.0
             && self.level_at(side, to) - self.reference_level() < -NEGLIGIBLE_LEVEL + 1.0
             && self.exponent.has_minimum()
         {
-            return Panel { side, from: d, to };
+            return CurvePanel { side, from: d, to };
         }
         let along = if (side == ProtocolEnd::Start) == (to > d) { 1.0 } else { -1.0 };
         let slope = along * self.exponent.slope(x, z);
@@ -130,7 +130,7 @@ impl<E: Exponent> VelocityCurve<E> {
         };
         let h = self.exponent.distance_of_variation(x, z, variation);
         let left = (to - d).abs();
-        Panel { side, from: d, to: if h >= left { to } else { d + h * (to - d) / left } }
+        CurvePanel { side, from: d, to: if h >= left { to } else { d + h * (to - d) / left } }
     }
 
     fn level_at(&self, side: ProtocolEnd, d: f64) -> f64 {
@@ -139,18 +139,18 @@ impl<E: Exponent> VelocityCurve<E> {
     }
 
     /// `v` at the end of a panel.
-    pub fn last(&self, panel: &Panel) -> f64 {
+    pub fn last(&self, panel: &CurvePanel) -> f64 {
         self.floor + self.above_floor(panel.side, panel.to)
     }
 
     /// Duration of a panel times the greater velocity of its ends: an upper bound of its slip where `v` is monotone.
-    pub fn stiffness(&self, panel: &Panel, first: f64, last: f64) -> f64 {
+    pub fn stiffness(&self, panel: &CurvePanel, first: f64, last: f64) -> f64 {
         self.t_f * (panel.to - panel.from).abs() * first.max(last)
     }
 
     /// The panel, shortened so that its stiffness is about `panel_variation` at most; `first` and `last` are the
     /// velocities at its ends.
-    pub fn limit_slip(&self, panel: Panel, first: f64, last: f64, panel_variation: f64) -> Panel {
+    pub fn limit_slip(&self, panel: CurvePanel, first: f64, last: f64, panel_variation: f64) -> CurvePanel {
         if self.stiffness(&panel, first, last) <= panel_variation {
             return panel;
         }
@@ -177,7 +177,7 @@ pub fn x_and_z(side: ProtocolEnd, d: f64) -> (f64, f64) {
 
 /// `x` and `z` at the nodes of a panel.
 #[inline(always)]
-pub fn x_and_z_at_nodes(panel: &Panel, rule: &Radau) -> (Nodes, Nodes) {
+pub fn x_and_z_at_nodes(panel: &CurvePanel, rule: &Radau) -> (Nodes, Nodes) {
     let (mut near, mut far) = ([0.0; NODES], [0.0; NODES]);
     for j in 0..NODES {
         near[j] = panel.from * rule.rest[j] + panel.to * rule.u[j];
@@ -189,18 +189,18 @@ pub fn x_and_z_at_nodes(panel: &Panel, rule: &Radau) -> (Nodes, Nodes) {
     }
 }
 
-impl Panel {
-    pub fn reversed(&self) -> Panel {
-        Panel { side: self.side, from: self.to, to: self.from }
+impl CurvePanel {
+    pub fn reversed(&self) -> CurvePanel {
+        CurvePanel { side: self.side, from: self.to, to: self.from }
     }
 
     /// The panel, shortened to `longest` if it is longer.
-    pub fn shortened(&self, longest: f64) -> Panel {
+    pub fn shortened(&self, longest: f64) -> CurvePanel {
         let length = (self.to - self.from).abs();
         if length <= longest {
             *self
         } else {
-            Panel { to: self.from + longest * (self.to - self.from) / length, ..*self }
+            CurvePanel { to: self.from + longest * (self.to - self.from) / length, ..*self }
         }
     }
 
@@ -212,15 +212,15 @@ impl Panel {
 /// Ranges of panels of a protocol in the order of time, some of them empty.
 #[derive(Debug, Clone, Copy)]
 pub struct PanelRanges {
-    pub panels: [Panel; 4],
+    pub panels: [CurvePanel; 4],
 }
 
 impl PanelRanges {
-    pub fn forward(&self) -> impl Iterator<Item = Panel> {
+    pub fn forward(&self) -> impl Iterator<Item = CurvePanel> {
         self.panels.into_iter().filter(|panel| !panel.is_empty())
     }
 
-    pub fn backward(&self) -> impl Iterator<Item = Panel> {
+    pub fn backward(&self) -> impl Iterator<Item = CurvePanel> {
         self.panels.into_iter().rev().map(|panel| panel.reversed()).filter(|panel| !panel.is_empty())
     }
 }

@@ -5,7 +5,7 @@
 //! `p > 0` stretches the start, `q > 0` the end.
 
 use super::Exponent;
-use super::curve::{Panel, PanelRanges, ProtocolEnd};
+use super::curve::{CurvePanel, PanelRanges, ProtocolEnd};
 
 /// The Hermite exponent.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -195,8 +195,8 @@ impl Exponent for Hermite {
     }
 
     fn panel_ranges(&self, _level: f64, _depth: f64) -> PanelRanges {
-        let half = |side| Panel { side, from: 0.0, to: 0.5 };
-        let empty = Panel { side: ProtocolEnd::End, from: 0.5, to: 0.5 };
+        let half = |side| CurvePanel { side, from: 0.0, to: 0.5 };
+        let empty = CurvePanel { side: ProtocolEnd::End, from: 0.5, to: 0.5 };
         PanelRanges { panels: [half(ProtocolEnd::Start), empty, empty, half(ProtocolEnd::End).reversed()] }
     }
 }

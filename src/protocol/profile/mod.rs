@@ -15,7 +15,7 @@ use crate::numerics::elementary::{exp, ln};
 use crate::numerics::radau::NODES;
 
 pub(super) use arrival::ArrivalProblem;
-pub(super) use curve::{Panel, PanelRanges, ProtocolEnd, VelocityCurve};
+pub(super) use curve::{CurvePanel, PanelRanges, ProtocolEnd, VelocityCurve};
 pub(super) use hermite::Hermite;
 pub(super) use motion::ResolvedProfile;
 pub(super) use theta::{InitialState, ResolvedPanel, WorkAndFriction, integrate_theta};

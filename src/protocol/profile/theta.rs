@@ -5,20 +5,21 @@
 //! `theta'` at the nodes.
 
 use multiversion::multiversion;
+use nalgebra::{SMatrix, SVector};
 
 use super::Exponent;
 use super::arrival::total;
-use super::curve::{MAX_PANELS, Panel, ProtocolEnd, VelocityCurve, x_and_z, x_and_z_at_nodes};
+use super::curve::{CurvePanel, MAX_PANELS, ProtocolEnd, VelocityCurve, x_and_z, x_and_z_at_nodes};
 use crate::model::Law;
 use crate::numerics::elementary::{exp, exp_m1, ln};
 use crate::numerics::radau::{NODES, Nodes, Radau, radau};
 use crate::protocol::SolverStats;
+use crate::protocol::control::{Tolerance, ValueRange};
 
-/// Panel with `v` and theta at its start and at its nodes.
+/// Panel with theta at its start, and with `v` and theta at its nodes.
 #[derive(Debug, Clone, Copy)]
 pub struct ResolvedPanel {
-    pub panel: Panel,
-    v_start: f64,
+    pub panel: CurvePanel,
     theta_start: f64,
     theta: Nodes,
     /// `theta'` at the start and at the nodes, accurate where it is small compared with 1.
@@ -31,9 +32,12 @@ pub struct ResolvedPanel {
 #[derive(Debug, Clone, Copy)]
 pub struct WorkAndFriction {
     pub work: f64,
-    pub friction_max: f64,
-    /// Least friction, as [`ResolvedPanel::work_and_least_friction`] defines it.
-    pub friction_min: f64,
+    pub friction: ValueRange,
+}
+
+impl WorkAndFriction {
+    /// No work yet.
+    pub const NONE: WorkAndFriction = WorkAndFriction { work: 0.0, friction: ValueRange::NONE };
 }
 
 /// State at the start of an integration.
@@ -41,7 +45,7 @@ pub struct WorkAndFriction {
 pub struct InitialState {
     /// Velocity.
     pub v: f64,
-    /// Contact lifetime.
+    /// State variable.
     pub theta: f64,
     /// `theta'`, accurate where it is small compared with 1.
     pub rate: f64,
@@ -114,10 +118,10 @@ fn lag<E: Exponent>(curve: &VelocityCurve<E>, side: ProtocolEnd, d: f64, v: f64)
 /// Lag at which theta stays on the slow solution, at most. Chosen: the deviation is exponentially small in the inverse lag.
 const MAX_LAG: f64 = 0.02;
 
-/// Variation of the exponent over a panel with collocation, fraction of that with a closed form. Chosen.
+/// Variation of the exponent over a panel with collocation, fraction of that with a closed form. Chosen: collocation needs shorter panels for the same accuracy.
 const STIFF_VARIATION: f64 = 0.6;
 
-/// `theta'` below which `1 - theta v` loses a digit or more.
+/// `theta'` below which `1 - theta v` loses a digit or more. Derived: `1 - theta v` is `theta'`, and its terms are of size 1.
 const MAX_CANCELLING_RATE: f64 = 0.1;
 
 #[multiversion(targets(
@@ -126,7 +130,7 @@ const MAX_CANCELLING_RATE: f64 = 0.1;
 ))]
 fn resolve<E: Exponent>(
     curve: &VelocityCurve<E>,
-    panel: Panel,
+    panel: CurvePanel,
     start: [f64; 3],
     stiff: bool,
     rule: &Radau,
@@ -176,47 +180,19 @@ fn resolve<E: Exponent>(
             }
         }
     }
-    (ResolvedPanel { panel, v_start, theta_start, theta, rate_start, rate, v }, slip[NODES - 1])
+    (ResolvedPanel { panel, theta_start, theta, rate_start, rate, v }, slip[NODES - 1])
 }
 
 /// `theta'` at the nodes of a panel of length `h`, from `rate/v + h A rate = 1/v - theta_start` divided by `h`. With
 /// `gained = v - v_start` the right side keeps its digits for small changes.
 #[inline(always)]
 fn collocate(rule: &Radau, h: f64, v: &Nodes, gained: &Nodes, v_start: f64, rate_start: f64) -> Nodes {
-    let (mut rows, mut right) = ([[0.0; NODES]; NODES], [0.0; NODES]);
-    for (j, row) in rows.iter_mut().enumerate() {
-        for (entry, column) in row.iter_mut().zip(&rule.columns) {
-            *entry = column[j];
-        }
-        row[j] += 1.0 / (h * v[j]);
-        right[j] = (rate_start - gained[j] / v[j]) / (h * v_start);
-    }
-    for k in 0..NODES {
-        let mut best = k;
-        for j in k + 1..NODES {
-            if rows[j][k].abs() > rows[best][k].abs() {
-                best = j;
-            }
-        }
-        rows.swap(k, best);
-        right.swap(k, best);
-        let pivot = rows[k];
-        let inverse = 1.0 / pivot[k];
-        for j in k + 1..NODES {
-            let factor = rows[j][k] * inverse;
-            for i in 0..NODES {
-                rows[j][i] -= factor * pivot[i];
-            }
-            right[j] -= factor * right[k];
-        }
-    }
-    for k in (0..NODES).rev() {
-        right[k] /= rows[k][k];
-        for j in 0..k {
-            right[j] -= rows[j][k] * right[k];
-        }
-    }
-    right
+    let matrix =
+        SMatrix::<f64, NODES, NODES>::from_fn(|j, k| rule.columns[k][j] + if j == k { 1.0 / (h * v[j]) } else { 0.0 });
+    let mut right = SVector::<f64, NODES>::from_fn(|j, _| (rate_start - gained[j] / v[j]) / (h * v_start));
+    // The Radau matrix has its spectrum in the right half-plane, so the sum is regular.
+    matrix.lu().solve_mut(&mut right);
+    right.into()
 }
 
 impl ResolvedPanel {
@@ -254,68 +230,19 @@ impl ResolvedPanel {
         radau().u.into_iter().zip(self.theta).zip(self.rate).map(|((u, theta), rate)| (u, theta, rate))
     }
 
-    /// Work of friction on the panel, and the least friction on it: at the start or a node, or between two of them if
-    /// friction falls below 0 only there.
-    pub fn work_and_least_friction<E: Exponent>(&self, law: &Law, curve: &VelocityCurve<E>) -> (f64, f64) {
-        let (friction, slope, power) = frictions(law, curve, self, radau());
-        let first = self.sample_at_start(law, curve);
-        (self.duration(curve) * power, self.least_friction(law, curve, first, &friction, &slope))
-    }
-
-    /// Friction at the start.
-    fn sample_at_start<E: Exponent>(&self, law: &Law, curve: &VelocityCurve<E>) -> Sample {
-        let friction = friction_at(law, self.v_start, self.theta_start);
-        Sample {
-            u: 0.0,
-            friction,
-            slope: self.slope(law, curve, 0.0, [self.v_start, self.theta_start, self.rate_start]),
-        }
-    }
-
-    /// Least friction, from its samples at the start and at the nodes.
-    fn least_friction<E: Exponent>(
-        &self,
-        law: &Law,
-        curve: &VelocityCurve<E>,
-        mut before: Sample,
-        friction: &Nodes,
-        slope: &Nodes,
-    ) -> f64 {
-        let mut least = friction.iter().copied().fold(before.friction, f64::min);
-        for j in 0..NODES {
-            let after = Sample { u: radau().u[j], friction: friction[j], slope: slope[j] };
-            // The tangent bounds a minimum in between.
-            if least >= 0.0
-                && before.slope < 0.0
-                && after.slope > 0.0
-                && before.friction + before.slope * (after.u - before.u) < 0.0
-            {
-                least = least.min(self.extreme_friction(law, curve, SIGN_RTOL, [before, after], -1.0));
-            }
-            before = after;
-        }
-        least
-    }
-
-    /// Adds the work of the panel, and extends the range of friction; the greatest friction is good to `rtol`.
+    /// Adds the work of the panel, and extends the range of friction, its extremes to `rtol` of the greater one.
     pub fn add_to<E: Exponent>(&self, law: &Law, curve: &VelocityCurve<E>, rtol: f64, totals: &mut WorkAndFriction) {
-        let rule = radau();
-        let (friction, slope, power) = frictions(law, curve, self, rule);
+        let (friction, slope, power) = frictions(law, curve, self, radau());
         totals.work += self.duration(curve) * power;
-        let mut before = self.sample_at_start(law, curve);
-        totals.friction_min = totals.friction_min.min(self.least_friction(law, curve, before, &friction, &slope));
-        totals.friction_max = totals.friction_max.max(before.friction);
-        for j in 0..NODES {
-            let after = Sample { u: rule.u[j], friction: friction[j], slope: slope[j] };
-            totals.friction_max = totals.friction_max.max(after.friction);
-            // The tangent bounds a maximum in between.
-            if before.slope > 0.0
-                && after.slope < 0.0
-                && before.friction + before.slope * (after.u - before.u) > totals.friction_max
-            {
-                let greatest = self.extreme_friction(law, curve, rtol, [before, after], 1.0);
-                totals.friction_max = totals.friction_max.max(greatest);
-            }
+        let at = |u: f64| {
+            let (x, z) = self.x_and_z(u);
+            let (v, theta) = (curve.floor + curve.w_f * exp(curve.exponent.value(x, z)), self.theta(u));
+            [friction_at(law, v, theta), self.slope(law, curve, u, [v, theta, self.rate(u)])]
+        };
+        let mut before = (0.0, at(0.0));
+        for ((u, friction), slope) in radau().u.into_iter().zip(friction).zip(slope) {
+            let after = (u, [friction, slope]);
+            totals.friction.add_interval(before, after, Tolerance::OfRange(rtol), at);
             before = after;
         }
     }
@@ -327,62 +254,7 @@ impl ResolvedPanel {
         let length = (self.panel.to - self.panel.from).abs();
         length * (law.a * curve.exponent.slope(x, z) * (1.0 - curve.floor / v) + law.b * curve.t_f * rate / theta)
     }
-
-    /// Greatest friction (`sign` 1) between two samples where it first rises and then falls, or least friction (`sign`
-    /// -1) where it first falls and then rises: the root of `tau'` by the Illinois method.
-    fn extreme_friction<E: Exponent>(
-        &self,
-        law: &Law,
-        curve: &VelocityCurve<E>,
-        rtol: f64,
-        [mut low, mut high]: [Sample; 2],
-        sign: f64,
-    ) -> f64 {
-        let mut extreme = sign * (sign * low.friction).max(sign * high.friction);
-        let (mut slope_low, mut slope_high) = (low.slope, high.slope);
-        let mut last = 0.0;
-        for _ in 0..MAX_STEPS {
-            let u = low.u + (high.u - low.u) * (slope_low / (slope_low - slope_high));
-            let theta = self.theta(u);
-            let rate = self.rate(u);
-            let (x, z) = self.x_and_z(u);
-            let v = curve.floor + curve.w_f * exp(curve.exponent.value(x, z));
-            let slope = self.slope(law, curve, u, [v, theta, rate]);
-            let friction = friction_at(law, v, theta);
-            extreme = sign * (sign * extreme).max(sign * friction);
-            // The extremum differs from this value by less than the slope over the bracket.
-            if slope.abs() * (high.u - low.u) <= 0.1 * rtol * friction.abs() {
-                break;
-            }
-            let sample = Sample { u, friction, slope };
-            if sign * slope > 0.0 {
-                (low, slope_low) = (sample, slope);
-                slope_high *= if last > 0.0 { 0.5 } else { 1.0 };
-                last = 1.0;
-            } else {
-                (high, slope_high) = (sample, slope);
-                slope_low *= if last < 0.0 { 0.5 } else { 1.0 };
-                last = -1.0;
-            }
-        }
-        extreme
-    }
 }
-
-/// Relative tolerance of a least friction of which only the sign counts. Chosen: the sign is certain.
-const SIGN_RTOL: f64 = 0.1;
-
-/// Friction at a fraction of a panel, and its slope there.
-#[derive(Debug, Clone, Copy)]
-struct Sample {
-    u: f64,
-    friction: f64,
-    /// `dtau/du`.
-    slope: f64,
-}
-
-/// Steps of the Illinois method, at most. Chosen: more than a bracket between two nodes takes.
-const MAX_STEPS: u32 = 60;
 
 /// Friction `tau = 1 + a ln v + b ln theta`.
 #[inline(always)]

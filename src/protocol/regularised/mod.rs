@@ -1,7 +1,7 @@
 //! The optimal protocol with its jumps replaced by smooth pieces, so that a spring of finite stiffness can drive it.
 //!
-//! The optimum jumps at both ends, and after a hold it leaves the bound with a corner. Each of these takes an infinite
-//! control velocity. Smooth pieces of length `delta_t` replace the velocity at both ends and about the end of a hold. A
+//! The optimum jumps at both ends, and after a floor arc it leaves the bound with a corner. Each of these takes an infinite
+//! control velocity. Smooth pieces of length `delta_t` replace the velocity at both ends and about the end of a floor arc. A
 //! piece meets value, slope and curvature of the optimum (0 at the ends of the protocol) and brings theta to its value on
 //! the optimum. The optimum between the pieces is unchanged (docs/derivations.md).
 
@@ -43,7 +43,7 @@ pub struct Regularised {
 /// `Infeasible` where there is no optimum, where the pieces overlap (`2 delta_t > t_f`), where an argument is outside its
 /// domain (`delta_t > 0`, `k > 0`, `m >= 0`), or where the velocity falls below 1e-12 of that at the end or below 1e-100:
 /// without the bound a deceleration jumps down by about `e^(1/a)`. `BelowBound` where a piece falls below `v = 1`; near a
-/// hold each piece does, since theta there is as large as `v >= 1` allows. `NegativeFriction` where `tau < 0` somewhere;
+/// floor arc each piece does, since theta there is as large as `v >= 1` allows. `NegativeFriction` where `tau < 0` somewhere;
 /// `Unproven` where the optimum need not be unique.
 pub fn solve(
     slider: &SpringBlock,
@@ -210,9 +210,9 @@ impl<F: FnMut(RegularisedSegment)> Assembly<F> {
         if piece.v.low < MIN_VELOCITY {
             return Err(Status::Infeasible);
         }
-        self.excess += piece.work - span.work;
-        self.replaced += piece.work;
-        self.friction_min = self.friction_min.min(piece.friction_min);
+        self.excess += piece.totals.work - span.work;
+        self.replaced += piece.totals.work;
+        self.friction_min = self.friction_min.min(piece.totals.friction.low);
         self.v.add(piece.v.low);
         self.v.add(piece.v.high);
         self.control.add(piece.control.low);

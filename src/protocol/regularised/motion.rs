@@ -16,7 +16,7 @@ pub(super) struct RegularisedMotion {
 
 /// Interval on which the motion is smooth.
 enum MotionInterval {
-    /// The optimum between two points of the hold or of the arc.
+    /// The optimum between two points of the floor arc or of the free arc.
     Kept(PathPoint, PathPoint),
     /// A range of the parameter of a smooth piece that begins at this time.
     Replaced { piece: Arc<ResolvedProfile<Hermite>>, begin: f64, from: f64, to: f64 },

@@ -167,7 +167,7 @@ impl Curve {
     }
 }
 
-/// Distance of the first breakpoint from an end, in units of `t_f`, at most. Chosen.
+/// Distance of the first breakpoint from an end, in units of `t_f`, at most. Chosen; the budgets of `shortcut` judge it.
 const MAX_FIRST_DISTANCE: f64 = 0.125;
 
 /// The member as a motion: the breakpoints are equidistant in the parameter `s`.

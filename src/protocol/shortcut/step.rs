@@ -1,6 +1,6 @@
 //! `step`: the velocity jumps to `v_f` and stays there.
 //!
-//! With `p = v_f t` and `k = v_f/v_i - 1` the contact lifetime is `theta = (1 + k e^-p)/v_f`, so all numbers have a
+//! With `p = v_f t` and `k = v_f/v_i - 1` the state variable is `theta = (1 + k e^-p)/v_f`, so all numbers have a
 //! closed form. The work contains `int ln(1 + k e^-p) dp`, a difference of two dilogarithms.
 
 use super::{Case, Family, Obstacle, Shortcut};
@@ -171,5 +171,5 @@ impl Decay {
     }
 }
 
-/// `p` at the end below which a Gauss rule gives the whole integral. Chosen.
+/// `p` at the end below which a Gauss rule gives the whole integral. Chosen: the dilogarithms would cancel there.
 const MAX_GAUSS_P: f64 = 2.0;

@@ -172,7 +172,9 @@ impl Follower<'_> {
             self.min_step_error *= COARSENING;
             return Err(StopReason::BelowStepError);
         }
-        let cycle = cycle?;
+        // From a point that the response need not reach.
+        let cycle =
+            cycle.map_err(|stop| if stop == StopReason::Divergence { StopReason::BelowStepError } else { stop })?;
         let range = cycle.extrema.map(|seen| seen.map_or(0.0, |seen| orbit.refined(seen).x));
         let end = self.slider.section_point(&cycle.end);
         let change = [end[0] - from[0], end[1] - from[1]];
@@ -188,9 +190,9 @@ impl Follower<'_> {
         let change_here = map_step.relative(map_step);
         let mut slopes = Matrix2::zeros();
         for (c, nudge) in nudges.into_iter().enumerate() {
-            let largest_step =
-                self.map_step(absolute(sum(map_step.from, nudge), map_step), map_step.tolerance)?.relative(map_step);
-            (0..2).for_each(|r| slopes[(r, c)] = (largest_step[r] - change_here[r]) / nudge[c]);
+            let from = absolute(sum(map_step.from, nudge), map_step);
+            let nudged = self.map_step(from, map_step.tolerance)?.relative(map_step);
+            (0..2).for_each(|r| slopes[(r, c)] = (nudged[r] - change_here[r]) / nudge[c]);
         }
         Ok(slopes)
     }

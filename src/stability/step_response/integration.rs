@@ -113,8 +113,8 @@ impl Integration<'_> {
     #[inline(always)]
     fn expand(&mut self, limit: f64) -> Option<DenseOutput<3, TERMS>> {
         let (slider, state) = (self.slider, *self.integrator.y());
-        let rates = Rates::of(state[Y], state[X]);
-        let fast = slider.fast(rates.v, rates.ageing);
+        let rates = Rates::of(slider.state_law, state[Y], state[X]);
+        let fast = slider.fast(&rates);
         // False for numbers out of range.
         let short = fast * self.integrator.proposal() < SERIES_BELOW;
         if !self.uses_series && !short {
@@ -241,9 +241,11 @@ mod tests {
 
     use super::super::scaled_block::Z;
     use super::*;
+    use crate::model::StateLaw;
 
     /// The published material at `v_f = 3.2e6`.
-    const SLIDER: ScaledBlock = ScaledBlock { a: 0.005, b: 0.01, inertia: 2.56e-3, k: 7.5e-3 };
+    const SLIDER: ScaledBlock =
+        ScaledBlock { state_law: StateLaw::Ageing, a: 0.005, b: 0.01, inertia: 2.56e-3, k: 7.5e-3 };
 
     /// Near steady sliding, where errors are those of a linear problem.
     const NEAR: State = [2e-5, 2e-3, 3e-3];
@@ -254,7 +256,7 @@ mod tests {
     #[test]
     fn order_of_a_series_is_its_number_of_terms() {
         let step = |state: &State, h: f64| {
-            let powers = SLIDER.series(state, &Rates::of(state[Y], state[X]), h);
+            let powers = SLIDER.series(state, &Rates::of(StateLaw::Ageing, state[Y], state[X]), h);
             DenseOutput::from_powers(0.0, h, *state, powers)
         };
         let exact = |h: f64| (0..64).fold(NEAR, |state, _| step(&state, h / 64.0).end);
@@ -268,7 +270,7 @@ mod tests {
         // The first terms are the right-hand sides.
         let [z, y, x] = SLIP;
         let (v, ageing) = (exp(x), exp(-y));
-        let powers = SLIDER.series(&SLIP, &Rates::of(y, x), 1.0);
+        let powers = SLIDER.series(&SLIP, &Rates::of(StateLaw::Ageing, y, x), 1.0);
         let slopes = [SLIDER.k * (1.0 - v), ageing - v, (z - SLIDER.a * x - SLIDER.b * y) / (SLIDER.inertia * v)];
         for r in [Z, Y, X] {
             assert!((powers[r][0] / slopes[r] - 1.0).abs() < 1e-15, "{r}");

@@ -76,7 +76,11 @@ pub(super) fn follow_once(
         is_peak_ambiguous: false,
         t: 0.0,
     };
-    let long_term = follower.run(slider.steady(x)).unwrap_or(LongTermBehaviour::Undecided);
+    let long_term = match follower.run(slider.steady(x)) {
+        Ok(long_term) => long_term,
+        Err(StopReason::Divergence) => LongTermBehaviour::BlowUp,
+        Err(_) => LongTermBehaviour::Undecided,
+    };
     let Follower { extrema: [low, high], t, budget, is_peak_ambiguous, .. } = follower;
     let unresolved = UnresolvedNumbers { t_peak: is_peak_ambiguous, ..UnresolvedNumbers::default() };
     Simulation { long_term, high, low, t, steps: MAX_STEPS - budget, unresolved }

@@ -13,7 +13,7 @@ mod scaled_block;
 mod series;
 mod simulation;
 
-use crate::model::{Law, Transition};
+use crate::model::{Law, StateLaw, Transition};
 use crate::numerics::elementary::{exp, ln};
 use crate::protocol::Status;
 use crate::stability::SteadySliding;
@@ -27,7 +27,9 @@ pub use simulation::{LongTermBehaviour, Simulation, UnresolvedNumbers, follow};
 
 /// A step of the control velocity.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Step {
+pub struct VelocityStep {
+    /// Evolution law of the state.
+    pub state_law: StateLaw,
     /// The friction law and both velocities.
     pub transition: Transition,
     /// Stiffness of the spring, `k > 0`; infinite for a rigid spring.
@@ -45,11 +47,13 @@ pub enum Outcome {
     LimitCycle,
     /// Undecided within the step limit.
     Undecided,
+    /// The velocity becomes infinite in finite time. Such a step has no [`Response`].
+    Diverged,
 }
 
 impl Outcome {
     /// Names in tables, in the order of the variants.
-    pub const NAMES: [&'static str; 3] = ["settled", "limit_cycle", "undecided"];
+    pub const NAMES: [&'static str; 4] = ["settled", "limit_cycle", "undecided", "diverged"];
 }
 
 /// Numbers of a response.
@@ -85,17 +89,17 @@ pub struct LimitCycle {
     pub v_trough: f64,
 }
 
-impl Step {
+impl VelocityStep {
     /// Scaled mass `m v_f^2`.
     pub fn inertia(&self) -> f64 {
         self.m * self.transition.v_f * self.transition.v_f
     }
 
-    /// Scaled step; `None` where the response takes no time: for a rigid spring, and for `v_i = v_f`.
-    pub fn scaled(&self) -> Option<Scaled> {
+    /// The step in scaled variables; `None` where the response takes no time: for a rigid spring, and for `v_i = v_f`.
+    pub fn scaled(&self) -> Option<ScaledStep> {
         let Transition { law, v_i, v_f } = self.transition;
-        let slider = ScaledBlock { a: law.a, b: law.b, inertia: self.inertia(), k: self.k };
-        (self.k.is_finite() && v_i != v_f).then_some(Scaled { slider, ratio: v_i / v_f })
+        let slider = ScaledBlock { state_law: self.state_law, a: law.a, b: law.b, inertia: self.inertia(), k: self.k };
+        (self.k.is_finite() && v_i != v_f).then_some(ScaledStep { slider, ratio: v_i / v_f })
     }
 
     /// Status and response, with numbers to the relative tolerance `rtol`.
@@ -104,10 +108,11 @@ impl Step {
         self.from_simulation(simulation.as_ref(), rtol)
     }
 
-    /// Status and response from the simulation of [`Step::scaled`], which other steps may share.
+    /// Status and response from the simulation of [`VelocityStep::scaled`], which other steps may share.
     ///
-    /// `BelowBound` where the velocity falls below 1, `Infeasible` where it becomes infinite in finite time, as it does
-    /// without mass below the critical stiffness.
+    /// `BelowBound` where the velocity falls below 1, `Infeasible` where it becomes infinite in finite time. This takes a mass
+    /// of 0, and below the critical stiffness every step suffices. With the slip law and that of Perrin, Rice and Zheng large
+    /// steps diverge above it too.
     pub fn from_simulation(&self, simulation: Option<&Simulation>, rtol: f64) -> (Status, Option<Response>) {
         let Transition { v_i, v_f, .. } = self.transition;
         let lowest = simulation.and_then(|simulation| simulation.low).map_or(v_f, |low| v_f * exp(low.x)).min(v_i);
@@ -126,14 +131,14 @@ impl Step {
 
 /// Parameters of the response in scaled variables; steps with equal parameters have the same simulation.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Scaled {
+pub struct ScaledStep {
     /// The block on its spring.
     pub slider: ScaledBlock,
     /// Ratio `v_i/v_f`.
     pub ratio: f64,
 }
 
-impl Scaled {
+impl ScaledStep {
     /// Simulates the response until its long-term behaviour is decided.
     pub fn follow(&self, rtol: f64) -> Simulation {
         follow(&self.slider, self.linear(), ln(self.ratio), rtol)
@@ -145,9 +150,10 @@ impl Scaled {
     }
 
     /// Parameters as bits: the key of the memo.
-    pub fn key(&self) -> [u64; 5] {
-        let ScaledBlock { a, b, inertia, k } = self.slider;
-        [a, b, inertia, k, self.ratio].map(f64::to_bits)
+    pub fn key(&self) -> [u64; 6] {
+        let ScaledBlock { state_law, a, b, inertia, k } = self.slider;
+        let [a, b, inertia, k, ratio] = [a, b, inertia, k, self.ratio].map(f64::to_bits);
+        [state_law as u64, a, b, inertia, k, ratio]
     }
 }
 

@@ -1,6 +1,6 @@
 //! A response over time.
 
-use super::Step;
+use super::VelocityStep;
 use super::integration::{IntegrationStep, step_to};
 use super::scaled_block::{ScaledBlock, State, X, Y};
 use crate::model::{Law, Transition};
@@ -9,7 +9,7 @@ use crate::numerics::gauss;
 use crate::protocol::{Moment, Motion};
 
 /// Intervals of a traced response, at most. Chosen: a limit of memory, far beyond the resolution of a picture.
-const MAX_STRETCHES: usize = 1 << 18;
+const MAX_INTERVALS: usize = 1 << 18;
 
 /// Gauss nodes for the work of one interval. Chosen: their order is that of a step, 16.
 const NODES: usize = 8;
@@ -28,7 +28,7 @@ pub struct StepResponseMotion {
 #[expect(clippy::large_enum_variant, reason = "arrests are few")]
 enum MotionInterval {
     /// A step of the integrator.
-    Step(IntegrationStep),
+    Integrated(IntegrationStep),
     /// An arrest that takes no time.
     Arrest { t: f64, from: State, to: State },
 }
@@ -37,13 +37,13 @@ impl MotionInterval {
     /// Time, in `l/v_f`, and state at the fraction `u` of the interval.
     fn at(&self, u: f64) -> (f64, State) {
         match self {
-            MotionInterval::Step(step) => (step.time(u), std::array::from_fn(|r| step.value(r, u))),
+            MotionInterval::Integrated(step) => (step.time(u), std::array::from_fn(|r| step.value(r, u))),
             MotionInterval::Arrest { t, from, to } => (*t, std::array::from_fn(|r| from[r] + u * (to[r] - from[r]))),
         }
     }
 }
 
-impl Step {
+impl VelocityStep {
     /// Response up to the time `t_f`, in `l/v_0`, with errors of a step below `0.03 rtol`.
     ///
     /// `None` for a rigid spring, for `v_i = v_f`, where the velocity becomes infinite, and for too many oscillations.
@@ -53,7 +53,8 @@ impl Step {
         if !self.k.is_finite() || x == 0.0 {
             return None;
         }
-        let slider = ScaledBlock { a: law.a, b: law.b, inertia: self.m * v_f * v_f, k: self.k };
+        let slider =
+            ScaledBlock { state_law: self.state_law, a: law.a, b: law.b, inertia: self.m * v_f * v_f, k: self.k };
         let start = slider.steady(x);
         let mut run = slider.run(start, slider.first_step(&start), 0.03 * rtol);
         let mut intervals = Vec::new();
@@ -63,8 +64,8 @@ impl Step {
                 intervals.push(MotionInterval::Arrest { t: run.t(), from: *run.y(), to: arrested });
                 run.jump(arrested, slider.first_step(&arrested));
             }
-            intervals.push(MotionInterval::Step(step_to(&mut run, end).ok()?));
-            if intervals.len() > MAX_STRETCHES {
+            intervals.push(MotionInterval::Integrated(step_to(&mut run, end).ok()?));
+            if intervals.len() > MAX_INTERVALS {
                 return None;
             }
         }
@@ -77,12 +78,12 @@ impl StepResponseMotion {
     pub fn work(&self) -> f64 {
         let rule = gauss::rule(NODES);
         let step_work = |step: &IntegrationStep| {
-            let at = |x: f64| self.moment(MotionInterval::Step(*step).at(0.5 * (1.0 + x)));
+            let at = |x: f64| self.moment(MotionInterval::Integrated(*step).at(0.5 * (1.0 + x)));
             let power: f64 = rule.x.iter().zip(&rule.w).map(|(&x, w)| w * at(x).friction * at(x).v).sum();
             0.5 * step.h() / self.v_f * power
         };
         let works = self.intervals.iter().filter_map(|interval| match interval {
-            MotionInterval::Step(step) => Some(step_work(step)),
+            MotionInterval::Integrated(step) => Some(step_work(step)),
             MotionInterval::Arrest { .. } => None,
         });
         works.sum()

@@ -36,6 +36,8 @@ pub enum StopReason {
     AtRest,
     /// No step is short enough: the velocity becomes infinite.
     BlowUp,
+    /// The velocity has begun to grow without bound (`ScaledBlock::diverges`).
+    Divergence,
     /// The step limit is reached.
     StepLimit,
     /// The motion is smaller than the errors of its steps.
@@ -48,7 +50,7 @@ const LINEAR_RADIUS: f64 = 1e-5;
 /// Distance from steady sliding that counts as rest, in errors of a step. Chosen: errors of three steps may add up.
 const REST_DISTANCE: f64 = 3.0;
 
-/// Half width of the band of settled velocities, in `|v/v_f - 1|`. Chosen.
+/// Half width of the band of settled velocities, in `|v/v_f - 1|`. By definition of the column `settling_time`.
 pub const SETTLED: f64 = 0.01;
 
 /// Band of settled velocities: `ln(1 - SETTLED)` and `ln(1 + SETTLED)`.
@@ -145,6 +147,9 @@ impl<'a> Orbit<'a> {
                 );
                 self.slope = 0.0;
             }
+            if self.slider.diverges(self.run.y()) {
+                return Err(StopReason::Divergence);
+            }
             let step = step_to(&mut self.run, f64::MAX).map_err(|_| StopReason::BlowUp)?;
             self.scan(&step);
             self.elapsed += step.h();
@@ -153,7 +158,7 @@ impl<'a> Orbit<'a> {
 
     fn is_at_rest(&self) -> bool {
         let [z, y, x] = *self.run.y();
-        let ScaledBlock { a, b, inertia, k } = *self.slider;
+        let ScaledBlock { a, b, inertia, k, .. } = *self.slider;
         // Friction converts ln theta to ln v by b/a, and the energy of a soft spring moves masses of M and a.
         let force = a.min((k * (inertia + a)).sqrt());
         x.abs() < self.rest_distance

@@ -4,11 +4,14 @@
 //! v_f^2`, the equations under `v_c = v_f` are
 //!
 //! ```text
-//! z' = k (1 - e^x),    y' = e^-y - e^x,    M e^x x' = z - a x - b y,
+//! z' = k (1 - e^x),    y' = e^-y G(e^q),    M e^x x' = z - a x - b y,    q = x + y,
 //! ```
 //!
-//! with steady sliding at 0. They are regular for `M = 0`, where the last equation is a constraint, and at every velocity.
+//! with steady sliding at 0. The evolution law of the state enters `y'` alone: `e^-y - e^x` for ageing, `-e^x q` for slip,
+//! and `(e^-y - e^(x + q))/2` for the law of Perrin, Rice and Zheng. The equations are regular for `M = 0`, where the last
+//! is a constraint, and at every velocity.
 
+use crate::model::StateLaw;
 use crate::numerics::elementary::{exp, exp_and_m1, ln};
 use crate::numerics::stiff::{Linearised, Points, System};
 
@@ -28,9 +31,11 @@ pub type SectionPoint = [f64; 2];
 /// Change of a logarithm during an arrest that counts as instantaneous, at most. Chosen: below the tightest tolerance.
 const NEGLIGIBLE: f64 = 1e-14;
 
-/// The block on its spring: the four parameters of the scaled equations.
+/// The block on its spring: the evolution law of the state and the four parameters of the scaled equations.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ScaledBlock {
+    /// Evolution law of the state.
+    pub state_law: StateLaw,
     /// Direct effect `a > 0`.
     pub a: f64,
     /// Evolution effect `b >= 0`.
@@ -79,14 +84,40 @@ impl ScaledBlock {
         let resting = (z - self.b * y) / self.a;
         let pull = self.a * (x - resting);
         let time = self.inertia * exp(x) / pull;
-        let rate = self.k / self.force() + exp(-y) + exp(x);
+        let rate = self.k / self.force() + exp(-y) + self.slip_rate(y, x);
         (x > resting + 1.0 && time * rate < NEGLIGIBLE).then_some([z, y, resting])
     }
 
     /// First step, in which the state changes little.
     pub fn first_step(&self, &[_, y, x]: &State) -> f64 {
         let v = exp(x);
-        1e-3 / (self.k * (1.0 - v).abs() / self.a + v + exp(-y))
+        1e-3 / (self.k * (1.0 - v).abs() / self.a + self.slip_rate(y, x) + exp(-y))
+    }
+
+    /// Bound of the rate of `y` by slip; that by healing is at most `e^-y`.
+    fn slip_rate(&self, y: f64, x: f64) -> f64 {
+        match self.state_law {
+            StateLaw::Ageing => exp(x),
+            StateLaw::Slip => exp(x) * (1.0 + (x + y).abs()),
+            StateLaw::Prz => exp(x) * (1.0 + exp(x + y)),
+        }
+    }
+
+    /// Whether a block without mass has certainly begun to diverge: `a q' = k (1 - v) - k_c v G(u)/u` with `u = e^q` per unit of slip is
+    /// positive, and stays so.
+    ///
+    /// With ageing this takes `k < k_c`, where every step diverges.
+    pub fn diverges(&self, &[_, y, x]: &State) -> bool {
+        let critical = self.b - self.a;
+        if self.inertia > 0.0 || critical <= 0.0 {
+            return false;
+        }
+        let q = x + y;
+        match self.state_law {
+            StateLaw::Ageing => false,
+            StateLaw::Slip => q >= self.k / critical,
+            StateLaw::Prz => 0.5 * (exp(q) - exp(-q)) >= self.k / critical,
+        }
     }
 
     /// Scale of the force: the change that changes `ln v` by 1 at rest, or more where inertia dominates.
@@ -94,11 +125,11 @@ impl ScaledBlock {
         (self.a * self.a.max((self.k * self.inertia).sqrt())).sqrt()
     }
 
-    /// Upper bound of the rate of the fastest motion at `v` and `ageing = e^-y`: damping by friction, oscillation on the
-    /// spring, and ageing.
-    pub fn fast(&self, v: f64, ageing: f64) -> f64 {
-        let (damping, swinging) = (self.a / (self.inertia * v), (self.k / self.inertia).sqrt());
-        damping.max(swinging) + ageing
+    /// Upper bound of the rate of the fastest motion: damping by friction, oscillation on the spring, and relaxation of the
+    /// state.
+    pub fn fast(&self, rates: &Rates) -> f64 {
+        let (damping, swinging) = (self.a / (self.inertia * rates.v), (self.k / self.inertia).sqrt());
+        damping.max(swinging) + rates.relaxation
     }
 }
 
@@ -109,39 +140,79 @@ pub struct Rates {
     pub v: f64,
     /// Excess velocity `v - 1`.
     pub excess: f64,
-    /// Ageing rate `e^-y`.
-    pub ageing: f64,
-    /// Slope `y' = e^-y - v`.
+    /// Slope `y'`.
     pub growth: f64,
+    /// Relaxation `-dy'/dy` of the state at fixed velocity.
+    pub relaxation: f64,
+    /// Derivative `dy'/dx`.
+    pub by_x: f64,
 }
 
 impl Rates {
-    /// Rates at `y` and `x`.
+    /// Rates at `y` and `x` under a law.
     #[inline(always)]
-    pub fn of(y: f64, x: f64) -> Rates {
+    pub fn of(state_law: StateLaw, y: f64, x: f64) -> Rates {
+        match state_law {
+            StateLaw::Ageing => Rates::ageing(y, x),
+            StateLaw::Slip => Rates::slip(y, x),
+            StateLaw::Prz => Rates::prz(y, x),
+        }
+    }
+
+    #[inline(always)]
+    fn ageing(y: f64, x: f64) -> Rates {
         let ((v, excess), (ageing, surplus)) = (exp_and_m1(x), exp_and_m1(-y));
         // Far from 1 the difference with 1 would lose digits.
         let near = excess.abs() < 0.5 && surplus.abs() < 0.5;
-        Rates { v, excess, ageing, growth: if near { surplus - excess } else { ageing - v } }
+        let growth = if near { surplus - excess } else { ageing - v };
+        Rates { v, excess, growth, relaxation: ageing, by_x: -v }
+    }
+
+    #[inline(always)]
+    fn slip(y: f64, x: f64) -> Rates {
+        let (v, excess) = exp_and_m1(x);
+        let q = x + y;
+        Rates { v, excess, growth: -v * q, relaxation: v, by_x: -v * (1.0 + q) }
+    }
+
+    #[inline(always)]
+    fn prz(y: f64, x: f64) -> Rates {
+        let (v, excess) = exp_and_m1(x);
+        let healing = exp(-y);
+        let (square, surplus) = exp_and_m1(2.0 * (x + y));
+        let relaxation = 0.5 * healing * (1.0 + square);
+        Rates { v, excess, growth: -0.5 * healing * surplus, relaxation, by_x: -healing * square }
     }
 }
 
 impl System<3> for ScaledBlock {
     #[inline(always)]
     fn linearise<const L: usize>(&self, points: &Points<3, L>) -> Linearised<3, L> {
+        match self.state_law {
+            StateLaw::Ageing => self.linearise_by::<L, 0>(points),
+            StateLaw::Slip => self.linearise_by::<L, 1>(points),
+            StateLaw::Prz => self.linearise_by::<L, 2>(points),
+        }
+    }
+}
+
+impl ScaledBlock {
+    /// The system under the law `StateLaw::ALL[LAW]`.
+    #[inline(always)]
+    fn linearise_by<const L: usize, const LAW: usize>(&self, points: &Points<3, L>) -> Linearised<3, L> {
         let mut at = Linearised { residual: [[0.0; L]; 3], mass: [[1.0; L]; 3], jacobian: [[[0.0; L]; 3]; 3] };
         let [z, y, x] = &points.y;
         let [z_slope, y_slope, x_slope] = &points.slope;
         for i in 0..L {
-            let Rates { v, excess, ageing, growth } = Rates::of(y[i], x[i]);
+            let Rates { v, excess, growth, relaxation, by_x } = Rates::of(StateLaw::ALL[LAW], y[i], x[i]);
             let mass = self.inertia * v;
             at.mass[X][i] = mass;
             at.residual[Z][i] = -self.k * excess - z_slope[i];
             at.residual[Y][i] = growth - y_slope[i];
             at.residual[X][i] = (z[i] - self.a * x[i] - self.b * y[i]) - mass * x_slope[i];
             at.jacobian[Z][X][i] = -self.k * v;
-            at.jacobian[Y][Y][i] = -ageing;
-            at.jacobian[Y][X][i] = -v;
+            at.jacobian[Y][Y][i] = -relaxation;
+            at.jacobian[Y][X][i] = by_x;
             at.jacobian[X][Z][i] = 1.0;
             at.jacobian[X][Y][i] = -self.b;
             at.jacobian[X][X][i] = -self.a - mass * x_slope[i];

@@ -3,6 +3,7 @@
 use super::long_term::{LinearStability, MAX_STEPS, follow_once, step_error};
 use super::orbit::Extremum;
 use super::scaled_block::ScaledBlock;
+use crate::model::StateLaw;
 use crate::numerics::elementary::exp;
 
 /// Long-term behaviour of a response.
@@ -24,7 +25,7 @@ pub enum LongTermBehaviour {
     },
     /// Undecided within the step limit.
     Undecided,
-    /// The velocity becomes infinite in finite time, which takes a mass of 0 and `k < b - a`.
+    /// The velocity becomes infinite in finite time, which takes a mass of 0.
     BlowUp,
 }
 
@@ -75,27 +76,9 @@ pub(super) const UNDERFLOW_LN_V: f64 = -1000.0;
 /// Runs at ever tighter tolerances end where no number changes by more than `rtol`. Otherwise the response is `Undecided`,
 /// or the numbers that change are unresolved.
 pub fn follow(slider: &ScaledBlock, linear: LinearStability, x: f64, rtol: f64) -> Simulation {
-    if slider.inertia == 0.0 && slider.b > slider.a && !linear.stable {
-        // Below the critical stiffness the potential (docs/derivations.md) has no lower bound; at it, it is constant.
-        let long_term = if slider.is_critical() { LongTermBehaviour::Undecided } else { LongTermBehaviour::BlowUp };
-        return Simulation {
-            long_term,
-            high: None,
-            low: None,
-            t: 0.0,
-            steps: 0,
-            unresolved: UnresolvedNumbers::default(),
-        };
-    }
-    if !is_checked(slider, x) {
-        return Simulation {
-            long_term: LongTermBehaviour::Undecided,
-            high: None,
-            low: None,
-            t: 0.0,
-            steps: 0,
-            unresolved: UnresolvedNumbers::default(),
-        };
+    if let Some(long_term) = without_simulation(slider, linear, x) {
+        let unresolved = UnresolvedNumbers::default();
+        return Simulation { long_term, high: None, low: None, t: 0.0, steps: 0, unresolved };
     }
     let mut simulation = follow_once(slider, linear, x, rtol, ACCURACIES[0]);
     let mut known = false;
@@ -118,6 +101,25 @@ pub fn follow(slider: &ScaledBlock, linear: LinearStability, x: f64, rtol: f64) 
         known = unresolved.is_some();
     }
     if known { simulation } else { Simulation { long_term: LongTermBehaviour::Undecided, ..simulation } }
+}
+
+/// Long-term behaviour that is known, or left undecided, without a simulation (docs/derivations.md).
+fn without_simulation(slider: &ScaledBlock, linear: LinearStability, x: f64) -> Option<LongTermBehaviour> {
+    if slider.inertia == 0.0 && slider.b > slider.a && !linear.stable {
+        // At the critical stiffness a potential is constant. Its level lines are closed for ageing, and for slip up to
+        // v_f/v_i = b/(b - a).
+        let is_closed = match slider.state_law {
+            StateLaw::Ageing => Some(true),
+            StateLaw::Slip => Some(exp(-x) < slider.b / slider.k),
+            StateLaw::Prz => None,
+        };
+        match is_closed {
+            Some(true) if slider.is_critical() => return Some(LongTermBehaviour::Undecided),
+            Some(_) => return Some(LongTermBehaviour::BlowUp),
+            None => {}
+        }
+    }
+    (!is_checked(slider, x)).then_some(LongTermBehaviour::Undecided)
 }
 
 /// Factor of each bound of the physical domain up to which responses are simulated. Chosen: the random sample of
@@ -168,7 +170,8 @@ impl Simulation {
                 unresolved.cycle_trough |= !slow(low, bottom);
                 alike(period, other) && near(high, top)
             }
-            (LongTermBehaviour::Undecided, LongTermBehaviour::Undecided) => return Some(unresolved),
+            (LongTermBehaviour::Undecided, LongTermBehaviour::Undecided)
+            | (LongTermBehaviour::BlowUp, LongTermBehaviour::BlowUp) => return Some(unresolved),
             _ => false,
         };
         let ([low, high], [bottom, top]) = (self.range(), other.range());

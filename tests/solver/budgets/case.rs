@@ -71,7 +71,9 @@ pub struct Case {
     pub regime: &'static str,
     /// Whether optimal protocols obey `v >= 1`.
     pub bounded: bool,
-    /// The axes of the table, in one order for all its points.
+    /// The form of friction.
+    pub friction: &'static str,
+    /// The axes of the table, in one order for all its points of one form.
     pub axes: Vec<(&'static str, Value)>,
     pub truths: Vec<(&'static str, Truth, Route)>,
 }
@@ -85,7 +87,7 @@ impl Case {
     /// A point with these axes.
     pub fn at(axes: impl IntoIterator<Item = (&'static str, f64)>) -> Case {
         let axes = axes.into_iter().map(|(axis, value)| (axis, Value::Number(value))).collect();
-        Case { regime: "", bounded: true, axes, truths: Vec::new() }
+        Case { regime: "", bounded: true, friction: "log", axes, truths: Vec::new() }
     }
 
     /// This case in a regime.

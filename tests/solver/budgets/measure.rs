@@ -118,7 +118,9 @@ const BOUNDS: [(&str, &str); 2] = [("work_error", "work"), ("gap_error", "gap")]
 /// What is checked of a point: its truths, and the bounds of errors that are known from them.
 fn checks(case: &Case, columns: &Columns) -> Vec<Check> {
     let check = |&(column, truth, route)| Check { column, truth, route, bounds: None };
-    let bounds = BOUNDS.into_iter().filter(|(bound, _)| columns.contains_key(bound)).filter_map(|(bound, column)| {
+    // With regularised friction there are no bounds.
+    let is_bound = |bound: &str| columns.contains_key(bound) && case.friction == "log";
+    let bounds = BOUNDS.into_iter().filter(|(bound, _)| is_bound(bound)).filter_map(|(bound, column)| {
         let truth = case.truths.iter().find(|(known, ..)| *known == column)?.1;
         Some(Check { column: bound, truth, route: Route::TrueError, bounds: Some(column) })
     });

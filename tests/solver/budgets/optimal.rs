@@ -29,6 +29,12 @@ pub const KNOWN: Known = Known {
         ("no bound down", "decelerations with velocity_bound = false"),
         ("under ceilings", "ceilings of velocity and friction, every sequence of arcs, near their limits"),
         ("infeasible", "decelerations shorter than t_min"),
+        ("slip", "the slip law: waits, then slides on the ceiling, or the reverse"),
+        ("rise", "the slip law: decelerations faster than at v = 1"),
+        ("ceiling below v_i", "laws slip and prz: a velocity ceiling between both velocities"),
+        ("prz", "the law of Perrin, Rice and Zheng, with one switch"),
+        ("chatter", "the law of Perrin, Rice and Zheng, with chattering"),
+        ("regularised friction", "the ageing law without a floor, with a turning point or not"),
     ],
     cases,
 };
@@ -103,7 +109,69 @@ fn cases() -> Vec<Case> {
     let none = ["v_ceiling", "tau_ceiling"].map(|axis| (axis, Value::Number(f64::INFINITY)));
     cases.iter_mut().for_each(|case| case.axes.extend(none));
     cases.extend(reference::table("optimal_ceilings").iter().map(under_ceilings));
+    cases.iter_mut().for_each(|case| case.axes.push(("law", Value::Word("ageing"))));
+    cases.extend(reference::table("relaxed").iter().flat_map(relaxed));
+    cases.extend(reference::table("arcsinh_optimal").iter().map(|row| {
+        let numbers = [
+            ["work", "v_start", "v_end", "hamiltonian", "theta_max"],
+            ["t_least", "dwork_da", "dwork_db", "dwork_dv_i", "dwork_dv_f"],
+        ];
+        let case = Case { friction: "regularised", ..Case::of(row, &AXES).within("regularised friction") };
+        case.reference(row, numbers.as_flattened()).word("status", "ok", Route::Reference)
+    }));
     cases
+}
+
+/// A row of another law than ageing, and the same in a little less than the least time.
+fn relaxed(row: &Row) -> [Case; 2] {
+    let law = if row.text("law") == "slip" { "slip" } else { "prz" };
+    let strategies = ["wait_jerk", "jerk_wait", "chatter", "rise"];
+    let strategy = strategies.into_iter().find(|word| *word == row.text("strategy")).expect("is a strategy");
+    let regime = match strategy {
+        _ if row.number("v_i") > row.number("v_ceiling") => "ceiling below v_i",
+        "rise" | "chatter" => strategy,
+        _ => law,
+    };
+    let at = |t_f: f64, regime: &'static str| {
+        let mut case = Case::of(row, &AXES).within(regime);
+        case.axes[0].1 = Value::Number(t_f);
+        let ceilings = [("v_ceiling", row.number("v_ceiling")), ("tau_ceiling", f64::INFINITY)];
+        case.axes.extend(ceilings.map(|(axis, value)| (axis, Value::Number(value))));
+        case.axes.push(("law", Value::Word(law)));
+        case
+    };
+    let (t_f, t_least) = (row.number("t_f"), row.number("t_least"));
+    let numbers = ["work", "v_start", "v_end", "hamiltonian", "theta_max", "friction_max", "t_least"];
+    let case = at(t_f, regime).reference(row, &numbers).word("strategy", strategy, Route::Reference);
+    // A time is what is left of t_f.
+    let times = ["time_at_floor", "time_at_v_ceiling"];
+    let case = times.iter().fold(case, |case, &time| case.scaled(time, row.number(time), t_f, Route::Reference));
+    let chatter = ["chatter_theta", "chatter_duty", "work_bang_bang"];
+    let case = match row.optional("chatter_time") {
+        Some(time) => case.reference(row, &chatter).scaled("chatter_time", time, t_f, Route::Reference),
+        None => case.nulls(&chatter, Route::Reference).nulls(&["chatter_time"], Route::Reference),
+    };
+    let case = match row.optional("v_ceiling_least") {
+        Some(_) => case.reference(row, &["v_ceiling_least"]),
+        None if row.number("v_f") <= row.number("v_i") => case.nulls(&["v_ceiling_least"], Route::Formula),
+        None => case,
+    };
+    let case = case.scaled("dwork_dtau_ceiling", 0.0, 1.0, Route::Formula);
+    let case = match row.optional("dwork_dv_ceiling") {
+        Some(0.0) => case.scaled("dwork_dv_ceiling", 0.0, 1.0, Route::Reference),
+        Some(_) => case.reference(row, &["dwork_dv_ceiling"]),
+        None => case,
+    };
+    let case = match row.optional("dwork_da") {
+        Some(_) => case.reference(row, &["dwork_da", "dwork_db", "dwork_dv_i", "dwork_dv_f"]),
+        None => case,
+    };
+    // Friction is positive at any state.
+    let highest = row.number("v_ceiling").max(row.number("v_i"));
+    let is_positive = 1.0 - row.number("b") * highest.ln() > 0.0;
+    let case = if is_positive { case.word("status", "ok", Route::Formula) } else { case };
+    let short = at(t_least * (1.0 - 1e-12), "infeasible").nulls(&["work", "strategy"], Route::Formula);
+    [case, short.word("status", "infeasible", Route::Formula).word("bound", "too_fast", Route::Formula)]
 }
 
 fn under_ceilings(row: &Row) -> Case {

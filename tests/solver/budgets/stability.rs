@@ -3,7 +3,7 @@
 use slipsweep::numerics::double_double::DoubleDouble as Dd;
 
 use super::Known;
-use super::case::{Case, Route, Truth};
+use super::case::{Case, Route, Truth, Value};
 use super::sweeps::Grid;
 use crate::reference::{self, Row};
 
@@ -18,6 +18,9 @@ pub const KNOWN: Known = Known {
         ("no mass", "m = 0"),
         ("rigid", "k = inf"),
         ("Hopf point", "the first Lyapunov coefficient from its definition"),
+        ("Hopf point of slip and prz", "the same for the other laws of the state"),
+        ("regularised friction", "eigenvalues at 120 digits and critical velocities with regularised friction"),
+        ("interpolated law", "the same, and the borders of smooth optima, by differences"),
     ],
     cases,
 };
@@ -62,8 +65,34 @@ fn cases() -> Vec<Case> {
         let rigid = point(&Sliding { k: f64::INFINITY, ..sliding }, "rigid");
         cases.push(rigid.nulls(&["growth_rate", "frequency", "decay_rate"], Route::Formula));
     }
-    cases.extend(reference::table("hopf").iter().map(hopf));
+    cases.extend(reference::table("hopf").iter().map(|row| hopf(row, Case::of(row, &AXES).within("Hopf point"))));
+    let mut cases: Vec<Case> = cases.into_iter().map(|case| with_law(case, "ageing")).collect();
+    cases.extend(reference::table("hopf_laws").iter().map(|row| {
+        let law = if row.text("law") == "slip" { "slip" } else { "prz" };
+        hopf(row, with_law(Case::of(row, &AXES).within("Hopf point of slip and prz"), law))
+    }));
+    cases.extend(reference::table("arcsinh_stability").iter().map(|row| {
+        let case = Case::at(
+            ["a", "b", "v_i", "v", "k", "m"].map(|name| (if name == "v" { "v_f" } else { name }, row.number(name))),
+        );
+        let case = Case { friction: "regularised", ..case.within("regularised friction") };
+        let numbers = ["k_od", "k_c_i", "k_c_f", "growth_rate", "decay_rate", "v_crit"];
+        let size = row.number("frequency").max(row.number("growth_rate").abs());
+        let case = case.reference(row, &numbers).scaled("frequency", row.number("frequency"), size, Route::Reference);
+        case.word("status", "ok", Route::Reference)
+    }));
+    cases.extend(reference::table("interpolated").iter().map(|row| {
+        let axes = ["law_eps", "a", "b", "v_i", "v_f", "k", "m"];
+        let case = Case::of(row, &axes).within("interpolated law");
+        hopf(row, case.reference(row, &["slip_fraction_smooth", "law_eps_smooth"]))
+    }));
     cases
+}
+
+/// This case for a law of the state.
+pub fn with_law(mut case: Case, law: &'static str) -> Case {
+    case.axes.push(("law", Value::Word(law)));
+    case
 }
 
 /// `(b - a)(1 + m v^2/a)`.
@@ -113,8 +142,8 @@ fn massless_eigenvalues(case: Case, sliding: &Sliding) -> Case {
 }
 
 /// A row of the table of Lyapunov coefficients.
-fn hopf(row: &Row) -> Case {
-    let case = Case::of(row, &AXES).within("Hopf point");
+fn hopf(row: &Row, case: Case) -> Case {
+    let case = case.reference(row, &["first_lyapunov_coefficient"]);
     match row.optional("first_lyapunov_coefficient") {
         Some(coefficient) if coefficient < 0.0 => case.word("hopf_type", "supercritical", Route::Reference),
         Some(_) => case.word("hopf_type", "subcritical", Route::Reference),

@@ -2,9 +2,10 @@
 
 use super::Known;
 use super::case::{Case, Route, Truth};
-use super::stability::AXES;
+use super::stability::{AXES, with_law};
 use super::sweeps::Grid;
 use crate::reference::{self, Row};
+use slipsweep::model::StateLaw;
 
 pub const KNOWN: Known = Known {
     table: "step_response",
@@ -14,6 +15,8 @@ pub const KNOWN: Known = Known {
         ("limit cycle", "responses that end on a limit cycle"),
         ("at once", "responses that settle at time 0: a rigid spring, or no change of velocity"),
         ("infeasible", "no mass, on a spring softer than b - a"),
+        ("slip", "the slip law"),
+        ("prz", "the law of Perrin, Rice and Zheng"),
         ("Hopf point", "the first Lyapunov coefficient from its definition"),
     ],
     cases,
@@ -25,7 +28,25 @@ const NUMBERS: [&str; 8] =
 fn cases() -> Vec<Case> {
     let followed = reference::table("step_response_ends");
     let coefficients = reference::table("hopf");
-    followed.iter().map(point).chain(at_once()).chain(coefficients.iter().map(coefficient)).collect()
+    let others = reference::table("step_response_laws");
+    let ageing = followed.iter().map(point).chain(at_once()).chain(coefficients.iter().map(coefficient));
+    ageing.map(|case| with_law(case, "ageing")).chain(others.iter().map(with_other_law)).collect()
+}
+
+/// A response with another law than ageing.
+fn with_other_law(row: &Row) -> Case {
+    let law = StateLaw::find(row.text("law")).expect("is a law");
+    let case = match row.text("outcome") {
+        "diverged" => endless(Case::of(row, &AXES)),
+        _ => point(row),
+    };
+    with_law(case.within(law.name()), law.name())
+}
+
+/// A response whose velocity becomes infinite.
+fn endless(case: Case) -> Case {
+    let case = case.nulls(&NUMBERS, Route::Law).nulls(&["stick_slip"], Route::Law);
+    case.word("outcome", "diverged", Route::Law).word("status", "infeasible", Route::Law)
 }
 
 fn point(row: &Row) -> Case {
@@ -55,9 +76,7 @@ fn at_once() -> Vec<Case> {
         let case = case.word("outcome", "settled", Route::Law).knows("stick_slip", Truth::Flag(false), Route::Law);
         case.word("status", "ok", Route::Law)
     });
-    let endless = axes(1e5, 4e-3, 0.0).within("infeasible").nulls(&NUMBERS, Route::Law);
-    let endless = endless.nulls(&["outcome", "stick_slip"], Route::Law).word("status", "infeasible", Route::Law);
-    at_once.into_iter().chain([endless]).collect()
+    at_once.into_iter().chain([endless(axes(1e5, 4e-3, 0.0).within("infeasible"))]).collect()
 }
 
 fn coefficient(row: &Row) -> Case {

@@ -1,6 +1,6 @@
 //! Tables at given points, computed as a sweep computes them.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write;
 use std::path::Path;
 
@@ -38,17 +38,25 @@ pub type Columns = BTreeMap<&'static str, Vec<Cell>>;
 /// All columns of a table, also those that are written only if requested, at the points of `cases`.
 pub fn compute(name: &'static str, grid: Grid, cases: &[Case], rtol: f64) -> Columns {
     let table = table::find(name).expect("is a table");
-    let names: Vec<&str> = table.columns().iter().map(|column| column.name).chain([table::STATUS]).collect();
-    let mut columns: Columns = names.iter().map(|name| (*name, vec![Cell::Null; cases.len()])).collect();
-    // A sweep is bounded or not as a whole.
-    for bounded in [true, false] {
-        let places: Vec<usize> = (0..cases.len()).filter(|&place| cases[place].bounded == bounded).collect();
+    let every: Vec<&str> = table.columns().iter().map(|column| column.name).chain([table::STATUS]).collect();
+    let mut columns: Columns = every.iter().map(|name| (*name, vec![Cell::Null; cases.len()])).collect();
+    // A sweep is bounded or not as a whole and has one form of friction, and its points have the same axes.
+    let kind = |place: usize| {
+        let Case { bounded, friction, axes, .. } = &cases[place];
+        (*bounded, *friction, axes.iter().map(|(axis, _)| *axis).collect::<Vec<_>>())
+    };
+    let kinds: BTreeSet<_> = (0..cases.len()).map(kind).collect();
+    for one in kinds {
+        let places: Vec<usize> = (0..cases.len()).filter(|&place| kind(place) == one).collect();
+        let (bounded, friction, _) = one;
         let chosen: Vec<&Case> = places.iter().map(|&place| &cases[place]).collect();
+        // Regularised friction has not all columns.
+        let is_known = |name: &&str| chosen.iter().any(|case| case.truths.iter().any(|(known, ..)| known == name));
+        let names: Vec<&str> = every.iter().copied().filter(|name| friction == "log" || is_known(name)).collect();
         let all = names.iter().map(|name| format!("\"{name}\"")).collect::<Vec<_>>().join(", ");
-        let head = format!("name = \"budgets\"\n[model]\nvelocity_bound = {bounded}\n");
+        let head = format!("name = \"budgets\"\n[model]\nvelocity_bound = {bounded}\nfriction = \"{friction}\"\n");
         let tail = |table: &str| format!("[tables.{table}]\nrtol = {rtol:?}\ncolumns = [{all}]\n");
         let sweeps: Vec<(String, usize)> = match grid {
-            _ if chosen.is_empty() => Vec::new(),
             Grid::Points => vec![(format!("{}{head}{}{}", zip(&chosen), lists(&chosen), tail(name)), 1)],
             Grid::Shortcuts => vec![(format!("{head}{}{}", blocks(&chosen), tail(name)), 4)],
             Grid::Reduced { word, reach, alphas } => {

@@ -48,10 +48,15 @@ fn examine(name: &str, points: u64, draw: fn(&mut Random) -> Point) {
     sample(&format!("shortcut {name}"), points, draw, |point, row| {
         let &Point { ref case, rtol } = point;
         let solved = solve(family, case, rtol);
-        row.status(match &solved {
+        let status = match &solved {
             Ok(shortcut) => shortcut.status(),
             Err(obstacle) => obstacle.status(),
-        });
+        };
+        // Outside the physical domain a member need not be found.
+        match status {
+            Status::NotConverged if !is_physical(case) => row.status = Some(status),
+            status => row.status(status),
+        }
         exists(name, case, &solved, row);
         let Ok(rough) = solved else { return };
         sound(&rough, row);

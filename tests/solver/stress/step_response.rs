@@ -1,9 +1,9 @@
 //! `step_response`: the end of a response agrees with stability, and responses scale.
 
-use slipsweep::model::Transition;
+use slipsweep::model::{StateLaw, Transition};
 use slipsweep::protocol::SpringBlock;
 use slipsweep::stability::SteadySliding;
-use slipsweep::stability::step_response::{Outcome, Response, Step};
+use slipsweep::stability::step_response::{Outcome, Response, VelocityStep};
 
 use super::random::Random;
 use super::{POINTS, Row, sample};
@@ -19,7 +19,7 @@ const FINER: f64 = 1e-2;
 
 #[derive(Debug)]
 struct Point {
-    step: Step,
+    step: VelocityStep,
     rtol: f64,
     /// Whether it is solved to a finer accuracy as well, which takes longer.
     held: bool,
@@ -29,7 +29,9 @@ fn draw(random: &mut Random) -> Point {
     let transition = random.transition();
     let SpringBlock { k, m, .. } = random.slider(transition.law, transition.v_f);
     let rtol = random.between(1e-8, 1e-2);
-    Point { step: Step { transition, k, m }, rtol, held: random.chance(HELD) }
+    let held = random.chance(HELD);
+    let state_law = random.one(&StateLaw::ALL);
+    Point { step: VelocityStep { state_law, transition, k, m }, rtol, held }
 }
 
 #[test]
@@ -40,9 +42,14 @@ fn every_response_is_right_or_undecided() {
         let (status, response) = step.from_simulation(simulation.as_ref(), rtol);
         row.status(status);
         let sliding = SteadySliding::new(step.transition.law, step.k, step.m, step.transition.v_f);
-        // Only without mass does anything become infinite, and only below k_c.
-        let runs_away = step.m == 0.0 && !sliding.is_stable();
-        row.fact("infinite only without mass below k_c", response.is_some() || runs_away);
+        // Only without mass does anything become infinite: with ageing below k_c, with the slip law also for large steps up.
+        let Transition { law, v_i, v_f } = step.transition;
+        let runs_away = match step.state_law {
+            StateLaw::Ageing => !sliding.is_stable(),
+            StateLaw::Slip => !sliding.is_stable() || (law.b > law.a && (v_f - v_i) / v_i >= law.a / step.k),
+            StateLaw::Prz => law.b > law.a,
+        };
+        row.fact("infinite only where theory allows it", response.is_some() || (step.m == 0.0 && runs_away));
         let Some(response) = response else { return };
         // The response knows m v^2 alone, which is rounded.
         let rounded = SteadySliding::new(step.transition.law, step.k, step.inertia(), 1.0);
@@ -52,11 +59,14 @@ fn every_response_is_right_or_undecided() {
         }
         // Powers of two scale without rounding.
         let Transition { law, v_i, v_f } = step.transition;
-        let other =
-            Step { transition: Transition { law, v_i: 16.0 * v_i, v_f: 16.0 * v_f }, m: step.m / 256.0, ..step };
+        let other = VelocityStep {
+            transition: Transition { law, v_i: 16.0 * v_i, v_f: 16.0 * v_f },
+            m: step.m / 256.0,
+            ..step
+        };
         let same = |x: f64, y: f64| x == y || (x.is_nan() && y.is_nan()) || (x < TINY && y < TINY);
         // Steps that share their scaled numbers share their course.
-        let key = |step: &Step| step.scaled().map(|scaled| scaled.key());
+        let key = |step: &VelocityStep| step.scaled().map(|scaled| scaled.key());
         row.fact("scaled numbers", key(&other) == key(&step));
         let scaled = other.from_simulation(simulation.as_ref(), rtol).1.expect("exists as the other one does");
         let times = |t: Option<f64>| t.map(|t| 16.0 * t);
@@ -72,7 +82,7 @@ fn every_response_is_right_or_undecided() {
 }
 
 /// What is reported at one accuracy agrees with what is reported at a finer one, if that decides at all.
-fn accurate(step: &Step, rough: &Response, rtol: f64, row: &mut Row) {
+fn accurate(step: &VelocityStep, rough: &Response, rtol: f64, row: &mut Row) {
     let finer = FINER * rtol;
     let simulation = step.scaled().map(|scaled| scaled.follow(finer));
     let Some(fine) = step.from_simulation(simulation.as_ref(), finer).1 else { return };
@@ -101,7 +111,7 @@ fn accurate(step: &Step, rough: &Response, rtol: f64, row: &mut Row) {
     }
 }
 
-fn sound(step: &Step, response: &Response, stable: bool, row: &mut Row) {
+fn sound(step: &VelocityStep, response: &Response, stable: bool, row: &mut Row) {
     let &Response { outcome, v_peak, v_trough, t_peak, settling_time, cycle, t_end, .. } = response;
     let v_f = step.transition.v_f;
     let moves = step.k.is_finite() && step.transition.v_i != v_f;
@@ -112,6 +122,7 @@ fn sound(step: &Step, response: &Response, stable: bool, row: &mut Row) {
             row.fact("a limit cycle has a period", cycle.is_some_and(|cycle| cycle.period > 0.0));
             row.fact("a limit cycle takes b > a", step.transition.law.b > step.transition.law.a);
         }
+        Outcome::Diverged => row.fact("a step that diverges has no response", false),
         Outcome::Undecided => row.fact("nothing is reported if undecided", v_peak.is_nan() && settling_time.is_none()),
     }
     if outcome != Outcome::Undecided {

@@ -1,6 +1,6 @@
 //! A member over time.
 
-use super::panel::Panel;
+use super::panel::FrictionPanel;
 use super::path::{FrictionPath, PathEnd};
 use crate::numerics::elementary::exp;
 use crate::protocol::{Moment, Motion};
@@ -8,7 +8,7 @@ use crate::protocol::{Moment, Motion};
 /// Member as a motion: panels in the order of time, of equal length in the parameter `s`.
 pub(super) struct BoundedFrictionMotion {
     pub path: FrictionPath,
-    pub panels: Vec<Panel>,
+    pub panels: Vec<FrictionPanel>,
 }
 
 impl Motion for BoundedFrictionMotion {

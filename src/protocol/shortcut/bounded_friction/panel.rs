@@ -1,6 +1,7 @@
 //! One panel of a path: collocation of `w` at the Radau nodes.
 
 use multiversion::multiversion;
+use nalgebra::SMatrix;
 
 use super::path::{FrictionPath, MAX_EXPONENT, MAX_QUADRATURE_EXPONENT, PathEnd};
 use crate::numerics::elementary::{exp, exp_m1, ln_1p};
@@ -8,7 +9,7 @@ use crate::numerics::radau::{NODES, Nodes, Radau, radau};
 
 /// Panel with `w` at its start and nodes.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Panel {
+pub(super) struct FrictionPanel {
     /// Whether it was integrated forwards in time.
     pub forward: bool,
     pub side: PathEnd,
@@ -26,7 +27,7 @@ pub(super) struct Panel {
 /// Solved panel.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct SolvedPanel {
-    pub panel: Panel,
+    pub panel: FrictionPanel,
     /// Derivative of `w` with respect to `alpha_3` at the end.
     pub w_by_alpha: f64,
     /// Slip in units of that of steady sliding, `int v/v_0 dd`, and its error estimate.
@@ -40,7 +41,7 @@ pub(super) struct SolvedPanel {
     pub error: f64,
 }
 
-impl Panel {
+impl FrictionPanel {
     /// Distance from the near end at the fraction `s` of the panel.
     pub fn distance(&self, s: f64) -> f64 {
         self.from * (1.0 - s) + self.to * s
@@ -59,16 +60,16 @@ impl Panel {
     }
 }
 
-/// Newton steps on a panel, at most.
+/// Newton steps on a panel, at most. Chosen: quadratic convergence takes four or five.
 const MAX_STEPS: usize = 10;
 
-/// Error of the quadrature in the first step, fraction of the change, at most.
+/// Error of the quadrature in the first step, fraction of the change, at most. Chosen: three digits of the step are correct.
 const QUADRATURE_FRACTION: f64 = 1e-3;
 
-/// Change below which a step that shrinks no more is rounding, in units of the rounding of `w`. Chosen.
+/// Change below which a step that shrinks no more is rounding, in units of the rounding of `w`. Chosen: two digits above the rounding of one value.
 const MAX_ROUNDINGS: f64 = 100.0;
 
-/// Change of `w` in the initial guess of a panel, at most. Chosen.
+/// Change of `w` in the initial guess of a panel, at most. Chosen: a factor of `e^20`, 5e8, of theta; Newton's method does the rest.
 const MAX_GUESS_CHANGE: f64 = 20.0;
 
 /// Solves the panel between two distances from an end, from `w` and its derivative at the first, to `tolerance`; `None`
@@ -139,12 +140,14 @@ pub(super) fn collocate(
             (steps, grow[NODES - 1] * (w_by_alpha + rule.integrals(&pushed)[NODES - 1]))
         } else {
             let forced = rule.integrals(&push);
-            let mut right: [[f64; 2]; NODES] = std::array::from_fn(|j| [rest[j], w_by_alpha + forced[j]]);
-            let mut matrix: [Nodes; NODES] = std::array::from_fn(|j| {
-                std::array::from_fn(|k| f64::from(u8::from(j == k)) - rule.columns[k][j] * slope[k])
+            let mut right = SMatrix::<f64, NODES, 2>::from_fn(|j, side| [rest[j], w_by_alpha + forced[j]][side]);
+            let matrix = SMatrix::<f64, NODES, NODES>::from_fn(|j, k| {
+                f64::from(u8::from(j == k)) - rule.columns[k][j] * slope[k]
             });
-            solve(&mut matrix, &mut right);
-            (right.map(|pair| pair[0]), right[NODES - 1][1])
+            if !matrix.lu().solve_mut(&mut right) {
+                return None;
+            }
+            (std::array::from_fn(|j| right[(j, 0)]), right[(NODES - 1, 1)])
         };
         let mut change = 0.0f64;
         for j in 0..NODES {
@@ -177,7 +180,7 @@ pub(super) fn collocate(
                 uncertain += rule.w[j] * speed[j] * (1.0 + w[j].abs() + rounding[j]);
             }
             let lack = (rule.unresolved(&speed) - count * f64::EPSILON * uncertain).max(0.0);
-            let panel = Panel { forward: path.forward, side, from, to, start, w, z, follows };
+            let panel = FrictionPanel { forward: path.forward, side, from, to, start, w, z, follows };
             return Some(SolvedPanel { panel, w_by_alpha: last, slip, lack, noise: 8.0 * noise, growth, error });
         }
     }
@@ -214,7 +217,7 @@ fn excesses(
     (z, follows, rounding)
 }
 
-/// Rounding of the slope of a polynomial through the nodes, in units of the rounding of its values.
+/// Rounding of the slope of a polynomial through the nodes, in units of the rounding of its values. Chosen: the order of the sum of the weights.
 const SLOPE_ROUNDING: f64 = 300.0;
 
 /// Initial guess of `w`: relaxation towards constant `ln(theta v)` where theta relaxes, constant `w` elsewhere.
@@ -247,38 +250,5 @@ fn guess(
     w
 }
 
-/// Relaxation exponent of a panel below which theta counts as constant. Chosen.
+/// Relaxation exponent of a panel below which theta counts as constant. Chosen: theta changes by less than a tenth of its distance from `1/v`.
 const MIN_RELAXATION: f64 = 0.1;
-
-/// Solves by Gaussian elimination with row pivots, for two right-hand sides.
-fn solve(matrix: &mut [Nodes; NODES], right: &mut [[f64; 2]; NODES]) {
-    for k in 0..NODES {
-        let mut pivot = k;
-        for j in k + 1..NODES {
-            if matrix[j][k].abs() > matrix[pivot][k].abs() {
-                pivot = j;
-            }
-        }
-        matrix.swap(k, pivot);
-        right.swap(k, pivot);
-        let (row, values) = (matrix[k], right[k]);
-        let inverse = 1.0 / row[k];
-        for j in k + 1..NODES {
-            let factor = matrix[j][k] * inverse;
-            for m in k..NODES {
-                matrix[j][m] -= factor * row[m];
-            }
-            right[j][0] -= factor * values[0];
-            right[j][1] -= factor * values[1];
-        }
-    }
-    for k in (0..NODES).rev() {
-        let inverse = 1.0 / matrix[k][k];
-        let found = [right[k][0] * inverse, right[k][1] * inverse];
-        right[k] = found;
-        for j in 0..k {
-            right[j][0] -= matrix[j][k] * found[0];
-            right[j][1] -= matrix[j][k] * found[1];
-        }
-    }
-}

@@ -9,7 +9,7 @@
 //! Positions are distances `d` from the nearer end, in units of `t_f`. They resolve layers much thinner than the rounding
 //! of `x`, and small changes keep their digits.
 
-use super::panel::{Panel, collocate};
+use super::panel::{FrictionPanel, collocate};
 use crate::model::Transition;
 use crate::numerics::elementary::{exp, exp_m1, ln, ln_1p};
 use crate::numerics::radau::{NODES, Radau, radau};
@@ -55,6 +55,16 @@ pub(super) enum Residual {
     TwoSidedSlip { spare: f64 },
 }
 
+impl Residual {
+    /// The spare time with which it compares.
+    pub fn spare(self) -> Option<f64> {
+        match self {
+            Residual::LnTheta => None,
+            Residual::Slip { spare } | Residual::TimeLoss { spare } | Residual::TwoSidedSlip { spare } => Some(spare),
+        }
+    }
+}
+
 /// A member of the family for one `alpha_3`.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct FrictionPath {
@@ -68,15 +78,13 @@ pub(super) struct FrictionPath {
     pub kappa: f64,
     /// Size of `w`: the smaller of 1 and its change from end to end.
     pub size: f64,
-    /// Error of `ln R` from rounding of `tau_M`, in units of the last position of 1.
-    pub ln_r_rounding: f64,
     pub residual: Residual,
     /// The ends in the direction of integration.
     end_states: [EndState; 2],
 }
 
 /// Result of a pass at its end.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, Default)]
 pub(super) struct PassResult {
     /// `w`: 0 if it arrives.
     pub w: f64,
@@ -114,19 +122,19 @@ pub(super) enum PassFailure {
     NotConverged,
 }
 
-/// Fall of `w` below both ends at which theta counts as 0. Chosen.
+/// Fall of `w` below both ends at which theta counts as 0. Chosen: `e^-25` is 1.4e-11, a seventh of the default `rtol`.
 const MAX_LN_THETA_FALL: f64 = 25.0;
 
-/// `-ln v` above which slip is negligible within any time. Chosen.
+/// `-ln v` above which slip is negligible within any time. Chosen: `e^-100` is 3.7e-44, and a legal duration is at most 1e20.
 pub(super) const NEGLIGIBLE_LN_V: f64 = 100.0;
 
-/// `-ln v` above which the velocity is 0 in double precision.
+/// `-ln v` above which the velocity is 0 in double precision. Derived: `e^-746` underflows.
 const UNDERFLOW_LN_V: f64 = 800.0;
 
 /// Where `ln[(tau_M - tau)/margin]` is below this, friction is `tau_M` to the last bit.
 const SATURATION_EXPONENT: f64 = -45.0;
 
-/// Exponent of `tau_M - tau`, at most: it stays within the range of a double.
+/// Exponent of `tau_M - tau`, at most: it stays within the range of a double. Chosen: `e^400` is 5e173.
 pub(super) const MAX_EXPONENT: f64 = 400.0;
 
 /// Panels of one pass, at most. Chosen: far more than a path that arrives takes.
@@ -155,20 +163,7 @@ impl FrictionPath {
         let ends = [end_state(v_i, margins.0, ln_r, log_ratio), end_state(v_f, margins.1, -ln_r, -log_ratio)];
         let end_states = if forward { ends } else { [ends[1], ends[0]] };
         let (kappa, size) = ((law.a - law.b) / law.a, log_ratio.abs().min(1.0));
-        let bound = if case.tau_ceiling.is_finite() { case.tau_ceiling.abs().max(1.0) } else { 0.0 };
-        let ln_r_rounding = bound / margins.0 * ((law.a - law.b) * log_ratio).abs() / margins.1;
-        FrictionPath {
-            alpha: 0.0,
-            forward,
-            t_f: case.t_f,
-            a: law.a,
-            ratio,
-            kappa,
-            size,
-            ln_r_rounding,
-            residual,
-            end_states,
-        }
+        FrictionPath { alpha: 0.0, forward, t_f: case.t_f, a: law.a, ratio, kappa, size, residual, end_states }
     }
 
     /// Scale of `alpha_3`: a change by it changes `ln v` by about a quarter.
@@ -178,17 +173,7 @@ impl FrictionPath {
 
     /// Smaller of `alpha_3` and its change that changes some velocity by a factor of e.
     pub fn alpha_resolution(&self, end: &PassResult) -> f64 {
-        let mut greatest = end.max_ln_v_by_alpha.max(1.0 / self.alpha.abs());
-        for k in 1..8 {
-            let d = 0.125 * f64::from(k);
-            let end_state = self.end_state(PathEnd::Start);
-            let exponent = self.exponent(end_state, d);
-            // In a standstill, unless the velocity is 0 in double precision.
-            if exponent > end_state.negligible_exponent && exponent < end_state.underflow_exponent {
-                greatest = greatest.max(self.friction_sensitivity(end_state, d));
-            }
-        }
-        1.0 / greatest
+        1.0 / end.max_ln_v_by_alpha.max(1.0 / self.alpha.abs())
     }
 
     /// Sensitivity of friction to `alpha_3`, `-dtau/dalpha_3`, in units of `a`.
@@ -233,13 +218,10 @@ impl FrictionPath {
                 let bent = -exp_m1(-end.w.max(-3.0));
                 (rise * bent, -bent / end.w_by_alpha)
             }
-            Residual::Slip { spare } | Residual::TwoSidedSlip { spare } => {
+            Residual::Slip { spare } | Residual::TwoSidedSlip { spare } | Residual::TimeLoss { spare } => {
                 let ln_ratio = ln(end.sum / spare);
-                (-ln_ratio, ln_ratio * end.sum / (rise * self.time_per_w(end.w) * end.w_by_alpha))
-            }
-            Residual::TimeLoss { spare } => {
-                let ln_ratio = ln(end.sum / spare);
-                (ln_ratio, -ln_ratio * end.sum / (rise * self.time_per_w(end.w) * end.w_by_alpha))
+                let step = ln_ratio * end.sum / (rise * self.time_per_w(end.w) * end.w_by_alpha);
+                if matches!(self.residual, Residual::TimeLoss { .. }) { (ln_ratio, -step) } else { (-ln_ratio, step) }
             }
         }
     }
@@ -255,22 +237,13 @@ impl FrictionPath {
         }
     }
 
-    /// Inverse of the error of `alpha_3` for an error of 1 in each panel.
-    pub fn precision(&self, end: &PassResult) -> f64 {
-        end.w_by_alpha.abs() / end.errors
-    }
-
     /// Error of `alpha_3` from rounding at the end, in units of the last position of 1.
     pub fn rounding(&self, end: &PassResult) -> f64 {
-        match self.residual {
-            Residual::LnTheta => end.noise / end.w_by_alpha.abs(),
-            Residual::Slip { .. } | Residual::TimeLoss { .. } | Residual::TwoSidedSlip { .. } => {
-                // One unit of the residual, and the rounding of t_f relative to the spare time.
-                let (residual_and_step, step) =
-                    self.residual_and_step(&PassResult { sum: std::f64::consts::E * end.sum, ..*end });
-                (step / (std::f64::consts::E * residual_and_step)).abs() * (1.0 + self.t_f / end.sum)
-            }
+        if self.residual == Residual::LnTheta {
+            return end.noise / end.w_by_alpha.abs();
         }
+        // One unit of the residual, and the rounding of t_f relative to the spare time.
+        (end.sum / (self.time_per_w(end.w) * end.w_by_alpha)).abs() * (1.0 + self.t_f / end.sum)
     }
 
     /// Error of `alpha_3` from rounding of a two-sided sum, without that of `t_f`, which affects every residual; 0 for the
@@ -367,30 +340,30 @@ impl FrictionPath {
         -self.margin_at(side, d) / self.a * along - self.ratio * rate
     }
 
-    /// Integrates along the path and hands every panel to `visit`. The two tolerances, in units of the size of `w`, are
-    /// those of the end, and of all that the end does not depend on. With a tolerance of the work, panels resolve the
-    /// velocity.
+    /// Integrates along the path. The two tolerances, in units of the size of `w`, are those of the end, and of all that
+    /// the end does not depend on. With a tolerance of the work, panels resolve the velocity, and are returned.
     ///
     /// # Errors
     ///
     /// The reason why the integration ends early.
     pub fn pass(
         &self,
-        tolerances: (f64, f64),
+        tolerance: f64,
         work: Option<WorkTolerance>,
         stats: &mut SolverStats,
-        mut visit: impl FnMut(&FrictionPath, &Panel),
-    ) -> Result<PassResult, PassFailure> {
+    ) -> Result<(PassResult, Vec<FrictionPanel>), PassFailure> {
+        let mut panels = Vec::new();
         if !matches!(self.residual, Residual::TwoSidedSlip { .. }) {
-            return self.pass_one_way(None, tolerances, work, stats, |panel| visit(self, panel));
+            let end = self.pass_one_way(None, tolerance, work, stats, &mut panels)?;
+            return Ok((end, panels));
         }
         let other = self.reversed();
         let (side, d) = self.friction_minimum().ok_or(PassFailure::AlphaTooSmall)?;
-        let first = self.pass_one_way(Some((side, d)), tolerances, work, stats, |panel| visit(self, panel))?;
+        let first = self.pass_one_way(Some((side, d)), tolerance, work, stats, &mut panels)?;
         let opposite = if side == PathEnd::Start { PathEnd::End } else { PathEnd::Start };
-        let second = other.pass_one_way(Some((opposite, d)), tolerances, work, stats, |panel| visit(&other, panel))?;
+        let second = other.pass_one_way(Some((opposite, d)), tolerance, work, stats, &mut panels)?;
         let theta = |path: &FrictionPath, side, end: &PassResult| exp(end.w) / path.end_state(side).v;
-        Ok(PassResult {
+        let end = PassResult {
             w: 0.0,
             w_by_alpha: theta(self, side, &first) * first.w_by_alpha
                 - theta(&other, opposite, &second) * second.w_by_alpha,
@@ -399,7 +372,8 @@ impl FrictionPath {
             errors: first.errors.max(second.errors),
             sum: first.sum + second.sum,
             work: first.work + second.work,
-        })
+        };
+        Ok((end, panels))
     }
 
     /// Failure where theta falls to 0.
@@ -419,31 +393,19 @@ impl FrictionPath {
     fn pass_one_way(
         &self,
         until: Option<(PathEnd, f64)>,
-        (tolerance, loosest): (f64, f64),
+        tolerance: f64,
         work: Option<WorkTolerance>,
         stats: &mut SolverStats,
-        mut visit: impl FnMut(&Panel),
+        kept: &mut Vec<FrictionPanel>,
     ) -> Result<PassResult, PassFailure> {
         let rule = radau();
-        let mut end = PassResult {
-            w: 0.0,
-            w_by_alpha: 0.0,
-            max_ln_v_by_alpha: 0.0,
-            noise: 0.0,
-            errors: 0.0,
-            sum: 0.0,
-            work: 0.0,
-        };
+        let mut end = PassResult::default();
         let mut h = self.first_panel(PathEnd::Start);
         let mut panels = 0;
         let mut before = PathEnd::Start;
-        // Loosest tolerance, where the end does not depend on the value.
-        let loosest = self.size * tolerance.max(loosest) / (1.0 + self.ratio);
-        let (tolerance, relative) = (self.size * tolerance, tolerance);
-        let (damping, layer) = self.damping();
-        let last_layer = MAX_LAYERS * self.first_panel(PathEnd::End);
+        let (tolerance, relative) = (self.size * tolerance / (1.0 + self.ratio), tolerance);
         let relaxation_distance = work.map_or(0.0, |work| self.relaxation_distance(work.accuracy));
-        let grows = until.is_some() && self.kappa * self.theta_rate(self.end_state(PathEnd::Start)) < 0.0;
+        let last_layer = MAX_LAYERS * self.first_panel(PathEnd::End);
         stats.quadratures += 1;
         for (side, from, to, is_negligible) in self.intervals(until) {
             let end_state = self.end_state(side);
@@ -453,22 +415,24 @@ impl FrictionPath {
             }
             let floor = end_state.other.min(0.0) - MAX_LN_THETA_FALL;
             if is_negligible {
-                end = self.skip_standstill(side, (from, to), end, rule, work.is_some(), &mut visit)?;
+                end = self.skip_standstill(side, (from, to), end, work.map(|_| &mut *kept))?;
                 continue;
             }
             let along = if side == PathEnd::Start { 1.0 } else { -1.0 };
             let mut d = from;
             while d != to {
                 let left = (to - d).abs();
-                // Several panels without elimination cost less than one with elimination.
                 let stiffness = self.stiffness(end_state, side, d, end.w);
-                let mild = 0.9 * MAX_QUADRATURE_EXPONENT / stiffness.abs();
                 // Short panels follow a growing solution: collocation would damp it.
-                let taken = if stiffness < 0.0 || h.min(left) < ELIMINATION_COST * mild { h.min(mild) } else { h };
                 // Theta hardly shows the velocity before it follows it.
-                let taken = if side == PathEnd::Start && d < relaxation_distance { taken.min(mild) } else { taken };
+                let is_relaxing = side == PathEnd::Start && d < relaxation_distance;
+                let taken = if stiffness < 0.0 || is_relaxing {
+                    h.min(0.9 * MAX_QUADRATURE_EXPONENT / stiffness.abs())
+                } else {
+                    h
+                };
                 // Panels are graded towards a layer at the end, or where theta follows the velocity up to the end.
-                let is_graded = left > last_layer || (stiffness > 0.0 && left > mild);
+                let is_graded = left > last_layer || (stiffness > 0.0 && left * stiffness > MAX_QUADRATURE_EXPONENT);
                 let taken = if side == PathEnd::End && to == 0.0 && is_graded {
                     taken.min(GRADING_RATIO * left)
                 } else {
@@ -484,24 +448,15 @@ impl FrictionPath {
                 }
                 panels += 1;
                 stats.nodes += NODES as u32;
-                let forgotten = match side {
-                    _ if until.is_some() => 0.0,
-                    PathEnd::Start => damping * layer - MAX_LN_AMPLIFICATION - self.size,
-                    PathEnd::End => damping.min(stiffness) * layer.min(next),
-                };
-                let tolerance = (tolerance * exp(forgotten.clamp(0.0, MAX_EXPONENT))).min(loosest);
-                let enough = 0.1 * tolerance * if grows { end.w.abs().min(1.0) } else { 1.0 };
-                let Some(found) = collocate(self, side, (d, next), [end.w, end.w_by_alpha], enough, rule) else {
+                let start = [end.w, end.w_by_alpha];
+                let Some(found) = collocate(self, side, (d, next), start, 0.1 * tolerance, rule) else {
                     h = 0.25 * length;
                     continue;
                 };
-                // A solution that grows from 0 has a relative tolerance.
-                let seed = if grows { found.panel.w[NODES - 1].abs().min(1.0) } else { 1.0 };
-                let (size, tolerance) = (seed * self.size, seed * tolerance);
                 let (contribution, lack) = self.residual_contribution(&found.panel, rule);
                 // The order of the error at the end is higher than that at the nodes: the power 3/2.
                 let end_lacks = |nodes: f64| nodes * nodes.sqrt();
-                let mut error_ratio = end_lacks(found.error / size) * size / tolerance;
+                let mut error_ratio = end_lacks(found.error / self.size) * self.size / tolerance;
                 error_ratio = error_ratio.max(end_lacks(lack) / relative);
                 let friction = self.friction(side, d).abs().max(self.friction(side, next).abs());
                 if let Some(WorkTolerance { accuracy, expected }) = work {
@@ -513,7 +468,9 @@ impl FrictionPath {
                     h = length * (0.8 * change).clamp(0.2, 0.8);
                     continue;
                 }
-                visit(&found.panel);
+                if work.is_some() {
+                    kept.push(found.panel);
+                }
                 end = PassResult {
                     w: found.panel.w[NODES - 1],
                     w_by_alpha: found.w_by_alpha,
@@ -541,9 +498,7 @@ impl FrictionPath {
         side: PathEnd,
         (from, to): (f64, f64),
         start: PassResult,
-        rule: &Radau,
-        shown: bool,
-        visit: &mut impl FnMut(&Panel),
+        kept: Option<&mut Vec<FrictionPanel>>,
     ) -> Result<PassResult, PassFailure> {
         let theta_rate = self.theta_rate(self.end_state(side)) * exp(-start.w);
         let change = |d: f64| theta_rate * (d - from).abs();
@@ -553,16 +508,19 @@ impl FrictionPath {
         }
         let level = |d: f64| start.w + ln_1p(change(d));
         let mut d = from;
-        while shown && d != to {
-            // Theta changes by a factor of three at most.
-            let theta = 1.0 + change(d);
-            let step = theta * if self.forward { 2.0 } else { 2.0 / 3.0 } / theta_rate.abs();
-            let next = if 1.5 * step >= (to - d).abs() { to } else { d + step * (to - from).signum() };
-            let position = |s: f64| d * (1.0 - s) + next * s;
-            let w = rule.u.map(|s| level(position(s)));
-            let z = std::array::from_fn(|j| self.ln_theta_v(side, position(rule.u[j]), w[j]));
-            visit(&Panel { forward: self.forward, side, from: d, to: next, start: level(d), w, z, follows: false });
-            d = next;
+        if let Some(kept) = kept {
+            while d != to {
+                // Theta changes by a factor of three at most.
+                let theta = 1.0 + change(d);
+                let step = theta * if self.forward { 2.0 } else { 2.0 / 3.0 } / theta_rate.abs();
+                let next = if 1.5 * step >= (to - d).abs() { to } else { d + step * (to - from).signum() };
+                let position = |s: f64| d * (1.0 - s) + next * s;
+                let w = radau().u.map(|s| level(position(s)));
+                let z = std::array::from_fn(|j| self.ln_theta_v(side, position(radau().u[j]), w[j]));
+                let (forward, start) = (self.forward, level(d));
+                kept.push(FrictionPanel { forward, side, from: d, to: next, start, w, z, follows: false });
+                d = next;
+            }
         }
         let noise = (start.noise + 2.0 * (last - 1.0).abs()) / last + level(to).abs();
         let (w_by_alpha, errors) = (start.w_by_alpha / last, start.errors / last);
@@ -573,13 +531,6 @@ impl FrictionPath {
     fn stiffness(&self, end_state: &EndState, side: PathEnd, d: f64, w: f64) -> f64 {
         let excess = exp_m1(self.ln_theta_v(side, d, w));
         -self.theta_rate(end_state) * exp(-w) * (excess - self.kappa * (1.0 + excess))
-    }
-
-    /// Lower bound of the decay rate of errors near the end, and the distance over which it holds.
-    fn damping(&self) -> (f64, f64) {
-        let end_state = self.end_state(PathEnd::End);
-        let layer = (end_state.l.abs() + self.alpha.abs()) * (1.0 + end_state.margin / self.a);
-        (0.25 * (self.kappa * self.theta_rate(end_state)).abs(), (1.0 / layer).min(0.25))
     }
 
     /// Distance from the start at which theta follows the velocity to `accuracy`; 0 where the change of velocity on the
@@ -594,11 +545,8 @@ impl FrictionPath {
     }
 
     /// Integral of the residual over a panel, and its error estimate in units of the spare time.
-    fn residual_contribution(&self, panel: &Panel, rule: &Radau) -> (f64, f64) {
-        let spare = match self.residual {
-            Residual::LnTheta => return (0.0, 0.0),
-            Residual::Slip { spare } | Residual::TimeLoss { spare } | Residual::TwoSidedSlip { spare } => spare,
-        };
+    fn residual_contribution(&self, panel: &FrictionPanel, rule: &Radau) -> (f64, f64) {
+        let Some(spare) = self.residual.spare() else { return (0.0, 0.0) };
         let scale = self.t_f * (panel.to - panel.from).abs();
         let mut values = [0.0; NODES];
         for ((value, &node), &w) in values.iter_mut().zip(&rule.u).zip(&panel.w) {
@@ -658,26 +606,20 @@ impl FrictionPath {
     }
 }
 
-/// Distance of the middle from either end.
+/// Distance of the middle from either end. By definition.
 const MIDPOINT: f64 = 0.5;
 
-/// Relative change of velocity that theta does not resolve, at most. Chosen.
+/// Relative change of velocity that theta does not resolve, at most. Chosen; the budgets of `shortcut` judge it.
 const MAX_UNRESOLVED_CHANGE: f64 = 0.01;
 
-/// Logarithm of the amplification of an error by a fall of theta, at most.
-const MAX_LN_AMPLIFICATION: f64 = MAX_LN_THETA_FALL + 30.0;
-
-/// Length of a panel in units of a layer at its end, at most. Chosen.
+/// Length of a panel in units of a layer at its end, at most. Chosen; the budgets of `shortcut` judge it.
 const MAX_LAYERS: f64 = 20.0;
 
-/// Length of a panel towards a layer, fraction of the remaining distance. Chosen.
+/// Length of a panel towards a layer, fraction of the remaining distance. Chosen; the budgets of `shortcut` judge it.
 const GRADING_RATIO: f64 = 0.8;
 
-/// Exponent over a panel that quadrature at its nodes resolves, at most. Chosen.
+/// Exponent over a panel that quadrature at its nodes resolves, at most. Chosen; the budgets of `shortcut` judge it.
 pub(super) const MAX_QUADRATURE_EXPONENT: f64 = 6.0;
-
-/// Cost of a panel with elimination, in units of one without.
-const ELIMINATION_COST: f64 = 4.0;
 
 /// Growth of a panel for a growth `x` of its error: `x^(3/32)`, close to the root of the order.
 fn root_of_order(x: f64) -> f64 {

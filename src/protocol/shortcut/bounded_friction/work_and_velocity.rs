@@ -1,6 +1,6 @@
 //! Work and range of the velocity along a pass.
 
-use super::panel::Panel;
+use super::panel::FrictionPanel;
 use super::path::{FrictionPath, PathEnd};
 use crate::model::Transition;
 use crate::numerics::radau::{NODES, radau};
@@ -16,9 +16,12 @@ pub(super) struct WorkAndVelocity {
 }
 
 impl WorkAndVelocity {
-    pub fn new(transition: &Transition) -> WorkAndVelocity {
+    /// Work and velocity of a transition along the panels of a pass.
+    pub fn of(transition: &Transition, path: &FrictionPath, panels: &[FrictionPanel]) -> WorkAndVelocity {
         let Transition { v_i, v_f, .. } = *transition;
-        WorkAndVelocity { work: 0.0, v_min: v_i.min(v_f), v_max: v_i.max(v_f), last: None }
+        let mut all = WorkAndVelocity { work: 0.0, v_min: v_i.min(v_f), v_max: v_i.max(v_f), last: None };
+        panels.iter().for_each(|panel| all.add(&path.towards(panel.forward), panel));
+        all
     }
 
     /// Work and velocity of steady sliding.
@@ -27,7 +30,7 @@ impl WorkAndVelocity {
     }
 
     /// Adds one panel.
-    pub fn add(&mut self, path: &FrictionPath, panel: &Panel) {
+    fn add(&mut self, path: &FrictionPath, panel: &FrictionPanel) {
         let rule = radau();
         let (mut before, mut sum) = (0.0, 0.0);
         let (_, z) = panel.state(path, 0.0);
@@ -53,7 +56,13 @@ impl WorkAndVelocity {
     }
 
     /// Adds the extremum between two fractions of a panel, by bisection.
-    fn add_extremum(&mut self, path: &FrictionPath, panel: &Panel, (mut low, mut high): (f64, f64), rising: bool) {
+    fn add_extremum(
+        &mut self,
+        path: &FrictionPath,
+        panel: &FrictionPanel,
+        (mut low, mut high): (f64, f64),
+        rising: bool,
+    ) {
         for _ in 0..MAX_HALVINGS {
             let middle = 0.5 * (low + high);
             let (w, z) = panel.state(path, middle);

@@ -1,6 +1,6 @@
 //! Exponent of `bounded_velocity`: the parabola `f = -z (L + c x)`.
 
-use crate::protocol::profile::{Exponent, Panel, PanelRanges, ProtocolEnd};
+use crate::protocol::profile::{CurvePanel, Exponent, PanelRanges, ProtocolEnd};
 
 /// The parabolic exponent.
 #[derive(Debug, Clone, Copy)]
@@ -71,14 +71,15 @@ impl Exponent for Parabola {
             let d = 2.0 * fall / (-slope + (slope * slope - 4.0 * self.c * fall).max(0.0).sqrt());
             if fall > 0.0 && d < rise { d } else { 0.0 }
         };
-        let whole =
-            |side, meeting| [Panel { side, from: 0.0, to: meeting }, Panel { side, from: meeting, to: meeting }];
+        let whole = |side, meeting| {
+            [CurvePanel { side, from: 0.0, to: meeting }, CurvePanel { side, from: meeting, to: meeting }]
+        };
         let parts = |side, meeting: f64, slope: f64, end: f64| {
             if !is_negligible {
                 return whole(side, meeting);
             }
             let d = crossing(meeting, slope, end);
-            [Panel { side, from: 0.0, to: d }, Panel { side, from: d, to: meeting }]
+            [CurvePanel { side, from: 0.0, to: d }, CurvePanel { side, from: d, to: meeting }]
         };
         let [first, second] = parts(ProtocolEnd::Start, x, self.l - self.c, level + self.value(0.0, 1.0));
         let [fourth, third] = parts(ProtocolEnd::End, 1.0 - x, -(self.l + self.c), level);

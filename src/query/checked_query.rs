@@ -17,7 +17,7 @@ use super::walk::{Visit, walk};
 use crate::names::hint;
 
 /// A valid query.
-pub struct Question {
+pub struct CheckedQuery {
     /// The query in the dialect of polars.
     pub query: Box<Query>,
     /// The known units of its columns, by name.
@@ -25,19 +25,19 @@ pub struct Question {
 }
 
 /// The fault of a query, and its help.
-pub struct Fault {
+pub struct InvalidQuery {
     pub found: String,
     pub help: String,
 }
 
-impl Fault {
-    fn new(found: impl Into<String>, help: impl Into<String>) -> Fault {
-        Fault { found: found.into(), help: help.into() }
+impl InvalidQuery {
+    fn new(found: impl Into<String>, help: impl Into<String>) -> InvalidQuery {
+        InvalidQuery { found: found.into(), help: help.into() }
     }
 }
 
 /// Functions of text. In polars they take text alone; functions of numbers take text too, and return nulls for it.
-const TEXT: &str = "array_agg bit_length concat concat_ws ends_with greatest initcap least left length lower ltrim max min octet_length \
+const TEXT_FUNCTIONS: &str = "array_agg bit_length concat concat_ws ends_with greatest initcap least left length lower ltrim max min octet_length \
     regexp_like replace reverse right rtrim split_part starts_with string_agg strpos substr upper";
 
 /// Whether a function has one of these names.
@@ -47,30 +47,33 @@ pub fn is_one_of(names: &str, function: &Function) -> bool {
 }
 
 /// The help for most queries.
-pub const CORRECT: &str =
+pub const GENERAL_HELP: &str =
     "correct the query; text goes in 'single quotes', names with special characters in \"double\" ones";
 
-impl Question {
+impl CheckedQuery {
     /// Parses and checks the query `sql` on the tables `sources`.
     ///
     /// # Errors
     ///
     /// What is wrong with the query, and how to correct it.
-    pub fn parse(sql: &str, sources: &[Source]) -> Result<Question, Fault> {
+    pub fn parse(sql: &str, sources: &[Source]) -> Result<CheckedQuery, InvalidQuery> {
         let statements = Parser::parse_sql(&GenericDialect {}, sql).map_err(|error| match error {
             ParserError::RecursionLimitExceeded => {
-                Fault::new("parentheses are nested too deeply", "simplify the query")
+                InvalidQuery::new("parentheses are nested too deeply", "simplify the query")
             }
             ParserError::TokenizerError(text) | ParserError::ParserError(text) => {
-                Fault::new(format!("not SQL: {text}"), CORRECT)
+                InvalidQuery::new(format!("not SQL: {text}"), GENERAL_HELP)
             }
         })?;
         let [statement] = <[Statement; 1]>::try_from(statements)
-            .map_err(|_| Fault::new("several statements, or none", "write one SELECT"))?;
+            .map_err(|_| InvalidQuery::new("several statements, or none", "write one SELECT"))?;
         let Statement::Query(mut query) = statement else {
             let words = statement.to_string();
             let first = words.split_whitespace().next().unwrap_or_default().to_uppercase();
-            return Err(Fault::new(format!("{first} is refused: `query` reads and never writes"), "write one SELECT"));
+            return Err(InvalidQuery::new(
+                format!("{first} is refused: `query` reads and never writes"),
+                "write one SELECT",
+            ));
         };
         let mut check = Check { sources, tables: HashSet::new(), fault: None };
         walk(query.as_mut(), &mut check);
@@ -81,7 +84,7 @@ impl Question {
         walk(query.as_mut(), &mut Names);
         let units = units(&query, sources);
         walk(query.as_mut(), &mut PolarsDialect { words });
-        Ok(Question { query, units })
+        Ok(CheckedQuery { query, units })
     }
 }
 
@@ -90,11 +93,11 @@ struct Check<'a> {
     sources: &'a [Source],
     /// Names of tables that the query defines itself.
     tables: HashSet<String>,
-    fault: Option<Fault>,
+    fault: Option<InvalidQuery>,
 }
 
 impl Check<'_> {
-    fn refuse(&mut self, fault: Fault) -> ControlFlow<()> {
+    fn refuse(&mut self, fault: InvalidQuery) -> ControlFlow<()> {
         self.fault = Some(fault);
         ControlFlow::Break(())
     }
@@ -106,13 +109,14 @@ impl Visit for Check<'_> {
             let name = &table.alias.name.value;
             // polars would use the table of the dataset instead.
             if self.sources.iter().any(|source| source.name == *name) {
-                return self.refuse(Fault::new(format!("WITH {name}: a table has this name"), "choose another name"));
+                return self
+                    .refuse(InvalidQuery::new(format!("WITH {name}: a table has this name"), "choose another name"));
             }
             self.tables.insert(name.clone());
         }
         match query.body.as_ref() {
             SetExpr::Insert(_) | SetExpr::Update(_) | SetExpr::Delete(_) | SetExpr::Merge(_) => {
-                self.refuse(Fault::new("refused: `query` reads and never writes", "write one SELECT"))
+                self.refuse(InvalidQuery::new("refused: `query` reads and never writes", "write one SELECT"))
             }
             _ => ControlFlow::Continue(()),
         }
@@ -121,8 +125,8 @@ impl Visit for Check<'_> {
     fn before(&mut self, expression: &mut Expr) -> ControlFlow<()> {
         let Expr::Function(function) = &*expression else { return ControlFlow::Continue(()) };
         let argument = first_argument(function).filter(|argument| is_constant(argument));
-        if argument.is_some() && is_one_of(AGGREGATES, function) {
-            return self.refuse(Fault::new(
+        if argument.is_some() && is_one_of(AGGREGATE_FUNCTIONS, function) {
+            return self.refuse(InvalidQuery::new(
                 format!("`{expression}`: no column in it"),
                 "count(*) counts rows; name a column for other aggregates",
             ));
@@ -135,13 +139,13 @@ impl Visit for Check<'_> {
         let condition = joins.filter_map(|join| outer_condition(&join.join_operator));
         if let Some(condition) = condition.into_iter().find(|condition| !is_equalities(condition)) {
             // polars would apply the other conditions to the joined rows, and lose rows without a match.
-            return self.refuse(Fault::new(
+            return self.refuse(InvalidQuery::new(
                 format!("ON {condition}: an outer join compares columns with columns by ="),
                 "filter in a subquery: FROM a LEFT JOIN (SELECT * FROM b WHERE ...) AS b ON a.x = b.x",
             ));
         }
         if select.into.is_some() {
-            return self.refuse(Fault::new(
+            return self.refuse(InvalidQuery::new(
                 "SELECT INTO writes a table, and `query` never does",
                 "leave INTO out; `--out FILE` writes the answer",
             ));
@@ -153,13 +157,13 @@ impl Visit for Check<'_> {
         let name = match &*table {
             TableFactor::Table { name, args: None, .. } => name,
             TableFactor::Table { name, .. } => {
-                return self.refuse(Fault::new(
+                return self.refuse(InvalidQuery::new(
                     format!("`{name}(...)`: only the tables of the dataset can be read"),
                     "name another dataset or file on the command line instead",
                 ));
             }
             TableFactor::TableFunction { .. } | TableFactor::Function { .. } => {
-                return self.refuse(Fault::new(
+                return self.refuse(InvalidQuery::new(
                     "a function in FROM: only the tables of the dataset can be read",
                     "name another dataset or file on the command line instead",
                 ));
@@ -174,12 +178,12 @@ impl Visit for Check<'_> {
             return ControlFlow::Continue(());
         }
         let help = hint(&word, self.sources.iter().map(|source| source.name.as_str()));
-        self.refuse(Fault::new(format!("no table `{word}`"), help))
+        self.refuse(InvalidQuery::new(format!("no table `{word}`"), help))
     }
 }
 
 /// Aggregates that polars applies to a constant as if it were one row.
-const AGGREGATES: &str = "avg max mean median min quantile_cont quantile_disc stddev stdev sum var variance";
+const AGGREGATE_FUNCTIONS: &str = "avg max mean median min quantile_cont quantile_disc stddev stdev sum var variance";
 
 /// The condition of a join that keeps or selects rows without a match.
 fn outer_condition(join: &JoinOperator) -> Option<&Expr> {
@@ -357,9 +361,10 @@ fn unit(expression: &Expr, sources: &[Source]) -> String {
             unit(inner, sources)
         }
         Expr::Function(function) => {
-            const KEEP: &str = "min max avg mean sum median first last abs quantile_cont quantile_disc stddev";
+            const UNIT_PRESERVING: &str =
+                "min max avg mean sum median first last abs quantile_cont quantile_disc stddev";
             match first_argument(function) {
-                Some(inner) if is_one_of(KEEP, function) => unit(inner, sources),
+                Some(inner) if is_one_of(UNIT_PRESERVING, function) => unit(inner, sources),
                 _ => String::new(),
             }
         }
@@ -450,7 +455,7 @@ impl PolarsDialect {
         if called == "log" && list.args.len() == 1 {
             function.name = ObjectName::from(vec![Ident::new("log10")]);
         }
-        if !TEXT.split(' ').any(|name| name == called) {
+        if !TEXT_FUNCTIONS.split(' ').any(|name| name == called) {
             return;
         }
         for argument in &mut list.args {

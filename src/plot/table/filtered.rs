@@ -87,7 +87,7 @@ impl Values {
 
 /// A table under conditions.
 #[derive(Debug)]
-pub struct Survey {
+pub struct FilteredTable {
     /// The name of the table.
     pub table: String,
     /// Its columns.
@@ -106,7 +106,7 @@ pub struct Survey {
     conditions: Vec<Condition>,
 }
 
-impl Survey {
+impl FilteredTable {
     /// Surveys the present parts of the table `name` of the dataset in `folder`.
     ///
     /// # Errors
@@ -117,7 +117,7 @@ impl Survey {
         manifest: &Manifest,
         name: &str,
         conditions: &[Condition],
-    ) -> Result<Survey, PlotError> {
+    ) -> Result<FilteredTable, PlotError> {
         let table = manifest.table(name).ok_or_else(|| PlotError::NoTable {
             name: name.to_owned(),
             found: manifest.tables.iter().map(|table| table.name.clone()).collect(),
@@ -125,7 +125,7 @@ impl Survey {
         let (parts, missing) = folder.verified(manifest, table).map_err(ReadError::from)?;
         let first = parts.first().ok_or_else(|| PlotError::Empty { table: name.to_owned() })?;
         let (headings, _) = frame::headings(first).map_err(ReadError::from)?;
-        let mut survey = Survey {
+        let mut filtered = FilteredTable {
             table: name.to_owned(),
             headings,
             axes: Vec::new(),
@@ -137,18 +137,18 @@ impl Survey {
             conditions: conditions.to_vec(),
         };
         for condition in conditions {
-            survey.check("--where", "column", &condition.column)?;
+            filtered.check("--where", "column", &condition.column)?;
         }
         let known = table::find(name).map_or(&[][..], |table| table.axes());
-        let names = survey.headings.iter().map(|heading| heading.name.as_str());
+        let names = filtered.headings.iter().map(|heading| heading.name.as_str());
         let axes: Vec<&str> = names.filter(|name| known.iter().any(|axis| axis.name() == *name)).collect();
-        (survey.axes, survey.rows) = survey.values(&axes)?;
-        match survey.rows {
-            0 if conditions.is_empty() => Err(PlotError::Empty { table: survey.table }),
-            0 => Err(survey.without_rows()?),
+        (filtered.axes, filtered.rows) = filtered.values(&axes)?;
+        match filtered.rows {
+            0 if conditions.is_empty() => Err(PlotError::Empty { table: filtered.table }),
+            0 => Err(filtered.without_rows()?),
             _ => {
-                survey.labels = survey.read_labels()?;
-                Ok(survey)
+                filtered.labels = filtered.read_labels()?;
+                Ok(filtered)
             }
         }
     }
@@ -260,7 +260,7 @@ impl Survey {
         }
     }
 
-    /// Calls `visit` with the cells of `columns` for each row that meets the conditions: numbers, and indices of words in [`Survey::words`]; NaN
+    /// Calls `visit` with the cells of `columns` for each row that meets the conditions: numbers, and indices of words in [`FilteredTable::words`]; NaN
     /// for null.
     ///
     /// # Errors
@@ -273,7 +273,7 @@ impl Survey {
         })
     }
 
-    /// Calls `visit` for rows as [`Survey::each`] does, until it returns `false`.
+    /// Calls `visit` for rows as [`FilteredTable::each`] does, until it returns `false`.
     ///
     /// # Errors
     ///
@@ -300,7 +300,7 @@ impl Survey {
         Ok(())
     }
 
-    /// Cells as numbers; for words, their indices in [`Survey::words`].
+    /// Cells as numbers; for words, their indices in [`FilteredTable::words`].
     fn numbers<'a>(&self, column: &str, cells: &'a Cells) -> Cow<'a, [f64]> {
         match cells {
             Cells::Numbers(numbers) => Cow::Borrowed(numbers),

@@ -1,0 +1,492 @@
+//! Landscapes under the slip law and that of Perrin, Rice and Zheng.
+//!
+//! `theta'` is at most the fastest rise `c`, and `theta v = u(lack)` depends on `lack = 1 - theta'/c = n/(c t_f)` alone. So feasible set, zeros and
+//! panels are those of an ageing path of the duration `c t_f` ([`Ends::under`]). At the zeros of `n` the integrand has a square root in place of a
+//! logarithm. Under the slip law `tau v = T v - a theta'/theta` with `T = 1 + (b - a) ln theta`, so that the work needs no logarithm of the velocity.
+
+use multiversion::multiversion;
+
+use super::panel_batch::{Prepared, choose};
+use super::path::{Ends, Path};
+use super::plan::MAX_SQUARINGS;
+use super::rules::MappedPanel;
+use super::screen::screen;
+use super::works::Works;
+use super::{Bins, Landscape, LandscapeBuffers};
+use crate::model::{Law, StateLaw};
+use crate::numerics::elementary::ln;
+use crate::numerics::gauss::Primitive;
+use crate::numerics::lambert::{NEAR_END, NEAREST_END, above_branch, near_branch, nearest_branch};
+use crate::numerics::lanes::{LANES, Lanes, Vector};
+use crate::numerics::root::crossing;
+use crate::protocol::{SolverStats, Status};
+
+/// Evaluates the shortcuts of a landscape under another law than ageing.
+pub(super) fn evaluate(of: &Landscape, a_2: &[f64], a_3: &[f64], out: LandscapeBuffers<'_>) -> SolverStats {
+    let LandscapeBuffers { work, v_min, status } = out;
+    let count = a_2.len().min(a_3.len()).min(status.len());
+    let wanted = count.min(work.len());
+    let mut bins = Bins::take();
+    bins.cells.begin(&of.frame);
+    let mut works = Works::new(of, &mut work[..wanted], &mut bins);
+    for first in (0..count).step_by(LANES) {
+        let block = first..(first + LANES).min(count);
+        let (mut a_2_lanes, mut a_3_lanes) = ([0.0; LANES], [0.0; LANES]);
+        a_2_lanes[..block.len()].copy_from_slice(&a_2[block.clone()]);
+        a_3_lanes[..block.len()].copy_from_slice(&a_3[block.clone()]);
+        let found = screen(&of.ends, &a_2_lanes, &a_3_lanes);
+        status[block.clone()].fill(Status::Infeasible);
+        if found[..block.len()].iter().all(|&found| found == Status::Infeasible) {
+            continue;
+        }
+        let doubtful = of.floors.open(&of.ends, &a_2_lanes, &a_3_lanes, &found);
+        let velocities = of.least_velocities(&a_2_lanes, &a_3_lanes, &found);
+        for (lane, i) in block.enumerate().filter(|&(lane, _)| found[lane] != Status::Infeasible) {
+            let own = if velocities[lane] < 1.0 { Status::BelowBound } else { Status::Ok };
+            let is_doubtful = doubtful & (1 << lane) != 0;
+            let friction = if is_doubtful { of.friction_min(&Path::new(&of.ends, a_2[i], a_3[i])) } else { 1.0 };
+            status[i] = own.with_friction(friction);
+            if let Some(v_min) = v_min.get_mut(i) {
+                *v_min = velocities[lane];
+            }
+            works.push(i, a_2[i], a_3[i]);
+        }
+    }
+    let stats = works.finish();
+    bins.keep();
+    if of.work_of_ends != 0.0 {
+        let feasible = work[..wanted].iter_mut().zip(status).filter(|(_, status)| **status != Status::Infeasible);
+        feasible.for_each(|(work, _)| *work += of.work_of_ends);
+    }
+    stats
+}
+
+/// The works of a batch of panels; those of empty lanes are meaningless.
+pub(super) fn sums(of: &Landscape, prepared: &Prepared, rule: &Primitive) -> Lanes {
+    let sums = match of.state {
+        StateLaw::Slip => slip_sums(prepared, rule, of.law, of.ends.t_f),
+        _ => prz_sums(prepared, rule, of.law, of.ends.t_f),
+    };
+    sums.map(|sum| of.t_f * sum)
+}
+
+macro_rules! kernels {
+    ($($name:ident = $state:expr;)*) => {$(
+        #[multiversion(targets(
+            "x86_64+avx+avx2+bmi1+bmi2+avx512f+avx512bw+avx512cd+avx512dq+avx512vl",
+            "x86_64+avx+avx2+bmi1+bmi2"
+        ))]
+        fn $name(prepared: &Prepared, rule: &Primitive, law: Law, scaled_time: f64) -> Lanes {
+            sum(prepared, rule, |theta, n| density($state, law, (1.0 / scaled_time) * n, theta))
+        }
+    )*};
+}
+
+kernels! {
+    slip_sums = StateLaw::Slip;
+    prz_sums = StateLaw::Prz;
+}
+
+/// The sums over the nodes.
+#[inline(always)]
+fn sum(prepared: &Prepared, rule: &Primitive, density: impl Fn(Vector, Vector) -> Vector) -> Lanes {
+    let Prepared { theta, n, gap, squarings, middle, half, unit, scale, .. } = *prepared;
+    let mut sum = Vector::splat(0.0);
+    for (x, w) in rule.x.iter().zip(&rule.w) {
+        for x in [*x, -*x] {
+            let (mut power, mut jacobian) = (middle + x * half, unit);
+            for level in 0..MAX_SQUARINGS {
+                let more = squarings - Vector::splat(f64::from(level) + 0.5);
+                (power, jacobian) = (choose(more, power * power, power), choose(more, power * jacobian, jacobian));
+            }
+            let eta = gap - power;
+            let theta = theta[0] + eta * (theta[1] + eta * (theta[2] + eta * theta[3]));
+            let n = n[0] + eta * (n[1] + eta * n[2]);
+            sum = sum + *w * (jacobian * density(theta, n));
+        }
+    }
+    (scale * sum).0
+}
+
+/// The part of `tau v` that is integrated.
+#[inline(always)]
+fn density(state: StateLaw, Law { a, b }: Law, lack: Vector, theta: Vector) -> Vector {
+    let lack = positive(lack);
+    let tau = 1.0 + (b - a) * theta.map(ln);
+    let tau = if state == StateLaw::Prz { tau + (0.5 * a) * lack.map(ln) } else { tau };
+    tau * products(state, lack) / theta
+}
+
+/// The lack, which rounding may make negative on the border.
+#[inline(always)]
+fn positive(lack: Vector) -> Vector {
+    lack.map(|lack| if lack > f64::MIN_POSITIVE { lack } else { f64::MIN_POSITIVE })
+}
+
+/// Whether all lanes are at most `end`.
+#[inline(always)]
+fn is_below(x: &Vector, end: f64) -> bool {
+    let mut beyond = 0.0;
+    for x in x.0 {
+        beyond += if x <= end { 0.0 } else { 1.0 };
+    }
+    beyond == 0.0
+}
+
+/// [`StateLaw::product`].
+#[inline(always)]
+fn products(state: StateLaw, lack: Vector) -> Vector {
+    match state {
+        StateLaw::Prz => lack.map(f64::sqrt),
+        // Each lane has the formula of its own argument, whatever the others hold.
+        _ if is_below(&lack, NEAREST_END) => lack.map(|lack| (1.0 / std::f64::consts::E) * nearest_branch(lack)),
+        _ => lack.map(|lack| {
+            if lack <= NEAREST_END {
+                (1.0 / std::f64::consts::E) * nearest_branch(lack)
+            } else if lack <= NEAR_END {
+                (1.0 / std::f64::consts::E) * near_branch(lack)
+            } else {
+                state.product(lack)
+            }
+        }),
+    }
+}
+
+/// Samples of the trend of the velocity. Chosen: more than twice as many as the trend has zeros, so that close pairs of zeros show in the differences.
+const SAMPLES: usize = 9;
+
+/// Newton steps from a secant between samples. Derived: from there each doubles the digits.
+const NEWTON_STEPS: usize = 4;
+
+/// Least last Newton step, in units of `t_f`, that is not converged. Derived: the velocity depends on the square of the error.
+const MAX_LAST_STEP: f64 = 1e-7;
+
+/// Fraction of a sample below which the parabola through it and its neighbours hints at two zeros. Chosen: a half, for the error of the parabola.
+const NEAR_ZERO: f64 = 0.5;
+
+/// The least velocities of eight shortcuts and their positions.
+struct Least {
+    v: Lanes,
+    place: Lanes,
+    /// 1 where the search needs more samples.
+    doubt: Lanes,
+    /// 1 where rounding matters.
+    lossy: Lanes,
+}
+
+impl Least {
+    const NONE: Least = Least { v: [0.0; LANES], place: [0.0; LANES], doubt: [0.0; LANES], lossy: [0.0; LANES] };
+}
+
+impl Landscape {
+    /// The least velocities of feasible shortcuts; others are meaningless.
+    fn least_velocities(&self, a_2: &Lanes, a_3: &Lanes, found: &[Status; LANES]) -> Lanes {
+        let wanted = found.map(|found| if found == Status::Infeasible { 0.0 } else { 1.0 });
+        let Least { mut v, place, doubt, lossy } = match self.state {
+            StateLaw::Slip => slip_velocities(&self.ends, a_2, a_3, &wanted),
+            _ => prz_velocities(&self.ends, a_2, a_3, &wanted),
+        };
+        for i in (0..LANES).filter(|&i| wanted[i] * (doubt[i] + lossy[i]) > 0.0) {
+            let path = Path::new(&self.ends, a_2[i], a_3[i]);
+            let inside = if doubt[i] > 0.0 { self.minima(&path, 1.0, -1.0) } else { vec![place[i]] };
+            let places = inside.into_iter().chain([0.0, 1.0]);
+            v[i] = places.map(|x| self.velocity(&path, x)).fold(f64::INFINITY, f64::min);
+        }
+        v
+    }
+
+    /// The place where the lack exceeds that of `v = 1` least.
+    pub(in crate::protocol) fn slowest(&self, path: &Path) -> f64 {
+        let (theta, n, t_f) = (path.theta(), path.n(), self.ends.t_f);
+        let excess = |x: f64| n.at(x) / t_f - self.state.lack(theta.at(x))[0];
+        let trend = |x: f64| -slopes(&theta.c, x).1 / t_f - self.state.lack(theta.at(x))[1] * slopes(&theta.c, x).0;
+        let place = |i: usize| i as f64 / (SLOWEST_SAMPLES - 1) as f64;
+        let samples: [f64; SLOWEST_SAMPLES] = std::array::from_fn(|i| excess(place(i)));
+        let mut places = vec![0.0, 1.0];
+        for i in 1..SLOWEST_SAMPLES - 1 {
+            if samples[i] <= samples[i - 1] && samples[i] <= samples[i + 1] {
+                let ends = [place(i - 1), place(i + 1)];
+                let [low, high] = ends.map(trend);
+                places.push(if low < 0.0 && high > 0.0 { crossing(trend, ends, [low, high], 0.0) } else { place(i) });
+            }
+        }
+        let exact = |x: &f64| {
+            let (theta, n) = path.at(*x);
+            n / t_f - self.state.lack(theta)[0]
+        };
+        places.into_iter().min_by(|x, y| exact(x).total_cmp(&exact(y))).unwrap_or(0.0)
+    }
+
+    /// The least velocity and the least friction of a feasible shortcut.
+    pub(in crate::protocol) fn least(&self, path: &Path) -> [f64; 2] {
+        let places = self.minima(path, 1.0, -1.0).into_iter().chain([0.0, 1.0]);
+        let v_min = places.map(|x| self.velocity(path, x)).fold(f64::INFINITY, f64::min);
+        [v_min, self.friction_min(path)]
+    }
+
+    /// The velocity at `x`, from values of 32 digits.
+    pub(super) fn velocity(&self, path: &Path, x: f64) -> f64 {
+        let (theta, n) = path.at(x);
+        self.state.product((n / self.ends.t_f).max(0.0)) / theta
+    }
+
+    /// The least friction on a feasible shortcut.
+    fn friction_min(&self, path: &Path) -> f64 {
+        let Law { a, b } = self.law;
+        let friction = |x: f64| {
+            let (v, theta) = (self.velocity(path, x), path.at(x).0);
+            if v > 0.0 { 1.0 + a * ln(v) + b * ln(theta) } else { f64::NEG_INFINITY }
+        };
+        self.minima(path, a, b - a).into_iter().chain([0.0, 1.0]).map(friction).fold(f64::INFINITY, f64::min)
+    }
+
+    /// The minima of `p ln(theta v) + q ln theta` inside the shortcut, and possibly other points.
+    fn minima(&self, path: &Path, p: f64, q: f64) -> Vec<f64> {
+        if self.state == StateLaw::Prz {
+            // p/2 ln n + q ln theta.
+            let exponents = Law { a: 0.5 * p, b: 0.5 * p + q };
+            let half = |end: f64| path.stationary(exponents, end).into_iter().map(move |d| (end - d).abs());
+            return half(0.0).chain(half(1.0)).collect();
+        }
+        let trend = |x: f64| {
+            let (theta, (slope, bend)) = (path.theta().at(x), slopes(&path.theta().c, x));
+            let lack = (path.n().at(x) / self.ends.t_f).max(0.0);
+            q * slope * self.ends.t_f * (lack - 1.0 + above_branch(lack)) - p * theta * bend
+        };
+        // Uniform, and denser towards both ends, where theta may be small.
+        let fine = (1..FINE_SAMPLES).map(|i| i as f64 / FINE_SAMPLES as f64);
+        let ends = (10..52).map(|k| (-k as f64).exp2());
+        let mut places: Vec<f64> = fine.chain(ends.clone()).chain(ends.map(|d| 1.0 - d)).chain([0.0, 1.0]).collect();
+        places.sort_by(f64::total_cmp);
+        let values: Vec<f64> = places.iter().map(|&x| trend(x)).collect();
+        let pairs = places.windows(2).zip(values.windows(2)).filter(|(_, f)| f[0] < 0.0 && f[1] >= 0.0);
+        pairs.map(|(x, f)| crossing(trend, [x[0], x[1]], [f[0], f[1]], f64::EPSILON)).collect()
+    }
+}
+
+/// Samples of the lack. Chosen: several for each stationary point of a cubic of a cubic.
+const SLOWEST_SAMPLES: usize = 33;
+
+/// Samples of a trend in doubt. Chosen: fifteen times those of the first search.
+const FINE_SAMPLES: usize = 256;
+
+/// First and second derivative of a cubic.
+#[inline(always)]
+fn slopes(&[_, c_1, c_2, c_3]: &[f64; 4], x: f64) -> (f64, f64) {
+    (c_1 + x * (2.0 * c_2 + 3.0 * c_3 * x), 2.0 * c_2 + 6.0 * c_3 * x)
+}
+
+/// A cubic and its derivatives at some places.
+#[inline(always)]
+fn jet(c: &[Vector; 4], x: Vector) -> [Vector; 4] {
+    let two_c_2 = c[2] + c[2];
+    let six_c_3 = 6.0 * c[3];
+    [
+        c[0] + x * (c[1] + x * (c[2] + x * c[3])),
+        c[1] + x * (two_c_2 + x * (0.5 * six_c_3)),
+        two_c_2 + x * six_c_3,
+        six_c_3,
+    ]
+}
+
+/// The rate of `ln v` times a positive number, and its slope. With derivatives by `x`, `s = theta_x` and `r = theta_xx`, it is `-2 n s - theta r` for
+/// the law of Perrin, Rice and Zheng and `-t_f u (1 + ln u) s - theta r` for the slip law, where `e u (1 + ln u) = lack - 1 + e u`.
+#[inline(always)]
+fn trend(state: StateLaw, scaled_time: f64, c: &[Vector; 4], x: Vector) -> (Vector, Vector) {
+    let [theta, s, r, jerk] = jet(c, x);
+    let n = Vector::splat(scaled_time) - s;
+    if state == StateLaw::Prz {
+        let pull = n + n;
+        return (Vector::splat(0.0) - pull * s - theta * r, s * r - pull * r - theta * jerk);
+    }
+    let lack = positive((1.0 / scaled_time) * n);
+    let e = std::f64::consts::E * products(state, lack);
+    let rest = lack + e - Vector::splat(1.0);
+    // d(e u)/d(theta_x) = -1/(scaled_time ln(e u)).
+    let slope = s * r * (Vector::splat(1.0) + e / rest) - scaled_time * (e * r) - theta * jerk;
+    (Vector::splat(0.0) - scaled_time * (rest * s) - theta * r, slope)
+}
+
+macro_rules! searches {
+    ($($name:ident = $state:expr;)*) => {$(
+        #[multiversion(targets(
+            "x86_64+avx+avx2+bmi1+bmi2+avx512f+avx512bw+avx512cd+avx512dq+avx512vl",
+            "x86_64+avx+avx2+bmi1+bmi2"
+        ))]
+        fn $name(ends: &Ends, a_2: &Lanes, a_3: &Lanes, wanted: &Lanes) -> Least {
+            least($state, ends, a_2, a_3, wanted)
+        }
+    )*};
+}
+
+searches! {
+    slip_velocities = StateLaw::Slip;
+    prz_velocities = StateLaw::Prz;
+}
+
+/// The least velocities: at an end, or where the trend changes from falling to rising between two samples.
+#[inline(always)]
+fn least(state: StateLaw, ends: &Ends, a_2: &Lanes, a_3: &Lanes, wanted: &Lanes) -> Least {
+    let ([a_2, a_3], rise) = ([a_2, a_3].map(|a| Vector(*a)), ends.rise.high);
+    let c = [Vector::splat(ends.theta_0.high), a_2, a_3, rise - (a_2 + a_3)];
+    let n_ends = [ends.t_f - a_2, ends.t_f - (3.0 * rise - (2.0 * a_2 + a_3))];
+    let theta_ends = [c[0], Vector::splat(ends.theta_1.high)];
+    let v_ends = [velocity(state, ends, n_ends[0], theta_ends[0]), velocity(state, ends, n_ends[1], theta_ends[1])];
+    let is_first = v_ends[1] - v_ends[0];
+    let end = End {
+        v: choose(is_first, v_ends[0], v_ends[1]),
+        theta: choose(is_first, theta_ends[0], theta_ends[1]),
+        n: choose(is_first, n_ends[0], n_ends[1]),
+    };
+    let place = choose(is_first, Vector::splat(0.0), Vector::splat(1.0));
+    let mut found = Least { v: end.v.0, place: place.0, ..Least::NONE };
+    let open = open(state, ends, &c, &n_ends, &end, wanted);
+    if open != [0.0; LANES] {
+        let at_end = (found.v, found.place);
+        search(state, ends, &c, &mut found);
+        for i in (0..LANES).filter(|&i| open[i] == 0.0) {
+            (found.v[i], found.place[i], found.doubt[i]) = (at_end.0[i], at_end.1[i], 0.0);
+        }
+    }
+    let [theta, s, ..] = jet(&c, Vector(found.place));
+    let n = Vector::splat(ends.t_f) - s;
+    for i in 0..LANES {
+        let size = c.iter().map(|c| c.0[i].abs()).sum::<f64>();
+        let loss = 4.0 * f64::EPSILON * (ends.t_f + 3.0 * size);
+        let is_sound = (ends.v_loss * theta.0[i] > loss) & (ends.v_loss * n.0[i] > 3.0 * loss);
+        found.lossy[i] = if is_sound { 0.0 } else { 1.0 };
+    }
+    found
+}
+
+/// The velocities where `n` and theta have these values.
+#[inline(always)]
+fn velocity(state: StateLaw, ends: &Ends, n: Vector, theta: Vector) -> Vector {
+    products(state, positive((1.0 / ends.t_f) * n)) / theta
+}
+
+/// The lesser of two numbers in each lane.
+#[inline(always)]
+fn lower(x: Vector, y: Vector) -> Vector {
+    choose(y - x, x, y)
+}
+
+/// The slower end of eight shortcuts.
+struct End {
+    v: Vector,
+    theta: Vector,
+    n: Vector,
+}
+
+/// 1 where the slower end, with `v = m`, need not be the slowest place.
+///
+/// `v >= m` where `lack >= f(m theta)`, with the inverse `f` of the product, which is convex (0 below `u = 1/e`). A chord bounds `f` from above; the rest
+/// is a cubic, not negative if no coefficient in Bernstein's form is.
+#[inline(always)]
+fn open(state: StateLaw, ends: &Ends, c: &[Vector; 4], n_ends: &[Vector; 2], end: &End, wanted: &Lanes) -> Lanes {
+    let third = 1.0 / 3.0;
+    let theta = [c[0], c[0] + third * c[1], c[0] + third * (c[1] + c[1] + c[2]), Vector::splat(ends.theta_1.high)];
+    let low = lower(lower(theta[0], theta[1]), lower(theta[2], theta[3]));
+    let minus = theta.map(|theta| -1.0 * theta);
+    let high = -1.0 * lower(lower(minus[0], minus[1]), lower(minus[2], minus[3]));
+    let other = choose(high - end.theta, high, low);
+    let u = end.v * other;
+    let lack = match state {
+        StateLaw::Prz => u.map(|u| if u > 0.0 { u * u } else { 0.0 }),
+        _ => (std::f64::consts::E * u).map(|e| {
+            let above = if e > 1.0 { e } else { 1.0 };
+            above * ln(above) - above + 1.0
+        }),
+    };
+    let chord = (end.n - ends.t_f * lack) / (end.theta - other);
+    // n in Bernstein's form.
+    let n = [n_ends[0], n_ends[0] - (2.0 * third) * c[2], n_ends[1] + third * (c[2] + c[2] + 6.0 * c[3]), n_ends[1]];
+    let mut open = [0.0; LANES];
+    for (i, open) in open.iter_mut().enumerate() {
+        let (top, bottom) = (end.theta.0[i] >= high.0[i], end.theta.0[i] <= low.0[i]);
+        let size = ends.t_f + c.iter().map(|c| c.0[i].abs()).sum::<f64>();
+        let doubt = 16.0 * f64::EPSILON * (3.0 + chord.0[i].abs()) * size;
+        let mut is_settled = top | bottom;
+        for k in 0..4 {
+            let rest = (n[k].0[i] - end.n.0[i]) - chord.0[i] * (theta[k].0[i] - end.theta.0[i]);
+            // Zero at the slower end itself.
+            let is_own = (k % 3 == 0) & (rest == 0.0);
+            is_settled &= is_own | (rest > doubt);
+        }
+        *open = if is_settled { 0.0 } else { wanted[i] };
+    }
+    open
+}
+
+/// Searches the shortcuts for velocities below those of `found`.
+#[inline(always)]
+fn search(state: StateLaw, ends: &Ends, c: &[Vector; 4], found: &mut Least) {
+    let spacing = 1.0 / (SAMPLES - 1) as f64;
+    let mut trends = [Vector::splat(0.0); SAMPLES];
+    for (k, sample) in trends.iter_mut().enumerate() {
+        *sample = trend(state, ends.t_f, c, Vector::splat(k as f64 * spacing)).0;
+    }
+    let (mut turns, mut low, mut high, mut x) = ([0.0; LANES], [0.0; LANES], [0.0; LANES], [0.0; LANES]);
+    for (k, pair) in trends.windows(2).enumerate() {
+        for i in 0..LANES {
+            let (f, g) = (pair[0].0[i], pair[1].0[i]);
+            let is_turn = (f < 0.0) & (g >= 0.0);
+            let from = k as f64 * spacing;
+            turns[i] += if is_turn { 1.0 } else { 0.0 };
+            low[i] = if is_turn { from } else { low[i] };
+            high[i] = if is_turn { from + spacing } else { high[i] };
+            x[i] = if is_turn { from + spacing * (f / (f - g)) } else { x[i] };
+        }
+    }
+    for three in trends.windows(3) {
+        for i in 0..LANES {
+            let [f, g, h] = [three[0].0[i], three[1].0[i], three[2].0[i]];
+            let (slope, bend) = (0.5 * (h - f), f - 2.0 * g + h);
+            // The extremum of the parabola lies between the three, and close to 0 or beyond.
+            let is_same = (f * g > 0.0) & (g * h > 0.0) & (slope.abs() <= bend.abs()) & (bend * g > 0.0);
+            let is_near = g * g * bend.abs() - 0.5 * slope * slope * g.abs() < NEAR_ZERO * g * g * bend.abs();
+            found.doubt[i] = if is_same & is_near { 1.0 } else { found.doubt[i] };
+        }
+    }
+    let mut step = [0.0f64; LANES];
+    for _ in 0..NEWTON_STEPS {
+        let (value, slope) = trend(state, ends.t_f, c, Vector(x));
+        for i in 0..LANES {
+            let (value, slope) = (value.0[i], slope.0[i]);
+            low[i] = if value < 0.0 { x[i] } else { low[i] };
+            high[i] = if value < 0.0 { high[i] } else { x[i] };
+            let next = x[i] - value / slope;
+            let next = if (next >= low[i]) & (next <= high[i]) { next } else { 0.5 * (low[i] + high[i]) };
+            step[i] = next - x[i];
+            x[i] = next;
+        }
+    }
+    let [theta, s, ..] = jet(c, Vector(x));
+    let n = Vector::splat(ends.t_f) - s;
+    let inside = velocity(state, ends, n, theta);
+    for i in 0..LANES {
+        let has_turn = turns[i] > 0.5;
+        let is_lower = has_turn & (inside.0[i] < found.v[i]);
+        found.v[i] = if is_lower { inside.0[i] } else { found.v[i] };
+        found.place[i] = if is_lower { x[i] } else { found.place[i] };
+        let is_open = (turns[i] > 1.5) | (has_turn & (step[i].is_nan() | (step[i].abs() > MAX_LAST_STEP)));
+        found.doubt[i] = if is_open { 1.0 } else { found.doubt[i] };
+    }
+}
+
+/// The contribution of one panel to the work, eight nodes at a time.
+pub(super) fn panel_sum(of: &Landscape, path: &Path, panel: &MappedPanel) -> f64 {
+    let ([q0, q1, q2, q3], [n0, n1, n2]) = path.about(panel.centre);
+    let (mut nodes, mut weights) = (Vec::with_capacity(panel.nodes + LANES), Vec::with_capacity(panel.nodes));
+    panel.each_node(|delta, weight| {
+        nodes.push((q0 + delta * (q1 + delta * (q2 + delta * q3)), n0 + delta * (n1 + delta * n2)));
+        weights.push(weight);
+    });
+    nodes.resize(nodes.len().next_multiple_of(LANES), (1.0, of.ends.t_f));
+    let mut densities = Vec::with_capacity(nodes.len());
+    for nodes in nodes.chunks_exact(LANES) {
+        let (theta, n) = (Vector(std::array::from_fn(|i| nodes[i].0)), Vector(std::array::from_fn(|i| nodes[i].1)));
+        densities.extend(density(of.state, of.law, (1.0 / of.ends.t_f) * n, theta).0);
+    }
+    of.t_f * weights.iter().zip(densities).map(|(weight, density)| weight * density).sum::<f64>()
+}

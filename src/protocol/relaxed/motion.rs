@@ -1,0 +1,139 @@
+//! The motion of a path: arcs on both bounds, a rise, and pulses instead of chattering.
+
+use super::bound_arc::{BoundArc, Kind};
+use super::rise::Rise;
+use super::state::{State, down, up};
+use super::{Path, Problem};
+use crate::numerics::elementary::exp;
+use crate::protocol::{Moment, Motion};
+
+/// Pulses on the ceiling that stand for chattering. Chosen: they cost 1e-4 more work in the case of docs/laws.md.
+pub const PULSES: usize = 16;
+
+/// Change of `ln theta` and length of an interval between landmarks. Chosen: a polynomial of degree 16 follows it to rounding.
+const INTERVAL: f64 = 1.0;
+
+/// A piece of the motion.
+#[derive(Debug, Clone, Copy)]
+enum Piece {
+    /// An arc on a bound from a state.
+    Bound { kind: Kind, from: State, length: f64 },
+    /// A rise of the slip law.
+    Rise(Rise),
+}
+
+/// The motion.
+pub struct BangBang {
+    problem: Problem,
+    t_f: f64,
+    /// Each piece, its time of start, and the intervals in it.
+    pieces: Vec<(Piece, f64, u32)>,
+}
+
+impl BangBang {
+    /// The motion of `path`.
+    pub(super) fn new(problem: &Problem, path: &Path, t_f: f64) -> BangBang {
+        let mut motion = BangBang { problem: *problem, t_f, pieces: Vec::new() };
+        match path {
+            Path::Turn { first, second } => motion.extend([*first, *second]),
+            Path::Chatter { first, second, time } => {
+                motion.extend([*first]);
+                let rest = first.ends[1];
+                let held = Problem { from: rest, to: rest, ratio: 0.0, span: 0.0, ..*problem };
+                if let Some(Path::Turn { first: pulse, second: back }) = held.wait_and_jerk(time / PULSES as f64) {
+                    (0..PULSES).for_each(|_| motion.extend([pulse, back]));
+                }
+                motion.extend([*second]);
+            }
+            Path::Rise(rise) => {
+                let length = problem.from.below_floor - rise.end();
+                motion.pieces.push((Piece::Rise(*rise), 0.0, (length / INTERVAL) as u32 + 1));
+                let (v, time) = (exp(rise.end()), rise.wait(problem));
+                let from = State::steady(v, problem.ceiling);
+                motion.extend([BoundArc { kind: Kind::Wait, length: time, ends: [from, problem.to], span: 0.0 }]);
+            }
+        }
+        motion
+    }
+
+    fn extend(&mut self, arcs: impl IntoIterator<Item = BoundArc>) {
+        for BoundArc { kind, length, ends: [from, to], .. } in arcs.into_iter().filter(|arc| arc.length > 0.0) {
+            let change = (from.below_floor - to.below_floor).abs();
+            let intervals = (((length + change) / INTERVAL) as u32).min(MAX_INTERVALS) + 1;
+            let start = self.end();
+            self.pieces.push((Piece::Bound { kind, from, length }, start, intervals));
+        }
+    }
+
+    /// Time at the end of the last piece.
+    fn end(&self) -> f64 {
+        self.pieces.last().map_or(0.0, |(piece, start, _)| start + self.duration_of(piece))
+    }
+
+    fn duration_of(&self, piece: &Piece) -> f64 {
+        match piece {
+            Piece::Bound { kind: Kind::Wait, length, .. } => *length,
+            Piece::Bound { kind: Kind::Jerk, length, .. } => length / self.problem.ceiling,
+            Piece::Rise(rise) => rise.time(&self.problem, rise.end()),
+        }
+    }
+
+    /// Time since the start of a piece, velocity and `-ln theta` at a fraction of it.
+    fn inside(&self, piece: &Piece, fraction: f64) -> [f64; 3] {
+        let Problem { law, ceiling, from: start, .. } = self.problem;
+        match *piece {
+            Piece::Bound { kind: Kind::Wait, from, length } => {
+                let t = fraction * length;
+                [t, 1.0, up(law, &from, ceiling, t).turn.below_floor]
+            }
+            Piece::Bound { kind: Kind::Jerk, from, length } => {
+                let slip = fraction * length;
+                [slip / ceiling, ceiling, down(law, &from, ceiling, slip).turn.below_floor]
+            }
+            Piece::Rise(rise) => {
+                let state = start.below_floor + fraction * (rise.end() - start.below_floor);
+                [rise.time(&self.problem, state), rise.velocity(&self.problem, state), state]
+            }
+        }
+    }
+}
+
+/// Greatest number of intervals of a piece. Chosen: a long wait approaches rest within them.
+const MAX_INTERVALS: u32 = 200;
+
+impl Motion for BangBang {
+    fn duration(&self) -> f64 {
+        self.t_f
+    }
+
+    fn landmarks(&self) -> Vec<f64> {
+        let all: u32 = self.pieces.iter().map(|(.., intervals)| intervals).sum();
+        (0..=all).map(|state| f64::from(state) / f64::from(all)).collect()
+    }
+
+    fn at(&self, s: f64) -> Moment {
+        let all: u32 = self.pieces.iter().map(|(.., intervals)| intervals).sum();
+        let mut along = s.clamp(0.0, 1.0) * f64::from(all);
+        let last = self.pieces.len().saturating_sub(1);
+        let mut found = [0.0, f64::NAN, f64::NAN];
+        for (state, (piece, start, intervals)) in self.pieces.iter().enumerate() {
+            let intervals = f64::from(*intervals);
+            if along <= intervals || state == last {
+                let [t, v, below_floor] = self.inside(piece, (along / intervals).min(1.0));
+                found = [start + t, v, below_floor];
+                break;
+            }
+            along -= intervals;
+        }
+        let [t, v, below_floor] = found;
+        let direct = if v == 1.0 { 0.0 } else { self.problem.a * crate::numerics::elementary::ln(v) };
+        Moment {
+            t: if s >= 1.0 { self.t_f } else { t },
+            v,
+            theta: exp(-below_floor),
+            friction: 1.0 + direct - self.problem.b * below_floor,
+            v_c: None,
+            beta: None,
+        }
+    }
+}

@@ -1,0 +1,155 @@
+//! Regularised friction by its definition, with the standard library, and its optimum: the velocities that conserve the Hamiltonian of a row, by
+//! bisection, take its time and its work.
+
+use super::motion::bisect;
+use super::verdict::{Verdict, number, word};
+use crate::dataset::Row;
+use crate::model::{Law, Transition};
+use crate::numerics::radau::radau;
+use crate::protocol::arcsinh::solve;
+use crate::table::STATUS;
+
+/// Panels of each branch. Chosen: shorter than the scale of the least `a`; the nodes near the turning point keep half the digits.
+const PANELS: u32 = 60;
+
+/// Friction over `a`, and its derivative by `ln v`.
+fn friction(law: &Law, ln_v: f64, ln_theta: f64) -> (f64, f64) {
+    let ln_2z = ln_v + (1.0 + law.b * ln_theta) / law.a;
+    let scaled = if ln_2z > 30.0 { ln_2z } else { (0.5 * ln_2z.exp()).asinh() };
+    (scaled, scaled.tanh())
+}
+
+/// Friction.
+pub fn tau(law: &Law, v: f64, theta: f64) -> f64 {
+    law.a * friction(law, v.ln(), theta.ln()).0
+}
+
+/// `a` and `b` of the logarithm with the same derivatives at steady sliding.
+pub fn linearised(law: &Law, v: f64) -> Law {
+    let reduced = friction(law, v.ln(), -v.ln()).1;
+    Law { a: law.a * reduced, b: law.b * reduced }
+}
+
+/// An extremal of the Hamiltonian `h`.
+struct Extremal {
+    law: Law,
+    h: f64,
+}
+
+impl Extremal {
+    /// `ln u` at `ln theta`, by bisection of `tau + a f (1 - u) = theta H`.
+    fn ln_u(&self, ln_theta: f64, rises: bool) -> f64 {
+        let target = ln_theta.exp() * self.h / self.law.a;
+        bisect(0.0, if rises { -1600.0 } else { 60.0 }, |ln_u| {
+            let (scaled, reduced) = friction(&self.law, ln_u - ln_theta, ln_theta);
+            scaled - reduced * ln_u.exp_m1() > target
+        })
+    }
+
+    /// Time, `int u dt` and work while `ln theta` goes between `low` and `high`, below the turning point `top` if there is one.
+    fn branch(&self, [low, high]: [f64; 2], top: Option<f64>, rises: bool) -> [f64; 3] {
+        let rule = radau();
+        // ln theta = top - x^2, or linear in the part.
+        let range = |place: f64| top.map_or(0.0, |top| (top - place).max(0.0).sqrt());
+        let [near, far] = [range(high), range(low)];
+        let mut sums = [0.0; 3];
+        for panel in 0..PANELS {
+            for (&u, &weight) in rule.u.iter().zip(&rule.w) {
+                let part = (f64::from(panel) + u) / f64::from(PANELS);
+                let weight = weight / f64::from(PANELS);
+                let x = near + part * (far - near);
+                let (ln_theta, slope) = match top {
+                    Some(top) => (top - x * x, 2.0 * x * (far - near)),
+                    None => (high - part * (high - low), high - low),
+                };
+                let ln_u = self.ln_u(ln_theta, rises);
+                let dt = weight * slope * ln_theta.exp() / ln_u.exp_m1().abs();
+                let scaled = friction(&self.law, ln_u - ln_theta, ln_theta).0;
+                let lag = dt * ln_u.exp();
+                let terms = [dt, lag, lag * (-ln_theta).exp() * self.law.a * scaled];
+                sums.iter_mut().zip(terms).for_each(|(sum, term)| *sum += term);
+            }
+        }
+        sums
+    }
+
+    /// The sums of the whole path of `problem`, with the greatest theta `theta_max` and the side of 1 of `u` at both ends.
+    fn path(&self, problem: &Transition, theta_max: f64, [start_rises, end_rises]: [bool; 2]) -> [f64; 3] {
+        let [start, end] = [-problem.v_i.ln(), -problem.v_f.ln()];
+        if start_rises && !end_rises {
+            let top = theta_max.ln();
+            let [up, down] = [self.branch([start, top], Some(top), true), self.branch([end, top], Some(top), false)];
+            return [0, 1, 2].map(|i| up[i] + down[i]);
+        }
+        let top = self.turning_point(start.max(end));
+        self.branch([start.min(end), start.max(end)], top, start_rises)
+    }
+
+    /// `ln theta` of a turning point within a factor of 10 above `from`, by bisection.
+    fn turning_point(&self, from: f64) -> Option<f64> {
+        let excess = |w: f64| self.law.a * friction(&self.law, -w, w).0 - w.exp() * self.h;
+        let high = from + 10f64.ln();
+        (excess(high) <= 0.0).then(|| bisect(from, high, |w| excess(w) > 0.0))
+    }
+}
+
+/// The work of the optimum of `problem` and `t_f` by the Hamiltonian `h` and the greatest theta of a solution, whose error of time is recorded;
+/// `None` where the sides of both ends contradict each other.
+pub fn certify(
+    verdict: &mut Verdict,
+    problem: &Transition,
+    t_f: f64,
+    [h, theta_max, v_start, v_end]: [f64; 4],
+) -> Option<f64> {
+    let extremal = Extremal { law: problem.law, h };
+    let sides = [v_start < problem.v_i, v_end < problem.v_f];
+    if sides == [false, true] {
+        verdict.push("optimum", f64::INFINITY);
+        return None;
+    }
+    let [time, lag, work] = extremal.path(problem, theta_max, sides);
+    let rise = (problem.v_i - problem.v_f) / (problem.v_i * problem.v_f);
+    // At rest theta rises as fast as it can: the slip counts.
+    let error = if rise > 0.0 { lag / (t_f - rise) - 1.0 } else { time / t_f - 1.0 };
+    for (v, theta, rises) in [(v_start, 1.0 / problem.v_i, sides[0]), (v_end, 1.0 / problem.v_f, sides[1])] {
+        let expected = (extremal.ln_u(theta.ln(), rises) - theta.ln()).exp();
+        verdict.push("velocity", if expected < 1e-300 { v } else { (v / expected - 1.0).abs() });
+    }
+    verdict.push("time", error.abs() * (h * if rise > 0.0 { t_f - rise } else { t_f } / work).abs().min(1.0));
+    Some(work)
+}
+
+/// Checks a row of `optimal`.
+pub fn check(row: &Row, problem: &Transition, t_f: f64) -> Verdict {
+    let mut verdict = Verdict::default();
+    let infeasible = t_f <= (problem.v_i - problem.v_f) / problem.v_i / problem.v_f;
+    verdict.status(row, infeasible);
+    if infeasible || word(row, STATUS) == Some("infeasible") {
+        return verdict;
+    }
+    let numbers = ["hamiltonian", "theta_max", "v_start", "v_end"].map(|column| number(row, column));
+    let [Some(h), Some(theta_max), Some(v_start), Some(v_end)] = numbers else {
+        return Verdict::unchecked("a column is not written: hamiltonian, theta_max, v_start or v_end");
+    };
+    let work = certify(&mut verdict, problem, t_f, [h, theta_max, v_start, v_end]);
+    verdict.compare(row, "work", work, None);
+    let greatest =
+        if v_start < problem.v_i && v_end > problem.v_f { theta_max } else { 1.0 / problem.v_i.min(problem.v_f) };
+    verdict.compare(row, "theta_max", Some(greatest), None);
+    verdict.compare_word(row, "strategy", if v_start > problem.v_i { "speed_up" } else { "slow_down" });
+    verdict
+}
+
+/// Compares the gap of a protocol of work `work` to the optimum.
+pub fn compare(verdict: &mut Verdict, row: &Row, problem: &Transition, t_f: f64, work: Option<f64>) {
+    let Some(found) = solve(problem, t_f).value.map(|found| found.optimum) else {
+        return verdict.compare(row, "work_optimal", None, None);
+    };
+    let numbers = [found.hamiltonian, found.theta_max, found.v_start, found.v_end];
+    let Some(optimal) = certify(verdict, problem, t_f, numbers) else { return };
+    verdict.compare(row, "work_optimal", Some(optimal), None);
+    if let Some(work) = work {
+        let gap = (work - optimal) / optimal;
+        verdict.compare(row, "gap", Some(gap), Some(gap.abs().max(1.0)));
+    }
+}
