@@ -1,11 +1,13 @@
 #!/usr/bin/env python3
-"""Coefficients of the approximations in src/numerics, by Chebyshev interpolation at 60 digits.
+"""Coefficients of the approximations in src/numerics, by interpolation in Chebyshev nodes at 60 digits.
 
     venv/bin/python coefficients.py        (needs mpmath)
 
 Prints each array, rounded to double, with the last Chebyshev coefficient: about the truncation error.
 """
-from mpmath import atanh, binomial, cos, exp, expm1, fsum, lambertw, log, mp, mpf, nstr, pi, sqrt
+from mpmath import (
+    atanh, binomial, cos, exp, expm1, fsum, lambertw, log, lu_solve, matrix, mp, mpf, nstr, pi, polyval, sqrt,
+)
 
 mp.dps = 60
 
@@ -55,11 +57,27 @@ def exp_tail(r):
     return (expm1(r) - r) / r**2 if abs(r) > mpf(10) ** -20 else mpf(1) / 2
 
 
-def above_branch(s):
-    """E/(1 + p + p^2/6) with E ln E - E + 1 = p^2/2, by s with p/(p + 4) = (s + 1) 5/12."""
-    part = (s + 1) * mpf(5) / 12
-    p = 4 * part / (1 - part)
-    return exp(1 + lambertw((p * p / 2 - 1) * exp(-1), 0).real) / (1 + p + p * p / 6)
+def above_branch(p):
+    """E with E ln E - E + 1 = p^2/2."""
+    return exp(1 + lambertw((p * p / 2 - 1) * exp(-1), 0).real)
+
+
+def rational(f, high, degrees):
+    """The interpolant of f on [0, high] with these degrees in Chebyshev nodes of p/(p + 6), and its greatest relative error."""
+    count = sum(degrees) + 1
+    most = high / (high + 6)
+    to_p = lambda s: 6 * s / (1 - s)
+    nodes = [to_p(most / 2 * (1 + cos(pi * (2 * j + 1) / (2 * count)))) for j in range(count)]
+    system = matrix(count, count)
+    for i, x in enumerate(nodes):
+        for j in range(degrees[0] + 1):
+            system[i, j] = x**j / f(x)
+        for j in range(1, degrees[1] + 1):
+            system[i, degrees[0] + j] = -(x**j)
+    solved = list(lu_solve(system, matrix([1] * count)))
+    above, below = solved[: degrees[0] + 1], [mpf(1)] + solved[degrees[0] + 1 :]
+    value = lambda x: polyval(above[::-1], x) / polyval(below[::-1], x)
+    return above, below, max(abs(value(x) / f(x) - 1) for x in (to_p(most * k / 400) for k in range(401)))
 
 
 ARRAYS = [
@@ -68,7 +86,6 @@ ARRAYS = [
     ("LN_U_FAR", ln_u_far, mpf(1) / 12, mpf(2) / 5, 3),
     ("ATANH", atanh_tail, mpf(0), ((sqrt(mpf(2)) - 1) / (sqrt(mpf(2)) + 1)) ** 2, 6),
     ("EXP", exp_tail, -log(mpf(2)) / 2, log(mpf(2)) / 2, 10),
-    ("NEAR", above_branch, mpf(-1), mpf(1), 35),
 ]
 
 for name, f, low, high, degree in ARRAYS:
@@ -76,3 +93,8 @@ for name, f, low, high, degree in ARRAYS:
     print(name, "truncation", nstr(last, 2))
     for c in coefficients:
         print("   ", repr(float(c)))
+
+above, below, error = rational(above_branch, mpf(20), (11, 10))
+print("NEAR_ABOVE and NEAR_BELOW", "truncation", nstr(error, 2))
+for c in above + below:
+    print("   ", repr(float(c)))

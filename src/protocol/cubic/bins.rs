@@ -6,7 +6,6 @@ use multiversion::multiversion;
 
 use super::Landscape;
 use super::cells::CellCache;
-use super::other_laws::sums;
 use super::panel_batch::{NodeBuffer, PanelBatch, Prepared, prepare};
 use super::plan::{PerShortcut, PlannedPanels};
 use super::rules::NODE_STEP;
@@ -163,10 +162,11 @@ impl Bins {
         for (&load, prepared) in ready.iter().zip(&self.prepared) {
             let PendingBatch { indices, count, bin, whole, .. } = &mut self.loads[load];
             let rule = primitive(nodes_of(*bin) as usize / 2);
-            let works = match of.state {
-                StateLaw::Ageing => prepared.works(rule, &mut self.space),
-                _ => sums(of, prepared, rule),
-            };
+            let mut works = prepared.works(of.state, rule, &mut self.space);
+            if of.state != StateLaw::Ageing {
+                // Velocities are not in units of t_f.
+                works = works.map(|work| of.t_f * work);
+            }
             let (count, first) = (std::mem::take(count), indices[0]);
             if *whole && indices.iter().enumerate().all(|(lane, &i)| i == first + lane) {
                 work[first..first + LANES].copy_from_slice(&works);

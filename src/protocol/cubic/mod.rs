@@ -83,7 +83,7 @@ impl Landscape {
         Landscape {
             law,
             state,
-            friction: Friction::new(law, &ends),
+            friction: Friction::new(state, law, &ends),
             floors: FrictionBounds::under(state, law, &ends),
             ends,
             t_f,

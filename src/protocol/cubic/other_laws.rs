@@ -6,18 +6,16 @@
 
 use multiversion::multiversion;
 
-use super::panel_batch::{Prepared, choose};
+use super::panel_batch::choose;
 use super::path::{Ends, Path};
-use super::plan::MAX_SQUARINGS;
 use super::rules::MappedPanel;
 use super::screen::screen;
 use super::works::Works;
 use super::{Bins, Landscape, LandscapeBuffers};
 use crate::model::{Law, StateLaw};
 use crate::numerics::elementary::ln;
-use crate::numerics::gauss::Primitive;
-use crate::numerics::lambert::{NEAR_END, NEAREST_END, above_branch, near_branch, nearest_branch};
-use crate::numerics::lanes::{LANES, Lanes, Vector};
+use crate::numerics::lambert::{NEAR_END, above_branch, far_branch, near_branches};
+use crate::numerics::lanes::{LANES, Lanes, Vector, least};
 use crate::numerics::root::crossing;
 use crate::protocol::{SolverStats, Status};
 
@@ -61,95 +59,114 @@ pub(super) fn evaluate(of: &Landscape, a_2: &[f64], a_3: &[f64], out: LandscapeB
     stats
 }
 
-/// The works of a batch of panels; those of empty lanes are meaningless.
-pub(super) fn sums(of: &Landscape, prepared: &Prepared, rule: &Primitive) -> Lanes {
-    let sums = match of.state {
-        StateLaw::Slip => slip_sums(prepared, rule, of.law, of.ends.t_f),
-        _ => prz_sums(prepared, rule, of.law, of.ends.t_f),
-    };
-    sums.map(|sum| of.t_f * sum)
-}
+/// `theta v` as a function of the lack of eight shortcuts, without branches: [`StateLaw::product`].
+pub(super) trait Product {
+    const LAW: StateLaw;
 
-macro_rules! kernels {
-    ($($name:ident = $state:expr;)*) => {$(
-        #[multiversion(targets(
-            "x86_64+avx+avx2+bmi1+bmi2+avx512f+avx512bw+avx512cd+avx512dq+avx512vl",
-            "x86_64+avx+avx2+bmi1+bmi2"
-        ))]
-        fn $name(prepared: &Prepared, rule: &Primitive, law: Law, scaled_time: f64) -> Lanes {
-            sum(prepared, rule, |theta, n| density($state, law, (1.0 / scaled_time) * n, theta))
-        }
-    )*};
-}
+    fn new() -> Self;
 
-kernels! {
-    slip_sums = StateLaw::Slip;
-    prz_sums = StateLaw::Prz;
-}
+    fn of(&self, lack: Vector) -> Vector;
 
-/// The sums over the nodes.
-#[inline(always)]
-fn sum(prepared: &Prepared, rule: &Primitive, density: impl Fn(Vector, Vector) -> Vector) -> Lanes {
-    let Prepared { theta, n, gap, squarings, middle, half, unit, scale, .. } = *prepared;
-    let mut sum = Vector::splat(0.0);
-    for (x, w) in rule.x.iter().zip(&rule.w) {
-        for x in [*x, -*x] {
-            let (mut power, mut jacobian) = (middle + x * half, unit);
-            for level in 0..MAX_SQUARINGS {
-                let more = squarings - Vector::splat(f64::from(level) + 0.5);
-                (power, jacobian) = (choose(more, power * power, power), choose(more, power * jacobian, jacobian));
-            }
-            let eta = gap - power;
-            let theta = theta[0] + eta * (theta[1] + eta * (theta[2] + eta * theta[3]));
-            let n = n[0] + eta * (n[1] + eta * n[2]);
-            sum = sum + *w * (jacobian * density(theta, n));
-        }
+    /// Velocity and `tau'`, both times `theta n`, and `theta n`, from theta, `n`, `a n'` over the unit of `tau'`, and `1/t_f`.
+    #[inline(always)]
+    fn node(&self, theta: Vector, n: Vector, slope: Vector, inverse_time: Vector) -> [Vector; 3] {
+        let n = positive(n);
+        let lack = n * inverse_time;
+        [n * self.of(lack), (n - n * lack) + slope * theta, theta * n]
     }
-    (scale * sum).0
 }
 
-/// The part of `tau v` that is integrated.
-#[inline(always)]
-fn density(state: StateLaw, Law { a, b }: Law, lack: Vector, theta: Vector) -> Vector {
-    let lack = positive(lack);
-    let tau = 1.0 + (b - a) * theta.map(ln);
-    let tau = if state == StateLaw::Prz { tau + (0.5 * a) * lack.map(ln) } else { tau };
-    tau * products(state, lack) / theta
-}
+/// The ageing law, with velocities in units of `1/t_f`.
+pub(super) struct Ageing;
 
-/// The lack, which rounding may make negative on the border.
-#[inline(always)]
-fn positive(lack: Vector) -> Vector {
-    lack.map(|lack| if lack > f64::MIN_POSITIVE { lack } else { f64::MIN_POSITIVE })
-}
+impl Product for Ageing {
+    const LAW: StateLaw = StateLaw::Ageing;
 
-/// Whether all lanes are at most `end`.
-#[inline(always)]
-fn is_below(x: &Vector, end: f64) -> bool {
-    let mut beyond = 0.0;
-    for x in x.0 {
-        beyond += if x <= end { 0.0 } else { 1.0 };
+    #[inline(always)]
+    fn new() -> Self {
+        Ageing
     }
-    beyond == 0.0
+
+    #[inline(always)]
+    fn of(&self, lack: Vector) -> Vector {
+        lack
+    }
+
+    #[inline(always)]
+    fn node(&self, theta: Vector, n: Vector, slope: Vector, _: Vector) -> [Vector; 3] {
+        // tau' lacks a multiple of the velocity, which the bilinear form does not see.
+        [n * n, n + slope * theta, theta * n]
+    }
 }
 
-/// [`StateLaw::product`].
-#[inline(always)]
-fn products(state: StateLaw, lack: Vector) -> Vector {
-    match state {
-        StateLaw::Prz => lack.map(f64::sqrt),
+/// The law of Perrin, Rice and Zheng.
+pub(super) struct Prz;
+
+/// The slip law.
+pub(super) struct Slip;
+
+/// The slip law where the lack is at most [`NEAR_END`]: the same bits.
+pub(super) struct NearSlip;
+
+impl Product for Prz {
+    const LAW: StateLaw = StateLaw::Prz;
+
+    #[inline(always)]
+    fn new() -> Self {
+        Prz
+    }
+
+    #[inline(always)]
+    fn of(&self, lack: Vector) -> Vector {
+        lack.map(f64::sqrt)
+    }
+}
+
+impl Product for NearSlip {
+    const LAW: StateLaw = StateLaw::Slip;
+
+    #[inline(always)]
+    fn new() -> Self {
+        NearSlip
+    }
+
+    #[inline(always)]
+    fn of(&self, lack: Vector) -> Vector {
+        (1.0 / std::f64::consts::E) * near_branches(lack)
+    }
+}
+
+impl Product for Slip {
+    const LAW: StateLaw = StateLaw::Slip;
+
+    #[inline(always)]
+    fn new() -> Self {
+        Slip
+    }
+
+    #[inline(always)]
+    fn of(&self, lack: Vector) -> Vector {
         // Each lane has the formula of its own argument, whatever the others hold.
-        _ if is_below(&lack, NEAREST_END) => lack.map(|lack| (1.0 / std::f64::consts::E) * nearest_branch(lack)),
-        _ => lack.map(|lack| {
-            if lack <= NEAREST_END {
-                (1.0 / std::f64::consts::E) * nearest_branch(lack)
-            } else if lack <= NEAR_END {
-                (1.0 / std::f64::consts::E) * near_branch(lack)
-            } else {
-                state.product(lack)
-            }
-        }),
+        let far = lack.map(|lack| (1.0 / std::f64::consts::E) * far_branch(lack));
+        choose(lack - Vector::splat(NEAR_END), far, NearSlip.of(lack))
     }
+}
+
+impl NearSlip {
+    /// Whether the lack of eight shortcuts, with coefficients of theta from the first power on, is nowhere beyond [`NEAR_END`].
+    #[inline(always)]
+    pub(super) fn holds(t_f: f64, [a_2, a_3, a_4]: [Vector; 3]) -> bool {
+        // t_f - n in Bernstein's form.
+        let second = a_2 + a_3;
+        let falls = lower(lower(a_2, second), second + a_3 + 3.0 * a_4);
+        least(&falls.0) >= t_f * (1.0 - NEAR_END)
+    }
+}
+
+/// The lack or `n`, which rounding may make negative on the border.
+#[inline(always)]
+pub(super) fn positive(lack: Vector) -> Vector {
+    lack.map(|lack| if lack > f64::MIN_POSITIVE { lack } else { f64::MIN_POSITIVE })
 }
 
 /// Samples of the trend of the velocity. Chosen: more than twice as many as the trend has zeros, so that close pairs of zeros show in the differences.
@@ -158,7 +175,7 @@ const SAMPLES: usize = 9;
 /// Newton steps from a secant between samples. Derived: from there each doubles the digits.
 const NEWTON_STEPS: usize = 4;
 
-/// Least last Newton step, in units of `t_f`, that is not converged. Derived: the velocity depends on the square of the error.
+/// Greatest last Newton step, in units of `t_f`, that converges. Derived: the velocity depends on the square of the error.
 const MAX_LAST_STEP: f64 = 1e-7;
 
 /// Fraction of a sample below which the parabola through it and its neighbours hints at two zeros. Chosen: a half, for the error of the parabola.
@@ -183,7 +200,11 @@ impl Landscape {
     fn least_velocities(&self, a_2: &Lanes, a_3: &Lanes, found: &[Status; LANES]) -> Lanes {
         let wanted = found.map(|found| if found == Status::Infeasible { 0.0 } else { 1.0 });
         let Least { mut v, place, doubt, lossy } = match self.state {
-            StateLaw::Slip => slip_velocities(&self.ends, a_2, a_3, &wanted),
+            StateLaw::Slip => {
+                let c = [Vector(*a_2), Vector(*a_3), self.ends.rise.high - (Vector(*a_2) + Vector(*a_3))];
+                let search = if NearSlip::holds(self.ends.t_f, c) { near_slip_velocities } else { slip_velocities };
+                search(&self.ends, a_2, a_3, &wanted)
+            }
             _ => prz_velocities(&self.ends, a_2, a_3, &wanted),
         };
         for i in (0..LANES).filter(|&i| wanted[i] * (doubt[i] + lossy[i]) > 0.0) {
@@ -292,15 +313,15 @@ fn jet(c: &[Vector; 4], x: Vector) -> [Vector; 4] {
 /// The rate of `ln v` times a positive number, and its slope. With derivatives by `x`, `s = theta_x` and `r = theta_xx`, it is `-2 n s - theta r` for
 /// the law of Perrin, Rice and Zheng and `-t_f u (1 + ln u) s - theta r` for the slip law, where `e u (1 + ln u) = lack - 1 + e u`.
 #[inline(always)]
-fn trend(state: StateLaw, scaled_time: f64, c: &[Vector; 4], x: Vector) -> (Vector, Vector) {
+fn trend<P: Product>(product: &P, scaled_time: f64, c: &[Vector; 4], x: Vector) -> (Vector, Vector) {
     let [theta, s, r, jerk] = jet(c, x);
     let n = Vector::splat(scaled_time) - s;
-    if state == StateLaw::Prz {
+    if P::LAW == StateLaw::Prz {
         let pull = n + n;
         return (Vector::splat(0.0) - pull * s - theta * r, s * r - pull * r - theta * jerk);
     }
     let lack = positive((1.0 / scaled_time) * n);
-    let e = std::f64::consts::E * products(state, lack);
+    let e = std::f64::consts::E * product.of(lack);
     let rest = lack + e - Vector::splat(1.0);
     // d(e u)/d(theta_x) = -1/(scaled_time ln(e u)).
     let slope = s * r * (Vector::splat(1.0) + e / rest) - scaled_time * (e * r) - theta * jerk;
@@ -308,30 +329,32 @@ fn trend(state: StateLaw, scaled_time: f64, c: &[Vector; 4], x: Vector) -> (Vect
 }
 
 macro_rules! searches {
-    ($($name:ident = $state:expr;)*) => {$(
+    ($($name:ident = $product:ty;)*) => {$(
         #[multiversion(targets(
             "x86_64+avx+avx2+bmi1+bmi2+avx512f+avx512bw+avx512cd+avx512dq+avx512vl",
             "x86_64+avx+avx2+bmi1+bmi2"
         ))]
         fn $name(ends: &Ends, a_2: &Lanes, a_3: &Lanes, wanted: &Lanes) -> Least {
-            least($state, ends, a_2, a_3, wanted)
+            least_velocities::<$product>(ends, a_2, a_3, wanted)
         }
     )*};
 }
 
 searches! {
-    slip_velocities = StateLaw::Slip;
-    prz_velocities = StateLaw::Prz;
+    near_slip_velocities = NearSlip;
+    slip_velocities = Slip;
+    prz_velocities = Prz;
 }
 
 /// The least velocities: at an end, or where the trend changes from falling to rising between two samples.
 #[inline(always)]
-fn least(state: StateLaw, ends: &Ends, a_2: &Lanes, a_3: &Lanes, wanted: &Lanes) -> Least {
+fn least_velocities<P: Product>(ends: &Ends, a_2: &Lanes, a_3: &Lanes, wanted: &Lanes) -> Least {
+    let product = &P::new();
     let ([a_2, a_3], rise) = ([a_2, a_3].map(|a| Vector(*a)), ends.rise.high);
     let c = [Vector::splat(ends.theta_0.high), a_2, a_3, rise - (a_2 + a_3)];
     let n_ends = [ends.t_f - a_2, ends.t_f - (3.0 * rise - (2.0 * a_2 + a_3))];
     let theta_ends = [c[0], Vector::splat(ends.theta_1.high)];
-    let v_ends = [velocity(state, ends, n_ends[0], theta_ends[0]), velocity(state, ends, n_ends[1], theta_ends[1])];
+    let v_ends = [velocity(product, ends, n_ends[0], theta_ends[0]), velocity(product, ends, n_ends[1], theta_ends[1])];
     let is_first = v_ends[1] - v_ends[0];
     let end = End {
         v: choose(is_first, v_ends[0], v_ends[1]),
@@ -340,10 +363,10 @@ fn least(state: StateLaw, ends: &Ends, a_2: &Lanes, a_3: &Lanes, wanted: &Lanes)
     };
     let place = choose(is_first, Vector::splat(0.0), Vector::splat(1.0));
     let mut found = Least { v: end.v.0, place: place.0, ..Least::NONE };
-    let open = open(state, ends, &c, &n_ends, &end, wanted);
+    let open = open::<P>(ends, &c, &n_ends, &end, wanted);
     if open != [0.0; LANES] {
         let at_end = (found.v, found.place);
-        search(state, ends, &c, &mut found);
+        search(product, ends, &c, &mut found);
         for i in (0..LANES).filter(|&i| open[i] == 0.0) {
             (found.v[i], found.place[i], found.doubt[i]) = (at_end.0[i], at_end.1[i], 0.0);
         }
@@ -361,8 +384,8 @@ fn least(state: StateLaw, ends: &Ends, a_2: &Lanes, a_3: &Lanes, wanted: &Lanes)
 
 /// The velocities where `n` and theta have these values.
 #[inline(always)]
-fn velocity(state: StateLaw, ends: &Ends, n: Vector, theta: Vector) -> Vector {
-    products(state, positive((1.0 / ends.t_f) * n)) / theta
+fn velocity<P: Product>(product: &P, ends: &Ends, n: Vector, theta: Vector) -> Vector {
+    product.of(positive((1.0 / ends.t_f) * n)) / theta
 }
 
 /// The lesser of two numbers in each lane.
@@ -383,7 +406,7 @@ struct End {
 /// `v >= m` where `lack >= f(m theta)`, with the inverse `f` of the product, which is convex (0 below `u = 1/e`). A chord bounds `f` from above; the rest
 /// is a cubic, not negative if no coefficient in Bernstein's form is.
 #[inline(always)]
-fn open(state: StateLaw, ends: &Ends, c: &[Vector; 4], n_ends: &[Vector; 2], end: &End, wanted: &Lanes) -> Lanes {
+fn open<P: Product>(ends: &Ends, c: &[Vector; 4], n_ends: &[Vector; 2], end: &End, wanted: &Lanes) -> Lanes {
     let third = 1.0 / 3.0;
     let theta = [c[0], c[0] + third * c[1], c[0] + third * (c[1] + c[1] + c[2]), Vector::splat(ends.theta_1.high)];
     let low = lower(lower(theta[0], theta[1]), lower(theta[2], theta[3]));
@@ -391,7 +414,7 @@ fn open(state: StateLaw, ends: &Ends, c: &[Vector; 4], n_ends: &[Vector; 2], end
     let high = -1.0 * lower(lower(minus[0], minus[1]), lower(minus[2], minus[3]));
     let other = choose(high - end.theta, high, low);
     let u = end.v * other;
-    let lack = match state {
+    let lack = match P::LAW {
         StateLaw::Prz => u.map(|u| if u > 0.0 { u * u } else { 0.0 }),
         _ => (std::f64::consts::E * u).map(|e| {
             let above = if e > 1.0 { e } else { 1.0 };
@@ -420,11 +443,11 @@ fn open(state: StateLaw, ends: &Ends, c: &[Vector; 4], n_ends: &[Vector; 2], end
 
 /// Searches the shortcuts for velocities below those of `found`.
 #[inline(always)]
-fn search(state: StateLaw, ends: &Ends, c: &[Vector; 4], found: &mut Least) {
+fn search<P: Product>(product: &P, ends: &Ends, c: &[Vector; 4], found: &mut Least) {
     let spacing = 1.0 / (SAMPLES - 1) as f64;
     let mut trends = [Vector::splat(0.0); SAMPLES];
     for (k, sample) in trends.iter_mut().enumerate() {
-        *sample = trend(state, ends.t_f, c, Vector::splat(k as f64 * spacing)).0;
+        *sample = trend(product, ends.t_f, c, Vector::splat(k as f64 * spacing)).0;
     }
     let (mut turns, mut low, mut high, mut x) = ([0.0; LANES], [0.0; LANES], [0.0; LANES], [0.0; LANES]);
     for (k, pair) in trends.windows(2).enumerate() {
@@ -450,7 +473,7 @@ fn search(state: StateLaw, ends: &Ends, c: &[Vector; 4], found: &mut Least) {
     }
     let mut step = [0.0f64; LANES];
     for _ in 0..NEWTON_STEPS {
-        let (value, slope) = trend(state, ends.t_f, c, Vector(x));
+        let (value, slope) = trend(product, ends.t_f, c, Vector(x));
         for i in 0..LANES {
             let (value, slope) = (value.0[i], slope.0[i]);
             low[i] = if value < 0.0 { x[i] } else { low[i] };
@@ -463,7 +486,7 @@ fn search(state: StateLaw, ends: &Ends, c: &[Vector; 4], found: &mut Least) {
     }
     let [theta, s, ..] = jet(c, Vector(x));
     let n = Vector::splat(ends.t_f) - s;
-    let inside = velocity(state, ends, n, theta);
+    let inside = velocity(product, ends, n, theta);
     for i in 0..LANES {
         let has_turn = turns[i] > 0.5;
         let is_lower = has_turn & (inside.0[i] < found.v[i]);
@@ -474,19 +497,17 @@ fn search(state: StateLaw, ends: &Ends, c: &[Vector; 4], found: &mut Least) {
     }
 }
 
-/// The contribution of one panel to the work, eight nodes at a time.
+/// The contribution of one panel to the work.
 pub(super) fn panel_sum(of: &Landscape, path: &Path, panel: &MappedPanel) -> f64 {
     let ([q0, q1, q2, q3], [n0, n1, n2]) = path.about(panel.centre);
-    let (mut nodes, mut weights) = (Vec::with_capacity(panel.nodes + LANES), Vec::with_capacity(panel.nodes));
+    let Law { a, b } = of.law;
+    let mut sum = 0.0;
     panel.each_node(|delta, weight| {
-        nodes.push((q0 + delta * (q1 + delta * (q2 + delta * q3)), n0 + delta * (n1 + delta * n2)));
-        weights.push(weight);
+        let theta = q0 + delta * (q1 + delta * (q2 + delta * q3));
+        let lack = ((n0 + delta * (n1 + delta * n2)) / of.ends.t_f).max(f64::MIN_POSITIVE);
+        // The part of `tau v` that is integrated.
+        let direct = if of.state == StateLaw::Prz { 0.5 * a * ln(lack) } else { 0.0 };
+        sum += weight * (1.0 + (b - a) * ln(theta) + direct) * of.state.product(lack) / theta;
     });
-    nodes.resize(nodes.len().next_multiple_of(LANES), (1.0, of.ends.t_f));
-    let mut densities = Vec::with_capacity(nodes.len());
-    for nodes in nodes.chunks_exact(LANES) {
-        let (theta, n) = (Vector(std::array::from_fn(|i| nodes[i].0)), Vector(std::array::from_fn(|i| nodes[i].1)));
-        densities.extend(density(of.state, of.law, (1.0 / of.ends.t_f) * n, theta).0);
-    }
-    of.t_f * weights.iter().zip(densities).map(|(weight, density)| weight * density).sum::<f64>()
+    of.t_f * sum
 }

@@ -4,12 +4,16 @@
 //! int sign(x - y) tau'(y) dy`. So the work is the mean of `tau_0` and `tau_1` times `int v dt`, plus a bilinear form of
 //! `v` and `tau'`, which the nodes of one Gauss rule give to the order of that rule
 //! ([`Primitive`](crate::numerics::gauss::Primitive)).
+//!
+//! Under the law of Perrin, Rice and Zheng `tau = 1 + a/2 ln n + (b - a) ln theta` up to a constant. Under the slip law
+//! `tau v = T v - a theta'/theta` with `T = 1 + (b - a) ln theta`: the sums use `T` for tau, and the rest depends on the ends alone.
 
 use multiversion::multiversion;
 
+use super::other_laws::{Ageing, NearSlip, Product, Prz, Slip};
 use super::path::Ends;
 use super::plan::MAX_SQUARINGS;
-use crate::model::Law;
+use crate::model::{Law, StateLaw};
 use crate::numerics::elementary::ln;
 use crate::numerics::gauss::{MAX_HALF, Primitive, ROWS};
 use crate::numerics::lanes::{LANES, Lanes, Vector, least};
@@ -37,6 +41,7 @@ pub(super) struct PanelBatch {
 /// The friction data common to the shortcuts of a landscape.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Friction {
+    /// The factor of `ln n`.
     a: f64,
     /// `b - a`.
     slope: f64,
@@ -49,11 +54,16 @@ pub(super) struct Friction {
 }
 
 impl Friction {
-    pub fn new(law: Law, ends: &Ends) -> Friction {
+    pub fn new(state: StateLaw, law: Law, ends: &Ends) -> Friction {
         let ln_theta = ln(ends.theta_0.high) + ln(ends.theta_1.high);
         let slope = law.b - law.a;
         let unit = if slope.abs() > MIN_WEAKENING * law.a { slope } else { MIN_WEAKENING * law.a };
-        Friction { a: law.a, slope, drive: unit * ends.t_f, constant: 1.0 - law.a * ln(ends.t_f), ln_theta }
+        let a = match state {
+            StateLaw::Ageing => law.a,
+            StateLaw::Slip => 0.0,
+            StateLaw::Prz => 0.5 * law.a,
+        };
+        Friction { a, slope, drive: unit * ends.t_f, constant: 1.0 - a * ln(ends.t_f), ln_theta }
     }
 }
 
@@ -96,6 +106,10 @@ pub(super) struct Prepared {
     pub unit: Vector,
     /// The constant factor of `d(eta)/dx`, `x` the node of the rule.
     pub scale: Vector,
+    /// `1/t_f`.
+    inverse_time: Vector,
+    /// Whether [`NearSlip`] holds on all of the path.
+    near: bool,
     kernel: Kernel,
 }
 
@@ -125,6 +139,8 @@ impl Prepared {
             half: none,
             unit: none,
             scale: none,
+            inverse_time: none,
+            near: false,
         }
     };
 }
@@ -150,12 +166,17 @@ impl PanelBatch {
 impl Prepared {
     /// The works; those of empty lanes are meaningless.
     #[inline(always)]
-    pub fn works(&self, rule: &Primitive, space: &mut NodeBuffer) -> Lanes {
-        match self.kernel {
-            Kernel::Squares => squares(self, rule, space),
-            Kernel::Square => square(self, rule, space),
-            Kernel::Fourth => fourth(self, rule, space),
-            Kernel::Eighth => eighth(self, rule, space),
+    pub fn works(&self, state: StateLaw, rule: &Primitive, space: &mut NodeBuffer) -> Lanes {
+        match (state, self.kernel) {
+            (StateLaw::Ageing, Kernel::Squares) => squares(self, rule, space),
+            (StateLaw::Ageing, Kernel::Square) => square(self, rule, space),
+            (StateLaw::Ageing, Kernel::Fourth) => fourth(self, rule, space),
+            (StateLaw::Ageing, Kernel::Eighth) => eighth(self, rule, space),
+            (StateLaw::Slip, Kernel::Squares) if self.near => near_slip_squares(self, rule, space),
+            (StateLaw::Slip, _) if self.near => near_slip(self, rule, space),
+            (StateLaw::Slip, _) => slip(self, rule, space),
+            (StateLaw::Prz, Kernel::Squares) => prz_squares(self, rule, space),
+            (StateLaw::Prz, _) => prz(self, rule, space),
         }
     }
 }
@@ -201,6 +222,8 @@ pub(super) fn prepare(panel_batch: &PanelBatch, ends: &Ends, friction: &Friction
     }
     let half = 0.5 * (to - from);
     *prepared = Prepared {
+        inverse_time: Vector::splat(1.0 / t_f),
+        near: NearSlip::holds(t_f, [a_2, a_3, a_4]),
         theta: [q0, side * q1, q2, side * q3],
         n: [n0, side * n1, n2],
         slope: [(friction.a / friction.drive) * n1, (2.0 * friction.a / friction.drive) * (side * n2)],
@@ -235,34 +258,44 @@ pub(super) fn choose(sign: Vector, yes: Vector, no: Vector) -> Vector {
 }
 
 macro_rules! kernels {
-    ($($(#[$doc:meta])* $name:ident = $most:literal, $same:literal;)*) => {$(
+    ($($(#[$doc:meta])* $name:ident = $most:literal, $same:literal, $product:ty;)*) => {$(
         $(#[$doc])*
         #[multiversion(targets(
             "x86_64+avx+avx2+bmi1+bmi2+avx512f+avx512bw+avx512cd+avx512dq+avx512vl",
             "x86_64+avx+avx2+bmi1+bmi2"
         ))]
         fn $name(prepared: &Prepared, rule: &Primitive, space: &mut NodeBuffer) -> Lanes {
-            sum::<$most, $same>(prepared, rule, space)
+            sum::<$most, $same, $product>(prepared, rule, space)
         }
     )*};
 }
 
 kernels! {
     /// All maps need one square root.
-    squares = 1, true;
+    squares = 1, true, Ageing;
     /// No map needs more than one square root.
-    square = 1, false;
+    square = 1, false, Ageing;
     /// No map needs more than two square roots.
-    fourth = 2, false;
+    fourth = 2, false, Ageing;
     /// Any maps.
-    eighth = 3, false;
+    eighth = 3, false, Ageing;
+    near_slip_squares = 1, true, NearSlip;
+    near_slip = 3, false, NearSlip;
+    slip = 3, false, Slip;
+    prz_squares = 1, true, Prz;
+    prz = 3, false, Prz;
 }
 
 /// The works if no map squares more than `SQUARINGS` times, and if all square exactly that often for `SAME`.
 #[inline(always)]
-fn sum<const SQUARINGS: u32, const SAME: bool>(prepared: &Prepared, rule: &Primitive, space: &mut NodeBuffer) -> Lanes {
+fn sum<const SQUARINGS: u32, const SAME: bool, P: Product>(
+    prepared: &Prepared,
+    rule: &Primitive,
+    space: &mut NodeBuffer,
+) -> Lanes {
+    let product = P::new();
     let NodeBuffer { v_even, v_odd, g_even, g_odd } = space;
-    let Prepared { theta, n, slope, drive, tau, gap, squarings, middle, half, unit, scale, .. } = *prepared;
+    let Prepared { theta, n, slope, drive, tau, gap, squarings, middle, half, unit, scale, inverse_time, .. } = *prepared;
     let count = rule.x.len().min(MAX_HALF);
     let mut mean = Vector::splat(0.0);
     for j in 0..count {
@@ -281,9 +314,7 @@ fn sum<const SQUARINGS: u32, const SAME: bool>(prepared: &Prepared, rule: &Primi
             let n = n[0] + eta * (n[1] + eta * n[2]);
             let slope = slope[0] + eta * slope[1];
             // Division by `theta n`: one division for two nodes.
-            *v = n * n;
-            *g = n + slope * theta;
-            *below = theta * n;
+            [*v, *g, *below] = product.node(theta, n, slope, inverse_time);
             *weight = jacobian;
         }
         let inverse = 1.0 / (below[0] * below[1]);
