@@ -67,7 +67,10 @@ fn main() {
             );
         }
     }
-    println!("{:>6} {:>6} {:>7} {:>9} {:>12} {:>7} {:>10}", "rtol", "t_f", "law", "feasible", "ns/feasible", "nodes", "of ageing");
+    println!(
+        "{:>6} {:>6} {:>7} {:>9} {:>12} {:>7} {:>10}",
+        "rtol", "t_f", "law", "feasible", "ns/feasible", "nodes", "of ageing"
+    );
     for rtol in RTOLS {
         for t_f in [0.1, 0.4] {
             let of = |law| measure(&Landscape::under(law, &transition, t_f, rtol));

@@ -147,6 +147,7 @@ fn faults<'a>(records: impl Iterator<Item = &'a Record>) -> Vec<String> {
 /// Writes the table and the pictures.
 fn keep(measured: &[(Subject, Vec<Record>)], ln: f64) -> Result<(), Box<dyn std::error::Error>> {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("results");
+    std::fs::create_dir_all(&folder)?;
     let all: Vec<&Record> = measured.iter().flat_map(|(_, records)| records).collect();
     store::write(&folder.join("work_precision.parquet"), &all, ln)?;
     for same in measured.chunk_by(|(p, _), (q, _)| p.name == q.name) {

@@ -7,7 +7,7 @@ from ._table import Columns, Picture
 
 
 # The axes of all tables, and what else the command takes.
-_FLAGS = dict.fromkeys([axis["name"] for table in _core.tables() for axis in table["axes"]] + ["from", "disturb", "loop", "rtol"])
+_FLAGS = dict.fromkeys([axis["name"] for table in _core.tables() for axis in table["axes"]] + ["friction", "from", "disturb", "loop", "rtol"])
 
 
 class Trace(Columns):
@@ -61,13 +61,14 @@ def trace(
     velocity_bound: bool = True,
     disturb: str | None = None,
     loop: str | None = None,
+    friction: str | None = None,
     **axes: float | str,
 ) -> Trace:
     """One protocol over time, such as `trace("optimal", t_f=0.02, a=0.03, b=0.05, v_i=3.0, v_f=100.0)`.
 
     Protocols and axes are those of `slipsweep trace --help`, in dimensionless units. An optimum can start on the way: `theta` and `t_left` take the
     place of `v_i` and `t_f`. `points` is the number of equally spaced times; by default the fewest that show every detail. `disturb`, such as
-    "theta=+10% at 0.25", changes the state suddenly; `loop` ("closed", "open") is what follows.
+    "theta=+10% at 0.25", changes the state suddenly; `loop` ("closed", "open") is what follows. `friction` is "log" or "regularised".
     """
     known = [name for name, _ in _core.protocols()]
     if protocol not in known:
@@ -75,7 +76,7 @@ def trace(
     arguments = [protocol]
     if "theta" in axes and "t_left" in axes:
         axes["from"] = f"theta={_text('theta', axes.pop('theta'))},t_left={_text('t_left', axes.pop('t_left'))}"
-    options = {"rtol": rtol, "disturb": disturb, "loop": loop}
+    options = {"rtol": rtol, "disturb": disturb, "loop": loop, "friction": friction}
     for name, value in (axes | {name: value for name, value in options.items() if value is not None}).items():
         if name not in _FLAGS:
             raise TypeError(f"trace() got an unexpected keyword argument {name!r}; expected {', '.join(_FLAGS)}")

@@ -32,6 +32,7 @@ use crate::verify::scale;
   slipsweep trace optimal --t-f 0.02 --a 0.03 --b 0.05 --v-i 3 --v-f 100
   slipsweep trace optimal --v-ceiling 300 --t-f 0.02 --a 0.03 --b 0.05 --v-i 3 --v-f 100 --out capped.csv
   slipsweep trace optimal --law slip --v-ceiling 600 --t-f 0.1 --a 0.03 --b 0.05 --v-i 4 --v-f 80
+  slipsweep trace optimal --friction regularised --t-f 0.5 --a 0.1 --b 0.12 --v-i 50 --v-f 200
   slipsweep trace optimal --from theta=0.3,t_left=0.015 --a 0.03 --b 0.05 --v-f 100
   slipsweep trace optimal --disturb \"theta=+10% at 0.25\" --t-f 0.02 --a 0.03 --b 0.05 --v-i 3 --v-f 100
   slipsweep trace gap --alpha-2 -0.12 --alpha-3 -0.066 --t-f 0.02 --a 0.03 --b 0.05 --v-i 3 --v-f 100 --out cubic.csv
@@ -62,6 +63,9 @@ pub struct Arguments {
     /// Evolution law of the state: ageing, slip or prz; ageing by default (optimal and best_cubic with --v-ceiling, gap, step_response)
     #[arg(long, value_name = "LAW", value_parser = law)]
     law: Option<StateLaw>,
+    /// Form of friction: log or regularised; log by default (optimal, gap)
+    #[arg(long, value_name = "FORM", value_parser = form)]
+    friction: Option<Friction>,
     /// Velocity before the protocol, in v_0
     #[arg(long, value_name = "V", value_parser = |text: &str| velocity(text, Quantity::InitialVelocity))]
     v_i: Option<f64>,
@@ -225,6 +229,11 @@ fn law(text: &str) -> Result<StateLaw, String> {
     StateLaw::find(text).ok_or_else(expected)
 }
 
+/// Parses the word of a form of friction.
+fn form(text: &str) -> Result<Friction, String> {
+    Friction::find(text).ok_or_else(|| format!("expected {}", Friction::ALL.map(Friction::name).join(", ")))
+}
+
 /// Parses a number in `domain`.
 fn legal(text: &str, domain: Domain) -> Result<f64, String> {
     match text.parse() {
@@ -252,6 +261,7 @@ struct TraceRequest {
     numbers: Vec<Named>,
     /// The evolution law, if named.
     law: Option<StateLaw>,
+    friction: Friction,
     /// Whether `v >= 1`; `None` if the bound has no effect.
     bounded: Option<bool>,
     rtol: f64,
@@ -394,9 +404,10 @@ impl Arguments {
             let of = given.iter().find(|(known, _)| *known == quantity).and_then(|(_, given)| *given);
             of.or(quantity.default().first().copied())
         };
-        let (protocol, case) =
-            Protocol::new(if self.from.is_some() { "feedback" } else { name }, !self.unbounded, number)
-                .map_err(|quantity| wrong(format!("`{name}` needs {}", flag(quantity))))?;
+        let friction = self.friction.unwrap_or_default();
+        let known = if self.from.is_some() { "feedback" } else { name };
+        let (protocol, case) = Protocol::new(known, (friction, !self.unbounded), number)
+            .map_err(|quantity| wrong(format!("`{name}` needs {}", flag(quantity))))?;
         let is_number = |quantity: Quantity| !quantity.has_scale() && quantity != Quantity::Law;
         let numbers = given.iter().filter(|(quantity, _)| is_number(*quantity));
         let numbers =
@@ -407,7 +418,8 @@ impl Arguments {
             case,
             numbers,
             law: self.law,
-            bounded: trace::has_floor(name).then_some(!self.unbounded),
+            friction,
+            bounded: trace::has_floor(name, friction).then_some(!self.unbounded),
             rtol: self.rtol.unwrap_or(DEFAULT_RTOL),
             units: Units::Scaled,
             origin: None,
@@ -447,6 +459,27 @@ impl Arguments {
                 return Err(wrong(format!("`{name}` takes no {flag}")));
             }
         }
+        let friction = self.friction.unwrap_or_default();
+        if friction == Friction::Regularised {
+            if !trace::has_regularised_friction(name) {
+                return Err(wrong(format!(
+                    "`{name}` does not support regularised friction\n  help: remove --friction"
+                )));
+            }
+            let unsupported = [
+                (self.from.is_some(), "--from"),
+                (self.disturb.is_some(), "--disturb"),
+                (self.unbounded, "--unbounded"),
+                (self.v_ceiling.is_some(), "--v-ceiling"),
+                (self.tau_ceiling.is_some(), "--tau-ceiling"),
+                (!self.is_ageing(), "--law"),
+            ];
+            if let Some((_, flag)) = unsupported.into_iter().find(|(is_given, _)| *is_given) {
+                return Err(wrong(format!(
+                    "{flag} does not support regularised friction\n  help: remove {flag} or --friction"
+                )));
+            }
+        }
         if !self.is_ageing() {
             let law = self.law.unwrap_or_default().name();
             for (is_given, flag) in [
@@ -479,8 +512,9 @@ impl Arguments {
         if !missing.is_empty() {
             return Err(wrong(format!("`{name}` needs {}", missing.join(", "))));
         }
-        let unused =
-            unused.into_iter().chain((self.unbounded && !trace::has_floor(name)).then(|| "--unbounded".to_owned()));
+        let unused = unused
+            .into_iter()
+            .chain((self.unbounded && !trace::has_floor(name, friction)).then(|| "--unbounded".to_owned()));
         match unused.into_iter().next() {
             Some(flag) => Err(wrong(format!("`{name}` takes no {flag}"))),
             None => Ok(()),
@@ -509,7 +543,9 @@ impl Arguments {
     fn row_of(&self, name: &str) -> Result<TraceRequest, Failure> {
         let is_own = |quantity: Quantity| !(quantity == Quantity::Time && name == "step_response");
         let given = self.given().into_iter().find(|(quantity, given)| given.is_some() && is_own(*quantity));
-        let given = given.map(|(quantity, _)| flag(quantity)).or(self.unbounded.then(|| "--unbounded".to_owned()));
+        let words = [(self.friction.is_some(), "--friction"), (self.unbounded, "--unbounded")];
+        let word = words.into_iter().find(|(is_given, _)| *is_given).map(|(_, flag)| flag.to_owned());
+        let given = given.map(|(quantity, _)| flag(quantity)).or(word);
         if let Some(flag) = given {
             return Err(wrong(format!(
                 "{flag}: not for a row of a dataset, which has its own parameters\n  help: remove {flag}"
@@ -528,10 +564,7 @@ impl Arguments {
         let (part, written) = row_at(path, &folder, listed, number)?;
         let spec = Spec::parse(&manifest.spec).map_err(Failure::failed)?;
         let units = units(&spec.model)?;
-        if friction(&spec.model)? == Friction::Regularised {
-            let found = format!("{}: no trace with regularised friction", path.display());
-            return Err(refused(found, "a dataset with friction = \"log\"", "compute it in a spec of its own"));
-        }
+        let friction = friction(&spec.model)?;
         let headings = frame::headings(&part).map_err(Failure::failed)?.0;
         let relative = [Quantity::Alpha2, Quantity::Alpha3].map(|alpha| {
             let heading = headings.iter().find(|heading| heading.name == alpha.name());
@@ -544,8 +577,9 @@ impl Arguments {
         }
         let bounded = spec.model.velocity_bound;
         let t_f = self.t_f.map(|t_f| units.scaled(Quantity::Time.unit(Scale::Model), t_f));
-        let (protocol_name, protocol, case) = trace::protocol_of(name, &scaled[0].1, (bounded, relative), t_f)
-            .map_err(|reason| wrong(format!("{}: row {number} of `{name}`: {reason}", path.display())))?;
+        let (protocol_name, protocol, case) =
+            trace::protocol_of(name, &scaled[0].1, (friction, bounded, relative), t_f)
+                .map_err(|reason| wrong(format!("{}: row {number} of `{name}`: {reason}", path.display())))?;
         let key = if name == "gap_min" { "gap" } else { name };
         let own = spec.tables.get(key).and_then(|table| table.rtol);
         let own = own.or(definition.and_then(|table| table.default_rtol())).unwrap_or(spec.accuracy.rtol);
@@ -556,12 +590,13 @@ impl Arguments {
             _ => None,
         });
         Ok(TraceRequest {
-            bounded: trace::has_floor(name).then_some(bounded),
+            bounded: trace::has_floor(name, friction).then_some(bounded),
             name: protocol_name,
             protocol,
             case,
             numbers,
             law,
+            friction,
             rtol: self.rtol.unwrap_or(own),
             units,
             origin: Some(Origin { dataset: manifest.name.clone(), table: name.to_owned(), row: number }),
@@ -733,6 +768,9 @@ fn header(arguments: &Arguments, request: &TraceRequest, path: &TracedPath, trac
     if let Some(law) = request.law {
         text.push_str(&format!(", law {}", law.name()));
     }
+    if request.friction == Friction::Regularised {
+        text.push_str(", regularised friction");
+    }
     if request.bounded == Some(false) {
         text.push_str(", without the velocity floor v >= 1");
     }
@@ -798,6 +836,9 @@ fn facts(arguments: &Arguments, request: &TraceRequest, path: &TracedPath, trace
     let numbers = request.numbers.iter().chain([&rtol]).chain(parameters.iter().map(|(parameter, _)| parameter));
     facts.extend(numbers.chain(&results).map(|number| (number.name.as_str(), format!("{:?}", number.value))));
     facts.extend(request.law.map(|law| ("law", law.name().to_owned())));
+    if request.friction == Friction::Regularised {
+        facts.push(("friction", request.friction.name().to_owned()));
+    }
     facts.extend(request.bounded.map(|bounded| ("velocity_bound", bounded.to_string())));
     facts.extend(arguments.points.map(|points| ("points", points.to_string())));
     facts.push(("status", path.status.name().to_owned()));

@@ -32,6 +32,14 @@ impl Friction {
     pub fn find(name: &str) -> Option<Friction> {
         Friction::ALL.into_iter().find(|friction| friction.name() == name)
     }
+
+    /// Friction, in `mu_0`, at `ln v` and `ln theta`.
+    pub fn at(self, law: &Law, ln_v: f64, ln_theta: f64) -> f64 {
+        match self {
+            Friction::Log => 1.0 + law.a * ln_v + law.b * ln_theta,
+            Friction::Regularised => law.a * scaled_friction(ln_v + (1.0 + law.b * ln_theta) / law.a),
+        }
+    }
 }
 
 /// The level of steady sliding at `ln theta`.

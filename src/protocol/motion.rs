@@ -1,5 +1,7 @@
 //! A protocol over time: traces show it, and `verify` integrates it independently.
 
+use crate::model::Friction;
+
 /// State of a protocol at one time, in scaled units.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Moment {
@@ -9,7 +11,7 @@ pub struct Moment {
     pub v: f64,
     /// State variable.
     pub theta: f64,
-    /// Friction `tau = 1 + a ln v + b ln theta`.
+    /// Friction.
     pub friction: f64,
     /// Control velocity, where the spring is elastic.
     pub v_c: Option<f64>,
@@ -30,6 +32,11 @@ pub trait Motion: Sync {
 
     /// State at `s`, clamped to `[0, 1]`.
     fn at(&self, s: f64) -> Moment;
+
+    /// Form of friction before and after the motion, and on it.
+    fn friction(&self) -> Friction {
+        Friction::Log
+    }
 
     /// Whether steady sliding at the initial velocity precedes; false for a motion that starts from some state.
     fn departs(&self) -> bool {

@@ -7,13 +7,15 @@ mod row;
 mod sample;
 mod write;
 
-use crate::model::{Law, Transition, Units};
+use crate::model::{Transition, Units};
 use crate::numerics::elementary::ln;
 use crate::protocol::{Moment, Motion};
 use crate::table::{Column, Kind};
 
 pub use disturbed::{Disturbance, Rest};
-pub use protocol::{Absence, Disturbed, Parameter, Protocol, TracedPath, has_floor, names, quantities};
+pub use protocol::{
+    Absence, Disturbed, Parameter, Protocol, TracedPath, has_floor, has_regularised_friction, names, quantities,
+};
 #[cfg(feature = "read")]
 pub use row::{Pathless, TABLES, protocol_of};
 pub use sample::{RANGE_RTOL, VALUE_RTOL};
@@ -24,12 +26,12 @@ pub const COLUMNS: [Column; 6] = [
     Column::number("t", "l/v_0", "time since the start; equal in two rows where the velocity jumps"),
     Column::number("v", "v_0", "velocity"),
     Column::number("theta", "l/v_0", "state variable"),
-    Column::number("tau", "mu_0 sigma", "friction 1 + a ln v + b ln theta"),
+    Column::number("tau", "mu_0 sigma", "friction: 1 + a ln v + b ln theta, or regularised"),
     Column::number("v_c", "v_0", "control velocity of the load point"),
     Column::number(
         "beta",
         "mu_0 sigma v_0",
-        "minus the costate of theta: 1 + a + a ln v + b ln theta + beta theta = 0 above the floor; null before and after the protocol",
+        "minus the costate of theta: tau + a + beta theta = 0 above the floor, with a tanh(tau/a) for a if friction is regularised; null before and after the protocol",
     ),
 ];
 
@@ -134,12 +136,11 @@ pub fn unit(column: usize) -> &'static str {
 /// The steady states before the start and after the end: theta is continuous, the velocity may jump.
 fn around(motion: &dyn Motion, transition: &Transition) -> [Moment; 2] {
     let (first, last) = (motion.at(0.0), motion.at(1.0));
-    let Law { a, b } = transition.law;
     let steady = |t: f64, v: f64, theta: f64| Moment {
         t,
         v,
         theta,
-        friction: 1.0 + a * ln(v) + b * ln(theta),
+        friction: motion.friction().at(&transition.law, ln(v), ln(theta)),
         v_c: first.v_c.map(|_| v),
         beta: None,
     };

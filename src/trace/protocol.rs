@@ -2,11 +2,13 @@
 
 use super::disturbed::{self, Disturbance, Rest};
 use crate::grid::Quantity;
-use crate::model::{Law, StateLaw, Transition};
+use crate::model::{Friction, Law, StateLaw, Transition};
 use crate::protocol::cubic::{Landscape, LandscapeBuffers};
 use crate::protocol::optimal::{self, Bounds, Optimum};
 use crate::protocol::shortcut::{self, Case, FAMILIES, Family, Obstacle};
-use crate::protocol::{Moment, Motion, SolverStats, SpringBlock, Status, best_cubic, compliant, regularised, relaxed};
+use crate::protocol::{
+    Moment, Motion, SolverStats, SpringBlock, Status, arcsinh, best_cubic, compliant, regularised, relaxed,
+};
 use crate::stability::step_response::VelocityStep;
 
 /// A protocol, with its spring if that is elastic.
@@ -15,6 +17,8 @@ use crate::stability::step_response::VelocityStep;
 pub enum Protocol {
     /// The protocol of least work under these bounds.
     Optimal { bounds: Bounds },
+    /// The protocol of least work with regularised friction, which needs no floor.
+    OptimalRegularised,
     /// The protocol of least work for a law other than ageing, between `v = 1` and `v_ceiling`.
     Relaxed { law: StateLaw, v_ceiling: f64 },
     /// The rest of a protocol of least work, from a state on the way: the transition of its case starts at `v_i = 1/theta`, its `t_f` is the
@@ -23,7 +27,7 @@ pub enum Protocol {
     /// The cubic shortcut of least work, with `v >= 1` under the floor of `bounds`, compared with the optimum under them.
     BestCubic { law: StateLaw, bounds: Bounds },
     /// A point of the landscape, scaled: `alpha_2 t_f` and `alpha_3 t_f^2`.
-    CubicPoint { law: StateLaw, a_2: f64, a_3: f64 },
+    CubicPoint { law: StateLaw, friction: Friction, a_2: f64, a_3: f64 },
     /// The member of a family.
     Family(&'static dyn Family),
     /// The response of a block on a spring to a step of the control velocity.
@@ -57,9 +61,14 @@ pub fn quantities(name: &str) -> Vec<Quantity> {
     start.into_iter().chain([Quantity::A, Quantity::B, Quantity::FinalVelocity]).chain(own.iter().copied()).collect()
 }
 
+/// Whether a protocol supports regularised friction.
+pub fn has_regularised_friction(name: &str) -> bool {
+    matches!(name, "optimal" | "gap")
+}
+
 /// Whether the velocity floor has an effect on a protocol.
-pub fn has_floor(name: &str) -> bool {
-    matches!(name, "optimal" | "feedback" | "best_cubic" | "regularised")
+pub fn has_floor(name: &str, friction: Friction) -> bool {
+    friction == Friction::Log && matches!(name, "optimal" | "feedback" | "best_cubic" | "regularised")
 }
 
 impl Protocol {
@@ -70,7 +79,7 @@ impl Protocol {
     /// A quantity without a number; the family, if no protocol has this name.
     pub fn new(
         name: &str,
-        bounded: bool,
+        (friction, bounded): (Friction, bool),
         number: impl Fn(Quantity) -> Option<f64>,
     ) -> Result<(Protocol, Case), Quantity> {
         let number = |quantity: Quantity| number(quantity).ok_or(quantity);
@@ -85,13 +94,14 @@ impl Protocol {
         let (k, m) = (number(Quantity::Stiffness)?, number(Quantity::Mass)?);
         let state_law = StateLaw::ALL.get(number(Quantity::Law)? as usize).copied().unwrap_or_default();
         let protocol = match (name, shortcut::find(name)) {
+            ("optimal", _) if friction == Friction::Regularised => Protocol::OptimalRegularised,
             ("optimal", _) if state_law != StateLaw::Ageing => Protocol::Relaxed { law: state_law, v_ceiling },
             ("optimal", _) => Protocol::Optimal { bounds },
             ("feedback", _) => Protocol::OptimalFrom { theta: number(Quantity::Theta)?, bounds },
             ("best_cubic", _) => Protocol::BestCubic { law: state_law, bounds },
             ("gap", _) => {
                 let (a_2, a_3) = (number(Quantity::Alpha2)?, number(Quantity::Alpha3)?);
-                Protocol::CubicPoint { law: state_law, a_2, a_3 }
+                Protocol::CubicPoint { law: state_law, friction, a_2, a_3 }
             }
             // With a rigid spring, or without a change of velocity, the block follows the load point at once, which only
             // the ageing law has as a shortcut.
@@ -259,10 +269,11 @@ impl Protocol {
     pub fn path(&self, case: &Case, rtol: f64) -> Result<TracedPath, Absence> {
         match *self {
             Protocol::Optimal { bounds } => optimum(case, &bounds, rtol),
+            Protocol::OptimalRegularised => regularised_optimum(case),
             Protocol::Relaxed { law, v_ceiling } => relaxed_optimum(case, law, v_ceiling),
             Protocol::OptimalFrom { theta, bounds } => rest(case, theta, &bounds, rtol),
             Protocol::BestCubic { law, bounds } => least_cubic(case, law, &bounds, rtol),
-            Protocol::CubicPoint { law, a_2, a_3 } => gap(case, law, (a_2, a_3), rtol),
+            Protocol::CubicPoint { law, friction, a_2, a_3 } => gap(case, (law, friction), (a_2, a_3), rtol),
             Protocol::Family(family) => member(family, case, rtol),
             Protocol::StepResponse { state_law, k, m } => response(case, state_law, (k, m), rtol),
             Protocol::Compliant { k, m } => smooth(case, k, m, rtol),
@@ -277,6 +288,22 @@ fn optimum(case: &Case, bounds: &Bounds, rtol: f64) -> Result<TracedPath, Absenc
         return Err(without_optimum(case, bounds, solved.status));
     };
     Ok(TracedPath { motion, status: solved.status, work: value.work, parameters: of_optimum(&value, bounds) })
+}
+
+/// The optimum with regularised friction.
+fn regularised_optimum(case: &Case) -> Result<TracedPath, Absence> {
+    let Case { transition, t_f, .. } = *case;
+    let (solved, motion) = arcsinh::motion(&transition, t_f);
+    let (Some(found), Some(motion)) = (solved.value, motion) else {
+        return Err(match (solved.status, arcsinh::least_time(&transition)) {
+            (Status::Infeasible, Some(t_min)) => Absence::Time { t_f, t_min, bounded: false },
+            (Status::Infeasible, None) => Obstacle::Domain.into(),
+            (Status::Unproven, _) => Absence::Unproven,
+            _ => Obstacle::NotConverged.into(),
+        });
+    };
+    let hamiltonian = Parameter::new("hamiltonian", found.optimum.hamiltonian, "mu_0 sigma v_0", "dW*/dt_f");
+    Ok(TracedPath { motion, status: solved.status, work: found.optimum.work, parameters: vec![hamiltonian] })
 }
 
 /// The optimum of another law than ageing; pulses stand for chattering.
@@ -439,7 +466,7 @@ fn least_cubic(case: &Case, law: StateLaw, bounds: &Bounds, rtol: f64) -> Result
         return Err(Absence::Border);
     }
     let landscape = Landscape::under(law, &case.transition, case.t_f, rtol);
-    let Some(motion) = landscape.motion(value.a_2, value.a_3) else {
+    let Some(motion) = landscape.motion(value.a_2, value.a_3, Friction::Log) else {
         return Err(Absence::Border);
     };
     let mut parameters = scaled(value.a_2, value.a_3);
@@ -447,11 +474,25 @@ fn least_cubic(case: &Case, law: StateLaw, bounds: &Bounds, rtol: f64) -> Result
     Ok(TracedPath { motion, status: solved.status, work: value.work, parameters })
 }
 
-fn gap(case: &Case, law: StateLaw, (a_2, a_3): (f64, f64), rtol: f64) -> Result<TracedPath, Absence> {
+fn gap(
+    case: &Case,
+    (law, friction): (StateLaw, Friction),
+    (a_2, a_3): (f64, f64),
+    rtol: f64,
+) -> Result<TracedPath, Absence> {
     let landscape = Landscape::under(law, &case.transition, case.t_f, rtol);
-    let (mut work, mut status) = ([0.0], [Status::Infeasible]);
-    landscape.evaluate(&[a_2], &[a_3], LandscapeBuffers { work: &mut work, v_min: &mut [], status: &mut status });
-    let motion = landscape.motion(a_2, a_3).ok_or(Obstacle::Velocity)?;
+    let (mut work, mut v_min, mut status) = ([0.0], [0.0], [Status::Infeasible]);
+    let (a, b) = ([a_2], [a_3]);
+    let out = LandscapeBuffers { work: &mut work, v_min: &mut v_min, status: &mut status };
+    landscape.evaluate(&a, &b, out);
+    if friction == Friction::Regularised {
+        let out = LandscapeBuffers { work: &mut work, v_min: &mut v_min, status: &mut status };
+        landscape.regularise(&a, &b, rtol, out);
+    }
+    if status == [Status::NotConverged] {
+        return Err(Obstacle::NotConverged.into());
+    }
+    let motion = landscape.motion(a_2, a_3, friction).ok_or(Obstacle::Velocity)?;
     Ok(TracedPath { motion, status: status[0], work: work[0], parameters: scaled(a_2, a_3) })
 }
 

@@ -3,7 +3,7 @@
 use super::Protocol;
 use crate::dataset::{Cell, Row};
 use crate::grid::Quantity;
-use crate::model::StateLaw;
+use crate::model::{Friction, StateLaw};
 use crate::protocol::Status;
 use crate::protocol::shortcut::Case;
 use crate::table::STATUS;
@@ -37,7 +37,7 @@ pub enum Pathless {
 pub fn protocol_of(
     table: &str,
     row: &Row,
-    (bounded, relative): (bool, [bool; 2]),
+    (friction, bounded, relative): (Friction, bool, [bool; 2]),
     t_f: Option<f64>,
 ) -> Result<(String, Protocol, Case), Pathless> {
     if !TABLES.contains(&table) {
@@ -81,7 +81,7 @@ pub fn protocol_of(
         name => name,
     };
     let (protocol, case) =
-        Protocol::new(name, bounded, number).map_err(|quantity| Pathless::Missing(quantity.name()))?;
+        Protocol::new(name, (friction, bounded), number).map_err(|quantity| Pathless::Missing(quantity.name()))?;
     let name = match protocol {
         Protocol::OptimalFrom { .. } => "optimal",
         Protocol::Family(family) => family.name(),

@@ -139,13 +139,21 @@ pub fn check(row: &Row, context: &Context, rtol: f64) -> Verdict {
         hopf.compare_coefficient(&mut verdict, row, rtol);
         smoothness(&mut verdict, row, &problem);
     }
+    eigenvalues(&mut verdict, row, law(problem.v_f), (k, m, problem.v_f));
+    verdict
+}
+
+/// Compares the eigenvalues at steady sliding with `v`, from the roots of the characteristic polynomial.
+fn eigenvalues(verdict: &mut Verdict, row: &Row, law: Law, (k, m, v): (f64, f64, f64)) {
     if !k.is_finite() {
         for column in ["growth_rate", "frequency", "decay_rate"] {
             verdict.compare(row, column, None, None);
         }
-        return verdict;
+        return;
     }
-    let v = problem.v_f;
+    let double = DoubleDouble::new;
+    let a = double(law.a);
+    let weakening = double(law.b) - a;
     let inertia = double(m) * double(v) * double(v);
     let (sum, c) = (inertia + a, double(k) - weakening);
     let all = if m > 0.0 {
@@ -155,7 +163,7 @@ pub fn check(row: &Row, context: &Context, rtol: f64) -> Verdict {
     };
     let Some([growth, frequency, decay]) = all.map(modes) else {
         verdict.miss("two eigenvalues are too close to be distinguished");
-        return verdict;
+        return;
     };
     // At the critical stiffness the growth rate is 0 and has no relative error.
     let modulus = growth.hypot(frequency);
@@ -163,5 +171,4 @@ pub fn check(row: &Row, context: &Context, rtol: f64) -> Verdict {
     // Near a double root the frequency is the square root of a small difference.
     verdict.compare(row, "frequency", Some(v * frequency), Some(v * modulus));
     verdict.compare(row, "decay_rate", (m > 0.0).then_some(v * decay), None);
-    verdict
 }

@@ -162,11 +162,20 @@ fn what_does_not_exist_states_which_bound() {
 #[test]
 fn wrong_arguments_get_one_clear_message() {
     const FROM: &str = "error: invalid value 'theta=0.3' for '--from <STATE>': expected theta=THETA,t_left=TIME";
-    let cases: [(&[&[&str]], &str); 12] = [
+    let cases: [(&[&[&str]], &str); 15] = [
         (&[&["optimal", "--t-f", "1"]], "error: `optimal` needs --a, --b, --v-i, --v-f"),
         (&[&["cubic", "--tau-ceiling", "2"], UP], "error: `cubic` takes no --tau-ceiling"),
         (&[&["cubic", "--disturb", "theta=+10% at 0.25"], UP], "error: `cubic` takes no --disturb"),
         (&[&["optimal", "--from", "theta=0.3"], &UP[2..6], &UP[8..]], FROM),
+        (&[&["cubic", "--friction", "regularised"], UP], "error: `cubic` does not support regularised friction"),
+        (
+            &[&["optimal", "--friction", "regularised", "--law", "slip"], UP],
+            "error: --law does not support regularised friction",
+        ),
+        (
+            &[&["optimal", "--friction", "Log"], UP],
+            "error: invalid value 'Log' for '--friction <FORM>': expected log, regularised",
+        ),
         (&[&["cubic", "--unbounded"], UP], "error: `cubic` takes no --unbounded"),
         (&[&["gap", "--alpha-2", "0"], UP], "error: `gap` needs --alpha-3"),
         (

@@ -4,7 +4,7 @@
 use crate::support::relative;
 use ode_solvers::dop_shared::OutputType;
 use ode_solvers::{Dop853, SVector, System};
-use slipsweep::model::{Law, StateLaw, Transition};
+use slipsweep::model::{Friction, Law, StateLaw, Transition};
 use slipsweep::protocol::optimal::Bounds;
 use slipsweep::protocol::shortcut::{self, Case};
 use slipsweep::protocol::{Moment, Motion, SolverStats, Status, optimal};
@@ -60,7 +60,23 @@ fn shortcuts() -> Vec<(Protocol, Case)> {
         }
     }
     cases.extend([0.02, 0.037, 0.049].map(|t_f| (BEST_CUBIC, case(PAPER, t_f))));
-    cases.push((Protocol::CubicPoint { law: StateLaw::Ageing, a_2: 0.01, a_3: -0.5 }, case(PAPER, 0.02)));
+    for friction in Friction::ALL {
+        let point = Protocol::CubicPoint { law: StateLaw::Ageing, friction, a_2: 0.01, a_3: -0.5 };
+        cases.push((point, case(PAPER, 0.02)));
+    }
+    cases
+}
+
+/// Optima of regularised friction: up, down, past the turning point and without, and near rest.
+fn regularised() -> Vec<(Protocol, Case)> {
+    let strong = Law { a: 0.1, b: 0.12 };
+    let cases =
+        [(50.0, 200.0, 0.5), (50.0, 200.0, 1e-3), (200.0, 50.0, 0.5), (200.0, 50.0, 0.0152), (100.0, 3.0, 40.0)];
+    let of = |(v_i, v_f, t_f)| (Protocol::OptimalRegularised, case(Transition { law: strong, v_i, v_f }, t_f));
+    let mut cases = cases.map(of).to_vec();
+    cases.extend(
+        [(PAPER, 0.02), (BACK, 0.5)].map(|(transition, t_f)| (Protocol::OptimalRegularised, case(transition, t_f))),
+    );
     cases
 }
 
@@ -68,7 +84,7 @@ fn shortcuts() -> Vec<(Protocol, Case)> {
 fn paths() -> Vec<(TracedPath, Transition)> {
     let mut paths: Vec<(TracedPath, Transition)> =
         optima().into_iter().map(|(transition, t_f)| (optimum(transition, t_f), transition)).collect();
-    for (protocol, case) in shortcuts() {
+    for (protocol, case) in shortcuts().into_iter().chain(regularised()) {
         paths.push((path(protocol, case), case.transition));
     }
     paths
@@ -98,7 +114,10 @@ fn the_contact_lifetime_obeys_its_equation_and_friction_its_law() {
             let error = (to.theta - from.theta) - ((to.t - from.t) - lag);
             let size = from.theta.max(to.theta);
             assert!(error.abs() < 1e-9 * size, "{v_i} {v_f} {} {pair:?}: {error:.1e} of {size}", motion.duration());
-            let friction = 1.0 + law.a * to.v.ln() + law.b * to.theta.ln();
+            let friction = match motion.friction() {
+                Friction::Log => 1.0 + law.a * to.v.ln() + law.b * to.theta.ln(),
+                Friction::Regularised => law.a * (0.5 * to.v * ((1.0 + law.b * to.theta.ln()) / law.a).exp()).asinh(),
+            };
             assert!(relative(to.friction, friction) < 1e-13, "{to:?}");
         }
         let (start, end) = (motion.at(0.0), motion.at(1.0));
@@ -134,6 +153,28 @@ fn optimal_protocols_arrive_and_keep_their_hamiltonian() {
                 [moment.friction * moment.v, -moment.beta.expect("is an extremal") * (1.0 - moment.theta * moment.v)];
             let error = (terms[0] + terms[1] - value.hamiltonian).abs() / terms[0].abs().max(terms[1].abs());
             assert!(error < 1e-12, "{transition:?} {t_f} {i}: {error:.1e}");
+        }
+    }
+}
+
+#[test]
+fn regularised_optima_keep_their_hamiltonian_and_end_in_steady_sliding() {
+    for (protocol, case) in regularised() {
+        let path = path(protocol, case);
+        let hamiltonian = path.parameters[0].value;
+        for i in 0..=1000 {
+            let moment = path.motion.at(f64::from(i) / 1000.0);
+            let terms =
+                [moment.friction * moment.v, -moment.beta.expect("is an extremal") * (1.0 - moment.theta * moment.v)];
+            let error = (terms[0] + terms[1] - hamiltonian).abs() / terms[0].abs().max(terms[1].abs());
+            assert!(error < 1e-11, "{case:?} {i}: {error:.1e}");
+        }
+        let trace = fewest(&path, case.transition);
+        let (first, last) = (trace.moments[0], trace.moments[trace.moments.len() - 1]);
+        for (moment, v) in [(first, case.transition.v_i), (last, case.transition.v_f)] {
+            let law = case.transition.law;
+            let steady = law.a * (0.5 * v * ((1.0 - law.b * v.ln()) / law.a).exp()).asinh();
+            assert!(relative(moment.v, v) < 1e-13 && relative(moment.friction, steady) < 1e-13, "{case:?} {moment:?}");
         }
     }
 }
@@ -437,7 +478,7 @@ fn what_does_not_exist_states_which_bound() {
     let free = absent(optimal(false), BACK, 0.3);
     assert_eq!(free.to_string(), "t_f = 0.3 is too short for v > 0: the least is t_min = 0.3233333333333333");
     assert_eq!(absent(BEST_CUBIC, BACK, 0.3955), Absence::Cubic { bounded: true });
-    let steep = Protocol::CubicPoint { law: StateLaw::Ageing, a_2: 3.0, a_3: 0.0 };
+    let steep = Protocol::CubicPoint { law: StateLaw::Ageing, friction: Friction::Log, a_2: 3.0, a_3: 0.0 };
     assert_eq!(absent(steep, PAPER, 0.02).to_string(), "v or theta would not stay positive");
     // Without the bound the optimum may leave the model, as its status reports.
     let below = path(optimal(false), case(PAPER, 0.06));

@@ -71,6 +71,16 @@ impl Extremal {
         Extremal { law, chart: Chart::Falling { ln_theta, theta: exp(ln_theta), level, scale }, from: 0.0, length }
     }
 
+    /// Its law of friction.
+    pub fn law(&self) -> &Law {
+        &self.law
+    }
+
+    /// The part between two fractions of the length.
+    pub fn part(&self, [from, to]: [f64; 2]) -> Extremal {
+        Extremal { from: self.from + from * self.length, length: (to - from) * self.length, ..*self }
+    }
+
     /// The Hamiltonian `H = dW/dt_f`.
     pub fn hamiltonian(&self) -> f64 {
         match self.chart {
@@ -96,6 +106,9 @@ impl Extremal {
         let Law { a, b } = self.law;
         let gain = (b - a) / a;
         match self.chart {
+            Chart::Turning { ln_theta, theta, level, .. } if x == 0.0 => {
+                Some(Point { ln_theta, theta, ln_u: 0.0, excess: 0.0, level, slope: 0.0 })
+            }
             Chart::Turning { ln_theta, theta, level, friction } => {
                 let fall = x * x;
                 let deficit = friction_rise(level, -gain * fall) - friction * exp_m1(-fall);
@@ -174,6 +187,11 @@ impl Point {
     pub fn velocity(&self) -> f64 {
         let v = exp(self.ln_u) / self.theta;
         if v < LEAST_VELOCITY { 0.0 } else { v }
+    }
+
+    /// Friction.
+    pub fn friction(&self, law: &Law) -> f64 {
+        law.a * scaled_friction(self.level)
     }
 
     /// The price of theta, `dW/dtheta` of the rest of the protocol: `(tau + a f)/theta`.

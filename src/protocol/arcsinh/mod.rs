@@ -4,7 +4,9 @@
 //! (docs/derivations.md, "Regularised friction").
 
 mod extremal;
+mod motion;
 
+use super::Motion;
 use super::optimal::{Optimum, Slopes, Strategy};
 use super::{Solved, SolverStats, Status};
 use crate::model::arcsinh::{reduction, scaled_friction, steady_level};
@@ -39,6 +41,20 @@ struct Problem {
 /// `Infeasible` unless `t_f` is above [`least_time`], and outside the domain (`a > 0`, `b >= 0`, `v_i, v_f > 0`, `t_f > 0`, all finite). `Unproven`
 /// where steady friction at the least theta is at most `(b - a) tanh(tau/a)`, which needs `b > 2 a`: extremals need not be unique there.
 pub fn solve(transition: &Transition, t_f: f64) -> Solved<Regularised> {
+    let Solved { status, value, stats } = extremal(transition, t_f);
+    Solved { status, value: value.map(|(found, _)| found), stats }
+}
+
+/// The optimum of duration `t_f` and its motion; see [`solve`].
+pub fn motion(transition: &Transition, t_f: f64) -> (Solved<Regularised>, Option<Box<dyn Motion>>) {
+    let Solved { status, value, mut stats } = extremal(transition, t_f);
+    let motion = value.and_then(|(_, member)| motion::ExtremalMotion::new(member, t_f, &mut stats));
+    let value = value.map(|(found, _)| found);
+    (Solved { status, value, stats }, motion.map(|motion| Box::new(motion) as Box<dyn Motion>))
+}
+
+/// The optimum and its extremal.
+fn extremal(transition: &Transition, t_f: f64) -> Solved<(Regularised, Extremal)> {
     let mut stats = SolverStats::default();
     let problem = Problem::new(transition).filter(|problem| t_f.is_finite() && t_f > problem.least_time());
     let Some(problem) = problem else { return Solved { status: Status::Infeasible, value: None, stats } };
@@ -136,7 +152,7 @@ impl Problem {
         is_found.then_some((member, sums))
     }
 
-    fn optimum(&self, t_f: f64, stats: &mut SolverStats) -> Option<Regularised> {
+    fn optimum(&self, t_f: f64, stats: &mut SolverStats) -> Option<(Regularised, Extremal)> {
         let (member, sums) = self.search(t_f, stats)?;
         let Transition { law, v_i, v_f } = self.transition;
         let [start, end]: [Point; 2] = [member.at(0.0)?, member.at(1.0)?];
@@ -164,7 +180,7 @@ impl Problem {
             v_ceiling: 0.0,
             tau_ceiling: 0.0,
         };
-        optimum.work.is_finite().then_some(Regularised { optimum, slopes })
+        optimum.work.is_finite().then_some((Regularised { optimum, slopes }, member))
     }
 }
 

@@ -331,6 +331,18 @@ fn lowest(values: &[f32; PLANNED_SHORTCUTS]) -> [f32; CELLS_PER_PLAN] {
     lowest
 }
 
+/// The coefficients at the samples of cells of this size.
+#[inline(always)]
+fn samples(middles: &[[f64; CELLS_PER_PLAN]; 2], size: f64) -> [PerShortcut; 2] {
+    let (mut a_2, mut a_3) = (spread(middles[0]), spread(middles[1]));
+    for (sample, [u, v]) in SAMPLES.into_iter().enumerate() {
+        for i in sample * CELLS_PER_PLAN..(sample + 1) * CELLS_PER_PLAN {
+            (a_2[i], a_3[i]) = ((a_2[i] + u) * size, (a_3[i] + v) * size);
+        }
+    }
+    [a_2, a_3]
+}
+
 /// Plans cells.
 #[multiversion(targets(
     "x86_64+avx+avx2+bmi1+bmi2+avx512f+avx512bw+avx512cd+avx512dq+avx512vl",
@@ -339,13 +351,7 @@ fn lowest(values: &[f32; PLANNED_SHORTCUTS]) -> [f32; CELLS_PER_PLAN] {
 fn chart(frame: &CellInputs, cells: &[CellKey; CELLS_PER_PLAN]) -> [CellPlan; CELLS_PER_PLAN] {
     let CellInputs { ends, accuracy, scale } = frame;
     let middles = [0, 1].map(|k| std::array::from_fn(|c| f64::from_bits(cells[c][k]) - INTEGER_SHIFT));
-    let (mut a_2, mut a_3) = (spread(middles[0]), spread(middles[1]));
-    let size = 1.0 / scale;
-    for (sample, [u, v]) in SAMPLES.into_iter().enumerate() {
-        for i in sample * CELLS_PER_PLAN..(sample + 1) * CELLS_PER_PLAN {
-            (a_2[i], a_3[i]) = ((a_2[i] + u) * size, (a_3[i] + v) * size);
-        }
-    }
+    let [a_2, a_3] = samples(&middles, 1.0 / scale);
     let Places { re, im, doubt } = places::<f32>(ends, &a_2, &a_3);
     let (mut straight, shadow) = nearest(&re, &im, &[0.0; PLANNED_SHORTCUTS], &[1.0; PLANNED_SHORTCUTS]);
     for straight in &mut straight {

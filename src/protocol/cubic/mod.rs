@@ -20,7 +20,7 @@ mod work_derivatives;
 mod works;
 
 use super::{Motion, SolverStats, Status};
-use crate::model::{Law, StateLaw, Transition};
+use crate::model::{Friction, Law, StateLaw, Transition};
 use crate::numerics::double_double::DoubleDouble;
 use crate::numerics::elementary::ln;
 use crate::numerics::gauss::rule;
@@ -29,7 +29,7 @@ use bins::Bins;
 use cells::CellInputs;
 use friction::{FrictionBounds, UndecidedShortcuts};
 use kernel::Slice;
-use panel_batch::Friction;
+use panel_batch::FrictionTerms;
 pub(super) use path::{Ends, Path, rise};
 use queue::Queue;
 use rules::{MappedPanel, NodeThresholds, Zeros, choose};
@@ -45,7 +45,7 @@ use works::Works;
 pub struct Landscape {
     law: Law,
     state: StateLaw,
-    friction: Friction,
+    friction: FrictionTerms,
     floors: FrictionBounds,
     ends: Ends,
     t_f: f64,
@@ -83,7 +83,7 @@ impl Landscape {
         Landscape {
             law,
             state,
-            friction: Friction::new(state, law, &ends),
+            friction: FrictionTerms::new(state, law, &ends),
             floors: FrictionBounds::under(state, law, &ends),
             ends,
             t_f,
@@ -105,11 +105,11 @@ impl Landscape {
         &self.ends
     }
 
-    /// The motion of the shortcut with these scaled coefficients; `None` if it is infeasible.
-    pub fn motion(&self, a_2: f64, a_3: f64) -> Option<Box<dyn Motion>> {
+    /// The motion of the shortcut with these scaled coefficients, under a form of friction; `None` if it is infeasible.
+    pub fn motion(&self, a_2: f64, a_3: f64, friction: Friction) -> Option<Box<dyn Motion>> {
         let mut status = [Status::Infeasible];
         self.evaluate(&[a_2], &[a_3], LandscapeBuffers { work: &mut [], v_min: &mut [], status: &mut status });
-        let motion = motion::CubicPoint::new(self.clone(), [a_2, a_3]);
+        let motion = motion::CubicPoint::new(self.clone(), [a_2, a_3], friction);
         (status != [Status::Infeasible]).then(|| Box::new(motion) as Box<dyn Motion>)
     }
 

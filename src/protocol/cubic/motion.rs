@@ -3,7 +3,7 @@
 use super::Landscape;
 use super::path::Path;
 use super::rules::zeros;
-use crate::model::StateLaw;
+use crate::model::{Friction, StateLaw};
 use crate::numerics::elementary::ln;
 use crate::protocol::{Moment, Motion};
 
@@ -12,12 +12,13 @@ pub(super) struct CubicPoint {
     of: Landscape,
     /// `alpha_2 t_f` and `alpha_3 t_f^2`.
     place: [f64; 2],
+    friction: Friction,
 }
 
 impl CubicPoint {
     /// The motion of a feasible shortcut of a landscape, with `alpha_2 t_f` and `alpha_3 t_f^2`.
-    pub fn new(of: Landscape, place: [f64; 2]) -> CubicPoint {
-        CubicPoint { of, place }
+    pub fn new(of: Landscape, place: [f64; 2], friction: Friction) -> CubicPoint {
+        CubicPoint { of, place, friction }
     }
 
     fn path(&self) -> Path<'_> {
@@ -59,8 +60,12 @@ impl Motion for CubicPoint {
             StateLaw::Ageing => n / (t_f * theta),
             _ => self.of.velocity(&self.path(), x),
         };
-        let friction = 1.0 + law.a * ln(v) + law.b * ln(theta);
+        let friction = self.friction.at(&law, ln(v), ln(theta));
         Moment { t: x * t_f, v, theta, friction, v_c: None, beta: None }
+    }
+
+    fn friction(&self) -> Friction {
+        self.friction
     }
 }
 

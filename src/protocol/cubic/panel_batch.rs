@@ -40,7 +40,7 @@ pub(super) struct PanelBatch {
 
 /// The friction data common to the shortcuts of a landscape.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Friction {
+pub(super) struct FrictionTerms {
     /// The factor of `ln n`.
     a: f64,
     /// `b - a`.
@@ -53,8 +53,8 @@ pub(super) struct Friction {
     ln_theta: f64,
 }
 
-impl Friction {
-    pub fn new(state: StateLaw, law: Law, ends: &Ends) -> Friction {
+impl FrictionTerms {
+    pub fn new(state: StateLaw, law: Law, ends: &Ends) -> FrictionTerms {
         let ln_theta = ln(ends.theta_0.high) + ln(ends.theta_1.high);
         let slope = law.b - law.a;
         let unit = if slope.abs() > MIN_WEAKENING * law.a { slope } else { MIN_WEAKENING * law.a };
@@ -63,7 +63,7 @@ impl Friction {
             StateLaw::Slip => 0.0,
             StateLaw::Prz => 0.5 * law.a,
         };
-        Friction { a, slope, drive: unit * ends.t_f, constant: 1.0 - a * ln(ends.t_f), ln_theta }
+        FrictionTerms { a, slope, drive: unit * ends.t_f, constant: 1.0 - a * ln(ends.t_f), ln_theta }
     }
 }
 
@@ -186,7 +186,7 @@ impl Prepared {
     "x86_64+avx+avx2+bmi1+bmi2+avx512f+avx512bw+avx512cd+avx512dq+avx512vl",
     "x86_64+avx+avx2+bmi1+bmi2"
 ))]
-pub(super) fn prepare(panel_batch: &PanelBatch, ends: &Ends, friction: &Friction, prepared: &mut Prepared) {
+pub(super) fn prepare(panel_batch: &PanelBatch, ends: &Ends, friction: &FrictionTerms, prepared: &mut Prepared) {
     let [a_2, a_3, low, high] = [panel_batch.a_2, panel_batch.a_3, panel_batch.low, panel_batch.high].map(Vector);
     let [side, gap, squarings] = [panel_batch.side, panel_batch.gap, panel_batch.squarings].map(Vector);
     let [from, to] = [panel_batch.from, panel_batch.to].map(Vector);
@@ -295,7 +295,8 @@ fn sum<const SQUARINGS: u32, const SAME: bool, P: Product>(
 ) -> Lanes {
     let product = P::new();
     let NodeBuffer { v_even, v_odd, g_even, g_odd } = space;
-    let Prepared { theta, n, slope, drive, tau, gap, squarings, middle, half, unit, scale, inverse_time, .. } = *prepared;
+    let Prepared { theta, n, slope, drive, tau, gap, squarings, middle, half, unit, scale, inverse_time, .. } =
+        *prepared;
     let count = rule.x.len().min(MAX_HALF);
     let mut mean = Vector::splat(0.0);
     for j in 0..count {

@@ -330,14 +330,21 @@ fn panels<T: Real, const SQUARINGS: u32>(
     for i in 0..PLANNED_SHORTCUTS {
         plan.deeper[i] = if (short[i] > 0.0) | (is_coarse::<T>() & (doubt[i] > 0.0)) { 1.0 } else { 0.0 };
     }
+    map_bounds::<SQUARINGS>(plan, &squarings);
+}
+
+/// Maps the bounds of the panels to the variables of their powers.
+#[inline(always)]
+fn map_bounds<const SQUARINGS: u32>(plan: &mut PlannedPanels, squarings: &[f32; PLANNED_SHORTCUTS]) {
     for level in 1..=SQUARINGS {
-        for ((from, to), &squarings) in plan.from.iter_mut().zip(&mut plan.to).zip(&squarings) {
+        for ((from, to), &squarings) in plan.from.iter_mut().zip(&mut plan.to).zip(squarings) {
             let more = squarings >= level as f32;
             *from = if more { from.sqrt() } else { *from };
             *to = if more { to.sqrt() } else { *to };
         }
     }
 }
+
 /// The powers of the maps.
 struct Powers {
     /// log2 of the powers.

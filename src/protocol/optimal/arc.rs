@@ -137,7 +137,7 @@ pub(super) fn phi_and_slope(z: f64) -> (f64, f64) {
     (phi, slope)
 }
 
-/// `2/(n + 2)!`: twelve terms of `phi(z)/(z^2/2)` leave 2e-18 at `|z| = 1/4`.
+/// `2/(n + 2)!`. Derived: twelve terms of `phi(z)/(z^2/2)` leave 2e-18 at `|z| = 1/4`.
 const PHI_OVER_HALF_SQUARE: [f64; 12] = {
     let mut terms = [1.0; 12];
     let mut n = 1;
@@ -391,13 +391,13 @@ pub(super) struct ArcPoint {
     pub ln_u: f64,
 }
 
-/// Nodes of a piece: a multiple of the lanes.
+/// Nodes of a piece. Chosen: two vectors of lanes.
 const PIECE_NODES: usize = 2 * LANES;
 
-/// Most pieces of an arc.
+/// Most pieces of an arc. Chosen: a limit on the work; doubling ends there.
 const MAX_PIECES: u32 = 1024;
 
-/// Relative accuracy of the time within a piece.
+/// Relative accuracy of the time within a piece. Chosen: a few roundings.
 const PIECE_TOLERANCE: f64 = 1e-15;
 
 impl EqualSteps {
@@ -444,7 +444,7 @@ impl EqualSteps {
     }
 }
 
-/// Layers of the turning point to one unit of `sinh p`: balances the two kinds of singularity in the `p` plane.
+/// Layers of the turning point to one unit of `sinh p`. Chosen: it balances the two kinds of singularity in the `p` plane.
 const LAYERS: f64 = 1.5;
 
 /// The branch points of `U` in the `p` plane, `asinh(2 sqrt(pi)/LAYERS e^(i pi/4))`.
@@ -453,10 +453,10 @@ const BRANCH: (f64, f64) = (1.556165173207204, 0.7409303559311022);
 /// Nodes beyond which a panel is divided in two. Chosen: halves need about half the nodes each; the budgets of `optimal` judge the error.
 const MAX_NODES: f64 = 64.0;
 
-/// Most panels of an arc.
+/// Most panels of an arc. Chosen: a limit on the work; 64 panels of 64 nodes.
 const MAX_PANELS: u32 = 64;
 
-/// The tolerance at which a quadrature uses the greatest numbers of panels and nodes.
+/// The tolerance at which a quadrature uses the greatest numbers of panels and nodes. Chosen: far below every rounding.
 const LEAST_TOLERANCE: f64 = 1e-200;
 
 /// Sums over equal panels of a line, with as many Gauss nodes as the nearest singularity needs.
@@ -534,10 +534,10 @@ fn zero_above(law: &Law, friction_a: f64, c: f64, shift: f64) -> (f64, f64) {
     (r, s)
 }
 
-/// Rounds of [`zero_above`] and [`last_zero`].
+/// Rounds of [`zero_above`] and [`last_zero`]. Chosen: the number of nodes needs one digit of the distance.
 const ROUNDS: u32 = 2;
 
-/// Range of what a logarithm is taken of.
+/// Range of what a logarithm is taken of. Chosen: its square neither underflows nor overflows.
 const LEAST: f64 = 1e-100;
 const MOST: f64 = 1e100;
 
@@ -575,14 +575,16 @@ fn last_zero(slope: f64, c_h: f64, grow: f64) -> Option<f64> {
     Some(exp_m1(x.max(rough_ln(grow) + CLOSEST)).sqrt())
 }
 
-/// Friction in units of `b - a` above which the zero of `E` below an arc is far from it, and how far at least.
+/// Friction in units of `b - a` above which the zero of `E` below an arc is far from it, and how far at least. Chosen: one digit of the distance.
 const HIGH: f64 = 4.0;
 const NEAREST_HIGH: f64 = 1.6;
 
-/// Zeros closer than this come with friction below `b - a`, where quadratures are refined until two agree.
+/// Zeros closer than this come with friction below `b - a`, where quadratures are refined until two agree. Chosen: there, the estimate asks for the
+/// most nodes.
 const CLOSEST: f64 = 0.01;
 
-/// Safety of the node estimate: `e^MARGIN` is the ratio of the error constant to the integral.
+/// Safety of the node estimate: `e^MARGIN` is the ratio of the error constant to the integral. Measured: the budgets of `optimal` (`cargo test --test
+/// solver budgets`).
 const MARGIN: f64 = 2.0;
 
 /// `asinh x` without cancellation; `root` is `sqrt(1 + x^2)`.
@@ -633,7 +635,8 @@ struct TurningSlice {
     sigma: f64,
 }
 
-/// Nodes that a kernel takes at once where there are as many: the operations of one half hide the latency of the other.
+/// Nodes that a kernel takes at once where there are as many: the operations of one half hide the latency of the other. Measured (`cargo bench
+/// --bench optimal`).
 const WIDE: usize = 2 * LANES;
 
 /// The sums of a kernel lane by lane.

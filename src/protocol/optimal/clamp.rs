@@ -246,7 +246,7 @@ pub(super) struct PathSums {
 }
 
 impl Path {
-    /// Friction, free, friction, free, velocity.
+    /// Most pieces. Derived: friction, free, friction, free, velocity.
     const MAX_PIECES: usize = 5;
 
     /// A free extremal as one piece.

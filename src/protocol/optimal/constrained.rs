@@ -181,7 +181,7 @@ fn find_bound(problem: &Problem, ceilings: &Ceilings, time: Time, rtol: f64, gue
     binds.then_some(found)
 }
 
-/// Usual error of a first parameter under ceilings.
+/// Usual error of a first parameter under ceilings. Measured: it decides only the tolerance of the first quadrature (`cargo bench --bench optimal`).
 const CAPPED_ERROR: f64 = 1e-2;
 
 /// The optimum of the time of the turn, then steady sliding.
@@ -441,23 +441,24 @@ fn lifetime(ln_theta: f64) -> Lifetime {
     Lifetime { theta: exp(ln_theta), rest: -exp_m1(ln_theta), ln: ln_theta }
 }
 
-/// What a step may leave, in units of what a free search may: the slope changes faster where an arc on a ceiling begins.
+/// What a step may leave, in units of what a free search may: the slope changes faster where an arc on a ceiling begins. Chosen: a hundredth of what
+/// two steps of a free search leave.
 const SLOPE_CHANGES: f64 = 1e-4;
 
-/// Tolerance of the last quadrature, in units of that of a free search: fine enough for most short arcs as well.
+/// Tolerance of the last quadrature, in units of that of a free search. Chosen: fine enough for most short arcs as well, which saves a quadrature.
 const LAST_TOLERANCE_RATIO: f64 = 0.02;
 
-/// Expected relative error of the time where nothing is known: quadratures start at the largest tolerance.
+/// Expected relative error of the time where nothing is known. Chosen: quadratures start at the largest tolerance.
 const UNKNOWN_TIME_ERROR: f64 = 0.1;
 
-/// Fraction of the time below which all arcs on ceilings together are short.
+/// Fraction of the time below which all arcs on ceilings together are short. Derived: as a difference of times, a longer one loses at most one digit.
 const SHORT_CEILING_TIME: f64 = 0.1;
 
-/// Rounding of the least and of the greatest feasible time, relative: that of a sum over panels.
+/// Rounding of the least and of the greatest feasible time, relative. Chosen: that of a sum over panels.
 const LIMIT_RTOL: f64 = 16.0 * f64::EPSILON;
 
-/// Widens a bracket beyond its rounding.
+/// Widens a bracket beyond its rounding. Chosen: far above the rounding, far below a step of the search.
 const MARGIN: f64 = 1e-6;
 
-/// Largest `ln u` that is searched.
+/// Largest `ln u` that is searched. Derived: beyond, `e^(ln u)` comes near overflow, at 709.
 const MOST_LN_U: f64 = 690.0;

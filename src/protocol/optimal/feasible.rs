@@ -165,9 +165,9 @@ fn zero_of_rising(f: impl Fn(f64) -> f64, mut low: (f64, f64), mut high: (f64, f
     high.0
 }
 
-/// Least and greatest time whose logarithm is taken: doubles without overflow.
+/// Least and greatest time whose logarithm is taken. Derived: doubles without overflow.
 const MIN_TIME: f64 = 1e-300;
 const MAX_TIME: f64 = 1e300;
 
-/// Greatest place that is searched: `exp` of it is a number.
+/// Greatest place that is searched. Derived: `exp` of it is a number.
 const MAX_PLACE: f64 = 600.0;

@@ -173,7 +173,7 @@ pub fn feedback(
     Some(Feedback { v: optimum.v_start, ln_v, pressure })
 }
 
-/// Roundings of what the time beyond the least one is a difference of.
+/// Roundings of the terms of which the time beyond the least one is a difference. Chosen: those of some dozen operations.
 const ROUNDINGS: f64 = 64.0;
 
 /// `x - ln(1 + x)` for `0 <= x < 0.5`, without cancellation.

@@ -260,7 +260,7 @@ pub fn lag_at_bound(theta: f64, time: f64) -> f64 {
     idle - theta * exp_m1(-time)
 }
 
-/// Most landmarks of a floor arc: beyond, nothing changes any more.
+/// Most landmarks of a floor arc. Chosen: beyond, `e^-100`, nothing changes any more.
 const MAX_MARKS: usize = 100;
 
 /// The argument in `[0, most]` at which a rising function with f(0) = 0 takes a value: bracketed secants of its logarithm.
@@ -289,10 +289,10 @@ fn inverse(value: f64, most: f64, f: impl Fn(f64) -> f64) -> f64 {
     d.clamp(0.0, most)
 }
 
-/// A relative difference that one more step makes up for.
+/// A relative difference after which one more step is enough. Derived: a step squares it.
 const LAST_STEP_RTOL: f64 = 1e-8;
 
-/// More steps than the secants take.
+/// Most steps. Chosen: more than bisection takes for all digits of a double.
 const MAX_STEPS: u32 = 60;
 
 #[cfg(test)]

@@ -16,28 +16,29 @@ pub(super) fn quadrature_tolerance(rtol: f64) -> f64 {
     0.02 * rtol
 }
 
-/// Steps across the seam of the family before it counts as met.
+/// Steps across the seam of the family before it counts as met. Chosen: more than a search takes that converges on either side.
 const MAX_CROSSINGS: u32 = 4;
 
-/// Most steps that make a short floor arc more exact.
+/// Most steps that make a short floor arc more exact. Chosen: more than a converging refinement takes.
 const MAX_REFINEMENTS: u32 = 10;
 
-/// A relative change of a short floor arc after which the next one is rounding.
+/// A relative change of a short floor arc after which the next one is rounding. Derived: the next one is its square.
 const LAST_REFINEMENT_RTOL: f64 = 1e-7;
 
 /// A relative difference of times that is rounding. Chosen: that of a few operations.
 const TIME_ROUNDING: f64 = 4.0 * f64::EPSILON;
 
-/// Fraction of the whole time below which a floor arc is short.
+/// Fraction of the whole time below which a floor arc is short. Derived: as a difference of times, a longer one loses at most two digits.
 const SHORT_FLOOR_TIME: f64 = 0.01;
 
-/// How far from the seam, in the scaled start of the arc or in `ln v(0+)`, a protocol without time at the floor is near it.
+/// How far from the seam, in the scaled start of the arc or in `ln v(0+)`, a protocol without time at the floor is near it. Chosen: above the usual
+/// error of a step.
 const SEAM_WIDTH: f64 = 1e-3;
 
 /// The rounding error of a velocity at the floor, relative. Chosen: `ln u` has errors of some roundings over `a`, at least 1e-3, far below this.
 pub(super) const ROUNDING: f64 = 1e-9;
 
-/// Tightest tolerance of a quadrature.
+/// Tightest tolerance of a quadrature. Chosen: below the rounding of a double by two digits.
 pub(super) const FINEST: f64 = 1e-18;
 
 /// A family of paths in one parameter, in which the time is monotone.
@@ -385,7 +386,7 @@ pub(super) fn velocity_range(found: &Extremal) -> [f64; 2] {
         .map(exp)
 }
 
-/// Halvings that find a place where the velocity is flat: half of the digits of a place are enough.
+/// Halvings that find a place where the velocity is flat. Derived: half of the digits of a place are enough.
 const HALVINGS: u32 = 36;
 
 /// The extremals of a problem; the parameter counts from `q_floor`.
@@ -499,7 +500,7 @@ impl Accuracy {
     }
 }
 
-/// Largest tolerance of a probe.
+/// Largest tolerance of a probe. Measured: coarser ones cost more steps (`cargo bench --bench optimal`).
 const COARSEST: f64 = 1e-4;
 
 /// `t_f = t_min`: the floor arc alone.

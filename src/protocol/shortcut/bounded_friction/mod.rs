@@ -112,12 +112,18 @@ const MAX_ERROR_GROWTH: f64 = 1e3;
 const LOW_NOISE: f64 = 1e-11;
 const MAX_NOISE: f64 = 1e-9;
 
+/// Whether the family is defined for a case.
+fn is_in_domain(case: &Case) -> bool {
+    let Transition { law, v_i, v_f } = case.transition;
+    let is_inside = law.a > 0.0 && law.b >= 0.0 && case.t_f > 0.0 && v_i >= 1.0 && v_f >= 1.0;
+    is_inside && [law.a, law.b, case.t_f, v_i, v_f].iter().all(|x| x.is_finite()) && !case.tau_ceiling.is_nan()
+}
+
 /// The path of the member that solves the case, and its panels.
 fn member(case: &Case, rtol: f64, stats: &mut SolverStats) -> Result<(FrictionPath, Vec<FrictionPanel>), Obstacle> {
     let Transition { law, v_i, v_f } = case.transition;
     let t_f = case.t_f;
-    let sound = law.a > 0.0 && law.b >= 0.0 && t_f > 0.0 && v_i >= 1.0 && v_f >= 1.0;
-    if !sound || ![law.a, law.b, t_f, v_i, v_f].iter().all(|x| x.is_finite()) || case.tau_ceiling.is_nan() {
+    if !is_in_domain(case) {
         return Err(Obstacle::Domain);
     }
     let unbounded = case.tau_ceiling == f64::INFINITY;

@@ -102,7 +102,7 @@ pub(super) fn collocate(
         // Rounding of the scaled friction and of its exponent.
         doubt[j] = scaled_friction[j].abs() + path.uncertainty(end_state, d) * distance;
     }
-    let mut w = guess(path, side, from, start, scale, &scaled_friction, rule);
+    let mut w = guess(path, (side, from), start, scale, &scaled_friction, rule);
     let mut before = f64::INFINITY;
     for _ in 0..MAX_STEPS {
         let (mut rate, mut speed, mut slope, mut push) = ([0.0; NODES], [0.0; NODES], [0.0; NODES], [0.0; NODES]);
@@ -126,28 +126,9 @@ pub(super) fn collocate(
         let decay = rule.integrals(&slope);
         let by_quadrature = decay.iter().all(|s| s.abs() <= MAX_QUADRATURE_EXPONENT);
         let (steps, last) = if by_quadrature {
-            let (mut grow, mut weighted, mut pushed) = ([0.0; NODES], [0.0; NODES], [0.0; NODES]);
-            for j in 0..NODES {
-                grow[j] = exp(decay[j]);
-                weighted[j] = slope[j] * rest[j] / grow[j];
-                pushed[j] = push[j] / grow[j];
-            }
-            let sums = rule.integrals(&weighted);
-            let mut steps = [0.0; NODES];
-            for j in 0..NODES {
-                steps[j] = rest[j] + grow[j] * sums[j];
-            }
-            (steps, grow[NODES - 1] * (w_by_alpha + rule.integrals(&pushed)[NODES - 1]))
+            step_by_quadrature([&decay, &slope, &rest, &push], w_by_alpha, rule)
         } else {
-            let forced = rule.integrals(&push);
-            let mut right = SMatrix::<f64, NODES, 2>::from_fn(|j, side| [rest[j], w_by_alpha + forced[j]][side]);
-            let matrix = SMatrix::<f64, NODES, NODES>::from_fn(|j, k| {
-                f64::from(u8::from(j == k)) - rule.columns[k][j] * slope[k]
-            });
-            if !matrix.lu().solve_mut(&mut right) {
-                return None;
-            }
-            (std::array::from_fn(|j| right[(j, 0)]), right[(NODES - 1, 1)])
+            step_by_elimination([&slope, &rest, &push], w_by_alpha, rule)?
         };
         let mut change = 0.0f64;
         for j in 0..NODES {
@@ -187,6 +168,33 @@ pub(super) fn collocate(
     None
 }
 
+/// A Newton step and the derivative by alpha at the last node, where the integral of the slope, `decay`, is small.
+#[inline(always)]
+fn step_by_quadrature([decay, slope, rest, push]: [&Nodes; 4], w_by_alpha: f64, rule: &Radau) -> (Nodes, f64) {
+    let (mut grow, mut weighted, mut pushed) = ([0.0; NODES], [0.0; NODES], [0.0; NODES]);
+    for j in 0..NODES {
+        grow[j] = exp(decay[j]);
+        weighted[j] = slope[j] * rest[j] / grow[j];
+        pushed[j] = push[j] / grow[j];
+    }
+    let sums = rule.integrals(&weighted);
+    let mut steps = [0.0; NODES];
+    for j in 0..NODES {
+        steps[j] = rest[j] + grow[j] * sums[j];
+    }
+    (steps, grow[NODES - 1] * (w_by_alpha + rule.integrals(&pushed)[NODES - 1]))
+}
+
+/// A Newton step and the derivative by alpha at the last node; `None` where the matrix is singular.
+#[inline(always)]
+fn step_by_elimination([slope, rest, push]: [&Nodes; 3], w_by_alpha: f64, rule: &Radau) -> Option<(Nodes, f64)> {
+    let forced = rule.integrals(push);
+    let mut right = SMatrix::<f64, NODES, 2>::from_fn(|j, side| [rest[j], w_by_alpha + forced[j]][side]);
+    let matrix =
+        SMatrix::<f64, NODES, NODES>::from_fn(|j, k| f64::from(u8::from(j == k)) - rule.columns[k][j] * slope[k]);
+    matrix.lu().solve_mut(&mut right).then(|| (std::array::from_fn(|j| right[(j, 0)]), right[(NODES - 1, 1)]))
+}
+
 /// `z` at the nodes, whether all are from the slope of `w`, and their rounding.
 ///
 /// `z = f + kappa w` is a small difference where theta follows the velocity; there `1 - e^z = theta'` is small, and the
@@ -224,8 +232,7 @@ const SLOPE_ROUNDING: f64 = 300.0;
 #[inline(always)]
 fn guess(
     path: &FrictionPath,
-    side: PathEnd,
-    from: f64,
+    (side, from): (PathEnd, f64),
     start: f64,
     scale: f64,
     scaled_friction: &Nodes,

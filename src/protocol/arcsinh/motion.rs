@@ -1,0 +1,69 @@
+//! An extremal of regularised friction over time.
+
+use super::extremal::Extremal;
+use crate::model::{Friction, Law};
+use crate::protocol::{Moment, Motion, SolverStats};
+
+/// Intervals between landmarks. Chosen: the velocity changes by a factor of 10 or so in each of the longest extremals.
+const INTERVALS: u32 = 32;
+
+/// The motion along an extremal; its parameter is the fraction of the coordinate.
+pub(super) struct ExtremalMotion {
+    extremal: Extremal,
+    t_f: f64,
+    /// Time at the start of each interval.
+    starts: Vec<f64>,
+}
+
+impl ExtremalMotion {
+    /// The motion of duration `t_f`; `None` if the extremal does not exist throughout.
+    pub fn new(extremal: Extremal, t_f: f64, stats: &mut SolverStats) -> Option<ExtremalMotion> {
+        let mut starts = vec![0.0];
+        for interval in 0..INTERVALS - 1 {
+            let time = extremal.part([interval, interval + 1].map(place)).sums(stats)?.time;
+            starts.push(starts[starts.len() - 1] + time);
+        }
+        Some(ExtremalMotion { extremal, t_f, starts })
+    }
+
+    /// Time at `s`.
+    fn time(&self, s: f64) -> Option<f64> {
+        let interval = ((s * f64::from(INTERVALS)) as u32).min(INTERVALS - 1);
+        let from = place(interval);
+        if s <= from {
+            return self.starts.get(interval as usize).copied();
+        }
+        let time = self.extremal.part([from, s]).sums(&mut SolverStats::default())?.time;
+        Some((self.starts.get(interval as usize)? + time).min(self.t_f))
+    }
+}
+
+/// The fraction at the start of an interval.
+fn place(interval: u32) -> f64 {
+    f64::from(interval) / f64::from(INTERVALS)
+}
+
+impl Motion for ExtremalMotion {
+    fn duration(&self) -> f64 {
+        self.t_f
+    }
+
+    fn landmarks(&self) -> Vec<f64> {
+        (0..=INTERVALS).map(place).collect()
+    }
+
+    fn at(&self, s: f64) -> Moment {
+        let s = s.clamp(0.0, 1.0);
+        let t = if s < 1.0 { self.time(s).unwrap_or(f64::NAN) } else { self.t_f };
+        let Some(point) = self.extremal.at(s) else {
+            return Moment { t, v: f64::NAN, theta: f64::NAN, friction: f64::NAN, v_c: None, beta: None };
+        };
+        let law: &Law = self.extremal.law();
+        let beta = Some(-point.costate(law));
+        Moment { t, v: point.velocity(), theta: point.theta, friction: point.friction(law), v_c: None, beta }
+    }
+
+    fn friction(&self) -> Friction {
+        Friction::Regularised
+    }
+}
