@@ -579,7 +579,7 @@ fn last_zero(slope: f64, c_h: f64, grow: f64) -> Option<f64> {
 const HIGH: f64 = 4.0;
 const NEAREST_HIGH: f64 = 1.6;
 
-/// Zeros closer than this come with friction below `b - a`, where quadratures are refined until two agree. Chosen: there, the estimate asks for the
+/// Zeros closer than this come with friction below `b - a`, where quadratures are refined until two agree. Chosen: there, the estimate requires the
 /// most nodes.
 const CLOSEST: f64 = 0.01;
 

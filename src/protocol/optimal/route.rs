@@ -292,7 +292,7 @@ fn inverse(value: f64, most: f64, f: impl Fn(f64) -> f64) -> f64 {
 /// A relative difference after which one more step is enough. Derived: a step squares it.
 const LAST_STEP_RTOL: f64 = 1e-8;
 
-/// Most steps. Chosen: more than bisection takes for all digits of a double.
+/// Most steps. Chosen: more than bisection needs.
 const MAX_STEPS: u32 = 60;
 
 #[cfg(test)]
