@@ -3,8 +3,8 @@
 //! multiplications and additions of the sum as it is done here, without logarithms, at the rate of independent ones.
 //! The choice of the rule, feasibility and `v_min` are in neither.
 //!
-//! The last lines compare the laws of slip and of Perrin, Rice and Zheng with ageing: time and nodes of a feasible point, for the same transition at
-//! durations with as many feasible points.
+//! The second table compares the laws of slip and of Perrin, Rice and Zheng with ageing: time and nodes of a feasible point, for the same transition at
+//! durations at which all laws have feasible shortcuts.
 //!
 //! `cargo bench --bench landscape`. On one core; feasibility and `v_min` of all points, feasible or not, are in the
 //! time. As many points are evaluated together as a run does; their coordinates are there before, as are the columns
@@ -127,7 +127,6 @@ impl Columns {
 fn pass(landscape: &Landscape, a_2: &[f64], a_3: &[f64], columns: &mut Columns) -> (u32, u32) {
     let Columns { work, v_min, status } = columns;
     let count = a_2.len().min(a_3.len());
-
     let (work, v_min, status) = (&mut work[..count], &mut v_min[..count], &mut status[..count]);
     let stats = landscape.evaluate(black_box(a_2), a_3, LandscapeBuffers { work, v_min, status });
     black_box(columns);

@@ -23,6 +23,22 @@ pub fn least(values: &Lanes) -> f64 {
     lower(lower(pair(0), pair(2)), lower(pair(1), pair(3)))
 }
 
+/// `yes` in the lanes where `sign` is above 0, else `no`.
+#[inline(always)]
+pub fn choose(sign: Vector, yes: Vector, no: Vector) -> Vector {
+    let mut chosen = no;
+    for i in 0..LANES {
+        chosen.0[i] = if sign.0[i] > 0.0 { yes.0[i] } else { no.0[i] };
+    }
+    chosen
+}
+
+/// The lesser of two numbers in each lane.
+#[inline(always)]
+pub fn lower(x: Vector, y: Vector) -> Vector {
+    choose(y - x, x, y)
+}
+
 /// [`Lanes`] with arithmetic, lane by lane.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[repr(align(64))]

@@ -13,6 +13,7 @@ mod other_laws;
 mod panel_batch;
 mod path;
 mod plan;
+mod product;
 mod queue;
 mod rules;
 mod screen;

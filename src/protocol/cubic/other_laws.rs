@@ -6,16 +6,16 @@
 
 use multiversion::multiversion;
 
-use super::panel_batch::choose;
 use super::path::{Ends, Path};
+use super::product::{NearSlip, Product, Prz, Slip, positive};
 use super::rules::MappedPanel;
 use super::screen::screen;
 use super::works::Works;
 use super::{Bins, Landscape, LandscapeBuffers};
 use crate::model::{Law, StateLaw};
 use crate::numerics::elementary::ln;
-use crate::numerics::lambert::{NEAR_END, above_branch, far_branch, near_branches};
-use crate::numerics::lanes::{LANES, Lanes, Vector, least};
+use crate::numerics::lambert::above_branch;
+use crate::numerics::lanes::{LANES, Lanes, Vector, choose, lower};
 use crate::numerics::root::crossing;
 use crate::protocol::{SolverStats, Status};
 
@@ -57,116 +57,6 @@ pub(super) fn evaluate(of: &Landscape, a_2: &[f64], a_3: &[f64], out: LandscapeB
         feasible.for_each(|(work, _)| *work += of.work_of_ends);
     }
     stats
-}
-
-/// `theta v` as a function of the lack of eight shortcuts, without branches: [`StateLaw::product`].
-pub(super) trait Product {
-    const LAW: StateLaw;
-
-    fn new() -> Self;
-
-    fn of(&self, lack: Vector) -> Vector;
-
-    /// Velocity and `tau'`, both times `theta n`, and `theta n`, from theta, `n`, `a n'` over the unit of `tau'`, and `1/t_f`.
-    #[inline(always)]
-    fn node(&self, theta: Vector, n: Vector, slope: Vector, inverse_time: Vector) -> [Vector; 3] {
-        let n = positive(n);
-        let lack = n * inverse_time;
-        [n * self.of(lack), (n - n * lack) + slope * theta, theta * n]
-    }
-}
-
-/// The ageing law, with velocities in units of `1/t_f`.
-pub(super) struct Ageing;
-
-impl Product for Ageing {
-    const LAW: StateLaw = StateLaw::Ageing;
-
-    #[inline(always)]
-    fn new() -> Self {
-        Ageing
-    }
-
-    #[inline(always)]
-    fn of(&self, lack: Vector) -> Vector {
-        lack
-    }
-
-    #[inline(always)]
-    fn node(&self, theta: Vector, n: Vector, slope: Vector, _: Vector) -> [Vector; 3] {
-        // tau' lacks a multiple of the velocity, which the bilinear form does not see.
-        [n * n, n + slope * theta, theta * n]
-    }
-}
-
-/// The law of Perrin, Rice and Zheng.
-pub(super) struct Prz;
-
-/// The slip law.
-pub(super) struct Slip;
-
-/// The slip law where the lack is at most [`NEAR_END`]: the same bits.
-pub(super) struct NearSlip;
-
-impl Product for Prz {
-    const LAW: StateLaw = StateLaw::Prz;
-
-    #[inline(always)]
-    fn new() -> Self {
-        Prz
-    }
-
-    #[inline(always)]
-    fn of(&self, lack: Vector) -> Vector {
-        lack.map(f64::sqrt)
-    }
-}
-
-impl Product for NearSlip {
-    const LAW: StateLaw = StateLaw::Slip;
-
-    #[inline(always)]
-    fn new() -> Self {
-        NearSlip
-    }
-
-    #[inline(always)]
-    fn of(&self, lack: Vector) -> Vector {
-        (1.0 / std::f64::consts::E) * near_branches(lack)
-    }
-}
-
-impl Product for Slip {
-    const LAW: StateLaw = StateLaw::Slip;
-
-    #[inline(always)]
-    fn new() -> Self {
-        Slip
-    }
-
-    #[inline(always)]
-    fn of(&self, lack: Vector) -> Vector {
-        // Each lane has the formula of its own argument, whatever the others hold.
-        let far = lack.map(|lack| (1.0 / std::f64::consts::E) * far_branch(lack));
-        choose(lack - Vector::splat(NEAR_END), far, NearSlip.of(lack))
-    }
-}
-
-impl NearSlip {
-    /// Whether the lack of eight shortcuts, with coefficients of theta from the first power on, is nowhere beyond [`NEAR_END`].
-    #[inline(always)]
-    pub(super) fn holds(t_f: f64, [a_2, a_3, a_4]: [Vector; 3]) -> bool {
-        // t_f - n in Bernstein's form.
-        let second = a_2 + a_3;
-        let falls = lower(lower(a_2, second), second + a_3 + 3.0 * a_4);
-        least(&falls.0) >= t_f * (1.0 - NEAR_END)
-    }
-}
-
-/// The lack or `n`, which rounding may make negative on the border.
-#[inline(always)]
-pub(super) fn positive(lack: Vector) -> Vector {
-    lack.map(|lack| if lack > f64::MIN_POSITIVE { lack } else { f64::MIN_POSITIVE })
 }
 
 /// Samples of the trend of the velocity. Chosen: more than twice as many as the trend has zeros, so that close pairs of zeros show in the differences.
@@ -313,7 +203,7 @@ fn jet(c: &[Vector; 4], x: Vector) -> [Vector; 4] {
 /// The rate of `ln v` times a positive number, and its slope. With derivatives by `x`, `s = theta_x` and `r = theta_xx`, it is `-2 n s - theta r` for
 /// the law of Perrin, Rice and Zheng and `-t_f u (1 + ln u) s - theta r` for the slip law, where `e u (1 + ln u) = lack - 1 + e u`.
 #[inline(always)]
-fn trend<P: Product>(product: &P, scaled_time: f64, c: &[Vector; 4], x: Vector) -> (Vector, Vector) {
+fn trend<P: Product>(scaled_time: f64, c: &[Vector; 4], x: Vector) -> (Vector, Vector) {
     let [theta, s, r, jerk] = jet(c, x);
     let n = Vector::splat(scaled_time) - s;
     if P::LAW == StateLaw::Prz {
@@ -321,7 +211,7 @@ fn trend<P: Product>(product: &P, scaled_time: f64, c: &[Vector; 4], x: Vector) 
         return (Vector::splat(0.0) - pull * s - theta * r, s * r - pull * r - theta * jerk);
     }
     let lack = positive((1.0 / scaled_time) * n);
-    let e = std::f64::consts::E * product.of(lack);
+    let e = std::f64::consts::E * P::of(lack);
     let rest = lack + e - Vector::splat(1.0);
     // d(e u)/d(theta_x) = -1/(scaled_time ln(e u)).
     let slope = s * r * (Vector::splat(1.0) + e / rest) - scaled_time * (e * r) - theta * jerk;
@@ -349,12 +239,11 @@ searches! {
 /// The least velocities: at an end, or where the trend changes from falling to rising between two samples.
 #[inline(always)]
 fn least_velocities<P: Product>(ends: &Ends, a_2: &Lanes, a_3: &Lanes, wanted: &Lanes) -> Least {
-    let product = &P::new();
     let ([a_2, a_3], rise) = ([a_2, a_3].map(|a| Vector(*a)), ends.rise.high);
     let c = [Vector::splat(ends.theta_0.high), a_2, a_3, rise - (a_2 + a_3)];
     let n_ends = [ends.t_f - a_2, ends.t_f - (3.0 * rise - (2.0 * a_2 + a_3))];
     let theta_ends = [c[0], Vector::splat(ends.theta_1.high)];
-    let v_ends = [velocity(product, ends, n_ends[0], theta_ends[0]), velocity(product, ends, n_ends[1], theta_ends[1])];
+    let v_ends = [velocity::<P>(ends, n_ends[0], theta_ends[0]), velocity::<P>(ends, n_ends[1], theta_ends[1])];
     let is_first = v_ends[1] - v_ends[0];
     let end = End {
         v: choose(is_first, v_ends[0], v_ends[1]),
@@ -366,7 +255,7 @@ fn least_velocities<P: Product>(ends: &Ends, a_2: &Lanes, a_3: &Lanes, wanted: &
     let open = open::<P>(ends, &c, &n_ends, &end, wanted);
     if open != [0.0; LANES] {
         let at_end = (found.v, found.place);
-        search(product, ends, &c, &mut found);
+        search::<P>(ends, &c, &mut found);
         for i in (0..LANES).filter(|&i| open[i] == 0.0) {
             (found.v[i], found.place[i], found.doubt[i]) = (at_end.0[i], at_end.1[i], 0.0);
         }
@@ -384,14 +273,8 @@ fn least_velocities<P: Product>(ends: &Ends, a_2: &Lanes, a_3: &Lanes, wanted: &
 
 /// The velocities where `n` and theta have these values.
 #[inline(always)]
-fn velocity<P: Product>(product: &P, ends: &Ends, n: Vector, theta: Vector) -> Vector {
-    product.of(positive((1.0 / ends.t_f) * n)) / theta
-}
-
-/// The lesser of two numbers in each lane.
-#[inline(always)]
-fn lower(x: Vector, y: Vector) -> Vector {
-    choose(y - x, x, y)
+fn velocity<P: Product>(ends: &Ends, n: Vector, theta: Vector) -> Vector {
+    P::of(positive((1.0 / ends.t_f) * n)) / theta
 }
 
 /// The slower end of eight shortcuts.
@@ -443,11 +326,11 @@ fn open<P: Product>(ends: &Ends, c: &[Vector; 4], n_ends: &[Vector; 2], end: &En
 
 /// Searches the shortcuts for velocities below those of `found`.
 #[inline(always)]
-fn search<P: Product>(product: &P, ends: &Ends, c: &[Vector; 4], found: &mut Least) {
+fn search<P: Product>(ends: &Ends, c: &[Vector; 4], found: &mut Least) {
     let spacing = 1.0 / (SAMPLES - 1) as f64;
     let mut trends = [Vector::splat(0.0); SAMPLES];
     for (k, sample) in trends.iter_mut().enumerate() {
-        *sample = trend(product, ends.t_f, c, Vector::splat(k as f64 * spacing)).0;
+        *sample = trend::<P>(ends.t_f, c, Vector::splat(k as f64 * spacing)).0;
     }
     let (mut turns, mut low, mut high, mut x) = ([0.0; LANES], [0.0; LANES], [0.0; LANES], [0.0; LANES]);
     for (k, pair) in trends.windows(2).enumerate() {
@@ -473,7 +356,7 @@ fn search<P: Product>(product: &P, ends: &Ends, c: &[Vector; 4], found: &mut Lea
     }
     let mut step = [0.0f64; LANES];
     for _ in 0..NEWTON_STEPS {
-        let (value, slope) = trend(product, ends.t_f, c, Vector(x));
+        let (value, slope) = trend::<P>(ends.t_f, c, Vector(x));
         for i in 0..LANES {
             let (value, slope) = (value.0[i], slope.0[i]);
             low[i] = if value < 0.0 { x[i] } else { low[i] };
@@ -486,7 +369,7 @@ fn search<P: Product>(product: &P, ends: &Ends, c: &[Vector; 4], found: &mut Lea
     }
     let [theta, s, ..] = jet(c, Vector(x));
     let n = Vector::splat(ends.t_f) - s;
-    let inside = velocity(product, ends, n, theta);
+    let inside = velocity::<P>(ends, n, theta);
     for i in 0..LANES {
         let has_turn = turns[i] > 0.5;
         let is_lower = has_turn & (inside.0[i] < found.v[i]);

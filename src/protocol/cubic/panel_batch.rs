@@ -10,13 +10,13 @@
 
 use multiversion::multiversion;
 
-use super::other_laws::{Ageing, NearSlip, Product, Prz, Slip};
 use super::path::Ends;
 use super::plan::MAX_SQUARINGS;
+use super::product::{Ageing, NearSlip, Product, Prz, Slip};
 use crate::model::{Law, StateLaw};
 use crate::numerics::elementary::ln;
 use crate::numerics::gauss::{MAX_HALF, Primitive, ROWS};
-use crate::numerics::lanes::{LANES, Lanes, Vector, least};
+use crate::numerics::lanes::{LANES, Lanes, Vector, choose, least};
 
 /// Panels of eight shortcuts with equal numbers of nodes, each with its map `delta = side (gap - s^(2^squarings))` of the distance from an end
 /// of the panel.
@@ -41,6 +41,7 @@ pub(super) struct PanelBatch {
 /// The friction data common to the shortcuts of a landscape.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct FrictionTerms {
+    state: StateLaw,
     /// The factor of `ln n`.
     a: f64,
     /// `b - a`.
@@ -63,7 +64,7 @@ impl FrictionTerms {
             StateLaw::Slip => 0.0,
             StateLaw::Prz => 0.5 * law.a,
         };
-        FrictionTerms { a, slope, drive: unit * ends.t_f, constant: 1.0 - a * ln(ends.t_f), ln_theta }
+        FrictionTerms { state, a, slope, drive: unit * ends.t_f, constant: 1.0 - a * ln(ends.t_f), ln_theta }
     }
 }
 
@@ -223,7 +224,7 @@ pub(super) fn prepare(panel_batch: &PanelBatch, ends: &Ends, friction: &Friction
     let half = 0.5 * (to - from);
     *prepared = Prepared {
         inverse_time: Vector::splat(1.0 / t_f),
-        near: NearSlip::holds(t_f, [a_2, a_3, a_4]),
+        near: friction.state == StateLaw::Slip && NearSlip::holds(t_f, [a_2, a_3, a_4]),
         theta: [q0, side * q1, q2, side * q3],
         n: [n0, side * n1, n2],
         slope: [(friction.a / friction.drive) * n1, (2.0 * friction.a / friction.drive) * (side * n2)],
@@ -245,16 +246,6 @@ pub(super) fn prepare(panel_batch: &PanelBatch, ends: &Ends, friction: &Friction
             Kernel::Eighth
         },
     };
-}
-
-/// Selects `yes` in the lanes where `sign` is above 0, else `no`.
-#[inline(always)]
-pub(super) fn choose(sign: Vector, yes: Vector, no: Vector) -> Vector {
-    let mut chosen = no;
-    for i in 0..LANES {
-        chosen.0[i] = if sign.0[i] > 0.0 { yes.0[i] } else { no.0[i] };
-    }
-    chosen
 }
 
 macro_rules! kernels {
@@ -293,7 +284,6 @@ fn sum<const SQUARINGS: u32, const SAME: bool, P: Product>(
     rule: &Primitive,
     space: &mut NodeBuffer,
 ) -> Lanes {
-    let product = P::new();
     let NodeBuffer { v_even, v_odd, g_even, g_odd } = space;
     let Prepared { theta, n, slope, drive, tau, gap, squarings, middle, half, unit, scale, inverse_time, .. } =
         *prepared;
@@ -315,7 +305,7 @@ fn sum<const SQUARINGS: u32, const SAME: bool, P: Product>(
             let n = n[0] + eta * (n[1] + eta * n[2]);
             let slope = slope[0] + eta * slope[1];
             // Division by `theta n`: one division for two nodes.
-            [*v, *g, *below] = product.node(theta, n, slope, inverse_time);
+            [*v, *g, *below] = P::node(theta, n, slope, inverse_time);
             *weight = jacobian;
         }
         let inverse = 1.0 / (below[0] * below[1]);
