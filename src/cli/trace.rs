@@ -261,6 +261,7 @@ struct TraceRequest {
     numbers: Vec<Named>,
     /// The evolution law, if named.
     law: Option<StateLaw>,
+    /// The form of friction.
     friction: Friction,
     /// Whether `v >= 1`; `None` if the bound has no effect.
     bounded: Option<bool>,
@@ -362,6 +363,14 @@ fn absent(protocol: &str, absence: Absence) -> Failure {
 /// Relative accuracy without a row of a table: the default of a spec.
 const DEFAULT_RTOL: f64 = 1e-10;
 
+/// Refuses the first of these flags that is given, since `what`, requested by `other`, does not support it.
+fn refuse_first(flags: &[(bool, &str)], what: &str, other: &str) -> Result<(), Failure> {
+    match flags.iter().find(|(is_given, _)| *is_given) {
+        Some((_, flag)) => Err(wrong(format!("{flag} does not support {what}\n  help: remove {flag} or {other}"))),
+        None => Ok(()),
+    }
+}
+
 /// The flag that gives a quantity.
 fn flag(quantity: Quantity) -> String {
     format!("--{}", quantity.name().replace('_', "-"))
@@ -459,45 +468,8 @@ impl Arguments {
                 return Err(wrong(format!("`{name}` takes no {flag}")));
             }
         }
-        let friction = self.friction.unwrap_or_default();
-        if friction == Friction::Regularised {
-            if !trace::has_regularised_friction(name) {
-                return Err(wrong(format!(
-                    "`{name}` does not support regularised friction\n  help: remove --friction"
-                )));
-            }
-            let unsupported = [
-                (self.from.is_some(), "--from"),
-                (self.disturb.is_some(), "--disturb"),
-                (self.unbounded, "--unbounded"),
-                (self.v_ceiling.is_some(), "--v-ceiling"),
-                (self.tau_ceiling.is_some(), "--tau-ceiling"),
-                (!self.is_ageing(), "--law"),
-            ];
-            if let Some((_, flag)) = unsupported.into_iter().find(|(is_given, _)| *is_given) {
-                return Err(wrong(format!(
-                    "{flag} does not support regularised friction\n  help: remove {flag} or --friction"
-                )));
-            }
-        }
-        if !self.is_ageing() {
-            let law = self.law.unwrap_or_default().name();
-            for (is_given, flag) in [
-                (self.from.is_some(), "--from"),
-                (self.disturb.is_some(), "--disturb"),
-                (self.unbounded, "--unbounded"),
-            ] {
-                if is_given {
-                    return Err(wrong(format!(
-                        "{flag} does not support the law `{law}`\n  help: remove {flag} or --law"
-                    )));
-                }
-            }
-            if matches!(name, "optimal" | "best_cubic") && !self.v_ceiling.is_some_and(f64::is_finite) {
-                let why = "without one, faster is always better";
-                return Err(wrong(format!("the law `{law}` needs --v-ceiling: {why}\n  help: add --v-ceiling 1000")));
-            }
-        }
+        self.check_friction(name)?;
+        self.check_law(name)?;
         let mut heeded = trace::quantities(if self.from.is_some() { "feedback" } else { name });
         heeded.retain(|quantity| self.is_ageing() || *quantity != Quantity::FrictionCeiling);
         let flags = |is_listed: &dyn Fn(Quantity, bool) -> bool| -> Vec<String> {
@@ -512,13 +484,53 @@ impl Arguments {
         if !missing.is_empty() {
             return Err(wrong(format!("`{name}` needs {}", missing.join(", "))));
         }
-        let unused = unused
-            .into_iter()
-            .chain((self.unbounded && !trace::has_floor(name, friction)).then(|| "--unbounded".to_owned()));
+        let unused = unused.into_iter().chain(
+            (self.unbounded && !trace::has_floor(name, self.friction.unwrap_or_default()))
+                .then(|| "--unbounded".to_owned()),
+        );
         match unused.into_iter().next() {
             Some(flag) => Err(wrong(format!("`{name}` takes no {flag}"))),
             None => Ok(()),
         }
+    }
+
+    /// Checks that the protocol `name` and the other parameters support the form of friction.
+    fn check_friction(&self, name: &str) -> Result<(), Failure> {
+        if self.friction.unwrap_or_default() == Friction::Log {
+            return Ok(());
+        }
+        let what = "regularised friction";
+        if !trace::has_regularised_friction(name) {
+            return Err(wrong(format!("`{name}` does not support {what}\n  help: remove --friction")));
+        }
+        self.refuse_starts(what, "--friction")?;
+        let others = [
+            (self.v_ceiling.is_some(), "--v-ceiling"),
+            (self.tau_ceiling.is_some(), "--tau-ceiling"),
+            (!self.is_ageing(), "--law"),
+        ];
+        refuse_first(&others, what, "--friction")
+    }
+
+    /// Checks that the other parameters support the evolution law.
+    fn check_law(&self, name: &str) -> Result<(), Failure> {
+        if self.is_ageing() {
+            return Ok(());
+        }
+        let law = self.law.unwrap_or_default().name();
+        self.refuse_starts(&format!("the law `{law}`"), "--law")?;
+        if matches!(name, "optimal" | "best_cubic") && !self.v_ceiling.is_some_and(f64::is_finite) {
+            let why = "without one, faster is always better";
+            return Err(wrong(format!("the law `{law}` needs --v-ceiling: {why}\n  help: add --v-ceiling 1000")));
+        }
+        Ok(())
+    }
+
+    /// Refuses a start on the way, a disturbance and a missing floor, which `what` does not support.
+    fn refuse_starts(&self, what: &str, flag: &str) -> Result<(), Failure> {
+        let given =
+            [(self.from.is_some(), "--from"), (self.disturb.is_some(), "--disturb"), (self.unbounded, "--unbounded")];
+        refuse_first(&given, what, flag)
     }
 
     /// Whether the law is ageing.

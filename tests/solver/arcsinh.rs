@@ -3,11 +3,12 @@
 
 use slipsweep::model::arcsinh::{excess, friction_rise, reduction, scaled_friction};
 use slipsweep::model::{Law, Transition};
-use slipsweep::protocol::arcsinh::{Regularised, least_time, solve};
+use slipsweep::protocol::arcsinh::{Regularised, least_time, motion, solve};
 use slipsweep::protocol::cubic::{Landscape, LandscapeBuffers};
 use slipsweep::protocol::{Status, optimal};
 use slipsweep::stability::SteadySliding;
 use slipsweep::stability::arcsinh::{critical_velocity, linearised};
+use slipsweep::trace::{Times, Trace};
 
 use crate::extent::quick_or_long;
 use crate::reference::{self, Row};
@@ -144,6 +145,30 @@ fn random_points_have_sound_numbers() {
         assert!(longer.theta_max >= optimum.theta_max, "{transition:?} {t_f}");
     }
     assert!(unproven < count / 2, "{unproven}");
+}
+
+/// Every random optimum can be traced: time never falls, and both ends have the theta of steady sliding and the velocities of the optimum.
+#[test]
+fn random_optima_can_be_traced() {
+    let mut random = Random(3);
+    let mut traced = 0;
+    for _ in 0..quick_or_long(60, 1_000) {
+        let (transition, t_f) = random_problem(&mut random);
+        let (solved, motion) = motion(&transition, t_f);
+        if solved.status != Status::Ok {
+            continue;
+        }
+        let (found, motion) = (solved.value.expect("is ok").optimum, motion.expect("is ok"));
+        let trace = Trace::of(&*motion, &transition, Times::Fewest);
+        let moments = trace.unwrap_or_else(|| panic!("{transition:?} {t_f}: no trace")).moments;
+        assert!(moments.windows(2).all(|pair| pair[0].t <= pair[1].t), "{transition:?} {t_f}");
+        let [first, last] = [0.0, 1.0].map(|s| motion.at(s));
+        assert!((first.theta * transition.v_i - 1.0).abs() < 1e-12, "{transition:?} {first:?}");
+        assert!((last.theta * transition.v_f - 1.0).abs() < 1e-11, "{transition:?} {last:?}");
+        assert!((first.v, last.v) == (found.v_start, found.v_end), "{transition:?} {first:?} {last:?}");
+        traced += 1;
+    }
+    assert!(traced > 20, "{traced}");
 }
 
 /// The value function solves `V_T = min_v [tau v + V_theta (1 - theta v)]`, so no protocol is cheaper: derivatives by differences, the minimum over

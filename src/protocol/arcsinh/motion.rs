@@ -4,7 +4,7 @@ use super::extremal::Extremal;
 use crate::model::{Friction, Law};
 use crate::protocol::{Moment, Motion, SolverStats};
 
-/// Intervals between landmarks. Chosen: the velocity changes by a factor of 10 or so in each of the longest extremals.
+/// Intervals between landmarks. Measured: with so many, all random optima of the physical domain can be traced (`cargo test random_optima`).
 const INTERVALS: u32 = 32;
 
 /// The motion along an extremal; its parameter is the fraction of the coordinate.
