@@ -68,20 +68,23 @@ fn main() {
         }
     }
     println!(
-        "{:>6} {:>6} {:>7} {:>9} {:>12} {:>7} {:>10}",
-        "rtol", "t_f", "law", "feasible", "ns/feasible", "nodes", "of ageing"
+        "{:>6} {:>6} {:>7} {:>9} {:>12} {:>10} {:>7} {:>9} {:>10}",
+        "rtol", "t_f", "law", "feasible", "ns/feasible", "of ageing", "nodes", "ns/point", "of ageing"
     );
     for rtol in RTOLS {
         for t_f in [0.1, 0.4] {
             let of = |law| measure(&Landscape::under(law, &transition, t_f, rtol));
-            let ageing = of(StateLaw::Ageing).each;
+            let ageing = of(StateLaw::Ageing);
             for law in StateLaw::ALL {
-                let Measured { feasible, nodes, each } = of(law);
+                let found = of(law);
+                let Measured { feasible, nodes, each } = found;
                 println!(
-                    "{rtol:>6e} {t_f:>6} {:>7} {feasible:>9} {:>12.1} {nodes:>7.1} {:>10.2}",
+                    "{rtol:>6e} {t_f:>6} {:>7} {feasible:>9} {:>12.1} {:>10.2} {nodes:>7.1} {:>9.1} {:>10.2}",
                     law.name(),
                     1e9 * each,
-                    each / ageing
+                    each / ageing.each,
+                    1e9 * found.of_a_point(),
+                    found.of_a_point() / ageing.of_a_point()
                 );
             }
         }
@@ -93,6 +96,13 @@ struct Measured {
     feasible: u32,
     nodes: f64,
     each: f64,
+}
+
+impl Measured {
+    /// Seconds of a point, feasible or not.
+    fn of_a_point(&self) -> f64 {
+        self.each * f64::from(self.feasible) / (POINTS * POINTS) as f64
+    }
 }
 
 /// Measures the landscape of coefficients from -0.5 to 0.5.

@@ -62,11 +62,14 @@ pub(super) fn evaluate(of: &Landscape, a_2: &[f64], a_3: &[f64], out: LandscapeB
 /// Samples of the trend of the velocity. Chosen: more than twice as many as the trend has zeros, so that close pairs of zeros show in the differences.
 const SAMPLES: usize = 9;
 
-/// Newton steps from a secant between samples. Derived: from there each doubles the digits.
-const NEWTON_STEPS: usize = 4;
+/// Most Newton steps from a secant between samples. Chosen: twice as many as usual; close to the border of feasibility minima are narrow.
+const NEWTON_STEPS: usize = 6;
 
-/// Greatest last Newton step, in units of `t_f`, that converges. Derived: the velocity depends on the square of the error.
-const MAX_LAST_STEP: f64 = 1e-7;
+/// Greatest relative change of the velocity that a further Newton step would bring. Chosen: below the rounding of a double.
+const MAX_LAST_CHANGE: f64 = 1e-17;
+
+/// Error of the place of a sign of the rough trend. Chosen: ten times the error of the trend.
+const ROUGH_PLACE: f64 = 1e-3;
 
 /// Fraction of a sample below which the parabola through it and its neighbours hints at two zeros. Chosen: a half, for the error of the parabola.
 const NEAR_ZERO: f64 = 0.5;
@@ -200,22 +203,52 @@ fn jet(c: &[Vector; 4], x: Vector) -> [Vector; 4] {
     ]
 }
 
-/// The rate of `ln v` times a positive number, and its slope. With derivatives by `x`, `s = theta_x` and `r = theta_xx`, it is `-2 n s - theta r` for
-/// the law of Perrin, Rice and Zheng and `-t_f u (1 + ln u) s - theta r` for the slip law, where `e u (1 + ln u) = lack - 1 + e u`.
-#[inline(always)]
-fn trend<P: Product>(scaled_time: f64, c: &[Vector; 4], x: Vector) -> (Vector, Vector) {
-    let [theta, s, r, jerk] = jet(c, x);
-    let n = Vector::splat(scaled_time) - s;
-    if P::LAW == StateLaw::Prz {
-        let pull = n + n;
-        return (Vector::splat(0.0) - pull * s - theta * r, s * r - pull * r - theta * jerk);
+/// The rate of `ln v` at a place, times a positive number.
+///
+/// With derivatives by `x`, `s = theta_x` and `r = theta_xx`, it is `-p s - theta r`, with the factor `p theta`: `p = 2 n` for the law of Perrin, Rice
+/// and Zheng, and `p = t_f u (1 + ln u)` for the slip law, where `e u (1 + ln u) = lack - 1 + e u`.
+struct Trend {
+    value: Vector,
+    slope: Vector,
+    /// The factor.
+    factor: Vector,
+    theta: Vector,
+    /// `theta v`.
+    u: Vector,
+}
+
+impl Trend {
+    #[inline(always)]
+    fn at<P: Product>(scaled_time: f64, c: &[Vector; 4], x: Vector) -> Trend {
+        let [theta, s, r, jerk] = jet(c, x);
+        let n = Vector::splat(scaled_time) - s;
+        let lack = lack(scaled_time, n);
+        let u = P::of(lack);
+        // p, and its derivative by theta_x.
+        let (pull, rate) = if P::LAW == StateLaw::Prz {
+            (n + n, Vector::splat(-2.0))
+        } else {
+            let e = std::f64::consts::E * u;
+            let rest = lack + e - Vector::splat(1.0);
+            (scaled_time * rest, Vector::splat(-1.0) - e / rest)
+        };
+        let value = Vector::splat(0.0) - pull * s - theta * r;
+        let slope = Vector::splat(0.0) - (rate * s + pull + s) * r - theta * jerk;
+        Trend { value, slope, factor: pull * theta, theta, u }
     }
-    let lack = positive((1.0 / scaled_time) * n);
-    let e = std::f64::consts::E * P::of(lack);
-    let rest = lack + e - Vector::splat(1.0);
-    // d(e u)/d(theta_x) = -1/(scaled_time ln(e u)).
-    let slope = s * r * (Vector::splat(1.0) + e / rest) - scaled_time * (e * r) - theta * jerk;
-    (Vector::splat(0.0) - scaled_time * (rest * s) - theta * r, slope)
+
+    /// The value alone, with `theta v`.
+    #[inline(always)]
+    fn value<P: Product>(scaled_time: f64, c: &[Vector; 4], x: Vector, u: Vector) -> Vector {
+        let [theta, s, r, _] = jet(c, x);
+        let n = Vector::splat(scaled_time) - s;
+        let pull = if P::LAW == StateLaw::Prz {
+            n + n
+        } else {
+            n + scaled_time * (std::f64::consts::E * u - Vector::splat(1.0))
+        };
+        Vector::splat(0.0) - pull * s - theta * r
+    }
 }
 
 macro_rules! searches {
@@ -243,7 +276,8 @@ fn least_velocities<P: Product>(ends: &Ends, a_2: &Lanes, a_3: &Lanes, wanted: &
     let c = [Vector::splat(ends.theta_0.high), a_2, a_3, rise - (a_2 + a_3)];
     let n_ends = [ends.t_f - a_2, ends.t_f - (3.0 * rise - (2.0 * a_2 + a_3))];
     let theta_ends = [c[0], Vector::splat(ends.theta_1.high)];
-    let v_ends = [velocity::<P>(ends, n_ends[0], theta_ends[0]), velocity::<P>(ends, n_ends[1], theta_ends[1])];
+    let u_ends = [P::of(lack(ends.t_f, n_ends[0])), P::of(lack(ends.t_f, n_ends[1]))];
+    let v_ends = [u_ends[0] / theta_ends[0], u_ends[1] / theta_ends[1]];
     let is_first = v_ends[1] - v_ends[0];
     let end = End {
         v: choose(is_first, v_ends[0], v_ends[1]),
@@ -255,26 +289,33 @@ fn least_velocities<P: Product>(ends: &Ends, a_2: &Lanes, a_3: &Lanes, wanted: &
     let open = open::<P>(ends, &c, &n_ends, &end, wanted);
     if open != [0.0; LANES] {
         let at_end = (found.v, found.place);
-        search::<P>(ends, &c, &mut found);
+        search::<P>(ends, &c, &u_ends, &open, &mut found);
         for i in (0..LANES).filter(|&i| open[i] == 0.0) {
             (found.v[i], found.place[i], found.doubt[i]) = (at_end.0[i], at_end.1[i], 0.0);
         }
     }
     let [theta, s, ..] = jet(&c, Vector(found.place));
     let n = Vector::splat(ends.t_f) - s;
-    for i in 0..LANES {
-        let size = c.iter().map(|c| c.0[i].abs()).sum::<f64>();
-        let loss = 4.0 * f64::EPSILON * (ends.t_f + 3.0 * size);
-        let is_sound = (ends.v_loss * theta.0[i] > loss) & (ends.v_loss * n.0[i] > 3.0 * loss);
-        found.lossy[i] = if is_sound { 0.0 } else { 1.0 };
-    }
+    let loss = 4.0 * f64::EPSILON * (Vector::splat(ends.t_f) + 3.0 * size_of(&c));
+    let [none, one] = [0.0, 1.0].map(Vector::splat);
+    // At the ends theta is known, and n the sum of four numbers.
+    let is_inside = Vector(found.place) * (one - Vector(found.place));
+    let inside = lower(ends.v_loss * theta - loss, ends.v_loss * n - 3.0 * loss);
+    let margin = choose(is_inside, inside, ends.v_loss * n - 0.5 * loss);
+    found.lossy = choose(margin, none, one).0;
     found
 }
 
-/// The velocities where `n` and theta have these values.
+/// The sum of the magnitudes of the coefficients.
 #[inline(always)]
-fn velocity<P: Product>(ends: &Ends, n: Vector, theta: Vector) -> Vector {
-    P::of(positive((1.0 / ends.t_f) * n)) / theta
+fn size_of(c: &[Vector; 4]) -> Vector {
+    c[0].map(f64::abs) + c[1].map(f64::abs) + (c[2].map(f64::abs) + c[3].map(f64::abs))
+}
+
+/// The lack `n/t_f`.
+#[inline(always)]
+fn lack(scaled_time: f64, n: Vector) -> Vector {
+    positive((1.0 / scaled_time) * n)
 }
 
 /// The slower end of eight shortcuts.
@@ -297,87 +338,99 @@ fn open<P: Product>(ends: &Ends, c: &[Vector; 4], n_ends: &[Vector; 2], end: &En
     let high = -1.0 * lower(lower(minus[0], minus[1]), lower(minus[2], minus[3]));
     let other = choose(high - end.theta, high, low);
     let u = end.v * other;
-    let lack = match P::LAW {
-        StateLaw::Prz => u.map(|u| if u > 0.0 { u * u } else { 0.0 }),
-        _ => (std::f64::consts::E * u).map(|e| {
-            let above = if e > 1.0 { e } else { 1.0 };
-            above * ln(above) - above + 1.0
-        }),
+    let lack = if P::LAW == StateLaw::Prz {
+        let u = choose(u, u, Vector::splat(0.0));
+        u * u
+    } else {
+        let (e, one) = (std::f64::consts::E * u, Vector::splat(1.0));
+        let above = choose(e - one, e, one);
+        above * above.map(ln) - above + one
     };
     let chord = (end.n - ends.t_f * lack) / (end.theta - other);
     // n in Bernstein's form.
     let n = [n_ends[0], n_ends[0] - (2.0 * third) * c[2], n_ends[1] + third * (c[2] + c[2] + 6.0 * c[3]), n_ends[1]];
-    let mut open = [0.0; LANES];
-    for (i, open) in open.iter_mut().enumerate() {
-        let (top, bottom) = (end.theta.0[i] >= high.0[i], end.theta.0[i] <= low.0[i]);
-        let size = ends.t_f + c.iter().map(|c| c.0[i].abs()).sum::<f64>();
-        let doubt = 16.0 * f64::EPSILON * (3.0 + chord.0[i].abs()) * size;
-        let mut is_settled = top | bottom;
-        for k in 0..4 {
-            let rest = (n[k].0[i] - end.n.0[i]) - chord.0[i] * (theta[k].0[i] - end.theta.0[i]);
-            // Zero at the slower end itself.
-            let is_own = (k % 3 == 0) & (rest == 0.0);
-            is_settled &= is_own | (rest > doubt);
-        }
-        *open = if is_settled { 0.0 } else { wanted[i] };
+    let size = Vector::splat(ends.t_f) + size_of(c);
+    let doubt = 16.0 * f64::EPSILON * ((Vector::splat(3.0) + chord.map(f64::abs)) * size);
+    let mut worst = Vector::splat(1.0);
+    for k in 0..4 {
+        let rest = (n[k] - end.n) - chord * (theta[k] - end.theta);
+        // Zero at the slower end itself.
+        let is_own = |rest: f64| if (k % 3 == 0) & (rest == 0.0) { 1.0 } else { -1.0 };
+        worst = lower(worst, choose(rest.map(is_own), Vector::splat(1.0), rest - doubt));
     }
-    open
+    // Above 0 where theta at the slower end is none of its bounds.
+    let inner = lower(high - end.theta, end.theta - low);
+    let none = Vector::splat(0.0);
+    choose(inner, Vector(*wanted), choose(worst, none, Vector(*wanted))).0
 }
 
 /// Searches the shortcuts for velocities below those of `found`.
 #[inline(always)]
-fn search<P: Product>(ends: &Ends, c: &[Vector; 4], found: &mut Least) {
+fn search<P: Product>(ends: &Ends, c: &[Vector; 4], u_ends: &[Vector; 2], open: &Lanes, found: &mut Least) {
     let spacing = 1.0 / (SAMPLES - 1) as f64;
-    let mut trends = [Vector::splat(0.0); SAMPLES];
-    for (k, sample) in trends.iter_mut().enumerate() {
-        *sample = trend::<P>(ends.t_f, c, Vector::splat(k as f64 * spacing)).0;
+    let [none, one, step] = [0.0, 1.0, spacing].map(Vector::splat);
+    // Minima close to an end must not be missed: the trends there are exact.
+    let first = Trend::value::<P>(ends.t_f, c, none, u_ends[0]);
+    let mut trends = [first; SAMPLES];
+    trends[SAMPLES - 1] = Trend::value::<P>(ends.t_f, c, one, u_ends[1]);
+    // Places are summed up, for the compiler would split the lanes of multiples.
+    let mut x = none;
+    for sample in &mut trends[1..SAMPLES - 1] {
+        x = x + step;
+        let n = Vector::splat(ends.t_f) - jet(c, x)[1];
+        *sample = Trend::value::<P>(ends.t_f, c, x, P::rough(lack(ends.t_f, n)));
     }
-    let (mut turns, mut low, mut high, mut x) = ([0.0; LANES], [0.0; LANES], [0.0; LANES], [0.0; LANES]);
+    let (mut turns, mut low, mut high, mut x) = (none, none, none, none);
     for (k, pair) in trends.windows(2).enumerate() {
-        for i in 0..LANES {
-            let (f, g) = (pair[0].0[i], pair[1].0[i]);
-            let is_turn = (f < 0.0) & (g >= 0.0);
-            let from = k as f64 * spacing;
-            turns[i] += if is_turn { 1.0 } else { 0.0 };
-            low[i] = if is_turn { from } else { low[i] };
-            high[i] = if is_turn { from + spacing } else { high[i] };
-            x[i] = if is_turn { from + spacing * (f / (f - g)) } else { x[i] };
-        }
+        let [f, g] = [pair[0], pair[1]];
+        let is_turn = choose(none - f, choose(none - g, none, one), none);
+        let [from, to] = [k, k + 1].map(|k| Vector::splat(k as f64 * spacing));
+        turns = turns + is_turn;
+        (low, high) = (choose(is_turn, from, low), choose(is_turn, to, high));
+        x = choose(is_turn, from + spacing * (f / (f - g)), x);
     }
+    let mut doubt = turns - Vector::splat(1.5);
     for three in trends.windows(3) {
-        for i in 0..LANES {
-            let [f, g, h] = [three[0].0[i], three[1].0[i], three[2].0[i]];
-            let (slope, bend) = (0.5 * (h - f), f - 2.0 * g + h);
-            // The extremum of the parabola lies between the three, and close to 0 or beyond.
-            let is_same = (f * g > 0.0) & (g * h > 0.0) & (slope.abs() <= bend.abs()) & (bend * g > 0.0);
-            let is_near = g * g * bend.abs() - 0.5 * slope * slope * g.abs() < NEAR_ZERO * g * g * bend.abs();
-            found.doubt[i] = if is_same & is_near { 1.0 } else { found.doubt[i] };
-        }
+        let [f, g, h] = [three[0], three[1], three[2]];
+        let (slope, bend) = (0.5 * (h - f), f - (g + g) + h);
+        let (steepness, curvature) = (slope.map(f64::abs), bend.map(f64::abs));
+        // The extremum of the parabola lies between the three, and close to 0 or beyond.
+        let is_same = lower(lower(f * g, g * h), lower(bend * g, curvature - steepness));
+        let is_near = 0.5 * (slope * slope * g.map(f64::abs)) - (1.0 - NEAR_ZERO) * (g * g * curvature);
+        doubt = choose(lower(is_same, is_near), one, doubt);
     }
-    let mut step = [0.0f64; LANES];
+    // One turn is followed to the minimum.
+    let mut left = choose(turns - Vector::splat(0.5), choose(turns - Vector::splat(1.5), none, Vector(*open)), none);
+    // The bounds leave room for the error of the samples.
+    let room = Vector::splat(ROUGH_PLACE);
+    (low, high) = (choose(low - room, low - room, none), lower(high + room, one));
+    let (mut last, mut u, mut theta, mut change) = (Vector::splat(spacing), one, one, none);
     for _ in 0..NEWTON_STEPS {
-        let (value, slope) = trend::<P>(ends.t_f, c, Vector(x));
-        for i in 0..LANES {
-            let (value, slope) = (value.0[i], slope.0[i]);
-            low[i] = if value < 0.0 { x[i] } else { low[i] };
-            high[i] = if value < 0.0 { high[i] } else { x[i] };
-            let next = x[i] - value / slope;
-            let next = if (next >= low[i]) & (next <= high[i]) { next } else { 0.5 * (low[i] + high[i]) };
-            step[i] = next - x[i];
-            x[i] = next;
+        if left == none {
+            break;
         }
+        let trend = Trend::at::<P>(ends.t_f, c, x);
+        let falls = none - trend.value;
+        (low, high) = (choose(falls, x, low), choose(falls, high, x));
+        let step = falls / trend.slope;
+        let next = x + step;
+        let is_outside = choose(low - next, one, next - high);
+        // ln v changes by this; what is left of it is smaller by the square of the ratio of the steps.
+        let newton_change = 0.5 * (step * (trend.value / trend.factor));
+        let (before, now) = (last * last, step * step);
+        let is_last = choose(is_outside, none, lower(before - now, MAX_LAST_CHANGE * before + newton_change * now));
+        (u, theta) = (choose(left, trend.u, u), choose(left, trend.theta, theta));
+        change = choose(left, newton_change, change);
+        let next = choose(is_outside, 0.5 * (low + high), next);
+        last = next - x;
+        x = choose(left, next, x);
+        left = choose(is_last, none, left);
     }
-    let [theta, s, ..] = jet(c, Vector(x));
-    let n = Vector::splat(ends.t_f) - s;
-    let inside = velocity::<P>(ends, n, theta);
-    for i in 0..LANES {
-        let has_turn = turns[i] > 0.5;
-        let is_lower = has_turn & (inside.0[i] < found.v[i]);
-        found.v[i] = if is_lower { inside.0[i] } else { found.v[i] };
-        found.place[i] = if is_lower { x[i] } else { found.place[i] };
-        let is_open = (turns[i] > 1.5) | (has_turn & (step[i].is_nan() | (step[i].abs() > MAX_LAST_STEP)));
-        found.doubt[i] = if is_open { 1.0 } else { found.doubt[i] };
-    }
+    let inside = (u + u * change) / theta;
+    let is_lower = choose(turns - Vector::splat(0.5), Vector(found.v) - inside, none);
+    found.v = choose(is_lower, inside, Vector(found.v)).0;
+    found.place = choose(is_lower, x, Vector(found.place)).0;
+    found.doubt = choose(left, one, choose(doubt, one, none)).0;
 }
 
 /// The contribution of one panel to the work.
