@@ -68,6 +68,7 @@ fn no_shortcut_of_other_laws_on_a_grid_costs_less() {
         touching += u32::from(best.v_min == 1.0);
         solved_rows += 1;
         let landscape = Landscape::under(state, &transition, t_f, 1e-12);
+        assert!(sampled_velocity(state, &transition, t_f, best) >= 1.0 - ROUNDED_VELOCITY, "{case}");
         let size = best.a_2.abs().max(best.a_3.abs());
         for reach in [1e-5, 1e-3, 0.1, 1.0, 5.0] {
             let at = |middle: f64, i: usize| middle + reach * size * (2.0 * i as f64 / (N - 1) as f64 - 1.0);
@@ -85,6 +86,41 @@ fn no_shortcut_of_other_laws_on_a_grid_costs_less() {
         }
     }
     assert!(solved_rows > 30 && touching > 10, "{solved_rows} {touching}");
+}
+
+/// The least velocity on a best shortcut by dense sampling; NaN where theta rises faster than the law allows.
+fn sampled_velocity(state: StateLaw, transition: &Transition, t_f: f64, best: BestCubic) -> f64 {
+    let rise = 1.0 / transition.v_f - 1.0 / transition.v_i;
+    let (a_2, a_3, a_4) = (best.a_2, best.a_3, rise - best.a_2 - best.a_3);
+    let even = (0..=2000).map(|i| f64::from(i) / 2000.0);
+    let ends = (11..50).map(|k| (-f64::from(k)).exp2());
+    let places = even.chain(ends.clone()).chain(ends.map(|d| 1.0 - d));
+    let velocity = |x: f64| {
+        let theta = 1.0 / transition.v_i + x * (a_2 + x * (a_3 + x * a_4));
+        let rate = (a_2 + x * (2.0 * a_3 + 3.0 * x * a_4)) / t_f;
+        let lack = 1.0 - rate / state.fastest_rise().high;
+        if lack > -ROUNDED_LACK { state.product(lack.max(0.0)) / theta } else { f64::NAN }
+    };
+    places.map(velocity).fold(f64::INFINITY, |least, v| if v.is_nan() || v < least { v } else { least })
+}
+
+/// Rounding of the coefficients in the lack, and in a velocity, which may depend on its square root.
+const ROUNDED_LACK: f64 = 1e-12;
+const ROUNDED_VELOCITY: f64 = 1e-6;
+
+/// The velocity is least within a thirtieth of the start: version 0.1.0 took a shortcut for the best that stops there.
+#[test]
+fn regress_the_velocity_may_be_least_close_to_the_start() {
+    let law = Law { a: 0.03, b: 0.02 };
+    let bounds = Bounds::new(true).with_v_ceiling(1e5);
+    let transition = Transition { law, v_i: 3000.0, v_f: 10.0 };
+    for (state, t_f) in [(StateLaw::Prz, 0.232079), (StateLaw::Slip, 0.293901), (StateLaw::Slip, 0.5)] {
+        let solved = solve_under(state, &transition, t_f, bounds, 1e-10);
+        assert_eq!(solved.status, Status::Ok, "{state:?} {t_f}");
+        let best = solved.value.expect("has values");
+        let found = sampled_velocity(state, &transition, t_f, best);
+        assert!(found >= 1.0 - ROUNDED_VELOCITY, "{state:?} {t_f}: {found} {best:?}");
+    }
 }
 
 /// Under a ceiling that the optimum does not reach, the numbers of ageing are those without it; a lower one raises W* alone.

@@ -153,7 +153,8 @@ fn solve_nonconvex(state: StateLaw, transition: &Transition, t_f: f64, v_ceiling
         CutResult::Empty => return without(Status::Infeasible, stats),
         CutResult::Exhausted => return without(Status::NotConverged, stats),
     }
-    let Some(least) = polar::least(&plane, &ellipse, &mut stats) else {
+    let rough = Landscape::under(state, transition, t_f, polar::ROUGH_RTOL);
+    let Some(least) = polar::least(&plane, &rough, &ellipse, &mut stats) else {
         return without(Status::NotConverged, stats);
     };
     // The work decreases towards friction that no optimum has.

@@ -89,7 +89,7 @@ impl<'a> Plane<'a> {
     pub fn conditions(&self, place: Coefficients) -> [Constraint; 4] {
         let path = self.path(place);
         if self.landscape.state() != StateLaw::Ageing {
-            return self.conditions_of_law(&path);
+            return self.conditions_of_law(|x| path.at(x), path.exact_theta().minimum(), self.landscape.slowest(&path));
         }
         let mut theta = path.exact_theta();
         theta.c[0] = theta.c[0] - DoubleDouble::new(self.floor);
@@ -106,21 +106,27 @@ impl<'a> Plane<'a> {
         [lifetime, velocity(surplus.minimum()), velocity(0.0), velocity(1.0)]
     }
 
-    /// The conditions under another law than ageing, where `v >= 1` as long as the lack is at least a convex function of theta.
-    fn conditions_of_law(&self, path: &Path) -> [Constraint; 4] {
+    /// The conditions under another law than ageing in double precision.
+    pub fn rough_conditions(&self, place: Coefficients) -> [Constraint; 4] {
+        let [a_2, a_3] = self.coefficients(place).map(|a| a.high);
+        let path = Path::new(self.landscape.ends(), a_2, a_3);
+        let at = |x: f64| (path.theta().at(x), path.n().at(x));
+        self.conditions_of_law(at, path.theta().minimum(), self.landscape.roughly_slowest(&path))
+    }
+
+    /// The conditions under another law than ageing, where `v >= 1` as long as the lack is at least a convex function of theta, from theta and `n`
+    /// at a place, the place of the least theta and the slowest place.
+    fn conditions_of_law(&self, at: impl Fn(f64) -> (f64, f64), lowest: f64, slowest: f64) -> [Constraint; 4] {
         let (state, t_f) = (self.landscape.state(), self.landscape.ends().t_f);
         let velocity = |x: f64| {
-            let ((theta, n), (d_theta, d_n)) = (path.at(x), self.basis.changes(x, 1.0 - x));
+            let ((theta, n), (d_theta, d_n)) = (at(x), self.basis.changes(x, 1.0 - x));
             let [least, slope] = state.lack(theta);
             let along = [0, 1].map(|i| d_n[i] / t_f - slope * d_theta[i]);
             Constraint { value: n / t_f - least, along, of: Bound::Velocity }
         };
-        let mut theta = path.exact_theta();
-        theta.c[0] = theta.c[0] - DoubleDouble::new(self.floor);
-        let x = theta.minimum();
-        let along = self.basis.changes(x, 1.0 - x).0;
-        let lifetime = Constraint { value: theta.at(x).high, along, of: Bound::Lifetime };
-        [lifetime, velocity(self.landscape.slowest(path)), velocity(0.0), velocity(1.0)]
+        let along = self.basis.changes(lowest, 1.0 - lowest).0;
+        let lifetime = Constraint { value: at(lowest).0 - self.floor, along, of: Bound::Lifetime };
+        [lifetime, velocity(slowest), velocity(0.0), velocity(1.0)]
     }
 
     /// Whether a point is admissible.

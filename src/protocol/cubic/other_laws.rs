@@ -111,24 +111,36 @@ impl Landscape {
 
     /// The place where the lack exceeds that of `v = 1` least.
     pub(in crate::protocol) fn slowest(&self, path: &Path) -> f64 {
-        let (theta, n, t_f) = (path.theta(), path.n(), self.ends.t_f);
-        let excess = |x: f64| n.at(x) / t_f - self.state.lack(theta.at(x))[0];
-        let trend = |x: f64| -slopes(&theta.c, x).1 / t_f - self.state.lack(theta.at(x))[1] * slopes(&theta.c, x).0;
-        let place = |i: usize| i as f64 / (SLOWEST_SAMPLES - 1) as f64;
-        let samples: [f64; SLOWEST_SAMPLES] = std::array::from_fn(|i| excess(place(i)));
-        let mut places = vec![0.0, 1.0];
-        for i in 1..SLOWEST_SAMPLES - 1 {
-            if samples[i] <= samples[i - 1] && samples[i] <= samples[i + 1] {
-                let ends = [place(i - 1), place(i + 1)];
-                let [low, high] = ends.map(trend);
-                places.push(if low < 0.0 && high > 0.0 { crossing(trend, ends, [low, high], 0.0) } else { place(i) });
-            }
-        }
         let exact = |x: &f64| {
             let (theta, n) = path.at(*x);
-            n / t_f - self.state.lack(theta)[0]
+            n / self.ends.t_f - self.state.lack(theta)[0]
         };
-        places.into_iter().min_by(|x, y| exact(x).total_cmp(&exact(y))).unwrap_or(0.0)
+        self.slow_places(path).min_by(|x, y| exact(x).total_cmp(&exact(y))).unwrap_or(0.0)
+    }
+
+    /// [`slowest`](Landscape::slowest) in double precision.
+    pub(in crate::protocol) fn roughly_slowest(&self, path: &Path) -> f64 {
+        self.slow_places(path).min_by(|x, y| self.excess(path, *x).total_cmp(&self.excess(path, *y))).unwrap_or(0.0)
+    }
+
+    /// By how much the lack exceeds that of `v = 1`.
+    fn excess(&self, path: &Path, x: f64) -> f64 {
+        path.n().at(x) / self.ends.t_f - self.state.lack(path.theta().at(x))[0]
+    }
+
+    /// The ends, and the places at which the excess is least within its neighbourhood.
+    fn slow_places(&self, path: &Path) -> impl Iterator<Item = f64> {
+        let trend = |x: f64| {
+            let (slope, bend) = slopes(&path.theta().c, x);
+            -bend / self.ends.t_f - self.state.lack(path.theta().at(x))[1] * slope
+        };
+        let samples: [(f64, f64); SLOWEST_SAMPLES] = std::array::from_fn(|i| {
+            let x = i as f64 / (SLOWEST_SAMPLES - 1) as f64;
+            (x, trend(x))
+        });
+        let pairs = samples.windows(2).filter(|pair| pair[0].1 < 0.0 && pair[1].1 >= 0.0);
+        let minima = pairs.map(|pair| crossing(trend, [pair[0].0, pair[1].0], [pair[0].1, pair[1].1], 0.0));
+        minima.chain([0.0, 1.0]).collect::<Vec<f64>>().into_iter()
     }
 
     /// The least velocity and the least friction of a feasible shortcut.
@@ -178,7 +190,7 @@ impl Landscape {
     }
 }
 
-/// Samples of the lack. Chosen: several for each stationary point of a cubic of a cubic.
+/// Samples of the trend of the excess. Chosen: several for each stationary point of a cubic of a cubic.
 const SLOWEST_SAMPLES: usize = 33;
 
 /// Samples of a trend in doubt. Chosen: fifteen times those of the first search.
