@@ -99,7 +99,7 @@ fn every_optimum_under_ceilings_is_right_or_states_so() {
         let fine = solve(transition, t_f, bounds, FINE);
         row.fact("converged at 1e-13", fine.status != Status::NotConverged);
         let (Some(rough), Some(fine)) = (certain(&solved), certain(&fine)) else { return };
-        let noise = noise_of_work(point);
+        let noise = noise_of_work(point, ROUNDINGS);
         // Of either work.
         row.at_most("work to rtol", (rough.work - fine.work).abs(), 2.0 * rtol * fine.work.abs() + 2.0 * noise);
         ceilings_cost(point, &fine, row);
@@ -110,8 +110,11 @@ fn every_optimum_under_ceilings_is_right_or_states_so() {
     });
 }
 
-/// What the solver and four roundings of each input may make of the work.
-fn noise_of_work(point: &Point) -> f64 {
+/// Roundings of an input until it is a term of the work. Chosen: those of a few operations.
+const ROUNDINGS: f64 = 4.0;
+
+/// What the solver and some roundings of each input may make of the work.
+fn noise_of_work(point: &Point, roundings: f64) -> f64 {
     let &Point { transition: Transition { law, v_i, v_f }, t_f, bounds, .. } = point;
     let (solved, found) = slopes(&point.transition, t_f, bounds, FINE);
     let Some(optimum) = solved.value else { return 0.0 };
@@ -122,7 +125,7 @@ fn noise_of_work(point: &Point) -> f64 {
         let by_ceilings = bound(slope.v_ceiling, bounds.v_ceiling) + bound(slope.tau_ceiling, bounds.tau_ceiling);
         inputs += (slope.a * law.a).abs() + (slope.b * law.b).abs() + by_velocities + by_ceilings.abs();
     }
-    64.0 * FINE * optimum.work.abs() + 4.0 * f64::EPSILON * inputs
+    64.0 * FINE * optimum.work.abs() + roundings * f64::EPSILON * inputs
 }
 
 fn feasible_where_the_limits_say(point: &Point, solved: &Solved<Optimum>, row: &mut Row) {
@@ -189,7 +192,7 @@ fn keeps_its_bounds(point: &Point, found: &Optimum, row: &mut Row) {
 /// A tighter ceiling costs work; one that does not bind costs nothing; none is the free optimum to the last bit.
 fn ceilings_cost(point: &Point, fine: &Optimum, row: &mut Row) {
     let &Point { ref transition, t_f, bounds, place, .. } = point;
-    let noise = noise_of_work(point);
+    let noise = noise_of_work(point, ROUNDINGS);
     let plain = solve(transition, t_f, bounds.without_ceilings(), FINE);
     if let Some(free) = certain(&plain) {
         row.at_most("ceilings cost", free.work - fine.work, noise);
@@ -264,7 +267,7 @@ fn slopes_are_slopes(point: &Point, row: &mut Row) {
         let bend = (simpson - fine).abs() + (simpson - rough).abs() + small;
         let names = ["dW*/da", "dW*/db", "dW*/dv_i", "dW*/dv_f", "dW*/dv_ceiling", "dW*/dtau_ceiling", "dW*/dt_f"];
         let dx = last.x - first.x;
-        let allowed = 4.0 * noise_of_work(point) + bend * dx.abs();
+        let allowed = 4.0 * noise_of_work(point, ROUNDINGS) + bend * dx.abs();
         row.at_most(names[parameter], (last.work - first.work - simpson * dx).abs(), allowed);
         return;
     }
@@ -333,8 +336,9 @@ fn starts_like_its_feedback(point: &Point, fine: &Optimum, row: &mut Row) {
         return;
     }
     let Some(found) = feedback(point, theta, point.t_f) else { return };
-    // Of either work.
-    row.at_most("feedback: work", (found.work_to_go - fine.work).abs(), 2.0 * noise_of_work(point));
+    // Of either work. The feedback begins with theta, which is the rounded inverse of an input, and so is that at the end.
+    let noise = noise_of_work(point, ROUNDINGS) + noise_of_work(point, ROUNDINGS + 1.0);
+    row.at_most("feedback: work", (found.work_to_go - fine.work).abs(), noise);
 }
 
 /// Steps of theta and of the time left that are small compared with how far the time is from its limits, where the work is
@@ -367,7 +371,7 @@ fn dynamic_programming(point: &Point, fine: &Optimum, row: &mut Row) {
     let here_is = Point { transition: Transition { v_i: 1.0 / theta, ..point.transition }, t_f: s, ..*point };
     let h = 1e-3 * (theta_1 - theta).abs().max(1e-2 * theta).min(theta);
     let (h, k) = within_limits(&here_is, h, 1e-3 * s);
-    let noise = noise_of_work(&here_is);
+    let noise = noise_of_work(&here_is, ROUNDINGS);
     let w = |i: f64, j: f64| feedback(point, theta + i * h, s + j * k).map(|found| found.work_to_go);
     let Some(here) = feedback(point, theta, s) else { return };
     let difference = |i: f64, j: f64, step: f64| {
