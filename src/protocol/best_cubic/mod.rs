@@ -163,6 +163,10 @@ fn solve_nonconvex(state: StateLaw, transition: &Transition, t_f: f64, v_ceiling
     }
     let path = plane.path(least.place);
     let [mut v_min, friction_min] = landscape.least(&path);
+    // A dip of the velocity that the border does not know.
+    if v_min < 1.0 - TOUCHING_VELOCITY {
+        return without(Status::NotConverged, stats);
+    }
     let touches = least.active.contains(&Bound::Velocity) && v_min < 1.0 + TOUCHING_VELOCITY;
     let [a_2, a_3] = plane.coefficients(least.place).map(|a| a.high);
     let gap = (least.work - work_optimal) / work_optimal;
@@ -176,7 +180,7 @@ fn solve_nonconvex(state: StateLaw, transition: &Transition, t_f: f64, v_ceiling
     Solved { status, value: Some(BestCubic { a_2, a_3, work: least.work, work_optimal, gap, v_min }), stats }
 }
 
-/// Excess of the least velocity over 1 that is rounding where the bound is active. Chosen: far above rounding.
+/// Distance of the least velocity from 1 that is rounding where the bound is active. Chosen: far above rounding.
 const TOUCHING_VELOCITY: f64 = 1e-6;
 
 /// The point of least work, and whether the velocity touches its least value there.

@@ -134,10 +134,22 @@ impl Landscape {
             let (slope, bend) = slopes(&path.theta().c, x);
             -bend / self.ends.t_f - self.state.lack(path.theta().at(x))[1] * slope
         };
-        let samples: [(f64, f64); SLOWEST_SAMPLES] = std::array::from_fn(|i| {
-            let x = i as f64 / (SLOWEST_SAMPLES - 1) as f64;
-            (x, trend(x))
-        });
+        let sample = |x: f64| (x, trend(x));
+        let spacing = 1.0 / (SLOWEST_SAMPLES - 1) as f64;
+        let mut samples: Vec<(f64, f64)> = (0..SLOWEST_SAMPLES).map(|i| sample(i as f64 * spacing)).collect();
+        for _ in 0..MAX_HALVINGS {
+            let hints: Vec<bool> = samples.windows(3).map(hints_at_zeros).collect();
+            if !hints.contains(&true) {
+                break;
+            }
+            // Both intervals of a hint are halved.
+            let is_halved = |i: usize| (i > 0 && hints[i - 1]) || hints.get(i) == Some(&true);
+            let pairs = samples.windows(2).enumerate();
+            let halves = pairs.filter(|&(i, _)| is_halved(i)).map(|(_, pair)| sample(0.5 * (pair[0].0 + pair[1].0)));
+            let halves: Vec<(f64, f64)> = halves.collect();
+            samples.extend(halves);
+            samples.sort_by(|x, y| x.0.total_cmp(&y.0));
+        }
         let pairs = samples.windows(2).filter(|pair| pair[0].1 < 0.0 && pair[1].1 >= 0.0);
         let minima = pairs.map(|pair| crossing(trend, [pair[0].0, pair[1].0], [pair[0].1, pair[1].1], 0.0));
         minima.chain([0.0, 1.0]).collect::<Vec<f64>>().into_iter()
@@ -192,6 +204,23 @@ impl Landscape {
 
 /// Samples of the trend of the excess. Chosen: several for each stationary point of a cubic of a cubic.
 const SLOWEST_SAMPLES: usize = 33;
+
+/// Most halvings of intervals in which a pair of zeros may hide. Chosen: a pair as close as the last ones changes the velocity by less than 1e-9.
+const MAX_HALVINGS: u32 = 5;
+
+/// Whether three samples of one sign hint at two zeros between them: the parabola through them has its extremum there, close to 0 or beyond.
+fn hints_at_zeros(samples: &[(f64, f64)]) -> bool {
+    let &[(x, f), (y, g), (z, h)] = samples else { return false };
+    if f * g <= 0.0 || g * h <= 0.0 {
+        return false;
+    }
+    // f = g + slope (x - y) + bend (x - y)^2.
+    let (before, after) = ((g - f) / (y - x), (h - g) / (z - y));
+    let bend = (after - before) / (z - x);
+    let slope = before + bend * (y - x);
+    let extremum = -0.5 * slope / bend;
+    extremum >= x - y && extremum <= z - y && bend * g > 0.0 && (g + 0.5 * slope * extremum) / g < NEAR_ZERO
+}
 
 /// Samples of a trend in doubt. Chosen: fifteen times those of the first search.
 const FINE_SAMPLES: usize = 256;
