@@ -167,14 +167,12 @@ fn solve_nonconvex(state: StateLaw, transition: &Transition, t_f: f64, v_ceiling
     if v_min < 1.0 - TOUCHING_VELOCITY {
         return without(Status::NotConverged, stats);
     }
-    let touches = least.active.contains(&Bound::Velocity) && v_min < 1.0 + TOUCHING_VELOCITY;
     let [a_2, a_3] = plane.coefficients(least.place).map(|a| a.high);
     let gap = (least.work - work_optimal) / work_optimal;
-    if touches {
-        v_min = 1.0;
-    } else if least.active.contains(&Bound::Velocity) {
-        // The fastest rise of the slip law, where the velocity depends on the root of the rounding of the coefficients.
-        v_min = v_min.min(state.product(0.0) / path.at(landscape.slowest(&path)).0);
+    if least.active.contains(&Bound::Velocity) {
+        // On the border the velocity is 1, or that of the fastest rise of the slip law; it depends on the root of the rounding of the coefficients.
+        let fastest_rise = state.product(0.0) / path.at(landscape.slowest(&path)).0;
+        v_min = v_min.min(fastest_rise.max(1.0)).max(1.0);
     }
     let status = Status::Ok.with_friction(friction_min).compared_with(optimum.status);
     Solved { status, value: Some(BestCubic { a_2, a_3, work: least.work, work_optimal, gap, v_min }), stats }

@@ -223,7 +223,8 @@ impl<'a> Polar<'a> {
         while step > last {
             let Sample { angle, fraction, .. } = least;
             let inside = NEIGHBOURS.into_iter().filter(|&(_, out)| out <= 0.0 || fraction < 1.0);
-            let near = inside.map(|(turn, out)| (angle + turn * step, (fraction + out * step).min(1.0)));
+            // What lies beyond the centre has starts of its own.
+            let near = inside.map(|(turn, out)| (angle + turn * step, (fraction + out * step).clamp(0.0, 1.0)));
             let best = self.samples(near, stats).into_iter().min_by(|x, y| x.work.total_cmp(&y.work));
             match best.filter(|best| best.work < least.work) {
                 Some(best) => least = best,

@@ -68,8 +68,8 @@ const NEWTON_STEPS: usize = 6;
 /// Greatest relative change of the velocity that a further Newton step would bring. Chosen: below the rounding of a double.
 const MAX_LAST_CHANGE: f64 = 1e-17;
 
-/// Error of the place of a sign of the rough trend. Chosen: ten times the error of the trend.
-const ROUGH_PLACE: f64 = 1e-3;
+/// Error of a rough trend in units of its first term. Chosen: thrice the greatest error of `u (1 + ln u)` (2.9e-4).
+const ROUGH_ERROR: f64 = 1e-3;
 
 /// Fraction of a sample below which the parabola through it and its neighbours hints at two zeros. Chosen: a half, for the error of the parabola.
 const NEAR_ZERO: f64 = 0.5;
@@ -278,9 +278,9 @@ impl Trend {
         Trend { value, slope, factor: pull * theta, theta, u }
     }
 
-    /// The value alone, with `theta v`.
+    /// The value alone and its first term, with `theta v`.
     #[inline(always)]
-    fn value<P: Product>(scaled_time: f64, c: &[Vector; 4], x: Vector, u: Vector) -> Vector {
+    fn value<P: Product>(scaled_time: f64, c: &[Vector; 4], x: Vector, u: Vector) -> [Vector; 2] {
         let [theta, s, r, _] = jet(c, x);
         let n = Vector::splat(scaled_time) - s;
         let pull = if P::LAW == StateLaw::Prz {
@@ -288,7 +288,8 @@ impl Trend {
         } else {
             n + scaled_time * (std::f64::consts::E * u - Vector::splat(1.0))
         };
-        Vector::splat(0.0) - pull * s - theta * r
+        let first = Vector::splat(0.0) - pull * s;
+        [first - theta * r, first]
     }
 }
 
@@ -343,7 +344,9 @@ fn least_velocities<P: Product>(ends: &Ends, a_2: &Lanes, a_3: &Lanes, wanted: &
     let is_inside = Vector(found.place) * (one - Vector(found.place));
     let inside = lower(ends.v_loss * theta - loss, ends.v_loss * n - 3.0 * loss);
     let margin = choose(is_inside, inside, ends.v_loss * n - 0.5 * loss);
-    found.lossy = choose(margin, none, one).0;
+    // The status tells the side of v = 1.
+    let distance = (Vector(found.v) - one).map(f64::abs);
+    found.lossy = choose(lower(margin, distance - Vector::splat(2.0 * ends.v_loss)), none, one).0;
     found
 }
 
@@ -410,16 +413,27 @@ fn open<P: Product>(ends: &Ends, c: &[Vector; 4], n_ends: &[Vector; 2], end: &En
 fn search<P: Product>(ends: &Ends, c: &[Vector; 4], u_ends: &[Vector; 2], open: &Lanes, found: &mut Least) {
     let spacing = 1.0 / (SAMPLES - 1) as f64;
     let [none, one, step] = [0.0, 1.0, spacing].map(Vector::splat);
-    // Minima close to an end must not be missed: the trends there are exact.
-    let first = Trend::value::<P>(ends.t_f, c, none, u_ends[0]);
+    let [first, _] = Trend::value::<P>(ends.t_f, c, none, u_ends[0]);
     let mut trends = [first; SAMPLES];
-    trends[SAMPLES - 1] = Trend::value::<P>(ends.t_f, c, one, u_ends[1]);
+    [trends[SAMPLES - 1], _] = Trend::value::<P>(ends.t_f, c, one, u_ends[1]);
     // Places are summed up, for the compiler would split the lanes of multiples.
-    let mut x = none;
+    let (mut x, mut sure) = (none, one);
     for sample in &mut trends[1..SAMPLES - 1] {
         x = x + step;
         let n = Vector::splat(ends.t_f) - jet(c, x)[1];
-        *sample = Trend::value::<P>(ends.t_f, c, x, P::rough(lack(ends.t_f, n)));
+        let [value, first] = Trend::value::<P>(ends.t_f, c, x, P::rough(lack(ends.t_f, n)));
+        (*sample, sure) = (value, lower(sure, value.map(f64::abs) - ROUGH_ERROR * first.map(f64::abs)));
+    }
+    // Where a sign may be wrong, samples are exact.
+    let unsure = choose(sure, none, Vector(*open));
+    if P::LAW == StateLaw::Slip && unsure != none {
+        x = none;
+        for sample in &mut trends[1..SAMPLES - 1] {
+            x = x + step;
+            let n = Vector::splat(ends.t_f) - jet(c, x)[1];
+            let [value, _] = Trend::value::<P>(ends.t_f, c, x, P::of(lack(ends.t_f, n)));
+            *sample = choose(unsure, value, *sample);
+        }
     }
     let (mut turns, mut low, mut high, mut x) = (none, none, none, none);
     for (k, pair) in trends.windows(2).enumerate() {
@@ -442,9 +456,6 @@ fn search<P: Product>(ends: &Ends, c: &[Vector; 4], u_ends: &[Vector; 2], open: 
     }
     // One turn is followed to the minimum.
     let mut left = choose(turns - Vector::splat(0.5), choose(turns - Vector::splat(1.5), none, Vector(*open)), none);
-    // The bounds leave room for the error of the samples.
-    let room = Vector::splat(ROUGH_PLACE);
-    (low, high) = (choose(low - room, low - room, none), lower(high + room, one));
     let (mut last, mut u, mut theta, mut change) = (Vector::splat(spacing), one, one, none);
     for _ in 0..NEWTON_STEPS {
         if left == none {

@@ -11,6 +11,7 @@ mod ceilings;
 mod compliant;
 pub mod crossover;
 mod landscape;
+mod laws;
 mod optimal;
 pub mod random;
 mod reference;
