@@ -385,7 +385,9 @@ fn sinh(zeros: &Zeros, low: f64, high: f64, best: (MappedPanel, f64)) -> (Mapped
     for i in 0..LANES {
         (re[i], im[i]) = complex_asinh((zeros.re[i] - centre) / height, zeros.im[i] / height);
     }
-    let image = focal(&re, &im, from, to);
+    // sinh(i pi - y) = sinh y: each zero has two images that matter.
+    let (other_re, other_im) = (re.map(|re| -re), im.map(|im| std::f64::consts::PI - im));
+    let image = focal(&re, &im, from, to).min(focal(&other_re, &other_im, from, to));
     let panel = MappedPanel { centre, map: PanelMap::Sinh { height }, from, to, nodes: 0 };
     if image - 2.0 > 2.0 * (best.1 - 2.0) { (panel, image) } else { best }
 }
