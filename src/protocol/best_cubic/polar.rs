@@ -31,8 +31,10 @@ pub(super) const ROUGH_RTOL: f64 = 1e-8;
 const MIN_WIDTH: f64 = 1e-8;
 /// Distance from the border, relative to that from the centre, at which the first search takes the border. Chosen: far above rounding.
 const INSET: f64 = 1e-10;
-/// Last step of the first search, in radians and fractions.
+/// Last step of the first search, in radians and fractions. Chosen: as long as a [`DIFFERENCE`].
 const ROUGH_STEP: f64 = 1e-3;
+/// Relative range of the works in a set which [`ROUGH_RTOL`] resolves. Chosen: a thousand times that.
+const MIN_RANGE: f64 = 1e-5;
 /// Works this close to the least one after the first search are refined. Chosen: a hundred times the accuracy of that search.
 const CLOSE_WORK: f64 = 1e-6;
 
@@ -79,7 +81,12 @@ pub(super) struct Least {
 pub(super) fn least(plane: &Plane, rough: &Landscape, ellipse: &Ellipse, stats: &mut SolverStats) -> Option<Least> {
     let first = Polar::around(plane, Some(rough), ellipse).or_else(|| Polar::around(plane, None, ellipse))?;
     let polar = Polar { rough: None, ..first.clone() };
-    let starts = first.starts(stats).into_iter();
+    let all = first.grid(stats);
+    let finite = || all.iter().map(|sample| sample.work).filter(|work| work.is_finite());
+    let [least, most] = [finite().fold(f64::INFINITY, f64::min), finite().fold(f64::NEG_INFINITY, f64::max)];
+    let is_resolved = most - least > MIN_RANGE * least.abs();
+    let (first, all) = if is_resolved { (first, all) } else { (polar.clone(), polar.grid(stats)) };
+    let starts = starts(&all).into_iter();
     let starts: Vec<Sample> = starts.map(|start| first.refine(start, FIRST_STEP, ROUGH_STEP, stats)).collect();
     let close = starts.iter().map(|start| start.work).fold(f64::INFINITY, f64::min);
     let is_close = |start: &&Sample| start.work <= close + CLOSE_WORK * close.abs();
@@ -88,11 +95,22 @@ pub(super) fn least(plane: &Plane, rough: &Landscape, ellipse: &Ellipse, stats: 
     let along = polar.direction(found.angle);
     let border = polar.border(along);
     let is_active = |condition: &&Constraint| reach(condition, along, border) <= (1.0 + ACTIVE) * border;
-    let on_border = plane.conditions(moved(polar.centre, along.map(|step| border * step)));
+    let on_border = plane.conditions(polar.place(along, border));
     let active = on_border.iter().filter(is_active).map(|condition| condition.of).collect();
     let active = if found.fraction == 1.0 { active } else { Vec::new() };
     let place = polar.place(along, found.fraction * border);
     found.work.is_finite().then_some(Least { work: found.work, place, active })
+}
+
+/// Samples of a grid with no neighbour of less work.
+fn starts(grid: &[Sample]) -> Vec<Sample> {
+    let at = |i: usize, ring: usize| grid[i % ANGLES * FRACTIONS.len() + ring];
+    let is_least = |&(i, ring): &(usize, usize)| {
+        let mut near = ring.saturating_sub(1)..(ring + 2).min(FRACTIONS.len());
+        near.all(|other| [i + ANGLES - 1, i, i + 1].iter().all(|&i_near| at(i_near, other).work >= at(i, ring).work))
+    };
+    let all = (0..ANGLES).flat_map(|i| (0..FRACTIONS.len()).map(move |ring| (i, ring)));
+    all.filter(is_least).map(|(i, ring)| at(i, ring)).collect()
 }
 
 /// First step of a refinement: half the angle between samples.
@@ -203,18 +221,11 @@ impl<'a> Polar<'a> {
         samples
     }
 
-    /// Samples with no neighbour of less work.
-    fn starts(&self, stats: &mut SolverStats) -> Vec<Sample> {
+    /// Samples of the whole set, angle by angle.
+    fn grid(&self, stats: &mut SolverStats) -> Vec<Sample> {
         let spacing = std::f64::consts::TAU / ANGLES as f64;
-        let all = || (0..ANGLES).flat_map(|i| (0..FRACTIONS.len()).map(move |ring| (i, ring)));
-        let samples = self.samples(all().map(|(i, ring)| (spacing * i as f64, FRACTIONS[ring])), stats);
-        let at = |i: usize, ring: usize| &samples[i * FRACTIONS.len() + ring];
-        let is_least = |&(i, ring): &(usize, usize)| {
-            let near = ring.saturating_sub(1)..(ring + 2).min(FRACTIONS.len());
-            let around = [i + ANGLES - 1, i, i + 1].map(|i| i % ANGLES);
-            near.flat_map(|ring| around.map(|i| at(i, ring).work)).all(|work| work >= at(i, ring).work)
-        };
-        all().filter(is_least).map(|(i, ring)| *at(i, ring)).collect()
+        let angles = (0..ANGLES).map(|i| spacing * i as f64);
+        self.samples(angles.flat_map(|angle| FRACTIONS.map(|fraction| (angle, fraction))), stats)
     }
 
     /// Moves to the neighbour of least work, with steps that are halved from the first to the last.
