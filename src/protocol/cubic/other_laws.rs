@@ -134,25 +134,7 @@ impl Landscape {
             let (slope, bend) = slopes(&path.theta().c, x);
             -bend / self.ends.t_f - self.state.lack(path.theta().at(x))[1] * slope
         };
-        let sample = |x: f64| (x, trend(x));
-        let spacing = 1.0 / (SLOWEST_SAMPLES - 1) as f64;
-        let mut samples: Vec<(f64, f64)> = (0..SLOWEST_SAMPLES).map(|i| sample(i as f64 * spacing)).collect();
-        for _ in 0..MAX_HALVINGS {
-            let hints: Vec<bool> = samples.windows(3).map(hints_at_zeros).collect();
-            if !hints.contains(&true) {
-                break;
-            }
-            // Both intervals of a hint are halved.
-            let is_halved = |i: usize| (i > 0 && hints[i - 1]) || hints.get(i) == Some(&true);
-            let pairs = samples.windows(2).enumerate();
-            let halves = pairs.filter(|&(i, _)| is_halved(i)).map(|(_, pair)| sample(0.5 * (pair[0].0 + pair[1].0)));
-            let halves: Vec<(f64, f64)> = halves.collect();
-            samples.extend(halves);
-            samples.sort_by(|x, y| x.0.total_cmp(&y.0));
-        }
-        let pairs = samples.windows(2).filter(|pair| pair[0].1 < 0.0 && pair[1].1 >= 0.0);
-        let minima = pairs.map(|pair| crossing(trend, [pair[0].0, pair[1].0], [pair[0].1, pair[1].1], 0.0));
-        minima.chain([0.0, 1.0]).collect::<Vec<f64>>().into_iter()
+        minima(trend, even_places().collect()).into_iter().chain([0.0, 1.0])
     }
 
     /// The least velocity and the least friction of a feasible shortcut.
@@ -191,19 +173,41 @@ impl Landscape {
             let lack = (path.n().at(x) / self.ends.t_f).max(0.0);
             q * slope * self.ends.t_f * (lack - 1.0 + above_branch(lack)) - p * theta * bend
         };
-        // Uniform, and denser towards both ends, where theta may be small.
-        let fine = (1..FINE_SAMPLES).map(|i| i as f64 / FINE_SAMPLES as f64);
-        let ends = (10..52).map(|k| (-k as f64).exp2());
-        let mut places: Vec<f64> = fine.chain(ends.clone()).chain(ends.map(|d| 1.0 - d)).chain([0.0, 1.0]).collect();
+        // Denser towards both ends, where theta may be small.
+        let ends = (6..52).map(|k| (-k as f64).exp2());
+        let mut places: Vec<f64> = even_places().chain(ends.clone()).chain(ends.map(|d| 1.0 - d)).collect();
         places.sort_by(f64::total_cmp);
-        let values: Vec<f64> = places.iter().map(|&x| trend(x)).collect();
-        let pairs = places.windows(2).zip(values.windows(2)).filter(|(_, f)| f[0] < 0.0 && f[1] >= 0.0);
-        pairs.map(|(x, f)| crossing(trend, [x[0], x[1]], [f[0], f[1]], f64::EPSILON)).collect()
+        minima(trend, places)
     }
 }
 
-/// Samples of the trend of the excess. Chosen: several for each stationary point of a cubic of a cubic.
-const SLOWEST_SAMPLES: usize = 33;
+/// Intervals between even places. Chosen: several for each stationary point of a cubic of a cubic.
+const INTERVALS: usize = 32;
+
+fn even_places() -> impl Iterator<Item = f64> {
+    (0..=INTERVALS).map(|i| i as f64 / INTERVALS as f64)
+}
+
+/// Where a trend changes from falling to rising, from samples at ascending places.
+fn minima(trend: impl Fn(f64) -> f64, places: Vec<f64>) -> Vec<f64> {
+    let sample = |x: f64| (x, trend(x));
+    let mut samples: Vec<(f64, f64)> = places.into_iter().map(sample).collect();
+    for _ in 0..MAX_HALVINGS {
+        let hints: Vec<bool> = samples.windows(3).map(hints_at_zeros).collect();
+        if !hints.contains(&true) {
+            break;
+        }
+        // Both intervals of a hint are halved.
+        let is_halved = |i: usize| (i > 0 && hints[i - 1]) || hints.get(i) == Some(&true);
+        let pairs = samples.windows(2).enumerate().filter(|&(i, _)| is_halved(i));
+        let halves: Vec<(f64, f64)> = pairs.map(|(_, pair)| sample(0.5 * (pair[0].0 + pair[1].0))).collect();
+        samples.extend(halves);
+        samples.sort_by(|x, y| x.0.total_cmp(&y.0));
+    }
+    let pairs = samples.windows(2).filter(|pair| pair[0].1 < 0.0 && pair[1].1 >= 0.0);
+    let between = |pair: &[(f64, f64)]| crossing(&trend, [pair[0].0, pair[1].0], [pair[0].1, pair[1].1], f64::EPSILON);
+    pairs.map(between).collect()
+}
 
 /// Most halvings of intervals in which a pair of zeros may hide. Chosen: a pair as close as the last ones changes the velocity by less than 1e-9.
 const MAX_HALVINGS: u32 = 5;
@@ -221,9 +225,6 @@ fn hints_at_zeros(samples: &[(f64, f64)]) -> bool {
     let extremum = -0.5 * slope / bend;
     extremum >= x - y && extremum <= z - y && bend * g > 0.0 && (g + 0.5 * slope * extremum) / g < NEAR_ZERO
 }
-
-/// Samples of a trend in doubt. Chosen: fifteen times those of the first search.
-const FINE_SAMPLES: usize = 256;
 
 /// First and second derivative of a cubic.
 #[inline(always)]
