@@ -8,6 +8,7 @@ mod bins;
 mod cells;
 mod friction;
 mod kernel;
+mod least_velocity;
 mod motion;
 mod other_laws;
 mod panel_batch;
