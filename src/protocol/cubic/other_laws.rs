@@ -144,15 +144,15 @@ impl Landscape {
             q * slope * self.ends.t_f * (lack - 1.0 + above_branch(lack)) - p * theta * bend
         };
         // Denser towards both ends, where theta may be small.
-        let ends = (6..52).map(|k| (-k as f64).exp2());
+        let ends = (5..52).map(|k| (-k as f64).exp2());
         let mut places: Vec<f64> = even_places().chain(ends.clone()).chain(ends.map(|d| 1.0 - d)).collect();
         places.sort_by(f64::total_cmp);
         minima(trend, places)
     }
 }
 
-/// Intervals between even places. Chosen: several for each stationary point of a cubic of a cubic.
-const INTERVALS: usize = 32;
+/// Intervals between even places. Chosen: three for each stationary point of a cubic of a cubic; hints at more are followed.
+const INTERVALS: usize = 16;
 
 fn even_places() -> impl Iterator<Item = f64> {
     (0..=INTERVALS).map(|i| i as f64 / INTERVALS as f64)
