@@ -13,15 +13,17 @@ use crate::numerics::lanes::{LANES, Lanes, Vector, choose, lower};
 
 /// Samples of the trend of the velocity. Chosen: more than twice as many as the trend has zeros, so that close pairs of zeros show in the differences.
 const SAMPLES: usize = 9;
+
+/// Distance between samples.
 const SPACING: f64 = 1.0 / (SAMPLES - 1) as f64;
 
-/// Most Newton steps from a secant between samples. Chosen: twice as many as usual; close to the border of feasibility minima are narrow.
+/// Most Newton steps from a secant between samples. Chosen: more than smooth minima take; close to the border of feasibility minima are narrow.
 const NEWTON_STEPS: usize = 6;
 
 /// Greatest relative change of the velocity that a further Newton step would bring. Chosen: below the rounding of a double.
 const MAX_LAST_CHANGE: f64 = 1e-17;
 
-/// Error of a rough trend in units of its first term. Chosen: thrice the greatest error of `u (1 + ln u)` (2.9e-4).
+/// Error of a rough trend in units of its first term. Chosen: thrice the error of the rough `u (1 + ln u)`, which `tests/solver/numerics.rs` bounds.
 const ROUGH_ERROR: f64 = 1e-3;
 
 /// Fraction of a sample below which the parabola through it and its neighbours hints at two zeros. Chosen: a half, for the error of the parabola.
@@ -254,7 +256,7 @@ fn search<P: Product>(ends: &Ends, c: &[Vector; 4], u_ends: &[Vector; 2], open: 
     found.doubt = choose(left, one, choose(doubt, one, none)).0;
 }
 
-/// Trends at even places, of which those inside are rough where that determines their signs.
+/// Trends at even places; those inside are rough where their signs are certain.
 #[inline(always)]
 fn trends<P: Product>(scaled_time: f64, c: &[Vector; 4], u_ends: &[Vector; 2], open: &Lanes) -> [Vector; SAMPLES] {
     let [none, one, step] = [0.0, 1.0, SPACING].map(Vector::splat);

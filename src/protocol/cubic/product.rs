@@ -12,7 +12,7 @@ pub(super) trait Product {
     /// `theta v`.
     fn of(lack: Vector) -> Vector;
 
-    /// `theta v` to 1.5e-4.
+    /// `theta v` to 4.4e-4.
     #[inline(always)]
     fn rough(lack: Vector) -> Vector {
         Self::of(lack)
