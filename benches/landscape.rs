@@ -3,8 +3,8 @@
 //! multiplications and additions of the sum as it is done here, without logarithms, at the rate of independent ones.
 //! The choice of the rule, feasibility and `v_min` are in neither.
 //!
-//! The second table compares the laws of slip and of Perrin, Rice and Zheng with ageing: time and nodes of a feasible point, for the same transition at
-//! durations at which all laws have feasible shortcuts.
+//! The second table compares the laws of slip and of Perrin, Rice and Zheng with ageing: time and nodes of a feasible point, and the time of any point,
+//! for the same transition at durations at which all laws have feasible shortcuts.
 //!
 //! `cargo bench --bench landscape`. On one core; feasibility and `v_min` of all points, feasible or not, are in the
 //! time. As many points are evaluated together as a run does; their coordinates are there before, as are the columns

@@ -105,8 +105,8 @@ fn sampled_velocity(state: StateLaw, transition: &Transition, t_f: f64, best: Be
 }
 
 /// Rounding of the coefficients in the lack, and in a velocity, which may depend on its square root.
-const ROUNDED_LACK: f64 = 1e-12;
-const ROUNDED_VELOCITY: f64 = 1e-6;
+const ROUNDED_LACK: f64 = 1e-14;
+const ROUNDED_VELOCITY: f64 = 1e-8;
 
 /// The velocity is least close to the start, or twice within a thirtieth of the path: an earlier version took shortcuts for the best that stop there.
 #[test]

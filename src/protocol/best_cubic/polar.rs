@@ -40,9 +40,10 @@ const CLOSE_WORK: f64 = 1e-6;
 
 /// Last step of a refinement, in radians and fractions. Derived: the work at a corner is linear in the step, so the step is rounding.
 const LAST_STEP: f64 = 1e-14;
-/// Steps inwards from a minimum on the border at which no work may be less. Chosen: hundredths, from the last step of the first search to rounding.
+/// Steps inwards from a minimum on the border at which no work may be less. Chosen: below the last step of the first search, down to rounding.
 const INWARDS: [f64; 5] = [1e-4, 1e-6, 1e-8, 1e-10, 1e-12];
-/// Half the width of the differences that determine a smooth minimum on the border, in radians. Chosen: truncation and rounding are then alike.
+/// Half the width of the differences that determine a smooth minimum on the border, in radians. Chosen: rounding leaves fourth differences far below
+/// [`MAX_FOURTH_DIFFERENCE`].
 const DIFFERENCE: f64 = 1e-3;
 /// Relative difference of works within rounding. Chosen: twice the accuracy of the works.
 const ROUNDING: f64 = 2e-13;
@@ -86,7 +87,7 @@ pub(super) fn least(plane: &Plane, rough: &Landscape, ellipse: &Ellipse, stats: 
     let [least, most] = [finite().fold(f64::INFINITY, f64::min), finite().fold(f64::NEG_INFINITY, f64::max)];
     let is_resolved = most - least > MIN_RANGE * least.abs();
     let (first, all) = if is_resolved { (first, all) } else { (polar.clone(), polar.grid(stats)) };
-    let starts = starts(&all).into_iter();
+    let starts = local_minima(&all).into_iter();
     let starts: Vec<Sample> = starts.map(|start| first.refine(start, FIRST_STEP, ROUGH_STEP, stats)).collect();
     let close = starts.iter().map(|start| start.work).fold(f64::INFINITY, f64::min);
     let is_close = |start: &&Sample| start.work <= close + CLOSE_WORK * close.abs();
@@ -103,7 +104,7 @@ pub(super) fn least(plane: &Plane, rough: &Landscape, ellipse: &Ellipse, stats: 
 }
 
 /// Samples of a grid with no neighbour of less work.
-fn starts(grid: &[Sample]) -> Vec<Sample> {
+fn local_minima(grid: &[Sample]) -> Vec<Sample> {
     let at = |i: usize, ring: usize| grid[i % ANGLES * FRACTIONS.len() + ring];
     let is_least = |&(i, ring): &(usize, usize)| {
         let mut near = ring.saturating_sub(1)..(ring + 2).min(FRACTIONS.len());
@@ -270,9 +271,8 @@ impl<'a> Polar<'a> {
         if is_smooth || found.fraction < 1.0 {
             return found;
         }
-        let Polished { near, step, .. } = self.polish(found, stats);
-        let is_better = step.abs() < LAST_POLISH && near.work <= found.work + ROUNDING * found.work.abs();
-        if is_better { near } else { found }
+        let Polished { near, .. } = self.polish(found, stats);
+        if near.work <= found.work + ROUNDING * found.work.abs() { near } else { found }
     }
 
     /// The least work on the border near an angle, by golden sections, and whether it lies between the bounds of the search.
